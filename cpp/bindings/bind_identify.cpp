@@ -1,0 +1,69 @@
+// Binds include/mgdd/identify: the calibration of the cycle model to measured traces.
+#include <optional>
+#include <string>
+#include <vector>
+
+#include "binding.hpp"
+#include "mgdd/identify/cylinder_fit.hpp"
+
+namespace mgdd::bindings {
+
+void bind_identify(py::module_& m) {
+  using namespace identify;
+  using py::arg;
+
+  py::class_<MeasuredCycle>(m, "MeasuredCycle")
+      .def(py::init([](std::string label, const InputArray& angle, const InputArray& pressure,
+                       const engine::OperatingPoint& point) {
+             return MeasuredCycle{std::move(label), to_column(angle, "crank_angle_cad"),
+                                  to_column(pressure, "pressure_bar"), point};
+           }),
+           py::kw_only(), arg("label"), arg("crank_angle_cad"), arg("pressure_bar"), arg("point"));
+
+  py::class_<LoadBurn> burn(m, "LoadBurn");
+  burn.def(py::init<>());
+  for (const auto& f : load_fields<double>()) {
+    burn.def_property(
+        f.domain.name.data(), [member = f.member](const LoadBurn& b) { return b.*member; },
+        [member = f.member](LoadBurn& b, double value) { b.*member = value; });
+  }
+
+  py::class_<LoadFit>(m, "LoadFit")
+      .def_property_readonly("burn", [](const LoadFit& l) { return l.burn; })
+      .def_property_readonly("model_bar", [](const LoadFit& l) { return to_array(l.model_bar); })
+      .def_readonly("p_max_bar", &LoadFit::p_max_bar)
+      .def_readonly("rmse_bar", &LoadFit::rmse_bar)
+      .def_readonly("rmse_percent", &LoadFit::rmse_percent)
+      .def_readonly("imep_closed_bar", &LoadFit::imep_closed_bar)
+      .def_readonly("imep_closed_model_bar", &LoadFit::imep_closed_model_bar)
+      .def_readonly("imep_closed_error_percent", &LoadFit::imep_closed_error_percent)
+      .def_readonly("largest_error_bar", &LoadFit::largest_error_bar)
+      .def_readonly("largest_error_cad", &LoadFit::largest_error_cad)
+      .def_readonly("ca50_cad", &LoadFit::ca50_cad)
+      .def_readonly("heat_loss_fraction", &LoadFit::heat_loss_fraction);
+
+  py::class_<CylinderFit>(m, "CylinderFit")
+      .def_property_readonly("cylinder", [](const CylinderFit& f) { return f.cylinder; })
+      .def_property_readonly("loads", [](const CylinderFit& f) { return f.loads; })
+      .def_property_readonly("report", [](const CylinderFit& f) { return f.report; });
+
+  m.def("load_parameters", &load_parameters, "Names that may be freed per load.");
+  m.def("common_parameters", &common_parameters, "Cylinder fields that may be freed for all loads.");
+  m.def("estimate_burn", &estimate_burn, arg("trace"), arg("cylinder"), "A start from the trace's heat release.");
+  m.def("with_burn", &with_burn, arg("cylinder"), arg("burn"), "The cylinder with one load's shape fields.");
+  m.def(
+      "fit_cylinder",
+      [](const std::vector<MeasuredCycle>& traces, const engine::Cylinder& cylinder, const std::vector<LoadBurn>& start,
+         const std::vector<std::string>& free, double step_cad, const std::string& integrator, int max_iterations) {
+        CylinderFitOptions options;
+        options.step_cad = step_cad;
+        options.integrator = engine::parse_integrator(integrator);
+        options.search.max_iterations = max_iterations;
+        const py::gil_scoped_release release;
+        return fit_cylinder(traces, cylinder, start, free, options);
+      },
+      arg("traces"), arg("cylinder"), arg("start"), arg("free"), arg("step_cad"), arg("integrator"),
+      arg("max_iterations"), "Levenberg-Marquardt with exact sensitivities; releases the GIL.");
+}
+
+}  // namespace mgdd::bindings

@@ -1,0 +1,238 @@
+// Binds include/mgdd/optimize: least squares for Python callables, its parameters, options and report.
+#include <string>
+
+#include "binding.hpp"
+#include "mgdd/common/error.hpp"
+#include "mgdd/optimize/least_squares.hpp"
+
+namespace mgdd::bindings {
+namespace {
+
+using optimize::FitReport;
+using optimize::LeastSquares;
+using optimize::LeastSquaresOptions;
+using optimize::Parameter;
+using DenseArray = py::array_t<double, py::array::c_style | py::array::forcecast>;
+using RowMajorMatrix = Eigen::Matrix<double, Eigen::Dynamic, Eigen::Dynamic, Eigen::RowMajor>;
+
+struct Evaluation {
+  bool usable = false;
+  DenseArray residual;
+  DenseArray jacobian;
+};
+
+DenseArray dense(const py::handle& object, const char* what, py::ssize_t dimensions) {
+  const DenseArray array(py::reinterpret_borrow<py::object>(object));
+  if (array.ndim() != dimensions) {
+    throw ShapeError(std::string("fun returned a ") + what + " with " + std::to_string(array.ndim()) +
+                     " dimensions, expected " + std::to_string(dimensions));
+  }
+  return array;
+}
+
+// fun(x) -> (residual, jacobian), or None where the model cannot be evaluated. Python gets its own copy of x.
+Evaluation call(const py::function& fun, const Eigen::VectorXd& x) {
+  const py::object result = fun(Eigen::VectorXd(x));
+  if (result.is_none()) {
+    return {};
+  }
+  if (!py::isinstance<py::tuple>(result) || py::len(result) != 2) {
+    throw ShapeError("fun must return (residual, jacobian) or None, returned " +
+                     std::string(py::repr(py::type::of(result))));
+  }
+  const auto pair = py::reinterpret_borrow<py::tuple>(result);
+  Evaluation evaluation{true, dense(pair[0], "residual", 1), dense(pair[1], "jacobian", 2)};
+  if (evaluation.jacobian.shape(0) != evaluation.residual.shape(0) ||
+      evaluation.jacobian.shape(1) != x.size()) {
+    throw ShapeError("fun returned a jacobian of " + std::to_string(evaluation.jacobian.shape(0)) + " x " +
+                     std::to_string(evaluation.jacobian.shape(1)) + " for " +
+                     std::to_string(evaluation.residual.shape(0)) + " residuals and " +
+                     std::to_string(x.size()) + " parameters");
+  }
+  return evaluation;
+}
+
+FitReport least_squares(const py::function& fun, const Eigen::VectorXd& x0, std::vector<Parameter> parameters,
+                        const LeastSquaresOptions& options) {
+  options.validate();
+  optimize::validate(parameters);
+  optimize::validate_start(parameters, x0);
+  // The first evaluation tells how many residuals there are; the search then starts from it.
+  Evaluation first = call(fun, x0);
+  bool have_first = true;
+  const auto n_residuals = first.usable ? first.residual.shape(0) : x0.size();
+  const auto model = [&](const Eigen::VectorXd& x, Eigen::VectorXd& residual, Eigen::MatrixXd* jacobian) {
+    const Evaluation evaluation = have_first ? std::move(first) : call(fun, x);
+    have_first = false;
+    if (!evaluation.usable) {
+      return false;
+    }
+    residual = Eigen::Map<const Eigen::VectorXd>(evaluation.residual.data(), evaluation.residual.shape(0));
+    if (jacobian != nullptr) {
+      *jacobian = Eigen::Map<const RowMajorMatrix>(evaluation.jacobian.data(), evaluation.jacobian.shape(0),
+                                                   evaluation.jacobian.shape(1));
+    }
+    return true;
+  };
+  return LeastSquares(std::move(parameters), n_residuals, options).solve(model, x0);
+}
+
+py::dict history(const FitReport& report) {
+  const auto n = static_cast<py::ssize_t>(report.history.size());
+  py::array_t<double> cost(n);
+  py::array_t<double> damping(n);
+  py::array_t<double> step_norm(n);
+  py::array_t<bool> accepted(n);
+  for (py::ssize_t i = 0; i < n; ++i) {
+    const optimize::FitStep& step = report.history[static_cast<std::size_t>(i)];
+    cost.mutable_at(i) = step.cost;
+    damping.mutable_at(i) = step.damping;
+    step_norm.mutable_at(i) = step.step_norm;
+    accepted.mutable_at(i) = step.accepted;
+  }
+  py::dict result;
+  result["cost"] = cost;
+  result["damping"] = damping;
+  result["step_norm"] = step_norm;
+  result["accepted"] = accepted;
+  return result;
+}
+
+// By value: an array kept from one report must not change with anything that happens later.
+template <class Member>
+auto by_value(Member FitReport::* member) {
+  return [member](const FitReport& report) -> Member { return report.*member; };
+}
+
+py::tuple parameter_state(const Parameter& p) {
+  return py::make_tuple(p.name, p.lower, p.upper, p.log_scaled);
+}
+
+py::tuple options_state(const LeastSquaresOptions& o) {
+  return py::make_tuple(o.max_iterations, o.cost_tolerance, o.step_tolerance, o.gradient_tolerance,
+                        o.initial_damping, o.correlation_limit, o.rank_tolerance, o.evaluate_together);
+}
+
+LeastSquaresOptions options_from(int max_iterations, double cost_tolerance, double step_tolerance,
+                                 double gradient_tolerance, double initial_damping, double correlation_limit,
+                                 double rank_tolerance, bool evaluate_together) {
+  const LeastSquaresOptions options{max_iterations,  cost_tolerance,    step_tolerance, gradient_tolerance,
+                                    initial_damping, correlation_limit, rank_tolerance, evaluate_together};
+  options.validate();
+  return options;
+}
+
+void bind_parameter(py::module_& m) {
+  py::class_<Parameter>(m, "Parameter",
+                        "One unknown of a fit: name, bounds, and whether it is searched as its log.")
+      .def(py::init([](std::string name, double lower, double upper, bool log_scaled) {
+             return Parameter{std::move(name), lower, upper, log_scaled};
+           }),
+           py::kw_only(), py::arg("name"), py::arg("lower") = Parameter{}.lower,
+           py::arg("upper") = Parameter{}.upper, py::arg("log_scaled") = false)
+      .def_readonly("name", &Parameter::name, "Name in reports and messages.")
+      .def_readonly("lower", &Parameter::lower, "Lower bound, -inf for none.")
+      .def_readonly("upper", &Parameter::upper, "Upper bound, inf for none.")
+      .def_readonly("log_scaled", &Parameter::log_scaled, "Searched as log(p); needs lower > 0.")
+      .def(
+          "__eq__", [](const Parameter& a, const Parameter& b) { return a == b; }, py::is_operator())
+      .def("__repr__",
+           [](const Parameter& p) {
+             return py::str("Parameter(name={!r}, lower={!r}, upper={!r}, log_scaled={!r})")
+                 .format(*parameter_state(p));
+           })
+      .def(py::pickle(&parameter_state, [](const py::tuple& t) {
+        return Parameter{t[0].cast<std::string>(), t[1].cast<double>(), t[2].cast<double>(),
+                         t[3].cast<bool>()};
+      }));
+}
+
+void bind_options(py::module_& m) {
+  const LeastSquaresOptions d;
+  py::class_<LeastSquaresOptions>(m, "LeastSquaresOptions",
+                                  "When a least-squares search ends and what it reports.")
+      .def(py::init(&options_from), py::kw_only(), py::arg("max_iterations") = d.max_iterations,
+           py::arg("cost_tolerance") = d.cost_tolerance, py::arg("step_tolerance") = d.step_tolerance,
+           py::arg("gradient_tolerance") = d.gradient_tolerance,
+           py::arg("initial_damping") = d.initial_damping, py::arg("correlation_limit") = d.correlation_limit,
+           py::arg("rank_tolerance") = d.rank_tolerance, py::arg("evaluate_together") = d.evaluate_together)
+      .def_readonly("max_iterations", &LeastSquaresOptions::max_iterations, "Trial steps.")
+      .def_readonly("cost_tolerance", &LeastSquaresOptions::cost_tolerance,
+                    "Relative decrease of the cost [-].")
+      .def_readonly("step_tolerance", &LeastSquaresOptions::step_tolerance,
+                    "Step over parameters, scaled [-].")
+      .def_readonly("gradient_tolerance", &LeastSquaresOptions::gradient_tolerance,
+                    "Cosine between the residual and a free Jacobian column [-].")
+      .def_readonly("initial_damping", &LeastSquaresOptions::initial_damping, "Relative to unit columns [-].")
+      .def_readonly("correlation_limit", &LeastSquaresOptions::correlation_limit,
+                    "Correlation beyond which two parameters count as unidentifiable [-].")
+      .def_readonly("rank_tolerance", &LeastSquaresOptions::rank_tolerance,
+                    "Singular value, relative to the largest, that counts as zero [-].")
+      .def_readonly("evaluate_together", &LeastSquaresOptions::evaluate_together,
+                    "Residual and Jacobian in one call.")
+      .def(
+          "__eq__", [](const LeastSquaresOptions& a, const LeastSquaresOptions& b) { return a == b; },
+          py::is_operator())
+      .def("__repr__",
+           [](const LeastSquaresOptions& o) {
+             return py::str(
+                        "LeastSquaresOptions(max_iterations={!r}, cost_tolerance={!r}, step_tolerance={!r}, "
+                        "gradient_tolerance={!r}, initial_damping={!r}, correlation_limit={!r}, "
+                        "rank_tolerance={!r}, evaluate_together={!r})")
+                 .format(*options_state(o));
+           })
+      .def(py::pickle(&options_state, [](const py::tuple& t) {
+        return options_from(t[0].cast<int>(), t[1].cast<double>(), t[2].cast<double>(), t[3].cast<double>(),
+                            t[4].cast<double>(), t[5].cast<double>(), t[6].cast<double>(), t[7].cast<bool>());
+      }));
+}
+
+void bind_report(py::module_& m) {
+  py::class_<FitReport>(m, "FitReport",
+                        "Result of a fit as the core gives it; `mgdd.optimize.FitReport` wraps it.")
+      .def(py::init<>(), "A fit that has not been run.")
+      .def_property_readonly("names", by_value(&FitReport::names), "Parameter names.")
+      .def_property_readonly("values", by_value(&FitReport::values), "Estimates.")
+      .def_property_readonly("stderr", by_value(&FitReport::standard_error), "Standard errors.")
+      .def_property_readonly("lower", by_value(&FitReport::lower), "Lower bounds.")
+      .def_property_readonly("upper", by_value(&FitReport::upper), "Upper bounds.")
+      .def_property_readonly("bounds_active", by_value(&FitReport::bounds_active),
+                             "-1 lower, +1 upper, 0 free.")
+      .def_property_readonly("covariance", by_value(&FitReport::covariance), "Covariance of the estimates.")
+      .def_property_readonly("correlation", by_value(&FitReport::correlation),
+                             "Correlation of the estimates.")
+      .def_property_readonly("unidentifiable", by_value(&FitReport::unidentifiable),
+                             "Names the data leave open.")
+      .def_property_readonly("findings", by_value(&FitReport::findings), "Reasons behind `unidentifiable`.")
+      .def_property_readonly("null_directions", by_value(&FitReport::null_directions),
+                             "Columns: parameter changes that leave the residual as it is.")
+      .def_property_readonly("residual", by_value(&FitReport::residual), "Residual at the estimates.")
+      .def_property_readonly("rmse", by_value(&FitReport::rmse), "Root mean square residual.")
+      .def_property_readonly("cost", by_value(&FitReport::cost), "Half the sum of squares.")
+      .def_property_readonly("nfev", by_value(&FitReport::nfev), "Residual evaluations.")
+      .def_property_readonly("njev", by_value(&FitReport::njev), "Jacobian evaluations.")
+      .def_property_readonly("iterations", by_value(&FitReport::iterations), "Trial steps.")
+      .def_property_readonly("n_residuals", by_value(&FitReport::n_residuals), "Number of residuals.")
+      .def_property_readonly("history", &history, "Arrays cost, damping, step_norm, accepted per trial step.")
+      .def_property_readonly(
+          "status", [](const FitReport& r) { return std::string(optimize::to_string(r.status)); },
+          "Why the search ended.")
+      .def_property_readonly(
+          "message", [](const FitReport& r) { return std::string(optimize::explain(r.status)); },
+          "The status as a sentence.")
+      .def_property_readonly("success", &FitReport::success, "Whether a tolerance was met.")
+      .def("__repr__", [](const FitReport& r) { return "<FitReport " + r.brief() + ">"; });
+}
+
+}  // namespace
+
+void bind_optimize(py::module_& m) {
+  bind_parameter(m);
+  bind_options(m);
+  bind_report(m);
+  m.def("least_squares", &least_squares, py::arg("fun"), py::arg("x0"), py::kw_only(), py::arg("parameters"),
+        py::arg("options"),
+        "Minimise sum(residual^2) / 2 for `fun(x) -> (residual, jacobian)`; None refuses a point.");
+}
+
+}  // namespace mgdd::bindings

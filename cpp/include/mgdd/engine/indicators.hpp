@@ -1,0 +1,89 @@
+// Scalars of one cycle: work, efficiency, peaks and burn angles, in the units of the field.
+// Definitions: Heywood 1988, chapters 2, 9 and 15; ringing intensity: Eng 2002.
+#pragma once
+
+#include <array>
+#include <cstddef>
+#include <span>
+#include <string_view>
+
+#include "mgdd/common/dual.hpp"
+
+namespace mgdd::engine {
+
+template <class T>
+struct Indicators {
+  T imep_closed_bar;   ///< trapezoid of p dV from IVC to EVO over the swept volume
+  T imep_gross_bar;    ///< closed plus the ideal remainder of -180..180 CAD
+  T efficiency_gross;  ///< gross work over fuel heat; NaN when motored
+  T p_max_bar, p_max_cad;
+  T dp_max_bar_per_cad, dp_max_cad;
+  T t_max_k, t_max_cad;
+  T ca10_cad, ca50_cad, ca90_cad;  ///< of the burn law; NaN when motored
+  T heat_loss_j, heat_loss_fraction;
+  T work_closed_j, work_gross_j;
+  T ringing_intensity_mw_per_m2;
+};
+
+template <class T>
+struct IndicatorField {
+  std::string_view name, unit;
+  T Indicators<T>::*member;
+};
+
+template <class T>
+constexpr auto indicator_fields() {
+  using I = Indicators<T>;
+  using F = IndicatorField<T>;
+  return std::array{F{"imep_closed_bar", "bar", &I::imep_closed_bar},
+                    F{"imep_gross_bar", "bar", &I::imep_gross_bar},
+                    F{"efficiency_gross", "-", &I::efficiency_gross},
+                    F{"p_max_bar", "bar", &I::p_max_bar},
+                    F{"p_max_cad", "°CA aTDC", &I::p_max_cad},
+                    F{"dp_max_bar_per_cad", "bar/°CA", &I::dp_max_bar_per_cad},
+                    F{"dp_max_cad", "°CA aTDC", &I::dp_max_cad},
+                    F{"t_max_k", "K", &I::t_max_k},
+                    F{"t_max_cad", "°CA aTDC", &I::t_max_cad},
+                    F{"ca10_cad", "°CA aTDC", &I::ca10_cad},
+                    F{"ca50_cad", "°CA aTDC", &I::ca50_cad},
+                    F{"ca90_cad", "°CA aTDC", &I::ca90_cad},
+                    F{"heat_loss_j", "J", &I::heat_loss_j},
+                    F{"heat_loss_fraction", "-", &I::heat_loss_fraction},
+                    F{"work_closed_j", "J", &I::work_closed_j},
+                    F{"work_gross_j", "J", &I::work_gross_j},
+                    F{"ringing_intensity_mw_per_m2", "MW/m^2", &I::ringing_intensity_mw_per_m2}};
+}
+
+template <class T>
+struct Peak {
+  double angle_hint_cad;  ///< the highest sample
+  T angle_cad, value;     ///< vertex of the parabola
+};
+
+/// Vertex of the parabola through sample `k` and its neighbours; the sample itself at an edge or on a plateau.
+template <class T>
+Peak<T> parabola_peak(std::span<const double> angle, std::size_t k, const T& before, const T& at,
+                      const T& after) noexcept {
+  const Peak<T> sample{angle[k], T(angle[k]), at};
+  if (k == 0 || k + 1 >= angle.size()) return sample;
+  const double left = angle[k] - angle[k - 1];
+  const double right = angle[k + 1] - angle[k];
+  const T rise = (at - before) / left;
+  const T fall = (after - at) / right;
+  const T bend = (fall - rise) / (left + right);
+  if (!(value_of(bend) < 0.0)) return sample;
+  const T offset = (rise / bend) * -0.5 + 0.5 * left;  // from the left neighbour to the vertex
+  return {angle[k], offset + angle[k - 1], before + rise * offset + bend * offset * (offset - left)};
+}
+
+/// RI = (beta dp/dt)^2 / (2 gamma p_max) sqrt(gamma R T_max), beta = 0.05 ms (Eng 2002), in MW/m2.
+template <class T>
+T ringing_intensity_mw_per_m2(const T& gamma, const T& dp_dt_pa_per_s, const T& p_max_pa, const T& t_max_k) noexcept {
+  using std::sqrt;
+  constexpr double beta_s = 0.05e-3;
+  constexpr double air_gas_constant_j_per_kgk = 287.05;
+  const T pulse = dp_dt_pa_per_s * beta_s;
+  return pulse * pulse / (2.0 * gamma * p_max_pa) * sqrt(gamma * air_gas_constant_j_per_kgk * t_max_k) * 1e-6;
+}
+
+}  // namespace mgdd::engine

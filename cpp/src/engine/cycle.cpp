@@ -1,0 +1,303 @@
+#include "mgdd/engine/cycle.hpp"
+
+#include <algorithm>
+#include <cmath>
+#include <limits>
+#include <string>
+#include <tuple>
+#include <utility>
+
+#include "mgdd/common/error.hpp"
+#include "mgdd/common/units.hpp"
+#include "mgdd/engine/gas.hpp"
+#include "mgdd/engine/wall_heat.hpp"
+
+namespace mgdd::engine {
+std::vector<double> crank_grid(const Cylinder& cylinder, double step_cad) {
+  if (!(step_cad >= step_lower_cad && step_cad <= step_upper_cad)) {
+    throw ParameterError("step_cad = " + std::to_string(step_cad) + " °CA: must be in [0.001, 5]");
+  }
+  const double span = cylinder.evo_cad - cylinder.ivc_cad;
+  // The tolerance keeps 270.0000001 steps from becoming 271 when span / step is not exact in binary.
+  const auto steps = static_cast<std::size_t>(std::ceil(span / step_cad - 1e-9));
+  std::vector<double> angles(steps + 1);
+  for (std::size_t k = 0; k < steps; ++k) angles[k] = cylinder.ivc_cad + static_cast<double>(k) * step_cad;
+  angles[steps] = cylinder.evo_cad;
+  return angles;
+}
+
+template <class T>
+CycleModel<T>::CycleModel(const BasicCylinder<T>& cylinder, std::vector<double> angles_cad, Integrator integrator)
+    : cylinder_(cylinder), geometry_(cylinder), integrator_(integrator), angles_(std::move(angles_cad)) {
+  const std::size_t n = angles_.size();
+  if (n < 3) throw ShapeError("angles_cad has " + std::to_string(n) + " entries: a cycle needs at least 3");
+  for (std::size_t k = 1; k < n; ++k) {
+    if (!(angles_[k] > angles_[k - 1])) {
+      throw DataError("angles_cad[" + std::to_string(k) + "] = " + std::to_string(angles_[k]) +
+                      ": crank angles must increase strictly");
+    }
+  }
+  volume_.resize(n);
+  wall_term_.resize(n);
+  motored_ratio_.resize(n);
+  keep_.resize(n);
+  gain_.resize(n);
+  tabulate();
+}
+
+template <class T>
+void CycleModel<T>::set_cylinder(const BasicCylinder<T>& cylinder) noexcept {
+  const auto tables_of = [](const BasicCylinder<T>& c) {
+    return std::tie(c.bore_mm, c.stroke_mm, c.connecting_rod_mm, c.compression_ratio, c.bowl_area_factor, c.gamma,
+                    c.gamma_model, c.wall_heat_model);
+  };
+  const bool same = tables_of(cylinder) == tables_of(cylinder_);
+  cylinder_ = cylinder;
+  if (same) return;
+  geometry_ = Geometry<T>(cylinder_);
+  tabulate();
+}
+
+template <class T>
+void CycleModel<T>::tabulate() noexcept {
+  using std::pow;
+  const std::size_t n = angles_.size();
+  for (std::size_t k = 0; k < n; ++k) volume_[k] = geometry_.volume_m3(angles_[k]);
+  volume_before_first_ = geometry_.volume_m3(angles_[0] - (angles_[1] - angles_[0]));
+  for (std::size_t k = 0; k < n; ++k) {
+    const double step = k + 1 < n ? angles_[k + 1] - angles_[k] : 0.0;
+    wall_term_[k] = WallHeat<T>::volume_term(cylinder_, geometry_, volume_[k], step);
+    motored_ratio_[k] = pow(volume_[0] / volume_[k], cylinder_.gamma);
+  }
+  if (cylinder_.gamma_model != GammaModel::constant) return;
+  for (std::size_t k = 0; k + 1 < n; ++k) {
+    const StepCoefficients c = coefficients(cylinder_.gamma, k);
+    keep_[k] = c.keep;
+    gain_[k] = c.gain;
+  }
+}
+
+template <class T>
+T CycleModel<T>::volume_before(std::size_t k) const noexcept {
+  return k > 0 ? volume_[k - 1] : volume_before_first_;
+}
+
+// First law over one step, dU = dQ - dW with U = p V / (gamma - 1), in the four forms of the work term dW:
+// trapezoid (p0 + p1)/2 dV; euler p0 dV; seed p0 (V0 - V_before), as printed in Tan 2018, eqs 2-11 to 2-15;
+// split: half the heat at V0, adiabatic to V1, half the heat at V1 (Strang 1968).
+template <class T>
+typename CycleModel<T>::StepCoefficients CycleModel<T>::coefficients(const T& gamma, std::size_t k) const noexcept {
+  using std::pow;
+  const T& v0 = volume_[k];
+  const T& v1 = volume_[k + 1];
+  const T inner = gamma - 1.0;
+  switch (integrator_) {
+    case Integrator::trapezoid: {
+      const T half = 0.5 * (v1 - v0);
+      const T denominator = 1.0 / (v1 / inner + half);
+      return {(v0 / inner - half) * denominator, denominator};
+    }
+    case Integrator::split: {
+      const T adiabatic = pow(v0 / v1, gamma);
+      return {adiabatic, 0.5 * inner * (adiabatic / v0 + 1.0 / v1)};
+    }
+    case Integrator::seed:
+      return {(v0 - inner * (v0 - volume_before(k))) / v1, inner / v1};
+    case Integrator::euler:
+      break;
+  }
+  return {(v0 - inner * (v1 - v0)) / v1, inner / v1};
+}
+
+template <class T>
+Charge<T> CycleModel<T>::charge(const BasicOperatingPoint<T>& point) const noexcept {
+  Charge<T> c;
+  c.intake_pa = point.intake_pressure_kpa * units::pa_per_kpa;
+  c.pressure_pa = c.intake_pa + cylinder_.ivc_pressure_rise_kpa * units::pa_per_kpa;
+  c.gas_j_per_k = point.trapped_mass_g
+                      ? *point.trapped_mass_g *
+                            (units::kg_per_g * units::gas_constant_j_per_molk / units::air_molar_mass_kg_per_mol)
+                      : cylinder_.volumetric_efficiency * c.intake_pa * geometry_.swept_m3 / point.intake_temperature_k;
+  c.fuel_heat_j = engine::fuel_heat_j(cylinder_, point);
+  c.burn_duration_cad = engine::burn_duration_cad(cylinder_, point);
+  c.speed_rpm = point.speed_rpm;
+  return c;
+}
+
+template <class T>
+std::size_t CycleModel<T>::fill_heat_release(const Charge<T>& charge, const T& soc_cad,
+                                             CycleWorkspace<T>& work) const noexcept {
+  const std::size_t n = angles_.size();
+  std::fill(work.heat_release_j.begin(), work.heat_release_j.end(), T(0.0));
+  if (!(value_of(charge.fuel_heat_j) > 0.0)) return n;
+  const Burn<T> burn(cylinder_, soc_cad, charge.burn_duration_cad);
+  const auto begin = angles_.begin();
+  const auto first = static_cast<std::size_t>(std::upper_bound(begin, angles_.end(), burn.start_cad()) - begin);
+  const double end = burn.end_cad();
+  T burned(0.0);  // heat before the first grid angle is lost to the model, as fuel burned before IVC would be
+  if (first == 0) burned = burn.fraction(angles_[0]);
+  for (std::size_t k = std::max<std::size_t>(first, 1); k < n; ++k) {
+    const T next = burn.fraction(angles_[k]);
+    work.heat_release_j[k - 1] = charge.fuel_heat_j * (next - burned);
+    burned = next;
+    if (angles_[k] >= end) break;
+  }
+  return static_cast<std::size_t>(std::lower_bound(begin, angles_.end(), value_of(soc_cad)) - begin);
+}
+
+template <class T>
+void CycleModel<T>::run(const Charge<T>& charge, const T& soc_cad, CycleWorkspace<T>& work) const noexcept {
+  const std::size_t burning = fill_heat_release(charge, soc_cad, work);
+  const bool woschni = cylinder_.wall_heat_model == WallHeatModel::woschni;
+  if (cylinder_.gamma_model == GammaModel::constant) {
+    woschni ? integrate<true, true>(charge, burning, work) : integrate<true, false>(charge, burning, work);
+  } else {
+    woschni ? integrate<false, true>(charge, burning, work) : integrate<false, false>(charge, burning, work);
+  }
+}
+
+template <class T>
+template <bool ConstantGamma, bool Woschni>
+void CycleModel<T>::integrate(const Charge<T>& charge, std::size_t first_burning,
+                              CycleWorkspace<T>& work) const noexcept {
+  const std::size_t n = angles_.size();
+  const T per_gas = 1.0 / charge.gas_j_per_k;
+  const WallHeat<T> wall(cylinder_, geometry_, charge.pressure_pa, charge.gas_j_per_k, charge.speed_rpm);
+  T pressure = charge.pressure_pa;
+  work.pressure_pa[0] = pressure;
+  for (std::size_t k = 0; k + 1 < n; ++k) {
+    const T temperature = pressure * volume_[k] * per_gas;
+    const T loss =
+        wall.template step_j<Woschni>(pressure, temperature, wall_term_[k], motored_ratio_[k], k >= first_burning);
+    work.heat_loss_j[k] = loss;
+    const T heat = work.heat_release_j[k] - loss;
+    if constexpr (ConstantGamma) {
+      pressure = keep_[k] * pressure + gain_[k] * heat;
+    } else {
+      // gamma at the step's start, then twice at its mean temperature.
+      T gamma = gamma_at(cylinder_, temperature);
+      T next{};
+      for (int pass = 0;; ++pass) {
+        const StepCoefficients c = coefficients(gamma, k);
+        next = c.keep * pressure + c.gain * heat;
+        if (pass == 2) break;
+        gamma = gamma_at(cylinder_, T(0.5 * (temperature + next * volume_[k + 1] * per_gas)));
+      }
+      work.gamma[k] = gamma;
+      pressure = next;
+    }
+    work.pressure_pa[k + 1] = pressure;
+  }
+  work.heat_loss_j[n - 1] = T(0.0);
+}
+
+template <class T>
+void CycleModel<T>::wall_heat(const Charge<T>& charge, std::span<const T> pressure_pa, double burning_from_cad,
+                              std::span<T> loss_j) const noexcept {
+  const WallHeat<T> wall(cylinder_, geometry_, charge.pressure_pa, charge.gas_j_per_k, charge.speed_rpm);
+  for (std::size_t k = 0; k + 1 < angles_.size(); ++k) {
+    const T& p = pressure_pa[k];
+    const T temperature = p * volume_[k] / charge.gas_j_per_k;
+    const bool burning = angles_[k] >= burning_from_cad;
+    loss_j[k] = cylinder_.wall_heat_model == WallHeatModel::woschni
+                    ? wall.template step_j<true>(p, temperature, wall_term_[k], motored_ratio_[k], burning)
+                    : wall.template step_j<false>(p, temperature, wall_term_[k], motored_ratio_[k], burning);
+  }
+}
+
+template <class T>
+T CycleModel<T>::step_gamma(std::size_t k, const CycleWorkspace<T>& work) const noexcept {
+  return cylinder_.gamma_model == GammaModel::constant ? cylinder_.gamma : work.gamma[k];
+}
+
+template <class T>
+T CycleModel<T>::booked_work_j(std::size_t k, const CycleWorkspace<T>& work) const noexcept {
+  using std::pow;
+  const T& p0 = work.pressure_pa[k];
+  switch (integrator_) {
+    case Integrator::trapezoid:
+      return 0.5 * (p0 + work.pressure_pa[k + 1]) * (volume_[k + 1] - volume_[k]);
+    case Integrator::split: {
+      const T inner = step_gamma(k, work) - 1.0;
+      const T heated = p0 * volume_[k] + 0.5 * inner * (work.heat_release_j[k] - work.heat_loss_j[k]);
+      return heated * (1.0 - pow(volume_[k] / volume_[k + 1], inner)) / inner;
+    }
+    case Integrator::seed:
+      return p0 * (volume_[k] - volume_before(k));
+    case Integrator::euler:
+      break;
+  }
+  return p0 * (volume_[k + 1] - volume_[k]);
+}
+
+template <class T>
+T CycleModel<T>::energy_change_j(std::size_t k, const CycleWorkspace<T>& work) const noexcept {
+  return (work.pressure_pa[k + 1] * volume_[k + 1] - work.pressure_pa[k] * volume_[k]) / (step_gamma(k, work) - 1.0);
+}
+
+template <class T>
+Indicators<T> CycleModel<T>::indicators(const Charge<T>& charge, const T& soc_cad,
+                                        const CycleWorkspace<T>& work) const noexcept {
+  const std::size_t n = angles_.size();
+  const std::vector<T>& p = work.pressure_pa;
+  T closed(0.0), loss(0.0);
+  std::size_t p_at = 0, t_at = 0, slope_at = 0;
+  double p_best = value_of(p[0]), t_best = value_of(p[0]) * value_of(volume_[0]);
+  double slope_best = -std::numeric_limits<double>::infinity();
+  for (std::size_t k = 0; k + 1 < n; ++k) {
+    closed += (p[k] + p[k + 1]) * (volume_[k + 1] - volume_[k]);
+    loss += work.heat_loss_j[k];
+    const double next = value_of(p[k + 1]);
+    if (next > p_best) p_best = next, p_at = k + 1;
+    const double energy = next * value_of(volume_[k + 1]);
+    if (energy > t_best) t_best = energy, t_at = k + 1;
+    const double slope = (next - value_of(p[k])) / (angles_[k + 1] - angles_[k]);
+    if (slope > slope_best) slope_best = slope, slope_at = k;
+  }
+  closed = 0.5 * closed;
+
+  const auto around = [&](std::size_t k, const auto& sample) {
+    return parabola_peak<T>(angles_, k, sample(k > 0 ? k - 1 : k), sample(k), sample(k + 1 < n ? k + 1 : k));
+  };
+  const Peak<T> p_peak = around(p_at, [&](std::size_t k) { return p[k]; });
+  const Peak<T> t_peak = around(t_at, [&](std::size_t k) { return T(p[k] * volume_[k] / charge.gas_j_per_k); });
+  const T slope = (p[slope_at + 1] - p[slope_at]) / (angles_[slope_at + 1] - angles_[slope_at]);
+
+  // Gross work: the ideal remainder of -180..180 CAD, intake pressure before IVC and the blow-down mean after EVO.
+  const T bottom = geometry_.clearance_m3 + geometry_.swept_m3;
+  const T gross = closed + charge.intake_pa * (volume_[0] - bottom) +
+                  0.5 * (p[n - 1] + charge.intake_pa) * (bottom - volume_[n - 1]);
+
+  Indicators<T> out;
+  out.work_closed_j = closed;
+  out.work_gross_j = gross;
+  out.imep_closed_bar = closed / geometry_.swept_m3 / units::pa_per_bar;
+  out.imep_gross_bar = gross / geometry_.swept_m3 / units::pa_per_bar;
+  out.p_max_bar = p_peak.value / units::pa_per_bar;
+  out.p_max_cad = p_peak.angle_cad;
+  out.t_max_k = t_peak.value;
+  out.t_max_cad = t_peak.angle_cad;
+  out.dp_max_bar_per_cad = slope / units::pa_per_bar;
+  out.dp_max_cad = T(0.5 * (angles_[slope_at] + angles_[slope_at + 1]));
+  out.heat_loss_j = loss;
+  out.ringing_intensity_mw_per_m2 =
+      engine::ringing_intensity_mw_per_m2(T(gamma_at(cylinder_, t_peak.value)),
+                                          T(slope * charge.speed_rpm * units::cad_per_s_per_rpm), p_peak.value,
+                                          t_peak.value);
+  const T none(std::numeric_limits<double>::quiet_NaN());
+  out.efficiency_gross = out.heat_loss_fraction = out.ca10_cad = out.ca50_cad = out.ca90_cad = none;
+  if (value_of(charge.fuel_heat_j) > 0.0) {
+    const Burn<T> burn(cylinder_, soc_cad, charge.burn_duration_cad);
+    out.efficiency_gross = gross / charge.fuel_heat_j;
+    out.heat_loss_fraction = loss / charge.fuel_heat_j;
+    out.ca10_cad = burn.angle_of(0.1);
+    out.ca50_cad = burn.angle_of(0.5);
+    out.ca90_cad = burn.angle_of(0.9);
+  }
+  return out;
+}
+
+template class CycleModel<double>;
+template class CycleModel<Dual<4>>;
+
+}  // namespace mgdd::engine

@@ -1,0 +1,76 @@
+"""Sphinx: `make docs`. Needs no network; notebooks come from ../notebooks."""
+
+from __future__ import annotations
+
+import filecmp
+import os
+import shutil
+from pathlib import Path
+
+import mgdd
+
+HERE = Path(__file__).parent
+
+project = "mgdd"
+author = "The mgdd developers"
+copyright = "2026, The mgdd developers"
+version = release = mgdd.__version__
+
+extensions = [
+    "sphinx.ext.autodoc",
+    "sphinx.ext.autosummary",
+    "sphinx.ext.mathjax",
+    "sphinx_copybutton",
+    "numpydoc",
+    "myst_nb",
+]
+exclude_patterns = ["_build", "**.ipynb_checkpoints"]
+suppress_warnings = ["toc.not_readable"]  # the front page fixes the order of pages, present or not
+
+# --- pages --------------------------------------------------------------------------------------------------
+myst_enable_extensions = ["amsmath", "colon_fence", "deflist", "dollarmath"]
+myst_heading_anchors = 3
+
+# The test suite executes every notebook; here that is asked for, so that a docs build stays quick.
+nb_execution_mode = os.environ.get("MGDD_DOCS_EXECUTE", "off")
+nb_execution_timeout = 300
+nb_execution_raise_on_error = True
+
+
+def copy_notebooks() -> None:
+    """Bring ../notebooks into docs/notebooks: Sphinx reads only what stands below its own folder."""
+    target = HERE / "notebooks"
+    target.mkdir(exist_ok=True)
+    sources = {path.name: path for path in (HERE.parent / "notebooks").glob("*.ipynb")}
+    for old in target.glob("*.ipynb"):
+        if old.name not in sources:
+            old.unlink()
+    for name, path in sources.items():
+        if not (target / name).exists() or not filecmp.cmp(path, target / name, shallow=False):
+            shutil.copyfile(path, target / name)
+
+
+copy_notebooks()
+shutil.rmtree(HERE / "generated", ignore_errors=True)  # a page of a name that is gone would be an orphan
+
+# --- reference ----------------------------------------------------------------------------------------------
+autosummary_generate = True
+autodoc_typehints = "none"  # the docstrings name type, shape and unit
+autodoc_member_order = "bysource"
+numpydoc_show_class_members = False
+nitpick_ignore_regex = [
+    (r"py:.*", r"(?!mgdd\.).*"),  # other projects: no inventories without a network
+    (r"py:.*", r"mgdd\._core.*"),  # documented where it is offered, in mgdd.<room>
+]
+
+# --- look ---------------------------------------------------------------------------------------------------
+html_theme = "pydata_sphinx_theme"
+html_title = f"mgdd {release}"
+html_theme_options = {
+    "navigation_with_keys": False,
+    "show_toc_level": 2,
+    "secondary_sidebar_items": ["page-toc"],
+    "footer_start": ["copyright"],
+    "footer_end": [],
+}
+html_show_sourcelink = False

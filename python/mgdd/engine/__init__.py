@@ -1,0 +1,28 @@
+"""The engine: one closed cycle, its best timing, and the analysis of measured pressure.
+
+Crank angles are °CA aTDC (firing TDC = 0, compression negative) throughout.
+"""
+
+from __future__ import annotations
+
+from mgdd._core import Cylinder, NoxProxy, OperatingPoint
+from mgdd.engine.cycle import convergence, sensitivities, simulate, timing_sweep
+from mgdd.engine.ignition import Timing, start_of_combustion, start_of_injection
+from mgdd.engine.optimum import Optimum, optimum
+from mgdd.engine.trace import analyze
+
+__all__ = [
+    "Cylinder",
+    "NoxProxy",
+    "OperatingPoint",
+    "Optimum",
+    "Timing",
+    "analyze",
+    "convergence",
+    "optimum",
+    "sensitivities",
+    "simulate",
+    "start_of_combustion",
+    "start_of_injection",
+    "timing_sweep",
+]

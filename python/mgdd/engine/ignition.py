@@ -1,0 +1,105 @@
+"""Ignition delay: from start of injection to start of combustion and back."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+from mgdd import _core
+from mgdd._core import Cylinder, OperatingPoint
+
+__all__ = ["Timing", "start_of_combustion", "start_of_injection"]
+
+
+@dataclass(frozen=True, kw_only=True)
+class Timing:
+    """An injection and its combustion.
+
+    Parameters
+    ----------
+    soi_cad, soc_cad : float
+        Start of injection and of combustion [°CA aTDC]; ``soc_cad`` is NaN without ignition.
+    delay_cad : float
+        Ignition delay, SOC minus SOI [°CA].
+    ignites : bool
+        Whether the charge ignites before the exhaust valve opens.
+    clipped : bool
+        The wanted SOC cannot be reached; this is the edge of what can.
+
+    Examples
+    --------
+    >>> from mgdd.engine import Cylinder, OperatingPoint, start_of_combustion
+    >>> start_of_combustion(Cylinder(), OperatingPoint(), soi_cad=-10.0).ignites
+    True
+    """
+
+    soi_cad: float
+    soc_cad: float
+    delay_cad: float
+    ignites: bool
+    clipped: bool
+
+
+def start_of_combustion(cylinder: Cylinder, point: OperatingPoint, *, soi_cad: float) -> Timing:
+    """Find the start of combustion of an injection.
+
+    Parameters
+    ----------
+    cylinder : Cylinder
+        ``ignition_model`` chooses the correlation: ``watson`` and ``wolfer`` by the integral over the motored
+        cycle, ``hardenberg_hase`` at the state of SOI, or ``polynomial`` in SOI.
+    point : OperatingPoint
+        Its fuel does not matter.
+    soi_cad : float
+        Start of injection [°CA aTDC], in [-60, 20].
+
+    Returns
+    -------
+    Timing
+        ``ignites`` is False where the charge stays below ignition until EVO.
+
+    Raises
+    ------
+    mgdd.errors.ParameterError
+        A timing outside its window.
+
+    References
+    ----------
+    Livengood and Wu (1955); Watson, Pilley and Marzouk (1980); Wolfer (1938); Hardenberg and Hase (1979).
+
+    Examples
+    --------
+    >>> from mgdd.engine import Cylinder, OperatingPoint, start_of_combustion
+    >>> round(start_of_combustion(Cylinder(), OperatingPoint(), soi_cad=-20.0).delay_cad, 1)
+    8.1
+    """
+    return Timing(**_core.start_of_combustion(cylinder, point, soi_cad))
+
+
+def start_of_injection(cylinder: Cylinder, point: OperatingPoint, *, soc_cad: float) -> Timing:
+    """Find the injection that ignites at a wanted start of combustion.
+
+    Parameters
+    ----------
+    cylinder, point
+        As in `start_of_combustion`.
+    soc_cad : float
+        Wanted start of combustion [°CA aTDC], in [-60, 20].
+
+    Returns
+    -------
+    Timing
+        With ``clipped=True`` at the edge of the reachable range, SOI in [-60, 20].
+
+    Raises
+    ------
+    mgdd.errors.ParameterError
+        A timing outside its window.
+
+    Examples
+    --------
+    >>> from mgdd.engine import Cylinder, OperatingPoint, start_of_injection
+    >>> timing = start_of_injection(Cylinder(), OperatingPoint(), soc_cad=-6.0)
+    >>> round(timing.soi_cad, 1), timing.clipped
+    (-10.6, False)
+    """
+    return Timing(**_core.start_of_injection(cylinder, point, soc_cad))

@@ -1,0 +1,208 @@
+"""The best timing of a model: an indicator over SOC, with limits on other indicators."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Callable, Mapping
+from dataclasses import dataclass, field
+
+import numpy as np
+
+from mgdd import _core
+from mgdd._core import Cylinder, OperatingPoint
+from mgdd.errors import ConvergenceError, ParameterError
+
+__all__ = ["Optimum", "optimum"]
+
+OBJECTIVES = ("efficiency_gross", "imep_gross_bar", "imep_closed_bar")
+_SCAN_CAD = 0.5
+_SECANT_CAD = 3.0
+_WINDOW_CAD = (-60.0, 20.0)
+
+
+@dataclass(frozen=True, kw_only=True)
+class Optimum:
+    """The best start of combustion and how flat the optimum is.
+
+    Parameters
+    ----------
+    soc_cad : float
+        Start of combustion [°CA aTDC].
+    ca50_cad : float
+        Angle of half burned [°CA aTDC].
+    efficiency_gross : float
+        Gross indicated efficiency there [-].
+    curvature_per_cad2 : float
+        Second difference of the objective over ±3 CAD [per °CA²]; NaN where a neighbour leaves the timing window.
+    objective : str
+        What was maximised.
+    value : float
+        The objective there, in its own unit.
+    limits : mapping of str to float
+        Limits that were kept, in the units of the names.
+    active_limits : tuple of str
+        Those that hold the optimum back.
+    at_bound : bool
+        Whether the optimum lies on the edge of the searched range.
+
+    Examples
+    --------
+    >>> from mgdd.engine import Cylinder, OperatingPoint, optimum
+    >>> round(optimum(Cylinder(), OperatingPoint()).ca50_cad, 1)
+    9.4
+    """
+
+    soc_cad: float
+    ca50_cad: float
+    efficiency_gross: float
+    curvature_per_cad2: float
+    objective: str
+    value: float
+    limits: Mapping[str, float] = field(default_factory=dict)
+    active_limits: tuple[str, ...] = ()
+    at_bound: bool = False
+
+
+def optimum(
+    cylinder: Cylinder,
+    point: OperatingPoint,
+    objective: str = "efficiency_gross",
+    *,
+    limits: Mapping[str, float] | None = None,
+    bounds_cad: tuple[float, float] = (-30.0, 10.0),
+    step_cad: float = 1.0,
+    integrator: str = "trapezoid",
+) -> Optimum:
+    """Find the start of combustion that maximises an indicator under limits on others.
+
+    A scan in steps of 0.5 CAD finds the basin; the root of the exact derivative, or the crossing of a limit,
+    refines it.
+
+    Parameters
+    ----------
+    cylinder : Cylinder
+        The model.
+    point : OperatingPoint
+        Must carry fuel.
+    objective : {"efficiency_gross", "imep_gross_bar", "imep_closed_bar"}
+        What to maximise.
+    limits : mapping of str to float, optional
+        Upper limits on indicators, for example ``{"p_max_bar": 95.0}``.
+    bounds_cad : tuple of float
+        Searched range of SOC [°CA aTDC].
+    step_cad, integrator
+        As in `simulate`.
+
+    Returns
+    -------
+    Optimum
+        With the active limits named.
+
+    Raises
+    ------
+    mgdd.errors.ParameterError
+        An unknown objective or limit, a motored point, bounds outside [-60, 20].
+    mgdd.errors.ConvergenceError
+        No timing in the range meets the limits; the message says how near it comes.
+
+    Examples
+    --------
+    >>> from mgdd.engine import Cylinder, OperatingPoint, optimum
+    >>> best = optimum(Cylinder(), OperatingPoint(), limits={"p_max_bar": 95.0})
+    >>> round(best.soc_cad, 2), best.active_limits
+    (-3.04, ('p_max_bar',))
+    """
+    limits = dict(limits or {})
+    _check(point, objective, limits, bounds_cad)
+    low, high = bounds_cad
+
+    def indicators(soc: float | np.ndarray) -> dict[str, np.ndarray]:
+        return _core.scan(cylinder, point, np.atleast_1d(np.asarray(soc, float)), step_cad, integrator)
+
+    def slope(soc: float) -> float:
+        raw = _core.sensitivities(cylinder, point, soc, ["soc_cad"], step_cad, integrator)
+        return float(raw["indicators"][objective][0])
+
+    def excess(soc: float) -> float:
+        """How far the worst limit is exceeded, relative to it; negative when all are kept."""
+        if not limits:
+            return -math.inf
+        now = indicators(soc)
+        return max(float(now[name][0]) / limit - 1.0 for name, limit in limits.items())
+
+    grid = np.linspace(low, high, max(3, round((high - low) / _SCAN_CAD) + 1))
+    columns = indicators(grid)
+    feasible = np.ones(grid.size, bool)
+    for name, limit in limits.items():
+        feasible &= columns[name] <= limit
+    if not feasible.any():
+        near = ", ".join(f"{name} >= {columns[name].min():.4g} (limit {limit:g})" for name, limit in limits.items())
+        raise ConvergenceError(
+            f"no soc_cad in [{low:g}, {high:g}] meets the limits: {near}; raise a limit or widen bounds_cad"
+        )
+    best = int(np.argmax(np.where(feasible, columns[objective], -np.inf)))
+    soc = _refine(float(grid[best]), grid, best, feasible, slope, excess)
+    now = indicators(soc)
+    active = tuple(name for name, limit in limits.items() if now[name][0] > limit * (1.0 - 1e-6))
+    return Optimum(
+        soc_cad=soc,
+        ca50_cad=float(now["ca50_cad"][0]),
+        efficiency_gross=float(now["efficiency_gross"][0]),
+        curvature_per_cad2=_curvature(indicators, objective, soc),
+        objective=objective,
+        value=float(now[objective][0]),
+        limits=limits,
+        active_limits=active,
+        at_bound=soc in (low, high),
+    )
+
+
+def _refine(
+    start: float,
+    grid: np.ndarray,
+    best: int,
+    feasible: np.ndarray,
+    slope: Callable[[float], float],
+    excess: Callable[[float], float],
+) -> float:
+    from scipy.optimize import brentq
+
+    climb = slope(start)
+    if climb == 0.0:
+        return start
+    step = 1 if climb > 0.0 else -1  # towards the better side
+    if not 0 <= best + step < grid.size:
+        return start
+    end = float(grid[best + step])
+    if not feasible[best + step]:  # the last kept angle before the limit, from the feasible side
+        crossing = float(brentq(excess, start, end, xtol=1e-10))
+        end = crossing if excess(crossing) <= 0.0 else crossing - step * 1e-9
+    if slope(end) * climb >= 0.0:
+        return end
+    return float(brentq(slope, start, end, xtol=1e-8))
+
+
+def _curvature(indicators: Callable[[np.ndarray], dict[str, np.ndarray]], objective: str, soc: float) -> float:
+    around = np.array([soc - _SECANT_CAD, soc, soc + _SECANT_CAD])
+    if around[0] < _WINDOW_CAD[0] or around[-1] > _WINDOW_CAD[1]:
+        return math.nan
+    before, at, after = indicators(around)[objective]
+    return float((before - 2.0 * at + after) / _SECANT_CAD**2)
+
+
+def _check(point: OperatingPoint, objective: str, limits: Mapping[str, float], bounds: tuple[float, float]) -> None:
+    known = _core.indicator_units()
+    if objective not in OBJECTIVES:
+        raise ParameterError(f"objective = {objective!r}: must be one of {', '.join(OBJECTIVES)}")
+    if not point.fuel_mg > 0.0:
+        raise ParameterError(f"fuel_mg = {point.fuel_mg:g}: an optimum needs fuel > 0")
+    for name, value in limits.items():
+        if name not in known:
+            raise ParameterError(f"limits: {name!r} is no indicator: must be one of {', '.join(known)}")
+        if not (value > 0.0 and math.isfinite(value)):
+            raise ParameterError(f"limits: {name} = {value:g}: must be > 0 and finite")
+    low, high = bounds
+    if not _WINDOW_CAD[0] <= low < high <= _WINDOW_CAD[1]:
+        raise ParameterError(
+            f"bounds_cad = ({low:g}, {high:g}): must increase and lie in [{_WINDOW_CAD[0]:g}, {_WINDOW_CAD[1]:g}] °CA aTDC"
+        )

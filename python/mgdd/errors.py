@@ -1,0 +1,16 @@
+"""The exceptions of mgdd: one tree, raised alike by the C++ core and by the Python layer.
+
+Every message names the field or file, the value, and the bound or the remedy.
+
+Examples
+--------
+>>> from mgdd.errors import DataError, Error
+>>> issubclass(DataError, Error), issubclass(DataError, ValueError)
+(True, True)
+"""
+
+from __future__ import annotations
+
+from mgdd._core import ConvergenceError, DataError, Error, ParameterError, ShapeError
+
+__all__ = ["ConvergenceError", "DataError", "Error", "ParameterError", "ShapeError"]

@@ -1,0 +1,198 @@
+"""Is this a cylinder pressure trace? Every refusal names the place, the value and the remedy."""
+
+from __future__ import annotations
+
+import math
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from mgdd.errors import DataError
+from mgdd.io.angles import CONVENTION, pair
+
+if TYPE_CHECKING:
+    from collections.abc import Callable, Sequence
+
+    from numpy.typing import ArrayLike, NDArray
+
+__all__ = ["ANGLE_UNITS", "PRESSURE_UNITS", "check_choice", "check_trace"]
+
+# Units per bar: dividing by an exact integer gives the correctly rounded value in bar.
+PRESSURE_UNITS = {"bar": 1.0, "kPa": 100.0, "Pa": 100000.0}
+ANGLE_UNITS = ("deg", "rad")
+MIN_SAMPLES = 20
+# Peak pressure from a throttled motored engine to twice today's diesels; traces without TDC get a floor.
+PEAK_BAR = (4.0, 500.0)
+FLOOR_BAR = 0.2
+# A four-stroke cycle is 4 pi = 12.57 rad.
+RADIAN_SPAN = 13.0
+_REMEDY_0_720 = "pass firing_tdc_deg= to read_pressure, or convert with mgdd.io.from_0_720"
+
+
+def check_trace(
+    angle: ArrayLike,
+    pressure: ArrayLike,
+    *,
+    unit: str = "bar",
+    angle_unit: str = "deg",
+    source: str = "trace",
+    rows: Sequence[int] | None = None,
+) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
+    """Check a pressure trace and return it in °CA aTDC and bar; the caller's arrays stay as they are.
+
+    Pressure relative to an unknown offset (a piezo signal before pegging) is accepted, so single values may
+    be negative; the unit is judged by the highest value.
+
+    Parameters
+    ----------
+    angle : array_like
+        Crank angle, firing TDC = 0 and compression negative, strictly rising in even steps [`angle_unit`].
+    pressure : array_like
+        Cylinder pressure [`unit`].
+    unit : {"bar", "kPa", "Pa"}
+        Unit of `pressure`.
+    angle_unit : {"deg", "rad"}
+        Unit of `angle`.
+    source : str
+        Name for the messages, for example the file.
+    rows : sequence of int, optional
+        Line number of each sample for the messages; without it they give the array index.
+
+    Returns
+    -------
+    tuple of ndarray
+        Crank angle [°CA aTDC] and pressure [bar], new float64 arrays.
+
+    Raises
+    ------
+    DataError
+        Fewer than 20 samples, NaN or infinity, unsorted or repeated angles, a step above 1.5 times the median
+        step, angles in another convention or unit, a pressure that cannot be in the unit said.
+    ShapeError
+        Arrays that are not one-dimensional and equally long.
+
+    Examples
+    --------
+    >>> import numpy as np
+    >>> from mgdd.io import check_trace
+    >>> angle = np.arange(-30.0, 31.0)
+    >>> _, pressure = check_trace(angle, 6e6 - 1000.0 * angle**2, unit="Pa")
+    >>> float(pressure.max())
+    60.0
+    """
+    check_choice("pressure_unit", unit, tuple(PRESSURE_UNITS))
+    check_choice("angle_unit", angle_unit, ANGLE_UNITS)
+    degrees, values = pair(angle, pressure)
+
+    def place(index: int) -> str:
+        return f"{source}, line {rows[index]}" if rows is not None else f"{source}, sample {index}"
+
+    if degrees.size < MIN_SAMPLES:
+        raise DataError(f"{source}: {degrees.size} samples; at least {MIN_SAMPLES} are needed")
+    for name, column in (("crank angle", degrees), ("pressure", values)):
+        bad = np.flatnonzero(~np.isfinite(column))
+        if bad.size:
+            where, value = place(int(bad[0])), column[bad[0]]
+            raise DataError(f"{where}: {name} = {value}: must be finite; remove or repair it")
+    if angle_unit == "rad":
+        degrees = np.rad2deg(degrees)
+    _check_span(degrees, angle_unit, source)
+    _check_order(degrees, place)
+    _check_convention(degrees, source)
+    _check_gap(degrees, place)
+    bar = values / PRESSURE_UNITS[unit]
+    _check_unit(degrees, values, unit, source)
+    _check_peak(degrees, bar, source)
+    return degrees, bar
+
+
+def check_choice(name: str, value: object, allowed: tuple[str, ...]) -> None:
+    """Refuse a keyword value outside its list, naming both."""
+    if value not in allowed:
+        raise DataError(f"{name} = {value!r}: must be one of {', '.join(map(repr, allowed))}")
+
+
+def _check_span(degrees: NDArray[np.float64], angle_unit: str, source: str) -> None:
+    span = float(np.ptp(degrees))
+    if angle_unit == "deg" and 0.0 < span < RADIAN_SPAN:
+        raise DataError(
+            f"{source}: crank angles span only {span:g} degrees: "
+            "this looks like radians; pass angle_unit='rad'"
+        )
+    if angle_unit == "rad" and span > math.degrees(RADIAN_SPAN):
+        raise DataError(
+            f"{source}: crank angles span {math.radians(span):g} rad: "
+            "this looks like degrees; pass angle_unit='deg'"
+        )
+
+
+def _check_order(degrees: NDArray[np.float64], place: Callable[[int], str]) -> None:
+    step = np.diff(degrees)
+    if np.all(step > 0.0):
+        return
+    if np.all(step < 0.0):
+        raise DataError(
+            f"{place(0)}: crank angles fall from {degrees[0]:g} to {degrees[-1]:g}: this looks like °bTDC; "
+            f"{CONVENTION}; mgdd.io.from_btdc converts"
+        )
+    index = int(np.argmin(step > 0.0)) + 1
+    before, here = degrees[index - 1], degrees[index]
+    if here == before:
+        raise DataError(f"{place(index)}: crank angle {here:g} is repeated: keep one sample per angle")
+    remedy = "sort the rows by crank angle"
+    if before - here > 300.0:
+        remedy = "this looks like the start of another cycle; give one cycle, for example the mean"
+    raise DataError(f"{place(index)}: crank angle {here:g} follows {before:g}: angles must rise; {remedy}")
+
+
+def _check_convention(degrees: NDArray[np.float64], source: str) -> None:
+    first, last = float(degrees[0]), float(degrees[-1])
+    if first < -360.5 or last > 360.5:
+        raise DataError(
+            f"{source}: crank angles run from {first:g} to {last:g}: this looks like a 0..720 record; "
+            f"{CONVENTION}; {_REMEDY_0_720}"
+        )
+
+
+def _check_gap(degrees: NDArray[np.float64], place: Callable[[int], str]) -> None:
+    step = np.diff(degrees)
+    median = float(np.median(step))
+    wide = np.flatnonzero(step > 1.5 * median * (1.0 + 1e-9))
+    if wide.size:
+        index = int(wide[0]) + 1
+        raise DataError(
+            f"{place(index)}: gap in the crank angle from {degrees[index - 1]:g} to {degrees[index]:g}: "
+            f"the usual step is {median:g}; fill it or cut the trace there"
+        )
+
+
+def _check_unit(degrees: NDArray[np.float64], values: NDArray[np.float64], unit: str, source: str) -> None:
+    peak = float(values.max())
+    at_tdc = bool(degrees[0] <= -5.0 and degrees[-1] >= 5.0)
+    low = PEAK_BAR[0] if at_tdc else FLOOR_BAR
+    if low <= peak / PRESSURE_UNITS[unit] <= PEAK_BAR[1]:
+        return
+    likely = [
+        other
+        for other, per_bar in PRESSURE_UNITS.items()
+        if other != unit and low <= peak / per_bar <= PEAK_BAR[1]
+    ]
+    if likely:
+        hint = " or ".join(f"pressure_unit={other!r}" for other in likely)
+        remedy = f"this looks like {' or '.join(likely)}; pass {hint}"
+    else:
+        remedy = f"no unit of {', '.join(PRESSURE_UNITS)} fits a cylinder pressure; check column and scale"
+    raise DataError(
+        f"{source}: the highest pressure {peak:g} {unit} is outside {low:g} to {PEAK_BAR[1]:g} bar: {remedy}"
+    )
+
+
+def _check_peak(degrees: NDArray[np.float64], bar: NDArray[np.float64], source: str) -> None:
+    top = int(np.argmax(bar))
+    inside = bar[np.abs(degrees) <= 90.0]
+    near = float(inside.max()) if inside.size else 0.0
+    if np.ptp(degrees) >= 180.0 and bar[top] > 2.0 * near:
+        raise DataError(
+            f"{source}: the highest pressure {bar[top]:g} bar stands at {degrees[top]:g}, far from firing "
+            f"TDC: {CONVENTION}; {_REMEDY_0_720}"
+        )

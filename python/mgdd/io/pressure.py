@@ -1,0 +1,185 @@
+"""Cylinder pressure traces: from text files and arrays to labelled Datasets, and back."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from mgdd.errors import DataError
+from mgdd.io.angles import aligned_angle
+from mgdd.io.checks import ANGLE_UNITS, PRESSURE_UNITS, check_choice, check_trace
+from mgdd.io.table import read_table
+from mgdd.results import ANGLE, check_labels, labelled_dataset
+
+if TYPE_CHECKING:
+    import os
+
+    import xarray as xr
+    from numpy.typing import ArrayLike
+
+__all__ = ["pressure_trace", "read_pressure", "write_pressure"]
+
+
+def pressure_trace(crank_angle_cad: ArrayLike, pressure_bar: ArrayLike, *, name: str = "trace") -> xr.Dataset:
+    """Check two arrays and make the Dataset of a measured trace from copies of them.
+
+    Parameters
+    ----------
+    crank_angle_cad : array_like
+        Crank angle [°CA aTDC], firing TDC = 0, compression negative, strictly rising.
+    pressure_bar : array_like
+        Cylinder pressure [bar].
+    name : str
+        What tables and figures call the trace; stored as ``attrs["file"]``.
+
+    Returns
+    -------
+    xarray.Dataset
+        ``pressure_bar(crank_angle_cad)``.
+
+    Raises
+    ------
+    DataError, ShapeError
+        As in `check_trace`.
+
+    Examples
+    --------
+    >>> import numpy as np
+    >>> from mgdd.io import pressure_trace
+    >>> angle = np.arange(-30.0, 31.0)
+    >>> trace = pressure_trace(angle, 60.0 - 0.01 * angle**2, name="bench 7")
+    >>> trace.attrs["file"], trace["pressure_bar"].attrs["units"]
+    ('bench 7', 'bar')
+    """
+    angle, pressure = check_trace(crank_angle_cad, pressure_bar, unit="bar", source=name)
+    return _dataset(angle, pressure, name)
+
+
+def read_pressure(
+    path: str | os.PathLike[str],
+    *,
+    angle_column: int | str = 0,
+    pressure_column: int | str = 1,
+    angle_unit: str = "deg",
+    pressure_unit: str = "bar",
+    firing_tdc_deg: float | None = None,
+    delimiter: str | None = None,
+    decimal: str = ".",
+) -> xr.Dataset:
+    r"""Read one measured pressure trace from a text file.
+
+    The file holds columns separated by comma, semicolon, tab or blanks; a header line and a line of units
+    may come first; empty lines and lines that start with ``#`` are skipped.
+
+    Parameters
+    ----------
+    path : path-like
+        The file.
+    angle_column, pressure_column : int or str
+        Position from 0, or the name in the header.
+    angle_unit : {"deg", "rad"}
+        Unit of the angle column.
+    pressure_unit : {"bar", "kPa", "Pa"}
+        Unit of the pressure column; a unit that the magnitude excludes is refused.
+    firing_tdc_deg : float, optional
+        For 0..720 records: the angle [deg] at which firing TDC stands, see `from_0_720`.
+        None: the file is in °CA aTDC already.
+    delimiter : str, optional
+        Column separator; None detects it.
+    decimal : {".", ","}
+        Decimal mark.
+
+    Returns
+    -------
+    xarray.Dataset
+        ``pressure_bar(crank_angle_cad)``; ``attrs["file"]`` is the file's name without its folder.
+
+    Raises
+    ------
+    FileNotFoundError
+        No such file.
+    DataError
+        An empty file, no such column, a cell that is not a finite number, and all of `check_trace`; the
+        message gives file, line, column, value and remedy.
+
+    Examples
+    --------
+    >>> import pathlib, tempfile
+    >>> from mgdd.io import read_pressure
+    >>> rows = "".join(f"{a},{6e6 - 1000 * a * a}\n" for a in range(-30, 31))
+    >>> with tempfile.TemporaryDirectory() as folder:
+    ...     file = pathlib.Path(folder) / "mean.csv"
+    ...     _ = file.write_text("angle,p\n" + rows)
+    ...     trace = read_pressure(file, pressure_column="p", pressure_unit="Pa")
+    >>> float(trace["pressure_bar"].max())
+    60.0
+    """
+    check_choice("pressure_unit", pressure_unit, tuple(PRESSURE_UNITS))
+    check_choice("angle_unit", angle_unit, ANGLE_UNITS)
+    table = read_table(path, delimiter=delimiter, decimal=decimal)
+    angle_index, pressure_index = table.index(angle_column), table.index(pressure_column)
+    said = table.unit(pressure_index)
+    if said in PRESSURE_UNITS and said != pressure_unit:
+        raise DataError(
+            f"{table.source}: the units row says {said!r} for the pressure: pass pressure_unit={said!r} "
+            f"instead of {pressure_unit!r}"
+        )
+    angle, pressure = table.numbers(angle_index), table.numbers(pressure_index)
+    rows = list(table.lines)
+    if firing_tdc_deg is not None:
+        degrees = np.rad2deg(angle) if angle_unit == "rad" else angle
+        try:
+            order, degrees = aligned_angle(degrees, firing_tdc_deg)
+        except DataError as error:
+            raise DataError(f"{table.source}: {error}") from None
+        angle, pressure, rows = degrees[order], pressure[order], [rows[i] for i in order]
+        angle_unit = "deg"
+    angle, pressure = check_trace(
+        angle, pressure, unit=pressure_unit, angle_unit=angle_unit, source=table.source, rows=rows
+    )
+    return _dataset(angle, pressure, Path(path).name)
+
+
+def write_pressure(dataset: xr.Dataset, path: str | os.PathLike[str]) -> None:
+    """Write a trace as CSV that `read_pressure` reads back bit by bit.
+
+    Parameters
+    ----------
+    dataset : xarray.Dataset
+        With ``pressure_bar(crank_angle_cad)``; other variables are not written.
+    path : path-like
+        The file; an existing one is replaced once the Dataset has passed its checks.
+
+    Raises
+    ------
+    DataError
+        No ``pressure_bar`` over ``crank_angle_cad``, missing units, and all of `check_trace`.
+
+    Examples
+    --------
+    >>> import pathlib, tempfile
+    >>> import numpy as np
+    >>> from mgdd.io import pressure_trace, read_pressure, write_pressure
+    >>> angle = np.arange(-30.0, 31.0)
+    >>> trace = pressure_trace(angle, 60.0 - 0.01 * angle**2)
+    >>> with tempfile.TemporaryDirectory() as folder:
+    ...     file = pathlib.Path(folder) / "mean.csv"
+    ...     write_pressure(trace, file)
+    ...     read_pressure(file).equals(trace)
+    True
+    """
+    if "pressure_bar" not in dataset or dataset["pressure_bar"].dims != (ANGLE,):
+        raise DataError(f"dataset has no pressure_bar({ANGLE}): make one with mgdd.io.pressure_trace")
+    check_labels(dataset[["pressure_bar"]])
+    measured = dataset["pressure_bar"]
+    angle, pressure = check_trace(measured[ANGLE].to_numpy(), measured.to_numpy(), source="dataset")
+    lines = ["# crank angle [°CA aTDC], cylinder pressure [bar]", f"{ANGLE},pressure_bar"]
+    lines += [f"{a!r},{p!r}" for a, p in zip(angle.tolist(), pressure.tolist(), strict=True)]
+    Path(path).write_text("\n".join(lines) + "\n", encoding="utf-8", newline="\n")
+
+
+def _dataset(angle: ArrayLike, pressure: ArrayLike, name: str) -> xr.Dataset:
+    variables = {ANGLE: (ANGLE, angle), "pressure_bar": (ANGLE, pressure)}
+    return labelled_dataset(variables, attrs={"file": name})

@@ -1,0 +1,14 @@
+"""Figures: a Dataset goes in, matplotlib Axes come out; `ax=` is accepted and nothing is shown or simulated.
+
+Every angle axis reads "crank angle [°CA aTDC]". Lines differ in dash or marker as well as in colour, so that
+a figure survives a black-and-white printer. Legends stand above the axes, where they hide no data: for a
+title use the figure's `suptitle`.
+"""
+
+from __future__ import annotations
+
+from mgdd.plot.calibration import calibration_overlay, wall_heat_profile
+from mgdd.plot.cycle import log_pv, pressure
+from mgdd.plot.timing import timing
+
+__all__ = ["calibration_overlay", "log_pv", "pressure", "timing", "wall_heat_profile"]

@@ -1,0 +1,190 @@
+"""Measured against modelled pressure, and how sharply the traces fix the wall-heat scale."""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from mgdd.errors import DataError
+from mgdd.plot.style import (
+    BLACK,
+    BLUE,
+    GREY,
+    LINE_STYLES,
+    ORANGE,
+    axis_label,
+    legend,
+    minus,
+    new_axes,
+    require,
+)
+from mgdd.results import ANGLE
+
+if TYPE_CHECKING:
+    import xarray as xr
+    from matplotlib.axes import Axes
+    from matplotlib.lines import Line2D
+
+__all__ = ["calibration_overlay", "wall_heat_profile"]
+
+_EVENTS = {"soi_cad": (":", ORANGE), "soc_cad": ("--", BLUE)}
+
+
+def calibration_overlay(overlay: xr.Dataset, *, ax: Axes | None = None) -> Axes:
+    """Draw measured points under the model's line, and their difference in a panel below.
+
+    Parameters
+    ----------
+    overlay : xarray.Dataset
+        ``measured_bar``, ``model_bar`` and ``residual_bar`` (model minus measured) [bar] over
+        ``crank_angle_cad`` [°CA aTDC] of one trace, as `mgdd.identify.fit_cylinder` gives. Start of injection
+        and of combustion, RMSE and IMEP error are shown where the Dataset has them.
+    ax : matplotlib.axes.Axes, optional
+        Where to draw; it gives its lower quarter to the residual panel. None makes a figure.
+
+    Returns
+    -------
+    matplotlib.axes.Axes
+        The upper axes; the residual panel is ``ax.figure.axes[-1]``.
+
+    Raises
+    ------
+    DataError
+        A variable is missing or has no unit.
+
+    Examples
+    --------
+    >>> import numpy as np
+    >>> from mgdd import plot
+    >>> from mgdd.results import labelled_dataset
+    >>> angle = np.arange(-30.0, 31.0)
+    >>> measured = 60.0 - 0.01 * angle**2
+    >>> overlay = labelled_dataset({
+    ...     "crank_angle_cad": ("crank_angle_cad", angle),
+    ...     "measured_bar": ("crank_angle_cad", measured),
+    ...     "model_bar": ("crank_angle_cad", measured + 0.2),
+    ...     "residual_bar": ("crank_angle_cad", 0.2 + 0.0 * angle),
+    ... })
+    >>> ax = plot.calibration_overlay(overlay)
+    >>> ax.figure.axes[-1].get_xlabel()
+    'crank angle [°CA aTDC]'
+    """
+    needed = (ANGLE, "measured_bar", "model_bar", "residual_bar")
+    optional = (*_EVENTS, "rmse_percent", "imep_closed_error_percent")
+    require(overlay, (*needed, *(name for name in optional if name in overlay)), "mgdd.identify.fit_cylinder")
+    ax = new_axes(ax, height=4.8)
+    panel = _panel_below(ax)
+    angle = overlay[ANGLE].to_numpy()
+    lines: list[Line2D] = ax.plot(
+        angle, overlay["measured_bar"], ".", color=GREY, markersize=4, label="measured"
+    )
+    lines += ax.plot(angle, overlay["model_bar"], "-", color=BLACK, linewidth=1.2, label=_model_name(overlay))
+    panel.plot(angle, overlay["residual_bar"], "-", color=BLACK, linewidth=1.0)
+    panel.axhline(0.0, color=GREY, linewidth=0.8)
+    for name, (dash, color) in _EVENTS.items():
+        if name in overlay and np.isfinite(overlay[name]):
+            at = float(overlay[name])
+            panel.axvline(at, linestyle=dash, color=color)
+            label = minus(f"{overlay[name].attrs['long_name']} {at:.1f}")
+            lines.append(ax.axvline(at, linestyle=dash, color=color, label=label))
+    ax.set_ylabel("cylinder pressure [bar]")
+    ax.tick_params(labelbottom=False)
+    ax.set_xlim(float(angle[0]), float(angle[-1]))
+    panel.set(xlabel=axis_label(overlay, ANGLE), ylabel="model −\nmeasured\n[bar]")
+    quality = _quality(overlay)
+    if quality:
+        ax.text(0.02, 0.95, quality, transform=ax.transAxes, va="top", fontsize="small")
+    legend(ax, lines)
+    return ax
+
+
+def wall_heat_profile(profile: xr.Dataset, *, ax: Axes | None = None) -> Axes:
+    """Draw the best reachable RMSE over the wall-heat scale: a flat curve means the traces do not fix it.
+
+    Parameters
+    ----------
+    profile : xarray.Dataset
+        ``rmse_percent`` [% of p_max] over ``wall_heat_scale`` [-], everything else refitted at each scale; a
+        second dimension, for example the trace, gives one line each.
+    ax : matplotlib.axes.Axes, optional
+        Where to draw; None makes a figure.
+
+    Returns
+    -------
+    matplotlib.axes.Axes
+        The axes; the shaded band holds the scales within 10 % of the best RMSE (of all traces together).
+
+    Raises
+    ------
+    DataError
+        A variable is missing, has no unit, or has not one or two dimensions.
+
+    Examples
+    --------
+    >>> from mgdd import plot
+    >>> from mgdd.results import labelled_dataset
+    >>> profile = labelled_dataset({
+    ...     "wall_heat_scale": ("wall_heat_scale", [0.0, 0.5, 1.0, 2.0]),
+    ...     "rmse_percent": ("wall_heat_scale", [0.30, 0.21, 0.20, 0.33]),
+    ... })
+    >>> plot.wall_heat_profile(profile).get_ylabel()
+    'pressure RMSE, closed cycle [% of p_max]'
+    """
+    require(profile, ("wall_heat_scale", "rmse_percent"), "mgdd.identify.wall_heat_profile")
+    rmse = profile["rmse_percent"]
+    if "wall_heat_scale" not in rmse.dims or rmse.ndim > 2:
+        raise DataError(
+            f"rmse_percent has dimensions {rmse.dims}: wall_heat_scale and at most one more are needed"
+        )
+    ax = new_axes(ax, height=4.2)
+    scale = profile["wall_heat_scale"].to_numpy()
+    others = [str(dim) for dim in rmse.dims if dim != "wall_heat_scale"]
+    curves = rmse.transpose("wall_heat_scale", *others).to_numpy().reshape(scale.size, -1)
+    names = [f"{name}" for name in profile[others[0]].to_numpy()] if others else ["best fit"]
+    lines: list[Line2D] = []
+    for index, name in enumerate(names):
+        dash, color = LINE_STYLES[index % len(LINE_STYLES)]
+        lines += ax.plot(
+            scale, curves[:, index], linestyle=dash, color=color, marker="o", markersize=3, label=name
+        )
+    together = np.sqrt(np.mean(curves**2, axis=1))
+    fine = np.linspace(float(scale.min()), float(scale.max()), 2001)
+    inside = fine[np.interp(fine, scale, together) <= 1.1 * together.min()]
+    span = ax.axvspan(
+        float(inside.min()),
+        float(inside.max()),
+        color=GREY,
+        alpha=0.2,
+        linewidth=0,
+        label="within 10 % of the best",
+    )
+    ax.set(xlabel=axis_label(profile, "wall_heat_scale"), ylabel=axis_label(profile, "rmse_percent"))
+    ax.set_ylim(bottom=0.0)
+    legend(ax, [*lines, span])
+    return ax
+
+
+def _panel_below(ax: Axes) -> Axes:
+    spec = ax.get_subplotspec()
+    if spec is not None:
+        inner = spec.subgridspec(2, 1, height_ratios=(3, 1), hspace=0.06)
+        ax.set_subplotspec(inner[0])
+        return ax.figure.add_subplot(inner[1], sharex=ax)
+    left, bottom, width, height = ax.get_position().bounds
+    ax.set_position((left, bottom + 0.27 * height, width, 0.73 * height))
+    return ax.figure.add_axes((left, bottom, width, 0.24 * height), sharex=ax)
+
+
+def _model_name(overlay: xr.Dataset) -> str:
+    burn = overlay.attrs.get("burn")
+    return f"model, {str(burn).replace('_', ' ').replace('wiebe', 'Wiebe')}" if burn else "model"
+
+
+def _quality(overlay: xr.Dataset) -> str:
+    parts = [str(overlay.attrs["file"])] if overlay.attrs.get("file") else []
+    if "rmse_percent" in overlay:
+        parts.append(f"RMSE {float(overlay['rmse_percent']):.2f} % of p_max")
+    if "imep_closed_error_percent" in overlay:
+        parts.append(f"closed IMEP {float(overlay['imep_closed_error_percent']):+.1f} %")
+    return minus("\n".join(parts))

@@ -1,0 +1,162 @@
+"""One cycle: pressure over crank angle, and log p over log V."""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from mgdd.errors import DataError
+from mgdd.plot.style import BLACK, BLUE, GREY, ORANGE, axis_label, legend, minus, new_axes, require
+from mgdd.results import ANGLE
+
+if TYPE_CHECKING:
+    import xarray as xr
+    from matplotlib.axes import Axes
+    from matplotlib.lines import Line2D
+
+__all__ = ["log_pv", "pressure"]
+
+_RATES = {
+    "heat_release_j_per_cad": ("-.", ORANGE),
+    "heat_release_net_j_per_cad": ("-.", ORANGE),
+    "heat_release_gross_j_per_cad": (":", ORANGE),
+}
+# The windows in which the exponents are fitted, °CA aTDC.
+_WINDOWS = {"n_compression": (-100.0, -40.0), "n_expansion": (60.0, 120.0)}
+_SLOPE_STYLES = {"n_compression": ("o--", BLUE), "n_expansion": ("s-.", ORANGE)}
+
+
+def pressure(dataset: xr.Dataset, *, ax: Axes | None = None) -> Axes:
+    """Draw pressure over crank angle, with what the Dataset knows of heat release and motoring.
+
+    Parameters
+    ----------
+    dataset : xarray.Dataset
+        ``pressure_bar(crank_angle_cad)`` [bar, °CA aTDC] of a measured trace, of `mgdd.engine.simulate` or of
+        `mgdd.engine.analyze`. Heat release rates [J/°CA] go to a twin axis,
+        ``motored_pressure_bar`` is dashed.
+    ax : matplotlib.axes.Axes, optional
+        Where to draw; None makes a figure.
+
+    Returns
+    -------
+    matplotlib.axes.Axes
+        The pressure axes.
+
+    Raises
+    ------
+    DataError
+        No ``pressure_bar``, or a variable without unit.
+
+    Examples
+    --------
+    >>> from mgdd import datasets, plot
+    >>> ax = plot.pressure(datasets.load_hd_traces()[0])
+    >>> ax.get_xlabel()
+    'crank angle [°CA aTDC]'
+    """
+    require(dataset, (ANGLE, "pressure_bar"), "mgdd.io.read_pressure or mgdd.engine.simulate")
+    rates = [name for name in _RATES if name in dataset]
+    optional = [name for name in ("motored_pressure_bar", *rates) if name in dataset]
+    require(dataset, tuple(optional), "mgdd.engine.simulate or mgdd.engine.analyze")
+    ax = new_axes(ax)
+    angle = dataset[ANGLE].to_numpy()
+    lines: list[Line2D] = ax.plot(angle, dataset["pressure_bar"], "-", color=BLACK, label=_name(dataset))
+    if "motored_pressure_bar" in dataset:
+        motored = dataset["motored_pressure_bar"]
+        lines += ax.plot(angle, motored, "--", color=GREY, label=motored.attrs["long_name"])
+    ax.set(xlabel=axis_label(dataset, ANGLE), ylabel=axis_label(dataset, "pressure_bar"))
+    ax.set_xlim(float(angle[0]), float(angle[-1]))
+    if rates:
+        twin = ax.twinx()
+        for name in rates:
+            dash, color = _RATES[name]
+            label = dataset[name].attrs["long_name"]
+            lines += twin.plot(angle, dataset[name], dash, color=color, linewidth=1.2, label=label)
+        twin.set_ylabel(axis_label(dataset, rates[0]) if len(rates) == 1 else "heat release rate [J/°CA]")
+    legend(ax, lines)
+    return ax
+
+
+def log_pv(dataset: xr.Dataset, *, ax: Axes | None = None) -> Axes:
+    """Draw pressure over volume on logarithmic axes, with the fitted polytropic slopes.
+
+    Parameters
+    ----------
+    dataset : xarray.Dataset
+        ``pressure_bar`` [bar] and ``volume_l`` [L] over ``crank_angle_cad``, as `mgdd.engine.analyze` and
+        `mgdd.engine.simulate` give. ``n_compression`` and ``n_expansion`` [-], where present, are drawn as
+        lines through the mean of their windows (-100 to -40 and 60 to 120 °CA aTDC).
+    ax : matplotlib.axes.Axes, optional
+        Where to draw; None makes a figure.
+
+    Returns
+    -------
+    matplotlib.axes.Axes
+        The axes, both scales logarithmic.
+
+    Raises
+    ------
+    DataError
+        A variable is missing, or a pressure is not positive (a trace before pegging).
+
+    Examples
+    --------
+    >>> import numpy as np
+    >>> from mgdd import plot
+    >>> from mgdd.results import labelled_dataset
+    >>> angle = np.arange(-120.0, 121.0)
+    >>> volume = 0.03 + 0.2 * (1 - np.cos(np.radians(angle)))
+    >>> cycle = labelled_dataset({
+    ...     "crank_angle_cad": ("crank_angle_cad", angle),
+    ...     "volume_l": ("crank_angle_cad", volume),
+    ...     "pressure_bar": ("crank_angle_cad", 0.5 * volume**-1.37),
+    ...     "n_compression": ((), 1.37),
+    ... })
+    >>> plot.log_pv(cycle).get_xlabel()
+    'cylinder volume [L]'
+    """
+    require(dataset, (ANGLE, "pressure_bar", "volume_l"), "mgdd.engine.analyze or mgdd.engine.simulate")
+    angle = dataset[ANGLE].to_numpy()
+    bar = dataset["pressure_bar"].to_numpy()
+    litre = dataset["volume_l"].to_numpy()
+    if not np.all(bar > 0.0):
+        index = int(np.argmin(bar > 0.0))
+        raise DataError(
+            f"pressure_bar = {bar[index]:g} at {angle[index]:g} °CA aTDC: a logarithm needs > 0; "
+            "peg the trace first with mgdd.engine.analyze"
+        )
+    ax = new_axes(ax, height=4.4)
+    lines: list[Line2D] = ax.plot(litre, bar, "-", color=BLACK, linewidth=1.2, label=_name(dataset))
+    for name, (low, high) in _WINDOWS.items():
+        window = (angle >= low) & (angle <= high)
+        if name not in dataset or not np.isfinite(dataset[name]) or np.count_nonzero(window) < 2:
+            continue
+        exponent = float(dataset[name])
+        constant = np.exp(np.mean(np.log(bar[window]) + exponent * np.log(litre[window])))
+        ends = np.array([litre[window].min(), litre[window].max()])
+        dash, color = _SLOPE_STYLES[name]
+        label = minus(f"{name.removeprefix('n_')} n = {exponent:.3f} ({low:g} to {high:g} °CA aTDC)")
+        lines += ax.plot(ends, constant * ends**-exponent, dash, color=color, linewidth=2.4, label=label)
+    ax.set(xscale="log", yscale="log", xlabel=axis_label(dataset, "volume_l"))
+    ax.set_ylabel(axis_label(dataset, "pressure_bar"))
+    _plain_ticks(ax)
+    legend(ax, lines, columns=1)
+    return ax
+
+
+def _name(dataset: xr.Dataset) -> str:
+    """Return the legend entry of the pressure: with the trace's name where it has one."""
+    file = dataset.attrs.get("file")
+    long_name = str(dataset["pressure_bar"].attrs["long_name"])
+    return f"{long_name}, {file}" if file else long_name
+
+
+def _plain_ticks(ax: Axes) -> None:
+    from matplotlib.ticker import LogLocator, NullFormatter, StrMethodFormatter
+
+    for axis in (ax.xaxis, ax.yaxis):
+        axis.set_major_locator(LogLocator(subs=(1.0, 2.0, 5.0)))
+        axis.set_major_formatter(StrMethodFormatter("{x:g}"))
+        axis.set_minor_formatter(NullFormatter())

@@ -1,0 +1,94 @@
+"""Efficiency and the two NOx proxies over injection or combustion timing."""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from mgdd.errors import DataError
+from mgdd.plot.style import BLACK, BLUE, ORANGE, axis_label, legend, minus, new_axes, require
+
+if TYPE_CHECKING:
+    import xarray as xr
+    from matplotlib.axes import Axes
+    from matplotlib.lines import Line2D
+    from numpy.typing import NDArray
+
+__all__ = ["timing"]
+
+_NOX = {"nox_affine_log_ppm": ("--", BLUE), "nox_arrhenius_ppm": ("-.", ORANGE)}
+
+
+def timing(sweep: xr.Dataset, *, ax: Axes | None = None) -> Axes:
+    """Draw efficiency and both NOx proxy maps over timing, with the best timing marked.
+
+    Parameters
+    ----------
+    sweep : xarray.Dataset
+        ``efficiency_gross`` [-], ``nox_affine_log_ppm`` and ``nox_arrhenius_ppm`` [ppm] over ``soc_cad``
+        [°CA aTDC], as `mgdd.engine.timing_sweep` gives. NOx goes to a twin axis.
+    ax : matplotlib.axes.Axes, optional
+        Where to draw; None makes a figure.
+
+    Returns
+    -------
+    matplotlib.axes.Axes
+        The efficiency axes. The mark is the vertex of the parabola through the highest sample and its
+        neighbours, or that sample itself where it ends the sweep; the legend then says so.
+
+    Raises
+    ------
+    DataError
+        A variable is missing or has no unit, fewer than three timings.
+
+    Examples
+    --------
+    >>> from mgdd import plot
+    >>> from mgdd.results import labelled_dataset
+    >>> sweep = labelled_dataset({
+    ...     "soc_cad": ("soc_cad", [-10.0, -6.0, 0.0]),
+    ...     "efficiency_gross": ("soc_cad", [0.5568, 0.5618, 0.5543]),
+    ...     "nox_affine_log_ppm": ("soc_cad", [1740.0, 1300.0, 920.0]),
+    ...     "nox_arrhenius_ppm": ("soc_cad", [2026.0, 1540.0, 1100.0]),
+    ... })
+    >>> plot.timing(sweep).get_xlabel()
+    'start of combustion [°CA aTDC]'
+    """
+    require(sweep, ("soc_cad", "efficiency_gross", *_NOX), "mgdd.engine.timing_sweep")
+    soc, efficiency = sweep["soc_cad"].to_numpy(), sweep["efficiency_gross"].to_numpy()
+    if soc.ndim != 1 or soc.size < 3:
+        raise DataError(f"soc_cad has shape {soc.shape}: at least three timings are needed")
+    ax = new_axes(ax)
+    lines: list[Line2D] = ax.plot(
+        soc, efficiency, "-", color=BLACK, label=sweep["efficiency_gross"].attrs["long_name"]
+    )
+    best, top, at_end = _vertex(soc, efficiency)
+    where = "best at the end of the sweep" if at_end else "best"
+    lines += ax.plot(
+        best, top, "o", color=BLACK, markersize=6, label=minus(f"{where}: {top:.4f} at {best:.1f} °CA aTDC")
+    )
+    ax.axvline(best, color=BLACK, linewidth=0.8, linestyle=":")
+    twin = ax.twinx()
+    for name, (dash, color) in _NOX.items():
+        label = sweep[name].attrs["long_name"]
+        lines += twin.plot(soc, sweep[name], linestyle=dash, color=color, label=label)
+    twin.set_ylabel("NOx proxy [ppm]")
+    twin.set_ylim(bottom=0.0)
+    ax.set(xlabel=axis_label(sweep, "soc_cad"), ylabel=axis_label(sweep, "efficiency_gross"))
+    legend(ax, lines)
+    return ax
+
+
+def _vertex(x: NDArray[np.float64], y: NDArray[np.float64]) -> tuple[float, float, bool]:
+    index = int(np.nanargmax(y))
+    if index in (0, y.size - 1):
+        return float(x[index]), float(y[index]), True
+    left, here, right = y[index - 1 : index + 2] - y[index]
+    before, after = x[index] - x[index - 1], x[index + 1] - x[index]
+    slope = (right * before**2 - left * after**2) / (before * after * (before + after))
+    bend = (right * before + left * after) / (before * after * (before + after))
+    if not bend < 0.0:
+        return float(x[index]), float(y[index]), False
+    shift = -slope / (2.0 * bend)
+    return float(x[index] + shift), float(y[index] + here + slope * shift + bend * shift**2), False

@@ -1,0 +1,7 @@
+"""Presets: named parameter sets as TOML, every value with its unit and its source."""
+
+from __future__ import annotations
+
+from mgdd.presets.preset import Preset, available, load
+
+__all__ = ["Preset", "available", "load"]

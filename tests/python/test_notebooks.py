@@ -1,0 +1,71 @@
+"""What the reader sees runs: notebooks, the examples of every docstring and page, the docs build itself."""
+
+from __future__ import annotations
+
+import doctest
+import importlib
+import os
+import pkgutil
+import re
+import subprocess
+import sys
+from pathlib import Path
+
+import nbclient
+import nbformat
+import pytest
+
+import mgdd
+
+ROOT = Path(__file__).resolve().parents[2]
+NOTEBOOKS = sorted((ROOT / "notebooks").glob("*.ipynb"))
+MODULES = sorted({"mgdd", *(module.name for module in pkgutil.walk_packages(mgdd.__path__, "mgdd."))})
+PAGES = [ROOT / "README.md", *sorted((ROOT / "docs").glob("*.md"))]
+FENCE = re.compile(r"^```python\n(.*?)^```", re.MULTILINE | re.DOTALL)
+
+
+def test_there_is_something_to_run() -> None:
+    assert NOTEBOOKS
+    assert "mgdd.engine" in MODULES
+    assert FENCE.search(PAGES[0].read_text(encoding="utf-8")), "README.md shows no Python"
+
+
+@pytest.mark.notebook
+@pytest.mark.parametrize("path", NOTEBOOKS, ids=lambda path: path.name)
+def test_notebook_runs(path: Path, tmp_path: Path) -> None:
+    notebook = nbformat.read(path, as_version=4)
+    resources = {"metadata": {"path": str(tmp_path)}}
+    nbclient.NotebookClient(notebook, timeout=300, kernel_name="python3", resources=resources).execute()
+
+
+@pytest.mark.parametrize("name", [name for name in MODULES if not name.endswith(("__main__", "._core"))])
+def test_docstring_examples(name: str, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.chdir(tmp_path)
+    module = importlib.import_module(name)
+    result = doctest.testmod(module, optionflags=doctest.ELLIPSIS | doctest.NORMALIZE_WHITESPACE)
+    assert result.failed == 0, f"{result.failed} of {result.attempted} examples of {name} failed: see above"
+
+
+@pytest.mark.parametrize("page", PAGES, ids=lambda page: page.name)
+def test_page_examples(page: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    """The Python blocks of a page run from top to bottom as one program."""
+    monkeypatch.chdir(tmp_path)
+    names: dict[str, object] = {"__name__": page.name}
+    for block in FENCE.findall(page.read_text(encoding="utf-8")):
+        if block.startswith(">>>"):
+            examples = doctest.DocTestParser().get_doctest(block, names, page.name, str(page), 0)
+            runner = doctest.DocTestRunner(optionflags=doctest.ELLIPSIS | doctest.NORMALIZE_WHITESPACE)
+            assert runner.run(examples, clear_globs=False).failed == 0
+            names.update(examples.globs)
+        else:
+            exec(compile(block, str(page), "exec"), names)  # noqa: S102
+
+
+@pytest.mark.docs
+def test_docs_build_without_a_warning(tmp_path: Path) -> None:
+    command = [sys.executable, "-m", "sphinx", "-W", "-n", "--keep-going", "-q", "-b", "html"]
+    folders = ["-d", str(tmp_path / "doctrees"), str(ROOT / "docs"), str(tmp_path / "html")]
+    environment = {**os.environ, "MGDD_DOCS_EXECUTE": "off"}
+    run = subprocess.run([*command, *folders], capture_output=True, text=True, env=environment)
+    assert run.returncode == 0, run.stdout + run.stderr
+    assert (tmp_path / "html" / "index.html").is_file()

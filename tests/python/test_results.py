@@ -1,0 +1,146 @@
+"""Labelled Datasets: nothing without a unit, and JSON that any reader takes."""
+
+from __future__ import annotations
+
+import json
+import subprocess
+import sys
+from enum import Enum
+from pathlib import PurePosixPath
+
+import numpy as np
+import pytest
+import xarray as xr
+from hypothesis import given
+from hypothesis import strategies as st
+
+from mgdd.errors import ConvergenceError, DataError, Error, ParameterError, ShapeError
+from mgdd.results import ANGLE, VARIABLES, check_labels, labelled_dataset, to_jsonable
+
+
+def cycle(**extra):
+    angle = np.arange(-2.0, 3.0)
+    return {ANGLE: (ANGLE, angle), "pressure_bar": (ANGLE, 60.0 - angle**2)} | extra
+
+
+def test_error_tree():
+    assert all(
+        issubclass(error, Error) for error in (ParameterError, ShapeError, DataError, ConvergenceError)
+    )
+    assert all(issubclass(error, ValueError) for error in (ParameterError, ShapeError, DataError))
+    assert issubclass(ConvergenceError, RuntimeError)
+
+
+def test_every_canonical_name_has_unit_and_long_name():
+    assert all(label.units.strip() and label.long_name.strip() for label in VARIABLES.values())
+    units = {
+        "_bar": "bar", "_k": "K", "_l": "L", "_ppm": "ppm", "_j": "J", "_j_per_cad": "J/°CA",
+        "_bar_per_cad": "bar/°CA", "_mw_per_m2": "MW/m²",
+    }  # fmt: skip
+    for name, label in VARIABLES.items():
+        suffixes = [suffix for suffix in units if name.endswith(suffix)]
+        if suffixes:
+            assert label.units == units[max(suffixes, key=len)], name
+
+
+def test_dataset_carries_values_units_and_attributes():
+    dataset = labelled_dataset(cycle(speed_rpm=((), 1200.0, "rpm", "engine speed")), attrs={"file": "a.csv"})
+    check_labels(dataset)
+    assert dataset["pressure_bar"].dims == (ANGLE,)
+    assert ANGLE in dataset.indexes
+    assert dataset[ANGLE].attrs == {"units": "°CA aTDC", "long_name": "crank angle"}
+    assert dataset["speed_rpm"].attrs == {"units": "rpm", "long_name": "engine speed"}
+    assert dataset.attrs == {"file": "a.csv"}
+
+
+def test_values_are_copied():
+    variables = cycle()
+    dataset = labelled_dataset(variables)
+    dataset["pressure_bar"][0] = -1.0
+    assert variables["pressure_bar"][1][0] == 56.0
+
+
+@pytest.mark.parametrize(
+    ("entry", "message"),
+    [
+        (((), 1.0), "variable torque_nm has no units"),
+        (((), 1.0, "", "torque"), "variable torque_nm has no units"),
+        (((), 1.0, "N·m", " "), "variable torque_nm has no long_name"),
+        (((), 1.0, "N·m"), r"variable torque_nm: give \(dims, values\) or"),
+        (("time_s", [1.0], "N·m", "torque"), "dimension time_s of torque_nm has no coordinate"),
+    ],
+)
+def test_label_faults_are_refused(entry, message):
+    with pytest.raises(DataError, match=message):
+        labelled_dataset(cycle(torque_nm=entry))
+
+
+def test_a_canonical_name_keeps_its_unit():
+    with pytest.raises(DataError, match="p_max_bar has units 'Pa': this name is reserved for 'bar'"):
+        labelled_dataset({"p_max_bar": ((), 1e7, "Pa", "maximum pressure")})
+
+
+def test_shape_faults_are_refused():
+    with pytest.raises(
+        ShapeError, match=r"volume_l has 3 samples along crank_angle_cad: crank_angle_cad has 5"
+    ):
+        labelled_dataset(cycle(volume_l=(ANGLE, [1.0, 2.0, 3.0])))
+    with pytest.raises(ShapeError, match=r"p_max_bar has shape \(1,\): 0 dimension"):
+        labelled_dataset(cycle(p_max_bar=((), [1.0])))
+
+
+def test_check_labels_names_the_culprit():
+    dataset = labelled_dataset(cycle())
+    dataset["bare"] = 1.0
+    with pytest.raises(DataError, match="variable bare has no units"):
+        check_labels(dataset)
+    with pytest.raises(DataError, match="dimension x has no coordinate"):
+        check_labels(xr.Dataset({"a": ("x", [1.0], {"units": "-", "long_name": "a"})}))
+
+
+class Status(Enum):
+    DONE = "done"
+
+
+def test_jsonable_of_everything_results_hold():
+    dataset = labelled_dataset(cycle(soi_cad=((), np.nan)))
+    obj = {
+        "status": Status.DONE, 1: np.int64(3), "flag": np.bool_(True), "path": PurePosixPath("a/b"),
+        "none": None, "set": {"b", "a"}, "inf": -np.inf, "array": dataset[ANGLE],
+        "nested": (np.array([[1.0, np.nan]]),),
+    }  # fmt: skip
+    assert to_jsonable(obj) == {
+        "status": "done", "1": 3, "flag": True, "path": "a/b", "none": None, "set": ["a", "b"], "inf": None,
+        "array": [-2.0, -1.0, 0.0, 1.0, 2.0], "nested": [[[1.0, None]]],
+    }  # fmt: skip
+    whole = to_jsonable(dataset)
+    assert whole["soi_cad"] is None
+    assert whole["pressure_bar"] == [56.0, 59.0, 60.0, 59.0, 56.0]
+
+
+def test_jsonable_refuses_what_has_no_form():
+    with pytest.raises(TypeError, match="complex has no JSON form"):
+        to_jsonable([1j])
+    with pytest.raises(TypeError, match="bytes has no JSON form"):
+        to_jsonable(b"a")
+
+
+nested = st.recursive(
+    st.none() | st.booleans() | st.integers() | st.floats() | st.text(),
+    lambda inner: st.lists(inner) | st.dictionaries(st.text(), inner),
+)
+
+
+@given(nested)
+def test_jsonable_is_strict_json_and_idempotent(obj):
+    once = to_jsonable(obj)
+    assert to_jsonable(once) == once
+    assert json.loads(json.dumps(once, allow_nan=False)) == once
+
+
+@pytest.mark.parametrize("module", ["mgdd.results", "mgdd.io", "mgdd.plot", "mgdd.datasets"])
+def test_import_is_light(module):
+    heavy = "{'xarray', 'matplotlib', 'pandas', 'scipy'}"
+    code = f"import sys, {module}; print(*({heavy} & set(sys.modules)))"
+    done = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=False)
+    assert (done.returncode, done.stdout.strip()) == (0, ""), done.stderr
