@@ -24,7 +24,8 @@ extensions = [
     "numpydoc",
     "myst_nb",
 ]
-exclude_patterns = ["_build", "**.ipynb_checkpoints"]
+templates_path = ["_templates"]
+exclude_patterns = ["_build", "_templates", "**.ipynb_checkpoints"]
 suppress_warnings = ["toc.not_readable"]  # the front page fixes the order of pages, present or not
 
 # --- pages --------------------------------------------------------------------------------------------------

@@ -45,6 +45,7 @@ void bind_identify(py::module_& m) {
   py::class_<CylinderFit>(m, "CylinderFit")
       .def_property_readonly("cylinder", [](const CylinderFit& f) { return f.cylinder; })
       .def_property_readonly("loads", [](const CylinderFit& f) { return f.loads; })
+      .def_property_readonly("correlation_if_free", [](const CylinderFit& f) { return f.correlation_if_free; })
       .def_property_readonly("report", [](const CylinderFit& f) { return f.report; });
 
   m.def("load_parameters", &load_parameters, "Names that may be freed per load.");

@@ -1,9 +1,13 @@
 #include "binding.hpp"
+#include "mgdd/common/platform.hpp"
 
 PYBIND11_MODULE(_core, m) {
   using namespace mgdd::bindings;
   m.doc() = "The C++ core of mgdd. Use it through mgdd.engine, mgdd.identify and mgdd.optimize.";
   m.attr("__version__") = MGDD_VERSION;
+  m.def("compiled_simd_level", &mgdd::compiled_simd_level, "Instruction set of this build.");
+  m.def("processor_simd_levels", &mgdd::processor_simd_levels, "Vector instruction sets of this processor.");
+  m.def("compiler", [] { return std::string(MGDD_COMPILER); }, "Compiler of this build.");
   bind_errors(m);
   bind_optimize(m);
   bind_cylinder(m);

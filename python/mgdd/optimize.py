@@ -23,9 +23,7 @@ from __future__ import annotations
 
 import html
 import math
-from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
-from types import MappingProxyType
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
@@ -34,6 +32,8 @@ from mgdd import _core
 from mgdd.errors import ParameterError, ShapeError
 
 if TYPE_CHECKING:
+    from collections.abc import Callable, Sequence
+
     from numpy.typing import ArrayLike, NDArray
 
 __all__ = ["FitReport", "least_squares"]
@@ -74,7 +74,7 @@ class FitReport:
         Residual at `values`; also as `fun`.
     nfev, njev, nit : int
         Residual evaluations, Jacobian evaluations, trial steps.
-    history : mapping of str to ndarray
+    history : dict of str to ndarray
         `cost`, `damping` [-], `step_norm` and `accepted` per trial step; entry 0 is the start.
     status : str
         ``not_run``, ``cost_converged``, ``step_converged``, ``gradient_converged``, ``iteration_limit``,
@@ -117,7 +117,7 @@ class FitReport:
     nfev: int
     njev: int
     nit: int
-    history: Mapping[str, NDArray[Any]]
+    history: dict[str, NDArray[Any]]
     status: str
     message: str
     success: bool
@@ -169,7 +169,7 @@ class FitReport:
             nfev=core_report.nfev,
             njev=core_report.njev,
             nit=core_report.iterations,
-            history=MappingProxyType({key: _frozen(column) for key, column in core_report.history.items()}),
+            history={key: _frozen(column) for key, column in core_report.history.items()},
             status=core_report.status,
             message=core_report.message,
             success=core_report.success,
@@ -390,7 +390,7 @@ def _vector(value: ArrayLike, name: str) -> NDArray[np.float64]:
 
 
 def _per_parameter(value: ArrayLike, name: str, n: int) -> NDArray[np.float64]:
-    vector = _vector([value] * n if np.ndim(value) == 0 else value, name)
+    vector = _vector(np.repeat(np.asarray(value), n) if np.ndim(value) == 0 else value, name)
     if vector.size != n:
         raise ShapeError(f"{name} has {vector.size} values for the {n} of x0")
     return vector
@@ -411,7 +411,7 @@ def _fit_percent(residual: NDArray[np.float64], data: ArrayLike) -> float | None
 def _plain(value: Any) -> Any:
     if isinstance(value, np.ndarray):
         return _plain(value.tolist())
-    if isinstance(value, Mapping):
+    if isinstance(value, dict):
         return {key: _plain(item) for key, item in value.items()}
     if isinstance(value, (tuple, list)):
         return [_plain(item) for item in value]

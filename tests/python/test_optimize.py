@@ -317,8 +317,13 @@ def test_reports_are_independent_and_read_only():
         first.values[0] = 0.0
     with pytest.raises(AttributeError):
         first.cost = 0.0
-    with pytest.raises(TypeError):
-        first.history["cost"] = 0.0
+    with pytest.raises(ValueError, match="read-only"):
+        first.history["cost"][0] = 0.0
+
+
+def test_reports_survive_pickling():
+    fit = least_squares(rosenbrock, [-1.2, 1.0], names=["a", "b"])
+    assert pickle.loads(pickle.dumps(fit)).to_dict() == fit.to_dict()
 
 
 def test_history_falls_and_counts():

@@ -93,9 +93,9 @@ typename CycleModel<T>::StepCoefficients CycleModel<T>::coefficients(const T& ga
   const T inner = gamma - 1.0;
   switch (integrator_) {
     case Integrator::trapezoid: {
-      const T half = 0.5 * (v1 - v0);
-      const T denominator = 1.0 / (v1 / inner + half);
-      return {(v0 / inner - half) * denominator, denominator};
+      const T half = 0.5 * inner * (v1 - v0);
+      const T per_volume = 1.0 / (v1 + half);
+      return {(v0 - half) * per_volume, inner * per_volume};
     }
     case Integrator::split: {
       const T adiabatic = pow(v0 / v1, gamma);
@@ -167,13 +167,15 @@ void CycleModel<T>::integrate(const Charge<T>& charge, std::size_t first_burning
   work.pressure_pa[0] = pressure;
   for (std::size_t k = 0; k + 1 < n; ++k) {
     const T temperature = pressure * volume_[k] * per_gas;
-    const T loss =
-        wall.template step_j<Woschni>(pressure, temperature, wall_term_[k], motored_ratio_[k], k >= first_burning);
+    const T lead = wall.lead_j(temperature, wall_term_[k]);
+    const auto film = wall.template film<Woschni>(pressure, motored_ratio_[k], k >= first_burning);
+    const T loss = film.times(lead);
     work.heat_loss_j[k] = loss;
-    const T heat = work.heat_release_j[k] - loss;
     if constexpr (ConstantGamma) {
-      pressure = keep_[k] * pressure + gain_[k] * heat;
+      // The film is the last to be known: everything else stands ready, so that one product and one sum wait for it.
+      pressure = (keep_[k] * pressure + gain_[k] * work.heat_release_j[k]) - film.times(gain_[k] * lead);
     } else {
+      const T heat = work.heat_release_j[k] - loss;
       // gamma at the step's start, then twice at its mean temperature.
       T gamma = gamma_at(cylinder_, temperature);
       T next{};

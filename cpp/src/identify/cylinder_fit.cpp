@@ -144,6 +144,20 @@ LoadFit compare(const MeasuredCycle& trace, const engine::Cylinder& cylinder, Cy
   return fit;
 }
 
+// The report has no correlation for a parameter held at its bound; the linearised problem there has.
+Eigen::MatrixXd correlation_if_free(const optimize::FitReport& report, CylinderResidual& residual,
+                                    const optimize::LeastSquaresOptions& search) {
+  if (report.bounds_active.isZero()) return report.correlation;
+  Eigen::VectorXd r(residual.n_residuals());
+  Eigen::MatrixXd jacobian(residual.n_residuals(), residual.n_parameters());
+  if (!residual(report.values, r, &jacobian)) return report.correlation;
+  optimize::FitReport free = report;
+  free.bounds_active.setZero();
+  optimize::describe_uncertainty(free, jacobian, Eigen::VectorXd::Ones(residual.n_parameters()),
+                                 {search.correlation_limit, search.rank_tolerance});
+  return free.correlation;
+}
+
 }  // namespace
 
 std::vector<std::string> load_parameters() {
@@ -216,6 +230,7 @@ CylinderFit fit_cylinder(const std::vector<MeasuredCycle>& traces, const engine:
   optimize::LeastSquares search(describe(chosen, traces), residual.n_residuals(), options.search);
   CylinderFit fit;
   fit.report = search.solve(residual, x);
+  fit.correlation_if_free = correlation_if_free(fit.report, residual, options.search);
   fit.cylinder = residual.cylinder(fit.report.values);
   for (std::size_t t = 0; t < traces.size(); ++t) {
     fit.loads.push_back(compare(traces[t], fit.cylinder, residual, t, fit.report.values));

@@ -141,17 +141,17 @@ std::string_view explain(FitStatus status) noexcept {
     case FitStatus::not_run:
       return "the fit has not been run";
     case FitStatus::cost_converged:
-      return "converged: a further step cannot lower the cost";
+      return "no further step lowers the cost";
     case FitStatus::step_converged:
-      return "converged: the steps have become negligible";
+      return "the steps have become negligible";
     case FitStatus::gradient_converged:
-      return "converged: the gradient over the free parameters is zero";
+      return "the gradient over the free parameters is zero";
     case FitStatus::iteration_limit:
       return "stopped at the iteration limit before a tolerance was met";
     case FitStatus::evaluation_failed:
       return "the model could not be evaluated at the start";
     case FitStatus::stalled:
-      return "stalled: no step lowers the cost although the gradient is not zero (a wrong Jacobian, a noisy "
+      return "no step lowers the cost although the gradient is not zero (a wrong Jacobian, a noisy "
              "residual "
              "or the edge of where the model can be evaluated)";
   }

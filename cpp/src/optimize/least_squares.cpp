@@ -137,7 +137,6 @@ LeastSquares::LeastSquares(std::vector<Parameter> parameters, Eigen::Index n_res
   rows_.setZero(std::min(rows_at_once, n_residuals_), n_ + 1);
   step_triangle_.setZero(n_ + 1, n_ + 1);
   step_rows_.setZero(n_, n_ + 1);
-  history_.reserve(static_cast<std::size_t>(options_.max_iterations) + 1);
 }
 
 void LeastSquares::prepare(const Eigen::VectorXd& start) {
@@ -153,6 +152,7 @@ void LeastSquares::prepare(const Eigen::VectorXd& start) {
   }
   largest_norm_.setZero();
   history_.clear();
+  history_.reserve(static_cast<std::size_t>(options_.max_iterations) + 1);
   nfev_ = njev_ = iterations_ = 0;
   damping_ = options_.initial_damping;
   growth_ = 2.0;

@@ -9,6 +9,7 @@ from mgdd.io.angles import from_0_720, from_btdc
 from mgdd.io.checks import check_trace
 from mgdd.io.conditions import read_conditions
 from mgdd.io.pressure import pressure_trace, read_pressure, write_pressure
+from mgdd.io.traces import write_traces
 
 __all__ = [
     "check_trace",
@@ -18,4 +19,5 @@ __all__ = [
     "read_conditions",
     "read_pressure",
     "write_pressure",
+    "write_traces",
 ]

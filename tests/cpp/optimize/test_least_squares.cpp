@@ -32,12 +32,12 @@ std::vector<Parameter> named(Index n) {
 }
 
 MatrixXd random_matrix(std::uint64_t seed, Index rows, Index columns) {
-  std::mt19937_64 engine(seed);
+  std::mt19937_64 generator(seed);
   std::normal_distribution<double> normal;
   MatrixXd m(rows, columns);
   for (Index j = 0; j < columns; ++j) {
     for (Index i = 0; i < rows; ++i) {
-      m(i, j) = normal(engine);
+      m(i, j) = normal(generator);
     }
   }
   return m;
@@ -461,7 +461,7 @@ TEST(LeastSquares, StartThatCannotBeEvaluatedIsAStatus) {
   EXPECT_TRUE(solver.solve(rosenbrock, start).success()) << "a failed fit leaves the solver usable";
 }
 
-// log(x) = 1 from x = 0.05: the first Gauss-Newton steps land at x < 0.
+// log(x) = -3 from x = 2: the first Gauss-Newton step lands at x < 0.
 TEST(LeastSquares, RefusedEvaluationShortensTheStep) {
   int refused = 0;
   const auto model = [&](const VectorXd& x, VectorXd& r, MatrixXd* j) {
@@ -543,6 +543,18 @@ TEST(LeastSquares, StderrCoversTheTruthAsOftenAsItPromises) {
   EXPECT_NEAR(covered[0], 190, 11);
   EXPECT_NEAR(covered[1], 190, 11);
   EXPECT_GE(within_three, 195);
+}
+
+TEST(LeastSquares, CopiesSearchOnTheirOwnWithoutAllocating) {
+  const LeastSquares original(named(2), 2);
+  LeastSquares copy = original;
+  copy.prepare(vector({-1.2, 1.0}));
+  const test_support::AllocationCounter counter;
+  while (copy.iterate(rosenbrock)) {
+  }
+  EXPECT_EQ(counter.count(), 0u);
+  EXPECT_TRUE(copy.report().success());
+  EXPECT_EQ(original.report().status, FitStatus::not_run);
 }
 
 TEST(LeastSquares, LoopDoesNotAllocate) {

@@ -11,13 +11,19 @@
 namespace mgdd::engine {
 
 /// Wiebe law truncated at s = 1 and renormalised, so that X(1) = 1: [1 - exp(-a s^(m+1))]/[1 - exp(-a)] (Wiebe 1956).
+/// `complete` is 1 - exp(-a): one for a whole burn.
 template <class T>
-T wiebe_fraction(const T& s, const T& a, const T& m) noexcept {
+T wiebe_fraction(const T& s, const T& a, const T& m, const T& complete) noexcept {
   using std::exp;
   using std::pow;
   if (value_of(s) <= 0.0) return T(0.0);
   if (value_of(s) >= 1.0) return T(1.0);
-  return (1.0 - exp(-(a * pow(s, m + 1.0)))) / (1.0 - exp(-a));
+  return (1.0 - exp(-(a * pow(s, m + 1.0)))) / complete;
+}
+template <class T>
+T wiebe_fraction(const T& s, const T& a, const T& m) noexcept {
+  using std::exp;
+  return wiebe_fraction(s, a, m, T(1.0 - exp(-a)));
 }
 
 /// Triangular heat release, peak 2 E / duration at half the duration. Tan 2018, eqs 2-7 to 2-10, print a slope that
@@ -36,12 +42,16 @@ struct Burn {
   BurnShape shape;
   T soc_cad, duration_cad;
   T a, m;                                                     // Wiebe
+  T complete{1.0};                                            // 1 - exp(-a)
   T second_fraction, second_delay_cad, second_duration_cad, second_m;  // double Wiebe (Miyamoto et al. 1985)
 
   Burn(const BasicCylinder<T>& c, const T& soc, const T& duration) noexcept
       : shape(c.burn_shape), soc_cad(soc), duration_cad(duration), a(c.wiebe_a), m(c.wiebe_m),
         second_fraction(c.second_fraction), second_delay_cad(c.second_delay_cad),
-        second_duration_cad(c.second_duration_cad), second_m(c.second_wiebe_m) {}
+        second_duration_cad(c.second_duration_cad), second_m(c.second_wiebe_m) {
+    using std::exp;
+    if (shape != BurnShape::triangle) complete = 1.0 - exp(-a);
+  }
 
   /// First and last angle with heat release.
   double start_cad() const noexcept {
@@ -63,12 +73,13 @@ struct Burn {
       case BurnShape::triangle:
         return triangle_fraction(s);
       case BurnShape::wiebe:
-        return wiebe_fraction(s, a, m);
+        return wiebe_fraction(s, a, m, complete);
       case BurnShape::double_wiebe:
         break;
     }
     const T s2 = (crank_angle_cad - soc_cad - second_delay_cad) / second_duration_cad;
-    return (1.0 - second_fraction) * wiebe_fraction(s, a, m) + second_fraction * wiebe_fraction(s2, a, second_m);
+    return (1.0 - second_fraction) * wiebe_fraction(s, a, m, complete) +
+           second_fraction * wiebe_fraction(s2, a, second_m, complete);
   }
 
   /// Angle at which the fraction x in (0, 1) is burned: closed form, for the double Wiebe bisection plus one Newton
@@ -82,7 +93,7 @@ struct Burn {
       return soc_cad + duration_cad * (x <= 0.5 ? std::sqrt(0.5 * x) : 1.0 - std::sqrt(0.5 * (1.0 - x)));
     }
     if (shape == BurnShape::wiebe) {
-      return soc_cad + duration_cad * pow(-log(1.0 - x * (1.0 - exp(-a))) / a, 1.0 / (m + 1.0));
+      return soc_cad + duration_cad * pow(-log(1.0 - x * complete) / a, 1.0 / (m + 1.0));
     }
     double low = start_cad();
     double high = end_cad();

@@ -5,6 +5,7 @@
 #include <cmath>
 
 #include "mgdd/common/dual.hpp"
+#include "mgdd/common/fast_power.hpp"
 #include "mgdd/common/units.hpp"
 #include "mgdd/engine/cylinder.hpp"
 #include "mgdd/engine/geometry.hpp"
@@ -46,12 +47,18 @@ T hohenberg_coefficient(const T& c1_bar_m3, const T& volume_m3, const T& pressur
          pow(piston_speed_m_per_s + 1.4, 0.8);
 }
 
-// w^0.8 as exp(0.8 ln w): cheaper than pow and equal to 2e-15 over any gas velocity.
-inline double four_fifths_power(double w) noexcept { return std::exp(0.8 * std::log(w)); }
+// Both powers stand in the chain from one pressure to the next, where std::pow would be the longest link.
+inline double four_fifths_power(double x) noexcept { return fast_power<4, 5>(x); }
+inline double two_fifths_power(double x) noexcept { return fast_power<2, 5>(x); }
 template <int N>
-Dual<N> four_fifths_power(const Dual<N>& w) noexcept {
-  const double y = four_fifths_power(w.value);
-  return chain(y, 0.8 * y / w.value, w);
+Dual<N> four_fifths_power(const Dual<N>& x) noexcept {
+  const double y = four_fifths_power(x.value);
+  return chain(y, 0.8 * y / x.value, x);
+}
+template <int N>
+Dual<N> two_fifths_power(const Dual<N>& x) noexcept {
+  const double y = two_fifths_power(x.value);
+  return chain(y, 0.4 * y / x.value, x);
 }
 
 /// Wall heat of one cycle. With T = p V/(N R), Woschni's p^0.8 T^-0.55 is p^0.25 V^-0.55 (N R)^0.55 and Hohenberg's
@@ -69,7 +76,7 @@ class WallHeat {
   /// `ref_pressure_pa` is p(IVC); `gas_j_per_k` is N R.
   WallHeat(const BasicCylinder<T>& c, const Geometry<T>& g, const T& ref_pressure_pa, const T& gas_j_per_k,
            const T& speed_rpm) noexcept
-      : wall_k_(c.wall_temperature_k), per_reference_(1.0 / ref_pressure_pa) {
+      : wall_k_(c.wall_temperature_k) {
     using std::pow;
     const T piston_speed = g.mean_piston_speed_m_per_s(speed_rpm);
     const T per_cad = 1.0 / (units::cad_per_s_per_rpm * speed_rpm);
@@ -77,7 +84,8 @@ class WallHeat {
     if (c.wall_heat_model == WallHeatModel::woschni) {
       still_ = c.woschni_c2 * piston_speed;
       // Cp Vs T_ref/(p_ref V_ref) (p - p_mot) with T_ref = p_ref V_ref/(N R).
-      burning_ = c.woschni_cp_m_per_sk * g.swept_m3 * ref_pressure_pa / gas_j_per_k;
+      burning_per_pa_ = c.woschni_cp_m_per_sk * g.swept_m3 / gas_j_per_k;
+      burning_ = burning_per_pa_ * ref_pressure_pa;
       still_power_ = four_fifths_power(still_);
       scale_ = c.wall_heat_scale * woschni_c1_bar_m * bar * pow(g.bore_m, -0.2) * pow(gas_j_per_k, 0.55) * per_cad;
     } else {
@@ -86,28 +94,51 @@ class WallHeat {
     }
   }
 
-  /// Heat lost in one step [J], positive from gas to wall. `motored_ratio` is p_mot / p_ref.
+  /// The heat of a step is `lead_j` times `film`: two factors, because the first is ready long before the second.
+  T lead_j(const T& temperature_k, const T& volume_term) const noexcept {
+    return scale_ * volume_term * (temperature_k - wall_k_);
+  }
+
+  /// p^0.25 w^0.8 (Woschni) or p^0.4 (Hohenberg), as factors.
   template <bool Woschni>
-  T step_j(const T& pressure_pa, const T& temperature_k, const T& volume_term, const T& motored_ratio,
-           bool burning) const noexcept {
-    using std::pow;
-    using std::sqrt;
-    const T lead = scale_ * volume_term * (temperature_k - wall_k_);
-    if constexpr (Woschni) {
-      const T film = lead * sqrt(sqrt(pressure_pa));
-      if (burning) {
-        const T rise = pressure_pa * per_reference_ - motored_ratio;
-        if (value_of(rise) > 0.0) return film * four_fifths_power(still_ + burning_ * rise);
+  struct Film {
+    T of_pressure, of_velocity;  // the second only for Woschni
+    T times(const T& factor) const noexcept {
+      if constexpr (Woschni) {
+        return factor * of_pressure * of_velocity;  // the last to be known comes last
+      } else {
+        return factor * of_pressure;
       }
-      return film * still_power_;
+    }
+  };
+
+  /// `motored_ratio` is p_mot / p_ref.
+  template <bool Woschni>
+  Film<Woschni> film(const T& pressure_pa, const T& motored_ratio, bool burning) const noexcept {
+    using std::sqrt;
+    if constexpr (Woschni) {
+      const T root = sqrt(sqrt(pressure_pa));
+      if (burning) {
+        // still + Cp Vs T_ref/(p_ref V_ref) (p - p_mot), the part without p first: it does not wait for the pressure.
+        const T velocity = (still_ - burning_ * motored_ratio) + burning_per_pa_ * pressure_pa;
+        if (velocity > still_) return {root, four_fifths_power(velocity)};
+      }
+      return {root, still_power_};
     } else {
-      return lead * pow(pressure_pa, 0.4);
+      return {two_fifths_power(pressure_pa), {}};
     }
   }
 
+  /// Heat lost in one step [J], positive from gas to wall.
+  template <bool Woschni>
+  T step_j(const T& pressure_pa, const T& temperature_k, const T& volume_term, const T& motored_ratio,
+           bool burning) const noexcept {
+    return film<Woschni>(pressure_pa, motored_ratio, burning).times(lead_j(temperature_k, volume_term));
+  }
+
  private:
-  T scale_, wall_k_, per_reference_;
-  T still_{}, burning_{}, still_power_{};
+  T scale_, wall_k_;
+  T still_{}, burning_{}, burning_per_pa_{}, still_power_{};
 };
 
 }  // namespace mgdd::engine

@@ -91,6 +91,7 @@ struct CylinderFit {
   engine::Cylinder cylinder;  ///< with the common parameters fitted; burn shape fields stay the start's
   std::vector<LoadFit> loads;
   optimize::FitReport report;
+  Eigen::MatrixXd correlation_if_free;  ///< as the report's, but with parameters at a bound taken as free there
 };
 
 /// Names that may be freed per load, and those that may be freed for all loads (cylinder fields).

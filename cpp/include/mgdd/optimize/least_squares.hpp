@@ -28,8 +28,8 @@ struct Parameter {
 struct LeastSquaresOptions {
   /// Trial steps. Well-posed fits need 5 to 50; curved valleys from far away stay below 200.
   int max_iterations = 200;
-  /// Relative decrease of the cost. 1e-12 is a relative change of 1e-6 in a parameter measured in its own
-  /// stderr.
+  /// Relative decrease of the cost. 1e-12 is a move of 1e-6 sqrt(degrees of freedom) stderr: not worth a
+  /// step.
   double cost_tolerance = 1e-12;
   /// Step over parameters, both scaled. Ten digits: far below any stderr, above the rounding of a simulation.
   double step_tolerance = 1e-10;

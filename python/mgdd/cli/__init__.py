@@ -1,0 +1,7 @@
+"""The command line: `mgdd demo`, `mgdd engine simulate | analyze | calibrate | optimum`, `mgdd doctor`."""
+
+from __future__ import annotations
+
+from mgdd.cli.main import main
+
+__all__ = ["main"]

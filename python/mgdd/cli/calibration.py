@@ -1,0 +1,125 @@
+"""`mgdd engine calibrate`: the fit, the comparison of burn laws, and the report in words."""
+
+from __future__ import annotations
+
+import argparse
+from typing import Any
+
+from mgdd.cli.options import engine_of, traces_of
+from mgdd.cli.output import check_output, emit, progress
+from mgdd.identify import CylinderFit, WallHeatProfile, fit_cylinder, wall_heat_profile
+from mgdd.report import write_report
+from mgdd.studies import compare_laws, run_measured_traces
+from mgdd.studies.measured_traces import law_row
+
+__all__ = ["calibrate"]
+
+_PER_TRACE = (
+    "file p_max_bar rmse_bar rmse_percent imep_closed_error_percent soc_cad burn_duration_cad fuel_heat_j ca50_cad "
+    "largest_error_bar largest_error_cad heat_loss_fraction"
+).split()
+
+
+def calibrate(args: argparse.Namespace) -> None:
+    """Fit, judge, compare, print."""
+    check_output(args, csv=False)
+    cylinder, point, _ = engine_of(args)
+    traces = traces_of(args)
+    free = [name.strip() for name in args.free.split(",")] if args.free else None
+    scheme: dict[str, Any] = {"step_cad": args.step_cad, "integrator": args.integrator}
+    with progress(args) as step:
+        step("calibrate")
+        fit = fit_cylinder(traces, cylinder, free=free, point=point, **scheme)
+        profile = None
+        if "wall_heat_scale" in fit.report.names:
+            profile = wall_heat_profile(traces, fit, point=point, free=free, progress=step, **scheme)
+        laws = compare_laws(traces, cylinder, point=point, progress=step, **scheme)
+        if args.report_folder:
+            result = run_measured_traces(traces, cylinder, point=point, progress=step)
+            write_report(result, args.report_folder)
+    payload = _payload(fit, profile, laws)
+    emit(args, payload, text=payload["report"])
+
+
+def _payload(fit: CylinderFit, profile: WallHeatProfile | None, laws: list[CylinderFit]) -> dict[str, Any]:
+    traces = []
+    with_soi = any(load.soi_cad == load.soi_cad for load in fit.loads)
+    for load in fit.loads:
+        values = load.to_dict()
+        row = {name: values[name] for name in _PER_TRACE}
+        if with_soi:
+            row |= {"soi_cad": load.soi_cad, "onset_against_soi_cad": load.onset_against_soi_cad}
+        shape = load.cylinder.to_dict()
+        row |= {name: shape[name] for name in fit.cylinder.fields() if _was_fitted(fit, name)}
+        traces.append(row)
+    scale: dict[str, Any] = {"value": fit.cylinder.wall_heat_scale, "stderr": None, "identifiable": None}
+    unidentifiable = set(fit.report.unidentifiable)
+    if profile is not None:
+        scale = profile.to_dict()
+        unidentifiable |= set() if profile.identifiable else {"wall_heat_scale"}
+    common = {"wall_heat_scale": scale}
+    for name in fit.report.names:
+        if "[" not in name and name != "wall_heat_scale":
+            at = fit.report.names.index(name)
+            common[name] = {
+                "value": float(fit.report.values[at]),
+                "stderr": float(fit.report.stderr[at]),
+                "identifiable": name not in unidentifiable,
+            }
+    ordered = [name for name in fit.report.names if name in unidentifiable]
+    return {
+        "law": fit.burn_law,
+        "status": fit.report.status,
+        "traces": traces,
+        "common": common,
+        "unidentifiable": ordered,
+        "laws": [law_row(law) for law in laws],
+        "warnings": list(fit.warnings),
+        "cylinder": fit.cylinder.to_dict(),
+        "report": _report(fit, profile, laws, ordered),
+    }
+
+
+def _was_fitted(fit: CylinderFit, name: str) -> bool:
+    return any(parameter.startswith(f"{name}[") for parameter in fit.report.names)
+
+
+def _report(
+    fit: CylinderFit, profile: WallHeatProfile | None, laws: list[CylinderFit], unidentifiable: list[str]
+) -> str:
+    out = [f"Calibration with {fit.burn_law}: {fit.report.message}", ""]
+    out += _loads(fit)
+    if profile is not None:
+        verdict = "identifiable" if profile.identifiable else "not identifiable from these traces"
+        out += [
+            "",
+            f"wall-heat scale {profile.value:.3f} +- {profile.stderr:.3f} (strongest correlation {profile.correlation:+.2f} "
+            f"with {profile.correlated_with}): {verdict}",
+            *(f"  {reason}" for reason in profile.reasons),
+        ]
+    if unidentifiable:
+        out += ["", f"not identifiable: {', '.join(unidentifiable)}"]
+    if fit.warnings:
+        out += ["", "what to distrust:", *(f"  - {text}" for text in fit.warnings)]
+    out += ["", "every burn law on the same traces:"]
+    for law in laws:
+        out += ["", f"{law.burn_law}  (wall-heat scale {law.cylinder.wall_heat_scale:.2f})", *_loads(law)]
+        out += [f"  - {text}" for text in law.warnings]
+    return "\n".join(out)
+
+
+def _loads(fit: CylinderFit) -> list[str]:
+    onset = any(load.soi_cad == load.soi_cad for load in fit.loads)
+    last = f" {'SOC - SOI':>10}" if onset else ""
+    out = [
+        f"  {'trace':24} {'RMSE [%]':>9} {'IMEP err [%]':>13} {'SOC':>7} {'duration':>9} {'heat [J]':>9} {'CA50':>7}"
+        f" {'largest error':>20}{last}"
+    ]
+    for load in fit.loads:
+        error = f"{load.largest_error_bar:+.1f} bar at {load.largest_error_cad:.0f}"
+        late = f" {load.onset_against_soi_cad:+10.1f}" if onset else ""
+        out.append(
+            f"  {load.file:24} {load.rmse_percent:9.2f} {load.imep_closed_error_percent:+13.1f} {load.soc_cad:7.2f} "
+            f"{load.burn_duration_cad:9.1f} {load.fuel_heat_j:9.0f} {load.ca50_cad:7.1f} {error:>20}{late}"
+        )
+    return out

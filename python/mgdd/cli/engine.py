@@ -1,0 +1,211 @@
+"""`mgdd engine simulate | analyze | calibrate | optimum`."""
+
+from __future__ import annotations
+
+import argparse
+import math
+from typing import Any
+
+from mgdd._core import Cylinder, OperatingPoint
+from mgdd.cli.calibration import calibrate
+from mgdd.cli.options import (
+    add_command,
+    add_engine,
+    add_files,
+    add_scheme,
+    engine_of,
+    number_pairs,
+    traces_of,
+)
+from mgdd.cli.output import check_output, emit, lines, progress
+from mgdd.engine import analyze, optimum, simulate, start_of_combustion, start_of_injection, timing_sweep
+from mgdd.errors import ConvergenceError, ParameterError
+from mgdd.studies import best_timing
+
+__all__ = ["add"]
+
+_DEFAULT_SOC_CAD = -6.0
+
+
+def add(commands: Any) -> None:
+    """Add the group and its four commands."""
+    group = commands.add_parser("engine", help="one cycle: simulate, analyze, calibrate, optimum")
+    group.set_defaults(parser=group)
+    verbs = group.add_subparsers(title="commands", metavar="COMMAND")
+    _add_simulate(verbs)
+    _add_analyze(verbs)
+    _add_calibrate(verbs)
+    _add_optimum(verbs)
+
+
+def _add_simulate(verbs: Any) -> None:
+    parser = add_command(
+        verbs, "simulate", _simulate,
+        help_text="simulate one closed cycle and print its indicators; -o FILE.csv writes the traces",
+        example="mgdd engine simulate --preset puma_single --soc-cad -6 --json",
+    )  # fmt: skip
+    timing = parser.add_mutually_exclusive_group()
+    timing.add_argument(
+        "--soc-cad", type=float, metavar="X", help=f"start of combustion [°CA aTDC] (default: {_DEFAULT_SOC_CAD:g})"
+    )
+    timing.add_argument("--soi-cad", type=float, metavar="X", help="start of injection [°CA aTDC]; the delay model adds on")
+    add_engine(parser)
+    add_scheme(parser, step_cad=1.0)
+
+
+def _simulate(args: argparse.Namespace) -> None:
+    check_output(args, csv=True)
+    cylinder, point, preset = engine_of(args)
+    soc = _start_of_combustion(args, cylinder, point)
+    cycle = simulate(cylinder, point, soc_cad=soc, step_cad=args.step_cad, integrator=args.integrator)
+    scalars = {name: float(v) for name, v in cycle.data_vars.items() if v.ndim == 0}
+    soi = args.soi_cad if args.soi_cad is not None else _injection_of(cylinder, point, soc)
+    payload = {
+        "preset": preset.name,
+        "integrator": args.integrator,
+        "step_cad": args.step_cad,
+        **scalars,
+        "soi_cad": soi,
+        "motored": point.fuel_mg == 0.0,
+    }
+    emit(args, payload, traces=cycle)
+
+
+def _injection_of(cylinder: Cylinder, point: OperatingPoint, soc: float) -> float:
+    timing = start_of_injection(cylinder, point, soc_cad=soc)
+    return math.nan if timing.clipped else timing.soi_cad
+
+
+def _start_of_combustion(args: argparse.Namespace, cylinder: Cylinder, point: OperatingPoint) -> float:
+    if args.soi_cad is None:
+        return _DEFAULT_SOC_CAD if args.soc_cad is None else float(args.soc_cad)
+    timing = start_of_combustion(cylinder, point, soi_cad=args.soi_cad)
+    if not timing.ignites:
+        raise ConvergenceError(f"soi_cad = {args.soi_cad:g} does not ignite before EVO: inject earlier")
+    return timing.soc_cad
+
+
+def _add_analyze(verbs: Any) -> None:
+    parser = add_command(
+        verbs, "analyze", _analyze,
+        help_text="analyse a measured pressure trace: pegging, heat release, burn angles, work",
+        example="mgdd engine analyze mean.csv --preset hd_diesel_128x144 --pressure-unit Pa --json",
+    )  # fmt: skip
+    add_files(parser, nargs=1)
+    group = parser.add_argument_group("analysis")
+    group.add_argument("--pegging", choices=("none", "inlet", "two_point", "least_squares"), default="none")
+    group.add_argument("--pegging-exponent", type=float, default=1.35, metavar="X", help="default: 1.35")
+    group.add_argument("--inlet-pressure-kpa", type=float, metavar="X", help="for pegging inlet (default: the point's)")
+    group.add_argument(
+        "--analysis-gamma", type=float, metavar="X",
+        help="constant gamma of the heat release (default: 1.33, or the law that --gamma names)",
+    )  # fmt: skip
+    group.add_argument("--heat-window-cad", type=float, nargs=2, metavar=("FROM", "TO"), help="default: -10 90")
+    group.add_argument("--fractions", choices=("net", "gross"), default="net", help="heat that CA10/50/90 refer to")
+    add_engine(parser)
+
+
+def _analyze(args: argparse.Namespace) -> None:
+    check_output(args, csv=True)
+    cylinder, point, _ = engine_of(args)
+    (trace,) = traces_of(args)
+    gamma: float | str = 1.33 if args.gamma is None else "cylinder"
+    if args.analysis_gamma is not None:
+        if args.gamma is not None:
+            raise ParameterError("--analysis-gamma and --gamma contradict each other: give one")
+        gamma = args.analysis_gamma
+    result = analyze(
+        trace,
+        cylinder,
+        point=point,
+        pegging=args.pegging,
+        pegging_exponent=args.pegging_exponent,
+        inlet_pressure_kpa=args.inlet_pressure_kpa,
+        gamma=gamma,
+        heat_window_cad=tuple(args.heat_window_cad) if args.heat_window_cad else None,
+        fractions=args.fractions,
+    )
+    named = gamma if args.gamma is None else (cylinder.gamma if args.gamma == "constant" else args.gamma)
+    payload = {
+        "file": result.attrs["file"],
+        **{name: float(v) for name, v in result.data_vars.items() if v.ndim == 0},
+        "method": result.attrs["method"],
+        "gamma": named,
+        "fractions": result.attrs["fractions"],
+        "warnings": list(result.attrs["warnings"]),
+    }
+    emit(args, payload, traces=result)
+
+
+def _add_calibrate(verbs: Any) -> None:
+    parser = add_command(
+        verbs, "calibrate", calibrate,
+        help_text="calibrate the cycle model to measured traces, and say what the fit cannot tell",
+        example="mgdd engine calibrate a25.csv a50.csv --preset hd_diesel_128x144 --conditions conditions.csv --json",
+    )  # fmt: skip
+    add_files(parser, nargs="+")
+    parser.add_argument("--free", metavar="NAME[,NAME]", help="parameters to fit (default: the law's own and wall_heat_scale)")
+    parser.add_argument("--report-folder", metavar="DIR", help="also write index.html and summary.json there")
+    add_engine(parser)
+    add_scheme(parser, step_cad=0.25)
+
+
+def _add_optimum(verbs: Any) -> None:
+    parser = add_command(
+        verbs, "optimum", _optimum,
+        help_text="find the best start of combustion of the model, or of measured traces after calibration",
+        example="mgdd engine optimum --preset puma_single --limit p_max_bar=95 --json",
+    )  # fmt: skip
+    add_files(parser, nargs="*")
+    parser.add_argument(
+        "--objective", choices=("efficiency_gross", "imep_gross_bar", "imep_closed_bar"),
+        help="default: efficiency_gross; with files imep_closed_bar, the work that a closed-valve trace carries",
+    )  # fmt: skip
+    parser.add_argument("--limit", action="append", default=[], metavar="NAME=X", help="upper limit on an indicator, repeatable")
+    parser.add_argument("--bounds-cad", type=float, nargs=2, default=(-30.0, 10.0), metavar=("LOW", "HIGH"))
+    add_engine(parser)
+    add_scheme(parser, step_cad=1.0)
+
+
+def _optimum(args: argparse.Namespace) -> None:
+    check_output(args, csv=not args.files)
+    cylinder, point, preset = engine_of(args)
+    limits = number_pairs(args.limit, "--limit")
+    if args.files:
+        _optimum_of_files(args, cylinder, point, limits)
+        return
+    scheme = {"step_cad": args.step_cad, "integrator": args.integrator}
+    best = optimum(
+        cylinder,
+        point,
+        args.objective or "efficiency_gross",
+        limits=limits,
+        bounds_cad=(args.bounds_cad[0], args.bounds_cad[1]),
+        **scheme,
+    )
+    now = simulate(cylinder, point, soc_cad=best.soc_cad, **scheme)
+    names = ("soc_cad", "ca50_cad", "efficiency_gross", "curvature_per_cad2", "objective", "value", "limits")
+    payload = {name: getattr(best, name) for name in names}
+    payload |= {"active_limits": list(best.active_limits), "at_bound": best.at_bound, "preset": preset.name}
+    payload |= {name: float(now[name]) for name in ("imep_gross_bar", "p_max_bar", "dp_max_bar_per_cad", "t_max_k")}
+    payload["soi_cad"] = _injection_of(cylinder, point, best.soc_cad)
+    sweep = timing_sweep(cylinder, point, **scheme) if args.output and args.output.endswith(".csv") else None
+    emit(args, payload, traces=sweep)
+
+
+def _optimum_of_files(
+    args: argparse.Namespace, cylinder: Cylinder, point: OperatingPoint, limits: dict[str, float]
+) -> None:
+    traces = traces_of(args)
+    with progress(args) as step:
+        rows = best_timing(
+            traces, cylinder, point=point, objective=args.objective or "imep_closed_bar", limits=limits, progress=step
+        )
+    text = "\n\n".join(
+        f"{row['file']}\n" + lines({k: f"{v[0]:.2f} to {v[1]:.2f}" for k, v in row.items() if _is_range(v)}) for row in rows
+    )
+    emit(args, {"wall_heat_scale": rows[0]["wall_heat_scale"], "traces": rows}, text=text)
+
+
+def _is_range(value: object) -> bool:
+    return isinstance(value, list) and len(value) == 2 and all(isinstance(v, float) for v in value)

@@ -1,0 +1,176 @@
+"""Options that several commands share, and the records that they make."""
+
+from __future__ import annotations
+
+import argparse
+from collections.abc import Callable, Sequence
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+from mgdd import presets
+from mgdd._core import Cylinder, OperatingPoint
+from mgdd.errors import DataError, ParameterError
+from mgdd.io import read_conditions, read_pressure
+
+if TYPE_CHECKING:
+    import xarray as xr
+
+__all__ = ["add_command", "add_engine", "add_files", "add_scheme", "engine_of", "number_pairs", "traces_of"]
+
+_POINT = tuple(OperatingPoint.fields())
+_CYLINDER_CHOICES = {
+    "burn": ("burn_shape", ("triangle", "wiebe", "double_wiebe")),
+    "gamma": ("gamma_model", ("constant", "linear", "polynomial")),
+    "wall_heat": ("wall_heat_model", ("woschni", "hohenberg")),
+    "ignition": ("ignition_model", ("watson", "wolfer", "hardenberg_hase", "polynomial")),
+}
+
+
+def add_command(
+    commands: Any, name: str, run: Callable[[argparse.Namespace], None], *, help_text: str, example: str
+) -> argparse.ArgumentParser:
+    """Add a command with its example, its JSON switch and its output file."""
+    parser: argparse.ArgumentParser = commands.add_parser(
+        name,
+        help=help_text,
+        description=help_text,
+        epilog=f"example:\n  {example}",
+        formatter_class=argparse.RawDescriptionHelpFormatter,
+    )
+    parser.add_argument("--json", action="store_true", help="one JSON object on stdout and nothing else")
+    parser.add_argument("-o", "--output", metavar="FILE", help="write the result to FILE (.json or .csv)")
+    parser.add_argument("--quiet", action="store_true", help="no progress on stderr")
+    parser.set_defaults(run=run, parser=parser)
+    return parser
+
+
+def add_engine(parser: argparse.ArgumentParser) -> None:
+    """Add the options of a cylinder and an operating point; their names are those of the parameters."""
+    group = parser.add_argument_group("engine")
+    group.add_argument(
+        "--preset", default="puma_single", metavar="NAME_OR_FILE.toml",
+        help=f"{', '.join(presets.available())} or a TOML file (default: puma_single)",
+    )  # fmt: skip
+    group.add_argument(
+        "--set", action="append", default=[], metavar="FIELD=VALUE",
+        help="any field of the cylinder or point, repeatable, for example bore_mm=90",
+    )  # fmt: skip
+    for field, info in OperatingPoint.fields().items():
+        unit = "" if info["unit"] == "-" else f" [{info['unit']}]"
+        group.add_argument(_dashed(field), type=float, metavar="X", help=f"{info['meaning']}{unit}")
+    group.add_argument("--motored", action="store_true", help="no fuel")
+    for option, (field, choices) in _CYLINDER_CHOICES.items():
+        group.add_argument(_dashed(option), choices=choices, help=Cylinder.fields()[field]["meaning"])
+
+
+def add_scheme(parser: argparse.ArgumentParser, *, step_cad: float) -> None:
+    """Add integrator and crank step."""
+    group = parser.add_argument_group("scheme")
+    group.add_argument("--integrator", choices=("trapezoid", "split", "seed", "euler"), default="trapezoid")
+    group.add_argument(
+        "--step-cad", type=float, default=step_cad, metavar="X", help=f"crank step, 0.001 to 5 (default: {step_cad:g})"
+    )
+
+
+def add_files(parser: argparse.ArgumentParser, *, nargs: str) -> None:
+    """Add pressure files and how to read them."""
+    parser.add_argument("files", nargs=nargs, metavar="FILE", help="pressure trace: CSV or two plain columns")
+    group = parser.add_argument_group("files")
+    group.add_argument("--pressure-unit", choices=("bar", "kPa", "Pa"), default="bar", help="default: bar")
+    group.add_argument("--pressure-column", default="1", metavar="NAME", help="column name, or number from 0 (default: 1)")
+    group.add_argument("--angle-column", default="0", metavar="NAME", help="column name, or number from 0 (default: 0)")
+    group.add_argument("--angle-unit", choices=("deg", "rad"), default="deg", help="default: deg")
+    group.add_argument(
+        "--firing-tdc-deg", type=float, metavar="X", help="angle of firing TDC in files that count from elsewhere"
+    )
+    group.add_argument(
+        "--conditions", metavar="FILE.csv", help="columns file,speed_rpm,trapped_mass_g,soi_cad: one row per trace"
+    )
+
+
+def engine_of(args: argparse.Namespace) -> tuple[Cylinder, OperatingPoint, presets.Preset]:
+    """Make cylinder and point from a preset and the options over it."""
+    preset = presets.load(args.preset)
+    cylinder: dict[str, Any] = {}
+    point: dict[str, Any] = {}
+    for item in args.set:
+        name, value = _pair(item, "--set", "FIELD=VALUE")
+        (point if name in _POINT else cylinder)[name] = _value(name, value)
+    for option, (field, _) in _CYLINDER_CHOICES.items():
+        if getattr(args, option) is not None:
+            cylinder[field] = getattr(args, option)
+    for field in _POINT:
+        if getattr(args, field) is not None:
+            point[field] = getattr(args, field)
+    if args.motored:
+        if point.get("fuel_mg"):
+            raise ParameterError(f"--motored and --fuel-mg {point['fuel_mg']:g} contradict each other: give one")
+        point["fuel_mg"] = 0.0
+    return preset.cylinder.replace(**cylinder), preset.point.replace(**point), preset
+
+
+def traces_of(args: argparse.Namespace) -> list[xr.Dataset]:
+    """Read the pressure files, with their conditions as attributes."""
+    conditions = read_conditions(args.conditions) if args.conditions else {}
+    unused = set(conditions)
+    traces = []
+    for file in args.files:
+        trace = read_pressure(
+            file,
+            angle_column=_column(args.angle_column),
+            pressure_column=_column(args.pressure_column),
+            angle_unit=args.angle_unit,
+            pressure_unit=args.pressure_unit,
+            firing_tdc_deg=args.firing_tdc_deg,
+        )
+        if conditions:
+            key = next((k for k in (file, Path(file).name, Path(file).stem) if k in conditions), None)
+            if key is None:
+                raise DataError(
+                    f"{args.conditions}: no row for {file}: its column 'file' holds {', '.join(map(repr, conditions))}"
+                )
+            trace = trace.assign_attrs(**conditions[key])
+            unused.discard(key)
+        traces.append(trace)
+    if unused:
+        raise DataError(f"{args.conditions}: rows without a trace: {', '.join(sorted(unused))}")
+    return traces
+
+
+def number_pairs(items: Sequence[str], option: str) -> dict[str, float]:
+    """Read repeated NAME=NUMBER options."""
+    out = {}
+    for item in items:
+        name, value = _pair(item, option, "NAME=NUMBER")
+        number = _value(name, value)
+        if isinstance(number, str):
+            raise ParameterError(f"{option} {item}: {value!r} is no number")
+        out[name] = number
+    return out
+
+
+def _dashed(name: str) -> str:
+    return "--" + name.replace("_", "-")
+
+
+def _pair(item: str, option: str, form: str) -> tuple[str, str]:
+    name, sign, value = item.partition("=")
+    if not (sign and name.strip() and value.strip()):
+        raise ParameterError(f"{option} {item}: write {form}")
+    return name.strip().replace("-", "_"), value.strip()
+
+
+def _value(name: str, text: str) -> float | str:
+    fields = {**Cylinder.fields(), **OperatingPoint.fields()}
+    if "choices" in fields.get(name, {}):
+        return text
+    try:
+        return float(text)
+    except ValueError:
+        if name in fields:
+            raise ParameterError(f"{name} = {text!r}: must be a number [{fields[name]['unit']}]") from None
+        return text
+
+
+def _column(text: str) -> int | str:
+    return int(text) if text.isdigit() else text

@@ -1,0 +1,362 @@
+"""Calibration of the cycle model to measured pressure traces."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, field, replace
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+
+from mgdd import _core
+from mgdd._core import Cylinder, OperatingPoint
+from mgdd.errors import DataError, ParameterError
+from mgdd.optimize import FitReport
+from mgdd.results import ANGLE, labelled_dataset
+
+if TYPE_CHECKING:
+    import xarray as xr
+
+__all__ = ["CylinderFit", "LoadFit", "fit_cylinder"]
+
+SHAPE_FIELDS = ("wiebe_m", "second_fraction", "second_delay_cad", "second_duration_cad", "second_wiebe_m")
+BURN_FIELDS = ("soc_cad", "burn_duration_cad", "fuel_heat_j")
+# An IMEP error beyond this share makes efficiency and timing doubtful, whatever the pressure RMSE says.
+_IMEP_LIMIT_PERCENT = 3.0
+
+
+@dataclass(frozen=True, kw_only=True)
+class LoadFit:
+    """One load of a calibration: its burn and how well the model meets the measurement.
+
+    Parameters
+    ----------
+    file : str
+        Name of the trace.
+    point : OperatingPoint
+        Conditions, with the fitted fuel and burn duration, ready for `mgdd.engine.simulate`.
+    cylinder : Cylinder
+        The fitted cylinder with the burn shape of this load.
+    soc_cad, burn_duration_cad, fuel_heat_j : float
+        Fitted burn: start [°CA aTDC], duration [°CA], heat [J].
+    soi_cad : float
+        Start of injection [°CA aTDC]; NaN if unknown.
+    onset_against_soi_cad : float
+        SOC minus SOI [°CA]; a negative one burns before the injection. NaN if SOI is unknown.
+    ca50_cad : float
+        Angle of half burned of the burn law [°CA aTDC].
+    p_max_bar : float
+        Highest measured sample [bar].
+    rmse_bar, rmse_percent : float
+        Pressure error of the closed cycle [bar], [% of p_max].
+    imep_closed_bar, imep_closed_error_percent : float
+        Measured closed-cycle IMEP [bar] and the model's error [%].
+    largest_error_bar, largest_error_cad : float
+        Largest local error, model minus measured [bar], and its angle [°CA aTDC].
+    heat_loss_fraction : float
+        Modelled wall heat over fuel heat [-].
+    overlay : xarray.Dataset
+        ``measured_bar``, ``model_bar``, ``residual_bar`` over ``crank_angle_cad``.
+
+    Examples
+    --------
+    >>> from mgdd import datasets, presets
+    >>> from mgdd.identify import fit_cylinder
+    >>> fit = fit_cylinder(datasets.load_hd_traces()[:1], presets.load("hd_diesel_128x144").cylinder)
+    >>> fit.loads[0].rmse_percent < 1.0
+    True
+    """
+
+    file: str
+    point: OperatingPoint
+    cylinder: Cylinder
+    soc_cad: float
+    burn_duration_cad: float
+    fuel_heat_j: float
+    soi_cad: float
+    onset_against_soi_cad: float
+    ca50_cad: float
+    p_max_bar: float
+    rmse_bar: float
+    rmse_percent: float
+    imep_closed_bar: float
+    imep_closed_error_percent: float
+    largest_error_bar: float
+    largest_error_cad: float
+    heat_loss_fraction: float
+    overlay: xr.Dataset
+
+    def to_dict(self) -> dict[str, Any]:
+        """Give the scalars of this load as a dict, without the overlay and the parameter records.
+
+        Returns
+        -------
+        dict
+            Field names to values.
+        """
+        skip = ("overlay", "point", "cylinder")
+        return {name: getattr(self, name) for name in self.__dataclass_fields__ if name not in skip}
+
+
+@dataclass(frozen=True, kw_only=True)
+class CylinderFit:
+    """A calibrated cylinder with its report.
+
+    Parameters
+    ----------
+    cylinder : Cylinder
+        With the common parameters fitted.
+    report : mgdd.optimize.FitReport
+        Estimates, standard errors, correlation. The residual is (model - measured)/p_max, so ``rmse`` is a fraction of
+        p_max. Standard errors take the residual as white noise; model error makes the true ones larger.
+    loads : tuple of LoadFit
+        Per trace, in the order given.
+    warnings : tuple of str
+        What to distrust, in words.
+    correlation_if_free : ndarray, shape (n, n)
+        As the report's correlation, but with parameters at a bound taken as free there.
+
+    Examples
+    --------
+    >>> from mgdd import datasets, presets
+    >>> from mgdd.identify import fit_cylinder
+    >>> fit = fit_cylinder(datasets.load_hd_traces(), presets.load("hd_diesel_128x144").cylinder)
+    >>> max(load.rmse_percent for load in fit.loads) < 1.0
+    True
+    >>> "wall_heat_scale" in fit.report.unidentifiable
+    True
+    """
+
+    cylinder: Cylinder
+    report: FitReport
+    loads: tuple[LoadFit, ...]
+    warnings: tuple[str, ...]
+    correlation_if_free: np.ndarray = field(repr=False)
+
+    @property
+    def burn_law(self) -> str:
+        """Burn shape and gamma law, for tables."""
+        gamma = f"{self.cylinder.gamma:g}" if self.cylinder.gamma_model == "constant" else self.cylinder.gamma_model
+        return f"{self.cylinder.burn_shape}, gamma {gamma}"
+
+    def correlations(self, name: str) -> dict[str, float]:
+        """Give the correlations of one parameter with all others, strongest first.
+
+        Parameters
+        ----------
+        name : str
+            As in ``report.names``.
+
+        Returns
+        -------
+        dict of str to float
+            Of the linearised problem at the estimate; a parameter at a bound counts as free there.
+        """
+        row = self.correlation_if_free[self.report.names.index(name)]
+        pairs = [(n, float(c)) for n, c in zip(self.report.names, row, strict=True) if n != name and np.isfinite(c)]
+        return dict(sorted(pairs, key=lambda pair: -abs(pair[1])))
+
+
+def fit_cylinder(
+    traces: Sequence[xr.Dataset],
+    cylinder: Cylinder,
+    *,
+    free: Sequence[str] | None = None,
+    point: OperatingPoint | None = None,
+    start: Sequence[Mapping[str, float]] | None = None,
+    step_cad: float = 0.25,
+    integrator: str = "trapezoid",
+    max_iterations: int = 200,
+) -> CylinderFit:
+    """Fit the cycle model to measured pressure: the burn per trace, the cylinder for all together.
+
+    Parameters
+    ----------
+    traces : sequence of xarray.Dataset
+        ``pressure_bar(crank_angle_cad)`` each, absolute. Attributes ``speed_rpm``, ``trapped_mass_g`` and
+        ``soi_cad`` are used where present; ``file`` names the trace. Samples outside IVC..EVO are dropped.
+    cylinder : Cylinder
+        Start and constants; its ``burn_shape`` and ``gamma_model`` choose the laws.
+    free : sequence of str, optional
+        Parameters to fit: per trace ``soc_cad burn_duration_cad fuel_heat_j`` and, of the Wiebe laws, ``wiebe_m
+        second_fraction second_delay_cad second_duration_cad second_wiebe_m``; for all traces any field of the
+        cylinder except ``ivc_cad`` and ``evo_cad``. Default: the three burn parameters and ``wall_heat_scale``, with
+        the double Wiebe also its five shape parameters.
+    point : OperatingPoint, optional
+        Conditions that a trace does not carry.
+    start : sequence of mapping, optional
+        Start of the per-trace parameters; from the heat release of the trace if left out.
+    step_cad : float
+        Largest step of the model [°CA]; measured steps are divided evenly.
+    integrator : str
+        As in `mgdd.engine.simulate`.
+    max_iterations : int
+        Trial steps of the search.
+
+    Returns
+    -------
+    CylinderFit
+        With one overlay Dataset per trace.
+
+    Raises
+    ------
+    mgdd.errors.ParameterError
+        An unknown or repeated name in ``free`` or ``start``.
+    mgdd.errors.DataError
+        A trace that cannot be used, or shows no heat release.
+
+    Notes
+    -----
+    Levenberg-Marquardt with exact forward sensitivities; ``wall_heat_scale`` is searched in [0, 2.5].
+
+    Examples
+    --------
+    >>> from mgdd import datasets, presets
+    >>> from mgdd.identify import fit_cylinder
+    >>> cylinder = presets.load("hd_diesel_128x144").cylinder
+    >>> fit = fit_cylinder(datasets.load_hd_traces(), cylinder, free=["soc_cad", "burn_duration_cad", "fuel_heat_j"])
+    >>> fit.report.success
+    True
+    """
+    if not traces:
+        raise DataError("no traces: a calibration needs at least one")
+    names = default_free(cylinder) if free is None else tuple([free] if isinstance(free, str) else free)
+    labels = _labels(traces)
+    measured = [_measured(trace, label, cylinder, point) for trace, label in zip(traces, labels, strict=True)]
+    burns = _starts(measured, cylinder, start)
+    core = _core.fit_cylinder(measured, cylinder, burns, list(names), step_cad, integrator, max_iterations)
+    loads = tuple(
+        _load(core.cylinder, fitted, trace, label, point)
+        for fitted, trace, label in zip(core.loads, traces, labels, strict=True)
+    )
+    fit = CylinderFit(
+        cylinder=core.cylinder,
+        report=FitReport.from_core(core.report),
+        loads=loads,
+        warnings=(),
+        correlation_if_free=np.asarray(core.correlation_if_free),
+    )
+    return replace(fit, warnings=_warnings(fit))
+
+
+def default_free(cylinder: Cylinder) -> tuple[str, ...]:
+    """Name what `fit_cylinder` frees for a burn law when nothing is said."""
+    shape = SHAPE_FIELDS if cylinder.burn_shape == "double_wiebe" else ()
+    return ("wall_heat_scale", *BURN_FIELDS, *shape)
+
+
+def conditions(trace: xr.Dataset, point: OperatingPoint | None) -> OperatingPoint:
+    """Give the operating point of a trace: its own attributes over ``point``."""
+    own = {n: float(trace.attrs[n]) for n in ("speed_rpm", "trapped_mass_g") if trace.attrs.get(n) is not None}
+    return (point or OperatingPoint()).replace(**own)
+
+
+def _labels(traces: Sequence[xr.Dataset]) -> list[str]:
+    names = [str(trace.attrs.get("file", f"trace{i}")) for i, trace in enumerate(traces)]
+    return [name if names.count(name) == 1 else f"{name}#{i}" for i, name in enumerate(names)]
+
+
+def _closed(trace: xr.Dataset, cylinder: Cylinder) -> tuple[np.ndarray, np.ndarray]:
+    for name in (ANGLE, "pressure_bar"):
+        if name not in trace.variables:
+            raise DataError(f"the trace has no {name}: read it with mgdd.io.read_pressure")
+    angle = trace[ANGLE].to_numpy()
+    inside = (angle >= cylinder.ivc_cad - 1e-9) & (angle <= cylinder.evo_cad + 1e-9)
+    return angle[inside], trace["pressure_bar"].to_numpy()[inside]
+
+
+def _measured(
+    trace: xr.Dataset, label: str, cylinder: Cylinder, point: OperatingPoint | None
+) -> _core.MeasuredCycle:
+    angle, pressure = _closed(trace, cylinder)
+    return _core.MeasuredCycle(
+        label=label, crank_angle_cad=angle, pressure_bar=pressure, point=conditions(trace, point)
+    )
+
+
+def _starts(
+    measured: Sequence[_core.MeasuredCycle], cylinder: Cylinder, start: Sequence[Mapping[str, float]] | None
+) -> list[_core.LoadBurn]:
+    burns = [_core.estimate_burn(trace, cylinder) for trace in measured]
+    if start is None:
+        return burns
+    if len(start) != len(burns):
+        raise ParameterError(f"start has {len(start)} entries for {len(burns)} traces")
+    known = _core.load_parameters()
+    for burn, values in zip(burns, start, strict=True):
+        for name, value in values.items():
+            if name not in known:
+                raise ParameterError(f"start: {name!r} is no parameter of a trace: must be one of {', '.join(known)}")
+            setattr(burn, name, float(value))
+    return burns
+
+
+def _load(
+    cylinder: Cylinder, fitted: _core.LoadFit, trace: xr.Dataset, label: str, point: OperatingPoint | None
+) -> LoadFit:
+    angle, pressure = _closed(trace, cylinder)
+    burn = fitted.burn
+    soi = float(trace.attrs.get("soi_cad", math.nan))
+    scalars = {
+        name: getattr(fitted, name)
+        for name in (
+            "p_max_bar rmse_bar rmse_percent imep_closed_bar imep_closed_error_percent largest_error_bar "
+            "largest_error_cad ca50_cad heat_loss_fraction"
+        ).split()
+    }
+    overlay = labelled_dataset(
+        {
+            ANGLE: (ANGLE, angle),
+            "measured_bar": (ANGLE, pressure),
+            "model_bar": (ANGLE, fitted.model_bar),
+            "residual_bar": (ANGLE, fitted.model_bar - pressure),
+            "rmse_bar": ((), fitted.rmse_bar),
+            "rmse_percent": ((), fitted.rmse_percent),
+            "imep_closed_error_percent": ((), fitted.imep_closed_error_percent),
+            "soc_cad": ((), burn.soc_cad),
+            "soi_cad": ((), soi),
+            "p_max_bar": ((), fitted.p_max_bar),
+        },
+        attrs={"file": label, "burn": cylinder.burn_shape},
+    )
+    own = conditions(trace, point).replace(
+        intake_pressure_kpa=float(pressure[0]) * 100.0,
+        fuel_mg=burn.fuel_heat_j / cylinder.lower_heating_value_mj_per_kg,
+        burn_duration_cad=burn.burn_duration_cad,
+    )
+    return LoadFit(
+        file=label,
+        point=own,
+        cylinder=_core.with_burn(cylinder, burn),
+        soc_cad=burn.soc_cad,
+        burn_duration_cad=burn.burn_duration_cad,
+        fuel_heat_j=burn.fuel_heat_j,
+        soi_cad=soi,
+        onset_against_soi_cad=burn.soc_cad - soi,
+        overlay=overlay,
+        **scalars,
+    )
+
+
+def _warnings(fit: CylinderFit) -> tuple[str, ...]:
+    out = []
+    if not fit.report.success:
+        out.append(f"the search ended without converging: {fit.report.message}")
+    early = [load for load in fit.loads if load.onset_against_soi_cad < 0.0]
+    if early:
+        each = ", ".join(f"{load.file} {load.onset_against_soi_cad:+.1f}" for load in early)
+        out.append(
+            f"the fitted burn starts before the injection (SOC minus SOI in °CA: {each}): the burn law bends to make "
+            "up for another error of the model, so its start is no physical onset"
+        )
+    errors = [load.imep_closed_error_percent for load in fit.loads]
+    if max(map(abs, errors)) > _IMEP_LIMIT_PERCENT:
+        word = "low" if sum(errors) < 0.0 else "high"
+        out.append(
+            f"closed IMEP is {min(map(abs, errors)):.1f} to {max(map(abs, errors)):.1f} % {word} although the pressure "
+            f"RMSE is at most {max(load.rmse_percent for load in fit.loads):.2f} % of p_max: a small RMSE proves nothing "
+            "here; do not read efficiency or fuel heat from this fit"
+        )
+    out += [f"{name} is not identifiable from these traces" for name in fit.report.unidentifiable]
+    return tuple(out)

@@ -1,0 +1,62 @@
+"""Columns of a result over its one dimension as CSV, with a units row."""
+
+from __future__ import annotations
+
+import os
+from pathlib import Path
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from mgdd.errors import ShapeError
+from mgdd.results import check_labels
+
+if TYPE_CHECKING:
+    import xarray as xr
+
+__all__ = ["write_traces"]
+
+
+def write_traces(dataset: xr.Dataset, path: str | os.PathLike[str]) -> None:
+    """Write every one-dimensional variable of a Dataset as CSV: a header, a units row, numbers in full precision.
+
+    Parameters
+    ----------
+    dataset : xarray.Dataset
+        With one dimension, or several of which the variables share none; scalars become comment lines on top.
+    path : path-like
+        The file; an existing one is replaced once the Dataset has passed its checks.
+
+    Raises
+    ------
+    mgdd.errors.DataError
+        A variable without units.
+    mgdd.errors.ShapeError
+        Variables over different dimensions.
+
+    Examples
+    --------
+    >>> import pathlib, tempfile
+    >>> from mgdd.engine import Cylinder, OperatingPoint, simulate
+    >>> from mgdd.io import write_traces
+    >>> with tempfile.TemporaryDirectory() as folder:
+    ...     file = pathlib.Path(folder) / "cycle.csv"
+    ...     write_traces(simulate(Cylinder(), OperatingPoint()), file)
+    ...     any(line.startswith("crank_angle_cad,pressure_bar") for line in file.read_text().splitlines())
+    True
+    """
+    check_labels(dataset)
+    dims = [dim for dim in dataset.dims if any(v.dims == (dim,) for v in dataset.data_vars.values())]
+    if len(dims) != 1 or any(v.ndim > 1 for v in dataset.variables.values()):
+        raise ShapeError(f"a CSV holds columns over one dimension; this result has {dict(dataset.sizes)}")
+    names = [str(dims[0]), *(str(n) for n, v in dataset.data_vars.items() if v.dims == (dims[0],))]
+    lines = [
+        f"# {name} = {float(v)!r} {v.attrs['units']}"
+        for name, v in dataset.data_vars.items()
+        if v.ndim == 0 and v.dtype.kind == "f"
+    ]
+    lines.append(",".join(names))
+    lines.append(",".join(dataset[name].attrs["units"] for name in names))
+    columns = np.column_stack([dataset[name].to_numpy() for name in names])
+    lines += [",".join(map(repr, row)) for row in columns.tolist()]
+    Path(path).write_text("\n".join(lines) + "\n", encoding="utf-8", newline="\n")

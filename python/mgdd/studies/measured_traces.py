@@ -1,0 +1,322 @@
+"""From measured pressure traces to a calibrated cycle model and its best injection timing."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Callable, Sequence
+from typing import TYPE_CHECKING, Any
+
+from mgdd import _core, presets
+from mgdd._core import Cylinder, OperatingPoint
+from mgdd.datasets import load_hd_traces
+from mgdd.engine import analyze, optimum, simulate
+from mgdd.identify import CylinderFit, LoadFit, WallHeatProfile, fit_cylinder, wall_heat_profile
+from mgdd.identify.cylinder import BURN_FIELDS, SHAPE_FIELDS
+from mgdd.results import labelled_dataset, to_jsonable
+from mgdd.studies.base import StudyResult
+from mgdd.studies.measured_figures import draw
+
+if TYPE_CHECKING:
+    import xarray as xr
+
+__all__ = ["best_timing", "compare_laws", "run_measured_traces"]
+
+# Burn shape and gamma law of each row of the comparison; the last two are worth reading on.
+LAWS = (
+    ("triangle", "constant"),
+    ("wiebe", "constant"),
+    ("triangle", "linear"),
+    ("wiebe", "linear"),
+    ("double_wiebe", "constant"),
+)
+WALL_HEAT_RANGE = (0.5, 1.0)
+_ANALYSIS = (
+    "n_compression n_expansion ca10_cad ca50_cad ca90_cad heat_net_j heat_gross_j imep_closed_bar p_max_bar p_max_cad"
+).split()
+Progress = Callable[[str], None]
+
+
+def _silent(_: str) -> None:
+    """Take no notice of progress."""
+
+
+def compare_laws(
+    traces: Sequence[xr.Dataset],
+    cylinder: Cylinder,
+    *,
+    point: OperatingPoint | None = None,
+    laws: Sequence[tuple[str, str]] = LAWS,
+    progress: Progress = _silent,
+    **options: Any,
+) -> list[CylinderFit]:
+    """Fit every burn law to the same traces.
+
+    Parameters
+    ----------
+    traces, cylinder, point, **options
+        As in `mgdd.identify.fit_cylinder`.
+    laws : sequence of (burn_shape, gamma_model)
+        Laws to compare.
+    progress : callable
+        Called with a short text before each fit.
+
+    Returns
+    -------
+    list of CylinderFit
+        In the order of ``laws``.
+
+    Examples
+    --------
+    >>> from mgdd import datasets, presets
+    >>> from mgdd.studies import compare_laws
+    >>> fits = compare_laws(datasets.load_hd_traces(), presets.load("hd_diesel_128x144").cylinder)
+    >>> [fit.burn_law for fit in fits][:2]
+    ['triangle, gamma 1.37', 'wiebe, gamma 1.37']
+    """
+    fits = []
+    for shape, gamma in laws:
+        law = cylinder.replace(burn_shape=shape, gamma_model=gamma)
+        progress(f"calibrate {shape}, {gamma} gamma")
+        fits.append(fit_cylinder(traces, law, point=point, **options))
+    return fits
+
+
+def best_timing(
+    traces: Sequence[xr.Dataset],
+    cylinder: Cylinder,
+    *,
+    point: OperatingPoint | None = None,
+    scales: Sequence[float] = WALL_HEAT_RANGE,
+    objective: str = "imep_closed_bar",
+    limits: dict[str, float] | None = None,
+    progress: Progress = _silent,
+    **options: Any,
+) -> list[dict[str, Any]]:
+    """Give each load's best timing and gain as a range over the wall-heat scale, the rest refitted at each.
+
+    The traces do not determine the wall heat, so a single best timing would be false precision.
+
+    Parameters
+    ----------
+    traces, cylinder, point, **options
+        As in `mgdd.identify.fit_cylinder`; the cylinder's burn shape and gamma law are used.
+    scales : sequence of float
+        Wall-heat scales to refit at [-].
+    objective : str
+        As in `mgdd.engine.optimum`. Closed-cycle work is the default because a closed-valve trace carries no more.
+    limits : dict, optional
+        Further limits, as in `mgdd.engine.optimum`.
+    progress : callable
+        Called with a short text before each fit.
+
+    Returns
+    -------
+    list of dict
+        Per trace: ``file``, ``p_max_limit_bar`` (the trace's own highest sample, or the model's where that is higher at
+        the measured timing), ``points`` (one per scale) and the ranges ``soc_cad``, ``ca50_cad``, ``gain_percent`` under
+        that limit and ``free_soc_cad``, ``free_ca50_cad``, ``free_gain_percent`` without. A gain is the
+        objective's relative rise over the fitted timing [%].
+
+    Examples
+    --------
+    >>> from mgdd import datasets, presets
+    >>> from mgdd.studies import best_timing
+    >>> rows = best_timing(datasets.load_hd_traces()[:1], presets.load("hd_diesel_128x144").cylinder)
+    >>> [round(soc) for soc in rows[0]["free_soc_cad"]]
+    [-6, -4]
+    """
+    names = BURN_FIELDS + (SHAPE_FIELDS if cylinder.burn_shape == "double_wiebe" else ())
+    points: list[list[dict[str, float]]] = [[] for _ in traces]
+    for scale in scales:
+        progress(f"best timing at wall-heat scale {scale:g}")
+        fit = fit_cylinder(traces, cylinder.replace(wall_heat_scale=scale), free=names, point=point, **options)
+        for own, load in zip(points, fit.loads, strict=True):
+            own.append(_timing(load, scale, objective, limits or {}))
+    return [_as_range(load.file, own) for load, own in zip(fit.loads, points, strict=True)]
+
+
+def run_measured_traces(
+    traces: Sequence[xr.Dataset] | None = None,
+    cylinder: Cylinder | None = None,
+    *,
+    point: OperatingPoint | None = None,
+    quick: bool = False,
+    figures: bool = True,
+    progress: Progress = _silent,
+) -> StudyResult:
+    """Run the main job: check, analyse, calibrate, and find the best timing of measured traces.
+
+    Parameters
+    ----------
+    traces : sequence of xarray.Dataset, optional
+        Measured traces; the four heavy-duty diesel traces of the package if left out.
+    cylinder : Cylinder, optional
+        The preset ``hd_diesel_128x144`` if left out.
+    point : OperatingPoint, optional
+        Conditions that a trace does not carry; the preset's if left out.
+    quick : bool
+        Leave out the profiles of the wall-heat scale.
+    figures : bool
+        Draw figures.
+    progress : callable
+        Called with a short text before each step.
+
+    Returns
+    -------
+    StudyResult
+        Its summary holds ``traces``, ``laws``, ``common``, ``unidentifiable``, ``warnings`` and ``best_timing``.
+
+    Examples
+    --------
+    >>> from mgdd.studies import run_measured_traces
+    >>> result = run_measured_traces(quick=True, figures=False)
+    >>> [round(row["analysis"]["ca50_cad"], 1) for row in result.summary["traces"]]
+    [5.0, 6.9, 9.4, 14.9]
+    """
+    preset = presets.load("hd_diesel_128x144")
+    own = traces is None
+    traces = load_hd_traces() if traces is None else list(traces)
+    cylinder = cylinder or preset.cylinder
+    point = point or preset.point
+    progress("analyse the traces")
+    analyses = [analyze(trace, cylinder, point=point) for trace in traces]
+    fits = compare_laws(traces, cylinder, point=point, progress=progress)
+    by_law = dict(zip(LAWS, fits, strict=True))
+    main, best = by_law["wiebe", "linear"], by_law["double_wiebe", "constant"]
+    profiles = {}
+    if not quick:
+        for fit in (main, best):
+            profiles[fit.burn_law] = wall_heat_profile(traces, fit, point=point, progress=progress)
+    timing_law = cylinder.replace(burn_shape="wiebe", gamma_model="linear")
+    timing = best_timing(traces, timing_law, point=point, progress=progress)
+    held = timing_law.replace(wall_heat_scale=WALL_HEAT_RANGE[0])
+    reference = fit_cylinder(traces, held, free=BURN_FIELDS, point=point)
+    summary = summarize(analyses, fits, main, profiles, timing)
+    summary["data"] = _PROVENANCE if own else "files of the user"
+    return StudyResult(
+        name="measured-traces",
+        dataset=_table(fits),
+        figures=draw(analyses, main, best, reference, profiles, timing) if figures else {},
+        summary=to_jsonable(summary),
+    )
+
+
+_PROVENANCE = (
+    "Four cycle-averaged closed-valve pressure traces of a heavy-duty diesel at 25, 50, 75 and 100 % load, from "
+    "LibICE-post (F. Ramognino), MIT licence."
+)
+
+
+def summarize(
+    analyses: Sequence[xr.Dataset],
+    fits: Sequence[CylinderFit],
+    main: CylinderFit,
+    profiles: dict[str, WallHeatProfile],
+    timing: Sequence[dict[str, Any]],
+) -> dict[str, Any]:
+    """Collect the numbers of a calibration as plain values."""
+    rows = []
+    for analysis, load, best in zip(analyses, main.loads, timing, strict=True):
+        rows.append(
+            {
+                "file": load.file,
+                "analysis": {name: float(analysis[name]) for name in _ANALYSIS},
+                "calibrated": load.to_dict(),
+                "best_timing": best,
+                "warnings": list(analysis.attrs["warnings"]),
+            }
+        )
+    return {
+        "mgdd": _core.__version__,
+        "law": main.burn_law,
+        "traces": rows,
+        "laws": [law_row(fit) for fit in fits],
+        "common": {"wall_heat_scale": {law: profile.to_dict() for law, profile in profiles.items()}},
+        "unidentifiable": sorted(
+            {*main.report.unidentifiable, *(["wall_heat_scale"] if _unknown(profiles) else [])}
+        ),
+        "warnings": [f"{fit.burn_law}: {text}" for fit in fits for text in fit.warnings],
+        "best_timing": list(timing),
+    }
+
+
+def law_row(fit: CylinderFit) -> dict[str, Any]:
+    """Give one row of the comparison of burn laws: lists over the traces."""
+    return {
+        "law": fit.burn_law,
+        "file": [load.file for load in fit.loads],
+        "rmse_percent": [load.rmse_percent for load in fit.loads],
+        "imep_closed_error_percent": [load.imep_closed_error_percent for load in fit.loads],
+        "soc_cad": [load.soc_cad for load in fit.loads],
+        "onset_against_soi_cad": [load.onset_against_soi_cad for load in fit.loads],
+        "largest_error_bar": [load.largest_error_bar for load in fit.loads],
+        "largest_error_cad": [load.largest_error_cad for load in fit.loads],
+        "wall_heat_scale": fit.cylinder.wall_heat_scale,
+        "warnings": list(fit.warnings),
+    }
+
+
+def _unknown(profiles: dict[str, WallHeatProfile]) -> bool:
+    return any(not profile.identifiable for profile in profiles.values())
+
+
+def _timing(load: LoadFit, scale: float, objective: str, limits: dict[str, float]) -> dict[str, float]:
+    now = simulate(load.cylinder, load.point, soc_cad=load.soc_cad)
+    # The model's own error in p_max at the measured timing is no violation of the limit.
+    ceiling = max(load.p_max_bar, float(now["p_max_bar"]) * (1.0 + 1e-9))
+    free = optimum(load.cylinder, load.point, objective, limits=limits)
+    kept = optimum(load.cylinder, load.point, objective, limits={"p_max_bar": ceiling, **limits})
+    base = float(now[objective])
+    return {
+        "wall_heat_scale": scale,
+        "fitted_soc_cad": load.soc_cad,
+        "p_max_limit_bar": ceiling,
+        "soc_cad": kept.soc_cad,
+        "ca50_cad": kept.ca50_cad,
+        "gain_percent": 100.0 * (kept.value / base - 1.0),
+        "free_soc_cad": free.soc_cad,
+        "free_ca50_cad": free.ca50_cad,
+        "free_gain_percent": 100.0 * (free.value / base - 1.0),
+        "free_p_max_bar": float(simulate(load.cylinder, load.point, soc_cad=free.soc_cad)["p_max_bar"]),
+        "efficiency_gross": float(now["efficiency_gross"]),
+        "curvature_per_cad2": free.curvature_per_cad2,
+    }
+
+
+def _as_range(file: str, points: list[dict[str, float]]) -> dict[str, Any]:
+    def span(name: str) -> list[float]:
+        values = [p[name] for p in points]
+        return [min(values), max(values)]
+
+    ranged = "soc_cad ca50_cad gain_percent free_soc_cad free_ca50_cad free_gain_percent fitted_soc_cad".split()
+    return {
+        "file": file,
+        "wall_heat_scale": span("wall_heat_scale"),
+        "p_max_limit_bar": max(p["p_max_limit_bar"] for p in points),
+        **{name: span(name) for name in ranged},
+        "points": points,
+    }
+
+
+def _table(fits: Sequence[CylinderFit]) -> xr.Dataset:
+    files = [load.file for load in fits[0].loads]
+    laws = [fit.burn_law for fit in fits]
+
+    def grid(name: str) -> list[list[float]]:
+        return [[float(getattr(load, name)) for load in fit.loads] for fit in fits]
+
+    dims = ("law", "file")
+    scales = [fit.cylinder.wall_heat_scale if math.isfinite(fit.report.rmse) else math.nan for fit in fits]
+    return labelled_dataset(
+        {
+            "law": ("law", laws, "-", "burn law and gamma"),
+            "file": ("file", files, "-", "trace"),
+            "rmse_percent": (dims, grid("rmse_percent")),
+            "imep_closed_error_percent": (dims, grid("imep_closed_error_percent")),
+            "soc_cad": (dims, grid("soc_cad")),
+            "onset_against_soi_cad": (dims, grid("onset_against_soi_cad"), "°CA", "fitted burn start minus SOI"),
+            "largest_error_bar": (dims, grid("largest_error_bar"), "bar", "largest local error, model minus measured"),
+            "largest_error_cad": (dims, grid("largest_error_cad"), "°CA aTDC", "angle of the largest local error"),
+            "wall_heat_scale": ("law", scales),
+        }
+    )

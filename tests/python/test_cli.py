@@ -1,0 +1,248 @@
+"""The command line: JSON alone on stdout, options named after parameters, exit codes, messages."""
+
+from __future__ import annotations
+
+import json
+import os
+import subprocess
+import sys
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from mgdd import datasets, io, presets
+from mgdd.cli import main
+from mgdd.engine import Cylinder, OperatingPoint, optimum, simulate
+
+HD = ("--preset", "hd_diesel_128x144")
+
+
+@pytest.fixture(scope="module")
+def files(tmp_path_factory: pytest.TempPathFactory) -> tuple[list[str], str]:
+    """The four measured traces as a user would have them: one file each, and a table of conditions."""
+    folder = tmp_path_factory.mktemp("traces")
+    names, rows = [], ["file,speed_rpm,trapped_mass_g,soi_cad"]
+    for trace in datasets.load_hd_traces():
+        file = folder / f"{trace.attrs['file']}.csv"
+        io.write_pressure(trace, file)
+        names.append(str(file))
+        a = trace.attrs
+        rows.append(f"{file.name},{a['speed_rpm']},{a['trapped_mass_g']},{a['soi_cad']}")
+    conditions = folder / "conditions.csv"
+    conditions.write_text("\n".join(rows) + "\n")
+    return names, str(conditions)
+
+
+def run_json(capsys: pytest.CaptureFixture[str], *argv: str) -> dict[str, object]:
+    code = main([*argv, "--json"])
+    captured = capsys.readouterr()
+    assert code == 0, captured.err
+    return json.loads(captured.out)  # fails unless stdout is exactly one JSON value
+
+
+def refused(capsys: pytest.CaptureFixture[str], *argv: str, code: int = 2) -> str:
+    assert main(list(argv)) == code
+    captured = capsys.readouterr()
+    assert captured.out == ""
+    return captured.err
+
+
+def test_simulate_prints_the_library_result(capsys: pytest.CaptureFixture[str]) -> None:
+    out = run_json(capsys, "engine", "simulate", "--preset", "puma_single", "--soc-cad", "-6")
+    cycle = simulate(Cylinder(), OperatingPoint(), soc_cad=-6.0)
+    for name in (
+        "imep_closed_bar imep_gross_bar efficiency_gross p_max_bar p_max_cad t_max_k dp_max_bar_per_cad ca50_cad "
+        "heat_loss_fraction"
+    ).split():
+        assert out[name] == pytest.approx(float(cycle[name]), rel=1e-12), name
+    assert out["imep_gross_bar"] == pytest.approx(9.627, rel=5e-4)
+
+
+def test_options_are_parameter_names(capsys: pytest.CaptureFixture[str]) -> None:
+    out = run_json(
+        capsys, "engine", "simulate", "--speed-rpm", "2000", "--fuel-mg", "12", "--burn-duration-cad", "25",
+        "--burn", "wiebe", "--gamma", "linear", "--integrator", "split", "--step-cad", "0.5", "--soc-cad", "-9",
+        "--set", "bore_mm=90", "--set", "compression_ratio=16", "--set", "ivc_cad=-130",
+    )  # fmt: skip
+    cylinder = Cylinder(bore_mm=90.0, compression_ratio=16.0, ivc_cad=-130.0, burn_shape="wiebe", gamma_model="linear")
+    point = OperatingPoint(speed_rpm=2000.0, fuel_mg=12.0, burn_duration_cad=25.0)
+    cycle = simulate(cylinder, point, soc_cad=-9.0, step_cad=0.5, integrator="split")
+    assert out["imep_closed_bar"] == pytest.approx(float(cycle["imep_closed_bar"]), rel=1e-12)
+
+
+def test_injection_timing_adds_the_delay(capsys: pytest.CaptureFixture[str]) -> None:
+    out = run_json(capsys, "engine", "simulate", "--soi-cad", "-10")
+    assert out["soi_cad"] == -10.0
+    assert out["soc_cad"] == pytest.approx(-5.4, abs=0.05)
+    late = refused(capsys, "engine", "simulate", "--soi-cad", "19", code=3)
+    assert "does not ignite" in late
+
+
+def test_motored_has_no_burn_angles(capsys: pytest.CaptureFixture[str]) -> None:
+    out = run_json(capsys, "engine", "simulate", "--motored")
+    assert out["ca50_cad"] is None
+    assert out["p_max_bar"] == pytest.approx(70.11, rel=5e-4)
+    assert "contradict" in refused(capsys, "engine", "simulate", "--motored", "--fuel-mg", "10")
+
+
+def test_output_file_holds_the_traces(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    file = tmp_path / "cycle.csv"
+    assert main(["engine", "simulate", "-o", str(file)]) == 0
+    capsys.readouterr()
+    rows = [line for line in file.read_text().splitlines() if not line.startswith("#")]
+    names, units = rows[0].split(","), rows[1].split(",")
+    table = np.array([[float(cell) for cell in row.split(",")] for row in rows[2:]])
+    cycle = simulate(Cylinder(), OperatingPoint())
+    assert units[names.index("pressure_bar")] == "bar"
+    np.testing.assert_array_equal(table[:, names.index("pressure_bar")], cycle["pressure_bar"].values)
+    assert "ending" in refused(capsys, "engine", "simulate", "-o", str(tmp_path / "cycle.xls"))
+
+
+def test_analyze_measured_trace(files: tuple[list[str], str], capsys: pytest.CaptureFixture[str]) -> None:
+    out = run_json(capsys, "engine", "analyze", files[0][1], *HD)
+    assert out["ca50_cad"] == pytest.approx(6.9, abs=0.05)
+    assert out["imep_closed_bar"] == pytest.approx(13.71, abs=0.005)
+    assert out["n_compression"] == pytest.approx(1.382, abs=0.002)
+    assert out["heat_net_j"] == pytest.approx(4434.0, abs=2.0)
+    assert out["method"] == "none"
+    assert out["gamma"] == 1.33
+    assert {"pegging_bar", "n_expansion", "ca10_cad", "ca90_cad", "heat_gross_j", "p_max_bar", "p_max_cad"} <= set(out)
+
+
+def test_analyze_pegging_recovers_an_offset(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    motored = simulate(Cylinder(wall_heat_scale=0.0), OperatingPoint(fuel_mg=0.0))
+    shifted = io.pressure_trace(motored["crank_angle_cad"].values, motored["pressure_bar"].values - 0.2, name="shifted")
+    file = tmp_path / "shifted.csv"
+    io.write_pressure(shifted, file)
+    out = run_json(
+        capsys, "engine", "analyze", str(file), "--pegging", "two_point", "--pegging-exponent", "1.37"
+    )
+    assert out["pegging_bar"] == pytest.approx(0.2, abs=0.005)
+
+
+def test_calibrate_reports_what_it_cannot_tell(
+    files: tuple[list[str], str], capsys: pytest.CaptureFixture[str]
+) -> None:
+    out = run_json(capsys, "engine", "calibrate", *files[0], *HD, "--conditions", files[1])
+    assert all(row["rmse_percent"] <= 1.0 and abs(row["imep_closed_error_percent"]) <= 3.0 for row in out["traces"])
+    assert {"file", "p_max_bar", "rmse_bar", "soc_cad", "burn_duration_cad", "fuel_heat_j", "ca50_cad"} <= set(
+        out["traces"][0]
+    )
+    scale = out["common"]["wall_heat_scale"]
+    assert {"value", "stderr", "identifiable"} <= set(scale)
+    assert scale["identifiable"] is False
+    assert "wall_heat_scale" in out["unidentifiable"]
+    assert "before the injection" in out["report"]
+    assert "% low" in out["report"]  # of the laws that miss the IMEP
+    assert len(out["laws"]) == 5
+
+
+def test_calibrate_without_conditions_has_no_onset_column(
+    files: tuple[list[str], str], capsys: pytest.CaptureFixture[str]
+) -> None:
+    out = run_json(capsys, "engine", "calibrate", *files[0], *HD)
+    assert all("onset_against_soi_cad" not in row for row in out["traces"])
+    measured = [row["rmse_percent"] for row in out["traces"]]
+    assert measured == pytest.approx([0.64, 0.50, 0.37, 0.68], abs=0.015)
+
+
+def test_optimum_matches_the_library(capsys: pytest.CaptureFixture[str]) -> None:
+    out = run_json(capsys, "engine", "optimum", "--limit", "p_max_bar=95")
+    best = optimum(Cylinder(), OperatingPoint(), limits={"p_max_bar": 95.0})
+    assert {"soc_cad", "ca50_cad", "efficiency_gross", "curvature_per_cad2"} <= set(out)
+    assert out["soc_cad"] == pytest.approx(best.soc_cad, abs=1e-9)
+    assert out["p_max_bar"] <= 95.0
+    assert out["active_limits"] == ["p_max_bar"]
+
+
+def test_optimum_of_files_is_a_range(files: tuple[list[str], str], capsys: pytest.CaptureFixture[str]) -> None:
+    out = run_json(capsys, "engine", "optimum", files[0][3], *HD, "--conditions", _one_row(files[1], 4))
+    (row,) = out["traces"]
+    assert row["free_soc_cad"] == pytest.approx([-13.9, -11.2], abs=0.1)
+    assert row["free_gain_percent"] == pytest.approx([1.2, 2.8], abs=0.1)
+
+
+def _one_row(conditions: str, row: int) -> str:
+    lines = Path(conditions).read_text().splitlines()
+    file = Path(conditions).with_name(f"row{row}.csv")
+    file.write_text(f"{lines[0]}\n{lines[row]}\n")
+    return str(file)
+
+
+@pytest.mark.parametrize(
+    ("argv", "words"),
+    [
+        (["--set", "bore_mm=-86"], ["bore_mm = -86", "must be > 0"]),
+        (["--set", "bore=86"], ["'bore'", "bore_mm"]),
+        (["--set", "bore_mm"], ["--set bore_mm", "FIELD=VALUE"]),
+        (["--set", "bore_mm=wide"], ["bore_mm = 'wide'", "[mm]"]),
+        (["--set", "compression_ratio=1"], ["compression_ratio = 1", "must be > 1"]),
+        (["--set", "bore_mm=nan"], ["bore_mm = nan", "must be > 0"]),
+        (["--set", "evo_cad=-150"], ["ivc_cad = -140", "must be before evo_cad = -150"]),
+        (["--set", "ivc_cad=140"], ["ivc_cad = 140", "°bTDC"]),
+        (["--soc-cad", "25"], ["soc_cad = 25", "°bTDC", "-25"]),
+        (["--soc-cad", "-150"], ["soc_cad = -150", "[-60, 20]"]),
+        (["--step-cad", "6"], ["step_cad = 6", "[0.001, 5]"]),
+        (["--preset", "puma"], ["no preset 'puma'", "puma_single"]),
+        (["--preset", "nowhere.toml"], ["nowhere.toml"]),
+    ],
+)
+def test_bad_input_names_field_value_and_remedy(
+    argv: list[str], words: list[str], capsys: pytest.CaptureFixture[str]
+) -> None:
+    error = refused(capsys, "engine", "simulate", *argv)
+    for word in words:
+        assert word in error
+
+
+def test_bad_files(tmp_path: Path, files: tuple[list[str], str], capsys: pytest.CaptureFixture[str]) -> None:
+    empty = tmp_path / "empty.csv"
+    empty.write_text("")
+    assert "empty" in refused(capsys, "engine", "analyze", str(empty))
+    assert "nowhere.csv" in refused(capsys, "engine", "analyze", "nowhere.csv")
+    pascal = tmp_path / "pascal.csv"
+    trace = datasets.load_hd_traces()[0]
+    pascal.write_text(
+        "\n".join(f"{a} {p * 1e5}" for a, p in zip(trace["crank_angle_cad"].values, trace["pressure_bar"].values, strict=True))
+    )
+    assert "Pa" in refused(capsys, "engine", "analyze", str(pascal), *HD)
+    assert main(["engine", "analyze", str(pascal), *HD, "--pressure-unit", "Pa"]) == 0
+    capsys.readouterr()
+    error = refused(capsys, "engine", "calibrate", files[0][0], *HD, "--conditions", files[1])
+    assert "rows without a trace" in error
+
+
+def test_infeasible_limit_has_its_own_exit_code(capsys: pytest.CaptureFixture[str]) -> None:
+    error = refused(capsys, "engine", "optimum", "--limit", "p_max_bar=50", code=3)
+    assert "p_max_bar >=" in error
+    assert "is no indicator" in refused(capsys, "engine", "optimum", "--limit", "p_maxx=50")
+
+
+def test_preset_file_round_trip(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    file = tmp_path / "mine.toml"
+    file.write_text(presets.load("puma_single").to_toml().replace("value = 86.0", "value = 90.0"))
+    out = run_json(capsys, "engine", "simulate", "--preset", str(file))
+    assert out["imep_gross_bar"] == pytest.approx(
+        float(simulate(Cylinder(bore_mm=90.0, stroke_mm=90.0), OperatingPoint())["imep_gross_bar"])
+    )
+
+
+def test_process_keeps_stdout_clean_and_help_has_an_example() -> None:
+    env = {**os.environ, "PYTHONWARNINGS": "error"}
+
+    def call(*argv: str) -> subprocess.CompletedProcess[str]:
+        return subprocess.run([sys.executable, "-m", "mgdd", *argv], capture_output=True, text=True, env=env, timeout=120)
+
+    version = call("--version")
+    assert version.returncode == 0
+    assert version.stdout.startswith("mgdd ")
+    doctor = call("doctor", "--json")
+    report = json.loads(doctor.stdout)
+    assert {"mgdd", "python", "simd_compiled", "simd_processor", "extras"} <= set(report)
+    for command in ("simulate", "analyze", "calibrate", "optimum"):
+        text = call("engine", command, "--help").stdout
+        assert "example:" in text
+        assert f"mgdd engine {command}" in text
+    assert call().returncode == 2
+    assert call("engine", "simulate", "--soc-cad", "-6", "--soi-cad", "-9").returncode == 2
