@@ -110,9 +110,7 @@ def convert(source: Path, out: Path) -> list[Path]:
 def main() -> int:
     folder = os.environ.get("MGDD_DATA_DIR")
     default = Path(folder) / "libice_hd_diesel" if folder else None
-    parser = argparse.ArgumentParser(
-        description="Convert the measured heavy-duty diesel traces to CSV in bar."
-    )
+    parser = argparse.ArgumentParser(description="Convert the measured heavy-duty diesel traces to CSV in bar.")
     parser.add_argument("--source", type=Path, default=default, help="folder that holds pExpA25 ... pExpA100")
     parser.add_argument(
         "--out",

@@ -37,9 +37,7 @@ def main() -> None:
         gamma_model="linear",
         wall_heat_scale=0.5,
     )
-    fit = fit_cylinder(
-        datasets.load_hd_traces(), base, free=["soc_cad", "burn_duration_cad", "fuel_heat_j"]
-    )
+    fit = fit_cylinder(datasets.load_hd_traces(), base, free=["soc_cad", "burn_duration_cad", "fuel_heat_j"])
     heat = np.array([load.fuel_heat_j for load in fit.loads])
     duration = np.array([load.burn_duration_cad for load in fit.loads])
     fuel = heat / base.lower_heating_value_mj_per_kg
@@ -60,7 +58,9 @@ def main() -> None:
     )
     sources = {f"cylinder.{name}": "as puma_single" for name in cylinder.to_dict()}
     sources |= {f"cylinder.{name}": DATA for name in _GEOMETRY}
-    sources |= {f"cylinder.{name}": FITTED for name in ("burn_duration_ref_cad", "burn_fuel_ref_mg", "burn_fuel_exponent")}
+    sources |= {
+        f"cylinder.{name}": FITTED for name in ("burn_duration_ref_cad", "burn_fuel_ref_mg", "burn_fuel_exponent")
+    }
     sources |= {
         "cylinder.burn_speed_ref_rpm": DATA,
         "cylinder.burn_speed_exponent": "as puma_single: all traces were taken at one speed",

@@ -19,7 +19,9 @@ using namespace engine;
 constexpr auto fields = cylinder_fields<double>();
 constexpr auto point_fields = operating_point_fields<double>();
 
-py::str as_str(std::string_view s) { return {s.data(), s.size()}; }
+py::str as_str(std::string_view s) {
+  return {s.data(), s.size()};
+}
 
 // One keyword of __init__ per field, with the C++ default.
 template <std::size_t>
@@ -62,7 +64,8 @@ py::dict describe_choice(std::string_view chosen, std::initializer_list<std::str
   py::dict record;
   record["unit"] = "-";
   py::list names;
-  for (const std::string_view name : choices) names.append(as_str(name));
+  for (const std::string_view name : choices)
+    names.append(as_str(name));
   record["choices"] = py::tuple(names);
   record["meaning"] = as_str(meaning);
   record["default"] = as_str(chosen);
@@ -71,7 +74,8 @@ py::dict describe_choice(std::string_view chosen, std::initializer_list<std::str
 
 py::dict to_dict(const Cylinder& c) {
   py::dict out;
-  for (const auto& f : fields) out[as_str(f.info.name)] = c.*(f.member);
+  for (const auto& f : fields)
+    out[as_str(f.info.name)] = c.*(f.member);
   out["burn_shape"] = as_str(to_string(c.burn_shape));
   out["gamma_model"] = as_str(to_string(c.gamma_model));
   out["wall_heat_model"] = as_str(to_string(c.wall_heat_model));
@@ -81,7 +85,8 @@ py::dict to_dict(const Cylinder& c) {
 
 py::dict to_dict(const OperatingPoint& p) {
   py::dict out;
-  for (const auto& f : point_fields) out[as_str(f.info.name)] = p.*(f.member);
+  for (const auto& f : point_fields)
+    out[as_str(f.info.name)] = p.*(f.member);
   out["burn_duration_cad"] = p.burn_duration_cad;
   out["trapped_mass_g"] = p.trapped_mass_g;
   return out;
@@ -174,14 +179,13 @@ OperatingPoint replaced(const OperatingPoint& from, const py::kwargs& changes) {
 template <class T>
 void bind_record(py::class_<T>& cls, const char* name) {
   cls.def("to_dict", [](const T& self) { return to_dict(self); }, "All fields as a new dict.");
-  cls.def("replace", [](const T& self, const py::kwargs& changes) { return replaced(self, changes); },
-          "A validated copy with some fields changed; an unknown name is a ParameterError.");
+  cls.def(
+      "replace", [](const T& self, const py::kwargs& changes) { return replaced(self, changes); },
+      "A validated copy with some fields changed; an unknown name is a ParameterError.");
   cls.def("__eq__", [](const T& self, const py::object& other) {
     return py::isinstance<T>(other) && self == other.cast<const T&>();
   });
-  cls.def("__hash__", [](const T& self) {
-    return py::hash(py::tuple(to_dict(self).attr("values")()));
-  });
+  cls.def("__hash__", [](const T& self) { return py::hash(py::tuple(to_dict(self).attr("values")())); });
   cls.def("__repr__", [name](const T& self) { return representation(name, self); });
   cls.def(py::pickle([](const T& self) { return py::make_tuple(1, to_dict(self)); },
                      [](const py::tuple& state) {
@@ -195,7 +199,8 @@ void bind_record(py::class_<T>& cls, const char* name) {
 }  // namespace
 
 void bind_cylinder(py::module_& m) {
-  py::class_<Cylinder> cylinder(m, "Cylinder", R"(Parameters of one cylinder: geometry, charge, gas, wall heat, burn law, ignition delay.
+  py::class_<Cylinder> cylinder(
+      m, "Cylinder", R"(Parameters of one cylinder: geometry, charge, gas, wall heat, burn law, ignition delay.
 
 Keyword-only and immutable; units stand in the names. Defaults are the preset `puma_single`.
 `Cylinder.fields()` lists every field with unit, bounds, meaning and default.
@@ -238,7 +243,8 @@ Examples
       [] {
         const Cylinder d;
         py::dict out;
-        for (const auto& f : fields) out[as_str(f.info.name)] = describe(f.info, py::float_(d.*(f.member)));
+        for (const auto& f : fields)
+          out[as_str(f.info.name)] = describe(f.info, py::float_(d.*(f.member)));
         out["burn_shape"] = describe_choice("triangle", {"triangle", "wiebe", "double_wiebe"}, "burn law");
         out["gamma_model"] = describe_choice("constant", {"constant", "linear", "polynomial"}, "gamma against T");
         out["wall_heat_model"] = describe_choice("woschni", {"woschni", "hohenberg"}, "wall-heat correlation");

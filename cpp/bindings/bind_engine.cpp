@@ -20,11 +20,14 @@ namespace {
 
 using namespace engine;
 
-py::str as_str(std::string_view s) { return {s.data(), s.size()}; }
+py::str as_str(std::string_view s) {
+  return {s.data(), s.size()};
+}
 
 py::dict to_dict(const Indicators<double>& indicators) {
   py::dict out;
-  for (const auto& f : indicator_fields<double>()) out[as_str(f.name)] = indicators.*(f.member);
+  for (const auto& f : indicator_fields<double>())
+    out[as_str(f.name)] = indicators.*(f.member);
   return out;
 }
 
@@ -44,8 +47,8 @@ py::dict simulate(const Cylinder& cylinder, const OperatingPoint& point, double 
   model.run(charge, soc_cad, work);
   const std::vector<double> angle(model.angles_cad().begin(), model.angles_cad().end());
   const std::size_t n = angle.size();
-  std::vector<double> pressure(n), volume(n), temperature(n), burned(n, 0.0), release(n, 0.0), loss(n, 0.0), booked(n, 0.0),
-      energy(n, 0.0);
+  std::vector<double> pressure(n), volume(n), temperature(n), burned(n, 0.0), release(n, 0.0), loss(n, 0.0),
+      booked(n, 0.0), energy(n, 0.0);
   const Burn<double> burn(cylinder, soc_cad, charge.burn_duration_cad);
   const bool fired = charge.fuel_heat_j > 0.0;
   for (std::size_t k = 0; k < n; ++k) {
@@ -80,7 +83,8 @@ py::dict simulate(const Cylinder& cylinder, const OperatingPoint& point, double 
 py::dict scan(const Cylinder& cylinder, const OperatingPoint& point, const InputArray& soc_cad, double step_cad,
               const std::string& integrator) {
   const std::vector<double> timings = to_column(soc_cad, "soc_cad");
-  for (const double soc : timings) check(cylinder, point, soc);
+  for (const double soc : timings)
+    check(cylinder, point, soc);
   const Integrator scheme = parse_integrator(integrator);
   std::vector<Indicators<double>> rows(timings.size());
   {
@@ -96,7 +100,8 @@ py::dict scan(const Cylinder& cylinder, const OperatingPoint& point, const Input
   py::dict out;
   for (const auto& f : indicator_fields<double>()) {
     std::vector<double> column;
-    for (const Indicators<double>& row : rows) column.push_back(row.*(f.member));
+    for (const Indicators<double>& row : rows)
+      column.push_back(row.*(f.member));
     out[as_str(f.name)] = to_array(column);
   }
   return out;
@@ -108,7 +113,8 @@ py::dict bind_sensitivities(const Cylinder& cylinder, const OperatingPoint& poin
   py::dict indicators;
   for (const auto& f : indicator_fields<double>()) {
     std::vector<double> column;
-    for (const Indicators<double>& direction : s.indicators) column.push_back(direction.*(f.member));
+    for (const Indicators<double>& direction : s.indicators)
+      column.push_back(direction.*(f.member));
     indicators[as_str(f.name)] = to_array(column);
   }
   py::dict out;
@@ -140,16 +146,18 @@ py::dict to_dict(const IgnitionTiming& t) {
 
 py::dict bind_analyze(const InputArray& angle, const InputArray& pressure, const Cylinder& cylinder,
                       const OperatingPoint& point, const TraceOptions& options) {
-  const TraceAnalysis a = analyze_trace(to_column(angle, "crank_angle_cad"), to_column(pressure, "pressure_bar"),
-                                        cylinder, point, options);
+  const TraceAnalysis a =
+      analyze_trace(to_column(angle, "crank_angle_cad"), to_column(pressure, "pressure_bar"), cylinder, point, options);
   const std::size_t n = a.angle_cad.size();
   const auto per_cad = [&](const std::vector<double>& step_j) {
     std::vector<double> rate(n, 0.0);
-    for (std::size_t k = 1; k < n; ++k) rate[k] = step_j[k] / (a.angle_cad[k] - a.angle_cad[k - 1]);
+    for (std::size_t k = 1; k < n; ++k)
+      rate[k] = step_j[k] / (a.angle_cad[k] - a.angle_cad[k - 1]);
     return rate;
   };
   std::vector<double> gross(n);
-  for (std::size_t k = 0; k < n; ++k) gross[k] = a.heat_net_j[k] + a.heat_loss_j[k];
+  for (std::size_t k = 0; k < n; ++k)
+    gross[k] = a.heat_net_j[k] + a.heat_loss_j[k];
   py::dict out;
   out["crank_angle_cad"] = to_array(a.angle_cad);
   out["pressure_bar"] = to_array(a.pressure_bar);
@@ -191,58 +199,69 @@ void bind_engine(py::module_& m) {
   m.def("sensitivities", &bind_sensitivities, arg("cylinder"), arg("point"), arg("soc_cad"), arg("names"),
         arg("step_cad"), arg("integrator"), "Exact derivatives of indicators and pressure.");
   m.def("differentiable_inputs", &differentiable_inputs, "Names that `sensitivities` takes.");
-  m.def("input_unit", [](const std::string& name) { return std::string(input_unit(name)); }, arg("name"),
-        "Unit of a differentiable input.");
+  m.def(
+      "input_unit", [](const std::string& name) { return std::string(input_unit(name)); }, arg("name"),
+      "Unit of a differentiable input.");
   m.def("convergence", &bind_convergence, arg("cylinder"), arg("point"), arg("soc_cad"), arg("step_cad"),
         arg("integrator"), "Step-size error per indicator: (value, extrapolated, error, order, unit).");
-  m.def("indicator_units", [] {
-    py::dict out;
-    for (const auto& f : indicator_fields<double>()) out[as_str(f.name)] = as_str(f.unit);
-    return out;
-  }, "Unit of every indicator.");
+  m.def(
+      "indicator_units",
+      [] {
+        py::dict out;
+        for (const auto& f : indicator_fields<double>())
+          out[as_str(f.name)] = as_str(f.unit);
+        return out;
+      },
+      "Unit of every indicator.");
 
-  m.def("start_of_combustion",
-        [](const Cylinder& c, const OperatingPoint& p, double soi) { return to_dict(start_of_combustion(c, p, soi)); },
-        arg("cylinder"), arg("point"), arg("soi_cad"), "SOI to SOC.");
-  m.def("start_of_injection",
-        [](const Cylinder& c, const OperatingPoint& p, double soc) { return to_dict(start_of_injection(c, p, soc)); },
-        arg("cylinder"), arg("point"), arg("soc_cad"), "SOC to SOI.");
+  m.def(
+      "start_of_combustion",
+      [](const Cylinder& c, const OperatingPoint& p, double soi) { return to_dict(start_of_combustion(c, p, soi)); },
+      arg("cylinder"), arg("point"), arg("soi_cad"), "SOI to SOC.");
+  m.def(
+      "start_of_injection",
+      [](const Cylinder& c, const OperatingPoint& p, double soc) { return to_dict(start_of_injection(c, p, soc)); },
+      arg("cylinder"), arg("point"), arg("soc_cad"), "SOC to SOI.");
   m.def("watson_delay_ms", py::vectorize(&watson_delay_ms), arg("pressure_bar"), arg("temperature_k"));
   m.def("wolfer_delay_ms", py::vectorize(&wolfer_delay_ms), arg("pressure_bar"), arg("temperature_k"));
   m.def("hardenberg_hase_delay_cad", py::vectorize(&hardenberg_hase_delay_cad), arg("pressure_bar"),
         arg("temperature_k"), arg("cetane_number"), arg("piston_speed_m_per_s"));
 
-  m.def("volume_l",
-        [](const Cylinder& c, const InputArray& angle) {
-          validate(c);
-          const Geometry<double> g(c);
-          return py::vectorize([&g](double a) { return g.volume_m3(a) / units::m3_per_l; })(angle);
-        },
-        arg("cylinder"), arg("crank_angle_cad"), "Cylinder volume [L].");
-  m.def("wall_area_m2",
-        [](const Cylinder& c, const InputArray& angle) {
-          validate(c);
-          const Geometry<double> g(c);
-          return py::vectorize([&g](double a) { return g.wall_area_m2(g.volume_m3(a)); })(angle);
-        },
-        arg("cylinder"), arg("crank_angle_cad"), "Wall area [m2].");
-  m.def("burned_fraction",
-        [](const Cylinder& c, const InputArray& angle, double soc, double duration) {
-          validate(c);
-          if (!(duration > 0.0)) {
-            throw ParameterError("burn_duration_cad = " + std::to_string(duration) + " °CA: must be > 0");
-          }
-          const Burn<double> burn(c, soc, duration);
-          return py::vectorize([&burn](double a) { return burn.fraction(a); })(angle);
-        },
-        arg("cylinder"), arg("crank_angle_cad"), arg("soc_cad"), arg("burn_duration_cad"), "Burned fraction [-].");
-  m.def("burn_duration_cad",
-        [](const Cylinder& c, const OperatingPoint& p) {
-          validate(c);
-          validate(p);
-          return burn_duration_cad(c, p);
-        },
-        arg("cylinder"), arg("point"), "Burn duration in force [°CA].");
+  m.def(
+      "volume_l",
+      [](const Cylinder& c, const InputArray& angle) {
+        validate(c);
+        const Geometry<double> g(c);
+        return py::vectorize([&g](double a) { return g.volume_m3(a) / units::m3_per_l; })(angle);
+      },
+      arg("cylinder"), arg("crank_angle_cad"), "Cylinder volume [L].");
+  m.def(
+      "wall_area_m2",
+      [](const Cylinder& c, const InputArray& angle) {
+        validate(c);
+        const Geometry<double> g(c);
+        return py::vectorize([&g](double a) { return g.wall_area_m2(g.volume_m3(a)); })(angle);
+      },
+      arg("cylinder"), arg("crank_angle_cad"), "Wall area [m2].");
+  m.def(
+      "burned_fraction",
+      [](const Cylinder& c, const InputArray& angle, double soc, double duration) {
+        validate(c);
+        if (!(duration > 0.0)) {
+          throw ParameterError("burn_duration_cad = " + std::to_string(duration) + " °CA: must be > 0");
+        }
+        const Burn<double> burn(c, soc, duration);
+        return py::vectorize([&burn](double a) { return burn.fraction(a); })(angle);
+      },
+      arg("cylinder"), arg("crank_angle_cad"), arg("soc_cad"), arg("burn_duration_cad"), "Burned fraction [-].");
+  m.def(
+      "burn_duration_cad",
+      [](const Cylinder& c, const OperatingPoint& p) {
+        validate(c);
+        validate(p);
+        return burn_duration_cad(c, p);
+      },
+      arg("cylinder"), arg("point"), "Burn duration in force [°CA].");
   m.attr("woschni_c1_bar_m") = woschni_c1_bar_m;
   m.def("woschni_coefficient", py::vectorize(&woschni_coefficient<double>), arg("c1_bar_m"), arg("bore_m"),
         arg("pressure_bar"), arg("temperature_k"), arg("gas_velocity_m_per_s"), "Film coefficient [W/(m2 K)].");
@@ -251,9 +270,9 @@ void bind_engine(py::module_& m) {
 
   py::class_<NoxProxy>(m, "NoxProxy")
       .def(py::init([](double t0, double nox0, double b) {
-             for (const auto& [name, value] : {std::pair{"reference_temperature_k", t0},
-                                               std::pair{"reference_nox_ppm", nox0},
-                                               std::pair{"activation_temperature_k", b}}) {
+             for (const auto& [name, value] :
+                  {std::pair{"reference_temperature_k", t0}, std::pair{"reference_nox_ppm", nox0},
+                   std::pair{"activation_temperature_k", b}}) {
                if (!(value > 0.0 && std::isfinite(value))) {
                  throw ParameterError(std::string(name) + " = " + std::to_string(value) + ": must be > 0");
                }
@@ -266,23 +285,35 @@ void bind_engine(py::module_& m) {
       .def_readonly("reference_temperature_k", &NoxProxy::reference_temperature_k)
       .def_readonly("reference_nox_ppm", &NoxProxy::reference_nox_ppm)
       .def_readonly("activation_temperature_k", &NoxProxy::activation_temperature_k)
-      .def("affine_log_ppm",
-           [](const NoxProxy& self, const InputArray& t) {
-             return py::vectorize([&self](double x) { return self.affine_log_ppm(x); })(t);
-           },
-           arg("t_max_k"), "NOx [ppm] by the affine-log map.")
-      .def("arrhenius_ppm",
-           [](const NoxProxy& self, const InputArray& t) {
-             return py::vectorize([&self](double x) { return self.arrhenius_ppm(x); })(t);
-           },
-           arg("t_max_k"), "NOx [ppm] by the Arrhenius map.");
+      .def(
+          "affine_log_ppm",
+          [](const NoxProxy& self, const InputArray& t) {
+            return py::vectorize([&self](double x) { return self.affine_log_ppm(x); })(t);
+          },
+          arg("t_max_k"), "NOx [ppm] by the affine-log map.")
+      .def(
+          "arrhenius_ppm",
+          [](const NoxProxy& self, const InputArray& t) {
+            return py::vectorize([&self](double x) { return self.arrhenius_ppm(x); })(t);
+          },
+          arg("t_max_k"), "NOx [ppm] by the Arrhenius map.");
 
   const TraceOptions d;
   py::class_<TraceOptions>(m, "TraceOptions")
-      .def(py::init([](const std::string& pegging, double exponent, double inlet, const std::string& source, double gamma,
-                       double compression, double combustion, double from, double to, double burn, bool gross) {
-             return TraceOptions{parse_pegging(pegging), exponent, inlet, parse_analysis_gamma(source), gamma,
-                                 compression, combustion, from, to, burn, gross};
+      .def(py::init([](const std::string& pegging, double exponent, double inlet, const std::string& source,
+                       double gamma, double compression, double combustion, double from, double to, double burn,
+                       bool gross) {
+             return TraceOptions{parse_pegging(pegging),
+                                 exponent,
+                                 inlet,
+                                 parse_analysis_gamma(source),
+                                 gamma,
+                                 compression,
+                                 combustion,
+                                 from,
+                                 to,
+                                 burn,
+                                 gross};
            }),
            py::kw_only(), arg("pegging") = std::string(to_string(d.pegging)),
            arg("pegging_exponent") = d.pegging_exponent, arg("inlet_pressure_kpa") = d.inlet_pressure_kpa,
@@ -292,11 +323,12 @@ void bind_engine(py::module_& m) {
            arg("burn_from_cad") = d.burn_from_cad, arg("fractions_of_gross") = d.fractions_of_gross);
   m.def("analyze_trace", &bind_analyze, arg("crank_angle_cad"), arg("pressure_bar"), arg("cylinder"), arg("point"),
         arg("options"), "Pegging, heat release, burn angles, work.");
-  m.def("check_trace",
-        [](const InputArray& angle, const InputArray& pressure) {
-          check_trace(to_column(angle, "crank_angle_cad"), to_column(pressure, "pressure_bar"));
-        },
-        arg("crank_angle_cad"), arg("pressure_bar"), "DataError unless the trace can be analysed.");
+  m.def(
+      "check_trace",
+      [](const InputArray& angle, const InputArray& pressure) {
+        check_trace(to_column(angle, "crank_angle_cad"), to_column(pressure, "pressure_bar"));
+      },
+      arg("crank_angle_cad"), arg("pressure_bar"), "DataError unless the trace can be analysed.");
 }
 
 }  // namespace mgdd::bindings

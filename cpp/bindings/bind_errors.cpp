@@ -8,7 +8,7 @@ namespace mgdd::bindings {
 namespace {
 
 py::object make(const char* name, const py::object& bases, const char* doc) {
-  const std::string qualified = std::string("mgdd.errors.") + name;
+  const std::string qualified = std::string("mgdd._core.") + name;
   py::object type =
       py::reinterpret_steal<py::object>(PyErr_NewExceptionWithDoc(qualified.c_str(), doc, bases.ptr(), nullptr));
   if (!type) throw py::error_already_set();

@@ -42,12 +42,11 @@ Evaluation call(const py::function& fun, const Eigen::VectorXd& x) {
   }
   const auto pair = py::reinterpret_borrow<py::tuple>(result);
   Evaluation evaluation{true, dense(pair[0], "residual", 1), dense(pair[1], "jacobian", 2)};
-  if (evaluation.jacobian.shape(0) != evaluation.residual.shape(0) ||
-      evaluation.jacobian.shape(1) != x.size()) {
+  if (evaluation.jacobian.shape(0) != evaluation.residual.shape(0) || evaluation.jacobian.shape(1) != x.size()) {
     throw ShapeError("fun returned a jacobian of " + std::to_string(evaluation.jacobian.shape(0)) + " x " +
                      std::to_string(evaluation.jacobian.shape(1)) + " for " +
-                     std::to_string(evaluation.residual.shape(0)) + " residuals and " +
-                     std::to_string(x.size()) + " parameters");
+                     std::to_string(evaluation.residual.shape(0)) + " residuals and " + std::to_string(x.size()) +
+                     " parameters");
   }
   return evaluation;
 }
@@ -109,8 +108,8 @@ py::tuple parameter_state(const Parameter& p) {
 }
 
 py::tuple options_state(const LeastSquaresOptions& o) {
-  return py::make_tuple(o.max_iterations, o.cost_tolerance, o.step_tolerance, o.gradient_tolerance,
-                        o.initial_damping, o.correlation_limit, o.rank_tolerance, o.evaluate_together);
+  return py::make_tuple(o.max_iterations, o.cost_tolerance, o.step_tolerance, o.gradient_tolerance, o.initial_damping,
+                        o.correlation_limit, o.rank_tolerance, o.evaluate_together);
 }
 
 LeastSquaresOptions options_from(int max_iterations, double cost_tolerance, double step_tolerance,
@@ -123,44 +122,39 @@ LeastSquaresOptions options_from(int max_iterations, double cost_tolerance, doub
 }
 
 void bind_parameter(py::module_& m) {
-  py::class_<Parameter>(m, "Parameter",
-                        "One unknown of a fit: name, bounds, and whether it is searched as its log.")
+  py::class_<Parameter>(m, "Parameter", "One unknown of a fit: name, bounds, and whether it is searched as its log.")
       .def(py::init([](std::string name, double lower, double upper, bool log_scaled) {
              return Parameter{std::move(name), lower, upper, log_scaled};
            }),
-           py::kw_only(), py::arg("name"), py::arg("lower") = Parameter{}.lower,
-           py::arg("upper") = Parameter{}.upper, py::arg("log_scaled") = false)
+           py::kw_only(), py::arg("name"), py::arg("lower") = Parameter{}.lower, py::arg("upper") = Parameter{}.upper,
+           py::arg("log_scaled") = false)
       .def_readonly("name", &Parameter::name, "Name in reports and messages.")
       .def_readonly("lower", &Parameter::lower, "Lower bound, -inf for none.")
       .def_readonly("upper", &Parameter::upper, "Upper bound, inf for none.")
       .def_readonly("log_scaled", &Parameter::log_scaled, "Searched as log(p); needs lower > 0.")
       .def(
           "__eq__", [](const Parameter& a, const Parameter& b) { return a == b; }, py::is_operator())
-      .def("__repr__",
-           [](const Parameter& p) {
-             return py::str("Parameter(name={!r}, lower={!r}, upper={!r}, log_scaled={!r})")
-                 .format(*parameter_state(p));
-           })
+      .def(
+          "__repr__",
+          [](const Parameter& p) {
+            return py::str("Parameter(name={!r}, lower={!r}, upper={!r}, log_scaled={!r})").format(*parameter_state(p));
+          })
       .def(py::pickle(&parameter_state, [](const py::tuple& t) {
-        return Parameter{t[0].cast<std::string>(), t[1].cast<double>(), t[2].cast<double>(),
-                         t[3].cast<bool>()};
+        return Parameter{t[0].cast<std::string>(), t[1].cast<double>(), t[2].cast<double>(), t[3].cast<bool>()};
       }));
 }
 
 void bind_options(py::module_& m) {
   const LeastSquaresOptions d;
-  py::class_<LeastSquaresOptions>(m, "LeastSquaresOptions",
-                                  "When a least-squares search ends and what it reports.")
+  py::class_<LeastSquaresOptions>(m, "LeastSquaresOptions", "When a least-squares search ends and what it reports.")
       .def(py::init(&options_from), py::kw_only(), py::arg("max_iterations") = d.max_iterations,
            py::arg("cost_tolerance") = d.cost_tolerance, py::arg("step_tolerance") = d.step_tolerance,
-           py::arg("gradient_tolerance") = d.gradient_tolerance,
-           py::arg("initial_damping") = d.initial_damping, py::arg("correlation_limit") = d.correlation_limit,
-           py::arg("rank_tolerance") = d.rank_tolerance, py::arg("evaluate_together") = d.evaluate_together)
+           py::arg("gradient_tolerance") = d.gradient_tolerance, py::arg("initial_damping") = d.initial_damping,
+           py::arg("correlation_limit") = d.correlation_limit, py::arg("rank_tolerance") = d.rank_tolerance,
+           py::arg("evaluate_together") = d.evaluate_together)
       .def_readonly("max_iterations", &LeastSquaresOptions::max_iterations, "Trial steps.")
-      .def_readonly("cost_tolerance", &LeastSquaresOptions::cost_tolerance,
-                    "Relative decrease of the cost [-].")
-      .def_readonly("step_tolerance", &LeastSquaresOptions::step_tolerance,
-                    "Step over parameters, scaled [-].")
+      .def_readonly("cost_tolerance", &LeastSquaresOptions::cost_tolerance, "Relative decrease of the cost [-].")
+      .def_readonly("step_tolerance", &LeastSquaresOptions::step_tolerance, "Step over parameters, scaled [-].")
       .def_readonly("gradient_tolerance", &LeastSquaresOptions::gradient_tolerance,
                     "Cosine between the residual and a free Jacobian column [-].")
       .def_readonly("initial_damping", &LeastSquaresOptions::initial_damping, "Relative to unit columns [-].")
@@ -168,8 +162,7 @@ void bind_options(py::module_& m) {
                     "Correlation beyond which two parameters count as unidentifiable [-].")
       .def_readonly("rank_tolerance", &LeastSquaresOptions::rank_tolerance,
                     "Singular value, relative to the largest, that counts as zero [-].")
-      .def_readonly("evaluate_together", &LeastSquaresOptions::evaluate_together,
-                    "Residual and Jacobian in one call.")
+      .def_readonly("evaluate_together", &LeastSquaresOptions::evaluate_together, "Residual and Jacobian in one call.")
       .def(
           "__eq__", [](const LeastSquaresOptions& a, const LeastSquaresOptions& b) { return a == b; },
           py::is_operator())
@@ -188,21 +181,17 @@ void bind_options(py::module_& m) {
 }
 
 void bind_report(py::module_& m) {
-  py::class_<FitReport>(m, "FitReport",
-                        "Result of a fit as the core gives it; `mgdd.optimize.FitReport` wraps it.")
+  py::class_<FitReport>(m, "FitReport", "Result of a fit as the core gives it; `mgdd.optimize.FitReport` wraps it.")
       .def(py::init<>(), "A fit that has not been run.")
       .def_property_readonly("names", by_value(&FitReport::names), "Parameter names.")
       .def_property_readonly("values", by_value(&FitReport::values), "Estimates.")
       .def_property_readonly("stderr", by_value(&FitReport::standard_error), "Standard errors.")
       .def_property_readonly("lower", by_value(&FitReport::lower), "Lower bounds.")
       .def_property_readonly("upper", by_value(&FitReport::upper), "Upper bounds.")
-      .def_property_readonly("bounds_active", by_value(&FitReport::bounds_active),
-                             "-1 lower, +1 upper, 0 free.")
+      .def_property_readonly("bounds_active", by_value(&FitReport::bounds_active), "-1 lower, +1 upper, 0 free.")
       .def_property_readonly("covariance", by_value(&FitReport::covariance), "Covariance of the estimates.")
-      .def_property_readonly("correlation", by_value(&FitReport::correlation),
-                             "Correlation of the estimates.")
-      .def_property_readonly("unidentifiable", by_value(&FitReport::unidentifiable),
-                             "Names the data leave open.")
+      .def_property_readonly("correlation", by_value(&FitReport::correlation), "Correlation of the estimates.")
+      .def_property_readonly("unidentifiable", by_value(&FitReport::unidentifiable), "Names the data leave open.")
       .def_property_readonly("findings", by_value(&FitReport::findings), "Reasons behind `unidentifiable`.")
       .def_property_readonly("null_directions", by_value(&FitReport::null_directions),
                              "Columns: parameter changes that leave the residual as it is.")
@@ -231,8 +220,7 @@ void bind_optimize(py::module_& m) {
   bind_options(m);
   bind_report(m);
   m.def("least_squares", &least_squares, py::arg("fun"), py::arg("x0"), py::kw_only(), py::arg("parameters"),
-        py::arg("options"),
-        "Minimise sum(residual^2) / 2 for `fun(x) -> (residual, jacobian)`; None refuses a point.");
+        py::arg("options"), "Minimise sum(residual^2) / 2 for `fun(x) -> (residual, jacobian)`; None refuses a point.");
 }
 
 }  // namespace mgdd::bindings

@@ -1,7 +1,8 @@
 """Model-guided data-driven optimization and control for internal combustion engine systems.
 
-The rooms: `mgdd.engine` (cycle model and trace analysis), `mgdd.identify` (calibration), `mgdd.optimize` (least squares),
-`mgdd.presets`, `mgdd.io`, `mgdd.datasets`, `mgdd.plot`, `mgdd.studies` and `mgdd.errors`. They are imported on use.
+The rooms: `mgdd.engine` (cycle model and trace analysis), `mgdd.identify` (calibration), `mgdd.optimize` (least
+squares), `mgdd.presets`, `mgdd.io`, `mgdd.datasets`, `mgdd.plot`, `mgdd.studies`, `mgdd.report`, `mgdd.results` and
+`mgdd.errors`. They are imported on use.
 
 Crank angles are degrees everywhere, firing TDC = 0, compression negative (°CA aTDC).
 """
@@ -13,13 +14,24 @@ from types import ModuleType
 
 from mgdd._core import __version__
 
-_ROOMS = ("datasets", "engine", "errors", "identify", "io", "optimize", "plot", "presets", "report", "results", "studies")
-
-__all__ = ["__version__", *_ROOMS]
+__all__ = [
+    "__version__",
+    "datasets",
+    "engine",
+    "errors",
+    "identify",
+    "io",
+    "optimize",
+    "plot",
+    "presets",
+    "report",
+    "results",
+    "studies",
+]
 
 
 def __getattr__(name: str) -> ModuleType:
-    if name in _ROOMS:
+    if name in __all__:
         return importlib.import_module(f"mgdd.{name}")
     raise AttributeError(f"module 'mgdd' has no attribute {name!r}")
 

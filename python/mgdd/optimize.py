@@ -228,9 +228,7 @@ class FitReport:
         >>> json.loads(json.dumps(FitReport.from_core(_core.FitReport()).to_dict()))["cost"] is None
         True
         """
-        return {
-            field: _plain(getattr(self, field)) for field in self.__dataclass_fields__ if field != "residual"
-        }
+        return {field: _plain(getattr(self, field)) for field in self.__dataclass_fields__ if field != "residual"}
 
     def _repr_html_(self) -> str:
         def line(cells: Sequence[str], tag: str) -> str:
@@ -365,9 +363,7 @@ def least_squares(
         rank_tolerance=rank_tolerance,
     )
     measured = None if data is None else _vector(data, "data")
-    return FitReport.from_core(
-        _core.least_squares(fun, start, parameters=parameters, options=options), measured
-    )
+    return FitReport.from_core(_core.least_squares(fun, start, parameters=parameters, options=options), measured)
 
 
 _COLUMNS = ("parameter", "value", "stderr", "lower", "upper", "remark")
@@ -401,9 +397,7 @@ def _fit_percent(residual: NDArray[np.float64], data: ArrayLike) -> float | None
     if not np.isfinite(residual).all():
         return None
     if measured.shape != residual.shape:
-        raise ShapeError(
-            f"data has shape {measured.shape}: must have one value per residual, {residual.shape}"
-        )
+        raise ShapeError(f"data has shape {measured.shape}: must have one value per residual, {residual.shape}")
     spread = float(np.linalg.norm(measured - measured.mean()))
     return 100.0 * (1.0 - float(np.linalg.norm(residual)) / spread) if spread > 0.0 else None
 

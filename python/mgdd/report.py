@@ -66,17 +66,21 @@ def _page(result: StudyResult) -> str:
     s = result.summary
     body = [
         "<h1>Measured pressure, calibrated cycle model, best timing</h1>",
-        f"<p>{_text(s['data'])} Angles are °CA aTDC: firing TDC = 0, compression negative. mgdd {_text(s['mgdd'])}.</p>",
+        f"<p>{_text(s['data'])} Angles are °CA aTDC (firing TDC = 0, compression negative). mgdd {s['mgdd']}.</p>",
         "<h2>Best timing</h2>",
-        "<p>The traces do not carry the wall heat, so each best timing is a range over a wall-heat scale of "
-        f"{_span(s['best_timing'][0]['wall_heat_scale'], 1)} with everything else refitted ({_text(s['law'])}). Gains are "
-        "in closed-cycle efficiency over the measured timing.</p>",
+        (
+            "<p>The traces do not carry the wall heat, so each best timing is a range over a wall-heat scale of "
+            f"{_span(s['best_timing'][0]['wall_heat_scale'], 1)} with everything else refitted ({_text(s['law'])}). "
+            "Gains are in closed-cycle efficiency over the measured timing.</p>"
+        ),
         _timing_table(s["best_timing"]),
         "<h2>What to distrust</h2>",
         _list(_distrust(s)),
         "<h2>Every burn law, side by side</h2>",
-        "<p>Pressure error over the closed cycle, error of the closed IMEP, fitted burn start against injection, and the "
-        "largest local error. A small pressure error alone proves nothing.</p>",
+        (
+            "<p>Pressure error over the closed cycle, error of the closed IMEP, fitted burn start against injection, "
+            "and the largest local error. A small pressure error alone proves nothing.</p>"
+        ),
         _law_table(s["laws"]),
         "<h2>Wall heat</h2>",
         _wall_heat(s["common"]["wall_heat_scale"]),
@@ -98,13 +102,13 @@ def _distrust(s: Mapping[str, Any]) -> list[str]:
     out = []
     for law, profile in s["common"]["wall_heat_scale"].items():
         if not profile["identifiable"]:
-            out.append(f"The wall-heat scale is not identifiable from these traces ({law}): {'; '.join(profile['reasons'])}.")
-    out += [f"{text[0].upper()}{text[1:]}." for text in s["warnings"]]
+            out.append(
+                f"The wall-heat scale is not identifiable from these traces ({law}): {'; '.join(profile['reasons'])}."
+            )
+    out += [f"{text}." for text in s["warnings"]]
     for row in s["traces"]:
         out += [f"{row['file']}: {text}." for text in row["warnings"]]
-    out.append(
-        "Standard errors take the residual as white noise; it is model error, so true uncertainties are larger."
-    )
+    out.append("Standard errors take the residual as white noise; it is model error, so true uncertainties are larger.")
     out.append("NOx is a proxy from the maximum bulk gas temperature with unfitted constants: read its trend only.")
     out.append("The gas exchange is not in these traces: gains leave out pumping work, emissions and exhaust enthalpy.")
     return out
@@ -171,7 +175,15 @@ def _law_table(laws: Sequence[Mapping[str, Any]]) -> str:
 def _wall_heat(profiles: Mapping[str, Mapping[str, Any]]) -> str:
     if not profiles:
         return "<p>Not profiled in this quick run.</p>"
-    head = ("law", "scale [-]", "standard error [-]", "strongest correlation", "with", "possible range [-]", "identifiable")
+    head = (
+        "law",
+        "scale [-]",
+        "standard error [-]",
+        "strongest correlation",
+        "with",
+        "possible range [-]",
+        "identifiable",
+    )
     body = [
         (
             law,
@@ -188,7 +200,15 @@ def _wall_heat(profiles: Mapping[str, Mapping[str, Any]]) -> str:
 
 
 def _burn_table(rows: Sequence[Mapping[str, Any]]) -> str:
-    head = ("trace", "SOC [°CA aTDC]", "duration [°CA]", "fuel heat [J]", "CA50 [°CA aTDC]", "RMSE [bar]", "wall heat [% of fuel]")
+    head = (
+        "trace",
+        "SOC [°CA aTDC]",
+        "duration [°CA]",
+        "fuel heat [J]",
+        "CA50 [°CA aTDC]",
+        "RMSE [bar]",
+        "wall heat [% of fuel]",
+    )
     body = []
     for row in rows:
         c = row["calibrated"]
@@ -207,12 +227,23 @@ def _burn_table(rows: Sequence[Mapping[str, Any]]) -> str:
 
 
 def _analysis_table(rows: Sequence[Mapping[str, Any]]) -> str:
-    head = ("trace", "p_max [bar]", "at [°CA aTDC]", "closed IMEP [bar]", "CA10", "CA50", "CA90 [°CA aTDC]", "net heat [J]", "n_c", "n_e")
-    names = "p_max_bar p_max_cad imep_closed_bar ca10_cad ca50_cad ca90_cad heat_net_j n_compression n_expansion".split()
+    head = (
+        "trace",
+        "p_max [bar]",
+        "at [°CA aTDC]",
+        "closed IMEP [bar]",
+        "CA10",
+        "CA50",
+        "CA90 [°CA aTDC]",
+        "net heat [J]",
+        "n_c",
+        "n_e",
+    )
+    names = (
+        "p_max_bar p_max_cad imep_closed_bar ca10_cad ca50_cad ca90_cad heat_net_j n_compression n_expansion".split()
+    )
     digits = (1, 1, 2, 1, 1, 1, 0, 3, 3)
-    body = [
-        (row["file"], *(f"{row['analysis'][n]:.{d}f}" for n, d in zip(names, digits, strict=True))) for row in rows
-    ]
+    body = [(row["file"], *(f"{row['analysis'][n]:.{d}f}" for n, d in zip(names, digits, strict=True))) for row in rows]
     return _table(head, body)
 
 

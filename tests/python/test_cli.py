@@ -107,7 +107,15 @@ def test_analyze_measured_trace(files: tuple[list[str], str], capsys: pytest.Cap
     assert out["heat_net_j"] == pytest.approx(4434.0, abs=2.0)
     assert out["method"] == "none"
     assert out["gamma"] == 1.33
-    assert {"pegging_bar", "n_expansion", "ca10_cad", "ca90_cad", "heat_gross_j", "p_max_bar", "p_max_cad"} <= set(out)
+    assert {
+        "pegging_bar",
+        "n_expansion",
+        "ca10_cad",
+        "ca90_cad",
+        "heat_gross_j",
+        "p_max_bar",
+        "p_max_cad",
+    } <= set(out)
 
 
 def test_analyze_pegging_recovers_an_offset(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
@@ -115,9 +123,7 @@ def test_analyze_pegging_recovers_an_offset(tmp_path: Path, capsys: pytest.Captu
     shifted = io.pressure_trace(motored["crank_angle_cad"].values, motored["pressure_bar"].values - 0.2, name="shifted")
     file = tmp_path / "shifted.csv"
     io.write_pressure(shifted, file)
-    out = run_json(
-        capsys, "engine", "analyze", str(file), "--pegging", "two_point", "--pegging-exponent", "1.37"
-    )
+    out = run_json(capsys, "engine", "analyze", str(file), "--pegging", "two_point", "--pegging-exponent", "1.37")
     assert out["pegging_bar"] == pytest.approx(0.2, abs=0.005)
 
 
@@ -126,9 +132,15 @@ def test_calibrate_reports_what_it_cannot_tell(
 ) -> None:
     out = run_json(capsys, "engine", "calibrate", *files[0], *HD, "--conditions", files[1])
     assert all(row["rmse_percent"] <= 1.0 and abs(row["imep_closed_error_percent"]) <= 3.0 for row in out["traces"])
-    assert {"file", "p_max_bar", "rmse_bar", "soc_cad", "burn_duration_cad", "fuel_heat_j", "ca50_cad"} <= set(
-        out["traces"][0]
-    )
+    assert {
+        "file",
+        "p_max_bar",
+        "rmse_bar",
+        "soc_cad",
+        "burn_duration_cad",
+        "fuel_heat_j",
+        "ca50_cad",
+    } <= set(out["traces"][0])
     scale = out["common"]["wall_heat_scale"]
     assert {"value", "stderr", "identifiable"} <= set(scale)
     assert scale["identifiable"] is False
@@ -204,7 +216,9 @@ def test_bad_files(tmp_path: Path, files: tuple[list[str], str], capsys: pytest.
     pascal = tmp_path / "pascal.csv"
     trace = datasets.load_hd_traces()[0]
     pascal.write_text(
-        "\n".join(f"{a} {p * 1e5}" for a, p in zip(trace["crank_angle_cad"].values, trace["pressure_bar"].values, strict=True))
+        "\n".join(
+            f"{a} {p * 1e5}" for a, p in zip(trace["crank_angle_cad"].values, trace["pressure_bar"].values, strict=True)
+        )
     )
     assert "Pa" in refused(capsys, "engine", "analyze", str(pascal), *HD)
     assert main(["engine", "analyze", str(pascal), *HD, "--pressure-unit", "Pa"]) == 0
@@ -232,7 +246,9 @@ def test_process_keeps_stdout_clean_and_help_has_an_example() -> None:
     env = {**os.environ, "PYTHONWARNINGS": "error"}
 
     def call(*argv: str) -> subprocess.CompletedProcess[str]:
-        return subprocess.run([sys.executable, "-m", "mgdd", *argv], capture_output=True, text=True, env=env, timeout=120)
+        return subprocess.run(
+            [sys.executable, "-m", "mgdd", *argv], capture_output=True, text=True, env=env, timeout=120
+        )
 
     version = call("--version")
     assert version.returncode == 0

@@ -130,7 +130,5 @@ def test_a_changed_packaged_file_is_refused(monkeypatch, tmp_path):
     (tmp_path / FILES[0]).write_text("tampered")
     monkeypatch.setattr(datasets, "_PACKAGE", tmp_path)
     found = hashlib.sha256(b"tampered").hexdigest()
-    with pytest.raises(
-        DataError, match=f"SHA-256 is {found}, shipped was .*: the file was changed; reinstall"
-    ):
+    with pytest.raises(DataError, match=f"SHA-256 is {found}, shipped was .*: the file was changed; reinstall"):
         datasets.path(NAME, FILES[0])

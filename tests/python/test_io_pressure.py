@@ -71,9 +71,7 @@ def test_encodings(file, encoding):
     assert read_pressure(path, angle_column="Winkel °KW").sizes[ANGLE] == ANGLES.size
 
 
-pascal = st.lists(st.integers(1_000, 3_000_000), min_size=267, max_size=267).map(
-    lambda p: [*p[:150], 3e7, *p[151:]]
-)
+pascal = st.lists(st.integers(1_000, 3_000_000), min_size=267, max_size=267).map(lambda p: [*p[:150], 3e7, *p[151:]])
 
 
 @given(pascal)
@@ -274,9 +272,7 @@ def test_a_refused_write_leaves_the_old_file(file):
     trace = pressure_trace(ANGLES, BAR)
     with pytest.raises(DataError, match="highest pressure"):
         write_pressure(trace.assign(pressure_bar=trace["pressure_bar"] * 0.0), path)
-    with pytest.raises(
-        DataError, match=r"no pressure_bar\(crank_angle_cad\): make one with mgdd.io.pressure_trace"
-    ):
+    with pytest.raises(DataError, match=r"no pressure_bar\(crank_angle_cad\): make one with mgdd.io.pressure_trace"):
         write_pressure(trace.drop_vars("pressure_bar"), path)
     assert path.read_text() == "old"
 

@@ -55,9 +55,7 @@ def test_linear_problem_equals_lstsq_and_its_covariance():
     np.testing.assert_allclose(fit.stderr, np.sqrt(np.diag(covariance)), rtol=1e-9)
     np.testing.assert_allclose(fit.residual, residual, atol=1e-9)
     assert fit.rmse == pytest.approx(np.sqrt(np.mean(residual**2)))
-    assert fit.fit_percent == pytest.approx(
-        100 * (1 - np.linalg.norm(residual) / np.linalg.norm(b - b.mean()))
-    )
+    assert fit.fit_percent == pytest.approx(100 * (1 - np.linalg.norm(residual) / np.linalg.norm(b - b.mean())))
     assert fit.x is fit.values
     assert fit.fun is fit.residual
 
@@ -65,12 +63,8 @@ def test_linear_problem_equals_lstsq_and_its_covariance():
 # NIST Statistical Reference Datasets, Misra1a, from both starts.
 @pytest.mark.parametrize("start", [(500.0, 1e-4), (250.0, 5e-4)])
 def test_nist_misra1a(start):
-    x = np.array(
-        [77.6, 114.9, 141.1, 190.8, 239.9, 289.0, 332.8, 378.4, 434.8, 477.3, 536.8, 593.1, 689.1, 760.0]
-    )
-    y = np.array(
-        [10.07, 14.73, 17.94, 23.93, 29.61, 35.18, 40.02, 44.82, 50.76, 55.05, 61.01, 66.40, 75.47, 81.78]
-    )
+    x = np.array([77.6, 114.9, 141.1, 190.8, 239.9, 289.0, 332.8, 378.4, 434.8, 477.3, 536.8, 593.1, 689.1, 760.0])
+    y = np.array([10.07, 14.73, 17.94, 23.93, 29.61, 35.18, 40.02, 44.82, 50.76, 55.05, 61.01, 66.40, 75.47, 81.78])
 
     def fun(b):
         e = np.exp(-b[1] * x)
@@ -194,9 +188,7 @@ def test_not_run_report_says_so():
     assert fit.summary().startswith("not_run")
 
 
-@pytest.mark.parametrize(
-    "answer", [None, (np.array([np.nan, 1.0]), np.eye(2)), (np.ones(2), np.full((2, 2), np.inf))]
-)
+@pytest.mark.parametrize("answer", [None, (np.array([np.nan, 1.0]), np.eye(2)), (np.ones(2), np.full((2, 2), np.inf))])
 def test_start_that_cannot_be_evaluated_is_a_status(answer):
     calls = []
     fit = least_squares(lambda x: calls.append(x) or answer, [1.0, 2.0], data=[1.0, 2.0])

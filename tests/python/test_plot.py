@@ -237,9 +237,7 @@ def test_timing_marks_the_optimum():
     ax = plot.timing(sweep())
     twin = twin_of(ax)
     assert ax.get_xlabel() == "start of combustion [°CA aTDC]"
-    np.testing.assert_array_equal(
-        line(ax, "gross indicated efficiency").get_data(), [SOC, sweep()["efficiency_gross"]]
-    )
+    np.testing.assert_array_equal(line(ax, "gross indicated efficiency").get_data(), [SOC, sweep()["efficiency_gross"]])
     for name, label in (("nox_affine_log_ppm", "affine-log"), ("nox_arrhenius_ppm", "Arrhenius")):
         np.testing.assert_array_equal(line(twin, f"NOx proxy, {label} map").get_ydata(), sweep()[name])
     best, top = line(ax, "best: 0.5600 at −5.7 °CA aTDC").get_data()
@@ -283,6 +281,4 @@ def test_values_that_cannot_be_drawn_are_refused():
     with pytest.raises(DataError, match=r"soc_cad has shape \(2,\): at least three timings"):
         plot.timing(sweep().isel(soc_cad=slice(2)))
     with pytest.raises(DataError, match="rmse_percent has dimensions"):
-        plot.wall_heat_profile(
-            profile().assign(rmse_percent=profile()["rmse_percent"].isel(wall_heat_scale=0))
-        )
+        plot.wall_heat_profile(profile().assign(rmse_percent=profile()["rmse_percent"].isel(wall_heat_scale=0)))

@@ -24,9 +24,7 @@ def cycle(**extra):
 
 
 def test_error_tree():
-    assert all(
-        issubclass(error, Error) for error in (ParameterError, ShapeError, DataError, ConvergenceError)
-    )
+    assert all(issubclass(error, Error) for error in (ParameterError, ShapeError, DataError, ConvergenceError))
     assert all(issubclass(error, ValueError) for error in (ParameterError, ShapeError, DataError))
     assert issubclass(ConvergenceError, RuntimeError)
 
@@ -81,9 +79,7 @@ def test_a_canonical_name_keeps_its_unit():
 
 
 def test_shape_faults_are_refused():
-    with pytest.raises(
-        ShapeError, match=r"volume_l has 3 samples along crank_angle_cad: crank_angle_cad has 5"
-    ):
+    with pytest.raises(ShapeError, match=r"volume_l has 3 samples along crank_angle_cad: crank_angle_cad has 5"):
         labelled_dataset(cycle(volume_l=(ANGLE, [1.0, 2.0, 3.0])))
     with pytest.raises(ShapeError, match=r"p_max_bar has shape \(1,\): 0 dimension"):
         labelled_dataset(cycle(p_max_bar=((), [1.0])))

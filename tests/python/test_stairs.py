@@ -47,9 +47,7 @@ def python_arrows(root: Path) -> list[tuple[str, str, str]]:
                 assert node.level == 0, f"{relative}: relative import"
                 names = [f"{node.module}.{alias.name}" for alias in node.names]
             ours = [name.split(".") for name in names if name.split(".")[0] == "mgdd"]
-            arrows += [
-                (str(path.relative_to(root)), room, parts[1] if parts[1:] else "mgdd") for parts in ours
-            ]
+            arrows += [(str(path.relative_to(root)), room, parts[1] if parts[1:] else "mgdd") for parts in ours]
     return arrows
 
 

@@ -105,8 +105,7 @@ class Delay {
 
   double algebraic_delay_cad(double soi_cad) const {
     if (cylinder_.ignition_model == IgnitionModel::polynomial) {
-      return cylinder_.ignition_c0_cad +
-             soi_cad * (cylinder_.ignition_c1 + soi_cad * cylinder_.ignition_c2_per_cad);
+      return cylinder_.ignition_c0_cad + soi_cad * (cylinder_.ignition_c1 + soi_cad * cylinder_.ignition_c2_per_cad);
     }
     return hardenberg_hase_delay_cad(interpolate(angle_, pressure_bar_, soi_cad),
                                      interpolate(angle_, temperature_k_, soi_cad), cylinder_.cetane_number,
@@ -117,13 +116,13 @@ class Delay {
   void accumulate() {
     const double ms_per_cad = 1e3 / (units::cad_per_s_per_rpm * speed_rpm_);
     const auto rate = [&](std::size_t k) {
-      return cylinder_.ignition_model == IgnitionModel::watson ? 1.0 / watson_delay_ms(pressure_bar_[k], temperature_k_[k])
-                                                               : 1.0 / wolfer_delay_ms(pressure_bar_[k], temperature_k_[k]);
+      return cylinder_.ignition_model == IgnitionModel::watson
+                 ? 1.0 / watson_delay_ms(pressure_bar_[k], temperature_k_[k])
+                 : 1.0 / wolfer_delay_ms(pressure_bar_[k], temperature_k_[k]);
     };
     progress_.assign(1, 0.0);
     for (std::size_t k = 1; k < angle_.size(); ++k) {
-      progress_.push_back(progress_.back() +
-                          0.5 * (rate(k - 1) + rate(k)) * (angle_[k] - angle_[k - 1]) * ms_per_cad);
+      progress_.push_back(progress_.back() + 0.5 * (rate(k - 1) + rate(k)) * (angle_[k] - angle_[k - 1]) * ms_per_cad);
     }
   }
 

@@ -11,11 +11,14 @@
 namespace mgdd::engine {
 namespace {
 
-bool places_grid(std::string_view name) noexcept { return name == "ivc_cad" || name == "evo_cad"; }
+bool places_grid(std::string_view name) noexcept {
+  return name == "ivc_cad" || name == "evo_cad";
+}
 
 [[noreturn]] void refuse(std::string_view name) {
   std::string valid;
-  for (const std::string& n : differentiable_inputs()) valid.append(valid.empty() ? "" : ", ").append(n);
+  for (const std::string& n : differentiable_inputs())
+    valid.append(valid.empty() ? "" : ", ").append(n);
   throw ParameterError("'" + std::string(name) + "' is no input with a derivative: must be one of " + valid);
 }
 
@@ -51,7 +54,8 @@ Indicators<double> direction(const Indicators<SensitivityScalar>& from, std::siz
   Indicators<double> to;
   constexpr auto source = indicator_fields<SensitivityScalar>();
   constexpr auto target = indicator_fields<double>();
-  for (std::size_t i = 0; i < source.size(); ++i) to.*(target[i].member) = (from.*(source[i].member)).grad[lane];
+  for (std::size_t i = 0; i < source.size(); ++i)
+    to.*(target[i].member) = (from.*(source[i].member)).grad[lane];
   return to;
 }
 
@@ -68,7 +72,8 @@ Indicators<double> simulate_indicators(const Cylinder& cylinder, const Operating
 
 std::vector<std::string> differentiable_inputs() {
   std::vector<std::string> names{"soc_cad", "burn_duration_cad", "trapped_mass_g"};
-  for (const auto& field : operating_point_fields<double>()) names.emplace_back(field.info.name);
+  for (const auto& field : operating_point_fields<double>())
+    names.emplace_back(field.info.name);
   for (const auto& field : cylinder_fields<double>()) {
     if (!places_grid(field.info.name)) names.emplace_back(field.info.name);
   }
@@ -89,7 +94,9 @@ std::string_view input_unit(std::string_view name) {
   refuse(name);
 }
 
-double& input(CycleInputs<double>& inputs, std::string_view name) { return find_input(inputs, name); }
+double& input(CycleInputs<double>& inputs, std::string_view name) {
+  return find_input(inputs, name);
+}
 SensitivityScalar& input(CycleInputs<SensitivityScalar>& inputs, std::string_view name) {
   return find_input(inputs, name);
 }
@@ -107,11 +114,12 @@ Sensitivities sensitivities(const Cylinder& cylinder, const OperatingPoint& poin
   // All names first: a wrong one is refused before any work, and an optional that is asked for is a constant of the
   // point in every pass, whichever inputs share its lanes.
   CycleInputs<double> base{cylinder, point, soc_cad};
-  for (const std::string& name : names) static_cast<void>(input(base, name));
+  for (const std::string& name : names)
+    static_cast<void>(input(base, name));
   constexpr auto lanes = static_cast<std::size_t>(sensitivity_lanes);
   for (std::size_t first = 0; first < names.size(); first += lanes) {
-    CycleInputs<SensitivityScalar> inputs{lift<SensitivityScalar>(base.cylinder),
-                                         lift<SensitivityScalar>(base.point), soc_cad};
+    CycleInputs<SensitivityScalar> inputs{lift<SensitivityScalar>(base.cylinder), lift<SensitivityScalar>(base.point),
+                                          soc_cad};
     const std::size_t count = std::min(lanes, names.size() - first);
     for (std::size_t lane = 0; lane < count; ++lane) {
       SensitivityScalar& variable = input(inputs, names[first + lane]);

@@ -22,9 +22,8 @@ constexpr std::pair<Pegging, std::string_view> pegging_names[] = {{Pegging::none
                                                                   {Pegging::inlet, "inlet"},
                                                                   {Pegging::two_point, "two_point"},
                                                                   {Pegging::least_squares, "least_squares"}};
-constexpr std::pair<AnalysisGamma, std::string_view> gamma_names[] = {{AnalysisGamma::constant, "constant"},
-                                                                      {AnalysisGamma::split, "split"},
-                                                                      {AnalysisGamma::cylinder, "cylinder"}};
+constexpr std::pair<AnalysisGamma, std::string_view> gamma_names[] = {
+    {AnalysisGamma::constant, "constant"}, {AnalysisGamma::split, "split"}, {AnalysisGamma::cylinder, "cylinder"}};
 
 constexpr double nan = std::numeric_limits<double>::quiet_NaN();
 using Column = std::vector<double>;
@@ -37,8 +36,8 @@ double mean_around(const Column& angle, const Column& pressure, double centre, d
     if (std::abs(angle[k] - centre) <= half + 1e-9) sum += pressure[k], ++count;
   }
   if (count == 0) {
-    throw DataError("pegging needs samples at " + text(centre) + " +- " + text(half) + " °CA aTDC, but the trace spans " +
-                    text(angle.front()) + " to " + text(angle.back()));
+    throw DataError("pegging needs samples at " + text(centre) + " +- " + text(half) +
+                    " °CA aTDC, but the trace spans " + text(angle.front()) + " to " + text(angle.back()));
   }
   return sum / count;
 }
@@ -46,8 +45,8 @@ double mean_around(const Column& angle, const Column& pressure, double centre, d
 double angle_where(const Column& angle, const Column& cumulative, std::size_t first, std::size_t peak, double level) {
   for (std::size_t k = first; k < peak; ++k) {
     if (cumulative[k + 1] >= level && cumulative[k + 1] > cumulative[k]) {
-      return angle[k] + (angle[k + 1] - angle[k]) * std::max(0.0, level - cumulative[k]) /
-                            (cumulative[k + 1] - cumulative[k]);
+      return angle[k] +
+             (angle[k + 1] - angle[k]) * std::max(0.0, level - cumulative[k]) / (cumulative[k + 1] - cumulative[k]);
     }
   }
   return nan;
@@ -82,7 +81,8 @@ void add_warnings(TraceAnalysis& a, const TraceOptions& options, std::size_t fir
                          " is outside 1.25..1.42: suspect pegging, TDC offset or pressure unit");
   }
   double highest = 0.0;
-  for (std::size_t k = first; k < last; ++k) highest = std::max(highest, a.heat_net_j[k + 1]);
+  for (std::size_t k = first; k < last; ++k)
+    highest = std::max(highest, a.heat_net_j[k + 1]);
   if (a.heat_net_j_total > 0.0 && first + 1 < last && a.heat_net_j[first + 1] > 0.1 * highest) {
     a.warnings.push_back("heat release has begun before heat_from_cad = " + text(options.heat_from_cad) +
                          ": start the window earlier");
@@ -99,10 +99,18 @@ void add_warnings(TraceAnalysis& a, const TraceOptions& options, std::size_t fir
 
 }  // namespace
 
-std::string_view to_string(Pegging v) noexcept { return name_of<Pegging>(pegging_names, v); }
-std::string_view to_string(AnalysisGamma v) noexcept { return name_of<AnalysisGamma>(gamma_names, v); }
-Pegging parse_pegging(std::string_view t) { return parse_name<Pegging>(pegging_names, "pegging", t); }
-AnalysisGamma parse_analysis_gamma(std::string_view t) { return parse_name<AnalysisGamma>(gamma_names, "gamma", t); }
+std::string_view to_string(Pegging v) noexcept {
+  return name_of<Pegging>(pegging_names, v);
+}
+std::string_view to_string(AnalysisGamma v) noexcept {
+  return name_of<AnalysisGamma>(gamma_names, v);
+}
+Pegging parse_pegging(std::string_view t) {
+  return parse_name<Pegging>(pegging_names, "pegging", t);
+}
+AnalysisGamma parse_analysis_gamma(std::string_view t) {
+  return parse_name<AnalysisGamma>(gamma_names, "gamma", t);
+}
 
 double polytropic_exponent(const Column& angle, const Column& pressure, const Cylinder& cylinder, double from_cad,
                            double to_cad) {
@@ -185,7 +193,8 @@ TraceAnalysis analyze_trace(const Column& angle_cad, const Column& pressure_bar,
   Charge<double> charge = model.charge(measured);
   charge.pressure_pa = a.pressure_bar.front() * units::pa_per_bar;
   Column pressure_pa(n);
-  for (std::size_t k = 0; k < n; ++k) pressure_pa[k] = a.pressure_bar[k] * units::pa_per_bar;
+  for (std::size_t k = 0; k < n; ++k)
+    pressure_pa[k] = a.pressure_bar[k] * units::pa_per_bar;
   const auto volume = model.volume_m3();
   for (std::size_t k = 0; k < n; ++k) {
     a.volume_l.push_back(volume[k] / units::m3_per_l);
@@ -237,7 +246,8 @@ TraceAnalysis analyze_trace(const Column& angle_cad, const Column& pressure_bar,
   a.ca90_cad = fraction(0.9);
 
   a.imep_closed_bar = a.work_closed_j / model.geometry().swept_m3 / units::pa_per_bar;
-  const auto at = static_cast<std::size_t>(std::max_element(pressure_pa.begin(), pressure_pa.end()) - pressure_pa.begin());
+  const auto at =
+      static_cast<std::size_t>(std::max_element(pressure_pa.begin(), pressure_pa.end()) - pressure_pa.begin());
   const Peak<double> top = parabola_peak<double>(a.angle_cad, at, a.pressure_bar[at > 0 ? at - 1 : at],
                                                  a.pressure_bar[at], a.pressure_bar[at + 1 < n ? at + 1 : at]);
   a.p_max_bar = top.value;

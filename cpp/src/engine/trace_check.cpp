@@ -50,9 +50,9 @@ void check_trace(const std::vector<double>& angle, const std::vector<double>& pr
   std::nth_element(sorted.begin(), middle, sorted.end());
   for (std::size_t k = 0; k < steps.size(); ++k) {
     if (steps[k] > 1.5 * *middle) {
-      throw DataError("gap of " + text(steps[k]) + " °CA between crank_angle_cad[" + std::to_string(k) + "] = " +
-                      text(angle[k]) + " and " + text(angle[k + 1]) + ", where the usual step is " + text(*middle) +
-                      ": fill it or cut the trace");
+      throw DataError("gap of " + text(steps[k]) + " °CA between crank_angle_cad[" + std::to_string(k) +
+                      "] = " + text(angle[k]) + " and " + text(angle[k + 1]) + ", where the usual step is " +
+                      text(*middle) + ": fill it or cut the trace");
     }
   }
   const double highest = *std::max_element(pressure.begin(), pressure.end());

@@ -21,7 +21,9 @@ namespace {
 // wall heat up to 2.5 times the textbook law.
 constexpr SearchDomain common_domains[] = {{"wall_heat_scale", "-", 0.0, 2.5, false}};
 
-bool places_grid(std::string_view name) { return name == "ivc_cad" || name == "evo_cad"; }
+bool places_grid(std::string_view name) {
+  return name == "ivc_cad" || name == "evo_cad";
+}
 bool is_load_field(std::string_view name) {
   const auto fields = load_fields<double>();
   return std::any_of(fields.begin(), fields.end(), [&](const auto& f) { return f.domain.name == name; });
@@ -49,7 +51,8 @@ Free resolve(const std::vector<std::string>& names) {
     }
     if (found) continue;
     std::string valid;
-    for (const std::string& n : load_parameters()) valid.append(valid.empty() ? "" : ", ").append(n);
+    for (const std::string& n : load_parameters())
+      valid.append(valid.empty() ? "" : ", ").append(n);
     throw ParameterError("free: '" + names[i] + "' is no parameter of a calibration; per load: " + valid +
                          "; for all loads: any field of the cylinder except ivc_cad and evo_cad");
   }
@@ -162,7 +165,8 @@ Eigen::MatrixXd correlation_if_free(const optimize::FitReport& report, CylinderR
 
 std::vector<std::string> load_parameters() {
   std::vector<std::string> names;
-  for (const auto& field : load_fields<double>()) names.emplace_back(field.domain.name);
+  for (const auto& field : load_fields<double>())
+    names.emplace_back(field.domain.name);
   return names;
 }
 
@@ -187,7 +191,8 @@ LoadBurn estimate_burn(const MeasuredCycle& trace, const engine::Cylinder& cylin
   const engine::TraceAnalysis a =
       engine::analyze_trace(trace.angle_cad, trace.pressure_bar, cylinder, trace.point, engine::TraceOptions{});
   if (!(a.heat_net_j_total > 0.0) || std::isnan(a.ca10_cad) || std::isnan(a.ca90_cad) || a.ca90_cad <= a.ca10_cad) {
-    throw DataError("trace '" + trace.label + "' shows no heat release after -10 °CA aTDC: it looks motored, and a burn "
+    throw DataError("trace '" + trace.label +
+                    "' shows no heat release after -10 °CA aTDC: it looks motored, and a burn "
                     "cannot be fitted to it");
   }
   LoadBurn burn;
@@ -223,9 +228,11 @@ CylinderFit fit_cylinder(const std::vector<MeasuredCycle>& traces, const engine:
   CylinderResidual residual(traces, cylinder, start, chosen.common, chosen.load, options.step_cad, options.integrator);
   Eigen::VectorXd x(residual.n_parameters());
   Eigen::Index i = 0;
-  for (const std::size_t k : chosen.common) x[i++] = cylinder.*(engine::cylinder_fields<double>()[k].member);
+  for (const std::size_t k : chosen.common)
+    x[i++] = cylinder.*(engine::cylinder_fields<double>()[k].member);
   for (const LoadBurn& burn : start) {
-    for (const std::size_t k : chosen.load) x[i++] = burn.*(load_fields<double>()[k].member);
+    for (const std::size_t k : chosen.load)
+      x[i++] = burn.*(load_fields<double>()[k].member);
   }
   optimize::LeastSquares search(describe(chosen, traces), residual.n_residuals(), options.search);
   CylinderFit fit;

@@ -45,7 +45,8 @@ CylinderResidual::CylinderResidual(const std::vector<MeasuredCycle>& traces, con
         const double from = trace.angle_cad[k - 1];
         const double span = trace.angle_cad[k] - from;
         const int parts = std::max(1, static_cast<int>(std::ceil(span / step_cad - 1e-9)));
-        for (int i = 1; i < parts; ++i) grid.push_back(from + span * i / parts);
+        for (int i = 1; i < parts; ++i)
+          grid.push_back(from + span * i / parts);
       }
       sample.push_back(grid.size());
       grid.push_back(trace.angle_cad[k]);
@@ -85,7 +86,8 @@ BasicLoadBurn<T> CylinderResidual::load_burn(std::size_t trace, const Eigen::Vec
   BasicLoadBurn<T> burn;
   constexpr auto from = load_fields<double>();
   constexpr auto to = load_fields<T>();
-  for (std::size_t i = 0; i < to.size(); ++i) burn.*(to[i].member) = T(start_[trace].*(from[i].member));
+  for (std::size_t i = 0; i < to.size(); ++i)
+    burn.*(to[i].member) = T(start_[trace].*(from[i].member));
   for (std::size_t i = 0; i < load_.size(); ++i) {
     const std::size_t active = common_.size() + i;
     burn.*(to[load_[i]].member) = as_variable<T>(x[column(trace, active)], active, first_lane);
@@ -126,9 +128,8 @@ bool CylinderResidual::run(std::size_t trace, const Eigen::VectorXd& x, std::siz
   const engine::BasicCylinder<T> c = shaped(cylinder_of<T>(x, first_lane), burn);
   own.model.set_cylinder(c);
   own.model.run(charge(load, own.model, c, burn), burn.soc_cad, own.work);
-  return std::all_of(own.work.pressure_pa.begin(), own.work.pressure_pa.end(), [](const T& p) {
-    return std::isfinite(value_of(p)) && value_of(p) > 0.0;
-  });
+  return std::all_of(own.work.pressure_pa.begin(), own.work.pressure_pa.end(),
+                     [](const T& p) { return std::isfinite(value_of(p)) && value_of(p) > 0.0; });
 }
 
 bool CylinderResidual::operator()(const Eigen::VectorXd& x, Eigen::VectorXd& residual,
@@ -176,8 +177,7 @@ CylinderResidual::Simulated CylinderResidual::simulate(std::size_t trace, const 
   for (const std::size_t k : load.sample) {
     out.pressure_bar.push_back(load.plain.work.pressure_pa[k] / units::pa_per_bar);
   }
-  out.indicators =
-      load.plain.model.indicators(charge(load, load.plain.model, c, at), at.soc_cad, load.plain.work);
+  out.indicators = load.plain.model.indicators(charge(load, load.plain.model, c, at), at.soc_cad, load.plain.work);
   return out;
 }
 

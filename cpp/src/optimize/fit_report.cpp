@@ -26,8 +26,8 @@ std::string direction_text(const FitReport& report, const Eigen::VectorXd& direc
   std::string text;
   for (Eigen::Index j = 0; j < direction.size(); ++j) {
     if (direction[j] != 0.0) {
-      text += (text.empty() ? "" : ", ") + report.names[static_cast<std::size_t>(j)] +
-              formatted(" %+.4g", direction[j]);
+      text +=
+          (text.empty() ? "" : ", ") + report.names[static_cast<std::size_t>(j)] + formatted(" %+.4g", direction[j]);
     }
   }
   return text;
@@ -37,10 +37,10 @@ void name_null_direction(FitReport& report, const Eigen::VectorXd& direction) {
   const Eigen::Index parts = (direction.array() != 0.0).count();
   Eigen::Index largest = 0;
   direction.cwiseAbs().maxCoeff(&largest);
-  report.findings.push_back(
-      parts == 1 ? report.names[static_cast<std::size_t>(largest)] + ": the residual does not depend on it"
-                 : "the residual does not change along (" + direction_text(report, direction) +
-                       "): only a combination of these is determined");
+  report.findings.push_back(parts == 1 ? report.names[static_cast<std::size_t>(largest)] +
+                                             ": the residual does not depend on it"
+                                       : "the residual does not change along (" + direction_text(report, direction) +
+                                             "): only a combination of these is determined");
 }
 
 // Same span, fewest names per column: elimination with full pivoting leaves every pivot in one column only.
@@ -61,15 +61,13 @@ void make_sparse(Eigen::MatrixXd& basis) {
   basis = (basis.array().abs() > least_share).select(basis, 0.0);
 }
 
-void check_shapes(const FitReport& report, const Eigen::MatrixXd& triangle,
-                  const Eigen::VectorXd& column_scale) {
+void check_shapes(const FitReport& report, const Eigen::MatrixXd& triangle, const Eigen::VectorXd& column_scale) {
   const auto n = static_cast<Eigen::Index>(report.names.size());
   if (triangle.cols() != n || triangle.rows() < n || column_scale.size() != n || report.values.size() != n ||
       report.bounds_active.size() != n) {
     throw ShapeError("describe_uncertainty: triangle is " + std::to_string(triangle.rows()) + " x " +
-                     std::to_string(triangle.cols()) + " and column_scale has " +
-                     std::to_string(column_scale.size()) + " values for " + std::to_string(n) +
-                     " parameters");
+                     std::to_string(triangle.cols()) + " and column_scale has " + std::to_string(column_scale.size()) +
+                     " values for " + std::to_string(n) + " parameters");
   }
 }
 
@@ -84,8 +82,8 @@ std::vector<Eigen::Index> free_parameters(FitReport& report, std::vector<bool>& 
     }
     const auto index = static_cast<std::size_t>(j);
     suspect[index] = true;
-    report.findings.push_back(report.names[index] + " stands at its " + (side < 0 ? "lower" : "upper") +
-                              " bound" + formatted(" %.6g", side < 0 ? report.lower[j] : report.upper[j]));
+    report.findings.push_back(report.names[index] + " stands at its " + (side < 0 ? "lower" : "upper") + " bound" +
+                              formatted(" %.6g", side < 0 ? report.lower[j] : report.upper[j]));
   }
   return free;
 }
@@ -107,8 +105,8 @@ Spectrum spectrum_of(const Eigen::MatrixXd& unit_columns, double rank_tolerance)
   result.v = svd.matrixV();
   const Eigen::VectorXd sigma = svd.singularValues();
   while (result.rank < n && sigma[result.rank] > rank_tolerance * sigma[0]) {
-    result.inverse += result.v.col(result.rank) * result.v.col(result.rank).transpose() /
-                      (sigma[result.rank] * sigma[result.rank]);
+    result.inverse +=
+        result.v.col(result.rank) * result.v.col(result.rank).transpose() / (sigma[result.rank] * sigma[result.rank]);
     ++result.rank;
   }
   return result;
@@ -164,16 +162,16 @@ bool is_converged(FitStatus status) noexcept {
 }
 
 std::string FitReport::brief() const {
-  std::string text = std::string(to_string(status)) + " after " + std::to_string(iterations) +
-                     " iterations, rmse " + formatted("%.6g", rmse);
+  std::string text = std::string(to_string(status)) + " after " + std::to_string(iterations) + " iterations, rmse " +
+                     formatted("%.6g", rmse);
   for (std::size_t i = 0; i < unidentifiable.size(); ++i) {
     text += (i == 0 ? ", not identifiable: " : ", ") + unidentifiable[i];
   }
   return text;
 }
 
-void describe_uncertainty(FitReport& report, const Eigen::MatrixXd& triangle,
-                          const Eigen::VectorXd& column_scale, const IdentifiabilityLimits& limits) {
+void describe_uncertainty(FitReport& report, const Eigen::MatrixXd& triangle, const Eigen::VectorXd& column_scale,
+                          const IdentifiabilityLimits& limits) {
   check_shapes(report, triangle, column_scale);
   const auto n = static_cast<Eigen::Index>(report.names.size());
   report.findings.clear();
@@ -220,8 +218,7 @@ void describe_uncertainty(FitReport& report, const Eigen::MatrixXd& triangle,
       const Eigen::Index column = free[static_cast<std::size_t>(b)];
       const bool b_null = null(b, b) > least_share * least_share;
       const Eigen::MatrixXd& source = a_null ? null : spectrum.inverse;
-      const double correlation =
-          a_null == b_null ? source(a, b) / std::sqrt(source(a, a) * source(b, b)) : 0.0;
+      const double correlation = a_null == b_null ? source(a, b) / std::sqrt(source(a, a) * source(b, b)) : 0.0;
       report.correlation(row, column) = a == b ? 1.0 : correlation;
       if (!a_null && !b_null) {
         report.covariance(row, column) = variance * spectrum.inverse(a, b) / (scale[a] * scale[b]);
@@ -230,8 +227,7 @@ void describe_uncertainty(FitReport& report, const Eigen::MatrixXd& triangle,
         suspect[static_cast<std::size_t>(row)] = suspect[static_cast<std::size_t>(column)] = true;
         report.findings.push_back(report.names[static_cast<std::size_t>(row)] + " and " +
                                   report.names[static_cast<std::size_t>(column)] + ": correlation" +
-                                  formatted(" %+.5f", correlation) +
-                                  formatted(" is beyond +-%g", limits.correlation));
+                                  formatted(" %+.5f", correlation) + formatted(" is beyond +-%g", limits.correlation));
       }
     }
     if (a_null) {

@@ -14,8 +14,7 @@ constexpr int iteration_ceiling = 1'000'000;  // the history is reserved for all
 constexpr double least_gain = 1e-4;           // accepted share of the predicted decrease (Moré 1978)
 constexpr double least_damping = 1e-24;       // rounding in a null direction, about 1e-30, stays harmless
 constexpr double largest_damping = 1e30;
-constexpr double trusted_damping =
-    1.0;  // above it a step is short because it is damped, not because it is over
+constexpr double trusted_damping = 1.0;     // above it a step is short because it is damped, not because it is over
 constexpr Eigen::Index rows_at_once = 256;  // rows times a dozen columns stay in the first-level cache
 
 std::string number(double value) {
@@ -60,14 +59,11 @@ void LeastSquaresOptions::validate() const {
           "in 1..1000000");
   require(cost_tolerance >= 0.0 && cost_tolerance < 1.0, "cost_tolerance", cost_tolerance, "in [0, 1)");
   require(step_tolerance >= 0.0 && step_tolerance < 1.0, "step_tolerance", step_tolerance, "in [0, 1)");
-  require(gradient_tolerance >= 0.0 && gradient_tolerance < 1.0, "gradient_tolerance", gradient_tolerance,
-          "in [0, 1)");
-  require(initial_damping >= least_damping && initial_damping <= largest_damping, "initial_damping",
-          initial_damping, "in [1e-24, 1e30]");
-  require(correlation_limit > 0.0 && correlation_limit <= 1.0, "correlation_limit", correlation_limit,
-          "in (0, 1]");
-  require(rank_tolerance >= epsilon && rank_tolerance < 1.0, "rank_tolerance", rank_tolerance,
-          "in [2.2e-16, 1)");
+  require(gradient_tolerance >= 0.0 && gradient_tolerance < 1.0, "gradient_tolerance", gradient_tolerance, "in [0, 1)");
+  require(initial_damping >= least_damping && initial_damping <= largest_damping, "initial_damping", initial_damping,
+          "in [1e-24, 1e30]");
+  require(correlation_limit > 0.0 && correlation_limit <= 1.0, "correlation_limit", correlation_limit, "in (0, 1]");
+  require(rank_tolerance >= epsilon && rank_tolerance < 1.0, "rank_tolerance", rank_tolerance, "in [2.2e-16, 1)");
 }
 
 void validate(const std::vector<Parameter>& parameters) {
@@ -88,16 +84,15 @@ void validate(const std::vector<Parameter>& parameters) {
       throw ParameterError(p.name + ": lower = " + number(p.lower) + " must be < upper = " + number(p.upper));
     }
     if (p.log_scaled && !(p.lower > 0.0)) {
-      throw ParameterError(p.name + ": lower = " + number(p.lower) +
-                           " must be > 0 for a log-scaled parameter");
+      throw ParameterError(p.name + ": lower = " + number(p.lower) + " must be > 0 for a log-scaled parameter");
     }
   }
 }
 
 void validate_start(const std::vector<Parameter>& parameters, const Eigen::VectorXd& start) {
   if (start.size() != static_cast<Eigen::Index>(parameters.size())) {
-    throw ShapeError("start has " + std::to_string(start.size()) + " values for " +
-                     std::to_string(parameters.size()) + " parameters");
+    throw ShapeError("start has " + std::to_string(start.size()) + " values for " + std::to_string(parameters.size()) +
+                     " parameters");
   }
   for (std::size_t i = 0; i < parameters.size(); ++i) {
     const Parameter& p = parameters[i];
@@ -109,8 +104,7 @@ void validate_start(const std::vector<Parameter>& parameters, const Eigen::Vecto
   }
 }
 
-LeastSquares::LeastSquares(std::vector<Parameter> parameters, Eigen::Index n_residuals,
-                           LeastSquaresOptions options)
+LeastSquares::LeastSquares(std::vector<Parameter> parameters, Eigen::Index n_residuals, LeastSquaresOptions options)
     : parameters_(std::move(parameters)),
       options_(options),
       n_(static_cast<Eigen::Index>(parameters_.size())),
@@ -118,8 +112,8 @@ LeastSquares::LeastSquares(std::vector<Parameter> parameters, Eigen::Index n_res
   options_.validate();
   validate(parameters_);
   if (n_residuals_ < n_) {
-    throw ShapeError("n_residuals = " + std::to_string(n_residuals_) + ": must be >= the " +
-                     std::to_string(n_) + " parameters");
+    throw ShapeError("n_residuals = " + std::to_string(n_residuals_) + ": must be >= the " + std::to_string(n_) +
+                     " parameters");
   }
   lower_.resize(n_);
   upper_.resize(n_);
@@ -128,8 +122,8 @@ LeastSquares::LeastSquares(std::vector<Parameter> parameters, Eigen::Index n_res
     lower_[j] = p.log_scaled ? std::log(p.lower) : p.lower;
     upper_[j] = p.log_scaled ? std::log(p.upper) : p.upper;
   }
-  for (Eigen::VectorXd* v : {&x_, &trial_x_, &z_, &trial_z_, &chain_, &magnitude_, &column_norm_,
-                             &largest_norm_, &scale_, &step_, &image_}) {
+  for (Eigen::VectorXd* v : {&x_, &trial_x_, &z_, &trial_z_, &chain_, &magnitude_, &column_norm_, &largest_norm_,
+                             &scale_, &step_, &image_}) {
     v->setConstant(n_, std::numeric_limits<double>::quiet_NaN());
   }
   side_.setZero(n_);
@@ -161,8 +155,7 @@ void LeastSquares::prepare(const Eigen::VectorXd& start) {
   phase_ = Phase::start;
 }
 
-bool LeastSquares::is_usable(bool returned, const Eigen::VectorXd& residual,
-                             const Eigen::MatrixXd* jacobian) const {
+bool LeastSquares::is_usable(bool returned, const Eigen::VectorXd& residual, const Eigen::MatrixXd* jacobian) const {
   if (residual.size() != n_residuals_) {
     throw ShapeError("the model returned " + std::to_string(residual.size()) + " residuals, expected " +
                      std::to_string(n_residuals_));
@@ -301,8 +294,7 @@ void LeastSquares::settle(bool accepted) noexcept {
   const double step_norm = step_.norm();
   const double floor = options_.cost_tolerance * cost_;
   const bool small_change = std::abs(predicted_) <= floor && std::abs(actual_) <= floor;
-  const bool small_step =
-      step_norm <= options_.step_tolerance * (scale_.array() * magnitude_.array()).matrix().norm();
+  const bool small_step = step_norm <= options_.step_tolerance * (scale_.array() * magnitude_.array()).matrix().norm();
   ++iterations_;
   if (accepted) {
     x_.swap(trial_x_);

@@ -93,8 +93,8 @@ def _report(
         verdict = "identifiable" if profile.identifiable else "not identifiable from these traces"
         out += [
             "",
-            f"wall-heat scale {profile.value:.3f} +- {profile.stderr:.3f} (strongest correlation {profile.correlation:+.2f} "
-            f"with {profile.correlated_with}): {verdict}",
+            f"wall-heat scale {profile.value:.3f} +- {profile.stderr:.3f}: {verdict}",
+            f"  strongest correlation {profile.correlation:+.2f}, with {profile.correlated_with}",
             *(f"  {reason}" for reason in profile.reasons),
         ]
     if unidentifiable:
@@ -111,10 +111,9 @@ def _report(
 def _loads(fit: CylinderFit) -> list[str]:
     onset = any(load.soi_cad == load.soi_cad for load in fit.loads)
     last = f" {'SOC - SOI':>10}" if onset else ""
-    out = [
-        f"  {'trace':24} {'RMSE [%]':>9} {'IMEP err [%]':>13} {'SOC':>7} {'duration':>9} {'heat [J]':>9} {'CA50':>7}"
-        f" {'largest error':>20}{last}"
-    ]
+    form = "  {:24} {:>9} {:>13} {:>7} {:>9} {:>9} {:>7} {:>20}"
+    head = ("trace", "RMSE [%]", "IMEP err [%]", "SOC", "duration", "heat [J]", "CA50", "largest error")
+    out = [form.format(*head) + last]
     for load in fit.loads:
         error = f"{load.largest_error_bar:+.1f} bar at {load.largest_error_cad:.0f}"
         late = f" {load.onset_against_soi_cad:+10.1f}" if onset else ""

@@ -37,13 +37,13 @@ def run(args: argparse.Namespace) -> None:
 
 
 def _text(summary: Any, page: Path) -> str:
+    form = "{:20} {:>8} {:>7} {:>7} {:>9}  {:>24} {:>13}  {:>18} {:>13}"
+    own, free = "best SOC, own p_max kept", "best SOC, no limit"
     out = [
         f"{len(summary['traces'])} measured traces, calibrated with {summary['law']}.",
         "",
-        f"{'trace':20} {'p_max':>8} {'CA50':>7} {'RMSE':>7} {'IMEP err':>9}  {'best SOC, own p_max kept':>24} {'gain':>13}"
-        f"  {'best SOC, no limit':>18} {'gain':>13}",
-        f"{'':20} {'[bar]':>8} {'[CAD]':>7} {'[%]':>7} {'[%]':>9}  {'[°CA aTDC]':>24} {'[%]':>13}  {'[°CA aTDC]':>18}"
-        f" {'[%]':>13}",
+        form.format("trace", "p_max", "CA50", "RMSE", "IMEP err", own, "gain", free, "gain"),
+        form.format("", "[bar]", "[CAD]", "[%]", "[%]", "[°CA aTDC]", "[%]", "[°CA aTDC]", "[%]"),
     ]
     for row in summary["traces"]:
         best, fit = row["best_timing"], row["calibrated"]

@@ -46,9 +46,14 @@ def _add_simulate(verbs: Any) -> None:
     )  # fmt: skip
     timing = parser.add_mutually_exclusive_group()
     timing.add_argument(
-        "--soc-cad", type=float, metavar="X", help=f"start of combustion [°CA aTDC] (default: {_DEFAULT_SOC_CAD:g})"
+        "--soc-cad",
+        type=float,
+        metavar="X",
+        help=f"start of combustion [°CA aTDC] (default: {_DEFAULT_SOC_CAD:g})",
     )
-    timing.add_argument("--soi-cad", type=float, metavar="X", help="start of injection [°CA aTDC]; the delay model adds on")
+    timing.add_argument(
+        "--soi-cad", type=float, metavar="X", help="start of injection [°CA aTDC]; the delay model adds on"
+    )
     add_engine(parser)
     add_scheme(parser, step_cad=1.0)
 
@@ -58,7 +63,7 @@ def _simulate(args: argparse.Namespace) -> None:
     cylinder, point, preset = engine_of(args)
     soc = _start_of_combustion(args, cylinder, point)
     cycle = simulate(cylinder, point, soc_cad=soc, step_cad=args.step_cad, integrator=args.integrator)
-    scalars = {name: float(v) for name, v in cycle.data_vars.items() if v.ndim == 0}
+    scalars = {str(name): float(v) for name, v in cycle.data_vars.items() if v.ndim == 0}
     soi = args.soi_cad if args.soi_cad is not None else _injection_of(cylinder, point, soc)
     payload = {
         "preset": preset.name,
@@ -128,7 +133,7 @@ def _analyze(args: argparse.Namespace) -> None:
     named = gamma if args.gamma is None else (cylinder.gamma if args.gamma == "constant" else args.gamma)
     payload = {
         "file": result.attrs["file"],
-        **{name: float(v) for name, v in result.data_vars.items() if v.ndim == 0},
+        **{str(name): float(v) for name, v in result.data_vars.items() if v.ndim == 0},
         "method": result.attrs["method"],
         "gamma": named,
         "fractions": result.attrs["fractions"],
@@ -144,7 +149,9 @@ def _add_calibrate(verbs: Any) -> None:
         example="mgdd engine calibrate a25.csv a50.csv --preset hd_diesel_128x144 --conditions conditions.csv --json",
     )  # fmt: skip
     add_files(parser, nargs="+")
-    parser.add_argument("--free", metavar="NAME[,NAME]", help="parameters to fit (default: the law's own and wall_heat_scale)")
+    parser.add_argument(
+        "--free", metavar="NAME[,NAME]", help="parameters to fit (default: the law's own and wall_heat_scale)"
+    )
     parser.add_argument("--report-folder", metavar="DIR", help="also write index.html and summary.json there")
     add_engine(parser)
     add_scheme(parser, step_cad=0.25)
@@ -161,7 +168,13 @@ def _add_optimum(verbs: Any) -> None:
         "--objective", choices=("efficiency_gross", "imep_gross_bar", "imep_closed_bar"),
         help="default: efficiency_gross; with files imep_closed_bar, the work that a closed-valve trace carries",
     )  # fmt: skip
-    parser.add_argument("--limit", action="append", default=[], metavar="NAME=X", help="upper limit on an indicator, repeatable")
+    parser.add_argument(
+        "--limit",
+        action="append",
+        default=[],
+        metavar="NAME=X",
+        help="upper limit on an indicator, repeatable",
+    )
     parser.add_argument("--bounds-cad", type=float, nargs=2, default=(-30.0, 10.0), metavar=("LOW", "HIGH"))
     add_engine(parser)
     add_scheme(parser, step_cad=1.0)
@@ -199,10 +212,16 @@ def _optimum_of_files(
     traces = traces_of(args)
     with progress(args) as step:
         rows = best_timing(
-            traces, cylinder, point=point, objective=args.objective or "imep_closed_bar", limits=limits, progress=step
+            traces,
+            cylinder,
+            point=point,
+            objective=args.objective or "imep_closed_bar",
+            limits=limits,
+            progress=step,
         )
     text = "\n\n".join(
-        f"{row['file']}\n" + lines({k: f"{v[0]:.2f} to {v[1]:.2f}" for k, v in row.items() if _is_range(v)}) for row in rows
+        f"{row['file']}\n" + lines({k: f"{v[0]:.2f} to {v[1]:.2f}" for k, v in row.items() if _is_range(v)})
+        for row in rows
     )
     emit(args, {"wall_heat_scale": rows[0]["wall_heat_scale"], "traces": rows}, text=text)
 

@@ -68,23 +68,34 @@ def add_scheme(parser: argparse.ArgumentParser, *, step_cad: float) -> None:
     group = parser.add_argument_group("scheme")
     group.add_argument("--integrator", choices=("trapezoid", "split", "seed", "euler"), default="trapezoid")
     group.add_argument(
-        "--step-cad", type=float, default=step_cad, metavar="X", help=f"crank step, 0.001 to 5 (default: {step_cad:g})"
+        "--step-cad",
+        type=float,
+        default=step_cad,
+        metavar="X",
+        help=f"crank step, 0.001 to 5 (default: {step_cad:g})",
     )
 
 
-def add_files(parser: argparse.ArgumentParser, *, nargs: str) -> None:
+def add_files(parser: argparse.ArgumentParser, *, nargs: int | str) -> None:
     """Add pressure files and how to read them."""
     parser.add_argument("files", nargs=nargs, metavar="FILE", help="pressure trace: CSV or two plain columns")
     group = parser.add_argument_group("files")
     group.add_argument("--pressure-unit", choices=("bar", "kPa", "Pa"), default="bar", help="default: bar")
-    group.add_argument("--pressure-column", default="1", metavar="NAME", help="column name, or number from 0 (default: 1)")
+    group.add_argument(
+        "--pressure-column", default="1", metavar="NAME", help="column name, or number from 0 (default: 1)"
+    )
     group.add_argument("--angle-column", default="0", metavar="NAME", help="column name, or number from 0 (default: 0)")
     group.add_argument("--angle-unit", choices=("deg", "rad"), default="deg", help="default: deg")
     group.add_argument(
-        "--firing-tdc-deg", type=float, metavar="X", help="angle of firing TDC in files that count from elsewhere"
+        "--firing-tdc-deg",
+        type=float,
+        metavar="X",
+        help="angle of firing TDC in files that count from elsewhere",
     )
     group.add_argument(
-        "--conditions", metavar="FILE.csv", help="columns file,speed_rpm,trapped_mass_g,soi_cad: one row per trace"
+        "--conditions",
+        metavar="FILE.csv",
+        help="columns file,speed_rpm,trapped_mass_g,soi_cad: one row per trace",
     )
 
 

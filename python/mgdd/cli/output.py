@@ -32,7 +32,11 @@ def check_output(args: argparse.Namespace, *, csv: bool) -> None:
 
 
 def emit(
-    args: argparse.Namespace, payload: Mapping[str, Any], *, text: str | None = None, traces: xr.Dataset | None = None
+    args: argparse.Namespace,
+    payload: Mapping[str, Any],
+    *,
+    text: str | None = None,
+    traces: xr.Dataset | None = None,
 ) -> None:
     """Print the result, as one JSON object or as text, and write it to the output file."""
     plain = to_jsonable(payload)

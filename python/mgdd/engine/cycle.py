@@ -188,7 +188,12 @@ def sensitivities(
         {
             ANGLE: (ANGLE, raw[ANGLE]),
             "parameter": ("parameter", names, "-", "input that is varied"),
-            "parameter_units": ("parameter", [_core.input_unit(name) for name in names], "-", "unit of the input"),
+            "parameter_units": (
+                "parameter",
+                [_core.input_unit(name) for name in names],
+                "-",
+                "unit of the input",
+            ),
         }
     ).set_coords("parameter_units")
     columns = {"pressure_bar": ((ANGLE, "parameter"), raw["pressure_bar"])}

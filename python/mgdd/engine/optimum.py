@@ -204,5 +204,6 @@ def _check(point: OperatingPoint, objective: str, limits: Mapping[str, float], b
     low, high = bounds
     if not _WINDOW_CAD[0] <= low < high <= _WINDOW_CAD[1]:
         raise ParameterError(
-            f"bounds_cad = ({low:g}, {high:g}): must increase and lie in [{_WINDOW_CAD[0]:g}, {_WINDOW_CAD[1]:g}] °CA aTDC"
+            f"bounds_cad = ({low:g}, {high:g}): must increase and lie in "
+            f"[{_WINDOW_CAD[0]:g}, {_WINDOW_CAD[1]:g}] °CA aTDC"
         )

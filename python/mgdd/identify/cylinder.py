@@ -266,9 +266,7 @@ def _closed(trace: xr.Dataset, cylinder: Cylinder) -> tuple[np.ndarray, np.ndarr
     return angle[inside], trace["pressure_bar"].to_numpy()[inside]
 
 
-def _measured(
-    trace: xr.Dataset, label: str, cylinder: Cylinder, point: OperatingPoint | None
-) -> _core.MeasuredCycle:
+def _measured(trace: xr.Dataset, label: str, cylinder: Cylinder, point: OperatingPoint | None) -> _core.MeasuredCycle:
     angle, pressure = _closed(trace, cylinder)
     return _core.MeasuredCycle(
         label=label, crank_angle_cad=angle, pressure_bar=pressure, point=conditions(trace, point)
@@ -355,8 +353,8 @@ def _warnings(fit: CylinderFit) -> tuple[str, ...]:
         word = "low" if sum(errors) < 0.0 else "high"
         out.append(
             f"closed IMEP is {min(map(abs, errors)):.1f} to {max(map(abs, errors)):.1f} % {word} although the pressure "
-            f"RMSE is at most {max(load.rmse_percent for load in fit.loads):.2f} % of p_max: a small RMSE proves nothing "
-            "here; do not read efficiency or fuel heat from this fit"
+            f"RMSE is at most {max(load.rmse_percent for load in fit.loads):.2f} % of p_max: a small RMSE proves "
+            "nothing here; do not read efficiency or fuel heat from this fit"
         )
     out += [f"{name} is not identifiable from these traces" for name in fit.report.unidentifiable]
     return tuple(out)

@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from mgdd._core import Cylinder, OperatingPoint
+from mgdd._core import OperatingPoint
 from mgdd.errors import ParameterError
 from mgdd.identify.cylinder import CylinderFit, default_free, fit_cylinder
 from mgdd.results import labelled_dataset
@@ -182,7 +182,11 @@ def _start(load: Any) -> dict[str, float]:
 
 
 def _crossing(
-    refit: Callable[[float], CylinderFit], fits: dict[float, CylinderFit], value: float, level: float, side: int
+    refit: Callable[[float], CylinderFit],
+    fits: dict[float, CylinderFit],
+    value: float,
+    level: float,
+    side: int,
 ) -> float:
     """Where the profile leaves the level on one side of the estimate; the bound if it does not."""
     from scipy.optimize import brentq
@@ -190,9 +194,7 @@ def _crossing(
     inside = value
     for scale in sorted((s for s in fits if (s - value) * side > 0.0), key=lambda s: abs(s - value)):
         if fits[scale].report.rmse > level:
-            return float(
-                brentq(lambda s: refit(float(s)).report.rmse - level, inside, scale, xtol=2e-3, rtol=1e-6)
-            )
+            return float(brentq(lambda s: refit(float(s)).report.rmse - level, inside, scale, xtol=2e-3, rtol=1e-6))
         inside = scale
     return 0.0 if side < 0 else UPPER
 
@@ -205,9 +207,7 @@ def _correlation(fit: CylinderFit) -> tuple[float, str]:
     return strongest, name
 
 
-def _reasons(
-    value: float, correlation: float, partner: str, low: float, high: float, report: Any
-) -> tuple[str, ...]:
+def _reasons(value: float, correlation: float, partner: str, low: float, high: float, report: Any) -> tuple[str, ...]:
     out = []
     if report.bounds_active[report.names.index(NAME)] != 0:
         out.append(f"the estimate {value:.3g} lies at a bound of [0, {UPPER:g}]")

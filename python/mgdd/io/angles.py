@@ -108,9 +108,7 @@ def aligned_angle(
     step = np.diff(angle_deg)
     if not np.all(step > 0.0):
         index = int(np.argmin(step > 0.0)) + 1
-        raise DataError(
-            f"angle_deg[{index}] = {angle_deg[index]:g} follows {angle_deg[index - 1]:g}: angles must rise"
-        )
+        raise DataError(f"angle_deg[{index}] = {angle_deg[index]:g} follows {angle_deg[index - 1]:g}: angles must rise")
     if angle_deg.size and angle_deg[-1] - angle_deg[0] > 720.0:
         span = angle_deg[-1] - angle_deg[0]
         raise DataError(f"angles span {span:g} degrees: one cycle of at most 720 degrees is needed")

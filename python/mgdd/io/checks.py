@@ -116,13 +116,11 @@ def _check_span(degrees: NDArray[np.float64], angle_unit: str, source: str) -> N
     span = float(np.ptp(degrees))
     if angle_unit == "deg" and 0.0 < span < RADIAN_SPAN:
         raise DataError(
-            f"{source}: crank angles span only {span:g} degrees: "
-            "this looks like radians; pass angle_unit='rad'"
+            f"{source}: crank angles span only {span:g} degrees: this looks like radians; pass angle_unit='rad'"
         )
     if angle_unit == "rad" and span > math.degrees(RADIAN_SPAN):
         raise DataError(
-            f"{source}: crank angles span {math.radians(span):g} rad: "
-            "this looks like degrees; pass angle_unit='deg'"
+            f"{source}: crank angles span {math.radians(span):g} rad: this looks like degrees; pass angle_unit='deg'"
         )
 
 
@@ -173,9 +171,7 @@ def _check_unit(degrees: NDArray[np.float64], values: NDArray[np.float64], unit:
     if low <= peak / PRESSURE_UNITS[unit] <= PEAK_BAR[1]:
         return
     likely = [
-        other
-        for other, per_bar in PRESSURE_UNITS.items()
-        if other != unit and low <= peak / per_bar <= PEAK_BAR[1]
+        other for other, per_bar in PRESSURE_UNITS.items() if other != unit and low <= peak / per_bar <= PEAK_BAR[1]
     ]
     if likely:
         hint = " or ".join(f"pressure_unit={other!r}" for other in likely)

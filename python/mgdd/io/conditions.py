@@ -63,9 +63,7 @@ def read_conditions(path: str | os.PathLike[str]) -> dict[str, dict[str, float]]
     unknown = [name for name in header if name != "file" and name not in _BOUNDS]
     if unknown or len(set(header)) != len(header):
         known = ", ".join(map(repr, ("file", *_BOUNDS)))
-        raise DataError(
-            f"{table.source}: unknown or repeated column in {header}: known are {known}, once each"
-        )
+        raise DataError(f"{table.source}: unknown or repeated column in {header}: known are {known}, once each")
     conditions: dict[str, dict[str, float]] = {}
     for line, row in zip(table.lines, table.rows, strict=True):
         cells = dict(zip(header, row, strict=True))
@@ -73,9 +71,7 @@ def read_conditions(path: str | os.PathLike[str]) -> dict[str, dict[str, float]]
         if not name or name in conditions:
             raise DataError(f"{table.source}, line {line}: file = {name!r}: name every trace, each once")
         conditions[name] = {
-            column: _value(cell, column, f"{table.source}, line {line}")
-            for column, cell in cells.items()
-            if cell
+            column: _value(cell, column, f"{table.source}, line {line}") for column, cell in cells.items() if cell
         }
     return conditions
 

@@ -38,8 +38,7 @@ class TextTable:
         if isinstance(column, str):
             if self.header is None:
                 raise DataError(
-                    f"{self.source}: no header, so there is no column {column!r}: "
-                    f"give its number, 0 to {width - 1}"
+                    f"{self.source}: no header, so there is no column {column!r}: give its number, 0 to {width - 1}"
                 )
             if self.header.count(column) != 1:
                 what = "no column" if column not in self.header else "more than one column"
@@ -76,9 +75,7 @@ class TextTable:
         return values
 
 
-def read_table(
-    path: str | os.PathLike[str], *, delimiter: str | None = None, decimal: str = "."
-) -> TextTable:
+def read_table(path: str | os.PathLike[str], *, delimiter: str | None = None, decimal: str = ".") -> TextTable:
     """Read a text table; `delimiter` None detects it from the first row that is not a comment."""
     if decimal not in (".", ","):
         raise DataError(f"decimal = {decimal!r}: must be '.' or ','")

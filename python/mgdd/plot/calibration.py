@@ -76,9 +76,7 @@ def calibration_overlay(overlay: xr.Dataset, *, ax: Axes | None = None) -> Axes:
     ax = new_axes(ax, height=4.8)
     panel = _panel_below(ax)
     angle = overlay[ANGLE].to_numpy()
-    lines: list[Line2D] = ax.plot(
-        angle, overlay["measured_bar"], ".", color=GREY, markersize=4, label="measured"
-    )
+    lines: list[Line2D] = ax.plot(angle, overlay["measured_bar"], ".", color=GREY, markersize=4, label="measured")
     lines += ax.plot(angle, overlay["model_bar"], "-", color=BLACK, linewidth=1.2, label=_model_name(overlay))
     panel.plot(angle, overlay["residual_bar"], "-", color=BLACK, linewidth=1.0)
     panel.axhline(0.0, color=GREY, linewidth=0.8)
@@ -134,9 +132,7 @@ def wall_heat_profile(profile: xr.Dataset, *, ax: Axes | None = None) -> Axes:
     require(profile, ("wall_heat_scale", "rmse_percent"), "mgdd.identify.wall_heat_profile")
     rmse = profile["rmse_percent"]
     if "wall_heat_scale" not in rmse.dims or rmse.ndim > 2:
-        raise DataError(
-            f"rmse_percent has dimensions {rmse.dims}: wall_heat_scale and at most one more are needed"
-        )
+        raise DataError(f"rmse_percent has dimensions {rmse.dims}: wall_heat_scale and at most one more are needed")
     ax = new_axes(ax, height=4.2)
     scale = profile["wall_heat_scale"].to_numpy()
     others = [str(dim) for dim in rmse.dims if dim != "wall_heat_scale"]
@@ -145,9 +141,7 @@ def wall_heat_profile(profile: xr.Dataset, *, ax: Axes | None = None) -> Axes:
     lines: list[Line2D] = []
     for index, name in enumerate(names):
         dash, color = LINE_STYLES[index % len(LINE_STYLES)]
-        lines += ax.plot(
-            scale, curves[:, index], linestyle=dash, color=color, marker="o", markersize=3, label=name
-        )
+        lines += ax.plot(scale, curves[:, index], linestyle=dash, color=color, marker="o", markersize=3, label=name)
     together = np.sqrt(np.mean(curves**2, axis=1))
     fine = np.linspace(float(scale.min()), float(scale.max()), 2001)
     inside = fine[np.interp(fine, scale, together) <= 1.1 * together.min()]

@@ -60,9 +60,7 @@ def timing(sweep: xr.Dataset, *, ax: Axes | None = None) -> Axes:
     if soc.ndim != 1 or soc.size < 3:
         raise DataError(f"soc_cad has shape {soc.shape}: at least three timings are needed")
     ax = new_axes(ax)
-    lines: list[Line2D] = ax.plot(
-        soc, efficiency, "-", color=BLACK, label=sweep["efficiency_gross"].attrs["long_name"]
-    )
+    lines: list[Line2D] = ax.plot(soc, efficiency, "-", color=BLACK, label=sweep["efficiency_gross"].attrs["long_name"])
     best, top, at_end = _vertex(soc, efficiency)
     where = "best at the end of the sweep" if at_end else "best"
     lines += ax.plot(

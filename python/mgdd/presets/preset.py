@@ -152,13 +152,9 @@ def _parse(text: str, *, source: str) -> Preset:
     if "cylinder" not in data:
         raise DataError(f"{source}: no table [cylinder]: it needs at least bore, stroke, rod and compression ratio")
     sources: dict[str, str] = {}
-    records = {
-        table: _record(table, data.get(table, {}), source=source, sources=sources) for table in _TABLES
-    }
+    records = {table: _record(table, data.get(table, {}), source=source, sources=sources) for table in _TABLES}
     name = data.get("name", Path(source).stem)
-    return Preset(
-        name=str(name), title=str(data.get("title", name)), sources=MappingProxyType(sources), **records
-    )
+    return Preset(name=str(name), title=str(data.get("title", name)), sources=MappingProxyType(sources), **records)
 
 
 def _record(table: str, entries: Any, *, source: str, sources: dict[str, str]) -> Any:
@@ -174,13 +170,12 @@ def _record(table: str, entries: Any, *, source: str, sources: dict[str, str]) -
             hint = f"did you mean {close[0]!r}?" if close else f"known are {', '.join(fields)}"
             raise ParameterError(f"{where}: unknown key: {hint}")
         if not isinstance(entry, dict) or "value" not in entry or not set(entry) <= {"value", "unit", "source"}:
-            raise ParameterError(
-                f'{where}: write {{ value = ..., unit = "{fields[key]["unit"]}", source = "..." }}'
-            )
+            raise ParameterError(f'{where}: write {{ value = ..., unit = "{fields[key]["unit"]}", source = "..." }}')
         unit = entry.get("unit")
         if unit != fields[key]["unit"]:
             raise ParameterError(
-                f"{where}: unit = {unit!r}: must be {fields[key]['unit']!r}; convert the value, units stand in the names"
+                f"{where}: unit = {unit!r}: must be {fields[key]['unit']!r}; convert the value, "
+                "units stand in the names"
             )
         values[key] = entry["value"]
         if "source" in entry:

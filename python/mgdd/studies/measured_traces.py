@@ -113,8 +113,8 @@ def best_timing(
     -------
     list of dict
         Per trace: ``file``, ``p_max_limit_bar`` (the trace's own highest sample, or the model's where that is higher at
-        the measured timing), ``points`` (one per scale) and the ranges ``soc_cad``, ``ca50_cad``, ``gain_percent`` under
-        that limit and ``free_soc_cad``, ``free_ca50_cad``, ``free_gain_percent`` without. A gain is the
+        the measured timing), ``points`` (one per scale) and the ranges ``soc_cad``, ``ca50_cad``, ``gain_percent``
+        under that limit and ``free_soc_cad``, ``free_ca50_cad``, ``free_gain_percent`` without. A gain is the
         objective's relative rise over the fitted timing [%].
 
     Examples
@@ -232,9 +232,7 @@ def summarize(
         "traces": rows,
         "laws": [law_row(fit) for fit in fits],
         "common": {"wall_heat_scale": {law: profile.to_dict() for law, profile in profiles.items()}},
-        "unidentifiable": sorted(
-            {*main.report.unidentifiable, *(["wall_heat_scale"] if _unknown(profiles) else [])}
-        ),
+        "unidentifiable": sorted({*main.report.unidentifiable, *(["wall_heat_scale"] if _unknown(profiles) else [])}),
         "warnings": [f"{fit.burn_law}: {text}" for fit in fits for text in fit.warnings],
         "best_timing": list(timing),
     }
@@ -314,9 +312,24 @@ def _table(fits: Sequence[CylinderFit]) -> xr.Dataset:
             "rmse_percent": (dims, grid("rmse_percent")),
             "imep_closed_error_percent": (dims, grid("imep_closed_error_percent")),
             "soc_cad": (dims, grid("soc_cad")),
-            "onset_against_soi_cad": (dims, grid("onset_against_soi_cad"), "°CA", "fitted burn start minus SOI"),
-            "largest_error_bar": (dims, grid("largest_error_bar"), "bar", "largest local error, model minus measured"),
-            "largest_error_cad": (dims, grid("largest_error_cad"), "°CA aTDC", "angle of the largest local error"),
+            "onset_against_soi_cad": (
+                dims,
+                grid("onset_against_soi_cad"),
+                "°CA",
+                "fitted burn start minus SOI",
+            ),
+            "largest_error_bar": (
+                dims,
+                grid("largest_error_bar"),
+                "bar",
+                "largest local error, model minus measured",
+            ),
+            "largest_error_cad": (
+                dims,
+                grid("largest_error_cad"),
+                "°CA aTDC",
+                "angle of the largest local error",
+            ),
             "wall_heat_scale": ("law", scales),
         }
     )

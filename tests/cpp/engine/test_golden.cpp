@@ -17,6 +17,7 @@ namespace {
 using test_support::Cycle;
 using test_support::EngineCase;
 using test_support::GoldenRow;
+using test_support::indicator;
 
 double optimum(const EngineCase& given, const std::string& wanted) {
   EngineCase c = given;

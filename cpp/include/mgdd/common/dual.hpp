@@ -28,28 +28,33 @@ struct Dual {
 
   constexpr Dual& operator+=(const Dual& o) noexcept {
     value += o.value;
-    for (std::size_t i = 0; i < grad.size(); ++i) grad[i] += o.grad[i];
+    for (std::size_t i = 0; i < grad.size(); ++i)
+      grad[i] += o.grad[i];
     return *this;
   }
   constexpr Dual& operator-=(const Dual& o) noexcept {
     value -= o.value;
-    for (std::size_t i = 0; i < grad.size(); ++i) grad[i] -= o.grad[i];
+    for (std::size_t i = 0; i < grad.size(); ++i)
+      grad[i] -= o.grad[i];
     return *this;
   }
   constexpr Dual& operator*=(const Dual& o) noexcept {
-    for (std::size_t i = 0; i < grad.size(); ++i) grad[i] = grad[i] * o.value + value * o.grad[i];
+    for (std::size_t i = 0; i < grad.size(); ++i)
+      grad[i] = grad[i] * o.value + value * o.grad[i];
     value *= o.value;
     return *this;
   }
   constexpr Dual& operator*=(double o) noexcept {
-    for (double& g : grad) g *= o;
+    for (double& g : grad)
+      g *= o;
     value *= o;
     return *this;
   }
   constexpr Dual& operator/=(const Dual& o) noexcept {
     const double inverse = 1.0 / o.value;
     value *= inverse;
-    for (std::size_t i = 0; i < grad.size(); ++i) grad[i] = (grad[i] - value * o.grad[i]) * inverse;
+    for (std::size_t i = 0; i < grad.size(); ++i)
+      grad[i] = (grad[i] - value * o.grad[i]) * inverse;
     return *this;
   }
 
@@ -84,7 +89,8 @@ inline constexpr bool is_dual_v = is_dual<T>::value;
 template <int N>
 constexpr Dual<N> chain(double f, double slope, const Dual<N>& x) noexcept {
   Dual<N> y(f);
-  for (std::size_t i = 0; i < x.grad.size(); ++i) y.grad[i] = slope * x.grad[i];
+  for (std::size_t i = 0; i < x.grad.size(); ++i)
+    y.grad[i] = slope * x.grad[i];
   return y;
 }
 
@@ -112,11 +118,14 @@ template <int N>
 Dual<N> pow(const Dual<N>& x, const Dual<N>& exponent) noexcept {
   Dual<N> y = pow(x, exponent.value);
   const double by_exponent = x.value > 0.0 ? y.value * std::log(x.value) : 0.0;
-  for (std::size_t i = 0; i < y.grad.size(); ++i) y.grad[i] += by_exponent * exponent.grad[i];
+  for (std::size_t i = 0; i < y.grad.size(); ++i)
+    y.grad[i] += by_exponent * exponent.grad[i];
   return y;
 }
 
-constexpr double value_of(double x) noexcept { return x; }
+constexpr double value_of(double x) noexcept {
+  return x;
+}
 template <int N>
 constexpr double value_of(const Dual<N>& x) noexcept {
   return x.value;

@@ -5,7 +5,7 @@
 
 namespace mgdd::units {
 
-inline constexpr double gas_constant_j_per_molk = 8.314462618;  ///< CODATA 2018, exact to the digits given
+inline constexpr double gas_constant_j_per_molk = 8.314462618;   ///< CODATA 2018, exact to the digits given
 inline constexpr double air_molar_mass_kg_per_mol = 28.9647e-3;  ///< dry air, US Standard Atmosphere 1976
 
 inline constexpr double pa_per_bar = 1e5;

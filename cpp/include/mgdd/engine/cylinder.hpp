@@ -26,20 +26,20 @@ struct BasicCylinder {
   T stroke_mm{86.0};
   T connecting_rod_mm{155.0};
   T compression_ratio{18.2};
-  T ivc_cad{-140.0};         ///< intake valve closing, start of the simulated part
-  T evo_cad{130.0};          ///< exhaust valve opening, end of the simulated part
-  T bowl_area_factor{1.0};   ///< [-] piston and head area over two flat discs; redundant with the wall-heat scale
+  T ivc_cad{-140.0};             ///< intake valve closing, start of the simulated part
+  T evo_cad{130.0};              ///< exhaust valve opening, end of the simulated part
+  T bowl_area_factor{1.0};       ///< [-] piston and head area over two flat discs; redundant with the wall-heat scale
   T ivc_pressure_rise_kpa{0.0};  ///< p(IVC) above the intake pressure
 
   // Charge and fuel.
-  T volumetric_efficiency{0.90};       ///< [-] on swept volume at intake conditions (Tan 2018, eq. 2-3)
+  T volumetric_efficiency{0.90};          ///< [-] on swept volume at intake conditions (Tan 2018, eq. 2-3)
   T lower_heating_value_mj_per_kg{42.8};  ///< EN 590 diesel, range 42.5 to 43.2
 
   // Ratio of specific heats. `gamma` also sets the motored reference pressure of Woschni in every model.
-  T gamma{1.37};                          ///< [-] constant (Tan 2018)
-  T gamma_linear_300k{1.38};              ///< [-] Gatowski et al. 1984: 1.38 - 8e-5 (T - 300 K)
+  T gamma{1.37};              ///< [-] constant (Tan 2018)
+  T gamma_linear_300k{1.38};  ///< [-] Gatowski et al. 1984: 1.38 - 8e-5 (T - 300 K)
   T gamma_linear_slope_per_k{-8.0e-5};
-  T gamma_polynomial_c0{1.338};           ///< [-] Brunt, Rai and Emtage 1998 (constants unverified)
+  T gamma_polynomial_c0{1.338};  ///< [-] Brunt, Rai and Emtage 1998 (constants unverified)
   T gamma_polynomial_c1_per_k{-6.0e-5};
   T gamma_polynomial_c2_per_k2{1.0e-8};
 
@@ -49,23 +49,24 @@ struct BasicCylinder {
   T woschni_cp_m_per_sk{3.24e-3};  ///< combustion term of the gas velocity (Woschni 1967)
   T wall_temperature_k{450.0};
 
-  // Burn. The duration law is duration_ref (fuel / fuel_ref)^0.6 (speed / speed_ref)^0.3 unless the point says otherwise.
+  // Burn. The duration law is duration_ref (fuel / fuel_ref)^0.6 (speed / speed_ref)^0.3 unless the point says
+  // otherwise.
   T burn_duration_ref_cad{30.0};
   T burn_fuel_ref_mg{20.0};
   T burn_speed_ref_rpm{1500.0};
   T burn_fuel_exponent{0.6};
   T burn_speed_exponent{0.3};
-  T wiebe_a{6.908};            ///< [-] 99.9 % burned at the end, before renormalisation
-  T wiebe_m{1.5};              ///< [-] shape; the exponent is m + 1
-  T second_fraction{0.6};      ///< [-] share of the heat in the second Wiebe law
-  T second_delay_cad{3.0};     ///< start of the second law after the first
+  T wiebe_a{6.908};         ///< [-] 99.9 % burned at the end, before renormalisation
+  T wiebe_m{1.5};           ///< [-] shape; the exponent is m + 1
+  T second_fraction{0.6};   ///< [-] share of the heat in the second Wiebe law
+  T second_delay_cad{3.0};  ///< start of the second law after the first
   T second_duration_cad{50.0};
   T second_wiebe_m{0.8};
 
   // Ignition delay.
-  T cetane_number{45.0};          ///< [-] for Hardenberg-Hase
-  T ignition_c0_cad{4.0};         ///< polynomial: c0 + c1 SOI + c2 SOI^2
-  T ignition_c1{0.0};             ///< [-]
+  T cetane_number{45.0};   ///< [-] for Hardenberg-Hase
+  T ignition_c0_cad{4.0};  ///< polynomial: c0 + c1 SOI + c2 SOI^2
+  T ignition_c1{0.0};      ///< [-]
   T ignition_c2_per_cad{0.0};
 
   BurnShape burn_shape{BurnShape::triangle};
@@ -104,7 +105,7 @@ struct FieldInfo {
 template <class Owner, class T>
 struct Field {
   FieldInfo info;
-  T Owner::*member;
+  T Owner::* member;
 };
 
 inline constexpr double unbounded = 1e300;  // finite, so that infinity itself is refused by the bound
@@ -153,8 +154,7 @@ constexpr auto cylinder_fields() {
       F{{"second_fraction", "-", 0.0, false, 1.0, "share of the heat in the second Wiebe law"}, &C::second_fraction},
       F{{"second_delay_cad", "°CA", -60.0, false, 120.0, "start of the second Wiebe law after the first"},
         &C::second_delay_cad},
-      F{{"second_duration_cad", "°CA", 0.0, true, 360.0, "duration of the second Wiebe law"},
-        &C::second_duration_cad},
+      F{{"second_duration_cad", "°CA", 0.0, true, 360.0, "duration of the second Wiebe law"}, &C::second_duration_cad},
       F{{"second_wiebe_m", "-", -0.5, true, 20.0, "shape of the second Wiebe law"}, &C::second_wiebe_m},
       F{{"cetane_number", "-", 0.0, true, 120.0, "for Hardenberg-Hase"}, &C::cetane_number},
       F{{"ignition_c0_cad", "°CA", -60.0, false, 60.0, "polynomial ignition delay, constant"}, &C::ignition_c0_cad},
@@ -210,7 +210,8 @@ BasicCylinder<T> lift(const Cylinder& from) {
   BasicCylinder<T> to;
   constexpr auto source = cylinder_fields<double>();
   constexpr auto target = cylinder_fields<T>();
-  for (std::size_t i = 0; i < source.size(); ++i) to.*(target[i].member) = T(from.*(source[i].member));
+  for (std::size_t i = 0; i < source.size(); ++i)
+    to.*(target[i].member) = T(from.*(source[i].member));
   to.burn_shape = from.burn_shape;
   to.gamma_model = from.gamma_model;
   to.wall_heat_model = from.wall_heat_model;
@@ -222,7 +223,8 @@ BasicOperatingPoint<T> lift(const OperatingPoint& from) {
   BasicOperatingPoint<T> to;
   constexpr auto source = operating_point_fields<double>();
   constexpr auto target = operating_point_fields<T>();
-  for (std::size_t i = 0; i < source.size(); ++i) to.*(target[i].member) = T(from.*(source[i].member));
+  for (std::size_t i = 0; i < source.size(); ++i)
+    to.*(target[i].member) = T(from.*(source[i].member));
   if (from.burn_duration_cad) to.burn_duration_cad = T(*from.burn_duration_cad);
   if (from.trapped_mass_g) to.trapped_mass_g = T(*from.trapped_mass_g);
   return to;

@@ -13,8 +13,8 @@ namespace mgdd::engine {
 template <class T>
 struct Geometry {
   T swept_m3, clearance_m3, piston_area_m2, bore_m, stroke_m;
-  T rod_ratio;     ///< [-] connecting rod over crank radius, R of eq. 2-1
-  T area_factor;   ///< [-]
+  T rod_ratio;    ///< [-] connecting rod over crank radius, R of eq. 2-1
+  T area_factor;  ///< [-]
 
   explicit Geometry(const BasicCylinder<T>& c) noexcept
       : bore_m(c.bore_mm * units::m_per_mm),

@@ -20,7 +20,7 @@ struct IgnitionTiming {
   double soc_cad = 0.0;    ///< NaN when the charge does not ignite before EVO
   double delay_cad = 0.0;  ///< SOC - SOI
   bool ignites = false;
-  bool clipped = false;    ///< the inverse met the edge of the reachable range and returned it
+  bool clipped = false;  ///< the inverse met the edge of the reachable range and returned it
 };
 
 inline constexpr double injection_lower_cad = -60.0;

@@ -28,7 +28,7 @@ struct Indicators {
 template <class T>
 struct IndicatorField {
   std::string_view name, unit;
-  T Indicators<T>::*member;
+  T Indicators<T>::* member;
 };
 
 template <class T>

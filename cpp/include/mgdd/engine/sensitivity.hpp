@@ -25,8 +25,8 @@ struct CycleInputs {
   T soc_cad;
 };
 
-/// Names of every input with a derivative: `soc_cad`, `burn_duration_cad`, `trapped_mass_g`, the fields of the point and
-/// the fields of the cylinder, without IVC and EVO (they place the grid).
+/// Names of every input with a derivative: `soc_cad`, `burn_duration_cad`, `trapped_mass_g`, the fields of the point
+/// and the fields of the cylinder, without IVC and EVO (they place the grid).
 std::vector<std::string> differentiable_inputs();
 
 /// Unit of a differentiable input; ParameterError for another name.
@@ -37,10 +37,10 @@ double& input(CycleInputs<double>& inputs, std::string_view name);
 SensitivityScalar& input(CycleInputs<SensitivityScalar>& inputs, std::string_view name);
 
 struct Sensitivities {
-  std::vector<std::string> names;               ///< of the inputs, in the order asked
+  std::vector<std::string> names;  ///< of the inputs, in the order asked
   std::vector<double> angles_cad;
-  std::vector<Indicators<double>> indicators;   ///< d indicator / d input, per unit of each
-  Eigen::MatrixXd pressure_bar;                 ///< [angle, input] d p / d input
+  std::vector<Indicators<double>> indicators;  ///< d indicator / d input, per unit of each
+  Eigen::MatrixXd pressure_bar;                ///< [angle, input] d p / d input
   Indicators<double> value;
 };
 
@@ -52,10 +52,10 @@ Sensitivities sensitivities(const Cylinder& cylinder, const OperatingPoint& poin
 /// Step-size error of one indicator at `step_cad` from runs at h, h/2 and h/4.
 struct ConvergenceEstimate {
   std::string_view name, unit;
-  double value;          ///< at h
-  double extrapolated;   ///< Richardson's limit
-  double error;          ///< value - extrapolated
-  double order;          ///< observed, NaN where the differences do not shrink
+  double value;         ///< at h
+  double extrapolated;  ///< Richardson's limit
+  double error;         ///< value - extrapolated
+  double order;         ///< observed, NaN where the differences do not shrink
 };
 std::vector<ConvergenceEstimate> convergence(const Cylinder& cylinder, const OperatingPoint& point, double soc_cad,
                                              double step_cad = default_step_cad,

@@ -1,6 +1,7 @@
 // Analysis of a measured pressure trace of the closed part: pegging, heat release, burn angles, work, polytropic
 // exponents. Angles °CA aTDC, pressure in bar at the border. Desk-time code: it allocates and throws.
-// Sources: Heywood 1988, chapter 9; Randolph 1990, Brunt and Pond 1997 (pegging); Krieger and Borman 1966 (heat release).
+// Sources: Heywood 1988, chapter 9; Randolph 1990, Brunt and Pond 1997 (pegging); Krieger and Borman 1966 (heat
+// release).
 #pragma once
 
 #include <string>
@@ -21,25 +22,25 @@ AnalysisGamma parse_analysis_gamma(std::string_view name);
 
 struct TraceOptions {
   Pegging pegging = Pegging::none;
-  double pegging_exponent = 1.35;     ///< [-] polytropic exponent of compression, 1.32 to 1.37 in a diesel
-  double inlet_pressure_kpa = 0.0;    ///< for `inlet`: the pressure at intake bottom dead centre
+  double pegging_exponent = 1.35;   ///< [-] polytropic exponent of compression, 1.32 to 1.37 in a diesel
+  double inlet_pressure_kpa = 0.0;  ///< for `inlet`: the pressure at intake bottom dead centre
 
   AnalysisGamma gamma_source = AnalysisGamma::constant;
-  double gamma = 1.33;                ///< [-] constant over the window
-  double gamma_compression = 1.37;    ///< [-] `split`: while the net heat is not yet positive
-  double gamma_combustion = 1.30;     ///< [-] `split`: from the burn start on
+  double gamma = 1.33;              ///< [-] constant over the window
+  double gamma_compression = 1.37;  ///< [-] `split`: while the net heat is not yet positive
+  double gamma_combustion = 1.30;   ///< [-] `split`: from the burn start on
 
-  double heat_from_cad = -10.0;       ///< window of the cumulative heat
+  double heat_from_cad = -10.0;  ///< window of the cumulative heat
   double heat_to_cad = 90.0;
-  double burn_from_cad = -10.0;       ///< Woschni's combustion term acts from here on
-  bool fractions_of_gross = false;    ///< CA10/50/90 of gross heat instead of net
+  double burn_from_cad = -10.0;     ///< Woschni's combustion term acts from here on
+  bool fractions_of_gross = false;  ///< CA10/50/90 of gross heat instead of net
 };
 
 struct TraceAnalysis {
   std::vector<double> angle_cad, pressure_bar, volume_l, temperature_k;
   std::vector<double> heat_net_j, heat_loss_j;                         ///< of the step that ends at the sample
   std::vector<double> heat_net_cumulative_j, heat_gross_cumulative_j;  ///< zero at the window's start
-  double pegging_bar = 0.0;  ///< added to the trace
+  double pegging_bar = 0.0;                                            ///< added to the trace
   double n_compression, n_expansion;
   double ca10_cad, ca50_cad, ca90_cad;
   double heat_net_j_total, heat_gross_j_total;  ///< maxima of the cumulative heat
@@ -48,8 +49,8 @@ struct TraceAnalysis {
   std::vector<std::string> warnings;  ///< what makes these figures doubtful
 };
 
-/// Offset to add to a relative trace [bar] (engine analysis calls it; here for use on its own). DataError where the trace
-/// does not cover the angles that the method reads.
+/// Offset to add to a relative trace [bar] (engine analysis calls it; here for use on its own). DataError where the
+/// trace does not cover the angles that the method reads.
 double pegging_offset_bar(const std::vector<double>& angle_cad, const std::vector<double>& pressure_bar,
                           const Cylinder& cylinder, const TraceOptions& options);
 

@@ -5,8 +5,8 @@
 
 namespace mgdd::engine {
 
-/// Throws ShapeError or DataError, naming index, value and remedy, unless angles [°CA aTDC] and pressures [bar] have the
-/// same length (>= 20), are finite, and angles increase strictly without a gap (a step over 1.5 times the median).
+/// Throws ShapeError or DataError, naming index, value and remedy, unless angles [°CA aTDC] and pressures [bar] have
+/// the same length (>= 20), are finite, and angles increase strictly without a gap (a step over 1.5 times the median).
 /// A highest pressure above 500 bar is refused as a wrong unit (Pa or kPa).
 void check_trace(const std::vector<double>& angle_cad, const std::vector<double>& pressure_bar);
 

@@ -99,15 +99,16 @@ class WallHeat {
     return scale_ * volume_term * (temperature_k - wall_k_);
   }
 
-  /// p^0.25 w^0.8 (Woschni) or p^0.4 (Hohenberg), as factors.
+  /// p^0.25 w^0.8 (Woschni) or p^0.4 (Hohenberg), as factors in the order in which they become known: the next pressure
+  /// waits for the last one only.
   template <bool Woschni>
   struct Film {
-    T of_pressure, of_velocity;  // the second only for Woschni
+    T early, late;  // Hohenberg has only the late one
     T times(const T& factor) const noexcept {
       if constexpr (Woschni) {
-        return factor * of_pressure * of_velocity;  // the last to be known comes last
+        return factor * early * late;
       } else {
-        return factor * of_pressure;
+        return factor * late;
       }
     }
   };
@@ -123,9 +124,9 @@ class WallHeat {
         const T velocity = (still_ - burning_ * motored_ratio) + burning_per_pa_ * pressure_pa;
         if (velocity > still_) return {root, four_fifths_power(velocity)};
       }
-      return {root, still_power_};
+      return {still_power_, root};
     } else {
-      return {two_fifths_power(pressure_pa), {}};
+      return {{}, two_fifths_power(pressure_pa)};
     }
   }
 

@@ -17,8 +17,8 @@
 
 namespace mgdd::identify {
 
-/// One measured closed cycle with its conditions. The first sample is p(IVC); the trapped amount is the point's mass, or
-/// eta_V p(IVC) V_s/(R T_in). Fuel and intake pressure of `point` are not used.
+/// One measured closed cycle with its conditions. The first sample is p(IVC); the trapped amount is the point's mass,
+/// or eta_V p(IVC) V_s/(R T_in). Fuel and intake pressure of `point` are not used.
 struct MeasuredCycle {
   std::string label;
   std::vector<double> angle_cad;
@@ -52,7 +52,7 @@ struct SearchDomain {
 template <class T>
 struct LoadField {
   SearchDomain domain;
-  T BasicLoadBurn<T>::*member;
+  T BasicLoadBurn<T>::* member;
 };
 
 template <class T>
@@ -98,14 +98,15 @@ struct CylinderFit {
 std::vector<std::string> load_parameters();
 std::vector<std::string> common_parameters();
 
-/// A start from the heat release of the trace: burn angles give start and duration, net heat plus a tenth the fuel heat.
+/// A start from the heat release of the trace: burn angles give start and duration, net heat plus a tenth the fuel
+/// heat.
 LoadBurn estimate_burn(const MeasuredCycle& trace, const engine::Cylinder& cylinder);
 
 /// The cylinder with the shape fields of one load's burn.
 engine::Cylinder with_burn(engine::Cylinder cylinder, const LoadBurn& burn);
 
-/// Fits. `free` mixes per-load and common names; all others keep their start value. Names, starts and traces are checked
-/// before any work (ParameterError, ShapeError, DataError). Parameters are named `soc_cad[label]` per load.
+/// Fits. `free` mixes per-load and common names; all others keep their start value. Names, starts and traces are
+/// checked before any work (ParameterError, ShapeError, DataError). Parameters are named `soc_cad[label]` per load.
 CylinderFit fit_cylinder(const std::vector<MeasuredCycle>& traces, const engine::Cylinder& cylinder,
                          const std::vector<LoadBurn>& start, const std::vector<std::string>& free,
                          const CylinderFitOptions& options = {});

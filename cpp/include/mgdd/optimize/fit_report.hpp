@@ -47,14 +47,12 @@ struct FitReport {
   Eigen::VectorXd lower;
   Eigen::VectorXd upper;
   Eigen::VectorXi bounds_active;  ///< -1 at the lower bound, +1 at the upper, 0 free
-  Eigen::MatrixXd
-      covariance;  ///< s^2 (J^T J)^-1 over the free parameters, s^2 = 2 cost / (n_residuals - rank)
-  Eigen::MatrixXd correlation;  ///< for a null direction its limit: +-1 between parameters that trade exactly
+  Eigen::MatrixXd covariance;     ///< s^2 (J^T J)^-1 over the free parameters, s^2 = 2 cost / (n_residuals - rank)
+  Eigen::MatrixXd correlation;    ///< for a null direction its limit: +-1 between parameters that trade exactly
   std::vector<std::string> unidentifiable;  ///< names that the data do not determine, in the order of `names`
   std::vector<std::string> findings;        ///< one sentence per reason behind `unidentifiable`
-  Eigen::MatrixXd
-      null_directions;       ///< columns: parameter changes, largest 1, that leave the residual as it is
-  Eigen::VectorXd residual;  ///< at `values`
+  Eigen::MatrixXd null_directions;          ///< columns: parameter changes, largest 1, that leave the residual as it is
+  Eigen::VectorXd residual;                 ///< at `values`
   double rmse = std::numeric_limits<double>::quiet_NaN();  ///< sqrt(mean r^2)
   double cost = std::numeric_limits<double>::quiet_NaN();  ///< sum r^2 / 2
   int nfev = 0;                                            ///< residual evaluations
@@ -81,7 +79,7 @@ struct IdentifiabilityLimits {
 /// `triangle` diag(`column_scale`) with orthonormal Q, so a Jacobian itself with a scale of ones is accepted
 /// too. Source: Bates and Watts (1988), section 2.2; truncation by singular values as in Björck (1996),
 /// section 2.7.
-void describe_uncertainty(FitReport& report, const Eigen::MatrixXd& triangle,
-                          const Eigen::VectorXd& column_scale, const IdentifiabilityLimits& limits);
+void describe_uncertainty(FitReport& report, const Eigen::MatrixXd& triangle, const Eigen::VectorXd& column_scale,
+                          const IdentifiabilityLimits& limits);
 
 }  // namespace mgdd::optimize

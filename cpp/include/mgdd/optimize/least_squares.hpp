@@ -111,8 +111,7 @@ class LeastSquares {
   enum class Phase { idle, start, search, done };
 
   template <class Model>
-  bool evaluate(Model&& model, const Eigen::VectorXd& x, Eigen::VectorXd& residual,
-                Eigen::MatrixXd* jacobian) {
+  bool evaluate(Model&& model, const Eigen::VectorXd& x, Eigen::VectorXd& residual, Eigen::MatrixXd* jacobian) {
     ++nfev_;
     njev_ += jacobian != nullptr ? 1 : 0;
     const bool returned = model(x, residual, jacobian);

@@ -1,0 +1,53 @@
+// Slider-crank against dead centres, the vector form of the mechanism, and its own slope by quadrature.
+#include "mgdd/engine/geometry.hpp"
+
+#include <cmath>
+
+#include <gtest/gtest.h>
+
+namespace mgdd::engine {
+namespace {
+
+TEST(EngineGeometry, DeadCentresAreExact) {
+  const Geometry<double> g{Cylinder{}};
+  EXPECT_NEAR(g.swept_m3, 0.25 * std::numbers::pi * 0.086 * 0.086 * 0.086, 1e-18);
+  EXPECT_NEAR(g.volume_m3(0.0), g.swept_m3 / 17.2, 1e-18);
+  EXPECT_NEAR(g.volume_m3(180.0) / (g.swept_m3 * 18.2 / 17.2), 1.0, 1e-14);
+  EXPECT_NEAR(g.volume_m3(180.0) / g.volume_m3(0.0), 18.2, 1e-12);
+}
+
+// Piston pin on the cylinder axis: its height is the crank pin's plus the leg of a right triangle.
+TEST(EngineGeometry, FollowsThePinOfTheMechanism) {
+  const Geometry<double> g{Cylinder{}};
+  for (double angle = -180.0; angle <= 180.0; angle += 7.5) {
+    const double phi = angle * std::numbers::pi / 180.0;
+    const double pin = 0.043 * std::cos(phi) + std::sqrt(0.155 * 0.155 - std::pow(0.043 * std::sin(phi), 2));
+    const double travel = 0.155 + 0.043 - pin;
+    EXPECT_NEAR(g.volume_m3(angle), g.clearance_m3 + travel * g.piston_area_m2, 1e-16);
+    EXPECT_NEAR(g.volume_m3(angle), g.volume_m3(-angle), 1e-18);
+    const double area = 2.0 * g.piston_area_m2 + std::numbers::pi * 0.086 * (travel + g.clearance_m3 / g.piston_area_m2);
+    EXPECT_NEAR(g.wall_area_m2(g.volume_m3(angle)), area, 1e-12);
+  }
+}
+
+TEST(EngineGeometry, SlopeIntegratesToTheVolume) {
+  const Geometry<double> g{Cylinder{}};
+  double volume = g.volume_m3(-140.0);
+  for (double a = -140.0; a < 130.0 - 1e-9; a += 1.0) {  // Simpson
+    volume += (g.volume_slope_m3_per_cad(a) + 4.0 * g.volume_slope_m3_per_cad(a + 0.5) +
+               g.volume_slope_m3_per_cad(a + 1.0)) / 6.0;
+  }
+  EXPECT_NEAR(volume / g.volume_m3(130.0), 1.0, 1e-9);
+}
+
+TEST(EngineGeometry, BowlFactorScalesTheDiscsOnly) {
+  Cylinder c;
+  const Geometry<double> flat(c);
+  c.bowl_area_factor = 1.4;
+  const Geometry<double> bowl(c);
+  EXPECT_NEAR(bowl.wall_area_m2(1e-4) - flat.wall_area_m2(1e-4), 0.8 * flat.piston_area_m2, 1e-15);
+  EXPECT_DOUBLE_EQ(flat.mean_piston_speed_m_per_s(1500.0), 4.3);
+}
+
+}  // namespace
+}  // namespace mgdd::engine

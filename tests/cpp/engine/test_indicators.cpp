@@ -1,0 +1,59 @@
+// Parabola, ringing intensity and NOx maps against closed forms.
+#include "mgdd/engine/indicators.hpp"
+
+#include <array>
+#include <cmath>
+#include <random>
+
+#include <gtest/gtest.h>
+
+#include "mgdd/engine/emissions.hpp"
+#include "support/engine_case.hpp"
+
+namespace mgdd::engine {
+namespace {
+
+TEST(EngineIndicators, ParabolaFindsTheVertexOfAnyQuadraticOnAnyGrid) {
+  std::mt19937_64 random(11);
+  std::uniform_real_distribution<double> step(0.2, 2.0), vertex(-0.1, 0.1);
+  for (int i = 0; i < 100; ++i) {
+    const double left = step(random), right = step(random), at = vertex(random);
+    const std::array<double, 3> angle{3.0 - left, 3.0, 3.0 + right};
+    const auto f = [&](double x) { return 80.0 - 1.7 * (x - 3.0 - at) * (x - 3.0 - at); };
+    const Peak<double> peak = parabola_peak<double>(angle, 1, f(angle[0]), f(angle[1]), f(angle[2]));
+    EXPECT_NEAR(peak.angle_cad, 3.0 + at, 1e-10);
+    EXPECT_NEAR(peak.value, 80.0, 1e-10);
+  }
+}
+
+TEST(EngineIndicators, ParabolaKeepsTheSampleAtAnEdgeAndOnAPlateau) {
+  const std::array<double, 3> angle{0.0, 1.0, 2.0};
+  EXPECT_EQ(parabola_peak<double>(angle, 0, 5.0, 5.0, 4.0).angle_cad, 0.0);
+  EXPECT_EQ(parabola_peak<double>(angle, 2, 4.0, 5.0, 5.0).value, 5.0);
+  EXPECT_EQ(parabola_peak<double>(angle, 1, 5.0, 5.0, 5.0).angle_cad, 1.0);
+}
+
+TEST(EngineIndicators, RingingIntensityByHand) {
+  // 0.05 ms x 90 MPa/s = 4500 Pa; 4500^2/(2 1.3 1e7) sqrt(1.3 287.05 2000) = 672.8 W/m2
+  EXPECT_NEAR(ringing_intensity_mw_per_m2(1.3, 90e6, 1e7, 2000.0), 672.83e-6, 1e-8);
+  const double slope = 2.989262e5 * 6.0 * 1500.0 * 0.05e-3;
+  const auto i = run(test_support::EngineCase()).indicators;
+  const double expected = slope * slope / (2.0 * 1.37 * 107.1515e5) * std::sqrt(1.37 * 287.05 * 1958.72) * 1e-6;
+  EXPECT_NEAR(i.ringing_intensity_mw_per_m2, expected, 1e-4 * expected);
+}
+
+TEST(EngineIndicators, BothNoxMapsAgreeInValueAndSlopeAtTheReference) {
+  const NoxProxy nox;
+  EXPECT_DOUBLE_EQ(nox.affine_log_ppm(1900.0), 1200.0);
+  EXPECT_DOUBLE_EQ(nox.arrhenius_ppm(1900.0), 1200.0);
+  const double slope = std::log(nox.affine_log_ppm(1901.0) / nox.affine_log_ppm(1900.0));
+  EXPECT_NEAR(slope, 4.4e-3, 0.05e-3);
+  EXPECT_NEAR(std::log(nox.arrhenius_ppm(1900.01) / nox.arrhenius_ppm(1899.99)) / 0.02, slope, 1e-7);
+  for (double t = 1600.0; t < 2400.0; t += 50.0) {
+    EXPECT_GT(nox.affine_log_ppm(t + 1.0), nox.affine_log_ppm(t));
+    EXPECT_GT(nox.arrhenius_ppm(t + 1.0), nox.arrhenius_ppm(t));
+  }
+}
+
+}  // namespace
+}  // namespace mgdd::engine

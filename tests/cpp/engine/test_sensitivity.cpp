@@ -1,0 +1,165 @@
+// Exact derivatives against Richardson-extrapolated central differences, and laws that need no differences.
+#include "mgdd/engine/sensitivity.hpp"
+
+#include <cmath>
+
+#include <gtest/gtest.h>
+
+#include "mgdd/common/error.hpp"
+#include "mgdd/common/units.hpp"
+#include "support/engine_case.hpp"
+
+namespace mgdd::engine {
+namespace {
+
+using test_support::Cycle;
+using test_support::EngineCase;
+
+// Away from kinks: SOC, the joint of the triangle and the end of each burn lie between grid angles.
+EngineCase smooth() {
+  return EngineCase("soc_cad=-6.37 burn_duration_cad=33.3 trapped_mass_g=0.78 second_duration_cad=50.3");
+}
+
+// All differences of one input: the central quotient at h and h/2, extrapolated to h^4.
+struct Differences {
+  std::vector<double> indicators, pressure_bar;
+};
+
+Differences differences(const EngineCase& c, std::string_view name) {
+  const auto at = [&](double offset) {
+    CycleInputs<double> inputs{c.cylinder, c.point, c.soc_cad};
+    input(inputs, name) += offset;
+    EngineCase moved = c;
+    moved.cylinder = inputs.cylinder;
+    moved.point = inputs.point;
+    moved.soc_cad = inputs.soc_cad;
+    const Cycle cycle = run(moved);
+    std::vector<double> all = cycle.pressures_bar();
+    for (const auto& field : indicator_fields<double>()) {
+      all.push_back(cycle.indicators.*(field.member));
+    }
+    return all;
+  };
+  CycleInputs<double> inputs{c.cylinder, c.point, c.soc_cad};
+  const double x = std::abs(input(inputs, name));
+  const double h = 1e-4 * (x > 0.0 ? x : 1.0);
+  const std::vector<double> a = at(h), b = at(-h), d = at(0.5 * h), e = at(-0.5 * h);
+  std::vector<double> slope(a.size());
+  for (std::size_t i = 0; i < a.size(); ++i) {
+    slope[i] = (4.0 * (d[i] - e[i]) / h - (a[i] - b[i]) / (2.0 * h)) / 3.0;
+  }
+  const auto n = static_cast<std::ptrdiff_t>(a.size() - indicator_fields<double>().size());
+  return {{slope.begin() + n, slope.end()}, {slope.begin(), slope.begin() + n}};
+}
+
+void compare(const EngineCase& c, const std::string& what) {
+  const std::vector<std::string> names = differentiable_inputs();
+  const Sensitivities s = sensitivities(c.cylinder, c.point, c.soc_cad, names, c.step_cad, c.integrator);
+  for (std::size_t i = 0; i < names.size(); ++i) {
+    const Differences d = differences(c, names[i]);
+    CycleInputs<double> inputs{c.cylinder, c.point, c.soc_cad};
+    const double x = std::abs(input(inputs, names[i]));
+    const double per = 1.0 / (x > 0.0 ? x : 1.0);
+    std::size_t k = 0;
+    for (const auto& field : indicator_fields<double>()) {
+      const double exact = s.indicators[i].*(field.member);
+      const double scale = std::max({std::abs(exact), std::abs(s.value.*(field.member)) * per, 1e-3 * per});
+      EXPECT_NEAR(exact, d.indicators[k++], 2e-6 * scale) << what << ": d " << field.name << " / d " << names[i];
+    }
+    const auto column = s.pressure_bar.col(static_cast<Eigen::Index>(i));
+    const double scale = std::max(column.cwiseAbs().maxCoeff(), s.value.p_max_bar * per);
+    for (std::size_t row = 0; row < d.pressure_bar.size(); ++row) {
+      EXPECT_NEAR(column[static_cast<Eigen::Index>(row)], d.pressure_bar[row], 2e-6 * scale) << what << names[i];
+    }
+  }
+}
+
+TEST(EngineSensitivity, AgreesWithDifferencesForEveryInputAndLaw) {
+  for (const auto shape : {BurnShape::triangle, BurnShape::wiebe, BurnShape::double_wiebe}) {
+    for (const auto gamma : {GammaModel::constant, GammaModel::linear, GammaModel::polynomial}) {
+      for (const auto wall : {WallHeatModel::woschni, WallHeatModel::hohenberg}) {
+        EngineCase c = smooth();
+        c.cylinder.burn_shape = shape;
+        c.cylinder.gamma_model = gamma;
+        c.cylinder.wall_heat_model = wall;
+        compare(c, std::string(to_string(shape)) + " " + std::string(to_string(gamma)));
+      }
+    }
+  }
+}
+
+TEST(EngineSensitivity, AgreesWithDifferencesForEveryIntegrator) {
+  for (const auto integrator : {Integrator::split, Integrator::seed, Integrator::euler}) {
+    EngineCase c = smooth();
+    c.integrator = integrator;
+    c.step_cad = 0.7;
+    compare(c, std::string(to_string(integrator)));
+  }
+}
+
+TEST(EngineSensitivity, TimingMovesTheBurnAndNothingBeforeIt) {
+  EngineCase c;
+  for (const auto shape : {BurnShape::triangle, BurnShape::wiebe, BurnShape::double_wiebe}) {
+    c.cylinder.burn_shape = shape;
+    const Sensitivities s = sensitivities(c.cylinder, c.point, -6.3, {"soc_cad"});
+    EXPECT_NEAR(s.indicators[0].ca10_cad, 1.0, 1e-9);
+    EXPECT_NEAR(s.indicators[0].ca50_cad, 1.0, 1e-9);
+    EXPECT_NEAR(s.indicators[0].ca90_cad, 1.0, 1e-9);
+    for (std::size_t k = 0; s.angles_cad[k] < -6.3; ++k) {
+      EXPECT_EQ(s.pressure_bar(static_cast<Eigen::Index>(k), 0), 0.0);
+    }
+    EXPECT_LT(s.pressure_bar(140, 0), 0.0);  // a later burn lowers p at TDC
+  }
+}
+
+TEST(EngineSensitivity, FuelAndHeatingValueTradeExactly) {
+  EngineCase c("burn_duration_cad=30");
+  const Sensitivities s =
+      sensitivities(c.cylinder, c.point, -6.3, {"fuel_mg", "lower_heating_value_mj_per_kg", "wall_heat_scale"});
+  for (const auto& field : indicator_fields<double>()) {
+    const double by_fuel = 20.0 * (s.indicators[0].*(field.member));
+    EXPECT_NEAR(by_fuel, 42.8 * (s.indicators[1].*(field.member)), 1e-9 * (1.0 + std::abs(by_fuel)));
+  }
+  EXPECT_GT(s.indicators[2].heat_loss_j, 0.0);
+  EXPECT_LT(s.indicators[2].imep_closed_bar, 0.0);
+}
+
+// Without wall heat the pressure is homogeneous of degree one in intake pressure and fuel (Euler's theorem).
+TEST(EngineSensitivity, AdiabaticPressureIsHomogeneous) {
+  const EngineCase c("wall_heat_scale=0 burn_duration_cad=30");
+  const Sensitivities s = sensitivities(c.cylinder, c.point, -6.3, {"intake_pressure_kpa", "fuel_mg"});
+  EXPECT_NEAR(150.0 * s.indicators[0].imep_gross_bar + 20.0 * s.indicators[1].imep_gross_bar, s.value.imep_gross_bar,
+              1e-10);
+  EXPECT_NEAR(150.0 * s.indicators[0].t_max_k + 20.0 * s.indicators[1].t_max_k, 0.0, 1e-8);
+}
+
+TEST(EngineSensitivity, NamesAreIndependentOfTheirCompany) {
+  const EngineCase c;
+  const std::vector<std::string> names = differentiable_inputs();
+  const Sensitivities all = sensitivities(c.cylinder, c.point, -6.3, names);
+  for (std::size_t i : {std::size_t{0}, std::size_t{9}, names.size() - 1}) {
+    EngineCase fixed = c;  // naming an optional holds it constant, also for its neighbours
+    fixed.point.burn_duration_cad = 30.0;
+    fixed.point.trapped_mass_g = run(c).charge.gas_j_per_k / units::gas_constant_j_per_molk * 28.9647;
+    const Sensitivities one = sensitivities(fixed.cylinder, fixed.point, -6.3, {names[i]});
+    EXPECT_NEAR(one.indicators[0].imep_gross_bar, all.indicators[i].imep_gross_bar, 1e-10) << names[i];
+  }
+}
+
+TEST(EngineSensitivity, UnknownInputIsRefusedByName) {
+  const EngineCase c;
+  for (const char* name : {"ivc_cad", "evo_cad", "burn_shape", "soc"}) {
+    try {
+      sensitivities(c.cylinder, c.point, -6.0, {"soc_cad", name});
+      FAIL() << name;
+    } catch (const ParameterError& error) {
+      EXPECT_NE(std::string(error.what()).find(name), std::string::npos);
+      EXPECT_NE(std::string(error.what()).find("wall_heat_scale"), std::string::npos);
+    }
+  }
+  EXPECT_EQ(input_unit("intake_pressure_kpa"), "kPa");
+  EXPECT_THROW(input_unit("evo_cad"), ParameterError);
+}
+
+}  // namespace
+}  // namespace mgdd::engine

@@ -1,0 +1,207 @@
+"""What the pages say is true: tables are recomputed, names are complete, citations have an entry.
+
+A table below ``<!-- checked: NAME -->`` is compared, label by label and number by number, with what the function
+``NAME`` in `tools/docs_tables.py` computes now; a printed number may be off by one in its last digit. In the same
+way ``<!-- number: NAME -->`` goes before a single number of the README.
+"""
+
+from __future__ import annotations
+
+import importlib
+import importlib.util
+import inspect
+import pkgutil
+import re
+import shlex
+from pathlib import Path
+
+import pytest
+
+import mgdd
+from mgdd.results import VARIABLES
+
+ROOT = Path(__file__).resolve().parents[2]
+_SPEC = importlib.util.spec_from_file_location("docs_tables", ROOT / "tools" / "docs_tables.py")
+assert _SPEC is not None
+assert _SPEC.loader is not None
+docs_tables = importlib.util.module_from_spec(_SPEC)
+_SPEC.loader.exec_module(docs_tables)
+DOCS = ROOT / "docs"
+PAGES = [*sorted(DOCS.glob("*.md")), *ROOT.glob("README.md")]
+TABLE = re.compile(r"<!-- checked: (\w+) -->\n+((?:\|.*\n)+)")
+NUMBER = re.compile(r"[-−]?\d+(?:\.\d+)?(?:e[-+]?\d+)?")
+MARKED = re.compile(r"<!-- number: (\w+) -->\s*\W*?(" + NUMBER.pattern + ")")
+CITATION = re.compile(
+    r"\b([A-Z][\w-]+)(?: et al\.|(?:, [A-Z][\w-]+)*,? and (?:[A-Z][\w-]+ )*[A-Z][\w-]+)?,? \(?((?:18|19|20)\d\d)\b"
+)
+# Names before a year that are no authors.
+NO_AUTHORS = {"CODATA", "Atmosphere"}
+
+
+def printed_numbers(text: str) -> list[tuple[float, float]]:
+    """Find the numbers in a text, each with one unit of its last digit."""
+    found = []
+    for match in NUMBER.findall(text):
+        plain = match.replace("−", "-")
+        mantissa, _, exponent = plain.partition("e")
+        decimals = len(mantissa.partition(".")[2]) - int(exponent or 0)
+        found.append((float(plain), 10.0**-decimals))
+    return found
+
+
+def tables_of(page: Path) -> list[tuple[str, dict[str, str]]]:
+    """Find the checked tables of a page: name, and the text of each row by its label."""
+    tables = []
+    for name, text in TABLE.findall(page.read_text(encoding="utf-8")):
+        rows = [[cell.strip() for cell in line.strip().strip("|").split(" | ")] for line in text.splitlines()]
+        head, _, *body = rows
+        if NUMBER.fullmatch(head[1]):
+            body.insert(0, head)
+        width = docs_tables.LABEL_COLUMNS.get(name, 1)
+        tables.append((name, {" ".join(row[:width]): " | ".join(row[width:]) for row in body}))
+    return tables
+
+
+TABLES = [(page, name, rows) for page in PAGES for name, rows in tables_of(page)]
+
+
+@pytest.mark.parametrize(("page", "name", "rows"), TABLES, ids=[f"{p.name}-{n}" for p, n, _ in TABLES])
+def test_table_holds(page: Path, name: str, rows: dict[str, str]) -> None:
+    truth = getattr(docs_tables, name)()
+    assert list(rows) == list(truth), f"rows of {name} in {page.name}"
+    for label, values in truth.items():
+        printed = printed_numbers(rows[label])
+        assert len(printed) == len(values), f"{name}, row {label!r}: computed {values}"
+        for (number, last), value in zip(printed, values, strict=True):
+            assert abs(number - value) <= 1.0001 * last, f"{name}, row {label!r}: {number} is {value}"
+
+
+def test_every_computed_table_is_printed() -> None:
+    printed = {name for _, name, _ in TABLES}
+    assert printed == set(docs_tables.__all__)
+
+
+def test_readme_numbers_hold() -> None:
+    for page in PAGES:
+        for name, text in MARKED.findall(page.read_text(encoding="utf-8")):
+            assert name in docs_tables.NUMBERS, f"{page.name}: no function computes {name!r}"
+            (number, last), value = printed_numbers(text)[0], docs_tables.NUMBERS[name]()
+            assert abs(number - value) <= 1.0001 * last, f"{page.name}: {name} = {number} is {value}"
+
+
+def test_variables_table_is_complete() -> None:
+    rows = re.findall(r"^\| `(\w+)` \| (.+?) \| (.+?) \|$", _page("formats").split("<!-- checked")[-1], re.MULTILINE)
+    table = {name: (units, long_name) for name, units, long_name in rows}
+    assert {name: (v.units, v.long_name) for name, v in VARIABLES.items()} == table
+
+
+# --- names --------------------------------------------------------------------------------------------------
+ROOMS = sorted(m.name for m in pkgutil.iter_modules(mgdd.__path__) if not m.name.startswith("_"))
+
+
+def public() -> list[tuple[str, str, object]]:
+    modules = [(room, importlib.import_module(f"mgdd.{room}")) for room in ROOMS]
+    return [(room, name, getattr(module, name)) for room, module in modules for name in module.__all__]
+
+
+def test_rooms_say_what_is_public() -> None:
+    assert set(mgdd.__all__) - {"__version__"} <= set(ROOMS)
+    for room in ROOMS:
+        assert importlib.import_module(f"mgdd.{room}").__all__, f"mgdd.{room} has no __all__"
+
+
+def test_reference_lists_every_public_name() -> None:
+    listed = set()
+    for block in re.findall(r"```\{eval-rst\}\n(.*?)```", _page("api"), re.DOTALL):
+        room = re.search(r"currentmodule:: (\S+)", block)
+        listed |= {f"{room[1]}.{name}" for name in re.findall(r"^   (\w+)$", block, re.MULTILINE) if room}
+        listed |= set(re.findall(r"autodata:: (\S+)", block))
+    expected = {f"mgdd.{room}.{name}" for room, name, _ in public()}
+    assert listed == expected, f"docs/api.md lacks {expected - listed}, has too much {listed - expected}"
+
+
+@pytest.mark.parametrize(("room", "name", "item"), public(), ids=lambda value: value if isinstance(value, str) else "")
+def test_public_docstring_is_complete(room: str, name: str, item: object) -> None:
+    if not callable(item):
+        pytest.skip("a constant; the reference documents it")
+    text = inspect.getdoc(item) or ""
+    summary = text.split("\n\n")[0].replace("\n", " ")
+    assert summary.endswith("."), f"mgdd.{room}.{name}: no summary"
+    if isinstance(item, type) and issubclass(item, Exception):
+        return
+    assert re.search(r"^Examples\n-{8}$", text, re.MULTILINE), f"mgdd.{room}.{name}: no example"
+    try:
+        takes_arguments = bool(inspect.signature(item).parameters)
+    except ValueError:  # a class of the core; its fields document themselves
+        takes_arguments = not hasattr(item, "fields")
+    section = re.search(r"^(Parameters|Attributes)\n-{10}$", text, re.MULTILINE)
+    assert section or not takes_arguments or hasattr(item, "fields"), f"mgdd.{room}.{name}: no Parameters"
+
+
+# --- sources ------------------------------------------------------------------------------------------------
+def bibliography() -> dict[str, tuple[str, str]]:
+    """Read references.bib: first author's family name and year, by key."""
+    text = (ROOT / "references.bib").read_text(encoding="utf-8")
+    for tex, letter in (('{\\"u}', "ü"), ('{\\"o}', "ö"), ("{\\'e}", "é")):
+        text = text.replace(tex, letter)
+    entries = {}
+    for key, body in re.findall(r"^@\w+\{(\w+),(.*?)^\}", text, re.MULTILINE | re.DOTALL):
+        author = re.search(r"author\s*=\s*\{(.*?)\},$", body, re.MULTILINE | re.DOTALL)
+        year = re.search(r"year\s*=\s*\{(\d+)\}", body)
+        entries[key] = (author[1].split(",")[0].split()[-1] if author else "", year[1] if year else "")
+    return entries
+
+
+def test_every_cited_key_has_an_entry() -> None:
+    known = bibliography()
+    text = "\n".join(page.read_text(encoding="utf-8") for page in PAGES)
+    cited = set(re.findall(r"\(#ref-(\w+)\)", text))
+    listed = re.findall(r"^\(ref-(\w+)\)=$", text, re.MULTILINE)
+    assert cited <= set(listed), "cited without an entry in the bibliography of theory_engine.md"
+    assert len(listed) == len(set(listed))
+    assert set(listed) <= set(known), "not in references.bib"
+    for target in set(listed):
+        shown = re.search(rf"^\(ref-{target}\)=\n(.*)", text, re.MULTILINE)
+        assert shown
+        assert shown[1].startswith(known[target][0]), target
+
+
+def test_every_author_and_year_in_the_sources_has_an_entry() -> None:
+    known = set(bibliography().values())
+    missing = {}
+    for folder, patterns in (
+        ("cpp", ("*.hpp", "*.cpp")),
+        ("python", ("*.py", "*.toml")),
+        ("docs", ("*.md",)),
+    ):
+        files = {f for p in patterns for f in (ROOT / folder).rglob(p) if "generated" not in f.parts}
+        for file in sorted(files):
+            text = re.sub(r"\s*\n\s*(?://+|#)?\s*", " ", file.read_text(encoding="utf-8"))
+            for match in CITATION.finditer(text):
+                if match.groups() not in known and match[1] not in NO_AUTHORS:
+                    missing[match[0]] = file.relative_to(ROOT).as_posix()
+    assert not missing, "cited, but not in references.bib"
+
+
+# --- commands -----------------------------------------------------------------------------------------------
+def test_commands_of_getting_started_run(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    from mgdd.cli import main
+
+    monkeypatch.chdir(tmp_path)
+    text = _page("getting_started")
+    python = re.findall(r"^```python\n(.*?)^```", text, re.MULTILINE | re.DOTALL)
+    exec(compile("\n".join(python), "getting_started.md", "exec"), {})  # noqa: S102
+    lines = [
+        line
+        for block in re.findall(r"^```shell\n(.*?)^```", text, re.MULTILINE | re.DOTALL)
+        for line in block.splitlines()
+    ]
+    commands = [shlex.split(line)[1:] for line in lines if line.startswith("mgdd engine")]
+    assert len(commands) >= 5
+    for command in commands:
+        assert main(command) == 0, command
+    assert (tmp_path / "fit.json").is_file()
+
+
+def _page(name: str) -> str:
+    return (DOCS / f"{name}.md").read_text(encoding="utf-8")
