@@ -58,13 +58,10 @@ def draw_timing(ax: Axes, fits: dict[float, CylinderFit]) -> None:
         best.append(top.soc_cad)
         ax.plot(top.soc_cad, float(efficiency.interp(soc_cad=top.soc_cad)), "o", color=colour, markersize=6)
     low, high = min(best), max(best)
-    text = f"best: {low:.1f} to {high:.1f}".replace("-", "−")
+    text = f"best: {low:.1f} to {high:.1f} °CA".replace("-", "−")
     ax.axvspan(low, high, color=ORANGE, alpha=0.25, linewidth=0, label=text)
-    ax.axvline(fits[0.5].loads[LOAD].soi_cad, color=GREY, linestyle=":", label="measured injection")
     ax.set(xlabel="start of combustion [°CA aTDC]", ylabel="efficiency, closed cycle [%]", xlim=(-20, 8))
-    ax.margins(y=0.1)
-    ax.legend(loc="lower center", frameon=False, ncols=2, columnspacing=1.0, handlelength=1.6)
-    ax.set_ylim(bottom=ax.get_ylim()[0] - 0.25 * np.ptp(ax.get_ylim()))
+    ax.legend(loc="lower right", frameon=False)
     ax.set_title("Best timing: a range, as the wall heat is unknown", loc="left")
 
 
