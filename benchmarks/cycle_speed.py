@@ -1,10 +1,10 @@
-"""How fast is one cycle against the literal equations and against Numba with the same algebra?
+"""One question: how fast is one cycle against the literal equations and against Numba with the same algebra.
 
     python benchmarks/cycle_speed.py [--bench-program build/bench/bench/bench_cycle] [--json FILE]
 
-`puma_single` at its nominal point, 270 steps, constant gamma, run and all indicators; 1000 timings around SOC -6 °CA aTDC per
-call, so that one call's overhead is shared. All contenders must agree to 1e-9 before any is timed; repeats are interleaved and
-pinned to one core. Only ratios of one run mean something: the clock of a shared machine moves.
+`puma_single` at its nominal point, 270 steps, constant gamma, run and all indicators; 1000 timings around SOC -6 °CA
+aTDC per call, so that one call's overhead is shared. All contenders must agree to 1e-9 before any is timed; repeats are
+interleaved and pinned to one core. Only ratios of one run mean something: the clock of a shared machine moves.
 """
 
 from __future__ import annotations
@@ -21,24 +21,29 @@ from collections.abc import Callable
 from pathlib import Path
 
 import numpy as np
-from numba_cycle import FORMS, INDICATORS, compile_form, engine
+from peers.numba_cycle import FORMS, INDICATORS, compile_form, engine
 
 import mgdd
 from mgdd import _core
 
 CYCLES = 1000
 TOLERANCE = 1e-9
+BENCH_PROGRAM = Path(__file__).parents[1] / "build" / "bench" / "bench" / "bench_cycle"
 CPP_NAMES = {"C++ loop, mgdd": "cycle/triangle", "C++ loop, literal": "literal/triangle"}
 
 
 def arguments() -> argparse.Namespace:
     parser = argparse.ArgumentParser(description=__doc__.splitlines()[0])
     parser.add_argument("--repeats", type=int, default=15, help="interleaved repeats, at least 9 (default 15)")
-    parser.add_argument("--bench-program", type=Path, help="bench_cycle of the preset `bench`: C++ without Python")
+    parser.add_argument(
+        "--bench-program", type=Path, help="bench_cycle: the C++ loop without Python (default: if built)"
+    )
     parser.add_argument("--json", type=Path, metavar="FILE", help="also write the figures to FILE")
     options = parser.parse_args()
     if options.repeats < 9:
         parser.error("--repeats must be at least 9")
+    if options.bench_program is None and BENCH_PROGRAM.exists():
+        options.bench_program = BENCH_PROGRAM
     return options
 
 
@@ -76,7 +81,7 @@ def contenders() -> dict[str, Callable[[], np.ndarray]]:
 
 
 def check_agreement(calls: dict[str, Callable[[], np.ndarray]]) -> float:
-    """Largest difference of any indicator of any contender from mgdd, relative to its size or 1; SystemExit above 1e-9."""
+    """Largest difference of any indicator from mgdd's, relative to its size or 1; SystemExit above 1e-9."""
     expected = calls["mgdd"]()
     worst = 0.0
     for name, call in calls.items():
@@ -124,9 +129,7 @@ def main() -> None:
     worst = check_agreement(calls)
     context = versions(options)
     times = measure(options, calls)
-    table = {
-        name: {"min_us": min(values), "median_us": statistics.median(values)} for name, values in times.items()
-    }
+    table = {name: {"min_us": min(values), "median_us": statistics.median(values)} for name, values in times.items()}
     reference = table["mgdd"]
     for row in table.values():
         row["ratio_min"] = row["min_us"] / reference["min_us"]
@@ -135,11 +138,10 @@ def main() -> None:
         print(f"{key:20s} {value}")
     print(f"agreement            {worst:.1e} over {len(INDICATORS)} indicators (bound {TOLERANCE:.0e})")
     print(f"repeats              {options.repeats} interleaved, {CYCLES} cycles each\n")
-    print(f"{'one cycle':20s} {'min us':>9s} {'median us':>10s} {'/ mgdd (min)':>13s} {'/ mgdd (median)':>16s}")
+    print(f"{'one cycle':20s} {'min us':>9s} {'median us':>10s} {'/ mgdd: min':>12s} {'median':>8s}")
     for name, row in table.items():
-        print(
-            f"{name:20s} {row['min_us']:9.2f} {row['median_us']:10.2f} {row['ratio_min']:13.2f} {row['ratio_median']:16.2f}"
-        )
+        times_us, ratios = (row["min_us"], row["median_us"]), (row["ratio_min"], row["ratio_median"])
+        print(f"{name:20s} {times_us[0]:9.2f} {times_us[1]:10.2f} {ratios[0]:12.2f} {ratios[1]:8.2f}")
     if options.json:
         report = {"context": context, "agreement": worst, "repeats": options.repeats, "cycles": table}
         options.json.write_text(json.dumps(report, indent=2) + "\n", encoding="utf-8")
@@ -152,7 +154,7 @@ def versions(options: argparse.Namespace) -> dict[str, str]:
     context = {
         "processor": processor(),
         "mgdd": f"{mgdd.__version__}, {_core.compiler()}, {_core.compiled_simd_level()}",
-        "Numba": f"{numba.__version__}, LLVM for {llvmlite.binding.get_host_cpu_name()} (every vector set of the processor)",
+        "Numba": f"{numba.__version__}, LLVM for {llvmlite.binding.get_host_cpu_name()}",
         "Python": f"{platform.python_version()}, NumPy {np.__version__}",
     }
     if options.bench_program:

@@ -26,7 +26,6 @@ extensions = [
 ]
 templates_path = ["_templates"]
 exclude_patterns = ["_build", "_templates", "**.ipynb_checkpoints"]
-suppress_warnings = ["toc.not_readable"]  # the front page fixes the order of pages, present or not
 
 # --- pages --------------------------------------------------------------------------------------------------
 myst_enable_extensions = ["amsmath", "colon_fence", "deflist", "dollarmath"]

@@ -73,9 +73,7 @@ def main() -> None:
     out = Path(sys.argv[1]) if len(sys.argv) > 1 else OUT
     traces, cylinder = datasets.load_hd_traces(), presets.load("hd_diesel_128x144").cylinder
     double = fit_cylinder(traces, cylinder.replace(burn_shape="double_wiebe", gamma_model="constant"))
-    single = {
-        scale: fit_cylinder(traces, cylinder.replace(wall_heat_scale=scale), free=BURN) for scale in (0.5, 1.0)
-    }
+    single = {scale: fit_cylinder(traces, cylinder.replace(wall_heat_scale=scale), free=BURN) for scale in (0.5, 1.0)}
     plt.rcParams |= {"font.size": 9.5, "axes.titlesize": 9.5, "legend.fontsize": 9.0, "svg.hashsalt": "mgdd"}
     fig, (left, right) = plt.subplots(1, 2, figsize=(8.8, 3.5), layout="constrained")
     draw_trace(left, analyze(traces[LOAD], cylinder), double)

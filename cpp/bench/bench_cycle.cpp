@@ -1,5 +1,6 @@
-// One scalar cycle with its indicators on `puma_single` (270 steps): each integrator, gamma, wall-heat and burn law, the
-// differentiated cycle, and the literal `pow` form of the same equations, which must agree to 1e-9 before it is timed.
+// One scalar cycle with its indicators on `puma_single` (270 steps): each integrator, gamma, wall-heat and burn law,
+// the differentiated cycle, and the literal `pow` form of the same equations, which must agree to 1e-9 before it is
+// timed.
 #include <benchmark/benchmark.h>
 
 #include <algorithm>
@@ -51,8 +52,12 @@ void run(benchmark::State& state, const Variant& v) {
   }
   state.SetItemsProcessed(state.iterations());
 }
-void cycle(benchmark::State& state, const Variant& v) { run<double>(state, v); }
-void dual_cycle(benchmark::State& state, const Variant& v) { run<Dual<4>>(state, v); }
+void cycle(benchmark::State& state, const Variant& v) {
+  run<double>(state, v);
+}
+void dual_cycle(benchmark::State& state, const Variant& v) {
+  run<Dual<4>>(state, v);
+}
 
 BENCHMARK_CAPTURE(cycle, triangle, Variant{});
 BENCHMARK_CAPTURE(cycle, wiebe, Variant{.burn = BurnShape::wiebe});
@@ -151,11 +156,18 @@ BENCHMARK(literal<true>)->Name("literal/triangle_motored_table");
 template <class Power>
 void chain_of(benchmark::State& state, Power power) {
   double x = 7.3;
-  for (auto _ : state) benchmark::DoNotOptimize(x = power(x) + 6.0);
+  for (auto _ : state)
+    benchmark::DoNotOptimize(x = power(x) + 6.0);
 }
-void power_chain(benchmark::State& state) { chain_of(state, [](double x) { return fast_power<4, 5>(x); }); }
-void pow_chain(benchmark::State& state) { chain_of(state, [](double x) { return std::pow(x, 0.8); }); }
-void exp_log_chain(benchmark::State& state) { chain_of(state, [](double x) { return std::exp(0.8 * std::log(x)); }); }
+void power_chain(benchmark::State& state) {
+  chain_of(state, [](double x) { return fast_power<4, 5>(x); });
+}
+void pow_chain(benchmark::State& state) {
+  chain_of(state, [](double x) { return std::pow(x, 0.8); });
+}
+void exp_log_chain(benchmark::State& state) {
+  chain_of(state, [](double x) { return std::exp(0.8 * std::log(x)); });
+}
 BENCHMARK(power_chain)->Name("power/fast_power");
 BENCHMARK(pow_chain)->Name("power/pow");
 BENCHMARK(exp_log_chain)->Name("power/exp_log");

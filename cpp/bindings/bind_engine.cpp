@@ -83,8 +83,10 @@ py::dict simulate(const Cylinder& cylinder, const OperatingPoint& point, double 
 py::dict scan(const Cylinder& cylinder, const OperatingPoint& point, const InputArray& soc_cad, double step_cad,
               const std::string& integrator) {
   const std::vector<double> timings = to_column(soc_cad, "soc_cad");
+  validate(cylinder);
+  validate(point);
   for (const double soc : timings)
-    check(cylinder, point, soc);
+    validate_timing("soc_cad", soc, cylinder);
   const Integrator scheme = parse_integrator(integrator);
   std::vector<Indicators<double>> rows(timings.size());
   {
@@ -184,6 +186,7 @@ py::dict bind_analyze(const InputArray& angle, const InputArray& pressure, const
   scalars["dp_max_bar_per_cad"] = a.dp_max_bar_per_cad;
   scalars["t_max_k"] = a.t_max_k;
   out["scalars"] = scalars;
+  out["motored"] = a.motored;
   out["warnings"] = a.warnings;
   return out;
 }
@@ -268,7 +271,31 @@ void bind_engine(py::module_& m) {
   m.def("hohenberg_coefficient", py::vectorize(&hohenberg_coefficient<double>), arg("c1_bar_m3"), arg("volume_m3"),
         arg("pressure_bar"), arg("temperature_k"), arg("piston_speed_m_per_s"), "Film coefficient [W/(m2 K)].");
 
-  py::class_<NoxProxy>(m, "NoxProxy")
+  py::class_<NoxProxy>(m, "NoxProxy", R"(NOx proxy from the maximum bulk gas temperature: a correlation to be fitted.
+
+Two maps with equal slope at the reference: affine-log, NOx0 exp(b/T0^2 (T - T0)), and Arrhenius,
+NOx0 exp(-b (1/T - 1/T0)). Valid at fixed intake oxygen only; the defaults are plausible, not of any engine.
+
+Parameters
+----------
+reference_temperature_k : float
+    T0 [K].
+reference_nox_ppm : float
+    NOx0, at T0 [ppm].
+activation_temperature_k : float
+    b [K].
+
+Raises
+------
+mgdd.errors.ParameterError
+    A constant that is not > 0.
+
+Examples
+--------
+>>> from mgdd.engine import NoxProxy
+>>> float(NoxProxy().arrhenius_ppm(1900.0))
+1200.0
+)")
       .def(py::init([](double t0, double nox0, double b) {
              for (const auto& [name, value] :
                   {std::pair{"reference_temperature_k", t0}, std::pair{"reference_nox_ppm", nox0},
@@ -282,9 +309,9 @@ void bind_engine(py::module_& m) {
            py::kw_only(), arg("reference_temperature_k") = NoxProxy{}.reference_temperature_k,
            arg("reference_nox_ppm") = NoxProxy{}.reference_nox_ppm,
            arg("activation_temperature_k") = NoxProxy{}.activation_temperature_k)
-      .def_readonly("reference_temperature_k", &NoxProxy::reference_temperature_k)
-      .def_readonly("reference_nox_ppm", &NoxProxy::reference_nox_ppm)
-      .def_readonly("activation_temperature_k", &NoxProxy::activation_temperature_k)
+      .def_readonly("reference_temperature_k", &NoxProxy::reference_temperature_k, "T0 [K].")
+      .def_readonly("reference_nox_ppm", &NoxProxy::reference_nox_ppm, "NOx0 [ppm].")
+      .def_readonly("activation_temperature_k", &NoxProxy::activation_temperature_k, "b [K].")
       .def(
           "affine_log_ppm",
           [](const NoxProxy& self, const InputArray& t) {
@@ -302,7 +329,7 @@ void bind_engine(py::module_& m) {
   py::class_<TraceOptions>(m, "TraceOptions")
       .def(py::init([](const std::string& pegging, double exponent, double inlet, const std::string& source,
                        double gamma, double compression, double combustion, double from, double to, double burn,
-                       bool gross) {
+                       bool end, bool gross) {
              return TraceOptions{parse_pegging(pegging),
                                  exponent,
                                  inlet,
@@ -313,6 +340,7 @@ void bind_engine(py::module_& m) {
                                  from,
                                  to,
                                  burn,
+                                 end,
                                  gross};
            }),
            py::kw_only(), arg("pegging") = std::string(to_string(d.pegging)),
@@ -320,7 +348,8 @@ void bind_engine(py::module_& m) {
            arg("gamma_source") = std::string(to_string(d.gamma_source)), arg("gamma") = d.gamma,
            arg("gamma_compression") = d.gamma_compression, arg("gamma_combustion") = d.gamma_combustion,
            arg("heat_from_cad") = d.heat_from_cad, arg("heat_to_cad") = d.heat_to_cad,
-           arg("burn_from_cad") = d.burn_from_cad, arg("fractions_of_gross") = d.fractions_of_gross);
+           arg("burn_from_cad") = d.burn_from_cad, arg("total_at_end") = d.total_at_end,
+           arg("fractions_of_gross") = d.fractions_of_gross);
   m.def("analyze_trace", &bind_analyze, arg("crank_angle_cad"), arg("pressure_bar"), arg("cylinder"), arg("point"),
         arg("options"), "Pegging, heat release, burn angles, work.");
   m.def(

@@ -28,6 +28,13 @@ ANGLE = "crank_angle_cad"
 class Label(NamedTuple):
     """Unit and long name of a variable; an axis label reads ``long_name [units]``.
 
+    Parameters
+    ----------
+    units : str
+        Unit as printed, ``"-"`` if dimensionless.
+    long_name : str
+        Name for axis labels.
+
     Examples
     --------
     >>> from mgdd.results import VARIABLES

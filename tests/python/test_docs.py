@@ -1,8 +1,8 @@
 """What the pages say is true: tables are recomputed, names are complete, citations have an entry.
 
-A table below ``<!-- checked: NAME -->`` is compared, label by label and number by number, with what the function
-``NAME`` in `tools/docs_tables.py` computes now; a printed number may be off by one in its last digit. In the same
-way ``<!-- number: NAME -->`` goes before a single number of the README.
+A table below ``<!-- checked: NAME -->`` (in the README: ``numbers``) is compared, label by label and number by
+number, with what ``NAME`` in `tools/docs_tables.py` computes now; a printed number may be off by one in its last digit.
+In the same way ``<!-- number: NAME -->`` goes before a single number.
 """
 
 from __future__ import annotations
@@ -28,14 +28,14 @@ docs_tables = importlib.util.module_from_spec(_SPEC)
 _SPEC.loader.exec_module(docs_tables)
 DOCS = ROOT / "docs"
 PAGES = [*sorted(DOCS.glob("*.md")), *ROOT.glob("README.md")]
-TABLE = re.compile(r"<!-- checked: (\w+) -->\n+((?:\|.*\n)+)")
+TABLE = re.compile(r"<!-- (?:checked|numbers): (\w+) -->\n+((?:\|.*\n)+)")
 NUMBER = re.compile(r"[-−]?\d+(?:\.\d+)?(?:e[-+]?\d+)?")
 MARKED = re.compile(r"<!-- number: (\w+) -->\s*\W*?(" + NUMBER.pattern + ")")
 CITATION = re.compile(
     r"\b([A-Z][\w-]+)(?: et al\.|(?:, [A-Z][\w-]+)*,? and (?:[A-Z][\w-]+ )*[A-Z][\w-]+)?,? \(?((?:18|19|20)\d\d)\b"
 )
 # Names before a year that are no authors.
-NO_AUTHORS = {"CODATA", "Atmosphere"}
+NO_AUTHORS = {"CODATA", "Atmosphere", "Paper"}
 
 
 def printed_numbers(text: str) -> list[tuple[float, float]]:
@@ -79,6 +79,11 @@ def test_table_holds(page: Path, name: str, rows: dict[str, str]) -> None:
 def test_every_computed_table_is_printed() -> None:
     printed = {name for _, name, _ in TABLES}
     assert printed == set(docs_tables.__all__)
+
+
+def test_independent_program_agrees() -> None:
+    for label, (reference, found) in docs_tables.golden().items():
+        assert found == pytest.approx(reference, rel=5e-4), label
 
 
 def test_readme_numbers_hold() -> None:
@@ -181,6 +186,14 @@ def test_every_author_and_year_in_the_sources_has_an_entry() -> None:
                 if match.groups() not in known and match[1] not in NO_AUTHORS:
                     missing[match[0]] = file.relative_to(ROOT).as_posix()
     assert not missing, "cited, but not in references.bib"
+
+
+def test_code_named_beside_an_equation_exists() -> None:
+    rows = re.findall(r"^\| 2-\d+.*?\| `([\w:]+)` in `(\S+)` \|", _page("theory_engine"), re.MULTILINE)
+    assert len(rows) >= 9
+    for name, file in rows:
+        folder = ROOT / "cpp" if file.startswith("src/") else ROOT / "cpp" / "include" / "mgdd"
+        assert re.search(rf"\b{name.split('::')[-1]}\(", (folder / file).read_text(encoding="utf-8")), name
 
 
 # --- commands -----------------------------------------------------------------------------------------------

@@ -21,7 +21,8 @@ std::vector<double> crank_grid(const Cylinder& cylinder, double step_cad) {
   // The tolerance keeps 270.0000001 steps from becoming 271 when span / step is not exact in binary.
   const auto steps = static_cast<std::size_t>(std::ceil(span / step_cad - 1e-9));
   std::vector<double> angles(steps + 1);
-  for (std::size_t k = 0; k < steps; ++k) angles[k] = cylinder.ivc_cad + static_cast<double>(k) * step_cad;
+  for (std::size_t k = 0; k < steps; ++k)
+    angles[k] = cylinder.ivc_cad + static_cast<double>(k) * step_cad;
   angles[steps] = cylinder.evo_cad;
   return angles;
 }
@@ -62,7 +63,8 @@ template <class T>
 void CycleModel<T>::tabulate() noexcept {
   using std::pow;
   const std::size_t n = angles_.size();
-  for (std::size_t k = 0; k < n; ++k) volume_[k] = geometry_.volume_m3(angles_[k]);
+  for (std::size_t k = 0; k < n; ++k)
+    volume_[k] = geometry_.volume_m3(angles_[k]);
   volume_before_first_ = geometry_.volume_m3(angles_[0] - (angles_[1] - angles_[0]));
   for (std::size_t k = 0; k < n; ++k) {
     const double step = k + 1 < n ? angles_[k + 1] - angles_[k] : 0.0;
@@ -282,10 +284,9 @@ Indicators<T> CycleModel<T>::indicators(const Charge<T>& charge, const T& soc_ca
   out.dp_max_bar_per_cad = slope / units::pa_per_bar;
   out.dp_max_cad = T(0.5 * (angles_[slope_at] + angles_[slope_at + 1]));
   out.heat_loss_j = loss;
-  out.ringing_intensity_mw_per_m2 =
-      engine::ringing_intensity_mw_per_m2(T(gamma_at(cylinder_, t_peak.value)),
-                                          T(slope * charge.speed_rpm * units::cad_per_s_per_rpm), p_peak.value,
-                                          t_peak.value);
+  out.ringing_intensity_mw_per_m2 = engine::ringing_intensity_mw_per_m2(
+      T(gamma_at(cylinder_, t_peak.value)), T(slope * charge.speed_rpm * units::cad_per_s_per_rpm), p_peak.value,
+      t_peak.value);
   const T none(std::numeric_limits<double>::quiet_NaN());
   out.efficiency_gross = out.heat_loss_fraction = out.ca10_cad = out.ca50_cad = out.ca90_cad = none;
   if (value_of(charge.fuel_heat_j) > 0.0) {

@@ -83,18 +83,29 @@ void add_warnings(TraceAnalysis& a, const TraceOptions& options, std::size_t fir
   double highest = 0.0;
   for (std::size_t k = first; k < last; ++k)
     highest = std::max(highest, a.heat_net_j[k + 1]);
-  if (a.heat_net_j_total > 0.0 && first + 1 < last && a.heat_net_j[first + 1] > 0.1 * highest) {
+  if (!a.motored && first + 1 < last && a.heat_net_j[first + 1] > 0.1 * highest) {
     a.warnings.push_back("heat release has begun before heat_from_cad = " + text(options.heat_from_cad) +
                          ": start the window earlier");
   }
-  if (a.imep_closed_bar < 0.0 && a.heat_net_j_total > 0.2 * std::abs(a.work_closed_j) && a.p_max_cad > 2.0) {
+  if (!a.motored && a.imep_closed_bar < 0.0) {
     a.warnings.push_back("closed work is negative although heat is released: suspect a TDC offset");
   }
-  const bool motored = !(a.heat_net_j_total > 0.1 * std::abs(a.pressure_bar.front()) * a.volume_l.front() * 100.0);
-  if (motored && (a.p_max_cad < -2.5 || a.p_max_cad > 0.3)) {
+  if (a.motored && (a.p_max_cad < -2.5 || a.p_max_cad > 0.3)) {
     a.warnings.push_back("the trace looks motored but peaks at " + text(a.p_max_cad) +
                          " °CA aTDC, not 0.1 to 1.5 before TDC: suspect a TDC offset");
   }
+}
+
+// Without a burn the pressure falls as it rose, less the wall loss; a burn leaves expansion well above compression. Far
+// from TDC an offset of the angle hardly moves the ratio: 3 CAD make it 1.07.
+bool looks_motored(const TraceAnalysis& a) {
+  const double distance_cad = std::min({100.0, -a.angle_cad.front(), a.angle_cad.back()});
+  if (distance_cad < 60.0) return false;
+  const auto at = [&](double angle) {
+    const auto k = std::lower_bound(a.angle_cad.begin(), a.angle_cad.end(), angle) - a.angle_cad.begin();
+    return a.pressure_bar[static_cast<std::size_t>(k)];
+  };
+  return at(distance_cad) < 1.1 * at(-distance_cad);
 }
 
 }  // namespace
@@ -235,6 +246,11 @@ TraceAnalysis analyze_trace(const Column& angle_cad, const Column& pressure_bar,
     throw DataError("no sample lies in the heat release window " + text(options.heat_from_cad) + " to " +
                     text(options.heat_to_cad) + " °CA aTDC");
   }
+  if (options.total_at_end) {
+    net_best = net;
+    gross_best = gross;
+    net_peak = gross_peak = last;
+  }
   a.heat_net_j_total = net_best;
   a.heat_gross_j_total = gross_best;
   const Column& cumulative = options.fractions_of_gross ? a.heat_gross_cumulative_j : a.heat_net_cumulative_j;
@@ -260,6 +276,7 @@ TraceAnalysis analyze_trace(const Column& angle_cad, const Column& pressure_bar,
   }
   a.n_compression = polytropic_exponent(a.angle_cad, a.pressure_bar, cylinder, -100.0, -40.0);
   a.n_expansion = polytropic_exponent(a.angle_cad, a.pressure_bar, cylinder, 60.0, 120.0);
+  a.motored = looks_motored(a);
   add_warnings(a, options, first, last);
   return a;
 }

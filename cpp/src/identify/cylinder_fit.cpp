@@ -190,9 +190,9 @@ engine::Cylinder with_burn(engine::Cylinder cylinder, const LoadBurn& burn) {
 LoadBurn estimate_burn(const MeasuredCycle& trace, const engine::Cylinder& cylinder) {
   const engine::TraceAnalysis a =
       engine::analyze_trace(trace.angle_cad, trace.pressure_bar, cylinder, trace.point, engine::TraceOptions{});
-  if (!(a.heat_net_j_total > 0.0) || std::isnan(a.ca10_cad) || std::isnan(a.ca90_cad) || a.ca90_cad <= a.ca10_cad) {
+  if (a.motored || !(a.heat_net_j_total > 0.0) || std::isnan(a.ca10_cad) || std::isnan(a.ca90_cad) || a.ca90_cad <= a.ca10_cad) {
     throw DataError("trace '" + trace.label +
-                    "' shows no heat release after -10 °CA aTDC: it looks motored, and a burn "
+                    "' shows no heat release: it looks motored, and a burn "
                     "cannot be fitted to it");
   }
   LoadBurn burn;

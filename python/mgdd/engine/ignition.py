@@ -100,6 +100,6 @@ def start_of_injection(cylinder: Cylinder, point: OperatingPoint, *, soc_cad: fl
     >>> from mgdd.engine import Cylinder, OperatingPoint, start_of_injection
     >>> timing = start_of_injection(Cylinder(), OperatingPoint(), soc_cad=-6.0)
     >>> round(timing.soi_cad, 1), timing.clipped
-    (-10.6, False)
+    (-10.8, False)
     """
     return Timing(**_core.start_of_injection(cylinder, point, soc_cad))

@@ -110,7 +110,7 @@ def optimum(
     >>> from mgdd.engine import Cylinder, OperatingPoint, optimum
     >>> best = optimum(Cylinder(), OperatingPoint(), limits={"p_max_bar": 95.0})
     >>> round(best.soc_cad, 2), best.active_limits
-    (-3.04, ('p_max_bar',))
+    (-3.08, ('p_max_bar',))
     """
     limits = dict(limits or {})
     _check(point, objective, limits, bounds_cad)

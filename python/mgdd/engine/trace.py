@@ -36,7 +36,7 @@ def analyze(
     pegging: str = "none",
     pegging_exponent: float = 1.35,
     inlet_pressure_kpa: float | None = None,
-    gamma: float | str = 1.33,
+    gamma: float | str | None = None,
     heat_window_cad: tuple[float, float] | None = None,
     fractions: str = "net",
 ) -> xr.Dataset:
@@ -59,10 +59,12 @@ def analyze(
         Polytropic exponent of compression [-].
     inlet_pressure_kpa : float, optional
         For ``inlet``; the point's intake pressure if left out.
-    gamma : float or {"split", "cylinder"}
-        A constant [-]; ``split`` is 1.37 before -10 CAD and 1.30 after; ``cylinder`` is the cylinder's own law.
+    gamma : float or {"split", "cylinder"}, optional
+        1.33 for a measured trace and ``cylinder`` for a simulated one if left out. A number is a constant [-];
+        ``split`` is 1.37 before -10 CAD and 1.30 after; ``cylinder`` is the cylinder's own law.
     heat_window_cad : tuple of float, optional
-        Window of the cumulative heat [°CA aTDC]; -10 to 90 for a measured trace, the whole for a simulated one.
+        Window of the cumulative heat [°CA aTDC]; -10 to 90 for a measured trace, the whole for a simulated one. The
+        heat is the peak of the cumulative value for a measured trace, its end for a simulated one.
     fractions : {"net", "gross"}
         Heat that CA10, CA50 and CA90 refer to. Gross is net plus the modelled wall heat.
 
@@ -71,8 +73,8 @@ def analyze(
     xarray.Dataset
         Traces over ``crank_angle_cad`` (rates belong to the step that ends at the sample) and scalars
         ``pegging_bar n_compression n_expansion ca10_cad ca50_cad ca90_cad heat_net_j heat_gross_j imep_closed_bar
-        p_max_bar p_max_cad dp_max_bar_per_cad t_max_k``. Attributes ``method``, ``gamma``, ``fractions`` and
-        ``warnings`` (what makes the figures doubtful).
+        p_max_bar p_max_cad dp_max_bar_per_cad t_max_k``. Attributes ``method``, ``gamma``, ``fractions``,
+        ``motored`` (no burn in this trace) and ``warnings`` (what makes the figures doubtful).
 
     Raises
     ------
@@ -105,7 +107,7 @@ def analyze(
     window = heat_window_cad or ((cylinder.ivc_cad, cylinder.evo_cad) if simulated else (-10.0, 90.0))
     if fractions not in ("net", "gross"):
         raise ParameterError(f"fractions = {fractions!r}: must be net or gross")
-    source, number, text = _gamma(gamma)
+    source, number, text = _gamma(gamma if gamma is not None else ("cylinder" if simulated else 1.33))
     inlet = point.intake_pressure_kpa if inlet_pressure_kpa is None else inlet_pressure_kpa
     options = _core.TraceOptions(
         pegging=pegging,
@@ -116,6 +118,7 @@ def analyze(
         heat_from_cad=window[0],
         heat_to_cad=window[1],
         burn_from_cad=float(trace["soc_cad"]) if simulated else window[0],
+        total_at_end=simulated,
         fractions_of_gross=fractions == "gross",
     )
     raw = _core.analyze_trace(trace[ANGLE].values, trace["pressure_bar"].values, cylinder, point, options)
@@ -132,6 +135,7 @@ def analyze(
             "method": pegging,
             "gamma": text,
             "fractions": fractions,
+            "motored": raw["motored"],
             "warnings": tuple(raw["warnings"]),
         },
     )

@@ -25,7 +25,8 @@ double relative_error(double x) {
 template <int P, int Q>
 double error_around(double x) {
   double worst = relative_error<P, Q>(x);
-  for (const double toward : {0.0, infinity}) worst = std::max(worst, relative_error<P, Q>(std::nextafter(x, toward)));
+  for (const double toward : {0.0, infinity})
+    worst = std::max(worst, relative_error<P, Q>(std::nextafter(x, toward)));
   return worst;
 }
 

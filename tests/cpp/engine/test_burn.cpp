@@ -71,7 +71,7 @@ TEST(EngineBurn, WiebeByHand) {
   const Burn<double> burn(c, 0.0, 1.0);
   const double whole = 1.0 - std::exp(-6.908);
   EXPECT_NEAR(burn.fraction(0.3), (1.0 - std::exp(-6.908 * std::pow(0.3, 2.5))) / whole, 1e-15);
-  EXPECT_NEAR(burn.angle_of(0.5), std::pow(std::log(2.0) / 6.908, 0.4), 2e-4);  // before renormalisation
+  EXPECT_NEAR(burn.angle_of(0.5), std::pow(std::log(2.0) / 6.908, 0.4), 3e-4);  // before renormalisation
   EXPECT_NEAR(burn.angle_of(0.5), 0.398, 5e-4);
   // The Wiebe law nearest to the triangle meets it at a quarter and at a half.
   for (const double s : {0.25, 0.5}) {

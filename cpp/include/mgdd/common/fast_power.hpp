@@ -1,6 +1,7 @@
-// fast_power<p, q>(x) = x^(p/q) for a fixed exponent between 0 and 1: less than half the latency of std::pow, relative error
-// below 1e-15 from 2^-32 to 2^32; outside (and for 0, negative, infinite, NaN) std::pow with the rounded exponent.
-// Dimensionless; noexcept, no heap. Method: table-driven argument reduction (Tang 1991), binomial series on the rest.
+// fast_power<p, q>(x) = x^(p/q) for a fixed exponent between 0 and 1: less than half the latency of std::pow, relative
+// error below 1e-15 from 2^-32 to 2^32; outside (and for 0, negative, infinite, NaN) std::pow with the rounded
+// exponent. Dimensionless; noexcept, no heap. Method: table-driven argument reduction (Tang 1991), binomial series on
+// the rest.
 #pragma once
 
 #include <array>
@@ -17,11 +18,13 @@ constexpr long double constant_power(long double c, int p, int q) noexcept {
   long double root = 1.0L;
   for (int pass = 0; pass < 100; ++pass) {
     long double lower = 1.0L;  // root^(q - 1)
-    for (int i = 1; i < q; ++i) lower *= root;
+    for (int i = 1; i < q; ++i)
+      lower *= root;
     root += (c / lower - root) / static_cast<long double>(q);
   }
   long double power = 1.0L;
-  for (int i = 0; i < p; ++i) power *= root;
+  for (int i = 0; i < p; ++i)
+    power *= root;
   return power;
 }
 
@@ -51,19 +54,23 @@ struct PowerTable {
     }
     const long double per_octave = constant_power(2.0L, P, Q);
     long double up = 1.0L;
-    for (std::size_t e = octaves / 2; e < octaves; ++e, up *= per_octave) octave[e] = static_cast<double>(up);
+    for (std::size_t e = octaves / 2; e < octaves; ++e, up *= per_octave)
+      octave[e] = static_cast<double>(up);
     long double down = 1.0L;
-    for (std::size_t e = octaves / 2; e > 0; --e) octave[e - 1] = static_cast<double>(down /= per_octave);
+    for (std::size_t e = octaves / 2; e > 0; --e)
+      octave[e - 1] = static_cast<double>(down /= per_octave);
     std::array<long double, 6> binomial{1.0L};
     for (std::size_t k = 0; k + 1 < binomial.size(); ++k) {
       const auto done = static_cast<long double>(k);
-      binomial[k + 1] = binomial[k] * (static_cast<long double>(P) / static_cast<long double>(Q) - done) / (done + 1.0L);
+      binomial[k + 1] =
+          binomial[k] * (static_cast<long double>(P) / static_cast<long double>(Q) - done) / (done + 1.0L);
     }
     // z^4 is h^2 z^2 - h^4/8 to within h^4/8 (Chebyshev), which keeps z^5 at an error of c5 h^5/8 < 1e-16.
     constexpr long double h = 0.5L / static_cast<long double>(centres);
     binomial[3] += binomial[5] * h * h;
     binomial[1] -= binomial[5] * h * h * h * h / 8.0L;
-    for (std::size_t k = 0; k < series.size(); ++k) series[k] = static_cast<double>(binomial[k]);
+    for (std::size_t k = 0; k < series.size(); ++k)
+      series[k] = static_cast<double>(binomial[k]);
   }
 };
 
@@ -82,7 +89,8 @@ inline double fast_power(double x) noexcept {
   const auto bits = std::bit_cast<std::uint64_t>(x);
   // Unsigned: a sign bit, zero, infinity and NaN fall outside as well.
   const std::uint64_t octave = (bits >> mantissa_bits) - Table::first_exponent;
-  if (octave >= Table::octaves) [[unlikely]] return std::pow(x, static_cast<double>(P) / Q);
+  if (octave >= Table::octaves) [[unlikely]]
+    return std::pow(x, static_cast<double>(P) / Q);
   const auto& centre = table.centre[(bits & mantissa) >> (mantissa_bits - Table::centre_bits)];
   const double z = std::bit_cast<double>((bits & mantissa) | one) * centre.inverse - 1.0;
   const double lead = table.octave[octave] * centre.power;

@@ -41,14 +41,20 @@ template <class T>
 struct Burn {
   BurnShape shape;
   T soc_cad, duration_cad;
-  T a, m;                                                     // Wiebe
-  T complete{1.0};                                            // 1 - exp(-a)
+  T a, m;                                                              // Wiebe
+  T complete{1.0};                                                     // 1 - exp(-a)
   T second_fraction, second_delay_cad, second_duration_cad, second_m;  // double Wiebe (Miyamoto et al. 1985)
 
   Burn(const BasicCylinder<T>& c, const T& soc, const T& duration) noexcept
-      : shape(c.burn_shape), soc_cad(soc), duration_cad(duration), a(c.wiebe_a), m(c.wiebe_m),
-        second_fraction(c.second_fraction), second_delay_cad(c.second_delay_cad),
-        second_duration_cad(c.second_duration_cad), second_m(c.second_wiebe_m) {
+      : shape(c.burn_shape),
+        soc_cad(soc),
+        duration_cad(duration),
+        a(c.wiebe_a),
+        m(c.wiebe_m),
+        second_fraction(c.second_fraction),
+        second_delay_cad(c.second_delay_cad),
+        second_duration_cad(c.second_duration_cad),
+        second_m(c.second_wiebe_m) {
     using std::exp;
     if (shape != BurnShape::triangle) complete = 1.0 - exp(-a);
   }

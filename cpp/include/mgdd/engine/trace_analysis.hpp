@@ -33,6 +33,7 @@ struct TraceOptions {
   double heat_from_cad = -10.0;  ///< window of the cumulative heat
   double heat_to_cad = 90.0;
   double burn_from_cad = -10.0;     ///< Woschni's combustion term acts from here on
+  bool total_at_end = false;          ///< heat at the window's end instead of its peak, for traces without drift
   bool fractions_of_gross = false;  ///< CA10/50/90 of gross heat instead of net
 };
 
@@ -46,6 +47,7 @@ struct TraceAnalysis {
   double heat_net_j_total, heat_gross_j_total;  ///< maxima of the cumulative heat
   double imep_closed_bar, work_closed_j;
   double p_max_bar, p_max_cad, dp_max_bar_per_cad, t_max_k;
+  bool motored = false;               ///< expansion runs on the compression line: no burn in this trace
   std::vector<std::string> warnings;  ///< what makes these figures doubtful
 };
 

@@ -1,5 +1,5 @@
-// Heat from the gas to the wall: the film coefficients of Woschni 1967 and Hohenberg 1979 [W/(m2 K)], pressure in bar and
-// lengths in m, and the same laws arranged for the step of a cycle, where most powers cancel. noexcept, no heap.
+// Heat from the gas to the wall: the film coefficients of Woschni 1967 and Hohenberg 1979 [W/(m2 K)], pressure in bar
+// and lengths in m, and the same laws arranged for the step of a cycle, where most powers cancel. noexcept, no heap.
 #pragma once
 
 #include <cmath>
@@ -48,8 +48,12 @@ T hohenberg_coefficient(const T& c1_bar_m3, const T& volume_m3, const T& pressur
 }
 
 // Both powers stand in the chain from one pressure to the next, where std::pow would be the longest link.
-inline double four_fifths_power(double x) noexcept { return fast_power<4, 5>(x); }
-inline double two_fifths_power(double x) noexcept { return fast_power<2, 5>(x); }
+inline double four_fifths_power(double x) noexcept {
+  return fast_power<4, 5>(x);
+}
+inline double two_fifths_power(double x) noexcept {
+  return fast_power<2, 5>(x);
+}
 template <int N>
 Dual<N> four_fifths_power(const Dual<N>& x) noexcept {
   const double y = four_fifths_power(x.value);

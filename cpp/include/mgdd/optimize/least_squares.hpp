@@ -12,50 +12,9 @@
 #include <Eigen/Core>
 
 #include "mgdd/optimize/fit_report.hpp"
+#include "mgdd/optimize/parameter.hpp"
 
 namespace mgdd::optimize {
-
-/// One unknown. A log-scaled parameter is searched as log(p): for positive numbers known only to their order.
-struct Parameter {
-  std::string name;
-  double lower = -std::numeric_limits<double>::infinity();
-  double upper = std::numeric_limits<double>::infinity();
-  bool log_scaled = false;  ///< needs lower > 0
-
-  bool operator==(const Parameter&) const = default;
-};
-
-struct LeastSquaresOptions {
-  /// Trial steps. Well-posed fits need 5 to 50; curved valleys from far away stay below 200.
-  int max_iterations = 200;
-  /// Relative decrease of the cost. 1e-12 is a move of 1e-6 sqrt(degrees of freedom) stderr: not worth a
-  /// step.
-  double cost_tolerance = 1e-12;
-  /// Step over parameters, both scaled. Ten digits: far below any stderr, above the rounding of a simulation.
-  double step_tolerance = 1e-10;
-  /// Largest cosine between the residual and a free Jacobian column. Reached only by exact Jacobians.
-  double gradient_tolerance = 1e-12;
-  /// Relative to unit columns. 1e-3 trusts the start nearly as much as Gauss-Newton does (Nielsen 1999: 1e-6
-  /// to 1).
-  double initial_damping = 1e-3;
-  /// Beyond 0.98 the stderr is more than five times that of the same parameter fitted alone.
-  double correlation_limit = 0.98;
-  /// Below 1e-10 the rounding of a Jacobian (1e-16) reaches the sixth digit of the direction.
-  double rank_tolerance = 1e-10;
-  /// Ask for residual and Jacobian in one call. False asks for the Jacobian only after a step was accepted.
-  bool evaluate_together = true;
-
-  /// Throws ParameterError naming the field, its value and its bound.
-  void validate() const;
-
-  bool operator==(const LeastSquaresOptions&) const = default;
-};
-
-/// Throws ParameterError: empty or repeated names, NaN bounds, lower >= upper, log-scaled with lower <= 0.
-void validate(const std::vector<Parameter>& parameters);
-
-/// Throws ShapeError for a wrong length, ParameterError for a value that is not finite or outside its bounds.
-void validate_start(const std::vector<Parameter>& parameters, const Eigen::VectorXd& start);
 
 /// Levenberg-Marquardt (Moré 1978 for the column scaling, Nielsen 1999 for the damping). A step that leaves
 /// the box is clipped and the remaining parameters are solved again; a parameter at a bound whose descent

@@ -1,7 +1,10 @@
 """The cycle of `puma_single` in Numba: the literal equations and the algebra of the C++ core, for `cycle_speed.py`.
 
-Trapezoid step, triangular burn, constant gamma, Woschni; every indicator of the core. One function `cycle(form, ...)` holds
-the three forms; the form is a compile-time constant, so each is compiled on its own.
+Trapezoid step, triangular burn, constant gamma, Woschni; every indicator of the core. The forms:
+
+- `literal`: p^0.8, T^-0.55, w^0.8 and (V_ref / V)^gamma in every step, as the equations are printed;
+- `cut`: the algebra of the core, with w^0.8 as exp(0.8 log w);
+- `cut_table`: the same with the core's own table-driven w^0.8, which is not what a Numba user would write.
 """
 
 from __future__ import annotations
@@ -23,21 +26,27 @@ INDICATORS = (
 Array = NDArray[np.float64]
 _MANTISSA = np.int64(0xFFFFFFFFFFFFF)
 _ONE = np.int64(0x3FF0000000000000)
-_CENTRES = 128
+_CENTRES = 256
 _OCTAVES = 64
 _INVERSE = 1.0 / (1.0 + (np.arange(_CENTRES) + 0.5) / _CENTRES)
 _POWER = (1.0 / _INVERSE) ** 0.8
 _OCTAVE = 2.0 ** (0.8 * (np.arange(_OCTAVES) - _OCTAVES // 2))
+_C5, _H = 0.011264, 0.5 / _CENTRES
+_C1, _C2, _C3, _C4 = 0.8 - _C5 * _H**4 / 8, -0.08, 0.032 + _C5 * _H**2, -0.0176
 
 
 @dataclass(frozen=True)
 class Engine:
-    """Parameters of the preset and its nominal point in SI, and the tables over the crank grid."""
+    """Parameters of the preset and its nominal point in SI, and the tables over the crank grid.
+
+    `constants`: swept and clearance volume, bore, gamma, wall-heat constant, C2, Cp, wall temperature, speed, fuel
+    heat, burn duration, intake pressure, N R, mean piston speed.
+    """
 
     angle: Array
     volume: Array
     area: Array
-    constants: Array  # swept, clearance, bore, gamma, wall scale, C2, Cp, wall T, speed, heat, duration, p(IVC), N R, Sp
+    constants: Array
 
 
 def engine(cylinder: object, point: object, burn_duration_cad: float) -> Engine:
@@ -79,11 +88,10 @@ def _table_power(x: float) -> float:
     octave = (bits >> 52) - (1023 - _OCTAVES // 2)
     if octave < 0 or octave >= _OCTAVES:
         return x**0.8
-    i = (bits & _MANTISSA) >> 45
+    i = (bits & _MANTISSA) >> 44
     z = np.int64((bits & _MANTISSA) | _ONE).view(np.float64) * _INVERSE[i] - 1.0
     lead = _OCTAVE[octave] * _POWER[i]
-    q = z * z
-    return lead + (lead * z) * ((0.8 - 0.08 * z) + q * ((0.032 - 0.0176 * z) + q * 0.011264))
+    return lead + (lead * z) * ((_C1 + _C2 * z) + (z * z) * (_C3 + _C4 * z))
 
 
 @numba.njit(error_model="numpy")
@@ -135,16 +143,15 @@ def _indicators(angle: Array, v: Array, c: Array, soc: float, p: Array, loss: Ar
 
 
 def compile_form(form: str, model: Engine) -> Callable[[Array], Array]:
-    """Compiles one of `FORMS`; the result maps start angles [°CA aTDC] to indicators, one row each."""
+    """Compile one of `FORMS`; the result maps start angles [°CA aTDC] to indicators, one row each."""
     literal, table = form == "literal", form == "cut_table"
     angle, v, area, c = model.angle, model.volume, model.area, model.constants
-    gamma, speed = c[3], c[8]
-    step = np.diff(angle)
+    gamma, step = c[3], np.diff(angle)
     half, inner = np.diff(v) / 2, gamma - 1
     keep = np.append((v[:-1] - inner * half) / (v[1:] + inner * half), 0.0)
     gain = np.append(inner / (v[1:] + inner * half), 0.0)
     wall = np.append(area[:-1] * v[:-1] ** -0.55 * step, 0.0)
-    motored = (v[0] / v) ** gamma
+    tables = np.column_stack([keep, gain, wall, (v[0] / v) ** gamma])
 
     @numba.njit(error_model="numpy")
     def release(angle: Array, c: Array, soc: float, heat_j: Array) -> None:
@@ -182,10 +189,7 @@ def compile_form(form: str, model: Engine) -> Callable[[Array], Array]:
         return _table_power(w) if table else math.exp(0.8 * math.log(w))
 
     @numba.njit(error_model="numpy")
-    def run_cut(
-        angle: Array, v: Array, keep: Array, gain: Array, wall: Array, motored: Array, c: Array, soc: float, p: Array,
-        loss: Array, q: Array,
-    ) -> None:  # fmt: skip
+    def run_cut(angle: Array, v: Array, tables: Array, c: Array, soc: float, p: Array, loss: Array, q: Array) -> None:
         swept, bore, cp, wall_k, speed, p_ref, gas = c[0], c[2], c[6], c[7], c[8], c[11], c[12]
         still, per_pa, per_gas = c[5] * c[13], cp * swept / gas, 1.0 / gas
         burning, still_power = per_pa * p_ref, power(still)
@@ -193,20 +197,19 @@ def compile_form(form: str, model: Engine) -> Callable[[Array], Array]:
         first = np.searchsorted(angle, soc)
         pressure = p[0] = p_ref
         for k in range(angle.size - 1):
-            lead = scale * wall[k] * (pressure * v[k] * per_gas - wall_k)
+            keep, gain, wall, motored = tables[k]
+            lead = scale * wall * (pressure * v[k] * per_gas - wall_k)
             root, velocity_power = math.sqrt(math.sqrt(pressure)), still_power
             if k >= first:
-                w = (still - burning * motored[k]) + per_pa * pressure
+                w = (still - burning * motored) + per_pa * pressure
                 if w > still:
                     velocity_power = power(w)
             loss[k] = lead * root * velocity_power
-            pressure = (keep[k] * pressure + gain[k] * q[k]) - gain[k] * lead * root * velocity_power
+            pressure = (keep * pressure + gain * q[k]) - gain * lead * root * velocity_power
             p[k + 1] = pressure
 
     @numba.njit(error_model="numpy")
-    def sweep(
-        timings: Array, angle: Array, v: Array, area: Array, keep: Array, gain: Array, wall: Array, motored: Array, c: Array
-    ) -> Array:
+    def sweep(timings: Array, angle: Array, v: Array, area: Array, tables: Array, c: Array) -> Array:
         p, loss, q = np.zeros(angle.size), np.zeros(angle.size), np.zeros(angle.size)
         out = np.empty((timings.size, 17))
         for i in range(timings.size):
@@ -214,8 +217,8 @@ def compile_form(form: str, model: Engine) -> Callable[[Array], Array]:
             if literal:
                 run_literal(angle, v, area, c, timings[i], p, loss, q)
             else:
-                run_cut(angle, v, keep, gain, wall, motored, c, timings[i], p, loss, q)
+                run_cut(angle, v, tables, c, timings[i], p, loss, q)
             _indicators(angle, v, c, timings[i], p, loss, out[i])
         return out
 
-    return lambda timings: sweep(timings, angle, v, area, keep, gain, wall, motored, c)
+    return lambda timings: sweep(timings, angle, v, area, tables, c)

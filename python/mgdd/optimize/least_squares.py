@@ -1,0 +1,139 @@
+"""Levenberg-Marquardt for a Python function."""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from mgdd import _core
+from mgdd.errors import ParameterError, ShapeError
+from mgdd.optimize.fit_report import FitReport
+
+if TYPE_CHECKING:
+    from collections.abc import Callable, Sequence
+
+    from numpy.typing import ArrayLike, NDArray
+
+__all__ = ["least_squares"]
+
+
+def least_squares(
+    fun: Callable[[NDArray[np.float64]], tuple[ArrayLike, ArrayLike] | None],
+    x0: ArrayLike,
+    *,
+    names: Sequence[str] | None = None,
+    lower: ArrayLike | None = None,
+    upper: ArrayLike | None = None,
+    log_scaled: ArrayLike | None = None,
+    data: ArrayLike | None = None,
+    max_iterations: int = 200,
+    cost_tolerance: float = 1e-12,
+    step_tolerance: float = 1e-10,
+    gradient_tolerance: float = 1e-12,
+    initial_damping: float = 1e-3,
+    correlation_limit: float = 0.98,
+    rank_tolerance: float = 1e-10,
+) -> FitReport:
+    """Minimise half the sum of squares of a residual with an exact Jacobian.
+
+    Levenberg-Marquardt with column scaling after Moré and damping after Nielsen. A step that leaves the
+    bounds is clipped, not rejected.
+
+    Parameters
+    ----------
+    fun : callable
+        ``fun(x) -> (residual, jacobian)`` with shapes (m,) and (m, n), m >= n, both in natural units. None,
+        or a value that is not finite, says that this point cannot be evaluated: the step is shortened.
+        Exceptions of `fun` pass through.
+    x0 : array_like, shape (n,)
+        Start, within the bounds.
+    names : sequence of str, optional
+        Parameter names; x0, x1, ... without.
+    lower, upper : array_like, shape (n,) or scalar, optional
+        Bounds; none without.
+    log_scaled : array_like of bool, shape (n,) or scalar, optional
+        Parameters searched as log(p); they need lower > 0. Everything reported stays in natural units.
+    data : array_like, shape (m,), optional
+        What the residual compares with, in its unit; gives `FitReport.fit_percent`.
+    max_iterations : int
+        Trial steps.
+    cost_tolerance, step_tolerance : float
+        Relative change of the cost, and scaled step over scaled parameters, that count as none [-].
+    gradient_tolerance : float
+        Cosine between the residual and a free Jacobian column that counts as zero [-].
+    initial_damping : float
+        Relative to Jacobian columns of unit length [-].
+    correlation_limit : float
+        Absolute correlation beyond which two parameters are reported as unidentifiable [-].
+    rank_tolerance : float
+        Singular value of the column-scaled Jacobian, relative to the largest, that counts as zero [-].
+
+    Returns
+    -------
+    FitReport
+        Also when the fit failed: look at `success`, `status` and `message`.
+
+    Raises
+    ------
+    ParameterError
+        Names, bounds, start or a tolerance outside its domain. Nothing has been evaluated then.
+    ShapeError
+        Arrays that do not belong together, or fewer residuals than parameters.
+
+    References
+    ----------
+    Moré (1978), The Levenberg-Marquardt algorithm: implementation and theory.
+    Nielsen (1999), Damping parameter in Marquardt's method.
+
+    Examples
+    --------
+    >>> import numpy as np
+    >>> def rosenbrock(x):
+    ...     residual = [10.0 * (x[1] - x[0] ** 2), 1.0 - x[0]]
+    ...     return residual, [[-20.0 * x[0], 10.0], [-1.0, 0.0]]
+    >>> fit = least_squares(rosenbrock, [-1.2, 1.0], names=["a", "b"], upper=[0.5, np.inf])
+    >>> fit.values.round(6).tolist(), fit.bounds_active.tolist(), fit.findings
+    ([0.5, 0.25], [1, 0], ('a stands at its upper bound 0.5',))
+    """
+    start = _vector(x0, "x0")
+    n = start.size
+    if names is None:
+        names = [f"x{i}" for i in range(n)]
+    elif isinstance(names, str) or len(names) != n:
+        raise ShapeError(f"names = {names!r}: must be {n} names, one per value of x0")
+    lowers = _per_parameter(-np.inf if lower is None else lower, "lower", n)
+    uppers = _per_parameter(np.inf if upper is None else upper, "upper", n)
+    logs = _per_parameter(False if log_scaled is None else log_scaled, "log_scaled", n)
+    parameters = [
+        _core.Parameter(name=name, lower=low, upper=high, log_scaled=bool(log))
+        for name, low, high, log in zip(names, lowers.tolist(), uppers.tolist(), logs.tolist(), strict=True)
+    ]
+    options = _core.LeastSquaresOptions(
+        max_iterations=max_iterations,
+        cost_tolerance=cost_tolerance,
+        step_tolerance=step_tolerance,
+        gradient_tolerance=gradient_tolerance,
+        initial_damping=initial_damping,
+        correlation_limit=correlation_limit,
+        rank_tolerance=rank_tolerance,
+    )
+    measured = None if data is None else _vector(data, "data")
+    return FitReport.from_core(_core.least_squares(fun, start, parameters=parameters, options=options), measured)
+
+
+def _vector(value: ArrayLike, name: str) -> NDArray[np.float64]:
+    try:
+        vector = np.array(value, dtype=np.float64)
+    except (TypeError, ValueError) as error:
+        raise ParameterError(f"{name} = {value!r}: must be numbers") from error
+    if vector.ndim != 1:
+        raise ShapeError(f"{name} has {vector.ndim} dimensions: must have 1")
+    return vector
+
+
+def _per_parameter(value: ArrayLike, name: str, n: int) -> NDArray[np.float64]:
+    vector = _vector(np.repeat(np.asarray(value), n) if np.ndim(value) == 0 else value, name)
+    if vector.size != n:
+        raise ShapeError(f"{name} has {vector.size} values for the {n} of x0")
+    return vector

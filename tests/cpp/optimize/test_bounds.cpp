@@ -1,0 +1,120 @@
+#include "support/fit_cases.hpp"
+
+#include <algorithm>
+
+#include <gtest/gtest.h>
+
+#include "mgdd/common/error.hpp"
+#include "support/no_alloc.hpp"
+
+namespace mgdd::optimize {
+namespace {
+
+TEST(LeastSquares, BoundsHoldTheSolutionOfTheReducedProblem) {
+  const MatrixXd a = random_matrix(6, 20, 3);
+  const VectorXd b = a * vector({2.0, -1.0, 0.5});
+  std::vector<Parameter> parameters = named(3);
+  parameters[0].upper = 1.0;
+  const FitReport fit = LeastSquares(parameters, 20).solve(Linear{a, b}, vector({-5.0, 0.0, 0.0}));
+  const MatrixXd rest = a.rightCols(2);
+  const VectorXd expected = (rest.transpose() * rest).inverse() * (rest.transpose() * (b - a.col(0)));
+  EXPECT_TRUE(fit.success()) << fit.brief();
+  EXPECT_EQ(fit.values[0], 1.0);
+  EXPECT_LT((fit.values.tail(2) - expected).norm(), 1e-9);
+  EXPECT_EQ(fit.bounds_active, Eigen::Vector3i(1, 0, 0));
+  EXPECT_EQ(fit.unidentifiable, std::vector<std::string>{"p0"});
+  EXPECT_TRUE(std::isnan(fit.standard_error[0]));
+  const MatrixXd reduced = (rest.transpose() * rest).inverse() * (2.0 * fit.cost / (20 - 2));
+  EXPECT_LT((fit.covariance.bottomRightCorner(2, 2) - reduced).norm(), 1e-12);
+}
+
+// With almost no damping one step solves a linear problem, also when it meets a bound on the way.
+TEST(LeastSquares, OtherParametersAreSolvedAgainAfterAClip) {
+  const MatrixXd a = random_matrix(6, 20, 3);
+  std::vector<Parameter> parameters = named(3);
+  parameters[0].upper = 1.0;
+  LeastSquaresOptions options;
+  options.initial_damping = 1e-20;
+  const FitReport fit =
+      LeastSquares(parameters, 20, options).solve(Linear{a, a * vector({2.0, -1.0, 0.5})}, vector({-5.0, 0.0, 0.0}));
+  ASSERT_GE(fit.history.size(), 2u);
+  EXPECT_NEAR(fit.history[1].cost, fit.cost, 1e-9 * fit.cost);
+}
+
+TEST(LeastSquares, StartAtAnOptimumOnTheBoundIsStationary) {
+  std::vector<Parameter> parameters = named(2);
+  parameters[0].lower = 0.0;
+  const MatrixXd identity = MatrixXd::Identity(2, 2);
+  const FitReport fit = LeastSquares(parameters, 2).solve(Linear{identity, vector({-1.0, 3.0})}, vector({0.0, 3.0}));
+  EXPECT_EQ(fit.status, FitStatus::gradient_converged);
+  EXPECT_EQ(fit.iterations, 0);
+  EXPECT_EQ(fit.bounds_active, Eigen::Vector2i(-1, 0));
+}
+
+// exp(log(upper)) may exceed upper by a rounding: the model must never see that.
+TEST(LeastSquares, LogScaledParametersStayInsideToTheLastDigit) {
+  for (int i = 1; i <= 300; ++i) {
+    const double upper = 0.37 * i;
+    const double target = std::nextafter(upper, 0.0);
+    const auto model = [&](const VectorXd& x, VectorXd& r, MatrixXd* j) {
+      EXPECT_LE(x[0], upper);
+      r[0] = x[0] - target;
+      r[1] = 1.0;
+      if (j != nullptr) {
+        *j << 1.0, 0.0;
+      }
+      return true;
+    };
+    EXPECT_TRUE(LeastSquares({{"p", 1e-3, upper, true}}, 2).solve(model, vector({0.7 * upper})).success());
+  }
+}
+
+TEST(LeastSquares, LeavesABoundWhoseDescentPointsInward) {
+  std::vector<Parameter> parameters = named(2);
+  parameters[0].lower = parameters[1].lower = 0.0;
+  const FitReport fit = LeastSquares(parameters, 2).solve(rosenbrock, vector({0.0, 0.0}));
+  EXPECT_TRUE(fit.success()) << fit.brief();
+  EXPECT_LT((fit.values - vector({1.0, 1.0})).norm(), 1e-9);
+}
+
+TEST(LeastSquares, EveryEvaluationStaysInTheBox) {
+  std::vector<Parameter> parameters = named(2);
+  parameters[0] = {"p0", -1.5, 0.5};
+  parameters[1] = {"p1", 1e-3, 2.0, true};
+  const auto watched = [](const VectorXd& x, VectorXd& r, MatrixXd* j) {
+    EXPECT_TRUE(x[0] >= -1.5 && x[0] <= 0.5 && x[1] >= 1e-3 && x[1] <= 2.0) << x.transpose();
+    return rosenbrock(x, r, j);
+  };
+  const FitReport fit = LeastSquares(parameters, 2).solve(watched, vector({-1.2, 1.0}));
+  EXPECT_TRUE(fit.success()) << fit.brief();
+  EXPECT_NEAR(fit.values[1], 0.25, 1e-9);
+}
+
+// The same search, once with bounds and once with a model that refuses every point outside them.
+TEST(LeastSquares, ClippingConvergesWhereRejectingDoesNot) {
+  const MatrixXd a = random_matrix(7, 20, 4);
+  const VectorXd b = a * vector({2.0, -2.0, 2.0, 0.1});
+  std::vector<Parameter> boxed = named(4);
+  for (Parameter& p : boxed) {
+    p.lower = -1.0;
+    p.upper = 1.0;
+  }
+  const Linear model{a, b};
+  const auto fenced = [&](const VectorXd& x, VectorXd& r, MatrixXd* j) {
+    return x.cwiseAbs().maxCoeff() <= 1.0 && model(x, r, j);
+  };
+  LeastSquares clipping(boxed, 20), rejecting(named(4), 20);
+  int clipping_found = 0, rejecting_found = 0;
+  const double best = clipping.solve(model, VectorXd::Zero(4)).cost;
+  for (std::uint64_t seed = 0; seed < 10; ++seed) {
+    const VectorXd start = random_matrix(100 + seed, 4, 1).array().tanh();
+    const FitReport clipped = clipping.solve(model, start);
+    clipping_found += clipped.success() && clipped.cost < best * (1 + 1e-9) ? 1 : 0;
+    rejecting_found += rejecting.solve(fenced, start).cost < best * (1 + 1e-3) ? 1 : 0;
+  }
+  EXPECT_EQ(clipping_found, 10);
+  EXPECT_LT(rejecting_found, 10);
+}
+
+}  // namespace
+}  // namespace mgdd::optimize
