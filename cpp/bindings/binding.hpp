@@ -28,6 +28,7 @@ void bind_errors(py::module_& m);
 void bind_optimize(py::module_& m);
 void bind_cylinder(py::module_& m);
 void bind_engine(py::module_& m);
+void bind_trace(py::module_& m);
 void bind_identify(py::module_& m);
 
 }  // namespace mgdd::bindings

@@ -12,5 +12,6 @@ PYBIND11_MODULE(_core, m) {
   bind_optimize(m);
   bind_cylinder(m);
   bind_engine(m);
+  bind_trace(m);
   bind_identify(m);
 }

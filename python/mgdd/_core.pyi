@@ -550,6 +550,32 @@ class OperatingPoint:
     def trapped_mass_g(self) -> float | None:
         ...
 class NoxProxy:
+    """
+    NOx proxy from the maximum bulk gas temperature: a correlation to be fitted.
+    
+    Two maps with equal slope at the reference: affine-log, NOx0 exp(b/T0^2 (T - T0)), and Arrhenius,
+    NOx0 exp(-b (1/T - 1/T0)). Valid at fixed intake oxygen only; the defaults are plausible, not of any engine.
+    
+    Parameters
+    ----------
+    reference_temperature_k : float
+        T0 [K].
+    reference_nox_ppm : float
+        NOx0, at T0 [ppm].
+    activation_temperature_k : float
+        b [K].
+    
+    Raises
+    ------
+    mgdd.errors.ParameterError
+        A constant that is not > 0.
+    
+    Examples
+    --------
+    >>> from mgdd.engine import NoxProxy
+    >>> float(NoxProxy().arrhenius_ppm(1900.0))
+    1200.0
+    """
     def __init__(self, *, reference_temperature_k: typing.SupportsFloat | typing.SupportsIndex = 1900.0, reference_nox_ppm: typing.SupportsFloat | typing.SupportsIndex = 1200.0, activation_temperature_k: typing.SupportsFloat | typing.SupportsIndex = 16000.0) -> None:
         ...
     def affine_log_ppm(self, t_max_k: typing.Annotated[numpy.typing.ArrayLike, numpy.float64]) -> typing.Any:
@@ -562,15 +588,21 @@ class NoxProxy:
         """
     @property
     def activation_temperature_k(self) -> float:
-        ...
+        """
+        b [K].
+        """
     @property
     def reference_nox_ppm(self) -> float:
-        ...
+        """
+        NOx0 [ppm].
+        """
     @property
     def reference_temperature_k(self) -> float:
-        ...
+        """
+        T0 [K].
+        """
 class TraceOptions:
-    def __init__(self, *, pegging: str = 'none', pegging_exponent: typing.SupportsFloat | typing.SupportsIndex = 1.35, inlet_pressure_kpa: typing.SupportsFloat | typing.SupportsIndex = 0.0, gamma_source: str = 'constant', gamma: typing.SupportsFloat | typing.SupportsIndex = 1.33, gamma_compression: typing.SupportsFloat | typing.SupportsIndex = 1.37, gamma_combustion: typing.SupportsFloat | typing.SupportsIndex = 1.3, heat_from_cad: typing.SupportsFloat | typing.SupportsIndex = -10.0, heat_to_cad: typing.SupportsFloat | typing.SupportsIndex = 90.0, burn_from_cad: typing.SupportsFloat | typing.SupportsIndex = -10.0, fractions_of_gross: bool = False) -> None:
+    def __init__(self, *, pegging: str = 'none', pegging_exponent: typing.SupportsFloat | typing.SupportsIndex = 1.35, inlet_pressure_kpa: typing.SupportsFloat | typing.SupportsIndex = 0.0, gamma_source: str = 'constant', gamma: typing.SupportsFloat | typing.SupportsIndex = 1.33, gamma_compression: typing.SupportsFloat | typing.SupportsIndex = 1.37, gamma_combustion: typing.SupportsFloat | typing.SupportsIndex = 1.3, heat_from_cad: typing.SupportsFloat | typing.SupportsIndex = -10.0, heat_to_cad: typing.SupportsFloat | typing.SupportsIndex = 90.0, burn_from_cad: typing.SupportsFloat | typing.SupportsIndex = -10.0, total_at_end: bool = False, fractions_of_gross: bool = False) -> None:
         ...
 class MeasuredCycle:
     def __init__(self, *, label: str, crank_angle_cad: typing.Annotated[numpy.typing.ArrayLike, numpy.float64], pressure_bar: typing.Annotated[numpy.typing.ArrayLike, numpy.float64], point: OperatingPoint) -> None:

@@ -11,7 +11,7 @@ import pytest
 CPP = "common > optimize > control > engine throttle > identify > guide > loop"
 PYTHON = (
     "_core > errors > results presets > io plot > optimize > control > engine throttle > identify > guide"
-    " > loop sweep design datasets > maps > rig > studies > report > cli"
+    " > loop sweep design datasets > maps > rig > studies > report > cli > __main__"
 )
 
 

@@ -10,7 +10,7 @@ from mgdd.cli.output import check_output, emit, progress
 from mgdd.identify import CylinderFit, WallHeatProfile, fit_cylinder, wall_heat_profile
 from mgdd.report import write_report
 from mgdd.studies import compare_laws, run_measured_traces
-from mgdd.studies.measured_traces import law_row
+from mgdd.studies.measured_summary import law_row
 
 __all__ = ["calibrate"]
 

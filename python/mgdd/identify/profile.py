@@ -11,7 +11,8 @@ import numpy as np
 
 from mgdd._core import OperatingPoint
 from mgdd.errors import ParameterError
-from mgdd.identify.cylinder import CylinderFit, default_free, fit_cylinder
+from mgdd.identify.cylinder import default_free, fit_cylinder
+from mgdd.identify.records import CylinderFit, LoadFit
 from mgdd.results import labelled_dataset
 
 if TYPE_CHECKING:
@@ -167,7 +168,7 @@ def wall_heat_profile(
     )
 
 
-def _start(load: Any) -> dict[str, float]:
+def _start(load: LoadFit) -> dict[str, float]:
     shape = load.cylinder
     return {
         "soc_cad": load.soc_cad,

@@ -2,19 +2,19 @@
 
 from __future__ import annotations
 
-import math
 from collections.abc import Callable, Sequence
 from typing import TYPE_CHECKING, Any
 
-from mgdd import _core, presets
+from mgdd import presets
 from mgdd._core import Cylinder, OperatingPoint
 from mgdd.datasets import load_hd_traces
 from mgdd.engine import analyze, optimum, simulate
-from mgdd.identify import CylinderFit, LoadFit, WallHeatProfile, fit_cylinder, wall_heat_profile
+from mgdd.identify import CylinderFit, LoadFit, fit_cylinder, wall_heat_profile
 from mgdd.identify.cylinder import BURN_FIELDS, SHAPE_FIELDS
-from mgdd.results import labelled_dataset, to_jsonable
+from mgdd.results import to_jsonable
 from mgdd.studies.base import StudyResult
 from mgdd.studies.measured_figures import draw
+from mgdd.studies.measured_summary import law_table, summarize
 
 if TYPE_CHECKING:
     import xarray as xr
@@ -30,9 +30,6 @@ LAWS = (
     ("double_wiebe", "constant"),
 )
 WALL_HEAT_RANGE = (0.5, 1.0)
-_ANALYSIS = (
-    "n_compression n_expansion ca10_cad ca50_cad ca90_cad heat_net_j heat_gross_j imep_closed_bar p_max_bar p_max_cad"
-).split()
 Progress = Callable[[str], None]
 
 
@@ -195,7 +192,7 @@ def run_measured_traces(
     summary["data"] = _PROVENANCE if own else "files of the user"
     return StudyResult(
         name="measured-traces",
-        dataset=_table(fits),
+        dataset=law_table(fits),
         figures=draw(analyses, main, best, reference, profiles, timing) if figures else {},
         summary=to_jsonable(summary),
     )
@@ -205,57 +202,6 @@ _PROVENANCE = (
     "Four cycle-averaged closed-valve pressure traces of a heavy-duty diesel at 25, 50, 75 and 100 % load, from "
     "LibICE-post (F. Ramognino), MIT licence."
 )
-
-
-def summarize(
-    analyses: Sequence[xr.Dataset],
-    fits: Sequence[CylinderFit],
-    main: CylinderFit,
-    profiles: dict[str, WallHeatProfile],
-    timing: Sequence[dict[str, Any]],
-) -> dict[str, Any]:
-    """Collect the numbers of a calibration as plain values."""
-    rows = []
-    for analysis, load, best in zip(analyses, main.loads, timing, strict=True):
-        rows.append(
-            {
-                "file": load.file,
-                "analysis": {name: float(analysis[name]) for name in _ANALYSIS},
-                "calibrated": load.to_dict(),
-                "best_timing": best,
-                "warnings": list(analysis.attrs["warnings"]),
-            }
-        )
-    return {
-        "mgdd": _core.__version__,
-        "law": main.burn_law,
-        "traces": rows,
-        "laws": [law_row(fit) for fit in fits],
-        "common": {"wall_heat_scale": {law: profile.to_dict() for law, profile in profiles.items()}},
-        "unidentifiable": sorted({*main.report.unidentifiable, *(["wall_heat_scale"] if _unknown(profiles) else [])}),
-        "warnings": [f"{fit.burn_law}: {text}" for fit in fits for text in fit.warnings],
-        "best_timing": list(timing),
-    }
-
-
-def law_row(fit: CylinderFit) -> dict[str, Any]:
-    """Give one row of the comparison of burn laws: lists over the traces."""
-    return {
-        "law": fit.burn_law,
-        "file": [load.file for load in fit.loads],
-        "rmse_percent": [load.rmse_percent for load in fit.loads],
-        "imep_closed_error_percent": [load.imep_closed_error_percent for load in fit.loads],
-        "soc_cad": [load.soc_cad for load in fit.loads],
-        "onset_against_soi_cad": [load.onset_against_soi_cad for load in fit.loads],
-        "largest_error_bar": [load.largest_error_bar for load in fit.loads],
-        "largest_error_cad": [load.largest_error_cad for load in fit.loads],
-        "wall_heat_scale": fit.cylinder.wall_heat_scale,
-        "warnings": list(fit.warnings),
-    }
-
-
-def _unknown(profiles: dict[str, WallHeatProfile]) -> bool:
-    return any(not profile.identifiable for profile in profiles.values())
 
 
 def _timing(load: LoadFit, scale: float, objective: str, limits: dict[str, float]) -> dict[str, float]:
@@ -294,42 +240,3 @@ def _as_range(file: str, points: list[dict[str, float]]) -> dict[str, Any]:
         **{name: span(name) for name in ranged},
         "points": points,
     }
-
-
-def _table(fits: Sequence[CylinderFit]) -> xr.Dataset:
-    files = [load.file for load in fits[0].loads]
-    laws = [fit.burn_law for fit in fits]
-
-    def grid(name: str) -> list[list[float]]:
-        return [[float(getattr(load, name)) for load in fit.loads] for fit in fits]
-
-    dims = ("law", "file")
-    scales = [fit.cylinder.wall_heat_scale if math.isfinite(fit.report.rmse) else math.nan for fit in fits]
-    return labelled_dataset(
-        {
-            "law": ("law", laws, "-", "burn law and gamma"),
-            "file": ("file", files, "-", "trace"),
-            "rmse_percent": (dims, grid("rmse_percent")),
-            "imep_closed_error_percent": (dims, grid("imep_closed_error_percent")),
-            "soc_cad": (dims, grid("soc_cad")),
-            "onset_against_soi_cad": (
-                dims,
-                grid("onset_against_soi_cad"),
-                "°CA",
-                "fitted burn start minus SOI",
-            ),
-            "largest_error_bar": (
-                dims,
-                grid("largest_error_bar"),
-                "bar",
-                "largest local error, model minus measured",
-            ),
-            "largest_error_cad": (
-                dims,
-                grid("largest_error_cad"),
-                "°CA aTDC",
-                "angle of the largest local error",
-            ),
-            "wall_heat_scale": ("law", scales),
-        }
-    )

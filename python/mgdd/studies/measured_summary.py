@@ -1,0 +1,110 @@
+"""Numbers of the measured-traces study as plain values and as a table."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from typing import TYPE_CHECKING, Any
+
+from mgdd import _core
+from mgdd.identify import CylinderFit, WallHeatProfile
+from mgdd.results import labelled_dataset
+
+if TYPE_CHECKING:
+    import xarray as xr
+
+__all__ = ["law_row", "law_table", "summarize"]
+
+_ANALYSIS = (
+    "n_compression n_expansion ca10_cad ca50_cad ca90_cad heat_net_j heat_gross_j imep_closed_bar p_max_bar p_max_cad"
+).split()
+
+
+def summarize(
+    analyses: Sequence[xr.Dataset],
+    fits: Sequence[CylinderFit],
+    main: CylinderFit,
+    profiles: Mapping[str, WallHeatProfile],
+    timing: Sequence[dict[str, Any]],
+) -> dict[str, Any]:
+    """Collect the numbers of a calibration as plain values."""
+    rows = []
+    for analysis, load, best in zip(analyses, main.loads, timing, strict=True):
+        rows.append(
+            {
+                "file": load.file,
+                "analysis": {name: float(analysis[name]) for name in _ANALYSIS},
+                "calibrated": load.to_dict(),
+                "best_timing": best,
+                "warnings": list(analysis.attrs["warnings"]),
+            }
+        )
+    return {
+        "mgdd": _core.__version__,
+        "law": main.burn_law,
+        "traces": rows,
+        "laws": [law_row(fit) for fit in fits],
+        "common": {"wall_heat_scale": {law: profile.to_dict() for law, profile in profiles.items()}},
+        "unidentifiable": sorted({*main.report.unidentifiable, *(["wall_heat_scale"] if _unknown(profiles) else [])}),
+        "warnings": [f"{fit.burn_law}: {text}" for fit in fits for text in fit.warnings],
+        "best_timing": list(timing),
+    }
+
+
+def law_row(fit: CylinderFit) -> dict[str, Any]:
+    """Give one row of the comparison of burn laws: lists over the traces."""
+    return {
+        "law": fit.burn_law,
+        "file": [load.file for load in fit.loads],
+        "rmse_percent": [load.rmse_percent for load in fit.loads],
+        "imep_closed_error_percent": [load.imep_closed_error_percent for load in fit.loads],
+        "soc_cad": [load.soc_cad for load in fit.loads],
+        "onset_against_soi_cad": [load.onset_against_soi_cad for load in fit.loads],
+        "largest_error_bar": [load.largest_error_bar for load in fit.loads],
+        "largest_error_cad": [load.largest_error_cad for load in fit.loads],
+        "wall_heat_scale": fit.cylinder.wall_heat_scale,
+        "warnings": list(fit.warnings),
+    }
+
+
+def _unknown(profiles: Mapping[str, WallHeatProfile]) -> bool:
+    return any(not profile.identifiable for profile in profiles.values())
+
+
+def law_table(fits: Sequence[CylinderFit]) -> xr.Dataset:
+    """Tabulate the comparison of burn laws over law and trace."""
+    files = [load.file for load in fits[0].loads]
+    laws = [fit.burn_law for fit in fits]
+
+    def grid(name: str) -> list[list[float]]:
+        return [[float(getattr(load, name)) for load in fit.loads] for fit in fits]
+
+    dims = ("law", "file")
+    scales = [fit.cylinder.wall_heat_scale for fit in fits]
+    return labelled_dataset(
+        {
+            "law": ("law", laws, "-", "burn law and gamma"),
+            "file": ("file", files, "-", "trace"),
+            "rmse_percent": (dims, grid("rmse_percent")),
+            "imep_closed_error_percent": (dims, grid("imep_closed_error_percent")),
+            "soc_cad": (dims, grid("soc_cad")),
+            "onset_against_soi_cad": (
+                dims,
+                grid("onset_against_soi_cad"),
+                "°CA",
+                "fitted burn start minus SOI",
+            ),
+            "largest_error_bar": (
+                dims,
+                grid("largest_error_bar"),
+                "bar",
+                "largest local error, model minus measured",
+            ),
+            "largest_error_cad": (
+                dims,
+                grid("largest_error_cad"),
+                "°CA aTDC",
+                "angle of the largest local error",
+            ),
+            "wall_heat_scale": ("law", scales),
+        }
+    )

@@ -1,0 +1,113 @@
+"""Exact derivatives against extrapolated differences, and laws that need none."""
+
+from __future__ import annotations
+
+import itertools
+
+import numpy as np
+import pytest
+
+from mgdd import _core
+from mgdd.engine import Cylinder, OperatingPoint, sensitivities, simulate
+from mgdd.errors import ParameterError
+from mgdd.results import check_labels
+
+# Away from kinks: start, joint and end of the burn lie between grid angles.
+SOC = -6.37
+POINT = OperatingPoint(burn_duration_cad=33.3, trapped_mass_g=0.78)
+INPUTS = tuple(_core.differentiable_inputs())
+SHAPES = ("triangle", "wiebe", "double_wiebe")
+GAMMAS = ("constant", "linear", "polynomial")
+WALLS = ("woschni", "hohenberg")
+
+
+def with_input(cylinder, point, soc, name, value):
+    if name == "soc_cad":
+        return cylinder, point, value
+    if name in OperatingPoint.fields():
+        return cylinder, point.replace(**{name: value}), soc
+    return cylinder.replace(**{name: value}), point, soc
+
+
+def everything(cylinder, point, soc):
+    raw = _core.simulate(cylinder, point, soc, 1.0, "trapezoid")
+    return np.concatenate([raw["pressure_bar"], list(raw["indicators"].values())])
+
+
+def extrapolated(cylinder, point, name):
+    """Central differences at h and h/2, extrapolated to fourth order."""
+    x = {"soc_cad": SOC, **cylinder.to_dict(), **point.to_dict()}[name]
+    h = 1e-4 * (abs(x) or 1.0)
+
+    def central(step):
+        high = everything(*with_input(cylinder, point, SOC, name, x + step))
+        low = everything(*with_input(cylinder, point, SOC, name, x - step))
+        return (high - low) / (2.0 * step)
+
+    return (4.0 * central(0.5 * h) - central(h)) / 3.0, 1.0 / (abs(x) or 1.0)
+
+
+@pytest.mark.parametrize(("shape", "gamma", "wall"), itertools.product(SHAPES, GAMMAS, WALLS))
+def test_every_derivative_agrees_with_differences(shape, gamma, wall):
+    cylinder = Cylinder(
+        burn_shape=shape, gamma_model=gamma, wall_heat_model=wall, second_duration_cad=50.3, wall_heat_scale=0.8
+    )
+    exact = sensitivities(cylinder, POINT, wrt=INPUTS, soc_cad=SOC)
+    value = everything(cylinder, POINT, SOC)
+    names = list(_core.indicator_units())
+    n = exact.sizes["crank_angle_cad"]
+    for name in INPUTS:
+        if name == "ignition_c1" or name == "wall_heat_scale" and cylinder.wall_heat_scale == 0.0:
+            continue
+        difference, per = extrapolated(cylinder, POINT, name)
+        one = exact.sel(parameter=name)
+        trace = one.pressure_bar.values
+        scale = max(np.abs(trace).max(), value[:n].max() * per)
+        np.testing.assert_allclose(trace, difference[:n], rtol=0.0, atol=2e-6 * scale, err_msg=name)
+        for i, indicator in enumerate(names):
+            found = float(one[indicator])
+            scale = max(abs(found), abs(value[n + i]) * per, 1e-3 * per)
+            assert found == pytest.approx(difference[n + i], rel=0.0, abs=2e-6 * scale), (indicator, name)
+
+
+@pytest.mark.parametrize("shape", SHAPES)
+def test_timing_moves_the_burn_and_nothing_before_it(shape):
+    d = sensitivities(Cylinder(burn_shape=shape), OperatingPoint(), wrt="soc_cad", soc_cad=-6.3)
+    for name in ("ca10_cad", "ca50_cad", "ca90_cad"):
+        assert float(d[name].squeeze()) == pytest.approx(1.0, abs=1e-9)
+    before = d.pressure_bar.where(d.crank_angle_cad < -6.3, drop=True)
+    assert (before == 0.0).all()
+    assert float(d.pressure_bar.sel(crank_angle_cad=0.0).squeeze()) < 0.0
+
+
+def test_fuel_and_heating_value_trade():
+    d = sensitivities(
+        Cylinder(), OperatingPoint(burn_duration_cad=30.0), wrt=["fuel_mg", "lower_heating_value_mj_per_kg"]
+    )
+    fuel, heat = d.pressure_bar.values.T
+    np.testing.assert_allclose(20.0 * fuel, 42.8 * heat, rtol=1e-12, atol=1e-12)
+
+
+def test_adiabatic_work_is_homogeneous_in_charge_and_fuel():
+    cylinder, point = Cylinder(wall_heat_scale=0.0), OperatingPoint(burn_duration_cad=30.0)
+    d = sensitivities(cylinder, point, wrt=["intake_pressure_kpa", "fuel_mg"])
+    by_charge, by_fuel = d.imep_gross_bar.values
+    value = float(simulate(cylinder, point).imep_gross_bar)
+    assert 150.0 * by_charge + 20.0 * by_fuel == pytest.approx(value, rel=1e-12)
+
+
+def test_best_timing_is_where_the_derivative_vanishes():
+    from mgdd.engine import optimum
+
+    best = optimum(Cylinder(), OperatingPoint())
+    d = sensitivities(Cylinder(), OperatingPoint(), wrt=["soc_cad"], soc_cad=best.soc_cad)
+    assert abs(float(d.efficiency_gross.squeeze())) < 1e-8
+
+
+def test_dataset_says_units_and_refuses_by_name():
+    d = sensitivities(Cylinder(), OperatingPoint())
+    check_labels(d)
+    assert d.parameter_units.sel(parameter="fuel_mg").item() == "mg"
+    for name in ("evo_cad", "soc"):
+        with pytest.raises(ParameterError, match=f"'{name}'.*wall_heat_scale"):
+            sensitivities(Cylinder(), OperatingPoint(), wrt=["fuel_mg", name])

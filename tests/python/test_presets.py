@@ -1,0 +1,161 @@
+"""Parameter records and presets: equality, hash, pickle, text, and TOML there and back for every field."""
+
+from __future__ import annotations
+
+import copy
+import math
+import pickle
+
+import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
+
+from mgdd import presets
+from mgdd.engine import Cylinder, OperatingPoint
+from mgdd.errors import DataError, ParameterError
+from mgdd.presets import Preset
+
+RECORDS = (Cylinder, OperatingPoint)
+CHANGES = [(kind, name) for kind in RECORDS for name in kind.fields()]
+
+
+def another(kind, name):
+    """A valid value of the field that is not its default."""
+    field = kind.fields()[name]
+    if "choices" in field:
+        return next(choice for choice in field["choices"] if choice != field["default"])
+    if field["default"] is None:
+        return 17.25
+    return field["default"] * 1.01 + (0.015625 if field["default"] == 0.0 else 0.0)
+
+
+@pytest.mark.parametrize(("kind", "name"), CHANGES, ids=[f"{k.__name__}.{n}" for k, n in CHANGES])
+def test_every_field_survives_every_way_round(kind, name, tmp_path):
+    value = another(kind, name)
+    changed, default = kind(**{name: value}), kind()
+    assert getattr(changed, name) == value
+    assert changed == default.replace(**{name: value})
+    assert changed != default
+    assert hash(changed) == hash(kind(**{name: value}))
+    assert hash(changed) != hash(default)
+    assert changed.to_dict()[name] == value
+    for copied in (pickle.loads(pickle.dumps(changed)), copy.deepcopy(changed), eval(repr(changed))):
+        assert copied == changed
+        assert hash(copied) == hash(changed)
+    assert repr(changed) == f"{kind.__name__}({name}={value!r})"
+    own = {"cylinder": changed} if kind is Cylinder else {"point": changed}
+    preset = Preset(name="mine", title='a "title", °CA', **{"cylinder": Cylinder(), "point": OperatingPoint(), **own})
+    file = tmp_path / "mine.toml"
+    file.write_text(preset.to_toml(), encoding="utf-8")
+    back = presets.load(file)
+    assert (back.name, back.title) == (preset.name, preset.title)
+    assert back.cylinder == preset.cylinder
+    assert back.point == preset.point
+
+
+def test_records_are_immutable_and_equal_to_their_own_kind_only():
+    cylinder = Cylinder()
+    with pytest.raises(AttributeError):
+        cylinder.bore_mm = 90.0
+    assert cylinder != OperatingPoint()
+    assert cylinder != "Cylinder()"
+    assert repr(cylinder) == "Cylinder()"
+    assert len({cylinder, Cylinder(), Cylinder(bore_mm=90.0)}) == 2
+    with pytest.raises(TypeError):
+        Cylinder(90.0)
+
+
+@given(
+    bore=st.floats(20.0, 500.0),
+    ratio=st.floats(5.0, 30.0),
+    scale=st.floats(0.0, 3.0),
+    slope=st.floats(-1.0e-4, 1.0e-4),
+)
+@settings(max_examples=50)
+def test_any_number_survives_exactly(bore, ratio, scale, slope, tmp_path_factory):
+    cylinder = Cylinder(
+        bore_mm=bore, compression_ratio=ratio, wall_heat_scale=scale, gamma_linear_slope_per_k=slope
+    )
+    assert pickle.loads(pickle.dumps(cylinder)) == cylinder
+    assert eval(repr(cylinder)) == cylinder
+    file = tmp_path_factory.mktemp("preset") / "x.toml"
+    file.write_text(Preset(name="x", title="x", cylinder=cylinder, point=OperatingPoint()).to_toml())
+    assert presets.load(file).cylinder == cylinder
+
+
+@pytest.mark.parametrize("name", presets.available())
+def test_shipped_presets_state_a_source_for_every_value(name, tmp_path):
+    preset = presets.load(name)
+    assert preset.name == name
+    for table, record in (("cylinder", preset.cylinder), ("point", preset.point)):
+        for key, value in record.to_dict().items():
+            if value is not None:
+                assert len(preset.sources[f"{table}.{key}"]) > 3, key
+    file = tmp_path / "copy.toml"
+    file.write_text(preset.to_toml(), encoding="utf-8")
+    assert presets.load(file) == preset
+
+
+def test_the_two_engines_are_what_they_say():
+    puma, hd = presets.load("puma_single"), presets.load("hd_diesel_128x144")
+    assert puma.cylinder == Cylinder()
+    assert puma.point == OperatingPoint()
+    assert "plausible" in puma.title.lower()
+    assert (hd.cylinder.bore_mm, hd.cylinder.stroke_mm, hd.cylinder.connecting_rod_mm) == (128.0, 144.0, 241.5)
+    assert (hd.cylinder.compression_ratio, hd.cylinder.ivc_cad, hd.cylinder.evo_cad) == (20.3, -143.0, 125.0)
+    assert hd.point.speed_rpm == 1200.0
+
+
+def written(tmp_path, text):
+    file = tmp_path / "bad.toml"
+    file.write_text(text, encoding="utf-8")
+    return file
+
+
+BORE = 'bore_mm = { value = 90.0, unit = "mm", source = "mine" }'
+
+
+@pytest.mark.parametrize(
+    ("text", "error", "match"),
+    [
+        (f"[cylinder]\n{BORE.replace('bore', 'bohr')}", ParameterError, "bohr_mm: unknown key: did you mean 'bore_mm'"),
+        (f"[cylinder]\n{BORE.replace('90.0', '-90.0')}", ParameterError, "bore_mm = -90 mm: must be > 0"),
+        (f"[cylinder]\n{BORE.replace('90.0', 'nan')}", ParameterError, "bore_mm = nan"),
+        (f"[cylinder]\n{BORE.replace('\"mm\"', '\"cm\"')}", ParameterError, "unit = 'cm': must be 'mm'"),
+        ('[cylinder]\nbore_mm = { value = 90.0, source = "mine" }', ParameterError, "unit = None: must be 'mm'"),
+        ("[cylinder]\nbore_mm = 90.0", ParameterError, 'bore_mm: write .* unit = "mm"'),
+        (f"[cylinder]\n{BORE.replace('source', 'origin')}", ParameterError, "bore_mm: write"),
+        (f"[cylinder]\n{BORE.replace('90.0', '\"wide\"')}", ParameterError, "bore_mm"),
+        (f"[cylinder]\n{BORE}\n[motor]\nx = 1", ParameterError, "unknown key 'motor'"),
+        ("[point]\n", DataError, r"no table \[cylinder\]"),
+        ("cylinder = 3", DataError, r"\[cylinder\] must be a table"),
+        ("[cylinder", DataError, "not valid TOML"),
+        ("", DataError, r"no table \[cylinder\]"),
+        (
+            '[cylinder]\nburn_shape = { value = "square", unit = "-", source = "mine" }',
+            ParameterError,
+            "burn_shape = 'square'.*triangle",
+        ),
+    ],
+)
+def test_a_bad_preset_is_refused_with_file_field_and_remedy(text, error, match, tmp_path):
+    file = written(tmp_path, text)
+    with pytest.raises(error, match=match) as caught:
+        presets.load(file)
+    assert "bad.toml" in str(caught.value)
+
+
+def test_an_unknown_preset_suggests_the_nearest(tmp_path):
+    with pytest.raises(ParameterError, match="did you mean 'puma_single'"):
+        presets.load("puma_singel")
+    with pytest.raises(FileNotFoundError):
+        presets.load(tmp_path / "none.toml")
+
+
+def test_a_partial_preset_keeps_the_defaults(tmp_path):
+    preset = presets.load(written(tmp_path, f"[cylinder]\n{BORE}"))
+    assert preset.cylinder == Cylinder(bore_mm=90.0)
+    assert preset.point == OperatingPoint()
+    assert preset.name == "bad"
+    assert preset.sources["cylinder.bore_mm"] == "mine"
+    assert math.isclose(preset.cylinder.swept_volume_l, math.pi / 4.0 * 0.9**2 * 0.86)
