@@ -95,7 +95,7 @@ def computed(text, quantity, at):
     return float(cycle[quantity])
 
 
-def test_every_reference_number_holds(root, caplog):
+def test_every_reference_number_holds(root):
     rows = [line.split(",") for line in (root / "tests/data/engine_golden.csv").read_text().splitlines()]
     rows = [row for row in rows if not row[0].startswith("#")][1:]
     wrong, compared = [], 0
@@ -229,6 +229,8 @@ def test_dataset_is_labelled_and_consistent():
     np.testing.assert_allclose(released, 12.0 * 42.8 * cycle.burned_fraction.values[1:], atol=1e-9)
     before = cycle.crank_angle_cad < -3.0
     np.testing.assert_array_equal(cycle.pressure_bar[before], cycle.motored_pressure_bar[before])
+    motored = simulate(Cylinder(), OperatingPoint(fuel_mg=0.0), step_cad=0.7)
+    np.testing.assert_array_equal(cycle.motored_pressure_bar, motored.pressure_bar)
     assert float(cycle.fuel_heat_j) == pytest.approx(12.0 * 42.8, rel=1e-15)
     burned = np.interp([float(cycle.ca50_cad)], cycle.crank_angle_cad, cycle.burned_fraction)
     assert burned[0] == pytest.approx(0.5, abs=2e-3)
@@ -242,11 +244,17 @@ def test_sweep_equals_single_cycles():
         one = simulate(Cylinder(), OperatingPoint(), soc_cad=soc)
         for name in ("efficiency_gross", "p_max_bar", "heat_loss_fraction", "ringing_intensity_mw_per_m2"):
             assert float(sweep[name].sel(soc_cad=soc)) == float(one[name])
-    assert (np.diff(timing_sweep(Cylinder(), OperatingPoint()).nox_affine_log_ppm) < 0.0).all()
+    np.testing.assert_array_equal(sweep.nox_affine_log_ppm, NoxProxy().affine_log_ppm(sweep.t_max_k))
+    np.testing.assert_array_equal(sweep.nox_arrhenius_ppm, NoxProxy().arrhenius_ppm(sweep.t_max_k))
+    many = timing_sweep(Cylinder(), OperatingPoint(), nox=NoxProxy(reference_nox_ppm=500.0))
+    assert (np.diff(many.nox_affine_log_ppm) < 0.0).all()  # NOx falls as the burn moves later
+    assert float(many.nox_affine_log_ppm.sel(soc_cad=-20.0)) == pytest.approx(
+        float(sweep.nox_affine_log_ppm.sel(soc_cad=-20.0)) * 500.0 / 1200.0, rel=1e-12
+    )
 
 
 def test_a_scan_lets_other_threads_work():
-    timings_cad = np.full(40_000, -6.0)
+    timings_cad = np.full(100_000, -6.0)
     done = threading.Event()
     ticks = []
 
@@ -264,4 +272,4 @@ def test_a_scan_lets_other_threads_work():
     gaps = np.diff([begin, *ticks])
     took = time.perf_counter() - begin
     assert len(ticks) > 20  # with the lock held, one long gap would be all
-    assert gaps.max() < 0.5 * took
+    assert gaps.max() < 0.7 * took

@@ -35,7 +35,9 @@ def test_agrees_with_a_search_without_derivatives(speed, fuel, scale, shape, obj
     point = POINT.replace(speed_rpm=speed, fuel_mg=fuel)
     best = optimum(cylinder, point, objective)
     other = minimize_scalar(
-        lambda soc: -value(cylinder, point, soc, objective), bounds=(-30.0, 10.0), method="bounded",
+        lambda soc: -value(cylinder, point, soc, objective),
+        bounds=(-30.0, 10.0),
+        method="bounded",
         options={"xatol": 1e-6},
     )
     assert best.value >= -other.fun * (1.0 - 1e-9)

@@ -39,9 +39,7 @@ def test_analysis_inverts_the_simulation(soc, fuel, speed, scale, shape, wall):
     assert float(back.heat_gross_cumulative_j[-1]) == pytest.approx(42.8 * fuel, rel=1e-9)
     net = float(back.heat_net_cumulative_j[-1])
     assert net + float(cycle.heat_loss_j) == pytest.approx(42.8 * fuel, rel=1e-9)
-    np.testing.assert_allclose(
-        back.heat_release_gross_j_per_cad, cycle.heat_release_j_per_cad, atol=1e-9 * 42.8 * fuel
-    )
+    np.testing.assert_allclose(back.heat_release_gross_j_per_cad, cycle.heat_release_j_per_cad, atol=1e-9 * 42.8 * fuel)
     assert float(back.ca50_cad) == pytest.approx(float(cycle.ca50_cad), abs=0.1)
     assert float(back.imep_closed_bar) == pytest.approx(float(cycle.imep_closed_bar), rel=1e-12)
 
@@ -78,9 +76,7 @@ def test_another_integrator_shifts_the_heat(integrator, percent, tolerance):
 @pytest.mark.parametrize("offset", [-0.3, -0.12, 0.05, 0.3])
 def test_pegging_recovers_an_offset(method, offset):
     cycle = simulate(ADIABATIC, MOTORED)
-    back = analyze(
-        moved(cycle, pressure=offset), ADIABATIC, point=MOTORED, pegging=method, pegging_exponent=1.37
-    )
+    back = analyze(moved(cycle, pressure=offset), ADIABATIC, point=MOTORED, pegging=method, pegging_exponent=1.37)
     assert float(back.pegging_bar) == pytest.approx(-offset, abs=0.005)
     np.testing.assert_allclose(back.pressure_bar, cycle.pressure_bar, atol=0.005)
     assert back.attrs["method"] == method
@@ -88,7 +84,7 @@ def test_pegging_recovers_an_offset(method, offset):
 
 def test_inlet_pegging_reads_bottom_dead_centre():
     angle = np.arange(-200.0, 131.0)
-    trace = pressure_trace(angle, np.where(angle < -160.0, 0.9 + 0.01 * (angle + 180.0), 3.0))
+    trace = pressure_trace(angle, np.where(angle < -160.0, 0.9 + 0.01 * (angle + 180.0), 30.0))
     for keyword in ({"inlet_pressure_kpa": 150.0}, {"point": POINT}):
         back = analyze(trace, CYLINDER, pegging="inlet", **keyword)
         assert float(back.pegging_bar) == pytest.approx(0.6, abs=1e-12)
@@ -133,7 +129,7 @@ def test_measured_traces_give_their_published_figures(load):
     check_labels(back)
     assert trace.sizes["crank_angle_cad"] == 267
     assert float(trace.pressure_bar.max()) == pytest.approx(own[0], abs=0.05)
-    assert float(trace.crank_angle_cad[trace.pressure_bar.argmax()]) == own[1]
+    assert float(trace.crank_angle_cad[int(trace.pressure_bar.values.argmax())]) == own[1]
     assert float(back.p_max_cad) == pytest.approx(own[1], abs=0.5)
     assert float(back.n_compression) == pytest.approx(own[2], abs=1e-3)
     assert float(back.n_expansion) == pytest.approx(own[3], abs=1e-3)

@@ -246,13 +246,8 @@ TraceAnalysis analyze_trace(const Column& angle_cad, const Column& pressure_bar,
     throw DataError("no sample lies in the heat release window " + text(options.heat_from_cad) + " to " +
                     text(options.heat_to_cad) + " °CA aTDC");
   }
-  if (options.total_at_end) {
-    net_best = net;
-    gross_best = gross;
-    net_peak = gross_peak = last;
-  }
-  a.heat_net_j_total = net_best;
-  a.heat_gross_j_total = gross_best;
+  a.heat_net_j_total = options.total_at_end ? net : net_best;
+  a.heat_gross_j_total = options.total_at_end ? gross : gross_best;
   const Column& cumulative = options.fractions_of_gross ? a.heat_gross_cumulative_j : a.heat_net_cumulative_j;
   const double total = options.fractions_of_gross ? gross_best : net_best;
   const std::size_t peak = options.fractions_of_gross ? gross_peak : net_peak;

@@ -25,7 +25,8 @@ TEST(EngineGeometry, FollowsThePinOfTheMechanism) {
     const double travel = 0.155 + 0.043 - pin;
     EXPECT_NEAR(g.volume_m3(angle), g.clearance_m3 + travel * g.piston_area_m2, 1e-16);
     EXPECT_NEAR(g.volume_m3(angle), g.volume_m3(-angle), 1e-18);
-    const double area = 2.0 * g.piston_area_m2 + std::numbers::pi * 0.086 * (travel + g.clearance_m3 / g.piston_area_m2);
+    const double area =
+        2.0 * g.piston_area_m2 + std::numbers::pi * 0.086 * (travel + g.clearance_m3 / g.piston_area_m2);
     EXPECT_NEAR(g.wall_area_m2(g.volume_m3(angle)), area, 1e-12);
   }
 }
@@ -34,8 +35,9 @@ TEST(EngineGeometry, SlopeIntegratesToTheVolume) {
   const Geometry<double> g{Cylinder{}};
   double volume = g.volume_m3(-140.0);
   for (double a = -140.0; a < 130.0 - 1e-9; a += 1.0) {  // Simpson
-    volume += (g.volume_slope_m3_per_cad(a) + 4.0 * g.volume_slope_m3_per_cad(a + 0.5) +
-               g.volume_slope_m3_per_cad(a + 1.0)) / 6.0;
+    volume +=
+        (g.volume_slope_m3_per_cad(a) + 4.0 * g.volume_slope_m3_per_cad(a + 0.5) + g.volume_slope_m3_per_cad(a + 1.0)) /
+        6.0;
   }
   EXPECT_NEAR(volume / g.volume_m3(130.0), 1.0, 1e-9);
 }

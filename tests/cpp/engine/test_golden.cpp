@@ -79,8 +79,7 @@ TEST(EngineGolden, EveryReferenceNumberHolds) {
   for (const GoldenRow& row : test_support::read_golden()) {
     if (row.quantity.starts_with("fit_")) continue;
     ++rows;
-    EXPECT_NEAR(computed(row), row.value, row.tolerance)
-        << row.settings << " -> " << row.quantity << " " << row.at;
+    EXPECT_NEAR(computed(row), row.value, row.tolerance) << row.settings << " -> " << row.quantity << " " << row.at;
   }
   EXPECT_GT(rows, 170);  // the file was read
 }

@@ -133,16 +133,19 @@ TEST(EngineSensitivity, AdiabaticPressureIsHomogeneous) {
   EXPECT_NEAR(150.0 * s.indicators[0].t_max_k + 20.0 * s.indicators[1].t_max_k, 0.0, 1e-8);
 }
 
+// Naming an optional of the point holds it constant for all inputs, also for those of another pass.
 TEST(EngineSensitivity, NamesAreIndependentOfTheirCompany) {
   const EngineCase c;
+  EngineCase fixed = c;
+  fixed.point.burn_duration_cad = 30.0;
+  fixed.point.trapped_mass_g = run(c).charge.gas_j_per_k / units::gas_constant_j_per_molk * 28.9647;
   const std::vector<std::string> names = differentiable_inputs();
   const Sensitivities all = sensitivities(c.cylinder, c.point, -6.3, names);
-  for (std::size_t i : {std::size_t{0}, std::size_t{9}, names.size() - 1}) {
-    EngineCase fixed = c;  // naming an optional holds it constant, also for its neighbours
-    fixed.point.burn_duration_cad = 30.0;
-    fixed.point.trapped_mass_g = run(c).charge.gas_j_per_k / units::gas_constant_j_per_molk * 28.9647;
+  for (std::size_t i = 0; i < names.size(); ++i) {
     const Sensitivities one = sensitivities(fixed.cylinder, fixed.point, -6.3, {names[i]});
-    EXPECT_NEAR(one.indicators[0].imep_gross_bar, all.indicators[i].imep_gross_bar, 1e-10) << names[i];
+    EXPECT_NEAR(one.indicators[0].imep_gross_bar, all.indicators[i].imep_gross_bar,
+                1e-9 * (1.0 + std::abs(all.indicators[i].imep_gross_bar)))
+        << names[i];
   }
 }
 

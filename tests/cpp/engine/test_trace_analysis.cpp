@@ -55,8 +55,8 @@ TEST(EngineTrace, NetHeatPutsTheMiddleEarlier) {
 }
 
 TEST(EngineTrace, AnotherGammaOrIntegratorShiftsTheHeatByKnownAmounts) {
-  for (const auto& [gamma, percent] : {std::pair{1.30, 7.7}, std::pair{1.33, 4.0}, std::pair{1.35, 1.9},
-                                       std::pair{1.40, -2.5}}) {
+  for (const auto& [gamma, percent] :
+       {std::pair{1.30, 7.7}, std::pair{1.33, 4.0}, std::pair{1.35, 1.9}, std::pair{1.40, -2.5}}) {
     TraceOptions o = whole(-6.0);
     o.gamma_source = AnalysisGamma::constant;
     o.gamma = gamma;
@@ -177,6 +177,16 @@ TEST(EngineTrace, AMotoredPeakFarFromTopDeadCentreIsNoticed) {
       a += error;
     }
     EXPECT_TRUE(says(analyze_trace(angle, cycle.pressures_bar(), c.cylinder, c.point, {}), "TDC")) << error;
+  }
+}
+
+TEST(EngineTrace, ALittleFuelIsNotTakenForNone) {
+  for (const auto& [fuel, motored] : {std::pair{"0", true}, std::pair{"3", false}, std::pair{"20", false}}) {
+    EXPECT_EQ(analyze(EngineCase("fuel_mg=" + std::string(fuel)), TraceOptions{}).motored, motored) << fuel;
+  }
+  for (const auto& trace : test_support::hd_traces()) {
+    EXPECT_FALSE(
+        analyze_trace(trace.angle_cad, trace.pressure_bar, test_support::hd_cylinder(), trace.point, {}).motored);
   }
 }
 

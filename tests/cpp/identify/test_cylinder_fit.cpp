@@ -61,7 +61,8 @@ struct Plant {
       t.angle_cad = cycle.angles();
       t.pressure_bar = cycle.pressures_bar();
       // p(IVC) fixes the charge and is not a residual: noise there is another experiment.
-      for (std::size_t k = 1; k < t.pressure_bar.size() && noise_bar > 0.0; ++k) t.pressure_bar[k] += noise(random);
+      for (std::size_t k = 1; k < t.pressure_bar.size() && noise_bar > 0.0; ++k)
+        t.pressure_bar[k] += noise(random);
       traces.push_back(t);
     }
   }
@@ -121,8 +122,8 @@ TEST(IdentifyFit, WallHeatIsIdentifiableWithKnownFuel) {
 // Woschni's film goes with scale (C2 Sp + Cp ...)^0.8: the three factors trade exactly. Cetane acts on nothing here.
 TEST(IdentifyFit, ExactlyTradingParametersAreNamed) {
   const Plant plant;
-  const CylinderFit f = fit(plant.traces, plant.start(),
-                            with(burn_names, {"wall_heat_scale", "woschni_c2", "woschni_cp_m_per_sk"}));
+  const CylinderFit f =
+      fit(plant.traces, plant.start(), with(burn_names, {"wall_heat_scale", "woschni_c2", "woschni_cp_m_per_sk"}));
   for (const char* name : {"wall_heat_scale", "woschni_c2", "woschni_cp_m_per_sk"}) {
     EXPECT_TRUE(names(f.report, name)) << name;
   }
@@ -168,8 +169,8 @@ TEST(IdentifyFit, DoubleWiebeMeetsItsBarAndMeasuredTracesDoNotTellTheWallHeat) {
   }
   c.burn_shape = BurnShape::double_wiebe;
   c.gamma_model = GammaModel::constant;
-  const std::vector<std::string> shape = with(
-      burn_names, {"wiebe_m", "second_fraction", "second_delay_cad", "second_duration_cad", "second_wiebe_m"});
+  const std::vector<std::string> shape =
+      with(burn_names, {"wiebe_m", "second_fraction", "second_delay_cad", "second_duration_cad", "second_wiebe_m"});
   const CylinderFit both = fit(traces, c, with(shape, {"wall_heat_scale"}));
   const double reference[] = {0.17, 0.17, 0.14, 0.27};
   for (std::size_t i = 0; i < 4; ++i) {

@@ -48,8 +48,9 @@ struct Problem {
   VectorXd x;
 
   explicit Problem(BurnShape shape)
-      : traces(two()), residual(traces, cylinder(shape), starts(), common(), {0, 1, 2, 3, 4, 5, 6, 7}, 0.5,
-                                engine::Integrator::trapezoid) {
+      : traces(two()),
+        residual(traces, cylinder(shape), starts(), common(), {0, 1, 2, 3, 4, 5, 6, 7}, 0.5,
+                 engine::Integrator::trapezoid) {
     x.resize(residual.n_parameters());
     x[0] = 1.38;  // fields come in the order of the record: gamma before the wall heat
     x[1] = 0.6;

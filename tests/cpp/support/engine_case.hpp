@@ -1,4 +1,5 @@
-// A cycle described by words ("fuel_mg=8 integrator=split"), the reference numbers that use them, and the measured traces.
+// A cycle described by words ("fuel_mg=8 integrator=split"), the reference numbers that use them, and the measured
+// traces.
 #pragma once
 
 #include <limits>
@@ -42,7 +43,8 @@ struct Cycle {
 };
 Cycle run(const EngineCase& c);
 
-/// Largest value of an indicator over SOC in [-30, 10] by golden section: no derivative, another method than the package's.
+/// Largest value of an indicator over SOC in [-30, 10] by golden section: no derivative, another method than the
+/// package's.
 double best_soc_cad(EngineCase c, std::string_view indicator);
 
 double indicator(const engine::Indicators<double>& of, std::string_view name);

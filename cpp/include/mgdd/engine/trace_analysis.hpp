@@ -33,7 +33,7 @@ struct TraceOptions {
   double heat_from_cad = -10.0;  ///< window of the cumulative heat
   double heat_to_cad = 90.0;
   double burn_from_cad = -10.0;     ///< Woschni's combustion term acts from here on
-  bool total_at_end = false;          ///< heat at the window's end instead of its peak, for traces without drift
+  bool total_at_end = false;        ///< report the heat at the window's end, not its peak; burn angles keep the peak
   bool fractions_of_gross = false;  ///< CA10/50/90 of gross heat instead of net
 };
 
