@@ -10,6 +10,7 @@ import pytest
 from mgdd import _core
 from mgdd.engine import Cylinder, OperatingPoint, sensitivities, simulate
 from mgdd.errors import ParameterError
+from mgdd.results import check_labels
 
 # Away from kinks: start, joint and end of the burn lie between grid angles.
 SOC = -6.37
@@ -58,11 +59,11 @@ def test_every_derivative_agrees_with_differences(shape, gamma, wall):
     for name in INPUTS:
         difference, per = extrapolated(cylinder, POINT, name)
         one = exact.sel(parameter=name)
-        trace = one.pressure_bar.values
+        trace = one.d_pressure_bar.values
         scale = max(np.abs(trace).max(), value[:n].max() * per)
         np.testing.assert_allclose(trace, difference[:n], rtol=0.0, atol=2e-6 * scale, err_msg=name)
         for i, indicator in enumerate(names):
-            found = float(one[indicator])
+            found = float(one[f"d_{indicator}"])
             scale = max(abs(found), abs(value[n + i]) * per, 1e-3 * per)
             assert found == pytest.approx(difference[n + i], rel=0.0, abs=2e-6 * scale), (indicator, name)
 
@@ -71,24 +72,24 @@ def test_every_derivative_agrees_with_differences(shape, gamma, wall):
 def test_timing_moves_the_burn_and_nothing_before_it(shape):
     d = sensitivities(Cylinder(burn_shape=shape), OperatingPoint(), wrt="soc_cad", soc_cad=-6.3)
     for name in ("ca10_cad", "ca50_cad", "ca90_cad"):
-        assert float(d[name].squeeze()) == pytest.approx(1.0, abs=1e-9)
-    before = d.pressure_bar.where(d.crank_angle_cad < -6.3, drop=True)
+        assert float(d[f"d_{name}"].squeeze()) == pytest.approx(1.0, abs=1e-9)
+    before = d.d_pressure_bar.where(d.crank_angle_cad < -6.3, drop=True)
     assert (before == 0.0).all()
-    assert float(d.pressure_bar.sel(crank_angle_cad=0.0).squeeze()) < 0.0
+    assert float(d.d_pressure_bar.sel(crank_angle_cad=0.0).squeeze()) < 0.0
 
 
 def test_fuel_and_heating_value_trade():
     d = sensitivities(
         Cylinder(), OperatingPoint(burn_duration_cad=30.0), wrt=["fuel_mg", "lower_heating_value_mj_per_kg"]
     )
-    fuel, heat = d.pressure_bar.values.T
+    fuel, heat = d.d_pressure_bar.values.T
     np.testing.assert_allclose(20.0 * fuel, 42.8 * heat, rtol=1e-12, atol=1e-12)
 
 
 def test_adiabatic_work_is_homogeneous_in_charge_and_fuel():
     cylinder, point = Cylinder(wall_heat_scale=0.0), OperatingPoint(burn_duration_cad=30.0)
     d = sensitivities(cylinder, point, wrt=["intake_pressure_kpa", "fuel_mg"])
-    by_charge, by_fuel = d.imep_gross_bar.values
+    by_charge, by_fuel = d.d_imep_gross_bar.values
     value = float(simulate(cylinder, point).imep_gross_bar)
     assert 150.0 * by_charge + 20.0 * by_fuel == pytest.approx(value, rel=1e-12)
 
@@ -98,14 +99,13 @@ def test_best_timing_is_where_the_derivative_vanishes():
 
     best = optimum(Cylinder(), OperatingPoint())
     d = sensitivities(Cylinder(), OperatingPoint(), wrt=["soc_cad"], soc_cad=best.soc_cad)
-    assert abs(float(d.efficiency_gross.squeeze())) < 1e-8
+    assert abs(float(d.d_efficiency_gross.squeeze())) < 1e-8
 
 
 def test_dataset_says_units_and_refuses_by_name():
     d = sensitivities(Cylinder(), OperatingPoint())
-    for name in d.variables:
-        assert d[name].attrs["long_name"], name
-        assert d[name].attrs["units"], name
+    check_labels(d)
+    assert d["d_p_max_bar"].attrs["units"] == "bar per unit of the parameter"
     assert d.parameter_units.sel(parameter="fuel_mg").item() == "mg"
     for name in ("evo_cad", "soc"):
         with pytest.raises(ParameterError, match=f"'{name}'.*wall_heat_scale"):

@@ -163,7 +163,7 @@ def sensitivities(
     Returns
     -------
     xarray.Dataset
-        The names of `simulate` over ``parameter``, each per unit of that parameter: ``pressure_bar(crank_angle_cad,
+        ``d_NAME`` for the names of `simulate`, per unit of the parameter: ``d_pressure_bar(crank_angle_cad,
         parameter)`` and the indicators over ``parameter``. Coordinate ``parameter_units`` says the units.
 
     Raises
@@ -179,7 +179,7 @@ def sensitivities(
     --------
     >>> from mgdd.engine import Cylinder, OperatingPoint, sensitivities
     >>> d = sensitivities(Cylinder(), OperatingPoint(), wrt=["soc_cad"])
-    >>> float(d["ca50_cad"].sel(parameter="soc_cad"))
+    >>> float(d["d_ca50_cad"].sel(parameter="soc_cad"))
     1.0
     """
     names = [wrt] if isinstance(wrt, str) else list(wrt)
@@ -201,7 +201,7 @@ def sensitivities(
     for name, (dims, values) in columns.items():
         label = VARIABLES[name]
         units = f"{label.units} per unit of the parameter"
-        out[name] = (dims, values, {"units": units, "long_name": f"sensitivity of {label.long_name}"})
+        out[f"d_{name}"] = (dims, values, {"units": units, "long_name": f"sensitivity of {label.long_name}"})
     return out
 
 
