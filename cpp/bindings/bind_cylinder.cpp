@@ -110,7 +110,13 @@ double as_number(const py::handle& key, const py::handle& value) {
     throw ParameterError(std::string(py::str(key)) + " = " + std::string(py::str(py::repr(value))) +
                          ": must be a number");
   }
-  return value.cast<double>();
+  const py::object number = py::reinterpret_steal<py::object>(PyNumber_Float(value.ptr()));
+  if (!number) {
+    PyErr_Clear();
+    throw ParameterError(std::string(py::str(key)) + " = " + std::string(py::str(py::repr(value))) +
+                         ": must be one real number");
+  }
+  return number.cast<double>();
 }
 
 [[noreturn]] void unknown_field(const char* owner, const py::handle& key, const py::dict& known) {

@@ -1,7 +1,10 @@
 // Binds include/mgdd/engine: the cycle, its sensitivities, ignition delay and the NOx proxy.
+#include <algorithm>
 #include <cmath>
 #include <cstddef>
+#include <optional>
 #include <string>
+#include <utility>
 #include <vector>
 
 #include "binding.hpp"
@@ -29,20 +32,21 @@ py::dict to_dict(const Indicators<double>& indicators) {
   return out;
 }
 
-void check(const Cylinder& cylinder, const OperatingPoint& point, double soc_cad) {
-  validate(cylinder);
-  validate(point);
-  validate_timing("soc_cad", soc_cad, cylinder);
-}
+// Parsed and checked with the GIL, computed without: the release ends with the scope or by reset().
+using FreeGil = std::optional<py::gil_scoped_release>;
 
 // Traces of one cycle; rates belong to the step that ends at the sample, and are zero at the first.
 py::dict simulate(const Cylinder& cylinder, const OperatingPoint& point, double soc_cad, double step_cad,
                   const std::string& integrator) {
-  check(cylinder, point, soc_cad);
-  const CycleModel<double> model(cylinder, crank_grid(cylinder, step_cad), parse_integrator(integrator));
+  validate_cycle(cylinder, point, soc_cad);
+  const Integrator scheme = parse_integrator(integrator);
+  FreeGil free_gil(std::in_place);
+  const CycleModel<double> model(cylinder, crank_grid(cylinder, step_cad), scheme);
   CycleWorkspace<double> work = model.make_workspace();
   const Charge<double> charge = model.charge(point);
   model.run(charge, soc_cad, work);
+  model.require_physical(work);
+  const Indicators<double> indicators = model.indicators(charge, soc_cad, work);
   const std::vector<double> angle(model.angles_cad().begin(), model.angles_cad().end());
   const std::size_t n = angle.size();
   std::vector<double> pressure(n), volume(n), temperature(n), burned(n, 0.0), release(n, 0.0), loss(n, 0.0),
@@ -61,8 +65,11 @@ py::dict simulate(const Cylinder& cylinder, const OperatingPoint& point, double 
     booked[k] = model.booked_work_j(k - 1, work);
     energy[k] = model.energy_change_j(k - 1, work);
   }
+  free_gil.reset();
   py::dict out;
-  out["indicators"] = to_dict(model.indicators(charge, soc_cad, work));
+  out["indicators"] = to_dict(indicators);
+  out["trapped_mass_g"] =
+      charge.gas_j_per_k * units::air_molar_mass_kg_per_mol / (units::gas_constant_j_per_molk * units::kg_per_g);
   out["fuel_heat_j"] = charge.fuel_heat_j;
   out["burn_duration_cad"] = charge.burn_duration_cad;
   out["crank_angle_cad"] = to_array(angle);
@@ -81,10 +88,9 @@ py::dict simulate(const Cylinder& cylinder, const OperatingPoint& point, double 
 py::dict scan(const Cylinder& cylinder, const OperatingPoint& point, const InputArray& soc_cad, double step_cad,
               const std::string& integrator) {
   const std::vector<double> timings = to_column(soc_cad, "soc_cad");
-  validate(cylinder);
-  validate(point);
   for (const double soc : timings)
     validate_timing("soc_cad", soc, cylinder);
+  if (!timings.empty()) validate_cycle(cylinder, point, *std::min_element(timings.begin(), timings.end()));
   const Integrator scheme = parse_integrator(integrator);
   std::vector<Indicators<double>> rows(timings.size());
   {
@@ -94,6 +100,7 @@ py::dict scan(const Cylinder& cylinder, const OperatingPoint& point, const Input
     const Charge<double> charge = model.charge(point);
     for (std::size_t i = 0; i < timings.size(); ++i) {
       model.run(charge, timings[i], work);
+      model.require_physical(work);
       rows[i] = model.indicators(charge, timings[i], work);
     }
   }
@@ -109,7 +116,10 @@ py::dict scan(const Cylinder& cylinder, const OperatingPoint& point, const Input
 
 py::dict bind_sensitivities(const Cylinder& cylinder, const OperatingPoint& point, double soc_cad,
                             const std::vector<std::string>& names, double step_cad, const std::string& integrator) {
-  const Sensitivities s = sensitivities(cylinder, point, soc_cad, names, step_cad, parse_integrator(integrator));
+  const Integrator scheme = parse_integrator(integrator);
+  FreeGil free_gil(std::in_place);
+  const Sensitivities s = sensitivities(cylinder, point, soc_cad, names, step_cad, scheme);
+  free_gil.reset();
   py::dict indicators;
   for (const auto& f : indicator_fields<double>()) {
     std::vector<double> column;
@@ -127,8 +137,12 @@ py::dict bind_sensitivities(const Cylinder& cylinder, const OperatingPoint& poin
 
 py::dict bind_convergence(const Cylinder& cylinder, const OperatingPoint& point, double soc_cad, double step_cad,
                           const std::string& integrator) {
+  const Integrator scheme = parse_integrator(integrator);
+  FreeGil free_gil(std::in_place);
+  const std::vector<ConvergenceEstimate> estimates = convergence(cylinder, point, soc_cad, step_cad, scheme);
+  free_gil.reset();
   py::dict out;
-  for (const auto& e : convergence(cylinder, point, soc_cad, step_cad, parse_integrator(integrator))) {
+  for (const auto& e : estimates) {
     out[as_str(e.name)] = py::make_tuple(e.value, e.extrapolated, e.error, e.order, as_str(e.unit));
   }
   return out;
@@ -218,6 +232,7 @@ void bind_engine(py::module_& m) {
         return burn_duration_cad(c, p);
       },
       arg("cylinder"), arg("point"), "Burn duration in force [°CA].");
+  m.attr("timing_window_cad") = py::make_tuple(timing_lower_cad, timing_upper_cad);
   m.attr("woschni_c1_bar_m") = woschni_c1_bar_m;
   m.def("woschni_coefficient", py::vectorize(&woschni_coefficient<double>), arg("c1_bar_m"), arg("bore_m"),
         arg("pressure_bar"), arg("temperature_k"), arg("gas_velocity_m_per_s"), "Film coefficient [W/(m2 K)].");

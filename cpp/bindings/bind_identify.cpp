@@ -48,6 +48,8 @@ void bind_identify(py::module_& m) {
       .def_property_readonly("correlation_if_free", [](const CylinderFit& f) { return f.correlation_if_free; })
       .def_property_readonly("report", [](const CylinderFit& f) { return f.report; });
 
+  m.attr("wall_heat_scale_upper") = wall_heat_scale_upper;
+  m.attr("correlation_limit") = optimize::LeastSquaresOptions{}.correlation_limit;
   m.def("load_parameters", &load_parameters, "Names that may be freed per load.");
   m.def("common_parameters", &common_parameters, "Cylinder fields that may be freed for all loads.");
   m.def("estimate_burn", &estimate_burn, arg("trace"), arg("cylinder"), "A start from the trace's heat release.");

@@ -1,6 +1,8 @@
 // Binds engine/trace_analysis.hpp and engine/trace_check.hpp: the analysis of measured pressure.
 #include <cstddef>
+#include <optional>
 #include <string>
+#include <utility>
 #include <vector>
 
 #include "binding.hpp"
@@ -14,8 +16,11 @@ using namespace engine;
 
 py::dict bind_analyze(const InputArray& angle, const InputArray& pressure, const Cylinder& cylinder,
                       const OperatingPoint& point, const TraceOptions& options) {
-  const TraceAnalysis a =
-      analyze_trace(to_column(angle, "crank_angle_cad"), to_column(pressure, "pressure_bar"), cylinder, point, options);
+  const std::vector<double> angles = to_column(angle, "crank_angle_cad");
+  const std::vector<double> pressures = to_column(pressure, "pressure_bar");
+  std::optional<py::gil_scoped_release> free_gil(std::in_place);
+  const TraceAnalysis a = analyze_trace(angles, pressures, cylinder, point, options);
+  free_gil.reset();
   const std::size_t n = a.angle_cad.size();
   const auto per_cad = [&](const std::vector<double>& step_j) {
     std::vector<double> rate(n, 0.0);

@@ -8,6 +8,7 @@
 #include <utility>
 
 #include "mgdd/common/error.hpp"
+#include "mgdd/common/text.hpp"
 #include "mgdd/common/units.hpp"
 #include "mgdd/engine/gas.hpp"
 #include "mgdd/engine/wall_heat.hpp"
@@ -18,13 +19,30 @@ std::vector<double> crank_grid(const Cylinder& cylinder, double step_cad) {
     throw ParameterError("step_cad = " + std::to_string(step_cad) + " °CA: must be in [0.001, 5]");
   }
   const double span = cylinder.evo_cad - cylinder.ivc_cad;
-  // The tolerance keeps 270.0000001 steps from becoming 271 when span / step is not exact in binary.
-  const auto steps = static_cast<std::size_t>(std::ceil(span / step_cad - 1e-9));
+  // A remainder below a millionth of a step comes from rounding: it lengthens the last step instead of making one.
+  const auto steps = static_cast<std::size_t>(std::ceil(span / step_cad - 1e-6));
   std::vector<double> angles(steps + 1);
   for (std::size_t k = 0; k < steps; ++k)
     angles[k] = cylinder.ivc_cad + static_cast<double>(k) * step_cad;
   angles[steps] = cylinder.evo_cad;
   return angles;
+}
+
+void validate_cycle(const Cylinder& cylinder, const OperatingPoint& point, double soc_cad) {
+  validate(cylinder);
+  validate(point);
+  validate_timing("soc_cad", soc_cad, cylinder);
+  const double first_kpa = point.intake_pressure_kpa + cylinder.ivc_pressure_rise_kpa;
+  if (!(first_kpa > 0.0)) {
+    throw ParameterError("ivc_pressure_rise_kpa = " + text(cylinder.ivc_pressure_rise_kpa) + " kPa: p(IVC) is " +
+                         text(first_kpa) + " kPa at intake_pressure_kpa = " + text(point.intake_pressure_kpa) +
+                         ", must be > 0");
+  }
+  const Burn<double> burn(cylinder, soc_cad, burn_duration_cad(cylinder, point));
+  if (burn.start_cad() < cylinder.ivc_cad) {
+    throw ParameterError("second_delay_cad = " + text(cylinder.second_delay_cad) + " °CA: the burn starts at " +
+                         text(burn.start_cad()) + " °CA aTDC, before ivc_cad = " + text(cylinder.ivc_cad));
+  }
 }
 
 template <class T>
@@ -131,7 +149,7 @@ std::size_t CycleModel<T>::fill_heat_release(const Charge<T>& charge, const T& s
                                              CycleWorkspace<T>& work) const noexcept {
   const std::size_t n = angles_.size();
   std::fill(work.heat_release_j.begin(), work.heat_release_j.end(), T(0.0));
-  if (!(value_of(charge.fuel_heat_j) > 0.0)) return n;
+  if (is_constant_zero(charge.fuel_heat_j)) return n;
   const Burn<T> burn(cylinder_, soc_cad, charge.burn_duration_cad);
   const auto begin = angles_.begin();
   const auto first = static_cast<std::size_t>(std::upper_bound(begin, angles_.end(), burn.start_cad()) - begin);
@@ -144,7 +162,8 @@ std::size_t CycleModel<T>::fill_heat_release(const Charge<T>& charge, const T& s
     burned = next;
     if (angles_[k] >= end) break;
   }
-  return static_cast<std::size_t>(std::lower_bound(begin, angles_.end(), value_of(soc_cad)) - begin);
+  if (!(value_of(charge.fuel_heat_j) > 0.0)) return n;
+  return static_cast<std::size_t>(std::lower_bound(begin, angles_.end(), burn.start_cad()) - begin);
 }
 
 template <class T>
@@ -207,6 +226,21 @@ void CycleModel<T>::wall_heat(const Charge<T>& charge, std::span<const T> pressu
                     ? wall.template step_j<true>(p, temperature, wall_term_[k], motored_ratio_[k], burning)
                     : wall.template step_j<false>(p, temperature, wall_term_[k], motored_ratio_[k], burning);
   }
+}
+
+template <class T>
+std::size_t CycleModel<T>::first_unphysical(const CycleWorkspace<T>& work) const noexcept {
+  const auto bad = [](const T& p) { return !(std::isfinite(value_of(p)) && value_of(p) > 0.0); };
+  return static_cast<std::size_t>(std::find_if(work.pressure_pa.begin(), work.pressure_pa.end(), bad) -
+                                  work.pressure_pa.begin());
+}
+
+template <class T>
+void CycleModel<T>::require_physical(const CycleWorkspace<T>& work) const {
+  const std::size_t k = first_unphysical(work);
+  if (k == angles_.size()) return;
+  throw ConvergenceError("the pressure leaves the physical range at " + text(angles_[k]) +
+                         " °CA aTDC: take a smaller step_cad, less wall heat or another point");
 }
 
 template <class T>
@@ -287,7 +321,7 @@ Indicators<T> CycleModel<T>::indicators(const Charge<T>& charge, const T& soc_ca
   out.ringing_intensity_mw_per_m2 = engine::ringing_intensity_mw_per_m2(
       T(gamma_at(cylinder_, t_peak.value)), T(slope * charge.speed_rpm * units::cad_per_s_per_rpm), p_peak.value,
       t_peak.value);
-  const T none(std::numeric_limits<double>::quiet_NaN());
+  const T none = undefined<T>();
   out.efficiency_gross = out.heat_loss_fraction = out.ca10_cad = out.ca50_cad = out.ca90_cad = none;
   if (value_of(charge.fuel_heat_j) > 0.0) {
     const Burn<T> burn(cylinder_, soc_cad, charge.burn_duration_cad);

@@ -6,6 +6,8 @@
 #include <limits>
 #include <vector>
 
+#include "mgdd/common/error.hpp"
+#include "mgdd/common/text.hpp"
 #include "mgdd/common/units.hpp"
 #include "mgdd/engine/cycle.hpp"
 
@@ -31,6 +33,7 @@ class Delay {
     const Charge<double> charge = model.charge(point);
     CycleWorkspace<double> work = model.make_workspace();
     model.run(charge, 0.0, work);
+    model.require_physical(work);
     piston_speed_ = model.geometry().mean_piston_speed_m_per_s(point.speed_rpm);
     for (std::size_t k = 0; k < angle_.size(); ++k) {
       pressure_bar_.push_back(work.pressure_pa[k] / units::pa_per_bar);
@@ -133,8 +136,7 @@ class Delay {
 };
 
 void check(const Cylinder& cylinder, const OperatingPoint& point, std::string_view name, double value) {
-  validate(cylinder);
-  validate(point);
+  validate_cycle(cylinder, point, 0.0);
   validate_timing(name, value, cylinder);
 }
 
@@ -161,6 +163,11 @@ double hardenberg_hase_delay_cad(double pressure_bar, double temperature_k, doub
 IgnitionTiming start_of_combustion(const Cylinder& cylinder, const OperatingPoint& point, double soi_cad) {
   check(cylinder, point, "soi_cad", soi_cad);
   const double soc = Delay(cylinder, point).soc(soi_cad);
+  if (soc < soi_cad) {
+    throw ParameterError("ignition_c0_cad = " + text(cylinder.ignition_c0_cad) +
+                         " °CA: the polynomial gives a delay of " + text(soc - soi_cad) +
+                         " °CA at soi_cad = " + text(soi_cad) + ", must be >= 0");
+  }
   return {soi_cad, soc, soc - soi_cad, !std::isnan(soc), false};
 }
 

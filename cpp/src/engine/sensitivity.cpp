@@ -65,6 +65,7 @@ Indicators<double> simulate_indicators(const Cylinder& cylinder, const Operating
   CycleWorkspace<double> work = model.make_workspace();
   const Charge<double> charge = model.charge(point);
   model.run(charge, soc_cad, work);
+  model.require_physical(work);
   return model.indicators(charge, soc_cad, work);
 }
 
@@ -103,10 +104,9 @@ SensitivityScalar& input(CycleInputs<SensitivityScalar>& inputs, std::string_vie
 
 Sensitivities sensitivities(const Cylinder& cylinder, const OperatingPoint& point, double soc_cad,
                             const std::vector<std::string>& names, double step_cad, Integrator integrator) {
-  validate(cylinder);
-  validate(point);
-  validate_timing("soc_cad", soc_cad, cylinder);
+  validate_cycle(cylinder, point, soc_cad);
   Sensitivities out;
+  out.value = simulate_indicators(cylinder, point, soc_cad, step_cad, integrator);
   out.names = names;
   out.angles_cad = crank_grid(cylinder, step_cad);
   const std::size_t n = out.angles_cad.size();
@@ -138,15 +138,12 @@ Sensitivities sensitivities(const Cylinder& cylinder, const OperatingPoint& poin
       }
     }
   }
-  out.value = simulate_indicators(cylinder, point, soc_cad, step_cad, integrator);
   return out;
 }
 
 std::vector<ConvergenceEstimate> convergence(const Cylinder& cylinder, const OperatingPoint& point, double soc_cad,
                                              double step_cad, Integrator integrator) {
-  validate(cylinder);
-  validate(point);
-  validate_timing("soc_cad", soc_cad, cylinder);
+  validate_cycle(cylinder, point, soc_cad);
   if (!(step_cad >= 4.0 * step_lower_cad)) {
     throw ParameterError("step_cad = " + std::to_string(step_cad) +
                          " °CA: the estimate also runs a quarter of it, so it must be >= 0.004");

@@ -19,7 +19,7 @@ namespace {
 
 // Search bounds of the common parameters that have tighter ones than their field: the calibration offline searches
 // wall heat up to 2.5 times the textbook law.
-constexpr SearchDomain common_domains[] = {{"wall_heat_scale", "-", 0.0, 2.5, false}};
+constexpr SearchDomain common_domains[] = {{"wall_heat_scale", "-", 0.0, wall_heat_scale_upper, false}};
 
 bool places_grid(std::string_view name) {
   return name == "ivc_cad" || name == "evo_cad";
@@ -93,6 +93,14 @@ void check_inputs(const std::vector<MeasuredCycle>& traces, const engine::Cylind
   }
   if (!(options.step_cad >= engine::step_lower_cad && options.step_cad <= engine::step_upper_cad)) {
     throw ParameterError("step_cad = " + text(options.step_cad) + " °CA: must be in [0.001, 5]");
+  }
+  for (std::size_t t = 0; t < start.size(); ++t) {
+    for (const auto& field : load_fields<double>()) {
+      const double value = start[t].*(field.member);
+      if (value >= field.domain.lower && value <= field.domain.upper) continue;
+      throw ParameterError("start of " + std::string(field.domain.name) + "[" + traces[t].label + "] = " + text(value) +
+                           ": must be in [" + text(field.domain.lower) + ", " + text(field.domain.upper) + "]");
+    }
   }
   for (const MeasuredCycle& trace : traces) {
     engine::validate(trace.point);
@@ -190,7 +198,8 @@ engine::Cylinder with_burn(engine::Cylinder cylinder, const LoadBurn& burn) {
 LoadBurn estimate_burn(const MeasuredCycle& trace, const engine::Cylinder& cylinder) {
   const engine::TraceAnalysis a =
       engine::analyze_trace(trace.angle_cad, trace.pressure_bar, cylinder, trace.point, engine::TraceOptions{});
-  if (a.motored || !(a.heat_net_j_total > 0.0) || std::isnan(a.ca10_cad) || std::isnan(a.ca90_cad) || a.ca90_cad <= a.ca10_cad) {
+  if (a.motored || !(a.heat_net_j_total > 0.0) || std::isnan(a.ca10_cad) || std::isnan(a.ca90_cad) ||
+      a.ca90_cad <= a.ca10_cad) {
     throw DataError("trace '" + trace.label +
                     "' shows no heat release: it looks motored, and a burn "
                     "cannot be fitted to it");
@@ -206,8 +215,8 @@ LoadBurn estimate_burn(const MeasuredCycle& trace, const engine::Cylinder& cylin
   if (unit.burn_shape == engine::BurnShape::double_wiebe) unit.burn_shape = engine::BurnShape::wiebe;
   const engine::Burn<double> law(unit, 0.0, 1.0);
   const double s10 = law.angle_of(0.1);
-  burn.burn_duration_cad = std::clamp((a.ca90_cad - a.ca10_cad) / (law.angle_of(0.9) - s10), 5.0, 150.0);
-  burn.soc_cad = std::clamp(a.ca10_cad - s10 * burn.burn_duration_cad, -40.0, 30.0);
+  burn.burn_duration_cad = (a.ca90_cad - a.ca10_cad) / (law.angle_of(0.9) - s10);
+  burn.soc_cad = a.ca10_cad - s10 * burn.burn_duration_cad;
   burn.fuel_heat_j = 1.1 * a.heat_net_j_total;
   if (cylinder.burn_shape == engine::BurnShape::double_wiebe) {
     // Split the single burn into a short first and a long second part; the fit settles their shares.
@@ -216,6 +225,9 @@ LoadBurn estimate_burn(const MeasuredCycle& trace, const engine::Cylinder& cylin
     burn.second_duration_cad = 1.3 * burn.burn_duration_cad;
     burn.burn_duration_cad *= 0.6;
     burn.wiebe_m = burn.second_wiebe_m = 1.0;
+  }
+  for (const auto& field : load_fields<double>()) {
+    burn.*(field.member) = std::clamp(burn.*(field.member), field.domain.lower, field.domain.upper);
   }
   return burn;
 }

@@ -87,7 +87,12 @@ def simulate(
             "energy_change_j": (ANGLE, raw["energy_change_j"], "J", "change of internal energy in the step"),
             **{name: ((), value) for name, value in scalars.items()},
         },
-        attrs={"integrator": integrator, "step_cad": step_cad, "speed_rpm": point.speed_rpm},
+        attrs={
+            "integrator": integrator,
+            "step_cad": step_cad,
+            "speed_rpm": point.speed_rpm,
+            "trapped_mass_g": raw["trapped_mass_g"],
+        },
     )
 
 

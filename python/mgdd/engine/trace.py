@@ -58,10 +58,10 @@ def analyze(
     pegging_exponent : float
         Polytropic exponent of compression [-].
     inlet_pressure_kpa : float, optional
-        For ``inlet``; the point's intake pressure if left out.
+        For ``inlet``; the point's intake pressure if only a point is given.
     gamma : float or {"split", "cylinder"}, optional
         1.33 for a measured trace and ``cylinder`` for a simulated one if left out. A number is a constant [-];
-        ``split`` is 1.37 before -10 CAD and 1.30 after; ``cylinder`` is the cylinder's own law.
+        ``split`` is 1.37 before the heat window and 1.30 from there on; ``cylinder`` is the cylinder's own law.
     heat_window_cad : tuple of float, optional
         Window of the cumulative heat [°CA aTDC]; -10 to 90 for a measured trace, the whole for a simulated one. The
         heat is the peak of the cumulative value for a measured trace, its end for a simulated one.
@@ -103,6 +103,8 @@ def analyze(
         if name not in trace.variables:
             raise DataError(f"the trace has no {name}: read it with mgdd.io.read_pressure or make it with simulate")
     simulated = "motored_pressure_bar" in trace.variables
+    if pegging == "inlet" and inlet_pressure_kpa is None and point is None:
+        raise ParameterError("pegging 'inlet' needs inlet_pressure_kpa, or a point with its intake pressure")
     point = _conditions(trace, point)
     window = heat_window_cad or ((cylinder.ivc_cad, cylinder.evo_cad) if simulated else (-10.0, 90.0))
     if fractions not in ("net", "gross"):

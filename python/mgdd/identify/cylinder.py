@@ -11,7 +11,7 @@ import numpy as np
 
 from mgdd import _core
 from mgdd._core import Cylinder, OperatingPoint
-from mgdd.errors import DataError, ParameterError
+from mgdd.errors import DataError, ParameterError, ShapeError
 from mgdd.identify.records import CylinderFit, LoadFit
 from mgdd.optimize import FitReport
 from mgdd.results import ANGLE, labelled_dataset
@@ -91,6 +91,8 @@ def fit_cylinder(
     if not traces:
         raise DataError("no traces: a calibration needs at least one")
     names = default_free(cylinder) if free is None else tuple([free] if isinstance(free, str) else free)
+    if hasattr(traces, "variables"):
+        raise ShapeError("traces is one Dataset: pass a list of them, [trace] for a single one")
     labels = _labels(traces)
     measured = [_measured(trace, label, cylinder, point) for trace, label in zip(traces, labels, strict=True)]
     burns = _starts(measured, cylinder, start)
@@ -122,8 +124,13 @@ def conditions(trace: xr.Dataset, point: OperatingPoint | None) -> OperatingPoin
 
 
 def _labels(traces: Sequence[xr.Dataset]) -> list[str]:
-    names = [str(trace.attrs.get("file", f"trace{i}")) for i, trace in enumerate(traces)]
-    return [name if names.count(name) == 1 else f"{name}#{i}" for i, name in enumerate(names)]
+    names: list[str] = []
+    for i, trace in enumerate(traces):
+        name = str(trace.attrs.get("file", f"trace{i}"))
+        while name in names:
+            name += f"#{i}"
+        names.append(name)
+    return names
 
 
 def _closed(trace: xr.Dataset, cylinder: Cylinder) -> tuple[np.ndarray, np.ndarray]:
@@ -145,13 +152,15 @@ def _measured(trace: xr.Dataset, label: str, cylinder: Cylinder, point: Operatin
 def _starts(
     measured: Sequence[_core.MeasuredCycle], cylinder: Cylinder, start: Sequence[Mapping[str, float]] | None
 ) -> list[_core.LoadBurn]:
-    burns = [_core.estimate_burn(trace, cylinder) for trace in measured]
     if start is None:
-        return burns
-    if len(start) != len(burns):
-        raise ParameterError(f"start has {len(start)} entries for {len(burns)} traces")
+        return [_core.estimate_burn(trace, cylinder) for trace in measured]
+    if len(start) != len(measured):
+        raise ParameterError(f"start has {len(start)} entries for {len(measured)} traces")
     known = _core.load_parameters()
-    for burn, values in zip(burns, start, strict=True):
+    burns = []
+    for trace, values in zip(measured, start, strict=True):
+        burns.append(_core.LoadBurn() if set(known) <= set(values) else _core.estimate_burn(trace, cylinder))
+        burn = burns[-1]
         for name, value in values.items():
             if name not in known:
                 raise ParameterError(f"start: {name!r} is no parameter of a trace: must be one of {', '.join(known)}")
@@ -219,9 +228,13 @@ def _warnings(fit: CylinderFit) -> tuple[str, ...]:
         )
     errors = [load.imep_closed_error_percent for load in fit.loads]
     if max(map(abs, errors)) > _IMEP_LIMIT_PERCENT:
-        word = "low" if sum(errors) < 0.0 else "high"
+        if max(errors) < 0.0 or min(errors) > 0.0:
+            size = sorted(map(abs, errors))
+            what = f"closed IMEP is {size[0]:.1f} to {size[-1]:.1f} % {'low' if errors[0] < 0.0 else 'high'}"
+        else:
+            what = f"closed IMEP is wrong by {min(errors):+.1f} to {max(errors):+.1f} %"
         out.append(
-            f"closed IMEP is {min(map(abs, errors)):.1f} to {max(map(abs, errors)):.1f} % {word} although the pressure "
+            f"{what} although the pressure "
             f"RMSE is at most {max(load.rmse_percent for load in fit.loads):.2f} % of p_max: a small RMSE proves "
             "nothing here; do not read efficiency or fuel heat from this fit"
         )

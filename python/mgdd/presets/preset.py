@@ -130,7 +130,10 @@ def load(name: str | os.PathLike[str]) -> Preset:
     """
     text = os.fspath(name)
     if text.endswith(".toml"):
-        return _parse(Path(text).read_text(encoding="utf-8"), source=text)
+        try:
+            return _parse(Path(text).read_text(encoding="utf-8"), source=text)
+        except UnicodeDecodeError as error:
+            raise DataError(f"{text}: not a UTF-8 text file: {error}") from error
     if text not in available():
         close = difflib.get_close_matches(text, available(), 1)
         hint = f"did you mean {close[0]!r}?" if close else "or pass a path that ends in .toml"

@@ -6,6 +6,7 @@
 #include <array>
 #include <cmath>
 #include <cstddef>
+#include <limits>
 #include <type_traits>
 
 namespace mgdd {
@@ -121,6 +122,23 @@ Dual<N> pow(const Dual<N>& x, const Dual<N>& exponent) noexcept {
   for (std::size_t i = 0; i < y.grad.size(); ++i)
     y.grad[i] += by_exponent * exponent.grad[i];
   return y;
+}
+
+/// Whether x is zero with every derivative.
+constexpr bool is_constant_zero(double x) noexcept {
+  return x == 0.0;
+}
+template <int N>
+constexpr bool is_constant_zero(const Dual<N>& x) noexcept {
+  return x == Dual<N>(0.0);
+}
+
+/// NaN with every derivative NaN: for a quantity that does not exist.
+template <class T>
+T undefined() noexcept {
+  T x(std::numeric_limits<double>::quiet_NaN());
+  if constexpr (is_dual_v<T>) x.grad.fill(x.value);
+  return x;
 }
 
 constexpr double value_of(double x) noexcept {

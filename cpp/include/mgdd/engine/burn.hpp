@@ -109,7 +109,7 @@ struct Burn {
     }
     const double root = 0.5 * (low + high);
     const double slope = slope_at(root);
-    if (!(slope > 0.0)) return T(root);
+    if (!(slope > 0.0)) return soc_cad + (root - value_of(soc_cad));  // a plateau between two burns moves with SOC
     return T(root) + (x - fraction(root)) / slope;
   }
 

@@ -23,6 +23,9 @@ inline constexpr double step_upper_cad = 5.0;
 /// [0.001, 5] CAD.
 std::vector<double> crank_grid(const Cylinder& cylinder, double step_cad = default_step_cad);
 
+/// All checks before a cycle: both records, the timing, p(IVC) > 0, a burn that starts after IVC. ParameterError.
+void validate_cycle(const Cylinder& cylinder, const OperatingPoint& point, double soc_cad);
+
 /// Traces of one cycle, one entry per grid angle. Entry k of the per-step columns belongs to the step k -> k + 1.
 template <class T>
 struct CycleWorkspace {
@@ -61,6 +64,12 @@ class CycleModel {
 
   /// Integrates one cycle into the workspace.
   void run(const Charge<T>& charge, const T& soc_cad, CycleWorkspace<T>& work) const noexcept;
+
+  /// Index of the first pressure that is not finite and positive; the number of angles if there is none.
+  std::size_t first_unphysical(const CycleWorkspace<T>& work) const noexcept;
+
+  /// For desk-time callers: ConvergenceError naming the angle where the pressure leaves the physical range.
+  void require_physical(const CycleWorkspace<T>& work) const;
 
   /// Scalars of the cycle that stands in the workspace.
   Indicators<T> indicators(const Charge<T>& charge, const T& soc_cad, const CycleWorkspace<T>& work) const noexcept;

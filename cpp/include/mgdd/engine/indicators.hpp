@@ -51,7 +51,7 @@ constexpr auto indicator_fields() {
                     F{"heat_loss_fraction", "-", &I::heat_loss_fraction},
                     F{"work_closed_j", "J", &I::work_closed_j},
                     F{"work_gross_j", "J", &I::work_gross_j},
-                    F{"ringing_intensity_mw_per_m2", "MW/m^2", &I::ringing_intensity_mw_per_m2}};
+                    F{"ringing_intensity_mw_per_m2", "MW/m²", &I::ringing_intensity_mw_per_m2}};
 }
 
 template <class T>

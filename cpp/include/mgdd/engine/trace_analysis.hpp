@@ -27,7 +27,7 @@ struct TraceOptions {
 
   AnalysisGamma gamma_source = AnalysisGamma::constant;
   double gamma = 1.33;              ///< [-] constant over the window
-  double gamma_compression = 1.37;  ///< [-] `split`: while the net heat is not yet positive
+  double gamma_compression = 1.37;  ///< [-] `split`: before `burn_from_cad`
   double gamma_combustion = 1.30;   ///< [-] `split`: from the burn start on
 
   double heat_from_cad = -10.0;  ///< window of the cumulative heat

@@ -54,15 +54,16 @@ inline double four_fifths_power(double x) noexcept {
 inline double two_fifths_power(double x) noexcept {
   return fast_power<2, 5>(x);
 }
+// At zero (C2 = 0 before the burn) the slope is infinite; zero there keeps every other derivative, which 0/0 would not.
 template <int N>
 Dual<N> four_fifths_power(const Dual<N>& x) noexcept {
   const double y = four_fifths_power(x.value);
-  return chain(y, 0.8 * y / x.value, x);
+  return chain(y, x.value > 0.0 ? 0.8 * y / x.value : 0.0, x);
 }
 template <int N>
 Dual<N> two_fifths_power(const Dual<N>& x) noexcept {
   const double y = two_fifths_power(x.value);
-  return chain(y, 0.4 * y / x.value, x);
+  return chain(y, x.value > 0.0 ? 0.4 * y / x.value : 0.0, x);
 }
 
 /// Wall heat of one cycle. With T = p V/(N R), Woschni's p^0.8 T^-0.55 is p^0.25 V^-0.55 (N R)^0.55 and Hohenberg's

@@ -59,7 +59,7 @@ template <class T>
 constexpr auto load_fields() {
   using B = BasicLoadBurn<T>;
   using F = LoadField<T>;
-  return std::array{F{{"soc_cad", "°CA aTDC", -30.0, 30.0, false}, &B::soc_cad},
+  return std::array{F{{"soc_cad", "°CA aTDC", -30.0, engine::timing_upper_cad, false}, &B::soc_cad},
                     F{{"burn_duration_cad", "°CA", 2.0, 150.0, true}, &B::burn_duration_cad},
                     F{{"fuel_heat_j", "J", 1e-2, 1e6, true}, &B::fuel_heat_j},
                     F{{"wiebe_m", "-", 0.0, 5.0, false}, &B::wiebe_m},
@@ -68,6 +68,8 @@ constexpr auto load_fields() {
                     F{{"second_duration_cad", "°CA", 5.0, 150.0, true}, &B::second_duration_cad},
                     F{{"second_wiebe_m", "-", 0.0, 5.0, false}, &B::second_wiebe_m}};
 }
+
+inline constexpr double wall_heat_scale_upper = 2.5;  ///< search bound offline, in textbook laws
 
 struct CylinderFitOptions {
   double step_cad = 0.25;  ///< largest step of the model; measured steps are divided evenly
