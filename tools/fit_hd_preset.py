@@ -67,7 +67,7 @@ def main() -> None:
         "cylinder.volumetric_efficiency": "reproduces the stated trapped masses from p(IVC) at 313 K",
         "cylinder.burn_shape": "a single Wiebe law meets the traces within 1 % of p_max",
         "cylinder.gamma_model": "the law that meets the traces (Gatowski et al. 1984)",
-        "cylinder.wall_heat_scale": "held: the traces do not determine it; 0.5 to 1 fits as well",
+        "cylinder.wall_heat_scale": "held: the traces do not determine it",
         "point.speed_rpm": DATA,
         "point.fuel_mg": "heat of the 50 % load trace " + FITTED,
         "point.intake_pressure_kpa": "first sample of the 50 % load trace, " + DATA,

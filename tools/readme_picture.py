@@ -43,7 +43,7 @@ def draw_trace(ax: Axes, heat: xr.Dataset, fit: CylinderFit) -> None:
     twin.set_ylabel("net heat release [J/°CA]", color=ORANGE)
     twin.tick_params(axis="y", colors=ORANGE)
     ax.legend(handles=lines, loc="upper right", frameon=False)
-    ax.set_title(f"Measured, then calibrated: RMSE {load.rmse_percent:.2f} % of p_max", loc="left")
+    ax.set_title(f"Calibrated, double Wiebe: RMSE {load.rmse_percent:.2f} % of p_max", loc="left")
 
 
 def draw_timing(ax: Axes, fits: dict[float, CylinderFit]) -> None:
@@ -54,7 +54,7 @@ def draw_timing(ax: Axes, fits: dict[float, CylinderFit]) -> None:
         sweep = timing_sweep(load.cylinder, load.point, soc_cad=np.arange(-20.0, 8.5, 0.5))
         efficiency = 100.0 * sweep["work_closed_j"] / load.fuel_heat_j
         ax.plot(sweep["soc_cad"], efficiency, dash, color=colour, label=f"wall-heat scale {scale:g}")
-        top = optimum(load.cylinder, load.point, "imep_closed_bar")
+        top = optimum(load.cylinder, load.point, "imep_closed_bar", step_cad=0.25)
         best.append(top.soc_cad)
         ax.plot(top.soc_cad, float(efficiency.interp(soc_cad=top.soc_cad)), "o", color=colour, markersize=6)
     low, high = min(best), max(best)
@@ -62,7 +62,7 @@ def draw_timing(ax: Axes, fits: dict[float, CylinderFit]) -> None:
     ax.axvspan(low, high, color=ORANGE, alpha=0.25, linewidth=0, label=text)
     ax.set(xlabel="start of combustion [°CA aTDC]", ylabel="efficiency, closed cycle [%]", xlim=(-20, 8))
     ax.legend(loc="lower right", frameon=False)
-    ax.set_title("Best timing: a range, as the wall heat is unknown", loc="left")
+    ax.set_title("Best timing, single Wiebe: wall heat is unknown", loc="left")
 
 
 def main() -> None:

@@ -6,7 +6,7 @@ import collections.abc
 import numpy
 import numpy.typing
 import typing
-__all__: list[str] = ['ConvergenceError', 'Cylinder', 'CylinderFit', 'DataError', 'Error', 'FitReport', 'LeastSquaresOptions', 'LoadBurn', 'LoadFit', 'MeasuredCycle', 'NoxProxy', 'OperatingPoint', 'Parameter', 'ParameterError', 'ShapeError', 'TraceOptions', 'analyze_trace', 'burn_duration_cad', 'burned_fraction', 'check_trace', 'common_parameters', 'compiled_simd_level', 'compiler', 'convergence', 'differentiable_inputs', 'estimate_burn', 'fit_cylinder', 'hardenberg_hase_delay_cad', 'hohenberg_coefficient', 'indicator_units', 'input_unit', 'least_squares', 'load_parameters', 'processor_simd_levels', 'scan', 'sensitivities', 'simulate', 'start_of_combustion', 'start_of_injection', 'volume_l', 'wall_area_m2', 'watson_delay_ms', 'with_burn', 'wolfer_delay_ms', 'woschni_c1_bar_m', 'woschni_coefficient']
+__all__: list[str] = ['ConvergenceError', 'Cylinder', 'CylinderFit', 'DataError', 'Error', 'FitReport', 'LeastSquaresOptions', 'LoadBurn', 'LoadFit', 'MeasuredCycle', 'NoxProxy', 'OperatingPoint', 'Parameter', 'ParameterError', 'ShapeError', 'TraceOptions', 'analyze_trace', 'burn_duration_cad', 'burned_fraction', 'check_trace', 'common_parameters', 'compiled_simd_level', 'compiler', 'convergence', 'correlation_limit', 'differentiable_inputs', 'estimate_burn', 'fit_cylinder', 'hardenberg_hase_delay_cad', 'hohenberg_coefficient', 'indicator_units', 'input_unit', 'least_squares', 'load_parameters', 'processor_simd_levels', 'scan', 'sensitivities', 'simulate', 'start_of_combustion', 'start_of_injection', 'timing_window_cad', 'volume_l', 'wall_area_m2', 'wall_heat_scale_upper', 'watson_delay_ms', 'with_burn', 'wolfer_delay_ms', 'woschni_c1_bar_m', 'woschni_coefficient']
 class Error(Exception):
     """
     Base of everything mgdd raises.
@@ -819,4 +819,7 @@ def woschni_coefficient(c1_bar_m: typing.Annotated[numpy.typing.ArrayLike, numpy
     Film coefficient [W/(m2 K)].
     """
 __version__: str = '0.1.0'
+correlation_limit: float = 0.98
+timing_window_cad: tuple = (-60.0, 20.0)
+wall_heat_scale_upper: float = 2.5
 woschni_c1_bar_m: float = 129.8

@@ -67,6 +67,7 @@ def _page(result: StudyResult) -> str:
     body = [
         "<h1>Measured pressure, calibrated cycle model, best timing</h1>",
         f"<p>{_text(s['data'])} Angles are °CA aTDC (firing TDC = 0, compression negative). mgdd {s['mgdd']}.</p>",
+        f"<p>Engine: {_text(', '.join(f'{name} {value:g}' for name, value in s['engine'].items()))}.</p>",
         "<h2>Best timing</h2>",
         (
             "<p>The traces do not carry the wall heat, so each best timing is a range over a wall-heat scale of "
@@ -109,6 +110,11 @@ def _distrust(s: Mapping[str, Any]) -> list[str]:
     for row in s["traces"]:
         out += [f"{row['file']}: {text}." for text in row["warnings"]]
     out.append("Standard errors take the residual as white noise; it is model error, so true uncertainties are larger.")
+    errors = [abs(point["p_max_model_error_bar"]) for row in s["best_timing"] for point in row["points"]]
+    out.append(
+        f"At the measured timing the model's p_max is wrong by up to {max(errors):.1f} bar: gains of a tenth of a "
+        "percent under the trace's own p_max lie within that error."
+    )
     out.append("NOx is a proxy from the maximum bulk gas temperature with unfitted constants: read its trend only.")
     out.append("The gas exchange is not in these traces: gains leave out pumping work, emissions and exhaust enthalpy.")
     return out
@@ -134,7 +140,7 @@ def _timing_table(rows: Sequence[Mapping[str, Any]]) -> str:
             f"{r['p_max_limit_bar']:.1f}",
             _span(r["free_soc_cad"], 1),
             _span(r["free_ca50_cad"], 1),
-            _span(r["free_gain_percent"], 1),
+            _span(r["free_gain_percent"], 2),
         )
         for r in rows
     ]
@@ -153,23 +159,25 @@ def _law_table(laws: Sequence[Mapping[str, Any]]) -> str:
         "largest error [bar]",
         "at [°CA aTDC]",
     )
+    onset = all("onset_against_soi_cad" in law for law in laws)
     body = []
     for law in laws:
         for i, file in enumerate(law["file"]):
             body.append(
-                (
+                [
                     law["law"] if i == 0 else "",
                     f"{law['wall_heat_scale']:.2f}" if i == 0 else "",
                     file,
                     f"{law['rmse_percent'][i]:.2f}",
                     f"{law['imep_closed_error_percent'][i]:+.1f}",
                     f"{law['soc_cad'][i]:.1f}",
-                    _number(law["onset_against_soi_cad"][i], "+.1f"),
+                    _number(law["onset_against_soi_cad"][i], "+.1f") if onset else "",
                     f"{law['largest_error_bar'][i]:+.1f}",
                     f"{law['largest_error_cad'][i]:.0f}",
-                )
+                ]
             )
-    return _table(head, body)
+    kept = [i for i, name in enumerate(head) if onset or name != "SOC minus SOI [°CA]"]
+    return _table([head[i] for i in kept], ([row[i] for i in kept] for row in body))
 
 
 def _wall_heat(profiles: Mapping[str, Mapping[str, Any]]) -> str:
@@ -187,11 +195,11 @@ def _wall_heat(profiles: Mapping[str, Mapping[str, Any]]) -> str:
     body = [
         (
             law,
-            f"{p['value']:.2f}",
+            _number(p["value"], ".2f"),
             _number(p["stderr"], ".3f"),
             _number(p["correlation"], ".2f"),
             p["correlated_with"],
-            f"{p['range_low']:.2f} to {p['range_high']:.2f}",
+            _span((p["range_low"], p["range_high"]), 2),
             "yes" if p["identifiable"] else "no",
         )
         for law, p in profiles.items()
@@ -207,7 +215,7 @@ def _burn_table(rows: Sequence[Mapping[str, Any]]) -> str:
         "fuel heat [J]",
         "CA50 [°CA aTDC]",
         "RMSE [bar]",
-        "wall heat [% of fuel]",
+        "wall heat over fuel heat [-]",
     )
     body = []
     for row in rows:
@@ -220,7 +228,7 @@ def _burn_table(rows: Sequence[Mapping[str, Any]]) -> str:
                 f"{c['fuel_heat_j']:.0f}",
                 f"{c['ca50_cad']:.1f}",
                 f"{c['rmse_bar']:.2f}",
-                f"{100 * c['heat_loss_fraction']:.1f}",
+                _number(c["heat_loss_fraction"], ".3f"),
             )
         )
     return _table(head, body)
@@ -243,7 +251,10 @@ def _analysis_table(rows: Sequence[Mapping[str, Any]]) -> str:
         "p_max_bar p_max_cad imep_closed_bar ca10_cad ca50_cad ca90_cad heat_net_j n_compression n_expansion".split()
     )
     digits = (1, 1, 2, 1, 1, 1, 0, 3, 3)
-    body = [(row["file"], *(f"{row['analysis'][n]:.{d}f}" for n, d in zip(names, digits, strict=True))) for row in rows]
+    body = [
+        (row["file"], *(_number(row["analysis"][n], f".{d}f") for n, d in zip(names, digits, strict=True)))
+        for row in rows
+    ]
     return _table(head, body)
 
 
@@ -266,7 +277,7 @@ def _list(items: Iterable[str]) -> str:
 
 
 def _span(pair: Sequence[float], digits: int) -> str:
-    low, high = (f"{value:.{digits}f}" for value in pair)
+    low, high = (_number(value, f".{digits}f") for value in pair)
     return low if low == high else f"{low} to {high}"
 
 

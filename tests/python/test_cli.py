@@ -208,7 +208,7 @@ def test_bad_input_names_field_value_and_remedy(
         assert word in error
 
 
-def test_bad_files(tmp_path: Path, files: tuple[list[str], str], capsys: pytest.CaptureFixture[str]) -> None:
+def test_bad_files(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
     empty = tmp_path / "empty.csv"
     empty.write_text("")
     assert "empty" in refused(capsys, "engine", "analyze", str(empty))
@@ -223,8 +223,58 @@ def test_bad_files(tmp_path: Path, files: tuple[list[str], str], capsys: pytest.
     assert "Pa" in refused(capsys, "engine", "analyze", str(pascal), *HD)
     assert main(["engine", "analyze", str(pascal), *HD, "--pressure-unit", "Pa"]) == 0
     capsys.readouterr()
-    error = refused(capsys, "engine", "calibrate", files[0][0], *HD, "--conditions", files[1])
-    assert "rows without a trace" in error
+    assert "--pressure-unit 'Pa'" in refused(capsys, "engine", "analyze", str(pascal), *HD)
+
+
+def test_conditions_of_a_campaign(
+    tmp_path: Path, files: tuple[list[str], str], capsys: pytest.CaptureFixture[str]
+) -> None:
+    out = run_json(capsys, "engine", "calibrate", files[0][0], *HD, "--conditions", files[1])  # one file of four rows
+    assert out["traces"][0]["soi_cad"] == -5.06
+    twin = tmp_path / Path(files[0][0]).name
+    twin.write_text(Path(files[0][0]).read_text())
+    error = refused(capsys, "engine", "calibrate", files[0][0], str(twin), *HD, "--conditions", files[1])
+    assert "fits both" in error
+    missing = tmp_path / "missing.csv"
+    missing.write_text("file,speed_rpm\nother.csv,1200\n")
+    error = refused(capsys, "engine", "calibrate", files[0][0], *HD, "--conditions", str(missing))
+    assert "no row for" in error
+    assert "'other.csv'" in error
+
+
+def test_a_short_trace_is_told_and_still_reported(
+    tmp_path: Path, files: tuple[list[str], str], capsys: pytest.CaptureFixture[str]
+) -> None:
+    trace = io.read_pressure(files[0][1]).sel(crank_angle_cad=slice(-90.0, 50.0))
+    short = tmp_path / "short.csv"
+    io.write_pressure(trace, short)
+    assert "trapped_mass_g" in refused(capsys, "engine", "calibrate", str(short), *HD)
+    out = run_json(
+        capsys,
+        "engine",
+        "calibrate",
+        str(short),
+        *HD,
+        "--trapped-mass-g",
+        "4.13863",
+        "--report-folder",
+        str(tmp_path / "r"),
+    )
+    assert any("spans -90 to 50" in text for text in out["warnings"])
+    assert "–" in (tmp_path / "r" / "index.html").read_text(encoding="utf-8")
+
+
+def test_late_injection_and_failed_fits_have_their_exit_codes(
+    files: tuple[list[str], str], capsys: pytest.CaptureFixture[str]
+) -> None:
+    assert "ignites at 26.2" in refused(capsys, "engine", "simulate", "--soi-cad", "14")
+    argv = ("engine", "calibrate", files[0][0], *HD, "--free", "wall_heat_scale,wiebe_a,wiebe_m,gamma,bore_mm")
+    code = main([*argv, "--json"])
+    captured = capsys.readouterr()
+    assert (code == 3) == (json.loads(captured.out)["status"] not in _CONVERGED)
+
+
+_CONVERGED = ("cost_converged", "step_converged", "gradient_converged")
 
 
 def test_infeasible_limit_has_its_own_exit_code(capsys: pytest.CaptureFixture[str]) -> None:

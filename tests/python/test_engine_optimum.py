@@ -120,7 +120,6 @@ def test_the_edge_of_the_range_is_marked():
     [
         (("torque",), {}, "objective = 'torque'.*efficiency_gross"),
         ((), {"limits": {"pmax": 90.0}}, "'pmax' is no indicator.*p_max_bar"),
-        ((), {"limits": {"p_max_bar": -1.0}}, "p_max_bar = -1: must be > 0"),
         ((), {"limits": {"p_max_bar": math.nan}}, "p_max_bar = nan"),
         ((), {"bounds_cad": (10.0, -30.0)}, "bounds_cad"),
         ((), {"bounds_cad": (-90.0, 0.0)}, r"bounds_cad.*\[-60, 20\]"),

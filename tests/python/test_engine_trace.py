@@ -89,7 +89,9 @@ def test_inlet_pegging_reads_bottom_dead_centre():
         back = analyze(trace, CYLINDER, pegging="inlet", **keyword)
         assert float(back.pegging_bar) == pytest.approx(0.6, abs=1e-12)
     with pytest.raises(DataError, match="-180"):
-        analyze(trace.sel(crank_angle_cad=slice(-150, 130)), CYLINDER, pegging="inlet")
+        analyze(trace.sel(crank_angle_cad=slice(-150, 130)), CYLINDER, point=POINT, pegging="inlet")
+    with pytest.raises(ParameterError, match="needs inlet_pressure_kpa, or a point"):
+        analyze(trace, CYLINDER, pegging="inlet")
 
 
 def test_a_wrong_offset_moves_the_compression_exponent():

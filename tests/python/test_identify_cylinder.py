@@ -177,7 +177,7 @@ def test_the_profile_of_a_plant_with_known_fuel_identifies_the_scale():
     traces, free = plant(0.02, 1), ("wall_heat_scale", "soc_cad", "burn_duration_cad")
     known = [{"fuel_heat_j": 42.8 * fuel} for fuel, _ in LOADS]
     fit = fit_cylinder(traces, START, free=free, start=known)
-    found = wall_heat_profile(traces, fit, free=free, scales=[0.5, 1.2])
+    found = wall_heat_profile(traces, fit, scales=[0.5, 1.2])
     assert found.identifiable, found.reasons
     assert found.range_low < 0.8 < found.range_high
     assert found.range_high - found.range_low < 0.1

@@ -155,7 +155,14 @@ def test_an_unknown_preset_suggests_the_nearest(tmp_path):
 
 
 def test_a_partial_preset_keeps_the_defaults(tmp_path):
-    preset = presets.load(written(tmp_path, f"[cylinder]\n{BORE}"))
+    fields = {**Cylinder.fields(), "bore_mm": {"unit": "mm", "default": 90.0}}
+    rows = [
+        f'{name} = {{ value = {fields[name]["default"]}, unit = "{fields[name]["unit"]}", source = "mine" }}'
+        for name in ("bore_mm", "stroke_mm", "connecting_rod_mm", "compression_ratio", "ivc_cad", "evo_cad")
+    ]
+    preset = presets.load(written(tmp_path, "[cylinder]\n" + "\n".join(rows)))
+    with pytest.raises(DataError, match="lacks evo_cad"):
+        presets.load(written(tmp_path, "[cylinder]\n" + "\n".join(rows[:-1])))
     assert preset.cylinder == Cylinder(bore_mm=90.0)
     assert preset.point == OperatingPoint()
     assert preset.name == "bad"

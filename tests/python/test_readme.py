@@ -28,7 +28,7 @@ def test_table_of_the_demo() -> None:
         computed.append(
             f"| {load} % | {fit['rmse_percent']:.2f} | {fit['imep_closed_error_percent']:+.1f} "
             f"| {span(best['soc_cad'], 1)} | {span(best['gain_percent'], 2)} "
-            f"| {span(best['free_soc_cad'], 1)} | {span(best['free_gain_percent'], 1)} |"
+            f"| {span(best['free_soc_cad'], 1)} | {span(best['free_gain_percent'], 2)} |"
         )
     assert written == computed
 

@@ -25,6 +25,7 @@ constexpr std::pair<Pegging, std::string_view> pegging_names[] = {{Pegging::none
 constexpr std::pair<AnalysisGamma, std::string_view> gamma_names[] = {
     {AnalysisGamma::constant, "constant"}, {AnalysisGamma::split, "split"}, {AnalysisGamma::cylinder, "cylinder"}};
 
+constexpr double coverage_cad = 15.0;  // a trace may end this far inside the closed part
 constexpr double nan = std::numeric_limits<double>::quiet_NaN();
 using Column = std::vector<double>;
 
@@ -75,7 +76,15 @@ void check_options(const TraceOptions& o) {
   if (!(o.heat_from_cad < o.heat_to_cad)) refuse("heat_from_cad", o.heat_from_cad, "before heat_to_cad");
 }
 
-void add_warnings(TraceAnalysis& a, const TraceOptions& options, std::size_t first, std::size_t last) {
+void add_warnings(TraceAnalysis& a, const Cylinder& cylinder, const TraceOptions& options, std::size_t first,
+                  std::size_t last) {
+  if (a.angle_cad.front() > cylinder.ivc_cad + coverage_cad || a.angle_cad.back() < cylinder.evo_cad - coverage_cad) {
+    a.warnings.push_back(
+        "the trace spans " + text(a.angle_cad.front()) + " to " + text(a.angle_cad.back()) +
+        " °CA aTDC of the closed part from ivc_cad = " + text(cylinder.ivc_cad) +
+        " to evo_cad = " + text(cylinder.evo_cad) +
+        ": its work is not the closed-cycle work, and without a trapped mass its temperature is wrong");
+  }
   if (a.n_compression < 1.25 || a.n_compression > 1.42) {
     a.warnings.push_back("polytropic exponent of compression " + text(a.n_compression) +
                          " is outside 1.25..1.42: suspect pegging, TDC offset or pressure unit");
@@ -272,7 +281,7 @@ TraceAnalysis analyze_trace(const Column& angle_cad, const Column& pressure_bar,
   a.n_compression = polytropic_exponent(a.angle_cad, a.pressure_bar, cylinder, -100.0, -40.0);
   a.n_expansion = polytropic_exponent(a.angle_cad, a.pressure_bar, cylinder, 60.0, 120.0);
   a.motored = looks_motored(a);
-  add_warnings(a, options, first, last);
+  add_warnings(a, cylinder, options, first, last);
   return a;
 }
 

@@ -7,6 +7,7 @@ from typing import Any
 
 from mgdd.cli.options import engine_of, traces_of
 from mgdd.cli.output import check_output, emit, progress
+from mgdd.errors import ConvergenceError
 from mgdd.identify import CylinderFit, WallHeatProfile, fit_cylinder, wall_heat_profile
 from mgdd.report import write_report
 from mgdd.studies import compare_laws, run_measured_traces
@@ -23,7 +24,7 @@ _PER_TRACE = (
 def calibrate(args: argparse.Namespace) -> None:
     """Fit, judge, compare, print."""
     check_output(args, csv=False)
-    cylinder, point, _ = engine_of(args)
+    cylinder, point, preset = engine_of(args)
     traces = traces_of(args)
     free = [name.strip() for name in args.free.split(",")] if args.free else None
     scheme: dict[str, Any] = {"step_cad": args.step_cad, "integrator": args.integrator}
@@ -31,14 +32,16 @@ def calibrate(args: argparse.Namespace) -> None:
         step("calibrate")
         fit = fit_cylinder(traces, cylinder, free=free, point=point, **scheme)
         profile = None
-        if "wall_heat_scale" in fit.report.names:
-            profile = wall_heat_profile(traces, fit, point=point, free=free, progress=step, **scheme)
+        if "wall_heat_scale" in fit.report.names and len(fit.report.names) > 1:
+            profile = wall_heat_profile(traces, fit, point=point, progress=step, **scheme)
         laws = compare_laws(traces, cylinder, point=point, progress=step, **scheme)
         if args.report_folder:
-            result = run_measured_traces(traces, cylinder, point=point, progress=step)
+            result = run_measured_traces(traces, cylinder, point=point, progress=step, **scheme)
             write_report(result, args.report_folder)
-    payload = _payload(fit, profile, laws)
+    payload = {"preset": preset.name, **_payload(fit, profile, laws)}
     emit(args, payload, text=payload["report"])
+    if not fit.report.success:
+        raise ConvergenceError(f"the calibration did not converge: {fit.report.message}")
 
 
 def _payload(fit: CylinderFit, profile: WallHeatProfile | None, laws: list[CylinderFit]) -> dict[str, Any]:
@@ -89,6 +92,9 @@ def _report(
 ) -> str:
     out = [f"Calibration with {fit.burn_law}: {fit.report.message}", ""]
     out += _loads(fit)
+    for name, value, error in zip(fit.report.names, fit.report.values, fit.report.stderr, strict=True):
+        if "[" not in name and name != "wall_heat_scale":
+            out.append(f"  {name} = {value:.6g} +- {error:.2g} (all traces)")
     if profile is not None:
         verdict = "identifiable" if profile.identifiable else "not identifiable from these traces"
         out += [

@@ -51,7 +51,7 @@ def _text(summary: Any, page: Path) -> str:
             f"{row['file']:20} {row['analysis']['p_max_bar']:8.1f} {row['analysis']['ca50_cad']:7.1f} "
             f"{fit['rmse_percent']:7.2f} {fit['imep_closed_error_percent']:+9.1f}  {_span(best['soc_cad'], 1):>24} "
             f"{_span(best['gain_percent'], 2):>13}  {_span(best['free_soc_cad'], 1):>18} "
-            f"{_span(best['free_gain_percent'], 1):>13}"
+            f"{_span(best['free_gain_percent'], 2):>13}"
         )
     out += [
         "",

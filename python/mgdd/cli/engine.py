@@ -6,6 +6,7 @@ import argparse
 import math
 from typing import Any
 
+from mgdd import _core
 from mgdd._core import Cylinder, OperatingPoint
 from mgdd.cli.calibration import calibrate
 from mgdd.cli.options import (
@@ -29,7 +30,12 @@ _DEFAULT_SOC_CAD = -6.0
 
 def add(commands: Any) -> None:
     """Add the group and its four commands."""
-    group = commands.add_parser("engine", help="one cycle: simulate, analyze, calibrate, optimum")
+    group = commands.add_parser(
+        "engine",
+        help="one cycle: simulate, analyze, calibrate, optimum",
+        epilog="example:\n  mgdd engine simulate --preset puma_single --soc-cad -6 --json",
+        formatter_class=argparse.RawDescriptionHelpFormatter,
+    )
     group.set_defaults(parser=group)
     verbs = group.add_subparsers(title="commands", metavar="COMMAND")
     _add_simulate(verbs)
@@ -43,6 +49,7 @@ def _add_simulate(verbs: Any) -> None:
         verbs, "simulate", _simulate,
         help_text="simulate one closed cycle and print its indicators; -o FILE.csv writes the traces",
         example="mgdd engine simulate --preset puma_single --soc-cad -6 --json",
+        endings=".json or .csv",
     )  # fmt: skip
     timing = parser.add_mutually_exclusive_group()
     timing.add_argument(
@@ -87,6 +94,12 @@ def _start_of_combustion(args: argparse.Namespace, cylinder: Cylinder, point: Op
     timing = start_of_combustion(cylinder, point, soi_cad=args.soi_cad)
     if not timing.ignites:
         raise ConvergenceError(f"soi_cad = {args.soi_cad:g} does not ignite before EVO: inject earlier")
+    latest = _core.timing_window_cad[1]
+    if timing.soc_cad > latest:
+        raise ParameterError(
+            f"soi_cad = {args.soi_cad:g} ignites at {timing.soc_cad:.1f} °CA aTDC, later than {latest:g}, the latest "
+            "start of combustion that is simulated: inject earlier"
+        )
     return timing.soc_cad
 
 
@@ -95,6 +108,7 @@ def _add_analyze(verbs: Any) -> None:
         verbs, "analyze", _analyze,
         help_text="analyse a measured pressure trace: pegging, heat release, burn angles, work",
         example="mgdd engine analyze mean.csv --preset hd_diesel_128x144 --pressure-unit Pa --json",
+        endings=".json or .csv",
     )  # fmt: skip
     add_files(parser, nargs=1)
     group = parser.add_argument_group("analysis")
@@ -112,7 +126,7 @@ def _add_analyze(verbs: Any) -> None:
 
 def _analyze(args: argparse.Namespace) -> None:
     check_output(args, csv=True)
-    cylinder, point, _ = engine_of(args)
+    cylinder, point, preset = engine_of(args)
     (trace,) = traces_of(args)
     gamma: float | str = 1.33 if args.gamma is None else "cylinder"
     if args.analysis_gamma is not None:
@@ -133,6 +147,7 @@ def _analyze(args: argparse.Namespace) -> None:
     named = gamma if args.gamma is None else (cylinder.gamma if args.gamma == "constant" else args.gamma)
     payload = {
         "file": result.attrs["file"],
+        "preset": preset.name,
         **{str(name): float(v) for name, v in result.data_vars.items() if v.ndim == 0},
         "method": result.attrs["method"],
         "gamma": named,
@@ -150,7 +165,10 @@ def _add_calibrate(verbs: Any) -> None:
     )  # fmt: skip
     add_files(parser, nargs="+")
     parser.add_argument(
-        "--free", metavar="NAME[,NAME]", help="parameters to fit (default: the law's own and wall_heat_scale)"
+        "--free",
+        metavar="NAME[,NAME]",
+        help="parameters to fit (default: soc_cad,burn_duration_cad,fuel_heat_j per trace and wall_heat_scale; "
+        "the double Wiebe also its shape)",
     )
     parser.add_argument("--report-folder", metavar="DIR", help="also write index.html and summary.json there")
     add_engine(parser)
@@ -162,6 +180,7 @@ def _add_optimum(verbs: Any) -> None:
         verbs, "optimum", _optimum,
         help_text="find the best start of combustion of the model, or of measured traces after calibration",
         example="mgdd engine optimum --preset puma_single --limit p_max_bar=95 --json",
+        endings=".json, without files also .csv",
     )  # fmt: skip
     add_files(parser, nargs="*")
     parser.add_argument(
@@ -175,9 +194,15 @@ def _add_optimum(verbs: Any) -> None:
         metavar="NAME=X",
         help="upper limit on an indicator, repeatable",
     )
-    parser.add_argument("--bounds-cad", type=float, nargs=2, default=(-30.0, 10.0), metavar=("LOW", "HIGH"))
+    parser.add_argument(
+        "--bounds-cad", type=float, nargs=2, metavar=("LOW", "HIGH"), help="searched range of SOC (default: -30 10)"
+    )
     add_engine(parser)
-    add_scheme(parser, step_cad=1.0)
+    add_scheme(parser, step_cad=None)
+
+
+def _bounds(args: argparse.Namespace) -> tuple[float, float] | None:
+    return (args.bounds_cad[0], args.bounds_cad[1]) if args.bounds_cad else None
 
 
 def _optimum(args: argparse.Namespace) -> None:
@@ -185,15 +210,15 @@ def _optimum(args: argparse.Namespace) -> None:
     cylinder, point, preset = engine_of(args)
     limits = number_pairs(args.limit, "--limit")
     if args.files:
-        _optimum_of_files(args, cylinder, point, limits)
+        _optimum_of_files(args, cylinder, point, limits, preset.name)
         return
-    scheme = {"step_cad": args.step_cad, "integrator": args.integrator}
+    scheme = {"step_cad": args.step_cad or 1.0, "integrator": args.integrator}
     best = optimum(
         cylinder,
         point,
         args.objective or "efficiency_gross",
         limits=limits,
-        bounds_cad=(args.bounds_cad[0], args.bounds_cad[1]),
+        bounds_cad=_bounds(args),
         **scheme,
     )
     now = simulate(cylinder, point, soc_cad=best.soc_cad, **scheme)
@@ -207,7 +232,7 @@ def _optimum(args: argparse.Namespace) -> None:
 
 
 def _optimum_of_files(
-    args: argparse.Namespace, cylinder: Cylinder, point: OperatingPoint, limits: dict[str, float]
+    args: argparse.Namespace, cylinder: Cylinder, point: OperatingPoint, limits: dict[str, float], preset: str
 ) -> None:
     traces = traces_of(args)
     with progress(args) as step:
@@ -217,13 +242,16 @@ def _optimum_of_files(
             point=point,
             objective=args.objective or "imep_closed_bar",
             limits=limits,
+            bounds_cad=_bounds(args),
             progress=step,
+            step_cad=args.step_cad or 0.25,
+            integrator=args.integrator,
         )
     text = "\n\n".join(
         f"{row['file']}\n" + lines({k: f"{v[0]:.2f} to {v[1]:.2f}" for k, v in row.items() if _is_range(v)})
         for row in rows
     )
-    emit(args, {"wall_heat_scale": rows[0]["wall_heat_scale"], "traces": rows}, text=text)
+    emit(args, {"preset": preset, "wall_heat_scale": rows[0]["wall_heat_scale"], "traces": rows}, text=text)
 
 
 def _is_range(value: object) -> bool:

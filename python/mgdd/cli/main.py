@@ -3,7 +3,10 @@
 from __future__ import annotations
 
 import argparse
+import io
 import logging
+import os
+import re
 import sys
 from collections.abc import Sequence
 
@@ -13,7 +16,8 @@ from mgdd.errors import ConvergenceError, Error
 
 __all__ = ["main"]
 
-EXIT_OK, EXIT_BAD_INPUT, EXIT_NO_CONVERGENCE, EXIT_INTERRUPTED = 0, 2, 3, 130
+EXIT_OK, EXIT_BAD_INPUT, EXIT_NO_CONVERGENCE, EXIT_INTERRUPTED, EXIT_PIPE = 0, 2, 3, 130, 141
+_ARGUMENT = re.compile(r"\b(pressure_unit|angle_unit|decimal|delimiter|firing_tdc_deg)=('[^']*'|[\d.]*)")
 
 _EPILOG = """exit codes: 0 done, 2 bad input or usage, 3 no convergence or no feasible answer, 130 interrupted.
 
@@ -43,6 +47,9 @@ def main(argv: Sequence[str] | None = None) -> int:
     >>> main(["engine", "optimum", "--burn-duration-cad", "30", "--limit", "p_max_bar=10"])
     3
     """
+    for stream in (sys.stdout, sys.stderr):
+        if isinstance(stream, io.TextIOWrapper):
+            stream.reconfigure(errors="replace")  # a terminal without °: a question mark, not a traceback
     parser = _parser()
     args = parser.parse_args(argv)
     logging.basicConfig(stream=sys.stderr, format="mgdd: %(levelname)s: %(message)s", level=logging.WARNING)
@@ -54,13 +61,21 @@ def main(argv: Sequence[str] | None = None) -> int:
     except ConvergenceError as error:
         print(f"mgdd: {error}", file=sys.stderr)
         return EXIT_NO_CONVERGENCE
+    except BrokenPipeError:
+        os.dup2(os.open(os.devnull, os.O_WRONLY), sys.stdout.fileno())  # the reader has left; nothing more to say
+        return EXIT_PIPE
     except (Error, OSError) as error:
-        print(f"mgdd: error: {error}", file=sys.stderr)
+        print(f"mgdd: error: {_as_options(str(error))}", file=sys.stderr)
         return EXIT_BAD_INPUT
     except KeyboardInterrupt:
         print("mgdd: interrupted", file=sys.stderr)
         return EXIT_INTERRUPTED
     return EXIT_OK
+
+
+def _as_options(message: str) -> str:
+    """Turn the remedies of the library, which name arguments, into those of the command line."""
+    return _ARGUMENT.sub(lambda m: f"--{m[1].replace('_', '-')} {m[2]}".rstrip(), message)
 
 
 def _parser() -> argparse.ArgumentParser:

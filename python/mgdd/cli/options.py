@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import argparse
+import logging
 from collections.abc import Callable, Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
@@ -17,17 +18,25 @@ if TYPE_CHECKING:
 
 __all__ = ["add_command", "add_engine", "add_files", "add_scheme", "engine_of", "number_pairs", "traces_of"]
 
+_LOG = logging.getLogger(__name__)
+_DEFAULT_PRESET = "puma_single"
 _POINT = tuple(OperatingPoint.fields())
 _CYLINDER_CHOICES = {
-    "burn": ("burn_shape", ("triangle", "wiebe", "double_wiebe")),
-    "gamma": ("gamma_model", ("constant", "linear", "polynomial")),
-    "wall_heat": ("wall_heat_model", ("woschni", "hohenberg")),
-    "ignition": ("ignition_model", ("watson", "wolfer", "hardenberg_hase", "polynomial")),
+    "burn": "burn_shape",
+    "gamma": "gamma_model",
+    "wall_heat": "wall_heat_model",
+    "ignition": "ignition_model",
 }
 
 
 def add_command(
-    commands: Any, name: str, run: Callable[[argparse.Namespace], None], *, help_text: str, example: str
+    commands: Any,
+    name: str,
+    run: Callable[[argparse.Namespace], None],
+    *,
+    help_text: str,
+    example: str,
+    endings: str = ".json",
 ) -> argparse.ArgumentParser:
     """Add a command with its example, its JSON switch and its output file."""
     parser: argparse.ArgumentParser = commands.add_parser(
@@ -38,7 +47,7 @@ def add_command(
         formatter_class=argparse.RawDescriptionHelpFormatter,
     )
     parser.add_argument("--json", action="store_true", help="one JSON object on stdout and nothing else")
-    parser.add_argument("-o", "--output", metavar="FILE", help="write the result to FILE (.json or .csv)")
+    parser.add_argument("-o", "--output", metavar="FILE", help=f"write the result to FILE ({endings})")
     parser.add_argument("--quiet", action="store_true", help="no progress on stderr")
     parser.set_defaults(run=run, parser=parser)
     return parser
@@ -48,7 +57,7 @@ def add_engine(parser: argparse.ArgumentParser) -> None:
     """Add the options of a cylinder and an operating point; their names are those of the parameters."""
     group = parser.add_argument_group("engine")
     group.add_argument(
-        "--preset", default="puma_single", metavar="NAME_OR_FILE.toml",
+        "--preset", metavar="NAME_OR_FILE.toml",
         help=f"{', '.join(presets.available())} or a TOML file (default: puma_single)",
     )  # fmt: skip
     group.add_argument(
@@ -57,13 +66,15 @@ def add_engine(parser: argparse.ArgumentParser) -> None:
     )  # fmt: skip
     for field, info in OperatingPoint.fields().items():
         unit = "" if info["unit"] == "-" else f" [{info['unit']}]"
-        group.add_argument(_dashed(field), type=float, metavar="X", help=f"{info['meaning']}{unit}")
+        meaning = info["meaning"].replace("; none = ", "; left out: ")
+        group.add_argument(_dashed(field), type=float, metavar="X", help=f"{meaning}{unit}")
     group.add_argument("--motored", action="store_true", help="no fuel")
-    for option, (field, choices) in _CYLINDER_CHOICES.items():
-        group.add_argument(_dashed(option), choices=choices, help=Cylinder.fields()[field]["meaning"])
+    for option, field in _CYLINDER_CHOICES.items():
+        info = Cylinder.fields()[field]
+        group.add_argument(_dashed(option), choices=info["choices"], help=info["meaning"])
 
 
-def add_scheme(parser: argparse.ArgumentParser, *, step_cad: float) -> None:
+def add_scheme(parser: argparse.ArgumentParser, *, step_cad: float | None) -> None:
     """Add integrator and crank step."""
     group = parser.add_argument_group("scheme")
     group.add_argument("--integrator", choices=("trapezoid", "split", "seed", "euler"), default="trapezoid")
@@ -72,7 +83,7 @@ def add_scheme(parser: argparse.ArgumentParser, *, step_cad: float) -> None:
         type=float,
         default=step_cad,
         metavar="X",
-        help=f"crank step, 0.001 to 5 (default: {step_cad:g})",
+        help=f"crank step, 0.001 to 5 (default: {'1, with files 0.25' if step_cad is None else f'{step_cad:g}'})",
     )
 
 
@@ -86,6 +97,8 @@ def add_files(parser: argparse.ArgumentParser, *, nargs: int | str) -> None:
     )
     group.add_argument("--angle-column", default="0", metavar="NAME", help="column name, or number from 0 (default: 0)")
     group.add_argument("--angle-unit", choices=("deg", "rad"), default="deg", help="default: deg")
+    group.add_argument("--decimal", choices=(".", ","), default=".", help="decimal mark (default: .)")
+    group.add_argument("--delimiter", metavar="CHAR", help="column separator (default: found in the file)")
     group.add_argument(
         "--firing-tdc-deg",
         type=float,
@@ -101,17 +114,30 @@ def add_files(parser: argparse.ArgumentParser, *, nargs: int | str) -> None:
 
 def engine_of(args: argparse.Namespace) -> tuple[Cylinder, OperatingPoint, presets.Preset]:
     """Make cylinder and point from a preset and the options over it."""
-    preset = presets.load(args.preset)
+    preset = presets.load(args.preset or _DEFAULT_PRESET)
+    if args.preset is None and getattr(args, "files", None):
+        c = preset.cylinder
+        _LOG.warning(
+            "no --preset: the traces are read with the geometry of %s (%g x %g mm, compression ratio %g)",
+            preset.name, c.bore_mm, c.stroke_mm, c.compression_ratio,
+        )  # fmt: skip
     cylinder: dict[str, Any] = {}
     point: dict[str, Any] = {}
     for item in args.set:
         name, value = _pair(item, "--set", "FIELD=VALUE")
-        (point if name in _POINT else cylinder)[name] = _value(name, value)
-    for option, (field, _) in _CYLINDER_CHOICES.items():
+        chosen = point if name in _POINT else cylinder
+        if name in chosen:
+            raise ParameterError(f"--set {name} is given twice: give it once")
+        chosen[name] = _value(name, value)
+    for option, field in _CYLINDER_CHOICES.items():
         if getattr(args, option) is not None:
+            if field in cylinder:
+                raise ParameterError(f"{_dashed(option)} and --set {field} contradict each other: give one")
             cylinder[field] = getattr(args, option)
     for field in _POINT:
         if getattr(args, field) is not None:
+            if field in point:
+                raise ParameterError(f"{_dashed(field)} and --set {field} contradict each other: give one")
             point[field] = getattr(args, field)
     if args.motored:
         if point.get("fuel_mg"):
@@ -123,7 +149,7 @@ def engine_of(args: argparse.Namespace) -> tuple[Cylinder, OperatingPoint, prese
 def traces_of(args: argparse.Namespace) -> list[xr.Dataset]:
     """Read the pressure files, with their conditions as attributes."""
     conditions = read_conditions(args.conditions) if args.conditions else {}
-    unused = set(conditions)
+    used: dict[str, str] = {}
     traces = []
     for file in args.files:
         trace = read_pressure(
@@ -133,6 +159,8 @@ def traces_of(args: argparse.Namespace) -> list[xr.Dataset]:
             angle_unit=args.angle_unit,
             pressure_unit=args.pressure_unit,
             firing_tdc_deg=args.firing_tdc_deg,
+            delimiter=args.delimiter,
+            decimal=args.decimal,
         )
         if conditions:
             key = next((k for k in (file, Path(file).name, Path(file).stem) if k in conditions), None)
@@ -140,11 +168,13 @@ def traces_of(args: argparse.Namespace) -> list[xr.Dataset]:
                 raise DataError(
                     f"{args.conditions}: no row for {file}: its column 'file' holds {', '.join(map(repr, conditions))}"
                 )
+            if key in used:
+                raise DataError(
+                    f"{args.conditions}: row {key!r} fits both {used[key]} and {file}: write their paths as given here"
+                )
+            used[key] = file
             trace = trace.assign_attrs(**conditions[key])
-            unused.discard(key)
         traces.append(trace)
-    if unused:
-        raise DataError(f"{args.conditions}: rows without a trace: {', '.join(sorted(unused))}")
     return traces
 
 
@@ -156,6 +186,8 @@ def number_pairs(items: Sequence[str], option: str) -> dict[str, float]:
         number = _value(name, value)
         if isinstance(number, str):
             raise ParameterError(f"{option} {item}: {value!r} is no number")
+        if name in out:
+            raise ParameterError(f"{option} {name} is given twice: give it once")
         out[name] = number
     return out
 

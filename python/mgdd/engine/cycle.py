@@ -2,8 +2,9 @@
 
 from __future__ import annotations
 
+import logging
 from collections.abc import Sequence
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
@@ -17,6 +18,7 @@ if TYPE_CHECKING:
 
 __all__ = ["convergence", "sensitivities", "simulate", "timing_sweep"]
 
+_LOG = logging.getLogger(__name__)
 _TRACES = (
     "pressure_bar",
     "volume_l",
@@ -55,7 +57,8 @@ def simulate(
     xarray.Dataset
         Over ``crank_angle_cad``: ``pressure_bar``, ``volume_l``, ``temperature_k``, ``motored_pressure_bar``,
         ``burned_fraction``, and ``heat_release_j_per_cad`` and ``heat_loss_j_per_cad`` of the step that ends
-        at the sample. The indicators (IMEP, efficiency, peaks, burn angles, heat loss) are scalars of it.
+        at the sample. The indicators (IMEP, efficiency, peaks, burn angles, heat loss) are scalars of it. Attribute
+        ``warnings`` names states beyond any piston engine.
 
     Raises
     ------
@@ -78,6 +81,9 @@ def simulate(
     scalars = {**raw["indicators"], "soc_cad": soc_cad}
     for name in ("fuel_heat_j", "burn_duration_cad"):
         scalars[name] = raw[name]
+    doubts = _doubts(raw, point)
+    for text in doubts:
+        _LOG.warning("%s", text)
     return labelled_dataset(
         {
             ANGLE: (ANGLE, raw[ANGLE]),
@@ -92,8 +98,24 @@ def simulate(
             "step_cad": step_cad,
             "speed_rpm": point.speed_rpm,
             "trapped_mass_g": raw["trapped_mass_g"],
+            "warnings": doubts,
         },
     )
+
+
+def _doubts(raw: dict[str, Any], point: OperatingPoint) -> tuple[str, ...]:
+    """Name states of no piston engine: the usual cause is an input in another unit."""
+    found = raw["indicators"]
+    checks = (
+        (found["t_max_k"] > 3500.0, f"t_max_k = {found['t_max_k']:.4g} K"),
+        (found["p_max_bar"] > 500.0, f"p_max_bar = {found['p_max_bar']:.4g} bar"),
+        (raw["temperature_k"][0] < 230.0, f"temperature at IVC = {raw['temperature_k'][0]:.4g} K"),
+        (
+            point.fuel_mg * 10.0 > raw["trapped_mass_g"] * 1e3,
+            f"fuel_mg = {point.fuel_mg:g} mg in trapped_mass_g = {raw['trapped_mass_g']:.4g} g of charge",
+        ),
+    )
+    return tuple(f"{text} is beyond any piston engine: check the units of the inputs" for bad, text in checks if bad)
 
 
 def timing_sweep(

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Iterable, Mapping
 from dataclasses import dataclass, field
 
 import numpy as np
@@ -17,7 +17,8 @@ __all__ = ["Optimum", "optimum"]
 OBJECTIVES = ("efficiency_gross", "imep_gross_bar", "imep_closed_bar")
 _SCAN_CAD = 0.5
 _SECANT_CAD = 3.0
-_WINDOW_CAD = (-60.0, 20.0)
+_WINDOW_CAD: tuple[float, float] = _core.timing_window_cad
+_DEFAULT_CAD = (-30.0, 10.0)
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -69,7 +70,7 @@ def optimum(
     objective: str = "efficiency_gross",
     *,
     limits: Mapping[str, float] | None = None,
-    bounds_cad: tuple[float, float] = (-30.0, 10.0),
+    bounds_cad: tuple[float, float] | None = None,
     step_cad: float = 1.0,
     integrator: str = "trapezoid",
 ) -> Optimum:
@@ -88,8 +89,8 @@ def optimum(
         What to maximise.
     limits : mapping of str to float, optional
         Upper limits on indicators, for example ``{"p_max_bar": 95.0}``.
-    bounds_cad : tuple of float
-        Searched range of SOC [°CA aTDC].
+    bounds_cad : tuple of float, optional
+        Searched range of SOC [°CA aTDC]; -30 to 10, as far as the valves are closed, if left out.
     step_cad, integrator
         As in `simulate`.
 
@@ -113,8 +114,9 @@ def optimum(
     (-3.08, ('p_max_bar',))
     """
     limits = dict(limits or {})
-    _check(point, objective, limits, bounds_cad)
-    low, high = bounds_cad
+    low, high = bounds_cad or (max(_DEFAULT_CAD[0], cylinder.ivc_cad), min(_DEFAULT_CAD[1], cylinder.evo_cad - 1.0))
+    check_request(objective, limits)
+    _check(point, low, high)
 
     def indicators(soc: float | np.ndarray) -> dict[str, np.ndarray]:
         return _core.scan(cylinder, point, np.atleast_1d(np.asarray(soc, float)), step_cad, integrator)
@@ -123,32 +125,32 @@ def optimum(
         raw = _core.sensitivities(cylinder, point, soc, ["soc_cad"], step_cad, integrator)
         return float(raw["indicators"][objective][0])
 
-    def excess(soc: float) -> float:
-        """How far the worst limit is exceeded, relative to it; negative when all are kept."""
-        if not limits:
-            return -math.inf
+    def excess(soc: float, names: Iterable[str]) -> float:
+        """How far the worst of these limits is exceeded, relative to its size; negative when all are kept."""
         now = indicators(soc)
-        return max(float(now[name][0]) / limit - 1.0 for name, limit in limits.items())
+        return max(float(now[name][0] - limits[name]) / max(1.0, abs(limits[name])) for name in names)
 
     grid = np.linspace(low, high, max(3, round((high - low) / _SCAN_CAD) + 1))
     columns = indicators(grid)
-    feasible = np.ones(grid.size, bool)
-    for name, limit in limits.items():
-        feasible &= columns[name] <= limit
+    if limits and not _feasible(columns, limits).any():
+        grid = np.sort(np.append(grid, _least_excess(grid, columns, limits, excess)))
+        columns = indicators(grid)
+    feasible = _feasible(columns, limits)
     if not feasible.any():
         near = ", ".join(f"{name} >= {columns[name].min():.4g} (limit {limit:g})" for name, limit in limits.items())
         raise ConvergenceError(
-            f"no soc_cad in [{low:g}, {high:g}] meets the limits: {near}; raise a limit or widen bounds_cad"
+            f"no soc_cad in [{low:g}, {high:g}] meets the limits together; each alone: {near}; raise a limit or widen "
+            "bounds_cad"
         )
     best = int(np.argmax(np.where(feasible, columns[objective], -np.inf)))
-    soc = _refine(float(grid[best]), grid, best, feasible, slope, excess)
+    soc = _refine(grid, best, feasible, slope, lambda at, end: excess(at, _broken(indicators(end), limits)))
     now = indicators(soc)
-    active = tuple(name for name, limit in limits.items() if now[name][0] > limit * (1.0 - 1e-6))
+    active = tuple(name for name, limit in limits.items() if now[name][0] > limit - 1e-6 * max(1.0, abs(limit)))
     return Optimum(
         soc_cad=soc,
         ca50_cad=float(now["ca50_cad"][0]),
         efficiency_gross=float(now["efficiency_gross"][0]),
-        curvature_per_cad2=_curvature(indicators, objective, soc),
+        curvature_per_cad2=_curvature(indicators, objective, soc, cylinder),
         objective=objective,
         value=float(now[objective][0]),
         limits=limits,
@@ -157,16 +159,43 @@ def optimum(
     )
 
 
+def _feasible(columns: dict[str, np.ndarray], limits: Mapping[str, float]) -> np.ndarray:
+    out = np.ones(columns["p_max_bar"].size, bool)
+    for name, limit in limits.items():
+        out &= columns[name] <= limit
+    return out
+
+
+def _broken(columns: dict[str, np.ndarray], limits: Mapping[str, float]) -> list[str]:
+    return [name for name, limit in limits.items() if columns[name][0] > limit]
+
+
+def _least_excess(
+    grid: np.ndarray,
+    columns: dict[str, np.ndarray],
+    limits: Mapping[str, float],
+    excess: Callable[[float, Iterable[str]], float],
+) -> float:
+    """Find the timing that breaks the limits least: a feasible window may be narrower than the scan."""
+    from scipy.optimize import minimize_scalar
+
+    worst = np.max([(columns[n] - limit) / max(1.0, abs(limit)) for n, limit in limits.items()], axis=0)
+    at = int(np.argmin(worst))
+    window = (grid[max(at - 1, 0)], grid[min(at + 1, grid.size - 1)])
+    found = minimize_scalar(excess, bounds=window, args=(list(limits),), method="bounded", options={"xatol": 1e-6})
+    return float(found.x)
+
+
 def _refine(
-    start: float,
     grid: np.ndarray,
     best: int,
     feasible: np.ndarray,
     slope: Callable[[float], float],
-    excess: Callable[[float], float],
+    excess: Callable[[float, float], float],
 ) -> float:
     from scipy.optimize import brentq
 
+    start = float(grid[best])
     climb = slope(start)
     if climb == 0.0:
         return start
@@ -174,34 +203,40 @@ def _refine(
     if not 0 <= best + step < grid.size:
         return start
     end = float(grid[best + step])
-    if not feasible[best + step]:  # the last kept angle before the limit, from the feasible side
-        crossing = float(brentq(excess, start, end, xtol=1e-10))
-        end = crossing if excess(crossing) <= 0.0 else crossing - step * 1e-9
+    if not feasible[best + step]:  # the last kept angle before a limit that breaks there, from the feasible side
+        outside = end
+        crossing = float(brentq(excess, start, outside, args=(outside,), xtol=1e-10))
+        end = crossing if excess(crossing, outside) <= 0.0 else crossing - step * 1e-9
     if slope(end) * climb >= 0.0:
         return end
     return float(brentq(slope, start, end, xtol=1e-8))
 
 
-def _curvature(indicators: Callable[[np.ndarray], dict[str, np.ndarray]], objective: str, soc: float) -> float:
+def _curvature(
+    indicators: Callable[[np.ndarray], dict[str, np.ndarray]], objective: str, soc: float, cylinder: Cylinder
+) -> float:
     around = np.array([soc - _SECANT_CAD, soc, soc + _SECANT_CAD])
-    if around[0] < _WINDOW_CAD[0] or around[-1] > _WINDOW_CAD[1]:
+    if around[0] < max(_WINDOW_CAD[0], cylinder.ivc_cad) or around[-1] > min(_WINDOW_CAD[1], cylinder.evo_cad - 1e-9):
         return math.nan
     before, at, after = indicators(around)[objective]
     return float((before - 2.0 * at + after) / _SECANT_CAD**2)
 
 
-def _check(point: OperatingPoint, objective: str, limits: Mapping[str, float], bounds: tuple[float, float]) -> None:
+def check_request(objective: str, limits: Mapping[str, float]) -> None:
+    """Refuse an unknown objective or limit before any work."""
     known = _core.indicator_units()
     if objective not in OBJECTIVES:
         raise ParameterError(f"objective = {objective!r}: must be one of {', '.join(OBJECTIVES)}")
-    if not point.fuel_mg > 0.0:
-        raise ParameterError(f"fuel_mg = {point.fuel_mg:g}: an optimum needs fuel > 0")
     for name, value in limits.items():
         if name not in known:
             raise ParameterError(f"limits: {name!r} is no indicator: must be one of {', '.join(known)}")
-        if not (value > 0.0 and math.isfinite(value)):
-            raise ParameterError(f"limits: {name} = {value:g}: must be > 0 and finite")
-    low, high = bounds
+        if not math.isfinite(value):
+            raise ParameterError(f"limits: {name} = {value:g}: must be finite")
+
+
+def _check(point: OperatingPoint, low: float, high: float) -> None:
+    if not point.fuel_mg > 0.0:
+        raise ParameterError(f"fuel_mg = {point.fuel_mg:g}: an optimum needs fuel > 0")
     if not _WINDOW_CAD[0] <= low < high <= _WINDOW_CAD[1]:
         raise ParameterError(
             f"bounds_cad = ({low:g}, {high:g}): must increase and lie in "

@@ -39,6 +39,7 @@ def analyze(
     gamma: float | str | None = None,
     heat_window_cad: tuple[float, float] | None = None,
     fractions: str = "net",
+    quiet: bool = False,
 ) -> xr.Dataset:
     """Analyse a pressure trace: pegging, heat release, burn angles, work, polytropic exponents.
 
@@ -67,6 +68,8 @@ def analyze(
         heat is the peak of the cumulative value for a measured trace, its end for a simulated one.
     fractions : {"net", "gross"}
         Heat that CA10, CA50 and CA90 refer to. Gross is net plus the modelled wall heat.
+    quiet : bool
+        Leave the warnings to the attribute instead of logging them too.
 
     Returns
     -------
@@ -100,7 +103,7 @@ def analyze(
     14.9
     """
     for name in (ANGLE, "pressure_bar"):
-        if name not in trace.variables:
+        if name not in getattr(trace, "variables", ()) or not hasattr(trace, "attrs"):
             raise DataError(f"the trace has no {name}: read it with mgdd.io.read_pressure or make it with simulate")
     simulated = "motored_pressure_bar" in trace.variables
     if pegging == "inlet" and inlet_pressure_kpa is None and point is None:
@@ -124,7 +127,7 @@ def analyze(
         fractions_of_gross=fractions == "gross",
     )
     raw = _core.analyze_trace(trace[ANGLE].values, trace["pressure_bar"].values, cylinder, point, options)
-    for warning in raw["warnings"]:
+    for warning in () if quiet else raw["warnings"]:
         _LOG.warning("%s: %s", trace.attrs.get("file", "trace"), warning)
     return labelled_dataset(
         {

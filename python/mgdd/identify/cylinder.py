@@ -11,6 +11,7 @@ import numpy as np
 
 from mgdd import _core
 from mgdd._core import Cylinder, OperatingPoint
+from mgdd.engine import analyze
 from mgdd.errors import DataError, ParameterError, ShapeError
 from mgdd.identify.records import CylinderFit, LoadFit
 from mgdd.optimize import FitReport
@@ -25,6 +26,7 @@ SHAPE_FIELDS = ("wiebe_m", "second_fraction", "second_delay_cad", "second_durati
 BURN_FIELDS = ("soc_cad", "burn_duration_cad", "fuel_heat_j")
 # An IMEP error beyond this share makes efficiency and timing doubtful, whatever the pressure RMSE says.
 _IMEP_LIMIT_PERCENT = 3.0
+_RMSE_LIMIT_PERCENT = 2.0
 
 
 def fit_cylinder(
@@ -108,7 +110,7 @@ def fit_cylinder(
         warnings=(),
         correlation_if_free=np.asarray(core.correlation_if_free),
     )
-    return replace(fit, warnings=_warnings(fit))
+    return replace(fit, warnings=(*_doubts(traces, cylinder, point), *_warnings(fit)))
 
 
 def default_free(cylinder: Cylinder) -> tuple[str, ...]:
@@ -215,8 +217,24 @@ def _load(
     )
 
 
+def _doubts(traces: Sequence[xr.Dataset], cylinder: Cylinder, point: OperatingPoint | None) -> list[str]:
+    """Collect what the analysis of each trace finds suspicious: TDC, pegging, unit, missing angles."""
+    out = []
+    for trace in traces:
+        analysis = analyze(trace, cylinder, point=point, quiet=True)
+        out += [f"{analysis.attrs['file']}: {text}" for text in analysis.attrs["warnings"]]
+    return out
+
+
 def _warnings(fit: CylinderFit) -> tuple[str, ...]:
     out = []
+    poor = [load for load in fit.loads if load.rmse_percent > _RMSE_LIMIT_PERCENT]
+    if poor:
+        each = ", ".join(f"{load.file} {load.rmse_percent:.1f} %" for load in poor)
+        out.append(
+            f"the model does not meet the measurement (pressure RMSE in % of p_max: {each}): suspect geometry, TDC, "
+            "pegging or the preset"
+        )
     if not fit.report.success:
         out.append(f"the search ended without converging: {fit.report.message}")
     early = [load for load in fit.loads if load.onset_against_soi_cad < 0.0]
@@ -227,10 +245,11 @@ def _warnings(fit: CylinderFit) -> tuple[str, ...]:
             "up for another error of the model, so its start is no physical onset"
         )
     errors = [load.imep_closed_error_percent for load in fit.loads]
-    if max(map(abs, errors)) > _IMEP_LIMIT_PERCENT:
+    if not max(map(abs, errors)) <= _IMEP_LIMIT_PERCENT:
         if max(errors) < 0.0 or min(errors) > 0.0:
-            size = sorted(map(abs, errors))
-            what = f"closed IMEP is {size[0]:.1f} to {size[-1]:.1f} % {'low' if errors[0] < 0.0 else 'high'}"
+            low, high = (f"{size:.1f}" for size in (min(map(abs, errors)), max(map(abs, errors))))
+            size = low if low == high else f"{low} to {high}"
+            what = f"closed IMEP is {size} % {'low' if errors[0] < 0.0 else 'high'}"
         else:
             what = f"closed IMEP is wrong by {min(errors):+.1f} to {max(errors):+.1f} %"
         out.append(

@@ -9,9 +9,10 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
+from mgdd import _core
 from mgdd._core import OperatingPoint
 from mgdd.errors import ParameterError
-from mgdd.identify.cylinder import default_free, fit_cylinder
+from mgdd.identify.cylinder import fit_cylinder
 from mgdd.identify.records import CylinderFit, LoadFit
 from mgdd.results import labelled_dataset
 
@@ -21,10 +22,10 @@ if TYPE_CHECKING:
 __all__ = ["WallHeatProfile", "wall_heat_profile"]
 
 NAME = "wall_heat_scale"
-UPPER = 2.5
+UPPER = float(_core.wall_heat_scale_upper)
 _RISE = 1.10  # a scale counts as possible while the refitted RMSE stays within 10 % of the best
 _WIDTH = 0.20  # and as identified when that range stays within 20 % of the best scale
-_CORRELATION = 0.98
+_CORRELATION = float(_core.correlation_limit)
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -84,9 +85,10 @@ def wall_heat_profile(
     *,
     scales: Sequence[float] = (0.0, 0.25, 0.5, 0.75, 1.0, 1.5, 2.0, 2.5),
     point: OperatingPoint | None = None,
-    free: Sequence[str] | None = None,
     progress: Callable[[str], None] | None = None,
-    **options: Any,
+    step_cad: float = 0.25,
+    integrator: str = "trapezoid",
+    max_iterations: int = 200,
 ) -> WallHeatProfile:
     """Refit everything else at fixed wall-heat scales, and judge whether the traces determine the scale.
 
@@ -97,13 +99,13 @@ def wall_heat_profile(
     fit : CylinderFit
         A fit in which ``wall_heat_scale`` was free.
     scales : sequence of float
-        Scales to refit at, in [0, 2.5]; the fitted one is added.
-    point, free : optional
+        Scales to refit at, in [0, 2.5]; the fitted one and both ends are added.
+    point : OperatingPoint, optional
         As given to `fit_cylinder`.
     progress : callable, optional
         Called with a short text before each refit.
-    **options
-        ``step_cad``, ``integrator`` and ``max_iterations`` of `fit_cylinder`.
+    step_cad, integrator, max_iterations
+        As given to `fit_cylinder`.
 
     Returns
     -------
@@ -113,7 +115,7 @@ def wall_heat_profile(
     Raises
     ------
     mgdd.errors.ParameterError
-        ``wall_heat_scale`` was not free, or a scale lies outside [0, 2.5].
+        ``wall_heat_scale`` was not free or free alone, or a scale lies outside [0, 2.5].
 
     Examples
     --------
@@ -129,7 +131,9 @@ def wall_heat_profile(
     bad = [scale for scale in scales if not 0.0 <= scale <= UPPER]
     if bad:
         raise ParameterError(f"scales: {bad[0]:g} must be in [0, {UPPER:g}]")
-    names = tuple(n for n in (default_free(fit.cylinder) if free is None else free) if n != NAME)
+    free = tuple(dict.fromkeys(name.split("[")[0] for name in fit.report.names if name != NAME))
+    if not free:
+        raise ParameterError(f"{NAME} was the only free parameter: a profile refits the others")
     value = float(fit.cylinder.wall_heat_scale)
     fits = {value: fit}
 
@@ -141,20 +145,24 @@ def wall_heat_profile(
             fits[scale] = fit_cylinder(
                 traces,
                 fit.cylinder.replace(wall_heat_scale=scale),
-                free=names,
+                free=free,
                 point=point,
                 start=[_start(load) for load in near.loads],
-                **options,
+                step_cad=step_cad,
+                integrator=integrator,
+                max_iterations=max_iterations,
             )
         return fits[scale]
 
-    for scale in sorted(scales, key=lambda s: abs(s - value)):
-        refit(float(scale))
-    best = min(f.report.rmse for f in fits.values())
-    low = _crossing(refit, fits, value, _RISE * best, -1)
-    high = _crossing(refit, fits, value, _RISE * best, +1)
+    if math.isfinite(fit.report.rmse):
+        for scale in sorted({*scales, 0.0, UPPER}, key=lambda s: abs(s - value)):
+            refit(float(scale))
+    best = min(fits, key=lambda scale: _rmse(fits[scale]))
+    level = _RISE * _rmse(fits[best])
+    low = _crossing(refit, fits, best, level, -1)
+    high = _crossing(refit, fits, best, level, +1)
     correlation, partner = _correlation(fit)
-    reasons = _reasons(value, correlation, partner, low, high, fit.report)
+    reasons = _reasons(fit, best, _rmse(fits[best]), correlation, partner, low, high)
     return WallHeatProfile(
         value=value,
         stderr=float(fit.report.stderr[fit.report.names.index(NAME)]),
@@ -166,6 +174,10 @@ def wall_heat_profile(
         reasons=reasons,
         dataset=_dataset(fits),
     )
+
+
+def _rmse(fit: CylinderFit) -> float:
+    return fit.report.rmse if math.isfinite(fit.report.rmse) else math.inf
 
 
 def _start(load: LoadFit) -> dict[str, float]:
@@ -183,21 +195,19 @@ def _start(load: LoadFit) -> dict[str, float]:
 
 
 def _crossing(
-    refit: Callable[[float], CylinderFit],
-    fits: dict[float, CylinderFit],
-    value: float,
-    level: float,
-    side: int,
+    refit: Callable[[float], CylinderFit], fits: dict[float, CylinderFit], best: float, level: float, side: int
 ) -> float:
-    """Where the profile leaves the level on one side of the estimate; the bound if it does not."""
+    """Where the profile leaves the level on one side of its best; the bound if it does not, NaN without any fit."""
     from scipy.optimize import brentq
 
-    inside = value
-    for scale in sorted((s for s in fits if (s - value) * side > 0.0), key=lambda s: abs(s - value)):
-        if fits[scale].report.rmse > level:
-            return float(brentq(lambda s: refit(float(s)).report.rmse - level, inside, scale, xtol=2e-3, rtol=1e-6))
+    if not math.isfinite(level):
+        return math.nan
+    inside = best
+    for scale in sorted((s for s in fits if (s - best) * side > 0.0), key=lambda s: abs(s - best)):
+        if _rmse(fits[scale]) > level:
+            return float(brentq(lambda s: min(_rmse(refit(float(s))), 1e6) - level, inside, scale, xtol=2e-3))
         inside = scale
-    return 0.0 if side < 0 else UPPER
+    return inside  # the outermost scale is the bound: both ends of [0, 2.5] are always refitted
 
 
 def _correlation(fit: CylinderFit) -> tuple[float, str]:
@@ -208,13 +218,20 @@ def _correlation(fit: CylinderFit) -> tuple[float, str]:
     return strongest, name
 
 
-def _reasons(value: float, correlation: float, partner: str, low: float, high: float, report: Any) -> tuple[str, ...]:
+def _reasons(
+    fit: CylinderFit, best: float, rmse: float, correlation: float, partner: str, low: float, high: float
+) -> tuple[str, ...]:
+    value = float(fit.cylinder.wall_heat_scale)
+    if not fit.report.success:
+        return (f"the fit itself did not converge: {fit.report.message}",)
     out = []
-    if report.bounds_active[report.names.index(NAME)] != 0:
+    if fit.report.bounds_active[fit.report.names.index(NAME)] != 0:
         out.append(f"the estimate {value:.3g} lies at a bound of [0, {UPPER:g}]")
+    if rmse < fit.report.rmse * (1.0 - 1e-3):
+        out.append(f"a refit at {best:.2f} fits better than the estimate {value:.2f}: the search met a local minimum")
     if abs(correlation) > _CORRELATION:
         out.append(f"its correlation with {partner} is {correlation:.3f}, beyond {_CORRELATION:g}")
-    if value <= 0.0 or low < (1.0 - _WIDTH) * value or high > (1.0 + _WIDTH) * value:
+    if best <= 0.0 or low < (1.0 - _WIDTH) * best or high > (1.0 + _WIDTH) * best:
         out.append(
             f"any scale from {low:.2f} to {high:.2f} fits within 10 % of the best RMSE once the rest is refitted"
         )

@@ -19,7 +19,7 @@ _BOUNDS = {
     "load_percent": (-math.inf, math.inf),
     "speed_rpm": (0.0, 30000.0),
     "trapped_mass_g": (0.0, 1000.0),
-    "soi_cad": (-90.0, 60.0),
+    "soi_cad": (-60.0, 20.0),
 }
 
 
@@ -56,7 +56,7 @@ def read_conditions(path: str | os.PathLike[str]) -> dict[str, dict[str, float]]
     ...     read_conditions(file)
     {'mean.csv': {'speed_rpm': 1200.0, 'soi_cad': -5.06}}
     """
-    table = read_table(path)
+    table = read_table(path, units_row=False)
     header = table.header
     if header is None or "file" not in header:
         raise DataError(f"{table.source}: the header needs a column 'file' that names each trace")
@@ -81,7 +81,8 @@ def _value(cell: str, column: str, where: str) -> float:
     if value is None or not math.isfinite(value):
         raise DataError(f"{where}: {column} = {cell!r}: must be a finite number; leave it empty if unknown")
     low, high = _BOUNDS[column]
-    if not low < value < high:
+    inside = low <= value <= high if column == "soi_cad" else low < value < high
+    if not inside:
         hint = f"; {CONVENTION}" if column == "soi_cad" else ""
         raise DataError(f"{where}: {column} = {value:g}: must be between {low:g} and {high:g}{hint}")
     return value

@@ -121,7 +121,12 @@ def read_pressure(
     table = read_table(path, delimiter=delimiter, decimal=decimal)
     angle_index, pressure_index = table.index(angle_column), table.index(pressure_column)
     said = table.unit(pressure_index)
-    if said in PRESSURE_UNITS and said != pressure_unit:
+    if said and said != pressure_unit and said not in PRESSURE_UNITS:
+        raise DataError(
+            f"{table.source}: the units row says {said!r} for the pressure: convert it to one of "
+            f"{', '.join(PRESSURE_UNITS)} first"
+        )
+    if said and said != pressure_unit:
         raise DataError(
             f"{table.source}: the units row says {said!r} for the pressure: pass pressure_unit={said!r} "
             f"instead of {pressure_unit!r}"

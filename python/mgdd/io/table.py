@@ -75,7 +75,9 @@ class TextTable:
         return values
 
 
-def read_table(path: str | os.PathLike[str], *, delimiter: str | None = None, decimal: str = ".") -> TextTable:
+def read_table(
+    path: str | os.PathLike[str], *, delimiter: str | None = None, decimal: str = ".", units_row: bool = True
+) -> TextTable:
     """Read a text table; `delimiter` None detects it from the first row that is not a comment."""
     if decimal not in (".", ","):
         raise DataError(f"decimal = {decimal!r}: must be '.' or ','")
@@ -92,8 +94,12 @@ def read_table(path: str | os.PathLike[str], *, delimiter: str | None = None, de
     mark = delimiter if delimiter is not None else _detect(content[0][1], decimal)
     cells = [(line, tuple(cell.strip().strip('"') for cell in text.split(mark))) for line, text in content]
     heads: list[tuple[str, ...]] = []
-    while cells and len(heads) < 2 and not any(_like_number(cell) for cell in cells[0][1]):
+    if not units_row and cells:
+        heads.append(cells.pop(0)[1])  # the caller's tables always have a header, and a row of empty cells is data
+    while cells and units_row and len(heads) < 2 and not any(_like_number(cell) for cell in cells[0][1]):
         heads.append(cells.pop(0)[1])
+    if not cells and not units_row:
+        return TextTable(str(file), decimal, heads[0], None, (), ())
     if not cells:
         raise DataError(f"{file}: no numeric rows below the header: rows of numbers are needed")
     width = len(cells[0][1])

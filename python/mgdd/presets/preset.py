@@ -18,6 +18,7 @@ from mgdd.errors import DataError, ParameterError
 
 __all__ = ["Preset", "available", "load"]
 
+_REQUIRED = ("bore_mm", "stroke_mm", "connecting_rod_mm", "compression_ratio", "ivc_cad", "evo_cad")
 _TABLES: Mapping[str, Any] = MappingProxyType({"cylinder": Cylinder, "point": OperatingPoint})
 
 
@@ -105,8 +106,9 @@ def load(name: str | os.PathLike[str]) -> Preset:
     Parameters
     ----------
     name : str or path-like
-        A shipped name, or a path that ends in ``.toml``. Fields that a file leaves out keep the default of
-        `mgdd.engine.Cylinder` and `mgdd.engine.OperatingPoint`.
+        A shipped name, or a path that ends in ``.toml``. A file must give bore, stroke, rod, compression ratio, IVC
+        and EVO; other fields that it leaves out keep the default of `mgdd.engine.Cylinder` and
+        `mgdd.engine.OperatingPoint`.
 
     Returns
     -------
@@ -132,6 +134,10 @@ def load(name: str | os.PathLike[str]) -> Preset:
     if text.endswith(".toml"):
         try:
             return _parse(Path(text).read_text(encoding="utf-8"), source=text)
+        except FileNotFoundError as error:
+            raise FileNotFoundError(
+                error.errno, f"no preset file {text!r}; shipped are {', '.join(available())}"
+            ) from None
         except UnicodeDecodeError as error:
             raise DataError(f"{text}: not a UTF-8 text file: {error}") from error
     if text not in available():
@@ -153,9 +159,12 @@ def _parse(text: str, *, source: str) -> Preset:
             f"{source}: unknown key {min(unknown)!r}: a preset has name, title, [cylinder] and [point]"
         )
     if "cylinder" not in data:
-        raise DataError(f"{source}: no table [cylinder]: it needs at least bore, stroke, rod and compression ratio")
+        raise DataError(f"{source}: no table [cylinder]: it needs at least {', '.join(_REQUIRED)}")
     sources: dict[str, str] = {}
     records = {table: _record(table, data.get(table, {}), source=source, sources=sources) for table in _TABLES}
+    missing = [name for name in _REQUIRED if name not in data["cylinder"]]
+    if missing:
+        raise DataError(f"{source}: [cylinder] lacks {', '.join(missing)}: an engine's geometry has no default")
     name = data.get("name", Path(source).stem)
     return Preset(name=str(name), title=str(data.get("title", name)), sources=MappingProxyType(sources), **records)
 

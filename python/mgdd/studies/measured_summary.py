@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Mapping, Sequence
 from typing import TYPE_CHECKING, Any
 
@@ -52,13 +53,15 @@ def summarize(
 
 def law_row(fit: CylinderFit) -> dict[str, Any]:
     """Give one row of the comparison of burn laws: lists over the traces."""
+    known = any(math.isfinite(load.soi_cad) for load in fit.loads)
+    onset = {"onset_against_soi_cad": [load.onset_against_soi_cad for load in fit.loads]} if known else {}
     return {
         "law": fit.burn_law,
+        **onset,
         "file": [load.file for load in fit.loads],
         "rmse_percent": [load.rmse_percent for load in fit.loads],
         "imep_closed_error_percent": [load.imep_closed_error_percent for load in fit.loads],
         "soc_cad": [load.soc_cad for load in fit.loads],
-        "onset_against_soi_cad": [load.onset_against_soi_cad for load in fit.loads],
         "largest_error_bar": [load.largest_error_bar for load in fit.loads],
         "largest_error_cad": [load.largest_error_cad for load in fit.loads],
         "wall_heat_scale": fit.cylinder.wall_heat_scale,

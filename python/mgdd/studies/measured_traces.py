@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Callable, Sequence
 from typing import TYPE_CHECKING, Any
 
@@ -9,6 +10,8 @@ from mgdd import presets
 from mgdd._core import Cylinder, OperatingPoint
 from mgdd.datasets import load_hd_traces
 from mgdd.engine import analyze, optimum, simulate
+from mgdd.engine.optimum import check_request
+from mgdd.errors import ConvergenceError
 from mgdd.identify import CylinderFit, LoadFit, fit_cylinder, wall_heat_profile
 from mgdd.identify.cylinder import BURN_FIELDS, SHAPE_FIELDS
 from mgdd.results import to_jsonable
@@ -30,6 +33,7 @@ LAWS = (
     ("double_wiebe", "constant"),
 )
 WALL_HEAT_RANGE = (0.5, 1.0)
+_GEOMETRY = ("bore_mm", "stroke_mm", "connecting_rod_mm", "compression_ratio", "ivc_cad", "evo_cad")
 Progress = Callable[[str], None]
 
 
@@ -44,13 +48,14 @@ def compare_laws(
     point: OperatingPoint | None = None,
     laws: Sequence[tuple[str, str]] = LAWS,
     progress: Progress = _silent,
-    **options: Any,
+    step_cad: float = 0.25,
+    integrator: str = "trapezoid",
 ) -> list[CylinderFit]:
     """Fit every burn law to the same traces.
 
     Parameters
     ----------
-    traces, cylinder, point, **options
+    traces, cylinder, point, step_cad, integrator
         As in `mgdd.identify.fit_cylinder`.
     laws : sequence of (burn_shape, gamma_model)
         Laws to compare.
@@ -74,7 +79,7 @@ def compare_laws(
     for shape, gamma in laws:
         law = cylinder.replace(burn_shape=shape, gamma_model=gamma)
         progress(f"calibrate {shape}, {gamma} gamma")
-        fits.append(fit_cylinder(traces, law, point=point, **options))
+        fits.append(fit_cylinder(traces, law, point=point, step_cad=step_cad, integrator=integrator))
     return fits
 
 
@@ -86,8 +91,10 @@ def best_timing(
     scales: Sequence[float] = WALL_HEAT_RANGE,
     objective: str = "imep_closed_bar",
     limits: dict[str, float] | None = None,
+    bounds_cad: tuple[float, float] | None = None,
     progress: Progress = _silent,
-    **options: Any,
+    step_cad: float = 0.25,
+    integrator: str = "trapezoid",
 ) -> list[dict[str, Any]]:
     """Give each load's best timing and gain as a range over the wall-heat scale, the rest refitted at each.
 
@@ -95,14 +102,16 @@ def best_timing(
 
     Parameters
     ----------
-    traces, cylinder, point, **options
+    traces, cylinder, point, step_cad, integrator
         As in `mgdd.identify.fit_cylinder`; the cylinder's burn shape and gamma law are used.
     scales : sequence of float
         Wall-heat scales to refit at [-].
     objective : str
         As in `mgdd.engine.optimum`. Closed-cycle work is the default because a closed-valve trace carries no more.
     limits : dict, optional
-        Further limits, as in `mgdd.engine.optimum`.
+        Further limits, as in `mgdd.engine.optimum`; they hold beside the trace's own p_max.
+    bounds_cad : tuple of float, optional
+        Searched range of SOC, as in `mgdd.engine.optimum`.
     progress : callable
         Called with a short text before each fit.
 
@@ -122,13 +131,19 @@ def best_timing(
     >>> [round(soc) for soc in rows[0]["free_soc_cad"]]
     [-6, -4]
     """
+    limits = limits or {}
+    check_request(objective, limits)
+    search: dict[str, Any] = {"bounds_cad": bounds_cad, "step_cad": step_cad, "integrator": integrator}
     names = BURN_FIELDS + (SHAPE_FIELDS if cylinder.burn_shape == "double_wiebe" else ())
     points: list[list[dict[str, float]]] = [[] for _ in traces]
     for scale in scales:
         progress(f"best timing at wall-heat scale {scale:g}")
-        fit = fit_cylinder(traces, cylinder.replace(wall_heat_scale=scale), free=names, point=point, **options)
+        held = cylinder.replace(wall_heat_scale=scale)
+        fit = fit_cylinder(traces, held, free=names, point=point, step_cad=step_cad, integrator=integrator)
+        if not math.isfinite(fit.report.rmse):
+            raise ConvergenceError(f"no calibration at wall-heat scale {scale:g}: {fit.report.message}")
         for own, load in zip(points, fit.loads, strict=True):
-            own.append(_timing(load, scale, objective, limits or {}))
+            own.append({**_timing(load, scale, objective, limits, search), "converged": fit.report.success})
     return [_as_range(load.file, own) for load, own in zip(fit.loads, points, strict=True)]
 
 
@@ -140,6 +155,8 @@ def run_measured_traces(
     quick: bool = False,
     figures: bool = True,
     progress: Progress = _silent,
+    step_cad: float = 0.25,
+    integrator: str = "trapezoid",
 ) -> StudyResult:
     """Run the main job: check, analyse, calibrate, and find the best timing of measured traces.
 
@@ -157,6 +174,8 @@ def run_measured_traces(
         Draw figures.
     progress : callable
         Called with a short text before each step.
+    step_cad, integrator
+        As in `mgdd.identify.fit_cylinder`.
 
     Returns
     -------
@@ -176,20 +195,22 @@ def run_measured_traces(
     cylinder = cylinder or preset.cylinder
     point = point or preset.point
     progress("analyse the traces")
-    analyses = [analyze(trace, cylinder, point=point) for trace in traces]
-    fits = compare_laws(traces, cylinder, point=point, progress=progress)
+    analyses = [analyze(trace, cylinder, point=point, quiet=True) for trace in traces]
+    scheme: dict[str, Any] = {"step_cad": step_cad, "integrator": integrator}
+    fits = compare_laws(traces, cylinder, point=point, progress=progress, **scheme)
     by_law = dict(zip(LAWS, fits, strict=True))
     main, best = by_law["wiebe", "linear"], by_law["double_wiebe", "constant"]
     profiles = {}
     if not quick:
         for fit in (main, best):
-            profiles[fit.burn_law] = wall_heat_profile(traces, fit, point=point, progress=progress)
+            profiles[fit.burn_law] = wall_heat_profile(traces, fit, point=point, progress=progress, **scheme)
     timing_law = cylinder.replace(burn_shape="wiebe", gamma_model="linear")
-    timing = best_timing(traces, timing_law, point=point, progress=progress)
+    timing = best_timing(traces, timing_law, point=point, progress=progress, **scheme)
     held = timing_law.replace(wall_heat_scale=WALL_HEAT_RANGE[0])
-    reference = fit_cylinder(traces, held, free=BURN_FIELDS, point=point)
+    reference = fit_cylinder(traces, held, free=BURN_FIELDS, point=point, **scheme)
     summary = summarize(analyses, fits, main, profiles, timing)
-    summary["data"] = _PROVENANCE if own else "files of the user"
+    summary["engine"] = {name: getattr(cylinder, name) for name in _GEOMETRY}
+    summary["data"] = _PROVENANCE if own else "Files of the user."
     return StudyResult(
         name="measured-traces",
         dataset=law_table(fits),
@@ -204,12 +225,16 @@ _PROVENANCE = (
 )
 
 
-def _timing(load: LoadFit, scale: float, objective: str, limits: dict[str, float]) -> dict[str, float]:
-    now = simulate(load.cylinder, load.point, soc_cad=load.soc_cad)
+def _timing(
+    load: LoadFit, scale: float, objective: str, limits: dict[str, float], search: dict[str, Any]
+) -> dict[str, float]:
+    scheme = {"step_cad": search["step_cad"], "integrator": search["integrator"]}
+    now = simulate(load.cylinder, load.point, soc_cad=load.soc_cad, **scheme)
     # The model's own error in p_max at the measured timing is no violation of the limit.
     ceiling = max(load.p_max_bar, float(now["p_max_bar"]) * (1.0 + 1e-9))
-    free = optimum(load.cylinder, load.point, objective, limits=limits)
-    kept = optimum(load.cylinder, load.point, objective, limits={"p_max_bar": ceiling, **limits})
+    own = {**limits, "p_max_bar": min(ceiling, limits.get("p_max_bar", math.inf))}
+    free = optimum(load.cylinder, load.point, objective, limits=limits, **search)
+    kept = optimum(load.cylinder, load.point, objective, limits=own, **search)
     base = float(now[objective])
     return {
         "wall_heat_scale": scale,
@@ -221,7 +246,9 @@ def _timing(load: LoadFit, scale: float, objective: str, limits: dict[str, float
         "free_soc_cad": free.soc_cad,
         "free_ca50_cad": free.ca50_cad,
         "free_gain_percent": 100.0 * (free.value / base - 1.0),
-        "free_p_max_bar": float(simulate(load.cylinder, load.point, soc_cad=free.soc_cad)["p_max_bar"]),
+        "free_p_max_bar": float(simulate(load.cylinder, load.point, soc_cad=free.soc_cad, **scheme)["p_max_bar"]),
+        "at_bound": free.at_bound or kept.at_bound,
+        "p_max_model_error_bar": float(now["p_max_bar"]) - load.p_max_bar,
         "efficiency_gross": float(now["efficiency_gross"]),
         "curvature_per_cad2": free.curvature_per_cad2,
     }
