@@ -53,7 +53,7 @@ void bind_identify(py::module_& m) {
   m.def("load_parameters", &load_parameters, "Names that may be freed per load.");
   m.def("common_parameters", &common_parameters, "Cylinder fields that may be freed for all loads.");
   m.def("estimate_burn", &estimate_burn, arg("trace"), arg("cylinder"), "A start from the trace's heat release.");
-  m.def("with_burn", &with_burn, arg("cylinder"), arg("burn"), "The cylinder with one load's shape fields.");
+  m.def("with_burn", &with_burn<double>, arg("cylinder"), arg("burn"), "The cylinder with one load's shape fields.");
   m.def(
       "fit_cylinder",
       [](const std::vector<MeasuredCycle>& traces, const engine::Cylinder& cylinder, const std::vector<LoadBurn>& start,

@@ -191,15 +191,6 @@ std::vector<std::string> common_parameters() {
   return names;
 }
 
-engine::Cylinder with_burn(engine::Cylinder cylinder, const LoadBurn& burn) {
-  cylinder.wiebe_m = burn.wiebe_m;
-  cylinder.second_fraction = burn.second_fraction;
-  cylinder.second_delay_cad = burn.second_delay_cad;
-  cylinder.second_duration_cad = burn.second_duration_cad;
-  cylinder.second_wiebe_m = burn.second_wiebe_m;
-  return cylinder;
-}
-
 LoadBurn estimate_burn(const MeasuredCycle& trace, const engine::Cylinder& cylinder) {
   const engine::TraceAnalysis a =
       engine::analyze_trace(trace.angle_cad, trace.pressure_bar, cylinder, trace.point, engine::TraceOptions{});

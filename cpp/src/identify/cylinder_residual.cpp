@@ -21,16 +21,6 @@ T as_variable(double value, std::size_t active, std::size_t first_lane) noexcept
   return T(value);
 }
 
-template <class T>
-engine::BasicCylinder<T> shaped(engine::BasicCylinder<T> c, const BasicLoadBurn<T>& burn) noexcept {
-  c.wiebe_m = burn.wiebe_m;
-  c.second_fraction = burn.second_fraction;
-  c.second_delay_cad = burn.second_delay_cad;
-  c.second_duration_cad = burn.second_duration_cad;
-  c.second_wiebe_m = burn.second_wiebe_m;
-  return c;
-}
-
 }  // namespace
 
 CylinderResidual::CylinderResidual(const std::vector<MeasuredCycle>& traces, const engine::Cylinder& cylinder,
@@ -125,7 +115,7 @@ bool CylinderResidual::run(std::size_t trace, const Eigen::VectorXd& x, std::siz
   Load& load = loads_[trace];
   Runner<T>& own = runner<T>(load);
   const BasicLoadBurn<T> burn = load_burn<T>(trace, x, first_lane);
-  const engine::BasicCylinder<T> c = shaped(cylinder_of<T>(x, first_lane), burn);
+  const engine::BasicCylinder<T> c = with_burn(cylinder_of<T>(x, first_lane), burn);
   own.model.set_cylinder(c);
   own.model.run(charge(load, own.model, c, burn), burn.soc_cad, own.work);
   return std::all_of(own.work.pressure_pa.begin(), own.work.pressure_pa.end(),
@@ -172,7 +162,7 @@ CylinderResidual::Simulated CylinderResidual::simulate(std::size_t trace, const 
   run<double>(trace, x, 0);
   const Load& load = loads_[trace];
   const LoadBurn at = burn(trace, x);
-  const engine::Cylinder c = shaped(cylinder(x), at);
+  const engine::Cylinder c = with_burn(cylinder(x), at);
   Simulated out;
   for (const std::size_t k : load.sample) {
     out.pressure_bar.push_back(load.plain.work.pressure_pa[k] / units::pa_per_bar);

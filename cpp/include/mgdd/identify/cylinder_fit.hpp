@@ -105,7 +105,15 @@ std::vector<std::string> common_parameters();
 LoadBurn estimate_burn(const MeasuredCycle& trace, const engine::Cylinder& cylinder);
 
 /// The cylinder with the shape fields of one load's burn.
-engine::Cylinder with_burn(engine::Cylinder cylinder, const LoadBurn& burn);
+template <class T>
+engine::BasicCylinder<T> with_burn(engine::BasicCylinder<T> cylinder, const BasicLoadBurn<T>& burn) noexcept {
+  cylinder.wiebe_m = burn.wiebe_m;
+  cylinder.second_fraction = burn.second_fraction;
+  cylinder.second_delay_cad = burn.second_delay_cad;
+  cylinder.second_duration_cad = burn.second_duration_cad;
+  cylinder.second_wiebe_m = burn.second_wiebe_m;
+  return cylinder;
+}
 
 /// Fits. `free` mixes per-load and common names; all others keep their start value. Names, starts and traces are
 /// checked before any work (ParameterError, ShapeError, DataError). Parameters are named `soc_cad[label]` per load.
