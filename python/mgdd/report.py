@@ -22,8 +22,9 @@ _STYLE = """
 body{font:16px/1.5 system-ui,sans-serif;max-width:70rem;margin:2rem auto;padding:0 1rem;color:#1a1a1a}
 h1{font-size:1.6rem}h2{font-size:1.2rem;margin-top:2.2rem;border-bottom:1px solid #ccc}
 table{border-collapse:collapse;font-size:.9rem;margin:1rem 0}td,th{padding:.25rem .6rem;border-bottom:1px solid #ddd}
-th{text-align:left;background:#f4f4f4}td{text-align:right}td:first-child{text-align:left}
-figure{margin:1.5rem 0}img{max-width:100%}figcaption{font-size:.9rem;color:#444}
+th{text-align:left;background:#f4f4f4}td{text-align:right}td:first-child,td.name{text-align:left}
+td{white-space:nowrap}figure{margin:1.5rem 0;break-inside:avoid}img{max-width:100%}
+figcaption{font-size:.9rem;color:#444}
 .scroll{overflow-x:auto}li{margin:.3rem 0}
 """
 
@@ -106,7 +107,8 @@ def _distrust(s: Mapping[str, Any]) -> list[str]:
             out.append(
                 f"The wall-heat scale is not identifiable from these traces ({law}): {'; '.join(profile['reasons'])}."
             )
-    out += [f"{text}." for text in s["warnings"]]
+    told = "wall_heat_scale is not identifiable from these traces"
+    out += [f"{text}." for text in s["warnings"] if not (out and text.endswith(told))]
     for row in s["traces"]:
         out += [f"{row['file']}: {text}." for text in row["warnings"]]
     out.append("Standard errors take the residual as white noise; it is model error, so true uncertainties are larger.")
@@ -260,8 +262,13 @@ def _analysis_table(rows: Sequence[Mapping[str, Any]]) -> str:
 
 def _table(head: Iterable[str], body: Iterable[Iterable[str]]) -> str:
     top = "".join(f"<th>{_text(cell)}</th>" for cell in head)
-    rows = "".join("<tr>" + "".join(f"<td>{_text(cell)}</td>" for cell in row) + "</tr>\n" for row in body)
+    rows = "".join("<tr>" + "".join(_cell(cell) for cell in row) + "</tr>\n" for row in body)
     return f'<div class="scroll"><table><thead><tr>{top}</tr></thead><tbody>\n{rows}</tbody></table></div>'
+
+
+def _cell(text: str) -> str:
+    name = ' class="name"' if text[:1].isalpha() else ""
+    return f"<td{name}>{_text(text)}</td>"
 
 
 def _figure(caption: str, figure: Figure) -> str:

@@ -59,8 +59,8 @@ class LoadFit:
     """
 
     file: str
-    point: OperatingPoint
-    cylinder: Cylinder
+    point: OperatingPoint = field(repr=False)
+    cylinder: Cylinder = field(repr=False)
     soc_cad: float
     burn_duration_cad: float
     fuel_heat_j: float
@@ -75,7 +75,7 @@ class LoadFit:
     largest_error_bar: float
     largest_error_cad: float
     heat_loss_fraction: float
-    overlay: xr.Dataset
+    overlay: xr.Dataset = field(repr=False)
 
     def to_dict(self) -> dict[str, Any]:
         """Give the scalars of this load as a dict, without the overlay and the parameter records.
