@@ -103,7 +103,7 @@ Spectrum spectrum_of(const Eigen::MatrixXd& unit_columns, double rank_tolerance)
   }
   const Eigen::JacobiSVD<Eigen::MatrixXd> svd(unit_columns, Eigen::ComputeThinV);
   result.v = svd.matrixV();
-  const Eigen::VectorXd sigma = svd.singularValues();
+  const Eigen::VectorXd& sigma = svd.singularValues();
   while (result.rank < n && sigma[result.rank] > rank_tolerance * sigma[0]) {
     result.inverse +=
         result.v.col(result.rank) * result.v.col(result.rank).transpose() / (sigma[result.rank] * sigma[result.rank]);

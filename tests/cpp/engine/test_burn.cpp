@@ -96,7 +96,7 @@ TEST(EngineBurn, DoubleWiebeIsTheWeightedSum) {
 }
 
 TEST(EngineBurn, DurationLaw) {
-  Cylinder c;
+  const Cylinder c;
   OperatingPoint p;
   EXPECT_DOUBLE_EQ(burn_duration_cad(c, p), 30.0);
   p.fuel_mg = 40.0;

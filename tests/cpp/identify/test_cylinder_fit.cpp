@@ -29,6 +29,7 @@ std::vector<std::string> with(std::vector<std::string> names, std::initializer_l
 
 std::vector<LoadBurn> estimates(const std::vector<MeasuredCycle>& traces, const engine::Cylinder& c) {
   std::vector<LoadBurn> burns;
+  burns.reserve(traces.size());
   for (const MeasuredCycle& t : traces) {
     burns.push_back(estimate_burn(t, c));
   }

@@ -15,7 +15,6 @@ using Eigen::Index;
 using Eigen::MatrixXd;
 using Eigen::VectorXd;
 using engine::BurnShape;
-using engine::GammaModel;
 
 static_assert(noexcept(std::declval<CylinderResidual&>()(std::declval<const VectorXd&>(), std::declval<VectorXd&>(),
                                                          static_cast<MatrixXd*>(nullptr))));

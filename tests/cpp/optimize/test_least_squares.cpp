@@ -85,7 +85,7 @@ TEST(LeastSquares, LogScalingFindsOrdersOfMagnitudeAndReportsNaturalUnits) {
   for (Index i = 0; i < 40; ++i) {
     y[i] = 3e-6 * std::exp(-1.7 * 0.1 * static_cast<double>(i)) + 1e-8 * noise[i];
   }
-  std::vector<Parameter> log_scaled{{"a", 1e-12, 1e6, true}, {"rate", 1e-6, 1e6, true}};
+  const std::vector<Parameter> log_scaled{{"a", 1e-12, 1e6, true}, {"rate", 1e-6, 1e6, true}};
   const FitReport in_log = LeastSquares(log_scaled, 40).solve(Decay{y}, vector({1.0, 1e-3}));
   const FitReport natural = LeastSquares(named(2), 40).solve(Decay{y}, vector({2.9e-6, 1.6}));
   EXPECT_TRUE(in_log.success()) << in_log.brief();
@@ -284,7 +284,7 @@ TEST(LeastSquares, BadInputIsRefusedByName) {
   LeastSquaresOptions options;
   options.initial_damping = -1.0;
   EXPECT_EQ(message([&] { LeastSquares(good, 5, options); }), "P initial_damping = -1: must be in [1e-24, 1e30]");
-  for (double LeastSquaresOptions::* field :
+  for (double LeastSquaresOptions::* const field :
        {&LeastSquaresOptions::cost_tolerance, &LeastSquaresOptions::step_tolerance,
         &LeastSquaresOptions::gradient_tolerance, &LeastSquaresOptions::initial_damping,
         &LeastSquaresOptions::correlation_limit, &LeastSquaresOptions::rank_tolerance}) {

@@ -108,6 +108,7 @@ std::vector<double> Cycle::angles() const {
 
 std::vector<double> Cycle::pressures_bar() const {
   std::vector<double> bar;
+  bar.reserve(work.pressure_pa.size());
   for (const double pa : work.pressure_pa) {
     bar.push_back(pa / units::pa_per_bar);
   }

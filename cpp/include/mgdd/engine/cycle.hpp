@@ -40,12 +40,12 @@ struct CycleWorkspace {
 /// What the operating point fixes for a whole cycle, in SI.
 template <class T>
 struct Charge {
-  T pressure_pa;  ///< at IVC
-  T intake_pa;
-  T gas_j_per_k;  ///< amount times R: p V = gas_j_per_k T
-  T fuel_heat_j;
-  T burn_duration_cad;
-  T speed_rpm;
+  T pressure_pa{};  ///< at IVC
+  T intake_pa{};
+  T gas_j_per_k{};  ///< amount times R: p V = gas_j_per_k T
+  T fuel_heat_j{};
+  T burn_duration_cad{};
+  T speed_rpm{};
 };
 
 template <class T>

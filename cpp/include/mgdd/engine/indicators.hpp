@@ -12,17 +12,24 @@
 namespace mgdd::engine {
 
 template <class T>
-struct Indicators {
-  T imep_closed_bar;   ///< trapezoid of p dV from IVC to EVO over the swept volume
-  T imep_gross_bar;    ///< closed plus the ideal remainder of -180..180 CAD
-  T efficiency_gross;  ///< gross work over fuel heat; NaN when motored
-  T p_max_bar, p_max_cad;
-  T dp_max_bar_per_cad, dp_max_cad;
-  T t_max_k, t_max_cad;
-  T ca10_cad, ca50_cad, ca90_cad;  ///< of the burn law; NaN when motored
-  T heat_loss_j, heat_loss_fraction;
-  T work_closed_j, work_gross_j;
-  T ringing_intensity_mw_per_m2;
+struct Indicators {                     // every value starts as NaN: nothing has been computed yet
+  T imep_closed_bar = undefined<T>();   ///< trapezoid of p dV from IVC to EVO over the swept volume
+  T imep_gross_bar = undefined<T>();    ///< closed plus the ideal remainder of -180..180 CAD
+  T efficiency_gross = undefined<T>();  ///< gross work over fuel heat; NaN when motored
+  T p_max_bar = undefined<T>();
+  T p_max_cad = undefined<T>();
+  T dp_max_bar_per_cad = undefined<T>();
+  T dp_max_cad = undefined<T>();
+  T t_max_k = undefined<T>();
+  T t_max_cad = undefined<T>();
+  T ca10_cad = undefined<T>();  ///< burn angles of the burn law; NaN when motored
+  T ca50_cad = undefined<T>();
+  T ca90_cad = undefined<T>();
+  T heat_loss_j = undefined<T>();
+  T heat_loss_fraction = undefined<T>();
+  T work_closed_j = undefined<T>();
+  T work_gross_j = undefined<T>();
+  T ringing_intensity_mw_per_m2 = undefined<T>();
 };
 
 template <class T>

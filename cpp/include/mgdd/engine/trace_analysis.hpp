@@ -42,11 +42,19 @@ struct TraceAnalysis {
   std::vector<double> heat_net_j, heat_loss_j;                         ///< of the step that ends at the sample
   std::vector<double> heat_net_cumulative_j, heat_gross_cumulative_j;  ///< zero at the window's start
   double pegging_bar = 0.0;                                            ///< added to the trace
-  double n_compression, n_expansion;
-  double ca10_cad, ca50_cad, ca90_cad;
-  double heat_net_j_total, heat_gross_j_total;  ///< maxima of the cumulative heat
-  double imep_closed_bar, work_closed_j;
-  double p_max_bar, p_max_cad, dp_max_bar_per_cad, t_max_k;
+  double n_compression = undefined<double>();
+  double n_expansion = undefined<double>();
+  double ca10_cad = undefined<double>();
+  double ca50_cad = undefined<double>();
+  double ca90_cad = undefined<double>();
+  double heat_net_j_total = undefined<double>();  ///< peak of the cumulative heat, or its end where options say so
+  double heat_gross_j_total = undefined<double>();
+  double imep_closed_bar = undefined<double>();
+  double work_closed_j = undefined<double>();
+  double p_max_bar = undefined<double>();
+  double p_max_cad = undefined<double>();
+  double dp_max_bar_per_cad = undefined<double>();
+  double t_max_k = undefined<double>();
   bool motored = false;               ///< expansion runs on the compression line: no burn in this trace
   std::vector<std::string> warnings;  ///< what makes these figures doubtful
 };

@@ -81,12 +81,16 @@ struct CylinderFitOptions {
 struct LoadFit {
   LoadBurn burn;
   std::vector<double> model_bar;
-  double p_max_bar;  ///< highest measured sample
-  double rmse_bar, rmse_percent;
-  double imep_closed_bar, imep_closed_model_bar, imep_closed_error_percent;
-  double largest_error_bar, largest_error_cad;
-  double ca50_cad;            ///< of the burn law
-  double heat_loss_fraction;  ///< of the fuel heat
+  double p_max_bar = undefined<double>();  ///< highest measured sample
+  double rmse_bar = undefined<double>();
+  double rmse_percent = undefined<double>();
+  double imep_closed_bar = undefined<double>();
+  double imep_closed_model_bar = undefined<double>();
+  double imep_closed_error_percent = undefined<double>();
+  double largest_error_bar = undefined<double>();
+  double largest_error_cad = undefined<double>();
+  double ca50_cad = undefined<double>();            ///< of the burn law
+  double heat_loss_fraction = undefined<double>();  ///< of the fuel heat
 };
 
 struct CylinderFit {
