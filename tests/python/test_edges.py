@@ -170,6 +170,15 @@ def test_a_trace_that_lacks_the_closed_part_is_doubted() -> None:
     assert any("TDC" in text for text in fit.warnings)
 
 
+def test_a_spike_is_told() -> None:
+    whole = datasets.load_hd_traces()[1]
+    pressure = whole["pressure_bar"].values.copy()
+    assert analyze(whole, HD).attrs["warnings"] == ()
+    pressure[100] += 90.0
+    spiked = io.pressure_trace(whole["crank_angle_cad"].values, pressure, name="spiked")
+    assert any("spike" in text for text in analyze(spiked, HD).attrs["warnings"])
+
+
 def test_best_timing_refuses_a_wrong_limit_before_any_fit() -> None:
     seen: list[str] = []
     with pytest.raises(ParameterError, match="'pmax' is no indicator"):

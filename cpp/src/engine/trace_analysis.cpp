@@ -89,6 +89,14 @@ void add_warnings(TraceAnalysis& a, const Cylinder& cylinder, const TraceOptions
     a.warnings.push_back("polytropic exponent of compression " + text(a.n_compression) +
                          " is outside 1.25..1.42: suspect pegging, TDC offset or pressure unit");
   }
+  for (std::size_t k = 1; k + 1 < a.pressure_bar.size(); ++k) {
+    const double jump = a.pressure_bar[k] - 0.5 * (a.pressure_bar[k - 1] + a.pressure_bar[k + 1]);
+    if (std::abs(jump) > 0.1 * a.p_max_bar) {
+      a.warnings.push_back("the sample at " + text(a.angle_cad[k]) + " °CA aTDC stands " + text(jump) +
+                           " bar off its neighbours: a spike, or a step too coarse");
+      break;
+    }
+  }
   double highest = 0.0;
   for (std::size_t k = first; k < last; ++k)
     highest = std::max(highest, a.heat_net_j[k + 1]);
