@@ -277,6 +277,23 @@ def test_late_injection_and_failed_fits_have_their_exit_codes(
 _CONVERGED = ("cost_converged", "step_converged", "gradient_converged")
 
 
+@pytest.mark.parametrize(
+    ("argv", "words"),
+    [
+        (["--pegging-exponent", "1.3"], "two_point or least_squares"),
+        (["--inlet-pressure-kpa", "150"], "--pegging inlet"),
+        (["--motored"], "do not act on measured traces"),
+        (["--set", "bore_mm=90", "--set", "bore_mm=80"], "given twice"),
+        (["--burn", "wiebe", "--set", "burn_shape=triangle"], "contradict"),
+        (["--speed-rpm", "1000", "--set", "speed_rpm=2000"], "contradict"),
+    ],
+)
+def test_options_that_would_do_nothing_are_refused(
+    argv: list[str], words: str, files: tuple[list[str], str], capsys: pytest.CaptureFixture[str]
+) -> None:
+    assert words in refused(capsys, "engine", "analyze", files[0][0], *HD, *argv)
+
+
 def test_infeasible_limit_has_its_own_exit_code(capsys: pytest.CaptureFixture[str]) -> None:
     error = refused(capsys, "engine", "optimum", "--limit", "p_max_bar=50", code=3)
     assert "p_max_bar >=" in error

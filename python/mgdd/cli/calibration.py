@@ -28,7 +28,7 @@ def calibrate(args: argparse.Namespace) -> None:
     traces = traces_of(args)
     free = [name.strip() for name in args.free.split(",")] if args.free else None
     scheme: dict[str, Any] = {"step_cad": args.step_cad, "integrator": args.integrator}
-    with progress(args) as step:
+    with progress(args, expected=25 + (45 if args.report_folder else 0)) as step:
         step("calibrate")
         fit = fit_cylinder(traces, cylinder, free=free, point=point, **scheme)
         profile = None

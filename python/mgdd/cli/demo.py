@@ -29,7 +29,7 @@ def add(commands: Any) -> None:
 def run(args: argparse.Namespace) -> None:
     """Run the study and write the report."""
     check_output(args, csv=False)
-    with progress(args) as step:
+    with progress(args, expected=45) as step:
         result = run_measured_traces(progress=step)
         step("write the report")
         page = write_report(result, Path(args.folder))

@@ -113,7 +113,7 @@ def _add_analyze(verbs: Any) -> None:
     add_files(parser, nargs=1)
     group = parser.add_argument_group("analysis")
     group.add_argument("--pegging", choices=("none", "inlet", "two_point", "least_squares"), default="none")
-    group.add_argument("--pegging-exponent", type=float, default=1.35, metavar="X", help="default: 1.35")
+    group.add_argument("--pegging-exponent", type=float, metavar="X", help="default: 1.35")
     group.add_argument("--inlet-pressure-kpa", type=float, metavar="X", help="for pegging inlet (default: the point's)")
     group.add_argument(
         "--analysis-gamma", type=float, metavar="X",
@@ -127,6 +127,7 @@ def _add_analyze(verbs: Any) -> None:
 def _analyze(args: argparse.Namespace) -> None:
     check_output(args, csv=True)
     cylinder, point, preset = engine_of(args)
+    _check_pegging(args)
     (trace,) = traces_of(args)
     gamma: float | str = 1.33 if args.gamma is None else "cylinder"
     if args.analysis_gamma is not None:
@@ -138,7 +139,7 @@ def _analyze(args: argparse.Namespace) -> None:
         cylinder,
         point=point,
         pegging=args.pegging,
-        pegging_exponent=args.pegging_exponent,
+        pegging_exponent=args.pegging_exponent or 1.35,
         inlet_pressure_kpa=args.inlet_pressure_kpa,
         gamma=gamma,
         heat_window_cad=tuple(args.heat_window_cad) if args.heat_window_cad else None,
@@ -155,6 +156,13 @@ def _analyze(args: argparse.Namespace) -> None:
         "warnings": list(result.attrs["warnings"]),
     }
     emit(args, payload, traces=result)
+
+
+def _check_pegging(args: argparse.Namespace) -> None:
+    if args.pegging_exponent is not None and args.pegging not in ("two_point", "least_squares"):
+        raise ParameterError("--pegging-exponent acts with --pegging two_point or least_squares only: choose one")
+    if args.inlet_pressure_kpa is not None and args.pegging != "inlet":
+        raise ParameterError("--inlet-pressure-kpa acts with --pegging inlet only: choose it")
 
 
 def _add_calibrate(verbs: Any) -> None:
@@ -235,7 +243,7 @@ def _optimum_of_files(
     args: argparse.Namespace, cylinder: Cylinder, point: OperatingPoint, limits: dict[str, float], preset: str
 ) -> None:
     traces = traces_of(args)
-    with progress(args) as step:
+    with progress(args, expected=2) as step:
         rows = best_timing(
             traces,
             cylinder,

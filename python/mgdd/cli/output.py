@@ -62,15 +62,19 @@ def lines(payload: Mapping[str, Any]) -> str:
 
 
 @contextmanager
-def progress(args: argparse.Namespace) -> Iterator[Callable[[str], None]]:
-    """Show a bar on stderr while work is long; nothing when stderr is no terminal or the user wants quiet."""
+def progress(args: argparse.Namespace, *, expected: int) -> Iterator[Callable[[str], None]]:
+    """Show a bar on stderr while work is long; nothing when stderr is no terminal or the user wants quiet.
+
+    How many refits a profile takes is known only at its end: `expected` steps is where the bar starts from.
+    """
     from tqdm import tqdm
 
     quiet = args.quiet or not sys.stderr.isatty()
-    with tqdm(disable=quiet, file=sys.stderr, unit="step", leave=False) as bar:
+    with tqdm(total=expected, disable=quiet, file=sys.stderr, unit="step", leave=False) as bar:
 
         def step(text: str) -> None:
             bar.set_description(text)
+            bar.total = max(expected, bar.n + 1)
             bar.update()
 
         yield step
