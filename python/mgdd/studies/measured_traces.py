@@ -6,7 +6,7 @@ import math
 from collections.abc import Callable, Sequence
 from typing import TYPE_CHECKING, Any
 
-from mgdd import presets
+from mgdd import _core, presets
 from mgdd._core import Cylinder, OperatingPoint
 from mgdd.datasets import load_hd_traces
 from mgdd.engine import analyze, optimum, simulate
@@ -77,7 +77,8 @@ def compare_laws(
     """
     fits = []
     for shape, gamma in laws:
-        law = cylinder.replace(burn_shape=shape, gamma_model=gamma)
+        start = min(cylinder.wall_heat_scale, _core.wall_heat_scale_upper)  # a held scale may lie beyond the search
+        law = cylinder.replace(burn_shape=shape, gamma_model=gamma, wall_heat_scale=start)
         progress(f"calibrate {shape}, {gamma} gamma")
         fits.append(fit_cylinder(traces, law, point=point, step_cad=step_cad, integrator=integrator))
     return fits
