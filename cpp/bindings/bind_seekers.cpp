@@ -1,0 +1,344 @@
+// Binds include/mgdd/optimize: the dithering seekers (extremum seeking, Newton, bounded) with limits and sensor lags.
+#include <limits>
+#include <optional>
+#include <string>
+#include <utility>
+#include <vector>
+
+#include "seeker_binding.hpp"
+
+namespace mgdd::bindings {
+namespace {
+
+using namespace optimize;
+constexpr double inf = std::numeric_limits<double>::infinity();
+
+DitherSettings dither_from(const py::object& amplitude, int period, const std::optional<std::vector<int>>& harmonics,
+                           Eigen::Index inputs) {
+  DitherSettings d;
+  d.amplitude = inputs_from(amplitude, "amplitude", inputs);
+  d.period = period;
+  if (harmonics) d.harmonics = *harmonics;
+  return d;
+}
+
+Inputs optional_inputs(const py::object& value, std::string_view name, Eigen::Index inputs) {
+  return value.is_none() ? Inputs{} : inputs_from(value, name, inputs);
+}
+
+py::dict space_dict(const SearchSpace& space) {
+  py::dict out;
+  out["start"] = std::vector<double>(space.start.begin(), space.start.end());
+  out["lower"] = std::vector<double>(space.lower.begin(), space.lower.end());
+  out["upper"] = std::vector<double>(space.upper.begin(), space.upper.end());
+  return out;
+}
+
+void add_dither(py::dict& out, const DitherSettings& d) {
+  out["amplitude"] = std::vector<double>(d.amplitude.begin(), d.amplitude.end());
+  out["period"] = d.period;
+  out["harmonics"] = d.harmonics;
+}
+
+std::vector<double> list_of(const Inputs& values) {
+  return {values.begin(), values.end()};
+}
+
+void bind_limit(py::module_& m) {
+  py::class_<Limit>(m, "Limit", R"(An upper limit on a measured quantity, kept by a seeker.
+
+Parameters
+----------
+name : str
+    What is limited, for example ``p_max_bar``.
+upper : float
+    The limit, in the unit of the quantity.
+margin : float
+    Kept free below the limit, same unit.
+method : {"switching", "penalty", "barrier"}
+    How J knows of the limit: not at all (the guard alone turns the steps), by a quadratic penalty on the excess, or
+    by a logarithmic barrier. The guard acts in all three.
+weight : float
+    Penalty: J units per squared scaled excess; barrier: J units times the logarithm of the scaled room.
+scale : float
+    Unit of the excess; 0 stands for the limit itself.
+
+Raises
+------
+mgdd.errors.ParameterError
+    When a seeker is made with it: limit not finite, negative margin, weight not > 0.
+
+Examples
+--------
+>>> from mgdd.optimize import Limit
+>>> Limit("p_max_bar", 95.0, margin=1.0)
+Limit('p_max_bar', 95.0, margin=1.0, method='switching', weight=1.0, scale=0.0)
+)")
+      .def(py::init([](std::string name, double upper, double margin, const std::string& method, double weight,
+                       double scale) {
+             Limit limit{std::move(name), upper, margin, parse_limit_method(method), weight, scale};
+             validate({limit});
+             return limit;
+           }),
+           py::arg("name"), py::arg("upper"), py::kw_only(), py::arg("margin") = 0.0, py::arg("method") = "switching",
+           py::arg("weight") = 1.0, py::arg("scale") = 0.0)
+      .def_readonly("name", &Limit::name, "What is limited.")
+      .def_readonly("upper", &Limit::upper, "The limit.")
+      .def_readonly("margin", &Limit::margin, "Kept free below the limit.")
+      .def_property_readonly(
+          "method", [](const Limit& l) { return std::string(to_string(l.method)); }, "How J knows of the limit.")
+      .def_readonly("weight", &Limit::weight, "Of penalty or barrier.")
+      .def_readonly("scale", &Limit::scale, "Unit of the excess.")
+      .def("__repr__",
+           [](const Limit& l) {
+             return py::str("Limit({!r}, {!r}, margin={!r}, method={!r}, weight={!r}, scale={!r})")
+                 .format(l.name, l.upper, l.margin, std::string(to_string(l.method)), l.weight, l.scale);
+           })
+      .def(py::pickle(
+          [](const Limit& l) {
+            return py::make_tuple(l.name, l.upper, l.margin, std::string(to_string(l.method)), l.weight, l.scale);
+          },
+          [](const py::tuple& t) {
+            return Limit{t[0].cast<std::string>(), t[1].cast<double>(),
+                         t[2].cast<double>(),      parse_limit_method(t[3].cast<std::string>()),
+                         t[4].cast<double>(),      t[5].cast<double>()};
+          }));
+  py::class_<ComponentLag>(m, "ComponentLag", R"(What stands between the plant and one measured component of J.
+
+Parameters
+----------
+delay_cycles : float
+    Transport delay [cycles].
+lag_cycles : float
+    Time constant of the first-order lag y += (1 - exp(-1/tau)) (x - y) [cycles]; 0 for none.
+
+Raises
+------
+mgdd.errors.ParameterError
+    A negative delay or lag.
+
+Examples
+--------
+>>> from mgdd.optimize import ComponentLag
+>>> gain, phase_deg = ComponentLag(delay_cycles=42, lag_cycles=25).response(period=10)
+>>> round(gain, 4), round(phase_deg % 360.0, 1)
+(0.0646, 140.5)
+)")
+      .def(py::init([](double delay, double lag) {
+             const ComponentLag out{delay, lag};
+             validate(std::vector<ComponentLag>{out});
+             return out;
+           }),
+           py::kw_only(), py::arg("delay_cycles") = 0.0, py::arg("lag_cycles") = 0.0)
+      .def_readonly("delay_cycles", &ComponentLag::delay_cycles, "Transport delay [cycles].")
+      .def_readonly("lag_cycles", &ComponentLag::lag_cycles, "Time constant of the lag [cycles].")
+      .def(
+          "response",
+          [](const ComponentLag& self, int period, int harmonic) {
+            if (period < 1 || harmonic < 1) throw ParameterError("period and harmonic: must be >= 1");
+            const SensorResponse r = sensor_response(self, harmonic, period);
+            return std::pair(r.gain, r.phase_rad * 180.0 / 3.14159265358979323846);
+          },
+          py::kw_only(), py::arg("period"), py::arg("harmonic") = 1,
+          "Gain [-] and phase lag [deg] at `harmonic` oscillations per `period` cycles.")
+      .def("__repr__",
+           [](const ComponentLag& l) {
+             return py::str("ComponentLag(delay_cycles={!r}, lag_cycles={!r})").format(l.delay_cycles, l.lag_cycles);
+           })
+      .def(py::pickle([](const ComponentLag& l) { return py::make_tuple(l.delay_cycles, l.lag_cycles); },
+                      [](const py::tuple& t) { return ComponentLag{t[0].cast<double>(), t[1].cast<double>()}; }));
+}
+
+std::vector<ComponentLag> components_from(const std::optional<std::vector<ComponentLag>>& components) {
+  return components.value_or(std::vector<ComponentLag>{ComponentLag{}});
+}
+
+void bind_extremum_seeking(py::module_& m) {
+  using R = Recorded<ExtremumSeeking>;
+  const ExtremumSeekingSettings d;
+  py::class_<R> cls(m, "ExtremumSeeking", "Extremum seeking; see mgdd.optimize.ExtremumSeeking.");
+  cls.def(py::init([](const py::object& start, const py::object& lower, const py::object& upper,
+                      const std::string& form, const py::object& amplitude, int period,
+                      const std::optional<std::vector<int>>& harmonics, const py::object& gain, const py::object& rate,
+                      double washout_pole, double low_pass,
+                      const std::optional<std::vector<ComponentLag>>& components, std::optional<int> hold_cycles,
+                      double amplitude_floor, double full_gradient, double limit_amplitude, bool maximize,
+                      const std::vector<Limit>& limits, std::optional<double> curvature) {
+            ExtremumSeekingSettings s;
+            s.space = space_from(start, lower, upper);
+            s.form = parse_mean_removal(form);
+            s.dither = dither_from(amplitude, period, harmonics, s.space.size());
+            s.gain = inputs_from(gain, "gain", s.space.size());
+            s.rate = optional_inputs(rate, "rate", s.space.size());
+            s.washout_pole = washout_pole;
+            s.low_pass = low_pass;
+            s.components = components_from(components);
+            s.hold_cycles = hold_cycles.value_or(-1);
+            s.amplitude_floor = amplitude_floor;
+            s.full_gradient = full_gradient;
+            s.limit_amplitude = limit_amplitude;
+            s.maximize = maximize;
+            s.limits = limits;
+            s.curvature = none_as_nan(curvature);
+            R out{ExtremumSeeking(s)};
+            warn_each(s.advice());
+            return out;
+          }),
+          py::kw_only(), py::arg("start"), py::arg("lower") = -inf, py::arg("upper") = inf, py::arg("form") = "batch",
+          py::arg("amplitude") = 1.0, py::arg("period") = d.dither.period, py::arg("harmonics") = py::none(),
+          py::arg("gain") = d.gain[0], py::arg("rate") = py::none(), py::arg("washout_pole") = d.washout_pole,
+          py::arg("low_pass") = d.low_pass, py::arg("components") = py::none(), py::arg("hold_cycles") = py::none(),
+          py::arg("amplitude_floor") = d.amplitude_floor, py::arg("full_gradient") = d.full_gradient,
+          py::arg("limit_amplitude") = d.limit_amplitude, py::arg("maximize") = true,
+          py::arg("limits") = std::vector<Limit>{}, py::arg("curvature") = py::none())
+      .def_property_readonly(
+          "gradient", [](const R& r) { return input_array(r.seeker.gradient()); },
+          "Last estimate of the slope of the maximised objective, shape (inputs,).")
+      .def_property_readonly(
+          "amplitude_share", [](const R& r) { return r.seeker.amplitude_share(); },
+          "Amplitude now over that of the settings.")
+      .def_property_readonly(
+          "settings",
+          [](const R& r) {
+            const ExtremumSeekingSettings& s = r.seeker.settings();
+            py::dict out = space_dict(s.space);
+            out["form"] = std::string(to_string(s.form));
+            add_dither(out, s.dither);
+            out["gain"] = list_of(s.gain);
+            out["rate"] = list_of(s.rate);
+            out["washout_pole"] = s.washout_pole;
+            out["low_pass"] = s.low_pass;
+            out["components"] = s.components;
+            out["hold_cycles"] = s.hold_cycles;
+            out["amplitude_floor"] = s.amplitude_floor;
+            out["full_gradient"] = s.full_gradient;
+            out["limit_amplitude"] = s.limit_amplitude;
+            out["maximize"] = s.maximize;
+            out["limits"] = s.limits;
+            out["curvature"] = nan_as_none(s.curvature);
+            return out;
+          },
+          "Arguments that make this seeker again.");
+  bind_seeking(cls);
+}
+
+void bind_newton(py::module_& m) {
+  using R = Recorded<NewtonSeeking>;
+  const NewtonSeekingSettings d;
+  py::class_<R> cls(m, "NewtonSeeking", "Newton extremum seeking; see mgdd.optimize.NewtonSeeking.");
+  cls.def(py::init([](const py::object& start, const py::object& lower, const py::object& upper,
+                      const py::object& amplitude, int period, const std::optional<std::vector<int>>& harmonics,
+                      double time_constant_cycles, double hessian_rate, double riccati_rate,
+                      const py::object& initial_hessian, const py::object& initial_inverse, double largest_inverse,
+                      int hold_cycles, const py::object& rate,
+                      const std::optional<std::vector<ComponentLag>>& components, double limit_amplitude,
+                      bool maximize, const std::vector<Limit>& limits) {
+            NewtonSeekingSettings s;
+            s.space = space_from(start, lower, upper);
+            const Eigen::Index n = s.space.size();
+            s.dither = dither_from(amplitude, period, harmonics, n);
+            s.time_constant_cycles = time_constant_cycles;
+            s.hessian_rate = hessian_rate;
+            s.riccati_rate = riccati_rate;
+            s.initial_hessian = inputs_from(initial_hessian, "initial_hessian", n);
+            s.initial_inverse = inputs_from(initial_inverse, "initial_inverse", n);
+            s.largest_inverse = largest_inverse;
+            s.hold_cycles = hold_cycles;
+            s.rate = optional_inputs(rate, "rate", n);
+            s.components = components_from(components);
+            s.limit_amplitude = limit_amplitude;
+            s.maximize = maximize;
+            s.limits = limits;
+            R out{NewtonSeeking(s)};
+            warn_each(s.advice());
+            return out;
+          }),
+          py::kw_only(), py::arg("start"), py::arg("lower") = -inf, py::arg("upper") = inf,
+          py::arg("amplitude") = d.dither.amplitude[0], py::arg("period") = d.dither.period,
+          py::arg("harmonics") = py::none(), py::arg("time_constant_cycles") = d.time_constant_cycles,
+          py::arg("hessian_rate") = d.hessian_rate, py::arg("riccati_rate") = d.riccati_rate,
+          py::arg("initial_hessian") = d.initial_hessian[0], py::arg("initial_inverse") = d.initial_inverse[0],
+          py::arg("largest_inverse") = d.largest_inverse, py::arg("hold_cycles") = d.hold_cycles,
+          py::arg("rate") = py::none(), py::arg("components") = py::none(),
+          py::arg("limit_amplitude") = d.limit_amplitude, py::arg("maximize") = true,
+          py::arg("limits") = std::vector<Limit>{})
+      .def_property_readonly(
+          "gradient", [](const R& r) { return input_array(r.seeker.gradient()); },
+          "Last estimate of the slope of the maximised objective, shape (inputs,).")
+      .def_property_readonly(
+          "hessian", [](const R& r) { return Eigen::MatrixXd(r.seeker.hessian()); },
+          "Filtered Hessian of the maximised objective, shape (inputs, inputs).")
+      .def_property_readonly(
+          "inverse_hessian", [](const R& r) { return Eigen::MatrixXd(r.seeker.inverse_hessian()); },
+          "State of the Riccati filter, which tends to the inverse Hessian.")
+      .def_property_readonly(
+          "settings",
+          [](const R& r) {
+            const NewtonSeekingSettings& s = r.seeker.settings();
+            py::dict out = space_dict(s.space);
+            add_dither(out, s.dither);
+            out["time_constant_cycles"] = s.time_constant_cycles;
+            out["hessian_rate"] = s.hessian_rate;
+            out["riccati_rate"] = s.riccati_rate;
+            out["initial_hessian"] = list_of(s.initial_hessian);
+            out["initial_inverse"] = list_of(s.initial_inverse);
+            out["largest_inverse"] = s.largest_inverse;
+            out["hold_cycles"] = s.hold_cycles;
+            out["rate"] = list_of(s.rate);
+            out["components"] = s.components;
+            out["limit_amplitude"] = s.limit_amplitude;
+            out["maximize"] = s.maximize;
+            out["limits"] = s.limits;
+            return out;
+          },
+          "Arguments that make this seeker again.");
+  bind_seeking(cls);
+}
+
+void bind_bounded(py::module_& m) {
+  using R = Recorded<BoundedSeeking>;
+  py::class_<R> cls(m, "BoundedSeeking", "Bounded extremum seeking; see mgdd.optimize.BoundedSeeking.");
+  cls.def(py::init([](const py::object& start, const py::object& lower, const py::object& upper,
+                      const py::object& amplitude, int period, const std::optional<std::vector<int>>& harmonics,
+                      double kappa, bool maximize, const std::vector<Limit>& limits,
+                      std::optional<double> curvature) {
+            BoundedSeekingSettings s;
+            s.space = space_from(start, lower, upper);
+            s.dither = dither_from(amplitude, period, harmonics, s.space.size());
+            s.kappa = kappa;
+            s.maximize = maximize;
+            s.limits = limits;
+            s.curvature = none_as_nan(curvature);
+            R out{BoundedSeeking(s)};
+            warn_each(s.advice());
+            return out;
+          }),
+          py::kw_only(), py::arg("start"), py::arg("lower") = -inf, py::arg("upper") = inf, py::arg("amplitude") = 1.0,
+          py::arg("period") = 10, py::arg("harmonics") = py::none(), py::arg("kappa") = 1.0,
+          py::arg("maximize") = true, py::arg("limits") = std::vector<Limit>{}, py::arg("curvature") = py::none())
+      .def_property_readonly(
+          "settings",
+          [](const R& r) {
+            const BoundedSeekingSettings& s = r.seeker.settings();
+            py::dict out = space_dict(s.space);
+            add_dither(out, s.dither);
+            out["kappa"] = s.kappa;
+            out["maximize"] = s.maximize;
+            out["limits"] = s.limits;
+            out["curvature"] = nan_as_none(s.curvature);
+            return out;
+          },
+          "Arguments that make this seeker again.");
+  bind_seeking(cls);
+}
+
+}  // namespace
+
+void bind_seekers(py::module_& m) {
+  bind_limit(m);
+  bind_extremum_seeking(m);
+  bind_newton(m);
+  bind_bounded(m);
+}
+
+}  // namespace mgdd::bindings
