@@ -69,6 +69,12 @@ struct BenchSettings {
 /// ParameterError names field, value and bound.
 void validate(const BenchSettings& settings);
 
+/// Earliest and latest SOC whose burn starts between IVC and EVO [°CA aTDC].
+std::array<double, 2> closed_part(const engine::Cylinder& cylinder) noexcept;
+
+/// Earliest and latest SOC that a bench takes: [-60, 20] °CA aTDC as far as the valves are closed.
+std::array<double, 2> timing_window(const engine::Cylinder& cylinder) noexcept;
+
 /// One measured cycle.
 struct BenchCycle {
   std::int64_t cycle = 0;
@@ -97,8 +103,8 @@ struct BenchCycle {
 
 class EngineBench {
  public:
-  /// ParameterError by `validate`.
-  explicit EngineBench(BenchSettings settings);
+  /// ParameterError by `validate`; ConvergenceError if a scheduled point has no physical cycle.
+  explicit EngineBench(const BenchSettings& settings);
 
   /// Runs one cycle. Requests are clamped to `window_cad`; NaN repeats the last one. Before the first cycle every
   /// sensor stands at its steady value for the first request.
@@ -122,7 +128,7 @@ class EngineBench {
   /// Speed or fuel of that cycle differ by more than 5 % from the cycle before.
   bool point_changes_at(std::int64_t cycle) const noexcept;
   /// Earliest and latest SOC that is not clamped [°CA aTDC].
-  std::array<double, 2> window_cad() const noexcept { return {earliest_cad_, latest_cad_}; }
+  std::array<double, 2> window_cad() const noexcept { return window_; }
   /// D and g of the analyser at the next cycle.
   std::size_t analyser_delay_cycles() const noexcept;
   double analyser_gain() const noexcept;
@@ -135,14 +141,13 @@ class EngineBench {
     double analyser_gain, fast_gain;
   };
   std::size_t index_at(std::int64_t cycle) const noexcept;
-  engine::PerformanceSignals signals_of(const engine::Indicators<double>& of, double nox_ppm) const noexcept;
   engine::Indicators<double> burn(const Prepared& at, double soc_cad, bool misfire, bool& unphysical) noexcept;
   void start(const Prepared& at, double soc_cad) noexcept;
-  void drift() noexcept;
-  double routed_ppm(const BenchCycle& c) const noexcept;
   void measure_nox(const Prepared& at, BenchCycle& c) noexcept;
   void judge(const Prepared& at, BenchCycle& c) noexcept;
   void measure_limits(BenchCycle& c) noexcept;
+  double cov_imep_percent() const noexcept;
+  double elapsed_kcycles() const noexcept;
   double noise(BenchStream stream) const noexcept;
 
   BenchSettings settings_;
@@ -150,12 +155,13 @@ class EngineBench {
   engine::CycleWorkspace<double> work_;
   std::vector<Prepared> prepared_;
   std::vector<double engine::Indicators<double>::*> limit_members_;  // null for the COV of IMEP
-  double earliest_cad_ = 0.0, latest_cad_ = 0.0;
+  std::array<double, 2> closed_, window_;
 
   std::uint64_t seed_ = 0;
   std::int64_t cycle_ = 0;
   double last_soc_cad_ = 0.0;
   double last_t_max_k_ = 0.0;
+  double last_imep_bar_ = 0.0;
   double ln_bias_ = 0.0;
   std::array<double, engine::Performance::max_terms> last_components_{};
   TransportLag analyser_, fast_, soft_through_analyser_;
