@@ -19,10 +19,6 @@ using namespace engine;
 constexpr auto fields = cylinder_fields<double>();
 constexpr auto point_fields = operating_point_fields<double>();
 
-py::str as_str(std::string_view s) {
-  return {s.data(), s.size()};
-}
-
 // One keyword of __init__ per field, with the C++ default.
 template <std::size_t>
 using Number = double;

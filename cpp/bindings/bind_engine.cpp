@@ -1,6 +1,5 @@
-// Binds include/mgdd/engine: the cycle, its sensitivities, ignition delay and the NOx proxy.
+// Binds include/mgdd/engine: the cycle, its sensitivities and ignition delay.
 #include <algorithm>
-#include <cmath>
 #include <cstddef>
 #include <optional>
 #include <string>
@@ -11,7 +10,6 @@
 #include "mgdd/common/error.hpp"
 #include "mgdd/common/units.hpp"
 #include "mgdd/engine/cycle.hpp"
-#include "mgdd/engine/emissions.hpp"
 #include "mgdd/engine/ignition.hpp"
 #include "mgdd/engine/sensitivity.hpp"
 #include "mgdd/engine/wall_heat.hpp"
@@ -20,10 +18,6 @@ namespace mgdd::bindings {
 namespace {
 
 using namespace engine;
-
-py::str as_str(std::string_view s) {
-  return {s.data(), s.size()};
-}
 
 py::dict to_dict(const Indicators<double>& indicators) {
   py::dict out;
@@ -238,60 +232,6 @@ void bind_engine(py::module_& m) {
         arg("pressure_bar"), arg("temperature_k"), arg("gas_velocity_m_per_s"), "Film coefficient [W/(m2 K)].");
   m.def("hohenberg_coefficient", py::vectorize(&hohenberg_coefficient<double>), arg("c1_bar_m3"), arg("volume_m3"),
         arg("pressure_bar"), arg("temperature_k"), arg("piston_speed_m_per_s"), "Film coefficient [W/(m2 K)].");
-
-  py::class_<NoxProxy>(m, "NoxProxy", R"(NOx proxy from the maximum bulk gas temperature: a correlation to be fitted.
-
-Two maps with equal slope at the reference: affine-log, NOx0 exp(b/T0^2 (T - T0)), and Arrhenius,
-NOx0 exp(-b (1/T - 1/T0)). Valid at fixed intake oxygen only; the defaults are plausible, not of any engine.
-
-Parameters
-----------
-reference_temperature_k : float
-    T0 [K].
-reference_nox_ppm : float
-    NOx0, at T0 [ppm].
-activation_temperature_k : float
-    b [K].
-
-Raises
-------
-mgdd.errors.ParameterError
-    A constant that is not > 0.
-
-Examples
---------
->>> from mgdd.engine import NoxProxy
->>> float(NoxProxy().arrhenius_ppm(1900.0))
-1200.0
-)")
-      .def(py::init([](double t0, double nox0, double b) {
-             for (const auto& [name, value] :
-                  {std::pair{"reference_temperature_k", t0}, std::pair{"reference_nox_ppm", nox0},
-                   std::pair{"activation_temperature_k", b}}) {
-               if (!(value > 0.0 && std::isfinite(value))) {
-                 throw ParameterError(std::string(name) + " = " + std::to_string(value) + ": must be > 0");
-               }
-             }
-             return NoxProxy{t0, nox0, b};
-           }),
-           py::kw_only(), arg("reference_temperature_k") = NoxProxy{}.reference_temperature_k,
-           arg("reference_nox_ppm") = NoxProxy{}.reference_nox_ppm,
-           arg("activation_temperature_k") = NoxProxy{}.activation_temperature_k)
-      .def_readonly("reference_temperature_k", &NoxProxy::reference_temperature_k, "T0 [K].")
-      .def_readonly("reference_nox_ppm", &NoxProxy::reference_nox_ppm, "NOx0 [ppm].")
-      .def_readonly("activation_temperature_k", &NoxProxy::activation_temperature_k, "b [K].")
-      .def(
-          "affine_log_ppm",
-          [](const NoxProxy& self, const InputArray& t) {
-            return py::vectorize([&self](double x) { return self.affine_log_ppm(x); })(t);
-          },
-          arg("t_max_k"), "NOx [ppm] by the affine-log map.")
-      .def(
-          "arrhenius_ppm",
-          [](const NoxProxy& self, const InputArray& t) {
-            return py::vectorize([&self](double x) { return self.arrhenius_ppm(x); })(t);
-          },
-          arg("t_max_k"), "NOx [ppm] by the Arrhenius map.");
 }
 
 }  // namespace mgdd::bindings

@@ -17,7 +17,7 @@ py::object make(const char* name, const py::object& bases, const char* doc) {
 
 // Held for the life of the process: translators outlive the module object.
 struct Types {
-  py::object error, parameter, shape, data, convergence;
+  py::object error, parameter, shape, data, convergence, rig;
 };
 Types& types() {
   static Types* held = new Types;
@@ -38,11 +38,14 @@ void bind_errors(py::module_& m) {
                 "Measured data that cannot be what the caller says they are.");
   t.convergence = make("ConvergenceError", py::make_tuple(t.error, runtime_error),
                        "A numerical method that did not reach its tolerance.");
+  t.rig = make("RigError", py::make_tuple(t.error, py::reinterpret_borrow<py::object>(PyExc_OSError)),
+               "A test rig that cannot do what was asked.");
   m.attr("Error") = t.error;
   m.attr("ParameterError") = t.parameter;
   m.attr("ShapeError") = t.shape;
   m.attr("DataError") = t.data;
   m.attr("ConvergenceError") = t.convergence;
+  m.attr("RigError") = t.rig;
 
   py::register_exception_translator([](std::exception_ptr pointer) {
     if (!pointer) return;
@@ -56,6 +59,8 @@ void bind_errors(py::module_& m) {
       PyErr_SetString(types().data.ptr(), e.what());
     } catch (const ConvergenceError& e) {
       PyErr_SetString(types().convergence.ptr(), e.what());
+    } catch (const RigError& e) {
+      PyErr_SetString(types().rig.ptr(), e.what());
     } catch (const Error& e) {
       PyErr_SetString(types().error.ptr(), e.what());
     }
@@ -67,6 +72,19 @@ std::vector<double> to_column(const InputArray& array, std::string_view name) {
     throw ShapeError(std::string(name) + " has " + std::to_string(array.ndim()) + " dimensions: must be one column");
   }
   return {array.data(), array.data() + array.size()};
+}
+
+void require_pickle_version(const py::tuple& state) {
+  if (py::len(state) < 2 || !py::isinstance<py::int_>(state[0]) || state[0].cast<int>() != 1) {
+    throw DataError("this pickle was written by another version of mgdd");
+  }
+}
+
+py::str representation(const char* name, const py::dict& keywords) {
+  py::list parts;
+  for (const auto& item : keywords)
+    parts.append(py::str("{}={!r}").format(item.first, item.second));
+  return py::str("{}({})").format(name, py::str(", ").attr("join")(parts));
 }
 
 py::array_t<double> to_array(const std::vector<double>& column) {

@@ -11,10 +11,10 @@ Examples
 
 from __future__ import annotations
 
-from mgdd._core import ConvergenceError, DataError, Error, ParameterError, ShapeError
+from mgdd._core import ConvergenceError, DataError, Error, ParameterError, RigError, ShapeError
 
-__all__ = ["ConvergenceError", "DataError", "Error", "ParameterError", "ShapeError"]
+__all__ = ["ConvergenceError", "DataError", "Error", "ParameterError", "RigError", "ShapeError"]
 
-for _error in (ConvergenceError, DataError, Error, ParameterError, ShapeError):
+for _error in (ConvergenceError, DataError, Error, ParameterError, RigError, ShapeError):
     _error.__module__ = __name__  # the public home, as tracebacks and pickles should name it
 del _error

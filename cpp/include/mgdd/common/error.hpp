@@ -32,4 +32,9 @@ struct ConvergenceError : Error {
   using Error::Error;
 };
 
+/// A test rig that cannot do what was asked: not connected, asked out of order, no answer.
+struct RigError : Error {
+  using Error::Error;
+};
+
 }  // namespace mgdd

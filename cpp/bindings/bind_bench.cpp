@@ -1,0 +1,286 @@
+// Binds loop/engine_bench.hpp: the virtual engine bench and the dynamics of its sensors.
+#include <cstddef>
+#include <cstdint>
+#include <map>
+#include <optional>
+#include <span>
+#include <string>
+#include <utility>
+#include <vector>
+
+#include "binding.hpp"
+#include "mgdd/common/error.hpp"
+#include "mgdd/loop/engine_bench.hpp"
+
+namespace mgdd::bindings {
+namespace {
+
+using namespace loop;
+using engine::indicator_fields;
+
+py::dict to_dict(const SensorDynamics& d) {
+  py::dict out;
+  out["delay_s"] = d.delay_s;
+  out["lag_s"] = d.lag_s;
+  out["noise_fraction"] = d.noise_fraction;
+  out["delay_cycles"] = d.delay_cycles;
+  out["lag_cycles"] = d.lag_cycles;
+  return out;
+}
+
+using Schedule = std::vector<std::pair<std::int64_t, engine::OperatingPoint>>;
+
+py::dict to_dict(const BenchSettings& s) {
+  Schedule schedule;
+  for (const ScheduledPoint& entry : s.schedule)
+    schedule.emplace_back(entry.cycle, entry.point);
+  py::dict out;
+  out["cylinder"] = s.cylinder;
+  out["schedule"] = schedule;
+  out["performance"] = s.performance;
+  out["nox_sensor"] = as_str(to_string(s.nox_sensor));
+  out["limits"] = s.limits;
+  out["soc_scatter_cad"] = s.soc_scatter_cad;
+  out["efficiency_noise_percent"] = s.efficiency_noise_percent;
+  out["misfire_probability"] = s.misfire_probability;
+  out["soc_drift_cad_per_kcycle"] = s.soc_drift_cad_per_kcycle;
+  out["wall_heat_drift_per_kcycle"] = s.wall_heat_drift_per_kcycle;
+  out["true_nox"] = s.true_nox;
+  out["soft_sensor"] = s.soft_sensor;
+  out["analyser"] = s.analyser;
+  out["fast_sensor"] = s.fast_sensor;
+  out["delay_whole_objective"] = s.delay_whole_objective;
+  out["step_cad"] = s.step_cad;
+  out["integrator"] = as_str(to_string(s.integrator));
+  out["seed"] = s.seed;
+  return out;
+}
+
+// Scalars of one cycle that are no indicator; flags count as 0 or 1 where they stand in a column.
+struct Column {
+  const char* name;
+  double (*of)(const BenchCycle&);
+};
+constexpr Column numbers[] = {{"soc_requested_cad", [](const BenchCycle& c) { return c.soc_requested_cad; }},
+                              {"soc_cad", [](const BenchCycle& c) { return c.soc_cad; }},
+                              {"nox_true_ppm", [](const BenchCycle& c) { return c.nox_true_ppm; }},
+                              {"nox_analyser_ppm", [](const BenchCycle& c) { return c.nox_analyser_ppm; }},
+                              {"nox_fast_ppm", [](const BenchCycle& c) { return c.nox_fast_ppm; }},
+                              {"nox_soft_ppm", [](const BenchCycle& c) { return c.nox_soft_ppm; }},
+                              {"nox_soft_corrected_ppm", [](const BenchCycle& c) { return c.nox_soft_corrected_ppm; }},
+                              {"j", [](const BenchCycle& c) { return c.j; }}};
+struct Flag {
+  const char* name;
+  bool BenchCycle::* member;
+};
+constexpr Flag flags[] = {{"misfire", &BenchCycle::misfire},
+                          {"clamped", &BenchCycle::clamped},
+                          {"unphysical", &BenchCycle::unphysical},
+                          {"operating_point_changed", &BenchCycle::operating_point_changed}};
+
+py::dict to_dict(const BenchCycle& c, const std::vector<std::string>& limit_names) {
+  py::dict out;
+  out["cycle"] = c.cycle;
+  for (const Column& column : numbers)
+    out[column.name] = column.of(c);
+  for (const Flag& flag : flags)
+    out[flag.name] = c.*(flag.member);
+  for (const auto& field : indicator_fields<double>())
+    out[as_str(field.name)] = c.indicators.*(field.member);
+  const auto components = c.component_values();
+  out["components"] = to_array({components.begin(), components.end()});
+  py::dict limits;
+  for (std::size_t i = 0; i < c.limit_count; ++i)
+    limits[as_str(limit_names[i])] = c.limit_values[i];
+  out["limits"] = limits;
+  return out;
+}
+
+template <class T, class Of>
+py::array_t<T> column_of(const std::vector<BenchCycle>& rows, Of of) {
+  py::array_t<T> out(static_cast<py::ssize_t>(rows.size()));
+  T* at = out.mutable_data();
+  for (const BenchCycle& row : rows)
+    *at++ = of(row);
+  return out;
+}
+
+template <class Of>
+py::array_t<double> table_of(const std::vector<BenchCycle>& rows, std::size_t width, Of of) {
+  py::array_t<double> out({static_cast<py::ssize_t>(rows.size()), static_cast<py::ssize_t>(width)});
+  double* at = out.mutable_data();
+  for (const BenchCycle& row : rows) {
+    for (const double value : of(row))
+      *at++ = value;
+  }
+  return out;
+}
+
+py::dict to_columns(const std::vector<BenchCycle>& rows, const BenchSettings& s) {
+  py::dict out;
+  out["cycle"] = column_of<std::int64_t>(rows, [](const BenchCycle& c) { return c.cycle; });
+  for (const Column& column : numbers)
+    out[column.name] = column_of<double>(rows, column.of);
+  for (const Flag& flag : flags)
+    out[flag.name] = column_of<bool>(rows, [&flag](const BenchCycle& c) { return c.*(flag.member); });
+  for (const auto& field : indicator_fields<double>()) {
+    out[as_str(field.name)] =
+        column_of<double>(rows, [&field](const BenchCycle& c) { return c.indicators.*(field.member); });
+  }
+  out["components"] = table_of(rows, s.performance.size(), [](const BenchCycle& c) { return c.component_values(); });
+  out["limits"] = table_of(rows, s.limits.size(), [](const BenchCycle& c) { return c.limits(); });
+  return out;
+}
+
+py::dict run(EngineBench& bench, const InputArray& soc_cad) {
+  const std::vector<double> requests = to_column(soc_cad, "soc_cad");
+  std::vector<BenchCycle> rows;
+  rows.reserve(requests.size());
+  {
+    const py::gil_scoped_release release;
+    for (const double soc : requests)
+      rows.push_back(bench.step(soc));
+  }
+  return to_columns(rows, bench.settings());
+}
+
+EngineBench make(const engine::Cylinder& cylinder, const Schedule& schedule,
+                 const std::optional<engine::Performance>& performance, const std::string& nox_sensor,
+                 const std::vector<std::string>& limits, double soc_scatter_cad, double efficiency_noise_percent,
+                 double misfire_probability, double soc_drift_cad_per_kcycle, double wall_heat_drift_per_kcycle,
+                 const std::optional<engine::NoxModel>& true_nox, const std::optional<engine::SoftSensor>& soft_sensor,
+                 const std::optional<SensorDynamics>& analyser, const std::optional<SensorDynamics>& fast_sensor,
+                 bool delay_whole_objective, double step_cad, const std::string& integrator, std::uint64_t seed) {
+  BenchSettings s;
+  s.cylinder = cylinder;
+  s.schedule.clear();
+  for (const auto& [cycle, point] : schedule)
+    s.schedule.push_back({cycle, point});
+  s.performance = performance.value_or(s.performance);
+  s.nox_sensor = parse_nox_sensor(nox_sensor);
+  s.limits = limits;
+  s.soc_scatter_cad = soc_scatter_cad;
+  s.efficiency_noise_percent = efficiency_noise_percent;
+  s.misfire_probability = misfire_probability;
+  s.soc_drift_cad_per_kcycle = soc_drift_cad_per_kcycle;
+  s.wall_heat_drift_per_kcycle = wall_heat_drift_per_kcycle;
+  s.true_nox = true_nox.value_or(s.true_nox);
+  s.soft_sensor = soft_sensor.value_or(s.soft_sensor);
+  s.analyser = analyser.value_or(s.analyser);
+  s.fast_sensor = fast_sensor.value_or(s.fast_sensor);
+  s.delay_whole_objective = delay_whole_objective;
+  s.step_cad = step_cad;
+  s.integrator = engine::parse_integrator(integrator);
+  s.seed = seed;
+  return EngineBench(s);
+}
+
+void bind_dynamics(py::module_& m) {
+  using py::arg;
+  py::class_<SensorDynamics> dynamics(m, "SensorDynamics",
+                                      R"(Transport delay, first-order lag and noise of a gas sensor.
+
+Parameters
+----------
+delay_s : float
+    Transport delay of the sample line [s], in [0, 60].
+lag_s : float
+    Time constant [s], in [0, 60]; t10-90 is 2.2 times it.
+noise_fraction : float
+    Standard deviation of a reading over the reading [-], in [0, 0.2].
+delay_cycles : int, optional
+    Delay in engine cycles instead; it does not follow the speed.
+lag_cycles : float, optional
+    Time constant in engine cycles instead.
+
+Raises
+------
+mgdd.errors.ParameterError
+    A value outside its domain.
+
+Examples
+--------
+>>> from mgdd.loop import SensorDynamics
+>>> SensorDynamics(delay_s=3.0, lag_s=2.0).delay_at(1500.0)
+38
+)");
+  dynamics
+      .def(py::init([](double delay_s, double lag_s, double noise, std::optional<std::int64_t> delay_cycles,
+                       std::optional<double> lag_cycles) {
+             const SensorDynamics made{delay_s, lag_s, noise, delay_cycles, lag_cycles};
+             validate("sensor", made);
+             return made;
+           }),
+           py::kw_only(), arg("delay_s") = 0.0, arg("lag_s") = 0.0, arg("noise_fraction") = 0.0,
+           arg("delay_cycles") = py::none(), arg("lag_cycles") = py::none())
+      .def_readonly("delay_s", &SensorDynamics::delay_s, "Transport delay [s].")
+      .def_readonly("lag_s", &SensorDynamics::lag_s, "Time constant [s].")
+      .def_readonly("noise_fraction", &SensorDynamics::noise_fraction, "Relative noise [-].")
+      .def_readonly("delay_cycles", &SensorDynamics::delay_cycles, "Delay in cycles, or None.")
+      .def_readonly("lag_cycles", &SensorDynamics::lag_cycles, "Time constant in cycles, or None.")
+      .def("delay_at", &SensorDynamics::delay_at, arg("speed_rpm"), "Delay in whole cycles at a speed.")
+      .def("gain_at", &SensorDynamics::gain_at, arg("speed_rpm"), "Gain of the lag filter per cycle [-].");
+  bind_value(dynamics, "SensorDynamics", [](const SensorDynamics& self) { return to_dict(self); });
+}
+
+}  // namespace
+
+void bind_bench(py::module_& m) {
+  using py::arg;
+  bind_dynamics(m);
+  const BenchSettings d;
+  py::class_<EngineBench>(m, "EngineBench", "The virtual engine bench; use mgdd.loop.EngineBench.")
+      .def(py::init(&make), py::kw_only(), arg("cylinder"), arg("schedule"), arg("performance") = py::none(),
+           arg("nox_sensor") = std::string(to_string(d.nox_sensor)), arg("limits") = std::vector<std::string>{},
+           arg("soc_scatter_cad") = d.soc_scatter_cad, arg("efficiency_noise_percent") = d.efficiency_noise_percent,
+           arg("misfire_probability") = d.misfire_probability,
+           arg("soc_drift_cad_per_kcycle") = d.soc_drift_cad_per_kcycle,
+           arg("wall_heat_drift_per_kcycle") = d.wall_heat_drift_per_kcycle, arg("true_nox") = py::none(),
+           arg("soft_sensor") = py::none(), arg("analyser") = py::none(), arg("fast_sensor") = py::none(),
+           arg("delay_whole_objective") = d.delay_whole_objective, arg("step_cad") = d.step_cad,
+           arg("integrator") = std::string(to_string(d.integrator)), arg("seed") = d.seed)
+      .def(
+          "step", [](EngineBench& self, double soc_cad) { return to_dict(self.step(soc_cad), self.settings().limits); },
+          arg("soc_cad"), "Run one cycle: what was measured, by name.")
+      .def("run_columns", &run, arg("soc_cad"), "Run one cycle per request, without the GIL: columns by name.")
+      .def(
+          "reset", [](EngineBench& self, std::optional<std::uint64_t> seed) { self.reset(seed.value_or(self.seed())); },
+          arg("seed") = py::none(), "Back to cycle 0, with another seed if given.")
+      .def(
+          "save",
+          [](const EngineBench& self) {
+            py::dict out;
+            for (const auto& [name, column] : self.save())
+              out[as_str(name)] = to_array(column);
+            return out;
+          },
+          "State of the run between two cycles: named columns.")
+      .def("restore", &EngineBench::restore, arg("state"), "Continue bit for bit from what `save` gave.")
+      .def("point_at", &EngineBench::point_at, arg("cycle"), "Operating point of a cycle.")
+      .def_property_readonly(
+          "point", [](const EngineBench& self) { return self.point(); }, "Operating point of the next cycle.")
+      .def_property_readonly("cycle", &EngineBench::cycle, "Index of the next cycle.")
+      .def_property_readonly("seed", &EngineBench::seed, "Seed of the run.")
+      .def_property_readonly("window_cad", &EngineBench::window_cad, "Earliest and latest SOC that is not clamped.")
+      .def_property_readonly("analyser_delay_cycles", &EngineBench::analyser_delay_cycles,
+                             "Delay of the analyser at the next cycle.")
+      .def_property_readonly("analyser_gain", &EngineBench::analyser_gain,
+                             "Gain of the analyser's lag filter at the next cycle [-].")
+      .def_property_readonly(
+          "settings", [](const EngineBench& self) { return to_dict(self.settings()); },
+          "Constructor keywords as a new dict.")
+      .def("__repr__",
+           [](const EngineBench& self) {
+             return py::str("<EngineBench at cycle {}, {!r}>").format(self.cycle(), self.point());
+           })
+      .def(py::pickle([](const EngineBench& self) { return py::make_tuple(1, to_dict(self.settings()), self.save()); },
+                      [](const py::tuple& state) {
+                        require_pickle_version(state);
+                        const py::object type = py::type::of<EngineBench>();
+                        auto bench = type(**state[1].cast<py::dict>()).cast<EngineBench>();
+                        bench.restore(state[2].cast<std::map<std::string, std::vector<double>>>());
+                        return bench;
+                      }));
+}
+
+}  // namespace mgdd::bindings

@@ -1,0 +1,268 @@
+// Binds engine/emissions.hpp: NOx proxy, NOx model, soft sensor and the fit to a sweep.
+#include <optional>
+#include <span>
+#include <string>
+#include <utility>
+#include <vector>
+
+#include "binding.hpp"
+#include "mgdd/common/error.hpp"
+#include "mgdd/engine/emissions.hpp"
+
+namespace mgdd::bindings {
+namespace {
+
+using namespace engine;
+
+py::dict to_dict(const NoxProxy& p) {
+  py::dict out;
+  out["reference_temperature_k"] = p.reference_temperature_k;
+  out["reference_nox_ppm"] = p.reference_nox_ppm;
+  out["activation_temperature_k"] = p.activation_temperature_k;
+  return out;
+}
+
+py::dict to_dict(const NoxModel& m) {
+  py::dict out;
+  out["proxy"] = m.proxy;
+  out["map"] = as_str(to_string(m.map));
+  out["intake_o2_fraction"] = m.intake_o2_fraction;
+  out["o2_exponent"] = m.o2_exponent;
+  return out;
+}
+
+py::dict to_dict(const SoftSensor& s) {
+  py::dict out;
+  out["model"] = s.model;
+  out["correction_gain"] = s.correction_gain;
+  return out;
+}
+
+NoxFit fit(const InputArray& t_max_k, const InputArray& nox_ppm, const std::string& map, double reference_k) {
+  return fit_nox_proxy(to_column(t_max_k, "t_max_k"), to_column(nox_ppm, "nox_ppm"), parse_nox_map(map), reference_k);
+}
+
+void bind_proxy(py::module_& m) {
+  using py::arg;
+  py::class_<NoxProxy> proxy(m, "NoxProxy",
+                             R"(NOx proxy from the maximum bulk gas temperature: a correlation to be fitted.
+
+Two maps with equal slope at the reference: affine-log, NOx0 exp(b/T0^2 (T - T0)), and Arrhenius,
+NOx0 exp(-b (1/T - 1/T0)). Valid at fixed intake oxygen only; the defaults are plausible, not of any engine.
+
+Parameters
+----------
+reference_temperature_k : float
+    T0 [K].
+reference_nox_ppm : float
+    NOx0, at T0 [ppm].
+activation_temperature_k : float
+    b [K].
+
+Raises
+------
+mgdd.errors.ParameterError
+    A constant that is not > 0.
+
+Examples
+--------
+>>> from mgdd.engine import NoxProxy
+>>> float(NoxProxy().arrhenius_ppm(1900.0))
+1200.0
+)");
+  proxy
+      .def(py::init([](double t0, double nox0, double b) {
+             const NoxProxy made{t0, nox0, b};
+             validate(made);
+             return made;
+           }),
+           py::kw_only(), arg("reference_temperature_k") = NoxProxy{}.reference_temperature_k,
+           arg("reference_nox_ppm") = NoxProxy{}.reference_nox_ppm,
+           arg("activation_temperature_k") = NoxProxy{}.activation_temperature_k)
+      .def_readonly("reference_temperature_k", &NoxProxy::reference_temperature_k, "T0 [K].")
+      .def_readonly("reference_nox_ppm", &NoxProxy::reference_nox_ppm, "NOx0 [ppm].")
+      .def_readonly("activation_temperature_k", &NoxProxy::activation_temperature_k, "b [K].")
+      .def(
+          "affine_log_ppm",
+          [](const NoxProxy& self, const InputArray& t) {
+            return py::vectorize([&self](double x) { return self.affine_log_ppm(x); })(t);
+          },
+          arg("t_max_k"), "NOx [ppm] by the affine-log map.")
+      .def(
+          "arrhenius_ppm",
+          [](const NoxProxy& self, const InputArray& t) {
+            return py::vectorize([&self](double x) { return self.arrhenius_ppm(x); })(t);
+          },
+          arg("t_max_k"), "NOx [ppm] by the Arrhenius map.");
+  bind_value(proxy, "NoxProxy", [](const NoxProxy& self) { return to_dict(self); });
+}
+
+}  // namespace
+
+void bind_emissions(py::module_& m) {
+  using py::arg;
+  bind_proxy(m);
+
+  py::class_<NoxModel> model(m, "NoxModel",
+                             R"(NOx of one cycle from its maximum bulk gas temperature and the intake oxygen.
+
+NOx = map(T_max) (x_O2 / 0.209)^n: a `NoxProxy` with the map that is used.
+
+Parameters
+----------
+proxy : NoxProxy
+    Constants of the map.
+map : {"affine_log", "arrhenius"}
+    Form of the map.
+intake_o2_fraction : float
+    Oxygen in the intake by volume [-]; 0.209 is air without exhaust gas recirculation.
+o2_exponent : float
+    n [-], 2 to 4, to be fitted.
+
+Raises
+------
+mgdd.errors.ParameterError
+    An unknown map, or a value outside its domain.
+
+Examples
+--------
+>>> from mgdd.engine import NoxModel
+>>> float(NoxModel(intake_o2_fraction=0.1045).ppm(1900.0))
+150.0
+)");
+  model
+      .def(py::init([](const std::optional<NoxProxy>& proxy, const std::string& map, double o2, double exponent) {
+             const NoxModel made{proxy.value_or(NoxProxy{}), parse_nox_map(map), o2, exponent};
+             validate(made);
+             return made;
+           }),
+           py::kw_only(), arg("proxy") = py::none(), arg("map") = std::string(to_string(NoxModel{}.map)),
+           arg("intake_o2_fraction") = NoxModel{}.intake_o2_fraction, arg("o2_exponent") = NoxModel{}.o2_exponent)
+      .def_property_readonly(
+          "proxy", [](const NoxModel& self) { return self.proxy; }, "Constants of the map.")
+      .def_property_readonly(
+          "map", [](const NoxModel& self) { return as_str(to_string(self.map)); }, "Name of the map.")
+      .def_readonly("intake_o2_fraction", &NoxModel::intake_o2_fraction, "Intake oxygen by volume [-].")
+      .def_readonly("o2_exponent", &NoxModel::o2_exponent, "n [-].")
+      .def(
+          "ppm",
+          [](const NoxModel& self, const InputArray& t) {
+            return py::vectorize([&self](double x) { return self.ppm(x); })(t);
+          },
+          arg("t_max_k"), "NOx [ppm].");
+  bind_value(model, "NoxModel", [](const NoxModel& self) { return to_dict(self); });
+
+  py::class_<SoftSensor> sensor(m, "SoftSensor",
+                                R"(Soft NOx sensor: the value of each cycle at once, its level held to a slow analyser.
+
+``b += c (ln(analyser / delayed) - b)`` once per cycle, where ``delayed`` is the uncorrected soft value after the
+analyser's own delay and lag: b approaches the log-ratio of the two at the rate c, however late the analyser is.
+
+Parameters
+----------
+model : NoxModel
+    NOx from the maximum bulk gas temperature.
+correction_gain : float
+    c per cycle [-], in [0, 1]; 0 never corrects.
+
+Raises
+------
+mgdd.errors.ParameterError
+    A value outside its domain.
+
+Examples
+--------
+>>> from mgdd.engine import SoftSensor
+>>> sensor = SoftSensor(correction_gain=0.5)
+>>> bias = sensor.next_bias(0.0, analyser_ppm=1320.0, delayed_soft_ppm=1200.0)
+>>> round(float(sensor.ppm(1900.0, ln_bias=bias)), 1)
+1258.6
+)");
+  sensor
+      .def(py::init([](const std::optional<NoxModel>& made, double gain) {
+             const SoftSensor soft{made.value_or(NoxModel{}), gain};
+             validate(soft);
+             return soft;
+           }),
+           py::kw_only(), arg("model") = py::none(), arg("correction_gain") = SoftSensor{}.correction_gain)
+      .def_property_readonly(
+          "model", [](const SoftSensor& self) { return self.model; }, "NOx from T_max.")
+      .def_readonly("correction_gain", &SoftSensor::correction_gain, "c per cycle [-].")
+      .def(
+          "ppm",
+          [](const SoftSensor& self, const InputArray& t, double ln_bias) {
+            return py::vectorize([&](double x) { return self.corrected_ppm(x, ln_bias); })(t);
+          },
+          arg("t_max_k"), py::kw_only(), arg("ln_bias") = 0.0, "NOx [ppm] at the log-bias b.")
+      .def("next_bias", &SoftSensor::next_bias, arg("ln_bias"), py::kw_only(), arg("analyser_ppm"),
+           arg("delayed_soft_ppm"), "The log-bias after one reading; values that are not positive leave it alone.");
+  bind_value(sensor, "SoftSensor", [](const SoftSensor& self) { return to_dict(self); });
+
+  py::class_<NoxFit>(m, "NoxFit", R"(A NOx proxy fitted to a sweep, with its spread: what `fit_nox_proxy` returns.
+
+Examples
+--------
+>>> from mgdd.engine import NoxProxy, fit_nox_proxy
+>>> t = [1800.0, 1850.0, 1900.0, 1950.0, 2000.0]
+>>> fit_nox_proxy(t, NoxProxy().affine_log_ppm(t)).points
+5
+)")
+      .def_property_readonly(
+          "proxy", [](const NoxFit& self) { return self.proxy; }, "The fitted constants.")
+      .def_property_readonly(
+          "map", [](const NoxFit& self) { return as_str(to_string(self.map)); }, "Name of the map.")
+      .def_readonly("points", &NoxFit::points, "Number of points.")
+      .def_readonly("residual_ln", &NoxFit::residual_ln, "Standard deviation of ln NOx about the fit [-].")
+      .def_readonly("reference_nox_stderr_ppm", &NoxFit::reference_nox_stderr_ppm, "Standard error of NOx0 [ppm].")
+      .def_readonly("activation_temperature_stderr_k", &NoxFit::activation_temperature_stderr_k,
+                    "Standard error of b [K].")
+      .def("__repr__", [](const NoxFit& self) {
+        py::dict keywords;
+        keywords["proxy"] = self.proxy;
+        keywords["map"] = as_str(to_string(self.map));
+        keywords["points"] = self.points;
+        keywords["residual_ln"] = self.residual_ln;
+        keywords["reference_nox_stderr_ppm"] = self.reference_nox_stderr_ppm;
+        keywords["activation_temperature_stderr_k"] = self.activation_temperature_stderr_k;
+        return representation("NoxFit", keywords);
+      });
+
+  m.def("fit_nox_proxy", &fit, arg("t_max_k"), arg("nox_ppm"), py::kw_only(),
+        arg("map") = std::string(to_string(NoxMap::affine_log)),
+        arg("reference_temperature_k") = NoxProxy{}.reference_temperature_k,
+        R"(Fit a NOx proxy to a sweep by least squares on ln NOx.
+
+Parameters
+----------
+t_max_k : array_like
+    Maximum bulk gas temperatures [K], at least five, at fixed oxygen, fuel and boost.
+nox_ppm : array_like
+    Measured NOx [ppm], of the same length.
+map : {"affine_log", "arrhenius"}
+    Form of the map.
+reference_temperature_k : float
+    T0 of the proxy [K]; it is chosen, not fitted.
+
+Returns
+-------
+NoxFit
+    Proxy, residual and standard errors.
+
+Raises
+------
+mgdd.errors.DataError
+    Fewer than five points, values that are not positive, equal temperatures, NOx that does not rise.
+mgdd.errors.ShapeError
+    Columns of unequal length.
+
+Examples
+--------
+>>> from mgdd.engine import NoxProxy, fit_nox_proxy
+>>> t = [1834.0, 1881.0, 1959.0, 2026.0, 2126.0]
+>>> fit = fit_nox_proxy(t, NoxProxy().arrhenius_ppm(t), map="arrhenius")
+>>> round(fit.proxy.activation_temperature_k)
+16000
+)");
+}
+
+}  // namespace mgdd::bindings

@@ -1,0 +1,172 @@
+// A virtual engine test bench: SOC in, what a real bench would measure of that cycle out. The plant is the cycle model
+// with scatter, misfire, drift and a schedule of operating points; its sensors are a NOx analyser, a fast NOx sensor
+// and a soft sensor. Angles in °CA aTDC, NOx in ppm. `step` is noexcept and allocation-free.
+// All randomness is a function of (seed, stream, cycle): the same seed gives the same run however it is cut.
+#pragma once
+
+#include <array>
+#include <cstddef>
+#include <cstdint>
+#include <map>
+#include <span>
+#include <string>
+#include <string_view>
+#include <vector>
+
+#include "mgdd/engine/cycle.hpp"
+#include "mgdd/engine/emissions.hpp"
+#include "mgdd/engine/performance.hpp"
+#include "mgdd/loop/transport_lag.hpp"
+
+namespace mgdd::loop {
+
+/// Which NOx value enters the performance.
+enum class NoxSensor { none, analyser, fast, soft, soft_corrected, true_value };
+std::string_view to_string(NoxSensor sensor) noexcept;
+NoxSensor parse_nox_sensor(std::string_view name);
+
+/// Streams of the random numbers that the bench draws; others are free for seekers and studies.
+enum class BenchStream : std::uint64_t { soc = 0, efficiency = 1, misfire = 2, analyser = 3, fast = 4 };
+inline constexpr std::uint64_t first_free_stream = 16;
+
+/// From cycle `cycle` on the engine runs at `point`.
+struct ScheduledPoint {
+  std::int64_t cycle = 0;
+  engine::OperatingPoint point{};
+
+  bool operator==(const ScheduledPoint&) const = default;
+};
+
+inline constexpr std::size_t max_limits = 8;
+inline constexpr std::string_view cov_imep_name = "cov_imep_percent";
+inline constexpr std::size_t cov_window_cycles = 50;
+
+struct BenchSettings {
+  engine::Cylinder cylinder{};
+  std::vector<ScheduledPoint> schedule{ScheduledPoint{}};  ///< first at cycle 0, cycles increasing, fuel > 0
+  double step_cad = engine::default_step_cad;
+  engine::Integrator integrator = engine::Integrator::trapezoid;
+
+  double soc_scatter_cad = 0.3;             ///< standard deviation of SOC from cycle to cycle, in [0, 5]
+  double efficiency_noise_percent = 0.25;   ///< standard deviation of efficiency in points, with the work and IMEP that
+                                            ///< belong to it; in [0, 20]
+  double misfire_probability = 0.0;         ///< [-] per cycle
+  double soc_drift_cad_per_kcycle = 0.0;    ///< offset of SOC, per 1000 cycles, in [-100, 100]
+  double wall_heat_drift_per_kcycle = 0.0;  ///< [-] change of wall_heat_scale per 1000 cycles, in [-100, 100]
+
+  engine::NoxModel true_nox{.map = engine::NoxMap::arrhenius};
+  engine::SoftSensor soft_sensor{};
+  SensorDynamics analyser{.delay_s = 3.0, .lag_s = 2.0, .noise_fraction = 0.01};
+  SensorDynamics fast_sensor{.delay_s = 0.05, .lag_s = 0.05, .noise_fraction = 0.03};  ///< ours: of an in-stack sensor
+
+  engine::Performance performance{};
+  NoxSensor nox_sensor = NoxSensor::soft;
+  bool delay_whole_objective = false;  ///< every component passes the analyser's delay and lag, NOx being the true one
+  std::vector<std::string> limits{};   ///< at most 8 names of indicators, or cov_imep_percent
+  std::uint64_t seed = 0;
+};
+
+/// ParameterError names field, value and bound.
+void validate(const BenchSettings& settings);
+
+/// Earliest and latest SOC whose burn starts between IVC and EVO [°CA aTDC].
+std::array<double, 2> closed_part(const engine::Cylinder& cylinder) noexcept;
+
+/// Earliest and latest SOC that a bench takes: [-60, 20] °CA aTDC as far as the valves are closed.
+std::array<double, 2> timing_window(const engine::Cylinder& cylinder) noexcept;
+
+/// One measured cycle.
+struct BenchCycle {
+  std::int64_t cycle = 0;
+  double soc_requested_cad = 0.0;
+  double soc_cad = 0.0;                     ///< of the burn: request, clamped, with drift and scatter
+  engine::Indicators<double> indicators{};  ///< efficiency, work and IMEP with their noise
+  bool misfire = false;                     ///< nothing burned: indicators of the motored cycle, efficiency of the
+                                            ///< fuel that was injected
+  bool clamped = false;                     ///< the request lay outside the timing window
+  bool unphysical = false;                  ///< no such cycle exists: indicators are NaN, J is that of the last one
+  bool operating_point_changed = false;     ///< speed or fuel moved by more than 5 % from the cycle before
+  double nox_true_ppm = 0.0;
+  double nox_analyser_ppm = 0.0;
+  double nox_fast_ppm = 0.0;
+  double nox_soft_ppm = 0.0;
+  double nox_soft_corrected_ppm = 0.0;
+  std::array<double, engine::Performance::max_terms> components{};
+  std::size_t component_count = 0;
+  double j = 0.0;                                 ///< sum of the components
+  std::array<double, max_limits> limit_values{};  ///< in the order of BenchSettings::limits
+  std::size_t limit_count = 0;
+
+  std::span<const double> component_values() const noexcept { return {components.data(), component_count}; }
+  std::span<const double> limits() const noexcept { return {limit_values.data(), limit_count}; }
+};
+
+class EngineBench {
+ public:
+  /// ParameterError by `validate`; ConvergenceError if a scheduled point has no physical cycle.
+  explicit EngineBench(const BenchSettings& settings);
+
+  /// Runs one cycle. Requests are clamped to `window_cad`; NaN repeats the last one. Before the first cycle every
+  /// sensor stands at its steady value for the first request.
+  BenchCycle step(double soc_cad) noexcept;
+
+  /// Back to cycle 0, with another seed.
+  void reset(std::uint64_t seed) noexcept;
+  void reset() noexcept { reset(seed_); }
+
+  /// Everything a run depends on besides the settings; `restore` is bit for bit. DataError for columns that do not
+  /// belong to this bench, which then is unchanged.
+  std::map<std::string, std::vector<double>> save() const;
+  void restore(const std::map<std::string, std::vector<double>>& state);
+
+  const BenchSettings& settings() const noexcept { return settings_; }
+  std::int64_t cycle() const noexcept { return cycle_; }  ///< index of the next cycle
+  std::uint64_t seed() const noexcept { return seed_; }
+  /// Operating point of the next cycle, and of any other.
+  const engine::OperatingPoint& point() const noexcept { return point_at(cycle_); }
+  const engine::OperatingPoint& point_at(std::int64_t cycle) const noexcept;
+  /// Speed or fuel of that cycle differ by more than 5 % from the cycle before.
+  bool point_changes_at(std::int64_t cycle) const noexcept;
+  /// Earliest and latest SOC that is not clamped [°CA aTDC].
+  std::array<double, 2> window_cad() const noexcept { return window_; }
+  /// D and g of the analyser at the next cycle.
+  std::size_t analyser_delay_cycles() const noexcept;
+  double analyser_gain() const noexcept;
+
+ private:
+  /// What an operating point fixes: computed once.
+  struct Prepared {
+    engine::Charge<double> charge;
+    std::size_t analyser_delay, fast_delay;
+    double analyser_gain, fast_gain;
+  };
+  std::size_t index_at(std::int64_t cycle) const noexcept;
+  engine::Indicators<double> burn(const Prepared& at, double soc_cad, bool misfire, bool& unphysical) noexcept;
+  void start(const Prepared& at, double soc_cad) noexcept;
+  void measure_nox(const Prepared& at, BenchCycle& c) noexcept;
+  void judge(const Prepared& at, BenchCycle& c) noexcept;
+  void measure_limits(BenchCycle& c) noexcept;
+  double cov_imep_percent() const noexcept;
+  double elapsed_kcycles() const noexcept;
+  double noise(BenchStream stream) const noexcept;
+
+  BenchSettings settings_;
+  engine::CycleModel<double> model_;
+  engine::CycleWorkspace<double> work_;
+  std::vector<Prepared> prepared_;
+  std::vector<double engine::Indicators<double>::*> limit_members_;  // null for the COV of IMEP
+  std::array<double, 2> closed_, window_;
+
+  std::uint64_t seed_ = 0;
+  std::int64_t cycle_ = 0;
+  double last_soc_cad_ = 0.0;
+  double last_t_max_k_ = 0.0;
+  double last_imep_bar_ = 0.0;
+  double ln_bias_ = 0.0;
+  std::array<double, engine::Performance::max_terms> last_components_{};
+  TransportLag analyser_, fast_, soft_through_analyser_;
+  std::vector<TransportLag> component_lags_;
+  std::array<double, cov_window_cycles> imep_bar_{};
+};
+
+}  // namespace mgdd::loop

@@ -1,0 +1,110 @@
+#include "mgdd/engine/emissions.hpp"
+
+#include <algorithm>
+#include <string>
+#include <utility>
+#include <vector>
+
+#include "mgdd/common/bounds.hpp"
+#include "mgdd/common/error.hpp"
+#include "mgdd/common/names.hpp"
+#include "mgdd/common/text.hpp"
+
+namespace mgdd::engine {
+namespace {
+
+constexpr std::pair<NoxMap, std::string_view> map_names[] = {{NoxMap::affine_log, "affine_log"},
+                                                             {NoxMap::arrhenius, "arrhenius"}};
+constexpr std::size_t fewest_points = 5;
+
+void require_positive_column(std::string_view name, std::span<const double> column) {
+  for (std::size_t i = 0; i < column.size(); ++i) {
+    if (column[i] > 0.0 && std::isfinite(column[i])) continue;
+    throw DataError(std::string(name) + "[" + std::to_string(i) + "] = " + text(column[i]) +
+                    ": must be > 0 and finite, leave such points out");
+  }
+}
+
+}  // namespace
+
+std::string_view to_string(NoxMap map) noexcept {
+  return name_of<NoxMap>(map_names, map);
+}
+NoxMap parse_nox_map(std::string_view name) {
+  return parse_name<NoxMap>(map_names, "map", name);
+}
+
+void validate(const NoxProxy& p) {
+  require_positive("reference_temperature_k", p.reference_temperature_k);
+  require_positive("reference_nox_ppm", p.reference_nox_ppm);
+  require_positive("activation_temperature_k", p.activation_temperature_k);
+}
+
+void validate(const NoxModel& m) {
+  validate(m.proxy);
+  if (!(m.intake_o2_fraction > 0.0 && m.intake_o2_fraction <= 1.0)) {
+    throw ParameterError("intake_o2_fraction = " + text(m.intake_o2_fraction) + ": must be in (0, 1]");
+  }
+  require_within("o2_exponent", m.o2_exponent, 0.0, 10.0);
+}
+
+void validate(const SoftSensor& s) {
+  validate(s.model);
+  require_within("correction_gain", s.correction_gain, 0.0, 1.0);
+}
+
+NoxFit fit_nox_proxy(std::span<const double> t_max_k, std::span<const double> nox_ppm, NoxMap map,
+                     double reference_temperature_k) {
+  const std::size_t n = t_max_k.size();
+  if (nox_ppm.size() != n) {
+    throw ShapeError("nox_ppm has " + std::to_string(nox_ppm.size()) + " entries: t_max_k has " + std::to_string(n));
+  }
+  require_positive("reference_temperature_k", reference_temperature_k, "K");
+  if (n < fewest_points) {
+    throw DataError("t_max_k has " + std::to_string(n) + " points: a fit needs at least " +
+                    std::to_string(fewest_points));
+  }
+  require_positive_column("t_max_k", t_max_k);
+  require_positive_column("nox_ppm", nox_ppm);
+  const auto [coldest, hottest] = std::minmax_element(t_max_k.begin(), t_max_k.end());
+  if (!(*hottest - *coldest > 1e-6 * *hottest)) {
+    throw DataError("t_max_k is " + text(*coldest) + " at every point: a slope needs temperatures that differ");
+  }
+
+  // ln NOx = a + b x, with x = (T - T0)/T0^2 or 1/T0 - 1/T: the slope is the activation temperature in both.
+  const double t0 = reference_temperature_k;
+  std::vector<double> x(n), y(n);
+  double x_mean = 0.0, y_mean = 0.0;
+  for (std::size_t i = 0; i < n; ++i) {
+    x[i] = map == NoxMap::arrhenius ? 1.0 / t0 - 1.0 / t_max_k[i] : (t_max_k[i] - t0) / (t0 * t0);
+    y[i] = std::log(nox_ppm[i]);
+    x_mean += x[i] / static_cast<double>(n);
+    y_mean += y[i] / static_cast<double>(n);
+  }
+  double xx = 0.0, xy = 0.0;
+  for (std::size_t i = 0; i < n; ++i) {
+    xx += (x[i] - x_mean) * (x[i] - x_mean);
+    xy += (x[i] - x_mean) * (y[i] - y_mean);
+  }
+  const double slope = xy / xx;
+  if (!(slope > 0.0)) {
+    throw DataError("nox_ppm does not rise with t_max_k (activation temperature " + text(slope) +
+                    " K): check the order of the points and that oxygen, fuel and boost stood still");
+  }
+  double squares = 0.0;
+  for (std::size_t i = 0; i < n; ++i) {
+    const double residual = y[i] - y_mean - slope * (x[i] - x_mean);
+    squares += residual * residual;
+  }
+  NoxFit fit;
+  fit.map = map;
+  fit.points = n;
+  fit.proxy = {t0, std::exp(y_mean - slope * x_mean), slope};
+  fit.residual_ln = std::sqrt(squares / static_cast<double>(n - 2));
+  fit.activation_temperature_stderr_k = fit.residual_ln / std::sqrt(xx);
+  fit.reference_nox_stderr_ppm =
+      fit.proxy.reference_nox_ppm * fit.residual_ln * std::sqrt(1.0 / static_cast<double>(n) + x_mean * x_mean / xx);
+  return fit;
+}
+
+}  // namespace mgdd::engine

@@ -1,0 +1,107 @@
+#include "mgdd/engine/performance.hpp"
+
+#include <algorithm>
+#include <cmath>
+#include <string>
+#include <utility>
+
+#include "mgdd/common/bounds.hpp"
+#include "mgdd/common/error.hpp"
+#include "mgdd/common/names.hpp"
+#include "mgdd/common/text.hpp"
+
+namespace mgdd::engine {
+namespace {
+
+using enum PerformanceSignal;
+
+constexpr std::pair<PerformanceSignal, std::string_view> signal_names[] = {{efficiency_percent, "efficiency_percent"},
+                                                                           {imep_gross_bar, "imep_gross_bar"},
+                                                                           {imep_closed_bar, "imep_closed_bar"},
+                                                                           {nox_ppm, "nox_ppm"},
+                                                                           {p_max_bar, "p_max_bar"},
+                                                                           {dp_max_bar_per_cad, "dp_max_bar_per_cad"},
+                                                                           {t_max_k, "t_max_k"}};
+constexpr std::pair<PerformanceSignal, std::string_view> signal_units[] = {{efficiency_percent, "%"},
+                                                                           {imep_gross_bar, "bar"},
+                                                                           {imep_closed_bar, "bar"},
+                                                                           {nox_ppm, "ppm"},
+                                                                           {p_max_bar, "bar"},
+                                                                           {dp_max_bar_per_cad, "bar/°CA"},
+                                                                           {t_max_k, "K"}};
+static_assert(std::size(signal_names) == performance_signal_count);
+static_assert(std::size(signal_units) == performance_signal_count);
+
+void validate(const PerformanceTerm& term, std::size_t index) {
+  const std::string owner = "terms[" + std::to_string(index) + "].";
+  if (static_cast<std::size_t>(term.signal) >= performance_signal_count) {
+    throw ParameterError(owner + "signal = " + std::to_string(static_cast<int>(term.signal)) + ": is no signal");
+  }
+  const std::string_view unit = unit_of(term.signal);
+  if (!std::isfinite(term.weight)) {
+    throw ParameterError(owner + "weight = " + text(term.weight) + ": must be finite");
+  }
+  require_positive(owner + "reference", term.reference, unit);
+  if (term.above) require_positive(owner + "above", *term.above, unit);
+}
+
+}  // namespace
+
+std::string_view to_string(PerformanceSignal signal) noexcept {
+  return name_of<PerformanceSignal>(signal_names, signal);
+}
+PerformanceSignal parse_performance_signal(std::string_view name) {
+  return parse_name<PerformanceSignal>(signal_names, "signal", name);
+}
+std::string_view unit_of(PerformanceSignal signal) noexcept {
+  return name_of<PerformanceSignal>(signal_units, signal);
+}
+
+double PerformanceTerm::value(double x) const noexcept {
+  if (!above) return weight * x / reference;
+  const double excess = std::max(0.0, (x - *above) / *above);
+  return weight * excess * excess;
+}
+
+Performance::Performance() noexcept = default;
+
+Performance::Performance(std::span<const PerformanceTerm> terms) : count_(terms.size()) {
+  if (terms.empty() || terms.size() > max_terms) {
+    throw ParameterError("terms has " + std::to_string(terms.size()) + " entries: must be 1 to " +
+                         std::to_string(max_terms));
+  }
+  for (std::size_t i = 0; i < terms.size(); ++i)
+    validate(terms[i], i);
+  std::copy(terms.begin(), terms.end(), terms_.begin());
+}
+
+bool Performance::uses(PerformanceSignal signal) const noexcept {
+  return std::any_of(terms().begin(), terms().end(), [&](const PerformanceTerm& t) { return t.signal == signal; });
+}
+
+double Performance::components(const PerformanceSignals& signals, std::span<double> out) const noexcept {
+  double sum = 0.0;
+  for (std::size_t i = 0; i < count_; ++i)
+    sum += out[i] = terms_[i].value(signals[terms_[i].signal]);
+  return sum;
+}
+
+double Performance::value(const PerformanceSignals& signals) const noexcept {
+  std::array<double, max_terms> scratch{};
+  return components(signals, scratch);
+}
+
+bool Performance::operator==(const Performance& other) const noexcept {
+  return std::equal(terms().begin(), terms().end(), other.terms().begin(), other.terms().end());
+}
+
+Performance efficiency_only() noexcept {
+  return {};
+}
+
+Performance efficiency_and_nox(double nox_weight_percent_per_ppm) {
+  require_within("nox_weight_percent_per_ppm", nox_weight_percent_per_ppm, 0.0, 1e6, "%/ppm");
+  return {{.signal = efficiency_percent}, {.signal = nox_ppm, .weight = -nox_weight_percent_per_ppm}};
+}
+
+}  // namespace mgdd::engine

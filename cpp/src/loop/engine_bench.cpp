@@ -1,0 +1,262 @@
+#include "mgdd/loop/engine_bench.hpp"
+
+#include <algorithm>
+#include <cmath>
+
+#include "mgdd/common/random.hpp"
+#include "mgdd/common/units.hpp"
+
+namespace mgdd::loop {
+namespace {
+
+constexpr double cycles_per_kcycle = 1000.0;
+constexpr double percent = 100.0;
+constexpr double changed_fraction = 0.05;
+constexpr double wall_heat_upper = 100.0;  // of the field, which drift must not leave
+
+using engine::Indicators;
+using Member = double Indicators<double>::*;
+
+const BenchSettings& checked(const BenchSettings& settings) {
+  validate(settings);
+  return settings;
+}
+
+std::vector<Member> members_of(const std::vector<std::string>& names) {
+  std::vector<Member> members;
+  for (const std::string& name : names) {
+    Member member = nullptr;
+    for (const auto& field : engine::indicator_fields<double>()) {
+      if (field.name == name) member = field.member;
+    }
+    members.push_back(member);
+  }
+  return members;
+}
+
+std::size_t longest_delay(const SensorDynamics& sensor, const std::vector<ScheduledPoint>& schedule) {
+  std::size_t longest = 0;
+  for (const ScheduledPoint& entry : schedule)
+    longest = std::max(longest, sensor.delay_at(entry.point.speed_rpm));
+  return longest;
+}
+
+bool differs(double now, double before) noexcept {
+  return std::abs(now - before) > changed_fraction * std::abs(before);
+}
+
+engine::PerformanceSignals signals_of(const Indicators<double>& of, double nox) noexcept {
+  using enum engine::PerformanceSignal;
+  engine::PerformanceSignals s;
+  s[efficiency_percent] = percent * of.efficiency_gross;
+  s[imep_gross_bar] = of.imep_gross_bar;
+  s[imep_closed_bar] = of.imep_closed_bar;
+  s[nox_ppm] = nox;
+  s[p_max_bar] = of.p_max_bar;
+  s[dp_max_bar_per_cad] = of.dp_max_bar_per_cad;
+  s[t_max_k] = of.t_max_k;
+  return s;
+}
+
+double routed_ppm(NoxSensor sensor, const BenchCycle& c) noexcept {
+  switch (sensor) {
+    case NoxSensor::analyser:
+      return c.nox_analyser_ppm;
+    case NoxSensor::fast:
+      return c.nox_fast_ppm;
+    case NoxSensor::soft:
+      return c.nox_soft_ppm;
+    case NoxSensor::soft_corrected:
+      return c.nox_soft_corrected_ppm;
+    case NoxSensor::true_value:
+      return c.nox_true_ppm;
+    case NoxSensor::none:
+      break;
+  }
+  return 0.0;
+}
+
+}  // namespace
+
+EngineBench::EngineBench(const BenchSettings& settings)
+    : settings_(checked(settings)),
+      model_(settings_.cylinder, engine::crank_grid(settings_.cylinder, settings_.step_cad), settings_.integrator),
+      work_(model_.make_workspace()),
+      limit_members_(members_of(settings_.limits)),
+      closed_(closed_part(settings_.cylinder)),
+      window_(timing_window(settings_.cylinder)),
+      seed_(settings_.seed),
+      analyser_(longest_delay(settings_.analyser, settings_.schedule)),
+      fast_(longest_delay(settings_.fast_sensor, settings_.schedule)),
+      soft_through_analyser_(longest_delay(settings_.analyser, settings_.schedule)) {
+  for (const ScheduledPoint& entry : settings_.schedule) {
+    const double rpm = entry.point.speed_rpm;
+    prepared_.push_back({model_.charge(entry.point), settings_.analyser.delay_at(rpm),
+                         settings_.fast_sensor.delay_at(rpm), settings_.analyser.gain_at(rpm),
+                         settings_.fast_sensor.gain_at(rpm)});
+    model_.run(prepared_.back().charge, window_[1], work_);
+    model_.require_physical(work_);
+  }
+  if (settings_.delay_whole_objective) {
+    component_lags_.assign(settings_.performance.size(),
+                           TransportLag(longest_delay(settings_.analyser, settings_.schedule)));
+  }
+}
+
+void EngineBench::reset(std::uint64_t seed) noexcept {
+  model_.set_cylinder(settings_.cylinder);
+  seed_ = seed;
+  cycle_ = 0;
+  last_soc_cad_ = last_t_max_k_ = last_imep_bar_ = ln_bias_ = 0.0;
+  last_components_.fill(0.0);
+  imep_bar_.fill(0.0);
+}
+
+std::size_t EngineBench::index_at(std::int64_t cycle) const noexcept {
+  const auto after = std::upper_bound(settings_.schedule.begin() + 1, settings_.schedule.end(), cycle,
+                                      [](std::int64_t c, const ScheduledPoint& entry) { return c < entry.cycle; });
+  return static_cast<std::size_t>(after - settings_.schedule.begin()) - 1;
+}
+
+const engine::OperatingPoint& EngineBench::point_at(std::int64_t cycle) const noexcept {
+  return settings_.schedule[index_at(cycle)].point;
+}
+
+bool EngineBench::point_changes_at(std::int64_t cycle) const noexcept {
+  const engine::OperatingPoint& now = point_at(cycle);
+  const engine::OperatingPoint& before = point_at(cycle - 1);
+  return differs(now.speed_rpm, before.speed_rpm) || differs(now.fuel_mg, before.fuel_mg);
+}
+
+std::size_t EngineBench::analyser_delay_cycles() const noexcept {
+  return prepared_[index_at(cycle_)].analyser_delay;
+}
+double EngineBench::analyser_gain() const noexcept {
+  return prepared_[index_at(cycle_)].analyser_gain;
+}
+
+double EngineBench::noise(BenchStream stream) const noexcept {
+  return random::normal(seed_, static_cast<std::uint64_t>(stream), static_cast<std::uint64_t>(cycle_));
+}
+
+double EngineBench::elapsed_kcycles() const noexcept {
+  return static_cast<double>(cycle_) / cycles_per_kcycle;
+}
+
+Indicators<double> EngineBench::burn(const Prepared& at, double soc_cad, bool misfire, bool& unphysical) noexcept {
+  engine::Charge<double> charge = at.charge;
+  if (misfire) charge.fuel_heat_j = 0.0;
+  model_.run(charge, soc_cad, work_);
+  unphysical = model_.first_unphysical(work_) < model_.angles_cad().size();
+  if (unphysical) return {};
+  Indicators<double> out = model_.indicators(charge, soc_cad, work_);
+  if (misfire) out.efficiency_gross = out.work_gross_j / at.charge.fuel_heat_j;
+  return out;
+}
+
+// Fills every sensor with its steady value at the first request, free of scatter and noise.
+void EngineBench::start(const Prepared& at, double soc_cad) noexcept {
+  bool unphysical = false;
+  const Indicators<double> steady = burn(at, soc_cad, false, unphysical);
+  if (!unphysical) last_t_max_k_ = steady.t_max_k;
+  const double nox = settings_.true_nox.ppm(last_t_max_k_);
+  analyser_.fill(nox);
+  fast_.fill(nox);
+  soft_through_analyser_.fill(settings_.soft_sensor.raw_ppm(last_t_max_k_));
+  if (!unphysical) settings_.performance.components(signals_of(steady, nox), last_components_);
+  for (std::size_t i = 0; i < component_lags_.size(); ++i)
+    component_lags_[i].fill(last_components_[i]);
+}
+
+BenchCycle EngineBench::step(double soc_cad) noexcept {
+  const Prepared& at = prepared_[index_at(cycle_)];
+  BenchCycle c;
+  c.cycle = cycle_;
+  c.soc_requested_cad = soc_cad;
+  c.operating_point_changed = point_changes_at(cycle_);
+  double applied = std::clamp(soc_cad, window_[0], window_[1]);
+  if (std::isnan(soc_cad)) applied = cycle_ > 0 ? last_soc_cad_ : window_[1];
+  c.clamped = applied != soc_cad;
+  last_soc_cad_ = applied;
+
+  if (settings_.wall_heat_drift_per_kcycle != 0.0) {
+    engine::Cylinder drifted = settings_.cylinder;
+    drifted.wall_heat_scale = std::clamp(
+        drifted.wall_heat_scale + settings_.wall_heat_drift_per_kcycle * elapsed_kcycles(), 0.0, wall_heat_upper);
+    model_.set_cylinder(drifted);
+  }
+  if (cycle_ == 0) start(at, applied);
+
+  c.soc_cad = applied + settings_.soc_drift_cad_per_kcycle * elapsed_kcycles();
+  if (settings_.soc_scatter_cad > 0.0) c.soc_cad += settings_.soc_scatter_cad * noise(BenchStream::soc);
+  c.soc_cad = std::clamp(c.soc_cad, closed_[0], closed_[1]);  // drift must not carry the burn out of the cycle
+  c.misfire = random::bernoulli(settings_.misfire_probability, seed_, static_cast<std::uint64_t>(BenchStream::misfire),
+                                static_cast<std::uint64_t>(cycle_));
+  c.indicators = burn(at, c.soc_cad, c.misfire, c.unphysical);
+  if (settings_.efficiency_noise_percent > 0.0 && !c.misfire && !c.unphysical) {
+    const double points = settings_.efficiency_noise_percent * noise(BenchStream::efficiency);
+    const double work_j = points / percent * at.charge.fuel_heat_j;
+    const double imep_bar = work_j / model_.geometry().swept_m3 / units::pa_per_bar;
+    c.indicators.work_closed_j += work_j;
+    c.indicators.work_gross_j += work_j;
+    c.indicators.imep_closed_bar += imep_bar;
+    c.indicators.imep_gross_bar += imep_bar;
+    c.indicators.efficiency_gross += points / percent;
+  }
+  measure_nox(at, c);
+  judge(at, c);
+  measure_limits(c);
+  ++cycle_;
+  return c;
+}
+
+void EngineBench::measure_nox(const Prepared& at, BenchCycle& c) noexcept {
+  if (!c.unphysical) last_t_max_k_ = c.indicators.t_max_k;
+  const auto read = [&](double level, double noise_fraction, BenchStream stream) {
+    return noise_fraction > 0.0 ? std::max(0.0, level * (1.0 + noise_fraction * noise(stream))) : level;
+  };
+  c.nox_true_ppm = settings_.true_nox.ppm(last_t_max_k_);
+  c.nox_analyser_ppm = read(analyser_.step(c.nox_true_ppm, at.analyser_delay, at.analyser_gain),
+                            settings_.analyser.noise_fraction, BenchStream::analyser);
+  c.nox_fast_ppm = read(fast_.step(c.nox_true_ppm, at.fast_delay, at.fast_gain), settings_.fast_sensor.noise_fraction,
+                        BenchStream::fast);
+  c.nox_soft_ppm = settings_.soft_sensor.raw_ppm(last_t_max_k_);
+  c.nox_soft_corrected_ppm = c.nox_soft_ppm * std::exp(ln_bias_);
+  const double delayed = soft_through_analyser_.step(c.nox_soft_ppm, at.analyser_delay, at.analyser_gain);
+  ln_bias_ = settings_.soft_sensor.next_bias(ln_bias_, c.nox_analyser_ppm, delayed);
+}
+
+void EngineBench::judge(const Prepared& at, BenchCycle& c) noexcept {
+  const engine::Performance& performance = settings_.performance;
+  const bool whole = settings_.delay_whole_objective;
+  const double nox = whole ? c.nox_true_ppm : routed_ppm(settings_.nox_sensor, c);
+  if (!c.unphysical) performance.components(signals_of(c.indicators, nox), last_components_);
+  c.component_count = performance.size();
+  for (std::size_t i = 0; i < c.component_count; ++i) {
+    const double now = last_components_[i];
+    c.components[i] = whole ? component_lags_[i].step(now, at.analyser_delay, at.analyser_gain) : now;
+    c.j += c.components[i];
+  }
+}
+
+void EngineBench::measure_limits(BenchCycle& c) noexcept {
+  if (!c.unphysical) last_imep_bar_ = c.indicators.imep_gross_bar;
+  imep_bar_[static_cast<std::size_t>(cycle_) % cov_window_cycles] = last_imep_bar_;
+  c.limit_count = limit_members_.size();
+  for (std::size_t i = 0; i < c.limit_count; ++i)
+    c.limit_values[i] = limit_members_[i] ? c.indicators.*(limit_members_[i]) : cov_imep_percent();
+}
+
+// Two passes over the window: a running sum would drift and depend on where a run was cut.
+double EngineBench::cov_imep_percent() const noexcept {
+  const std::size_t n = std::min(static_cast<std::size_t>(cycle_) + 1, cov_window_cycles);
+  if (n < 2) return 0.0;
+  double mean = 0.0, squares = 0.0;
+  for (std::size_t i = 0; i < n; ++i)
+    mean += imep_bar_[i] / static_cast<double>(n);
+  for (std::size_t i = 0; i < n; ++i)
+    squares += (imep_bar_[i] - mean) * (imep_bar_[i] - mean);
+  return percent * std::sqrt(squares / static_cast<double>(n - 1)) / std::abs(mean);
+}
+
+}  // namespace mgdd::loop

@@ -1,0 +1,109 @@
+// What the bench refuses before it exists.
+#include <cmath>
+#include <string>
+#include <utility>
+
+#include "mgdd/common/bounds.hpp"
+#include "mgdd/common/error.hpp"
+#include "mgdd/common/names.hpp"
+#include "mgdd/common/text.hpp"
+#include "mgdd/engine/burn.hpp"
+#include "mgdd/loop/engine_bench.hpp"
+
+namespace mgdd::loop {
+namespace {
+
+constexpr std::pair<NoxSensor, std::string_view> sensor_names[] = {{NoxSensor::none, "none"},
+                                                                   {NoxSensor::analyser, "analyser"},
+                                                                   {NoxSensor::fast, "fast"},
+                                                                   {NoxSensor::soft, "soft"},
+                                                                   {NoxSensor::soft_corrected, "soft_corrected"},
+                                                                   {NoxSensor::true_value, "true_value"}};
+
+// The message of another room, with the field of the bench in front.
+template <class Check>
+void within(const std::string& owner, Check check) {
+  try {
+    check();
+  } catch (const ParameterError& error) {
+    throw ParameterError(owner + "." + error.what());
+  }
+}
+
+void validate_schedule(const BenchSettings& s) {
+  if (s.schedule.empty()) throw ParameterError("schedule is empty: must have an operating point for cycle 0");
+  if (s.schedule.front().cycle != 0) {
+    throw ParameterError("schedule[0].cycle = " + std::to_string(s.schedule.front().cycle) + ": must be 0");
+  }
+  const std::array<double, 2> window = timing_window(s.cylinder);
+  for (std::size_t i = 0; i < s.schedule.size(); ++i) {
+    const ScheduledPoint& now = s.schedule[i];
+    const std::string owner = "schedule[" + std::to_string(i) + "]";
+    if (i > 0 && now.cycle <= s.schedule[i - 1].cycle) {
+      throw ParameterError(owner + ".cycle = " + std::to_string(now.cycle) + ": must be > " +
+                           std::to_string(s.schedule[i - 1].cycle) + ", the cycle before it");
+    }
+    within(owner, [&] { engine::validate_cycle(s.cylinder, now.point, window[1]); });
+    if (!(now.point.fuel_mg > 0.0)) {
+      throw ParameterError(owner + ".fuel_mg = " + text(now.point.fuel_mg) + " mg: must be > 0, a bench fires");
+    }
+  }
+}
+
+void validate_limits(const BenchSettings& s) {
+  if (s.limits.size() > max_limits) {
+    throw ParameterError("limits has " + std::to_string(s.limits.size()) + " entries: must be at most " +
+                         std::to_string(max_limits));
+  }
+  for (const std::string& name : s.limits) {
+    if (name == cov_imep_name) continue;
+    std::string known(cov_imep_name);
+    bool found = false;
+    for (const auto& field : engine::indicator_fields<double>()) {
+      found = found || field.name == name;
+      known.append(", ").append(field.name);
+    }
+    if (!found) throw ParameterError("limits: '" + name + "' is not measured: must be one of " + known);
+  }
+}
+
+}  // namespace
+
+std::string_view to_string(NoxSensor sensor) noexcept {
+  return name_of<NoxSensor>(sensor_names, sensor);
+}
+NoxSensor parse_nox_sensor(std::string_view name) {
+  return parse_name<NoxSensor>(sensor_names, "nox_sensor", name);
+}
+
+std::array<double, 2> closed_part(const engine::Cylinder& c) noexcept {
+  const double lead = c.burn_shape == engine::BurnShape::double_wiebe ? std::fmin(0.0, c.second_delay_cad) : 0.0;
+  return {c.ivc_cad - lead, std::nextafter(c.evo_cad, c.ivc_cad)};
+}
+
+std::array<double, 2> timing_window(const engine::Cylinder& c) noexcept {
+  const std::array<double, 2> closed = closed_part(c);
+  return {std::fmax(engine::timing_lower_cad, closed[0]), std::fmin(engine::timing_upper_cad, closed[1])};
+}
+
+void validate(const BenchSettings& s) {
+  engine::validate(s.cylinder);
+  static_cast<void>(engine::crank_grid(s.cylinder, s.step_cad));
+  validate_schedule(s);
+  require_within("soc_scatter_cad", s.soc_scatter_cad, 0.0, 5.0, "°CA");
+  require_within("efficiency_noise_percent", s.efficiency_noise_percent, 0.0, 20.0, "%");
+  require_within("misfire_probability", s.misfire_probability, 0.0, 1.0);
+  require_within("soc_drift_cad_per_kcycle", s.soc_drift_cad_per_kcycle, -100.0, 100.0, "°CA");
+  require_within("wall_heat_drift_per_kcycle", s.wall_heat_drift_per_kcycle, -100.0, 100.0);
+  within("true_nox", [&] { engine::validate(s.true_nox); });
+  within("soft_sensor", [&] { engine::validate(s.soft_sensor); });
+  validate("analyser", s.analyser);
+  validate("fast_sensor", s.fast_sensor);
+  if (s.nox_sensor == NoxSensor::none && !s.delay_whole_objective &&
+      s.performance.uses(engine::PerformanceSignal::nox_ppm)) {
+    throw ParameterError("nox_sensor = 'none': the performance uses nox_ppm, name the sensor that measures it");
+  }
+  validate_limits(s);
+}
+
+}  // namespace mgdd::loop

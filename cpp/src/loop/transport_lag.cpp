@@ -1,0 +1,74 @@
+#include "mgdd/loop/transport_lag.hpp"
+
+#include <algorithm>
+#include <cmath>
+#include <string>
+
+#include "mgdd/common/bounds.hpp"
+#include "mgdd/common/error.hpp"
+
+namespace mgdd::loop {
+namespace {
+
+constexpr double longest_s = 60.0;
+constexpr double longest_cycles = 100000.0;
+
+// Four-stroke: one cycle lasts 120 / N seconds.
+double cycles(double time_s, double speed_rpm) noexcept {
+  return time_s * speed_rpm / 120.0;
+}
+
+}  // namespace
+
+std::size_t SensorDynamics::delay_at(double speed_rpm) const noexcept {
+  if (delay_cycles) return static_cast<std::size_t>(*delay_cycles);
+  return static_cast<std::size_t>(std::round(cycles(delay_s, speed_rpm)));
+}
+
+double SensorDynamics::gain_at(double speed_rpm) const noexcept {
+  const double tau = lag_cycles ? *lag_cycles : cycles(lag_s, speed_rpm);
+  return tau > 0.0 ? -std::expm1(-1.0 / tau) : 1.0;
+}
+
+void validate(std::string_view sensor, const SensorDynamics& d) {
+  const std::string owner = std::string(sensor) + ".";
+  require_within(owner + "delay_s", d.delay_s, 0.0, longest_s, "s");
+  require_within(owner + "lag_s", d.lag_s, 0.0, longest_s, "s");
+  require_within(owner + "noise_fraction", d.noise_fraction, 0.0, 0.2);
+  if (d.delay_cycles) {
+    require_within(owner + "delay_cycles", static_cast<double>(*d.delay_cycles), 0.0, longest_cycles);
+  }
+  if (d.lag_cycles) require_within(owner + "lag_cycles", *d.lag_cycles, 0.0, longest_cycles);
+}
+
+void TransportLag::fill(double steady) noexcept {
+  std::fill(line_.begin(), line_.end(), steady);
+  level_ = steady;
+}
+
+double TransportLag::step(double x, std::size_t delay, double gain) noexcept {
+  const std::size_t n = line_.size();
+  at_ = at_ + 1 < n ? at_ + 1 : 0;
+  line_[at_] = x;
+  const double inlet = line_[at_ >= delay ? at_ - delay : at_ + n - delay];
+  level_ = gain < 1.0 ? level_ + gain * (inlet - level_) : inlet;
+  return level_;
+}
+
+std::vector<double> TransportLag::save() const {
+  std::vector<double> state{level_, static_cast<double>(at_)};
+  state.insert(state.end(), line_.begin(), line_.end());
+  return state;
+}
+
+void TransportLag::restore(const std::vector<double>& state) {
+  if (state.size() != state_size() || !(state[1] >= 0.0 && state[1] < static_cast<double>(line_.size()))) {
+    throw DataError("the state of a transport lag has " + std::to_string(state.size()) + " entries: must be " +
+                    std::to_string(state_size()) + ", the second an index of the line");
+  }
+  level_ = state[0];
+  at_ = static_cast<std::size_t>(state[1]);
+  std::copy(state.begin() + 2, state.end(), line_.begin());
+}
+
+}  // namespace mgdd::loop
