@@ -157,40 +157,40 @@ void bind_extremum_seeking(py::module_& m) {
   using R = Recorded<ExtremumSeeking>;
   const ExtremumSeekingSettings d;
   py::class_<R> cls(m, "ExtremumSeeking", "Extremum seeking; see mgdd.optimize.ExtremumSeeking.");
-  cls.def(py::init([](const py::object& start, const py::object& lower, const py::object& upper,
-                      const std::string& form, const py::object& amplitude, int period,
-                      const std::optional<std::vector<int>>& harmonics, const py::object& gain, const py::object& rate,
-                      double washout_pole, double low_pass,
-                      const std::optional<std::vector<ComponentLag>>& components, std::optional<int> hold_cycles,
-                      double amplitude_floor, double full_gradient, double limit_amplitude, bool maximize,
-                      const std::vector<Limit>& limits, std::optional<double> curvature) {
-            ExtremumSeekingSettings s;
-            s.space = space_from(start, lower, upper);
-            s.form = parse_mean_removal(form);
-            s.dither = dither_from(amplitude, period, harmonics, s.space.size());
-            s.gain = inputs_from(gain, "gain", s.space.size());
-            s.rate = optional_inputs(rate, "rate", s.space.size());
-            s.washout_pole = washout_pole;
-            s.low_pass = low_pass;
-            s.components = components_from(components);
-            s.hold_cycles = hold_cycles.value_or(-1);
-            s.amplitude_floor = amplitude_floor;
-            s.full_gradient = full_gradient;
-            s.limit_amplitude = limit_amplitude;
-            s.maximize = maximize;
-            s.limits = limits;
-            s.curvature = none_as_nan(curvature);
-            R out{ExtremumSeeking(s)};
-            warn_each(s.advice());
-            return out;
-          }),
-          py::kw_only(), py::arg("start"), py::arg("lower") = -inf, py::arg("upper") = inf, py::arg("form") = "batch",
-          py::arg("amplitude") = 1.0, py::arg("period") = d.dither.period, py::arg("harmonics") = py::none(),
-          py::arg("gain") = d.gain[0], py::arg("rate") = py::none(), py::arg("washout_pole") = d.washout_pole,
-          py::arg("low_pass") = d.low_pass, py::arg("components") = py::none(), py::arg("hold_cycles") = py::none(),
-          py::arg("amplitude_floor") = d.amplitude_floor, py::arg("full_gradient") = d.full_gradient,
-          py::arg("limit_amplitude") = d.limit_amplitude, py::arg("maximize") = true,
-          py::arg("limits") = std::vector<Limit>{}, py::arg("curvature") = py::none())
+  cls.def(
+         py::init([](const py::object& start, const py::object& lower, const py::object& upper, const std::string& form,
+                     const py::object& amplitude, int period, const std::optional<std::vector<int>>& harmonics,
+                     const py::object& gain, const py::object& rate, double washout_pole, double low_pass,
+                     const std::optional<std::vector<ComponentLag>>& components, std::optional<int> hold_cycles,
+                     double amplitude_floor, double full_gradient, double limit_amplitude, bool maximize,
+                     const std::vector<Limit>& limits, std::optional<double> curvature) {
+           ExtremumSeekingSettings s;
+           s.space = space_from(start, lower, upper);
+           s.form = parse_mean_removal(form);
+           s.dither = dither_from(amplitude, period, harmonics, s.space.size());
+           s.gain = inputs_from(gain, "gain", s.space.size());
+           s.rate = optional_inputs(rate, "rate", s.space.size());
+           s.washout_pole = washout_pole;
+           s.low_pass = low_pass;
+           s.components = components_from(components);
+           s.hold_cycles = hold_cycles.value_or(-1);
+           s.amplitude_floor = amplitude_floor;
+           s.full_gradient = full_gradient;
+           s.limit_amplitude = limit_amplitude;
+           s.maximize = maximize;
+           s.limits = limits;
+           s.curvature = none_as_nan(curvature);
+           R out{ExtremumSeeking(s)};
+           warn_each(s.advice());
+           return out;
+         }),
+         py::kw_only(), py::arg("start"), py::arg("lower") = -inf, py::arg("upper") = inf, py::arg("form") = "batch",
+         py::arg("amplitude") = 1.0, py::arg("period") = d.dither.period, py::arg("harmonics") = py::none(),
+         py::arg("gain") = d.gain[0], py::arg("rate") = py::none(), py::arg("washout_pole") = d.washout_pole,
+         py::arg("low_pass") = d.low_pass, py::arg("components") = py::none(), py::arg("hold_cycles") = py::none(),
+         py::arg("amplitude_floor") = d.amplitude_floor, py::arg("full_gradient") = d.full_gradient,
+         py::arg("limit_amplitude") = d.limit_amplitude, py::arg("maximize") = true,
+         py::arg("limits") = std::vector<Limit>{}, py::arg("curvature") = py::none())
       .def_property_readonly(
           "gradient", [](const R& r) { return input_array(r.seeker.gradient()); },
           "Last estimate of the slope of the maximised objective, shape (inputs,).")
@@ -231,8 +231,8 @@ void bind_newton(py::module_& m) {
                       double time_constant_cycles, double hessian_rate, double riccati_rate,
                       const py::object& initial_hessian, const py::object& initial_inverse, double largest_inverse,
                       int hold_cycles, const py::object& rate,
-                      const std::optional<std::vector<ComponentLag>>& components, double limit_amplitude,
-                      bool maximize, const std::vector<Limit>& limits) {
+                      const std::optional<std::vector<ComponentLag>>& components, double limit_amplitude, bool maximize,
+                      const std::vector<Limit>& limits) {
             NewtonSeekingSettings s;
             s.space = space_from(start, lower, upper);
             const Eigen::Index n = s.space.size();
@@ -300,8 +300,7 @@ void bind_bounded(py::module_& m) {
   py::class_<R> cls(m, "BoundedSeeking", "Bounded extremum seeking; see mgdd.optimize.BoundedSeeking.");
   cls.def(py::init([](const py::object& start, const py::object& lower, const py::object& upper,
                       const py::object& amplitude, int period, const std::optional<std::vector<int>>& harmonics,
-                      double kappa, bool maximize, const std::vector<Limit>& limits,
-                      std::optional<double> curvature) {
+                      double kappa, bool maximize, const std::vector<Limit>& limits, std::optional<double> curvature) {
             BoundedSeekingSettings s;
             s.space = space_from(start, lower, upper);
             s.dither = dither_from(amplitude, period, harmonics, s.space.size());
@@ -314,8 +313,8 @@ void bind_bounded(py::module_& m) {
             return out;
           }),
           py::kw_only(), py::arg("start"), py::arg("lower") = -inf, py::arg("upper") = inf, py::arg("amplitude") = 1.0,
-          py::arg("period") = 10, py::arg("harmonics") = py::none(), py::arg("kappa") = 1.0,
-          py::arg("maximize") = true, py::arg("limits") = std::vector<Limit>{}, py::arg("curvature") = py::none())
+          py::arg("period") = 10, py::arg("harmonics") = py::none(), py::arg("kappa") = 1.0, py::arg("maximize") = true,
+          py::arg("limits") = std::vector<Limit>{}, py::arg("curvature") = py::none())
       .def_property_readonly(
           "settings",
           [](const R& r) {

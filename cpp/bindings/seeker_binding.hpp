@@ -45,7 +45,7 @@ inline optimize::SearchSpace space_from(const py::object& start, const py::objec
 }
 
 inline py::array_t<double> input_array(const optimize::Inputs& values) {
-  return {static_cast<py::ssize_t>(values.size()), values.data()};
+  return py::array_t<double>(static_cast<py::ssize_t>(values.size()), values.data());
 }
 
 inline py::object nan_as_none(double value) {
@@ -106,8 +106,7 @@ void bind_seeking(py::class_<Recorded<S>>& cls) {
             const optimize::Reading reading = reading_from(r.seeker, j, limits, misfire, buffer);
             const optimize::Inputs before = r.seeker.estimate();
             const optimize::TellStatus status = r.seeker.tell(reading);
-            optimize::require(status, r.seeker.protocol(), reading, r.seeker.component_count(),
-                              r.seeker.limit_count());
+            optimize::require(status, r.seeker.protocol(), reading, r.seeker.component_count(), r.seeker.limit_count());
             const bool fired = status == optimize::TellStatus::accepted;
             const optimize::Inputs& applied = r.seeker.applied();
             double sum = fired ? 0.0 : std::numeric_limits<double>::quiet_NaN();

@@ -166,7 +166,8 @@ GoldenSection::Parabola GoldenSection::parabola() const noexcept {
   return {middle - 0.5 * c[1] / c[2] * width, 2.0 * c[2] / (width * width)};
 }
 
-// After three measurements: the estimate follows the vertex, slowly, with limits kept for both sides; the bracket goes with it.
+// After three measurements: the estimate follows the vertex, slowly, with limits kept for both sides; the bracket goes
+// with it.
 void GoldenSection::refine() noexcept {
   const double reach = reach_share * (upper_ - lower_);
   Inputs step = scalar_input(parabola().vertex - estimate_[0]);

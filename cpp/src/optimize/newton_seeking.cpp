@@ -16,11 +16,11 @@ NewtonSeekingSettings checked(NewtonSeekingSettings s) {
   validate(s.components);
   if (s.rate.size() == 0) s.rate = s.dither.amplitude * (3.0 / s.dither.period);
   validate_entries("rate", s.rate, n, 0.0);
-  for (const auto& [name, value, upper] : {std::tuple{"time_constant_cycles", s.time_constant_cycles, 1e9},
-                                           std::tuple{"hessian_rate", s.hessian_rate, 1.0},
-                                           std::tuple{"riccati_rate", s.riccati_rate, 1.0},
-                                           std::tuple{"largest_inverse", s.largest_inverse, 1e300},
-                                           std::tuple{"limit_amplitude", s.limit_amplitude, 1.0}}) {
+  for (const auto& [name, value, upper] :
+       {std::tuple{"time_constant_cycles", s.time_constant_cycles, 1e9},
+        std::tuple{"hessian_rate", s.hessian_rate, 1.0}, std::tuple{"riccati_rate", s.riccati_rate, 1.0},
+        std::tuple{"largest_inverse", s.largest_inverse, 1e300},
+        std::tuple{"limit_amplitude", s.limit_amplitude, 1.0}}) {
     if (!(value > 0.0 && value <= upper)) {
       throw ParameterError(std::string(name) + " = " + text(value) + ": must be > 0 and <= " + text(upper));
     }
@@ -66,8 +66,8 @@ NewtonSeeking::NewtonSeeking(NewtonSeekingSettings settings)
 
 const Inputs& NewtonSeeking::ask() noexcept {
   for (Eigen::Index i = 0; i < estimate_.size(); ++i) {
-    applied_[i] = estimate_[i] +
-                  share_ * settings_.dither.amplitude[i] * dither_.perturbation(static_cast<int>(phase_), i);
+    applied_[i] =
+        estimate_[i] + share_ * settings_.dither.amplitude[i] * dither_.perturbation(static_cast<int>(phase_), i);
   }
   protocol_.asked = true;
   return applied_;

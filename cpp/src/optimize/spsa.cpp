@@ -36,7 +36,8 @@ SpsaSettings checked(SpsaSettings s) {
   const bool second = s.form == SpsaForm::second_order;
   if (s.gain == 0.0) s.gain = second ? 3.0 : 20.0;
   positive("perturbation", s.perturbation);
-  if (s.step_max == 0.0) s.step_max = s.form == SpsaForm::one_measurement ? s.perturbation / 5.0 : s.perturbation * 4.0 / 3.0;
+  if (s.step_max == 0.0)
+    s.step_max = s.form == SpsaForm::one_measurement ? s.perturbation / 5.0 : s.perturbation * 4.0 / 3.0;
   positive("gain", s.gain);
   if (!(s.step_max > 0.0)) throw ParameterError("step_max = " + text(s.step_max) + ": must be > 0");
   const Eigen::Index n = s.space.size();
@@ -44,8 +45,8 @@ SpsaSettings checked(SpsaSettings s) {
   if (!(s.stability >= 0.0 && std::isfinite(s.stability))) {
     throw ParameterError("stability = " + text(s.stability) + ": must be >= 0 and finite");
   }
-  for (const auto& [name, value] : {std::pair{"gain_exponent", s.gain_exponent},
-                                    std::pair{"perturbation_exponent", s.perturbation_exponent}}) {
+  for (const auto& [name, value] :
+       {std::pair{"gain_exponent", s.gain_exponent}, std::pair{"perturbation_exponent", s.perturbation_exponent}}) {
     if (!(value >= 0.0 && value <= 1.0)) {
       throw ParameterError(std::string(name) + " = " + text(value) + ": must lie in [0, 1]");
     }
@@ -123,7 +124,8 @@ int Spsa::measurements_per_iteration() const noexcept {
 
 double Spsa::gain_now() const noexcept {
   if (settings_.schedule == GainSchedule::constant) return settings_.gain;
-  return settings_.gain / std::pow(static_cast<double>(iteration_) + 1.0 + settings_.stability, settings_.gain_exponent);
+  return settings_.gain /
+         std::pow(static_cast<double>(iteration_) + 1.0 + settings_.stability, settings_.gain_exponent);
 }
 
 double Spsa::perturbation_now() const noexcept {
@@ -220,7 +222,8 @@ Inputs Spsa::newton_step() noexcept {
   const auto n = hessian_.rows();
   const InputMatrix floor = InputMatrix::Identity(n, n) * least;
   InputMatrix bent = -hessian_;
-  for (double shift = least; Eigen::LLT<InputMatrix>(bent - floor).info() != Eigen::Success && shift < 1e300; shift *= 2.0)
+  for (double shift = least; Eigen::LLT<InputMatrix>(bent - floor).info() != Eigen::Success && shift < 1e300;
+       shift *= 2.0)
     bent.diagonal().array() += shift;
   return bent.llt().solve(gradient_);
 }

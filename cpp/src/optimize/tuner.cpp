@@ -21,9 +21,9 @@ constexpr double default_rms = 0.2, default_distance = 5.0, default_arrival = 0.
 constexpr double default_cycles = 50.0;
 constexpr double reserve = 0.85;  // noise makes arrival later than the mean path: plan for this share of the wish
 constexpr int batch_period = 6, continuous_period = 10;
-constexpr double periods_of_lag = 2.4;       // a compensated period of 2.4 tau still passes 0.36 of the echo
-constexpr double slow_periods = 6.0;         // uncompensated: omega (D + tau) <= 60 degrees
-constexpr double delays_per_tau = 3.0;       // an integrator with delay D is well damped for tau >= 3 D
+constexpr double periods_of_lag = 2.4;  // a compensated period of 2.4 tau still passes 0.36 of the echo
+constexpr double slow_periods = 6.0;    // uncompensated: omega (D + tau) <= 60 degrees
+constexpr double delays_per_tau = 3.0;  // an integrator with delay D is well damped for tau >= 3 D
 
 TuningWish filled(TuningWish w) {
   const auto positive = [](std::string_view name, double value, std::string_view remedy) {
@@ -56,8 +56,9 @@ Tuning tune_spsa(const TuningWish& w) {
   t.method = TunedMethod::spsa;
   t.period = 2;
   if (w.lag.delay_cycles > 0.0 || w.lag.lag_cycles > 0.0) {
-    throw ParameterError("method = 'spsa': takes a measurement without delay and lag; hold each set-point until the "
-                         "sensor has settled, or use 'batch'");
+    throw ParameterError(
+        "method = 'spsa': takes a measurement without delay and lag; hold each set-point until the "
+        "sensor has settled, or use 'batch'");
   }
   const double wished = std::isnan(w.cycles) ? default_cycles : w.cycles;
   const double ratio = w.arrival / w.distance;

@@ -1,5 +1,5 @@
-// Bounded extremum seeking (Scheinker and Krstic 2014): the measurement enters only the phase of an oscillation, so that
-// no step is ever larger than a omega, whatever J does. One step per cycle:
+// Bounded extremum seeking (Scheinker and Krstic 2014): the measurement enters only the phase of an oscillation, so
+// that no step is ever larger than a omega, whatever J does. One step per cycle:
 //   theta_i <- theta_i + a_i omega_i cos(omega_i k - kappa J),    omega_i = 2 pi n_i/M     (J maximised)
 // and the mean drifts at kappa a^2 omega/2 times the slope (Lie bracket average). No mean to remove, no filter.
 // ask and tell are noexcept and allocation-free.

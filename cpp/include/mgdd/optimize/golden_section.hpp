@@ -1,7 +1,7 @@
 // Golden-section search of one input (Kiefer 1953) that knows about noise: two inner points are measured in turns until
 // their means differ by more than chance or a budget is spent; a draw cuts both ends. Once draws say that the bracket
-// is as small as the noise allows, the search goes on as triples around the vertex of a parabola through its samples, so
-// that it keeps tracking. ask and tell are noexcept and allocation-free.
+// is as small as the noise allows, the search goes on as triples around the vertex of a parabola through its samples,
+// so that it keeps tracking. ask and tell are noexcept and allocation-free.
 #pragma once
 
 #include <array>

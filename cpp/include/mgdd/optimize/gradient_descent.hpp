@@ -14,11 +14,11 @@ namespace mgdd::optimize {
 
 struct GradientDescentSettings {
   SearchSpace space;
-  double step_size = 15.0;      ///< lambda_c, squared input unit per unit of J, > 0
-  double difference = 1.0;      ///< c in input units, > 0
-  Inputs rate{};                ///< largest change per step; empty: none
-  double tolerance = 0.02;      ///< converged once every entry of a step is below it, input unit
-  std::int64_t iterations = 60; ///< steps after which an unconverged search says so; it goes on all the same
+  double step_size = 15.0;       ///< lambda_c, squared input unit per unit of J, > 0
+  double difference = 1.0;       ///< c in input units, > 0
+  Inputs rate{};                 ///< largest change per step; empty: none
+  double tolerance = 0.02;       ///< converged once every entry of a step is below it, input unit
+  std::int64_t iterations = 60;  ///< steps after which an unconverged search says so; it goes on all the same
   bool maximize = true;
   std::vector<Limit> limits;
   double curvature = std::numeric_limits<double>::quiet_NaN();  ///< J'' if known

@@ -9,7 +9,6 @@
 #include <string_view>
 #include <vector>
 
-
 #include "mgdd/optimize/local_model.hpp"
 #include "mgdd/optimize/seeker.hpp"
 

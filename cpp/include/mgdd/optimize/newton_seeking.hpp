@@ -1,6 +1,6 @@
-// Newton extremum seeking (Ghaffari, Krstic and Nesic 2012): dither, gradient and Hessian by demodulation, and a Riccati
-// filter Gamma -> H^-1, so that the rate of approach does not depend on the curvature of the map.
-// The estimate is held until H and Gamma have settled. ask and tell are noexcept and allocation-free.
+// Newton extremum seeking (Ghaffari, Krstic and Nesic 2012): dither, gradient and Hessian by demodulation, and a
+// Riccati filter Gamma -> H^-1, so that the rate of approach does not depend on the curvature of the map. The estimate
+// is held until H and Gamma have settled. ask and tell are noexcept and allocation-free.
 #pragma once
 
 #include <cmath>
@@ -17,14 +17,14 @@ namespace mgdd::optimize {
 struct NewtonSeekingSettings {
   SearchSpace space;
   DitherSettings dither{.amplitude = scalar_input(2.0), .period = 10, .harmonics = {1}};
-  double time_constant_cycles = 40.0;  ///< tau of the approach
-  double hessian_rate = 0.03;          ///< low-pass of H per cycle
-  double riccati_rate = 0.02;          ///< w_r
-  Inputs initial_hessian = scalar_input(-0.051);          ///< diagonal of H0, < 0, J unit per squared input unit
-  Inputs initial_inverse = scalar_input(-20.0);           ///< diagonal of Gamma0, < 0
-  double largest_inverse = 100.0;                         ///< bound of |Gamma|, > 0
-  int hold_cycles = 300;                                  ///< estimate held at the start
-  Inputs rate{};                                          ///< per cycle; empty: 3 A/M
+  double time_constant_cycles = 40.0;             ///< tau of the approach
+  double hessian_rate = 0.03;                     ///< low-pass of H per cycle
+  double riccati_rate = 0.02;                     ///< w_r
+  Inputs initial_hessian = scalar_input(-0.051);  ///< diagonal of H0, < 0, J unit per squared input unit
+  Inputs initial_inverse = scalar_input(-20.0);   ///< diagonal of Gamma0, < 0
+  double largest_inverse = 100.0;                 ///< bound of |Gamma|, > 0
+  int hold_cycles = 300;                          ///< estimate held at the start
+  Inputs rate{};                                  ///< per cycle; empty: 3 A/M
   std::vector<ComponentLag> components{ComponentLag{}};
   double limit_amplitude = 0.5;  ///< share of the amplitude while a limit holds the estimate back
   bool maximize = true;

@@ -26,8 +26,7 @@ concept AnySeeker = requires(S seeker, const S constant, const Reading& reading)
   { constant.limit_count() } noexcept -> std::same_as<std::size_t>;
 };
 
-using Seeker =
-    std::variant<ExtremumSeeking, NewtonSeeking, BoundedSeeking, Spsa, GradientDescent, GoldenSection>;
+using Seeker = std::variant<ExtremumSeeking, NewtonSeeking, BoundedSeeking, Spsa, GradientDescent, GoldenSection>;
 
 static_assert(AnySeeker<ExtremumSeeking> && AnySeeker<NewtonSeeking> && AnySeeker<BoundedSeeking> && AnySeeker<Spsa> &&
               AnySeeker<GradientDescent> && AnySeeker<GoldenSection>);

@@ -1,6 +1,6 @@
 // Simultaneous perturbation stochastic approximation: the slope in every direction from two measurements, whatever the
-// number of inputs (Spall 1992, gains after Spall 1998); one-measurement form (Spall 1997) with the trend of J taken off;
-// second-order form with four measurements (Spall 2000). One engine cycle per measurement. All randomness is a
+// number of inputs (Spall 1992, gains after Spall 1998); one-measurement form (Spall 1997) with the trend of J taken
+// off; second-order form with four measurements (Spall 2000). One engine cycle per measurement. All randomness is a
 // function of (seed, iteration). ask and tell are noexcept and allocation-free.
 #pragma once
 
@@ -29,17 +29,18 @@ struct SpsaSettings {
   SearchSpace space;
   SpsaForm form = SpsaForm::first_order;
   GainSchedule schedule = GainSchedule::decreasing;
-  double gain = 0.0;  ///< a, squared input unit per unit of J (second order: dimensionless); 0 = 20, or 3 for the latter
-  double stability = 50.0;  ///< A
-  double gain_exponent = 0.602;         ///< alpha
-  double perturbation = 1.5;            ///< c in input units, > 0
-  double perturbation_exponent = 0.101; ///< gamma
-  double step_max = 0.0;                ///< largest change per iteration and input; 0 = 4/3 c, one measurement: c/5
-  int averaging = 1;                    ///< gradients per iteration
-  bool blocking = false;                ///< accept a step only if J there is not below the last one less 2 noise_sd
-  double noise_sd = 0.0;                ///< of one measurement of J, for blocking
-  double initial_hessian = -0.051;      ///< second order: curvature before the first measurement, < 0
-  double hessian_prior = 20.0;          ///< ... and how many iterations it counts for
+  double gain =
+      0.0;  ///< a, squared input unit per unit of J (second order: dimensionless); 0 = 20, or 3 for the latter
+  double stability = 50.0;               ///< A
+  double gain_exponent = 0.602;          ///< alpha
+  double perturbation = 1.5;             ///< c in input units, > 0
+  double perturbation_exponent = 0.101;  ///< gamma
+  double step_max = 0.0;                 ///< largest change per iteration and input; 0 = 4/3 c, one measurement: c/5
+  int averaging = 1;                     ///< gradients per iteration
+  bool blocking = false;                 ///< accept a step only if J there is not below the last one less 2 noise_sd
+  double noise_sd = 0.0;                 ///< of one measurement of J, for blocking
+  double initial_hessian = -0.051;       ///< second order: curvature before the first measurement, < 0
+  double hessian_prior = 20.0;           ///< ... and how many iterations it counts for
   std::uint64_t seed = 0;
   bool maximize = true;
   std::vector<Limit> limits;
@@ -54,7 +55,8 @@ class Spsa {
 
   const Inputs& ask() noexcept;
   TellStatus tell(const Reading& reading) noexcept;
-  /// New operating point: forget limits and what was measured of this iteration; keep the estimate, begin the gains anew.
+  /// New operating point: forget limits and what was measured of this iteration; keep the estimate, begin the gains
+  /// anew.
   void restart() noexcept;
 
   const Inputs& estimate() const noexcept { return estimate_; }

@@ -4,7 +4,8 @@
 //   batch:      the same rms over sqrt(1 - M/(2 tau))
 //   SPSA (constant gain): q = a |J''|, rms = sigma/(c |J''|) sqrt(q/(2 (2 - q))), cycles = 2 ln(eps/e0)/ln(1 - q)
 //   cost of the dither: |J''|/2 A^2/2 (SPSA: c^2) and of the jitter: |J''|/2 rms^2, in units of J
-// Lengths that the user leaves open scale with L = sqrt(sigma/|J''|), where J has fallen by half a noise. Desk-time code.
+// Lengths that the user leaves open scale with L = sqrt(sigma/|J''|), where J has fallen by half a noise. Desk-time
+// code.
 #pragma once
 
 #include <limits>
@@ -24,8 +25,8 @@ struct TuningWish {
   TunedMethod method = TunedMethod::batch;
   double noise_sd = std::numeric_limits<double>::quiet_NaN();   ///< of J from cycle to cycle, > 0
   double curvature = std::numeric_limits<double>::quiet_NaN();  ///< J'' at the optimum; its sign is not used
-  ComponentLag lag{};               ///< between plant and J
-  bool compensated = true;          ///< the seeker knows the lag and turns its demodulation back
+  ComponentLag lag{};                                           ///< between plant and J
+  bool compensated = true;  ///< the seeker knows the lag and turns its demodulation back
   // NaN: left open.
   double rms = std::numeric_limits<double>::quiet_NaN();            ///< of the estimate at the end; 0.2 L
   double cycles = std::numeric_limits<double>::quiet_NaN();         ///< to arrive; 50, more where a lag asks for it
