@@ -373,7 +373,7 @@ def test_static_surface_of_measured_nox(cycles):
     assert (early - late) / 4.0 == pytest.approx(30.0, abs=0.5)
 
 
-def test_the_sensor_lag_hid_a_third_of_the_nox_slope(measured):
+def test_the_sensor_lag_hid_two_fifths_of_the_nox_slope(measured):
     late, early = measured.predict([2.0, -2.0])["nox_ppm"].to_numpy()
     assert (early - late) / 4.0 == pytest.approx(50.0, abs=3.0)
 

@@ -50,7 +50,7 @@ class Support:
     basis : QuadraticBasis
         Turns points into terms.
     root : ndarray, shape (p, p)
-        W with leverage = |W t|² of the terms t; the n records in the box have the mean p/n.
+        W, whose product with the terms has the leverage as its sum of squares; the n records in the box have the mean p/n.
 
     Examples
     --------

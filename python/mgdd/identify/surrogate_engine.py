@@ -59,7 +59,7 @@ class SurrogateEngine:
     >>> sorted(reading)
     ['imep_bar', 'mfb50_cad', 'mprr', 'nox_ppm', 'supported']
     >>> round(reading["imep_bar"], 1)
-    7.1
+    7.2
     """
 
     def __init__(
