@@ -66,6 +66,7 @@ def test_sensor_and_surface_of_the_slow_signal_are_recovered(exact):
     assert sensor.delay_cycles == 3
     assert sensor.tau_cycles == pytest.approx(6.0, abs=0.1)  # the trial grid and its parabola
     assert sensor.delay_share == {3: 1.0}
+    assert sensor.total_cycles == sensor.delay_cycles + sensor.tau_cycles
     assert not sensor.at_bound
     soi = np.linspace(-7.0, 9.0, 9)
     np.testing.assert_allclose(exact.predict(soi, AT)["nox_ppm"], law(soi, 0.42, 2.9, 1200.0)["nox_ppm"], atol=12.0)
@@ -122,6 +123,17 @@ def test_rows_that_are_not_excited_or_not_measured_are_left_out():
     assert np.isfinite(again.residuals[500:520, 0]).all()
 
 
+def test_the_held_out_part_has_no_say_in_the_lags():
+    records = random_step_records(4000)
+    other = records.copy(deep=True)
+    for name in ("nox_ppm", "imep_bar"):
+        other[name][3005:] = records[name].to_numpy()[3001:-4]
+    found, truth = fit_surrogate(other), fit_surrogate(records)
+    assert found.signals["nox_ppm"].sensor == truth.signals["nox_ppm"].sensor
+    assert found.signals["imep_bar"].lag_scores == truth.signals["imep_bar"].lag_scores
+    assert found.signals["imep_bar"].r2_held_out < 0.9 < truth.signals["imep_bar"].r2_held_out
+
+
 def test_results_are_labelled(known):
     check_labels(known.predict([-2.0, 0.0]))
     check_labels(known.quality())
@@ -144,6 +156,17 @@ def test_leverage_of_the_records_sums_to_the_number_of_terms(known):
     points = np.column_stack([records[name] for name in INPUTS])
     inside = np.all((points >= known.support.lower) & (points <= known.support.upper), axis=1)
     assert known.support.leverage(points[inside]).sum() == pytest.approx(15.0)
+    assert known.support.contains(points[inside]).mean() == pytest.approx(0.99, abs=0.004)
+    assert not known.support.contains(points[~inside]).any()
+
+
+def test_the_optimum_stays_out_of_the_corners_of_the_box(known):
+    corner = {"doi_main_ms": 0.49, "doi_h2_ms": 3.9, "p2m_us": 1350.0}
+    best = known.optimum({"nox_ppm": -1.0}, at=corner)
+    assert best.at_edge
+    assert best.soi_cad < known.support.upper[0] - 0.1
+    assert known.predict(best.soi_cad - 1e-6, corner)["supported"]
+    assert not known.predict(best.soi_cad + 1e-6, corner)["supported"]
 
 
 def test_optimum_is_that_of_the_law(exact):

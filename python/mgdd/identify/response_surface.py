@@ -28,12 +28,6 @@ class QuadraticBasis:
         first, second = np.triu_indices(z.shape[1])
         return np.column_stack([np.ones(len(z)), z, z[:, first] * z[:, second]])
 
-    @property
-    def size(self) -> int:
-        """Number of terms."""
-        inputs = self.centre.size
-        return 1 + inputs + inputs * (inputs + 1) // 2
-
 
 @dataclass(frozen=True, kw_only=True, eq=False)
 class Support:
@@ -50,7 +44,8 @@ class Support:
     basis : QuadraticBasis
         Turns points into terms.
     root : ndarray, shape (p, p)
-        W, whose product with the terms has the leverage as its sum of squares; the n records in the box have the mean p/n.
+        W, whose product with the terms has the leverage as its sum of squares; over the n records in the box its
+        mean is p/n.
 
     Examples
     --------
