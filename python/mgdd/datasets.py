@@ -8,13 +8,17 @@ import os
 from pathlib import Path
 from typing import TYPE_CHECKING
 
+import numpy as np
+
 from mgdd.errors import DataError
 from mgdd.io import read_conditions, read_pressure
+from mgdd.io.table import read_table
+from mgdd.results import labelled_dataset
 
 if TYPE_CHECKING:
     import xarray as xr
 
-__all__ = ["available", "load_hd_traces", "path"]
+__all__ = ["available", "load_h2df_cycles", "load_hd_traces", "path"]
 
 _VARIABLE = "MGDD_DATA_DIR"
 _PACKAGE = Path(__file__).parent / "data"
@@ -28,6 +32,50 @@ _PACKAGED = {
         f"{_HD}_LICENSE.txt": "ec423cc5506eea1ffbfc9955c3ec8f86139996963d84ff306a5ee41eda8a4ff1",
     }
 }
+
+_H2DF = "h2df_502"
+_H2DF_FILE = "h2df_test502_cycles.csv"
+_H2DF_SHA256 = "482b1cd0ce7e6389d8872f547d6fb05f7f63df9715eb6de1e76d7c066dada39c"
+_CAD = "°CA aTDC"
+_SIGN = "given in degrees before TDC (positive = early), sign turned here"
+# Column of the file: name here, factor, unit, long name, note on the origin.
+_H2DF_COLUMNS: dict[str, tuple[str, float, str, str, str]] = {
+    "control_mode": ("control_mode", 1.0, "-", "control mode: 2 = random steps, 1 = stock control", ""),
+    "soi_main_degbtdc": ("soi_cad", -1.0, _CAD, "start of injection", f"main injection; {_SIGN}"),
+    "soi_pre_degbtdc": ("soi_pilot_cad", -1.0, _CAD, "start of pilot injection", _SIGN),
+    "doi_main_ms": ("doi_main_ms", 1.0, "ms", "duration of main injection", ""),
+    "doi_pre_ms": ("doi_pilot_ms", 1.0, "ms", "duration of pilot injection", ""),
+    "p2m_us": ("p2m_us", 1.0, "µs", "pilot-to-main gap", ""),
+    "doi_h2_ms": ("doi_h2_ms", 1.0, "ms", "duration of hydrogen injection", ""),
+    "imep_bar": ("imep_bar", 1.0, "bar", "IMEP", "gross or net: not documented"),
+    "mprr_new": (
+        "mprr",
+        1.0,
+        "bar/°CA (not documented)",
+        "maximum pressure rise rate",
+        "unit not documented, most likely bar/deg",
+    ),
+    "mfb10_deg": ("mfb10_cad", 1.0, _CAD, "MFB10, angle of 10 % burned", ""),
+    "mfb50_deg": ("mfb50_cad", 1.0, _CAD, "MFB50, angle of 50 % burned", ""),
+    "mfb90_deg": ("mfb90_cad", 1.0, _CAD, "MFB90, angle of 90 % burned", ""),
+    "nox_ppm": ("nox_ppm", 1.0, "ppm", "NOx at the sensor", "CAN sensor, delayed and slow; no gas analyser"),
+    "soot_mg_m3": ("soot_mg_per_m3", 1.0, "mg/m³", "soot", ""),
+    "o2_noxsensor_pct": ("o2_percent", 1.0, "%", "O2 at the NOx sensor", ""),
+    "exh_T_cyl1_C": ("exhaust_temperature_k", 1.0, "K", "exhaust temperature of cylinder 1", "given in °C"),
+    "rail_bar": ("rail_bar", 1.0, "bar", "rail pressure", ""),
+    "speed_rpm": ("speed_rpm", 1.0, "rpm", "engine speed", ""),
+    "e_diesel_kJ": ("diesel_energy_kj", 1.0, "kJ", "energy of the diesel injections", ""),
+    "e_h2_kJ": ("h2_energy_kj", 1.0, "kJ", "energy of the hydrogen injection", ""),
+}
+_H2DF_ATTRS = {
+    "title": "hydrogen-diesel engine under random steps, test 502",
+    "source": "https://github.com/alexwin9478/H2dfDnnTrainExpData, commit f10b298, data/Test_502_NoPress.mat",
+    "citation": "A. Winkler, V. Sharma, D. Gordon, A. Norouzi, Zenodo, doi 10.5281/zenodo.16902579",
+    "licence": "Apache-2.0",
+    "changes": "21 of 153 fields, units converted, angles turned to °CA aTDC",
+    "angle_convention": "°CA aTDC: firing TDC = 0, compression negative; soi_cad = -(degrees before TDC)",
+}
+_BURN_ANGLES = ("mfb10_cad", "mfb50_cad", "mfb90_cad")
 
 
 def available() -> tuple[str, ...]:
@@ -134,6 +182,78 @@ def load_hd_traces() -> list[xr.Dataset]:
         trace = read_pressure(file, angle_column="crank_angle_cad", pressure_column=column)
         traces.append(trace.assign_attrs(file=column, **values))
     return traces
+
+
+def load_h2df_cycles(*, checked: bool = True, mask_held: bool = True) -> xr.Dataset:
+    """Load 24 998 measured cycles of a hydrogen-diesel engine under random steps of its injection.
+
+    One row is one cycle (80 ms at 1500 rpm) of a 4.5 L engine with diesel pilot and main injection and hydrogen
+    in the intake. The set is not in the package: put it in ``$MGDD_DATA_DIR/h2df_502``.
+
+    Parameters
+    ----------
+    checked : bool
+        Refuse a file whose SHA-256 is not that of the export described on the page "A measured engine"; False
+        reads an export of your own with the same columns.
+    mask_held : bool
+        Set the burn angles to NaN in the cycles where the log repeats all three of the cycle before: such a
+        repeat is no measurement.
+
+    Returns
+    -------
+    xarray.Dataset
+        Over ``cycle``: commands, indicators and slow signals, angles in °CA aTDC; ``excited`` marks the cycles
+        under random steps, ``burn_angles_held`` the repeats. Attributes say source, licence and changes.
+
+    Raises
+    ------
+    FileNotFoundError
+        As in `path`.
+    DataError
+        Another SHA-256, a missing column, or cycles that do not count up by one.
+
+    References
+    ----------
+    A. Winkler, V. Sharma, D. Gordon, A. Norouzi, H2dfDnnTrainExpData,
+    https://github.com/alexwin9478/H2dfDnnTrainExpData, Zenodo doi 10.5281/zenodo.16902579, Apache-2.0 licence.
+
+    Examples
+    --------
+    >>> from mgdd import datasets
+    >>> if "h2df_502" in datasets.available():
+    ...     cycles = datasets.load_h2df_cycles()
+    ...     assert cycles.sizes["cycle"] == 24998
+    """
+    file = path(_H2DF, _H2DF_FILE)
+    if checked and (found := hashlib.sha256(file.read_bytes()).hexdigest()) != _H2DF_SHA256:
+        raise DataError(
+            f"{file}: SHA-256 is {found}, known is {_H2DF_SHA256}: the file is another export; pass checked=False "
+            "to read it all the same"
+        )
+    table = read_table(file)
+    cycle = table.numbers(table.index("cycle"))
+    if not np.all(np.diff(cycle) == 1.0):
+        row = int(np.argmax(np.diff(cycle) != 1.0)) + 1
+        raise DataError(f"{file}: cycle {cycle[row]:g} follows {cycle[row - 1]:g}: cycles must count up by one")
+    columns = {column: table.numbers(table.index(column)) for column in _H2DF_COLUMNS}
+    arrays = {entry[0]: entry[1] * columns[column] for column, entry in _H2DF_COLUMNS.items()}
+    arrays["exhaust_temperature_k"] += 273.15
+    burn = np.column_stack([arrays[name] for name in _BURN_ANGLES])
+    held = np.r_[False, np.all(burn[1:] == burn[:-1], axis=1)]
+    for name in _BURN_ANGLES if mask_held else ():
+        arrays[name][held] = np.nan
+    variables: dict[str, tuple[object, ...]] = {
+        "cycle": ("cycle", cycle.astype(np.int64), "-", "engine cycle"),
+        "excited": ("cycle", arrays["control_mode"] == 2.0, "-", "cycle under random steps"),
+        "burn_angles_held": ("cycle", held, "-", "burn angles repeat the cycle before"),
+    }
+    for name, _, units, long_name, _ in _H2DF_COLUMNS.values():
+        variables[name] = ("cycle", arrays[name], units, long_name)
+    records = labelled_dataset(variables, attrs=_H2DF_ATTRS)
+    for name, _, _, _, note in _H2DF_COLUMNS.values():
+        if note:
+            records[name].attrs["note"] = note
+    return records
 
 
 def _data_dir() -> Path | None:
