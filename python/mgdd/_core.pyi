@@ -752,6 +752,21 @@ class NoxFit:
     """
     A NOx proxy fitted to a sweep, with its spread: what `fit_nox_proxy` returns.
     
+    Attributes
+    ----------
+    proxy : NoxProxy
+        The fitted constants.
+    map : str
+        Name of the map.
+    points : int
+        Number of points.
+    residual_ln : float
+        Standard deviation of ln NOx about the fit [-].
+    reference_nox_stderr_ppm : float
+        Standard error of NOx0 [ppm], delta method.
+    activation_temperature_stderr_k : float
+        Standard error of b [K].
+    
     Examples
     --------
     >>> from mgdd.engine import NoxProxy, fit_nox_proxy
@@ -1228,40 +1243,9 @@ def fit_cylinder(traces: collections.abc.Sequence[MeasuredCycle], cylinder: Cyli
     """
     Levenberg-Marquardt with exact sensitivities; releases the GIL.
     """
-def fit_nox_proxy(t_max_k: typing.Annotated[numpy.typing.ArrayLike, numpy.float64], nox_ppm: typing.Annotated[numpy.typing.ArrayLike, numpy.float64], *, map: str = 'affine_log', reference_temperature_k: typing.SupportsFloat | typing.SupportsIndex = 1900.0) -> NoxFit:
+def fit_nox_proxy(t_max_k: typing.Annotated[numpy.typing.ArrayLike, numpy.float64], nox_ppm: typing.Annotated[numpy.typing.ArrayLike, numpy.float64], map: str, reference_temperature_k: typing.SupportsFloat | typing.SupportsIndex) -> NoxFit:
     """
-    Fit a NOx proxy to a sweep by least squares on ln NOx.
-    
-    Parameters
-    ----------
-    t_max_k : array_like
-        Maximum bulk gas temperatures [K], at least five, at fixed oxygen, fuel and boost.
-    nox_ppm : array_like
-        Measured NOx [ppm], of the same length.
-    map : {"affine_log", "arrhenius"}
-        Form of the map.
-    reference_temperature_k : float
-        T0 of the proxy [K]; it is chosen, not fitted.
-    
-    Returns
-    -------
-    NoxFit
-        Proxy, residual and standard errors.
-    
-    Raises
-    ------
-    mgdd.errors.DataError
-        Fewer than five points, values that are not positive, equal temperatures, NOx that does not rise.
-    mgdd.errors.ShapeError
-        Columns of unequal length.
-    
-    Examples
-    --------
-    >>> from mgdd.engine import NoxProxy, fit_nox_proxy
-    >>> t = [1834.0, 1881.0, 1959.0, 2026.0, 2126.0]
-    >>> fit = fit_nox_proxy(t, NoxProxy().arrhenius_ppm(t), map="arrhenius")
-    >>> round(fit.proxy.activation_temperature_k)
-    16000
+    Least squares on ln NOx; use mgdd.engine.fit_nox_proxy.
     """
 def hardenberg_hase_delay_cad(pressure_bar: typing.Annotated[numpy.typing.ArrayLike, numpy.float64], temperature_k: typing.Annotated[numpy.typing.ArrayLike, numpy.float64], cetane_number: typing.Annotated[numpy.typing.ArrayLike, numpy.float64], piston_speed_m_per_s: typing.Annotated[numpy.typing.ArrayLike, numpy.float64]) -> typing.Any:
     ...

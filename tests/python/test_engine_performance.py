@@ -56,7 +56,7 @@ def test_soft_sensor_on_arrays() -> None:
 
 
 def test_fit_of_a_model_sweep_reads_its_own_proxy_back() -> None:
-    sweep = timing_sweep(Cylinder(), OperatingPoint(), np.linspace(-15.0, 5.0, 9))
+    sweep = timing_sweep(Cylinder(), OperatingPoint(), soc_cad=np.linspace(-15.0, 5.0, 9))
     t = sweep["t_max_k"].values
     fit = fit_nox_proxy(t, NoxProxy().arrhenius_ppm(t), map="arrhenius")
     assert fit.proxy.reference_nox_ppm == pytest.approx(1200.0)

@@ -200,7 +200,7 @@ def test_the_rig_is_the_bench() -> None:
         with pytest.raises(RigError, match=r"measure\(\) before apply\(\)"):
             rig.measure()
         for bad in (float("nan"), float("inf")):
-            with pytest.raises(ParameterError, match="soc_cad = (nan|inf): must be finite"):
+            with pytest.raises(ParameterError, match=r"soc_cad = (nan|inf): must be finite"):
                 rig.apply(bad)
         assert bench.cycle == 0
         for soc in requests(30):

@@ -14,10 +14,10 @@ from mgdd._core import (
     Performance,
     PerformanceTerm,
     SoftSensor,
-    fit_nox_proxy,
 )
 from mgdd.engine.cycle import convergence, sensitivities, simulate, timing_sweep
 from mgdd.engine.ignition import Timing, start_of_combustion, start_of_injection
+from mgdd.engine.nox import fit_nox_proxy
 from mgdd.engine.optimum import Optimum, optimum
 from mgdd.engine.trace import analyze
 

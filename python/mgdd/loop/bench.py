@@ -192,7 +192,7 @@ class EngineBench(_core.EngineBench):
 
 
 def _unique(names: Sequence[str]) -> list[str]:
-    """Number the names that occur more than once."""
+    """Add a number to the names that occur more than once."""
     total, seen = Counter(names), Counter[str]()
     out = []
     for name in names:
