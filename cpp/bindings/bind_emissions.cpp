@@ -200,6 +200,21 @@ Examples
 
   py::class_<NoxFit>(m, "NoxFit", R"(A NOx proxy fitted to a sweep, with its spread: what `fit_nox_proxy` returns.
 
+Attributes
+----------
+proxy : NoxProxy
+    The fitted constants.
+map : str
+    Name of the map.
+points : int
+    Number of points.
+residual_ln : float
+    Standard deviation of ln NOx about the fit [-].
+reference_nox_stderr_ppm : float
+    Standard error of NOx0 [ppm], delta method.
+activation_temperature_stderr_k : float
+    Standard error of b [K].
+
 Examples
 --------
 >>> from mgdd.engine import NoxProxy, fit_nox_proxy
@@ -227,42 +242,8 @@ Examples
         return representation("NoxFit", keywords);
       });
 
-  m.def("fit_nox_proxy", &fit, arg("t_max_k"), arg("nox_ppm"), py::kw_only(),
-        arg("map") = std::string(to_string(NoxMap::affine_log)),
-        arg("reference_temperature_k") = NoxProxy{}.reference_temperature_k,
-        R"(Fit a NOx proxy to a sweep by least squares on ln NOx.
-
-Parameters
-----------
-t_max_k : array_like
-    Maximum bulk gas temperatures [K], at least five, at fixed oxygen, fuel and boost.
-nox_ppm : array_like
-    Measured NOx [ppm], of the same length.
-map : {"affine_log", "arrhenius"}
-    Form of the map.
-reference_temperature_k : float
-    T0 of the proxy [K]; it is chosen, not fitted.
-
-Returns
--------
-NoxFit
-    Proxy, residual and standard errors.
-
-Raises
-------
-mgdd.errors.DataError
-    Fewer than five points, values that are not positive, equal temperatures, NOx that does not rise.
-mgdd.errors.ShapeError
-    Columns of unequal length.
-
-Examples
---------
->>> from mgdd.engine import NoxProxy, fit_nox_proxy
->>> t = [1834.0, 1881.0, 1959.0, 2026.0, 2126.0]
->>> fit = fit_nox_proxy(t, NoxProxy().arrhenius_ppm(t), map="arrhenius")
->>> round(fit.proxy.activation_temperature_k)
-16000
-)");
+  m.def("fit_nox_proxy", &fit, arg("t_max_k"), arg("nox_ppm"), arg("map"), arg("reference_temperature_k"),
+        "Least squares on ln NOx; use mgdd.engine.fit_nox_proxy.");
 }
 
 }  // namespace mgdd::bindings

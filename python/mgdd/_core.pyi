@@ -1,12 +1,12 @@
 """
-The C++ core of mgdd. Use it through mgdd.engine, mgdd.identify and mgdd.optimize.
+The C++ core of mgdd. Use it through mgdd.engine, mgdd.identify, mgdd.optimize and mgdd.loop.
 """
 from __future__ import annotations
 import collections.abc
 import numpy
 import numpy.typing
 import typing
-__all__: list[str] = ['ConvergenceError', 'Cylinder', 'CylinderFit', 'DataError', 'Error', 'FitReport', 'LeastSquaresOptions', 'LoadBurn', 'LoadFit', 'MeasuredCycle', 'NoxProxy', 'OperatingPoint', 'Parameter', 'ParameterError', 'ShapeError', 'TraceOptions', 'analyze_trace', 'burn_duration_cad', 'burned_fraction', 'check_trace', 'common_parameters', 'compiled_simd_level', 'compiler', 'convergence', 'correlation_limit', 'differentiable_inputs', 'estimate_burn', 'fit_cylinder', 'hardenberg_hase_delay_cad', 'hohenberg_coefficient', 'indicator_units', 'input_unit', 'least_squares', 'load_parameters', 'processor_simd_levels', 'scan', 'sensitivities', 'simulate', 'start_of_combustion', 'start_of_injection', 'timing_window_cad', 'volume_l', 'wall_area_m2', 'wall_heat_scale_upper', 'watson_delay_ms', 'with_burn', 'wolfer_delay_ms', 'woschni_c1_bar_m', 'woschni_coefficient']
+__all__: list[str] = ['ConvergenceError', 'Cylinder', 'CylinderFit', 'DataError', 'EngineBench', 'Error', 'FitReport', 'LeastSquaresOptions', 'LoadBurn', 'LoadFit', 'MeasuredCycle', 'NoxFit', 'NoxModel', 'NoxProxy', 'OperatingPoint', 'Parameter', 'ParameterError', 'Performance', 'PerformanceTerm', 'RigError', 'SensorDynamics', 'ShapeError', 'SoftSensor', 'TraceOptions', 'analyze_trace', 'burn_duration_cad', 'burned_fraction', 'check_trace', 'common_parameters', 'compiled_simd_level', 'compiler', 'convergence', 'correlation_limit', 'differentiable_inputs', 'estimate_burn', 'fit_cylinder', 'fit_nox_proxy', 'hardenberg_hase_delay_cad', 'hohenberg_coefficient', 'indicator_units', 'input_unit', 'least_squares', 'load_parameters', 'processor_simd_levels', 'scan', 'sensitivities', 'simulate', 'start_of_combustion', 'start_of_injection', 'timing_window_cad', 'volume_l', 'wall_area_m2', 'wall_heat_scale_upper', 'watson_delay_ms', 'with_burn', 'wolfer_delay_ms', 'woschni_c1_bar_m', 'woschni_coefficient']
 class Error(Exception):
     """
     Base of everything mgdd raises.
@@ -26,6 +26,10 @@ class DataError(Error, ValueError):
 class ConvergenceError(Error, RuntimeError):
     """
     A numerical method that did not reach its tolerance.
+    """
+class RigError(Error, OSError):
+    """
+    A test rig that cannot do what was asked.
     """
 class Parameter:
     """
@@ -576,7 +580,17 @@ class NoxProxy:
     >>> float(NoxProxy().arrhenius_ppm(1900.0))
     1200.0
     """
+    def __eq__(self, arg0: typing.Any) -> bool:
+        ...
+    def __getstate__(self) -> tuple[int, dict]:
+        ...
+    def __hash__(self) -> int:
+        ...
     def __init__(self, *, reference_temperature_k: typing.SupportsFloat | typing.SupportsIndex = 1900.0, reference_nox_ppm: typing.SupportsFloat | typing.SupportsIndex = 1200.0, activation_temperature_k: typing.SupportsFloat | typing.SupportsIndex = 16000.0) -> None:
+        ...
+    def __repr__(self) -> str:
+        ...
+    def __setstate__(self, arg0: tuple) -> None:
         ...
     def affine_log_ppm(self, t_max_k: typing.Annotated[numpy.typing.ArrayLike, numpy.float64]) -> typing.Any:
         """
@@ -585,6 +599,10 @@ class NoxProxy:
     def arrhenius_ppm(self, t_max_k: typing.Annotated[numpy.typing.ArrayLike, numpy.float64]) -> typing.Any:
         """
         NOx [ppm] by the Arrhenius map.
+        """
+    def to_dict(self) -> dict:
+        """
+        Constructor keywords as a new dict.
         """
     @property
     def activation_temperature_k(self) -> float:
@@ -600,6 +618,331 @@ class NoxProxy:
     def reference_temperature_k(self) -> float:
         """
         T0 [K].
+        """
+class NoxModel:
+    """
+    NOx of one cycle from its maximum bulk gas temperature and the intake oxygen.
+    
+    NOx = map(T_max) (x_O2 / 0.209)^n: a `NoxProxy` with the map that is used.
+    
+    Parameters
+    ----------
+    proxy : NoxProxy
+        Constants of the map.
+    map : {"affine_log", "arrhenius"}
+        Form of the map.
+    intake_o2_fraction : float
+        Oxygen in the intake by volume [-]; 0.209 is air without exhaust gas recirculation.
+    o2_exponent : float
+        n [-], 2 to 4, to be fitted.
+    
+    Raises
+    ------
+    mgdd.errors.ParameterError
+        An unknown map, or a value outside its domain.
+    
+    Examples
+    --------
+    >>> from mgdd.engine import NoxModel
+    >>> float(NoxModel(intake_o2_fraction=0.1045).ppm(1900.0))
+    150.0
+    """
+    def __eq__(self, arg0: typing.Any) -> bool:
+        ...
+    def __getstate__(self) -> tuple[int, dict]:
+        ...
+    def __hash__(self) -> int:
+        ...
+    def __init__(self, *, proxy: NoxProxy | None = None, map: str = 'affine_log', intake_o2_fraction: typing.SupportsFloat | typing.SupportsIndex = 0.209, o2_exponent: typing.SupportsFloat | typing.SupportsIndex = 3.0) -> None:
+        ...
+    def __repr__(self) -> str:
+        ...
+    def __setstate__(self, arg0: tuple) -> None:
+        ...
+    def ppm(self, t_max_k: typing.Annotated[numpy.typing.ArrayLike, numpy.float64]) -> typing.Any:
+        """
+        NOx [ppm].
+        """
+    def to_dict(self) -> dict:
+        """
+        Constructor keywords as a new dict.
+        """
+    @property
+    def intake_o2_fraction(self) -> float:
+        """
+        Intake oxygen by volume [-].
+        """
+    @property
+    def map(self) -> str:
+        """
+        Name of the map.
+        """
+    @property
+    def o2_exponent(self) -> float:
+        """
+        n [-].
+        """
+    @property
+    def proxy(self) -> NoxProxy:
+        """
+        Constants of the map.
+        """
+class SoftSensor:
+    """
+    Soft NOx sensor: the value of each cycle at once, its level held to a slow analyser.
+    
+    ``b += c (ln(analyser / delayed) - b)`` once per cycle, where ``delayed`` is the uncorrected soft value after the
+    analyser's own delay and lag: b approaches the log-ratio of the two at the rate c, however late the analyser is.
+    
+    Parameters
+    ----------
+    model : NoxModel
+        NOx from the maximum bulk gas temperature.
+    correction_gain : float
+        c per cycle [-], in [0, 1]; 0 never corrects.
+    
+    Raises
+    ------
+    mgdd.errors.ParameterError
+        A value outside its domain.
+    
+    Examples
+    --------
+    >>> from mgdd.engine import SoftSensor
+    >>> sensor = SoftSensor(correction_gain=0.5)
+    >>> bias = sensor.next_bias(0.0, analyser_ppm=1320.0, delayed_soft_ppm=1200.0)
+    >>> round(float(sensor.ppm(1900.0, ln_bias=bias)), 1)
+    1258.6
+    """
+    def __eq__(self, arg0: typing.Any) -> bool:
+        ...
+    def __getstate__(self) -> tuple[int, dict]:
+        ...
+    def __hash__(self) -> int:
+        ...
+    def __init__(self, *, model: NoxModel | None = None, correction_gain: typing.SupportsFloat | typing.SupportsIndex = 0.01) -> None:
+        ...
+    def __repr__(self) -> str:
+        ...
+    def __setstate__(self, arg0: tuple) -> None:
+        ...
+    def next_bias(self, ln_bias: typing.SupportsFloat | typing.SupportsIndex, *, analyser_ppm: typing.SupportsFloat | typing.SupportsIndex, delayed_soft_ppm: typing.SupportsFloat | typing.SupportsIndex) -> float:
+        """
+        The log-bias after one reading; values that are not positive leave it alone.
+        """
+    def ppm(self, t_max_k: typing.Annotated[numpy.typing.ArrayLike, numpy.float64], *, ln_bias: typing.SupportsFloat | typing.SupportsIndex = 0.0) -> typing.Any:
+        """
+        NOx [ppm] at the log-bias b.
+        """
+    def to_dict(self) -> dict:
+        """
+        Constructor keywords as a new dict.
+        """
+    @property
+    def correction_gain(self) -> float:
+        """
+        c per cycle [-].
+        """
+    @property
+    def model(self) -> NoxModel:
+        """
+        NOx from T_max.
+        """
+class NoxFit:
+    """
+    A NOx proxy fitted to a sweep, with its spread: what `fit_nox_proxy` returns.
+    
+    Attributes
+    ----------
+    proxy : NoxProxy
+        The fitted constants.
+    map : str
+        Name of the map.
+    points : int
+        Number of points.
+    residual_ln : float
+        Standard deviation of ln NOx about the fit [-].
+    reference_nox_stderr_ppm : float
+        Standard error of NOx0 [ppm], delta method.
+    activation_temperature_stderr_k : float
+        Standard error of b [K].
+    
+    Examples
+    --------
+    >>> from mgdd.engine import NoxProxy, fit_nox_proxy
+    >>> t = [1800.0, 1850.0, 1900.0, 1950.0, 2000.0]
+    >>> fit_nox_proxy(t, NoxProxy().affine_log_ppm(t)).points
+    5
+    """
+    def __repr__(self) -> str:
+        ...
+    @property
+    def activation_temperature_stderr_k(self) -> float:
+        """
+        Standard error of b [K].
+        """
+    @property
+    def map(self) -> str:
+        """
+        Name of the map.
+        """
+    @property
+    def points(self) -> int:
+        """
+        Number of points.
+        """
+    @property
+    def proxy(self) -> NoxProxy:
+        """
+        The fitted constants.
+        """
+    @property
+    def reference_nox_stderr_ppm(self) -> float:
+        """
+        Standard error of NOx0 [ppm].
+        """
+    @property
+    def residual_ln(self) -> float:
+        """
+        Standard deviation of ln NOx about the fit [-].
+        """
+class PerformanceTerm:
+    """
+    One term of the performance J of a cycle.
+    
+    Its value is ``weight * x / reference``; with a limit, ``weight * max(0, (x - above) / above) ** 2``. J is maximised,
+    so a penalty has a negative weight.
+    
+    Parameters
+    ----------
+    signal : str
+        ``efficiency_percent``, ``imep_gross_bar``, ``imep_closed_bar``, ``nox_ppm``, ``p_max_bar``,
+        ``dp_max_bar_per_cad`` or ``t_max_k``.
+    weight : float
+        Unit of J per unit of x / reference.
+    reference : float
+        > 0, in the unit of the signal; not used by a hinge.
+    above : float, optional
+        Limit > 0 of a hinge, in the unit of the signal.
+    
+    Raises
+    ------
+    mgdd.errors.ParameterError
+        An unknown signal or a value outside its domain.
+    
+    Examples
+    --------
+    >>> from mgdd.engine import PerformanceTerm
+    >>> PerformanceTerm("dp_max_bar_per_cad", -2.0, above=10.0).value(15.0)
+    -0.5
+    """
+    def __eq__(self, arg0: typing.Any) -> bool:
+        ...
+    def __getstate__(self) -> tuple[int, dict]:
+        ...
+    def __hash__(self) -> int:
+        ...
+    def __init__(self, signal: str, weight: typing.SupportsFloat | typing.SupportsIndex = 1.0, *, reference: typing.SupportsFloat | typing.SupportsIndex = 1.0, above: typing.SupportsFloat | typing.SupportsIndex | None = None) -> None:
+        ...
+    def __repr__(self) -> str:
+        ...
+    def __setstate__(self, arg0: tuple) -> None:
+        ...
+    def to_dict(self) -> dict:
+        """
+        Constructor keywords as a new dict.
+        """
+    def value(self, x: typing.SupportsFloat | typing.SupportsIndex) -> float:
+        """
+        Value of the term at the signal x.
+        """
+    @property
+    def above(self) -> float | None:
+        """
+        Limit of a hinge, or None.
+        """
+    @property
+    def reference(self) -> float:
+        """
+        In the unit of the signal.
+        """
+    @property
+    def signal(self) -> str:
+        """
+        Name of the signal.
+        """
+    @property
+    def weight(self) -> float:
+        """
+        Unit of J per unit of x / reference.
+        """
+class Performance:
+    """
+    The performance J of a cycle, to be maximised: a sum of one to eight terms.
+    
+    Parameters
+    ----------
+    terms : sequence of PerformanceTerm, optional
+        Efficiency in percent if left out.
+    
+    Raises
+    ------
+    mgdd.errors.ParameterError
+        No term, or more than eight.
+    
+    References
+    ----------
+    Tan (2018), section 5.3.
+    
+    Examples
+    --------
+    >>> from mgdd.engine import Performance
+    >>> j = Performance.efficiency_and_nox(0.004)
+    >>> j.components({"efficiency_percent": 56.0, "nox_ppm": 1500.0})
+    array([56., -6.])
+    >>> j.value({"efficiency_percent": 56.0, "nox_ppm": 1500.0})
+    50.0
+    """
+    @staticmethod
+    def efficiency_and_nox(nox_weight_percent_per_ppm: typing.SupportsFloat | typing.SupportsIndex = 0.004) -> Performance:
+        """
+        J = efficiency in percent - weight * NOx; the weight in %/ppm.
+        """
+    @staticmethod
+    def efficiency_only() -> Performance:
+        """
+        J = gross indicated efficiency in percent.
+        """
+    def __eq__(self, arg0: typing.Any) -> bool:
+        ...
+    def __getstate__(self) -> tuple[int, dict]:
+        ...
+    def __hash__(self) -> int:
+        ...
+    def __init__(self, terms: collections.abc.Sequence[PerformanceTerm] | None = None) -> None:
+        ...
+    def __len__(self) -> int:
+        ...
+    def __repr__(self) -> str:
+        ...
+    def __setstate__(self, arg0: tuple) -> None:
+        ...
+    def components(self, signals: dict) -> numpy.typing.NDArray[numpy.float64]:
+        """
+        Value of each term, from a dict of signals by name.
+        """
+    def to_dict(self) -> dict:
+        """
+        Constructor keywords as a new dict.
+        """
+    def value(self, signals: dict) -> float:
+        """
+        J, from a dict of signals by name.
+        """
+    @property
+    def terms(self) -> tuple:
+        """
+        The terms, in order.
         """
 class TraceOptions:
     def __init__(self, *, pegging: str = 'none', pegging_exponent: typing.SupportsFloat | typing.SupportsIndex = 1.35, inlet_pressure_kpa: typing.SupportsFloat | typing.SupportsIndex = 0.0, gamma_source: str = 'constant', gamma: typing.SupportsFloat | typing.SupportsIndex = 1.33, gamma_compression: typing.SupportsFloat | typing.SupportsIndex = 1.37, gamma_combustion: typing.SupportsFloat | typing.SupportsIndex = 1.3, heat_from_cad: typing.SupportsFloat | typing.SupportsIndex = -10.0, heat_to_cad: typing.SupportsFloat | typing.SupportsIndex = 90.0, burn_from_cad: typing.SupportsFloat | typing.SupportsIndex = -10.0, total_at_end: bool = False, fractions_of_gross: bool = False) -> None:
@@ -708,6 +1051,154 @@ class CylinderFit:
     @property
     def report(self) -> FitReport:
         ...
+class SensorDynamics:
+    """
+    Transport delay, first-order lag and noise of a gas sensor.
+    
+    Parameters
+    ----------
+    delay_s : float
+        Transport delay of the sample line [s], in [0, 60].
+    lag_s : float
+        Time constant [s], in [0, 60]; t10-90 is 2.2 times it.
+    noise_fraction : float
+        Standard deviation of a reading over the reading [-], in [0, 0.2].
+    delay_cycles : int, optional
+        Delay in engine cycles instead; it does not follow the speed.
+    lag_cycles : float, optional
+        Time constant in engine cycles instead.
+    
+    Raises
+    ------
+    mgdd.errors.ParameterError
+        A value outside its domain.
+    
+    Examples
+    --------
+    >>> from mgdd.loop import SensorDynamics
+    >>> SensorDynamics(delay_s=3.0, lag_s=2.0).delay_at(1500.0)
+    38
+    """
+    def __eq__(self, arg0: typing.Any) -> bool:
+        ...
+    def __getstate__(self) -> tuple[int, dict]:
+        ...
+    def __hash__(self) -> int:
+        ...
+    def __init__(self, *, delay_s: typing.SupportsFloat | typing.SupportsIndex = 0.0, lag_s: typing.SupportsFloat | typing.SupportsIndex = 0.0, noise_fraction: typing.SupportsFloat | typing.SupportsIndex = 0.0, delay_cycles: typing.SupportsInt | typing.SupportsIndex | None = None, lag_cycles: typing.SupportsFloat | typing.SupportsIndex | None = None) -> None:
+        ...
+    def __repr__(self) -> str:
+        ...
+    def __setstate__(self, arg0: tuple) -> None:
+        ...
+    def delay_at(self, speed_rpm: typing.SupportsFloat | typing.SupportsIndex) -> int:
+        """
+        Delay in whole cycles at a speed.
+        """
+    def gain_at(self, speed_rpm: typing.SupportsFloat | typing.SupportsIndex) -> float:
+        """
+        Gain of the lag filter per cycle [-].
+        """
+    def to_dict(self) -> dict:
+        """
+        Constructor keywords as a new dict.
+        """
+    @property
+    def delay_cycles(self) -> int | None:
+        """
+        Delay in cycles, or None.
+        """
+    @property
+    def delay_s(self) -> float:
+        """
+        Transport delay [s].
+        """
+    @property
+    def lag_cycles(self) -> float | None:
+        """
+        Time constant in cycles, or None.
+        """
+    @property
+    def lag_s(self) -> float:
+        """
+        Time constant [s].
+        """
+    @property
+    def noise_fraction(self) -> float:
+        """
+        Relative noise [-].
+        """
+class EngineBench:
+    """
+    The virtual engine bench; use mgdd.loop.EngineBench.
+    """
+    def __getstate__(self) -> tuple[int, dict, dict[str, list[float]]]:
+        ...
+    def __init__(self, *, cylinder: Cylinder, schedule: collections.abc.Sequence[tuple[typing.SupportsInt | typing.SupportsIndex, OperatingPoint]], performance: Performance | None = None, nox_sensor: str = 'soft', limits: collections.abc.Sequence[str] = [], soc_scatter_cad: typing.SupportsFloat | typing.SupportsIndex = 0.3, efficiency_noise_percent: typing.SupportsFloat | typing.SupportsIndex = 0.25, misfire_probability: typing.SupportsFloat | typing.SupportsIndex = 0.0, soc_drift_cad_per_kcycle: typing.SupportsFloat | typing.SupportsIndex = 0.0, wall_heat_drift_per_kcycle: typing.SupportsFloat | typing.SupportsIndex = 0.0, true_nox: NoxModel | None = None, soft_sensor: SoftSensor | None = None, analyser: SensorDynamics | None = None, fast_sensor: SensorDynamics | None = None, delay_whole_objective: bool = False, step_cad: typing.SupportsFloat | typing.SupportsIndex = 1.0, integrator: str = 'trapezoid', seed: typing.SupportsInt | typing.SupportsIndex = 0) -> None:
+        ...
+    def __repr__(self) -> str:
+        ...
+    def __setstate__(self, arg0: tuple) -> None:
+        ...
+    def point_at(self, cycle: typing.SupportsInt | typing.SupportsIndex) -> OperatingPoint:
+        """
+        Operating point of a cycle.
+        """
+    def reset(self, seed: typing.SupportsInt | typing.SupportsIndex | None = None) -> None:
+        """
+        Back to cycle 0, with another seed if given.
+        """
+    def restore(self, state: collections.abc.Mapping[str, collections.abc.Sequence[typing.SupportsFloat | typing.SupportsIndex]]) -> None:
+        """
+        Continue bit for bit from what `save` gave.
+        """
+    def run_columns(self, soc_cad: typing.Annotated[numpy.typing.ArrayLike, numpy.float64]) -> dict:
+        """
+        Run one cycle per request, without the GIL: columns by name.
+        """
+    def save(self) -> dict:
+        """
+        State of the run between two cycles: named columns.
+        """
+    def step(self, soc_cad: typing.SupportsFloat | typing.SupportsIndex) -> dict:
+        """
+        Run one cycle: what was measured, by name.
+        """
+    @property
+    def analyser_delay_cycles(self) -> int:
+        """
+        Delay of the analyser at the next cycle.
+        """
+    @property
+    def analyser_gain(self) -> float:
+        """
+        Gain of the analyser's lag filter at the next cycle [-].
+        """
+    @property
+    def cycle(self) -> int:
+        """
+        Index of the next cycle.
+        """
+    @property
+    def point(self) -> OperatingPoint:
+        """
+        Operating point of the next cycle.
+        """
+    @property
+    def seed(self) -> int:
+        """
+        Seed of the run.
+        """
+    @property
+    def settings(self) -> dict:
+        """
+        Constructor keywords as a new dict.
+        """
+    @property
+    def window_cad(self) -> typing.Annotated[list[float], "FixedSize(2)"]:
+        """
+        Earliest and latest SOC that is not clamped.
+        """
 def analyze_trace(crank_angle_cad: typing.Annotated[numpy.typing.ArrayLike, numpy.float64], pressure_bar: typing.Annotated[numpy.typing.ArrayLike, numpy.float64], cylinder: Cylinder, point: OperatingPoint, options: TraceOptions) -> dict:
     """
     Pegging, heat release, burn angles, work.
@@ -751,6 +1242,10 @@ def estimate_burn(trace: MeasuredCycle, cylinder: Cylinder) -> LoadBurn:
 def fit_cylinder(traces: collections.abc.Sequence[MeasuredCycle], cylinder: Cylinder, start: collections.abc.Sequence[LoadBurn], free: collections.abc.Sequence[str], step_cad: typing.SupportsFloat | typing.SupportsIndex, integrator: str, max_iterations: typing.SupportsInt | typing.SupportsIndex) -> CylinderFit:
     """
     Levenberg-Marquardt with exact sensitivities; releases the GIL.
+    """
+def fit_nox_proxy(t_max_k: typing.Annotated[numpy.typing.ArrayLike, numpy.float64], nox_ppm: typing.Annotated[numpy.typing.ArrayLike, numpy.float64], map: str, reference_temperature_k: typing.SupportsFloat | typing.SupportsIndex) -> NoxFit:
+    """
+    Least squares on ln NOx; use mgdd.engine.fit_nox_proxy.
     """
 def hardenberg_hase_delay_cad(pressure_bar: typing.Annotated[numpy.typing.ArrayLike, numpy.float64], temperature_k: typing.Annotated[numpy.typing.ArrayLike, numpy.float64], cetane_number: typing.Annotated[numpy.typing.ArrayLike, numpy.float64], piston_speed_m_per_s: typing.Annotated[numpy.typing.ArrayLike, numpy.float64]) -> typing.Any:
     ...

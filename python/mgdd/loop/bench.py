@@ -1,0 +1,201 @@
+"""The virtual engine bench: SOC in, what a bench would measure of that cycle out."""
+
+from __future__ import annotations
+
+from collections import Counter
+from collections.abc import Iterable, Sequence
+from typing import TYPE_CHECKING, Any
+
+from mgdd import _core, presets
+from mgdd._core import Cylinder, NoxModel, OperatingPoint, Performance, SensorDynamics, SoftSensor
+from mgdd.errors import ParameterError
+from mgdd.presets import Preset
+from mgdd.results import VARIABLES, labelled_dataset
+
+if TYPE_CHECKING:
+    import xarray as xr
+    from numpy.typing import ArrayLike
+
+__all__ = ["EngineBench"]
+
+_FLAGS = {
+    "misfire": "nothing burned",
+    "clamped": "request outside the timing window",
+    "unphysical": "no such cycle exists",
+    "operating_point_changed": "speed or fuel moved by more than 5 %",
+}
+_COV = "cov_imep_percent"
+
+
+class EngineBench(_core.EngineBench):
+    """A virtual engine bench: the cycle model with chance, drift and the sensors of a real one.
+
+    The plant scatters, misfires and drifts as asked, and runs through a schedule of operating points. Its sensors are
+    a NOx analyser (late and slow), a fast NOx sensor and a soft sensor that maps the maximum gas temperature. All
+    chance is a function of seed and cycle: the same seed gives the same run, however it is cut. A bench can be
+    pickled and copied at any cycle; one bench must not be stepped from two threads at once.
+
+    Parameters
+    ----------
+    engine : str, Preset or Cylinder
+        A preset, its name, or a cylinder of your own.
+    point : OperatingPoint, optional
+        Operating point; that of the preset if left out. It must carry fuel.
+    schedule : sequence of (int, OperatingPoint), optional
+        First cycle of each operating point, the first being 0, instead of ``point``.
+    performance : Performance, optional
+        What is to be maximised; gross efficiency in percent if left out.
+    nox_sensor : {"soft", "soft_corrected", "analyser", "fast", "true_value", "none"}
+        Which NOx value enters the performance.
+    limits : sequence of str
+        Up to eight indicators to report as limits, or ``"cov_imep_percent"`` (of the last 50 cycles; 0 at the first).
+    soc_scatter_cad : float
+        Standard deviation of SOC from cycle to cycle [°CA].
+    efficiency_noise_percent : float
+        Standard deviation of the measured efficiency [points], with the work and IMEP that belong to it.
+    misfire_probability : float
+        Of each cycle [-].
+    soc_drift_cad_per_kcycle, wall_heat_drift_per_kcycle : float
+        Offset of SOC [°CA] and of the wall-heat scale [-] per 1000 cycles.
+    true_nox : NoxModel, optional
+        NOx of the plant from its own maximum gas temperature; an Arrhenius map if left out.
+    soft_sensor : SoftSensor, optional
+        The soft sensor; an affine-log map with the same constants if left out.
+    analyser, fast_sensor : SensorDynamics, optional
+        Delay, lag and noise: 3 s, 2 s, 1 % and 0.05 s, 0.05 s, 3 % if left out.
+    delay_whole_objective : bool
+        Every component passes the analyser's delay and lag, without its noise; NOx then is the true one.
+    step_cad, integrator
+        As in `mgdd.engine.simulate`.
+    seed : int
+        Of all chance, in [0, 2**64).
+
+    Raises
+    ------
+    mgdd.errors.ParameterError
+        A setting outside its domain; the message names field, value and bound.
+    mgdd.errors.ConvergenceError
+        A scheduled point without a physical cycle.
+
+    Examples
+    --------
+    >>> from mgdd.engine import Performance
+    >>> from mgdd.loop import EngineBench
+    >>> bench = EngineBench(performance=Performance.efficiency_and_nox(), nox_sensor="analyser", seed=1)
+    >>> cycle = bench.step(-6.0)
+    >>> len(cycle["components"]), cycle["misfire"]
+    (2, False)
+    """
+
+    def __init__(
+        self,
+        engine: str | Preset | Cylinder = "puma_single",
+        point: OperatingPoint | None = None,
+        *,
+        schedule: Iterable[tuple[int, OperatingPoint]] | None = None,
+        performance: Performance | None = None,
+        nox_sensor: str = "soft",
+        limits: Sequence[str] = (),
+        soc_scatter_cad: float = 0.3,
+        efficiency_noise_percent: float = 0.25,
+        misfire_probability: float = 0.0,
+        soc_drift_cad_per_kcycle: float = 0.0,
+        wall_heat_drift_per_kcycle: float = 0.0,
+        true_nox: NoxModel | None = None,
+        soft_sensor: SoftSensor | None = None,
+        analyser: SensorDynamics | None = None,
+        fast_sensor: SensorDynamics | None = None,
+        delay_whole_objective: bool = False,
+        step_cad: float = 1.0,
+        integrator: str = "trapezoid",
+        seed: int = 0,
+    ) -> None:
+        if schedule is not None and point is not None:
+            raise ParameterError("point and schedule were both given: name the operating points in one of them")
+        if isinstance(limits, str):
+            raise ParameterError(f"limits = {limits!r}: must be a sequence of names")
+        if not 0 <= seed < 2**64:
+            raise ParameterError(f"seed = {seed}: must be in [0, 2**64)")
+        if isinstance(engine, str):
+            engine = presets.load(engine)
+        if isinstance(engine, Preset):
+            cylinder, nominal = engine.cylinder, engine.point
+        else:
+            cylinder, nominal = engine, OperatingPoint()
+        super().__init__(
+            cylinder=cylinder,
+            schedule=[(0, point or nominal)] if schedule is None else list(schedule),
+            performance=performance,
+            nox_sensor=nox_sensor,
+            limits=list(limits),
+            soc_scatter_cad=soc_scatter_cad,
+            efficiency_noise_percent=efficiency_noise_percent,
+            misfire_probability=misfire_probability,
+            soc_drift_cad_per_kcycle=soc_drift_cad_per_kcycle,
+            wall_heat_drift_per_kcycle=wall_heat_drift_per_kcycle,
+            true_nox=true_nox,
+            soft_sensor=soft_sensor,
+            analyser=analyser,
+            fast_sensor=fast_sensor,
+            delay_whole_objective=delay_whole_objective,
+            step_cad=step_cad,
+            integrator=integrator,
+            seed=seed,
+        )
+
+    def run(self, soc_cad: ArrayLike) -> xr.Dataset:
+        """Run one cycle per requested start of combustion, without the GIL.
+
+        Parameters
+        ----------
+        soc_cad : array_like
+            Requests [°CA aTDC], one-dimensional; clamped to `window_cad` and flagged, NaN repeats the last one.
+
+        Returns
+        -------
+        xarray.Dataset
+            Over ``cycle``: requested and actual SOC, the indicators as measured, NOx by every sensor, the flags,
+            ``components`` over ``component`` and their sum ``j``, and ``limits`` over ``limit`` where limits were
+            named.
+
+        Raises
+        ------
+        mgdd.errors.ShapeError
+            Requests that are no column.
+
+        Examples
+        --------
+        >>> from mgdd.loop import EngineBench
+        >>> bench = EngineBench(soc_scatter_cad=0.0, efficiency_noise_percent=0.0)
+        >>> bench.run([-6.0, -5.0])["p_max_bar"].values.round(1)
+        array([107.2, 103. ])
+        """
+        columns = self.run_columns(soc_cad)
+        settings = self.settings
+        terms = _unique([term.signal for term in settings["performance"].terms])
+        variables: dict[str, tuple[Any, ...]] = {"cycle": ("cycle", columns.pop("cycle"))}
+        components, limits = columns.pop("components"), columns.pop("limits")
+        for name, values in columns.items():
+            label = (("-", _FLAGS[name]) if name in _FLAGS else ()) if name not in VARIABLES else ()
+            variables[name] = ("cycle", values, *label)
+        variables["component"] = ("component", terms, "-", "term of the performance")
+        variables["components"] = (("cycle", "component"), components, "unit of J", "component of the performance")
+        names = settings["limits"]
+        if names:
+            units = {**{name: label.units for name, label in VARIABLES.items()}, _COV: "%"}
+            own = "unit of the limit"
+            variables["limit"] = ("limit", names, "-", "limited quantity")
+            variables["limit_units"] = ("limit", [units[name] for name in names], "-", own)
+            variables["limits"] = (("cycle", "limit"), limits, own, "measured value of a limited quantity")
+        out = labelled_dataset(variables, attrs={"seed": self.seed, "nox_sensor": settings["nox_sensor"]})
+        return out.set_coords("limit_units") if names else out
+
+
+def _unique(names: Sequence[str]) -> list[str]:
+    """Add a number to the names that occur more than once."""
+    total, seen = Counter(names), Counter[str]()
+    out = []
+    for name in names:
+        seen[name] += 1
+        out.append(name if total[name] == 1 else f"{name}_{seen[name]}")
+    return out

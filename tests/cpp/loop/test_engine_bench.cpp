@@ -1,0 +1,297 @@
+// Laws of the virtual bench: it is the cycle model, its sensors are their closed forms, its chance has its statistics.
+#include "mgdd/loop/engine_bench.hpp"
+
+#include <algorithm>
+#include <cmath>
+#include <limits>
+#include <string>
+#include <vector>
+
+#include <gtest/gtest.h>
+
+#include "support/bench_case.hpp"
+#include "support/engine_case.hpp"
+
+namespace mgdd::loop {
+namespace {
+
+using test_support::quiet_bench;
+
+engine::Indicators<double> cycle_of(const engine::Cylinder& cylinder, const engine::OperatingPoint& point, double soc) {
+  const engine::CycleModel<double> model(cylinder, engine::crank_grid(cylinder));
+  engine::CycleWorkspace<double> work = model.make_workspace();
+  const engine::Charge<double> charge = model.charge(point);
+  model.run(charge, soc, work);
+  return model.indicators(charge, soc, work);
+}
+
+TEST(EngineBench, WithoutChanceItIsTheCycleModel) {
+  EngineBench bench(quiet_bench());
+  for (const double soc : {-20.0, -6.0, 3.5}) {
+    const BenchCycle c = bench.step(soc);
+    const auto expected = cycle_of({}, {}, soc);
+    for (const auto& field : engine::indicator_fields<double>())
+      EXPECT_EQ(c.indicators.*(field.member), expected.*(field.member)) << field.name;
+    EXPECT_EQ(c.soc_cad, soc);
+    EXPECT_DOUBLE_EQ(c.j, 100.0 * expected.efficiency_gross - 0.004 * c.nox_true_ppm);
+    EXPECT_EQ(c.j, c.components[0] + c.components[1]);
+  }
+  EXPECT_EQ(bench.cycle(), 3);
+}
+
+TEST(EngineBench, TrueNoxOfTheDefaultEngine) {
+  EngineBench bench(quiet_bench());
+  const double soc[] = {-20.0, -10.0, -5.0, 0.0, 5.0}, nox[] = {4257.0, 2026.0, 1451.0, 1100.0, 887.0};
+  for (int i = 0; i < 5; ++i)
+    EXPECT_NEAR(bench.step(soc[i]).nox_true_ppm, nox[i], 0.005 * nox[i]);
+}
+
+TEST(EngineBench, TheOptimumMovesLaterWithTheWeightOfNox) {
+  const double weight[] = {0.0, 0.002, 0.004, 0.008, 0.016}, soc[] = {-5.63, -2.72, -0.65, 2.36, 6.49},
+               efficiency[] = {0.5619, 0.5598, 0.5559, 0.5473, 0.5307}, nox[] = {1509.0, 1269.0, 1137.0, 988.0, 843.0};
+  for (int i = 0; i < 5; ++i) {
+    EngineBench bench(quiet_bench(weight[i]));
+    double low = -15.0, high = 10.0;
+    while (high - low > 0.01) {
+      const double third = (high - low) / 3.0;
+      if (bench.step(low + third).j < bench.step(high - third).j) {
+        low += third;
+      } else {
+        high -= third;
+      }
+    }
+    const BenchCycle best = bench.step(0.5 * (low + high));
+    EXPECT_NEAR(best.soc_cad, soc[i], 0.15) << weight[i];
+    EXPECT_NEAR(best.indicators.efficiency_gross, efficiency[i], 2e-4) << weight[i];
+    EXPECT_NEAR(best.nox_true_ppm, nox[i], 0.01 * nox[i]) << weight[i];
+  }
+}
+
+TEST(EngineBench, SensorsStartSteadyAndAnswerAStepInClosedForm) {
+  EngineBench bench(quiet_bench());
+  const BenchCycle first = bench.step(-10.0);
+  EXPECT_EQ(first.nox_analyser_ppm, first.nox_true_ppm);
+  EXPECT_EQ(first.nox_fast_ppm, first.nox_true_ppm);
+  const double before = first.nox_true_ppm;
+  const double fast_tau = 0.05 * 1500.0 / 120.0;
+  for (int k = 1; k < 200; ++k) {
+    const BenchCycle c = bench.step(0.0);
+    const double rise = c.nox_true_ppm - before;
+    const double slow = k >= 39 ? before + rise * (1.0 - std::exp(-(k - 38.0) / 25.0)) : before;
+    const double fast = k >= 2 ? before + rise * (1.0 - std::exp(-(k - 1.0) / fast_tau)) : before;
+    ASSERT_NEAR(c.nox_analyser_ppm, slow, 1e-8) << k;
+    ASSERT_NEAR(c.nox_fast_ppm, fast, 1e-8) << k;
+  }
+  EXPECT_EQ(bench.analyser_delay_cycles(), 38u);
+  EXPECT_DOUBLE_EQ(bench.analyser_gain(), -std::expm1(-1.0 / 25.0));
+}
+
+TEST(EngineBench, TheCorrectionFindsTheAnalyserAtItsRate) {
+  BenchSettings s = quiet_bench();
+  s.soft_sensor.model = s.true_nox;
+  s.soft_sensor.model.proxy.reference_nox_ppm *= 1.3;
+  EngineBench bench(s);
+  for (int k = 0; k < 400; ++k) {
+    const BenchCycle c = bench.step(-6.0);
+    ASSERT_NEAR(std::log(c.nox_soft_corrected_ppm / c.nox_soft_ppm), -std::log(1.3) * (1.0 - std::pow(0.99, k)), 1e-9);
+    ASSERT_NEAR(c.nox_soft_ppm / c.nox_true_ppm, 1.3, 1e-12);
+  }
+}
+
+TEST(EngineBench, ATrueProxyIsNotCorrectedEvenInTransients) {
+  BenchSettings s = quiet_bench();
+  s.soft_sensor.model = s.true_nox;
+  EngineBench bench(s);
+  for (int k = 0; k < 500; ++k) {
+    const BenchCycle c = bench.step(test_support::wandering_soc_cad(k));
+    ASSERT_NEAR(c.nox_soft_corrected_ppm, c.nox_true_ppm, 1e-9);
+  }
+}
+
+TEST(EngineBench, EachSensorReachesThePerformance) {
+  for (const NoxSensor sensor :
+       {NoxSensor::analyser, NoxSensor::fast, NoxSensor::soft, NoxSensor::soft_corrected, NoxSensor::true_value}) {
+    BenchSettings s = quiet_bench(1.0);
+    s.nox_sensor = sensor;
+    s.soft_sensor.correction_gain = 0.3;
+    EngineBench bench(s);
+    BenchCycle c;
+    for (int k = 0; k < 60; ++k)
+      c = bench.step(test_support::wandering_soc_cad(k));
+    const double values[] = {c.nox_analyser_ppm, c.nox_fast_ppm, c.nox_soft_ppm, c.nox_soft_corrected_ppm,
+                             c.nox_true_ppm};
+    EXPECT_EQ(std::count(std::begin(values), std::end(values), -c.components[1]), 1) << to_string(sensor);
+    EXPECT_EQ(-c.components[1], values[static_cast<int>(sensor) - 1]) << to_string(sensor);
+    EXPECT_EQ(parse_nox_sensor(to_string(sensor)), sensor);
+  }
+}
+
+TEST(EngineBench, TheWholeObjectiveCanPassTheAnalyser) {
+  BenchSettings s = quiet_bench();
+  const double before = EngineBench(s).step(-10.0).j, after = EngineBench(s).step(0.0).j;
+  s.delay_whole_objective = true;
+  s.analyser.delay_cycles = 7;
+  s.analyser.lag_cycles = 3.0;
+  EngineBench bench(s);
+  EXPECT_EQ(bench.step(-10.0).j, before);
+  for (int k = 1; k < 40; ++k) {
+    const double expected = k >= 8 ? after + (before - after) * std::exp(-(k - 7.0) / 3.0) : before;
+    ASSERT_NEAR(bench.step(0.0).j, expected, 1e-9) << k;
+  }
+}
+
+TEST(EngineBench, ScatterAndNoiseHaveTheirStatistics) {
+  constexpr int n = 4000;
+  BenchSettings s;
+  s.analyser.lag_s = s.analyser.delay_s = 0.0;
+  EngineBench bench(s);
+  double soc = 0.0, soc2 = 0.0, eta = 0.0, eta2 = 0.0, both = 0.0, reading2 = 0.0, fast2 = 0.0;
+  double fast_level = bench.step(-6.0).nox_true_ppm;
+  bench.reset(5);
+  const double gain = s.fast_sensor.gain_at(1500.0);
+  double last_true = 0.0;
+  for (int k = 0; k < n; ++k) {
+    const BenchCycle c = bench.step(-6.0);
+    const double e = 100.0 * (c.indicators.efficiency_gross - cycle_of({}, {}, c.soc_cad).efficiency_gross);
+    soc += (c.soc_cad + 6.0) / n;
+    soc2 += std::pow(c.soc_cad + 6.0, 2) / n;
+    eta += e / n;
+    eta2 += e * e / n;
+    both += e * (c.soc_cad + 6.0) / n;
+    reading2 += std::pow(c.nox_analyser_ppm / c.nox_true_ppm - 1.0, 2) / n;
+    if (k > 0) fast_level += gain * (last_true - fast_level);
+    if (k > 20) fast2 += std::pow(c.nox_fast_ppm / fast_level - 1.0, 2) / (n - 21);
+    last_true = c.nox_true_ppm;
+    ASSERT_NEAR(c.indicators.efficiency_gross, c.indicators.work_gross_j / 856.0, 1e-12);
+  }
+  const double four = 4.0 / std::sqrt(static_cast<double>(n));
+  EXPECT_NEAR(soc, 0.0, 0.3 * four);
+  EXPECT_NEAR(eta, 0.0, 0.25 * four);
+  EXPECT_NEAR(std::sqrt(soc2), 0.3, 0.3 * four);
+  EXPECT_NEAR(std::sqrt(eta2), 0.25, 0.25 * four);
+  EXPECT_NEAR(both, 0.0, 0.3 * 0.25 * four);
+  EXPECT_NEAR(std::sqrt(reading2), 0.01, 0.01 * four);
+  EXPECT_NEAR(std::sqrt(fast2), 0.03, 0.03 * four);
+}
+
+TEST(EngineBench, AMisfireBurnsNothing) {
+  constexpr int n = 4000;
+  BenchSettings s = quiet_bench();
+  s.misfire_probability = 0.1;
+  EngineBench bench(s);
+  engine::OperatingPoint motored;
+  motored.fuel_mg = 0.0;
+  const auto dead = cycle_of({}, motored, -6.0);
+  const auto fired = cycle_of({}, {}, -6.0);
+  int misfires = 0, pairs = 0;
+  bool last = false;
+  for (int k = 0; k < n; ++k) {
+    const BenchCycle c = bench.step(-6.0);
+    misfires += c.misfire;
+    pairs += c.misfire && last;
+    last = c.misfire;
+    EXPECT_EQ(c.indicators.imep_gross_bar, (c.misfire ? dead : fired).imep_gross_bar);
+    EXPECT_EQ(c.indicators.p_max_bar, (c.misfire ? dead : fired).p_max_bar);
+    if (!c.misfire) continue;
+    EXPECT_DOUBLE_EQ(c.indicators.efficiency_gross, dead.work_gross_j / 856.0);
+    EXPECT_LT(c.nox_true_ppm, 1.0);
+    EXPECT_TRUE(std::isfinite(c.j));
+  }
+  EXPECT_NEAR(misfires, 0.1 * n, 4.0 * std::sqrt(0.09 * n));
+  EXPECT_NEAR(pairs, 0.01 * n, 4.0 * std::sqrt(0.0099 * n));
+}
+
+TEST(EngineBench, DriftMovesTimingAndWallHeat) {
+  BenchSettings s = quiet_bench();
+  s.soc_drift_cad_per_kcycle = 2.0;
+  s.wall_heat_drift_per_kcycle = 0.4;
+  EngineBench bench(s);
+  BenchCycle c;
+  for (int k = 0; k <= 500; ++k)
+    c = bench.step(-6.0);
+  EXPECT_DOUBLE_EQ(c.soc_cad, -5.0);
+  engine::Cylinder worn;
+  worn.wall_heat_scale = 0.7;
+  EXPECT_DOUBLE_EQ(c.indicators.efficiency_gross, cycle_of(worn, {}, -5.0).efficiency_gross);
+  bench.reset(0);
+  EXPECT_EQ(bench.step(-6.0).indicators.efficiency_gross, cycle_of({}, {}, -6.0).efficiency_gross);
+}
+
+TEST(EngineBench, TheScheduleChangesThePointAndSaysSo) {
+  BenchSettings s = quiet_bench();
+  engine::OperatingPoint warm, fast, little;
+  warm.intake_temperature_k = 330.0;
+  fast.speed_rpm = 3000.0;
+  little.speed_rpm = 3000.0;
+  little.fuel_mg = 20.8;
+  s.schedule = {{0, {}}, {3, warm}, {5, fast}, {8, little}};
+  EngineBench bench(s);
+  for (std::int64_t k = 0; k < 12; ++k) {
+    const engine::OperatingPoint& expected = k < 3 ? engine::OperatingPoint{} : k < 5 ? warm : k < 8 ? fast : little;
+    EXPECT_EQ(bench.point(), expected);
+    EXPECT_EQ(bench.point_at(k), expected);
+    EXPECT_EQ(bench.analyser_delay_cycles(), k < 5 ? 38u : 75u);
+    const BenchCycle c = bench.step(-6.0);
+    EXPECT_EQ(c.indicators.imep_gross_bar, cycle_of({}, expected, -6.0).imep_gross_bar);
+    EXPECT_EQ(c.operating_point_changed, k == 5) << k;  // 4 % more fuel is no change
+  }
+}
+
+TEST(EngineBench, RequestsOutsideTheWindowAreClampedAndFlagged) {
+  EngineBench bench(quiet_bench());
+  EXPECT_EQ(bench.window_cad(), (std::array<double, 2>{-60.0, 20.0}));
+  EXPECT_EQ(bench.step(-61.0).soc_cad, -60.0);
+  EXPECT_FALSE(bench.step(-7.0).clamped);
+  const BenchCycle lost = bench.step(std::numeric_limits<double>::quiet_NaN());
+  EXPECT_EQ(lost.soc_cad, -7.0);
+  EXPECT_TRUE(lost.clamped);
+  const BenchCycle late = bench.step(std::numeric_limits<double>::infinity());
+  EXPECT_EQ(late.soc_cad, 20.0);
+  EXPECT_TRUE(late.clamped);
+  engine::Cylinder narrow;
+  narrow.ivc_cad = -40.0;
+  narrow.evo_cad = 15.0;
+  EXPECT_EQ(timing_window(narrow)[0], -40.0);
+  EXPECT_LT(timing_window(narrow)[1], 15.0);
+}
+
+TEST(EngineBench, LimitsAreTheMeasuredValues) {
+  BenchSettings s;
+  s.limits = {"p_max_bar", std::string(cov_imep_name), "dp_max_bar_per_cad", "t_max_k"};
+  EngineBench bench(s);
+  std::vector<double> imep;
+  for (int k = 0; k < 120; ++k) {
+    const BenchCycle c = bench.step(-6.0);
+    imep.push_back(c.indicators.imep_gross_bar);
+    ASSERT_EQ(c.limits().size(), 4u);
+    EXPECT_EQ(c.limits()[0], c.indicators.p_max_bar);
+    EXPECT_EQ(c.limits()[2], c.indicators.dp_max_bar_per_cad);
+    EXPECT_EQ(c.limits()[3], c.indicators.t_max_k);
+    const std::vector<double> window(imep.end() - std::min<std::ptrdiff_t>(50, std::ssize(imep)), imep.end());
+    double mean = 0.0, squares = 0.0;
+    for (const double x : window)
+      mean += x / static_cast<double>(window.size());
+    for (const double x : window)
+      squares += std::pow(x - mean, 2);
+    const double cov = k == 0 ? 0.0 : 100.0 * std::sqrt(squares / static_cast<double>(window.size() - 1)) / mean;
+    EXPECT_NEAR(c.limits()[1], cov, 1e-10) << k;
+  }
+}
+
+TEST(EngineBench, AnImpossibleCycleIsFlaggedAndRepeatsTheLastValue) {
+  BenchSettings s = quiet_bench();
+  s.schedule.front().point.speed_rpm = 50.0;
+  s.step_cad = 5.0;
+  s.wall_heat_drift_per_kcycle = 100.0;
+  EngineBench bench(s);
+  BenchCycle last = bench.step(-6.0), c = last;
+  while (!(c = bench.step(-6.0)).unphysical && c.cycle < 1000)
+    last = c;
+  ASSERT_TRUE(c.unphysical);
+  EXPECT_EQ(c.j, last.j);
+  EXPECT_EQ(c.nox_true_ppm, last.nox_true_ppm);
+  EXPECT_TRUE(std::isnan(c.indicators.imep_gross_bar));
+}
+
+}  // namespace
+}  // namespace mgdd::loop

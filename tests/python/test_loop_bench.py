@@ -1,0 +1,220 @@
+"""The virtual bench and the simulated rig from Python: labels, chunking, state, threads, errors."""
+
+from __future__ import annotations
+
+import copy
+import pickle
+import threading
+
+import numpy as np
+import pytest
+
+from mgdd import _core, presets
+from mgdd.engine import Cylinder, NoxModel, NoxProxy, OperatingPoint, Performance, PerformanceTerm, SoftSensor, simulate
+from mgdd.errors import DataError, ParameterError, RigError, ShapeError
+from mgdd.loop import EngineBench, SensorDynamics
+from mgdd.results import check_labels
+from mgdd.rig import Measurement, Rig, SimulatedRig
+
+QUIET = {"soc_scatter_cad": 0.0, "efficiency_noise_percent": 0.0}
+SILENT = SensorDynamics(delay_s=3.0, lag_s=2.0)
+RICH = {
+    "performance": Performance.efficiency_and_nox(),
+    "limits": ["p_max_bar", "cov_imep_percent"],
+    "misfire_probability": 0.05,
+    "soc_drift_cad_per_kcycle": 1.0,
+    "wall_heat_drift_per_kcycle": 0.1,
+    "seed": 3,
+}
+
+
+def requests(n: int) -> np.ndarray:
+    return -6.0 + 4.0 * np.sin(np.arange(n) * 0.7)
+
+
+def test_without_chance_it_is_the_cycle_model() -> None:
+    preset = presets.load("hd_diesel_128x144")
+    for engine in ("hd_diesel_128x144", preset):
+        cycle = EngineBench(engine, **QUIET).step(-4.0)
+        model = simulate(preset.cylinder, preset.point, soc_cad=-4.0)
+        for name in ("imep_gross_bar", "p_max_bar", "efficiency_gross", "ca50_cad"):
+            assert cycle[name] == float(model[name])
+    own = EngineBench(Cylinder(bore_mm=90.0), OperatingPoint(fuel_mg=15.0), **QUIET).step(-4.0)
+    assert own["p_max_bar"] == float(
+        simulate(Cylinder(bore_mm=90.0), OperatingPoint(fuel_mg=15.0), soc_cad=-4.0)["p_max_bar"]
+    )
+
+
+def test_run_is_labelled_and_complete() -> None:
+    out = EngineBench(**RICH).run(requests(80))
+    check_labels(out)
+    assert dict(out.sizes) == {"cycle": 80, "component": 2, "limit": 2}
+    np.testing.assert_array_equal(out["cycle"], np.arange(80))
+    np.testing.assert_allclose(out["components"].sum("component"), out["j"], rtol=1e-15)
+    np.testing.assert_array_equal(out["limits"].sel(limit="p_max_bar"), out["p_max_bar"])
+    np.testing.assert_allclose(
+        out["components"].sel(component="efficiency_percent"), 100.0 * out["efficiency_gross"], rtol=1e-15
+    )
+    np.testing.assert_allclose(out["components"].sel(component="nox_ppm"), -0.004 * out["nox_soft_ppm"], rtol=1e-15)
+    np.testing.assert_array_equal(out["soc_requested_cad"], requests(80))
+    assert list(out["limit_units"].values) == ["bar", "%"]
+    assert out["misfire"].dtype == bool
+    assert 0 < int(out["misfire"].sum()) < 20
+    assert "limits" not in EngineBench().run([-6.0])
+
+
+def test_repeated_terms_keep_names_of_their_own() -> None:
+    terms = [
+        PerformanceTerm("efficiency_percent"),
+        PerformanceTerm("p_max_bar", -1.0, above=100.0),
+        PerformanceTerm("p_max_bar", -0.1, reference=10.0),
+    ]
+    out = EngineBench(performance=Performance(terms), **QUIET).run([-6.0])
+    assert list(out["component"].values) == ["efficiency_percent", "p_max_bar_1", "p_max_bar_2"]
+    p_max = float(out["p_max_bar"][0])
+    np.testing.assert_allclose(out["components"][0, 1:], [-((p_max / 100.0 - 1.0) ** 2), -0.01 * p_max])
+
+
+def test_steps_chunks_copies_and_pickles_give_one_run() -> None:
+    soc = requests(120)
+    whole = EngineBench(**RICH).run(soc)
+    chunked = EngineBench(**RICH)
+    parts = [chunked.run(soc[:33]), chunked.run(soc[33:34])]
+    twins = [chunked, copy.deepcopy(chunked), pickle.loads(pickle.dumps(chunked)), EngineBench(**RICH)]
+    twins[3].restore(chunked.save())
+    for twin in twins:
+        assert type(twin) is EngineBench
+        assert twin.cycle == 34
+        rest = twin.run(soc[34:])
+        for name in whole.data_vars:
+            if "cycle" in whole[name].dims:
+                joined = np.concatenate([part[name].values for part in [*parts, rest]])
+                np.testing.assert_array_equal(joined, whole[name].values, err_msg=str(name))
+    one_by_one = EngineBench(**RICH)
+    assert [one_by_one.step(x)["j"] for x in soc] == list(whole["j"].values)
+    one_by_one.reset()
+    assert one_by_one.step(soc[0])["j"] == float(whole["j"][0])
+    one_by_one.reset(4)
+    assert (one_by_one.seed, one_by_one.cycle) == (4, 0)
+    assert one_by_one.step(soc[0])["j"] != float(whole["j"][0])
+
+
+def test_settings_build_the_same_bench_again() -> None:
+    bench = EngineBench(**RICH, analyser=SensorDynamics(delay_cycles=3, lag_cycles=1.5))
+    again = _core.EngineBench(**bench.settings)
+    assert again.settings == bench.settings
+    assert again.step(-3.0)["j"] == bench.step(-3.0)["j"]
+    # The Python constructor repeats the defaults of the core.
+    assert EngineBench().settings == _core.EngineBench(cylinder=Cylinder(), schedule=[(0, OperatingPoint())]).settings
+
+
+def test_a_run_leaves_the_interpreter_free() -> None:
+    done = threading.Event()
+    soc = np.full(200_000, -6.0)
+    seen = []
+
+    def work() -> None:
+        EngineBench().run_columns(soc)
+        done.set()
+
+    thread = threading.Thread(target=work)
+    thread.start()
+    while not done.is_set():
+        seen.append(done.wait(0.002))
+    thread.join()
+    assert len(seen) > 5
+
+
+def test_analyser_and_schedule() -> None:
+    points = [(0, OperatingPoint()), (30, OperatingPoint(speed_rpm=3000.0))]
+    bench = EngineBench(schedule=points, analyser=SILENT, **QUIET)
+    assert bench.analyser_delay_cycles == 38
+    out = bench.run(np.full(40, -6.0))
+    assert list(np.flatnonzero(out["operating_point_changed"])) == [30]
+    assert bench.analyser_delay_cycles == 75
+    assert bench.point == points[1][1]
+    assert bench.point_at(0) == points[0][1]
+    np.testing.assert_array_equal(out["nox_analyser_ppm"][:30], out["nox_true_ppm"][0])
+
+
+def test_the_corrected_soft_sensor_finds_a_biased_analyser() -> None:
+    soft = SoftSensor(model=NoxModel(proxy=NoxProxy(reference_nox_ppm=1000.0), map="arrhenius"))
+    out = EngineBench(soft_sensor=soft, seed=1).run(np.full(1500, -6.0))
+    ratio = (out["nox_soft_corrected_ppm"] / out["nox_true_ppm"]).values
+    assert ratio[0] == pytest.approx(1000.0 / 1200.0)
+    assert ratio[800:].mean() == pytest.approx(1.0, abs=0.005)
+
+
+@pytest.mark.parametrize(
+    ("settings", "message"),
+    [
+        ({"point": OperatingPoint(), "schedule": [(0, OperatingPoint())]}, "point and schedule were both given"),
+        ({"schedule": []}, "schedule is empty"),
+        ({"schedule": [(2, OperatingPoint())]}, r"schedule\[0\].cycle = 2: must be 0"),
+        ({"limits": "p_max_bar"}, "limits = 'p_max_bar': must be a sequence"),
+        ({"limits": ["torque"]}, "limits: 'torque' is not measured"),
+        ({"seed": -1}, r"seed = -1: must be in \[0, 2\*\*64\)"),
+        ({"nox_sensor": "nose"}, "nox_sensor = 'nose': must be one of none, analyser"),
+        ({"nox_sensor": "none", "performance": Performance.efficiency_and_nox()}, "nox_sensor = 'none'"),
+        ({"integrator": "magic"}, "integrator = 'magic'"),
+        ({"engine": "no_such_preset"}, "no preset 'no_such_preset'"),
+        ({"point": OperatingPoint(fuel_mg=0.0)}, r"schedule\[0\].fuel_mg = 0 mg: must be > 0"),
+        ({"misfire_probability": 2.0}, "misfire_probability = 2: must be in"),
+    ],
+)
+def test_settings_are_refused_by_name(settings: dict[str, object], message: str) -> None:
+    with pytest.raises(ParameterError, match=message):
+        EngineBench(**settings)
+
+
+def test_a_refused_call_changes_nothing() -> None:
+    bench = EngineBench(**RICH)
+    bench.run(requests(20))
+    state = bench.save()
+    with pytest.raises(ShapeError, match="soc_cad has 2 dimensions"):
+        bench.run(np.zeros((3, 3)))
+    spoiled = dict(state)
+    del spoiled["fast"]
+    with pytest.raises(DataError, match="no column 'fast'"):
+        bench.restore(spoiled)
+    assert all(np.array_equal(state[name], column) for name, column in bench.save().items())
+    twin = EngineBench(**RICH)
+    twin.run(requests(20))
+    assert bench.step(-6.0)["j"] == twin.step(-6.0)["j"]
+
+
+def test_the_request_array_is_left_alone() -> None:
+    soc = np.array([-100.0, -6.0])
+    out = EngineBench(**QUIET).run(soc)
+    np.testing.assert_array_equal(soc, [-100.0, -6.0])
+    np.testing.assert_array_equal(out["clamped"], [True, False])
+    assert float(out["soc_cad"][0]) == -60.0
+
+
+def test_the_rig_is_the_bench() -> None:
+    bench, twin = EngineBench(**RICH), EngineBench(**RICH)
+    rig = SimulatedRig(bench)
+    assert isinstance(rig, Rig)
+    with rig as entered:
+        assert entered is rig
+        with pytest.raises(RigError, match=r"measure\(\) before apply\(\)"):
+            rig.measure()
+        for bad in (float("nan"), float("inf")):
+            with pytest.raises(ParameterError, match=r"soc_cad = (nan|inf): must be finite"):
+                rig.apply(bad)
+        assert bench.cycle == 0
+        for soc in requests(30):
+            rig.apply(soc)
+            measured, expected = rig.measure(), twin.step(soc)
+            assert isinstance(measured, Measurement)
+            assert measured.components == tuple(expected["components"])
+            assert measured.performance == pytest.approx(expected["j"])
+            assert measured.limits == expected["limits"]
+            assert measured.misfire is expected["misfire"]
+            assert measured.values["soc_cad"] == expected["soc_cad"]
+        rig.measure()  # the engine runs on at the timing applied last
+        assert bench.cycle == 31
+    for call in (rig.measure, lambda: rig.apply(-6.0), rig.__enter__):
+        with pytest.raises(RigError, match="the rig is closed"):
+            call()
+    assert issubclass(RigError, OSError)
