@@ -8,6 +8,7 @@
 #include <utility>
 #include <vector>
 
+#include "bench_columns.hpp"
 #include "binding.hpp"
 #include "mgdd/common/error.hpp"
 #include "mgdd/loop/engine_bench.hpp"
@@ -224,6 +225,10 @@ Examples
 }
 
 }  // namespace
+
+py::dict bench_columns(const std::vector<BenchCycle>& rows, const BenchSettings& settings) {
+  return to_columns(rows, settings);
+}
 
 void bind_bench(py::module_& m) {
   using py::arg;

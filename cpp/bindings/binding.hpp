@@ -62,6 +62,7 @@ void bind_emissions(py::module_& m);
 void bind_engine(py::module_& m);
 void bind_performance(py::module_& m);
 void bind_bench(py::module_& m);
+void bind_loop(py::module_& m);
 void bind_trace(py::module_& m);
 void bind_identify(py::module_& m);
 

@@ -19,4 +19,5 @@ PYBIND11_MODULE(_core, m) {
   bind_trace(m);
   bind_identify(m);
   bind_bench(m);
+  bind_loop(m);
 }

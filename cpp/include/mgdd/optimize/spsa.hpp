@@ -58,6 +58,8 @@ class Spsa {
   /// New operating point: forget limits and what was measured of this iteration; keep the estimate, begin the gains
   /// anew.
   void restart() noexcept;
+  /// Other random numbers from now on; a run of many seeds starts each from the same settings.
+  void reseed(std::uint64_t seed) noexcept { settings_.seed = seed; }
 
   const Inputs& estimate() const noexcept { return estimate_; }
   const Inputs& gradient() const noexcept { return gradient_; }

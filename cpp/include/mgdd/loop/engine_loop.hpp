@@ -1,0 +1,104 @@
+// The closed loop: a seeker on the virtual bench, one ask, one cycle, one tell; and what such a run comes to.
+// `loop_step` and `LoopStatistics::add` are noexcept and allocation-free. The same seeker driven from Python one
+// ask/tell at a time goes the same way, bit for bit. Angles in °CA aTDC.
+#pragma once
+
+#include <cstdint>
+#include <limits>
+#include <string>
+#include <vector>
+
+#include "mgdd/loop/engine_bench.hpp"
+#include "mgdd/optimize/seekers.hpp"
+
+namespace mgdd::loop {
+
+/// One cycle of a run: what the bench gave, and the estimate that stood before it.
+struct LoopCycle {
+  BenchCycle bench{};
+  double estimate_cad = 0.0;
+};
+
+/// ParameterError unless the seeker has one input, as many components as the bench's performance (or one, for their
+/// sum) and the bench's limits in the same order.
+void require_match(const EngineBench& bench, std::size_t inputs, std::size_t components,
+                   const std::vector<optimize::Limit>& limits);
+
+template <optimize::AnySeeker S>
+void require_match(const EngineBench& bench, const S& seeker) {
+  require_match(bench, static_cast<std::size_t>(seeker.estimate().size()), seeker.component_count(),
+                seeker.settings().limits);
+}
+
+/// One cycle; a new operating point restarts the seeker before it asks.
+template <optimize::AnySeeker S>
+LoopCycle loop_step(EngineBench& bench, S& seeker) noexcept {
+  if (bench.point_changes_at(bench.cycle())) seeker.restart();
+  LoopCycle out;
+  out.estimate_cad = seeker.estimate()[0];
+  out.bench = bench.step(seeker.ask()[0]);
+  const BenchCycle& c = out.bench;
+  const bool summed = seeker.component_count() == 1;
+  seeker.tell(
+      {summed ? std::span<const double>(&c.j, 1) : c.component_values(), c.limits(), c.misfire || c.unphysical});
+  return out;
+}
+
+/// What to look for in a run.
+struct LoopCriteria {
+  double optimum_cad = std::numeric_limits<double>::quiet_NaN();  ///< NaN: cycles and rms are not judged
+  double arrival_cad = 1.0;                                       ///< |estimate - optimum| that counts as arrived
+  std::int64_t tail_cycles = 100;                                 ///< behind `final_cad`
+  std::int64_t exceed_from = 1000;                                ///< first cycle that counts for the limits
+  std::vector<double> exceed_above{};                             ///< per limit of the bench: values above count
+};
+
+/// What a run came to. "Second half" is from cycle n/2 on.
+struct LoopSummary {
+  std::int64_t cycles = 0;
+  double final_cad = std::numeric_limits<double>::quiet_NaN();          ///< mean estimate of the last cycles
+  double mean_cad = std::numeric_limits<double>::quiet_NaN();           ///< mean estimate, second half
+  double rms_cad = std::numeric_limits<double>::quiet_NaN();            ///< about the optimum, second half
+  double cycles_to = std::numeric_limits<double>::quiet_NaN();          ///< first estimate that has arrived; NaN: never
+  double cycles_stays = std::numeric_limits<double>::quiet_NaN();       ///< from here on it never leaves again
+  double exceeded_fraction = std::numeric_limits<double>::quiet_NaN();  ///< of cycles from `exceed_from` on
+  double mean_applied_cad = std::numeric_limits<double>::quiet_NaN();   ///< second half
+  double mean_j = std::numeric_limits<double>::quiet_NaN();             ///< second half, fired cycles
+  double mean_efficiency_percent = std::numeric_limits<double>::quiet_NaN();
+  double mean_nox_ppm = std::numeric_limits<double>::quiet_NaN();  ///< true NOx, second half, fired cycles
+  double lowest_cad = std::numeric_limits<double>::infinity();     ///< of the estimate
+  double highest_cad = -std::numeric_limits<double>::infinity();
+  std::int64_t misfires = 0;
+};
+
+class LoopStatistics {
+ public:
+  /// `cycles` is the planned length of the run.
+  LoopStatistics(LoopCriteria criteria, std::int64_t cycles);
+
+  void add(const LoopCycle& cycle) noexcept;
+  /// Of the cycles added so far.
+  LoopSummary summary() const noexcept;
+
+ private:
+  struct Mean {
+    double sum = 0.0;
+    std::int64_t count = 0;
+    void add(double x) noexcept {
+      sum += x;
+      ++count;
+    }
+    double value() const noexcept {
+      return count > 0 ? sum / static_cast<double>(count) : std::numeric_limits<double>::quiet_NaN();
+    }
+  };
+
+  LoopCriteria criteria_;
+  std::int64_t planned_, seen_ = 0, counted_ = 0, exceeded_ = 0;
+  std::int64_t first_arrival_ = -1, last_away_ = -1;
+  Mean tail_, half_, square_, applied_, j_, efficiency_, nox_;
+  double lowest_ = std::numeric_limits<double>::infinity(), highest_ = -std::numeric_limits<double>::infinity();
+  std::int64_t misfires_ = 0;
+};
+
+}  // namespace mgdd::loop

@@ -1,0 +1,31 @@
+// Many whole closed loops at once: every bench with every seeker and every seed, on all cores. A loop depends on its
+// own bench, seeker and seed only, so the result is the same on any number of threads. Desk-time code.
+#pragma once
+
+#include <cstdint>
+#include <functional>
+#include <vector>
+
+#include "mgdd/loop/engine_loop.hpp"
+
+namespace mgdd::loop {
+
+struct MonteCarloPlan {
+  std::vector<EngineBench> benches;
+  std::vector<LoopCriteria> criteria;  ///< one per bench
+  std::vector<optimize::Seeker> seekers;
+  std::vector<std::uint64_t> seeds;  ///< of the bench and of a seeker that draws; each loop starts at cycle 0
+  std::int64_t cycles = 1000;
+  int threads = 0;  ///< 0 = all cores
+};
+
+struct MonteCarloResult {
+  std::vector<LoopSummary> loops;  ///< [bench][seeker][seed], the last index fastest
+  std::vector<bool> finished;      ///< all true unless stopped
+};
+
+/// ParameterError for an empty plan or a seeker that does not fit a bench. `stop` is polled by the calling thread about
+/// every 50 ms; loops that are running then are dropped, finished ones stay.
+MonteCarloResult monte_carlo(const MonteCarloPlan& plan, const std::function<bool()>& stop);
+
+}  // namespace mgdd::loop

@@ -1,0 +1,89 @@
+#include "mgdd/loop/engine_loop.hpp"
+
+#include <algorithm>
+#include <cmath>
+#include <utility>
+
+namespace mgdd::loop {
+
+void require_match(const EngineBench& bench, std::size_t inputs, std::size_t components,
+                   const std::vector<optimize::Limit>& limits) {
+  if (inputs != 1) {
+    throw ParameterError("start has " + std::to_string(inputs) + " entries: the bench takes one input, soc_cad");
+  }
+  const std::size_t terms = bench.settings().performance.size();
+  if (components != 1 && components != terms) {
+    throw ParameterError("components has " + std::to_string(components) +
+                         " entries: the performance of the bench has " + std::to_string(terms) +
+                         " terms; give as many, or one for their sum");
+  }
+  std::vector<std::string> names;
+  for (const optimize::Limit& limit : limits)
+    names.push_back(limit.name);
+  if (names == bench.settings().limits) return;
+  const auto list = [](const std::vector<std::string>& all) {
+    std::string out = "[";
+    for (const std::string& name : all)
+      out += (out.size() > 1 ? ", " : "") + name;
+    return out + "]";
+  };
+  throw ParameterError("limits of the seeker " + list(names) + " and of the bench " + list(bench.settings().limits) +
+                       " differ: name the same ones in the same order");
+}
+
+LoopStatistics::LoopStatistics(LoopCriteria criteria, std::int64_t cycles)
+    : criteria_(std::move(criteria)), planned_(cycles) {}
+
+void LoopStatistics::add(const LoopCycle& cycle) noexcept {
+  const std::int64_t k = seen_++;
+  const double estimate = cycle.estimate_cad;
+  const BenchCycle& b = cycle.bench;
+  lowest_ = std::min(lowest_, estimate);
+  highest_ = std::max(highest_, estimate);
+  if (b.misfire) ++misfires_;
+  if (std::abs(estimate - criteria_.optimum_cad) <= criteria_.arrival_cad) {
+    if (first_arrival_ < 0) first_arrival_ = k;
+  } else {
+    last_away_ = k;
+  }
+  if (k >= planned_ - criteria_.tail_cycles) tail_.add(estimate);
+  if (k >= planned_ / 2) {
+    half_.add(estimate);
+    square_.add((estimate - criteria_.optimum_cad) * (estimate - criteria_.optimum_cad));
+    applied_.add(b.soc_requested_cad);
+    if (!b.misfire && !b.unphysical) {
+      j_.add(b.j);
+      efficiency_.add(100.0 * b.indicators.efficiency_gross);
+      nox_.add(b.nox_true_ppm);
+    }
+  }
+  if (k >= criteria_.exceed_from && !criteria_.exceed_above.empty()) {
+    ++counted_;
+    bool over = false;
+    for (std::size_t i = 0; i < std::min(b.limit_count, criteria_.exceed_above.size()); ++i)
+      over = over || b.limit_values[i] > criteria_.exceed_above[i];
+    if (over) ++exceeded_;
+  }
+}
+
+LoopSummary LoopStatistics::summary() const noexcept {
+  LoopSummary out;
+  out.cycles = seen_;
+  out.final_cad = tail_.value();
+  out.mean_cad = half_.value();
+  out.mean_applied_cad = applied_.value();
+  out.mean_j = j_.value();
+  out.mean_efficiency_percent = efficiency_.value();
+  out.mean_nox_ppm = nox_.value();
+  out.lowest_cad = lowest_;
+  out.highest_cad = highest_;
+  out.misfires = misfires_;
+  if (counted_ > 0) out.exceeded_fraction = static_cast<double>(exceeded_) / static_cast<double>(counted_);
+  if (!std::isfinite(criteria_.optimum_cad)) return out;
+  out.rms_cad = std::sqrt(square_.value());
+  if (first_arrival_ >= 0) out.cycles_to = static_cast<double>(first_arrival_);
+  if (last_away_ + 1 < seen_) out.cycles_stays = static_cast<double>(last_away_ + 1);
+  return out;
+}
+
+}  // namespace mgdd::loop
