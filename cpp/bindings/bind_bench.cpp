@@ -10,7 +10,7 @@
 
 #include "bench_columns.hpp"
 #include "binding.hpp"
-#include "mgdd/common/error.hpp"
+#include "mgdd/common/bounds.hpp"
 #include "mgdd/loop/engine_bench.hpp"
 
 namespace mgdd::bindings {
@@ -176,6 +176,11 @@ EngineBench make(const engine::Cylinder& cylinder, const Schedule& schedule,
   return EngineBench(s);
 }
 
+double checked_speed(double speed_rpm) {
+  require_within("speed_rpm", speed_rpm, 0.0, 1e5, "rpm");
+  return speed_rpm;
+}
+
 void bind_dynamics(py::module_& m) {
   using py::arg;
   py::class_<SensorDynamics> dynamics(m, "SensorDynamics",
@@ -219,8 +224,14 @@ Examples
       .def_readonly("noise_fraction", &SensorDynamics::noise_fraction, "Relative noise [-].")
       .def_readonly("delay_cycles", &SensorDynamics::delay_cycles, "Delay in cycles, or None.")
       .def_readonly("lag_cycles", &SensorDynamics::lag_cycles, "Time constant in cycles, or None.")
-      .def("delay_at", &SensorDynamics::delay_at, arg("speed_rpm"), "Delay in whole cycles at a speed.")
-      .def("gain_at", &SensorDynamics::gain_at, arg("speed_rpm"), "Gain of the lag filter per cycle [-].");
+      .def(
+          "delay_at",
+          [](const SensorDynamics& self, double speed_rpm) { return self.delay_at(checked_speed(speed_rpm)); },
+          arg("speed_rpm"), "Delay in whole cycles at a speed.")
+      .def(
+          "gain_at",
+          [](const SensorDynamics& self, double speed_rpm) { return self.gain_at(checked_speed(speed_rpm)); },
+          arg("speed_rpm"), "Gain of the lag filter per cycle [-].");
   bind_value(dynamics, "SensorDynamics", [](const SensorDynamics& self) { return to_dict(self); });
 }
 

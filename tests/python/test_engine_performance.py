@@ -108,6 +108,7 @@ def test_performance_takes_signals_by_name() -> None:
         (lambda: NoxProxy(reference_nox_ppm=0.0), "reference_nox_ppm = 0: must be > 0"),
         (lambda: NoxModel(intake_o2_fraction=2.0), r"intake_o2_fraction = 2: must be in \(0, 1\]"),
         (lambda: SoftSensor(correction_gain=-1.0), r"correction_gain = -1: must be in \[0, 1\]"),
+        (lambda: SensorDynamics().delay_at(-1.0), r"speed_rpm = -1 rpm: must be in \[0, 100000\]"),
         (lambda: SensorDynamics(delay_s=100.0), r"sensor.delay_s = 100 s: must be in \[0, 60\]"),
     ],
 )

@@ -17,7 +17,7 @@ constexpr double wall_heat_upper = 100.0;  // of the field, which drift must not
 using engine::Indicators;
 using Member = double Indicators<double>::*;
 
-const BenchSettings& checked(const BenchSettings& settings) {
+BenchSettings checked(BenchSettings settings) {
   validate(settings);
   return settings;
 }
@@ -104,7 +104,6 @@ EngineBench::EngineBench(const BenchSettings& settings)
 }
 
 void EngineBench::reset(std::uint64_t seed) noexcept {
-  model_.set_cylinder(settings_.cylinder);
   seed_ = seed;
   cycle_ = 0;
   last_soc_cad_ = last_t_max_k_ = last_imep_bar_ = ln_bias_ = 0.0;

@@ -1,4 +1,5 @@
 // What the bench refuses before it exists.
+#include <algorithm>
 #include <cmath>
 #include <string>
 #include <utility>
@@ -40,12 +41,17 @@ void validate_schedule(const BenchSettings& s) {
     const ScheduledPoint& now = s.schedule[i];
     const std::string owner = "schedule[" + std::to_string(i) + "]";
     if (i > 0 && now.cycle <= s.schedule[i - 1].cycle) {
-      throw ParameterError(owner + ".cycle = " + std::to_string(now.cycle) + ": must be > " +
-                           std::to_string(s.schedule[i - 1].cycle) + ", the cycle before it");
+      throw ParameterError(std::string(owner)
+                               .append(".cycle = ")
+                               .append(std::to_string(now.cycle))
+                               .append(": must be > ")
+                               .append(std::to_string(s.schedule[i - 1].cycle)));
     }
     within(owner, [&] { engine::validate_cycle(s.cylinder, now.point, window[1]); });
     if (!(now.point.fuel_mg > 0.0)) {
-      throw ParameterError(owner + ".fuel_mg = " + text(now.point.fuel_mg) + " mg: must be > 0, a bench fires");
+      const std::string given = text(now.point.fuel_mg);
+      throw ParameterError(
+          std::string(owner).append(".fuel_mg = ").append(given).append(" mg: must be > 0, a bench fires"));
     }
   }
 }
@@ -55,16 +61,17 @@ void validate_limits(const BenchSettings& s) {
     throw ParameterError("limits has " + std::to_string(s.limits.size()) + " entries: must be at most " +
                          std::to_string(max_limits));
   }
-  for (const std::string& name : s.limits) {
-    if (name == cov_imep_name) continue;
-    std::string known(cov_imep_name);
-    bool found = false;
-    for (const auto& field : engine::indicator_fields<double>()) {
-      found = found || field.name == name;
-      known.append(", ").append(field.name);
-    }
-    if (!found) throw ParameterError("limits: '" + name + "' is not measured: must be one of " + known);
-  }
+  constexpr auto fields = engine::indicator_fields<double>();
+  std::string known(cov_imep_name);
+  for (const auto& field : fields)
+    known.append(", ").append(field.name);
+  const auto measured = [&](const std::string& name) {
+    return name == cov_imep_name ||
+           std::any_of(fields.begin(), fields.end(), [&](const auto& field) { return field.name == name; });
+  };
+  const auto stranger = std::find_if_not(s.limits.begin(), s.limits.end(), measured);
+  if (stranger == s.limits.end()) return;
+  throw ParameterError("limits: '" + *stranger + "' is not measured: must be one of " + known);
 }
 
 }  // namespace

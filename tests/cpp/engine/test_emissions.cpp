@@ -1,7 +1,9 @@
 // NOx from T_max: the maps against each other, the oxygen factor, the correction of the soft sensor, the fit.
 #include "mgdd/engine/emissions.hpp"
 
+#include <algorithm>
 #include <cmath>
+#include <cstdint>
 #include <limits>
 #include <string>
 #include <vector>
@@ -74,9 +76,8 @@ TEST(NoxFit, RecoversExactDataOfBothMapsAtAnyReference) {
   const NoxProxy truth{1950.0, 800.0, 21000.0};
   for (const NoxMap map : {NoxMap::affine_log, NoxMap::arrhenius}) {
     const NoxModel model{.proxy = truth, .map = map};
-    std::vector<double> nox;
-    for (const double t : sweep_k)
-      nox.push_back(model.ppm(t));
+    std::vector<double> nox(sweep_k.size());
+    std::transform(sweep_k.begin(), sweep_k.end(), nox.begin(), [&](double t) { return model.ppm(t); });
     const NoxFit fit = fit_nox_proxy(sweep_k, nox, map, 1950.0);
     EXPECT_NEAR(fit.proxy.activation_temperature_k, 21000.0, 1e-6);
     EXPECT_NEAR(fit.proxy.reference_nox_ppm, 800.0, 1e-8);
@@ -95,9 +96,9 @@ TEST(NoxFit, StandardErrorsAreThoseOfRepeatedSweeps) {
   const NoxModel model{.map = NoxMap::arrhenius};
   double b_sum = 0.0, b_squares = 0.0, n_sum = 0.0, n_squares = 0.0, b_stderr = 0.0, n_stderr = 0.0, spread = 0.0;
   for (int k = 0; k < sweeps; ++k) {
-    std::vector<double> nox;
-    for (std::size_t i = 0; i < sweep_k.size(); ++i)
-      nox.push_back(model.ppm(sweep_k[i]) * std::exp(sigma * random::normal(1, i, static_cast<std::uint64_t>(k))));
+    std::vector<double> nox(sweep_k.size());
+    for (std::size_t i = 0; i < nox.size(); ++i)
+      nox[i] = model.ppm(sweep_k[i]) * std::exp(sigma * random::normal(1, i, static_cast<std::uint64_t>(k)));
     const NoxFit fit = fit_nox_proxy(sweep_k, nox, NoxMap::arrhenius);
     b_sum += fit.proxy.activation_temperature_k / sweeps;
     b_squares += std::pow(fit.proxy.activation_temperature_k - 16000.0, 2) / sweeps;

@@ -145,7 +145,8 @@ TEST(EngineBench, ScatterAndNoiseHaveTheirStatistics) {
   BenchSettings s;
   s.analyser.lag_s = s.analyser.delay_s = 0.0;
   EngineBench bench(s);
-  double soc = 0.0, soc2 = 0.0, eta = 0.0, eta2 = 0.0, both = 0.0, reading2 = 0.0, fast2 = 0.0;
+  double soc = 0.0, soc2 = 0.0, eta = 0.0, eta2 = 0.0, both = 0.0, reading2 = 0.0, fast2 = 0.0, cross = 0.0;
+  const double swept_m3 = engine::Geometry<double>({}).swept_m3;
   double fast_level = bench.step(-6.0).nox_true_ppm;
   bench.reset(5);
   const double gain = s.fast_sensor.gain_at(1500.0);
@@ -161,7 +162,10 @@ TEST(EngineBench, ScatterAndNoiseHaveTheirStatistics) {
     reading2 += std::pow(c.nox_analyser_ppm / c.nox_true_ppm - 1.0, 2) / n;
     if (k > 0) fast_level += gain * (last_true - fast_level);
     if (k > 20) fast2 += std::pow(c.nox_fast_ppm / fast_level - 1.0, 2) / (n - 21);
+    cross += (c.nox_analyser_ppm / c.nox_true_ppm - 1.0) * (c.nox_fast_ppm / fast_level - 1.0) / n;
     last_true = c.nox_true_ppm;
+    ASSERT_NEAR(c.indicators.imep_gross_bar * swept_m3 * 1e5, c.indicators.work_gross_j, 1e-9);
+    ASSERT_NEAR(c.indicators.imep_closed_bar * swept_m3 * 1e5, c.indicators.work_closed_j, 1e-9);
     ASSERT_NEAR(c.indicators.efficiency_gross, c.indicators.work_gross_j / 856.0, 1e-12);
   }
   const double four = 4.0 / std::sqrt(static_cast<double>(n));
@@ -169,6 +173,7 @@ TEST(EngineBench, ScatterAndNoiseHaveTheirStatistics) {
   EXPECT_NEAR(eta, 0.0, 0.25 * four);
   EXPECT_NEAR(std::sqrt(soc2), 0.3, 0.3 * four);
   EXPECT_NEAR(std::sqrt(eta2), 0.25, 0.25 * four);
+  EXPECT_NEAR(cross, 0.0, 0.01 * 0.03 * four);
   EXPECT_NEAR(both, 0.0, 0.3 * 0.25 * four);
   EXPECT_NEAR(std::sqrt(reading2), 0.01, 0.01 * four);
   EXPECT_NEAR(std::sqrt(fast2), 0.03, 0.03 * four);

@@ -52,6 +52,7 @@ TEST(EngineBenchState, TheSameSeedGivesTheSameRunAfterResetAndInThreads) {
   EXPECT_EQ(run(bench, 200), whole);
   std::vector<History> parallel(3);
   std::vector<std::thread> threads;
+  threads.reserve(parallel.size());
   for (History& mine : parallel) {
     threads.emplace_back([&mine] {
       EngineBench own(eventful());

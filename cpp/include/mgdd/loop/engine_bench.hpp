@@ -137,8 +137,8 @@ class EngineBench {
   /// What an operating point fixes: computed once.
   struct Prepared {
     engine::Charge<double> charge;
-    std::size_t analyser_delay, fast_delay;
-    double analyser_gain, fast_gain;
+    std::size_t analyser_delay = 0, fast_delay = 0;
+    double analyser_gain = 1.0, fast_gain = 1.0;
   };
   std::size_t index_at(std::int64_t cycle) const noexcept;
   engine::Indicators<double> burn(const Prepared& at, double soc_cad, bool misfire, bool& unphysical) noexcept;
