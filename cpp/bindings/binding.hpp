@@ -26,6 +26,7 @@ py::array_t<double> to_array(const std::vector<double>& column);
 
 void bind_errors(py::module_& m);
 void bind_optimize(py::module_& m);
+void bind_learning(py::module_& m);
 void bind_cylinder(py::module_& m);
 void bind_engine(py::module_& m);
 void bind_trace(py::module_& m);

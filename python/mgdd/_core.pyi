@@ -6,7 +6,7 @@ import collections.abc
 import numpy
 import numpy.typing
 import typing
-__all__: list[str] = ['ConvergenceError', 'Cylinder', 'CylinderFit', 'DataError', 'Error', 'FitReport', 'LeastSquaresOptions', 'LoadBurn', 'LoadFit', 'MeasuredCycle', 'NoxProxy', 'OperatingPoint', 'Parameter', 'ParameterError', 'ShapeError', 'TraceOptions', 'analyze_trace', 'burn_duration_cad', 'burned_fraction', 'check_trace', 'common_parameters', 'compiled_simd_level', 'compiler', 'convergence', 'correlation_limit', 'differentiable_inputs', 'estimate_burn', 'fit_cylinder', 'hardenberg_hase_delay_cad', 'hohenberg_coefficient', 'indicator_units', 'input_unit', 'least_squares', 'load_parameters', 'processor_simd_levels', 'scan', 'sensitivities', 'simulate', 'start_of_combustion', 'start_of_injection', 'timing_window_cad', 'volume_l', 'wall_area_m2', 'wall_heat_scale_upper', 'watson_delay_ms', 'with_burn', 'wolfer_delay_ms', 'woschni_c1_bar_m', 'woschni_coefficient']
+__all__: list[str] = ['ConvergenceError', 'Cylinder', 'CylinderFit', 'DataError', 'Error', 'FitReport', 'IterativeLearning', 'LeastSquaresOptions', 'LoadBurn', 'LoadFit', 'MeasuredCycle', 'NoxProxy', 'OperatingPoint', 'Parameter', 'ParameterError', 'ShapeError', 'TraceOptions', 'analyze_trace', 'burn_duration_cad', 'burned_fraction', 'check_trace', 'common_parameters', 'compiled_simd_level', 'compiler', 'convergence', 'correlation_limit', 'differentiable_inputs', 'estimate_burn', 'fit_cylinder', 'hardenberg_hase_delay_cad', 'hohenberg_coefficient', 'indicator_units', 'input_unit', 'least_squares', 'load_parameters', 'processor_simd_levels', 'scan', 'sensitivities', 'simulate', 'start_of_combustion', 'start_of_injection', 'timing_window_cad', 'volume_l', 'wall_area_m2', 'wall_heat_scale_upper', 'watson_delay_ms', 'with_burn', 'wolfer_delay_ms', 'woschni_c1_bar_m', 'woschni_coefficient']
 class Error(Exception):
     """
     Base of everything mgdd raises.
@@ -236,6 +236,67 @@ class FitReport:
     def values(self) -> typing.Annotated[numpy.typing.NDArray[numpy.float64], "[m, 1]"]:
         """
         Estimates.
+        """
+class IterativeLearning:
+    """
+    Iterative learning control, ask and tell.
+    """
+    def __init__(self, initial: typing.Annotated[numpy.typing.ArrayLike, numpy.float64], *, law: str, impulse_response: typing.Annotated[numpy.typing.ArrayLike, numpy.float64], relative_degree: typing.SupportsInt | typing.SupportsIndex | None = None, k_p: typing.SupportsFloat | typing.SupportsIndex | None = None, k_d: typing.SupportsFloat | typing.SupportsIndex | None = None, learning_function: typing.Annotated[numpy.typing.ArrayLike, numpy.float64], lead: typing.SupportsInt | typing.SupportsIndex | None = None, cutoff: typing.SupportsFloat | typing.SupportsIndex | None = None, error_weight: typing.SupportsFloat | typing.SupportsIndex | None = None, input_weight: typing.SupportsFloat | typing.SupportsIndex | None = None, change_weight: typing.SupportsFloat | typing.SupportsIndex | None = None, lower: typing.SupportsFloat | typing.SupportsIndex = ..., upper: typing.SupportsFloat | typing.SupportsIndex = ..., rate: typing.SupportsFloat | typing.SupportsIndex = ..., guard: bool = True) -> None:
+        ...
+    def ask(self) -> numpy.typing.NDArray[numpy.float64]:
+        """
+        Input of this trial.
+        """
+    def convergence(self) -> dict:
+        """
+        Findings of the linear theory, by name.
+        """
+    def restore(self, state: collections.abc.Mapping[str, collections.abc.Sequence[typing.SupportsFloat | typing.SupportsIndex]]) -> None:
+        """
+        Go on from the columns of `state`.
+        """
+    def state(self) -> dict[str, list[float]]:
+        """
+        Columns by name.
+        """
+    def tell(self, error: typing.Annotated[numpy.typing.ArrayLike, numpy.float64]) -> None:
+        """
+        Error of this trial; makes the next input.
+        """
+    @property
+    def best_input(self) -> numpy.typing.NDArray[numpy.float64]:
+        """
+        Its input.
+        """
+    @property
+    def best_norm(self) -> float:
+        """
+        Its error norm.
+        """
+    @property
+    def best_trial(self) -> int:
+        """
+        Trial of the least error norm.
+        """
+    @property
+    def error_norms(self) -> numpy.typing.NDArray[numpy.float64]:
+        """
+        Error norms of the latest trials.
+        """
+    @property
+    def frozen(self) -> bool:
+        """
+        Whether the guard stopped learning.
+        """
+    @property
+    def relative_degree(self) -> int:
+        """
+        Samples until an input acts.
+        """
+    @property
+    def trial(self) -> int:
+        """
+        Number of the trial to come.
         """
 class Cylinder:
     """
