@@ -57,6 +57,7 @@ void bind_errors(py::module_& m);
 void bind_optimize(py::module_& m);
 void bind_seekers(py::module_& m);
 void bind_direct_seekers(py::module_& m);
+void bind_learning(py::module_& m);
 void bind_cylinder(py::module_& m);
 void bind_emissions(py::module_& m);
 void bind_engine(py::module_& m);

@@ -12,6 +12,7 @@ PYBIND11_MODULE(_core, m) {
   bind_optimize(m);
   bind_seekers(m);
   bind_direct_seekers(m);
+  bind_learning(m);
   bind_cylinder(m);
   bind_emissions(m);
   bind_engine(m);

@@ -1,7 +1,8 @@
-"""Least squares with bounds, log-scaled parameters and an honest report: numbers in, numbers out.
+"""Least squares and iterative learning control: numbers in, numbers out.
 
-`least_squares` runs the Levenberg-Marquardt search of the C++ core on a Python function. Every fit of this
-package, also those that never enter Python while they run, answers with a `FitReport`.
+`IterativeLearning` improves the input of a repeated task from the error of each trial. `least_squares`, with bounds,
+log-scaled parameters and an honest report, runs the Levenberg-Marquardt search of the C++ core on a Python function.
+Every fit of this package, also those that never enter Python while they run, answers with a `FitReport`.
 
 Examples
 --------
@@ -22,6 +23,7 @@ np.True_
 from __future__ import annotations
 
 from mgdd.optimize.fit_report import FitReport
+from mgdd.optimize.iterative_learning import ConvergenceReport, IterativeLearning
 from mgdd.optimize.least_squares import least_squares
 
-__all__ = ["FitReport", "least_squares"]
+__all__ = ["ConvergenceReport", "FitReport", "IterativeLearning", "least_squares"]
