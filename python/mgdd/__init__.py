@@ -1,6 +1,6 @@
 """Model-guided data-driven optimization and control for internal combustion engine systems.
 
-The rooms: `mgdd.engine` (cycle model and trace analysis), `mgdd.identify` (calibration), `mgdd.optimize` (least
+The rooms: `mgdd.engine` (cycle model and trace analysis), `mgdd.identify` (calibration), `mgdd.optimize` (seekers and least
 squares), `mgdd.loop` (virtual bench), `mgdd.rig` (test rigs), `mgdd.presets`, `mgdd.io`, `mgdd.datasets`, `mgdd.plot`,
 `mgdd.studies`, `mgdd.report`, `mgdd.results` and `mgdd.errors`. They are imported on use.
 
