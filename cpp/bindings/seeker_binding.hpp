@@ -19,15 +19,22 @@ template <class S>
 struct Recorded {
   S seeker;
   std::vector<double> applied{}, estimate{}, objective{};  // one row per told cycle; estimate before the tell
-  std::vector<double> misfire{};
+  std::vector<double> misfire{}, cycle{};
 };
+
+/// A number (of any kind that NumPy takes) as a column of one, or a column.
+inline std::vector<double> numbers_from(const py::object& value, std::string_view name) {
+  const InputArray array(value);
+  if (array.ndim() == 0) return {*array.data()};
+  return to_column(array, name);
+}
 
 /// A number for every input, or one number per input.
 inline optimize::Inputs inputs_from(const py::object& value, std::string_view name, Eigen::Index inputs) {
   if (py::isinstance<py::float_>(value) || py::isinstance<py::int_>(value)) {
     return optimize::Inputs::Constant(inputs, value.cast<double>());
   }
-  const std::vector<double> column = to_column(InputArray(value), name);
+  const std::vector<double> column = numbers_from(value, name);
   if (column.size() > optimize::max_inputs) {
     throw ShapeError(std::string(name) + " has " + std::to_string(column.size()) + " entries: at most " +
                      std::to_string(optimize::max_inputs) + " inputs are possible");
@@ -75,7 +82,7 @@ optimize::Reading reading_from(const S& seeker, const py::object& j, const py::o
     if (py::isinstance<py::float_>(j) || py::isinstance<py::int_>(j)) {
       buffer.components.assign(1, j.cast<double>());
     } else {
-      buffer.components = to_column(InputArray(j), "J");
+      buffer.components = numbers_from(j, "J");
     }
   }
   if (py::isinstance<py::dict>(limits)) {
@@ -87,7 +94,7 @@ optimize::Reading reading_from(const S& seeker, const py::object& j, const py::o
       buffer.limits.push_back(by_name[limit.name.c_str()].template cast<double>());
     }
   } else if (!limits.is_none()) {
-    buffer.limits = to_column(InputArray(limits), "limits");
+    buffer.limits = numbers_from(limits, "limits");
   }
   return {buffer.components, buffer.limits, misfire};
 }
@@ -105,10 +112,11 @@ void bind_seeking(py::class_<Recorded<S>>& cls) {
             ReadingBuffer buffer;
             const optimize::Reading reading = reading_from(r.seeker, j, limits, misfire, buffer);
             const optimize::Inputs before = r.seeker.estimate();
+            const optimize::Inputs applied = r.seeker.applied();  // a seeker may move it while it learns
+            const auto cycle = static_cast<double>(r.seeker.protocol().cycle);
             const optimize::TellStatus status = r.seeker.tell(reading);
             optimize::require(status, r.seeker.protocol(), reading, r.seeker.component_count(), r.seeker.limit_count());
             const bool fired = status == optimize::TellStatus::accepted;
-            const optimize::Inputs& applied = r.seeker.applied();
             double sum = fired ? 0.0 : std::numeric_limits<double>::quiet_NaN();
             for (const double c : reading.components)
               sum += c;
@@ -116,6 +124,7 @@ void bind_seeking(py::class_<Recorded<S>>& cls) {
             r.estimate.insert(r.estimate.end(), before.data(), before.data() + before.size());
             r.objective.push_back(sum);
             r.misfire.push_back(fired ? 0.0 : 1.0);
+            r.cycle.push_back(cycle);
           },
           py::arg("J"), py::arg("limits") = py::none(), py::kw_only(), py::arg("misfire") = false,
           "Accept what was measured at the input of the last ask.\n\n"
@@ -159,9 +168,29 @@ void bind_seeking(py::class_<Recorded<S>>& cls) {
             out["estimate"] = py::array_t<double>({rows, inputs}, r.estimate.data());
             out["objective"] = to_array(r.objective);
             out["misfire"] = to_array(r.misfire);
+            out["cycle"] = to_array(r.cycle);
             return out;
           },
           "Columns behind .history.")
+      .def(
+          "_set_history_columns",
+          [](R& r, const InputArray& applied, const InputArray& estimate, const InputArray& objective,
+             const InputArray& misfire, const InputArray& cycle) {
+            const py::ssize_t rows = objective.size();
+            const py::ssize_t entries = rows * r.seeker.estimate().size();
+            if (applied.size() != entries || estimate.size() != entries || misfire.size() != rows ||
+                cycle.size() != rows) {
+              throw ShapeError("history: its columns do not belong together, or to another number of inputs");
+            }
+            const auto column = [](const InputArray& a) { return std::vector<double>(a.data(), a.data() + a.size()); };
+            r.applied = column(applied);
+            r.estimate = column(estimate);
+            r.objective = column(objective);
+            r.misfire = column(misfire);
+            r.cycle = column(cycle);
+          },
+          py::kw_only(), py::arg("applied"), py::arg("estimate"), py::arg("objective"), py::arg("misfire"),
+          py::arg("cycle"), "Columns behind .history, as _history_columns gave them.")
       .def(
           "_clear_history",
           [](R& r) {
@@ -169,6 +198,7 @@ void bind_seeking(py::class_<Recorded<S>>& cls) {
             r.estimate.clear();
             r.objective.clear();
             r.misfire.clear();
+            r.cycle.clear();
           },
           "Forget the history, keep the state.");
 }

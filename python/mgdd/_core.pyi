@@ -369,6 +369,10 @@ class ExtremumSeeking:
         """
         Columns behind .history.
         """
+    def _set_history_columns(self, *, applied: typing.Annotated[numpy.typing.ArrayLike, numpy.float64], estimate: typing.Annotated[numpy.typing.ArrayLike, numpy.float64], objective: typing.Annotated[numpy.typing.ArrayLike, numpy.float64], misfire: typing.Annotated[numpy.typing.ArrayLike, numpy.float64], cycle: typing.Annotated[numpy.typing.ArrayLike, numpy.float64]) -> None:
+        """
+        Columns behind .history, as _history_columns gave them.
+        """
     def ask(self) -> numpy.typing.NDArray[numpy.float64]:
         """
         The input to apply in this cycle, shape (inputs,). Asking again before tell gives the same.
@@ -448,6 +452,10 @@ class NewtonSeeking:
     def _history_columns(self) -> dict:
         """
         Columns behind .history.
+        """
+    def _set_history_columns(self, *, applied: typing.Annotated[numpy.typing.ArrayLike, numpy.float64], estimate: typing.Annotated[numpy.typing.ArrayLike, numpy.float64], objective: typing.Annotated[numpy.typing.ArrayLike, numpy.float64], misfire: typing.Annotated[numpy.typing.ArrayLike, numpy.float64], cycle: typing.Annotated[numpy.typing.ArrayLike, numpy.float64]) -> None:
+        """
+        Columns behind .history, as _history_columns gave them.
         """
     def ask(self) -> numpy.typing.NDArray[numpy.float64]:
         """
@@ -534,6 +542,10 @@ class BoundedSeeking:
         """
         Columns behind .history.
         """
+    def _set_history_columns(self, *, applied: typing.Annotated[numpy.typing.ArrayLike, numpy.float64], estimate: typing.Annotated[numpy.typing.ArrayLike, numpy.float64], objective: typing.Annotated[numpy.typing.ArrayLike, numpy.float64], misfire: typing.Annotated[numpy.typing.ArrayLike, numpy.float64], cycle: typing.Annotated[numpy.typing.ArrayLike, numpy.float64]) -> None:
+        """
+        Columns behind .history, as _history_columns gave them.
+        """
     def ask(self) -> numpy.typing.NDArray[numpy.float64]:
         """
         The input to apply in this cycle, shape (inputs,). Asking again before tell gives the same.
@@ -603,6 +615,10 @@ class Spsa:
     def _history_columns(self) -> dict:
         """
         Columns behind .history.
+        """
+    def _set_history_columns(self, *, applied: typing.Annotated[numpy.typing.ArrayLike, numpy.float64], estimate: typing.Annotated[numpy.typing.ArrayLike, numpy.float64], objective: typing.Annotated[numpy.typing.ArrayLike, numpy.float64], misfire: typing.Annotated[numpy.typing.ArrayLike, numpy.float64], cycle: typing.Annotated[numpy.typing.ArrayLike, numpy.float64]) -> None:
+        """
+        Columns behind .history, as _history_columns gave them.
         """
     def ask(self) -> numpy.typing.NDArray[numpy.float64]:
         """
@@ -699,6 +715,10 @@ class GradientDescent:
         """
         Columns behind .history.
         """
+    def _set_history_columns(self, *, applied: typing.Annotated[numpy.typing.ArrayLike, numpy.float64], estimate: typing.Annotated[numpy.typing.ArrayLike, numpy.float64], objective: typing.Annotated[numpy.typing.ArrayLike, numpy.float64], misfire: typing.Annotated[numpy.typing.ArrayLike, numpy.float64], cycle: typing.Annotated[numpy.typing.ArrayLike, numpy.float64]) -> None:
+        """
+        Columns behind .history, as _history_columns gave them.
+        """
     def ask(self) -> numpy.typing.NDArray[numpy.float64]:
         """
         The input to apply in this cycle, shape (inputs,). Asking again before tell gives the same.
@@ -783,6 +803,10 @@ class GoldenSection:
     def _history_columns(self) -> dict:
         """
         Columns behind .history.
+        """
+    def _set_history_columns(self, *, applied: typing.Annotated[numpy.typing.ArrayLike, numpy.float64], estimate: typing.Annotated[numpy.typing.ArrayLike, numpy.float64], objective: typing.Annotated[numpy.typing.ArrayLike, numpy.float64], misfire: typing.Annotated[numpy.typing.ArrayLike, numpy.float64], cycle: typing.Annotated[numpy.typing.ArrayLike, numpy.float64]) -> None:
+        """
+        Columns behind .history, as _history_columns gave them.
         """
     def ask(self) -> numpy.typing.NDArray[numpy.float64]:
         """

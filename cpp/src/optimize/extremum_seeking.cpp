@@ -71,7 +71,8 @@ std::vector<std::string> ExtremumSeekingSettings::advice() const {
     if (!(gain[i] > bound * (1.0 + 1e-12))) continue;
     out.push_back("gain = " + text(gain[i]) + " is above " + text(bound) + ", the bound of averaging: with it tau = " +
                   text(2.0 / (gain[i] * dither.amplitude[i] * std::abs(curvature))) + " cycles is below " +
-                  text(windows * dither.period) + " (" + text(windows) + " periods); lower the gain or the period");
+                  text(windows * dither.period) + (windows > 1.0 ? " (two periods)" : " (one period)") +
+                  "; lower the gain or the period");
   }
   return out;
 }
@@ -151,8 +152,8 @@ void ExtremumSeeking::learn(const Reading& reading) noexcept {
   const double period = dither_.period();
   const Inputs no_step = Inputs::Zero(estimate_.size());
   const Inputs way_back = 3.0 * a / period;
-  const bool holding = held_ > 0;
-  if (holding) --held_;
+  if (held_ > 0) --held_;
+  const bool holding = held_ > 0;  // in the next cycle: after the last held one the estimate may move
   bool moved_by_alarm = false;
 
   if (settings_.form == MeanRemoval::batch) {

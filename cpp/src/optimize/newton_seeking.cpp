@@ -116,8 +116,8 @@ void NewtonSeeking::learn(const Reading& reading) noexcept {
     }
   }
   const bool full = seen_ + 1 >= dither_.period();
-  const bool holding = held_ > 0;
-  if (holding) --held_;
+  if (held_ > 0) --held_;
+  const bool holding = held_ > 0;  // in the next cycle: after the last held one the estimate may move
   Inputs step = Inputs::Zero(n);
   if (full) {
     gradient_ = gradient;

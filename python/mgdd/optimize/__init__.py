@@ -1,11 +1,19 @@
-"""Least squares and iterative learning control: numbers in, numbers out.
+"""Seekers that find a best input from measurements alone, their tuner, iterative learning, and least squares.
 
-`IterativeLearning` improves the input of a repeated task from the error of each trial. `least_squares`, with bounds,
-log-scaled parameters and an honest report, runs the Levenberg-Marquardt search of the C++ core on a Python function.
-Every fit of this package, also those that never enter Python while they run, answers with a `FitReport`.
+A seeker proposes an input (``ask``) and accepts what was measured there (``tell``), one engine cycle at a time; it
+never holds a plant, so simulation, replay and the test bench are the same loop. `tune` chooses amplitude, period
+and gain from noise and curvature, `measure_map` reads those off measurements, `maximize` runs the loop on a
+function. `IterativeLearning` improves the input of a repeated task from the error of each trial. `least_squares` is the Levenberg-Marquardt search behind every fit, which answers with a `FitReport`.
 
 Examples
 --------
+>>> from mgdd.optimize import maximize, tune
+>>> tuning = tune(0.25, -0.051, distance=12.0, arrival=1.0)
+>>> seeker = tuning.seeker(start=-18.0, lower=-30.0, upper=10.0)
+>>> history = maximize(lambda soi: 56.0 - 0.0255 * (soi[0] + 6.0) ** 2, seeker, 300)
+>>> abs(seeker.estimate[0] + 6.0) < 0.1
+np.True_
+
 >>> import numpy as np
 >>> from mgdd.optimize import least_squares
 >>> t = np.linspace(0.0, 3.0, 40)
@@ -22,8 +30,33 @@ np.True_
 
 from __future__ import annotations
 
+from mgdd._core import ComponentLag, Limit
+from mgdd.optimize.direct_seekers import GoldenSection, GradientDescent, Spsa
+from mgdd.optimize.dither_seekers import BoundedSeeking, ExtremumSeeking, NewtonSeeking
 from mgdd.optimize.fit_report import FitReport
 from mgdd.optimize.iterative_learning import ConvergenceReport, IterativeLearning
 from mgdd.optimize.least_squares import least_squares
+from mgdd.optimize.measured_map import MeasuredMap, measure_map
+from mgdd.optimize.run import load_seeker, maximize
+from mgdd.optimize.tuning import Tuning, tune
 
-__all__ = ["ConvergenceReport", "FitReport", "IterativeLearning", "least_squares"]
+__all__ = [
+    "BoundedSeeking",
+    "ComponentLag",
+    "ConvergenceReport",
+    "ExtremumSeeking",
+    "FitReport",
+    "GoldenSection",
+    "GradientDescent",
+    "IterativeLearning",
+    "Limit",
+    "MeasuredMap",
+    "NewtonSeeking",
+    "Spsa",
+    "Tuning",
+    "least_squares",
+    "load_seeker",
+    "maximize",
+    "measure_map",
+    "tune",
+]

@@ -3,6 +3,7 @@
 #pragma once
 
 #include <Eigen/Core>
+#include <cmath>
 #include <cstdint>
 #include <map>
 #include <string>
@@ -21,6 +22,7 @@ class StateWriter {
   void operator()(std::string_view name, const double& value) { put(name, {value}); }
   void operator()(std::string_view name, const bool& value) { put(name, {value ? 1.0 : 0.0}); }
   void operator()(std::string_view name, const std::int64_t& value) { put(name, {static_cast<double>(value)}); }
+  void operator()(std::string_view name, const std::int64_t& value, std::int64_t) { (*this)(name, value); }
   void operator()(std::string_view name, const std::vector<double>& value) { put(name, value); }
   template <class Derived>
   void operator()(std::string_view name, const Eigen::PlainObjectBase<Derived>& value) {
@@ -42,8 +44,18 @@ class StateReader {
   void operator()(std::string_view name, bool& value) { value = column(name, 1)[0] != 0.0; }
   void operator()(std::string_view name, std::int64_t& value) {
     const double stored = column(name, 1)[0];
+    if (!(std::abs(stored) <= 0x1p53) || stored != std::trunc(stored)) refuse(name, "must hold a whole number");
     value = static_cast<std::int64_t>(stored);
-    if (static_cast<double>(value) != stored) refuse(name, "must hold a whole number");
+  }
+  /// A counter that indexes a table: 0 <= value < end.
+  void operator()(std::string_view name, std::int64_t& value, std::int64_t end) {
+    std::int64_t stored = 0;
+    (*this)(name, stored);
+    if (!(stored >= 0 && stored < end)) {
+      refuse(name,
+             "= " + std::to_string(stored) + ": must lie in [0, " + std::to_string(end) + "), as these settings say");
+    }
+    value = stored;
   }
   void operator()(std::string_view name, std::vector<double>& value) { value = column(name, value.size()); }
   template <class Derived>

@@ -72,7 +72,7 @@ class ExtremumSeeking {
     v("estimate", self.estimate_);
     v("applied", self.applied_);
     v("gradient", self.gradient_);
-    v("phase", self.phase_);
+    v("phase", self.phase_, self.settings_.dither.period);
     v("seen", self.seen_);
     v("held", self.held_);
     v("share", self.share_);

@@ -49,9 +49,9 @@ class GoldenSection {
     v("applied", self.applied_);
     v("lower", self.lower_);
     v("upper", self.upper_);
-    v("turn", self.turn_);
     v("draws", self.draws_);
     v("refining", self.refining_);
+    v("turn", self.turn_, self.refining_ ? 3 : 2);
     v("sample_input", self.sample_input_);
     v("sample_j", self.sample_j_);
     v("samples", self.samples_);

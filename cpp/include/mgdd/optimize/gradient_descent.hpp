@@ -53,7 +53,7 @@ class GradientDescent {
     v("applied", self.applied_);
     v("gradient", self.gradient_);
     v("above", self.above_);
-    v("stage", self.stage_);
+    v("stage", self.stage_, 2 * self.estimate_.size());
     v("iteration", self.iteration_);
     v("converged_at", self.converged_at_);
     LimitGuard::visit(self.guard_, v);

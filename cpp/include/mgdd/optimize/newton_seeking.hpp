@@ -61,7 +61,7 @@ class NewtonSeeking {
     v("gradient", self.gradient_);
     v("hessian", self.hessian_);
     v("inverse", self.inverse_);
-    v("phase", self.phase_);
+    v("phase", self.phase_, self.settings_.dither.period);
     v("seen", self.seen_);
     v("held", self.held_);
     v("share", self.share_);

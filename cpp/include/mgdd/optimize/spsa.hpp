@@ -87,7 +87,7 @@ class Spsa {
     v("measured", self.measured_);
     v("iteration", self.iteration_);
     v("draw", self.draw_);
-    v("stage", self.stage_);
+    v("stage", self.stage_, self.measurements_per_iteration());
     v("blocked", self.blocked_);
     v("accepted_j", self.accepted_j_);
     v("has_accepted", self.has_accepted_);

@@ -1,0 +1,188 @@
+"""Seekers that compare measurements at chosen inputs: SPSA, two-sided differences, golden section."""
+
+from __future__ import annotations
+
+from typing import ClassVar
+
+from mgdd import _core
+from mgdd.optimize.seeker_record import SeekerRecord
+
+__all__ = ["GoldenSection", "GradientDescent", "Spsa"]
+
+
+class Spsa(SeekerRecord, _core.Spsa):
+    """Simultaneous perturbation: the slope in every direction from two measurements.
+
+    Each iteration measures J at estimate +- c Delta, with random signs Delta, one cycle each, whatever the
+    number of inputs. Gains: a_k = gain/(k + 1 + stability)^gain_exponent and c_k = perturbation/(k +
+    1)^perturbation_exponent, or both constant. All arguments are keywords.
+
+    Parameters
+    ----------
+    start : float or array_like, shape (inputs,)
+        First estimate, in the unit of the input; one to eight inputs.
+    lower, upper : float or array_like
+        Bounds of the applied input, per input; infinite for none. The start must lie inside by the perturbation
+        (twice that in the second-order form).
+    form : {"first_order", "second_order", "one_measurement"}
+        Two measurements per gradient; four, with the Hessian; or one, with the trend of J taken off.
+    schedule : {"decreasing", "constant"}
+        Decreasing gains settle; constant gains go on tracking.
+    gain : float, optional
+        a [squared unit of the input per unit of J]; dimensionless in the second-order form. 20, or 3 there.
+    stability : float
+        A, iterations, >= 0; a tenth of the expected number is usual.
+    gain_exponent, perturbation_exponent : float
+        alpha and gamma; they must differ by more than 0.5 where gains decrease [-].
+    perturbation : float
+        c, in the unit of the input, > 0.
+    step_max : float, optional
+        Largest change of the estimate per iteration and input; 4/3 perturbation, or 1/5 of it with one
+        measurement.
+    averaging : int
+        Gradients per iteration.
+    blocking : bool
+        Measure once more at the new estimate and refuse it where J is worse by more than 2 `noise_sd`.
+    noise_sd : float
+        Standard deviation of one measurement of J, for blocking.
+    initial_hessian : float
+        Second order: curvature to begin with, < 0 [unit of J per squared unit of the input].
+    hessian_prior : float
+        Second order: iterations that `initial_hessian` counts for.
+    seed : int
+        Of the random signs: the same seed gives the same run.
+    maximize : bool
+        False to minimise J.
+    limits : sequence of Limit
+        Measured quantities to keep.
+    curvature : float, optional
+        J'' if known: a first step factor gain abs(J'') above 1 gives a UserWarning.
+
+    Raises
+    ------
+    mgdd.errors.ParameterError
+        A value outside its domain, or bounds that exclude the start.
+    mgdd.errors.ShapeError
+        Entries that are not one per input.
+
+    References
+    ----------
+    Spall (1992), Multivariate stochastic approximation using a simultaneous perturbation gradient
+    approximation; (1998), implementation; (1997), one-measurement form; (2000), second-order form.
+
+    Examples
+    --------
+    >>> from mgdd.optimize import Spsa
+    >>> seeker = Spsa(start=[8.0, -6.0], seed=4)
+    >>> for _ in range(600):
+    ...     x = seeker.ask()
+    ...     seeker.tell(-0.02 * x[0] ** 2 - 0.03 * x[1] ** 2)
+    >>> bool(abs(seeker.estimate).max() < 0.5)
+    True
+    """
+
+    kind: ClassVar[str] = "Spsa"
+
+
+class GradientDescent(SeekerRecord, _core.GradientDescent):
+    """Gradient steps by two-sided differences, two cycles per input and step.
+
+    Converges on a noise-free J for 0 < step_size < 2/abs(J''), fastest near 1/abs(J''). All arguments are
+    keywords.
+
+    Parameters
+    ----------
+    start : float or array_like, shape (inputs,)
+        First estimate, in the unit of the input; one to eight inputs.
+    lower, upper : float or array_like
+        Bounds of the applied input, per input; infinite for none. The start must lie inside by `difference`.
+    step_size : float
+        lambda_c, > 0 [squared unit of the input per unit of J].
+    difference : float
+        c, half the distance of the two measurements, in the unit of the input, > 0.
+    rate : float or array_like, optional
+        Largest change per step, per input; none without.
+    tolerance : float
+        Converged once every entry of a step is smaller, in the unit of the input.
+    iterations : int
+        Steps within which `converged_at` is looked for; the search goes on all the same.
+    maximize : bool
+        False to minimise J.
+    limits : sequence of Limit
+        Measured quantities to keep.
+    curvature : float, optional
+        J'' if known: a step size that cannot converge gives a UserWarning with the bound.
+
+    Raises
+    ------
+    mgdd.errors.ParameterError
+        A value outside its domain, or bounds that exclude the start.
+    mgdd.errors.ShapeError
+        Entries that are not one per input.
+
+    References
+    ----------
+    Kiefer and Wolfowitz (1952), Stochastic estimation of the maximum of a regression function.
+    Tan (2018), Model-guided data-driven optimization and control for internal combustion engine systems.
+
+    Examples
+    --------
+    >>> from mgdd.optimize import GradientDescent
+    >>> seeker = GradientDescent(start=-9.0, step_size=18.0)
+    >>> while seeker.converged_at is None:
+    ...     seeker.tell(-0.0255 * (seeker.ask()[0] + 5.0) ** 2)
+    >>> seeker.converged_at, round(float(seeker.estimate[0]), 3)
+    (4, -5.0)
+    """
+
+    kind: ClassVar[str] = "GradientDescent"
+
+
+class GoldenSection(SeekerRecord, _core.GoldenSection):
+    """Golden-section search of one input that believes a comparison only beyond the noise.
+
+    Two inner points are measured in turns until their means differ by more than chance; a draw cuts both ends.
+    When the bracket is as small as the noise allows, the search goes on as triples around the vertex of a
+    parabola and keeps tracking. All arguments are keywords.
+
+    Parameters
+    ----------
+    start : float
+        Estimate before the first decision.
+    lower, upper : float
+        The bracket, finite; also the bounds of the applied input.
+    noise_sd : float
+        Standard deviation of one measurement of J; 0 believes every comparison.
+    significance : float
+        Standard errors that decide a comparison.
+    samples_max : int
+        Measurements of each inner point before a draw.
+    tolerance : float
+        Width of the bracket at which a noise-free search ends, in the unit of the input, > 0.
+    maximize : bool
+        False to minimise J.
+    limits : sequence of Limit
+        Measured quantities to keep.
+
+    Raises
+    ------
+    mgdd.errors.ParameterError
+        A value outside its domain, an infinite bound, or bounds that exclude the start.
+    mgdd.errors.ShapeError
+        More than one input.
+
+    References
+    ----------
+    Kiefer (1953), Sequential minimax search for a maximum.
+
+    Examples
+    --------
+    >>> from mgdd.optimize import GoldenSection
+    >>> seeker = GoldenSection(start=-15.0, lower=-30.0, upper=10.0)
+    >>> while not seeker.converged:
+    ...     seeker.tell(-0.0255 * (seeker.ask()[0] + 5.6) ** 2)
+    >>> seeker.cycle, round(float(seeker.estimate[0]), 2)
+    (17, -5.6)
+    """
+
+    kind: ClassVar[str] = "GoldenSection"
