@@ -25,47 +25,49 @@ void bind_spsa(py::module_& m) {
   using R = Recorded<Spsa>;
   const SpsaSettings d;
   py::class_<R> cls(m, "Spsa", "Simultaneous perturbation; see mgdd.optimize.Spsa.");
-  cls.def(
-         py::init([](const py::object& start, const py::object& lower, const py::object& upper, const std::string& form,
-                     const std::string& schedule, std::optional<double> gain, double stability, double gain_exponent,
-                     double perturbation, double perturbation_exponent, std::optional<double> step_max, int averaging,
-                     bool blocking, double noise_sd, double initial_hessian, double hessian_prior, std::uint64_t seed,
-                     bool maximize, const std::vector<Limit>& limits, std::optional<double> curvature) {
-           SpsaSettings s;
-           s.space = space_from(start, lower, upper);
-           s.form = parse_spsa_form(form);
-           s.schedule = parse_gain_schedule(schedule);
-           s.gain = gain.value_or(0.0);
-           if (gain && !(*gain > 0.0)) throw ParameterError("gain = " + std::to_string(*gain) + ": must be > 0");
-           s.stability = stability;
-           s.gain_exponent = gain_exponent;
-           s.perturbation = perturbation;
-           s.perturbation_exponent = perturbation_exponent;
-           s.step_max = step_max.value_or(0.0);
-           if (step_max && !(*step_max > 0.0)) {
-             throw ParameterError("step_max = " + std::to_string(*step_max) + ": must be > 0");
-           }
-           s.averaging = averaging;
-           s.blocking = blocking;
-           s.noise_sd = noise_sd;
-           s.initial_hessian = initial_hessian;
-           s.hessian_prior = hessian_prior;
-           s.seed = seed;
-           s.maximize = maximize;
-           s.limits = limits;
-           s.curvature = none_as_nan(curvature);
-           R out{Spsa(s)};
-           warn_each(out.seeker.settings().advice());
-           return out;
-         }),
-         py::kw_only(), py::arg("start"), py::arg("lower") = -inf, py::arg("upper") = inf,
-         py::arg("form") = "first_order", py::arg("schedule") = "decreasing", py::arg("gain") = py::none(),
-         py::arg("stability") = d.stability, py::arg("gain_exponent") = d.gain_exponent,
-         py::arg("perturbation") = d.perturbation, py::arg("perturbation_exponent") = d.perturbation_exponent,
-         py::arg("step_max") = py::none(), py::arg("averaging") = d.averaging, py::arg("blocking") = d.blocking,
-         py::arg("noise_sd") = d.noise_sd, py::arg("initial_hessian") = d.initial_hessian,
-         py::arg("hessian_prior") = d.hessian_prior, py::arg("seed") = d.seed, py::arg("maximize") = true,
-         py::arg("limits") = std::vector<Limit>{}, py::arg("curvature") = py::none())
+  cls.def(py::init([](const py::object& start, const py::object& lower, const py::object& upper,
+                      const std::string& form, const std::string& schedule, std::optional<double> gain,
+                      double stability, double gain_exponent, double perturbation, double perturbation_exponent,
+                      std::optional<double> step_max, int averaging, bool blocking, double noise_sd,
+                      double initial_hessian, double hessian_prior, double limit_amplitude, std::uint64_t seed,
+                      bool maximize, const std::vector<Limit>& limits, std::optional<double> curvature) {
+            SpsaSettings s;
+            s.space = space_from(start, lower, upper);
+            s.form = parse_spsa_form(form);
+            s.schedule = parse_gain_schedule(schedule);
+            s.gain = gain.value_or(0.0);
+            if (gain && !(*gain > 0.0)) throw ParameterError("gain = " + std::to_string(*gain) + ": must be > 0");
+            s.stability = stability;
+            s.gain_exponent = gain_exponent;
+            s.perturbation = perturbation;
+            s.perturbation_exponent = perturbation_exponent;
+            s.step_max = step_max.value_or(0.0);
+            if (step_max && !(*step_max > 0.0)) {
+              throw ParameterError("step_max = " + std::to_string(*step_max) + ": must be > 0");
+            }
+            s.averaging = averaging;
+            s.blocking = blocking;
+            s.noise_sd = noise_sd;
+            s.initial_hessian = initial_hessian;
+            s.hessian_prior = hessian_prior;
+            s.limit_amplitude = limit_amplitude;
+            s.seed = seed;
+            s.maximize = maximize;
+            s.limits = limits;
+            s.curvature = none_as_nan(curvature);
+            R out{Spsa(s)};
+            warn_each(out.seeker.settings().advice());
+            return out;
+          }),
+          py::kw_only(), py::arg("start"), py::arg("lower") = -inf, py::arg("upper") = inf,
+          py::arg("form") = "first_order", py::arg("schedule") = "decreasing", py::arg("gain") = py::none(),
+          py::arg("stability") = d.stability, py::arg("gain_exponent") = d.gain_exponent,
+          py::arg("perturbation") = d.perturbation, py::arg("perturbation_exponent") = d.perturbation_exponent,
+          py::arg("step_max") = py::none(), py::arg("averaging") = d.averaging, py::arg("blocking") = d.blocking,
+          py::arg("noise_sd") = d.noise_sd, py::arg("initial_hessian") = d.initial_hessian,
+          py::arg("hessian_prior") = d.hessian_prior, py::arg("limit_amplitude") = d.limit_amplitude,
+          py::arg("seed") = d.seed, py::arg("maximize") = true, py::arg("limits") = std::vector<Limit>{},
+          py::arg("curvature") = py::none())
       .def_property_readonly(
           "gradient", [](const R& r) { return input_array(r.seeker.gradient()); },
           "Gradient of the last iteration, shape (inputs,).")
@@ -97,6 +99,7 @@ void bind_spsa(py::module_& m) {
             out["noise_sd"] = s.noise_sd;
             out["initial_hessian"] = s.initial_hessian;
             out["hessian_prior"] = s.hessian_prior;
+            out["limit_amplitude"] = s.limit_amplitude;
             out["seed"] = s.seed;
             out["maximize"] = s.maximize;
             out["limits"] = s.limits;

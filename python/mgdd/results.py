@@ -80,6 +80,7 @@ VARIABLES: Mapping[str, Label] = MappingProxyType(
         "work_gross_j": Label("J", "gross work (-180 to 180 °CA)"),
         "ringing_intensity_mw_per_m2": Label("MW/m²", "ringing intensity"),
         "soc_cad": Label(_CAD, "start of combustion"),
+        "estimate_cad": Label(_CAD, "estimate of the best timing"),
         "soi_cad": Label(_CAD, "start of injection"),
         "burn_duration_cad": Label("°CA", "burn duration"),
         "fuel_heat_j": Label("J", "fuel heat"),

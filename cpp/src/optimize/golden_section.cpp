@@ -15,6 +15,9 @@ constexpr std::size_t ring = 256;               // samples behind the parabola
 constexpr double reach_share = 0.3;             // of the bracket: how far the refinement looks to both sides
 constexpr double near_widths = 1.5;             // from the middle: samples beyond do not shape the parabola
 constexpr double first_samples = 2.0;           // of each point before chance is judged
+constexpr double limit_samples = 4.0;           // ... where limits are measured: their noise is not known
+constexpr double widest_share = 0.2;            // of the first bracket: the refinement looks no wider
+constexpr double narrow_share = 0.25;           // of its width, while a limit holds the refinement back
 constexpr std::int64_t last_draws = 2;          // in a row: the bracket is as small as the noise allows
 
 GoldenSectionSettings checked(GoldenSectionSettings s) {
@@ -48,6 +51,7 @@ GoldenSection::GoldenSection(GoldenSectionSettings settings)
       applied_(estimate_),
       lower_(settings_.space.lower[0]),
       upper_(settings_.space.upper[0]),
+      width_(upper_ - lower_),
       sample_input_(ring, 0.0),
       sample_j_(ring, 0.0) {}
 
@@ -101,7 +105,7 @@ TellStatus GoldenSection::tell(const Reading& reading) noexcept {
 void GoldenSection::decide() noexcept {
   const bool exact = settings_.noise_sd == 0.0;
   const double n = std::min(points_[0].count, points_[1].count);
-  if (n < (exact ? 1.0 : first_samples)) return;
+  if (n < (exact ? 1.0 : limit_count() > 0 ? limit_samples : first_samples)) return;
   const auto mean = [](double sum, const Point& p) { return sum / p.count; };
   const double over0 = mean(points_[0].excess, points_[0]);
   const double over1 = mean(points_[1].excess, points_[1]);
@@ -141,8 +145,9 @@ void GoldenSection::cut(double lower, double upper) noexcept {
   if (exact) return;
   // Ends that lie less than the noise below the top tell nothing: wide enough that they lie one noise_sd below.
   const double wide = fit.bend < 0.0 ? std::sqrt(8.0 * settings_.noise_sd / -fit.bend) : 0.0;
-  const double most = settings_.space.upper[0] - settings_.space.lower[0];
-  centre_bracket(std::min(most, std::max(upper_ - lower_, wide)));
+  const double most = widest_share * (settings_.space.upper[0] - settings_.space.lower[0]);
+  width_ = std::min(most, std::max(upper_ - lower_, wide));
+  centre_bracket(width_);
 }
 
 // Of the parabola through the samples near the bracket; its middle and bend 0 where they do not bend down.
@@ -174,7 +179,8 @@ void GoldenSection::refine() noexcept {
   clip_each(step, scalar_input(0.25 * reach));
   step = guard_.admit(estimate_, step, scalar_input(reach), scalar_input(reach));
   move_within(estimate_, step, settings_.space, scalar_input(0.0));
-  centre_bracket(upper_ - lower_);
+  const double target = guard_.active() ? narrow_share * width_ : width_;
+  centre_bracket(upper_ - lower_ + 0.1 * (target - (upper_ - lower_)));
 }
 
 // Same distance to both sides of the estimate: one that leaned would pull the estimate its way.

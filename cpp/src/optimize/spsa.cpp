@@ -26,6 +26,7 @@ constexpr std::array<std::pair<GainSchedule, std::string_view>, 2> schedule_name
 constexpr double memory = 10.0;              // measurements behind the trend and the limits
 constexpr double one_measurement_start = 6;  // measurements before the trend is trusted
 constexpr double blocking_errors = 2.0;
+constexpr double share_rate = 0.25;  // how fast the perturbation follows its target, per iteration
 
 SpsaSettings checked(SpsaSettings s) {
   const auto positive = [](std::string_view name, double value) {
@@ -65,6 +66,9 @@ SpsaSettings checked(SpsaSettings s) {
     throw ParameterError("initial_hessian = " + text(s.initial_hessian) + ": must be < 0, the bend of a maximum");
   }
   positive("hessian_prior", s.hessian_prior);
+  if (!(s.limit_amplitude > 0.0 && s.limit_amplitude <= 1.0)) {
+    throw ParameterError("limit_amplitude = " + text(s.limit_amplitude) + ": must be > 0 and <= 1");
+  }
   return s;
 }
 
@@ -129,8 +133,9 @@ double Spsa::gain_now() const noexcept {
 }
 
 double Spsa::perturbation_now() const noexcept {
-  if (settings_.schedule == GainSchedule::constant) return settings_.perturbation;
-  return settings_.perturbation / std::pow(static_cast<double>(iteration_) + 1.0, settings_.perturbation_exponent);
+  if (settings_.schedule == GainSchedule::constant) return share_ * settings_.perturbation;
+  return share_ * settings_.perturbation /
+         std::pow(static_cast<double>(iteration_) + 1.0, settings_.perturbation_exponent);
 }
 
 // +1 or -1, each with probability one half: bounded away from zero, as the proof of Spall 1992 needs.
@@ -232,13 +237,16 @@ void Spsa::finish_iteration() noexcept {
   gradient_ = sum_ / settings_.averaging;
   sum_.setZero();
   const bool second = settings_.form == SpsaForm::second_order;
-  Inputs step = gain_now() * (second ? newton_step() : gradient_);
+  // The noise of a gradient grows with 1/c: the gain follows c squared, so that the estimate does not get rougher.
+  Inputs step = gain_now() * share_ * share_ * (second ? newton_step() : gradient_);
   const Inputs most = Inputs::Constant(step.size(), settings_.step_max);
   clip_each(step, most);
   const Inputs reach = Inputs::Constant(step.size(), perturbation_now() * (second ? 2.0 : 1.0));
   step = guard_.admit(estimate_, step, reach, most);
   candidate_ = estimate_;
-  move_within(candidate_, step, settings_.space, reach);
+  const double widest = settings_.perturbation * (second ? 2.0 : 1.0);
+  move_within(candidate_, step, settings_.space, Inputs::Constant(step.size(), widest));
+  share_ += share_rate * ((guard_.active() ? settings_.limit_amplitude : 1.0) - share_);
 }
 
 void Spsa::restart() noexcept {
@@ -248,6 +256,7 @@ void Spsa::restart() noexcept {
   sum_.setZero();
   hessian_sum_.setZero();
   has_accepted_ = false;
+  share_ = 1.0;
   trend_.forget();
   guard_.forget();
 }

@@ -1,11 +1,23 @@
-"""Loops: the virtual engine bench that seekers and rigs run against.
+"""Closed loops: the virtual engine bench, a seeker on it, and thousands of such runs at once.
 
-Crank angles are °CA aTDC (firing TDC = 0, compression negative) throughout.
+`EngineBench` is the plant with its chance and its sensors, `run_seeker` closes the loop in the core, `monte_carlo` does
+so for seeds, gains and operating points on all cores, `steady_optimum` says where a seeker should end.
 """
 
 from __future__ import annotations
 
 from mgdd._core import SensorDynamics
 from mgdd.loop.bench import EngineBench
+from mgdd.loop.seek import LoopRun, monte_carlo, run_seeker
+from mgdd.loop.steady import SteadyOptimum, steady_map, steady_optimum
 
-__all__ = ["EngineBench", "SensorDynamics"]
+__all__ = [
+    "EngineBench",
+    "LoopRun",
+    "SensorDynamics",
+    "SteadyOptimum",
+    "monte_carlo",
+    "run_seeker",
+    "steady_map",
+    "steady_optimum",
+]

@@ -170,25 +170,30 @@ class EngineBench(_core.EngineBench):
         >>> bench.run([-6.0, -5.0])["p_max_bar"].values.round(1)
         array([107.2, 103. ])
         """
-        columns = self.run_columns(soc_cad)
-        settings = self.settings
-        terms = _unique([term.signal for term in settings["performance"].terms])
-        variables: dict[str, tuple[Any, ...]] = {"cycle": ("cycle", columns.pop("cycle"))}
-        components, limits = columns.pop("components"), columns.pop("limits")
-        for name, values in columns.items():
-            label = (("-", _FLAGS[name]) if name in _FLAGS else ()) if name not in VARIABLES else ()
-            variables[name] = ("cycle", values, *label)
-        variables["component"] = ("component", terms, "-", "term of the performance")
-        variables["components"] = (("cycle", "component"), components, "unit of J", "component of the performance")
-        names = settings["limits"]
-        if names:
-            units = {**{name: label.units for name, label in VARIABLES.items()}, _COV: "%"}
-            own = "unit of the limit"
-            variables["limit"] = ("limit", names, "-", "limited quantity")
-            variables["limit_units"] = ("limit", [units[name] for name in names], "-", own)
-            variables["limits"] = (("cycle", "limit"), limits, own, "measured value of a limited quantity")
-        out = labelled_dataset(variables, attrs={"seed": self.seed, "nox_sensor": settings["nox_sensor"]})
-        return out.set_coords("limit_units") if names else out
+        return cycles_to_dataset(self, self.run_columns(soc_cad))
+
+
+def cycles_to_dataset(bench: EngineBench, columns: dict[str, Any], **more: ArrayLike) -> xr.Dataset:
+    """Label the columns of a run, with further columns of names that `VARIABLES` knows."""
+    settings = bench.settings
+    terms = _unique([term.signal for term in settings["performance"].terms])
+    variables: dict[str, tuple[Any, ...]] = {"cycle": ("cycle", columns.pop("cycle"))}
+    variables |= {name: ("cycle", values) for name, values in more.items()}
+    components, limits = columns.pop("components"), columns.pop("limits")
+    for name, values in columns.items():
+        label = (("-", _FLAGS[name]) if name in _FLAGS else ()) if name not in VARIABLES else ()
+        variables[name] = ("cycle", values, *label)
+    variables["component"] = ("component", terms, "-", "term of the performance")
+    variables["components"] = (("cycle", "component"), components, "unit of J", "component of the performance")
+    names = settings["limits"]
+    if names:
+        units = {**{name: label.units for name, label in VARIABLES.items()}, _COV: "%"}
+        own = "unit of the limit"
+        variables["limit"] = ("limit", names, "-", "limited quantity")
+        variables["limit_units"] = ("limit", [units[name] for name in names], "-", own)
+        variables["limits"] = (("cycle", "limit"), limits, own, "measured value of a limited quantity")
+    out = labelled_dataset(variables, attrs={"seed": bench.seed, "nox_sensor": settings["nox_sensor"]})
+    return out.set_coords("limit_units") if names else out
 
 
 def _unique(names: Sequence[str]) -> list[str]:

@@ -3,7 +3,8 @@
 A seeker proposes an input (``ask``) and accepts what was measured there (``tell``), one engine cycle at a time; it
 never holds a plant, so simulation, replay and the test bench are the same loop. `tune` chooses amplitude, period
 and gain from noise and curvature, `measure_map` reads those off measurements, `maximize` runs the loop on a
-function. `IterativeLearning` improves the input of a repeated task from the error of each trial. `least_squares` is the Levenberg-Marquardt search behind every fit, which answers with a `FitReport`.
+function. `IterativeLearning` improves the input of a repeated task from the error of each trial. `least_squares` is
+the Levenberg-Marquardt search behind every fit, which answers with a `FitReport`.
 
 Examples
 --------

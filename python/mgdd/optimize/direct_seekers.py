@@ -49,6 +49,8 @@ class Spsa(SeekerRecord, _core.Spsa):
         Second order: curvature to begin with, < 0 [unit of J per squared unit of the input].
     hessian_prior : float
         Second order: iterations that `initial_hessian` counts for.
+    limit_amplitude : float
+        Share of the perturbation while a limit holds the estimate back [-].
     seed : int
         Of the random signs: the same seed gives the same run.
     maximize : bool

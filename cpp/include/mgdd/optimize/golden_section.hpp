@@ -49,6 +49,7 @@ class GoldenSection {
     v("applied", self.applied_);
     v("lower", self.lower_);
     v("upper", self.upper_);
+    v("width", self.width_);
     v("draws", self.draws_);
     v("refining", self.refining_);
     v("turn", self.turn_, self.refining_ ? 3 : 2);
@@ -83,6 +84,7 @@ class GoldenSection {
   Protocol protocol_;
   Inputs estimate_, applied_;
   double lower_, upper_;
+  double width_;           // of the bracket when the refinement began
   std::int64_t turn_ = 0;  // which inner point, or which of a triple, is measured now
   std::int64_t draws_ = 0;
   bool refining_ = false;

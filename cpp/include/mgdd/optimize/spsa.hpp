@@ -41,6 +41,7 @@ struct SpsaSettings {
   double noise_sd = 0.0;                 ///< of one measurement of J, for blocking
   double initial_hessian = -0.051;       ///< second order: curvature before the first measurement, < 0
   double hessian_prior = 20.0;           ///< ... and how many iterations it counts for
+  double limit_amplitude = 0.5;          ///< share of c while a limit holds the estimate back
   std::uint64_t seed = 0;
   bool maximize = true;
   std::vector<Limit> limits;
@@ -89,6 +90,7 @@ class Spsa {
     v("draw", self.draw_);
     v("stage", self.stage_, self.measurements_per_iteration());
     v("blocked", self.blocked_);
+    v("share", self.share_);
     v("accepted_j", self.accepted_j_);
     v("has_accepted", self.has_accepted_);
     LocalModel::visit(self.trend_, v, "trend");
@@ -115,6 +117,7 @@ class Spsa {
   std::int64_t draw_ = 0;         // gradients begun since construction: index of the random numbers
   std::int64_t stage_ = 0;        // measurement within the iteration
   std::int64_t blocked_ = 0;
+  double share_ = 1.0;  // perturbation now over that of the schedule
   double accepted_j_ = 0.0;
   bool has_accepted_ = false;
 };

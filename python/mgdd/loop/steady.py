@@ -1,0 +1,219 @@
+"""What a bench would show without chance and without waiting: steady maps of J and limits, and their optimum."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass, field
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+
+from mgdd._core import SensorDynamics
+from mgdd.errors import ConvergenceError, ParameterError
+from mgdd.loop.bench import EngineBench
+from mgdd.results import labelled_dataset
+
+if TYPE_CHECKING:
+    import xarray as xr
+    from numpy.typing import ArrayLike
+
+__all__ = ["SteadyOptimum", "steady_map", "steady_optimum"]
+
+_SCAN_CAD = 0.25
+_SECANT_CAD = 3.0
+
+
+@dataclass(frozen=True, kw_only=True)
+class SteadyOptimum:
+    """The timing at which a bench without chance has its best J, limits kept.
+
+    Parameters
+    ----------
+    soc_cad : float
+        Start of combustion [°CA aTDC].
+    j : float
+        Performance there.
+    curvature : float
+        Second difference of J over ±3 CAD at the free optimum [per °CA²].
+    limits : mapping of str to float
+        Limits that were kept.
+    active_limits : tuple of str
+        Those that hold the optimum back.
+    free_soc_cad : float
+        The optimum without limits [°CA aTDC].
+    limit_scatter : mapping of str to float
+        Standard deviation of each limited quantity from cycle to cycle that the scatter of SOC causes at the optimum,
+        to first order, in its unit.
+
+    Examples
+    --------
+    >>> from mgdd.loop import EngineBench, steady_optimum
+    >>> best = steady_optimum(EngineBench(limits=["p_max_bar"]), {"p_max_bar": 95.0})
+    >>> best.active_limits, best.soc_cad > best.free_soc_cad
+    (('p_max_bar',), True)
+    """
+
+    soc_cad: float
+    j: float
+    curvature: float
+    limits: Mapping[str, float] = field(default_factory=dict)
+    active_limits: tuple[str, ...] = ()
+    free_soc_cad: float
+    limit_scatter: Mapping[str, float] = field(default_factory=dict)
+
+
+def steady_map(bench: EngineBench, soc_cad: ArrayLike, *, cycle: int = 0) -> xr.Dataset:
+    """Measure a bench without scatter, noise, misfire and drift, each sensor settled.
+
+    Parameters
+    ----------
+    bench : EngineBench
+        Read, not run: the map is made on a quiet copy.
+    soc_cad : array_like
+        Starts of combustion [°CA aTDC], one-dimensional.
+    cycle : int
+        The operating point is that of this cycle of the schedule.
+
+    Returns
+    -------
+    xarray.Dataset
+        Over ``soc_cad``: ``j``, ``efficiency_gross``, ``imep_gross_bar``, ``p_max_bar``, ``dp_max_bar_per_cad``,
+        ``t_max_k``, ``nox_true_ppm``, ``nox_soft_ppm``.
+
+    Raises
+    ------
+    mgdd.errors.ParameterError
+        A timing outside the window of the bench.
+
+    Examples
+    --------
+    >>> from mgdd.loop import EngineBench, steady_map
+    >>> steady_map(EngineBench(), [-10.0, -5.0])["efficiency_gross"].values.round(3)
+    array([0.557, 0.562])
+    """
+    quiet = _quiet(bench, cycle)
+    timings = np.atleast_1d(np.asarray(soc_cad, float))
+    low, high = quiet.window_cad
+    for soc in timings:
+        if not low <= soc <= high:
+            raise ParameterError(f"soc_cad = {soc:g}: must lie in [{low:g}, {high:g}], the window of the bench")
+    rows = [_settled(quiet, float(soc)) for soc in timings]
+    names = ("efficiency_gross", "imep_gross_bar", "p_max_bar", "dp_max_bar_per_cad", "t_max_k")
+    variables: dict[str, tuple[Any, ...]] = {"soc_cad": ("soc_cad", timings)}
+    variables["j"] = ("soc_cad", [row["j"] for row in rows])
+    for name in (*names, "nox_true_ppm", "nox_soft_ppm"):
+        variables[name] = ("soc_cad", [row[name] for row in rows])
+    return labelled_dataset(variables)
+
+
+def steady_optimum(
+    bench: EngineBench,
+    limits: Mapping[str, float] | None = None,
+    *,
+    bounds_cad: tuple[float, float] = (-30.0, 10.0),
+    cycle: int = 0,
+) -> SteadyOptimum:
+    """Find the best timing of a bench without chance: what its seekers are judged by.
+
+    Parameters
+    ----------
+    bench : EngineBench
+        Read, not run.
+    limits : mapping of str to float, optional
+        Upper limits on indicators, for example ``{"p_max_bar": 95.0}``.
+    bounds_cad : tuple of float
+        Searched range [°CA aTDC].
+    cycle : int
+        The operating point is that of this cycle of the schedule.
+
+    Returns
+    -------
+    SteadyOptimum
+        To about 0.001 CAD.
+
+    Raises
+    ------
+    mgdd.errors.ParameterError
+        Bounds outside the window of the bench, or a limit that is no indicator.
+    mgdd.errors.ConvergenceError
+        No timing in the range meets the limits.
+
+    Examples
+    --------
+    >>> from mgdd.loop import EngineBench, steady_optimum
+    >>> round(steady_optimum(EngineBench()).soc_cad, 2)
+    -5.63
+    """
+    from scipy.optimize import brentq, minimize_scalar
+
+    limits = dict(limits or {})
+    quiet = _quiet(bench, cycle)
+    low, high = bounds_cad
+    window = quiet.window_cad
+    if not window[0] <= low < high <= window[1]:
+        raise ParameterError(
+            f"bounds_cad = ({low:g}, {high:g}): must increase and lie in [{window[0]:g}, {window[1]:g}]"
+        )
+    first = _settled(quiet, low)
+    for name in limits:
+        if name not in first:
+            raise ParameterError(f"limits: {name!r} is no indicator of the bench, for example p_max_bar")
+
+    def j(soc: float) -> float:
+        return float(_settled(quiet, soc)["j"])
+
+    def excess(soc: float) -> float:
+        now = _settled(quiet, soc)
+        return max((float(now[name]) - limit for name, limit in limits.items()), default=-1.0)
+
+    def peak(a: float, b: float) -> float:
+        return float(minimize_scalar(lambda x: -j(x), bounds=(a, b), method="bounded", options={"xatol": 1e-4}).x)
+
+    grid = np.linspace(low, high, round((high - low) / _SCAN_CAD) + 1)
+    values = np.array([j(x) for x in grid])
+    top = int(np.argmax(values))
+    free = peak(grid[max(top - 1, 0)], grid[min(top + 1, grid.size - 1)])
+    soc = free
+    if excess(free) > 0.0:
+        kept = np.array([excess(x) <= 0.0 for x in grid])
+        if not kept.any():
+            raise ConvergenceError(f"no soc_cad in [{low:g}, {high:g}] keeps {limits}: raise a limit")
+        best = int(np.argmax(np.where(kept, values, -np.inf)))
+        step = 1 if grid[best] < free else -1
+        outside = grid[best + step] if abs(grid[best + step] - grid[best]) < abs(free - grid[best]) else free
+        soc = float(brentq(excess, grid[best], outside, xtol=1e-6)) if excess(outside) > 0.0 else float(grid[best])
+    at = _settled(quiet, soc)
+    around = [j(free - _SECANT_CAD), j(free), j(free + _SECANT_CAD)]
+    scatter = float(bench.settings["soc_scatter_cad"])
+    early, late = _settled(quiet, soc - 0.05), _settled(quiet, soc + 0.05)
+    return SteadyOptimum(
+        soc_cad=soc,
+        j=float(at["j"]),
+        curvature=(around[0] - 2.0 * around[1] + around[2]) / _SECANT_CAD**2,
+        limits=limits,
+        active_limits=tuple(name for name, limit in limits.items() if at[name] > limit - 1e-3 * max(1.0, abs(limit))),
+        free_soc_cad=free,
+        limit_scatter={name: abs(late[name] - early[name]) / 0.1 * scatter for name in limits},
+    )
+
+
+def _quiet(bench: EngineBench, cycle: int) -> EngineBench:
+    """Copy a bench without anything random or slow, at the operating point of one cycle."""
+    settings = bench.settings
+    cylinder = settings.pop("cylinder")
+    settings.pop("schedule")
+    silent = {name: SensorDynamics(delay_s=0.0, lag_s=0.0, noise_fraction=0.0) for name in ("analyser", "fast_sensor")}
+    still = dict.fromkeys(
+        (
+            "soc_scatter_cad", "efficiency_noise_percent", "misfire_probability", "soc_drift_cad_per_kcycle",
+            "wall_heat_drift_per_kcycle",
+        ),
+        0.0,
+    )  # fmt: skip
+    return EngineBench(cylinder, bench.point_at(cycle), **{**settings, **silent, **still})
+
+
+def _settled(quiet: EngineBench, soc_cad: float) -> dict[str, Any]:
+    """Measure one cycle from rest: every sensor stands at its steady value."""
+    quiet.reset()
+    return quiet.step(soc_cad)
