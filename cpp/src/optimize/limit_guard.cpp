@@ -102,11 +102,11 @@ Inputs LimitGuard::admit(const Inputs& estimate, const Inputs& step, const Input
       const Inputs s = models_[worst].slope();
       const double over = worst_excess * limits_[worst].scale;
       out = step - s * ((s.dot(step) + over) / s.squaredNorm());
-    } else if (has_good_) {
+    } else if (has_good_ && good_ != estimate) {
       out = good_ - estimate;
-    } else {
+    } else if (!reach.isZero(0.0)) {
       out.setZero();
-    }
+    }  // without a reach its steps are the only dither: they go on, or no slope would ever be learnt
     clip_each(out, rate);
   } else {
     good_ = estimate;

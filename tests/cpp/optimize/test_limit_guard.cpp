@@ -130,7 +130,8 @@ TEST(LimitGuard, GoesToTheLastGoodPointWhileTheSlopeIsNotKnown) {
   EXPECT_EQ(guard.admit(scalar_input(9.0), scalar_input(0.3), none, rate)[0], -0.5);
   guard.forget();
   guard.record(scalar_input(3.0), high);
-  EXPECT_EQ(guard.admit(scalar_input(9.0), scalar_input(0.3), none, rate)[0], 0.0) << "no good point: stay";
+  EXPECT_EQ(guard.admit(scalar_input(9.0), scalar_input(0.3), scalar_input(1.0), rate)[0], 0.0) << "the dither looks";
+  EXPECT_EQ(guard.admit(scalar_input(9.0), scalar_input(0.3), none, rate)[0], 0.3) << "no dither: the steps look";
 }
 
 TEST(LimitGuard, AlarmsAfterThreeCyclesInARowOverTheSameLimit) {

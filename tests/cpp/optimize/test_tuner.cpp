@@ -94,7 +94,7 @@ TEST(Tuner, AKnownLagIsTurnedBackAndArrives) {
     const auto late = [&](double x) { return sensor.show(quadratic(x)); };
     const std::vector<double> path =
         std::visit([&](auto& seeker) { return search(seeker, late, static_cast<int>(8.0 * t.cycles)); }, any);
-    EXPECT_NEAR(first_within(path, 1.0) / t.cycles, 1.0, 0.35);
+    EXPECT_NEAR(first_within(path, 1.0) / t.cycles, 0.85, 0.35);
     EXPECT_LT(std::abs(path.back()), 0.3);
     EXPECT_LT(rms_of(path, path.size() / 2, path.size()), 0.5);
   }
