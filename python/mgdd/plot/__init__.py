@@ -8,7 +8,8 @@ title use the figure's `suptitle`.
 from __future__ import annotations
 
 from mgdd.plot.calibration import calibration_overlay, wall_heat_profile
+from mgdd.plot.convergence import plot_convergence
 from mgdd.plot.cycle import log_pv, pressure
 from mgdd.plot.timing import timing
 
-__all__ = ["calibration_overlay", "log_pv", "pressure", "timing", "wall_heat_profile"]
+__all__ = ["calibration_overlay", "log_pv", "plot_convergence", "pressure", "timing", "wall_heat_profile"]
