@@ -70,7 +70,7 @@ def test_table_puts_the_interval_behind_its_mean() -> None:
     assert table(rows).splitlines() == [
         "who               x  n_low",
         "a    1.235 [1, 1.5]      3",
-        "bcd              2      –",
+        "bcd               2      –",
     ]
     assert table([]) == "(no rows)"
 

@@ -1,4 +1,4 @@
-"""What a study hands back, and how all of them run: part by part, with an end by Ctrl-C that keeps the finished ones."""
+"""What a study hands back, and how all of them run: part by part, with an end by Ctrl-C that keeps the finished."""
 
 from __future__ import annotations
 

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import math
 from dataclasses import dataclass
+from functools import partial
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
@@ -100,14 +101,14 @@ def run_ch4_esc(
     seeds = min(check_seeds(seeds), 4) if quick else check_seeds(seeds)
     performance = Performance.efficiency_and_nox()
     best = steady_optimum(EngineBench(**_QUIET, performance=performance, nox_sensor="true_value"))
-    parts = [(f"{case.name}, period {case.period}", lambda case=case: _run_case(case, best)) for case in CASES]
+    parts = [(f"{case.name}, period {case.period}", partial(_run_case, case, best)) for case in CASES]
     done, interrupted = run_parts(parts, progress)
     rows = [row for row, _, _ in done]
     own: list[dict[str, Any]] = []
     tracks: list[NDArray[np.float64]] = []
     if not interrupted:
         wise = [
-            (f"component by component, period {period}", lambda p=period, t=time: _component_wise(p, t, best, seeds))
+            (f"component by component, period {period}", partial(_component_wise, period, time, best, seeds))
             for period, time in ((10, 40.0), (60, 240.0))
         ]
         found, interrupted = run_parts(wise, progress)

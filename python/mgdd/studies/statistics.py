@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import copy
 import math
 from collections.abc import Iterable
 from typing import TYPE_CHECKING, Any
@@ -16,7 +17,7 @@ if TYPE_CHECKING:
     import xarray as xr
     from numpy.typing import ArrayLike, NDArray
 
-__all__ = ["bands", "finished_loops", "mean_interval", "rms", "run_finished", "with_interval"]
+__all__ = ["bands", "finished_loops", "mean_interval", "rms", "run_finished", "run_with_slope", "with_interval"]
 
 _CONFIDENCE = 0.95
 
@@ -78,3 +79,25 @@ def bands(make: Callable[[int], tuple[EngineBench, Any]], seeds: Iterable[int], 
     """Give median, 10 % and 90 % quantile of the estimate over seeds, cycle by cycle, shape (3, cycles) [°CA aTDC]."""
     runs = [run_finished(*make(seed), cycles).dataset["estimate_cad"].to_numpy() for seed in seeds]
     return np.asarray(np.quantile(np.stack(runs), [0.5, 0.1, 0.9], axis=0))
+
+
+def run_with_slope(bench: EngineBench, seeker: Any, cycles: int) -> xr.Dataset:
+    """Give the cycles of `run_seeker` with the seeker's own slope of J, as mean over one dither period.
+
+    Bench and seeker are copied: the same loop is run once in the core and once by ask and tell, which are one
+    trajectory bit for bit.
+    """
+    twin, listener = copy.deepcopy(bench), copy.deepcopy(seeker)
+    run = run_finished(bench, seeker, cycles).dataset
+    slope = np.empty(cycles)
+    for cycle in range(cycles):
+        measured = twin.step(float(listener.ask()[0]))
+        parts = measured["components"]
+        told = parts if listener.component_count > 1 else parts.sum()
+        listener.tell(told, measured["limits"] if listener.limit_names else None, misfire=measured["misfire"])
+        slope[cycle] = listener.gradient[0]
+    settings = listener.settings
+    period = 1 if settings.get("form") == "batch" else int(settings["period"])  # a batch is such a mean itself
+    mean = np.convolve(slope, np.full(period, 1.0 / period))[:cycles]
+    attrs = {"units": "%/°CA", "long_name": "estimated slope of J"}
+    return run.assign(gradient_per_cad=("cycle", mean, attrs))
