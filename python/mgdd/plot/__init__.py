@@ -9,6 +9,7 @@ from __future__ import annotations
 
 from mgdd.plot.calibration import calibration_overlay, wall_heat_profile
 from mgdd.plot.cycle import log_pv, pressure
+from mgdd.plot.seeking import seeker_limit, seeker_run
 from mgdd.plot.timing import timing
 
-__all__ = ["calibration_overlay", "log_pv", "pressure", "timing", "wall_heat_profile"]
+__all__ = ["calibration_overlay", "log_pv", "pressure", "seeker_limit", "seeker_run", "timing", "wall_heat_profile"]
