@@ -16,6 +16,7 @@ from mgdd.cli.seekers import Task, default_cycles, make_seeker
 from mgdd.engine import Performance
 from mgdd.errors import ConvergenceError, ParameterError
 from mgdd.loop import EngineBench, LoopRun, SteadyOptimum, run_seeker, steady_optimum, summarize_cycles
+from mgdd.results import VARIABLES
 
 if TYPE_CHECKING:
     import xarray as xr
@@ -237,7 +238,7 @@ def _table(cycles: xr.Dataset) -> xr.Dataset:
     table = cycles.drop_dims([dim for dim in cycles.dims if dim != "cycle"])
     if "limit" in cycles.dims and _COV in cycles["limit"].to_numpy():
         cov = cycles["limits"].sel(limit=_COV, drop=True).drop_vars("limit_units", errors="ignore")
-        table[_COV] = cov.assign_attrs(units="%", long_name="COV of IMEP, last 50 cycles")
+        table[_COV] = cov.assign_attrs(VARIABLES[_COV]._asdict())
     return table
 
 

@@ -50,7 +50,7 @@ def summarize_cycles(
     >>> again["cycles_to"] == run.summary["cycles_to"]
     True
     """
-    estimate = cycles["estimate_cad"].to_numpy()
+    estimate: NDArray[np.float64] = cycles["estimate_cad"].to_numpy()
     n = estimate.size
     half = np.arange(n) >= n // 2
     misfire = cycles["misfire"].to_numpy().astype(bool)
@@ -76,8 +76,9 @@ def summarize_cycles(
     }
     if optimum_cad is None or not math.isfinite(optimum_cad):
         return out
-    out["rms_cad"] = math.sqrt(_mean((estimate[half] - optimum_cad) ** 2))
-    near = np.abs(estimate - optimum_cad) <= arrival_cad
+    away = np.asarray(estimate - optimum_cad, dtype=np.float64)
+    out["rms_cad"] = math.sqrt(_mean(away[half] ** 2))
+    near = np.abs(away) <= arrival_cad
     if near.any():
         out["cycles_to"] = float(np.argmax(near))
     if n and near[-1]:
@@ -89,7 +90,8 @@ def _exceeded(cycles: xr.Dataset, first: int, above: Mapping[str, float]) -> flo
     if not above or "limits" not in cycles or cycles.sizes["cycle"] <= first:
         return math.nan
     thresholds = np.array([above.get(str(name), math.inf) for name in cycles["limit"].to_numpy()])
-    return _mean((cycles["limits"].to_numpy()[first:] > thresholds).any(axis=1).astype(np.float64))
+    over = np.any(cycles["limits"].to_numpy()[first:] > thresholds, axis=1)
+    return float(np.mean(over))
 
 
 def _mean(values: NDArray[np.float64]) -> float:

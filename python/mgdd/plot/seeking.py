@@ -6,6 +6,7 @@ from typing import TYPE_CHECKING
 
 from mgdd.errors import DataError
 from mgdd.plot.style import BLACK, BLUE, GREY, ORANGE, axis_label, legend, minus, new_axes, require
+from mgdd.results import VARIABLES
 
 if TYPE_CHECKING:
     import xarray as xr
@@ -108,7 +109,7 @@ def seeker_limit(cycles: xr.Dataset, name: str, upper: float, *, ax: Axes | None
     ax = new_axes(ax)
     lines: list[Line2D] = ax.plot(cycles["cycle"], values, ".", color=GREY, markersize=2, label="measured")
     lines += [ax.axhline(upper, color=ORANGE, linestyle="--", label=minus(f"limit {upper:g}"))]
-    own = axis_label(cycles, name) if name in cycles else f"{name} [{values['limit_units'].item()}]"
-    ax.set(xlabel=axis_label(cycles, "cycle"), ylabel=own)
+    long_name = VARIABLES[name].long_name if name in VARIABLES else name
+    ax.set(xlabel=axis_label(cycles, "cycle"), ylabel=f"{long_name} [{values['limit_units'].item()}]")
     legend(ax, lines)
     return ax
