@@ -269,6 +269,9 @@ void bind_bench(py::module_& m) {
       .def_property_readonly(
           "point", [](const EngineBench& self) { return self.point(); }, "Operating point of the next cycle.")
       .def_property_readonly("cycle", &EngineBench::cycle, "Index of the next cycle.")
+      .def_property_readonly(
+          "operating_point_changes", [](const EngineBench& self) { return self.point_changes_at(self.cycle()); },
+          "Whether speed or fuel of the next cycle differ by more than 5 % from those of the last one.")
       .def_property_readonly("seed", &EngineBench::seed, "Seed of the run.")
       .def_property_readonly("window_cad", &EngineBench::window_cad, "Earliest and latest SOC that is not clamped.")
       .def_property_readonly("analyser_delay_cycles", &EngineBench::analyser_delay_cycles,
