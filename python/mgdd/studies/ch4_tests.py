@@ -83,7 +83,7 @@ class _Outcome:
 
 def run_ch4_tests(
     *,
-    seeds: int = 100,
+    seeds: int = 50,
     quick: bool = False,
     figures: bool = True,
     progress: Progress | None = None,
