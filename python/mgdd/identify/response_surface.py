@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
+from functools import lru_cache
 from typing import TYPE_CHECKING
 
 import numpy as np
@@ -25,7 +26,7 @@ class QuadraticBasis:
     def __call__(self, points: NDArray[np.float64]) -> NDArray[np.float64]:
         """Return the terms, shape (n, 1 + m + m (m + 1)/2), of points of shape (n, m)."""
         z = (points - self.centre) / self.scale
-        first, second = np.triu_indices(z.shape[1])
+        first, second = _pairs(z.shape[1])
         return np.column_stack([np.ones(len(z)), z, z[:, first] * z[:, second]])
 
 
@@ -77,8 +78,7 @@ class Support:
         ndarray, shape (n,)
             Diagonal of the hat matrix [-].
         """
-        terms = self.basis(np.asarray(points, dtype=np.float64))
-        return np.asarray(np.sum((terms @ self.root.T) ** 2, axis=1), dtype=np.float64)
+        return self._leverage_of(self.basis(np.asarray(points, dtype=np.float64)))
 
     def contains(self, points: Sequence[Sequence[float]] | NDArray[np.float64]) -> NDArray[np.bool_]:
         """Tell which points lie in the box and do not exceed the leverage limit.
@@ -94,8 +94,21 @@ class Support:
             False outside, and for NaN.
         """
         at = np.asarray(points, dtype=np.float64)
+        return self.contains_terms(at, self.basis(at))
+
+    def contains_terms(self, at: NDArray[np.float64], terms: NDArray[np.float64]) -> NDArray[np.bool_]:
+        """Tell the same of points whose terms are known."""
         inside = np.all((at >= self.lower) & (at <= self.upper), axis=1)
-        return np.asarray(inside & (self.leverage(at) <= self.leverage_limit * (1.0 + 1e-9)), dtype=np.bool_)
+        return np.asarray(inside & (self._leverage_of(terms) <= self.leverage_limit * (1.0 + 1e-9)), dtype=np.bool_)
+
+    def _leverage_of(self, terms: NDArray[np.float64]) -> NDArray[np.float64]:
+        return np.asarray(np.sum((terms @ self.root.T) ** 2, axis=1), dtype=np.float64)
+
+
+@lru_cache
+def _pairs(inputs: int) -> tuple[NDArray[np.intp], NDArray[np.intp]]:
+    first, second = np.triu_indices(inputs)
+    return first, second
 
 
 def support_of(points: NDArray[np.float64], basis: QuadraticBasis, *, inputs: tuple[str, ...], share: float) -> Support:

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 from dataclasses import dataclass
+from functools import cached_property
 from typing import TYPE_CHECKING
 
 import numpy as np
@@ -285,8 +286,12 @@ class EngineSurrogate:
     def evaluate(self, points: NDArray[np.float64]) -> tuple[NDArray[np.float64], NDArray[np.bool_]]:
         """Return steady values, shape (n, signals), and whether each point is supported."""
         terms = self.basis(points)
-        values = terms @ np.column_stack([signal.coefficients for signal in self.signals.values()])
+        values = terms @ self._coefficients
         columns = [list(self.signals).index(name) for name in self.nonnegative]
-        supported = self.support.contains(points) & np.all(values[:, columns] >= 0.0, axis=1)
+        supported = self.support.contains_terms(points, terms) & np.all(values[:, columns] >= 0.0, axis=1)
         values[:, columns] = np.maximum(values[:, columns], 0.0)
         return values, supported
+
+    @cached_property
+    def _coefficients(self) -> NDArray[np.float64]:
+        return np.column_stack([signal.coefficients for signal in self.signals.values()])
