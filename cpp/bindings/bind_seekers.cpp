@@ -157,40 +157,42 @@ void bind_extremum_seeking(py::module_& m) {
   using R = Recorded<ExtremumSeeking>;
   const ExtremumSeekingSettings d;
   py::class_<R> cls(m, "ExtremumSeeking", "Extremum seeking; see mgdd.optimize.ExtremumSeeking.");
-  cls.def(
-         py::init([](const py::object& start, const py::object& lower, const py::object& upper, const std::string& form,
-                     const py::object& amplitude, int period, const std::optional<std::vector<int>>& harmonics,
-                     const py::object& gain, const py::object& rate, double washout_pole, double low_pass,
-                     const std::optional<std::vector<ComponentLag>>& components, std::optional<int> hold_cycles,
-                     double amplitude_floor, double full_gradient, double limit_amplitude, bool maximize,
-                     const std::vector<Limit>& limits, std::optional<double> curvature) {
-           ExtremumSeekingSettings s;
-           s.space = space_from(start, lower, upper);
-           s.form = parse_mean_removal(form);
-           s.dither = dither_from(amplitude, period, harmonics, s.space.size());
-           s.gain = inputs_from(gain, "gain", s.space.size());
-           s.rate = optional_inputs(rate, "rate", s.space.size());
-           s.washout_pole = washout_pole;
-           s.low_pass = low_pass;
-           s.components = components_from(components);
-           s.hold_cycles = hold_cycles.value_or(-1);
-           s.amplitude_floor = amplitude_floor;
-           s.full_gradient = full_gradient;
-           s.limit_amplitude = limit_amplitude;
-           s.maximize = maximize;
-           s.limits = limits;
-           s.curvature = none_as_nan(curvature);
-           R out{ExtremumSeeking(s)};
-           warn_each(s.advice());
-           return out;
-         }),
-         py::kw_only(), py::arg("start"), py::arg("lower") = -inf, py::arg("upper") = inf, py::arg("form") = "batch",
-         py::arg("amplitude") = 1.0, py::arg("period") = d.dither.period, py::arg("harmonics") = py::none(),
-         py::arg("gain") = d.gain[0], py::arg("rate") = py::none(), py::arg("washout_pole") = d.washout_pole,
-         py::arg("low_pass") = d.low_pass, py::arg("components") = py::none(), py::arg("hold_cycles") = py::none(),
-         py::arg("amplitude_floor") = d.amplitude_floor, py::arg("full_gradient") = d.full_gradient,
-         py::arg("limit_amplitude") = d.limit_amplitude, py::arg("maximize") = true,
-         py::arg("limits") = std::vector<Limit>{}, py::arg("curvature") = py::none())
+  cls.def(py::init([](const py::object& start, const py::object& lower, const py::object& upper,
+                      const std::string& form, const py::object& amplitude, int period,
+                      const std::optional<std::vector<int>>& harmonics, const py::object& gain, const py::object& rate,
+                      const py::object& recovery_rate, double washout_pole, double low_pass,
+                      const std::optional<std::vector<ComponentLag>>& components, std::optional<int> hold_cycles,
+                      double amplitude_floor, double full_gradient, double limit_amplitude, bool maximize,
+                      const std::vector<Limit>& limits, std::optional<double> curvature) {
+            ExtremumSeekingSettings s;
+            s.space = space_from(start, lower, upper);
+            s.form = parse_mean_removal(form);
+            s.dither = dither_from(amplitude, period, harmonics, s.space.size());
+            s.gain = inputs_from(gain, "gain", s.space.size());
+            s.rate = optional_inputs(rate, "rate", s.space.size());
+            s.recovery_rate = optional_inputs(recovery_rate, "recovery_rate", s.space.size());
+            s.washout_pole = washout_pole;
+            s.low_pass = low_pass;
+            s.components = components_from(components);
+            s.hold_cycles = hold_cycles.value_or(-1);
+            s.amplitude_floor = amplitude_floor;
+            s.full_gradient = full_gradient;
+            s.limit_amplitude = limit_amplitude;
+            s.maximize = maximize;
+            s.limits = limits;
+            s.curvature = none_as_nan(curvature);
+            R out{ExtremumSeeking(s)};
+            warn_each(s.advice());
+            return out;
+          }),
+          py::kw_only(), py::arg("start"), py::arg("lower") = -inf, py::arg("upper") = inf, py::arg("form") = "batch",
+          py::arg("amplitude") = 1.0, py::arg("period") = d.dither.period, py::arg("harmonics") = py::none(),
+          py::arg("gain") = d.gain[0], py::arg("rate") = py::none(), py::arg("recovery_rate") = py::none(),
+          py::arg("washout_pole") = d.washout_pole, py::arg("low_pass") = d.low_pass,
+          py::arg("components") = py::none(), py::arg("hold_cycles") = py::none(),
+          py::arg("amplitude_floor") = d.amplitude_floor, py::arg("full_gradient") = d.full_gradient,
+          py::arg("limit_amplitude") = d.limit_amplitude, py::arg("maximize") = true,
+          py::arg("limits") = std::vector<Limit>{}, py::arg("curvature") = py::none())
       .def_property_readonly(
           "gradient", [](const R& r) { return input_array(r.seeker.gradient()); },
           "Last estimate of the slope of the maximised objective, shape (inputs,).")
@@ -206,6 +208,7 @@ void bind_extremum_seeking(py::module_& m) {
             add_dither(out, s.dither);
             out["gain"] = list_of(s.gain);
             out["rate"] = list_of(s.rate);
+            out["recovery_rate"] = list_of(s.recovery_rate);
             out["washout_pole"] = s.washout_pole;
             out["low_pass"] = s.low_pass;
             out["components"] = s.components;

@@ -26,10 +26,12 @@ ExtremumSeekingSettings checked(ExtremumSeekingSettings s) {
   validate(s.space, s.dither.amplitude);
   validate(s.components);
   validate_entries("gain", s.gain, n, 0.0, 1e300);
+  if (s.recovery_rate.size() == 0) s.recovery_rate = s.rate.size() == 0 ? s.dither.amplitude : s.rate;
   if (s.rate.size() == 0) {
     s.rate = s.dither.amplitude * ((s.form == MeanRemoval::batch ? 1.0 : 3.0) / s.dither.period);
   }
   validate_entries("rate", s.rate, n, 0.0);
+  validate_entries("recovery_rate", s.recovery_rate, n, 0.0);
   const auto inside = [](std::string_view name, double value, double lower, double upper) {
     if (!(value > lower && value <= upper)) {
       throw ParameterError(std::string(name) + " = " + text(value) + ": must be > " + text(lower) +
@@ -141,7 +143,7 @@ bool ExtremumSeeking::remove_mean(const Reading& reading) noexcept {
 void ExtremumSeeking::move(Inputs step, const Inputs& rate) noexcept {
   clip_each(step, rate);
   const Inputs reach = settings_.dither.amplitude * share_;
-  step = guard_.admit(estimate_, step, reach, rate.cwiseMax(3.0 * settings_.dither.amplitude / dither_.period()));
+  step = guard_.admit(estimate_, step, reach, rate.cwiseMax(settings_.recovery_rate));
   if (guard_.active()) ++limited_cycles_;
   move_within(estimate_, step, settings_.space, settings_.dither.amplitude);
 }
@@ -151,7 +153,6 @@ void ExtremumSeeking::learn(const Reading& reading) noexcept {
   const Inputs& a = settings_.dither.amplitude;
   const double period = dither_.period();
   const Inputs no_step = Inputs::Zero(estimate_.size());
-  const Inputs way_back = 3.0 * a / period;
   if (held_ > 0) --held_;
   const bool holding = held_ > 0;  // in the next cycle: after the last held one the estimate may move
   bool moved_by_alarm = false;
@@ -176,7 +177,7 @@ void ExtremumSeeking::learn(const Reading& reading) noexcept {
   }
   if (!moved_by_alarm && guard_.alarmed()) {
     const Inputs before = estimate_;
-    move(no_step, settings_.form == MeanRemoval::batch ? Inputs(way_back * 3.0) : way_back);
+    move(no_step, settings_.recovery_rate);
     if (settings_.form == MeanRemoval::batch && (estimate_ - before).squaredNorm() > 0.0) {
       phase_ = 0;  // the window has lost its held estimate: begin it anew
       ++seen_;

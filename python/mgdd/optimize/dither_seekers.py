@@ -37,6 +37,8 @@ class ExtremumSeeking(SeekerRecord, _core.ExtremumSeeking):
     rate : float or array_like, optional
         Largest change of the estimate per cycle, per input; amplitude/period in batches (once per period) and
         3 amplitude/period otherwise.
+    recovery_rate : float or array_like, optional
+        The same on the way back below a broken limit; `rate` where that is given, else one amplitude.
     washout_pole : float
         h of (z - 1)/(z - h) for the form ``"washout"`` [-].
     low_pass : float

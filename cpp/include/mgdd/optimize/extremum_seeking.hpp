@@ -26,8 +26,9 @@ struct ExtremumSeekingSettings {
   MeanRemoval form = MeanRemoval::batch;
   Inputs gain = scalar_input(0.98);  ///< g_r, input unit per unit of J; the default gives tau = 40 at J'' = -0.051
   Inputs rate{};                     ///< largest change of the estimate per cycle; empty: A/M in batches, else 3 A/M
-  double washout_pole = 0.9;         ///< h of (z - 1)/(z - h)
-  double low_pass = 1.0;             ///< b of y += b (x - y) after demodulation; 1 = off
+  Inputs recovery_rate{};     ///< the same on the way back below a limit; empty: `rate` where that is given, else A
+  double washout_pole = 0.9;  ///< h of (z - 1)/(z - h)
+  double low_pass = 1.0;      ///< b of y += b (x - y) after demodulation; 1 = off
   std::vector<ComponentLag> components{ComponentLag{}};
   int hold_cycles = -1;  ///< estimate held at the start and after `restart`; -1 = one window
 
