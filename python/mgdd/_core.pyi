@@ -1866,6 +1866,11 @@ class EngineBench:
         Index of the next cycle.
         """
     @property
+    def operating_point_changes(self) -> bool:
+        """
+        Whether speed or fuel of the next cycle differ by more than 5 % from those of the last one.
+        """
+    @property
     def point(self) -> OperatingPoint:
         """
         Operating point of the next cycle.

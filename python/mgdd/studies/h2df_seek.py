@@ -153,7 +153,10 @@ def run_h2df_seek(
     tell = progress or _quiet
     tell("fitting the surrogate")
     surrogate = _surrogate()
-    cases = [_case(surrogate, objective, name) for objective in _OBJECTIVES for name in objective.seekers]
+    cases = []
+    for objective in _OBJECTIVES:
+        held = _held_objective(surrogate, objective)
+        cases += [_case(surrogate, objective, name, held) for name in objective.seekers]
     runs = []
     for case in cases:
         tell(f"{case.objective.name}: {case.seeker}")
@@ -199,14 +202,13 @@ def _lag_of(surrogate: EngineSurrogate, name: str) -> ComponentLag:
     return ComponentLag(delay_cycles=float(signal.lag_cycles - first), lag_cycles=tau)
 
 
-def _case(surrogate: EngineSurrogate, objective: _Objective, seeker: str) -> _Case:
+def _case(surrogate: EngineSurrogate, objective: _Objective, seeker: str, held: NDArray[np.float64]) -> _Case:
     best = surrogate.optimum(objective.weights, objective.limits)
     free = surrogate.optimum(objective.weights)
     around = surrogate.predict(free.soi_cad + np.array([-0.5, 0.0, 0.5]))
     j = np.sum([weight * around[name].to_numpy() for name, weight in objective.weights.items()], axis=0)
     curvature = float(j[0] - 2.0 * j[1] + j[2]) / 0.25
     lags = tuple(_lag_of(surrogate, name) for name in objective.weights) if objective.compensated else ()
-    held = _held_objective(surrogate, objective)
     if seeker in ("spsa", "golden"):
         noise = float(np.std(np.diff(held))) / math.sqrt(2.0)
         tuning = _tuned(noise, curvature, best, ComponentLag(), "spsa")
