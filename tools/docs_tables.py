@@ -17,19 +17,26 @@ from mgdd.engine import Cylinder, OperatingPoint, analyze, simulate
 from mgdd.identify import CylinderFit, wall_heat_profile
 from mgdd.io import pressure_trace
 from mgdd.results import ANGLE, VARIABLES
-from mgdd.studies import best_timing, compare_laws
+from mgdd.studies import best_timing, compare_laws, run_study
 
 __all__ = [
     "burn_laws",
     "convergence",
     "demo",
+    "esc_cases",
+    "esc_components",
+    "esc_tests",
     "gamma",
     "golden",
     "ignition",
     "integrators",
+    "learning",
     "optimum",
     "pegging",
     "profile",
+    "seekers",
+    "sensor_fits",
+    "sensors",
     "tdc",
     "timing",
     "timing_table",
@@ -40,7 +47,7 @@ __all__ = [
 ]
 
 Rows = Mapping[str, list[float]]
-LABEL_COLUMNS = {"woschni_units": 2, "burn_laws": 2, "variables": 3}
+LABEL_COLUMNS = {"woschni_units": 2, "burn_laws": 2, "variables": 3, "esc_cases": 2, "seekers": 2}
 LAW_NAMES = {
     ("triangle", "constant"): "triangle, 1.37",
     ("wiebe", "constant"): "Wiebe, 1.37",
@@ -266,6 +273,61 @@ def traces() -> Rows:
 
 def variables() -> Rows:
     return {f"`{name}` {label.units} {label.long_name}": [] for name, label in VARIABLES.items()}
+
+
+# --- studies ------------------------------------------------------------------------------------------------
+@cache
+def study(name: str) -> Mapping[str, Any]:
+    return run_study(name, figures=False).summary
+
+
+def _with_ends(row: Mapping[str, Any], *names: str) -> list[float]:
+    """Mean and ends of its interval where the row has them, else the number alone; nothing for what never happens."""
+    found = [row.get(name + end) for name in names for end in ("", "_low", "_high")]
+    return [float(value) for value in found if value is not None]
+
+
+def seekers() -> Rows:
+    names = ("cycles_to_1_cad", "rms_cad", "final_cad", "j_lost")
+    return {f"{row['seeker']} {row['settings']}": _with_ends(row, *names) for row in study("ch3-optimizers")["rows"]}
+
+
+def learning() -> Rows:
+    names = ("sigma_max", "first_rms_cad", "third_rms_cad", "last_rms_cad")
+    return {f"`{row['law']}`": _with_ends(row, *names) for row in study("ch3-optimizers")["iterative_learning"]}
+
+
+def sensors() -> Rows:
+    steps = ("timing_step_t90_cycles", "load_step_t90_cycles", "load_step_t90_s")
+    names = ("steady_error_percent", "worst_error_percent", "scatter_percent")
+    return {row["sensor"]: [float(row[name]) for name in (*names, *steps)] for row in study("ch4-sensors")["rows"]}
+
+
+def sensor_fits() -> Rows:
+    names = ("reference_nox_ppm", "reference_nox_stderr_ppm", "activation_temperature_k")
+    names += ("activation_temperature_stderr_k", "residual_percent")
+    return {f"`{row['map']}`": [row[name] for name in names] for row in study("ch4-sensors")["fits"]}
+
+
+def esc_cases() -> Rows:
+    names = ("phase_deg", "step_sign", "cycles_stays", "final_cad")
+    return {f"{row['case']} {row['period_cycles']}": _with_ends(row, *names) for row in study("ch4-esc")["rows"]}
+
+
+def esc_components() -> Rows:
+    names = ("time_constant_cycles", "nox_gain", "rms_cad")
+    return {f"period {row['period_cycles']}": _with_ends(row, *names) for row in study("ch4-esc")["component_wise"]}
+
+
+def esc_tests() -> Rows:
+    names = ("start_cad", "optimum_cad", "final_cad", "cycles_to_1_cad", "efficiency_before_percent")
+    names += ("efficiency_after_percent", "nox_before_ppm", "nox_after_ppm", "gain_percent_points")
+    means = {"efficiency_after_percent", "nox_after_ppm", "gain_percent_points"}
+    rows = {}
+    for row in study("ch4-tests")["rows"]:
+        kept = {name: value for name, value in row.items() if name.rpartition("_")[0] not in means}
+        rows[row["test"]] = _with_ends(kept, *names)
+    return rows
 
 
 # --- single numbers -----------------------------------------------------------------------------------------

@@ -12,7 +12,7 @@ from mgdd import datasets
 from mgdd.errors import DataError, ParameterError
 from mgdd.identify import EngineSurrogate, fit_surrogate, random_step_records
 from mgdd.results import check_labels, to_jsonable
-from mgdd.studies import StudyResult, h2df_seek, run_h2df_seek
+from mgdd.studies import StudyResult, h2df_seek, run_h2df_seek, run_study
 
 needs_records = pytest.mark.skipif(
     "h2df_502" not in datasets.available(), reason="MGDD_DATA_DIR holds no folder h2df_502"
@@ -61,7 +61,7 @@ def test_rows_and_dataset_on_made_records(made: EngineSurrogate) -> None:
         assert one["final_soi_cad"] == pytest.approx(float(final.mean()))
         assert one["error_cad"] == pytest.approx(one["final_soi_cad"] - one["optimum_soi_cad"])
         half = 12.7062 * float(final.std("seed", ddof=1)) / np.sqrt(2.0)  # t of one degree of freedom
-        assert one["final_soi_high_cad"] - one["final_soi_cad"] == pytest.approx(half, rel=1e-4)
+        assert one["final_soi_cad_high"] - one["final_soi_cad"] == pytest.approx(half, rel=1e-4)
         assert 0.0 <= one["outside_share"] <= 1.0
     lag = made.signals["nox_ppm"].sensor
     assert lag is not None
@@ -90,7 +90,20 @@ def test_the_same_seeds_give_the_same_numbers() -> None:
     second = run_h2df_seek(seeds=2, quick=True, figures=False)
     np.testing.assert_array_equal(first.dataset["final_soi_cad"][:, 0], second.dataset["final_soi_cad"][:, 0])
     assert (second.dataset["final_soi_cad"][:, 0] != second.dataset["final_soi_cad"][:, 1]).any()
-    assert np.isnan(first.summary["rows"][0]["final_soi_low_cad"])
+    assert np.isnan(first.summary["rows"][0]["final_soi_cad_low"])
+
+
+def test_ctrl_c_keeps_the_finished_seekers(made: EngineSurrogate, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(h2df_seek, "_surrogate", lambda: made)
+
+    def press(text: str) -> None:
+        if text.endswith("spsa"):
+            raise KeyboardInterrupt
+
+    result = run_h2df_seek(seeds=1, quick=True, progress=press)
+    assert result.summary["interrupted"] is True
+    assert [row["seeker"] for row in result.summary["rows"]] == ["batch", "newton"]
+    assert len(result.figures) == 2
 
 
 def test_errors_name_the_remedy(monkeypatch: pytest.MonkeyPatch) -> None:
@@ -98,7 +111,7 @@ def test_errors_name_the_remedy(monkeypatch: pytest.MonkeyPatch) -> None:
         run_h2df_seek(seeds=0)
     monkeypatch.delenv("MGDD_DATA_DIR", raising=False)
     with pytest.raises(DataError, match="MGDD_DATA_DIR"):
-        run_h2df_seek(quick=True)
+        run_study("h2df-seek", quick=True)
 
 
 @needs_records

@@ -34,13 +34,13 @@ double whole_number(const std::vector<double>& from, std::size_t at, const char*
 
 StateColumns EngineBench::state() const {
   StateColumns columns{{"cycle", {static_cast<double>(cycle_)}},
-              {"seed", {static_cast<double>(seed_ >> 32), static_cast<double>(seed_ & 0xFFFFFFFFu)}},
-              {"last", {last_soc_cad_, last_t_max_k_, last_imep_bar_, ln_bias_}},
-              {"last_components", {last_components_.begin(), last_components_.end()}},
-              {"imep_gross_bar", {imep_bar_.begin(), imep_bar_.end()}},
-              {"analyser", analyser_.save()},
-              {"fast", fast_.save()},
-              {"soft_through_analyser", soft_through_analyser_.save()}};
+                       {"seed", {static_cast<double>(seed_ >> 32), static_cast<double>(seed_ & 0xFFFFFFFFu)}},
+                       {"last", {last_soc_cad_, last_t_max_k_, last_imep_bar_, ln_bias_}},
+                       {"last_components", {last_components_.begin(), last_components_.end()}},
+                       {"imep_gross_bar", {imep_bar_.begin(), imep_bar_.end()}},
+                       {"analyser", analyser_.save()},
+                       {"fast", fast_.save()},
+                       {"soft_through_analyser", soft_through_analyser_.save()}};
   for (std::size_t i = 0; i < component_lags_.size(); ++i)
     columns["component_" + std::to_string(i)] = component_lags_[i].save();
   return columns;

@@ -15,7 +15,7 @@ constexpr std::size_t ring = 256;               // samples behind the parabola
 constexpr double reach_share = 0.3;             // of the bracket: how far the refinement looks to both sides
 constexpr double near_widths = 1.5;             // from the middle: samples beyond do not shape the parabola
 constexpr double first_samples = 2.0;           // of each point before chance is judged
-constexpr double limit_samples = 4.0;           // ... where limits are measured: their noise is not known
+constexpr double limit_samples = 4.0;           // ... before a limit decides: its noise is not known
 constexpr double widest_share = 0.2;            // of the first bracket: the refinement looks no wider
 constexpr double narrow_share = 0.25;           // of its width, while a limit holds the refinement back
 constexpr std::int64_t last_draws = 2;          // in a row: the bracket is as small as the noise allows
@@ -105,11 +105,12 @@ TellStatus GoldenSection::tell(const Reading& reading) noexcept {
 void GoldenSection::decide() noexcept {
   const bool exact = settings_.noise_sd == 0.0;
   const double n = std::min(points_[0].count, points_[1].count);
-  if (n < (exact ? 1.0 : limit_count() > 0 ? limit_samples : first_samples)) return;
+  if (n < (exact ? 1.0 : first_samples)) return;
   const auto mean = [](double sum, const Point& p) { return sum / p.count; };
   const double over0 = mean(points_[0].excess, points_[0]);
   const double over1 = mean(points_[1].excess, points_[1]);
   if (limit_count() > 0 && std::max(over0, over1) > 0.0) {
+    if (!exact && n < limit_samples) return;
     draws_ = 0;
     return over0 > over1 ? cut(inner(0), upper_) : cut(lower_, inner(1));
   }

@@ -247,12 +247,8 @@ def _draw(cycles: xr.Dataset, best: SteadyOptimum, limits: Mapping[str, float], 
 
     from mgdd import plot
 
-    rows = 1 + len(limits)
-    figure = Figure(figsize=(8.0, 3.6 * rows), layout="constrained")
-    panels = figure.subplots(rows, 1, sharex=True, squeeze=False)[:, 0]
-    plot.seeker_run(cycles, optimum_cad=best.soc_cad, ax=panels[0])
-    for ax, (name, upper) in zip(panels[1:], limits.items(), strict=True):
-        plot.seeker_limit(cycles, name, upper, ax=ax)
+    figure = Figure(figsize=(8.0, 7.0), layout="constrained")
+    plot.plot_seeking(cycles, optimum_cad=best.soc_cad, limit_values=limits, ax=figure.add_subplot())
     figure.savefig(file, dpi=150)
     print(f"wrote {file}", file=sys.stderr)
 

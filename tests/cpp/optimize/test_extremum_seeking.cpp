@@ -11,7 +11,7 @@ double log_slope(ExtremumSeekingSettings s) {
   const auto period = static_cast<std::size_t>(s.dither.period);
   ExtremumSeeking seeker(std::move(s));
   const std::vector<double> path = search(seeker, quadratic, 400 * static_cast<int>(period));
-  const std::size_t begin = 3 * period, end = 11 * period;
+  const std::size_t begin = 10 * period, end = 30 * period;  // behind the transient of the start
   return std::log(std::abs((path[end] - path.back()) / (path[begin] - path.back()))) / static_cast<double>(end - begin);
 }
 

@@ -1,0 +1,39 @@
+"""Draw the figures of docs/studies.md: one or two of each study.
+
+Run `python tools/study_figures.py [FOLDER]` with the package installed; FOLDER defaults to docs/_static.
+"""
+
+from __future__ import annotations
+
+import sys
+from pathlib import Path
+
+import matplotlib as mpl
+
+from mgdd.studies import run_study
+
+OUT = Path(__file__).parents[1] / "docs" / "_static"
+# Study, number of the figure, resolution: each file stays below 100 kB.
+FIGURES = {
+    "study_seekers.png": ("ch3-optimizers", 0, 72),
+    "study_sensors.png": ("ch4-sensors", 1, 72),
+    "study_delay.png": ("ch4-esc", 0, 90),
+    "study_cures.png": ("ch4-esc", 1, 90),
+    "study_tests.png": ("ch4-tests", 3, 80),
+}
+
+
+def main() -> None:
+    """Run each study once, write its figures."""
+    mpl.use("Agg")
+    out = Path(sys.argv[1]) if len(sys.argv) > 1 else OUT
+    mpl.rcParams["font.size"] = 9.5
+    results = {name: run_study(name) for name, _, _ in FIGURES.values()}
+    for file, (name, number, dpi) in FIGURES.items():
+        figure = list(results[name].figures.values())[number]
+        figure.savefig(out / file, dpi=dpi, metadata={"Software": None})
+        print(file, (out / file).stat().st_size // 1024, "kB")
+
+
+if __name__ == "__main__":
+    main()
