@@ -360,7 +360,7 @@ def _dataset(cases: list[_Case], runs: list[_Runs], surrogate: EngineSurrogate) 
         "final_soi_cad": (every, finals, cad, "mean estimate of the last 100 cycles"),
         "final_soi_interval_cad": (
             "case",
-            [_interval(_final(r)) for r in runs],
+            [_half_interval(f) for f in finals],
             "°CA",
             "half 95 % interval of its mean",
         ),
