@@ -41,7 +41,7 @@ SEEKERS: dict[str, Callable[[], Any]] = {
     "washout": lambda: ExtremumSeeking(form="washout", **SPACE),
     "component-wise": lambda: ExtremumSeeking(gain=0.15, **LATE, **SPACE),
     "newton": lambda: NewtonSeeking(**SPACE),
-    "late newton": lambda: NewtonSeeking(**LATE, **SPACE),
+    "late newton": lambda: NewtonSeeking(time_constant_cycles=240.0, **LATE, **SPACE),
     "bounded": lambda: BoundedSeeking(**SPACE),
     "spsa": lambda: Spsa(seed=3, **SPACE),
     "second-order spsa": lambda: Spsa(form="second_order", seed=3, **SPACE),

@@ -3,14 +3,15 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Callable, Mapping
+from collections.abc import Mapping
 from dataclasses import dataclass, field
+from functools import partial
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
 from mgdd import datasets
-from mgdd.errors import DataError, ParameterError
+from mgdd.errors import DataError
 from mgdd.identify import EngineSurrogate, SurrogateEngine, SurrogateOptimum, fit_surrogate
 from mgdd.optimize import (
     BoundedSeeking,
@@ -24,8 +25,9 @@ from mgdd.optimize import (
     tune,
 )
 from mgdd.results import labelled_dataset
-from mgdd.studies.base import StudyResult
+from mgdd.studies.base import Progress, StudyResult, check_seeds, run_parts
 from mgdd.studies.h2df_figures import draw
+from mgdd.studies.statistics import mean_interval, with_interval
 
 if TYPE_CHECKING:
     import xarray as xr
@@ -97,7 +99,7 @@ def run_h2df_seek(
     seeds: int = 20,
     quick: bool = False,
     figures: bool = True,
-    progress: Callable[[str], None] | None = None,
+    progress: Progress | None = None,
 ) -> StudyResult:
     """Let every seeker look for the best injection timing of the measured hydrogen-diesel engine.
 
@@ -145,19 +147,18 @@ def run_h2df_seek(
     ...     result = run_h2df_seek(seeds=1, quick=True, figures=False)
     ...     assert len(result.summary["rows"]) == 12
     """
-    if seeds < 1:
-        raise ParameterError(f"seeds = {seeds}: must be >= 1")
-    if quick:
-        seeds = min(seeds, _QUICK_SEEDS)
+    seeds = min(check_seeds(seeds), _QUICK_SEEDS if quick else seeds)
     cycles = _QUICK_CYCLES if quick else _CYCLES
-    tell = progress or _quiet
-    tell("fitting the surrogate")
+    if progress is not None:
+        progress("fitting the surrogate")
     surrogate = _surrogate()
-    cases = [_case(surrogate, objective, name) for objective in _OBJECTIVES for name in objective.seekers]
-    runs = []
-    for case in cases:
-        tell(f"{case.objective.name}: {case.seeker}")
-        runs.append(_run(surrogate, case, seeds, cycles))
+    cases = []
+    for objective in _OBJECTIVES:
+        held = _held_objective(surrogate, objective)
+        cases += [_case(surrogate, objective, name, held) for name in objective.seekers]
+    parts = [(f"{case.objective.name}: {case.seeker}", partial(_run, surrogate, case, seeds, cycles)) for case in cases]
+    runs, interrupted = run_parts(parts, progress)
+    cases = cases[: len(runs)]
     dataset = _dataset(cases, runs, surrogate)
     sensor = surrogate.signals["nox_ppm"].sensor
     lag = _lag_of(surrogate, "nox_ppm")
@@ -171,13 +172,10 @@ def run_h2df_seek(
         "nox_lag_cycles": lag.lag_cycles,
         "nox_lag_stderr_cycles": sensor.tau_stderr_cycles if sensor is not None else math.nan,
         "records": dict(surrogate.source),
+        "interrupted": interrupted,
         "rows": [_row(case, run) for case, run in zip(cases, runs, strict=True)],
     }
     return StudyResult(name=_NAME, dataset=dataset, figures=draw(dataset) if figures else {}, summary=summary)
-
-
-def _quiet(_: str) -> None:
-    return None
 
 
 def _surrogate() -> EngineSurrogate:
@@ -199,14 +197,13 @@ def _lag_of(surrogate: EngineSurrogate, name: str) -> ComponentLag:
     return ComponentLag(delay_cycles=float(signal.lag_cycles - first), lag_cycles=tau)
 
 
-def _case(surrogate: EngineSurrogate, objective: _Objective, seeker: str) -> _Case:
+def _case(surrogate: EngineSurrogate, objective: _Objective, seeker: str, held: NDArray[np.float64]) -> _Case:
     best = surrogate.optimum(objective.weights, objective.limits)
     free = surrogate.optimum(objective.weights)
     around = surrogate.predict(free.soi_cad + np.array([-0.5, 0.0, 0.5]))
     j = np.sum([weight * around[name].to_numpy() for name, weight in objective.weights.items()], axis=0)
     curvature = float(j[0] - 2.0 * j[1] + j[2]) / 0.25
     lags = tuple(_lag_of(surrogate, name) for name in objective.weights) if objective.compensated else ()
-    held = _held_objective(surrogate, objective)
     if seeker in ("spsa", "golden"):
         noise = float(np.std(np.diff(held))) / math.sqrt(2.0)
         tuning = _tuned(noise, curvature, best, ComponentLag(), "spsa")
@@ -318,16 +315,13 @@ def _arrivals(case: _Case, run: _Runs) -> NDArray[np.float64]:
 
 def _row(case: _Case, run: _Runs) -> dict[str, Any]:
     final, arrivals = _final(run), _arrivals(case, run)
-    half = _interval(final)
     later = run.estimate.shape[1] // 2
     reached = np.where(np.isnan(arrivals), np.inf, arrivals)
     median = float(np.median(reached))
     return {
         "objective": case.objective.name,
         "seeker": case.seeker,
-        "final_soi_cad": float(final.mean()),
-        "final_soi_low_cad": float(final.mean() - half),
-        "final_soi_high_cad": float(final.mean() + half),
+        **with_interval("final_soi_cad", final),
         "final_soi_sd_cad": float(final.std(ddof=1)) if final.size > 1 else math.nan,
         "optimum_soi_cad": case.best.soi_cad,
         "error_cad": float(final.mean() - case.best.soi_cad),
@@ -344,13 +338,9 @@ def _row(case: _Case, run: _Runs) -> dict[str, Any]:
     }
 
 
-def _interval(values: NDArray[np.float64]) -> float:
-    """Return half the width of the 95 % interval of a mean."""
-    from scipy.stats import t
-
-    if values.size < 2:
-        return math.nan
-    return float(t.ppf(0.975, values.size - 1) * values.std(ddof=1) / math.sqrt(values.size))
+def _half_interval(values: NDArray[np.float64]) -> float:
+    mean, _, high = mean_interval(values)
+    return high - mean
 
 
 def _dataset(cases: list[_Case], runs: list[_Runs], surrogate: EngineSurrogate) -> xr.Dataset:
@@ -370,7 +360,7 @@ def _dataset(cases: list[_Case], runs: list[_Runs], surrogate: EngineSurrogate) 
         "final_soi_cad": (every, finals, cad, "mean estimate of the last 100 cycles"),
         "final_soi_interval_cad": (
             "case",
-            [_interval(_final(r)) for r in runs],
+            [_half_interval(f) for f in finals],
             "°CA",
             "half 95 % interval of its mean",
         ),
