@@ -89,6 +89,8 @@ Limit('p_max_bar', 95.0, margin=1.0, method='switching', weight=1.0, scale=0.0)
           "method", [](const Limit& l) { return std::string(to_string(l.method)); }, "How J knows of the limit.")
       .def_readonly("weight", &Limit::weight, "Of penalty or barrier.")
       .def_readonly("scale", &Limit::scale, "Unit of the excess.")
+      .def(
+          "__eq__", [](const Limit& a, const Limit& b) { return a == b; }, py::is_operator())
       .def("__repr__",
            [](const Limit& l) {
              return py::str("Limit({!r}, {!r}, margin={!r}, method={!r}, weight={!r}, scale={!r})")
@@ -141,6 +143,8 @@ Examples
           },
           py::kw_only(), py::arg("period"), py::arg("harmonic") = 1,
           "Gain [-] and phase lag [deg] at `harmonic` oscillations per `period` cycles.")
+      .def(
+          "__eq__", [](const ComponentLag& a, const ComponentLag& b) { return a == b; }, py::is_operator())
       .def("__repr__",
            [](const ComponentLag& l) {
              return py::str("ComponentLag(delay_cycles={!r}, lag_cycles={!r})").format(l.delay_cycles, l.lag_cycles);

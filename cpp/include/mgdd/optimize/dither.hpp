@@ -14,6 +14,8 @@ namespace mgdd::optimize {
 struct ComponentLag {
   double delay_cycles = 0.0;  ///< D >= 0
   double lag_cycles = 0.0;    ///< tau >= 0; 0 = none
+
+  bool operator==(const ComponentLag&) const = default;
 };
 
 struct DitherSettings {

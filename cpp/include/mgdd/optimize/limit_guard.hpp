@@ -26,6 +26,8 @@ struct Limit {
   LimitMethod method = LimitMethod::switching;
   double weight = 1.0;  ///< penalty: J units per squared scaled excess; barrier: J units times the logarithm
   double scale = 0.0;   ///< > 0; 0 = abs(upper), or 1
+
+  bool operator==(const Limit&) const = default;
 };
 void validate(const std::vector<Limit>& limits);
 
