@@ -12,7 +12,7 @@ from mgdd import datasets
 from mgdd.errors import DataError, ParameterError
 from mgdd.identify import EngineSurrogate, fit_surrogate, random_step_records
 from mgdd.results import check_labels, to_jsonable
-from mgdd.studies import StudyResult, h2df_seek, run_h2df_seek, run_study
+from mgdd.studies import StudyResult, h2df_cases, h2df_seek, run_h2df_seek, run_study
 
 needs_records = pytest.mark.skipif(
     "h2df_502" not in datasets.available(), reason="MGDD_DATA_DIR holds no folder h2df_502"
@@ -37,10 +37,10 @@ def row(result: StudyResult, objective: str, seeker: str) -> dict[str, Any]:
 def test_noise_is_read_at_the_period_of_the_dither() -> None:
     white = np.random.default_rng(1).normal(3.0, 0.25, 60_000)
     for period in (6, 13):
-        assert h2df_seek._noise_at(white, period) == pytest.approx(0.25, rel=0.03)
+        assert h2df_cases.noise_at(white, period) == pytest.approx(0.25, rel=0.03)
     slow = np.sin(2.0 * np.pi * np.arange(6000) / 600.0)
-    assert h2df_seek._noise_at(slow, 6) < 0.05 * np.std(slow)
-    assert h2df_seek._noise_at(np.full(600, 7.0), 6) == pytest.approx(0.0, abs=1e-12)
+    assert h2df_cases.noise_at(slow, 6) < 0.05 * np.std(slow)
+    assert h2df_cases.noise_at(np.full(600, 7.0), 6) == pytest.approx(0.0, abs=1e-12)
 
 
 @pytest.mark.usefixtures("on_made_records")
