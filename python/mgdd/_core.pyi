@@ -272,6 +272,9 @@ class Limit:
     >>> Limit("p_max_bar", 95.0, margin=1.0)
     Limit('p_max_bar', 95.0, margin=1.0, method='switching', weight=1.0, scale=0.0)
     """
+    __hash__: typing.ClassVar[None] = None
+    def __eq__(self, arg0: Limit) -> bool:
+        ...
     def __getstate__(self) -> tuple[str, float, float, str, float, float]:
         ...
     def __init__(self, name: str, upper: typing.SupportsFloat | typing.SupportsIndex, *, margin: typing.SupportsFloat | typing.SupportsIndex = 0.0, method: str = 'switching', weight: typing.SupportsFloat | typing.SupportsIndex = 1.0, scale: typing.SupportsFloat | typing.SupportsIndex = 0.0) -> None:
@@ -333,6 +336,9 @@ class ComponentLag:
     >>> round(gain, 4), round(phase_deg % 360.0, 1)
     (0.0646, 140.5)
     """
+    __hash__: typing.ClassVar[None] = None
+    def __eq__(self, arg0: ComponentLag) -> bool:
+        ...
     def __getstate__(self) -> tuple[float, float]:
         ...
     def __init__(self, *, delay_cycles: typing.SupportsFloat | typing.SupportsIndex = 0.0, lag_cycles: typing.SupportsFloat | typing.SupportsIndex = 0.0) -> None:

@@ -108,11 +108,11 @@ def learned():
 
 
 PLOTS = {
-    "seeking": (plot.plot_seeking, sought),
-    "convergence": (plot.plot_convergence, tracks),
-    "sensors over cycles": (plot.plot_sensors, readings),
-    "sensors over timing": (plot.plot_sensors, lambda: readings("soc_cad")),
-    "learning": (plot.plot_learning, learned),
+    "seeking": (plot.seeking, sought),
+    "convergence": (plot.convergence, tracks),
+    "sensors over cycles": (plot.sensors, readings),
+    "sensors over timing": (plot.sensors, lambda: readings("soc_cad")),
+    "learning": (plot.learning, learned),
     "pressure of a simulation": (plot.pressure, simulated),
     "pressure of an analysis": (plot.pressure, analysed),
     "pressure of a measurement": (plot.pressure, lambda: datasets.load_hd_traces()[3]),
@@ -308,10 +308,10 @@ def test_timing_says_when_the_sweep_ends_too_early():
         (plot.calibration_overlay, overlay, "residual_bar", "mgdd.identify.fit_cylinder"),
         (plot.wall_heat_profile, profile, "rmse_percent", "mgdd.identify.wall_heat_profile"),
         (plot.timing, sweep, "nox_arrhenius_ppm", "mgdd.engine.timing_sweep"),
-        (plot.plot_seeking, sought, "soc_requested_cad", "mgdd.loop.run_seeker"),
-        (plot.plot_convergence, tracks, "estimate_median_cad", "a study of mgdd.studies"),
-        (plot.plot_sensors, readings, "nox_true_ppm", "mgdd.loop.EngineBench.run"),
-        (plot.plot_learning, learned, "ca50_error_cad", "mgdd.studies.run_ch3_optimizers"),
+        (plot.seeking, sought, "soc_requested_cad", "mgdd.loop.run_seeker"),
+        (plot.convergence, tracks, "estimate_median_cad", "a study of mgdd.studies"),
+        (plot.sensors, readings, "nox_true_ppm", "mgdd.loop.EngineBench.run"),
+        (plot.learning, learned, "ca50_error_cad", "mgdd.studies.run_ch3_optimizers"),
     ],
 )
 def test_a_missing_variable_is_named_with_its_maker(function, dataset, variable, maker):
@@ -341,7 +341,7 @@ def test_values_that_cannot_be_drawn_are_refused():
 
 def test_seeking_has_four_panels_in_order():
     caps = {"p_max_bar": 100.0}
-    ax = plot.plot_seeking(sought(), optimum_cad=-6.0, limit_values=caps)
+    ax = plot.seeking(sought(), optimum_cad=-6.0, limit_values=caps)
     panels = ax.figure.axes
     assert [panel.get_ylabel() for panel in panels] == [
         "timing [°CA aTDC]", "J [unit of J]", "NOx,\nsoft sensor [ppm]", "limited [bar, K]",
@@ -358,38 +358,38 @@ def test_seeking_has_four_panels_in_order():
 
 def test_seeking_shows_the_slope_or_leaves_panels_out():
     with_slope = sought().assign(gradient_per_cad=("cycle", NEAR, {"units": "%/°CA", "long_name": "slope"}))
-    assert plot.plot_seeking(with_slope).figure.axes[2].get_ylabel() == "slope [%/°CA]"
+    assert plot.seeking(with_slope).figure.axes[2].get_ylabel() == "slope [%/°CA]"
     bare = sought().drop_dims("limit").assign_attrs(nox_sensor="none")
-    assert len(plot.plot_seeking(bare).figure.axes) == 2
+    assert len(plot.seeking(bare).figure.axes) == 2
     free = plt.figure().add_axes((0.2, 0.2, 0.7, 0.6))
-    assert plot.plot_seeking(sought(), ax=free) is free
+    assert plot.seeking(sought(), ax=free) is free
     assert len(free.figure.axes) == 4
     misfired = sought()
     misfired["j"][7] = np.nan
-    assert np.isfinite(line(plot.plot_seeking(misfired).figure.axes[1], "mean of 50 cycles").get_ydata()).all()
+    assert np.isfinite(line(plot.seeking(misfired).figure.axes[1], "mean of 50 cycles").get_ydata()).all()
     with pytest.raises(DataError, match="limit_values: 'torque' was not measured"):
-        plot.plot_seeking(sought(), limit_values={"torque": 3.0})
+        plot.seeking(sought(), limit_values={"torque": 3.0})
 
 
 def test_convergence_bands_and_refusals():
-    ax = plot.plot_convergence(tracks())
+    ax = plot.convergence(tracks())
     np.testing.assert_array_equal(line(ax, "fast").get_ydata(), tracks()["estimate_median_cad"][1])
     assert len(ax.collections) == 2
     band = ax.collections[0].get_paths()[0].vertices[:, 1]
     low, high = tracks()["estimate_low_cad"][0], tracks()["estimate_high_cad"][0]
     assert (band.min(), band.max()) == pytest.approx((float(low.min()), float(high.max())))
-    assert len(plot.plot_convergence(tracks().drop_vars("estimate_low_cad")).collections) == 0
+    assert len(plot.convergence(tracks().drop_vars("estimate_low_cad")).collections) == 0
     with pytest.raises(DataError, match="must be cycle and one more"):
-        plot.plot_convergence(tracks().isel(case=0, drop=True))
+        plot.convergence(tracks().isel(case=0, drop=True))
     many = tracks().isel(case=[0, 1] * 6).assign_coords(case=("case", list("abcdefghijkl"), tracks()["case"].attrs))
     with pytest.raises(DataError, match="case has 12 entries: at most 9"):
-        plot.plot_convergence(many)
+        plot.convergence(many)
 
 
 def test_sensors_over_cycles_timing_and_temperature():
     for over in ("cycle", "soc_cad", "t_max_k"):
         data = readings(over)
-        ax = plot.plot_sensors(data)
+        ax = plot.sensors(data)
         analyser = line(ax, "analyser")
         np.testing.assert_array_equal(analyser.get_data(), [data[over], data["nox_analyser_ppm"]])
         assert (analyser.get_marker() == "None") == (over == "cycle")
@@ -398,4 +398,4 @@ def test_sensors_over_cycles_timing_and_temperature():
         }  # fmt: skip
     wrong = readings().rename(cycle="seed")
     with pytest.raises(DataError, match="must be one of cycle, soc_cad"):
-        plot.plot_sensors(wrong)
+        plot.sensors(wrong)

@@ -248,7 +248,7 @@ def _draw(cycles: xr.Dataset, best: SteadyOptimum, limits: Mapping[str, float], 
     from mgdd import plot
 
     figure = Figure(figsize=(8.0, 7.0), layout="constrained")
-    plot.plot_seeking(cycles, optimum_cad=best.soc_cad, limit_values=limits, ax=figure.add_subplot())
+    plot.seeking(cycles, optimum_cad=best.soc_cad, limit_values=limits, ax=figure.add_subplot())
     figure.savefig(file, dpi=150)
     print(f"wrote {file}", file=sys.stderr)
 

@@ -14,14 +14,14 @@ if TYPE_CHECKING:
     from matplotlib.artist import Artist
     from matplotlib.axes import Axes
 
-__all__ = ["plot_convergence"]
+__all__ = ["convergence"]
 
 _BAND = ("estimate_low_cad", "estimate_high_cad")
 # Two colours-and-dashes more than the house has: a comparison of seekers needs them.
 _STYLES = (*LINE_STYLES, ("-", ORANGE), ("--", GREEN), ("-.", BLUE), (":", BLACK))
 
 
-def plot_convergence(tracks: xr.Dataset, *, ax: Axes | None = None) -> Axes:
+def convergence(tracks: xr.Dataset, *, ax: Axes | None = None) -> Axes:
     """Draw how estimates approach the optimum: medians as lines, quantiles over seeds as bands.
 
     Parameters
@@ -56,7 +56,7 @@ def plot_convergence(tracks: xr.Dataset, *, ax: Axes | None = None) -> Axes:
     ...         ("case", "cycle"), [-14.0 * np.exp(-cycle / t) - 6.0 for t in (80.0, 20.0)], "°CA aTDC", "estimate"
     ...     ),
     ... })
-    >>> plot.plot_convergence(tracks).get_ylabel()
+    >>> plot.convergence(tracks).get_ylabel()
     'estimate [°CA aTDC]'
     """
     optional = (*_BAND, "optimum_cad")

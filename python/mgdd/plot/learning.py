@@ -11,12 +11,12 @@ if TYPE_CHECKING:
     from matplotlib.axes import Axes
     from matplotlib.lines import Line2D
 
-__all__ = ["plot_learning"]
+__all__ = ["learning"]
 
 _MARKERS = "osv^D"
 
 
-def plot_learning(learned: xr.Dataset, *, ax: Axes | None = None) -> Axes:
+def learning(learned: xr.Dataset, *, ax: Axes | None = None) -> Axes:
     """Draw how the error of a repeated task falls from trial to trial, one line per learning law.
 
     Parameters
@@ -44,7 +44,7 @@ def plot_learning(learned: xr.Dataset, *, ax: Axes | None = None) -> Axes:
     ...     "law": ("law", ["p"], "-", "learning law"), "trial": ("trial", [0, 1, 2], "-", "trial"),
     ...     "ca50_error_cad": (("law", "trial"), [[8.0, 4.0, 2.0]], "°CA", "rms error of CA50"),
     ... })
-    >>> plot.plot_learning(learned).get_ylabel()
+    >>> plot.learning(learned).get_ylabel()
     'rms error of CA50 [°CA]'
     """
     require(learned, ("law", "trial", "ca50_error_cad"), "mgdd.studies.run_ch3_optimizers")

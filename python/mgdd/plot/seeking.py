@@ -16,13 +16,13 @@ if TYPE_CHECKING:
     from matplotlib.axes import Axes
     from numpy.typing import NDArray
 
-__all__ = ["plot_seeking"]
+__all__ = ["seeking"]
 
 _NEEDED = ("cycle", "estimate_cad", "soc_requested_cad", "j")
 _SLOPE = "gradient_per_cad"
 
 
-def plot_seeking(
+def seeking(
     run: xr.Dataset,
     *,
     optimum_cad: float | None = None,
@@ -72,7 +72,7 @@ def plot_seeking(
     ...     "soc_requested_cad": ("cycle", -6.0 - 10.0 * 0.9**cycle + np.sin(0.6 * cycle)),
     ...     "j": ("cycle", 56.0 - 0.9**cycle),
     ... })
-    >>> [panel.get_ylabel() for panel in plot.plot_seeking(run).figure.axes]
+    >>> [panel.get_ylabel() for panel in plot.seeking(run).figure.axes]
     ['timing [°CA aTDC]', 'J [unit of J]']
     """
     sensor = f"nox_{run.attrs.get('nox_sensor', 'none')}_ppm".replace("true_value", "true")

@@ -12,7 +12,7 @@ if TYPE_CHECKING:
     from matplotlib.artist import Artist
     from matplotlib.axes import Axes
 
-__all__ = ["plot_sensors"]
+__all__ = ["sensors"]
 
 # Behind each other in this order: the noisy ones first, the true value above them.
 _SENSORS: dict[str, dict[str, Any]] = {
@@ -28,7 +28,7 @@ _MARKER_SIZES = {"nox_fast_ppm": 6.0, "nox_soft_corrected_ppm": 7.0, "nox_analys
 _OVER = ("cycle", "soc_cad", "soi_cad", "t_max_k")
 
 
-def plot_sensors(readings: xr.Dataset, *, ax: Axes | None = None) -> Axes:
+def sensors(readings: xr.Dataset, *, ax: Axes | None = None) -> Axes:
     """Draw what the NOx sensors say beside the true value.
 
     Parameters
@@ -54,7 +54,7 @@ def plot_sensors(readings: xr.Dataset, *, ax: Axes | None = None) -> Axes:
     --------
     >>> from mgdd import plot
     >>> from mgdd.loop import EngineBench
-    >>> plot.plot_sensors(EngineBench(seed=1).run([-6.0] * 20)).get_ylabel()
+    >>> plot.sensors(EngineBench(seed=1).run([-6.0] * 20)).get_ylabel()
     'NOx [ppm]'
     """
     names = [name for name in _SENSORS if name in readings]

@@ -253,7 +253,7 @@ def _draw(dataset: xr.Dataset) -> dict[str, Figure]:
     tracks = dataset[["estimate_median_cad", "estimate_low_cad", "estimate_high_cad", "optimum_cad"]]
     for index, ax in enumerate(axes.flat):
         if index < len(names):
-            plot.plot_convergence(tracks.isel(seeker=[index]), ax=ax)
+            plot.convergence(tracks.isel(seeker=[index]), ax=ax)
             ax.get_legend().remove()
             ax.set_title(str(names[index]), loc="left", fontsize="small")
             ax.set(xlabel="", ylabel="")
@@ -265,6 +265,6 @@ def _draw(dataset: xr.Dataset) -> dict[str, Figure]:
     out = {"Estimate over cycles: median of the seeds, with the band that holds 80 % of them": figure}
     if "law" in dataset:
         learning = Figure(figsize=(6.6, 3.8), layout="constrained")
-        plot.plot_learning(dataset, ax=learning.add_subplot())
+        plot.learning(dataset, ax=learning.add_subplot())
         out["Iterative learning of a repeated load step"] = learning
     return out

@@ -274,7 +274,7 @@ def _draw(dataset: xr.Dataset) -> dict[str, Figure]:
         kept = [place for place in places if place < dataset.sizes["case"]]
         if kept:
             figure = Figure(figsize=(7.4, 4.2), layout="constrained")
-            plot.plot_convergence(dataset.isel(case=kept, cycle=slice(cycles)), ax=figure.add_subplot())
+            plot.convergence(dataset.isel(case=kept, cycle=slice(cycles)), ax=figure.add_subplot())
             out[caption] = figure
     if "component_median_cad" in dataset:
         own = dataset[["component_median_cad", "component_low_cad", "component_high_cad", "optimum_cad"]]
@@ -283,6 +283,6 @@ def _draw(dataset: xr.Dataset) -> dict[str, Figure]:
         labels = [f"period {int(period)}" for period in own["case"].to_numpy()]
         own = own.assign_coords(case=("case", labels, {"units": "-", "long_name": "case"}))
         figure = Figure(figsize=(7.4, 4.2), layout="constrained")
-        plot.plot_convergence(own.isel(cycle=slice(2000)), ax=figure.add_subplot())
+        plot.convergence(own.isel(cycle=slice(2000)), ax=figure.add_subplot())
         out["Only NOx is late, each component demodulated with its own phase; default noise"] = figure
     return out

@@ -28,14 +28,14 @@ def draw(dataset: xr.Dataset) -> dict[str, Figure]:
     map_names = {"steady_true_ppm": "nox_true_ppm", "steady_analyser_ppm": "nox_analyser_ppm"}
     map_names |= {f"fitted_{name}_ppm": f"nox_{name}_ppm" for name in ("affine_log", "arrhenius")}
     mapped = dataset[[*map_names, "t_max_k"]].rename(map_names).swap_dims(soi_cad="t_max_k").drop_vars("soi_cad")
-    plot.plot_sensors(mapped, ax=left)
-    plot.plot_sensors(steady, ax=right)
+    plot.sensors(mapped, ax=left)
+    plot.sensors(steady, ax=right)
     out = {"Map of the soft sensor over the maximum gas temperature, and every sensor over injection timing": figure}
     if "step" in dataset:
         figure = Figure(figsize=(11.0, 4.2), layout="constrained")
         steps = dataset[[*names.values()]]
         for ax, step in zip(figure.subplots(1, steps.sizes["step"], squeeze=False).flat, dataset["step"], strict=True):
-            plot.plot_sensors(steps.sel(step=step).drop_vars("step"), ax=ax)
+            plot.sensors(steps.sel(step=step).drop_vars("step"), ax=ax)
             ax.annotate(str(step.item()), (0.98, 0.04), xycoords="axes fraction", ha="right")
         out["Answers of the sensors to a step of timing and of load at cycle 0"] = figure
     if "correction_cycle" in dataset:

@@ -233,7 +233,7 @@ def _draw(done: Sequence[_Outcome], limited: Sequence[_Outcome]) -> dict[str, Fi
     for outcome, caps in [*((o, None) for o in done), *((o, {"p_max_bar": P_MAX_BAR}) for o in limited)]:
         figure = Figure(figsize=(7.4, 8.0 if caps else 6.4), layout="constrained")
         run = outcome.run.isel(cycle=slice(_SHOWN))
-        plot.plot_seeking(run, optimum_cad=outcome.row["optimum_cad"], limit_values=caps, ax=figure.add_subplot())
+        plot.seeking(run, optimum_cad=outcome.row["optimum_cad"], limit_values=caps, ax=figure.add_subplot())
         under = f", maximum pressure at most {P_MAX_BAR:g} bar" if caps else ""
         out[f"Test {outcome.row['test']}{under} (one seed)"] = figure
     return out
