@@ -1,7 +1,6 @@
 // Binds loop/engine_bench.hpp: the virtual engine bench and the dynamics of its sensors.
 #include <cstddef>
 #include <cstdint>
-#include <map>
 #include <optional>
 #include <span>
 #include <string>
@@ -262,20 +261,17 @@ void bind_bench(py::module_& m) {
       .def(
           "reset", [](EngineBench& self, std::optional<std::uint64_t> seed) { self.reset(seed.value_or(self.seed())); },
           arg("seed") = py::none(), "Back to cycle 0, with another seed if given.")
-      .def(
-          "save",
-          [](const EngineBench& self) {
-            py::dict out;
-            for (const auto& [name, column] : self.save())
-              out[as_str(name)] = to_array(column);
-            return out;
-          },
-          "State of the run between two cycles: named columns.")
-      .def("restore", &EngineBench::restore, arg("state"), "Continue bit for bit from what `save` gave.")
+      .def_property(
+          "state", &EngineBench::state, &EngineBench::restore,
+          "State of the run between two cycles: named lists of numbers, JSON-able. Setting it continues that\n"
+          "run bit for bit; a state of another bench raises DataError and changes nothing.")
       .def("point_at", &EngineBench::point_at, arg("cycle"), "Operating point of a cycle.")
       .def_property_readonly(
           "point", [](const EngineBench& self) { return self.point(); }, "Operating point of the next cycle.")
       .def_property_readonly("cycle", &EngineBench::cycle, "Index of the next cycle.")
+      .def_property_readonly(
+          "operating_point_changes", [](const EngineBench& self) { return self.point_changes_at(self.cycle()); },
+          "Whether speed or fuel of the next cycle differ by more than 5 % from those of the last one.")
       .def_property_readonly("seed", &EngineBench::seed, "Seed of the run.")
       .def_property_readonly("window_cad", &EngineBench::window_cad, "Earliest and latest SOC that is not clamped.")
       .def_property_readonly("analyser_delay_cycles", &EngineBench::analyser_delay_cycles,
@@ -289,12 +285,12 @@ void bind_bench(py::module_& m) {
            [](const EngineBench& self) {
              return py::str("<EngineBench at cycle {}, {!r}>").format(self.cycle(), self.point());
            })
-      .def(py::pickle([](const EngineBench& self) { return py::make_tuple(1, to_dict(self.settings()), self.save()); },
+      .def(py::pickle([](const EngineBench& self) { return py::make_tuple(1, to_dict(self.settings()), self.state()); },
                       [](const py::tuple& state) {
                         require_pickle_version(state);
                         const py::object type = py::type::of<EngineBench>();
                         auto bench = type(**state[1].cast<py::dict>()).cast<EngineBench>();
-                        bench.restore(state[2].cast<std::map<std::string, std::vector<double>>>());
+                        bench.restore(state[2].cast<StateColumns>());
                         return bench;
                       }));
 }

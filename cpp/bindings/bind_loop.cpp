@@ -74,7 +74,8 @@ py::dict run(EngineBench& bench, Recorded<S>& recorded, std::int64_t cycles, con
       rows.push_back(cycle.bench);
       estimate.push_back(cycle.estimate_cad);
       const bool fired = !(cycle.bench.misfire || cycle.bench.unphysical);
-      recorded.applied.push_back(recorded.seeker.applied()[0]);
+      recorded.cycle.push_back(static_cast<double>(recorded.seeker.protocol().cycle - 1));
+      recorded.applied.push_back(cycle.bench.soc_requested_cad);
       recorded.estimate.push_back(cycle.estimate_cad);
       recorded.objective.push_back(fired ? cycle.bench.j : std::numeric_limits<double>::quiet_NaN());
       recorded.misfire.push_back(fired ? 0.0 : 1.0);

@@ -606,7 +606,7 @@ class Spsa:
     """
     Simultaneous perturbation; see mgdd.optimize.Spsa.
     """
-    def __init__(self, *, start: typing.Any, lower: typing.Any = ..., upper: typing.Any = ..., form: str = 'first_order', schedule: str = 'decreasing', gain: typing.SupportsFloat | typing.SupportsIndex | None = None, stability: typing.SupportsFloat | typing.SupportsIndex = 50.0, gain_exponent: typing.SupportsFloat | typing.SupportsIndex = 0.602, perturbation: typing.SupportsFloat | typing.SupportsIndex = 1.5, perturbation_exponent: typing.SupportsFloat | typing.SupportsIndex = 0.101, step_max: typing.SupportsFloat | typing.SupportsIndex | None = None, averaging: typing.SupportsInt | typing.SupportsIndex = 1, blocking: bool = False, noise_sd: typing.SupportsFloat | typing.SupportsIndex = 0.0, initial_hessian: typing.SupportsFloat | typing.SupportsIndex = -0.051, hessian_prior: typing.SupportsFloat | typing.SupportsIndex = 20.0, seed: typing.SupportsInt | typing.SupportsIndex = 0, maximize: bool = True, limits: collections.abc.Sequence[Limit] = [], curvature: typing.SupportsFloat | typing.SupportsIndex | None = None) -> None:
+    def __init__(self, *, start: typing.Any, lower: typing.Any = ..., upper: typing.Any = ..., form: str = 'first_order', schedule: str = 'decreasing', gain: typing.SupportsFloat | typing.SupportsIndex | None = None, stability: typing.SupportsFloat | typing.SupportsIndex = 50.0, gain_exponent: typing.SupportsFloat | typing.SupportsIndex = 0.602, perturbation: typing.SupportsFloat | typing.SupportsIndex = 1.5, perturbation_exponent: typing.SupportsFloat | typing.SupportsIndex = 0.101, step_max: typing.SupportsFloat | typing.SupportsIndex | None = None, averaging: typing.SupportsInt | typing.SupportsIndex = 1, blocking: bool = False, noise_sd: typing.SupportsFloat | typing.SupportsIndex = 0.0, initial_hessian: typing.SupportsFloat | typing.SupportsIndex = -0.051, hessian_prior: typing.SupportsFloat | typing.SupportsIndex = 20.0, limit_amplitude: typing.SupportsFloat | typing.SupportsIndex = 0.5, seed: typing.SupportsInt | typing.SupportsIndex = 0, maximize: bool = True, limits: collections.abc.Sequence[Limit] = [], curvature: typing.SupportsFloat | typing.SupportsIndex | None = None) -> None:
         ...
     def _clear_history(self) -> None:
         """
@@ -1842,17 +1842,9 @@ class EngineBench:
         """
         Back to cycle 0, with another seed if given.
         """
-    def restore(self, state: collections.abc.Mapping[str, collections.abc.Sequence[typing.SupportsFloat | typing.SupportsIndex]]) -> None:
-        """
-        Continue bit for bit from what `save` gave.
-        """
     def run_columns(self, soc_cad: typing.Annotated[numpy.typing.ArrayLike, numpy.float64]) -> dict:
         """
         Run one cycle per request, without the GIL: columns by name.
-        """
-    def save(self) -> dict:
-        """
-        State of the run between two cycles: named columns.
         """
     def step(self, soc_cad: typing.SupportsFloat | typing.SupportsIndex) -> dict:
         """
@@ -1874,6 +1866,11 @@ class EngineBench:
         Index of the next cycle.
         """
     @property
+    def operating_point_changes(self) -> bool:
+        """
+        Whether speed or fuel of the next cycle differ by more than 5 % from those of the last one.
+        """
+    @property
     def point(self) -> OperatingPoint:
         """
         Operating point of the next cycle.
@@ -1888,6 +1885,15 @@ class EngineBench:
         """
         Constructor keywords as a new dict.
         """
+    @property
+    def state(self) -> dict[str, list[float]]:
+        """
+        State of the run between two cycles: named lists of numbers, JSON-able. Setting it continues that
+        run bit for bit; a state of another bench raises DataError and changes nothing.
+        """
+    @state.setter
+    def state(self, arg1: collections.abc.Mapping[str, collections.abc.Sequence[typing.SupportsFloat | typing.SupportsIndex]]) -> None:
+        ...
     @property
     def window_cad(self) -> typing.Annotated[list[float], "FixedSize(2)"]:
         """

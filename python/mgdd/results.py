@@ -99,6 +99,7 @@ VARIABLES: Mapping[str, Label] = MappingProxyType(
         "nox_soft_ppm": Label("ppm", "NOx, soft sensor"),
         "nox_soft_corrected_ppm": Label("ppm", "NOx, soft sensor held to the analyser"),
         "j": Label("unit of J", "performance J"),
+        "cov_imep_percent": Label("%", "COV of IMEP, last 50 cycles"),
         "measured_bar": Label("bar", "measured pressure"),
         "model_bar": Label("bar", "model pressure"),
         "residual_bar": Label("bar", "model minus measured pressure"),

@@ -81,7 +81,7 @@ def test_steps_chunks_copies_and_pickles_give_one_run() -> None:
     chunked = EngineBench(**RICH)
     parts = [chunked.run(soc[:33]), chunked.run(soc[33:34])]
     twins = [chunked, copy.deepcopy(chunked), pickle.loads(pickle.dumps(chunked)), EngineBench(**RICH)]
-    twins[3].restore(chunked.save())
+    twins[3].state = chunked.state
     for twin in twins:
         assert type(twin) is EngineBench
         assert twin.cycle == 34
@@ -170,14 +170,14 @@ def test_settings_are_refused_by_name(settings: dict[str, object], message: str)
 def test_a_refused_call_changes_nothing() -> None:
     bench = EngineBench(**RICH)
     bench.run(requests(20))
-    state = bench.save()
+    state = bench.state
     with pytest.raises(ShapeError, match="soc_cad has 2 dimensions"):
         bench.run(np.zeros((3, 3)))
     spoiled = dict(state)
     del spoiled["fast"]
     with pytest.raises(DataError, match="no column 'fast'"):
-        bench.restore(spoiled)
-    assert all(np.array_equal(state[name], column) for name, column in bench.save().items())
+        bench.state = spoiled
+    assert all(np.array_equal(state[name], column) for name, column in bench.state.items())
     twin = EngineBench(**RICH)
     twin.run(requests(20))
     assert bench.step(-6.0)["j"] == twin.step(-6.0)["j"]

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import itertools
+
 import matplotlib.pyplot as plt
 import numpy as np
 import pytest
@@ -61,7 +63,56 @@ def sweep(efficiency=None):
     })  # fmt: skip
 
 
+CYCLE = np.arange(300)
+NEAR = -6.0 - 9.0 * np.exp(-CYCLE / 40.0)
+
+
+def sought():
+    return labelled_dataset(
+        {
+            "cycle": ("cycle", CYCLE), "estimate_cad": ("cycle", NEAR),
+            "soc_requested_cad": ("cycle", NEAR + np.sin(CYCLE)), "j": ("cycle", 56.0 - 0.02 * (NEAR + 6.0) ** 2),
+            "nox_soft_ppm": ("cycle", 1500.0 - 30.0 * (NEAR + 6.0)),
+            "limit": ("limit", ["p_max_bar", "t_max_k"], "-", "limited quantity"),
+            "limit_units": ("limit", ["bar", "K"], "-", "unit of the limit"),
+            "limits": (("cycle", "limit"), np.column_stack([90.0 - NEAR, 1900.0 - NEAR]), "unit of the limit", "value"),
+        },
+        attrs={"nox_sensor": "soft"},
+    ).set_coords("limit_units")  # fmt: skip
+
+
+def tracks():
+    cases, dims = ["slow", "fast"], ("case", "cycle")
+    curves = np.stack([-6.0 - 9.0 * np.exp(-CYCLE / t) for t in (80.0, 20.0)])
+    cad = "°CA aTDC"
+    return labelled_dataset({
+        "cycle": ("cycle", CYCLE), "case": ("case", cases, "-", "case"),
+        "estimate_median_cad": (dims, curves, cad, "estimate"), "optimum_cad": ((), -6.0, cad, "optimum"),
+        "estimate_low_cad": (dims, curves - 0.5, cad, "low"), "estimate_high_cad": (dims, curves + 0.7, cad, "high"),
+    })  # fmt: skip
+
+
+def readings(over="cycle"):
+    axis = {"cycle": CYCLE.astype(float), "soc_cad": SOC, "t_max_k": 1900.0 + 10.0 * SOC}[over]
+    names = ("true", "analyser", "fast", "soft", "soft_corrected")
+    return labelled_dataset({
+        over: (over, axis), **{f"nox_{name}_ppm": (over, 900.0 + axis + k) for k, name in enumerate(names)},
+    })  # fmt: skip
+
+
+def learned():
+    return labelled_dataset({
+        "law": ("law", ["p", "norm_optimal"], "-", "learning law"), "trial": ("trial", [0, 1, 2], "-", "trial"),
+        "ca50_error_cad": (("law", "trial"), [[8.0, 4.0, 2.0], [8.0, 1.0, 0.5]], "°CA", "rms error of CA50"),
+    })  # fmt: skip
+
+
 PLOTS = {
+    "seeking": (plot.plot_seeking, sought),
+    "convergence": (plot.plot_convergence, tracks),
+    "sensors over cycles": (plot.plot_sensors, readings),
+    "sensors over timing": (plot.plot_sensors, lambda: readings("soc_cad")),
+    "learning": (plot.plot_learning, learned),
     "pressure of a simulation": (plot.pressure, simulated),
     "pressure of an analysis": (plot.pressure, analysed),
     "pressure of a measurement": (plot.pressure, lambda: datasets.load_hd_traces()[3]),
@@ -257,6 +308,10 @@ def test_timing_says_when_the_sweep_ends_too_early():
         (plot.calibration_overlay, overlay, "residual_bar", "mgdd.identify.fit_cylinder"),
         (plot.wall_heat_profile, profile, "rmse_percent", "mgdd.identify.wall_heat_profile"),
         (plot.timing, sweep, "nox_arrhenius_ppm", "mgdd.engine.timing_sweep"),
+        (plot.plot_seeking, sought, "soc_requested_cad", "mgdd.loop.run_seeker"),
+        (plot.plot_convergence, tracks, "estimate_median_cad", "a study of mgdd.studies"),
+        (plot.plot_sensors, readings, "nox_true_ppm", "mgdd.loop.EngineBench.run"),
+        (plot.plot_learning, learned, "ca50_error_cad", "mgdd.studies.run_ch3_optimizers"),
     ],
 )
 def test_a_missing_variable_is_named_with_its_maker(function, dataset, variable, maker):
@@ -282,3 +337,65 @@ def test_values_that_cannot_be_drawn_are_refused():
         plot.timing(sweep().isel(soc_cad=slice(2)))
     with pytest.raises(DataError, match="rmse_percent has dimensions"):
         plot.wall_heat_profile(profile().assign(rmse_percent=profile()["rmse_percent"].isel(wall_heat_scale=0)))
+
+
+def test_seeking_has_four_panels_in_order():
+    caps = {"p_max_bar": 100.0}
+    ax = plot.plot_seeking(sought(), optimum_cad=-6.0, limit_values=caps)
+    panels = ax.figure.axes
+    assert [panel.get_ylabel() for panel in panels] == [
+        "timing [°CA aTDC]", "J [unit of J]", "NOx,\nsoft sensor [ppm]", "limited [bar, K]",
+    ]  # fmt: skip
+    assert all(upper.get_position().y0 > lower.get_position().y1 for upper, lower in itertools.pairwise(panels))
+    np.testing.assert_array_equal(line(ax, "estimate").get_data(), [CYCLE, NEAR])
+    np.testing.assert_array_equal(line(ax, "with dither").get_ydata(), sought()["soc_requested_cad"])
+    np.testing.assert_array_equal(line(panels[3], "limit p_max_bar 100").get_ydata(), [100.0, 100.0])
+    assert "optimum −6.00" in entries(ax)
+    mean = line(panels[1], "mean of 50 cycles").get_ydata()
+    j = sought()["j"].to_numpy()
+    assert mean[[0, 9, 200]] == pytest.approx([j[0], j[:10].mean(), j[151:201].mean()])
+
+
+def test_seeking_shows_the_slope_or_leaves_panels_out():
+    with_slope = sought().assign(gradient_per_cad=("cycle", NEAR, {"units": "%/°CA", "long_name": "slope"}))
+    assert plot.plot_seeking(with_slope).figure.axes[2].get_ylabel() == "slope [%/°CA]"
+    bare = sought().drop_dims("limit").assign_attrs(nox_sensor="none")
+    assert len(plot.plot_seeking(bare).figure.axes) == 2
+    free = plt.figure().add_axes((0.2, 0.2, 0.7, 0.6))
+    assert plot.plot_seeking(sought(), ax=free) is free
+    assert len(free.figure.axes) == 4
+    misfired = sought()
+    misfired["j"][7] = np.nan
+    assert np.isfinite(line(plot.plot_seeking(misfired).figure.axes[1], "mean of 50 cycles").get_ydata()).all()
+    with pytest.raises(DataError, match="limit_values: 'torque' was not measured"):
+        plot.plot_seeking(sought(), limit_values={"torque": 3.0})
+
+
+def test_convergence_bands_and_refusals():
+    ax = plot.plot_convergence(tracks())
+    np.testing.assert_array_equal(line(ax, "fast").get_ydata(), tracks()["estimate_median_cad"][1])
+    assert len(ax.collections) == 2
+    band = ax.collections[0].get_paths()[0].vertices[:, 1]
+    low, high = tracks()["estimate_low_cad"][0], tracks()["estimate_high_cad"][0]
+    assert (band.min(), band.max()) == pytest.approx((float(low.min()), float(high.max())))
+    assert len(plot.plot_convergence(tracks().drop_vars("estimate_low_cad")).collections) == 0
+    with pytest.raises(DataError, match="must be cycle and one more"):
+        plot.plot_convergence(tracks().isel(case=0, drop=True))
+    many = tracks().isel(case=[0, 1] * 6).assign_coords(case=("case", list("abcdefghijkl"), tracks()["case"].attrs))
+    with pytest.raises(DataError, match="case has 12 entries: at most 9"):
+        plot.plot_convergence(many)
+
+
+def test_sensors_over_cycles_timing_and_temperature():
+    for over in ("cycle", "soc_cad", "t_max_k"):
+        data = readings(over)
+        ax = plot.plot_sensors(data)
+        analyser = line(ax, "analyser")
+        np.testing.assert_array_equal(analyser.get_data(), [data[over], data["nox_analyser_ppm"]])
+        assert (analyser.get_marker() == "None") == (over == "cycle")
+        assert set(entries(ax)) == {
+            "true value", "analyser", "fast sensor", "soft sensor", "soft sensor held to the analyser",
+        }  # fmt: skip
+    wrong = readings().rename(cycle="seed")
+    with pytest.raises(DataError, match="must be one of cycle, soc_cad"):
+        plot.plot_sensors(wrong)

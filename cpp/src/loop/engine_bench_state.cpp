@@ -11,12 +11,10 @@
 namespace mgdd::loop {
 namespace {
 
-using State = std::map<std::string, std::vector<double>>;
-
 constexpr double half_word = 4294967296.0;         // 2^32: a double holds each half of the seed exactly
 constexpr double last_cycle = 9007199254740992.0;  // 2^53
 
-const std::vector<double>& column(const State& state, const std::string& name, std::size_t size) {
+const std::vector<double>& column(const StateColumns& state, const std::string& name, std::size_t size) {
   const auto found = state.find(name);
   if (found == state.end()) throw DataError("state has no column '" + name + "': it is of another bench");
   if (found->second.size() != size) {
@@ -34,8 +32,8 @@ double whole_number(const std::vector<double>& from, std::size_t at, const char*
 
 }  // namespace
 
-State EngineBench::save() const {
-  State state{{"cycle", {static_cast<double>(cycle_)}},
+StateColumns EngineBench::state() const {
+  StateColumns columns{{"cycle", {static_cast<double>(cycle_)}},
               {"seed", {static_cast<double>(seed_ >> 32), static_cast<double>(seed_ & 0xFFFFFFFFu)}},
               {"last", {last_soc_cad_, last_t_max_k_, last_imep_bar_, ln_bias_}},
               {"last_components", {last_components_.begin(), last_components_.end()}},
@@ -44,11 +42,11 @@ State EngineBench::save() const {
               {"fast", fast_.save()},
               {"soft_through_analyser", soft_through_analyser_.save()}};
   for (std::size_t i = 0; i < component_lags_.size(); ++i)
-    state["component_" + std::to_string(i)] = component_lags_[i].save();
-  return state;
+    columns["component_" + std::to_string(i)] = component_lags_[i].save();
+  return columns;
 }
 
-void EngineBench::restore(const State& state) {
+void EngineBench::restore(const StateColumns& state) {
   EngineBench next = *this;  // so that a refused state changes nothing
   next.cycle_ = static_cast<std::int64_t>(whole_number(column(state, "cycle", 1), 0, "cycle", last_cycle));
   const std::vector<double>& seed = column(state, "seed", 2);
@@ -68,7 +66,7 @@ void EngineBench::restore(const State& state) {
   next.soft_through_analyser_.restore(column(state, "soft_through_analyser", soft_through_analyser_.state_size()));
   for (std::size_t i = 0; i < component_lags_.size(); ++i)
     next.component_lags_[i].restore(column(state, "component_" + std::to_string(i), component_lags_[i].state_size()));
-  const std::size_t expected = save().size();
+  const std::size_t expected = this->state().size();
   if (state.size() != expected) {
     throw DataError("state has " + std::to_string(state.size()) + " columns: must be " + std::to_string(expected) +
                     ", it is of another bench");

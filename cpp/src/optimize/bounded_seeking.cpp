@@ -78,9 +78,7 @@ TellStatus BoundedSeeking::tell(const Reading& reading) noexcept {
   for (Eigen::Index i = 0; i < n; ++i)
     step[i] = largest[i] * std::cos(omega_[i] * static_cast<double>(phase) - settings_.kappa * j);
   const Inputs none = Inputs::Zero(n);
-  const Inputs admitted = guard_.admit(applied_, step, none, largest);
-  // An oscillation that stands still would never learn which way leads back below a limit.
-  if (admitted.squaredNorm() > 0.0) step = admitted;
+  step = guard_.admit(applied_, step, none, largest);
   move_within(applied_, step, settings_.space, none);
   return status;
 }

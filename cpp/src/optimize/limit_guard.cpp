@@ -102,11 +102,11 @@ Inputs LimitGuard::admit(const Inputs& estimate, const Inputs& step, const Input
       const Inputs s = models_[worst].slope();
       const double over = worst_excess * limits_[worst].scale;
       out = step - s * ((s.dot(step) + over) / s.squaredNorm());
-    } else if (has_good_) {
+    } else if (has_good_ && good_ != estimate) {
       out = good_ - estimate;
-    } else {
+    } else if (!reach.isZero(0.0)) {
       out.setZero();
-    }
+    }  // without a reach its steps are the only dither: they go on, or no slope would ever be learnt
     clip_each(out, rate);
   } else {
     good_ = estimate;
@@ -124,8 +124,18 @@ Inputs LimitGuard::admit(const Inputs& estimate, const Inputs& step, const Input
     }
     if (!changed) break;
   }
-  clip_each(out, rate.cwiseMax(step.cwiseAbs()));
-  return out;
+  // What projections in turns leave over: a shorter step in the same direction keeps every rate and every limit.
+  const Inputs cap = rate.cwiseMax(step.cwiseAbs());
+  double share = 1.0;
+  for (Eigen::Index i = 0; i < out.size(); ++i) {
+    if (std::abs(out[i]) > cap[i]) share = std::min(share, cap[i] / std::abs(out[i]));
+  }
+  for (std::size_t i = 0; i < limits_.size(); ++i) {
+    const double rise = models_[i].slope().dot(out);
+    const double room = std::max(0.0, -excess(i, estimate, reach));
+    if (rise > room + 1e-12 * limits_[i].scale) share = std::min(share, room / rise);
+  }
+  return out * share;
 }
 
 bool LimitGuard::alarmed() const noexcept {

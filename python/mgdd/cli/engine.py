@@ -1,4 +1,4 @@
-"""`mgdd engine simulate | analyze | calibrate | optimum`."""
+"""`mgdd engine simulate | analyze | calibrate | optimum`; `seek` has a module of its own."""
 
 from __future__ import annotations
 
@@ -19,6 +19,7 @@ from mgdd.cli.options import (
     traces_of,
 )
 from mgdd.cli.output import check_output, emit, lines, progress
+from mgdd.cli.seek import add_seek
 from mgdd.engine import analyze, optimum, simulate, start_of_combustion, start_of_injection, timing_sweep
 from mgdd.errors import ConvergenceError, ParameterError
 from mgdd.studies import best_timing
@@ -29,10 +30,10 @@ _DEFAULT_SOC_CAD = -6.0
 
 
 def add(commands: Any) -> None:
-    """Add the group and its four commands."""
+    """Add the group and its commands."""
     group = commands.add_parser(
         "engine",
-        help="one cycle: simulate, analyze, calibrate, optimum",
+        help="one cycle: simulate, analyze, calibrate, optimum; many: seek",
         epilog="example:\n  mgdd engine simulate --preset puma_single --soc-cad -6 --json",
         formatter_class=argparse.RawDescriptionHelpFormatter,
     )
@@ -42,6 +43,7 @@ def add(commands: Any) -> None:
     _add_analyze(verbs)
     _add_calibrate(verbs)
     _add_optimum(verbs)
+    add_seek(verbs)
 
 
 def _add_simulate(verbs: Any) -> None:

@@ -17,7 +17,7 @@ from mgdd.results import VARIABLES, to_jsonable
 if TYPE_CHECKING:
     import xarray as xr
 
-__all__ = ["check_output", "emit", "progress"]
+__all__ = ["check_figure", "check_output", "emit", "lines", "progress"]
 
 
 def check_output(args: argparse.Namespace, *, csv: bool) -> None:
@@ -29,6 +29,16 @@ def check_output(args: argparse.Namespace, *, csv: bool) -> None:
         raise ParameterError(f"-o {args.output}: the ending must be one of {', '.join(allowed)}")
     if not Path(args.output).resolve().parent.is_dir():
         raise ParameterError(f"-o {args.output}: there is no folder {Path(args.output).parent}")
+
+
+def check_figure(file: str | None) -> None:
+    """Refuse a figure of unknown kind before any work is done."""
+    if file is None:
+        return
+    if Path(file).suffix not in (".png", ".svg", ".pdf"):
+        raise ParameterError(f"--figure {file}: the ending must be one of .png, .svg, .pdf")
+    if not Path(file).resolve().parent.is_dir():
+        raise ParameterError(f"--figure {file}: there is no folder {Path(file).parent}")
 
 
 def emit(

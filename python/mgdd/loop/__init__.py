@@ -10,6 +10,7 @@ from mgdd._core import SensorDynamics
 from mgdd.loop.bench import EngineBench
 from mgdd.loop.seek import LoopRun, monte_carlo, run_seeker
 from mgdd.loop.steady import SteadyOptimum, steady_map, steady_optimum
+from mgdd.loop.summary import summarize_cycles
 
 __all__ = [
     "EngineBench",
@@ -20,4 +21,5 @@ __all__ = [
     "run_seeker",
     "steady_map",
     "steady_optimum",
+    "summarize_cycles",
 ]

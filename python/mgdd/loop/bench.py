@@ -16,15 +16,14 @@ if TYPE_CHECKING:
     import xarray as xr
     from numpy.typing import ArrayLike
 
-__all__ = ["EngineBench"]
+__all__ = ["FLAGS", "EngineBench"]
 
-_FLAGS = {
+FLAGS = {
     "misfire": "nothing burned",
     "clamped": "request outside the timing window",
     "unphysical": "no such cycle exists",
     "operating_point_changed": "speed or fuel moved by more than 5 %",
 }
-_COV = "cov_imep_percent"
 
 
 class EngineBench(_core.EngineBench):
@@ -181,13 +180,13 @@ def cycles_to_dataset(bench: EngineBench, columns: dict[str, Any], **more: Array
     variables |= {name: ("cycle", values) for name, values in more.items()}
     components, limits = columns.pop("components"), columns.pop("limits")
     for name, values in columns.items():
-        label = (("-", _FLAGS[name]) if name in _FLAGS else ()) if name not in VARIABLES else ()
+        label = (("-", FLAGS[name]) if name in FLAGS else ()) if name not in VARIABLES else ()
         variables[name] = ("cycle", values, *label)
     variables["component"] = ("component", terms, "-", "term of the performance")
     variables["components"] = (("cycle", "component"), components, "unit of J", "component of the performance")
     names = settings["limits"]
     if names:
-        units = {**{name: label.units for name, label in VARIABLES.items()}, _COV: "%"}
+        units = {name: label.units for name, label in VARIABLES.items()}
         own = "unit of the limit"
         variables["limit"] = ("limit", names, "-", "limited quantity")
         variables["limit_units"] = ("limit", [units[name] for name in names], "-", own)

@@ -2,7 +2,8 @@
 
 from __future__ import annotations
 
-from mgdd.rig.base import Measurement, Rig
+from mgdd.rig.base import AnnouncingRig, Measurement, Rig
+from mgdd.rig.seek import run_on_rig
 from mgdd.rig.simulated import SimulatedRig
 
-__all__ = ["Measurement", "Rig", "SimulatedRig"]
+__all__ = ["AnnouncingRig", "Measurement", "Rig", "SimulatedRig", "run_on_rig"]

@@ -7,7 +7,7 @@ from dataclasses import dataclass, field
 from types import TracebackType
 from typing import Protocol, Self, runtime_checkable
 
-__all__ = ["Measurement", "Rig"]
+__all__ = ["AnnouncingRig", "Measurement", "Rig"]
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -46,7 +46,10 @@ class Measurement:
         float
             In the unit of J.
         """
-        return sum(self.components)
+        total = 0.0
+        for component in self.components:  # plain order: the built-in sum rounds otherwise from Python 3.12 on
+            total += component
+        return total
 
 
 @runtime_checkable
@@ -91,3 +94,30 @@ class Rig(Protocol):
     def __exit__(
         self, kind: type[BaseException] | None, error: BaseException | None, trace: TracebackType | None, /
     ) -> None: ...
+
+
+@runtime_checkable
+class AnnouncingRig(Rig, Protocol):
+    """A rig that knows of a new operating point before the cycle, as one that sets speed and fuel itself does.
+
+    Other rigs may say it afterwards, in ``values["operating_point_changed"]``; that costs one cycle.
+
+    Examples
+    --------
+    >>> from mgdd.loop import EngineBench
+    >>> from mgdd.rig import AnnouncingRig, SimulatedRig
+    >>> rig = SimulatedRig(EngineBench())
+    >>> isinstance(rig, AnnouncingRig), rig.operating_point_changes
+    (True, False)
+    """
+
+    @property
+    def operating_point_changes(self) -> bool:
+        """Whether the next cycle runs at another operating point than the last one.
+
+        Returns
+        -------
+        bool
+            True once per change, until that cycle is measured.
+        """
+        ...

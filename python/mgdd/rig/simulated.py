@@ -37,6 +37,17 @@ class SimulatedRig:
         self._soc_cad: float | None = None
         self._closed = False
 
+    @property
+    def operating_point_changes(self) -> bool:
+        """Whether the next cycle brings a new operating point of the schedule.
+
+        Returns
+        -------
+        bool
+            True where speed or fuel move by more than 5 %.
+        """
+        return bool(self.bench.operating_point_changes)
+
     def apply(self, soc_cad: float) -> None:
         """Set the start of combustion of the next cycle.
 

@@ -1,8 +1,28 @@
-"""Studies: whole pieces of work, each with `run(...) -> StudyResult`."""
+"""Studies: whole pieces of work that end in a table, figures and a summary.
+
+`available_studies` lists them, `run_study` runs one by name; each is also a function, `run_<name>(...)`, that returns
+a `StudyResult`.
+"""
 
 from __future__ import annotations
 
 from mgdd.studies.base import StudyResult
+from mgdd.studies.ch3_optimizers import run_ch3_optimizers
+from mgdd.studies.ch4_esc import run_ch4_esc
+from mgdd.studies.ch4_sensors import run_ch4_sensors
+from mgdd.studies.ch4_tests import run_ch4_tests
 from mgdd.studies.measured_traces import best_timing, compare_laws, run_measured_traces
+from mgdd.studies.registry import available_studies, run_study
 
-__all__ = ["StudyResult", "best_timing", "compare_laws", "run_measured_traces"]
+__all__ = [
+    "StudyResult",
+    "available_studies",
+    "best_timing",
+    "compare_laws",
+    "run_ch3_optimizers",
+    "run_ch4_esc",
+    "run_ch4_sensors",
+    "run_ch4_tests",
+    "run_measured_traces",
+    "run_study",
+]

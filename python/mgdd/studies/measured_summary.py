@@ -7,7 +7,7 @@ from collections.abc import Mapping, Sequence
 from typing import TYPE_CHECKING, Any
 
 from mgdd import _core
-from mgdd.identify import CylinderFit, WallHeatProfile
+from mgdd.identify import CylinderFit, LoadFit, WallHeatProfile
 from mgdd.results import labelled_dataset
 
 if TYPE_CHECKING:
@@ -40,6 +40,9 @@ def summarize(
             }
         )
     return {
+        "study": "measured-traces",
+        "seeds": 0,
+        "rows": [_row(load, best) for load, best in zip(main.loads, timing, strict=True)],
         "mgdd": _core.__version__,
         "law": main.burn_law,
         "traces": rows,
@@ -48,6 +51,22 @@ def summarize(
         "unidentifiable": sorted({*main.report.unidentifiable, *(["wall_heat_scale"] if _unknown(profiles) else [])}),
         "warnings": [f"{fit.burn_law}: {text}" for fit in fits for text in fit.warnings],
         "best_timing": list(timing),
+    }
+
+
+def _row(load: LoadFit, best: Mapping[str, Any]) -> dict[str, Any]:
+    """Give one trace as a flat row; best timing and gain are ranges over the wall-heat scale, its own p_max kept."""
+    (early, late), (least, most) = best["soc_cad"], best["gain_percent"]
+    return {
+        "trace": load.file,
+        "p_max_bar": load.p_max_bar,
+        "ca50_cad": load.ca50_cad,
+        "rmse_percent": load.rmse_percent,
+        "imep_closed_error_percent": load.imep_closed_error_percent,
+        "best_soc_from_cad": early,
+        "best_soc_to_cad": late,
+        "gain_from_percent": least,
+        "gain_to_percent": most,
     }
 
 

@@ -76,13 +76,13 @@ TEST(EngineBenchState, ARestoredRunContinuesBitForBit) {
     for (const int cut : {0, 1, 60, 130}) {
       EngineBench bench(s);
       run(bench, cut);
-      const auto state = bench.save();
+      const auto state = bench.state();
       const History rest = run(bench, 120);
       s.seed = 99;  // the seed belongs to the state
       EngineBench other(s);
       run(other, 33);
       other.restore(state);
-      EXPECT_EQ(other.save(), state);
+      EXPECT_EQ(other.state(), state);
       EXPECT_EQ(run(other, 120), rest) << cut;
       s.seed = 7;
     }
@@ -92,7 +92,7 @@ TEST(EngineBenchState, ARestoredRunContinuesBitForBit) {
 TEST(EngineBenchState, ARefusedStateChangesNothing) {
   EngineBench bench(eventful());
   run(bench, 40);
-  const auto good = bench.save();
+  const auto good = bench.state();
   const auto refused = [&](const std::function<void(std::map<std::string, std::vector<double>>&)>& spoil) {
     auto bad = good;
     spoil(bad);
@@ -102,7 +102,7 @@ TEST(EngineBenchState, ARefusedStateChangesNothing) {
     } catch (const DataError& error) {
       message = error.what();
     }
-    EXPECT_EQ(bench.save(), good);
+    EXPECT_EQ(bench.state(), good);
     return message;
   };
   EXPECT_EQ(refused([](auto& s) { s.erase("fast"); }), "state has no column 'fast': it is of another bench");

@@ -7,12 +7,12 @@
 #include <array>
 #include <cstddef>
 #include <cstdint>
-#include <map>
 #include <span>
 #include <string>
 #include <string_view>
 #include <vector>
 
+#include "mgdd/common/state.hpp"
 #include "mgdd/engine/cycle.hpp"
 #include "mgdd/engine/emissions.hpp"
 #include "mgdd/engine/performance.hpp"
@@ -116,8 +116,8 @@ class EngineBench {
 
   /// Everything a run depends on besides the settings; `restore` is bit for bit. DataError for columns that do not
   /// belong to this bench, which then is unchanged.
-  std::map<std::string, std::vector<double>> save() const;
-  void restore(const std::map<std::string, std::vector<double>>& state);
+  StateColumns state() const;
+  void restore(const StateColumns& state);
 
   const BenchSettings& settings() const noexcept { return settings_; }
   std::int64_t cycle() const noexcept { return cycle_; }  ///< index of the next cycle

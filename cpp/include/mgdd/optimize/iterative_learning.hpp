@@ -5,11 +5,11 @@
 #pragma once
 
 #include <cstddef>
-#include <map>
 #include <span>
 #include <string>
 #include <vector>
 
+#include "mgdd/common/state.hpp"
 #include "mgdd/optimize/learning_convergence.hpp"
 #include "mgdd/optimize/learning_law.hpp"
 
@@ -33,7 +33,7 @@ enum class LearningStatus {
 class IterativeLearning {
  public:
   /// Numbers by name, enough to go on bit for bit.
-  using State = std::map<std::string, std::vector<double>>;
+  using State = StateColumns;
 
   /// Norms kept; older ones are forgotten.
   static constexpr std::size_t history_length = 1000;

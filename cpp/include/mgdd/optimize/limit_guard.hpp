@@ -50,7 +50,8 @@ class LimitGuard {
   const LocalModel& model(std::size_t i) const noexcept { return models_[i]; }
 
   /// The nearest step to `step` that no limit forbids; where the estimate itself is over a limit, the way back:
-  /// along the learnt slope, or to the last good point while the slope is not known. Each entry stays within `rate`.
+  /// along the learnt slope, or to the last good point while the slope is not known (with no such point the estimate
+  /// stays, unless `reach` is zero and nothing but steps explores). Each entry stays within `rate`.
   Inputs admit(const Inputs& estimate, const Inputs& step, const Inputs& reach, const Inputs& rate) noexcept;
 
   /// True when the last `admit` changed its step.

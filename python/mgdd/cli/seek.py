@@ -1,0 +1,265 @@
+"""`mgdd engine seek`: a seeker on the virtual bench, and what it came to."""
+
+from __future__ import annotations
+
+import argparse
+import copy
+import math
+import sys
+from collections.abc import Iterator, Mapping
+from contextlib import contextmanager
+from typing import TYPE_CHECKING, Any
+
+from mgdd.cli.options import add_command, add_engine, engine_of, number_pairs
+from mgdd.cli.output import check_figure, check_output, emit
+from mgdd.cli.seekers import Task, default_cycles, make_seeker
+from mgdd.engine import Performance
+from mgdd.errors import ConvergenceError, ParameterError
+from mgdd.loop import EngineBench, LoopRun, SteadyOptimum, run_seeker, steady_optimum, summarize_cycles
+from mgdd.results import VARIABLES
+
+if TYPE_CHECKING:
+    import xarray as xr
+
+__all__ = ["add_seek"]
+
+_METHODS = ("extremum_seeking", "newton", "bounded", "spsa", "golden")
+_FORMS = ("batch", "moving_average", "washout")
+_LATE = ("extremum_seeking", "newton")
+_COV, _COV_CYCLES, _COV_TRIAL = "cov_imep_percent", 50, 1000
+_MOST_CYCLES = 2_000_000
+_ARRIVAL_CAD = 1.0
+_EXCEED_FROM = 1000
+# Fields that the library names in its messages, and the options that set them.
+_OPTIONS = {
+    "soc_scatter_cad = ": "--soc-scatter-cad ",
+    "efficiency_noise_percent = ": "--noise ",
+    "misfire_probability = ": "--misfire ",
+    "seed = ": "--seed ",
+    "start = ": "--start-cad ",
+    "limits: ": "--limit ",
+}
+
+
+def add_seek(verbs: Any) -> None:
+    """Add the command."""
+    parser = add_command(
+        verbs, "seek", _seek,
+        help_text="let a seeker find the best start of combustion on the virtual bench, one cycle at a time",
+        example="mgdd engine seek --method extremum_seeking --start-cad -20 --limit p_max_bar=95 --json",
+        endings=".json or .csv, the cycles",
+    )  # fmt: skip
+    parser.add_argument("--method", choices=_METHODS, default="extremum_seeking", help="default: extremum_seeking")
+    parser.add_argument("--form", choices=_FORMS, help="of extremum_seeking (default: batch)")
+    parser.add_argument("--start-cad", type=float, default=-20.0, metavar="X", help="first SOC (default: -20)")
+    parser.add_argument("--lower-cad", type=float, default=-30.0, metavar="X", help="earliest SOC (default: -30)")
+    parser.add_argument("--upper-cad", type=float, default=10.0, metavar="X", help="latest SOC (default: 10)")
+    parser.add_argument(
+        "--cycles", type=int, metavar="N",
+        help="length of the run (default: 2000; with --sensor analyser 16 time constants of the seeker, 4000 at least)",
+    )  # fmt: skip
+    parser.add_argument("--seed", type=int, default=0, metavar="N", help="of all chance (default: 0)")
+    parser.add_argument(
+        "--limit", action="append", default=[], metavar="NAME=X",
+        help=f"keep an indicator, or {_COV}, below X; repeatable",
+    )  # fmt: skip
+    parser.add_argument(
+        "--limit-method", choices=("switching", "penalty", "barrier"),
+        help="how J knows of the limit: not at all, by a penalty or by a barrier (default: switching)",
+    )  # fmt: skip
+    parser.add_argument("--figure", metavar="FILE", help="draw the run (.png, .svg or .pdf)")
+    group = parser.add_argument_group("bench")
+    group.add_argument(
+        "--sensor", choices=("none", "analyser", "soft"), default="none",
+        help="none: J is the efficiency in percent; otherwise less 0.004 per ppm NOx by that sensor (default: none)",
+    )  # fmt: skip
+    group.add_argument(
+        "--soc-scatter-cad", type=float, default=0.3, metavar="X", help="standard deviation of SOC (default: 0.3)"
+    )
+    group.add_argument(
+        "--noise", type=float, default=0.25, metavar="X",
+        help="standard deviation of the measured efficiency, in points (default: 0.25)",
+    )  # fmt: skip
+    group.add_argument("--misfire", type=float, default=0.0, metavar="P", help="probability per cycle (default: 0)")
+    add_engine(parser)
+
+
+def _seek(args: argparse.Namespace) -> None:
+    check_output(args, csv=True)
+    check_figure(args.figure)
+    _check(args)
+    limits = number_pairs(args.limit, "--limit")
+    for name, value in limits.items():
+        if not math.isfinite(value):
+            raise ParameterError(f"--limit {name}={value:g}: must be finite")
+    bench, preset = _bench(args, limits)
+    _check_bounds(args, bench)
+    best = _optimum(args, bench, limits)
+    task = Task(
+        method=args.method,
+        form=args.form or "batch",
+        start_cad=args.start_cad,
+        bounds_cad=(args.lower_cad, args.upper_cad),
+        seed=args.seed,
+        noise_sd=args.noise,
+        limits=limits,
+        limit_method=args.limit_method or "switching",
+        late=args.sensor == "analyser",
+        bench=bench,
+        best=best,
+    )
+    with _option_names():
+        seeker = make_seeker(task)
+    cycles = default_cycles(task) if args.cycles is None else args.cycles
+    above = _thresholds(best, limits)
+    criteria: dict[str, Any] = {"optimum_cad": best.soc_cad, "arrival_cad": _ARRIVAL_CAD}
+    criteria |= {"exceed_from": _EXCEED_FROM, "exceed_above": above or None}
+    run = run_seeker(bench, seeker, cycles, **criteria)
+    summary = summarize_cycles(run.dataset, **criteria) if run.interrupted else run.summary
+    emit(args, _payload(args, preset, run, summary, best, limits), traces=_table(run.dataset))
+    if args.figure:
+        _draw(run.dataset, best, limits, args.figure)
+    if run.interrupted:
+        raise KeyboardInterrupt
+
+
+def _check(args: argparse.Namespace) -> None:
+    if args.form is not None and args.method != "extremum_seeking":
+        raise ParameterError(f"--form acts with --method extremum_seeking only, not with {args.method}: leave it out")
+    if args.limit_method is not None and not args.limit:
+        raise ParameterError("--limit-method acts with --limit NAME=X only: give a limit or leave it out")
+    if args.cycles is not None and not 1 <= args.cycles <= _MOST_CYCLES:
+        raise ParameterError(
+            f"--cycles {args.cycles}: must be in [1, {_MOST_CYCLES}]; mgdd.loop.run_seeker continues longer runs"
+        )
+    if args.sensor == "analyser" and args.method not in _LATE:
+        raise ParameterError(
+            f"--method {args.method} takes J of the same cycle, and the analyser is late: use --sensor soft, or "
+            "--method extremum_seeking or newton, which turn their demodulation back by the lag"
+        )
+
+
+def _check_bounds(args: argparse.Namespace, bench: EngineBench) -> None:
+    low, high = bench.window_cad
+    for option, value in (("--lower-cad", args.lower_cad), ("--upper-cad", args.upper_cad)):
+        if not low <= value <= high:
+            raise ParameterError(f"{option} {value:g}: must be in [{low:g}, {high:g}], the window of the bench")
+    if not args.lower_cad < args.upper_cad:
+        raise ParameterError(
+            f"--lower-cad {args.lower_cad:g}: must be below --upper-cad {args.upper_cad:g}; move one of them"
+        )
+
+
+def _bench(args: argparse.Namespace, limits: Mapping[str, float]) -> tuple[EngineBench, str]:
+    cylinder, point, preset = engine_of(args)
+    if not point.fuel_mg > 0.0:
+        raise ParameterError("fuel_mg = 0: nothing burns, so there is no timing to seek; leave --motored out")
+    nox = args.sensor != "none"
+    with _option_names():
+        bench = EngineBench(
+            cylinder,
+            point,
+            performance=Performance.efficiency_and_nox() if nox else Performance.efficiency_only(),
+            nox_sensor=args.sensor,
+            limits=list(limits),
+            soc_scatter_cad=args.soc_scatter_cad,
+            efficiency_noise_percent=args.noise,
+            misfire_probability=args.misfire,
+            seed=args.seed,
+        )
+    return bench, preset.name
+
+
+def _optimum(args: argparse.Namespace, bench: EngineBench, limits: Mapping[str, float]) -> SteadyOptimum:
+    """Find where the seeker should end; COV of IMEP has no steady value, so it is judged there."""
+    steady = {name: value for name, value in limits.items() if name != _COV}
+    with _option_names():
+        best = steady_optimum(bench, steady, bounds_cad=(args.lower_cad, args.upper_cad))
+    if not best.curvature < 0.0:
+        raise ConvergenceError(
+            f"the performance has no maximum near --lower-cad {args.lower_cad:g} to --upper-cad {args.upper_cad:g} "
+            f"(curvature {best.curvature:.3g} at {best.free_soc_cad:.1f}): move the bounds"
+        )
+    if _COV in limits:
+        trial = copy.deepcopy(bench).run([best.soc_cad] * _COV_TRIAL)
+        cov = float(trial["limits"].sel(limit=_COV)[_COV_CYCLES:].mean())
+        if cov > limits[_COV]:
+            raise ConvergenceError(
+                f"--limit {_COV}={limits[_COV]:g}: the bench has {cov:.3g} % at its best timing, {best.soc_cad:.1f}; "
+                "raise the limit, or lower --noise, --soc-scatter-cad or --misfire"
+            )
+    return best
+
+
+def _thresholds(best: SteadyOptimum, limits: Mapping[str, float]) -> dict[str, float]:
+    """Limit and three standard deviations of what is compared with it; a COV of n cycles scatters by 1/sqrt(2n - 2)."""
+    own = 1.0 / math.sqrt(2.0 * (_COV_CYCLES - 1))
+    scatter = {name: best.limit_scatter.get(name, own * value) for name, value in limits.items()}
+    return {name: value + 3.0 * scatter[name] for name, value in limits.items()}
+
+
+def _payload(
+    args: argparse.Namespace,
+    preset: str,
+    run: LoopRun,
+    summary: Mapping[str, float],
+    best: SteadyOptimum,
+    limits: Mapping[str, float],
+) -> dict[str, Any]:
+    out: dict[str, Any] = {
+        "method": args.method,
+        "preset": preset,
+        "sensor": args.sensor,
+        "seed": args.seed,
+        "cycles": run.dataset.sizes["cycle"],
+        "start_cad": args.start_cad,
+        "final_cad": summary["final_cad"],
+        "optimum_cad": best.soc_cad,
+        "free_optimum_cad": best.free_soc_cad,
+        "cycles_to_1_cad": summary["cycles_to"],
+        "rms_cad": summary["rms_cad"],
+        "limit_exceeded_fraction": summary["exceeded_fraction"],
+        "mean_j": summary["mean_j"],
+        "mean_efficiency_percent": summary["mean_efficiency_percent"],
+        "mean_nox_ppm": summary["mean_nox_ppm"],
+        "misfires": int(summary["misfires"]),
+        "limits": dict(limits),
+        "interrupted": run.interrupted,
+    }
+    if args.method == "extremum_seeking":
+        out["form"] = args.form or "batch"
+    if limits:
+        out["limit_method"] = args.limit_method or "switching"
+    return out
+
+
+def _table(cycles: xr.Dataset) -> xr.Dataset:
+    """Leave the columns over cycles; limited indicators are among them, COV is added."""
+    table = cycles.drop_dims([dim for dim in cycles.dims if dim != "cycle"])
+    if "limit" in cycles.dims and _COV in cycles["limit"].to_numpy():
+        cov = cycles["limits"].sel(limit=_COV, drop=True).drop_vars("limit_units", errors="ignore")
+        table[_COV] = cov.assign_attrs(VARIABLES[_COV]._asdict())
+    return table
+
+
+def _draw(cycles: xr.Dataset, best: SteadyOptimum, limits: Mapping[str, float], file: str) -> None:
+    from matplotlib.figure import Figure
+
+    from mgdd import plot
+
+    figure = Figure(figsize=(8.0, 7.0), layout="constrained")
+    plot.plot_seeking(cycles, optimum_cad=best.soc_cad, limit_values=limits, ax=figure.add_subplot())
+    figure.savefig(file, dpi=150)
+    print(f"wrote {file}", file=sys.stderr)
+
+
+@contextmanager
+def _option_names() -> Iterator[None]:
+    """Let errors of the library name the options."""
+    try:
+        yield
+    except (ParameterError, ConvergenceError) as error:
+        text = str(error)
+        for field, option in _OPTIONS.items():
+            text = text.replace(field, option) if text.startswith(field) else text
+        raise type(error)(text) from error

@@ -1,0 +1,89 @@
+"""Estimates over cycles: one line per seeker or case, with the band of many seeds around it."""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from mgdd.errors import DataError
+from mgdd.plot.style import BLACK, BLUE, GREEN, GREY, LINE_STYLES, ORANGE, axis_label, legend, minus, new_axes, require
+
+if TYPE_CHECKING:
+    import xarray as xr
+    from matplotlib.artist import Artist
+    from matplotlib.axes import Axes
+
+__all__ = ["plot_convergence"]
+
+_BAND = ("estimate_low_cad", "estimate_high_cad")
+# Two colours-and-dashes more than the house has: a comparison of seekers needs them.
+_STYLES = (*LINE_STYLES, ("-", ORANGE), ("--", GREEN), ("-.", BLUE), (":", BLACK))
+
+
+def plot_convergence(tracks: xr.Dataset, *, ax: Axes | None = None) -> Axes:
+    """Draw how estimates approach the optimum: medians as lines, quantiles over seeds as bands.
+
+    Parameters
+    ----------
+    tracks : xarray.Dataset
+        ``estimate_median_cad`` [°CA aTDC] over ``cycle`` and one more dimension, whose coordinate names the lines (at
+        most nine). Where the Dataset has them, ``estimate_low_cad`` and ``estimate_high_cad`` are the band and
+        ``optimum_cad``, a number, is where the estimates should go.
+    ax : matplotlib.axes.Axes, optional
+        Where to draw; None makes a figure.
+
+    Returns
+    -------
+    matplotlib.axes.Axes
+        The axes.
+
+    Raises
+    ------
+    DataError
+        A variable is missing or has no unit, other dimensions, too many lines.
+
+    Examples
+    --------
+    >>> import numpy as np
+    >>> from mgdd import plot
+    >>> from mgdd.results import labelled_dataset
+    >>> cycle = np.arange(200)
+    >>> tracks = labelled_dataset({
+    ...     "cycle": ("cycle", cycle),
+    ...     "case": ("case", ["slow", "fast"], "-", "case"),
+    ...     "estimate_median_cad": (
+    ...         ("case", "cycle"), [-14.0 * np.exp(-cycle / t) - 6.0 for t in (80.0, 20.0)], "°CA aTDC", "estimate"
+    ...     ),
+    ... })
+    >>> plot.plot_convergence(tracks).get_ylabel()
+    'estimate [°CA aTDC]'
+    """
+    optional = (*_BAND, "optimum_cad")
+    require(tracks, ("cycle", "estimate_median_cad", *(n for n in optional if n in tracks)), "a study of mgdd.studies")
+    median = tracks["estimate_median_cad"]
+    others = [str(dim) for dim in median.dims if dim != "cycle"]
+    if "cycle" not in median.dims or len(others) != 1:
+        raise DataError(f"estimate_median_cad has dimensions {median.dims}: must be cycle and one more")
+    names = [str(name) for name in tracks[others[0]].to_numpy()]
+    if len(names) > len(_STYLES):
+        raise DataError(f"{others[0]} has {len(names)} entries: at most {len(_STYLES)} lines can be told apart")
+    ax = new_axes(ax, height=4.2)
+    cycle = tracks["cycle"].to_numpy()
+    handles: list[Artist] = []
+    for index, name in enumerate(names):
+        dash, color = _STYLES[index]
+        own = tracks.isel({others[0]: index})
+        if all(end in tracks for end in _BAND):
+            low, high = (own[end].to_numpy() for end in _BAND)
+            ax.fill_between(cycle, low, high, color=color, alpha=0.13, linewidth=0.0)
+        handles += ax.plot(cycle, own["estimate_median_cad"], linestyle=dash, color=color, linewidth=1.4, label=name)
+    if "optimum_cad" in tracks and np.ndim(tracks["optimum_cad"]) == 0:
+        best = float(tracks["optimum_cad"])
+        label = minus(f"optimum {best:.2f}")
+        handles.append(ax.axhline(best, color=GREY, linewidth=0.9, linestyle=(0, (1, 1)), label=label))
+    ax.set(xlabel=axis_label(tracks, "cycle"), ylabel=axis_label(tracks, "estimate_median_cad"))
+    ax.set_xlim(float(cycle[0]), float(cycle[-1]))
+    ax.grid(alpha=0.3)
+    legend(ax, handles)
+    return ax

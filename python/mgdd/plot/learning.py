@@ -1,0 +1,65 @@
+"""Error over trials of iterative learning."""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING
+
+from mgdd.plot.style import LINE_STYLES, axis_label, legend, new_axes, require
+
+if TYPE_CHECKING:
+    import xarray as xr
+    from matplotlib.axes import Axes
+    from matplotlib.lines import Line2D
+
+__all__ = ["plot_learning"]
+
+_MARKERS = "osv^D"
+
+
+def plot_learning(learned: xr.Dataset, *, ax: Axes | None = None) -> Axes:
+    """Draw how the error of a repeated task falls from trial to trial, one line per learning law.
+
+    Parameters
+    ----------
+    learned : xarray.Dataset
+        ``ca50_error_cad`` [°CA] over ``law`` and ``trial``, as `mgdd.studies.run_ch3_optimizers` gives.
+    ax : matplotlib.axes.Axes, optional
+        Where to draw; None makes a figure.
+
+    Returns
+    -------
+    matplotlib.axes.Axes
+        The axes, logarithmic in the error.
+
+    Raises
+    ------
+    DataError
+        A variable is missing or has no unit.
+
+    Examples
+    --------
+    >>> from mgdd import plot
+    >>> from mgdd.results import labelled_dataset
+    >>> learned = labelled_dataset({
+    ...     "law": ("law", ["p"], "-", "learning law"), "trial": ("trial", [0, 1, 2], "-", "trial"),
+    ...     "ca50_error_cad": (("law", "trial"), [[8.0, 4.0, 2.0]], "°CA", "rms error of CA50"),
+    ... })
+    >>> plot.plot_learning(learned).get_ylabel()
+    'rms error of CA50 [°CA]'
+    """
+    require(learned, ("law", "trial", "ca50_error_cad"), "mgdd.studies.run_ch3_optimizers")
+    ax = new_axes(ax)
+    error = learned["ca50_error_cad"].transpose("law", "trial").to_numpy()
+    lines: list[Line2D] = []
+    for index, law in enumerate(learned["law"].to_numpy()):
+        dash, color = LINE_STYLES[index % len(LINE_STYLES)]
+        lines += ax.semilogy(
+            learned["trial"], error[index], linestyle=dash, color=color, marker=_MARKERS[index % len(_MARKERS)],
+            markersize=4, label=str(law),
+        )  # fmt: skip
+    ax.set(xlabel=axis_label(learned, "trial"), ylabel=axis_label(learned, "ca50_error_cad"))
+    ax.yaxis.set_major_formatter("{x:g}")
+    ax.yaxis.set_minor_formatter("{x:g}")
+    ax.grid(alpha=0.3, which="both")
+    legend(ax, lines, columns=3)
+    return ax

@@ -1,0 +1,161 @@
+"""A run of a seeker in four panels: input, performance, slope or sensor, and what is limited."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from mgdd.errors import DataError
+from mgdd.plot.style import BLACK, BLUE, GREY, LINE_STYLES, ORANGE, axis_label, legend, minus, new_axes, require
+
+if TYPE_CHECKING:
+    import xarray as xr
+    from matplotlib.artist import Artist
+    from matplotlib.axes import Axes
+    from numpy.typing import NDArray
+
+__all__ = ["plot_seeking"]
+
+_NEEDED = ("cycle", "estimate_cad", "soc_requested_cad", "j")
+_SLOPE = "gradient_per_cad"
+
+
+def plot_seeking(
+    run: xr.Dataset,
+    *,
+    optimum_cad: float | None = None,
+    limit_values: Mapping[str, float] | None = None,
+    mean_cycles: int = 50,
+    ax: Axes | None = None,
+) -> Axes:
+    """Draw a closed loop as stacked panels over the cycles.
+
+    The panels are the input with its dither and the estimate; J with its running mean; the estimated slope of J, or
+    the NOx sensor behind J where the run has no slope; and the limited quantities, each with its limit. A panel without
+    data is left out.
+
+    Parameters
+    ----------
+    run : xarray.Dataset
+        ``estimate_cad``, ``soc_requested_cad`` [°CA aTDC] and ``j`` over ``cycle``, as `mgdd.loop.run_seeker` gives;
+        optional are ``gradient_per_cad`` [unit of J per °CA], NOx of the sensor that ``attrs["nox_sensor"]`` names, and
+        ``limits`` over ``limit``.
+    optimum_cad : float, optional
+        Where the estimate should go [°CA aTDC].
+    limit_values : mapping of str to float, optional
+        Limits by name, in their units.
+    mean_cycles : int
+        Window of the running mean of J [cycles].
+    ax : matplotlib.axes.Axes, optional
+        Where to draw; it is divided into the panels. None makes a figure.
+
+    Returns
+    -------
+    matplotlib.axes.Axes
+        The axes of the first panel; the others are the last ones of ``ax.figure.axes``.
+
+    Raises
+    ------
+    DataError
+        A variable is missing or has no unit, or a limit that the run did not measure.
+
+    Examples
+    --------
+    >>> import numpy as np
+    >>> from mgdd import plot
+    >>> from mgdd.results import labelled_dataset
+    >>> cycle = np.arange(60)
+    >>> run = labelled_dataset({
+    ...     "cycle": ("cycle", cycle), "estimate_cad": ("cycle", -6.0 - 10.0 * 0.9**cycle),
+    ...     "soc_requested_cad": ("cycle", -6.0 - 10.0 * 0.9**cycle + np.sin(0.6 * cycle)),
+    ...     "j": ("cycle", 56.0 - 0.9**cycle),
+    ... })
+    >>> [panel.get_ylabel() for panel in plot.plot_seeking(run).figure.axes]
+    ['timing [°CA aTDC]', 'J [unit of J]']
+    """
+    sensor = f"nox_{run.attrs.get('nox_sensor', 'none')}_ppm".replace("true_value", "true")
+    third = _SLOPE if _SLOPE in run else sensor if sensor in run else None
+    limited = [str(name) for name in run["limit"].to_numpy()] if "limits" in run else []
+    require(run, (*_NEEDED, *([third] if third else []), *(["limits"] if limited else [])), "mgdd.loop.run_seeker")
+    for name in limit_values or {}:
+        if name not in limited:
+            raise DataError(f"limit_values: {name!r} was not measured as a limit in this run, which has {limited}")
+    ax = new_axes(ax, height=2.0 + 1.6 * (1 + bool(third) + bool(limited)))
+    panels = _divide(ax, 2 + bool(third) + bool(limited))
+    cycle = run["cycle"].to_numpy()
+    handles: list[Artist] = []
+    handles += ax.plot(cycle, run["soc_requested_cad"], color=GREY, linewidth=0.6, label="with dither")
+    handles += ax.plot(cycle, run["estimate_cad"], color=BLACK, linewidth=1.6, label="estimate")
+    if optimum_cad is not None:
+        label = minus(f"optimum {optimum_cad:.2f}")
+        handles.append(ax.axhline(optimum_cad, color=BLUE, linestyle="--", linewidth=1.0, label=label))
+    ax.set_ylabel("timing [°CA aTDC]")
+    j = run["j"].to_numpy()
+    panels[1].plot(cycle, j, ".", color=GREY, markersize=1.5)
+    handles += panels[1].plot(
+        cycle, _running_mean(j, mean_cycles), "-", color=ORANGE, linewidth=1.4, label=f"mean of {mean_cycles} cycles"
+    )
+    panels[1].set_ylabel(f"J [{run['j'].attrs['units']}]")
+    if third:
+        panels[2].plot(cycle, run[third], color=BLACK, linewidth=0.8)
+        if third == _SLOPE:
+            panels[2].axhline(0.0, color=GREY, linewidth=0.8)
+        panels[2].set_ylabel(_short(run, third))
+    for index, name in enumerate(limited):
+        dash, color = LINE_STYLES[index % len(LINE_STYLES)]
+        panels[-1].plot(cycle, run["limits"].sel(limit=name), linestyle=dash, color=color, linewidth=0.7)
+        if limit_values and name in limit_values:
+            value = limit_values[name]
+            label = minus(f"limit {name} {value:g}")
+            line = panels[-1].axhline(value, color=ORANGE, linestyle=(0, (4, 1.5)), linewidth=1.6, label=label)
+            handles.append(line)
+    if limited:
+        panels[-1].set_ylabel(_limit_label(run, limited))
+    for panel in panels:
+        panel.grid(alpha=0.3)
+        panel.tick_params(labelbottom=panel is panels[-1])
+    ax.set_xlim(float(cycle[0]), float(cycle[-1]))
+    panels[-1].set_xlabel(axis_label(run, "cycle"))
+    ax.figure.align_ylabels(panels)
+    legend(ax, handles, columns=3)
+    return ax
+
+
+def _short(run: xr.Dataset, name: str) -> str:
+    if name == _SLOPE:
+        return f"slope [{run[name].attrs['units']}]"
+    long_name = str(run[name].attrs["long_name"]).replace(", ", ",\n")
+    return f"{long_name} [{run[name].attrs['units']}]"
+
+
+def _limit_label(run: xr.Dataset, names: list[str]) -> str:
+    units = [str(unit) for unit in run["limit_units"].to_numpy()] if "limit_units" in run.coords else ["-"] * len(names)
+    if len(names) == 1:
+        return f"{names[0]} [{units[0]}]"
+    return f"limited [{', '.join(dict.fromkeys(units))}]"
+
+
+def _running_mean(values: NDArray[np.float64], window: int) -> NDArray[np.float64]:
+    """Mean of the last `window` values, of fewer at the beginning; misfires (NaN) are left out."""
+    known = np.isfinite(values)
+    total = np.concatenate([[0.0], np.cumsum(np.where(known, values, 0.0))])
+    count = np.concatenate([[0], np.cumsum(known)])
+    last = np.arange(1, values.size + 1)
+    first = np.maximum(last - window, 0)
+    return np.asarray((total[last] - total[first]) / np.maximum(count[last] - count[first], 1))
+
+
+def _divide(ax: Axes, panels: int) -> list[Axes]:
+    """Divide axes into panels one above the other; the given ones become the uppermost."""
+    spec = ax.get_subplotspec()
+    if spec is not None:
+        inner = spec.subgridspec(panels, 1, height_ratios=[1.4] + [1.0] * (panels - 1), hspace=0.08)
+        ax.set_subplotspec(inner[0])
+        return [ax, *(ax.figure.add_subplot(inner[place], sharex=ax) for place in range(1, panels))]
+    left, bottom, width, height = ax.get_position().bounds
+    part = height / panels
+    ax.set_position((left, bottom + (panels - 1) * part, width, 0.92 * part))
+    places = [bottom + (panels - 1 - place) * part for place in range(1, panels)]
+    return [ax, *(ax.figure.add_axes((left, place, width, 0.92 * part), sharex=ax) for place in places)]

@@ -1,0 +1,103 @@
+"""Means over seeds with their 95 % interval, and bands of trajectories."""
+
+from __future__ import annotations
+
+import copy
+import math
+from collections.abc import Iterable
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+
+from mgdd.loop import EngineBench, LoopRun, monte_carlo, run_seeker
+
+if TYPE_CHECKING:
+    from collections.abc import Callable
+
+    import xarray as xr
+    from numpy.typing import ArrayLike, NDArray
+
+__all__ = ["bands", "finished_loops", "mean_interval", "rms", "run_finished", "run_with_slope", "with_interval"]
+
+_CONFIDENCE = 0.95
+
+
+def mean_interval(values: ArrayLike) -> tuple[float, float, float]:
+    """Give the mean of independent values and the ends of its 95 % interval, by Student's t.
+
+    Parameters
+    ----------
+    values : array_like
+        One value per seed; NaN (a loop that never arrived) is left out.
+
+    Returns
+    -------
+    tuple of float
+        Mean, low and high end; the ends are NaN for fewer than two values.
+    """
+    from scipy.special import stdtrit
+
+    known = np.asarray(values, float).ravel()
+    known = known[np.isfinite(known)]
+    if known.size == 0:
+        return math.nan, math.nan, math.nan
+    mean = float(known.mean())
+    if known.size == 1:
+        return mean, math.nan, math.nan
+    freedom = known.size - 1
+    half = float(stdtrit(freedom, 0.5 + 0.5 * _CONFIDENCE) * known.std(ddof=1) / math.sqrt(known.size))
+    return mean, mean - half, mean + half
+
+
+def with_interval(name: str, values: ArrayLike) -> dict[str, float]:
+    """Name a mean and the ends of its interval as a row does: ``name``, ``name_low``, ``name_high``."""
+    return dict(zip((name, f"{name}_low", f"{name}_high"), mean_interval(values), strict=True))
+
+
+def rms(values: ArrayLike) -> float:
+    """Give the root of the mean square over seeds."""
+    return float(np.sqrt(np.nanmean(np.square(np.asarray(values, float)))))
+
+
+def finished_loops(bench: EngineBench, seeker: Any, seeds: Iterable[int], **how: Any) -> xr.Dataset:
+    """Run `monte_carlo` of one bench and one seeker, over ``seed`` alone; Ctrl-C is raised again, not returned."""
+    table = monte_carlo(bench, seeker, seeds, **how)
+    if not bool(table["finished"].all()):
+        raise KeyboardInterrupt
+    return table.isel(bench=0, seeker=0, drop=True)
+
+
+def run_finished(bench: EngineBench, seeker: Any, cycles: int, **how: Any) -> LoopRun:
+    """Run `run_seeker`; Ctrl-C is raised again, not returned."""
+    run = run_seeker(bench, seeker, cycles, **how)
+    if run.interrupted:
+        raise KeyboardInterrupt
+    return run
+
+
+def bands(make: Callable[[int], tuple[EngineBench, Any]], seeds: Iterable[int], cycles: int) -> NDArray[np.float64]:
+    """Give median, 10 % and 90 % quantile of the estimate over seeds, cycle by cycle, shape (3, cycles) [°CA aTDC]."""
+    runs = [run_finished(*make(seed), cycles).dataset["estimate_cad"].to_numpy() for seed in seeds]
+    return np.asarray(np.quantile(np.stack(runs), [0.5, 0.1, 0.9], axis=0))
+
+
+def run_with_slope(bench: EngineBench, seeker: Any, cycles: int) -> xr.Dataset:
+    """Give the cycles of `run_seeker` with the seeker's own slope of J, as mean over one dither period.
+
+    Bench and seeker are copied: the same loop is run once in the core and once by ask and tell, which are one
+    trajectory bit for bit.
+    """
+    twin, listener = copy.deepcopy(bench), copy.deepcopy(seeker)
+    run = run_finished(bench, seeker, cycles).dataset
+    slope = np.empty(cycles)
+    for cycle in range(cycles):
+        measured = twin.step(float(listener.ask()[0]))
+        parts = measured["components"]
+        told = parts if listener.component_count > 1 else parts.sum()
+        listener.tell(told, measured["limits"] if listener.limit_names else None, misfire=measured["misfire"])
+        slope[cycle] = listener.gradient[0]
+    settings = listener.settings
+    period = 1 if settings.get("form") == "batch" else int(settings["period"])  # a batch is such a mean itself
+    mean = np.convolve(slope, np.full(period, 1.0 / period))[:cycles]
+    attrs = {"units": "%/°CA", "long_name": "estimated slope of J"}
+    return run.assign(gradient_per_cad=("cycle", mean, attrs))

@@ -1,0 +1,102 @@
+// Many loops at once are the same loops, on any number of threads.
+#include "mgdd/loop/monte_carlo.hpp"
+
+#include <gtest/gtest.h>
+
+#include <atomic>
+#include <cstring>
+
+namespace mgdd::loop {
+namespace {
+
+using optimize::scalar_input;
+
+MonteCarloPlan small_plan() {
+  MonteCarloPlan plan;
+  BenchSettings bench;
+  bench.limits = {"p_max_bar"};
+  plan.benches.emplace_back(bench);
+  bench.schedule[0].point.fuel_mg = 30.0;
+  bench.misfire_probability = 0.01;
+  plan.benches.emplace_back(bench);
+  plan.criteria = {{.optimum_cad = -5.6, .exceed_from = 100, .exceed_above = {95.0}}, {.optimum_cad = -9.0}};
+  const optimize::SearchSpace space{scalar_input(-12.0), scalar_input(-30.0), scalar_input(10.0)};
+  const std::vector<optimize::Limit> limits{{.name = "p_max_bar", .upper = 150.0}};
+  optimize::ExtremumSeekingSettings esc;
+  esc.space = space;
+  esc.limits = limits;
+  optimize::SpsaSettings spsa;
+  spsa.space = space;
+  spsa.limits = limits;
+  plan.seekers = {optimize::ExtremumSeeking(esc), optimize::Spsa(spsa)};
+  plan.seeds = {3, 1, 4};
+  plan.cycles = 300;
+  return plan;
+}
+
+bool same(const LoopSummary& a, const LoopSummary& b) {  // bit for bit, NaN included
+  return std::memcmp(&a, &b, sizeof(LoopSummary)) == 0;
+}
+
+TEST(MonteCarlo, IsTheSameLoopsOnAnyNumberOfThreads) {
+  MonteCarloPlan plan = small_plan();
+  plan.threads = 1;
+  const MonteCarloResult one = monte_carlo(plan, {});
+  plan.threads = 5;
+  const MonteCarloResult five = monte_carlo(plan, {});
+  ASSERT_EQ(one.loops.size(), 12u);
+  for (std::size_t i = 0; i < one.loops.size(); ++i) {
+    EXPECT_TRUE(one.finished[i]);
+    EXPECT_TRUE(same(one.loops[i], five.loops[i])) << i;
+  }
+  // ... and each is the loop that one would run alone: bench 1, seeker 1 (SPSA), seed 4.
+  EngineBench bench = plan.benches[1];
+  bench.reset(4);
+  auto spsa = std::get<optimize::Spsa>(plan.seekers[1]);
+  spsa.reseed(4);
+  LoopStatistics alone(plan.criteria[1], plan.cycles);
+  for (int k = 0; k < plan.cycles; ++k)
+    alone.add(loop_step(bench, spsa));
+  EXPECT_TRUE(same(alone.summary(), one.loops[11]));
+}
+
+TEST(MonteCarlo, SeedsDiffer) {
+  const MonteCarloResult r = monte_carlo(small_plan(), {});
+  for (std::size_t group = 0; group < 12; group += 3) {
+    EXPECT_NE(r.loops[group].mean_cad, r.loops[group + 1].mean_cad);
+    EXPECT_NE(r.loops[group + 1].mean_cad, r.loops[group + 2].mean_cad);
+  }
+}
+
+TEST(MonteCarlo, StopsEarlyAndKeepsWhatIsFinished) {
+  MonteCarloPlan plan = small_plan();
+  plan.seeds.assign(5000, 1);
+  std::atomic<int> looks{0};
+  const MonteCarloResult r = monte_carlo(plan, [&] { return ++looks >= 2; });
+  const auto done = std::count(r.finished.begin(), r.finished.end(), true);
+  EXPECT_GT(done, 0);
+  EXPECT_LT(done, static_cast<std::ptrdiff_t>(r.finished.size()));
+  const MonteCarloResult first = monte_carlo(small_plan(), {});
+  for (std::size_t i = 0; i < 3; ++i)
+    EXPECT_TRUE(!r.finished[i] || same(r.loops[i], first.loops[1])) << i;  // every seed of the long plan is 1
+}
+
+TEST(MonteCarlo, AnEmptyOrUnfittingPlanIsRefused) {
+  MonteCarloPlan plan = small_plan();
+  plan.seeds.clear();
+  EXPECT_THROW(monte_carlo(plan, {}), ParameterError);
+  plan = small_plan();
+  plan.cycles = 0;
+  EXPECT_THROW(monte_carlo(plan, {}), ParameterError);
+  plan = small_plan();
+  plan.criteria.pop_back();
+  EXPECT_THROW(monte_carlo(plan, {}), ShapeError);
+  plan = small_plan();
+  optimize::GoldenSectionSettings golden;
+  golden.space = {scalar_input(0.0), scalar_input(-20.0), scalar_input(5.0)};
+  plan.seekers.emplace_back(optimize::GoldenSection(golden));  // knows no limits
+  EXPECT_THROW(monte_carlo(plan, {}), ParameterError);
+}
+
+}  // namespace
+}  // namespace mgdd::loop

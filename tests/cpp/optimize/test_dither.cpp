@@ -1,0 +1,177 @@
+// The dither and its echo: orthogonality, the phase that sensors add, its compensation, and harmonics that mix.
+#include "support/lagged_sensor.hpp"
+#include "support/seeker_case.hpp"
+
+namespace mgdd::optimize {
+namespace {
+
+using test_support::LaggedSensor;
+
+DitherSettings window(int period, std::vector<int> harmonics) {
+  return {.amplitude = Inputs::Constant(static_cast<Eigen::Index>(harmonics.size()), 1.0),
+          .period = period,
+          .harmonics = std::move(harmonics)};
+}
+
+TEST(Dither, HarmonicsAreOrthogonalOverTheWindow) {
+  const Dither dither(window(40, {4, 5, 7}), {ComponentLag{}}, true);
+  for (int i = 0; i < 3; ++i) {
+    for (int k = 0; k < 3; ++k) {
+      double product = 0.0, mean = 0.0;
+      for (int phase = 0; phase < 40; ++phase) {
+        product += dither.perturbation(phase, i) * dither.demodulation(phase, 0, k);
+        mean += dither.perturbation(phase, i);
+      }
+      EXPECT_NEAR(product, i == k ? 20.0 : 0.0, 1e-12);
+      EXPECT_NEAR(mean, 0.0, 1e-12);
+    }
+  }
+}
+
+TEST(Dither, SensorResponseIsThatOfTheDiscreteLag) {
+  const auto degrees = [](double delay, double lag, int period) {
+    return std::fmod(sensor_response({delay, lag}, 1, period).phase_rad * 180.0 / pi, 360.0);
+  };
+  EXPECT_NEAR(degrees(42.0, 25.0, 10), 140.5, 0.1);
+  EXPECT_NEAR(degrees(34.0, 25.0, 10), 212.5, 0.1);
+  EXPECT_EQ(sensor_response({0.0, 0.0}, 1, 10).gain, 1.0);
+  EXPECT_EQ(sensor_response({0.0, 0.0}, 3, 10).phase_rad, 0.0);
+  EXPECT_NEAR(degrees(38.0, 25.0, 400), 180.0 / pi * (2.0 * pi / 400.0 * 38.0 + std::atan(2.0 * pi / 400.0 * 25.0)),
+              0.6);
+}
+
+// --- the echo in J, with the estimate held ------------------------------------------------------------------
+
+struct Analyser {
+  int delay;
+  double lag;
+  int period;
+  bool compensated;
+};
+
+// Mean slope that demodulation reads off a late J while the estimate stays at `at`.
+double slope_read(const Analyser& a, double at) {
+  ExtremumSeekingSettings s = plain_seeking(at);
+  s.dither.period = a.period;
+  s.hold_cycles = 1'000'000;
+  if (a.compensated) s.components = {{static_cast<double>(a.delay), a.lag}};
+  ExtremumSeeking seeker(s);
+  LaggedSensor sensor(a.delay, a.lag, quadratic(at));
+  const auto late = [&](const Inputs& x) { return sensor.show(quadratic(x[0])); };
+  for (int k = 0; k < 20 * a.period + 600; ++k)
+    cycle_of(seeker, late);
+  while (seeker.protocol().cycle % a.period != 0)
+    cycle_of(seeker, late);
+  double mean = 0.0;
+  for (int k = 0; k < a.period; ++k) {
+    cycle_of(seeker, late);
+    mean += seeker.gradient()[0] / a.period;
+  }
+  return mean;
+}
+
+TEST(Dither, SignOfTheStepIsThatOfTheCosineOfThePhase) {
+  const double at = -8.0, truth = bend * at;
+  const std::vector<std::pair<Analyser, bool>> cases{{{0, 0.0, 10, false}, true},    {{42, 25.0, 10, false}, false},
+                                                     {{34, 25.0, 10, false}, false}, {{38, 25.0, 120, false}, false},
+                                                     {{38, 25.0, 400, false}, true}, {{38, 25.0, 120, true}, true},
+                                                     {{38, 25.0, 60, true}, true}};
+  for (const auto& [a, rises] : cases) {
+    SCOPED_TRACE("D " + std::to_string(a.delay) + ", P " + std::to_string(a.period));
+    const SensorResponse r = sensor_response({static_cast<double>(a.delay), a.lag}, 1, a.period);
+    const double read = slope_read(a, at);
+    EXPECT_EQ(read > 0.0, rises);
+    EXPECT_NEAR(read, a.compensated ? truth : truth * r.gain * std::cos(r.phase_rad), 1e-6);
+    EXPECT_TRUE(a.compensated || rises == (std::cos(r.phase_rad) > 0.0));
+  }
+}
+
+TEST(Dither, EachComponentIsTurnedBackByItsOwnPhase) {
+  const Inputs at = inputs({3.0, -2.0, 5.0});
+  InputMatrix h(3, 3);
+  h << -0.06, 0.02, 0.0, 0.02, -0.05, -0.01, 0.0, -0.01, -0.08;
+  const Inputs late_slope = inputs({0.2, -0.1, 0.3});
+  const auto at_once = [&](const Inputs& x) { return 0.5 * x.dot(h * x); };
+  const auto late = [&](const Inputs& x) { return late_slope.dot(x) - 0.01 * x.squaredNorm(); };
+  const Inputs truth = h * at + late_slope - 0.02 * at;
+  for (const MeanRemoval form : {MeanRemoval::batch, MeanRemoval::moving_average}) {
+    ExtremumSeekingSettings s;
+    s.space = space_at(at);
+    s.dither = window(40, {4, 5, 7});
+    s.form = form;
+    s.gain = Inputs::Constant(3, 0.2);
+    s.hold_cycles = 100'000;
+    s.components = {{0.0, 0.0}, {17.0, 6.0}};
+    ExtremumSeeking seeker(s);
+    LaggedSensor sensor(17, 6.0, late(at));
+    Inputs mean = Inputs::Zero(3);
+    for (int k = 0; k < 840; ++k) {
+      const Inputs x = seeker.ask();
+      const double j[] = {at_once(x), sensor.show(late(x))};
+      seeker.tell({j, {}, false});
+      if (k >= 800) mean += seeker.gradient() / 40.0;
+    }
+    EXPECT_LT((mean - truth).norm(), form == MeanRemoval::batch ? 1e-3 : 1e-9) << to_string(form);
+    EXPECT_LT((seeker.gradient() - truth).norm(), form == MeanRemoval::batch ? 1e-9 : 10.0);
+  }
+}
+
+// The table of the analyser behind all of J: tau 4P, no clip, counted until it stays within 1.5 CAD.
+TEST(Dither, CompensatedAnalyserArrives) {
+  for (const auto& [period, expected] : {std::pair{120, 698.0}, std::pair{60, 268.0}}) {
+    const double j2 = -0.0637;
+    ExtremumSeekingSettings s = plain_seeking(-8.0);
+    s.dither.period = period;
+    s.gain = scalar_input(gain_for(4.0 * period, 1.0, j2));
+    s.components = {{38.0, 25.0}};
+    ExtremumSeeking seeker(s);
+    LaggedSensor sensor(38, 25.0, 0.5 * j2 * 64.0);
+    const std::vector<double> path =
+        search(seeker, [&](double x) { return sensor.show(0.5 * j2 * x * x); }, 20 * period);
+    std::size_t stays = path.size();
+    while (stays > 0 && std::abs(path[stays - 1]) <= 1.5)
+      --stays;
+    EXPECT_LT(std::abs(path.back()), 0.5);
+    EXPECT_NEAR(static_cast<double>(stays), expected, 0.35 * expected) << "period " << period;
+  }
+}
+
+// --- refusals -----------------------------------------------------------------------------------------------
+
+TEST(Dither, RefusesHarmonicsThatMix) {
+  const auto refused = [](int period, std::vector<int> n, bool hessian = false) {
+    const DitherSettings s = window(period, std::move(n));
+    EXPECT_THROW(validate(s, s.amplitude.size(), hessian), ParameterError);
+  };
+  refused(3, {1});
+  refused(0, {1});
+  refused(10, {5});
+  refused(10, {0});
+  refused(40, {4, 4});
+  refused(40, {4, 8});
+  refused(40, {8, 4});
+  refused(40, {3, 4, 7});
+  refused(40, {7, 4, 3});
+  refused(4, {1}, true);      // 2 n is half of the window: cosine only
+  refused(40, {5, 10, 17});   // twice
+  refused(20, {6, 7}, true);  // 2 * 7 folds onto 6
+  EXPECT_NO_THROW(validate(window(40, {4, 5, 7}), 3, true));
+  EXPECT_NO_THROW(validate(window(4, {1}), 1, false));
+  EXPECT_THROW(validate(window(40, {4, 5}), 3, false), ShapeError);
+  DitherSettings s = window(10, {1});
+  for (const double amplitude : {0.0, -1.0, std::nan(""), unlimited}) {
+    s.amplitude = scalar_input(amplitude);
+    EXPECT_THROW(validate(s, 1, false), ParameterError) << amplitude;
+  }
+}
+
+TEST(Dither, RefusesComponentsByName) {
+  EXPECT_THROW(validate(std::vector<ComponentLag>{}), ShapeError);
+  for (const double bad : {-1.0, std::nan(""), unlimited}) {
+    EXPECT_THROW(validate(std::vector<ComponentLag>{{bad, 0.0}}), ParameterError);
+    EXPECT_THROW(validate(std::vector<ComponentLag>{{0.0, 0.0}, {0.0, bad}}), ParameterError);
+  }
+}
+
+}  // namespace
+}  // namespace mgdd::optimize

@@ -1,0 +1,197 @@
+// The guard of measured limits: what it learns, what it lets pass, the way back, and what it adds to J.
+#include "support/seeker_case.hpp"
+
+namespace mgdd::optimize {
+namespace {
+
+double uniform(std::uint64_t index, double low, double high) {
+  return low + (high - low) * random::uniform(21, 0, index);
+}
+
+// --- the plane that it learns -------------------------------------------------------------------------------
+
+TEST(LocalModel, ReturnsThePlaneThatTheDataLieOn) {
+  for (Eigen::Index n = 1; n <= 3; ++n) {
+    LocalModel model(n, 12.0);
+    Inputs slope(n), x(n);
+    for (Eigen::Index i = 0; i < n; ++i)
+      slope[i] = 0.7 - static_cast<double>(i);
+    for (std::uint64_t k = 0; k < 60; ++k) {
+      for (Eigen::Index i = 0; i < n; ++i)
+        x[i] = uniform(k * 10 + static_cast<std::uint64_t>(i), -2.0, 5.0);
+      model.record(x, 100.0 + slope.dot(x));
+    }
+    EXPECT_LT((model.slope() - slope).norm(), 1e-8);
+    EXPECT_NEAR(model.predict(x * 2.0), 100.0 + 2.0 * slope.dot(x), 1e-6);
+    EXPECT_NEAR(model.cycles(), 12.0, 0.1);
+    EXPECT_TRUE(model.slope_known(2.0));
+    model.forget();
+    EXPECT_EQ(model.cycles(), 0.0);
+    EXPECT_EQ(model.slope(), Inputs::Zero(n));
+    EXPECT_FALSE(model.slope_known(2.0));
+  }
+}
+
+TEST(LocalModel, DoesNotClaimASlopeThatNoiseExplains) {
+  int claims = 0;
+  for (std::uint64_t seed = 0; seed < 400; ++seed) {
+    LocalModel model(1, 40.0);
+    for (std::uint64_t k = 0; k < 40; ++k)
+      model.record(scalar_input(std::sin(0.6283 * static_cast<double>(k))), random::normal(seed, 1, k));
+    claims += model.slope_known(3.0) ? 1 : 0;
+  }
+  EXPECT_LT(claims, 20);
+}
+
+// --- what it lets pass --------------------------------------------------------------------------------------
+
+/// A guard that knows planes value = level + slope x, from exact measurements around `at`.
+LimitGuard taught(const std::vector<Limit>& limits, const std::vector<Inputs>& slopes,
+                  const std::vector<double>& levels, const Inputs& at) {
+  LimitGuard guard(limits, at.size(), 30.0);
+  std::vector<double> values(limits.size());
+  for (std::uint64_t k = 0; k < 40; ++k) {
+    Inputs x = at;
+    for (Eigen::Index i = 0; i < at.size(); ++i)
+      x[i] += uniform(k * 10 + static_cast<std::uint64_t>(i), -1.0, 1.0);
+    for (std::size_t l = 0; l < limits.size(); ++l)
+      values[l] = levels[l] + slopes[l].dot(x);
+    guard.record(x, values);
+  }
+  return guard;
+}
+
+TEST(LimitGuard, NeverAdmitsAStepWhosePredictionIsOverALimit) {
+  int turned = 0;
+  for (std::uint64_t trial = 0; trial < 3000; ++trial) {
+    const auto n = static_cast<Eigen::Index>(1 + trial % 3);
+    const std::size_t count = 1 + trial % 2;
+    std::uint64_t draw = trial * 100;
+    const auto vector = [&](double size) {
+      Inputs v(n);
+      for (Eigen::Index i = 0; i < n; ++i)
+        v[i] = uniform(draw++, -size, size);
+      return v;
+    };
+    const Inputs at = vector(5.0), step = vector(3.0), reach = vector(1.0).cwiseAbs();
+    const Inputs rate = vector(2.0).cwiseAbs();
+    std::vector<Limit> limits;
+    std::vector<Inputs> slopes;
+    std::vector<double> levels;
+    for (std::size_t l = 0; l < count; ++l) {
+      slopes.push_back(vector(2.0));
+      const double room = uniform(draw++, 0.0, 2.0) + slopes[l].cwiseAbs().dot(reach);
+      levels.push_back(uniform(draw++, -50.0, 50.0));
+      limits.push_back({"l", levels[l] + slopes[l].dot(at) + room + 0.5, 0.5});
+    }
+    LimitGuard guard = taught(limits, slopes, levels, at);
+    const Inputs out = guard.admit(at, step, reach, rate);
+    for (std::size_t l = 0; l < count; ++l)
+      ASSERT_LE(guard.excess(l, at + out, reach), 1e-6) << "trial " << trial;
+    const Inputs cap = rate.cwiseMax(step.cwiseAbs());
+    ASSERT_TRUE(((cap - out.cwiseAbs()).array() > -1e-12).all()) << "trial " << trial;
+    if (guard.active()) {
+      ++turned;
+    } else {
+      ASSERT_EQ(out, step);
+    }
+  }
+  EXPECT_GT(turned, 500);
+  EXPECT_LT(turned, 2700);
+}
+
+TEST(LimitGuard, SlidesAlongALimitInSeveralInputs) {
+  const Inputs slope = inputs({3.0, 4.0}), at = inputs({0.0, 0.0});
+  LimitGuard guard = taught({{"l", 10.0}}, {slope}, {10.0}, at);
+  const Inputs out = guard.admit(at, inputs({1.0, 1.0}), Inputs::Zero(2), Inputs::Constant(2, 5.0));
+  EXPECT_NEAR(slope.dot(out), 0.0, 1e-6);
+  EXPECT_LT((out - inputs({0.16, -0.12})).norm(), 1e-6);  // the step less its part along the slope
+  EXPECT_TRUE(guard.active());
+}
+
+TEST(LimitGuard, ComesBackAlongTheSlopeNoFasterThanTheRate) {
+  const Inputs slope = scalar_input(2.0), at = scalar_input(5.0), reach = scalar_input(1.0);
+  LimitGuard guard = taught({{"l", 10.0, 1.0}}, {slope}, {0.0}, at);  // 2 (x + 1) <= 9: x <= 3.5
+  EXPECT_NEAR(guard.excess(0, at, reach), 3.0, 1e-6);
+  EXPECT_NEAR(guard.admit(at, scalar_input(0.4), reach, scalar_input(10.0))[0], -1.5, 1e-6);
+  EXPECT_NEAR(guard.admit(at, scalar_input(0.4), reach, scalar_input(0.3))[0], -0.3, 1e-12);
+  EXPECT_TRUE(guard.active());
+}
+
+TEST(LimitGuard, GoesToTheLastGoodPointWhileTheSlopeIsNotKnown) {
+  LimitGuard guard({{"l", 10.0}}, 1, 30.0);
+  const Inputs none = scalar_input(0.0), rate = scalar_input(0.5);
+  EXPECT_EQ(guard.admit(scalar_input(3.0), scalar_input(7.0), none, rate)[0], 7.0) << "nothing is known yet";
+  const double low[] = {9.0}, high[] = {40.0};
+  guard.record(scalar_input(3.0), low);
+  EXPECT_EQ(guard.admit(scalar_input(3.0), none, none, rate)[0], 0.0);
+  guard.record(scalar_input(3.0), high);
+  EXPECT_NEAR(guard.admit(scalar_input(3.2), scalar_input(0.3), none, rate)[0], -0.2, 1e-12);
+  EXPECT_EQ(guard.admit(scalar_input(9.0), scalar_input(0.3), none, rate)[0], -0.5);
+  guard.forget();
+  guard.record(scalar_input(3.0), high);
+  EXPECT_EQ(guard.admit(scalar_input(9.0), scalar_input(0.3), scalar_input(1.0), rate)[0], 0.0) << "the dither looks";
+  EXPECT_EQ(guard.admit(scalar_input(9.0), scalar_input(0.3), none, rate)[0], 0.3) << "no dither: the steps look";
+}
+
+TEST(LimitGuard, AlarmsAfterThreeCyclesInARowOverTheSameLimit) {
+  LimitGuard guard({{"a", 10.0, 1.0}, {"b", 5.0}}, 1, 30.0);
+  const auto record = [&](double a, double b) {
+    const double values[] = {a, b};
+    guard.record(scalar_input(0.0), values);
+    return guard.alarmed();
+  };
+  EXPECT_FALSE(record(9.5, 1.0));
+  EXPECT_FALSE(record(9.5, 6.0));
+  EXPECT_TRUE(record(9.5, 1.0));
+  EXPECT_FALSE(record(9.0, 6.0));
+  EXPECT_FALSE(record(9.5, 6.0));
+  EXPECT_TRUE(record(9.5, 6.0));
+  guard.forget();
+  EXPECT_FALSE(guard.alarmed());
+}
+
+// --- what it adds to J --------------------------------------------------------------------------------------
+
+double shaping(Limit limit, double value) {
+  LimitGuard guard({std::move(limit)}, 1, 10.0);
+  const double values[] = {value};
+  return guard.shaping(values);
+}
+
+TEST(LimitGuard, PenaltyIsTheSquareOfTheScaledExcess) {
+  const Limit limit{"l", 100.0, 2.0, LimitMethod::penalty, 3.0, 10.0};
+  EXPECT_EQ(shaping(limit, 97.9), 0.0);
+  EXPECT_NEAR(shaping(limit, 118.0), -3.0 * 4.0, 1e-12);
+  EXPECT_NEAR(shaping({"l", -50.0, 0.0, LimitMethod::penalty, 1.0}, 0.0), -1.0, 1e-12) << "scale: the limit itself";
+  EXPECT_EQ(shaping({"l", 100.0}, 500.0), 0.0) << "switching leaves J alone";
+}
+
+TEST(LimitGuard, BarrierIsTheLogarithmOfTheRoomAndGoesOnAsItsTangent) {
+  const Limit limit{"l", 100.0, 0.0, LimitMethod::barrier, 2.0, 10.0};
+  EXPECT_NEAR(shaping(limit, 90.0), 0.0, 1e-12);
+  EXPECT_NEAR(shaping(limit, 95.0), 2.0 * std::log(0.5), 1e-12);
+  const double edge = 100.0 - 0.01 * 10.0;
+  EXPECT_NEAR(shaping(limit, edge), 2.0 * std::log(0.01), 1e-9);
+  EXPECT_NEAR((shaping(limit, edge + 1e-6) - shaping(limit, edge - 1e-6)) / 2e-6, -2.0 / 0.1, 1e-3);
+  EXPECT_NEAR(shaping(limit, 120.0), 2.0 * (std::log(0.01) - 2.01 / 0.01), 1e-9);
+}
+
+TEST(LimitGuard, RefusesLimitsByName) {
+  const auto message = [](Limit limit) -> std::string {
+    try {
+      validate({std::move(limit)});
+    } catch (const ParameterError& e) {
+      return e.what();
+    }
+    return "";
+  };
+  EXPECT_TRUE(message({"p", 1.0}).empty());
+  EXPECT_NE(message({"p", unlimited}).find("limit p: upper = inf"), std::string::npos);
+  EXPECT_NE(message({"p", 1.0, -1.0}).find("margin = -1"), std::string::npos);
+  EXPECT_NE(message({"p", 1.0, 0.0, LimitMethod::penalty, 0.0}).find("weight = 0"), std::string::npos);
+  EXPECT_NE(message({"p", 1.0, 0.0, LimitMethod::penalty, 1.0, std::nan("")}).find("scale = nan"), std::string::npos);
+}
+
+}  // namespace
+}  // namespace mgdd::optimize

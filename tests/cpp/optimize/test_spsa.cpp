@@ -1,0 +1,227 @@
+// SPSA: a gradient without bias from two measurements in any dimension, and its averaged, blocking, one-measurement and
+// second-order variants.
+#include "support/seeker_case.hpp"
+
+namespace mgdd::optimize {
+namespace {
+
+/// A negative definite matrix with cross terms, for 1 to 5 inputs.
+InputMatrix bowl(Eigen::Index n) {
+  InputMatrix h = InputMatrix::Zero(n, n);
+  for (Eigen::Index i = 0; i < n; ++i) {
+    h(i, i) = -0.04 - 0.01 * static_cast<double>(i);
+    if (i > 0) h(i, i - 1) = h(i - 1, i) = 0.012;
+  }
+  return h;
+}
+
+Inputs somewhere(Eigen::Index n) {
+  Inputs x(n);
+  for (Eigen::Index i = 0; i < n; ++i)
+    x[i] = (i % 2 == 0 ? 6.0 : -5.0) + 0.5 * static_cast<double>(i);
+  return x;
+}
+
+SpsaSettings frozen(Eigen::Index n) {
+  SpsaSettings s;
+  s.space = space_at(somewhere(n));
+  s.schedule = GainSchedule::constant;
+  s.gain = 1e-300;
+  return s;
+}
+
+TEST(Spsa, GradientOfAQuadraticHasNoBiasAndTakesTwoMeasurementsInAnyDimension) {
+  const int draws = 10'000;
+  for (Eigen::Index n = 1; n <= 5; ++n) {
+    for (const double c : {0.5, 3.0}) {
+      SpsaSettings s = frozen(n);
+      s.perturbation = c;
+      s.seed = static_cast<std::uint64_t>(n);
+      Spsa seeker(s);
+      const InputMatrix h = bowl(n);
+      Inputs sum = Inputs::Zero(n), squares = sum;
+      for (int k = 0; k < draws; ++k) {
+        for (int m = 0; m < 2; ++m)
+          cycle_of(seeker, [&](const Inputs& x) { return 0.5 * x.dot(h * x); });
+        ASSERT_EQ(seeker.iteration(), k + 1);
+        sum += seeker.gradient();
+        squares += seeker.gradient().cwiseAbs2();
+      }
+      EXPECT_EQ(seeker.estimate(), s.space.start);
+      EXPECT_EQ(seeker.protocol().cycle, 2 * draws);
+      const Inputs truth = h * s.space.start;
+      for (Eigen::Index i = 0; i < n; ++i) {
+        const double mean = sum[i] / draws;
+        const double error = std::sqrt(std::max(0.0, squares[i] / draws - mean * mean) / draws);
+        EXPECT_NEAR(mean, truth[i], 3.0 * error + 1e-12) << n << " inputs, c " << c << ", entry " << i;
+      }
+    }
+  }
+}
+
+TEST(Spsa, AveragingDividesTheVarianceOfTheGradient) {
+  std::vector<double> variance;
+  for (const int q : {1, 4}) {
+    SpsaSettings s = frozen(3);
+    s.averaging = q;
+    Spsa seeker(s);
+    EXPECT_EQ(seeker.measurements_per_iteration(), 2 * q);
+    double sum = 0.0, square = 0.0;
+    const int draws = 4000;
+    for (int k = 0; k < draws * 2 * q; ++k) {
+      cycle_of(seeker, [&](const Inputs& x) { return 0.5 * x.dot(bowl(3) * x); });
+      if ((k + 1) % (2 * q) != 0) continue;
+      sum += seeker.gradient()[0];
+      square += seeker.gradient()[0] * seeker.gradient()[0];
+    }
+    variance.push_back(square / draws - sum * sum / draws / draws);
+  }
+  EXPECT_NEAR(variance[0] / variance[1], 4.0, 0.4);
+}
+
+TEST(Spsa, EveryFormFindsTheOptimumOfTwoToFiveInputs) {
+  for (const SpsaForm form : {SpsaForm::first_order, SpsaForm::second_order, SpsaForm::one_measurement}) {
+    for (const bool blocking : {false, true}) {
+      if (blocking && form == SpsaForm::one_measurement) continue;
+      for (Eigen::Index n = 2; n <= 5; ++n) {
+        double worst = 0.0;
+        for (std::uint64_t seed = 0; seed < 10; ++seed) {
+          SpsaSettings s;
+          s.space = space_at(somewhere(n));
+          s.form = form;
+          s.averaging = form == SpsaForm::one_measurement ? 1 : 2;
+          s.blocking = blocking;
+          s.noise_sd = 0.1;
+          s.seed = seed;
+          Spsa seeker(s);
+          for (int k = 0; k < 12'000; ++k) {
+            cycle_of(seeker, [&](const Inputs& x) {
+              return 56.0 + 0.5 * x.dot(bowl(n) * x) + 0.1 * random::normal(seed, 8, static_cast<std::uint64_t>(k));
+            });
+          }
+          worst = std::max(worst, seeker.estimate().cwiseAbs().maxCoeff());
+          EXPECT_TRUE(blocking || seeker.blocked() == 0);
+        }
+        EXPECT_LT(worst, form == SpsaForm::one_measurement ? 2.5 : 1.0)
+            << to_string(form) << (blocking ? " blocking, " : ", ") << n << " inputs";
+      }
+    }
+  }
+}
+
+TEST(Spsa, SecondOrderLearnsTheHessian) {
+  for (Eigen::Index n = 1; n <= 5; ++n) {
+    SpsaSettings s = frozen(n);
+    s.form = SpsaForm::second_order;
+    s.hessian_prior = 1.0;
+    Spsa seeker(s);
+    EXPECT_EQ(seeker.measurements_per_iteration(), 4);
+    for (int k = 0; k < 4 * 20'000; ++k)
+      cycle_of(seeker, [&](const Inputs& x) { return 0.5 * x.dot(bowl(n) * x); });
+    EXPECT_LT((seeker.hessian() - bowl(n)).cwiseAbs().maxCoeff(), 0.004) << n << " inputs";
+  }
+}
+
+TEST(Spsa, FirstOrderFiguresOfTheDefaultEngine) {
+  double cycles = 0.0, square = 0.0;
+  for (std::uint64_t seed = 0; seed < 200; ++seed) {
+    SpsaSettings s;
+    s.space = space_at(scalar_input(12.0));
+    s.seed = seed;
+    Spsa seeker(s);
+    const std::vector<double> path = search(seeker, quadratic, 2000, 0.25, seed);
+    cycles += first_within(path, 1.0) / 200.0;
+    square += path.back() * path.back() / 200.0;
+  }
+  EXPECT_NEAR(cycles, 58.0, 8.0);
+  EXPECT_NEAR(std::sqrt(square), 0.42, 0.07);
+}
+
+TEST(Spsa, ConstantGainsGoOnTracking) {
+  SpsaSettings s;
+  s.space = space_at(scalar_input(0.0));
+  s.schedule = GainSchedule::constant;
+  s.gain = 2.0;
+  Spsa seeker(s);
+  search(seeker, quadratic, 3000);
+  EXPECT_NEAR(search(seeker, [](double x) { return quadratic(x - 8.0); }, 300).back(), 8.0, 0.1);
+}
+
+TEST(Spsa, BlockingRefusesAStepThatMakesJWorse) {
+  SpsaSettings s;
+  s.space = space_at(scalar_input(5.0));
+  s.schedule = GainSchedule::constant;
+  s.gain = 2.5 / std::abs(bend);  // every step overshoots: |1 - 2.5| > 1
+  s.step_max = 1e3;
+  Spsa free(s);
+  EXPECT_GT(std::abs(search(free, quadratic, 40).back()), 100.0);
+  s.blocking = true;
+  Spsa guarded(s);
+  EXPECT_EQ(guarded.measurements_per_iteration(), 3);
+  for (const double x : search(guarded, quadratic, 300))
+    EXPECT_LE(std::abs(x), 7.5 + 1e-9);  // the first step has nothing to be compared with
+  EXPECT_GT(guarded.blocked(), 90);
+}
+
+TEST(Spsa, ASeedRepeatsARunAndAnotherDoesNot) {
+  const auto path = [](std::uint64_t seed) {
+    SpsaSettings s;
+    s.space = space_at(inputs({3.0, 4.0}));
+    s.seed = seed;
+    Spsa seeker(s);
+    for (int k = 0; k < 100; ++k)
+      cycle_of(seeker, [](const Inputs& x) { return -0.02 * x.squaredNorm(); });
+    return seeker.estimate();
+  };
+  EXPECT_EQ(path(1), path(1));
+  EXPECT_NE(path(1), path(2));
+}
+
+TEST(Spsa, OneMeasurementDoesNotMindAConstantAddedToJ) {
+  SpsaSettings s;
+  s.space = space_at(scalar_input(6.0));
+  s.form = SpsaForm::one_measurement;
+  Spsa plain(s), lifted(s);
+  const std::vector<double> a = search(plain, quadratic, 800);
+  const std::vector<double> b = search(lifted, [](double x) { return quadratic(x) + 1e6; }, 800);
+  for (std::size_t k = 0; k < a.size(); ++k)
+    ASSERT_NEAR(a[k], b[k], 1e-5);
+}
+
+TEST(Spsa, MinimisingIsMaximisingTheNegative) {
+  SpsaSettings s;
+  s.space = space_at(scalar_input(8.0));
+  Spsa up(s);
+  s.maximize = false;
+  Spsa down(s);
+  EXPECT_EQ(search(up, quadratic, 600), search(down, [](double x) { return -quadratic(x); }, 600));
+}
+
+TEST(Spsa, RefusesAndAdvises) {
+  const auto refused = [](auto change) {
+    SpsaSettings s;
+    change(s);
+    EXPECT_THROW(Spsa{s}, ParameterError);
+  };
+  refused([](auto& s) { s.gain = -1.0; });
+  refused([](auto& s) { s.perturbation = 0.0; });
+  refused([](auto& s) { s.stability = -1.0; });
+  refused([](auto& s) { s.gain_exponent = 0.55; });
+  refused([](auto& s) { s.averaging = 0; });
+  refused([](auto& s) { s.noise_sd = -0.1; });
+  refused([](auto& s) { s.initial_hessian = 0.0; });
+  refused([](auto& s) { s.hessian_prior = 0.0; });
+  refused([](auto& s) { s.step_max = -1.0; });
+  SpsaSettings s;
+  s.schedule = GainSchedule::constant;
+  s.gain = 30.0;
+  EXPECT_TRUE(s.advice().empty());
+  s.curvature = bend;
+  ASSERT_EQ(s.advice().size(), 1u);
+  EXPECT_NE(s.advice()[0].find("19.6"), std::string::npos) << s.advice()[0];
+  s.gain = 19.0;
+  EXPECT_TRUE(s.advice().empty());
+}
+
+}  // namespace
+}  // namespace mgdd::optimize

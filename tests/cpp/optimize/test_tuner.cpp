@@ -1,0 +1,159 @@
+// The tuner: its closed forms, the seekers that it makes, and its plain word where a wish cannot be met.
+#include "mgdd/optimize/tuner.hpp"
+
+#include "support/lagged_sensor.hpp"
+#include "support/seeker_case.hpp"
+
+namespace mgdd::optimize {
+namespace {
+
+constexpr double sigma = 0.25;
+
+TuningWish default_wish(TunedMethod method = TunedMethod::batch) {
+  TuningWish w;
+  w.method = method;
+  w.noise_sd = sigma;
+  w.curvature = bend;
+  w.distance = 12.0;
+  w.arrival = 1.0;
+  return w;
+}
+
+Seeker seeker_of(const Tuning& t, double start, std::uint64_t seed, const ComponentLag& lag = {}) {
+  if (t.method == TunedMethod::spsa) {
+    SpsaSettings s;
+    s.space = space_at(scalar_input(start));
+    s.schedule = GainSchedule::constant;
+    s.gain = t.gain;
+    s.perturbation = t.amplitude;
+    s.step_max = t.rate;
+    s.seed = seed;
+    return Spsa(s);
+  }
+  ExtremumSeekingSettings s;
+  s.space = space_at(scalar_input(start));
+  s.form = t.method == TunedMethod::batch ? MeanRemoval::batch : MeanRemoval::moving_average;
+  s.dither = {.amplitude = scalar_input(t.amplitude), .period = t.period, .harmonics = {1}};
+  s.gain = scalar_input(t.gain);
+  s.rate = scalar_input(t.rate);
+  s.components = {lag};
+  return ExtremumSeeking(s);
+}
+
+TEST(Tuner, PredictionsAreTheClosedForms) {
+  for (const TunedMethod method : {TunedMethod::batch, TunedMethod::moving_average, TunedMethod::spsa}) {
+    const Tuning t = tune(default_wish(method));
+    const double a = std::abs(bend);
+    if (method == TunedMethod::spsa) {
+      const double q = t.gain * a;
+      EXPECT_NEAR(t.rms, sigma / (t.amplitude * a) * std::sqrt(q / (2.0 * (2.0 - q))), 1e-12);
+      EXPECT_NEAR(t.dither_cost, 0.5 * a * t.amplitude * t.amplitude, 1e-12);
+    } else {
+      const double tau = 2.0 / (t.gain * t.amplitude * a);
+      const double batch = method == TunedMethod::batch ? std::sqrt(1.0 - t.period / (2.0 * tau)) : 1.0;
+      EXPECT_NEAR(t.time_constant_cycles, tau, 1e-9);
+      EXPECT_NEAR(t.rms, sigma / (t.amplitude * a * std::sqrt(tau) * batch), 1e-12);
+      EXPECT_NEAR(t.dither_cost, 0.25 * a * t.amplitude * t.amplitude, 1e-12);
+      EXPECT_GE(tau, 2.0 * t.period);
+    }
+    EXPECT_NEAR(t.jitter_cost, 0.5 * a * t.rms * t.rms, 1e-12);
+    EXPECT_EQ(t.met, t.reasons.empty());
+  }
+}
+
+TEST(Tuner, WhatItPredictsHappens) {
+  for (const TunedMethod method : {TunedMethod::batch, TunedMethod::moving_average, TunedMethod::spsa}) {
+    TuningWish w = default_wish(method);
+    w.cycles = 100.0;
+    const Tuning t = tune(w);
+    EXPECT_TRUE(t.met);
+    double cycles = 0.0, square = 0.0;
+    for (std::uint64_t seed = 0; seed < 200; ++seed) {
+      Seeker any = seeker_of(t, seed % 2 == 0 ? 12.0 : -12.0, seed);
+      const std::vector<double> path =
+          std::visit([&](auto& seeker) { return search(seeker, quadratic, 2400, sigma, seed); }, any);
+      cycles += first_within(path, 1.0) / 200.0;
+      square += std::pow(rms_of(path, 400, 2400), 2) / 200.0;
+    }
+    EXPECT_NEAR(std::sqrt(square) / t.rms, 1.0, 0.15) << to_string(method);
+    EXPECT_NEAR(cycles / t.cycles, 1.0, 0.25) << to_string(method);
+    EXPECT_LE(cycles, 100.0) << to_string(method);
+  }
+}
+
+TEST(Tuner, AKnownLagIsTurnedBackAndArrives) {
+  TuningWish w = default_wish();
+  w.lag = {38.0, 25.0};
+  const Tuning t = tune(w);
+  EXPECT_GE(t.period, 60);
+  EXPECT_GE(t.time_constant_cycles, 4.0 * t.period);
+  EXPECT_NEAR(t.sensor_gain, sensor_response(w.lag, 1, t.period).gain, 1e-12);
+  for (const double start : {12.0, -12.0}) {
+    Seeker any = seeker_of(t, start, 0, w.lag);
+    test_support::LaggedSensor sensor(38, 25.0, quadratic(start));
+    const auto late = [&](double x) { return sensor.show(quadratic(x)); };
+    const std::vector<double> path =
+        std::visit([&](auto& seeker) { return search(seeker, late, static_cast<int>(8.0 * t.cycles)); }, any);
+    EXPECT_NEAR(first_within(path, 1.0) / t.cycles, 0.85, 0.35);
+    EXPECT_LT(std::abs(path.back()), 0.3);
+    EXPECT_LT(rms_of(path, path.size() / 2, path.size()), 0.5);
+  }
+}
+
+TEST(Tuner, AnUnknownLagAsksForADitherSlowEnoughToKeepTheSign) {
+  TuningWish w = default_wish();
+  w.lag = {38.0, 25.0};
+  w.compensated = false;
+  const Tuning t = tune(w);
+  EXPECT_GE(t.period, 6 * (38 + 25));
+  EXPECT_LT(t.sensor_phase_rad, pi / 3.0 + 0.02);
+  const Tuning compensated = [&] {
+    w.compensated = true;
+    return tune(w);
+  }();
+  EXPECT_GT(t.cycles, 3.0 * compensated.cycles);
+}
+
+TEST(Tuner, SaysPlainlyWhatCannotBeMet) {
+  TuningWish w = default_wish();
+  w.cycles = 10.0;
+  Tuning t = tune(w);
+  EXPECT_FALSE(t.met);
+  ASSERT_EQ(t.reasons.size(), 1u);
+  EXPECT_NE(t.reasons[0].find("cycles = 10 is too few"), std::string::npos);
+  w = default_wish();
+  w.rms = 0.05;
+  w.amplitude_max = 1.0;
+  t = tune(w);
+  EXPECT_FALSE(t.met);
+  EXPECT_NE(t.reasons.back().find("rms = 0.05 is out of reach with amplitude_max = 1"), std::string::npos);
+  w.amplitude_max = 1.01 * t.amplitude * t.rms / 0.05;  // the amplitude that its sentence asks for
+  EXPECT_TRUE(tune(w).met);
+}
+
+TEST(Tuner, RefusesByName) {
+  const auto message = [](auto change) -> std::string {
+    TuningWish w = default_wish();
+    change(w);
+    try {
+      tune(w);
+    } catch (const ParameterError& e) {
+      return e.what();
+    }
+    return "";
+  };
+  EXPECT_NE(message([](auto& w) { w.noise_sd = 0.0; }).find("noise_sd = 0"), std::string::npos);
+  EXPECT_NE(message([](auto& w) { w.curvature = std::nan(""); }).find("curvature| = nan"), std::string::npos);
+  EXPECT_NE(message([](auto& w) { w.rms = -1.0; }).find("rms = -1"), std::string::npos);
+  EXPECT_NE(message([](auto& w) { w.cycles = 0.0; }).find("cycles = 0"), std::string::npos);
+  EXPECT_NE(message([](auto& w) { w.arrival = 12.0; }).find("must be below distance = 12"), std::string::npos);
+  EXPECT_NE(message([](auto& w) { w.lag.delay_cycles = -1.0; }).find("delay_cycles = -1"), std::string::npos);
+  EXPECT_NE(message([](auto& w) {
+              w.method = TunedMethod::spsa;
+              w.lag.lag_cycles = 5.0;
+            }).find("without delay and lag"),
+            std::string::npos);
+}
+
+}  // namespace
+}  // namespace mgdd::optimize

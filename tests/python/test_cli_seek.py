@@ -1,0 +1,222 @@
+"""`mgdd engine seek`: it arrives where the steady map says, keeps limits, and says what is wrong with an option."""
+
+from __future__ import annotations
+
+import json
+import math
+import os
+import signal
+import subprocess
+import sys
+import time
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from mgdd.cli import main
+from mgdd.engine import Performance
+from mgdd.loop import EngineBench, run_seeker, steady_optimum
+from mgdd.optimize import ExtremumSeeking
+
+METHODS = ("extremum_seeking", "newton", "bounded", "spsa", "golden")
+SEEDS = range(3)
+
+
+def seek(capsys: pytest.CaptureFixture[str], *argv: str) -> dict[str, object]:
+    code = main(["engine", "seek", *argv, "--json"])
+    captured = capsys.readouterr()
+    assert code == 0, captured.err
+    return json.loads(captured.out)
+
+
+def refused(capsys: pytest.CaptureFixture[str], *argv: str, code: int = 2) -> str:
+    assert main(["engine", "seek", *argv]) == code
+    captured = capsys.readouterr()
+    assert captured.out == ""
+    return captured.err
+
+
+@pytest.mark.parametrize("method", METHODS)
+def test_every_method_finds_the_steady_optimum(method: str, capsys: pytest.CaptureFixture[str]) -> None:
+    best = steady_optimum(EngineBench())
+    runs = [seek(capsys, "--method", method, "--seed", str(seed)) for seed in SEEDS]
+    for run in runs:
+        assert run["optimum_cad"] == best.soc_cad
+        assert run["cycles"] == 2000
+        assert run["limit_exceeded_fraction"] is None
+        assert run["mean_j"] == run["mean_efficiency_percent"] < best.j
+        assert 0 < run["cycles_to_1_cad"] < 1000
+        assert run["rms_cad"] < 1.2
+    assert np.mean([run["final_cad"] for run in runs]) == pytest.approx(best.soc_cad, abs=1.0)
+    assert len({run["final_cad"] for run in runs}) == len(runs)
+
+
+@pytest.mark.parametrize("method", METHODS)
+def test_every_method_keeps_the_pressure_limit(method: str, capsys: pytest.CaptureFixture[str]) -> None:
+    runs = [seek(capsys, "--method", method, "--seed", str(seed), "--limit", "p_max_bar=95") for seed in SEEDS]
+    assert runs[0]["optimum_cad"] == pytest.approx(-3.08, abs=0.01)
+    assert runs[0]["free_optimum_cad"] == pytest.approx(-5.63, abs=0.01)
+    assert runs[0]["limits"] == {"p_max_bar": 95.0}
+    assert np.mean([run["limit_exceeded_fraction"] for run in runs]) < 0.01
+    # The dither stays below the limit, so its mean lies on the late side.
+    assert -0.1 < np.mean([run["final_cad"] - run["optimum_cad"] for run in runs]) < 1.25
+
+
+@pytest.mark.parametrize("how", ["penalty", "barrier"])
+def test_limits_known_to_j_are_kept_as_well(how: str, capsys: pytest.CaptureFixture[str]) -> None:
+    run = seek(capsys, "--limit", "p_max_bar=95", "--limit", "dp_max_bar_per_cad=8", "--limit-method", how)
+    assert (run["limit_method"], run["limit_exceeded_fraction"]) == (how, 0.0)
+    assert abs(run["final_cad"] - run["optimum_cad"]) < 1.5
+    plain = seek(capsys, "--limit", "p_max_bar=95", "--limit", "dp_max_bar_per_cad=8")
+    assert run["final_cad"] != plain["final_cad"]
+
+
+@pytest.mark.parametrize(
+    ("method", "form"), [("extremum_seeking", f) for f in ("batch", "moving_average", "washout")] + [("newton", None)]
+)
+def test_seekers_behind_the_analyser_arrive(method: str, form: str | None, capsys: pytest.CaptureFixture[str]) -> None:
+    bench = EngineBench(performance=Performance.efficiency_and_nox(), nox_sensor="analyser")
+    option = [] if form is None else ["--form", form]
+    run = seek(capsys, "--sensor", "analyser", "--method", method, *option)
+    assert run["optimum_cad"] == steady_optimum(bench).soc_cad
+    assert run["cycles"] == 4000
+    assert run["final_cad"] == pytest.approx(run["optimum_cad"], abs=1.0)
+    assert run["rms_cad"] < 0.6
+    assert run["mean_nox_ppm"] < 1300.0
+
+
+def test_the_period_follows_the_lag_of_the_speed(capsys: pytest.CaptureFixture[str]) -> None:
+    run = seek(capsys, "--sensor", "analyser", "--speed-rpm", "4000", "--fuel-mg", "25", "--seed", "2")
+    assert run["cycles"] > 8000  # the lag lasts 67 cycles here, 25 at 1500 rpm
+    assert run["final_cad"] == pytest.approx(run["optimum_cad"], abs=1.0)
+
+
+def test_the_soft_sensor_needs_no_patience(capsys: pytest.CaptureFixture[str]) -> None:
+    for method in METHODS:
+        run = seek(capsys, "--sensor", "soft", "--method", method, "--preset", "hd_diesel_128x144", "--misfire", "0.01")
+        assert (run["cycles"], run["preset"]) == (2000, "hd_diesel_128x144")
+        assert run["final_cad"] == pytest.approx(run["optimum_cad"], abs=1.5)
+        assert 5 <= run["misfires"] <= 45
+
+
+def test_it_is_the_library_run(capsys: pytest.CaptureFixture[str], tmp_path: Path) -> None:
+    file = tmp_path / "run.csv"
+    argv = ("--seed", "7", "--cycles", "1500", "--start-cad", "-12", "--form", "moving_average", "-o", str(file))
+    out = seek(capsys, *argv)
+    bench = EngineBench(seed=7)
+    best = steady_optimum(bench)
+    seeker = ExtremumSeeking(
+        start=-12.0, lower=-30.0, upper=10.0, form="moving_average", gain=2.0 / (abs(best.curvature) * 40.0)
+    )
+    run = run_seeker(bench, seeker, 1500, optimum_cad=best.soc_cad)
+    assert out["final_cad"] == run.summary["final_cad"]
+    assert out["rms_cad"] == run.summary["rms_cad"]
+    assert out["cycles_to_1_cad"] == run.summary["cycles_to"]
+    header, units, *rows = file.read_text().splitlines()
+    columns = header.split(",")
+    assert units.split(",")[columns.index("estimate_cad")] == "°CA aTDC"
+    table = np.array([[float(cell) for cell in row.split(",")] for row in rows])
+    np.testing.assert_array_equal(table[:, columns.index("estimate_cad")], run.dataset["estimate_cad"])
+    np.testing.assert_array_equal(table[:, columns.index("p_max_bar")], run.dataset["p_max_bar"])
+
+
+def test_a_run_that_never_arrives_says_so(capsys: pytest.CaptureFixture[str]) -> None:
+    out = seek(capsys, "--cycles", "20")
+    assert out["cycles_to_1_cad"] is None
+    assert main(["engine", "seek", "--cycles", "20"]) == 0
+    assert "cycles_to_1_cad                           –" in capsys.readouterr().out
+
+
+def test_cov_of_imep_can_be_a_limit(capsys: pytest.CaptureFixture[str], tmp_path: Path) -> None:
+    file = tmp_path / "run.csv"
+    out = seek(capsys, "--limit", "cov-imep-percent=1.0", "-o", str(file))
+    assert out["limits"] == {"cov_imep_percent": 1.0}
+    assert out["limit_exceeded_fraction"] < 0.02
+    assert file.read_text().splitlines()[0].endswith(",cov_imep_percent")
+    assert "%" in file.read_text().splitlines()[1]
+    message = refused(capsys, "--limit", "cov_imep_percent=0.1", code=3)
+    assert "cov_imep_percent=0.1: the bench has 0.4" in message
+
+
+def test_figure(capsys: pytest.CaptureFixture[str], tmp_path: Path) -> None:
+    file = tmp_path / "run.png"
+    seek(capsys, "--figure", str(file), "--limit", "p_max_bar=95", "--misfire", "0.01", "--cycles", "300")
+    assert file.read_bytes().startswith(b"\x89PNG")
+    assert "--figure run.bmp" in refused(capsys, "--figure", "run.bmp")
+    assert "no folder" in refused(capsys, "--figure", "nowhere/run.png")
+
+
+@pytest.mark.parametrize(
+    ("wrong", "right", "message", "code"),
+    [
+        (["--start-cad", "-29.5"], ["--start-cad", "-29"], "--start-cad -29.5: must be in [-29, 9]", 2),
+        (["--start-cad", "11", "--method", "golden"], ["--start-cad", "9"], "must be in [-30, 10]", 2),
+        (["--start-cad", "nan"], ["--start-cad", "-8"], "--start-cad nan", 2),
+        (["--lower-cad", "-61"], ["--lower-cad", "-60"], "--lower-cad -61: must be in [-60, 20]", 2),
+        (["--upper-cad", "-25"], ["--upper-cad", "-5"], "--start-cad -20: must be in [-29, -26]", 2),
+        (["--upper-cad", "-30"], ["--upper-cad", "0"], "--lower-cad -30: must be below --upper-cad -30", 2),
+        (["--cycles", "0"], ["--cycles", "1"], "--cycles 0: must be in [1, ", 2),
+        (["--cycles", "-5"], ["--cycles", "1"], "--cycles -5", 2),
+        (["--seed", "-1"], ["--seed", "1"], "--seed -1: must be in [0, 2**64)", 2),
+        (["--misfire", "1.5"], ["--misfire", "0.5"], "--misfire 1.5: must be in [0, 1]", 2),
+        (["--noise", "-1"], ["--noise", "0"], "--noise -1 %: must be in [0, 20]", 2),
+        (["--soc-scatter-cad", "6"], ["--soc-scatter-cad", "5"], "--soc-scatter-cad 6 °CA: must be in [0, 5]", 2),
+        (["--limit", "p_maxx=95"], ["--limit", "p_max_bar=95"], "--limit 'p_maxx' is not measured: must be one of", 2),
+        (["--limit", "p_max_bar"], ["--limit", "p_max_bar=95"], "write NAME=NUMBER", 2),
+        (["--limit", "p_max_bar=nan"], ["--limit", "p_max_bar=95"], "p_max_bar=nan: must be finite", 2),
+        (["--limit", "p_max_bar=20"], ["--limit", "p_max_bar=85"], "no soc_cad in [-30, 10] keeps", 3),
+        (["--limit-method", "barrier"], ["--limit-method", "barrier", "--limit", "p_max_bar=95"], "--limit NAME=X", 2),
+        (["--form", "batch", "--method", "spsa"], ["--form", "batch"], "--method extremum_seeking only", 2),
+        (["--sensor", "analyser", "--method", "spsa"], ["--method", "spsa"], "use --sensor soft", 2),
+        (["--sensor", "analyser", "--method", "golden"], ["--method", "golden"], "use --sensor soft", 2),
+        (["--sensor", "analyser", "--method", "bounded"], ["--method", "bounded"], "use --sensor soft", 2),
+        (["--motored"], [], "leave --motored out", 2),
+        (["--preset", "nonesuch"], ["--preset", "puma_single"], "nonesuch", 2),
+        (["--set", "bore_mm=-1"], ["--set", "bore_mm=80"], "bore_mm = -1", 2),
+        (["-o", "run.txt"], [], "-o run.txt: the ending", 2),
+    ],
+)
+def test_wrong_then_right(
+    wrong: list[str], right: list[str], message: str, code: int, capsys: pytest.CaptureFixture[str]
+) -> None:
+    short = ["--cycles", "40"]
+    assert message in refused(capsys, *([] if "--cycles" in wrong else short), *wrong, code=code)
+    out = seek(capsys, *([] if "--cycles" in right else short), *right)
+    assert math.isfinite(out["final_cad"])
+
+
+def test_help_names_the_default_length(capsys: pytest.CaptureFixture[str]) -> None:
+    with pytest.raises(SystemExit) as stop:
+        main(["engine", "seek", "--help"])
+    assert stop.value.code == 0
+    assert "4000 at least" in " ".join(capsys.readouterr().out.split())
+
+
+@pytest.mark.skipif(os.name != "posix", reason="needs SIGINT")
+def test_ctrl_c_leaves_the_cycles_so_far(tmp_path: Path) -> None:
+    ready = tmp_path / "ready"
+    program = (
+        "import pathlib, sys\n"
+        "import mgdd.cli.seek as seek\n"
+        "run = seek.run_seeker\n"
+        "def told(*args, **kwargs):\n"
+        f"    pathlib.Path({str(ready)!r}).touch()\n"
+        "    return run(*args, **kwargs)\n"
+        "seek.run_seeker = told\n"
+        "from mgdd.cli import main\n"
+        "sys.exit(main(['engine', 'seek', '--cycles', '2000000', '--json']))\n"
+    )
+    with subprocess.Popen([sys.executable, "-c", program], stdout=subprocess.PIPE, stderr=subprocess.PIPE) as process:
+        while not ready.exists() and process.poll() is None:
+            time.sleep(0.02)
+        time.sleep(0.3)
+        process.send_signal(signal.SIGINT)
+        out, err = process.communicate(timeout=120)
+    assert process.returncode == 130, err.decode()
+    result = json.loads(out)
+    assert result["interrupted"] is True
+    assert 0 <= result["cycles"] < 2_000_000
+    if result["cycles"] >= 1000:
+        assert abs(result["final_cad"] - result["optimum_cad"]) < 4.0
+    assert b"interrupted" in err

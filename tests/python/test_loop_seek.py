@@ -1,0 +1,187 @@
+"""Closed loops from Python: the same run in one piece, in pieces, cycle by cycle; whole loops at once."""
+
+from __future__ import annotations
+
+import math
+import os
+import signal
+import threading
+from typing import Any
+
+import numpy as np
+import pytest
+import xarray as xr
+
+from mgdd.engine import OperatingPoint, Performance
+from mgdd.errors import ParameterError
+from mgdd.loop import EngineBench, monte_carlo, run_seeker, steady_map, steady_optimum
+from mgdd.optimize import ExtremumSeeking, GoldenSection, Limit, NewtonSeeking, Spsa
+from mgdd.results import check_labels
+
+SPACE = {"start": -14.0, "lower": -30.0, "upper": 10.0}
+
+
+def bench(**more: Any) -> EngineBench:
+    return EngineBench(
+        schedule=[(0, OperatingPoint()), (160, OperatingPoint(fuel_mg=28.0))],
+        performance=Performance.efficiency_and_nox(),
+        nox_sensor="soft",
+        limits=["p_max_bar"],
+        misfire_probability=0.02,
+        seed=11,
+        **more,
+    )
+
+
+def seeker(kind: str) -> Any:
+    limits = [Limit("p_max_bar", 120.0)]
+    if kind == "newton":
+        return NewtonSeeking(**SPACE, limits=limits)
+    if kind == "spsa":
+        return Spsa(**SPACE, limits=limits, seed=3)
+    return ExtremumSeeking(**SPACE, limits=limits, form=kind)
+
+
+@pytest.mark.parametrize("kind", ["batch", "moving_average", "newton", "spsa"])
+def test_one_run_is_its_pieces_is_ask_and_tell(kind: str) -> None:
+    whole = run_seeker(bench(), seeker(kind), 400)
+    plant, pieces = bench(), seeker(kind)
+    joined = xr.concat([run_seeker(plant, pieces, n).dataset for n in (1, 130, 200, 69)], "cycle")
+    np.testing.assert_array_equal(whole.dataset["estimate_cad"], joined["estimate_cad"])
+    np.testing.assert_array_equal(whole.dataset["j"], joined["j"])
+
+    plant, single = bench(), seeker(kind)
+    for k in range(400):
+        if k == 160:
+            single.restart()
+        assert single.estimate[0] == whole.dataset["estimate_cad"][k]
+        cycle = plant.step(single.ask()[0])
+        single.tell(cycle["j"], cycle["limits"], misfire=cycle["misfire"])
+    assert whole.summary["misfires"] == single.misfires > 0
+    np.testing.assert_array_equal(single.history["applied"].values[:, 0], whole.dataset["soc_requested_cad"])
+
+
+def test_labels_and_history_of_a_run() -> None:
+    it = seeker("batch")
+    run = run_seeker(bench(), it, 200, optimum_cad=-2.0, exceed_above={"p_max_bar": 110.0}, exceed_from=100)
+    check_labels(run.dataset)
+    assert run.dataset.sizes["cycle"] == 200
+    assert not run.interrupted
+    over = (run.dataset["limits"].sel(limit="p_max_bar")[100:] > 110.0).mean()
+    assert run.summary["exceeded_fraction"] == pytest.approx(float(over), abs=1e-12)
+    assert run.summary["final_cad"] == pytest.approx(float(run.dataset["estimate_cad"][100:].mean()), abs=1e-12)
+    np.testing.assert_array_equal(it.history["applied"].values[:, 0], run.dataset["soc_requested_cad"])
+
+
+def test_monte_carlo_is_labelled_and_the_same_on_any_thread_count() -> None:
+    plants = [EngineBench(), EngineBench(point=OperatingPoint(fuel_mg=30.0))]
+    gains = [ExtremumSeeking(**SPACE, gain=g) for g in (0.5, 1.0)]
+    one = monte_carlo(plants, gains, range(6), cycles=300, optimum_cad=[-5.6, -8.5], threads=1)
+    two = monte_carlo(plants, gains, range(6), cycles=300, optimum_cad=[-5.6, -8.5], threads=2)
+    check_labels(one)
+    xr.testing.assert_identical(one, two)
+    alone = run_seeker(EngineBench(point=OperatingPoint(fuel_mg=30.0), seed=4), gains[1], 300, optimum_cad=-8.5)
+    assert float(one["rms_cad"][1, 1, 4]) == alone.summary["rms_cad"]
+
+
+def test_another_thread_runs_while_loops_do() -> None:
+    """The GIL is released: a counter in Python makes progress during one call of the core."""
+    stop, count = threading.Event(), 0
+
+    def work() -> None:
+        nonlocal count
+        while not stop.is_set():
+            count += 1
+
+    thread = threading.Thread(target=work)
+    thread.start()
+    before = count
+    run_seeker(EngineBench(), ExtremumSeeking(**SPACE), 20_000)
+    during = count - before
+    stop.set()
+    thread.join()
+    assert during > 100
+
+
+@pytest.mark.skipif(os.name != "posix", reason="needs POSIX signals")
+def test_ctrl_c_leaves_a_usable_partial_result() -> None:
+    plant, it = EngineBench(seed=2), ExtremumSeeking(**SPACE)
+    timer = threading.Timer(0.3, os.kill, (os.getpid(), signal.SIGINT))
+    timer.start()
+    run = run_seeker(plant, it, 3_000_000)
+    assert run.interrupted
+    n = run.dataset.sizes["cycle"]
+    assert 0 < n < 3_000_000
+    assert plant.cycle == it.cycle == n
+    twin = run_seeker(EngineBench(seed=2), ExtremumSeeking(**SPACE), n + 50)
+    more = run_seeker(plant, it, 50)
+    np.testing.assert_array_equal(more.dataset["estimate_cad"], twin.dataset["estimate_cad"][n:])
+
+    timer = threading.Timer(0.3, os.kill, (os.getpid(), signal.SIGINT))
+    timer.start()
+    table = monte_carlo(EngineBench(), it, range(20_000), cycles=1000)
+    finished = table["finished"].values
+    assert 0 < finished.sum() < finished.size
+    assert np.isfinite(table["mean_cad"].values[finished]).all()
+    assert np.isnan(table["mean_cad"].values[~finished]).all()
+
+
+def test_steady_optimum_agrees_with_the_model_and_with_the_long_run() -> None:
+    from mgdd.engine import Cylinder, optimum
+
+    free = steady_optimum(EngineBench())
+    assert free.soc_cad == pytest.approx(optimum(Cylinder(), OperatingPoint()).soc_cad, abs=0.002)
+    assert free.curvature == pytest.approx(-0.051, rel=0.05)
+    limited = steady_optimum(EngineBench(limits=["p_max_bar"]), {"p_max_bar": 95.0})
+    model = optimum(Cylinder(), OperatingPoint(), limits={"p_max_bar": 95.0})
+    assert limited.soc_cad == pytest.approx(model.soc_cad, abs=0.002)
+    scattered = EngineBench(limits=["p_max_bar"], efficiency_noise_percent=0.0).run(np.full(4000, limited.soc_cad))
+    assert float(scattered["p_max_bar"].std()) == pytest.approx(limited.limit_scatter["p_max_bar"], rel=0.05)
+
+
+@pytest.mark.parametrize(("weight", "soc"), [(0.0, -5.63), (0.002, -2.72), (0.004, -0.65), (0.008, 2.36)])
+def test_the_optimum_moves_late_with_the_weight_of_nox(weight: float, soc: float) -> None:
+    plant = EngineBench(performance=Performance.efficiency_and_nox(weight), nox_sensor="true_value")
+    assert steady_optimum(plant).soc_cad == pytest.approx(soc, abs=0.03)
+
+
+def test_steady_map_is_quiet_and_labelled() -> None:
+    table = steady_map(EngineBench(soc_scatter_cad=2.0, misfire_probability=0.5), [-10.0, -6.0, 0.0])
+    check_labels(table)
+    np.testing.assert_allclose(table["efficiency_gross"], [0.5568, 0.5618, 0.5543], rtol=5e-4)
+    with pytest.raises(ParameterError, match="soc_cad = 45: must lie in"):
+        steady_map(EngineBench(), [45.0])
+
+
+@pytest.mark.parametrize(
+    ("call", "message"),
+    [
+        (lambda: run_seeker(EngineBench(), ExtremumSeeking(**SPACE), 0), "cycles = 0: must be >= 1"),
+        (
+            lambda: run_seeker(EngineBench(), ExtremumSeeking(**SPACE, limits=[Limit("p_max_bar", 95.0)]), 5),
+            r"limits of the seeker \[p_max_bar\] and of the bench \[\] differ",
+        ),
+        (
+            lambda: run_seeker(EngineBench(), GoldenSection(**SPACE), 5, exceed_above={"p_max_bar": 1.0}),
+            "exceed_above: .*p_max_bar",
+        ),
+        (lambda: monte_carlo([], ExtremumSeeking(**SPACE), [1], cycles=5), "benches is empty"),
+        (lambda: monte_carlo(EngineBench(), ExtremumSeeking(**SPACE), [-1], cycles=5), "seeds: -1 must be"),
+        (lambda: monte_carlo(EngineBench(), [3.0], [1], cycles=5), "3.0 is no seeker"),
+        (lambda: steady_optimum(EngineBench(), {"nonsense": 1.0}), "'nonsense' is no indicator"),
+        (lambda: steady_optimum(EngineBench(), bounds_cad=(5.0, -5.0)), "must increase"),
+    ],
+)
+def test_bad_calls_name_what_is_wrong(call: Any, message: str) -> None:
+    with pytest.raises(ParameterError, match=message):
+        call()
+
+
+def test_a_refused_run_moves_neither_bench_nor_seeker() -> None:
+    plant, it = EngineBench(), NewtonSeeking(**SPACE, limits=[Limit("p_max_bar", 95.0)])
+    state = it.state
+    with pytest.raises(ParameterError):
+        run_seeker(plant, it, 10)
+    assert plant.cycle == 0
+    assert it.state == state
+    assert math.isfinite(run_seeker(EngineBench(limits=["p_max_bar"]), it, 10).summary["mean_j"])

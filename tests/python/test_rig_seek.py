@@ -1,0 +1,255 @@
+"""A seeker on a rig: the loop of the core bit for bit, restarts, misfires, interruption and errors."""
+
+from __future__ import annotations
+
+import copy
+from collections.abc import Callable
+from types import TracebackType
+from typing import Any, Self
+
+import numpy as np
+import pytest
+
+from mgdd.engine import OperatingPoint, Performance
+from mgdd.errors import DataError, ParameterError, RigError
+from mgdd.loop import EngineBench, run_seeker, summarize_cycles
+from mgdd.optimize import (
+    BoundedSeeking,
+    ComponentLag,
+    ExtremumSeeking,
+    GoldenSection,
+    GradientDescent,
+    Limit,
+    NewtonSeeking,
+    Spsa,
+)
+from mgdd.results import check_labels
+from mgdd.rig import AnnouncingRig, Measurement, Rig, SimulatedRig, run_on_rig
+
+CYCLES = 700
+NAMES = ["p_max_bar", "dp_max_bar_per_cad", "cov_imep_percent"]
+SPACE: dict[str, Any] = {
+    "start": -18.0,
+    "lower": -30.0,
+    "upper": 10.0,
+    "limits": [Limit("p_max_bar", 120.0), Limit("dp_max_bar_per_cad", 9.0, method="penalty"), Limit(NAMES[2], 40.0)],
+}
+LATE = {"components": [ComponentLag(), ComponentLag(delay_cycles=38, lag_cycles=25.0)], "period": 60}
+SEEKERS: dict[str, Callable[[], Any]] = {
+    "batch": lambda: ExtremumSeeking(**SPACE),
+    "moving_average": lambda: ExtremumSeeking(form="moving_average", **SPACE),
+    "washout": lambda: ExtremumSeeking(form="washout", **SPACE),
+    "component-wise": lambda: ExtremumSeeking(gain=0.15, **LATE, **SPACE),
+    "newton": lambda: NewtonSeeking(**SPACE),
+    "late newton": lambda: NewtonSeeking(**LATE, **SPACE),
+    "bounded": lambda: BoundedSeeking(**SPACE),
+    "spsa": lambda: Spsa(seed=3, **SPACE),
+    "second-order spsa": lambda: Spsa(form="second_order", seed=3, **SPACE),
+    "one-measurement spsa": lambda: Spsa(form="one_measurement", seed=3, **SPACE),
+    "descent": lambda: GradientDescent(step_size=8.0, **SPACE),
+    "golden": lambda: GoldenSection(noise_sd=0.25, **SPACE),
+}
+
+
+def rough_bench(sensor: str = "analyser") -> EngineBench:
+    """A bench on which everything happens: misfires, limits, a late sensor, drift and two new operating points."""
+    point = OperatingPoint()
+    return EngineBench(
+        schedule=[(0, point), (251, point.replace(speed_rpm=1900.0)), (500, point.replace(fuel_mg=12.0))],
+        performance=Performance.efficiency_and_nox(),
+        nox_sensor=sensor,
+        limits=NAMES,
+        misfire_probability=0.05,
+        soc_drift_cad_per_kcycle=1.0,
+        seed=9,
+    )
+
+
+class ScriptedRig:
+    """Gives back what a function says of a timing; announces nothing."""
+
+    def __init__(self, answer: Callable[[int, float], Measurement]) -> None:
+        self.answer, self.applied = answer, list[float]()
+
+    def apply(self, soc_cad: float) -> None:
+        self.applied.append(soc_cad)
+
+    def measure(self) -> Measurement:
+        return self.answer(len(self.applied) - 1, self.applied[-1])
+
+    def __enter__(self) -> Self:
+        return self
+
+    def __exit__(
+        self, kind: type[BaseException] | None, error: BaseException | None, trace: TracebackType | None, /
+    ) -> None:
+        return None
+
+
+def hill(_: int, soc: float) -> Measurement:
+    return Measurement(components=(56.0 - 0.0255 * (soc + 5.6) ** 2,))
+
+
+def seeker() -> ExtremumSeeking:
+    return ExtremumSeeking(start=-12.0, lower=-30.0, upper=10.0)
+
+
+@pytest.mark.parametrize("sensor", ["analyser", "soft_corrected"])
+@pytest.mark.parametrize("name", SEEKERS)
+def test_the_simulated_rig_is_the_loop_of_the_core(name: str, sensor: str) -> None:
+    in_core, on_rig = SEEKERS[name](), SEEKERS[name]()
+    criteria: dict[str, Any] = {
+        "optimum_cad": -1.0, "arrival_cad": 2.0, "exceed_from": 300, "exceed_above": {"p_max_bar": 121.0}
+    }  # fmt: skip
+    core = run_seeker(rough_bench(sensor), in_core, CYCLES, **criteria)
+    with SimulatedRig(rough_bench(sensor)) as rig:
+        run = run_on_rig(rig, on_rig, CYCLES, **criteria)
+    check_labels(run.dataset)
+    assert 10 < int(run.dataset["misfire"].sum()) < 70
+    assert list(np.flatnonzero(run.dataset["operating_point_changed"])) == [251, 500]
+    assert set(core.dataset.variables) | {"void"} == set(run.dataset.variables)
+    for column in core.dataset.variables:
+        if column != "component":
+            np.testing.assert_array_equal(run.dataset[column], core.dataset[column], err_msg=str(column))
+            assert run.dataset[column].dtype == core.dataset[column].dtype, column
+            assert run.dataset[column].attrs == core.dataset[column].attrs, column
+    assert on_rig.state == in_core.state
+    np.testing.assert_array_equal(on_rig.history["objective"], in_core.history["objective"])
+    for figure, value in core.summary.items():
+        assert run.summary[figure] == pytest.approx(value, rel=1e-12, nan_ok=True), figure
+    assert not run.interrupted
+
+
+def test_a_run_in_pieces_is_one_run() -> None:
+    whole = run_seeker(rough_bench(), SEEKERS["batch"](), CYCLES)
+    again = SEEKERS["batch"]()
+    rig = SimulatedRig(rough_bench())
+    pieces = [run_on_rig(rig, again, n) for n in (251, 1, 200)]
+    last = run_seeker(rig.bench, again, CYCLES - 452)
+    joined = np.concatenate([piece.dataset["estimate_cad"] for piece in (*pieces, last)])
+    np.testing.assert_array_equal(joined, whole.dataset["estimate_cad"])
+    np.testing.assert_array_equal(pieces[2].dataset["cycle"], np.arange(252, 452))
+
+
+def test_the_restart_comes_before_the_cycle() -> None:
+    """Deaf to the announcement, the trajectory differs."""
+    core = run_seeker(rough_bench(), SEEKERS["batch"](), CYCLES)
+
+    class Deaf(SimulatedRig):
+        @property
+        def operating_point_changes(self) -> bool:
+            return False
+
+    deaf = Deaf(rough_bench())
+    run = run_on_rig(deaf, SEEKERS["batch"](), CYCLES)
+    same = run.dataset["estimate_cad"].to_numpy() == core.dataset["estimate_cad"].to_numpy()
+    assert same[:252].all()
+    assert not same[252:].all()
+
+
+def test_a_change_that_is_only_measured_costs_one_cycle() -> None:
+    def answer(cycle: int, soc: float) -> Measurement:
+        best = -5.6 if cycle < 305 else 0.0
+        changed = {"operating_point_changed": float(cycle == 305)}
+        return Measurement(components=(56.0 - 0.0255 * (soc - best) ** 2 - 3.0 * (cycle >= 305),), values=changed)
+
+    rig, own = ScriptedRig(answer), seeker()
+    assert isinstance(rig, Rig)
+    assert not isinstance(rig, AnnouncingRig)
+    run = run_on_rig(rig, own, 1200)
+    assert list(np.flatnonzero(run.dataset["void"])) == [305]
+    assert not run.dataset["misfire"].any()
+    assert np.isnan(own.history["objective"][305])
+    assert run.summary["final_cad"] == pytest.approx(0.0, abs=0.05)
+
+    by_hand = seeker()
+    for cycle in range(1200):
+        told = answer(cycle, float(by_hand.ask()[0]))
+        by_hand.tell(told.performance, misfire=cycle == 305)
+        if cycle == 305:
+            by_hand.restart()
+    np.testing.assert_array_equal(own.history["estimate"], by_hand.history["estimate"])
+
+
+def test_a_plain_rig_gives_what_it_measures() -> None:
+    def answer(cycle: int, soc: float) -> Measurement:
+        values = {"boost_kpa": 150.0} if cycle % 2 else {}
+        return Measurement(components=hill(cycle, soc).components, misfire=cycle == 4, values=values)
+
+    run = run_on_rig(ScriptedRig(answer), seeker(), 200, optimum_cad=-5.6)
+    check_labels(run.dataset)
+    assert run.dataset["boost_kpa"].attrs["units"] == "not given by the rig"
+    assert np.isnan(run.dataset["boost_kpa"][::2]).all()
+    assert (run.dataset["boost_kpa"][1::2] == 150.0).all()
+    assert run.summary["misfires"] == 1.0
+    assert np.isnan(run.summary["mean_efficiency_percent"])
+    assert run.summary["cycles_to"] > 10
+    assert "limits" not in run.dataset
+
+
+def test_ctrl_c_leaves_a_usable_result() -> None:
+    pressed = []
+
+    def answer(cycle: int, soc: float) -> Measurement:
+        if cycle == 120 and not pressed:
+            pressed.append(cycle)
+            raise KeyboardInterrupt
+        return hill(cycle, soc)
+
+    rig, own, whole = ScriptedRig(answer), seeker(), seeker()
+    run = run_on_rig(rig, own, 400, optimum_cad=-5.6)
+    assert (run.interrupted, run.dataset.attrs["interrupted"]) == (True, 1)
+    assert run.dataset.sizes["cycle"] == own.cycle == 120
+    assert np.isfinite(run.summary["final_cad"])
+    rest = run_on_rig(rig, own, 280)
+    straight = run_on_rig(ScriptedRig(hill), whole, 400)
+    joined = np.concatenate([run.dataset["estimate_cad"], rest.dataset["estimate_cad"]])
+    np.testing.assert_array_equal(joined, straight.dataset["estimate_cad"])
+    np.testing.assert_array_equal(rest.dataset["cycle"], np.arange(120, 400))
+
+
+def test_ctrl_c_before_the_first_cycle() -> None:
+    def answer(_: int, __: float) -> Measurement:
+        raise KeyboardInterrupt
+
+    run = run_on_rig(ScriptedRig(answer), seeker(), 10, optimum_cad=-5.6)
+    assert (run.interrupted, run.dataset.sizes["cycle"]) == (True, 0)
+    assert np.isnan(run.summary["final_cad"])
+
+
+def test_errors_name_the_remedy_and_change_nothing() -> None:
+    own = seeker()
+    before = copy.deepcopy(own.state)
+    rig = ScriptedRig(hill)
+    with pytest.raises(ParameterError, match="cycles = 0: must be >= 1"):
+        run_on_rig(rig, own, 0)
+    with pytest.raises(ParameterError, match="2 entries: a rig takes one input"):
+        run_on_rig(rig, Spsa(start=[0.0, 1.0]), 5)
+    assert rig.applied == []
+    assert own.state == before
+    limited = ExtremumSeeking(start=-12.0, lower=-30.0, upper=10.0, limits=[Limit("p_max_bar", 95.0)])
+    with pytest.raises(ParameterError, match="'p_max_bar' is not measured by the rig: it measures no limited"):
+        run_on_rig(rig, limited, 5)
+    split = ExtremumSeeking(start=-12.0, lower=-30.0, upper=10.0, components=[ComponentLag()] * 3)
+    with pytest.raises(ParameterError, match="components has 3 entries: the rig measures 1"):
+        run_on_rig(rig, split, 5)
+    assert limited.cycle == split.cycle == 0
+    closed = SimulatedRig(EngineBench())
+    closed.close()
+    with pytest.raises(RigError, match="rig is closed"):
+        run_on_rig(closed, own, 5)
+    broken = ScriptedRig(lambda cycle, _: Measurement(components=(np.nan if cycle == 7 else 50.0,)))
+    with pytest.raises(DataError):
+        run_on_rig(broken, own, 20)
+    assert own.cycle == 7
+    assert own.history.sizes["cycle"] == 7
+    assert run_on_rig(ScriptedRig(hill), own, 300).summary["final_cad"] == pytest.approx(-5.6, abs=0.1)
+
+
+def test_summary_of_half_a_run() -> None:
+    run = run_seeker(EngineBench(seed=2), seeker(), 500, optimum_cad=-5.63)
+    part = summarize_cycles(run.dataset.isel(cycle=slice(0, 250)), optimum_cad=-5.63, exceed_above={"p_max_bar": 1.0})
+    estimate = run.dataset["estimate_cad"].to_numpy()[:250]
+    assert part["final_cad"] == pytest.approx(estimate[150:].mean())
+    assert part["rms_cad"] == pytest.approx(np.sqrt(np.mean((estimate[125:] + 5.63) ** 2)))
+    assert np.isnan(part["exceeded_fraction"])

@@ -1,0 +1,299 @@
+"""Seekers in Python: ask and tell, bad input, history, files, pickles, and runs that go on in another process."""
+
+from __future__ import annotations
+
+import copy
+import json
+import pickle
+import subprocess
+import sys
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pytest
+from hypothesis import given
+from hypothesis import strategies as st
+
+from mgdd.errors import DataError, ParameterError, ShapeError
+from mgdd.optimize import (
+    BoundedSeeking,
+    ComponentLag,
+    ExtremumSeeking,
+    GoldenSection,
+    GradientDescent,
+    Limit,
+    NewtonSeeking,
+    Spsa,
+    load_seeker,
+    maximize,
+)
+from mgdd.results import check_labels
+
+LIMITS = [Limit("p_max_bar", 150.0, margin=1.0), Limit("rise", 4.0, method="penalty", weight=2.0, scale=1.0)]
+PAIR = {"start": [3.0, -4.0], "lower": [-20.0, -np.inf], "upper": 20.0}
+MAKERS: dict[str, Any] = {
+    "batch": lambda: ExtremumSeeking(start=8.0, lower=-30.0, curvature=-0.051),
+    "moving_average": lambda: ExtremumSeeking(start=8.0, form="moving_average", low_pass=0.5),
+    "washout": lambda: ExtremumSeeking(start=8.0, form="washout", maximize=False, hold_cycles=3),
+    "lagged": lambda: ExtremumSeeking(start=8.0, components=[ComponentLag(), ComponentLag(delay_cycles=3)]),
+    "two_inputs": lambda: ExtremumSeeking(**PAIR, period=40, harmonics=[4, 5], limits=LIMITS),
+    "newton": lambda: NewtonSeeking(start=8.0, hold_cycles=20),
+    "bounded": lambda: BoundedSeeking(start=8.0, upper=30.0),
+    "spsa": lambda: Spsa(**PAIR, seed=2**63 + 5, blocking=True, noise_sd=0.1),
+    "spsa_second_order": lambda: Spsa(start=8.0, form="second_order", limits=LIMITS),
+    "spsa_one_measurement": lambda: Spsa(start=8.0, form="one_measurement", schedule="constant"),
+    "gradient_descent": lambda: GradientDescent(**PAIR, rate=[0.5, np.inf]),
+    "golden_section": lambda: GoldenSection(start=8.0, lower=-30.0, upper=30.0, noise_sd=0.2),
+}
+every = pytest.mark.parametrize("make", MAKERS.values(), ids=MAKERS)
+
+
+def run(seeker: Any, cycles: int) -> list[list[float]]:
+    """Drive a seeker on a quadratic with ripple; returns what it applied."""
+    applied = []
+    for _ in range(cycles):
+        x = seeker.ask()
+        applied.append(x.tolist())
+        j = -0.03 * float((x - 1.0) @ (x - 1.0)) + 0.2 * np.sin(1.7 * seeker.cycle)
+        parts = [j] if seeker.component_count == 1 else [0.7 * j, 0.3 * j]
+        limits = {"p_max_bar": 140.0 + x[0], "rise": 2.0 - 0.1 * x[0]} if seeker.limit_names else None
+        seeker.tell(parts, limits, misfire=seeker.cycle % 40 == 17)
+    return applied
+
+
+# --- what it accepts ----------------------------------------------------------------------------------------
+def test_tell_takes_numbers_of_every_kind() -> None:
+    seeker = ExtremumSeeking(start=np.float32(2.0), lower=np.array([-9.0]))
+    for j in (1.0, 2, np.float32(3.0), np.array(4.0), np.array([5.0]), [6.0], (7.0,)):
+        seeker.ask()
+        seeker.tell(j)
+    assert seeker.history["objective"].values.tolist() == [1.0, 2.0, 3.0, 4.0, 5.0, 6.0, 7.0]
+
+
+def test_limits_by_name_or_in_order() -> None:
+    first, second = (ExtremumSeeking(start=8.0, limits=LIMITS) for _ in range(2))
+    for k in range(30):
+        first.ask()
+        first.tell(float(k), [149.0 + k, 2.0])
+        second.ask()
+        second.tell(float(k), {"rise": 2.0, "p_max_bar": 149.0 + k})
+    assert first.state == second.state
+
+
+@every
+@pytest.mark.parametrize("bad", [np.nan, np.inf, -np.inf])
+def test_a_refused_value_names_the_cycle_and_changes_nothing(make: Any, bad: float) -> None:
+    seeker, untouched = make(), make()
+    limits = [100.0, 1.0] if seeker.limit_names else None
+    run(seeker, 25)
+    run(untouched, 25)
+    seeker.ask()
+    untouched.ask()
+    before = seeker.state
+    with pytest.raises(DataError, match=r"cycle 25: J = .*misfire=True"):
+        seeker.tell([bad] * seeker.component_count, limits)
+    with pytest.raises(ShapeError, match="cycle 25: J has 3 components"):
+        seeker.tell([1.0, 2.0, 3.0], limits)
+    with pytest.raises(ShapeError, match=r"cycle 25: limits has 3 values|limits: 'p_max_bar' is missing"):
+        seeker.tell([1.0] * seeker.component_count, {"other": 1.0} if limits else [1.0, 2.0, 3.0])
+    assert seeker.state == before
+    assert seeker.history.sizes["cycle"] == 25
+    assert run(seeker, 60) == run(untouched, 60)
+    with pytest.raises(ParameterError, match="cycle 85: tell without ask"):
+        seeker.tell([1.0] * seeker.component_count, limits)
+
+
+@every
+def test_a_misfire_is_counted_and_not_read(make: Any) -> None:
+    seeker = make()
+    x = seeker.ask()
+    seeker.tell(np.nan, misfire=True)
+    assert (seeker.cycle, seeker.misfires) == (1, 1)
+    np.testing.assert_array_equal(seeker.ask(), x)
+    assert seeker.history["misfire"].values.tolist() == [1]
+    assert np.isnan(seeker.history["objective"].values).all()
+
+
+@pytest.mark.parametrize(
+    ("make", "message"),
+    [
+        (lambda: ExtremumSeeking(start=30.0, upper=10.0), r"start = 30: must lie in \[-inf, 9\]"),
+        (lambda: ExtremumSeeking(start=0.0, lower=5.0), "start = 0: must lie in"),
+        (lambda: ExtremumSeeking(start=0.0, lower=-0.5, upper=0.5), "room for the perturbation"),
+        (lambda: ExtremumSeeking(start=0.0, period=3), "period = 3: must be at least 4"),
+        (lambda: ExtremumSeeking(start=[0, 0, 0], period=40, harmonics=[3, 4, 7]), "sum or difference"),
+        (lambda: ExtremumSeeking(start=[0, 0]), "harmonics has 1 entries: must have 2"),
+        (lambda: ExtremumSeeking(start=0.0, form="median"), "form = .median.*batch"),
+        (lambda: ExtremumSeeking(start=[0.0] * 9), "at most 8"),
+        (lambda: NewtonSeeking(start=0.0, initial_hessian=1.0), "initial_hessian = 1: must be < 0"),
+        (lambda: BoundedSeeking(start=0.0, kappa=0.0), "kappa = 0: must be > 0"),
+        (lambda: Spsa(start=0.0, gain=0.0), "gain = 0.*: must be > 0"),
+        (lambda: GoldenSection(start=0.0, lower=-np.inf, upper=1.0), "lower = -inf: must be finite"),
+        (lambda: ComponentLag(delay_cycles=-1.0), "delay_cycles = -1"),
+    ],
+)
+def test_settings_are_refused_by_name(make: Any, message: str) -> None:
+    with pytest.raises((ParameterError, ShapeError), match=message):
+        make()
+
+
+def test_a_gain_above_the_bound_of_averaging_warns_with_the_bound() -> None:
+    with pytest.warns(UserWarning, match=r"gain = 9 is above 3\.92\d+, the bound of averaging"):
+        ExtremumSeeking(start=0.0, gain=9.0, curvature=-0.051)
+    with pytest.warns(UserWarning, match=r"gain = 3 is above 1\.96"):
+        ExtremumSeeking(start=0.0, gain=3.0, form="moving_average", curvature=-0.051)
+    with pytest.warns(UserWarning, match=r"step_size = 45 is not below 39\.2"):
+        GradientDescent(start=0.0, step_size=45.0, curvature=-0.051)
+    ExtremumSeeking(start=0.0, gain=9.0)
+
+
+# --- history ------------------------------------------------------------------------------------------------
+@every
+def test_history_holds_what_was_applied_and_told(make: Any) -> None:
+    seeker = make()
+    estimate = seeker.estimate
+    applied = run(seeker, 50)
+    history = seeker.history
+    check_labels(history)
+    assert history["applied"].dims == ("cycle", "input")
+    np.testing.assert_array_equal(history["applied"], applied)
+    np.testing.assert_array_equal(history["estimate"][0], estimate)
+    assert history["misfire"].values.sum() == seeker.misfires == 1
+    assert np.isnan(history["objective"]).values.tolist() == [k == 17 for k in range(50)]
+    assert {history[name].attrs["units"] for name in ("applied", "estimate")} == {"unit of the input"}
+    seeker.clear_history()
+    run(seeker, 3)
+    assert seeker.history["cycle"].values.tolist() == [50, 51, 52]
+
+
+# --- files and pickles --------------------------------------------------------------------------------------
+CONTINUE = """
+import json, pickle, sys
+sys.path.insert(0, {folder!r})
+from test_seekers import run
+from mgdd.optimize import load_seeker
+path = {path!r}
+seeker = load_seeker(path) if path.endswith("json") else pickle.loads(open(path, "rb").read())
+print(json.dumps([run(seeker, 120), seeker.state]))
+"""
+
+
+@pytest.mark.parametrize("way", ["json", "pickle"])
+def test_a_new_process_continues_bit_for_bit(way: str, tmp_path: Path) -> None:
+    scripts, expected = [], []
+    for name, make in MAKERS.items():
+        seeker = make()
+        run(seeker, 47)
+        seeker.ask()
+        path = tmp_path / f"{name}.{way}"
+        if way == "json":
+            seeker.save(path)
+        else:
+            path.write_bytes(pickle.dumps(seeker))
+        scripts.append(CONTINUE.format(folder=str(Path(__file__).parent), path=str(path)))
+        expected.append([run(seeker, 120), seeker.state])
+    done = subprocess.run([sys.executable, "-c", "".join(scripts)], capture_output=True, text=True, check=True)
+    assert [json.loads(line) for line in done.stdout.splitlines()] == expected
+
+
+@every
+def test_copies_and_pickles_are_equal_and_apart(make: Any) -> None:
+    seeker = make()
+    run(seeker, 30)
+    for other in (copy.copy(seeker), copy.deepcopy(seeker), pickle.loads(pickle.dumps(seeker))):
+        assert type(other) is type(seeker)
+        assert other.state == seeker.state
+        assert repr(other) == repr(seeker)
+        assert other.history.identical(seeker.history)
+        run(other, 5)
+        assert seeker.cycle == 30
+
+
+@every
+def test_file_is_legal_json_and_says_what_it_is(make: Any, tmp_path: Path) -> None:
+    seeker = make()
+    run(seeker, 30)
+    seeker.save(tmp_path / "run.json")
+    assert [path.name for path in tmp_path.iterdir()] == ["run.json"]
+
+    def refuse(token: str) -> None:
+        raise AssertionError(token)
+
+    content = json.loads((tmp_path / "run.json").read_text(), parse_constant=refuse)
+    assert content["kind"] == type(seeker).__name__
+    assert content["mgdd_version"]
+    assert set(content["settings"]) == set(seeker.settings)
+    again = type(seeker).load(tmp_path / "run.json")
+    again.save(tmp_path / "again.json")
+    assert (tmp_path / "again.json").read_text() == (tmp_path / "run.json").read_text()
+    other = GradientDescent if isinstance(seeker, Spsa) else Spsa
+    with pytest.raises(DataError, match=f"holds a {content['kind']}, not a {other.kind}"):
+        other.load(tmp_path / "run.json")
+
+
+def test_files_that_are_no_seekers_are_refused_by_name(tmp_path: Path) -> None:
+    path = tmp_path / "x.json"
+    ExtremumSeeking(start=0.0).save(path)
+    good = json.loads(path.read_text())
+    for change in (
+        {"format": 99},
+        {"kind": "Oracle"},
+        {"kind": 3},
+        {"settings": {}},
+        {"settings": good["settings"] | {"period": 3}},
+        {"state": {}},
+        {"state": good["state"] | {"phase": [77.0]}},
+        {"state": good["state"] | {"estimate": "text"}},
+    ):
+        path.write_text(json.dumps(good | change))
+        with pytest.raises(DataError, match=r"x\.json"):
+            load_seeker(path)
+    for text in ("", "[]", "{}", "no json", '{"number": "abc"}'):
+        path.write_text(text)
+        with pytest.raises(DataError, match=r"x\.json"):
+            load_seeker(path)
+
+
+def test_a_state_of_another_kind_is_refused_and_changes_nothing() -> None:
+    seeker = ExtremumSeeking(start=0.0)
+    run(seeker, 5)
+    before = seeker.state
+    for other in (Spsa(start=0.0).state, MAKERS["two_inputs"]().state, before | {"phase": [10.0]}):
+        with pytest.raises(ParameterError, match="state"):
+            seeker.state = other
+        assert seeker.state == before
+
+
+# --- the loop -----------------------------------------------------------------------------------------------
+def test_maximize_takes_limits_and_misfires_and_stops_cleanly() -> None:
+    seeker = ExtremumSeeking(start=8.0, limits=LIMITS)
+
+    def engine(x: Any) -> Any:
+        if seeker.cycle == 60:
+            raise KeyboardInterrupt
+        return None if seeker.cycle % 20 == 3 else (-0.03 * x[0] ** 2, [140.0, 1.0])
+
+    history = maximize(engine, seeker, 500)
+    assert history.sizes["cycle"] == seeker.cycle == 60
+    assert seeker.misfires == 3
+    seeker.ask()
+    seeker.tell(1.0, [140.0, 1.0])
+    with pytest.raises(ParameterError, match="cycles = -1"):
+        maximize(engine, seeker, -1)
+
+
+# --- properties ---------------------------------------------------------------------------------------------
+@given(
+    name=st.sampled_from(sorted(set(MAKERS) - {"lagged"})),
+    answers=st.lists(st.floats(-1e6, 1e6), min_size=1, max_size=120),
+)
+def test_applied_inputs_stay_within_bounds_whatever_is_told(name: str, answers: list[float]) -> None:
+    seeker = MAKERS[name]()
+    lower, upper = (np.array(seeker.settings[side]) for side in ("lower", "upper"))
+    reach = np.array(seeker.settings.get("amplitude", [0.0])) if name != "bounded" else 0.0
+    for answer in answers:
+        x = seeker.ask()
+        assert np.all((lower <= x) & (x <= upper))
+        seeker.tell(answer, [answer, -answer] if seeker.limit_names else None)
+        assert np.all((lower + reach <= seeker.estimate) & (seeker.estimate <= upper - reach))

@@ -1,0 +1,161 @@
+"""The tuner in Python: the measured map behind it, the seekers that it makes, and what it says."""
+
+from __future__ import annotations
+
+import pickle
+from typing import Any
+
+import numpy as np
+import pytest
+from hypothesis import given
+from hypothesis import strategies as st
+
+from mgdd.errors import DataError, ParameterError, ShapeError
+from mgdd.optimize import ExtremumSeeking, Limit, Spsa, maximize, measure_map, tune
+
+SIGMA, BEND = 0.25, -0.051
+METHODS = ["batch", "moving_average", "spsa"]
+
+
+# --- the measured map ---------------------------------------------------------------------------------------
+@given(optimum=st.floats(-20.0, 20.0), bend=st.floats(0.01, 10.0), level=st.floats(-1e3, 1e3), maximize=st.booleans())
+def test_an_exact_parabola_comes_back(optimum: float, bend: float, level: float, maximize: bool) -> None:
+    theta = np.array([-30.0, -12.0, -5.0, 0.0, 3.0, 11.0, 25.0])
+    sign = -1.0 if maximize else 1.0
+    found = measure_map(theta, level + sign * 0.5 * bend * (theta - optimum) ** 2, maximize=maximize)
+    assert found.curvature == pytest.approx(sign * bend, rel=1e-6)
+    assert found.optimum == pytest.approx(optimum, abs=1e-6)
+    assert found.noise_sd < 1e-8 * (abs(level) + 1e3 * bend)
+    assert found.points == 7
+
+
+def test_standard_errors_are_those_of_the_scatter_over_many_repetitions() -> None:
+    rng = np.random.default_rng(3)
+    theta = np.repeat([-16.0, -9.0, -4.0, 2.0, 5.0], 8)
+    maps = [measure_map(theta, 0.5 * BEND * (theta + 4.0) ** 2 + rng.normal(0.0, SIGMA, 40)) for _ in range(400)]
+    for name, truth in (("noise_sd", SIGMA), ("curvature", BEND), ("optimum", -4.0)):
+        values = np.array([getattr(found, name) for found in maps])
+        stated = np.mean([getattr(found, f"{name}_stderr") for found in maps])
+        assert values.mean() == pytest.approx(truth, abs=0.25 * values.std())
+        assert stated == pytest.approx(values.std(), rel=0.15)
+
+
+@pytest.mark.parametrize(
+    ("theta", "j", "error", "message"),
+    [
+        ([0, 1, 2, 3], [0, 1, 1, 0], DataError, "4 points at 4 distinct inputs: must be at least 5 at 3"),
+        ([0, 1, 0, 1, 0, 1], [0, 1, 0, 1, 0, 1], DataError, "6 points at 2 distinct inputs"),
+        ([0, 1, 2, 3, 4], [4, 1, 0, 1, 4], DataError, "bends up over theta .*no maximum; widen"),
+        ([0, 1, 2, 3, 4], [0, 1, 2, 3, 4], DataError, "bends up|no maximum"),
+        ([0, 1, 2, 3, np.nan], [4, 1, 0, 1, 4], DataError, "must be finite; leave misfired cycles out"),
+        ([0, 1, 2, 3, 4], [4, 1, 0, 1, np.inf], DataError, "must be finite"),
+        ([0, 1, 1 + 1e-15, 0, 1], [0, 1, 1, 0, 1], DataError, "distinct inputs"),
+        ([0, 1, 2], [0, 1], ShapeError, r"theta has shape \(3,\), J \(2,\)"),
+        ([[0, 1, 2]], [[0, 1, 2]], ShapeError, "in one dimension"),
+    ],
+)
+def test_measurements_without_an_optimum_are_refused(theta: Any, j: Any, error: type[Exception], message: str) -> None:
+    if message == "bends up|no maximum":
+        j = np.array(j) + np.array([1e-9, 0, 0, 0, 0])
+    with pytest.raises(error, match=message):
+        measure_map(theta, j)
+
+
+def test_a_minimum_is_refused_as_a_maximum_and_taken_as_a_minimum() -> None:
+    with pytest.raises(DataError, match="no minimum"):
+        measure_map([-2, -1, 0, 1, 2], [-4, -1, 0, -1, -4], maximize=False)
+    assert measure_map([-2, -1, 0, 1, 2], [4, 1, 0, 1, 4], maximize=False).curvature == pytest.approx(2.0)
+
+
+# --- the tuner ----------------------------------------------------------------------------------------------
+@pytest.mark.parametrize("method", METHODS)
+def test_the_tuned_seeker_arrives_as_predicted(method: str) -> None:
+    tuning = tune(SIGMA, BEND, method=method, distance=12.0, arrival=1.0, cycles=100.0)
+    assert tuning.met
+    counts, squares = [], []
+    for seed in range(40):
+        rng = np.random.default_rng(seed)
+        seeker = tuning.seeker(start=12.0 if seed % 2 else -12.0, seed=seed)
+        history = maximize(lambda x, rng=rng: 0.5 * BEND * x[0] ** 2 + rng.normal(0.0, SIGMA), seeker, 1200)
+        path = history["estimate"].values[:, 0]
+        counts.append(int(np.argmax(np.abs(path) <= 1.0)))
+        squares.append(float(np.mean(path[400:] ** 2)))
+    assert np.sqrt(np.mean(squares)) == pytest.approx(tuning.rms, rel=0.15)
+    assert np.mean(counts) == pytest.approx(tuning.cycles, rel=0.25)
+    assert np.mean(counts) < 100.0
+
+
+def test_the_seeker_carries_what_was_tuned() -> None:
+    tuning = tune(SIGMA, BEND, delay_cycles=38.0, lag_cycles=25.0)
+    seeker = tuning.seeker(start=-15.0, lower=-30.0, upper=10.0, limits=[Limit("p", 9.0)], hold_cycles=7)
+    assert isinstance(seeker, ExtremumSeeking)
+    settings = seeker.settings
+    assert settings["form"] == "batch"
+    assert settings["amplitude"] == [tuning.amplitude]
+    assert settings["gain"] == [tuning.gain]
+    assert settings["rate"] == [tuning.rate]
+    assert settings["period"] == tuning.period
+    assert settings["curvature"] == BEND
+    assert settings["hold_cycles"] == 7
+    assert (settings["components"][0].delay_cycles, settings["components"][0].lag_cycles) == (38.0, 25.0)
+    assert seeker.limit_names == ["p"]
+    slow = tune(SIGMA, BEND, delay_cycles=38.0, lag_cycles=25.0, compensated=False)
+    assert slow.period >= 378
+    blind = slow.seeker(start=0.0)  # no warning: the gain is judged by the curvature that the sensor lets through
+    assert isinstance(blind, ExtremumSeeking)
+    assert blind.settings["components"][0].delay_cycles == 0.0
+    spsa = tune(SIGMA, BEND, method="spsa").seeker(start=0.0, seed=5, maximize=False)
+    assert isinstance(spsa, Spsa)
+    assert spsa.settings["schedule"] == "constant"
+    assert spsa.settings["seed"] == 5
+    assert spsa.settings["maximize"] is False
+
+
+def test_summary_says_plainly_whether_the_wish_is_met() -> None:
+    text = tune(SIGMA, BEND, distance=12.0, arrival=1.0, cycles=100.0).summary()
+    assert text.endswith("The wish is met.")
+    hopeless = tune(SIGMA, BEND, rms=0.01, amplitude_max=1.0, cycles=20.0)
+    assert not hopeless.met
+    assert "The wish cannot be met:" in hopeless.summary()
+    assert "out of reach with amplitude_max = 1" in hopeless.summary()
+    assert "cycles = 20 is too few" in hopeless.summary()
+    assert "turned back" in tune(SIGMA, BEND, delay_cycles=5.0).summary()
+    assert "not compensated" in tune(SIGMA, BEND, delay_cycles=5.0, compensated=False).summary()
+    assert "measurements per iteration" in tune(SIGMA, BEND, method="spsa").summary()
+
+
+def test_tuning_is_a_value() -> None:
+    tuning = tune(SIGMA, BEND)
+    assert pickle.loads(pickle.dumps(tuning)) == tuning == tune(SIGMA, BEND)
+    assert tune(SIGMA, -BEND).gain == tuning.gain
+
+
+@pytest.mark.parametrize(
+    ("arguments", "message"),
+    [
+        ({"noise_sd": 0.0}, "noise_sd = 0: must be > 0; repeat one set-point"),
+        ({"curvature": 0.0}, "curvature. = 0: must be > 0; measure J"),
+        ({"curvature": np.nan}, "curvature. = nan"),
+        ({"method": "annealing"}, "method = .annealing."),
+        ({"rms": -1.0}, "rms = -1"),
+        ({"arrival": 30.0, "distance": 20.0}, "arrival = 30: must be below distance = 20"),
+        ({"method": "spsa", "lag_cycles": 3.0}, "without delay and lag"),
+        ({"delay_cycles": -1.0}, "delay_cycles = -1"),
+    ],
+)
+def test_wishes_are_refused_by_name(arguments: dict[str, Any], message: str) -> None:
+    with pytest.raises(ParameterError, match=message):
+        tune(**({"noise_sd": SIGMA, "curvature": BEND} | arguments))
+
+
+@given(
+    noise=st.floats(1e-3, 1e3),
+    bend=st.floats(1e-3, 1e3),
+    method=st.sampled_from(["batch", "moving_average"]),
+    lag=st.floats(0.0, 40.0),
+)
+def test_every_tuning_keeps_to_the_bounds_of_averaging(noise: float, bend: float, method: str, lag: float) -> None:
+    tuning = tune(noise, bend, method=method, lag_cycles=lag)
+    assert tuning.time_constant_cycles >= 2.0 * tuning.period
+    assert tuning.amplitude <= 1.8 * np.sqrt(noise / bend) * (1.0 + 1e-9)
+    tuning.seeker(start=0.0)  # warnings are errors here: no advice against it
