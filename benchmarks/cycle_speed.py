@@ -11,8 +11,6 @@ from __future__ import annotations
 
 import argparse
 import json
-import os
-import platform
 import statistics
 import subprocess
 import sys
@@ -22,8 +20,8 @@ from pathlib import Path
 
 import numpy as np
 from peers.numba_cycle import FORMS, INDICATORS, compile_form, engine
+from support import machine
 
-import mgdd
 from mgdd import _core
 
 CYCLES = 1000
@@ -45,21 +43,6 @@ def arguments() -> argparse.Namespace:
     if options.bench_program is None and BENCH_PROGRAM.exists():
         options.bench_program = BENCH_PROGRAM
     return options
-
-
-def processor() -> str:
-    try:
-        for line in Path("/proc/cpuinfo").read_text(encoding="utf-8").splitlines():
-            if line.startswith("model name"):
-                return line.split(":", 1)[1].strip()
-    except OSError:
-        pass
-    return platform.processor()
-
-
-def pin() -> None:
-    if hasattr(os, "sched_setaffinity"):
-        os.sched_setaffinity(0, {max(os.sched_getaffinity(0))})
 
 
 def contenders() -> dict[str, Callable[[], np.ndarray]]:
@@ -124,7 +107,7 @@ def measure(options: argparse.Namespace, calls: dict[str, Callable[[], np.ndarra
 
 def main() -> None:
     options = arguments()
-    pin()
+    machine.pin()
     calls = contenders()
     worst = check_agreement(calls)
     context = versions(options)
@@ -151,12 +134,8 @@ def versions(options: argparse.Namespace) -> dict[str, str]:
     import llvmlite.binding
     import numba
 
-    context = {
-        "processor": processor(),
-        "mgdd": f"{mgdd.__version__}, {_core.compiler()}, {_core.compiled_simd_level()}",
-        "Numba": f"{numba.__version__}, LLVM for {llvmlite.binding.get_host_cpu_name()}",
-        "Python": f"{platform.python_version()}, NumPy {np.__version__}",
-    }
+    context = machine.versions()
+    context["Numba"] = f"{numba.__version__}, LLVM for {llvmlite.binding.get_host_cpu_name()}"
     if options.bench_program:
         built = cpp_program(options.bench_program)[1]
         context["C++ program"] = f"{built['compiler']}, {built['isa']}"

@@ -155,16 +155,25 @@ void GoldenSection::cut(double lower, double upper) noexcept {
 GoldenSection::Parabola GoldenSection::parabola() const noexcept {
   const double middle = 0.5 * (lower_ + upper_);
   const double width = upper_ - lower_;
-  Eigen::Matrix3d normal = Eigen::Matrix3d::Zero();
-  Eigen::Vector3d right = Eigen::Vector3d::Zero();
+  // Sums of powers: as a matrix in the loop they would go through memory at every sample.
+  double n0 = 0.0, n1 = 0.0, n2 = 0.0, n3 = 0.0, n4 = 0.0, r0 = 0.0, r1 = 0.0, r2 = 0.0;
   const auto n = std::min(static_cast<std::size_t>(samples_), ring);
   for (std::size_t k = 0; k < n; ++k) {
     const double x = (sample_input_[k] - middle) / width;
     if (std::abs(x) > near_widths) continue;
-    const Eigen::Vector3d row(1.0, x, x * x);
-    normal += row * row.transpose();
-    right += row * (sample_j_[k] - sample_j_[0]);
+    const double square = x * x;
+    const double j = sample_j_[k] - sample_j_[0];
+    n0 += 1.0;
+    n1 += x;
+    n2 += square;
+    n3 += x * square;
+    n4 += square * square;
+    r0 += j;
+    r1 += x * j;
+    r2 += square * j;
   }
+  const Eigen::Matrix3d normal{{n0, n1, n2}, {n1, n2, n3}, {n2, n3, n4}};
+  const Eigen::Vector3d right(r0, r1, r2);
   const Eigen::LDLT<Eigen::Matrix3d> factor(normal);
   if (!(factor.vectorD().minCoeff() > 1e-9 * factor.vectorD().maxCoeff())) return {middle, 0.0};
   const Eigen::Vector3d c = factor.solve(right);

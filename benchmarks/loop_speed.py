@@ -1,0 +1,222 @@
+"""One question: what does a closed loop cost, and what of that is the seeker.
+
+    python benchmarks/loop_speed.py [--loops 2000] [--bench-program build/bench/bench/bench_seekers] [--json FILE]
+
+The virtual bench on `puma_single` with its default noise, extremum seeking from -20 °CA aTDC, 1000 cycles to a loop.
+Times of one core are processor time, so that neighbours on a shared machine disturb them less; the ratio of two threads
+to one is of wall time, interleaved, and means nothing while others keep the cores busy: the load is printed.
+
+Before anything is timed, the loop in the core must equal the one driven from Python bit for bit, and two threads must
+give the numbers of one.
+"""
+
+from __future__ import annotations
+
+import argparse
+import json
+import os
+import statistics
+import subprocess
+import sys
+import time
+from collections.abc import Callable
+from pathlib import Path
+
+import numpy as np
+from peers import peer_seekers
+from peers.peer_seekers import Contender, Plant, null_time_us
+from support import machine
+
+from mgdd import optimize
+from mgdd.loop import EngineBench, monte_carlo, run_seeker
+
+CYCLES, PAIRS, STEPS = 1000, 20_000, 20_000
+START, LOWER, UPPER = -20.0, -30.0, 10.0
+BENCH_PROGRAM = Path(__file__).parents[1] / "build" / "bench" / "bench" / "bench_seekers"
+Times = dict[str, list[float]]
+
+
+def arguments() -> argparse.Namespace:
+    parser = argparse.ArgumentParser(description=__doc__.splitlines()[0])
+    parser.add_argument("--repeats", type=int, default=9, help="interleaved repeats, at least 9 (default 9)")
+    parser.add_argument("--loops", type=int, default=2000, help="loops on one and on two threads (default 2000)")
+    parser.add_argument("--loop-repeats", type=int, default=3, help="interleaved repeats of those (default 3)")
+    parser.add_argument("--bench-program", type=Path, help="bench_seekers: ask and tell in C++ (default: if built)")
+    parser.add_argument("--json", type=Path, metavar="FILE", help="also write the figures to FILE")
+    options = parser.parse_args()
+    if options.repeats < 9 or options.loops < 2 or options.loop_repeats < 1:
+        parser.error("--repeats must be at least 9, --loops at least 2, --loop-repeats at least 1")
+    if options.bench_program is None and BENCH_PROGRAM.exists():
+        options.bench_program = BENCH_PROGRAM
+    return options
+
+
+def loop_seeker() -> optimize.ExtremumSeeking:
+    return optimize.ExtremumSeeking(start=START, lower=LOWER, upper=UPPER)
+
+
+def drive_from_python(bench: EngineBench, seeker: optimize.ExtremumSeeking, cycles: int) -> None:
+    for _ in range(cycles):
+        cycle = bench.step(float(seeker.ask()[0]))
+        seeker.tell(cycle["j"])
+
+
+def check_agreement(loops: int) -> np.ndarray:
+    """Return the applied inputs of the loop; SystemExit where a faster way gives other numbers than a slower one."""
+    run = run_seeker(EngineBench(seed=3), loop_seeker(), CYCLES)
+    seeker = loop_seeker()
+    drive_from_python(EngineBench(seed=3), seeker, CYCLES)
+    if not np.array_equal(run.dataset["estimate_cad"], seeker.history["estimate"][:, 0]):
+        sys.exit("the loop in the core and the loop driven from Python differ: nothing timed")
+    one, two = (monte_carlo(EngineBench(), loop_seeker(), range(loops), cycles=CYCLES, threads=n) for n in (1, 2))
+    if not one.identical(two):
+        sys.exit("one thread and two threads give different numbers: nothing timed")
+    if float(one["final_cad"][0, 0, 3]) != run.summary["final_cad"]:
+        sys.exit("a loop of monte_carlo and the same loop of run_seeker differ: nothing timed")
+    return seeker.history["applied"].values[:, 0].copy()
+
+
+def seekers() -> dict[str, Callable[[], object]]:
+    bounds = {"start": 0.0, "lower": LOWER, "upper": UPPER}
+    return {
+        "ExtremumSeeking": lambda: optimize.ExtremumSeeking(**bounds),
+        "NewtonSeeking": lambda: optimize.NewtonSeeking(**bounds),
+        "BoundedSeeking": lambda: optimize.BoundedSeeking(**bounds),
+        "Spsa": lambda: optimize.Spsa(**bounds),
+        "GradientDescent": lambda: optimize.GradientDescent(**bounds),
+        "GoldenSection": lambda: optimize.GoldenSection(**bounds, noise_sd=0.25),
+        "ExtremumSeeking, 3 inputs": lambda: optimize.ExtremumSeeking(start=[0.0] * 3, period=40, harmonics=[4, 5, 7]),
+        "ExtremumSeeking, a limit": lambda: optimize.ExtremumSeeking(
+            **bounds, limits=[optimize.Limit("p_max_bar", 95.0)]
+        ),
+    }
+
+
+def time_pairs(make: Callable[[], object], values: tuple[object, ...]) -> float:
+    """Microseconds of processor time per ask and tell; the loop around them included."""
+    seeker = make()
+    ask, tell = seeker.ask, seeker.tell  # type: ignore[attr-defined]
+    begin = time.process_time()
+    for _ in range(PAIRS):
+        ask()
+        tell(*values)
+    return (time.process_time() - begin) / PAIRS * 1e6
+
+
+def ours_on_null(plant: Plant, start: float, seed: int) -> None:  # noqa: ARG001 - no chance in it
+    seeker = optimize.ExtremumSeeking(start=start)
+    ask, tell = seeker.ask, seeker.tell
+    while True:
+        tell(plant(float(ask()[0])))
+
+
+def null_contenders() -> dict[str, Contender]:
+    found: dict[str, Contender] = {
+        "mgdd ExtremumSeeking": ours_on_null,
+        "ten lines of Python": peer_seekers.plain_esc(),
+    }
+    if peer_seekers.installed()["cernml-extremum-seeking"] is not None:
+        found["cernml ExtremumSeeker"] = peer_seekers.cernml()
+    return found
+
+
+def time_loops(applied: np.ndarray, into: Times) -> None:
+    """Milliseconds of processor time for 1000 cycles: whole loops of three kinds, and the bench without a seeker."""
+
+    def timed(name: str, call: Callable[[], object]) -> None:
+        begin = time.process_time()
+        call()
+        into.setdefault(name, []).append((time.process_time() - begin) * 1e3)
+
+    timed("run_seeker, with its Dataset", lambda: run_seeker(EngineBench(), loop_seeker(), CYCLES))
+    timed("monte_carlo, one loop", lambda: monte_carlo(EngineBench(), loop_seeker(), [0], cycles=CYCLES, threads=1))
+    timed("driven from Python, ask/step/tell", lambda: drive_from_python(EngineBench(), loop_seeker(), CYCLES))
+    timed("bench alone, in the core", lambda: EngineBench().run_columns(applied))
+
+
+def time_threads(options: argparse.Namespace) -> dict[str, float]:
+    """Seconds of wall time, smallest of the interleaved repeats; ratio of the repeat in which it is most favourable."""
+    seeker, bench, seeds = loop_seeker(), EngineBench(), range(options.loops)
+    seconds: dict[int, list[float]] = {1: [], 2: []}
+    for _ in range(options.loop_repeats):
+        for threads, values in seconds.items():
+            begin = time.perf_counter()
+            monte_carlo(bench, seeker, seeds, cycles=CYCLES, threads=threads)
+            values.append(time.perf_counter() - begin)
+    ratios = [one / two for one, two in zip(seconds[1], seconds[2], strict=True)]
+    return {
+        "loops": options.loops,
+        "one_thread_s": min(seconds[1]),
+        "two_threads_s": min(seconds[2]),
+        "ratio_of_smallest": min(seconds[1]) / min(seconds[2]),
+        "ratio_median": statistics.median(ratios),
+    }
+
+
+def cpp_program(program: Path) -> dict[str, float]:
+    """Nanoseconds per ask and tell in C++."""
+    command = [program, "--benchmark_format=json", "--benchmark_min_time=0.05"]
+    report = json.loads(subprocess.run(command, check=True, capture_output=True, text=True).stdout)
+    for row in report["benchmarks"]:
+        if row.get("error_occurred"):
+            sys.exit(f"{row['name']}: {row['error_message']}")
+    return {row["name"]: row["cpu_time"] for row in report["benchmarks"]}
+
+
+def summary(times: Times) -> dict[str, dict[str, float]]:
+    return {name: {"min": min(values), "median": statistics.median(values)} for name, values in times.items()}
+
+
+def show(title: str, table: dict[str, dict[str, float]], rate: Callable[[float], str]) -> None:
+    print(f"\n{title:36s} {'min':>9s} {'median':>9s}")
+    for name, row in table.items():
+        print(f"{name:36s} {row['min']:9.3f} {row['median']:9.3f}   {rate(row['min'])}")
+
+
+def main() -> None:
+    options = arguments()
+    context = machine.versions()
+    for package, version in peer_seekers.installed().items():
+        context[package] = version or "missing: left out (pip install --group bench)"
+    applied = check_agreement(8)
+    cores = os.sched_getaffinity(0) if hasattr(os, "sched_getaffinity") else None
+    threads = time_threads(options)
+    context["load after the threads"] = machine.load()
+    machine.pin()
+    loops: Times = {}
+    pairs: Times = {}
+    null: Times = {}
+    for _ in range(options.repeats):
+        time_loops(applied, loops)
+        for name, make in seekers().items():
+            values = (0.0, (80.0,)) if name.endswith("limit") else (0.0,)
+            pairs.setdefault(name, []).append(time_pairs(make, values))
+        for name, contender in null_contenders().items():
+            null.setdefault(name, []).append(null_time_us(contender, START, STEPS))
+    if cores is not None:
+        os.sched_setaffinity(0, cores)
+    cpp = cpp_program(options.bench_program) if options.bench_program else {}
+    for key, value in context.items():
+        print(f"{key:26s} {value}")
+    print(f"\n{threads['loops']} loops of {CYCLES} cycles, wall time")
+    print(f"one thread {threads['one_thread_s']:.2f} s, two threads {threads['two_threads_s']:.2f} s", end=", ")
+    print(f"ratio {threads['ratio_of_smallest']:.2f} (median of the repeats {threads['ratio_median']:.2f})")
+    loop_table, pair_table, null_table = summary(loops), summary(pairs), summary(null)
+    show(f"ms per {CYCLES} cycles", loop_table, lambda ms: f"{CYCLES / ms * 1e3:9.0f} cycles/s")
+    show("us per ask/tell pair, from Python", pair_table, lambda us: f"{1e6 / us:9.0f} /s")
+    show("us per step on a null plant", null_table, lambda us: f"{1e6 / us:9.0f} steps/s")
+    alone = loop_table["bench alone, in the core"]["min"]
+    share = max(0.0, loop_table["monte_carlo, one loop"]["min"] / alone - 1.0)
+    print(f"\nbeside the bench alone, the loop in the core takes {100 * share:.1f} % more", end="")
+    name = "seeker/extremum_seeking/inputs:1/limits:0"
+    print(f"; ask and tell in C++ are {100 * cpp[name] / (alone * 1e3):.2f} % of it" if cpp else "")
+    for key, value in cpp.items():
+        print(f"{key:50s} {value:8.1f} ns")
+    if options.json:
+        report = {"context": context, "threads": threads, "loops_ms": loop_table, "pairs_us": pair_table}
+        report |= {"null_us": null_table, "cpp_ns": cpp}
+        options.json.write_text(json.dumps(report, indent=2) + "\n", encoding="utf-8")
+
+
+if __name__ == "__main__":
+    main()

@@ -1,0 +1,153 @@
+"""What others would take as a seeker, for `seekers_vs_peers.py` and `loop_speed.py`.
+
+Each contender is `contender(plant, start, seed)`: it sets `plant.estimate`, then calls `plant(x)` for one noisy J that
+is to be maximised, again and again until the plant raises `FinishedError`. Peers minimise -J. A peer that is not
+installed is left out and named.
+
+Settings called tuned were found by trying on this very problem, and the trying is not counted.
+"""
+
+from __future__ import annotations
+
+import contextlib
+import importlib.metadata
+import math
+import time
+from collections import deque
+from collections.abc import Callable
+from typing import Protocol
+
+import numpy as np
+
+PACKAGES = {"noisyopt": "noisyopt", "nevergrad": "nevergrad", "cernml": "cernml-extremum-seeking"}
+
+
+class Plant(Protocol):
+    """What a contender is run on."""
+
+    estimate: float
+
+    def __call__(self, x: float) -> float:
+        """Return J at x, or raise FinishedError."""
+
+
+class FinishedError(Exception):
+    """The plant has seen enough."""
+
+
+Contender = Callable[[Plant, float, int], None]
+
+
+class NullPlant:
+    """Returns zero until it has been asked often enough."""
+
+    def __init__(self, evaluations: int) -> None:
+        self.estimate, self._left = 0.0, evaluations
+
+    def __call__(self, x: float) -> float:  # noqa: ARG002 - a plant takes an input
+        """Return zero, or raise FinishedError."""
+        if self._left == 0:
+            raise FinishedError
+        self._left -= 1
+        return 0.0
+
+
+def run_to_end(contender: Contender, plant: Plant, start: float, seed: int) -> None:
+    with contextlib.suppress(FinishedError):
+        contender(plant, start, seed)
+
+
+def null_time_us(contender: Contender, start: float, evaluations: int) -> float:
+    """Processor time per evaluation of a `NullPlant`, in microseconds, that of the plant included."""
+    plant = NullPlant(evaluations)
+    begin = time.process_time()
+    run_to_end(contender, plant, start, 1)
+    return (time.process_time() - begin) / evaluations * 1e6
+
+
+def installed() -> dict[str, str | None]:
+    """Package to its version; None where it is missing."""
+    found: dict[str, str | None] = {}
+    for package in PACKAGES.values():
+        try:
+            found[package] = importlib.metadata.version(package)
+        except importlib.metadata.PackageNotFoundError:
+            found[package] = None
+    return found
+
+
+def noisyopt(a: float = 1.0, c: float = 1.0, iterations: int = 6000) -> Contender:
+    """`minimizeSPSA`, unpaired: an engine does not repeat its noise. Its stability constant is 0.01 iterations."""
+    from noisyopt import minimizeSPSA
+
+    def run(plant: Plant, start: float, seed: int) -> None:
+        np.random.seed(seed)  # noqa: NPY002 - the generator that the package draws from
+        plant.estimate = start
+
+        def told(x: np.ndarray) -> None:
+            plant.estimate = float(x[0])
+
+        while True:
+            at = np.array([plant.estimate])
+            minimizeSPSA(lambda x: -plant(x[0]), at, niter=iterations, paired=False, a=a, c=c, callback=told)
+
+    return run
+
+
+def nevergrad(a: float | None = None, c: float | None = None) -> Contender:
+    """`SPSA`; the estimate is its iterate, which arrives earlier than the average that it recommends."""
+    import nevergrad as ng
+
+    def run(plant: Plant, start: float, seed: int) -> None:
+        parameter = ng.p.Scalar(init=start)
+        parameter.random_state.seed(seed)
+        optimizer = ng.optimizers.registry["SPSA"](parametrization=parameter)
+        optimizer.a = optimizer.a if a is None else a
+        optimizer.c = optimizer.c if c is None else c
+        while True:
+            candidate = optimizer.ask()
+            plant.estimate = start + float(optimizer.t[0])
+            optimizer.tell(candidate, -plant(candidate.value))
+
+    return run
+
+
+def cernml(oscillation_size: float = 0.1, gain: float = 0.2) -> Contender:
+    """Bounded extremum seeking; the estimate is the mean of the last oscillation, 17.5 evaluations by default."""
+    from cernml.extremum_seeking import ExtremumSeeker
+
+    def run(plant: Plant, start: float, seed: int) -> None:  # noqa: ARG001 - no chance in it
+        seeker = ExtremumSeeker(oscillation_size=oscillation_size, gain=gain)
+        last: deque[float] = deque(maxlen=round(2 * math.pi / seeker.get_time_step()))
+        total = 0.0
+        generator = seeker.make_generator(np.array([start]))
+        step = next(generator)
+        while True:
+            x = float(step.params[0])
+            if len(last) == last.maxlen:
+                total -= last[0]
+            last.append(x)
+            total += x
+            plant.estimate = total / len(last)
+            step = generator.send(-plant(x))
+
+    return run
+
+
+def plain_esc(amplitude: float = 1.0, period: int = 10, gain: float = 0.98) -> Contender:
+    """Ten lines of Python: dither, mean of the last period off, demodulate, integrate."""
+    sine = [math.sin(2 * math.pi * k / period) for k in range(period)]
+
+    def run(plant: Plant, start: float, seed: int) -> None:  # noqa: ARG001 - no chance in it
+        estimate, window, total, k = start, [0.0] * period, 0.0, 0
+        while True:
+            plant.estimate = estimate
+            phase = k % period
+            j = plant(estimate + amplitude * sine[phase])
+            total += j - window[phase]
+            window[phase] = j
+            k += 1
+            if k > period:
+                estimate += gain * (j - total / period) * sine[phase]
+
+    return run
