@@ -13,14 +13,6 @@ namespace {
 using namespace optimize;
 constexpr double inf = std::numeric_limits<double>::infinity();
 
-py::dict space_dict(const SearchSpace& space) {
-  py::dict out;
-  out["start"] = std::vector<double>(space.start.begin(), space.start.end());
-  out["lower"] = std::vector<double>(space.lower.begin(), space.lower.end());
-  out["upper"] = std::vector<double>(space.upper.begin(), space.upper.end());
-  return out;
-}
-
 void bind_spsa(py::module_& m) {
   using R = Recorded<Spsa>;
   const SpsaSettings d;
@@ -69,9 +61,6 @@ void bind_spsa(py::module_& m) {
           py::arg("seed") = d.seed, py::arg("maximize") = true, py::arg("limits") = std::vector<Limit>{},
           py::arg("curvature") = py::none())
       .def_property_readonly(
-          "gradient", [](const R& r) { return input_array(r.seeker.gradient()); },
-          "Gradient of the last iteration, shape (inputs,).")
-      .def_property_readonly(
           "hessian", [](const R& r) { return Eigen::MatrixXd(r.seeker.hessian()); },
           "Averaged Hessian of the second-order form, shape (inputs, inputs).")
       .def_property_readonly(
@@ -108,6 +97,7 @@ void bind_spsa(py::module_& m) {
           },
           "Arguments that make this seeker again.");
   bind_seeking(cls);
+  bind_gradient(cls);
 }
 
 void bind_gradient_descent(py::module_& m) {
@@ -136,9 +126,6 @@ void bind_gradient_descent(py::module_& m) {
           py::arg("tolerance") = d.tolerance, py::arg("iterations") = d.iterations, py::arg("maximize") = true,
           py::arg("limits") = std::vector<Limit>{}, py::arg("curvature") = py::none())
       .def_property_readonly(
-          "gradient", [](const R& r) { return input_array(r.seeker.gradient()); },
-          "Gradient of the last step, shape (inputs,).")
-      .def_property_readonly(
           "iteration", [](const R& r) { return r.seeker.iteration(); }, "Steps made.")
       .def_property_readonly(
           "converged_at",
@@ -153,7 +140,7 @@ void bind_gradient_descent(py::module_& m) {
             py::dict out = space_dict(s.space);
             out["step_size"] = s.step_size;
             out["difference"] = s.difference;
-            out["rate"] = std::vector<double>(s.rate.begin(), s.rate.end());
+            out["rate"] = list_of(s.rate);
             out["tolerance"] = s.tolerance;
             out["iterations"] = s.iterations;
             out["maximize"] = s.maximize;
@@ -163,6 +150,7 @@ void bind_gradient_descent(py::module_& m) {
           },
           "Arguments that make this seeker again.");
   bind_seeking(cls);
+  bind_gradient(cls);
 }
 
 void bind_golden_section(py::module_& m) {

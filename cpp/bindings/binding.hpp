@@ -55,6 +55,7 @@ py::array_t<double> to_array(const std::vector<double>& column);
 
 void bind_errors(py::module_& m);
 void bind_optimize(py::module_& m);
+void bind_limits(py::module_& m);
 void bind_seekers(py::module_& m);
 void bind_direct_seekers(py::module_& m);
 void bind_learning(py::module_& m);

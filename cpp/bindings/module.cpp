@@ -10,6 +10,7 @@ PYBIND11_MODULE(_core, m) {
   m.def("compiler", [] { return std::string(MGDD_COMPILER); }, "Compiler of this build.");
   bind_errors(m);
   bind_optimize(m);
+  bind_limits(m);
   bind_seekers(m);
   bind_direct_seekers(m);
   bind_learning(m);

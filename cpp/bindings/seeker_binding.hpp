@@ -55,6 +55,19 @@ inline py::array_t<double> input_array(const optimize::Inputs& values) {
   return py::array_t<double>(static_cast<py::ssize_t>(values.size()), values.data());
 }
 
+inline std::vector<double> list_of(const optimize::Inputs& values) {
+  return {values.begin(), values.end()};
+}
+
+/// The arguments `start`, `lower` and `upper` again.
+inline py::dict space_dict(const optimize::SearchSpace& space) {
+  py::dict out;
+  out["start"] = list_of(space.start);
+  out["lower"] = list_of(space.lower);
+  out["upper"] = list_of(space.upper);
+  return out;
+}
+
 inline py::object nan_as_none(double value) {
   return std::isnan(value) ? py::object(py::none()) : py::object(py::float_(value));
 }
@@ -201,6 +214,14 @@ void bind_seeking(py::class_<Recorded<S>>& cls) {
             r.cycle.clear();
           },
           "Forget the history, keep the state.");
+}
+
+/// The slope that the seeker estimates.
+template <class S>
+void bind_gradient(py::class_<Recorded<S>>& cls) {
+  cls.def_property_readonly(
+      "gradient", [](const Recorded<S>& r) { return input_array(r.seeker.gradient()); },
+      "Last estimate of the slope of the maximised objective, shape (inputs,).");
 }
 
 }  // namespace mgdd::bindings

@@ -666,7 +666,7 @@ class Spsa:
     @property
     def gradient(self) -> numpy.typing.NDArray[numpy.float64]:
         """
-        Gradient of the last iteration, shape (inputs,).
+        Last estimate of the slope of the maximised objective, shape (inputs,).
         """
     @property
     def hessian(self) -> typing.Annotated[numpy.typing.NDArray[numpy.float64], "[m, n]"]:
@@ -765,7 +765,7 @@ class GradientDescent:
     @property
     def gradient(self) -> numpy.typing.NDArray[numpy.float64]:
         """
-        Gradient of the last step, shape (inputs,).
+        Last estimate of the slope of the maximised objective, shape (inputs,).
         """
     @property
     def iteration(self) -> int:

@@ -25,11 +25,11 @@ def sensors() -> StudyResult:
 
 
 @pytest.fixture(scope="module")
-def tests() -> StudyResult:
+def four_tests() -> StudyResult:
     return run_ch4_tests(quick=True)
 
 
-@pytest.mark.parametrize("name", ["seekers", "sensors", "tests"])
+@pytest.mark.parametrize("name", ["seekers", "sensors", "four_tests"])
 def test_summary_dataset_and_figures(name: str, request: pytest.FixtureRequest) -> None:
     result: StudyResult = request.getfixturevalue(name)
     check_labels(result.dataset)
@@ -137,8 +137,8 @@ def test_the_correction_takes_a_hundred_cycles_per_e_fold(sensors: StudyResult) 
 
 
 # --- tests --------------------------------------------------------------------------------------------------
-def test_each_test_ends_at_the_optimum_of_its_own_performance(tests: StudyResult) -> None:
-    rows = tests.summary["rows"]
+def test_each_test_ends_at_the_optimum_of_its_own_performance(four_tests: StudyResult) -> None:
+    rows = four_tests.summary["rows"]
     assert [row["test"][0] for row in rows] == list("1234")
     assert [row["start_cad"] for row in rows] == [-20.0, 5.0, -20.0, -20.0]
     optima = [-5.63, -5.63, -0.65, -0.67]
@@ -149,24 +149,24 @@ def test_each_test_ends_at_the_optimum_of_its_own_performance(tests: StudyResult
         assert row["gain_percent_points_low"] > 0.0
 
 
-def test_before_and_after_belong_together(tests: StudyResult) -> None:
-    for row in tests.summary["rows"]:
+def test_before_and_after_belong_together(four_tests: StudyResult) -> None:
+    for row in four_tests.summary["rows"]:
         weight = 0.004 if "NOx" in row["test"] else 0.0
         gain = row["efficiency_after_percent"] - row["efficiency_before_percent"]
         gain -= weight * (row["nox_after_ppm"] - row["nox_before_ppm"])
         assert row["gain_percent_points"] == pytest.approx(gain)
 
 
-def test_nox_costs_efficiency_and_the_soft_sensor_saves_time(tests: StudyResult) -> None:
-    efficiency, _, analyser, soft = tests.summary["rows"]
+def test_nox_costs_efficiency_and_the_soft_sensor_saves_time(four_tests: StudyResult) -> None:
+    efficiency, _, analyser, soft = four_tests.summary["rows"]
     for row in (analyser, soft):
         assert row["nox_after_ppm_high"] < 0.8 * efficiency["nox_after_ppm_low"]
         assert row["efficiency_after_percent_high"] < efficiency["efficiency_after_percent_low"]
     assert soft["cycles_to_1_cad_high"] < 0.6 * analyser["cycles_to_1_cad_low"]
 
 
-def test_the_limited_run_keeps_its_limit(tests: StudyResult) -> None:
-    (row,) = tests.summary["limited"]
-    assert row["optimum_cad"] > tests.summary["rows"][0]["optimum_cad"] + 2.0
+def test_the_limited_run_keeps_its_limit(four_tests: StudyResult) -> None:
+    (row,) = four_tests.summary["limited"]
+    assert row["optimum_cad"] > four_tests.summary["rows"][0]["optimum_cad"] + 2.0
     assert row["final_cad"] > row["optimum_cad"]
     assert row["exceeded_share"] < 0.01

@@ -4,6 +4,7 @@
 #include <numbers>
 #include <utility>
 
+#include "mgdd/common/bounds.hpp"
 #include "mgdd/common/text.hpp"
 
 namespace mgdd::optimize {
@@ -13,9 +14,7 @@ BoundedSeekingSettings checked(BoundedSeekingSettings s) {
   const Eigen::Index n = s.space.size();
   validate(s.dither, n, false);
   validate(s.space, Inputs::Zero(n));
-  if (!(s.kappa > 0.0 && std::isfinite(s.kappa))) {
-    throw ParameterError("kappa = " + text(s.kappa) + ": must be > 0 and finite");
-  }
+  require_positive("kappa", s.kappa);
   return s;
 }
 

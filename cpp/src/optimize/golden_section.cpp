@@ -5,6 +5,7 @@
 #include <cmath>
 #include <utility>
 
+#include "mgdd/common/bounds.hpp"
 #include "mgdd/common/text.hpp"
 
 namespace mgdd::optimize {
@@ -33,11 +34,8 @@ GoldenSectionSettings checked(GoldenSectionSettings s) {
   if (!(s.noise_sd >= 0.0 && std::isfinite(s.noise_sd))) {
     throw ParameterError("noise_sd = " + text(s.noise_sd) + ": must be >= 0 and finite");
   }
-  for (const auto& [name, value] : {std::pair{"significance", s.significance}, std::pair{"tolerance", s.tolerance}}) {
-    if (!(value > 0.0 && std::isfinite(value))) {
-      throw ParameterError(std::string(name) + " = " + text(value) + ": must be > 0 and finite");
-    }
-  }
+  require_positive("significance", s.significance);
+  require_positive("tolerance", s.tolerance);
   if (s.samples_max < 1) throw ParameterError("samples_max = " + std::to_string(s.samples_max) + ": must be >= 1");
   return s;
 }

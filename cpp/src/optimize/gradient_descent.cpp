@@ -3,6 +3,7 @@
 #include <cmath>
 #include <utility>
 
+#include "mgdd/common/bounds.hpp"
 #include "mgdd/common/text.hpp"
 
 namespace mgdd::optimize {
@@ -10,11 +11,8 @@ namespace {
 
 GradientDescentSettings checked(GradientDescentSettings s) {
   const Eigen::Index n = s.space.size();
-  for (const auto& [name, value] : {std::pair{"step_size", s.step_size}, std::pair{"difference", s.difference}}) {
-    if (!(value > 0.0 && std::isfinite(value))) {
-      throw ParameterError(std::string(name) + " = " + text(value) + ": must be > 0 and finite");
-    }
-  }
+  require_positive("step_size", s.step_size);
+  require_positive("difference", s.difference);
   validate(s.space, Inputs::Constant(n, s.difference));
   if (s.rate.size() == 0) s.rate = Inputs::Constant(n, unlimited);
   validate_entries("rate", s.rate, n, 0.0);

@@ -6,6 +6,7 @@
 #include <cmath>
 #include <utility>
 
+#include "mgdd/common/bounds.hpp"
 #include "mgdd/common/names.hpp"
 #include "mgdd/common/random.hpp"
 #include "mgdd/common/text.hpp"
@@ -29,17 +30,12 @@ constexpr double blocking_errors = 2.0;
 constexpr double share_rate = 0.25;  // how fast the perturbation follows its target, per iteration
 
 SpsaSettings checked(SpsaSettings s) {
-  const auto positive = [](std::string_view name, double value) {
-    if (!(value > 0.0 && std::isfinite(value))) {
-      throw ParameterError(std::string(name) + " = " + text(value) + ": must be > 0 and finite");
-    }
-  };
   const bool second = s.form == SpsaForm::second_order;
   if (s.gain == 0.0) s.gain = second ? 3.0 : 20.0;
-  positive("perturbation", s.perturbation);
+  require_positive("perturbation", s.perturbation);
   if (s.step_max == 0.0)
     s.step_max = s.form == SpsaForm::one_measurement ? s.perturbation / 5.0 : s.perturbation * 4.0 / 3.0;
-  positive("gain", s.gain);
+  require_positive("gain", s.gain);
   if (!(s.step_max > 0.0)) throw ParameterError("step_max = " + text(s.step_max) + ": must be > 0");
   const Eigen::Index n = s.space.size();
   validate(s.space, Inputs::Constant(n, s.perturbation * (second ? 2.0 : 1.0)));
@@ -65,7 +61,7 @@ SpsaSettings checked(SpsaSettings s) {
   if (!(s.initial_hessian < 0.0 && std::isfinite(s.initial_hessian))) {
     throw ParameterError("initial_hessian = " + text(s.initial_hessian) + ": must be < 0, the bend of a maximum");
   }
-  positive("hessian_prior", s.hessian_prior);
+  require_positive("hessian_prior", s.hessian_prior);
   if (!(s.limit_amplitude > 0.0 && s.limit_amplitude <= 1.0)) {
     throw ParameterError("limit_amplitude = " + text(s.limit_amplitude) + ": must be > 0 and <= 1");
   }
