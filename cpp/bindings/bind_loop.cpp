@@ -52,6 +52,7 @@ LoopCriteria criteria_from(double optimum_cad, double arrival_cad, std::int64_t 
   out.tail_cycles = tail_cycles;
   out.exceed_from = exceed_from;
   out.exceed_above = std::move(exceed_above);
+  validate(out);
   return out;
 }
 

@@ -91,7 +91,8 @@ struct ReadingBuffer {
 template <class S>
 optimize::Reading reading_from(const S& seeker, const py::object& j, const py::object& limits, bool misfire,
                                ReadingBuffer& buffer) {
-  if (!misfire || !j.is_none()) {
+  if (j.is_none() && !misfire) throw ShapeError("J is missing: tell what was measured, or misfire=True");
+  if (!j.is_none()) {
     if (py::isinstance<py::float_>(j) || py::isinstance<py::int_>(j)) {
       buffer.components.assign(1, j.cast<double>());
     } else {
@@ -100,6 +101,10 @@ optimize::Reading reading_from(const S& seeker, const py::object& j, const py::o
   }
   if (py::isinstance<py::dict>(limits)) {
     const auto by_name = py::reinterpret_borrow<py::dict>(limits);
+    if (by_name.size() > seeker.settings().limits.size()) {
+      throw ShapeError("limits has " + std::to_string(by_name.size()) + " names: the settings have " +
+                       std::to_string(seeker.settings().limits.size()));
+    }
     for (const optimize::Limit& limit : seeker.settings().limits) {
       if (!by_name.contains(limit.name)) {
         throw ShapeError("limits: '" + limit.name + "' is missing: tell one value for every limit of the settings");
@@ -139,7 +144,7 @@ void bind_seeking(py::class_<Recorded<S>>& cls) {
             r.misfire.push_back(fired ? 0.0 : 1.0);
             r.cycle.push_back(cycle);
           },
-          py::arg("J"), py::arg("limits") = py::none(), py::kw_only(), py::arg("misfire") = false,
+          py::arg("J") = py::none(), py::arg("limits") = py::none(), py::kw_only(), py::arg("misfire") = false,
           "Accept what was measured at the input of the last ask.\n\n"
           "J: float, or one number per component; limits: one value per limit, in order or by name;\n"
           "misfire: the cycle is counted and its numbers are not read.\n"

@@ -4,13 +4,18 @@
 #include <cmath>
 #include <utility>
 
+#include "mgdd/common/bounds.hpp"
+
 namespace mgdd::loop {
 
-void require_match(const EngineBench& bench, std::size_t inputs, std::size_t components,
+void require_match(const EngineBench& bench, const optimize::Inputs& estimate, std::size_t components,
                    const std::vector<optimize::Limit>& limits) {
-  if (inputs != 1) {
-    throw ParameterError("start has " + std::to_string(inputs) + " entries: the bench takes one input, soc_cad");
+  if (estimate.size() != 1) {
+    throw ParameterError("start has " + std::to_string(estimate.size()) +
+                         " entries: the bench takes one input, soc_cad");
   }
+  const auto [earliest, latest] = bench.window_cad();
+  require_within("estimate of the seeker", estimate[0], earliest, latest, "°CA aTDC");
   const std::size_t terms = bench.settings().performance.size();
   if (components != 1 && components != terms) {
     throw ParameterError("components has " + std::to_string(components) +
@@ -29,6 +34,15 @@ void require_match(const EngineBench& bench, std::size_t inputs, std::size_t com
   };
   throw ParameterError("limits of the seeker " + list(names) + " and of the bench " + list(bench.settings().limits) +
                        " differ: name the same ones in the same order");
+}
+
+void validate(const LoopCriteria& c) {
+  require_positive("arrival_cad", c.arrival_cad);
+  if (c.tail_cycles < 1) throw ParameterError("tail_cycles = " + std::to_string(c.tail_cycles) + ": must be >= 1");
+  if (c.exceed_from < 0) throw ParameterError("exceed_from = " + std::to_string(c.exceed_from) + ": must be >= 0");
+  for (const double value : c.exceed_above) {
+    if (std::isnan(value)) throw ParameterError("exceed_above holds NaN: give a number, or leave the limit out");
+  }
 }
 
 LoopStatistics::LoopStatistics(LoopCriteria criteria, std::int64_t cycles)

@@ -28,6 +28,10 @@ void validate(const DitherSettings& settings, Eigen::Index inputs, bool hessian)
                          ": must be at least 4 cycles (and at most 1000000) to tell a slope from a mean");
   }
   const std::vector<int>& n = settings.harmonics;
+  if (n.size() == 1 && inputs > 1) {
+    throw ShapeError("harmonics has 1 entry: " + std::to_string(inputs) +
+                     " inputs need one each, on a longer period; for example period 40 with harmonics 4, 5, 7");
+  }
   if (static_cast<Eigen::Index>(n.size()) != inputs) {
     throw ShapeError("harmonics has " + std::to_string(n.size()) + " entries: must have " + std::to_string(inputs) +
                      ", one per entry of start");

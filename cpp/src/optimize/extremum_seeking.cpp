@@ -22,6 +22,7 @@ constexpr double share_rate = 0.25;  // how fast the amplitude follows its targe
 
 ExtremumSeekingSettings checked(ExtremumSeekingSettings s) {
   const Eigen::Index n = s.space.size();
+  if (n < 1) throw ShapeError("start is empty: give one number per input");
   validate(s.dither, n, false);
   validate(s.space, s.dither.amplitude);
   validate(s.components);

@@ -18,6 +18,7 @@ constexpr double near_widths = 1.5;             // from the middle: samples beyo
 constexpr double first_samples = 2.0;           // of each point before chance is judged
 constexpr double limit_samples = 4.0;           // ... before a limit decides: its noise is not known
 constexpr double widest_share = 0.2;            // of the first bracket: the refinement looks no wider
+constexpr double width_rate = 0.05;             // how fast the width follows what the parabola says, per triple
 constexpr double narrow_share = 0.25;           // of its width, while a limit holds the refinement back
 constexpr std::int64_t last_draws = 2;          // in a row: the bracket is as small as the noise allows
 
@@ -180,13 +181,17 @@ GoldenSection::Parabola GoldenSection::parabola() const noexcept {
 }
 
 // After three measurements: the estimate follows the vertex, slowly, with limits kept for both sides; the bracket goes
-// with it.
+// with it and grows or shrinks until its ends lie one noise_sd below the top, or until a bend shows at all.
 void GoldenSection::refine() noexcept {
   const double reach = reach_share * (upper_ - lower_);
-  Inputs step = scalar_input(parabola().vertex - estimate_[0]);
+  const Parabola fit = parabola();
+  Inputs step = scalar_input(fit.vertex - estimate_[0]);
   clip_each(step, scalar_input(0.25 * reach));
   step = guard_.admit(estimate_, step, scalar_input(reach), scalar_input(reach));
   move_within(estimate_, step, settings_.space, scalar_input(0.0));
+  const double most = widest_share * (settings_.space.upper[0] - settings_.space.lower[0]);
+  const double wide = fit.bend < 0.0 ? std::sqrt(8.0 * settings_.noise_sd / -fit.bend) : most;
+  width_ += width_rate * (std::clamp(wide, settings_.tolerance, most) - width_);
   const double target = guard_.active() ? narrow_share * width_ : width_;
   centre_bracket(upper_ - lower_ + 0.1 * (target - (upper_ - lower_)));
 }

@@ -17,9 +17,10 @@ constexpr std::array<std::pair<LimitMethod, std::string_view>, 3> method_names{{
     {LimitMethod::barrier, "barrier"},
 }};
 
-constexpr double significance = 2.0;   // standard errors
-constexpr double alarm_cycles = 3.0;   // in a row over the limit
-constexpr double barrier_edge = 0.01;  // scaled distance where the logarithm goes on as its tangent
+constexpr double significance = 2.0;    // standard errors
+constexpr double patience_share = 0.6;  // of the memory, before a limit without a slope is no longer waited for
+constexpr double alarm_cycles = 3.0;    // in a row over the limit
+constexpr double barrier_edge = 0.01;   // scaled distance where the logarithm goes on as its tangent
 
 }  // namespace
 
@@ -33,6 +34,10 @@ LimitMethod parse_limit_method(std::string_view name) {
 void validate(const std::vector<Limit>& limits) {
   for (const Limit& limit : limits) {
     const std::string at = "limit " + limit.name + ": ";
+    if (limit.name.empty()) throw ParameterError("limit: name is empty: say what is limited");
+    if (std::count_if(limits.begin(), limits.end(), [&](const Limit& l) { return l.name == limit.name; }) > 1) {
+      throw ParameterError(at + "is given twice: give it once");
+    }
     if (!std::isfinite(limit.upper)) throw ParameterError(at + "upper = " + text(limit.upper) + ": must be finite");
     if (!(limit.margin >= 0.0 && std::isfinite(limit.margin))) {
       throw ParameterError(at + "margin = " + text(limit.margin) + ": must be >= 0 and finite");
@@ -48,6 +53,7 @@ void validate(const std::vector<Limit>& limits) {
 
 LimitGuard::LimitGuard(std::vector<Limit> limits, Eigen::Index inputs, double memory)
     : limits_(std::move(limits)),
+      patience_(patience_share * memory),
       models_(limits_.size(), LocalModel(inputs, memory)),
       in_a_row_(limits_.size(), 0.0),
       good_(Inputs::Zero(inputs)) {
@@ -104,9 +110,9 @@ Inputs LimitGuard::admit(const Inputs& estimate, const Inputs& step, const Input
       out = step - s * ((s.dot(step) + over) / s.squaredNorm());
     } else if (has_good_ && good_ != estimate) {
       out = good_ - estimate;
-    } else if (!reach.isZero(0.0)) {
+    } else if (!reach.isZero(0.0) && models_[worst].cycles() < patience_) {
       out.setZero();
-    }  // without a reach its steps are the only dither: they go on, or no slope would ever be learnt
+    }  // else the steps go on: they may be the only dither, or no slope may ever show
     clip_each(out, rate);
   } else {
     good_ = estimate;
@@ -118,6 +124,7 @@ Inputs LimitGuard::admit(const Inputs& estimate, const Inputs& step, const Input
       const double allowed = std::max(0.0, excess(i, estimate, reach));
       const double over = excess(i, estimate + out, reach) - allowed;
       const Inputs s = models_[i].slope();
+      if (silent(i, allowed)) continue;
       if (!(over > 1e-12 * limits_[i].scale) || !(s.squaredNorm() > 0.0)) continue;
       out -= s * (over / s.squaredNorm());
       changed = active_ = true;
@@ -133,9 +140,15 @@ Inputs LimitGuard::admit(const Inputs& estimate, const Inputs& step, const Input
   for (std::size_t i = 0; i < limits_.size(); ++i) {
     const double rise = models_[i].slope().dot(out);
     const double room = std::max(0.0, -excess(i, estimate, reach));
+    if (silent(i, excess(i, estimate, reach))) continue;
     if (rise > room + 1e-12 * limits_[i].scale) share = std::min(share, room / rise);
   }
   return out * share;
+}
+
+// Broken, looked at for long, and without a slope that stands out of its noise: it cannot say where to go.
+bool LimitGuard::silent(std::size_t i, double excess) const noexcept {
+  return excess > 0.0 && models_[i].cycles() >= patience_ && !models_[i].slope_known(significance);
 }
 
 bool LimitGuard::alarmed() const noexcept {

@@ -11,6 +11,7 @@ namespace {
 
 NewtonSeekingSettings checked(NewtonSeekingSettings s) {
   const Eigen::Index n = s.space.size();
+  if (n < 1) throw ShapeError("start is empty: give one number per input");
   validate(s.dither, n, true);
   validate(s.space, s.dither.amplitude);
   validate(s.components);

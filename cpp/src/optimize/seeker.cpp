@@ -58,6 +58,14 @@ void validate(const SearchSpace& space, const Inputs& reach) {
   }
 }
 
+void require_within_space(std::string_view column, const Inputs& values, const SearchSpace& space) {
+  for (Eigen::Index i = 0; i < values.size(); ++i) {
+    if (values[i] >= space.lower[i] && values[i] <= space.upper[i]) continue;
+    throw ParameterError("state column '" + std::string(column) + "' holds " + text(values[i]) + ": must lie in [" +
+                         text(space.lower[i]) + ", " + text(space.upper[i]) + "], the bounds of these settings");
+  }
+}
+
 TellStatus Protocol::check(const Reading& reading, std::size_t components, std::size_t limits) const noexcept {
   if (!asked) return TellStatus::not_asked;
   if (reading.misfire) return TellStatus::misfire;

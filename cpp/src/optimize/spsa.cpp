@@ -164,21 +164,22 @@ TellStatus Spsa::tell(const Reading& reading) noexcept {
   guard_.record(applied_, reading.limits);
   const int gradients_end = per_gradient() * settings_.averaging;
   if (stage_ < gradients_end) {
+    around_j_ += j;
     finish_gradient(j);
     if (++stage_ < gradients_end) return status;
     finish_iteration();
     if (settings_.blocking) return status;
     estimate_ = candidate_;
   } else {  // the extra measurement of blocking, at the candidate
-    if (!has_accepted_ || j >= accepted_j_ - blocking_errors * settings_.noise_sd) {
+    // Measured anew in every iteration, so that a plant that has changed cannot block for ever.
+    if (j >= around_j_ / gradients_end - blocking_errors * settings_.noise_sd) {
       estimate_ = candidate_;
-      accepted_j_ = j;
-      has_accepted_ = true;
     } else {
       ++blocked_;
     }
   }
   stage_ = 0;
+  around_j_ = 0.0;
   ++iteration_;
   return status;
 }
@@ -251,7 +252,7 @@ void Spsa::restart() noexcept {
   ++draw_;
   sum_.setZero();
   hessian_sum_.setZero();
-  has_accepted_ = false;
+  around_j_ = 0.0;
   share_ = 1.0;
   trend_.forget();
   guard_.forget();

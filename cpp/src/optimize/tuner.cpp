@@ -82,6 +82,11 @@ Tuning tune_spsa(const TuningWish& w) {
 
 Tuning tune_dither(const TuningWish& w) {
   const bool batch = w.method == TunedMethod::batch;
+  if (!batch && !w.compensated && (w.lag.delay_cycles > 0.0 || w.lag.lag_cycles > 0.0)) {
+    throw ParameterError(
+        "method = 'moving_average': behind a lag that is not compensated its window slows the approach by "
+        "more than these forms say; use 'batch', or compensate");
+  }
   const bool lagged = w.lag.delay_cycles > 0.0 || w.lag.lag_cycles > 0.0;
   const double whole_lag = w.lag.delay_cycles + w.lag.lag_cycles;
   Tuning t;

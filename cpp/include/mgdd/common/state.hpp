@@ -40,7 +40,7 @@ class StateReader {
  public:
   explicit StateReader(const StateColumns& columns) : columns_(columns) {}
 
-  void operator()(std::string_view name, double& value) { value = column(name, 1)[0]; }
+  void operator()(std::string_view name, double& value) { value = numbers(name, 1)[0]; }
   void operator()(std::string_view name, bool& value) { value = column(name, 1)[0] != 0.0; }
   void operator()(std::string_view name, std::int64_t& value) {
     const double stored = column(name, 1)[0];
@@ -57,10 +57,10 @@ class StateReader {
     }
     value = stored;
   }
-  void operator()(std::string_view name, std::vector<double>& value) { value = column(name, value.size()); }
+  void operator()(std::string_view name, std::vector<double>& value) { value = numbers(name, value.size()); }
   template <class Derived>
   void operator()(std::string_view name, Eigen::PlainObjectBase<Derived>& value) {
-    const std::vector<double>& stored = column(name, static_cast<std::size_t>(value.size()));
+    const std::vector<double>& stored = numbers(name, static_cast<std::size_t>(value.size()));
     for (Eigen::Index i = 0; i < value.size(); ++i)
       value.data()[i] = stored[static_cast<std::size_t>(i)];
   }
@@ -73,6 +73,13 @@ class StateReader {
   }
 
  private:
+  const std::vector<double>& numbers(std::string_view name, std::size_t size) {
+    const std::vector<double>& stored = column(name, size);
+    for (const double value : stored) {
+      if (std::isnan(value)) refuse(name, "holds NaN: a run would not survive it");
+    }
+    return stored;
+  }
   const std::vector<double>& column(std::string_view name, std::size_t size) {
     const auto found = columns_.find(std::string(name));
     if (found == columns_.end()) refuse(name, "is missing: it belongs to another kind of object");
@@ -99,13 +106,15 @@ StateColumns save_state(const T& object) {
   return writer.columns;
 }
 
-/// Puts saved columns into `object`, or throws and leaves it as it was.
+/// Puts saved columns into `object`, or throws and leaves it as it was. A class that knows more about what its state
+/// may be has `void require_usable() const`, which throws.
 template <class T>
 void restore_state(T& object, const StateColumns& columns) {
   T copy = object;
   StateReader reader(columns);
   T::visit(copy, reader);
   reader.finish();
+  if constexpr (requires { copy.require_usable(); }) copy.require_usable();
   object = std::move(copy);
 }
 

@@ -19,15 +19,14 @@ struct LoopCycle {
   double estimate_cad = 0.0;
 };
 
-/// ParameterError unless the seeker has one input, as many components as the bench's performance (or one, for their
-/// sum) and the bench's limits in the same order.
-void require_match(const EngineBench& bench, std::size_t inputs, std::size_t components,
+/// ParameterError unless the seeker has one input that stands in the bench's window, as many components as the bench's
+/// performance (or one, for their sum) and the bench's limits in the same order.
+void require_match(const EngineBench& bench, const optimize::Inputs& estimate, std::size_t components,
                    const std::vector<optimize::Limit>& limits);
 
 template <optimize::AnySeeker S>
 void require_match(const EngineBench& bench, const S& seeker) {
-  require_match(bench, static_cast<std::size_t>(seeker.estimate().size()), seeker.component_count(),
-                seeker.settings().limits);
+  require_match(bench, seeker.estimate(), seeker.component_count(), seeker.settings().limits);
 }
 
 /// One cycle; a new operating point restarts the seeker before it asks.
@@ -70,6 +69,9 @@ struct LoopSummary {
   double highest_cad = -std::numeric_limits<double>::infinity();
   std::int64_t misfires = 0;
 };
+
+/// ParameterError naming field, value and bound.
+void validate(const LoopCriteria& criteria);
 
 class LoopStatistics {
  public:

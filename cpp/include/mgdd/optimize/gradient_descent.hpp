@@ -46,6 +46,9 @@ class GradientDescent {
   std::size_t component_count() const noexcept { return 1; }
   std::size_t limit_count() const noexcept { return settings_.limits.size(); }
 
+  /// ParameterError for a restored state that these settings do not allow.
+  void require_usable() const { require_within_space("estimate", estimate_, settings_.space); }
+
   template <class Self, class V>
   static void visit(Self& self, V& v) {
     Protocol::visit(self.protocol_, v);

@@ -76,6 +76,9 @@ class LimitGuard {
 
  private:
   std::vector<Limit> limits_;
+  bool silent(std::size_t i, double excess) const noexcept;
+
+  double patience_;                 // cycles that a broken limit is given to show its slope
   std::vector<LocalModel> models_;  // one per limit
   std::vector<double> in_a_row_;
   Inputs good_;

@@ -53,6 +53,12 @@ class NewtonSeeking {
   std::size_t component_count() const noexcept { return settings_.components.size(); }
   std::size_t limit_count() const noexcept { return settings_.limits.size(); }
 
+  /// ParameterError for a restored state that these settings do not allow.
+  void require_usable() const {
+    require_within_space("estimate", estimate_, settings_.space);
+    if (!(share_ > 0.0 && share_ <= 1.0)) throw ParameterError("state column 'share' must lie in (0, 1]");
+  }
+
   template <class Self, class V>
   static void visit(Self& self, V& v) {
     Protocol::visit(self.protocol_, v);

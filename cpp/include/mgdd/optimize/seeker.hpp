@@ -76,6 +76,9 @@ struct Protocol {
 void require(TellStatus status, const Protocol& protocol, const Reading& reading, std::size_t components,
              std::size_t limits);
 
+/// ParameterError unless every entry of a restored column lies within the bounds of these settings.
+void require_within_space(std::string_view column, const Inputs& values, const SearchSpace& space);
+
 /// Sum of the components of J, negated where the user minimises.
 inline double objective_of(const Reading& reading, bool maximize) noexcept {
   double sum = 0.0;

@@ -37,11 +37,12 @@ struct SpsaSettings {
   double perturbation_exponent = 0.101;  ///< gamma
   double step_max = 0.0;                 ///< largest change per iteration and input; 0 = 4/3 c, one measurement: c/5
   int averaging = 1;                     ///< gradients per iteration
-  bool blocking = false;                 ///< accept a step only if J there is not below the last one less 2 noise_sd
-  double noise_sd = 0.0;                 ///< of one measurement of J, for blocking
-  double initial_hessian = -0.051;       ///< second order: curvature before the first measurement, < 0
-  double hessian_prior = 20.0;           ///< ... and how many iterations it counts for
-  double limit_amplitude = 0.5;          ///< share of c while a limit holds the estimate back
+  bool blocking =
+      false;  ///< accept a step only if J there is not below its mean around the old estimate less 2 noise_sd
+  double noise_sd = 0.0;            ///< of one measurement of J, for blocking
+  double initial_hessian = -0.051;  ///< second order: curvature before the first measurement, < 0
+  double hessian_prior = 20.0;      ///< ... and how many iterations it counts for
+  double limit_amplitude = 0.5;     ///< share of c while a limit holds the estimate back
   std::uint64_t seed = 0;
   bool maximize = true;
   std::vector<Limit> limits;
@@ -75,6 +76,13 @@ class Spsa {
   std::size_t component_count() const noexcept { return 1; }
   std::size_t limit_count() const noexcept { return settings_.limits.size(); }
 
+  /// ParameterError for a restored state that these settings do not allow.
+  void require_usable() const {
+    require_within_space("estimate", estimate_, settings_.space);
+    require_within_space("candidate", candidate_, settings_.space);
+    if (!(share_ > 0.0 && share_ <= 1.0)) throw ParameterError("state column 'share' must lie in (0, 1]");
+  }
+
   template <class Self, class V>
   static void visit(Self& self, V& v) {
     Protocol::visit(self.protocol_, v);
@@ -91,8 +99,7 @@ class Spsa {
     v("stage", self.stage_, self.measurements_per_iteration());
     v("blocked", self.blocked_);
     v("share", self.share_);
-    v("accepted_j", self.accepted_j_);
-    v("has_accepted", self.has_accepted_);
+    v("around_j", self.around_j_);
     LocalModel::visit(self.trend_, v, "trend");
     LimitGuard::visit(self.guard_, v);
   }
@@ -117,9 +124,8 @@ class Spsa {
   std::int64_t draw_ = 0;         // gradients begun since construction: index of the random numbers
   std::int64_t stage_ = 0;        // measurement within the iteration
   std::int64_t blocked_ = 0;
-  double share_ = 1.0;  // perturbation now over that of the schedule
-  double accepted_j_ = 0.0;
-  bool has_accepted_ = false;
+  double share_ = 1.0;     // perturbation now over that of the schedule
+  double around_j_ = 0.0;  // sum of J measured around the estimate in this iteration
 };
 
 }  // namespace mgdd::optimize
