@@ -387,7 +387,7 @@ class ExtremumSeeking:
         """
         The operating point has changed: forget the window, keep the estimate.
         """
-    def tell(self, J: typing.Any, limits: typing.Any = None, *, misfire: bool = False) -> None:
+    def tell(self, J: typing.Any = None, limits: typing.Any = None, *, misfire: bool = False) -> None:
         """
         Accept what was measured at the input of the last ask.
         
@@ -471,7 +471,7 @@ class NewtonSeeking:
         """
         The operating point has changed: forget the window, keep the estimate.
         """
-    def tell(self, J: typing.Any, limits: typing.Any = None, *, misfire: bool = False) -> None:
+    def tell(self, J: typing.Any = None, limits: typing.Any = None, *, misfire: bool = False) -> None:
         """
         Accept what was measured at the input of the last ask.
         
@@ -560,7 +560,7 @@ class BoundedSeeking:
         """
         The operating point has changed: forget the window, keep the estimate.
         """
-    def tell(self, J: typing.Any, limits: typing.Any = None, *, misfire: bool = False) -> None:
+    def tell(self, J: typing.Any = None, limits: typing.Any = None, *, misfire: bool = False) -> None:
         """
         Accept what was measured at the input of the last ask.
         
@@ -634,7 +634,7 @@ class Spsa:
         """
         The operating point has changed: forget the window, keep the estimate.
         """
-    def tell(self, J: typing.Any, limits: typing.Any = None, *, misfire: bool = False) -> None:
+    def tell(self, J: typing.Any = None, limits: typing.Any = None, *, misfire: bool = False) -> None:
         """
         Accept what was measured at the input of the last ask.
         
@@ -733,7 +733,7 @@ class GradientDescent:
         """
         The operating point has changed: forget the window, keep the estimate.
         """
-    def tell(self, J: typing.Any, limits: typing.Any = None, *, misfire: bool = False) -> None:
+    def tell(self, J: typing.Any = None, limits: typing.Any = None, *, misfire: bool = False) -> None:
         """
         Accept what was measured at the input of the last ask.
         
@@ -822,7 +822,7 @@ class GoldenSection:
         """
         The operating point has changed: forget the window, keep the estimate.
         """
-    def tell(self, J: typing.Any, limits: typing.Any = None, *, misfire: bool = False) -> None:
+    def tell(self, J: typing.Any = None, limits: typing.Any = None, *, misfire: bool = False) -> None:
         """
         Accept what was measured at the input of the last ask.
         

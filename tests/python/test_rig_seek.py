@@ -248,7 +248,7 @@ def test_errors_name_the_remedy_and_change_nothing() -> None:
 
 def test_summary_of_half_a_run() -> None:
     run = run_seeker(EngineBench(seed=2), seeker(), 500, optimum_cad=-5.63)
-    part = summarize_cycles(run.dataset.isel(cycle=slice(0, 250)), optimum_cad=-5.63, exceed_above={"p_max_bar": 1.0})
+    part = summarize_cycles(run.dataset.isel(cycle=slice(0, 250)), optimum_cad=-5.63)
     estimate = run.dataset["estimate_cad"].to_numpy()[:250]
     assert part["final_cad"] == pytest.approx(estimate[150:].mean())
     assert part["rms_cad"] == pytest.approx(np.sqrt(np.mean((estimate[125:] + 5.63) ** 2)))

@@ -123,7 +123,7 @@ def test_a_misfire_is_counted_and_not_read(make: Any) -> None:
         (lambda: ExtremumSeeking(start=0.0, lower=-0.5, upper=0.5), "room for the perturbation"),
         (lambda: ExtremumSeeking(start=0.0, period=3), "period = 3: must be at least 4"),
         (lambda: ExtremumSeeking(start=[0, 0, 0], period=40, harmonics=[3, 4, 7]), "sum or difference"),
-        (lambda: ExtremumSeeking(start=[0, 0]), "harmonics has 1 entries: must have 2"),
+        (lambda: ExtremumSeeking(start=[0, 0]), "harmonics has 1 entry: 2 inputs need one each"),
         (lambda: ExtremumSeeking(start=0.0, form="median"), "form = .median.*batch"),
         (lambda: ExtremumSeeking(start=[0.0] * 9), "at most 8"),
         (lambda: NewtonSeeking(start=0.0, initial_hessian=1.0), "initial_hessian = 1: must be < 0"),

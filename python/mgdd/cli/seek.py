@@ -132,6 +132,11 @@ def _check(args: argparse.Namespace) -> None:
         raise ParameterError(
             f"--cycles {args.cycles}: must be in [1, {_MOST_CYCLES}]; mgdd.loop.run_seeker continues longer runs"
         )
+    if args.method == "bounded" and any(item.partition("=")[0] == _COV for item in args.limit):
+        raise ParameterError(
+            f"--method bounded reads limits off its own oscillation, and {_COV} looks back {_COV_CYCLES} cycles: use "
+            "another method"
+        )
     if args.sensor == "analyser" and args.method not in _LATE:
         raise ParameterError(
             f"--method {args.method} takes J of the same cycle, and the analyser is late: use --sensor soft, or "
@@ -191,6 +196,15 @@ def _optimum(args: argparse.Namespace, bench: EngineBench, limits: Mapping[str, 
     return best
 
 
+def _above(run: LoopRun, limits: Mapping[str, float]) -> float:
+    """Share of the cycles from 1000 on above a limit itself, scatter included."""
+    if not limits or run.dataset.sizes["cycle"] <= _EXCEED_FROM:
+        return math.nan
+    measured = run.dataset["limits"].to_numpy()[_EXCEED_FROM:]
+    caps = [limits[str(name)] for name in run.dataset["limit"].to_numpy()]
+    return float((measured > caps).any(axis=1).mean())
+
+
 def _thresholds(best: SteadyOptimum, limits: Mapping[str, float]) -> dict[str, float]:
     """Limit and three standard deviations of what is compared with it; a COV of n cycles scatters by 1/sqrt(2n - 2)."""
     own = 1.0 / math.sqrt(2.0 * (_COV_CYCLES - 1))
@@ -219,11 +233,13 @@ def _payload(
         "cycles_to_1_cad": summary["cycles_to"],
         "rms_cad": summary["rms_cad"],
         "limit_exceeded_fraction": summary["exceeded_fraction"],
+        "limit_above_fraction": _above(run, limits),
         "mean_j": summary["mean_j"],
         "mean_efficiency_percent": summary["mean_efficiency_percent"],
         "mean_nox_ppm": summary["mean_nox_ppm"],
         "misfires": int(summary["misfires"]),
         "limits": dict(limits),
+        "limit_thresholds": _thresholds(best, limits),
         "interrupted": run.interrupted,
     }
     if args.method == "extremum_seeking":

@@ -67,6 +67,11 @@ def make_seeker(task: Task) -> Seeker:
     """Make the seeker; its gain follows from the curvature of the steady map, its period from the lag."""
     low, high = task.bounds_cad
     amplitude = _amplitude(task)
+    if low + amplitude > high - amplitude:
+        raise ParameterError(
+            f"--upper-cad {high:g}: must be at least {2.0 * amplitude:g} °CA above --lower-cad {low:g}, room for what "
+            f"--method {task.method} moves to both sides"
+        )
     if not low + amplitude <= task.start_cad <= high - amplitude:
         less = f", less the {amplitude:g} °CA that --method {task.method} moves about it" if amplitude else ""
         raise ParameterError(

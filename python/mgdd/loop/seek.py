@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+import operator
 from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass
 from typing import TYPE_CHECKING, Any
@@ -198,13 +199,13 @@ def monte_carlo(
     """
     bench_list = [benches] if isinstance(benches, EngineBench) else list(benches)
     seeker_list = list(seekers) if isinstance(seekers, Sequence) else [seekers]
-    seed_list = [int(seed) for seed in seeds]
+    seed_list = _whole_seeds(seeds)
     for seed in seed_list:
         if not 0 <= seed < 2**64:
             raise ParameterError(f"seeds: {seed} must be in [0, 2**64)")
     if optimum_cad is None:
         optima = [math.nan] * len(bench_list)
-    elif isinstance(optimum_cad, int | float):
+    elif isinstance(optimum_cad, int | float | np.number):
         optima = [float(optimum_cad)] * len(bench_list)
     else:
         optima = [float(value) for value in optimum_cad]
@@ -232,6 +233,13 @@ def monte_carlo(
     for name, values in raw.items():
         variables[name] = (dims, np.where(finished, values.reshape(shape), np.nan), *_SUMMARY[name])
     return labelled_dataset(variables, attrs={"cycles": cycles})
+
+
+def _whole_seeds(seeds: Iterable[int]) -> list[int]:
+    try:
+        return [operator.index(seed) for seed in seeds]
+    except TypeError as error:
+        raise ParameterError(f"seeds: must be whole numbers, for example range(20): {error}") from None
 
 
 def _thresholds(bench: EngineBench, exceed_above: Mapping[str, float] | None) -> list[float]:

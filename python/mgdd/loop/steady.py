@@ -2,14 +2,16 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Mapping
 from dataclasses import dataclass, field
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
+from mgdd import _core
 from mgdd._core import SensorDynamics
-from mgdd.errors import ConvergenceError, ParameterError
+from mgdd.errors import ConvergenceError, ParameterError, ShapeError
 from mgdd.loop.bench import EngineBench
 from mgdd.results import labelled_dataset
 
@@ -93,6 +95,8 @@ def steady_map(bench: EngineBench, soc_cad: ArrayLike, *, cycle: int = 0) -> xr.
     """
     quiet = _quiet(bench, cycle)
     timings = np.atleast_1d(np.asarray(soc_cad, float))
+    if timings.ndim != 1:
+        raise ShapeError(f"soc_cad has {timings.ndim} dimensions: must be a column")
     low, high = quiet.window_cad
     for soc in timings:
         if not low <= soc <= high:
@@ -146,7 +150,9 @@ def steady_optimum(
     """
     from scipy.optimize import brentq, minimize_scalar
 
-    limits = dict(limits or {})
+    limits = _checked_limits(limits)
+    if cycle < 0:
+        raise ParameterError(f"cycle = {cycle}: must be >= 0")
     quiet = _quiet(bench, cycle)
     low, high = bounds_cad
     window = quiet.window_cad
@@ -154,10 +160,6 @@ def steady_optimum(
         raise ParameterError(
             f"bounds_cad = ({low:g}, {high:g}): must increase and lie in [{window[0]:g}, {window[1]:g}]"
         )
-    first = _settled(quiet, low)
-    for name in limits:
-        if name not in first:
-            raise ParameterError(f"limits: {name!r} is no indicator of the bench, for example p_max_bar")
 
     def j(soc: float) -> float:
         return float(_settled(quiet, soc)["j"])
@@ -195,6 +197,20 @@ def steady_optimum(
         free_soc_cad=free,
         limit_scatter={name: abs(late[name] - early[name]) / 0.1 * scatter for name in limits},
     )
+
+
+def _checked_limits(limits: Mapping[str, float] | None) -> dict[str, float]:
+    if limits is None:
+        return {}
+    if not isinstance(limits, Mapping):
+        raise ParameterError(f"limits = {limits!r}: must map names to numbers, for example {{'p_max_bar': 95.0}}")
+    known = _core.indicator_units()
+    for name, value in limits.items():
+        if name not in known:
+            raise ParameterError(f"limits: {name!r} is no indicator of the bench, for example p_max_bar")
+        if not (isinstance(value, int | float | np.number) and math.isfinite(value)):
+            raise ParameterError(f"limits: {name} = {value!r}: must be a finite number")
+    return dict(limits)
 
 
 def _quiet(bench: EngineBench, cycle: int) -> EngineBench:

@@ -8,6 +8,8 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
+from mgdd.errors import ParameterError
+
 if TYPE_CHECKING:
     import xarray as xr
     from numpy.typing import NDArray
@@ -37,8 +39,13 @@ def summarize_cycles(
     Returns
     -------
     dict
-        The summary of `run_seeker`, with the halves and the tail of the cycles at hand. NaN where nothing was
-        measured.
+        The summary of `run_seeker`, to rounding, with the halves and the tail of the cycles at hand. NaN where nothing
+        was measured.
+
+    Raises
+    ------
+    mgdd.errors.ParameterError
+        A limit in ``exceed_above`` that was not measured, a NaN there, or a criterion out of its range.
 
     Examples
     --------
@@ -50,6 +57,7 @@ def summarize_cycles(
     >>> again["cycles_to"] == run.summary["cycles_to"]
     True
     """
+    _check_criteria(cycles, arrival_cad, tail_cycles, exceed_from, exceed_above or {})
     estimate: NDArray[np.float64] = cycles["estimate_cad"].to_numpy()
     n = estimate.size
     half = np.arange(n) >= n // 2
@@ -84,6 +92,23 @@ def summarize_cycles(
     if n and near[-1]:
         out["cycles_stays"] = float(n - np.argmin(near[::-1])) if not near.all() else 0.0
     return out
+
+
+def _check_criteria(
+    cycles: xr.Dataset, arrival_cad: float, tail_cycles: int, exceed_from: int, above: Mapping[str, float]
+) -> None:
+    if not arrival_cad > 0.0:
+        raise ParameterError(f"arrival_cad = {arrival_cad:g}: must be > 0")
+    if tail_cycles < 1:
+        raise ParameterError(f"tail_cycles = {tail_cycles}: must be >= 1")
+    if exceed_from < 0:
+        raise ParameterError(f"exceed_from = {exceed_from}: must be >= 0")
+    measured = [str(name) for name in cycles["limit"].to_numpy()] if "limits" in cycles else []
+    for name, value in above.items():
+        if name not in measured:
+            raise ParameterError(f"exceed_above: {name!r} is not among the limits that were measured, {measured}")
+        if math.isnan(value):
+            raise ParameterError(f"exceed_above: {name} = nan: give a number, or leave it out")
 
 
 def _exceeded(cycles: xr.Dataset, first: int, above: Mapping[str, float]) -> float:

@@ -101,6 +101,14 @@ def run_on_rig(
         raise ParameterError(f"cycles = {cycles}: must be >= 1")
     if seeker.estimate.size != 1:
         raise ParameterError(f"start has {seeker.estimate.size} entries: a rig takes one input, soc_cad")
+    if not isinstance(rig, Rig):
+        raise ParameterError(f"rig = {rig!r}: must have apply() and measure(); wrap a bench in SimulatedRig")
+    names = seeker.limit_names
+    known = getattr(rig, "limit_names", None)
+    if known is not None and not set(names) <= set(known):
+        raise ParameterError(f"limits of the seeker {names} are not all measured by the rig, which has {list(known)}")
+    if unknown := sorted(set(exceed_above or {}) - set(names)):
+        raise ParameterError(f"exceed_above: {unknown} not among the limits of the seeker, {names}")
     announcing = rig if isinstance(rig, AnnouncingRig) else None
     first, log, interrupted = seeker.cycle, _Log(), False
     try:

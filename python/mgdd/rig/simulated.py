@@ -48,6 +48,11 @@ class SimulatedRig:
         """
         return bool(self.bench.operating_point_changes)
 
+    @property
+    def limit_names(self) -> list[str]:
+        """Names of the limited quantities that `measure` reports."""
+        return list(self.bench.settings["limits"])
+
     def apply(self, soc_cad: float) -> None:
         """Set the start of combustion of the next cycle.
 

@@ -82,7 +82,7 @@ TEST(LimitGuard, NeverAdmitsAStepWhosePredictionIsOverALimit) {
       slopes.push_back(vector(2.0));
       const double room = uniform(draw++, 0.0, 2.0) + slopes[l].cwiseAbs().dot(reach);
       levels.push_back(uniform(draw++, -50.0, 50.0));
-      limits.push_back({"l", levels[l] + slopes[l].dot(at) + room + 0.5, 0.5});
+      limits.push_back({"l" + std::to_string(l), levels[l] + slopes[l].dot(at) + room + 0.5, 0.5});
     }
     LimitGuard guard = taught(limits, slopes, levels, at);
     const Inputs out = guard.admit(at, step, reach, rate);

@@ -1,0 +1,156 @@
+"""What a review found: runs that stood still, states that no run could have, and answers to wrong questions."""
+
+from __future__ import annotations
+
+from typing import Any
+
+import numpy as np
+import pytest
+
+from mgdd.errors import ParameterError, ShapeError
+from mgdd.loop import EngineBench, monte_carlo, run_seeker, steady_map, steady_optimum, summarize_cycles
+from mgdd.optimize import (
+    BoundedSeeking,
+    ComponentLag,
+    ExtremumSeeking,
+    GoldenSection,
+    GradientDescent,
+    Limit,
+    NewtonSeeking,
+    Spsa,
+    tune,
+)
+from mgdd.rig import SimulatedRig, run_on_rig
+
+SPACE = {"start": -12.0, "lower": -30.0, "upper": 10.0}
+
+
+def test_blocking_follows_a_plant_whose_best_value_has_dropped() -> None:
+    rng = np.random.default_rng(1)
+    seeker = Spsa(**SPACE, schedule="constant", gain=2.0, blocking=True, noise_sd=0.25)
+    for level, best, cycles in ((56.0, -5.6, 600), (51.0, 0.0, 1500)):
+        for _ in range(cycles):
+            x = seeker.ask()[0]
+            seeker.tell(level - 0.0255 * (x - best) ** 2 + 0.25 * rng.standard_normal())
+    assert abs(seeker.estimate[0]) < 2.0
+
+
+def test_golden_section_finds_its_width_again() -> None:
+    """Of 200 seeds at another operating point none may end more than 1.5 CAD off (one in fifty did)."""
+    from mgdd.engine import OperatingPoint
+
+    bench = EngineBench(point=OperatingPoint(speed_rpm=2500.0, fuel_mg=30.0))
+    best = steady_optimum(bench)
+    seeker = GoldenSection(start=-20.0, lower=-30.0, upper=10.0, noise_sd=0.25)
+    table = monte_carlo(bench, seeker, range(200), cycles=2000, optimum_cad=best.soc_cad)
+    assert np.abs(table["final_cad"].values - best.soc_cad).max() < 1.5
+
+
+def test_a_limit_without_a_slope_does_not_hold_the_start_for_ever() -> None:
+    """COV of IMEP looks back 50 cycles: its answer to the timing is hidden, and it is feasible at the optimum only."""
+    bench = EngineBench(limits=["cov_imep_percent"])
+    space = {"start": -20.0, "lower": -30.0, "upper": 10.0}
+    limits = [Limit("cov_imep_percent", 0.6)]
+    seekers = [ExtremumSeeking(**space, limits=limits), NewtonSeeking(**space, limits=limits)]
+    table = monte_carlo(bench, seekers, range(10), cycles=3000)
+    assert np.abs(table["final_cad"].values + 5.63).max() < 3.0
+
+
+@pytest.mark.parametrize(
+    "seeker",
+    [
+        ExtremumSeeking(**SPACE),
+        NewtonSeeking(**SPACE),
+        BoundedSeeking(**SPACE),
+        Spsa(**SPACE),
+        GradientDescent(**SPACE),
+        GoldenSection(**SPACE),
+    ],
+    ids=lambda s: s.kind,
+)
+@pytest.mark.parametrize("value", [500.0, float("nan"), float("inf")])
+def test_a_state_outside_the_bounds_is_refused(seeker: Any, value: float) -> None:
+    good = seeker.state
+    with pytest.raises(ParameterError, match="state column 'estimate' holds"):
+        seeker.state = {**good, "estimate": [value]}
+    assert seeker.state == good
+    seeker.state = good
+    assert -30.0 <= seeker.ask()[0] <= 10.0
+
+
+def test_criteria_that_say_nothing_are_refused_before_the_rig_moves() -> None:
+    bench = EngineBench(limits=["p_max_bar"])
+    rig, seeker = SimulatedRig(bench), ExtremumSeeking(**SPACE, limits=[Limit("p_max_bar", 95.0)])
+    with pytest.raises(ParameterError, match=r"exceed_above: \['p_max'\]"):
+        run_on_rig(rig, seeker, 5, exceed_above={"p_max": 80.0})
+    with pytest.raises(ParameterError, match="not all measured by the rig"):
+        run_on_rig(SimulatedRig(other := EngineBench()), seeker, 5)
+    with pytest.raises(ParameterError, match="wrap a bench in SimulatedRig"):
+        run_on_rig(bench, seeker, 5)  # type: ignore[arg-type]
+    assert bench.cycle == other.cycle == seeker.cycle == 0
+    run = run_on_rig(rig, seeker, 5, exceed_from=0, exceed_above={"p_max_bar": 80.0})
+    assert run.summary["exceeded_fraction"] == 1.0
+    with pytest.raises(ParameterError, match="p_max_bar = nan"):
+        summarize_cycles(run.dataset, exceed_above={"p_max_bar": float("nan")})
+    with pytest.raises(ParameterError, match="exceed_above holds NaN"):
+        run_seeker(bench, seeker, 5, exceed_above={"p_max_bar": float("nan")})
+
+
+@pytest.mark.parametrize(
+    ("call", "error", "message"),
+    [
+        (
+            lambda: run_seeker(EngineBench(), ExtremumSeeking(start=-100.0), 5),
+            ParameterError,
+            "-100 °CA aTDC: must be in",
+        ),
+        (
+            lambda: run_seeker(EngineBench(), ExtremumSeeking(**SPACE), 5, tail_cycles=0),
+            ParameterError,
+            "tail_cycles = 0",
+        ),
+        (
+            lambda: run_seeker(EngineBench(), ExtremumSeeking(**SPACE), 5, arrival_cad=-1.0),
+            ParameterError,
+            "arrival_cad",
+        ),
+        (
+            lambda: monte_carlo(EngineBench(), ExtremumSeeking(**SPACE), [0.5], cycles=5),
+            ParameterError,
+            "whole numbers",
+        ),
+        (lambda: steady_optimum(EngineBench(), {"p_max_bar": float("nan")}), ParameterError, "p_max_bar = nan"),
+        (lambda: steady_optimum(EngineBench(), {"p_max_bar": None}), ParameterError, "p_max_bar = None"),  # type: ignore[dict-item]
+        (lambda: steady_optimum(EngineBench(), {"misfire": 0.0}), ParameterError, "'misfire' is no indicator"),
+        (lambda: steady_optimum(EngineBench(), cycle=-1), ParameterError, "cycle = -1"),
+        (lambda: steady_map(EngineBench(), [[1.0, 2.0]]), ShapeError, "2 dimensions"),
+        (lambda: ExtremumSeeking(start=[]), ShapeError, "start is empty"),
+        (lambda: ExtremumSeeking(start=[0.0, 1.0]), ShapeError, "harmonics has 1 entry: 2 inputs need one each"),
+        (lambda: Spsa(**SPACE, limits=[Limit("a", 1.0), Limit("a", 2.0)]), ParameterError, "limit a: is given twice"),
+        (lambda: Limit("", 1.0), ParameterError, "name is empty"),
+        (
+            lambda: tune(0.25, -0.051, method="moving_average", delay_cycles=38.0, compensated=False),
+            ParameterError,
+            "use 'batch', or compensate",
+        ),
+    ],
+)
+def test_wrong_questions_get_an_answer_that_names_them(call: Any, error: type[Exception], message: str) -> None:
+    with pytest.raises(error, match=message):
+        call()
+
+
+def test_tell_needs_a_measurement_or_a_misfire() -> None:
+    seeker = ExtremumSeeking(**SPACE, limits=[Limit("p_max_bar", 95.0)])
+    seeker.ask()
+    with pytest.raises(ShapeError, match="J is missing"):
+        seeker.tell()
+    with pytest.raises(ShapeError, match="limits has 2 names"):
+        seeker.tell(50.0, {"p_max_bar": 90.0, "p_maxx": 1.0})
+    seeker.tell(misfire=True)
+    assert (seeker.cycle, seeker.misfires) == (1, 1)
+
+
+def test_limits_and_lags_compare_by_value() -> None:
+    assert Limit("p_max_bar", 95.0) == Limit("p_max_bar", 95.0) != Limit("p_max_bar", 96.0)
+    assert ComponentLag(lag_cycles=2.0) == ComponentLag(lag_cycles=2.0) != ComponentLag()
