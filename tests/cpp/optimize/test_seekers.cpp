@@ -36,8 +36,7 @@ TEST_P(FarStart, ArrivesOnceStaysAndHasNoBias) {
 }
 
 INSTANTIATE_TEST_SUITE_P(EverySeeker, FarStart,
-                         testing::Combine(testing::Range(0, forms), testing::Values(40.0, -40.0)),
-                         [](const auto& one) {
+                         testing::Combine(testing::Range(0, forms), testing::Values(40.0, -40.0)), [](const auto& one) {
                            return form_name(static_cast<std::size_t>(std::get<0>(one.param))) +
                                   (std::get<1>(one.param) > 0.0 ? "_from_above" : "_from_below");
                          });
