@@ -93,7 +93,8 @@ class LearningUpdate {
   std::optional<ZeroPhaseLowPass> q_;
   bool norm_optimal_ = false;
   double error_weight_ = 0.0, input_weight_ = 0.0, change_weight_ = 0.0;
-  Eigen::LLT<Eigen::MatrixXd> factor_;  // of G^T We G + Wu + Wd
+  // Of G^T We G + Wu + Wd; of something, so that a law without it can be moved.
+  Eigen::LLT<Eigen::MatrixXd> factor_{Eigen::MatrixXd::Identity(1, 1)};
   Eigen::VectorXd work_;
 };
 
