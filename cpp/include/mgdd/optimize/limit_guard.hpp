@@ -53,7 +53,8 @@ class LimitGuard {
 
   /// The nearest step to `step` that no limit forbids; where the estimate itself is over a limit, the way back:
   /// along the learnt slope, or to the last good point while the slope is not known (with no such point the estimate
-  /// stays, unless `reach` is zero and nothing but steps explores). Each entry stays within `rate`.
+  /// stays, unless `reach` is zero and nothing but steps explores, or the limit has been broken for long without
+  /// showing a slope: it cannot say where to go and is not waited for). Each entry stays within `rate`.
   Inputs admit(const Inputs& estimate, const Inputs& step, const Inputs& reach, const Inputs& rate) noexcept;
 
   /// True when the last `admit` changed its step.
@@ -75,9 +76,9 @@ class LimitGuard {
   }
 
  private:
-  std::vector<Limit> limits_;
   bool silent(std::size_t i, double excess) const noexcept;
 
+  std::vector<Limit> limits_;
   double patience_;                 // cycles that a broken limit is given to show its slope
   std::vector<LocalModel> models_;  // one per limit
   std::vector<double> in_a_row_;
