@@ -12,16 +12,20 @@ from mgdd.identify.surrogate import EngineSurrogate, SignalModel
 from mgdd.identify.surrogate_engine import SurrogateEngine
 from mgdd.identify.surrogate_fit import fit_surrogate
 from mgdd.identify.surrogate_optimum import SurrogateOptimum
+from mgdd.identify.throttle_fit import FittedParameters, ThrottleFit, ThrottleModel
 
 __all__ = [
     "CylinderFit",
     "EngineSurrogate",
+    "FittedParameters",
     "LoadFit",
     "SensorLag",
     "SignalModel",
     "Support",
     "SurrogateEngine",
     "SurrogateOptimum",
+    "ThrottleFit",
+    "ThrottleModel",
     "WallHeatProfile",
     "fit_cylinder",
     "fit_surrogate",
