@@ -139,7 +139,7 @@ TEST(ThrottleLaws, TheGapOfTheGearIsCrossedAndHeld) {
 
 // Two masses without a gap, rigid as the step allows, are the one mass.
 TEST(ThrottleLaws, ANarrowGapIsNoGap) {
-  Throttle rigid;
+  const Throttle rigid;
   Throttle geared = rigid;
   geared.backlash = Backlash::compliance;
   geared.backlash_half_deg = 1e-6;
