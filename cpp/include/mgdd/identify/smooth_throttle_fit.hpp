@@ -40,7 +40,8 @@ struct SmoothThrottleFitOptions {
   double undetermined_error = 0.25;  ///< a width with a larger relative standard error is named
 };
 
-/// Bounds 0.1 and 10 times the centre, and three stages: a twentieth and a quarter of the record, then all of it.
+/// Bounds 0.1 and 10 times the centre, and four stages: a twentieth of the record without and with the widths, a
+/// quarter, then all of it with all ten. For records of about 20 s with steps every 0.1 s.
 SmoothThrottleFitOptions smooth_throttle_options(const std::array<double, 10>& centre);
 
 struct SmoothThrottleFit {
