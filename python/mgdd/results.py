@@ -107,6 +107,13 @@ VARIABLES: Mapping[str, Label] = MappingProxyType(
         "rmse_percent": Label("% of p_max", "pressure RMSE, closed cycle"),
         "imep_closed_error_percent": Label("%", "error of the closed-cycle IMEP"),
         "wall_heat_scale": Label("-", "wall-heat scale"),
+        "time_s": Label("s", "time"),
+        "duty": Label("-", "duty"),
+        "angle_deg": Label("deg", "plate angle"),
+        "model_deg": Label("deg", "plate angle, model"),
+        "current_a": Label("A", "motor current"),
+        "supply_v": Label("V", "supply voltage"),
+        "speed_deg_per_s": Label("deg/s", "plate speed"),
     }
 )
 

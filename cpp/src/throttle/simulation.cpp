@@ -37,7 +37,7 @@ void check_column(std::string_view name, std::span<const double> column, std::si
 }
 
 PlantCoefficients<Wide> packed(const std::array<Coefficients, width>& lanes) noexcept {
-  std::array<Wide, count> columns;
+  std::array<Wide, count> columns{};
   for (int lane = 0; lane < width; ++lane) {
     const auto flat = std::bit_cast<std::array<double, count>>(lanes[static_cast<std::size_t>(lane)]);
     for (std::size_t i = 0; i < count; ++i)
@@ -147,7 +147,7 @@ std::vector<double> simulate_many(std::span<const ThrottleCase> cases, const Thr
   std::vector<double> rows(lanes * n);
   for (std::size_t first = 0; first < cases.size(); first += lanes) {
     const std::size_t used = std::min(lanes, cases.size() - first);
-    std::array<Coefficients, lanes> coefficients;
+    std::array<Coefficients, lanes> coefficients{};
     BasicThrottleState<Wide> state;
     for (std::size_t lane = 0; lane < lanes; ++lane) {  // idle lanes repeat the last case
       const ThrottleCase& one = cases[first + std::min(lane, used - 1)];

@@ -22,11 +22,13 @@ namespace mgdd {
 namespace detail {
 
 /// Vectors of GCC and Clang; a type of its own because the attribute does not wait for a template argument.
+// NOLINTBEGIN(modernize-use-using): an alias drops the attribute.
 template <int N>
 struct LaneVector {
   typedef double Numbers __attribute__((vector_size(N * 8)));
   typedef std::int64_t Bits __attribute__((vector_size(N * 8)));
 };
+// NOLINTEND(modernize-use-using)
 
 }  // namespace detail
 
@@ -43,7 +45,7 @@ template <int N>
 struct Lanes {
   static_assert(N >= 2 && (N & (N - 1)) == 0, "a power of two");
   using Vector = typename detail::LaneVector<N>::Numbers;
-  Vector v;
+  Vector v{};
 
   Lanes() noexcept = default;
   MGDD_INLINE Lanes(double all) noexcept : v(Vector{} + all) {}  // NOLINT(google-explicit-constructor): a constant

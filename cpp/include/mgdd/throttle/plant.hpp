@@ -10,6 +10,7 @@
 #include <cstddef>
 
 #include "mgdd/common/lanes.hpp"
+#include "mgdd/common/units.hpp"
 #include "mgdd/throttle/throttle.hpp"
 
 namespace mgdd::throttle {
@@ -163,14 +164,14 @@ auto BasicThrottlePlant<T>::load(const T& angle, const Input& in) const noexcept
   const T slope = spring + select(share == ramp, preload * c_.inverse_ramp, zero);
   const T below_stop = larger(c_.closed - angle, zero);
   const T beyond_stop = larger(angle - c_.open, zero);
-  Load l;
+  Load l{};
   l.spring = spring * x + preload * share;
   l.spring_implicit = h * slope;
   l.stop = c_.stop * (below_stop - beyond_stop);
   l.stop_implicit = select(below_stop + beyond_stop > zero, c_.stop_implicit, zero);
   l.air = in.airflow_torque_nm;
   if (flows_) {
-    l.air += c_.air_torque * each(angle, [](double rad) { return airflow_coefficient(rad * 57.29577951308232); });
+    l.air += c_.air_torque * each(angle, [](double rad) { return airflow_coefficient(rad / units::rad_per_deg); });
   }
   l.torque = l.stop + l.air - l.spring;
   l.implicit = l.spring_implicit + l.stop_implicit;

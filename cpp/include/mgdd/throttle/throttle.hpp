@@ -109,7 +109,7 @@ struct FieldInfo {
 };
 struct Field {
   FieldInfo info;
-  double Throttle::* member;
+  double Throttle::* member = nullptr;
 };
 
 /// All numbers of a throttle, in the order of the struct.

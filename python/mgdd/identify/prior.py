@@ -1,0 +1,128 @@
+"""What is known of a throttle before its log: limits, the groups that set the duty, and a simulation."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Callable, Mapping
+from dataclasses import dataclass
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+
+from mgdd.errors import ParameterError
+
+if TYPE_CHECKING:
+    from numpy.typing import NDArray
+
+__all__ = ["DutyGroups", "Prior", "prior_of"]
+
+_TRAVEL_DEG = (0.0, 90.0)
+_MARGIN_DEG = 1.0
+# Preload plus friction of a common throttle at 12 V, for models that name neither.
+_SWING = 0.3
+
+
+@dataclass(frozen=True, kw_only=True)
+class DutyGroups:
+    """Torques over the stall torque per unit duty: what moves the plate, in duty.
+
+    Parameters
+    ----------
+    preload_above, preload_below : float
+        Preload of the limp-home springs [-].
+    spring_above_per_deg, spring_below_per_deg : float
+        Slope of the springs [1/deg].
+    coulomb : float
+        Dry friction [-].
+    """
+
+    preload_above: float
+    preload_below: float
+    spring_above_per_deg: float
+    spring_below_per_deg: float
+    coulomb: float
+
+
+@dataclass(frozen=True, kw_only=True)
+class Prior:
+    """A throttle as excitation sees it; `simulate` gives the columns of a run from a start angle [deg]."""
+
+    simulate: Callable[[NDArray[np.float64], NDArray[np.float64], float], Mapping[str, NDArray[np.float64]]]
+    limp_home_deg: float | None = None
+    stops_deg: tuple[float, float] = _TRAVEL_DEG
+    groups: DutyGroups | None = None
+
+    @property
+    def window_deg(self) -> tuple[float, float]:
+        """The travel without 1 deg at either stop."""
+        return self.stops_deg[0] + _MARGIN_DEG, self.stops_deg[1] - _MARGIN_DEG
+
+    @property
+    def swing(self) -> float:
+        """Duty amplitude that crosses limp-home both ways, with a tenth to spare."""
+        if self.groups is None:
+            return _SWING
+        need = max(self.groups.preload_above, self.groups.preload_below) + self.groups.coulomb
+        return min(1.0, math.ceil(110.0 * need) / 100.0)
+
+
+def prior_of(model: Any) -> Prior:
+    """Return what a throttle, a fitted model or a callable says of itself."""
+    if all(hasattr(model, name) for name in ("coulomb_nm", "limp_home_deg", "preload_above_nm")):
+        return _of_throttle(model)
+    if hasattr(model, "model") and hasattr(model, "report"):  # a ThrottleFit
+        return prior_of(model.model)
+    if hasattr(model, "simulate") and hasattr(model, "parameters"):
+        return _of_model(model)
+    if callable(model):
+        return Prior(simulate=lambda time, duty, start: _columns(model(time, duty, start), time.size))
+    raise ParameterError(f"prior = {type(model).__name__}: must be a Throttle, a fitted model or a callable")
+
+
+def _of_throttle(throttle: Any) -> Prior:
+    def run(time: NDArray[np.float64], duty: NDArray[np.float64], start: float) -> Mapping[str, NDArray[np.float64]]:
+        from mgdd.throttle import simulate
+
+        result = simulate(throttle, duty=duty, time_s=time, start_deg=start)
+        return _columns({name: result[name].to_numpy() for name in ("angle_deg", "current_a")}, time.size)
+
+    stall = throttle.torque_constant_nm_per_a * (throttle.supply_v - throttle.driver_drop_v)
+    stall /= throttle.resistance_ohm + throttle.driver_resistance_ohm
+    per_deg = math.radians(1.0) / stall
+    sliding = throttle.coulomb_nm
+    return Prior(
+        simulate=run,
+        limp_home_deg=throttle.limp_home_deg,
+        stops_deg=(throttle.closed_deg, throttle.open_deg),
+        groups=DutyGroups(
+            preload_above=throttle.preload_above_nm / stall,
+            preload_below=throttle.preload_below_nm / stall,
+            spring_above_per_deg=throttle.spring_above_nm_per_rad * per_deg,
+            spring_below_per_deg=throttle.spring_below_nm_per_rad * per_deg,
+            coulomb=sliding / stall,
+        ),
+    )
+
+
+def _of_model(model: Any) -> Prior:
+    values = dict(model.parameters)
+
+    def run(time: NDArray[np.float64], duty: NDArray[np.float64], start: float) -> Mapping[str, NDArray[np.float64]]:
+        return _columns(model.simulate(time, duty, start_deg=start), time.size)
+
+    return Prior(
+        simulate=run,
+        limp_home_deg=values.get("limp_home_deg"),
+        stops_deg=(values.get("closed_deg", _TRAVEL_DEG[0]), values.get("open_deg", _TRAVEL_DEG[1])),
+    )
+
+
+def _columns(answer: Any, size: int) -> Mapping[str, NDArray[np.float64]]:
+    table = answer if isinstance(answer, Mapping) else {"angle_deg": answer}
+    out = {str(name): np.asarray(table[name], dtype=np.float64) for name in ("angle_deg", "current_a") if name in table}
+    for name, values in out.items():
+        if values.shape != (size,):
+            raise ParameterError(f"prior: {name} has shape {values.shape}: must be one value per sample, ({size},)")
+        if not np.isfinite(values).all():
+            raise ParameterError(f"prior: {name} is not finite at sample {int(np.argmin(np.isfinite(values)))}")
+    return out

@@ -1,0 +1,398 @@
+"""What an identified throttle hands back, and what any model of a throttle can be asked."""
+
+from __future__ import annotations
+
+import html
+import json
+import math
+import tomllib
+from collections.abc import Mapping
+from dataclasses import dataclass, field
+from types import MappingProxyType
+from typing import TYPE_CHECKING, Any, Protocol, runtime_checkable
+
+from mgdd.errors import DataError, ParameterError
+from mgdd.results import to_jsonable
+
+if TYPE_CHECKING:
+    import numpy as np
+    from numpy.typing import ArrayLike, NDArray
+
+    from mgdd.optimize import FitReport
+
+__all__ = ["KINDS", "FittedParameters", "ThrottleFit", "ThrottleModel", "unit_of"]
+
+KINDS = ("first_principle", "pw_r", "pw_w", "pw_p")
+# Endings of parameter names, longest first, and the unit they stand for.
+_UNITS = {
+    "_deg_per_s2_per_duty": "deg/s² per duty",
+    "_duty_per_deg": "duty/deg",
+    "_per_deg2": "1/deg²",
+    "_per_deg": "1/deg",
+    "_deg_per_duty": "deg/duty",
+    "_nms_per_rad": "N m s/rad",
+    "_nm_per_rad": "N m/rad",
+    "_nm_per_a": "N m/A",
+    "_vs_per_rad": "V s/rad",
+    "_deg_per_s": "deg/s",
+    "_rad_per_s": "rad/s",
+    "_per_s": "1/s",
+    "_kgm2": "kg m²",
+    "_samples": "samples",
+    "_ohm": "ohm",
+    "_deg": "deg",
+    "_rad": "rad",
+    "_duty": "-",
+    "_nm": "N m",
+    "_mh": "mH",
+    "_ms": "ms",
+    "_v": "V",
+    "_a": "A",
+    "_s": "s",
+}
+
+
+def unit_of(name: str) -> str:
+    """Return the unit that a parameter name ends in, ``"-"`` if it names none."""
+    return next((unit for ending, unit in _UNITS.items() if name.endswith(ending)), "-")
+
+
+@runtime_checkable
+class ThrottleModel(Protocol):
+    """A throttle model that can run free and predict ahead: first-principle or pseudo-Wiener.
+
+    Examples
+    --------
+    >>> from mgdd.identify import ThrottleModel
+    >>> isinstance(3.0, ThrottleModel)
+    False
+    """
+
+    @property
+    def kind(self) -> str:
+        """One of ``first_principle``, ``pw_r``, ``pw_w``, ``pw_p``."""
+
+    @property
+    def parameters(self) -> Mapping[str, float]:
+        """Values by name; the name ends in the unit."""
+
+    def simulate(self, time_s: ArrayLike, duty: ArrayLike, *, start_deg: float) -> NDArray[np.float64]:
+        """Run free: entry k is the angle [deg] at ``time_s[k]``; ``duty[k]`` acts from there to the next sample."""
+
+    def predict(self, time_s: ArrayLike, duty: ArrayLike, angle_deg: ArrayLike, horizon: int) -> NDArray[np.float64]:
+        """Predict `horizon` samples ahead: entry k is the angle [deg] at sample k + horizon from data up to k."""
+
+    def to_toml(self) -> str:
+        """Write the model as TOML."""
+
+
+@dataclass(frozen=True, kw_only=True)
+class FittedParameters:
+    """Parameters of a fit as they stand in a TOML file, each with its unit and origin.
+
+    Parameters
+    ----------
+    kind : str
+        One of ``first_principle``, ``pw_r``, ``pw_w``, ``pw_p``.
+    values, stderr : mapping of str to float
+        By parameter name, in the unit that the name ends in; NaN where there is no standard error.
+    source : str
+        Where they come from, as the file says it.
+    fit : mapping of str to float
+        ``fit_percent_train``, ``fit_percent_test`` [%] and ``rmse_test_deg`` [deg], as far as known.
+    unidentifiable : tuple of str
+        Names that the log did not determine.
+
+    Examples
+    --------
+    >>> from mgdd.identify import FittedParameters
+    >>> saved = FittedParameters(kind="pw_r", values={"tau_s": 0.0197}, source="fitted to ramp.csv")
+    >>> FittedParameters.from_toml(saved.to_toml()) == saved
+    True
+    """
+
+    kind: str
+    values: Mapping[str, float]
+    source: str
+    stderr: Mapping[str, float] = field(default_factory=dict)
+    fit: Mapping[str, float] = field(default_factory=dict)
+    unidentifiable: tuple[str, ...] = ()
+
+    def __post_init__(self) -> None:
+        if self.kind not in KINDS:
+            raise ParameterError(f"kind = {self.kind!r}: must be one of {', '.join(map(repr, KINDS))}")
+        for name, value in self.values.items():
+            if not math.isfinite(value):
+                raise ParameterError(f"{name} = {value!r}: must be finite")
+        known = {name: float(value) for name, value in self.stderr.items() if math.isfinite(value)}
+        object.__setattr__(self, "stderr", MappingProxyType(known))
+        for name in ("values", "fit"):
+            object.__setattr__(self, name, MappingProxyType(dict(getattr(self, name))))
+
+    def to_toml(self) -> str:
+        """Write one line per value with unit, standard error and source.
+
+        Returns
+        -------
+        str
+            TOML that `from_toml` reads back equal.
+        """
+        lines = [f"kind = {_text(self.kind)}", f"source = {_text(self.source)}"]
+        lines += [f"unidentifiable = {json.dumps(list(self.unidentifiable), ensure_ascii=False)}"]
+        if self.fit:
+            lines += ["", "[fit]", *(f"{name} = {float(value)!r}" for name, value in self.fit.items())]
+        lines += ["", "[parameters]"]
+        for name, value in self.values.items():
+            error = f", stderr = {self.stderr[name]!r}" if name in self.stderr else ""
+            lines.append(
+                f"{name} = {{ value = {float(value)!r}, unit = {_text(unit_of(name))}{error}, "
+                f"source = {_text(self.source)} }}"
+            )
+        return "\n".join(lines) + "\n"
+
+    @classmethod
+    def from_toml(cls, text: str, *, source: str = "fit") -> FittedParameters:
+        """Read what `to_toml` wrote.
+
+        Parameters
+        ----------
+        text : str
+            The TOML text.
+        source : str
+            Name for the messages, for example the file.
+
+        Returns
+        -------
+        FittedParameters
+            The parameters.
+
+        Raises
+        ------
+        DataError
+            No TOML, a missing table, a value without number or with the wrong unit.
+        ParameterError
+            An unknown kind, or a value that is not finite.
+        """
+        try:
+            data = tomllib.loads(text)
+        except tomllib.TOMLDecodeError as error:
+            raise DataError(f"{source}: not valid TOML: {error}") from error
+        table = data.get("parameters")
+        if not isinstance(table, dict) or not table:
+            raise DataError(f"{source}: no table [parameters]: mgdd throttle identify --output writes one")
+        values: dict[str, float] = {}
+        stderr: dict[str, float] = {}
+        for name, entry in table.items():
+            unit = unit_of(name)
+            if not isinstance(entry, dict) or not isinstance(entry.get("value"), int | float):
+                raise DataError(f'{source}: [parameters] {name}: write {{ value = ..., unit = "{unit}" }}')
+            if entry.get("unit") != unit:
+                raise DataError(
+                    f"{source}: [parameters] {name}: unit = {entry.get('unit')!r}: must be {unit!r}; convert the "
+                    "value, units stand in the names"
+                )
+            values[name] = float(entry["value"])
+            if "stderr" in entry:
+                stderr[name] = float(entry["stderr"])
+        return cls(
+            kind=str(data.get("kind", "")),
+            values=values,
+            source=str(data.get("source", source)),
+            stderr=stderr,
+            fit={str(name): float(value) for name, value in data.get("fit", {}).items()},
+            unidentifiable=tuple(str(name) for name in data.get("unidentifiable", ())),
+        )
+
+
+@dataclass(frozen=True, kw_only=True, eq=False, repr=False)
+class ThrottleFit:
+    """An identified throttle: the model, how well it follows the log, and what the log left open.
+
+    The names of SciPy's results (``x``, ``fun``, ``cost``, ``nfev``, ``njev``, ``nit``, ``status``, ``message``,
+    ``success``) are those of `report`.
+
+    Parameters
+    ----------
+    report : mgdd.optimize.FitReport
+        Estimates, standard errors, correlation, history.
+    model : ThrottleModel
+        The fitted model, ready to simulate.
+    kind : str
+        One of ``first_principle``, ``pw_r``, ``pw_w``, ``pw_p``.
+    fit_percent_train : float
+        Free-run fit on the log it was fitted to [%].
+    fit_percent_test : float or None
+        Free-run fit on another log [%].
+    rmse_test_deg : float or None
+        Free-run error on that log [deg].
+    parameters : mapping of str to float
+        All parameters of the model; the names end in their units.
+    unidentifiable : tuple of str
+        Names that the log does not determine.
+    findings : tuple of str
+        What to distrust and which excitation would settle it, in words.
+    source : str
+        Name of the log.
+
+    See Also
+    --------
+    identify_throttle : makes one.
+
+    Examples
+    --------
+    >>> from mgdd.identify import ThrottleFit
+    >>> "fit_percent_test" in ThrottleFit.__dataclass_fields__
+    True
+    """
+
+    report: FitReport
+    model: ThrottleModel
+    kind: str
+    fit_percent_train: float
+    fit_percent_test: float | None = None
+    rmse_test_deg: float | None = None
+    parameters: Mapping[str, float] = field(default_factory=dict)
+    unidentifiable: tuple[str, ...] = ()
+    findings: tuple[str, ...] = ()
+    source: str = "log"
+
+    @property
+    def x(self) -> NDArray[np.float64]:
+        """Estimates of the free parameters in the order of ``report.names``."""
+        return self.report.x
+
+    @property
+    def fun(self) -> NDArray[np.float64]:
+        """Residual at the estimate."""
+        return self.report.fun
+
+    @property
+    def cost(self) -> float:
+        """Half the sum of squares."""
+        return self.report.cost
+
+    @property
+    def nfev(self) -> int:
+        """Residual evaluations."""
+        return self.report.nfev
+
+    @property
+    def njev(self) -> int:
+        """Jacobian evaluations."""
+        return self.report.njev
+
+    @property
+    def nit(self) -> int:
+        """Trial steps."""
+        return self.report.nit
+
+    @property
+    def status(self) -> str:
+        """Status of the solver."""
+        return self.report.status
+
+    @property
+    def message(self) -> str:
+        """The status as a sentence."""
+        return self.report.message
+
+    @property
+    def success(self) -> bool:
+        """Whether a tolerance was met."""
+        return self.report.success
+
+    def __repr__(self) -> str:
+        test = "" if self.fit_percent_test is None else f", test {self.fit_percent_test:.2f} %"
+        return f"<ThrottleFit {self.kind}, {self.status}, train {self.fit_percent_train:.2f} %{test}>"
+
+    def fitted(self) -> FittedParameters:
+        """Give the parameters with units, standard errors and origin.
+
+        Returns
+        -------
+        FittedParameters
+            What `to_toml` writes.
+        """
+        errors = dict(zip(self.report.names, self.report.stderr.tolist(), strict=True))
+        figures = {
+            "fit_percent_train": self.fit_percent_train,
+            "fit_percent_test": self.fit_percent_test,
+            "rmse_test_deg": self.rmse_test_deg,
+        }
+        return FittedParameters(
+            kind=self.kind,
+            values=self.parameters,
+            stderr={name: error for name, error in errors.items() if name in self.parameters},
+            source=f"fitted to {self.source}",
+            fit={name: value for name, value in figures.items() if value is not None},
+            unidentifiable=self.unidentifiable,
+        )
+
+    def to_toml(self) -> str:
+        """Write the parameters as TOML with units, standard errors and the name of the log.
+
+        Returns
+        -------
+        str
+            Text that `FittedParameters.from_toml` and `load_throttle_model` read.
+        """
+        return self.fitted().to_toml()
+
+    def to_dict(self) -> dict[str, Any]:
+        """Give everything but residual and model as plain Python values.
+
+        Returns
+        -------
+        dict
+            With ``fit_percent_train``, ``fit_percent_test``, ``rmse_test``, ``parameters``, ``unidentifiable``,
+            ``findings``, ``stderr`` and the solver's figures.
+        """
+        plain: dict[str, Any] = to_jsonable(
+            {
+                "model": self.kind,
+                "source": self.source,
+                "fit_percent_train": self.fit_percent_train,
+                "fit_percent_test": self.fit_percent_test,
+                "rmse_test": self.rmse_test_deg,
+                "parameters": self.parameters,
+                "stderr": dict(zip(self.report.names, self.report.stderr.tolist(), strict=True)),
+                "unidentifiable": self.unidentifiable,
+                "findings": self.findings,
+                "status": self.status,
+                "success": self.success,
+                "nit": self.nit,
+                "nfev": self.nfev,
+            }
+        )
+        return plain
+
+    def summary(self) -> str:
+        """Say in a page how good the fit is and what is open.
+
+        Returns
+        -------
+        str
+            Figures, the table of the report, and the findings.
+        """
+        return "\n".join([self._headline(), "", self.report.summary(), *self._notes()])
+
+    def _headline(self) -> str:
+        test = "no test log"
+        if self.fit_percent_test is not None:
+            error = "" if self.rmse_test_deg is None else f", RMSE {self.rmse_test_deg:.4g} deg"
+            test = f"test {self.fit_percent_test:.2f} %{error}"
+        return f"{self.kind} fitted to {self.source}: free-run fit train {self.fit_percent_train:.2f} %, {test}"
+
+    def _notes(self) -> list[str]:
+        extra = [finding for finding in self.findings if finding not in self.report.findings]
+        return ["", "what this log cannot tell:", *(f"  {finding}" for finding in extra)] if extra else []
+
+    def _repr_html_(self) -> str:
+        extra = [finding for finding in self.findings if finding not in self.report.findings]
+        items = "".join(f"<li>{html.escape(finding)}</li>" for finding in extra)
+        notes = f"<p>what this log cannot tell:</p><ul>{items}</ul>" if extra else ""
+        return f"<div><p><b>{html.escape(self._headline())}</b></p>{self.report._repr_html_()}{notes}</div>"
+
+
+def _text(value: str) -> str:
+    return json.dumps(value, ensure_ascii=False)
