@@ -110,6 +110,23 @@ Dual<N> log(const Dual<N>& x) noexcept {
   return chain(std::log(x.value), 1.0 / x.value, x);
 }
 template <int N>
+Dual<N> sin(const Dual<N>& x) noexcept {
+  return chain(std::sin(x.value), std::cos(x.value), x);
+}
+template <int N>
+Dual<N> cos(const Dual<N>& x) noexcept {
+  return chain(std::cos(x.value), -std::sin(x.value), x);
+}
+template <int N>
+Dual<N> tanh(const Dual<N>& x) noexcept {
+  const double t = std::tanh(x.value);
+  return chain(t, 1.0 - t * t, x);
+}
+template <int N>
+Dual<N> abs(const Dual<N>& x) noexcept {
+  return chain(std::abs(x.value), x.value < 0.0 ? -1.0 : 1.0, x);
+}
+template <int N>
 Dual<N> pow(const Dual<N>& x, double exponent) noexcept {
   const double y = std::pow(x.value, exponent);
   return chain(y, exponent * std::pow(x.value, exponent - 1.0), x);

@@ -1,0 +1,168 @@
+#include "mgdd/throttle/simulation.hpp"
+
+#include <algorithm>
+#include <array>
+#include <bit>
+#include <cmath>
+#include <string>
+
+#include "mgdd/common/bounds.hpp"
+#include "mgdd/common/error.hpp"
+#include "mgdd/common/text.hpp"
+#include "mgdd/common/units.hpp"
+
+namespace mgdd::throttle {
+namespace {
+
+constexpr int width = 8;
+using Wide = Lanes<width>;
+using WidePlant = BasicThrottlePlant<Wide>;
+using Coefficients = PlantCoefficients<double>;
+
+constexpr std::size_t count = sizeof(Coefficients) / sizeof(double);
+static_assert(sizeof(PlantCoefficients<Wide>) == count * sizeof(Wide));
+
+void check_column(std::string_view name, std::span<const double> column, std::size_t n, bool may_be_empty) {
+  if (may_be_empty && column.empty()) return;
+  if (column.size() != n) {
+    throw ShapeError(std::string(name) + " has " + std::to_string(column.size()) + " samples, duty has " +
+                     std::to_string(n));
+  }
+  for (std::size_t k = 0; k < n; ++k) {
+    if (!std::isfinite(column[k])) {
+      throw DataError(std::string(name) + " is " + text(column[k]) + " at sample " + std::to_string(k) +
+                      ": must be finite");
+    }
+  }
+}
+
+PlantCoefficients<Wide> packed(const std::array<Coefficients, width>& lanes) noexcept {
+  std::array<Wide, count> columns{};
+  for (int lane = 0; lane < width; ++lane) {
+    const auto flat = std::bit_cast<std::array<double, count>>(lanes[static_cast<std::size_t>(lane)]);
+    for (std::size_t i = 0; i < count; ++i)
+      columns[i].set(lane, flat[i]);
+  }
+  return std::bit_cast<PlantCoefficients<Wide>>(columns);
+}
+
+// The hot loop of many runs: rows of `width` angles per sample.
+MGDD_CLONES void run_lanes(const WidePlant& plant, const ThrottleSignals& signals, std::size_t steps,
+                           BasicThrottleState<Wide>& state, double* rows) noexcept {
+  BasicThrottleInput<Wide> input;
+  BasicThrottleState<Wide> s = state;
+  input.bridge = signals.bridge;
+  input.supply_v = plant.coefficients().supply;
+  const Wide to_deg(1.0 / units::rad_per_deg);
+  const std::size_t n = signals.duty.size();
+  for (std::size_t k = 0; k < n; ++k) {
+    (s.plate_angle_rad * to_deg).store(rows + k * static_cast<std::size_t>(width));
+    if (k + 1 == n) break;
+    input.duty = Wide(signals.duty[k]);
+    if (!signals.supply_v.empty()) input.supply_v = Wide(signals.supply_v[k]);
+    input.airflow_torque_nm = Wide(signals.airflow_torque_nm.empty() ? 0.0 : signals.airflow_torque_nm[k]);
+    for (std::size_t i = 0; i < steps; ++i)
+      plant.step(s, input);
+  }
+  state = s;
+}
+
+void put(BasicThrottleState<Wide>& wide, int lane, const ThrottleState& one) noexcept {
+  wide.angle_rad.set(lane, one.angle_rad);
+  wide.speed_rad_per_s.set(lane, one.speed_rad_per_s);
+  wide.current_a.set(lane, one.current_a);
+  wide.bristle_rad.set(lane, one.bristle_rad);
+  wide.plate_angle_rad.set(lane, one.plate_angle_rad);
+  wide.plate_speed_rad_per_s.set(lane, one.plate_speed_rad_per_s);
+  wide.plate_bristle_rad.set(lane, one.plate_bristle_rad);
+}
+
+}  // namespace
+
+std::size_t steps_per_sample(double sample_s, double step_s) {
+  require_within("step_s", step_s, step_lower_s, step_upper_s, "s");
+  const double ratio = sample_s / step_s;
+  const double whole = std::round(ratio);
+  if (!(whole >= 1.0 && whole <= 1e9 && std::abs(ratio - whole) <= 1e-9 * whole)) {
+    throw ParameterError("step_s = " + text(step_s) + " s: must go a whole number of times into the sample time of " +
+                         text(sample_s) + " s");
+  }
+  return static_cast<std::size_t>(whole);
+}
+
+void validate(const ThrottleSignals& signals) {
+  const std::size_t n = signals.duty.size();
+  check_column("duty", signals.duty, n, false);
+  check_column("supply_v", signals.supply_v, n, true);
+  check_column("airflow_torque_nm", signals.airflow_torque_nm, n, true);
+  for (std::size_t k = 0; k < n; ++k) {
+    if (!(std::abs(signals.duty[k]) <= 1.0)) {
+      throw DataError("duty = " + text(signals.duty[k]) + " at sample " + std::to_string(k) +
+                      ": must be in [-1, 1]; a duty in percent is divided by 100");
+    }
+    if (!signals.supply_v.empty() && !(signals.supply_v[k] >= 0.0)) {
+      throw DataError("supply_v = " + text(signals.supply_v[k]) + " V at sample " + std::to_string(k) +
+                      ": must be >= 0");
+    }
+  }
+}
+
+void simulate(const ThrottlePlant& plant, const ThrottleSignals& signals, std::size_t steps, ThrottleState& state,
+              const ThrottleColumns& columns) noexcept {
+  constexpr double to_deg = 1.0 / units::rad_per_deg;
+  ThrottleInput input;
+  ThrottleState s = state;
+  input.bridge = signals.bridge;
+  input.supply_v = plant.coefficients().supply;
+  const std::size_t n = signals.duty.size();
+  for (std::size_t k = 0; k < n; ++k) {
+    if (!columns.angle_deg.empty()) columns.angle_deg[k] = s.plate_angle_rad * to_deg;
+    if (!columns.speed_deg_per_s.empty()) columns.speed_deg_per_s[k] = s.plate_speed_rad_per_s * to_deg;
+    if (!columns.current_a.empty()) columns.current_a[k] = s.current_a;
+    if (k + 1 == n) break;
+    input.duty = signals.duty[k];
+    if (!signals.supply_v.empty()) input.supply_v = signals.supply_v[k];
+    if (!signals.airflow_torque_nm.empty()) input.airflow_torque_nm = signals.airflow_torque_nm[k];
+    for (std::size_t i = 0; i < steps; ++i)
+      plant.step(s, input);
+  }
+  state = s;
+}
+
+std::vector<double> simulate_many(std::span<const ThrottleCase> cases, const ThrottleSignals& signals,
+                                  std::size_t steps, double step_s) {
+  validate(signals);
+  require_within("step_s", step_s, step_lower_s, step_upper_s, "s");
+  bool flows = false;
+  for (const ThrottleCase& one : cases) {
+    validate(one.throttle);
+    if (one.throttle.friction != cases[0].throttle.friction || one.throttle.backlash != cases[0].throttle.backlash) {
+      throw ParameterError("friction and backlash must have the same form in all cases of one call");
+    }
+    flows = flows || one.throttle.pressure_drop_kpa > 0.0;
+  }
+  const std::size_t n = signals.duty.size();
+  constexpr auto lanes = static_cast<std::size_t>(width);
+  std::vector<double> angle_deg(cases.size() * n);
+  std::vector<double> rows(lanes * n);
+  for (std::size_t first = 0; first < cases.size(); first += lanes) {
+    const std::size_t used = std::min(lanes, cases.size() - first);
+    std::array<Coefficients, lanes> coefficients{};
+    BasicThrottleState<Wide> state;
+    for (std::size_t lane = 0; lane < lanes; ++lane) {  // idle lanes repeat the last case
+      const ThrottleCase& one = cases[first + std::min(lane, used - 1)];
+      coefficients[lane] = plant_coefficients(one.throttle, step_s);
+      put(state, static_cast<int>(lane), one.start);
+    }
+    Throttle options = cases[first].throttle;
+    if (flows) options.pressure_drop_kpa = 1.0;
+    run_lanes(WidePlant(packed(coefficients), options, step_s), signals, steps, state, rows.data());
+    for (std::size_t lane = 0; lane < used; ++lane) {
+      for (std::size_t k = 0; k < n; ++k)
+        angle_deg[(first + lane) * n + k] = rows[k * lanes + lane];
+    }
+  }
+  return angle_deg;
+}
+
+}  // namespace mgdd::throttle

@@ -1,0 +1,196 @@
+#include "mgdd/identify/simulation_residual.hpp"
+
+#include <cmath>
+#include <limits>
+
+#include <gtest/gtest.h>
+
+#include "mgdd/common/random.hpp"
+#include "mgdd/optimize/least_squares.hpp"
+#include "support/no_alloc.hpp"
+
+namespace mgdd::identify {
+namespace {
+
+using Eigen::MatrixXd;
+using Eigen::VectorXd;
+
+// A user's own functor: a driven pendulum, x'' = gain u - damping x' - stiffness sin(x), read with an offset.
+struct Pendulum {
+  static constexpr int n_states = 2;
+  static constexpr int n_inputs = 1;
+  static constexpr int n_parameters = 4;
+
+  template <class T>
+  Values<T, 2> derivative(const Values<T, 4>& p, const Values<T, 2>& x, const Values<double, 1>& u) const noexcept {
+    using std::sin;
+    return {x[1], p[0] * u[0] - p[1] * x[1] - p[2] * sin(x[0])};
+  }
+  template <class T>
+  T output(const Values<T, 4>& p, const Values<T, 2>& x, const Values<double, 1>&) const noexcept {
+    return x[0] + p[3];
+  }
+};
+static_assert(Ode<Pendulum> && StepModel<Rk4<Pendulum>> && !HasStart<Rk4<Pendulum>>);
+
+// First-order lag with its exact discrete step; starts where the parameter says.
+struct Lag {
+  static constexpr int n_states = 1;
+  static constexpr int n_inputs = 1;
+  static constexpr int n_parameters = 3;  // gain, time constant [s], start
+
+  template <class T>
+  Values<T, 1> step(const Values<T, 3>& p, const Values<T, 1>& x, const Values<double, 1>& u,
+                    double dt_s) const noexcept {
+    using std::exp;
+    const T keep = exp(-dt_s / p[1]);
+    return {keep * x[0] + (1.0 - keep) * (p[0] * u[0])};
+  }
+  template <class T>
+  T output(const Values<T, 3>&, const Values<T, 1>& x, const Values<double, 1>&) const noexcept {
+    return x[0];
+  }
+  template <class T>
+  Values<T, 1> start(const Values<T, 3>& p, const Values<T, 1>&) const noexcept {
+    return {p[2]};
+  }
+};
+static_assert(StepModel<Lag> && HasStart<Lag>);
+
+constexpr Values<double, 4> pendulum_truth{3.0, 0.4, 2.0, 0.1};
+
+SimulationRecord pendulum_record(std::uint64_t seed, std::size_t n, double noise = 0.0) {
+  SimulationRecord record{
+      .dt_s = 0.02, .input = {}, .output = {}, .start = {0.2, -0.1}, .free_start = {}, .weight = {}};
+  const Rk4<Pendulum> model{};
+  Values<double, 2> x{0.2, -0.1};
+  for (std::size_t k = 0; k < n; ++k) {
+    const Values<double, 1> u{2.0 * random::uniform(seed, 0, k / 20) - 1.0};
+    record.input.push_back(u[0]);
+    record.output.push_back(model.output<double>(pendulum_truth, x, u) + noise * random::normal(seed, 1, k));
+    x = model.step<double>(pendulum_truth, x, u, record.dt_s);
+  }
+  return record;
+}
+
+template <class Residual>
+double largest_difference_error(Residual& residual, const VectorXd& x) {
+  VectorXd r(residual.n_residuals()), up = r, down = r;
+  MatrixXd j(residual.n_residuals(), residual.n_unknowns());
+  EXPECT_TRUE(residual(x, r, &j));
+  double worst = 0.0;
+  for (Eigen::Index i = 0; i < x.size(); ++i) {
+    const double h = 1e-5 * std::max(1.0, std::abs(x[i]));
+    VectorXd moved = x;
+    moved[i] = x[i] + h;
+    EXPECT_TRUE(residual(moved, up, nullptr));
+    moved[i] = x[i] - h;
+    EXPECT_TRUE(residual(moved, down, nullptr));
+    worst = std::max(worst, ((up - down) / (2.0 * h) - j.col(i)).norm() / j.col(i).norm());
+  }
+  return worst;
+}
+
+TEST(SimulationResidual, SensitivitiesAgreeWithCentralDifferences) {
+  std::vector<SimulationRecord> records{pendulum_record(1, 300), pendulum_record(2, 200)};
+  records[0].free_start = {0, 1};
+  records[1].free_start = {1};
+  records[1].skip = 30;
+  records[1].sigma = 0.05;
+  records[1].weight.assign(200, 0.5);
+  SimulationResidual residual(Rk4<Pendulum>{{}, 2}, {2.5, 0.5, 1.5, 0.0}, {0, 1, 2, 3}, records);
+  EXPECT_EQ(residual.n_unknowns(), 7);
+  EXPECT_EQ(residual.n_residuals(), 300 + 170);
+  EXPECT_LT(largest_difference_error(residual, residual.start()), 1e-8);
+}
+
+TEST(SimulationResidual, AnyNumberOfUnknownsGivesTheSameColumns) {
+  // One to six free columns pass through different dual widths; a column never depends on its neighbours.
+  auto record = pendulum_record(3, 100);
+  record.free_start = {0, 1};
+  SimulationResidual all(Rk4<Pendulum>{}, pendulum_truth, {0, 1, 2, 3}, {record});
+  VectorXd r(all.n_residuals());
+  MatrixXd j(all.n_residuals(), 6);
+  ASSERT_TRUE(all(all.start(), r, &j));
+  record.free_start = {};
+  for (std::size_t p = 0; p < 4; ++p) {
+    SimulationResidual one(Rk4<Pendulum>{}, pendulum_truth, {p}, {record});
+    MatrixXd single(one.n_residuals(), 1);
+    ASSERT_TRUE(one(one.start(), r, &single));
+    EXPECT_LT((single.col(0) - j.col(static_cast<Eigen::Index>(p))).norm(), 1e-13 * single.norm());
+  }
+}
+
+TEST(SimulationResidual, ALinearLagMatchesItsClosedFormAndStartsWhereItsParameterSays) {
+  SimulationRecord record{.dt_s = 0.01,
+                          .input = std::vector<double>(200, 1.0),
+                          .output = std::vector<double>(200, 0.0),
+                          .start = {0.0},
+                          .free_start = {},
+                          .weight = {}};
+  SimulationResidual residual(Lag{}, {2.0, 0.3, 0.5}, {0, 1, 2}, {record});
+  VectorXd y(200);
+  MatrixXd j(200, 3);
+  ASSERT_TRUE(residual(residual.start(), y, &j));
+  for (Eigen::Index k = 0; k < 200; ++k) {
+    const double t = 0.01 * static_cast<double>(k);
+    const double e = std::exp(-t / 0.3);
+    EXPECT_NEAR(y[k], 2.0 + (0.5 - 2.0) * e, 1e-13);
+    EXPECT_NEAR(j(k, 0), 1.0 - e, 1e-13);
+    EXPECT_NEAR(j(k, 1), (0.5 - 2.0) * e * t / 0.09, 1e-12);
+    EXPECT_NEAR(j(k, 2), e, 1e-13);
+  }
+}
+
+TEST(SimulationResidual, AUsersFunctorIsFittedByLeastSquares) {
+  auto record = pendulum_record(4, 1500, 0.01);
+  record.start = {record.output[0], 0.0};
+  record.free_start = {0, 1};
+  record.sigma = 0.01;
+  SimulationResidual residual(Rk4<Pendulum>{}, {2.0, 0.2, 1.0, 0.0}, {0, 1, 2, 3}, {record});
+  std::vector<optimize::Parameter> unknowns{{"gain", 0.1, 20.0, true},      {"damping", 0.01, 5.0, true},
+                                            {"stiffness", 0.1, 20.0, true}, {"offset", -1.0, 1.0},
+                                            {"angle_0", -3.0, 3.0},         {"rate_0", -3.0, 3.0}};
+  const auto fit = optimize::LeastSquares(unknowns, residual.n_residuals()).solve(residual, residual.start());
+  ASSERT_TRUE(fit.success()) << fit.brief();
+  EXPECT_NEAR(fit.rmse, 1.0, 0.05);
+  for (Eigen::Index i = 0; i < 4; ++i)
+    EXPECT_NEAR(fit.values[i], pendulum_truth[static_cast<std::size_t>(i)], 4.0 * fit.standard_error[i]);
+}
+
+TEST(SimulationResidual, EvaluatesWithoutTheHeapAndRefusesAnEscape) {
+  auto record = pendulum_record(5, 200);
+  record.free_start = {0, 1};
+  SimulationResidual residual(Rk4<Pendulum>{}, pendulum_truth, {0, 1, 2, 3}, {record});
+  static_assert(noexcept(residual(std::declval<const VectorXd&>(), std::declval<VectorXd&>(), nullptr)));
+  VectorXd x = residual.start(), r(200);
+  MatrixXd j(200, 6);
+  const test_support::AllocationCounter counter;
+  EXPECT_TRUE(residual(x, r, &j));
+  EXPECT_TRUE(residual(x, r, nullptr));
+  EXPECT_EQ(counter.count(), 0U);
+  x[1] = -1e6;  // explodes under a fixed step
+  EXPECT_FALSE(residual(x, r, &j));
+  EXPECT_FALSE(residual(x, r, nullptr));
+}
+
+TEST(SimulationResidual, NamesWhatDoesNotBelongTogether) {
+  const auto build = [](auto change, std::vector<std::size_t> free = {0}) {
+    auto record = pendulum_record(6, 50);
+    change(record);
+    return SimulationResidual(Rk4<Pendulum>{}, pendulum_truth, std::move(free), {record});
+  };
+  EXPECT_THROW(build([](SimulationRecord& r) { r.input.pop_back(); }), ShapeError);
+  EXPECT_THROW(build([](SimulationRecord& r) { r.start.pop_back(); }), ShapeError);
+  EXPECT_THROW(build([](SimulationRecord& r) { r.skip = 50; }), ShapeError);
+  EXPECT_THROW(build([](SimulationRecord& r) { r.dt_s = 0.0; }), ParameterError);
+  EXPECT_THROW(build([](SimulationRecord& r) { r.sigma = -1.0; }), ParameterError);
+  EXPECT_THROW(build([](SimulationRecord& r) { r.free_start = {2}; }), ParameterError);
+  EXPECT_THROW(build([](SimulationRecord& r) { r.output[7] = std::numeric_limits<double>::infinity(); }),
+               ParameterError);
+  EXPECT_THROW(build([](SimulationRecord&) {}, {1, 1}), ParameterError);
+  EXPECT_EQ(build([](SimulationRecord&) {}).n_unknowns(), 1);
+}
+
+}  // namespace
+}  // namespace mgdd::identify

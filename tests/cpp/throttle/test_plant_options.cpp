@@ -1,0 +1,143 @@
+// Every combination of options: nothing allocates or throws, numbers stay bounded, lanes hold the bits of plain code.
+#include <gtest/gtest.h>
+
+#include <cmath>
+#include <cstddef>
+#include <limits>
+#include <string>
+#include <vector>
+
+#include "mgdd/common/error.hpp"
+#include "mgdd/common/random.hpp"
+#include "mgdd/throttle/simulation.hpp"
+#include "support/no_alloc.hpp"
+#include "support/throttle_case.hpp"
+
+namespace mgdd::throttle {
+namespace {
+
+static_assert(noexcept(std::declval<const ThrottlePlant&>().step(std::declval<ThrottleState&>(),
+                                                                 std::declval<const ThrottleInput&>())));
+static_assert(noexcept(simulate(std::declval<const ThrottlePlant&>(), {}, 1, std::declval<ThrottleState&>(), {})));
+static_assert(std::is_trivially_copyable_v<ThrottleState>);
+
+constexpr Friction all_frictions[] = {Friction::coulomb, Friction::stiction, Friction::stribeck,
+                                      Friction::karnopp, Friction::tanh,     Friction::lugre};
+constexpr Backlash all_backlashes[] = {Backlash::none, Backlash::compliance, Backlash::hysteresis};
+
+template <class Visit>
+void every_combination(Visit visit) {
+  for (const Friction friction : all_frictions) {
+    for (const Backlash backlash : all_backlashes) {
+      for (const Bridge bridge : {Bridge::brake, Bridge::open}) {
+        for (const double inductance : {0.0, 1.5}) {
+          for (const double air : {0.0, 10.0}) {
+            Throttle t;
+            t.stiction_nm = 0.31;
+            t.friction = friction;
+            t.backlash = backlash;
+            t.inductance_mh = inductance;
+            t.pressure_drop_kpa = air;
+            t.dead_band = 0.02;
+            t.driver_drop_v = 0.5;
+            visit(t, bridge);
+          }
+        }
+      }
+    }
+  }
+}
+
+std::vector<double> rough_duty(std::size_t n) {
+  std::vector<double> duty(n);
+  for (std::size_t k = 0; k < n; ++k) {
+    const auto i = static_cast<double>(k);
+    duty[k] = k % 97 < 10 ? 0.0 : 0.9 * std::sin(0.05 * i) * std::cos(0.003 * i);
+  }
+  return duty;
+}
+
+TEST(ThrottleOptions, NoStepAllocates) {
+  const std::vector<double> duty = rough_duty(1000);
+  every_combination([&](const Throttle& t, Bridge bridge) {
+    for (const double step_s : {1e-4, 1e-3}) {
+      const ThrottlePlant plant(t, step_s);
+      ThrottleState state = at_rest(30.0);
+      std::vector<double> angle(duty.size());
+      ThrottleColumns columns;
+      columns.angle_deg = angle;
+      const ThrottleSignals signals{.duty = duty, .bridge = bridge};
+      const test_support::AllocationCounter counter;
+      simulate(plant, signals, 10, state, columns);
+      ASSERT_EQ(counter.count(), 0U);
+      for (const double a : angle)
+        ASSERT_TRUE(a > -2.0 && a < 92.0) << a;
+    }
+  });
+}
+
+TEST(ThrottleOptions, LanesHoldTheBitsOfThePlainCode) {
+  const std::vector<double> duty = rough_duty(300);
+  std::vector<double> supply(duty.size());
+  std::vector<double> air(duty.size());
+  for (std::size_t k = 0; k < duty.size(); ++k) {
+    supply[k] = 12.0 + std::sin(0.1 * static_cast<double>(k));
+    air[k] = -0.1 * std::cos(0.02 * static_cast<double>(k));
+  }
+  every_combination([&](const Throttle& base, Bridge bridge) {
+    const ThrottleSignals signals{duty, supply, air, bridge};
+    std::vector<ThrottleCase> cases;
+    for (int i = 0; i < 11; ++i) {  // one full set of lanes and a part of another
+      Throttle t = base;
+      t.coulomb_nm *= 0.7 + 0.02 * i;
+      t.preload_above_nm *= 1.0 + 0.05 * i;
+      t.inertia_kgm2 *= 1.0 + 0.03 * i;
+      cases.push_back({t, at_rest(5.0 + 7.0 * i)});
+    }
+    const std::vector<double> many = simulate_many(cases, signals, 10, 1e-4);
+    for (std::size_t i = 0; i < cases.size(); ++i) {
+      ThrottleState state = cases[i].start;
+      std::vector<double> angle(duty.size());
+      ThrottleColumns columns;
+      columns.angle_deg = angle;
+      simulate(ThrottlePlant(cases[i].throttle), signals, 10, state, columns);
+      for (std::size_t k = 0; k < duty.size(); ++k) {
+        ASSERT_EQ(many[i * duty.size() + k], angle[k])
+            << "case " << i << " sample " << k << " friction " << name_of(friction_names(), base.friction);
+      }
+    }
+  });
+}
+
+TEST(ThrottleOptions, BadParametersAreNamedAndGoodOnesPassAfterwards) {
+  const auto message = [](const Throttle& t) -> std::string {
+    try {
+      validate(t);
+    } catch (const ParameterError& error) {
+      return error.what();
+    }
+    return "";
+  };
+  for (const Field& field : fields()) {
+    Throttle t;
+    t.*(field.member) = std::numeric_limits<double>::quiet_NaN();
+    EXPECT_EQ(message(t).rfind(std::string(field.info.name) + " = nan", 0), 0U) << message(t);
+  }
+  Throttle t;
+  t.limp_home_deg = 95.0;
+  EXPECT_NE(message(t).find("between closed_deg = 0 and open_deg = 90"), std::string::npos) << message(t);
+  t = {};
+  t.friction = Friction::stribeck;
+  t.stiction_nm = 0.1;
+  EXPECT_NE(message(t).find("stiction_nm = 0.1"), std::string::npos) << message(t);
+  t.friction = Friction::coulomb;
+  EXPECT_EQ(message(t), "");
+  EXPECT_THROW(ThrottlePlant(Throttle{}, 0.01), ParameterError);
+  EXPECT_THROW(steps_per_sample(1e-3, 3e-4), ParameterError);
+  EXPECT_EQ(steps_per_sample(1e-3, 1e-4), 10U);
+  const std::vector<double> duty{0.0, 1.2};
+  EXPECT_THROW(validate(ThrottleSignals{.duty = duty}), DataError);
+}
+
+}  // namespace
+}  // namespace mgdd::throttle
