@@ -299,7 +299,7 @@ def staircase(
     --------
     >>> from mgdd.identify import staircase
     >>> stairs = staircase(offset=0.0, amplitude=0.3)
-    >>> float(stairs["time_s"][-1]), round(float(stairs["duty"].max()), 9)
+    >>> round(float(stairs["time_s"][-1]), 6), round(float(stairs["duty"].max()), 9)
     (30.249, 0.3)
     """
     _check_swing(offset, amplitude)
