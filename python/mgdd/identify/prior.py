@@ -18,6 +18,10 @@ __all__ = ["DutyGroups", "Prior", "prior_of"]
 
 _TRAVEL_DEG = (0.0, 90.0)
 _MARGIN_DEG = 1.0
+_PW_R = (
+    *("above_preload_duty", "below_preload_duty", "above_spring_duty_per_deg", "below_spring_duty_per_deg"),
+    *("above_coulomb_duty", "below_coulomb_duty"),
+)
 # Preload plus friction of a common throttle at 12 V, for models that name neither.
 _SWING = 0.3
 
@@ -110,10 +114,24 @@ def _of_model(model: Any) -> Prior:
     def run(time: NDArray[np.float64], duty: NDArray[np.float64], start: float) -> Mapping[str, NDArray[np.float64]]:
         return _columns(model.simulate(time, duty, start_deg=start), time.size)
 
+    groups = None
+    if all(name in values for name in _PW_R):
+        above, below, spring_above, spring_below, *coulomb = (float(values[name]) for name in _PW_R)
+        groups = DutyGroups(
+            preload_above=above,
+            preload_below=below,
+            spring_above_per_deg=spring_above,
+            spring_below_per_deg=spring_below,
+            coulomb=max(coulomb),
+        )
     return Prior(
         simulate=run,
         limp_home_deg=values.get("limp_home_deg"),
-        stops_deg=(values.get("closed_deg", _TRAVEL_DEG[0]), values.get("open_deg", _TRAVEL_DEG[1])),
+        stops_deg=(
+            float(getattr(model, "closed_deg", values.get("closed_deg", _TRAVEL_DEG[0]))),
+            float(getattr(model, "open_deg", values.get("open_deg", _TRAVEL_DEG[1]))),
+        ),
+        groups=groups,
     )
 
 
