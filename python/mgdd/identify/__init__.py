@@ -7,7 +7,9 @@ from mgdd.identify.excitation import amplitude_random_steps, chirp, multisine, p
 from mgdd.identify.excitation_check import ExcitationCheck, check_excitation
 from mgdd.identify.excitation_design import design_excitation
 from mgdd.identify.metrics import ResidualTests, fit_percent, mse, residual_tests, rmse, vaf_percent
+from mgdd.identify.online_update import OnlineUpdate
 from mgdd.identify.profile import WallHeatProfile, wall_heat_profile
+from mgdd.identify.pseudo_wiener_fit import fit_pseudo_wiener
 from mgdd.identify.random_steps import random_step_records
 from mgdd.identify.record_content import RecordContent
 from mgdd.identify.records import CylinderFit, LoadFit
@@ -32,6 +34,7 @@ __all__ = [
     "ExcitationCheck",
     "FittedParameters",
     "LoadFit",
+    "OnlineUpdate",
     "RecordContent",
     "ResidualTests",
     "SensorLag",
@@ -49,6 +52,7 @@ __all__ = [
     "correlation_dataset",
     "design_excitation",
     "fit_cylinder",
+    "fit_pseudo_wiener",
     "fit_percent",
     "fit_surrogate",
     "mse",
