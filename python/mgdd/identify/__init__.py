@@ -9,7 +9,7 @@ from mgdd.identify.excitation_design import design_excitation
 from mgdd.identify.metrics import ResidualTests, fit_percent, mse, residual_tests, rmse, vaf_percent
 from mgdd.identify.online_update import OnlineUpdate
 from mgdd.identify.profile import WallHeatProfile, wall_heat_profile
-from mgdd.identify.pseudo_wiener_fit import fit_pseudo_wiener
+from mgdd.identify.pseudo_wiener_fit import PseudoWienerFit, fit_pseudo_wiener
 from mgdd.identify.random_steps import random_step_records
 from mgdd.identify.record_content import RecordContent
 from mgdd.identify.records import CylinderFit, LoadFit
@@ -35,6 +35,7 @@ __all__ = [
     "FittedParameters",
     "LoadFit",
     "OnlineUpdate",
+    "PseudoWienerFit",
     "RecordContent",
     "ResidualTests",
     "SensorLag",
