@@ -67,5 +67,6 @@ void bind_bench(py::module_& m);
 void bind_loop(py::module_& m);
 void bind_trace(py::module_& m);
 void bind_identify(py::module_& m);
+void bind_identify_throttle(py::module_& m);
 
 }  // namespace mgdd::bindings

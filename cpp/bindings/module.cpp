@@ -20,6 +20,7 @@ PYBIND11_MODULE(_core, m) {
   bind_performance(m);
   bind_trace(m);
   bind_identify(m);
+  bind_identify_throttle(m);
   bind_bench(m);
   bind_loop(m);
 }
