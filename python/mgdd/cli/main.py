@@ -11,7 +11,7 @@ import sys
 from collections.abc import Sequence
 
 from mgdd import _core
-from mgdd.cli import demo, doctor, engine, study
+from mgdd.cli import demo, doctor, engine, study, throttle
 from mgdd.errors import ConvergenceError, Error
 
 __all__ = ["main"]
@@ -25,6 +25,7 @@ examples:
   mgdd demo
   mgdd engine simulate --preset puma_single --soc-cad -6 --json
   mgdd engine optimum --limit p_max_bar=95
+  mgdd throttle simulate --preset P1 --duty 0.6 --json
   mgdd study --list
 """
 
@@ -91,6 +92,7 @@ def _parser() -> argparse.ArgumentParser:
     commands = parser.add_subparsers(title="commands", metavar="COMMAND")
     demo.add(commands)
     engine.add(commands)
+    throttle.add(commands)
     study.add(commands)
     doctor.add(commands)
     return parser
