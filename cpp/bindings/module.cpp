@@ -23,6 +23,7 @@ PYBIND11_MODULE(_core, m) {
   bind_throttle(m);
   bind_throttle_step(m);
   bind_identify(m);
+  bind_identify_throttle(m);
   bind_bench(m);
   bind_loop(m);
 }
