@@ -26,6 +26,7 @@ from mgdd.identify.surrogate_engine import SurrogateEngine
 from mgdd.identify.surrogate_fit import fit_surrogate
 from mgdd.identify.surrogate_optimum import SurrogateOptimum
 from mgdd.identify.throttle_fit import FittedParameters, ThrottleFit, ThrottleModel
+from mgdd.identify.throttle_fits import load_throttle_model
 from mgdd.identify.throttle_front import identify_throttle
 from mgdd.identify.throttle_validation import (
     ThrottleValidation,
@@ -66,8 +67,9 @@ __all__ = [
     "fit_percent",
     "fit_smooth_throttle",
     "fit_surrogate",
-    "identify_throttle",
     "fit_throttle",
+    "identify_throttle",
+    "load_throttle_model",
     "mse",
     "multisine",
     "n_step_rms",
