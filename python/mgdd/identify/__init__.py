@@ -14,7 +14,9 @@ from mgdd.identify.first_principle import (
 )
 from mgdd.identify.metrics import ResidualTests, fit_percent, mse, residual_tests, rmse, vaf_percent
 from mgdd.identify.ode_fit import OdeFit, OdeModel, fit_ode
+from mgdd.identify.online_update import OnlineUpdate
 from mgdd.identify.profile import WallHeatProfile, wall_heat_profile
+from mgdd.identify.pseudo_wiener_fit import fit_pseudo_wiener
 from mgdd.identify.random_steps import random_step_records
 from mgdd.identify.record_content import RecordContent
 from mgdd.identify.records import CylinderFit, LoadFit
@@ -45,6 +47,7 @@ __all__ = [
     "LoadFit",
     "OdeFit",
     "OdeModel",
+    "OnlineUpdate",
     "RecordContent",
     "ResidualTests",
     "SensorLag",
@@ -65,6 +68,7 @@ __all__ = [
     "fit_cylinder",
     "fit_ode",
     "fit_percent",
+    "fit_pseudo_wiener",
     "fit_smooth_throttle",
     "fit_surrogate",
     "fit_throttle",
