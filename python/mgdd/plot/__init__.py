@@ -15,6 +15,7 @@ from mgdd.plot.learning import learning
 from mgdd.plot.seeking import seeking
 from mgdd.plot.sensors import sensors
 from mgdd.plot.throttle import free_run, holding_duty
+from mgdd.plot.throttle_run import throttle_run
 from mgdd.plot.timing import timing
 
 __all__ = [
@@ -30,6 +31,7 @@ __all__ = [
     "residual_correlation",
     "seeking",
     "sensors",
+    "throttle_run",
     "timing",
     "wall_heat_profile",
 ]

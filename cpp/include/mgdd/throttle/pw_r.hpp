@@ -20,8 +20,8 @@ enum class Switching {
 };
 enum class DryFriction {
   set_valued,  ///< sticks exactly (proximal step)
-  /// Smooth, for gradients: under a load of a share r of the friction it creeps at w_e atanh(r) (half: 0.55 w_e); the
-  /// level is right within 0.5 % above 3 w_e.
+  /// Smooth, for gradients: under a load of a share r of the friction it creeps at up to w_e atanh(r) (half: 0.55 w_e);
+  /// the level is right within 0.5 % above 3 w_e.
   tanh,
 };
 
