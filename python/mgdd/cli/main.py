@@ -17,7 +17,10 @@ from mgdd.errors import ConvergenceError, Error
 __all__ = ["main"]
 
 EXIT_OK, EXIT_BAD_INPUT, EXIT_NO_CONVERGENCE, EXIT_INTERRUPTED, EXIT_PIPE = 0, 2, 3, 130, 141
-_ARGUMENT = re.compile(r"\b(pressure_unit|angle_unit|decimal|delimiter|firing_tdc_deg)=('[^']*'|[\d.]*)")
+_ARGUMENT = re.compile(
+    r"\b(pressure_unit|angle_unit|duty_unit|time_unit|decimal|delimiter|firing_tdc_deg|start_s|stop_s|step_s|duty|angle)"
+    r"=('[^']*'|[\d.]*)"
+)
 
 _EPILOG = """exit codes: 0 done, 2 bad input or usage, 3 no convergence or no feasible answer, 130 interrupted.
 
@@ -77,6 +80,8 @@ def main(argv: Sequence[str] | None = None) -> int:
 
 def _as_options(message: str) -> str:
     """Turn the remedies of the library, which name arguments, into those of the command line."""
+    message = message.replace("fit one side with two_sided=False", "leave --two-sided out for one side")
+    message = message.replace("angle_window_deg", "--angle-window-deg").replace("limp_home_deg =", "--limp-home-deg =")
     return _ARGUMENT.sub(lambda m: f"--{m[1].replace('_', '-')} {m[2]}".rstrip(), message)
 
 

@@ -18,6 +18,7 @@ from mgdd.identify.surrogate_engine import SurrogateEngine
 from mgdd.identify.surrogate_fit import fit_surrogate
 from mgdd.identify.surrogate_optimum import SurrogateOptimum
 from mgdd.identify.throttle_fit import FittedParameters, ThrottleFit, ThrottleModel
+from mgdd.identify.throttle_front import identify_throttle
 from mgdd.identify.throttle_validation import (
     ThrottleValidation,
     correlation_dataset,
@@ -51,6 +52,7 @@ __all__ = [
     "fit_cylinder",
     "fit_percent",
     "fit_surrogate",
+    "identify_throttle",
     "mse",
     "multisine",
     "n_step_rms",

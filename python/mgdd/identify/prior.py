@@ -10,6 +10,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from mgdd.errors import ParameterError
+from mgdd.throttle import Throttle, simulate
 
 if TYPE_CHECKING:
     from numpy.typing import NDArray
@@ -72,7 +73,7 @@ class Prior:
 
 def prior_of(model: Any) -> Prior:
     """Return what a throttle, a fitted model or a callable says of itself."""
-    if all(hasattr(model, name) for name in ("coulomb_nm", "limp_home_deg", "preload_above_nm")):
+    if isinstance(model, Throttle):
         return _of_throttle(model)
     if hasattr(model, "model") and hasattr(model, "report"):  # a ThrottleFit
         return prior_of(model.model)
@@ -83,17 +84,14 @@ def prior_of(model: Any) -> Prior:
     raise ParameterError(f"prior = {type(model).__name__}: must be a Throttle, a fitted model or a callable")
 
 
-def _of_throttle(throttle: Any) -> Prior:
+def _of_throttle(throttle: Throttle) -> Prior:
     def run(time: NDArray[np.float64], duty: NDArray[np.float64], start: float) -> Mapping[str, NDArray[np.float64]]:
-        from mgdd.throttle import simulate
-
-        result = simulate(throttle, duty=duty, time_s=time, start_deg=start)
+        result = simulate(throttle, duty, time_s=time, start_deg=start)
         return _columns({name: result[name].to_numpy() for name in ("angle_deg", "current_a")}, time.size)
 
-    stall = throttle.torque_constant_nm_per_a * (throttle.supply_v - throttle.driver_drop_v)
-    stall /= throttle.resistance_ohm + throttle.driver_resistance_ohm
+    stall = throttle.stall_torque_nm
     per_deg = math.radians(1.0) / stall
-    sliding = throttle.coulomb_nm
+    sliding = max(throttle.coulomb_nm, 0.0 if throttle.friction in ("coulomb", "tanh") else throttle.stiction_nm)
     return Prior(
         simulate=run,
         limp_home_deg=throttle.limp_home_deg,
@@ -109,7 +107,7 @@ def _of_throttle(throttle: Any) -> Prior:
 
 
 def _of_model(model: Any) -> Prior:
-    values = dict(model.parameters)
+    values: dict[str, float] = dict(model.parameters)
 
     def run(time: NDArray[np.float64], duty: NDArray[np.float64], start: float) -> Mapping[str, NDArray[np.float64]]:
         return _columns(model.simulate(time, duty, start_deg=start), time.size)

@@ -8,6 +8,7 @@ from __future__ import annotations
 
 from mgdd._core import Throttle
 from mgdd.throttle.characteristics import airflow_torque_nm, groups, holding_duty, linear_part, mass_flow_kg_per_s
+from mgdd.throttle.interop import initial_state, to_iosystem
 from mgdd.throttle.simulate import simulate, simulate_many, step_summary
 
 __all__ = [
@@ -15,9 +16,11 @@ __all__ = [
     "airflow_torque_nm",
     "groups",
     "holding_duty",
+    "initial_state",
     "linear_part",
     "mass_flow_kg_per_s",
     "simulate",
     "simulate_many",
     "step_summary",
+    "to_iosystem",
 ]
