@@ -68,6 +68,7 @@ void bind_loop(py::module_& m);
 void bind_trace(py::module_& m);
 void bind_identify(py::module_& m);
 void bind_throttle(py::module_& m);
+void bind_sensors(py::module_& m);
 void bind_throttle_step(py::module_& m);
 
 }  // namespace mgdd::bindings
