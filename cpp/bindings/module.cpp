@@ -21,6 +21,7 @@ PYBIND11_MODULE(_core, m) {
   bind_performance(m);
   bind_trace(m);
   bind_throttle(m);
+  bind_sensors(m);
   bind_throttle_step(m);
   bind_pseudo_wiener(m);
   bind_identify(m);
