@@ -7,7 +7,7 @@
 
 #include "mgdd/common/fast_tanh.hpp"
 
-#define MGDD_INLINE [[gnu::always_inline]] inline
+#define MGDD_LANE_INLINE [[gnu::always_inline]] inline
 
 namespace mgdd::identify {
 namespace {
@@ -23,14 +23,14 @@ struct Columns {
   V c[n];
 };
 template <class V, int n>
-MGDD_INLINE Columns<V, n> operator*(const V& a, const Columns<V, n>& b) noexcept {
+MGDD_LANE_INLINE Columns<V, n> operator*(const V& a, const Columns<V, n>& b) noexcept {
   Columns<V, n> r;
   for (int i = 0; i < n; ++i)
     r.c[i] = a * b.c[i];
   return r;
 }
 template <class V, int n>
-MGDD_INLINE Columns<V, n> operator+(const Columns<V, n>& a, const Columns<V, n>& b) noexcept {
+MGDD_LANE_INLINE Columns<V, n> operator+(const Columns<V, n>& a, const Columns<V, n>& b) noexcept {
   Columns<V, n> r;
   for (int i = 0; i < n; ++i)
     r.c[i] = a.c[i] + b.c[i];
@@ -49,11 +49,11 @@ struct Layout<double> {
 };
 
 template <class V>
-MGDD_INLINE void both_tanh(const V& a, const V& b, V& ta, V& tb) noexcept {
+MGDD_LANE_INLINE void both_tanh(const V& a, const V& b, V& ta, V& tb) noexcept {
   ta = fast_tanh(a);
   tb = fast_tanh(b);
 }
-MGDD_INLINE void both_tanh(const double& a, const double& b, double& ta, double& tb) noexcept {
+MGDD_LANE_INLINE void both_tanh(const double& a, const double& b, double& ta, double& tb) noexcept {
   const Lanes2 t = fast_tanh(Lanes2{a, b});
   ta = t[0];
   tb = t[1];
@@ -78,8 +78,8 @@ struct Stage {
 };
 
 template <class V>
-MGDD_INLINE void evaluate(const Constants<V>& c, const V& angle, const V& speed, const V& current, const V& drive,
-                          Stage<V>& f) noexcept {
+MGDD_LANE_INLINE void evaluate(const Constants<V>& c, const V& angle, const V& speed, const V& current, const V& drive,
+                               Stage<V>& f) noexcept {
   const V deflection = angle - c.limp_home;
   const V s = speed * c.over_width;
   const V z = deflection * c.over_preload_width;
@@ -107,7 +107,7 @@ struct Matrix3 {
 
 // w A for A = [0 1 0; a10 a11 torque; 0 -emf -resistance].
 template <class V>
-MGDD_INLINE Matrix3<V> times_a(const Matrix3<V>& w, const Stage<V>& f, const Constants<V>& c) noexcept {
+MGDD_LANE_INLINE Matrix3<V> times_a(const Matrix3<V>& w, const Stage<V>& f, const Constants<V>& c) noexcept {
   Matrix3<V> r;
   for (int i = 0; i < 3; ++i) {
     r.m[i][0] = w.m[i][1] * f.a10;
@@ -118,7 +118,7 @@ MGDD_INLINE Matrix3<V> times_a(const Matrix3<V>& w, const Stage<V>& f, const Con
 }
 
 template <class V>
-MGDD_INLINE Matrix3<V> plus_identity(double diagonal, double factor, const Matrix3<V>& a) noexcept {
+MGDD_LANE_INLINE Matrix3<V> plus_identity(double diagonal, double factor, const Matrix3<V>& a) noexcept {
   Matrix3<V> r;
   for (int i = 0; i < 3; ++i) {
     for (int j = 0; j < 3; ++j)
@@ -134,7 +134,7 @@ struct SumsOfOne {
   Lanes2 bb[2]{}, br{};
   double rr = 0.0;
 
-  MGDD_INLINE void add(const Lanes8& a, const Lanes2& b, double r) noexcept {
+  MGDD_LANE_INLINE void add(const Lanes8& a, const Lanes2& b, double r) noexcept {
     for (int i = 0; i < 8; ++i)
       aa[i] += a[i] * a;
     for (int i = 0; i < 2; ++i) {
@@ -151,7 +151,7 @@ template <class V>
 struct SumsOfLanes {
   V jj[55]{}, jr[10]{}, rr{};
 
-  MGDD_INLINE void add(const Columns<V, 8>& a, const Columns<V, 2>& b, const V& r) noexcept {
+  MGDD_LANE_INLINE void add(const Columns<V, 8>& a, const Columns<V, 2>& b, const V& r) noexcept {
     V row[10];
     for (int i = 0; i < 8; ++i)
       row[i] = a.c[i];
@@ -168,8 +168,8 @@ struct SumsOfLanes {
 };
 
 template <class V, class Sums>
-MGDD_INLINE void sweep(const throttle::SmoothPlant& plant, const SmoothThrottleRecord& record, std::size_t n_samples,
-                       const V (&p)[10], Sums& sums) noexcept {
+MGDD_LANE_INLINE void sweep(const throttle::SmoothPlant& plant, const SmoothThrottleRecord& record,
+                            std::size_t n_samples, const V (&p)[10], Sums& sums) noexcept {
   using Speed = typename Layout<V>::Speed;
   using Current = typename Layout<V>::Current;
   const double h = record.dt_s;
@@ -249,8 +249,8 @@ MGDD_INLINE void sweep(const throttle::SmoothPlant& plant, const SmoothThrottleR
 
 constexpr double squared_deg = deg_per_rad * deg_per_rad;
 
-MGDD_INLINE void one(const throttle::SmoothPlant& plant, const SmoothThrottleRecord& record, std::size_t n_samples,
-                     const std::array<double, 10>& parameters, NormalSums& out) noexcept {
+MGDD_LANE_INLINE void one(const throttle::SmoothPlant& plant, const SmoothThrottleRecord& record, std::size_t n_samples,
+                          const std::array<double, 10>& parameters, NormalSums& out) noexcept {
   double p[10];
   for (std::size_t i = 0; i < 10; ++i)
     p[i] = parameters[i];
@@ -271,8 +271,8 @@ MGDD_INLINE void one(const throttle::SmoothPlant& plant, const SmoothThrottleRec
   out.sum_squares = squared_deg * sums.rr;
 }
 
-MGDD_INLINE void lanes(const throttle::SmoothPlant& plant, const SmoothThrottleRecord& record, std::size_t n_samples,
-                       const std::array<double, 10>* parameters, NormalSums* out) noexcept {
+MGDD_LANE_INLINE void lanes(const throttle::SmoothPlant& plant, const SmoothThrottleRecord& record,
+                            std::size_t n_samples, const std::array<double, 10>* parameters, NormalSums* out) noexcept {
   Lanes8 p[10];
   for (std::size_t i = 0; i < 10; ++i) {
     for (std::size_t lane = 0; lane < 8; ++lane)

@@ -18,6 +18,9 @@ if TYPE_CHECKING:
 
 __all__ = ["add"]
 
+# A search that no step improves any more has ended too: stiction makes the last of the cost rough.
+_ENDED = ("stalled",)
+
 
 def add(verbs: Any) -> None:
     """Add both commands."""
@@ -66,7 +69,7 @@ def _identify(args: argparse.Namespace) -> None:
     emit(args, payload, text=f"{fit.summary()}\n\n{validation.summary()}")
     if args.figure:
         _draw(validation, args.figure, identify.correlation_dataset(fit.report))
-    if not fit.success:
+    if not fit.success and fit.status not in _ENDED:
         raise ConvergenceError(
             f"{args.file}: the fit has not converged ({fit.message}); excite more or fix a parameter"
         )

@@ -129,7 +129,7 @@ def open_questions(
     `swing` is the duty amplitude that moves the plate across limp-home [-]; `pairs` are correlated parameters of a fit.
     """
     lh = content.limp_home_deg
-    where = "" if math.isnan(lh) else f" ({lh:g} deg)"
+    where = "" if math.isnan(lh) else f" ({lh:.3g} deg)"
     ramp = f"a triangle of ±{swing:.2g} duty at {_TRIANGLE_HZ:g} Hz across limp-home{where}"
     out = []
     if content.travel_open_deg + content.travel_closed_deg < _LEAST_TRAVEL_DEG:
@@ -171,7 +171,9 @@ def open_questions(
         )
     if content.time_at_stops_s > 0.3 * content.duration_s:
         share = 100.0 * content.time_at_stops_s / content.duration_s
-        out.append(f"the plate rests on an end stop {share:.0f} % of the time, which tells nothing: lower the offset")
+        out.append(
+            f"the plate rests on an end stop {share:.0f} % of the time, which tells nothing: lower offset or amplitude"
+        )
     return tuple(out)
 
 
