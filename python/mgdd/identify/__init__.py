@@ -14,7 +14,9 @@ from mgdd.identify.first_principle import (
 )
 from mgdd.identify.metrics import ResidualTests, fit_percent, mse, residual_tests, rmse, vaf_percent
 from mgdd.identify.ode_fit import OdeFit, OdeModel, fit_ode
+from mgdd.identify.online_update import OnlineUpdate
 from mgdd.identify.profile import WallHeatProfile, wall_heat_profile
+from mgdd.identify.pseudo_wiener_fit import fit_pseudo_wiener
 from mgdd.identify.random_steps import random_step_records
 from mgdd.identify.record_content import RecordContent
 from mgdd.identify.records import CylinderFit, LoadFit
@@ -26,6 +28,8 @@ from mgdd.identify.surrogate_engine import SurrogateEngine
 from mgdd.identify.surrogate_fit import fit_surrogate
 from mgdd.identify.surrogate_optimum import SurrogateOptimum
 from mgdd.identify.throttle_fit import FittedParameters, ThrottleFit, ThrottleModel
+from mgdd.identify.throttle_fits import load_throttle_model
+from mgdd.identify.throttle_front import identify_throttle
 from mgdd.identify.throttle_validation import (
     ThrottleValidation,
     correlation_dataset,
@@ -43,6 +47,7 @@ __all__ = [
     "LoadFit",
     "OdeFit",
     "OdeModel",
+    "OnlineUpdate",
     "RecordContent",
     "ResidualTests",
     "SensorLag",
@@ -63,9 +68,12 @@ __all__ = [
     "fit_cylinder",
     "fit_ode",
     "fit_percent",
+    "fit_pseudo_wiener",
     "fit_smooth_throttle",
     "fit_surrogate",
     "fit_throttle",
+    "identify_throttle",
+    "load_throttle_model",
     "mse",
     "multisine",
     "n_step_rms",

@@ -108,9 +108,9 @@ def multisine(
     ParameterError
         As in `chirp`; less than one harmonic, more than there are odd ones, less than one period.
 
-    References
-    ----------
-    Schroeder (1970), Synthesis of low-peak-factor signals and binary sequences with low autocorrelation.
+    Notes
+    -----
+    Phase k of N is -pi k (k - 1)/N, Schroeder's for a flat spectrum.
 
     Examples
     --------
@@ -299,9 +299,10 @@ def staircase(
     --------
     >>> from mgdd.identify import staircase
     >>> stairs = staircase(offset=0.0, amplitude=0.3)
-    >>> float(stairs["time_s"][-1]), round(float(stairs["duty"].max()), 9)
+    >>> round(float(stairs["time_s"][-1]), 6), round(float(stairs["duty"].max()), 9)
     (30.249, 0.3)
     """
+    _check_swing(offset, amplitude)
     held = _hold(hold_s, step_s)
     if not (math.isfinite(rise) and rise > 0.0):
         raise ParameterError(f"rise = {rise:g}: must be > 0")
@@ -398,15 +399,19 @@ def _check_band(low_hz: float, high_hz: float, step_s: float) -> None:
         )
 
 
-def _signal(
-    kind: str, time: NDArray[np.float64], wave: NDArray[np.float64], offset: float, amplitude: float, **attrs: float
-) -> xr.Dataset:
+def _check_swing(offset: float, amplitude: float) -> None:
     if not (math.isfinite(offset) and math.isfinite(amplitude) and amplitude >= 0.0):
         raise ParameterError(f"offset = {offset:g}, amplitude = {amplitude:g}: must be finite, the amplitude >= 0")
     if abs(offset) + amplitude > 1.0 + 1e-12:
         raise ParameterError(
             f"amplitude = {amplitude:g}: with offset = {offset:g} the duty passes ±1; at most {1.0 - abs(offset):g}"
         )
+
+
+def _signal(
+    kind: str, time: NDArray[np.float64], wave: NDArray[np.float64], offset: float, amplitude: float, **attrs: float
+) -> xr.Dataset:
+    _check_swing(offset, amplitude)
     duty = np.clip(offset + amplitude * wave, -1.0, 1.0)
     labels = {"kind": kind, "offset": offset, "amplitude": amplitude, **attrs}
     return labelled_dataset({"time_s": ("time_s", time), "duty": ("time_s", duty)}, attrs=labels)

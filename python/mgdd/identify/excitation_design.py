@@ -80,9 +80,9 @@ def design_excitation(
 
     Examples
     --------
-    >>> from mgdd import presets, throttle
+    >>> from mgdd.throttle import Throttle
     >>> from mgdd.identify import design_excitation
-    >>> signal, check = design_excitation("chirp", throttle.load_preset("P1"), duration_s=4.0)
+    >>> signal, check = design_excitation("chirp", Throttle(), duration_s=4.0)
     >>> check.passed, 0.1 < signal.attrs["offset"] < 0.2
     (True, True)
     """

@@ -199,9 +199,9 @@ def residual_tests(residual: ArrayLike, duty: ArrayLike, *, lags: int = 25) -> R
     ShapeError
         Arrays of different shape.
 
-    References
-    ----------
-    Ljung (1999), System Identification: Theory for the User, section 16.6.
+    Notes
+    -----
+    A prediction that starts from the last noisy sample carries its noise: the residual then has -0.5 at lag 1.
 
     Examples
     --------

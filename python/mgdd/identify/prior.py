@@ -10,6 +10,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from mgdd.errors import ParameterError
+from mgdd.throttle import Throttle, simulate
 
 if TYPE_CHECKING:
     from numpy.typing import NDArray
@@ -18,6 +19,14 @@ __all__ = ["DutyGroups", "Prior", "prior_of"]
 
 _TRAVEL_DEG = (0.0, 90.0)
 _MARGIN_DEG = 1.0
+_PW_R = (
+    *("above_preload_duty", "below_preload_duty", "above_spring_duty_per_deg", "below_spring_duty_per_deg"),
+    *("above_coulomb_duty", "below_coulomb_duty"),
+)
+_GROUPS = (
+    *("beta_above_duty", "beta_below_duty", "kappa_above_duty_per_deg", "kappa_below_duty_per_deg"),
+    "delta_duty",
+)
 # Preload plus friction of a common throttle at 12 V, for models that name neither.
 _SWING = 0.3
 
@@ -68,7 +77,7 @@ class Prior:
 
 def prior_of(model: Any) -> Prior:
     """Return what a throttle, a fitted model or a callable says of itself."""
-    if all(hasattr(model, name) for name in ("coulomb_nm", "limp_home_deg", "preload_above_nm")):
+    if isinstance(model, Throttle):
         return _of_throttle(model)
     if hasattr(model, "model") and hasattr(model, "report"):  # a ThrottleFit
         return prior_of(model.model)
@@ -79,17 +88,14 @@ def prior_of(model: Any) -> Prior:
     raise ParameterError(f"prior = {type(model).__name__}: must be a Throttle, a fitted model or a callable")
 
 
-def _of_throttle(throttle: Any) -> Prior:
+def _of_throttle(throttle: Throttle) -> Prior:
     def run(time: NDArray[np.float64], duty: NDArray[np.float64], start: float) -> Mapping[str, NDArray[np.float64]]:
-        from mgdd.throttle import simulate
-
-        result = simulate(throttle, duty=duty, time_s=time, start_deg=start)
+        result = simulate(throttle, duty, time_s=time, start_deg=start)
         return _columns({name: result[name].to_numpy() for name in ("angle_deg", "current_a")}, time.size)
 
-    stall = throttle.torque_constant_nm_per_a * (throttle.supply_v - throttle.driver_drop_v)
-    stall /= throttle.resistance_ohm + throttle.driver_resistance_ohm
+    stall = throttle.stall_torque_nm
     per_deg = math.radians(1.0) / stall
-    sliding = throttle.coulomb_nm
+    sliding = max(throttle.coulomb_nm, 0.0 if throttle.friction in ("coulomb", "tanh") else throttle.stiction_nm)
     return Prior(
         simulate=run,
         limp_home_deg=throttle.limp_home_deg,
@@ -105,15 +111,30 @@ def _of_throttle(throttle: Any) -> Prior:
 
 
 def _of_model(model: Any) -> Prior:
-    values = dict(model.parameters)
+    values: dict[str, float] = dict(model.parameters)
 
     def run(time: NDArray[np.float64], duty: NDArray[np.float64], start: float) -> Mapping[str, NDArray[np.float64]]:
         return _columns(model.simulate(time, duty, start_deg=start), time.size)
 
+    groups = None
+    names = next((names for names in (_PW_R, _GROUPS) if all(name in values for name in names)), None)
+    if names is not None:
+        above, below, spring_above, spring_below, *coulomb = (float(values[name]) for name in names)
+        groups = DutyGroups(
+            preload_above=above,
+            preload_below=below,
+            spring_above_per_deg=spring_above,
+            spring_below_per_deg=spring_below,
+            coulomb=max(coulomb),
+        )
     return Prior(
         simulate=run,
         limp_home_deg=values.get("limp_home_deg"),
-        stops_deg=(values.get("closed_deg", _TRAVEL_DEG[0]), values.get("open_deg", _TRAVEL_DEG[1])),
+        stops_deg=(
+            float(getattr(model, "closed_deg", values.get("closed_deg", _TRAVEL_DEG[0]))),
+            float(getattr(model, "open_deg", values.get("open_deg", _TRAVEL_DEG[1]))),
+        ),
+        groups=groups,
     )
 
 

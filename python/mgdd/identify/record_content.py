@@ -15,9 +15,10 @@ if TYPE_CHECKING:
 
 __all__ = ["RecordContent", "open_questions", "record_content"]
 
-# A plate that moves: beyond the noise of a 12-bit sensor differentiated over 20 ms.
-_MOVING_DEG_PER_S = 5.0
+# Speed and travel are taken over 20 ms, travel with a play of 0.1 deg: beyond the noise of a 12-bit sensor.
 _SPEED_WINDOW_S = 0.02
+_PLAY_DEG = 0.1
+_LEAST_TRAVEL_DEG = 1.0
 _CROSSING_DEG = 0.5
 _STOP_DEG = 0.5
 _LEAST_SHARE = 0.05
@@ -37,8 +38,8 @@ class RecordContent:
         Range of the angle [deg].
     peak_speed_deg_per_s : float
         Highest speed, over 20 ms [deg/s].
-    time_moving_s, time_opening_s, time_closing_s : float
-        Time at more than 5 deg/s, and in each direction [s].
+    travel_open_deg, travel_closed_deg : float
+        Way that the plate went in each direction, noise left out [deg].
     time_above_s, time_below_s : float
         Time more than 0.5 deg above and below limp-home [s]; NaN if limp-home is unknown.
     limp_home_crossings : int
@@ -49,14 +50,20 @@ class RecordContent:
         Length [s].
     limp_home_deg : float
         As given, or NaN [deg].
+
+    Examples
+    --------
+    >>> from mgdd.identify import check_excitation, triangle
+    >>> check = check_excitation(triangle(offset=0.0, amplitude=0.2), lambda time, duty, start: 30.0 + 100.0 * duty)
+    >>> round(check.content.angle_high_deg, 6)
+    50.0
     """
 
     angle_low_deg: float
     angle_high_deg: float
     peak_speed_deg_per_s: float
-    time_moving_s: float
-    time_opening_s: float
-    time_closing_s: float
+    travel_open_deg: float
+    travel_closed_deg: float
     time_above_s: float
     time_below_s: float
     limp_home_crossings: int
@@ -76,6 +83,7 @@ def record_content(
     step = float(time[-1] - time[0]) / (time.size - 1)
     lag = max(1, min(round(_SPEED_WINDOW_S / step), time.size - 1))
     speed = (angle[lag:] - angle[:-lag]) / (lag * step)
+    opened, closed = _travel(angle, lag)
     above = below = math.nan
     crossings = 0
     if limp_home_deg is not None:
@@ -91,9 +99,8 @@ def record_content(
         angle_low_deg=float(angle.min()),
         angle_high_deg=float(angle.max()),
         peak_speed_deg_per_s=float(np.abs(speed).max()),
-        time_moving_s=float((np.abs(speed) > _MOVING_DEG_PER_S).sum()) * step,
-        time_opening_s=float((speed > _MOVING_DEG_PER_S).sum()) * step,
-        time_closing_s=float((speed < -_MOVING_DEG_PER_S).sum()) * step,
+        travel_open_deg=opened,
+        travel_closed_deg=closed,
         time_above_s=above,
         time_below_s=below,
         limp_home_crossings=crossings,
@@ -101,6 +108,17 @@ def record_content(
         duration_s=float(time[-1] - time[0]) + step,
         limp_home_deg=math.nan if limp_home_deg is None else limp_home_deg,
     )
+
+
+def _travel(angle: NDArray[np.float64], window: int) -> tuple[float, float]:
+    """Return the way up and the way down of the means over `window` samples, seen through a play."""
+    blocks = angle[: angle.size // window * window].reshape(-1, window).mean(axis=1).tolist()
+    held, up, down = blocks[0], 0.0, 0.0
+    for value in blocks:
+        moved = max(value - _PLAY_DEG, min(held, value + _PLAY_DEG)) - held
+        up, down = up + max(moved, 0.0), down - min(moved, 0.0)
+        held += moved
+    return up, down
 
 
 def open_questions(
@@ -111,19 +129,20 @@ def open_questions(
     `swing` is the duty amplitude that moves the plate across limp-home [-]; `pairs` are correlated parameters of a fit.
     """
     lh = content.limp_home_deg
-    where = "" if math.isnan(lh) else f" ({lh:g} deg)"
+    where = "" if math.isnan(lh) else f" ({lh:.3g} deg)"
     ramp = f"a triangle of ±{swing:.2g} duty at {_TRIANGLE_HZ:g} Hz across limp-home{where}"
     out = []
-    if content.time_moving_s < _LEAST_SHARE * min(content.duration_s, 1.0):
+    if content.travel_open_deg + content.travel_closed_deg < _LEAST_TRAVEL_DEG:
         return (
             (
                 "the plate hardly moves: nothing but a lower bound of the breakaway duty can be learned; drive it "
                 f"with {ramp}"
             ),
         )
-    one_way = min(content.time_opening_s, content.time_closing_s) < _LEAST_SHARE * content.time_moving_s
+    up, down = content.travel_open_deg, content.travel_closed_deg
+    one_way = min(up, down) < _LEAST_SHARE * max(up, down)
     if one_way:
-        way = "opens" if content.time_opening_s > content.time_closing_s else "closes"
+        way = "opens" if up > down else "closes"
         out.append(
             f"the plate only {way}: Coulomb torque and preload push the same way and are indistinguishable in "
             "this log; "
@@ -152,7 +171,9 @@ def open_questions(
         )
     if content.time_at_stops_s > 0.3 * content.duration_s:
         share = 100.0 * content.time_at_stops_s / content.duration_s
-        out.append(f"the plate rests on an end stop {share:.0f} % of the time, which tells nothing: lower the offset")
+        out.append(
+            f"the plate rests on an end stop {share:.0f} % of the time, which tells nothing: lower offset or amplitude"
+        )
     return tuple(out)
 
 

@@ -321,12 +321,17 @@ class ThrottleFit:
         }
         return FittedParameters(
             kind=self.kind,
-            values=self.parameters,
-            stderr={name: error for name, error in errors.items() if name in self.parameters},
+            values={**self.parameters, **self._travel()},
+            stderr={name: errors[own] for name in self.parameters if (own := _fitted_name(name, errors)) is not None},
             source=f"fitted to {self.source}",
             fit={name: value for name, value in figures.items() if value is not None},
             unidentifiable=self.unidentifiable,
         )
+
+    def _travel(self) -> dict[str, float]:
+        """Return the end stops of a model that does not count them among its parameters."""
+        ends = {name: getattr(self.model, name, None) for name in ("closed_deg", "open_deg")}
+        return {name: float(end) for name, end in ends.items() if end is not None and name not in self.parameters}
 
     def to_toml(self) -> str:
         """Write the parameters as TOML with units, standard errors and the name of the log.
@@ -392,6 +397,12 @@ class ThrottleFit:
         items = "".join(f"<li>{html.escape(finding)}</li>" for finding in extra)
         notes = f"<p>what this log cannot tell:</p><ul>{items}</ul>" if extra else ""
         return f"<div><p><b>{html.escape(self._headline())}</b></p>{self.report._repr_html_()}{notes}</div>"
+
+
+def _fitted_name(name: str, fitted: Mapping[str, float]) -> str | None:
+    """Return the fitted parameter that a model's parameter follows; sides that share one drop their prefix."""
+    shared = name.removeprefix("above_").removeprefix("below_")
+    return name if name in fitted else shared if shared in fitted else None
 
 
 def _text(value: str) -> str:

@@ -290,7 +290,7 @@ def validate_throttle(
     for horizon in horizons_s:
         _samples(horizon, step, time.size)
     run = free_run(own, log)
-    skip = round(DISCARD_S / step)
+    skip = discarded(log)
     measured, modelled = angle[skip:], run["model_deg"].to_numpy()[skip:]
     one = angle[1:] - np.asarray(own.predict(time, duty, angle, 1), dtype=np.float64)
     tests = residual_tests(one[skip:], duty[:-1][skip:])
@@ -330,6 +330,11 @@ def free_run(model: ThrottleModel, log: xr.Dataset) -> xr.Dataset:
         },
         attrs={"file": str(log.attrs.get("file", "log")), "kind": model.kind},
     )
+
+
+def discarded(log: xr.Dataset) -> int:
+    """Return how many samples at the start a figure of merit leaves out."""
+    return round(DISCARD_S / _step(log["time_s"].to_numpy()))
 
 
 def entangled(report: FitReport) -> tuple[tuple[str, str, float], ...]:

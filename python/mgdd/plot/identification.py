@@ -183,8 +183,8 @@ def correlation_matrix(correlation: xr.Dataset, *, ax: Axes | None = None) -> Ax
     values = correlation["correlation"].transpose("parameter", "other").to_numpy()
     n = len(names)
     ax = new_axes(ax, height=max(3.4, 1.6 + 0.42 * n))
+    ax.set_facecolor("#dddddd")
     image = ax.imshow(values, vmin=-1.0, vmax=1.0, cmap="RdBu_r")
-    image.cmap.set_bad("#dddddd")
     ax.figure.colorbar(image, ax=ax, label="correlation [-]", shrink=0.9)
     size = "small" if n <= 8 else "xx-small"
     for i in range(n):
