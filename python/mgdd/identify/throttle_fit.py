@@ -390,12 +390,12 @@ class ThrottleFit:
 
     def _notes(self) -> list[str]:
         extra = [finding for finding in self.findings if finding not in self.report.findings]
-        return ["", "what this log cannot tell:", *(f"  {finding}" for finding in extra)] if extra else []
+        return ["", "findings:", *(f"  {finding}" for finding in extra)] if extra else []
 
     def _repr_html_(self) -> str:
         extra = [finding for finding in self.findings if finding not in self.report.findings]
         items = "".join(f"<li>{html.escape(finding)}</li>" for finding in extra)
-        notes = f"<p>what this log cannot tell:</p><ul>{items}</ul>" if extra else ""
+        notes = f"<p>findings:</p><ul>{items}</ul>" if extra else ""
         return f"<div><p><b>{html.escape(self._headline())}</b></p>{self.report._repr_html_()}{notes}</div>"
 
 
