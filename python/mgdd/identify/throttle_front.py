@@ -99,7 +99,9 @@ def identify_throttle(
         log["time_s"].to_numpy(), log["angle_deg"].to_numpy(), limp_home_deg=home, stops_deg=known.stops_deg
     )
     asked = open_questions(content, swing=known.swing, pairs=entangled(fit.report))
-    findings = tuple(dict.fromkeys((*fit.findings, *asked)))
+    # The report names correlated pairs, too; here each comes with its remedy.
+    own = (text for text in fit.findings if not (text in fit.report.findings and ": correlation " in text))
+    findings = tuple(dict.fromkeys((*own, *asked)))
     return dataclasses.replace(
         fit,
         fit_percent_train=train,
