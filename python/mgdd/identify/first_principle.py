@@ -176,7 +176,7 @@ def fit_throttle(
     Duty and angle determine torques only in units of duty and inertia only as an acceleration per duty, so the
     unknowns are groups: tau = J/b, G = g/J, preload T_pt/g, stiffness k_s/g and friction T_d/g with g the stall torque
     per unit duty and b all viscous damping. A regression on the torque balance of the moving samples gives the start;
-    the free run is then fitted in stages (statics, dynamics, all), from `n_starts` starts. A side of limp-home the
+    the free run is then fitted in stages (dynamics, static groups, all), from `n_starts` starts. A side of limp-home the
     log does not visit keeps its start values and is named. With a resistance, a supply and one of inertia or torque
     constant the physical numbers are computed back (`physical_parameters`) and said in `findings`.
 
@@ -221,7 +221,7 @@ def fit_throttle(
 
     References
     ----------
-    Moreau (1988) for the friction step; Ljung (1999), section 5.2, for the output error.
+    Nielsen (1999) for the damping; Bates and Watts (1988), section 2.2, for the uncertainty.
 
     Examples
     --------
@@ -271,21 +271,20 @@ def fit_throttle(
     bounds = {parameter.name: parameter for parameter in _core.throttle_group_bounds()}
     for name, value in values.items():
         low, high = bounds[name].lower, bounds[name].upper
-        if name in (start or {}) or name in (fixed or {}):
-            if not low <= value <= high:
-                raise ParameterError(f"{name} = {value!r}: must be within [{low:g}, {high:g}]")
+        if (name in (start or {}) or name in (fixed or {})) and not low <= value <= high:
+            raise ParameterError(f"{name} = {value!r}: must be within [{low:g}, {high:g}]")
         values[name] = min(max(value, low), high)
     index = {name: i for i, name in enumerate(_NAMES)}
-    statics = [index[name] for name in free if name not in ("tau_s", "gain_deg_per_s2_per_duty", "electrical_s")]
+    static = [index[name] for name in free if name not in ("tau_s", "gain_deg_per_s2_per_duty", "electrical_s")]
     dynamics = [index[name] for name in free if name in ("tau_s", "gain_deg_per_s2_per_duty")]
     everything = [index[name] for name in free]
     if not everything:
         raise ParameterError("fixed: nothing is left to estimate")
-    stages = [
+    stages: list[tuple[list[int], list[int], float, float, int]] = [
         (part, [], fraction, tolerance, max_iterations)
         for part, fraction, tolerance in (
             (dynamics, 0.1, 1e-3),
-            (statics, 0.1, 1e-3),
+            (static, 0.1, 1e-3),
             (everything, 0.25, 1e-4),
             (everything, 1.0, cost_tolerance),
         )
@@ -380,8 +379,6 @@ def physical_parameters(
     >>> round(found["torque_constant_nm_per_a"], 4)
     0.2291
     """
-    if (inertia_kgm2 is None) == (torque_constant_nm_per_a is None):
-        raise ParameterError("inertia_kgm2, torque_constant_nm_per_a: give exactly one of them")
     known = {
         "resistance_ohm": resistance_ohm,
         "supply_v": supply_v,
@@ -391,13 +388,14 @@ def physical_parameters(
     for name, value in known.items():
         if value is not None and not (math.isfinite(value) and value > 0.0):
             raise ParameterError(f"{name} = {value!r}: must be > 0")
+    if (inertia_kgm2 is None) == (torque_constant_nm_per_a is None):
+        raise ParameterError("inertia_kgm2, torque_constant_nm_per_a: give exactly one of them")
     p = model.parameters
     gain = math.radians(p["gain_deg_per_s2_per_duty"])
-    if inertia_kgm2 is not None:
-        stall = gain * inertia_kgm2
-    else:
-        assert torque_constant_nm_per_a is not None
+    if torque_constant_nm_per_a is not None:
         stall = torque_constant_nm_per_a * supply_v / resistance_ohm
+    else:
+        stall = gain * float(inertia_kgm2 or math.nan)
     inertia = stall / gain
     constant = stall * resistance_ohm / supply_v
     return {

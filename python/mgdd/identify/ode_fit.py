@@ -204,7 +204,7 @@ def fit_ode(
 
     References
     ----------
-    Ljung (1999), System Identification, section 5.2, for the output-error form.
+    Nielsen (1999) for the damping; Bates and Watts (1988), section 2.2, for the uncertainty.
 
     Examples
     --------
@@ -352,7 +352,7 @@ def _simulate(
         rows = derivative(t, at, u, p)
         if isinstance(rows, np.ndarray) and rows.shape == at.shape:
             return rows
-        stacked = np.stack([np.broadcast_to(row, at.shape[1:]) for row in rows])  # type: ignore[arg-type,union-attr]
+        stacked = np.stack([np.broadcast_to(row, at.shape[1:]) for row in rows])  # type: ignore[union-attr]
         if stacked.shape != at.shape:
             raise ShapeError(f"derivative returned shape {stacked.shape}: must be {at.shape}, one row per state")
         return stacked

@@ -162,7 +162,7 @@ def fit_smooth_throttle(
 
     References
     ----------
-    Loh et al. (2013) for the friction and preload terms; Nielsen (1999) for the damping.
+    Nielsen (1999) for the damping; Moré (1978) for the scaling; Griewank and Walther (2008) for the sensitivities.
 
     Examples
     --------

@@ -7,6 +7,7 @@ a `StudyResult`.
 from __future__ import annotations
 
 from mgdd.studies.base import StudyResult
+from mgdd.studies.ch2_throttle_characteristics import run_ch2_throttle_characteristics
 from mgdd.studies.ch3_optimizers import run_ch3_optimizers
 from mgdd.studies.ch4_esc import run_ch4_esc
 from mgdd.studies.ch4_sensors import run_ch4_sensors
@@ -20,6 +21,7 @@ __all__ = [
     "available_studies",
     "best_timing",
     "compare_laws",
+    "run_ch2_throttle_characteristics",
     "run_ch3_optimizers",
     "run_ch4_esc",
     "run_ch4_sensors",

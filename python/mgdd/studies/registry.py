@@ -14,6 +14,7 @@ __all__ = ["available_studies", "run_study"]
 # One line per study: "my-name" is run_my_name in mgdd.studies.my_name, imported when it is run.
 _TITLES = {
     "measured-traces": "calibrate a cycle model to four measured traces and find their best timing",
+    "ch2-throttle-characteristics": "holding-duty hysteresis, rate dependence and air flow of a throttle",
     "ch3-optimizers": "every seeker on the same engine, noise, start and budget",
     "ch4-sensors": "NOx analyser, fast sensor and soft sensor, steady and in transients",
     "ch4-esc": "what a late NOx analyser does to extremum seeking, and three cures",

@@ -1,7 +1,7 @@
 // Hyperbolic tangent without branches or tables, for a double or a vector of them (SIMD lanes). Dimensionless;
 // noexcept, no heap. Relative error below 1e-15 for every finite argument; NaN stays NaN. Only + - * / and bit shifts,
 // so that every lane width gives the same bits. Method: tanh x = e/(e + 2) with e = exp(2|x|) - 1, range reduction by
-// ln 2 in two parts (Cody and Waite 1980, chapter 6) and the Taylor polynomial of exp(r) - 1 on |r| <= ln(2)/2, whose
+// ln 2 in two parts and the Taylor polynomial of exp(r) - 1 on |r| <= ln(2)/2, whose
 // first left-out term is 5e-16 of the result.
 #pragma once
 

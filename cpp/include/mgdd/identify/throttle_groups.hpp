@@ -1,7 +1,7 @@
 // First-principle throttle in the groups that duty and angle determine, one number per group, both sides of limp-home:
 // tau = J/b, G = g/J, beta = T_pt/g, kappa = k_s/g, delta = T_d/g, limp-home angle and electrical time L/R. Set-valued
 // friction solved exactly in each step; derivatives by duals, zero while the plate sticks. Working units deg, s, duty.
-// noexcept, no heap. Method as throttle/plant.hpp (Moreau 1988).
+// noexcept, no heap. Method as in throttle/plant.hpp.
 #pragma once
 
 #include <array>

@@ -1,8 +1,7 @@
 // Smooth twin of the throttle plant for optimisers: friction and limp-home preload are hyperbolic tangents, so that the
 // right-hand side has exact derivatives everywhere. SI units and rad; the output is the angle in deg. It creeps under
 // load where a set-valued friction sticks (speed below about width times load/friction). Allocation-free, noexcept.
-// Source: the electronic throttle with tanh friction and preload as in Loh et al. 2013, with motor and gear written
-// out.
+// Motor, gear, spring and limp-home as in throttle/plant.hpp, with tanh in place of the sign.
 #pragma once
 
 #include <array>
