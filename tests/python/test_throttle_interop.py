@@ -34,7 +34,12 @@ def test_the_response_is_our_simulation(throttle: Throttle) -> None:
 @pytest.mark.parametrize("delay", [0, 2])
 def test_pseudo_wiener_models_respond_as_they_simulate(kind: str, delay: int) -> None:
     control = pytest.importorskip("control")
-    model = PseudoWiener(kind, {"delay_samples": float(delay), "sample_s": 2e-3})
+    own = {
+        "pw_r": {},
+        "pw_w": {f"rise_{i}_deg": 12.0 for i in range(1, 7)},
+        "pw_p": {"gain_1_deg_per_duty": 200.0, "radius_1_duty": 0.03},
+    }[kind]
+    model = PseudoWiener(kind, {"delay_samples": float(delay), "sample_s": 2e-3, **own})
     signal = amplitude_random_steps(0.6, offset=0.1, amplitude=0.4, hold_s=0.05, step_s=2e-3)
     time, duty = signal["time_s"].to_numpy(), signal["duty"].to_numpy()
     ours = model.simulate(time, duty, start_deg=20.0)
