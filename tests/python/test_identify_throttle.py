@@ -87,7 +87,25 @@ def test_a_slow_opening_fits_itself_and_nothing_else(test_log: Any) -> None:
     assert "the plate only opens: Coulomb torque and preload push the same way and are indistinguishable" in said
     assert "add a triangle of ±0.25 duty at 0.05 Hz across limp-home" in said
     assert "never goes below limp-home" in said
+    assert "what it has learned does not carry over" in said
     assert all(finding in fit.summary() for finding in fit.findings)
+
+
+def test_each_side_gets_its_set(train: Any) -> None:
+    fit = identify_throttle(train, two_sided=True, limp_home_deg=8.0, starts=2)
+    assert {"above_coulomb_duty", "below_coulomb_duty"} <= set(fit.report.names)
+    assert fit.fit_percent_train > 98.5
+    assert fit.parameters["above_coulomb_duty"] == pytest.approx(0.0927, rel=0.05)
+    with pytest.raises(ParameterError, match="only pw_r has one per side"):
+        identify_throttle(train, "pw_p", two_sided=True)
+
+
+@pytest.mark.parametrize("kind", ["pw_w", "pw_p"])
+def test_models_without_friction_inside_are_told_so(kind: str, train: Any, test_log: Any) -> None:
+    fit = identify_throttle(train, kind, starts=2)
+    validation = validate_throttle(fit, test_log)
+    assert validation.fit_percent < 60.0
+    assert "take a model with friction" in "\n".join(validation.findings)
 
 
 def test_what_cannot_be_fitted_is_refused(train: Any) -> None:
