@@ -16,7 +16,7 @@ from mgdd.identify.metrics import ResidualTests, fit_percent, mse, residual_test
 from mgdd.identify.ode_fit import OdeFit, OdeModel, fit_ode
 from mgdd.identify.online_update import OnlineUpdate
 from mgdd.identify.profile import WallHeatProfile, wall_heat_profile
-from mgdd.identify.pseudo_wiener_fit import fit_pseudo_wiener
+from mgdd.identify.pseudo_wiener_fit import PseudoWienerFit, fit_pseudo_wiener
 from mgdd.identify.random_steps import random_step_records
 from mgdd.identify.record_content import RecordContent
 from mgdd.identify.records import CylinderFit, LoadFit
@@ -48,6 +48,7 @@ __all__ = [
     "OdeFit",
     "OdeModel",
     "OnlineUpdate",
+    "PseudoWienerFit",
     "RecordContent",
     "ResidualTests",
     "SensorLag",
