@@ -176,9 +176,9 @@ def fit_throttle(
     Duty and angle determine torques only in units of duty and inertia only as an acceleration per duty, so the
     unknowns are groups: tau = J/b, G = g/J, preload T_pt/g, stiffness k_s/g and friction T_d/g with g the stall torque
     per unit duty and b all viscous damping. A regression on the torque balance of the moving samples gives the start;
-    the free run is then fitted in stages (dynamics, static groups, all), from `n_starts` starts. A side of limp-home the
-    log does not visit keeps its start values and is named. With a resistance, a supply and one of inertia or torque
-    constant the physical numbers are computed back (`physical_parameters`) and said in `findings`.
+    the free run is then fitted in stages (dynamics, static groups, all), from `n_starts` starts. A side of limp-home
+    the log does not visit keeps its start values and is named. With a resistance, a supply and one of inertia or
+    torque constant the physical numbers are computed back (`physical_parameters`) and said in `findings`.
 
     Parameters
     ----------

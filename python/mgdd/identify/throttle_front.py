@@ -126,7 +126,8 @@ def _carried_over(train: float, test: float | None) -> tuple[str, ...]:
     if test is None or train - test < _LOST_PERCENT:
         return ()
     text = (
-        f"the fit meets its own log at {train:.1f} % and the test log at {test:.1f} %: what it has learned does not carry "
+        f"the fit meets its own log at {train:.1f} % and the test log at {test:.1f} %: what it has learned does "
+        "not carry "
         "over; fit fewer parameters, from more starts, or to a log that excites them all"
     )
     return (text,)
