@@ -127,8 +127,7 @@ def _carried_over(train: float, test: float | None) -> tuple[str, ...]:
         return ()
     text = (
         f"the fit meets its own log at {train:.1f} % and the test log at {test:.1f} %: what it has learned does "
-        "not carry "
-        "over; fit fewer parameters, from more starts, or to a log that excites them all"
+        "not carry over; fit fewer parameters, from more starts, or to a log that excites them all"
     )
     return (text,)
 
