@@ -1,6 +1,6 @@
 """One question: how long does the ten-parameter throttle fit take, and from how many starts does it arrive.
 
-    python benchmarks/throttle_identification.py [--repeats 5] [--starts 20] [--scipy-starts 20] [--json FILE]
+    python benchmarks/throttle_identification.py [--repeats 5] [--starts 20] [--peer-starts 20] [--json FILE]
 
 Smooth throttle, 20 000 samples at 1 ms, RK4 one step per sample: random levels held 80 samples in the first half, a
 linear chirp 0.2 to 6 Hz in the second, pulled slowly towards the middle angle; starts at rest at a known angle; angle
@@ -108,9 +108,9 @@ def measure(name: str, options: argparse.Namespace) -> dict:
     rows = {}
     for contender, call in contenders(duty, angle, start, lower, upper).items():
         call(starts[0])
-        repeats = 1 if "SciPy" in contender else options.repeats
+        repeats = options.repeats if contender == "mgdd" else 1
         seconds, rmse = [], []
-        mine = starts[: options.scipy_starts] if "SciPy" in contender else starts
+        mine = starts if contender == "mgdd" else starts[: options.peer_starts]
         for p in mine:
             best = []
             for _ in range(repeats):
@@ -147,7 +147,7 @@ def main() -> None:
     parser = argparse.ArgumentParser(description=__doc__.splitlines()[0])
     parser.add_argument("--repeats", type=int, default=5)
     parser.add_argument("--starts", type=int, default=20)
-    parser.add_argument("--scipy-starts", type=int, default=20, help="starts for SciPy, the slowest (default 20)")
+    parser.add_argument("--peer-starts", type=int, default=20, help="starts for the peers (default 20)")
     parser.add_argument("--json", type=Path, metavar="FILE", help="also write the figures to FILE")
     options = parser.parse_args()
     machine.pin()
