@@ -13,6 +13,7 @@ from mgdd.identify.first_principle import (
     throttle_start,
 )
 from mgdd.identify.metrics import ResidualTests, fit_percent, mse, residual_tests, rmse, vaf_percent
+from mgdd.identify.n_step import n_step_rms, split_log
 from mgdd.identify.ode_fit import OdeFit, OdeModel, fit_ode
 from mgdd.identify.online_update import OnlineUpdate
 from mgdd.identify.profile import WallHeatProfile, wall_heat_profile
@@ -30,13 +31,7 @@ from mgdd.identify.surrogate_optimum import SurrogateOptimum
 from mgdd.identify.throttle_fit import FittedParameters, ThrottleFit, ThrottleModel
 from mgdd.identify.throttle_fits import load_throttle_model
 from mgdd.identify.throttle_front import identify_throttle
-from mgdd.identify.throttle_validation import (
-    ThrottleValidation,
-    correlation_dataset,
-    n_step_rms,
-    split_log,
-    validate_throttle,
-)
+from mgdd.identify.throttle_validation import ThrottleValidation, correlation_dataset, validate_throttle
 
 __all__ = [
     "CylinderFit",
