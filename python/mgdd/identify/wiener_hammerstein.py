@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import itertools
 from dataclasses import dataclass
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
@@ -195,8 +195,8 @@ def fit_linear(record: xr.Dataset, *, order: int = 6, iterations: int = 15) -> L
         regressors = np.column_stack(columns)
         estimate = np.linalg.solve(regressors.T @ regressors, regressors.T @ yf[order:])
         roots = np.roots(np.r_[1.0, estimate[:order]])
-        a = np.real(np.poly(np.where(np.abs(roots) > 1.0, 1.0 / np.conj(roots), roots)))
-        b = estimate[order:]
+        a = np.asarray(np.real(np.poly(np.where(np.abs(roots) > 1.0, 1.0 / np.conj(roots), roots))), dtype=np.float64)
+        b = np.asarray(estimate[order:], dtype=np.float64)
         error = float(np.sqrt(np.mean((y - _core.filter_series(b, a, u))[_SKIP:] ** 2)))
         if error < best[0]:
             best = (error, b, a)
@@ -333,7 +333,7 @@ def _fit(model: _core.WienerHammerstein, start: Vector, u: Vector, y: Vector, it
     return model.fit(start=start, input=u, output=y, skip=_SKIP, options=options)
 
 
-def _groups(roots: NDArray[np.complex128]) -> list[list[complex]]:
+def _groups(roots: NDArray[Any]) -> list[list[complex]]:
     pairs = [[complex(z), complex(z.conjugate())] for z in roots if z.imag > 1e-9]
     return pairs + [[complex(z.real)] for z in roots if abs(z.imag) <= 1e-9]
 
@@ -364,7 +364,7 @@ def _partitions(linear: LinearApproximation, u: Vector, y: Vector, first: int, l
             scale = float(np.abs(between).max())
             columns = [_core.filter_series(b2, a2, (between / scale) ** k) for k in range(_SCAN_DEGREE + 1)]
             regressors = np.column_stack(columns)[_SKIP:]
-            curve = np.linalg.lstsq(regressors, y[_SKIP:], rcond=None)[0]
+            curve = np.asarray(np.linalg.lstsq(regressors, y[_SKIP:], rcond=None)[0], dtype=np.float64)
             error = float(np.sqrt(np.mean((regressors @ curve - y[_SKIP:]) ** 2)))
             found.append((error, b1, a1, b2, a2, curve, scale))
     return sorted(found, key=lambda entry: entry[0])

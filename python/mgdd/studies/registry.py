@@ -18,7 +18,7 @@ _TITLES = {
     "ch4-sensors": "NOx analyser, fast sensor and soft sensor, steady and in transients",
     "ch4-esc": "what a late NOx analyser does to extremum seeking, and three cures",
     "ch4-tests": "four tests of extremum seeking: efficiency, another start, NOx by analyser and by soft sensor",
-    "identification-benchmarks": "a drive, two tanks and a circuit, measured: fits beside published ones (needs the sets)",
+    "identification-benchmarks": "measured drive, tanks and circuit: fits beside published ones (needs the data sets)",
     "h2df-seek": "seekers on a surrogate of a measured hydrogen-diesel engine (needs the data set)",
 }
 
