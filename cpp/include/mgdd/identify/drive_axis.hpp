@@ -1,7 +1,7 @@
 // Motor-driven linear axis with friction: mass, viscous friction per direction, Coulomb friction with a Stribeck rise,
 // and an offset force that may drift. Units SI, input V, output m. A StepModel: step() is noexcept and heap-free.
-// Friction at rest is set-valued and solved exactly by the proximal step (Moreau 1988), so the axis neither chatters
-// nor creeps. Stribeck term: Armstrong-Hélouvry, Dupont and Canudas de Wit 1994, with the exponent 1.
+// Friction at rest is set-valued and solved exactly by a proximal step, so the axis neither chatters nor creeps. The
+// Stribeck term falls exponentially with the speed.
 #pragma once
 
 #include <array>
