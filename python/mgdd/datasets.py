@@ -317,8 +317,8 @@ def _emps_record(file: Path) -> xr.Dataset:
         attrs={
             "title": "electro-mechanical positioning system (EMPS)",
             "file": file.name,
-            "citation": "A. Janot, M. Gautier, M. Brunot, Data Set and Reference Models of EMPS, 2019 Workshop on "
-            "Nonlinear System Identification Benchmarks",
+            "citation": "A. Janot, M. Gautier, M. Brunot, Data Set and Reference Models of EMPS, Workshop on "
+            "Nonlinear System Identification Benchmarks (2019)",
             "licence": "Apache-2.0 of the redistributing repository forgi86/sysid-neural-continuous; the terms of "
             "the authors were not seen",
         },
@@ -375,7 +375,7 @@ def load_cascaded_tanks() -> tuple[xr.Dataset, xr.Dataset]:
 
 
 def load_wiener_hammerstein() -> tuple[xr.Dataset, xr.Dataset]:
-    """Load the measured Wiener-Hammerstein circuit of SYSID 2009: filter, diode, filter, at 51.2 kHz.
+    """Load the measured Wiener-Hammerstein circuit of the SYSID benchmark: filter, diode, filter, at 51.2 kHz.
 
     The set is not in the package: put ``WienerHammerBenchmark.csv`` into ``$MGDD_DATA_DIR/wh2009``.
 
@@ -421,7 +421,7 @@ def load_wiener_hammerstein() -> tuple[xr.Dataset, xr.Dataset]:
             },
             attrs={
                 "title": f"Wiener-Hammerstein circuit, {title}",
-                "citation": "J. Schoukens, J. Suykens, L. Ljung, Wiener-Hammerstein benchmark, SYSID 2009",
+                "citation": "J. Schoukens, J. Suykens, L. Ljung, Wiener-Hammerstein benchmark (2009)",
                 "licence": "MIT of the redistributing repository forgi86/RNN-adaptation; the terms of the authors "
                 "were not seen",
             },

@@ -121,6 +121,14 @@ class DriveFit:
         Of the free run over the record [%].
     starts_fit_percent : tuple of float
         The same for every start, best first: how sharply the record points at one answer.
+
+    Examples
+    --------
+    >>> from mgdd import datasets
+    >>> from mgdd.identify import fit_drive
+    >>> if "emps" in datasets.available():
+    ...     fit = fit_drive(datasets.load_emps()[0], friction="coulomb", drift=False, starts=1)
+    ...     assert fit.fit_percent == fit.starts_fit_percent[0]
     """
 
     report: FitReport
@@ -192,7 +200,34 @@ def drive_start(record: xr.Dataset) -> tuple[float, float]:
 
 
 def drive_free_run(model: DriveModel, record: xr.Dataset) -> NDArray[np.float64]:
-    """Simulate a record from the state its first 20 samples show: positions [m] of samples 20 to the end."""
+    """Simulate a record from the state that its first 20 samples show.
+
+    Parameters
+    ----------
+    model : DriveModel
+        The slide.
+    record : xarray.Dataset
+        As `fit_drive` takes it; only the first 20 positions are used.
+
+    Returns
+    -------
+    ndarray, shape (n - 20,)
+        Positions of samples 20 to the end [m].
+
+    Raises
+    ------
+    mgdd.errors.DataError
+        Times that are not evenly spaced.
+
+    Examples
+    --------
+    >>> from mgdd import datasets
+    >>> from mgdd.identify import DriveModel, drive_free_run, drive_inverse_dynamics
+    >>> if "emps" in datasets.available():
+    ...     train, test = datasets.load_emps()
+    ...     slide = DriveModel(parameters=drive_inverse_dynamics(train), force_n_per_v=float(train["force_n_per_v"]))
+    ...     assert drive_free_run(slide, test).size == 24821
+    """
     position, speed = drive_start(record)
     later = record.isel(time_s=slice(_WINDOW - 1, None))
     run = model.simulate(later["time_s"], later["drive_v"], start_position_m=position, start_speed_m_per_s=speed)

@@ -152,6 +152,14 @@ class TanksFit:
         The tanks.
     rmse_v : float
         Of the free run over the record [V].
+
+    Examples
+    --------
+    >>> from mgdd import datasets
+    >>> from mgdd.identify import fit_two_tanks
+    >>> if "cascaded_tanks" in datasets.available():
+    ...     fit = fit_two_tanks(datasets.load_cascaded_tanks()[0], starts=1)
+    ...     assert fit.rmse_v == fit.report.rmse
     """
 
     report: FitReport

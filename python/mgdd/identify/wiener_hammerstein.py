@@ -43,6 +43,15 @@ class LinearApproximation:
         Taken off the input, added to the output, in the units of the record.
     rmse : float
         Of the response over the record, first 100 samples left out [unit of the output].
+
+    Examples
+    --------
+    >>> import numpy as np
+    >>> from mgdd.identify import LinearApproximation
+    >>> lag = LinearApproximation(
+    ...     numerator=np.array([0.5]), denominator=np.array([1.0, -0.5]), input_mean=0.0, output_mean=1.0, rmse=0.0)
+    >>> lag.simulate([1.0, 1.0, 1.0]).tolist()
+    [1.5, 1.75, 1.875]
     """
 
     numerator: Vector
@@ -80,6 +89,16 @@ class WienerHammersteinModel:
         Grid of the curve, in the unit of the input.
     values : ndarray
         Coefficients in the order of the report's names.
+
+    Examples
+    --------
+    >>> import numpy as np
+    >>> from mgdd.identify import WienerHammersteinModel
+    >>> circuit = WienerHammersteinModel(
+    ...     first_order=1, last_order=1, n_curve=4, lower=-1.0, upper=1.0,
+    ...     values=np.r_[-0.5, 0.5, -0.5, 0.5, -3.0, -1.0, 1.0, 3.0])  # two lags, and a curve that is the identity
+    >>> circuit.simulate([1.0, 1.0, 1.0]).round(4).tolist()
+    [0.25, 0.5, 0.6875]
     """
 
     first_order: int
@@ -136,6 +155,15 @@ class WienerHammersteinFit:
         The linear filter it started from.
     partitions_rmse : tuple of float
         After the short fit of every partition that was followed, best first: how clearly one wins.
+
+    Examples
+    --------
+    >>> from mgdd import datasets
+    >>> from mgdd.identify import fit_wiener_hammerstein
+    >>> if "wh2009" in datasets.available():
+    ...     some = datasets.load_wiener_hammerstein()[0].isel(time_s=slice(0, 5000))
+    ...     fit = fit_wiener_hammerstein(some, scan_samples=5000, follow=3, max_iterations=10)
+    ...     assert fit.rmse <= fit.linear.rmse
     """
 
     report: FitReport
@@ -265,9 +293,9 @@ def fit_wiener_hammerstein(
     >>> u = np.convolve(rng.standard_normal(6003), np.ones(4) / 4.0, "valid")
     >>> x, w, y = np.zeros(6000), np.zeros(6000), np.zeros(6000)
     >>> for k in range(1, 6000):
-    ...     x[k] = 0.7 * x[k - 1] + 0.3 * u[k]
-    ...     w[k] = np.tanh(2.0 * x[k])
-    ...     y[k] = 0.5 * y[k - 1] + 0.5 * w[k]
+    ...     x[k] = 0.9 * x[k - 1] + 0.1 * u[k]
+    ...     w[k] = np.tanh(4.0 * x[k])
+    ...     y[k] = 0.3 * y[k - 1] + 0.7 * w[k]
     >>> record = labelled_dataset({
     ...     "time_s": ("time_s", np.arange(6000) / 1000.0, "s", "time"),
     ...     "input_v": ("time_s", u, "V", "input"), "output_v": ("time_s", y, "V", "output")})
