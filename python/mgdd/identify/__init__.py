@@ -16,6 +16,7 @@ from mgdd.identify.metrics import ResidualTests, fit_percent, mse, residual_test
 from mgdd.identify.n_step import n_step_rms, split_log
 from mgdd.identify.ode_fit import OdeFit, OdeModel, fit_ode
 from mgdd.identify.online_update import OnlineUpdate
+from mgdd.identify.drive_axis import DriveFit, DriveModel, drive_free_run, drive_inverse_dynamics, fit_drive
 from mgdd.identify.profile import WallHeatProfile, wall_heat_profile
 from mgdd.identify.pseudo_wiener_fit import PseudoWienerFit, fit_pseudo_wiener
 from mgdd.identify.random_steps import random_step_records
@@ -32,13 +33,24 @@ from mgdd.identify.throttle_fit import FittedParameters, ThrottleFit, ThrottleMo
 from mgdd.identify.throttle_fits import load_throttle_model
 from mgdd.identify.throttle_front import identify_throttle
 from mgdd.identify.throttle_validation import ThrottleValidation, correlation_dataset, validate_throttle
+from mgdd.identify.two_tanks import TanksFit, TwoTanksModel, fit_two_tanks
+from mgdd.identify.wiener_hammerstein import (
+    LinearApproximation,
+    WienerHammersteinFit,
+    WienerHammersteinModel,
+    fit_linear,
+    fit_wiener_hammerstein,
+)
 
 __all__ = [
     "CylinderFit",
+    "DriveFit",
+    "DriveModel",
     "EngineSurrogate",
     "ExcitationCheck",
     "FirstPrincipleModel",
     "FittedParameters",
+    "LinearApproximation",
     "LoadFit",
     "OdeFit",
     "OdeModel",
@@ -75,6 +87,19 @@ __all__ = [
     "n_step_rms",
     "physical_parameters",
     "prbs",
+    "TanksFit",
+    "TwoTanksModel",
+    "WallHeatProfile",
+    "WienerHammersteinFit",
+    "WienerHammersteinModel",
+    "drive_free_run",
+    "drive_inverse_dynamics",
+    "fit_cylinder",
+    "fit_drive",
+    "fit_linear",
+    "fit_surrogate",
+    "fit_two_tanks",
+    "fit_wiener_hammerstein",
     "random_step_records",
     "residual_tests",
     "rmse",
