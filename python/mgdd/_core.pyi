@@ -6,7 +6,7 @@ import collections.abc
 import numpy
 import numpy.typing
 import typing
-__all__: list[str] = ['BoundedSeeking', 'ComponentLag', 'ConvergenceError', 'Cylinder', 'CylinderFit', 'DataError', 'EngineBench', 'Error', 'ExtremumSeeking', 'FitReport', 'GoldenSection', 'GradientDescent', 'IterativeLearning', 'LeastSquaresOptions', 'Limit', 'LoadBurn', 'LoadFit', 'MeasuredCycle', 'NewtonSeeking', 'NoxFit', 'NoxModel', 'NoxProxy', 'OperatingPoint', 'Parameter', 'ParameterError', 'Performance', 'PerformanceTerm', 'RigError', 'SensorDynamics', 'ShapeError', 'SoftSensor', 'Spsa', 'Throttle', 'TraceOptions', 'analyze_trace', 'burn_duration_cad', 'burned_fraction', 'check_trace', 'common_parameters', 'compiled_simd_level', 'compiler', 'convergence', 'correlation_limit', 'differentiable_inputs', 'estimate_burn', 'fit_cylinder', 'fit_nox_proxy', 'hardenberg_hase_delay_cad', 'hohenberg_coefficient', 'indicator_units', 'input_unit', 'least_squares', 'load_parameters', 'monte_carlo', 'processor_simd_levels', 'run_loop', 'scan', 'sensitivities', 'simulate', 'simulate_throttle', 'simulate_throttle_many', 'start_of_combustion', 'start_of_injection', 'throttle_airflow_torque', 'timing_window_cad', 'tune', 'volume_l', 'wall_area_m2', 'wall_heat_scale_upper', 'watson_delay_ms', 'with_burn', 'wolfer_delay_ms', 'woschni_c1_bar_m', 'woschni_coefficient']
+__all__: list[str] = ['BoundedSeeking', 'ComponentLag', 'ConvergenceError', 'Cylinder', 'CylinderFit', 'DataError', 'EngineBench', 'Error', 'ExtremumSeeking', 'FitReport', 'GoldenSection', 'GradientDescent', 'IterativeLearning', 'LeastSquaresOptions', 'Limit', 'LoadBurn', 'LoadFit', 'MeasuredCycle', 'NewtonSeeking', 'NoxFit', 'NoxModel', 'NoxProxy', 'OperatingPoint', 'Parameter', 'ParameterError', 'Performance', 'PerformanceTerm', 'RigError', 'SensorDynamics', 'SensorPair', 'ShapeError', 'SoftSensor', 'Spsa', 'Throttle', 'ThrottleStepper', 'TraceOptions', 'analyze_trace', 'burn_duration_cad', 'burned_fraction', 'check_trace', 'common_parameters', 'compiled_simd_level', 'compiler', 'convergence', 'correlation_limit', 'differentiable_inputs', 'estimate_burn', 'fit_cylinder', 'fit_nox_proxy', 'hardenberg_hase_delay_cad', 'hohenberg_coefficient', 'indicator_units', 'input_unit', 'least_squares', 'load_parameters', 'monte_carlo', 'processor_simd_levels', 'run_loop', 'scan', 'sense_throttle', 'sensitivities', 'sensor_fault_kinds', 'simulate', 'simulate_throttle', 'simulate_throttle_many', 'start_of_combustion', 'start_of_injection', 'throttle_airflow_torque', 'timing_window_cad', 'tune', 'volume_l', 'wall_area_m2', 'wall_heat_scale_upper', 'watson_delay_ms', 'with_burn', 'wolfer_delay_ms', 'woschni_c1_bar_m', 'woschni_coefficient']
 class Error(Exception):
     """
     Base of everything mgdd raises.
@@ -1883,6 +1883,138 @@ class Throttle:
         """
         viscous friction [N m s/rad]
         """
+class SensorPair:
+    """
+    Two redundant position sensors of a throttle with opposite slopes, and their check.
+    
+    Keyword-only and immutable. The first gives ``closed_v + span_v angle/travel_deg``, the second ``supply_v`` minus that.
+    
+    Parameters
+    ----------
+    closed_v, span_v : float
+        First sensor at 0 deg, and its rise over the travel [V]; 0 and 5 are the ideal form of catalogues.
+    travel_deg : float
+        Angle of the full span [deg].
+    supply_v : float
+        Supply of sensors and converter [V].
+    noise_v : float
+        Noise at the converter, rms of each sensor [V].
+    lag_s : float
+        Time constant of the anti-alias filter [s].
+    adc_bits : int
+        Bits of the converter, 4 to 24.
+    sum_tolerance_v : float
+        The sum may differ from the supply by less than this [V].
+    low_v, high_v : float
+        Range of a healthy sensor [V].
+    debounce_s : float
+        A check must fail without a break for so long before the fault counts [s].
+    
+    Raises
+    ------
+    mgdd.errors.ParameterError
+        A field outside its domain, naming field, value and bound.
+    
+    Examples
+    --------
+    >>> from mgdd.throttle import SensorPair
+    >>> SensorPair().adc_bits
+    12
+    """
+    def __eq__(self, arg0: typing.Any) -> bool:
+        ...
+    def __getstate__(self) -> tuple[int, dict]:
+        ...
+    def __hash__(self) -> int:
+        ...
+    def __init__(self, *, closed_v: typing.SupportsFloat | typing.SupportsIndex = 0.5, span_v: typing.SupportsFloat | typing.SupportsIndex = 4.0, travel_deg: typing.SupportsFloat | typing.SupportsIndex = 90.0, supply_v: typing.SupportsFloat | typing.SupportsIndex = 5.0, noise_v: typing.SupportsFloat | typing.SupportsIndex = 0.002, lag_s: typing.SupportsFloat | typing.SupportsIndex = 0.0003, adc_bits: typing.SupportsInt | typing.SupportsIndex = 12, sum_tolerance_v: typing.SupportsFloat | typing.SupportsIndex = 0.2, low_v: typing.SupportsFloat | typing.SupportsIndex = 0.2, high_v: typing.SupportsFloat | typing.SupportsIndex = 4.8, debounce_s: typing.SupportsFloat | typing.SupportsIndex = 0.2) -> None:
+        ...
+    def __repr__(self) -> str:
+        ...
+    def __setstate__(self, arg0: tuple) -> None:
+        ...
+    def to_dict(self) -> dict:
+        """
+        Constructor keywords as a new dict.
+        """
+    @property
+    def adc_bits(self) -> int:
+        """
+        Bits of the converter.
+        """
+    @property
+    def closed_v(self) -> float:
+        """
+        First sensor at 0 deg [V].
+        """
+    @property
+    def debounce_s(self) -> float:
+        """
+        Time a check must fail [s].
+        """
+    @property
+    def high_v(self) -> float:
+        """
+        Highest healthy voltage [V].
+        """
+    @property
+    def lag_s(self) -> float:
+        """
+        Time constant of the anti-alias filter [s].
+        """
+    @property
+    def low_v(self) -> float:
+        """
+        Lowest healthy voltage [V].
+        """
+    @property
+    def lsb_v(self) -> float:
+        """
+        Step of the converter [V].
+        """
+    @property
+    def noise_v(self) -> float:
+        """
+        Noise of each sensor, rms [V].
+        """
+    @property
+    def span_v(self) -> float:
+        """
+        Rise of the first sensor over the travel [V].
+        """
+    @property
+    def sum_tolerance_v(self) -> float:
+        """
+        Tolerance of the sum [V].
+        """
+    @property
+    def supply_v(self) -> float:
+        """
+        Supply of sensors and converter [V].
+        """
+    @property
+    def travel_deg(self) -> float:
+        """
+        Angle of the full span [deg].
+        """
+class ThrottleStepper:
+    """
+    One sample of a throttle from a given state; behind mgdd.throttle.to_iosystem.
+    
+    The state is angle [deg], speed [deg/s], current [A] and bristle [deg] of motor and gear, then angle, speed and bristle
+    of the plate.
+    """
+    @staticmethod
+    def at_rest(angle_deg: typing.SupportsFloat | typing.SupportsIndex) -> typing.Annotated[list[float], "FixedSize(7)"]:
+        """
+        State at rest at an angle [deg], without current.
+        """
+    def __init__(self, throttle: Throttle, *, sample_s: typing.SupportsFloat | typing.SupportsIndex, step_s: typing.SupportsFloat | typing.SupportsIndex) -> None:
+        ...
+    def advance(self, state: typing.Annotated[collections.abc.Sequence[typing.SupportsFloat | typing.SupportsIndex], "FixedSize(7)"], duty: typing.SupportsFloat | typing.SupportsIndex) -> typing.Annotated[list[float], "FixedSize(7)"]:
+        """
+        State after one sample under a duty [-], which is clipped to -1..1.
+        """
 class MeasuredCycle:
     def __init__(self, *, label: str, crank_angle_cad: typing.Annotated[numpy.typing.ArrayLike, numpy.float64], pressure_bar: typing.Annotated[numpy.typing.ArrayLike, numpy.float64], point: OperatingPoint) -> None:
         ...
@@ -2253,6 +2385,10 @@ def scan(cylinder: Cylinder, point: OperatingPoint, soc_cad: typing.Annotated[nu
     """
     Indicators over a column of timings; releases the GIL.
     """
+def sense_throttle(pair: SensorPair, angle_deg: typing.Annotated[numpy.typing.ArrayLike, numpy.float64], *, sample_s: typing.SupportsFloat | typing.SupportsIndex, seed: typing.SupportsInt | typing.SupportsIndex, faults: typing.Annotated[collections.abc.Sequence[tuple[str, typing.SupportsFloat | typing.SupportsIndex, typing.SupportsFloat | typing.SupportsIndex]], "FixedSize(2)"]) -> dict:
+    """
+    Samples of both sensors; behind mgdd.throttle.sense.
+    """
 def sensitivities(cylinder: Cylinder, point: OperatingPoint, soc_cad: typing.SupportsFloat | typing.SupportsIndex, names: collections.abc.Sequence[str], step_cad: typing.SupportsFloat | typing.SupportsIndex, integrator: str) -> dict:
     """
     Exact derivatives of indicators and pressure.
@@ -2307,6 +2443,7 @@ def woschni_coefficient(c1_bar_m: typing.Annotated[numpy.typing.ArrayLike, numpy
     """
 __version__: str = '0.1.0'
 correlation_limit: float = 0.98
+sensor_fault_kinds: tuple = ('none', 'open_wire', 'short_to_ground', 'short_to_supply', 'offset', 'gain', 'stuck')
 timing_window_cad: tuple = (-60.0, 20.0)
 wall_heat_scale_upper: float = 2.5
 woschni_c1_bar_m: float = 129.8
