@@ -23,7 +23,11 @@ PYBIND11_MODULE(_core, m) {
   bind_throttle(m);
   bind_sensors(m);
   bind_throttle_step(m);
+  bind_pseudo_wiener(m);
   bind_identify(m);
+  bind_recursive(m);
+  bind_identify_throttle(m);
+  bind_benchmark_models(m);
   bind_bench(m);
   bind_loop(m);
 }

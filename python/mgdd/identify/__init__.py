@@ -6,18 +6,29 @@ from mgdd.identify.cylinder import fit_cylinder
 from mgdd.identify.excitation import amplitude_random_steps, chirp, multisine, prbs, staircase, triangle
 from mgdd.identify.excitation_check import ExcitationCheck, check_excitation
 from mgdd.identify.excitation_design import design_excitation
+from mgdd.identify.first_principle import (
+    FirstPrincipleModel,
+    fit_throttle,
+    physical_parameters,
+    throttle_start,
+)
 from mgdd.identify.metrics import ResidualTests, fit_percent, mse, residual_tests, rmse, vaf_percent
+from mgdd.identify.ode_fit import OdeFit, OdeModel, fit_ode
+from mgdd.identify.online_update import OnlineUpdate
 from mgdd.identify.profile import WallHeatProfile, wall_heat_profile
+from mgdd.identify.pseudo_wiener_fit import fit_pseudo_wiener
 from mgdd.identify.random_steps import random_step_records
 from mgdd.identify.record_content import RecordContent
 from mgdd.identify.records import CylinderFit, LoadFit
 from mgdd.identify.response_surface import Support
 from mgdd.identify.sensor_lag import SensorLag
+from mgdd.identify.smooth_throttle import SmoothThrottleFit, fit_smooth_throttle, simulate_smooth_throttle
 from mgdd.identify.surrogate import EngineSurrogate, SignalModel
 from mgdd.identify.surrogate_engine import SurrogateEngine
 from mgdd.identify.surrogate_fit import fit_surrogate
 from mgdd.identify.surrogate_optimum import SurrogateOptimum
 from mgdd.identify.throttle_fit import FittedParameters, ThrottleFit, ThrottleModel
+from mgdd.identify.throttle_fits import load_throttle_model
 from mgdd.identify.throttle_front import identify_throttle
 from mgdd.identify.throttle_validation import (
     ThrottleValidation,
@@ -31,12 +42,17 @@ __all__ = [
     "CylinderFit",
     "EngineSurrogate",
     "ExcitationCheck",
+    "FirstPrincipleModel",
     "FittedParameters",
     "LoadFit",
+    "OdeFit",
+    "OdeModel",
+    "OnlineUpdate",
     "RecordContent",
     "ResidualTests",
     "SensorLag",
     "SignalModel",
+    "SmoothThrottleFit",
     "Support",
     "SurrogateEngine",
     "SurrogateOptimum",
@@ -50,18 +66,26 @@ __all__ = [
     "correlation_dataset",
     "design_excitation",
     "fit_cylinder",
+    "fit_ode",
     "fit_percent",
+    "fit_pseudo_wiener",
+    "fit_smooth_throttle",
     "fit_surrogate",
+    "fit_throttle",
     "identify_throttle",
+    "load_throttle_model",
     "mse",
     "multisine",
     "n_step_rms",
+    "physical_parameters",
     "prbs",
     "random_step_records",
     "residual_tests",
     "rmse",
+    "simulate_smooth_throttle",
     "split_log",
     "staircase",
+    "throttle_start",
     "triangle",
     "vaf_percent",
     "validate_throttle",

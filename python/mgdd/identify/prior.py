@@ -23,6 +23,10 @@ _PW_R = (
     *("above_preload_duty", "below_preload_duty", "above_spring_duty_per_deg", "below_spring_duty_per_deg"),
     *("above_coulomb_duty", "below_coulomb_duty"),
 )
+_GROUPS = (
+    *("beta_above_duty", "beta_below_duty", "kappa_above_duty_per_deg", "kappa_below_duty_per_deg"),
+    "delta_duty",
+)
 # Preload plus friction of a common throttle at 12 V, for models that name neither.
 _SWING = 0.3
 
@@ -113,8 +117,9 @@ def _of_model(model: Any) -> Prior:
         return _columns(model.simulate(time, duty, start_deg=start), time.size)
 
     groups = None
-    if all(name in values for name in _PW_R):
-        above, below, spring_above, spring_below, *coulomb = (float(values[name]) for name in _PW_R)
+    names = next((names for names in (_PW_R, _GROUPS) if all(name in values for name in names)), None)
+    if names is not None:
+        above, below, spring_above, spring_below, *coulomb = (float(values[name]) for name in names)
         groups = DutyGroups(
             preload_above=above,
             preload_below=below,

@@ -321,12 +321,17 @@ class ThrottleFit:
         }
         return FittedParameters(
             kind=self.kind,
-            values=self.parameters,
+            values={**self.parameters, **self._travel()},
             stderr={name: errors[own] for name in self.parameters if (own := _fitted_name(name, errors)) is not None},
             source=f"fitted to {self.source}",
             fit={name: value for name, value in figures.items() if value is not None},
             unidentifiable=self.unidentifiable,
         )
+
+    def _travel(self) -> dict[str, float]:
+        """Return the end stops of a model that does not count them among its parameters."""
+        ends = {name: getattr(self.model, name, None) for name in ("closed_deg", "open_deg")}
+        return {name: float(end) for name, end in ends.items() if end is not None and name not in self.parameters}
 
     def to_toml(self) -> str:
         """Write the parameters as TOML with units, standard errors and the name of the log.

@@ -47,7 +47,8 @@ def identify_throttle(
     test : xarray.Dataset, optional
         Another log, for ``fit_percent_test`` and ``rmse_test_deg``.
     limp_home_deg : float, optional
-        Limp-home angle [deg]; None: the record starts at rest there.
+        Limp-home angle [deg], if it is known. None: the first-principle fit estimates it, for the others the record
+        starts at rest there.
     two_sided : bool
         Fit a set of parameters above and one below limp-home; the log must have been on both sides.
     starts : int, optional
@@ -83,21 +84,30 @@ def identify_throttle(
     check_throttle_log(log)
     if test is not None:
         check_throttle_log(test)
-    limp_home = _limp_home(log) if limp_home_deg is None else limp_home_deg
+    limp_home = limp_home_deg
+    if limp_home is None and (two_sided or model != "first_principle"):
+        limp_home = _limp_home(log)
     if two_sided:
         check_throttle_log(log, two_sided=True, limp_home_deg=limp_home)
-    fit = fit_kind(log, model, limp_home_deg=limp_home, two_sided=two_sided, starts=starts, seed=seed)
+    known_home = limp_home_deg if model == "first_principle" else limp_home
+    fit = fit_kind(log, model, limp_home_deg=known_home, two_sided=two_sided, starts=starts, seed=seed)
     train, _ = _quality(fit, log)
-    figures: dict[str, float] = {"fit_percent_train": train}
-    if test is not None:
-        figures["fit_percent_test"], figures["rmse_test_deg"] = _quality(fit, test)
+    tested = (None, None) if test is None else _quality(fit, test)
     known = prior_of(fit.model)
+    home = known.limp_home_deg if limp_home is None else limp_home
     content = record_content(
-        log["time_s"].to_numpy(), log["angle_deg"].to_numpy(), limp_home_deg=limp_home, stops_deg=known.stops_deg
+        log["time_s"].to_numpy(), log["angle_deg"].to_numpy(), limp_home_deg=home, stops_deg=known.stops_deg
     )
     asked = open_questions(content, swing=known.swing, pairs=entangled(fit.report))
     findings = tuple(dict.fromkeys((*fit.findings, *asked)))
-    return dataclasses.replace(fit, findings=findings, source=str(log.attrs.get("file", "log")), **figures)
+    return dataclasses.replace(
+        fit,
+        fit_percent_train=train,
+        fit_percent_test=tested[0],
+        rmse_test_deg=tested[1],
+        findings=findings,
+        source=str(log.attrs.get("file", "log")),
+    )
 
 
 def _quality(fit: ThrottleFit, log: xr.Dataset) -> tuple[float, float]:

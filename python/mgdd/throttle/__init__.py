@@ -9,10 +9,12 @@ from __future__ import annotations
 from mgdd._core import Throttle
 from mgdd.throttle.characteristics import airflow_torque_nm, groups, holding_duty, linear_part, mass_flow_kg_per_s
 from mgdd.throttle.interop import initial_state, to_iosystem
+from mgdd.throttle.pseudo_wiener import PseudoWiener
 from mgdd.throttle.sensors import SensorFault, SensorPair, sense
 from mgdd.throttle.simulate import simulate, simulate_many, step_summary
 
 __all__ = [
+    "PseudoWiener",
     "SensorFault",
     "SensorPair",
     "Throttle",

@@ -1,0 +1,119 @@
+// Binds the measured-benchmark models of include/mgdd/identify: drive axis, two tanks, Wiener-Hammerstein.
+#include <map>
+#include <string>
+#include <vector>
+
+#include "binding.hpp"
+#include "mgdd/identify/drive_axis.hpp"
+#include "mgdd/identify/free_run_fit.hpp"
+#include "mgdd/identify/two_tanks.hpp"
+#include "mgdd/identify/wiener_hammerstein.hpp"
+
+namespace mgdd::bindings {
+namespace {
+
+using namespace identify;
+using py::arg;
+
+struct InputRecord {
+  std::vector<double> input, output, start;
+  std::vector<std::string> free_start;
+  std::size_t skip;
+};
+
+template <class Domains>
+std::vector<std::string> domain_names(const Domains& domains) {
+  std::vector<std::string> names;
+  for (const FitDomain& domain : domains)
+    names.emplace_back(domain.name);
+  return names;
+}
+
+template <class Model>
+void bind_step_model(py::class_<Model>& cls) {
+  cls.def_property_readonly_static("parameter_names",
+                                   [](const py::object&) { return domain_names(Model::parameters); });
+  cls.def_property_readonly_static("state_names", [](const py::object&) { return domain_names(Model::states); });
+  cls.def(
+      "free_run",
+      [](const Model& model, const std::vector<double>& parameters, const std::vector<double>& start,
+         const InputArray& input,
+         double dt_s) { return to_array(free_run(model, parameters, start, to_column(input, "input"), dt_s)); },
+      py::kw_only(), arg("parameters"), arg("start"), arg("input"), arg("dt_s"), "Output at every sample.");
+  cls.def(
+      "fit",
+      [](const Model& model, const std::vector<double>& base, const std::vector<std::string>& free,
+         const std::vector<InputRecord>& inputs, double dt_s, const optimize::LeastSquaresOptions& options) {
+        const py::gil_scoped_release release;
+        std::vector<SimulationRecord> records;
+        for (const InputRecord& in : inputs) {
+          SimulationRecord record;
+          record.dt_s = dt_s;
+          record.input = in.input;
+          record.output = in.output;
+          record.start = in.start;
+          record.skip = in.skip;
+          for (const std::string& name : in.free_start)
+            record.free_start.push_back(domain_index(Model::states, name, "state"));
+          records.push_back(std::move(record));
+        }
+        return fit_free_run(model, base, free, std::move(records), options);
+      },
+      py::kw_only(), arg("base"), arg("free"), arg("records"), arg("dt_s"), arg("options"),
+      "Levenberg-Marquardt on the free run with exact sensitivities; releases the GIL.");
+}
+
+}  // namespace
+
+void bind_benchmark_models(py::module_& m) {
+  py::class_<InputRecord>(m, "FreeRunRecord", "One measured record, its start and what of the start is unknown.")
+      .def(py::init([](const InputArray& input, const InputArray& output, std::vector<double> start,
+                       std::vector<std::string> free_start, std::size_t skip) {
+             return InputRecord{to_column(input, "input"), to_column(output, "output"), std::move(start),
+                                std::move(free_start), skip};
+           }),
+           py::kw_only(), arg("input"), arg("output"), arg("start"), arg("free_start") = std::vector<std::string>{},
+           arg("skip") = 0);
+
+  py::class_<FreeRunFit>(m, "FreeRunFit", "What a free-run fit hands back.")
+      .def_readonly("report", &FreeRunFit::report)
+      .def_readonly("parameters", &FreeRunFit::parameters)
+      .def_readonly("starts", &FreeRunFit::starts)
+      .def_property_readonly("outputs", [](const FreeRunFit& fit) {
+        py::list outputs;
+        for (const std::vector<double>& output : fit.outputs)
+          outputs.append(to_array(output));
+        return outputs;
+      });
+
+  py::class_<DriveAxis> axis(m, "DriveAxis", "Motor-driven axis with friction.");
+  axis.def(py::init([](double force_n_per_v, double centre_m) { return DriveAxis{force_n_per_v, centre_m}; }),
+           py::kw_only(), arg("force_n_per_v"), arg("centre_m") = 0.0);
+  bind_step_model(axis);
+
+  py::class_<TwoTanks> tanks(m, "TwoTanks", "Two tanks in a row with overflow.");
+  tanks.def(py::init([](double lower_brim_v) {
+              TwoTanks model;
+              model.lower_brim_v = lower_brim_v;
+              return model;
+            }),
+            py::kw_only(), arg("lower_brim_v"));
+  bind_step_model(tanks);
+
+  py::class_<WienerHammerstein>(m, "WienerHammerstein", "Filter, static curve, filter.")
+      .def(py::init([](int first_order, int last_order, int n_curve, double lower, double upper) {
+             const WienerHammerstein model{first_order, last_order, n_curve, lower, upper};
+             model.validate();
+             return model;
+           }),
+           py::kw_only(), arg("first_order"), arg("last_order"), arg("n_curve"), arg("lower"), arg("upper"))
+      .def_property_readonly("names", &WienerHammerstein::names)
+      .def("simulate", &WienerHammerstein::simulate, arg("parameters"), arg("input"), "Response from rest.")
+      .def("curve", &WienerHammerstein::curve, arg("parameters"), arg("x"), "The static curve.")
+      .def("fit", &fit_wiener_hammerstein, py::kw_only(), arg("start"), arg("input"), arg("output"), arg("skip"),
+           arg("options"), py::call_guard<py::gil_scoped_release>(),
+           "Levenberg-Marquardt on the response with exact derivatives; releases the GIL.");
+  m.def("filter_series", &filter_series, arg("b"), arg("a"), arg("u"), "B/A u from rest.");
+}
+
+}  // namespace mgdd::bindings
