@@ -83,9 +83,7 @@ class OnlineUpdate:
         values = dict(model.parameters)
         self._core: _core.RecursivePwR | _core.WindowPwR | _core.GradientPwR
         if method == "recursive_least_squares":
-            self._core = _core.RecursivePwR(
-                values, free=names, every=every, noise_deg=noise_deg, forgetting=forgetting
-            )
+            self._core = _core.RecursivePwR(values, free=names, every=every, noise_deg=noise_deg, forgetting=forgetting)
         elif method == "window":
             self._core = _core.WindowPwR(
                 values,
@@ -98,9 +96,7 @@ class OnlineUpdate:
         elif method == "gradient":
             self._core = _core.GradientPwR(values, free=names, adaptation_gain=adaptation_gain, noise_deg=noise_deg)
         else:
-            raise ParameterError(
-                f"method = {method!r}: must be one of 'recursive_least_squares', 'window', 'gradient'"
-            )
+            raise ParameterError(f"method = {method!r}: must be one of 'recursive_least_squares', 'window', 'gradient'")
 
     def update(self, duty: ArrayLike, angle_deg: ArrayLike) -> int:
         """Take one or many samples in order.

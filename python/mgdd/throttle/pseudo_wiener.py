@@ -140,7 +140,10 @@ class PseudoWiener:
         old = self.parameters["sample_s"]
         if abs(sample_s - old) <= _UNEVEN * old:
             return self
-        changes = {"sample_s": sample_s, "delay_samples": float(round(self.parameters["delay_samples"] * old / sample_s))}
+        changes = {
+            "sample_s": sample_s,
+            "delay_samples": float(round(self.parameters["delay_samples"] * old / sample_s)),
+        }
         if self.kind == "pw_r":
             changes["substeps"] = float(max(1, round(sample_s / _STEP_S)))
         return self.replace(**changes)
