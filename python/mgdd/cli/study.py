@@ -45,7 +45,8 @@ def run(args: argparse.Namespace) -> None:
     check_output(args, csv=False)
     titles = available_studies()
     if args.list:
-        text = "\n".join(f"{name:18} {title}" for name, title in titles.items())
+        width = max(map(len, titles))
+        text = "\n".join(f"{name:{width}} {title}" for name, title in titles.items())
         emit(args, {"studies": [{"name": name, "title": title} for name, title in titles.items()]}, text=text)
         return
     if args.name not in titles:

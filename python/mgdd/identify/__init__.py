@@ -13,8 +13,10 @@ from mgdd.identify.first_principle import (
     throttle_start,
 )
 from mgdd.identify.metrics import ResidualTests, fit_percent, mse, residual_tests, rmse, vaf_percent
+from mgdd.identify.n_step import n_step_rms, split_log
 from mgdd.identify.ode_fit import OdeFit, OdeModel, fit_ode
 from mgdd.identify.online_update import OnlineUpdate
+from mgdd.identify.drive_axis import DriveFit, DriveModel, drive_free_run, drive_inverse_dynamics, fit_drive
 from mgdd.identify.profile import WallHeatProfile, wall_heat_profile
 from mgdd.identify.pseudo_wiener_fit import PseudoWienerFit, fit_pseudo_wiener
 from mgdd.identify.random_steps import random_step_records
@@ -30,20 +32,25 @@ from mgdd.identify.surrogate_optimum import SurrogateOptimum
 from mgdd.identify.throttle_fit import FittedParameters, ThrottleFit, ThrottleModel
 from mgdd.identify.throttle_fits import load_throttle_model
 from mgdd.identify.throttle_front import identify_throttle
-from mgdd.identify.throttle_validation import (
-    ThrottleValidation,
-    correlation_dataset,
-    n_step_rms,
-    split_log,
-    validate_throttle,
+from mgdd.identify.throttle_validation import ThrottleValidation, correlation_dataset, validate_throttle
+from mgdd.identify.two_tanks import TanksFit, TwoTanksModel, fit_two_tanks
+from mgdd.identify.wiener_hammerstein import (
+    LinearApproximation,
+    WienerHammersteinFit,
+    WienerHammersteinModel,
+    fit_linear,
+    fit_wiener_hammerstein,
 )
 
 __all__ = [
     "CylinderFit",
+    "DriveFit",
+    "DriveModel",
     "EngineSurrogate",
     "ExcitationCheck",
     "FirstPrincipleModel",
     "FittedParameters",
+    "LinearApproximation",
     "LoadFit",
     "OdeFit",
     "OdeModel",
@@ -80,6 +87,19 @@ __all__ = [
     "n_step_rms",
     "physical_parameters",
     "prbs",
+    "TanksFit",
+    "TwoTanksModel",
+    "WallHeatProfile",
+    "WienerHammersteinFit",
+    "WienerHammersteinModel",
+    "drive_free_run",
+    "drive_inverse_dynamics",
+    "fit_cylinder",
+    "fit_drive",
+    "fit_linear",
+    "fit_surrogate",
+    "fit_two_tanks",
+    "fit_wiener_hammerstein",
     "random_step_records",
     "residual_tests",
     "rmse",

