@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from types import MappingProxyType
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, cast
 
 import numpy as np
 
@@ -123,7 +123,7 @@ def fit_pseudo_wiener(
     >>> round(fit.parameters["above_coulomb_duty"], 4)
     0.08
     """
-    logs = [log] if hasattr(log, "variables") else list(log)
+    logs = cast("list[xr.Dataset]", [log] if hasattr(log, "variables") else list(log))
     if not logs:
         raise DataError("no logs: a fit needs at least one")
     sample_s = _sample(logs)

@@ -103,7 +103,7 @@ def study_throttle(plant: str) -> Throttle:
 
 def _records(plant: str) -> dict[str, xr.Dataset]:
     """Simulate the three logs from rest at limp-home, through a noisy 12-bit sensor."""
-    time = np.arange(round(DURATION_S / SAMPLE_S)) * SAMPLE_S
+    time = np.arange(round(DURATION_S / SAMPLE_S), dtype=np.float64) * SAMPLE_S
     step = np.arange(time.size) // 150
     duties = {
         "train": _chirp(0.20, 0.2, 6.0, time),
@@ -126,7 +126,7 @@ def _records(plant: str) -> dict[str, xr.Dataset]:
     return out
 
 
-def _chirp(amplitude: float, low_hz: float, high_hz: float, time: NDArray[np.float64]) -> NDArray[np.float64]:
+def _chirp(amplitude: float, low_hz: float, high_hz: float, time: NDArray[np.floating[Any]]) -> NDArray[np.float64]:
     phase = low_hz * time + (high_hz - low_hz) * time**2 / (2.0 * DURATION_S)
     return np.asarray(0.15 + amplitude * np.sin(2.0 * np.pi * phase))
 
