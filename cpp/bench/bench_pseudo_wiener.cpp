@@ -37,8 +37,25 @@ void sample(benchmark::State& state) {
 BENCHMARK(sample<PwR, double>);
 BENCHMARK(sample<PwW, double>);
 BENCHMARK(sample<PwP, double>);
-BENCHMARK(sample<PwR, Lanes<4>>);
 BENCHMARK(sample<PwR, Dual<5>>);
+
+// Lanes pay off only in a function that is compiled per instruction set.
+MGDD_CLONES void run_lanes(const BasicPwRModel<Lanes<8>>& model, BasicPwRState<Lanes<8>>& state, int samples) noexcept {
+  for (int k = 0; k < samples; ++k)
+    model.advance(state, Lanes<8>(k % 200 < 100 ? 0.35 : 0.1));
+}
+void eight_lanes(benchmark::State& state) {
+  const auto model = model_of(lift<Lanes<8>>(example<PwR>()));
+  auto s = model.at_rest(Lanes<8>(20.0), Lanes<8>(0.0));
+  for (auto _ : state) {
+    run_lanes(model, s, 1000);
+    benchmark::DoNotOptimize(s);
+  }
+  state.counters["ns_per_sample_and_lane"] =
+      benchmark::Counter(8000.0 * static_cast<double>(state.iterations()) * 1e-9,
+                         benchmark::Counter::kIsRate | benchmark::Counter::kInvert);
+}
+BENCHMARK(eight_lanes);
 
 // 20 samples of 2 ms in three moves, as a predictive controller asks once per period.
 template <class P>
