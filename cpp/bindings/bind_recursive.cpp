@@ -1,6 +1,6 @@
 // Binds include/mgdd/identify/pseudo_wiener_fit.hpp and recursive_*.hpp: the fit and the on-line update.
-#include <array>
 #include <algorithm>
+#include <array>
 #include <map>
 #include <string>
 #include <vector>
