@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from mgdd.identify.cylinder import fit_cylinder
+from mgdd.identify.drive_axis import DriveFit, DriveModel, drive_free_run, drive_inverse_dynamics, fit_drive
 from mgdd.identify.excitation import amplitude_random_steps, chirp, multisine, prbs, staircase, triangle
 from mgdd.identify.excitation_check import ExcitationCheck, check_excitation
 from mgdd.identify.excitation_design import design_excitation
@@ -16,7 +17,6 @@ from mgdd.identify.metrics import ResidualTests, fit_percent, mse, residual_test
 from mgdd.identify.n_step import n_step_rms, split_log
 from mgdd.identify.ode_fit import OdeFit, OdeModel, fit_ode
 from mgdd.identify.online_update import OnlineUpdate
-from mgdd.identify.drive_axis import DriveFit, DriveModel, drive_free_run, drive_inverse_dynamics, fit_drive
 from mgdd.identify.profile import WallHeatProfile, wall_heat_profile
 from mgdd.identify.pseudo_wiener_fit import PseudoWienerFit, fit_pseudo_wiener
 from mgdd.identify.random_steps import random_step_records
@@ -64,22 +64,32 @@ __all__ = [
     "Support",
     "SurrogateEngine",
     "SurrogateOptimum",
+    "TanksFit",
     "ThrottleFit",
     "ThrottleModel",
     "ThrottleValidation",
+    "TwoTanksModel",
     "WallHeatProfile",
+    "WienerHammersteinFit",
+    "WienerHammersteinModel",
     "amplitude_random_steps",
     "check_excitation",
     "chirp",
     "correlation_dataset",
     "design_excitation",
+    "drive_free_run",
+    "drive_inverse_dynamics",
     "fit_cylinder",
+    "fit_drive",
+    "fit_linear",
     "fit_ode",
     "fit_percent",
     "fit_pseudo_wiener",
     "fit_smooth_throttle",
     "fit_surrogate",
     "fit_throttle",
+    "fit_two_tanks",
+    "fit_wiener_hammerstein",
     "identify_throttle",
     "load_throttle_model",
     "mse",
@@ -87,19 +97,6 @@ __all__ = [
     "n_step_rms",
     "physical_parameters",
     "prbs",
-    "TanksFit",
-    "TwoTanksModel",
-    "WallHeatProfile",
-    "WienerHammersteinFit",
-    "WienerHammersteinModel",
-    "drive_free_run",
-    "drive_inverse_dynamics",
-    "fit_cylinder",
-    "fit_drive",
-    "fit_linear",
-    "fit_surrogate",
-    "fit_two_tanks",
-    "fit_wiener_hammerstein",
     "random_step_records",
     "residual_tests",
     "rmse",
