@@ -4,7 +4,8 @@
 
 Smooth throttle, 20 000 samples at 1 ms, RK4 one step per sample: random levels held 80 samples in the first half, a
 linear chirp 0.2 to 6 Hz in the second, pulled slowly towards the middle angle; starts at rest at a known angle; angle
-noise 0.05 deg. Free: Km, Ke, R, Kv, Tc, ws, ks, Tpd, ths, thLH; known: J, N, L, supply. Starts within +-50 % of every
+noise 0.05 deg. Free: Km, Ke, R, Kv, Tc, ks, Tpd, thLH and both smoothing widths; known: J, N, L, supply. Starts within
++-50 % of every
 parameter, the same for all; bounds 0.1 and 10 times the truth; stop at a relative cost of 1e-9. Reached: rmse within
 0.5 % of that at the truth. All contenders must agree on the simulation to 1e-7 deg before any is timed. One core;
 processor seconds, so that a neighbour on a shared machine does not count.
