@@ -10,6 +10,7 @@
 #include "mgdd/common/units.hpp"
 #include "mgdd/engine/cylinder.hpp"
 #include "mgdd/engine/geometry.hpp"
+#include "record_binding.hpp"
 
 namespace mgdd::bindings {
 namespace {
@@ -44,30 +45,6 @@ void bind_init(py::class_<Cylinder>& cls, std::index_sequence<I...>) {
           (py::arg(fields[I].info.name.data()) = d.*(fields[I].member))...);
 }
 
-py::dict describe(const FieldInfo& info, const py::object& standard) {
-  py::dict record;
-  record["unit"] = as_str(info.unit);
-  record["lower"] = info.lower;
-  record["lower_open"] = info.lower_open;
-  record["upper"] = info.upper;
-  record["meaning"] = as_str(info.meaning);
-  record["default"] = standard;
-  return record;
-}
-
-py::dict describe_choice(std::string_view chosen, std::initializer_list<std::string_view> choices,
-                         std::string_view meaning) {
-  py::dict record;
-  record["unit"] = "-";
-  py::list names;
-  for (const std::string_view name : choices)
-    names.append(as_str(name));
-  record["choices"] = py::tuple(names);
-  record["meaning"] = as_str(meaning);
-  record["default"] = as_str(chosen);
-  return record;
-}
-
 py::dict to_dict(const Cylinder& c) {
   py::dict out;
   for (const auto& f : fields)
@@ -88,50 +65,11 @@ py::dict to_dict(const OperatingPoint& p) {
   return out;
 }
 
-template <class T>
-py::str representation(const char* name, const T& object) {
-  py::list parts;
-  const py::dict now = to_dict(object);
-  const py::dict standard = to_dict(T{});
-  for (const auto& item : now) {
-    if (!item.second.equal(standard[item.first])) {
-      parts.append(py::str("{}={!r}").format(item.first, item.second));
-    }
-  }
-  return py::str("{}({})").format(name, py::str(", ").attr("join")(parts));
-}
-
-double as_number(const py::handle& key, const py::handle& value) {
-  if (py::isinstance<py::bool_>(value) || !(py::isinstance<py::float_>(value) || PyNumber_Check(value.ptr()))) {
-    throw ParameterError(std::string(py::str(key)) + " = " + std::string(py::str(py::repr(value))) +
-                         ": must be a number");
-  }
-  const py::object number = py::reinterpret_steal<py::object>(PyNumber_Float(value.ptr()));
-  if (!number) {
-    PyErr_Clear();
-    throw ParameterError(std::string(py::str(key)) + " = " + std::string(py::str(py::repr(value))) +
-                         ": must be one real number");
-  }
-  return number.cast<double>();
-}
-
-[[noreturn]] void unknown_field(const char* owner, const py::handle& key, const py::dict& known) {
-  const py::object close = py::module_::import("difflib").attr("get_close_matches")(key, known.attr("keys")(), 1);
-  std::string hint = "one of " + std::string(py::str(py::str(", ").attr("join")(known.attr("keys")())));
-  if (py::len(close) > 0) hint = "did you mean '" + close[py::int_(0)].cast<std::string>() + "'?";
-  throw ParameterError(std::string(owner) + " has no field '" + std::string(py::str(key)) + "': " + hint);
-}
-
 Cylinder replaced(const Cylinder& from, const py::kwargs& changes) {
   Cylinder c = from;
   for (const auto& [key, value] : changes) {
     const auto name = key.cast<std::string>();
-    const auto choice = [&] {
-      if (!py::isinstance<py::str>(value)) {
-        throw ParameterError(name + " = " + std::string(py::str(py::repr(value))) + ": must be a name");
-      }
-      return value.cast<std::string>();
-    };
+    const auto choice = [&] { return as_name(key, value); };
     bool found = true;
     if (name == "burn_shape") {
       c.burn_shape = parse_burn_shape(choice());
@@ -177,25 +115,11 @@ OperatingPoint replaced(const OperatingPoint& from, const py::kwargs& changes) {
   return p;
 }
 
-// What both records share: comparison, hashing, text, dict, pickle through the keyword constructor.
 template <class T>
 void bind_record(py::class_<T>& cls, const char* name) {
-  cls.def("to_dict", [](const T& self) { return to_dict(self); }, "All fields as a new dict.");
-  cls.def(
-      "replace", [](const T& self, const py::kwargs& changes) { return replaced(self, changes); },
-      "A validated copy with some fields changed; an unknown name is a ParameterError.");
-  cls.def("__eq__", [](const T& self, const py::object& other) {
-    return py::isinstance<T>(other) && self == other.cast<const T&>();
-  });
-  cls.def("__hash__", [](const T& self) { return py::hash(py::tuple(to_dict(self).attr("values")())); });
-  cls.def("__repr__", [name](const T& self) { return representation(name, self); });
-  cls.def(py::pickle([](const T& self) { return py::make_tuple(1, to_dict(self)); },
-                     [](const py::tuple& state) {
-                       if (py::len(state) != 2 || state[0].cast<int>() != 1) {
-                         throw DataError("this pickle was written by another version of mgdd");
-                       }
-                       return replaced(T{}, py::kwargs(state[1].cast<py::dict>()));
-                     }));
+  bind_parameters(
+      cls, name, [](const T& self) { return to_dict(self); },
+      [](const T& self, const py::kwargs& changes) { return replaced(self, changes); });
 }
 
 }  // namespace

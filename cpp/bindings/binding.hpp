@@ -67,6 +67,12 @@ void bind_bench(py::module_& m);
 void bind_loop(py::module_& m);
 void bind_trace(py::module_& m);
 void bind_identify(py::module_& m);
+void bind_pseudo_wiener(py::module_& m);
+void bind_recursive(py::module_& m);
 void bind_benchmark_models(py::module_& m);
+void bind_throttle(py::module_& m);
+void bind_sensors(py::module_& m);
+void bind_throttle_step(py::module_& m);
+void bind_identify_throttle(py::module_& m);
 
 }  // namespace mgdd::bindings

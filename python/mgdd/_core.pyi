@@ -1,12 +1,12 @@
 """
-The C++ core of mgdd. Use it through mgdd.engine, mgdd.identify, mgdd.optimize and mgdd.loop.
+The C++ core of mgdd. Use it through mgdd.engine, mgdd.throttle, mgdd.identify, mgdd.optimize and mgdd.loop.
 """
 from __future__ import annotations
 import collections.abc
 import numpy
 import numpy.typing
 import typing
-__all__: list[str] = ['BoundedSeeking', 'ComponentLag', 'ConvergenceError', 'Cylinder', 'CylinderFit', 'DataError', 'DriveAxis', 'EngineBench', 'Error', 'ExtremumSeeking', 'FitReport', 'FreeRunFit', 'FreeRunRecord', 'GoldenSection', 'GradientDescent', 'IterativeLearning', 'LeastSquaresOptions', 'Limit', 'LoadBurn', 'LoadFit', 'MeasuredCycle', 'NewtonSeeking', 'NoxFit', 'NoxModel', 'NoxProxy', 'OperatingPoint', 'Parameter', 'ParameterError', 'Performance', 'PerformanceTerm', 'RigError', 'SensorDynamics', 'ShapeError', 'SoftSensor', 'Spsa', 'TraceOptions', 'TwoTanks', 'WienerHammerstein', 'analyze_trace', 'burn_duration_cad', 'burned_fraction', 'check_trace', 'common_parameters', 'compiled_simd_level', 'compiler', 'convergence', 'correlation_limit', 'differentiable_inputs', 'estimate_burn', 'filter_series', 'fit_cylinder', 'fit_nox_proxy', 'hardenberg_hase_delay_cad', 'hohenberg_coefficient', 'indicator_units', 'input_unit', 'least_squares', 'load_parameters', 'monte_carlo', 'processor_simd_levels', 'run_loop', 'scan', 'sensitivities', 'simulate', 'start_of_combustion', 'start_of_injection', 'timing_window_cad', 'tune', 'volume_l', 'wall_area_m2', 'wall_heat_scale_upper', 'watson_delay_ms', 'with_burn', 'wolfer_delay_ms', 'woschni_c1_bar_m', 'woschni_coefficient']
+__all__: list[str] = ['BoundedSeeking', 'ComponentLag', 'ConvergenceError', 'Cylinder', 'CylinderFit', 'DataError', 'DriveAxis', 'EngineBench', 'Error', 'ExtremumSeeking', 'FitReport', 'FreeRunFit', 'FreeRunRecord', 'GoldenSection', 'GradientDescent', 'IterativeLearning', 'LeastSquaresOptions', 'Limit', 'LoadBurn', 'LoadFit', 'MeasuredCycle', 'NewtonSeeking', 'NoxFit', 'NoxModel', 'NoxProxy', 'OperatingPoint', 'Parameter', 'ParameterError', 'Performance', 'PerformanceTerm', 'RigError', 'SensorDynamics', 'ShapeError', 'SoftSensor', 'Spsa', 'Throttle', 'TraceOptions', 'TwoTanks', 'WienerHammerstein', 'analyze_trace', 'burn_duration_cad', 'burned_fraction', 'check_trace', 'common_parameters', 'compiled_simd_level', 'compiler', 'convergence', 'correlation_limit', 'differentiable_inputs', 'estimate_burn', 'filter_series', 'fit_cylinder', 'fit_nox_proxy', 'fit_smooth_throttle', 'fit_throttle_groups', 'hardenberg_hase_delay_cad', 'hohenberg_coefficient', 'indicator_units', 'input_unit', 'latin_hypercube', 'least_squares', 'load_parameters', 'monte_carlo', 'processor_simd_levels', 'run_loop', 'scan', 'sensitivities', 'simulate', 'simulate_smooth_throttle', 'simulate_throttle', 'simulate_throttle_groups', 'simulate_throttle_many', 'smooth_throttle_example', 'smooth_throttle_instruction_set', 'smooth_throttle_names', 'start_of_combustion', 'start_of_injection', 'throttle_airflow_torque', 'throttle_group_bounds', 'throttle_group_names', 'timing_window_cad', 'tune', 'volume_l', 'wall_area_m2', 'wall_heat_scale_upper', 'watson_delay_ms', 'with_burn', 'wolfer_delay_ms', 'woschni_c1_bar_m', 'woschni_coefficient']
 class Error(Exception):
     """
     Base of everything mgdd raises.
@@ -1647,6 +1647,242 @@ class Performance:
 class TraceOptions:
     def __init__(self, *, pegging: str = 'none', pegging_exponent: typing.SupportsFloat | typing.SupportsIndex = 1.35, inlet_pressure_kpa: typing.SupportsFloat | typing.SupportsIndex = 0.0, gamma_source: str = 'constant', gamma: typing.SupportsFloat | typing.SupportsIndex = 1.33, gamma_compression: typing.SupportsFloat | typing.SupportsIndex = 1.37, gamma_combustion: typing.SupportsFloat | typing.SupportsIndex = 1.3, heat_from_cad: typing.SupportsFloat | typing.SupportsIndex = -10.0, heat_to_cad: typing.SupportsFloat | typing.SupportsIndex = 90.0, burn_from_cad: typing.SupportsFloat | typing.SupportsIndex = -10.0, total_at_end: bool = False, fractions_of_gross: bool = False) -> None:
         ...
+class Throttle:
+    """
+    Parameters of an electronic throttle body, seen from the plate shaft.
+    
+    Keyword-only and immutable; units stand in the names. Angles are degrees from mechanically closed, opening positive.
+    Defaults are the preset `P1`. `Throttle.fields()` lists every field with unit, bounds, meaning and default.
+    
+    Raises
+    ------
+    mgdd.errors.ParameterError
+        A field outside its domain, naming field, value and bound.
+    
+    Examples
+    --------
+    >>> from mgdd.throttle import Throttle
+    >>> t = Throttle(limp_home_deg=10.0, friction="stribeck", stiction_nm=0.3)
+    >>> t
+    Throttle(stiction_nm=0.3, limp_home_deg=10.0, friction='stribeck')
+    >>> t.replace(supply_v=14.4).supply_v
+    14.4
+    """
+    @staticmethod
+    def fields() -> dict:
+        """
+        Every field by name: unit, bounds or choices, meaning, default.
+        """
+    def __eq__(self, arg0: typing.Any) -> bool:
+        ...
+    def __getstate__(self) -> tuple[int, dict]:
+        ...
+    def __hash__(self) -> int:
+        ...
+    def __init__(self, *, friction: str = 'coulomb', backlash: str = 'none', inertia_kgm2: typing.SupportsFloat | typing.SupportsIndex = 0.0021, viscous_nms_per_rad: typing.SupportsFloat | typing.SupportsIndex = 0.0088, torque_constant_nm_per_a: typing.SupportsFloat | typing.SupportsIndex = 0.383, back_emf_vs_per_rad: typing.SupportsFloat | typing.SupportsIndex = 0.383, resistance_ohm: typing.SupportsFloat | typing.SupportsIndex = 1.5, inductance_mh: typing.SupportsFloat | typing.SupportsIndex = 1.5, supply_v: typing.SupportsFloat | typing.SupportsIndex = 12.0, driver_drop_v: typing.SupportsFloat | typing.SupportsIndex = 0.0, driver_resistance_ohm: typing.SupportsFloat | typing.SupportsIndex = 0.0, dead_band: typing.SupportsFloat | typing.SupportsIndex = 0.0, coulomb_nm: typing.SupportsFloat | typing.SupportsIndex = 0.284, stiction_nm: typing.SupportsFloat | typing.SupportsIndex = 0.284, stribeck_rad_per_s: typing.SupportsFloat | typing.SupportsIndex = 0.3, karnopp_rad_per_s: typing.SupportsFloat | typing.SupportsIndex = 0.05, tanh_rad_per_s: typing.SupportsFloat | typing.SupportsIndex = 0.05, bristle_nm_per_rad: typing.SupportsFloat | typing.SupportsIndex = 81.0, bristle_damping_nms_per_rad: typing.SupportsFloat | typing.SupportsIndex = 0.41, limp_home_deg: typing.SupportsFloat | typing.SupportsIndex = 8.0, spring_above_nm_per_rad: typing.SupportsFloat | typing.SupportsIndex = 0.087, spring_below_nm_per_rad: typing.SupportsFloat | typing.SupportsIndex = 0.087, preload_above_nm: typing.SupportsFloat | typing.SupportsIndex = 0.396, preload_below_nm: typing.SupportsFloat | typing.SupportsIndex = 0.396, preload_ramp_deg: typing.SupportsFloat | typing.SupportsIndex = 0.25, closed_deg: typing.SupportsFloat | typing.SupportsIndex = 0.0, open_deg: typing.SupportsFloat | typing.SupportsIndex = 90.0, stop_stiffness_nm_per_rad: typing.SupportsFloat | typing.SupportsIndex = 5000.0, stop_damping_nms_per_rad: typing.SupportsFloat | typing.SupportsIndex = 4.5, backlash_half_deg: typing.SupportsFloat | typing.SupportsIndex = 0.2, gear_stiffness_nm_per_rad: typing.SupportsFloat | typing.SupportsIndex = 200.0, gear_damping_nms_per_rad: typing.SupportsFloat | typing.SupportsIndex = 0.2, plate_inertia_kgm2: typing.SupportsFloat | typing.SupportsIndex = 0.0003, plate_friction_share: typing.SupportsFloat | typing.SupportsIndex = 0.3, bore_mm: typing.SupportsFloat | typing.SupportsIndex = 60.0, pressure_drop_kpa: typing.SupportsFloat | typing.SupportsIndex = 0.0) -> None:
+        ...
+    def __repr__(self) -> str:
+        ...
+    def __setstate__(self, arg0: tuple) -> None:
+        ...
+    def replace(self, **kwargs) -> Throttle:
+        """
+        A validated copy with some fields changed; an unknown name is a ParameterError.
+        """
+    def to_dict(self) -> dict:
+        """
+        All fields as a new dict.
+        """
+    @property
+    def back_emf_vs_per_rad(self) -> float:
+        """
+        motor voltage per plate speed [V s/rad]
+        """
+    @property
+    def backlash(self) -> str:
+        """
+        Play between gear and plate.
+        """
+    @property
+    def backlash_half_deg(self) -> float:
+        """
+        half gap of the gear [deg]
+        """
+    @property
+    def bore_mm(self) -> float:
+        """
+        bore of the throttle [mm]
+        """
+    @property
+    def bristle_damping_nms_per_rad(self) -> float:
+        """
+        LuGre bristle damping [N m s/rad]
+        """
+    @property
+    def bristle_nm_per_rad(self) -> float:
+        """
+        LuGre bristle stiffness [N m/rad]
+        """
+    @property
+    def closed_deg(self) -> float:
+        """
+        lower end stop [deg]
+        """
+    @property
+    def coulomb_nm(self) -> float:
+        """
+        Coulomb friction [N m]
+        """
+    @property
+    def damping_nms_per_rad(self) -> float:
+        """
+        Viscous friction and braking by the shorted motor, b = K_v + K K_e/R [N m s/rad].
+        """
+    @property
+    def dead_band(self) -> float:
+        """
+        duty without effect on either side of zero [-]
+        """
+    @property
+    def driver_drop_v(self) -> float:
+        """
+        voltage lost in the bridge at full duty [V]
+        """
+    @property
+    def driver_resistance_ohm(self) -> float:
+        """
+        resistance of the bridge [ohm]
+        """
+    @property
+    def friction(self) -> str:
+        """
+        Law of the dry friction.
+        """
+    @property
+    def gear_damping_nms_per_rad(self) -> float:
+        """
+        contact damping of the gear [N m s/rad]
+        """
+    @property
+    def gear_stiffness_nm_per_rad(self) -> float:
+        """
+        contact stiffness of the gear [N m/rad]
+        """
+    @property
+    def inductance_mh(self) -> float:
+        """
+        armature inductance [mH]
+        """
+    @property
+    def inertia_kgm2(self) -> float:
+        """
+        inertia of plate, gears and motor at the plate [kg m²]
+        """
+    @property
+    def karnopp_rad_per_s(self) -> float:
+        """
+        half band of rest of Karnopp's form [rad/s]
+        """
+    @property
+    def limp_home_deg(self) -> float:
+        """
+        rest angle without current [deg]
+        """
+    @property
+    def open_deg(self) -> float:
+        """
+        upper end stop [deg]
+        """
+    @property
+    def plate_friction_share(self) -> float:
+        """
+        share of the friction on the plate's side of the gap [-]
+        """
+    @property
+    def plate_inertia_kgm2(self) -> float:
+        """
+        inertia on the plate's side of the gap [kg m²]
+        """
+    @property
+    def preload_above_nm(self) -> float:
+        """
+        preload above limp-home [N m]
+        """
+    @property
+    def preload_below_nm(self) -> float:
+        """
+        preload below limp-home [N m]
+        """
+    @property
+    def preload_ramp_deg(self) -> float:
+        """
+        half width over which the preload changes sign [deg]
+        """
+    @property
+    def pressure_drop_kpa(self) -> float:
+        """
+        pressure drop that loads the plate [kPa]
+        """
+    @property
+    def resistance_ohm(self) -> float:
+        """
+        armature resistance [ohm]
+        """
+    @property
+    def spring_above_nm_per_rad(self) -> float:
+        """
+        spring above limp-home [N m/rad]
+        """
+    @property
+    def spring_below_nm_per_rad(self) -> float:
+        """
+        spring below limp-home [N m/rad]
+        """
+    @property
+    def stall_torque_nm(self) -> float:
+        """
+        Stall torque per unit duty, g = K (V - V_drop)/R [N m].
+        """
+    @property
+    def stiction_nm(self) -> float:
+        """
+        breakaway friction [N m]
+        """
+    @property
+    def stop_damping_nms_per_rad(self) -> float:
+        """
+        damping of the end stops [N m s/rad]
+        """
+    @property
+    def stop_stiffness_nm_per_rad(self) -> float:
+        """
+        stiffness of the end stops [N m/rad]
+        """
+    @property
+    def stribeck_rad_per_s(self) -> float:
+        """
+        speed of the Stribeck curve [rad/s]
+        """
+    @property
+    def supply_v(self) -> float:
+        """
+        supply of the bridge [V]
+        """
+    @property
+    def tanh_rad_per_s(self) -> float:
+        """
+        width of the smooth form [rad/s]
+        """
+    @property
+    def torque_constant_nm_per_a(self) -> float:
+        """
+        motor torque per current at the plate [N m/A]
+        """
+    @property
+    def viscous_nms_per_rad(self) -> float:
+        """
+        viscous friction [N m s/rad]
+        """
 class MeasuredCycle:
     def __init__(self, *, label: str, crank_angle_cad: typing.Annotated[numpy.typing.ArrayLike, numpy.float64], pressure_bar: typing.Annotated[numpy.typing.ArrayLike, numpy.float64], point: OperatingPoint) -> None:
         ...
@@ -2038,6 +2274,14 @@ def fit_nox_proxy(t_max_k: typing.Annotated[numpy.typing.ArrayLike, numpy.float6
     """
     Least squares on ln NOx; use mgdd.engine.fit_nox_proxy.
     """
+def fit_smooth_throttle(duty: typing.Annotated[numpy.typing.ArrayLike, numpy.float64], angle_deg: typing.Annotated[numpy.typing.ArrayLike, numpy.float64], *, starts: collections.abc.Sequence[typing.Annotated[collections.abc.Sequence[typing.SupportsFloat | typing.SupportsIndex], "FixedSize(10)"]], lower: typing.Annotated[collections.abc.Sequence[typing.SupportsFloat | typing.SupportsIndex], "FixedSize(10)"], upper: typing.Annotated[collections.abc.Sequence[typing.SupportsFloat | typing.SupportsIndex], "FixedSize(10)"], step_s: typing.SupportsFloat | typing.SupportsIndex, start: typing.Annotated[collections.abc.Sequence[typing.SupportsFloat | typing.SupportsIndex], "FixedSize(3)"], inertia_kgm2: typing.SupportsFloat | typing.SupportsIndex, gear_ratio: typing.SupportsFloat | typing.SupportsIndex, inductance_h: typing.SupportsFloat | typing.SupportsIndex, supply_v: typing.SupportsFloat | typing.SupportsIndex, cost_tolerance: typing.SupportsFloat | typing.SupportsIndex, lanes: bool) -> dict:
+    """
+    Staged fit of the ten parameters from every start; releases the GIL.
+    """
+def fit_throttle_groups(records: collections.abc.Sequence[tuple[typing.SupportsFloat | typing.SupportsIndex, typing.Annotated[numpy.typing.ArrayLike, numpy.float64], typing.Annotated[numpy.typing.ArrayLike, numpy.float64], collections.abc.Sequence[typing.SupportsFloat | typing.SupportsIndex], typing.SupportsInt | typing.SupportsIndex, bool]], *, stages: collections.abc.Sequence[tuple[collections.abc.Sequence[typing.SupportsInt | typing.SupportsIndex], collections.abc.Sequence[typing.SupportsInt | typing.SupportsIndex], typing.SupportsFloat | typing.SupportsIndex, typing.SupportsFloat | typing.SupportsIndex, typing.SupportsInt | typing.SupportsIndex]], starts: collections.abc.Sequence[typing.Annotated[collections.abc.Sequence[typing.SupportsFloat | typing.SupportsIndex], "FixedSize(9)"]], closed_deg: typing.SupportsFloat | typing.SupportsIndex, open_deg: typing.SupportsFloat | typing.SupportsIndex, ramp_deg: typing.SupportsFloat | typing.SupportsIndex, substeps: typing.SupportsInt | typing.SupportsIndex, n_threads: typing.SupportsInt | typing.SupportsIndex) -> dict:
+    """
+    Staged multi-start fit of the throttle groups; releases the GIL.
+    """
 def hardenberg_hase_delay_cad(pressure_bar: typing.Annotated[numpy.typing.ArrayLike, numpy.float64], temperature_k: typing.Annotated[numpy.typing.ArrayLike, numpy.float64], cetane_number: typing.Annotated[numpy.typing.ArrayLike, numpy.float64], piston_speed_m_per_s: typing.Annotated[numpy.typing.ArrayLike, numpy.float64]) -> typing.Any:
     ...
 def hohenberg_coefficient(c1_bar_m3: typing.Annotated[numpy.typing.ArrayLike, numpy.float64], volume_m3: typing.Annotated[numpy.typing.ArrayLike, numpy.float64], pressure_bar: typing.Annotated[numpy.typing.ArrayLike, numpy.float64], temperature_k: typing.Annotated[numpy.typing.ArrayLike, numpy.float64], piston_speed_m_per_s: typing.Annotated[numpy.typing.ArrayLike, numpy.float64]) -> typing.Any:
@@ -2051,6 +2295,10 @@ def indicator_units() -> dict:
 def input_unit(name: str) -> str:
     """
     Unit of a differentiable input.
+    """
+def latin_hypercube(parameters: collections.abc.Sequence[Parameter], n: typing.SupportsInt | typing.SupportsIndex, seed: typing.SupportsInt | typing.SupportsIndex) -> list[typing.Annotated[numpy.typing.NDArray[numpy.float64], "[m, 1]"]]:
+    """
+    Points between the bounds, one per cell of every axis.
     """
 def least_squares(fun: collections.abc.Callable, x0: typing.Annotated[numpy.typing.ArrayLike, numpy.float64, "[m, 1]"], *, parameters: collections.abc.Sequence[Parameter], options: LeastSquaresOptions) -> FitReport:
     """
@@ -2110,6 +2358,26 @@ def simulate(cylinder: Cylinder, point: OperatingPoint, soc_cad: typing.Supports
     """
     One cycle: traces and indicators.
     """
+def simulate_smooth_throttle(parameters: typing.Annotated[collections.abc.Sequence[typing.SupportsFloat | typing.SupportsIndex], "FixedSize(10)"], duty: typing.Annotated[numpy.typing.ArrayLike, numpy.float64], *, step_s: typing.SupportsFloat | typing.SupportsIndex, start: typing.Annotated[collections.abc.Sequence[typing.SupportsFloat | typing.SupportsIndex], "FixedSize(3)"], inertia_kgm2: typing.SupportsFloat | typing.SupportsIndex, gear_ratio: typing.SupportsFloat | typing.SupportsIndex, inductance_h: typing.SupportsFloat | typing.SupportsIndex, supply_v: typing.SupportsFloat | typing.SupportsIndex) -> numpy.typing.NDArray[numpy.float64]:
+    """
+    Angle [deg] on every sample; releases the GIL.
+    """
+def simulate_throttle_groups(values: typing.Annotated[collections.abc.Sequence[typing.SupportsFloat | typing.SupportsIndex], "FixedSize(9)"], duty: typing.Annotated[numpy.typing.ArrayLike, numpy.float64], *, step_s: typing.SupportsFloat | typing.SupportsIndex, start: typing.Annotated[collections.abc.Sequence[typing.SupportsFloat | typing.SupportsIndex], "FixedSize(3)"], closed_deg: typing.SupportsFloat | typing.SupportsIndex, open_deg: typing.SupportsFloat | typing.SupportsIndex, ramp_deg: typing.SupportsFloat | typing.SupportsIndex, substeps: typing.SupportsInt | typing.SupportsIndex) -> numpy.typing.NDArray[numpy.float64]:
+    """
+    Angle [deg] on every sample; releases the GIL.
+    """
+def smooth_throttle_instruction_set() -> str:
+    """
+    Instruction set that the kernel chose on this machine.
+    """
+def simulate_throttle(throttle: Throttle, duty: typing.Annotated[numpy.typing.ArrayLike, numpy.float64], *, sample_s: typing.SupportsFloat | typing.SupportsIndex, start_deg: typing.SupportsFloat | typing.SupportsIndex, bridge: str, supply_v: typing.Annotated[numpy.typing.ArrayLike, numpy.float64], airflow_torque_nm: typing.Annotated[numpy.typing.ArrayLike, numpy.float64], step_s: typing.SupportsFloat | typing.SupportsIndex) -> dict:
+    """
+    One throttle over columns, from rest; behind mgdd.throttle.simulate.
+    """
+def simulate_throttle_many(throttles: collections.abc.Sequence[Throttle], duty: typing.Annotated[numpy.typing.ArrayLike, numpy.float64], *, sample_s: typing.SupportsFloat | typing.SupportsIndex, start_deg: typing.Annotated[numpy.typing.ArrayLike, numpy.float64], bridge: str, supply_v: typing.Annotated[numpy.typing.ArrayLike, numpy.float64], airflow_torque_nm: typing.Annotated[numpy.typing.ArrayLike, numpy.float64], step_s: typing.SupportsFloat | typing.SupportsIndex) -> numpy.typing.NDArray[numpy.float64]:
+    """
+    Many throttles under one input, in lanes; behind mgdd.throttle.simulate_many.
+    """
 def start_of_combustion(cylinder: Cylinder, point: OperatingPoint, soi_cad: typing.SupportsFloat | typing.SupportsIndex) -> dict:
     """
     SOI to SOC.
@@ -2117,6 +2385,14 @@ def start_of_combustion(cylinder: Cylinder, point: OperatingPoint, soi_cad: typi
 def start_of_injection(cylinder: Cylinder, point: OperatingPoint, soc_cad: typing.SupportsFloat | typing.SupportsIndex) -> dict:
     """
     SOC to SOI.
+    """
+def throttle_group_bounds() -> list:
+    """
+    The nine groups with their bounds.
+    """
+def throttle_airflow_torque(throttle: Throttle, angle_deg: typing.Annotated[numpy.typing.ArrayLike, numpy.float64]) -> numpy.typing.NDArray[numpy.float64]:
+    """
+    Torque of the modelled air flow [N m]; behind mgdd.throttle.airflow_torque_nm.
     """
 def tune(*, noise_sd: typing.SupportsFloat | typing.SupportsIndex, curvature: typing.SupportsFloat | typing.SupportsIndex, method: str, delay_cycles: typing.SupportsFloat | typing.SupportsIndex, lag_cycles: typing.SupportsFloat | typing.SupportsIndex, compensated: bool, rms: typing.SupportsFloat | typing.SupportsIndex | None, cycles: typing.SupportsFloat | typing.SupportsIndex | None, distance: typing.SupportsFloat | typing.SupportsIndex | None, arrival: typing.SupportsFloat | typing.SupportsIndex | None, amplitude_max: typing.SupportsFloat | typing.SupportsIndex | None) -> dict:
     """
@@ -2144,6 +2420,9 @@ def woschni_coefficient(c1_bar_m: typing.Annotated[numpy.typing.ArrayLike, numpy
     """
 __version__: str = '0.1.0'
 correlation_limit: float = 0.98
+smooth_throttle_example: tuple = (0.016, 0.004, 0.12, 0.5, 0.12, 0.25, 0.02, 0.14, 0.016, 1.2)
+smooth_throttle_names: tuple = ('torque_constant_nm_per_a', 'viscous_nms_per_rad', 'coulomb_nm', 'friction_width_rad_per_s', 'spring_nm_per_rad', 'preload_nm', 'preload_width_rad', 'limp_home_rad', 'emf_constant_vs_per_rad', 'resistance_ohm')
+throttle_group_names: tuple = ('tau_s', 'gain_deg_per_s2_per_duty', 'beta_above_duty', 'kappa_above_duty_per_deg', 'delta_duty', 'beta_below_duty', 'kappa_below_duty_per_deg', 'limp_home_deg', 'electrical_s')
 timing_window_cad: tuple = (-60.0, 20.0)
 wall_heat_scale_upper: float = 2.5
 woschni_c1_bar_m: float = 129.8

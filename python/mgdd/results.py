@@ -107,6 +107,23 @@ VARIABLES: Mapping[str, Label] = MappingProxyType(
         "rmse_percent": Label("% of p_max", "pressure RMSE, closed cycle"),
         "imep_closed_error_percent": Label("%", "error of the closed-cycle IMEP"),
         "wall_heat_scale": Label("-", "wall-heat scale"),
+        "time_s": Label("s", "time"),
+        "duty": Label("-", "duty"),
+        "angle_deg": Label("deg", "plate angle"),
+        "model_deg": Label("deg", "plate angle, model"),
+        "current_a": Label("A", "motor current"),
+        "supply_v": Label("V", "supply voltage"),
+        "airflow_torque_nm": Label("N m", "torque of the air flow on the plate"),
+        "start_angle_deg": Label("deg", "plate angle at the start"),
+        "final_angle_deg": Label("deg", "plate angle at the end"),
+        "max_angle_deg": Label("deg", "highest plate angle"),
+        "min_angle_deg": Label("deg", "lowest plate angle"),
+        "max_current_a": Label("A", "highest motor current"),
+        "duration_s": Label("s", "length of the run"),
+        "step_s": Label("s", "integration step"),
+        "t10_s": Label("s", "time to 10 % of the way"),
+        "t90_s": Label("s", "time to 90 % of the way"),
+        "speed_deg_per_s": Label("deg/s", "plate speed"),
     }
 )
 

@@ -14,8 +14,9 @@ from mgdd import presets
 from mgdd.engine import Cylinder, OperatingPoint
 from mgdd.errors import DataError, ParameterError
 from mgdd.presets import Preset
+from mgdd.throttle import Throttle
 
-RECORDS = (Cylinder, OperatingPoint)
+RECORDS = (Cylinder, OperatingPoint, Throttle)
 CHANGES = [(kind, name) for kind in RECORDS for name in kind.fields()]
 
 
@@ -43,14 +44,16 @@ def test_every_field_survives_every_way_round(kind, name, tmp_path):
         assert copied == changed
         assert hash(copied) == hash(changed)
     assert repr(changed) == f"{kind.__name__}({name}={value!r})"
-    own = {"cylinder": changed} if kind is Cylinder else {"point": changed}
-    preset = Preset(name="mine", title='a "title", °CA', **{"cylinder": Cylinder(), "point": OperatingPoint(), **own})
+    table = {Cylinder: "cylinder", OperatingPoint: "point", Throttle: "throttle"}[kind]
+    engine = {} if kind is Throttle else {"cylinder": Cylinder(), "point": OperatingPoint()}
+    preset = Preset(name="mine", title='a "title", °CA', **{**engine, table: changed})
     file = tmp_path / "mine.toml"
     file.write_text(preset.to_toml(), encoding="utf-8")
     back = presets.load(file)
     assert (back.name, back.title) == (preset.name, preset.title)
-    assert back.cylinder == preset.cylinder
-    assert back.point == preset.point
+    assert back.records == preset.records
+    assert back.records == preset.records
+    assert getattr(back, table) == changed
 
 
 def test_records_are_immutable_and_equal_to_their_own_kind_only():
@@ -85,7 +88,7 @@ def test_any_number_survives_exactly(bore, ratio, scale, slope, tmp_path_factory
 def test_shipped_presets_state_a_source_for_every_value(name, tmp_path):
     preset = presets.load(name)
     assert preset.name == name
-    for table, record in (("cylinder", preset.cylinder), ("point", preset.point)):
+    for table, record in preset.records.items():
         for key, value in record.to_dict().items():
             if value is not None:
                 assert len(preset.sources[f"{table}.{key}"]) > 3, key
@@ -102,6 +105,42 @@ def test_the_two_engines_are_what_they_say():
     assert (hd.cylinder.bore_mm, hd.cylinder.stroke_mm, hd.cylinder.connecting_rod_mm) == (128.0, 144.0, 241.5)
     assert (hd.cylinder.compression_ratio, hd.cylinder.ivc_cad, hd.cylinder.evo_cad) == (20.3, -143.0, 125.0)
     assert hd.point.speed_rpm == 1200.0
+
+
+def test_the_three_throttles_are_what_they_say():
+    p1, p2, p3 = (presets.load(name).throttle for name in presets.available("throttle"))
+    assert p1 == Throttle()
+    assert (p2.friction, p2.stiction_nm / p2.coulomb_nm) == ("stribeck", pytest.approx(1.1))
+    assert p2 == p1.replace(
+        spring_above_nm_per_rad=0.819, spring_below_nm_per_rad=0.819, preload_above_nm=0.2, preload_below_nm=0.2,
+        coulomb_nm=0.1, stiction_nm=0.11, friction="stribeck",
+    )  # fmt: skip
+    assert (p3.limp_home_deg, p3.torque_constant_nm_per_a / p3.resistance_ohm) == (12.0, 0.24)
+    for name in presets.available("throttle"):  # the only place of rest is limp-home
+        throttle = presets.load(name).throttle
+        assert min(throttle.preload_above_nm, throttle.preload_below_nm) > throttle.stiction_nm
+        assert "not read" in presets.load(name).sources["throttle.inertia_kgm2"] or name == "P3"
+
+
+def test_engines_and_throttles_are_kept_apart():
+    assert presets.available() == tuple(sorted(presets.available("engine") + presets.available("throttle")))
+    assert [presets.load(name).kind for name in ("P1", "puma_single")] == ["throttle", "engine"]
+    with pytest.raises(ParameterError, match="'P1' is a throttle, not an engine: shipped engines are hd_diesel"):
+        _ = presets.load("P1").cylinder
+    with pytest.raises(ParameterError, match="'P1' is a throttle, not an engine"):
+        _ = presets.load("P1").point
+    with pytest.raises(ParameterError, match="'puma_single' is an engine, not a throttle: shipped throttles are P1"):
+        _ = presets.load("puma_single").throttle
+    with pytest.raises(ParameterError, match="'puma_single' is an engine, not a throttle"):
+        presets.load("puma_single", kind="throttle")
+    with pytest.raises(ParameterError, match="no preset 'P4': shipped are P1, P2, P3; or pass a path"):
+        presets.load("P4", kind="throttle")
+    with pytest.raises(ParameterError, match="kind = 'car': must be one of engine, throttle"):
+        presets.available("car")
+    for nothing in ({}, {"point": OperatingPoint()}, {"cylinder": Cylinder(), "throttle": Throttle()}):
+        with pytest.raises(ParameterError, match=r"preset 'x': give a cylinder \(and its point\), or a throttle"):
+            Preset(name="x", title="x", **nothing)
+    assert Preset(name="x", title="x", cylinder=Cylinder()).point == OperatingPoint()
 
 
 def written(tmp_path, text):
@@ -129,6 +168,18 @@ def spoilt(old, new):
         (spoilt("source", "origin"), ParameterError, "bore_mm: write"),
         (spoilt("90.0", '"wide"'), ParameterError, "bore_mm"),
         (f"[cylinder]\n{BORE}\n[motor]\nx = 1", ParameterError, "unknown key 'motor'"),
+        (f"[cylinder]\n{BORE}\n[throttle]\n", ParameterError, r"\[cylinder\] beside \[throttle\]"),
+        ("[throttle]\n", DataError, r"\[throttle\] lacks inertia_kgm2, .*a motor has no default"),
+        (
+            '[throttle]\ncoulomb_nm = { value = 0.3, unit = "N cm", source = "mine" }',
+            ParameterError,
+            "coulomb_nm: unit = 'N cm': must be 'N m'",
+        ),
+        (
+            '[throttle]\ncoulomb_nm = { value = -0.3, unit = "N m", source = "mine" }',
+            ParameterError,
+            "coulomb_nm = -0.3 N m: must be >= 0",
+        ),
         ("[point]\n", DataError, r"no table \[cylinder\]"),
         ("cylinder = 3", DataError, r"\[cylinder\] must be a table"),
         ("[cylinder", DataError, "not valid TOML"),

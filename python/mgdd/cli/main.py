@@ -11,13 +11,16 @@ import sys
 from collections.abc import Sequence
 
 from mgdd import _core
-from mgdd.cli import demo, doctor, engine, study
+from mgdd.cli import demo, doctor, engine, study, throttle
 from mgdd.errors import ConvergenceError, Error
 
 __all__ = ["main"]
 
 EXIT_OK, EXIT_BAD_INPUT, EXIT_NO_CONVERGENCE, EXIT_INTERRUPTED, EXIT_PIPE = 0, 2, 3, 130, 141
-_ARGUMENT = re.compile(r"\b(pressure_unit|angle_unit|decimal|delimiter|firing_tdc_deg)=('[^']*'|[\d.]*)")
+_ARGUMENT = re.compile(
+    r"\b(pressure_unit|angle_unit|duty_unit|time_unit|decimal|delimiter|firing_tdc_deg|start_s|stop_s|step_s|duty|angle)"
+    r"=('[^']*'|[\d.]*)"
+)
 
 _EPILOG = """exit codes: 0 done, 2 bad input or usage, 3 no convergence or no feasible answer, 130 interrupted.
 
@@ -25,6 +28,7 @@ examples:
   mgdd demo
   mgdd engine simulate --preset puma_single --soc-cad -6 --json
   mgdd engine optimum --limit p_max_bar=95
+  mgdd throttle simulate --preset P1 --duty 0.6 --json
   mgdd study --list
 """
 
@@ -76,6 +80,8 @@ def main(argv: Sequence[str] | None = None) -> int:
 
 def _as_options(message: str) -> str:
     """Turn the remedies of the library, which name arguments, into those of the command line."""
+    message = message.replace("fit one side with two_sided=False", "leave --two-sided out for one side")
+    message = message.replace("angle_window_deg", "--angle-window-deg").replace("limp_home_deg =", "--limp-home-deg =")
     return _ARGUMENT.sub(lambda m: f"--{m[1].replace('_', '-')} {m[2]}".rstrip(), message)
 
 
@@ -91,6 +97,7 @@ def _parser() -> argparse.ArgumentParser:
     commands = parser.add_subparsers(title="commands", metavar="COMMAND")
     demo.add(commands)
     engine.add(commands)
+    throttle.add(commands)
     study.add(commands)
     doctor.add(commands)
     return parser

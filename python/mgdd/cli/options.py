@@ -58,7 +58,7 @@ def add_engine(parser: argparse.ArgumentParser) -> None:
     group = parser.add_argument_group("engine")
     group.add_argument(
         "--preset", metavar="NAME_OR_FILE.toml",
-        help=f"{', '.join(presets.available())} or a TOML file (default: puma_single)",
+        help=f"{', '.join(presets.available('engine'))} or a TOML file (default: puma_single)",
     )  # fmt: skip
     group.add_argument(
         "--set", action="append", default=[], metavar="FIELD=VALUE",
@@ -114,7 +114,7 @@ def add_files(parser: argparse.ArgumentParser, *, nargs: int | str) -> None:
 
 def engine_of(args: argparse.Namespace) -> tuple[Cylinder, OperatingPoint, presets.Preset]:
     """Make cylinder and point from a preset and the options over it."""
-    preset = presets.load(args.preset or _DEFAULT_PRESET)
+    preset = presets.load(args.preset or _DEFAULT_PRESET, kind="engine")
     if args.preset is None and getattr(args, "files", None):
         c = preset.cylinder
         _LOG.warning(

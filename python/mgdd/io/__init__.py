@@ -1,4 +1,4 @@
-"""Files in, files out: measured pressure as CSV or plain columns, operating conditions as CSV.
+"""Files in, files out: measured pressure, throttle logs (also from MATLAB) and operating conditions.
 
 Angles are degrees of crank angle with firing TDC = 0 and compression negative (°CA aTDC); pressure is in bar.
 """
@@ -9,15 +9,21 @@ from mgdd.io.angles import from_0_720, from_btdc
 from mgdd.io.checks import check_trace
 from mgdd.io.conditions import read_conditions
 from mgdd.io.pressure import pressure_trace, read_pressure, write_pressure
+from mgdd.io.throttle_checks import check_throttle_log
+from mgdd.io.throttle_log import read_throttle_log, throttle_log, write_throttle_log
 from mgdd.io.traces import write_traces
 
 __all__ = [
+    "check_throttle_log",
     "check_trace",
     "from_0_720",
     "from_btdc",
     "pressure_trace",
     "read_conditions",
     "read_pressure",
+    "read_throttle_log",
+    "throttle_log",
     "write_pressure",
+    "write_throttle_log",
     "write_traces",
 ]

@@ -116,7 +116,7 @@ class EngineBench(_core.EngineBench):
         if not 0 <= seed < 2**64:
             raise ParameterError(f"seed = {seed}: must be in [0, 2**64)")
         if isinstance(engine, str):
-            engine = presets.load(engine)
+            engine = presets.load(engine, kind="engine")
         if isinstance(engine, Preset):
             cylinder, nominal = engine.cylinder, engine.point
         else:

@@ -1,6 +1,6 @@
 """Figures: a Dataset goes in, matplotlib Axes come out; `ax=` is accepted and nothing is shown or simulated.
 
-Every angle axis reads "crank angle [°CA aTDC]". Lines differ in dash or marker as well as in colour, so that
+Every crank-angle axis reads "crank angle [°CA aTDC]". Lines differ in dash or marker as well as in colour, so that
 a figure survives a black-and-white printer. Legends stand above the axes, where they hide no data: for a
 title use the figure's `suptitle`.
 """
@@ -10,19 +10,31 @@ from __future__ import annotations
 from mgdd.plot.calibration import calibration_overlay, wall_heat_profile
 from mgdd.plot.convergence import convergence
 from mgdd.plot.cycle import log_pv, pressure
+from mgdd.plot.identification import correlation_matrix, error_growth, residual_correlation
 from mgdd.plot.learning import learning
 from mgdd.plot.seeking import seeking
 from mgdd.plot.sensors import sensors
+from mgdd.plot.throttle import free_run, holding_duty
+from mgdd.plot.throttle_habits import air_flow, rate_dependence
+from mgdd.plot.throttle_run import throttle_run
 from mgdd.plot.timing import timing
 
 __all__ = [
+    "air_flow",
     "calibration_overlay",
     "convergence",
+    "correlation_matrix",
+    "error_growth",
+    "free_run",
+    "holding_duty",
     "learning",
     "log_pv",
     "pressure",
+    "rate_dependence",
+    "residual_correlation",
     "seeking",
     "sensors",
+    "throttle_run",
     "timing",
     "wall_heat_profile",
 ]

@@ -17,6 +17,7 @@ from mgdd.plot.style import (
     legend,
     minus,
     new_axes,
+    panel_below,
     require,
 )
 from mgdd.results import ANGLE
@@ -74,7 +75,7 @@ def calibration_overlay(overlay: xr.Dataset, *, ax: Axes | None = None) -> Axes:
     optional = (*_EVENTS, "rmse_percent", "imep_closed_error_percent")
     require(overlay, (*needed, *(name for name in optional if name in overlay)), "mgdd.identify.fit_cylinder")
     ax = new_axes(ax, height=4.8)
-    panel = _panel_below(ax)
+    panel = panel_below(ax)
     angle = overlay[ANGLE].to_numpy()
     lines: list[Line2D] = ax.plot(angle, overlay["measured_bar"], ".", color=GREY, markersize=4, label="measured")
     lines += ax.plot(angle, overlay["model_bar"], "-", color=BLACK, linewidth=1.2, label=_model_name(overlay))
@@ -157,17 +158,6 @@ def wall_heat_profile(profile: xr.Dataset, *, ax: Axes | None = None) -> Axes:
     ax.set_ylim(bottom=0.0)
     legend(ax, [*lines, span])
     return ax
-
-
-def _panel_below(ax: Axes) -> Axes:
-    spec = ax.get_subplotspec()
-    if spec is not None:
-        inner = spec.subgridspec(2, 1, height_ratios=(3, 1), hspace=0.06)
-        ax.set_subplotspec(inner[0])
-        return ax.figure.add_subplot(inner[1], sharex=ax)
-    left, bottom, width, height = ax.get_position().bounds
-    ax.set_position((left, bottom + 0.27 * height, width, 0.73 * height))
-    return ax.figure.add_axes((left, bottom, width, 0.24 * height), sharex=ax)
 
 
 def _model_name(overlay: xr.Dataset) -> str:

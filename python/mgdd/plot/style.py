@@ -25,6 +25,7 @@ __all__ = [
     "legend",
     "minus",
     "new_axes",
+    "panel_below",
     "require",
 ]
 
@@ -46,6 +47,18 @@ def new_axes(ax: Axes | None, *, height: float = 3.8) -> Axes:
     import matplotlib.pyplot as plt
 
     return plt.subplots(figsize=(6.6, height), layout="constrained")[1]
+
+
+def panel_below(ax: Axes, *, share: float = 0.25) -> Axes:
+    """Give the lower `share` of `ax` to new axes with the same x axis, and return them."""
+    spec = ax.get_subplotspec()
+    if spec is not None:
+        inner = spec.subgridspec(2, 1, height_ratios=(1.0 - share, share), hspace=0.06)
+        ax.set_subplotspec(inner[0])
+        return ax.figure.add_subplot(inner[1], sharex=ax)
+    left, bottom, width, height = ax.get_position().bounds
+    ax.set_position((left, bottom + (share + 0.02) * height, width, (0.98 - share) * height))
+    return ax.figure.add_axes((left, bottom, width, (share - 0.01) * height), sharex=ax)
 
 
 def require(dataset: xr.Dataset, names: tuple[str, ...], made_by: str) -> None:

@@ -14,10 +14,12 @@ __all__ = ["available_studies", "run_study"]
 # One line per study: "my-name" is run_my_name in mgdd.studies.my_name, imported when it is run.
 _TITLES = {
     "measured-traces": "calibrate a cycle model to four measured traces and find their best timing",
+    "ch2-throttle-characteristics": "holding-duty hysteresis, rate dependence and air flow of a throttle",
     "ch3-optimizers": "every seeker on the same engine, noise, start and budget",
     "ch4-sensors": "NOx analyser, fast sensor and soft sensor, steady and in transients",
     "ch4-esc": "what a late NOx analyser does to extremum seeking, and three cures",
     "ch4-tests": "four tests of extremum seeking: efficiency, another start, NOx by analyser and by soft sensor",
+    "ch7-pseudo-wiener": "three pseudo-Wiener models of a throttle, in free run and re-anchored",
     "identification-benchmarks": "measured drive, tanks and circuit: fits beside published ones (needs the data sets)",
     "h2df-seek": "seekers on a surrogate of a measured hydrogen-diesel engine (needs the data set)",
 }

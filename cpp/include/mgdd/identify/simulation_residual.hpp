@@ -1,6 +1,6 @@
 // Output-error residual of a simulated model with exact forward sensitivities: free run over one or several records,
 // ready for optimize::LeastSquares. r(k) = weight(k) (y_model(k) - y_measured(k)) / sigma. Units are the model's own;
-// dt in s. The call is noexcept and allocates nothing. Source of the output-error form: Ljung 1999, section 5.2.
+// dt in s. The call is noexcept and allocates nothing. Sensitivities: Griewank and Walther 2008, chapter 3.
 #pragma once
 
 #include <algorithm>

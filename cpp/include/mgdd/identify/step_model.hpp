@@ -41,8 +41,7 @@ concept Ode = requires(const O& ode, const Values<double, O::n_parameters>& para
   { ode.template output<double>(parameters, state, input) } noexcept -> std::same_as<double>;
 };
 
-/// Classical Runge-Kutta of order 4 with the input held, `substeps` equal steps per sample (Hairer, Norsett and Wanner
-/// 1993, table 1.2).
+/// Classical Runge-Kutta of order 4 with the input held, `substeps` equal steps per sample.
 template <Ode O>
 struct Rk4 {
   static constexpr int n_states = O::n_states;

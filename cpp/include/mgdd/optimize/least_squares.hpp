@@ -58,6 +58,28 @@ class LeastSquares {
     return phase_ == Phase::search;
   }
 
+  /// The same search with the evaluation outside, for callers that evaluate many searches side by side: `ask()` is the
+  /// point to evaluate next, `tell()` takes residual and Jacobian there and returns false when the search has ended.
+  /// Always one `tell()` per `ask()`, after `prepare()`.
+  [[nodiscard]] const Eigen::VectorXd& ask() noexcept {
+    if (phase_ == Phase::start) return x_;
+    if (phase_ == Phase::search) propose();
+    return trial_x_;
+  }
+  bool tell(bool usable, const Eigen::VectorXd& residual, const Eigen::MatrixXd& jacobian) {
+    const auto given = [&](const Eigen::VectorXd&, Eigen::VectorXd& r, Eigen::MatrixXd* j) {
+      r = residual;
+      *j = jacobian;
+      return usable;
+    };
+    if (phase_ == Phase::start) {
+      begin(evaluate(given, x_, residual_, &jacobian_));
+    } else if (phase_ == Phase::search) {
+      settle(judge(evaluate(given, trial_x_, trial_residual_, &trial_jacobian_)));
+    }
+    return phase_ == Phase::search;
+  }
+
   /// State of the search, by value. Between iterations the status reads iteration_limit: stopped by the
   /// caller.
   [[nodiscard]] FitReport report() const;

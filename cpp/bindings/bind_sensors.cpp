@@ -1,0 +1,152 @@
+// Binds throttle/sensors.hpp: settings of the sensor pair, and samples of a whole run without the GIL.
+#include <array>
+#include <cstddef>
+#include <cstdint>
+#include <string>
+#include <tuple>
+#include <vector>
+
+#include "binding.hpp"
+#include "mgdd/throttle/sensors.hpp"
+
+namespace mgdd::bindings {
+namespace {
+
+using namespace throttle;
+
+py::dict to_dict(const SensorPair& p) {
+  py::dict out;
+  out["closed_v"] = p.closed_v;
+  out["span_v"] = p.span_v;
+  out["travel_deg"] = p.travel_deg;
+  out["supply_v"] = p.supply_v;
+  out["noise_v"] = p.noise_v;
+  out["lag_s"] = p.lag_s;
+  out["adc_bits"] = p.adc_bits;
+  out["sum_tolerance_v"] = p.sum_tolerance_v;
+  out["low_v"] = p.low_v;
+  out["high_v"] = p.high_v;
+  out["debounce_s"] = p.debounce_s;
+  return out;
+}
+
+template <class Of>
+py::array_t<double> volts(const std::vector<SensorReading>& rows, Of of) {
+  py::array_t<double> out(static_cast<py::ssize_t>(rows.size()));
+  double* at = out.mutable_data();
+  for (const SensorReading& row : rows)
+    *at++ = of(row);
+  return out;
+}
+
+template <class Of>
+py::array_t<bool> flags(const std::vector<SensorReading>& rows, Of of) {
+  py::array_t<bool> out(static_cast<py::ssize_t>(rows.size()));
+  bool* at = out.mutable_data();
+  for (const SensorReading& row : rows)
+    *at++ = of(row);
+  return out;
+}
+
+py::dict sense(const SensorPair& pair, const InputArray& angle_deg, double sample_s, std::uint64_t seed,
+               const std::array<std::tuple<std::string, double, double>, 2>& faults) {
+  std::array<SensorFault, 2> parsed;
+  for (std::size_t i = 0; i < 2; ++i) {
+    const auto& [kind, from_s, size] = faults[i];
+    parsed[i] = {parse_name(sensor_fault_names(), "fault", kind), from_s, size};
+  }
+  const std::vector<double> angle = to_column(angle_deg, "angle_deg");
+  SensorSampler sampler(pair, sample_s, seed, parsed);
+  std::vector<SensorReading> rows;
+  rows.reserve(angle.size());
+  {
+    const py::gil_scoped_release release;
+    for (const double value : angle)
+      rows.push_back(sampler.step(value));
+  }
+  py::dict out;
+  out["first_v"] = volts(rows, [](const SensorReading& r) { return r.volts[0]; });
+  out["second_v"] = volts(rows, [](const SensorReading& r) { return r.volts[1]; });
+  out["sensed_angle_deg"] = volts(rows, [](const SensorReading& r) { return r.angle_deg; });
+  out["sum_error_v"] = volts(rows, [](const SensorReading& r) { return r.sum_error_v; });
+  out["first_range_fault"] = flags(rows, [](const SensorReading& r) { return r.range_fault[0]; });
+  out["second_range_fault"] = flags(rows, [](const SensorReading& r) { return r.range_fault[1]; });
+  out["sum_fault"] = flags(rows, [](const SensorReading& r) { return r.sum_fault; });
+  out["fault"] = flags(rows, [](const SensorReading& r) { return r.fault; });
+  return out;
+}
+
+}  // namespace
+
+void bind_sensors(py::module_& m) {
+  const SensorPair d;
+  py::class_<SensorPair> cls(m, "SensorPair",
+                             R"(Two redundant position sensors of a throttle with opposite slopes, and their check.
+
+Keyword-only and immutable. The first gives ``closed_v + span_v angle/travel_deg``, the second ``supply_v`` minus that.
+
+Parameters
+----------
+closed_v, span_v : float
+    First sensor at 0 deg, and its rise over the travel [V]; 0 and 5 are the ideal form of catalogues.
+travel_deg : float
+    Angle of the full span [deg].
+supply_v : float
+    Supply of sensors and converter [V].
+noise_v : float
+    Noise at the converter, rms of each sensor [V].
+lag_s : float
+    Time constant of the anti-alias filter [s].
+adc_bits : int
+    Bits of the converter, 4 to 24.
+sum_tolerance_v : float
+    The sum may differ from the supply by less than this [V].
+low_v, high_v : float
+    Range of a healthy sensor [V].
+debounce_s : float
+    A check must fail without a break for so long before the fault counts [s].
+
+Raises
+------
+mgdd.errors.ParameterError
+    A field outside its domain, naming field, value and bound.
+
+Examples
+--------
+>>> from mgdd.throttle import SensorPair
+>>> SensorPair().adc_bits
+12
+)");
+  cls.def(py::init([](double closed_v, double span_v, double travel_deg, double supply_v, double noise_v, double lag_s,
+                      int adc_bits, double sum_tolerance_v, double low_v, double high_v, double debounce_s) {
+            const SensorPair p{closed_v, span_v,          travel_deg, supply_v, noise_v,   lag_s,
+                               adc_bits, sum_tolerance_v, low_v,      high_v,   debounce_s};
+            validate(p);
+            return p;
+          }),
+          py::kw_only(), py::arg("closed_v") = d.closed_v, py::arg("span_v") = d.span_v,
+          py::arg("travel_deg") = d.travel_deg, py::arg("supply_v") = d.supply_v, py::arg("noise_v") = d.noise_v,
+          py::arg("lag_s") = d.lag_s, py::arg("adc_bits") = d.adc_bits, py::arg("sum_tolerance_v") = d.sum_tolerance_v,
+          py::arg("low_v") = d.low_v, py::arg("high_v") = d.high_v, py::arg("debounce_s") = d.debounce_s);
+  cls.def_readonly("closed_v", &SensorPair::closed_v, "First sensor at 0 deg [V].");
+  cls.def_readonly("span_v", &SensorPair::span_v, "Rise of the first sensor over the travel [V].");
+  cls.def_readonly("travel_deg", &SensorPair::travel_deg, "Angle of the full span [deg].");
+  cls.def_readonly("supply_v", &SensorPair::supply_v, "Supply of sensors and converter [V].");
+  cls.def_readonly("noise_v", &SensorPair::noise_v, "Noise of each sensor, rms [V].");
+  cls.def_readonly("lag_s", &SensorPair::lag_s, "Time constant of the anti-alias filter [s].");
+  cls.def_readonly("adc_bits", &SensorPair::adc_bits, "Bits of the converter.");
+  cls.def_readonly("sum_tolerance_v", &SensorPair::sum_tolerance_v, "Tolerance of the sum [V].");
+  cls.def_readonly("low_v", &SensorPair::low_v, "Lowest healthy voltage [V].");
+  cls.def_readonly("high_v", &SensorPair::high_v, "Highest healthy voltage [V].");
+  cls.def_readonly("debounce_s", &SensorPair::debounce_s, "Time a check must fail [s].");
+  cls.def_property_readonly("lsb_v", &SensorPair::lsb_v, "Step of the converter [V].");
+  bind_value(cls, "SensorPair", [](const SensorPair& p) { return to_dict(p); });
+  py::list kinds;
+  for (const auto& [kind, name] : sensor_fault_names())
+    kinds.append(as_str(name));
+  m.attr("sensor_fault_kinds") = py::tuple(kinds);
+  m.def("sense_throttle", &sense, py::arg("pair"), py::arg("angle_deg"), py::kw_only(), py::arg("sample_s"),
+        py::arg("seed"), py::arg("faults"), "Samples of both sensors; behind mgdd.throttle.sense.");
+}
+
+}  // namespace mgdd::bindings

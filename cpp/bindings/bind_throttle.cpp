@@ -1,0 +1,249 @@
+// Binds include/mgdd/throttle: the parameter record, and runs over sampled inputs without the GIL.
+#include <algorithm>
+#include <cstddef>
+#include <span>
+#include <stdexcept>
+#include <string>
+#include <utility>
+#include <vector>
+
+#include "binding.hpp"
+#include "mgdd/common/bounds.hpp"
+#include "mgdd/common/error.hpp"
+#include "mgdd/throttle/plant.hpp"
+#include "mgdd/throttle/simulation.hpp"
+#include "record_binding.hpp"
+
+namespace mgdd::bindings {
+namespace {
+
+using namespace throttle;
+
+constexpr std::size_t field_count = 34;
+constexpr std::size_t steps_between_looks = 200'000;
+
+py::dict to_dict(const Throttle& t) {
+  py::dict out;
+  for (const Field& field : fields())
+    out[as_str(field.info.name)] = t.*(field.member);
+  out["friction"] = as_str(name_of(friction_names(), t.friction));
+  out["backlash"] = as_str(name_of(backlash_names(), t.backlash));
+  return out;
+}
+
+// One keyword of __init__ per number, with the C++ default.
+template <std::size_t>
+using Number = double;
+
+template <std::size_t... I>
+void bind_init(py::class_<Throttle>& cls, std::index_sequence<I...>) {
+  const Throttle d;
+  cls.def(py::init([](const std::string& friction, const std::string& backlash, Number<I>... values) {
+            Throttle t;
+            ((t.*(fields()[I].member) = values), ...);
+            t.friction = parse_name(friction_names(), "friction", friction);
+            t.backlash = parse_name(backlash_names(), "backlash", backlash);
+            validate(t);
+            return t;
+          }),
+          py::kw_only(), py::arg("friction") = std::string(name_of(friction_names(), d.friction)),
+          py::arg("backlash") = std::string(name_of(backlash_names(), d.backlash)),
+          (py::arg(fields()[I].info.name.data()) = d.*(fields()[I].member))...);
+}
+
+Throttle replaced(const Throttle& from, const py::kwargs& changes) {
+  Throttle t = from;
+  for (const auto& [key, value] : changes) {
+    const auto name = key.cast<std::string>();
+    if (name == "friction") {
+      t.friction = parse_name(friction_names(), name, as_name(key, value));
+    } else if (name == "backlash") {
+      t.backlash = parse_name(backlash_names(), name, as_name(key, value));
+    } else {
+      const auto all = fields();
+      const auto field = std::find_if(all.begin(), all.end(), [&](const Field& f) { return f.info.name == name; });
+      if (field == all.end()) unknown_field("Throttle", key, to_dict(from));
+      t.*(field->member) = as_number(key, value);
+    }
+  }
+  validate(t);
+  return t;
+}
+
+template <class Enum>
+py::dict describe_names(Names<Enum> names, Enum chosen, std::string_view meaning) {
+  std::vector<std::string_view> valid;
+  for (const auto& [value, name] : names)
+    valid.push_back(name);
+  return describe_choice(name_of(names, chosen), valid, meaning);
+}
+
+py::dict describe_fields() {
+  const Throttle d;
+  py::dict out;
+  for (const Field& field : fields())
+    out[as_str(field.info.name)] = describe(field.info, py::float_(d.*(field.member)));
+  out["friction"] = describe_names(friction_names(), d.friction, "law of the dry friction");
+  out["backlash"] = describe_names(backlash_names(), d.backlash, "play between gear and plate");
+  return out;
+}
+
+void bind_record(py::module_& m) {
+  if (fields().size() != field_count) throw std::logic_error("bind_throttle.cpp: field_count is out of date");
+  py::class_<Throttle> cls(m, "Throttle",
+                           R"(Parameters of an electronic throttle body, seen from the plate shaft.
+
+Keyword-only and immutable; units stand in the names. Angles are degrees from mechanically closed, opening positive.
+Defaults are the preset `P1`. `Throttle.fields()` lists every field with unit, bounds, meaning and default.
+
+Raises
+------
+mgdd.errors.ParameterError
+    A field outside its domain, naming field, value and bound.
+
+Examples
+--------
+>>> from mgdd.throttle import Throttle
+>>> t = Throttle(limp_home_deg=10.0, friction="stribeck", stiction_nm=0.3)
+>>> t
+Throttle(stiction_nm=0.3, limp_home_deg=10.0, friction='stribeck')
+>>> t.replace(supply_v=14.4).supply_v
+14.4
+)");
+  bind_init(cls, std::make_index_sequence<field_count>{});
+  for (const Field& field : fields()) {
+    cls.def_property_readonly(
+        field.info.name.data(), [member = field.member](const Throttle& t) { return t.*member; },
+        (std::string(field.info.meaning) + " [" + std::string(field.info.unit) + "]").c_str());
+  }
+  cls.def_property_readonly(
+      "friction", [](const Throttle& t) { return std::string(name_of(friction_names(), t.friction)); },
+      "Law of the dry friction.");
+  cls.def_property_readonly(
+      "backlash", [](const Throttle& t) { return std::string(name_of(backlash_names(), t.backlash)); },
+      "Play between gear and plate.");
+  cls.def_property_readonly("stall_torque_nm", &Throttle::stall_torque_nm,
+                            "Stall torque per unit duty, g = K (V - V_drop)/R [N m].");
+  cls.def_property_readonly("damping_nms_per_rad", &Throttle::damping_nms_per_rad,
+                            "Viscous friction and braking by the shorted motor, b = K_v + K K_e/R [N m s/rad].");
+  cls.def_static("fields", &describe_fields, "Every field by name: unit, bounds or choices, meaning, default.");
+  bind_parameters(cls, "Throttle", [](const Throttle& t) { return to_dict(t); }, &replaced);
+}
+
+// Columns that live as long as a run; an empty one stands for "not given".
+struct Inputs {
+  Inputs(const InputArray& duty, const InputArray& supply, const InputArray& air, const std::string& bridge_name)
+      : duty_column(to_column(duty, "duty")),
+        supply_column(to_column(supply, "supply_v")),
+        air_column(to_column(air, "airflow_torque_nm")),
+        bridge(parse_name(bridge_names(), "bridge", bridge_name)) {
+    if (duty_column.empty()) throw ShapeError("duty has no samples");
+    validate(part(0, duty_column.size()));
+  }
+  ThrottleSignals part(std::size_t from, std::size_t count) const {
+    const auto cut = [&](const std::vector<double>& column) {
+      return column.empty() ? std::span<const double>{} : std::span(column).subspan(from, count);
+    };
+    return {cut(duty_column), cut(supply_column), cut(air_column), bridge};
+  }
+
+  std::vector<double> duty_column, supply_column, air_column;
+  Bridge bridge;
+};
+
+// Lets Ctrl-C through: whatever a signal handler raises ends the run.
+void look_for_signals() {
+  const py::gil_scoped_acquire gil;
+  if (PyErr_CheckSignals() != 0) throw py::error_already_set();
+}
+
+double checked_start(const Throttle& t, double start_deg) {
+  require_within("start_deg", start_deg, t.closed_deg, t.open_deg, "deg");
+  return start_deg;
+}
+
+py::dict simulate_one(const Throttle& t, const InputArray& duty, double sample_s, double start_deg,
+                      const std::string& bridge, const InputArray& supply_v, const InputArray& airflow_torque_nm,
+                      double step_s) {
+  const Inputs inputs(duty, supply_v, airflow_torque_nm, bridge);
+  const std::size_t steps = steps_per_sample(sample_s, step_s);
+  const ThrottlePlant plant(t, step_s);
+  ThrottleState state = at_rest(checked_start(t, start_deg));
+  const std::size_t n = inputs.duty_column.size();
+  std::vector<double> angle(n), speed(n), current(n);
+  {
+    const py::gil_scoped_release release;
+    const std::size_t chunk = std::max<std::size_t>(1, steps_between_looks / steps);
+    // The last sample of a chunk is the first of the next: its inputs act from there.
+    for (std::size_t from = 0;; from += chunk) {
+      const std::size_t count = std::min(chunk + 1, n - from);
+      const auto cut = [&](std::vector<double>& column) { return std::span(column).subspan(from, count); };
+      simulate(plant, inputs.part(from, count), steps, state, {cut(angle), cut(speed), cut(current)});
+      if (from + count == n) break;
+      look_for_signals();
+    }
+  }
+  py::dict out;
+  out["angle_deg"] = to_array(angle);
+  out["speed_deg_per_s"] = to_array(speed);
+  out["current_a"] = to_array(current);
+  return out;
+}
+
+py::array_t<double> simulate_lanes(const std::vector<Throttle>& throttles, const InputArray& duty, double sample_s,
+                                   const InputArray& start_deg, const std::string& bridge, const InputArray& supply_v,
+                                   const InputArray& airflow_torque_nm, double step_s) {
+  const Inputs inputs(duty, supply_v, airflow_torque_nm, bridge);
+  const std::size_t steps = steps_per_sample(sample_s, step_s);
+  const std::vector<double> starts = to_column(start_deg, "start_deg");
+  if (starts.size() != throttles.size()) {
+    throw ShapeError("start_deg has " + std::to_string(starts.size()) + " entries, there are " +
+                     std::to_string(throttles.size()) + " throttles");
+  }
+  std::vector<ThrottleCase> cases;
+  for (std::size_t i = 0; i < throttles.size(); ++i) {
+    if (throttles[i].friction != throttles[0].friction || throttles[i].backlash != throttles[0].backlash) {
+      throw ParameterError("throttle " + std::to_string(i) +
+                           ": friction and backlash must have the same form in all throttles of one call");
+    }
+    cases.push_back({throttles[i], at_rest(checked_start(throttles[i], starts[i]))});
+  }
+  const std::size_t n = inputs.duty_column.size();
+  py::array_t<double> out({static_cast<py::ssize_t>(cases.size()), static_cast<py::ssize_t>(n)});
+  double* at = out.mutable_data();
+  {
+    const py::gil_scoped_release release;
+    constexpr std::size_t cases_between_looks = 64;
+    for (std::size_t from = 0; from < cases.size(); from += cases_between_looks) {
+      const std::size_t count = std::min(cases_between_looks, cases.size() - from);
+      const std::vector<double> rows =
+          simulate_many(std::span(cases).subspan(from, count), inputs.part(0, n), steps, step_s);
+      at = std::copy(rows.begin(), rows.end(), at);
+      look_for_signals();
+    }
+  }
+  return out;
+}
+
+py::array_t<double> air_torque(const Throttle& t, const InputArray& angle_deg) {
+  std::vector<double> torque = to_column(angle_deg, "angle_deg");
+  for (double& value : torque)
+    value = airflow_torque_nm(t, value);
+  return to_array(torque);
+}
+
+}  // namespace
+
+void bind_throttle(py::module_& m) {
+  bind_record(m);
+  m.def("simulate_throttle", &simulate_one, py::arg("throttle"), py::arg("duty"), py::kw_only(), py::arg("sample_s"),
+        py::arg("start_deg"), py::arg("bridge"), py::arg("supply_v"), py::arg("airflow_torque_nm"), py::arg("step_s"),
+        "One throttle over columns, from rest; behind mgdd.throttle.simulate.");
+  m.def("simulate_throttle_many", &simulate_lanes, py::arg("throttles"), py::arg("duty"), py::kw_only(),
+        py::arg("sample_s"), py::arg("start_deg"), py::arg("bridge"), py::arg("supply_v"), py::arg("airflow_torque_nm"),
+        py::arg("step_s"), "Many throttles under one input, in lanes; behind mgdd.throttle.simulate_many.");
+  m.def("throttle_airflow_torque", &air_torque, py::arg("throttle"), py::arg("angle_deg"),
+        "Torque of the modelled air flow [N m]; behind mgdd.throttle.airflow_torque_nm.");
+}
+
+}  // namespace mgdd::bindings

@@ -1,0 +1,117 @@
+// Fits from many starts, and fits in stages. Starts come from a Latin hypercube of counter-based random numbers, so
+// that the same seed gives the same starts on every machine; results do not depend on the number of threads. Desk-time.
+#pragma once
+
+#include <atomic>
+#include <cmath>
+#include <cstddef>
+#include <cstdint>
+#include <exception>
+#include <string>
+#include <thread>
+#include <utility>
+#include <vector>
+
+#include <Eigen/Core>
+
+#include "mgdd/common/error.hpp"
+#include "mgdd/identify/simulation_residual.hpp"
+#include "mgdd/optimize/fit_report.hpp"
+#include "mgdd/optimize/least_squares.hpp"
+#include "mgdd/optimize/parameter.hpp"
+
+namespace mgdd::identify {
+
+/// `n` points between the finite bounds of the parameters, one per cell of every axis; log-scaled ones evenly in the
+/// logarithm. ParameterError for a bound that is not finite.
+std::vector<Eigen::VectorXd> latin_hypercube(const std::vector<optimize::Parameter>& parameters, std::size_t n,
+                                             std::uint64_t seed);
+
+struct MultiStartFit {
+  std::vector<optimize::FitReport> reports;  ///< one per start, in order
+  std::size_t best = 0;                      ///< lowest cost
+  std::size_t n_reached = 0;                 ///< reports whose rmse is within 0.5 % of the best
+};
+
+/// Ranks finished reports.
+MultiStartFit rank(std::vector<optimize::FitReport> reports);
+
+/// `fit(start)` for every start. With several threads `fit` is called from all of them: it must not share state.
+template <class Fit>
+MultiStartFit multi_start(const std::vector<Eigen::VectorXd>& starts, Fit&& fit, std::size_t n_threads = 1) {
+  if (starts.empty()) throw ShapeError("starts: must be at least one");
+  std::vector<optimize::FitReport> reports(starts.size());
+  if (n_threads <= 1) {
+    for (std::size_t i = 0; i < starts.size(); ++i)
+      reports[i] = fit(starts[i]);
+    return rank(std::move(reports));
+  }
+  std::atomic<std::size_t> next{0};
+  std::vector<std::exception_ptr> failures(starts.size());
+  {
+    std::vector<std::jthread> workers;
+    for (std::size_t t = 0; t < std::min(n_threads, starts.size()); ++t) {
+      workers.emplace_back([&] {
+        for (std::size_t i = next++; i < starts.size(); i = next++) {
+          try {
+            reports[i] = fit(starts[i]);
+          } catch (...) {
+            failures[i] = std::current_exception();
+          }
+        }
+      });
+    }
+  }
+  for (const std::exception_ptr& failure : failures) {
+    if (failure) std::rethrow_exception(failure);
+  }
+  return rank(std::move(reports));
+}
+
+/// One stage of a staged fit: which parameters are free, on how many first samples of which records.
+struct FitStage {
+  std::vector<std::size_t> free;
+  std::vector<std::size_t> records;  ///< indices; empty for all
+  double fraction = 1.0;             ///< of the samples of each record
+  optimize::LeastSquaresOptions search{};
+};
+
+/// Stages one after the other, each from where the last one ended. `parameters` describes every model parameter;
+/// `values` comes in as the start and goes out as the estimate. Returns the report of the last stage.
+template <StepModel Model>
+optimize::FitReport fit_in_stages(const Model& model, const std::vector<optimize::Parameter>& parameters,
+                                  const std::vector<SimulationRecord>& records, const std::vector<FitStage>& stages,
+                                  Values<double, Model::n_parameters>& values) {
+  if (parameters.size() != values.size()) {
+    throw ShapeError("parameters has " + std::to_string(parameters.size()) + " entries: must have " +
+                     std::to_string(values.size()));
+  }
+  if (stages.empty()) throw ShapeError("stages: must be at least one");
+  optimize::FitReport report;
+  for (const FitStage& stage : stages) {
+    std::vector<SimulationRecord> chosen;
+    for (std::size_t r = 0; r < records.size(); ++r) {
+      if (!stage.records.empty() && std::ranges::find(stage.records, r) == stage.records.end()) continue;
+      SimulationRecord record = records[r];
+      const auto n = static_cast<std::size_t>(std::llround(stage.fraction * static_cast<double>(record.output.size())));
+      record.output.resize(n);
+      record.input.resize(n * static_cast<std::size_t>(Model::n_inputs));
+      if (!record.weight.empty()) record.weight.resize(n);
+      chosen.push_back(std::move(record));
+    }
+    std::vector<optimize::Parameter> unknowns;
+    for (const std::size_t i : stage.free)
+      unknowns.push_back(parameters.at(i));
+    for (std::size_t r = 0; r < chosen.size(); ++r) {
+      for (const std::size_t s : chosen[r].free_start)
+        unknowns.push_back({.name = "start_" + std::to_string(s) + "[" + std::to_string(r) + "]"});
+    }
+    SimulationResidual<Model> residual(model, values, stage.free, std::move(chosen));
+    optimize::LeastSquares search(unknowns, residual.n_residuals(), stage.search);
+    report = search.solve(residual, residual.start());
+    values = residual.parameters(report.values);
+  }
+  return report;
+}
+
+}  // namespace mgdd::identify

@@ -1,0 +1,92 @@
+// Two redundant position sensors of a throttle plate with opposite slopes, their faults, and the check between them.
+// V1 = closed_v + span_v angle/travel, V2 = supply - V1; then fault, anti-alias filter, noise, limits and converter.
+// Volts and degrees. `step` is noexcept and allocation-free; equal seeds give equal noise in any order of calls.
+// Thresholds: sum within 0.2 V and range 0.2 to 4.8 V (Bosch Motorsport, MS 6 manual); 200 ms of debouncing is common.
+#pragma once
+
+#include <array>
+#include <cstdint>
+#include <optional>
+
+#include "mgdd/common/names.hpp"
+
+namespace mgdd::throttle {
+
+struct SensorPair {
+  double closed_v = 0.5;  ///< first sensor at 0 deg; 0 with span 5 is the ideal form of catalogues
+  double span_v = 4.0;    ///< over the travel
+  double travel_deg = 90.0;
+  double supply_v = 5.0;
+  double noise_v = 0.002;  ///< rms at the converter, each sensor its own
+  double lag_s = 3e-4;     ///< anti-alias filter, first order
+  int adc_bits = 12;
+  double sum_tolerance_v = 0.2;
+  double low_v = 0.2;  ///< range of a healthy sensor
+  double high_v = 4.8;
+  double debounce_s = 0.2;  ///< a check must fail without a break for so long
+
+  bool operator==(const SensorPair&) const = default;
+
+  [[nodiscard]] double lsb_v() const noexcept { return supply_v / static_cast<double>(1LL << adc_bits); }
+};
+
+enum class SensorFaultKind {
+  none,
+  open_wire,        ///< the input's resistor pulls it to 0 V
+  short_to_ground,  ///< 0 V
+  short_to_supply,
+  offset,  ///< size [V] is added
+  gain,    ///< the voltage grows by the share `size` [-]
+  stuck,   ///< holds the voltage of its onset
+};
+struct SensorFault {
+  SensorFaultKind kind = SensorFaultKind::none;
+  double from_s = 0.0;
+  double size = 0.0;
+};
+Names<SensorFaultKind> sensor_fault_names() noexcept;
+
+/// Everything that changes from sample to sample.
+struct SensorState {
+  std::array<double, 2> filtered_v{};
+  std::array<std::optional<double>, 2> stuck_v{};
+  std::int64_t sample = 0;
+  std::int64_t failing = 0;  ///< samples in a row with a failing check
+  bool fault = false;        ///< latched
+};
+
+struct SensorReading {
+  std::array<double, 2> volts{};  ///< as converted
+  double angle_deg = 0.0;         ///< of the first sensor, of the second where only the first is out of range
+  double sum_error_v = 0.0;       ///< V1 + V2 - supply
+  std::array<bool, 2> range_fault{};
+  bool sum_fault = false;
+  bool fault = false;  ///< a check has failed for the debounce time: open the bridge
+};
+
+/// ParameterError naming field, value and bound.
+void validate(const SensorPair& pair);
+void validate(const SensorFault& fault);
+
+class SensorSampler {
+ public:
+  /// ParameterError for bad settings, a fault of bad size, or a sample time outside [1e-5, 1] s.
+  SensorSampler(const SensorPair& pair, double sample_s, std::uint64_t seed, const std::array<SensorFault, 2>& faults);
+
+  /// Takes the next sample of the true angle.
+  SensorReading step(double angle_deg) noexcept;
+
+  const SensorState& state() const noexcept { return state_; }
+
+ private:
+  double faulty(std::size_t which, double volts, double time_s) noexcept;
+
+  SensorPair pair_;
+  double sample_s_, filter_, lsb_v_, highest_v_;
+  std::uint64_t seed_;
+  std::array<SensorFault, 2> faults_;
+  std::int64_t debounce_;
+  SensorState state_;
+};
+
+}  // namespace mgdd::throttle

@@ -1,0 +1,114 @@
+#include "mgdd/throttle/sensors.hpp"
+
+#include <algorithm>
+#include <cmath>
+#include <cstddef>
+#include <string>
+
+#include "mgdd/common/bounds.hpp"
+#include "mgdd/common/error.hpp"
+#include "mgdd/common/random.hpp"
+#include "mgdd/common/text.hpp"
+
+namespace mgdd::throttle {
+namespace {
+
+constexpr std::pair<SensorFaultKind, std::string_view> fault_table[] = {
+    {SensorFaultKind::none, "none"},
+    {SensorFaultKind::open_wire, "open_wire"},
+    {SensorFaultKind::short_to_ground, "short_to_ground"},
+    {SensorFaultKind::short_to_supply, "short_to_supply"},
+    {SensorFaultKind::offset, "offset"},
+    {SensorFaultKind::gain, "gain"},
+    {SensorFaultKind::stuck, "stuck"}};
+
+}  // namespace
+
+Names<SensorFaultKind> sensor_fault_names() noexcept {
+  return fault_table;
+}
+
+void validate(const SensorPair& p) {
+  require_within("supply_v", p.supply_v, 0.1, 100.0, "V");
+  require_within("closed_v", p.closed_v, 0.0, p.supply_v, "V");
+  require_positive("span_v", p.span_v, "V");
+  if (!(p.closed_v + p.span_v <= p.supply_v)) {
+    throw ParameterError("span_v = " + text(p.span_v) +
+                         " V: closed_v + span_v must be <= supply_v = " + text(p.supply_v) + " V");
+  }
+  require_within("travel_deg", p.travel_deg, 1.0, 360.0, "deg");
+  require_within("noise_v", p.noise_v, 0.0, p.supply_v, "V");
+  require_within("lag_s", p.lag_s, 0.0, 1.0, "s");
+  require_within("adc_bits", p.adc_bits, 4.0, 24.0);
+  require_within("sum_tolerance_v", p.sum_tolerance_v, 0.0, p.supply_v, "V");
+  require_within("low_v", p.low_v, 0.0, p.supply_v, "V");
+  require_within("high_v", p.high_v, p.low_v, p.supply_v, "V");
+  require_within("debounce_s", p.debounce_s, 0.0, 60.0, "s");
+}
+
+void validate(const SensorFault& fault) {
+  require_within("from_s", fault.from_s, 0.0, 1e9, "s");
+  if (fault.kind == SensorFaultKind::offset) require_within("size", fault.size, -100.0, 100.0, "V");
+  if (fault.kind == SensorFaultKind::gain) require_within("size", fault.size, -1.0, 10.0);
+}
+
+SensorSampler::SensorSampler(const SensorPair& pair, double sample_s, std::uint64_t seed,
+                             const std::array<SensorFault, 2>& faults)
+    : pair_(pair), sample_s_(sample_s), seed_(seed), faults_(faults) {
+  validate(pair);
+  require_within("sample_s", sample_s, 1e-5, 1.0, "s");
+  for (const SensorFault& fault : faults)
+    validate(fault);
+  filter_ = pair.lag_s > 0.0 ? -std::expm1(-sample_s / pair.lag_s) : 1.0;
+  lsb_v_ = pair.lsb_v();
+  highest_v_ = pair.supply_v - lsb_v_;
+  debounce_ = std::max<std::int64_t>(1, std::llround(pair.debounce_s / sample_s));
+}
+
+double SensorSampler::faulty(std::size_t which, double volts, double time_s) noexcept {
+  const SensorFault& fault = faults_[which];
+  if (time_s < fault.from_s) return volts;
+  switch (fault.kind) {
+    case SensorFaultKind::none:
+      return volts;
+    case SensorFaultKind::open_wire:
+    case SensorFaultKind::short_to_ground:
+      return 0.0;
+    case SensorFaultKind::short_to_supply:
+      return pair_.supply_v;
+    case SensorFaultKind::offset:
+      return volts + fault.size;
+    case SensorFaultKind::gain:
+      return volts * (1.0 + fault.size);
+    case SensorFaultKind::stuck:
+      if (!state_.stuck_v[which]) state_.stuck_v[which] = volts;
+      return *state_.stuck_v[which];
+  }
+  return volts;
+}
+
+SensorReading SensorSampler::step(double angle_deg) noexcept {
+  const double time_s = static_cast<double>(state_.sample) * sample_s_;
+  const double first_v = pair_.closed_v + pair_.span_v * angle_deg / pair_.travel_deg;
+  const std::array<double, 2> clean{first_v, pair_.supply_v - first_v};
+  SensorReading out;
+  for (std::size_t i = 0; i < 2; ++i) {
+    const double volts = std::clamp(faulty(i, clean[i], time_s), 0.0, pair_.supply_v);
+    double& held = state_.filtered_v[i];
+    held = state_.sample == 0 ? volts : held + filter_ * (volts - held);
+    const double noise = pair_.noise_v * random::normal(seed_, i, static_cast<std::uint64_t>(state_.sample));
+    out.volts[i] = std::clamp(std::round((held + noise) / lsb_v_) * lsb_v_, 0.0, highest_v_);
+    out.range_fault[i] = out.volts[i] < pair_.low_v || out.volts[i] > pair_.high_v;
+  }
+  out.sum_error_v = out.volts[0] + out.volts[1] - pair_.supply_v;
+  out.sum_fault = std::abs(out.sum_error_v) >= pair_.sum_tolerance_v;
+  const double used_v = out.range_fault[0] && !out.range_fault[1] ? pair_.supply_v - out.volts[1] : out.volts[0];
+  out.angle_deg = (used_v - pair_.closed_v) / pair_.span_v * pair_.travel_deg;
+  state_.failing = out.range_fault[0] || out.range_fault[1] || out.sum_fault ? state_.failing + 1 : 0;
+  state_.fault = state_.fault || state_.failing >= debounce_;
+  out.fault = state_.fault;
+  ++state_.sample;
+  return out;
+}
+
+}  // namespace mgdd::throttle

@@ -1,0 +1,105 @@
+"""`mgdd throttle identify | validate`: a model from a log, and a model against a log."""
+
+from __future__ import annotations
+
+import argparse
+import logging
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+from mgdd import identify
+from mgdd.cli.options import add_command
+from mgdd.cli.output import check_figure, emit
+from mgdd.cli.throttle_files import add_log_options, check_ending, log_of, wrote
+from mgdd.errors import ConvergenceError
+from mgdd.identify.throttle_fit import KINDS
+
+if TYPE_CHECKING:
+    import xarray as xr
+
+__all__ = ["add"]
+
+_LOG = logging.getLogger(__name__)
+
+# Searches that ended without a tolerance met, but with a model: stiction makes the last of the cost rough.
+_ENDED = ("stalled", "iteration_limit")
+
+
+def add(verbs: Any) -> None:
+    """Add both commands."""
+    fit = add_command(
+        verbs, "identify", _identify,
+        help_text="fit a model to a log, test it on another, and say what the log cannot tell",
+        example="mgdd throttle identify chirp.csv --model pw_r --test steps.csv --output fit.toml --json",
+        endings=".toml, the parameters, or .json",
+    )  # fmt: skip
+    fit.add_argument("file", metavar="FILE", help="log to fit: CSV, plain columns or .mat")
+    fit.add_argument("--model", choices=KINDS, default="pw_r", help="default: pw_r")
+    fit.add_argument("--test", metavar="FILE", help="log to test on, with the same columns")
+    fit.add_argument(
+        "--limp-home-deg", type=float, metavar="X", help="limp-home angle [deg] (default: from the log, or the model's)"
+    )
+    fit.add_argument("--two-sided", action="store_true", help="fit both sides of limp-home")
+    fit.add_argument("--seed", type=int, default=0, metavar="N", help="of the starts (default: 0)")
+    fit.add_argument("--figure", metavar="FILE", help="draw the validation (.png, .svg or .pdf)")
+    add_log_options(fit)
+    check = add_command(
+        verbs, "validate", _validate,
+        help_text="run a fitted model against a log: free run, 5, 20 and 50 ms ahead, residual tests",
+        example="mgdd throttle validate fit.toml steps.csv --json",
+    )  # fmt: skip
+    check.add_argument("fit", metavar="FIT.toml", help="parameters written by identify")
+    check.add_argument("file", metavar="FILE", help="log: CSV, plain columns or .mat")
+    check.add_argument("--figure", metavar="FILE", help="draw the validation (.png, .svg or .pdf)")
+    add_log_options(check)
+
+
+def _identify(args: argparse.Namespace) -> None:
+    check_ending(args.output, (".toml", ".json"))
+    check_figure(args.figure)
+    log = log_of(args, args.file)
+    test = None if args.test is None else log_of(args, args.test)
+    fit = identify.identify_throttle(
+        log, args.model, test=test, limp_home_deg=args.limp_home_deg, two_sided=args.two_sided, seed=args.seed
+    )
+    validation = identify.validate_throttle(fit, log if test is None else test)
+    payload = fit.to_dict() | {"validation": validation.to_dict()}
+    own = args.output if args.output is not None and Path(args.output).suffix == ".toml" else None
+    if own is not None:
+        Path(own).write_text(fit.to_toml(), encoding="utf-8", newline="\n")
+        wrote(own)
+        args.output = None
+    emit(args, payload, text=f"{fit.summary()}\n\n{validation.summary()}")
+    if args.figure:
+        _draw(validation, args.figure, identify.correlation_dataset(fit.report))
+    if not fit.success and fit.status not in _ENDED:
+        raise ConvergenceError(f"{args.file}: the fit has failed ({fit.message}); look at the log, or excite more")
+    if fit.status == "iteration_limit":
+        _LOG.warning("%s: the search %s; the figures hold for what it has found", args.file, fit.message)
+
+
+def _validate(args: argparse.Namespace) -> None:
+    check_ending(args.output, (".json",))
+    check_figure(args.figure)
+    model = identify.load_throttle_model(args.fit)
+    validation = identify.validate_throttle(model, log_of(args, args.file))
+    emit(args, validation.to_dict(), text=validation.summary())
+    if args.figure:
+        _draw(validation, args.figure, None)
+
+
+def _draw(validation: identify.ThrottleValidation, file: str, correlation: xr.Dataset | None) -> None:
+    from matplotlib.figure import Figure
+
+    from mgdd import plot
+
+    rows = 1 if correlation is None else 2
+    figure = Figure(figsize=(12.0, 4.6 * rows), layout="constrained")
+    axes = figure.subplots(rows, 3 if rows == 1 else 2).ravel()
+    plot.free_run(validation.free_run, ax=axes[0])
+    plot.error_growth(validation.n_step, ax=axes[1])
+    plot.residual_correlation(validation.tests.correlations, ax=axes[2])
+    if correlation is not None:
+        plot.correlation_matrix(correlation, ax=axes[3])
+    figure.savefig(file, dpi=150)
+    wrote(file)

@@ -1,0 +1,279 @@
+"""Is this the log of a throttle? Every refusal names the row, the column and the remedy."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from mgdd.errors import DataError, ParameterError
+from mgdd.results import check_labels
+
+if TYPE_CHECKING:
+    import xarray as xr
+    from numpy.typing import NDArray
+
+__all__ = ["Place", "check_throttle_log"]
+
+MIN_SAMPLES = 50
+MIN_DURATION_S = 0.5
+# A plate needs 70 to 200 ms through its travel: slower logs miss it, and 10 µs is beyond any position sensor.
+STEP_S = (1e-5, 0.1)
+JITTER = 0.1  # of the step
+# Closed to wide open, with the overrun of a soft stop and a zero that is a little off.
+ANGLE_DEG = (-10.0, 95.0)
+RADIANS = 1.7
+STILL_DEG = 0.3
+SIDE_DEG, SIDE_S = 0.5, 0.1
+_WINDOW = "keep one part with start_s= or stop_s="
+
+
+@dataclass(frozen=True)
+class Place:
+    """How a message calls a sample and a column: by line of a file, or by index."""
+
+    source: str
+    rows: Sequence[int] | None = None
+    columns: Mapping[str, str] | None = None
+
+    def row(self, index: int) -> str:
+        """Return "FILE, line 7" or "log, sample 5"."""
+        return f"{self.source}, " + (f"sample {index}" if self.rows is None else f"line {self.rows[index]}")
+
+    def column(self, name: str) -> str:
+        """Return how the source calls a column."""
+        return f"column {(self.columns or {}).get(name, repr(name))}"
+
+    def cell(self, index: int, name: str) -> str:
+        """Return row and column."""
+        return f"{self.row(index)}, {self.column(name)}"
+
+
+def check_throttle_log(log: xr.Dataset, *, two_sided: bool = False, limp_home_deg: float | None = None) -> xr.Dataset:
+    """Refuse what no throttle can be identified from.
+
+    Parameters
+    ----------
+    log : xarray.Dataset
+        ``duty`` [-] and ``angle_deg`` [deg] over ``time_s`` [s], as `read_throttle_log` gives it.
+    two_sided : bool
+        Whether both sides of limp-home are to be identified: then the plate must have been on both.
+    limp_home_deg : float, optional
+        Limp-home angle [deg]; `two_sided` needs it.
+
+    Returns
+    -------
+    xarray.Dataset
+        The same log.
+
+    Raises
+    ------
+    DataError
+        NaN, repeated or falling time, gaps, uneven sampling, duty beyond ±1, an angle that stands still or cannot be
+        in degrees, exchanged columns, fewer than 50 samples or 0.5 s, or one side only; the message names row,
+        column and remedy.
+    ParameterError
+        `two_sided` without `limp_home_deg`.
+
+    Examples
+    --------
+    >>> import numpy as np
+    >>> from mgdd.io import check_throttle_log, throttle_log
+    >>> time = np.arange(2000) * 1e-3
+    >>> log = throttle_log(time, 0.2 * np.sin(6.0 * time), 20.0 + 15.0 * np.sin(6.0 * time - 0.5))
+    >>> check_throttle_log(log, two_sided=True, limp_home_deg=8.0) is log
+    True
+    """
+    for name in ("time_s", "duty", "angle_deg"):
+        if name not in log.variables or log[name].dims != ("time_s",):
+            raise DataError(f"log has no {name}(time_s): make one with mgdd.io.read_throttle_log or throttle_log")
+    names = [name for name in ("duty", "angle_deg", "current_a", "supply_v") if name in log]
+    check_labels(log[names])
+    place = Place(str(log.attrs.get("file", "log")))
+    columns = {name: np.asarray(log[name].to_numpy(), dtype=np.float64) for name in ("time_s", *names)}
+    check_finite(columns, place)
+    check_time(columns["time_s"], place)
+    check_even(columns["time_s"], place)
+    check_signals(columns["duty"], columns["angle_deg"], place=place)
+    if two_sided:
+        _check_sides(columns["time_s"], columns["angle_deg"], limp_home_deg, place)
+    return log
+
+
+def check_finite(columns: Mapping[str, NDArray[np.float64]], place: Place) -> None:
+    """Refuse NaN and infinity."""
+    for name, values in columns.items():
+        bad = np.flatnonzero(~np.isfinite(values))
+        if bad.size:
+            at = int(bad[0])
+            more = f" ({bad.size} such cells)" if bad.size > 1 else ""
+            raise DataError(
+                f"{place.cell(at, name)}: {values[at]} is not finite{more}: repair it or cut the log; {_WINDOW}"
+            )
+
+
+def check_time(time: NDArray[np.float64], place: Place) -> None:
+    """Refuse time that does not rise, leaves gaps, cannot be in seconds, or is too short."""
+    column = place.column("time_s")
+    if time.size < MIN_SAMPLES:
+        raise DataError(f"{place.source}, {column}: {time.size} samples; at least {MIN_SAMPLES} are needed: log longer")
+    step = np.diff(time)
+    if not np.all(step > 0.0):
+        at = int(np.argmin(step > 0.0)) + 1
+        before, here = time[at - 1], time[at]
+        if here == before:
+            remedy = "keep one row per time, or export time with more digits"
+            raise DataError(f"{place.cell(at, 'time_s')}: time {here:g} s is repeated: {remedy}")
+        remedy = "sort the rows by time; if a second record starts here, give one record per file"
+        raise DataError(f"{place.cell(at, 'time_s')}: time falls from {before:g} to {here:g} s: {remedy}")
+    usual = float(np.median(step))
+    if not STEP_S[0] <= usual <= STEP_S[1]:
+        milliseconds = usual > STEP_S[1]
+        looks = "milliseconds; pass time_unit='ms'" if milliseconds else "seconds already; pass time_unit='s'"
+        raise DataError(
+            f"{place.source}, {column}: the usual step is {usual:g} s; a throttle needs {STEP_S[0]:g} to "
+            f"{STEP_S[1]:g} s: this looks like {looks}"
+        )
+    wide = np.flatnonzero(step > 1.5 * usual)
+    if wide.size:
+        at = int(wide[0]) + 1
+        missing = round(step[at - 1] / usual) - 1
+        raise DataError(
+            f"{place.cell(at, 'time_s')}: gap from {time[at - 1]:.6g} to {time[at]:.6g} s where the usual step is "
+            f"{usual:.3g} s, about {max(missing, 1)} sample(s) missing: pass stop_s={time[at - 1]:.6g} or "
+            f"start_s={time[at]:.6g} to keep one side"
+        )
+    if time[-1] - time[0] < MIN_DURATION_S:
+        raise DataError(
+            f"{place.source}, {column}: {time[-1] - time[0]:.3g} s; at least {MIN_DURATION_S:g} s are needed: log more"
+        )
+
+
+def check_even(time: NDArray[np.float64], place: Place) -> None:
+    """Refuse uneven sampling: the models step evenly."""
+    usual = float(time[-1] - time[0]) / (time.size - 1)
+    off = np.abs(np.diff(time) - usual)
+    drift = np.abs(time - time[0] - usual * np.arange(time.size))
+    if off.max() > JITTER * usual or drift.max() > 0.5 * usual:
+        at = int(np.argmax(off)) + 1 if off.max() > JITTER * usual else int(np.argmax(drift))
+        raise DataError(
+            f"{place.cell(at, 'time_s')}: uneven sampling: the step is {time[at] - time[at - 1]:.6g} s and the mean "
+            f"{usual:.6g} s: pass step_s={float(f'{usual:.2g}'):g} to resample"
+        )
+
+
+def check_signals(
+    duty: NDArray[np.float64],
+    angle: NDArray[np.float64],
+    *,
+    place: Place,
+    duty_unit: str = "-",
+    angle_unit: str = "deg",
+    travel_deg: float = 90.0,
+) -> None:
+    """Refuse a duty or an angle that cannot be one, in the units said; both are converted already."""
+    raw_duty = duty * 100.0 if duty_unit == "%" else duty
+    raw_angle = {"rad": np.deg2rad(angle), "%": angle * 100.0 / travel_deg}.get(angle_unit, angle)
+    _check_exchanged(raw_duty, raw_angle, duty_unit, place)
+    _check_duty(raw_duty, duty_unit, place)
+    _check_angle(angle, raw_angle, angle_unit, place)
+
+
+def _check_exchanged(duty: NDArray[np.float64], angle: NDArray[np.float64], duty_unit: str, place: Place) -> None:
+    top = int(np.argmax(np.abs(duty)))
+    like_angle = np.ptp(duty) > STILL_DEG and duty.min() > -5.0 and 3.0 < duty.max() <= 100.5
+    like_duty = np.abs(angle).max() <= 1.0 and np.ptp(angle) > 1e-3
+    if duty_unit == "-" and like_angle and like_duty:
+        hint = "exchange duty= and angle="
+        if angle.min() > -0.1:
+            hint += ", or, if they are right, pass duty_unit='%' and angle_unit='rad'"
+        raise DataError(
+            f"{place.cell(top, 'duty')}: {duty[top]:g} beside angles within {angle.min():.3g} to {angle.max():.3g}: "
+            f"the columns look exchanged; {hint}"
+        )
+    lowest = int(np.argmin(angle))
+    if duty_unit == "%" and angle.min() < ANGLE_DEG[0] and angle.max() <= 100.0 and duty.min() > -5.0:
+        raise DataError(
+            f"{place.cell(lowest, 'angle_deg')}: {angle[lowest]:g} is no opening, and the duty never pulls closed: "
+            "the columns look exchanged; exchange duty= and angle="
+        )
+
+
+def _check_duty(duty: NDArray[np.float64], unit: str, place: Place) -> None:
+    top = int(np.argmax(np.abs(duty)))
+    largest = abs(float(duty[top]))
+    if unit == "%":
+        if 0.0 < largest <= 1.0:
+            raise DataError(
+                f"{place.cell(top, 'duty')}: the largest duty is {largest:g} %: this looks like a fraction; "
+                "pass duty_unit='-'"
+            )
+        limit = 100.0
+    else:
+        limit = 1.0
+    if largest <= limit * (1.0 + 1e-9):
+        return
+    at = int(np.argmax(np.abs(duty) > limit * (1.0 + 1e-9)))
+    remedy = "convert it to -1 to 1 first (volts: divide by the supply)"
+    if unit == "-" and 3.0 < largest <= 100.0:
+        remedy = "this looks like percent; pass duty_unit='%'"
+    elif largest <= 1.05 * limit:
+        remedy = "the driver cuts there: clip it"
+    raise DataError(f"{place.cell(at, 'duty')}: duty {duty[at]:g} is beyond ±{limit:g}: {remedy}")
+
+
+def _check_angle(angle: NDArray[np.float64], raw: NDArray[np.float64], unit: str, place: Place) -> None:
+    top, lowest = int(np.argmax(raw)), int(np.argmin(raw))
+    span = float(np.ptp(angle))
+    if unit == "deg" and np.ptp(raw) > 0.01 and np.abs(raw).max() <= RADIANS:
+        raise DataError(
+            f"{place.cell(top, 'angle_deg')}: the highest angle is {raw[top]:.4g} deg: this looks like radians; pass "
+            "angle_unit='rad'"
+        )
+    if unit == "rad" and raw[top] > RADIANS:
+        raise DataError(
+            f"{place.cell(top, 'angle_deg')}: the highest angle is {raw[top]:.4g} rad, "
+            f"{math.degrees(raw[top]):.0f} deg: this looks like degrees; pass angle_unit='deg'"
+        )
+    if angle[top] > ANGLE_DEG[1]:
+        remedy = "convert it to degrees of the plate first"
+        if unit == "deg" and raw[top] <= 105.0:
+            remedy = "this looks like percent of travel; pass angle_unit='%'"
+        raise DataError(
+            f"{place.cell(top, 'angle_deg')}: the highest angle is {angle[top]:.4g} deg, beyond "
+            f"{ANGLE_DEG[1]:g}: {remedy}"
+        )
+    if angle[lowest] < ANGLE_DEG[0]:
+        raise DataError(
+            f"{place.cell(lowest, 'angle_deg')}: the lowest angle is {angle[lowest]:.4g} deg, below {ANGLE_DEG[0]:g}: "
+            "count from the closed plate, opening positive; if this is the duty, exchange duty= and angle="
+        )
+    if span < STILL_DEG:
+        raise DataError(
+            f"{place.cell(0, 'angle_deg')}: the angle stays within {span:.2g} deg of {angle[0]:.4g}: check column and "
+            "sensor; if the plate did stick, drive it beyond breakaway (mgdd.identify.design_excitation)"
+        )
+
+
+def _check_sides(
+    time: NDArray[np.float64], angle: NDArray[np.float64], limp_home_deg: float | None, place: Place
+) -> None:
+    if limp_home_deg is None:
+        raise ParameterError("limp_home_deg = None: a two-sided check needs the limp-home angle [deg]")
+    step = float(time[-1] - time[0]) / (time.size - 1)
+    for side, inside, extreme in (
+        ("below", angle < limp_home_deg - SIDE_DEG, int(np.argmin(angle))),
+        ("above", angle > limp_home_deg + SIDE_DEG, int(np.argmax(angle))),
+    ):
+        spent = float(inside.sum()) * step
+        if spent < SIDE_S:
+            end = "lowest" if side == "below" else "highest"
+            sign = "negative" if side == "below" else "positive"
+            raise DataError(
+                f"{place.cell(extreme, 'angle_deg')}: {spent:.2g} s {side} limp-home ({limp_home_deg:g} deg; the {end} "
+                f"angle is {angle[extreme]:.4g} deg): a two-sided fit needs both sides; add {sign} duty until "
+                "the plate crosses (mgdd.identify.design_excitation), or fit one side with two_sided=False"
+            )

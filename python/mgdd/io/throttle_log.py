@@ -1,0 +1,326 @@
+"""Throttle logs: from text files, MATLAB files and arrays to labelled Datasets, and back."""
+
+from __future__ import annotations
+
+import math
+from pathlib import Path
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from mgdd.errors import DataError, ParameterError, ShapeError
+from mgdd.io.checks import check_choice
+from mgdd.io.mat_file import read_mat
+from mgdd.io.table import read_table
+from mgdd.io.throttle_checks import (
+    Place,
+    check_even,
+    check_finite,
+    check_signals,
+    check_throttle_log,
+    check_time,
+)
+from mgdd.results import labelled_dataset
+
+if TYPE_CHECKING:
+    import os
+
+    import xarray as xr
+    from numpy.typing import ArrayLike, NDArray
+
+__all__ = ["read_throttle_log", "throttle_log", "write_throttle_log"]
+
+_TIME_UNITS = {"s": 1.0, "ms": 1e3}
+_ANGLE_UNITS = ("deg", "rad", "%")
+_DUTY_UNITS = ("-", "%")
+_OPTIONAL = ("current_a", "supply_v")
+
+
+def throttle_log(
+    time_s: ArrayLike,
+    duty: ArrayLike,
+    angle_deg: ArrayLike,
+    *,
+    current_a: ArrayLike | None = None,
+    supply_v: ArrayLike | None = None,
+    step_s: float | None = None,
+    name: str = "log",
+) -> xr.Dataset:
+    """Check arrays and make the Dataset of a throttle log from copies of them.
+
+    Parameters
+    ----------
+    time_s : array_like
+        Time [s], rising in even steps.
+    duty : array_like
+        Duty [-], -1 to 1, positive opens; ``duty[k]`` acts from ``time_s[k]`` to the next sample.
+    angle_deg : array_like
+        Plate angle from closed [deg], opening positive.
+    current_a, supply_v : array_like, optional
+        Motor current [A] and supply voltage [V].
+    step_s : float, optional
+        Resample to this even step [s]: the duty holds, the others are interpolated.
+    name : str
+        What messages and figures call the log; stored as ``attrs["file"]``.
+
+    Returns
+    -------
+    xarray.Dataset
+        ``duty`` and ``angle_deg`` over ``time_s``.
+
+    Raises
+    ------
+    DataError, ShapeError
+        As in `check_throttle_log`; arrays that do not belong together.
+    ParameterError
+        A step that is not positive.
+
+    Examples
+    --------
+    >>> import numpy as np
+    >>> from mgdd.io import throttle_log
+    >>> time = np.arange(1000) * 1e-3
+    >>> log = throttle_log(time, 0.2 * np.sin(6.0 * time), 20.0 + 15.0 * np.sin(6.0 * time - 0.5))
+    >>> log["angle_deg"].attrs["units"], log.sizes["time_s"]
+    ('deg', 1000)
+    """
+    columns = _columns({"time_s": time_s, "duty": duty, "angle_deg": angle_deg}, name)
+    for key, values in (("current_a", current_a), ("supply_v", supply_v)):
+        if values is not None:
+            columns |= _columns({key: values}, name)
+    return _checked(columns, Place(name), step_s=step_s, name=name)
+
+
+def read_throttle_log(
+    path: str | os.PathLike[str],
+    *,
+    time: int | str = "time_s",
+    duty: int | str = "duty",
+    angle: int | str = "angle_deg",
+    current: int | str | None = None,
+    supply: int | str | None = None,
+    time_unit: str = "s",
+    duty_unit: str = "-",
+    angle_unit: str = "deg",
+    travel_deg: float = 90.0,
+    start_s: float | None = None,
+    stop_s: float | None = None,
+    step_s: float | None = None,
+    delimiter: str | None = None,
+    decimal: str = ".",
+) -> xr.Dataset:
+    r"""Read one throttle log from a text file or a MATLAB file (version 5 to 7).
+
+    Parameters
+    ----------
+    path : path-like
+        The file; ``.mat`` is read as MATLAB, everything else as text with separated columns.
+    time, duty, angle : int or str
+        Column by position from 0 or by name in the header; in a MATLAB file the variable, ``struct.field``, or the
+        column of the only matrix.
+    current, supply : int or str, optional
+        Motor current [A] and supply voltage [V]; None takes ``current_a`` and ``supply_v`` where the file has them.
+    time_unit : {"s", "ms"}
+        Unit of the time column.
+    duty_unit : {"-", "%"}
+        Unit of the duty column: -1 to 1, or percent.
+    angle_unit : {"deg", "rad", "%"}
+        Unit of the angle column; percent of `travel_deg`.
+    travel_deg : float
+        Angle at 100 percent [deg].
+    start_s, stop_s : float, optional
+        Keep the rows from `start_s` to `stop_s` [s]; both ends count.
+    step_s : float, optional
+        Resample to this even step [s]: the duty holds, the others are interpolated.
+    delimiter : str, optional
+        Column separator of a text file; None detects it.
+    decimal : {".", ","}
+        Decimal mark of a text file.
+
+    Returns
+    -------
+    xarray.Dataset
+        ``duty`` [-] and ``angle_deg`` [deg] over ``time_s`` [s]; ``attrs["file"]`` is the file's name.
+
+    Raises
+    ------
+    FileNotFoundError
+        No such file.
+    DataError
+        No such column, a cell that is no number, and all of `check_throttle_log`; the message gives file, line,
+        column and remedy.
+    ParameterError
+        An empty window, a step that is not positive.
+
+    Examples
+    --------
+    >>> import pathlib, tempfile
+    >>> from mgdd.io import read_throttle_log
+    >>> rows = "".join(f"{k},{20 * (-1) ** (k // 50)},{0.2 + 1e-3 * (k % 100)}\n" for k in range(1000))
+    >>> with tempfile.TemporaryDirectory() as folder:
+    ...     file = pathlib.Path(folder) / "bench.csv"
+    ...     _ = file.write_text("t,u,theta\n" + rows)
+    ...     log = read_throttle_log(
+    ...         file, time="t", duty="u", angle="theta", time_unit="ms", duty_unit="%", angle_unit="rad"
+    ...     )
+    >>> float(log["duty"].max())
+    0.2
+    """
+    check_choice("time_unit", time_unit, tuple(_TIME_UNITS))
+    check_choice("duty_unit", duty_unit, _DUTY_UNITS)
+    check_choice("angle_unit", angle_unit, _ANGLE_UNITS)
+    if not 0.0 < travel_deg <= 95.0:
+        raise ParameterError(f"travel_deg = {travel_deg:g}: must be in (0, 95]")
+    wanted = {"time_s": time, "duty": duty, "angle_deg": angle, "current_a": current, "supply_v": supply}
+    columns, place = _read(path, wanted, delimiter=delimiter, decimal=decimal)
+    scales = {"time_s": 1.0 / _TIME_UNITS[time_unit], "duty": 0.01 if duty_unit == "%" else 1.0}
+    scales["angle_deg"] = {"rad": math.degrees(1.0), "%": travel_deg / 100.0}.get(angle_unit, 1.0)
+    columns = {key: values * scales.get(key, 1.0) for key, values in columns.items()}
+    columns, place = _window(columns, place, start_s, stop_s)
+    return _checked(
+        columns,
+        place,
+        step_s=step_s,
+        name=Path(path).name,
+        duty_unit=duty_unit,
+        angle_unit=angle_unit,
+        travel_deg=travel_deg,
+    )
+
+
+def write_throttle_log(log: xr.Dataset, path: str | os.PathLike[str]) -> None:
+    """Write a log as CSV with a units row that `read_throttle_log` reads back bit by bit.
+
+    Parameters
+    ----------
+    log : xarray.Dataset
+        As `read_throttle_log` gives it; other variables are not written.
+    path : path-like
+        The file; an existing one is replaced once the log has passed its checks.
+
+    Raises
+    ------
+    DataError
+        All of `check_throttle_log`.
+
+    Examples
+    --------
+    >>> import pathlib, tempfile
+    >>> import numpy as np
+    >>> from mgdd.io import read_throttle_log, throttle_log, write_throttle_log
+    >>> time = np.arange(1000) * 1e-3
+    >>> log = throttle_log(time, 0.2 * np.sin(6.0 * time), 20.0 + 15.0 * np.sin(6.0 * time - 0.5))
+    >>> with tempfile.TemporaryDirectory() as folder:
+    ...     file = pathlib.Path(folder) / "log.csv"
+    ...     write_throttle_log(log, file)
+    ...     read_throttle_log(file).equals(log)
+    True
+    """
+    check_throttle_log(log)
+    names = ["time_s", "duty", "angle_deg", *(name for name in _OPTIONAL if name in log)]
+    lines = [",".join(names), ",".join(log[name].attrs["units"] for name in names)]
+    lines += [",".join(map(repr, row)) for row in np.column_stack([log[name].to_numpy() for name in names]).tolist()]
+    Path(path).write_text("\n".join(lines) + "\n", encoding="utf-8", newline="\n")
+
+
+def _columns(given: dict[str, ArrayLike], name: str) -> dict[str, NDArray[np.float64]]:
+    out = {}
+    for key, values in given.items():
+        try:
+            column = np.array(values, dtype=np.float64)
+        except (TypeError, ValueError) as error:
+            raise DataError(f"{name}, column {key!r}: must be numbers") from error
+        if column.ndim != 1:
+            raise ShapeError(f"{key} has shape {column.shape}: must have 1 dimension")
+        out[key] = column
+    return out
+
+
+def _read(
+    path: str | os.PathLike[str], wanted: dict[str, int | str | None], *, delimiter: str | None, decimal: str
+) -> tuple[dict[str, NDArray[np.float64]], Place]:
+    called: dict[str, str] = {}
+    columns: dict[str, NDArray[np.float64]] = {}
+    if Path(path).suffix.lower() == ".mat":
+        mat = read_mat(path)
+        for key, column in wanted.items():
+            chosen = key if column is None and mat.has(key) else column
+            if chosen is not None:
+                columns[key], called[key] = mat.numbers(chosen), repr(chosen)
+        return columns, Place(mat.source, columns=called)
+    table = read_table(path, delimiter=delimiter, decimal=decimal)
+    for key, column in wanted.items():
+        chosen = key if column is None and key in (table.header or ()) else column
+        if chosen is not None:
+            columns[key], called[key] = table.numbers(table.index(chosen)), repr(chosen)
+    return columns, Place(table.source, table.lines, called)
+
+
+def _window(
+    columns: dict[str, NDArray[np.float64]], place: Place, start_s: float | None, stop_s: float | None
+) -> tuple[dict[str, NDArray[np.float64]], Place]:
+    if start_s is None and stop_s is None:
+        return columns, place
+    low, high = -math.inf if start_s is None else start_s, math.inf if stop_s is None else stop_s
+    time = columns["time_s"]
+    if time.size != min(values.size for values in columns.values()):
+        return columns, place  # the shape check says so
+    margin = 1e-9 * max(1.0, float(np.abs(time).max()))
+    keep = np.flatnonzero((time >= low - margin) & (time <= high + margin))
+    if not keep.size:
+        raise ParameterError(
+            f"start_s = {low:g}, stop_s = {high:g}: no row of {place.source} lies between; it runs from {time.min():g} "
+            f"to {time.max():g} s"
+        )
+    rows = range(time.size) if place.rows is None else place.rows
+    kept = {key: values[keep] for key, values in columns.items()}
+    return kept, Place(place.source, None if place.rows is None else [rows[i] for i in keep.tolist()], place.columns)
+
+
+def _checked(
+    columns: dict[str, NDArray[np.float64]],
+    place: Place,
+    *,
+    step_s: float | None,
+    name: str,
+    duty_unit: str = "-",
+    angle_unit: str = "deg",
+    travel_deg: float = 90.0,
+) -> xr.Dataset:
+    size = columns["time_s"].size
+    for key, values in columns.items():
+        if values.size != size:
+            raise ShapeError(
+                f"{place.source}: {key} has {values.size} samples, time {size}: columns must be equally long"
+            )
+    check_finite(columns, place)
+    check_time(columns["time_s"], place)
+    if step_s is None:
+        check_even(columns["time_s"], place)
+    else:
+        columns, place = _resampled(columns, step_s, place)
+    check_signals(
+        columns["duty"],
+        columns["angle_deg"],
+        place=place,
+        duty_unit=duty_unit,
+        angle_unit=angle_unit,
+        travel_deg=travel_deg,
+    )
+    variables = {key: ("time_s", values) for key, values in columns.items()}
+    return labelled_dataset(variables, attrs={"file": name})
+
+
+def _resampled(
+    columns: dict[str, NDArray[np.float64]], step_s: float, place: Place
+) -> tuple[dict[str, NDArray[np.float64]], Place]:
+    time = columns["time_s"]
+    if not 0.0 < step_s <= 0.1:
+        raise ParameterError(f"step_s = {step_s:g}: must be in (0, 0.1] s")
+    even = time[0] + step_s * np.arange(math.floor((time[-1] - time[0]) / step_s * (1.0 + 1e-12)) + 1)
+    held = np.clip(np.searchsorted(time, even + 1e-9 * step_s, side="right") - 1, 0, time.size - 1)
+    out = {key: np.interp(even, time, values) for key, values in columns.items()}
+    out["duty"] = columns["duty"][held]
+    out["time_s"] = even
+    rows = None if place.rows is None else [place.rows[i] for i in held.tolist()]
+    return out, Place(place.source, rows, place.columns)

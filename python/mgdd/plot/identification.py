@@ -1,0 +1,206 @@
+"""What a validation says: error ahead, what residuals remember, and which parameters are entangled."""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from mgdd.errors import DataError
+from mgdd.plot.style import (
+    BLACK,
+    BLUE,
+    GREY,
+    LINE_STYLES,
+    ORANGE,
+    axis_label,
+    legend,
+    minus,
+    new_axes,
+    panel_below,
+    require,
+)
+
+if TYPE_CHECKING:
+    import xarray as xr
+    from matplotlib.artist import Artist
+    from matplotlib.axes import Axes
+    from matplotlib.patches import Rectangle
+
+__all__ = ["correlation_matrix", "error_growth", "residual_correlation"]
+
+_TANGLED = 0.98
+
+
+def error_growth(n_step: xr.Dataset, *, ax: Axes | None = None) -> Axes:
+    """Draw how the error of a prediction grows with its horizon: one line per predictor.
+
+    Parameters
+    ----------
+    n_step : xarray.Dataset
+        ``n_step_rms_deg`` [deg] over ``predictor`` and ``horizon_s`` [s], as `mgdd.identify.n_step_rms` gives it; at
+        most five predictors.
+    ax : matplotlib.axes.Axes, optional
+        Where to draw; None makes a figure.
+
+    Returns
+    -------
+    matplotlib.axes.Axes
+        The axes; errors are on a logarithmic scale.
+
+    Raises
+    ------
+    DataError
+        A variable is missing or has no unit; too many predictors.
+
+    Examples
+    --------
+    >>> from mgdd import plot
+    >>> from mgdd.results import labelled_dataset
+    >>> n_step = labelled_dataset({
+    ...     "predictor": ("predictor", ["pw_r", "persistence"], "-", "predictor"),
+    ...     "horizon_s": ("horizon_s", [0.005, 0.02, 0.05], "s", "horizon"),
+    ...     "n_step_rms_deg": (
+    ...         ("predictor", "horizon_s"), [[0.03, 0.05, 0.08], [0.41, 1.55, 3.98]], "deg", "RMS error ahead"
+    ...     ),
+    ... })
+    >>> plot.error_growth(n_step).get_ylabel()
+    'RMS error ahead [deg]'
+    """
+    require(n_step, ("predictor", "horizon_s", "n_step_rms_deg"), "mgdd.identify.n_step_rms")
+    names = [str(name).replace("_", " ") for name in n_step["predictor"].to_numpy()]
+    if len(names) > len(LINE_STYLES):
+        raise DataError(f"predictor has {len(names)} entries: at most {len(LINE_STYLES)} lines can be told apart")
+    ax = new_axes(ax)
+    horizon = 1e3 * n_step["horizon_s"].to_numpy()
+    rms = n_step["n_step_rms_deg"].transpose("predictor", "horizon_s").to_numpy()
+    lines: list[Artist] = []
+    for index, name in enumerate(names):
+        dash, color = LINE_STYLES[index]
+        lines += ax.plot(horizon, rms[index], linestyle=dash, color=color, marker="o", markersize=4, label=name)
+    ax.set(xlabel="horizon [ms]", ylabel=axis_label(n_step, "n_step_rms_deg"), yscale="log")
+    ax.set_xticks(horizon)
+    ax.grid(alpha=0.3, which="both")
+    legend(ax, lines)
+    return ax
+
+
+def residual_correlation(correlations: xr.Dataset, *, ax: Axes | None = None) -> Axes:
+    """Draw the autocorrelation of a residual and, below, its correlation with earlier input.
+
+    Parameters
+    ----------
+    correlations : xarray.Dataset
+        ``autocorrelation`` and ``cross_correlation`` over ``lag`` and the number ``limit``, as
+        `mgdd.identify.residual_tests` gives it in ``correlations``.
+    ax : matplotlib.axes.Axes, optional
+        Where to draw; it gives its lower half away. None makes a figure.
+
+    Returns
+    -------
+    matplotlib.axes.Axes
+        The upper axes; the lower one is ``ax.figure.axes[-1]``.
+
+    Raises
+    ------
+    DataError
+        A variable is missing or has no unit.
+
+    Examples
+    --------
+    >>> from mgdd import plot
+    >>> from mgdd.results import labelled_dataset
+    >>> correlations = labelled_dataset({
+    ...     "lag": ("lag", [1, 2, 3], "samples", "lag"),
+    ...     "autocorrelation": ("lag", [0.3, 0.1, 0.0], "-", "autocorrelation of the residual"),
+    ...     "cross_correlation": ("lag", [0.0, 0.02, 0.01], "-", "correlation of residual and earlier duty"),
+    ...     "limit": ((), 0.05, "-", "95 % limit"),
+    ... })
+    >>> plot.residual_correlation(correlations).figure.axes[-1].get_xlabel()
+    'lag [samples]'
+    """
+    names = ("autocorrelation", "cross_correlation")
+    require(correlations, ("lag", *names, "limit"), "mgdd.identify.residual_tests")
+    ax = new_axes(ax, height=4.4)
+    panels = (ax, panel_below(ax, share=0.5))
+    lag, limit = correlations["lag"].to_numpy(), float(correlations["limit"])
+    lines: list[Artist] = []
+    for panel, name in zip(panels, names, strict=True):
+        values = correlations[name].to_numpy()
+        band = panel.axhspan(
+            -limit, limit, color=GREY, alpha=0.25, linewidth=0.0, label=minus(f"±{limit:.3g}, 95 % of lags")
+        )
+        out = np.abs(values) > limit
+        panel.vlines(lag, 0.0, values, color=BLACK, linewidth=1.2)
+        (inside,) = panel.plot(lag[~out], values[~out], "o", color=BLUE, markersize=4, label="inside")
+        (outside,) = panel.plot(lag[out], values[out], "s", color=ORANGE, markersize=4, label="outside")
+        panel.axhline(0.0, color=BLACK, linewidth=0.8)
+        panel.grid(alpha=0.3)
+        lines = lines or [band, inside, outside]
+    ax.set_ylabel("residual with itself [-]")
+    ax.tick_params(labelbottom=False)
+    panels[1].set(xlabel=axis_label(correlations, "lag"), ylabel="with earlier duty [-]")
+    legend(ax, lines, columns=3)
+    return ax
+
+
+def correlation_matrix(correlation: xr.Dataset, *, ax: Axes | None = None) -> Axes:
+    """Draw how the estimates of a fit depend on each other; pairs beyond 0.98 cannot be told apart.
+
+    Parameters
+    ----------
+    correlation : xarray.Dataset
+        ``correlation`` [-] over ``parameter`` and ``other``, the names; NaN for a parameter at a bound. As
+        `mgdd.identify.correlation_dataset` gives it.
+    ax : matplotlib.axes.Axes, optional
+        Where to draw; None makes a figure.
+
+    Returns
+    -------
+    matplotlib.axes.Axes
+        The axes; numbers stand in the cells, those beyond 0.98 in a frame.
+
+    Raises
+    ------
+    DataError
+        A variable is missing or has no unit.
+
+    Examples
+    --------
+    >>> from mgdd import plot
+    >>> from mgdd.results import labelled_dataset
+    >>> names = ["preload", "coulomb"]
+    >>> correlation = labelled_dataset({
+    ...     "parameter": ("parameter", names, "-", "parameter"),
+    ...     "other": ("other", names, "-", "parameter"),
+    ...     "correlation": (("parameter", "other"), [[1.0, -0.99], [-0.99, 1.0]], "-", "correlation"),
+    ... })
+    >>> plot.correlation_matrix(correlation).texts[1].get_text()
+    '−0.99'
+    """
+    require(correlation, ("parameter", "other", "correlation"), "mgdd.identify.correlation_dataset")
+    names = [str(name) for name in correlation["parameter"].to_numpy()]
+    values = correlation["correlation"].transpose("parameter", "other").to_numpy()
+    n = len(names)
+    ax = new_axes(ax, height=max(3.4, 1.6 + 0.42 * n))
+    ax.set_facecolor("#dddddd")
+    image = ax.imshow(values, vmin=-1.0, vmax=1.0, cmap="RdBu_r")
+    ax.figure.colorbar(image, ax=ax, label="correlation [-]", shrink=0.9)
+    size = "small" if n <= 8 else "xx-small"
+    for i in range(n):
+        for j in range(n):
+            value = float(values[i, j])
+            shown = minus(f"{value:.2f}") if np.isfinite(value) else "–"
+            dark = np.isfinite(value) and abs(value) > 0.6
+            ax.text(j, i, shown, ha="center", va="center", fontsize=size, color="white" if dark else BLACK)
+            if i != j and np.isfinite(value) and abs(value) > _TANGLED:
+                ax.add_patch(_frame(j, i))
+    ax.set_xticks(range(n), names, rotation=40, ha="right", rotation_mode="anchor", fontsize="small")
+    ax.set_yticks(range(n), names, fontsize="small")
+    return ax
+
+
+def _frame(column: int, row: int) -> Rectangle:
+    from matplotlib.patches import Rectangle
+
+    return Rectangle((column - 0.46, row - 0.46), 0.92, 0.92, fill=False, edgecolor=BLACK, linewidth=1.8)

@@ -1,0 +1,145 @@
+"""A throttle's duty against its angle, and a model's free run over a log."""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from mgdd.plot.style import BLACK, BLUE, GREY, ORANGE, axis_label, legend, minus, new_axes, panel_below, require
+
+if TYPE_CHECKING:
+    import xarray as xr
+    from matplotlib.axes import Axes
+    from matplotlib.lines import Line2D
+
+__all__ = ["free_run", "holding_duty"]
+
+_MADE_BY = "mgdd.io.read_throttle_log"
+
+
+def holding_duty(log: xr.Dataset, *, limp_home_deg: float | None = None, ax: Axes | None = None) -> Axes:
+    """Draw the duty of a slow ramp over the angle: the gap between the branches is twice the friction.
+
+    Parameters
+    ----------
+    log : xarray.Dataset
+        ``duty`` [-] and ``angle_deg`` [deg] over ``time_s`` [s] of a triangle or staircase; ``model_deg`` [deg], if
+        there, is drawn over it.
+    limp_home_deg : float, optional
+        Marks limp-home [deg].
+    ax : matplotlib.axes.Axes, optional
+        Where to draw; None makes a figure.
+
+    Returns
+    -------
+    matplotlib.axes.Axes
+        The axes.
+
+    Raises
+    ------
+    DataError
+        A variable is missing or has no unit.
+
+    Examples
+    --------
+    >>> import numpy as np
+    >>> from mgdd import plot
+    >>> from mgdd.results import labelled_dataset
+    >>> time = np.arange(1000) * 0.02
+    >>> duty = 0.3 * np.sin(0.3 * time)
+    >>> log = labelled_dataset({
+    ...     "time_s": ("time_s", time), "duty": ("time_s", duty), "angle_deg": ("time_s", 40.0 + 100.0 * duty)
+    ... })
+    >>> plot.holding_duty(log).get_xlabel()
+    'plate angle [deg]'
+    """
+    has_model = "model_deg" in log
+    require(log, ("time_s", "duty", "angle_deg", *(("model_deg",) if has_model else ())), _MADE_BY)
+    ax = new_axes(ax)
+    duty, angle = log["duty"].to_numpy(), log["angle_deg"].to_numpy()
+    rising = _rising(duty)
+    lines: list[Line2D] = []
+    for chosen, dash, color, label in (
+        (rising, "-", BLACK, "duty rising"),
+        (~rising, "--", BLUE, "duty falling"),
+    ):
+        lines += ax.plot(
+            _only(angle, chosen), _only(duty, chosen), linestyle=dash, color=color, linewidth=1.3, label=label
+        )
+    if has_model:
+        lines += ax.plot(log["model_deg"], duty, linestyle=":", color=ORANGE, linewidth=1.4, label="model")
+    if limp_home_deg is not None:
+        label = f"limp-home {limp_home_deg:g} deg"
+        lines.append(ax.axvline(limp_home_deg, color=GREY, linewidth=0.9, linestyle=(0, (1, 1)), label=label))
+    ax.set(xlabel=axis_label(log, "angle_deg"), ylabel=axis_label(log, "duty"))
+    ax.grid(alpha=0.3)
+    legend(ax, lines)
+    return ax
+
+
+def free_run(run: xr.Dataset, *, ax: Axes | None = None) -> Axes:
+    """Draw measured and modelled angle over time, and their difference in a panel below.
+
+    Parameters
+    ----------
+    run : xarray.Dataset
+        ``angle_deg``, ``model_deg`` and ``residual_deg`` [deg] over ``time_s`` [s], as
+        `mgdd.identify.validate_throttle` gives it in ``free_run``.
+    ax : matplotlib.axes.Axes, optional
+        Where to draw; it gives its lower quarter to the residual panel. None makes a figure.
+
+    Returns
+    -------
+    matplotlib.axes.Axes
+        The upper axes; the residual panel is ``ax.figure.axes[-1]``.
+
+    Raises
+    ------
+    DataError
+        A variable is missing or has no unit.
+
+    Examples
+    --------
+    >>> import numpy as np
+    >>> from mgdd import plot
+    >>> from mgdd.results import labelled_dataset
+    >>> time = np.arange(100) * 0.01
+    >>> run = labelled_dataset({
+    ...     "time_s": ("time_s", time),
+    ...     "angle_deg": ("time_s", 20.0 + time),
+    ...     "model_deg": ("time_s", 20.1 + time),
+    ...     "residual_deg": ("time_s", 0.1 + 0.0 * time, "deg", "model minus measured angle"),
+    ... })
+    >>> plot.free_run(run).figure.axes[-1].get_xlabel()
+    'time [s]'
+    """
+    require(run, ("time_s", "angle_deg", "model_deg", "residual_deg"), "mgdd.identify.validate_throttle")
+    ax = new_axes(ax, height=4.4)
+    panel = panel_below(ax)
+    time = run["time_s"].to_numpy()
+    name = str(run.attrs.get("kind", "")).replace("_", " ")
+    lines: list[Line2D] = ax.plot(time, run["angle_deg"], "-", color=GREY, linewidth=2.4, label="measured")
+    label = f"model, free run ({name})" if name else "model, free run"
+    lines += ax.plot(time, run["model_deg"], "--", color=BLACK, linewidth=1.0, label=label)
+    panel.plot(time, run["residual_deg"], "-", color=BLACK, linewidth=0.8)
+    panel.axhline(0.0, color=GREY, linewidth=0.8)
+    ax.set_ylabel(axis_label(run, "angle_deg"))
+    ax.tick_params(labelbottom=False)
+    ax.set_xlim(float(time[0]), float(time[-1]))
+    ax.grid(alpha=0.3)
+    panel.grid(alpha=0.3)
+    panel.set(xlabel=axis_label(run, "time_s"), ylabel=minus("model -\nmeasured\n[deg]"))
+    legend(ax, lines)
+    return ax
+
+
+def _rising(duty: np.ndarray) -> np.ndarray:
+    """Mark the samples of a rising duty; where it holds, the last direction counts."""
+    slope = np.sign(np.diff(duty, prepend=duty[:1]))
+    last = np.maximum.accumulate(np.where(slope != 0.0, np.arange(duty.size), 0))
+    return np.asarray(slope[last] >= 0.0)
+
+
+def _only(values: np.ndarray, chosen: np.ndarray) -> np.ndarray:
+    return np.where(chosen, values, np.nan)

@@ -1,0 +1,115 @@
+"""Habits of a throttle: its loop of angle over duty at several frequencies, and its answer to air flow."""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING
+
+from mgdd.plot.style import GREY, LINE_STYLES, axis_label, legend, minus, new_axes, require
+
+if TYPE_CHECKING:
+    import xarray as xr
+    from matplotlib.axes import Axes
+    from matplotlib.lines import Line2D
+
+__all__ = ["air_flow", "rate_dependence"]
+
+_MADE_BY = "mgdd.studies.run_ch2_throttle_characteristics"
+
+
+def rate_dependence(dataset: xr.Dataset, *, ax: Axes | None = None) -> Axes:
+    """Draw the angle over the duty for every frequency.
+
+    Parameters
+    ----------
+    dataset : xarray.Dataset
+        ``loop_duty`` [-] and ``loop_angle_deg`` [deg] over ``frequency_hz`` [Hz] and ``phase``: one preset of the
+        study ``ch2-throttle-characteristics``.
+    ax : matplotlib.axes.Axes, optional
+        Where to draw; None makes a figure.
+
+    Returns
+    -------
+    matplotlib.axes.Axes
+        The axes.
+
+    Raises
+    ------
+    DataError
+        A variable is missing or has no unit.
+
+    Examples
+    --------
+    >>> from mgdd import plot
+    >>> from mgdd.studies import run_study
+    >>> study = run_study("ch2-throttle-characteristics", quick=True, figures=False)
+    >>> plot.rate_dependence(study.dataset.isel(preset=0)).get_xlabel()
+    'duty [-]'
+    """
+    require(dataset, ("frequency_hz", "phase", "loop_duty", "loop_angle_deg"), _MADE_BY)
+    ax = new_axes(ax)
+    lines: list[Line2D] = []
+    for place, frequency in enumerate(dataset["frequency_hz"].to_numpy()):
+        one = dataset.isel(frequency_hz=place)
+        dash, color = LINE_STYLES[place % len(LINE_STYLES)]
+        width = 1.3 if place < len(LINE_STYLES) else 2.2
+        label = f"{frequency:g} Hz"
+        lines += ax.plot(
+            one["loop_duty"], one["loop_angle_deg"], linestyle=dash, color=color, linewidth=width, label=label
+        )
+    ax.set(xlabel=axis_label(dataset, "loop_duty"), ylabel=axis_label(dataset, "loop_angle_deg"))
+    ax.grid(alpha=0.3)
+    legend(ax, lines, columns=4)
+    return ax
+
+
+def air_flow(dataset: xr.Dataset, *, ax: Axes | None = None) -> Axes:
+    """Draw the angle over time at constant duty for every torque of the air flow.
+
+    Parameters
+    ----------
+    dataset : xarray.Dataset
+        ``air_angle_deg`` [deg] over ``airflow_torque_nm`` [N m] and ``time_s`` [s]: one preset and one arrival of the
+        study ``ch2-throttle-characteristics``; attribute ``air_from_s`` marks the onset.
+    ax : matplotlib.axes.Axes, optional
+        Where to draw; None makes a figure.
+
+    Returns
+    -------
+    matplotlib.axes.Axes
+        The axes.
+
+    Raises
+    ------
+    DataError
+        A variable is missing or has no unit.
+
+    Examples
+    --------
+    >>> from mgdd import plot
+    >>> from mgdd.studies import run_study
+    >>> study = run_study("ch2-throttle-characteristics", quick=True, figures=False)
+    >>> plot.air_flow(study.dataset.isel(preset=0, arrival=0)).get_ylabel()
+    'plate angle [deg]'
+    """
+    require(dataset, ("time_s", "airflow_torque_nm", "air_angle_deg"), _MADE_BY)
+    ax = new_axes(ax)
+    lines: list[Line2D] = []
+    for place, torque in enumerate(dataset["airflow_torque_nm"].to_numpy()):
+        dash, color = LINE_STYLES[place % len(LINE_STYLES)]
+        angle = dataset["air_angle_deg"].isel(airflow_torque_nm=place)
+        label = minus(f"{torque:g} N m")
+        lines += ax.plot(dataset["time_s"], angle, linestyle=dash, color=color, linewidth=1.4, label=label)
+    if "air_from_s" in dataset.attrs:
+        lines.append(
+            ax.axvline(
+                float(dataset.attrs["air_from_s"]),
+                color=GREY,
+                linewidth=0.9,
+                linestyle=(0, (1, 1)),
+                label="air flow from here",
+            )
+        )
+    ax.set(xlabel=axis_label(dataset, "time_s"), ylabel=axis_label(dataset, "air_angle_deg"))
+    ax.grid(alpha=0.3)
+    legend(ax, lines, columns=3)
+    return ax

@@ -1,0 +1,80 @@
+"""A run of a throttle over time: angle, duty and current, one below the other."""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING
+
+from mgdd.plot.style import BLACK, BLUE, GREY, ORANGE, axis_label, legend, new_axes, panel_below, require
+
+if TYPE_CHECKING:
+    import xarray as xr
+    from matplotlib.axes import Axes
+
+__all__ = ["throttle_run"]
+
+_PANELS = (("duty", BLUE), ("current_a", ORANGE))
+
+
+def throttle_run(run: xr.Dataset, *, ax: Axes | None = None) -> Axes:
+    """Draw the plate angle over time, and duty and current in panels below.
+
+    Parameters
+    ----------
+    run : xarray.Dataset
+        ``angle_deg`` [deg] and ``duty`` [-] over ``time_s`` [s], and ``current_a`` [A] if there, as
+        `mgdd.throttle.simulate` or `mgdd.io.read_throttle_log` gives them. Attribute ``limp_home_deg`` is marked.
+    ax : matplotlib.axes.Axes, optional
+        Where to draw; it gives its lower half to the panels. None makes a figure.
+
+    Returns
+    -------
+    matplotlib.axes.Axes
+        The axes of the angle.
+
+    Raises
+    ------
+    DataError
+        A variable is missing or has no unit.
+
+    Examples
+    --------
+    >>> from mgdd import plot
+    >>> from mgdd.throttle import Throttle, simulate
+    >>> plot.throttle_run(simulate(Throttle(), 0.5, duration_s=0.2)).get_ylabel()
+    'plate angle [deg]'
+    """
+    panels = [(name, color) for name, color in _PANELS if name == "duty" or name in run]
+    require(run, ("time_s", "angle_deg", *(name for name, _ in panels)), "mgdd.throttle.simulate")
+    ax = new_axes(ax, height=4.8)
+    time = run["time_s"].to_numpy()
+    lines = ax.plot(time, run["angle_deg"], "-", color=BLACK, linewidth=1.4, label=run["angle_deg"].attrs["long_name"])
+    if "limp_home_deg" in run.attrs:
+        rest = float(run.attrs["limp_home_deg"])
+        lines.append(
+            ax.axhline(rest, color=GREY, linewidth=0.9, linestyle=(0, (1, 1)), label=f"limp-home {rest:g} deg")
+        )
+    ax.set_ylabel(axis_label(run, "angle_deg"))
+    ax.set_xlim(float(time[0]), float(time[-1]))
+    below = _panels_below(ax, len(panels))
+    for panel, (name, color) in zip(below, panels, strict=True):
+        # The input of a sample holds until the next one.
+        panel.plot(time, run[name], color=color, linewidth=1.1, drawstyle="steps-post" if name == "duty" else "default")
+        panel.axhline(0.0, color=GREY, linewidth=0.8)
+        panel.set_ylabel(axis_label(run, name))
+    below[-1].set_xlabel(axis_label(run, "time_s"))
+    for one in (ax, *below):
+        one.grid(alpha=0.3)
+        one.tick_params(labelbottom=one is below[-1])
+    ax.figure.align_ylabels([ax, *below])
+    legend(ax, lines)
+    return ax
+
+
+def _panels_below(ax: Axes, count: int) -> list[Axes]:
+    """Give the lower half of `ax` to `count` panels with the same time axis."""
+    spec = ax.get_subplotspec()
+    if spec is None:
+        return [panel_below(ax, share=share) for share in (0.5, 0.25)[2 - count :]]
+    inner = spec.subgridspec(count + 1, 1, height_ratios=(1.0, *[0.5] * count), hspace=0.08)
+    ax.set_subplotspec(inner[0])
+    return [ax.figure.add_subplot(inner[place + 1], sharex=ax) for place in range(count)]

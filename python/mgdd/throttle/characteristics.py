@@ -1,0 +1,285 @@
+"""What the parameters of a throttle say in closed form: groups, holding duty, linear part, air flow."""
+
+from __future__ import annotations
+
+import math
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from mgdd import _core
+from mgdd._core import Throttle
+from mgdd.errors import ParameterError
+from mgdd.results import labelled_dataset
+
+if TYPE_CHECKING:
+    import xarray as xr
+    from numpy.typing import ArrayLike, NDArray
+
+__all__ = ["airflow_torque_nm", "groups", "holding_duty", "linear_part", "mass_flow_kg_per_s"]
+
+_DEG = math.radians(1.0)
+AIR_KG_PER_M3 = 1.2041  # dry air at 20 degC and 101.325 kPa
+
+
+def groups(throttle: Throttle) -> xr.Dataset:
+    """Give the groups of parameters that duty and angle can tell apart.
+
+    Parameters
+    ----------
+    throttle : Throttle
+        Its parameters.
+
+    Returns
+    -------
+    xarray.Dataset
+        Scalars: ``stall_torque_nm`` g = K (V - V_drop)/R, ``damping_nms_per_rad`` b = K_v + K K_e/R, ``tau_s`` = J/b,
+        ``gain_deg_per_s2`` = g/J per duty, and in units of duty ``preload_above``, ``preload_below``, ``coulomb`` and
+        ``stiction`` (torque over g), and ``spring_above_per_deg``, ``spring_below_per_deg`` [1/deg].
+
+    Raises
+    ------
+    mgdd.errors.ParameterError
+        None for a valid throttle.
+
+    Notes
+    -----
+    Inertia, torque constant and resistance cannot be told apart from duty and angle alone; these groups can.
+
+    Examples
+    --------
+    >>> from mgdd.throttle import Throttle, groups
+    >>> g = groups(Throttle())
+    >>> round(float(g["tau_s"]), 4), round(float(g["preload_above"]), 4), round(float(g["coulomb"]), 4)
+    (0.0197, 0.1292, 0.0927)
+    """
+    stall, damping = throttle.stall_torque_nm, throttle.damping_nms_per_rad
+    tau = throttle.inertia_kgm2 / damping if damping > 0.0 else math.inf
+    scalars = {
+        "stall_torque_nm": (stall, "N m", "stall torque per unit duty"),
+        "damping_nms_per_rad": (damping, "N m s/rad", "viscous friction and braking by the motor"),
+        "tau_s": (tau, "s", "time constant of the speed"),
+        "gain_deg_per_s2": (stall / throttle.inertia_kgm2 / _DEG, "deg/s²", "acceleration per unit duty"),
+        "preload_above": (throttle.preload_above_nm / stall, "-", "preload above limp-home, in duty"),
+        "preload_below": (throttle.preload_below_nm / stall, "-", "preload below limp-home, in duty"),
+        "coulomb": (throttle.coulomb_nm / stall, "-", "Coulomb friction, in duty"),
+        "stiction": (_breakaway_nm(throttle) / stall, "-", "breakaway friction, in duty"),
+        "spring_above_per_deg": (throttle.spring_above_nm_per_rad * _DEG / stall, "1/deg", "spring above, in duty"),
+        "spring_below_per_deg": (throttle.spring_below_nm_per_rad * _DEG / stall, "1/deg", "spring below, in duty"),
+    }
+    return labelled_dataset({name: ((), *entry) for name, entry in scalars.items()})
+
+
+def holding_duty(throttle: Throttle, angle_deg: ArrayLike | None = None) -> xr.Dataset:
+    """Give the duty that holds the plate at an angle, with the band that friction leaves free.
+
+    Parameters
+    ----------
+    throttle : Throttle
+        Its parameters; the modelled air flow (``pressure_drop_kpa``) counts.
+    angle_deg : array_like, shape (n,), optional
+        Angles [deg] within the travel; the travel in steps of about 0.25 deg if left out.
+
+    Returns
+    -------
+    xarray.Dataset
+        Over ``angle_deg``, in duty [-] and not clipped to 1: ``duty_spring``, which balances springs and air;
+        ``duty_rising`` and ``duty_falling``, at which the plate slides open and closed very slowly; and
+        ``duty_breakaway_up`` and ``duty_breakaway_down``, at which it leaves its rest.
+
+    Raises
+    ------
+    mgdd.errors.ParameterError
+        An angle outside the travel or not finite.
+
+    Notes
+    -----
+    The friction of slow sliding is the Coulomb level, with the forms ``stribeck`` and ``lugre`` the breakaway level;
+    the form ``tanh`` has no band at rest, its branches are those of a plate in motion.
+
+    Examples
+    --------
+    >>> from mgdd.throttle import Throttle, holding_duty
+    >>> curve = holding_duty(Throttle(), [45.0])
+    >>> round(float(curve["duty_rising"][0] - curve["duty_falling"][0]), 4)
+    0.1854
+    """
+    t = throttle
+    angle = _angles(t, angle_deg)
+    x = (angle - t.limp_home_deg) * _DEG
+    above = x >= 0.0
+    share = np.clip((angle - t.limp_home_deg) / t.preload_ramp_deg, -1.0, 1.0)
+    spring = np.where(above, t.spring_above_nm_per_rad, t.spring_below_nm_per_rad) * x
+    preload = np.where(above, t.preload_above_nm, t.preload_below_nm) * share
+    balance = spring + preload - _core.throttle_airflow_torque(t, angle)
+    slow = t.stiction_nm if t.friction in ("stribeck", "lugre") else t.coulomb_nm
+    leave = _breakaway_nm(t)
+    columns = {
+        "duty_spring": (balance, "duty that balances the springs"),
+        "duty_rising": (balance + slow, "duty while the plate slides open slowly"),
+        "duty_falling": (balance - slow, "duty while the plate slides closed slowly"),
+        "duty_breakaway_up": (balance + leave, "duty at which the plate leaves its rest to open"),
+        "duty_breakaway_down": (balance - leave, "duty at which the plate leaves its rest to close"),
+    }
+    return labelled_dataset(
+        {
+            "angle_deg": ("angle_deg", angle),
+            **{name: ("angle_deg", _duty_of(t, torque), "-", text) for name, (torque, text) in columns.items()},
+        }
+    )
+
+
+def linear_part(throttle: Throttle, *, side: str = "above") -> xr.Dataset:
+    """Give the linear part on one side of limp-home: no dry friction, no preload, no inductance.
+
+    Parameters
+    ----------
+    throttle : Throttle
+        Its parameters.
+    side : {"above", "below"}
+        Whose spring.
+
+    Returns
+    -------
+    xarray.Dataset
+        ``pole_real_per_s`` and ``pole_imag_rad_per_s`` over ``pole``, slow one first, ``gain_deg_per_duty``,
+        ``natural_frequency_rad_per_s`` and ``damping_ratio`` [-]; without a spring the gain is infinite and the ratio
+        is not a number.
+
+    Raises
+    ------
+    mgdd.errors.ParameterError
+        A side that does not exist.
+
+    Examples
+    --------
+    >>> from mgdd.throttle import Throttle, linear_part
+    >>> linear_part(Throttle())["pole_real_per_s"].values.round(3).tolist()
+    [-0.83, -49.929]
+    """
+    if side not in ("above", "below"):
+        raise ParameterError(f"side = {side!r}: must be 'above' or 'below'")
+    spring = throttle.spring_above_nm_per_rad if side == "above" else throttle.spring_below_nm_per_rad
+    inertia, damping = throttle.inertia_kgm2, throttle.damping_nms_per_rad
+    poles = np.asarray(np.roots([inertia, damping, spring]), dtype=np.complex128)
+    poles = poles[np.argsort(np.abs(poles), kind="stable")]
+    frequency = math.sqrt(spring / inertia)
+    ratio = damping / (2.0 * math.sqrt(spring * inertia)) if spring > 0.0 else math.nan
+    gain = throttle.stall_torque_nm / spring / _DEG if spring > 0.0 else math.inf
+    return labelled_dataset(
+        {
+            "pole": ("pole", np.arange(poles.size), "-", "pole"),
+            "pole_real_per_s": ("pole", poles.real, "1/s", "real part of the pole"),
+            "pole_imag_rad_per_s": ("pole", poles.imag, "rad/s", "imaginary part of the pole"),
+            "gain_deg_per_duty": ((), gain, "deg", "angle per unit duty at rest"),
+            "natural_frequency_rad_per_s": ((), frequency, "rad/s", "natural frequency"),
+            "damping_ratio": ((), ratio, "-", "damping ratio"),
+        },
+        attrs={"side": side},
+    )
+
+
+def airflow_torque_nm(throttle: Throttle, angle_deg: ArrayLike) -> NDArray[np.float64]:
+    """Give the torque of the modelled air flow, -D³ dp C_T(angle): it closes.
+
+    Parameters
+    ----------
+    throttle : Throttle
+        Its ``bore_mm`` D and ``pressure_drop_kpa`` dp.
+    angle_deg : array_like
+        Plate angles [deg].
+
+    Returns
+    -------
+    ndarray
+        Torque [N m], <= 0, in the shape of `angle_deg`. The table of C_T is a placeholder of plausible shape, to be
+        fitted to a flow bench.
+
+    Raises
+    ------
+    mgdd.errors.ParameterError
+        An angle that is not finite.
+
+    Examples
+    --------
+    >>> from mgdd.throttle import Throttle, airflow_torque_nm
+    >>> airflow_torque_nm(Throttle(pressure_drop_kpa=10.0), [0.0, 55.0, 90.0]).round(3).tolist()
+    [-0.0, -0.108, -0.0]
+    """
+    angle = np.asarray(angle_deg, dtype=np.float64)
+    if not np.isfinite(angle).all():
+        raise ParameterError("angle_deg holds a value that is not finite")
+    return np.asarray(_core.throttle_airflow_torque(throttle, angle.ravel())).reshape(angle.shape)
+
+
+def mass_flow_kg_per_s(
+    area_m2: ArrayLike,
+    *,
+    pressure_drop_kpa: ArrayLike,
+    discharge_coefficient: float = 1.0,
+    density_kg_per_m3: float = AIR_KG_PER_M3,
+) -> NDArray[np.float64]:
+    """Give the mass flow of a steady flow bench, C_d A sqrt(2 rho dp).
+
+    Parameters
+    ----------
+    area_m2 : array_like
+        Opening [m²], >= 0.
+    pressure_drop_kpa : array_like
+        Pressure drop [kPa], >= 0.
+    discharge_coefficient : float
+        C_d [-], above 0 and at most 1.5.
+    density_kg_per_m3 : float
+        Density upstream [kg/m³], > 0; air at 20 °C and 101.325 kPa if left out.
+
+    Returns
+    -------
+    ndarray
+        Mass flow [kg/s]. Incompressible: for drops of a few kPa.
+
+    Raises
+    ------
+    mgdd.errors.ParameterError
+        A value outside its domain.
+
+    Notes
+    -----
+    Tan (2018) lists C_d and the density of air at 20 °C among the symbols of the throttle; the equation is Bernoulli's.
+
+    Examples
+    --------
+    >>> from mgdd.throttle import mass_flow_kg_per_s
+    >>> round(float(mass_flow_kg_per_s(1e-3, pressure_drop_kpa=2.5, discharge_coefficient=0.98)), 4)
+    0.076
+    """
+    area, drop = np.asarray(area_m2, dtype=np.float64), np.asarray(pressure_drop_kpa, dtype=np.float64)
+    for name, values in (("area_m2", area), ("pressure_drop_kpa", drop)):
+        bad = ~(np.isfinite(values) & (values >= 0.0))
+        if bad.any():
+            raise ParameterError(f"{name} = {values[bad].flat[0]:g}: must be finite and >= 0")
+    if not 0.0 < discharge_coefficient <= 1.5:
+        raise ParameterError(f"discharge_coefficient = {discharge_coefficient:g}: must be > 0 and <= 1.5")
+    if not (math.isfinite(density_kg_per_m3) and density_kg_per_m3 > 0.0):
+        raise ParameterError(f"density_kg_per_m3 = {density_kg_per_m3:g}: must be > 0 and finite")
+    return np.asarray(discharge_coefficient * area * np.sqrt(2.0 * density_kg_per_m3 * 1e3 * drop))
+
+
+def _breakaway_nm(t: Throttle) -> float:
+    return t.coulomb_nm if t.friction in ("coulomb", "tanh") else t.stiction_nm
+
+
+def _duty_of(t: Throttle, torque: NDArray[np.float64]) -> NDArray[np.float64]:
+    """Give the duty of a static torque; the dead band comes on top."""
+    duty = torque / t.stall_torque_nm
+    return np.asarray(duty + np.sign(duty) * t.dead_band)
+
+
+def _angles(t: Throttle, angle_deg: ArrayLike | None) -> NDArray[np.float64]:
+    if angle_deg is None:
+        return np.linspace(t.closed_deg, t.open_deg, 4 * max(1, round(t.open_deg - t.closed_deg)) + 1)
+    angle = np.atleast_1d(np.asarray(angle_deg, dtype=np.float64))
+    bad = ~((angle >= t.closed_deg) & (angle <= t.open_deg))
+    if bad.any():
+        travel = f"{t.closed_deg:g} to {t.open_deg:g} deg"
+        raise ParameterError(f"angle_deg = {angle[bad].flat[0]:g} deg: must lie within the travel, {travel}")
+    return angle

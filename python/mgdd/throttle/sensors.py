@@ -1,0 +1,162 @@
+"""What the two position sensors make of a run, and when the check between them sees a fault."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Sequence
+from dataclasses import dataclass
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from mgdd import _core
+from mgdd._core import SensorPair
+from mgdd.errors import DataError, ParameterError
+from mgdd.results import labelled_dataset
+
+if TYPE_CHECKING:
+    import xarray as xr
+
+__all__ = ["SensorFault", "SensorPair", "sense"]
+
+_VOLTS = {
+    "first_v": ("V", "first sensor"),
+    "second_v": ("V", "second sensor"),
+    "sensed_angle_deg": ("deg", "plate angle as sensed"),
+    "sum_error_v": ("V", "sum of both sensors minus supply"),
+}
+_FLAGS = {
+    "first_range_fault": "first sensor out of range",
+    "second_range_fault": "second sensor out of range",
+    "sum_fault": "sum out of tolerance",
+    "fault": "a check has failed for the debounce time",
+}
+
+
+@dataclass(frozen=True, kw_only=True)
+class SensorFault:
+    """A fault of one sensor, from a time on.
+
+    Parameters
+    ----------
+    kind : {"open_wire", "short_to_ground", "short_to_supply", "offset", "gain", "stuck"}
+        What fails; an open wire reads 0 V, a stuck sensor holds the voltage of the onset.
+    sensor : {1, 2}
+        Which sensor.
+    from_s : float
+        Onset after the first sample [s], >= 0.
+    size : float
+        Added voltage of ``offset`` [V], share by which ``gain`` grows [-].
+
+    Raises
+    ------
+    mgdd.errors.ParameterError
+        No such kind or sensor, a size for a kind that has none or none for one that needs it.
+
+    Examples
+    --------
+    >>> from mgdd.throttle import SensorFault
+    >>> SensorFault(kind="offset", sensor=2, size=0.25).from_s
+    0.0
+    """
+
+    kind: str
+    sensor: int = 1
+    from_s: float = 0.0
+    size: float = 0.0
+
+    def __post_init__(self) -> None:
+        """Refuse what cannot be."""
+        kinds = [kind for kind in _core.sensor_fault_kinds if kind != "none"]
+        if self.kind not in kinds:
+            raise ParameterError(f"kind = {self.kind!r}: must be one of {', '.join(kinds)}")
+        if self.sensor not in (1, 2):
+            raise ParameterError(f"sensor = {self.sensor}: must be 1 or 2")
+        if (self.kind in ("offset", "gain")) != (self.size != 0.0):
+            raise ParameterError(f"size = {self.size:g}: goes with kind 'offset' [V] or 'gain' [-], which need it")
+
+
+def sense(
+    run: xr.Dataset,
+    sensors: SensorPair | None = None,
+    *,
+    faults: Sequence[SensorFault] = (),
+    seed: int = 0,
+) -> xr.Dataset:
+    """Sample the true angle of a run with both sensors, converter and plausibility check.
+
+    Parameters
+    ----------
+    run : xarray.Dataset
+        ``angle_deg`` [deg] over even ``time_s`` [s], as `simulate` gives it.
+    sensors : SensorPair, optional
+        Sensors and thresholds; 0.5 to 4.5 V, 12 bits and 2 mV of noise if left out.
+    faults : sequence of SensorFault
+        At most one per sensor.
+    seed : int
+        Of the noise, >= 0.
+
+    Returns
+    -------
+    xarray.Dataset
+        Over ``time_s``: ``first_v``, ``second_v``, ``sensed_angle_deg``, ``sum_error_v`` and the flags
+        ``first_range_fault``, ``second_range_fault``, ``sum_fault`` and ``fault``, which stays; scalar ``detected_s``
+        is the time from the first onset (from the first sample without a fault) to ``fault`` [s], NaN if never.
+
+    Raises
+    ------
+    mgdd.errors.ParameterError
+        Two faults of one sensor, a fault outside its domain, a negative seed.
+    mgdd.errors.DataError
+        No angle or no even time.
+
+    Notes
+    -----
+    Thresholds: sum within 0.2 V and range 0.2 to 4.8 V as in the manual of the Bosch MS 6 engine control; 200 ms of
+    debouncing is common in service literature.
+
+    Examples
+    --------
+    >>> from mgdd.throttle import SensorFault, Throttle, sense, simulate
+    >>> run = simulate(Throttle(), 0.3, duration_s=0.5)
+    >>> seen = sense(run, faults=[SensorFault(kind="short_to_ground", sensor=2, from_s=0.1)])
+    >>> round(float(seen["detected_s"]), 3)
+    0.2
+    """
+    for name in ("time_s", "angle_deg"):
+        if name not in run.variables:
+            raise DataError(f"run has no variable {name!r}: mgdd.throttle.simulate makes it")
+    if seed < 0:
+        raise ParameterError(f"seed = {seed}: must be >= 0")
+    time = run["time_s"].to_numpy()
+    if time.size < 2:
+        raise DataError(f"time_s has {time.size} sample(s): at least two are needed")
+    sample = float(np.round((time[-1] - time[0]) / (time.size - 1), 9))
+    off = np.abs(time - time[0] - sample * np.arange(time.size)) > 1e-3 * sample
+    if off.any():
+        k = int(np.argmax(off))
+        raise DataError(f"time_s = {time[k]:g} s at sample {k} is off the even grid of {sample:g} s: resample first")
+    per_sensor = [("none", 0.0, 0.0), ("none", 0.0, 0.0)]
+    for fault in faults:
+        if per_sensor[fault.sensor - 1][0] != "none":
+            raise ParameterError(f"faults: sensor {fault.sensor} has two: give at most one per sensor")
+        per_sensor[fault.sensor - 1] = (fault.kind, fault.from_s, fault.size)
+    raw = _core.sense_throttle(
+        SensorPair() if sensors is None else sensors,
+        run["angle_deg"].to_numpy(),
+        sample_s=sample,
+        seed=seed,
+        faults=per_sensor,
+    )
+    onset = min((fault.from_s for fault in faults), default=0.0)
+    latched = raw["fault"].any()
+    detected = float(time[int(np.argmax(raw["fault"]))] - time[0]) - onset if latched else math.nan
+    return labelled_dataset(
+        {
+            "time_s": ("time_s", time),
+            **{name: ("time_s", raw[name], *label) for name, label in _VOLTS.items()},
+            **{name: ("time_s", raw[name], "-", text) for name, text in _FLAGS.items()},
+            "detected_s": ((), detected, "s", "time from onset to detection"),
+        },
+        attrs={"seed": seed, "faults": tuple(f"{f.kind} of sensor {f.sensor}" for f in faults)},
+    )

@@ -1,0 +1,306 @@
+"""Runs of a throttle: one with all its signals, or many at once, and the summary of a step."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Sequence
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+
+from mgdd import _core
+from mgdd._core import Throttle
+from mgdd.errors import DataError, ParameterError, ShapeError
+from mgdd.results import labelled_dataset
+
+if TYPE_CHECKING:
+    import xarray as xr
+    from numpy.typing import ArrayLike, NDArray
+
+__all__ = ["simulate", "simulate_many", "step_summary"]
+
+_DEFAULT_DURATION_S = 1.0
+# Samples may be off an even grid by this share of a sample: what six decimals of a file cost.
+_UNEVEN = 1e-3
+_MOVED_DEG = 0.01
+
+
+def simulate(
+    throttle: Throttle,
+    duty: ArrayLike,
+    *,
+    time_s: ArrayLike | None = None,
+    sample_s: float = 1e-3,
+    duration_s: float | None = None,
+    start_deg: float | None = None,
+    bridge: str = "brake",
+    supply_v: ArrayLike | None = None,
+    airflow_torque_nm: ArrayLike = 0.0,
+    step_s: float = 1e-4,
+) -> xr.Dataset:
+    """Simulate one throttle from rest, without current, under a duty signal.
+
+    Parameters
+    ----------
+    throttle : Throttle
+        Its parameters.
+    duty : float or array_like, shape (n,)
+        Duty [-], -1 to 1, positive opens. Sample k acts from ``time_s[k]`` to ``time_s[k + 1]``.
+    time_s : array_like, shape (n,), optional
+        Even, increasing times [s]; without it samples are `sample_s` apart and start at 0.
+    sample_s : float
+        Time between samples [s]; not used where `time_s` is given.
+    duration_s : float, optional
+        Length of the run [s], for a constant duty only, rounded to whole samples; 1 s if left out.
+    start_deg : float, optional
+        Angle at the start [deg], within the travel; limp-home if left out.
+    bridge : {"brake", "open"}
+        What the bridge does at zero duty: short the motor, which brakes, or let go of it.
+    supply_v : float or array_like, shape (n,), optional
+        Supply of the bridge [V]; that of the throttle if left out.
+    airflow_torque_nm : float or array_like, shape (n,)
+        Torque on the plate [N m], positive when it opens; in addition to ``pressure_drop_kpa`` of the throttle.
+    step_s : float
+        Integration step [s], 1e-6 to 5e-3; goes a whole number of times into the sample time.
+
+    Returns
+    -------
+    xarray.Dataset
+        ``duty`` [-], ``angle_deg`` [deg], ``speed_deg_per_s`` and ``current_a`` over ``time_s``, and ``supply_v`` and
+        ``airflow_torque_nm`` where they were given. Its attributes are the run's settings and every parameter.
+
+    Raises
+    ------
+    mgdd.errors.ParameterError
+        A start outside the travel, a step or a bridge that does not exist.
+    mgdd.errors.DataError
+        A duty beyond 1, a value that is not finite, an uneven time.
+    mgdd.errors.ShapeError
+        Columns of different length.
+
+    Notes
+    -----
+    Tan (2018), section 7.1.1, names the parts of the model; its equations were not at hand. Dry friction is solved
+    exactly at every step (Moreau 1988), so that the plate sticks without creeping.
+
+    Examples
+    --------
+    >>> from mgdd import presets
+    >>> from mgdd.throttle import simulate
+    >>> run = simulate(presets.load("P1").throttle, 0.6, duration_s=0.06)
+    >>> round(float(run["angle_deg"][-1]), 2)
+    33.6
+    """
+    times, column, sample = _grid(duty, time_s=time_s, sample_s=sample_s, duration_s=duration_s)
+    start = throttle.limp_home_deg if start_deg is None else float(start_deg)
+    supply = _signal("supply_v", supply_v, column.size)
+    air = _signal("airflow_torque_nm", airflow_torque_nm, column.size)
+    raw = _core.simulate_throttle(
+        throttle,
+        column,
+        sample_s=sample,
+        start_deg=start,
+        bridge=bridge,
+        supply_v=supply,
+        airflow_torque_nm=air,
+        step_s=step_s,
+    )
+    variables: dict[str, tuple[Any, ...]] = {"time_s": ("time_s", times), "duty": ("time_s", column)}
+    variables |= {name: ("time_s", values) for name, values in raw.items()}
+    if supply.size:
+        variables["supply_v"] = ("time_s", supply)
+    if air.any():
+        variables["airflow_torque_nm"] = ("time_s", air)
+    settings = {"start_deg": start, "bridge": bridge, "sample_s": sample, "step_s": step_s}
+    return labelled_dataset(variables, attrs={**settings, **throttle.to_dict()})
+
+
+def simulate_many(
+    throttles: Throttle | Sequence[Throttle],
+    duty: ArrayLike,
+    *,
+    time_s: ArrayLike | None = None,
+    sample_s: float = 1e-3,
+    duration_s: float | None = None,
+    start_deg: ArrayLike | None = None,
+    bridge: str = "brake",
+    supply_v: ArrayLike | None = None,
+    airflow_torque_nm: ArrayLike = 0.0,
+    step_s: float = 1e-4,
+) -> xr.Dataset:
+    """Simulate many throttles, or many starts of one, under the same signals, several at once in vector lanes.
+
+    Parameters
+    ----------
+    throttles : Throttle or sequence of Throttle
+        One for all starts, or one per case; friction and backlash have the same form in all.
+    duty, time_s, sample_s, duration_s, bridge, supply_v, airflow_torque_nm, step_s
+        As in `simulate`.
+    start_deg : float or array_like, shape (cases,), optional
+        Angle of each case at the start [deg]; its limp-home if left out.
+
+    Returns
+    -------
+    xarray.Dataset
+        ``angle_deg(case, time_s)`` [deg], with the bits that `simulate` gives case by case; ``duty(time_s)`` and
+        ``start_deg(case)``.
+
+    Raises
+    ------
+    mgdd.errors.ParameterError, mgdd.errors.DataError, mgdd.errors.ShapeError
+        As in `simulate`; also no throttle at all, and as many starts as there are no throttles.
+
+    Examples
+    --------
+    >>> from mgdd.throttle import Throttle, simulate_many
+    >>> runs = simulate_many(Throttle(), 0.0, duration_s=0.5, start_deg=[0.0, 30.0, 90.0], bridge="open")
+    >>> runs["angle_deg"][:, -1].values.round(1).tolist()
+    [7.8, 8.0, 8.0]
+    """
+    times, column, sample = _grid(duty, time_s=time_s, sample_s=sample_s, duration_s=duration_s)
+    wanted = 1 if start_deg is None else np.atleast_1d(np.asarray(start_deg, dtype=np.float64)).size
+    cases = [throttles] * wanted if isinstance(throttles, Throttle) else list(throttles)
+    if not cases:
+        raise ParameterError("throttles is empty: give at least one")
+    if start_deg is None:
+        starts = np.array([one.limp_home_deg for one in cases])
+    else:
+        starts = np.atleast_1d(np.asarray(start_deg, dtype=np.float64))
+        if starts.size == 1:
+            starts = np.repeat(starts, len(cases))
+    angle = _core.simulate_throttle_many(
+        cases,
+        column,
+        sample_s=sample,
+        start_deg=starts,
+        bridge=bridge,
+        supply_v=_signal("supply_v", supply_v, column.size),
+        airflow_torque_nm=_signal("airflow_torque_nm", airflow_torque_nm, column.size),
+        step_s=step_s,
+    )
+    return labelled_dataset(
+        {
+            "time_s": ("time_s", times),
+            "case": ("case", np.arange(len(cases)), "-", "case"),
+            "duty": ("time_s", column),
+            "start_deg": ("case", starts, "deg", "plate angle at the start"),
+            "angle_deg": (("case", "time_s"), angle),
+        },
+        attrs={"bridge": bridge, "sample_s": sample, "step_s": step_s},
+    )
+
+
+def step_summary(run: xr.Dataset) -> dict[str, float]:
+    """Summarize a run as the answer to a step at its first sample.
+
+    Parameters
+    ----------
+    run : xarray.Dataset
+        ``angle_deg`` [deg] over ``time_s`` [s], from `simulate` or a log.
+
+    Returns
+    -------
+    dict of str to float
+        ``start_angle_deg``, ``final_angle_deg``, ``max_angle_deg`` and ``min_angle_deg`` [deg], and ``t10_s`` and
+        ``t90_s`` [s]: when 10 and 90 percent of the way from start to final are first passed, interpolated between
+        samples; NaN where the plate ends within 0.01 deg of its start.
+
+    Raises
+    ------
+    mgdd.errors.DataError
+        No angle or no time in the Dataset, or no sample.
+
+    Examples
+    --------
+    >>> from mgdd.throttle import Throttle, simulate, step_summary
+    >>> summary = step_summary(simulate(Throttle(), 1.0, duration_s=0.3))
+    >>> round(summary["t10_s"], 3), round(summary["t90_s"], 3)
+    (0.019, 0.078)
+    """
+    for name in ("time_s", "angle_deg"):
+        if name not in run.variables:
+            raise DataError(f"run has no variable {name!r}: mgdd.throttle.simulate makes it")
+    time, angle = run["time_s"].to_numpy(), run["angle_deg"].to_numpy()
+    if angle.ndim != 1 or not angle.size:
+        raise DataError(f"angle_deg has shape {angle.shape}: a summary is of one run with at least one sample")
+    start, final = float(angle[0]), float(angle[-1])
+    return {
+        "start_angle_deg": start,
+        "final_angle_deg": final,
+        "max_angle_deg": float(angle.max()),
+        "min_angle_deg": float(angle.min()),
+        "t10_s": _passes(time, angle, 0.1),
+        "t90_s": _passes(time, angle, 0.9),
+    }
+
+
+def _passes(time: NDArray[np.float64], angle: NDArray[np.float64], share: float) -> float:
+    """Give the time after the first sample at which a share of the way from first to last angle is passed."""
+    way = float(angle[-1] - angle[0])
+    if abs(way) < _MOVED_DEG:
+        return math.nan
+    done = (angle - angle[0]) / way
+    k = int(np.argmax(done >= share))
+    part = (share - done[k - 1]) / (done[k] - done[k - 1])
+    return float(time[k - 1] + part * (time[k] - time[k - 1]) - time[0])
+
+
+def _grid(
+    duty: ArrayLike, *, time_s: ArrayLike | None, sample_s: float, duration_s: float | None
+) -> tuple[NDArray[np.float64], NDArray[np.float64], float]:
+    """Give times, duty column and sample time."""
+    column = np.asarray(duty, dtype=np.float64)
+    if column.ndim > 1:
+        raise ShapeError(f"duty has shape {column.shape}: must be one number or one column")
+    if time_s is not None:
+        if duration_s is not None:
+            raise ParameterError(f"duration_s = {duration_s:g} s contradicts time_s: leave one out")
+        times = np.asarray(time_s, dtype=np.float64)
+        sample = _sample_time(times)
+        if column.ndim == 0:
+            column = np.full(times.size, float(column))
+        if column.size != times.size:
+            raise ShapeError(f"duty has {column.size} samples, time_s has {times.size}")
+        return times, column, sample
+    if not (math.isfinite(sample_s) and sample_s > 0.0):
+        raise ParameterError(f"sample_s = {sample_s:g} s: must be > 0 and finite")
+    if column.ndim == 0:
+        length = _DEFAULT_DURATION_S if duration_s is None else duration_s
+        if not (math.isfinite(length) and length >= sample_s):
+            raise ParameterError(f"duration_s = {length:g} s: must be finite and >= sample_s = {sample_s:g} s")
+        column = np.full(round(length / sample_s) + 1, float(column))
+    elif duration_s is not None:
+        raise ParameterError(
+            f"duration_s = {duration_s:g} s: goes with a constant duty only; this one has {column.size} samples"
+        )
+    return np.arange(column.size, dtype=np.float64) * float(sample_s), column, float(sample_s)
+
+
+def _sample_time(times: NDArray[np.float64]) -> float:
+    if times.ndim != 1 or times.size < 2:
+        raise ShapeError(f"time_s has shape {times.shape}: must be one column of at least two samples")
+    if not np.isfinite(times).all():
+        raise DataError(f"time_s is not finite at sample {int(np.argmin(np.isfinite(times)))}")
+    gaps = np.diff(times)
+    if not (gaps > 0.0).all():
+        k = int(np.argmax(gaps <= 0.0)) + 1
+        raise DataError(f"time_s = {times[k]:g} s at sample {k} does not exceed the one before: sort it, drop repeats")
+    # Six digits after the point, as many tables have them: the sample time is what they mean, to a nanosecond.
+    sample = float(np.round((times[-1] - times[0]) / (times.size - 1), 9))
+    off = np.abs(times - times[0] - sample * np.arange(times.size)) > _UNEVEN * sample
+    if off.any():
+        k = int(np.argmax(off))
+        raise DataError(
+            f"time_s = {times[k]:g} s at sample {k} is off the even grid of {sample:g} s: resample the duty first"
+        )
+    return sample
+
+
+def _signal(name: str, values: ArrayLike | None, size: int) -> NDArray[np.float64]:
+    """Give a column; empty if there is none."""
+    if values is None:
+        return np.empty(0)
+    column = np.asarray(values, dtype=np.float64)
+    if column.ndim > 1:
+        raise ShapeError(f"{name} has shape {column.shape}: must be one number or one column")
+    return np.full(size, float(column)) if column.ndim == 0 else column

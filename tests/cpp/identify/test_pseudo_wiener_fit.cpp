@@ -1,0 +1,187 @@
+// Identification of pseudo-Wiener models: exact recovery, unmodelled dynamics, coverage, ranking of the three kinds.
+#include <gtest/gtest.h>
+
+#include <cmath>
+#include <random>
+
+#include "mgdd/identify/pseudo_wiener_fit.hpp"
+#include "support/throttle_records.hpp"
+
+namespace mgdd::identify {
+namespace {
+
+using test_support::Signal;
+using throttle::PwP;
+using throttle::PwR;
+using throttle::PwW;
+
+const std::array<double, 5> truth{0.0197, 83597.0, 0.1292, 4.96e-4, 0.0927};  // tau, G, beta, kappa, delta
+
+/// The start from which the printed recovery figures were found.
+PwR far_start() {
+  PwR p;
+  for (auto* s : {&p.above, &p.below}) {
+    s->tau_s = 0.03;
+    s->gain_deg_per_s2_per_duty = 5e4;
+    s->preload_duty = 0.1;
+    s->spring_duty_per_deg = 1e-3;
+    s->coulomb_duty = 0.05;
+  }
+  return p;
+}
+
+PseudoWienerFitOptions one_search() {
+  PseudoWienerFitOptions o;
+  o.only_given_start = true;
+  return o;
+}
+
+template <class P>
+Signal free_run(const P& p, const Signal& duty, double start_deg) {
+  const auto model = throttle::model_of(p);
+  auto state = model.at_rest(start_deg, 0.0);
+  Signal y(duty.size());
+  throttle::simulate(model, state, std::span<const double>(duty), std::span<double>(y));
+  return y;
+}
+Signal free_run(const throttle::PseudoWiener& p, const Signal& duty, double start_deg) {
+  return std::visit([&](const auto& q) { return free_run(q, duty, start_deg); }, p);
+}
+
+TEST(PseudoWienerFit, RecoversEveryParameterOfItsOwnKindExactly) {
+  const Signal duty = test_support::chirp(0.15, 0.20, 0.2, 6.0, 12.0);
+  PseudoWienerFitOptions o = one_search();
+  o.search.cost_tolerance = 1e-14;
+  o.search.step_tolerance = 1e-13;
+  const auto fit = fit_pseudo_wiener({{duty, free_run(PwR{}, duty, 8.0)}}, far_start(), o);
+  for (int i = 0; i < 5; ++i) {
+    const double expected = truth[static_cast<std::size_t>(i)];
+    EXPECT_NEAR(fit.report.values[i], expected, 1e-6 * expected) << fit.report.names[static_cast<std::size_t>(i)];
+  }
+}
+
+TEST(PseudoWienerFit, StaysCloseBehindNoiseInductanceAndStribeckFriction) {
+  const auto log =
+      test_support::throttle_log(test_support::log_throttle(), test_support::chirp(0.15, 0.20, 0.2, 6.0, 12.0), 1);
+  const auto fit = fit_pseudo_wiener({{log.duty, log.angle_deg}}, far_start(), one_search());
+  const std::array<double, 5> share{0.08, 0.05, 0.01, 0.08, 0.04};
+  for (int i = 0; i < 5; ++i) {
+    const double expected = truth[static_cast<std::size_t>(i)];
+    EXPECT_NEAR(fit.report.values[i], expected, share[static_cast<std::size_t>(i)] * expected) << i;
+  }
+  EXPECT_GE(test_support::fit_percent(log.angle_deg, free_run(fit.model, log.duty, log.angle_deg[0])), 98.0);
+}
+
+TEST(PseudoWienerFit, IntervalsCoverTheTruth) {
+  const Signal duty = test_support::chirp(0.15, 0.20, 0.2, 6.0, 12.0);
+  const Signal clean = free_run(PwR{}, duty, 8.0);
+  std::array<int, 5> covered{};
+  for (unsigned seed = 0; seed < 60; ++seed) {
+    std::mt19937 bits(seed);
+    std::normal_distribution<double> noise(0.0, 0.05);
+    Signal noisy = clean;
+    for (std::size_t k = 1; k < noisy.size(); ++k)
+      noisy[k] += noise(bits);
+    const auto fit = fit_pseudo_wiener({{duty, noisy}}, PwR{}, one_search());
+    for (int i = 0; i < 5; ++i) {
+      const double off = std::abs(fit.report.values[i] - truth[static_cast<std::size_t>(i)]);
+      covered[static_cast<std::size_t>(i)] += off <= 1.96 * fit.report.standard_error[i] ? 1 : 0;
+    }
+  }
+  for (const int count : covered)
+    EXPECT_GE(count, 50);
+}
+
+TEST(PseudoWienerFit, SidesAreFittedApartFromOneLog) {
+  PwR two;
+  two.below.preload_duty = 0.16;
+  two.below.spring_duty_per_deg = 3e-3;
+  two.limp_home_deg = 30.0;
+  const Signal duty = test_support::chirp(0.0, 0.30, 0.3, 5.0, 8.0);
+  PwR start = two;
+  start.below = start.above;
+  PseudoWienerFitOptions o = one_search();
+  o.sides = Sides::both;
+  o.search.cost_tolerance = 1e-14;
+  o.free = {"preload_duty", "spring_duty_per_deg", "coulomb_duty"};
+  const auto fit = fit_pseudo_wiener({{duty, free_run(two, duty, 30.0)}}, start, o);
+  ASSERT_EQ(fit.report.names.size(), 6u);
+  const PwR& found = std::get<PwR>(fit.model);
+  EXPECT_NEAR(found.below.preload_duty, 0.16, 3e-4);
+  EXPECT_NEAR(found.below.spring_duty_per_deg, 3e-3, 3e-5);
+  EXPECT_NEAR(found.above.preload_duty, 0.1292, 1e-4);
+}
+
+TEST(PseudoWienerFit, FindsTheDelayByTrying) {
+  PwR late;
+  late.frame.delay_samples = 2;
+  const Signal duty = test_support::chirp(0.15, 0.20, 0.5, 6.0, 4.0);
+  PseudoWienerFitOptions o = one_search();
+  o.delays = {0, 1, 2, 3};
+  const auto fit = fit_pseudo_wiener({{duty, free_run(late, duty, 8.0)}}, PwR{}, o);
+  EXPECT_EQ(throttle::frame_of(fit.model).delay_samples, 2);
+}
+
+// The table of the three kinds on one throttle. Training fits are those of the best of all starts.
+TEST(PseudoWienerFit, RanksTheKindsOnP1) {
+  const auto t = test_support::log_throttle();
+  const auto train = test_support::throttle_log(t, test_support::chirp(0.15, 0.20, 0.2, 6.0, 12.0), 0);
+  const auto chirp = test_support::throttle_log(t, test_support::chirp(0.15, 0.18, 0.3, 5.0, 12.0), 1);
+  const auto steps = test_support::throttle_log(t, test_support::golden_steps(12.0), 2);
+  struct Result {
+    double train, chirp, steps, ahead;
+  };
+  const auto judge = [&](const throttle::PseudoWiener& base, PseudoWienerFitOptions o) {
+    const auto fit = fit_pseudo_wiener({{train.duty, train.angle_deg}}, base, o);
+    const auto percent = [&](const auto& log) {
+      return test_support::fit_percent(log.angle_deg, free_run(fit.model, log.duty, log.angle_deg[0]));
+    };
+    return Result{percent(train), percent(chirp), percent(steps),
+                  test_support::ahead_rms(chirp, free_run(fit.model, chirp.duty, chirp.angle_deg[0]), 20)};
+  };
+  PseudoWienerFitOptions few;
+  few.starts = 6;
+  const Result r = judge(far_start(), one_search());
+  const Result w = judge(PwW{}, few);
+  const Result p = judge(PwP{}, few);
+  EXPECT_GE(r.train, 99.3);
+  EXPECT_GE(r.chirp, 99.0);
+  EXPECT_GE(r.steps, 96.0);
+  EXPECT_LE(r.ahead, 0.06);
+  EXPECT_GE(w.train, 79.7);
+  EXPECT_GE(p.train, 53.7);
+  EXPECT_LE(w.steps, 75.0);
+  EXPECT_LE(p.steps, 75.0);
+  const double persistence = test_support::ahead_rms(chirp, Signal(chirp.duty.size(), 0.0), 20);
+  EXPECT_NEAR(persistence, 1.548, 0.01);
+  EXPECT_LT(r.ahead, 0.25 * std::min(w.ahead, p.ahead));
+  EXPECT_LT(std::max(w.ahead, p.ahead), 0.75);  // re-anchored, both are good enough to guide
+}
+
+TEST(PseudoWienerFit, RefusesWhatCannotBeFittedAndSaysWhy) {
+  const Signal duty(100, 0.1);
+  const Signal angle(100, 20.0);
+  const auto message = [](auto&& call) -> std::string {
+    try {
+      call();
+    } catch (const Error& error) {
+      return error.what();
+    }
+    return "";
+  };
+  EXPECT_EQ(message([&] { static_cast<void>(fit_pseudo_wiener({}, PwR{}, {})); }),
+            "records is empty: a fit needs at least one log");
+  EXPECT_NE(message([&] { static_cast<void>(fit_pseudo_wiener({{duty, Signal(99, 1.0)}}, PwR{}, {})); }).find("99"),
+            std::string::npos);
+  EXPECT_NE(message([&] {
+              static_cast<void>(fit_pseudo_wiener({{Signal(100, 1.5), angle}}, PwR{}, {}));
+            }).find("records[0], sample 0"),
+            std::string::npos);
+  PseudoWienerFitOptions o;
+  o.free = {"mass"};
+  EXPECT_EQ(message([&] { static_cast<void>(fit_pseudo_wiener({{duty, angle}}, PwR{}, o)); }),
+            "free: 'mass' is no parameter of pw_r");
+}
+
+}  // namespace
+}  // namespace mgdd::identify

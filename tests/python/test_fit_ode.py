@@ -1,0 +1,127 @@
+"""The user's own ODE through the house fit."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+
+from mgdd import _core
+from mgdd.errors import DataError, ParameterError, ShapeError
+from mgdd.identify import OdeModel, fit_ode, fit_smooth_throttle, simulate_smooth_throttle
+
+
+def pendulum(_t, x, u, p):
+    return x[1], p[0] * u[0] - p[1] * x[1] - p[2] * np.sin(x[0])
+
+
+def record(n=600, noise=0.0, seed=1):
+    rng = np.random.default_rng(seed)
+    time = 0.02 * np.arange(n)
+    u = np.repeat(rng.uniform(-1, 1, n // 20 + 1), 20)[:n]
+    model = OdeModel(
+        derivative=pendulum,
+        output=lambda x, _u, _p: x[0],
+        parameters={"gain": 3.0, "damping": 0.4, "stiffness": 2.0},
+        start=(0.2, -0.1),
+    )
+    return time, u, model.simulate(time, u) + noise * rng.standard_normal(n)
+
+
+def fit(time, u, y, **options):
+    settings = {
+        "parameters": {"gain": 2.0, "damping": 0.2, "stiffness": 1.0},
+        "start": [y[0], 0.0],
+        "free_start": [0, 1],
+        "bounds": {"gain": (0.1, 20.0), "damping": (0.01, 5.0), "stiffness": (0.1, 20.0)},
+        "log_scaled": ["gain", "damping", "stiffness"],
+    }
+    return fit_ode(pendulum, time, u=u, y=y, **(settings | options))
+
+
+def test_exact_data_give_back_parameters_and_start():
+    time, u, y = record()
+    found = fit(time, u, y)
+    assert found.report.success
+    np.testing.assert_allclose(found.report.values, [3.0, 0.4, 2.0, 0.2, -0.1], rtol=1e-6)
+    np.testing.assert_allclose(found.model.simulate(time, u), y, atol=1e-7)
+
+
+def test_noise_gives_honest_errors_and_fixed_parameters_stay():
+    time, u, y = record(noise=0.01, seed=3)
+    found = fit(
+        time, u, y, sigma=0.01, free=["gain", "stiffness"], parameters={"gain": 2.0, "damping": 0.4, "stiffness": 1.0}
+    )
+    assert found.report.names == ("gain", "stiffness", "start_0", "start_1")
+    assert found.model.parameters["damping"] == 0.4
+    assert found.report.rmse == pytest.approx(1.0, abs=0.1)
+    assert np.all(np.abs(found.report.values - [3.0, 2.0, 0.2, -0.1]) < 4 * found.report.stderr)
+
+
+def test_many_starts_report_how_many_arrived():
+    time, u, y = record(200)
+    found = fit(
+        time,
+        u,
+        y,
+        n_starts=3,
+        bounds={
+            "gain": (1.0, 6.0),
+            "damping": (0.1, 1.0),
+            "stiffness": (0.5, 5.0),
+            "start_0": (-1, 1),
+            "start_1": (-1, 1),
+        },
+    )
+    assert len(found.reports) == 3
+    assert 1 <= found.n_reached <= 3
+
+
+def test_python_and_the_core_agree_on_one_problem():
+    truth = np.array(_core.smooth_throttle_example)
+    rng = np.random.default_rng(4)
+    duty = np.repeat(rng.uniform(-0.35, 0.35, 13), 80)[:1000]
+    angle = simulate_smooth_throttle(duty) + rng.normal(0.0, 0.05, duty.size)
+
+    def throttle(_t, x, u, p):
+        km, kv, tc, ws, ks, tpd, ths, home, ke, r = p
+        deflection = x[0] - home
+        torque = (
+            20 * km * x[2] - kv * x[1] - tc * np.tanh(x[1] / ws) - ks * deflection - tpd * np.tanh(deflection / ths)
+        )
+        return x[1], torque / 2e-3, (12.0 * u[0] - r * x[2] - 20 * ke * x[1]) / 1e-3
+
+    free = ["torque_constant_nm_per_a", "coulomb_nm", "preload_nm", "limp_home_rad"]
+    names = list(_core.smooth_throttle_names)
+    found = fit_ode(
+        throttle,
+        1e-3 * np.arange(duty.size),
+        u=duty,
+        y=angle,
+        parameters=dict(zip(names, truth * np.where(np.isin(names, free), 1.1, 1.0), strict=True)),
+        start=[0.14, 0.0, 0.0],
+        output=lambda x, _u, _p: np.degrees(x[0]),
+        free=free,
+        cost_tolerance=1e-12,
+    )
+    values = np.array([found.model.parameters[name] for name in names])
+    assert np.sum((simulate_smooth_throttle(duty, parameters=values) - angle) ** 2) == pytest.approx(
+        2 * found.report.cost, rel=1e-9
+    )
+    # The core's ten-parameter fit cannot be worse than four parameters at the same place.
+    core = fit_smooth_throttle(duty, angle, starts=values, lower=0.1 * truth, upper=10 * truth)
+    assert core.report.cost <= found.report.cost
+
+
+def test_wrong_calls_name_the_remedy_and_a_right_one_follows():
+    time, u, y = record(100)
+    with pytest.raises(ParameterError, match="no parameter of this model"):
+        fit(time, u, y, log_scaled=["gane"])
+    with pytest.raises(ShapeError, match="y has shape"):
+        fit(time, u, y[:-1])
+    with pytest.raises(DataError, match="equal steps"):
+        fit(time**2, u, y)
+    with pytest.raises(DataError, match="sample 7"):
+        fit(time, u, np.where(np.arange(100) == 7, np.nan, y))
+    with pytest.raises(ParameterError, match="no finite simulation"):
+        fit(time, u, y, parameters={"gain": 2.0, "damping": -1e9, "stiffness": 1.0}, bounds={}, log_scaled=[])
+    assert fit(time, u, y).report.success

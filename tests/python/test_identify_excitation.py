@@ -1,0 +1,199 @@
+"""Excitation: what the signals are, that they stay within the duty, and what a check says before they are sent."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from typing import Any
+
+import numpy as np
+import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
+
+from mgdd import identify
+from mgdd.errors import DataError, ParameterError
+from mgdd.identify.excitation import maximum_length_sequence
+
+SIGNALS: dict[str, Callable[..., Any]] = {
+    "chirp": identify.chirp,
+    "multisine": identify.multisine,
+    "prbs": identify.prbs,
+    "amplitude_random_steps": identify.amplitude_random_steps,
+    "staircase": identify.staircase,
+    "triangle": identify.triangle,
+}
+
+
+def duty(signal: Any) -> np.ndarray:
+    return np.asarray(signal["duty"].to_numpy())
+
+
+@pytest.mark.parametrize("name", SIGNALS)
+@settings(max_examples=8, deadline=None)
+@given(offset=st.floats(-0.9, 0.9), share=st.floats(0.05, 1.0))
+def test_every_signal_keeps_its_swing_and_its_clock(name: str, offset: float, share: float) -> None:
+    amplitude = share * (1.0 - abs(offset))
+    signal = SIGNALS[name](offset=offset, amplitude=amplitude, step_s=2e-3)
+    values = duty(signal)
+    assert np.abs(values - offset).max() <= amplitude * (1.0 + 1e-12) + 1e-12
+    assert np.abs(values - offset).max() >= 0.85 * amplitude
+    np.testing.assert_allclose(signal["time_s"], 2e-3 * np.arange(values.size), rtol=1e-12)
+    assert signal.attrs["kind"] == name
+    assert signal["duty"].attrs["units"] == "-"
+
+
+@pytest.mark.parametrize("name", SIGNALS)
+def test_a_duty_beyond_one_is_refused_with_the_largest_amplitude(name: str) -> None:
+    with pytest.raises(ParameterError, match=r"amplitude = 0.6: with offset = 0.5 the duty passes ±1; at most 0.5"):
+        SIGNALS[name](offset=0.5, amplitude=0.6)
+    SIGNALS[name](offset=0.5, amplitude=0.5)
+    for bad in (float("nan"), -0.1):
+        with pytest.raises(ParameterError, match="amplitude"):
+            SIGNALS[name](offset=0.0, amplitude=bad)
+    with pytest.raises(ParameterError, match="step_s"):
+        SIGNALS[name](offset=0.0, amplitude=0.1, step_s=-1e-3)
+
+
+def test_the_chirp_sweeps_between_its_frequencies() -> None:
+    values = duty(identify.chirp(20.0, offset=0.1, amplitude=0.2, low_hz=0.5, high_hz=8.0)) - 0.1
+    rising = np.flatnonzero((values[:-1] < 0.0) & (values[1:] >= 0.0))
+    period = np.diff(rising) * 1e-3
+    at = 0.5 * (rising[1:] + rising[:-1]) * 1e-3
+    np.testing.assert_allclose(1.0 / period, 0.5 + 7.5 * at / 20.0, rtol=0.02)
+
+
+def test_frequencies_above_half_the_sampling_rate_are_refused() -> None:
+    with pytest.raises(ParameterError, match=r"high_hz = 6: must be below half the sampling rate, 5 Hz"):
+        identify.chirp(offset=0.0, amplitude=0.1, step_s=0.1)
+    identify.chirp(offset=0.0, amplitude=0.1, step_s=0.05)
+    with pytest.raises(ParameterError, match="half the sampling rate"):
+        identify.multisine(offset=0.0, amplitude=0.1, step_s=0.1)
+    with pytest.raises(ParameterError, match="low <= high"):
+        identify.chirp(offset=0.0, amplitude=0.1, low_hz=7.0)
+    with pytest.raises(ParameterError, match="hold_s"):
+        identify.prbs(offset=0.0, amplitude=0.1, hold_s=1e-4)
+
+
+def test_the_multisine_has_its_odd_lines_and_nothing_else() -> None:
+    signal = identify.multisine(10.0, offset=0.0, amplitude=0.2)
+    spectrum = np.abs(np.fft.rfft(duty(signal))) / duty(signal).size
+    lines = np.flatnonzero(spectrum > 1e-3 * spectrum.max())
+    assert lines.size == 20
+    assert np.all(lines % 2 == 1)
+    assert lines[-1] * 0.1 <= 8.0
+    np.testing.assert_allclose(spectrum[lines], spectrum[lines[0]], rtol=1e-6)
+    ac = duty(signal)
+    assert np.abs(ac).max() / np.sqrt(np.mean(ac**2)) == pytest.approx(signal.attrs["crest_factor"], rel=1e-3)
+    assert signal.attrs["crest_factor"] < 2.0
+    with pytest.raises(ParameterError, match=r"harmonics = 41: must be in \[1, 40\]"):
+        identify.multisine(offset=0.0, amplitude=0.2, harmonics=41)
+    with pytest.raises(ParameterError, match="one period"):
+        identify.multisine(5.0, offset=0.0, amplitude=0.2)
+
+
+@pytest.mark.parametrize("register", range(3, 13))
+def test_registers_have_maximum_length(register: int) -> None:
+    bits = 2.0 * maximum_length_sequence(register) - 1.0
+    assert bits.size == 2**register - 1
+    assert bits.sum() == 1.0
+    spectrum = np.fft.fft(bits)
+    autocorrelation = np.fft.ifft(np.abs(spectrum) ** 2).real
+    np.testing.assert_allclose(autocorrelation[1:], -1.0, atol=1e-6 * bits.size)
+
+
+@pytest.mark.parametrize("register", range(13, 17))
+def test_long_registers_pass_every_state_once(register: int) -> None:
+    bits = maximum_length_sequence(register)
+    wrapped = np.r_[bits, bits[:register]]
+    words = sum(wrapped[i : i + bits.size] << i for i in range(register))
+    assert np.unique(words).size == bits.size
+    assert words.min() > 0
+
+
+def test_random_steps_follow_the_golden_ratio_or_a_seed() -> None:
+    steps = duty(identify.amplitude_random_steps(6.0, offset=0.15, amplitude=0.20))[::150]
+    k = np.arange(steps.size)
+    np.testing.assert_allclose(steps, 0.15 + 0.20 * (2.0 * np.mod(0.6180339887 * k, 1.0) - 1.0), rtol=1e-12)
+    seeded = [
+        duty(identify.amplitude_random_steps(6.0, offset=0.0, amplitude=0.3, hold_s=(0.05, 0.3), seed=s))
+        for s in (1, 1, 2)
+    ]
+    assert np.array_equal(seeded[0], seeded[1])
+    assert not np.array_equal(seeded[0], seeded[2])
+    holds = np.diff(np.flatnonzero(np.diff(seeded[0])))
+    assert holds.min() >= 50
+    assert holds.max() <= 300
+    with pytest.raises(ParameterError, match="seed"):
+        identify.amplitude_random_steps(6.0, offset=0.0, amplitude=0.3, hold_s=(0.05, 0.3))
+    with pytest.raises(ParameterError, match="first must not exceed"):
+        identify.amplitude_random_steps(6.0, offset=0.0, amplitude=0.3, hold_s=(0.3, 0.05), seed=1)
+
+
+def test_the_staircase_climbs_and_returns() -> None:
+    signal = identify.staircase(offset=0.05, amplitude=0.1, cycles=2)
+    levels = duty(signal)[::250]
+    assert levels.size == 81
+    np.testing.assert_allclose(np.abs(np.diff(levels)), 0.01, rtol=1e-9)
+    np.testing.assert_allclose(levels[[0, 20, 40, 60, 80]], [-0.05, 0.15, -0.05, 0.15, -0.05], atol=1e-12)
+
+
+def test_the_triangle_is_one() -> None:
+    values = duty(identify.triangle(20.0, offset=0.1, amplitude=0.3, frequency_hz=0.1))
+    np.testing.assert_allclose(values[[0, 2500, 5000, 7500, 10000]], [0.1, 0.4, 0.1, -0.2, 0.1], atol=1e-12)
+    np.testing.assert_allclose(np.abs(np.diff(values)), 4.0 * 0.3 * 0.1 * 1e-3, rtol=1e-6, atol=1e-12)
+
+
+def lazy(time_s: Any, duty: Any, start_deg: float) -> dict[str, Any]:
+    """A plate that follows its duty at once, and a motor that takes 10 A at full duty."""
+    assert len(time_s) == len(duty)
+    return {"angle_deg": start_deg + 100.0 * np.asarray(duty), "current_a": 10.0 * np.asarray(duty)}
+
+
+def test_a_check_reports_what_it_simulated() -> None:
+    signal = identify.chirp(offset=0.1, amplitude=0.2)
+    check = identify.check_excitation(signal, lazy, start_deg=20.0)
+    assert check.passed
+    assert check.content.angle_high_deg == pytest.approx(50.0, abs=0.01)
+    assert check.content.angle_low_deg == pytest.approx(10.0, abs=0.01)
+    assert check.content.peak_speed_deg_per_s == pytest.approx(20.0 * 2.0 * np.pi * 6.0, rel=0.05)
+    assert check.peak_current_a == pytest.approx(3.0, abs=0.01)
+    assert check.rms_current_a == pytest.approx(10.0 * np.sqrt(0.1**2 + 0.5 * 0.2**2), rel=0.03)
+    np.testing.assert_array_equal(check.prediction["angle_deg"], 20.0 + 100.0 * signal["duty"])
+    assert "inside the limits" in check.summary()
+    assert check.to_dict()["peak_current_a"] == check.peak_current_a
+
+
+@pytest.mark.parametrize(
+    ("limits", "said"),
+    [
+        ({"angle_window_deg": (1.0, 40.0)}, "opens to 50.0 deg, beyond 40: lower offset or amplitude"),
+        ({"angle_window_deg": (15.0, 60.0)}, "closes to 10.0 deg, beyond 15: raise the offset"),
+        ({"max_rate_deg_per_s": 300.0}, "deg/s, above 300: lower the amplitude"),
+        ({"max_current_a": 2.0}, "the motor takes 3.00 A, above 2: lower the amplitude"),
+    ],
+)
+def test_every_limit_is_told_with_its_remedy(limits: dict[str, Any], said: str) -> None:
+    check = identify.check_excitation(identify.chirp(offset=0.1, amplitude=0.2), lazy, start_deg=20.0, **limits)
+    assert not check.passed
+    assert len(check.findings) == 1
+    assert said in check.findings[0]
+    assert "outside the limits" in check.summary()
+    assert identify.check_excitation(identify.chirp(offset=0.1, amplitude=0.05), lazy, start_deg=20.0, **limits).passed
+
+
+def test_a_check_refuses_what_it_cannot_judge() -> None:
+    signal = identify.chirp(offset=0.1, amplitude=0.2)
+    with pytest.raises(ParameterError, match=r"angle_window_deg = \(40, 10\)"):
+        identify.check_excitation(signal, lazy, angle_window_deg=(40.0, 10.0))
+    with pytest.raises(ParameterError, match="max_current_a = -1"):
+        identify.check_excitation(signal, lazy, max_current_a=-1.0)
+    with pytest.raises(ParameterError, match="no current"):
+        identify.check_excitation(signal, lambda t, u, s: 20.0 + 0.0 * t + 0.0 * u + 0.0 * s, max_current_a=1.0)
+    with pytest.raises(ParameterError, match="must be a Throttle"):
+        identify.check_excitation(signal, 3.0)
+    with pytest.raises(ParameterError, match="shape"):
+        identify.check_excitation(signal, lambda t, u, s: t[:-1] + u[:-1] + s)
+    with pytest.raises(ParameterError, match="not finite"):
+        identify.check_excitation(signal, lambda t, u, s: t * np.nan + u + s)
+    with pytest.raises(DataError, match=r"no duty\(time_s\)"):
+        identify.check_excitation(signal.drop_vars("duty"), lazy)

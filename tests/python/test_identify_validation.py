@@ -1,0 +1,221 @@
+"""Figures of merit, residual tests, blocks of time, and sentences about what a log cannot tell."""
+
+from __future__ import annotations
+
+from typing import Any
+
+import numpy as np
+import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
+from hypothesis.extra.numpy import arrays
+
+from mgdd import identify
+from mgdd.errors import DataError, ParameterError, ShapeError
+from mgdd.identify.record_content import open_questions, record_content
+from mgdd.io import throttle_log
+
+TIME = np.arange(6000) * 1e-3
+RNG = np.random.default_rng(7)
+
+signals = arrays(np.float64, 40, elements=st.floats(-1e3, 1e3)).filter(lambda y: float(np.ptp(y)) > 1e-3)
+
+
+@settings(max_examples=50, deadline=None)
+@given(y=signals, offset=st.floats(-100.0, 100.0))
+def test_the_metrics_have_their_fixed_points(y: np.ndarray, offset: float) -> None:
+    assert identify.fit_percent(y, y) == 100.0
+    assert identify.fit_percent(y, np.full_like(y, y.mean())) == pytest.approx(0.0, abs=1e-9)
+    assert identify.fit_percent(y - y.mean(), -(y - y.mean())) == pytest.approx(-100.0, abs=1e-9)
+    assert identify.vaf_percent(y, y + offset) == pytest.approx(100.0, abs=1e-9)
+    assert identify.rmse(y, y + offset) == pytest.approx(abs(offset), rel=1e-9, abs=1e-9)
+    assert identify.mse(y, y + offset) == pytest.approx(offset**2, rel=1e-9, abs=1e-9)
+
+
+def test_the_metrics_exactly() -> None:
+    y = np.sin(np.linspace(0.0, 20.0, 500))
+    assert abs(identify.fit_percent(y, y) - 100.0) <= 1e-12
+    assert abs(identify.fit_percent(y, np.full_like(y, y.mean()))) <= 1e-12
+    assert identify.fit_percent(y, -y) < 0.0
+    assert abs(identify.vaf_percent(y, y + 3.0) - 100.0) <= 1e-12
+    assert identify.fit_percent(y, y + 3.0) < 0.0
+
+
+def test_the_metrics_refuse_what_has_no_answer() -> None:
+    with pytest.raises(DataError, match="constant"):
+        identify.fit_percent(np.ones(5), np.ones(5))
+    with pytest.raises(DataError, match="second signal, sample 2: nan"):
+        identify.rmse(np.zeros(4), [0.0, 0.0, np.nan, 0.0])
+    with pytest.raises(ShapeError, match="must be equal"):
+        identify.mse(np.zeros(4), np.zeros(5))
+    with pytest.raises(ShapeError, match="not empty"):
+        identify.mse([], [])
+
+
+def test_white_residuals_pass_as_often_as_they_should() -> None:
+    rng = np.random.default_rng(11)
+    passed, inside = 0, []
+    for _ in range(200):
+        noise = rng.standard_normal((2, 1500))
+        tests = identify.residual_tests(noise[0], noise[1])
+        passed += tests.white
+        inside += [tests.share_white, tests.share_independent]
+    assert np.mean(inside) == pytest.approx(0.95, abs=0.01)
+    assert 0.55 < passed / 200 < 0.75, "one of 25 lags is forgiven: 64 of 100"
+
+
+def test_memory_and_what_the_input_explains_are_found() -> None:
+    noise = RNG.standard_normal((2, 4000))
+    slow = np.convolve(noise[0], [1.0, 0.8, 0.4])[:4000]
+    assert not identify.residual_tests(slow, noise[1]).white
+    driven = noise[0] + 0.3 * np.roll(noise[1], 5)
+    tests = identify.residual_tests(driven, noise[1])
+    assert tests.share_independent < 1.0
+    assert int(np.argmax(np.abs(tests.correlations["cross_correlation"].to_numpy()))) + 1 == 5
+    assert float(tests.correlations["cross_correlation"][4]) == pytest.approx(0.3 / np.hypot(1.0, 0.3), abs=0.05)
+    assert tests.limit == pytest.approx(1.96 / np.sqrt(4000.0))
+
+
+def test_residual_tests_refuse_too_little() -> None:
+    with pytest.raises(DataError, match="100 samples"):
+        identify.residual_tests(np.arange(99.0), np.arange(99.0))
+    with pytest.raises(DataError, match="residual is constant"):
+        identify.residual_tests(np.ones(200), np.arange(200.0))
+    with pytest.raises(DataError, match="duty is constant"):
+        identify.residual_tests(np.arange(200.0), np.ones(200))
+    with pytest.raises(ParameterError, match="lags = 0"):
+        identify.residual_tests(np.arange(200.0), np.arange(200.0), lags=0)
+
+
+def log(angle: np.ndarray | None = None, duty: np.ndarray | None = None) -> Any:
+    u = 0.25 * np.sin(2.0 * np.pi * TIME) if duty is None else duty
+    return throttle_log(TIME, u, 20.0 + 60.0 * u if angle is None else angle, name="bench.csv")
+
+
+def test_a_log_is_split_by_time() -> None:
+    parts = identify.split_log(log())
+    assert [part.sizes["time_s"] for part in parts] == [3600, 1200, 1200]
+    np.testing.assert_array_equal(np.concatenate([part["time_s"] for part in parts]), TIME)
+    assert [part.sizes["time_s"] for part in identify.split_log(log(), shares=(0.5, 0.5))] == [3000, 3000]
+    with pytest.raises(ParameterError, match="add up to 1"):
+        identify.split_log(log(), shares=(0.5, 0.4))
+    with pytest.raises(DataError, match="log more"):
+        identify.split_log(log(), shares=(0.95, 0.05))
+
+
+class Proportional:
+    """A plate that follows its duty at once: exact on the logs made here."""
+
+    kind = "pw_r"
+
+    def __init__(self, gain: float = 60.0) -> None:
+        self.parameters = {"gain": gain, "limp_home_deg": 8.0}
+
+    def simulate(self, time_s: Any, duty: Any, *, start_deg: float) -> np.ndarray:
+        gain = self.parameters["gain"]
+        return np.asarray(start_deg + gain * (np.asarray(duty) - duty[0]) + 0.0 * np.asarray(time_s))
+
+    def predict(self, time_s: Any, duty: Any, angle_deg: Any, horizon: int) -> np.ndarray:
+        run = self.simulate(time_s, duty, start_deg=angle_deg[0])
+        return np.asarray(angle_deg[:-horizon] + run[horizon:] - run[:-horizon])
+
+    def to_toml(self) -> str:
+        return ""
+
+
+class Runaway(Proportional):
+    """A fit that has failed."""
+
+    def simulate(self, time_s: Any, duty: Any, *, start_deg: float) -> np.ndarray:
+        return np.full(len(time_s), np.nan * start_deg * duty[0])
+
+
+def test_a_validation_reports_free_run_and_steps_ahead() -> None:
+    noisy = log()["angle_deg"].to_numpy() + 0.05 * RNG.standard_normal(TIME.size)
+    noisy[0] = 20.0  # a free run starts at the first sample, noise and all
+    validation = identify.validate_throttle(Proportional(), log(noisy))
+    assert validation.fit_percent > 99.0
+    assert validation.rmse_deg == pytest.approx(0.05, rel=0.2)
+    assert validation.mse_deg2 == pytest.approx(validation.rmse_deg**2)
+    rms = validation.n_step["n_step_rms_deg"]
+    assert rms.sel(predictor="pw_r").to_numpy() == pytest.approx(0.05 * np.sqrt(2.0), rel=0.1)
+    travelled = 60.0 * 0.25 * 2.0 * np.sin(np.pi * 0.05) / np.sqrt(2.0)
+    assert float(rms.sel(predictor="persistence")[2]) == pytest.approx(np.hypot(travelled, 0.05 * 1.41), rel=0.02)
+    assert validation.tests.share_white < 1.0
+    text = validation.summary()
+    assert "free-run fit 99" in text
+    assert "50 ms ahead" in text
+    assert validation.to_dict()["n_step_rms"]["20"] == pytest.approx(float(rms[0, 1]))
+    np.testing.assert_allclose(validation.free_run["residual_deg"], validation.free_run["model_deg"] - noisy)
+
+
+def test_n_steps_can_be_compared_with_the_truth() -> None:
+    noisy = log()["angle_deg"].to_numpy() + 0.05 * RNG.standard_normal(TIME.size)
+    rms = identify.n_step_rms(Proportional(), log(noisy), true_deg=log()["angle_deg"])["n_step_rms_deg"]
+    assert rms.sel(predictor="pw_r").to_numpy() == pytest.approx(0.05, rel=0.1)
+    with pytest.raises(ParameterError, match="no whole number of samples"):
+        identify.n_step_rms(Proportional(), log(), horizons_s=(0.0055,))
+    with pytest.raises(ParameterError, match="more than half"):
+        identify.n_step_rms(Proportional(), log(), horizons_s=(5.0,))
+
+
+def test_a_poor_fit_is_named() -> None:
+    validation = identify.validate_throttle(Proportional(30.0), log())
+    assert validation.fit_percent < 60.0
+    assert any("below the 85 %" in finding for finding in validation.findings)
+
+
+def test_a_model_that_runs_away_is_an_error() -> None:
+    with pytest.raises(DataError, match=r"runs away on bench\.csv"):
+        identify.validate_throttle(Runaway(), log())
+
+
+# --- what a log cannot tell --------------------------------------------------------------------------------------
+
+
+def questions(angle: np.ndarray, **options: Any) -> str:
+    content = record_content(TIME, angle, limp_home_deg=8.0, stops_deg=(0.0, 90.0))
+    return "\n".join(open_questions(content, swing=0.25, **options))
+
+
+def test_a_rich_log_leaves_nothing_open() -> None:
+    assert questions(10.0 + 9.0 * np.sin(2.0 * np.pi * 2.0 * TIME)) == ""
+
+
+def test_one_direction_only() -> None:
+    said = questions(2.0 + 14.0 * TIME)
+    assert "the plate only opens: Coulomb torque and preload" in said
+    assert "add a triangle of ±0.25 duty at 0.05 Hz across limp-home (8 deg)" in said
+    assert "only closes" in questions(85.0 - 14.0 * TIME)
+
+
+def test_one_side_only() -> None:
+    said = questions(40.0 + 15.0 * np.sin(2.0 * np.pi * 2.0 * TIME))
+    assert "never goes below limp-home (8 deg), the lowest angle is 25.0 deg" in said
+    assert "above" not in said
+    assert "never goes above" in questions(4.0 + 3.0 * np.sin(2.0 * np.pi * 8.0 * TIME))
+
+
+def test_slow_still_and_stopped() -> None:
+    assert "at most" in questions(10.0 + 9.0 * np.sin(2.0 * np.pi * 0.5 * TIME))
+    assert "hardly moves" in questions(8.0 + 1e-3 * TIME)
+    stopped = np.clip(60.0 + 60.0 * np.sin(2.0 * np.pi * 1.0 * TIME), 2.0, 90.0)
+    assert "end stop 3" in questions(np.where(stopped < 8.0, 4.0, stopped))
+
+
+def test_entangled_pairs_get_their_own_remedy() -> None:
+    rich = 10.0 + 9.0 * np.sin(2.0 * np.pi * 2.0 * TIME)
+    said = questions(rich, pairs=[("preload_duty", "coulomb_duty", -0.993)])
+    assert (
+        "preload_duty and coulomb_duty are indistinguishable in this log (correlation -0.993): add a triangle" in said
+    )
+    assert "add a chirp to 6 Hz" in questions(rich, pairs=[("tau_s", "gain_deg_per_s2_per_duty", 0.99)])
+    one_way = questions(2.0 + 14.0 * TIME, pairs=[("preload_duty", "coulomb_duty", -0.999)])
+    assert one_way.count("indistinguishable") == 1, "said once"
+
+
+def test_crossings_are_counted_with_a_band() -> None:
+    noise = 0.05 * RNG.standard_normal(TIME.size)
+    content = record_content(TIME, 8.0 + 5.0 * np.sin(2.0 * np.pi * TIME) + noise, limp_home_deg=8.0)
+    assert content.limp_home_crossings == 11
+    assert content.time_above_s == pytest.approx(content.time_below_s, abs=0.05)

@@ -1,0 +1,377 @@
+"""The throttle plant at its Python face: closed forms, measured-like figures, lanes, sensors, refusals."""
+
+from __future__ import annotations
+
+import signal
+
+import numpy as np
+import pytest
+
+from mgdd import presets
+from mgdd.errors import DataError, ParameterError, ShapeError
+from mgdd.results import check_labels, labelled_dataset
+from mgdd.throttle import (
+    SensorFault,
+    SensorPair,
+    Throttle,
+    airflow_torque_nm,
+    groups,
+    holding_duty,
+    linear_part,
+    mass_flow_kg_per_s,
+    sense,
+    simulate,
+    simulate_many,
+    step_summary,
+)
+
+P1 = Throttle()
+BARE = P1.replace(coulomb_nm=0.0, stiction_nm=0.0, preload_above_nm=0.0, preload_below_nm=0.0, inductance_mh=0.0)
+
+
+def ramp(rate_per_s, top, *, sample_s=1e-3):
+    return np.linspace(0.0, top, round(abs(top) / rate_per_s / sample_s) + 1)
+
+
+def first_time(run, condition):
+    hit = np.asarray(condition)
+    assert hit.any()
+    return float(run["time_s"][int(np.argmax(hit))])
+
+
+# --- laws ---------------------------------------------------------------------------------------------------------
+
+
+@pytest.mark.parametrize("bridge", ["brake", "open"])
+@pytest.mark.parametrize("name", ["P1", "P2", "P3"])
+def test_without_duty_the_plate_goes_home(name, bridge):
+    throttle = presets.load(name).throttle
+    runs = simulate_many(throttle, 0.0, duration_s=5.0, start_deg=[0.0, 30.0, 90.0], bridge=bridge)
+    np.testing.assert_allclose(runs["angle_deg"][:, -1], throttle.limp_home_deg, atol=0.25)
+
+
+def test_where_friction_exceeds_the_preload_there_is_a_band_of_rest():
+    throttle = P1.replace(preload_above_nm=0.2, preload_below_nm=0.2, spring_above_nm_per_rad=0.819)
+    edge = np.degrees((0.284 - 0.2) / 0.819)
+    assert edge == pytest.approx(5.88, abs=0.005)
+    runs = simulate_many(throttle, 0.0, duration_s=5.0, start_deg=[8.0 + 10.0, 8.0 + 20.0, 8.0 + edge - 0.1])
+    np.testing.assert_allclose(runs["angle_deg"][:2, -1] - 8.0, edge, atol=0.1)
+    assert float(runs["angle_deg"][2, -1]) == 8.0 + edge - 0.1
+
+
+@pytest.mark.parametrize("sign", [1.0, -1.0])
+def test_breakaway_from_limp_home(sign):
+    expected = float(groups(P1)["preload_above"] + groups(P1)["stiction"])
+    assert expected == pytest.approx(0.2219, abs=5e-5)
+    run = simulate(P1, sign * ramp(0.01, 0.3))
+    left = np.abs(run["angle_deg"] - 8.0) > 0.3
+    assert float(run["duty"][int(np.argmax(left.to_numpy()))]) == pytest.approx(sign * 0.2230, abs=0.0015)
+
+
+@pytest.mark.parametrize(("supply_v", "expected"), [(10.0, 0.2663), (12.0, 0.2219), (14.4, 0.1849)])
+def test_breakaway_scales_with_the_supply(supply_v, expected):
+    g = groups(P1.replace(supply_v=supply_v))
+    assert float(g["preload_above"] + g["coulomb"]) == pytest.approx(expected, rel=5e-4)
+    given, built = (
+        simulate(P1, ramp(0.02, 0.3), supply_v=supply_v),
+        simulate(P1.replace(supply_v=supply_v), ramp(0.02, 0.3)),
+    )
+    np.testing.assert_array_equal(given["angle_deg"], built["angle_deg"])
+    left = np.abs(given["angle_deg"] - 8.0) > 0.3
+    assert float(given["duty"][int(np.argmax(left.to_numpy()))]) == pytest.approx(expected, abs=0.003)
+
+
+def test_holding_duty_has_twice_the_friction_between_its_branches():
+    curve = holding_duty(P1)
+    check_labels(curve)
+    width = curve["duty_rising"] - curve["duty_falling"]
+    np.testing.assert_allclose(width, 2.0 * float(groups(P1)["coulomb"]), rtol=1e-12)
+    assert float(width[0]) == pytest.approx(0.1854, abs=5e-5)
+    at_45 = float(holding_duty(P1, [45.0])["duty_spring"][0])
+    assert at_45 == pytest.approx((0.396 + 0.087 * np.radians(37.0)) / 3.064, rel=1e-12)
+    # A closing air flow asks for more duty, a dead band too; stiction widens the band of rest only.
+    assert float(holding_duty(P1.replace(pressure_drop_kpa=10.0), [45.0])["duty_spring"][0]) > at_45 + 0.02
+    assert float(holding_duty(P1.replace(dead_band=0.05), [45.0])["duty_spring"][0]) == pytest.approx(at_45 + 0.05)
+    sticky = holding_duty(P1.replace(friction="stiction", stiction_nm=0.3), [45.0])
+    assert float(sticky["duty_breakaway_up"] - sticky["duty_rising"]) == pytest.approx(0.016 / 3.064)
+
+
+def test_the_plate_stays_within_the_holding_band_and_leaves_it():
+    throttle = presets.load("P2").throttle.replace(friction="coulomb", stiction_nm=0.1)
+    curve = holding_duty(throttle, [45.0])
+    low, high = float(curve["duty_falling"][0]), float(curve["duty_rising"][0])
+    for duty, stays in ((low + 1e-3, True), (high - 1e-3, True), (low - 1e-3, False), (high + 1e-3, False)):
+        # The current builds up first: it starts where it will stay, at rest against the spring.
+        run = simulate(throttle.replace(inductance_mh=0.0), duty, start_deg=45.0, duration_s=0.5)
+        assert (abs(float(run["angle_deg"][-1]) - 45.0) < 1e-9) == stays, duty
+    # In degrees: 2 T_d/k_s wide at one duty, or the whole travel where that is less.
+    half = np.degrees(0.1 / 0.819)
+    middle = float(curve["duty_spring"][0])
+    starts = [45.0 - half + 0.05, 45.0 + half - 0.05, 45.0 - half - 0.2, 45.0 + half + 0.2]
+    runs = simulate_many(throttle.replace(inductance_mh=0.0), middle, start_deg=starts, duration_s=0.5)
+    moved = np.abs(runs["angle_deg"][:, -1].to_numpy() - starts)
+    assert (moved < 1e-9).tolist() == [True, True, False, False]
+    assert np.degrees(2.0 * 0.284 / 0.087) > 82.0
+
+
+def test_without_friction_and_preload_the_plate_follows_the_closed_form():
+    slow, fast = linear_part(BARE)["pole_real_per_s"].values
+    time = np.arange(5001) * 1e-3
+    exact = 8.0 + 1.8 * (fast * np.exp(slow * time) - slow * np.exp(fast * time)) / (fast - slow)
+    for step_s, tolerance in ((1e-4, 4e-5), (1e-3, 3.5e-4)):
+        run = simulate(BARE, np.zeros(time.size), start_deg=9.8, step_s=step_s)
+        assert np.abs(run["angle_deg"] - exact).max() < tolerance
+
+
+def test_linear_part():
+    part = linear_part(P1)
+    check_labels(part)
+    np.testing.assert_allclose(part["pole_real_per_s"], [-0.8298, -49.929], rtol=1e-4)
+    assert not part["pole_imag_rad_per_s"].any()
+    assert float(part["gain_deg_per_duty"]) == pytest.approx(2017.9, rel=1e-4)
+    assert float(part["natural_frequency_rad_per_s"]) == pytest.approx(6.437, rel=1e-3)
+    assert float(part["damping_ratio"]) == pytest.approx(3.943, rel=1e-3)
+    soft = linear_part(P1.replace(spring_below_nm_per_rad=0.0), side="below")
+    assert np.isinf(soft["gain_deg_per_duty"])
+    with pytest.raises(ParameterError, match="side = 'left': must be 'above' or 'below'"):
+        linear_part(P1, side="left")
+
+
+def test_mirrored_duty_gives_the_mirrored_angle():
+    middle = P1.replace(limp_home_deg=45.0)
+    duty = 0.35 * np.sin(np.arange(4000) * 4e-3) + 0.1 * np.sin(np.arange(4000) * 0.031)
+    up, down = simulate(middle, duty, start_deg=50.0), simulate(middle, -duty, start_deg=40.0)
+    assert float(np.ptp(up["angle_deg"])) > 30.0
+    np.testing.assert_allclose(up["angle_deg"] - 45.0, 45.0 - down["angle_deg"], atol=1e-10)
+
+
+# --- figures of P1 --------------------------------------------------------------------------------------------------
+
+
+def test_full_duty_opens_and_closes():
+    run = simulate(P1, 1.0, duration_s=0.3)
+    summary = step_summary(run)
+    assert summary["t10_s"] == pytest.approx(0.019, abs=0.002)
+    assert summary["t90_s"] == pytest.approx(0.078, abs=0.002)
+    assert first_time(run, run["angle_deg"] >= 90.0) == pytest.approx(0.085, abs=0.002)
+    closing = simulate(P1, -1.0, start_deg=90.0, duration_s=0.3)
+    assert first_time(closing, closing["angle_deg"] <= 0.0) == pytest.approx(0.071, abs=0.002)
+    # On the stop: a peak, no rebound, and a penetration of what is left of the stall torque.
+    assert summary["max_angle_deg"] - 90.0 == pytest.approx(0.37, abs=0.06)
+    after = run["angle_deg"][run["time_s"] > 0.087]
+    assert float(after.min()) > 90.0
+    assert summary["final_angle_deg"] - 90.0 == pytest.approx(0.026, rel=0.15)
+
+
+@pytest.mark.parametrize(
+    ("bridge", "start", "end", "expected"),
+    [("open", 90.0, 9.0, 0.191), ("brake", 90.0, 9.0, 0.905), ("brake", 0.0, 7.0, 0.128)],
+)
+def test_power_off(bridge, start, end, expected):
+    run = simulate(P1, 0.0, start_deg=start, bridge=bridge, duration_s=1.5)
+    hit = run["angle_deg"] <= end if start > end else run["angle_deg"] >= end
+    assert first_time(run, hit) == pytest.approx(expected, rel=0.03)
+
+
+def test_step_size_is_of_first_order():
+    steps = (1e-3, 5e-4, 2e-4, 1e-4, 5e-5, 1e-5)
+    ends = [float(simulate(P1, 0.6, duration_s=0.06, step_s=step)["angle_deg"][-1]) for step in steps]
+    np.testing.assert_allclose(ends, [33.368, 33.518, 33.575, 33.599, 33.610, 33.620], atol=0.01)
+    errors = 33.622 - np.array(ends[:4])
+    np.testing.assert_allclose(errors / np.array(steps[:4]), errors[0] / steps[0], rtol=0.15)
+
+
+# --- face -----------------------------------------------------------------------------------------------------------
+
+
+def test_a_run_says_what_it_is():
+    run = simulate(P1, [0.1, 0.2, 0.3], supply_v=13.0, airflow_torque_nm=[0.0, -0.1, -0.1], bridge="open")
+    check_labels(run)
+    assert set(run.data_vars) == {
+        "duty", "angle_deg", "speed_deg_per_s", "current_a", "supply_v", "airflow_torque_nm"
+    }  # fmt: skip
+    assert (run.attrs["bridge"], run.attrs["start_deg"], run.attrs["coulomb_nm"]) == ("open", 8.0, 0.284)
+    assert float(run["current_a"][0]) == 0.0
+    assert set(simulate(P1, 0.1, duration_s=0.01).data_vars) == {"duty", "angle_deg", "speed_deg_per_s", "current_a"}
+    assert simulate(P1, 0.0).sizes["time_s"] == 1001
+
+
+def test_a_long_run_in_pieces_is_the_same_run():
+    # More steps than between two looks for Ctrl-C.
+    duty = 0.15 + 0.2 * np.sin(np.arange(45_000) * 2e-3)
+    whole = simulate(P1, duty)
+    halves = simulate_many([P1, P1], duty)
+    np.testing.assert_array_equal(whole["angle_deg"], halves["angle_deg"][1])
+
+
+def test_lanes_give_the_bits_of_single_runs():
+    throttles = [P1.replace(coulomb_nm=0.2 + 0.01 * i, limp_home_deg=8.0 + i) for i in range(11)]
+    duty = 0.3 * np.sin(np.arange(1500) * 0.02)
+    runs = simulate_many(throttles, duty, airflow_torque_nm=-0.05, supply_v=13.0)
+    assert runs["start_deg"].values.tolist() == [8.0 + i for i in range(11)]
+    check_labels(runs)
+    for i, throttle in enumerate(throttles):
+        one = simulate(throttle, duty, airflow_torque_nm=-0.05, supply_v=13.0)
+        np.testing.assert_array_equal(runs["angle_deg"][i], one["angle_deg"])
+
+
+def test_ctrl_c_ends_a_long_run():
+    def interrupt(*_):
+        raise KeyboardInterrupt
+
+    before = signal.signal(signal.SIGALRM, interrupt)
+    try:
+        for run in (
+            lambda: simulate(P1, np.full(4_000_000, 0.1), step_s=1e-5),
+            lambda: simulate_many([P1] * 20_000, np.full(2000, 0.1), step_s=1e-5),
+        ):
+            signal.setitimer(signal.ITIMER_REAL, 0.3)
+            with pytest.raises(KeyboardInterrupt):
+                run()
+    finally:
+        signal.setitimer(signal.ITIMER_REAL, 0.0)
+        signal.signal(signal.SIGALRM, before)
+
+
+def test_summary_of_a_falling_step_and_of_none():
+    summary = step_summary(simulate(P1, -0.6, start_deg=80.0, duration_s=0.5))
+    assert summary["min_angle_deg"] == pytest.approx(0.0, abs=0.3)
+    assert 0.0 < summary["t10_s"] < summary["t90_s"] < 0.5
+    still = step_summary(simulate(P1, 0.0, duration_s=0.1))
+    assert np.isnan(still["t10_s"])
+    assert np.isnan(still["t90_s"])
+    with pytest.raises(DataError, match="run has no variable 'angle_deg'"):
+        step_summary(labelled_dataset({"time_s": ("time_s", [0.0])}))
+
+
+def test_air_flow_and_flow_bench():
+    throttle = P1.replace(pressure_drop_kpa=10.0)
+    torque = airflow_torque_nm(throttle, [[0.0, 55.0], [75.0, 90.0]])
+    np.testing.assert_allclose(torque, [[0.0, -0.108], [-0.085 * 2.16, 0.0]], atol=1e-12)
+    assert float(mass_flow_kg_per_s(1e-3, pressure_drop_kpa=2.5, discharge_coefficient=0.98)) == pytest.approx(
+        0.0760, abs=5e-5
+    )
+    with pytest.raises(ParameterError, match="angle_deg holds a value that is not finite"):
+        airflow_torque_nm(throttle, [np.nan])
+    for bad, message in (
+        ({"area_m2": -1.0, "pressure_drop_kpa": 1.0}, "area_m2 = -1"),
+        ({"area_m2": 1.0, "pressure_drop_kpa": np.nan}, "pressure_drop_kpa = nan"),
+        ({"area_m2": 1.0, "pressure_drop_kpa": 1.0, "discharge_coefficient": 0.0}, "discharge_coefficient = 0"),
+        ({"area_m2": 1.0, "pressure_drop_kpa": 1.0, "density_kg_per_m3": -1.0}, "density_kg_per_m3 = -1"),
+    ):
+        with pytest.raises(ParameterError, match=message):
+            mass_flow_kg_per_s(**bad)
+
+
+@pytest.mark.parametrize(
+    ("options", "error", "message"),
+    [
+        ({"duty": [0.0, 1.5]}, DataError, r"duty = 1.5 at sample 1: must be in \[-1, 1\]"),
+        ({"duty": [0.0, np.nan]}, DataError, "duty is nan at sample 1"),
+        ({"duty": [[0.0, 0.1]]}, ShapeError, r"duty has shape \(1, 2\)"),
+        ({"duty": []}, ShapeError, "duty has no samples"),
+        ({"duty": [0.0, 0.1], "duration_s": 1.0}, ParameterError, "goes with a constant duty only"),
+        ({"duty": 0.1, "duration_s": 0.0}, ParameterError, "duration_s = 0 s: must be finite and >= sample_s"),
+        ({"duty": 0.1, "sample_s": np.inf}, ParameterError, "sample_s = inf s: must be > 0"),
+        ({"duty": [0.1], "time_s": [0.0, 0.1]}, ShapeError, "duty has 1 samples, time_s has 2"),
+        ({"duty": 0.1, "time_s": [0.0]}, ShapeError, "at least two samples"),
+        ({"duty": 0.1, "time_s": [0.0, np.nan]}, DataError, "time_s is not finite at sample 1"),
+        ({"duty": 0.1, "time_s": [0.0, 0.0]}, DataError, "at sample 1 does not exceed the one before"),
+        ({"duty": 0.1, "time_s": [0.0, 0.1, 0.3]}, DataError, "off the even grid of 0.15 s: resample"),
+        ({"duty": 0.1, "time_s": [0.0, 0.1], "duration_s": 1.0}, ParameterError, "contradicts time_s"),
+        ({"duty": 0.1, "start_deg": 91.0}, ParameterError, r"start_deg = 91 deg: must be in \[0, 90\]"),
+        ({"duty": 0.1, "bridge": "closed"}, ParameterError, "bridge = 'closed': must be one of brake, open"),
+        ({"duty": 0.1, "supply_v": -1.0}, DataError, "supply_v = -1 V at sample 0"),
+        ({"duty": [0.1, 0.1], "supply_v": [12.0] * 3}, ShapeError, "supply_v has 3 samples, duty has 2"),
+        ({"duty": 0.1, "supply_v": [[12.0]]}, ShapeError, r"supply_v has shape \(1, 1\)"),
+        ({"duty": 0.1, "airflow_torque_nm": np.inf}, DataError, "airflow_torque_nm is inf at sample 0"),
+        ({"duty": 0.1, "step_s": 1e-7}, ParameterError, r"step_s = 1e-07 s: must be in \[1e-06, 0.005\]"),
+        ({"duty": 0.1, "step_s": 3e-4}, ParameterError, "must go a whole number of times"),
+    ],
+)
+def test_bad_input_is_refused_by_one_and_many(options, error, message):
+    with pytest.raises(error, match=message):
+        simulate(P1, **options)
+    with pytest.raises(error, match=message):
+        simulate_many([P1, P1], **options)
+    assert simulate(P1, 0.0, duration_s=0.01).sizes["time_s"] == 11
+
+
+def test_bad_cases_of_many_are_refused():
+    with pytest.raises(ParameterError, match="throttles is empty"):
+        simulate_many([], 0.1)
+    with pytest.raises(ShapeError, match="start_deg has 3 entries, there are 2 throttles"):
+        simulate_many([P1, P1], 0.1, start_deg=[1.0, 2.0, 3.0])
+    with pytest.raises(ParameterError, match="throttle 1: friction and backlash must have the same form"):
+        simulate_many([P1, P1.replace(friction="tanh")], 0.1)
+    assert simulate_many([P1, P1], 0.1, start_deg=5.0)["start_deg"].values.tolist() == [5.0, 5.0]
+    with pytest.raises(ParameterError, match="angle_deg = 91 deg: must lie within the travel, 0 to 90 deg"):
+        holding_duty(P1, [91.0])
+
+
+# --- sensors --------------------------------------------------------------------------------------------------------
+
+
+@pytest.fixture(scope="module")
+def sweep():
+    return simulate(P1, 0.26 * np.sin(np.arange(3000) * 2.1e-3))
+
+
+def test_healthy_sensors_follow_the_plate(sweep):
+    seen = sense(sweep)
+    check_labels(seen)
+    assert not seen["fault"].any()
+    assert np.isnan(seen["detected_s"])
+    np.testing.assert_allclose(seen["sum_error_v"], 0.0, atol=0.0138)
+    error = seen["sensed_angle_deg"] - sweep["angle_deg"]
+    assert float(error.std()) == pytest.approx(0.045, abs=0.02)
+    assert seen.identical(sense(sweep, SensorPair(), seed=0))
+    assert not seen["first_v"].equals(sense(sweep, seed=1)["first_v"])
+
+
+@pytest.mark.parametrize("sensor", [1, 2])
+@pytest.mark.parametrize(
+    ("kind", "size"), [("open_wire", 0.0), ("short_to_ground", 0.0), ("short_to_supply", 0.0), ("offset", 0.25)]
+)
+def test_faults_are_detected_in_200_ms(sweep, kind, size, sensor):
+    seen = sense(sweep, faults=[SensorFault(kind=kind, sensor=sensor, from_s=0.4, size=size)])
+    assert float(seen["detected_s"]) <= 0.2 + 1e-9
+    assert bool(seen["fault"][-1])
+    assert not seen["fault"][:400].any()
+
+
+def test_small_faults_stay_unseen(sweep):
+    # 5 % of the first voltage is 0.2 V at 78.75 deg.
+    for angle, failing in ((70.0, False), (85.0, True)):
+        still = sweep.assign(angle_deg=sweep["angle_deg"] * 0.0 + angle)
+        still["angle_deg"].attrs = sweep["angle_deg"].attrs
+        seen = sense(still, faults=[SensorFault(kind="gain", size=0.05)])
+        assert bool(seen["fault"].any()) == failing
+
+
+def test_bad_sensors_and_faults_are_refused(sweep):
+    for bad, message in (
+        ({"kind": "rust"}, "kind = 'rust': must be one of open_wire"),
+        ({"kind": "stuck", "sensor": 3}, "sensor = 3: must be 1 or 2"),
+        ({"kind": "stuck", "size": 1.0}, "size = 1: goes with kind 'offset'"),
+        ({"kind": "offset"}, "size = 0: goes with kind 'offset'"),
+    ):
+        with pytest.raises(ParameterError, match=message):
+            SensorFault(**bad)
+    stuck = SensorFault(kind="stuck")
+    with pytest.raises(ParameterError, match="sensor 1 has two"):
+        sense(sweep, faults=[stuck, stuck])
+    with pytest.raises(ParameterError, match="from_s = -1 s"):
+        sense(sweep, faults=[SensorFault(kind="stuck", from_s=-1.0)])
+    with pytest.raises(ParameterError, match="seed = -1"):
+        sense(sweep, seed=-1)
+    with pytest.raises(DataError, match="run has no variable 'angle_deg'"):
+        sense(sweep.drop_vars("angle_deg"))
+    with pytest.raises(DataError, match="at least two"):
+        sense(sweep.isel(time_s=[0]))
+    with pytest.raises(DataError, match="off the even grid"):
+        sense(sweep.isel(time_s=[0, 1, 3]))
+    with pytest.raises(ParameterError, match="adc_bits = 2: must be in"):
+        SensorPair(adc_bits=2)
+    assert SensorPair(closed_v=0.0, span_v=5.0) == SensorPair(span_v=5.0, closed_v=0.0)
+    assert eval(repr(SensorPair(noise_v=0.001))) == SensorPair(noise_v=0.001)

@@ -1,0 +1,84 @@
+"""A throttle in python-control: the same response as our own simulation, alone and in a loop."""
+
+from __future__ import annotations
+
+import builtins
+from typing import Any
+
+import numpy as np
+import pytest
+
+from mgdd.errors import ParameterError
+from mgdd.identify import amplitude_random_steps
+from mgdd.throttle import PseudoWiener, Throttle, initial_state, simulate, to_iosystem
+
+
+@pytest.mark.parametrize(
+    "throttle",
+    [Throttle(), Throttle(inductance_mh=0.0, friction="lugre", stiction_nm=0.3), Throttle(backlash="compliance")],
+    ids=["P1", "lugre", "backlash"],
+)
+def test_the_response_is_our_simulation(throttle: Throttle) -> None:
+    control = pytest.importorskip("control")
+    signal = amplitude_random_steps(0.6, offset=0.1, amplitude=0.4, hold_s=0.05)
+    time, duty = signal["time_s"].to_numpy(), signal["duty"].to_numpy()
+    ours = simulate(throttle, duty, time_s=time, start_deg=20.0)["angle_deg"].to_numpy()
+    system = to_iosystem(throttle)
+    response = control.input_output_response(system, time, duty, initial_state(throttle, 20.0))
+    assert system.dt == 1e-3
+    assert np.ptp(ours) > 5.0
+    np.testing.assert_allclose(response.outputs, ours, rtol=0.0, atol=1e-9)
+
+
+@pytest.mark.parametrize("kind", ["pw_r", "pw_w", "pw_p"])
+@pytest.mark.parametrize("delay", [0, 2])
+def test_pseudo_wiener_models_respond_as_they_simulate(kind: str, delay: int) -> None:
+    control = pytest.importorskip("control")
+    own = {
+        "pw_r": {},
+        "pw_w": {f"rise_{i}_deg": 12.0 for i in range(1, 7)},
+        "pw_p": {"gain_1_deg_per_duty": 200.0, "radius_1_duty": 0.03},
+    }[kind]
+    model = PseudoWiener(kind, {"delay_samples": float(delay), "sample_s": 2e-3, **own})
+    signal = amplitude_random_steps(0.6, offset=0.1, amplitude=0.4, hold_s=0.05, step_s=2e-3)
+    time, duty = signal["time_s"].to_numpy(), signal["duty"].to_numpy()
+    ours = model.simulate(time, duty, start_deg=20.0)
+    start = initial_state(model, 20.0)
+    response = control.input_output_response(to_iosystem(model, sample_s=2e-3), time, duty, start)
+    assert np.ptp(ours) > 5.0
+    np.testing.assert_array_equal(response.outputs, ours)
+
+
+def test_a_loop_closes_around_it() -> None:
+    control = pytest.importorskip("control")
+    throttle = Throttle()
+    plant = to_iosystem(throttle, sample_s=2e-3)
+    gain = control.tf([0.02], [1.0], 2e-3, inputs=["error"], outputs=["duty"], name="gain")
+    add = control.summing_junction(inputs=["reference", "-angle_deg"], output="error", name="add", dt=2e-3)
+    loop = control.interconnect([plant, gain, add], inputs=["reference"], outputs=["angle_deg"], dt=2e-3)
+    time = np.arange(400) * 2e-3
+    start = np.concatenate([initial_state(throttle), np.zeros(loop.nstates - 7)])
+    angle = control.input_output_response(loop, time, np.full(time.size, 40.0), start).outputs
+    assert angle[0] == pytest.approx(8.0)
+    assert 25.0 < angle[-1] < 40.0, "a proportional loop stops where friction and spring hold it"
+
+
+def test_bad_samples_and_starts_are_refused() -> None:
+    pytest.importorskip("control")
+    with pytest.raises(ParameterError, match="sample"):
+        to_iosystem(Throttle(), sample_s=1.5e-4)
+    with pytest.raises(ParameterError, match=r"start_deg = 95: must lie within the travel"):
+        initial_state(Throttle(), 95.0)
+
+
+def test_the_missing_package_is_named_with_its_extra(monkeypatch: pytest.MonkeyPatch) -> None:
+    real = builtins.__import__
+
+    def without(name: str, *args: Any, **kwargs: Any) -> Any:
+        if name == "control":
+            raise ImportError(name)
+        return real(name, *args, **kwargs)
+
+    monkeypatch.setattr(builtins, "__import__", without)
+    with pytest.raises(ImportError, match=r"pip install 'mgdd\[control\]'"):
+        to_iosystem(Throttle())
