@@ -38,6 +38,6 @@ def _overlay(dataset: xr.Dataset, name: str) -> Figure:
     legend(top, lines)
     bottom.plot(time, simulated - measured, color=BLACK)
     bottom.axhline(0.0, color=BLUE, linewidth=0.8)
-    bottom.set_ylabel(f"free run less measured [{measured.attrs['units']}]")
+    bottom.set_ylabel(f"residual [{measured.attrs['units']}]")
     bottom.set_xlabel("time [s]")
     return figure
