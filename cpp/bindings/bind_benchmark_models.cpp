@@ -107,6 +107,8 @@ void bind_benchmark_models(py::module_& m) {
              return model;
            }),
            py::kw_only(), arg("first_order"), arg("last_order"), arg("n_curve"), arg("lower"), arg("upper"))
+      .def_readonly("lower", &WienerHammerstein::lower)
+      .def_readonly("upper", &WienerHammerstein::upper)
       .def_property_readonly("names", &WienerHammerstein::names)
       .def("simulate", &WienerHammerstein::simulate, arg("parameters"), arg("input"), "Response from rest.")
       .def("curve", &WienerHammerstein::curve, arg("parameters"), arg("x"), "The static curve.")

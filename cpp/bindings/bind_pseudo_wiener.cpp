@@ -6,6 +6,7 @@
 
 #include "binding.hpp"
 #include "mgdd/common/error.hpp"
+#include "mgdd/common/text.hpp"
 #include "mgdd/throttle/pseudo_wiener.hpp"
 #include "pseudo_wiener_binding.hpp"
 

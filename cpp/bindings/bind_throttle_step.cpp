@@ -2,18 +2,31 @@
 // mgdd.throttle.to_iosystem.
 #include <array>
 #include <cmath>
+#include <cstring>
+#include <map>
 #include <string>
+#include <type_traits>
+#include <utility>
+#include <variant>
 #include <vector>
 
 #include "binding.hpp"
 #include "mgdd/common/error.hpp"
+#include "mgdd/throttle/pseudo_wiener.hpp"
 #include "mgdd/throttle/simulation.hpp"
+#include "pseudo_wiener_binding.hpp"
 
 namespace mgdd::bindings {
 
 namespace {
 
 using namespace mgdd::throttle;
+
+void require_finite(const double* state, std::size_t size, double duty) {
+  for (std::size_t i = 0; i < size; ++i)
+    if (!std::isfinite(state[i])) throw DataError("state holds a value that is not finite");
+  if (!std::isfinite(duty)) throw DataError("duty is not finite");
+}
 
 constexpr double rad_per_deg = 0.017453292519943295;
 constexpr std::size_t n_states = 7;
@@ -40,14 +53,57 @@ struct Stepper {
       : plant(throttle, step_s), steps(steps_per_sample(sample_s, step_s)), supply_v(throttle.supply_v) {}
 
   Numbers advance(const Numbers& state, double duty) const {
-    for (const double value : state)
-      if (!std::isfinite(value)) throw DataError("state holds a value that is not finite");
-    if (!std::isfinite(duty)) throw DataError("duty is not finite");
+    require_finite(state.data(), state.size(), duty);
     ThrottleState s = inside(state);
     const ThrottleInput input{.duty = duty, .supply_v = supply_v};
     for (std::size_t i = 0; i < steps; ++i)
       plant.step(s, input);
     return outside(s);
+  }
+};
+
+// The states of pseudo-Wiener models are nothing but doubles, so they go out and in as such.
+template <class State>
+std::vector<double> numbers_of(const State& s) {
+  static_assert(std::is_trivially_copyable_v<State> && sizeof(State) % sizeof(double) == 0);
+  std::vector<double> out(sizeof(State) / sizeof(double));
+  std::memcpy(out.data(), &s, sizeof(State));
+  return out;
+}
+
+template <class State>
+State state_of(const std::vector<double>& numbers) {
+  if (numbers.size() != sizeof(State) / sizeof(double)) {
+    throw ShapeError("state has " + std::to_string(numbers.size()) + " values: must have " +
+                     std::to_string(sizeof(State) / sizeof(double)));
+  }
+  State s;
+  std::memcpy(static_cast<void*>(&s), numbers.data(), sizeof(State));
+  return s;
+}
+
+struct PseudoWienerStepper {
+  PseudoWiener parameters;
+  PseudoWienerModel model;
+
+  explicit PseudoWienerStepper(PseudoWiener p) : parameters(std::move(p)), model(prepare(parameters)) {}
+
+  std::vector<double> at_rest(double angle_deg) const {
+    return std::visit([&](const auto& m) { return numbers_of(m.at_rest(angle_deg, 0.0)); }, model);
+  }
+  std::vector<double> advance(const std::vector<double>& state, double duty) const {
+    require_finite(state.data(), state.size(), duty);
+    return std::visit(
+        [&](const auto& m) {
+          auto s = state_of<typename std::decay_t<decltype(m)>::State>(state);
+          m.advance(s, duty);
+          return numbers_of(s);
+        },
+        model);
+  }
+  double output(const std::vector<double>& state) const {
+    return std::visit(
+        [&](const auto& m) { return m.output(state_of<typename std::decay_t<decltype(m)>::State>(state)); }, model);
   }
 };
 
@@ -67,6 +123,19 @@ of the plate.
           "State at rest at an angle [deg], without current.")
       .def("advance", &Stepper::advance, py::arg("state"), py::arg("duty"),
            "State after one sample under a duty [-], which is clipped to -1..1.");
+  py::class_<PseudoWienerStepper>(
+      m, "PseudoWienerStepper",
+      "One sample of a pseudo-Wiener model from a given state; behind mgdd.throttle.to_iosystem.")
+      .def(py::init([](const std::string& kind, const std::map<std::string, double>& parameters,
+                       const std::string& switching, const std::string& friction) {
+             return PseudoWienerStepper(make_pseudo_wiener(kind, parameters, switching, friction));
+           }),
+           py::arg("kind"), py::arg("parameters"), py::kw_only(), py::arg("switching") = "predicted",
+           py::arg("friction") = "set_valued")
+      .def("at_rest", &PseudoWienerStepper::at_rest, py::arg("angle_deg"), "State at rest at an angle [deg].")
+      .def("advance", &PseudoWienerStepper::advance, py::arg("state"), py::arg("duty"),
+           "State after one sample under a duty [-].")
+      .def("output", &PseudoWienerStepper::output, py::arg("state"), "Angle [deg] of a state.");
 }
 
 }  // namespace mgdd::bindings

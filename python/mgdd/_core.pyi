@@ -6,7 +6,7 @@ import collections.abc
 import numpy
 import numpy.typing
 import typing
-__all__: list[str] = ['BoundedSeeking', 'ComponentLag', 'ConvergenceError', 'Cylinder', 'CylinderFit', 'DataError', 'EngineBench', 'Error', 'ExtremumSeeking', 'FitReport', 'GoldenSection', 'GradientDescent', 'IterativeLearning', 'LeastSquaresOptions', 'Limit', 'LoadBurn', 'LoadFit', 'MeasuredCycle', 'NewtonSeeking', 'NoxFit', 'NoxModel', 'NoxProxy', 'OperatingPoint', 'Parameter', 'ParameterError', 'Performance', 'PerformanceTerm', 'RigError', 'SensorDynamics', 'SensorPair', 'ShapeError', 'SoftSensor', 'Spsa', 'Throttle', 'ThrottleStepper', 'TraceOptions', 'analyze_trace', 'burn_duration_cad', 'burned_fraction', 'check_trace', 'common_parameters', 'compiled_simd_level', 'compiler', 'convergence', 'correlation_limit', 'differentiable_inputs', 'estimate_burn', 'fit_cylinder', 'fit_nox_proxy', 'hardenberg_hase_delay_cad', 'hohenberg_coefficient', 'indicator_units', 'input_unit', 'least_squares', 'load_parameters', 'monte_carlo', 'processor_simd_levels', 'run_loop', 'scan', 'sense_throttle', 'sensitivities', 'sensor_fault_kinds', 'simulate', 'simulate_throttle', 'simulate_throttle_many', 'start_of_combustion', 'start_of_injection', 'throttle_airflow_torque', 'timing_window_cad', 'tune', 'volume_l', 'wall_area_m2', 'wall_heat_scale_upper', 'watson_delay_ms', 'with_burn', 'wolfer_delay_ms', 'woschni_c1_bar_m', 'woschni_coefficient']
+__all__: list[str] = ['BoundedSeeking', 'ComponentLag', 'ConvergenceError', 'Cylinder', 'CylinderFit', 'DataError', 'EngineBench', 'Error', 'ExtremumSeeking', 'FitReport', 'GoldenSection', 'GradientDescent', 'IterativeLearning', 'LeastSquaresOptions', 'Limit', 'LoadBurn', 'LoadFit', 'MeasuredCycle', 'NewtonSeeking', 'NoxFit', 'NoxModel', 'NoxProxy', 'OperatingPoint', 'Parameter', 'ParameterError', 'Performance', 'PerformanceTerm', 'RigError', 'SensorDynamics', 'ShapeError', 'SoftSensor', 'Spsa', 'Throttle', 'TraceOptions', 'analyze_trace', 'burn_duration_cad', 'burned_fraction', 'check_trace', 'common_parameters', 'compiled_simd_level', 'compiler', 'convergence', 'correlation_limit', 'differentiable_inputs', 'estimate_burn', 'fit_cylinder', 'fit_nox_proxy', 'fit_smooth_throttle', 'fit_throttle_groups', 'hardenberg_hase_delay_cad', 'hohenberg_coefficient', 'indicator_units', 'input_unit', 'latin_hypercube', 'least_squares', 'load_parameters', 'monte_carlo', 'processor_simd_levels', 'run_loop', 'scan', 'sensitivities', 'simulate', 'simulate_smooth_throttle', 'simulate_throttle', 'simulate_throttle_groups', 'simulate_throttle_many', 'smooth_throttle_example', 'smooth_throttle_instruction_set', 'smooth_throttle_names', 'start_of_combustion', 'start_of_injection', 'throttle_airflow_torque', 'throttle_group_bounds', 'throttle_group_names', 'timing_window_cad', 'tune', 'volume_l', 'wall_area_m2', 'wall_heat_scale_upper', 'watson_delay_ms', 'with_burn', 'wolfer_delay_ms', 'woschni_c1_bar_m', 'woschni_coefficient']
 class Error(Exception):
     """
     Base of everything mgdd raises.
@@ -1883,138 +1883,6 @@ class Throttle:
         """
         viscous friction [N m s/rad]
         """
-class SensorPair:
-    """
-    Two redundant position sensors of a throttle with opposite slopes, and their check.
-    
-    Keyword-only and immutable. The first gives ``closed_v + span_v angle/travel_deg``, the second ``supply_v`` minus that.
-    
-    Parameters
-    ----------
-    closed_v, span_v : float
-        First sensor at 0 deg, and its rise over the travel [V]; 0 and 5 are the ideal form of catalogues.
-    travel_deg : float
-        Angle of the full span [deg].
-    supply_v : float
-        Supply of sensors and converter [V].
-    noise_v : float
-        Noise at the converter, rms of each sensor [V].
-    lag_s : float
-        Time constant of the anti-alias filter [s].
-    adc_bits : int
-        Bits of the converter, 4 to 24.
-    sum_tolerance_v : float
-        The sum may differ from the supply by less than this [V].
-    low_v, high_v : float
-        Range of a healthy sensor [V].
-    debounce_s : float
-        A check must fail without a break for so long before the fault counts [s].
-    
-    Raises
-    ------
-    mgdd.errors.ParameterError
-        A field outside its domain, naming field, value and bound.
-    
-    Examples
-    --------
-    >>> from mgdd.throttle import SensorPair
-    >>> SensorPair().adc_bits
-    12
-    """
-    def __eq__(self, arg0: typing.Any) -> bool:
-        ...
-    def __getstate__(self) -> tuple[int, dict]:
-        ...
-    def __hash__(self) -> int:
-        ...
-    def __init__(self, *, closed_v: typing.SupportsFloat | typing.SupportsIndex = 0.5, span_v: typing.SupportsFloat | typing.SupportsIndex = 4.0, travel_deg: typing.SupportsFloat | typing.SupportsIndex = 90.0, supply_v: typing.SupportsFloat | typing.SupportsIndex = 5.0, noise_v: typing.SupportsFloat | typing.SupportsIndex = 0.002, lag_s: typing.SupportsFloat | typing.SupportsIndex = 0.0003, adc_bits: typing.SupportsInt | typing.SupportsIndex = 12, sum_tolerance_v: typing.SupportsFloat | typing.SupportsIndex = 0.2, low_v: typing.SupportsFloat | typing.SupportsIndex = 0.2, high_v: typing.SupportsFloat | typing.SupportsIndex = 4.8, debounce_s: typing.SupportsFloat | typing.SupportsIndex = 0.2) -> None:
-        ...
-    def __repr__(self) -> str:
-        ...
-    def __setstate__(self, arg0: tuple) -> None:
-        ...
-    def to_dict(self) -> dict:
-        """
-        Constructor keywords as a new dict.
-        """
-    @property
-    def adc_bits(self) -> int:
-        """
-        Bits of the converter.
-        """
-    @property
-    def closed_v(self) -> float:
-        """
-        First sensor at 0 deg [V].
-        """
-    @property
-    def debounce_s(self) -> float:
-        """
-        Time a check must fail [s].
-        """
-    @property
-    def high_v(self) -> float:
-        """
-        Highest healthy voltage [V].
-        """
-    @property
-    def lag_s(self) -> float:
-        """
-        Time constant of the anti-alias filter [s].
-        """
-    @property
-    def low_v(self) -> float:
-        """
-        Lowest healthy voltage [V].
-        """
-    @property
-    def lsb_v(self) -> float:
-        """
-        Step of the converter [V].
-        """
-    @property
-    def noise_v(self) -> float:
-        """
-        Noise of each sensor, rms [V].
-        """
-    @property
-    def span_v(self) -> float:
-        """
-        Rise of the first sensor over the travel [V].
-        """
-    @property
-    def sum_tolerance_v(self) -> float:
-        """
-        Tolerance of the sum [V].
-        """
-    @property
-    def supply_v(self) -> float:
-        """
-        Supply of sensors and converter [V].
-        """
-    @property
-    def travel_deg(self) -> float:
-        """
-        Angle of the full span [deg].
-        """
-class ThrottleStepper:
-    """
-    One sample of a throttle from a given state; behind mgdd.throttle.to_iosystem.
-    
-    The state is angle [deg], speed [deg/s], current [A] and bristle [deg] of motor and gear, then angle, speed and bristle
-    of the plate.
-    """
-    @staticmethod
-    def at_rest(angle_deg: typing.SupportsFloat | typing.SupportsIndex) -> typing.Annotated[list[float], "FixedSize(7)"]:
-        """
-        State at rest at an angle [deg], without current.
-        """
-    def __init__(self, throttle: Throttle, *, sample_s: typing.SupportsFloat | typing.SupportsIndex, step_s: typing.SupportsFloat | typing.SupportsIndex) -> None:
-        ...
-    def advance(self, state: typing.Annotated[collections.abc.Sequence[typing.SupportsFloat | typing.SupportsIndex], "FixedSize(7)"], duty: typing.SupportsFloat | typing.SupportsIndex) -> typing.Annotated[list[float], "FixedSize(7)"]:
-        """
-        State after one sample under a duty [-], which is clipped to -1..1.
-        """
 class MeasuredCycle:
     def __init__(self, *, label: str, crank_angle_cad: typing.Annotated[numpy.typing.ArrayLike, numpy.float64], pressure_bar: typing.Annotated[numpy.typing.ArrayLike, numpy.float64], point: OperatingPoint) -> None:
         ...
@@ -2321,6 +2189,14 @@ def fit_nox_proxy(t_max_k: typing.Annotated[numpy.typing.ArrayLike, numpy.float6
     """
     Least squares on ln NOx; use mgdd.engine.fit_nox_proxy.
     """
+def fit_smooth_throttle(duty: typing.Annotated[numpy.typing.ArrayLike, numpy.float64], angle_deg: typing.Annotated[numpy.typing.ArrayLike, numpy.float64], *, starts: collections.abc.Sequence[typing.Annotated[collections.abc.Sequence[typing.SupportsFloat | typing.SupportsIndex], "FixedSize(10)"]], lower: typing.Annotated[collections.abc.Sequence[typing.SupportsFloat | typing.SupportsIndex], "FixedSize(10)"], upper: typing.Annotated[collections.abc.Sequence[typing.SupportsFloat | typing.SupportsIndex], "FixedSize(10)"], step_s: typing.SupportsFloat | typing.SupportsIndex, start: typing.Annotated[collections.abc.Sequence[typing.SupportsFloat | typing.SupportsIndex], "FixedSize(3)"], inertia_kgm2: typing.SupportsFloat | typing.SupportsIndex, gear_ratio: typing.SupportsFloat | typing.SupportsIndex, inductance_h: typing.SupportsFloat | typing.SupportsIndex, supply_v: typing.SupportsFloat | typing.SupportsIndex, cost_tolerance: typing.SupportsFloat | typing.SupportsIndex, lanes: bool) -> dict:
+    """
+    Staged fit of the ten parameters from every start; releases the GIL.
+    """
+def fit_throttle_groups(records: collections.abc.Sequence[tuple[typing.SupportsFloat | typing.SupportsIndex, typing.Annotated[numpy.typing.ArrayLike, numpy.float64], typing.Annotated[numpy.typing.ArrayLike, numpy.float64], collections.abc.Sequence[typing.SupportsFloat | typing.SupportsIndex], typing.SupportsInt | typing.SupportsIndex, bool]], *, stages: collections.abc.Sequence[tuple[collections.abc.Sequence[typing.SupportsInt | typing.SupportsIndex], collections.abc.Sequence[typing.SupportsInt | typing.SupportsIndex], typing.SupportsFloat | typing.SupportsIndex, typing.SupportsFloat | typing.SupportsIndex, typing.SupportsInt | typing.SupportsIndex]], starts: collections.abc.Sequence[typing.Annotated[collections.abc.Sequence[typing.SupportsFloat | typing.SupportsIndex], "FixedSize(9)"]], closed_deg: typing.SupportsFloat | typing.SupportsIndex, open_deg: typing.SupportsFloat | typing.SupportsIndex, ramp_deg: typing.SupportsFloat | typing.SupportsIndex, substeps: typing.SupportsInt | typing.SupportsIndex, n_threads: typing.SupportsInt | typing.SupportsIndex) -> dict:
+    """
+    Staged multi-start fit of the throttle groups; releases the GIL.
+    """
 def hardenberg_hase_delay_cad(pressure_bar: typing.Annotated[numpy.typing.ArrayLike, numpy.float64], temperature_k: typing.Annotated[numpy.typing.ArrayLike, numpy.float64], cetane_number: typing.Annotated[numpy.typing.ArrayLike, numpy.float64], piston_speed_m_per_s: typing.Annotated[numpy.typing.ArrayLike, numpy.float64]) -> typing.Any:
     ...
 def hohenberg_coefficient(c1_bar_m3: typing.Annotated[numpy.typing.ArrayLike, numpy.float64], volume_m3: typing.Annotated[numpy.typing.ArrayLike, numpy.float64], pressure_bar: typing.Annotated[numpy.typing.ArrayLike, numpy.float64], temperature_k: typing.Annotated[numpy.typing.ArrayLike, numpy.float64], piston_speed_m_per_s: typing.Annotated[numpy.typing.ArrayLike, numpy.float64]) -> typing.Any:
@@ -2334,6 +2210,10 @@ def indicator_units() -> dict:
 def input_unit(name: str) -> str:
     """
     Unit of a differentiable input.
+    """
+def latin_hypercube(parameters: collections.abc.Sequence[Parameter], n: typing.SupportsInt | typing.SupportsIndex, seed: typing.SupportsInt | typing.SupportsIndex) -> list[typing.Annotated[numpy.typing.NDArray[numpy.float64], "[m, 1]"]]:
+    """
+    Points between the bounds, one per cell of every axis.
     """
 def least_squares(fun: collections.abc.Callable, x0: typing.Annotated[numpy.typing.ArrayLike, numpy.float64, "[m, 1]"], *, parameters: collections.abc.Sequence[Parameter], options: LeastSquaresOptions) -> FitReport:
     """
@@ -2385,10 +2265,6 @@ def scan(cylinder: Cylinder, point: OperatingPoint, soc_cad: typing.Annotated[nu
     """
     Indicators over a column of timings; releases the GIL.
     """
-def sense_throttle(pair: SensorPair, angle_deg: typing.Annotated[numpy.typing.ArrayLike, numpy.float64], *, sample_s: typing.SupportsFloat | typing.SupportsIndex, seed: typing.SupportsInt | typing.SupportsIndex, faults: typing.Annotated[collections.abc.Sequence[tuple[str, typing.SupportsFloat | typing.SupportsIndex, typing.SupportsFloat | typing.SupportsIndex]], "FixedSize(2)"]) -> dict:
-    """
-    Samples of both sensors; behind mgdd.throttle.sense.
-    """
 def sensitivities(cylinder: Cylinder, point: OperatingPoint, soc_cad: typing.SupportsFloat | typing.SupportsIndex, names: collections.abc.Sequence[str], step_cad: typing.SupportsFloat | typing.SupportsIndex, integrator: str) -> dict:
     """
     Exact derivatives of indicators and pressure.
@@ -2396,6 +2272,18 @@ def sensitivities(cylinder: Cylinder, point: OperatingPoint, soc_cad: typing.Sup
 def simulate(cylinder: Cylinder, point: OperatingPoint, soc_cad: typing.SupportsFloat | typing.SupportsIndex, step_cad: typing.SupportsFloat | typing.SupportsIndex, integrator: str) -> dict:
     """
     One cycle: traces and indicators.
+    """
+def simulate_smooth_throttle(parameters: typing.Annotated[collections.abc.Sequence[typing.SupportsFloat | typing.SupportsIndex], "FixedSize(10)"], duty: typing.Annotated[numpy.typing.ArrayLike, numpy.float64], *, step_s: typing.SupportsFloat | typing.SupportsIndex, start: typing.Annotated[collections.abc.Sequence[typing.SupportsFloat | typing.SupportsIndex], "FixedSize(3)"], inertia_kgm2: typing.SupportsFloat | typing.SupportsIndex, gear_ratio: typing.SupportsFloat | typing.SupportsIndex, inductance_h: typing.SupportsFloat | typing.SupportsIndex, supply_v: typing.SupportsFloat | typing.SupportsIndex) -> numpy.typing.NDArray[numpy.float64]:
+    """
+    Angle [deg] on every sample; releases the GIL.
+    """
+def simulate_throttle_groups(values: typing.Annotated[collections.abc.Sequence[typing.SupportsFloat | typing.SupportsIndex], "FixedSize(9)"], duty: typing.Annotated[numpy.typing.ArrayLike, numpy.float64], *, step_s: typing.SupportsFloat | typing.SupportsIndex, start: typing.Annotated[collections.abc.Sequence[typing.SupportsFloat | typing.SupportsIndex], "FixedSize(3)"], closed_deg: typing.SupportsFloat | typing.SupportsIndex, open_deg: typing.SupportsFloat | typing.SupportsIndex, ramp_deg: typing.SupportsFloat | typing.SupportsIndex, substeps: typing.SupportsInt | typing.SupportsIndex) -> numpy.typing.NDArray[numpy.float64]:
+    """
+    Angle [deg] on every sample; releases the GIL.
+    """
+def smooth_throttle_instruction_set() -> str:
+    """
+    Instruction set that the kernel chose on this machine.
     """
 def simulate_throttle(throttle: Throttle, duty: typing.Annotated[numpy.typing.ArrayLike, numpy.float64], *, sample_s: typing.SupportsFloat | typing.SupportsIndex, start_deg: typing.SupportsFloat | typing.SupportsIndex, bridge: str, supply_v: typing.Annotated[numpy.typing.ArrayLike, numpy.float64], airflow_torque_nm: typing.Annotated[numpy.typing.ArrayLike, numpy.float64], step_s: typing.SupportsFloat | typing.SupportsIndex) -> dict:
     """
@@ -2412,6 +2300,10 @@ def start_of_combustion(cylinder: Cylinder, point: OperatingPoint, soi_cad: typi
 def start_of_injection(cylinder: Cylinder, point: OperatingPoint, soc_cad: typing.SupportsFloat | typing.SupportsIndex) -> dict:
     """
     SOC to SOI.
+    """
+def throttle_group_bounds() -> list:
+    """
+    The nine groups with their bounds.
     """
 def throttle_airflow_torque(throttle: Throttle, angle_deg: typing.Annotated[numpy.typing.ArrayLike, numpy.float64]) -> numpy.typing.NDArray[numpy.float64]:
     """
@@ -2443,7 +2335,9 @@ def woschni_coefficient(c1_bar_m: typing.Annotated[numpy.typing.ArrayLike, numpy
     """
 __version__: str = '0.1.0'
 correlation_limit: float = 0.98
-sensor_fault_kinds: tuple = ('none', 'open_wire', 'short_to_ground', 'short_to_supply', 'offset', 'gain', 'stuck')
+smooth_throttle_example: tuple = (0.016, 0.004, 0.12, 0.5, 0.12, 0.25, 0.02, 0.14, 0.016, 1.2)
+smooth_throttle_names: tuple = ('torque_constant_nm_per_a', 'viscous_nms_per_rad', 'coulomb_nm', 'friction_width_rad_per_s', 'spring_nm_per_rad', 'preload_nm', 'preload_width_rad', 'limp_home_rad', 'emf_constant_vs_per_rad', 'resistance_ohm')
+throttle_group_names: tuple = ('tau_s', 'gain_deg_per_s2_per_duty', 'beta_above_duty', 'kappa_above_duty_per_deg', 'delta_duty', 'beta_below_duty', 'kappa_below_duty_per_deg', 'limp_home_deg', 'electrical_s')
 timing_window_cad: tuple = (-60.0, 20.0)
 wall_heat_scale_upper: float = 2.5
 woschni_c1_bar_m: float = 129.8

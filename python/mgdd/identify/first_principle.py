@@ -176,9 +176,9 @@ def fit_throttle(
     Duty and angle determine torques only in units of duty and inertia only as an acceleration per duty, so the
     unknowns are groups: tau = J/b, G = g/J, preload T_pt/g, stiffness k_s/g and friction T_d/g with g the stall torque
     per unit duty and b all viscous damping. A regression on the torque balance of the moving samples gives the start;
-    the free run is then fitted in stages (dynamics, static groups, all), from `n_starts` starts. A side of limp-home the
-    log does not visit keeps its start values and is named. With a resistance, a supply and one of inertia or torque
-    constant the physical numbers are computed back (`physical_parameters`) and said in `findings`.
+    the free run is then fitted in stages (dynamics, static groups, all), from `n_starts` starts. A side of limp-home
+    the log does not visit keeps its start values and is named. With a resistance, a supply and one of inertia or
+    torque constant the physical numbers are computed back (`physical_parameters`) and said in `findings`.
 
     Parameters
     ----------
@@ -246,7 +246,7 @@ def fit_throttle(
     if np.ptp(angle) < 1.0:
         raise DataError(f"angle_deg moves by {np.ptp(angle):.3g} deg: drive the plate, mgdd.identify.design_excitation")
     values = throttle_start()
-    values["limp_home_deg"] = _limp_home(duty, angle, values["limp_home_deg"])
+    values["limp_home_deg"] = _limp_home(step_s, duty, angle, values["limp_home_deg"])
     values |= {name: float(value) for name, value in {**(start or {}), **(fixed or {})}.items()}
     findings: list[str] = []
     unvisited: list[str] = []
@@ -433,9 +433,16 @@ def _step(time_s: ArrayLike, size: int) -> float:
     return float((time[-1] - time[0]) / (size - 1))
 
 
-def _limp_home(duty: NDArray[np.float64], angle: NDArray[np.float64], otherwise: float) -> float:
-    still = (np.abs(duty) < 0.01) & (np.abs(np.gradient(angle)) < 0.05)
-    return float(np.median(angle[still])) if np.count_nonzero(still) > 50 else otherwise
+def _limp_home(step_s: float, duty: NDArray[np.float64], angle: NDArray[np.float64], otherwise: float) -> float:
+    """Angle at the end of the longest rest without duty, if it lasts half a second."""
+    edges = np.flatnonzero(np.diff(np.concatenate([[0], (np.abs(duty) < 0.01).astype(int), [0]])))
+    begins, ends = edges[::2], edges[1::2]
+    if begins.size == 0:
+        return otherwise
+    longest = int(np.argmax(ends - begins))
+    tail = angle[max(begins[longest], ends[longest] - round(0.1 / step_s)) : ends[longest]]
+    at_rest = (ends[longest] - begins[longest]) * step_s >= 0.5 and np.ptp(tail) < 0.5
+    return float(np.median(tail)) if at_rest else otherwise
 
 
 def _regression(

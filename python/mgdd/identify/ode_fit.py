@@ -54,7 +54,7 @@ class OdeModel:
     ...     start=(0.0,),
     ... )
     >>> lag.simulate([0.0, 0.1, 0.2], [1.0, 1.0, 1.0]).round(4).tolist()
-    [0.0, 0.3625, 0.6593]
+    [0.0, 0.3625, 0.6594]
     """
 
     derivative: Derivative

@@ -49,9 +49,10 @@ class OnlineUpdate:
     ParameterError
         A model of another kind, an unknown method or parameter.
 
-    References
-    ----------
-    Ljung (1999), section 11.2; g_r is a symbol of Tan (2018), the law is ours.
+    Notes
+    -----
+    g_r is a symbol of Tan (2018); the law behind it is ours. Supply and winding resistance change the gain alone, so
+    preload, spring and friction in duty all fall where the gain rises.
 
     Examples
     --------

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
 from types import MappingProxyType
 from typing import TYPE_CHECKING
 
@@ -18,10 +19,32 @@ from mgdd.throttle import PseudoWiener
 if TYPE_CHECKING:
     import xarray as xr
 
-__all__ = ["fit_pseudo_wiener"]
+__all__ = ["PseudoWienerFit", "fit_pseudo_wiener"]
 
 # Enough that the best of PW-W and PW-P is found more than once on the records of the study.
 _STARTS = MappingProxyType({"pw_r": 9, "pw_w": 16, "pw_p": 16})
+
+
+@dataclass(frozen=True, kw_only=True, eq=False, repr=False)
+class PseudoWienerFit(ThrottleFit):
+    """A `ThrottleFit` that also says how its searches ended.
+
+    Parameters
+    ----------
+    hits : int
+        Searches that ended at the best fit: once only says that a better one may exist.
+    search_rmse_deg : tuple of float
+        Error of every search [deg], the best first; infinite where one failed.
+
+    Examples
+    --------
+    >>> from mgdd.identify import PseudoWienerFit
+    >>> "hits" in PseudoWienerFit.__dataclass_fields__
+    True
+    """
+
+    hits: int = 1
+    search_rmse_deg: tuple[float, ...] = ()
 
 
 def fit_pseudo_wiener(
@@ -38,7 +61,7 @@ def fit_pseudo_wiener(
     starts: int | None = None,
     seed: int = 1,
     max_iterations: int = 150,
-) -> ThrottleFit:
+) -> PseudoWienerFit:
     """Fit a pseudo-Wiener model in free run, from several starts.
 
     Parameters
@@ -71,7 +94,7 @@ def fit_pseudo_wiener(
 
     Returns
     -------
-    ThrottleFit
+    PseudoWienerFit
         The best of all searches; its findings say how many of them ended there.
 
     Raises
@@ -140,7 +163,7 @@ def fit_pseudo_wiener(
             found.append("the best fit was found once only: a better one may exist, raise starts")
     if kind == "pw_r" and sides == "shared":
         found.append("one set of values serves both sides of limp-home: sides='both' fits a set each")
-    return ThrottleFit(
+    return PseudoWienerFit(
         report=wrapped,
         model=model,
         kind=kind,
@@ -148,6 +171,8 @@ def fit_pseudo_wiener(
         parameters=dict(model.parameters),
         unidentifiable=wrapped.unidentifiable,
         findings=tuple(found),
+        hits=int(hits),
+        search_rmse_deg=tuple(rmse.tolist()),
         source=str(logs[0].attrs.get("file", "log")),
     )
 

@@ -6,8 +6,11 @@ import errno
 from pathlib import Path
 from typing import TYPE_CHECKING
 
+from mgdd.errors import ParameterError
 from mgdd.identify.first_principle import FirstPrincipleModel, fit_throttle
+from mgdd.identify.pseudo_wiener_fit import fit_pseudo_wiener
 from mgdd.identify.throttle_fit import FittedParameters, ThrottleFit, ThrottleModel
+from mgdd.throttle import PseudoWiener
 
 if TYPE_CHECKING:
     import os
@@ -27,7 +30,10 @@ def fit_kind(
     if kind == "first_principle":
         fixed = None if limp_home_deg is None else {"limp_home_deg": limp_home_deg}
         return fit_throttle(log, fixed=fixed, n_starts=starts or _STARTS, seed=seed)
-    raise NotImplementedError(two_sided)
+    if two_sided and kind != "pw_r":
+        raise ParameterError(f"two_sided = True: {kind} has one set of parameters; only pw_r has one per side")
+    sides = "both" if two_sided else "shared"
+    return fit_pseudo_wiener(log, kind, limp_home_deg=limp_home_deg, sides=sides, starts=starts, seed=seed)
 
 
 def load_throttle_model(path: str | os.PathLike[str]) -> ThrottleModel:
@@ -66,6 +72,8 @@ def load_throttle_model(path: str | os.PathLike[str]) -> ThrottleModel:
     if not file.exists():
         raise FileNotFoundError(errno.ENOENT, "no such file: check the path", str(file))
     saved = FittedParameters.from_toml(file.read_text(encoding="utf-8"), source=str(file))
+    if saved.kind != "first_principle":
+        return PseudoWiener(saved.kind, saved.values)
     values = dict(saved.values)
     travel = {name: values.pop(name) for name in _TRAVEL if name in values}
     closed, opened = travel.get("closed_deg", 0.0), travel.get("open_deg", 90.0)

@@ -21,6 +21,7 @@ if TYPE_CHECKING:
 
 __all__ = ["identify_throttle"]
 
+_LOST_PERCENT = 10.0
 # Rest, as the noise of a sensor and the soft corner of the preload leave it.
 _REST_S, _REST_DEG, _READ_S = 0.01, 0.5, 0.004
 
@@ -99,7 +100,9 @@ def identify_throttle(
         log["time_s"].to_numpy(), log["angle_deg"].to_numpy(), limp_home_deg=home, stops_deg=known.stops_deg
     )
     asked = open_questions(content, swing=known.swing, pairs=entangled(fit.report))
-    findings = tuple(dict.fromkeys((*fit.findings, *asked)))
+    # The report names correlated pairs, too; here each comes with its remedy.
+    own = (text for text in fit.findings if not (text in fit.report.findings and ": correlation " in text))
+    findings = tuple(dict.fromkeys((*own, *_carried_over(train, tested[0]), *asked)))
     return dataclasses.replace(
         fit,
         fit_percent_train=train,
@@ -116,6 +119,17 @@ def _quality(fit: ThrottleFit, log: xr.Dataset) -> tuple[float, float]:
     skip = discarded(log)
     measured, modelled = run["angle_deg"].to_numpy()[skip:], run["model_deg"].to_numpy()[skip:]
     return fit_percent(measured, modelled), rmse(measured, modelled)
+
+
+def _carried_over(train: float, test: float | None) -> tuple[str, ...]:
+    """Say that a fit holds for its own log only."""
+    if test is None or train - test < _LOST_PERCENT:
+        return ()
+    text = (
+        f"the fit meets its own log at {train:.1f} % and the test log at {test:.1f} %: what it has learned does "
+        "not carry over; fit fewer parameters, from more starts, or to a log that excites them all"
+    )
+    return (text,)
 
 
 def _limp_home(log: xr.Dataset) -> float:

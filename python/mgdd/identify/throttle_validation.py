@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import itertools
 import math
 from collections.abc import Sequence
 from dataclasses import dataclass, field
@@ -10,8 +9,9 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from mgdd.errors import DataError, ParameterError
+from mgdd.errors import DataError
 from mgdd.identify.metrics import ResidualTests, fit_percent, mse, residual_tests, rmse, vaf_percent
+from mgdd.identify.n_step import DISCARD_S, HORIZONS_S, columns_of, n_step_rms, samples_of, step_of
 from mgdd.identify.prior import prior_of
 from mgdd.identify.record_content import open_questions, record_content
 from mgdd.identify.throttle_fit import ThrottleFit, ThrottleModel
@@ -20,18 +20,13 @@ from mgdd.results import labelled_dataset
 
 if TYPE_CHECKING:
     import xarray as xr
-    from numpy.typing import ArrayLike, NDArray
 
     from mgdd.optimize import FitReport
 
-__all__ = ["ThrottleValidation", "correlation_dataset", "n_step_rms", "split_log", "validate_throttle"]
+__all__ = ["ThrottleValidation", "correlation_dataset", "validate_throttle"]
 
-HORIZONS_S = (0.005, 0.020, 0.050)
-# What the start of a free run still carries of the unknown speed and current.
-DISCARD_S = 0.05
 _CORRELATED = 0.98
 _GOOD_PERCENT = 85.0
-_WHOLE = 1e-6
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -126,112 +121,6 @@ class ThrottleValidation:
         return values
 
 
-def split_log(log: xr.Dataset, *, shares: Sequence[float] = (0.6, 0.2, 0.2)) -> tuple[xr.Dataset, ...]:
-    """Cut a log into blocks of time for training, validation and test; samples are never shuffled.
-
-    Parameters
-    ----------
-    log : xarray.Dataset
-        A throttle log.
-    shares : sequence of float
-        Shares of the blocks in order; together 1 [-].
-
-    Returns
-    -------
-    tuple of xarray.Dataset
-        The blocks; time keeps running.
-
-    Raises
-    ------
-    ParameterError
-        Shares that are not positive or do not add up to 1.
-    DataError
-        A block that is too short, and all of `mgdd.io.check_throttle_log`.
-
-    Examples
-    --------
-    >>> import numpy as np
-    >>> from mgdd.identify import split_log
-    >>> from mgdd.io import throttle_log
-    >>> time = np.arange(5000) * 1e-3
-    >>> log = throttle_log(time, 0.2 * np.sin(6.0 * time), 20.0 + 15.0 * np.sin(6.0 * time - 0.5))
-    >>> [part.sizes["time_s"] for part in split_log(log)]
-    [3000, 1000, 1000]
-    """
-    check_throttle_log(log)
-    if not len(shares) or min(shares) <= 0.0 or abs(sum(shares) - 1.0) > 1e-9:
-        raise ParameterError(f"shares = {tuple(shares)}: must be positive and add up to 1")
-    edges = np.rint(np.cumsum([0.0, *shares]) * log.sizes["time_s"]).astype(int).tolist()
-    blocks = tuple(log.isel(time_s=slice(a, b)) for a, b in itertools.pairwise(edges))
-    return tuple(check_throttle_log(block) for block in blocks)
-
-
-def n_step_rms(
-    model: ThrottleModel,
-    log: xr.Dataset,
-    *,
-    horizons_s: Sequence[float] = HORIZONS_S,
-    true_deg: ArrayLike | None = None,
-) -> xr.Dataset:
-    """Give the error of predictions that start anew from the measurement at every sample.
-
-    Parameters
-    ----------
-    model : ThrottleModel
-        The model.
-    log : xarray.Dataset
-        A throttle log.
-    horizons_s : sequence of float
-        How far ahead [s]; whole numbers of samples.
-    true_deg : array_like, optional
-        True angle [deg] to compare with, where it is known; None compares with the measured one.
-
-    Returns
-    -------
-    xarray.Dataset
-        ``n_step_rms_deg`` [deg] over ``predictor`` (the model, and an angle that stays where it is) and ``horizon_s``.
-
-    Raises
-    ------
-    ParameterError
-        A horizon that is no whole number of samples, or longer than the log.
-
-    Examples
-    --------
-    >>> import numpy as np
-    >>> from mgdd.identify import n_step_rms
-    >>> from mgdd.io import throttle_log
-    >>> class Still:
-    ...     kind, parameters = "pw_r", {}
-    ...     def predict(self, time_s, duty, angle_deg, horizon):
-    ...         return np.asarray(angle_deg)[:-horizon]
-    >>> time = np.arange(2000) * 1e-3
-    >>> log = throttle_log(time, 0.2 * np.sin(6.0 * time), 20.0 + 15.0 * np.sin(6.0 * time - 0.5))
-    >>> rms = n_step_rms(Still(), log)["n_step_rms_deg"]
-    >>> bool((rms[0] == rms[1]).all())
-    True
-    """
-    time, duty, angle = _arrays(log)
-    truth = angle if true_deg is None else np.asarray(true_deg, dtype=np.float64)
-    step = _step(time)
-    skip = round(DISCARD_S / step)
-    table = np.empty((2, len(horizons_s)))
-    for at, horizon in enumerate(horizons_s):
-        n = _samples(horizon, step, time.size)
-        ahead = np.asarray(model.predict(time, duty, angle, n), dtype=np.float64)
-        if ahead.shape != (time.size - n,):
-            raise DataError(f"predict gave {ahead.shape} values {n} samples ahead: must be ({time.size - n},)")
-        target = truth[n:][skip:]
-        table[:, at] = rmse(target, ahead[skip:]), rmse(target, angle[: time.size - n][skip:])
-    return labelled_dataset(
-        {
-            "predictor": ("predictor", [str(model.kind), "persistence"], "-", "predictor"),
-            "horizon_s": ("horizon_s", np.asarray(horizons_s, dtype=np.float64), "s", "horizon"),
-            "n_step_rms_deg": (("predictor", "horizon_s"), table, "deg", "RMS error ahead"),
-        }
-    )
-
-
 def validate_throttle(
     model: ThrottleModel | ThrottleFit,
     log: xr.Dataset,
@@ -285,10 +174,10 @@ def validate_throttle(
     check_throttle_log(log)
     fit = model if isinstance(model, ThrottleFit) else None
     own = model.model if isinstance(model, ThrottleFit) else model
-    time, duty, angle = _arrays(log)
-    step = _step(time)
+    time, duty, angle = columns_of(log)
+    step = step_of(time)
     for horizon in horizons_s:
-        _samples(horizon, step, time.size)
+        samples_of(horizon, step, time.size)
     run = free_run(own, log)
     skip = discarded(log)
     measured, modelled = angle[skip:], run["model_deg"].to_numpy()[skip:]
@@ -316,7 +205,7 @@ def validate_throttle(
 
 def free_run(model: ThrottleModel, log: xr.Dataset) -> xr.Dataset:
     """Run a model free over a log from its first angle."""
-    time, duty, angle = _arrays(log)
+    time, duty, angle = columns_of(log)
     run = np.asarray(model.simulate(time, duty, start_deg=float(angle[0])), dtype=np.float64)
     if run.shape != angle.shape or not np.isfinite(run).all():
         raise DataError(f"the {model.kind} model runs away on {log.attrs.get('file', 'log')}: its fit has failed")
@@ -334,7 +223,7 @@ def free_run(model: ThrottleModel, log: xr.Dataset) -> xr.Dataset:
 
 def discarded(log: xr.Dataset) -> int:
     """Return how many samples at the start a figure of merit leaves out."""
-    return round(DISCARD_S / _step(log["time_s"].to_numpy()))
+    return round(DISCARD_S / step_of(log["time_s"].to_numpy()))
 
 
 def entangled(report: FitReport) -> tuple[tuple[str, str, float], ...]:
@@ -392,21 +281,3 @@ def _notes(fitted: float, tests: ResidualTests) -> list[str]:
             "which take it as white, are too small"
         )
     return out
-
-
-def _arrays(log: xr.Dataset) -> tuple[NDArray[np.float64], NDArray[np.float64], NDArray[np.float64]]:
-    time, duty, angle = (np.asarray(log[n].to_numpy(), dtype=np.float64) for n in ("time_s", "duty", "angle_deg"))
-    return time, duty, angle
-
-
-def _step(time: NDArray[np.float64]) -> float:
-    return float(time[-1] - time[0]) / (time.size - 1)
-
-
-def _samples(horizon_s: float, step_s: float, size: int) -> int:
-    n = round(horizon_s / step_s)
-    if n < 1 or abs(n * step_s - horizon_s) > _WHOLE * step_s * max(n, 1) + 1e-9:
-        raise ParameterError(f"horizons_s: {horizon_s:g} s is no whole number of samples of {step_s:g} s")
-    if n > size // 2:
-        raise ParameterError(f"horizons_s: {horizon_s:g} s is more than half of the log, {size * step_s:g} s")
-    return n

@@ -13,7 +13,9 @@ from mgdd.studies.ch4_esc import run_ch4_esc
 from mgdd.studies.ch4_sensors import run_ch4_sensors
 from mgdd.studies.ch4_tests import run_ch4_tests
 from mgdd.studies.ch7_first_principle import run_ch7_first_principle
+from mgdd.studies.ch7_pseudo_wiener import run_ch7_pseudo_wiener
 from mgdd.studies.h2df_seek import run_h2df_seek
+from mgdd.studies.identification_benchmarks import run_identification_benchmarks
 from mgdd.studies.measured_traces import best_timing, compare_laws, run_measured_traces
 from mgdd.studies.registry import available_studies, run_study
 
@@ -28,7 +30,9 @@ __all__ = [
     "run_ch4_sensors",
     "run_ch4_tests",
     "run_ch7_first_principle",
+    "run_ch7_pseudo_wiener",
     "run_h2df_seek",
+    "run_identification_benchmarks",
     "run_measured_traces",
     "run_study",
 ]

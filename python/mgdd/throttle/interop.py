@@ -1,4 +1,4 @@
-"""A throttle as a sampled-data system of python-control (optional)."""
+"""A throttle, plant or pseudo-Wiener model, as a sampled-data system of python-control (optional)."""
 
 from __future__ import annotations
 
@@ -9,6 +9,7 @@ import numpy as np
 from mgdd import _core
 from mgdd._core import Throttle
 from mgdd.errors import ParameterError
+from mgdd.throttle.pseudo_wiener import PseudoWiener
 
 if TYPE_CHECKING:
     from numpy.typing import NDArray
@@ -23,21 +24,21 @@ _STATES = (
 _ANGLE = _STATES.index("plate_angle_deg")
 
 
-def initial_state(throttle: Throttle, start_deg: float | None = None) -> NDArray[np.float64]:
+def initial_state(model: Throttle | PseudoWiener, start_deg: float | None = None) -> NDArray[np.float64]:
     """Give the state of a throttle at rest, as systems of `to_iosystem` start from it.
 
     Parameters
     ----------
-    throttle : Throttle
-        Its parameters.
+    model : Throttle or PseudoWiener
+        The throttle.
     start_deg : float, optional
         Angle [deg], within the travel; limp-home if left out.
 
     Returns
     -------
-    ndarray, shape (7,)
-        Angle [deg], speed [deg/s], current [A] and bristle [deg] of motor and gear, then angle, speed and bristle of
-        the plate.
+    ndarray
+        Of a Throttle angle [deg], speed [deg/s], current [A] and bristle [deg] of motor and gear, then angle, speed
+        and bristle of the plate; of a PseudoWiener the states of its block in deg, s and duty.
 
     Raises
     ------
@@ -50,25 +51,28 @@ def initial_state(throttle: Throttle, start_deg: float | None = None) -> NDArray
     >>> initial_state(Throttle(), 20.0).round(6).tolist()
     [20.0, 0.0, 0.0, 0.0, 20.0, 0.0, 0.0]
     """
-    start = throttle.limp_home_deg if start_deg is None else float(start_deg)
-    if not throttle.closed_deg <= start <= throttle.open_deg:
-        raise ParameterError(
-            f"start_deg = {start:g}: must lie within the travel, {throttle.closed_deg:g} to {throttle.open_deg:g} deg"
-        )
-    return np.asarray(_core.ThrottleStepper.at_rest(start), dtype=np.float64)
+    values = model.parameters if isinstance(model, PseudoWiener) else model.to_dict()
+    limp_home, closed, opened = (float(values[name]) for name in ("limp_home_deg", "closed_deg", "open_deg"))
+    start = limp_home if start_deg is None else float(start_deg)
+    if not closed <= start <= opened:
+        raise ParameterError(f"start_deg = {start:g}: must lie within the travel, {closed:g} to {opened:g} deg")
+    rest = _stepper(model).at_rest(start) if isinstance(model, PseudoWiener) else _core.ThrottleStepper.at_rest(start)
+    return np.asarray(rest, dtype=np.float64)
 
 
-def to_iosystem(throttle: Throttle, *, sample_s: float = 1e-3, step_s: float = 1e-4, name: str = "throttle") -> Any:
+def to_iosystem(
+    model: Throttle | PseudoWiener, *, sample_s: float = 1e-3, step_s: float = 1e-4, name: str = "throttle"
+) -> Any:
     """Give a throttle as a discrete-time `control.NonlinearIOSystem`: duty in, plate angle out.
 
     Parameters
     ----------
-    throttle : Throttle
-        Its parameters.
+    model : Throttle or PseudoWiener
+        The plant, or a pseudo-Wiener model of it.
     sample_s : float
         Time between samples, the time base of the system [s]; the duty holds in between.
     step_s : float
-        Integration step [s], a whole number of times in the sample time.
+        Integration step of a Throttle [s], a whole number of times in the sample time.
     name : str
         Name of the system.
 
@@ -100,14 +104,23 @@ def to_iosystem(throttle: Throttle, *, sample_s: float = 1e-3, step_s: float = 1
         import control
     except ImportError as error:
         raise ImportError("to_iosystem needs python-control: pip install 'mgdd[control]'") from error
-    stepper = _core.ThrottleStepper(throttle, sample_s=sample_s, step_s=step_s)
+    stepper: Any
+    if isinstance(model, PseudoWiener):
+        stepper = _stepper(model.at_sample(sample_s))
+        states = [f"state_{i}" for i in range(initial_state(model).size)]
+    else:
+        stepper = _core.ThrottleStepper(model, sample_s=sample_s, step_s=step_s)
+        states = list(_STATES)
 
     def update(_time: float, state: Any, inputs: Any, _params: dict[str, Any]) -> NDArray[np.float64]:
         return np.asarray(stepper.advance(np.asarray(state, dtype=np.float64), float(np.ravel(inputs)[0])))
 
     def output(_time: float, state: Any, _inputs: Any, _params: dict[str, Any]) -> NDArray[np.float64]:
-        return np.asarray([state[_ANGLE]], dtype=np.float64)
+        column = np.asarray(state, dtype=np.float64)
+        return np.asarray([stepper.output(column) if isinstance(model, PseudoWiener) else column[_ANGLE]])
 
-    return control.nlsys(
-        update, output, inputs=["duty"], outputs=["angle_deg"], states=list(_STATES), dt=sample_s, name=name
-    )
+    return control.nlsys(update, output, inputs=["duty"], outputs=["angle_deg"], states=states, dt=sample_s, name=name)
+
+
+def _stepper(model: PseudoWiener) -> Any:
+    return _core.PseudoWienerStepper(model.kind, dict(model.parameters), **model._options)

@@ -1,7 +1,7 @@
 // Motor-driven linear axis with friction: mass, viscous friction per direction, Coulomb friction with a Stribeck rise,
 // and an offset force that may drift. Units SI, input V, output m. A StepModel: step() is noexcept and heap-free.
-// Friction at rest is set-valued and solved exactly by the proximal step (Moreau 1988), so the axis neither chatters
-// nor creeps. Stribeck term: Armstrong-Hélouvry, Dupont and Canudas de Wit 1994, with the exponent 1.
+// Friction at rest is set-valued and solved exactly by a proximal step, so the axis neither chatters nor creeps. The
+// Stribeck term falls exponentially with the speed.
 #pragma once
 
 #include <array>
@@ -21,8 +21,8 @@ struct DriveAxis {
 
   static constexpr std::array<FitDomain, 9> parameters = {{
       {"mass_kg", 1e-3, 1e5},
-      {"viscous_forward_ns_per_m", 0.0, 1e6},
-      {"viscous_backward_ns_per_m", 0.0, 1e6},
+      {"viscous_ns_per_m", 0.0, 1e6},
+      {"viscous_asymmetry_ns_per_m", -1e6, 1e6},  // forward: viscous + this; backward: viscous - this
       {"coulomb_n", 0.0, 1e5},
       {"stribeck_n", 0.0, 1e5},
       {"stribeck_speed_m_per_s", 1e-3, 1e2},
@@ -41,7 +41,7 @@ struct DriveAxis {
   Values<T, 3> step(const Values<T, 9>& p, const Values<T, 3>& state, const Values<double, 1>& input,
                     double dt_s) const noexcept {
     using std::exp;
-    const auto& [mass, forward, backward, coulomb, stribeck, stribeck_speed, offset, drift, stiffness] = p;
+    const auto& [mass, viscous, asymmetry, coulomb, stribeck, stribeck_speed, offset, drift, stiffness] = p;
     const auto& [position, speed, time] = state;
     const T drive = mass * (1.0 / dt_s) * speed + force_n_per_v * input[0] - offset - drift * time -
                     stiffness * (position - centre_m);
@@ -50,9 +50,9 @@ struct DriveAxis {
     if (value_of(stribeck) > 0.0) limit += stribeck * exp((value_of(speed) > 0.0 ? -speed : speed) / stribeck_speed);
     T next(0.0);
     if (ahead && drive > limit) {
-      next = (drive - limit) / (mass * (1.0 / dt_s) + forward);
+      next = (drive - limit) / (mass * (1.0 / dt_s) + viscous + asymmetry);
     } else if (!ahead && drive < -limit) {
-      next = (drive + limit) / (mass * (1.0 / dt_s) + backward);
+      next = (drive + limit) / (mass * (1.0 / dt_s) + viscous - asymmetry);
     }
     return {position + dt_s * next, next, time + dt_s};
   }

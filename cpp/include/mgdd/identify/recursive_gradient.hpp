@@ -1,6 +1,6 @@
 // On-line update of PW-R along the gradient of its own re-anchored prediction, with the adaptation gain g_r of
 // Tan (2018): q <- q + g_r s e/(1 + s's), e = measured minus predicted, s = d prediction/d q, q = log of the parameter
-// over its start. Normalised as in Goodwin and Sin 1984, section 3.3. Units: deg, s, duty. noexcept, allocation-free.
+// over its start. The law is ours. Units: deg, s, duty. noexcept, allocation-free.
 #pragma once
 
 #include <algorithm>

@@ -1,5 +1,5 @@
 // On-line update of PW-R by recursive least squares on the form that is linear in the parameters. Units: deg, s, duty.
-// `update` is noexcept and allocation-free. Source: Ljung 1999, section 11.2; the exact held-input form is ours.
+// `update` is noexcept and allocation-free. The regression form for a held input is ours.
 #pragma once
 
 #include <array>

@@ -2,7 +2,7 @@
 // derivatives. Sampled signals; the unit of the input and of the output are the caller's, both filters have gain 1 at
 // rest, so that the curve between them carries the unit and no gain is counted twice.
 // Structure and derivatives: Schoukens, Pintelon and Rolain 2014 (block-oriented, started from linear approximations);
-// the curve is a uniform cubic B-spline (de Boor 1978). Desk-time: allocates; the residual call is noexcept.
+// the curve is a uniform cubic B-spline. Desk-time: allocates; the residual call is noexcept.
 #pragma once
 
 #include <cstddef>
@@ -19,7 +19,7 @@ namespace mgdd::identify {
 [[nodiscard]] Eigen::VectorXd filter_series(const Eigen::VectorXd& b, const Eigen::VectorXd& a,
                                             const Eigen::VectorXd& u);
 
-/// Whether all roots of A lie inside the unit circle (step-down recursion; Kay 1988).
+/// Whether all roots of A lie inside the unit circle (Schur-Cohn, by the step-down recursion).
 [[nodiscard]] bool is_stable(const Eigen::VectorXd& a) noexcept;
 
 /// Orders of the filters and the grid of the curve: coefficients at equal steps of `lower` to `upper`, linear beyond.

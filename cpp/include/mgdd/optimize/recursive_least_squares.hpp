@@ -1,6 +1,6 @@
 // Recursive least squares with forgetting: numbers in, numbers out. y = phi' p + noise; every update is noexcept and
 // allocation-free. The estimate stays inside a box, and the trace of P inside a cap, so that a dull input neither
-// drifts nor winds up. Source: Ljung 1999, section 11.2 (forgetting factor), eq. 11.12.
+// drifts nor winds up. The textbook recursion with a forgetting factor; box and cap are ours.
 #pragma once
 
 #include <cmath>

@@ -1,6 +1,6 @@
 // The play operator (backlash of half width r): the output rests until the input pushes an end of the gap against it.
 // Rate independent; input, output and r share one unit. noexcept, nothing allocated.
-// Source: Brokate and Sprekels 1996, section 2.1.
+// The classical operator of hysteresis theory; its laws (rate independence, wiping out, width) stand in the tests.
 #pragma once
 
 #include "mgdd/common/dual_select.hpp"

@@ -1,6 +1,6 @@
 // PW-P, a Wiener model whose output block remembers: two lags, then a play operator (or a Prandtl-Ishlinskii sum of up
 // to eight) and a gain. Units: deg, s, duty. Five parameters with one play. Every step is noexcept and allocation-free;
-// T is double, Dual<N> or Lanes<N>. A massless spring with dry friction is a play (Brokate and Sprekels 1996), so the
+// T is double, Dual<N> or Lanes<N>. A massless spring with dry friction is a play, so the
 // model is right for slow motion and wrong where inertia matters.
 #pragma once
 

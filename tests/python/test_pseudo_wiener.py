@@ -1,0 +1,168 @@
+"""Pseudo-Wiener models from Python: model face, files, fit, on-line update, and the study's table."""
+
+from __future__ import annotations
+
+import copy
+import pickle
+
+import numpy as np
+import pytest
+
+from mgdd.errors import DataError, ParameterError, ShapeError
+from mgdd.identify import OnlineUpdate, ThrottleModel, fit_pseudo_wiener
+from mgdd.io import throttle_log
+from mgdd.studies import run_ch7_pseudo_wiener
+from mgdd.throttle import PseudoWiener, Throttle
+
+TIME = np.arange(4000) * 1e-3
+DUTY = 0.15 + 0.2 * np.sin(2.0 * np.pi * (0.5 * TIME + 0.6 * TIME**2))
+MAP = {f"rise_{i}_deg": 12.0 for i in range(1, 7)}
+MODELS = [
+    PseudoWiener.of_throttle(Throttle()),
+    PseudoWiener("pw_r", {"delay_samples": 2.0}, switching="measured", friction="tanh"),
+    PseudoWiener("pw_w", {**MAP, "map_start": 1.0}),
+    PseudoWiener("pw_p", {"gain_1_deg_per_duty": 150.0, "radius_1_duty": 0.05}),
+    PseudoWiener("pw_p", {"plays": 4.0, "gain_4_deg_per_duty": 50.0, "radius_4_duty": 0.1}),
+]
+
+
+@pytest.mark.parametrize("model", MODELS, ids=lambda model: f"{model.kind}-{len(model.parameters)}")
+def test_a_model_survives_every_copy(model: PseudoWiener) -> None:
+    assert isinstance(model, ThrottleModel)
+    for other in (
+        PseudoWiener.from_toml(model.to_toml()),
+        pickle.loads(pickle.dumps(model)),
+        copy.deepcopy(model),
+    ):
+        assert other == model
+        assert hash(other) == hash(model)
+    assert model.replace(limp_home_deg=9.0) != model
+    assert set(model.units) == set(model.parameters)
+
+
+@pytest.mark.parametrize("model", MODELS, ids=lambda model: f"{model.kind}-{len(model.parameters)}")
+def test_prediction_joins_measurement_and_free_run(model: PseudoWiener) -> None:
+    free = model.simulate(TIME, DUTY, start_deg=20.0)
+    assert free.shape == TIME.shape
+    ahead = model.predict(TIME, DUTY, free, 20, speed_gain_per_s=0.0, bias_gain_duty_per_deg=0.0)
+    assert ahead.shape == (TIME.size - 20,)
+    if model.parameters["delay_samples"] == 0.0:
+        np.testing.assert_allclose(ahead, free[20:], atol=1e-9)
+    angle, slope = model.slopes(np.full(30, 0.3), start_deg=20.0)
+    assert slope.shape == (30, 30)
+    assert np.abs(np.triu(slope, 1)).max() == 0.0
+    np.testing.assert_array_equal(angle[:0], [])
+
+
+def test_slopes_are_the_differences() -> None:
+    model = MODELS[0]
+    duty = np.full(24, 0.35)
+    _, slope = model.slopes(duty, start_deg=30.0)
+    for k in (0, 7, 23):
+        up, down = duty.copy(), duty.copy()
+        up[k] += 1e-6
+        down[k] -= 1e-6
+        difference = (model.slopes(up, start_deg=30.0)[0] - model.slopes(down, start_deg=30.0)[0]) / 2e-6
+        np.testing.assert_allclose(slope[:, k], difference, rtol=1e-5, atol=1e-5)
+
+
+def test_another_sample_time_keeps_seconds_and_steps() -> None:
+    model = PseudoWiener("pw_r", {"delay_samples": 4.0})
+    coarse = model.at_sample(2e-3)
+    assert coarse.parameters["delay_samples"] == 2.0
+    assert coarse.parameters["substeps"] == 4.0
+    fine = model.simulate(TIME, np.repeat(DUTY[::2], 2), start_deg=8.0)
+    np.testing.assert_allclose(coarse.simulate(TIME[::2], DUTY[::2], start_deg=8.0), fine[::2], atol=1e-9)
+
+
+def test_bad_input_says_what_and_leaves_things_alone() -> None:
+    with pytest.raises(ParameterError, match=r"above_tau_s = -1 s: must be in \[0\.005, 0\.3\]"):
+        PseudoWiener("pw_r", {"above_tau_s": -1.0})
+    with pytest.raises(ParameterError, match="'mass' is no parameter of pw_w"):
+        PseudoWiener("pw_w", {"mass": 1.0})
+    with pytest.raises(ParameterError, match="must be one of pw_r, pw_w, pw_p"):
+        PseudoWiener("wiener")
+    with pytest.raises(ParameterError, match=r"delay_samples = 1\.5: must be a whole number"):
+        PseudoWiener("pw_r", {"delay_samples": 1.5})
+    model = MODELS[0]
+    with pytest.raises(DataError, match="uneven"):
+        model.simulate(TIME**2, DUTY, start_deg=8.0)
+    with pytest.raises(ShapeError, match="two columns of one length"):
+        model.simulate(TIME, DUTY[:-1], start_deg=8.0)
+    with pytest.raises(ParameterError, match="horizon = 0"):
+        model.predict(TIME, DUTY, DUTY, 0)
+    with pytest.raises(DataError, match=r"unit = 'rad': must be 'deg'"):
+        PseudoWiener.from_toml(model.to_toml().replace('"deg"', '"rad"'))
+    with pytest.raises(DataError, match=r"no table \[parameters\]"):
+        PseudoWiener.from_toml('kind = "pw_r"')
+
+
+def test_the_fit_recovers_a_model_of_its_own_kind() -> None:
+    truth = PseudoWiener("pw_r", {"above_coulomb_duty": 0.08, "below_coulomb_duty": 0.08, "above_tau_s": 0.025})
+    truth = truth.replace(below_tau_s=0.025)
+    log = throttle_log(TIME, DUTY, truth.simulate(TIME, DUTY, start_deg=8.0))
+    fit = fit_pseudo_wiener(log, starts=3)
+    for name in ("above_tau_s", "above_coulomb_duty", "below_coulomb_duty"):
+        assert fit.parameters[name] == pytest.approx(truth.parameters[name], rel=1e-3)
+    assert fit.fit_percent_train > 99.9
+    assert fit.model.kind == fit.kind == "pw_r"
+    assert len(fit.search_rmse_deg) == 3
+    assert any("searches ended at the best fit" in text for text in fit.findings)
+    assert PseudoWiener.from_toml(fit.to_toml()) == fit.model
+    with pytest.raises(ParameterError, match="must be a pw_w"):
+        fit_pseudo_wiener(log, "pw_w", start=truth)
+    with pytest.raises(DataError, match="different sample times"):
+        fit_pseudo_wiener([log, log.isel(time_s=slice(None, None, 2))])
+
+
+@pytest.mark.parametrize("method", ["recursive_least_squares", "window", "gradient"])
+def test_online_update_learns_the_gain_and_restarts(method: str) -> None:
+    truth = PseudoWiener("pw_r", {"limp_home_deg": 8.0})
+    time = np.arange(12000) * 1e-3
+    duty = 0.14 + 0.16 * np.sin(2.0 * np.pi * 2.5 * time)
+    angle = truth.simulate(time, duty, start_deg=30.0)
+    # 15 % less gain: preload, spring and friction in duty are 15 % too high by the same factor.
+    factor = 0.85
+    wrong = truth.replace(
+        above_gain_deg_per_s2_per_duty=factor * truth.parameters["above_gain_deg_per_s2_per_duty"],
+        **{
+            f"above_{name}": truth.parameters[f"above_{name}"] / factor
+            for name in ("preload_duty", "spring_duty_per_deg", "coulomb_duty")
+        },
+    )
+    update = OnlineUpdate(wrong, method=method)
+    assert update.update(duty[:6000], angle[:6000]) > 10
+    other = OnlineUpdate(wrong, method=method)
+    other.restore(update.state())
+    update.update(duty[6000:], angle[6000:])
+    other.update(duty[6000:], angle[6000:])
+    assert update.model == other.model
+    gain = update.model.parameters["above_gain_deg_per_s2_per_duty"]
+    assert gain == pytest.approx(truth.parameters["above_gain_deg_per_s2_per_duty"], rel=0.08)
+    with pytest.raises(ParameterError):
+        other.restore({"nothing": [1.0]})
+    assert update.model == other.model
+
+
+def test_online_update_refuses_what_it_cannot_do() -> None:
+    with pytest.raises(ParameterError, match="must be a pw_r"):
+        OnlineUpdate(MODELS[2])
+    with pytest.raises(ParameterError, match="method = 'newton'"):
+        OnlineUpdate(MODELS[0], method="newton")
+    with pytest.raises(ParameterError, match="'mass' is no parameter"):
+        OnlineUpdate(MODELS[0], free=["mass"])
+
+
+def test_the_study_ranks_the_kinds() -> None:
+    result = run_ch7_pseudo_wiener(starts=4, quick=True)
+    rows = {(row["plant"], row["model"]): row for row in result.summary["rows"]}
+    printed = {"P1": {"pw_r": 99.4, "pw_w": 79.7, "pw_p": 53.7}, "P2": {"pw_r": 99.4, "pw_w": 92.0, "pw_p": 82.4}}
+    for plant, kinds in printed.items():
+        for kind, train in kinds.items():
+            row = rows[plant, kind]
+            assert row["fit_train_percent"] >= train - 0.05
+            assert row["ahead_20_ms_deg"] < rows[plant, "persistence"]["ahead_20_ms_deg"]
+        assert rows[plant, "pw_r"]["ahead_20_ms_deg"] <= 0.06
+    assert rows["P1", "pw_r"]["fit_steps_percent"] >= 96.0
+    assert rows["P1", "persistence"]["ahead_20_ms_deg"] == pytest.approx(1.548, abs=0.01)
+    assert len(result.figures) == 4
