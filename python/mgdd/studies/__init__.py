@@ -12,6 +12,7 @@ from mgdd.studies.ch3_optimizers import run_ch3_optimizers
 from mgdd.studies.ch4_esc import run_ch4_esc
 from mgdd.studies.ch4_sensors import run_ch4_sensors
 from mgdd.studies.ch4_tests import run_ch4_tests
+from mgdd.studies.ch7_first_principle import run_ch7_first_principle
 from mgdd.studies.ch7_pseudo_wiener import run_ch7_pseudo_wiener
 from mgdd.studies.h2df_seek import run_h2df_seek
 from mgdd.studies.identification_benchmarks import run_identification_benchmarks
@@ -28,6 +29,7 @@ __all__ = [
     "run_ch4_esc",
     "run_ch4_sensors",
     "run_ch4_tests",
+    "run_ch7_first_principle",
     "run_ch7_pseudo_wiener",
     "run_h2df_seek",
     "run_identification_benchmarks",

@@ -1,0 +1,64 @@
+"""Studies of the throttle: the habits of the plant, and what the first-principle fit makes of noisy logs."""
+
+from __future__ import annotations
+
+import pytest
+
+from mgdd.results import check_labels
+from mgdd.studies import run_ch2_throttle_characteristics, run_ch7_first_principle
+
+
+@pytest.fixture(scope="module")
+def habits():
+    return run_ch2_throttle_characteristics(quick=True)
+
+
+def values(result, effect):
+    return {row["condition"]: row["value"] for row in result.summary["rows"] if row["effect"] == effect}
+
+
+def test_swing_shrinks_with_the_frequency(habits):
+    spans = values(habits, "rate dependence")
+    expected = {0.1: 82.3, 0.5: 62.0, 1.0: 33.0, 2.0: 16.2, 5.0: 5.8, 10.0: 2.4}
+    for frequency, span in expected.items():
+        assert spans[f"span at {frequency:g} Hz"] == pytest.approx(span, rel=0.03), frequency
+    from_02 = list(spans.values())[1:]
+    assert from_02 == sorted(from_02, reverse=True)
+
+
+def test_slow_ramp_shows_twice_the_friction(habits):
+    (row,) = [row for row in habits.summary["rows"] if row["effect"] == "hysteresis"]
+    assert row["closed_form"] == pytest.approx(0.1854, abs=5e-5)
+    assert row["value"] == pytest.approx(0.1975, abs=0.002)
+
+
+def test_air_moves_the_plate_at_constant_duty(habits):
+    air = values(habits, "air flow")
+    assert air["-0.4 N m, at rest after opening"] == pytest.approx(0.0, abs=1e-6)
+    assert air["0 N m, at rest after closing"] == pytest.approx(0.0, abs=1e-3)
+    assert air["-0.1 N m, at rest after closing"] < -30.0
+    assert air["-0.4 N m, at rest after unloaded"] < air["-0.3 N m, at rest after unloaded"] < -5.0
+
+
+def test_result_is_labelled_and_drawn(habits):
+    check_labels(habits.dataset)
+    assert len(habits.figures) == 3
+    assert habits.summary["seeds"] == 0
+
+
+def test_groups_are_found_also_where_the_plant_does_more():
+    result = run_ch7_first_principle(seeds=1, quick=True)
+    check_labels(result.dataset)
+    assert len(result.figures) == 3
+    errors = {(row["case"], row["group"]): abs(row["error_percent"]) for row in result.summary["rows"]}
+    bounds = {
+        "tau_s": 8.0,
+        "gain_deg_per_s2_per_duty": 5.0,
+        "beta_above_duty": 1.0,
+        "kappa_above_duty_per_deg": 8.0,
+        "delta_duty": 4.0,
+    }
+    for group, bound in bounds.items():
+        assert errors["P1 with inductance and Stribeck friction", group] <= bound, group
+    for fit in result.summary["fits"]:
+        assert fit["train_percent"] >= 98.0, fit["case"]
