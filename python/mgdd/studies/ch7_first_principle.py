@@ -162,7 +162,7 @@ def _case(
         }
         for own, fitted, unit in _GROUPS
     ]
-    fits = {"case": name}
+    fits: dict[str, Any] = {"case": name}
     for record, values in quality.items():
         fits |= with_interval(f"{record.replace(' ', '_')}_percent", np.array(values))
     return rows, fits, run
