@@ -6,7 +6,7 @@ import collections.abc
 import numpy
 import numpy.typing
 import typing
-__all__: list[str] = ['BoundedSeeking', 'ComponentLag', 'ConvergenceError', 'Cylinder', 'CylinderFit', 'DataError', 'EngineBench', 'Error', 'ExtremumSeeking', 'FitReport', 'GoldenSection', 'GradientDescent', 'IterativeLearning', 'LeastSquaresOptions', 'Limit', 'LoadBurn', 'LoadFit', 'MeasuredCycle', 'NewtonSeeking', 'NoxFit', 'NoxModel', 'NoxProxy', 'OperatingPoint', 'Parameter', 'ParameterError', 'Performance', 'PerformanceTerm', 'RigError', 'SensorDynamics', 'ShapeError', 'SoftSensor', 'Spsa', 'Throttle', 'TraceOptions', 'analyze_trace', 'burn_duration_cad', 'burned_fraction', 'check_trace', 'common_parameters', 'compiled_simd_level', 'compiler', 'convergence', 'correlation_limit', 'differentiable_inputs', 'estimate_burn', 'fit_cylinder', 'fit_nox_proxy', 'fit_smooth_throttle', 'fit_throttle_groups', 'hardenberg_hase_delay_cad', 'hohenberg_coefficient', 'indicator_units', 'input_unit', 'latin_hypercube', 'least_squares', 'load_parameters', 'monte_carlo', 'processor_simd_levels', 'run_loop', 'scan', 'sensitivities', 'simulate', 'simulate_smooth_throttle', 'simulate_throttle', 'simulate_throttle_groups', 'simulate_throttle_many', 'smooth_throttle_example', 'smooth_throttle_instruction_set', 'smooth_throttle_names', 'start_of_combustion', 'start_of_injection', 'throttle_airflow_torque', 'throttle_group_bounds', 'throttle_group_names', 'timing_window_cad', 'tune', 'volume_l', 'wall_area_m2', 'wall_heat_scale_upper', 'watson_delay_ms', 'with_burn', 'wolfer_delay_ms', 'woschni_c1_bar_m', 'woschni_coefficient']
+__all__: list[str] = ['BoundedSeeking', 'ComponentLag', 'ConvergenceError', 'Cylinder', 'CylinderFit', 'DataError', 'DriveAxis', 'EngineBench', 'Error', 'ExtremumSeeking', 'FitReport', 'FreeRunFit', 'FreeRunRecord', 'GoldenSection', 'GradientDescent', 'GradientPwR', 'IterativeLearning', 'LeastSquaresOptions', 'Limit', 'LoadBurn', 'LoadFit', 'MeasuredCycle', 'NewtonSeeking', 'NoxFit', 'NoxModel', 'NoxProxy', 'OperatingPoint', 'Parameter', 'ParameterError', 'Performance', 'PerformanceTerm', 'PseudoWienerModel', 'PseudoWienerStepper', 'RecursivePwR', 'RigError', 'SensorDynamics', 'SensorPair', 'ShapeError', 'SoftSensor', 'Spsa', 'Throttle', 'ThrottleStepper', 'TraceOptions', 'TwoTanks', 'WienerHammerstein', 'WindowPwR', 'analyze_trace', 'burn_duration_cad', 'burned_fraction', 'check_trace', 'common_parameters', 'compiled_simd_level', 'compiler', 'convergence', 'correlation_limit', 'differentiable_inputs', 'estimate_burn', 'filter_series', 'fit_cylinder', 'fit_nox_proxy', 'fit_pseudo_wiener', 'fit_smooth_throttle', 'fit_throttle_groups', 'hardenberg_hase_delay_cad', 'hohenberg_coefficient', 'indicator_units', 'input_unit', 'latin_hypercube', 'least_squares', 'load_parameters', 'monte_carlo', 'processor_simd_levels', 'pseudo_wiener_of', 'pseudo_wiener_units', 'run_loop', 'scan', 'sense_throttle', 'sensitivities', 'sensor_fault_kinds', 'simulate', 'simulate_smooth_throttle', 'simulate_throttle', 'simulate_throttle_groups', 'simulate_throttle_many', 'smooth_throttle_example', 'smooth_throttle_instruction_set', 'smooth_throttle_names', 'start_of_combustion', 'start_of_injection', 'throttle_airflow_torque', 'throttle_group_bounds', 'throttle_group_names', 'timing_window_cad', 'tune', 'volume_l', 'wall_area_m2', 'wall_heat_scale_upper', 'watson_delay_ms', 'with_burn', 'wolfer_delay_ms', 'woschni_c1_bar_m', 'woschni_coefficient']
 class Error(Exception):
     """
     Base of everything mgdd raises.
@@ -1883,6 +1883,183 @@ class Throttle:
         """
         viscous friction [N m s/rad]
         """
+class SensorPair:
+    """
+    Two redundant position sensors of a throttle with opposite slopes, and their check.
+    
+    Keyword-only and immutable. The first gives ``closed_v + span_v angle/travel_deg``, the second ``supply_v`` minus that.
+    
+    Parameters
+    ----------
+    closed_v, span_v : float
+        First sensor at 0 deg, and its rise over the travel [V]; 0 and 5 are the ideal form of catalogues.
+    travel_deg : float
+        Angle of the full span [deg].
+    supply_v : float
+        Supply of sensors and converter [V].
+    noise_v : float
+        Noise at the converter, rms of each sensor [V].
+    lag_s : float
+        Time constant of the anti-alias filter [s].
+    adc_bits : int
+        Bits of the converter, 4 to 24.
+    sum_tolerance_v : float
+        The sum may differ from the supply by less than this [V].
+    low_v, high_v : float
+        Range of a healthy sensor [V].
+    debounce_s : float
+        A check must fail without a break for so long before the fault counts [s].
+    
+    Raises
+    ------
+    mgdd.errors.ParameterError
+        A field outside its domain, naming field, value and bound.
+    
+    Examples
+    --------
+    >>> from mgdd.throttle import SensorPair
+    >>> SensorPair().adc_bits
+    12
+    """
+    def __eq__(self, arg0: typing.Any) -> bool:
+        ...
+    def __getstate__(self) -> tuple[int, dict]:
+        ...
+    def __hash__(self) -> int:
+        ...
+    def __init__(self, *, closed_v: typing.SupportsFloat | typing.SupportsIndex = 0.5, span_v: typing.SupportsFloat | typing.SupportsIndex = 4.0, travel_deg: typing.SupportsFloat | typing.SupportsIndex = 90.0, supply_v: typing.SupportsFloat | typing.SupportsIndex = 5.0, noise_v: typing.SupportsFloat | typing.SupportsIndex = 0.002, lag_s: typing.SupportsFloat | typing.SupportsIndex = 0.0003, adc_bits: typing.SupportsInt | typing.SupportsIndex = 12, sum_tolerance_v: typing.SupportsFloat | typing.SupportsIndex = 0.2, low_v: typing.SupportsFloat | typing.SupportsIndex = 0.2, high_v: typing.SupportsFloat | typing.SupportsIndex = 4.8, debounce_s: typing.SupportsFloat | typing.SupportsIndex = 0.2) -> None:
+        ...
+    def __repr__(self) -> str:
+        ...
+    def __setstate__(self, arg0: tuple) -> None:
+        ...
+    def to_dict(self) -> dict:
+        """
+        Constructor keywords as a new dict.
+        """
+    @property
+    def adc_bits(self) -> int:
+        """
+        Bits of the converter.
+        """
+    @property
+    def closed_v(self) -> float:
+        """
+        First sensor at 0 deg [V].
+        """
+    @property
+    def debounce_s(self) -> float:
+        """
+        Time a check must fail [s].
+        """
+    @property
+    def high_v(self) -> float:
+        """
+        Highest healthy voltage [V].
+        """
+    @property
+    def lag_s(self) -> float:
+        """
+        Time constant of the anti-alias filter [s].
+        """
+    @property
+    def low_v(self) -> float:
+        """
+        Lowest healthy voltage [V].
+        """
+    @property
+    def lsb_v(self) -> float:
+        """
+        Step of the converter [V].
+        """
+    @property
+    def noise_v(self) -> float:
+        """
+        Noise of each sensor, rms [V].
+        """
+    @property
+    def span_v(self) -> float:
+        """
+        Rise of the first sensor over the travel [V].
+        """
+    @property
+    def sum_tolerance_v(self) -> float:
+        """
+        Tolerance of the sum [V].
+        """
+    @property
+    def supply_v(self) -> float:
+        """
+        Supply of sensors and converter [V].
+        """
+    @property
+    def travel_deg(self) -> float:
+        """
+        Angle of the full span [deg].
+        """
+class ThrottleStepper:
+    """
+    One sample of a throttle from a given state; behind mgdd.throttle.to_iosystem.
+    
+    The state is angle [deg], speed [deg/s], current [A] and bristle [deg] of motor and gear, then angle, speed and bristle
+    of the plate.
+    """
+    @staticmethod
+    def at_rest(angle_deg: typing.SupportsFloat | typing.SupportsIndex) -> typing.Annotated[list[float], "FixedSize(7)"]:
+        """
+        State at rest at an angle [deg], without current.
+        """
+    def __init__(self, throttle: Throttle, *, sample_s: typing.SupportsFloat | typing.SupportsIndex, step_s: typing.SupportsFloat | typing.SupportsIndex) -> None:
+        ...
+    def advance(self, state: typing.Annotated[collections.abc.Sequence[typing.SupportsFloat | typing.SupportsIndex], "FixedSize(7)"], duty: typing.SupportsFloat | typing.SupportsIndex) -> typing.Annotated[list[float], "FixedSize(7)"]:
+        """
+        State after one sample under a duty [-], which is clipped to -1..1.
+        """
+class PseudoWienerStepper:
+    """
+    One sample of a pseudo-Wiener model from a given state; behind mgdd.throttle.to_iosystem.
+    """
+    def __init__(self, kind: str, parameters: collections.abc.Mapping[str, typing.SupportsFloat | typing.SupportsIndex], *, switching: str = 'predicted', friction: str = 'set_valued') -> None:
+        ...
+    def advance(self, state: collections.abc.Sequence[typing.SupportsFloat | typing.SupportsIndex], duty: typing.SupportsFloat | typing.SupportsIndex) -> list[float]:
+        """
+        State after one sample under a duty [-].
+        """
+    def at_rest(self, angle_deg: typing.SupportsFloat | typing.SupportsIndex) -> list[float]:
+        """
+        State at rest at an angle [deg].
+        """
+    def output(self, state: collections.abc.Sequence[typing.SupportsFloat | typing.SupportsIndex]) -> float:
+        """
+        Angle [deg] of a state.
+        """
+class PseudoWienerModel:
+    """
+    A pseudo-Wiener model; use mgdd.throttle.PseudoWiener.
+    """
+    __hash__: typing.ClassVar[None] = None
+    def __eq__(self, arg0: typing.Any) -> bool:
+        ...
+    def __init__(self, kind: str, parameters: collections.abc.Mapping[str, typing.SupportsFloat | typing.SupportsIndex], *, switching: str = 'predicted', friction: str = 'set_valued') -> None:
+        ...
+    def predict(self, duty: typing.Annotated[numpy.typing.ArrayLike, numpy.float64], angle_deg: typing.Annotated[numpy.typing.ArrayLike, numpy.float64], horizon: typing.SupportsInt | typing.SupportsIndex, *, angle_gain: typing.SupportsFloat | typing.SupportsIndex = 0.35, speed_gain_per_s: typing.SupportsFloat | typing.SupportsIndex = 35.0, bias_gain_duty_per_deg: typing.SupportsFloat | typing.SupportsIndex = 0.004, offset_gain: typing.SupportsFloat | typing.SupportsIndex = 1.0) -> list[float]:
+        """
+        Re-anchored prediction `horizon` samples ahead [deg].
+        """
+    def simulate(self, duty: typing.Annotated[numpy.typing.ArrayLike, numpy.float64], start_deg: typing.SupportsFloat | typing.SupportsIndex) -> numpy.typing.NDArray[numpy.float64]:
+        """
+        Free run: angle [deg] per sample.
+        """
+    def slopes(self, duty: typing.Annotated[numpy.typing.ArrayLike, numpy.float64], *, start_deg: typing.SupportsFloat | typing.SupportsIndex, speed_deg_per_s: typing.SupportsFloat | typing.SupportsIndex = 0.0) -> tuple[numpy.typing.NDArray[numpy.float64], typing.Annotated[numpy.typing.NDArray[numpy.float64], "[m, n]"]]:
+        """
+        Angle after each sample of a horizon [deg] and d angle / d duty [deg].
+        """
+    @property
+    def kind(self) -> str:
+        ...
+    @property
+    def parameters(self) -> dict:
+        ...
 class MeasuredCycle:
     def __init__(self, *, label: str, crank_angle_cad: typing.Annotated[numpy.typing.ArrayLike, numpy.float64], pressure_bar: typing.Annotated[numpy.typing.ArrayLike, numpy.float64], point: OperatingPoint) -> None:
         ...
@@ -1986,6 +2163,138 @@ class CylinderFit:
         ...
     @property
     def report(self) -> FitReport:
+        ...
+class RecursivePwR:
+    """
+    Recursive least squares of PW-R; use mgdd.identify.OnlineUpdate.
+    """
+    def __init__(self, parameters: collections.abc.Mapping[str, typing.SupportsFloat | typing.SupportsIndex], *, free: collections.abc.Sequence[str], every: typing.SupportsInt | typing.SupportsIndex, noise_deg: typing.SupportsFloat | typing.SupportsIndex, forgetting: typing.SupportsFloat | typing.SupportsIndex) -> None:
+        ...
+    def restore(self, state: collections.abc.Mapping[str, collections.abc.Sequence[typing.SupportsFloat | typing.SupportsIndex]]) -> None:
+        ...
+    def state(self) -> dict[str, list[float]]:
+        ...
+    def update(self, duty: typing.Annotated[numpy.typing.ArrayLike, numpy.float64], angle_deg: typing.Annotated[numpy.typing.ArrayLike, numpy.float64]) -> int:
+        """
+        Takes samples in order; returns how many changed the model.
+        """
+    @property
+    def parameters(self) -> dict:
+        ...
+class WindowPwR:
+    """
+    Sliding-window fit of PW-R; use mgdd.identify.OnlineUpdate.
+    """
+    def __init__(self, parameters: collections.abc.Mapping[str, typing.SupportsFloat | typing.SupportsIndex], *, free: collections.abc.Sequence[str], every: typing.SupportsInt | typing.SupportsIndex, noise_deg: typing.SupportsFloat | typing.SupportsIndex, prior_spread: typing.SupportsFloat | typing.SupportsIndex, iterate_every: typing.SupportsInt | typing.SupportsIndex) -> None:
+        ...
+    def restore(self, state: collections.abc.Mapping[str, collections.abc.Sequence[typing.SupportsFloat | typing.SupportsIndex]]) -> None:
+        ...
+    def state(self) -> dict[str, list[float]]:
+        ...
+    def update(self, duty: typing.Annotated[numpy.typing.ArrayLike, numpy.float64], angle_deg: typing.Annotated[numpy.typing.ArrayLike, numpy.float64]) -> int:
+        """
+        Takes samples in order; returns how many changed the model.
+        """
+    @property
+    def parameters(self) -> dict:
+        ...
+class GradientPwR:
+    """
+    Gradient update of PW-R; use mgdd.identify.OnlineUpdate.
+    """
+    def __init__(self, parameters: collections.abc.Mapping[str, typing.SupportsFloat | typing.SupportsIndex], *, free: collections.abc.Sequence[str], adaptation_gain: typing.SupportsFloat | typing.SupportsIndex, noise_deg: typing.SupportsFloat | typing.SupportsIndex) -> None:
+        ...
+    def restore(self, state: collections.abc.Mapping[str, collections.abc.Sequence[typing.SupportsFloat | typing.SupportsIndex]]) -> None:
+        ...
+    def state(self) -> dict[str, list[float]]:
+        ...
+    def update(self, duty: typing.Annotated[numpy.typing.ArrayLike, numpy.float64], angle_deg: typing.Annotated[numpy.typing.ArrayLike, numpy.float64]) -> int:
+        """
+        Takes samples in order; returns how many changed the model.
+        """
+    @property
+    def parameters(self) -> dict:
+        ...
+class FreeRunRecord:
+    """
+    One measured record, its start and what of the start is unknown.
+    """
+    def __init__(self, *, input: typing.Annotated[numpy.typing.ArrayLike, numpy.float64], output: typing.Annotated[numpy.typing.ArrayLike, numpy.float64], start: collections.abc.Sequence[typing.SupportsFloat | typing.SupportsIndex], free_start: collections.abc.Sequence[str] = [], skip: typing.SupportsInt | typing.SupportsIndex = 0) -> None:
+        ...
+class FreeRunFit:
+    """
+    What a free-run fit hands back.
+    """
+    @property
+    def outputs(self) -> list:
+        ...
+    @property
+    def parameters(self) -> list[float]:
+        ...
+    @property
+    def report(self) -> FitReport:
+        ...
+    @property
+    def starts(self) -> list[list[float]]:
+        ...
+class DriveAxis:
+    """
+    Motor-driven axis with friction.
+    """
+    parameter_names: typing.ClassVar[list] = ['mass_kg', 'viscous_ns_per_m', 'viscous_asymmetry_ns_per_m', 'coulomb_n', 'stribeck_n', 'stribeck_speed_m_per_s', 'offset_n', 'offset_drift_n_per_s', 'stiffness_n_per_m']
+    state_names: typing.ClassVar[list] = ['position_m', 'speed_m_per_s', 'time_s']
+    def __init__(self, *, force_n_per_v: typing.SupportsFloat | typing.SupportsIndex, centre_m: typing.SupportsFloat | typing.SupportsIndex = 0.0) -> None:
+        ...
+    def fit(self, *, base: collections.abc.Sequence[typing.SupportsFloat | typing.SupportsIndex], free: collections.abc.Sequence[str], records: collections.abc.Sequence[FreeRunRecord], dt_s: typing.SupportsFloat | typing.SupportsIndex, options: LeastSquaresOptions) -> FreeRunFit:
+        """
+        Levenberg-Marquardt on the free run with exact sensitivities; releases the GIL.
+        """
+    def free_run(self, *, parameters: collections.abc.Sequence[typing.SupportsFloat | typing.SupportsIndex], start: collections.abc.Sequence[typing.SupportsFloat | typing.SupportsIndex], input: typing.Annotated[numpy.typing.ArrayLike, numpy.float64], dt_s: typing.SupportsFloat | typing.SupportsIndex) -> numpy.typing.NDArray[numpy.float64]:
+        """
+        Output at every sample.
+        """
+class TwoTanks:
+    """
+    Two tanks in a row with overflow.
+    """
+    parameter_names: typing.ClassVar[list] = ['pump_per_s', 'upper_outflow_per_s', 'upper_exponent', 'lower_outflow_per_s', 'lower_exponent', 'lower_datum_v', 'upper_brim_v', 'overflow_share', 'delay_samples']
+    state_names: typing.ClassVar[list] = ['upper_level_v', 'lower_level_v', 'pump_before_v', 'pump_before_that_v']
+    def __init__(self, *, lower_brim_v: typing.SupportsFloat | typing.SupportsIndex) -> None:
+        ...
+    def fit(self, *, base: collections.abc.Sequence[typing.SupportsFloat | typing.SupportsIndex], free: collections.abc.Sequence[str], records: collections.abc.Sequence[FreeRunRecord], dt_s: typing.SupportsFloat | typing.SupportsIndex, options: LeastSquaresOptions) -> FreeRunFit:
+        """
+        Levenberg-Marquardt on the free run with exact sensitivities; releases the GIL.
+        """
+    def free_run(self, *, parameters: collections.abc.Sequence[typing.SupportsFloat | typing.SupportsIndex], start: collections.abc.Sequence[typing.SupportsFloat | typing.SupportsIndex], input: typing.Annotated[numpy.typing.ArrayLike, numpy.float64], dt_s: typing.SupportsFloat | typing.SupportsIndex) -> numpy.typing.NDArray[numpy.float64]:
+        """
+        Output at every sample.
+        """
+class WienerHammerstein:
+    """
+    Filter, static curve, filter.
+    """
+    def __init__(self, *, first_order: typing.SupportsInt | typing.SupportsIndex, last_order: typing.SupportsInt | typing.SupportsIndex, n_curve: typing.SupportsInt | typing.SupportsIndex, lower: typing.SupportsFloat | typing.SupportsIndex, upper: typing.SupportsFloat | typing.SupportsIndex) -> None:
+        ...
+    def curve(self, parameters: typing.Annotated[numpy.typing.ArrayLike, numpy.float64, "[m, 1]"], x: typing.Annotated[numpy.typing.ArrayLike, numpy.float64, "[m, 1]"]) -> typing.Annotated[numpy.typing.NDArray[numpy.float64], "[m, 1]"]:
+        """
+        The static curve.
+        """
+    def fit(self, *, start: typing.Annotated[numpy.typing.ArrayLike, numpy.float64, "[m, 1]"], input: typing.Annotated[numpy.typing.ArrayLike, numpy.float64, "[m, 1]"], output: typing.Annotated[numpy.typing.ArrayLike, numpy.float64, "[m, 1]"], skip: typing.SupportsInt | typing.SupportsIndex, options: LeastSquaresOptions) -> FitReport:
+        """
+        Levenberg-Marquardt on the response with exact derivatives; releases the GIL.
+        """
+    def simulate(self, parameters: typing.Annotated[numpy.typing.ArrayLike, numpy.float64, "[m, 1]"], input: typing.Annotated[numpy.typing.ArrayLike, numpy.float64, "[m, 1]"]) -> typing.Annotated[numpy.typing.NDArray[numpy.float64], "[m, 1]"]:
+        """
+        Response from rest.
+        """
+    @property
+    def lower(self) -> float:
+        ...
+    @property
+    def names(self) -> list[str]:
+        ...
+    @property
+    def upper(self) -> float:
         ...
 class SensorDynamics:
     """
@@ -2181,6 +2490,10 @@ def estimate_burn(trace: MeasuredCycle, cylinder: Cylinder) -> LoadBurn:
     """
     A start from the trace's heat release.
     """
+def filter_series(b: typing.Annotated[numpy.typing.ArrayLike, numpy.float64, "[m, 1]"], a: typing.Annotated[numpy.typing.ArrayLike, numpy.float64, "[m, 1]"], u: typing.Annotated[numpy.typing.ArrayLike, numpy.float64, "[m, 1]"]) -> typing.Annotated[numpy.typing.NDArray[numpy.float64], "[m, 1]"]:
+    """
+    B/A u from rest.
+    """
 def fit_cylinder(traces: collections.abc.Sequence[MeasuredCycle], cylinder: Cylinder, start: collections.abc.Sequence[LoadBurn], free: collections.abc.Sequence[str], step_cad: typing.SupportsFloat | typing.SupportsIndex, integrator: str, max_iterations: typing.SupportsInt | typing.SupportsIndex) -> CylinderFit:
     """
     Levenberg-Marquardt with exact sensitivities; releases the GIL.
@@ -2188,6 +2501,10 @@ def fit_cylinder(traces: collections.abc.Sequence[MeasuredCycle], cylinder: Cyli
 def fit_nox_proxy(t_max_k: typing.Annotated[numpy.typing.ArrayLike, numpy.float64], nox_ppm: typing.Annotated[numpy.typing.ArrayLike, numpy.float64], map: str, reference_temperature_k: typing.SupportsFloat | typing.SupportsIndex) -> NoxFit:
     """
     Least squares on ln NOx; use mgdd.engine.fit_nox_proxy.
+    """
+def fit_pseudo_wiener(*, kind: str, records: collections.abc.Sequence[tuple[typing.Annotated[numpy.typing.ArrayLike, numpy.float64], typing.Annotated[numpy.typing.ArrayLike, numpy.float64]]], parameters: collections.abc.Mapping[str, typing.SupportsFloat | typing.SupportsIndex], sides: str, free: collections.abc.Sequence[str], delays: collections.abc.Sequence[typing.SupportsInt | typing.SupportsIndex], starts: typing.SupportsInt | typing.SupportsIndex, seed: typing.SupportsInt | typing.SupportsIndex, only_given_start: bool, try_map_start: bool, max_iterations: typing.SupportsInt | typing.SupportsIndex) -> tuple[dict, FitReport, numpy.typing.NDArray[numpy.float64], int]:
+    """
+    Output-error fit from several starts: parameters, report, RMSE of every search, hits of the best.
     """
 def fit_smooth_throttle(duty: typing.Annotated[numpy.typing.ArrayLike, numpy.float64], angle_deg: typing.Annotated[numpy.typing.ArrayLike, numpy.float64], *, starts: collections.abc.Sequence[typing.Annotated[collections.abc.Sequence[typing.SupportsFloat | typing.SupportsIndex], "FixedSize(10)"]], lower: typing.Annotated[collections.abc.Sequence[typing.SupportsFloat | typing.SupportsIndex], "FixedSize(10)"], upper: typing.Annotated[collections.abc.Sequence[typing.SupportsFloat | typing.SupportsIndex], "FixedSize(10)"], step_s: typing.SupportsFloat | typing.SupportsIndex, start: typing.Annotated[collections.abc.Sequence[typing.SupportsFloat | typing.SupportsIndex], "FixedSize(3)"], inertia_kgm2: typing.SupportsFloat | typing.SupportsIndex, gear_ratio: typing.SupportsFloat | typing.SupportsIndex, inductance_h: typing.SupportsFloat | typing.SupportsIndex, supply_v: typing.SupportsFloat | typing.SupportsIndex, cost_tolerance: typing.SupportsFloat | typing.SupportsIndex, lanes: bool) -> dict:
     """
@@ -2231,6 +2548,14 @@ def processor_simd_levels() -> list[str]:
     """
     Vector instruction sets of this processor.
     """
+def pseudo_wiener_of(throttle: Throttle) -> PseudoWienerModel:
+    """
+    PW-R with the groups of a first-principle throttle.
+    """
+def pseudo_wiener_units(kind: str) -> dict:
+    """
+    Unit of every parameter.
+    """
 @typing.overload
 def run_loop(bench: EngineBench, seeker: ExtremumSeeking, cycles: typing.SupportsInt | typing.SupportsIndex, *, optimum_cad: typing.SupportsFloat | typing.SupportsIndex, arrival_cad: typing.SupportsFloat | typing.SupportsIndex, tail_cycles: typing.SupportsInt | typing.SupportsIndex, exceed_from: typing.SupportsInt | typing.SupportsIndex, exceed_above: collections.abc.Sequence[typing.SupportsFloat | typing.SupportsIndex]) -> dict:
     """
@@ -2265,6 +2590,10 @@ def scan(cylinder: Cylinder, point: OperatingPoint, soc_cad: typing.Annotated[nu
     """
     Indicators over a column of timings; releases the GIL.
     """
+def sense_throttle(pair: SensorPair, angle_deg: typing.Annotated[numpy.typing.ArrayLike, numpy.float64], *, sample_s: typing.SupportsFloat | typing.SupportsIndex, seed: typing.SupportsInt | typing.SupportsIndex, faults: typing.Annotated[collections.abc.Sequence[tuple[str, typing.SupportsFloat | typing.SupportsIndex, typing.SupportsFloat | typing.SupportsIndex]], "FixedSize(2)"]) -> dict:
+    """
+    Samples of both sensors; behind mgdd.throttle.sense.
+    """
 def sensitivities(cylinder: Cylinder, point: OperatingPoint, soc_cad: typing.SupportsFloat | typing.SupportsIndex, names: collections.abc.Sequence[str], step_cad: typing.SupportsFloat | typing.SupportsIndex, integrator: str) -> dict:
     """
     Exact derivatives of indicators and pressure.
@@ -2277,21 +2606,21 @@ def simulate_smooth_throttle(parameters: typing.Annotated[collections.abc.Sequen
     """
     Angle [deg] on every sample; releases the GIL.
     """
-def simulate_throttle_groups(values: typing.Annotated[collections.abc.Sequence[typing.SupportsFloat | typing.SupportsIndex], "FixedSize(9)"], duty: typing.Annotated[numpy.typing.ArrayLike, numpy.float64], *, step_s: typing.SupportsFloat | typing.SupportsIndex, start: typing.Annotated[collections.abc.Sequence[typing.SupportsFloat | typing.SupportsIndex], "FixedSize(3)"], closed_deg: typing.SupportsFloat | typing.SupportsIndex, open_deg: typing.SupportsFloat | typing.SupportsIndex, ramp_deg: typing.SupportsFloat | typing.SupportsIndex, substeps: typing.SupportsInt | typing.SupportsIndex) -> numpy.typing.NDArray[numpy.float64]:
-    """
-    Angle [deg] on every sample; releases the GIL.
-    """
-def smooth_throttle_instruction_set() -> str:
-    """
-    Instruction set that the kernel chose on this machine.
-    """
 def simulate_throttle(throttle: Throttle, duty: typing.Annotated[numpy.typing.ArrayLike, numpy.float64], *, sample_s: typing.SupportsFloat | typing.SupportsIndex, start_deg: typing.SupportsFloat | typing.SupportsIndex, bridge: str, supply_v: typing.Annotated[numpy.typing.ArrayLike, numpy.float64], airflow_torque_nm: typing.Annotated[numpy.typing.ArrayLike, numpy.float64], step_s: typing.SupportsFloat | typing.SupportsIndex) -> dict:
     """
     One throttle over columns, from rest; behind mgdd.throttle.simulate.
     """
+def simulate_throttle_groups(values: typing.Annotated[collections.abc.Sequence[typing.SupportsFloat | typing.SupportsIndex], "FixedSize(9)"], duty: typing.Annotated[numpy.typing.ArrayLike, numpy.float64], *, step_s: typing.SupportsFloat | typing.SupportsIndex, start: typing.Annotated[collections.abc.Sequence[typing.SupportsFloat | typing.SupportsIndex], "FixedSize(3)"], closed_deg: typing.SupportsFloat | typing.SupportsIndex, open_deg: typing.SupportsFloat | typing.SupportsIndex, ramp_deg: typing.SupportsFloat | typing.SupportsIndex, substeps: typing.SupportsInt | typing.SupportsIndex) -> numpy.typing.NDArray[numpy.float64]:
+    """
+    Angle [deg] on every sample; releases the GIL.
+    """
 def simulate_throttle_many(throttles: collections.abc.Sequence[Throttle], duty: typing.Annotated[numpy.typing.ArrayLike, numpy.float64], *, sample_s: typing.SupportsFloat | typing.SupportsIndex, start_deg: typing.Annotated[numpy.typing.ArrayLike, numpy.float64], bridge: str, supply_v: typing.Annotated[numpy.typing.ArrayLike, numpy.float64], airflow_torque_nm: typing.Annotated[numpy.typing.ArrayLike, numpy.float64], step_s: typing.SupportsFloat | typing.SupportsIndex) -> numpy.typing.NDArray[numpy.float64]:
     """
     Many throttles under one input, in lanes; behind mgdd.throttle.simulate_many.
+    """
+def smooth_throttle_instruction_set() -> str:
+    """
+    Instruction set that the kernel chose on this machine.
     """
 def start_of_combustion(cylinder: Cylinder, point: OperatingPoint, soi_cad: typing.SupportsFloat | typing.SupportsIndex) -> dict:
     """
@@ -2301,13 +2630,13 @@ def start_of_injection(cylinder: Cylinder, point: OperatingPoint, soc_cad: typin
     """
     SOC to SOI.
     """
-def throttle_group_bounds() -> list:
-    """
-    The nine groups with their bounds.
-    """
 def throttle_airflow_torque(throttle: Throttle, angle_deg: typing.Annotated[numpy.typing.ArrayLike, numpy.float64]) -> numpy.typing.NDArray[numpy.float64]:
     """
     Torque of the modelled air flow [N m]; behind mgdd.throttle.airflow_torque_nm.
+    """
+def throttle_group_bounds() -> list:
+    """
+    The nine groups with their bounds.
     """
 def tune(*, noise_sd: typing.SupportsFloat | typing.SupportsIndex, curvature: typing.SupportsFloat | typing.SupportsIndex, method: str, delay_cycles: typing.SupportsFloat | typing.SupportsIndex, lag_cycles: typing.SupportsFloat | typing.SupportsIndex, compensated: bool, rms: typing.SupportsFloat | typing.SupportsIndex | None, cycles: typing.SupportsFloat | typing.SupportsIndex | None, distance: typing.SupportsFloat | typing.SupportsIndex | None, arrival: typing.SupportsFloat | typing.SupportsIndex | None, amplitude_max: typing.SupportsFloat | typing.SupportsIndex | None) -> dict:
     """
@@ -2335,6 +2664,7 @@ def woschni_coefficient(c1_bar_m: typing.Annotated[numpy.typing.ArrayLike, numpy
     """
 __version__: str = '0.1.0'
 correlation_limit: float = 0.98
+sensor_fault_kinds: tuple = ('none', 'open_wire', 'short_to_ground', 'short_to_supply', 'offset', 'gain', 'stuck')
 smooth_throttle_example: tuple = (0.016, 0.004, 0.12, 0.5, 0.12, 0.25, 0.02, 0.14, 0.016, 1.2)
 smooth_throttle_names: tuple = ('torque_constant_nm_per_a', 'viscous_nms_per_rad', 'coulomb_nm', 'friction_width_rad_per_s', 'spring_nm_per_rad', 'preload_nm', 'preload_width_rad', 'limp_home_rad', 'emf_constant_vs_per_rad', 'resistance_ohm')
 throttle_group_names: tuple = ('tau_s', 'gain_deg_per_s2_per_duty', 'beta_above_duty', 'kappa_above_duty_per_deg', 'delta_duty', 'beta_below_duty', 'kappa_below_duty_per_deg', 'limp_home_deg', 'electrical_s')
