@@ -157,7 +157,8 @@ def test_online_update_refuses_what_it_cannot_do() -> None:
 
 def test_the_study_ranks_the_kinds() -> None:
     result = run_ch7_pseudo_wiener(starts=4, quick=True)
-    rows = {(row["plant"], row["model"]): row for row in result.summary["rows"]}
+    rows = {(row["plant"], row["model"]): row for row in result.summary["rows"] if row["lag_start"] != "best"}
+    better = {(row["plant"], row["model"]): row for row in result.summary["rows"] if row["lag_start"] == "best"}
     printed = {"P1": {"pw_r": 99.4, "pw_w": 79.7, "pw_p": 53.7}, "P2": {"pw_r": 99.4, "pw_w": 92.0, "pw_p": 82.4}}
     for plant, kinds in printed.items():
         for kind, train in kinds.items():
@@ -165,6 +166,12 @@ def test_the_study_ranks_the_kinds() -> None:
             assert row["fit_train_percent"] >= train - 0.05
             assert row["ahead_20_ms_deg"] < rows[plant, "persistence"]["ahead_20_ms_deg"]
         assert rows[plant, "pw_r"]["ahead_20_ms_deg"] <= 0.06
+    for case, row in better.items():
+        assert row["fit_train_percent"] >= rows[case]["fit_train_percent"] - 0.3
+    ahead = [rows["P1", kind]["ahead_20_ms_deg"] for kind in ("pw_r", "pw_w", "pw_p", "persistence")]
+    assert ahead == sorted(ahead)
+    assert 0.55 <= rows["P1", "pw_w"]["ahead_20_ms_deg"] <= 0.70
     assert rows["P1", "pw_r"]["fit_steps_percent"] >= 96.0
+    assert rows["P1", "pw_w"]["fit_steps_percent"] <= 50.0
     assert rows["P1", "persistence"]["ahead_20_ms_deg"] == pytest.approx(1.548, abs=0.01)
     assert len(result.figures) == 4

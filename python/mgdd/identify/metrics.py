@@ -21,7 +21,7 @@ _SHARE = 0.95
 
 
 def fit_percent(measured: ArrayLike, model: ArrayLike) -> float:
-    """Return 100 (1 - |y - yh| / |y - mean y|): 100 is perfect, 0 as good as the mean.
+    """Return ``100 (1 - |y - yh| / |y - mean y|)``: 100 is perfect, 0 as good as the mean.
 
     Parameters
     ----------

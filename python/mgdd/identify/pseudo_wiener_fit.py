@@ -60,6 +60,7 @@ def fit_pseudo_wiener(
     settings: Mapping[str, float] | None = None,
     starts: int | None = None,
     seed: int = 1,
+    lag_start: str = "best",
     max_iterations: int = 150,
 ) -> PseudoWienerFit:
     """Fit a pseudo-Wiener model in free run, from several starts.
@@ -89,6 +90,9 @@ def fit_pseudo_wiener(
         Searches per delay (PW-W and PW-P: per delay and start rule of the lags).
     seed : int
         Of the Latin hypercube of starts.
+    lag_start : {"best", "rest", "map"}
+        PW-W and PW-P: what the lags hold when a free run starts. ``rest``: no duty, as of a throttle that waits at
+        limp-home; ``map``: what the static map turns into the first angle; ``best``: whichever fits better.
     max_iterations : int
         Trial steps per search.
 
@@ -135,6 +139,10 @@ def fit_pseudo_wiener(
     values: dict[str, float] = {**base.at_sample(sample_s).parameters, "limp_home_deg": limp_home}
     if kind == "pw_p" and start is None:
         values["plays"] = float(plays)
+    if lag_start not in ("best", "rest", "map"):
+        raise ParameterError(f"lag_start = {lag_start!r}: must be one of best, rest, map")
+    if lag_start != "best" and "map_start" in values:
+        values["map_start"] = float(lag_start == "map")
     values |= {name: float(value) for name, value in (settings or {}).items()}
     delays = [delay_samples] if isinstance(delay_samples, int) else list(delay_samples)
     parameters, report, rmse, hits = _core.fit_pseudo_wiener(
@@ -147,7 +155,7 @@ def fit_pseudo_wiener(
         starts=_STARTS.get(kind, 1) if starts is None else starts,
         seed=seed,
         only_given_start=start is not None,
-        try_map_start=True,
+        try_map_start=lag_start == "best",
         max_iterations=max_iterations,
     )
     wrapped = FitReport.from_core(report, np.concatenate([angle for _, angle in columns]))
