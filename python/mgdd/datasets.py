@@ -318,7 +318,7 @@ def _emps_record(file: Path) -> xr.Dataset:
             "title": "electro-mechanical positioning system (EMPS)",
             "file": file.name,
             "citation": "A. Janot, M. Gautier, M. Brunot, Data Set and Reference Models of EMPS, Workshop on "
-            "Nonlinear System Identification Benchmarks, 2019",
+            "Nonlinear System Identification Benchmarks (workshop of 2019)",
             "licence": "Apache-2.0 of the redistributing repository forgi86/sysid-neural-continuous; the terms of "
             "the authors were not seen",
         },

@@ -53,9 +53,10 @@ def run_ch7_pseudo_wiener(
     StudyResult
         Rows ``plant model lag_start fit_train_percent fit_chirp_percent fit_steps_percent ahead_5_ms_deg
         ahead_20_ms_deg ahead_50_ms_deg starts hits``: free-run fits, and the RMS error against the true angle of the
-        prediction ``measured(k) + simulated(k + H) - simulated(k)`` on the validation chirp. ``hits`` counts the searches that
-        ended at the best fit. Every record starts at limp-home without duty, so ``lag_start`` is *rest* in the first
-        rows; *best* also lets the lags start from the first angle. The row *persistence* predicts that nothing moves.
+        prediction ``measured(k) + simulated(k + H) - simulated(k)`` on the validation chirp. ``hits`` counts the
+        searches that ended at the best fit. Every record starts at limp-home without duty, so ``lag_start`` is *rest*
+        in the first rows; *best* also lets the lags start from the first angle. The row *persistence* predicts that
+        nothing moves.
 
     Raises
     ------
