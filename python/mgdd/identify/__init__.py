@@ -7,16 +7,13 @@ from mgdd.identify.drive_axis import DriveFit, DriveModel, drive_free_run, drive
 from mgdd.identify.excitation import amplitude_random_steps, chirp, multisine, prbs, staircase, triangle
 from mgdd.identify.excitation_check import ExcitationCheck, check_excitation
 from mgdd.identify.excitation_design import design_excitation
-from mgdd.identify.first_principle import (
-    FirstPrincipleModel,
-    fit_throttle,
-    physical_parameters,
-    throttle_start,
-)
+from mgdd.identify.first_principle import fit_throttle, throttle_start
+from mgdd.identify.first_principle_model import FirstPrincipleModel
 from mgdd.identify.metrics import ResidualTests, fit_percent, mse, residual_tests, rmse, vaf_percent
 from mgdd.identify.n_step import n_step_rms, split_log
 from mgdd.identify.ode_fit import OdeFit, OdeModel, fit_ode
 from mgdd.identify.online_update import OnlineUpdate
+from mgdd.identify.physical_parameters import physical_parameters
 from mgdd.identify.profile import WallHeatProfile, wall_heat_profile
 from mgdd.identify.pseudo_wiener_fit import PseudoWienerFit, fit_pseudo_wiener
 from mgdd.identify.random_steps import random_step_records

@@ -2,136 +2,29 @@
 
 from __future__ import annotations
 
-import math
 from collections.abc import Mapping
-from dataclasses import dataclass
-from types import MappingProxyType
 from typing import TYPE_CHECKING
 
 import numpy as np
 
 from mgdd import _core
-from mgdd.errors import DataError, ParameterError, ShapeError
+from mgdd.errors import DataError, ParameterError
+from mgdd.identify.first_principle_model import GROUP_NAMES, FirstPrincipleModel, sample_step
+from mgdd.identify.first_principle_start import SIDE_DEG, regression_start, rest_angle, spread_starts
 from mgdd.identify.metrics import fit_percent
-from mgdd.identify.throttle_fit import FittedParameters, ThrottleFit
+from mgdd.identify.physical_parameters import physical_parameters
+from mgdd.identify.throttle_fit import ThrottleFit
 from mgdd.optimize import FitReport
 
 if TYPE_CHECKING:
     import xarray as xr
-    from numpy.typing import ArrayLike, NDArray
+    from numpy.typing import NDArray
 
-__all__ = ["FirstPrincipleModel", "fit_throttle", "physical_parameters", "throttle_start"]
+__all__ = ["fit_throttle", "throttle_start"]
 
-_NAMES = tuple(_core.throttle_group_names)
-_ABOVE = ("beta_above_duty", "kappa_above_duty_per_deg")
-_BELOW = ("beta_below_duty", "kappa_below_duty_per_deg")
-_SIDE_DEG = 1.0  # beyond it a sample belongs to one side of limp-home
-_SIDE_S = 0.3  # shorter visits cannot settle a side's two parameters
-
-
-@dataclass(frozen=True, kw_only=True)
-class FirstPrincipleModel:
-    """Throttle in groups: set-valued friction, springs with preload on both sides, motor as a torque source.
-
-    Parameters
-    ----------
-    parameters : mapping of str to float
-        ``tau_s``, ``gain_deg_per_s2_per_duty``, preload ``beta_above_duty`` / ``beta_below_duty``, stiffness
-        ``kappa_above_duty_per_deg`` / ``kappa_below_duty_per_deg``, friction ``delta_duty``, ``limp_home_deg`` and
-        ``electrical_s`` (L/R, 0 for none).
-    closed_deg, open_deg : float
-        Mechanical stops [deg].
-    ramp_deg : float
-        Half width of the preload's ramp at limp-home [deg].
-    substeps : int
-        Steps per sample.
-
-    Examples
-    --------
-    >>> from mgdd.identify import FirstPrincipleModel, throttle_start
-    >>> model = FirstPrincipleModel(parameters=throttle_start())
-    >>> model.simulate([0.0, 0.001, 0.002], [0.0, 0.0, 0.0], start_deg=8.0).tolist()
-    [8.0, 8.0, 8.0]
-    """
-
-    parameters: Mapping[str, float]
-    closed_deg: float = 0.0
-    open_deg: float = 90.0
-    ramp_deg: float = 0.25
-    substeps: int = 2
-
-    def __post_init__(self) -> None:
-        missing = set(_NAMES) - set(self.parameters)
-        if missing:
-            raise ParameterError(f"parameters: {', '.join(sorted(missing))} missing")
-        ordered = {name: float(self.parameters[name]) for name in _NAMES}
-        for name, value in ordered.items():
-            if not math.isfinite(value):
-                raise ParameterError(f"{name} = {value!r}: must be finite")
-        object.__setattr__(self, "parameters", MappingProxyType(ordered))
-
-    @property
-    def kind(self) -> str:
-        """``first_principle``."""
-        return "first_principle"
-
-    def simulate(self, time_s: ArrayLike, duty: ArrayLike, *, start_deg: float) -> NDArray[np.float64]:
-        """Run free from rest.
-
-        Parameters
-        ----------
-        time_s, duty : array_like, shape (n,)
-            Constant sample time [s]; duty [-], held to the next sample.
-        start_deg : float
-            Angle at the first sample [deg].
-
-        Returns
-        -------
-        ndarray, shape (n,)
-            Angle [deg] at every sample.
-        """
-        u = np.asarray(duty, dtype=np.float64)
-        return _core.simulate_throttle_groups(
-            list(self.parameters.values()),
-            np.clip(u, -1.0, 1.0),
-            step_s=_step(time_s, u.size),
-            start=[float(start_deg), 0.0, 0.0],
-            closed_deg=self.closed_deg,
-            open_deg=self.open_deg,
-            ramp_deg=self.ramp_deg,
-            substeps=self.substeps,
-        )
-
-    def predict(self, time_s: ArrayLike, duty: ArrayLike, angle_deg: ArrayLike, horizon: int) -> NDArray[np.float64]:
-        """Predict `horizon` samples ahead: the measured angle plus the free run's change over the horizon.
-
-        Parameters
-        ----------
-        time_s, duty, angle_deg : array_like, shape (n,)
-            Log [s, -, deg].
-        horizon : int
-            Samples, at least 1.
-
-        Returns
-        -------
-        ndarray, shape (n - horizon,)
-            Entry k is the angle [deg] at sample k + horizon.
-        """
-        measured = np.asarray(angle_deg, dtype=np.float64)
-        if not 1 <= horizon < measured.size:
-            raise ParameterError(f"horizon = {horizon}: must be within [1, {measured.size - 1}] samples")
-        run = self.simulate(time_s, duty, start_deg=float(measured[0]))
-        return measured[:-horizon] + run[horizon:] - run[:-horizon]
-
-    def to_toml(self) -> str:
-        """Write the parameters as TOML with their units.
-
-        Returns
-        -------
-        str
-            TOML for `FittedParameters.from_toml`.
-        """
-        return FittedParameters(kind=self.kind, values=self.parameters, source="model").to_toml()
+ABOVE = ("beta_above_duty", "kappa_above_duty_per_deg")
+BELOW = ("beta_below_duty", "kappa_below_duty_per_deg")
+SIDE_S = 0.3  # shorter visits cannot settle a side's two parameters
 
 
 def throttle_start() -> dict[str, float]:
@@ -149,7 +42,7 @@ def throttle_start() -> dict[str, float]:
     0.03
     """
     values = (0.03, 5e4, 0.1, 1e-3, 0.05, 0.1, 1e-3, 8.0, 0.0)
-    return dict(zip(_NAMES, values, strict=True))
+    return dict(zip(GROUP_NAMES, values, strict=True))
 
 
 def fit_throttle(
@@ -236,45 +129,45 @@ def fit_throttle(
     >>> bool(fit.fit_percent_train > 99.0)
     True
     """
-    time, duty, angle = _columns(log)
-    step_s = _step(time, time.size)
+    time, duty, angle = log_columns(log)
+    step_s = sample_step(time, time.size)
     for name in [*(start or {}), *(fixed or {})]:
-        if name not in _NAMES:
-            raise ParameterError(f"{name!r}: no throttle group; they are {', '.join(_NAMES)}")
+        if name not in GROUP_NAMES:
+            raise ParameterError(f"{name!r}: no throttle group; they are {', '.join(GROUP_NAMES)}")
     if n_starts < 1 or threads < 1:
         raise ParameterError(f"n_starts = {n_starts}, threads = {threads}: must be >= 1")
     if np.ptp(angle) < 1.0:
         raise DataError(f"angle_deg moves by {np.ptp(angle):.3g} deg: drive the plate, mgdd.identify.design_excitation")
     values = throttle_start()
-    values["limp_home_deg"] = _limp_home(step_s, duty, angle, values["limp_home_deg"])
+    values["limp_home_deg"] = rest_angle(step_s, duty, angle, values["limp_home_deg"])
     values |= {name: float(value) for name, value in {**(start or {}), **(fixed or {})}.items()}
     findings: list[str] = []
     unvisited: list[str] = []
-    free = [name for name in _NAMES if name not in (fixed or {})]
+    free = [name for name in GROUP_NAMES if name not in (fixed or {})]
     if not electrical and "electrical_s" in free:
         free.remove("electrical_s")
     sides = {
-        "above": (angle > values["limp_home_deg"] + _SIDE_DEG, _ABOVE),
-        "below": (angle < values["limp_home_deg"] - _SIDE_DEG, _BELOW),
+        "above": (angle > values["limp_home_deg"] + SIDE_DEG, ABOVE),
+        "below": (angle < values["limp_home_deg"] - SIDE_DEG, BELOW),
     }
     for side, (visited, names) in sides.items():
-        if np.count_nonzero(visited) * step_s < _SIDE_S:
+        if np.count_nonzero(visited) * step_s < SIDE_S:
             gone = [name for name in (*names, "limp_home_deg") if name in free]
             free = [name for name in free if name not in gone]
             unvisited += gone
             findings.append(
-                f"the plate spends less than {_SIDE_S:g} s {side} limp-home ({values['limp_home_deg']:.3g} deg): "
+                f"the plate spends less than {SIDE_S:g} s {side} limp-home ({values['limp_home_deg']:.3g} deg): "
                 f"{', '.join(gone) or 'that side'} kept at the start value; an excitation across limp-home would tell"
             )
     if start is None:
-        values |= _regression(step_s, duty, angle, values, free, closed_deg, open_deg)
+        values |= regression_start(step_s, duty, angle, values, free, closed_deg, open_deg)
     bounds = {parameter.name: parameter for parameter in _core.throttle_group_bounds()}
     for name, value in values.items():
         low, high = bounds[name].lower, bounds[name].upper
         if (name in (start or {}) or name in (fixed or {})) and not low <= value <= high:
             raise ParameterError(f"{name} = {value!r}: must be within [{low:g}, {high:g}]")
         values[name] = min(max(value, low), high)
-    index = {name: i for i, name in enumerate(_NAMES)}
+    index = {name: i for i, name in enumerate(GROUP_NAMES)}
     static = [index[name] for name in free if name not in ("tau_s", "gain_deg_per_s2_per_duty", "electrical_s")]
     dynamics = [index[name] for name in free if name in ("tau_s", "gain_deg_per_s2_per_duty")]
     everything = [index[name] for name in free]
@@ -293,7 +186,7 @@ def fit_throttle(
     found = _core.fit_throttle_groups(
         [(step_s, np.clip(duty, -1.0, 1.0), angle, [float(angle[0]), 0.0, 0.0], 0, False)],
         stages=stages,
-        starts=_starts(values, free, bounds, n_starts, seed),
+        starts=spread_starts(values, free, bounds, n_starts, seed),
         closed_deg=closed_deg,
         open_deg=open_deg,
         ramp_deg=0.25,
@@ -302,7 +195,7 @@ def fit_throttle(
     )
     report = FitReport.from_core(found["reports"][found["best"]], angle)
     model = FirstPrincipleModel(
-        parameters=dict(zip(_NAMES, found["values"], strict=True)), closed_deg=closed_deg, open_deg=open_deg
+        parameters=dict(zip(GROUP_NAMES, found["values"], strict=True)), closed_deg=closed_deg, open_deg=open_deg
     )
     findings += report.findings
     if n_starts > 1:
@@ -323,7 +216,7 @@ def fit_throttle(
         findings.append("physical numbers: " + ", ".join(f"{name} {value:.4g}" for name, value in physical.items()))
     fit_test, rmse_test = None, None
     if test is not None:
-        test_time, test_duty, test_angle = _columns(test)
+        test_time, test_duty, test_angle = log_columns(test)
         run = model.simulate(test_time, test_duty, start_deg=float(test_angle[0]))
         fit_test, rmse_test = fit_percent(test_angle, run), float(np.sqrt(np.mean((run - test_angle) ** 2)))
     run = model.simulate(time, duty, start_deg=float(angle[0]))
@@ -341,76 +234,7 @@ def fit_throttle(
     )
 
 
-def physical_parameters(
-    model: FirstPrincipleModel,
-    *,
-    resistance_ohm: float,
-    supply_v: float,
-    inertia_kgm2: float | None = None,
-    torque_constant_nm_per_a: float | None = None,
-) -> dict[str, float]:
-    """Compute physical numbers back from groups: g = K V/R and G = g/J leave one number to be known.
-
-    Parameters
-    ----------
-    model : FirstPrincipleModel
-        Groups.
-    resistance_ohm, supply_v : float
-        Measured at the terminals [ohm, V].
-    inertia_kgm2, torque_constant_nm_per_a : float
-        Exactly one of them [kg m², N m/A at the plate].
-
-    Returns
-    -------
-    dict of str to float
-        Inertia, torque constant, viscous friction (without back-EMF), springs, preloads and Coulomb friction, all at
-        the plate shaft.
-
-    Raises
-    ------
-    ParameterError
-        A number that is not positive, or none or both of the two.
-
-    Examples
-    --------
-    >>> from mgdd.identify import FirstPrincipleModel, physical_parameters, throttle_start
-    >>> model = FirstPrincipleModel(parameters=throttle_start())
-    >>> found = physical_parameters(model, resistance_ohm=1.5, supply_v=12.0, inertia_kgm2=0.0021)
-    >>> round(found["torque_constant_nm_per_a"], 4)
-    0.2291
-    """
-    known = {
-        "resistance_ohm": resistance_ohm,
-        "supply_v": supply_v,
-        "inertia_kgm2": inertia_kgm2,
-        "torque_constant_nm_per_a": torque_constant_nm_per_a,
-    }
-    for name, value in known.items():
-        if value is not None and not (math.isfinite(value) and value > 0.0):
-            raise ParameterError(f"{name} = {value!r}: must be > 0")
-    if (inertia_kgm2 is None) == (torque_constant_nm_per_a is None):
-        raise ParameterError("inertia_kgm2, torque_constant_nm_per_a: give exactly one of them")
-    p = model.parameters
-    gain = math.radians(p["gain_deg_per_s2_per_duty"])
-    if torque_constant_nm_per_a is not None:
-        stall = torque_constant_nm_per_a * supply_v / resistance_ohm
-    else:
-        stall = gain * float(inertia_kgm2 or math.nan)
-    inertia = stall / gain
-    constant = stall * resistance_ohm / supply_v
-    return {
-        "inertia_kgm2": inertia,
-        "torque_constant_nm_per_a": constant,
-        "viscous_nms_per_rad": inertia / p["tau_s"] - constant**2 / resistance_ohm,
-        "spring_above_nm_per_rad": math.degrees(p["kappa_above_duty_per_deg"]) * stall,
-        "spring_below_nm_per_rad": math.degrees(p["kappa_below_duty_per_deg"]) * stall,
-        "preload_above_nm": p["beta_above_duty"] * stall,
-        "preload_below_nm": p["beta_below_duty"] * stall,
-        "coulomb_nm": p["delta_duty"] * stall,
-    }
-
-
-def _columns(log: xr.Dataset) -> tuple[NDArray[np.float64], NDArray[np.float64], NDArray[np.float64]]:
+def log_columns(log: xr.Dataset) -> tuple[NDArray[np.float64], NDArray[np.float64], NDArray[np.float64]]:
     for name in ("time_s", "duty", "angle_deg"):
         if name not in log:
             raise DataError(f"log has no {name}: mgdd.io.read_throttle_log and throttle_log make one")
@@ -421,101 +245,3 @@ def _columns(log: xr.Dataset) -> tuple[NDArray[np.float64], NDArray[np.float64],
     if time.size < 100:
         raise DataError(f"log has {time.size} samples: at least 100 are needed")
     return time, duty, angle
-
-
-def _step(time_s: ArrayLike, size: int) -> float:
-    time = np.asarray(time_s, dtype=np.float64)
-    if time.ndim != 1 or time.size != size or size < 2:
-        raise ShapeError(f"time_s has shape {time.shape}, duty {size} values: must be equal and at least 2")
-    steps = np.diff(time)
-    if steps.min() <= 0.0 or np.ptp(steps) > 1e-3 * steps.mean():
-        raise DataError("time_s: must rise in equal steps; read_throttle_log(..., step_s=...) resamples")
-    return float((time[-1] - time[0]) / (size - 1))
-
-
-def _limp_home(step_s: float, duty: NDArray[np.float64], angle: NDArray[np.float64], otherwise: float) -> float:
-    """Angle at the end of the longest rest without duty, if it lasts half a second."""
-    edges = np.flatnonzero(np.diff(np.concatenate([[0], (np.abs(duty) < 0.01).astype(int), [0]])))
-    begins, ends = edges[::2], edges[1::2]
-    if begins.size == 0:
-        return otherwise
-    longest = int(np.argmax(ends - begins))
-    tail = angle[max(begins[longest], ends[longest] - round(0.1 / step_s)) : ends[longest]]
-    at_rest = (ends[longest] - begins[longest]) * step_s >= 0.5 and np.ptp(tail) < 0.5
-    return float(np.median(tail)) if at_rest else otherwise
-
-
-def _regression(
-    step_s: float,
-    duty: NDArray[np.float64],
-    angle: NDArray[np.float64],
-    values: Mapping[str, float],
-    free: list[str],
-    closed_deg: float,
-    open_deg: float,
-) -> dict[str, float]:
-    """Torque balance of the moving samples: u = +-beta + kappa x + delta sign(w) + w/(G tau) + dw/dt/G."""
-    half = max(3, round(0.010 / step_s))
-    if angle.size < 10 * half:
-        return {}
-    grid = step_s * np.arange(-half, half + 1)
-    weights = np.linalg.pinv(np.vander(grid, 4, increasing=True))
-    smooth, speed, push = (
-        np.convolve(angle, scale * weights[order][::-1], mode="valid")
-        for order, scale in ((0, 1.0), (1, 1.0), (2, 2.0))
-    )
-    u = np.convolve(duty, np.full(2 * half + 1, 1.0 / (2 * half + 1)), mode="valid")
-    x = smooth - values["limp_home_deg"]
-    inside = (smooth > closed_deg + 1.0) & (smooth < open_deg - 1.0) & (np.abs(x) > _SIDE_DEG)
-    # A window that holds a reversal, or starts from rest, has no single friction sign.
-    moving = np.minimum.reduce([np.abs(np.roll(speed, shift)) for shift in (-half, 0, half)]) > 5.0
-    steady = np.sign(np.roll(speed, -half)) == np.sign(np.roll(speed, half))
-    chosen = inside & moving & steady
-    if np.count_nonzero(chosen) < 50:
-        return {}
-    above = x > 0.0
-    columns = {
-        "beta_above_duty": above * 1.0,
-        "kappa_above_duty_per_deg": above * x,
-        "beta_below_duty": ~above * -1.0,
-        "kappa_below_duty_per_deg": ~above * x,
-        "delta_duty": np.sign(speed),
-        "damping": speed,
-        "inertia": push,
-    }
-    names = [name for name in columns if name in free or name in ("damping", "inertia")]
-    matrix = np.column_stack([columns[name][chosen] for name in names])
-    target = u[chosen] - sum(
-        values[name] * columns[name][chosen] for name in columns if name in values and name not in names
-    )
-    solution = dict(zip(names, np.linalg.lstsq(matrix, target, rcond=None)[0].tolist(), strict=True))
-    inertia, damping = solution.pop("inertia"), solution.pop("damping")
-    found = {name: value for name, value in solution.items() if value > 0.0}
-    if inertia > 0.0 and "gain_deg_per_s2_per_duty" in free:
-        found["gain_deg_per_s2_per_duty"] = 1.0 / inertia
-        if damping > 0.0 and "tau_s" in free:
-            found["tau_s"] = inertia / damping
-    return found
-
-
-def _starts(
-    values: Mapping[str, float], free: list[str], bounds: Mapping[str, _core.Parameter], n_starts: int, seed: int
-) -> list[list[float]]:
-    first = [values[name] for name in _NAMES]
-    if n_starts == 1:
-        return [first]
-    around = [name for name in free if bounds[name].log_scaled]
-    box = [
-        _core.Parameter(
-            name=name,
-            lower=max(bounds[name].lower, 0.5 * values[name]),
-            upper=min(bounds[name].upper, 2.0 * values[name]),
-            log_scaled=True,
-        )
-        for name in around
-    ]
-    starts = [first]
-    for point in _core.latin_hypercube(box, n_starts - 1, seed):
-        other = dict(values) | dict(zip(around, np.asarray(point).tolist(), strict=True))
-        starts.append([other[name] for name in _NAMES])
-    return starts

@@ -7,7 +7,8 @@ from pathlib import Path
 from typing import TYPE_CHECKING
 
 from mgdd.errors import ParameterError
-from mgdd.identify.first_principle import FirstPrincipleModel, fit_throttle
+from mgdd.identify.first_principle import fit_throttle
+from mgdd.identify.first_principle_model import FirstPrincipleModel
 from mgdd.identify.pseudo_wiener_fit import fit_pseudo_wiener
 from mgdd.identify.throttle_fit import FittedParameters, ThrottleFit, ThrottleModel
 from mgdd.throttle import PseudoWiener
