@@ -40,6 +40,15 @@ def add(verbs: Any) -> None:
         "--limp-home-deg", type=float, metavar="X", help="limp-home angle [deg] (default: from the log, or the model's)"
     )
     fit.add_argument("--two-sided", action="store_true", help="fit both sides of limp-home")
+    fit.add_argument("--closed-deg", type=float, default=0.0, metavar="X", help="lower end stop [deg] (default: 0)")
+    fit.add_argument("--open-deg", type=float, default=90.0, metavar="X", help="upper end stop [deg] (default: 90)")
+    fit.add_argument(
+        "--delay-samples",
+        type=_counts,
+        default=0,
+        metavar="N[,N...]",
+        help="samples until the duty acts; of several the best",
+    )
     fit.add_argument("--seed", type=int, default=0, metavar="N", help="of the starts (default: 0)")
     fit.add_argument("--figure", metavar="FILE", help="draw the validation (.png, .svg or .pdf)")
     add_log_options(fit)
@@ -54,21 +63,29 @@ def add(verbs: Any) -> None:
     add_log_options(check)
 
 
+def _counts(text: str) -> list[int]:
+    try:
+        return [int(part) for part in text.split(",")]
+    except ValueError:
+        raise argparse.ArgumentTypeError(f"{text!r}: must be whole numbers, for example 0,2,4") from None
+
+
 def _identify(args: argparse.Namespace) -> None:
     check_ending(args.output, (".toml", ".json"))
     check_figure(args.figure)
     log = log_of(args, args.file)
     test = None if args.test is None else log_of(args, args.test)
     fit = identify.identify_throttle(
-        log, args.model, test=test, limp_home_deg=args.limp_home_deg, two_sided=args.two_sided, seed=args.seed
-    )
-    validation = identify.validate_throttle(fit, log if test is None else test)
-    payload = fit.to_dict() | {"validation": validation.to_dict()}
+        log, args.model, test=test, limp_home_deg=args.limp_home_deg, two_sided=args.two_sided,
+        closed_deg=args.closed_deg, open_deg=args.open_deg, delay_samples=args.delay_samples, seed=args.seed,
+    )  # fmt: skip
     own = args.output if args.output is not None and Path(args.output).suffix == ".toml" else None
     if own is not None:
         Path(own).write_text(fit.to_toml(), encoding="utf-8", newline="\n")
         wrote(own)
         args.output = None
+    validation = identify.validate_throttle(fit, log if test is None else test)
+    payload = fit.to_dict() | {"validation": validation.to_dict()}
     emit(args, payload, text=f"{fit.summary()}\n\n{validation.summary()}")
     if args.figure:
         _draw(validation, args.figure, identify.correlation_dataset(fit.report))

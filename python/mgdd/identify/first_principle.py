@@ -230,7 +230,7 @@ def fit_throttle(
         parameters=dict(model.parameters),
         unidentifiable=(*unvisited, *report.unidentifiable),
         findings=tuple(findings),
-        source=str(log.attrs.get("source", "log")),
+        source=str(log.attrs.get("file", "log")),
     )
 
 

@@ -70,7 +70,7 @@ def n_step_rms(
     model: ThrottleModel,
     log: xr.Dataset,
     *,
-    horizons_s: Sequence[float] = HORIZONS_S,
+    horizons_s: Sequence[float] | None = None,
     true_deg: ArrayLike | None = None,
 ) -> xr.Dataset:
     """Give the error of predictions that start anew from the measurement at every sample.
@@ -82,7 +82,7 @@ def n_step_rms(
     log : xarray.Dataset
         A throttle log.
     horizons_s : sequence of float
-        How far ahead [s]; whole numbers of samples.
+        How far ahead [s]; whole numbers of samples. None: 5, 20 and 50 ms, each as the nearest whole sample.
     true_deg : array_like, optional
         True angle [deg] to compare with, where it is known; None compares with the measured one.
 
@@ -114,6 +114,7 @@ def n_step_rms(
     time, duty, angle = columns_of(log)
     truth = angle if true_deg is None else np.asarray(true_deg, dtype=np.float64)
     step = step_of(time)
+    horizons_s = whole_horizons(step, time.size) if horizons_s is None else horizons_s
     skip = round(DISCARD_S / step)
     table = np.empty((2, len(horizons_s)))
     for at, horizon in enumerate(horizons_s):
@@ -139,6 +140,12 @@ def columns_of(log: xr.Dataset) -> tuple[NDArray[np.float64], NDArray[np.float64
 
 def step_of(time: NDArray[np.float64]) -> float:
     return float(time[-1] - time[0]) / (time.size - 1)
+
+
+def whole_horizons(step_s: float, size: int) -> tuple[float, ...]:
+    """5, 20 and 50 ms in whole samples, at least one; what a log samples too coarsely or is too short for falls out."""
+    samples = sorted({max(1, round(horizon / step_s)) for horizon in HORIZONS_S})
+    return tuple(n * step_s for n in samples if n <= max(1, size // 2))
 
 
 def samples_of(horizon_s: float, step_s: float, size: int) -> int:

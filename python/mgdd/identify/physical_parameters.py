@@ -5,6 +5,7 @@ from __future__ import annotations
 import math
 
 from mgdd.errors import ParameterError
+from mgdd.identify.first_principle_model import FirstPrincipleModel
 
 __all__ = ["physical_parameters"]
 

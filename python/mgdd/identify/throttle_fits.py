@@ -15,26 +15,56 @@ from mgdd.throttle import PseudoWiener
 
 if TYPE_CHECKING:
     import os
+    from collections.abc import Sequence
 
     import xarray as xr
 
-__all__ = ["fit_kind", "load_throttle_model"]
+__all__ = ["check_kind", "fit_kind", "load_throttle_model"]
 
 _STARTS = 4
+_WORTH = 0.97
 _TRAVEL = ("closed_deg", "open_deg")
 
 
 def fit_kind(
-    log: xr.Dataset, kind: str, *, limp_home_deg: float | None, two_sided: bool, starts: int | None, seed: int
+    log: xr.Dataset,
+    kind: str,
+    *,
+    limp_home_deg: float | None,
+    two_sided: bool,
+    delay_samples: int | Sequence[int],
+    stops_deg: tuple[float, float],
+    starts: int | None,
+    seed: int,
 ) -> ThrottleFit:
     """Fit a kind with what the front knows; what is None keeps the fit's own default."""
+    closed, opened = stops_deg
     if kind == "first_principle":
         fixed = None if limp_home_deg is None else {"limp_home_deg": limp_home_deg}
-        return fit_throttle(log, fixed=fixed, n_starts=starts or _STARTS, seed=seed)
-    if two_sided and kind != "pw_r":
-        raise ParameterError(f"two_sided = True: {kind} has one set of parameters; only pw_r has one per side")
+        fits = [
+            fit_throttle(
+                log, fixed=fixed, electrical=electrical, n_starts=starts or _STARTS, seed=seed,
+                closed_deg=closed, open_deg=opened,
+            )
+            for electrical in (False, True)
+        ]  # fmt: skip
+        # A lag of the current that only follows the noise is left out: one number less to carry over.
+        return fits[1] if fits[1].report.rmse < _WORTH * fits[0].report.rmse else fits[0]
     sides = "both" if two_sided else "shared"
-    return fit_pseudo_wiener(log, kind, limp_home_deg=limp_home_deg, sides=sides, starts=starts, seed=seed)
+    return fit_pseudo_wiener(
+        log, kind, limp_home_deg=limp_home_deg, sides=sides, delay_samples=delay_samples, starts=starts, seed=seed,
+        settings={"closed_deg": closed, "open_deg": opened},
+    )  # fmt: skip
+
+
+def check_kind(kind: str, *, two_sided: bool, delay_samples: int | Sequence[int]) -> None:
+    """Refuse what the kind does not have, before the log is looked at."""
+    if two_sided and kind in ("pw_w", "pw_p"):
+        raise ParameterError(f"two_sided = True: {kind} has one set of parameters; only pw_r has one per side")
+    if kind == "first_principle" and delay_samples not in (0, (0,), [0]):
+        raise ParameterError(
+            f"delay_samples = {delay_samples!r}: the first-principle groups have none; pw_r, pw_w and pw_p do"
+        )
 
 
 def load_throttle_model(path: str | os.PathLike[str]) -> ThrottleModel:

@@ -11,7 +11,7 @@ import numpy as np
 
 from mgdd.errors import DataError
 from mgdd.identify.metrics import ResidualTests, fit_percent, mse, residual_tests, rmse, vaf_percent
-from mgdd.identify.n_step import DISCARD_S, HORIZONS_S, columns_of, n_step_rms, samples_of, step_of
+from mgdd.identify.n_step import DISCARD_S, columns_of, n_step_rms, samples_of, step_of, whole_horizons
 from mgdd.identify.prior import prior_of
 from mgdd.identify.record_content import open_questions, record_content
 from mgdd.identify.throttle_fit import ThrottleFit, ThrottleModel
@@ -125,7 +125,7 @@ def validate_throttle(
     model: ThrottleModel | ThrottleFit,
     log: xr.Dataset,
     *,
-    horizons_s: Sequence[float] = HORIZONS_S,
+    horizons_s: Sequence[float] | None = None,
     limp_home_deg: float | None = None,
 ) -> ThrottleValidation:
     """Validate a model, or a fit, on a log, best on one that it was not fitted to.
@@ -137,7 +137,7 @@ def validate_throttle(
     log : xarray.Dataset
         The log.
     horizons_s : sequence of float
-        How far ahead predictions are tested [s].
+        How far ahead predictions are tested [s]. None: 5, 20 and 50 ms, each as the nearest whole sample.
     limp_home_deg : float, optional
         Limp-home angle [deg]; None takes the model's.
 
@@ -176,6 +176,7 @@ def validate_throttle(
     own = model.model if isinstance(model, ThrottleFit) else model
     time, duty, angle = columns_of(log)
     step = step_of(time)
+    horizons_s = whole_horizons(step, time.size) if horizons_s is None else horizons_s
     for horizon in horizons_s:
         samples_of(horizon, step, time.size)
     run = free_run(own, log)
