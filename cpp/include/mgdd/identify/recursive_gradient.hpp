@@ -73,7 +73,7 @@ class GradientPwR {
   template <class Self, class V>
   static void visit(Self& self, V& v) {
     v("factors", self.factors_);
-    v("last_duty", self.last_duty_);
+    v("held_duty", self.last_duty_);
     const auto dual = [&v](const std::string& name, auto& x) {
       v(name, x.value);
       for (std::size_t i = 0; i < x.grad.size(); ++i)

@@ -44,7 +44,7 @@ class WindowPwR {
     v("duty", self.duty_);
     v("angle_deg", self.angle_);
     v("known", self.known_);
-    v("last_duty", self.last_duty_);
+    v("held_duty", self.last_duty_);
     v("duty_sum", self.duty_sum_);
     v("damping", self.damping_);
     v("cost", self.cost_);
