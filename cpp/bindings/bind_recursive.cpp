@@ -1,6 +1,7 @@
 // Binds include/mgdd/identify/pseudo_wiener_fit.hpp and recursive_*.hpp: the fit and the on-line update.
 #include <algorithm>
 #include <array>
+#include <cmath>
 #include <map>
 #include <string>
 #include <vector>
@@ -181,6 +182,7 @@ void bind_recursive(py::module_& m) {
       gradient,
       [](GradientUpdate& o, double u, double y) {
         if (!o.started) {
+          if (!std::isfinite(y) || !std::isfinite(u)) return false;  // a dropped sample is nowhere to start
           o.core.start(y, u);
           o.started = true;
           o.duty = u;

@@ -127,6 +127,9 @@ def test_random_steps_follow_the_golden_ratio_or_a_seed() -> None:
         identify.amplitude_random_steps(6.0, offset=0.0, amplitude=0.3, hold_s=(0.05, 0.3))
     with pytest.raises(ParameterError, match="first must not exceed"):
         identify.amplitude_random_steps(6.0, offset=0.0, amplitude=0.3, hold_s=(0.3, 0.05), seed=1)
+    for seed in (-1, 1.5, True):
+        with pytest.raises(ParameterError, match=f"seed = {seed}: must be a whole number >= 0"):
+            identify.amplitude_random_steps(6.0, offset=0.0, amplitude=0.3, seed=seed)  # type: ignore[arg-type]
 
 
 def test_the_staircase_climbs_and_returns() -> None:

@@ -192,6 +192,36 @@ def test_exchanged_columns(tmp_path: Path) -> None:
     read_throttle_log(percent, duty="angle_deg", angle="duty", duty_unit="%")
 
 
+def test_a_still_duty(tmp_path: Path) -> None:
+    path = csv(tmp_path / "s.csv", {"time_s": TIME, "u": np.full(1200, 0.2), "angle_deg": ANGLE, "supply_v": DUTY + 13})
+    with pytest.raises(
+        DataError,
+        match=r"s\.csv, lines 2 to 1201, column 'u': the duty stays at 0\.2: check the column; .*log a varied",
+    ):
+        read_throttle_log(path, duty="u")
+    with pytest.raises(DataError, match=r"log, samples 0 to 1199, column 'duty': the duty stays at -0\.3"):
+        log(duty=np.full(1200, -0.3))
+    log(duty=np.where(TIME < 0.6, 0.2, 0.25))
+    read_throttle_log(csv(tmp_path / "t.csv", {"time_s": TIME, "u": DUTY, "angle_deg": ANGLE}), duty="u")
+
+
+def test_exchanged_time(tmp_path: Path) -> None:
+    path = csv(tmp_path / "x.csv", {"time_s": TIME, "duty": DUTY, "angle_deg": ANGLE})
+    with pytest.raises(
+        DataError, match=r"x\.csv, line \d+, column 'angle_deg': time falls at \d+ of 1199.*'time_s' rises"
+    ):
+        read_throttle_log(path, time="angle_deg", angle="time_s")
+    with pytest.raises(DataError, match="the columns look exchanged; exchange time= and angle="):
+        read_throttle_log(path, time="angle_deg", angle="time_s")
+    stairs = np.repeat([0.1, 0.2, 0.3, 0.2, 0.1, 0.0], 200)  # mostly repeated
+    for duty in (DUTY, stairs):
+        with pytest.raises(DataError, match="the columns look exchanged; exchange time= and duty="):
+            log(duty, TIME, ANGLE)
+    with pytest.raises(DataError, match="columns exchanged\\? check time=, duty= and angle=; if they are right, sort"):
+        log(ANGLE, DUTY, ANGLE)
+    read_throttle_log(path)
+
+
 def test_percent_and_radians_beside_each_other_are_both_offered(tmp_path: Path) -> None:
     path = csv(tmp_path / "z.csv", {"time_s": TIME, "duty": DUTY * 100.0 + 30.0, "angle_deg": np.deg2rad(ANGLE)})
     with pytest.raises(
@@ -216,6 +246,16 @@ def test_radians_and_percent_of_travel(tmp_path: Path) -> None:
     assert float(read_throttle_log(percent, angle_unit="%")["angle_deg"].max()) == pytest.approx(90.0, abs=0.01)
     with pytest.raises(DataError, match="count from the closed plate"):
         log(angle=ANGLE - 40.0)
+
+
+def test_a_fraction_of_the_travel(tmp_path: Path) -> None:
+    path = csv(tmp_path / "f.csv", {"time_s": TIME, "duty": DUTY, "angle_deg": ANGLE / 38.0})
+    with pytest.raises(
+        DataError, match="angle_unit='rad'; or like a fraction of the travel; multiply it by 100 and pass"
+    ):
+        read_throttle_log(path)
+    again = csv(tmp_path / "g.csv", {"time_s": TIME, "duty": DUTY, "angle_deg": ANGLE / 38.0 * 100.0})
+    np.testing.assert_allclose(read_throttle_log(again, angle_unit="%", travel_deg=38.0)["angle_deg"], ANGLE)
 
 
 def test_too_short() -> None:
@@ -248,6 +288,20 @@ def test_uneven_sampling_is_resampled() -> None:
         log(drifting)
     with pytest.raises(ParameterError, match="step_s"):
         log(uneven, step_s=-1.0)
+
+
+def test_jitter_is_no_gap() -> None:
+    for seed in range(20):
+        time = np.arange(4000) * 1e-3
+        jittered = time + 0.1e-3 * np.random.default_rng(seed).standard_normal(4000)
+        duty, angle = np.interp(time % 1.0, TIME, DUTY), np.interp(time % 1.0, TIME, ANGLE)
+        with pytest.raises(DataError, match=r"uneven sampling: .*pass step_s=0.001 to resample"):
+            log(jittered, duty, angle)
+        assert log(jittered, duty, angle, step_s=1e-3).sizes["time_s"] >= 3999
+        for at in (2000, 3990):  # one sample that is missing is still seen, by its own row
+            keep = np.delete(np.arange(4000), at)
+            with pytest.raises(DataError, match=rf"sample {at}, .*gap from .*, about 1 sample\(s\) missing"):
+                log(jittered[keep], duty[keep], angle[keep])
 
 
 def test_a_two_sided_fit_needs_both_sides() -> None:

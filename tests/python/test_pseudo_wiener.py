@@ -133,6 +133,7 @@ def test_online_update_learns_the_gain_and_restarts(method: str) -> None:
     # Without noise 15 % of gain is inside the gate of a difference of 5 ms: 10 ms shows four times as much.
     every = 10 if method == "recursive_least_squares" else 5
     update = OnlineUpdate(wrong, method=method, every=every)
+    assert update.update([np.nan, 0.0, np.nan], [30.0, np.nan, np.nan]) == 0  # dropped before the first
     assert update.update(duty[:6000], angle[:6000]) > 0
     other = OnlineUpdate(wrong, method=method, every=every)
     other.restore(update.state())

@@ -65,15 +65,21 @@ RecursivePwR::RecursivePwR(const RecursivePwRSettings& settings)
       below_(make_core(settings_, settings_.model.below, 7)) {}
 
 UpdateGate RecursivePwR::update(double duty, double angle_deg) noexcept {
-  if (!std::isfinite(duty) || !std::isfinite(angle_deg)) return UpdateGate::not_finite;
-  UpdateGate gate = UpdateGate::filling;
+  const bool has_duty = std::isfinite(duty);
+  const bool has_angle = std::isfinite(angle_deg);
+  const int delay = settings_.model.frame.delay_samples;
+  UpdateGate gate = has_duty && has_angle ? UpdateGate::filling : UpdateGate::not_finite;
   if (count_ % settings_.every == 0) {
-    position_ = Eigen::Vector3d(position_[1], position_[2], angle_deg - settings_.model.limp_home_deg);
+    const double now = has_angle ? angle_deg - settings_.model.limp_home_deg : position_[2];
+    position_ = Eigen::Vector3d(position_[1], position_[2], now);
     duty_mean_ = Eigen::Vector2d(duty_mean_[1], duty_sum_ / settings_.every);
     duty_sum_ = 0.0;
-    if (count_ >= 2 * settings_.every) gate = learn();
+    if (!has_angle) clean_from_ = std::max(clean_from_, count_ + 1);
+    if (gate == UpdateGate::filling && count_ >= clean_from_ + 2 * settings_.every) gate = learn();
   }
-  duty_sum_ += line_.pass(duty, settings_.model.frame.delay_samples);
+  // A dropped sample keeps its place in time: a clock that stood still would turn the gap into a jump of the plate.
+  if (!has_duty) clean_from_ = std::max(clean_from_, count_ + delay + 1);
+  duty_sum_ += line_.pass(has_duty ? duty : 0.0, delay);
   ++count_;
   return gate;
 }

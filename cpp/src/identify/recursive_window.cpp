@@ -23,17 +23,20 @@ WindowPwR::WindowPwR(const WindowPwRSettings& settings) : settings_(settings) {
 }
 
 bool WindowPwR::update(double duty, double angle_deg) noexcept {
-  if (!std::isfinite(duty) || !std::isfinite(angle_deg)) return false;
+  // A dropped sample keeps its place in time: its duty is taken as the last one, its angle weighs nothing.
+  const bool has_angle = std::isfinite(angle_deg);
+  if (std::isfinite(duty)) last_duty_ = duty;
   const bool adds = count_ % settings_.every == 0;
   if (adds) {
     const auto point = count_ / settings_.every;
-    angle_[point % points] = angle_deg;
+    angle_[point % points] = has_angle ? angle_deg : angle_[(point + points - 1) % points];
+    known_[point % points] = has_angle ? 1.0 : 0.0;
     if (point > 0) duty_[(point - 1) % points] = duty_sum_ / settings_.every;
     duty_sum_ = 0.0;
   }
-  duty_sum_ += line_.pass(duty, settings_.model.frame.delay_samples);
+  duty_sum_ += line_.pass(last_duty_, settings_.model.frame.delay_samples);
   ++count_;
-  return adds;
+  return adds && has_angle;
 }
 
 template <class T>
@@ -62,8 +65,8 @@ double WindowPwR::evaluate(const Column& z, Square* normal, Column* gradient) co
     const std::int64_t at = (last + 1 + i) % points;
     const D y = model.output(state);
     const double r = (y.value - angle_[at]) * over_sigma;
-    cost += r * r;
-    if (normal != nullptr) {
+    if (known_[at] > 0.0) cost += r * r;
+    if (normal != nullptr && known_[at] > 0.0) {
       const Eigen::Map<const Column> slope(y.grad.data());
       *normal += slope * slope.transpose() * (over_sigma * over_sigma);
       *gradient += slope * (r * over_sigma);
@@ -83,6 +86,7 @@ double WindowPwR::evaluate(const Column& z, Square* normal, Column* gradient) co
 
 bool WindowPwR::iterate() noexcept {
   if (count_ < static_cast<std::int64_t>(points) * settings_.every) return false;
+  if (known_.sum() < 0.5 * points) return false;
   const std::int64_t first = ((count_ - 1) / settings_.every + 1) % points;
   Column z;
   z.head<5>() = factors_;

@@ -40,9 +40,8 @@ def throttle_of(args: argparse.Namespace) -> tuple[Throttle, str]:
             raise ParameterError(f"--set {item}: write FIELD=VALUE")
         if name not in fields:
             close = difflib.get_close_matches(name, fields, 1)
-            raise ParameterError(
-                f"--set {item}: no field {name!r}" + (f"; did you mean {close[0]!r}?" if close else "")
-            )
+            guess = f"; did you mean {close[0]!r}?" if close else ""
+            raise ParameterError(f"--set {item}: no field {name!r}{guess}; the fields are {', '.join(fields)}")
         if name in values:
             raise ParameterError(f"--set {name} is given twice: give it once")
         values[name] = text if "choices" in fields[name] else _number(name, text, str(fields[name]["unit"]))

@@ -13,7 +13,9 @@ from mgdd.cli.output import check_figure, check_output, emit
 from mgdd.cli.throttle_parameters import add_throttle, throttle_of
 from mgdd.errors import DataError, ParameterError
 from mgdd.io.table import read_table
+from mgdd.io.throttle_checks import Place
 from mgdd.throttle import simulate, step_summary
+from mgdd.throttle.simulation import sample_time
 
 if TYPE_CHECKING:
     import xarray as xr
@@ -107,7 +109,23 @@ def _from_file(args: argparse.Namespace) -> dict[str, Any]:
             out[name] = value
         elif name in header:
             out[name] = table.numbers(table.index(name))
+    _check_rows(out, Place(table.source, table.lines))
     return out
+
+
+def _check_rows(columns: dict[str, Any], place: Place) -> None:
+    """Refuse by line of the file what the simulation would refuse by sample."""
+    sample_time(columns["time_s"], place.row)
+    duty = columns["duty"]
+    if np.abs(duty).max() > 1.0:
+        at = int(np.argmax(np.abs(duty) > 1.0))
+        raise DataError(
+            f"{place.cell(at, 'duty')}: duty = {duty[at]:g}: must be in [-1, 1]; a duty in percent is divided by 100"
+        )
+    supply = np.asarray(columns.get("supply_v", 0.0))
+    if supply.ndim and supply.min() < 0.0:
+        at = int(np.argmax(supply < 0.0))
+        raise DataError(f"{place.cell(at, 'supply_v')}: supply_v = {supply[at]:g} V: must be >= 0")
 
 
 def _draw(run: xr.Dataset, file: str) -> None:

@@ -233,7 +233,7 @@ def amplitude_random_steps(
     Raises
     ------
     ParameterError
-        As in `chirp`; a hold shorter than the sample time; a range without seed.
+        As in `chirp`; a hold shorter than the sample time; a range without seed; a negative seed.
 
     Examples
     --------
@@ -253,6 +253,8 @@ def amplitude_random_steps(
             raise ParameterError("seed = None: a range of hold_s is drawn at random and needs a seed")
         levels, holds = 2.0 * np.mod(_GOLDEN * np.arange(count), 1.0) - 1.0, np.full(count, least)
     else:
+        if isinstance(seed, bool) or not isinstance(seed, int | np.integer) or seed < 0:
+            raise ParameterError(f"seed = {seed!r}: must be a whole number >= 0")
         rng = np.random.default_rng(seed)
         levels, holds = rng.uniform(-1.0, 1.0, count), rng.integers(least, most + 1, count)
     wave = np.repeat(levels, holds)[: time.size]

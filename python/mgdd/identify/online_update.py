@@ -105,7 +105,8 @@ class OnlineUpdate:
         Parameters
         ----------
         duty, angle_deg : float or array_like, shape (n,)
-            Duty sent [-] and angle measured [deg] at each sample.
+            Duty sent [-] and angle measured [deg] at each sample; NaN where one was dropped, which keeps the clock
+            and teaches nothing.
 
         Returns
         -------

@@ -27,6 +27,10 @@ JITTER = 0.1  # of the step
 ANGLE_DEG = (-10.0, 95.0)
 RADIANS = 1.7
 STILL_DEG = 0.3
+STILL_DUTY = 1e-3
+# Of the steps that are not zero: a file of two records falls once, a signal in place of the time half of the way.
+MANY_FALLS = 0.1
+GAP_WINDOW = 20
 SIDE_DEG, SIDE_S = 0.5, 0.1
 _WINDOW = "keep one part with start_s= or stop_s="
 
@@ -42,6 +46,12 @@ class Place:
     def row(self, index: int) -> str:
         """Return "FILE, line 7" or "log, sample 5"."""
         return f"{self.source}, " + (f"sample {index}" if self.rows is None else f"line {self.rows[index]}")
+
+    def span(self, first: int, last: int) -> str:
+        """Return "FILE, lines 2 to 1001" or "log, samples 0 to 999"."""
+        if self.rows is None:
+            return f"{self.source}, samples {first} to {last}"
+        return f"{self.source}, lines {self.rows[first]} to {self.rows[last]}"
 
     def column(self, name: str) -> str:
         """Return how the source calls a column."""
@@ -72,9 +82,9 @@ def check_throttle_log(log: xr.Dataset, *, two_sided: bool = False, limp_home_de
     Raises
     ------
     DataError
-        NaN, repeated or falling time, gaps, uneven sampling, duty beyond ±1, an angle that stands still or cannot be
-        in degrees, exchanged columns, fewer than 50 samples or 0.5 s, or one side only; the message names row,
-        column and remedy.
+        NaN, repeated or falling time, gaps, uneven sampling, duty beyond ±1, a duty or an angle that stands still, an
+        angle that cannot be in degrees, exchanged columns, fewer than 50 samples or 0.5 s, or one side only; the
+        message names row, column and remedy.
     ParameterError
         `two_sided` without `limp_home_deg`.
 
@@ -95,7 +105,7 @@ def check_throttle_log(log: xr.Dataset, *, two_sided: bool = False, limp_home_de
     place = Place(str(log.attrs.get("file", "log")))
     columns = {name: np.asarray(log[name].to_numpy(), dtype=np.float64) for name in ("time_s", *names)}
     check_finite(columns, place)
-    check_time(columns["time_s"], place)
+    check_time(columns, place)
     check_even(columns["time_s"], place)
     check_signals(columns["duty"], columns["angle_deg"], place=place)
     if two_sided:
@@ -115,13 +125,18 @@ def check_finite(columns: Mapping[str, NDArray[np.float64]], place: Place) -> No
             )
 
 
-def check_time(time: NDArray[np.float64], place: Place) -> None:
-    """Refuse time that does not rise, leaves gaps, cannot be in seconds, or is too short."""
+def check_time(columns: Mapping[str, NDArray[np.float64]], place: Place) -> None:
+    """Refuse time that does not rise, leaves gaps, cannot be in seconds, or is too short.
+
+    The other columns tell whether one of them is the time.
+    """
+    time = columns["time_s"]
     column = place.column("time_s")
     if time.size < MIN_SAMPLES:
         raise DataError(f"{place.source}, {column}: {time.size} samples; at least {MIN_SAMPLES} are needed: log longer")
     step = np.diff(time)
     if not np.all(step > 0.0):
+        _check_time_exchanged(columns, place)
         at = int(np.argmin(step > 0.0)) + 1
         before, here = time[at - 1], time[at]
         if here == before:
@@ -137,9 +152,9 @@ def check_time(time: NDArray[np.float64], place: Place) -> None:
             f"{place.source}, {column}: the usual step is {usual:g} s; a throttle needs {STEP_S[0]:g} to "
             f"{STEP_S[1]:g} s: this looks like {looks}"
         )
-    wide = np.flatnonzero(step > 1.5 * usual)
-    if wide.size:
-        at = int(wide[0]) + 1
+    wide = next((k for k in np.flatnonzero(step > 1.5 * usual).tolist() if _shifts(time, k, usual)), None)
+    if wide is not None:
+        at = wide + 1
         missing = round(step[at - 1] / usual) - 1
         raise DataError(
             f"{place.cell(at, 'time_s')}: gap from {time[at - 1]:.6g} to {time[at]:.6g} s where the usual step is "
@@ -150,6 +165,33 @@ def check_time(time: NDArray[np.float64], place: Place) -> None:
         raise DataError(
             f"{place.source}, {column}: {time[-1] - time[0]:.3g} s; at least {MIN_DURATION_S:g} s are needed: log more"
         )
+
+
+def _shifts(time: NDArray[np.float64], at: int, usual: float) -> bool:
+    """Whether what follows a wide step comes late: after jitter it comes when it should, and no sample is missing."""
+    before = time[max(at + 1 - GAP_WINDOW, 0) : at + 1]
+    after = time[at + 1 : at + 1 + GAP_WINDOW]
+    due = np.median(before + usual * np.arange(before.size, 0, -1))
+    return bool(np.median(after - usual * np.arange(after.size)) - due > 0.5 * usual)
+
+
+def _check_time_exchanged(columns: Mapping[str, NDArray[np.float64]], place: Place) -> None:
+    step = np.diff(columns["time_s"])
+    falls = np.flatnonzero(step < 0.0)
+    if falls.size <= MANY_FALLS * np.count_nonzero(step):
+        return
+    at = int(falls[0]) + 1
+    what = f"{place.cell(at, 'time_s')}: time falls at {falls.size} of {step.size} steps"
+    for name, values in columns.items():
+        if name != "time_s" and np.all(np.diff(values) > 0.0):
+            option = name.partition("_")[0]
+            raise DataError(
+                f"{what}, and {place.column(name)} rises throughout: the columns look exchanged; exchange time= and "
+                f"{option}="
+            )
+    raise DataError(
+        f"{what}: columns exchanged? check time=, duty= and angle=; if they are right, sort the rows by time"
+    )
 
 
 def check_even(time: NDArray[np.float64], place: Place) -> None:
@@ -179,6 +221,12 @@ def check_signals(
     raw_angle = {"rad": np.deg2rad(angle), "%": angle * 100.0 / travel_deg}.get(angle_unit, angle)
     _check_exchanged(raw_duty, raw_angle, duty_unit, place)
     _check_duty(raw_duty, duty_unit, place)
+    if np.ptp(duty) < STILL_DUTY:
+        raise DataError(
+            f"{place.span(0, duty.size - 1)}, {place.column('duty')}: the duty stays at {raw_duty[0]:.4g}: check the "
+            "column; a duty that stands still tells nothing about the throttle: log a varied one "
+            "(mgdd.identify.design_excitation)"
+        )
     _check_angle(angle, raw_angle, angle_unit, place)
 
 
@@ -229,10 +277,10 @@ def _check_angle(angle: NDArray[np.float64], raw: NDArray[np.float64], unit: str
     top, lowest = int(np.argmax(raw)), int(np.argmin(raw))
     span = float(np.ptp(angle))
     if unit == "deg" and np.ptp(raw) > 0.01 and np.abs(raw).max() <= RADIANS:
-        raise DataError(
-            f"{place.cell(top, 'angle_deg')}: the highest angle is {raw[top]:.4g} deg: this looks like radians; pass "
-            "angle_unit='rad'"
-        )
+        remedy = "this looks like radians; pass angle_unit='rad'"
+        if raw[lowest] >= -0.1 and raw[top] <= 1.1:
+            remedy += "; or like a fraction of the travel; multiply it by 100 and pass angle_unit='%'"
+        raise DataError(f"{place.cell(top, 'angle_deg')}: the highest angle is {raw[top]:.4g} deg: {remedy}")
     if unit == "rad" and raw[top] > RADIANS:
         raise DataError(
             f"{place.cell(top, 'angle_deg')}: the highest angle is {raw[top]:.4g} rad, "

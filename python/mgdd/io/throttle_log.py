@@ -294,7 +294,7 @@ def _checked(
                 f"{place.source}: {key} has {values.size} samples, time {size}: columns must be equally long"
             )
     check_finite(columns, place)
-    check_time(columns["time_s"], place)
+    check_time(columns, place)
     if step_s is None:
         check_even(columns["time_s"], place)
     else:

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
@@ -20,6 +20,7 @@ if TYPE_CHECKING:
 __all__ = ["simulate", "simulate_many", "step_summary"]
 
 _DEFAULT_DURATION_S = 1.0
+_MOST_SAMPLES = 5_000_000
 # Samples may be off an even grid by this share of a sample: what six decimals of a file cost.
 _UNEVEN = 1e-3
 _MOVED_DEG = 0.01
@@ -256,7 +257,7 @@ def _grid(
         if duration_s is not None:
             raise ParameterError(f"duration_s = {duration_s:g} s contradicts time_s: leave one out")
         times = np.asarray(time_s, dtype=np.float64)
-        sample = _sample_time(times)
+        sample = sample_time(times)
         if column.ndim == 0:
             column = np.full(times.size, float(column))
         if column.size != times.size:
@@ -268,6 +269,8 @@ def _grid(
         length = _DEFAULT_DURATION_S if duration_s is None else duration_s
         if not (math.isfinite(length) and length >= sample_s):
             raise ParameterError(f"duration_s = {length:g} s: must be finite and >= sample_s = {sample_s:g} s")
+        if length / sample_s > _MOST_SAMPLES:
+            raise ParameterError(f"duration_s = {length:g} s: {_MOST_SAMPLES} samples of {sample_s:g} s are the most")
         column = np.full(round(length / sample_s) + 1, float(column))
     elif duration_s is not None:
         raise ParameterError(
@@ -276,22 +279,23 @@ def _grid(
     return np.arange(column.size, dtype=np.float64) * float(sample_s), column, float(sample_s)
 
 
-def _sample_time(times: NDArray[np.float64]) -> float:
+def sample_time(times: NDArray[np.float64], row: Callable[[int], str] = "sample {}".format) -> float:
+    """Give the sample time of even times [s]; `row` is how a message calls sample k."""
     if times.ndim != 1 or times.size < 2:
         raise ShapeError(f"time_s has shape {times.shape}: must be one column of at least two samples")
     if not np.isfinite(times).all():
-        raise DataError(f"time_s is not finite at sample {int(np.argmin(np.isfinite(times)))}")
+        raise DataError(f"time_s is not finite at {row(int(np.argmin(np.isfinite(times))))}")
     gaps = np.diff(times)
     if not (gaps > 0.0).all():
         k = int(np.argmax(gaps <= 0.0)) + 1
-        raise DataError(f"time_s = {times[k]:g} s at sample {k} does not exceed the one before: sort it, drop repeats")
+        raise DataError(f"time_s = {times[k]:g} s at {row(k)} does not exceed the one before: sort it, drop repeats")
     # Six digits after the point, as many tables have them: the sample time is what they mean, to a nanosecond.
     sample = float(np.round((times[-1] - times[0]) / (times.size - 1), 9))
     off = np.abs(times - times[0] - sample * np.arange(times.size)) > _UNEVEN * sample
     if off.any():
         k = int(np.argmax(off))
         raise DataError(
-            f"time_s = {times[k]:g} s at sample {k} is off the even grid of {sample:g} s: resample the duty first"
+            f"time_s = {times[k]:g} s at {row(k)} is off the even grid of {sample:g} s: resample the duty first"
         )
     return sample
 

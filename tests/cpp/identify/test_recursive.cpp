@@ -188,6 +188,79 @@ TEST(ReanchoringObserver, FollowsThePlantBehindASupplyStep) {
   EXPECT_TRUE(std::isfinite(observer.state().position_deg));
 }
 
+// Drops angle, duty or both at 80 places, some of them in a row.
+test_support::ThrottleLog with_gaps(test_support::ThrottleLog log) {
+  for (std::size_t i = 0; i < 80; ++i) {
+    const std::size_t k = 100 + 100 * i + (i % 4) * (i % 7) + (i % 10 == 0 ? 0 : i % 3);
+    if (i % 3 != 1) log.angle_deg[k] = std::nan("");
+    if (i % 3 != 0) log.duty[k] = std::nan("");
+  }
+  return log;
+}
+
+TEST(RecursivePwR, DroppedSamplesCostNothingButThemselves) {
+  const auto log = supply_step(8.2, 3.0);
+  const auto holed = with_gaps(log);
+  RecursivePwR clean(RecursivePwRSettings{});
+  RecursivePwR online(RecursivePwRSettings{});
+  int dropped = 0;
+  for (std::size_t k = 0; k < log.duty.size(); ++k) {
+    static_cast<void>(clean.update(log.duty[k], log.angle_deg[k]));
+    dropped += online.update(holed.duty[k], holed.angle_deg[k]) == UpdateGate::not_finite;
+  }
+  EXPECT_EQ(dropped, 80);
+  const auto a = clean.model().above;
+  const auto b = online.model().above;
+  EXPECT_NEAR(b.gain_deg_per_s2_per_duty / a.gain_deg_per_s2_per_duty, 1.0, 5e-3);
+  EXPECT_NEAR(b.preload_duty / a.preload_duty, 1.0, 5e-3);
+  EXPECT_LT(online.updates(), clean.updates());
+  EXPECT_GT(online.updates(), clean.updates() * 8 / 10);
+}
+
+TEST(WindowPwR, DroppedSamplesCostNothingButThemselves) {
+  const auto log = supply_step(8.2, 3.0);
+  const auto holed = with_gaps(log);
+  WindowPwR clean(WindowPwRSettings{});
+  WindowPwR online(WindowPwRSettings{});
+  for (std::size_t k = 0; k < log.duty.size(); ++k) {
+    static_cast<void>(clean.update(log.duty[k], log.angle_deg[k]));
+    static_cast<void>(online.update(holed.duty[k], holed.angle_deg[k]));
+    if (k % 50 != 49) continue;
+    static_cast<void>(clean.iterate());
+    static_cast<void>(online.iterate());
+  }
+  const auto a = clean.model().above;
+  const auto b = online.model().above;
+  EXPECT_NEAR(b.gain_deg_per_s2_per_duty / a.gain_deg_per_s2_per_duty, 1.0, 0.01);
+  EXPECT_NEAR(b.preload_duty / a.preload_duty, 1.0, 0.01);
+  for (int k = 0; k < 600; ++k)
+    EXPECT_FALSE(online.update(0.1, std::nan("")));
+  EXPECT_FALSE(online.iterate());
+  EXPECT_EQ(online.model().above, b);
+}
+
+TEST(GradientPwR, DroppedSamplesCostNothingButThemselves) {
+  const auto log = supply_step(8.2, 3.0);
+  const auto holed = with_gaps(log);
+  GradientPwR clean(GradientPwRSettings{});
+  GradientPwR online(GradientPwRSettings{});
+  clean.start(log.angle_deg[0]);
+  online.start(log.angle_deg[0]);
+  for (std::size_t k = 1; k < log.duty.size(); ++k) {
+    static_cast<void>(clean.update(log.duty[k - 1], log.angle_deg[k]));
+    static_cast<void>(online.update(holed.duty[k - 1], holed.angle_deg[k]));
+  }
+  const auto a = clean.model().above;
+  const auto b = online.model().above;
+  EXPECT_NEAR(b.gain_deg_per_s2_per_duty / a.gain_deg_per_s2_per_duty, 1.0, 0.01);
+  EXPECT_NEAR(b.preload_duty / a.preload_duty, 1.0, 0.01);
+  // A gap of half a second: the observer runs on instead of standing where the plate was.
+  for (int k = 0; k < 500; ++k)
+    EXPECT_EQ(online.update(1.0, std::nan("")), 0.0);
+  EXPECT_GT(online.update(1.0, 90.0), -5.0);
+  EXPECT_LT(online.update(1.0, 90.0), 5.0);
+}
+
 TEST(RecursiveRealTime, NothingIsAllocated) {
   RecursivePwR rls(RecursivePwRSettings{});
   WindowPwR window(WindowPwRSettings{});
@@ -225,6 +298,18 @@ TEST(RecursiveLeastSquares, FindsALineAndCapsItsTrace) {
   const auto before = rls.estimate();
   EXPECT_FALSE(rls.update({1.0, 0.0}, std::nan("")));
   EXPECT_EQ(rls.estimate(), before);
+  for (const double extreme : {1e200, 1e308}) {  // the squares overflow
+    const auto covariance = rls.covariance();
+    const auto updates = rls.updates();
+    EXPECT_FALSE(rls.update({extreme, -extreme}, 1.0));
+    EXPECT_EQ(rls.estimate(), before);
+    EXPECT_EQ(rls.covariance(), covariance);
+    EXPECT_EQ(rls.updates(), updates);
+  }
+  s.forgetting = 0.5;
+  EXPECT_NO_THROW(optimize::RecursiveLeastSquares<2>{s});
+  s.forgetting = 0.49;
+  EXPECT_THROW(optimize::RecursiveLeastSquares<2>{s}, ParameterError);
   s.forgetting = 1.5;
   EXPECT_THROW(optimize::RecursiveLeastSquares<2>{s}, ParameterError);
 }

@@ -142,6 +142,17 @@ TEST(SimulationResidual, ALinearLagMatchesItsClosedFormAndStartsWhereItsParamete
   }
 }
 
+TEST(SimulationResidual, ARecordWithoutUnknownsLeavesNoStaleRows) {
+  std::vector<SimulationRecord> records{pendulum_record(6, 60), pendulum_record(7, 40)};
+  records[1].free_start = {0};
+  SimulationResidual residual(Rk4<Pendulum>{{}, 2}, pendulum_truth, {}, records);
+  VectorXd r(100);
+  MatrixXd j = MatrixXd::Constant(100, 1, 7.0);  // what an earlier call or the allocator left there
+  ASSERT_TRUE(residual(residual.start(), r, &j));
+  EXPECT_EQ(j.topRows(60), MatrixXd::Zero(60, 1));
+  EXPECT_EQ(j(60, 0), 1.0);
+}
+
 TEST(SimulationResidual, AUsersFunctorIsFittedByLeastSquares) {
   auto record = pendulum_record(4, 1500, 0.01);
   record.start = {record.output[0], 0.0};

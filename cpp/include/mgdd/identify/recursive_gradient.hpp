@@ -39,16 +39,20 @@ class GradientPwR {
 
   void start(double angle_deg, double duty = 0.0) noexcept {
     state_ = throttle::model_of(seeded<Scalar>()).at_rest(Scalar(angle_deg), Scalar(duty));
+    last_duty_ = duty;
   }
 
-  /// One sample: `duty` was sent at the sample before this angle. Gives measured minus predicted angle [deg].
+  /// One sample: `duty` was sent at the sample before this angle. Gives measured minus predicted angle [deg];
+  /// 0 for a dropped sample (NaN), which moves the observer on by the last duty and teaches nothing.
   double update(double duty, double angle_deg) noexcept {
-    if (!std::isfinite(duty) || !std::isfinite(angle_deg)) return 0.0;
+    const bool has_duty = std::isfinite(duty);
+    if (has_duty) last_duty_ = duty;
     const auto model = throttle::model_of(seeded<Scalar>());
-    model.advance(state_, Scalar(duty));
+    model.advance(state_, Scalar(last_duty_));
+    if (!std::isfinite(angle_deg)) return 0.0;
     const Scalar y = model.output(state_);
     const double error = angle_deg - y.value;
-    if (std::abs(error) > settings_.least_error_deg) {
+    if (has_duty && std::abs(error) > settings_.least_error_deg) {
       double power = 1.0;
       for (std::size_t i = 0; i < 5; ++i)
         power += settings_.free[i] ? y.grad[i] * y.grad[i] : 0.0;
@@ -59,7 +63,7 @@ class GradientPwR {
       }
     }
     model.reanchor(state_, Scalar(angle_deg), settings_.anchor);
-    return error;
+    return has_duty ? error : 0.0;
   }
 
   throttle::PwR model() const noexcept { return bounded(seeded<double>()); }
@@ -69,6 +73,7 @@ class GradientPwR {
   template <class Self, class V>
   static void visit(Self& self, V& v) {
     v("factors", self.factors_);
+    v("held_duty", self.last_duty_);
     const auto dual = [&v](const std::string& name, auto& x) {
       v(name, x.value);
       for (std::size_t i = 0; i < x.grad.size(); ++i)
@@ -93,6 +98,7 @@ class GradientPwR {
   GradientPwRSettings settings_;
   Eigen::Matrix<double, 5, 1> factors_ = Eigen::Matrix<double, 5, 1>::Zero();
   throttle::BasicPwRState<Scalar> state_{};
+  double last_duty_ = 0.0;
 };
 
 }  // namespace mgdd::identify

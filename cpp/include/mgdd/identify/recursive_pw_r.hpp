@@ -52,7 +52,8 @@ class RecursivePwR {
 
   explicit RecursivePwR(const RecursivePwRSettings& settings);
 
-  /// One sample: the angle measured now and the duty that is sent now.
+  /// One sample: the angle measured now and the duty that is sent now. Call it for a dropped sample too, with NaN: time
+  /// goes on, and no difference that the sample touches is learned from.
   UpdateGate update(double duty, double angle_deg) noexcept;
 
   /// The model with the present numbers, inside the bounds.
@@ -68,6 +69,7 @@ class RecursivePwR {
   template <class Self, class V>
   static void visit(Self& self, V& v) {
     v("count", self.count_);
+    v("clean_from", self.clean_from_);
     v("position_deg", self.position_);
     v("duty_sum", self.duty_sum_);
     v("duty_mean", self.duty_mean_);
@@ -97,7 +99,8 @@ class RecursivePwR {
   Eigen::Vector3d position_ = Eigen::Vector3d::Zero();   // x(k-1), x(k), x(k+1), from limp-home
   Eigen::Vector2d duty_mean_ = Eigen::Vector2d::Zero();  // over the difference before and the present one
   double duty_sum_ = 0.0;
-  std::int64_t count_ = 0;  // samples taken
+  std::int64_t count_ = 0;       // samples taken
+  std::int64_t clean_from_ = 0;  // from this sample on every angle that counts and every acting duty is known
 };
 
 }  // namespace mgdd::identify

@@ -28,9 +28,11 @@ class WindowPwR {
 
   explicit WindowPwR(const WindowPwRSettings& settings);
 
-  /// One sample: the angle measured now and the duty sent now. True when a point was added.
+  /// One sample: the angle measured now and the duty sent now; NaN for what was dropped. True when a point was
+  /// added.
   bool update(double duty, double angle_deg) noexcept;
-  /// One Levenberg-Marquardt step on the full window. False when there is none yet or the step was refused.
+  /// One Levenberg-Marquardt step on the full window. False when there is none yet, when more than half of its angles
+  /// were dropped, or when the step was refused.
   bool iterate() noexcept;
 
   throttle::PwR model() const noexcept;
@@ -41,6 +43,8 @@ class WindowPwR {
     v("factors", self.factors_);
     v("duty", self.duty_);
     v("angle_deg", self.angle_);
+    v("known", self.known_);
+    v("held_duty", self.last_duty_);
     v("duty_sum", self.duty_sum_);
     v("damping", self.damping_);
     v("cost", self.cost_);
@@ -62,7 +66,9 @@ class WindowPwR {
   Eigen::Matrix<double, 5, 1> factors_ = Eigen::Matrix<double, 5, 1>::Zero();
   Eigen::Matrix<double, points, 1> duty_ = Eigen::Matrix<double, points, 1>::Zero();   // acts from a point to the next
   Eigen::Matrix<double, points, 1> angle_ = Eigen::Matrix<double, points, 1>::Zero();  // ring, oldest at count_
+  Eigen::Matrix<double, points, 1> known_ = Eigen::Matrix<double, points, 1>::Zero();  // 1, or 0 for a dropped angle
   throttle::DelayLine<double> line_;
+  double last_duty_ = 0.0;
   double duty_sum_ = 0.0;
   double damping_ = 1e-2;
   double cost_ = 0.0;

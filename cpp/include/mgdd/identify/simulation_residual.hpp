@@ -59,10 +59,11 @@ class SimulationResidual {
     for (std::size_t r = 0; r < records_.size(); ++r) {
       const std::size_t lanes = free_.size() + records_[r].free_start.size();
       bool finite = true;
+      // Unknowns of other records do not act here, and a record without any has no column of its own to write.
+      if (jacobian != nullptr) jacobian->middleRows(row, rows(r)).setZero();
       if (jacobian == nullptr || lanes == 0) {
         finite = run<double>(r, x, row, residual, nullptr, 0);
       } else {
-        jacobian->middleRows(row, rows(r)).setZero();  // start states of other records do not act here
         for (std::size_t first = 0; first < lanes && finite;) {
           const std::size_t left = lanes - first;
           if (left <= 4) {

@@ -22,11 +22,11 @@ struct RecursiveSettings {
   Column lower = Column::Constant(-1e300);
   Column upper = Column::Constant(1e300);
   Column start_variance = Column::Ones();  ///< diagonal of P; 0 holds that parameter
-  double forgetting = 0.998;               ///< lambda, in (0, 1]
+  double forgetting = 0.998;               ///< lambda, in [0.5, 1]: below, the memory is less than two equations
   double trace_cap = 1e6;                  ///< of P, relative to the scaled start: trace(P)/trace(P_0)
 
   void validate() const {
-    if (!(forgetting > 0.5 && forgetting <= 1.0)) require_within("forgetting", forgetting, 0.5, 1.0);
+    require_within("forgetting", forgetting, 0.5, 1.0);
     require_within("trace_cap", trace_cap, 1.0, 1e12);
     for (int i = 0; i < N; ++i) {
       const std::string at = "[" + std::to_string(i) + "]";
@@ -53,22 +53,24 @@ class RecursiveLeastSquares {
   /// What the next output should be for a regressor.
   double predict(const Column& phi) const noexcept { return phi.dot(estimate_); }
 
-  /// Takes one equation. False, and nothing changed, when a number is not finite.
+  /// Takes one equation. False, and nothing changed, when a number is not finite or would not stay so.
   bool update(const Column& phi, double y) noexcept {
     if (!std::isfinite(y) || !phi.allFinite()) return false;
     const Column gain = covariance_ * phi;
     const double divisor = settings_.forgetting + phi.dot(gain);
     const double error = y - phi.dot(estimate_);
-    estimate_ += gain * (error / divisor);
-    estimate_ = estimate_.cwiseMax(settings_.lower).cwiseMin(settings_.upper);
-    covariance_ -= gain * gain.transpose() / divisor;
+    const Column moved = estimate_ + gain * (error / divisor);
+    Square left = covariance_ - gain * gain.transpose() / divisor;
     // Forget only what the cap allows, so that directions without excitation do not grow for ever.
     const double cap = settings_.trace_cap * settings_.start_variance.sum();
-    const double trace = covariance_.trace();
+    const double trace = left.trace();
     double growth = 1.0 / settings_.forgetting;
     if (trace * growth > cap && trace > 0.0) growth = cap / trace > 1.0 ? cap / trace : 1.0;
-    covariance_ *= growth;
-    covariance_ = (0.5 * (covariance_ + covariance_.transpose())).eval();
+    left *= growth;
+    // Before the box: its comparisons would hide a NaN.
+    if (!moved.allFinite() || !left.allFinite()) return false;
+    estimate_ = moved.cwiseMax(settings_.lower).cwiseMin(settings_.upper);
+    covariance_ = 0.5 * (left + left.transpose());
     ++updates_;
     return true;
   }
