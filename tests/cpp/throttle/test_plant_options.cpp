@@ -109,6 +109,20 @@ TEST(ThrottleOptions, LanesHoldTheBitsOfThePlainCode) {
   });
 }
 
+// A supply that falls below what the bridge drops drives nothing, and nothing backwards.
+TEST(ThrottleOptions, ASupplyBelowTheDropDrivesNothing) {
+  Throttle t;
+  t.driver_drop_v = 2.0;
+  test::DrivenThrottle low(t, 8.0);
+  low.input.supply_v = 1.0;
+  low.go(1.0, 0.2);
+  EXPECT_EQ(low.state.current_a, 0.0);
+  EXPECT_NEAR(low.angle_deg(), 8.0, 1e-12);
+  low.input.supply_v = 12.0;
+  low.go(1.0, 0.2);
+  EXPECT_GT(low.angle_deg(), 80.0);
+}
+
 TEST(ThrottleOptions, BadParametersAreNamedAndGoodOnesPassAfterwards) {
   const auto message = [](const Throttle& t) -> std::string {
     try {

@@ -140,7 +140,7 @@ auto BasicThrottlePlant<T>::motor(const State& s, const Input& in) const noexcep
   const T duty = larger(smaller(in.duty, T(1.0)), T(-1.0));
   const T zero(0.0);
   const T effective = larger(larger(duty, -duty) - c_.dead_band, zero);
-  const T driver_v = with_sign(effective * (in.supply_v - c_.drop), duty);
+  const T driver_v = with_sign(effective * larger(in.supply_v - c_.drop, zero), duty);
   Motor m{(c_.inductance_over_h * s.current_a + driver_v) * c_.inverse_impedance,
           -(c_.back_emf * c_.inverse_impedance)};
   if (in.bridge == Bridge::open) {
