@@ -8,7 +8,7 @@ from pathlib import Path
 
 import pytest
 
-CPP = "common > optimize > control > engine throttle > identify > guide > loop"
+CPP = "common > math > dynamics > optimize > control > engine throttle > identify > guide > loop"
 PYTHON = (
     "_core > errors > results presets > io plot > optimize > control > engine throttle > identify > guide"
     " > loop sweep design datasets > maps > rig > studies > report > cli > __main__"

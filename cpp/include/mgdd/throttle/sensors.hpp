@@ -8,7 +8,7 @@
 #include <cstdint>
 #include <optional>
 
-#include "mgdd/common/names.hpp"
+#include "mgdd/common/enum_names.hpp"
 
 namespace mgdd::throttle {
 
