@@ -289,34 +289,36 @@ def _with_ends(row: Mapping[str, Any], *names: str) -> list[float]:
 
 def seekers() -> Rows:
     names = ("cycles_to_1_cad", "rms_cad", "final_cad", "j_lost")
-    return {f"{row['seeker']} {row['settings']}": _with_ends(row, *names) for row in study("ch3-optimizers")["rows"]}
+    return {f"{row['seeker']} {row['settings']}": _with_ends(row, *names) for row in study("seeker-comparison")["rows"]}
 
 
 def learning() -> Rows:
     names = ("sigma_max", "first_rms_cad", "third_rms_cad", "last_rms_cad")
-    return {f"`{row['law']}`": _with_ends(row, *names) for row in study("ch3-optimizers")["iterative_learning"]}
+    return {f"`{row['law']}`": _with_ends(row, *names) for row in study("seeker-comparison")["iterative_learning"]}
 
 
 def sensors() -> Rows:
     steps = ("timing_step_t90_cycles", "load_step_t90_cycles", "load_step_t90_s")
     names = ("steady_error_percent", "worst_error_percent", "scatter_percent")
-    return {row["sensor"]: [float(row[name]) for name in (*names, *steps)] for row in study("ch4-sensors")["rows"]}
+    return {row["sensor"]: [float(row[name]) for name in (*names, *steps)] for row in study("nox-sensors")["rows"]}
 
 
 def sensor_fits() -> Rows:
     names = ("reference_nox_ppm", "reference_nox_stderr_ppm", "activation_temperature_k")
     names += ("activation_temperature_stderr_k", "residual_percent")
-    return {f"`{row['map']}`": [row[name] for name in names] for row in study("ch4-sensors")["fits"]}
+    return {f"`{row['map']}`": [row[name] for name in names] for row in study("nox-sensors")["fits"]}
 
 
 def esc_cases() -> Rows:
     names = ("phase_deg", "step_sign", "cycles_stays", "final_cad")
-    return {f"{row['case']} {row['period_cycles']}": _with_ends(row, *names) for row in study("ch4-esc")["rows"]}
+    return {f"{row['case']} {row['period_cycles']}": _with_ends(row, *names) for row in study("sensor-delay")["rows"]}
 
 
 def esc_components() -> Rows:
     names = ("time_constant_cycles", "nox_gain", "rms_cad")
-    return {f"period {row['period_cycles']}": _with_ends(row, *names) for row in study("ch4-esc")["component_wise"]}
+    return {
+        f"period {row['period_cycles']}": _with_ends(row, *names) for row in study("sensor-delay")["component_wise"]
+    }
 
 
 def esc_tests() -> Rows:
@@ -324,7 +326,7 @@ def esc_tests() -> Rows:
     names += ("efficiency_after_percent", "nox_before_ppm", "nox_after_ppm", "gain_percent_points")
     means = {"efficiency_after_percent", "nox_after_ppm", "gain_percent_points"}
     rows = {}
-    for row in study("ch4-tests")["rows"]:
+    for row in study("timing-tests")["rows"]:
         kept = {name: value for name, value in row.items() if name.rpartition("_")[0] not in means}
         rows[row["test"]] = _with_ends(kept, *names)
     return rows

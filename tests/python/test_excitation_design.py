@@ -8,8 +8,9 @@ import numpy as np
 import pytest
 
 from mgdd.errors import ConvergenceError, ParameterError
-from mgdd.identify import check_excitation, chirp, design_excitation, triangle
-from mgdd.identify.excitation_design import EXCITATIONS
+from mgdd.identify import check_excitation, design_excitation
+from mgdd.identify.throttle.excitation_design import EXCITATIONS
+from mgdd.signals import chirp, triangle
 from mgdd.throttle import Throttle, groups, simulate
 
 P1 = Throttle()

@@ -11,7 +11,9 @@ import xarray as xr
 
 from mgdd import datasets
 from mgdd.errors import DataError, ParameterError, ShapeError
-from mgdd.identify import (
+from mgdd.results import labelled_dataset
+from mgdd.studies import run_study
+from mgdd.studies.benchmarks import (
     DriveModel,
     TwoTanksModel,
     drive_free_run,
@@ -21,8 +23,6 @@ from mgdd.identify import (
     fit_two_tanks,
     fit_wiener_hammerstein,
 )
-from mgdd.results import labelled_dataset
-from mgdd.studies import run_study
 
 SETS = ("emps", "cascaded_tanks", "wh2009")
 needs = {

@@ -9,17 +9,9 @@ import numpy as np
 import pytest
 
 from mgdd.errors import DataError, ParameterError
-from mgdd.identify import (
-    FittedParameters,
-    ThrottleModel,
-    amplitude_random_steps,
-    chirp,
-    identify_throttle,
-    load_throttle_model,
-    triangle,
-    validate_throttle,
-)
+from mgdd.identify import FittedParameters, ThrottleModel, identify_throttle, load_throttle_model, validate_throttle
 from mgdd.io import throttle_log
+from mgdd.signals import amplitude_random_steps, chirp, triangle
 from mgdd.throttle import Throttle, simulate
 
 P1 = Throttle()

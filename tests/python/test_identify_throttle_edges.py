@@ -12,16 +12,9 @@ import xarray as xr
 from mgdd import presets
 from mgdd.cli import main
 from mgdd.errors import ParameterError
-from mgdd.identify import (
-    FirstPrincipleModel,
-    amplitude_random_steps,
-    chirp,
-    design_excitation,
-    identify_throttle,
-    throttle_start,
-    validate_throttle,
-)
+from mgdd.identify import FirstPrincipleModel, design_excitation, identify_throttle, throttle_start, validate_throttle
 from mgdd.io import throttle_log, write_throttle_log
+from mgdd.signals import amplitude_random_steps, chirp
 from mgdd.throttle import Throttle, groups, simulate
 
 NOISE_DEG = 0.03

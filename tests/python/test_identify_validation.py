@@ -10,9 +10,9 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 from hypothesis.extra.numpy import arrays
 
-from mgdd import identify
+from mgdd import identify, signals
 from mgdd.errors import DataError, ParameterError, ShapeError
-from mgdd.identify.record_content import open_questions, record_content
+from mgdd.identify.throttle.record_content import open_questions, record_content
 from mgdd.io import throttle_log
 
 TIME = np.arange(6000) * 1e-3
@@ -24,32 +24,32 @@ signals = arrays(np.float64, 40, elements=st.floats(-1e3, 1e3)).filter(lambda y:
 @settings(max_examples=50, deadline=None)
 @given(y=signals, offset=st.floats(-100.0, 100.0))
 def test_the_metrics_have_their_fixed_points(y: np.ndarray, offset: float) -> None:
-    assert identify.fit_percent(y, y) == 100.0
-    assert identify.fit_percent(y, np.full_like(y, y.mean())) == pytest.approx(0.0, abs=1e-9)
-    assert identify.fit_percent(y - y.mean(), -(y - y.mean())) == pytest.approx(-100.0, abs=1e-9)
-    assert identify.vaf_percent(y, y + offset) == pytest.approx(100.0, abs=1e-9)
-    assert identify.rmse(y, y + offset) == pytest.approx(abs(offset), rel=1e-9, abs=1e-9)
-    assert identify.mse(y, y + offset) == pytest.approx(offset**2, rel=1e-9, abs=1e-9)
+    assert signals.fit_percent(y, y) == 100.0
+    assert signals.fit_percent(y, np.full_like(y, y.mean())) == pytest.approx(0.0, abs=1e-9)
+    assert signals.fit_percent(y - y.mean(), -(y - y.mean())) == pytest.approx(-100.0, abs=1e-9)
+    assert signals.vaf_percent(y, y + offset) == pytest.approx(100.0, abs=1e-9)
+    assert signals.rmse(y, y + offset) == pytest.approx(abs(offset), rel=1e-9, abs=1e-9)
+    assert signals.mse(y, y + offset) == pytest.approx(offset**2, rel=1e-9, abs=1e-9)
 
 
 def test_the_metrics_exactly() -> None:
     y = np.sin(np.linspace(0.0, 20.0, 500))
-    assert abs(identify.fit_percent(y, y) - 100.0) <= 1e-12
-    assert abs(identify.fit_percent(y, np.full_like(y, y.mean()))) <= 1e-12
-    assert identify.fit_percent(y, -y) < 0.0
-    assert abs(identify.vaf_percent(y, y + 3.0) - 100.0) <= 1e-12
-    assert identify.fit_percent(y, y + 3.0) < 0.0
+    assert abs(signals.fit_percent(y, y) - 100.0) <= 1e-12
+    assert abs(signals.fit_percent(y, np.full_like(y, y.mean()))) <= 1e-12
+    assert signals.fit_percent(y, -y) < 0.0
+    assert abs(signals.vaf_percent(y, y + 3.0) - 100.0) <= 1e-12
+    assert signals.fit_percent(y, y + 3.0) < 0.0
 
 
 def test_the_metrics_refuse_what_has_no_answer() -> None:
     with pytest.raises(DataError, match="constant"):
-        identify.fit_percent(np.ones(5), np.ones(5))
+        signals.fit_percent(np.ones(5), np.ones(5))
     with pytest.raises(DataError, match="second signal, sample 2: nan"):
-        identify.rmse(np.zeros(4), [0.0, 0.0, np.nan, 0.0])
+        signals.rmse(np.zeros(4), [0.0, 0.0, np.nan, 0.0])
     with pytest.raises(ShapeError, match="must be equal"):
-        identify.mse(np.zeros(4), np.zeros(5))
+        signals.mse(np.zeros(4), np.zeros(5))
     with pytest.raises(ShapeError, match="not empty"):
-        identify.mse([], [])
+        signals.mse([], [])
 
 
 def test_white_residuals_pass_as_often_as_they_should() -> None:
@@ -57,7 +57,7 @@ def test_white_residuals_pass_as_often_as_they_should() -> None:
     passed, inside = 0, []
     for _ in range(200):
         noise = rng.standard_normal((2, 1500))
-        tests = identify.residual_tests(noise[0], noise[1])
+        tests = signals.residual_tests(noise[0], noise[1])
         passed += tests.white
         inside += [tests.share_white, tests.share_independent]
     assert np.mean(inside) == pytest.approx(0.95, abs=0.01)
@@ -67,9 +67,9 @@ def test_white_residuals_pass_as_often_as_they_should() -> None:
 def test_memory_and_what_the_input_explains_are_found() -> None:
     noise = RNG.standard_normal((2, 4000))
     slow = np.convolve(noise[0], [1.0, 0.8, 0.4])[:4000]
-    assert not identify.residual_tests(slow, noise[1]).white
+    assert not signals.residual_tests(slow, noise[1]).white
     driven = noise[0] + 0.3 * np.roll(noise[1], 5)
-    tests = identify.residual_tests(driven, noise[1])
+    tests = signals.residual_tests(driven, noise[1])
     assert tests.share_independent < 1.0
     assert int(np.argmax(np.abs(tests.correlations["cross_correlation"].to_numpy()))) + 1 == 5
     assert float(tests.correlations["cross_correlation"][4]) == pytest.approx(0.3 / np.hypot(1.0, 0.3), abs=0.05)
@@ -78,13 +78,13 @@ def test_memory_and_what_the_input_explains_are_found() -> None:
 
 def test_residual_tests_refuse_too_little() -> None:
     with pytest.raises(DataError, match="100 samples"):
-        identify.residual_tests(np.arange(99.0), np.arange(99.0))
+        signals.residual_tests(np.arange(99.0), np.arange(99.0))
     with pytest.raises(DataError, match="residual is constant"):
-        identify.residual_tests(np.ones(200), np.arange(200.0))
+        signals.residual_tests(np.ones(200), np.arange(200.0))
     with pytest.raises(DataError, match="duty is constant"):
-        identify.residual_tests(np.arange(200.0), np.ones(200))
+        signals.residual_tests(np.arange(200.0), np.ones(200))
     with pytest.raises(ParameterError, match="lags = 0"):
-        identify.residual_tests(np.arange(200.0), np.arange(200.0), lags=0)
+        signals.residual_tests(np.arange(200.0), np.arange(200.0), lags=0)
 
 
 def log(angle: np.ndarray | None = None, duty: np.ndarray | None = None) -> Any:

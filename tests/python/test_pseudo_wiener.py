@@ -11,7 +11,7 @@ import pytest
 from mgdd.errors import DataError, ParameterError, ShapeError
 from mgdd.identify import OnlineUpdate, ThrottleModel, fit_pseudo_wiener
 from mgdd.io import throttle_log
-from mgdd.studies import run_ch7_pseudo_wiener
+from mgdd.studies import run_throttle_pseudo_wiener
 from mgdd.throttle import PseudoWiener, Throttle
 
 TIME = np.arange(4000) * 1e-3
@@ -157,7 +157,7 @@ def test_online_update_refuses_what_it_cannot_do() -> None:
 
 
 def test_the_study_ranks_the_kinds() -> None:
-    result = run_ch7_pseudo_wiener(starts=4, quick=True)
+    result = run_throttle_pseudo_wiener(starts=4, quick=True)
     rows = {(row["plant"], row["model"]): row for row in result.summary["rows"] if row["lag_start"] != "best"}
     better = {(row["plant"], row["model"]): row for row in result.summary["rows"] if row["lag_start"] == "best"}
     printed = {"P1": {"pw_r": 99.4, "pw_w": 79.7, "pw_p": 53.7}, "P2": {"pw_r": 99.4, "pw_w": 92.0, "pw_p": 82.4}}

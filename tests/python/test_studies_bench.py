@@ -11,22 +11,29 @@ import pytest
 
 from mgdd.loop import EngineBench, steady_optimum
 from mgdd.results import check_labels
-from mgdd.studies import StudyResult, available_studies, run_ch3_optimizers, run_ch4_sensors, run_ch4_tests, run_study
+from mgdd.studies import (
+    StudyResult,
+    available_studies,
+    run_nox_sensors,
+    run_seeker_comparison,
+    run_study,
+    run_timing_tests,
+)
 
 
 @pytest.fixture(scope="module")
 def seekers() -> StudyResult:
-    return run_ch3_optimizers(quick=True)
+    return run_seeker_comparison(quick=True)
 
 
 @pytest.fixture(scope="module")
 def sensors() -> StudyResult:
-    return run_ch4_sensors(quick=True)
+    return run_nox_sensors(quick=True)
 
 
 @pytest.fixture(scope="module")
 def four_tests() -> StudyResult:
-    return run_ch4_tests(quick=True)
+    return run_timing_tests(quick=True)
 
 
 @pytest.mark.parametrize("name", ["seekers", "sensors", "four_tests"])
@@ -48,7 +55,7 @@ def test_summary_dataset_and_figures(name: str, request: pytest.FixtureRequest) 
 
 
 def test_without_figures_and_with_seeds() -> None:
-    result = run_study("ch4-sensors", seeds=1, figures=False)
+    result = run_study("nox-sensors", seeds=1, figures=False)
     assert result.figures == {}
     assert result.summary["seeds"] == 1
     assert result.summary["rows"][0]["steady_error_percent_low"] is None  # one seed says nothing of its spread

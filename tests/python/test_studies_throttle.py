@@ -5,12 +5,12 @@ from __future__ import annotations
 import pytest
 
 from mgdd.results import check_labels
-from mgdd.studies import run_ch2_throttle_characteristics, run_ch7_first_principle
+from mgdd.studies import run_throttle_characteristics, run_throttle_first_principle
 
 
 @pytest.fixture(scope="module")
 def habits():
-    return run_ch2_throttle_characteristics(quick=True)
+    return run_throttle_characteristics(quick=True)
 
 
 def values(result, effect):
@@ -47,7 +47,7 @@ def test_result_is_labelled_and_drawn(habits):
 
 
 def test_groups_are_found_also_where_the_plant_does_more():
-    result = run_ch7_first_principle(seeds=1, quick=True)
+    result = run_throttle_first_principle(seeds=1, quick=True)
     check_labels(result.dataset)
     assert len(result.figures) == 3
     errors = {(row["case"], row["group"]): abs(row["error_percent"]) for row in result.summary["rows"]}

@@ -9,8 +9,8 @@ import pytest
 
 from mgdd import datasets
 from mgdd.errors import ConvergenceError, DataError, ParameterError
-from mgdd.identify import SurrogateEngine, fit_surrogate, random_step_records
 from mgdd.results import check_labels
+from mgdd.surrogate import SurrogateEngine, fit_surrogate, random_step_records
 
 INPUTS = ("soi_cad", "doi_main_ms", "doi_h2_ms", "p2m_us")
 AT = {"doi_main_ms": 0.42, "doi_h2_ms": 2.9, "p2m_us": 1200.0}

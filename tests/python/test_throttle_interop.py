@@ -9,7 +9,7 @@ import numpy as np
 import pytest
 
 from mgdd.errors import ParameterError
-from mgdd.identify import amplitude_random_steps
+from mgdd.signals import amplitude_random_steps
 from mgdd.throttle import PseudoWiener, Throttle, initial_state, simulate, to_iosystem
 
 

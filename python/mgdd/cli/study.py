@@ -28,7 +28,7 @@ def add(commands: Any) -> None:
         "study",
         run,
         help_text="run a study of the package: a table over seeds, with figures",
-        example="mgdd study ch4-esc --figures figures",
+        example="mgdd study sensor-delay --figures figures",
     )
     parser.add_argument("name", nargs="?", metavar="NAME", help=f"one of {', '.join(available_studies())}")
     parser.add_argument("--list", action="store_true", help="list the studies and their titles")

@@ -12,7 +12,7 @@ from mgdd.cli.output import emit
 from mgdd.cli.throttle_files import check_ending
 from mgdd.cli.throttle_parameters import add_throttle, throttle_of
 from mgdd.errors import ParameterError
-from mgdd.identify.excitation_design import EXCITATIONS
+from mgdd.identify.throttle.excitation_design import EXCITATIONS
 
 if TYPE_CHECKING:
     import xarray as xr

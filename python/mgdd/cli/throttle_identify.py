@@ -12,7 +12,7 @@ from mgdd.cli.options import add_command
 from mgdd.cli.output import check_figure, emit
 from mgdd.cli.throttle_files import add_log_options, check_ending, log_of, wrote
 from mgdd.errors import ConvergenceError
-from mgdd.identify.throttle_fit import KINDS
+from mgdd.identify.throttle.fit import KINDS
 
 if TYPE_CHECKING:
     import xarray as xr

@@ -13,7 +13,7 @@ from mgdd.engine import analyze, optimum, simulate
 from mgdd.engine.optimum import check_request
 from mgdd.errors import ConvergenceError
 from mgdd.identify import CylinderFit, LoadFit, fit_cylinder, wall_heat_profile
-from mgdd.identify.cylinder import BURN_FIELDS, SHAPE_FIELDS
+from mgdd.identify.engine.cylinder import BURN_FIELDS, SHAPE_FIELDS
 from mgdd.results import to_jsonable
 from mgdd.studies.base import StudyResult
 from mgdd.studies.measured_figures import draw

@@ -1,0 +1,24 @@
+"""Sampled signals, whatever the plant: quality figures, tests of residuals, excitation.
+
+Numbers in, numbers out; units are those of the caller.
+"""
+
+from __future__ import annotations
+
+from mgdd.signals.excitation import amplitude_random_steps, chirp, multisine, prbs, staircase, triangle
+from mgdd.signals.metrics import ResidualTests, fit_percent, mse, residual_tests, rmse, vaf_percent
+
+__all__ = [
+    "ResidualTests",
+    "amplitude_random_steps",
+    "chirp",
+    "fit_percent",
+    "mse",
+    "multisine",
+    "prbs",
+    "residual_tests",
+    "rmse",
+    "staircase",
+    "triangle",
+    "vaf_percent",
+]
