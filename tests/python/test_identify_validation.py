@@ -18,11 +18,11 @@ from mgdd.io import throttle_log
 TIME = np.arange(6000) * 1e-3
 RNG = np.random.default_rng(7)
 
-signals = arrays(np.float64, 40, elements=st.floats(-1e3, 1e3)).filter(lambda y: float(np.ptp(y)) > 1e-3)
+records = arrays(np.float64, 40, elements=st.floats(-1e3, 1e3)).filter(lambda y: float(np.ptp(y)) > 1e-3)
 
 
 @settings(max_examples=50, deadline=None)
-@given(y=signals, offset=st.floats(-100.0, 100.0))
+@given(y=records, offset=st.floats(-100.0, 100.0))
 def test_the_metrics_have_their_fixed_points(y: np.ndarray, offset: float) -> None:
     assert signals.fit_percent(y, y) == 100.0
     assert signals.fit_percent(y, np.full_like(y, y.mean())) == pytest.approx(0.0, abs=1e-9)
