@@ -15,7 +15,8 @@ import numpy as np
 
 from mgdd import datasets, presets
 from mgdd.engine import analyze, optimum, timing_sweep
-from mgdd.identify import CylinderFit, fit_cylinder
+from mgdd.identify import fit_cylinder
+from mgdd.identify.engine.records import CylinderFit
 
 if TYPE_CHECKING:
     import xarray as xr

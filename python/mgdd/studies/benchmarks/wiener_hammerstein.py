@@ -10,7 +10,7 @@ import numpy as np
 
 from mgdd import _core
 from mgdd.errors import DataError, ParameterError
-from mgdd.optimize import FitReport
+from mgdd.results import FitReport
 
 if TYPE_CHECKING:
     import xarray as xr
