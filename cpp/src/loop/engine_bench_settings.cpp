@@ -27,7 +27,7 @@ void within(const std::string& owner, Check check) {
   try {
     check();
   } catch (const ParameterError& error) {
-    throw ParameterError(owner + "." + error.what());
+    throw error.within(owner);
   }
 }
 
