@@ -47,11 +47,16 @@ TEST(CommonText, AnErrorCarriesFieldValueAndBoundBesideItsMessage) {
   EXPECT_EQ(std::get<double>(number.value), -86.0);
   EXPECT_EQ(number.bound, "> 0");
 
-  const ParameterError owned = number.within("cylinder");
+  const ParameterError owned = within("cylinder", number);
   EXPECT_STREQ(owned.what(), "cylinder.bore_mm = -86 mm: must be > 0");
   EXPECT_EQ(owned.field, "cylinder.bore_mm");
   EXPECT_EQ(std::get<double>(owned.value), -86.0);
   EXPECT_EQ(owned.bound, "> 0");
+
+  const ParameterError told = in_context("cycle 7: ", number);
+  EXPECT_STREQ(told.what(), "cycle 7: bore_mm = -86 mm: must be > 0");
+  EXPECT_EQ(told.field, "bore_mm");
+  EXPECT_EQ(told.bound, "> 0");
 
   const DataError count("samples", std::size_t{3}, "needs at least 8", "-");
   EXPECT_STREQ(count.what(), "samples = 3: needs at least 8");
@@ -73,10 +78,10 @@ TEST(CommonText, SharedBoundsSetThemToo) {
     }
     return ParameterError("nothing thrown");
   };
-  const ParameterError within = caught([] { require_within("gain", 2.0, 0.0, 1.0, "deg"); });
-  EXPECT_STREQ(within.what(), "gain = 2 deg: must be in [0, 1]");
-  EXPECT_EQ(within.field, "gain");
-  EXPECT_EQ(within.bound, "in [0, 1]");
+  const ParameterError closed = caught([] { require_within("gain", 2.0, 0.0, 1.0, "deg"); });
+  EXPECT_STREQ(closed.what(), "gain = 2 deg: must be in [0, 1]");
+  EXPECT_EQ(closed.field, "gain");
+  EXPECT_EQ(closed.bound, "in [0, 1]");
   const ParameterError nan = caught([] { require_positive("rate", std::numeric_limits<double>::quiet_NaN()); });
   EXPECT_EQ(nan.field, "rate");
   EXPECT_TRUE(std::isnan(std::get<double>(nan.value)));

@@ -61,16 +61,6 @@ struct Error : std::runtime_error {
 /// A parameter outside its domain.
 struct ParameterError : Error {
   using Error::Error;
-
-  /// The same refusal seen from the owner of the field: `owner.field = value: ...`.
-  [[nodiscard]] ParameterError within(std::string_view owner) const {
-    const std::string prefix = std::string(owner) + ".";
-    ParameterError outer(prefix + what());
-    outer.field = field.empty() ? field : prefix + field;
-    outer.value = value;
-    outer.bound = bound;
-    return outer;
-  }
 };
 
 /// An array of the wrong length or dimension.
@@ -92,5 +82,23 @@ struct ConvergenceError : Error {
 struct RigError : Error {
   using Error::Error;
 };
+
+/// The same refusal with words in front of its message: `cycle 7: J = inf: must be finite`.
+template <std::derived_from<Error> E>
+[[nodiscard]] E in_context(std::string_view words, const E& inner) {
+  E outer(std::string(words) + inner.what());
+  outer.field = inner.field;
+  outer.value = inner.value;
+  outer.bound = inner.bound;
+  return outer;
+}
+
+/// The same refusal seen from the owner of the field: `owner.field = value: ...`.
+template <std::derived_from<Error> E>
+[[nodiscard]] E within(std::string_view owner, const E& inner) {
+  E outer = in_context(std::string(owner) + ".", inner);
+  if (!inner.field.empty()) outer.field = std::string(owner) + "." + inner.field;
+  return outer;
+}
 
 }  // namespace mgdd
