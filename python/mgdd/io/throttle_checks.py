@@ -101,7 +101,9 @@ def check_throttle_log(log: xr.Dataset, *, two_sided: bool = False, limp_home_de
         if name not in log.variables or log[name].dims != ("time_s",):
             raise DataError(f"log has no {name}(time_s): make one with mgdd.io.read_throttle_log or throttle_log")
     names = [name for name in ("duty", "angle_deg", "current_a", "supply_v") if name in log]
-    check_labels(log[names])
+    signals = log[names]
+    signals.attrs = {}  # what the user notes beside the log is not ours to judge
+    check_labels(signals)
     place = Place(str(log.attrs.get("file", "log")))
     columns = {name: np.asarray(log[name].to_numpy(), dtype=np.float64) for name in ("time_s", *names)}
     check_finite(columns, place)

@@ -158,5 +158,5 @@ def sense(
             **{name: ("time_s", raw[name], "-", text) for name, text in _FLAGS.items()},
             "detected_s": ((), detected, "s", "time from onset to detection"),
         },
-        attrs={"seed": seed, "faults": tuple(f"{f.kind} of sensor {f.sensor}" for f in faults)},
+        attrs={"seed": seed, "faults": ", ".join(f"{f.kind} of sensor {f.sensor}" for f in faults)},
     )
