@@ -176,7 +176,8 @@ def _signal_of(excitation: xr.Dataset) -> tuple[np.ndarray, np.ndarray]:
     for name in ("time_s", "duty"):
         if name not in excitation.variables or excitation[name].dims != ("time_s",):
             raise DataError(f"excitation has no {name}(time_s): mgdd.signals.chirp and its sisters make one")
-    return (np.asarray(excitation[name].to_numpy(), dtype=np.float64) for name in ("time_s", "duty"))  # type: ignore[return-value]
+    time, duty = (np.asarray(excitation[name].to_numpy(), dtype=np.float64) for name in ("time_s", "duty"))
+    return time, duty
 
 
 def _check_limits(window: tuple[float, float], max_rate_deg_per_s: float | None, max_current_a: float | None) -> None:
