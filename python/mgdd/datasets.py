@@ -14,6 +14,7 @@ from mgdd.errors import DataError
 from mgdd.io import read_conditions, read_pressure
 from mgdd.io.table import read_table
 from mgdd.results import labelled_dataset
+from mgdd.signals.even_grid import check_count
 
 if TYPE_CHECKING:
     import xarray as xr
@@ -251,9 +252,7 @@ def load_h2df_cycles(*, checked: bool = True, mask_held: bool = True) -> xr.Data
         )
     table = read_table(file)
     cycle = table.numbers(table.index("cycle"))
-    if not np.all(np.diff(cycle) == 1.0):
-        row = int(np.argmax(np.diff(cycle) != 1.0)) + 1
-        raise DataError(f"{file}: cycle {cycle[row]:g} follows {cycle[row - 1]:g}: cycles must count up by one")
+    check_count(cycle, f"{file}: cycle")
     columns = {column: table.numbers(table.index(column)) for column in _H2DF_COLUMNS}
     arrays = {entry[0]: entry[1] * columns[column] for column, entry in _H2DF_COLUMNS.items()}
     arrays["exhaust_temperature_k"] += 273.15

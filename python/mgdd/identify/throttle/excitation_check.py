@@ -12,6 +12,7 @@ from mgdd.errors import ParameterError
 from mgdd.identify.throttle.prior import prior_of
 from mgdd.identify.throttle.record_content import RecordContent, open_questions, record_content
 from mgdd.results import labelled_dataset
+from mgdd.signals.even_grid import even_step
 
 if TYPE_CHECKING:
     import xarray as xr
@@ -177,6 +178,7 @@ def _signal_of(excitation: xr.Dataset) -> tuple[np.ndarray, np.ndarray]:
         if name not in excitation.variables or excitation[name].dims != ("time_s",):
             raise DataError(f"excitation has no {name}(time_s): mgdd.signals.chirp and its sisters make one")
     time, duty = (np.asarray(excitation[name].to_numpy(), dtype=np.float64) for name in ("time_s", "duty"))
+    even_step(time)
     return time, duty
 
 

@@ -12,6 +12,7 @@ from mgdd.errors import DataError, ParameterError
 from mgdd.identify.throttle.fit import ThrottleModel
 from mgdd.io import check_throttle_log
 from mgdd.results import labelled_dataset
+from mgdd.signals.even_grid import even_step
 from mgdd.signals.metrics import rmse
 
 if TYPE_CHECKING:
@@ -113,7 +114,7 @@ def n_step_rms(
     """
     time, duty, angle = columns_of(log)
     truth = angle if true_deg is None else np.asarray(true_deg, dtype=np.float64)
-    step = step_of(time)
+    step = even_step(time)
     horizons_s = whole_horizons(step, time.size) if horizons_s is None else horizons_s
     skip = round(DISCARD_S / step)
     table = np.empty((2, len(horizons_s)))
@@ -136,10 +137,6 @@ def n_step_rms(
 def columns_of(log: xr.Dataset) -> tuple[NDArray[np.float64], NDArray[np.float64], NDArray[np.float64]]:
     time, duty, angle = (np.asarray(log[n].to_numpy(), dtype=np.float64) for n in ("time_s", "duty", "angle_deg"))
     return time, duty, angle
-
-
-def step_of(time: NDArray[np.float64]) -> float:
-    return float(time[-1] - time[0]) / (time.size - 1)
 
 
 def whole_horizons(step_s: float, size: int) -> tuple[float, ...]:

@@ -13,6 +13,7 @@ from mgdd import _core
 from mgdd.errors import DataError, ParameterError
 from mgdd.identify.throttle.fit import ThrottleFit
 from mgdd.optimize import FitReport
+from mgdd.signals.even_grid import common_step
 from mgdd.signals.metrics import fit_percent
 from mgdd.throttle import PseudoWiener
 
@@ -186,10 +187,5 @@ def fit_pseudo_wiener(
 
 
 def _sample(logs: Sequence[xr.Dataset]) -> float:
-    steps = []
-    for one in logs:
-        time = one["time_s"].to_numpy()
-        steps.append(float(time[-1] - time[0]) / max(1, time.size - 1))
-    if max(steps) - min(steps) > 1e-3 * min(steps) or not min(steps) > 0.0:
-        raise DataError("the logs have different sample times: resample them to one")
-    return steps[0]
+    names = [f"log {k}" for k in range(1, len(logs) + 1)]
+    return common_step([one["time_s"].to_numpy() for one in logs], names)

@@ -11,11 +11,12 @@ import numpy as np
 
 from mgdd.errors import DataError
 from mgdd.identify.throttle.fit import ThrottleFit, ThrottleModel
-from mgdd.identify.throttle.n_step import DISCARD_S, columns_of, n_step_rms, samples_of, step_of, whole_horizons
+from mgdd.identify.throttle.n_step import DISCARD_S, columns_of, n_step_rms, samples_of, whole_horizons
 from mgdd.identify.throttle.prior import prior_of
 from mgdd.identify.throttle.record_content import open_questions, record_content
 from mgdd.io import check_throttle_log
 from mgdd.results import labelled_dataset
+from mgdd.signals.even_grid import even_step
 from mgdd.signals.metrics import ResidualTests, fit_percent, mse, residual_tests, rmse, vaf_percent
 
 if TYPE_CHECKING:
@@ -175,7 +176,7 @@ def validate_throttle(
     fit = model if isinstance(model, ThrottleFit) else None
     own = model.model if isinstance(model, ThrottleFit) else model
     time, duty, angle = columns_of(log)
-    step = step_of(time)
+    step = even_step(time)
     horizons_s = whole_horizons(step, time.size) if horizons_s is None else horizons_s
     for horizon in horizons_s:
         samples_of(horizon, step, time.size)
@@ -224,7 +225,7 @@ def free_run(model: ThrottleModel, log: xr.Dataset) -> xr.Dataset:
 
 def discarded(log: xr.Dataset) -> int:
     """Return how many samples at the start a figure of merit leaves out."""
-    return round(DISCARD_S / step_of(log["time_s"].to_numpy()))
+    return round(DISCARD_S / even_step(log["time_s"]))
 
 
 def entangled(report: FitReport) -> tuple[tuple[str, str, float], ...]:
