@@ -19,6 +19,9 @@ from mgdd.errors import DataError, ShapeError
 from mgdd.io import throttle_log
 from mgdd.results import labelled_dataset
 from mgdd.signals.even_grid import check_count, common_step, even_step
+from mgdd.studies.benchmarks.drive_axis import drive_inverse_dynamics
+from mgdd.studies.benchmarks.two_tanks import fit_two_tanks
+from mgdd.studies.benchmarks.wiener_hammerstein import fit_linear
 from mgdd.throttle import PseudoWiener, Throttle, sense, simulate
 
 STEP = 1e-3
@@ -48,20 +51,20 @@ def drive(time: np.ndarray[Any, Any]) -> object:
         "position_m": ("time_s", position, "m", "position"),
         "force_n_per_v": ((), 35.0, "N/V", "force per volt"),
     }
-    return identify.drive_inverse_dynamics(labelled_dataset(record))
+    return drive_inverse_dynamics(labelled_dataset(record))
 
 
 def tanks(time: np.ndarray[Any, Any]) -> object:
     level = 5.0 + np.sin(3.0 * EVEN)
     record = {"pump_v": ("time_s", DUTY + 3.0, "V", "pump"), "level_v": ("time_s", level, "V", "level")}
-    return identify.fit_two_tanks(labelled_dataset({"time_s": ("time_s", time), **record}), starts=1, max_iterations=1)
+    return fit_two_tanks(labelled_dataset({"time_s": ("time_s", time), **record}), starts=1, max_iterations=1)
 
 
 def circuit(time: np.ndarray[Any, Any]) -> object:
     signal = np.random.default_rng(0).standard_normal((2, time.size))
     output = lfilter([0.1], [1.0, -0.9], signal[0]) + 0.01 * signal[1]
     record = {"input_v": ("time_s", signal[0], "V", "input"), "output_v": ("time_s", output, "V", "output")}
-    return identify.fit_linear(labelled_dataset({"time_s": ("time_s", time), **record}), order=1, iterations=1)
+    return fit_linear(labelled_dataset({"time_s": ("time_s", time), **record}), order=1, iterations=1)
 
 
 def lag(_: float, x: Any, u: Any, p: Any) -> Any:

@@ -14,7 +14,7 @@ import pytest
 import xarray as xr
 
 import mgdd
-from mgdd import datasets, identify, optimize, presets
+from mgdd import datasets, identify, optimize, presets, signals, surrogate
 from mgdd.engine import Cylinder, OperatingPoint, analyze, convergence, sensitivities, simulate, timing_sweep
 from mgdd.io import (
     check_throttle_log,
@@ -77,8 +77,8 @@ def validation() -> identify.ThrottleValidation:
     return identify.validate_throttle(model, log())
 
 
-def surrogate() -> identify.EngineSurrogate:
-    return identify.fit_surrogate(identify.random_step_records(1500))
+def of_records() -> surrogate.EngineSurrogate:
+    return surrogate.fit_surrogate(surrogate.random_step_records(1500))
 
 
 def wall_heat() -> xr.Dataset:
@@ -100,27 +100,27 @@ SIGNALS = ("amplitude_random_steps", "chirp", "multisine", "prbs", "staircase", 
 NEEDS = {"load_cascaded_tanks": "cascaded_tanks", "load_emps": "emps", "load_h2df_cycles": "h2df_502",
          "load_wiener_hammerstein": "wh2009"}  # fmt: skip
 MADE: dict[str, Callable[[Path], Any]] = {
-    **{f"identify.{name}": lambda _, n=name: getattr(identify, n)(offset=0.15, amplitude=0.2) for name in SIGNALS},
+    **{f"signals.{name}": lambda _, n=name: getattr(signals, n)(offset=0.15, amplitude=0.2) for name in SIGNALS},
     **{f"datasets.{name}": lambda _, n=name: getattr(datasets, n)() for name in (*NEEDS, "load_hd_traces")},
     "engine.analyze": lambda _: analyze(simulate(Cylinder(), OperatingPoint(fuel_mg=0.0)), Cylinder()),
     "engine.convergence": lambda _: convergence(Cylinder(), POINT),
     "engine.sensitivities": lambda _: sensitivities(Cylinder(), POINT),
     "engine.simulate": lambda _: simulate(Cylinder(), OperatingPoint(intake_pressure_kpa=700.0, fuel_mg=400.0)),
     "engine.timing_sweep": lambda _: timing_sweep(Cylinder(), POINT),
-    "identify.EngineSurrogate.predict": lambda _: surrogate().predict([-4.0, 0.0]),
-    "identify.EngineSurrogate.quality": lambda _: surrogate().quality(),
+    "surrogate.EngineSurrogate.predict": lambda _: of_records().predict([-4.0, 0.0]),
+    "surrogate.EngineSurrogate.quality": lambda _: of_records().quality(),
     "identify.ExcitationCheck.prediction": lambda _: identify.check_excitation(
-        identify.chirp(offset=0.15, amplitude=0.1), Throttle()
+        signals.chirp(offset=0.15, amplitude=0.1), Throttle()
     ).prediction,
     "identify.LoadFit.overlay": lambda _: fitted_load(),
-    "identify.ResidualTests.correlations": lambda _: validation().tests.correlations,
+    "signals.ResidualTests.correlations": lambda _: validation().tests.correlations,
     "identify.ThrottleValidation.n_step": lambda _: validation().n_step,
     "identify.ThrottleValidation.free_run": lambda _: validation().free_run,
     "identify.WallHeatProfile.dataset": lambda _: wall_heat(),
     "identify.correlation_dataset": lambda _: identify.correlation_dataset(report()),
     "identify.design_excitation": lambda _: identify.design_excitation("chirp", Throttle())[0],
     "identify.n_step_rms": lambda _: validation().n_step,
-    "identify.random_step_records": lambda _: identify.random_step_records(50),
+    "surrogate.random_step_records": lambda _: surrogate.random_step_records(50),
     "identify.split_log": lambda _: identify.split_log(log(), shares=(0.5, 0.5)),
     "io.check_throttle_log": lambda _: check_throttle_log(log()),
     "io.pressure_trace": lambda _: pressure_trace(np.arange(-40.0, 41.0), 60.0 - 0.01 * np.arange(-40.0, 41.0) ** 2),
