@@ -51,7 +51,7 @@ def test_a_cycle_that_leaves_the_numbers_says_where() -> None:
 
 
 def test_slips_of_units_are_told() -> None:
-    assert simulate(Cylinder(), POINT).attrs["warnings"] == ()
+    assert simulate(Cylinder(), POINT).attrs["warnings"] == ""
     for cylinder, point in (
         (Cylinder(), POINT.replace(fuel_mg=500.0)),
         (Cylinder(), POINT.replace(intake_temperature_k=20.0)),
@@ -160,7 +160,7 @@ def test_start_is_checked_before_the_fit() -> None:
 def test_a_trace_that_lacks_the_closed_part_is_doubted() -> None:
     whole = datasets.load_hd_traces()[1]
     part = io.pressure_trace(whole["crank_angle_cad"].values[83:-63], whole["pressure_bar"].values[83:-63], name="part")
-    assert any("spans" in text for text in analyze(part, HD).attrs["warnings"])
+    assert "spans" in analyze(part, HD).attrs["warnings"]
     with pytest.raises(DataError, match=r"'part' starts at -60.*trapped_mass_g"):
         fit_cylinder([part], HD)
     shifted = io.pressure_trace(
@@ -173,10 +173,10 @@ def test_a_trace_that_lacks_the_closed_part_is_doubted() -> None:
 def test_a_spike_is_told() -> None:
     whole = datasets.load_hd_traces()[1]
     pressure = whole["pressure_bar"].values.copy()
-    assert analyze(whole, HD).attrs["warnings"] == ()
+    assert analyze(whole, HD).attrs["warnings"] == ""
     pressure[100] += 90.0
     spiked = io.pressure_trace(whole["crank_angle_cad"].values, pressure, name="spiked")
-    assert any("spike" in text for text in analyze(spiked, HD).attrs["warnings"])
+    assert "spike" in analyze(spiked, HD).attrs["warnings"]
 
 
 def test_best_timing_refuses_a_wrong_limit_before_any_fit() -> None:

@@ -87,7 +87,7 @@ def test_wrong_drive_input_is_named_then_right_works() -> None:
     with pytest.raises(ParameterError, match="'weight_kg': must be one of mass_kg"):
         DriveModel(parameters={"weight_kg": 1.0}, force_n_per_v=1.0).simulate([0.0, 1.0], [0.0, 0.0])
     model = DriveModel(parameters=SLIDE, force_n_per_v=35.0)
-    with pytest.raises(DataError, match="not evenly spaced"):
+    with pytest.raises(DataError, match="uneven sampling"):
         model.simulate([0.0, 0.1, 0.3], [0.0, 0.0, 0.0])
     with pytest.raises(ShapeError, match="must be one length"):
         model.simulate([0.0, 0.1, 0.2], [0.0, 0.0])

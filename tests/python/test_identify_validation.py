@@ -14,6 +14,7 @@ from mgdd import identify, signals
 from mgdd.errors import DataError, ParameterError, ShapeError
 from mgdd.identify.throttle.record_content import open_questions, record_content
 from mgdd.io import throttle_log
+from mgdd.throttle import Throttle, simulate
 
 TIME = np.arange(6000) * 1e-3
 RNG = np.random.default_rng(7)
@@ -219,3 +220,25 @@ def test_crossings_are_counted_with_a_band() -> None:
     content = record_content(TIME, 8.0 + 5.0 * np.sin(2.0 * np.pi * TIME) + noise, limp_home_deg=8.0)
     assert content.limp_home_crossings == 11
     assert content.time_above_s == pytest.approx(content.time_below_s, abs=0.05)
+
+
+@pytest.mark.parametrize("how", ["identify_throttle", "fit_throttle", "fit_pseudo_wiener"])
+def test_a_fit_in_percent_has_one_definition(how: str) -> None:
+    """Every way to a fit says the figure that its validation says: the free run without its first 50 ms."""
+    rng = np.random.default_rng(0)
+    train, test = (
+        throttle_log(run["time_s"], run["duty"], run["angle_deg"] + 0.03 * rng.standard_normal(run.sizes["time_s"]))
+        for run in (
+            simulate(Throttle(), signals.chirp(4.0, offset=0.15, amplitude=swing)["duty"]) for swing in (0.2, 0.15)
+        )
+    )
+    fits = {
+        "identify_throttle": lambda: identify.identify_throttle(train, test=test, starts=1),
+        "fit_throttle": lambda: identify.fit_throttle(train, test=test, n_starts=1),
+        "fit_pseudo_wiener": lambda: identify.fit_pseudo_wiener(train, limp_home_deg=8.0, starts=1),
+    }
+    fit = fits[how]()
+    assert fit.fit_percent_train == identify.validate_throttle(fit.model, train).fit_percent
+    if fit.fit_percent_test is not None:
+        validation = identify.validate_throttle(fit.model, test)
+        assert (fit.fit_percent_test, fit.rmse_test_deg) == (validation.fit_percent, validation.rmse_deg)

@@ -155,7 +155,7 @@ def _analyze(args: argparse.Namespace) -> None:
         "method": result.attrs["method"],
         "gamma": named,
         "fractions": result.attrs["fractions"],
-        "warnings": list(result.attrs["warnings"]),
+        "warnings": result.attrs["warnings"].splitlines(),
     }
     emit(args, payload, traces=result)
 

@@ -6,7 +6,7 @@ import argparse
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
-from mgdd import identify
+from mgdd import identify, signals
 from mgdd.cli.options import add_command
 from mgdd.cli.output import emit
 from mgdd.cli.throttle_files import check_ending
@@ -98,7 +98,7 @@ def _excite(args: argparse.Namespace) -> None:
             angle_window_deg=window, **limits,
         )  # fmt: skip
     else:
-        make = getattr(identify, args.kind)
+        make = getattr(signals, args.kind)
         signal = make(offset=args.offset, amplitude=args.amplitude, step_s=args.step_s, **given)
         check = identify.check_excitation(signal, throttle, angle_window_deg=window, **limits)
         if not check.passed:

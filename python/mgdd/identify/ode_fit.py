@@ -12,6 +12,7 @@ import numpy as np
 from mgdd import _core
 from mgdd.errors import DataError, ParameterError, ShapeError
 from mgdd.optimize import FitReport, least_squares
+from mgdd.signals.even_grid import even_step
 
 if TYPE_CHECKING:
     from collections.abc import Callable, Collection, Sequence
@@ -327,11 +328,9 @@ def _record(time_s: ArrayLike, u: ArrayLike) -> tuple[NDArray[np.float64], NDArr
     inputs = inputs[:, None] if inputs.ndim == 1 else inputs
     if time.ndim != 1 or time.size < 2 or inputs.ndim != 2 or len(inputs) != time.size:
         raise ShapeError(f"time_s has shape {time.shape}, u {inputs.shape}: must be (n,) and (n,) or (n, n_inputs)")
-    steps = np.diff(time)
     if not np.isfinite(inputs).all() or not np.isfinite(time).all():
         raise DataError("time_s, u: must be finite numbers")
-    if not (steps > 0.0).all() or steps.max() - steps.min() > 1e-3 * steps.mean():
-        raise DataError("time_s: must rise in equal steps; resample the record first")
+    even_step(time)
     return time, inputs
 
 
@@ -345,7 +344,7 @@ def _simulate(
     substeps: int,
 ) -> NDArray[np.float64]:
     x = state.copy()
-    h = (time[-1] - time[0]) / (time.size - 1) / substeps
+    h = even_step(time) / substeps
     y = np.empty((time.size, p.shape[1]))
 
     def slope(t: float, at: NDArray[np.float64], u: NDArray[np.float64]) -> NDArray[np.float64]:

@@ -36,7 +36,7 @@ def summarize(
                 "analysis": {name: float(analysis[name]) for name in _ANALYSIS},
                 "calibrated": load.to_dict(),
                 "best_timing": best,
-                "warnings": list(analysis.attrs["warnings"]),
+                "warnings": analysis.attrs["warnings"].splitlines(),
             }
         )
     return {

@@ -12,6 +12,7 @@ import numpy as np
 
 from mgdd import _core
 from mgdd.errors import DataError, ParameterError, ShapeError
+from mgdd.signals.even_grid import even_step, is_same_step
 
 if TYPE_CHECKING:
     from numpy.typing import ArrayLike, NDArray
@@ -22,7 +23,6 @@ __all__ = ["PseudoWiener"]
 
 _STEP_S = 5e-4  # of PW-R
 _GAIN_SAMPLE_S = 1e-3  # the observer gains are per 1 ms
-_UNEVEN = 1e-3
 
 
 class PseudoWiener:
@@ -138,7 +138,7 @@ class PseudoWiener:
             The copy, or the model itself.
         """
         old = self.parameters["sample_s"]
-        if abs(sample_s - old) <= _UNEVEN * old:
+        if is_same_step(sample_s, old):
             return self
         changes = {
             "sample_s": sample_s,
@@ -339,9 +339,7 @@ def _grid(time_s: ArrayLike, duty: ArrayLike) -> tuple[float, NDArray[np.float64
     column = np.asarray(duty, dtype=np.float64)
     if time.ndim != 1 or time.size < 2 or column.shape != time.shape:
         raise ShapeError(f"time_s has shape {time.shape}, duty {column.shape}: must be two columns of one length >= 2")
-    step = float(time[-1] - time[0]) / (time.size - 1)
-    if not step > 0.0 or not np.allclose(np.diff(time), step, rtol=0.0, atol=0.1 * step):
-        raise DataError("time_s is uneven: resample the record to a constant step")
+    step = even_step(time)
     if not (np.isfinite(column).all() and np.abs(column).max() <= 1.0):
         raise DataError("duty: must be finite and in [-1, 1]")
     return step, column

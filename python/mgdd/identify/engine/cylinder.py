@@ -222,7 +222,7 @@ def _doubts(traces: Sequence[xr.Dataset], cylinder: Cylinder, point: OperatingPo
     out = []
     for trace in traces:
         analysis = analyze(trace, cylinder, point=point, quiet=True)
-        out += [f"{analysis.attrs['file']}: {text}" for text in analysis.attrs["warnings"]]
+        out += [f"{analysis.attrs['file']}: {text}" for text in analysis.attrs["warnings"].splitlines()]
     return out
 
 

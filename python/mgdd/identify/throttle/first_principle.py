@@ -13,8 +13,8 @@ from mgdd.identify.throttle.first_principle_model import GROUP_NAMES, FirstPrinc
 from mgdd.identify.throttle.first_principle_start import SIDE_DEG, regression_start, rest_angle, spread_starts
 from mgdd.identify.throttle.fit import ThrottleFit
 from mgdd.identify.throttle.physical_parameters import physical_parameters
+from mgdd.identify.throttle.quality import quality
 from mgdd.optimize import FitReport
-from mgdd.signals.metrics import fit_percent
 
 if TYPE_CHECKING:
     import xarray as xr
@@ -130,6 +130,8 @@ def fit_throttle(
     True
     """
     time, duty, angle = log_columns(log)
+    if test is not None:
+        log_columns(test)
     step_s = sample_step(time, time.size)
     for name in [*(start or {}), *(fixed or {})]:
         if name not in GROUP_NAMES:
@@ -214,17 +216,12 @@ def fit_throttle(
             torque_constant_nm_per_a=torque_constant_nm_per_a,
         )
         findings.append("physical numbers: " + ", ".join(f"{name} {value:.4g}" for name, value in physical.items()))
-    fit_test, rmse_test = None, None
-    if test is not None:
-        test_time, test_duty, test_angle = log_columns(test)
-        run = model.simulate(test_time, test_duty, start_deg=float(test_angle[0]))
-        fit_test, rmse_test = fit_percent(test_angle, run), float(np.sqrt(np.mean((run - test_angle) ** 2)))
-    run = model.simulate(time, duty, start_deg=float(angle[0]))
+    fit_test, rmse_test = (None, None) if test is None else quality(model, [test])
     return ThrottleFit(
         report=report,
         model=model,
         kind="first_principle",
-        fit_percent_train=fit_percent(angle, run),
+        fit_percent_train=quality(model, [log])[0],
         fit_percent_test=fit_test,
         rmse_test_deg=rmse_test,
         parameters=dict(model.parameters),

@@ -11,8 +11,9 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from mgdd import _core
-from mgdd.errors import DataError, ParameterError, ShapeError
+from mgdd.errors import ParameterError, ShapeError
 from mgdd.identify.throttle.fit import FittedParameters
+from mgdd.signals.even_grid import even_step
 
 if TYPE_CHECKING:
     from numpy.typing import ArrayLike, NDArray
@@ -136,7 +137,4 @@ def sample_step(time_s: ArrayLike, size: int) -> float:
     time = np.asarray(time_s, dtype=np.float64)
     if time.ndim != 1 or time.size != size or size < 2:
         raise ShapeError(f"time_s has shape {time.shape}, duty {size} values: must be equal and at least 2")
-    steps = np.diff(time)
-    if steps.min() <= 0.0 or np.ptp(steps) > 1e-3 * steps.mean():
-        raise DataError("time_s: must rise in equal steps; read_throttle_log(..., step_s=...) resamples")
-    return float((time[-1] - time[0]) / (size - 1))
+    return even_step(time, remedy="read_throttle_log(..., step_s={step:g}) resamples")

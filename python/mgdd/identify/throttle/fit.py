@@ -64,11 +64,11 @@ class ThrottleFit:
     kind : str
         One of ``first_principle``, ``pw_r``, ``pw_w``, ``pw_p``.
     fit_percent_train : float
-        Free-run fit on the log it was fitted to [%].
+        Free-run fit on the log it was fitted to, without its first 50 ms [%].
     fit_percent_test : float or None
-        Free-run fit on another log [%].
+        The same on another log [%].
     rmse_test_deg : float or None
-        Free-run error on that log [deg].
+        Free-run error on that log, without its first 50 ms [deg].
     parameters : mapping of str to float
         All parameters of the model; the names end in their units.
     unidentifiable : tuple of str

@@ -11,10 +11,10 @@ from mgdd.errors import ParameterError
 from mgdd.identify.throttle.fit import KINDS, ThrottleFit
 from mgdd.identify.throttle.fits import check_kind, fit_kind
 from mgdd.identify.throttle.prior import prior_of
+from mgdd.identify.throttle.quality import quality
 from mgdd.identify.throttle.record_content import open_questions, record_content
-from mgdd.identify.throttle.validation import discarded, entangled, free_run
+from mgdd.identify.throttle.validation import entangled
 from mgdd.io import check_throttle_log
-from mgdd.signals.metrics import fit_percent, rmse
 
 if TYPE_CHECKING:
     from collections.abc import Sequence
@@ -113,8 +113,8 @@ def identify_throttle(
         log, model, limp_home_deg=known_home, two_sided=two_sided, delay_samples=delay_samples,
         stops_deg=(closed_deg, open_deg), starts=starts, seed=seed,
     )  # fmt: skip
-    train, _ = _quality(fit, log)
-    tested = (None, None) if test is None else _quality(fit, test)
+    train, _ = quality(fit.model, [log])
+    tested = (None, None) if test is None else quality(fit.model, [test])
     known = prior_of(fit.model)
     home = known.limp_home_deg if limp_home is None else limp_home
     content = record_content(
@@ -134,14 +134,6 @@ def identify_throttle(
         findings=findings,
         source=str(log.attrs.get("file", "log")),
     )
-
-
-def _quality(fit: ThrottleFit, log: xr.Dataset) -> tuple[float, float]:
-    """Return free-run fit [%] and error [deg], without the start."""
-    run = free_run(fit.model, log)
-    skip = discarded(log)
-    measured, modelled = run["angle_deg"].to_numpy()[skip:], run["model_deg"].to_numpy()[skip:]
-    return fit_percent(measured, modelled), rmse(measured, modelled)
 
 
 def _carried_over(train: float, test: float | None) -> tuple[str, ...]:

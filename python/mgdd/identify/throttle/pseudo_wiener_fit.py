@@ -12,8 +12,9 @@ import numpy as np
 from mgdd import _core
 from mgdd.errors import DataError, ParameterError
 from mgdd.identify.throttle.fit import ThrottleFit
+from mgdd.identify.throttle.quality import quality
 from mgdd.optimize import FitReport
-from mgdd.signals.metrics import fit_percent
+from mgdd.signals.even_grid import common_step
 from mgdd.throttle import PseudoWiener
 
 if TYPE_CHECKING:
@@ -160,10 +161,6 @@ def fit_pseudo_wiener(
     )
     wrapped = FitReport.from_core(report, np.concatenate([angle for _, angle in columns]))
     model = PseudoWiener(kind, parameters)
-    modelled = [
-        model.simulate(one["time_s"].to_numpy(), duty, start_deg=float(angle[0]))
-        for one, (duty, angle) in zip(logs, columns, strict=True)
-    ]
     found = [*wrapped.findings]
     if rmse.size > 1:
         found.append(f"{hits} of {rmse.size} searches ended at the best fit")
@@ -175,7 +172,7 @@ def fit_pseudo_wiener(
         report=wrapped,
         model=model,
         kind=kind,
-        fit_percent_train=fit_percent(np.concatenate([angle for _, angle in columns]), np.concatenate(modelled)),
+        fit_percent_train=quality(model, logs)[0],
         parameters=dict(model.parameters),
         unidentifiable=wrapped.unidentifiable,
         findings=tuple(found),
@@ -186,10 +183,5 @@ def fit_pseudo_wiener(
 
 
 def _sample(logs: Sequence[xr.Dataset]) -> float:
-    steps = []
-    for one in logs:
-        time = one["time_s"].to_numpy()
-        steps.append(float(time[-1] - time[0]) / max(1, time.size - 1))
-    if max(steps) - min(steps) > 1e-3 * min(steps) or not min(steps) > 0.0:
-        raise DataError("the logs have different sample times: resample them to one")
-    return steps[0]
+    names = [f"log {k}" for k in range(1, len(logs) + 1)]
+    return common_step([one["time_s"].to_numpy() for one in logs], names)

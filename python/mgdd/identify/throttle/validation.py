@@ -9,13 +9,14 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from mgdd.errors import DataError
 from mgdd.identify.throttle.fit import ThrottleFit, ThrottleModel
-from mgdd.identify.throttle.n_step import DISCARD_S, columns_of, n_step_rms, samples_of, step_of, whole_horizons
+from mgdd.identify.throttle.n_step import n_step_rms, samples_of, whole_horizons
 from mgdd.identify.throttle.prior import prior_of
+from mgdd.identify.throttle.quality import columns_of, discarded, free_run
 from mgdd.identify.throttle.record_content import open_questions, record_content
 from mgdd.io import check_throttle_log
 from mgdd.results import labelled_dataset
+from mgdd.signals.even_grid import even_step
 from mgdd.signals.metrics import ResidualTests, fit_percent, mse, residual_tests, rmse, vaf_percent
 
 if TYPE_CHECKING:
@@ -175,12 +176,12 @@ def validate_throttle(
     fit = model if isinstance(model, ThrottleFit) else None
     own = model.model if isinstance(model, ThrottleFit) else model
     time, duty, angle = columns_of(log)
-    step = step_of(time)
+    step = even_step(time)
     horizons_s = whole_horizons(step, time.size) if horizons_s is None else horizons_s
     for horizon in horizons_s:
         samples_of(horizon, step, time.size)
     run = free_run(own, log)
-    skip = discarded(log)
+    skip = discarded(step, time.size)
     measured, modelled = angle[skip:], run["model_deg"].to_numpy()[skip:]
     one = angle[1:] - np.asarray(own.predict(time, duty, angle, 1), dtype=np.float64)
     tests = residual_tests(one[skip:], duty[:-1][skip:])
@@ -202,29 +203,6 @@ def validate_throttle(
         findings=(*notes, *open_questions(content, swing=known.swing, pairs=pairs)),
         source=str(log.attrs.get("file", "log")),
     )
-
-
-def free_run(model: ThrottleModel, log: xr.Dataset) -> xr.Dataset:
-    """Run a model free over a log from its first angle."""
-    time, duty, angle = columns_of(log)
-    run = np.asarray(model.simulate(time, duty, start_deg=float(angle[0])), dtype=np.float64)
-    if run.shape != angle.shape or not np.isfinite(run).all():
-        raise DataError(f"the {model.kind} model runs away on {log.attrs.get('file', 'log')}: its fit has failed")
-    return labelled_dataset(
-        {
-            "time_s": ("time_s", time),
-            "duty": ("time_s", duty),
-            "angle_deg": ("time_s", angle),
-            "model_deg": ("time_s", run),
-            "residual_deg": ("time_s", run - angle, "deg", "model minus measured angle"),
-        },
-        attrs={"file": str(log.attrs.get("file", "log")), "kind": model.kind},
-    )
-
-
-def discarded(log: xr.Dataset) -> int:
-    """Return how many samples at the start a figure of merit leaves out."""
-    return round(DISCARD_S / step_of(log["time_s"].to_numpy()))
 
 
 def entangled(report: FitReport) -> tuple[tuple[str, str, float], ...]:

@@ -11,6 +11,7 @@ import numpy as np
 from mgdd import _core
 from mgdd.errors import DataError, ParameterError, ShapeError
 from mgdd.optimize import FitReport
+from mgdd.signals.even_grid import even_step
 
 if TYPE_CHECKING:
     import xarray as xr
@@ -392,8 +393,4 @@ def _spacing(time: NDArray[np.float64], drive: NDArray[np.float64]) -> float:
         raise ShapeError(f"time_s has shape {time.shape}, drive_v {drive.shape}: must be one length")
     if time.size < 2:
         raise DataError(f"time_s has {time.size} samples: at least two are needed")
-    steps = np.diff(time)
-    dt_s = float((time[-1] - time[0]) / (time.size - 1))
-    if not (dt_s > 0.0 and np.all(np.abs(steps - dt_s) < 1e-3 * dt_s)):
-        raise DataError("time_s is not evenly spaced: resample the record first")
-    return dt_s
+    return even_step(time)

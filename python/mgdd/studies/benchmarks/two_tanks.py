@@ -11,6 +11,7 @@ import numpy as np
 from mgdd import _core
 from mgdd.errors import DataError, ParameterError
 from mgdd.optimize import FitReport
+from mgdd.signals.even_grid import even_step
 
 if TYPE_CHECKING:
     import xarray as xr
@@ -244,9 +245,7 @@ def _fit(
     max_iterations: int,
 ) -> _core.FreeRunFit:
     time = record["time_s"].to_numpy()
-    dt_s = float(time[1] - time[0])
-    if not (dt_s > 0.0 and np.allclose(np.diff(time), dt_s, rtol=1e-3)):
-        raise DataError("time_s is not evenly spaced: resample the record first")
+    dt_s = even_step(time)
     pump, level = record["pump_v"].to_numpy(), record["level_v"].to_numpy()
     data = _core.FreeRunRecord(
         input=pump,

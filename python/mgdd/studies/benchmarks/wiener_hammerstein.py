@@ -11,6 +11,7 @@ import numpy as np
 from mgdd import _core
 from mgdd.errors import DataError, ParameterError
 from mgdd.optimize import FitReport
+from mgdd.signals.even_grid import even_step
 
 if TYPE_CHECKING:
     import xarray as xr
@@ -343,6 +344,7 @@ def _signals(record: xr.Dataset) -> tuple[Vector, Vector]:
     u, y = record["input_v"].to_numpy(), record["output_v"].to_numpy()
     if u.size < 1000:
         raise DataError(f"the record has {u.size} samples: at least 1000 are needed")
+    even_step(record["time_s"])
     return u, y
 
 
