@@ -119,7 +119,7 @@ def integrators() -> Rows:
             float(fired["work_booked_j"].sum()),
             *_values(fired, "work_closed_j"),
             *_values(fine, "efficiency_gross"),
-            engine.optimum(cylinder, point, integrator=name).soc_cad,
+            engine.find_optimum(cylinder, point, integrator=name)["soc_cad"],
         ]
     return rows
 
@@ -141,8 +141,8 @@ def gamma() -> Rows:
 
 def optimum() -> Rows:
     cylinder, point = single()
-    best = {s: engine.optimum(cylinder.replace(wall_heat_scale=s), point) for s in (0.0, 0.5, 1.0, 2.0)}
-    return {f"{s:g}": [b.ca50_cad, b.efficiency_gross, b.curvature_per_cad2] for s, b in best.items()}
+    best = {s: engine.find_optimum(cylinder.replace(wall_heat_scale=s), point) for s in (0.0, 0.5, 1.0, 2.0)}
+    return {f"{s:g}": [b["ca50_cad"], b["efficiency_gross"], b.curvature] for s, b in best.items()}
 
 
 def convergence() -> Rows:
@@ -349,7 +349,7 @@ NUMBERS: Mapping[str, Callable[[], float]] = {
     "wiebe_imep_error_percent": _imep_error("wiebe", "linear"),
     "double_wiebe_rmse_percent": _rmse("double_wiebe", "constant"),
     "double_wiebe_imep_error_percent": _imep_error("double_wiebe", "constant"),
-    "best_ca50_cad": lambda: engine.optimum(*single()).ca50_cad,
+    "best_ca50_cad": lambda: engine.find_optimum(*single())["ca50_cad"],
     "efficiency_gross": lambda: float(simulate(*single(), soc_cad=-6.0)["efficiency_gross"]),
     "seed_motored_work_j": lambda: integrators()["`seed`"][1],
     "step_error_imep_percent": lambda: (

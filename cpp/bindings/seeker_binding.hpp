@@ -148,8 +148,8 @@ void bind_seeking(py::class_<Recorded<S>>& cls) {
           "Accept what was measured at the input of the last ask.\n\n"
           "J: float, or one number per component; limits: one value per limit, in order or by name;\n"
           "misfire: the cycle is counted and its numbers are not read.\n"
-          "Raises ParameterError (tell without ask), ShapeError (wrong count), DataError (NaN or infinity); the\n"
-          "state is unchanged then.")
+          "Raises ParameterError (tell without ask), ShapeError (wrong count), DataError (not finite, or beyond\n"
+          "1e30 in magnitude); the state is unchanged then.")
       .def(
           "restart", [](R& r) { r.seeker.restart(); },
           "The operating point has changed: forget the window, keep the estimate.")

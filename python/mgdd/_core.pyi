@@ -393,8 +393,8 @@ class ExtremumSeeking:
         
         J: float, or one number per component; limits: one value per limit, in order or by name;
         misfire: the cycle is counted and its numbers are not read.
-        Raises ParameterError (tell without ask), ShapeError (wrong count), DataError (NaN or infinity); the
-        state is unchanged then.
+        Raises ParameterError (tell without ask), ShapeError (wrong count), DataError (not finite, or beyond
+        1e30 in magnitude); the state is unchanged then.
         """
     @property
     def amplitude_share(self) -> float:
@@ -477,8 +477,8 @@ class NewtonSeeking:
         
         J: float, or one number per component; limits: one value per limit, in order or by name;
         misfire: the cycle is counted and its numbers are not read.
-        Raises ParameterError (tell without ask), ShapeError (wrong count), DataError (NaN or infinity); the
-        state is unchanged then.
+        Raises ParameterError (tell without ask), ShapeError (wrong count), DataError (not finite, or beyond
+        1e30 in magnitude); the state is unchanged then.
         """
     @property
     def component_count(self) -> int:
@@ -566,8 +566,8 @@ class BoundedSeeking:
         
         J: float, or one number per component; limits: one value per limit, in order or by name;
         misfire: the cycle is counted and its numbers are not read.
-        Raises ParameterError (tell without ask), ShapeError (wrong count), DataError (NaN or infinity); the
-        state is unchanged then.
+        Raises ParameterError (tell without ask), ShapeError (wrong count), DataError (not finite, or beyond
+        1e30 in magnitude); the state is unchanged then.
         """
     @property
     def component_count(self) -> int:
@@ -640,8 +640,8 @@ class Spsa:
         
         J: float, or one number per component; limits: one value per limit, in order or by name;
         misfire: the cycle is counted and its numbers are not read.
-        Raises ParameterError (tell without ask), ShapeError (wrong count), DataError (NaN or infinity); the
-        state is unchanged then.
+        Raises ParameterError (tell without ask), ShapeError (wrong count), DataError (not finite, or beyond
+        1e30 in magnitude); the state is unchanged then.
         """
     @property
     def blocked(self) -> int:
@@ -739,8 +739,8 @@ class GradientDescent:
         
         J: float, or one number per component; limits: one value per limit, in order or by name;
         misfire: the cycle is counted and its numbers are not read.
-        Raises ParameterError (tell without ask), ShapeError (wrong count), DataError (NaN or infinity); the
-        state is unchanged then.
+        Raises ParameterError (tell without ask), ShapeError (wrong count), DataError (not finite, or beyond
+        1e30 in magnitude); the state is unchanged then.
         """
     @property
     def component_count(self) -> int:
@@ -828,8 +828,8 @@ class GoldenSection:
         
         J: float, or one number per component; limits: one value per limit, in order or by name;
         misfire: the cycle is counted and its numbers are not read.
-        Raises ParameterError (tell without ask), ShapeError (wrong count), DataError (NaN or infinity); the
-        state is unchanged then.
+        Raises ParameterError (tell without ask), ShapeError (wrong count), DataError (not finite, or beyond
+        1e30 in magnitude); the state is unchanged then.
         """
     @property
     def bracket(self) -> tuple[float, float]:

@@ -14,6 +14,7 @@ from mgdd.errors import DataError
 from mgdd.io import read_conditions, read_pressure
 from mgdd.io.table import read_table
 from mgdd.results import labelled_dataset
+from mgdd.signals.even_grid import check_count
 
 if TYPE_CHECKING:
     import xarray as xr
@@ -44,6 +45,14 @@ _PACKAGED = {
 _H2DF = "h2df_502"
 _H2DF_FILE = "h2df_test502_cycles.csv"
 _H2DF_SHA256 = "482b1cd0ce7e6389d8872f547d6fb05f7f63df9715eb6de1e76d7c066dada39c"
+# The sets that a reader reads, and the files that each needs.
+_FILES: dict[str, tuple[str, ...]] = {
+    "cascaded_tanks": ("dataBenchmark.csv",),
+    "emps": ("DATA_EMPS.mat", "DATA_EMPS_PULSES.mat"),
+    _H2DF: (_H2DF_FILE,),
+    _HD: (f"{_HD}_conditions.csv", f"{_HD}_traces.csv"),
+    "wh2009": ("WienerHammerBenchmark.csv",),
+}
 _CAD = "°CA aTDC"
 _SIGN = "given in degrees before TDC (positive = early), sign turned here"
 # Column of the file: name here, factor, unit, long name, note on the origin.
@@ -92,7 +101,7 @@ def available() -> tuple[str, ...]:
     Returns
     -------
     tuple of str
-        The sets in the package and the folders in ``MGDD_DATA_DIR``, sorted.
+        The sets whose files are all in the package or in ``MGDD_DATA_DIR``, sorted.
 
     Examples
     --------
@@ -101,8 +110,11 @@ def available() -> tuple[str, ...]:
     True
     """
     folder = _data_dir()
-    own = [entry.name for entry in folder.iterdir() if entry.is_dir()] if folder and folder.is_dir() else []
-    return tuple(sorted({*_PACKAGED, *own}))
+
+    def there(name: str, file: str) -> bool:
+        return file in _PACKAGED.get(name, {}) or (folder is not None and (folder / name / file).is_file())
+
+    return tuple(sorted(name for name, files in _FILES.items() if all(there(name, file) for file in files)))
 
 
 def path(name: str, file: str) -> Path:
@@ -240,9 +252,7 @@ def load_h2df_cycles(*, checked: bool = True, mask_held: bool = True) -> xr.Data
         )
     table = read_table(file)
     cycle = table.numbers(table.index("cycle"))
-    if not np.all(np.diff(cycle) == 1.0):
-        row = int(np.argmax(np.diff(cycle) != 1.0)) + 1
-        raise DataError(f"{file}: cycle {cycle[row]:g} follows {cycle[row - 1]:g}: cycles must count up by one")
+    check_count(cycle, f"{file}: cycle")
     columns = {column: table.numbers(table.index(column)) for column in _H2DF_COLUMNS}
     arrays = {entry[0]: entry[1] * columns[column] for column, entry in _H2DF_COLUMNS.items()}
     arrays["exhaust_temperature_k"] += 273.15
@@ -294,7 +304,7 @@ def load_emps() -> tuple[xr.Dataset, xr.Dataset]:
     ...     train, test = datasets.load_emps()
     ...     assert train.sizes["time_s"] == 24841
     """
-    first, second = (_emps_record(path("emps", file)) for file in ("DATA_EMPS.mat", "DATA_EMPS_PULSES.mat"))
+    first, second = (_emps_record(path("emps", file)) for file in _FILES["emps"])
     return first, second
 
 
@@ -353,7 +363,7 @@ def load_cascaded_tanks() -> tuple[xr.Dataset, xr.Dataset]:
     ...     train, test = datasets.load_cascaded_tanks()
     ...     assert test.sizes["time_s"] == 1024
     """
-    table = read_table(path("cascaded_tanks", "dataBenchmark.csv"))
+    table = read_table(path("cascaded_tanks", *_FILES["cascaded_tanks"]))
 
     def record(pump: str, level: str, title: str) -> xr.Dataset:
         values = table.numbers(table.index(pump)), table.numbers(table.index(level))
@@ -403,7 +413,7 @@ def load_wiener_hammerstein() -> tuple[xr.Dataset, xr.Dataset]:
     ...     train, test = datasets.load_wiener_hammerstein()
     ...     assert test.sizes["time_s"] == 78_800
     """
-    file = path("wh2009", "WienerHammerBenchmark.csv")
+    file = path("wh2009", *_FILES["wh2009"])
     with file.open(encoding="utf-8") as lines:
         header = lines.readline().strip()
         if not header.replace('"', "").startswith("uBenchMark,yBenchMark"):

@@ -102,8 +102,16 @@ def test_the_data_folder_comes_first(monkeypatch, tmp_path):
     own.parent.mkdir()
     own.write_text("mine")
     assert datasets.path(NAME, FILES[0]) == own
+
+
+def test_only_what_a_reader_reads_is_available(monkeypatch, tmp_path):
+    monkeypatch.setenv("MGDD_DATA_DIR", str(tmp_path))
     (tmp_path / "bench_7").mkdir()
-    assert datasets.available() == ("bench_7", NAME)
+    (tmp_path / "emps").mkdir()
+    (tmp_path / "emps" / "DATA_EMPS.mat").write_text("one of its two files")
+    assert datasets.available() == (NAME,)
+    (tmp_path / "emps" / "DATA_EMPS_PULSES.mat").write_text("the other")
+    assert datasets.available() == ("emps", NAME)
 
 
 def test_a_data_folder_that_is_not_there_is_no_obstacle(monkeypatch, tmp_path):

@@ -119,7 +119,7 @@ def test_wrong_calls_name_the_remedy_and_a_right_one_follows():
         fit(time, u, y, log_scaled=["gane"])
     with pytest.raises(ShapeError, match="one length"):
         fit(time, u, y[:-1])
-    with pytest.raises(DataError, match="equal steps"):
+    with pytest.raises(DataError, match="uneven sampling"):
         fit(time**2, u, y)
     with pytest.raises(DataError, match="y: sample 7"):
         fit(time, u, np.where(np.arange(100) == 7, np.nan, y))

@@ -12,6 +12,7 @@ from hypothesis import strategies as st
 
 from mgdd import identify, signals
 from mgdd.errors import DataError, ParameterError
+from mgdd.identify.throttle.excitation_check import _signal_of
 from mgdd.signals.excitation import maximum_length_sequence
 
 SIGNALS: dict[str, Callable[..., Any]] = {
@@ -183,6 +184,12 @@ def test_every_limit_is_told_with_its_remedy(limits: dict[str, Any], said: str) 
     assert said in str(found)
     assert "outside the limits" in check.summary()
     assert identify.check_excitation(signals.chirp(offset=0.1, amplitude=0.05), lazy, start_deg=20.0, **limits).passed
+
+
+def test_the_columns_of_a_signal_are_a_pair_that_can_be_read_twice() -> None:
+    columns = _signal_of(signals.chirp(offset=0.1, amplitude=0.1))
+    assert isinstance(columns, tuple)
+    assert [column.dtype for column in columns] == [np.float64, np.float64]
 
 
 def test_a_check_refuses_what_it_cannot_judge() -> None:

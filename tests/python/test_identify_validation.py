@@ -14,7 +14,9 @@ from mgdd import identify, signals
 from mgdd.errors import DataError, ParameterError, ShapeError
 from mgdd.identify.throttle.record_content import open_questions, record_content
 from mgdd.io import throttle_log
+from mgdd.optimize import FitOptions
 from mgdd.signals.model import RunInputs, SampledModel
+from mgdd.throttle import Throttle, simulate
 
 TIME = np.arange(6000) * 1e-3
 RNG = np.random.default_rng(7)
@@ -219,3 +221,25 @@ def test_crossings_are_counted_with_a_band() -> None:
     content = record_content(TIME, 8.0 + 5.0 * np.sin(2.0 * np.pi * TIME) + noise, limp_home_deg=8.0)
     assert content.limp_home_crossings == 11
     assert content.time_above_s == pytest.approx(content.time_below_s, abs=0.05)
+
+
+@pytest.mark.parametrize("how", ["identify_throttle", "fit_throttle", "fit_pseudo_wiener"])
+def test_a_fit_in_percent_has_one_definition(how: str) -> None:
+    """Every way to a fit says the figure that its validation says: the free run without its first 50 ms."""
+    rng = np.random.default_rng(0)
+    train, test = (
+        throttle_log(run["time_s"], run["duty"], run["angle_deg"] + 0.03 * rng.standard_normal(run.sizes["time_s"]))
+        for run in (
+            simulate(Throttle(), signals.chirp(4.0, offset=0.15, amplitude=swing)["duty"]) for swing in (0.2, 0.15)
+        )
+    )
+    once = FitOptions(n_starts=1)
+    fits = {
+        "identify_throttle": lambda: identify.identify_throttle(train, test=test, options=once),
+        "fit_throttle": lambda: identify.fit_throttle(train, test=test, options=once),
+        "fit_pseudo_wiener": lambda: identify.fit_pseudo_wiener(train, limp_home_deg=8.0, options=once),
+    }
+    fit = fits[how]()
+    assert fit.train == identify.validate_throttle(fit.model, train).quality
+    if fit.test is not None:
+        assert fit.test == identify.validate_throttle(fit.model, test).quality

@@ -60,7 +60,7 @@ def test_rows_and_dataset_on_made_records(made: EngineSurrogate) -> None:
         limited = "≤ 5" in one["objective"]
         weights = {"imep_bar": 1.0} if limited else {"imep_bar": 1.0, "nox_ppm": -0.001}
         limits = {"mprr": 5.0} if limited else {}
-        assert one["optimum_soi_cad"] == made.optimum(weights, limits).soi_cad
+        assert one["optimum_soi_cad"] == made.find_optimum(weights, limits)["soi_cad"]
         final = result.dataset["final_soi_cad"][at]
         assert one["final_soi_cad"] == pytest.approx(float(final.mean()))
         assert one["error_cad"] == pytest.approx(one["final_soi_cad"] - one["optimum_soi_cad"])

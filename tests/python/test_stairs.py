@@ -11,7 +11,7 @@ import pytest
 
 CPP = "common > math > dynamics > optimize > control > engine throttle > identify > guide > loop"
 PYTHON = (
-    "_core > errors > results presets > signals io plot > optimize > control > engine throttle > identify > surrogate"
+    "_core > errors > results presets > signals > io plot > optimize > control > engine throttle > identify > surrogate"
     " > guide > loop sweep design datasets > maps > rig > studies > report > cli > __main__"
 )
 

@@ -9,7 +9,7 @@ import math
 import numpy as np
 import pytest
 
-from mgdd.loop import EngineBench, steady_optimum
+from mgdd.loop import EngineBench, find_steady_optimum
 from mgdd.results import check_labels
 from mgdd.studies import (
     StudyResult,
@@ -66,7 +66,7 @@ def test_every_form_of_every_seeker_competes_and_arrives(seekers: StudyResult) -
     rows = {row["seeker"]: row for row in seekers.summary["rows"]}
     assert len(rows) == 13
     assert all(row["share_arrived"] == 1.0 for row in rows.values())
-    best = steady_optimum(EngineBench()).soc_cad
+    best = find_steady_optimum(EngineBench())["soc_cad"]
     assert seekers.summary["optimum_cad"] == pytest.approx(best)
     for row in rows.values():
         assert row["final_cad"] == pytest.approx(best, abs=1.0), row["seeker"]

@@ -77,7 +77,7 @@ def analyze(
         Traces over ``crank_angle_cad`` (rates belong to the step that ends at the sample) and scalars
         ``pegging_bar n_compression n_expansion ca10_cad ca50_cad ca90_cad heat_net_j heat_gross_j imep_closed_bar
         p_max_bar p_max_cad dp_max_bar_per_cad t_max_k``. Attributes ``method``, ``gamma``, ``fractions``,
-        ``motored`` (no burn in this trace) and ``warnings`` (what makes the figures doubtful).
+        ``motored`` (1: no burn in this trace, else 0) and ``warnings`` (what makes the figures doubtful, one per line).
 
     Raises
     ------
@@ -140,8 +140,8 @@ def analyze(
             "method": pegging,
             "gamma": text,
             "fractions": fractions,
-            "motored": raw["motored"],
-            "warnings": tuple(raw["warnings"]),
+            "motored": int(raw["motored"]),
+            "warnings": "\n".join(raw["warnings"]),
         },
     )
 

@@ -1,7 +1,8 @@
 """Identification: fitting models to measured records, and what such a fit can and cannot tell.
 
-Engine: `fit_cylinder`, `compare_laws`, `wall_heat_profile`, `best_timing`. Every fit answers with a `mgdd.results.Fit`. Throttle: `identify_throttle`, `validate_throttle` and the fits and
-excitations below them. Any ODE: `fit_ode`.
+Engine: `fit_cylinder`, `compare_laws`, `wall_heat_profile`, `best_timing`. Throttle: `identify_throttle`,
+`validate_throttle` and the fits and excitations below them. Any ODE: `fit_ode`. Every fit answers with a
+`mgdd.results.Fit`.
 """
 
 from __future__ import annotations

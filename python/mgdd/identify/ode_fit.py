@@ -16,7 +16,8 @@ from mgdd.optimize.fit_options import FitOptions, fit_options
 from mgdd.optimize.fit_run import draw_run, fit_run, quality_of
 from mgdd.results import VARIABLES, Fit, Label
 from mgdd.results.fit import n_best_of
-from mgdd.signals.model import RunInputs, SampledModel, columns_of, sample_step
+from mgdd.signals.even_grid import even_step
+from mgdd.signals.model import RunInputs, SampledModel, columns_of
 
 if TYPE_CHECKING:
     from collections.abc import Callable, Collection, Sequence
@@ -194,7 +195,7 @@ def fit_ode(
     chosen_options = fit_options(options, n_starts=1, seed=0, max_iterations=100, tolerance=1e-9)
     n_starts = chosen_options.n_starts
     time, *columns, measured = columns_of(record, ("time_s", *input_names, output_name))
-    sample_step(time)
+    even_step(time)
     inputs = np.column_stack(columns)
     state = np.array(initial_state, dtype=np.float64)
     if state.ndim != 1 or not np.isfinite(state).all():
@@ -319,7 +320,7 @@ def _simulate(
     substeps: int,
 ) -> NDArray[np.float64]:
     x = state.copy()
-    h = (time[-1] - time[0]) / (time.size - 1) / substeps
+    h = even_step(time) / substeps
     y = np.empty((time.size, p.shape[1]))
 
     def slope(t: float, at: NDArray[np.float64], u: NDArray[np.float64]) -> NDArray[np.float64]:

@@ -38,6 +38,7 @@ from mgdd.optimize.fit_options import FitOptions
 from mgdd.optimize.iterative_learning import ConvergenceReport, IterativeLearning
 from mgdd.optimize.least_squares import least_squares
 from mgdd.optimize.measured_map import MeasuredMap, measure_map
+from mgdd.optimize.optimum import Optimum
 from mgdd.optimize.run import load_seeker, maximize
 from mgdd.optimize.tuning import Tuning, tune
 
@@ -53,6 +54,7 @@ __all__ = [
     "Limit",
     "MeasuredMap",
     "NewtonSeeking",
+    "Optimum",
     "Spsa",
     "Tuning",
     "least_squares",

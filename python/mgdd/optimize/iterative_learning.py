@@ -240,7 +240,8 @@ class IterativeLearning:
         mgdd.errors.ShapeError
             Not one error per sample.
         mgdd.errors.DataError
-            A value that is not finite, with trial and sample, or trials that diverge beyond the range of a float.
+            A value that is not finite or beyond 1e30 in magnitude, with trial and sample, or trials that diverge
+            beyond the range of a float.
             As after every refusal, the learner is as it was.
 
         Examples

@@ -298,7 +298,7 @@ def _classified(report: _core.FitReport) -> tuple[Finding, ...]:
 def _strongest(report: _core.FitReport, count: int) -> list[tuple[str, str]]:
     """Return the `count` most correlated pairs outside the null directions, in the order of the parameters."""
     c, null = np.asarray(report.correlation), np.asarray(report.null_directions)
-    loose = np.asarray(null != 0.0).reshape(len(report.names), -1).any(axis=1)
+    loose = [bool(np.any(row != 0.0)) for row in np.reshape(null, (len(report.names), -1))]
     pairs = [
         (bool(loose[i] or loose[j]), -abs(c[i, j]), i, j)
         for i in range(len(report.names))

@@ -1,4 +1,4 @@
-"""Labelled results: xarray Datasets in which every variable says its unit and its long name.
+"""Labelled results: xarray Datasets in which every variable says its unit and its long name, ready for netCDF.
 
 The units of the names that several rooms share stand once, in `VARIABLES`.
 """
@@ -8,6 +8,7 @@ from __future__ import annotations
 import math
 from collections.abc import Mapping, Sequence
 from enum import Enum
+from numbers import Real
 from pathlib import PurePath
 from types import MappingProxyType
 from typing import TYPE_CHECKING, Any, NamedTuple
@@ -143,7 +144,7 @@ def labelled_dataset(
         scalar. A name that is its own only dimension becomes the coordinate of that dimension. Dimensionless
         quantities have the unit ``"-"``.
     attrs : mapping, optional
-        Attributes of the Dataset.
+        Attributes of the Dataset, as netCDF stores them: text, a number, or a flat sequence of numbers.
 
     Returns
     -------
@@ -154,7 +155,7 @@ def labelled_dataset(
     ------
     DataError
         A variable without unit or long name, a unit that contradicts `VARIABLES`, a dimension without
-        coordinate.
+        coordinate, an attribute that netCDF cannot hold.
     ShapeError
         Values whose shape does not fit ``dims``.
 
@@ -171,6 +172,7 @@ def labelled_dataset(
     """
     import xarray as xr
 
+    _check_attributes("the Dataset", attrs or {})
     arrays: dict[str, tuple[tuple[str, ...], np.ndarray[Any, Any], dict[str, str]]] = {}
     sizes: dict[str, tuple[int, str]] = {}
     for name, entry in variables.items():
@@ -192,7 +194,7 @@ def labelled_dataset(
 
 
 def check_labels(dataset: xr.Dataset) -> None:
-    """Refuse a Dataset in which a variable or coordinate lacks its unit or long name.
+    """Refuse a Dataset in which a variable lacks its unit or long name, or that netCDF cannot store.
 
     Parameters
     ----------
@@ -202,7 +204,7 @@ def check_labels(dataset: xr.Dataset) -> None:
     Raises
     ------
     DataError
-        Names the first offending variable.
+        Names the first offending variable or attribute.
 
     Examples
     --------
@@ -215,7 +217,9 @@ def check_labels(dataset: xr.Dataset) -> None:
     ...     print(error)
     variable pressure_bar has no units: say them ('-' if dimensionless)
     """
+    _check_attributes("the Dataset", dataset.attrs)
     for name, variable in dataset.variables.items():
+        _check_attributes(f"variable {name}", variable.attrs)
         _check(str(name), variable.attrs.get("units"), variable.attrs.get("long_name"))
     for dim in dataset.dims:
         if dim not in dataset.coords:
@@ -287,3 +291,25 @@ def _check(name: str, units: object, long_name: object) -> None:
     known = VARIABLES.get(name)
     if known is not None and known.units != units:
         raise DataError(f"variable {name} has units {units!r}: this name is reserved for {known.units!r}")
+
+
+def _check_attributes(owner: str, attrs: Mapping[Any, Any]) -> None:
+    """Refuse an attribute that no netCDF file can hold; found when the file is written, the run would be lost."""
+    for name, value in attrs.items():
+        if not isinstance(name, str) or not name:
+            raise DataError(f"attribute {name!r} of {owner}: its name must be text")
+        if isinstance(value, str) or _is_number(value):
+            continue
+        if isinstance(value, Sequence | np.ndarray) and not isinstance(value, bytes):
+            items = list(value) if np.ndim(np.asarray(value, dtype=object)) == 1 else []
+            if items and all(_is_number(item) for item in items):
+                continue
+        remedy = "join the lines to one text" if isinstance(value, Sequence) else "give text, or 0 or 1 for a bool"
+        raise DataError(
+            f"attribute {name} of {owner} = {value!r}: netCDF stores text, numbers and flat, non-empty sequences of "
+            f"numbers; {remedy}"
+        )
+
+
+def _is_number(value: object) -> bool:
+    return isinstance(value, Real) and not isinstance(value, bool)

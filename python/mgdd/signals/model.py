@@ -12,14 +12,13 @@ import numpy as np
 
 from mgdd.errors import DataError, ParameterError, ShapeError
 from mgdd.results import VARIABLES, Label, labelled_dataset
+from mgdd.signals.even_grid import even_step
 
 if TYPE_CHECKING:
     import xarray as xr
     from numpy.typing import NDArray
 
-__all__ = ["RunInputs", "SampledModel", "columns_of", "sample_step"]
-
-_UNEVEN = 1e-3
+__all__ = ["RunInputs", "SampledModel", "check_horizon", "columns_of"]
 
 
 class RunInputs(NamedTuple):
@@ -39,7 +38,6 @@ class SampledModel(ABC):
     state_names: tuple[str, ...] = ()
     observed_state: str | None = None  # the state that a measured output shows
     labels: ClassVar[Mapping[str, Label]] = MappingProxyType({})
-    uneven: ClassVar[float] = _UNEVEN
 
     @abstractmethod
     def _run(self, run: RunInputs) -> NDArray[np.float64]:
@@ -78,7 +76,7 @@ class SampledModel(ABC):
             A state that the model does not have.
         """
         time, *columns = columns_of(inputs, ("time_s", *self.input_names))
-        run = self._run(RunInputs(time, sample_step(time, self.uneven), columns, self.state_of(initial_state)))
+        run = self._run(RunInputs(time, even_step(time), columns, self.state_of(initial_state)))
         return self._labelled(time, {**dict(zip(self.input_names, columns, strict=True)), self.output_name: run})
 
     def predict(self, record: Any, horizon: int) -> xr.Dataset:
@@ -150,14 +148,6 @@ def columns_of(table: Any, names: Sequence[str]) -> list[NDArray[np.float64]]:
         if not np.isfinite(column).all():
             raise DataError(f"{name}: sample {int(np.argmin(np.isfinite(column)))} is not a finite number")
     return columns
-
-
-def sample_step(time: NDArray[np.float64], uneven: float = _UNEVEN) -> float:
-    """Return the step of an even grid [s]."""
-    step = float((time[-1] - time[0]) / (time.size - 1))
-    if not step > 0.0 or np.abs(np.diff(time) - step).max() > uneven * step:
-        raise DataError("time_s is not evenly spaced: must rise in equal steps; resample the record first")
-    return step
 
 
 def check_horizon(horizon: int, size: int) -> None:

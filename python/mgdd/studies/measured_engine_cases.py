@@ -16,11 +16,12 @@ from mgdd.optimize import (
     GoldenSection,
     Limit,
     NewtonSeeking,
+    Optimum,
     Spsa,
     Tuning,
     tune,
 )
-from mgdd.surrogate import EngineSurrogate, SurrogateEngine, SurrogateOptimum
+from mgdd.surrogate import EngineSurrogate, SurrogateEngine
 
 if TYPE_CHECKING:
     from numpy.typing import NDArray
@@ -79,8 +80,8 @@ class Case:
 
     objective: Objective
     seeker: str
-    best: SurrogateOptimum
-    free: SurrogateOptimum
+    best: Optimum
+    free: Optimum
     curvature: float
     tuning: Tuning
     noise_sd: float
@@ -97,9 +98,9 @@ def lag_of(surrogate: EngineSurrogate, name: str) -> ComponentLag:
 
 def tuned_case(surrogate: EngineSurrogate, objective: Objective, seeker: str, held: NDArray[np.float64]) -> Case:
     """Tune a seeker by the curvature of the surface and by the noise of J held at the start, `held`."""
-    best = surrogate.optimum(objective.weights, objective.limits)
-    free = surrogate.optimum(objective.weights)
-    around = surrogate.predict(free.soi_cad + np.array([-0.5, 0.0, 0.5]))
+    best = surrogate.find_optimum(objective.weights, objective.limits)
+    free = surrogate.find_optimum(objective.weights)
+    around = surrogate.predict(free["soi_cad"] + np.array([-0.5, 0.0, 0.5]))
     j = np.sum([weight * around[name].to_numpy() for name, weight in objective.weights.items()], axis=0)
     curvature = float(j[0] - 2.0 * j[1] + j[2]) / 0.25
     lags = tuple(lag_of(surrogate, name) for name in objective.weights) if objective.compensated else ()
@@ -123,7 +124,7 @@ def tuned_case(surrogate: EngineSurrogate, objective: Objective, seeker: str, he
     )
 
 
-def _tuned(noise: float, curvature: float, best: SurrogateOptimum, lag: ComponentLag, method: str) -> Tuning:
+def _tuned(noise: float, curvature: float, best: Optimum, lag: ComponentLag, method: str) -> Tuning:
     return tune(
         noise,
         curvature,
@@ -131,7 +132,7 @@ def _tuned(noise: float, curvature: float, best: SurrogateOptimum, lag: Componen
         delay_cycles=lag.delay_cycles,
         lag_cycles=lag.lag_cycles,
         cycles=_WISHED_CYCLES,
-        distance=abs(START_CAD - best.soi_cad),
+        distance=abs(START_CAD - best["soi_cad"]),
         arrival=ARRIVAL_CAD,
         amplitude_max=_AMPLITUDE_CAD,
     )

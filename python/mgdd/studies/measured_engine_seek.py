@@ -169,7 +169,7 @@ def _final(run: _Runs) -> NDArray[np.float64]:
 
 
 def _arrivals(case: Case, run: _Runs) -> NDArray[np.float64]:
-    near = np.abs(run.estimate - case.best.soi_cad) <= ARRIVAL_CAD
+    near = np.abs(run.estimate - case.best["soi_cad"]) <= ARRIVAL_CAD
     return np.where(near.any(axis=1), near.argmax(axis=1), np.nan)
 
 
@@ -183,10 +183,10 @@ def _row(case: Case, run: _Runs) -> dict[str, Any]:
         "seeker": case.seeker,
         **with_interval("final_soi_cad", final),
         "final_soi_sd_cad": float(final.std(ddof=1)) if final.size > 1 else math.nan,
-        "optimum_soi_cad": case.best.soi_cad,
-        "error_cad": float(final.mean() - case.best.soi_cad),
+        "optimum_soi_cad": case.best["soi_cad"],
+        "error_cad": float(final.mean() - case.best["soi_cad"]),
         "cycles_to_1_cad": median if math.isfinite(median) else None,
-        "ends_within_1_cad_share": float(np.mean(np.abs(final - case.best.soi_cad) <= ARRIVAL_CAD)),
+        "ends_within_1_cad_share": float(np.mean(np.abs(final - case.best["soi_cad"]) <= ARRIVAL_CAD)),
         "outside_share": float(run.outside.mean()),
         "mean_imep_bar": float(run.signals["imep_bar"][:, later:].mean()),
         "mean_pressure_rise": float(run.signals["mprr"][:, later:].mean()),
@@ -208,15 +208,21 @@ def _dataset(cases: list[Case], runs: list[_Runs], surrogate: EngineSurrogate) -
     estimates = np.stack([run.estimate for run in runs])
     low, median, high = np.quantile(estimates, [0.1, 0.5, 0.9], axis=1)
     every = ("case", "seed")
+    ranges = [case.best.bounds["soi_cad"] for case in cases]
     variables: dict[str, tuple[Any, ...]] = {
         "case": ("case", np.arange(len(cases)), "-", "seeker on objective"),
         "seed": ("seed", np.arange(estimates.shape[1]), "-", "seed"),
         "cycle": ("cycle", np.arange(estimates.shape[2])),
         "objective": ("case", [case.objective.name for case in cases], "-", "objective"),
         "seeker": ("case", [case.seeker for case in cases], "-", "seeker"),
-        "optimum_soi_cad": ("case", [case.best.soi_cad for case in cases], cad, "optimum of the surrogate"),
-        "supported_low_cad": ("case", [case.best.range_cad[0] for case in cases], cad, "earliest supported SOI"),
-        "supported_high_cad": ("case", [case.best.range_cad[1] for case in cases], cad, "latest supported SOI"),
+        "optimum_soi_cad": ("case", [case.best["soi_cad"] for case in cases], cad, "optimum of the surrogate"),
+        "supported_low_cad": (
+            "case",
+            [low for low, _ in ranges],
+            cad,
+            "earliest supported SOI",
+        ),
+        "supported_high_cad": ("case", [high for _, high in ranges], cad, "latest supported SOI"),
         "final_soi_cad": (every, finals, cad, "mean estimate of the last 100 cycles"),
         "final_soi_interval_cad": (
             "case",

@@ -37,7 +37,7 @@ def summarize(
                 "analysis": {name: float(analysis[name]) for name in _ANALYSIS},
                 "calibrated": figures_of(load),
                 "best_timing": best,
-                "warnings": list(analysis.attrs["warnings"]),
+                "warnings": analysis.attrs["warnings"].splitlines(),
             }
         )
     return {

@@ -10,13 +10,14 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from mgdd.loop import EngineBench, SteadyOptimum, steady_optimum
+from mgdd.loop import EngineBench, find_steady_optimum
 from mgdd.optimize import (
     BoundedSeeking,
     ExtremumSeeking,
     GoldenSection,
     GradientDescent,
     NewtonSeeking,
+    Optimum,
     Spsa,
     Tuning,
     tune,
@@ -101,7 +102,7 @@ def run_seeker_comparison(
     1.0
     """
     seeds = min(check_seeds(seeds), 6) if quick else check_seeds(seeds)
-    best = steady_optimum(EngineBench())
+    best = find_steady_optimum(EngineBench())
     contenders = _contenders(best)
     parts = [(c.name, partial(_run, c, best, seeds)) for c in contenders]
     done, interrupted = run_parts(parts, progress)
@@ -116,7 +117,7 @@ def run_seeker_comparison(
         "rows": [outcome.row for outcome in done],
         "iterative_learning": [own.row() for own in learned],
         "iterative_learning_seeds": min(seeds, 20),
-        "optimum_cad": best.soc_cad,
+        "optimum_cad": best["soc_cad"],
         "curvature_percent_per_cad2": best.curvature,
         "start_cad": START_CAD,
         "cycles": CYCLES,
@@ -130,9 +131,9 @@ def run_seeker_comparison(
     )
 
 
-def _contenders(best: SteadyOptimum) -> list[_Contender]:
+def _contenders(best: Optimum) -> list[_Contender]:
     box: dict[str, Any] = {"start": START_CAD, "lower": BOUNDS_CAD[0], "upper": BOUNDS_CAD[1]}
-    wish: dict[str, Any] = {"distance": best.soc_cad - START_CAD, "arrival": ARRIVAL_CAD}
+    wish: dict[str, Any] = {"distance": best["soc_cad"] - START_CAD, "arrival": ARRIVAL_CAD}
     batch = tune(NOISE_PERCENT, best.curvature, method="batch", **wish)
     spsa = tune(NOISE_PERCENT, best.curvature, method="spsa", **wish)
     dither = "amplitude 1, period 10, gain 0.98"
@@ -187,10 +188,10 @@ def _short(tuning: Tuning) -> str:
     return f"amplitude {tuning.amplitude:.2f}, period {tuning.period}, gain {tuning.gain:.2f}"
 
 
-def _run(contender: _Contender, best: SteadyOptimum, seeds: int) -> _Outcome:
+def _run(contender: _Contender, best: Optimum, seeds: int) -> _Outcome:
     seeker = contender.seeker
     table = finished_loops(
-        EngineBench(), seeker, range(seeds), cycles=CYCLES, optimum_cad=best.soc_cad, arrival_cad=ARRIVAL_CAD
+        EngineBench(), seeker, range(seeds), cycles=CYCLES, optimum_cad=best["soc_cad"], arrival_cad=ARRIVAL_CAD
     )
 
     def make(seed: int) -> tuple[EngineBench, Any]:
@@ -204,12 +205,12 @@ def _run(contender: _Contender, best: SteadyOptimum, seeds: int) -> _Outcome:
         "share_arrived": float(np.isfinite(table["cycles_to"]).mean()),
         "rms_cad": rms(table["rms_cad"]),
         **with_interval("final_cad", table["final_cad"]),
-        **with_interval("j_lost", best.j - table["mean_j"]),
+        **with_interval("j_lost", best.value - table["mean_j"]),
     }
     return _Outcome(row=row, bands=bands(make, range(min(seeds, _BAND_SEEDS)), _SHOWN), table=table)
 
 
-def _dataset(done: Sequence[_Outcome], learned: Sequence[Learned], best: SteadyOptimum) -> xr.Dataset:
+def _dataset(done: Sequence[_Outcome], learned: Sequence[Learned], best: Optimum) -> xr.Dataset:
     cad, dims = "°CA aTDC", ("seeker", "cycle")
     tracks = np.stack([outcome.bands for outcome in done])
 
@@ -229,7 +230,7 @@ def _dataset(done: Sequence[_Outcome], learned: Sequence[Learned], best: SteadyO
         "rms_cad": (own, by_seed("rms_cad"), "°CA", "rms error of the estimate, second half"),
         "final_cad": (own, by_seed("final_cad"), cad, "mean estimate of the last 100 cycles"),
         "mean_j": (own, by_seed("mean_j"), "%", "mean J, second half"),
-        "optimum_cad": ((), best.soc_cad, cad, "optimum"),
+        "optimum_cad": ((), best["soc_cad"], cad, "optimum"),
     }
     if learned:
         trials = learned[0].rms_cad.shape[1]

@@ -10,8 +10,8 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from mgdd.engine import Performance
-from mgdd.loop import EngineBench, SensorDynamics, SteadyOptimum, steady_optimum
-from mgdd.optimize import ComponentLag, ExtremumSeeking
+from mgdd.loop import EngineBench, SensorDynamics, find_steady_optimum
+from mgdd.optimize import ComponentLag, ExtremumSeeking, Optimum
 from mgdd.results import labelled_dataset, to_jsonable
 from mgdd.studies.base import Progress, StudyResult, check_seeds, run_parts
 from mgdd.studies.statistics import bands, finished_loops, rms, run_finished, with_interval
@@ -100,7 +100,7 @@ def run_sensor_delay(
     """
     seeds = min(check_seeds(seeds), 4) if quick else check_seeds(seeds)
     performance = Performance.efficiency_and_nox()
-    best = steady_optimum(EngineBench(**_QUIET, performance=performance, nox_sensor="true_value"))
+    best = find_steady_optimum(EngineBench(**_QUIET, performance=performance, nox_sensor="true_value"))
     parts = [(f"{case.name}, period {case.period}", partial(_run_case, case, best)) for case in CASES]
     done, interrupted = run_parts(parts, progress)
     rows = [row for row, _, _ in done]
@@ -120,9 +120,9 @@ def run_sensor_delay(
         "rows": rows,
         "component_wise": own,
         "frozen_slope_percent_per_cad": [slope for _, slope, _ in done],
-        "optimum_cad": best.soc_cad,
+        "optimum_cad": best["soc_cad"],
         "curvature_percent_per_cad2": best.curvature,
-        "start_cad": best.soc_cad - EARLY_CAD,
+        "start_cad": best["soc_cad"] - EARLY_CAD,
         "arrival_cad": ARRIVAL_CAD,
         "cycles": CYCLES,
         "slow_dither_rule_cycles": 6.0 * (_ANALYSER.delay_cycles + _ANALYSER.lag_cycles),
@@ -136,7 +136,7 @@ def run_sensor_delay(
     )
 
 
-def _run_case(case: _Case, best: SteadyOptimum) -> tuple[dict[str, Any], float, NDArray[np.float64]]:
+def _run_case(case: _Case, best: Optimum) -> tuple[dict[str, Any], float, NDArray[np.float64]]:
     """Give the row of one case, its slope as demodulated at the frozen start, and its trajectory."""
     sensor = SensorDynamics(delay_cycles=int(case.lag.delay_cycles), lag_cycles=case.lag.lag_cycles, noise_fraction=0.0)
     late = case.lag.delay_cycles + case.lag.lag_cycles
@@ -152,7 +152,7 @@ def _run_case(case: _Case, best: SteadyOptimum) -> tuple[dict[str, Any], float, 
 
     def seeker(hold_cycles: int | None) -> ExtremumSeeking:
         return ExtremumSeeking(
-            start=best.soc_cad - EARLY_CAD,
+            start=best["soc_cad"] - EARLY_CAD,
             lower=BOUNDS_CAD[0],
             upper=BOUNDS_CAD[1],
             form="moving_average",
@@ -163,7 +163,7 @@ def _run_case(case: _Case, best: SteadyOptimum) -> tuple[dict[str, Any], float, 
             hold_cycles=hold_cycles,
         )
 
-    run = run_finished(bench(), seeker(None), CYCLES, optimum_cad=best.soc_cad, arrival_cad=ARRIVAL_CAD)
+    run = run_finished(bench(), seeker(None), CYCLES, optimum_cad=best["soc_cad"], arrival_cad=ARRIVAL_CAD)
     settle = case.period * math.ceil((case.lag.delay_cycles + 20.0 * case.lag.lag_cycles) / case.period + 2.0)
     slope = _frozen_slope(bench(), seeker(settle + 2 * case.period), settle, case.period)
     stays = run.summary["cycles_stays"]
@@ -189,7 +189,7 @@ def _frozen_slope(bench: EngineBench, seeker: ExtremumSeeking, settle: int, peri
 
 
 def _component_wise(
-    period: int, time_constant: float, best: SteadyOptimum, seeds: int
+    period: int, time_constant: float, best: Optimum, seeds: int
 ) -> tuple[dict[str, Any], NDArray[np.float64]]:
     """Give the row of a seeker that demodulates efficiency at once and NOx with the analyser's phase, and its bands."""
     sensor = SensorDynamics(
@@ -201,7 +201,7 @@ def _component_wise(
             performance=Performance.efficiency_and_nox(), nox_sensor="analyser", analyser=sensor, seed=seed
         )
         return bench, ExtremumSeeking(
-            start=best.soc_cad,
+            start=best["soc_cad"],
             lower=BOUNDS_CAD[0],
             upper=BOUNDS_CAD[1],
             form="moving_average",
@@ -211,7 +211,7 @@ def _component_wise(
             components=[ComponentLag(), _ANALYSER],
         )
 
-    table = finished_loops(*make(0), range(seeds), cycles=CYCLES, optimum_cad=best.soc_cad)
+    table = finished_loops(*make(0), range(seeds), cycles=CYCLES, optimum_cad=best["soc_cad"])
     row = {
         "case": "analyser, NOx demodulated with its own phase",
         "period_cycles": period,
@@ -227,7 +227,7 @@ def _dataset(
     done: list[tuple[dict[str, Any], float, NDArray[np.float64]]],
     own: list[dict[str, Any]],
     tracks: list[NDArray[np.float64]],
-    best: SteadyOptimum,
+    best: Optimum,
 ) -> xr.Dataset:
     cad = "°CA aTDC"
     names = [f"{row['case']}, period {row['period_cycles']}" for row, _, _ in done]
@@ -241,7 +241,7 @@ def _dataset(
         "frozen_slope": ("case", [slope for _, slope, _ in done], "%/°CA", "demodulated slope of J, estimate frozen"),
         "cycles_stays": ("case", stays, "-", "cycle from which the estimate stays"),
         "final_cad": ("case", [row["final_cad"] for row, _, _ in done], cad, "mean estimate of the last cycles"),
-        "optimum_cad": ((), best.soc_cad, cad, "optimum"),
+        "optimum_cad": ((), best["soc_cad"], cad, "optimum"),
     }
     if own:
         both = np.stack(tracks)

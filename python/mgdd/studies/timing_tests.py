@@ -10,8 +10,8 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from mgdd.engine import Performance
-from mgdd.loop import EngineBench, SteadyOptimum, steady_map, steady_optimum
-from mgdd.optimize import ComponentLag, ExtremumSeeking, Limit
+from mgdd.loop import EngineBench, find_steady_optimum, steady_map
+from mgdd.optimize import ComponentLag, ExtremumSeeking, Limit, Optimum
 from mgdd.results import labelled_dataset, to_jsonable
 from mgdd.studies.base import Progress, StudyResult, check_seeds, run_parts
 from mgdd.studies.statistics import finished_loops, rms, run_with_slope, with_interval
@@ -46,7 +46,7 @@ class _Test:
             seed=seed,
         )
 
-    def seeker(self, best: SteadyOptimum, *, limited: bool = False) -> ExtremumSeeking:
+    def seeker(self, best: Optimum, *, limited: bool = False) -> ExtremumSeeking:
         late = self.nox_sensor == "analyser"
         return ExtremumSeeking(
             start=self.start_cad,
@@ -157,15 +157,15 @@ def run_timing_tests(
 def _run(test: _Test, seeds: int, *, limited: bool = False) -> _Outcome:
     bench = test.bench(limited=limited)
     caps = {"p_max_bar": P_MAX_BAR} if limited else {}
-    best = steady_optimum(bench, caps)
+    best = find_steady_optimum(bench, caps)
     seeker = test.seeker(best, limited=limited)
-    above = {name: cap + 3.0 * best.limit_scatter[name] for name, cap in caps.items()}
+    above = {name: cap + 3.0 * best[f"scatter_{name}"] for name, cap in caps.items()}
     table = finished_loops(
         bench,
         seeker,
         range(seeds),
         cycles=CYCLES,
-        optimum_cad=best.soc_cad,
+        optimum_cad=best["soc_cad"],
         arrival_cad=ARRIVAL_CAD,
         tail_cycles=TAIL,
         exceed_above=above or None,
@@ -179,7 +179,7 @@ def _run(test: _Test, seeds: int, *, limited: bool = False) -> _Outcome:
         "test": test.name,
         "period_cycles": test.period,
         "start_cad": test.start_cad,
-        "optimum_cad": best.soc_cad,
+        "optimum_cad": best["soc_cad"],
         **with_interval("final_cad", table["final_cad"]),
         "rms_cad": rms(table["rms_cad"]),
         **with_interval("cycles_to_1_cad", table["cycles_to"]),

@@ -7,7 +7,6 @@ from __future__ import annotations
 
 from mgdd.surrogate.engine import SurrogateEngine
 from mgdd.surrogate.fit import fit_surrogate
-from mgdd.surrogate.optimum import SurrogateOptimum
 from mgdd.surrogate.random_steps import random_step_records
 from mgdd.surrogate.response_surface import Support
 from mgdd.surrogate.sensor_lag import SensorLag
@@ -19,7 +18,6 @@ __all__ = [
     "SignalModel",
     "Support",
     "SurrogateEngine",
-    "SurrogateOptimum",
     "fit_surrogate",
     "random_step_records",
 ]

@@ -10,6 +10,7 @@ import numpy as np
 
 from mgdd.errors import DataError, ParameterError
 from mgdd.results import Label
+from mgdd.signals.even_grid import check_count
 from mgdd.surrogate.response_surface import QuadraticBasis, least_squares_of, r_squared, support_of
 from mgdd.surrogate.sensor_lag import SensorLag, find_sensor_lag, lagged
 from mgdd.surrogate.surrogate import STEERED, EngineSurrogate, SignalModel
@@ -229,8 +230,7 @@ def _read(
         if records[name].dims != ("cycle",):
             raise DataError(f"{name} has dims {records[name].dims}: must be ('cycle',)")
     cycle = records["cycle"].to_numpy()
-    if not np.all(np.diff(cycle) == 1):
-        raise DataError("cycle must count up by one: a lag in rows has no meaning across a gap")
+    check_count(cycle)
     commands = np.column_stack([records[name].to_numpy().astype(np.float64) for name in inputs])
     excited = records["excited"].to_numpy().astype(np.bool_) if "excited" in records else np.ones(cycle.size, np.bool_)
     if not np.all(np.isfinite(commands)):

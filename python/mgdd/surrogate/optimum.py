@@ -3,73 +3,33 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
-from dataclasses import dataclass
 from typing import TYPE_CHECKING
 
 import numpy as np
 from numpy.polynomial import Polynomial
 
+from mgdd._core import Limit
 from mgdd.errors import ConvergenceError
+from mgdd.optimize import Optimum
 
 if TYPE_CHECKING:
     from numpy.typing import NDArray
 
     from mgdd.surrogate.surrogate import EngineSurrogate
 
-__all__ = ["SurrogateOptimum", "best_along"]
+__all__ = ["best_along"]
 
 _TINY = 1e-9  # relative slack of a limit at its own crossing
-
-
-@dataclass(frozen=True, kw_only=True)
-class SurrogateOptimum:
-    """The best supported start of injection of a surrogate.
-
-    Parameters
-    ----------
-    soi_cad : float
-        Start of injection [°CA aTDC].
-    value : float
-        The objective there.
-    objective : mapping of str to float
-        Weight of each signal in what was maximised, per unit of the signal.
-    prediction : mapping of str to float
-        Every signal there, in its unit.
-    limits : mapping of str to float
-        Limits that were kept, in the units of the signals.
-    active_limits : tuple of str
-        Those that hold the optimum back.
-    at_edge : bool
-        Whether it lies on the edge of the supported range: the records say nothing of what is beyond.
-    range_cad : tuple of float
-        Ends of the supported range of SOI around it [°CA aTDC].
-
-    Examples
-    --------
-    >>> from mgdd.surrogate import fit_surrogate, random_step_records
-    >>> best = fit_surrogate(random_step_records(1500)).optimum("imep_bar")
-    >>> round(best.soi_cad), best.at_edge
-    (-4, False)
-    """
-
-    soi_cad: float
-    value: float
-    objective: Mapping[str, float]
-    prediction: Mapping[str, float]
-    limits: Mapping[str, float]
-    active_limits: tuple[str, ...]
-    at_edge: bool
-    range_cad: tuple[float, float]
 
 
 def best_along(
     surrogate: EngineSurrogate,
     weights: Mapping[str, float],
-    limits: Mapping[str, float],
+    kept: tuple[Limit, ...],
     at: Mapping[str, float] | None,
-) -> SurrogateOptimum:
+) -> Optimum:
     """Maximise the weighted sum of signals over SOI where supported and within the limits."""
-    support = surrogate.support
+    support, limits = surrogate.support, {limit.name: limit.upper - limit.margin for limit in kept}
     column = support.inputs.index("soi_cad")
     low, high = float(support.lower[column]), float(support.upper[column])
     nodes = np.linspace(low, high, 5)
@@ -104,15 +64,16 @@ def best_along(
         )
     best = float(candidates[int(np.argmax(np.where(feasible, goal(candidates), -np.inf)))])
     start, end = _range_around(best, edges, inside & _kept(rules, 0.5 * (edges[1:] + edges[:-1])))
-    return SurrogateOptimum(
-        soi_cad=best,
+    return Optimum(
+        inputs={"soi_cad": best},
+        objective=" + ".join(name if weight == 1.0 else f"{weight:g} {name}" for name, weight in weights.items()),
         value=float(goal(best)),
-        objective=dict(weights),
-        prediction={name: float(curve(best)) for name, curve in curves.items()},
-        limits=dict(limits),
+        values={name: float(curve(best)) for name, curve in curves.items()},
+        limits=kept,
         active_limits=tuple(n for n, curve in held.items() if abs(curve(best)) <= _TINY * max(1.0, abs(limits[n]))),
-        at_edge=min(best - start, end - best) <= _TINY * (high - low),
-        range_cad=(start, end),
+        at_bound=min(best - start, end - best) <= _TINY * (high - low),
+        bounds={"soi_cad": (start, end)},
+        curvature=float(goal.deriv(2)(best)),
     )
 
 

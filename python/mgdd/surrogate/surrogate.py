@@ -2,16 +2,19 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from functools import cached_property
 from typing import TYPE_CHECKING
 
 import numpy as np
 
+from mgdd._core import Limit
 from mgdd.errors import ParameterError
+from mgdd.optimize import Optimum
+from mgdd.optimize.optimum import limits_of
 from mgdd.results import Label, labelled_dataset
-from mgdd.surrogate.optimum import SurrogateOptimum, best_along
+from mgdd.surrogate.optimum import best_along
 from mgdd.surrogate.response_surface import QuadraticBasis, Support
 from mgdd.surrogate.sensor_lag import SensorLag
 
@@ -177,12 +180,12 @@ class EngineSurrogate:
         held = {name: value for name, value in self.operating_point(at).items() if name != STEERED}
         return labelled_dataset(variables, attrs=held)
 
-    def optimum(
+    def find_optimum(
         self,
         objective: str | Mapping[str, float] = "imep_bar",
-        limits: Mapping[str, float] | None = None,
+        limits: Mapping[str, float] | Sequence[Limit] | None = None,
         at: Mapping[str, float] | None = None,
-    ) -> SurrogateOptimum:
+    ) -> Optimum:
         """Find the start of injection that maximises a signal, or a weighted sum, within the support.
 
         Surfaces are quadratic along SOI, so the optimum is exact.
@@ -191,15 +194,16 @@ class EngineSurrogate:
         ----------
         objective : str or mapping of str to float
             A signal, or the weight of each signal, for example ``{"imep_bar": 1.0, "nox_ppm": -0.002}``.
-        limits : mapping of str to float, optional
-            Upper limits on signals, in their units.
+        limits : mapping of str to float, or sequence of Limit, optional
+            Upper limits on signals, in their units; the margin of a `Limit` is kept.
         at : mapping of str to float, optional
             The other inputs, in their units; their medians if left out.
 
         Returns
         -------
-        SurrogateOptimum
-            With ``at_edge`` when the records, not the engine, hold it.
+        mgdd.optimize.Optimum
+            Input ``soi_cad``; ``values`` holds every signal there, ``bounds`` the supported range around it, and
+            ``at_bound`` says that the records, not the engine, hold it.
 
         Raises
         ------
@@ -211,21 +215,21 @@ class EngineSurrogate:
         Examples
         --------
         >>> from mgdd.surrogate import fit_surrogate, random_step_records
-        >>> best = fit_surrogate(random_step_records(1500)).optimum("imep_bar", {"mprr": 5.0})
-        >>> best.active_limits, best.at_edge
+        >>> best = fit_surrogate(random_step_records(1500)).find_optimum("imep_bar", {"mprr": 5.0})
+        >>> best.active_limits, best.at_bound
         (('mprr',), False)
         """
         weights = {objective: 1.0} if isinstance(objective, str) else dict(objective)
-        limits = dict(limits or {})
+        kept = limits_of(limits)
         if not weights:
             raise ParameterError("objective = {}: must name at least one signal")
-        for what, numbers in (("objective", weights), ("limits", limits)):
+        for what, numbers in (("objective", weights), ("limits", {limit.name: limit.upper for limit in kept})):
             for name, value in numbers.items():
                 if name not in self.signals:
-                    raise ParameterError(f"{what}: {name!r} is no signal: must be one of {', '.join(self.signals)}")
+                    raise ParameterError(f"{what}: {name!r} is not a signal: must be one of {', '.join(self.signals)}")
                 if not np.isfinite(value):
                     raise ParameterError(f"{what}: {name} = {value:g}: must be finite")
-        return best_along(self, weights, limits, at)
+        return best_along(self, weights, kept, at)
 
     def quality(self) -> xr.Dataset:
         """Tabulate how well each surface does.

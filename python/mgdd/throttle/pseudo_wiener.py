@@ -11,7 +11,8 @@ import numpy as np
 
 from mgdd import _core
 from mgdd.errors import DataError
-from mgdd.signals.model import RunInputs, SampledModel, check_horizon, columns_of, sample_step
+from mgdd.signals.even_grid import even_step, is_same_step
+from mgdd.signals.model import RunInputs, SampledModel, check_horizon, columns_of
 from mgdd.throttle.fitted_parameters import parameter_text
 
 if TYPE_CHECKING:
@@ -25,7 +26,6 @@ __all__ = ["PseudoWiener"]
 
 _STEP_S = 5e-4  # of PW-R
 _GAIN_SAMPLE_S = 1e-3  # the observer gains are per 1 ms
-_UNEVEN = 1e-3
 
 
 class PseudoWiener(SampledModel):
@@ -73,7 +73,6 @@ class PseudoWiener(SampledModel):
     input_names = ("duty",)
     output_name = observed_state = "angle_deg"
     state_names = ("angle_deg",)
-    uneven = 0.1
 
     def __init__(
         self,
@@ -148,7 +147,7 @@ class PseudoWiener(SampledModel):
             The copy, or the model itself.
         """
         old = self.parameters["sample_s"]
-        if abs(sample_s - old) <= _UNEVEN * old:
+        if is_same_step(sample_s, old):
             return self
         changes = {
             "sample_s": sample_s,
@@ -201,7 +200,7 @@ class PseudoWiener(SampledModel):
         """
         time, u, angle = columns_of(record, ("time_s", "duty", "angle_deg"))
         check_horizon(horizon, angle.size)
-        sample_s = sample_step(time, self.uneven)
+        sample_s = even_step(time)
         share = sample_s / _GAIN_SAMPLE_S
         ahead = self.at_sample(sample_s)._core.predict(
             _duty(u),

@@ -13,6 +13,7 @@ from mgdd import _core
 from mgdd._core import SensorPair
 from mgdd.errors import DataError, ParameterError
 from mgdd.results import labelled_dataset
+from mgdd.signals.even_grid import even_step
 
 if TYPE_CHECKING:
     import xarray as xr
@@ -129,13 +130,7 @@ def sense(
     if seed < 0:
         raise ParameterError(f"seed = {seed}: must be >= 0")
     time = run["time_s"].to_numpy()
-    if time.size < 2:
-        raise DataError(f"time_s has {time.size} sample(s): at least two are needed")
-    sample = float(np.round((time[-1] - time[0]) / (time.size - 1), 9))
-    off = np.abs(time - time[0] - sample * np.arange(time.size)) > 1e-3 * sample
-    if off.any():
-        k = int(np.argmax(off))
-        raise DataError(f"time_s = {time[k]:g} s at sample {k} is off the even grid of {sample:g} s: resample first")
+    sample = even_step(time)
     per_sensor = [("none", 0.0, 0.0), ("none", 0.0, 0.0)]
     for fault in faults:
         if per_sensor[fault.sensor - 1][0] != "none":
@@ -158,5 +153,5 @@ def sense(
             **{name: ("time_s", raw[name], "-", text) for name, text in _FLAGS.items()},
             "detected_s": ((), detected, "s", "time from onset to detection"),
         },
-        attrs={"seed": seed, "faults": tuple(f"{f.kind} of sensor {f.sensor}" for f in faults)},
+        attrs={"seed": seed, "faults": ", ".join(f"{f.kind} of sensor {f.sensor}" for f in faults)},
     )

@@ -363,9 +363,15 @@ TEST(IterativeLearning, ARefusedErrorChangesNothing) {
   const auto asked = learner.state();
   EXPECT_EQ(learner.try_tell(Column(3, 0.0)), LearningStatus::wrong_length);
   EXPECT_THROW(learner.tell(Column(5, 0.0)), ShapeError);
-  EXPECT_EQ(learner.try_tell(Column{1.0, nan, 0.0, 0.0}), LearningStatus::not_finite);
-  EXPECT_EQ(learner.try_tell(Column(4, 1.7e308)), LearningStatus::overflow);
+  EXPECT_EQ(learner.try_tell(Column{1.0, nan, 0.0, 0.0}), LearningStatus::not_a_reading);
+  for (const double beyond : {1.001e30, -1e31, 1.7e308})
+    EXPECT_EQ(learner.try_tell(Column{1.0, beyond, 0.0, 0.0}), LearningStatus::not_a_reading);
   EXPECT_THROW(learner.tell(Column(4, 1.7e308)), DataError);
+  IterativeLearning steep(p_type(4, 1e300));
+  steep.ask();
+  const auto flat = steep.state();
+  EXPECT_EQ(steep.try_tell(Column(4, 1e20)), LearningStatus::overflow);
+  EXPECT_EQ(steep.state(), flat);
   try {
     learner.tell(Column{1.0, 2.0, -infinity, 0.0});
     FAIL();

@@ -62,10 +62,9 @@ std::span<const double> IterativeLearning::ask() noexcept {
 LearningStatus IterativeLearning::try_tell(std::span<const double> error) noexcept {
   if (!asked_) return LearningStatus::not_asked;
   if (error.size() != input_.size()) return LearningStatus::wrong_length;
-  if (!is_finite(error)) return LearningStatus::not_finite;
+  if (!std::all_of(error.begin(), error.end(), is_reading)) return LearningStatus::not_a_reading;
   const std::span<const double> window = error.subspan(law_.relative_degree());
   const double norm = norm_of(window);
-  if (!std::isfinite(norm)) return LearningStatus::overflow;
 
   const bool freeze = frozen_ || (settings_.guard && is_rising(norm));
   if (!freeze) {
@@ -100,15 +99,15 @@ LearningStatus IterativeLearning::tell(std::span<const double> error) {
     case LearningStatus::wrong_length:
       throw ShapeError("error of " + trial + " has " + std::to_string(error.size()) + " samples: must have " +
                        std::to_string(input_.size()) + ", one per sample of the input");
-    case LearningStatus::not_finite: {
-      const auto at = std::find_if(error.begin(), error.end(), [](double value) { return !std::isfinite(value); });
-      throw DataError("error of " + trial + ", sample " + std::to_string(at - error.begin()) + " = " + text(*at) +
-                      ": must be finite; repeat the trial, or fill the gap before telling");
+    case LearningStatus::not_a_reading: {
+      const auto at = std::find_if_not(error.begin(), error.end(), is_reading);
+      throw DataError("error of " + trial + ", sample " + std::to_string(at - error.begin()), *at,
+                      "must be finite and at most " + text(largest_reading) +
+                          " in magnitude; repeat the trial, or fill the gap before telling");
     }
     case LearningStatus::overflow:
       throw DataError("error of " + trial +
-                      " drives its norm or the next input beyond the range of a double: the trials diverge, lower the "
-                      "gain");
+                      " drives the next input beyond the range of a double: the trials diverge, lower the gain");
     case LearningStatus::learned:
     case LearningStatus::frozen:
       break;

@@ -1,5 +1,6 @@
 #include "mgdd/optimize/seekers/seeker.hpp"
 
+#include <algorithm>
 #include <cmath>
 #include <string>
 
@@ -10,6 +11,13 @@ namespace {
 
 std::string entry(std::string_view name, Eigen::Index i, Eigen::Index size) {
   return size == 1 ? std::string(name) : std::string(name) + "[" + std::to_string(i) + "]";
+}
+
+[[noreturn]] void refuse_reading(const std::string& at, std::string_view name, double value) {
+  const DataError refusal(
+      name, value,
+      "must be finite and at most " + text(largest_reading) + " in magnitude; tell misfire=True if the cycle misfired");
+  throw in_context(at, refusal);
 }
 
 }  // namespace
@@ -71,13 +79,9 @@ TellStatus Protocol::check(const Reading& reading, std::size_t components, std::
   if (reading.misfire) return TellStatus::misfire;
   if (reading.components.size() != components) return TellStatus::wrong_component_count;
   if (reading.limits.size() != limits) return TellStatus::wrong_limit_count;
-  for (const double value : reading.components) {
-    if (!std::isfinite(value)) return TellStatus::not_finite;
-  }
-  for (const double value : reading.limits) {
-    if (!std::isfinite(value)) return TellStatus::not_finite;
-  }
-  return TellStatus::accepted;
+  const bool measured = std::all_of(reading.components.begin(), reading.components.end(), is_reading) &&
+                        std::all_of(reading.limits.begin(), reading.limits.end(), is_reading);
+  return measured ? TellStatus::accepted : TellStatus::not_a_reading;
 }
 
 void Protocol::count(TellStatus status) noexcept {
@@ -102,17 +106,13 @@ void require(TellStatus status, const Protocol& protocol, const Reading& reading
     case TellStatus::wrong_limit_count:
       throw ShapeError(at + "limits has " + std::to_string(reading.limits.size()) + " values: must have " +
                        std::to_string(limits) + ", one per limit of the settings");
-    case TellStatus::not_finite:
-      for (std::size_t i = 0; i < reading.components.size(); ++i) {
-        if (!std::isfinite(reading.components[i])) {
-          throw DataError(at + "J = " + text(reading.components[i]) +
-                          ": must be finite; tell misfire=True if the cycle misfired");
-        }
+    case TellStatus::not_a_reading:
+      for (const double value : reading.components) {
+        if (!is_reading(value)) refuse_reading(at, "J", value);
       }
       for (std::size_t i = 0; i < reading.limits.size(); ++i) {
-        if (!std::isfinite(reading.limits[i])) {
-          throw DataError(at + "limits[" + std::to_string(i) + "] = " + text(reading.limits[i]) +
-                          ": must be finite; tell misfire=True if the cycle misfired");
+        if (!is_reading(reading.limits[i])) {
+          refuse_reading(at, "limits[" + std::to_string(i) + "]", reading.limits[i]);
         }
       }
   }

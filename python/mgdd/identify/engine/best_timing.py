@@ -7,7 +7,7 @@ from collections.abc import Callable, Sequence
 from typing import TYPE_CHECKING, Any
 
 from mgdd._core import Cylinder, OperatingPoint
-from mgdd.engine import optimum, simulate
+from mgdd.engine import find_optimum, simulate
 from mgdd.engine.optimum import check_request
 from mgdd.errors import ConvergenceError
 from mgdd.identify.engine.cylinder import BURN_FIELDS, SHAPE_FIELDS, fit_cylinder
@@ -45,11 +45,11 @@ def best_timing(
     scales : sequence of float
         Wall-heat scales to refit at [-].
     objective : str
-        As in `mgdd.engine.optimum`. Closed-cycle work is the default because a closed-valve trace carries no more.
+        As in `mgdd.engine.find_optimum`. Closed-cycle work is the default because a closed-valve trace carries no more.
     limits : dict, optional
-        Further limits, as in `mgdd.engine.optimum`; they hold beside the trace's own p_max.
+        Further limits, as in `mgdd.engine.find_optimum`; they hold beside the trace's own p_max.
     bounds_cad : tuple of float, optional
-        Searched range of SOC, as in `mgdd.engine.optimum`.
+        Searched range of SOC, as in `mgdd.engine.find_optimum`.
     progress : callable, optional
         Called with a short text before each fit.
 
@@ -94,24 +94,24 @@ def _timing(
     # The model's own error in p_max at the measured timing is no violation of the limit.
     ceiling = max(load.p_max_bar, float(now["p_max_bar"]) * (1.0 + 1e-9))
     own = {**limits, "p_max_bar": min(ceiling, limits.get("p_max_bar", math.inf))}
-    free = optimum(load.cylinder, load.point, objective, limits=limits, **search)
-    kept = optimum(load.cylinder, load.point, objective, limits=own, **search)
+    free = find_optimum(load.cylinder, load.point, objective, limits=limits, **search)
+    kept = find_optimum(load.cylinder, load.point, objective, limits=own, **search)
     base = float(now[objective])
     return {
         "wall_heat_scale": scale,
         "fitted_soc_cad": load.soc_cad,
         "p_max_limit_bar": ceiling,
-        "soc_cad": kept.soc_cad,
-        "ca50_cad": kept.ca50_cad,
+        "soc_cad": kept["soc_cad"],
+        "ca50_cad": kept["ca50_cad"],
         "gain_percent": 100.0 * (kept.value / base - 1.0),
-        "free_soc_cad": free.soc_cad,
-        "free_ca50_cad": free.ca50_cad,
+        "free_soc_cad": free["soc_cad"],
+        "free_ca50_cad": free["ca50_cad"],
         "free_gain_percent": 100.0 * (free.value / base - 1.0),
-        "free_p_max_bar": float(simulate(load.cylinder, load.point, soc_cad=free.soc_cad, **scheme)["p_max_bar"]),
+        "free_p_max_bar": float(simulate(load.cylinder, load.point, soc_cad=free["soc_cad"], **scheme)["p_max_bar"]),
         "at_bound": free.at_bound or kept.at_bound,
         "p_max_model_error_bar": float(now["p_max_bar"]) - load.p_max_bar,
         "efficiency_gross": float(now["efficiency_gross"]),
-        "curvature_per_cad2": free.curvature_per_cad2,
+        "curvature_per_cad2": free.curvature,
     }
 
 

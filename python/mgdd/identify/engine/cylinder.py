@@ -242,7 +242,9 @@ def _doubts(traces: Sequence[xr.Dataset], cylinder: Cylinder, point: OperatingPo
     for trace in traces:
         analysis = analyze(trace, cylinder, point=point, quiet=True)
         file = str(analysis.attrs["file"])
-        out += [Finding("doubtful_trace", (file,), f"{file}: {text}") for text in analysis.attrs["warnings"]]
+        out += [
+            Finding("doubtful_trace", (file,), f"{file}: {text}") for text in analysis.attrs["warnings"].splitlines()
+        ]
     return out
 
 

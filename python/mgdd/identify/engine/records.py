@@ -5,14 +5,13 @@ from __future__ import annotations
 from dataclasses import dataclass, field
 from typing import TYPE_CHECKING, Any
 
-import numpy as np
-
 from mgdd._core import Cylinder, OperatingPoint
 from mgdd.results import VARIABLES, Fit, labelled_dataset
 
 if TYPE_CHECKING:
     from collections.abc import Sequence
 
+    import numpy as np
     import xarray as xr
 
 __all__ = ["CylinderFit", "Load", "burn_law", "figures_of", "load_table"]

@@ -12,6 +12,7 @@ from mgdd.errors import ParameterError
 from mgdd.identify.throttle.prior import prior_of
 from mgdd.identify.throttle.record_content import RecordContent, open_questions, record_content
 from mgdd.results import Finding, labelled_dataset
+from mgdd.signals.even_grid import even_step
 
 if TYPE_CHECKING:
     import xarray as xr
@@ -176,7 +177,9 @@ def _signal_of(excitation: xr.Dataset) -> tuple[np.ndarray, np.ndarray]:
     for name in ("time_s", "duty"):
         if name not in excitation.variables or excitation[name].dims != ("time_s",):
             raise DataError(f"excitation has no {name}(time_s): mgdd.signals.chirp and its sisters make one")
-    return (np.asarray(excitation[name].to_numpy(), dtype=np.float64) for name in ("time_s", "duty"))  # type: ignore[return-value]
+    time, duty = (np.asarray(excitation[name].to_numpy(), dtype=np.float64) for name in ("time_s", "duty"))
+    even_step(time)
+    return time, duty
 
 
 def _check_limits(window: tuple[float, float], max_rate_deg_per_s: float | None, max_current_a: float | None) -> None:

@@ -15,7 +15,8 @@ from mgdd.identify.throttle.free_run import draw_free_run, free_run, quality_of,
 from mgdd.identify.throttle.physical_parameters import physical_parameters
 from mgdd.optimize.fit_options import FitOptions, fit_options
 from mgdd.results import Finding, Fit, FitReport
-from mgdd.signals.model import columns_of, sample_step
+from mgdd.signals.even_grid import even_step
+from mgdd.signals.model import columns_of
 
 if TYPE_CHECKING:
     import xarray as xr
@@ -106,7 +107,9 @@ def fit_throttle(
     chosen = fit_options(options, n_starts=4, seed=0, max_iterations=60, tolerance=1e-10)
     n_starts = chosen.n_starts
     time, duty, angle = _columns(log)
-    step_s = sample_step(time)
+    if test is not None:
+        _columns(test)
+    step_s = even_step(time, remedy="read_throttle_log(..., step_s={step:g}) resamples")
     for name in [*(start_values or {}), *(fixed or {})]:
         if name not in GROUP_NAMES:
             raise ParameterError(f"{name!r}: no throttle group; they are {', '.join(GROUP_NAMES)}")
@@ -203,8 +206,8 @@ def fit_throttle(
         report=report,
         model=model,
         kind=model.kind,
-        train=quality_of(run),
-        test=None if test is None else quality_of(free_run(model, test)),
+        train=quality_of([run]),
+        test=None if test is None else quality_of([free_run(model, test)]),
         unidentifiable=(*unvisited, *report.unidentifiable),
         findings=tuple(findings),
         source=source_of(log),

@@ -1,20 +1,36 @@
-"""The free run of a throttle model over a log, and how close it comes: the one definition for every throttle fit."""
+"""The one measure of how well a throttle model meets a log: its free run, without the first 50 ms."""
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from typing import TYPE_CHECKING, Any, cast
 
 import numpy as np
 
 from mgdd.errors import DataError
-from mgdd.identify.throttle.n_step import DISCARD_S, columns_of, step_of
 from mgdd.results import Fit, FitQuality, Model, labelled_dataset
+from mgdd.signals.even_grid import even_step
 from mgdd.signals.metrics import nrmse_fit_percent, rmse
 
 if TYPE_CHECKING:
     import xarray as xr
+    from numpy.typing import NDArray
 
-__all__ = ["discarded", "draw_free_run", "free_run", "quality_of", "source_of"]
+__all__ = ["columns_of", "discarded", "draw_free_run", "free_run", "quality_of", "source_of"]
+
+# What the start of a free run still carries of the unknown speed and current.
+DISCARD_S = 0.05
+
+
+def columns_of(log: xr.Dataset) -> tuple[NDArray[np.float64], NDArray[np.float64], NDArray[np.float64]]:
+    """Return time [s], duty [-] and angle [deg] of a log."""
+    time, duty, angle = (np.asarray(log[n].to_numpy(), dtype=np.float64) for n in ("time_s", "duty", "angle_deg"))
+    return time, duty, angle
+
+
+def discarded(step_s: float, size: int) -> int:
+    """Return how many samples at the start a figure of merit leaves out: 50 ms, at most half of the record."""
+    return min(round(DISCARD_S / step_s), size // 2)
 
 
 def free_run(model: Model, log: xr.Dataset) -> xr.Dataset:
@@ -35,21 +51,15 @@ def free_run(model: Model, log: xr.Dataset) -> xr.Dataset:
     )
 
 
-def quality_of(run: xr.Dataset) -> FitQuality:
-    """Compare a free run with its log, without the first 50 ms."""
-    skip = discarded(run)
-    measured, modelled = run["angle_deg"].to_numpy()[skip:], run["model_deg"].to_numpy()[skip:]
-    return FitQuality(
-        nrmse_fit_percent=nrmse_fit_percent(measured, modelled),
-        rmse=rmse(measured, modelled),
-        unit="deg",
-        n=measured.size,
-    )
-
-
-def discarded(log: xr.Dataset) -> int:
-    """Return how many samples at the start a figure of merit leaves out."""
-    return round(DISCARD_S / step_of(log["time_s"].to_numpy()))
+def quality_of(runs: Sequence[xr.Dataset]) -> FitQuality:
+    """Compare free runs with their logs, all together, each without its first 50 ms."""
+    measured, modelled = [], []
+    for run in runs:
+        skip = discarded(even_step(run["time_s"]), run.sizes["time_s"])
+        measured.append(run["angle_deg"].to_numpy()[skip:])
+        modelled.append(run["model_deg"].to_numpy()[skip:])
+    y, yh = np.concatenate(measured), np.concatenate(modelled)
+    return FitQuality(nrmse_fit_percent=nrmse_fit_percent(y, yh), rmse=rmse(y, yh), unit="deg", n=y.size)
 
 
 def source_of(log: xr.Dataset) -> str:

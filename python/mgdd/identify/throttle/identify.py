@@ -114,7 +114,7 @@ def identify_throttle(
         log, model, limp_home_deg=known_home, two_sided=two_sided, delay_samples=delay_samples,
         stops_deg=(closed_deg, open_deg), options=options,
     )  # fmt: skip
-    tested = None if test is None else quality_of(free_run(fit.model, test))
+    tested = None if test is None else quality_of([free_run(fit.model, test)])
     known = prior_of(fit.model)
     home = known.limp_home_deg if limp_home is None else limp_home
     content = record_content(

@@ -9,19 +9,19 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from mgdd.errors import DataError, ParameterError
+from mgdd.identify.throttle.free_run import columns_of, discarded
 from mgdd.io import check_throttle_log
 from mgdd.results import Model, labelled_dataset
+from mgdd.signals.even_grid import even_step
 from mgdd.signals.metrics import rmse
 
 if TYPE_CHECKING:
     import xarray as xr
-    from numpy.typing import ArrayLike, NDArray
+    from numpy.typing import ArrayLike
 
 __all__ = ["n_step_rms", "split_log"]
 
 HORIZONS_S = (0.005, 0.020, 0.050)
-# What the start of a free run still carries of the unknown speed and current.
-DISCARD_S = 0.05
 _WHOLE = 1e-6
 
 
@@ -107,9 +107,9 @@ def n_step_rms(
     """
     time, _, angle = columns_of(log)
     truth = angle if true_deg is None else np.asarray(true_deg, dtype=np.float64)
-    step = step_of(time)
+    step = even_step(time)
     horizons_s = whole_horizons(step, time.size) if horizons_s is None else horizons_s
-    skip = round(DISCARD_S / step)
+    skip = discarded(step, time.size)
     table = np.empty((2, len(horizons_s)))
     for at, horizon in enumerate(horizons_s):
         n = samples_of(horizon, step, time.size)
@@ -125,15 +125,6 @@ def n_step_rms(
             "n_step_rms_deg": (("predictor", "horizon_s"), table, "deg", "RMS error ahead"),
         }
     )
-
-
-def columns_of(log: xr.Dataset) -> tuple[NDArray[np.float64], NDArray[np.float64], NDArray[np.float64]]:
-    time, duty, angle = (np.asarray(log[n].to_numpy(), dtype=np.float64) for n in ("time_s", "duty", "angle_deg"))
-    return time, duty, angle
-
-
-def step_of(time: NDArray[np.float64]) -> float:
-    return float(time[-1] - time[0]) / (time.size - 1)
 
 
 def whole_horizons(step_s: float, size: int) -> tuple[float, ...]:

@@ -42,8 +42,8 @@ def physical_parameters(
 
     Examples
     --------
-    >>> from mgdd.identify import FirstPrincipleModel, physical_parameters, throttle_start
-    >>> model = FirstPrincipleModel(parameters=throttle_start())
+    >>> from mgdd.identify import FirstPrincipleModel, physical_parameters
+    >>> model = FirstPrincipleModel()
     >>> found = physical_parameters(model, resistance_ohm=1.5, supply_v=12.0, inertia_kgm2=0.0021)
     >>> round(found["torque_constant_nm_per_a"], 4)
     0.2291

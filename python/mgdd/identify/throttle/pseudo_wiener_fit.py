@@ -10,10 +10,10 @@ import numpy as np
 
 from mgdd import _core
 from mgdd.errors import DataError, ParameterError
-from mgdd.identify.throttle.free_run import discarded, draw_free_run, free_run, quality_of, source_of
+from mgdd.identify.throttle.free_run import draw_free_run, free_run, quality_of, source_of
 from mgdd.optimize.fit_options import FitOptions, fit_options
-from mgdd.results import Finding, Fit, FitQuality, FitReport
-from mgdd.signals.metrics import nrmse_fit_percent, rmse
+from mgdd.results import Finding, Fit, FitReport
+from mgdd.signals.even_grid import common_step
 from mgdd.throttle import PseudoWiener
 
 if TYPE_CHECKING:
@@ -146,7 +146,7 @@ def fit_pseudo_wiener(
         report=wrapped,
         model=model,
         kind=kind,
-        train=_quality(runs),
+        train=quality_of(runs),
         unidentifiable=wrapped.unidentifiable,
         findings=tuple(found),
         source=source_of(logs[0]),
@@ -157,22 +157,6 @@ def fit_pseudo_wiener(
     )
 
 
-def _quality(runs: Sequence[xr.Dataset]) -> FitQuality:
-    """Compare all runs together."""
-    if len(runs) == 1:
-        return quality_of(runs[0])
-    measured, modelled = (
-        np.concatenate([run[name].to_numpy()[discarded(run) :] for run in runs]) for name in ("angle_deg", "model_deg")
-    )
-    percent = nrmse_fit_percent(measured, modelled)
-    return FitQuality(nrmse_fit_percent=percent, rmse=rmse(measured, modelled), unit="deg", n=measured.size)
-
-
 def _sample(logs: Sequence[xr.Dataset]) -> float:
-    steps = []
-    for one in logs:
-        time = one["time_s"].to_numpy()
-        steps.append(float(time[-1] - time[0]) / max(1, time.size - 1))
-    if max(steps) - min(steps) > 1e-3 * min(steps) or not min(steps) > 0.0:
-        raise DataError("the logs have different sample times: resample them to one")
-    return steps[0]
+    names = [f"log {k}" for k in range(1, len(logs) + 1)]
+    return common_step([one["time_s"].to_numpy() for one in logs], names)

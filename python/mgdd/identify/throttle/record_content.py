@@ -9,6 +9,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from mgdd.results import Finding
+from mgdd.signals.even_grid import even_step
 
 if TYPE_CHECKING:
     from collections.abc import Iterable
@@ -83,7 +84,7 @@ def record_content(
     stops_deg: tuple[float, float] | None = None,
 ) -> RecordContent:
     """Describe a record; `stops_deg` are the ends of the travel [deg]."""
-    step = float(time[-1] - time[0]) / (time.size - 1)
+    step = even_step(time)
     lag = max(1, min(round(_SPEED_WINDOW_S / step), time.size - 1))
     speed = (angle[lag:] - angle[:-lag]) / (lag * step)
     opened, closed = _travel(angle, lag)

@@ -14,7 +14,8 @@ from mgdd.errors import ParameterError, ShapeError
 from mgdd.optimize.fit_options import FitOptions, fit_options
 from mgdd.optimize.fit_run import draw_run, fit_run, quality_of
 from mgdd.results import VARIABLES, Fit, FitReport
-from mgdd.signals.model import RunInputs, SampledModel, columns_of, sample_step
+from mgdd.signals.even_grid import even_step
+from mgdd.signals.model import RunInputs, SampledModel, columns_of
 
 if TYPE_CHECKING:
     from numpy.typing import ArrayLike, NDArray
@@ -169,7 +170,7 @@ def fit_smooth_throttle(
         starts=table.tolist(),
         lower=_ten(lower, "lower"),
         upper=_ten(upper, "upper"),
-        step_s=sample_step(time),
+        step_s=even_step(time),
         start=state,
         **plant.constants,
         cost_tolerance=chosen.tolerance,

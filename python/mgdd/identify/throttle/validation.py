@@ -9,12 +9,13 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from mgdd.identify.throttle.free_run import discarded, free_run, quality_of, source_of
-from mgdd.identify.throttle.n_step import columns_of, n_step_rms, samples_of, step_of, whole_horizons
+from mgdd.identify.throttle.free_run import columns_of, discarded, free_run, quality_of, source_of
+from mgdd.identify.throttle.n_step import n_step_rms, samples_of, whole_horizons
 from mgdd.identify.throttle.prior import prior_of
 from mgdd.identify.throttle.record_content import open_questions, record_content
 from mgdd.io import check_throttle_log
 from mgdd.results import Finding, Fit, FitQuality, FitReport, Model
+from mgdd.signals.even_grid import even_step
 from mgdd.signals.metrics import ResidualTests, residual_tests, vaf_percent
 
 if TYPE_CHECKING:
@@ -73,8 +74,9 @@ class ThrottleValidation:
         str
             Free run, n steps ahead, residual tests, findings.
         """
+        figures = f"free-run fit {self.quality.nrmse_fit_percent:.2f} %, VAF {self.vaf_percent:.2f} %"
         rows = [
-            f"{self.kind} on {self.source}: free-run fit {self.quality.nrmse_fit_percent:.2f} %, VAF {self.vaf_percent:.2f} %",
+            f"{self.kind} on {self.source}: {figures}",
             f"free-run error {self.quality.rmse:.4g} deg RMS, {self.quality.rmse**2:.4g} deg² mean square",
         ]
         for horizon, pair in zip(self.n_step["horizon_s"].to_numpy(), self._growth(), strict=True):
@@ -166,19 +168,19 @@ def validate_throttle(
     fit = model if isinstance(model, Fit) else None
     own = model.model if isinstance(model, Fit) else model
     time, duty, angle = columns_of(log)
-    step = step_of(time)
+    step = even_step(time)
     horizons_s = whole_horizons(step, time.size) if horizons_s is None else horizons_s
     for horizon in horizons_s:
         samples_of(horizon, step, time.size)
     run = free_run(own, log)
-    skip = discarded(log)
+    skip = discarded(step, time.size)
     measured, modelled = angle[skip:], run["model_deg"].to_numpy()[skip:]
     one = angle[1:] - own.predict(log, 1)["angle_deg"].to_numpy()
     tests = residual_tests(one[skip:], duty[:-1][skip:])
     known = prior_of(own)
     limp_home = known.limp_home_deg if limp_home_deg is None else limp_home_deg
     content = record_content(time, angle, limp_home_deg=limp_home, stops_deg=known.stops_deg)
-    quality = quality_of(run)
+    quality = quality_of([run])
     notes = _notes(quality, tests)
     pairs = entangled(fit.report) if fit is not None else ()
     return ThrottleValidation(

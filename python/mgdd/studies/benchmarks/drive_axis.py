@@ -4,19 +4,25 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 from dataclasses import dataclass
+from types import MappingProxyType
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
 from mgdd import _core
-from mgdd.errors import DataError, ParameterError, ShapeError
-from mgdd.results import FitReport
+from mgdd.errors import ParameterError
+from mgdd.optimize.fit_options import FitOptions, fit_options
+from mgdd.optimize.fit_run import draw_run, fit_run, quality_of
+from mgdd.results import Fit, FitReport, Label
+from mgdd.results.fit import n_best_of
+from mgdd.signals.even_grid import even_step
+from mgdd.signals.model import RunInputs, SampledModel
 
 if TYPE_CHECKING:
     import xarray as xr
-    from numpy.typing import ArrayLike, NDArray
+    from numpy.typing import NDArray
 
-__all__ = ["DriveFit", "DriveModel", "drive_free_run", "drive_inverse_dynamics", "fit_drive"]
+__all__ = ["DriveModel", "drive_free_run", "drive_inverse_dynamics", "fit_drive"]
 
 _WINDOW = 20  # samples from which position and speed at the start are taken
 _FORMS: dict[str, tuple[str, ...]] = {
@@ -40,7 +46,7 @@ _FILTER_ORDER, _DECIMATION = 4, 10
 
 
 @dataclass(frozen=True, kw_only=True)
-class DriveModel:
+class DriveModel(SampledModel):
     """A slide with mass, friction and offset, driven by a voltage.
 
     Parameters
@@ -52,89 +58,45 @@ class DriveModel:
     force_n_per_v : float
         Force of the drive per volt [N/V].
 
+    Notes
+    -----
+    Inputs are ``time_s`` [s], whose zero is where the drift of the offset starts, and ``drive_v`` [V]; states are
+    ``position_m`` and ``speed_m_per_s``, at rest at 0 without; the output is ``position_m`` [m].
+
     Examples
     --------
-    >>> from mgdd.studies.benchmarks import DriveModel
+    >>> from mgdd.studies.benchmarks.drive_axis import DriveModel
     >>> slide = DriveModel(parameters={"mass_kg": 95.0, "coulomb_n": 20.0}, force_n_per_v=35.0)
-    >>> slide.simulate([0.0, 0.001, 0.002], [0.5, 0.5, 0.5]).tolist()  # 17.5 N do not overcome 20 N
+    >>> run = slide.simulate({"time_s": [0.0, 0.001, 0.002], "drive_v": [0.5, 0.5, 0.5]})
+    >>> run["position_m"].values.tolist()  # 17.5 N do not overcome 20 N
     [0.0, 0.0, 0.0]
     """
+
+    input_names = ("drive_v",)
+    output_name = observed_state = "position_m"
+    state_names = ("position_m", "speed_m_per_s")
+    labels = MappingProxyType({"drive_v": Label("V", "voltage"), "position_m": Label("m", "position")})
 
     parameters: Mapping[str, float]
     force_n_per_v: float
 
-    def simulate(
-        self,
-        time_s: ArrayLike,
-        drive_v: ArrayLike,
-        *,
-        start_position_m: float = 0.0,
-        start_speed_m_per_s: float = 0.0,
-    ) -> NDArray[np.float64]:
-        """Run freely from a start; the voltage of a sample acts until the next.
+    @property
+    def kind(self) -> str:
+        """``drive``."""
+        return "drive"
 
-        Parameters
-        ----------
-        time_s : array_like, shape (n,)
-            Evenly spaced times [s]; zero is where the drift of the offset starts.
-        drive_v : array_like, shape (n,)
-            Voltage [V].
-        start_position_m, start_speed_m_per_s : float
-            State at the first sample [m, m/s].
+    def _rest(self) -> list[float]:
+        return [0.0, 0.0]
 
-        Returns
-        -------
-        ndarray, shape (n,)
-            Position [m].
-
-        Raises
-        ------
-        mgdd.errors.DataError
-            Times that are not evenly spaced.
-        mgdd.errors.ShapeError
-            Arrays of different length.
-        mgdd.errors.ParameterError
-            A parameter with an unknown name.
-        """
-        time, drive = np.asarray(time_s, dtype=np.float64), np.asarray(drive_v, dtype=np.float64)
+    def _run(self, run: RunInputs) -> NDArray[np.float64]:
         return np.asarray(
             _core.DriveAxis(force_n_per_v=self.force_n_per_v).free_run(
                 parameters=_row(self.parameters),
-                start=[start_position_m, start_speed_m_per_s, float(time[0])],
-                input=drive,
-                dt_s=_spacing(time, drive),
+                start=[*run.state, float(run.time_s[0])],
+                input=run.columns[0],
+                dt_s=run.step_s,
             )
         )
-
-
-@dataclass(frozen=True, kw_only=True)
-class DriveFit:
-    """A fitted slide.
-
-    Parameters
-    ----------
-    report : FitReport
-        Of the best start; the residual is in m.
-    model : DriveModel
-        The slide.
-    fit_percent : float
-        Of the free run over the record [%].
-    starts_fit_percent : tuple of float
-        The same for every start, best first: how sharply the record points at one answer.
-
-    Examples
-    --------
-    >>> from mgdd import datasets
-    >>> from mgdd.studies.benchmarks import fit_drive
-    >>> if "emps" in datasets.available():
-    ...     fit = fit_drive(datasets.load_emps()[0], friction="coulomb", drift=False, starts=1)
-    ...     assert fit.fit_percent == fit.starts_fit_percent[0]
-    """
-
-    report: FitReport
-    model: DriveModel
-    fit_percent: float
-    starts_fit_percent: tuple[float, ...]
 
 
 def drive_inverse_dynamics(
@@ -170,14 +132,14 @@ def drive_inverse_dynamics(
     Examples
     --------
     >>> from mgdd import datasets
-    >>> from mgdd.studies.benchmarks import drive_inverse_dynamics
+    >>> from mgdd.studies.benchmarks.drive_axis import drive_inverse_dynamics
     >>> if "emps" in datasets.available():
     ...     found = drive_inverse_dynamics(datasets.load_emps()[0], directional=False)
     ...     assert round(found["mass_kg"], 1) == 95.1
     """
     from scipy.signal import butter, filtfilt
 
-    dt_s = _spacing(record["time_s"].to_numpy(), record["drive_v"].to_numpy())
+    dt_s = even_step(record["time_s"])
     b, a = butter(_FILTER_ORDER, 2.0 * cutoff_hz * dt_s)
     position = filtfilt(b, a, record["position_m"].to_numpy())
     speed = np.gradient(position, dt_s)
@@ -222,7 +184,7 @@ def drive_free_run(model: DriveModel, record: xr.Dataset) -> NDArray[np.float64]
     Examples
     --------
     >>> from mgdd import datasets
-    >>> from mgdd.studies.benchmarks import DriveModel, drive_free_run, drive_inverse_dynamics
+    >>> from mgdd.studies.benchmarks.drive_axis import DriveModel, drive_free_run, drive_inverse_dynamics
     >>> if "emps" in datasets.available():
     ...     train, test = datasets.load_emps()
     ...     slide = DriveModel(parameters=drive_inverse_dynamics(train), force_n_per_v=float(train["force_n_per_v"]))
@@ -230,8 +192,7 @@ def drive_free_run(model: DriveModel, record: xr.Dataset) -> NDArray[np.float64]
     """
     position, speed = drive_start(record)
     later = record.isel(time_s=slice(_WINDOW - 1, None))
-    run = model.simulate(later["time_s"], later["drive_v"], start_position_m=position, start_speed_m_per_s=speed)
-    return run[1:]
+    return model.simulate(later, initial_state=(position, speed))["position_m"].to_numpy()[1:]
 
 
 def fit_drive(
@@ -239,11 +200,9 @@ def fit_drive(
     *,
     friction: str = "stribeck",
     drift: bool = True,
-    start: Mapping[str, float] | None = None,
-    starts: int = 48,
-    seed: int = 1,
-    max_iterations: int = 60,
-) -> DriveFit:
+    start_values: Mapping[str, float] | None = None,
+    options: FitOptions | None = None,
+) -> Fit:
     """Fit mass and friction of a driven slide to its free run under the measured voltage.
 
     Output-error fit with exact sensitivities; position and speed at the start come from the first 20 samples, which
@@ -262,24 +221,20 @@ def fit_drive(
         rise towards rest.
     drift : bool
         Let the offset force drift linearly over the record, as an amplifier does that warms up.
-    start : mapping of str to float, optional
+    start_values : mapping of str to float, optional
         First start, by parameter name; without it the inverse dynamics give it (`drive_inverse_dynamics`).
-    starts : int
-        Number of starts, >= 1.
-    seed : int
-        Of the scattered starts.
-    max_iterations : int
-        Trial steps per start.
+    options : FitOptions, optional
+        48 starts, scattered with seed 1, 60 trial steps per start and a tolerance of 1e-6 where nothing else is said.
 
     Returns
     -------
-    DriveFit
-        Report, model and fit.
+    mgdd.results.Fit
+        Report [m], model, and the error of every start: how sharply the record points at one answer.
 
     Raises
     ------
     mgdd.errors.ParameterError
-        An unknown form of friction or parameter, or fewer than one start.
+        An unknown form of friction or parameter.
     mgdd.errors.DataError
         Uneven times, or fewer than 100 samples.
 
@@ -290,34 +245,31 @@ def fit_drive(
     Examples
     --------
     >>> import numpy as np
-    >>> from mgdd.studies.benchmarks import DriveModel, fit_drive
-    >>> from mgdd.results import labelled_dataset
+    >>> from mgdd.studies.benchmarks.drive_axis import DriveModel, fit_drive
+    >>> from mgdd.optimize import FitOptions
     >>> time = np.arange(4000) * 1e-3
     >>> drive = 2.0 * np.sign(np.sin(4.0 * time)) + 0.5 * np.sin(11.0 * time)
     >>> truth = {"mass_kg": 90.0, "coulomb_n": 21.0, "viscous_ns_per_m": 200.0, "offset_n": 1.0}
-    >>> position = DriveModel(parameters=truth, force_n_per_v=35.0).simulate(time, drive)
-    >>> record = labelled_dataset({
-    ...     "time_s": ("time_s", time, "s", "time"),
-    ...     "drive_v": ("time_s", drive, "V", "voltage"),
-    ...     "position_m": ("time_s", position, "m", "position"),
-    ...     "force_n_per_v": ((), 35.0, "N/V", "force per volt"),
-    ... })
-    >>> fit = fit_drive(record, friction="directional", drift=False, starts=2, start=dict(truth, mass_kg=95.0))
+    >>> slide = DriveModel(parameters=truth, force_n_per_v=35.0)
+    >>> record = slide.simulate({"time_s": time, "drive_v": drive}).assign(force_n_per_v=35.0)
+    >>> options = FitOptions(n_starts=2)
+    >>> fit = fit_drive(
+    ...     record, friction="directional", drift=False, start_values=dict(truth, mass_kg=95.0), options=options)
     >>> round(fit.model.parameters["mass_kg"])
     90
     """
     if friction not in _FORMS:
         raise ParameterError(f"friction = {friction!r}: must be one of {', '.join(_FORMS)}")
-    if starts < 1:
-        raise ParameterError(f"starts = {starts}: must be >= 1")
+    chosen = fit_options(options, n_starts=48, seed=1, max_iterations=60, tolerance=1e-6)
+    starts = chosen.n_starts
     names = tuple(_core.DriveAxis.parameter_names)
     free = ["mass_kg", "viscous_ns_per_m", *_FORMS[friction]]
     free += ["offset_drift_n_per_s"] if drift else []
     first = _core_record(record)
-    dt_s = _spacing(record["time_s"].to_numpy(), record["drive_v"].to_numpy())
+    dt_s = even_step(record["time_s"])
     axis = _core.DriveAxis(force_n_per_v=float(record["force_n_per_v"]))
-    options = _core.LeastSquaresOptions(max_iterations=max_iterations, cost_tolerance=1e-6)
-    base = dict(drive_inverse_dynamics(record) if start is None else start)
+    search = _core.LeastSquaresOptions(max_iterations=chosen.max_iterations, cost_tolerance=chosen.tolerance)
+    base = dict(drive_inverse_dynamics(record) if start_values is None else start_values)
     if friction == "coulomb":
         base["viscous_asymmetry_ns_per_m"] = 0.0
     elif friction == "stribeck":
@@ -326,7 +278,7 @@ def fit_drive(
         base.setdefault("stribeck_n", 10.0)
         base["stribeck_speed_m_per_s"] = _REST
     base = dict(zip(names, _row(base), strict=True))
-    rng = np.random.default_rng(seed)
+    rng = np.random.default_rng(chosen.seed)
     measured = record["position_m"].to_numpy()[_WINDOW:]
     found: list[tuple[float, Any]] = []
     for index in range(starts):
@@ -337,19 +289,29 @@ def fit_drive(
         else:
             near = min(found, key=lambda entry: entry[0])[1].parameters
             point = _scattered(dict(zip(names, near, strict=True)), free, _NEAR, rng)
-        result = axis.fit(base=list(point.values()), free=free, records=[first], dt_s=dt_s, options=options)
+        result = axis.fit(base=list(point.values()), free=free, records=[first], dt_s=dt_s, options=search)
         found.append((float(result.report.cost), result))
     found.sort(key=lambda entry: entry[0])
-    percents = tuple(
-        float(100.0 * (1.0 - np.sqrt(2.0 * cost) / np.linalg.norm(measured - measured.mean()))) for cost, _ in found
-    )
     best = found[0][1]
-    parameters = dict(zip(names, best.parameters, strict=True))
-    return DriveFit(
-        report=FitReport.from_core(best.report, measured),
-        model=DriveModel(parameters=parameters, force_n_per_v=float(record["force_n_per_v"])),
-        fit_percent=percents[0],
-        starts_fit_percent=percents,
+    errors = tuple(float(np.sqrt(2.0 * cost / measured.size)) for cost, _ in found)
+    model = DriveModel(
+        parameters=dict(zip(names, best.parameters, strict=True)), force_n_per_v=float(record["force_n_per_v"])
+    )
+    report = FitReport.from_core(best.report, measured)
+    run = fit_run(
+        record["time_s"].to_numpy()[_WINDOW:], measured, drive_free_run(model, record), model.labels["position_m"]
+    )
+    return Fit(
+        report=report,
+        model=model,
+        kind=model.kind,
+        train=quality_of(run),
+        findings=report.findings,
+        unidentifiable=report.unidentifiable,
+        start_rmse=errors,
+        n_best=n_best_of(errors),
+        run=run,
+        draw=draw_run,
     )
 
 
@@ -385,15 +347,3 @@ def _core_record(record: xr.Dataset) -> Any:
         start=[position, speed, float(record["time_s"][first])],
         skip=1,
     )
-
-
-def _spacing(time: NDArray[np.float64], drive: NDArray[np.float64]) -> float:
-    if time.shape != drive.shape or time.ndim != 1:
-        raise ShapeError(f"time_s has shape {time.shape}, drive_v {drive.shape}: must be one length")
-    if time.size < 2:
-        raise DataError(f"time_s has {time.size} samples: at least two are needed")
-    steps = np.diff(time)
-    dt_s = float((time[-1] - time[0]) / (time.size - 1))
-    if not (dt_s > 0.0 and np.all(np.abs(steps - dt_s) < 1e-3 * dt_s)):
-        raise DataError("time_s is not evenly spaced: resample the record first")
-    return dt_s

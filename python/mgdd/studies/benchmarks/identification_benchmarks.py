@@ -11,10 +11,14 @@ import numpy as np
 
 from mgdd import datasets
 from mgdd.errors import DataError
+from mgdd.optimize import FitOptions
 from mgdd.results import labelled_dataset
+from mgdd.signals import nrmse_fit_percent, rmse
 from mgdd.studies.base import Progress, StudyResult, run_parts
-from mgdd.studies.benchmarks import drive_free_run, fit_drive, fit_linear, fit_two_tanks, fit_wiener_hammerstein
+from mgdd.studies.benchmarks.drive_axis import drive_free_run, fit_drive
 from mgdd.studies.benchmarks.figures import draw
+from mgdd.studies.benchmarks.two_tanks import fit_two_tanks
+from mgdd.studies.benchmarks.wiener_hammerstein import fit_linear, fit_wiener_hammerstein
 
 if TYPE_CHECKING:
     import xarray as xr
@@ -130,14 +134,6 @@ def run_identification_benchmarks(
     return StudyResult(name=_NAME, dataset=dataset, figures=draw(dataset) if figures else {}, summary=summary)
 
 
-def _fit_percent(measured: Vector, simulated: Vector) -> float:
-    return float(100.0 * (1.0 - np.linalg.norm(measured - simulated) / np.linalg.norm(measured - measured.mean())))
-
-
-def _rmse(measured: Vector, simulated: Vector) -> float:
-    return float(np.sqrt(np.mean((measured - simulated) ** 2)))
-
-
 def _row(name: str, model: str, train: float, test: float, metric: str, unit: str, **more: Any) -> dict[str, Any]:
     return {
         "set": name,
@@ -168,24 +164,26 @@ def _drive_parts(train: xr.Dataset, test: xr.Dataset, quick: bool) -> list[tuple
 
 def _hold_out(train: xr.Dataset, friction: str, drift: bool) -> float:
     """Mean fit [%] of the last cycle after a fit to the first three, and of the first after a fit to the others."""
-    options: dict[str, Any] = {"friction": friction, "drift": drift, "starts": _HOLD_OUT_STARTS}
+    options: dict[str, Any] = {"friction": friction, "drift": drift, "options": FitOptions(n_starts=_HOLD_OUT_STARTS)}
     early = fit_drive(train.isel(time_s=slice(0, _LAST_CYCLE)), **options)
     late = fit_drive(train.isel(time_s=slice(_SECOND_CYCLE, None)), **options)
     first = train.isel(time_s=slice(0, _SECOND_CYCLE))
     tail, whole = _LAST_CYCLE - _DRIVE_WINDOW, train["position_m"].to_numpy()
     return 0.5 * (
-        _fit_percent(whole[_LAST_CYCLE:], drive_free_run(early.model, train)[tail:])
-        + _fit_percent(whole[_DRIVE_WINDOW:_SECOND_CYCLE], drive_free_run(late.model, first))
+        nrmse_fit_percent(whole[_LAST_CYCLE:], drive_free_run(early.model, train)[tail:])
+        + nrmse_fit_percent(whole[_DRIVE_WINDOW:_SECOND_CYCLE], drive_free_run(late.model, first))
     )
 
 
 def _drive(train: xr.Dataset, test: xr.Dataset, text: str, friction: str, drift: bool, quick: bool) -> _Case:
     began = time.process_time()
-    fit = fit_drive(train, friction=friction, drift=drift, starts=_QUICK_STARTS if quick else _DRIVE_STARTS)
+    options = FitOptions(n_starts=_QUICK_STARTS if quick else _DRIVE_STARTS)
+    fit = fit_drive(train, friction=friction, drift=drift, options=options)
     seconds = time.process_time() - began
     runs = {key: drive_free_run(fit.model, record) for key, record in (("train", train), ("test", test))}
     truth = {key: record["position_m"].to_numpy()[_DRIVE_WINDOW:] for key, record in (("train", train), ("test", test))}
-    scores = {key: _fit_percent(truth[key], runs[key]) for key in runs}
+    scores = {key: nrmse_fit_percent(truth[key], runs[key]) for key in runs}
+    percents = 100.0 * (1.0 - np.asarray(fit.start_rmse) / truth["train"].std())
     return _Case(
         row=_row(
             "emps",
@@ -198,8 +196,8 @@ def _drive(train: xr.Dataset, test: xr.Dataset, text: str, friction: str, drift:
             seconds=seconds,
             status=fit.report.status,
             hold_out=None if quick else _hold_out(train, friction, drift),
-            starts=len(fit.starts_fit_percent),
-            starts_within_0_05=int(np.sum(np.asarray(fit.starts_fit_percent) > fit.fit_percent - 0.05)),
+            starts=len(fit.start_rmse),
+            starts_within_0_05=int(np.sum(percents > percents[0] - 0.05)),
         ),
         time_s=test["time_s"].to_numpy()[_DRIVE_WINDOW:],
         measured=truth["test"],
@@ -223,20 +221,20 @@ def _tanks(train: xr.Dataset, test: xr.Dataset, text: str, form: str) -> _Case:
     began = time.process_time()
     fit = fit_two_tanks(train, form=form)
     seconds = time.process_time() - began
-    upper, lower = fit.model.estimate_start(test, window=_TANKS_WINDOW)
-    run = fit.model.simulate(test["pump_v"], dt_s=4.0, start_upper_v=upper, start_lower_v=lower)
+    state = fit.model.estimate_state(test, window=_TANKS_WINDOW)
+    run = fit.model.simulate(test, initial_state=state)["level_v"].to_numpy()
     truth = test["level_v"].to_numpy()
     row = _row(
         "cascaded_tanks",
         text,
-        fit.rmse_v,
-        _rmse(truth, run),
+        fit.report.rmse,
+        rmse(truth, run),
         _RMSE,
         "V",
         n_parameters=len(fit.report.names),
         seconds=seconds,
         status=fit.report.status,
-        test_without_window=_rmse(truth[_TANKS_WINDOW:], run[_TANKS_WINDOW:]),
+        test_without_window=rmse(truth[_TANKS_WINDOW:], run[_TANKS_WINDOW:]),
     )
     return _Case(row=row, time_s=test["time_s"].to_numpy(), measured=truth, simulated=run, drawn=form == "grey_box")
 
@@ -253,10 +251,13 @@ def _linear(train: xr.Dataset, test: xr.Dataset) -> _Case:
     began = time.process_time()
     fit = fit_linear(train)
     seconds = time.process_time() - began
-    run, truth = fit.simulate(test["input_v"])[_CIRCUIT_WINDOW:], test["output_v"].to_numpy()[_CIRCUIT_WINDOW:]
+    run, truth = (
+        fit.simulate(test)["output_v"].to_numpy()[_CIRCUIT_WINDOW:],
+        test["output_v"].to_numpy()[_CIRCUIT_WINDOW:],
+    )
     more = {"n_parameters": 13, "seconds": seconds, "status": "best of 15 passes"}
     return _Case(
-        row=_row("wh2009", "linear, order 6", 1e3 * fit.rmse, 1e3 * _rmse(truth, run), _RMSE, "mV", **more),
+        row=_row("wh2009", "linear, order 6", 1e3 * fit.rmse, 1e3 * rmse(truth, run), _RMSE, "mV", **more),
     )
 
 
@@ -264,12 +265,15 @@ def _circuit(train: xr.Dataset, test: xr.Dataset, quick: bool) -> _Case:
     began = time.process_time()
     fit = fit_wiener_hammerstein(train, scan_samples=8000 if quick else 15_000)
     seconds = time.process_time() - began
-    run, truth = fit.model.simulate(test["input_v"])[_CIRCUIT_WINDOW:], test["output_v"].to_numpy()[_CIRCUIT_WINDOW:]
+    run, truth = (
+        fit.model.simulate(test)["output_v"].to_numpy()[_CIRCUIT_WINDOW:],
+        test["output_v"].to_numpy()[_CIRCUIT_WINDOW:],
+    )
     row = _row(
         "wh2009",
         "filter of order 3, cubic spline, filter of order 4",
-        1e3 * fit.rmse,
-        1e3 * _rmse(truth, run),
+        1e3 * fit.report.rmse,
+        1e3 * rmse(truth, run),
         _RMSE,
         "mV",
         n_parameters=len(fit.report.names),

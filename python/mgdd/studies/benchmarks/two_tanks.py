@@ -4,19 +4,25 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 from dataclasses import dataclass
+from types import MappingProxyType
 from typing import TYPE_CHECKING
 
 import numpy as np
 
 from mgdd import _core
 from mgdd.errors import DataError, ParameterError
-from mgdd.results import FitReport
+from mgdd.optimize.fit_options import FitOptions, fit_options
+from mgdd.optimize.fit_run import draw_run, fit_run, quality_of
+from mgdd.results import Fit, FitReport, Label
+from mgdd.results.fit import n_best_of
+from mgdd.signals.even_grid import even_step
+from mgdd.signals.model import RunInputs, SampledModel
 
 if TYPE_CHECKING:
     import xarray as xr
-    from numpy.typing import ArrayLike, NDArray
+    from numpy.typing import NDArray
 
-__all__ = ["TanksFit", "TwoTanksModel", "fit_two_tanks"]
+__all__ = ["TwoTanksModel", "fit_two_tanks"]
 
 _UNKNOWN_LEVELS = ["upper_level_v", "lower_level_v"]
 # Starts: outflow exponents, and all else in the order of a first guess from time constants of minutes.
@@ -54,7 +60,7 @@ _FORMS: dict[str, tuple[dict[str, float], tuple[str, ...]]] = {
 
 
 @dataclass(frozen=True, kw_only=True)
-class TwoTanksModel:
+class TwoTanksModel(SampledModel):
     """Two tanks in a row: a pump fills the upper one, its outlet and part of its overflow the lower one.
 
     Parameters
@@ -66,50 +72,47 @@ class TwoTanksModel:
     lower_brim_v : float
         Level at which the lower tank runs over and the sensor ends [V].
 
+    Notes
+    -----
+    The input is ``pump_v`` [V] over ``time_s`` [s]; states are ``upper_level_v`` and ``lower_level_v``, empty without;
+    the output is ``level_v`` of the lower tank [V].
+
     Examples
     --------
-    >>> from mgdd.studies.benchmarks import TwoTanksModel
+    >>> import numpy as np
+    >>> from mgdd.studies.benchmarks.two_tanks import TwoTanksModel
     >>> tanks = TwoTanksModel(parameters=dict(
     ...     pump_per_s=0.05, upper_outflow_per_s=0.05, upper_exponent=0.5, lower_outflow_per_s=0.05, lower_exponent=0.5,
     ...     lower_datum_v=0.0, upper_brim_v=10.0, overflow_share=0.5, delay_samples=0.0))
-    >>> level = tanks.simulate([2.0] * 500, dt_s=4.0, start_upper_v=0.0, start_lower_v=0.0)
-    >>> round(float(level[-1]), 2)  # steady: pump * 2 V = outflow * sqrt(level)
+    >>> run = tanks.simulate({"time_s": 4.0 * np.arange(500), "pump_v": np.full(500, 2.0)})
+    >>> round(float(run["level_v"][-1]), 2)  # steady: pump * 2 V = outflow * sqrt(level)
     4.0
     """
+
+    input_names = ("pump_v",)
+    output_name = "level_v"
+    state_names = ("upper_level_v", "lower_level_v")
+    observed_state = "lower_level_v"
+    labels = MappingProxyType({"pump_v": Label("V", "pump voltage"), "level_v": Label("V", "level")})
 
     parameters: Mapping[str, float]
     lower_brim_v: float = 10.0
 
-    def simulate(
-        self, pump_v: ArrayLike, *, dt_s: float, start_upper_v: float, start_lower_v: float
-    ) -> NDArray[np.float64]:
-        """Run freely from two levels.
+    @property
+    def kind(self) -> str:
+        """``two_tanks``."""
+        return "two_tanks"
 
-        Parameters
-        ----------
-        pump_v : array_like, shape (n,)
-            Pump voltage [V], held over each sample.
-        dt_s : float
-            Sample time [s].
-        start_upper_v, start_lower_v : float
-            Levels at the first sample [V].
+    def _rest(self) -> list[float]:
+        return [0.0, 0.0]
 
-        Returns
-        -------
-        ndarray, shape (n,)
-            Level of the lower tank [V].
-
-        Raises
-        ------
-        mgdd.errors.ParameterError
-            Unknown or missing parameters.
-        """
-        pump = np.asarray(pump_v, dtype=np.float64)
-        start = [start_upper_v, start_lower_v, float(pump[0]), float(pump[0])]
+    def _run(self, run: RunInputs) -> NDArray[np.float64]:
+        pump = run.columns[0]
+        start = [*run.state, float(pump[0]), float(pump[0])]
         model = _core.TwoTanks(lower_brim_v=self.lower_brim_v)
-        return np.asarray(model.free_run(parameters=_row(self.parameters), start=start, input=pump, dt_s=dt_s))
+        return np.asarray(model.free_run(parameters=_row(self.parameters), start=start, input=pump, dt_s=run.step_s))
 
-    def estimate_start(self, record: xr.Dataset, *, window: int = 50) -> tuple[float, float]:
+    def estimate_state(self, record: xr.Dataset, *, window: int = 50) -> dict[str, float]:
         """Estimate the two levels at the first sample from the first samples of a record, parameters held.
 
         Parameters
@@ -121,8 +124,8 @@ class TwoTanksModel:
 
         Returns
         -------
-        tuple of float
-            Upper and lower level [V].
+        dict of str to float
+            ``upper_level_v`` and ``lower_level_v`` [V], for `simulate`.
 
         Raises
         ------
@@ -137,39 +140,10 @@ class TwoTanksModel:
         brim = float(self.parameters["upper_brim_v"])
         fits = [_fit(self.parameters, [], known, share * brim, self.lower_brim_v, 100) for share in (0.2, 0.5, 0.9)]
         best = min(fits, key=lambda fit: float(fit.report.cost))
-        return float(best.starts[0][0]), float(best.starts[0][1])
+        return dict(zip(self.state_names, map(float, best.starts[0][:2]), strict=True))
 
 
-@dataclass(frozen=True, kw_only=True)
-class TanksFit:
-    """Fitted tanks.
-
-    Parameters
-    ----------
-    report : FitReport
-        Parameters and the two levels at the start of the record; the residual is in V.
-    model : TwoTanksModel
-        The tanks.
-    rmse_v : float
-        Of the free run over the record [V].
-
-    Examples
-    --------
-    >>> from mgdd import datasets
-    >>> from mgdd.studies.benchmarks import fit_two_tanks
-    >>> if "cascaded_tanks" in datasets.available():
-    ...     fit = fit_two_tanks(datasets.load_cascaded_tanks()[0], starts=1)
-    ...     assert fit.rmse_v == fit.report.rmse
-    """
-
-    report: FitReport
-    model: TwoTanksModel
-    rmse_v: float
-
-
-def fit_two_tanks(
-    record: xr.Dataset, *, form: str = "grey_box", starts: int = 4, seed: int = 1, max_iterations: int = 200
-) -> TanksFit:
+def fit_two_tanks(record: xr.Dataset, *, form: str = "grey_box", options: FitOptions | None = None) -> Fit:
     """Fit two tanks to their free run, the levels at the start included.
 
     Parameters
@@ -181,22 +155,19 @@ def fit_two_tanks(
         ``grey_box``: outflow of the upper tank proportional to its level, of the lower one by a power of the level
         above a datum, overflow in part into the lower tank, delay of the pump; ``grey_box_free_exponent``: the upper
         outflow by a power too.
-    starts : int
-        Number of starts, >= 1; the best by the error on this record is taken.
-    seed : int
-        Of the scattered starts.
-    max_iterations : int
-        Trial steps per start.
+    options : FitOptions, optional
+        4 starts, scattered with seed 1, 200 trial steps per start and a tolerance of 1e-9 where nothing else is said;
+        the best by the error on this record is taken.
 
     Returns
     -------
-    TanksFit
-        Report, model and error.
+    mgdd.results.Fit
+        Report (parameters and the two levels at the first sample) [V] and model.
 
     Raises
     ------
     mgdd.errors.ParameterError
-        An unknown form or fewer than one start.
+        An unknown form.
     mgdd.errors.DataError
         Times that are not even.
 
@@ -207,31 +178,43 @@ def fit_two_tanks(
     Examples
     --------
     >>> from mgdd import datasets
-    >>> from mgdd.studies.benchmarks import fit_two_tanks
+    >>> from mgdd.optimize import FitOptions
+    >>> from mgdd.studies.benchmarks.two_tanks import fit_two_tanks
     >>> if "cascaded_tanks" in datasets.available():
-    ...     fit = fit_two_tanks(datasets.load_cascaded_tanks()[0], starts=1)
-    ...     assert fit.rmse_v < 0.16
+    ...     fit = fit_two_tanks(datasets.load_cascaded_tanks()[0], options=FitOptions(n_starts=1))
+    ...     assert fit.train.rmse < 0.16
     """
     if form not in _FORMS:
         raise ParameterError(f"form = {form!r}: must be one of {', '.join(_FORMS)}")
-    if starts < 1:
-        raise ParameterError(f"starts = {starts}: must be >= 1")
+    chosen = fit_options(options, n_starts=4, seed=1, max_iterations=200, tolerance=1e-9)
     base, free = _FORMS[form]
-    rng = np.random.default_rng(seed)
+    rng = np.random.default_rng(chosen.seed)
     fits = []
-    for index in range(starts):
+    for index in range(chosen.n_starts):
         point = dict(base)
         for name in free if index else ():
             point[name] *= float(np.exp(0.15 * rng.standard_normal()))
         point["overflow_share"] = min(point["overflow_share"], 1.0)
         upper = min(0.8 * point["upper_brim_v"], 25.0) if form.startswith("grey_box") else 4.0
-        fits.append(_fit(point, list(free), record, upper, 10.0, max_iterations))
+        fits.append(_fit(point, list(free), record, upper, 10.0, chosen.max_iterations, chosen.tolerance))
     best = min(fits, key=lambda fit: float(fit.report.cost))
     names = tuple(_core.TwoTanks.parameter_names)
-    return TanksFit(
-        report=FitReport.from_core(best.report, record["level_v"].to_numpy()),
-        model=TwoTanksModel(parameters=dict(zip(names, best.parameters, strict=True))),
-        rmse_v=float(best.report.rmse),
+    report = FitReport.from_core(best.report, record["level_v"].to_numpy())
+    model = TwoTanksModel(parameters=dict(zip(names, best.parameters, strict=True)))
+    modelled = model.simulate(record, initial_state=[float(x) for x in best.starts[0][:2]])["level_v"]
+    run = fit_run(record["time_s"].to_numpy(), record["level_v"].to_numpy(), modelled, model.labels["level_v"])
+    errors = tuple(sorted(float(fit.report.rmse) for fit in fits))
+    return Fit(
+        report=report,
+        model=model,
+        kind=model.kind,
+        train=quality_of(run),
+        findings=report.findings,
+        unidentifiable=report.unidentifiable,
+        start_rmse=errors,
+        n_best=n_best_of(errors),
+        run=run,
+        draw=draw_run,
     )
 
 
@@ -242,11 +225,10 @@ def _fit(
     upper_v: float,
     lower_brim_v: float,
     max_iterations: int,
+    tolerance: float = 1e-9,
 ) -> _core.FreeRunFit:
     time = record["time_s"].to_numpy()
-    dt_s = float(time[1] - time[0])
-    if not (dt_s > 0.0 and np.allclose(np.diff(time), dt_s, rtol=1e-3)):
-        raise DataError("time_s is not evenly spaced: resample the record first")
+    dt_s = even_step(time)
     pump, level = record["pump_v"].to_numpy(), record["level_v"].to_numpy()
     data = _core.FreeRunRecord(
         input=pump,
@@ -254,7 +236,7 @@ def _fit(
         start=[upper_v, float(level[0]), float(pump[0]), float(pump[0])],
         free_start=_UNKNOWN_LEVELS,
     )
-    options = _core.LeastSquaresOptions(max_iterations=max_iterations, cost_tolerance=1e-9)
+    options = _core.LeastSquaresOptions(max_iterations=max_iterations, cost_tolerance=tolerance)
     return _core.TwoTanks(lower_brim_v=lower_brim_v).fit(
         base=_row(parameters), free=free, records=[data], dt_s=dt_s, options=options
     )

@@ -4,13 +4,19 @@ from __future__ import annotations
 
 import itertools
 from dataclasses import dataclass
+from types import MappingProxyType
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
 from mgdd import _core
 from mgdd.errors import DataError, ParameterError
-from mgdd.results import FitReport
+from mgdd.optimize.fit_options import FitOptions, fit_options
+from mgdd.optimize.fit_run import draw_run, fit_run, quality_of
+from mgdd.results import Fit, FitReport, Label
+from mgdd.results.fit import n_best_of
+from mgdd.signals.even_grid import even_step
+from mgdd.signals.model import RunInputs, SampledModel
 
 if TYPE_CHECKING:
     import xarray as xr
@@ -26,13 +32,14 @@ __all__ = [
     "fit_wiener_hammerstein",
 ]
 
+_LABELS = MappingProxyType({"input_v": Label("V", "input voltage"), "output_v": Label("V", "output voltage")})
 _SKIP = 100  # samples in which a filter that starts at rest forgets it
 _SCAN_DEGREE = 6  # of the polynomial that stands for the curve while partitions are compared
 _MARGIN = 0.05  # of the range of the signal, on either side of the curve's grid
 
 
 @dataclass(frozen=True, kw_only=True)
-class LinearApproximation:
+class LinearApproximation(SampledModel):
     """A linear filter B/A about the mean of a record.
 
     Parameters
@@ -47,12 +54,16 @@ class LinearApproximation:
     Examples
     --------
     >>> import numpy as np
-    >>> from mgdd.studies.benchmarks import LinearApproximation
+    >>> from mgdd.studies.benchmarks.wiener_hammerstein import LinearApproximation
     >>> lag = LinearApproximation(
     ...     numerator=np.array([0.5]), denominator=np.array([1.0, -0.5]), input_mean=0.0, output_mean=1.0, rmse=0.0)
-    >>> lag.simulate([1.0, 1.0, 1.0]).tolist()
+    >>> lag.simulate({"time_s": [0.0, 1.0, 2.0], "input_v": [1.0, 1.0, 1.0]})["output_v"].values.tolist()
     [1.5, 1.75, 1.875]
     """
+
+    input_names = ("input_v",)
+    output_name = "output_v"
+    labels = _LABELS
 
     numerator: Vector
     denominator: Vector
@@ -60,25 +71,27 @@ class LinearApproximation:
     output_mean: float
     rmse: float
 
-    def simulate(self, signal: ArrayLike) -> Vector:
-        """Respond to an input, from rest.
+    @property
+    def kind(self) -> str:
+        """``linear_filter``."""
+        return "linear_filter"
 
-        Parameters
-        ----------
-        signal : array_like, shape (n,)
-            Input.
+    @property
+    def parameters(self) -> dict[str, float]:
+        """Coefficients by name."""
+        both = {"numerator": self.numerator, "denominator": self.denominator}
+        return {f"{name}_{i}": float(value) for name, values in both.items() for i, value in enumerate(values)}
 
-        Returns
-        -------
-        ndarray, shape (n,)
-            Output.
-        """
-        deviation = np.asarray(signal, dtype=np.float64) - self.input_mean
+    def _rest(self) -> list[float]:
+        return []
+
+    def _run(self, run: RunInputs) -> Vector:
+        deviation = run.columns[0] - self.input_mean
         return np.asarray(_core.filter_series(self.numerator, self.denominator, deviation)) + self.output_mean
 
 
 @dataclass(frozen=True, kw_only=True)
-class WienerHammersteinModel:
+class WienerHammersteinModel(SampledModel):
     """Filter, static curve, filter; both filters have gain 1 at rest.
 
     Parameters
@@ -93,13 +106,18 @@ class WienerHammersteinModel:
     Examples
     --------
     >>> import numpy as np
-    >>> from mgdd.studies.benchmarks import WienerHammersteinModel
+    >>> from mgdd.studies.benchmarks.wiener_hammerstein import WienerHammersteinModel
     >>> circuit = WienerHammersteinModel(
     ...     first_order=1, last_order=1, n_curve=4, lower=-1.0, upper=1.0,
     ...     values=np.r_[-0.5, 0.5, -0.5, 0.5, -3.0, -1.0, 1.0, 3.0])  # two lags, and a curve that is the identity
-    >>> circuit.simulate([1.0, 1.0, 1.0]).round(4).tolist()
+    >>> run = circuit.simulate({"time_s": [0.0, 1.0, 2.0], "input_v": [1.0, 1.0, 1.0]})
+    >>> run["output_v"].values.round(4).tolist()
     [0.25, 0.5, 0.6875]
     """
+
+    input_names = ("input_v",)
+    output_name = "output_v"
+    labels = _LABELS
 
     first_order: int
     last_order: int
@@ -108,20 +126,21 @@ class WienerHammersteinModel:
     upper: float
     values: Vector
 
-    def simulate(self, signal: ArrayLike) -> Vector:
-        """Respond to an input, from rest.
+    @property
+    def kind(self) -> str:
+        """``wiener_hammerstein``."""
+        return "wiener_hammerstein"
 
-        Parameters
-        ----------
-        signal : array_like, shape (n,)
-            Input.
+    @property
+    def parameters(self) -> dict[str, float]:
+        """Coefficients by name."""
+        return dict(zip(_core_model(self).names, self.values.tolist(), strict=True))
 
-        Returns
-        -------
-        ndarray, shape (n,)
-            Output.
-        """
-        return np.asarray(_core_model(self).simulate(self.values, np.asarray(signal, dtype=np.float64)))
+    def _rest(self) -> list[float]:
+        return []
+
+    def _run(self, run: RunInputs) -> Vector:
+        return np.asarray(_core_model(self).simulate(self.values, run.columns[0]))
 
     def curve(self, signal: ArrayLike) -> Vector:
         """Evaluate the static curve.
@@ -139,38 +158,28 @@ class WienerHammersteinModel:
         return np.asarray(_core_model(self).curve(self.values, np.asarray(signal, dtype=np.float64)))
 
 
-@dataclass(frozen=True, kw_only=True)
-class WienerHammersteinFit:
-    """A fitted Wiener-Hammerstein model.
+@dataclass(frozen=True, kw_only=True, eq=False, repr=False)
+class WienerHammersteinFit(Fit):
+    """A fit of a Wiener-Hammerstein model; `start_rmse` has the error of every partition that was followed.
 
     Parameters
     ----------
-    report : FitReport
-        Of the final fit, in the unit of the output.
-    model : WienerHammersteinModel
-        The model.
-    rmse : float
-        Of the response over the record, first 100 samples left out [unit of the output].
     linear : LinearApproximation
         The linear filter it started from.
-    partitions_rmse : tuple of float
-        After the short fit of every partition that was followed, best first: how clearly one wins.
 
     Examples
     --------
     >>> from mgdd import datasets
-    >>> from mgdd.studies.benchmarks import fit_wiener_hammerstein
+    >>> from mgdd.optimize import FitOptions
+    >>> from mgdd.studies.benchmarks.wiener_hammerstein import fit_wiener_hammerstein
     >>> if "wh2009" in datasets.available():
     ...     some = datasets.load_wiener_hammerstein()[0].isel(time_s=slice(0, 5000))
-    ...     fit = fit_wiener_hammerstein(some, scan_samples=5000, follow=3, max_iterations=10)
-    ...     assert fit.rmse <= fit.linear.rmse
+    ...     options = FitOptions(max_iterations=10)
+    ...     fit = fit_wiener_hammerstein(some, scan_samples=5000, follow=3, options=options)
+    ...     assert fit.train.rmse <= fit.linear.rmse
     """
 
-    report: FitReport
-    model: WienerHammersteinModel
-    rmse: float
     linear: LinearApproximation
-    partitions_rmse: tuple[float, ...]
 
 
 def fit_linear(record: xr.Dataset, *, order: int = 6, iterations: int = 15) -> LinearApproximation:
@@ -204,7 +213,7 @@ def fit_linear(record: xr.Dataset, *, order: int = 6, iterations: int = 15) -> L
     Examples
     --------
     >>> from mgdd import datasets
-    >>> from mgdd.studies.benchmarks import fit_linear
+    >>> from mgdd.studies.benchmarks.wiener_hammerstein import fit_linear
     >>> if "wh2009" in datasets.available():
     ...     assert fit_linear(datasets.load_wiener_hammerstein()[0], order=2, iterations=3).rmse > 0.04
     """
@@ -242,7 +251,7 @@ def fit_wiener_hammerstein(
     n_curve: int = 20,
     follow: int = 8,
     scan_samples: int = 15_000,
-    max_iterations: int = 30,
+    options: FitOptions | None = None,
 ) -> WienerHammersteinFit:
     """Fit filter, curve and filter to the response of a circuit.
 
@@ -264,13 +273,14 @@ def fit_wiener_hammerstein(
         Partitions that get a complete short fit.
     scan_samples : int
         Samples used until one partition has won.
-    max_iterations : int
-        Trial steps of the last fit.
+    options : FitOptions, optional
+        30 trial steps and a tolerance of 1e-7 of the last fit where nothing else is said; the other options have no
+        effect here and are refused.
 
     Returns
     -------
-    WienerHammersteinFit
-        Report, model, linear start.
+    mgdd.results.Fit
+        Report and model in the unit of the output, first 100 samples left out, and the linear start, ``linear``.
 
     Raises
     ------
@@ -287,7 +297,8 @@ def fit_wiener_hammerstein(
     Examples
     --------
     >>> import numpy as np
-    >>> from mgdd.studies.benchmarks import fit_wiener_hammerstein
+    >>> from mgdd.optimize import FitOptions
+    >>> from mgdd.studies.benchmarks.wiener_hammerstein import fit_wiener_hammerstein
     >>> from mgdd.results import labelled_dataset
     >>> rng = np.random.default_rng(1)
     >>> u = np.convolve(rng.standard_normal(6003), np.ones(4) / 4.0, "valid")
@@ -300,12 +311,14 @@ def fit_wiener_hammerstein(
     ...     "time_s": ("time_s", np.arange(6000) / 1000.0, "s", "time"),
     ...     "input_v": ("time_s", u, "V", "input"), "output_v": ("time_s", y, "V", "output")})
     >>> fit = fit_wiener_hammerstein(
-    ...     record, linear_order=2, first_order=1, last_order=1, scan_samples=3000, max_iterations=60)
-    >>> fit.rmse < 0.1 * fit.linear.rmse
+    ...     record, linear_order=2, first_order=1, last_order=1, scan_samples=3000,
+    ...     options=FitOptions(max_iterations=60))
+    >>> fit.train.rmse < 0.1 * fit.linear.rmse
     True
     """
     if not 1 <= follow <= 1000:
         raise ParameterError(f"follow = {follow}: must be in [1, 1000]")
+    chosen = fit_options(options, max_iterations=30, tolerance=1e-7)
     u, y = _signals(record)
     linear = fit_linear(record, order=linear_order)
     some_u, some_y = u[:scan_samples], y[:scan_samples]
@@ -322,20 +335,31 @@ def fit_wiener_hammerstein(
         short.append((float(report.rmse), model, report))
     short.sort(key=lambda entry: entry[0])
     _, model, report = short[0]
-    report = _fit(model, report.values, u, y, max_iterations)
+    report = _fit(model, report.values, u, y, chosen.max_iterations, chosen.tolerance)
+    wrapped = FitReport.from_core(report, y[_SKIP:])
+    fitted = WienerHammersteinModel(
+        first_order=first_order,
+        last_order=last_order,
+        n_curve=n_curve,
+        lower=model.lower,
+        upper=model.upper,
+        values=np.asarray(report.values),
+    )
+    modelled = fitted.simulate(record)["output_v"].to_numpy()
+    run = fit_run(record["time_s"].to_numpy()[_SKIP:], y[_SKIP:], modelled[_SKIP:], _LABELS["output_v"])
+    errors = tuple(entry[0] for entry in short)
     return WienerHammersteinFit(
-        report=FitReport.from_core(report, y[_SKIP:]),
-        model=WienerHammersteinModel(
-            first_order=first_order,
-            last_order=last_order,
-            n_curve=n_curve,
-            lower=model.lower,
-            upper=model.upper,
-            values=np.asarray(report.values),
-        ),
-        rmse=float(report.rmse),
+        report=wrapped,
+        model=fitted,
+        kind=fitted.kind,
+        train=quality_of(run),
+        findings=wrapped.findings,
+        unidentifiable=wrapped.unidentifiable,
+        start_rmse=errors,
+        n_best=n_best_of(errors),
+        run=run,
+        draw=draw_run,
         linear=linear,
-        partitions_rmse=tuple(entry[0] for entry in short),
     )
 
 
@@ -343,6 +367,7 @@ def _signals(record: xr.Dataset) -> tuple[Vector, Vector]:
     u, y = record["input_v"].to_numpy(), record["output_v"].to_numpy()
     if u.size < 1000:
         raise DataError(f"the record has {u.size} samples: at least 1000 are needed")
+    even_step(record["time_s"])
     return u, y
 
 
@@ -356,8 +381,10 @@ def _core_model(model: WienerHammersteinModel) -> _core.WienerHammerstein:
     )
 
 
-def _fit(model: _core.WienerHammerstein, start: Vector, u: Vector, y: Vector, iterations: int) -> _core.FitReport:
-    options = _core.LeastSquaresOptions(max_iterations=iterations, cost_tolerance=1e-7)
+def _fit(
+    model: _core.WienerHammerstein, start: Vector, u: Vector, y: Vector, iterations: int, tolerance: float = 1e-7
+) -> _core.FitReport:
+    options = _core.LeastSquaresOptions(max_iterations=iterations, cost_tolerance=tolerance)
     return model.fit(start=start, input=u, output=y, skip=_SKIP, options=options)
 
 

@@ -12,17 +12,18 @@
 #include "mgdd/common/state.hpp"
 #include "mgdd/optimize/learning/learning_convergence.hpp"
 #include "mgdd/optimize/learning/learning_law.hpp"
+#include "mgdd/optimize/reading.hpp"
 
 namespace mgdd::optimize {
 
 /// What became of an error trajectory. After the refusals, from `not_asked` on, everything is as it was.
 enum class LearningStatus {
-  learned,       ///< the input of the next trial follows from the law
-  frozen,        ///< the guard stopped learning, now or before: the next trial repeats the best input so far
-  not_asked,     ///< ask() comes first, once per trial
-  wrong_length,  ///< not one error per sample
-  not_finite,    ///< NaN or infinity in the error
-  overflow,      ///< error norm or next input beyond the range of a double: the trials diverge
+  learned,        ///< the input of the next trial follows from the law
+  frozen,         ///< the guard stopped learning, now or before: the next trial repeats the best input so far
+  not_asked,      ///< ask() comes first, once per trial
+  wrong_length,   ///< not one error per sample
+  not_a_reading,  ///< a sample of the error that is NaN or beyond `largest_reading`
+  overflow,       ///< next input beyond the range of a double: the trials diverge
 };
 
 /// Learns on the samples m..N-1 of the error, which the inputs 0..N-1-m reach; the m inputs behind those act only after

@@ -11,6 +11,7 @@
 #include <string_view>
 
 #include "mgdd/common/error.hpp"
+#include "mgdd/optimize/reading.hpp"
 
 namespace mgdd::optimize {
 
@@ -43,14 +44,15 @@ void validate(const SearchSpace& space, const Inputs& reach);
 void validate_entries(std::string_view name, const Inputs& values, Eigen::Index inputs, double lower,
                       double upper = unlimited);
 
-/// What one cycle returned. Components of J add up to it; a misfired cycle's numbers are not read.
+/// What one cycle returned. Components of J add up to it; a misfired cycle's numbers are not read, all others must
+/// satisfy `is_reading`.
 struct Reading {
   std::span<const double> components;
   std::span<const double> limits;  ///< measured values of the limited quantities, in the order of the settings
   bool misfire = false;
 };
 
-enum class TellStatus { accepted, misfire, not_asked, wrong_component_count, wrong_limit_count, not_finite };
+enum class TellStatus { accepted, misfire, not_asked, wrong_component_count, wrong_limit_count, not_a_reading };
 
 /// The bookkeeping of ask and tell.
 struct Protocol {
