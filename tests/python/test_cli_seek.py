@@ -16,7 +16,7 @@ import pytest
 
 from mgdd.cli import main
 from mgdd.engine import Performance
-from mgdd.loop import EngineBench, find_steady_optimum, run_seeker
+from mgdd.loop import EngineBench, LoopCriteria, find_steady_optimum, run_seeker
 from mgdd.optimize import ExtremumSeeking
 
 METHODS = ("extremum_seeking", "newton", "bounded", "spsa", "golden")
@@ -109,7 +109,7 @@ def test_it_is_the_library_run(capsys: pytest.CaptureFixture[str], tmp_path: Pat
     seeker = ExtremumSeeking(
         start=-12.0, lower=-30.0, upper=10.0, form="moving_average", gain=2.0 / (abs(best.curvature) * 40.0)
     )
-    run = run_seeker(bench, seeker, 1500, optimum_cad=best["soc_cad"])
+    run = run_seeker(bench, seeker, 1500, criteria=LoopCriteria(optimum=best["soc_cad"]))
     assert out["final_cad"] == run.summary["final_cad"]
     assert out["rms_cad"] == run.summary["rms_cad"]
     assert out["cycles_to_1_cad"] == run.summary["cycles_to"]
