@@ -9,7 +9,14 @@ import numpy as np
 import pytest
 
 from mgdd.errors import DataError, ParameterError
-from mgdd.identify import FittedParameters, ThrottleModel, identify_throttle, load_throttle_model, validate_throttle
+from mgdd.identify import (
+    FittedParameters,
+    ThrottleModel,
+    fit_throttle,
+    identify_throttle,
+    load_throttle_model,
+    validate_throttle,
+)
 from mgdd.io import throttle_log
 from mgdd.signals import amplitude_random_steps, chirp, triangle
 from mgdd.throttle import Throttle, simulate
@@ -66,6 +73,20 @@ def test_a_fit_says_how_good_it_is(kind: str, train: Any, test_log: Any, tmp_pat
     np.testing.assert_array_equal(
         again.simulate(time, duty, start_deg=8.0), fit.model.simulate(time, duty, start_deg=8.0)
     )
+
+
+def test_a_lag_of_the_current_is_kept_only_where_it_pays() -> None:
+    signal = chirp(4.0, offset=0.01, amplitude=0.34, high_hz=5.0)
+    run = simulate(P1, signal["duty"], time_s=signal["time_s"])  # 1 ms of lag, worth 0.08 deg RMS
+    noise = np.random.default_rng(1).standard_normal(run.sizes["time_s"])
+    for noise_deg, kept in ((0.03, True), (0.25, True), (0.47, False)):
+        log = throttle_log(run["time_s"], run["duty"], run["angle_deg"] + noise_deg * noise)
+        without, with_lag = (fit_throttle(log, electrical=lag, n_starts=1).report.rmse for lag in (False, True))
+        assert with_lag < without
+        assert (with_lag < 0.97 * without) is kept
+        fit = identify_throttle(log, "first_principle", starts=1)
+        assert (fit.parameters["electrical_s"] > 0.0) is kept
+        assert fit.report.rmse == pytest.approx(with_lag if kept else without, rel=1e-9)
 
 
 def test_a_slow_opening_fits_itself_and_nothing_else(test_log: Any) -> None:
