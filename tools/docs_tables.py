@@ -14,10 +14,11 @@ import numpy as np
 
 from mgdd import datasets, engine, presets
 from mgdd.engine import Cylinder, OperatingPoint, analyze, simulate
-from mgdd.identify import CylinderFit, wall_heat_profile
+from mgdd.identify import best_timing, compare_laws, wall_heat_profile
+from mgdd.identify.engine.records import CylinderFit
 from mgdd.io import pressure_trace
 from mgdd.results import ANGLE, VARIABLES
-from mgdd.studies import best_timing, compare_laws, run_study
+from mgdd.studies import run_study
 
 __all__ = [
     "burn_laws",
@@ -165,7 +166,7 @@ def burn_laws() -> Rows:
             own.imep_closed_error_percent,
             own.onset_against_soi_cad,
             own.largest_error_bar,
-            fit.cylinder.wall_heat_scale,
+            fit.model.wall_heat_scale,
         ]
         for law, fit in fits().items()
         for load, own in zip(_LOADS, fit.loads, strict=True)

@@ -12,8 +12,8 @@ import pytest
 from mgdd import _core, datasets, io, presets
 from mgdd.engine import Cylinder, OperatingPoint, analyze, convergence, find_optimum, sensitivities, simulate
 from mgdd.errors import ConvergenceError, DataError, ParameterError, ShapeError
-from mgdd.identify import fit_cylinder, wall_heat_profile
-from mgdd.studies import best_timing
+from mgdd.identify import best_timing, fit_cylinder, wall_heat_profile
+from mgdd.optimize import FitOptions
 
 HD = presets.load("hd_diesel_128x144").cylinder
 POINT = OperatingPoint(burn_duration_cad=30.0)
@@ -137,7 +137,9 @@ def test_profile_follows_the_fit_and_never_invents_its_range() -> None:
 
 def test_profile_of_an_unfinished_fit_says_so() -> None:
     trace = datasets.load_hd_traces()[1:2]
-    bad = fit_cylinder(trace, HD.replace(burn_shape="double_wiebe", gamma_model="constant"), max_iterations=2)
+    bad = fit_cylinder(
+        trace, HD.replace(burn_shape="double_wiebe", gamma_model="constant"), options=FitOptions(max_iterations=2)
+    )
     profile = wall_heat_profile(trace, bad, scales=[0.5, 1.0])
     assert not profile.identifiable
     assert "did not converge" in profile.reasons[0]
@@ -149,9 +151,9 @@ def test_profile_of_an_unfinished_fit_says_so() -> None:
 def test_start_is_checked_before_the_fit() -> None:
     trace = datasets.load_hd_traces()[1:2]
     with pytest.raises(ParameterError, match=r"start of second_fraction\[pressure_a50_bar\] = 5: must be in \[0, 1\]"):
-        fit_cylinder(trace, HD, start=[{"second_fraction": 5.0}])
+        fit_cylinder(trace, HD, start_values=[{"second_fraction": 5.0}])
     with pytest.raises(ParameterError, match="fuel_heat_j"):
-        fit_cylinder(trace, HD, start=[{"fuel_heat_j": math.nan}])
+        fit_cylinder(trace, HD, start_values=[{"fuel_heat_j": math.nan}])
     with pytest.raises(ShapeError, match="list of them"):
         fit_cylinder(trace[0], HD)
     assert fit_cylinder(trace, HD).report.success
@@ -167,7 +169,7 @@ def test_a_trace_that_lacks_the_closed_part_is_doubted() -> None:
         whole["crank_angle_cad"].values[:-12] + 10.0, whole["pressure_bar"].values[:-12], name="late"
     )
     fit = fit_cylinder([shifted], HD)
-    assert any("TDC" in text for text in fit.warnings)
+    assert any(found.code == "doubtful_trace" and "TDC" in found.text for found in fit.findings)
 
 
 def test_a_spike_is_told() -> None:

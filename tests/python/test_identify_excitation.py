@@ -170,17 +170,18 @@ def test_a_check_reports_what_it_simulated() -> None:
 @pytest.mark.parametrize(
     ("limits", "said"),
     [
-        ({"angle_window_deg": (1.0, 40.0)}, "opens to 50.0 deg, beyond 40: lower offset or amplitude"),
-        ({"angle_window_deg": (15.0, 60.0)}, "closes to 10.0 deg, beyond 15: raise the offset"),
-        ({"max_rate_deg_per_s": 300.0}, "deg/s, above 300: lower the amplitude"),
-        ({"max_current_a": 2.0}, "the motor takes 3.00 A, above 2: lower the amplitude"),
+        ({"angle_window_deg": (1.0, 40.0)}, "opens to 50.0 deg, beyond 40; lower offset or amplitude"),
+        ({"angle_window_deg": (15.0, 60.0)}, "closes to 10.0 deg, beyond 15; raise the offset"),
+        ({"max_rate_deg_per_s": 300.0}, "deg/s, above 300; lower the amplitude"),
+        ({"max_current_a": 2.0}, "the motor takes 3.00 A, above 2; lower the amplitude"),
     ],
 )
 def test_every_limit_is_told_with_its_remedy(limits: dict[str, Any], said: str) -> None:
     check = identify.check_excitation(signals.chirp(offset=0.1, amplitude=0.2), lazy, start_deg=20.0, **limits)
     assert not check.passed
-    assert len(check.findings) == 1
-    assert said in check.findings[0]
+    (found,) = check.findings
+    assert (found.code, found.names) == ("limit_exceeded", tuple(limits))
+    assert said in str(found)
     assert "outside the limits" in check.summary()
     assert identify.check_excitation(signals.chirp(offset=0.1, amplitude=0.05), lazy, start_deg=20.0, **limits).passed
 

@@ -14,6 +14,7 @@ from mgdd import identify, signals
 from mgdd.errors import DataError, ParameterError, ShapeError
 from mgdd.identify.throttle.record_content import open_questions, record_content
 from mgdd.io import throttle_log
+from mgdd.signals.model import RunInputs, SampledModel
 from mgdd.throttle import Throttle, simulate
 
 TIME = np.arange(6000) * 1e-3
@@ -25,9 +26,9 @@ records = arrays(np.float64, 40, elements=st.floats(-1e3, 1e3)).filter(lambda y:
 @settings(max_examples=50, deadline=None)
 @given(y=records, offset=st.floats(-100.0, 100.0))
 def test_the_metrics_have_their_fixed_points(y: np.ndarray, offset: float) -> None:
-    assert signals.fit_percent(y, y) == 100.0
-    assert signals.fit_percent(y, np.full_like(y, y.mean())) == pytest.approx(0.0, abs=1e-9)
-    assert signals.fit_percent(y - y.mean(), -(y - y.mean())) == pytest.approx(-100.0, abs=1e-9)
+    assert signals.nrmse_fit_percent(y, y) == 100.0
+    assert signals.nrmse_fit_percent(y, np.full_like(y, y.mean())) == pytest.approx(0.0, abs=1e-9)
+    assert signals.nrmse_fit_percent(y - y.mean(), -(y - y.mean())) == pytest.approx(-100.0, abs=1e-9)
     assert signals.vaf_percent(y, y + offset) == pytest.approx(100.0, abs=1e-9)
     assert signals.rmse(y, y + offset) == pytest.approx(abs(offset), rel=1e-9, abs=1e-9)
     assert signals.mse(y, y + offset) == pytest.approx(offset**2, rel=1e-9, abs=1e-9)
@@ -35,16 +36,16 @@ def test_the_metrics_have_their_fixed_points(y: np.ndarray, offset: float) -> No
 
 def test_the_metrics_exactly() -> None:
     y = np.sin(np.linspace(0.0, 20.0, 500))
-    assert abs(signals.fit_percent(y, y) - 100.0) <= 1e-12
-    assert abs(signals.fit_percent(y, np.full_like(y, y.mean()))) <= 1e-12
-    assert signals.fit_percent(y, -y) < 0.0
+    assert abs(signals.nrmse_fit_percent(y, y) - 100.0) <= 1e-12
+    assert abs(signals.nrmse_fit_percent(y, np.full_like(y, y.mean()))) <= 1e-12
+    assert signals.nrmse_fit_percent(y, -y) < 0.0
     assert abs(signals.vaf_percent(y, y + 3.0) - 100.0) <= 1e-12
-    assert signals.fit_percent(y, y + 3.0) < 0.0
+    assert signals.nrmse_fit_percent(y, y + 3.0) < 0.0
 
 
 def test_the_metrics_refuse_what_has_no_answer() -> None:
     with pytest.raises(DataError, match="constant"):
-        signals.fit_percent(np.ones(5), np.ones(5))
+        signals.nrmse_fit_percent(np.ones(5), np.ones(5))
     with pytest.raises(DataError, match="second signal, sample 2: nan"):
         signals.rmse(np.zeros(4), [0.0, 0.0, np.nan, 0.0])
     with pytest.raises(ShapeError, match="must be equal"):
@@ -104,40 +105,38 @@ def test_a_log_is_split_by_time() -> None:
         identify.split_log(log(), shares=(0.95, 0.05))
 
 
-class Proportional:
+class Proportional(SampledModel):
     """A plate that follows its duty at once: exact on the logs made here."""
 
     kind = "pw_r"
+    input_names = ("duty",)
+    output_name = observed_state = "angle_deg"
+    state_names = ("angle_deg",)
 
     def __init__(self, gain: float = 60.0) -> None:
         self.parameters = {"gain": gain, "limp_home_deg": 8.0}
 
-    def simulate(self, time_s: Any, duty: Any, *, start_deg: float) -> np.ndarray:
-        gain = self.parameters["gain"]
-        return np.asarray(start_deg + gain * (np.asarray(duty) - duty[0]) + 0.0 * np.asarray(time_s))
+    def _rest(self) -> list[float]:
+        return [8.0]
 
-    def predict(self, time_s: Any, duty: Any, angle_deg: Any, horizon: int) -> np.ndarray:
-        run = self.simulate(time_s, duty, start_deg=angle_deg[0])
-        return np.asarray(angle_deg[:-horizon] + run[horizon:] - run[:-horizon])
-
-    def to_toml(self) -> str:
-        return ""
+    def _run(self, run: RunInputs) -> np.ndarray:
+        return np.asarray(run.state[0] + self.parameters["gain"] * (run.columns[0] - run.columns[0][0]))
 
 
 class Runaway(Proportional):
     """A fit that has failed."""
 
-    def simulate(self, time_s: Any, duty: Any, *, start_deg: float) -> np.ndarray:
-        return np.full(len(time_s), np.nan * start_deg * duty[0])
+    def _run(self, run: RunInputs) -> np.ndarray:
+        return np.full(run.time_s.size, np.nan)
 
 
 def test_a_validation_reports_free_run_and_steps_ahead() -> None:
     noisy = log()["angle_deg"].to_numpy() + 0.05 * RNG.standard_normal(TIME.size)
     noisy[0] = 20.0  # a free run starts at the first sample, noise and all
     validation = identify.validate_throttle(Proportional(), log(noisy))
-    assert validation.fit_percent > 99.0
-    assert validation.rmse_deg == pytest.approx(0.05, rel=0.2)
-    assert validation.mse_deg2 == pytest.approx(validation.rmse_deg**2)
+    assert validation.quality.nrmse_fit_percent > 99.0
+    assert validation.quality.rmse == pytest.approx(0.05, rel=0.2)
+    assert validation.to_dict()["mse_deg2"] == pytest.approx(validation.quality.rmse**2)
     rms = validation.n_step["n_step_rms_deg"]
     assert rms.sel(predictor="pw_r").to_numpy() == pytest.approx(0.05 * np.sqrt(2.0), rel=0.1)
     travelled = 60.0 * 0.25 * 2.0 * np.sin(np.pi * 0.05) / np.sqrt(2.0)
@@ -213,8 +212,9 @@ def test_n_steps_can_be_compared_with_the_truth() -> None:
 
 def test_a_poor_fit_is_named() -> None:
     validation = identify.validate_throttle(Proportional(30.0), log())
-    assert validation.fit_percent < 60.0
-    assert any("below the 85 %" in finding for finding in validation.findings)
+    assert validation.quality.nrmse_fit_percent < 60.0
+    poor = next(finding for finding in validation.findings if finding.code == "poor_free_run")
+    assert "below the 85 %" in poor.text
 
 
 def test_a_model_that_runs_away_is_an_error() -> None:
@@ -227,7 +227,7 @@ def test_a_model_that_runs_away_is_an_error() -> None:
 
 def questions(angle: np.ndarray, **options: Any) -> str:
     content = record_content(TIME, angle, limp_home_deg=8.0, stops_deg=(0.0, 90.0))
-    return "\n".join(open_questions(content, swing=0.25, **options))
+    return "\n".join(map(str, open_questions(content, swing=0.25, **options)))
 
 
 def test_a_rich_log_leaves_nothing_open() -> None:
@@ -259,7 +259,7 @@ def test_entangled_pairs_get_their_own_remedy() -> None:
     rich = 10.0 + 9.0 * np.sin(2.0 * np.pi * 2.0 * TIME)
     said = questions(rich, pairs=[("preload_duty", "coulomb_duty", -0.993)])
     assert (
-        "preload_duty and coulomb_duty are indistinguishable in this log (correlation -0.993): add a triangle" in said
+        "preload_duty and coulomb_duty are indistinguishable in this log (correlation -0.993); add a triangle" in said
     )
     assert "add a chirp to 6 Hz" in questions(rich, pairs=[("tau_s", "gain_deg_per_s2_per_duty", 0.99)])
     one_way = questions(2.0 + 14.0 * TIME, pairs=[("preload_duty", "coulomb_duty", -0.999)])

@@ -22,7 +22,7 @@ from mgdd.cli.output import check_output, emit, lines, progress
 from mgdd.cli.seek import add_seek
 from mgdd.engine import analyze, find_optimum, simulate, start_of_combustion, start_of_injection, timing_sweep
 from mgdd.errors import ConvergenceError, ParameterError
-from mgdd.studies import best_timing
+from mgdd.identify import best_timing
 
 __all__ = ["add"]
 

@@ -102,7 +102,7 @@ def _excite(args: argparse.Namespace) -> None:
         signal = make(offset=args.offset, amplitude=args.amplitude, step_s=args.step_s, **given)
         check = identify.check_excitation(signal, throttle, angle_window_deg=window, **limits)
         if not check.passed:
-            raise ParameterError("this signal must not be sent: " + "; ".join(check.findings))
+            raise ParameterError("this signal must not be sent: " + "; ".join(map(str, check.findings)))
     attrs = {name: value for name, value in signal.attrs.items() if name != "kind"}
     payload = {"kind": args.kind, "preset": preset, "samples": signal.sizes["time_s"], "step_s": args.step_s}
     payload |= attrs | check.to_dict()

@@ -14,13 +14,13 @@ if TYPE_CHECKING:
     import xarray as xr
     from numpy.typing import ArrayLike, NDArray
 
-__all__ = ["ResidualTests", "fit_percent", "mse", "residual_tests", "rmse", "vaf_percent"]
+__all__ = ["ResidualTests", "mse", "nrmse_fit_percent", "residual_tests", "rmse", "vaf_percent"]
 
 _LIMIT = 1.96
 _SHARE = 0.95
 
 
-def fit_percent(measured: ArrayLike, model: ArrayLike) -> float:
+def nrmse_fit_percent(measured: ArrayLike, model: ArrayLike) -> float:
     """Return ``100 (1 - |y - yh| / |y - mean y|)``: 100 is perfect, 0 as good as the mean.
 
     Parameters
@@ -42,8 +42,8 @@ def fit_percent(measured: ArrayLike, model: ArrayLike) -> float:
 
     Examples
     --------
-    >>> from mgdd.signals import fit_percent
-    >>> fit_percent([1.0, 2.0, 3.0], [1.0, 2.0, 3.0]), fit_percent([1.0, 2.0, 3.0], [2.0, 2.0, 2.0])
+    >>> from mgdd.signals import nrmse_fit_percent
+    >>> nrmse_fit_percent([1.0, 2.0, 3.0], [1.0, 2.0, 3.0]), nrmse_fit_percent([1.0, 2.0, 3.0], [2.0, 2.0, 2.0])
     (100.0, 0.0)
     """
     y, yh = _pair(measured, model)
@@ -66,7 +66,7 @@ def vaf_percent(measured: ArrayLike, model: ArrayLike) -> float:
     Raises
     ------
     DataError, ShapeError
-        As in `fit_percent`.
+        As in `nrmse_fit_percent`.
 
     Examples
     --------

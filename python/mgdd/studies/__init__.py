@@ -9,7 +9,7 @@ from __future__ import annotations
 from mgdd.studies.base import StudyResult
 from mgdd.studies.benchmarks.identification_benchmarks import run_identification_benchmarks
 from mgdd.studies.measured_engine_seek import run_measured_engine_seek
-from mgdd.studies.measured_traces import best_timing, compare_laws, run_measured_traces
+from mgdd.studies.measured_traces import run_measured_traces
 from mgdd.studies.nox_sensors import run_nox_sensors
 from mgdd.studies.registry import available_studies, run_study
 from mgdd.studies.seeker_comparison import run_seeker_comparison
@@ -22,8 +22,6 @@ from mgdd.studies.timing_tests import run_timing_tests
 __all__ = [
     "StudyResult",
     "available_studies",
-    "best_timing",
-    "compare_laws",
     "run_identification_benchmarks",
     "run_measured_engine_seek",
     "run_measured_traces",

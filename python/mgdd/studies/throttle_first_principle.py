@@ -10,8 +10,9 @@ import numpy as np
 from mgdd import presets
 from mgdd.identify import fit_throttle
 from mgdd.io import throttle_log
+from mgdd.optimize import FitOptions
 from mgdd.results import labelled_dataset, to_jsonable
-from mgdd.signals import fit_percent
+from mgdd.signals import nrmse_fit_percent
 from mgdd.studies.base import Progress, StudyResult, check_seeds, run_parts
 from mgdd.studies.statistics import with_interval
 from mgdd.throttle import Throttle, groups, simulate
@@ -145,13 +146,13 @@ def _case(
     for seed in range(seeds):
         rng = np.random.default_rng(seed)
         logs = {record: _log(throttle, duty, rng) for record, duty in records.items()}
-        fit = fit_throttle(logs["train"], seed=seed)
+        fit = fit_throttle(logs["train"], options=FitOptions(seed=seed))
         for own, fitted, _ in _GROUPS:
             errors[fitted].append(100.0 * (fit.parameters[fitted] / float(truth[own]) - 1.0))
         for record, log in logs.items():
             time, measured = log["time_s"].to_numpy(), log["angle_deg"].to_numpy()
-            model = fit.model.simulate(time, records[record], start_deg=float(measured[0]))
-            quality[record].append(fit_percent(measured, model))
+            model = fit.model.simulate(log, initial_state={"angle_deg": float(measured[0])})["angle_deg"].to_numpy()
+            quality[record].append(nrmse_fit_percent(measured, model))
             run = {"time_s": time, "angle_deg": measured, "model_deg": model}
     rows = [
         {

@@ -10,8 +10,9 @@ import numpy as np
 from mgdd import presets
 from mgdd.errors import ParameterError
 from mgdd.identify import fit_pseudo_wiener
+from mgdd.optimize import FitOptions
 from mgdd.results import labelled_dataset, to_jsonable
-from mgdd.signals import fit_percent
+from mgdd.signals import nrmse_fit_percent
 from mgdd.studies.base import Progress, StudyResult, run_parts
 from mgdd.throttle import Throttle, simulate
 
@@ -155,20 +156,22 @@ def _judge(plant: str, kind: str, rule: str, starts: int) -> tuple[dict[str, Any
     limp_home = study_throttle(plant).limp_home_deg
     # PW-P at rest ends in a flat valley of no play: one search in thirty reaches its floor.
     count = None if kind == "pw_r" else 5 * starts if rule == "rest" else starts
-    fit = fit_pseudo_wiener(logs["train"], kind, limp_home_deg=limp_home, starts=count, lag_start=rule)
+    fit = fit_pseudo_wiener(
+        logs["train"], kind, limp_home_deg=limp_home, lag_start=rule, options=FitOptions(n_starts=count)
+    )
     runs = {
-        name: fit.model.simulate(log["time_s"], log["duty"], start_deg=float(log["angle_deg"][0]))
+        name: fit.model.simulate(log, initial_state={"angle_deg": float(log["angle_deg"][0])})["angle_deg"].to_numpy()
         for name, log in logs.items()
     }
-    free = {name: fit_percent(logs[name]["angle_deg"], runs[name]) for name in RECORDS}
+    free = {name: nrmse_fit_percent(logs[name]["angle_deg"], runs[name]) for name in RECORDS}
     ahead = _ahead(logs["chirp"], runs["chirp"], HORIZONS)
     row = {
         "plant": plant,
         "model": kind,
         "lag_start": rule,
         **_columns(free, ahead),
-        "starts": len(fit.search_rmse_deg),
-        "hits": fit.hits,
+        "starts": len(fit.start_rmse),
+        "hits": fit.n_best,
     }
     extra = {
         "parameters": dict(fit.parameters),

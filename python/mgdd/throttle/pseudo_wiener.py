@@ -2,22 +2,25 @@
 
 from __future__ import annotations
 
-import json
 import tomllib
 from collections.abc import Mapping
 from types import MappingProxyType
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
 from mgdd import _core
-from mgdd.errors import DataError, ParameterError, ShapeError
+from mgdd.errors import DataError
 from mgdd.signals.even_grid import even_step, is_same_step
+from mgdd.signals.model import RunInputs, SampledModel, check_horizon, columns_of
+from mgdd.throttle.fitted_parameters import parameter_text
 
 if TYPE_CHECKING:
+    import xarray as xr
     from numpy.typing import ArrayLike, NDArray
 
     from mgdd._core import Throttle
+    from mgdd.results import Fit
 
 __all__ = ["PseudoWiener"]
 
@@ -25,7 +28,7 @@ _STEP_S = 5e-4  # of PW-R
 _GAIN_SAMPLE_S = 1e-3  # the observer gains are per 1 ms
 
 
-class PseudoWiener:
+class PseudoWiener(SampledModel):
     """A pseudo-Wiener model of a throttle.
 
     Parameters
@@ -60,10 +63,16 @@ class PseudoWiener:
     >>> from mgdd.throttle import PseudoWiener, Throttle
     >>> model = PseudoWiener.of_throttle(Throttle())
     >>> time = np.arange(200) * 1e-3
-    >>> angle = model.simulate(time, np.full(200, 0.4), start_deg=8.0)
+    >>> run = model.simulate({"time_s": time, "duty": np.full(200, 0.4)}, initial_state={"angle_deg": 8.0})
+    >>> run["angle_deg"].units
+    'deg'
     >>> PseudoWiener.from_toml(model.to_toml()) == model
     True
     """
+
+    input_names = ("duty",)
+    output_name = observed_state = "angle_deg"
+    state_names = ("angle_deg",)
 
     def __init__(
         self,
@@ -148,50 +157,27 @@ class PseudoWiener:
             changes["substeps"] = float(max(1, round(sample_s / _STEP_S)))
         return self.replace(**changes)
 
-    def simulate(self, time_s: ArrayLike, duty: ArrayLike, *, start_deg: float) -> NDArray[np.float64]:
-        """Run free from rest.
+    def _rest(self) -> list[float]:
+        return [float(self.parameters["limp_home_deg"])]
 
-        Parameters
-        ----------
-        time_s : array_like, shape (n,)
-            Even, increasing times [s].
-        duty : array_like, shape (n,)
-            Duty [-]; sample k acts from ``time_s[k]`` to ``time_s[k + 1]``.
-        start_deg : float
-            Angle at the first sample [deg].
-
-        Returns
-        -------
-        ndarray, shape (n,)
-            Angle at ``time_s`` [deg].
-
-        Raises
-        ------
-        DataError
-            An uneven time.
-        ShapeError
-            Columns of different length.
-        """
-        sample_s, u = _grid(time_s, duty)
-        return np.asarray(self.at_sample(sample_s)._core.simulate(u, start_deg=float(start_deg)))
+    def _run(self, run: RunInputs) -> NDArray[np.float64]:
+        return np.asarray(self.at_sample(run.step_s)._core.simulate(_duty(run.columns[0]), start_deg=run.state[0]))
 
     def predict(
         self,
-        time_s: ArrayLike,
-        duty: ArrayLike,
-        angle_deg: ArrayLike,
+        record: Any,
         horizon: int,
         *,
         angle_gain: float = 0.35,
         speed_gain_per_s: float = 35.0,
         bias_gain_duty_per_deg: float = 0.004,
-    ) -> NDArray[np.float64]:
-        """Predict ahead of a measured record, re-anchored at every sample.
+    ) -> xr.Dataset:
+        """Predict ahead of a measured record, corrected by the measurement at every sample.
 
         Parameters
         ----------
-        time_s, duty, angle_deg : array_like, shape (n,)
-            The record: time [s], duty [-], angle [deg].
+        record : xarray.Dataset, DataFrame or mapping of columns
+            ``time_s`` [s], ``duty`` [-] and ``angle_deg`` [deg].
         horizon : int
             Samples ahead, at least 1.
         angle_gain, speed_gain_per_s, bias_gain_duty_per_deg : float
@@ -200,36 +186,34 @@ class PseudoWiener:
 
         Returns
         -------
-        ndarray, shape (n - horizon,)
-            Entry k is the prediction of the angle at sample k + horizon from data up to k [deg].
+        xarray.Dataset
+            ``angle_deg`` over ``time_s`` from sample `horizon` on; entry k is predicted from the data up to sample k.
 
         Raises
         ------
         DataError
-            An uneven time.
+            A missing column, a value that is not finite, or times that are not even.
         ShapeError
             Columns of different length.
         ParameterError
             A horizon that does not fit into the record.
         """
-        sample_s, u = _grid(time_s, duty)
+        time, u, angle = columns_of(record, ("time_s", "duty", "angle_deg"))
+        check_horizon(horizon, angle.size)
+        sample_s = even_step(time)
         share = sample_s / _GAIN_SAMPLE_S
-        angle = np.asarray(angle_deg, dtype=np.float64)
-        if horizon < 1:
-            raise ParameterError(f"horizon = {horizon}: must be in [1, {u.size - 1}], below the samples of the log")
-        return np.asarray(
-            self.at_sample(sample_s)._core.predict(
-                u,
-                angle,
-                int(horizon),
-                angle_gain=1.0 - (1.0 - angle_gain) ** share,
-                speed_gain_per_s=speed_gain_per_s * share,
-                bias_gain_duty_per_deg=bias_gain_duty_per_deg * share,
-            )
+        ahead = self.at_sample(sample_s)._core.predict(
+            _duty(u),
+            angle,
+            int(horizon),
+            angle_gain=1.0 - (1.0 - angle_gain) ** share,
+            speed_gain_per_s=speed_gain_per_s * share,
+            bias_gain_duty_per_deg=bias_gain_duty_per_deg * share,
         )
+        return self._labelled(time[horizon:], {"angle_deg": np.asarray(ahead)})
 
     def slopes(
-        self, duty: ArrayLike, *, start_deg: float, speed_deg_per_s: float = 0.0
+        self, duty: ArrayLike, *, initial_state: Mapping[str, float]
     ) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
         """Predict a horizon from a state, with exact sensitivities to every duty.
 
@@ -237,10 +221,8 @@ class PseudoWiener:
         ----------
         duty : array_like, shape (n,)
             Duty of the horizon [-].
-        start_deg : float
-            Angle now [deg].
-        speed_deg_per_s : float
-            Speed now [deg/s], PW-R only.
+        initial_state : mapping of str to float
+            ``angle_deg`` now [deg] and, of PW-R, ``speed_deg_per_s`` [deg/s], 0 without.
 
         Returns
         -------
@@ -248,33 +230,26 @@ class PseudoWiener:
             Angle after each sample [deg], shape (n,), and d angle / d duty [deg], shape (n, n), lower triangular.
         """
         angle, slope = self._core.slopes(
-            np.asarray(duty, dtype=np.float64), start_deg=float(start_deg), speed_deg_per_s=float(speed_deg_per_s)
+            np.asarray(duty, dtype=np.float64),
+            start_deg=float(initial_state["angle_deg"]),
+            speed_deg_per_s=float(initial_state.get("speed_deg_per_s", 0.0)),
         )
         return np.asarray(angle), np.asarray(slope)
 
-    def to_toml(self, *, source: str = "mgdd") -> str:
+    def to_toml(self, *, fit: Fit | None = None) -> str:
         """Write the model as TOML that `from_toml` reads back equal.
 
         Parameters
         ----------
-        source : str
-            Where the numbers come from.
+        fit : mgdd.results.Fit, optional
+            The fit that the numbers come from: its record, its standard errors and its quality are written, too.
 
         Returns
         -------
         str
             One line per value with its unit.
         """
-        text = json.dumps(source, ensure_ascii=False)
-        units = self.units
-        lines = [f'kind = "{self.kind}"', f"source = {text}", "unidentifiable = []"]
-        lines += [f'{name} = "{value}"' for name, value in self._options.items()]
-        lines += ["", "[parameters]"]
-        lines += [
-            f'{name} = {{ value = {value!r}, unit = "{units[name]}", source = {text} }}'
-            for name, value in self.parameters.items()
-        ]
-        return "\n".join(lines) + "\n"
+        return parameter_text(self.kind, self.parameters, options=self._options, fit=fit)
 
     @classmethod
     def from_toml(cls, text: str) -> PseudoWiener:
@@ -334,12 +309,7 @@ def _rebuild(kind: str, parameters: Mapping[str, float], options: Mapping[str, s
     return PseudoWiener(kind, parameters, switching=options["switching"], friction=options["friction"])
 
 
-def _grid(time_s: ArrayLike, duty: ArrayLike) -> tuple[float, NDArray[np.float64]]:
-    time = np.asarray(time_s, dtype=np.float64)
-    column = np.asarray(duty, dtype=np.float64)
-    if time.ndim != 1 or time.size < 2 or column.shape != time.shape:
-        raise ShapeError(f"time_s has shape {time.shape}, duty {column.shape}: must be two columns of one length >= 2")
-    step = even_step(time)
-    if not (np.isfinite(column).all() and np.abs(column).max() <= 1.0):
-        raise DataError("duty: must be finite and in [-1, 1]")
-    return step, column
+def _duty(column: NDArray[np.float64]) -> NDArray[np.float64]:
+    if not np.abs(column).max() <= 1.0:
+        raise DataError("duty: must be in [-1, 1]; a duty in percent is divided by 100")
+    return column

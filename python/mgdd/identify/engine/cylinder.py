@@ -14,10 +14,10 @@ from mgdd import _core
 from mgdd._core import Cylinder, OperatingPoint
 from mgdd.engine import analyze
 from mgdd.errors import DataError, ParameterError, ShapeError
-from mgdd.identify.engine.records import CylinderFit, LoadFit
+from mgdd.identify.engine.records import CylinderFit, Load, burn_law, load_table
 from mgdd.io.trace_forms import as_trace
-from mgdd.optimize import FitReport
-from mgdd.results import ANGLE, labelled_dataset
+from mgdd.optimize.fit_options import FitOptions, fit_options
+from mgdd.results import ANGLE, Finding, FitQuality, FitReport, labelled_dataset
 
 if TYPE_CHECKING:
     import xarray as xr
@@ -37,10 +37,10 @@ def fit_cylinder(
     *,
     free: Sequence[str] | None = None,
     point: OperatingPoint | None = None,
-    start: Sequence[Mapping[str, float]] | None = None,
+    start_values: Sequence[Mapping[str, float]] | None = None,
     step_cad: float = 0.25,
     integrator: str = "trapezoid",
-    max_iterations: int = 200,
+    options: FitOptions | None = None,
 ) -> CylinderFit:
     """Fit the cycle model to measured pressure: the burn per trace, the cylinder for all together.
 
@@ -58,24 +58,27 @@ def fit_cylinder(
         the double Wiebe also its five shape parameters.
     point : OperatingPoint, optional
         Conditions that a trace does not carry.
-    start : sequence of mapping, optional
-        Start of the per-trace parameters; from the heat release of the trace if left out.
+    start_values : sequence of mapping, optional
+        Start values of the per-trace parameters; from the heat release of the trace if left out.
     step_cad : float
         Largest step of the model [°CA]; measured steps are divided evenly.
     integrator : str
         As in `mgdd.engine.simulate`.
-    max_iterations : int
-        Trial steps of the search.
+    options : FitOptions, optional
+        200 trial steps of the search where nothing else is said; the other options have no effect here and are refused.
 
     Returns
     -------
-    CylinderFit
-        With one overlay Dataset per trace.
+    mgdd.results.Fit
+        `model` is the cylinder with the common parameters, `kind` its burn law. It has further fields: ``loads``, per
+        trace the burn, the errors, an overlay Dataset, and cylinder and point ready for `mgdd.engine.simulate`;
+        ``table``, their figures in one Dataset; ``correlation_if_free``, the correlation with parameters at a bound
+        taken as free.
 
     Raises
     ------
     mgdd.errors.ParameterError
-        An unknown or repeated name in ``free`` or ``start``.
+        An unknown or repeated name in ``free`` or ``start_values``.
     mgdd.errors.DataError
         A trace that cannot be used, or shows no heat release.
 
@@ -100,20 +103,34 @@ def fit_cylinder(
         raise DataError("no traces: a calibration needs at least one")
     labels = _labels(traces)
     measured = [_measured(trace, label, cylinder, point) for trace, label in zip(traces, labels, strict=True)]
-    burns = _starts(measured, cylinder, start)
-    core = _core.fit_cylinder(measured, cylinder, burns, list(names), step_cad, integrator, max_iterations)
+    burns = _starts(measured, cylinder, start_values)
+    chosen = fit_options(options, max_iterations=200)
+    core = _core.fit_cylinder(measured, cylinder, burns, list(names), step_cad, integrator, chosen.max_iterations)
     loads = tuple(
         _load(core.cylinder, fitted, trace, label, point)
         for fitted, trace, label in zip(core.loads, traces, labels, strict=True)
     )
+    report = FitReport.from_core(core.report)
     fit = CylinderFit(
-        cylinder=core.cylinder,
-        report=FitReport.from_core(core.report),
+        report=report,
+        model=core.cylinder,
+        kind=burn_law(core.cylinder),
+        train=FitQuality(nrmse_fit_percent=None, rmse=100.0 * report.rmse, unit="% of p_max", n=report.residual.size),
+        unidentifiable=report.unidentifiable,
+        source=", ".join(labels),
+        draw=_draw,
         loads=loads,
-        warnings=(),
+        table=load_table(loads),
         correlation_if_free=np.asarray(core.correlation_if_free),
     )
-    return replace(fit, warnings=(*_doubts(traces, cylinder, point), *_warnings(fit)))
+    return replace(fit, findings=(*_doubts(traces, cylinder, point), *_findings(fit)))
+
+
+def _draw(fit: CylinderFit, ax: Any) -> Any:
+    """Draw the trace that the model meets worst."""
+    from mgdd import plot
+
+    return plot.calibration_overlay(max(fit.loads, key=lambda load: load.rmse_percent).overlay, ax=ax)
 
 
 def default_free(cylinder: Cylinder) -> tuple[str, ...]:
@@ -155,27 +172,29 @@ def _measured(trace: xr.Dataset, label: str, cylinder: Cylinder, point: Operatin
 
 
 def _starts(
-    measured: Sequence[_core.MeasuredCycle], cylinder: Cylinder, start: Sequence[Mapping[str, float]] | None
+    measured: Sequence[_core.MeasuredCycle], cylinder: Cylinder, start_values: Sequence[Mapping[str, float]] | None
 ) -> list[_core.LoadBurn]:
-    if start is None:
+    if start_values is None:
         return [_core.estimate_burn(trace, cylinder) for trace in measured]
-    if len(start) != len(measured):
-        raise ParameterError(f"start has {len(start)} entries for {len(measured)} traces")
+    if len(start_values) != len(measured):
+        raise ParameterError(f"start_values has {len(start_values)} entries for {len(measured)} traces")
     known = _core.load_parameters()
     burns = []
-    for trace, values in zip(measured, start, strict=True):
+    for trace, values in zip(measured, start_values, strict=True):
         burns.append(_core.LoadBurn() if set(known) <= set(values) else _core.estimate_burn(trace, cylinder))
         burn = burns[-1]
         for name, value in values.items():
             if name not in known:
-                raise ParameterError(f"start: {name!r} is no parameter of a trace: must be one of {', '.join(known)}")
+                raise ParameterError(
+                    f"start_values: {name!r} is no parameter of a trace: must be one of {', '.join(known)}"
+                )
             setattr(burn, name, float(value))
     return burns
 
 
 def _load(
     cylinder: Cylinder, fitted: _core.LoadFit, trace: xr.Dataset, label: str, point: OperatingPoint | None
-) -> LoadFit:
+) -> Load:
     angle, pressure = _closed(trace, cylinder)
     burn = fitted.burn
     soi = float(trace.attrs.get("soi_cad", math.nan))
@@ -206,7 +225,7 @@ def _load(
         fuel_mg=burn.fuel_heat_j / cylinder.lower_heating_value_mj_per_kg,
         burn_duration_cad=burn.burn_duration_cad,
     )
-    return LoadFit(
+    return Load(
         file=label,
         point=own,
         cylinder=_core.with_burn(cylinder, burn),
@@ -220,32 +239,43 @@ def _load(
     )
 
 
-def _doubts(traces: Sequence[xr.Dataset], cylinder: Cylinder, point: OperatingPoint | None) -> list[str]:
+def _doubts(traces: Sequence[xr.Dataset], cylinder: Cylinder, point: OperatingPoint | None) -> list[Finding]:
     """Collect what the analysis of each trace finds suspicious: TDC, pegging, unit, missing angles."""
     out = []
     for trace in traces:
         analysis = analyze(trace, cylinder, point=point, quiet=True)
-        out += [f"{analysis.attrs['file']}: {text}" for text in analysis.attrs["warnings"].splitlines()]
+        file = str(analysis.attrs["file"])
+        out += [
+            Finding("doubtful_trace", (file,), f"{file}: {text}") for text in analysis.attrs["warnings"].splitlines()
+        ]
     return out
 
 
-def _warnings(fit: CylinderFit) -> tuple[str, ...]:
-    out = []
+def _findings(fit: CylinderFit) -> tuple[Finding, ...]:
+    out: list[Finding] = []
     poor = [load for load in fit.loads if load.rmse_percent > _RMSE_LIMIT_PERCENT]
     if poor:
         each = ", ".join(f"{load.file} {load.rmse_percent:.1f} %" for load in poor)
         out.append(
-            f"the model does not meet the measurement (pressure RMSE in % of p_max: {each}): suspect geometry, TDC, "
-            "pegging or the preset"
+            Finding(
+                "poor_fit",
+                tuple(load.file for load in poor),
+                f"the model does not meet the measurement (pressure RMSE in % of p_max: {each})",
+                "suspect geometry, TDC, pegging or the preset",
+            )
         )
     if not fit.report.success:
-        out.append(f"the search ended without converging: {fit.report.message}")
+        out.append(Finding("not_converged", (), f"the search ended without converging: {fit.report.message}"))
     early = [load for load in fit.loads if load.onset_against_soi_cad < 0.0]
     if early:
         each = ", ".join(f"{load.file} {load.onset_against_soi_cad:+.1f}" for load in early)
         out.append(
-            f"the fitted burn starts before the injection (SOC minus SOI in °CA: {each}): the burn law bends to make "
-            "up for another error of the model, so its start is no physical onset"
+            Finding(
+                "early_onset",
+                tuple(load.file for load in early),
+                f"the fitted burn starts before the injection (SOC minus SOI in °CA: {each}): the burn law bends to "
+                "make up for another error of the model, so its start is no physical onset",
+            )
         )
     errors = [load.imep_closed_error_percent for load in fit.loads]
     if not max(map(abs, errors)) <= _IMEP_LIMIT_PERCENT:
@@ -256,9 +286,16 @@ def _warnings(fit: CylinderFit) -> tuple[str, ...]:
         else:
             what = f"closed IMEP is wrong by {min(errors):+.1f} to {max(errors):+.1f} %"
         out.append(
-            f"{what} although the pressure "
-            f"RMSE is at most {max(load.rmse_percent for load in fit.loads):.2f} % of p_max: a small RMSE proves "
-            "nothing here; do not read efficiency or fuel heat from this fit"
+            Finding(
+                "imep_error",
+                tuple(load.file for load in fit.loads),
+                f"{what} although the pressure RMSE is at most "
+                f"{max(load.rmse_percent for load in fit.loads):.2f} % of p_max: a small RMSE proves nothing here",
+                "do not read efficiency or fuel heat from this fit",
+            )
         )
-    out += [f"{name} is not identifiable from these traces" for name in fit.report.unidentifiable]
+    out += [
+        Finding("unidentifiable", (name,), f"{name} is not identifiable from these traces")
+        for name in fit.report.unidentifiable
+    ]
     return tuple(out)

@@ -13,7 +13,8 @@ from mgdd import _core
 from mgdd._core import OperatingPoint
 from mgdd.errors import ParameterError
 from mgdd.identify.engine.cylinder import fit_cylinder
-from mgdd.identify.engine.records import CylinderFit, LoadFit
+from mgdd.identify.engine.records import CylinderFit, Load
+from mgdd.optimize import FitOptions
 from mgdd.results import labelled_dataset
 
 if TYPE_CHECKING:
@@ -88,7 +89,7 @@ def wall_heat_profile(
     progress: Callable[[str], None] | None = None,
     step_cad: float = 0.25,
     integrator: str = "trapezoid",
-    max_iterations: int = 200,
+    options: FitOptions | None = None,
 ) -> WallHeatProfile:
     """Refit everything else at fixed wall-heat scales, and judge whether the traces determine the scale.
 
@@ -96,15 +97,15 @@ def wall_heat_profile(
     ----------
     traces : sequence of xarray.Dataset, or of any form of a trace that `mgdd.engine.analyze` takes
         As given to `fit_cylinder`.
-    fit : CylinderFit
-        A fit in which ``wall_heat_scale`` was free.
+    fit : mgdd.results.Fit
+        A fit of `fit_cylinder` in which ``wall_heat_scale`` was free.
     scales : sequence of float
         Scales to refit at, in [0, 2.5]; the fitted one and both ends are added.
     point : OperatingPoint, optional
         As given to `fit_cylinder`.
     progress : callable, optional
         Called with a short text before each refit.
-    step_cad, integrator, max_iterations
+    step_cad, integrator, options
         As given to `fit_cylinder`.
 
     Returns
@@ -134,23 +135,23 @@ def wall_heat_profile(
     free = tuple(dict.fromkeys(name.split("[")[0] for name in fit.report.names if name != NAME))
     if not free:
         raise ParameterError(f"{NAME} was the only free parameter: a profile refits the others")
-    value = float(fit.cylinder.wall_heat_scale)
+    value = float(fit.model.wall_heat_scale)
     fits = {value: fit}
 
     def refit(scale: float) -> CylinderFit:
         if scale not in fits:
             if progress is not None:
-                progress(f"{fit.burn_law}: refit at wall-heat scale {scale:.3g}")
+                progress(f"{fit.kind}: refit at wall-heat scale {scale:.3g}")
             near = fits[min(fits, key=lambda known: abs(known - scale))]
             fits[scale] = fit_cylinder(
                 traces,
-                fit.cylinder.replace(wall_heat_scale=scale),
+                fit.model.replace(wall_heat_scale=scale),
                 free=free,
                 point=point,
-                start=[_start(load) for load in near.loads],
+                start_values=[_start_values(load) for load in near.loads],
                 step_cad=step_cad,
                 integrator=integrator,
-                max_iterations=max_iterations,
+                options=options,
             )
         return fits[scale]
 
@@ -180,7 +181,7 @@ def _rmse(fit: CylinderFit) -> float:
     return fit.report.rmse if math.isfinite(fit.report.rmse) else math.inf
 
 
-def _start(load: LoadFit) -> dict[str, float]:
+def _start_values(load: Load) -> dict[str, float]:
     shape = load.cylinder
     return {
         "soc_cad": load.soc_cad,
@@ -211,17 +212,17 @@ def _crossing(
 
 
 def _correlation(fit: CylinderFit) -> tuple[float, str]:
-    pairs = fit.correlations(NAME)
-    if not pairs:
-        return math.nan, "none"
-    name, strongest = next(iter(pairs.items()))
+    """Return the strongest correlation of the scale, where it is at a bound that of the linearised problem there."""
+    row = fit.correlation_if_free[fit.report.names.index(NAME)]
+    pairs = [(n, float(c)) for n, c in zip(fit.report.names, row, strict=True) if n != NAME and math.isfinite(c)]
+    name, strongest = min(pairs, key=lambda pair: -abs(pair[1]), default=("none", math.nan))
     return strongest, name
 
 
 def _reasons(
     fit: CylinderFit, best: float, rmse: float, correlation: float, partner: str, low: float, high: float
 ) -> tuple[str, ...]:
-    value = float(fit.cylinder.wall_heat_scale)
+    value = float(fit.model.wall_heat_scale)
     if not fit.report.success:
         return (f"the fit itself did not converge: {fit.report.message}",)
     out = []

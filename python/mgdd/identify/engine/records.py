@@ -1,23 +1,24 @@
-"""What a calibration hands back: one record per load, one for all."""
+"""Records of a calibration: a `Fit` with one load per trace."""
 
 from __future__ import annotations
 
 from dataclasses import dataclass, field
 from typing import TYPE_CHECKING, Any
 
-import numpy as np
-
 from mgdd._core import Cylinder, OperatingPoint
-from mgdd.optimize import FitReport
+from mgdd.results import VARIABLES, Fit, labelled_dataset
 
 if TYPE_CHECKING:
+    from collections.abc import Sequence
+
+    import numpy as np
     import xarray as xr
 
-__all__ = ["CylinderFit", "LoadFit"]
+__all__ = ["CylinderFit", "Load", "burn_law", "figures_of", "load_table"]
 
 
 @dataclass(frozen=True, kw_only=True)
-class LoadFit:
+class Load:
     """One load of a calibration: its burn and how well the model meets the measurement.
 
     Parameters
@@ -77,33 +78,20 @@ class LoadFit:
     heat_loss_fraction: float
     overlay: xr.Dataset = field(repr=False)
 
-    def to_dict(self) -> dict[str, Any]:
-        """Give the scalars of this load as a dict, without the overlay and the parameter records.
 
-        Returns
-        -------
-        dict
-            Field names to values.
-        """
-        skip = ("overlay", "point", "cylinder")
-        return {name: getattr(self, name) for name in self.__dataclass_fields__ if name not in skip}
+@dataclass(frozen=True, kw_only=True, eq=False, repr=False)
+class CylinderFit(Fit):
+    """A calibrated cylinder: `model` is the cylinder with the common parameters fitted, `kind` its burn law.
 
-
-@dataclass(frozen=True, kw_only=True)
-class CylinderFit:
-    """A calibrated cylinder with its report.
+    The residual of the report is (model - measured)/p_max, so its ``rmse`` is a fraction of p_max. Standard errors take
+    the residual as white noise; model error makes the true ones larger.
 
     Parameters
     ----------
-    cylinder : Cylinder
-        With the common parameters fitted.
-    report : mgdd.optimize.FitReport
-        Estimates, standard errors, correlation. The residual is (model - measured)/p_max, so ``rmse`` is a fraction of
-        p_max. Standard errors take the residual as white noise; model error makes the true ones larger.
-    loads : tuple of LoadFit
-        Per trace, in the order given.
-    warnings : tuple of str
-        What to distrust, in words.
+    loads : tuple of Load
+        Per trace, in the order given: burn, errors, and cylinder and point ready for `mgdd.engine.simulate`.
+    table : xarray.Dataset
+        The figures of all loads over ``file``.
     correlation_if_free : ndarray, shape (n, n)
         As the report's correlation, but with parameters at a bound taken as free there.
 
@@ -114,35 +102,38 @@ class CylinderFit:
     >>> fit = fit_cylinder(datasets.load_hd_traces(), presets.load("hd_diesel_128x144").cylinder)
     >>> max(load.rmse_percent for load in fit.loads) < 1.0
     True
-    >>> "wall_heat_scale" in fit.report.unidentifiable
+    >>> "wall_heat_scale" in fit.unidentifiable
     True
     """
 
-    cylinder: Cylinder
-    report: FitReport
-    loads: tuple[LoadFit, ...]
-    warnings: tuple[str, ...]
-    correlation_if_free: np.ndarray = field(repr=False)
+    loads: tuple[Load, ...]
+    table: xr.Dataset
+    correlation_if_free: np.ndarray
 
-    @property
-    def burn_law(self) -> str:
-        """Burn shape and gamma law, for tables."""
-        gamma = f"{self.cylinder.gamma:g}" if self.cylinder.gamma_model == "constant" else self.cylinder.gamma_model
-        return f"{self.cylinder.burn_shape}, gamma {gamma}"
 
-    def correlations(self, name: str) -> dict[str, float]:
-        """Give the correlations of one parameter with all others, strongest first.
+def burn_law(cylinder: Cylinder) -> str:
+    """Name burn shape and gamma law, for tables."""
+    gamma = f"{cylinder.gamma:g}" if cylinder.gamma_model == "constant" else cylinder.gamma_model
+    return f"{cylinder.burn_shape}, gamma {gamma}"
 
-        Parameters
-        ----------
-        name : str
-            As in ``report.names``.
 
-        Returns
-        -------
-        dict of str to float
-            Of the linearised problem at the estimate; a parameter at a bound counts as free there.
-        """
-        row = self.correlation_if_free[self.report.names.index(name)]
-        pairs = [(n, float(c)) for n, c in zip(self.report.names, row, strict=True) if n != name and np.isfinite(c)]
-        return dict(sorted(pairs, key=lambda pair: -abs(pair[1])))
+def figures_of(load: Load) -> dict[str, Any]:
+    """Give the name and the numbers of a load, without the overlay and the parameter records."""
+    skip = ("overlay", "point", "cylinder")
+    return {name: getattr(load, name) for name in load.__dataclass_fields__ if name not in skip}
+
+
+_LABELS = {
+    "onset_against_soi_cad": ("°CA", "fitted burn start minus SOI"),
+    "largest_error_bar": ("bar", "largest local error, model minus measured"),
+    "largest_error_cad": ("°CA aTDC", "angle of the largest local error"),
+}
+
+
+def load_table(loads: Sequence[Load]) -> xr.Dataset:
+    """Tabulate the figures of all loads."""
+    rows = [figures_of(load) for load in loads]
+    columns = {name: [row[name] for row in rows] for name in rows[0] if name != "file"}
+    files = ("file", [row["file"] for row in rows], "-", "trace")
+    labels = {name: _LABELS.get(name) or VARIABLES[name] for name in columns}
+    return labelled_dataset({"file": files, **{name: ("file", columns[name], *labels[name]) for name in columns}})

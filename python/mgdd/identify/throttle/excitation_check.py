@@ -11,7 +11,7 @@ import numpy as np
 from mgdd.errors import ParameterError
 from mgdd.identify.throttle.prior import prior_of
 from mgdd.identify.throttle.record_content import RecordContent, open_questions, record_content
-from mgdd.results import labelled_dataset
+from mgdd.results import Finding, labelled_dataset
 from mgdd.signals.even_grid import even_step
 
 if TYPE_CHECKING:
@@ -28,9 +28,9 @@ class ExcitationCheck:
     ----------
     passed : bool
         Whether every limit holds.
-    findings : tuple of str
+    findings : tuple of Finding
         Each limit that is passed, with the remedy.
-    unanswered : tuple of str
+    unanswered : tuple of Finding
         What a log of this excitation could not tell, and which one could.
     content : RecordContent
         Range, speeds, directions, crossings and stops of the predicted angle.
@@ -47,20 +47,20 @@ class ExcitationCheck:
     >>> def lazy(time_s, duty, start_deg):
     ...     return 30.0 + 100.0 * np.asarray(duty)
     >>> check = check_excitation(chirp(offset=0.15, amplitude=0.2), lazy, angle_window_deg=(1.0, 60.0))
-    >>> check.passed, check.findings[0].split(":")[0]
+    >>> check.passed, check.findings[0].text
     (False, 'the plate opens to 65.0 deg, beyond 60')
     """
 
     passed: bool
-    findings: tuple[str, ...]
-    unanswered: tuple[str, ...]
+    findings: tuple[Finding, ...]
+    unanswered: tuple[Finding, ...]
     content: RecordContent
     peak_current_a: float
     rms_current_a: float
     prediction: xr.Dataset = field(repr=False)
 
     def summary(self) -> str:
-        """Say it in a few lines.
+        """Return a short summary.
 
         Returns
         -------
@@ -89,7 +89,7 @@ class ExcitationCheck:
             Names to values; those of `content` stand beside the others.
         """
         own = {name: getattr(self, name) for name in ("passed", "peak_current_a", "rms_current_a")}
-        words = {"findings": list(self.findings), "unanswered": list(self.unanswered)}
+        words = {name: [str(finding) for finding in getattr(self, name)] for name in ("findings", "unanswered")}
         return own | {name: getattr(self.content, name) for name in RecordContent.__dataclass_fields__} | words
 
 
@@ -108,7 +108,7 @@ def check_excitation(
     ----------
     excitation : xarray.Dataset
         ``duty`` over ``time_s``, as `chirp` and its sisters make it.
-    prior : Throttle, ThrottleModel or callable
+    prior : Throttle, Model or callable
         What is known of the throttle, for example a preset. A callable gets ``(time_s, duty, start_deg)`` and gives
         the angle [deg], or a mapping with ``angle_deg`` and ``current_a``.
     angle_window_deg : (float, float), optional
@@ -197,23 +197,31 @@ def _violations(
     window: tuple[float, float],
     max_rate_deg_per_s: float | None,
     max_current_a: float | None,
-) -> tuple[str, ...]:
-    out = []
+) -> tuple[Finding, ...]:
+    out: list[Finding] = []
+
+    def add(name: str, text: str, remedy: str) -> None:
+        out.append(Finding("limit_exceeded", (name,), text, remedy))
+
     if content.angle_high_deg > window[1]:
-        out.append(
-            f"the plate opens to {content.angle_high_deg:.1f} deg, beyond {window[1]:g}: lower offset or amplitude, or "
-            "widen angle_window_deg if it may"
+        add(
+            "angle_window_deg",
+            f"the plate opens to {content.angle_high_deg:.1f} deg, beyond {window[1]:g}",
+            "lower offset or amplitude, or widen angle_window_deg if it may",
         )
     if content.angle_low_deg < window[0]:
-        out.append(
-            f"the plate closes to {content.angle_low_deg:.1f} deg, beyond {window[0]:g}: raise the offset or lower the "
-            "amplitude, or widen angle_window_deg if it may"
+        add(
+            "angle_window_deg",
+            f"the plate closes to {content.angle_low_deg:.1f} deg, beyond {window[0]:g}",
+            "raise the offset or lower the amplitude, or widen angle_window_deg if it may",
         )
     if max_rate_deg_per_s is not None and content.peak_speed_deg_per_s > max_rate_deg_per_s:
-        out.append(
-            f"the plate moves at {content.peak_speed_deg_per_s:.0f} deg/s, above {max_rate_deg_per_s:g}: lower "
-            "the amplitude"
+        add(
+            "max_rate_deg_per_s",
+            f"the plate moves at {content.peak_speed_deg_per_s:.0f} deg/s, above {max_rate_deg_per_s:g}",
+            "lower the amplitude",
         )
     if max_current_a is not None and peak_current_a > max_current_a:
-        out.append(f"the motor takes {peak_current_a:.2f} A, above {max_current_a:g}: lower the amplitude")
+        text = f"the motor takes {peak_current_a:.2f} A, above {max_current_a:g}"
+        add("max_current_a", text, "lower the amplitude")
     return tuple(out)

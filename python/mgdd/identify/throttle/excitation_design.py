@@ -48,7 +48,7 @@ def design_excitation(
     ----------
     kind : {"chirp", "multisine", "prbs", "amplitude_random_steps", "staircase", "triangle"}
         The signal; its other parameters keep their defaults, except a chirp below limp-home: 0.5 to 8 Hz.
-    prior : Throttle or ThrottleModel
+    prior : Throttle or Model
         What is known of the throttle; it must know limp-home and friction.
     side : {"above", "below", "both"}
         Side of limp-home to be identified.
@@ -122,7 +122,7 @@ def design_excitation(
             if side == "both" or kind in _QUASI_STATIC or abs(miss) < 1.0:
                 break
             offset = max(min(offset - _RECENTRE * miss, 0.99), -0.99)
-    last = "; ".join(check.findings) if check is not None else "nothing was tried"
+    last = "; ".join(map(str, check.findings)) if check is not None else "nothing was tried"
     raise ConvergenceError(
         f"no {kind} {'across' if side == 'both' else side} limp-home stays inside: with amplitude "
         f"{amplitude:.3g} around "

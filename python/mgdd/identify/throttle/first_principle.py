@@ -9,67 +9,48 @@ import numpy as np
 
 from mgdd import _core
 from mgdd.errors import DataError, ParameterError
-from mgdd.identify.throttle.first_principle_model import GROUP_NAMES, FirstPrincipleModel, sample_step
+from mgdd.identify.throttle.first_principle_model import GROUP_NAMES, TYPICAL, FirstPrincipleModel
 from mgdd.identify.throttle.first_principle_start import SIDE_DEG, regression_start, rest_angle, spread_starts
-from mgdd.identify.throttle.fit import ThrottleFit
+from mgdd.identify.throttle.free_run import draw_free_run, free_run, quality_of, source_of
 from mgdd.identify.throttle.physical_parameters import physical_parameters
-from mgdd.identify.throttle.quality import quality
-from mgdd.optimize import FitReport
+from mgdd.optimize.fit_options import FitOptions, fit_options
+from mgdd.results import Finding, Fit, FitReport
+from mgdd.signals.even_grid import even_step
+from mgdd.signals.model import columns_of
 
 if TYPE_CHECKING:
     import xarray as xr
     from numpy.typing import NDArray
 
-__all__ = ["fit_throttle", "throttle_start"]
+__all__ = ["fit_throttle"]
 
 ABOVE = ("beta_above_duty", "kappa_above_duty_per_deg")
 BELOW = ("beta_below_duty", "kappa_below_duty_per_deg")
 SIDE_S = 0.3  # shorter visits cannot settle a side's two parameters
 
 
-def throttle_start() -> dict[str, float]:
-    """Return middle-of-the-road groups of a passenger-car throttle, a start for a fit.
-
-    Returns
-    -------
-    dict of str to float
-        By group name.
-
-    Examples
-    --------
-    >>> from mgdd.identify import throttle_start
-    >>> throttle_start()["tau_s"]
-    0.03
-    """
-    values = (0.03, 5e4, 0.1, 1e-3, 0.05, 0.1, 1e-3, 8.0, 0.0)
-    return dict(zip(GROUP_NAMES, values, strict=True))
-
-
 def fit_throttle(
     log: xr.Dataset,
     *,
     test: xr.Dataset | None = None,
-    start: Mapping[str, float] | None = None,
+    start_values: Mapping[str, float] | None = None,
     fixed: Mapping[str, float] | None = None,
     electrical: bool = False,
     closed_deg: float = 0.0,
     open_deg: float = 90.0,
-    n_starts: int = 4,
-    seed: int = 0,
+    options: FitOptions | None = None,
     threads: int = 1,
-    max_iterations: int = 60,
-    cost_tolerance: float = 1e-10,
     resistance_ohm: float | None = None,
     supply_v: float | None = None,
     inertia_kgm2: float | None = None,
     torque_constant_nm_per_a: float | None = None,
-) -> ThrottleFit:
+) -> Fit:
     """Identify the first-principle throttle from duty and angle.
 
     Duty and angle determine torques only in units of duty and inertia only as an acceleration per duty, so the
     unknowns are groups: tau = J/b, G = g/J, preload T_pt/g, stiffness k_s/g and friction T_d/g with g the stall torque
     per unit duty and b all viscous damping. A regression on the torque balance of the moving samples gives the start;
-    the free run is then fitted in stages (dynamics, static groups, all), from `n_starts` starts. A side of limp-home
+    the free run is then fitted in stages (dynamics, static groups, all), from several starts. A side of limp-home
     the log does not visit keeps its start values and is named. With a resistance, a supply and one of inertia or
     torque constant the physical numbers are computed back (`physical_parameters`) and said in `findings`.
 
@@ -78,8 +59,8 @@ def fit_throttle(
     log : xarray.Dataset
         ``duty`` [-] and ``angle_deg`` [deg] over ``time_s`` [s], evenly sampled.
     test : xarray.Dataset, optional
-        Another log; gives ``fit_percent_test``.
-    start : mapping of str to float, optional
+        Another log; gives the quality ``test``.
+    start_values : mapping of str to float, optional
         Start values of some groups; taken as they are instead of the regression.
     fixed : mapping of str to float, optional
         Groups that are known and not estimated.
@@ -87,22 +68,17 @@ def fit_throttle(
         Also estimate ``electrical_s`` (L/R).
     closed_deg, open_deg : float
         Mechanical stops [deg].
-    n_starts : int
-        1 for the first start alone; further ones within a factor of 2 around it.
-    seed : int
-        Of the further starts.
+    options : FitOptions, optional
+        4 starts, within a factor of 2 around the first, with seed 0, 60 trial steps per stage and a tolerance of 1e-10
+        of the last stage where nothing else is said.
     threads : int
         Threads over starts.
-    max_iterations : int
-        Trial steps per stage.
-    cost_tolerance : float
-        Relative decrease of the cost that ends the last stage [-].
     resistance_ohm, supply_v, inertia_kgm2, torque_constant_nm_per_a : float, optional
         Known numbers, for `physical_parameters`; their absence is said in `findings`.
 
     Returns
     -------
-    ThrottleFit
+    mgdd.results.Fit
         ``kind`` is ``first_principle``.
 
     Raises
@@ -119,31 +95,30 @@ def fit_throttle(
     Examples
     --------
     >>> import numpy as np
-    >>> from mgdd.identify import FirstPrincipleModel, fit_throttle, throttle_start
-    >>> from mgdd.io import throttle_log
+    >>> from mgdd.identify import FirstPrincipleModel, fit_throttle
+    >>> from mgdd.optimize import FitOptions
     >>> time = 1e-3 * np.arange(4000)
     >>> duty = 0.12 + 0.2 * np.sin(2 * np.pi * time * (0.5 + time))
-    >>> truth = FirstPrincipleModel(parameters=throttle_start())
-    >>> log = throttle_log(time, duty, truth.simulate(time, duty, start_deg=30.0))
-    >>> fit = fit_throttle(log, n_starts=1)
-    >>> bool(fit.fit_percent_train > 99.0)
+    >>> log = FirstPrincipleModel().simulate({"time_s": time, "duty": duty}, initial_state={"angle_deg": 30.0})
+    >>> fit = fit_throttle(log, options=FitOptions(n_starts=1))
+    >>> fit.train.nrmse_fit_percent > 99.0
     True
     """
-    time, duty, angle = log_columns(log)
-    if test is not None:
-        log_columns(test)
-    step_s = sample_step(time, time.size)
-    for name in [*(start or {}), *(fixed or {})]:
+    chosen = fit_options(options, n_starts=4, seed=0, max_iterations=60, tolerance=1e-10)
+    n_starts = chosen.n_starts
+    time, duty, angle = _columns(log)
+    step_s = even_step(time)
+    for name in [*(start_values or {}), *(fixed or {})]:
         if name not in GROUP_NAMES:
             raise ParameterError(f"{name!r}: no throttle group; they are {', '.join(GROUP_NAMES)}")
-    if n_starts < 1 or threads < 1:
-        raise ParameterError(f"n_starts = {n_starts}, threads = {threads}: must be >= 1")
+    if threads < 1:
+        raise ParameterError(f"threads = {threads}: must be >= 1")
     if np.ptp(angle) < 1.0:
         raise DataError(f"angle_deg moves by {np.ptp(angle):.3g} deg: drive the plate, mgdd.identify.design_excitation")
-    values = throttle_start()
+    values = dict(TYPICAL)
     values["limp_home_deg"] = rest_angle(step_s, duty, angle, values["limp_home_deg"])
-    values |= {name: float(value) for name, value in {**(start or {}), **(fixed or {})}.items()}
-    findings: list[str] = []
+    values |= {name: float(value) for name, value in {**(start_values or {}), **(fixed or {})}.items()}
+    findings: list[Finding] = []
     unvisited: list[str] = []
     free = [name for name in GROUP_NAMES if name not in (fixed or {})]
     if not electrical and "electrical_s" in free:
@@ -158,15 +133,20 @@ def fit_throttle(
             free = [name for name in free if name not in gone]
             unvisited += gone
             findings.append(
-                f"the plate spends less than {SIDE_S:g} s {side} limp-home ({values['limp_home_deg']:.3g} deg): "
-                f"{', '.join(gone) or 'that side'} kept at the start value; an excitation across limp-home would tell"
+                Finding(
+                    "start_value_kept",
+                    tuple(gone),
+                    f"the plate spends less than {SIDE_S:g} s {side} limp-home ({values['limp_home_deg']:.3g} deg): "
+                    f"{', '.join(gone) or 'that side'} kept at the start value",
+                    "use an excitation across limp-home",
+                )
             )
-    if start is None:
+    if start_values is None:
         values |= regression_start(step_s, duty, angle, values, free, closed_deg, open_deg)
     bounds = {parameter.name: parameter for parameter in _core.throttle_group_bounds()}
     for name, value in values.items():
         low, high = bounds[name].lower, bounds[name].upper
-        if (name in (start or {}) or name in (fixed or {})) and not low <= value <= high:
+        if (name in (start_values or {}) or name in (fixed or {})) and not low <= value <= high:
             raise ParameterError(f"{name} = {value!r}: must be within [{low:g}, {high:g}]")
         values[name] = min(max(value, low), high)
     index = {name: i for i, name in enumerate(GROUP_NAMES)}
@@ -176,19 +156,19 @@ def fit_throttle(
     if not everything:
         raise ParameterError("fixed: nothing is left to estimate")
     stages: list[tuple[list[int], list[int], float, float, int]] = [
-        (part, [], fraction, tolerance, max_iterations)
+        (part, [], fraction, tolerance, chosen.max_iterations)
         for part, fraction, tolerance in (
             (dynamics, 0.1, 1e-3),
             (static, 0.1, 1e-3),
             (everything, 0.25, 1e-4),
-            (everything, 1.0, cost_tolerance),
+            (everything, 1.0, chosen.tolerance),
         )
         if part and (fraction == 1.0 or fraction * time.size >= 200)
     ]
     found = _core.fit_throttle_groups(
         [(step_s, np.clip(duty, -1.0, 1.0), angle, [float(angle[0]), 0.0, 0.0], 0, False)],
         stages=stages,
-        starts=spread_starts(values, free, bounds, n_starts, seed),
+        starts=spread_starts(values, free, bounds, n_starts, chosen.seed),
         closed_deg=closed_deg,
         open_deg=open_deg,
         ramp_deg=0.25,
@@ -200,12 +180,14 @@ def fit_throttle(
         parameters=dict(zip(GROUP_NAMES, found["values"], strict=True)), closed_deg=closed_deg, open_deg=open_deg
     )
     findings += report.findings
-    if n_starts > 1:
-        findings.append(f"{found['n_reached']} of {n_starts} starts reached the best fit")
     if supply_v is None or resistance_ohm is None or (inertia_kgm2 is None) == (torque_constant_nm_per_a is None):
         findings.append(
-            "groups only: duty and angle cannot separate inertia, torque constant, resistance and damping; give "
-            "resistance_ohm, supply_v and one of inertia_kgm2 and torque_constant_nm_per_a"
+            Finding(
+                "groups_only",
+                (),
+                "groups only: duty and angle cannot separate inertia, torque constant, resistance and damping",
+                "give resistance_ohm, supply_v and one of inertia_kgm2 and torque_constant_nm_per_a",
+            )
         )
     else:
         physical = physical_parameters(
@@ -215,30 +197,27 @@ def fit_throttle(
             inertia_kgm2=inertia_kgm2,
             torque_constant_nm_per_a=torque_constant_nm_per_a,
         )
-        findings.append("physical numbers: " + ", ".join(f"{name} {value:.4g}" for name, value in physical.items()))
-    fit_test, rmse_test = (None, None) if test is None else quality(model, [test])
-    return ThrottleFit(
+        text = "physical numbers: " + ", ".join(f"{name} {value:.4g}" for name, value in physical.items())
+        findings.append(Finding("physical_parameters", tuple(physical), text))
+    run = free_run(model, log)
+    return Fit(
         report=report,
         model=model,
-        kind="first_principle",
-        fit_percent_train=quality(model, [log])[0],
-        fit_percent_test=fit_test,
-        rmse_test_deg=rmse_test,
-        parameters=dict(model.parameters),
+        kind=model.kind,
+        train=quality_of(run),
+        test=None if test is None else quality_of(free_run(model, test)),
         unidentifiable=(*unvisited, *report.unidentifiable),
         findings=tuple(findings),
-        source=str(log.attrs.get("file", "log")),
+        source=source_of(log),
+        start_rmse=tuple(sorted(float(one.rmse) for one in found["reports"])),
+        n_best=int(found["n_reached"]),
+        run=run,
+        draw=draw_free_run,
     )
 
 
-def log_columns(log: xr.Dataset) -> tuple[NDArray[np.float64], NDArray[np.float64], NDArray[np.float64]]:
-    for name in ("time_s", "duty", "angle_deg"):
-        if name not in log:
-            raise DataError(f"log has no {name}: mgdd.io.read_throttle_log and throttle_log make one")
-    time, duty, angle = (np.array(log[name], dtype=np.float64) for name in ("time_s", "duty", "angle_deg"))
-    for name, column in (("time_s", time), ("duty", duty), ("angle_deg", angle)):
-        if column.ndim != 1 or not np.isfinite(column).all():
-            raise DataError(f"{name}: must be one column of finite numbers")
-    if time.size < 100:
-        raise DataError(f"log has {time.size} samples: at least 100 are needed")
-    return time, duty, angle
+def _columns(log: xr.Dataset) -> list[NDArray[np.float64]]:
+    columns = columns_of(log, ("time_s", "duty", "angle_deg"))
+    if columns[0].size < 100:
+        raise DataError(f"log has {columns[0].size} samples: at least 100 are needed")
+    return columns

@@ -4,34 +4,38 @@ from __future__ import annotations
 
 import math
 from collections.abc import Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from types import MappingProxyType
 from typing import TYPE_CHECKING
 
 import numpy as np
 
 from mgdd import _core
-from mgdd.errors import ParameterError, ShapeError
-from mgdd.identify.throttle.fit import FittedParameters
-from mgdd.signals.even_grid import even_step
+from mgdd.errors import ParameterError
+from mgdd.signals.model import RunInputs, SampledModel
+from mgdd.throttle.fitted_parameters import FittedParameters, parameter_text
 
 if TYPE_CHECKING:
-    from numpy.typing import ArrayLike, NDArray
+    from numpy.typing import NDArray
+
+    from mgdd.results import Fit
 
 __all__ = ["FirstPrincipleModel"]
 
 GROUP_NAMES = tuple(_core.throttle_group_names)
+# Groups of a typical passenger-car throttle, the start of a fit.
+TYPICAL = MappingProxyType(dict(zip(GROUP_NAMES, (0.03, 5e4, 0.1, 1e-3, 0.05, 0.1, 1e-3, 8.0, 0.0), strict=True)))
 
 
 @dataclass(frozen=True, kw_only=True)
-class FirstPrincipleModel:
+class FirstPrincipleModel(SampledModel):
     """Throttle in groups: set-valued friction, springs with preload on both sides, motor as a torque source.
 
     Parameters
     ----------
-    parameters : mapping of str to float
-        ``tau_s``, ``gain_deg_per_s2_per_duty``, preload ``beta_above_duty`` / ``beta_below_duty``, stiffness
-        ``kappa_above_duty_per_deg`` / ``kappa_below_duty_per_deg``, friction ``delta_duty``, ``limp_home_deg`` and
+    parameters : mapping of str to float, optional
+        Those of a typical passenger-car throttle without. ``tau_s``, ``gain_deg_per_s2_per_duty``, preload
+        ``beta_above_duty`` / ``beta_below_duty``, stiffness ``kappa_above_duty_per_deg`` / ``kappa_below_duty_per_deg``, friction ``delta_duty``, ``limp_home_deg`` and
         ``electrical_s`` (L/R, 0 for none).
     closed_deg, open_deg : float
         Mechanical stops [deg].
@@ -42,13 +46,17 @@ class FirstPrincipleModel:
 
     Examples
     --------
-    >>> from mgdd.identify import FirstPrincipleModel, throttle_start
-    >>> model = FirstPrincipleModel(parameters=throttle_start())
-    >>> model.simulate([0.0, 0.001, 0.002], [0.0, 0.0, 0.0], start_deg=8.0).tolist()
+    >>> from mgdd.identify import FirstPrincipleModel
+    >>> run = FirstPrincipleModel().simulate({"time_s": [0.0, 0.001, 0.002], "duty": [0.0, 0.0, 0.0]})
+    >>> run["angle_deg"].values.tolist()
     [8.0, 8.0, 8.0]
     """
 
-    parameters: Mapping[str, float]
+    input_names = ("duty",)
+    output_name = observed_state = "angle_deg"
+    state_names = ("angle_deg", "speed_deg_per_s", "lagged_duty")
+
+    parameters: Mapping[str, float] = field(default_factory=lambda: dict(TYPICAL))
     closed_deg: float = 0.0
     open_deg: float = 90.0
     ramp_deg: float = 0.25
@@ -74,67 +82,61 @@ class FirstPrincipleModel:
         """``first_principle``."""
         return "first_principle"
 
-    def simulate(self, time_s: ArrayLike, duty: ArrayLike, *, start_deg: float) -> NDArray[np.float64]:
-        """Run free from rest.
+    def _rest(self) -> list[float]:
+        return [self.parameters["limp_home_deg"], 0.0, 0.0]
 
-        Parameters
-        ----------
-        time_s, duty : array_like, shape (n,)
-            Constant sample time [s]; duty [-], held to the next sample.
-        start_deg : float
-            Angle at the first sample [deg].
-
-        Returns
-        -------
-        ndarray, shape (n,)
-            Angle [deg] at every sample.
-        """
-        u = np.asarray(duty, dtype=np.float64)
+    def _run(self, run: RunInputs) -> NDArray[np.float64]:
         return _core.simulate_throttle_groups(
             list(self.parameters.values()),
-            np.clip(u, -1.0, 1.0),
-            step_s=sample_step(time_s, u.size),
-            start=[float(start_deg), 0.0, 0.0],
+            np.clip(run.columns[0], -1.0, 1.0),
+            step_s=run.step_s,
+            start=run.state,
             closed_deg=self.closed_deg,
             open_deg=self.open_deg,
             ramp_deg=self.ramp_deg,
             substeps=self.substeps,
         )
 
-    def predict(self, time_s: ArrayLike, duty: ArrayLike, angle_deg: ArrayLike, horizon: int) -> NDArray[np.float64]:
-        """Predict `horizon` samples ahead: the measured angle plus the free run's change over the horizon.
+    def to_toml(self, *, fit: Fit | None = None) -> str:
+        """Write the model as TOML with units.
 
         Parameters
         ----------
-        time_s, duty, angle_deg : array_like, shape (n,)
-            Log [s, -, deg].
-        horizon : int
-            Samples, at least 1.
-
-        Returns
-        -------
-        ndarray, shape (n - horizon,)
-            Entry k is the angle [deg] at sample k + horizon.
-        """
-        measured = np.asarray(angle_deg, dtype=np.float64)
-        if not 1 <= horizon < measured.size:
-            raise ParameterError(f"horizon = {horizon}: must be within [1, {measured.size - 1}] samples")
-        run = self.simulate(time_s, duty, start_deg=float(measured[0]))
-        return measured[:-horizon] + run[horizon:] - run[:-horizon]
-
-    def to_toml(self) -> str:
-        """Write the parameters as TOML with their units.
+        fit : mgdd.results.Fit, optional
+            The fit that the numbers come from: its record, its standard errors and its quality are written, too.
 
         Returns
         -------
         str
-            TOML for `FittedParameters.from_toml`.
+            TOML for `from_toml`.
         """
-        return FittedParameters(kind=self.kind, values=self.parameters, source="model").to_toml()
+        values = {**self.parameters, "closed_deg": self.closed_deg, "open_deg": self.open_deg}
+        return parameter_text(self.kind, values, fit=fit)
 
+    @classmethod
+    def from_toml(cls, text: str) -> FirstPrincipleModel:
+        """Read what `to_toml` wrote.
 
-def sample_step(time_s: ArrayLike, size: int) -> float:
-    time = np.asarray(time_s, dtype=np.float64)
-    if time.ndim != 1 or time.size != size or size < 2:
-        raise ShapeError(f"time_s has shape {time.shape}, duty {size} values: must be equal and at least 2")
-    return even_step(time, remedy="read_throttle_log(..., step_s={step:g}) resamples")
+        Parameters
+        ----------
+        text : str
+            The TOML text.
+
+        Returns
+        -------
+        FirstPrincipleModel
+            The model.
+
+        Raises
+        ------
+        DataError
+            Not TOML, no parameters, a wrong unit.
+        ParameterError
+            An unknown kind or parameter, a value outside its domain.
+        """
+        saved = FittedParameters.from_toml(text)
+        if saved.kind != "first_principle":
+            raise ParameterError(f"kind = {saved.kind!r}: must be 'first_principle'")
+        values = dict(saved.values)
+        closed, opened = values.pop("closed_deg", 0.0), values.pop("open_deg", 90.0)
+        return cls(parameters=values, closed_deg=closed, open_deg=opened)

@@ -3,15 +3,17 @@
 from __future__ import annotations
 
 import errno
+from dataclasses import replace
 from pathlib import Path
 from typing import TYPE_CHECKING
 
 from mgdd.errors import ParameterError
 from mgdd.identify.throttle.first_principle import fit_throttle
 from mgdd.identify.throttle.first_principle_model import FirstPrincipleModel
-from mgdd.identify.throttle.fit import FittedParameters, ThrottleFit, ThrottleModel
 from mgdd.identify.throttle.pseudo_wiener_fit import fit_pseudo_wiener
+from mgdd.optimize import FitOptions
 from mgdd.throttle import PseudoWiener
+from mgdd.throttle.fitted_parameters import FittedParameters
 
 if TYPE_CHECKING:
     import os
@@ -19,11 +21,11 @@ if TYPE_CHECKING:
 
     import xarray as xr
 
+    from mgdd.results import Fit, Model
+
 __all__ = ["check_kind", "fit_kind", "load_throttle_model"]
 
-_STARTS = 4
 _WORTH = 0.97
-_TRAVEL = ("closed_deg", "open_deg")
 
 
 def fit_kind(
@@ -34,17 +36,15 @@ def fit_kind(
     two_sided: bool,
     delay_samples: int | Sequence[int],
     stops_deg: tuple[float, float],
-    starts: int | None,
-    seed: int,
-) -> ThrottleFit:
+    options: FitOptions | None,
+) -> Fit:
     """Fit a kind with what the front knows; what is None keeps the fit's own default."""
     closed, opened = stops_deg
     if kind == "first_principle":
         fixed = None if limp_home_deg is None else {"limp_home_deg": limp_home_deg}
         fits = [
             fit_throttle(
-                log, fixed=fixed, electrical=electrical, n_starts=starts or _STARTS, seed=seed,
-                closed_deg=closed, open_deg=opened,
+                log, fixed=fixed, electrical=electrical, options=options, closed_deg=closed, open_deg=opened,
             )
             for electrical in (False, True)
         ]  # fmt: skip
@@ -52,7 +52,7 @@ def fit_kind(
         return fits[1] if fits[1].report.rmse < _WORTH * fits[0].report.rmse else fits[0]
     sides = "both" if two_sided else "shared"
     return fit_pseudo_wiener(
-        log, kind, limp_home_deg=limp_home_deg, sides=sides, delay_samples=delay_samples, starts=starts, seed=seed,
+        log, kind, limp_home_deg=limp_home_deg, sides=sides, delay_samples=delay_samples, options=_seeded(options),
         settings={"closed_deg": closed, "open_deg": opened},
     )  # fmt: skip
 
@@ -67,17 +67,17 @@ def check_kind(kind: str, *, two_sided: bool, delay_samples: int | Sequence[int]
         )
 
 
-def load_throttle_model(path: str | os.PathLike[str]) -> ThrottleModel:
+def load_throttle_model(path: str | os.PathLike[str]) -> Model:
     """Make a model of the parameters that a fit has written.
 
     Parameters
     ----------
     path : path-like
-        TOML of `ThrottleFit.to_toml`, as ``mgdd throttle identify --output`` writes it.
+        TOML of `mgdd.results.Fit.to_toml`, as ``mgdd throttle identify --output`` writes it.
 
     Returns
     -------
-    ThrottleModel
+    mgdd.results.Model
         Ready to simulate.
 
     Raises
@@ -92,20 +92,22 @@ def load_throttle_model(path: str | os.PathLike[str]) -> ThrottleModel:
     Examples
     --------
     >>> import pathlib, tempfile
-    >>> from mgdd.identify import FirstPrincipleModel, load_throttle_model, throttle_start
+    >>> from mgdd.identify import FirstPrincipleModel, load_throttle_model
     >>> with tempfile.TemporaryDirectory() as folder:
     ...     file = pathlib.Path(folder) / "fit.toml"
-    ...     _ = file.write_text(FirstPrincipleModel(parameters=throttle_start()).to_toml())
+    ...     _ = file.write_text(FirstPrincipleModel().to_toml())
     ...     load_throttle_model(file).kind
     'first_principle'
     """
     file = Path(path)
     if not file.exists():
         raise FileNotFoundError(errno.ENOENT, "no such file: check the path", str(file))
-    saved = FittedParameters.from_toml(file.read_text(encoding="utf-8"), source=str(file))
-    if saved.kind != "first_principle":
-        return PseudoWiener(saved.kind, saved.values)
-    values = dict(saved.values)
-    travel = {name: values.pop(name) for name in _TRAVEL if name in values}
-    closed, opened = travel.get("closed_deg", 0.0), travel.get("open_deg", 90.0)
-    return FirstPrincipleModel(parameters=values, closed_deg=closed, open_deg=opened)
+    text = file.read_text(encoding="utf-8")
+    saved = FittedParameters.from_toml(text, source=str(file))
+    return FirstPrincipleModel.from_toml(text) if saved.kind == "first_principle" else PseudoWiener.from_toml(text)
+
+
+def _seeded(options: FitOptions | None) -> FitOptions:
+    """Return the options with the seed of every identification, 0."""
+    known = options or FitOptions()
+    return known if known.seed is not None else replace(known, seed=0)

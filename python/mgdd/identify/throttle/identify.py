@@ -8,19 +8,23 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from mgdd.errors import ParameterError
-from mgdd.identify.throttle.fit import KINDS, ThrottleFit
 from mgdd.identify.throttle.fits import check_kind, fit_kind
+from mgdd.identify.throttle.free_run import free_run, quality_of, source_of
 from mgdd.identify.throttle.prior import prior_of
-from mgdd.identify.throttle.quality import quality
 from mgdd.identify.throttle.record_content import open_questions, record_content
 from mgdd.identify.throttle.validation import entangled
 from mgdd.io import check_throttle_log
+from mgdd.results import Finding, Fit, FitQuality
+from mgdd.results.finding import unique
+from mgdd.throttle.fitted_parameters import KINDS
 
 if TYPE_CHECKING:
     from collections.abc import Sequence
 
     import xarray as xr
     from numpy.typing import NDArray
+
+    from mgdd.optimize import FitOptions
 
 __all__ = ["identify_throttle"]
 
@@ -41,9 +45,8 @@ def identify_throttle(
     closed_deg: float = 0.0,
     open_deg: float = 90.0,
     delay_samples: int | Sequence[int] = 0,
-    starts: int | None = None,
-    seed: int = 0,
-) -> ThrottleFit:
+    options: FitOptions | None = None,
+) -> Fit:
     """Fit a throttle model to a log and test it on another.
 
     Parameters
@@ -54,7 +57,7 @@ def identify_throttle(
         Kind of the model: pseudo-Wiener with friction inside (the default), strict Wiener, Wiener with play, or the
         groups of the first-principle plant.
     test : xarray.Dataset, optional
-        Another log, for ``fit_percent_test`` and ``rmse_test_deg``.
+        Another log, for the quality ``test``.
     limp_home_deg : float, optional
         Limp-home angle [deg], if it is known. None: the first-principle fit estimates it from a log that has been on
         both sides; otherwise the record starts at rest there, and the findings say which angle was read off it.
@@ -64,15 +67,13 @@ def identify_throttle(
         Mechanical stops [deg].
     delay_samples : int or sequence of int
         Samples, 0 to 5, until the duty acts; of several the best is kept. Pseudo-Wiener models only.
-    starts : int, optional
-        Starts of the search; None takes the model's own number.
-    seed : int
-        Of the starts.
+    options : FitOptions, optional
+        How hard to search; the number of starts is the model's own, the seed 0 without.
 
     Returns
     -------
-    ThrottleFit
-        Model, report, fits in percent, and findings in words.
+    mgdd.results.Fit
+        Model, report, quality of the free run without its first 50 ms, and findings.
 
     Raises
     ------
@@ -89,15 +90,15 @@ def identify_throttle(
     >>> from mgdd.throttle import Throttle, simulate
     >>> signal = chirp(3.0, offset=0.15, amplitude=0.2)
     >>> run = simulate(Throttle(), signal["duty"], time_s=signal["time_s"])
-    >>> fit = identify_throttle(throttle_log(run["time_s"], run["duty"], run["angle_deg"]), starts=2)
-    >>> fit.kind, fit.fit_percent_train > 98.0
+    >>> from mgdd.optimize import FitOptions
+    >>> log = throttle_log(run["time_s"], run["duty"], run["angle_deg"])
+    >>> fit = identify_throttle(log, options=FitOptions(n_starts=2))
+    >>> fit.kind, fit.train.nrmse_fit_percent > 98.0
     ('pw_r', True)
     """
     if model not in KINDS:
         raise ParameterError(f"model = {model!r}: must be one of {', '.join(map(repr, KINDS))}")
     check_kind(model, two_sided=two_sided, delay_samples=delay_samples)
-    if seed < 0:
-        raise ParameterError(f"seed = {seed}: must be >= 0")
     if not closed_deg < open_deg:
         raise ParameterError(f"open_deg = {open_deg!r}: must be above closed_deg = {closed_deg!r}")
     check_throttle_log(log)
@@ -111,10 +112,9 @@ def identify_throttle(
     known_home = limp_home_deg if model == "first_principle" else limp_home
     fit = fit_kind(
         log, model, limp_home_deg=known_home, two_sided=two_sided, delay_samples=delay_samples,
-        stops_deg=(closed_deg, open_deg), starts=starts, seed=seed,
+        stops_deg=(closed_deg, open_deg), options=options,
     )  # fmt: skip
-    train, _ = quality(fit.model, [log])
-    tested = (None, None) if test is None else quality(fit.model, [test])
+    tested = None if test is None else quality_of(free_run(fit.model, test))
     known = prior_of(fit.model)
     home = known.limp_home_deg if limp_home is None else limp_home
     content = record_content(
@@ -122,61 +122,55 @@ def identify_throttle(
     )
     asked = open_questions(content, swing=known.swing, pairs=entangled(fit.report))
     # The report names correlated pairs, too; here each comes with its remedy.
-    own = (text for text in fit.findings if not (text in fit.report.findings and ": correlation " in text))
+    own = (found for found in fit.findings if found.code != "correlated")
     read = _read_off(log, home) if limp_home_deg is None and model != "first_principle" else ()
     stops = _plateaus(log, home, (closed_deg, open_deg))
-    findings = tuple(dict.fromkeys((*own, *_carried_over(train, tested[0]), *read, *stops, *asked)))
-    return dataclasses.replace(
-        fit,
-        fit_percent_train=train,
-        fit_percent_test=tested[0],
-        rmse_test_deg=tested[1],
-        findings=findings,
-        source=str(log.attrs.get("file", "log")),
-    )
+    findings = unique((*own, *_carried_over(fit.train, tested), *read, *stops, *asked))
+    return dataclasses.replace(fit, test=tested, findings=findings)
 
 
-def _carried_over(train: float, test: float | None) -> tuple[str, ...]:
-    """Say that a fit holds for its own log only."""
-    if test is None or train - test < _LOST_PERCENT:
+def _carried_over(train: FitQuality | None, test: FitQuality | None) -> tuple[Finding, ...]:
+    """Report a fit that holds for its own log only."""
+    own, other = (None if quality is None else quality.nrmse_fit_percent for quality in (train, test))
+    if own is None or other is None or own - other < _LOST_PERCENT:
         return ()
     text = (
-        f"the fit meets its own log at {train:.1f} % and the test log at {test:.1f} %: what it has learned does "
-        "not carry over; fit fewer parameters, from more starts, or to a log that excites them all"
+        f"the fit meets its own log at {own:.1f} % and the test log at {other:.1f} %: what it has learned does "
+        "not carry over"
     )
-    return (text,)
+    remedy = "fit fewer parameters, from more starts, or to a log that excites them all"
+    return (Finding("overfitted", (), text, remedy),)
 
 
-def _read_off(log: xr.Dataset, home: float | None) -> tuple[str, ...]:
+def _read_off(log: xr.Dataset, home: float | None) -> tuple[Finding, ...]:
     """Say where limp-home was read off, and doubt it where friction may hold the plate elsewhere."""
     duty, angle = log["duty"].to_numpy(), log["angle_deg"].to_numpy()
     if home is None:
         return ()
-    text = f"limp-home was read off the first samples: {home:.3g} deg"
+    text, remedy = f"limp-home was read off the first samples: {home:.3g} deg", ""
     if abs(float(duty[0])) > _IDLE_DUTY and angle.min() < home - _SIDE_DEG and angle.max() > home + _SIDE_DEG:
         text += (
             f"; the duty is {float(duty[0]):.3g} there and the plate goes to both sides, so friction may have held it "
-            "elsewhere: give limp_home_deg"
+            "elsewhere"
         )
-    return (text,)
+        remedy = "give limp_home_deg"
+    return (Finding("limp_home_read_off", ("limp_home_deg",), text, remedy),)
 
 
-def _plateaus(log: xr.Dataset, home: float | None, stops_deg: tuple[float, float]) -> tuple[str, ...]:
+def _plateaus(log: xr.Dataset, home: float | None, stops_deg: tuple[float, float]) -> tuple[Finding, ...]:
     """Name an extreme angle that the plate meets again and again inside the travel: a stop that was not given."""
     angle = log["angle_deg"].to_numpy()
     low, high = float(angle.min()), float(angle.max())
-    texts = []
+    found = []
     for name, extreme, stop, share in (
         ("closed_deg", low, stops_deg[0], angle - low),
         ("open_deg", high, stops_deg[1], high - angle),
     ):
         inside = abs(extreme - stop) > _SIDE_DEG and (home is None or abs(extreme - home) > _SIDE_DEG)
         if inside and _visits(share < _PLATEAU_DEG) >= _PLATEAU_VISITS:
-            texts.append(
-                f"the plate stops at {extreme:.3g} deg again and again, {name} is {stop:g} deg: if there is a stop, "
-                "give it"
-            )
-    return tuple(texts)
+            text = f"the plate stops at {extreme:.3g} deg again and again, {name} is {stop:g} deg"
+            found.append(Finding("unknown_stop", (name,), text, "if there is a stop, give it"))
+    return tuple(found)
 
 
 def _visits(there: NDArray[np.bool_]) -> int:
@@ -190,7 +184,7 @@ def _limp_home(log: xr.Dataset) -> float:
     first = angle[: max(2, int(np.searchsorted(time, time[0] + _REST_S)))]
     if float(np.ptp(first)) > _REST_DEG:
         raise ParameterError(
-            f"limp_home_deg = None: {log.attrs.get('file', 'log')} does not start at rest (it moves by "
+            f"limp_home_deg = None: {source_of(log)} does not start at rest (it moves by "
             f"{float(np.ptp(first)):.2g} deg in {1e3 * _REST_S:g} ms), so limp-home cannot be read off it; give it"
         )
     return float(angle[: max(1, int(np.searchsorted(time, time[0] + _READ_S)))].mean())

@@ -9,10 +9,9 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from mgdd.errors import DataError, ParameterError
-from mgdd.identify.throttle.fit import ThrottleModel
-from mgdd.identify.throttle.quality import columns_of, discarded
+from mgdd.identify.throttle.free_run import columns_of, discarded
 from mgdd.io import check_throttle_log
-from mgdd.results import labelled_dataset
+from mgdd.results import Model, labelled_dataset
 from mgdd.signals.even_grid import even_step
 from mgdd.signals.metrics import rmse
 
@@ -67,7 +66,7 @@ def split_log(log: xr.Dataset, *, shares: Sequence[float] = (0.6, 0.2, 0.2)) -> 
 
 
 def n_step_rms(
-    model: ThrottleModel,
+    model: Model,
     log: xr.Dataset,
     *,
     horizons_s: Sequence[float] | None = None,
@@ -77,7 +76,7 @@ def n_step_rms(
 
     Parameters
     ----------
-    model : ThrottleModel
+    model : Model
         The model.
     log : xarray.Dataset
         A throttle log.
@@ -99,19 +98,14 @@ def n_step_rms(
     Examples
     --------
     >>> import numpy as np
-    >>> from mgdd.identify import n_step_rms
-    >>> from mgdd.io import throttle_log
-    >>> class Still:
-    ...     kind, parameters = "pw_r", {}
-    ...     def predict(self, time_s, duty, angle_deg, horizon):
-    ...         return np.asarray(angle_deg)[:-horizon]
-    >>> time = np.arange(2000) * 1e-3
-    >>> log = throttle_log(time, 0.2 * np.sin(6.0 * time), 20.0 + 15.0 * np.sin(6.0 * time - 0.5))
-    >>> rms = n_step_rms(Still(), log)["n_step_rms_deg"]
-    >>> bool((rms[0] == rms[1]).all())
-    True
+    >>> from mgdd.identify import FirstPrincipleModel, n_step_rms
+    >>> model, time = FirstPrincipleModel(), np.arange(2000) * 1e-3
+    >>> log = model.simulate({"time_s": time, "duty": 0.1 + 0.2 * np.sin(6.0 * time)})
+    >>> rms = n_step_rms(model, log)["n_step_rms_deg"]
+    >>> bool((rms[0] < 1e-9).all()), bool((rms[1] > 0.1).all())
+    (True, True)
     """
-    time, duty, angle = columns_of(log)
+    time, _, angle = columns_of(log)
     truth = angle if true_deg is None else np.asarray(true_deg, dtype=np.float64)
     step = even_step(time)
     horizons_s = whole_horizons(step, time.size) if horizons_s is None else horizons_s
@@ -119,7 +113,7 @@ def n_step_rms(
     table = np.empty((2, len(horizons_s)))
     for at, horizon in enumerate(horizons_s):
         n = samples_of(horizon, step, time.size)
-        ahead = np.asarray(model.predict(time, duty, angle, n), dtype=np.float64)
+        ahead = model.predict(log, n)["angle_deg"].to_numpy()
         if ahead.shape != (time.size - n,):
             raise DataError(f"predict gave {ahead.shape} values {n} samples ahead: must be ({time.size - n},)")
         target = truth[n:][skip:]

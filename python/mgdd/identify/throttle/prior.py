@@ -10,6 +10,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from mgdd.errors import ParameterError
+from mgdd.results import Fit
 from mgdd.throttle import Throttle, simulate
 
 if TYPE_CHECKING:
@@ -79,7 +80,7 @@ def prior_of(model: Any) -> Prior:
     """Return what a throttle, a fitted model or a callable says of itself."""
     if isinstance(model, Throttle):
         return _of_throttle(model)
-    if hasattr(model, "model") and hasattr(model, "report"):  # a ThrottleFit
+    if isinstance(model, Fit):
         return prior_of(model.model)
     if hasattr(model, "simulate") and hasattr(model, "parameters"):
         return _of_model(model)
@@ -114,7 +115,7 @@ def _of_model(model: Any) -> Prior:
     values: dict[str, float] = dict(model.parameters)
 
     def run(time: NDArray[np.float64], duty: NDArray[np.float64], start: float) -> Mapping[str, NDArray[np.float64]]:
-        return _columns(model.simulate(time, duty, start_deg=start), time.size)
+        return _columns(model.simulate({"time_s": time, "duty": duty}, initial_state={"angle_deg": start}), time.size)
 
     groups = None
     names = next((names for names in (_PW_R, _GROUPS) if all(name in values for name in names)), None)
@@ -139,7 +140,7 @@ def _of_model(model: Any) -> Prior:
 
 
 def _columns(answer: Any, size: int) -> Mapping[str, NDArray[np.float64]]:
-    table = answer if isinstance(answer, Mapping) else {"angle_deg": answer}
+    table = answer if hasattr(answer, "keys") else {"angle_deg": answer}
     out = {str(name): np.asarray(table[name], dtype=np.float64) for name in ("angle_deg", "current_a") if name in table}
     for name, values in out.items():
         if values.shape != (size,):

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass
 from types import MappingProxyType
 from typing import TYPE_CHECKING, cast
 
@@ -11,41 +10,20 @@ import numpy as np
 
 from mgdd import _core
 from mgdd.errors import DataError, ParameterError
-from mgdd.identify.throttle.fit import ThrottleFit
-from mgdd.identify.throttle.quality import quality
-from mgdd.optimize import FitReport
-from mgdd.signals.even_grid import common_step
+from mgdd.identify.throttle.free_run import discarded, draw_free_run, free_run, quality_of, source_of
+from mgdd.optimize.fit_options import FitOptions, fit_options
+from mgdd.results import Finding, Fit, FitQuality, FitReport
+from mgdd.signals.even_grid import common_step, even_step
+from mgdd.signals.metrics import nrmse_fit_percent, rmse
 from mgdd.throttle import PseudoWiener
 
 if TYPE_CHECKING:
     import xarray as xr
 
-__all__ = ["PseudoWienerFit", "fit_pseudo_wiener"]
+__all__ = ["fit_pseudo_wiener"]
 
 # Enough that the best of PW-W and PW-P is found more than once on the records of the study.
 _STARTS = MappingProxyType({"pw_r": 9, "pw_w": 16, "pw_p": 16})
-
-
-@dataclass(frozen=True, kw_only=True, eq=False, repr=False)
-class PseudoWienerFit(ThrottleFit):
-    """A `ThrottleFit` that also says how its searches ended.
-
-    Parameters
-    ----------
-    hits : int
-        Searches that ended at the best fit: once only says that a better one may exist.
-    search_rmse_deg : tuple of float
-        Error of every search [deg], the best first; infinite where one failed.
-
-    Examples
-    --------
-    >>> from mgdd.identify import PseudoWienerFit
-    >>> "hits" in PseudoWienerFit.__dataclass_fields__
-    True
-    """
-
-    hits: int = 1
-    search_rmse_deg: tuple[float, ...] = ()
 
 
 def fit_pseudo_wiener(
@@ -57,13 +35,11 @@ def fit_pseudo_wiener(
     free: Sequence[str] = (),
     delay_samples: int | Sequence[int] = 0,
     plays: int = 1,
-    start: PseudoWiener | None = None,
+    start_values: PseudoWiener | None = None,
     settings: Mapping[str, float] | None = None,
-    starts: int | None = None,
-    seed: int = 1,
     lag_start: str = "best",
-    max_iterations: int = 150,
-) -> PseudoWienerFit:
+    options: FitOptions | None = None,
+) -> Fit:
     """Fit a pseudo-Wiener model in free run, from several starts.
 
     Parameters
@@ -83,24 +59,21 @@ def fit_pseudo_wiener(
         Delay of the duty, 0 to 5 samples; of several the best is kept.
     plays : int
         PW-P: number of plays, 1 to 8.
-    start : PseudoWiener, optional
+    start_values : PseudoWiener, optional
         A single search from here, instead of many.
     settings : mapping of str to float, optional
         Settings and held parameters of the model by name.
-    starts : int, optional
-        Searches per delay (PW-W and PW-P: per delay and start rule of the lags).
-    seed : int
-        Of the Latin hypercube of starts.
     lag_start : {"best", "rest", "map"}
         PW-W and PW-P: what the lags hold when a free run starts. ``rest``: no duty, as of a throttle that waits at
         limp-home; ``map``: what the static map turns into the first angle; ``best``: whichever fits better.
-    max_iterations : int
-        Trial steps per search.
+    options : FitOptions, optional
+        9 searches per delay of PW-R and 16 of the others (per delay and start rule of the lags), seed 1 of their Latin
+        hypercube, and 150 trial steps per search where nothing else is said.
 
     Returns
     -------
-    PseudoWienerFit
-        The best of all searches; its findings say how many of them ended there.
+    mgdd.results.Fit
+        The best of all searches; `n_best` counts those that ended there, `start_rmse` has the error of each [deg].
 
     Raises
     ------
@@ -118,27 +91,28 @@ def fit_pseudo_wiener(
     --------
     >>> import numpy as np
     >>> from mgdd.identify import fit_pseudo_wiener
-    >>> from mgdd.io import throttle_log
+    >>> from mgdd.optimize import FitOptions
     >>> from mgdd.throttle import PseudoWiener
     >>> time = np.arange(4000) * 1e-3
     >>> duty = 0.15 + 0.2 * np.sin(2.0 * np.pi * (0.5 * time + 0.6 * time**2))
     >>> truth = PseudoWiener("pw_r", {"above_coulomb_duty": 0.08, "below_coulomb_duty": 0.08})
-    >>> log = throttle_log(time, duty, truth.simulate(time, duty, start_deg=8.0))
-    >>> fit = fit_pseudo_wiener(log, limp_home_deg=8.0, starts=2)
+    >>> log = truth.simulate({"time_s": time, "duty": duty}, initial_state={"angle_deg": 8.0})
+    >>> fit = fit_pseudo_wiener(log, limp_home_deg=8.0, options=FitOptions(n_starts=2))
     >>> round(fit.parameters["above_coulomb_duty"], 4)
     0.08
     """
+    chosen = fit_options(options, n_starts=_STARTS.get(kind, 1), seed=1, max_iterations=150)
     logs = cast("list[xr.Dataset]", [log] if hasattr(log, "variables") else list(log))
     if not logs:
         raise DataError("no logs: a fit needs at least one")
     sample_s = _sample(logs)
     columns = [(one["duty"].to_numpy(), one["angle_deg"].to_numpy()) for one in logs]
     limp_home = float(columns[0][1][0]) if limp_home_deg is None else float(limp_home_deg)
-    base = PseudoWiener(kind) if start is None else start
+    base = PseudoWiener(kind) if start_values is None else start_values
     if base.kind != kind:
-        raise ParameterError(f"start is a {base.kind}: must be a {kind}")
+        raise ParameterError(f"start_values is a {base.kind}: must be a {kind}")
     values: dict[str, float] = {**base.at_sample(sample_s).parameters, "limp_home_deg": limp_home}
-    if kind == "pw_p" and start is None:
+    if kind == "pw_p" and start_values is None:
         values["plays"] = float(plays)
     if lag_start not in ("best", "rest", "map"):
         raise ParameterError(f"lag_start = {lag_start!r}: must be one of best, rest, map")
@@ -146,40 +120,55 @@ def fit_pseudo_wiener(
         values["map_start"] = float(lag_start == "map")
     values |= {name: float(value) for name, value in (settings or {}).items()}
     delays = [delay_samples] if isinstance(delay_samples, int) else list(delay_samples)
-    parameters, report, rmse, hits = _core.fit_pseudo_wiener(
+    parameters, report, errors, n_best = _core.fit_pseudo_wiener(
         kind=kind,
         records=columns,
         parameters=values,
         sides=sides,
         free=list(free),
         delays=delays,
-        starts=_STARTS.get(kind, 1) if starts is None else starts,
-        seed=seed,
-        only_given_start=start is not None,
+        starts=chosen.n_starts,
+        seed=chosen.seed,
+        only_given_start=start_values is not None,
         try_map_start=lag_start == "best",
-        max_iterations=max_iterations,
+        max_iterations=chosen.max_iterations,
     )
     wrapped = FitReport.from_core(report, np.concatenate([angle for _, angle in columns]))
     model = PseudoWiener(kind, parameters)
+    runs = [free_run(model, one) for one in logs]
     found = [*wrapped.findings]
-    if rmse.size > 1:
-        found.append(f"{hits} of {rmse.size} searches ended at the best fit")
-        if hits < 2:
-            found.append("the best fit was found once only: a better one may exist, raise starts")
+    if errors.size > 1 and n_best < 2:
+        text = "the best fit was found once only: a better one may exist"
+        found.append(Finding("found_once", (), text, "raise n_starts"))
     if kind == "pw_r" and sides == "shared":
-        found.append("one set of values serves both sides of limp-home: sides='both' fits a set each")
-    return PseudoWienerFit(
+        text = "one set of values serves both sides of limp-home"
+        found.append(Finding("shared_sides", (), text, "sides='both' fits a set each"))
+    return Fit(
         report=wrapped,
         model=model,
         kind=kind,
-        fit_percent_train=quality(model, logs)[0],
-        parameters=dict(model.parameters),
+        train=_quality(runs),
         unidentifiable=wrapped.unidentifiable,
         findings=tuple(found),
-        hits=int(hits),
-        search_rmse_deg=tuple(rmse.tolist()),
-        source=str(logs[0].attrs.get("file", "log")),
+        source=source_of(logs[0]),
+        start_rmse=tuple(errors.tolist()),
+        n_best=int(n_best),
+        run=runs[0],
+        draw=draw_free_run,
     )
+
+
+def _quality(runs: Sequence[xr.Dataset]) -> FitQuality:
+    """Compare all runs together."""
+    if len(runs) == 1:
+        return quality_of(runs[0])
+    skips = [discarded(even_step(run["time_s"]), run.sizes["time_s"]) for run in runs]
+    measured, modelled = (
+        np.concatenate([run[name].to_numpy()[skip:] for run, skip in zip(runs, skips, strict=True)])
+        for name in ("angle_deg", "model_deg")
+    )
+    percent = nrmse_fit_percent(measured, modelled)
+    return FitQuality(nrmse_fit_percent=percent, rmse=rmse(measured, modelled), unit="deg", n=measured.size)
 
 
 def _sample(logs: Sequence[xr.Dataset]) -> float:

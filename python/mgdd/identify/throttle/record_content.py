@@ -8,6 +8,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
+from mgdd.results import Finding
 from mgdd.signals.even_grid import even_step
 
 if TYPE_CHECKING:
@@ -126,56 +127,63 @@ def _travel(angle: NDArray[np.float64], window: int) -> tuple[float, float]:
 
 def open_questions(
     content: RecordContent, *, swing: float, pairs: Iterable[tuple[str, str, float]] = ()
-) -> tuple[str, ...]:
-    """Say what the record leaves open and which excitation would settle it.
+) -> tuple[Finding, ...]:
+    """Return what the record leaves open, each with the excitation that would settle it.
 
     `swing` is the duty amplitude that moves the plate across limp-home [-]; `pairs` are correlated parameters of a fit.
     """
     lh = content.limp_home_deg
     where = "" if math.isnan(lh) else f" ({lh:.3g} deg)"
     ramp = f"a triangle of ±{swing:.2g} duty at {_TRIANGLE_HZ:g} Hz across limp-home{where}"
-    out = []
+    out: list[Finding] = []
+
+    def add(code: str, text: str, remedy: str, *names: str) -> None:
+        out.append(Finding(code, names, text, remedy))
+
     if content.travel_open_deg + content.travel_closed_deg < _LEAST_TRAVEL_DEG:
-        return (
-            (
-                "the plate hardly moves: nothing but a lower bound of the breakaway duty can be learned; drive it "
-                f"with {ramp}"
-            ),
-        )
+        text = "the plate hardly moves: nothing but a lower bound of the breakaway duty can be learned"
+        return (Finding("no_motion", (), text, f"drive it with {ramp}"),)
     up, down = content.travel_open_deg, content.travel_closed_deg
     one_way = min(up, down) < _LEAST_SHARE * max(up, down)
     if one_way:
         way = "opens" if up > down else "closes"
-        out.append(
-            f"the plate only {way}: Coulomb torque and preload push the same way and are indistinguishable in "
-            "this log; "
-            f"add {ramp}, which moves it both ways"
+        add(
+            "one_way",
+            f"the plate only {way}: Coulomb torque and preload push the same way and are indistinguishable in this log",
+            f"add {ramp}, which moves it both ways",
         )
     for first, second, value in pairs:
         if not (one_way and {_kind(first), _kind(second)} == {"Coulomb", "preload"}):
-            out.append(
-                f"{first} and {second} are indistinguishable in this log (correlation {value:+.3f}): "
-                f"{_remedy(first, second, ramp)}"
+            add(
+                "indistinguishable",
+                f"{first} and {second} are indistinguishable in this log (correlation {value:+.3f})",
+                _remedy(first, second, ramp),
+                first,
+                second,
             )
     if not math.isnan(lh):
         for side, spent, sign in (("below", content.time_below_s, -1.0), ("above", content.time_above_s, 1.0)):
             if spent < _LEAST_SIDE_S:
                 extreme = content.angle_low_deg if sign < 0.0 else content.angle_high_deg
-                out.append(
-                    f"the plate never goes {side} limp-home{where}, the {'lowest' if sign < 0.0 else 'highest'} "
-                    "angle is "
-                    f"{extreme:.1f} deg: spring and preload {side} it stay unknown; add {ramp}"
+                add(
+                    "side_not_visited",
+                    f"the plate never goes {side} limp-home{where}, the {'lowest' if sign < 0.0 else 'highest'} angle "
+                    f"is {extreme:.1f} deg: spring and preload {side} it stay unknown",
+                    f"add {ramp}",
+                    side,
                 )
     if content.peak_speed_deg_per_s < _FAST_DEG_PER_S:
-        out.append(
-            f"the plate moves at most {content.peak_speed_deg_per_s:.0f} deg/s: inertia, damping and delay "
-            "hardly act; add a "
-            f"chirp to 6 Hz or steps of ±{swing:.2g} duty"
+        add(
+            "too_slow",
+            f"the plate moves at most {content.peak_speed_deg_per_s:.0f} deg/s: inertia, damping and delay hardly act",
+            f"add a chirp to 6 Hz or steps of ±{swing:.2g} duty",
         )
     if content.time_at_stops_s > 0.3 * content.duration_s:
         share = 100.0 * content.time_at_stops_s / content.duration_s
-        out.append(
-            f"the plate rests on an end stop {share:.0f} % of the time, which tells nothing: lower offset or amplitude"
+        add(
+            "on_stop",
+            f"the plate rests on an end stop {share:.0f} % of the time, which tells nothing",
+            "lower offset or amplitude",
         )
     return tuple(out)
 

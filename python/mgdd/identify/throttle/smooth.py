@@ -2,125 +2,105 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
-from typing import TYPE_CHECKING
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, field, replace
+from types import MappingProxyType
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
 from mgdd import _core
-from mgdd.errors import ShapeError
-from mgdd.optimize import FitReport
+from mgdd.errors import ParameterError, ShapeError
+from mgdd.optimize.fit_options import FitOptions, fit_options
+from mgdd.optimize.fit_run import draw_run, fit_run, quality_of
+from mgdd.results import VARIABLES, Fit, FitReport
+from mgdd.signals.even_grid import even_step
+from mgdd.signals.model import RunInputs, SampledModel, columns_of
 
 if TYPE_CHECKING:
     from numpy.typing import ArrayLike, NDArray
 
-__all__ = ["SmoothThrottleFit", "fit_smooth_throttle", "simulate_smooth_throttle"]
+__all__ = ["SmoothThrottle", "fit_smooth_throttle"]
+
+_EXAMPLE = MappingProxyType(dict(zip(_core.smooth_throttle_names, _core.smooth_throttle_example, strict=True)))
+_START_RAD = 0.14
 
 
 @dataclass(frozen=True, kw_only=True)
-class SmoothThrottleFit:
-    """Fits of one record from several starts.
+class SmoothThrottle(SampledModel):
+    """The smooth throttle: tanh friction and preload, coil current, RK4 with one step per sample.
 
     Parameters
     ----------
-    reports : tuple of mgdd.optimize.FitReport
-        One per start, in order; rmse in deg, without the residual itself.
-    best : int
-        Index of the lowest cost.
-    n_reached : int
-        Starts whose rmse is within 0.5 % of the best.
-    n_sweeps : int
-        Passes over the whole record, all starts together.
-
-    Examples
-    --------
-    >>> from mgdd.identify import SmoothThrottleFit
-    >>> SmoothThrottleFit(reports=(), best=0, n_reached=0, n_sweeps=0).n_reached
-    0
-    """
-
-    reports: tuple[FitReport, ...]
-    best: int
-    n_reached: int
-    n_sweeps: int
-
-    @property
-    def report(self) -> FitReport:
-        """Report of the best start."""
-        return self.reports[self.best]
-
-
-def simulate_smooth_throttle(
-    duty: ArrayLike,
-    *,
-    parameters: ArrayLike | None = None,
-    step_s: float = 1e-3,
-    start: tuple[float, float, float] = (0.14, 0.0, 0.0),
-    inertia_kgm2: float = 2e-3,
-    gear_ratio: float = 20.0,
-    inductance_h: float = 1e-3,
-    supply_v: float = 12.0,
-) -> NDArray[np.float64]:
-    """Simulate the smooth throttle: RK4, one step per sample, duty held.
-
-    Parameters
-    ----------
-    duty : array_like, shape (n,)
-        Duty [-].
-    parameters : array_like, shape (10,), optional
-        In the order of ``mgdd._core.smooth_throttle_names``; an example throttle without.
-    step_s : float
-        Sample time [s].
-    start : tuple of float
-        Angle [rad], speed [rad/s] and current [A] at the first sample.
+    parameters : mapping of str to float, optional
+        The ten of ``mgdd._core.smooth_throttle_names`` (SI, rad); an example throttle without.
     inertia_kgm2, gear_ratio, inductance_h, supply_v : float
-        Constants [kg m², -, H, V].
-
-    Returns
-    -------
-    ndarray, shape (n,)
-        Angle [deg].
+        Known constants [kg m², -, H, V].
 
     Raises
     ------
     ParameterError
-        A constant that is not positive.
+        A parameter that is missing or unknown.
 
     Examples
     --------
-    >>> from mgdd.identify import simulate_smooth_throttle
-    >>> simulate_smooth_throttle([0.0] * 5).round(3).tolist()
+    >>> import numpy as np
+    >>> from mgdd.identify import SmoothThrottle
+    >>> run = SmoothThrottle().simulate({"time_s": 1e-3 * np.arange(5), "duty": np.zeros(5)})
+    >>> run["angle_deg"].values.round(3).tolist()
     [8.021, 8.021, 8.021, 8.021, 8.021]
     """
-    values = _core.smooth_throttle_example if parameters is None else parameters
-    return _core.simulate_smooth_throttle(
-        _ten(values, "parameters"),
-        np.asarray(duty, dtype=np.float64),
-        step_s=step_s,
-        start=list(start),
-        inertia_kgm2=inertia_kgm2,
-        gear_ratio=gear_ratio,
-        inductance_h=inductance_h,
-        supply_v=supply_v,
-    )
+
+    input_names = ("duty",)
+    output_name = "angle_deg"
+    state_names = ("angle_rad", "speed_rad_per_s", "current_a")
+
+    parameters: Mapping[str, float] = field(default_factory=lambda: dict(_EXAMPLE))
+    inertia_kgm2: float = 2e-3
+    gear_ratio: float = 20.0
+    inductance_h: float = 1e-3
+    supply_v: float = 12.0
+
+    def __post_init__(self) -> None:
+        odd = set(self.parameters) ^ set(_EXAMPLE)
+        if odd:
+            raise ParameterError(
+                f"parameters: {', '.join(sorted(odd))} missing or unknown: must be {', '.join(_EXAMPLE)}"
+            )
+        ordered = {name: float(self.parameters[name]) for name in _EXAMPLE}
+        object.__setattr__(self, "parameters", MappingProxyType(ordered))
+
+    @property
+    def kind(self) -> str:
+        """``smooth``."""
+        return "smooth"
+
+    @property
+    def constants(self) -> dict[str, float]:
+        """The known constants by name."""
+        return {name: getattr(self, name) for name in ("inertia_kgm2", "gear_ratio", "inductance_h", "supply_v")}
+
+    def _rest(self) -> list[float]:
+        return [_START_RAD, 0.0, 0.0]
+
+    def _run(self, run: RunInputs) -> NDArray[np.float64]:
+        values = list(self.parameters.values())
+        return _core.simulate_smooth_throttle(
+            values, run.columns[0], step_s=run.step_s, start=run.state, **self.constants
+        )
 
 
 def fit_smooth_throttle(
-    duty: ArrayLike,
-    angle_deg: ArrayLike,
+    record: Any,
     *,
-    starts: ArrayLike,
+    start_values: ArrayLike,
     lower: ArrayLike,
     upper: ArrayLike,
-    step_s: float = 1e-3,
-    start: tuple[float, float, float] = (0.14, 0.0, 0.0),
-    inertia_kgm2: float = 2e-3,
-    gear_ratio: float = 20.0,
-    inductance_h: float = 1e-3,
-    supply_v: float = 12.0,
-    cost_tolerance: float = 1e-9,
+    initial_state: Mapping[str, float] | Sequence[float] | None = None,
+    model: SmoothThrottle | None = None,
+    options: FitOptions | None = None,
     lanes: bool = True,
-) -> SmoothThrottleFit:
+) -> Fit:
     """Fit the ten parameters of the smooth throttle to a record of duty and angle.
 
     Levenberg-Marquardt on the output error of the free run with exact sensitivities, in four stages: a twentieth of
@@ -129,27 +109,27 @@ def fit_smooth_throttle(
 
     Parameters
     ----------
-    duty, angle_deg : array_like, shape (n,)
-        Record on a constant sample time [-, deg].
-    starts : array_like, shape (n_starts, 10) or (10,)
+    record : xarray.Dataset, DataFrame or mapping of columns
+        ``duty`` [-] and ``angle_deg`` [deg] over an evenly spaced ``time_s`` [s].
+    start_values : array_like, shape (n_starts, 10) or (10,)
         In the order of ``mgdd._core.smooth_throttle_names`` (SI, rad).
     lower, upper : array_like, shape (10,)
         Bounds, positive.
-    step_s : float
-        Sample time [s].
-    start : tuple of float
-        Known angle [rad], speed [rad/s] and current [A] at the first sample.
-    inertia_kgm2, gear_ratio, inductance_h, supply_v : float
-        Known constants [kg m², -, H, V].
-    cost_tolerance : float
-        Relative decrease of the cost that ends the last stage [-].
+    initial_state : mapping of str to float, or sequence of float, optional
+        Known ``angle_rad``, ``speed_rad_per_s`` and ``current_a`` at the first sample; that of `SmoothThrottle`
+        without.
+    model : SmoothThrottle, optional
+        Its constants are taken; those of an example throttle without.
+    options : FitOptions, optional
+        A tolerance of 1e-9 of the last stage where nothing else is said; the other options have no effect here and are
+        refused.
     lanes : bool
         Several starts at once; False takes one after the other and gives the same numbers.
 
     Returns
     -------
-    SmoothThrottleFit
-        Reports of all starts.
+    mgdd.results.Fit
+        The best start, and the reports of all (without their residual).
 
     Raises
     ------
@@ -168,38 +148,51 @@ def fit_smooth_throttle(
     --------
     >>> import numpy as np
     >>> from mgdd import _core
-    >>> from mgdd.identify import fit_smooth_throttle, simulate_smooth_throttle
+    >>> from mgdd.identify import SmoothThrottle, fit_smooth_throttle
     >>> levels = 0.7 * np.random.default_rng(1).random(100) - 0.35
-    >>> duty = np.repeat(levels, 80)
-    >>> truth = np.array(_core.smooth_throttle_example)
-    >>> angle = simulate_smooth_throttle(duty) + np.random.default_rng(2).normal(0.0, 0.05, duty.size)
-    >>> fit = fit_smooth_throttle(duty, angle, starts=1.1 * truth, lower=0.1 * truth, upper=10 * truth)
+    >>> time, truth = 1e-3 * np.arange(8000), np.array(_core.smooth_throttle_example)
+    >>> log = SmoothThrottle().simulate({"time_s": time, "duty": np.repeat(levels, 80)})
+    >>> log["angle_deg"] = log["angle_deg"] + np.random.default_rng(2).normal(0.0, 0.05, time.size)
+    >>> fit = fit_smooth_throttle(log, start_values=1.1 * truth, lower=0.1 * truth, upper=10 * truth)
     >>> bool(fit.report.rmse < 0.051)
     True
     """
-    table = np.atleast_2d(np.asarray(starts, dtype=np.float64))
+    chosen = fit_options(options, tolerance=1e-9)
+    table = np.atleast_2d(np.asarray(start_values, dtype=np.float64))
     if table.ndim != 2 or table.shape[1] != 10:
-        raise ShapeError(f"starts has shape {table.shape}: must be (n_starts, 10)")
+        raise ShapeError(f"start_values has shape {table.shape}: must be (n_starts, 10)")
+    plant = model or SmoothThrottle()
+    time, duty, angle = columns_of(record, ("time_s", "duty", "angle_deg"))
+    state = plant.state_of(initial_state)
     found = _core.fit_smooth_throttle(
-        np.asarray(duty, dtype=np.float64),
-        np.asarray(angle_deg, dtype=np.float64),
+        duty,
+        angle,
         starts=table.tolist(),
         lower=_ten(lower, "lower"),
         upper=_ten(upper, "upper"),
-        step_s=step_s,
-        start=list(start),
-        inertia_kgm2=inertia_kgm2,
-        gear_ratio=gear_ratio,
-        inductance_h=inductance_h,
-        supply_v=supply_v,
-        cost_tolerance=cost_tolerance,
+        step_s=even_step(time),
+        start=state,
+        **plant.constants,
+        cost_tolerance=chosen.tolerance,
         lanes=lanes,
     )
-    return SmoothThrottleFit(
-        reports=tuple(FitReport.from_core(report) for report in found["reports"]),
-        best=found["best"],
-        n_reached=found["n_reached"],
-        n_sweeps=found["n_sweeps"],
+    reports = tuple(FitReport.from_core(report) for report in found["reports"])
+    best = reports[found["best"]]
+    fitted = replace(plant, parameters=dict(zip(_EXAMPLE, best.values.tolist(), strict=True)))
+    modelled = fitted.simulate(record, initial_state=state)["angle_deg"].to_numpy()
+    run = fit_run(time, angle, modelled, VARIABLES["angle_deg"]) if np.isfinite(modelled).all() else None
+    return Fit(
+        report=best,
+        model=fitted,
+        kind=fitted.kind,
+        train=None if run is None else quality_of(run),
+        findings=best.findings,
+        unidentifiable=best.unidentifiable,
+        start_rmse=tuple(sorted(report.rmse for report in reports)),
+        n_best=int(found["n_reached"]),
+        start_reports=reports,
+        run=run,
+        draw=draw_run,
     )
 
 

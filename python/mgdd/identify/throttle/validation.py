@@ -9,22 +9,19 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from mgdd.identify.throttle.fit import ThrottleFit, ThrottleModel
+from mgdd.identify.throttle.free_run import columns_of, discarded, free_run, quality_of, source_of
 from mgdd.identify.throttle.n_step import n_step_rms, samples_of, whole_horizons
 from mgdd.identify.throttle.prior import prior_of
-from mgdd.identify.throttle.quality import columns_of, discarded, free_run
 from mgdd.identify.throttle.record_content import open_questions, record_content
 from mgdd.io import check_throttle_log
-from mgdd.results import labelled_dataset
+from mgdd.results import Finding, Fit, FitQuality, FitReport, Model
 from mgdd.signals.even_grid import even_step
-from mgdd.signals.metrics import ResidualTests, fit_percent, mse, residual_tests, rmse, vaf_percent
+from mgdd.signals.metrics import ResidualTests, residual_tests, vaf_percent
 
 if TYPE_CHECKING:
     import xarray as xr
 
-    from mgdd.optimize import FitReport
-
-__all__ = ["ThrottleValidation", "correlation_dataset", "validate_throttle"]
+__all__ = ["ThrottleValidation", "entangled", "validate_throttle"]
 
 _CORRELATED = 0.98
 _GOOD_PERCENT = 85.0
@@ -38,43 +35,39 @@ class ThrottleValidation:
     ----------
     kind : str
         Kind of the model.
-    fit_percent, vaf_percent : float
-        Of the free run [%], without its first 50 ms.
-    rmse_deg : float
-        Error of the free run [deg].
-    mse_deg2 : float
-        Its square [deg²].
+    quality : FitQuality
+        Of the free run, without its first 50 ms.
+    vaf_percent : float
+        Variance accounted for by the same run [%].
     n_step : xarray.Dataset
         ``n_step_rms_deg`` [deg] of the model and of "stays where it is" over ``horizon_s`` [s].
     tests : ResidualTests
         On the one-step residuals.
     free_run : xarray.Dataset
         ``duty``, ``angle_deg``, ``model_deg`` and ``residual_deg`` over ``time_s``.
-    findings : tuple of str
+    findings : tuple of Finding
         What to distrust, what the log cannot tell, and which excitation would.
     source : str
         Name of the log.
 
     Examples
     --------
-    >>> from mgdd.identify import ThrottleValidation
-    >>> "fit_percent" in ThrottleValidation.__dataclass_fields__
+    >>> from mgdd.identify.throttle.validation import ThrottleValidation
+    >>> "quality" in ThrottleValidation.__dataclass_fields__
     True
     """
 
     kind: str
-    fit_percent: float
+    quality: FitQuality
     vaf_percent: float
-    rmse_deg: float
-    mse_deg2: float
     n_step: xr.Dataset = field(repr=False)
     tests: ResidualTests = field(repr=False)
     free_run: xr.Dataset = field(repr=False)
-    findings: tuple[str, ...] = ()
+    findings: tuple[Finding, ...] = ()
     source: str = "log"
 
     def summary(self) -> str:
-        """Say it in a few lines.
+        """Return a short summary.
 
         Returns
         -------
@@ -82,8 +75,9 @@ class ThrottleValidation:
             Free run, n steps ahead, residual tests, findings.
         """
         rows = [
-            f"{self.kind} on {self.source}: free-run fit {self.fit_percent:.2f} %, VAF {self.vaf_percent:.2f} %",
-            f"free-run error {self.rmse_deg:.4g} deg RMS, {self.mse_deg2:.4g} deg² mean square",
+            f"{self.kind} on {self.source}: free-run fit {self.quality.nrmse_fit_percent:.2f} %, VAF "
+            f"{self.vaf_percent:.2f} %",
+            f"free-run error {self.quality.rmse:.4g} deg RMS, {self.quality.rmse**2:.4g} deg² mean square",
         ]
         for horizon, pair in zip(self.n_step["horizon_s"].to_numpy(), self._growth(), strict=True):
             rows.append(f"{1e3 * horizon:4.0f} ms ahead {pair[0]:.4g} deg RMS (staying there: {pair[1]:.4g})")
@@ -102,17 +96,24 @@ class ThrottleValidation:
         dict
             With ``n_step_rms`` by horizon in milliseconds.
         """
-        names = ("kind", "source", "fit_percent", "vaf_percent", "rmse_deg", "mse_deg2")
+        figures = {
+            "kind": self.kind,
+            "source": self.source,
+            "fit_percent": self.quality.nrmse_fit_percent,
+            "vaf_percent": self.vaf_percent,
+            "rmse_deg": self.quality.rmse,
+            "mse_deg2": self.quality.rmse**2,
+        }
         horizons = [f"{1e3 * h:g}" for h in self.n_step["horizon_s"].to_numpy()]
         growth = self._growth()
-        return {name: getattr(self, name) for name in names} | {
+        return figures | {
             "n_step_rms": {h: pair[0] for h, pair in zip(horizons, growth, strict=True)},
             "n_step_rms_persistence": {h: pair[1] for h, pair in zip(horizons, growth, strict=True)},
             "residual_white": self.tests.white,
             "residual_independent": self.tests.independent,
             "share_white": self.tests.share_white,
             "share_independent": self.tests.share_independent,
-            "findings": list(self.findings),
+            "findings": [str(finding) for finding in self.findings],
         }
 
     def _growth(self) -> list[list[float]]:
@@ -123,7 +124,7 @@ class ThrottleValidation:
 
 
 def validate_throttle(
-    model: ThrottleModel | ThrottleFit,
+    model: Model | Fit,
     log: xr.Dataset,
     *,
     horizons_s: Sequence[float] | None = None,
@@ -133,7 +134,7 @@ def validate_throttle(
 
     Parameters
     ----------
-    model : ThrottleModel or ThrottleFit
+    model : Model or Fit
         The model; a fit also says which of its parameters are entangled.
     log : xarray.Dataset
         The log.
@@ -157,24 +158,15 @@ def validate_throttle(
     Examples
     --------
     >>> import numpy as np
-    >>> from mgdd.identify import validate_throttle
-    >>> from mgdd.io import throttle_log
-    >>> class Still:
-    ...     kind, parameters = "pw_r", {}
-    ...     def simulate(self, time_s, duty, *, start_deg):
-    ...         return np.full(len(time_s), start_deg)
-    ...     def predict(self, time_s, duty, angle_deg, horizon):
-    ...         return np.asarray(angle_deg)[:-horizon]
-    ...     def to_toml(self):
-    ...         return ""
-    >>> time = np.arange(2000) * 1e-3
-    >>> log = throttle_log(time, 0.2 * np.sin(6.0 * time), 20.0 + 15.0 * np.sin(6.0 * time))
-    >>> validate_throttle(Still(), log).fit_percent < 1.0
-    True
+    >>> from mgdd.identify import FirstPrincipleModel, validate_throttle
+    >>> model, time = FirstPrincipleModel(), np.arange(2000) * 1e-3
+    >>> log = model.simulate({"time_s": time, "duty": 0.2 * np.sin(6.0 * time)})
+    >>> validate_throttle(model, log).quality.nrmse_fit_percent
+    100.0
     """
     check_throttle_log(log)
-    fit = model if isinstance(model, ThrottleFit) else None
-    own = model.model if isinstance(model, ThrottleFit) else model
+    fit = model if isinstance(model, Fit) else None
+    own = model.model if isinstance(model, Fit) else model
     time, duty, angle = columns_of(log)
     step = even_step(time)
     horizons_s = whole_horizons(step, time.size) if horizons_s is None else horizons_s
@@ -183,25 +175,23 @@ def validate_throttle(
     run = free_run(own, log)
     skip = discarded(step, time.size)
     measured, modelled = angle[skip:], run["model_deg"].to_numpy()[skip:]
-    one = angle[1:] - np.asarray(own.predict(time, duty, angle, 1), dtype=np.float64)
+    one = angle[1:] - own.predict(log, 1)["angle_deg"].to_numpy()
     tests = residual_tests(one[skip:], duty[:-1][skip:])
     known = prior_of(own)
     limp_home = known.limp_home_deg if limp_home_deg is None else limp_home_deg
     content = record_content(time, angle, limp_home_deg=limp_home, stops_deg=known.stops_deg)
-    fitted = fit_percent(measured, modelled)
-    notes = _notes(fitted, tests)
+    quality = quality_of(run)
+    notes = _notes(quality, tests)
     pairs = entangled(fit.report) if fit is not None else ()
     return ThrottleValidation(
         kind=own.kind,
-        fit_percent=fitted,
+        quality=quality,
         vaf_percent=vaf_percent(measured, modelled),
-        rmse_deg=rmse(measured, modelled),
-        mse_deg2=mse(measured, modelled),
         n_step=n_step_rms(own, log, horizons_s=horizons_s),
         tests=tests,
         free_run=run,
         findings=(*notes, *open_questions(content, swing=known.swing, pairs=pairs)),
-        source=str(log.attrs.get("file", "log")),
+        source=source_of(log),
     )
 
 
@@ -216,47 +206,26 @@ def entangled(report: FitReport) -> tuple[tuple[str, str, float], ...]:
     )
 
 
-def correlation_dataset(report: FitReport) -> xr.Dataset:
-    """Give the correlation of the estimates of a fit as a labelled matrix.
-
-    Parameters
-    ----------
-    report : mgdd.optimize.FitReport
-        The report of a fit.
-
-    Returns
-    -------
-    xarray.Dataset
-        ``correlation`` [-] over ``parameter`` and ``other``; NaN for parameters at a bound.
-
-    Examples
-    --------
-    >>> from mgdd.identify import correlation_dataset
-    >>> from mgdd.optimize import least_squares
-    >>> report = least_squares(lambda x: ([x[0] - 1.0, x[1], x[0] + x[1]], [[1, 0], [0, 1], [1, 1]]), [0.0, 0.0])
-    >>> round(float(correlation_dataset(report)["correlation"][0, 1]), 3)
-    -0.5
-    """
-    names = list(report.names)
-    return labelled_dataset(
-        {
-            "parameter": ("parameter", names, "-", "parameter"),
-            "other": ("other", names, "-", "parameter"),
-            "correlation": (("parameter", "other"), np.asarray(report.correlation), "-", "correlation"),
-        }
-    )
-
-
-def _notes(fitted: float, tests: ResidualTests) -> list[str]:
+def _notes(quality: FitQuality, tests: ResidualTests) -> list[Finding]:
     out = []
+    fitted = math.nan if quality.nrmse_fit_percent is None else quality.nrmse_fit_percent
     if fitted < _GOOD_PERCENT:
         out.append(
-            f"the free run reaches {fitted:.1f} %, below the {_GOOD_PERCENT:g} % that a throttle model should: look at "
-            "the overlay for a wrong sign, delay or side, or take a model with friction (pw_r, first_principle)"
+            Finding(
+                "poor_free_run",
+                (),
+                f"the free run reaches {fitted:.1f} %, below the {_GOOD_PERCENT:g} % that a throttle model should",
+                "look at the overlay for a wrong sign, delay or side, or take a model with friction (pw_r, "
+                "first_principle)",
+            )
         )
     if not tests.white:
         out.append(
-            "the one-step residual has memory: usual near stiction, where it is no reason to reject; standard errors, "
-            "which take it as white, are too small"
+            Finding(
+                "residual_not_white",
+                (),
+                "the one-step residual has memory: usual near stiction, where it is no reason to reject; standard "
+                "errors, which take it as white, are too small",
+            )
         )
     return out

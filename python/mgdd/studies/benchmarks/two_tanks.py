@@ -10,7 +10,7 @@ import numpy as np
 
 from mgdd import _core
 from mgdd.errors import DataError, ParameterError
-from mgdd.optimize import FitReport
+from mgdd.results import FitReport
 from mgdd.signals.even_grid import even_step
 
 if TYPE_CHECKING:

@@ -10,11 +10,13 @@ import numpy as np
 
 from mgdd import _core
 from mgdd.errors import ShapeError
-from mgdd.results import to_jsonable
+from mgdd.results.finding import Finding, findings_html
+from mgdd.results.labels import labelled_dataset, to_jsonable
 
 if TYPE_CHECKING:
     from collections.abc import Sequence
 
+    import xarray as xr
     from numpy.typing import ArrayLike, NDArray
 
 __all__ = ["FitReport"]
@@ -43,15 +45,15 @@ class FitReport:
         Of the free parameters; NaN rows and columns for those at a bound.
     unidentifiable : tuple of str
         Names the data do not determine: at a bound, correlated beyond the limit, or in a null direction.
-    findings : tuple of str
-        One sentence per reason behind `unidentifiable`.
+    findings : tuple of Finding
+        One per reason behind `unidentifiable`: ``at_bound``, ``null_direction`` or ``correlated``.
     null_directions : ndarray, shape (n, k)
         Parameter changes, largest entry 1, that leave the residual as it is.
     rmse : float
         Root mean square of the residual, in its unit.
     cost : float
         Half the sum of squares.
-    fit_percent : float or None
+    nrmse_fit_percent : float or None
         100 (1 - norm(residual) / norm(data - mean)), None without data [%].
     residual : ndarray, shape (n_residuals,)
         Residual at `values`; also as `fun`.
@@ -69,7 +71,7 @@ class FitReport:
 
     See Also
     --------
-    least_squares : makes one.
+    mgdd.optimize.least_squares : makes one.
 
     References
     ----------
@@ -91,11 +93,11 @@ class FitReport:
     covariance: NDArray[np.float64]
     correlation: NDArray[np.float64]
     unidentifiable: tuple[str, ...]
-    findings: tuple[str, ...]
+    findings: tuple[Finding, ...]
     null_directions: NDArray[np.float64]
     rmse: float
     cost: float
-    fit_percent: float | None
+    nrmse_fit_percent: float | None
     residual: NDArray[np.float64]
     nfev: int
     njev: int
@@ -114,7 +116,7 @@ class FitReport:
         core_report : _core.FitReport
             As any fit of the core returns it.
         data : array_like, shape (n_residuals,), optional
-            What the residual was compared with, in the unit of the residual; gives `fit_percent`.
+            What the residual was compared with, in the unit of the residual; gives `nrmse_fit_percent`.
 
         Returns
         -------
@@ -143,11 +145,11 @@ class FitReport:
             covariance=_frozen(core_report.covariance),
             correlation=_frozen(core_report.correlation),
             unidentifiable=tuple(core_report.unidentifiable),
-            findings=tuple(core_report.findings),
+            findings=_classified(core_report),
             null_directions=_frozen(core_report.null_directions),
             rmse=core_report.rmse,
             cost=core_report.cost,
-            fit_percent=None if data is None else _fit_percent(residual, data),
+            nrmse_fit_percent=None if data is None else _fit_percent(residual, data),
             residual=residual,
             nfev=core_report.nfev,
             njev=core_report.njev,
@@ -211,15 +213,46 @@ class FitReport:
         >>> json.loads(json.dumps(FitReport.from_core(_core.FitReport()).to_dict()))["cost"] is None
         True
         """
-        return {field: to_jsonable(getattr(self, field)) for field in self.__dataclass_fields__ if field != "residual"}
+        own = [field for field in self.__dataclass_fields__ if field not in ("residual", "findings")]
+        plain = {field: to_jsonable(getattr(self, field)) for field in own}
+        return plain | {"findings": [finding.to_dict() for finding in self.findings]}
+
+    def to_dataset(self) -> xr.Dataset:
+        """Tabulate the estimates and their correlation.
+
+        Returns
+        -------
+        xarray.Dataset
+            ``value``, ``stderr``, ``lower``, ``upper`` and ``bound_active`` over ``parameter``, and ``correlation`` [-]
+            over ``parameter`` and ``other``; NaN for parameters at a bound.
+
+        Examples
+        --------
+        >>> from mgdd.optimize import least_squares
+        >>> report = least_squares(lambda x: ([x[0] - 1.0, x[1], x[0] + x[1]], [[1, 0], [0, 1], [1, 1]]), [0.0, 0.0])
+        >>> round(float(report.to_dataset()["correlation"][0, 1]), 3)
+        -0.5
+        """
+        names, own = list(self.names), "unit of the parameter"
+        return labelled_dataset(
+            {
+                "parameter": ("parameter", names, "-", "parameter"),
+                "other": ("other", names, "-", "parameter"),
+                "value": ("parameter", self.values, own, "estimate"),
+                "stderr": ("parameter", self.stderr, own, "standard error"),
+                "lower": ("parameter", self.lower, own, "lower bound"),
+                "upper": ("parameter", self.upper, own, "upper bound"),
+                "bound_active": ("parameter", self.bounds_active, "-", "bound reached: -1 lower, 1 upper"),
+                "correlation": (("parameter", "other"), self.correlation, "-", "correlation"),
+            }
+        )
 
     def _repr_html_(self) -> str:
         def line(cells: Sequence[str], tag: str) -> str:
             return "<tr>" + "".join(f"<{tag}>{html.escape(cell)}</{tag}>" for cell in cells) + "</tr>"
 
         body = "".join(line(row, "td") for row in self._rows())
-        findings = "".join(f"<li>{html.escape(finding)}</li>" for finding in self.findings)
-        notes = f"<p>not identifiable from these data:</p><ul>{findings}</ul>" if findings else ""
+        notes = findings_html("not identifiable from these data", self.findings)
         return (
             f"<div><p><b>{html.escape(self.status)}</b>: {html.escape(self.message)}<br>"
             f"{html.escape(self._numbers())}</p>"
@@ -227,7 +260,7 @@ class FitReport:
         )
 
     def _numbers(self) -> str:
-        fit = "" if self.fit_percent is None else f", fit {self.fit_percent:.4g} %"
+        fit = "" if self.nrmse_fit_percent is None else f", fit {self.nrmse_fit_percent:.4g} %"
         return (
             f"rmse {self.rmse:.6g}, cost {self.cost:.6g}{fit}; "
             f"{self.nit} iterations, {self.nfev} residual and {self.njev} Jacobian evaluations"
@@ -243,6 +276,37 @@ class FitReport:
                 remark = "not identifiable"
             rows.append((name, *(f"{number:.6g}" for number in numbers), remark))
         return rows
+
+
+def _classified(report: _core.FitReport) -> tuple[Finding, ...]:
+    """Give the sentences of the core their code and names; they stand in the order bounds, null directions, pairs."""
+    names, sentences = tuple(report.names), list(report.findings)
+    if not sentences:  # a fit that failed has bounds, but no uncertainty was described
+        return ()
+    reasons: list[tuple[str, tuple[str, ...]]] = [
+        ("at_bound", (name,)) for name, side in zip(names, report.bounds_active, strict=False) if side != 0
+    ]
+    null = np.asarray(report.null_directions)
+    reasons += [
+        ("null_direction", tuple(name for name, part in zip(names, column, strict=True) if part != 0.0))
+        for column in (null.T if null.ndim == 2 else ())
+    ]
+    reasons += [("correlated", pair) for pair in _strongest(report, len(sentences) - len(reasons))]
+    return tuple(Finding(code, own, text) for (code, own), text in zip(reasons, sentences, strict=True))
+
+
+def _strongest(report: _core.FitReport, count: int) -> list[tuple[str, str]]:
+    """Return the `count` most correlated pairs outside the null directions, in the order of the parameters."""
+    c, null = np.asarray(report.correlation), np.atleast_1d(np.asarray(report.null_directions))
+    loose = np.not_equal(null, 0.0).reshape(len(report.names), -1).any(axis=1)
+    pairs = [
+        (bool(loose[i] or loose[j]), -abs(c[i, j]), i, j)
+        for i in range(len(report.names))
+        for j in range(i + 1, len(report.names))
+        if np.isfinite(c[i, j])
+    ]
+    kept = sorted((i, j) for *_, i, j in sorted(pairs)[:count])
+    return [(report.names[i], report.names[j]) for i, j in kept]
 
 
 def _frozen(array: ArrayLike) -> NDArray[Any]:

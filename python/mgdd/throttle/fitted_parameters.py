@@ -8,10 +8,14 @@ import tomllib
 from collections.abc import Mapping
 from dataclasses import dataclass, field
 from types import MappingProxyType
+from typing import TYPE_CHECKING
 
 from mgdd.errors import DataError, ParameterError
 
-__all__ = ["KINDS", "FittedParameters", "unit_of"]
+if TYPE_CHECKING:
+    from mgdd.results import Fit
+
+__all__ = ["KINDS", "FittedParameters", "parameter_text", "unit_of"]
 
 KINDS = ("first_principle", "pw_r", "pw_w", "pw_p")
 # Endings of parameter names, longest first, and the unit they stand for.
@@ -67,7 +71,7 @@ class FittedParameters:
 
     Examples
     --------
-    >>> from mgdd.identify import FittedParameters
+    >>> from mgdd.throttle.fitted_parameters import FittedParameters
     >>> saved = FittedParameters(kind="pw_r", values={"tau_s": 0.0197}, source="fitted to ramp.csv")
     >>> FittedParameters.from_toml(saved.to_toml()) == saved
     True
@@ -168,3 +172,34 @@ class FittedParameters:
 
 def _text(value: str) -> str:
     return json.dumps(value, ensure_ascii=False)
+
+
+def parameter_text(
+    kind: str, values: Mapping[str, float], *, options: Mapping[str, str] | None = None, fit: Fit | None = None
+) -> str:
+    """Write a model as TOML; with a fit also its record, standard errors, quality and open parameters."""
+    if fit is None:
+        text = FittedParameters(kind=kind, values=values, source="model").to_toml()
+    else:
+        figures = {
+            "fit_percent_train": None if fit.train is None else fit.train.nrmse_fit_percent,
+            "fit_percent_test": None if fit.test is None else fit.test.nrmse_fit_percent,
+            "rmse_test_deg": None if fit.test is None else fit.test.rmse,
+        }
+        errors = fit.stderr
+        text = FittedParameters(
+            kind=kind,
+            values=values,
+            stderr={name: errors[own] for name in values if (own := _fitted_name(name, errors)) is not None},
+            source=f"fitted to {fit.source}",
+            fit={name: value for name, value in figures.items() if value is not None},
+            unidentifiable=fit.unidentifiable,
+        ).to_toml()
+    head, parameters = text.split("\n\n", 1)
+    return "\n".join([head, *(f"{name} = {_text(value)}" for name, value in (options or {}).items()), "", parameters])
+
+
+def _fitted_name(name: str, fitted: Mapping[str, float]) -> str | None:
+    """Return the fitted parameter that a model's parameter follows; sides that share one drop their prefix."""
+    shared = name.removeprefix("above_").removeprefix("below_")
+    return name if name in fitted else shared if shared in fitted else None
