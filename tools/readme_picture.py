@@ -14,7 +14,7 @@ import matplotlib as mpl
 import numpy as np
 
 from mgdd import datasets, presets
-from mgdd.engine import analyze, timing_sweep
+from mgdd.engine import analyze, find_optimum, timing_sweep
 from mgdd.identify import fit_cylinder
 from mgdd.identify.engine.records import CylinderFit
 

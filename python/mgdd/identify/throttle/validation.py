@@ -74,9 +74,9 @@ class ThrottleValidation:
         str
             Free run, n steps ahead, residual tests, findings.
         """
+        percent = self.quality.nrmse_fit_percent
         rows = [
-            f"{self.kind} on {self.source}: free-run fit {self.quality.nrmse_fit_percent:.2f} %, VAF "
-            f"{self.vaf_percent:.2f} %",
+            f"{self.kind} on {self.source}: free-run fit {percent:.2f} %, VAF {self.vaf_percent:.2f} %",
             f"free-run error {self.quality.rmse:.4g} deg RMS, {self.quality.rmse**2:.4g} deg² mean square",
         ]
         for horizon, pair in zip(self.n_step["horizon_s"].to_numpy(), self._growth(), strict=True):
