@@ -35,8 +35,8 @@ class FirstPrincipleModel(SampledModel):
     ----------
     parameters : mapping of str to float, optional
         Those of a typical passenger-car throttle without. ``tau_s``, ``gain_deg_per_s2_per_duty``, preload
-        ``beta_above_duty`` / ``beta_below_duty``, stiffness ``kappa_above_duty_per_deg`` / ``kappa_below_duty_per_deg``, friction
-        ``delta_duty``, ``limp_home_deg`` and ``electrical_s`` (L/R, 0 for none).
+        ``beta_above_duty`` / ``beta_below_duty``, stiffness ``kappa_above_duty_per_deg`` / ``kappa_below_duty_per_deg``,
+        friction ``delta_duty``, ``limp_home_deg`` and ``electrical_s`` (L/R, 0 for none).
     closed_deg, open_deg : float
         Mechanical stops [deg].
     ramp_deg : float
