@@ -56,8 +56,8 @@ def draw_timing(ax: Axes, fits: dict[float, CylinderFit]) -> None:
         efficiency = 100.0 * sweep["work_closed_j"] / load.fuel_heat_j
         ax.plot(sweep["soc_cad"], efficiency, dash, color=colour, label=f"wall-heat scale {scale:g}")
         top = find_optimum(load.cylinder, load.point, "imep_closed_bar", step_cad=0.25)
-        best.append(top.soc_cad)
-        ax.plot(top.soc_cad, float(efficiency.interp(soc_cad=top.soc_cad)), "o", color=colour, markersize=6)
+        best.append(top["soc_cad"])
+        ax.plot(top["soc_cad"], float(efficiency.interp(soc_cad=top["soc_cad"])), "o", color=colour, markersize=6)
     low, high = min(best), max(best)
     text = f"best: {low:.1f} to {high:.1f} °CA".replace("-", "−")
     ax.axvspan(low, high, color=ORANGE, alpha=0.25, linewidth=0, label=text)

@@ -36,8 +36,9 @@ _HD = "hd_diesel_128x144"
 # SHA-256 of every file that the package carries.
 _PACKAGED = {
     _HD: {
-        f"{_HD}_traces.csv": "549fbf964e04f38ebd90bdd6fced50d4e8ba8082dcbddd270a0414b2a04afe5a",
-        f"{_HD}_conditions.csv": "b2c35f1c6b1f200f6e7f3985e994451050137ff408f6f77e31b5a7bc1ac48b95",
+        f"{_HD}_traces.csv": "47e92d491a838de2aceeb7b84b62375613c465c5a109fae0122babf65024cadb",
+        f"{_HD}_conditions.csv": "599f36c318f968fd3894d1d44f56995ed7cad5e18daf19ef320f92532c5cb9a4",
+        f"{_HD}_SOURCE.txt": "23b966d613723032f57cb31ccafbfd6ebe920f3d95709b2e0901209f8c0f4e8a",
         f"{_HD}_LICENSE.txt": "ec423cc5506eea1ffbfc9955c3ec8f86139996963d84ff306a5ee41eda8a4ff1",
     }
 }
@@ -183,8 +184,8 @@ def load_hd_traces() -> list[xr.Dataset]:
 
     References
     ----------
-    F. Ramognino, LibICE-post, https://github.com/RamogninoF/LibICE-post, MIT licence; the CSV header gives
-    commit and files.
+    F. Ramognino, LibICE-post, https://github.com/RamogninoF/LibICE-post, MIT licence;
+    ``hd_diesel_128x144_SOURCE.txt`` gives commit, files and columns.
 
     Examples
     --------

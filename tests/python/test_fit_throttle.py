@@ -15,6 +15,7 @@ from mgdd.identify import (
     physical_parameters,
 )
 from mgdd.identify.throttle.first_principle_model import TYPICAL
+from mgdd.identify.throttle.first_principle_start import regression_start
 from mgdd.io import throttle_log
 from mgdd.optimize import FitOptions
 from mgdd.results import Model
@@ -58,6 +59,21 @@ def test_noise_free_log_gives_the_visited_side_back():
     for name in ("tau_s", "gain_deg_per_s2_per_duty", "beta_above_duty", "kappa_above_duty_per_deg", "delta_duty"):
         assert fit.parameters[name] == pytest.approx(TRUTH[name], rel=1e-5), name
     assert fit.train.nrmse_fit_percent > 99.99
+
+
+@pytest.mark.parametrize("amplitude", [0.25, 0.4])
+def test_the_start_leaves_out_windows_that_hold_a_reversal_or_a_rest(amplitude):
+    time = 1e-3 * np.arange(6000)
+    duty = 0.15 + amplitude * np.sin(2 * np.pi * 4.0 * time) + 0.1 * np.sin(2 * np.pi * 0.4 * time)
+    run = FirstPrincipleModel(parameters=TRUTH).simulate(
+        {"time_s": time, "duty": duty}, initial_state={"angle_deg": 40.0}
+    )
+    angle = run["angle_deg"].to_numpy()
+    known = dict(TYPICAL) | {"limp_home_deg": 8.0}
+    free = [name for name in TRUTH if name not in ("limp_home_deg", "electrical_s")]
+    found = regression_start(1e-3, duty, angle, known, free, 0.0, 90.0)
+    for name in ("tau_s", "gain_deg_per_s2_per_duty", "beta_above_duty", "delta_duty"):
+        assert found[name] == pytest.approx(TRUTH[name], rel=0.025), name
 
 
 def test_a_one_sided_log_names_the_other_side_and_an_excitation():

@@ -10,7 +10,7 @@ import pytest
 import xarray as xr
 
 from mgdd.errors import DataError, ParameterError
-from mgdd.identify import identify_throttle, load_throttle_model, validate_throttle
+from mgdd.identify import fit_throttle, identify_throttle, load_throttle_model, validate_throttle
 from mgdd.io import throttle_log
 from mgdd.optimize import FitOptions
 from mgdd.results import Model
@@ -68,6 +68,22 @@ def test_a_fit_says_how_good_it_is(kind: str, train: Any, test_log: Any, tmp_pat
     xr.testing.assert_identical(
         again.simulate(test_log, initial_state=start), fit.model.simulate(test_log, initial_state=start)
     )
+
+
+def test_a_lag_of_the_current_is_kept_only_where_it_pays() -> None:
+    signal = chirp(4.0, offset=0.01, amplitude=0.34, high_hz=5.0)
+    run = simulate(P1, signal["duty"], time_s=signal["time_s"])  # 1 ms of lag, worth 0.08 deg RMS
+    noise = np.random.default_rng(1).standard_normal(run.sizes["time_s"])
+    for noise_deg, kept in ((0.03, True), (0.25, True), (0.47, False)):
+        log = throttle_log(run["time_s"], run["duty"], run["angle_deg"] + noise_deg * noise)
+        without, with_lag = (
+            fit_throttle(log, electrical=lag, options=FitOptions(n_starts=1)).report.rmse for lag in (False, True)
+        )
+        assert with_lag < without
+        assert (with_lag < 0.97 * without) is kept
+        fit = identify_throttle(log, "first_principle", starts=1)
+        assert (fit.parameters["electrical_s"] > 0.0) is kept
+        assert fit.report.rmse == pytest.approx(with_lag if kept else without, rel=1e-9)
 
 
 def test_a_slow_opening_fits_itself_and_nothing_else(test_log: Any) -> None:

@@ -150,6 +150,57 @@ def test_a_validation_reports_free_run_and_steps_ahead() -> None:
     np.testing.assert_allclose(validation.free_run["residual_deg"], validation.free_run["model_deg"] - noisy)
 
 
+class Wrong(Proportional):
+    """A model that is right but for some samples, by as many degrees; both in the free run and ahead."""
+
+    def __init__(self, error_deg: np.ndarray) -> None:
+        super().__init__()
+        self.error_deg = error_deg
+
+    def simulate(self, time_s: Any, duty: Any, *, start_deg: float) -> np.ndarray:
+        return super().simulate(time_s, duty, start_deg=start_deg) + self.error_deg
+
+    def predict(self, time_s: Any, duty: Any, angle_deg: Any, horizon: int) -> np.ndarray:
+        right = super().simulate(time_s, duty, start_deg=angle_deg[0])
+        return np.asarray(right[horizon:] + self.error_deg[:-horizon])
+
+
+def test_the_first_50_ms_count_for_nothing_and_the_next_sample_counts() -> None:
+    def validated(first: int, last: int) -> identify.ThrottleValidation:
+        error = np.zeros(TIME.size)
+        error[first:last] = 6.0
+        # A little noise in the log keeps the residual tests defined.
+        noisy = log()["angle_deg"].to_numpy() + 1e-6 * np.sin(np.arange(TIME.size))
+        return identify.validate_throttle(Wrong(error), log(noisy))
+
+    start, later = validated(0, 50), validated(50, 51)
+    assert start.rmse_deg < 1e-5
+    assert start.fit_percent > 99.99
+    assert float(start.n_step["n_step_rms_deg"].sel(predictor="pw_r").max()) < 1e-5
+    counted = TIME.size - 50
+    assert later.rmse_deg == pytest.approx(6.0 / np.sqrt(counted), rel=1e-3)
+    for horizon, rms in zip((5, 20, 50), later.n_step["n_step_rms_deg"].sel(predictor="pw_r").to_numpy(), strict=True):
+        assert rms == pytest.approx(6.0 / np.sqrt(counted - horizon), rel=1e-3)
+
+
+def test_the_residual_is_compared_with_the_duty_that_was_held_while_it_arose() -> None:
+    duty = 0.1 * RNG.standard_normal(TIME.size).clip(-2.0, 2.0)
+    late = 3  # samples between the duty that the model misses and the one that is held
+    missed = np.zeros(TIME.size)
+    missed[late + 1 :] = 20.0 * duty[: -late - 1]
+    noise = 0.05 * RNG.standard_normal(TIME.size)
+
+    class Held(Proportional):
+        def predict(self, time_s: Any, duty: Any, angle_deg: Any, horizon: int) -> np.ndarray:
+            ahead = super().predict(time_s, duty, angle_deg, horizon)
+            return np.asarray(ahead - (missed + noise)[horizon:])
+
+    tests = identify.validate_throttle(Held(), log(duty=duty)).tests
+    correlation = tests.correlations["cross_correlation"]
+    assert float(correlation["lag"][int(np.argmax(np.abs(correlation.to_numpy())))]) == late
+    assert float(np.abs(correlation).max()) > 0.95
+
+
 def test_n_steps_can_be_compared_with_the_truth() -> None:
     noisy = log()["angle_deg"].to_numpy() + 0.05 * RNG.standard_normal(TIME.size)
     rms = identify.n_step_rms(Proportional(), log(noisy), true_deg=log()["angle_deg"])["n_step_rms_deg"]

@@ -7,7 +7,7 @@ import warnings
 import numpy as np
 import pytest
 
-from mgdd.loop import EngineBench, find_steady_optimum, monte_carlo
+from mgdd.loop import EngineBench, LoopCriteria, find_steady_optimum, monte_carlo
 from mgdd.optimize import BoundedSeeking, ExtremumSeeking, GoldenSection, GradientDescent, Limit, NewtonSeeking, Spsa
 
 SPACE = {"start": -20.0, "lower": -30.0, "upper": 10.0}
@@ -41,7 +41,7 @@ def run(name: str, upper: float, chosen: dict[str, object]) -> tuple[float, dict
         list(chosen.values()),
         SEEDS,
         cycles=CYCLES,
-        exceed_above={name: upper + 3.0 * best[f"scatter_{name}"]},
+        criteria=LoopCriteria(exceed_above={name: upper + 3.0 * best[f"scatter_{name}"]}),
     ).isel(bench=0)
     rows = {
         key: (table["exceeded_fraction"].values[i], table["mean_applied_cad"].values[i]) for i, key in enumerate(chosen)
@@ -63,7 +63,7 @@ def test_without_the_limit_the_same_seeds_exceed_it_nearly_always() -> None:
     assert best.free_inputs["soc_cad"] == pytest.approx(-5.63, abs=0.02)
     free = ExtremumSeeking(**SPACE, limits=[Limit("p_max_bar", 1000.0)])
     above = {"p_max_bar": 95.0 + 3.0 * best["scatter_p_max_bar"]}
-    table = monte_carlo(bench, free, SEEDS, cycles=CYCLES, exceed_above=above)
+    table = monte_carlo(bench, free, SEEDS, cycles=CYCLES, criteria=LoopCriteria(exceed_above=above))
     assert float(table["exceeded_fraction"].min()) > 0.9
 
 
@@ -104,9 +104,9 @@ def test_the_seeker_returns_below_the_limit_after_a_load_step() -> None:
     best = find_steady_optimum(bench, {"p_max_bar": upper}, cycle=1000)
     seeker = ExtremumSeeking(**SPACE, limits=[Limit("p_max_bar", upper)])
     above = {"p_max_bar": upper + 3.0 * best["scatter_p_max_bar"]}
-    table = monte_carlo(bench, seeker, SEEDS, cycles=2500, exceed_from=1150, exceed_above=above)
+    table = monte_carlo(bench, seeker, SEEDS, cycles=2500, criteria=LoopCriteria(exceed_from=1150, exceed_above=above))
     assert float(table["exceeded_fraction"].max()) < 0.01
-    before = monte_carlo(bench, seeker, SEEDS, cycles=1100, exceed_from=1000, exceed_above=above)
+    before = monte_carlo(bench, seeker, SEEDS, cycles=1100, criteria=LoopCriteria(exceed_from=1000, exceed_above=above))
     assert float(before["exceeded_fraction"].mean()) > 0.005  # the step does break it for some cycles
 
 

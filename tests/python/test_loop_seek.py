@@ -14,7 +14,7 @@ import xarray as xr
 
 from mgdd.engine import OperatingPoint, Performance
 from mgdd.errors import ParameterError
-from mgdd.loop import EngineBench, find_steady_optimum, monte_carlo, run_seeker, steady_map
+from mgdd.loop import EngineBench, LoopCriteria, find_steady_optimum, monte_carlo, run_seeker, steady_map
 from mgdd.optimize import ExtremumSeeking, GoldenSection, Limit, NewtonSeeking, Spsa
 from mgdd.results import check_labels
 
@@ -63,7 +63,9 @@ def test_one_run_is_its_pieces_is_ask_and_tell(kind: str) -> None:
 
 def test_labels_and_history_of_a_run() -> None:
     it = seeker("batch")
-    run = run_seeker(bench(), it, 200, optimum_cad=-2.0, exceed_above={"p_max_bar": 110.0}, exceed_from=100)
+    run = run_seeker(
+        bench(), it, 200, criteria=LoopCriteria(optimum=-2.0, exceed_above={"p_max_bar": 110.0}, exceed_from=100)
+    )
     check_labels(run.dataset)
     assert run.dataset.sizes["cycle"] == 200
     assert not run.interrupted
@@ -76,11 +78,13 @@ def test_labels_and_history_of_a_run() -> None:
 def test_monte_carlo_is_labelled_and_the_same_on_any_thread_count() -> None:
     plants = [EngineBench(), EngineBench(point=OperatingPoint(fuel_mg=30.0))]
     gains = [ExtremumSeeking(**SPACE, gain=g) for g in (0.5, 1.0)]
-    one = monte_carlo(plants, gains, range(6), cycles=300, optimum_cad=[-5.6, -8.5], threads=1)
-    two = monte_carlo(plants, gains, range(6), cycles=300, optimum_cad=[-5.6, -8.5], threads=2)
+    one = monte_carlo(plants, gains, range(6), cycles=300, threads=1, criteria=LoopCriteria(optimum=[-5.6, -8.5]))
+    two = monte_carlo(plants, gains, range(6), cycles=300, threads=2, criteria=LoopCriteria(optimum=[-5.6, -8.5]))
     check_labels(one)
     xr.testing.assert_identical(one, two)
-    alone = run_seeker(EngineBench(point=OperatingPoint(fuel_mg=30.0), seed=4), gains[1], 300, optimum_cad=-8.5)
+    alone = run_seeker(
+        EngineBench(point=OperatingPoint(fuel_mg=30.0), seed=4), gains[1], 300, criteria=LoopCriteria(optimum=-8.5)
+    )
     assert float(one["rms_cad"][1, 1, 4]) == alone.summary["rms_cad"]
 
 
@@ -162,7 +166,9 @@ def test_steady_map_is_quiet_and_labelled() -> None:
             r"limits of the seeker \[p_max_bar\] and of the bench \[\] differ",
         ),
         (
-            lambda: run_seeker(EngineBench(), GoldenSection(**SPACE), 5, exceed_above={"p_max_bar": 1.0}),
+            lambda: run_seeker(
+                EngineBench(), GoldenSection(**SPACE), 5, criteria=LoopCriteria(exceed_above={"p_max_bar": 1.0})
+            ),
             "exceed_above: .*p_max_bar",
         ),
         (lambda: monte_carlo([], ExtremumSeeking(**SPACE), [1], cycles=5), "benches is empty"),

@@ -27,7 +27,7 @@ from mgdd.io import (
 )
 from mgdd.loop import EngineBench, monte_carlo, run_seeker, steady_map
 from mgdd.results import check_labels, labelled_dataset
-from mgdd.rig import SimulatedRig, run_on_rig
+from mgdd.rig import SimulatedRig
 from mgdd.studies import run_measured_traces
 from mgdd.throttle import SensorFault, Throttle, groups, holding_duty, linear_part, sense, simulate_many
 from mgdd.throttle import simulate as simulate_throttle
@@ -63,7 +63,7 @@ def seeker() -> optimize.ExtremumSeeking:
 
 def rig_run() -> xr.Dataset:
     with SimulatedRig(EngineBench(seed=1)) as rig:
-        return run_on_rig(rig, seeker(), 20).dataset
+        return run_seeker(rig, seeker(), 20).dataset
 
 
 def learned() -> xr.Dataset:

@@ -8,7 +8,15 @@ import numpy as np
 import pytest
 
 from mgdd.errors import ParameterError, ShapeError
-from mgdd.loop import EngineBench, find_steady_optimum, monte_carlo, run_seeker, steady_map, summarize_cycles
+from mgdd.loop import (
+    EngineBench,
+    LoopCriteria,
+    find_steady_optimum,
+    monte_carlo,
+    run_seeker,
+    steady_map,
+    summarize_cycles,
+)
 from mgdd.optimize import (
     BoundedSeeking,
     ComponentLag,
@@ -20,7 +28,7 @@ from mgdd.optimize import (
     Spsa,
     tune,
 )
-from mgdd.rig import SimulatedRig, run_on_rig
+from mgdd.rig import SimulatedRig
 
 SPACE = {"start": -12.0, "lower": -30.0, "upper": 10.0}
 
@@ -42,7 +50,7 @@ def test_golden_section_finds_its_width_again() -> None:
     bench = EngineBench(point=OperatingPoint(speed_rpm=2500.0, fuel_mg=30.0))
     best = find_steady_optimum(bench)
     seeker = GoldenSection(start=-20.0, lower=-30.0, upper=10.0, noise_sd=0.25)
-    table = monte_carlo(bench, seeker, range(200), cycles=2000, optimum_cad=best["soc_cad"])
+    table = monte_carlo(bench, seeker, range(200), cycles=2000, criteria=LoopCriteria(optimum=best["soc_cad"]))
     assert np.abs(table["final_cad"].values - best["soc_cad"]).max() < 1.5
 
 
@@ -82,18 +90,18 @@ def test_criteria_that_say_nothing_are_refused_before_the_rig_moves() -> None:
     bench = EngineBench(limits=["p_max_bar"])
     rig, seeker = SimulatedRig(bench), ExtremumSeeking(**SPACE, limits=[Limit("p_max_bar", 95.0)])
     with pytest.raises(ParameterError, match=r"exceed_above: \['p_max'\]"):
-        run_on_rig(rig, seeker, 5, exceed_above={"p_max": 80.0})
+        run_seeker(rig, seeker, 5, criteria=LoopCriteria(exceed_above={"p_max": 80.0}))
     with pytest.raises(ParameterError, match="not all measured by the rig"):
-        run_on_rig(SimulatedRig(other := EngineBench()), seeker, 5)
+        run_seeker(SimulatedRig(other := EngineBench()), seeker, 5)
     with pytest.raises(ParameterError, match="wrap a bench in SimulatedRig"):
-        run_on_rig(bench, seeker, 5)  # type: ignore[arg-type]
+        run_seeker(bench, seeker, 5)  # type: ignore[arg-type]
     assert bench.cycle == other.cycle == seeker.cycle == 0
-    run = run_on_rig(rig, seeker, 5, exceed_from=0, exceed_above={"p_max_bar": 80.0})
+    run = run_seeker(rig, seeker, 5, criteria=LoopCriteria(exceed_from=0, exceed_above={"p_max_bar": 80.0}))
     assert run.summary["exceeded_fraction"] == 1.0
     with pytest.raises(ParameterError, match="p_max_bar = nan"):
-        summarize_cycles(run.dataset, exceed_above={"p_max_bar": float("nan")})
+        summarize_cycles(run.dataset, LoopCriteria(exceed_above={"p_max_bar": float("nan")}))
     with pytest.raises(ParameterError, match="exceed_above holds NaN"):
-        run_seeker(bench, seeker, 5, exceed_above={"p_max_bar": float("nan")})
+        run_seeker(bench, seeker, 5, criteria=LoopCriteria(exceed_above={"p_max_bar": float("nan")}))
 
 
 @pytest.mark.parametrize(
@@ -105,12 +113,12 @@ def test_criteria_that_say_nothing_are_refused_before_the_rig_moves() -> None:
             "-100 °CA aTDC: must be in",
         ),
         (
-            lambda: run_seeker(EngineBench(), ExtremumSeeking(**SPACE), 5, tail_cycles=0),
+            lambda: run_seeker(EngineBench(), ExtremumSeeking(**SPACE), 5, criteria=LoopCriteria(tail_cycles=0)),
             ParameterError,
             "tail_cycles = 0",
         ),
         (
-            lambda: run_seeker(EngineBench(), ExtremumSeeking(**SPACE), 5, arrival_cad=-1.0),
+            lambda: run_seeker(EngineBench(), ExtremumSeeking(**SPACE), 5, criteria=LoopCriteria(arrival=-1.0)),
             ParameterError,
             "arrival_cad",
         ),

@@ -12,6 +12,7 @@ import numpy as np
 
 from mgdd import datasets
 from mgdd.errors import DataError
+from mgdd.loop import SurrogatePlant, run_seeker
 from mgdd.results import labelled_dataset
 from mgdd.studies.base import Progress, StudyResult, check_seeds, run_parts
 from mgdd.studies.measured_engine_cases import (
@@ -146,21 +147,16 @@ def _surrogate() -> EngineSurrogate:
 
 
 def _run(surrogate: EngineSurrogate, case: Case, seeds: int, cycles: int) -> _Runs:
-    weights, limits = case.objective.weights, case.objective.limits
     estimate, outside = np.empty((seeds, cycles)), np.empty((seeds, cycles))
     signals = {name: np.empty((seeds, cycles)) for name in surrogate.signals}
     for seed in range(seeds):
-        seeker = seeker_of(case, seed)
         engine = SurrogateEngine(surrogate, start_soi_cad=START_CAD, seed=seed)
-        for cycle in range(cycles):
-            estimate[seed, cycle] = seeker.estimate[0]
-            reading = engine.step(float(seeker.ask()[0]))
-            terms = np.array([weight * reading[name] for name, weight in weights.items()])
-            told = terms if case.lags else terms.sum()
-            seeker.tell(told, [reading[name] for name in limits] if limits else None)
-            outside[seed, cycle] = not reading["supported"]
-            for name, column in signals.items():
-                column[seed, cycle] = reading[name]
+        plant = SurrogatePlant(engine, case.objective.weights, limits=list(case.objective.limits))
+        run = run_seeker(plant, seeker_of(case, seed), cycles).dataset
+        estimate[seed] = run["estimate"][:, 0]
+        outside[seed] = 1.0 - run["supported"]
+        for name, column in signals.items():
+            column[seed] = run[name]
     return _Runs(estimate=estimate, outside=outside, signals=signals)
 
 

@@ -10,7 +10,7 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from mgdd.loop import EngineBench, find_steady_optimum
+from mgdd.loop import EngineBench, LoopCriteria, find_steady_optimum
 from mgdd.optimize import (
     BoundedSeeking,
     ExtremumSeeking,
@@ -191,7 +191,11 @@ def _short(tuning: Tuning) -> str:
 def _run(contender: _Contender, best: Optimum, seeds: int) -> _Outcome:
     seeker = contender.seeker
     table = finished_loops(
-        EngineBench(), seeker, range(seeds), cycles=CYCLES, optimum_cad=best["soc_cad"], arrival_cad=ARRIVAL_CAD
+        EngineBench(),
+        seeker,
+        range(seeds),
+        cycles=CYCLES,
+        criteria=LoopCriteria(optimum=best["soc_cad"], arrival=ARRIVAL_CAD),
     )
 
     def make(seed: int) -> tuple[EngineBench, Any]:

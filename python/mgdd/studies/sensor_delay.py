@@ -10,7 +10,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from mgdd.engine import Performance
-from mgdd.loop import EngineBench, SensorDynamics, find_steady_optimum
+from mgdd.loop import EngineBench, LoopCriteria, SensorDynamics, find_steady_optimum
 from mgdd.optimize import ComponentLag, ExtremumSeeking, Optimum
 from mgdd.results import labelled_dataset, to_jsonable
 from mgdd.studies.base import Progress, StudyResult, check_seeds, run_parts
@@ -163,7 +163,9 @@ def _run_case(case: _Case, best: Optimum) -> tuple[dict[str, Any], float, NDArra
             hold_cycles=hold_cycles,
         )
 
-    run = run_finished(bench(), seeker(None), CYCLES, optimum_cad=best["soc_cad"], arrival_cad=ARRIVAL_CAD)
+    run = run_finished(
+        bench(), seeker(None), CYCLES, criteria=LoopCriteria(optimum=best["soc_cad"], arrival=ARRIVAL_CAD)
+    )
     settle = case.period * math.ceil((case.lag.delay_cycles + 20.0 * case.lag.lag_cycles) / case.period + 2.0)
     slope = _frozen_slope(bench(), seeker(settle + 2 * case.period), settle, case.period)
     stays = run.summary["cycles_stays"]
@@ -211,7 +213,7 @@ def _component_wise(
             components=[ComponentLag(), _ANALYSER],
         )
 
-    table = finished_loops(*make(0), range(seeds), cycles=CYCLES, optimum_cad=best["soc_cad"])
+    table = finished_loops(*make(0), range(seeds), cycles=CYCLES, criteria=LoopCriteria(optimum=best["soc_cad"]))
     row = {
         "case": "analyser, NOx demodulated with its own phase",
         "period_cycles": period,

@@ -10,7 +10,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from mgdd.engine import Performance
-from mgdd.loop import EngineBench, find_steady_optimum, steady_map
+from mgdd.loop import EngineBench, LoopCriteria, find_steady_optimum, steady_map
 from mgdd.optimize import ComponentLag, ExtremumSeeking, Limit, Optimum
 from mgdd.results import labelled_dataset, to_jsonable
 from mgdd.studies.base import Progress, StudyResult, check_seeds, run_parts
@@ -165,10 +165,7 @@ def _run(test: _Test, seeds: int, *, limited: bool = False) -> _Outcome:
         seeker,
         range(seeds),
         cycles=CYCLES,
-        optimum_cad=best["soc_cad"],
-        arrival_cad=ARRIVAL_CAD,
-        tail_cycles=TAIL,
-        exceed_above=above or None,
+        criteria=LoopCriteria(optimum=best["soc_cad"], arrival=ARRIVAL_CAD, tail_cycles=TAIL, exceed_above=above),
     )
     before = steady_map(bench, [test.start_cad])
     efficiency = 100.0 * float(before["efficiency_gross"][0])

@@ -94,13 +94,15 @@ class SurrogateEngine:
         self._sensor = steady.copy()
         self._row = self._left = self._cycles = 0
 
-    def step(self, soi_cad: float) -> dict[str, float | bool]:
+    def step(self, soi_cad: float, at: Mapping[str, float] | None = None) -> dict[str, float | bool]:
         """Run one cycle.
 
         Parameters
         ----------
         soi_cad : float
             Command of this cycle [°CA aTDC].
+        at : mapping of str to float, optional
+            Other inputs of this cycle, in their units, instead of the engine's own.
 
         Returns
         -------
@@ -113,7 +115,7 @@ class SurrogateEngine:
         mgdd.errors.ParameterError
             A command that is not finite, or outside the support with ``outside="raise"``; the engine has not moved.
         """
-        steady, supported = self._steady(soi_cad)
+        steady, supported = self._steady(soi_cad, at)
         if not supported and self._outside == "raise":
             raise ParameterError(f"soi_cad = {soi_cad:g}: outside the support of the records; stay inside")
         self._history = np.vstack([steady, self._history[:-1]])
@@ -159,8 +161,10 @@ class SurrogateEngine:
         self._history, self._sensor, self._generator = history, sensor, generator
         self._row, self._left, self._cycles = row, left, int(saved["cycles"])
 
-    def _steady(self, soi_cad: float) -> tuple[NDArray[np.float64], bool]:
-        values, supported = self.surrogate.evaluate(self.surrogate.points(np.array([float(soi_cad)]), self._at))
+    def _steady(self, soi_cad: float, at: Mapping[str, float] | None = None) -> tuple[NDArray[np.float64], bool]:
+        values, supported = self.surrogate.evaluate(
+            self.surrogate.points(np.array([float(soi_cad)]), {**self._at, **(at or {})})
+        )
         return values[0], bool(supported[0])
 
     def _residual(self) -> NDArray[np.float64]:

@@ -131,17 +131,12 @@ def sense(
         raise ParameterError(f"seed = {seed}: must be >= 0")
     time = run["time_s"].to_numpy()
     sample = even_step(time)
-    per_sensor = [("none", 0.0, 0.0), ("none", 0.0, 0.0)]
-    for fault in faults:
-        if per_sensor[fault.sensor - 1][0] != "none":
-            raise ParameterError(f"faults: sensor {fault.sensor} has two: give at most one per sensor")
-        per_sensor[fault.sensor - 1] = (fault.kind, fault.from_s, fault.size)
     raw = _core.sense_throttle(
         SensorPair() if sensors is None else sensors,
         run["angle_deg"].to_numpy(),
         sample_s=sample,
         seed=seed,
-        faults=per_sensor,
+        faults=fault_pair(faults),
     )
     onset = min((fault.from_s for fault in faults), default=0.0)
     latched = raw["fault"].any()
@@ -155,3 +150,13 @@ def sense(
         },
         attrs={"seed": seed, "faults": ", ".join(f"{f.kind} of sensor {f.sensor}" for f in faults)},
     )
+
+
+def fault_pair(faults: Sequence[SensorFault]) -> list[tuple[str, float, float]]:
+    """Give kind, onset [s] and size of the fault of each sensor; ParameterError for two of one sensor."""
+    per_sensor = [("none", 0.0, 0.0), ("none", 0.0, 0.0)]
+    for fault in faults:
+        if per_sensor[fault.sensor - 1][0] != "none":
+            raise ParameterError(f"faults: sensor {fault.sensor} has two: give at most one per sensor")
+        per_sensor[fault.sensor - 1] = (fault.kind, fault.from_s, fault.size)
+    return per_sensor

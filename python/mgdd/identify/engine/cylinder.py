@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+import os
 from collections.abc import Mapping, Sequence
 from dataclasses import replace
 from typing import TYPE_CHECKING, Any
@@ -14,6 +15,7 @@ from mgdd._core import Cylinder, OperatingPoint
 from mgdd.engine import analyze
 from mgdd.errors import DataError, ParameterError, ShapeError
 from mgdd.identify.engine.records import CylinderFit, Load, burn_law, load_table
+from mgdd.io.trace_forms import as_trace
 from mgdd.optimize.fit_options import FitOptions, fit_options
 from mgdd.results import ANGLE, Finding, FitQuality, FitReport, labelled_dataset
 
@@ -30,7 +32,7 @@ _RMSE_LIMIT_PERCENT = 2.0
 
 
 def fit_cylinder(
-    traces: Sequence[xr.Dataset],
+    traces: Sequence[Any],
     cylinder: Cylinder,
     *,
     free: Sequence[str] | None = None,
@@ -44,7 +46,7 @@ def fit_cylinder(
 
     Parameters
     ----------
-    traces : sequence of xarray.Dataset
+    traces : sequence of xarray.Dataset, or of any form of a trace that `mgdd.engine.analyze` takes
         ``pressure_bar(crank_angle_cad)`` each, absolute. Attributes ``speed_rpm``, ``trapped_mass_g`` and
         ``soi_cad`` are used where present; ``file`` names the trace. Samples outside IVC..EVO are dropped.
     cylinder : Cylinder
@@ -93,11 +95,12 @@ def fit_cylinder(
     >>> fit.report.success
     True
     """
+    names = default_free(cylinder) if free is None else tuple([free] if isinstance(free, str) else free)
+    if isinstance(traces, str | os.PathLike | Mapping) or hasattr(traces, "to_numpy") or hasattr(traces, "variables"):
+        raise ShapeError(f"traces is one {type(traces).__name__}: pass a list of traces, [trace] for a single one")
+    traces = [as_trace(trace) for trace in traces]
     if not traces:
         raise DataError("no traces: a calibration needs at least one")
-    names = default_free(cylinder) if free is None else tuple([free] if isinstance(free, str) else free)
-    if hasattr(traces, "variables"):
-        raise ShapeError("traces is one Dataset: pass a list of them, [trace] for a single one")
     labels = _labels(traces)
     measured = [_measured(trace, label, cylinder, point) for trace, label in zip(traces, labels, strict=True)]
     burns = _starts(measured, cylinder, start_values)

@@ -81,7 +81,7 @@ class WallHeatProfile:
 
 
 def wall_heat_profile(
-    traces: Sequence[xr.Dataset],
+    traces: Sequence[Any],
     fit: CylinderFit,
     *,
     scales: Sequence[float] = (0.0, 0.25, 0.5, 0.75, 1.0, 1.5, 2.0, 2.5),
@@ -95,7 +95,7 @@ def wall_heat_profile(
 
     Parameters
     ----------
-    traces : sequence of xarray.Dataset
+    traces : sequence of xarray.Dataset, or of any form of a trace that `mgdd.engine.analyze` takes
         As given to `fit_cylinder`.
     fit : mgdd.results.Fit
         A fit of `fit_cylinder` in which ``wall_heat_scale`` was free.
