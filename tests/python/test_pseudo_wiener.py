@@ -13,7 +13,7 @@ from mgdd.errors import DataError, ParameterError, ShapeError
 from mgdd.identify import OnlineUpdate, fit_pseudo_wiener
 from mgdd.optimize import FitOptions
 from mgdd.results import Model
-from mgdd.studies import run_throttle_pseudo_wiener
+from mgdd.studies.throttle_pseudo_wiener import run_throttle_pseudo_wiener
 from mgdd.throttle import PseudoWiener, Throttle
 
 TIME = np.arange(4000) * 1e-3

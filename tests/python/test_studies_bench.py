@@ -11,14 +11,10 @@ import pytest
 
 from mgdd.loop import EngineBench, find_steady_optimum
 from mgdd.results import check_labels
-from mgdd.studies import (
-    StudyResult,
-    available_studies,
-    run_nox_sensors,
-    run_seeker_comparison,
-    run_study,
-    run_timing_tests,
-)
+from mgdd.studies import StudyResult, available_studies, run_study
+from mgdd.studies.nox_sensors import run_nox_sensors
+from mgdd.studies.seeker_comparison import run_seeker_comparison
+from mgdd.studies.timing_tests import run_timing_tests
 
 
 @pytest.fixture(scope="module")

@@ -5,7 +5,8 @@ from __future__ import annotations
 import pytest
 
 from mgdd.results import check_labels
-from mgdd.studies import run_throttle_characteristics, run_throttle_first_principle
+from mgdd.studies.throttle_characteristics import run_throttle_characteristics
+from mgdd.studies.throttle_first_principle import run_throttle_first_principle
 
 
 @pytest.fixture(scope="module")

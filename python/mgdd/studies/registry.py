@@ -11,7 +11,8 @@ from mgdd.studies.base import Progress, StudyResult, check_seeds
 
 __all__ = ["available_studies", "run_study"]
 
-# One line per study: "my-name" is run_my_name of mgdd.studies.
+# One line per study: "my-name" is run_my_name of mgdd.studies.my_name, or of the module that stands below.
+_MODULES = {"identification-benchmarks": "benchmarks.identification_benchmarks"}
 _TITLES = {
     "measured-traces": "calibrate a cycle model to four measured traces and find their best timing",
     "throttle-characteristics": "holding-duty hysteresis, rate dependence and air flow of a throttle",
@@ -85,7 +86,8 @@ def run_study(
     """
     if name not in _TITLES:
         raise ParameterError(f"study {name!r}: must be one of {', '.join(_TITLES)}")
-    function = getattr(import_module("mgdd.studies"), f"run_{name.replace('-', '_')}")
+    own = name.replace("-", "_")
+    function = getattr(import_module(f"mgdd.studies.{_MODULES.get(name, own)}"), f"run_{own}")
     options: dict[str, Any] = {"quick": quick, "figures": figures}
     if progress is not None:
         options["progress"] = progress
