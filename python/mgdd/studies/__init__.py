@@ -1,7 +1,7 @@
 """Studies: whole pieces of work that end in a table, figures and a summary.
 
-`available_studies` lists them, `run_study` runs one by name; each is also a function, `run_<name>(...)`, that returns
-a `StudyResult`.
+`available_studies` lists them, `run_study` runs one by name and returns a `StudyResult`. `run_measured_traces` is the
+study of the user's own traces.
 """
 
 from __future__ import annotations
