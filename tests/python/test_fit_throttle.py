@@ -9,7 +9,6 @@ from mgdd import _core
 from mgdd.errors import DataError, ParameterError, ShapeError
 from mgdd.identify import (
     FirstPrincipleModel,
-    FittedParameters,
     ThrottleModel,
     fit_smooth_throttle,
     fit_throttle,
@@ -72,7 +71,7 @@ def test_a_two_sided_log_with_noise_gives_both_sides_and_predicts_another_log():
     assert fit.parameters["limp_home_deg"] == pytest.approx(8.0, abs=0.1)
     assert fit.fit_percent_train > 98.0
     assert fit.fit_percent_test > 90.0
-    assert FittedParameters.from_toml(fit.model.to_toml()).values == dict(fit.parameters)
+    assert FirstPrincipleModel.from_toml(fit.to_toml()) == fit.model
 
 
 def test_physical_numbers_come_back_from_either_known_number():

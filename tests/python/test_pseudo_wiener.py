@@ -91,10 +91,10 @@ def test_bad_input_says_what_and_leaves_things_alone() -> None:
         model.simulate(TIME, DUTY[:-1], start_deg=8.0)
     with pytest.raises(ParameterError, match="horizon = 0"):
         model.predict(TIME, DUTY, DUTY, 0)
-    with pytest.raises(DataError, match=r"unit = 'rad': must be 'deg'"):
+    with pytest.raises(ParameterError, match=r"unit = 'rad': must be 'deg'"):
         PseudoWiener.from_toml(model.to_toml().replace('"deg"', '"rad"'))
     with pytest.raises(DataError, match=r"no table \[parameters\]"):
-        PseudoWiener.from_toml('kind = "pw_r"')
+        PseudoWiener.from_toml('kind = "pw_r"\nformat = 1')
 
 
 def test_the_fit_recovers_a_model_of_its_own_kind() -> None:

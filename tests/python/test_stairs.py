@@ -10,8 +10,8 @@ import pytest
 
 CPP = "common > optimize > control > engine throttle > identify > guide > loop"
 PYTHON = (
-    "_core > errors > results presets > io plot > optimize > control > engine throttle > identify > guide"
-    " > loop sweep design datasets > maps > rig > studies > report > cli > __main__"
+    "_core > errors _units > results > io plot > presets > optimize > control > engine throttle > identify"
+    " > guide > loop sweep design datasets > maps > rig > studies > report > cli > __main__"
 )
 
 

@@ -21,12 +21,17 @@ from mgdd.identify.record_content import RecordContent
 from mgdd.identify.records import CylinderFit, LoadFit
 from mgdd.identify.response_surface import Support
 from mgdd.identify.sensor_lag import SensorLag
-from mgdd.identify.smooth_throttle import SmoothThrottleFit, fit_smooth_throttle, simulate_smooth_throttle
+from mgdd.identify.smooth_throttle import (
+    SmoothThrottleFit,
+    SmoothThrottleModel,
+    fit_smooth_throttle,
+    simulate_smooth_throttle,
+)
 from mgdd.identify.surrogate import EngineSurrogate, SignalModel
 from mgdd.identify.surrogate_engine import SurrogateEngine
 from mgdd.identify.surrogate_fit import fit_surrogate
 from mgdd.identify.surrogate_optimum import SurrogateOptimum
-from mgdd.identify.throttle_fit import FittedParameters, ThrottleFit, ThrottleModel
+from mgdd.identify.throttle_fit import ThrottleFit, ThrottleModel
 from mgdd.identify.throttle_fits import load_throttle_model
 from mgdd.identify.throttle_front import identify_throttle
 from mgdd.identify.throttle_validation import ThrottleValidation, correlation_dataset, validate_throttle
@@ -46,7 +51,6 @@ __all__ = [
     "EngineSurrogate",
     "ExcitationCheck",
     "FirstPrincipleModel",
-    "FittedParameters",
     "LinearApproximation",
     "LoadFit",
     "OdeFit",
@@ -58,6 +62,7 @@ __all__ = [
     "SensorLag",
     "SignalModel",
     "SmoothThrottleFit",
+    "SmoothThrottleModel",
     "Support",
     "SurrogateEngine",
     "SurrogateOptimum",

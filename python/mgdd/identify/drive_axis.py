@@ -10,6 +10,7 @@ import numpy as np
 
 from mgdd import _core
 from mgdd.errors import DataError, ParameterError, ShapeError
+from mgdd.io.parameters import ParameterFile, Parameters, entries, wanted
 from mgdd.optimize import FitReport
 
 if TYPE_CHECKING:
@@ -40,7 +41,7 @@ _FILTER_ORDER, _DECIMATION = 4, 10
 
 
 @dataclass(frozen=True, kw_only=True)
-class DriveModel:
+class DriveModel(Parameters):
     """A slide with mass, friction and offset, driven by a voltage.
 
     Parameters
@@ -104,6 +105,21 @@ class DriveModel:
                 input=drive,
                 dt_s=_spacing(time, drive),
             )
+        )
+
+    def to_parameters(self) -> ParameterFile:
+        """Give all parameters, as `to_toml` writes them."""
+        values = dict(zip(_core.DriveAxis.parameter_names, _row(self.parameters), strict=True))
+        tables = {"parameters": entries(values), "settings": entries({"force_n_per_v": float(self.force_n_per_v)})}
+        return ParameterFile(kind="drive", tables=tables)
+
+    @classmethod
+    def from_parameters(cls, file: ParameterFile) -> DriveModel:
+        """Make the slide of a file that `to_toml` wrote."""
+        file.expect(kinds=("drive",), tables=("parameters", "settings"))
+        return cls(
+            parameters=file.values("parameters", wanted(_core.DriveAxis.parameter_names)),
+            force_n_per_v=file.values("settings", wanted(("force_n_per_v",)))["force_n_per_v"],
         )
 
 

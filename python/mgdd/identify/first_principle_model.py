@@ -12,7 +12,7 @@ import numpy as np
 
 from mgdd import _core
 from mgdd.errors import DataError, ParameterError, ShapeError
-from mgdd.identify.throttle_fit import FittedParameters
+from mgdd.io.parameters import FIT_NOTES, ParameterFile, Parameters, Wanted, entries, wanted
 
 if TYPE_CHECKING:
     from numpy.typing import ArrayLike, NDArray
@@ -20,10 +20,11 @@ if TYPE_CHECKING:
 __all__ = ["FirstPrincipleModel"]
 
 GROUP_NAMES = tuple(_core.throttle_group_names)
+_SETTINGS = ("closed_deg", "open_deg", "ramp_deg", "substeps")
 
 
 @dataclass(frozen=True, kw_only=True)
-class FirstPrincipleModel:
+class FirstPrincipleModel(Parameters):
     """Throttle in groups: set-valued friction, springs with preload on both sides, motor as a torque source.
 
     Parameters
@@ -121,15 +122,19 @@ class FirstPrincipleModel:
         run = self.simulate(time_s, duty, start_deg=float(measured[0]))
         return measured[:-horizon] + run[horizon:] - run[:-horizon]
 
-    def to_toml(self) -> str:
-        """Write the parameters as TOML with their units.
+    def to_parameters(self) -> ParameterFile:
+        """Give groups and settings, as `to_toml` writes them."""
+        settings = {name: getattr(self, name) for name in _SETTINGS}
+        return ParameterFile(
+            kind=self.kind, tables={"parameters": entries(self.parameters), "settings": entries(settings)}
+        )
 
-        Returns
-        -------
-        str
-            TOML for `FittedParameters.from_toml`.
-        """
-        return FittedParameters(kind=self.kind, values=self.parameters, source="model").to_toml()
+    @classmethod
+    def from_parameters(cls, file: ParameterFile) -> FirstPrincipleModel:
+        """Make the model of a file that `to_toml` or a fit wrote."""
+        file.expect(kinds=("first_principle",), tables=("parameters", "settings", "fit?"), notes=FIT_NOTES)
+        settings = file.values("settings", {**wanted(_SETTINGS), "substeps": Wanted(form="integer")})
+        return cls(parameters=file.values("parameters", wanted(GROUP_NAMES)), **settings)
 
 
 def sample_step(time_s: ArrayLike, size: int) -> float:

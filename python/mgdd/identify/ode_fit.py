@@ -10,7 +10,9 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from mgdd import _core
+from mgdd._units import unit_of
 from mgdd.errors import DataError, ParameterError, ShapeError
+from mgdd.io.parameters import Entry, ParameterFile, Wanted, entries, wanted
 from mgdd.optimize import FitReport, least_squares
 
 if TYPE_CHECKING:
@@ -25,6 +27,8 @@ __all__ = ["OdeFit", "OdeModel", "fit_ode"]
 
 # Central differences: the truncation h^2 and the rounding eps/h meet near eps^(1/3).
 _STEP = 6e-6
+_FUNCTIONS = ("derivative", "output")
+_STATE = "unit of the state"
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -87,6 +91,69 @@ class OdeModel:
         state = np.array(self.start if start is None else start, dtype=np.float64)[:, None]
         p = np.array(list(self.parameters.values()))[:, None]
         return _simulate(self.derivative, self.output, time, inputs, state, p, self.substeps)[:, 0]
+
+    def to_toml(self) -> str:
+        """Write parameters, start and substeps as TOML, with the names of the two functions.
+
+        Returns
+        -------
+        str
+            The text of a parameter file, for `from_toml`.
+        """
+        settings = {
+            "start": Entry(value=[float(x) for x in self.start], unit=_STATE),
+            "substeps": Entry(value=self.substeps),
+        }
+        functions = {name: _name_of(getattr(self, name)) for name in _FUNCTIONS}
+        tables = {"parameters": entries(self.parameters), "settings": settings, "functions": entries(functions)}
+        return ParameterFile(kind="ode", tables=tables).to_toml()
+
+    @classmethod
+    def from_toml(
+        cls, text: str, *, derivative: Derivative, output: Output | None = None, origin: str = "text"
+    ) -> OdeModel:
+        """Read what `to_toml` wrote; the functions are Python and are given again.
+
+        Parameters
+        ----------
+        text : str
+            The text of a parameter file.
+        derivative, output : callable
+            The functions of the model that was written; the first state without `output`.
+        origin : str
+            Name for the messages, for example the file.
+
+        Returns
+        -------
+        OdeModel
+            Simulates bit for bit as the one that was written.
+
+        Raises
+        ------
+        DataError
+            Not TOML, another kind or format version, a missing table or key.
+        ParameterError
+            An unknown key, a wrong type, or functions of other names than those that were written.
+        """
+        file = ParameterFile.from_toml(text, origin=origin)
+        file.expect(kinds=("ode",), tables=("parameters", "settings", "functions"))
+        read: Output = _first_state if output is None else output
+        functions = {"derivative": derivative, "output": read}
+        for name, written in file.values("functions", wanted(_FUNCTIONS, form="text")).items():
+            if _name_of(functions[name]) != written:
+                raise ParameterError(
+                    f"{name} = {_name_of(functions[name])}: {origin} was written with {written}; give that function, "
+                    f"or change the line in [functions] if it was renamed"
+                )
+        settings = file.values("settings", {"start": Wanted(_STATE, "numbers"), "substeps": Wanted(form="integer")})
+        values = file.values("parameters", {name: Wanted(unit_of(name)) for name in file.tables["parameters"]})
+        return cls(
+            derivative=derivative,
+            output=read,
+            parameters=values,
+            start=tuple(float(value) for value in settings["start"]),
+            substeps=settings["substeps"],
+        )
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -313,6 +380,10 @@ def fit_ode(
     )
     reached = sum(bool(report.rmse <= 1.005 * best.rmse) for report in reports)
     return OdeFit(report=best, model=model, reports=reports, n_reached=reached)
+
+
+def _name_of(function: Any) -> str:
+    return str(getattr(function, "__qualname__", type(function).__qualname__))
 
 
 def _first_state(x: NDArray[Any], u: NDArray[Any], p: NDArray[Any]) -> NDArray[Any]:

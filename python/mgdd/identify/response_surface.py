@@ -65,6 +65,10 @@ class Support:
     basis: QuadraticBasis
     root: NDArray[np.float64]
 
+    def __post_init__(self) -> None:
+        # One layout in memory, so that a product has the same last bits after a round trip through a file.
+        object.__setattr__(self, "root", np.ascontiguousarray(self.root))
+
     def leverage(self, points: Sequence[Sequence[float]] | NDArray[np.float64]) -> NDArray[np.float64]:
         """Say how far points are from the middle of the records, in the metric of the fit.
 

@@ -2,19 +2,108 @@
 
 from __future__ import annotations
 
+import math
+from collections.abc import Mapping
 from dataclasses import dataclass
+from types import MappingProxyType
 from typing import TYPE_CHECKING
 
 import numpy as np
 
 from mgdd import _core
-from mgdd.errors import ShapeError
+from mgdd.errors import ParameterError, ShapeError
+from mgdd.identify.first_principle_model import sample_step
+from mgdd.io.parameters import ParameterFile, Parameters, entries, wanted
 from mgdd.optimize import FitReport
 
 if TYPE_CHECKING:
     from numpy.typing import ArrayLike, NDArray
 
-__all__ = ["SmoothThrottleFit", "fit_smooth_throttle", "simulate_smooth_throttle"]
+__all__ = ["SmoothThrottleFit", "SmoothThrottleModel", "fit_smooth_throttle", "simulate_smooth_throttle"]
+
+
+_CONSTANTS = ("inertia_kgm2", "gear_ratio", "inductance_h", "supply_v")
+
+
+@dataclass(frozen=True, kw_only=True)
+class SmoothThrottleModel(Parameters):
+    """Throttle with smooth friction and springs, differentiable everywhere: RK4, one step per sample.
+
+    Parameters
+    ----------
+    parameters : mapping of str to float
+        By the names in ``mgdd._core.smooth_throttle_names`` (SI, rad), all positive.
+    inertia_kgm2, gear_ratio, inductance_h, supply_v : float
+        Constants [kg m², -, H, V].
+
+    Examples
+    --------
+    >>> from mgdd import _core
+    >>> from mgdd.identify import SmoothThrottleModel
+    >>> values = dict(zip(_core.smooth_throttle_names, _core.smooth_throttle_example, strict=True))
+    >>> model = SmoothThrottleModel(parameters=values)
+    >>> model.simulate([0.0, 0.001], [0.0, 0.0], start_deg=8.0).round(3).tolist()
+    [8.0, 8.0]
+    """
+
+    parameters: Mapping[str, float]
+    inertia_kgm2: float = 2e-3
+    gear_ratio: float = 20.0
+    inductance_h: float = 1e-3
+    supply_v: float = 12.0
+
+    def __post_init__(self) -> None:
+        names = tuple(_core.smooth_throttle_names)
+        if set(self.parameters) != set(names):
+            raise ParameterError(f"parameters = {sorted(self.parameters)}: must be {', '.join(names)}")
+        ordered = {name: float(self.parameters[name]) for name in names}
+        object.__setattr__(self, "parameters", MappingProxyType(ordered))
+        for name, value in {**ordered, **{name: getattr(self, name) for name in _CONSTANTS}}.items():
+            if not (math.isfinite(value) and value > 0.0):
+                raise ParameterError(f"{name} = {value!r}: must be finite and > 0")
+
+    @property
+    def kind(self) -> str:
+        """``smooth``."""
+        return "smooth"
+
+    def simulate(self, time_s: ArrayLike, duty: ArrayLike, *, start_deg: float) -> NDArray[np.float64]:
+        """Run free from rest, without current.
+
+        Parameters
+        ----------
+        time_s, duty : array_like, shape (n,)
+            Constant sample time [s]; duty [-], held to the next sample.
+        start_deg : float
+            Angle at the first sample [deg].
+
+        Returns
+        -------
+        ndarray, shape (n,)
+            Angle [deg] at every sample.
+        """
+        u = np.asarray(duty, dtype=np.float64)
+        return simulate_smooth_throttle(
+            u,
+            parameters=list(self.parameters.values()),
+            step_s=sample_step(time_s, u.size),
+            start=(math.radians(start_deg), 0.0, 0.0),
+            **{name: getattr(self, name) for name in _CONSTANTS},
+        )
+
+    def to_parameters(self) -> ParameterFile:
+        """Give parameters and constants, as `to_toml` writes them."""
+        settings = {name: float(getattr(self, name)) for name in _CONSTANTS}
+        return ParameterFile(
+            kind=self.kind, tables={"parameters": entries(self.parameters), "settings": entries(settings)}
+        )
+
+    @classmethod
+    def from_parameters(cls, file: ParameterFile) -> SmoothThrottleModel:
+        """Make the model of a file that `to_toml` wrote."""
+        file.expect(kinds=("smooth",), tables=("parameters", "settings"))
+        parameters = file.values("parameters", wanted(_core.smooth_throttle_names))
+        return cls(parameters=parameters, **file.values("settings", wanted(_CONSTANTS)))
 
 
 @dataclass(frozen=True, kw_only=True)

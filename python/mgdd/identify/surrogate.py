@@ -13,6 +13,7 @@ from mgdd.errors import ParameterError
 from mgdd.identify.response_surface import QuadraticBasis, Support
 from mgdd.identify.sensor_lag import SensorLag
 from mgdd.identify.surrogate_optimum import SurrogateOptimum, best_along
+from mgdd.io.parameters import ParameterFile, Parameters
 from mgdd.results import Label, labelled_dataset
 
 if TYPE_CHECKING:
@@ -75,7 +76,7 @@ class SignalModel:
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
-class EngineSurrogate:
+class EngineSurrogate(Parameters):
     """Quadratic surfaces of the signals of an engine over its commands, with their support and residuals.
 
     Parameters
@@ -248,6 +249,19 @@ class EngineSurrogate:
                 "cyclic_sd": ("signal", [m.cyclic_sd for m in models], own, "cyclic standard deviation"),
             }
         )
+
+    def to_parameters(self) -> ParameterFile:
+        """Give everything, residuals included, as `to_toml` writes it."""
+        from mgdd.identify.surrogate_file import surrogate_file
+
+        return surrogate_file(self)
+
+    @classmethod
+    def from_parameters(cls, file: ParameterFile) -> EngineSurrogate:
+        """Make the surrogate of a file that `to_toml` wrote."""
+        from mgdd.identify.surrogate_file import read_surrogate
+
+        return read_surrogate(file)
 
     def operating_point(self, at: Mapping[str, float] | None = None) -> dict[str, float]:
         """Complete a choice of inputs with the medians of the rest, and check it.

@@ -3,11 +3,12 @@
 from __future__ import annotations
 
 import html
+import math
 from collections.abc import Mapping
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from typing import TYPE_CHECKING, Any, Protocol, runtime_checkable
 
-from mgdd.identify.fitted_parameters import KINDS, FittedParameters, unit_of
+from mgdd.io.parameters import ParameterFile, entries
 from mgdd.results import to_jsonable
 
 if TYPE_CHECKING:
@@ -16,7 +17,9 @@ if TYPE_CHECKING:
 
     from mgdd.optimize import FitReport
 
-__all__ = ["KINDS", "FittedParameters", "ThrottleFit", "ThrottleModel", "unit_of"]
+__all__ = ["KINDS", "ThrottleFit", "ThrottleModel"]
+
+KINDS = ("first_principle", "pw_r", "pw_w", "pw_p")
 
 
 @runtime_checkable
@@ -44,8 +47,8 @@ class ThrottleModel(Protocol):
     def predict(self, time_s: ArrayLike, duty: ArrayLike, angle_deg: ArrayLike, horizon: int) -> NDArray[np.float64]:
         """Predict `horizon` samples ahead: entry k is the angle [deg] at sample k + horizon from data up to k."""
 
-    def to_toml(self) -> str:
-        """Write the model as TOML."""
+    def to_parameters(self) -> ParameterFile:
+        """Give everything that changes a result; ``to_toml`` writes it."""
 
 
 @dataclass(frozen=True, kw_only=True, eq=False, repr=False)
@@ -149,43 +152,42 @@ class ThrottleFit:
         test = "" if self.fit_percent_test is None else f", test {self.fit_percent_test:.2f} %"
         return f"<ThrottleFit {self.kind}, {self.status}, train {self.fit_percent_train:.2f} %{test}>"
 
-    def fitted(self) -> FittedParameters:
-        """Give the parameters with units, standard errors and origin.
+    def to_parameters(self) -> ParameterFile:
+        """Give the model with standard errors, fit and name of the log, as `to_toml` writes them.
 
         Returns
         -------
-        FittedParameters
-            What `to_toml` writes.
+        mgdd.io.ParameterFile
+            Of the kind of the model; ``load_throttle_model`` makes the model again.
         """
+        file = self.model.to_parameters()
         errors = dict(zip(self.report.names, self.report.stderr.tolist(), strict=True))
-        figures = {
-            "fit_percent_train": self.fit_percent_train,
-            "fit_percent_test": self.fit_percent_test,
-            "rmse_test_deg": self.rmse_test_deg,
+        known = {
+            name: errors[own]
+            for name in file.tables["parameters"]
+            if (own := _fitted_name(name, errors)) is not None and math.isfinite(errors[own])
         }
-        return FittedParameters(
-            kind=self.kind,
-            values={**self.parameters, **self._travel()},
-            stderr={name: errors[own] for name in self.parameters if (own := _fitted_name(name, errors)) is not None},
-            source=f"fitted to {self.source}",
-            fit={name: value for name, value in figures.items() if value is not None},
-            unidentifiable=self.unidentifiable,
+        parameters = {name: replace(entry, stderr=known.get(name)) for name, entry in file.tables["parameters"].items()}
+        figures = {name: getattr(self, name) for name in ("fit_percent_train", "fit_percent_test", "rmse_test_deg")}
+        fit = entries({name: value for name, value in figures.items() if value is not None})
+        for name in ("fit_percent_train", "fit_percent_test"):
+            if name in fit:
+                fit[name] = replace(fit[name], unit="%")
+        return replace(
+            file,
+            tables={**file.tables, "parameters": parameters, "fit": fit},
+            notes={"source": f"fitted to {self.source}", "unidentifiable": list(self.unidentifiable)},
         )
 
-    def _travel(self) -> dict[str, float]:
-        """Return the end stops of a model that does not count them among its parameters."""
-        ends = {name: getattr(self.model, name, None) for name in ("closed_deg", "open_deg")}
-        return {name: float(end) for name, end in ends.items() if end is not None and name not in self.parameters}
-
     def to_toml(self) -> str:
-        """Write the parameters as TOML with units, standard errors and the name of the log.
+        """Write the model as TOML with units, standard errors and the name of the log.
 
         Returns
         -------
         str
-            Text that `FittedParameters.from_toml` and `load_throttle_model` read.
+            Text that `load_throttle_model` and ``from_toml`` of the model read.
         """
-        return self.fitted().to_toml()
+        return self.to_parameters().to_toml()
 
     def to_dict(self) -> dict[str, Any]:
         """Give everything but residual and model as plain Python values.

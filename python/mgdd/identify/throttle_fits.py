@@ -2,15 +2,14 @@
 
 from __future__ import annotations
 
-import errno
-from pathlib import Path
 from typing import TYPE_CHECKING
 
 from mgdd.errors import ParameterError
 from mgdd.identify.first_principle import fit_throttle
 from mgdd.identify.first_principle_model import FirstPrincipleModel
 from mgdd.identify.pseudo_wiener_fit import fit_pseudo_wiener
-from mgdd.identify.throttle_fit import FittedParameters, ThrottleFit, ThrottleModel
+from mgdd.identify.throttle_fit import KINDS, ThrottleFit, ThrottleModel
+from mgdd.io.parameters import ParameterFile
 from mgdd.throttle import PseudoWiener
 
 if TYPE_CHECKING:
@@ -23,7 +22,6 @@ __all__ = ["check_kind", "fit_kind", "load_throttle_model"]
 
 _STARTS = 4
 _WORTH = 0.97
-_TRAVEL = ("closed_deg", "open_deg")
 
 
 def fit_kind(
@@ -85,9 +83,9 @@ def load_throttle_model(path: str | os.PathLike[str]) -> ThrottleModel:
     FileNotFoundError
         No such file.
     DataError
-        Not TOML, no parameters, a wrong unit.
+        Not TOML, another kind or format version, a missing table or key.
     ParameterError
-        An unknown kind or parameter, a value outside its domain.
+        An unknown key, another unit, a wrong type, a value outside its domain.
 
     Examples
     --------
@@ -99,13 +97,7 @@ def load_throttle_model(path: str | os.PathLike[str]) -> ThrottleModel:
     ...     load_throttle_model(file).kind
     'first_principle'
     """
-    file = Path(path)
-    if not file.exists():
-        raise FileNotFoundError(errno.ENOENT, "no such file: check the path", str(file))
-    saved = FittedParameters.from_toml(file.read_text(encoding="utf-8"), source=str(file))
-    if saved.kind != "first_principle":
-        return PseudoWiener(saved.kind, saved.values)
-    values = dict(saved.values)
-    travel = {name: values.pop(name) for name in _TRAVEL if name in values}
-    closed, opened = travel.get("closed_deg", 0.0), travel.get("open_deg", 90.0)
-    return FirstPrincipleModel(parameters=values, closed_deg=closed, open_deg=opened)
+    file = ParameterFile.read(path)
+    model = FirstPrincipleModel if file.kind == "first_principle" else PseudoWiener
+    file.expect(kinds=KINDS, tables=file.tables, notes=file.notes)
+    return model.from_parameters(file)

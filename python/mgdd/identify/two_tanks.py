@@ -10,6 +10,7 @@ import numpy as np
 
 from mgdd import _core
 from mgdd.errors import DataError, ParameterError
+from mgdd.io.parameters import ParameterFile, Parameters, entries, wanted
 from mgdd.optimize import FitReport
 
 if TYPE_CHECKING:
@@ -54,7 +55,7 @@ _FORMS: dict[str, tuple[dict[str, float], tuple[str, ...]]] = {
 
 
 @dataclass(frozen=True, kw_only=True)
-class TwoTanksModel:
+class TwoTanksModel(Parameters):
     """Two tanks in a row: a pump fills the upper one, its outlet and part of its overflow the lower one.
 
     Parameters
@@ -108,6 +109,21 @@ class TwoTanksModel:
         start = [start_upper_v, start_lower_v, float(pump[0]), float(pump[0])]
         model = _core.TwoTanks(lower_brim_v=self.lower_brim_v)
         return np.asarray(model.free_run(parameters=_row(self.parameters), start=start, input=pump, dt_s=dt_s))
+
+    def to_parameters(self) -> ParameterFile:
+        """Give all parameters, as `to_toml` writes them."""
+        values = dict(zip(_core.TwoTanks.parameter_names, _row(self.parameters), strict=True))
+        tables = {"parameters": entries(values), "settings": entries({"lower_brim_v": float(self.lower_brim_v)})}
+        return ParameterFile(kind="two_tanks", tables=tables)
+
+    @classmethod
+    def from_parameters(cls, file: ParameterFile) -> TwoTanksModel:
+        """Make the tanks of a file that `to_toml` wrote."""
+        file.expect(kinds=("two_tanks",), tables=("parameters", "settings"))
+        return cls(
+            parameters=file.values("parameters", wanted(_core.TwoTanks.parameter_names)),
+            lower_brim_v=file.values("settings", wanted(("lower_brim_v",)))["lower_brim_v"],
+        )
 
     def estimate_start(self, record: xr.Dataset, *, window: int = 50) -> tuple[float, float]:
         """Estimate the two levels at the first sample from the first samples of a record, parameters held.

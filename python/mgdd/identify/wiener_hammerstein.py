@@ -10,6 +10,7 @@ import numpy as np
 
 from mgdd import _core
 from mgdd.errors import DataError, ParameterError
+from mgdd.io.parameters import ParameterFile, Parameters, entries, wanted
 from mgdd.optimize import FitReport
 
 if TYPE_CHECKING:
@@ -28,11 +29,12 @@ __all__ = [
 
 _SKIP = 100  # samples in which a filter that starts at rest forgets it
 _SCAN_DEGREE = 6  # of the polynomial that stands for the curve while partitions are compared
+_UNITS = dict.fromkeys(("input_mean", "output_mean", "rmse", "lower", "upper"), "unit of the record")
 _MARGIN = 0.05  # of the range of the signal, on either side of the curve's grid
 
 
 @dataclass(frozen=True, kw_only=True)
-class LinearApproximation:
+class LinearApproximation(Parameters):
     """A linear filter B/A about the mean of a record.
 
     Parameters
@@ -76,9 +78,25 @@ class LinearApproximation:
         deviation = np.asarray(signal, dtype=np.float64) - self.input_mean
         return np.asarray(_core.filter_series(self.numerator, self.denominator, deviation)) + self.output_mean
 
+    def to_parameters(self) -> ParameterFile:
+        """Give filter and means, as `to_toml` writes them."""
+        return _saved("linear_filter", self, ("numerator", "denominator", "input_mean", "output_mean", "rmse"))
+
+    @classmethod
+    def from_parameters(cls, file: ParameterFile) -> LinearApproximation:
+        """Make the filter of a file that `to_toml` wrote."""
+        return cls(
+            **_read(
+                "linear_filter",
+                file,
+                numbers=("input_mean", "output_mean", "rmse"),
+                vectors=("numerator", "denominator"),
+            )
+        )
+
 
 @dataclass(frozen=True, kw_only=True)
-class WienerHammersteinModel:
+class WienerHammersteinModel(Parameters):
     """Filter, static curve, filter; both filters have gain 1 at rest.
 
     Parameters
@@ -122,6 +140,24 @@ class WienerHammersteinModel:
             Output.
         """
         return np.asarray(_core_model(self).simulate(self.values, np.asarray(signal, dtype=np.float64)))
+
+    def to_parameters(self) -> ParameterFile:
+        """Give orders, grid and coefficients, as `to_toml` writes them."""
+        names = ("first_order", "last_order", "n_curve", "lower", "upper", "values")
+        return _saved("wiener_hammerstein", self, names)
+
+    @classmethod
+    def from_parameters(cls, file: ParameterFile) -> WienerHammersteinModel:
+        """Make the model of a file that `to_toml` wrote."""
+        return cls(
+            **_read(
+                "wiener_hammerstein",
+                file,
+                numbers=("lower", "upper"),
+                vectors=("values",),
+                integers=("first_order", "last_order", "n_curve"),
+            )
+        )
 
     def curve(self, signal: ArrayLike) -> Vector:
         """Evaluate the static curve.
@@ -337,6 +373,24 @@ def fit_wiener_hammerstein(
         linear=linear,
         partitions_rmse=tuple(entry[0] for entry in short),
     )
+
+
+def _saved(kind: str, model: object, names: tuple[str, ...]) -> ParameterFile:
+    return ParameterFile(kind=kind, tables={"parameters": entries({n: getattr(model, n) for n in names}, _UNITS)})
+
+
+def _read(
+    kind: str,
+    file: ParameterFile,
+    *,
+    numbers: tuple[str, ...],
+    vectors: tuple[str, ...],
+    integers: tuple[str, ...] = (),
+) -> dict[str, Any]:
+    file.expect(kinds=(kind,), tables=("parameters",))
+    expected = {**wanted(numbers, _UNITS), **wanted(vectors, form="numbers"), **wanted(integers, form="integer")}
+    values = file.values("parameters", expected)
+    return values | {name: np.array(values[name], dtype=np.float64) for name in vectors}
 
 
 def _signals(record: xr.Dataset) -> tuple[Vector, Vector]:

@@ -2,8 +2,6 @@
 
 from __future__ import annotations
 
-import json
-import tomllib
 from collections.abc import Mapping
 from types import MappingProxyType
 from typing import TYPE_CHECKING
@@ -12,6 +10,7 @@ import numpy as np
 
 from mgdd import _core
 from mgdd.errors import DataError, ParameterError, ShapeError
+from mgdd.io.parameters import FIT_NOTES, ParameterFile, Parameters, Wanted, entries, wanted
 
 if TYPE_CHECKING:
     from numpy.typing import ArrayLike, NDArray
@@ -20,12 +19,13 @@ if TYPE_CHECKING:
 
 __all__ = ["PseudoWiener"]
 
+_KINDS = ("pw_r", "pw_w", "pw_p")
 _STEP_S = 5e-4  # of PW-R
 _GAIN_SAMPLE_S = 1e-3  # the observer gains are per 1 ms
 _UNEVEN = 1e-3
 
 
-class PseudoWiener:
+class PseudoWiener(Parameters):
     """A pseudo-Wiener model of a throttle.
 
     Parameters
@@ -252,69 +252,25 @@ class PseudoWiener:
         )
         return np.asarray(angle), np.asarray(slope)
 
-    def to_toml(self, *, source: str = "mgdd") -> str:
-        """Write the model as TOML that `from_toml` reads back equal.
-
-        Parameters
-        ----------
-        source : str
-            Where the numbers come from.
-
-        Returns
-        -------
-        str
-            One line per value with its unit.
-        """
-        text = json.dumps(source, ensure_ascii=False)
-        units = self.units
-        lines = [f'kind = "{self.kind}"', f"source = {text}", "unidentifiable = []"]
-        lines += [f'{name} = "{value}"' for name, value in self._options.items()]
-        lines += ["", "[parameters]"]
-        lines += [
-            f'{name} = {{ value = {value!r}, unit = "{units[name]}", source = {text} }}'
-            for name, value in self.parameters.items()
-        ]
-        return "\n".join(lines) + "\n"
+    def to_parameters(self) -> ParameterFile:
+        """Give all numbers and choices, as `to_toml` writes them."""
+        return ParameterFile(
+            kind=self.kind,
+            tables={"parameters": entries(self.parameters, self.units), "settings": entries(self._options)},
+        )
 
     @classmethod
-    def from_toml(cls, text: str) -> PseudoWiener:
-        """Read what `to_toml` wrote, or a saved fit of these kinds.
-
-        Parameters
-        ----------
-        text : str
-            The TOML text.
-
-        Returns
-        -------
-        PseudoWiener
-            The model.
-
-        Raises
-        ------
-        DataError
-            No TOML, or no table ``[parameters]`` of values with units.
-        ParameterError
-            A kind, name or value that does not exist.
-        """
+    def from_parameters(cls, file: ParameterFile) -> PseudoWiener:
+        """Make the model of a file that `to_toml` or a fit wrote."""
+        file.expect(kinds=_KINDS, tables=("parameters", "settings", "fit?"), notes=FIT_NOTES)
+        units = {name: str(unit) for name, unit in _core.pseudo_wiener_units(file.kind).items()}
+        said = file.values("parameters", {name: Wanted(unit, required=False) for name, unit in units.items()})
+        options = file.values("settings", wanted(("switching", "friction"), form="text"))
         try:
-            data = tomllib.loads(text)
-        except tomllib.TOMLDecodeError as error:
-            raise DataError(f"not valid TOML: {error}") from error
-        table = data.get("parameters")
-        if not isinstance(table, dict) or not table:
-            raise DataError("no table [parameters]: PseudoWiener.to_toml writes one")
-        kind = str(data.get("kind", ""))
-        values = {}
-        for name, entry in table.items():
-            if not isinstance(entry, dict) or not isinstance(entry.get("value"), int | float):
-                raise DataError(f"[parameters] {name}: write {{ value = ..., unit = ... }}")
-            values[name] = float(entry["value"])
-        options = {name: str(data[name]) for name in ("switching", "friction") if name in data}
-        model = cls(kind, values, **options)
-        for name, unit in model.units.items():
-            if name in table and table[name].get("unit") != unit:
-                raise DataError(f"[parameters] {name}: unit = {table[name].get('unit')!r}: must be {unit!r}")
+            model = cls(file.kind, said, **options)
+        except ParameterError as error:
+            raise ParameterError(f"{file.origin}: {error}") from error
+        file.values("parameters", wanted(model.parameters, units))  # which of them there are, the numbers say
         return model
 
     def __eq__(self, other: object) -> bool:
