@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import copy
 import pickle
+from collections.abc import Callable
 
 import numpy as np
 import pytest
@@ -11,7 +12,7 @@ import pytest
 from mgdd.errors import DataError, ParameterError, ShapeError
 from mgdd.identify import OnlineUpdate, ThrottleModel, fit_pseudo_wiener
 from mgdd.io import throttle_log
-from mgdd.studies import run_ch7_pseudo_wiener
+from mgdd.studies import StudyResult
 from mgdd.throttle import PseudoWiener, Throttle
 
 TIME = np.arange(4000) * 1e-3
@@ -156,8 +157,8 @@ def test_online_update_refuses_what_it_cannot_do() -> None:
         OnlineUpdate(MODELS[0], free=["mass"])
 
 
-def test_the_study_ranks_the_kinds() -> None:
-    result = run_ch7_pseudo_wiener(starts=4, quick=True)
+def test_the_study_ranks_the_kinds(quick_study: Callable[..., StudyResult]) -> None:
+    result = quick_study("ch7-pseudo-wiener", starts=4)
     rows = {(row["plant"], row["model"]): row for row in result.summary["rows"] if row["lag_start"] != "best"}
     better = {(row["plant"], row["model"]): row for row in result.summary["rows"] if row["lag_start"] == "best"}
     printed = {"P1": {"pw_r": 99.4, "pw_w": 79.7, "pw_p": 53.7}, "P2": {"pw_r": 99.4, "pw_w": 92.0, "pw_p": 82.4}}

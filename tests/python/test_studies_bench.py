@@ -5,28 +5,29 @@ from __future__ import annotations
 import itertools
 import json
 import math
+from collections.abc import Callable
 
 import numpy as np
 import pytest
 
 from mgdd.loop import EngineBench, steady_optimum
 from mgdd.results import check_labels
-from mgdd.studies import StudyResult, available_studies, run_ch3_optimizers, run_ch4_sensors, run_ch4_tests, run_study
+from mgdd.studies import StudyResult, available_studies, run_study
 
 
 @pytest.fixture(scope="module")
-def seekers() -> StudyResult:
-    return run_ch3_optimizers(quick=True)
+def seekers(quick_study: Callable[..., StudyResult]) -> StudyResult:
+    return quick_study("ch3-optimizers")
 
 
 @pytest.fixture(scope="module")
-def sensors() -> StudyResult:
-    return run_ch4_sensors(quick=True)
+def sensors(quick_study: Callable[..., StudyResult]) -> StudyResult:
+    return quick_study("ch4-sensors")
 
 
 @pytest.fixture(scope="module")
-def four_tests() -> StudyResult:
-    return run_ch4_tests(quick=True)
+def four_tests(quick_study: Callable[..., StudyResult]) -> StudyResult:
+    return quick_study("ch4-tests")
 
 
 @pytest.mark.parametrize("name", ["seekers", "sensors", "four_tests"])

@@ -11,6 +11,7 @@ from typing import TYPE_CHECKING, Any
 from mgdd.cli.options import add_command
 from mgdd.cli.output import check_output, emit, progress
 from mgdd.errors import ParameterError
+from mgdd.report import write_report
 from mgdd.studies import available_studies, run_study
 
 if TYPE_CHECKING:
@@ -37,6 +38,7 @@ def add(commands: Any) -> None:
     )
     parser.add_argument("--quick", action="store_true", help="a shorter study with wider intervals")
     parser.add_argument("--figures", metavar="DIR", help="write its figures into DIR")
+    parser.add_argument("--report", metavar="DIR", help="write a page with tables and figures into DIR")
     parser.add_argument("--format", choices=("png", "svg"), default="png", help="of the figures (default: png)")
 
 
@@ -56,11 +58,15 @@ def run(args: argparse.Namespace) -> None:
     if folder is not None:
         folder.mkdir(parents=True, exist_ok=True)
     with progress(args, expected=10) as step:
-        result = run_study(args.name, seeds=args.seeds, quick=args.quick, figures=folder is not None, progress=step)
+        drawn = folder is not None or args.report is not None
+        result = run_study(args.name, seeds=args.seeds, quick=args.quick, figures=drawn, progress=step)
         paths = [] if folder is None else _write(result.figures, folder, f"{args.name}.{args.format}")
+        page = None if args.report is None else write_report(result, args.report)
     summary: dict[str, Any] = dict(result.summary)
     if folder is not None:
         summary["figures"] = [path.as_posix() for path in paths]
+    if page is not None:
+        summary["report"] = page.as_posix()
     emit(args, summary, text=_text(titles[args.name], summary))
     if summary.get("interrupted"):
         raise KeyboardInterrupt
@@ -84,6 +90,8 @@ def _text(title: str, summary: Mapping[str, Any]) -> str:
         out += ["", "Brackets: 95 % interval of the mean over seeds."]
     if summary.get("figures"):
         out += ["", *summary["figures"]]
+    if summary.get("report"):
+        out += ["", f"Report: {summary['report']}"]
     return "\n".join(out)
 
 

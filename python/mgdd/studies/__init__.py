@@ -18,9 +18,12 @@ from mgdd.studies.h2df_seek import run_h2df_seek
 from mgdd.studies.identification_benchmarks import run_identification_benchmarks
 from mgdd.studies.measured_traces import best_timing, compare_laws, run_measured_traces
 from mgdd.studies.registry import available_studies, run_study
+from mgdd.studies.sections import Section, Table
 
 __all__ = [
+    "Section",
     "StudyResult",
+    "Table",
     "available_studies",
     "best_timing",
     "compare_laws",
