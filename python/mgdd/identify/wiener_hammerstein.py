@@ -76,7 +76,7 @@ class LinearApproximation(Parameters):
             Output.
         """
         deviation = np.asarray(signal, dtype=np.float64) - self.input_mean
-        return np.asarray(_core.filter_series(self.numerator, self.denominator, deviation)) + self.output_mean
+        return _filtered(self.numerator, self.denominator, deviation) + self.output_mean
 
     def to_parameters(self) -> ParameterFile:
         """Give filter and means, as `to_toml` writes them."""
@@ -253,7 +253,7 @@ def fit_linear(record: xr.Dataset, *, order: int = 6, iterations: int = 15) -> L
     best: tuple[float, Vector, Vector] = (np.inf, np.ones(1), np.ones(1))
     n = u.size
     for _ in range(iterations):
-        uf, yf = _core.filter_series([1.0], a, u), _core.filter_series([1.0], a, y)
+        uf, yf = _filtered(np.ones(1), a, u), _filtered(np.ones(1), a, y)
         columns = [-yf[order - i : n - i] for i in range(1, order + 1)]
         columns += [uf[order - i : n - i] for i in range(order + 1)]
         regressors = np.column_stack(columns)
@@ -261,7 +261,7 @@ def fit_linear(record: xr.Dataset, *, order: int = 6, iterations: int = 15) -> L
         roots = np.roots(np.r_[1.0, estimate[:order]])
         a = np.asarray(np.real(np.poly(np.where(np.abs(roots) > 1.0, 1.0 / np.conj(roots), roots))), dtype=np.float64)
         b = np.asarray(estimate[order:], dtype=np.float64)
-        error = float(np.sqrt(np.mean((y - _core.filter_series(b, a, u))[_SKIP:] ** 2)))
+        error = float(np.sqrt(np.mean((y - _filtered(b, a, u))[_SKIP:] ** 2)))
         if error < best[0]:
             best = (error, b, a)
     return LinearApproximation(
@@ -393,6 +393,12 @@ def _read(
     return values | {name: np.array(values[name], dtype=np.float64) for name in vectors}
 
 
+def _filtered(b: Vector, a: Vector, signal: Vector) -> Vector:
+    from scipy.signal import lfilter
+
+    return np.asarray(lfilter(b, a, signal), dtype=np.float64)
+
+
 def _signals(record: xr.Dataset) -> tuple[Vector, Vector]:
     u, y = record["input_v"].to_numpy(), record["output_v"].to_numpy()
     if u.size < 1000:
@@ -442,9 +448,9 @@ def _partitions(linear: LinearApproximation, u: Vector, y: Vector, first: int, l
             proper = b1.size <= a1.size and b2.size <= a2.size
             if not (proper and 2 <= a1.size <= first + 1 and 2 <= a2.size <= last + 1):
                 continue
-            between = _core.filter_series(b1, a1, u)
+            between = _filtered(b1, a1, u)
             scale = float(np.abs(between).max())
-            columns = [_core.filter_series(b2, a2, (between / scale) ** k) for k in range(_SCAN_DEGREE + 1)]
+            columns = [_filtered(b2, a2, (between / scale) ** k) for k in range(_SCAN_DEGREE + 1)]
             regressors = np.column_stack(columns)[_SKIP:]
             curve = np.asarray(np.linalg.lstsq(regressors, y[_SKIP:], rcond=None)[0], dtype=np.float64)
             error = float(np.sqrt(np.mean((regressors @ curve - y[_SKIP:]) ** 2)))
@@ -466,7 +472,7 @@ def _start(
 ) -> tuple[_core.WienerHammerstein, Vector]:
     _, b1, a1, b2, a2, curve, scale = candidate
     (b1, a1), (b2, a2) = _padded(b1, a1, first), _padded(b2, a2, last)
-    between = np.asarray(_core.filter_series(b1, a1, u))
+    between = np.asarray(_filtered(b1, a1, u))
     margin = _MARGIN * float(np.ptp(between))
     lower, upper = float(between.min()) - margin, float(between.max()) + margin
     model = _core.WienerHammerstein(first_order=first, last_order=last, n_curve=n_curve, lower=lower, upper=upper)
