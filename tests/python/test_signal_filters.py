@@ -1,4 +1,4 @@
-"""What SciPy computes for the package equals the plain definitions: shift registers, polynomials, difference equations."""
+"""What SciPy computes here equals the plain definitions: shift registers, polynomials, difference equations."""
 
 from __future__ import annotations
 
