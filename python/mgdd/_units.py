@@ -39,6 +39,7 @@ _UNITS = {
     "_scatter_cad": "°CA",
     "_rms_cad": "°CA",
     "_cad": "°CA aTDC",
+    "_mean_j": "unit of J",
     "_deg2": "deg²",
     "_deg": "deg",
     "_rad": "rad",
@@ -55,6 +56,7 @@ _UNITS = {
     "_mh": "mH",
     "_ms": "ms",
     "_mg": "mg",
+    "_us": "µs",
     "_kg": "kg",
     "_m": "m",
     "_g": "g",
@@ -89,4 +91,5 @@ def unit_of(name: str) -> str:
     >>> unit_of("spring_above_nm_per_rad"), unit_of("compression_ratio")
     ('N m/rad', '-')
     """
-    return next((_UNITS[ending] for ending in _LONGEST_FIRST if name.endswith(ending)), "-")
+    whole = f"_{name}"
+    return next((_UNITS[ending] for ending in _LONGEST_FIRST if whole.endswith(ending)), "-")

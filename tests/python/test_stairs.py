@@ -10,7 +10,7 @@ import pytest
 
 CPP = "common > optimize > control > engine throttle > identify > guide > loop"
 PYTHON = (
-    "_core > errors _units > results > io plot > presets > optimize > control > engine throttle > identify"
+    "_core > errors _units > results > _describe > io plot > presets > optimize > control > engine throttle > identify"
     " > guide > loop sweep design datasets > maps > rig > studies > report > cli > __main__"
 )
 

@@ -10,6 +10,7 @@ import numpy as np
 
 from mgdd import _core
 from mgdd._core import Cylinder, OperatingPoint
+from mgdd._describe import described
 from mgdd.errors import ConvergenceError, ParameterError
 
 __all__ = ["Optimum", "optimum"]
@@ -21,6 +22,7 @@ _WINDOW_CAD: tuple[float, float] = _core.timing_window_cad
 _DEFAULT_CAD = (-30.0, 10.0)
 
 
+@described
 @dataclass(frozen=True, kw_only=True)
 class Optimum:
     """The best start of combustion and how flat the optimum is.

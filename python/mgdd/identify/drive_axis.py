@@ -9,6 +9,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from mgdd import _core
+from mgdd._describe import described
 from mgdd.errors import DataError, ParameterError, ShapeError
 from mgdd.io.parameters import ParameterFile, Parameters, entries, wanted
 from mgdd.optimize import FitReport
@@ -40,6 +41,7 @@ _REST = 1e-3  # least speed of the Stribeck rise [m/s]: the slide leaves it with
 _FILTER_ORDER, _DECIMATION = 4, 10
 
 
+@described
 @dataclass(frozen=True, kw_only=True)
 class DriveModel(Parameters):
     """A slide with mass, friction and offset, driven by a voltage.
@@ -123,6 +125,7 @@ class DriveModel(Parameters):
         )
 
 
+@described
 @dataclass(frozen=True, kw_only=True)
 class DriveFit:
     """A fitted slide.

@@ -8,6 +8,7 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
+from mgdd._describe import described
 from mgdd.errors import ParameterError
 from mgdd.identify.prior import prior_of
 from mgdd.identify.record_content import RecordContent, open_questions, record_content
@@ -19,6 +20,7 @@ if TYPE_CHECKING:
 __all__ = ["ExcitationCheck", "check_excitation"]
 
 
+@described
 @dataclass(frozen=True, kw_only=True)
 class ExcitationCheck:
     """What the prior model does under an excitation, and the verdict.

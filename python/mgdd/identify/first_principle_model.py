@@ -11,6 +11,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from mgdd import _core
+from mgdd._describe import described
 from mgdd.errors import DataError, ParameterError, ShapeError
 from mgdd.io.parameters import FIT_NOTES, ParameterFile, Parameters, Wanted, entries, wanted
 
@@ -23,6 +24,7 @@ GROUP_NAMES = tuple(_core.throttle_group_names)
 _SETTINGS = ("closed_deg", "open_deg", "ramp_deg", "substeps")
 
 
+@described
 @dataclass(frozen=True, kw_only=True)
 class FirstPrincipleModel(Parameters):
     """Throttle in groups: set-valued friction, springs with preload on both sides, motor as a torque source.

@@ -7,6 +7,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
+from mgdd._describe import described
 from mgdd.errors import DataError, ParameterError, ShapeError
 from mgdd.results import labelled_dataset
 
@@ -134,6 +135,7 @@ def rmse(measured: ArrayLike, model: ArrayLike) -> float:
     return float(np.sqrt(mse(measured, model)))
 
 
+@described
 @dataclass(frozen=True, kw_only=True)
 class ResidualTests:
     """Correlations that a residual should not have.

@@ -10,6 +10,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from mgdd import _core
+from mgdd._describe import described
 from mgdd._units import unit_of
 from mgdd.errors import DataError, ParameterError, ShapeError
 from mgdd.io.parameters import Entry, ParameterFile, Wanted, entries, wanted
@@ -31,6 +32,7 @@ _FUNCTIONS = ("derivative", "output")
 _STATE = "unit of the state"
 
 
+@described
 @dataclass(frozen=True, kw_only=True)
 class OdeModel:
     """An ordinary differential equation with its parameters, on fixed Runge-Kutta steps with the input held.
@@ -156,6 +158,7 @@ class OdeModel:
         )
 
 
+@described
 @dataclass(frozen=True, kw_only=True)
 class OdeFit:
     """Result of `fit_ode`.

@@ -11,6 +11,7 @@ import numpy as np
 
 from mgdd import _core
 from mgdd._core import OperatingPoint
+from mgdd._describe import described
 from mgdd.errors import ParameterError
 from mgdd.identify.cylinder import fit_cylinder
 from mgdd.identify.records import CylinderFit, LoadFit
@@ -28,6 +29,7 @@ _WIDTH = 0.20  # and as identified when that range stays within 20 % of the best
 _CORRELATION = float(_core.correlation_limit)
 
 
+@described
 @dataclass(frozen=True, kw_only=True)
 class WallHeatProfile:
     """What the traces say about the wall-heat scale.

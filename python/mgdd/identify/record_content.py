@@ -8,6 +8,8 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
+from mgdd._describe import described
+
 if TYPE_CHECKING:
     from collections.abc import Iterable
 
@@ -28,6 +30,7 @@ _FAST_DEG_PER_S = 60.0
 _TRIANGLE_HZ = 0.05
 
 
+@described
 @dataclass(frozen=True, kw_only=True)
 class RecordContent:
     """Sides, directions, speeds and stops of one record.

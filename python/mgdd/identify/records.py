@@ -8,6 +8,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from mgdd._core import Cylinder, OperatingPoint
+from mgdd._describe import described
 from mgdd.optimize import FitReport
 
 if TYPE_CHECKING:
@@ -16,6 +17,7 @@ if TYPE_CHECKING:
 __all__ = ["CylinderFit", "LoadFit"]
 
 
+@described
 @dataclass(frozen=True, kw_only=True)
 class LoadFit:
     """One load of a calibration: its burn and how well the model meets the measurement.
@@ -146,3 +148,17 @@ class CylinderFit:
         row = self.correlation_if_free[self.report.names.index(name)]
         pairs = [(n, float(c)) for n, c in zip(self.report.names, row, strict=True) if n != name and np.isfinite(c)]
         return dict(sorted(pairs, key=lambda pair: -abs(pair[1])))
+
+
+described(
+    CylinderFit,
+    rows=lambda fit: {
+        "burn_law": fit.burn_law,
+        "status": fit.report.status,
+        "wall_heat_scale": fit.cylinder.wall_heat_scale,
+        "rmse_percent": {load.file: load.rmse_percent for load in fit.loads},
+        "imep_closed_error_percent": {load.file: load.imep_closed_error_percent for load in fit.loads},
+        "unidentifiable": fit.report.unidentifiable,
+        "warnings": fit.warnings,
+    },
+)

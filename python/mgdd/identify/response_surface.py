@@ -8,6 +8,8 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
+from mgdd._describe import described
+
 if TYPE_CHECKING:
     from collections.abc import Sequence
 
@@ -30,6 +32,7 @@ class QuadraticBasis:
         return np.column_stack([np.ones(len(z)), z, z[:, first] * z[:, second]])
 
 
+@described
 @dataclass(frozen=True, kw_only=True, eq=False)
 class Support:
     """Where a surrogate may be believed: a box of quantiles, and leverage no higher than records in it have.

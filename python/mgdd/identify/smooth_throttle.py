@@ -11,6 +11,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from mgdd import _core
+from mgdd._describe import described
 from mgdd.errors import ParameterError, ShapeError
 from mgdd.identify.first_principle_model import sample_step
 from mgdd.io.parameters import ParameterFile, Parameters, entries, wanted
@@ -25,6 +26,7 @@ __all__ = ["SmoothThrottleFit", "SmoothThrottleModel", "fit_smooth_throttle", "s
 _CONSTANTS = ("inertia_kgm2", "gear_ratio", "inductance_h", "supply_v")
 
 
+@described
 @dataclass(frozen=True, kw_only=True)
 class SmoothThrottleModel(Parameters):
     """Throttle with smooth friction and springs, differentiable everywhere: RK4, one step per sample.
@@ -106,6 +108,7 @@ class SmoothThrottleModel(Parameters):
         return cls(parameters=parameters, **file.values("settings", wanted(_CONSTANTS)))
 
 
+@described
 @dataclass(frozen=True, kw_only=True)
 class SmoothThrottleFit:
     """Fits of one record from several starts.

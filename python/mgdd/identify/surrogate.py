@@ -9,6 +9,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
+from mgdd._describe import described
 from mgdd.errors import ParameterError
 from mgdd.identify.response_surface import QuadraticBasis, Support
 from mgdd.identify.sensor_lag import SensorLag
@@ -25,6 +26,7 @@ __all__ = ["STEERED", "EngineSurrogate", "SignalModel"]
 STEERED = "soi_cad"
 
 
+@described
 @dataclass(frozen=True, kw_only=True, eq=False)
 class SignalModel:
     """The surface of one signal, and how well it does.
@@ -75,6 +77,7 @@ class SignalModel:
     cyclic_sd: float
 
 
+@described
 @dataclass(frozen=True, kw_only=True, eq=False)
 class EngineSurrogate(Parameters):
     """Quadratic surfaces of the signals of an engine over its commands, with their support and residuals.

@@ -9,6 +9,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 from numpy.polynomial import Polynomial
 
+from mgdd._describe import described
 from mgdd.errors import ConvergenceError
 
 if TYPE_CHECKING:
@@ -21,6 +22,7 @@ __all__ = ["SurrogateOptimum", "best_along"]
 _TINY = 1e-9  # relative slack of a limit at its own crossing
 
 
+@described
 @dataclass(frozen=True, kw_only=True)
 class SurrogateOptimum:
     """The best supported start of injection of a surrogate.

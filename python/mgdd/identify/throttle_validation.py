@@ -9,6 +9,7 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
+from mgdd._describe import described
 from mgdd.errors import DataError
 from mgdd.identify.metrics import ResidualTests, fit_percent, mse, residual_tests, rmse, vaf_percent
 from mgdd.identify.n_step import DISCARD_S, columns_of, n_step_rms, samples_of, step_of, whole_horizons
@@ -29,6 +30,7 @@ _CORRELATED = 0.98
 _GOOD_PERCENT = 85.0
 
 
+@described
 @dataclass(frozen=True, kw_only=True)
 class ThrottleValidation:
     """A model against a log.

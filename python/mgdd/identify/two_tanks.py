@@ -9,6 +9,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from mgdd import _core
+from mgdd._describe import described
 from mgdd.errors import DataError, ParameterError
 from mgdd.io.parameters import ParameterFile, Parameters, entries, wanted
 from mgdd.optimize import FitReport
@@ -54,6 +55,7 @@ _FORMS: dict[str, tuple[dict[str, float], tuple[str, ...]]] = {
 }
 
 
+@described
 @dataclass(frozen=True, kw_only=True)
 class TwoTanksModel(Parameters):
     """Two tanks in a row: a pump fills the upper one, its outlet and part of its overflow the lower one.
@@ -156,6 +158,7 @@ class TwoTanksModel(Parameters):
         return float(best.starts[0][0]), float(best.starts[0][1])
 
 
+@described
 @dataclass(frozen=True, kw_only=True)
 class TanksFit:
     """Fitted tanks.

@@ -9,6 +9,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from mgdd import _core
+from mgdd._describe import described
 from mgdd.errors import DataError, ParameterError
 from mgdd.io.parameters import ParameterFile, Parameters, entries, wanted
 from mgdd.optimize import FitReport
@@ -33,6 +34,7 @@ _UNITS = dict.fromkeys(("input_mean", "output_mean", "rmse", "lower", "upper"), 
 _MARGIN = 0.05  # of the range of the signal, on either side of the curve's grid
 
 
+@described
 @dataclass(frozen=True, kw_only=True)
 class LinearApproximation(Parameters):
     """A linear filter B/A about the mean of a record.
@@ -95,6 +97,7 @@ class LinearApproximation(Parameters):
         )
 
 
+@described
 @dataclass(frozen=True, kw_only=True)
 class WienerHammersteinModel(Parameters):
     """Filter, static curve, filter; both filters have gain 1 at rest.
@@ -175,6 +178,7 @@ class WienerHammersteinModel(Parameters):
         return np.asarray(_core_model(self).curve(self.values, np.asarray(signal, dtype=np.float64)))
 
 
+@described
 @dataclass(frozen=True, kw_only=True)
 class WienerHammersteinFit:
     """A fitted Wiener-Hammerstein model.

@@ -8,6 +8,7 @@ from typing import TYPE_CHECKING, Any
 
 from mgdd import _core, presets
 from mgdd._core import Cylinder, NoxModel, OperatingPoint, Performance, SensorDynamics, SoftSensor
+from mgdd._describe import as_html, rows_of
 from mgdd.errors import ParameterError
 from mgdd.presets import Preset
 from mgdd.results import VARIABLES, labelled_dataset
@@ -170,6 +171,9 @@ class EngineBench(_core.EngineBench):
         array([107.2, 103. ])
         """
         return cycles_to_dataset(self, self.run_columns(soc_cad))
+
+    def _repr_html_(self) -> str:
+        return as_html(f"EngineBench at cycle {self.cycle}", rows_of(self.settings))
 
 
 def cycles_to_dataset(bench: EngineBench, columns: dict[str, Any], **more: ArrayLike) -> xr.Dataset:

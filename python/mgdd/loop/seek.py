@@ -11,6 +11,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from mgdd import _core
+from mgdd._describe import described
 from mgdd.errors import ParameterError
 from mgdd.loop.bench import EngineBench, cycles_to_dataset
 from mgdd.results import labelled_dataset
@@ -42,6 +43,7 @@ _SUMMARY = {
 }
 
 
+@described
 @dataclass(frozen=True, kw_only=True)
 class LoopRun:
     """A closed loop, cycle by cycle, and what it came to.

@@ -11,6 +11,7 @@ import numpy as np
 
 from mgdd import _core
 from mgdd._core import SensorDynamics
+from mgdd._describe import described
 from mgdd.errors import ConvergenceError, ParameterError, ShapeError
 from mgdd.loop.bench import EngineBench
 from mgdd.results import labelled_dataset
@@ -25,6 +26,7 @@ _SCAN_CAD = 0.25
 _SECANT_CAD = 3.0
 
 
+@described
 @dataclass(frozen=True, kw_only=True)
 class SteadyOptimum:
     """The timing at which a bench without chance has its best J, limits kept.

@@ -10,6 +10,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from mgdd import _core
+from mgdd._describe import as_html, rows_of
 from mgdd.errors import ParameterError
 from mgdd.results import labelled_dataset
 
@@ -347,6 +348,9 @@ class IterativeLearning:
         frozen = ", frozen" if self.frozen else ""
         samples = self._settings["initial"].size
         return f"<IterativeLearning law={self._settings['law']!r}, {samples} samples, trial {self.trial}{frozen}>"
+
+    def _repr_html_(self) -> str:
+        return as_html("IterativeLearning", rows_of({"trial": self.trial, "frozen": self.frozen, **self._settings}))
 
 
 def _column(value: ArrayLike, name: str) -> NDArray[np.float64]:

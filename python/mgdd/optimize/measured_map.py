@@ -8,6 +8,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
+from mgdd._describe import described
 from mgdd.errors import DataError, ShapeError
 
 if TYPE_CHECKING:
@@ -18,6 +19,7 @@ __all__ = ["MeasuredMap", "measure_map"]
 _FEWEST_POINTS, _FEWEST_INPUTS = 5, 3
 
 
+@described
 @dataclass(frozen=True, kw_only=True)
 class MeasuredMap:
     """Noise, curvature and optimum of a measured map J(theta), each with its standard error.

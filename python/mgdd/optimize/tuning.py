@@ -7,6 +7,7 @@ from dataclasses import dataclass
 from typing import TYPE_CHECKING, Any
 
 from mgdd import _core
+from mgdd._describe import described
 from mgdd.optimize.direct_seekers import Spsa
 from mgdd.optimize.dither_seekers import ExtremumSeeking
 
@@ -16,6 +17,7 @@ if TYPE_CHECKING:
 __all__ = ["Tuning", "tune"]
 
 
+@described
 @dataclass(frozen=True, kw_only=True)
 class Tuning:
     """Settings of a seeker, what averaging theory predicts for them, and whether that meets the wish.

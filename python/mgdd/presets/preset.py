@@ -12,6 +12,7 @@ from types import MappingProxyType
 from typing import Any, cast
 
 from mgdd._core import Cylinder, OperatingPoint, Throttle
+from mgdd._describe import core_rows, described
 from mgdd.errors import DataError, ParameterError
 from mgdd.io.parameters import Entry, ParameterFile, Parameters, Wanted
 
@@ -156,6 +157,13 @@ class Preset(Parameters):
             raise DataError(f"{file.origin}: [{tables[0]}] lacks {', '.join(missing)}: {_MISSING[file.kind]}")
         name = str(file.notes.get("name", Path(file.origin).stem))
         return cls(name=name, title=str(file.notes.get("title", name)), sources=MappingProxyType(sources), **records)
+
+
+described(
+    Preset,
+    title=lambda preset: f"Preset {preset.name}, {preset.kind}: {preset.title}",
+    rows=lambda preset: [row for record in preset.records.values() for row in core_rows(record)],
+)
 
 
 def available(kind: str | None = None) -> tuple[str, ...]:

@@ -7,9 +7,12 @@ from dataclasses import dataclass, field
 from types import TracebackType
 from typing import Protocol, Self, runtime_checkable
 
+from mgdd._describe import described
+
 __all__ = ["AnnouncingRig", "Measurement", "Rig"]
 
 
+@described
 @dataclass(frozen=True, kw_only=True)
 class Measurement:
     """What was measured of one engine cycle.

@@ -6,6 +6,7 @@ from collections.abc import Callable, Iterable, Mapping
 from dataclasses import dataclass, field
 from typing import TYPE_CHECKING, Any, TypeVar
 
+from mgdd._describe import described
 from mgdd.errors import ParameterError
 from mgdd.studies.sections import Section, standard_sections
 
@@ -58,6 +59,20 @@ class StudyResult:
     def __post_init__(self) -> None:
         if not self.sections:
             object.__setattr__(self, "sections", standard_sections(self.summary, self.figures, self.dataset))
+
+
+described(
+    StudyResult,
+    title=lambda result: f"StudyResult {result.name}" + (f": {result.title}" if result.title else ""),
+    rows=lambda result: {
+        "seeds": result.summary.get("seeds"),
+        "rows": len(result.summary.get("rows", ())),
+        "sections": tuple(section.title for section in result.sections),
+        "figures": len(result.figures),
+        "dataset": result.dataset,
+        "interrupted": bool(result.summary.get("interrupted", False)),
+    },
+)
 
 
 def check_seeds(seeds: int) -> int:

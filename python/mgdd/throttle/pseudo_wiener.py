@@ -9,6 +9,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from mgdd import _core
+from mgdd._describe import described, rows_of
 from mgdd.errors import DataError, ParameterError, ShapeError
 from mgdd.io.parameters import FIT_NOTES, ParameterFile, Parameters, Wanted, entries, wanted
 
@@ -279,11 +280,15 @@ class PseudoWiener(Parameters):
     def __hash__(self) -> int:
         return hash((self.kind, tuple(self.parameters.values()), *self._options.values()))
 
-    def __repr__(self) -> str:
-        return f"PseudoWiener({self.kind!r}, {dict(self.parameters)!r})"
-
     def __reduce__(self) -> tuple[object, ...]:
         return _rebuild, (self.kind, dict(self.parameters), dict(self._options))
+
+
+described(
+    PseudoWiener,
+    title=lambda model: f"PseudoWiener {model.kind}, " + ", ".join(f"{n} {v}" for n, v in model._options.items()),
+    rows=lambda model: rows_of(model.parameters, model.units),
+)
 
 
 def _rebuild(kind: str, parameters: Mapping[str, float], options: Mapping[str, str]) -> PseudoWiener:
