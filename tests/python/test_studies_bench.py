@@ -5,35 +5,29 @@ from __future__ import annotations
 import itertools
 import json
 import math
+from collections.abc import Callable
 
 import numpy as np
 import pytest
 
 from mgdd.loop import EngineBench, find_steady_optimum
 from mgdd.results import check_labels
-from mgdd.studies import (
-    StudyResult,
-    available_studies,
-    run_nox_sensors,
-    run_seeker_comparison,
-    run_study,
-    run_timing_tests,
-)
+from mgdd.studies import StudyResult, available_studies, run_study
 
 
 @pytest.fixture(scope="module")
-def seekers() -> StudyResult:
-    return run_seeker_comparison(quick=True)
+def seekers(quick_study: Callable[..., StudyResult]) -> StudyResult:
+    return quick_study("seeker-comparison")
 
 
 @pytest.fixture(scope="module")
-def sensors() -> StudyResult:
-    return run_nox_sensors(quick=True)
+def sensors(quick_study: Callable[..., StudyResult]) -> StudyResult:
+    return quick_study("nox-sensors")
 
 
 @pytest.fixture(scope="module")
-def four_tests() -> StudyResult:
-    return run_timing_tests(quick=True)
+def four_tests(quick_study: Callable[..., StudyResult]) -> StudyResult:
+    return quick_study("timing-tests")
 
 
 @pytest.mark.parametrize("name", ["seekers", "sensors", "four_tests"])

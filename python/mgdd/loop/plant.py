@@ -8,10 +8,12 @@ from dataclasses import dataclass, field
 from typing import Protocol, runtime_checkable
 
 from mgdd.errors import ParameterError
+from mgdd.results.describe import described
 
 __all__ = ["AnnouncingPlant", "Measurement", "Plant", "checked_inputs"]
 
 
+@described
 @dataclass(frozen=True, kw_only=True)
 class Measurement:
     """What was measured of one engine cycle, or at one sample.

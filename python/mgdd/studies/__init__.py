@@ -12,6 +12,7 @@ from mgdd.studies.measured_engine_seek import run_measured_engine_seek
 from mgdd.studies.measured_traces import run_measured_traces
 from mgdd.studies.nox_sensors import run_nox_sensors
 from mgdd.studies.registry import available_studies, run_study
+from mgdd.studies.sections import Section, Table
 from mgdd.studies.seeker_comparison import run_seeker_comparison
 from mgdd.studies.sensor_delay import run_sensor_delay
 from mgdd.studies.throttle_characteristics import run_throttle_characteristics
@@ -20,7 +21,9 @@ from mgdd.studies.throttle_pseudo_wiener import run_throttle_pseudo_wiener
 from mgdd.studies.timing_tests import run_timing_tests
 
 __all__ = [
+    "Section",
     "StudyResult",
+    "Table",
     "available_studies",
     "run_identification_benchmarks",
     "run_measured_engine_seek",

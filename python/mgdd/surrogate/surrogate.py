@@ -11,9 +11,11 @@ import numpy as np
 
 from mgdd._core import Limit
 from mgdd.errors import ParameterError
+from mgdd.io.parameters import ParameterFile, Parameters
 from mgdd.optimize import Optimum
 from mgdd.optimize.optimum import limits_of
 from mgdd.results import Label, labelled_dataset
+from mgdd.results.describe import described
 from mgdd.surrogate.optimum import best_along
 from mgdd.surrogate.response_surface import QuadraticBasis, Support
 from mgdd.surrogate.sensor_lag import SensorLag
@@ -27,6 +29,7 @@ __all__ = ["STEERED", "EngineSurrogate", "SignalModel"]
 STEERED = "soi_cad"
 
 
+@described
 @dataclass(frozen=True, kw_only=True, eq=False)
 class SignalModel:
     """The surface of one signal, and how well it does.
@@ -77,8 +80,9 @@ class SignalModel:
     cyclic_sd: float
 
 
+@described
 @dataclass(frozen=True, kw_only=True, eq=False)
-class EngineSurrogate:
+class EngineSurrogate(Parameters):
     """Quadratic surfaces of the signals of an engine over its commands, with their support and residuals.
 
     Parameters
@@ -252,6 +256,19 @@ class EngineSurrogate:
                 "cyclic_sd": ("signal", [m.cyclic_sd for m in models], own, "cyclic standard deviation"),
             }
         )
+
+    def to_parameters(self) -> ParameterFile:
+        """Give everything, residuals included, as `to_toml` writes it."""
+        from mgdd.surrogate.file import surrogate_file
+
+        return surrogate_file(self)
+
+    @classmethod
+    def from_parameters(cls, file: ParameterFile) -> EngineSurrogate:
+        """Make the surrogate of a file that `to_toml` wrote."""
+        from mgdd.surrogate.file import read_surrogate
+
+        return read_surrogate(file)
 
     def operating_point(self, at: Mapping[str, float] | None = None) -> dict[str, float]:
         """Complete a choice of inputs with the medians of the rest, and check it.
