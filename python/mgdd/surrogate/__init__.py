@@ -10,7 +10,8 @@ from mgdd.surrogate.fit import fit_surrogate
 from mgdd.surrogate.random_steps import random_step_records
 from mgdd.surrogate.response_surface import Support
 from mgdd.surrogate.sensor_lag import SensorLag
-from mgdd.surrogate.surrogate import EngineSurrogate, SignalModel
+from mgdd.surrogate.signal_model import SignalModel
+from mgdd.surrogate.surrogate import EngineSurrogate
 
 __all__ = [
     "EngineSurrogate",

@@ -12,10 +12,12 @@ from mgdd.io.parameters import Entry, ParameterFile, Wanted, wanted
 from mgdd.results import Label
 from mgdd.surrogate.response_surface import QuadraticBasis, Support
 from mgdd.surrogate.sensor_lag import SensorLag
-from mgdd.surrogate.surrogate import EngineSurrogate, SignalModel
+from mgdd.surrogate.signal_model import SignalModel
 
 if TYPE_CHECKING:
     from numpy.typing import NDArray
+
+    from mgdd.surrogate.surrogate import EngineSurrogate
 
 __all__ = ["read_surrogate", "surrogate_file"]
 
@@ -49,8 +51,8 @@ def surrogate_file(surrogate: EngineSurrogate) -> ParameterFile:
     return ParameterFile(kind="surrogate", tables=tables)
 
 
-def read_surrogate(file: ParameterFile) -> EngineSurrogate:
-    """Make the surrogate of such a file."""
+def read_surrogate(file: ParameterFile) -> dict[str, Any]:
+    """Give what such a file holds, by the fields of the surrogate."""
     per_signal = [table for table in file.tables if table.startswith(_SIGNAL)]
     file.expect(kinds=("surrogate",), tables=("inputs", "support", "signals", "records", "source", *per_signal))
     inputs = file.values("inputs", {**wanted(_LABELS, form="texts"), "median": Wanted(_PER_INPUT, "numbers")})
@@ -73,7 +75,7 @@ def read_surrogate(file: ParameterFile) -> EngineSurrogate:
         basis=QuadraticBasis(centre=centre, scale=scale),
         root=_array(file, "[support] root", own["root"], (terms, terms)),
     )
-    return EngineSurrogate(
+    return dict(  # noqa: C408 one line per field
         signals={name: _signal_of(file, name, label, terms) for name, label in labels.items()},
         support=support,
         medians={
