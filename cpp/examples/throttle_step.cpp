@@ -6,7 +6,7 @@
 
 #include "mgdd/common/units.hpp"
 #include "mgdd/throttle/plant.hpp"
-#include "mgdd/throttle/pw_r.hpp"
+#include "mgdd/throttle/models/pw_r.hpp"
 
 int main(int argc, char** argv) {
   using namespace mgdd::throttle;
