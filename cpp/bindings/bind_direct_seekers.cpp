@@ -4,7 +4,7 @@
 #include <string>
 #include <vector>
 
-#include "mgdd/optimize/tuner.hpp"
+#include "mgdd/optimize/seekers/tuner.hpp"
 #include "seeker_binding.hpp"
 
 namespace mgdd::bindings {

@@ -4,7 +4,7 @@
 #include <vector>
 
 #include "binding.hpp"
-#include "mgdd/identify/cylinder_fit.hpp"
+#include "mgdd/identify/engine/cylinder_fit.hpp"
 
 namespace mgdd::bindings {
 

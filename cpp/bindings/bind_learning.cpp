@@ -5,7 +5,7 @@
 #include <vector>
 
 #include "binding.hpp"
-#include "mgdd/optimize/iterative_learning.hpp"
+#include "mgdd/optimize/learning/iterative_learning.hpp"
 
 namespace mgdd::bindings {
 namespace {

@@ -4,8 +4,8 @@
 #include <vector>
 
 #include "binding.hpp"
-#include "mgdd/optimize/dither.hpp"
-#include "mgdd/optimize/limit_guard.hpp"
+#include "mgdd/optimize/seekers/dither.hpp"
+#include "mgdd/optimize/seekers/limit_guard.hpp"
 
 namespace mgdd::bindings {
 namespace {

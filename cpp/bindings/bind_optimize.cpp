@@ -3,7 +3,7 @@
 
 #include "binding.hpp"
 #include "mgdd/common/error.hpp"
-#include "mgdd/optimize/least_squares.hpp"
+#include "mgdd/optimize/least_squares/least_squares.hpp"
 
 namespace mgdd::bindings {
 namespace {

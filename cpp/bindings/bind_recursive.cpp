@@ -1,4 +1,4 @@
-// Binds include/mgdd/identify/pseudo_wiener_fit.hpp and recursive_*.hpp: the fit and the on-line update.
+// Binds include/mgdd/identify/throttle/pseudo_wiener_fit.hpp and recursive_*.hpp: the fit and the on-line update.
 #include <algorithm>
 #include <array>
 #include <cmath>
@@ -9,10 +9,10 @@
 #include "binding.hpp"
 #include "mgdd/common/error.hpp"
 #include "mgdd/common/state.hpp"
-#include "mgdd/identify/pseudo_wiener_fit.hpp"
-#include "mgdd/identify/recursive_gradient.hpp"
-#include "mgdd/identify/recursive_pw_r.hpp"
-#include "mgdd/identify/recursive_window.hpp"
+#include "mgdd/identify/online/recursive_gradient.hpp"
+#include "mgdd/identify/online/recursive_pw_r.hpp"
+#include "mgdd/identify/online/recursive_window.hpp"
+#include "mgdd/identify/throttle/pseudo_wiener_fit.hpp"
 #include "pseudo_wiener_binding.hpp"
 
 namespace mgdd::bindings {

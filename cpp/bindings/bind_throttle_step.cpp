@@ -12,7 +12,7 @@
 
 #include "binding.hpp"
 #include "mgdd/common/error.hpp"
-#include "mgdd/throttle/pseudo_wiener.hpp"
+#include "mgdd/throttle/models/pseudo_wiener.hpp"
 #include "mgdd/throttle/simulation.hpp"
 #include "pseudo_wiener_binding.hpp"
 

@@ -6,8 +6,8 @@
 #include <vector>
 
 #include "binding.hpp"
-#include "mgdd/engine/trace_analysis.hpp"
-#include "mgdd/engine/trace_check.hpp"
+#include "mgdd/engine/pressure/trace_analysis.hpp"
+#include "mgdd/engine/pressure/trace_check.hpp"
 
 namespace mgdd::bindings {
 namespace {

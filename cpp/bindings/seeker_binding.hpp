@@ -10,7 +10,7 @@
 #include "binding.hpp"
 #include "mgdd/common/error.hpp"
 #include "mgdd/common/state.hpp"
-#include "mgdd/optimize/seekers.hpp"
+#include "mgdd/optimize/seekers/seekers.hpp"
 
 namespace mgdd::bindings {
 

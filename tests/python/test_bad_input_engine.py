@@ -22,6 +22,7 @@ from mgdd.engine import (
 from mgdd.errors import DataError, Error, ParameterError
 from mgdd.identify import fit_cylinder
 from mgdd.io import pressure_trace
+from mgdd.optimize import FitOptions
 
 CYLINDER, POINT = Cylinder(), OperatingPoint()
 NUMBERS = [
@@ -209,11 +210,11 @@ def trace():
         ({"free": []}, ParameterError, "free is empty"),
         ({"step_cad": 0.0}, ParameterError, "step_cad = 0"),
         ({"integrator": "rk4"}, ParameterError, "integrator = 'rk4'"),
-        ({"max_iterations": 0}, ParameterError, "max_iterations = 0"),
-        ({"start": [{"fuel": 3.0}]}, ParameterError, "'fuel' is no parameter of a trace.*fuel_heat_j"),
-        ({"start": [{"fuel_heat_j": -3.0}]}, ParameterError, r"fuel_heat_j\[trace\] = -3"),
-        ({"start": [{"soc_cad": math.nan}]}, ParameterError, r"soc_cad\[trace\] = -?nan"),
-        ({"start": []}, ParameterError, "start has 0 entries for 1 traces"),
+        ({"options": FitOptions(seed=1)}, ParameterError, "seed has no effect on this fit"),
+        ({"start_values": [{"fuel": 3.0}]}, ParameterError, "'fuel' is no parameter of a trace.*fuel_heat_j"),
+        ({"start_values": [{"fuel_heat_j": -3.0}]}, ParameterError, r"fuel_heat_j\[trace\] = -3"),
+        ({"start_values": [{"soc_cad": math.nan}]}, ParameterError, r"soc_cad\[trace\] = -?nan"),
+        ({"start_values": []}, ParameterError, "start_values has 0 entries for 1 traces"),
     ],
 )
 def test_calibrations_that_cannot_start(keyword, error, match):

@@ -101,7 +101,10 @@ def test_variables_table_is_complete() -> None:
 
 
 # --- names --------------------------------------------------------------------------------------------------
-ROOMS = sorted(m.name for m in pkgutil.iter_modules(mgdd.__path__) if not m.name.startswith("_"))
+ROOMS = [
+    *sorted(m.name for m in pkgutil.iter_modules(mgdd.__path__) if not m.name.startswith("_")),
+    "studies.benchmarks",
+]
 
 
 def public() -> list[tuple[str, str, object]]:

@@ -311,7 +311,7 @@ def test_timing_says_when_the_sweep_ends_too_early():
         (plot.seeking, sought, "soc_requested_cad", "mgdd.loop.run_seeker"),
         (plot.convergence, tracks, "estimate_median_cad", "a study of mgdd.studies"),
         (plot.sensors, readings, "nox_true_ppm", "mgdd.loop.EngineBench.run"),
-        (plot.learning, learned, "ca50_error_cad", "mgdd.studies.run_ch3_optimizers"),
+        (plot.learning, learned, "ca50_error_cad", "mgdd.studies.run_seeker_comparison"),
     ],
 )
 def test_a_missing_variable_is_named_with_its_maker(function, dataset, variable, maker):

@@ -6,13 +6,13 @@ import argparse
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
-from mgdd import identify
+from mgdd import identify, signals
 from mgdd.cli.options import add_command
 from mgdd.cli.output import emit
 from mgdd.cli.throttle_files import check_ending
 from mgdd.cli.throttle_parameters import add_throttle, throttle_of
 from mgdd.errors import ParameterError
-from mgdd.identify.excitation_design import EXCITATIONS
+from mgdd.identify.throttle.excitation_design import EXCITATIONS
 
 if TYPE_CHECKING:
     import xarray as xr
@@ -98,11 +98,11 @@ def _excite(args: argparse.Namespace) -> None:
             angle_window_deg=window, **limits,
         )  # fmt: skip
     else:
-        make = getattr(identify, args.kind)
+        make = getattr(signals, args.kind)
         signal = make(offset=args.offset, amplitude=args.amplitude, step_s=args.step_s, **given)
         check = identify.check_excitation(signal, throttle, angle_window_deg=window, **limits)
         if not check.passed:
-            raise ParameterError("this signal must not be sent: " + "; ".join(check.findings))
+            raise ParameterError("this signal must not be sent: " + "; ".join(map(str, check.findings)))
     attrs = {name: value for name, value in signal.attrs.items() if name != "kind"}
     payload = {"kind": args.kind, "preset": preset, "samples": signal.sizes["time_s"], "step_s": args.step_s}
     payload |= attrs | check.to_dict()

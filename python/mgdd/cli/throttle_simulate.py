@@ -14,8 +14,8 @@ from mgdd.cli.throttle_parameters import add_throttle, throttle_of
 from mgdd.errors import DataError, ParameterError
 from mgdd.io.table import read_table
 from mgdd.io.throttle_checks import Place
+from mgdd.signals.even_grid import even_step
 from mgdd.throttle import simulate, step_summary
-from mgdd.throttle.simulation import sample_time
 
 if TYPE_CHECKING:
     import xarray as xr
@@ -115,7 +115,7 @@ def _from_file(args: argparse.Namespace) -> dict[str, Any]:
 
 def _check_rows(columns: dict[str, Any], place: Place) -> None:
     """Refuse by line of the file what the simulation would refuse by sample."""
-    sample_time(columns["time_s"], place.row)
+    even_step(columns["time_s"], where=lambda at: place.cell(at, "time_s"), remedy="resample the duty first")
     duty = columns["duty"]
     if np.abs(duty).max() > 1.0:
         at = int(np.argmax(np.abs(duty) > 1.0))

@@ -18,7 +18,7 @@ from mgdd._core import (
 from mgdd.engine.cycle import convergence, sensitivities, simulate, timing_sweep
 from mgdd.engine.ignition import Timing, start_of_combustion, start_of_injection
 from mgdd.engine.nox import fit_nox_proxy
-from mgdd.engine.optimum import Optimum, optimum
+from mgdd.engine.optimum import find_optimum
 from mgdd.engine.trace import analyze
 
 __all__ = [
@@ -27,15 +27,14 @@ __all__ = [
     "NoxModel",
     "NoxProxy",
     "OperatingPoint",
-    "Optimum",
     "Performance",
     "PerformanceTerm",
     "SoftSensor",
     "Timing",
     "analyze",
     "convergence",
+    "find_optimum",
     "fit_nox_proxy",
-    "optimum",
     "sensitivities",
     "simulate",
     "start_of_combustion",

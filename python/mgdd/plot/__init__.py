@@ -12,6 +12,7 @@ from mgdd.plot.convergence import convergence
 from mgdd.plot.cycle import log_pv, pressure
 from mgdd.plot.identification import correlation_matrix, error_growth, residual_correlation
 from mgdd.plot.learning import learning
+from mgdd.plot.measured import measured_and_model
 from mgdd.plot.seeking import seeking
 from mgdd.plot.sensors import sensors
 from mgdd.plot.throttle import free_run, holding_duty
@@ -29,6 +30,7 @@ __all__ = [
     "holding_duty",
     "learning",
     "log_pv",
+    "measured_and_model",
     "pressure",
     "rate_dependence",
     "residual_correlation",

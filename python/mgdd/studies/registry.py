@@ -11,18 +11,18 @@ from mgdd.studies.base import Progress, StudyResult, check_seeds
 
 __all__ = ["available_studies", "run_study"]
 
-# One line per study: "my-name" is run_my_name in mgdd.studies.my_name, imported when it is run.
+# One line per study: "my-name" is run_my_name of mgdd.studies.
 _TITLES = {
     "measured-traces": "calibrate a cycle model to four measured traces and find their best timing",
-    "ch2-throttle-characteristics": "holding-duty hysteresis, rate dependence and air flow of a throttle",
-    "ch3-optimizers": "every seeker on the same engine, noise, start and budget",
-    "ch4-sensors": "NOx analyser, fast sensor and soft sensor, steady and in transients",
-    "ch4-esc": "what a late NOx analyser does to extremum seeking, and three cures",
-    "ch4-tests": "four tests of extremum seeking: efficiency, another start, NOx by analyser and by soft sensor",
-    "ch7-first-principle": "groups of a throttle from noisy logs, also where the plant does more than the model",
-    "ch7-pseudo-wiener": "three pseudo-Wiener models of a throttle, in free run and re-anchored",
+    "throttle-characteristics": "holding-duty hysteresis, rate dependence and air flow of a throttle",
+    "seeker-comparison": "every seeker on the same engine, noise, start and budget",
+    "nox-sensors": "NOx analyser, fast sensor and soft sensor, steady and in transients",
+    "sensor-delay": "what a late NOx analyser does to extremum seeking, and three cures",
+    "timing-tests": "four tests of extremum seeking: efficiency, another start, NOx by analyser and by soft sensor",
+    "throttle-first-principle": "groups of a throttle from noisy logs, also where the plant does more than the model",
+    "throttle-pseudo-wiener": "three pseudo-Wiener models of a throttle, in free run and re-anchored",
     "identification-benchmarks": "measured drive, tanks and circuit: fits beside published ones (needs the data sets)",
-    "h2df-seek": "seekers on a surrogate of a measured hydrogen-diesel engine (needs the data set)",
+    "measured-engine-seek": "seekers on a surrogate of a measured hydrogen-diesel engine (needs the data set)",
 }
 
 
@@ -37,7 +37,7 @@ def available_studies() -> dict[str, str]:
     Examples
     --------
     >>> from mgdd.studies import available_studies
-    >>> "ch4-esc" in available_studies()
+    >>> "sensor-delay" in available_studies()
     True
     """
     return dict(_TITLES)
@@ -79,14 +79,13 @@ def run_study(
     Examples
     --------
     >>> from mgdd.studies import run_study
-    >>> result = run_study("ch4-esc", seeds=2, quick=True, figures=False)
+    >>> result = run_study("sensor-delay", seeds=2, quick=True, figures=False)
     >>> [row["step_sign"] for row in result.summary["rows"]]
     [1, -1, -1, -1, 1, 1, 1]
     """
     if name not in _TITLES:
         raise ParameterError(f"study {name!r}: must be one of {', '.join(_TITLES)}")
-    module = name.replace("-", "_")
-    function = getattr(import_module(f"mgdd.studies.{module}"), f"run_{module}")
+    function = getattr(import_module("mgdd.studies"), f"run_{name.replace('-', '_')}")
     options: dict[str, Any] = {"quick": quick, "figures": figures}
     if progress is not None:
         options["progress"] = progress

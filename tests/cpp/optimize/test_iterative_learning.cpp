@@ -1,4 +1,4 @@
-#include "mgdd/optimize/iterative_learning.hpp"
+#include "mgdd/optimize/learning/iterative_learning.hpp"
 
 #include <algorithm>
 #include <cmath>

@@ -15,10 +15,10 @@
 #include <Eigen/Core>
 
 #include "mgdd/common/error.hpp"
-#include "mgdd/identify/simulation_residual.hpp"
-#include "mgdd/optimize/fit_report.hpp"
-#include "mgdd/optimize/least_squares.hpp"
-#include "mgdd/optimize/parameter.hpp"
+#include "mgdd/identify/output_error.hpp"
+#include "mgdd/optimize/least_squares/fit_report.hpp"
+#include "mgdd/optimize/least_squares/least_squares.hpp"
+#include "mgdd/optimize/least_squares/parameter.hpp"
 
 namespace mgdd::identify {
 

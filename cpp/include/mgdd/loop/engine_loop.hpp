@@ -9,7 +9,7 @@
 #include <vector>
 
 #include "mgdd/loop/engine_bench.hpp"
-#include "mgdd/optimize/seekers.hpp"
+#include "mgdd/optimize/seekers/seekers.hpp"
 
 namespace mgdd::loop {
 
