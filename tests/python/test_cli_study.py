@@ -9,7 +9,8 @@ from typing import Any
 import pytest
 
 from mgdd.cli import main
-from mgdd.cli.study import table
+from mgdd.cli.output import show
+from mgdd.cli.study import rows_table
 from mgdd.studies import available_studies, sensor_delay
 
 
@@ -30,8 +31,13 @@ def test_list(capsys: pytest.CaptureFixture[str]) -> None:
 @pytest.mark.parametrize("argv", [["no-such-study"], ["no-such-study", "--json"], []])
 def test_an_unknown_name_lists_the_known_ones(capsys: pytest.CaptureFixture[str], argv: list[str]) -> None:
     out, err = run(capsys, *argv, code=2)
-    assert out == ""
     assert all(name in err for name in available_studies())
+    if "--json" in argv:
+        error = json.loads(out)["error"]
+        assert error["type"] == "ParameterError"
+        assert f"mgdd: error: {error['message']}\n" == err
+    else:
+        assert out == ""
 
 
 def test_refused_before_any_work(capsys: pytest.CaptureFixture[str], tmp_path: Path) -> None:
@@ -67,12 +73,12 @@ def test_table_puts_the_interval_behind_its_mean() -> None:
         {"who": "a", "x": 1.23456, "x_low": 1.0, "x_high": 1.5, "n_low": 3},
         {"who": "bcd", "x": 2.0, "x_low": None, "x_high": None, "n_low": None},
     ]
-    assert table(rows).splitlines() == [
+    assert show([rows_table(rows)]).splitlines() == [
         "who               x  n_low",
         "a    1.235 [1, 1.5]      3",
         "bcd               2      –",
     ]
-    assert table([]) == "(no rows)"
+    assert show([rows_table([])]) == "(no rows)"
 
 
 def test_ctrl_c_prints_what_is_finished(capsys: pytest.CaptureFixture[str], monkeypatch: pytest.MonkeyPatch) -> None:

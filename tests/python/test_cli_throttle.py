@@ -177,5 +177,5 @@ def test_bad_logs_and_files_are_refused(
     assert "below limp-home" in said
     assert "leave --two-sided out" in said
     bad = tmp_path / "fit.toml"
-    bad.write_text("kind = 'pw_r'\n")
+    bad.write_text("kind = 'pw_r'\nformat = 1\n")
     assert "no table [parameters]" in refused(capsys, "throttle", "validate", str(bad), files[0])

@@ -11,12 +11,11 @@ import xarray as xr
 
 from mgdd.errors import DataError, ParameterError
 from mgdd.identify import fit_throttle, identify_throttle, load_throttle_model, validate_throttle
-from mgdd.io import throttle_log
+from mgdd.io import ParameterFile, throttle_log
 from mgdd.optimize import FitOptions
 from mgdd.results import Model
 from mgdd.signals import amplitude_random_steps, chirp, triangle
-from mgdd.throttle import Throttle, simulate
-from mgdd.throttle.fitted_parameters import FittedParameters
+from mgdd.throttle import PseudoWiener, Throttle, simulate
 
 P1 = Throttle()
 
@@ -57,10 +56,13 @@ def test_a_fit_says_how_good_it_is(kind: str, train: Any, test_log: Any, tmp_pat
     assert float(ahead.sel(predictor=kind).max()) < 0.5
     assert float(ahead.sel(predictor="persistence").max()) > 1.0
 
-    saved = FittedParameters.from_toml(fit.to_toml())
-    assert FittedParameters.from_toml(saved.to_toml()) == saved
-    assert saved.source == "fitted to chirp.csv"
-    assert saved.stderr, "standard errors are saved"
+    saved = ParameterFile.from_toml(fit.to_toml())
+    assert ParameterFile.from_toml(saved.to_toml()) == saved
+    assert saved.notes["source"] == "fitted to chirp.csv"
+    assert saved.tables["fit"]["fit_percent_train"].value == fit.train.nrmse_fit_percent
+    errors = dict(zip(fit.report.names, fit.report.stderr, strict=True))
+    kept = {name: entry.stderr for name, entry in saved.tables["parameters"].items() if entry.stderr is not None}
+    assert set(kept.values()) == {error for error in errors.values() if np.isfinite(error)}
     file = tmp_path / "fit.toml"
     file.write_text(fit.to_toml(), encoding="utf-8")
     again = load_throttle_model(file)
@@ -81,7 +83,7 @@ def test_a_lag_of_the_current_is_kept_only_where_it_pays() -> None:
         )
         assert with_lag < without
         assert (with_lag < 0.97 * without) is kept
-        fit = identify_throttle(log, "first_principle", starts=1)
+        fit = identify_throttle(log, "first_principle", options=FitOptions(n_starts=1))
         assert (fit.parameters["electrical_s"] > 0.0) is kept
         assert fit.report.rmse == pytest.approx(with_lag if kept else without, rel=1e-9)
 
@@ -130,15 +132,25 @@ def test_what_cannot_be_fitted_is_refused(train: Any) -> None:
 
 
 def test_saved_parameters_are_checked(tmp_path: Path) -> None:
-    good = FittedParameters(kind="pw_r", values={"tau_s": 0.02}, source="me").to_toml()
-    with pytest.raises(DataError, match=r"tau_s: unit = 'ms': must be 's'"):
-        FittedParameters.from_toml(good.replace('"s"', '"ms"'))
-    with pytest.raises(DataError, match="not valid TOML"):
-        FittedParameters.from_toml("kind = ")
-    with pytest.raises(ParameterError, match=r"kind = 'arx'"):
-        FittedParameters.from_toml(good.replace("pw_r", "arx"))
-    with pytest.raises(ParameterError, match="must be finite"):
-        FittedParameters.from_toml(good.replace("0.02", "nan"))
-    assert FittedParameters.from_toml(good).values["tau_s"] == 0.02
+    model, file = PseudoWiener("pw_r", {"above_tau_s": 0.02}), tmp_path / "fit.toml"
+    good = model.to_toml()
+    for old, new, error, match in (
+        ('"s"', '"ms"', ParameterError, r"fit\.toml: \[parameters\] above_tau_s: unit = 'ms': must be 's'"),
+        ("kind = ", "kind ", DataError, "not valid TOML"),
+        ("pw_r", "arx", DataError, "kind = 'arx': must be 'first_principle' or 'pw_r'"),
+        ("value = 0.02,", "value = nan,", ParameterError, r"fit\.toml: above_tau_s = nan"),
+        ("above_tau_s", "above_tua_s", ParameterError, "above_tua_s: unknown key: did you mean 'above_tau_s'"),
+        ("switching = ", "switch = ", ParameterError, "switch: unknown key: did you mean 'switching'"),
+        ('"predicted"', '"guessed"', ParameterError, r"fit\.toml: .*guessed"),
+    ):
+        file.write_text(good.replace(old, new), encoding="utf-8")
+        with pytest.raises(error, match=match):
+            load_throttle_model(file)
+    lines = [line for line in good.splitlines() if not line.startswith("above_tau_s")]
+    file.write_text("\n".join(lines), encoding="utf-8")
+    with pytest.raises(DataError, match=r"\[parameters\] lacks above_tau_s: write above_tau_s = "):
+        load_throttle_model(file)
+    file.write_text(good, encoding="utf-8")
+    assert load_throttle_model(file) == model
     with pytest.raises(FileNotFoundError):
         load_throttle_model(tmp_path / "none.toml")

@@ -14,7 +14,7 @@ import pytest
 import mgdd
 
 PACKAGE_FILES = re.compile(
-    r"mgdd/(.*\.pyi?|_core\..*\.so|py\.typed|presets/[^/]+\.toml|data/([^/]+/)*[^/]+\.(csv|txt)|.*\.pyc)"
+    r"mgdd/(.*\.pyi?|_core\..*\.so|py\.typed|presets/[^/]+\.toml|report/templates/[^/]+\.(html|css)|data/([^/]+/)*[^/]+\.(csv|txt)|.*\.pyc)"
     r"|mgdd-[^/]+\.dist-info/.*|(\.\./)*bin/mgdd"
 )
 

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import copy
 import pickle
+from collections.abc import Callable
 
 import numpy as np
 import pytest
@@ -13,7 +14,7 @@ from mgdd.errors import DataError, ParameterError, ShapeError
 from mgdd.identify import OnlineUpdate, fit_pseudo_wiener
 from mgdd.optimize import FitOptions
 from mgdd.results import Model
-from mgdd.studies.throttle_pseudo_wiener import run_throttle_pseudo_wiener
+from mgdd.studies import StudyResult
 from mgdd.throttle import PseudoWiener, Throttle
 
 TIME = np.arange(4000) * 1e-3
@@ -105,10 +106,10 @@ def test_bad_input_says_what_and_leaves_things_alone() -> None:
         model.simulate({"time_s": TIME, "duty": DUTY}, initial_state={"angle": 8.0})
     with pytest.raises(ParameterError, match="horizon = 0"):
         model.predict(simulate(model, 8.0), 0)
-    with pytest.raises(DataError, match=r"unit = 'rad': must be 'deg'"):
+    with pytest.raises(ParameterError, match=r"unit = 'rad': must be 'deg'"):
         PseudoWiener.from_toml(model.to_toml().replace('"deg"', '"rad"'))
     with pytest.raises(DataError, match=r"no table \[parameters\]"):
-        PseudoWiener.from_toml('kind = "pw_r"')
+        PseudoWiener.from_toml('kind = "pw_r"\nformat = 1')
 
 
 def test_the_fit_recovers_a_model_of_its_own_kind() -> None:
@@ -171,8 +172,8 @@ def test_online_update_refuses_what_it_cannot_do() -> None:
         OnlineUpdate(MODELS[0], free=["mass"])
 
 
-def test_the_study_ranks_the_kinds() -> None:
-    result = run_throttle_pseudo_wiener(starts=4, quick=True)
+def test_the_study_ranks_the_kinds(quick_study: Callable[..., StudyResult]) -> None:
+    result = quick_study("throttle-pseudo-wiener", starts=4)
     rows = {(row["plant"], row["model"]): row for row in result.summary["rows"] if row["lag_start"] != "best"}
     better = {(row["plant"], row["model"]): row for row in result.summary["rows"] if row["lag_start"] == "best"}
     printed = {"P1": {"pw_r": 99.4, "pw_w": 79.7, "pw_p": 53.7}, "P2": {"pw_r": 99.4, "pw_w": 92.0, "pw_p": 82.4}}

@@ -5,6 +5,7 @@ from __future__ import annotations
 import itertools
 import json
 import math
+from collections.abc import Callable
 
 import numpy as np
 import pytest
@@ -12,24 +13,21 @@ import pytest
 from mgdd.loop import EngineBench, find_steady_optimum
 from mgdd.results import check_labels
 from mgdd.studies import StudyResult, available_studies, run_study
-from mgdd.studies.nox_sensors import run_nox_sensors
-from mgdd.studies.seeker_comparison import run_seeker_comparison
-from mgdd.studies.timing_tests import run_timing_tests
 
 
 @pytest.fixture(scope="module")
-def seekers() -> StudyResult:
-    return run_seeker_comparison(quick=True)
+def seekers(quick_study: Callable[..., StudyResult]) -> StudyResult:
+    return quick_study("seeker-comparison")
 
 
 @pytest.fixture(scope="module")
-def sensors() -> StudyResult:
-    return run_nox_sensors(quick=True)
+def sensors(quick_study: Callable[..., StudyResult]) -> StudyResult:
+    return quick_study("nox-sensors")
 
 
 @pytest.fixture(scope="module")
-def four_tests() -> StudyResult:
-    return run_timing_tests(quick=True)
+def four_tests(quick_study: Callable[..., StudyResult]) -> StudyResult:
+    return quick_study("timing-tests")
 
 
 @pytest.mark.parametrize("name", ["seekers", "sensors", "four_tests"])

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import json
 import math
+from collections.abc import Callable
 
 import numpy as np
 import pytest
@@ -17,8 +18,8 @@ KEYS = ["case", "period_cycles", "phase_deg", "step_sign", "cycles_stays", "fina
 
 
 @pytest.fixture(scope="module")
-def result() -> StudyResult:
-    return run_sensor_delay(seeds=4, quick=True)
+def result(quick_study: Callable[..., StudyResult]) -> StudyResult:
+    return quick_study("sensor-delay", seeds=4)
 
 
 def test_seven_rows_in_order(result: StudyResult) -> None:

@@ -6,7 +6,7 @@ import argparse
 from typing import Any
 
 from mgdd.cli.options import engine_of, traces_of
-from mgdd.cli.output import check_output, emit, progress
+from mgdd.cli.output import check_output, emit
 from mgdd.errors import ConvergenceError
 from mgdd.identify import compare_laws, fit_cylinder, wall_heat_profile
 from mgdd.identify.engine.profile import WallHeatProfile
@@ -30,16 +30,16 @@ def calibrate(args: argparse.Namespace) -> None:
     traces = traces_of(args)
     free = [name.strip() for name in args.free.split(",")] if args.free else None
     scheme: dict[str, Any] = {"step_cad": args.step_cad, "integrator": args.integrator}
-    with progress(args, expected=25 + (45 if args.report_folder else 0)) as step:
-        step("calibrate")
-        fit = fit_cylinder(traces, cylinder, free=free, point=point, **scheme)
-        profile = None
-        if "wall_heat_scale" in fit.report.names and len(fit.report.names) > 1:
-            profile = wall_heat_profile(traces, fit, point=point, progress=step, **scheme)
-        laws = compare_laws(traces, cylinder, point=point, progress=step, **scheme)
-        if args.report_folder:
-            result = run_measured_traces(traces, cylinder, point=point, progress=step, **scheme)
-            write_report(result, args.report_folder)
+    step = args.progress.expect(25 + (45 if args.report_folder else 0))
+    step("calibrate")
+    fit = fit_cylinder(traces, cylinder, free=free, point=point, **scheme)
+    profile = None
+    if "wall_heat_scale" in fit.report.names and len(fit.report.names) > 1:
+        profile = wall_heat_profile(traces, fit, point=point, progress=step, **scheme)
+    laws = compare_laws(traces, cylinder, point=point, progress=step, **scheme)
+    if args.report_folder:
+        result = run_measured_traces(traces, cylinder, point=point, progress=step, **scheme)
+        write_report(result, args.report_folder)
     payload = {"preset": preset.name, **_payload(fit, profile, laws)}
     emit(args, payload, text=payload["report"])
     if not fit.report.success:

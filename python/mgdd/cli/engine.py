@@ -18,7 +18,7 @@ from mgdd.cli.options import (
     number_pairs,
     traces_of,
 )
-from mgdd.cli.output import check_output, emit, lines, progress
+from mgdd.cli.output import check_output, emit, lines
 from mgdd.cli.seek import add_seek
 from mgdd.engine import analyze, find_optimum, simulate, start_of_combustion, start_of_injection, timing_sweep
 from mgdd.errors import ConvergenceError, ParameterError
@@ -250,18 +250,17 @@ def _optimum_of_files(
     args: argparse.Namespace, cylinder: Cylinder, point: OperatingPoint, limits: dict[str, float], preset: str
 ) -> None:
     traces = traces_of(args)
-    with progress(args, expected=2) as step:
-        rows = best_timing(
-            traces,
-            cylinder,
-            point=point,
-            objective=args.objective or "imep_closed_bar",
-            limits=limits,
-            bounds_cad=_bounds(args),
-            progress=step,
-            step_cad=args.step_cad or 0.25,
-            integrator=args.integrator,
-        )
+    rows = best_timing(
+        traces,
+        cylinder,
+        point=point,
+        objective=args.objective or "imep_closed_bar",
+        limits=limits,
+        bounds_cad=_bounds(args),
+        progress=args.progress.expect(2),
+        step_cad=args.step_cad or 0.25,
+        integrator=args.integrator,
+    )
     text = "\n\n".join(
         f"{row['file']}\n" + lines({k: f"{v[0]:.2f} to {v[1]:.2f}" for k, v in row.items() if _is_range(v)})
         for row in rows

@@ -12,8 +12,8 @@ from mgdd.cli.options import add_command
 from mgdd.cli.output import check_figure, emit
 from mgdd.cli.throttle_files import add_log_options, check_ending, log_of, wrote
 from mgdd.errors import ConvergenceError
+from mgdd.identify.throttle.fits import KINDS
 from mgdd.optimize import FitOptions
-from mgdd.throttle.fitted_parameters import KINDS
 
 if TYPE_CHECKING:
     import xarray as xr

@@ -11,11 +11,14 @@ import numpy as np
 
 from mgdd import _core
 from mgdd.errors import ParameterError, ShapeError
+from mgdd.io.parameters import Entry, ParameterFile, Wanted, entries, wanted
 from mgdd.optimize import least_squares
 from mgdd.optimize.fit_options import FitOptions, fit_options
 from mgdd.optimize.fit_run import draw_run, fit_run, quality_of
 from mgdd.results import VARIABLES, Fit, Label
+from mgdd.results.describe import described
 from mgdd.results.fit import n_best_of
+from mgdd.results.units import unit_of
 from mgdd.signals.even_grid import even_step
 from mgdd.signals.model import RunInputs, SampledModel, columns_of
 
@@ -31,8 +34,11 @@ __all__ = ["OdeModel", "fit_ode"]
 
 # Central differences: the truncation h^2 and the rounding eps/h meet near eps^(1/3).
 _STEP = 6e-6
+_FUNCTIONS = ("derivative", "output")
+_STATE = "unit of the state"
 
 
+@described
 @dataclass(frozen=True, kw_only=True)
 class OdeModel(SampledModel):
     """An ordinary differential equation with its parameters, on fixed Runge-Kutta steps with the input held.
@@ -96,6 +102,79 @@ class OdeModel(SampledModel):
 
     def _label(self, name: str) -> Label:
         return VARIABLES.get(name, Label(f"unit of {name}", name))
+
+    def to_toml(self) -> str:
+        """Write parameters, initial state, columns and substeps as TOML, with the names of the two functions.
+
+        Returns
+        -------
+        str
+            The text of a parameter file, for `from_toml`.
+        """
+        settings = {
+            "initial_state": Entry(value=[float(x) for x in self.initial_state], unit=_STATE),
+            "substeps": Entry(value=self.substeps),
+            "input_names": Entry(value=list(self.input_names)),
+            "output_name": Entry(value=self.output_name),
+        }
+        functions = {name: _name_of(getattr(self, name)) for name in _FUNCTIONS}
+        tables = {"parameters": entries(self.parameters), "settings": settings, "functions": entries(functions)}
+        return ParameterFile(kind="ode", tables=tables).to_toml()
+
+    @classmethod
+    def from_toml(
+        cls, text: str, *, derivative: Derivative, output: Output | None = None, origin: str = "text"
+    ) -> OdeModel:
+        """Read what `to_toml` wrote; the functions are Python and are given again.
+
+        Parameters
+        ----------
+        text : str
+            The text of a parameter file.
+        derivative, output : callable
+            The functions of the model that was written; the first state without `output`.
+        origin : str
+            Name for the messages, for example the file.
+
+        Returns
+        -------
+        OdeModel
+            Simulates bit for bit as the one that was written.
+
+        Raises
+        ------
+        DataError
+            Not TOML, another kind or format version, a missing table or key.
+        ParameterError
+            An unknown key, a wrong type, or functions of other names than those that were written.
+        """
+        file = ParameterFile.from_toml(text, origin=origin)
+        file.expect(kinds=("ode",), tables=("parameters", "settings", "functions"))
+        read: Output = _first_state if output is None else output
+        functions = {"derivative": derivative, "output": read}
+        for name, written in file.values("functions", wanted(_FUNCTIONS, form="text")).items():
+            if _name_of(functions[name]) != written:
+                raise ParameterError(
+                    f"{name} = {_name_of(functions[name])}: {origin} was written with {written}; give that function, "
+                    f"or change the line in [functions] if it was renamed"
+                )
+        expected = {
+            "initial_state": Wanted(_STATE, "numbers"),
+            "substeps": Wanted(form="integer"),
+            "input_names": Wanted(form="texts"),
+            "output_name": Wanted(form="text"),
+        }
+        settings = file.values("settings", expected)
+        values = file.values("parameters", {name: Wanted(unit_of(name)) for name in file.tables["parameters"]})
+        return cls(
+            derivative=derivative,
+            output=read,
+            parameters=values,
+            initial_state=tuple(float(value) for value in settings["initial_state"]),
+            substeps=settings["substeps"],
+            input_names=tuple(settings["input_names"]),
+            output_name=settings["output_name"],
+        )
 
 
 def fit_ode(
@@ -302,6 +381,10 @@ def fit_ode(
         run=run,
         draw=draw_run,
     )
+
+
+def _name_of(function: Any) -> str:
+    return str(getattr(function, "__qualname__", type(function).__qualname__))
 
 
 def _first_state(x: NDArray[Any], u: NDArray[Any], p: NDArray[Any]) -> NDArray[Any]:

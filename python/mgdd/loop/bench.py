@@ -12,6 +12,7 @@ from mgdd.errors import ParameterError, RigError
 from mgdd.loop.plant import Measurement, checked_inputs
 from mgdd.presets import Preset
 from mgdd.results import VARIABLES, labelled_dataset
+from mgdd.results.describe import as_html, rows_of
 
 if TYPE_CHECKING:
     import xarray as xr
@@ -221,6 +222,9 @@ class EngineBench(_core.EngineBench):
         array([107.2, 103. ])
         """
         return cycles_to_dataset(self, self.run_columns(soc_cad))
+
+    def _repr_html_(self) -> str:
+        return as_html(f"EngineBench at cycle {self.cycle}", rows_of(self.settings))
 
 
 def cycles_to_dataset(bench: EngineBench, columns: dict[str, Any], **more: ArrayLike) -> xr.Dataset:

@@ -8,10 +8,12 @@ from dataclasses import dataclass, field
 from typing import Protocol, runtime_checkable
 
 from mgdd.errors import ParameterError
+from mgdd.results.describe import described
 
 __all__ = ["AnnouncingPlant", "Measurement", "Plant", "checked_inputs"]
 
 
+@described
 @dataclass(frozen=True, kw_only=True)
 class Measurement:
     """What was measured of one engine cycle, or at one sample.
@@ -116,7 +118,8 @@ class AnnouncingPlant(Plant, Protocol):
 
     Examples
     --------
-    >>> from mgdd.loop import AnnouncingPlant, EngineBench
+    >>> from mgdd.loop import EngineBench
+    >>> from mgdd.loop.plant import AnnouncingPlant
     >>> bench = EngineBench()
     >>> isinstance(bench, AnnouncingPlant), bench.operating_point_changes
     (True, False)

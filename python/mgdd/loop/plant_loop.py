@@ -15,6 +15,7 @@ from mgdd.loop.criteria import LoopCriteria
 from mgdd.loop.plant import AnnouncingPlant, Measurement, Plant
 from mgdd.loop.summary import summarize_cycles
 from mgdd.results import VARIABLES, labelled_dataset
+from mgdd.results.describe import described
 
 if TYPE_CHECKING:
     import xarray as xr
@@ -37,6 +38,7 @@ class _Log:
     measured: list[Measurement] = field(default_factory=list)
 
 
+@described
 @dataclass(frozen=True, kw_only=True)
 class LoopRun:
     """A closed loop, cycle by cycle, and what it came to.

@@ -241,10 +241,26 @@ class Fit:
         DataError
             A model that has no such file.
         """
-        write = getattr(self.model, "to_toml", None)
-        if write is None:
+        give = getattr(self.model, "to_parameters", None)
+        if give is None:
             raise DataError(f"{type(self.model).__name__} has no parameter file: keep the parameters of to_dict()")
-        text: str = write(fit=self)
+        figures = {
+            "fit_percent_train": None if self.train is None else self.train.nrmse_fit_percent,
+            "fit_percent_test": None if self.test is None else self.test.nrmse_fit_percent,
+            "rmse_test": None if self.test is None else self.test.rmse,
+        }
+        units = {
+            "fit_percent_train": "%",
+            "fit_percent_test": "%",
+            "rmse_test": "-" if self.test is None else self.test.unit,
+        }
+        file = give().with_fit(
+            stderr=self.stderr,
+            figures={name: (value, units[name]) for name, value in figures.items() if value is not None},
+            source=f"fitted to {self.source}",
+            unidentifiable=self.unidentifiable,
+        )
+        text: str = file.to_toml()
         return text
 
     def _repr_html_(self) -> str:

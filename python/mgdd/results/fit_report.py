@@ -171,7 +171,7 @@ class FitReport:
         return self.residual
 
     def __repr__(self) -> str:
-        open_names = f", unidentifiable={list(self.unidentifiable)}" if self.unidentifiable else ""
+        open_names = f", {len(self.unidentifiable)} unidentifiable" if self.unidentifiable else ""
         return f"<FitReport {self.status}, {len(self.names)} parameters, rmse={self.rmse:.6g}{open_names}>"
 
     def summary(self) -> str:

@@ -9,7 +9,6 @@ if TYPE_CHECKING:
 
     import xarray as xr
 
-    from mgdd.results.fit import Fit
 
 __all__ = ["Model"]
 
@@ -44,7 +43,7 @@ class Model(Protocol):
     def predict(self, record: Any, horizon: int) -> xr.Dataset:
         """Predict `horizon` samples ahead of every sample of a record, from its data up to that sample."""
 
-    def to_toml(self, *, fit: Fit | None = None) -> str:
+    def to_toml(self) -> str:
         """Write the model as TOML, with the standard errors and figures of the fit that it comes from."""
 
     @classmethod

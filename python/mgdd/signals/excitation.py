@@ -363,15 +363,11 @@ def triangle(
 
 def maximum_length_sequence(register: int) -> NDArray[np.int_]:
     """Return one period, 2**register - 1 bits, of the register that starts with all ones."""
-    state = [1] * register
-    bits = np.empty(2**register - 1, dtype=np.int_)
-    for index in range(bits.size):
-        bits[index] = state[-1]
-        new = 0
-        for tap in _TAPS[register]:
-            new ^= state[tap - 1]
-        state = [new, *state[:-1]]
-    return bits
+    from scipy.signal import max_len_seq
+
+    # SciPy counts the bits from the other end and always feeds back the last.
+    bits, _ = max_len_seq(register, taps=[register - tap for tap in _TAPS[register][1:]])
+    return np.asarray(bits, dtype=np.int_)
 
 
 def _time(duration_s: float, step_s: float) -> NDArray[np.float64]:

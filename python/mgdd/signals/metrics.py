@@ -9,6 +9,7 @@ import numpy as np
 
 from mgdd.errors import DataError, ParameterError, ShapeError
 from mgdd.results import labelled_dataset
+from mgdd.results.describe import described
 
 if TYPE_CHECKING:
     import xarray as xr
@@ -134,6 +135,7 @@ def rmse(measured: ArrayLike, model: ArrayLike) -> float:
     return float(np.sqrt(mse(measured, model)))
 
 
+@described
 @dataclass(frozen=True, kw_only=True)
 class ResidualTests:
     """Correlations that a residual should not have.

@@ -16,6 +16,7 @@ from mgdd.identify.engine.cylinder import BURN_FIELDS
 from mgdd.results.labels import to_jsonable
 from mgdd.studies.base import StudyResult
 from mgdd.studies.measured_figures import draw
+from mgdd.studies.measured_sections import measured_sections
 from mgdd.studies.measured_summary import law_table, summarize
 
 if TYPE_CHECKING:
@@ -95,11 +96,15 @@ def run_measured_traces(
     summary = summarize(analyses, fits, main, profiles, timing)
     summary["engine"] = {name: getattr(cylinder, name) for name in _GEOMETRY}
     summary["data"] = _PROVENANCE if own else "Files of the user."
+    plain = to_jsonable(summary)
+    drawn = draw(analyses, main, best, reference, profiles, timing) if figures else {}
     return StudyResult(
         name="measured-traces",
+        title="Measured pressure, calibrated cycle model, best timing",
         dataset=law_table(fits),
-        figures=draw(analyses, main, best, reference, profiles, timing) if figures else {},
-        summary=to_jsonable(summary),
+        figures=drawn,
+        summary=plain,
+        sections=measured_sections(plain, drawn),
     )
 
 

@@ -9,6 +9,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from mgdd.errors import DataError, ParameterError
+from mgdd.results.describe import described
 from mgdd.surrogate.sensor_lag import decay_of
 from mgdd.surrogate.surrogate import EngineSurrogate
 
@@ -177,6 +178,19 @@ class SurrogateEngine:
         self._row += 1
         self._left -= 1
         return row
+
+
+described(
+    SurrogateEngine,
+    rows=lambda engine: {
+        "signals": tuple(engine.surrogate.signals),
+        "inputs": engine.surrogate.inputs,
+        "cycles": engine.cycles,
+        "block_cycles": engine._block,
+        "residuals": engine._starts is not None,
+        "outside": engine._outside,
+    },
+)
 
 
 def _starts(residuals: NDArray[np.float64], block: int) -> NDArray[np.intp]:

@@ -13,7 +13,8 @@ from mgdd.results import Label
 from mgdd.signals.even_grid import check_count
 from mgdd.surrogate.response_surface import QuadraticBasis, least_squares_of, r_squared, support_of
 from mgdd.surrogate.sensor_lag import SensorLag, find_sensor_lag, lagged
-from mgdd.surrogate.surrogate import STEERED, EngineSurrogate, SignalModel
+from mgdd.surrogate.signal_model import SignalModel
+from mgdd.surrogate.surrogate import STEERED, EngineSurrogate
 
 if TYPE_CHECKING:
     import xarray as xr

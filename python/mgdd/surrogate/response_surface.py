@@ -8,6 +8,8 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
+from mgdd.results.describe import described
+
 if TYPE_CHECKING:
     from collections.abc import Sequence
 
@@ -30,6 +32,7 @@ class QuadraticBasis:
         return np.column_stack([np.ones(len(z)), z, z[:, first] * z[:, second]])
 
 
+@described
 @dataclass(frozen=True, kw_only=True, eq=False)
 class Support:
     """Where a surrogate may be believed: a box of quantiles, and leverage no higher than records in it have.
@@ -64,6 +67,10 @@ class Support:
     leverage_limit: float
     basis: QuadraticBasis
     root: NDArray[np.float64]
+
+    def __post_init__(self) -> None:
+        # One layout in memory, so that a product has the same last bits after a round trip through a file.
+        object.__setattr__(self, "root", np.ascontiguousarray(self.root))
 
     def leverage(self, points: Sequence[Sequence[float]] | NDArray[np.float64]) -> NDArray[np.float64]:
         """Say how far points are from the middle of the records, in the metric of the fit.

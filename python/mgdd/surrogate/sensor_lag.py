@@ -9,6 +9,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from mgdd.errors import DataError
+from mgdd.results.describe import described
 
 if TYPE_CHECKING:
     from collections.abc import Mapping
@@ -24,6 +25,7 @@ _RESAMPLES = 200
 _NEAR_DELAY, _NEAR_TAU = 2, 4  # cycles, and steps of the trial time constants
 
 
+@described
 @dataclass(frozen=True, kw_only=True)
 class SensorLag:
     """Delay and first-order lag of a sensor, as the records show them.

@@ -11,74 +11,28 @@ import numpy as np
 
 from mgdd._core import Limit
 from mgdd.errors import ParameterError
+from mgdd.io.parameters import ParameterFile, Parameters
 from mgdd.optimize import Optimum
 from mgdd.optimize.optimum import limits_of
 from mgdd.results import Label, labelled_dataset
+from mgdd.results.describe import described
+from mgdd.surrogate.file import read_surrogate, surrogate_file
 from mgdd.surrogate.optimum import best_along
 from mgdd.surrogate.response_surface import QuadraticBasis, Support
-from mgdd.surrogate.sensor_lag import SensorLag
+from mgdd.surrogate.signal_model import SignalModel
 
 if TYPE_CHECKING:
     import xarray as xr
     from numpy.typing import ArrayLike, NDArray
 
-__all__ = ["STEERED", "EngineSurrogate", "SignalModel"]
+__all__ = ["STEERED", "EngineSurrogate"]
 
 STEERED = "soi_cad"
 
 
+@described
 @dataclass(frozen=True, kw_only=True, eq=False)
-class SignalModel:
-    """The surface of one signal, and how well it does.
-
-    Parameters
-    ----------
-    name : str
-        The signal.
-    label : Label
-        Unit and long name.
-    coefficients : ndarray, shape (p,)
-        Of the terms of `Support.basis`, in the unit of the signal.
-    lag_cycles : int
-        From the command to the log; of a slow signal the delay before its lag [cycles].
-    lag_scores : mapping of int to float
-        Cross-validated R² of the static surface at each lag [-].
-    lag_at_bound : bool
-        Whether the lag lies on the upper edge of what was searched.
-    sensor : SensorLag or None
-        The dynamics of a slow signal.
-    r2 : float
-        R² over all records used [-].
-    r2_held_out : float
-        R² on the last part of the records, from a fit to the part before [-].
-    residual_sd : float
-        Standard deviation of record minus model, in the unit of the signal.
-    cyclic_sd : float
-        The part of it from one cycle to the next while the command is held; the rest is what the surface misses.
-
-    Examples
-    --------
-    >>> from mgdd.surrogate import fit_surrogate, random_step_records
-    >>> imep = fit_surrogate(random_step_records(1500)).signals["imep_bar"]
-    >>> imep.lag_cycles, round(imep.residual_sd, 1)
-    (1, 0.1)
-    """
-
-    name: str
-    label: Label
-    coefficients: NDArray[np.float64]
-    lag_cycles: int
-    lag_scores: Mapping[int, float]
-    lag_at_bound: bool
-    sensor: SensorLag | None
-    r2: float
-    r2_held_out: float
-    residual_sd: float
-    cyclic_sd: float
-
-
-@dataclass(frozen=True, kw_only=True, eq=False)
-class EngineSurrogate:
+class EngineSurrogate(Parameters):
     """Quadratic surfaces of the signals of an engine over its commands, with their support and residuals.
 
     Parameters
@@ -252,6 +206,15 @@ class EngineSurrogate:
                 "cyclic_sd": ("signal", [m.cyclic_sd for m in models], own, "cyclic standard deviation"),
             }
         )
+
+    def to_parameters(self) -> ParameterFile:
+        """Give everything, residuals included, as `to_toml` writes it."""
+        return surrogate_file(self)
+
+    @classmethod
+    def from_parameters(cls, file: ParameterFile) -> EngineSurrogate:
+        """Make the surrogate of a file that `to_toml` wrote."""
+        return cls(**read_surrogate(file))
 
     def operating_point(self, at: Mapping[str, float] | None = None) -> dict[str, float]:
         """Complete a choice of inputs with the medians of the rest, and check it.

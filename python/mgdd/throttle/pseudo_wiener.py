@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import tomllib
 from collections.abc import Mapping
 from types import MappingProxyType
 from typing import TYPE_CHECKING, Any
@@ -10,25 +9,26 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from mgdd import _core
-from mgdd.errors import DataError
+from mgdd.errors import DataError, ParameterError
+from mgdd.io.parameters import FIT_NOTES, ParameterFile, Parameters, Wanted, entries, wanted
+from mgdd.results.describe import described, rows_of
 from mgdd.signals.even_grid import even_step, is_same_step
 from mgdd.signals.model import RunInputs, SampledModel, check_horizon, columns_of
-from mgdd.throttle.fitted_parameters import parameter_text
 
 if TYPE_CHECKING:
     import xarray as xr
     from numpy.typing import ArrayLike, NDArray
 
     from mgdd._core import Throttle
-    from mgdd.results import Fit
 
 __all__ = ["PseudoWiener"]
 
+_KINDS = ("pw_r", "pw_w", "pw_p")
 _STEP_S = 5e-4  # of PW-R
 _GAIN_SAMPLE_S = 1e-3  # the observer gains are per 1 ms
 
 
-class PseudoWiener(SampledModel):
+class PseudoWiener(SampledModel, Parameters):
     """A pseudo-Wiener model of a throttle.
 
     Parameters
@@ -236,60 +236,25 @@ class PseudoWiener(SampledModel):
         )
         return np.asarray(angle), np.asarray(slope)
 
-    def to_toml(self, *, fit: Fit | None = None) -> str:
-        """Write the model as TOML that `from_toml` reads back equal.
-
-        Parameters
-        ----------
-        fit : mgdd.results.Fit, optional
-            The fit that the numbers come from: its record, its standard errors and its quality are written, too.
-
-        Returns
-        -------
-        str
-            One line per value with its unit.
-        """
-        return parameter_text(self.kind, self.parameters, options=self._options, fit=fit)
+    def to_parameters(self) -> ParameterFile:
+        """Give all numbers and choices, as `to_toml` writes them."""
+        return ParameterFile(
+            kind=self.kind,
+            tables={"parameters": entries(self.parameters, self.units), "settings": entries(self._options)},
+        )
 
     @classmethod
-    def from_toml(cls, text: str) -> PseudoWiener:
-        """Read what `to_toml` wrote, or a saved fit of these kinds.
-
-        Parameters
-        ----------
-        text : str
-            The TOML text.
-
-        Returns
-        -------
-        PseudoWiener
-            The model.
-
-        Raises
-        ------
-        DataError
-            No TOML, or no table ``[parameters]`` of values with units.
-        ParameterError
-            A kind, name or value that does not exist.
-        """
+    def from_parameters(cls, file: ParameterFile) -> PseudoWiener:
+        """Make the model of a file that `to_toml` or a fit wrote."""
+        file.expect(kinds=_KINDS, tables=("parameters", "settings", "fit?"), notes=FIT_NOTES)
+        units = {name: str(unit) for name, unit in _core.pseudo_wiener_units(file.kind).items()}
+        said = file.values("parameters", {name: Wanted(unit, required=False) for name, unit in units.items()})
+        options = file.values("settings", wanted(("switching", "friction"), form="text"))
         try:
-            data = tomllib.loads(text)
-        except tomllib.TOMLDecodeError as error:
-            raise DataError(f"not valid TOML: {error}") from error
-        table = data.get("parameters")
-        if not isinstance(table, dict) or not table:
-            raise DataError("no table [parameters]: PseudoWiener.to_toml writes one")
-        kind = str(data.get("kind", ""))
-        values = {}
-        for name, entry in table.items():
-            if not isinstance(entry, dict) or not isinstance(entry.get("value"), int | float):
-                raise DataError(f"[parameters] {name}: write {{ value = ..., unit = ... }}")
-            values[name] = float(entry["value"])
-        options = {name: str(data[name]) for name in ("switching", "friction") if name in data}
-        model = cls(kind, values, **options)
-        for name, unit in model.units.items():
-            if name in table and table[name].get("unit") != unit:
-                raise DataError(f"[parameters] {name}: unit = {table[name].get('unit')!r}: must be {unit!r}")
+            model = cls(file.kind, said, **options)
+        except ParameterError as error:
+            raise ParameterError(f"{file.origin}: {error}") from error
+        file.values("parameters", wanted(model.parameters, units))  # which of them there are, the numbers say
         return model
 
     def __eq__(self, other: object) -> bool:
@@ -298,11 +263,15 @@ class PseudoWiener(SampledModel):
     def __hash__(self) -> int:
         return hash((self.kind, tuple(self.parameters.values()), *self._options.values()))
 
-    def __repr__(self) -> str:
-        return f"PseudoWiener({self.kind!r}, {dict(self.parameters)!r})"
-
     def __reduce__(self) -> tuple[object, ...]:
         return _rebuild, (self.kind, dict(self.parameters), dict(self._options))
+
+
+described(
+    PseudoWiener,
+    title=lambda model: f"PseudoWiener {model.kind}, " + ", ".join(f"{n} {v}" for n, v in model._options.items()),
+    rows=lambda model: rows_of(model.parameters, model.units),
+)
 
 
 def _rebuild(kind: str, parameters: Mapping[str, float], options: Mapping[str, str]) -> PseudoWiener:

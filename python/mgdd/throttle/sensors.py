@@ -10,8 +10,8 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from mgdd import _core
-from mgdd._core import SensorPair
 from mgdd.errors import DataError, ParameterError
+from mgdd.io.parameters import ParameterFile, Parameters, Wanted, entries, wanted
 from mgdd.results import labelled_dataset
 from mgdd.signals.even_grid import even_step
 
@@ -32,6 +32,25 @@ _FLAGS = {
     "sum_fault": "sum out of tolerance",
     "fault": "a check has failed for the debounce time",
 }
+
+
+class SensorPair(Parameters, _core.SensorPair):  # noqa: D101 the core's text
+    __doc__ = _core.SensorPair.__doc__
+
+    def to_parameters(self) -> ParameterFile:
+        """Give all fields, as `to_toml` writes them."""
+        return ParameterFile(kind="sensor_pair", tables={"parameters": entries(self.to_dict())})
+
+    @classmethod
+    def from_parameters(cls, file: ParameterFile) -> SensorPair:
+        """Make the pair of a file that `to_toml` wrote."""
+        file.expect(kinds=("sensor_pair",), tables=("parameters",))
+        names = [name for name in cls().to_dict() if name != "adc_bits"]
+        values = file.values("parameters", {**wanted(names), "adc_bits": Wanted(form="integer")})
+        try:
+            return cls(**values)
+        except ParameterError as error:
+            raise ParameterError(f"{file.origin}: [parameters] {error}") from error
 
 
 @dataclass(frozen=True, kw_only=True)

@@ -8,7 +8,7 @@
 #include <vector>
 
 #include <Eigen/Eigenvalues>
-#include <Eigen/LU>
+#include <Eigen/QR>
 
 #include "mgdd/common/error.hpp"
 #include "mgdd/common/text.hpp"
@@ -148,7 +148,9 @@ void judge(LearningUpdate law, ConvergenceReport& report) {
   report.monotone = report.sigma_max < 1.0;
   if (!report.asymptotic) return;
   if (law.cutoff()) {
-    report.limit_error_map = identity - g * (identity - input_map).partialPivLu().solve(learned);
+    // Not LU: behind its last block Eigen 3.4.1 binds a null reference, which the undefined-behaviour sanitizer
+    // refuses.
+    report.limit_error_map = identity - g * (identity - input_map).householderQr().solve(learned);
     report.limit_error_gain = largest_singular_value(report.limit_error_map);
   } else {
     report.limit_error_map = MatrixXd::Zero(n, n);

@@ -45,6 +45,10 @@ Inputs LocalModel::slope() const noexcept {
   return regular.llt().solve(cross_);
 }
 
+double LocalModel::predict(const Inputs& at) const noexcept {
+  return mean_ + slope().dot(at - mean_input_);
+}
+
 bool LocalModel::slope_known(double errors) const noexcept {
   if (weight_ < fewest_cycles) return false;
   const Inputs s = slope();

@@ -16,6 +16,7 @@ from mgdd.identify.engine.cylinder import fit_cylinder
 from mgdd.identify.engine.records import CylinderFit, Load
 from mgdd.optimize import FitOptions
 from mgdd.results import labelled_dataset
+from mgdd.results.describe import described
 
 if TYPE_CHECKING:
     import xarray as xr
@@ -29,6 +30,7 @@ _WIDTH = 0.20  # and as identified when that range stays within 20 % of the best
 _CORRELATION = float(_core.correlation_limit)
 
 
+@described
 @dataclass(frozen=True, kw_only=True)
 class WallHeatProfile:
     """What the traces say about the wall-heat scale.

@@ -7,6 +7,7 @@ from typing import TYPE_CHECKING, Any
 
 from mgdd._core import Cylinder, OperatingPoint
 from mgdd.results import VARIABLES, Fit, labelled_dataset
+from mgdd.results.describe import described
 
 if TYPE_CHECKING:
     from collections.abc import Sequence
@@ -17,6 +18,7 @@ if TYPE_CHECKING:
 __all__ = ["CylinderFit", "Load", "burn_law", "figures_of", "load_table"]
 
 
+@described
 @dataclass(frozen=True, kw_only=True)
 class Load:
     """One load of a calibration: its burn and how well the model meets the measurement.

@@ -12,6 +12,7 @@ from mgdd.errors import ParameterError
 from mgdd.identify.throttle.prior import prior_of
 from mgdd.identify.throttle.record_content import RecordContent, open_questions, record_content
 from mgdd.results import Finding, labelled_dataset
+from mgdd.results.describe import described
 from mgdd.signals.even_grid import even_step
 
 if TYPE_CHECKING:
@@ -20,6 +21,7 @@ if TYPE_CHECKING:
 __all__ = ["ExcitationCheck", "check_excitation"]
 
 
+@described
 @dataclass(frozen=True, kw_only=True)
 class ExcitationCheck:
     """What the prior model does under an excitation, and the verdict.

@@ -12,23 +12,23 @@ import numpy as np
 
 from mgdd import _core
 from mgdd.errors import ParameterError
+from mgdd.io.parameters import FIT_NOTES, ParameterFile, Parameters, Wanted, entries, wanted
 from mgdd.signals.model import RunInputs, SampledModel
-from mgdd.throttle.fitted_parameters import FittedParameters, parameter_text
 
 if TYPE_CHECKING:
     from numpy.typing import NDArray
 
-    from mgdd.results import Fit
 
 __all__ = ["FirstPrincipleModel"]
 
+_SETTINGS = ("closed_deg", "open_deg", "ramp_deg", "substeps")
 GROUP_NAMES = tuple(_core.throttle_group_names)
 # Groups of a typical passenger-car throttle, the start of a fit.
 TYPICAL = MappingProxyType(dict(zip(GROUP_NAMES, (0.03, 5e4, 0.1, 1e-3, 0.05, 0.1, 1e-3, 8.0, 0.0), strict=True)))
 
 
 @dataclass(frozen=True, kw_only=True)
-class FirstPrincipleModel(SampledModel):
+class FirstPrincipleModel(SampledModel, Parameters):
     """Throttle in groups: set-valued friction, springs with preload on both sides, motor as a torque source.
 
     Parameters
@@ -97,46 +97,16 @@ class FirstPrincipleModel(SampledModel):
             substeps=self.substeps,
         )
 
-    def to_toml(self, *, fit: Fit | None = None) -> str:
-        """Write the model as TOML with units.
-
-        Parameters
-        ----------
-        fit : mgdd.results.Fit, optional
-            The fit that the numbers come from: its record, its standard errors and its quality are written, too.
-
-        Returns
-        -------
-        str
-            TOML for `from_toml`.
-        """
-        values = {**self.parameters, "closed_deg": self.closed_deg, "open_deg": self.open_deg}
-        return parameter_text(self.kind, values, fit=fit)
+    def to_parameters(self) -> ParameterFile:
+        """Give groups and settings, as `to_toml` writes them."""
+        settings = {name: getattr(self, name) for name in _SETTINGS}
+        return ParameterFile(
+            kind=self.kind, tables={"parameters": entries(self.parameters), "settings": entries(settings)}
+        )
 
     @classmethod
-    def from_toml(cls, text: str) -> FirstPrincipleModel:
-        """Read what `to_toml` wrote.
-
-        Parameters
-        ----------
-        text : str
-            The TOML text.
-
-        Returns
-        -------
-        FirstPrincipleModel
-            The model.
-
-        Raises
-        ------
-        DataError
-            Not TOML, no parameters, a wrong unit.
-        ParameterError
-            An unknown kind or parameter, a value outside its domain.
-        """
-        saved = FittedParameters.from_toml(text)
-        if saved.kind != "first_principle":
-            raise ParameterError(f"kind = {saved.kind!r}: must be 'first_principle'")
-        values = dict(saved.values)
-        closed, opened = values.pop("closed_deg", 0.0), values.pop("open_deg", 90.0)
-        return cls(parameters=values, closed_deg=closed, open_deg=opened)
+    def from_parameters(cls, file: ParameterFile) -> FirstPrincipleModel:
+        """Make the model of a file that `to_toml` or a fit wrote."""
+        file.expect(kinds=("first_principle",), tables=("parameters", "settings", "fit?"), notes=FIT_NOTES)
+        settings = file.values("settings", {**wanted(_SETTINGS), "substeps": Wanted(form="integer")})
+        return cls(parameters=file.values("parameters", wanted(GROUP_NAMES)), **settings)

@@ -46,14 +46,13 @@ def regression_start(
     open_deg: float,
 ) -> dict[str, float]:
     """Torque balance of the moving samples: u = +-beta + kappa x + delta sign(w) + w/(G tau) + dw/dt/G."""
+    from scipy.signal import savgol_filter
+
     half = max(3, round(0.010 / step_s))
     if angle.size < 10 * half:
         return {}
-    grid = step_s * np.arange(-half, half + 1)
-    weights = np.linalg.pinv(np.vander(grid, 4, increasing=True))
     smooth, speed, push = (
-        np.convolve(angle, scale * weights[order][::-1], mode="valid")
-        for order, scale in ((0, 1.0), (1, 1.0), (2, 2.0))
+        np.asarray(savgol_filter(angle, 2 * half + 1, 3, deriv=order, delta=step_s)[half:-half]) for order in range(3)
     )
     u = np.convolve(duty, np.full(2 * half + 1, 1.0 / (2 * half + 1)), mode="valid")
     x = smooth - values["limp_home_deg"]

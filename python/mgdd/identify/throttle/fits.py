@@ -2,18 +2,16 @@
 
 from __future__ import annotations
 
-import errno
 from dataclasses import replace
-from pathlib import Path
 from typing import TYPE_CHECKING
 
 from mgdd.errors import ParameterError
 from mgdd.identify.throttle.first_principle import fit_throttle
 from mgdd.identify.throttle.first_principle_model import FirstPrincipleModel
 from mgdd.identify.throttle.pseudo_wiener_fit import fit_pseudo_wiener
+from mgdd.io.parameters import ParameterFile
 from mgdd.optimize import FitOptions
 from mgdd.throttle import PseudoWiener
-from mgdd.throttle.fitted_parameters import FittedParameters
 
 if TYPE_CHECKING:
     import os
@@ -23,8 +21,9 @@ if TYPE_CHECKING:
 
     from mgdd.results import Fit, Model
 
-__all__ = ["check_kind", "fit_kind", "load_throttle_model"]
+__all__ = ["KINDS", "check_kind", "fit_kind", "load_throttle_model"]
 
+KINDS = ("first_principle", "pw_r", "pw_w", "pw_p")
 _WORTH = 0.97
 
 
@@ -85,9 +84,9 @@ def load_throttle_model(path: str | os.PathLike[str]) -> Model:
     FileNotFoundError
         No such file.
     DataError
-        Not TOML, no parameters, a wrong unit.
+        Not TOML, another kind or format version, a missing table or key.
     ParameterError
-        An unknown kind or parameter, a value outside its domain.
+        An unknown key, another unit, a wrong type, a value outside its domain.
 
     Examples
     --------
@@ -99,12 +98,10 @@ def load_throttle_model(path: str | os.PathLike[str]) -> Model:
     ...     load_throttle_model(file).kind
     'first_principle'
     """
-    file = Path(path)
-    if not file.exists():
-        raise FileNotFoundError(errno.ENOENT, "no such file: check the path", str(file))
-    text = file.read_text(encoding="utf-8")
-    saved = FittedParameters.from_toml(text, source=str(file))
-    return FirstPrincipleModel.from_toml(text) if saved.kind == "first_principle" else PseudoWiener.from_toml(text)
+    file = ParameterFile.read(path)
+    model = FirstPrincipleModel if file.kind == "first_principle" else PseudoWiener
+    file.expect(kinds=KINDS, tables=file.tables, notes=file.notes)
+    return model.from_parameters(file)
 
 
 def _seeded(options: FitOptions | None) -> FitOptions:

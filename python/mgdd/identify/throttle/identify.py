@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from mgdd.errors import ParameterError
-from mgdd.identify.throttle.fits import check_kind, fit_kind
+from mgdd.identify.throttle.fits import KINDS, check_kind, fit_kind
 from mgdd.identify.throttle.free_run import free_run, quality_of, source_of
 from mgdd.identify.throttle.prior import prior_of
 from mgdd.identify.throttle.record_content import open_questions, record_content
@@ -16,7 +16,6 @@ from mgdd.identify.throttle.validation import entangled
 from mgdd.io import check_throttle_log
 from mgdd.results import Finding, Fit, FitQuality
 from mgdd.results.finding import unique
-from mgdd.throttle.fitted_parameters import KINDS
 
 if TYPE_CHECKING:
     from collections.abc import Sequence

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from types import MappingProxyType
@@ -11,6 +12,7 @@ import numpy as np
 
 from mgdd import _core
 from mgdd.errors import ParameterError, ShapeError
+from mgdd.io.parameters import FIT_NOTES, ParameterFile, Parameters, entries, wanted
 from mgdd.optimize.fit_options import FitOptions, fit_options
 from mgdd.optimize.fit_run import draw_run, fit_run, quality_of
 from mgdd.results import VARIABLES, Fit, FitReport
@@ -24,10 +26,11 @@ __all__ = ["SmoothThrottle", "fit_smooth_throttle"]
 
 _EXAMPLE = MappingProxyType(dict(zip(_core.smooth_throttle_names, _core.smooth_throttle_example, strict=True)))
 _START_RAD = 0.14
+_CONSTANTS = ("inertia_kgm2", "gear_ratio", "inductance_h", "supply_v")
 
 
 @dataclass(frozen=True, kw_only=True)
-class SmoothThrottle(SampledModel):
+class SmoothThrottle(SampledModel, Parameters):
     """The smooth throttle: tanh friction and preload, coil current, RK4 with one step per sample.
 
     Parameters
@@ -69,6 +72,9 @@ class SmoothThrottle(SampledModel):
             )
         ordered = {name: float(self.parameters[name]) for name in _EXAMPLE}
         object.__setattr__(self, "parameters", MappingProxyType(ordered))
+        for name, value in {**ordered, **self.constants}.items():
+            if not (math.isfinite(value) and value > 0.0):
+                raise ParameterError(f"{name} = {value!r}: must be finite and > 0")
 
     @property
     def kind(self) -> str:
@@ -78,7 +84,21 @@ class SmoothThrottle(SampledModel):
     @property
     def constants(self) -> dict[str, float]:
         """The known constants by name."""
-        return {name: getattr(self, name) for name in ("inertia_kgm2", "gear_ratio", "inductance_h", "supply_v")}
+        return {name: getattr(self, name) for name in _CONSTANTS}
+
+    def to_parameters(self) -> ParameterFile:
+        """Give parameters and constants, as `to_toml` writes them."""
+        return ParameterFile(
+            kind=self.kind, tables={"parameters": entries(self.parameters), "settings": entries(self.constants)}
+        )
+
+    @classmethod
+    def from_parameters(cls, file: ParameterFile) -> SmoothThrottle:
+        """Make the model of a file that `to_toml` or a fit wrote."""
+        file.expect(kinds=("smooth",), tables=("parameters", "settings", "fit?"), notes=FIT_NOTES)
+        return cls(
+            parameters=file.values("parameters", wanted(_EXAMPLE)), **file.values("settings", wanted(_CONSTANTS))
+        )
 
     def _rest(self) -> list[float]:
         return [_START_RAD, 0.0, 0.0]

@@ -15,6 +15,7 @@ from mgdd.identify.throttle.prior import prior_of
 from mgdd.identify.throttle.record_content import open_questions, record_content
 from mgdd.io import check_throttle_log
 from mgdd.results import Finding, Fit, FitQuality, FitReport, Model
+from mgdd.results.describe import described
 from mgdd.signals.even_grid import even_step
 from mgdd.signals.metrics import ResidualTests, residual_tests, vaf_percent
 
@@ -27,6 +28,7 @@ _CORRELATED = 0.98
 _GOOD_PERCENT = 85.0
 
 
+@described
 @dataclass(frozen=True, kw_only=True)
 class ThrottleValidation:
     """A model against a log.

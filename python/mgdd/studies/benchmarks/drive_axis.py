@@ -11,9 +11,11 @@ import numpy as np
 
 from mgdd import _core
 from mgdd.errors import ParameterError
+from mgdd.io.parameters import ParameterFile, entries
 from mgdd.optimize.fit_options import FitOptions, fit_options
 from mgdd.optimize.fit_run import draw_run, fit_run, quality_of
 from mgdd.results import Fit, FitReport, Label
+from mgdd.results.describe import described
 from mgdd.results.fit import n_best_of
 from mgdd.signals.even_grid import even_step
 from mgdd.signals.model import RunInputs, SampledModel
@@ -45,6 +47,7 @@ _REST = 1e-3  # least speed of the Stribeck rise [m/s]: the slide leaves it with
 _FILTER_ORDER, _DECIMATION = 4, 10
 
 
+@described
 @dataclass(frozen=True, kw_only=True)
 class DriveModel(SampledModel):
     """A slide with mass, friction and offset, driven by a voltage.
@@ -97,6 +100,12 @@ class DriveModel(SampledModel):
                 dt_s=run.step_s,
             )
         )
+
+    def to_parameters(self) -> ParameterFile:
+        """Give all parameters, as `to_toml` writes them."""
+        values = dict(zip(_core.DriveAxis.parameter_names, _row(self.parameters), strict=True))
+        tables = {"parameters": entries(values), "settings": entries({"force_n_per_v": float(self.force_n_per_v)})}
+        return ParameterFile(kind="drive", tables=tables)
 
 
 def drive_inverse_dynamics(

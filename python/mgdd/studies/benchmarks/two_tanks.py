@@ -14,6 +14,7 @@ from mgdd.errors import DataError, ParameterError
 from mgdd.optimize.fit_options import FitOptions, fit_options
 from mgdd.optimize.fit_run import draw_run, fit_run, quality_of
 from mgdd.results import Fit, FitReport, Label
+from mgdd.results.describe import described
 from mgdd.results.fit import n_best_of
 from mgdd.signals.even_grid import even_step
 from mgdd.signals.model import RunInputs, SampledModel
@@ -59,6 +60,7 @@ _FORMS: dict[str, tuple[dict[str, float], tuple[str, ...]]] = {
 }
 
 
+@described
 @dataclass(frozen=True, kw_only=True)
 class TwoTanksModel(SampledModel):
     """Two tanks in a row: a pump fills the upper one, its outlet and part of its overflow the lower one.

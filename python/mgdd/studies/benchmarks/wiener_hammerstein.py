@@ -11,9 +11,11 @@ import numpy as np
 
 from mgdd import _core
 from mgdd.errors import DataError, ParameterError
+from mgdd.io.parameters import ParameterFile, entries, wanted
 from mgdd.optimize.fit_options import FitOptions, fit_options
 from mgdd.optimize.fit_run import draw_run, fit_run, quality_of
 from mgdd.results import Fit, FitReport, Label
+from mgdd.results.describe import described
 from mgdd.results.fit import n_best_of
 from mgdd.signals.even_grid import even_step
 from mgdd.signals.model import RunInputs, SampledModel
@@ -35,9 +37,11 @@ __all__ = [
 _LABELS = MappingProxyType({"input_v": Label("V", "input voltage"), "output_v": Label("V", "output voltage")})
 _SKIP = 100  # samples in which a filter that starts at rest forgets it
 _SCAN_DEGREE = 6  # of the polynomial that stands for the curve while partitions are compared
+_UNITS = dict.fromkeys(("input_mean", "output_mean", "rmse", "lower", "upper"), "unit of the record")
 _MARGIN = 0.05  # of the range of the signal, on either side of the curve's grid
 
 
+@described
 @dataclass(frozen=True, kw_only=True)
 class LinearApproximation(SampledModel):
     """A linear filter B/A about the mean of a record.
@@ -90,6 +94,7 @@ class LinearApproximation(SampledModel):
         return np.asarray(_core.filter_series(self.numerator, self.denominator, deviation)) + self.output_mean
 
 
+@described
 @dataclass(frozen=True, kw_only=True)
 class WienerHammersteinModel(SampledModel):
     """Filter, static curve, filter; both filters have gain 1 at rest.
@@ -141,6 +146,24 @@ class WienerHammersteinModel(SampledModel):
 
     def _run(self, run: RunInputs) -> Vector:
         return np.asarray(_core_model(self).simulate(self.values, run.columns[0]))
+
+    def to_parameters(self) -> ParameterFile:
+        """Give orders, grid and coefficients, as `to_toml` writes them."""
+        names = ("first_order", "last_order", "n_curve", "lower", "upper", "values")
+        return _saved("wiener_hammerstein", self, names)
+
+    @classmethod
+    def from_parameters(cls, file: ParameterFile) -> WienerHammersteinModel:
+        """Make the model of a file that `to_toml` wrote."""
+        return cls(
+            **_read(
+                "wiener_hammerstein",
+                file,
+                numbers=("lower", "upper"),
+                vectors=("values",),
+                integers=("first_order", "last_order", "n_curve"),
+            )
+        )
 
     def curve(self, signal: ArrayLike) -> Vector:
         """Evaluate the static curve.
@@ -226,7 +249,7 @@ def fit_linear(record: xr.Dataset, *, order: int = 6, iterations: int = 15) -> L
     best: tuple[float, Vector, Vector] = (np.inf, np.ones(1), np.ones(1))
     n = u.size
     for _ in range(iterations):
-        uf, yf = _core.filter_series([1.0], a, u), _core.filter_series([1.0], a, y)
+        uf, yf = _filtered(np.ones(1), a, u), _filtered(np.ones(1), a, y)
         columns = [-yf[order - i : n - i] for i in range(1, order + 1)]
         columns += [uf[order - i : n - i] for i in range(order + 1)]
         regressors = np.column_stack(columns)
@@ -234,7 +257,7 @@ def fit_linear(record: xr.Dataset, *, order: int = 6, iterations: int = 15) -> L
         roots = np.roots(np.r_[1.0, estimate[:order]])
         a = np.asarray(np.real(np.poly(np.where(np.abs(roots) > 1.0, 1.0 / np.conj(roots), roots))), dtype=np.float64)
         b = np.asarray(estimate[order:], dtype=np.float64)
-        error = float(np.sqrt(np.mean((y - _core.filter_series(b, a, u))[_SKIP:] ** 2)))
+        error = float(np.sqrt(np.mean((y - _filtered(b, a, u))[_SKIP:] ** 2)))
         if error < best[0]:
             best = (error, b, a)
     return LinearApproximation(
@@ -363,6 +386,30 @@ def fit_wiener_hammerstein(
     )
 
 
+def _saved(kind: str, model: object, names: tuple[str, ...]) -> ParameterFile:
+    return ParameterFile(kind=kind, tables={"parameters": entries({n: getattr(model, n) for n in names}, _UNITS)})
+
+
+def _read(
+    kind: str,
+    file: ParameterFile,
+    *,
+    numbers: tuple[str, ...],
+    vectors: tuple[str, ...],
+    integers: tuple[str, ...] = (),
+) -> dict[str, Any]:
+    file.expect(kinds=(kind,), tables=("parameters",))
+    expected = {**wanted(numbers, _UNITS), **wanted(vectors, form="numbers"), **wanted(integers, form="integer")}
+    values = file.values("parameters", expected)
+    return values | {name: np.array(values[name], dtype=np.float64) for name in vectors}
+
+
+def _filtered(b: Vector, a: Vector, signal: Vector) -> Vector:
+    from scipy.signal import lfilter
+
+    return np.asarray(lfilter(b, a, signal), dtype=np.float64)
+
+
 def _signals(record: xr.Dataset) -> tuple[Vector, Vector]:
     u, y = record["input_v"].to_numpy(), record["output_v"].to_numpy()
     if u.size < 1000:
@@ -415,9 +462,9 @@ def _partitions(linear: LinearApproximation, u: Vector, y: Vector, first: int, l
             proper = b1.size <= a1.size and b2.size <= a2.size
             if not (proper and 2 <= a1.size <= first + 1 and 2 <= a2.size <= last + 1):
                 continue
-            between = _core.filter_series(b1, a1, u)
+            between = _filtered(b1, a1, u)
             scale = float(np.abs(between).max())
-            columns = [_core.filter_series(b2, a2, (between / scale) ** k) for k in range(_SCAN_DEGREE + 1)]
+            columns = [_filtered(b2, a2, (between / scale) ** k) for k in range(_SCAN_DEGREE + 1)]
             regressors = np.column_stack(columns)[_SKIP:]
             curve = np.asarray(np.linalg.lstsq(regressors, y[_SKIP:], rcond=None)[0], dtype=np.float64)
             error = float(np.sqrt(np.mean((regressors @ curve - y[_SKIP:]) ** 2)))
@@ -439,7 +486,7 @@ def _start(
 ) -> tuple[_core.WienerHammerstein, Vector]:
     _, b1, a1, b2, a2, curve, scale = candidate
     (b1, a1), (b2, a2) = _padded(b1, a1, first), _padded(b2, a2, last)
-    between = np.asarray(_core.filter_series(b1, a1, u))
+    between = np.asarray(_filtered(b1, a1, u))
     margin = _MARGIN * float(np.ptp(between))
     lower, upper = float(between.min()) - margin, float(between.max()) + margin
     model = _core.WienerHammerstein(first_order=first, last_order=last, n_curve=n_curve, lower=lower, upper=upper)

@@ -51,19 +51,21 @@ class RecursiveLeastSquares {
   }
 
   /// What the next output should be for a regressor.
-  double predict(const Column& phi) const noexcept { return phi.dot(estimate_); }
+  double predict(const Column& phi) const noexcept { return dot(phi, estimate_); }
 
   /// Takes one equation. False, and nothing changed, when a number is not finite or would not stay so.
   bool update(const Column& phi, double y) noexcept {
     if (!std::isfinite(y) || !phi.allFinite()) return false;
-    const Column gain = covariance_ * phi;
-    const double divisor = settings_.forgetting + phi.dot(gain);
-    const double error = y - phi.dot(estimate_);
+    Column gain;
+    for (int i = 0; i < N; ++i)
+      gain[i] = dot(covariance_.col(i), phi);  // symmetric
+    const double divisor = settings_.forgetting + dot(phi, gain);
+    const double error = y - dot(phi, estimate_);
     const Column moved = estimate_ + gain * (error / divisor);
     Square left = covariance_ - gain * gain.transpose() / divisor;
     // Forget only what the cap allows, so that directions without excitation do not grow for ever.
-    const double cap = settings_.trace_cap * settings_.start_variance.sum();
-    const double trace = left.trace();
+    const double cap = settings_.trace_cap * dot(settings_.start_variance, Column::Ones());
+    const double trace = dot(left.diagonal(), Column::Ones());
     double growth = 1.0 / settings_.forgetting;
     if (trace * growth > cap && trace > 0.0) growth = cap / trace > 1.0 ? cap / trace : 1.0;
     left *= growth;
@@ -93,6 +95,15 @@ class RecursiveLeastSquares {
   }
 
  private:
+  /// In one order and without fusing, whatever instruction set the caller is compiled for: Eigen's sum has neither.
+  template <class A, class B>
+  static double dot(const A& a, const B& b) noexcept {
+    double sum = 0.0;
+    for (int i = 0; i < N; ++i)
+      sum += a[i] * b[i];
+    return sum;
+  }
+
   Settings settings_;
   Column estimate_;
   Square covariance_;

@@ -1,4 +1,4 @@
-"""Public data by name: first in the folder MGDD_DATA_DIR, then (hash-checked) in the package."""
+"""Public data by name: first in the folder MGDD_DATA_DIR, then (hash-checked) in the package, then what was fetched."""
 
 from __future__ import annotations
 
@@ -10,6 +10,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
+from mgdd.datasets.origins import ORIGINS, fetch, fetched, find_fetched
 from mgdd.errors import DataError
 from mgdd.io import read_conditions, read_pressure
 from mgdd.io.table import read_table
@@ -21,6 +22,7 @@ if TYPE_CHECKING:
 
 __all__ = [
     "available",
+    "fetch",
     "load_cascaded_tanks",
     "load_emps",
     "load_h2df_cycles",
@@ -30,7 +32,7 @@ __all__ = [
 ]
 
 _VARIABLE = "MGDD_DATA_DIR"
-_PACKAGE = Path(__file__).parent / "data"
+_PACKAGE = Path(__file__).parents[1] / "data"
 _HD = "hd_diesel_128x144"
 
 # SHA-256 of every file that the package carries.
@@ -102,7 +104,7 @@ def available() -> tuple[str, ...]:
     Returns
     -------
     tuple of str
-        The sets whose files are all in the package or in ``MGDD_DATA_DIR``, sorted.
+        The sets whose files are all in the package or in ``MGDD_DATA_DIR``, and those that were fetched, sorted.
 
     Examples
     --------
@@ -115,11 +117,12 @@ def available() -> tuple[str, ...]:
     def there(name: str, file: str) -> bool:
         return file in _PACKAGED.get(name, {}) or (folder is not None and (folder / name / file).is_file())
 
-    return tuple(sorted(name for name, files in _FILES.items() if all(there(name, file) for file in files)))
+    found = {name for name, files in _FILES.items() if all(there(name, file) for file in files)}
+    return tuple(sorted({*found, *fetched()}))
 
 
 def path(name: str, file: str) -> Path:
-    """Find a file of a data set: ``$MGDD_DATA_DIR/name/file`` first, then the package.
+    """Find a file of a data set: ``$MGDD_DATA_DIR/name/file`` first, then the package, then what `fetch` has kept.
 
     Parameters
     ----------
@@ -136,7 +139,7 @@ def path(name: str, file: str) -> Path:
     Raises
     ------
     FileNotFoundError
-        It is in neither place; the message names both.
+        It is in none of these places; the message names them.
     DataError
         The packaged file differs from what was shipped.
 
@@ -149,14 +152,17 @@ def path(name: str, file: str) -> Path:
     folder = _data_dir()
     if folder is not None and (folder / name / file).is_file():
         return folder / name / file
+    if (kept := find_fetched(name, file)) is not None:
+        return kept
     packaged = _PACKAGE / file
     digest = _PACKAGED.get(name, {}).get(file)
     if digest is None or not packaged.is_file():
         first = f"looked for {folder / name / file}" if folder else f"{_VARIABLE} is not set"
+        fetching = f", or fetch it: mgdd.datasets.fetch({name!r})" if name in ORIGINS else ""
         raise FileNotFoundError(
             errno.ENOENT,
             f"no file {file!r} of data set {name!r}: {first}, and the package ({_PACKAGE}) lacks it; "
-            f"set {_VARIABLE} to a folder that holds {name}/{file}; "
+            f"set {_VARIABLE} to a folder that holds {name}/{file}{fetching}; "
             f"data sets at hand: {', '.join(available())}",
         )
     found = hashlib.sha256(packaged.read_bytes()).hexdigest()
