@@ -10,7 +10,7 @@ from typing import Any
 
 from mgdd._core import Limit
 from mgdd.errors import ParameterError
-from mgdd.results import to_jsonable
+from mgdd.results.labels import to_jsonable
 
 __all__ = ["Optimum", "limits_of"]
 

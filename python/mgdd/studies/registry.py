@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import inspect
+from collections.abc import Callable
 from importlib import import_module
 from typing import Any
 
@@ -11,7 +12,8 @@ from mgdd.studies.base import Progress, StudyResult, check_seeds
 
 __all__ = ["available_studies", "run_study"]
 
-# One line per study: "my-name" is run_my_name of mgdd.studies.
+# One line per study: "my-name" is run_my_name of mgdd.studies.my_name, or of the module that stands below.
+_MODULES = {"identification-benchmarks": "benchmarks.identification_benchmarks"}
 _TITLES = {
     "measured-traces": "calibrate a cycle model to four measured traces and find their best timing",
     "throttle-characteristics": "holding-duty hysteresis, rate dependence and air flow of a throttle",
@@ -83,9 +85,7 @@ def run_study(
     >>> [row["step_sign"] for row in result.summary["rows"]]
     [1, -1, -1, -1, 1, 1, 1]
     """
-    if name not in _TITLES:
-        raise ParameterError(f"study {name!r}: must be one of {', '.join(_TITLES)}")
-    function = getattr(import_module("mgdd.studies"), f"run_{name.replace('-', '_')}")
+    function = function_of(name)
     options: dict[str, Any] = {"quick": quick, "figures": figures}
     if progress is not None:
         options["progress"] = progress
@@ -95,3 +95,14 @@ def run_study(
         options["seeds"] = check_seeds(seeds)
     result: StudyResult = function(**options)
     return result
+
+
+def function_of(name: str) -> Callable[..., StudyResult]:
+    """Give the function that runs a study; ParameterError for an unknown name."""
+    if name not in _TITLES:
+        raise ParameterError(f"study {name!r}: must be one of {', '.join(_TITLES)}")
+    own = name.replace("-", "_")
+    function: Callable[..., StudyResult] = getattr(
+        import_module(f"mgdd.studies.{_MODULES.get(name, own)}"), f"run_{own}"
+    )
+    return function
