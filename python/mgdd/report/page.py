@@ -10,7 +10,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from mgdd._core import __version__
-from mgdd.results import to_jsonable
+from mgdd.results.labels import to_jsonable
 from mgdd.studies import available_studies
 
 if TYPE_CHECKING:
