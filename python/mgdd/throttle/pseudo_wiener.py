@@ -267,10 +267,7 @@ class PseudoWiener(Parameters):
         units = {name: str(unit) for name, unit in _core.pseudo_wiener_units(file.kind).items()}
         said = file.values("parameters", {name: Wanted(unit, required=False) for name, unit in units.items()})
         options = file.values("settings", wanted(("switching", "friction"), form="text"))
-        try:
-            model = cls(file.kind, said, **options)
-        except ParameterError as error:
-            raise ParameterError(f"{file.origin}: {error}") from error
+        model = cls(file.kind, said, **options)
         file.values("parameters", wanted(model.parameters, units))  # which of them there are, the numbers say
         return model
 
