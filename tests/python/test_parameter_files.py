@@ -77,7 +77,9 @@ def pseudo_wiener(draw: st.DrawFn) -> PseudoWiener:
         options["switching"] = draw(st.sampled_from(["predicted", "measured"]))
         options["friction"] = draw(st.sampled_from(["set_valued", "tanh"]))
         values |= {"substeps": float(draw(st.integers(1, 6))), "ramp_deg": draw(span(0.05, 1.5))}
-        values |= {"tanh_deg_per_s": draw(span(0.5, 20.0))}
+        values |= {"tanh_deg_per_s": draw(span(0.5, 20.0)), "dead_band_deg": draw(span(0.0, 1.0))}
+    if kind == "pw_w":
+        values |= {"knot_lower_duty": draw(span(-0.5, -0.2)), "knot_upper_duty": draw(span(0.2, 0.6))}
     if kind == "pw_p":
         values["plays"] = float(draw(st.integers(1, 8)))
     base = dict(PseudoWiener(kind, values, **options).parameters)
@@ -117,6 +119,16 @@ def test_a_throttle_model_simulates_bit_for_bit_after_a_file(model: Any, start_d
 def test_stops_ramp_and_substeps_of_a_first_principle_model_come_back() -> None:
     model = FirstPrincipleModel(parameters=GROUPS, closed_deg=2.0, open_deg=60.0, ramp_deg=1.0, substeps=5)
     assert FirstPrincipleModel.from_toml(model.to_toml()) == model
+
+
+def test_a_value_outside_its_domain_names_the_file(tmp_path: Path) -> None:
+    model, file = FirstPrincipleModel(parameters=GROUPS), tmp_path / "model.toml"
+    file.write_text(model.to_toml().replace("tau_s = { value = 0.03", "tau_s = { value = -0.03"), encoding="utf-8")
+    with pytest.raises(ParameterError, match=r"model\.toml: tau_s = -0\.03: must be > 0"):
+        load_throttle_model(file)
+    pair = SensorPair().to_toml().replace("adc_bits = { value = 12", "adc_bits = { value = 99")
+    with pytest.raises(ParameterError, match=r"^pair\.toml: adc_bits = 99"):
+        SensorPair.from_toml(pair, origin="pair.toml")
 
 
 def test_a_file_of_a_model_is_loaded_whatever_its_kind(tmp_path: Path) -> None:
@@ -314,7 +326,7 @@ def test_any_number_and_text_come_back(value: float, text: str) -> None:
         ("0.30000000000000004", "[1]", ParameterError, r"tau_s: value = \[1\]: must be a number"),
         ("1e-17", '"small"', ParameterError, r"tau_s: stderr = 'small': must be a number"),
         ("[parameters]", "[parameter]", ParameterError, r"unknown key 'parameter': did you mean '\[parameters\]'\?"),
-        ("empty = []", "emtpy = []", ParameterError, "unknown key 'emtpy': did you mean 'empty'"),
+        ("empty = []", "emptys = []", ParameterError, "unknown key 'emptys': did you mean 'empty'"),
         ("[parameters]", "[parameters", DataError, "a.toml: not valid TOML"),
     ],
 )
