@@ -16,6 +16,7 @@ import mgdd
 from mgdd import identify, io, optimize, signals, surrogate, throttle
 from mgdd.engine import Cylinder, OperatingPoint, fit_nox_proxy, timing_sweep
 from mgdd.loop import EngineBench, steady_map
+from mgdd.optimize import FitOptions
 
 Array = np.ndarray[Any, Any]
 Call = Callable[..., Any]
@@ -23,8 +24,8 @@ Call = Callable[..., Any]
 TIME = np.arange(600) * 1e-3
 DUTY = 0.15 + 0.2 * np.sin(2.0 * np.pi * TIME * (0.5 + 4.0 * TIME))
 MODEL = throttle.PseudoWiener("pw_r")
-ANGLE = MODEL.simulate(TIME, DUTY, start_deg=8.0)
-GROUPS = identify.FirstPrincipleModel(parameters=identify.throttle_start())
+ANGLE = MODEL.simulate({"time_s": TIME, "duty": DUTY})["angle_deg"].to_numpy()
+GROUPS = identify.FirstPrincipleModel()
 CRANK = np.arange(-90.0, 91.0)
 BAR = 40.0 * np.exp(-((CRANK / 40.0) ** 2)) + 1.0
 NOISE = np.random.default_rng(0).standard_normal(600)
@@ -40,15 +41,12 @@ def lag(_: float, x: Any, u: Any, p: Any) -> Any:
     return (p[0] * u[0] - x) / p[1]
 
 
-def fitted(time: Any, u: Any, y: Any, start: Any) -> Any:
-    parameters = {"gain": 100.0, "lag_s": 0.1}
-    return identify.fit_ode(lag, time, u=u, y=y, parameters=parameters, start=start, max_iterations=2).report.values
-
-
-def ode(time: Any, u: Any, start: Any) -> Any:
-    parameters = {"gain": 100.0, "lag_s": 0.1}
-    model = identify.OdeModel(derivative=lag, output=lambda x, *_: x[0], parameters=parameters, start=(0.0,))
-    return model.simulate(time, u, start=start)
+def fitted(time: Any, u: Any, y: Any, state: Any) -> Any:
+    record = {"time_s": time, "duty": u, "angle_deg": y}
+    names = {"input_names": ["duty"], "output_name": "angle_deg", "parameters": {"gain": 100.0, "lag_s": 0.1}}
+    return identify.fit_ode(
+        lag, record, initial_state=state, options=FitOptions(max_iterations=2), **names
+    ).report.values
 
 
 def updated(duty: Any, angle: Any) -> Any:
@@ -82,7 +80,8 @@ def logged(*columns: Any) -> Any:
 
 
 def smooth(duty: Any, angle: Any, starts: Any, lower: Any, upper: Any) -> Any:
-    return identify.fit_smooth_throttle(duty, angle, starts=starts, lower=lower, upper=upper).report.values
+    record = {"time_s": TIME, "duty": duty, "angle_deg": angle}
+    return identify.fit_smooth_throttle(record, start_values=starts, lower=lower, upper=upper).report.values
 
 
 def swept(**options: Any) -> Any:
@@ -104,17 +103,11 @@ CALLS: dict[str, tuple[Call, tuple[Array, ...]]] = {
     "engine.timing_sweep": (
         lambda soc: timing_sweep(Cylinder(), OperatingPoint(), soc_cad=soc)["imep_gross_bar"].to_numpy(), (SOC,),
     ),
-    "identify.FirstPrincipleModel.simulate": (lambda t, u: GROUPS.simulate(t, u, start_deg=8.0), (TIME, DUTY)),
-    "identify.FirstPrincipleModel.predict": (lambda t, u, y: GROUPS.predict(t, u, y, 5), (TIME, DUTY, ANGLE)),
-    "identify.OdeModel.simulate": (ode, (TIME, DUTY, np.array([8.0]))),
     "identify.OnlineUpdate.update": (updated, (DUTY, ANGLE)),
     "identify.fit_ode": (fitted, (TIME, DUTY, ANGLE, np.array([8.0]))),
     "identify.fit_smooth_throttle": (smooth, (DUTY, ANGLE, 1.05 * TEN, 0.1 * TEN, 10.0 * TEN)),
     "identify.n_step_rms": (
         lambda y: identify.n_step_rms(MODEL, log(), true_deg=y)["n_step_rms_deg"].to_numpy(), (ANGLE,),
-    ),
-    "identify.simulate_smooth_throttle": (
-        lambda u, p: identify.simulate_smooth_throttle(u, parameters=p), (DUTY, TEN),
     ),
     "io.check_trace": (io.check_trace, (CRANK, BAR)),
     "io.from_0_720": (lambda a, p: io.from_0_720(a, p, firing_tdc_deg=360.0), (CRANK + 360.0, BAR)),
@@ -130,7 +123,7 @@ CALLS: dict[str, tuple[Call, tuple[Array, ...]]] = {
         lambda x, y: optimize.measure_map(x, y).curvature, (SWEEP, -SWEEP**2),
     ),
     "signals.even_step": (signals.even_step, (TIME,)),
-    "signals.fit_percent": (signals.fit_percent, (ANGLE, ANGLE + NOISE)),
+    "signals.nrmse_fit_percent": (signals.nrmse_fit_percent, (ANGLE, ANGLE + NOISE)),
     "signals.mse": (signals.mse, (ANGLE, ANGLE + NOISE)),
     "signals.residual_tests": (lambda e, u: signals.residual_tests(e, u).share_white, (NOISE, DUTY)),
     "signals.rmse": (signals.rmse, (ANGLE, ANGLE + NOISE)),
@@ -138,9 +131,7 @@ CALLS: dict[str, tuple[Call, tuple[Array, ...]]] = {
     "surrogate.EngineSurrogate.predict": (
         lambda soi: RECORDS.predict(soi)["imep_bar"].to_numpy(), (np.array([-4.0, 0.0]),),
     ),
-    "throttle.PseudoWiener.simulate": (lambda t, u: MODEL.simulate(t, u, start_deg=8.0), (TIME, DUTY)),
-    "throttle.PseudoWiener.predict": (lambda t, u, y: MODEL.predict(t, u, y, 5), (TIME, DUTY, ANGLE)),
-    "throttle.PseudoWiener.slopes": (lambda u: MODEL.slopes(u, start_deg=8.0)[1], (DUTY[:20],)),
+    "throttle.PseudoWiener.slopes": (lambda u: MODEL.slopes(u, initial_state={"angle_deg": 8.0})[1], (DUTY[:20],)),
     "throttle.airflow_torque_nm": (lambda a: throttle.airflow_torque_nm(throttle.Throttle(), a), (OPEN,)),
     "throttle.holding_duty": (
         lambda a: throttle.holding_duty(throttle.Throttle(), a)["duty_rising"].to_numpy(), (OPEN,),
@@ -187,7 +178,7 @@ def takers() -> Iterable[str]:
 
 
 def test_every_taker_of_arrays_is_here() -> None:
-    found = {name for name in takers() if not name.startswith(("identify.ThrottleModel.", "optimize.FitReport."))}
+    found = {name for name in takers() if not name.startswith("results.FitReport.")}
     assert set(CALLS) == found
 
 
@@ -203,3 +194,13 @@ def test_every_form_gives_the_same_numbers(name: str, form: str) -> None:
     for values, copy, own in zip(arrays, before, given, strict=True):
         np.testing.assert_array_equal(values, copy)
         np.testing.assert_array_equal(np.asarray(own), copy)
+
+
+@pytest.mark.parametrize("table", [*FORMS, "frame", "dataset"])
+@pytest.mark.parametrize("model", [MODEL, GROUPS], ids=lambda model: model.kind)
+def test_models_take_columns_of_every_form(model: Any, table: str) -> None:
+    columns = {"time_s": TIME, "duty": DUTY, "angle_deg": ANGLE}
+    tables = {"frame": pd.DataFrame(columns), "dataset": xr.Dataset({n: ("row", v) for n, v in columns.items()})}
+    given = tables[table] if table in tables else {name: FORMS[table](values) for name, values in columns.items()}
+    np.testing.assert_array_equal(model.simulate(given)["angle_deg"], model.simulate(columns)["angle_deg"])
+    np.testing.assert_array_equal(model.predict(given, 5)["angle_deg"], model.predict(columns, 5)["angle_deg"])

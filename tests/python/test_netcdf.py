@@ -26,10 +26,11 @@ from mgdd.io import (
     write_throttle_log,
 )
 from mgdd.loop import EngineBench, monte_carlo, run_seeker, steady_map
-from mgdd.results import check_labels, labelled_dataset
+from mgdd.optimize import FitOptions
+from mgdd.results import Fit, check_labels, labelled_dataset
 from mgdd.rig import SimulatedRig
 from mgdd.studies import run_measured_traces
-from mgdd.throttle import SensorFault, Throttle, groups, holding_duty, linear_part, sense, simulate_many
+from mgdd.throttle import PseudoWiener, SensorFault, Throttle, groups, holding_duty, linear_part, sense, simulate_many
 from mgdd.throttle import simulate as simulate_throttle
 
 POINT = OperatingPoint()
@@ -66,6 +67,13 @@ def rig_run() -> xr.Dataset:
         return run_seeker(rig, seeker(), 20).dataset
 
 
+def sought(name: str) -> xr.Dataset:
+    bounds = {} if name in ("GradientDescent", "Spsa") else {"lower": -20.0, "upper": 20.0}
+    more = {"noise_sd": 0.1} if name == "GoldenSection" else {}
+    made = getattr(optimize, name)(start=1.0, **bounds, **more)
+    return optimize.maximize(lambda x: -float((x[0] - 2.0) ** 2), made, 20)
+
+
 def learned() -> xr.Dataset:
     learner = optimize.IterativeLearning(np.zeros(10), k_p=0.5)
     learner.ask()
@@ -97,6 +105,24 @@ def fitted_load() -> xr.Dataset:
     return fit.loads[0].overlay
 
 
+def fitted() -> Fit:
+    return identify.identify_throttle(log(), "first_principle", options=FitOptions(n_starts=1))
+
+
+def duty_lag(_: float, x: Any, u: Any, p: Any) -> Any:
+    return (p[0] * u[0] - x) / p[1]
+
+
+MODELS = {
+    "identify.FirstPrincipleModel": identify.FirstPrincipleModel(),
+    "identify.SmoothThrottle": identify.SmoothThrottle(),
+    "identify.OdeModel": identify.OdeModel(
+        derivative=duty_lag, output=lambda x, *_: x[0], parameters={"gain": 50.0, "lag_s": 0.1}, initial_state=(8.0,),
+        input_names=("duty",), output_name="angle_deg",
+    ),
+    "throttle.PseudoWiener": PseudoWiener("pw_r"),
+}  # fmt: skip
+SEEKERS = ("BoundedSeeking", "ExtremumSeeking", "GoldenSection", "GradientDescent", "NewtonSeeking", "Spsa")
 SIGNALS = ("amplitude_random_steps", "chirp", "multisine", "prbs", "staircase", "triangle")
 NEEDS = {"load_cascaded_tanks": "cascaded_tanks", "load_emps": "emps", "load_h2df_cycles": "h2df_502",
          "load_wiener_hammerstein": "wh2009"}  # fmt: skip
@@ -113,10 +139,10 @@ MADE: dict[str, Callable[[Path], Any]] = {
     "identify.ExcitationCheck.prediction": lambda _: identify.check_excitation(
         signals.chirp(offset=0.15, amplitude=0.1), Throttle()
     ).prediction,
-    "identify.fit_cylinder.overlay": lambda _: fitted_load(),
+    "results.Fit.run": lambda _: [fitted().run, fitted_load()],
     "signals.ResidualTests.correlations": lambda _: validation().tests.correlations,
-    "identify.validate_throttle.n_step": lambda _: validation().n_step,
-    "identify.validate_throttle.free_run": lambda _: validation().free_run,
+    "identify.ThrottleValidation.n_step": lambda _: validation().n_step,
+    "identify.ThrottleValidation.free_run": lambda _: validation().free_run,
     "identify.WallHeatProfile.dataset": lambda _: wall_heat(),
     "results.FitReport.to_dataset": lambda _: report().to_dataset(),
     "identify.design_excitation": lambda _: identify.design_excitation("chirp", Throttle())[0],
@@ -136,8 +162,11 @@ MADE: dict[str, Callable[[Path], Any]] = {
     "optimize.maximize": lambda _: optimize.maximize(
         lambda x: -float((x[0] - 2.0) ** 2), optimize.GradientDescent(start=1.0), 20
     ),
+    **{f"optimize.{name}.history": lambda _, n=name: sought(n) for name in SEEKERS},
     "results.labelled_dataset": lambda _: labelled_dataset({"time_s": ("time_s", TIME)}),
     "studies.StudyResult.dataset": lambda _: run_measured_traces(quick=True, figures=False).dataset,
+    **{f"{name}.simulate": lambda _, n=name: MODELS[n].simulate(log()) for name in MODELS},
+    **{f"{name}.predict": lambda _, n=name: MODELS[n].predict(log(), 5) for name in MODELS},
     "throttle.groups": lambda _: groups(Throttle()),
     "throttle.holding_duty": lambda _: holding_duty(Throttle()),
     "throttle.linear_part": lambda _: linear_part(Throttle()),
@@ -158,6 +187,8 @@ def sources(module: str) -> Iterable[str]:
     room = importlib.import_module(f"mgdd.{module}")
     for name in room.__all__:
         thing = getattr(room, name)
+        if getattr(thing, "_is_protocol", False):
+            continue
         if not inspect.isclass(thing):
             if callable(thing) and is_dataset(getattr(thing, "__annotations__", {}).get("return", "")):
                 yield f"{module}.{name}"
@@ -165,7 +196,8 @@ def sources(module: str) -> Iterable[str]:
         for key, field in getattr(thing, "__annotations__", {}).items():
             if is_dataset(field):
                 yield f"{module}.{name}.{key}"
-        for key, member in vars(thing).items():
+        members = {k: v for base in reversed(thing.__mro__) if "mgdd" in base.__module__ for k, v in vars(base).items()}
+        for key, member in members.items():
             function = member.fget if isinstance(member, property) else getattr(member, "__func__", member)
             returned = getattr(function, "__annotations__", {}).get("return", "")
             if not key.startswith("_") and is_dataset(returned):
