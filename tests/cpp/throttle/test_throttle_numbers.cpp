@@ -9,10 +9,10 @@
 #include <vector>
 
 #include "mgdd/common/error.hpp"
-#include "mgdd/throttle/pseudo_wiener.hpp"
+#include "mgdd/throttle/models/pseudo_wiener.hpp"
+#include "mgdd/throttle/models/smooth.hpp"
 #include "mgdd/throttle/sensors.hpp"
 #include "mgdd/throttle/simulation.hpp"
-#include "mgdd/throttle/smooth_plant.hpp"
 #include "support/asymmetric_throttle.hpp"
 
 namespace mgdd::throttle {
