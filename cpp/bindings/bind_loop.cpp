@@ -1,6 +1,7 @@
 // Binds include/mgdd/loop: a seeker on the bench without the GIL, and many whole loops on all cores.
 #include <algorithm>
 #include <cstdint>
+#include <optional>
 #include <string>
 #include <variant>
 #include <vector>
@@ -44,15 +45,15 @@ constexpr SummaryField summary_fields[] = {
     {"highest_cad", [](const LoopSummary& s) { return s.highest_cad; }},
     {"misfires", [](const LoopSummary& s) { return static_cast<double>(s.misfires); }}};
 
-LoopCriteria criteria_from(double optimum_cad, double arrival_cad, std::int64_t tail_cycles, std::int64_t exceed_from,
-                           std::vector<double> exceed_above) {
+LoopCriteria criteria_from(std::int64_t cycles, double optimum_cad, double arrival_cad, std::int64_t tail_cycles,
+                           std::optional<std::int64_t> exceed_from, std::vector<double> exceed_above) {
   LoopCriteria out;
   out.optimum_cad = optimum_cad;
   out.arrival_cad = arrival_cad;
   out.tail_cycles = tail_cycles;
   out.exceed_from = exceed_from;
   out.exceed_above = std::move(exceed_above);
-  validate(out);
+  validate(out, cycles);
   return out;
 }
 
@@ -99,9 +100,9 @@ void bind_run(py::module_& m) {
   m.def(
       "run_loop",
       [](EngineBench& bench, Recorded<S>& seeker, std::int64_t cycles, double optimum_cad, double arrival_cad,
-         std::int64_t tail_cycles, std::int64_t exceed_from, std::vector<double> exceed_above) {
+         std::int64_t tail_cycles, std::optional<std::int64_t> exceed_from, std::vector<double> exceed_above) {
         return run(bench, seeker, cycles,
-                   criteria_from(optimum_cad, arrival_cad, tail_cycles, exceed_from, std::move(exceed_above)));
+                   criteria_from(cycles, optimum_cad, arrival_cad, tail_cycles, exceed_from, std::move(exceed_above)));
       },
       py::arg("bench"), py::arg("seeker"), py::arg("cycles"), py::kw_only(), py::arg("optimum_cad"),
       py::arg("arrival_cad"), py::arg("tail_cycles"), py::arg("exceed_from"), py::arg("exceed_above"),
@@ -120,7 +121,7 @@ void bind_monte_carlo(py::module_& m) {
       "monte_carlo",
       [](const std::vector<EngineBench*>& benches, const py::list& seekers, const std::vector<std::uint64_t>& seeds,
          std::int64_t cycles, const std::vector<double>& optimum_cad, double arrival_cad, std::int64_t tail_cycles,
-         std::int64_t exceed_from, const std::vector<std::vector<double>>& exceed_above, int threads) {
+         std::optional<std::int64_t> exceed_from, const std::vector<std::vector<double>>& exceed_above, int threads) {
         MonteCarloPlan plan;
         for (const EngineBench* bench : benches)
           plan.benches.push_back(*bench);
@@ -129,7 +130,7 @@ void bind_monte_carlo(py::module_& m) {
         }
         for (std::size_t i = 0; i < benches.size(); ++i) {
           plan.criteria.push_back(
-              criteria_from(optimum_cad[i], arrival_cad, tail_cycles, exceed_from, exceed_above[i]));
+              criteria_from(cycles, optimum_cad[i], arrival_cad, tail_cycles, exceed_from, exceed_above[i]));
         }
         for (const py::handle& object : seekers) {
           if (take<optimize::ExtremumSeeking>(object, plan.seekers) ||

@@ -14,9 +14,18 @@ import xarray as xr
 
 from mgdd.engine import OperatingPoint, Performance
 from mgdd.errors import ParameterError
-from mgdd.loop import EngineBench, LoopCriteria, find_steady_optimum, monte_carlo, run_seeker, steady_map
+from mgdd.loop import (
+    EngineBench,
+    LoopCriteria,
+    find_steady_optimum,
+    monte_carlo,
+    run_seeker,
+    steady_map,
+    summarize_cycles,
+)
 from mgdd.optimize import ExtremumSeeking, GoldenSection, Limit, NewtonSeeking, Spsa
 from mgdd.results import check_labels
+from mgdd.rig import SimulatedRig
 
 SPACE = {"start": -14.0, "lower": -30.0, "upper": 10.0}
 
@@ -73,6 +82,23 @@ def test_labels_and_history_of_a_run() -> None:
     assert run.summary["exceeded_fraction"] == pytest.approx(float(over), abs=1e-12)
     assert run.summary["final_cad"] == pytest.approx(float(run.dataset["estimate_cad"][100:].mean()), abs=1e-12)
     np.testing.assert_array_equal(it.history["applied"].values[:, 0], run.dataset["soc_requested_cad"])
+
+
+def test_limits_are_judged_in_short_runs_too() -> None:
+    goal = LoopCriteria(exceed_above={"p_max_bar": 110.0})
+    for cycles in (1, 7, 200):
+        run = run_seeker(bench(), seeker("batch"), cycles, criteria=goal)
+        over = run.dataset["limits"].sel(limit="p_max_bar")[cycles // 2 :] > 110.0
+        assert run.summary["exceeded_fraction"] == pytest.approx(float(over.mean()), abs=1e-12)
+        assert summarize_cycles(run.dataset, goal)["exceeded_fraction"] == run.summary["exceeded_fraction"]
+    assert LoopCriteria().counted_from(5000) == 1000
+    late = LoopCriteria(exceed_from=200, exceed_above={"p_max_bar": 110.0})
+    for plant in (own := bench(), SimulatedRig(rigged := bench())):
+        with pytest.raises(ParameterError, match="exceed_from = 200: must be < cycles = 200, or no cycle counts"):
+            run_seeker(plant, seeker("batch"), 200, criteria=late)
+    with pytest.raises(ParameterError, match="exceed_from = 200"):
+        monte_carlo(own, seeker("batch"), range(2), cycles=200, criteria=late)
+    assert own.cycle == rigged.cycle == 0
 
 
 def test_monte_carlo_is_labelled_and_the_same_on_any_thread_count() -> None:

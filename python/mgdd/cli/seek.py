@@ -31,7 +31,6 @@ _LATE = ("extremum_seeking", "newton")
 _COV, _COV_CYCLES, _COV_TRIAL = "cov_imep_percent", 50, 1000
 _MOST_CYCLES = 2_000_000
 _ARRIVAL_CAD = 1.0
-_EXCEED_FROM = 1000
 # Fields that the library names in its messages, and the options that set them.
 _OPTIONS = {
     "soc_scatter_cad = ": "--soc-scatter-cad ",
@@ -114,7 +113,7 @@ def _seek(args: argparse.Namespace) -> None:
         seeker = make_seeker(task)
     cycles = default_cycles(task) if args.cycles is None else args.cycles
     above = _thresholds(best, limits)
-    goal = LoopCriteria(optimum=best["soc_cad"], arrival=_ARRIVAL_CAD, exceed_from=_EXCEED_FROM, exceed_above=above)
+    goal = LoopCriteria(optimum=best["soc_cad"], arrival=_ARRIVAL_CAD, exceed_above=above)
     try:
         run = run_seeker(bench, seeker, cycles, criteria=goal)
     except Interrupted as stop:
@@ -202,10 +201,11 @@ def _optimum(args: argparse.Namespace, bench: EngineBench, limits: Mapping[str, 
 
 
 def _above(run: LoopRun, limits: Mapping[str, float]) -> float:
-    """Share of the cycles from 1000 on above a limit itself, scatter included."""
-    if not limits or run.dataset.sizes["cycle"] <= _EXCEED_FROM:
+    """Share of the cycles that count above a limit itself, scatter included."""
+    cycles = run.dataset.sizes["cycle"]
+    if not limits or cycles == 0:
         return math.nan
-    measured = run.dataset["limits"].to_numpy()[_EXCEED_FROM:]
+    measured = run.dataset["limits"].to_numpy()[LoopCriteria().counted_from(cycles) :]
     caps = [limits[str(name)] for name in run.dataset["limit"].to_numpy()]
     return float((measured > caps).any(axis=1).mean())
 

@@ -10,6 +10,8 @@ from mgdd.errors import ParameterError
 
 __all__ = ["LoopCriteria"]
 
+_LONGEST_SETTLING = 1000  # cycles that do not count for the limits unless the caller says so; as in the core
+
 
 @dataclass(frozen=True, kw_only=True)
 class LoopCriteria:
@@ -23,8 +25,9 @@ class LoopCriteria:
         Distance to the optimum that counts as arrived [unit of the input].
     tail_cycles : int
         Cycles behind ``final_cad``.
-    exceed_from : int
-        First cycle that counts for ``exceeded_fraction``.
+    exceed_from : int, optional
+        First cycle that counts for ``exceeded_fraction``; by default 1000, or the middle of a run of fewer than 2000
+        cycles.
     exceed_above : mapping of str to float
         Per limit, the value above which a cycle counts.
 
@@ -46,7 +49,7 @@ class LoopCriteria:
     optimum: float | None = None
     arrival: float = 1.0
     tail_cycles: int = 100
-    exceed_from: int = 1000
+    exceed_from: int | None = None
     exceed_above: Mapping[str, float] = field(default_factory=dict)
 
     def __post_init__(self) -> None:
@@ -56,11 +59,48 @@ class LoopCriteria:
             raise ParameterError(f"arrival = {self.arrival:g}: must be > 0")
         if self.tail_cycles < 1:
             raise ParameterError(f"tail_cycles = {self.tail_cycles}: must be >= 1")
-        if self.exceed_from < 0:
+        if self.exceed_from is not None and self.exceed_from < 0:
             raise ParameterError(f"exceed_from = {self.exceed_from}: must be >= 0")
         for name, value in self.exceed_above.items():
             if math.isnan(value):
                 raise ParameterError(f"exceed_above: {name} = nan: give a number, or leave it out")
+
+    def counted_from(self, cycles: int) -> int:
+        """Give the first cycle that counts for ``exceeded_fraction``.
+
+        Parameters
+        ----------
+        cycles : int
+            Length of the run.
+
+        Returns
+        -------
+        int
+            ``exceed_from`` or its default for that length.
+
+        Examples
+        --------
+        >>> from mgdd.loop import LoopCriteria
+        >>> [LoopCriteria().counted_from(cycles) for cycles in (300, 5000)]
+        [150, 1000]
+        """
+        return min(_LONGEST_SETTLING, cycles // 2) if self.exceed_from is None else self.exceed_from
+
+    def require_counted(self, cycles: int) -> None:
+        """Raise where no cycle of a run would count for ``exceeded_fraction``.
+
+        Parameters
+        ----------
+        cycles : int
+            Length of the run.
+
+        Raises
+        ------
+        mgdd.errors.ParameterError
+            ``exceed_from`` is not below ``cycles``.
+        """
+        if self.exceed_above and self.exceed_from is not None and self.exceed_from >= cycles:
+            raise ParameterError(f"exceed_from = {self.exceed_from}: must be < cycles = {cycles}, or no cycle counts")
 
     def thresholds(self, names: tuple[str, ...]) -> list[float]:
         """Give ``exceed_above`` in the order of the limits, infinite where it has none; empty if it is empty.

@@ -87,6 +87,7 @@ def steer(plant: Plant, seeker: Any, cycles: int, criteria: LoopCriteria) -> Loo
             f"limits of the seeker {list(names)} are not all measured by the plant, which has {list(plant.limit_names)}"
         )
     criteria.thresholds(names)
+    criteria.require_counted(cycles)
     announcing = plant if isinstance(plant, AnnouncingPlant) else None
     first, log, interrupted = seeker.cycle, _Log(), False
     try:

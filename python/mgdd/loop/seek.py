@@ -198,7 +198,7 @@ def monte_carlo(
             optimum_cad=[own["optimum_cad"] for own in each],
             arrival_cad=each[0]["arrival_cad"] if each else 1.0,
             tail_cycles=each[0]["tail_cycles"] if each else 1,
-            exceed_from=each[0]["exceed_from"] if each else 0,
+            exceed_from=each[0]["exceed_from"] if each else None,
             exceed_above=[own["exceed_above"] for own in each],
             threads=threads,
         ),

@@ -69,7 +69,7 @@ def summarize_cycles(cycles: xr.Dataset, criteria: LoopCriteria | None = None) -
         "rms_cad": math.nan,
         "cycles_to": math.nan,
         "cycles_stays": math.nan,
-        "exceeded_fraction": _exceeded(cycles, criteria.exceed_from, criteria.exceed_above),
+        "exceeded_fraction": _exceeded(cycles, criteria.counted_from(n), criteria.exceed_above),
         "mean_applied_cad": _mean(applied[half]),
         "mean_j": fired("j"),
         "mean_efficiency_percent": fired("efficiency_gross", 100.0),
