@@ -31,8 +31,8 @@ constexpr std::string_view above_prefix = "above_";
 const std::vector<std::string> pw_r_default{"tau_s", "gain_deg_per_s2_per_duty", "preload_duty", "spring_duty_per_deg",
                                             "coulomb_duty"};
 
-optimize::Parameter parameter_of(const throttle::PseudoWienerField& field, std::string_view name) {
-  return {std::string(name), field.lower, field.upper, field.log_scaled};
+optimize::Parameter parameter_of(const FieldInfo& field, std::string_view name) {
+  return {std::string(name), field.domain.lower, field.domain.upper, field.domain.log_scaled};
 }
 
 std::vector<PseudoWienerUnknown> unknowns(const PwR&, const PseudoWienerFitOptions& o) {
@@ -69,7 +69,7 @@ std::vector<PseudoWienerUnknown> by_name(PseudoWienerKind kind, std::size_t n_de
     return out;
   }
   for (const std::string& name : o.free) {
-    const auto found = std::ranges::find(rows, name, &throttle::PseudoWienerField::name);
+    const auto found = std::ranges::find(rows, name, &FieldInfo::name);
     if (found == rows.end()) {
       throw ParameterError("free: '" + name + "' is no parameter of " +
                            std::string(name_of(throttle::pseudo_wiener_names(), kind)));
