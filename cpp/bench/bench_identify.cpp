@@ -9,6 +9,7 @@
 #include "mgdd/common/random.hpp"
 #include "mgdd/identify/output_error.hpp"
 #include "mgdd/identify/throttle/smooth_kernel.hpp"
+#include "mgdd/math/dispatch.hpp"
 
 namespace {
 
@@ -74,7 +75,7 @@ void one_set(benchmark::State& state) {
     accumulate(SmoothPlant{}, log().record(), n_samples, shifted(1.02), sums);
     benchmark::DoNotOptimize(sums);
   }
-  state.SetLabel(std::string(smooth_throttle_instruction_set()));
+  state.SetLabel(std::string(to_string(instruction_set())));
 }
 BENCHMARK(one_set)->Unit(benchmark::kMillisecond);
 

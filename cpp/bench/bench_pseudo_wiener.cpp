@@ -4,6 +4,7 @@
 #include <array>
 #include <vector>
 
+#include "mgdd/math/dispatch.hpp"
 #include "mgdd/throttle/models/pseudo_wiener.hpp"
 
 namespace {
@@ -40,7 +41,7 @@ BENCHMARK(sample<PwP, double>);
 BENCHMARK(sample<PwR, Dual<5>>);
 
 // Lanes pay off only in a function that is compiled per instruction set.
-MGDD_CLONES void run_lanes(const BasicPwRModel<Lanes<8>>& model, BasicPwRState<Lanes<8>>& state, int samples) noexcept {
+MGDD_INLINE void run_lanes(const BasicPwRModel<Lanes<8>>& model, BasicPwRState<Lanes<8>>& state, int samples) noexcept {
   for (int k = 0; k < samples; ++k)
     model.advance(state, Lanes<8>(k % 200 < 100 ? 0.35 : 0.1));
 }
@@ -48,7 +49,7 @@ void eight_lanes(benchmark::State& state) {
   const auto model = model_of(lift<Lanes<8>>(example<PwR>()));
   auto s = model.at_rest(Lanes<8>(20.0), Lanes<8>(0.0));
   for (auto _ : state) {
-    run_lanes(model, s, 1000);
+    dispatch([&]() MGDD_INLINE_LAMBDA { run_lanes(model, s, 1000); });
     benchmark::DoNotOptimize(s);
   }
   state.counters["ns_per_sample_and_lane"] =

@@ -1,5 +1,6 @@
 // Binds the measured-benchmark models of cpp/systems: drive axis, two tanks, Wiener-Hammerstein.
 #include <map>
+#include <span>
 #include <string>
 #include <vector>
 
@@ -22,19 +23,18 @@ struct InputRecord {
   std::size_t skip;
 };
 
-template <class Domains>
-std::vector<std::string> domain_names(const Domains& domains) {
+std::vector<std::string> names_of(std::span<const FieldInfo> fields) {
   std::vector<std::string> names;
-  for (const FitDomain& domain : domains)
-    names.emplace_back(domain.name);
+  for (const FieldInfo& field : fields)
+    names.emplace_back(field.name);
   return names;
 }
 
 template <class Model>
 void bind_step_model(py::class_<Model>& cls) {
   cls.def_property_readonly_static("parameter_names",
-                                   [](const py::object&) { return domain_names(Model::parameters); });
-  cls.def_property_readonly_static("state_names", [](const py::object&) { return domain_names(Model::states); });
+                                   [](const py::object&) { return names_of(Model::parameters); });
+  cls.def_property_readonly_static("state_names", [](const py::object&) { return names_of(Model::states); });
   cls.def(
       "free_run",
       [](const Model& model, const std::vector<double>& parameters, const std::vector<double>& start,
@@ -55,7 +55,7 @@ void bind_step_model(py::class_<Model>& cls) {
           record.start = in.start;
           record.skip = in.skip;
           for (const std::string& name : in.free_start)
-            record.free_start.push_back(domain_index(Model::states, name, "state"));
+            record.free_start.push_back(field_index(Model::states, name, "state"));
           records.push_back(std::move(record));
         }
         return fit_free_run(model, base, free, std::move(records), options);

@@ -8,6 +8,7 @@
 #include "mgdd/identify/multi_start.hpp"
 #include "mgdd/identify/throttle/smooth_fit.hpp"
 #include "mgdd/identify/throttle/throttle_groups.hpp"
+#include "mgdd/math/dispatch.hpp"
 
 namespace mgdd::bindings {
 namespace {
@@ -134,7 +135,7 @@ void bind_identify_throttle(py::module_& m) {
   m.attr("smooth_throttle_example") = py::tuple(py::cast(throttle::smooth_plant_example));
   m.attr("throttle_group_names") = py::tuple(py::cast(names_of(ThrottleGroups::parameter_names)));
   m.def(
-      "smooth_throttle_instruction_set", [] { return as_str(smooth_throttle_instruction_set()); },
+      "smooth_throttle_instruction_set", [] { return as_str(to_string(instruction_set())); },
       "Instruction set that the kernel chose on this machine.");
   m.def(
       "simulate_smooth_throttle",
@@ -165,7 +166,7 @@ void bind_identify_throttle(py::module_& m) {
         return rows;
       },
       "The nine groups with their bounds.");
-  m.def("latin_hypercube", &latin_hypercube, arg("parameters"), arg("n"), arg("seed"),
+  m.def("latin_hypercube", &spread_starts, arg("parameters"), arg("n"), arg("seed"),
         "Points between the bounds, one per cell of every axis.");
 }
 

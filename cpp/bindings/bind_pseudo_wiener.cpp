@@ -114,7 +114,7 @@ PseudoWiener make_pseudo_wiener(const std::string& kind, const std::map<std::str
       [&](auto& p) {
         const auto places = numbers(p);
         for (const auto& [name, value] : given) {
-          const auto row = std::ranges::find(rows, name, &PseudoWienerField::name);
+          const auto row = std::ranges::find(rows, name, &FieldInfo::name);
           if (row != rows.end()) {
             *places[static_cast<std::size_t>(row - rows.begin())] = value;
           } else if (std::ranges::any_of(settings, [&](const Setting& s) { return name == s.name; })) {

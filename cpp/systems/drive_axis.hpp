@@ -6,15 +6,14 @@
 
 #include <array>
 #include <cmath>
-#include <string_view>
 
+#include "mgdd/common/field.hpp"
 #include "mgdd/identify/free_run_fit.hpp"
 #include "mgdd/identify/step_model.hpp"
 #include "mgdd/math/dual.hpp"
 
 namespace mgdd::systems {
 
-using identify::FitDomain;
 using identify::StepModel;
 using identify::Values;
 
@@ -23,20 +22,21 @@ struct DriveAxis {
   static constexpr int n_inputs = 1;
   static constexpr int n_parameters = 9;
 
-  static constexpr std::array<FitDomain, 9> parameters = {{
-      {"mass_kg", 1e-3, 1e5},
-      {"viscous_ns_per_m", 0.0, 1e6},
-      {"viscous_asymmetry_ns_per_m", -1e6, 1e6},  // forward: viscous + this; backward: viscous - this
-      {"coulomb_n", 0.0, 1e5},
-      {"stribeck_n", 0.0, 1e5},
-      {"stribeck_speed_m_per_s", 1e-3, 1e2},
-      {"offset_n", -1e5, 1e5},
-      {"offset_drift_n_per_s", -1e3, 1e3},
-      {"stiffness_n_per_m", -1e6, 1e6},
+  static constexpr std::array<FieldInfo, 9> parameters = {{
+      {"mass_kg", "kg", closed(1e-3, 1e5), "moved mass"},
+      {"viscous_ns_per_m", "N s/m", closed(0.0, 1e6), "viscous friction, mean of both directions"},
+      {"viscous_asymmetry_ns_per_m", "N s/m", closed(-1e6, 1e6), "added to it forward, taken off backward"},
+      {"coulomb_n", "N", closed(0.0, 1e5), "Coulomb friction"},
+      {"stribeck_n", "N", closed(0.0, 1e5), "rise of the friction towards rest"},
+      {"stribeck_speed_m_per_s", "m/s", closed(1e-3, 1e2), "speed of that rise"},
+      {"offset_n", "N", closed(-1e5, 1e5), "constant force"},
+      {"offset_drift_n_per_s", "N/s", closed(-1e3, 1e3), "its drift"},
+      {"stiffness_n_per_m", "N/m", closed(-1e6, 1e6), "stiffness about the centre"},
   }};
   /// time_s is the time since the start of the record: the drift needs it, a fit leaves it fixed.
-  static constexpr std::array<FitDomain, 3> states = {
-      {{"position_m", -1e3, 1e3}, {"speed_m_per_s", -1e3, 1e3}, {"time_s", 0.0, 1e9}}};
+  static constexpr std::array<FieldInfo, 3> states = {{{"position_m", "m", closed(-1e3, 1e3), "position"},
+                                                       {"speed_m_per_s", "m/s", closed(-1e3, 1e3), "speed"},
+                                                       {"time_s", "s", closed(0.0, 1e9), "time since the start"}}};
 
   double force_n_per_v = 1.0;  ///< actuator gain; only its ratio to the mass and the forces acts
   double centre_m = 0.0;       ///< where the stiffness exerts no force

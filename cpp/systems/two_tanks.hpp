@@ -7,15 +7,14 @@
 #include <array>
 #include <cmath>
 #include <cstddef>
-#include <string_view>
 
+#include "mgdd/common/field.hpp"
 #include "mgdd/identify/free_run_fit.hpp"
 #include "mgdd/identify/step_model.hpp"
 #include "mgdd/math/dual.hpp"
 
 namespace mgdd::systems {
 
-using identify::FitDomain;
 using identify::StepModel;
 using identify::Values;
 
@@ -24,22 +23,23 @@ struct TwoTanks {
   static constexpr int n_inputs = 1;
   static constexpr int n_parameters = 9;
 
-  static constexpr std::array<FitDomain, 9> parameters = {{
-      {"pump_per_s", 1e-5, 10.0},           // level rate per pump volt
-      {"upper_outflow_per_s", 1e-6, 10.0},  // k1 in k1 x1^p1
-      {"upper_exponent", 0.05, 2.0},
-      {"lower_outflow_per_s", 1e-6, 10.0},
-      {"lower_exponent", 0.05, 2.0},
-      {"lower_datum_v", -5.0, 5.0},  // reading at which the lower outlet runs dry
-      {"upper_brim_v", 1.0, 200.0},
-      {"overflow_share", 0.0, 1.0},  // of the upper overflow that lands in the lower tank
-      {"delay_samples", 0.0, 2.0},   // of the pump, interpolated
+  static constexpr std::array<FieldInfo, 9> parameters = {{
+      {"pump_per_s", "1/s", closed(1e-5, 10.0), "level rate per pump volt"},
+      {"upper_outflow_per_s", "1/s", closed(1e-6, 10.0), "k1 of the upper outflow k1 x1^p1"},
+      {"upper_exponent", "-", closed(0.05, 2.0), "p1 of the upper outflow"},
+      {"lower_outflow_per_s", "1/s", closed(1e-6, 10.0), "k2 of the lower outflow k2 (x2 - datum)^p2"},
+      {"lower_exponent", "-", closed(0.05, 2.0), "p2 of the lower outflow"},
+      {"lower_datum_v", "V", closed(-5.0, 5.0), "reading at which the lower outlet runs dry"},
+      {"upper_brim_v", "V", closed(1.0, 200.0), "level at which the upper tank runs over"},
+      {"overflow_share", "-", closed(0.0, 1.0), "share of the upper overflow that lands in the lower tank"},
+      {"delay_samples", "samples", closed(0.0, 2.0), "delay of the pump, interpolated"},
   }};
   /// The upper level is not measured: its unit is that of the lower level times the ratio of the floor areas.
-  static constexpr std::array<FitDomain, 4> states = {{{"upper_level_v", 0.0, 200.0},
-                                                       {"lower_level_v", -5.0, 20.0},
-                                                       {"pump_before_v", -100.0, 100.0},
-                                                       {"pump_before_that_v", -100.0, 100.0}}};
+  static constexpr std::array<FieldInfo, 4> states = {
+      {{"upper_level_v", "V", closed(0.0, 200.0), "level of the upper tank"},
+       {"lower_level_v", "V", closed(-5.0, 20.0), "level of the lower tank"},
+       {"pump_before_v", "V", closed(-100.0, 100.0), "input of the sample before"},
+       {"pump_before_that_v", "V", closed(-100.0, 100.0), "input of the sample before that"}}};
 
   double lower_brim_v = 10.0;  ///< the lower tank runs over here, and the sensor ends here
   int substeps = 10;           ///< of the explicit Euler step; the tanks' time constants are minutes

@@ -1,13 +1,14 @@
 #include "mgdd/engine/emissions.hpp"
 
 #include <algorithm>
+#include <array>
 #include <string>
 #include <utility>
 #include <vector>
 
-#include "mgdd/common/bounds.hpp"
 #include "mgdd/common/enum_names.hpp"
 #include "mgdd/common/error.hpp"
+#include "mgdd/common/field.hpp"
 #include "mgdd/common/text.hpp"
 
 namespace mgdd::engine {
@@ -17,11 +18,24 @@ constexpr std::pair<NoxMap, std::string_view> map_names[] = {{NoxMap::affine_log
                                                              {NoxMap::arrhenius, "arrhenius"}};
 constexpr std::size_t fewest_points = 5;
 
+constexpr std::array proxy_fields{
+    field<&NoxProxy::reference_temperature_k>({"reference_temperature_k", "K", above(0.0), "T0 of the map"}),
+    field<&NoxProxy::reference_nox_ppm>({"reference_nox_ppm", "ppm", above(0.0), "NOx at T0"}),
+    field<&NoxProxy::activation_temperature_k>({"activation_temperature_k", "K", above(0.0), "b of the Arrhenius map"}),
+};
+constexpr std::array model_fields{
+    field<&NoxModel::intake_o2_fraction>({"intake_o2_fraction", "-", above(0.0, 1.0), "intake oxygen by volume"}),
+    field<&NoxModel::o2_exponent>({"o2_exponent", "-", closed(0.0, 10.0), "exponent of the oxygen factor"}),
+};
+constexpr std::array sensor_fields{
+    field<&SoftSensor::correction_gain>({"correction_gain", "-", closed(0.0, 1.0), "share of the log-ratio per cycle"}),
+};
+
 void require_positive_column(std::string_view name, std::span<const double> column) {
   for (std::size_t i = 0; i < column.size(); ++i) {
     if (column[i] > 0.0 && std::isfinite(column[i])) continue;
-    throw DataError(std::string(name) + "[" + std::to_string(i) + "] = " + text(column[i]) +
-                    ": must be > 0 and finite, leave such points out");
+    throw DataError(std::string(name) + "[" + std::to_string(i) + "]", column[i],
+                    "must be > 0 and finite, leave such points out");
   }
 }
 
@@ -35,22 +49,17 @@ NoxMap parse_nox_map(std::string_view name) {
 }
 
 void validate(const NoxProxy& p) {
-  require_positive("reference_temperature_k", p.reference_temperature_k);
-  require_positive("reference_nox_ppm", p.reference_nox_ppm);
-  require_positive("activation_temperature_k", p.activation_temperature_k);
+  require_fields(proxy_fields, p);
 }
 
 void validate(const NoxModel& m) {
   validate(m.proxy);
-  if (!(m.intake_o2_fraction > 0.0 && m.intake_o2_fraction <= 1.0)) {
-    throw ParameterError("intake_o2_fraction = " + text(m.intake_o2_fraction) + ": must be in (0, 1]");
-  }
-  require_within("o2_exponent", m.o2_exponent, 0.0, 10.0);
+  require_fields(model_fields, m);
 }
 
 void validate(const SoftSensor& s) {
   validate(s.model);
-  require_within("correction_gain", s.correction_gain, 0.0, 1.0);
+  require_fields(sensor_fields, s);
 }
 
 NoxFit fit_nox_proxy(std::span<const double> t_max_k, std::span<const double> nox_ppm, NoxMap map,

@@ -1,12 +1,13 @@
 // What the bench refuses before it exists.
 #include <algorithm>
+#include <array>
 #include <cmath>
 #include <string>
 #include <utility>
 
-#include "mgdd/common/bounds.hpp"
 #include "mgdd/common/enum_names.hpp"
 #include "mgdd/common/error.hpp"
+#include "mgdd/common/field.hpp"
 #include "mgdd/common/text.hpp"
 #include "mgdd/engine/burn.hpp"
 #include "mgdd/loop/engine_bench.hpp"
@@ -20,6 +21,18 @@ constexpr std::pair<NoxSensor, std::string_view> sensor_names[] = {{NoxSensor::n
                                                                    {NoxSensor::soft, "soft"},
                                                                    {NoxSensor::soft_corrected, "soft_corrected"},
                                                                    {NoxSensor::true_value, "true_value"}};
+
+using S = BenchSettings;
+constexpr std::array setting_fields{
+    field<&S::soc_scatter_cad>({"soc_scatter_cad", "°CA", closed(0.0, 5.0), "standard deviation of SOC"}),
+    field<&S::efficiency_noise_percent>(
+        {"efficiency_noise_percent", "%", closed(0.0, 20.0), "standard deviation of efficiency in points"}),
+    field<&S::misfire_probability>({"misfire_probability", "-", closed(0.0, 1.0), "misfires per cycle"}),
+    field<&S::soc_drift_cad_per_kcycle>(
+        {"soc_drift_cad_per_kcycle", "°CA", closed(-100.0, 100.0), "offset of SOC per 1000 cycles"}),
+    field<&S::wall_heat_drift_per_kcycle>(
+        {"wall_heat_drift_per_kcycle", "-", closed(-100.0, 100.0), "change of wall_heat_scale per 1000 cycles"}),
+};
 
 // The refusal of another room, with the field of the bench in front.
 template <class Check>
@@ -97,11 +110,7 @@ void validate(const BenchSettings& s) {
   engine::validate(s.cylinder);
   static_cast<void>(engine::crank_grid(s.cylinder, s.step_cad));
   validate_schedule(s);
-  require_within("soc_scatter_cad", s.soc_scatter_cad, 0.0, 5.0, "°CA");
-  require_within("efficiency_noise_percent", s.efficiency_noise_percent, 0.0, 20.0, "%");
-  require_within("misfire_probability", s.misfire_probability, 0.0, 1.0);
-  require_within("soc_drift_cad_per_kcycle", s.soc_drift_cad_per_kcycle, -100.0, 100.0, "°CA");
-  require_within("wall_heat_drift_per_kcycle", s.wall_heat_drift_per_kcycle, -100.0, 100.0);
+  require_fields(setting_fields, s);
   check_member("true_nox", [&] { engine::validate(s.true_nox); });
   check_member("soft_sensor", [&] { engine::validate(s.soft_sensor); });
   validate("analyser", s.analyser);

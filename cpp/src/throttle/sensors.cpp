@@ -1,12 +1,13 @@
 #include "mgdd/throttle/sensors.hpp"
 
 #include <algorithm>
+#include <array>
 #include <cmath>
 #include <cstddef>
 #include <string>
 
-#include "mgdd/common/bounds.hpp"
 #include "mgdd/common/error.hpp"
+#include "mgdd/common/field.hpp"
 #include "mgdd/common/random.hpp"
 #include "mgdd/common/text.hpp"
 
@@ -22,6 +23,14 @@ constexpr std::pair<SensorFaultKind, std::string_view> fault_table[] = {
     {SensorFaultKind::gain, "gain"},
     {SensorFaultKind::stuck, "stuck"}};
 
+constexpr std::array pair_fields{
+    field<&SensorPair::supply_v>({"supply_v", "V", closed(0.1, 100.0), "supply of both sensors"}),
+    field<&SensorPair::span_v>({"span_v", "V", above(0.0), "change of voltage over the travel"}),
+    field<&SensorPair::travel_deg>({"travel_deg", "deg", closed(1.0, 360.0), "travel behind that change"}),
+    field<&SensorPair::lag_s>({"lag_s", "s", closed(0.0, 1.0), "time constant of the input filter"}),
+    field<&SensorPair::debounce_s>({"debounce_s", "s", closed(0.0, 60.0), "time a fault must last"}),
+};
+
 }  // namespace
 
 Names<SensorFaultKind> sensor_fault_names() noexcept {
@@ -29,21 +38,16 @@ Names<SensorFaultKind> sensor_fault_names() noexcept {
 }
 
 void validate(const SensorPair& p) {
-  require_within("supply_v", p.supply_v, 0.1, 100.0, "V");
-  require_within("closed_v", p.closed_v, 0.0, p.supply_v, "V");
-  require_positive("span_v", p.span_v, "V");
-  if (!(p.closed_v + p.span_v <= p.supply_v)) {
-    throw ParameterError("span_v = " + text(p.span_v) +
-                         " V: closed_v + span_v must be <= supply_v = " + text(p.supply_v) + " V");
-  }
-  require_within("travel_deg", p.travel_deg, 1.0, 360.0, "deg");
-  require_within("noise_v", p.noise_v, 0.0, p.supply_v, "V");
-  require_within("lag_s", p.lag_s, 0.0, 1.0, "s");
+  require_fields(pair_fields, p);
   require_within("adc_bits", p.adc_bits, 4.0, 24.0);
-  require_within("sum_tolerance_v", p.sum_tolerance_v, 0.0, p.supply_v, "V");
-  require_within("low_v", p.low_v, 0.0, p.supply_v, "V");
+  require_within("closed_v", p.closed_v, 0.0, p.supply_v, "V");
+  if (!(p.closed_v + p.span_v <= p.supply_v)) {
+    throw ParameterError("span_v", p.span_v, "closed_v + span_v must be <= supply_v = " + text(p.supply_v) + " V", "V");
+  }
+  for (const auto& [name, volts] :
+       {std::pair{"noise_v", p.noise_v}, std::pair{"sum_tolerance_v", p.sum_tolerance_v}, std::pair{"low_v", p.low_v}})
+    require_within(name, volts, 0.0, p.supply_v, "V");
   require_within("high_v", p.high_v, p.low_v, p.supply_v, "V");
-  require_within("debounce_s", p.debounce_s, 0.0, 60.0, "s");
 }
 
 void validate(const SensorFault& fault) {

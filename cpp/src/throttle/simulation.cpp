@@ -10,6 +10,7 @@
 #include "mgdd/common/error.hpp"
 #include "mgdd/common/text.hpp"
 #include "mgdd/common/units.hpp"
+#include "mgdd/math/dispatch.hpp"
 
 namespace mgdd::throttle {
 namespace {
@@ -47,7 +48,7 @@ PlantCoefficients<Wide> packed(const std::array<Coefficients, width>& lanes) noe
 }
 
 // The hot loop of many runs: rows of `width` angles per sample.
-MGDD_CLONES void run_lanes(const WidePlant& plant, const ThrottleSignals& signals, std::size_t steps,
+MGDD_INLINE void run_lanes(const WidePlant& plant, const ThrottleSignals& signals, std::size_t steps,
                            BasicThrottleState<Wide>& state, double* rows) noexcept {
   BasicThrottleInput<Wide> input;
   BasicThrottleState<Wide> s = state;
@@ -156,7 +157,8 @@ std::vector<double> simulate_many(std::span<const ThrottleCase> cases, const Thr
     }
     Throttle options = cases[first].throttle;
     if (flows) options.pressure_drop_kpa = 1.0;
-    run_lanes(WidePlant(packed(coefficients), options, step_s), signals, steps, state, rows.data());
+    const WidePlant plant(packed(coefficients), options, step_s);
+    dispatch([&]() MGDD_INLINE_LAMBDA { run_lanes(plant, signals, steps, state, rows.data()); });
     for (std::size_t lane = 0; lane < used; ++lane) {
       for (std::size_t k = 0; k < n; ++k)
         angle_deg[(first + lane) * n + k] = rows[k * lanes + lane];

@@ -11,57 +11,42 @@
 namespace mgdd::throttle {
 namespace {
 
-constexpr double most = 1e300;  // finite, so that infinity itself is refused
-
 using T = Throttle;
 constexpr std::array field_table{
-    Field{{"inertia_kgm2", "kg m²", 0.0, true, 1.0, "inertia of plate, gears and motor at the plate"},
-          &T::inertia_kgm2},
-    Field{{"viscous_nms_per_rad", "N m s/rad", 0.0, false, 100.0, "viscous friction"}, &T::viscous_nms_per_rad},
-    Field{{"torque_constant_nm_per_a", "N m/A", 0.0, true, 100.0, "motor torque per current at the plate"},
-          &T::torque_constant_nm_per_a},
-    Field{{"back_emf_vs_per_rad", "V s/rad", 0.0, false, 100.0, "motor voltage per plate speed"},
-          &T::back_emf_vs_per_rad},
-    Field{{"resistance_ohm", "ohm", 0.0, true, 1e4, "armature resistance"}, &T::resistance_ohm},
-    Field{{"inductance_mh", "mH", 0.0, false, 1e4, "armature inductance"}, &T::inductance_mh},
-    Field{{"supply_v", "V", 0.0, true, 100.0, "supply of the bridge"}, &T::supply_v},
-    Field{{"driver_drop_v", "V", 0.0, false, 100.0, "voltage lost in the bridge at full duty"}, &T::driver_drop_v},
-    Field{{"driver_resistance_ohm", "ohm", 0.0, false, 1e4, "resistance of the bridge"}, &T::driver_resistance_ohm},
-    Field{{"dead_band", "-", 0.0, false, 0.9, "duty without effect on either side of zero"}, &T::dead_band},
-    Field{{"coulomb_nm", "N m", 0.0, false, 100.0, "Coulomb friction"}, &T::coulomb_nm},
-    Field{{"stiction_nm", "N m", 0.0, false, 100.0, "breakaway friction"}, &T::stiction_nm},
-    Field{{"stribeck_rad_per_s", "rad/s", 0.0, true, 1e3, "speed of the Stribeck curve"}, &T::stribeck_rad_per_s},
-    Field{{"karnopp_rad_per_s", "rad/s", 0.0, true, 1e3, "half band of rest of Karnopp's form"}, &T::karnopp_rad_per_s},
-    Field{{"tanh_rad_per_s", "rad/s", 0.0, true, 1e3, "width of the smooth form"}, &T::tanh_rad_per_s},
-    Field{{"bristle_nm_per_rad", "N m/rad", 0.0, true, 1e6, "LuGre bristle stiffness"}, &T::bristle_nm_per_rad},
-    Field{{"bristle_damping_nms_per_rad", "N m s/rad", 0.0, false, 1e3, "LuGre bristle damping"},
-          &T::bristle_damping_nms_per_rad},
-    Field{{"limp_home_deg", "deg", -360.0, false, 360.0, "rest angle without current"}, &T::limp_home_deg},
-    Field{{"spring_above_nm_per_rad", "N m/rad", 0.0, false, 1e4, "spring above limp-home"},
-          &T::spring_above_nm_per_rad},
-    Field{{"spring_below_nm_per_rad", "N m/rad", 0.0, false, 1e4, "spring below limp-home"},
-          &T::spring_below_nm_per_rad},
-    Field{{"preload_above_nm", "N m", 0.0, false, 100.0, "preload above limp-home"}, &T::preload_above_nm},
-    Field{{"preload_below_nm", "N m", 0.0, false, 100.0, "preload below limp-home"}, &T::preload_below_nm},
-    Field{{"preload_ramp_deg", "deg", 0.0, true, 45.0, "half width over which the preload changes sign"},
-          &T::preload_ramp_deg},
-    Field{{"closed_deg", "deg", -360.0, false, 360.0, "lower end stop"}, &T::closed_deg},
-    Field{{"open_deg", "deg", -360.0, false, 360.0, "upper end stop"}, &T::open_deg},
-    Field{{"stop_stiffness_nm_per_rad", "N m/rad", 0.0, true, 1e7, "stiffness of the end stops"},
-          &T::stop_stiffness_nm_per_rad},
-    Field{{"stop_damping_nms_per_rad", "N m s/rad", 0.0, false, 1e5, "damping of the end stops"},
-          &T::stop_damping_nms_per_rad},
-    Field{{"backlash_half_deg", "deg", 0.0, true, 10.0, "half gap of the gear"}, &T::backlash_half_deg},
-    Field{{"gear_stiffness_nm_per_rad", "N m/rad", 0.0, true, 1e6, "contact stiffness of the gear"},
-          &T::gear_stiffness_nm_per_rad},
-    Field{{"gear_damping_nms_per_rad", "N m s/rad", 0.0, false, 1e3, "contact damping of the gear"},
-          &T::gear_damping_nms_per_rad},
-    Field{{"plate_inertia_kgm2", "kg m²", 0.0, true, 1.0, "inertia on the plate's side of the gap"},
-          &T::plate_inertia_kgm2},
-    Field{{"plate_friction_share", "-", 0.0, false, 1.0, "share of the friction on the plate's side of the gap"},
-          &T::plate_friction_share},
-    Field{{"bore_mm", "mm", 0.0, true, 1e3, "bore of the throttle"}, &T::bore_mm},
-    Field{{"pressure_drop_kpa", "kPa", 0.0, false, 200.0, "pressure drop that loads the plate"}, &T::pressure_drop_kpa},
+    field<&T::inertia_kgm2>({"inertia_kgm2", "kg m²", above(0.0, 1.0), "inertia of plate, gears and motor at the plate"}),
+    field<&T::viscous_nms_per_rad>({"viscous_nms_per_rad", "N m s/rad", closed(0.0, 100.0), "viscous friction"}),
+    field<&T::torque_constant_nm_per_a>({"torque_constant_nm_per_a", "N m/A", above(0.0, 100.0), "motor torque per current at the plate"}),
+    field<&T::back_emf_vs_per_rad>({"back_emf_vs_per_rad", "V s/rad", closed(0.0, 100.0), "motor voltage per plate speed"}),
+    field<&T::resistance_ohm>({"resistance_ohm", "ohm", above(0.0, 1e4), "armature resistance"}),
+    field<&T::inductance_mh>({"inductance_mh", "mH", closed(0.0, 1e4), "armature inductance"}),
+    field<&T::supply_v>({"supply_v", "V", above(0.0, 100.0), "supply of the bridge"}),
+    field<&T::driver_drop_v>({"driver_drop_v", "V", closed(0.0, 100.0), "voltage lost in the bridge at full duty"}),
+    field<&T::driver_resistance_ohm>({"driver_resistance_ohm", "ohm", closed(0.0, 1e4), "resistance of the bridge"}),
+    field<&T::dead_band>({"dead_band", "-", closed(0.0, 0.9), "duty without effect on either side of zero"}),
+    field<&T::coulomb_nm>({"coulomb_nm", "N m", closed(0.0, 100.0), "Coulomb friction"}),
+    field<&T::stiction_nm>({"stiction_nm", "N m", closed(0.0, 100.0), "breakaway friction"}),
+    field<&T::stribeck_rad_per_s>({"stribeck_rad_per_s", "rad/s", above(0.0, 1e3), "speed of the Stribeck curve"}),
+    field<&T::karnopp_rad_per_s>({"karnopp_rad_per_s", "rad/s", above(0.0, 1e3), "half band of rest of Karnopp's form"}),
+    field<&T::tanh_rad_per_s>({"tanh_rad_per_s", "rad/s", above(0.0, 1e3), "width of the smooth form"}),
+    field<&T::bristle_nm_per_rad>({"bristle_nm_per_rad", "N m/rad", above(0.0, 1e6), "LuGre bristle stiffness"}),
+    field<&T::bristle_damping_nms_per_rad>({"bristle_damping_nms_per_rad", "N m s/rad", closed(0.0, 1e3), "LuGre bristle damping"}),
+    field<&T::limp_home_deg>({"limp_home_deg", "deg", closed(-360.0, 360.0), "rest angle without current"}),
+    field<&T::spring_above_nm_per_rad>({"spring_above_nm_per_rad", "N m/rad", closed(0.0, 1e4), "spring above limp-home"}),
+    field<&T::spring_below_nm_per_rad>({"spring_below_nm_per_rad", "N m/rad", closed(0.0, 1e4), "spring below limp-home"}),
+    field<&T::preload_above_nm>({"preload_above_nm", "N m", closed(0.0, 100.0), "preload above limp-home"}),
+    field<&T::preload_below_nm>({"preload_below_nm", "N m", closed(0.0, 100.0), "preload below limp-home"}),
+    field<&T::preload_ramp_deg>({"preload_ramp_deg", "deg", above(0.0, 45.0), "half width over which the preload changes sign"}),
+    field<&T::closed_deg>({"closed_deg", "deg", closed(-360.0, 360.0), "lower end stop"}),
+    field<&T::open_deg>({"open_deg", "deg", closed(-360.0, 360.0), "upper end stop"}),
+    field<&T::stop_stiffness_nm_per_rad>({"stop_stiffness_nm_per_rad", "N m/rad", above(0.0, 1e7), "stiffness of the end stops"}),
+    field<&T::stop_damping_nms_per_rad>({"stop_damping_nms_per_rad", "N m s/rad", closed(0.0, 1e5), "damping of the end stops"}),
+    field<&T::backlash_half_deg>({"backlash_half_deg", "deg", above(0.0, 10.0), "half gap of the gear"}),
+    field<&T::gear_stiffness_nm_per_rad>({"gear_stiffness_nm_per_rad", "N m/rad", above(0.0, 1e6), "contact stiffness of the gear"}),
+    field<&T::gear_damping_nms_per_rad>({"gear_damping_nms_per_rad", "N m s/rad", closed(0.0, 1e3), "contact damping of the gear"}),
+    field<&T::plate_inertia_kgm2>({"plate_inertia_kgm2", "kg m²", above(0.0, 1.0), "inertia on the plate's side of the gap"}),
+    field<&T::plate_friction_share>({"plate_friction_share", "-", closed(0.0, 1.0), "share of the friction on the plate's side of the gap"}),
+    field<&T::bore_mm>({"bore_mm", "mm", above(0.0, 1e3), "bore of the throttle"}),
+    field<&T::pressure_drop_kpa>({"pressure_drop_kpa", "kPa", closed(0.0, 200.0), "pressure drop that loads the plate"}),
 };
 
 constexpr std::pair<Friction, std::string_view> friction_table[] = {
@@ -71,14 +56,6 @@ constexpr std::pair<Backlash, std::string_view> backlash_table[] = {
     {Backlash::none, "none"}, {Backlash::compliance, "compliance"}, {Backlash::hysteresis, "hysteresis"}};
 constexpr std::pair<Bridge, std::string_view> bridge_table[] = {{Bridge::brake, "brake"}, {Bridge::open, "open"}};
 
-void check(const FieldInfo& info, double value) {
-  const bool above = info.lower_open ? value > info.lower : value >= info.lower;
-  if (above && value <= info.upper) return;  // NaN fails both comparisons
-  std::string bound = (info.lower_open ? "must be > " : "must be >= ") + text(info.lower);
-  if (info.upper < most) bound += " and <= " + text(info.upper);
-  throw ParameterError(info.name, value, bound, info.unit);
-}
-
 // Shape of the closing torque over the opening: largest near 75 deg, none closed or wide open.
 constexpr std::array<double, 11> air_angle_deg{0.0, 10.0, 20.0, 30.0, 40.0, 50.0, 60.0, 70.0, 75.0, 80.0, 90.0};
 constexpr std::array<double, 11> air_coefficient{0.0,   0.003, 0.008, 0.015, 0.025, 0.040,
@@ -86,7 +63,7 @@ constexpr std::array<double, 11> air_coefficient{0.0,   0.003, 0.008, 0.015, 0.0
 
 }  // namespace
 
-std::span<const Field> fields() noexcept {
+std::span<const Field<Throttle>> fields() noexcept {
   return field_table;
 }
 Names<Friction> friction_names() noexcept {
@@ -100,30 +77,30 @@ Names<Bridge> bridge_names() noexcept {
 }
 
 void validate(const Throttle& t) {
-  for (const Field& field : field_table)
-    check(field.info, t.*(field.member));
+  require_fields(field_table, t);
   if (!(t.closed_deg < t.open_deg)) {
-    throw ParameterError("open_deg = " + text(t.open_deg) + " deg: must be above closed_deg = " + text(t.closed_deg));
+    throw ParameterError("open_deg", t.open_deg, "must be above closed_deg = " + text(t.closed_deg), "deg");
   }
   if (!(t.limp_home_deg >= t.closed_deg && t.limp_home_deg <= t.open_deg)) {
-    throw ParameterError("limp_home_deg = " + text(t.limp_home_deg) + " deg: must lie between closed_deg = " +
-                         text(t.closed_deg) + " and open_deg = " + text(t.open_deg));
+    throw ParameterError(
+        "limp_home_deg", t.limp_home_deg,
+        "must lie between closed_deg = " + text(t.closed_deg) + " and open_deg = " + text(t.open_deg), "deg");
   }
   if (t.friction != Friction::coulomb && t.friction != Friction::tanh && !(t.stiction_nm >= t.coulomb_nm)) {
-    throw ParameterError("stiction_nm = " + text(t.stiction_nm) +
-                         " N m: must be >= coulomb_nm = " + text(t.coulomb_nm) + " for friction = '" +
-                         std::string(name_of(friction_names(), t.friction)) + "'");
+    throw ParameterError("stiction_nm", t.stiction_nm,
+                         "must be >= coulomb_nm = " + text(t.coulomb_nm) + " for friction = '" +
+                             std::string(name_of(friction_names(), t.friction)) + "'",
+                         "N m");
   }
   if (t.friction == Friction::lugre && !(t.coulomb_nm > 0.0)) {
-    throw ParameterError("coulomb_nm = " + text(t.coulomb_nm) + " N m: must be > 0 for friction = 'lugre'");
+    throw ParameterError("coulomb_nm", t.coulomb_nm, "must be > 0 for friction = 'lugre'", "N m");
   }
   if (!(t.driver_drop_v < t.supply_v)) {
-    throw ParameterError("driver_drop_v = " + text(t.driver_drop_v) +
-                         " V: must be below supply_v = " + text(t.supply_v));
+    throw ParameterError("driver_drop_v", t.driver_drop_v, "must be below supply_v = " + text(t.supply_v), "V");
   }
   if (t.backlash == Backlash::compliance && !(t.plate_inertia_kgm2 < t.inertia_kgm2)) {
-    throw ParameterError("plate_inertia_kgm2 = " + text(t.plate_inertia_kgm2) +
-                         " kg m²: must be below inertia_kgm2 = " + text(t.inertia_kgm2) + ", of which it is a part");
+    throw ParameterError("plate_inertia_kgm2", t.plate_inertia_kgm2,
+                         "must be below inertia_kgm2 = " + text(t.inertia_kgm2) + ", of which it is a part", "kg m²");
   }
 }
 

@@ -153,9 +153,9 @@ TEST(ThrottleGroups, NamesWrongInput) {
   EXPECT_NO_THROW((void)fit_throttle_groups({}, {chirp_record(100, 0.0, 0)}, {stage}, {truth}, 1));
 }
 
-TEST(LatinHypercube, HasOnePointPerCellOfEveryAxis) {
+TEST(SpreadStarts, HasOnePointPerCellOfEveryAxis) {
   const std::vector<optimize::Parameter> box{{"a", -1.0, 3.0}, {"b", 1e-3, 10.0, true}};
-  const auto points = latin_hypercube(box, 16, 5);
+  const auto points = spread_starts(box, 16, 5);
   std::array<int, 16> a{}, b{};
   for (const Eigen::VectorXd& point : points) {
     ++a[static_cast<std::size_t>(16.0 * (point[0] + 1.0) / 4.0)];
@@ -165,9 +165,9 @@ TEST(LatinHypercube, HasOnePointPerCellOfEveryAxis) {
     EXPECT_EQ(a[i], 1);
     EXPECT_EQ(b[i], 1);
   }
-  EXPECT_EQ(latin_hypercube(box, 16, 5)[3], points[3]);
-  EXPECT_NE(latin_hypercube(box, 16, 6)[3], points[3]);
-  EXPECT_THROW((void)latin_hypercube({{"a"}}, 4, 1), ParameterError);
+  EXPECT_EQ(spread_starts(box, 16, 5)[3], points[3]);
+  EXPECT_NE(spread_starts(box, 16, 6)[3], points[3]);
+  EXPECT_THROW((void)spread_starts({{"a"}}, 4, 1), ParameterError);
 }
 
 }  // namespace

@@ -294,11 +294,12 @@ INSTANTIATE_TEST_SUITE_P(Friction, PlantEquations,
 TEST(AsymmetricThrottle, HasNoDefaultAndNoTwoEqualNumbers) {
   const Throttle p = asymmetric_throttle();
   EXPECT_NO_THROW(validate(p));
-  for (const Field& field : fields()) {
-    EXPECT_NE(p.*(field.member), Throttle{}.*(field.member)) << field.info.name;
-    for (const Field& other : fields()) {
-      if (field.member != other.member) {
-        EXPECT_NE(p.*(field.member), p.*(other.member)) << field.info.name << " and " << other.info.name;
+  const Throttle standard;
+  for (const auto& field : fields()) {
+    EXPECT_NE(field.in(p), field.in(standard)) << field.info.name;
+    for (const auto& other : fields()) {
+      if (&field != &other) {
+        EXPECT_NE(field.in(p), other.in(p)) << field.info.name << " and " << other.info.name;
       }
     }
   }

@@ -176,9 +176,9 @@ TEST(ThrottleOptions, BadParametersAreNamedAndGoodOnesPassAfterwards) {
     }
     return "";
   };
-  for (const Field& field : fields()) {
+  for (const auto& field : fields()) {
     Throttle t;
-    t.*(field.member) = std::numeric_limits<double>::quiet_NaN();
+    field.in(t) = std::numeric_limits<double>::quiet_NaN();
     EXPECT_EQ(message(t).rfind(std::string(field.info.name) + " = nan", 0), 0U) << message(t);
   }
   Throttle t;

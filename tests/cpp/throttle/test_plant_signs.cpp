@@ -177,15 +177,13 @@ TEST(PlantSigns, EveryParameterActsOnItsSideAndItsWay) {
   p.backlash = Backlash::hysteresis;
   p.limp_home_deg = 30.0;
   for (const Way& way : ways) {
-    double Throttle::* member = nullptr;
-    for (const Field& field : fields()) {
-      if (field.info.name == way.field) member = field.member;
-    }
-    ASSERT_NE(member, nullptr) << way.field;
+    const auto all = fields();
+    const auto field = find_field(all, way.field);
+    ASSERT_NE(field, all.end()) << way.field;
     for (const bool opens : {true, false}) {
       const auto travel = [&](double factor) {
         Throttle q = p;
-        q.*member *= factor;
+        field->in(q) *= factor;
         if (!opens) q.pressure_drop_kpa = 0.0;
         const double from = opens ? 32.0 : 28.0;
         const double duty = opens ? 0.5 : -0.5;

@@ -25,9 +25,10 @@ void expect_bounds(const P& good, PseudoWienerKind kind) {
   const auto rows = fields(kind);
   ASSERT_EQ(rows.size(), numbers(good).size());
   for (std::size_t i = 0; i < rows.size(); ++i) {
-    EXPECT_LT(rows[i].lower, rows[i].upper) << rows[i].name;
-    EXPECT_TRUE(!rows[i].log_scaled || rows[i].lower > 0.0) << rows[i].name;
-    for (const double outside : {rows[i].lower - 1e-3 * (1.0 + std::abs(rows[i].lower)), rows[i].upper * 1.01,
+    const Domain& domain = rows[i].domain;
+    EXPECT_LT(domain.lower, domain.upper) << rows[i].name;
+    EXPECT_TRUE(!domain.log_scaled || domain.lower > 0.0) << rows[i].name;
+    for (const double outside : {domain.lower - 1e-3 * (1.0 + std::abs(domain.lower)), domain.upper * 1.01,
                                  std::numeric_limits<double>::quiet_NaN()}) {
       P bad = good;
       *numbers(bad)[i] = outside;

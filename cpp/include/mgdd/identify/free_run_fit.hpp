@@ -4,6 +4,7 @@
 
 #include <algorithm>
 #include <cstddef>
+#include <span>
 #include <string>
 #include <string_view>
 #include <utility>
@@ -11,20 +12,13 @@
 
 #include <Eigen/Core>
 
-#include "mgdd/common/bounds.hpp"
 #include "mgdd/common/error.hpp"
+#include "mgdd/common/field.hpp"
 #include "mgdd/identify/output_error.hpp"
 #include "mgdd/identify/step_model.hpp"
 #include "mgdd/optimize/least_squares/least_squares.hpp"
 
 namespace mgdd::identify {
-
-/// Name and bounds of a model parameter or state.
-struct FitDomain {
-  std::string_view name;
-  double lower;
-  double upper;
-};
 
 struct FreeRunFit {
   optimize::FitReport report;
@@ -33,13 +27,13 @@ struct FreeRunFit {
   std::vector<std::vector<double>> outputs;  ///< free run on every sample of every record
 };
 
-template <class Domains>
-std::size_t domain_index(const Domains& domains, std::string_view name, std::string_view what) {
-  const auto found = std::ranges::find(domains, name, &FitDomain::name);
-  if (found != domains.end()) return static_cast<std::size_t>(found - domains.begin());
+/// Place of a parameter or state; ParameterError that lists the names where there is none of that name.
+inline std::size_t field_index(std::span<const FieldInfo> fields, std::string_view name, std::string_view what) {
+  const auto found = std::ranges::find(fields, name, &FieldInfo::name);
+  if (found != fields.end()) return static_cast<std::size_t>(found - fields.begin());
   std::string known;
-  for (const FitDomain& domain : domains)
-    known.append(known.empty() ? "" : ", ").append(domain.name);
+  for (const FieldInfo& field : fields)
+    known.append(known.empty() ? "" : ", ").append(field.name);
   throw ParameterError(std::string(what) + " '" + std::string(name) + "': must be one of " + known);
 }
 
@@ -54,23 +48,22 @@ FreeRunFit fit_free_run(const Model& model, const std::vector<double>& base, con
                      std::to_string(parameters.size()));
   }
   for (std::size_t i = 0; i < parameters.size(); ++i) {
-    const FitDomain& domain = Model::parameters[i];
-    require_within(domain.name, base[i], domain.lower, domain.upper);
+    require_in(Model::parameters[i].domain, Model::parameters[i].name, base[i]);
     parameters[i] = base[i];
   }
   std::vector<std::size_t> indices;
   std::vector<optimize::Parameter> unknowns;
   for (const std::string& name : free) {
-    const std::size_t i = domain_index(Model::parameters, name, "parameter");
+    const std::size_t i = field_index(Model::parameters, name, "parameter");
     indices.push_back(i);
-    unknowns.push_back({name, Model::parameters[i].lower, Model::parameters[i].upper, false});
+    unknowns.push_back(optimize::parameter_of(Model::parameters[i], name));
   }
   for (std::size_t r = 0; r < records.size(); ++r) {
     for (const std::size_t s : records[r].free_start) {
       if (s >= Model::states.size()) throw ShapeError("free_start: no such state");
-      const FitDomain& domain = Model::states[s];
+      const FieldInfo& state = Model::states[s];
       const std::string suffix = records.size() > 1 ? "_" + std::to_string(r) : "";
-      unknowns.push_back({"start_" + std::string(domain.name) + suffix, domain.lower, domain.upper, false});
+      unknowns.push_back(optimize::parameter_of(state, "start_" + std::string(state.name) + suffix));
     }
   }
   SimulationResidual<Model> residual(model, parameters, std::move(indices), std::move(records));

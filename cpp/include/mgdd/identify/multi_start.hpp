@@ -22,8 +22,8 @@ namespace mgdd::identify {
 
 /// `n` points between the finite bounds of the parameters, one per cell of every axis; log-scaled ones evenly in the
 /// logarithm. ParameterError for a bound that is not finite.
-std::vector<Eigen::VectorXd> latin_hypercube(const std::vector<optimize::Parameter>& parameters, std::size_t n,
-                                             std::uint64_t seed);
+std::vector<Eigen::VectorXd> spread_starts(const std::vector<optimize::Parameter>& parameters, std::size_t n,
+                                           std::uint64_t seed);
 
 struct MultiStartFit {
   std::vector<optimize::FitReport> reports;  ///< one per start, in order

@@ -9,6 +9,8 @@
 #include <cstdint>
 #include <type_traits>
 
+#include "mgdd/math/dispatch.hpp"
+
 namespace mgdd {
 
 /// Integers as wide as the values: int64 for a double, a vector of int64 for a vector of doubles.
@@ -23,7 +25,7 @@ struct LaneBits<double> {
 
 /// exp(r) - 1 for |r| <= ln(2)/2; in Estrin's order, whose chain of dependent operations is short.
 template <class V>
-[[gnu::always_inline]] inline V small_expm1(const V& r) noexcept {
+MGDD_INLINE V small_expm1(const V& r) noexcept {
   const V r2 = r * r;
   const V r4 = r2 * r2;
   const V a = 1.0 / 2 + r * (1.0 / 6);
@@ -35,7 +37,7 @@ template <class V>
 }
 
 template <class V>
-[[gnu::always_inline]] inline V fast_tanh(const V& x) noexcept {
+MGDD_INLINE V fast_tanh(const V& x) noexcept {
   using Bits = typename LaneBits<V>::type;
   constexpr double over_ln2 = 0x1.71547652b82fep+0;
   constexpr double ln2_high = 0x1.62e42fee00000p-1;  // 21 trailing zero bits: k ln2_high is exact

@@ -8,14 +8,7 @@
 #include <cstddef>
 #include <cstdint>
 
-#if defined(__x86_64__) && defined(__linux__) && defined(__GNUC__) && !defined(__clang__)
-/// A function compiled once per instruction set and chosen when the program is loaded.
-#define MGDD_CLONES __attribute__((target_clones("avx512f", "avx2", "default")))
-#else
-#define MGDD_CLONES
-#endif
-/// Inlined into the clones above: the code of a lane must take the instruction set of its caller.
-#define MGDD_INLINE [[gnu::always_inline]] inline
+#include "mgdd/math/dispatch.hpp"
 
 namespace mgdd {
 

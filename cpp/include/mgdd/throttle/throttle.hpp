@@ -10,6 +10,7 @@
 #include <utility>
 
 #include "mgdd/common/enum_names.hpp"
+#include "mgdd/common/field.hpp"
 
 namespace mgdd::throttle {
 
@@ -98,22 +99,8 @@ struct Throttle {
   }
 };
 
-/// What a field is: name, unit, domain [lower, upper] (open below where said) and meaning.
-struct FieldInfo {
-  std::string_view name;
-  std::string_view unit;
-  double lower;
-  bool lower_open;
-  double upper;
-  std::string_view meaning;
-};
-struct Field {
-  FieldInfo info;
-  double Throttle::* member = nullptr;
-};
-
 /// All numbers of a throttle, in the order of the struct.
-std::span<const Field> fields() noexcept;
+std::span<const Field<Throttle>> fields() noexcept;
 
 Names<Friction> friction_names() noexcept;
 Names<Backlash> backlash_names() noexcept;

@@ -19,13 +19,13 @@ Core::Column numbers_of(const throttle::PwRSide& s, double t) noexcept {
 Core make_core(const RecursivePwRSettings& s, const throttle::PwRSide& side, std::size_t first_field) {
   const auto rows = throttle::fields(throttle::PseudoWienerKind::pw_r);
   const double t = s.every * s.model.frame.sample_s;
-  const auto& tau = rows[first_field];
-  const auto& gain = rows[first_field + 1];
+  const Domain& tau = rows[first_field].domain;
+  const Domain& gain = rows[first_field + 1].domain;
   Core::Settings c;
   c.start = numbers_of(side, t);
   c.lower << 1.0 - std::exp(-t / tau.upper), gain.lower, 0.0, 0.0, 0.0;
-  c.upper << 1.0 - std::exp(-t / tau.lower), gain.upper, gain.upper * rows[first_field + 2].upper,
-      gain.upper * rows[first_field + 3].upper, gain.upper * rows[first_field + 4].upper;
+  c.upper << 1.0 - std::exp(-t / tau.lower), gain.upper, gain.upper * rows[first_field + 2].domain.upper,
+      gain.upper * rows[first_field + 3].domain.upper, gain.upper * rows[first_field + 4].domain.upper;
   // Half the gain and a preload or friction of 0.1 duty are plausible surprises; over the variance of the equation.
   const double g = side.gain_deg_per_s2_per_duty;
   const double noise = 6.0 * s.noise_deg * s.noise_deg;
@@ -134,7 +134,7 @@ throttle::PwR RecursivePwR::model() const noexcept {
     if (core.updates() == 0) return;
     const auto& p = core.estimate();
     const auto& free = settings_.free;
-    const auto bounded = [&](std::size_t i, double value) { return std::clamp(value, rows[i].lower, rows[i].upper); };
+    const auto bounded = [&](std::size_t i, double value) { return rows[i].domain.clamped(value); };
     if (free[0]) s.tau_s = bounded(0, -t / std::log(std::clamp(1.0 - p[0], 1e-6, 1.0 - 1e-6)));
     if (free[1]) s.gain_deg_per_s2_per_duty = bounded(1, p[1]);
     const double g = s.gain_deg_per_s2_per_duty;

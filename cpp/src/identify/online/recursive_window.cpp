@@ -129,7 +129,7 @@ throttle::PwR bounded(throttle::PwR parameters) noexcept {
   const auto rows = throttle::fields(throttle::PseudoWienerKind::pw_r);
   const auto places = throttle::numbers(parameters);
   for (std::size_t i = 0; i < rows.size(); ++i)
-    *places[i] = std::clamp(*places[i], rows[i].lower, rows[i].upper);
+    *places[i] = rows[i].domain.clamped(*places[i]);
   return parameters;
 }
 

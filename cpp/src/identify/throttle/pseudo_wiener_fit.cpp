@@ -4,12 +4,12 @@
 #include <array>
 #include <cmath>
 #include <limits>
-#include <random>
 
 #include <Eigen/Dense>
 
 #include "mgdd/common/bounds.hpp"
 #include "mgdd/common/error.hpp"
+#include "mgdd/math/latin_hypercube.hpp"
 #include "mgdd/optimize/least_squares/least_squares.hpp"
 
 namespace mgdd::identify {
@@ -31,8 +31,8 @@ constexpr std::string_view above_prefix = "above_";
 const std::vector<std::string> pw_r_default{"tau_s", "gain_deg_per_s2_per_duty", "preload_duty", "spring_duty_per_deg",
                                             "coulomb_duty"};
 
-optimize::Parameter parameter_of(const throttle::PseudoWienerField& field, std::string_view name) {
-  return {std::string(name), field.lower, field.upper, field.log_scaled};
+optimize::Parameter parameter_of(const FieldInfo& field, std::string_view name) {
+  return {std::string(name), field.domain.lower, field.domain.upper, field.domain.log_scaled};
 }
 
 std::vector<PseudoWienerUnknown> unknowns(const PwR&, const PseudoWienerFitOptions& o) {
@@ -69,7 +69,7 @@ std::vector<PseudoWienerUnknown> by_name(PseudoWienerKind kind, std::size_t n_de
     return out;
   }
   for (const std::string& name : o.free) {
-    const auto found = std::ranges::find(rows, name, &throttle::PseudoWienerField::name);
+    const auto found = std::ranges::find(rows, name, &FieldInfo::name);
     if (found == rows.end()) {
       throw ParameterError("free: '" + name + "' is no parameter of " +
                            std::string(name_of(throttle::pseudo_wiener_names(), kind)));
@@ -152,25 +152,6 @@ class Residual {
   const std::vector<PseudoWienerUnknown>& unknowns_;
 };
 
-/// Latin hypercube: row i, column j in (0, 1).
-Eigen::MatrixXd latin_hypercube(int rows, int columns, std::uint64_t seed) {
-  std::mt19937_64 bits(seed);
-  const auto uniform = [&] { return static_cast<double>(bits() >> 11) * 0x1p-53; };
-  Eigen::MatrixXd out(rows, columns);
-  std::vector<int> order(static_cast<std::size_t>(rows));
-  for (int j = 0; j < columns; ++j) {
-    for (int i = 0; i < rows; ++i)
-      order[static_cast<std::size_t>(i)] = i;
-    for (int i = rows - 1; i > 0; --i) {  // own shuffle: std::shuffle differs between libraries
-      const auto other = static_cast<std::size_t>(uniform() * (i + 1));
-      std::swap(order[static_cast<std::size_t>(i)], order[other]);
-    }
-    for (int i = 0; i < rows; ++i)
-      out(i, j) = (order[static_cast<std::size_t>(i)] + uniform()) / rows;
-  }
-  return out;
-}
-
 double between(double share, double lower, double upper) {
   return lower * std::pow(upper / lower, share);
 }
@@ -230,7 +211,7 @@ std::vector<PwR> starts(const PwR& base, const std::vector<ThrottleRecord>&, Eig
 /// Starts of PW-W: both lags by a Latin hypercube over 3 ms to 3 s, the map by linear least squares behind them.
 std::vector<PwW> starts(const PwW& base, const std::vector<ThrottleRecord>& records, Eigen::Index n,
                         const PseudoWienerFitOptions& o, int count) {
-  const Eigen::MatrixXd cube = latin_hypercube(count, 2, o.seed);
+  const Eigen::MatrixXd cube = latin_hypercube(static_cast<std::size_t>(count), 2, o.seed);
   const Eigen::VectorXd y = measured(records, n);
   constexpr int knots = throttle::wiener_knots;
   const double width = (base.knot_upper_duty - base.knot_lower_duty) / (knots - 1);
@@ -264,7 +245,7 @@ std::vector<PwW> starts(const PwW& base, const std::vector<ThrottleRecord>& reco
 /// Starts of PW-P: lags and width of the play by a Latin hypercube, offset and gain by linear least squares.
 std::vector<PwP> starts(const PwP& base, const std::vector<ThrottleRecord>& records, Eigen::Index n,
                         const PseudoWienerFitOptions& o, int count) {
-  const Eigen::MatrixXd cube = latin_hypercube(count, 3, o.seed);
+  const Eigen::MatrixXd cube = latin_hypercube(static_cast<std::size_t>(count), 3, o.seed);
   const Eigen::VectorXd y = measured(records, n);
   std::vector<PwP> out;
   for (int i = 0; i < count; ++i) {

@@ -5,9 +5,8 @@
 // Vectors are handed over inside one inlined function: no calling convention is involved.
 #pragma GCC diagnostic ignored "-Wpsabi"
 
+#include "mgdd/math/dispatch.hpp"
 #include "mgdd/math/fast_tanh.hpp"
-
-#define MGDD_LANE_INLINE [[gnu::always_inline]] inline
 
 namespace mgdd::identify {
 namespace {
@@ -23,14 +22,14 @@ struct Columns {
   V c[n];
 };
 template <class V, int n>
-MGDD_LANE_INLINE Columns<V, n> operator*(const V& a, const Columns<V, n>& b) noexcept {
+MGDD_INLINE Columns<V, n> operator*(const V& a, const Columns<V, n>& b) noexcept {
   Columns<V, n> r;
   for (int i = 0; i < n; ++i)
     r.c[i] = a * b.c[i];
   return r;
 }
 template <class V, int n>
-MGDD_LANE_INLINE Columns<V, n> operator+(const Columns<V, n>& a, const Columns<V, n>& b) noexcept {
+MGDD_INLINE Columns<V, n> operator+(const Columns<V, n>& a, const Columns<V, n>& b) noexcept {
   Columns<V, n> r;
   for (int i = 0; i < n; ++i)
     r.c[i] = a.c[i] + b.c[i];
@@ -49,11 +48,11 @@ struct Layout<double> {
 };
 
 template <class V>
-MGDD_LANE_INLINE void both_tanh(const V& a, const V& b, V& ta, V& tb) noexcept {
+MGDD_INLINE void both_tanh(const V& a, const V& b, V& ta, V& tb) noexcept {
   ta = fast_tanh(a);
   tb = fast_tanh(b);
 }
-MGDD_LANE_INLINE void both_tanh(const double& a, const double& b, double& ta, double& tb) noexcept {
+MGDD_INLINE void both_tanh(const double& a, const double& b, double& ta, double& tb) noexcept {
   const Lanes2 t = fast_tanh(Lanes2{a, b});
   ta = t[0];
   tb = t[1];
@@ -78,8 +77,8 @@ struct Stage {
 };
 
 template <class V>
-MGDD_LANE_INLINE void evaluate(const Constants<V>& c, const V& angle, const V& speed, const V& current, const V& drive,
-                               Stage<V>& f) noexcept {
+MGDD_INLINE void evaluate(const Constants<V>& c, const V& angle, const V& speed, const V& current, const V& drive,
+                          Stage<V>& f) noexcept {
   const V deflection = angle - c.limp_home;
   const V s = speed * c.over_width;
   const V z = deflection * c.over_preload_width;
@@ -107,7 +106,7 @@ struct Matrix3 {
 
 // w A for A = [0 1 0; a10 a11 torque; 0 -emf -resistance].
 template <class V>
-MGDD_LANE_INLINE Matrix3<V> times_a(const Matrix3<V>& w, const Stage<V>& f, const Constants<V>& c) noexcept {
+MGDD_INLINE Matrix3<V> times_a(const Matrix3<V>& w, const Stage<V>& f, const Constants<V>& c) noexcept {
   Matrix3<V> r;
   for (int i = 0; i < 3; ++i) {
     r.m[i][0] = w.m[i][1] * f.a10;
@@ -118,7 +117,7 @@ MGDD_LANE_INLINE Matrix3<V> times_a(const Matrix3<V>& w, const Stage<V>& f, cons
 }
 
 template <class V>
-MGDD_LANE_INLINE Matrix3<V> plus_identity(double diagonal, double factor, const Matrix3<V>& a) noexcept {
+MGDD_INLINE Matrix3<V> plus_identity(double diagonal, double factor, const Matrix3<V>& a) noexcept {
   Matrix3<V> r;
   for (int i = 0; i < 3; ++i) {
     for (int j = 0; j < 3; ++j)
@@ -134,7 +133,7 @@ struct SumsOfOne {
   Lanes2 bb[2]{}, br{};
   double rr = 0.0;
 
-  MGDD_LANE_INLINE void add(const Lanes8& a, const Lanes2& b, double r) noexcept {
+  MGDD_INLINE void add(const Lanes8& a, const Lanes2& b, double r) noexcept {
     for (int i = 0; i < 8; ++i)
       aa[i] += a[i] * a;
     for (int i = 0; i < 2; ++i) {
@@ -151,7 +150,7 @@ template <class V>
 struct SumsOfLanes {
   V jj[55]{}, jr[10]{}, rr{};
 
-  MGDD_LANE_INLINE void add(const Columns<V, 8>& a, const Columns<V, 2>& b, const V& r) noexcept {
+  MGDD_INLINE void add(const Columns<V, 8>& a, const Columns<V, 2>& b, const V& r) noexcept {
     V row[10];
     for (int i = 0; i < 8; ++i)
       row[i] = a.c[i];
@@ -168,8 +167,8 @@ struct SumsOfLanes {
 };
 
 template <class V, class Sums>
-MGDD_LANE_INLINE void sweep(const throttle::SmoothPlant& plant, const SmoothThrottleRecord& record,
-                            std::size_t n_samples, const V (&p)[10], Sums& sums) noexcept {
+MGDD_INLINE void sweep(const throttle::SmoothPlant& plant, const SmoothThrottleRecord& record, std::size_t n_samples,
+                       const V (&p)[10], Sums& sums) noexcept {
   using Speed = typename Layout<V>::Speed;
   using Current = typename Layout<V>::Current;
   const double h = record.dt_s;
@@ -225,8 +224,8 @@ MGDD_LANE_INLINE void sweep(const throttle::SmoothPlant& plant, const SmoothThro
         t.m[i][j] = (p1.m[i][j] + p2.m[i][j]) + (p3.m[i][j] + p4.m[i][j]);
       t.m[i][i] += 1.0;
     }
-    const auto next = [&] [[gnu::always_inline]] (int i, const auto& a, const auto& s, const auto& q, const auto& b1,
-                                                  const auto& b2, const auto& b3, int column) {
+    const auto next = [&](int i, const auto& a, const auto& s, const auto& q, const auto& b1, const auto& b2,
+                          const auto& b3, int column) MGDD_INLINE_LAMBDA {
       return ((t.m[i][0] * a + t.m[i][1] * s) + (t.m[i][2] * q + w1.m[i][column] * b1)) +
              (w2.m[i][column] * b2 + w3.m[i][column] * b3);
     };
@@ -249,8 +248,8 @@ MGDD_LANE_INLINE void sweep(const throttle::SmoothPlant& plant, const SmoothThro
 
 constexpr double squared_deg = deg_per_rad * deg_per_rad;
 
-MGDD_LANE_INLINE void one(const throttle::SmoothPlant& plant, const SmoothThrottleRecord& record, std::size_t n_samples,
-                          const std::array<double, 10>& parameters, NormalSums& out) noexcept {
+MGDD_INLINE void one(const throttle::SmoothPlant& plant, const SmoothThrottleRecord& record, std::size_t n_samples,
+                     const std::array<double, 10>& parameters, NormalSums& out) noexcept {
   double p[10];
   for (std::size_t i = 0; i < 10; ++i)
     p[i] = parameters[i];
@@ -271,8 +270,8 @@ MGDD_LANE_INLINE void one(const throttle::SmoothPlant& plant, const SmoothThrott
   out.sum_squares = squared_deg * sums.rr;
 }
 
-MGDD_LANE_INLINE void lanes(const throttle::SmoothPlant& plant, const SmoothThrottleRecord& record,
-                            std::size_t n_samples, const std::array<double, 10>* parameters, NormalSums* out) noexcept {
+MGDD_INLINE void lanes(const throttle::SmoothPlant& plant, const SmoothThrottleRecord& record, std::size_t n_samples,
+                       const std::array<double, 10>* parameters, NormalSums* out) noexcept {
   Lanes8 p[10];
   for (std::size_t i = 0; i < 10; ++i) {
     for (std::size_t lane = 0; lane < 8; ++lane)
@@ -292,58 +291,17 @@ MGDD_LANE_INLINE void lanes(const throttle::SmoothPlant& plant, const SmoothThro
   }
 }
 
-// The same source compiled once per instruction set.
-#define MGDD_CLONE(suffix, attribute)                                                                                  \
-  attribute void one_##suffix(const throttle::SmoothPlant& plant, const SmoothThrottleRecord& record, std::size_t n,   \
-                              const std::array<double, 10>& parameters, NormalSums& out) noexcept {                    \
-    one(plant, record, n, parameters, out);                                                                            \
-  }                                                                                                                    \
-  attribute void lanes_##suffix(const throttle::SmoothPlant& plant, const SmoothThrottleRecord& record, std::size_t n, \
-                                const std::array<double, 10>* parameters, NormalSums* out) noexcept {                  \
-    lanes(plant, record, n, parameters, out);                                                                          \
-  }
-
-MGDD_CLONE(baseline, )
-#if defined(__x86_64__) && defined(__GNUC__)
-MGDD_CLONE(avx2, __attribute__((target("avx2,fma"))))
-MGDD_CLONE(avx512f, __attribute__((target("avx512f"))))
-#define MGDD_HAS(set) __builtin_cpu_supports(set)
-#endif
-
-struct Choice {
-  decltype(&one_baseline) one = &one_baseline;
-  decltype(&lanes_baseline) lanes = &lanes_baseline;
-  std::string_view name = "baseline";
-};
-
-Choice choose() noexcept {
-#ifdef MGDD_HAS
-  if (MGDD_HAS("avx512f")) return {&one_avx512f, &lanes_avx512f, "avx512f"};
-  if (MGDD_HAS("avx2")) return {&one_avx2, &lanes_avx2, "avx2"};
-#endif
-  return {};
-}
-
-const Choice& choice() noexcept {
-  static const Choice chosen = choose();
-  return chosen;
-}
-
 }  // namespace
 
 void accumulate(const throttle::SmoothPlant& plant, const SmoothThrottleRecord& record, std::size_t n_samples,
                 const std::array<double, 10>& parameters, NormalSums& sums) noexcept {
-  choice().one(plant, record, n_samples, parameters, sums);
+  dispatch([&]() MGDD_INLINE_LAMBDA { one(plant, record, n_samples, parameters, sums); });
 }
 
 void accumulate(const throttle::SmoothPlant& plant, const SmoothThrottleRecord& record, std::size_t n_samples,
                 std::span<const std::array<double, 10>, smooth_throttle_lanes> parameters,
                 std::span<NormalSums, smooth_throttle_lanes> sums) noexcept {
-  choice().lanes(plant, record, n_samples, parameters.data(), sums.data());
-}
-
-std::string_view smooth_throttle_instruction_set() noexcept {
-  return choice().name;
+  dispatch([&]() MGDD_INLINE_LAMBDA { lanes(plant, record, n_samples, parameters.data(), sums.data()); });
 }
 
 }  // namespace mgdd::identify

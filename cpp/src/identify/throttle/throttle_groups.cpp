@@ -1,24 +1,34 @@
 #include "mgdd/identify/throttle/throttle_groups.hpp"
 
+#include <array>
 #include <string>
 
-#include "mgdd/common/bounds.hpp"
+#include "mgdd/common/field.hpp"
 
 namespace mgdd::identify {
 
 static_assert(StepModel<ThrottleGroups>);
 
+namespace {
+
+constexpr std::array<FieldInfo, 9> group_fields{
+    {{"tau_s", "s", log_scale(0.003, 1.0), "time constant J/b"},
+     {"gain_deg_per_s2_per_duty", "deg/s² per duty", log_scale(3e3, 1e6), "acceleration per duty"},
+     {"beta_above_duty", "-", log_scale(1e-3, 0.6), "preload above limp-home"},
+     {"kappa_above_duty_per_deg", "duty/deg", log_scale(1e-5, 2e-2), "spring above limp-home"},
+     {"delta_duty", "-", log_scale(1e-3, 0.5), "dry friction"},
+     {"beta_below_duty", "-", log_scale(1e-3, 0.6), "preload below limp-home"},
+     {"kappa_below_duty_per_deg", "duty/deg", log_scale(1e-5, 5e-2), "spring below limp-home"},
+     {"limp_home_deg", "deg", closed(-5.0, 60.0), "limp-home angle"},
+     {"electrical_s", "s", closed(0.0, 0.02), "electrical time constant"}}};
+
+}  // namespace
+
 std::vector<optimize::Parameter> throttle_group_parameters() {
-  const std::array<optimize::Parameter, 9> domain{{{"tau_s", 0.003, 1.0, true},
-                                                   {"gain_deg_per_s2_per_duty", 3e3, 1e6, true},
-                                                   {"beta_above_duty", 1e-3, 0.6, true},
-                                                   {"kappa_above_duty_per_deg", 1e-5, 2e-2, true},
-                                                   {"delta_duty", 1e-3, 0.5, true},
-                                                   {"beta_below_duty", 1e-3, 0.6, true},
-                                                   {"kappa_below_duty_per_deg", 1e-5, 5e-2, true},
-                                                   {"limp_home_deg", -5.0, 60.0, false},
-                                                   {"electrical_s", 0.0, 0.02, false}}};
-  return {domain.begin(), domain.end()};
+  std::vector<optimize::Parameter> out;
+  for (const FieldInfo& field : group_fields)
+    out.push_back(optimize::parameter_of(field, std::string(field.name)));
+  return out;
 }
 
 ThrottleGroupsFit fit_throttle_groups(const ThrottleGroups& model, const std::vector<SimulationRecord>& records,
@@ -30,7 +40,7 @@ ThrottleGroupsFit fit_throttle_groups(const ThrottleGroups& model, const std::ve
   const std::vector<optimize::Parameter> parameters = throttle_group_parameters();
   for (const Values<double, 9>& start : starts) {
     for (std::size_t i = 0; i < start.size(); ++i)
-      require_within(parameters[i].name, start[i], parameters[i].lower, parameters[i].upper);
+      require_in(group_fields[i], start[i]);
   }
   std::vector<Eigen::VectorXd> indices;  // which start: each thread then owns its entry of `ends`
   std::vector<Values<double, 9>> ends = starts;

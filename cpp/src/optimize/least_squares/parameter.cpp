@@ -1,8 +1,11 @@
 #include "mgdd/optimize/least_squares/parameter.hpp"
 
+#include <algorithm>
+#include <array>
 #include <cmath>
 #include <cstddef>
 #include <limits>
+#include <utility>
 
 #include "mgdd/common/error.hpp"
 #include "mgdd/common/text.hpp"
@@ -11,25 +14,36 @@ namespace mgdd::optimize {
 namespace {
 
 constexpr double epsilon = std::numeric_limits<double>::epsilon();
+constexpr double off_open_bound = 1e-6;  // of the bound or 1
 
-void require(bool holds, const char* field, double value, const char* bound) {
-  if (!holds) {
-    throw ParameterError(std::string(field) + " = " + text(value) + ": must be " + bound);
-  }
-}
+using O = LeastSquaresOptions;
+constexpr Domain fraction{.lower = 0.0, .upper = 1.0, .upper_open = true};
+constexpr std::array option_fields{
+    field<&O::cost_tolerance>({"cost_tolerance", "-", fraction, "relative decrease of the cost that ends a search"}),
+    field<&O::step_tolerance>({"step_tolerance", "-", fraction, "relative step that ends a search"}),
+    field<&O::gradient_tolerance>({"gradient_tolerance", "-", fraction, "cosine of the gradient that ends a search"}),
+    field<&O::initial_damping>(
+        {"initial_damping", "-", closed(least_damping, largest_damping), "damping of the first step"}),
+    field<&O::correlation_limit>({"correlation_limit", "-", above(0.0, 1.0), "correlation above which two are named"}),
+    field<&O::rank_tolerance>({"rank_tolerance",
+                               "-",
+                               {.lower = epsilon, .upper = 1.0, .upper_open = true},
+                               "singular value, over the largest, that counts as zero"}),
+};
 
 }  // namespace
 
+Parameter parameter_of(const FieldInfo& field, std::string name) {
+  const auto off = [](bool open, double bound) {
+    return open ? off_open_bound * std::max(1.0, std::abs(bound)) : 0.0;
+  };
+  const Domain& d = field.domain;
+  return {std::move(name), d.lower + off(d.lower_open, d.lower), d.upper - off(d.upper_open, d.upper), d.log_scaled};
+}
+
 void LeastSquaresOptions::validate() const {
-  require(max_iterations >= 1 && max_iterations <= iteration_ceiling, "max_iterations", max_iterations,
-          "in 1..1000000");
-  require(cost_tolerance >= 0.0 && cost_tolerance < 1.0, "cost_tolerance", cost_tolerance, "in [0, 1)");
-  require(step_tolerance >= 0.0 && step_tolerance < 1.0, "step_tolerance", step_tolerance, "in [0, 1)");
-  require(gradient_tolerance >= 0.0 && gradient_tolerance < 1.0, "gradient_tolerance", gradient_tolerance, "in [0, 1)");
-  require(initial_damping >= least_damping && initial_damping <= largest_damping, "initial_damping", initial_damping,
-          "in [1e-24, 1e30]");
-  require(correlation_limit > 0.0 && correlation_limit <= 1.0, "correlation_limit", correlation_limit, "in (0, 1]");
-  require(rank_tolerance >= epsilon && rank_tolerance < 1.0, "rank_tolerance", rank_tolerance, "in [2.2e-16, 1)");
+  require_within("max_iterations", max_iterations, 1, iteration_ceiling);
+  require_fields(option_fields, *this);
 }
 
 void validate(const std::vector<Parameter>& parameters) {

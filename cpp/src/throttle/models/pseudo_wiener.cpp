@@ -29,56 +29,56 @@ constexpr std::array<std::pair<LagStart, std::string_view>, 2> starts{{
     {LagStart::inverse_map, "inverse_map"},
 }};
 
-constexpr std::array<PseudoWienerField, n_pw_r> pw_r_fields{{
-    {"above_tau_s", "s", 0.005, 0.3, true, "time constant J/b above limp-home"},
-    {"above_gain_deg_per_s2_per_duty", "deg/s² per duty", 1e4, 4e5, true, "acceleration per duty G above limp-home"},
-    {"above_preload_duty", "-", 0.0, 0.5, false, "preload beta above limp-home"},
-    {"above_spring_duty_per_deg", "duty/deg", 1e-5, 2e-2, true, "spring kappa above limp-home"},
-    {"above_coulomb_duty", "-", 0.003, 0.3, true, "dry friction delta above limp-home"},
-    {"above_square_per_deg", "1/deg", -5e-3, 5e-3, false, "c2 of the static map above limp-home"},
-    {"above_cube_per_deg2", "1/deg²", -5e-5, 5e-5, false, "c3 of the static map above limp-home"},
-    {"below_tau_s", "s", 0.005, 0.3, true, "time constant J/b below limp-home"},
-    {"below_gain_deg_per_s2_per_duty", "deg/s² per duty", 1e4, 4e5, true, "acceleration per duty G below limp-home"},
-    {"below_preload_duty", "-", 0.0, 0.5, false, "preload beta below limp-home"},
-    {"below_spring_duty_per_deg", "duty/deg", 1e-5, 2e-2, true, "spring kappa below limp-home"},
-    {"below_coulomb_duty", "-", 0.003, 0.3, true, "dry friction delta below limp-home"},
-    {"below_square_per_deg", "1/deg", -5e-3, 5e-3, false, "c2 of the static map below limp-home"},
-    {"below_cube_per_deg2", "1/deg²", -5e-5, 5e-5, false, "c3 of the static map below limp-home"},
-    {"limp_home_deg", "deg", 0.0, 90.0, false, "limp-home angle"},
+constexpr std::array<FieldInfo, n_pw_r> pw_r_fields{{
+    {"above_tau_s", "s", log_scale(0.005, 0.3), "time constant J/b above limp-home"},
+    {"above_gain_deg_per_s2_per_duty", "deg/s² per duty", log_scale(1e4, 4e5), "acceleration per duty G above limp-home"},
+    {"above_preload_duty", "-", closed(0.0, 0.5), "preload beta above limp-home"},
+    {"above_spring_duty_per_deg", "duty/deg", log_scale(1e-5, 2e-2), "spring kappa above limp-home"},
+    {"above_coulomb_duty", "-", log_scale(0.003, 0.3), "dry friction delta above limp-home"},
+    {"above_square_per_deg", "1/deg", closed(-5e-3, 5e-3), "c2 of the static map above limp-home"},
+    {"above_cube_per_deg2", "1/deg²", closed(-5e-5, 5e-5), "c3 of the static map above limp-home"},
+    {"below_tau_s", "s", log_scale(0.005, 0.3), "time constant J/b below limp-home"},
+    {"below_gain_deg_per_s2_per_duty", "deg/s² per duty", log_scale(1e4, 4e5), "acceleration per duty G below limp-home"},
+    {"below_preload_duty", "-", closed(0.0, 0.5), "preload beta below limp-home"},
+    {"below_spring_duty_per_deg", "duty/deg", log_scale(1e-5, 2e-2), "spring kappa below limp-home"},
+    {"below_coulomb_duty", "-", log_scale(0.003, 0.3), "dry friction delta below limp-home"},
+    {"below_square_per_deg", "1/deg", closed(-5e-3, 5e-3), "c2 of the static map below limp-home"},
+    {"below_cube_per_deg2", "1/deg²", closed(-5e-5, 5e-5), "c3 of the static map below limp-home"},
+    {"limp_home_deg", "deg", closed(0.0, 90.0), "limp-home angle"},
 }};
-constexpr std::array<PseudoWienerField, n_pw_w> pw_w_fields{{
-    {"first_s", "s", 1e-3, 20.0, true, "first lag"},
-    {"second_s", "s", 1e-3, 20.0, true, "second lag"},
-    {"base_deg", "deg", -500.0, 500.0, false, "output at the lowest knot"},
-    {"rise_1_deg", "deg", 0.0, 5000.0, false, "rise from knot 1 to 2"},
-    {"rise_2_deg", "deg", 0.0, 5000.0, false, "rise from knot 2 to 3"},
-    {"rise_3_deg", "deg", 0.0, 5000.0, false, "rise from knot 3 to 4"},
-    {"rise_4_deg", "deg", 0.0, 5000.0, false, "rise from knot 4 to 5"},
-    {"rise_5_deg", "deg", 0.0, 5000.0, false, "rise from knot 5 to 6"},
-    {"rise_6_deg", "deg", 0.0, 5000.0, false, "rise from knot 6 to 7"},
-    {"limp_home_deg", "deg", 0.0, 90.0, false, "limp-home angle"},
+constexpr std::array<FieldInfo, n_pw_w> pw_w_fields{{
+    {"first_s", "s", log_scale(1e-3, 20.0), "first lag"},
+    {"second_s", "s", log_scale(1e-3, 20.0), "second lag"},
+    {"base_deg", "deg", closed(-500.0, 500.0), "output at the lowest knot"},
+    {"rise_1_deg", "deg", closed(0.0, 5000.0), "rise from knot 1 to 2"},
+    {"rise_2_deg", "deg", closed(0.0, 5000.0), "rise from knot 2 to 3"},
+    {"rise_3_deg", "deg", closed(0.0, 5000.0), "rise from knot 3 to 4"},
+    {"rise_4_deg", "deg", closed(0.0, 5000.0), "rise from knot 4 to 5"},
+    {"rise_5_deg", "deg", closed(0.0, 5000.0), "rise from knot 5 to 6"},
+    {"rise_6_deg", "deg", closed(0.0, 5000.0), "rise from knot 6 to 7"},
+    {"limp_home_deg", "deg", closed(0.0, 90.0), "limp-home angle"},
 }};
-constexpr std::array<PseudoWienerField, n_pw_p> pw_p_fields{{
-    {"first_s", "s", 1e-3, 20.0, true, "first lag"},
-    {"second_s", "s", 1e-3, 20.0, true, "second lag"},
-    {"offset_deg", "deg", -500.0, 500.0, false, "output at zero play, from limp-home"},
-    {"radius_1_duty", "-", 0.0, 0.5, false, "half width of play 1"},
-    {"gain_1_deg_per_duty", "deg/duty", 0.0, 20000.0, false, "gain of play 1"},
-    {"radius_2_duty", "-", 0.0, 0.5, false, "half width of play 2"},
-    {"gain_2_deg_per_duty", "deg/duty", 0.0, 20000.0, false, "gain of play 2"},
-    {"radius_3_duty", "-", 0.0, 0.5, false, "half width of play 3"},
-    {"gain_3_deg_per_duty", "deg/duty", 0.0, 20000.0, false, "gain of play 3"},
-    {"radius_4_duty", "-", 0.0, 0.5, false, "half width of play 4"},
-    {"gain_4_deg_per_duty", "deg/duty", 0.0, 20000.0, false, "gain of play 4"},
-    {"radius_5_duty", "-", 0.0, 0.5, false, "half width of play 5"},
-    {"gain_5_deg_per_duty", "deg/duty", 0.0, 20000.0, false, "gain of play 5"},
-    {"radius_6_duty", "-", 0.0, 0.5, false, "half width of play 6"},
-    {"gain_6_deg_per_duty", "deg/duty", 0.0, 20000.0, false, "gain of play 6"},
-    {"radius_7_duty", "-", 0.0, 0.5, false, "half width of play 7"},
-    {"gain_7_deg_per_duty", "deg/duty", 0.0, 20000.0, false, "gain of play 7"},
-    {"radius_8_duty", "-", 0.0, 0.5, false, "half width of play 8"},
-    {"gain_8_deg_per_duty", "deg/duty", 0.0, 20000.0, false, "gain of play 8"},
-    {"limp_home_deg", "deg", 0.0, 90.0, false, "limp-home angle"},
+constexpr std::array<FieldInfo, n_pw_p> pw_p_fields{{
+    {"first_s", "s", log_scale(1e-3, 20.0), "first lag"},
+    {"second_s", "s", log_scale(1e-3, 20.0), "second lag"},
+    {"offset_deg", "deg", closed(-500.0, 500.0), "output at zero play, from limp-home"},
+    {"radius_1_duty", "-", closed(0.0, 0.5), "half width of play 1"},
+    {"gain_1_deg_per_duty", "deg/duty", closed(0.0, 20000.0), "gain of play 1"},
+    {"radius_2_duty", "-", closed(0.0, 0.5), "half width of play 2"},
+    {"gain_2_deg_per_duty", "deg/duty", closed(0.0, 20000.0), "gain of play 2"},
+    {"radius_3_duty", "-", closed(0.0, 0.5), "half width of play 3"},
+    {"gain_3_deg_per_duty", "deg/duty", closed(0.0, 20000.0), "gain of play 3"},
+    {"radius_4_duty", "-", closed(0.0, 0.5), "half width of play 4"},
+    {"gain_4_deg_per_duty", "deg/duty", closed(0.0, 20000.0), "gain of play 4"},
+    {"radius_5_duty", "-", closed(0.0, 0.5), "half width of play 5"},
+    {"gain_5_deg_per_duty", "deg/duty", closed(0.0, 20000.0), "gain of play 5"},
+    {"radius_6_duty", "-", closed(0.0, 0.5), "half width of play 6"},
+    {"gain_6_deg_per_duty", "deg/duty", closed(0.0, 20000.0), "gain of play 6"},
+    {"radius_7_duty", "-", closed(0.0, 0.5), "half width of play 7"},
+    {"gain_7_deg_per_duty", "deg/duty", closed(0.0, 20000.0), "gain of play 7"},
+    {"radius_8_duty", "-", closed(0.0, 0.5), "half width of play 8"},
+    {"gain_8_deg_per_duty", "deg/duty", closed(0.0, 20000.0), "gain of play 8"},
+    {"limp_home_deg", "deg", closed(0.0, 90.0), "limp-home angle"},
 }};
 
 template <class Model>
@@ -86,7 +86,7 @@ void check_numbers(const Model& p, PseudoWienerKind kind) {
   const auto values = numbers(p);
   const auto rows = fields(kind);
   for (std::size_t i = 0; i < values.size(); ++i)
-    require_within(rows[i].name, *values[i], rows[i].lower, rows[i].upper, rows[i].unit);
+    require_in(rows[i], *values[i]);
   p.frame.validate();
   if (!(p.limp_home_deg >= p.frame.closed_deg && p.limp_home_deg <= p.frame.open_deg)) {
     require_within("limp_home_deg", p.limp_home_deg, p.frame.closed_deg, p.frame.open_deg, "deg");
@@ -121,7 +121,7 @@ Names<LagStart> lag_start_names() noexcept {
   return starts;
 }
 
-std::span<const PseudoWienerField> fields(PseudoWienerKind kind) noexcept {
+std::span<const FieldInfo> fields(PseudoWienerKind kind) noexcept {
   switch (kind) {
     case PseudoWienerKind::pw_r:
       return pw_r_fields;

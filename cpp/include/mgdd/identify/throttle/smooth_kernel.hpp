@@ -8,7 +8,6 @@
 #include <array>
 #include <cstddef>
 #include <span>
-#include <string_view>
 
 #include "mgdd/throttle/models/smooth.hpp"
 
@@ -39,8 +38,5 @@ void accumulate(const throttle::SmoothPlant& plant, const SmoothThrottleRecord& 
 void accumulate(const throttle::SmoothPlant& plant, const SmoothThrottleRecord& record, std::size_t n_samples,
                 std::span<const std::array<double, 10>, smooth_throttle_lanes> parameters,
                 std::span<NormalSums, smooth_throttle_lanes> sums) noexcept;
-
-/// Instruction set in use: "avx512f", "avx2" or "baseline".
-std::string_view smooth_throttle_instruction_set() noexcept;
 
 }  // namespace mgdd::identify

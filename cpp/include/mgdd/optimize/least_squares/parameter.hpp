@@ -8,6 +8,8 @@
 
 #include <Eigen/Core>
 
+#include "mgdd/common/field.hpp"
+
 namespace mgdd::optimize {
 
 /// One unknown. A log-scaled parameter is searched as log(p): for positive numbers known only to their order.
@@ -19,6 +21,9 @@ struct Parameter {
 
   bool operator==(const Parameter&) const = default;
 };
+
+/// A field as an unknown of a search, within its domain; an open bound is kept off by a millionth.
+Parameter parameter_of(const FieldInfo& field, std::string name);
 
 inline constexpr int iteration_ceiling = 1'000'000;  ///< the history is reserved for all iterations
 inline constexpr double least_damping = 1e-24;       ///< rounding in a null direction, about 1e-30, stays harmless

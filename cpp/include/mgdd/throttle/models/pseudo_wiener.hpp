@@ -15,6 +15,7 @@
 #include <vector>
 
 #include "mgdd/common/enum_names.hpp"
+#include "mgdd/common/field.hpp"
 #include "mgdd/throttle/models/pw_p.hpp"
 #include "mgdd/throttle/models/pw_r.hpp"
 #include "mgdd/throttle/models/pw_w.hpp"
@@ -170,18 +171,8 @@ void predict_moves(const DualModel& model, const State& state,
 
 // --- parameters by name ---------------------------------------------------------------------------------------
 
-/// One number of a model: as a table row and as the bounds of a search.
-struct PseudoWienerField {
-  std::string_view name;
-  std::string_view unit;
-  double lower;
-  double upper;
-  bool log_scaled;
-  std::string_view meaning;
-};
-
-/// All numbers of a kind in a fixed order. `plays` matters for PW-P only.
-std::span<const PseudoWienerField> fields(PseudoWienerKind kind) noexcept;
+/// All numbers of a kind in a fixed order, their domains as the bounds of a search. `plays` matters for PW-P only.
+std::span<const FieldInfo> fields(PseudoWienerKind kind) noexcept;
 
 /// Numbers in the order of `fields`; PW-P lists all eight plays, those beyond `plays` zero.
 inline constexpr std::size_t n_pw_r = 15;
