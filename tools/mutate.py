@@ -9,6 +9,7 @@ stands in tools/equivalent_mutants.toml, with the reason.
 from __future__ import annotations
 
 import argparse
+import fcntl
 import json
 import math
 import re
@@ -17,7 +18,7 @@ import tomllib
 from collections import Counter
 from collections.abc import Sequence
 from pathlib import Path
-from typing import Any
+from typing import IO, Any
 
 from mutant_runs import Cpp, Outcome, Python, Runner, fingerprint
 from mutants import Mutant, sample
@@ -116,6 +117,17 @@ def table(head: dict[str, Any], rows: Sequence[dict[str, Any]]) -> str:
     return "\n".join([*(["survivors:", *lines, ""] if lines else []), *out])
 
 
+def _alone(scratch: Path) -> IO[str]:
+    """Keep other runs out of the copy as long as the file stays open."""
+    scratch.mkdir(parents=True, exist_ok=True)
+    lock = (scratch / ".lock").open("w")
+    try:
+        fcntl.flock(lock, fcntl.LOCK_EX | fcntl.LOCK_NB)
+    except BlockingIOError:
+        raise RuntimeError(f"another run uses {scratch}: wait for its end") from None
+    return lock
+
+
 def main() -> int:
     """Run a sample; the exit code tells whether it could run, not how many survive."""
     parser = argparse.ArgumentParser(description=__doc__.splitlines()[0] if __doc__ else None)
@@ -146,19 +158,18 @@ def main() -> int:
     ledger = Ledger(FOLDER / f"{args.module}.json", fingerprint(runner.tests()))
     rows: list[dict[str, Any]] = []
     head = summary(args.module, args.seed, rows, 0)
-    ready = False
+    lock: IO[str] | None = None
     while tried and head["n"] < args.n:
         batch, tried = tried[: args.n - head["n"]], tried[args.n - head["n"] :]
         for mutant in sorted(batch, key=lambda m: (m.path, m.line)):  # neighbours share what is built
             row = ledger.find(mutant)
             if row is None:
-                if not ready:
+                if lock is None:
                     print(
                         f"{args.module}: {len(pool)} lines can change; preparing {scratch.relative_to(ROOT)}",
                         flush=True,
                     )
                     runner.prepare()
-                    ready = True
                 row = ledger.add(mutant, runner.run(mutant))
                 told = f"{row['status']:12s} {row['seconds']:5.0f} s  {mutant.path}:{mutant.line}  {mutant.kind}"
                 print(f"[{len(rows) + 1:3d}] {told}" + (f"  ({row['by']})" if row["by"] else ""), flush=True)
