@@ -62,6 +62,8 @@ TEST(PwWEquations, AStartOnTheMapIsTheLowestPlaceWithThatAngle) {
     EXPECT_EQ(s.line.before[1], 0.3);
   }
   EXPECT_NEAR(model.at_rest(7.5, 0.0).second_duty, -0.27 + 2.0 * 0.13, 1e-6);
+  EXPECT_EQ(model.at_rest(-5.0, 0.0).second_duty, -0.27) << "beyond the map: its end";
+  EXPECT_EQ(model.at_rest(99.0, 0.0).second_duty, 0.51);
 }
 
 TEST(PwWEquations, ACorrectionMovesTheOffsetByItsShare) {

@@ -268,6 +268,9 @@ TEST(SmoothPlant, SolvesItsEquations) {
     }
   }
   EXPECT_EQ(SmoothPlant{}, (SmoothPlant{2e-3, 20.0, 1e-3, 12.0}));
+  EXPECT_EQ(SmoothPlant::n_states, 3);
+  EXPECT_EQ(SmoothPlant::n_inputs, 1);
+  EXPECT_EQ(SmoothPlant::n_parameters, 10);
 }
 
 }  // namespace

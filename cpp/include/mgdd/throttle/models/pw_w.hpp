@@ -83,7 +83,8 @@ class BasicPwWModel {
   const Parameters& parameters() const noexcept { return p_; }
 
  private:
-  // Bisection for the place, one Newton step for the derivatives; the lowest such place where the map is flat.
+  // Bisection for the place, one Newton step for the derivatives; the lowest such place where the map is flat, its end
+  // for an angle beyond it.
   T inverse_map(const T& angle_deg) const noexcept {
     constexpr double edge = 1e-6;
     T low(p_.knot_lower_duty);
@@ -96,7 +97,8 @@ class BasicPwWModel {
     }
     const T slope = (map(low + T(edge)) - map(low - T(edge))) * T(0.5 / edge);
     const T safe = larger(slope, T(1.0));
-    return select(slope > T(1.0), low + (angle_deg - map(low)) / safe, low);
+    const T place = low + (angle_deg - map(low)) / safe;
+    return select(slope > T(1.0), larger(smaller(place, T(p_.knot_upper_duty)), T(p_.knot_lower_duty)), low);
   }
 
   Parameters p_;
