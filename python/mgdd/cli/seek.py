@@ -19,6 +19,7 @@ from mgdd.loop import EngineBench, LoopCriteria, find_steady_optimum, run_seeker
 from mgdd.loop.plant_loop import LoopRun
 from mgdd.optimize import Optimum
 from mgdd.results import VARIABLES
+from mgdd.results.units import unit_attributes
 
 if TYPE_CHECKING:
     import xarray as xr
@@ -259,7 +260,7 @@ def _table(cycles: xr.Dataset) -> xr.Dataset:
     table = cycles.drop_dims([dim for dim in cycles.dims if dim != "cycle"])
     if "limit" in cycles.dims and _COV in cycles["limit"].to_numpy():
         cov = cycles["limits"].sel(limit=_COV, drop=True).drop_vars("limit_units", errors="ignore")
-        table[_COV] = cov.assign_attrs(VARIABLES[_COV]._asdict())
+        table[_COV] = cov.assign_attrs(unit_attributes(*VARIABLES[_COV]))
     return table
 
 

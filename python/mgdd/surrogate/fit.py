@@ -10,6 +10,7 @@ import numpy as np
 
 from mgdd.errors import DataError, ParameterError
 from mgdd.results import Label
+from mgdd.results.labels import label_of
 from mgdd.signals.even_grid import check_count
 from mgdd.surrogate.response_surface import QuadraticBasis, least_squares_of, r_squared, support_of
 from mgdd.surrogate.sensor_lag import SensorLag, find_sensor_lag, lagged
@@ -112,14 +113,14 @@ def fit_surrogate(
     models, left = {}, []
     for name in signals:
         values = records[name].to_numpy().astype(np.float64)
-        label = Label(records[name].attrs["units"], records[name].attrs["long_name"])
+        label = label_of(records[name])
         models[name], residual = _fit_signal(log, values, name, label, slow=name in slow, max_lag=max_lag, seed=seed)
         left.append(residual)
     return EngineSurrogate(
         signals=models,
         support=support_of(used, basis, inputs=names, share=box),
         medians={name: float(m) for name, m in zip(names, np.median(used, axis=0), strict=True)},
-        input_labels={n: Label(records[n].attrs["units"], records[n].attrs["long_name"]) for n in names},
+        input_labels={n: label_of(records[n]) for n in names},
         nonnegative=tuple(name for name in nonnegative if name in signals),
         residuals=np.column_stack(left),
         source=dict(records.attrs),
