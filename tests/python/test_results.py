@@ -217,7 +217,7 @@ def test_printed_units_become_expressions_and_come_back(printed, units, remark):
 
 @pytest.mark.parametrize("units", ["3 bar", "a+b", "bar/", "[bar]", "last 50 cycles"])
 def test_what_is_no_unit_is_refused(units):
-    with pytest.raises(DataError, match=r"variable x has units .* is no product or quotient of units, such as N\*m"):
+    with pytest.raises(DataError, match=r"variable x has units .* is not a product or quotient of units, such as N\*m"):
         labelled_dataset({"x": ((), 1.0, units, "quantity")})
     assert labelled_dataset({"x": ((), 1.0, "bar", f"quantity, {units}")})["x"].attrs["units"] == "bar"
 

@@ -60,7 +60,7 @@ def add_seek(verbs: Any) -> None:
         "--cycles", type=int, metavar="N",
         help="length of the run (default: 2000; with --sensor analyser 16 time constants of the seeker, 4000 at least)",
     )  # fmt: skip
-    parser.add_argument("--seed", type=int, default=0, metavar="N", help="of all chance (default: 0)")
+    parser.add_argument("--seed", type=int, default=0, metavar="N", help="of all noise (default: 0)")
     parser.add_argument(
         "--limit", action="append", default=[], metavar="NAME=X",
         help=f"keep an indicator, or {_COV}, below X; repeatable",

@@ -147,7 +147,7 @@ def read_throttle_log(
     FileNotFoundError
         No such file.
     DataError
-        No such column, a cell that is no number, and all of `check_throttle_log`; the message gives file, line,
+        No such column, a cell that is not a number, and all of `check_throttle_log`; the message gives file, line,
         column and remedy.
     ParameterError
         An empty window, a step that is not positive.

@@ -1,6 +1,6 @@
 """Labelled results: xarray Datasets in which every variable says its unit and its long name, ready for netCDF.
 
-The units of the names that several rooms share stand once, in `VARIABLES`.
+The units of the names that several modules share stand once, in `VARIABLES`.
 """
 
 from __future__ import annotations

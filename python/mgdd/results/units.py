@@ -137,7 +137,7 @@ def attribute_units(printed: str) -> str:
     Raises
     ------
     ValueError
-        Text that is no product or quotient of units.
+        Text that is not a product or quotient of units.
 
     Examples
     --------
@@ -154,12 +154,12 @@ def attribute_units(printed: str) -> str:
     for pattern, written in _WRITTEN:
         text = pattern.sub(written, text)
     if not _EXPRESSION.fullmatch(text):
-        raise ValueError(f"{printed!r} is no product or quotient of units, such as N*m or degree/second**2")
+        raise ValueError(f"{printed!r} is not a product or quotient of units, such as N*m or degree/second**2")
     return text
 
 
 def unit_attributes(printed: str, long_name: str) -> dict[str, str]:
-    """Return the attributes ``units`` and ``long_name``; what the expression loses, stands behind the long name.
+    """Return the attributes ``units`` and ``long_name``; what the expression loses, ends the long name.
 
     Parameters
     ----------
@@ -209,7 +209,7 @@ def printed_units(units: str, long_name: str) -> tuple[str, str]:
             if attribute_units(remark) == units:
                 return remark, name
         except ValueError:
-            pass  # the last part of a name is no unit
+            pass  # the last part of a name is not a unit
     return _typeset(units), long_name
 
 
