@@ -102,7 +102,7 @@ def test_bad_input_says_what_and_leaves_things_alone() -> None:
         model.simulate({"time_s": TIME})
     with pytest.raises(DataError, match=r"duty: must be in \[-1, 1\]"):
         simulate(model, 8.0, duty=10.0 * DUTY)
-    with pytest.raises(ParameterError, match="'angle' is no state: must be one of angle_deg"):
+    with pytest.raises(ParameterError, match="'angle' is not a state: must be one of angle_deg"):
         model.simulate({"time_s": TIME, "duty": DUTY}, initial_state={"angle": 8.0})
     with pytest.raises(ParameterError, match="horizon = 0"):
         model.predict(simulate(model, 8.0), 0)

@@ -134,7 +134,7 @@ def monte_carlo(
 ) -> xr.Dataset:
     """Run every seeker on every bench with every seed, whole loops at once on all cores.
 
-    Each loop starts from cycle 0 of its bench and from where its seeker stands. Chance depends on the seed alone, so
+    Each loop starts from cycle 0 of its bench and from where its seeker stands. Noise depends on the seed alone, so
     the numbers are the same on any number of threads.
 
     Parameters

@@ -89,7 +89,7 @@ def run_study(
     Raises
     ------
     mgdd.errors.ParameterError
-        An unknown name, fewer than one seed, or seeds for a study without chance.
+        An unknown name, fewer than one seed, or seeds for a deterministic study.
 
     Examples
     --------
@@ -104,7 +104,7 @@ def run_study(
         options["progress"] = progress
     if seeds is not None:
         if "seeds" not in inspect.signature(function).parameters:
-            raise ParameterError(f"seeds = {seeds}: study {name!r} has no chance in it; leave them out")
+            raise ParameterError(f"seeds = {seeds}: study {name!r} is deterministic; leave them out")
         options["seeds"] = check_seeds(seeds)
     result: StudyResult = function(**options)
     return result

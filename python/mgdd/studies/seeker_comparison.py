@@ -62,7 +62,7 @@ def run_seeker_comparison(
 ) -> StudyResult:
     """Compare every seeker on the same engine, noise, start and budget of 2000 cycles.
 
-    The problem is the gross efficiency of the virtual bench with its default chance (0.3 CAD scatter of combustion,
+    The problem is the gross efficiency of the virtual bench with its default noise (0.3 CAD scatter of combustion,
     0.25 points of efficiency), from SOC -20 °CA aTDC, without limits. Every seeker has its default settings except
     where ``settings`` says so; those called tuned are what `mgdd.optimize.tune` makes of noise, curvature and
     distance. Iterative learning solves another task, a load step that is repeated, and has a table of its own.

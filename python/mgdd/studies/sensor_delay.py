@@ -14,6 +14,7 @@ from mgdd.loop import EngineBench, LoopCriteria, SensorDynamics, find_steady_opt
 from mgdd.optimize import ComponentLag, ExtremumSeeking, Optimum
 from mgdd.results import labelled_dataset
 from mgdd.results.labels import to_jsonable
+from mgdd.results.units import unit_attributes
 from mgdd.studies.base import Progress, StudyResult, check_seeds, run_parts
 from mgdd.studies.statistics import bands, finished_loops, rms, run_finished, with_interval
 
@@ -284,7 +285,7 @@ def _draw(dataset: xr.Dataset) -> dict[str, Figure]:
         names = {f"component_{name}_cad": f"estimate_{name}_cad" for name in ("median", "low", "high")}
         own = own.rename({**names, "component_period": "case"})
         labels = [f"period {int(period)}" for period in own["case"].to_numpy()]
-        own = own.assign_coords(case=("case", labels, {"units": "-", "long_name": "case"}))
+        own = own.assign_coords(case=("case", labels, unit_attributes("-", "case")))
         figure = Figure(figsize=(7.4, 4.2), layout="constrained")
         plot.convergence(own.isel(cycle=slice(2000)), ax=figure.add_subplot())
         out["Only NOx is late, each component demodulated with its own phase; default noise"] = figure

@@ -11,6 +11,7 @@ import numpy as np
 
 from mgdd.loop import EngineBench, monte_carlo, run_seeker
 from mgdd.loop.plant_loop import LoopRun
+from mgdd.results.units import unit_attributes
 
 if TYPE_CHECKING:
     from collections.abc import Callable
@@ -100,5 +101,5 @@ def run_with_slope(bench: EngineBench, seeker: Any, cycles: int) -> xr.Dataset:
     settings = listener.settings
     period = 1 if settings.get("form") == "batch" else int(settings["period"])  # a batch is such a mean itself
     mean = np.convolve(slope, np.full(period, 1.0 / period))[:cycles]
-    attrs = {"units": "%/°CA", "long_name": "estimated slope of J"}
+    attrs = unit_attributes("%/°CA", "estimated slope of J")
     return run.assign(gradient_per_cad=("cycle", mean, attrs))

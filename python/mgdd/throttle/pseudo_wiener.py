@@ -44,7 +44,7 @@ class PseudoWiener(SampledModel, Parameters):
     switching : {"predicted", "measured"}
         PW-R: side of limp-home by the predicted position, or frozen by the measurement.
     friction : {"set_valued", "tanh"}
-        PW-R: exact sticking, or smooth for gradients; the smooth one creeps under load at up to ``tanh_deg_per_s
+        PW-R: exact stiction, or smooth for gradients; the smooth one creeps under load at up to ``tanh_deg_per_s
         atanh(load / friction)``.
 
     Raises
@@ -65,7 +65,7 @@ class PseudoWiener(SampledModel, Parameters):
     >>> time = np.arange(200) * 1e-3
     >>> run = model.simulate({"time_s": time, "duty": np.full(200, 0.4)}, initial_state={"angle_deg": 8.0})
     >>> run["angle_deg"].units
-    'deg'
+    'degree'
     >>> PseudoWiener.from_toml(model.to_toml()) == model
     True
     """

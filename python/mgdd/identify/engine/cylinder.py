@@ -187,7 +187,7 @@ def _starts(
         for name, value in values.items():
             if name not in known:
                 raise ParameterError(
-                    f"start_values: {name!r} is no parameter of a trace: must be one of {', '.join(known)}"
+                    f"start_values: {name!r} is not a parameter of a trace: must be one of {', '.join(known)}"
                 )
             setattr(burn, name, float(value))
     return burns
@@ -275,7 +275,7 @@ def _findings(fit: CylinderFit) -> tuple[Finding, ...]:
                 "early_onset",
                 tuple(load.file for load in early),
                 f"the fitted burn starts before the injection (SOC minus SOI in °CA: {each}): the burn law bends to "
-                "make up for another error of the model, so its start is no physical onset",
+                "make up for another error of the model, so its start is not a physical onset",
             )
         )
     errors = [load.imep_closed_error_percent for load in fit.loads]

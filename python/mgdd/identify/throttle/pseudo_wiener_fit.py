@@ -84,7 +84,7 @@ def fit_pseudo_wiener(
     Notes
     -----
     Output error with exact forward sensitivities on Levenberg-Marquardt. Only groups of the physical parameters can be
-    told from duty and angle: tau = J/b, G = g/J, and preload, spring and friction over the stall torque g.
+    identified from duty and angle: tau = J/b, G = g/J, and preload, spring and friction over the stall torque g.
 
     Examples
     --------
