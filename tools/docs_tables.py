@@ -17,7 +17,8 @@ from mgdd.engine import Cylinder, OperatingPoint, analyze, simulate
 from mgdd.identify import best_timing, compare_laws, wall_heat_profile
 from mgdd.identify.engine.records import CylinderFit
 from mgdd.io import pressure_trace
-from mgdd.results import ANGLE, VARIABLES
+from mgdd.results import VARIABLES
+from mgdd.results.labels import ANGLE
 from mgdd.studies import run_study
 
 __all__ = [

@@ -5,8 +5,8 @@
 #include <exception>
 
 #include "mgdd/common/units.hpp"
+#include "mgdd/throttle/models/pw_r.hpp"
 #include "mgdd/throttle/plant.hpp"
-#include "mgdd/throttle/pw_r.hpp"
 
 int main(int argc, char** argv) {
   using namespace mgdd::throttle;

@@ -25,9 +25,9 @@ hypothesis.settings.load_profile("reproducible")
 
 @functools.cache
 def _quick_study(name: str, **options: int) -> Any:
-    from mgdd import studies
+    from mgdd.studies.registry import function_of
 
-    return getattr(studies, f"run_{name.replace('-', '_')}")(quick=True, **options)
+    return function_of(name)(quick=True, **options)
 
 
 @pytest.fixture(scope="session")

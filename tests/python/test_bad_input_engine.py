@@ -191,7 +191,7 @@ def test_traces_that_cannot_be_what_they_say(spoil, match):
 def test_a_dataset_without_pressure_is_refused():
     cycle = simulate(CYLINDER, POINT)
     for call in (lambda t: analyze(t, CYLINDER), lambda t: fit_cylinder([t], CYLINDER)):
-        with pytest.raises(DataError, match=r"no pressure_bar.*read_pressure"):
+        with pytest.raises(DataError, match="no pressure_bar, it has"):
             call(cycle.drop_vars("pressure_bar"))
     with pytest.raises(DataError, match=r"peg|> 0"):
         analyze(pressure_trace(*good_trace()).assign(pressure_bar=lambda d: d.pressure_bar - 3.0), CYLINDER)

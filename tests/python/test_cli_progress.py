@@ -14,7 +14,7 @@ from mgdd import cli
 from mgdd.cli import main, output
 from mgdd.cli.progress import _INTERVAL_S, Progress
 from mgdd.errors import ParameterError
-from mgdd.studies import Table
+from mgdd.studies.sections import Table
 
 
 class Terminal(io.StringIO):

@@ -10,7 +10,8 @@ import pytest
 
 from mgdd import io, presets
 from mgdd.cli import main
-from mgdd.throttle import simulate, step_summary
+from mgdd.throttle import simulate
+from mgdd.throttle.simulation import step_summary
 
 COMMAND = ("throttle", "simulate")
 

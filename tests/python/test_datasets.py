@@ -18,7 +18,8 @@ from mgdd import datasets
 from mgdd.datasets.origins import ORIGINS, Origin
 from mgdd.errors import DataError
 from mgdd.io import read_pressure
-from mgdd.results import ANGLE, check_labels
+from mgdd.results import check_labels
+from mgdd.results.labels import ANGLE
 
 NAME = "hd_diesel_128x144"
 FILES = (f"{NAME}_traces.csv", f"{NAME}_conditions.csv", f"{NAME}_SOURCE.txt", f"{NAME}_LICENSE.txt")

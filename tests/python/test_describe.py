@@ -12,30 +12,27 @@ import numpy as np
 import pytest
 
 from mgdd import _core, datasets, presets
-from mgdd.engine import Cylinder, NoxModel, OperatingPoint, Performance, SoftSensor, optimum
+from mgdd.engine import Cylinder, NoxModel, OperatingPoint, Performance, SoftSensor, find_optimum
 from mgdd.identify import (
-    DriveModel,
     FirstPrincipleModel,
-    LinearApproximation,
     OdeModel,
-    SmoothThrottleModel,
-    SurrogateEngine,
+    SmoothThrottle,
     check_excitation,
-    chirp,
     fit_cylinder,
-    fit_surrogate,
     fit_throttle,
-    random_step_records,
-    throttle_start,
     validate_throttle,
 )
 from mgdd.io import throttle_log
-from mgdd.loop import EngineBench, SensorDynamics, run_seeker, steady_optimum
-from mgdd.optimize import ExtremumSeeking, GoldenSection, Limit, tune
+from mgdd.loop import EngineBench, SensorDynamics, find_steady_optimum, run_seeker
+from mgdd.optimize import ExtremumSeeking, FitOptions, GoldenSection, Limit, tune
 from mgdd.presets import Preset
 from mgdd.results.describe import Row, as_html, as_text, rows_of
 from mgdd.results.units import unit_of
+from mgdd.signals import chirp
 from mgdd.studies import StudyResult
+from mgdd.studies.benchmarks.drive_axis import DriveModel
+from mgdd.studies.benchmarks.wiener_hammerstein import LinearApproximation
+from mgdd.surrogate import SurrogateEngine, fit_surrogate, random_step_records
 from mgdd.throttle import PseudoWiener, SensorPair, Throttle, simulate
 
 
@@ -66,14 +63,14 @@ def objects() -> dict[str, Callable[[], Any]]:
         "seeker": lambda: ExtremumSeeking(**seeking),
         "golden": lambda: GoldenSection(**seeking, noise_sd=0.2),
         "run": lambda: run_seeker(EngineBench(), ExtremumSeeking(**seeking), 300),
-        "steady": lambda: steady_optimum(EngineBench(limits=["p_max_bar"]), {"p_max_bar": 95.0}),
-        "optimum": lambda: optimum(Cylinder(), OperatingPoint()),
+        "steady": lambda: find_steady_optimum(EngineBench(limits=["p_max_bar"]), {"p_max_bar": 95.0}),
+        "optimum": lambda: find_optimum(Cylinder(), OperatingPoint()),
         "tuning": lambda: tune(0.25, -0.1, method="batch", distance=10.0, arrival=1.0),
         "pw_r": lambda: PseudoWiener("pw_r"),
         "pw_p": lambda: PseudoWiener("pw_p", {"plays": 8.0}),
-        "first principle": lambda: FirstPrincipleModel(parameters=throttle_start()),
-        "smooth": lambda: SmoothThrottleModel(parameters=example),
-        "ode": lambda: OdeModel(derivative=print, output=print, parameters={"tau_s": 1.0}, start=(0.0,)),
+        "first principle": FirstPrincipleModel,
+        "smooth": lambda: SmoothThrottle(parameters=example),
+        "ode": lambda: OdeModel(derivative=print, output=print, parameters={"tau_s": 1.0}, initial_state=(0.0,)),
         "drive": lambda: DriveModel(parameters={"mass_kg": 95.0}, force_n_per_v=35.0),
         "filter": lambda: LinearApproximation(
             numerator=np.ones(9), denominator=np.ones(1), input_mean=0.0, output_mean=0.0, rmse=0.0
@@ -82,11 +79,11 @@ def objects() -> dict[str, Callable[[], Any]]:
         "support": lambda: surrogate().support,
         "signal": lambda: surrogate().signals["nox_ppm"],
         "lag": lambda: surrogate().signals["nox_ppm"].sensor,
-        "best": lambda: surrogate().optimum("imep_bar"),
+        "best": lambda: surrogate().find_optimum("imep_bar"),
         "surrogate engine": lambda: SurrogateEngine(surrogate()),
-        "fit": lambda: fit_throttle(log(), n_starts=1),
-        "report": lambda: fit_throttle(log(), n_starts=1).report,
-        "validation": lambda: validate_throttle(FirstPrincipleModel(parameters=throttle_start()), log()),
+        "fit": lambda: fit_throttle(log(), options=FitOptions(n_starts=1)),
+        "report": lambda: fit_throttle(log(), options=FitOptions(n_starts=1)).report,
+        "validation": lambda: validate_throttle(FirstPrincipleModel(), log()),
         "check": lambda: check_excitation(chirp(4.0, offset=0.01, amplitude=0.34), Throttle()),
         "calibration": lambda: fit_cylinder(datasets.load_hd_traces()[:1], presets.load("hd_diesel_128x144").cylinder),
     }
@@ -117,7 +114,7 @@ def test_the_text_is_short_and_the_html_whole(name: str) -> None:
     assert "object at 0x" not in repr(thing)
     markup = thing._repr_html_()
     Tags(markup)
-    assert type(thing).__name__ in markup or name in ("fit", "report")
+    assert type(thing).__name__ in markup or name in ("fit", "report", "calibration")
     assert "<td" in markup
 
 
@@ -127,7 +124,7 @@ def test_units_are_there() -> None:
     assert re.search(r"inertia_kgm2</th><td[^>]*>0\.0021</td><td[^>]*>kg m²</td>", markup)
     assert markup.count("<tr>") == len(Throttle.fields())
     assert "bore_mm 86 mm" in repr(presets.load("puma_single"))
-    assert "rmse_percent.pressure_a25_bar 0." in repr(objects()["calibration"]())
+    assert "% of p_max" in repr(objects()["calibration"]())
 
 
 def test_a_record_of_the_core_still_evaluates_to_itself() -> None:

@@ -101,10 +101,7 @@ def test_variables_table_is_complete() -> None:
 
 
 # --- names --------------------------------------------------------------------------------------------------
-ROOMS = [
-    *sorted(m.name for m in pkgutil.iter_modules(mgdd.__path__) if not m.name.startswith("_")),
-    "studies.benchmarks",
-]
+ROOMS = sorted(m.name for m in pkgutil.iter_modules(mgdd.__path__) if not m.name.startswith("_"))
 
 
 def public() -> list[tuple[str, str, object]]:

@@ -154,7 +154,7 @@ def test_start_is_checked_before_the_fit() -> None:
         fit_cylinder(trace, HD, start_values=[{"second_fraction": 5.0}])
     with pytest.raises(ParameterError, match="fuel_heat_j"):
         fit_cylinder(trace, HD, start_values=[{"fuel_heat_j": math.nan}])
-    with pytest.raises(ShapeError, match="list of them"):
+    with pytest.raises(ShapeError, match="list of traces"):
         fit_cylinder(trace[0], HD)
     assert fit_cylinder(trace, HD).report.success
 

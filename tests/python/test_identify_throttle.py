@@ -59,7 +59,7 @@ def test_a_fit_says_how_good_it_is(kind: str, train: Any, test_log: Any, tmp_pat
     saved = ParameterFile.from_toml(fit.to_toml())
     assert ParameterFile.from_toml(saved.to_toml()) == saved
     assert saved.notes["source"] == "fitted to chirp.csv"
-    assert saved.tables["fit"]["fit_percent_train"].value == fit.fit_percent_train
+    assert saved.tables["fit"]["fit_percent_train"].value == fit.train.nrmse_fit_percent
     errors = dict(zip(fit.report.names, fit.report.stderr, strict=True))
     kept = {name: entry.stderr for name, entry in saved.tables["parameters"].items() if entry.stderr is not None}
     assert set(kept.values()) == {error for error in errors.values() if np.isfinite(error)}
@@ -83,7 +83,7 @@ def test_a_lag_of_the_current_is_kept_only_where_it_pays() -> None:
         )
         assert with_lag < without
         assert (with_lag < 0.97 * without) is kept
-        fit = identify_throttle(log, "first_principle", starts=1)
+        fit = identify_throttle(log, "first_principle", options=FitOptions(n_starts=1))
         assert (fit.parameters["electrical_s"] > 0.0) is kept
         assert fit.report.rmse == pytest.approx(with_lag if kept else without, rel=1e-9)
 

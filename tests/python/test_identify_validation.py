@@ -13,8 +13,10 @@ from hypothesis.extra.numpy import arrays
 from mgdd import identify, signals
 from mgdd.errors import DataError, ParameterError, ShapeError
 from mgdd.identify.throttle.record_content import open_questions, record_content
+from mgdd.identify.throttle.validation import ThrottleValidation
 from mgdd.io import throttle_log
 from mgdd.optimize import FitOptions
+from mgdd.signals.metrics import mse
 from mgdd.signals.model import RunInputs, SampledModel
 from mgdd.throttle import Throttle, simulate
 
@@ -32,7 +34,7 @@ def test_the_metrics_have_their_fixed_points(y: np.ndarray, offset: float) -> No
     assert signals.nrmse_fit_percent(y - y.mean(), -(y - y.mean())) == pytest.approx(-100.0, abs=1e-9)
     assert signals.vaf_percent(y, y + offset) == pytest.approx(100.0, abs=1e-9)
     assert signals.rmse(y, y + offset) == pytest.approx(abs(offset), rel=1e-9, abs=1e-9)
-    assert signals.mse(y, y + offset) == pytest.approx(offset**2, rel=1e-9, abs=1e-9)
+    assert mse(y, y + offset) == pytest.approx(offset**2, rel=1e-9, abs=1e-9)
 
 
 def test_the_metrics_exactly() -> None:
@@ -50,9 +52,9 @@ def test_the_metrics_refuse_what_has_no_answer() -> None:
     with pytest.raises(DataError, match="second signal, sample 2: nan"):
         signals.rmse(np.zeros(4), [0.0, 0.0, np.nan, 0.0])
     with pytest.raises(ShapeError, match="must be equal"):
-        signals.mse(np.zeros(4), np.zeros(5))
+        mse(np.zeros(4), np.zeros(5))
     with pytest.raises(ShapeError, match="not empty"):
-        signals.mse([], [])
+        mse([], [])
 
 
 def test_white_residuals_pass_as_often_as_they_should() -> None:
@@ -157,16 +159,17 @@ class Wrong(Proportional):
         super().__init__()
         self.error_deg = error_deg
 
-    def simulate(self, time_s: Any, duty: Any, *, start_deg: float) -> np.ndarray:
-        return super().simulate(time_s, duty, start_deg=start_deg) + self.error_deg
+    def _run(self, run: RunInputs) -> np.ndarray:
+        return super()._run(run) + self.error_deg
 
-    def predict(self, time_s: Any, duty: Any, angle_deg: Any, horizon: int) -> np.ndarray:
-        right = super().simulate(time_s, duty, start_deg=angle_deg[0])
-        return np.asarray(right[horizon:] + self.error_deg[:-horizon])
+    def predict(self, record: Any, horizon: int) -> Any:
+        state = {"angle_deg": float(record["angle_deg"][0])}
+        right = Proportional().simulate(record, initial_state=state).isel(time_s=slice(horizon, None))
+        return right.assign(angle_deg=right["angle_deg"] + self.error_deg[:-horizon])
 
 
 def test_the_first_50_ms_count_for_nothing_and_the_next_sample_counts() -> None:
-    def validated(first: int, last: int) -> identify.ThrottleValidation:
+    def validated(first: int, last: int) -> ThrottleValidation:
         error = np.zeros(TIME.size)
         error[first:last] = 6.0
         # A little noise in the log keeps the residual tests defined.
@@ -174,11 +177,11 @@ def test_the_first_50_ms_count_for_nothing_and_the_next_sample_counts() -> None:
         return identify.validate_throttle(Wrong(error), log(noisy))
 
     start, later = validated(0, 50), validated(50, 51)
-    assert start.rmse_deg < 1e-5
-    assert start.fit_percent > 99.99
+    assert start.quality.rmse < 1e-5
+    assert start.quality.nrmse_fit_percent > 99.99
     assert float(start.n_step["n_step_rms_deg"].sel(predictor="pw_r").max()) < 1e-5
     counted = TIME.size - 50
-    assert later.rmse_deg == pytest.approx(6.0 / np.sqrt(counted), rel=1e-3)
+    assert later.quality.rmse == pytest.approx(6.0 / np.sqrt(counted), rel=1e-3)
     for horizon, rms in zip((5, 20, 50), later.n_step["n_step_rms_deg"].sel(predictor="pw_r").to_numpy(), strict=True):
         assert rms == pytest.approx(6.0 / np.sqrt(counted - horizon), rel=1e-3)
 
@@ -191,9 +194,9 @@ def test_the_residual_is_compared_with_the_duty_that_was_held_while_it_arose() -
     noise = 0.05 * RNG.standard_normal(TIME.size)
 
     class Held(Proportional):
-        def predict(self, time_s: Any, duty: Any, angle_deg: Any, horizon: int) -> np.ndarray:
-            ahead = super().predict(time_s, duty, angle_deg, horizon)
-            return np.asarray(ahead - (missed + noise)[horizon:])
+        def predict(self, record: Any, horizon: int) -> Any:
+            ahead = super().predict(record, horizon)
+            return ahead.assign(angle_deg=ahead["angle_deg"] - (missed + noise)[horizon:])
 
     tests = identify.validate_throttle(Held(), log(duty=duty)).tests
     correlation = tests.correlations["cross_correlation"]

@@ -16,7 +16,8 @@ from scipy import linalg, signal
 
 from mgdd.engine import Cylinder, OperatingPoint, simulate
 from mgdd.errors import DataError, ParameterError, ShapeError
-from mgdd.optimize import ConvergenceReport, IterativeLearning
+from mgdd.optimize import IterativeLearning
+from mgdd.optimize.iterative_learning import ConvergenceReport
 from mgdd.results import check_labels
 
 

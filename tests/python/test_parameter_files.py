@@ -10,6 +10,7 @@ from typing import Any
 
 import numpy as np
 import pytest
+import xarray as xr
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
@@ -17,29 +18,20 @@ from mgdd import _core, presets
 from mgdd.engine import Cylinder, OperatingPoint
 from mgdd.engine import simulate as simulate_cycle
 from mgdd.errors import DataError, ParameterError
-from mgdd.identify import (
-    DriveModel,
-    EngineSurrogate,
-    FirstPrincipleModel,
-    LinearApproximation,
-    OdeModel,
-    SmoothThrottleModel,
-    SurrogateEngine,
-    TwoTanksModel,
-    WienerHammersteinModel,
-    fit_surrogate,
-    load_throttle_model,
-    random_step_records,
-    throttle_start,
-)
+from mgdd.identify import FirstPrincipleModel, OdeModel, SmoothThrottle, load_throttle_model
+from mgdd.identify.throttle.first_principle_model import TYPICAL
 from mgdd.io import ParameterFile
 from mgdd.io.parameters import Entry, Wanted
 from mgdd.presets import Preset
+from mgdd.studies.benchmarks.drive_axis import DriveModel
+from mgdd.studies.benchmarks.two_tanks import TwoTanksModel
+from mgdd.studies.benchmarks.wiener_hammerstein import LinearApproximation, WienerHammersteinModel
+from mgdd.surrogate import EngineSurrogate, SurrogateEngine, fit_surrogate, random_step_records
 from mgdd.throttle import PseudoWiener, SensorPair, Throttle, sense, simulate
 
 TIME = 1e-3 * np.arange(300)
 DUTY = 0.1 + 0.5 * np.sin(2.0 * np.pi * TIME * (2.0 + 20.0 * TIME))
-GROUPS = throttle_start()
+GROUPS = dict(TYPICAL)
 
 
 def span(low: float, high: float) -> st.SearchStrategy[float]:
@@ -77,7 +69,9 @@ def pseudo_wiener(draw: st.DrawFn) -> PseudoWiener:
         options["switching"] = draw(st.sampled_from(["predicted", "measured"]))
         options["friction"] = draw(st.sampled_from(["set_valued", "tanh"]))
         values |= {"substeps": float(draw(st.integers(1, 6))), "ramp_deg": draw(span(0.05, 1.5))}
-        values |= {"tanh_deg_per_s": draw(span(0.5, 20.0))}
+        values |= {"tanh_deg_per_s": draw(span(0.5, 20.0)), "dead_band_deg": draw(span(0.0, 1.0))}
+    if kind == "pw_w":
+        values |= {"knot_lower_duty": draw(span(-0.5, -0.2)), "knot_upper_duty": draw(span(0.2, 0.6))}
     if kind == "pw_p":
         values["plays"] = float(draw(st.integers(1, 8)))
     base = dict(PseudoWiener(kind, values, **options).parameters)
@@ -88,9 +82,9 @@ def pseudo_wiener(draw: st.DrawFn) -> PseudoWiener:
 
 
 @st.composite
-def smooth(draw: st.DrawFn) -> SmoothThrottleModel:
+def smooth(draw: st.DrawFn) -> SmoothThrottle:
     example = dict(zip(_core.smooth_throttle_names, _core.smooth_throttle_example, strict=True))
-    return SmoothThrottleModel(
+    return SmoothThrottle(
         parameters=example | changed(draw, example, list(example)),
         inertia_kgm2=draw(span(1e-3, 5e-3)),
         gear_ratio=draw(span(10.0, 30.0)),
@@ -109,14 +103,24 @@ def test_a_throttle_model_simulates_bit_for_bit_after_a_file(model: Any, start_d
     assert again == model
     assert again.to_toml() == model.to_toml()
     step = TIME * (model.parameters.get("sample_s", 1e-3) / 1e-3)
-    np.testing.assert_array_equal(
-        again.simulate(step, DUTY, start_deg=start_deg), model.simulate(step, DUTY, start_deg=start_deg)
-    )
+    state = [math.radians(start_deg), 0.0, 0.0] if model.kind == "smooth" else {"angle_deg": start_deg}
+    one, two = (m.simulate({"time_s": step, "duty": DUTY}, initial_state=state) for m in (again, model))
+    xr.testing.assert_identical(one, two)
 
 
 def test_stops_ramp_and_substeps_of_a_first_principle_model_come_back() -> None:
     model = FirstPrincipleModel(parameters=GROUPS, closed_deg=2.0, open_deg=60.0, ramp_deg=1.0, substeps=5)
     assert FirstPrincipleModel.from_toml(model.to_toml()) == model
+
+
+def test_a_value_outside_its_domain_names_the_file(tmp_path: Path) -> None:
+    model, file = FirstPrincipleModel(parameters=GROUPS), tmp_path / "model.toml"
+    file.write_text(model.to_toml().replace("tau_s = { value = 0.03", "tau_s = { value = -0.03"), encoding="utf-8")
+    with pytest.raises(ParameterError, match=r"model\.toml: tau_s = -0\.03: must be > 0"):
+        load_throttle_model(file)
+    pair = SensorPair().to_toml().replace("adc_bits = { value = 12", "adc_bits = { value = 99")
+    with pytest.raises(ParameterError, match=r"^pair\.toml: adc_bits = 99"):
+        SensorPair.from_toml(pair, origin="pair.toml")
 
 
 def test_a_file_of_a_model_is_loaded_whatever_its_kind(tmp_path: Path) -> None:
@@ -186,27 +190,28 @@ def second(x: Any, _: Any, p: Any) -> Any:
 
 
 def test_an_ode_model_comes_back_with_its_functions() -> None:
-    model = OdeModel(derivative=lag, output=second, parameters={"gain": 2.1, "time_s": 1 / 3}, start=(0.1,), substeps=3)
+    model = OdeModel(
+        derivative=lag, output=second, parameters={"gain": 2.1, "time_s": 1 / 3}, initial_state=(0.1,), substeps=3
+    )
     again = OdeModel.from_toml(model.to_toml(), derivative=lag, output=second)
     assert again == model
-    np.testing.assert_array_equal(again.simulate(TIME, DUTY), model.simulate(TIME, DUTY))
+    inputs = {"time_s": TIME, "u": DUTY}
+    xr.testing.assert_identical(again.simulate(inputs), model.simulate(inputs))
     with pytest.raises(ParameterError, match="output = _first_state: text was written with second; give that function"):
         OdeModel.from_toml(model.to_toml(), derivative=lag)
 
 
 def test_benchmark_models_come_back() -> None:
     drive = DriveModel(parameters={"mass_kg": 95.0, "coulomb_n": 20.0, "stribeck_n": 1 / 3}, force_n_per_v=35.1)
-    runs = [m.simulate(TIME, 3.0 * DUTY) for m in (drive, DriveModel.from_toml(drive.to_toml()))]
-    np.testing.assert_array_equal(*runs)
+    inputs = {"time_s": TIME, "drive_v": 3.0 * DUTY, "pump_v": 2.0 + DUTY, "input_v": DUTY}
+    xr.testing.assert_identical(drive.simulate(inputs), DriveModel.from_toml(drive.to_toml()).simulate(inputs))
     names = _core.TwoTanks.parameter_names
     tanks = TwoTanksModel(
         parameters=dict(zip(names, (0.05, 0.05, 0.5, 0.05, 0.5, -0.1, 9.0, 0.4, 1.0), strict=True)), lower_brim_v=8.0
     )
-    runs = [
-        m.simulate(2.0 + DUTY, dt_s=4.0, start_upper_v=1.0, start_lower_v=2.0)
-        for m in (tanks, TwoTanksModel.from_toml(tanks.to_toml()))
-    ]
-    np.testing.assert_array_equal(*runs)
+    slow = {**inputs, "time_s": 4.0 * np.arange(TIME.size)}
+    runs = [m.simulate(slow, initial_state=[1.0, 2.0]) for m in (tanks, TwoTanksModel.from_toml(tanks.to_toml()))]
+    xr.testing.assert_identical(*runs)
     linear = LinearApproximation(
         numerator=np.array([0.5, 0.1]), denominator=np.array([1.0, -1 / 3]), input_mean=0.1, output_mean=1.0, rmse=0.2
     )
@@ -216,7 +221,7 @@ def test_benchmark_models_come_back() -> None:
     )  # fmt: skip
     for model in (linear, circuit):
         again = type(model).from_toml(model.to_toml())
-        np.testing.assert_array_equal(again.simulate(DUTY), model.simulate(DUTY))
+        xr.testing.assert_identical(again.simulate(inputs), model.simulate(inputs))
 
 
 @pytest.fixture(scope="module")
@@ -314,7 +319,7 @@ def test_any_number_and_text_come_back(value: float, text: str) -> None:
         ("0.30000000000000004", "[1]", ParameterError, r"tau_s: value = \[1\]: must be a number"),
         ("1e-17", '"small"', ParameterError, r"tau_s: stderr = 'small': must be a number"),
         ("[parameters]", "[parameter]", ParameterError, r"unknown key 'parameter': did you mean '\[parameters\]'\?"),
-        ("empty = []", "emtpy = []", ParameterError, "unknown key 'emtpy': did you mean 'empty'"),
+        ("empty = []", "emptys = []", ParameterError, "unknown key 'emptys': did you mean 'empty'"),
         ("[parameters]", "[parameters", DataError, "a.toml: not valid TOML"),
     ],
 )

@@ -14,6 +14,7 @@ import mgdd
 from mgdd import datasets, io
 from mgdd.cli.main import main
 from mgdd.engine import Cylinder, OperatingPoint, simulate, timing_sweep
+from mgdd.io.traces import write_traces
 from mgdd.throttle import Throttle, sense
 from mgdd.throttle import simulate as simulate_throttle
 
@@ -40,7 +41,7 @@ def of_log(path: Path) -> xr.Dataset:
 def of_traces(dataset: Callable[[], xr.Dataset]) -> Callable[[Path], xr.Dataset]:
     def write(path: Path) -> xr.Dataset:
         made = dataset()
-        io.write_traces(made, path)
+        write_traces(made, path)
         return made
 
     return write

@@ -16,7 +16,8 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from mgdd.errors import ConvergenceError, DataError, Error, ParameterError, ShapeError
-from mgdd.results import ANGLE, VARIABLES, check_labels, labelled_dataset, to_jsonable
+from mgdd.results import VARIABLES, check_labels, labelled_dataset
+from mgdd.results.labels import ANGLE, to_jsonable
 
 
 def cycle(**extra):

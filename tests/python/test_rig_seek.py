@@ -12,7 +12,9 @@ import pytest
 
 from mgdd.engine import OperatingPoint, Performance
 from mgdd.errors import DataError, Interrupted, ParameterError, RigError
-from mgdd.loop import AnnouncingPlant, EngineBench, LoopCriteria, Measurement, run_seeker, summarize_cycles
+from mgdd.loop import EngineBench, LoopCriteria, Measurement, run_seeker
+from mgdd.loop.plant import AnnouncingPlant
+from mgdd.loop.summary import summarize_cycles
 from mgdd.optimize import (
     BoundedSeeking,
     ComponentLag,

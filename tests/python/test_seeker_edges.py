@@ -8,15 +8,8 @@ import numpy as np
 import pytest
 
 from mgdd.errors import ParameterError, ShapeError
-from mgdd.loop import (
-    EngineBench,
-    LoopCriteria,
-    find_steady_optimum,
-    monte_carlo,
-    run_seeker,
-    steady_map,
-    summarize_cycles,
-)
+from mgdd.loop import EngineBench, LoopCriteria, find_steady_optimum, monte_carlo, run_seeker, steady_map
+from mgdd.loop.summary import summarize_cycles
 from mgdd.optimize import (
     BoundedSeeking,
     ComponentLag,

@@ -11,7 +11,8 @@ import pytest
 
 from mgdd.errors import ParameterError
 from mgdd.results import check_labels
-from mgdd.studies import StudyResult, run_sensor_delay, run_study
+from mgdd.studies import StudyResult, run_study
+from mgdd.studies.sensor_delay import run_sensor_delay
 
 KEYS = ["case", "period_cycles", "phase_deg", "step_sign", "cycles_stays", "final_cad"]
 

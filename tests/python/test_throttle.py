@@ -18,12 +18,12 @@ from mgdd.throttle import (
     groups,
     holding_duty,
     linear_part,
-    mass_flow_kg_per_s,
     sense,
     simulate,
     simulate_many,
-    step_summary,
 )
+from mgdd.throttle.characteristics import mass_flow_kg_per_s
+from mgdd.throttle.simulation import step_summary
 
 P1 = Throttle()
 BARE = P1.replace(coulomb_nm=0.0, stiction_nm=0.0, preload_above_nm=0.0, preload_below_nm=0.0, inductance_mh=0.0)

@@ -9,7 +9,8 @@ from typing import Any
 from mgdd.cli.options import add_command
 from mgdd.cli.output import check_output, emit
 from mgdd.report import write_report
-from mgdd.studies import Table, run_measured_traces
+from mgdd.studies import run_measured_traces
+from mgdd.studies.sections import Table
 
 __all__ = ["add"]
 

@@ -10,8 +10,9 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from mgdd.errors import ParameterError
-from mgdd.io import write_traces
-from mgdd.results import VARIABLES, to_jsonable
+from mgdd.io.traces import write_traces
+from mgdd.results import VARIABLES
+from mgdd.results.labels import to_jsonable
 from mgdd.studies.sections import Table
 
 if TYPE_CHECKING:

@@ -15,7 +15,8 @@ from mgdd.cli.output import Stopped, check_figure, check_output, emit
 from mgdd.cli.seekers import Task, default_cycles, make_seeker
 from mgdd.engine import Performance
 from mgdd.errors import ConvergenceError, Interrupted, ParameterError
-from mgdd.loop import EngineBench, LoopCriteria, LoopRun, find_steady_optimum, run_seeker
+from mgdd.loop import EngineBench, LoopCriteria, find_steady_optimum, run_seeker
+from mgdd.loop.plant_loop import LoopRun
 from mgdd.optimize import Optimum
 from mgdd.results import VARIABLES
 

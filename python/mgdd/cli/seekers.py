@@ -9,17 +9,8 @@ from typing import TYPE_CHECKING, Any
 
 from mgdd.errors import ParameterError
 from mgdd.loop import steady_map
-from mgdd.optimize import (
-    BoundedSeeking,
-    ComponentLag,
-    ExtremumSeeking,
-    GoldenSection,
-    Limit,
-    NewtonSeeking,
-    Spsa,
-    Tuning,
-    tune,
-)
+from mgdd.optimize import BoundedSeeking, ComponentLag, ExtremumSeeking, GoldenSection, Limit, NewtonSeeking, Spsa, tune
+from mgdd.optimize.tuning import Tuning
 
 if TYPE_CHECKING:
     from mgdd.loop import EngineBench

@@ -12,8 +12,8 @@ from mgdd.cli.options import add_command
 from mgdd.cli.output import check_output, emit
 from mgdd.errors import ParameterError
 from mgdd.report import write_report
-from mgdd.studies import Table, available_studies, run_study
-from mgdd.studies.sections import cells, column_names
+from mgdd.studies import available_studies, run_study
+from mgdd.studies.sections import Table, cells, column_names
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure

@@ -17,6 +17,8 @@ from mgdd.identify.throttle.excitation_design import EXCITATIONS
 if TYPE_CHECKING:
     import xarray as xr
 
+    from mgdd.identify.throttle.excitation_check import ExcitationCheck
+
 __all__ = ["add"]
 
 # Options that only some of the signals have, as the arguments of their functions.
@@ -109,9 +111,9 @@ def _excite(args: argparse.Namespace) -> None:
     emit(args, payload, text=_text(args.kind, attrs, check), traces=_table(args.output, check))
 
 
-def _text(kind: str, attrs: dict[str, Any], check: identify.ExcitationCheck) -> str:
+def _text(kind: str, attrs: dict[str, Any], check: ExcitationCheck) -> str:
     return f"{kind}, offset {attrs['offset']:.4g}, amplitude {attrs['amplitude']:.4g}\n{check.summary()}"
 
 
-def _table(output: str | None, check: identify.ExcitationCheck) -> xr.Dataset | None:
+def _table(output: str | None, check: ExcitationCheck) -> xr.Dataset | None:
     return check.prediction if output is not None and Path(output).suffix == ".csv" else None

@@ -15,7 +15,8 @@ from mgdd.errors import DataError, ParameterError
 from mgdd.io.table import read_table
 from mgdd.io.throttle_checks import Place
 from mgdd.signals.even_grid import even_step
-from mgdd.throttle import simulate, step_summary
+from mgdd.throttle import simulate
+from mgdd.throttle.simulation import step_summary
 
 if TYPE_CHECKING:
     import xarray as xr
@@ -131,9 +132,9 @@ def _check_rows(columns: dict[str, Any], place: Place) -> None:
 def _draw(run: xr.Dataset, file: str) -> None:
     from matplotlib.figure import Figure
 
-    from mgdd import plot
+    from mgdd.plot.throttle_run import throttle_run
 
     figure = Figure(figsize=(7.0, 5.4), layout="constrained")
-    plot.throttle_run(run, ax=figure.add_subplot())
+    throttle_run(run, ax=figure.add_subplot())
     figure.savefig(file, dpi=150)
     print(f"wrote {file}", file=sys.stderr)

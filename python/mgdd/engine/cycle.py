@@ -10,7 +10,8 @@ import numpy as np
 
 from mgdd import _core
 from mgdd._core import Cylinder, NoxProxy, OperatingPoint
-from mgdd.results import ANGLE, VARIABLES, labelled_dataset
+from mgdd.results import VARIABLES, labelled_dataset
+from mgdd.results.labels import ANGLE
 
 if TYPE_CHECKING:
     import xarray as xr

@@ -9,7 +9,8 @@ from mgdd import _core
 from mgdd._core import Cylinder, OperatingPoint
 from mgdd.errors import ParameterError
 from mgdd.io.trace_forms import as_trace
-from mgdd.results import ANGLE, labelled_dataset
+from mgdd.results import labelled_dataset
+from mgdd.results.labels import ANGLE
 
 if TYPE_CHECKING:
     import xarray as xr

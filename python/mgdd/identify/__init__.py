@@ -10,9 +10,9 @@ from __future__ import annotations
 from mgdd.identify.engine.best_timing import best_timing
 from mgdd.identify.engine.burn_laws import compare_laws
 from mgdd.identify.engine.cylinder import fit_cylinder
-from mgdd.identify.engine.profile import WallHeatProfile, wall_heat_profile
+from mgdd.identify.engine.profile import wall_heat_profile
 from mgdd.identify.ode_fit import OdeModel, fit_ode
-from mgdd.identify.throttle.excitation_check import ExcitationCheck, check_excitation
+from mgdd.identify.throttle.excitation_check import check_excitation
 from mgdd.identify.throttle.excitation_design import design_excitation
 from mgdd.identify.throttle.first_principle import fit_throttle
 from mgdd.identify.throttle.first_principle_model import FirstPrincipleModel
@@ -22,19 +22,14 @@ from mgdd.identify.throttle.n_step import n_step_rms, split_log
 from mgdd.identify.throttle.online_update import OnlineUpdate
 from mgdd.identify.throttle.physical_parameters import physical_parameters
 from mgdd.identify.throttle.pseudo_wiener_fit import fit_pseudo_wiener
-from mgdd.identify.throttle.record_content import RecordContent
 from mgdd.identify.throttle.smooth import SmoothThrottle, fit_smooth_throttle
-from mgdd.identify.throttle.validation import ThrottleValidation, validate_throttle
+from mgdd.identify.throttle.validation import validate_throttle
 
 __all__ = [
-    "ExcitationCheck",
     "FirstPrincipleModel",
     "OdeModel",
     "OnlineUpdate",
-    "RecordContent",
     "SmoothThrottle",
-    "ThrottleValidation",
-    "WallHeatProfile",
     "best_timing",
     "check_excitation",
     "compare_laws",

@@ -75,7 +75,7 @@ def check_trace(
     Examples
     --------
     >>> import numpy as np
-    >>> from mgdd.io import check_trace
+    >>> from mgdd.io.checks import check_trace
     >>> angle = np.arange(-30.0, 31.0)
     >>> _, pressure = check_trace(angle, 6e6 - 1000.0 * angle**2, unit="Pa")
     >>> float(pressure.max())

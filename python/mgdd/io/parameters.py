@@ -8,79 +8,25 @@ from __future__ import annotations
 
 import difflib
 import errno
-import re
 import tomllib
 from collections.abc import Collection, Iterable, Mapping
 from dataclasses import dataclass, field, replace
 from pathlib import Path
-from types import MappingProxyType
-from typing import TYPE_CHECKING, Any, Literal, NamedTuple, Self
+from typing import TYPE_CHECKING, Any, Self
 
 import numpy as np
 
 from mgdd.errors import DataError, ParameterError
-from mgdd.results.units import unit_of
+from mgdd.io.parameter_entries import FORMS, PARTS, Entry, Wanted, entries, entry_of, fits, key_line, quoted, wanted
 
 if TYPE_CHECKING:
     import os
 
 __all__ = ["Entry", "ParameterFile", "Parameters", "Wanted", "entries", "wanted"]
 
-Form = Literal["number", "integer", "flag", "text", "numbers", "texts"]
 FORMAT = 1
 FIT_NOTES = ("source", "unidentifiable")  # what a fit says beside its model, in a table [fit] too
 _HEAD = ("kind", "format")
-_PARTS = ("value", "unit", "stderr", "source")
-
-
-class Wanted(NamedTuple):
-    """What a reader expects of one key.
-
-    Parameters
-    ----------
-    unit : str
-        The unit that must stand there.
-    form : {"number", "integer", "flag", "text", "numbers", "texts"}
-        Type of the value; ``numbers`` is a list of numbers, or a list of such lists.
-    required : bool
-        Whether the key must be there.
-    """
-
-    unit: str = "-"
-    form: Form = "number"
-    required: bool = True
-
-
-_FORMS = {
-    "number": "a number",
-    "integer": "a whole number",
-    "flag": "true or false",
-    "text": "text in quotes",
-    "numbers": "a list of numbers",
-    "texts": "a list of texts in quotes",
-}
-
-
-@dataclass(frozen=True, kw_only=True)
-class Entry:
-    """One value of a parameter file.
-
-    Parameters
-    ----------
-    value : float, int, bool, str or list
-        The value; lists hold numbers, or lists of numbers.
-    unit : str or None
-        Its unit, ``"-"`` if dimensionless; None where the file does not say it.
-    stderr : float, optional
-        Standard error, in the same unit.
-    source : str, optional
-        Where the value comes from.
-    """
-
-    value: Any
-    unit: str | None = "-"
-    stderr: float | None = None
-    source: str | None = None
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -157,14 +103,14 @@ class ParameterFile:
 
     def to_toml(self) -> str:
         """Write TOML with one line per value; numbers come back bit for bit."""
-        out = [_line("kind", self.kind), _line("format", FORMAT)]
-        out += [_line(name, value) for name, value in self.notes.items()]
+        out = [key_line("kind", self.kind), key_line("format", FORMAT)]
+        out += [key_line(name, value) for name, value in self.notes.items()]
         for table, values in self.tables.items():
-            out += ["", f"[{_key(table)}]"]
+            out += ["", f"[{quoted(table)}]"]
             for key, entry in values.items():
-                said = {part: getattr(entry, part) for part in _PARTS}
-                parts = ", ".join(_line(part, value) for part, value in said.items() if value is not None)
-                out.append(f"{_key(key)} = {{ {parts} }}")
+                said = {part: getattr(entry, part) for part in PARTS}
+                parts = ", ".join(key_line(part, value) for part, value in said.items() if value is not None)
+                out.append(f"{quoted(key)} = {{ {parts} }}")
         return "\n".join(out) + "\n"
 
     @classmethod
@@ -191,7 +137,7 @@ class ParameterFile:
                 "the file follows the page Formats, or update mgdd"
             )
         tables = {
-            name: {key: _entry(entry) for key, entry in table.items()}
+            name: {key: entry_of(entry) for key, entry in table.items()}
             for name, table in data.items()
             if isinstance(table, dict)
         }
@@ -273,18 +219,14 @@ class ParameterFile:
             for part, value, need in (
                 ("value", entry.value, form), ("stderr", entry.stderr, "number"), ("source", entry.source, "text"),
             ):  # fmt: skip
-                if not (_fits(value, need) or (part != "value" and value is None)):
-                    raise ParameterError(f"{where}: {part} = {_short(value)}: must be {_FORMS[need]}")
+                if not (fits(value, need) or (part != "value" and value is None)):
+                    raise ParameterError(f"{where}: {part} = {_short(value)}: must be {FORMS[need]}")
             out[key] = float(entry.value) if form == "number" else entry.value
         missing = [key for key, want in wanted.items() if want.required and key not in found]
         if missing:
             example = _example(missing[0], wanted[missing[0]].unit)
             raise DataError(f"{self.origin}: [{table}] lacks {', '.join(missing)}: write {example}")
         return out
-
-    def with_notes(self, **notes: Any) -> ParameterFile:
-        """Give a copy with further notes."""
-        return replace(self, notes={**self.notes, **notes})
 
 
 class Parameters:
@@ -332,70 +274,21 @@ class Parameters:
         ParameterError
             An unknown key, another unit, a wrong type, a value outside its domain.
         """
-        return cls.from_parameters(ParameterFile.from_toml(text, origin=origin))
+        return cls.of_file(ParameterFile.from_toml(text, origin=origin))
 
-
-def entries(
-    values: Mapping[str, Any], units: Mapping[str, str] = MappingProxyType({}), **common: Any
-) -> dict[str, Entry]:
-    """Make the entries of a table: units as given, else as the names end; `common` goes into each."""
-    return {
-        name: Entry(value=_plain(value), unit=units.get(name, unit_of(name)), **common)
-        for name, value in values.items()
-    }
-
-
-def wanted(
-    names: Iterable[str], units: Mapping[str, str] = MappingProxyType({}), form: Form = "number"
-) -> dict[str, Wanted]:
-    """Ask for keys of one form, all required: units as given, else as the names end."""
-    return {name: Wanted(units.get(name, unit_of(name)), form) for name in names}
-
-
-def _plain(value: Any) -> Any:
-    if isinstance(value, np.ndarray | np.generic):
-        return value.tolist()
-    return list(value) if isinstance(value, tuple) else value
-
-
-def _entry(entry: Any) -> Entry:
-    """Take an entry as it stands; what is not one has no unit, which `ParameterFile.values` refuses."""
-    if not isinstance(entry, dict) or "value" not in entry or not set(entry) <= set(_PARTS):
-        return Entry(value=entry, unit=None)
-    return Entry(**{"unit": None, **entry})
-
-
-def _fits(value: Any, form: str) -> bool:
-    if form == "numbers":
-        rows = value if isinstance(value, list) else [None]
-        return all(_fits(row, "numbers" if isinstance(row, list) else "number") for row in rows)
-    if form == "texts":
-        return isinstance(value, list) and all(isinstance(item, str) for item in value)
-    if form in ("number", "integer"):
-        types: tuple[type, ...] = (int, float) if form == "number" else (int,)
-        return isinstance(value, types) and not isinstance(value, bool)
-    return isinstance(value, bool if form == "flag" else str)
-
-
-def _line(key: str, value: Any) -> str:
-    """Write ``key = value`` on one line; lists of lists get a line per row."""
-    import tomli_w
-
-    # Strings escape their line breaks, so those left belong to lists.
-    text = re.sub(r",\n\s*\]", "]", tomli_w.dumps({key: value}).rstrip("\n"))
-    text = re.sub(r"\[\n\s*", "[", text)
-    text = re.sub(r",\n\s*", ", ", text)
-    rows = isinstance(value, list) and any(isinstance(row, list) for row in value)
-    return text.replace("], [", "],\n  [") if rows else text
-
-
-def _key(name: str) -> str:
-    """Quote a key where TOML needs it."""
-    return _line(name, 0).removesuffix(" = 0")
+    @classmethod
+    def of_file(cls, file: ParameterFile) -> Self:
+        """Make the object of a file that was read; every refusal names the file."""
+        try:
+            return cls.from_parameters(file)
+        except ParameterError as error:
+            if str(error).startswith(f"{file.origin}: "):
+                raise
+            raise ParameterError(f"{file.origin}: {error}") from error
 
 
 def _example(key: str, unit: str) -> str:
-    return f'{_key(key)} = {{ value = ..., unit = "{unit}", source = "..." }}'
+    return f'{quoted(key)} = {{ value = ..., unit = "{unit}", source = "..." }}'
 
 
 def _near(name: str, known: Iterable[str]) -> str:

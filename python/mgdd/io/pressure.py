@@ -11,7 +11,8 @@ from mgdd.errors import DataError
 from mgdd.io.angles import aligned_angle
 from mgdd.io.checks import ANGLE_UNITS, PRESSURE_UNITS, check_choice, check_trace
 from mgdd.io.table import read_table
-from mgdd.results import ANGLE, check_labels, labelled_dataset
+from mgdd.results import check_labels, labelled_dataset
+from mgdd.results.labels import ANGLE
 
 if TYPE_CHECKING:
     import os

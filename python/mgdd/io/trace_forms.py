@@ -10,7 +10,7 @@ import numpy as np
 
 from mgdd.errors import DataError
 from mgdd.io.pressure import pressure_trace, read_pressure
-from mgdd.results import ANGLE
+from mgdd.results.labels import ANGLE
 
 if TYPE_CHECKING:
     import xarray as xr

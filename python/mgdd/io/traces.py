@@ -41,7 +41,7 @@ def write_traces(dataset: xr.Dataset, path: str | os.PathLike[str]) -> None:
     --------
     >>> import pathlib, tempfile
     >>> from mgdd.engine import Cylinder, OperatingPoint, simulate
-    >>> from mgdd.io import write_traces
+    >>> from mgdd.io.traces import write_traces
     >>> with tempfile.TemporaryDirectory() as folder:
     ...     file = pathlib.Path(folder) / "cycle.csv"
     ...     write_traces(simulate(Cylinder(), OperatingPoint()), file)

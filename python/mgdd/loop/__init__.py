@@ -10,19 +10,15 @@ from __future__ import annotations
 from mgdd._core import SensorDynamics
 from mgdd.loop.bench import EngineBench
 from mgdd.loop.criteria import LoopCriteria
-from mgdd.loop.plant import AnnouncingPlant, Measurement, Plant
-from mgdd.loop.plant_loop import LoopRun
+from mgdd.loop.plant import Measurement, Plant
 from mgdd.loop.seek import monte_carlo, run_seeker
 from mgdd.loop.steady import find_steady_optimum, steady_map
-from mgdd.loop.summary import summarize_cycles
 from mgdd.loop.surrogate_plant import SurrogatePlant
 from mgdd.loop.virtual_throttle import VirtualThrottle
 
 __all__ = [
-    "AnnouncingPlant",
     "EngineBench",
     "LoopCriteria",
-    "LoopRun",
     "Measurement",
     "Plant",
     "SensorDynamics",
@@ -32,5 +28,4 @@ __all__ = [
     "monte_carlo",
     "run_seeker",
     "steady_map",
-    "summarize_cycles",
 ]

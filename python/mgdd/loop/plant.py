@@ -118,7 +118,8 @@ class AnnouncingPlant(Plant, Protocol):
 
     Examples
     --------
-    >>> from mgdd.loop import AnnouncingPlant, EngineBench
+    >>> from mgdd.loop import EngineBench
+    >>> from mgdd.loop.plant import AnnouncingPlant
     >>> bench = EngineBench()
     >>> isinstance(bench, AnnouncingPlant), bench.operating_point_changes
     (True, False)

@@ -42,7 +42,8 @@ def summarize_cycles(cycles: xr.Dataset, criteria: LoopCriteria | None = None) -
 
     Examples
     --------
-    >>> from mgdd.loop import EngineBench, LoopCriteria, run_seeker, summarize_cycles
+    >>> from mgdd.loop import EngineBench, LoopCriteria, run_seeker
+    >>> from mgdd.loop.summary import summarize_cycles
     >>> from mgdd.optimize import GoldenSection
     >>> seeker = GoldenSection(start=-20.0, lower=-30.0, upper=10.0, noise_sd=0.25)
     >>> run = run_seeker(EngineBench(seed=1), seeker, 300, criteria=LoopCriteria(optimum=-5.63))

@@ -35,28 +35,25 @@ from mgdd._core import ComponentLag, Limit
 from mgdd.optimize.direct_seekers import GoldenSection, GradientDescent, Spsa
 from mgdd.optimize.dither_seekers import BoundedSeeking, ExtremumSeeking, NewtonSeeking
 from mgdd.optimize.fit_options import FitOptions
-from mgdd.optimize.iterative_learning import ConvergenceReport, IterativeLearning
+from mgdd.optimize.iterative_learning import IterativeLearning
 from mgdd.optimize.least_squares import least_squares
-from mgdd.optimize.measured_map import MeasuredMap, measure_map
+from mgdd.optimize.measured_map import measure_map
 from mgdd.optimize.optimum import Optimum
 from mgdd.optimize.run import load_seeker, maximize
-from mgdd.optimize.tuning import Tuning, tune
+from mgdd.optimize.tuning import tune
 
 __all__ = [
     "BoundedSeeking",
     "ComponentLag",
-    "ConvergenceReport",
     "ExtremumSeeking",
     "FitOptions",
     "GoldenSection",
     "GradientDescent",
     "IterativeLearning",
     "Limit",
-    "MeasuredMap",
     "NewtonSeeking",
     "Optimum",
     "Spsa",
-    "Tuning",
     "least_squares",
     "load_seeker",
     "maximize",

@@ -35,6 +35,6 @@ def quality_of(run: xr.Dataset) -> FitQuality:
 
 def draw_run(fit: Fit, ax: Any) -> Any:
     """Draw a fit that keeps such a run."""
-    from mgdd import plot
+    from mgdd.plot.measured import measured_and_model
 
-    return plot.measured_and_model(cast("xr.Dataset", fit.run), ax=ax)
+    return measured_and_model(cast("xr.Dataset", fit.run), ax=ax)

@@ -10,7 +10,8 @@ from typing import Any
 
 from mgdd._core import Limit
 from mgdd.errors import ParameterError
-from mgdd.results import to_jsonable
+from mgdd.results.describe import as_html, rows_of
+from mgdd.results.labels import to_jsonable
 
 __all__ = ["Optimum", "limits_of"]
 
@@ -76,6 +77,9 @@ class Optimum:
             if name in numbers:
                 return numbers[name]
         raise KeyError(f"{name!r}: this optimum has {', '.join([*self.inputs, *self.values])}")
+
+    def _repr_html_(self) -> str:
+        return as_html("Optimum", rows_of({name: getattr(self, name) for name in self.__dataclass_fields__}))
 
     def __repr__(self) -> str:
         at = ", ".join(f"{name} {value:.4g}" for name, value in self.inputs.items())

@@ -12,16 +12,12 @@ from mgdd.plot.convergence import convergence
 from mgdd.plot.cycle import log_pv, pressure
 from mgdd.plot.identification import correlation_matrix, error_growth, residual_correlation
 from mgdd.plot.learning import learning
-from mgdd.plot.measured import measured_and_model
 from mgdd.plot.seeking import seeking
 from mgdd.plot.sensors import sensors
 from mgdd.plot.throttle import free_run, holding_duty
-from mgdd.plot.throttle_habits import air_flow, rate_dependence
-from mgdd.plot.throttle_run import throttle_run
 from mgdd.plot.timing import timing
 
 __all__ = [
-    "air_flow",
     "calibration_overlay",
     "convergence",
     "correlation_matrix",
@@ -30,13 +26,10 @@ __all__ = [
     "holding_duty",
     "learning",
     "log_pv",
-    "measured_and_model",
     "pressure",
-    "rate_dependence",
     "residual_correlation",
     "seeking",
     "sensors",
-    "throttle_run",
     "timing",
     "wall_heat_profile",
 ]

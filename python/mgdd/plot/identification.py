@@ -151,7 +151,7 @@ def correlation_matrix(correlation: xr.Dataset, *, ax: Axes | None = None) -> Ax
     ----------
     correlation : xarray.Dataset
         ``correlation`` [-] over ``parameter`` and ``other``, the names; NaN for a parameter at a bound. As
-        `mgdd.identify.correlation_dataset` gives it.
+        `mgdd.results.FitReport.to_dataset` gives it.
     ax : matplotlib.axes.Axes, optional
         Where to draw; None makes a figure.
 
@@ -178,7 +178,7 @@ def correlation_matrix(correlation: xr.Dataset, *, ax: Axes | None = None) -> Ax
     >>> plot.correlation_matrix(correlation).texts[1].get_text()
     '−0.99'
     """
-    require(correlation, ("parameter", "other", "correlation"), "mgdd.identify.correlation_dataset")
+    require(correlation, ("parameter", "other", "correlation"), "mgdd.results.FitReport.to_dataset")
     names = [str(name) for name in correlation["parameter"].to_numpy()]
     values = correlation["correlation"].transpose("parameter", "other").to_numpy()
     n = len(names)

@@ -36,14 +36,15 @@ def measured_and_model(run: xr.Dataset, *, ax: Axes | None = None) -> Axes:
 
     Examples
     --------
-    >>> from mgdd import plot
+    >>> from matplotlib.figure import Figure
+    >>> from mgdd.plot.measured import measured_and_model
     >>> from mgdd.results import labelled_dataset
     >>> run = labelled_dataset({
     ...     "time_s": ("time_s", [0.0, 1.0]),
     ...     "measured": ("time_s", [0.0, 1.0], "V", "level, measured"),
     ...     "model": ("time_s", [0.0, 0.9], "V", "level, free run"),
     ... })
-    >>> plot.measured_and_model(run).get_ylabel()
+    >>> measured_and_model(run, ax=Figure().add_subplot()).get_ylabel()
     'level, measured [V]'
     """
     require(run, ("time_s", "measured", "model"), "mgdd.results.Fit")

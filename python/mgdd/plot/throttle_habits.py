@@ -13,7 +13,7 @@ if TYPE_CHECKING:
 
 __all__ = ["air_flow", "rate_dependence"]
 
-_MADE_BY = "mgdd.studies.run_throttle_characteristics"
+_MADE_BY = "the study throttle-characteristics"
 
 
 def rate_dependence(dataset: xr.Dataset, *, ax: Axes | None = None) -> Axes:
@@ -39,10 +39,10 @@ def rate_dependence(dataset: xr.Dataset, *, ax: Axes | None = None) -> Axes:
 
     Examples
     --------
-    >>> from mgdd import plot
+    >>> from mgdd.plot.throttle_habits import rate_dependence
     >>> from mgdd.studies import run_study
     >>> study = run_study("throttle-characteristics", quick=True, figures=False)
-    >>> plot.rate_dependence(study.dataset.isel(preset=0)).get_xlabel()
+    >>> rate_dependence(study.dataset.isel(preset=0)).get_xlabel()
     'duty [-]'
     """
     require(dataset, ("frequency_hz", "phase", "loop_duty", "loop_angle_deg"), _MADE_BY)
@@ -85,10 +85,10 @@ def air_flow(dataset: xr.Dataset, *, ax: Axes | None = None) -> Axes:
 
     Examples
     --------
-    >>> from mgdd import plot
+    >>> from mgdd.plot.throttle_habits import air_flow
     >>> from mgdd.studies import run_study
     >>> study = run_study("throttle-characteristics", quick=True, figures=False)
-    >>> plot.air_flow(study.dataset.isel(preset=0, arrival=0)).get_ylabel()
+    >>> air_flow(study.dataset.isel(preset=0, arrival=0)).get_ylabel()
     'plate angle [deg]'
     """
     require(dataset, ("time_s", "airflow_torque_nm", "air_angle_deg"), _MADE_BY)

@@ -244,7 +244,7 @@ def load(name: str | os.PathLike[str], *, kind: str | None = None) -> Preset:
 def _load(text: str, kind: str | None) -> Preset:
     if text.endswith(".toml"):
         try:
-            return Preset.from_parameters(ParameterFile.read(text))
+            return Preset.of_file(ParameterFile.read(text))
         except FileNotFoundError as error:
             raise FileNotFoundError(
                 error.errno, f"no preset file {text!r}; shipped are {', '.join(available(kind))}"
@@ -280,7 +280,4 @@ def _record(file: ParameterFile, table: str, sources: dict[str, str]) -> Any:
     values = file.values(table, wanted)
     said = file.tables.get(table, {})
     sources.update({f"{table}.{key}": entry.source for key, entry in said.items() if entry.source is not None})
-    try:
-        return kind().replace(**values)
-    except ParameterError as error:
-        raise ParameterError(f"{file.origin}: [{table}] {error}") from error
+    return kind().replace(**values)

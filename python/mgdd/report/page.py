@@ -10,13 +10,14 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from mgdd._core import __version__
-from mgdd.results import to_jsonable
+from mgdd.results.labels import to_jsonable
 from mgdd.studies import available_studies
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
 
-    from mgdd.studies import Section, StudyResult
+    from mgdd.studies import StudyResult
+    from mgdd.studies.sections import Section
 
 __all__ = ["write_report"]
 

@@ -8,11 +8,10 @@ from __future__ import annotations
 from mgdd.results.finding import Finding
 from mgdd.results.fit import Fit, FitQuality
 from mgdd.results.fit_report import FitReport
-from mgdd.results.labels import ANGLE, VARIABLES, Label, check_labels, labelled_dataset, to_jsonable
+from mgdd.results.labels import VARIABLES, Label, check_labels, labelled_dataset
 from mgdd.results.model import Model
 
 __all__ = [
-    "ANGLE",
     "VARIABLES",
     "Finding",
     "Fit",
@@ -22,5 +21,4 @@ __all__ = [
     "Model",
     "check_labels",
     "labelled_dataset",
-    "to_jsonable",
 ]

@@ -171,8 +171,10 @@ class FitReport:
         return self.residual
 
     def __repr__(self) -> str:
-        open_names = f", {len(self.unidentifiable)} unidentifiable" if self.unidentifiable else ""
-        return f"<FitReport {self.status}, {len(self.names)} parameters, rmse={self.rmse:.6g}{open_names}>"
+        text = f"<FitReport {self.status}, {len(self.names)} parameters, rmse={self.rmse:.6g}"
+        names = f", unidentifiable={list(self.unidentifiable)}" if self.unidentifiable else ""
+        fits = len(text) + len(names) < 100
+        return f"{text}{names}>" if fits else f"{text}, {len(self.unidentifiable)} unidentifiable>"
 
     def summary(self) -> str:
         """Table of the fit for a terminal.

@@ -248,7 +248,7 @@ def to_jsonable(obj: Any) -> Any:
     Examples
     --------
     >>> import numpy as np
-    >>> from mgdd.results import to_jsonable
+    >>> from mgdd.results.labels import to_jsonable
     >>> to_jsonable({"a": np.float64(1.5), "b": np.array([1.0, np.nan])})
     {'a': 1.5, 'b': [1.0, None]}
     """

@@ -7,14 +7,12 @@ from __future__ import annotations
 
 from mgdd.signals.even_grid import even_step
 from mgdd.signals.excitation import amplitude_random_steps, chirp, multisine, prbs, staircase, triangle
-from mgdd.signals.metrics import ResidualTests, mse, nrmse_fit_percent, residual_tests, rmse, vaf_percent
+from mgdd.signals.metrics import nrmse_fit_percent, residual_tests, rmse, vaf_percent
 
 __all__ = [
-    "ResidualTests",
     "amplitude_random_steps",
     "chirp",
     "even_step",
-    "mse",
     "multisine",
     "nrmse_fit_percent",
     "prbs",

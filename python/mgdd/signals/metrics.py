@@ -100,7 +100,7 @@ def mse(measured: ArrayLike, model: ArrayLike) -> float:
 
     Examples
     --------
-    >>> from mgdd.signals import mse
+    >>> from mgdd.signals.metrics import mse
     >>> mse([1.0, 2.0], [1.0, 4.0])
     2.0
     """

@@ -107,6 +107,13 @@ class SampledModel(ABC):
         run = self.simulate(record, initial_state=start)[self.output_name].to_numpy()
         return self._labelled(time[horizon:], {self.output_name: measured[:-horizon] + run[horizon:] - run[:-horizon]})
 
+    def __getstate__(self) -> dict[str, Any]:
+        return {name: dict(own) if isinstance(own, MappingProxyType) else own for name, own in vars(self).items()}
+
+    def __setstate__(self, state: dict[str, Any]) -> None:
+        for name, own in state.items():
+            object.__setattr__(self, name, MappingProxyType(own) if isinstance(own, dict) else own)
+
     def state_of(self, given: Mapping[str, float] | Sequence[float] | None) -> list[float]:
         """Return the whole state of a free run from what is given of it."""
         state = self._rest()

@@ -18,9 +18,9 @@ from mgdd.optimize import (
     NewtonSeeking,
     Optimum,
     Spsa,
-    Tuning,
     tune,
 )
+from mgdd.optimize.tuning import Tuning
 from mgdd.surrogate import EngineSurrogate, SurrogateEngine
 
 if TYPE_CHECKING:

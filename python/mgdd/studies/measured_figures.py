@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING, Any
 
 from mgdd import plot
 from mgdd.engine import timing_sweep
-from mgdd.identify import WallHeatProfile
+from mgdd.identify.engine.profile import WallHeatProfile
 from mgdd.identify.engine.records import CylinderFit
 
 if TYPE_CHECKING:

@@ -7,7 +7,7 @@ from collections.abc import Mapping, Sequence
 from typing import TYPE_CHECKING, Any
 
 from mgdd import _core
-from mgdd.identify import WallHeatProfile
+from mgdd.identify.engine.profile import WallHeatProfile
 from mgdd.identify.engine.records import CylinderFit, Load, figures_of
 from mgdd.results import labelled_dataset
 

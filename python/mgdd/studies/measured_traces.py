@@ -13,7 +13,7 @@ from mgdd.identify import best_timing, compare_laws, fit_cylinder, wall_heat_pro
 from mgdd.identify.engine.best_timing import WALL_HEAT_RANGE
 from mgdd.identify.engine.burn_laws import LAWS
 from mgdd.identify.engine.cylinder import BURN_FIELDS
-from mgdd.results import to_jsonable
+from mgdd.results.labels import to_jsonable
 from mgdd.studies.base import StudyResult
 from mgdd.studies.measured_figures import draw
 from mgdd.studies.measured_sections import measured_sections

@@ -12,7 +12,8 @@ import numpy as np
 from mgdd import presets
 from mgdd.engine import NoxModel, NoxProxy, OperatingPoint, SoftSensor, fit_nox_proxy, start_of_combustion
 from mgdd.loop import EngineBench, SensorDynamics
-from mgdd.results import VARIABLES, labelled_dataset, to_jsonable
+from mgdd.results import VARIABLES, labelled_dataset
+from mgdd.results.labels import to_jsonable
 from mgdd.studies.base import Progress, StudyResult, check_seeds, run_parts
 from mgdd.studies.nox_sensors_figures import draw
 from mgdd.studies.statistics import with_interval
@@ -95,7 +96,7 @@ def run_nox_sensors(
 
     Examples
     --------
-    >>> from mgdd.studies import run_nox_sensors
+    >>> from mgdd.studies.nox_sensors import run_nox_sensors
     >>> rows = run_nox_sensors(seeds=1, quick=True, figures=False).summary["rows"]
     >>> {row["sensor"]: row["timing_step_t90_cycles"] for row in rows}["soft sensor, fitted proxy"]
     0

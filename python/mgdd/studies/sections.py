@@ -33,7 +33,7 @@ class Table:
 
     Examples
     --------
-    >>> from mgdd.studies import Table
+    >>> from mgdd.studies.sections import Table
     >>> Table(columns=("throttle", "limp-home [deg]"), rows=(("P1", "8"), ("P3", "12"))).rows[1]
     ('P3', '12')
     """
@@ -61,7 +61,7 @@ class Section:
 
     Examples
     --------
-    >>> from mgdd.studies import Section
+    >>> from mgdd.studies.sections import Section
     >>> Section(title="What to distrust", items=("NOx is a proxy: read its trend only.",)).table is None
     True
     """

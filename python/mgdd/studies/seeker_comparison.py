@@ -19,10 +19,11 @@ from mgdd.optimize import (
     NewtonSeeking,
     Optimum,
     Spsa,
-    Tuning,
     tune,
 )
-from mgdd.results import labelled_dataset, to_jsonable
+from mgdd.optimize.tuning import Tuning
+from mgdd.results import labelled_dataset
+from mgdd.results.labels import to_jsonable
 from mgdd.studies.base import Progress, StudyResult, check_seeds, run_parts
 from mgdd.studies.load_step_learning import LAWS, Learned, learn
 from mgdd.studies.statistics import bands, finished_loops, rms, with_interval
@@ -96,7 +97,7 @@ def run_seeker_comparison(
 
     Examples
     --------
-    >>> from mgdd.studies import run_seeker_comparison
+    >>> from mgdd.studies.seeker_comparison import run_seeker_comparison
     >>> result = run_seeker_comparison(seeds=2, quick=True, figures=False)
     >>> min(row["share_arrived"] for row in result.summary["rows"])
     1.0

@@ -12,7 +12,8 @@ import numpy as np
 from mgdd.engine import Performance
 from mgdd.loop import EngineBench, LoopCriteria, SensorDynamics, find_steady_optimum
 from mgdd.optimize import ComponentLag, ExtremumSeeking, Optimum
-from mgdd.results import labelled_dataset, to_jsonable
+from mgdd.results import labelled_dataset
+from mgdd.results.labels import to_jsonable
 from mgdd.studies.base import Progress, StudyResult, check_seeds, run_parts
 from mgdd.studies.statistics import bands, finished_loops, rms, run_finished, with_interval
 
@@ -93,7 +94,7 @@ def run_sensor_delay(
 
     Examples
     --------
-    >>> from mgdd.studies import run_sensor_delay
+    >>> from mgdd.studies.sensor_delay import run_sensor_delay
     >>> rows = run_sensor_delay(seeds=2, quick=True, figures=False).summary["rows"]
     >>> rows[0]["cycles_stays"], rows[1]["cycles_stays"]
     (72, None)

@@ -9,7 +9,8 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from mgdd.loop import EngineBench, LoopRun, monte_carlo, run_seeker
+from mgdd.loop import EngineBench, monte_carlo, run_seeker
+from mgdd.loop.plant_loop import LoopRun
 
 if TYPE_CHECKING:
     from collections.abc import Callable

@@ -9,7 +9,8 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from mgdd import presets
-from mgdd.results import labelled_dataset, to_jsonable
+from mgdd.results import labelled_dataset
+from mgdd.results.labels import to_jsonable
 from mgdd.studies.base import Progress, StudyResult, run_parts
 from mgdd.throttle import Throttle, groups, holding_duty, simulate
 
@@ -212,6 +213,7 @@ def _draw(dataset: xr.Dataset) -> dict[str, Figure]:
     from matplotlib.figure import Figure
 
     from mgdd import plot
+    from mgdd.plot.throttle_habits import air_flow, rate_dependence
 
     out = {}
     ramp = labelled_dataset(
@@ -228,9 +230,9 @@ def _draw(dataset: xr.Dataset) -> dict[str, Figure]:
     out[f"Duty of a slow ramp over the angle, {first}: opening and closing differ by twice the friction"] = figure
     for name in dataset["preset"].to_numpy():
         figure = Figure(figsize=(6.8, 4.2), layout="constrained")
-        plot.rate_dependence(dataset.sel(preset=name), ax=figure.add_subplot())
+        rate_dependence(dataset.sel(preset=name), ax=figure.add_subplot())
         out[f"Rate dependence of {name}: the loop of angle over duty shrinks with the frequency"] = figure
         figure = Figure(figsize=(6.8, 4.2), layout="constrained")
-        plot.air_flow(dataset.sel(preset=name, arrival="closing"), ax=figure.add_subplot())
+        air_flow(dataset.sel(preset=name, arrival="closing"), ax=figure.add_subplot())
         out[f"Air flow moves the plate of {name} at constant duty, at rest after closing"] = figure
     return out

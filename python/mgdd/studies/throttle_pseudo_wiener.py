@@ -11,7 +11,8 @@ from mgdd import presets
 from mgdd.errors import ParameterError
 from mgdd.identify import fit_pseudo_wiener
 from mgdd.optimize import FitOptions
-from mgdd.results import labelled_dataset, to_jsonable
+from mgdd.results import labelled_dataset
+from mgdd.results.labels import to_jsonable
 from mgdd.signals import nrmse_fit_percent
 from mgdd.studies.base import Progress, StudyResult, run_parts
 from mgdd.throttle import Throttle, simulate
@@ -71,7 +72,7 @@ def run_throttle_pseudo_wiener(
 
     Examples
     --------
-    >>> from mgdd.studies import run_throttle_pseudo_wiener
+    >>> from mgdd.studies.throttle_pseudo_wiener import run_throttle_pseudo_wiener
     >>> rows = run_throttle_pseudo_wiener(starts=1, figures=False).summary["rows"]
     >>> rows[0]["model"], rows[0]["fit_steps_percent"] > 96.0
     ('pw_r', True)

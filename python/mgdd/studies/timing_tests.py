@@ -12,7 +12,8 @@ import numpy as np
 from mgdd.engine import Performance
 from mgdd.loop import EngineBench, LoopCriteria, find_steady_optimum, steady_map
 from mgdd.optimize import ComponentLag, ExtremumSeeking, Limit, Optimum
-from mgdd.results import labelled_dataset, to_jsonable
+from mgdd.results import labelled_dataset
+from mgdd.results.labels import to_jsonable
 from mgdd.studies.base import Progress, StudyResult, check_seeds, run_parts
 from mgdd.studies.statistics import finished_loops, rms, run_with_slope, with_interval
 
@@ -124,7 +125,7 @@ def run_timing_tests(
 
     Examples
     --------
-    >>> from mgdd.studies import run_timing_tests
+    >>> from mgdd.studies.timing_tests import run_timing_tests
     >>> rows = run_timing_tests(seeds=2, quick=True, figures=False).summary["rows"]
     >>> [row["gain_percent_points"] > 0.0 for row in rows]
     [True, True, True, True]

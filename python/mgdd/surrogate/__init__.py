@@ -8,16 +8,10 @@ from __future__ import annotations
 from mgdd.surrogate.engine import SurrogateEngine
 from mgdd.surrogate.fit import fit_surrogate
 from mgdd.surrogate.random_steps import random_step_records
-from mgdd.surrogate.response_surface import Support
-from mgdd.surrogate.sensor_lag import SensorLag
-from mgdd.surrogate.signal_model import SignalModel
 from mgdd.surrogate.surrogate import EngineSurrogate
 
 __all__ = [
     "EngineSurrogate",
-    "SensorLag",
-    "SignalModel",
-    "Support",
     "SurrogateEngine",
     "fit_surrogate",
     "random_step_records",

@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from mgdd import _core
-from mgdd.errors import DataError, ParameterError
+from mgdd.errors import DataError
 from mgdd.io.parameters import FIT_NOTES, ParameterFile, Parameters, Wanted, entries, wanted
 from mgdd.results.describe import described, rows_of
 from mgdd.signals.even_grid import even_step, is_same_step
@@ -250,10 +250,7 @@ class PseudoWiener(SampledModel, Parameters):
         units = {name: str(unit) for name, unit in _core.pseudo_wiener_units(file.kind).items()}
         said = file.values("parameters", {name: Wanted(unit, required=False) for name, unit in units.items()})
         options = file.values("settings", wanted(("switching", "friction"), form="text"))
-        try:
-            model = cls(file.kind, said, **options)
-        except ParameterError as error:
-            raise ParameterError(f"{file.origin}: {error}") from error
+        model = cls(file.kind, said, **options)
         file.values("parameters", wanted(model.parameters, units))  # which of them there are, the numbers say
         return model
 

@@ -46,11 +46,7 @@ class SensorPair(Parameters, _core.SensorPair):  # noqa: D101 the core's text
         """Make the pair of a file that `to_toml` wrote."""
         file.expect(kinds=("sensor_pair",), tables=("parameters",))
         names = [name for name in cls().to_dict() if name != "adc_bits"]
-        values = file.values("parameters", {**wanted(names), "adc_bits": Wanted(form="integer")})
-        try:
-            return cls(**values)
-        except ParameterError as error:
-            raise ParameterError(f"{file.origin}: [parameters] {error}") from error
+        return cls(**file.values("parameters", {**wanted(names), "adc_bits": Wanted(form="integer")}))
 
 
 @dataclass(frozen=True, kw_only=True)

@@ -212,7 +212,8 @@ def step_summary(run: xr.Dataset) -> dict[str, float]:
 
     Examples
     --------
-    >>> from mgdd.throttle import Throttle, simulate, step_summary
+    >>> from mgdd.throttle import Throttle, simulate
+    >>> from mgdd.throttle.simulation import step_summary
     >>> summary = step_summary(simulate(Throttle(), 1.0, duration_s=0.3))
     >>> round(summary["t10_s"], 3), round(summary["t90_s"], 3)
     (0.019, 0.078)

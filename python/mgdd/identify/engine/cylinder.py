@@ -17,7 +17,8 @@ from mgdd.errors import DataError, ParameterError, ShapeError
 from mgdd.identify.engine.records import CylinderFit, Load, burn_law, load_table
 from mgdd.io.trace_forms import as_trace
 from mgdd.optimize.fit_options import FitOptions, fit_options
-from mgdd.results import ANGLE, Finding, FitQuality, FitReport, labelled_dataset
+from mgdd.results import Finding, FitQuality, FitReport, labelled_dataset
+from mgdd.results.labels import ANGLE
 
 if TYPE_CHECKING:
     import xarray as xr

@@ -13,6 +13,7 @@ import numpy as np
 from mgdd import _core
 from mgdd.errors import ParameterError
 from mgdd.io.parameters import FIT_NOTES, ParameterFile, Parameters, Wanted, entries, wanted
+from mgdd.results.describe import described
 from mgdd.signals.model import RunInputs, SampledModel
 
 if TYPE_CHECKING:
@@ -27,6 +28,7 @@ GROUP_NAMES = tuple(_core.throttle_group_names)
 TYPICAL = MappingProxyType(dict(zip(GROUP_NAMES, (0.03, 5e4, 0.1, 1e-3, 0.05, 0.1, 1e-3, 8.0, 0.0), strict=True)))
 
 
+@described
 @dataclass(frozen=True, kw_only=True)
 class FirstPrincipleModel(SampledModel, Parameters):
     """Throttle in groups: set-valued friction, springs with preload on both sides, motor as a torque source.

@@ -101,7 +101,7 @@ def load_throttle_model(path: str | os.PathLike[str]) -> Model:
     file = ParameterFile.read(path)
     model = FirstPrincipleModel if file.kind == "first_principle" else PseudoWiener
     file.expect(kinds=KINDS, tables=file.tables, notes=file.notes)
-    return model.from_parameters(file)
+    return model.of_file(file)
 
 
 def _seeded(options: FitOptions | None) -> FitOptions:

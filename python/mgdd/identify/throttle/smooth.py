@@ -16,6 +16,7 @@ from mgdd.io.parameters import FIT_NOTES, ParameterFile, Parameters, entries, wa
 from mgdd.optimize.fit_options import FitOptions, fit_options
 from mgdd.optimize.fit_run import draw_run, fit_run, quality_of
 from mgdd.results import VARIABLES, Fit, FitReport
+from mgdd.results.describe import described
 from mgdd.signals.even_grid import even_step
 from mgdd.signals.model import RunInputs, SampledModel, columns_of
 
@@ -29,6 +30,7 @@ _START_RAD = 0.14
 _CONSTANTS = ("inertia_kgm2", "gear_ratio", "inductance_h", "supply_v")
 
 
+@described
 @dataclass(frozen=True, kw_only=True)
 class SmoothThrottle(SampledModel, Parameters):
     """The smooth throttle: tanh friction and preload, coil current, RK4 with one step per sample.

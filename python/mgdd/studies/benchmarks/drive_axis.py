@@ -11,7 +11,7 @@ import numpy as np
 
 from mgdd import _core
 from mgdd.errors import ParameterError
-from mgdd.io.parameters import ParameterFile, entries
+from mgdd.io.parameters import ParameterFile, Parameters, entries, wanted
 from mgdd.optimize.fit_options import FitOptions, fit_options
 from mgdd.optimize.fit_run import draw_run, fit_run, quality_of
 from mgdd.results import Fit, FitReport, Label
@@ -49,7 +49,7 @@ _FILTER_ORDER, _DECIMATION = 4, 10
 
 @described
 @dataclass(frozen=True, kw_only=True)
-class DriveModel(SampledModel):
+class DriveModel(SampledModel, Parameters):
     """A slide with mass, friction and offset, driven by a voltage.
 
     Parameters
@@ -106,6 +106,15 @@ class DriveModel(SampledModel):
         values = dict(zip(_core.DriveAxis.parameter_names, _row(self.parameters), strict=True))
         tables = {"parameters": entries(values), "settings": entries({"force_n_per_v": float(self.force_n_per_v)})}
         return ParameterFile(kind="drive", tables=tables)
+
+    @classmethod
+    def from_parameters(cls, file: ParameterFile) -> DriveModel:
+        """Make the slide of a file that `to_toml` wrote."""
+        file.expect(kinds=("drive",), tables=("parameters", "settings"))
+        return cls(
+            parameters=file.values("parameters", wanted(_core.DriveAxis.parameter_names)),
+            force_n_per_v=file.values("settings", wanted(("force_n_per_v",)))["force_n_per_v"],
+        )
 
 
 def drive_inverse_dynamics(

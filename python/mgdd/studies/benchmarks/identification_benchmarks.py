@@ -99,7 +99,7 @@ def run_identification_benchmarks(
     Examples
     --------
     >>> from mgdd import datasets
-    >>> from mgdd.studies import run_identification_benchmarks
+    >>> from mgdd.studies.benchmarks.identification_benchmarks import run_identification_benchmarks
     >>> if "cascaded_tanks" in datasets.available():
     ...     result = run_identification_benchmarks(quick=True, figures=False)
     ...     assert {"set", "train", "test"} <= set(result.summary["rows"][0])

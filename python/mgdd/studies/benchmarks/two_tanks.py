@@ -11,6 +11,7 @@ import numpy as np
 
 from mgdd import _core
 from mgdd.errors import DataError, ParameterError
+from mgdd.io.parameters import ParameterFile, Parameters, entries, wanted
 from mgdd.optimize.fit_options import FitOptions, fit_options
 from mgdd.optimize.fit_run import draw_run, fit_run, quality_of
 from mgdd.results import Fit, FitReport, Label
@@ -62,7 +63,7 @@ _FORMS: dict[str, tuple[dict[str, float], tuple[str, ...]]] = {
 
 @described
 @dataclass(frozen=True, kw_only=True)
-class TwoTanksModel(SampledModel):
+class TwoTanksModel(SampledModel, Parameters):
     """Two tanks in a row: a pump fills the upper one, its outlet and part of its overflow the lower one.
 
     Parameters
@@ -113,6 +114,21 @@ class TwoTanksModel(SampledModel):
         start = [*run.state, float(pump[0]), float(pump[0])]
         model = _core.TwoTanks(lower_brim_v=self.lower_brim_v)
         return np.asarray(model.free_run(parameters=_row(self.parameters), start=start, input=pump, dt_s=run.step_s))
+
+    def to_parameters(self) -> ParameterFile:
+        """Give all parameters, as `to_toml` writes them."""
+        values = dict(zip(_core.TwoTanks.parameter_names, _row(self.parameters), strict=True))
+        tables = {"parameters": entries(values), "settings": entries({"lower_brim_v": float(self.lower_brim_v)})}
+        return ParameterFile(kind="two_tanks", tables=tables)
+
+    @classmethod
+    def from_parameters(cls, file: ParameterFile) -> TwoTanksModel:
+        """Make the tanks of a file that `to_toml` wrote."""
+        file.expect(kinds=("two_tanks",), tables=("parameters", "settings"))
+        return cls(
+            parameters=file.values("parameters", wanted(_core.TwoTanks.parameter_names)),
+            lower_brim_v=file.values("settings", wanted(("lower_brim_v",)))["lower_brim_v"],
+        )
 
     def estimate_state(self, record: xr.Dataset, *, window: int = 50) -> dict[str, float]:
         """Estimate the two levels at the first sample from the first samples of a record, parameters held.

@@ -11,7 +11,7 @@ import numpy as np
 
 from mgdd import _core
 from mgdd.errors import DataError, ParameterError
-from mgdd.io.parameters import ParameterFile, entries, wanted
+from mgdd.io.parameters import ParameterFile, Parameters, entries, wanted
 from mgdd.optimize.fit_options import FitOptions, fit_options
 from mgdd.optimize.fit_run import draw_run, fit_run, quality_of
 from mgdd.results import Fit, FitReport, Label
@@ -43,7 +43,7 @@ _MARGIN = 0.05  # of the range of the signal, on either side of the curve's grid
 
 @described
 @dataclass(frozen=True, kw_only=True)
-class LinearApproximation(SampledModel):
+class LinearApproximation(SampledModel, Parameters):
     """A linear filter B/A about the mean of a record.
 
     Parameters
@@ -93,10 +93,20 @@ class LinearApproximation(SampledModel):
         deviation = run.columns[0] - self.input_mean
         return np.asarray(_core.filter_series(self.numerator, self.denominator, deviation)) + self.output_mean
 
+    def to_parameters(self) -> ParameterFile:
+        """Give filter and means, as `to_toml` writes them."""
+        return _saved("linear_filter", self, ("numerator", "denominator", "input_mean", "output_mean", "rmse"))
+
+    @classmethod
+    def from_parameters(cls, file: ParameterFile) -> LinearApproximation:
+        """Make the filter of a file that `to_toml` wrote."""
+        numbers, vectors = ("input_mean", "output_mean", "rmse"), ("numerator", "denominator")
+        return cls(**_read("linear_filter", file, numbers=numbers, vectors=vectors))
+
 
 @described
 @dataclass(frozen=True, kw_only=True)
-class WienerHammersteinModel(SampledModel):
+class WienerHammersteinModel(SampledModel, Parameters):
     """Filter, static curve, filter; both filters have gain 1 at rest.
 
     Parameters
