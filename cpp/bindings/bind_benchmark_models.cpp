@@ -32,8 +32,7 @@ std::vector<std::string> names_of(std::span<const FieldInfo> fields) {
 
 template <class Model>
 void bind_step_model(py::class_<Model>& cls) {
-  cls.def_property_readonly_static("parameter_names",
-                                   [](const py::object&) { return names_of(Model::parameters); });
+  cls.def_property_readonly_static("parameter_names", [](const py::object&) { return names_of(Model::parameters); });
   cls.def_property_readonly_static("state_names", [](const py::object&) { return names_of(Model::states); });
   cls.def(
       "free_run",

@@ -30,36 +30,36 @@ void bind_init(py::class_<Cylinder>& cls, std::index_sequence<I...>) {
   cls.def(py::init([](const std::string& burn, const std::string& gamma, const std::string& wall,
                       const std::string& ignition, Number<I>... values) {
             Cylinder c;
-            ((c.*(fields[I].member) = values), ...);
-            c.burn_shape = parse_burn_shape(burn);
-            c.gamma_model = parse_gamma_model(gamma);
-            c.wall_heat_model = parse_wall_heat_model(wall);
-            c.ignition_model = parse_ignition_model(ignition);
+            ((fields[I].in(c) = values), ...);
+            c.burn.burn_shape = parse_burn_shape(burn);
+            c.gas.gamma_model = parse_gamma_model(gamma);
+            c.wall_heat.wall_heat_model = parse_wall_heat_model(wall);
+            c.ignition.ignition_model = parse_ignition_model(ignition);
             validate(c);
             return c;
           }),
-          py::kw_only(), py::arg("burn_shape") = std::string(to_string(d.burn_shape)),
-          py::arg("gamma_model") = std::string(to_string(d.gamma_model)),
-          py::arg("wall_heat_model") = std::string(to_string(d.wall_heat_model)),
-          py::arg("ignition_model") = std::string(to_string(d.ignition_model)),
-          (py::arg(fields[I].info.name.data()) = d.*(fields[I].member))...);
+          py::kw_only(), py::arg("burn_shape") = std::string(to_string(d.burn.burn_shape)),
+          py::arg("gamma_model") = std::string(to_string(d.gas.gamma_model)),
+          py::arg("wall_heat_model") = std::string(to_string(d.wall_heat.wall_heat_model)),
+          py::arg("ignition_model") = std::string(to_string(d.ignition.ignition_model)),
+          (py::arg(fields[I].info.name.data()) = fields[I].in(d))...);
 }
 
 py::dict to_dict(const Cylinder& c) {
   py::dict out;
   for (const auto& f : fields)
-    out[as_str(f.info.name)] = c.*(f.member);
-  out["burn_shape"] = as_str(to_string(c.burn_shape));
-  out["gamma_model"] = as_str(to_string(c.gamma_model));
-  out["wall_heat_model"] = as_str(to_string(c.wall_heat_model));
-  out["ignition_model"] = as_str(to_string(c.ignition_model));
+    out[as_str(f.info.name)] = f.in(c);
+  out["burn_shape"] = as_str(to_string(c.burn.burn_shape));
+  out["gamma_model"] = as_str(to_string(c.gas.gamma_model));
+  out["wall_heat_model"] = as_str(to_string(c.wall_heat.wall_heat_model));
+  out["ignition_model"] = as_str(to_string(c.ignition.ignition_model));
   return out;
 }
 
 py::dict to_dict(const OperatingPoint& p) {
   py::dict out;
   for (const auto& f : point_fields)
-    out[as_str(f.info.name)] = p.*(f.member);
+    out[as_str(f.info.name)] = f.in(p);
   out["burn_duration_cad"] = p.burn_duration_cad;
   out["trapped_mass_g"] = p.trapped_mass_g;
   return out;
@@ -72,17 +72,17 @@ Cylinder replaced(const Cylinder& from, const py::kwargs& changes) {
     const auto choice = [&] { return as_name(key, value); };
     bool found = true;
     if (name == "burn_shape") {
-      c.burn_shape = parse_burn_shape(choice());
+      c.burn.burn_shape = parse_burn_shape(choice());
     } else if (name == "gamma_model") {
-      c.gamma_model = parse_gamma_model(choice());
+      c.gas.gamma_model = parse_gamma_model(choice());
     } else if (name == "wall_heat_model") {
-      c.wall_heat_model = parse_wall_heat_model(choice());
+      c.wall_heat.wall_heat_model = parse_wall_heat_model(choice());
     } else if (name == "ignition_model") {
-      c.ignition_model = parse_ignition_model(choice());
+      c.ignition.ignition_model = parse_ignition_model(choice());
     } else {
       found = false;
       for (const auto& f : fields) {
-        if (f.info.name == name) c.*(f.member) = as_number(key, value), found = true;
+        if (f.info.name == name) f.in(c) = as_number(key, value), found = true;
       }
     }
     if (!found) unknown_field("Cylinder", key, to_dict(from));
@@ -106,7 +106,7 @@ OperatingPoint replaced(const OperatingPoint& from, const py::kwargs& changes) {
     } else {
       bool found = false;
       for (const auto& f : point_fields) {
-        if (f.info.name == name) p.*(f.member) = as_number(key, value), found = true;
+        if (f.info.name == name) f.in(p) = as_number(key, value), found = true;
       }
       if (!found) unknown_field("OperatingPoint", key, to_dict(from));
     }
@@ -148,21 +148,23 @@ Examples
   bind_init(cylinder, std::make_index_sequence<fields.size()>{});
   for (const auto& f : fields) {
     cylinder.def_property_readonly(
-        f.info.name.data(), [member = f.member](const Cylinder& c) { return c.*member; },
+        f.info.name.data(), [f](const Cylinder& c) { return f.in(c); },
         (std::string(f.info.meaning) + " [" + std::string(f.info.unit) + "]").c_str());
   }
-  cylinder.def_property_readonly("burn_shape", [](const Cylinder& c) { return std::string(to_string(c.burn_shape)); });
+  cylinder.def_property_readonly("burn_shape",
+                                 [](const Cylinder& c) { return std::string(to_string(c.burn.burn_shape)); });
   cylinder.def_property_readonly("gamma_model",
-                                 [](const Cylinder& c) { return std::string(to_string(c.gamma_model)); });
+                                 [](const Cylinder& c) { return std::string(to_string(c.gas.gamma_model)); });
   cylinder.def_property_readonly("wall_heat_model",
-                                 [](const Cylinder& c) { return std::string(to_string(c.wall_heat_model)); });
+                                 [](const Cylinder& c) { return std::string(to_string(c.wall_heat.wall_heat_model)); });
   cylinder.def_property_readonly("ignition_model",
-                                 [](const Cylinder& c) { return std::string(to_string(c.ignition_model)); });
+                                 [](const Cylinder& c) { return std::string(to_string(c.ignition.ignition_model)); });
   cylinder.def_property_readonly(
-      "swept_volume_l", [](const Cylinder& c) { return Geometry<double>(c).swept_m3 / units::m3_per_l; },
+      "swept_volume_l", [](const Cylinder& c) { return Geometry<double>(c.geometry).swept_m3 / units::m3_per_l; },
       "Swept volume [L].");
   cylinder.def_property_readonly(
-      "clearance_volume_l", [](const Cylinder& c) { return Geometry<double>(c).clearance_m3 / units::m3_per_l; },
+      "clearance_volume_l",
+      [](const Cylinder& c) { return Geometry<double>(c.geometry).clearance_m3 / units::m3_per_l; },
       "Clearance volume [L].");
   cylinder.def_static(
       "fields",
@@ -170,7 +172,7 @@ Examples
         const Cylinder d;
         py::dict out;
         for (const auto& f : fields)
-          out[as_str(f.info.name)] = describe(f.info, py::float_(d.*(f.member)));
+          out[as_str(f.info.name)] = describe(f.info, py::float_(f.in(d)));
         out["burn_shape"] = describe_choice("triangle", {"triangle", "wiebe", "double_wiebe"}, "burn law");
         out["gamma_model"] = describe_choice("constant", {"constant", "linear", "polynomial"}, "gamma against T");
         out["wall_heat_model"] = describe_choice("woschni", {"woschni", "hohenberg"}, "wall-heat correlation");
@@ -210,7 +212,7 @@ OperatingPoint(speed_rpm=2000.0, fuel_mg=12.0)
             py::arg("trapped_mass_g") = py::none());
   for (const auto& f : point_fields) {
     point.def_property_readonly(
-        f.info.name.data(), [member = f.member](const OperatingPoint& p) { return p.*member; },
+        f.info.name.data(), [f](const OperatingPoint& p) { return f.in(p); },
         (std::string(f.info.meaning) + " [" + std::string(f.info.unit) + "]").c_str());
   }
   point.def_property_readonly("burn_duration_cad", [](const OperatingPoint& p) { return p.burn_duration_cad; });
@@ -221,7 +223,7 @@ OperatingPoint(speed_rpm=2000.0, fuel_mg=12.0)
         const OperatingPoint standard;
         py::dict out;
         for (const auto& f : point_fields) {
-          out[as_str(f.info.name)] = describe(f.info, py::float_(standard.*(f.member)));
+          out[as_str(f.info.name)] = describe(f.info, py::float_(f.in(standard)));
         }
         out[as_str(burn_duration_info.name)] = describe(burn_duration_info, py::none());
         out[as_str(trapped_mass_info.name)] = describe(trapped_mass_info, py::none());

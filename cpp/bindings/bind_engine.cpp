@@ -45,7 +45,7 @@ py::dict simulate(const Cylinder& cylinder, const OperatingPoint& point, double 
   const std::size_t n = angle.size();
   std::vector<double> pressure(n), volume(n), temperature(n), burned(n, 0.0), release(n, 0.0), loss(n, 0.0),
       booked(n, 0.0), energy(n, 0.0);
-  const Burn<double> burn(cylinder, soc_cad, charge.burn_duration_cad);
+  const Burn<double> burn(cylinder.burn, soc_cad, charge.burn_duration_cad);
   const bool fired = charge.fuel_heat_j > 0.0;
   for (std::size_t k = 0; k < n; ++k) {
     pressure[k] = work.pressure_pa[k] / units::pa_per_bar;
@@ -195,7 +195,7 @@ void bind_engine(py::module_& m) {
       "volume_l",
       [](const Cylinder& c, const InputArray& angle) {
         validate(c);
-        const Geometry<double> g(c);
+        const Geometry<double> g(c.geometry);
         return py::vectorize([&g](double a) { return g.volume_m3(a) / units::m3_per_l; })(angle);
       },
       arg("cylinder"), arg("crank_angle_cad"), "Cylinder volume [L].");
@@ -203,7 +203,7 @@ void bind_engine(py::module_& m) {
       "wall_area_m2",
       [](const Cylinder& c, const InputArray& angle) {
         validate(c);
-        const Geometry<double> g(c);
+        const Geometry<double> g(c.geometry);
         return py::vectorize([&g](double a) { return g.wall_area_m2(g.volume_m3(a)); })(angle);
       },
       arg("cylinder"), arg("crank_angle_cad"), "Wall area [m2].");
@@ -214,7 +214,7 @@ void bind_engine(py::module_& m) {
         if (!(duration > 0.0)) {
           throw ParameterError("burn_duration_cad = " + std::to_string(duration) + " °CA: must be > 0");
         }
-        const Burn<double> burn(c, soc, duration);
+        const Burn<double> burn(c.burn, soc, duration);
         return py::vectorize([&burn](double a) { return burn.fraction(a); })(angle);
       },
       arg("cylinder"), arg("crank_angle_cad"), arg("soc_cad"), arg("burn_duration_cad"), "Burned fraction [-].");
@@ -223,7 +223,7 @@ void bind_engine(py::module_& m) {
       [](const Cylinder& c, const OperatingPoint& p) {
         validate(c);
         validate(p);
-        return burn_duration_cad(c, p);
+        return burn_duration_cad(c.burn, p);
       },
       arg("cylinder"), arg("point"), "Burn duration in force [°CA].");
   m.attr("timing_window_cad") = py::make_tuple(timing_lower_cad, timing_upper_cad);

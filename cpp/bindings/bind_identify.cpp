@@ -24,8 +24,8 @@ void bind_identify(py::module_& m) {
   burn.def(py::init<>());
   for (const auto& f : load_fields<double>()) {
     burn.def_property(
-        f.domain.name.data(), [member = f.member](const LoadBurn& b) { return b.*member; },
-        [member = f.member](LoadBurn& b, double value) { b.*member = value; });
+        f.info.name.data(), [f](const LoadBurn& b) { return f.in(b); },
+        [f](LoadBurn& b, double value) { f.in(b) = value; });
   }
 
   py::class_<LoadFit>(m, "LoadFit")

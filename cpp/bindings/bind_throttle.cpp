@@ -24,8 +24,8 @@ constexpr std::size_t steps_between_looks = 200'000;
 
 py::dict to_dict(const Throttle& t) {
   py::dict out;
-  for (const Field& field : fields())
-    out[as_str(field.info.name)] = t.*(field.member);
+  for (const auto& field : fields())
+    out[as_str(field.info.name)] = field.in(t);
   out["friction"] = as_str(name_of(friction_names(), t.friction));
   out["backlash"] = as_str(name_of(backlash_names(), t.backlash));
   return out;
@@ -40,7 +40,7 @@ void bind_init(py::class_<Throttle>& cls, std::index_sequence<I...>) {
   const Throttle d;
   cls.def(py::init([](const std::string& friction, const std::string& backlash, Number<I>... values) {
             Throttle t;
-            ((t.*(fields()[I].member) = values), ...);
+            ((fields()[I].in(t) = values), ...);
             t.friction = parse_name(friction_names(), "friction", friction);
             t.backlash = parse_name(backlash_names(), "backlash", backlash);
             validate(t);
@@ -48,7 +48,7 @@ void bind_init(py::class_<Throttle>& cls, std::index_sequence<I...>) {
           }),
           py::kw_only(), py::arg("friction") = std::string(name_of(friction_names(), d.friction)),
           py::arg("backlash") = std::string(name_of(backlash_names(), d.backlash)),
-          (py::arg(fields()[I].info.name.data()) = d.*(fields()[I].member))...);
+          (py::arg(fields()[I].info.name.data()) = fields()[I].in(d))...);
 }
 
 Throttle replaced(const Throttle& from, const py::kwargs& changes) {
@@ -61,9 +61,9 @@ Throttle replaced(const Throttle& from, const py::kwargs& changes) {
       t.backlash = parse_name(backlash_names(), name, as_name(key, value));
     } else {
       const auto all = fields();
-      const auto field = std::find_if(all.begin(), all.end(), [&](const Field& f) { return f.info.name == name; });
+      const auto field = find_field(all, name);
       if (field == all.end()) unknown_field("Throttle", key, to_dict(from));
-      t.*(field->member) = as_number(key, value);
+      field->in(t) = as_number(key, value);
     }
   }
   validate(t);
@@ -81,8 +81,8 @@ py::dict describe_names(Names<Enum> names, Enum chosen, std::string_view meaning
 py::dict describe_fields() {
   const Throttle d;
   py::dict out;
-  for (const Field& field : fields())
-    out[as_str(field.info.name)] = describe(field.info, py::float_(d.*(field.member)));
+  for (const auto& field : fields())
+    out[as_str(field.info.name)] = describe(field.info, py::float_(field.in(d)));
   out["friction"] = describe_names(friction_names(), d.friction, "law of the dry friction");
   out["backlash"] = describe_names(backlash_names(), d.backlash, "play between gear and plate");
   return out;
@@ -111,9 +111,9 @@ Throttle(stiction_nm=0.3, limp_home_deg=10.0, friction='stribeck')
 14.4
 )");
   bind_init(cls, std::make_index_sequence<field_count>{});
-  for (const Field& field : fields()) {
+  for (const auto& field : fields()) {
     cls.def_property_readonly(
-        field.info.name.data(), [member = field.member](const Throttle& t) { return t.*member; },
+        field.info.name.data(), [field](const Throttle& t) { return field.in(t); },
         (std::string(field.info.meaning) + " [" + std::string(field.info.unit) + "]").c_str());
   }
   cls.def_property_readonly(

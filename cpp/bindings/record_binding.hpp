@@ -6,17 +6,17 @@
 #include <vector>
 
 #include "binding.hpp"
+#include "mgdd/common/field.hpp"
 
 namespace mgdd::bindings {
 
 /// Unit, bounds, meaning and default of a number.
-template <class FieldInfo>
-py::dict describe(const FieldInfo& info, const py::object& standard) {
+inline py::dict describe(const FieldInfo& info, const py::object& standard) {
   py::dict record;
   record["unit"] = as_str(info.unit);
-  record["lower"] = info.lower;
-  record["lower_open"] = info.lower_open;
-  record["upper"] = info.upper;
+  record["lower"] = info.domain.lower;
+  record["lower_open"] = info.domain.lower_open;
+  record["upper"] = info.domain.upper;
   record["meaning"] = as_str(info.meaning);
   record["default"] = standard;
   return record;

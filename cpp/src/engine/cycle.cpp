@@ -17,7 +17,7 @@ namespace mgdd::engine {
 
 template <class T>
 CycleModel<T>::CycleModel(const BasicCylinder<T>& cylinder, std::vector<double> angles_cad, Integrator integrator)
-    : cylinder_(cylinder), geometry_(cylinder), integrator_(integrator), angles_(std::move(angles_cad)) {
+    : cylinder_(cylinder), geometry_(cylinder.geometry), integrator_(integrator), angles_(std::move(angles_cad)) {
   const std::size_t n = angles_.size();
   if (n < 3) throw ShapeError("angles_cad has " + std::to_string(n) + " entries: a cycle needs at least 3");
   for (std::size_t k = 1; k < n; ++k) {
@@ -37,13 +37,14 @@ CycleModel<T>::CycleModel(const BasicCylinder<T>& cylinder, std::vector<double> 
 template <class T>
 void CycleModel<T>::set_cylinder(const BasicCylinder<T>& cylinder) noexcept {
   const auto tables_of = [](const BasicCylinder<T>& c) {
-    return std::tie(c.bore_mm, c.stroke_mm, c.connecting_rod_mm, c.compression_ratio, c.bowl_area_factor, c.gamma,
-                    c.gamma_model, c.wall_heat_model);
+    const GeometryParameters<T>& g = c.geometry;
+    return std::tie(g.bore_mm, g.stroke_mm, g.connecting_rod_mm, g.compression_ratio, g.bowl_area_factor, c.gas.gamma,
+                    c.gas.gamma_model, c.wall_heat.wall_heat_model);
   };
   const bool same = tables_of(cylinder) == tables_of(cylinder_);
   cylinder_ = cylinder;
   if (same) return;
-  geometry_ = Geometry<T>(cylinder_);
+  geometry_ = Geometry<T>(cylinder_.geometry);
   tabulate();
 }
 
@@ -56,12 +57,12 @@ void CycleModel<T>::tabulate() noexcept {
   volume_before_first_ = geometry_.volume_m3(angles_[0] - (angles_[1] - angles_[0]));
   for (std::size_t k = 0; k < n; ++k) {
     const double step = k + 1 < n ? angles_[k + 1] - angles_[k] : 0.0;
-    wall_term_[k] = WallHeat<T>::volume_term(cylinder_, geometry_, volume_[k], step);
-    motored_ratio_[k] = pow(volume_[0] / volume_[k], cylinder_.gamma);
+    wall_term_[k] = WallHeat<T>::volume_term(cylinder_.wall_heat.wall_heat_model, geometry_, volume_[k], step);
+    motored_ratio_[k] = pow(volume_[0] / volume_[k], cylinder_.gas.gamma);
   }
-  if (cylinder_.gamma_model != GammaModel::constant) return;
+  if (cylinder_.gas.gamma_model != GammaModel::constant) return;
   for (std::size_t k = 0; k + 1 < n; ++k) {
-    const StepCoefficients c = coefficients(cylinder_.gamma, k);
+    const StepCoefficients c = coefficients(cylinder_.gas.gamma, k);
     keep_[k] = c.keep;
     gain_[k] = c.gain;
   }
@@ -103,13 +104,14 @@ template <class T>
 Charge<T> CycleModel<T>::charge(const BasicOperatingPoint<T>& point) const noexcept {
   Charge<T> c;
   c.intake_pa = point.intake_pressure_kpa * units::pa_per_kpa;
-  c.pressure_pa = c.intake_pa + cylinder_.ivc_pressure_rise_kpa * units::pa_per_kpa;
-  c.gas_j_per_k = point.trapped_mass_g
-                      ? *point.trapped_mass_g *
-                            (units::kg_per_g * units::gas_constant_j_per_molk / units::air_molar_mass_kg_per_mol)
-                      : cylinder_.volumetric_efficiency * c.intake_pa * geometry_.swept_m3 / point.intake_temperature_k;
-  c.fuel_heat_j = engine::fuel_heat_j(cylinder_, point);
-  c.burn_duration_cad = engine::burn_duration_cad(cylinder_, point);
+  c.pressure_pa = c.intake_pa + cylinder_.gas.ivc_pressure_rise_kpa * units::pa_per_kpa;
+  c.gas_j_per_k =
+      point.trapped_mass_g
+          ? *point.trapped_mass_g *
+                (units::kg_per_g * units::gas_constant_j_per_molk / units::air_molar_mass_kg_per_mol)
+          : cylinder_.gas.volumetric_efficiency * c.intake_pa * geometry_.swept_m3 / point.intake_temperature_k;
+  c.fuel_heat_j = engine::fuel_heat_j(cylinder_.gas, point);
+  c.burn_duration_cad = engine::burn_duration_cad(cylinder_.burn, point);
   c.speed_rpm = point.speed_rpm;
   return c;
 }
@@ -120,7 +122,7 @@ std::size_t CycleModel<T>::fill_heat_release(const Charge<T>& charge, const T& s
   const std::size_t n = angles_.size();
   std::fill(work.heat_release_j.begin(), work.heat_release_j.end(), T(0.0));
   if (is_constant_zero(charge.fuel_heat_j)) return n;
-  const Burn<T> burn(cylinder_, soc_cad, charge.burn_duration_cad);
+  const Burn<T> burn(cylinder_.burn, soc_cad, charge.burn_duration_cad);
   const auto begin = angles_.begin();
   const auto first = static_cast<std::size_t>(std::upper_bound(begin, angles_.end(), burn.start_cad()) - begin);
   const double end = burn.end_cad();
@@ -139,8 +141,8 @@ std::size_t CycleModel<T>::fill_heat_release(const Charge<T>& charge, const T& s
 template <class T>
 void CycleModel<T>::run(const Charge<T>& charge, const T& soc_cad, CycleWorkspace<T>& work) const noexcept {
   const std::size_t burning = fill_heat_release(charge, soc_cad, work);
-  const bool woschni = cylinder_.wall_heat_model == WallHeatModel::woschni;
-  if (cylinder_.gamma_model == GammaModel::constant) {
+  const bool woschni = cylinder_.wall_heat.wall_heat_model == WallHeatModel::woschni;
+  if (cylinder_.gas.gamma_model == GammaModel::constant) {
     woschni ? integrate<true, true>(charge, burning, work) : integrate<true, false>(charge, burning, work);
   } else {
     woschni ? integrate<false, true>(charge, burning, work) : integrate<false, false>(charge, burning, work);
@@ -153,7 +155,7 @@ void CycleModel<T>::integrate(const Charge<T>& charge, std::size_t first_burning
                               CycleWorkspace<T>& work) const noexcept {
   const std::size_t n = angles_.size();
   const T per_gas = 1.0 / charge.gas_j_per_k;
-  const WallHeat<T> wall(cylinder_, geometry_, charge.pressure_pa, charge.gas_j_per_k, charge.speed_rpm);
+  const WallHeat<T> wall(cylinder_.wall_heat, geometry_, charge.pressure_pa, charge.gas_j_per_k, charge.speed_rpm);
   T pressure = charge.pressure_pa;
   work.pressure_pa[0] = pressure;
   for (std::size_t k = 0; k + 1 < n; ++k) {
@@ -168,13 +170,13 @@ void CycleModel<T>::integrate(const Charge<T>& charge, std::size_t first_burning
     } else {
       const T heat = work.heat_release_j[k] - loss;
       // gamma at the step's start, then twice at its mean temperature.
-      T gamma = gamma_at(cylinder_, temperature);
+      T gamma = gamma_at(cylinder_.gas, temperature);
       T next{};
       for (int pass = 0;; ++pass) {
         const StepCoefficients c = coefficients(gamma, k);
         next = c.keep * pressure + c.gain * heat;
         if (pass == 2) break;
-        gamma = gamma_at(cylinder_, T(0.5 * (temperature + next * volume_[k + 1] * per_gas)));
+        gamma = gamma_at(cylinder_.gas, T(0.5 * (temperature + next * volume_[k + 1] * per_gas)));
       }
       work.gamma[k] = gamma;
       pressure = next;
@@ -187,12 +189,12 @@ void CycleModel<T>::integrate(const Charge<T>& charge, std::size_t first_burning
 template <class T>
 void CycleModel<T>::wall_heat(const Charge<T>& charge, std::span<const T> pressure_pa, double burning_from_cad,
                               std::span<T> loss_j) const noexcept {
-  const WallHeat<T> wall(cylinder_, geometry_, charge.pressure_pa, charge.gas_j_per_k, charge.speed_rpm);
+  const WallHeat<T> wall(cylinder_.wall_heat, geometry_, charge.pressure_pa, charge.gas_j_per_k, charge.speed_rpm);
   for (std::size_t k = 0; k + 1 < angles_.size(); ++k) {
     const T& p = pressure_pa[k];
     const T temperature = p * volume_[k] / charge.gas_j_per_k;
     const bool burning = angles_[k] >= burning_from_cad;
-    loss_j[k] = cylinder_.wall_heat_model == WallHeatModel::woschni
+    loss_j[k] = cylinder_.wall_heat.wall_heat_model == WallHeatModel::woschni
                     ? wall.template step_j<true>(p, temperature, wall_term_[k], motored_ratio_[k], burning)
                     : wall.template step_j<false>(p, temperature, wall_term_[k], motored_ratio_[k], burning);
   }
@@ -215,7 +217,7 @@ void CycleModel<T>::require_physical(const CycleWorkspace<T>& work) const {
 
 template <class T>
 T CycleModel<T>::step_gamma(std::size_t k, const CycleWorkspace<T>& work) const noexcept {
-  return cylinder_.gamma_model == GammaModel::constant ? cylinder_.gamma : work.gamma[k];
+  return cylinder_.gas.gamma_model == GammaModel::constant ? cylinder_.gas.gamma : work.gamma[k];
 }
 
 template <class T>
@@ -289,12 +291,12 @@ Indicators<T> CycleModel<T>::indicators(const Charge<T>& charge, const T& soc_ca
   out.dp_max_cad = T(0.5 * (angles_[slope_at] + angles_[slope_at + 1]));
   out.heat_loss_j = loss;
   out.ringing_intensity_mw_per_m2 = engine::ringing_intensity_mw_per_m2(
-      T(gamma_at(cylinder_, t_peak.value)), T(slope * charge.speed_rpm * units::cad_per_s_per_rpm), p_peak.value,
+      T(gamma_at(cylinder_.gas, t_peak.value)), T(slope * charge.speed_rpm * units::cad_per_s_per_rpm), p_peak.value,
       t_peak.value);
   const T none = undefined<T>();
   out.efficiency_gross = out.heat_loss_fraction = out.ca10_cad = out.ca50_cad = out.ca90_cad = none;
   if (value_of(charge.fuel_heat_j) > 0.0) {
-    const Burn<T> burn(cylinder_, soc_cad, charge.burn_duration_cad);
+    const Burn<T> burn(cylinder_.burn, soc_cad, charge.burn_duration_cad);
     out.efficiency_gross = gross / charge.fuel_heat_j;
     out.heat_loss_fraction = loss / charge.fuel_heat_j;
     out.ca10_cad = burn.angle_of(0.1);

@@ -5,23 +5,21 @@
 #include "mgdd/common/enum_names.hpp"
 #include "mgdd/common/error.hpp"
 #include "mgdd/common/text.hpp"
+#include "mgdd/engine/gas.hpp"
 
 namespace mgdd::engine {
 namespace {
 
-void check(const FieldInfo& info, double value) {
-  const bool above = info.lower_open ? value > info.lower : value >= info.lower;
-  if (above && value <= info.upper) return;  // NaN fails both comparisons
-  std::string bound = (info.lower_open ? "must be > " : "must be >= ") + text(info.lower);
-  if (info.upper < unbounded) bound += " and <= " + text(info.upper);
-  if (info.name == "ivc_cad" && value > 0.0) {
-    bound +=
-        "; this looks like °bTDC: angles are °CA aTDC (firing TDC = 0, compression negative), so pass " + text(-value);
+// What a crank angle outside its domain probably is.
+std::string hint(std::string_view name, double value) {
+  if (name == "ivc_cad" && value > 0.0) {
+    return "; this looks like °bTDC: angles are °CA aTDC (firing TDC = 0, compression negative), so pass " +
+           text(-value);
   }
-  if (info.name == "evo_cad" && value > 180.0 && value <= 720.0) {
-    bound += "; angles are counted from firing TDC = 0 (gas-exchange TDC = 360)";
+  if (name == "evo_cad" && value > 180.0 && value <= 720.0) {
+    return "; angles are counted from firing TDC = 0 (gas-exchange TDC = 360)";
   }
-  throw ParameterError(info.name, value, bound, info.unit);
+  return "";
 }
 
 constexpr std::pair<GammaModel, std::string_view> gamma_names[] = {
@@ -43,54 +41,54 @@ constexpr std::pair<Integrator, std::string_view> integrator_names[] = {{Integra
 }  // namespace
 
 void validate(const Cylinder& c) {
-  if (c.ivc_cad >= c.evo_cad) {  // before the bounds, whose message would hide the real mistake
-    throw ParameterError("ivc_cad = " + text(c.ivc_cad) + " °CA aTDC: must be before evo_cad = " + text(c.evo_cad) +
-                         "; angles are °CA aTDC (firing TDC = 0, compression negative)" +
-                         (c.ivc_cad > 0.0 ? ", and " + text(c.ivc_cad) + " looks like °bTDC" : ""));
+  const GeometryParameters<double>& g = c.geometry;
+  if (g.ivc_cad >= g.evo_cad) {  // before the bounds, whose message would hide the real mistake
+    throw ParameterError("ivc_cad", g.ivc_cad,
+                         "must be before evo_cad = " + text(g.evo_cad) +
+                             "; angles are °CA aTDC (firing TDC = 0, compression negative)" +
+                             (g.ivc_cad > 0.0 ? ", and " + text(g.ivc_cad) + " looks like °bTDC" : ""),
+                         "°CA aTDC");
   }
-  for (const auto& field : cylinder_fields<double>())
-    check(field.info, c.*(field.member));
-  if (!(2.0 * c.connecting_rod_mm > c.stroke_mm)) {
-    throw ParameterError("connecting_rod_mm = " + text(c.connecting_rod_mm) +
-                         " mm: must be longer than the crank radius, half of stroke_mm = " + text(c.stroke_mm));
+  for (const auto& f : cylinder_fields<double>()) {
+    const double value = f.in(c);
+    if (f.info.domain.contains(value)) continue;
+    throw ParameterError(f.info.name, value, requirement(f.info.domain) + hint(f.info.name, value), f.info.unit);
+  }
+  if (!(2.0 * g.connecting_rod_mm > g.stroke_mm)) {
+    throw ParameterError("connecting_rod_mm", g.connecting_rod_mm,
+                         "must be longer than the crank radius, half of stroke_mm = " + text(g.stroke_mm), "mm");
   }
   // gamma(T) must stay above 1 over the temperatures a cycle can meet.
   for (const double t : {250.0, 1000.0, 2000.0, 3500.0}) {
-    const double linear = c.gamma_linear_300k + c.gamma_linear_slope_per_k * (t - 300.0);
-    const double poly = c.gamma_polynomial_c0 + t * (c.gamma_polynomial_c1_per_k + t * c.gamma_polynomial_c2_per_k2);
-    if (c.gamma_model == GammaModel::linear && !(linear > 1.0)) {
-      throw ParameterError("gamma_linear_slope_per_k = " + text(c.gamma_linear_slope_per_k) + ": gamma is " +
-                           text(linear) + " at " + text(t) + " K, must stay > 1");
-    }
-    if (c.gamma_model == GammaModel::polynomial && !(poly > 1.0)) {
-      throw ParameterError("gamma_polynomial_c1_per_k = " + text(c.gamma_polynomial_c1_per_k) + ": gamma is " +
-                           text(poly) + " at " + text(t) + " K, must stay > 1");
-    }
+    const double gamma = gamma_at(c.gas, t);
+    if (c.gas.gamma_model == GammaModel::constant || gamma > 1.0) continue;
+    const bool linear = c.gas.gamma_model == GammaModel::linear;
+    throw ParameterError(linear ? "gamma_linear_slope_per_k" : "gamma_polynomial_c1_per_k",
+                         linear ? c.gas.gamma_linear_slope_per_k : c.gas.gamma_polynomial_c1_per_k,
+                         "gamma is " + text(gamma) + " at " + text(t) + " K, must stay > 1");
   }
 }
 
 void validate(const OperatingPoint& p) {
-  for (const auto& field : operating_point_fields<double>())
-    check(field.info, p.*(field.member));
-  if (p.burn_duration_cad) check(burn_duration_info, *p.burn_duration_cad);
-  if (p.trapped_mass_g) check(trapped_mass_info, *p.trapped_mass_g);
+  require_fields(operating_point_fields<double>(), p);
+  if (p.burn_duration_cad) require_in(burn_duration_info, *p.burn_duration_cad);
+  if (p.trapped_mass_g) require_in(trapped_mass_info, *p.trapped_mass_g);
 }
 
 void validate_timing(std::string_view name, double value, const Cylinder& c) {
-  const std::string given = std::string(name) + " = " + text(value) + " °CA aTDC";
+  const auto refuse = [&](const std::string& why) { throw ParameterError(name, value, why, "°CA aTDC"); };
   if (value > timing_upper_cad && value <= 90.0) {
-    throw ParameterError(given + ": must be <= " + text(timing_upper_cad) +
-                         "; this looks like °bTDC: angles are °CA aTDC (firing TDC = 0, compression negative), so "
-                         "pass " +
-                         text(-value));
+    refuse("must be <= " + text(timing_upper_cad) +
+           "; this looks like °bTDC: angles are °CA aTDC (firing TDC = 0, compression negative), so pass " +
+           text(-value));
   }
   if (!(value >= timing_lower_cad && value <= timing_upper_cad)) {
-    throw ParameterError(given + ": must be in [" + text(timing_lower_cad) + ", " + text(timing_upper_cad) +
-                         "] °CA aTDC (firing TDC = 0, compression negative)");
+    refuse("must be in [" + text(timing_lower_cad) + ", " + text(timing_upper_cad) +
+           "] °CA aTDC (firing TDC = 0, compression negative)");
   }
-  if (!(value >= c.ivc_cad && value < c.evo_cad)) {
-    throw ParameterError(given + ": must lie in the closed part, from ivc_cad = " + text(c.ivc_cad) +
-                         " to evo_cad = " + text(c.evo_cad));
+  if (!(value >= c.geometry.ivc_cad && value < c.geometry.evo_cad)) {
+    refuse("must lie in the closed part, from ivc_cad = " + text(c.geometry.ivc_cad) +
+           " to evo_cad = " + text(c.geometry.evo_cad));
   }
 }
 

@@ -26,7 +26,7 @@ double interpolate(const std::vector<double>& x, const std::vector<double>& y, d
 // The motored cycle and what the chosen correlation needs of it.
 class Delay {
  public:
-  Delay(const Cylinder& cylinder, OperatingPoint point) : cylinder_(cylinder), speed_rpm_(point.speed_rpm) {
+  Delay(const Cylinder& cylinder, OperatingPoint point) : law_(cylinder.ignition), speed_rpm_(point.speed_rpm) {
     point.fuel_mg = 0.0;
     angle_ = crank_grid(cylinder);
     const CycleModel<double> model(cylinder, angle_);
@@ -43,7 +43,7 @@ class Delay {
   }
 
   bool by_integral() const noexcept {
-    return cylinder_.ignition_model == IgnitionModel::watson || cylinder_.ignition_model == IgnitionModel::wolfer;
+    return law_.ignition_model == IgnitionModel::watson || law_.ignition_model == IgnitionModel::wolfer;
   }
 
   double soc(double soi_cad) const {
@@ -107,21 +107,19 @@ class Delay {
   }
 
   double algebraic_delay_cad(double soi_cad) const {
-    if (cylinder_.ignition_model == IgnitionModel::polynomial) {
-      return cylinder_.ignition_c0_cad + soi_cad * (cylinder_.ignition_c1 + soi_cad * cylinder_.ignition_c2_per_cad);
+    if (law_.ignition_model == IgnitionModel::polynomial) {
+      return law_.ignition_c0_cad + soi_cad * (law_.ignition_c1 + soi_cad * law_.ignition_c2_per_cad);
     }
     return hardenberg_hase_delay_cad(interpolate(angle_, pressure_bar_, soi_cad),
-                                     interpolate(angle_, temperature_k_, soi_cad), cylinder_.cetane_number,
-                                     piston_speed_);
+                                     interpolate(angle_, temperature_k_, soi_cad), law_.cetane_number, piston_speed_);
   }
 
   // Cumulative trapezoid of dt/tau. It does not depend on SOI, so that the same table serves both directions.
   void accumulate() {
     const double ms_per_cad = 1e3 / (units::cad_per_s_per_rpm * speed_rpm_);
     const auto rate = [&](std::size_t k) {
-      return cylinder_.ignition_model == IgnitionModel::watson
-                 ? 1.0 / watson_delay_ms(pressure_bar_[k], temperature_k_[k])
-                 : 1.0 / wolfer_delay_ms(pressure_bar_[k], temperature_k_[k]);
+      return law_.ignition_model == IgnitionModel::watson ? 1.0 / watson_delay_ms(pressure_bar_[k], temperature_k_[k])
+                                                          : 1.0 / wolfer_delay_ms(pressure_bar_[k], temperature_k_[k]);
     };
     progress_.assign(1, 0.0);
     for (std::size_t k = 1; k < angle_.size(); ++k) {
@@ -129,7 +127,7 @@ class Delay {
     }
   }
 
-  const Cylinder& cylinder_;
+  const IgnitionParameters<double>& law_;
   double speed_rpm_;
   double piston_speed_ = 0.0;
   std::vector<double> angle_, pressure_bar_, temperature_k_, progress_;
@@ -164,9 +162,10 @@ IgnitionTiming start_of_combustion(const Cylinder& cylinder, const OperatingPoin
   check(cylinder, point, "soi_cad", soi_cad);
   const double soc = Delay(cylinder, point).soc(soi_cad);
   if (soc < soi_cad) {
-    throw ParameterError("ignition_c0_cad = " + text(cylinder.ignition_c0_cad) +
-                         " °CA: the polynomial gives a delay of " + text(soc - soi_cad) +
-                         " °CA at soi_cad = " + text(soi_cad) + ", must be >= 0");
+    throw ParameterError("ignition_c0_cad", cylinder.ignition.ignition_c0_cad,
+                         "the polynomial gives a delay of " + text(soc - soi_cad) +
+                             " °CA at soi_cad = " + text(soi_cad) + ", must be >= 0",
+                         "°CA");
   }
   return {soi_cad, soc, soc - soi_cad, !std::isnan(soc), false};
 }

@@ -27,14 +27,14 @@ T& find_input(CycleInputs<T>& inputs, std::string_view name) {
   if (name == "soc_cad") return inputs.soc_cad;
   if (name == "burn_duration_cad") {
     if (!inputs.point.burn_duration_cad) {
-      inputs.point.burn_duration_cad = burn_duration_cad(inputs.cylinder, inputs.point);
+      inputs.point.burn_duration_cad = burn_duration_cad(inputs.cylinder.burn, inputs.point);
     }
     return *inputs.point.burn_duration_cad;
   }
   if (name == "trapped_mass_g") {
     if (!inputs.point.trapped_mass_g) {
-      const Geometry<T> geometry(inputs.cylinder);
-      const T amount_mol = inputs.cylinder.volumetric_efficiency * inputs.point.intake_pressure_kpa *
+      const Geometry<T> geometry(inputs.cylinder.geometry);
+      const T amount_mol = inputs.cylinder.gas.volumetric_efficiency * inputs.point.intake_pressure_kpa *
                            units::pa_per_kpa * geometry.swept_m3 /
                            (inputs.point.intake_temperature_k * units::gas_constant_j_per_molk);
       inputs.point.trapped_mass_g = amount_mol * (units::air_molar_mass_kg_per_mol / units::kg_per_g);
@@ -42,10 +42,10 @@ T& find_input(CycleInputs<T>& inputs, std::string_view name) {
     return *inputs.point.trapped_mass_g;
   }
   for (const auto& field : operating_point_fields<T>()) {
-    if (field.info.name == name) return inputs.point.*(field.member);
+    if (field.info.name == name) return field.in(inputs.point);
   }
   for (const auto& field : cylinder_fields<T>()) {
-    if (field.info.name == name && !places_grid(name)) return inputs.cylinder.*(field.member);
+    if (field.info.name == name && !places_grid(name)) return field.in(inputs.cylinder);
   }
   refuse(name);
 }

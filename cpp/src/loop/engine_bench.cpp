@@ -180,8 +180,9 @@ BenchCycle EngineBench::step(double soc_cad) noexcept {
 
   if (settings_.wall_heat_drift_per_kcycle != 0.0) {
     engine::Cylinder drifted = settings_.cylinder;
-    drifted.wall_heat_scale = std::clamp(
-        drifted.wall_heat_scale + settings_.wall_heat_drift_per_kcycle * elapsed_kcycles(), 0.0, wall_heat_upper);
+    drifted.wall_heat.wall_heat_scale =
+        std::clamp(drifted.wall_heat.wall_heat_scale + settings_.wall_heat_drift_per_kcycle * elapsed_kcycles(), 0.0,
+                   wall_heat_upper);
     model_.set_cylinder(drifted);
   }
   if (cycle_ == 0) start(at, applied);

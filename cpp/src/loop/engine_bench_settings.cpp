@@ -97,8 +97,9 @@ NoxSensor parse_nox_sensor(std::string_view name) {
 }
 
 std::array<double, 2> closed_part(const engine::Cylinder& c) noexcept {
-  const double lead = c.burn_shape == engine::BurnShape::double_wiebe ? std::fmin(0.0, c.second_delay_cad) : 0.0;
-  return {c.ivc_cad - lead, std::nextafter(c.evo_cad, c.ivc_cad)};
+  const double lead =
+      c.burn.burn_shape == engine::BurnShape::double_wiebe ? std::fmin(0.0, c.burn.second_delay_cad) : 0.0;
+  return {c.geometry.ivc_cad - lead, std::nextafter(c.geometry.evo_cad, c.geometry.ivc_cad)};
 }
 
 std::array<double, 2> timing_window(const engine::Cylinder& c) noexcept {

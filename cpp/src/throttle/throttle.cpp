@@ -13,10 +13,13 @@ namespace {
 
 using T = Throttle;
 constexpr std::array field_table{
-    field<&T::inertia_kgm2>({"inertia_kgm2", "kg m²", above(0.0, 1.0), "inertia of plate, gears and motor at the plate"}),
+    field<&T::inertia_kgm2>(
+        {"inertia_kgm2", "kg m²", above(0.0, 1.0), "inertia of plate, gears and motor at the plate"}),
     field<&T::viscous_nms_per_rad>({"viscous_nms_per_rad", "N m s/rad", closed(0.0, 100.0), "viscous friction"}),
-    field<&T::torque_constant_nm_per_a>({"torque_constant_nm_per_a", "N m/A", above(0.0, 100.0), "motor torque per current at the plate"}),
-    field<&T::back_emf_vs_per_rad>({"back_emf_vs_per_rad", "V s/rad", closed(0.0, 100.0), "motor voltage per plate speed"}),
+    field<&T::torque_constant_nm_per_a>(
+        {"torque_constant_nm_per_a", "N m/A", above(0.0, 100.0), "motor torque per current at the plate"}),
+    field<&T::back_emf_vs_per_rad>(
+        {"back_emf_vs_per_rad", "V s/rad", closed(0.0, 100.0), "motor voltage per plate speed"}),
     field<&T::resistance_ohm>({"resistance_ohm", "ohm", above(0.0, 1e4), "armature resistance"}),
     field<&T::inductance_mh>({"inductance_mh", "mH", closed(0.0, 1e4), "armature inductance"}),
     field<&T::supply_v>({"supply_v", "V", above(0.0, 100.0), "supply of the bridge"}),
@@ -26,27 +29,39 @@ constexpr std::array field_table{
     field<&T::coulomb_nm>({"coulomb_nm", "N m", closed(0.0, 100.0), "Coulomb friction"}),
     field<&T::stiction_nm>({"stiction_nm", "N m", closed(0.0, 100.0), "breakaway friction"}),
     field<&T::stribeck_rad_per_s>({"stribeck_rad_per_s", "rad/s", above(0.0, 1e3), "speed of the Stribeck curve"}),
-    field<&T::karnopp_rad_per_s>({"karnopp_rad_per_s", "rad/s", above(0.0, 1e3), "half band of rest of Karnopp's form"}),
+    field<&T::karnopp_rad_per_s>(
+        {"karnopp_rad_per_s", "rad/s", above(0.0, 1e3), "half band of rest of Karnopp's form"}),
     field<&T::tanh_rad_per_s>({"tanh_rad_per_s", "rad/s", above(0.0, 1e3), "width of the smooth form"}),
     field<&T::bristle_nm_per_rad>({"bristle_nm_per_rad", "N m/rad", above(0.0, 1e6), "LuGre bristle stiffness"}),
-    field<&T::bristle_damping_nms_per_rad>({"bristle_damping_nms_per_rad", "N m s/rad", closed(0.0, 1e3), "LuGre bristle damping"}),
+    field<&T::bristle_damping_nms_per_rad>(
+        {"bristle_damping_nms_per_rad", "N m s/rad", closed(0.0, 1e3), "LuGre bristle damping"}),
     field<&T::limp_home_deg>({"limp_home_deg", "deg", closed(-360.0, 360.0), "rest angle without current"}),
-    field<&T::spring_above_nm_per_rad>({"spring_above_nm_per_rad", "N m/rad", closed(0.0, 1e4), "spring above limp-home"}),
-    field<&T::spring_below_nm_per_rad>({"spring_below_nm_per_rad", "N m/rad", closed(0.0, 1e4), "spring below limp-home"}),
+    field<&T::spring_above_nm_per_rad>(
+        {"spring_above_nm_per_rad", "N m/rad", closed(0.0, 1e4), "spring above limp-home"}),
+    field<&T::spring_below_nm_per_rad>(
+        {"spring_below_nm_per_rad", "N m/rad", closed(0.0, 1e4), "spring below limp-home"}),
     field<&T::preload_above_nm>({"preload_above_nm", "N m", closed(0.0, 100.0), "preload above limp-home"}),
     field<&T::preload_below_nm>({"preload_below_nm", "N m", closed(0.0, 100.0), "preload below limp-home"}),
-    field<&T::preload_ramp_deg>({"preload_ramp_deg", "deg", above(0.0, 45.0), "half width over which the preload changes sign"}),
+    field<&T::preload_ramp_deg>(
+        {"preload_ramp_deg", "deg", above(0.0, 45.0), "half width over which the preload changes sign"}),
     field<&T::closed_deg>({"closed_deg", "deg", closed(-360.0, 360.0), "lower end stop"}),
     field<&T::open_deg>({"open_deg", "deg", closed(-360.0, 360.0), "upper end stop"}),
-    field<&T::stop_stiffness_nm_per_rad>({"stop_stiffness_nm_per_rad", "N m/rad", above(0.0, 1e7), "stiffness of the end stops"}),
-    field<&T::stop_damping_nms_per_rad>({"stop_damping_nms_per_rad", "N m s/rad", closed(0.0, 1e5), "damping of the end stops"}),
+    field<&T::stop_stiffness_nm_per_rad>(
+        {"stop_stiffness_nm_per_rad", "N m/rad", above(0.0, 1e7), "stiffness of the end stops"}),
+    field<&T::stop_damping_nms_per_rad>(
+        {"stop_damping_nms_per_rad", "N m s/rad", closed(0.0, 1e5), "damping of the end stops"}),
     field<&T::backlash_half_deg>({"backlash_half_deg", "deg", above(0.0, 10.0), "half gap of the gear"}),
-    field<&T::gear_stiffness_nm_per_rad>({"gear_stiffness_nm_per_rad", "N m/rad", above(0.0, 1e6), "contact stiffness of the gear"}),
-    field<&T::gear_damping_nms_per_rad>({"gear_damping_nms_per_rad", "N m s/rad", closed(0.0, 1e3), "contact damping of the gear"}),
-    field<&T::plate_inertia_kgm2>({"plate_inertia_kgm2", "kg m²", above(0.0, 1.0), "inertia on the plate's side of the gap"}),
-    field<&T::plate_friction_share>({"plate_friction_share", "-", closed(0.0, 1.0), "share of the friction on the plate's side of the gap"}),
+    field<&T::gear_stiffness_nm_per_rad>(
+        {"gear_stiffness_nm_per_rad", "N m/rad", above(0.0, 1e6), "contact stiffness of the gear"}),
+    field<&T::gear_damping_nms_per_rad>(
+        {"gear_damping_nms_per_rad", "N m s/rad", closed(0.0, 1e3), "contact damping of the gear"}),
+    field<&T::plate_inertia_kgm2>(
+        {"plate_inertia_kgm2", "kg m²", above(0.0, 1.0), "inertia on the plate's side of the gap"}),
+    field<&T::plate_friction_share>(
+        {"plate_friction_share", "-", closed(0.0, 1.0), "share of the friction on the plate's side of the gap"}),
     field<&T::bore_mm>({"bore_mm", "mm", above(0.0, 1e3), "bore of the throttle"}),
-    field<&T::pressure_drop_kpa>({"pressure_drop_kpa", "kPa", closed(0.0, 200.0), "pressure drop that loads the plate"}),
+    field<&T::pressure_drop_kpa>(
+        {"pressure_drop_kpa", "kPa", closed(0.0, 200.0), "pressure drop that loads the plate"}),
 };
 
 constexpr std::pair<Friction, std::string_view> friction_table[] = {
@@ -82,9 +97,9 @@ void validate(const Throttle& t) {
     throw ParameterError("open_deg", t.open_deg, "must be above closed_deg = " + text(t.closed_deg), "deg");
   }
   if (!(t.limp_home_deg >= t.closed_deg && t.limp_home_deg <= t.open_deg)) {
-    throw ParameterError(
-        "limp_home_deg", t.limp_home_deg,
-        "must lie between closed_deg = " + text(t.closed_deg) + " and open_deg = " + text(t.open_deg), "deg");
+    throw ParameterError("limp_home_deg", t.limp_home_deg,
+                         "must lie between closed_deg = " + text(t.closed_deg) + " and open_deg = " + text(t.open_deg),
+                         "deg");
   }
   if (t.friction != Friction::coulomb && t.friction != Friction::tanh && !(t.stiction_nm >= t.coulomb_nm)) {
     throw ParameterError("stiction_nm", t.stiction_nm,

@@ -11,19 +11,19 @@ namespace {
 
 std::vector<Cylinder> laws() {
   std::vector<Cylinder> all(5);
-  all[1].burn_shape = BurnShape::wiebe;
-  all[2].burn_shape = BurnShape::double_wiebe;
-  all[3].burn_shape = BurnShape::double_wiebe;
-  all[3].second_delay_cad = -4.0;  // the second law may start first
-  all[4].burn_shape = BurnShape::wiebe;
-  all[4].wiebe_a = 2.0;
-  all[4].wiebe_m = -0.3;
+  all[1].burn.burn_shape = BurnShape::wiebe;
+  all[2].burn.burn_shape = BurnShape::double_wiebe;
+  all[3].burn.burn_shape = BurnShape::double_wiebe;
+  all[3].burn.second_delay_cad = -4.0;  // the second law may start first
+  all[4].burn.burn_shape = BurnShape::wiebe;
+  all[4].burn.wiebe_a = 2.0;
+  all[4].burn.wiebe_m = -0.3;
   return all;
 }
 
 TEST(EngineBurn, FractionRisesFromZeroToOne) {
   for (const Cylinder& c : laws()) {
-    const Burn<double> burn(c, -6.3, 31.7);
+    const Burn<double> burn(c.burn, -6.3, 31.7);
     EXPECT_EQ(burn.fraction(burn.start_cad()), 0.0);
     EXPECT_DOUBLE_EQ(burn.fraction(burn.end_cad()), 1.0);
     EXPECT_DOUBLE_EQ(burn.fraction(burn.end_cad() + 100.0), 1.0);
@@ -37,7 +37,7 @@ TEST(EngineBurn, FractionRisesFromZeroToOne) {
 
 TEST(EngineBurn, AngleInvertsTheFraction) {
   for (const Cylinder& c : laws()) {
-    const Burn<double> burn(c, -6.3, 31.7);
+    const Burn<double> burn(c.burn, -6.3, 31.7);
     for (const double x : {0.01, 0.1, 0.5, 0.9, 0.99}) {
       EXPECT_NEAR(burn.fraction(burn.angle_of(x)), x, 1e-12);
     }
@@ -46,8 +46,8 @@ TEST(EngineBurn, AngleInvertsTheFraction) {
 
 TEST(EngineBurn, SlopeIntegratesToOne) {
   for (const Cylinder& c : laws()) {
-    if (c.wiebe_m < 0.0) continue;  // its slope is infinite at the start
-    const Burn<double> burn(c, -6.3, 31.7);
+    if (c.burn.wiebe_m < 0.0) continue;  // its slope is infinite at the start
+    const Burn<double> burn(c.burn, -6.3, 31.7);
     double total = 0.0;
     for (double a = -20.0; a < 60.0; a += 0.01) {
       total += 0.01 * burn.slope_at(a + 0.005);
@@ -57,7 +57,7 @@ TEST(EngineBurn, SlopeIntegratesToOne) {
 }
 
 TEST(EngineBurn, TriangleByHand) {
-  const Burn<double> burn(Cylinder{}, -6.0, 30.0);
+  const Burn<double> burn(Cylinder{}.burn, -6.0, 30.0);
   EXPECT_NEAR(burn.angle_of(0.5) + 6.0, 15.0, 1e-12);
   EXPECT_NEAR((burn.angle_of(0.9) - burn.angle_of(0.1)) / 30.0, 1.0 - 2.0 * std::sqrt(0.05), 1e-12);
   EXPECT_NEAR(1.0 - 2.0 * std::sqrt(0.05), 0.5528, 5e-5);
@@ -67,8 +67,8 @@ TEST(EngineBurn, TriangleByHand) {
 
 TEST(EngineBurn, WiebeByHand) {
   Cylinder c;
-  c.burn_shape = BurnShape::wiebe;
-  const Burn<double> burn(c, 0.0, 1.0);
+  c.burn.burn_shape = BurnShape::wiebe;
+  const Burn<double> burn(c.burn, 0.0, 1.0);
   const double whole = 1.0 - std::exp(-6.908);
   EXPECT_NEAR(burn.fraction(0.3), (1.0 - std::exp(-6.908 * std::pow(0.3, 2.5))) / whole, 1e-15);
   EXPECT_NEAR(burn.angle_of(0.5), std::pow(std::log(2.0) / 6.908, 0.4), 3e-4);  // before renormalisation
@@ -81,32 +81,32 @@ TEST(EngineBurn, WiebeByHand) {
 
 TEST(EngineBurn, DoubleWiebeIsTheWeightedSum) {
   Cylinder c;
-  c.burn_shape = BurnShape::double_wiebe;
-  const Burn<double> both(c, -6.0, 20.0);
+  c.burn.burn_shape = BurnShape::double_wiebe;
+  const Burn<double> both(c.burn, -6.0, 20.0);
   for (const double a : {-5.0, -1.0, 5.0, 20.0, 45.0}) {
-    const double first = wiebe_fraction((a + 6.0) / 20.0, c.wiebe_a, c.wiebe_m);
-    const double second = wiebe_fraction((a + 3.0) / 50.0, c.wiebe_a, c.second_wiebe_m);
+    const double first = wiebe_fraction((a + 6.0) / 20.0, c.burn.wiebe_a, c.burn.wiebe_m);
+    const double second = wiebe_fraction((a + 3.0) / 50.0, c.burn.wiebe_a, c.burn.second_wiebe_m);
     EXPECT_NEAR(both.fraction(a), 0.4 * first + 0.6 * second, 1e-15);
   }
-  c.second_fraction = 0.0;
-  const Burn<double> one(c, -6.0, 20.0);
-  c.burn_shape = BurnShape::wiebe;
-  const Burn<double> plain(c, -6.0, 20.0);
+  c.burn.second_fraction = 0.0;
+  const Burn<double> one(c.burn, -6.0, 20.0);
+  c.burn.burn_shape = BurnShape::wiebe;
+  const Burn<double> plain(c.burn, -6.0, 20.0);
   EXPECT_DOUBLE_EQ(one.fraction(3.3), plain.fraction(3.3));
 }
 
 TEST(EngineBurn, DurationLaw) {
   const Cylinder c;
   OperatingPoint p;
-  EXPECT_DOUBLE_EQ(burn_duration_cad(c, p), 30.0);
+  EXPECT_DOUBLE_EQ(burn_duration_cad(c.burn, p), 30.0);
   p.fuel_mg = 40.0;
   p.speed_rpm = 3000.0;
-  EXPECT_NEAR(burn_duration_cad(c, p), 30.0 * std::pow(2.0, 0.9), 1e-12);
+  EXPECT_NEAR(burn_duration_cad(c.burn, p), 30.0 * std::pow(2.0, 0.9), 1e-12);
   p.burn_duration_cad = 17.0;
-  EXPECT_EQ(burn_duration_cad(c, p), 17.0);
+  EXPECT_EQ(burn_duration_cad(c.burn, p), 17.0);
   p = {};
   p.fuel_mg = 0.0;
-  EXPECT_EQ(burn_duration_cad(c, p), 30.0);
+  EXPECT_EQ(burn_duration_cad(c.burn, p), 30.0);
 }
 
 }  // namespace

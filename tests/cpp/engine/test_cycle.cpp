@@ -42,7 +42,7 @@ TEST(EngineCycle, ReleasesTheFuelEnergyForAnyStartAndDuration) {
   std::uniform_real_distribution<double> start(-25.0, 10.0), duration(1.5, 90.0);
   EngineCase c;
   for (const BurnShape shape : shapes) {
-    c.cylinder.burn_shape = shape;
+    c.cylinder.burn.burn_shape = shape;
     for (int i = 0; i < 200; ++i) {
       c.soc_cad = start(random);
       c.point.burn_duration_cad = duration(random);
@@ -55,7 +55,7 @@ TEST(EngineCycle, ReleasesTheFuelEnergyForAnyStartAndDuration) {
 TEST(EngineCycle, HeatBeforeTheGridIsLost) {
   const EngineCase c("burn_shape=double_wiebe ivc_cad=-50 soc_cad=-45 second_delay_cad=-15");
   const Cycle cycle = run(c);
-  const Burn<double> burn(c.cylinder, c.soc_cad, 30.0);
+  const Burn<double> burn(c.cylinder.burn, c.soc_cad, 30.0);
   const double lost = burn.fraction(-50.0);
   EXPECT_GT(lost, 0.01);
   EXPECT_NEAR(sum(cycle.work.heat_release_j), 856.0 * (1.0 - lost), 1e-9);
@@ -69,7 +69,7 @@ TEST(EngineCycle, StepGammaBelongsToTheMeanTemperature) {
     for (std::size_t k = 0; k + 1 < cycle.work.pressure_pa.size(); ++k) {
       const double mean = 0.5 * (cycle.temperature_k(cycle.model.angles_cad()[k]) +
                                  cycle.temperature_k(cycle.model.angles_cad()[k + 1]));
-      EXPECT_NEAR(cycle.work.gamma[k], gamma_at(c.cylinder, mean), 1e-6) << law;
+      EXPECT_NEAR(cycle.work.gamma[k], gamma_at(c.cylinder.gas, mean), 1e-6) << law;
     }
   }
 }
@@ -81,9 +81,9 @@ TEST(EngineCycle, ObeysTheFirstLawInEveryVariant) {
       for (const WallHeatModel wall : walls) {
         for (const BurnShape shape : shapes) {
           c.integrator = integrator;
-          c.cylinder.gamma_model = gamma;
-          c.cylinder.wall_heat_model = wall;
-          c.cylinder.burn_shape = shape;
+          c.cylinder.gas.gamma_model = gamma;
+          c.cylinder.wall_heat.wall_heat_model = wall;
+          c.cylinder.burn.burn_shape = shape;
           const Cycle cycle = run(c);
           double worst = 0.0;
           for (std::size_t k = 0; k + 1 < cycle.work.pressure_pa.size(); ++k) {
@@ -121,7 +121,7 @@ TEST(EngineCycle, EnergyBalanceClosesWithHandBookedWork) {
 
 TEST(EngineCycle, AdiabaticMotoredCompressionIsTheClosedForm) {
   EngineCase c("fuel_mg=0 wall_heat_scale=0");
-  const Geometry<double> g(c.cylinder);
+  const Geometry<double> g(c.cylinder.geometry);
   const double top_bar = 1.5 * std::pow(g.volume_m3(-140.0) / g.volume_m3(0.0), 1.37);
   EXPECT_NEAR(top_bar, 70.904, 5e-4);
   EXPECT_NEAR(run(c).pressure_bar(0.0), top_bar, 5e-4 * top_bar);
@@ -242,11 +242,11 @@ TEST(EngineCycle, SettingACylinderEqualsBuildingANewModel) {
   for (const GammaModel gamma : gammas) {
     for (const auto& field : cylinder_fields<double>()) {
       EngineCase c = start;
-      c.cylinder.gamma_model = gamma;
+      c.cylinder.gas.gamma_model = gamma;
       const std::vector<double> grid = crank_grid(c.cylinder);
       CycleModel<double> reused(c.cylinder, grid);
-      const double old = c.cylinder.*(field.member);
-      c.cylinder.*(field.member) = old * 1.03 + (old == 0.0 ? 0.01 : 0.0);
+      const double old = field.in(c.cylinder);
+      field.in(c.cylinder) = old * 1.03 + (old == 0.0 ? 0.01 : 0.0);
       reused.set_cylinder(c.cylinder);
       const CycleModel<double> fresh(c.cylinder, grid);
       CycleWorkspace<double> a = reused.make_workspace(), b = fresh.make_workspace();

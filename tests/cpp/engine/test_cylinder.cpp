@@ -33,11 +33,12 @@ void check_bounds(const Fields& fields) {
   const Record good;
   EXPECT_NO_THROW(validate(good));
   for (const auto& field : fields) {
-    const double below = field.info.lower_open ? field.info.lower : field.info.lower - 1e-6;
-    const double above = field.info.upper * (field.info.upper > 0.0 ? 1.0 + 1e-9 : 1.0) + 1e-6;
-    for (const double bad : {std::nan(""), infinity, -infinity, below, above}) {
+    const Domain& domain = field.info.domain;
+    const double below = domain.lower_open ? domain.lower : domain.lower - 1e-6;
+    const double beyond = domain.upper * (domain.upper > 0.0 ? 1.0 + 1e-9 : 1.0) + 1e-6;
+    for (const double bad : {std::nan(""), infinity, -infinity, below, beyond}) {
       Record record = good;
-      record.*(field.member) = bad;
+      field.in(record) = bad;
       const std::string message = refusal([&] { validate(record); });
       EXPECT_NE(message, "accepted") << field.info.name << " " << bad;
       const bool order = contains(message, "before evo_cad");  // IVC after EVO is said as such
@@ -46,7 +47,7 @@ void check_bounds(const Fields& fields) {
     }
     EXPECT_FALSE(field.info.unit.empty());
     EXPECT_FALSE(field.info.meaning.empty());
-    EXPECT_LT(field.info.lower, field.info.upper);
+    EXPECT_LT(domain.lower, domain.upper);
   }
 }
 
@@ -65,16 +66,16 @@ TEST(EngineCylinder, EveryFieldRefusesWhatIsOutsideItsDomain) {
 
 TEST(EngineCylinder, CrossRules) {
   Cylinder c;
-  c.connecting_rod_mm = 43.0;
+  c.geometry.connecting_rod_mm = 43.0;
   EXPECT_TRUE(contains(refusal([&] { validate(c); }), "connecting_rod_mm = 43 mm: must be longer"));
   c = {};
-  c.ivc_cad = 140.0;
+  c.geometry.ivc_cad = 140.0;
   EXPECT_TRUE(contains(refusal([&] { validate(c); }), "looks like °bTDC"));
   c = {};
-  c.gamma_model = GammaModel::linear;
-  c.gamma_linear_slope_per_k = -1.9e-4;
+  c.gas.gamma_model = GammaModel::linear;
+  c.gas.gamma_linear_slope_per_k = -1.9e-4;
   EXPECT_TRUE(contains(refusal([&] { validate(c); }), "must stay > 1"));
-  c.gamma_model = GammaModel::constant;  // then the slope is not in use
+  c.gas.gamma_model = GammaModel::constant;  // then the slope is not in use
   EXPECT_EQ(refusal([&] { validate(c); }), "accepted");
 }
 
@@ -90,7 +91,7 @@ TEST(EngineCylinder, TimingMustLieInItsWindowAndInTheClosedPart) {
   EXPECT_TRUE(contains(message, "soc_cad = 25 °CA aTDC")) << message;
   EXPECT_TRUE(contains(message, "°bTDC") && contains(message, "pass -25")) << message;
   Cylinder late = c;
-  late.ivc_cad = -30.0;
+  late.geometry.ivc_cad = -30.0;
   EXPECT_TRUE(contains(refusal([&] { validate_timing("soc_cad", -40.0, late); }), "closed part"));
 }
 
@@ -116,19 +117,19 @@ TEST(EngineCylinder, NamesGoBothWays) {
 
 TEST(EngineCylinder, LiftKeepsEveryFieldAndAddsNoDerivative) {
   Cylinder c;
-  c.burn_shape = BurnShape::double_wiebe;
-  c.wall_heat_model = WallHeatModel::hohenberg;
-  c.gamma_model = GammaModel::polynomial;
-  c.ignition_model = IgnitionModel::wolfer;
+  c.burn.burn_shape = BurnShape::double_wiebe;
+  c.wall_heat.wall_heat_model = WallHeatModel::hohenberg;
+  c.gas.gamma_model = GammaModel::polynomial;
+  c.ignition.ignition_model = IgnitionModel::wolfer;
   double value = 1.25;
   for (const auto& field : cylinder_fields<double>()) {
-    c.*(field.member) = value *= 1.01;
+    field.in(c) = value *= 1.01;
   }
   const auto lifted = lift<Dual<4>>(c);
   constexpr auto fields = cylinder_fields<double>();
   constexpr auto duals = cylinder_fields<Dual<4>>();
   for (std::size_t i = 0; i < fields.size(); ++i) {
-    EXPECT_EQ((lifted.*(duals[i].member)), Dual<4>(c.*(fields[i].member))) << fields[i].info.name;
+    EXPECT_EQ(duals[i].in(lifted), Dual<4>(fields[i].in(c))) << fields[i].info.name;
   }
   EXPECT_EQ(lift<double>(c), c);
 }

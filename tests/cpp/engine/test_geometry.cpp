@@ -9,7 +9,7 @@ namespace mgdd::engine {
 namespace {
 
 TEST(EngineGeometry, DeadCentresAreExact) {
-  const Geometry<double> g{Cylinder{}};
+  const Geometry<double> g{GeometryParameters<double>{}};
   EXPECT_NEAR(g.swept_m3, 0.25 * std::numbers::pi * 0.086 * 0.086 * 0.086, 1e-18);
   EXPECT_NEAR(g.volume_m3(0.0), g.swept_m3 / 17.2, 1e-18);
   EXPECT_NEAR(g.volume_m3(180.0) / (g.swept_m3 * 18.2 / 17.2), 1.0, 1e-14);
@@ -18,7 +18,7 @@ TEST(EngineGeometry, DeadCentresAreExact) {
 
 // Piston pin on the cylinder axis: its height is the crank pin's plus the leg of a right triangle.
 TEST(EngineGeometry, FollowsThePinOfTheMechanism) {
-  const Geometry<double> g{Cylinder{}};
+  const Geometry<double> g{GeometryParameters<double>{}};
   for (double angle = -180.0; angle <= 180.0; angle += 7.5) {
     const double phi = angle * std::numbers::pi / 180.0;
     const double pin = 0.043 * std::cos(phi) + std::sqrt(0.155 * 0.155 - std::pow(0.043 * std::sin(phi), 2));
@@ -32,7 +32,7 @@ TEST(EngineGeometry, FollowsThePinOfTheMechanism) {
 }
 
 TEST(EngineGeometry, SlopeIntegratesToTheVolume) {
-  const Geometry<double> g{Cylinder{}};
+  const Geometry<double> g{GeometryParameters<double>{}};
   double volume = g.volume_m3(-140.0);
   for (double a = -140.0; a < 130.0 - 1e-9; a += 1.0) {  // Simpson
     volume +=
@@ -44,9 +44,9 @@ TEST(EngineGeometry, SlopeIntegratesToTheVolume) {
 
 TEST(EngineGeometry, BowlFactorScalesTheDiscsOnly) {
   Cylinder c;
-  const Geometry<double> flat(c);
-  c.bowl_area_factor = 1.4;
-  const Geometry<double> bowl(c);
+  const Geometry<double> flat(c.geometry);
+  c.geometry.bowl_area_factor = 1.4;
+  const Geometry<double> bowl(c.geometry);
   EXPECT_NEAR(bowl.wall_area_m2(1e-4) - flat.wall_area_m2(1e-4), 0.8 * flat.piston_area_m2, 1e-15);
   EXPECT_DOUBLE_EQ(flat.mean_piston_speed_m_per_s(1500.0), 4.3);
 }

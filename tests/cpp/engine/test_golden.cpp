@@ -35,7 +35,7 @@ double optimum(const EngineCase& given, const std::string& wanted) {
 }
 
 double geometry(const EngineCase& c, const GoldenRow& row) {
-  const Geometry<double> g(c.cylinder);
+  const Geometry<double> g(c.cylinder.geometry);
   if (row.quantity == "swept_volume_l") return g.swept_m3 / units::m3_per_l;
   if (row.quantity == "clearance_volume_l") return g.clearance_m3 / units::m3_per_l;
   if (row.quantity == "volume_l") return g.volume_m3(row.at) / units::m3_per_l;
@@ -47,7 +47,7 @@ double simulated(const EngineCase& c, const GoldenRow& row) {
   const Cycle cycle = run(c);
   const double amount_mol = cycle.charge.gas_j_per_k / units::gas_constant_j_per_molk;
   if (row.quantity == "amount_mol") return amount_mol;
-  if (row.quantity == "alpha_k_per_j") return (c.cylinder.gamma - 1.0) / cycle.charge.gas_j_per_k;
+  if (row.quantity == "alpha_k_per_j") return (c.cylinder.gas.gamma - 1.0) / cycle.charge.gas_j_per_k;
   if (row.quantity == "pressure_bar") return cycle.pressure_bar(row.at);
   if (row.quantity == "temperature_k") return cycle.temperature_k(row.at);
   if (row.quantity == "nox_arrhenius_ppm") return NoxProxy{}.arrhenius_ppm(cycle.indicators.t_max_k);

@@ -31,8 +31,8 @@ std::size_t allocations(const EngineCase& c) {
   CycleWorkspace<T> work = model.make_workspace();
   const BasicOperatingPoint<T> point = lift<T>(c.point);
   BasicCylinder<T> other = model.cylinder();
-  other.gamma = other.gamma + 0.01;
-  other.bore_mm = other.bore_mm + 1.0;
+  other.gas.gamma = other.gas.gamma + 0.01;
+  other.geometry.bore_mm = other.geometry.bore_mm + 1.0;
   const AllocationCounter counter;
   for (int i = 0; i < 3; ++i) {
     model.set_cylinder(other);
@@ -53,9 +53,9 @@ TEST(EngineRealTime, NothingIsAllocatedInAnyVariant) {
           for (const double fuel : {0.0, 20.0}) {
             EngineCase c;
             c.integrator = integrator;
-            c.cylinder.gamma_model = gamma;
-            c.cylinder.wall_heat_model = wall;
-            c.cylinder.burn_shape = burn;
+            c.cylinder.gas.gamma_model = gamma;
+            c.cylinder.wall_heat.wall_heat_model = wall;
+            c.cylinder.burn.burn_shape = burn;
             c.point.fuel_mg = fuel;
             EXPECT_EQ(allocations<double>(c), 0u) << to_string(integrator) << " " << to_string(burn);
             EXPECT_EQ(allocations<Dual<4>>(c), 0u) << to_string(integrator) << " " << to_string(burn);

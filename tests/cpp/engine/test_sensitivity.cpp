@@ -79,9 +79,9 @@ TEST(EngineSensitivity, AgreesWithDifferencesForEveryInputAndLaw) {
     for (const auto gamma : {GammaModel::constant, GammaModel::linear, GammaModel::polynomial}) {
       for (const auto wall : {WallHeatModel::woschni, WallHeatModel::hohenberg}) {
         EngineCase c = smooth();
-        c.cylinder.burn_shape = shape;
-        c.cylinder.gamma_model = gamma;
-        c.cylinder.wall_heat_model = wall;
+        c.cylinder.burn.burn_shape = shape;
+        c.cylinder.gas.gamma_model = gamma;
+        c.cylinder.wall_heat.wall_heat_model = wall;
         compare(c, std::string(to_string(shape)) + " " + std::string(to_string(gamma)));
       }
     }
@@ -100,7 +100,7 @@ TEST(EngineSensitivity, AgreesWithDifferencesForEveryIntegrator) {
 TEST(EngineSensitivity, TimingMovesTheBurnAndNothingBeforeIt) {
   EngineCase c;
   for (const auto shape : {BurnShape::triangle, BurnShape::wiebe, BurnShape::double_wiebe}) {
-    c.cylinder.burn_shape = shape;
+    c.cylinder.burn.burn_shape = shape;
     const Sensitivities s = sensitivities(c.cylinder, c.point, -6.3, {"soc_cad"});
     EXPECT_NEAR(s.indicators[0].ca10_cad, 1.0, 1e-9);
     EXPECT_NEAR(s.indicators[0].ca50_cad, 1.0, 1e-9);

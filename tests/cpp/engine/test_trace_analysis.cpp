@@ -110,7 +110,7 @@ TEST(EngineTrace, InletPeggingTakesTheMeanAroundBottomDeadCentre) {
 
 TEST(EngineTrace, OneDegreeOfTdcErrorCostsNinePercentOfImep) {
   EngineCase c;
-  const Geometry<double> g(c.cylinder);
+  const Geometry<double> g(c.cylinder.geometry);
   const auto change_percent = [&](double offset) {
     const Cycle cycle = run(c);
     const std::vector<double> p = cycle.pressures_bar(), angle = cycle.angles();
@@ -199,7 +199,7 @@ TEST(EngineTrace, ASoundTraceRaisesNoWarning) {
 }
 
 TEST(EngineTrace, PolytropicExponentOfAPolytropicTrace) {
-  const Geometry<double> g{Cylinder{}};
+  const Geometry<double> g{GeometryParameters<double>{}};
   std::vector<double> angle, p;
   for (double a = -140.0; a <= 130.0; a += 1.0) {
     angle.push_back(a);

@@ -69,7 +69,7 @@ struct Plant {
   }
   engine::Cylinder start() const {
     engine::Cylinder c = truth.cylinder;
-    c.wall_heat_scale = 0.3;
+    c.wall_heat.wall_heat_scale = 0.3;
     return c;
   }
 };
@@ -78,7 +78,7 @@ TEST(IdentifyFit, RecoversTheTruthWithoutNoise) {
   const Plant plant;
   const CylinderFit f = fit(plant.traces, plant.start(), with(burn_names, {"wall_heat_scale"}));
   EXPECT_TRUE(f.report.success());
-  EXPECT_NEAR(f.cylinder.wall_heat_scale, 0.8, 0.8e-6);
+  EXPECT_NEAR(f.cylinder.wall_heat.wall_heat_scale, 0.8, 0.8e-6);
   EXPECT_NEAR(f.loads[0].burn.soc_cad, -5.0, 5e-6);
   EXPECT_NEAR(f.loads[1].burn.soc_cad, -9.0, 9e-6);
   EXPECT_NEAR(f.loads[0].burn.burn_duration_cad, 42.0, 42e-6);
@@ -114,7 +114,7 @@ TEST(IdentifyFit, WallHeatIsIdentifiableWithKnownFuel) {
   start[1].fuel_heat_j = 24.0 * 42.8;
   const CylinderFit f = fit_cylinder(plant.traces, plant.start(), start, free, {});
   EXPECT_TRUE(f.report.unidentifiable.empty());
-  EXPECT_NEAR(f.cylinder.wall_heat_scale, 0.8, 4.0 * f.report.standard_error[0]);
+  EXPECT_NEAR(f.cylinder.wall_heat.wall_heat_scale, 0.8, 4.0 * f.report.standard_error[0]);
   EXPECT_LT(f.report.standard_error[0], 0.02 * 0.8);
   const CylinderFit blind = fit(plant.traces, plant.start(), with(free, {"fuel_heat_j"}));
   EXPECT_GT(blind.report.standard_error[0], 1.5 * f.report.standard_error[0]);
@@ -142,8 +142,8 @@ TEST(IdentifyFit, MeasuredTracesMeetTheReferenceFits) {
     if (!fits.contains(row.settings)) {
       const EngineCase c(row.settings);
       engine::Cylinder cylinder = test_support::hd_cylinder();
-      cylinder.burn_shape = c.cylinder.burn_shape;
-      cylinder.gamma_model = c.cylinder.gamma_model;
+      cylinder.burn.burn_shape = c.cylinder.burn.burn_shape;
+      cylinder.gas.gamma_model = c.cylinder.gas.gamma_model;
       std::vector<std::string> free = with(burn_names, {"wall_heat_scale"});
       if (c.words.contains("free")) free.push_back(c.words.at("free"));
       fits[row.settings] = fit(test_support::hd_traces(c.words.at("traces") == "hd"), cylinder, free);
@@ -168,8 +168,8 @@ TEST(IdentifyFit, DoubleWiebeMeetsItsBarAndMeasuredTracesDoNotTellTheWallHeat) {
     EXPECT_LE(load.rmse_percent, 1.0);
     EXPECT_LE(std::abs(load.imep_closed_error_percent), 3.0);
   }
-  c.burn_shape = BurnShape::double_wiebe;
-  c.gamma_model = GammaModel::constant;
+  c.burn.burn_shape = BurnShape::double_wiebe;
+  c.gas.gamma_model = GammaModel::constant;
   const std::vector<std::string> shape =
       with(burn_names, {"wiebe_m", "second_fraction", "second_delay_cad", "second_duration_cad", "second_wiebe_m"});
   const CylinderFit both = fit(traces, c, with(shape, {"wall_heat_scale"}));
@@ -180,7 +180,7 @@ TEST(IdentifyFit, DoubleWiebeMeetsItsBarAndMeasuredTracesDoNotTellTheWallHeat) {
   }
   // The profile is flat: any scale fits within a few tenths of a percent.
   for (const auto& [scale, percent] : {std::pair{0.0, 0.30}, std::pair{0.5, 0.21}, std::pair{1.0, 0.20}}) {
-    c.wall_heat_scale = scale;
+    c.wall_heat.wall_heat_scale = scale;
     const double rmse = 100.0 * fit(traces, c, shape).report.rmse;
     EXPECT_LE(rmse, percent + 0.005);
     EXPECT_GE(rmse, percent - 0.04);
@@ -226,8 +226,8 @@ TEST(IdentifyFit, BadInputIsRefusedByNameAndChangesNothing) {
   refuses([](auto& t, auto&, auto&, auto&) { t[1].pressure_bar[3] = std::nan(""); }, "pressure_bar[3]");
   refuses([](auto& t, auto&, auto&, auto&) { t[1].pressure_bar[3] = -0.2; }, "peg it");
   refuses([](auto& t, auto&, auto&, auto&) { t[0].point.speed_rpm = -1.0; }, "speed_rpm = -1");
-  refuses([](auto&, auto&, auto&, auto& c) { c.bore_mm = -86.0; }, "bore_mm = -86");
-  refuses([](auto&, auto&, auto&, auto& c) { c.ivc_cad = -100.0; }, "cut it to the closed part");
+  refuses([](auto&, auto&, auto&, auto& c) { c.geometry.bore_mm = -86.0; }, "bore_mm = -86");
+  refuses([](auto&, auto&, auto&, auto& c) { c.geometry.ivc_cad = -100.0; }, "cut it to the closed part");
   EXPECT_TRUE(fit(plant.traces, plant.start(), burn_names).report.success());
   CylinderFitOptions options;
   options.step_cad = 0.0;
@@ -247,7 +247,7 @@ TEST(IdentifyFit, ParameterListsAreDisjoint) {
   }
   LoadBurn burn;
   burn.second_wiebe_m = 1.9;
-  EXPECT_EQ(with_burn(engine::Cylinder{}, burn).second_wiebe_m, 1.9);
+  EXPECT_EQ(with_burn(engine::Cylinder{}, burn).burn.second_wiebe_m, 1.9);
 }
 
 }  // namespace

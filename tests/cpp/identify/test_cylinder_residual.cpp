@@ -65,7 +65,7 @@ struct Problem {
   }
   static engine::Cylinder cylinder(BurnShape shape) {
     engine::Cylinder c = test_support::hd_cylinder();
-    c.burn_shape = shape;
+    c.burn.burn_shape = shape;
     return c;
   }
 };
@@ -110,7 +110,7 @@ TEST(IdentifyResidual, IsModelMinusMeasuredOverPeak) {
     }
     EXPECT_EQ(r[static_cast<Index>(t * 267)], 0.0);  // the first sample is p(IVC)
   }
-  EXPECT_EQ(p.residual.cylinder(p.x).wall_heat_scale, 0.6);
+  EXPECT_EQ(p.residual.cylinder(p.x).wall_heat.wall_heat_scale, 0.6);
   EXPECT_EQ(p.residual.burn(1, p.x).fuel_heat_j, 5000.0);
 }
 

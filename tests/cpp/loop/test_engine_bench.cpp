@@ -216,7 +216,7 @@ TEST(EngineBench, DriftMovesTimingAndWallHeat) {
     c = bench.step(-6.0);
   EXPECT_DOUBLE_EQ(c.soc_cad, -5.0);
   engine::Cylinder worn;
-  worn.wall_heat_scale = 0.7;
+  worn.wall_heat.wall_heat_scale = 0.7;
   EXPECT_DOUBLE_EQ(c.indicators.efficiency_gross, cycle_of(worn, {}, -5.0).efficiency_gross);
   bench.reset(0);
   EXPECT_EQ(bench.step(-6.0).indicators.efficiency_gross, cycle_of({}, {}, -6.0).efficiency_gross);
@@ -254,8 +254,8 @@ TEST(EngineBench, RequestsOutsideTheWindowAreClampedAndFlagged) {
   EXPECT_EQ(late.soc_cad, 20.0);
   EXPECT_TRUE(late.clamped);
   engine::Cylinder narrow;
-  narrow.ivc_cad = -40.0;
-  narrow.evo_cad = 15.0;
+  narrow.geometry.ivc_cad = -40.0;
+  narrow.geometry.evo_cad = 15.0;
   EXPECT_EQ(timing_window(narrow)[0], -40.0);
   EXPECT_LT(timing_window(narrow)[1], 15.0);
 }

@@ -131,7 +131,7 @@ TEST(EngineBenchState, NothingIsAllocatedWithAnyOption) {
             s.efficiency_noise_percent *= chance;
             s.misfire_probability = 0.3 * chance;
             s.soc_drift_cad_per_kcycle = s.wall_heat_drift_per_kcycle = drift;
-            s.cylinder.burn_shape = shape;
+            s.cylinder.burn.burn_shape = shape;
             s.schedule.back().cycle = 2;
             EngineBench bench(s);
             const test_support::AllocationCounter counter;
@@ -164,7 +164,7 @@ TEST(EngineBenchSettings, EveryFieldIsCheckedByName) {
     EXPECT_EQ(message(spoil).substr(0, text.size()), text);
   };
   EXPECT_EQ(message([](auto&) {}), "accepted");
-  starts("bore_mm = -1 mm: must be > 0", [](auto& s) { s.cylinder.bore_mm = -1.0; });
+  starts("bore_mm = -1 mm: must be > 0", [](auto& s) { s.cylinder.geometry.bore_mm = -1.0; });
   starts("step_cad = 9 °CA: must be in", [](auto& s) { s.step_cad = 9.0; });
   starts("schedule is empty: must have", [](auto& s) { s.schedule.clear(); });
   starts("schedule[0].cycle = 4: must be 0", [](auto& s) { s.schedule[0].cycle = 4; });
@@ -189,7 +189,7 @@ TEST(EngineBenchSettings, EveryFieldIsCheckedByName) {
   starts("limits has 9 entries: must be at most 8", [](auto& s) { s.limits.assign(9, "p_max_bar"); });
   EXPECT_THROW(parse_nox_sensor("nose"), ParameterError);
   BenchSettings cold;
-  cold.cylinder.wall_heat_scale = 100.0;
+  cold.cylinder.wall_heat.wall_heat_scale = 100.0;
   cold.schedule[0].point.speed_rpm = 10.0;
   EXPECT_THROW(EngineBench{cold}, ConvergenceError);
 }

@@ -32,13 +32,13 @@ std::vector<std::vector<std::string>> read_csv(const std::string& path) {
 
 void set(EngineCase& c, const std::string& name, const std::string& value) {
   if (name == "burn_shape") {
-    c.cylinder.burn_shape = engine::parse_burn_shape(value);
+    c.cylinder.burn.burn_shape = engine::parse_burn_shape(value);
   } else if (name == "gamma_model") {
-    c.cylinder.gamma_model = engine::parse_gamma_model(value);
+    c.cylinder.gas.gamma_model = engine::parse_gamma_model(value);
   } else if (name == "wall_heat_model") {
-    c.cylinder.wall_heat_model = engine::parse_wall_heat_model(value);
+    c.cylinder.wall_heat.wall_heat_model = engine::parse_wall_heat_model(value);
   } else if (name == "ignition_model") {
-    c.cylinder.ignition_model = engine::parse_ignition_model(value);
+    c.cylinder.ignition.ignition_model = engine::parse_ignition_model(value);
   } else if (name == "integrator") {
     c.integrator = engine::parse_integrator(value);
   } else if (name == "soc_cad") {
@@ -54,13 +54,13 @@ void set(EngineCase& c, const std::string& name, const std::string& value) {
   } else {
     for (const auto& field : engine::operating_point_fields<double>()) {
       if (field.info.name == name) {
-        c.point.*(field.member) = std::stod(value);
+        field.in(c.point) = std::stod(value);
         return;
       }
     }
     for (const auto& field : engine::cylinder_fields<double>()) {
       if (field.info.name == name) {
-        c.cylinder.*(field.member) = std::stod(value);
+        field.in(c.cylinder) = std::stod(value);
         return;
       }
     }

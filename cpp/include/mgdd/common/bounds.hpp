@@ -23,7 +23,9 @@ struct Domain {
     return (lower_open ? value > lower : value >= lower) && (upper_open ? value < upper : value <= upper);
   }
   /// The nearest number between the bounds.
-  constexpr double clamped(double value) const noexcept { return value < lower ? lower : upper < value ? upper : value; }
+  constexpr double clamped(double value) const noexcept {
+    return value < lower ? lower : upper < value ? upper : value;
+  }
 };
 
 /// [lower, upper]

@@ -45,7 +45,7 @@ struct Burn {
   T complete{1.0};                                                     // 1 - exp(-a)
   T second_fraction, second_delay_cad, second_duration_cad, second_m;  // double Wiebe (Miyamoto et al. 1985)
 
-  Burn(const BasicCylinder<T>& c, const T& soc, const T& duration) noexcept
+  Burn(const BurnParameters<T>& c, const T& soc, const T& duration) noexcept
       : shape(c.burn_shape),
         soc_cad(soc),
         duration_cad(duration),
@@ -116,7 +116,7 @@ struct Burn {
   /// dX/dphi [1/°CA], exact, through a one-direction dual in the angle.
   double slope_at(double crank_angle_cad) const noexcept {
     using One = Dual<1>;
-    BasicCylinder<One> c;
+    BurnParameters<One> c;
     c.burn_shape = shape;
     c.wiebe_a = value_of(a);
     c.wiebe_m = value_of(m);

@@ -7,7 +7,7 @@ namespace mgdd::engine {
 
 /// gamma(T): constant (Tan 2018), linear (Gatowski et al. 1984) or polynomial (Brunt, Rai and Emtage 1998).
 template <class T>
-T gamma_at(const BasicCylinder<T>& c, const T& temperature_k) noexcept {
+T gamma_at(const GasParameters<T>& c, const T& temperature_k) noexcept {
   switch (c.gamma_model) {
     case GammaModel::linear:
       return c.gamma_linear_300k + c.gamma_linear_slope_per_k * (temperature_k - 300.0);

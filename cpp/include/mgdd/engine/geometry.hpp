@@ -16,7 +16,7 @@ struct Geometry {
   T rod_ratio;    ///< [-] connecting rod over crank radius, R of eq. 2-1
   T area_factor;  ///< [-]
 
-  explicit Geometry(const BasicCylinder<T>& c) noexcept
+  explicit Geometry(const GeometryParameters<T>& c) noexcept
       : bore_m(c.bore_mm * units::m_per_mm),
         stroke_m(c.stroke_mm * units::m_per_mm),
         rod_ratio(c.connecting_rod_mm * 2.0 / c.stroke_mm),

@@ -72,14 +72,13 @@ template <class T>
 class WallHeat {
  public:
   /// Volume part of h A dt for a step of `step_cad`: area times V^-0.55 (Woschni) or V^-0.46 (Hohenberg).
-  static T volume_term(const BasicCylinder<T>& c, const Geometry<T>& g, const T& volume_m3, double step_cad) noexcept {
+  static T volume_term(WallHeatModel model, const Geometry<T>& g, const T& volume_m3, double step_cad) noexcept {
     using std::pow;
-    return g.wall_area_m2(volume_m3) * pow(volume_m3, c.wall_heat_model == WallHeatModel::woschni ? -0.55 : -0.46) *
-           step_cad;
+    return g.wall_area_m2(volume_m3) * pow(volume_m3, model == WallHeatModel::woschni ? -0.55 : -0.46) * step_cad;
   }
 
   /// `ref_pressure_pa` is p(IVC); `gas_j_per_k` is N R.
-  WallHeat(const BasicCylinder<T>& c, const Geometry<T>& g, const T& ref_pressure_pa, const T& gas_j_per_k,
+  WallHeat(const WallHeatParameters<T>& c, const Geometry<T>& g, const T& ref_pressure_pa, const T& gas_j_per_k,
            const T& speed_rpm) noexcept
       : wall_k_(c.wall_temperature_k) {
     using std::pow;

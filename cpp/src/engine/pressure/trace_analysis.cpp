@@ -78,11 +78,12 @@ void check_options(const TraceOptions& o) {
 
 void add_warnings(TraceAnalysis& a, const Cylinder& cylinder, const TraceOptions& options, std::size_t first,
                   std::size_t last) {
-  if (a.angle_cad.front() > cylinder.ivc_cad + coverage_cad || a.angle_cad.back() < cylinder.evo_cad - coverage_cad) {
+  if (a.angle_cad.front() > cylinder.geometry.ivc_cad + coverage_cad ||
+      a.angle_cad.back() < cylinder.geometry.evo_cad - coverage_cad) {
     a.warnings.push_back(
         "the trace spans " + text(a.angle_cad.front()) + " to " + text(a.angle_cad.back()) +
-        " °CA aTDC of the closed part from ivc_cad = " + text(cylinder.ivc_cad) +
-        " to evo_cad = " + text(cylinder.evo_cad) +
+        " °CA aTDC of the closed part from ivc_cad = " + text(cylinder.geometry.ivc_cad) +
+        " to evo_cad = " + text(cylinder.geometry.evo_cad) +
         ": its work is not the closed-cycle work, and without a trapped mass its temperature is wrong");
   }
   if (a.n_compression < 1.25 || a.n_compression > 1.42) {
@@ -142,7 +143,7 @@ AnalysisGamma parse_analysis_gamma(std::string_view t) {
 
 double polytropic_exponent(const Column& angle, const Column& pressure, const Cylinder& cylinder, double from_cad,
                            double to_cad) {
-  const Geometry<double> geometry(cylinder);
+  const Geometry<double> geometry(cylinder.geometry);
   double n = 0.0, sx = 0.0, sy = 0.0, sxx = 0.0, sxy = 0.0;
   for (std::size_t k = 0; k < angle.size(); ++k) {
     if (angle[k] < from_cad - 1e-9 || angle[k] > to_cad + 1e-9 || !(pressure[k] > 0.0)) continue;
@@ -157,7 +158,7 @@ double polytropic_exponent(const Column& angle, const Column& pressure, const Cy
 double pegging_offset_bar(const Column& angle, const Column& pressure, const Cylinder& cylinder,
                           const TraceOptions& options) {
   check_options(options);
-  const Geometry<double> geometry(cylinder);
+  const Geometry<double> geometry(cylinder.geometry);
   const double n = options.pegging_exponent;
   switch (options.pegging) {
     case Pegging::none:
@@ -199,14 +200,14 @@ TraceAnalysis analyze_trace(const Column& angle_cad, const Column& pressure_bar,
   TraceAnalysis a;
   a.pegging_bar = pegging_offset_bar(angle_cad, pressure_bar, cylinder, options);
   for (std::size_t k = 0; k < angle_cad.size(); ++k) {
-    if (angle_cad[k] < cylinder.ivc_cad - 1e-9 || angle_cad[k] > cylinder.evo_cad + 1e-9) continue;
+    if (angle_cad[k] < cylinder.geometry.ivc_cad - 1e-9 || angle_cad[k] > cylinder.geometry.evo_cad + 1e-9) continue;
     a.angle_cad.push_back(angle_cad[k]);
     a.pressure_bar.push_back(pressure_bar[k] + a.pegging_bar);
   }
   const std::size_t n = a.angle_cad.size();
   if (n < 20) {
-    throw DataError("only " + std::to_string(n) + " samples lie between ivc_cad = " + text(cylinder.ivc_cad) +
-                    " and evo_cad = " + text(cylinder.evo_cad) + ": an analysis needs at least 20");
+    throw DataError("only " + std::to_string(n) + " samples lie between ivc_cad = " + text(cylinder.geometry.ivc_cad) +
+                    " and evo_cad = " + text(cylinder.geometry.evo_cad) + ": an analysis needs at least 20");
   }
   for (std::size_t k = 0; k < n; ++k) {
     if (!(a.pressure_bar[k] > 0.0)) {
@@ -241,7 +242,7 @@ TraceAnalysis analyze_trace(const Column& angle_cad, const Column& pressure_bar,
   for (std::size_t k = 0; k + 1 < n; ++k) {
     const double mean_k = 0.5 * (a.temperature_k[k] + a.temperature_k[k + 1]);
     double gamma = options.gamma;
-    if (options.gamma_source == AnalysisGamma::cylinder) gamma = gamma_at(cylinder, mean_k);
+    if (options.gamma_source == AnalysisGamma::cylinder) gamma = gamma_at(cylinder.gas, mean_k);
     if (options.gamma_source == AnalysisGamma::split) {
       gamma = a.angle_cad[k] < options.burn_from_cad ? options.gamma_compression : options.gamma_combustion;
     }

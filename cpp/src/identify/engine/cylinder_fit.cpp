@@ -5,7 +5,7 @@
 #include <cstddef>
 #include <utility>
 
-#include "mgdd/common/error.hpp"
+#include "mgdd/common/bounds.hpp"
 #include "mgdd/common/text.hpp"
 #include "mgdd/common/units.hpp"
 #include "mgdd/engine/burn.hpp"
@@ -17,16 +17,12 @@
 namespace mgdd::identify {
 namespace {
 
-// Search bounds of the common parameters that have tighter ones than their field: the calibration offline searches
-// wall heat up to 2.5 times the textbook law.
-constexpr SearchDomain common_domains[] = {{"wall_heat_scale", "-", 0.0, wall_heat_scale_upper, false}};
-
 bool places_grid(std::string_view name) {
   return name == "ivc_cad" || name == "evo_cad";
 }
 bool is_load_field(std::string_view name) {
   const auto fields = load_fields<double>();
-  return std::any_of(fields.begin(), fields.end(), [&](const auto& f) { return f.domain.name == name; });
+  return std::any_of(fields.begin(), fields.end(), [&](const auto& f) { return f.info.name == name; });
 }
 
 struct Free {
@@ -43,7 +39,7 @@ Free resolve(const std::vector<std::string>& names) {
     bool found = false;
     const auto loads = load_fields<double>();
     for (std::size_t k = 0; k < loads.size(); ++k) {
-      if (loads[k].domain.name == names[i]) free.load.push_back(k), found = true;
+      if (loads[k].info.name == names[i]) free.load.push_back(k), found = true;
     }
     const auto common = engine::cylinder_fields<double>();
     for (std::size_t k = 0; k < common.size() && !found; ++k) {
@@ -60,24 +56,20 @@ Free resolve(const std::vector<std::string>& names) {
   return free;
 }
 
-SearchDomain domain_of(const engine::FieldInfo& info) {
-  for (const SearchDomain& d : common_domains) {
-    if (d.name == info.name) return d;
-  }
-  const double open = info.lower_open ? 1e-6 * std::max(1.0, std::abs(info.lower)) : 0.0;
-  return {info.name, info.unit, info.lower + open, info.upper, false};
+// The calibration offline searches wall heat up to 2.5 times the textbook law, everything else in its domain.
+optimize::Parameter common_parameter(FieldInfo info) {
+  if (info.name == "wall_heat_scale") info.domain = closed(0.0, wall_heat_scale_upper);
+  return optimize::parameter_of(info, std::string(info.name));
 }
 
 std::vector<optimize::Parameter> describe(const Free& free, const std::vector<MeasuredCycle>& traces) {
   std::vector<optimize::Parameter> out;
-  for (const std::size_t k : free.common) {
-    const SearchDomain d = domain_of(engine::cylinder_fields<double>()[k].info);
-    out.push_back({std::string(d.name), d.lower, d.upper, d.log_scaled});
-  }
+  for (const std::size_t k : free.common)
+    out.push_back(common_parameter(engine::cylinder_fields<double>()[k].info));
   for (const MeasuredCycle& trace : traces) {
     for (const std::size_t k : free.load) {
-      const SearchDomain d = load_fields<double>()[k].domain;
-      out.push_back({std::string(d.name) + "[" + trace.label + "]", d.lower, d.upper, d.log_scaled});
+      const FieldInfo info = load_fields<double>()[k].info;
+      out.push_back(optimize::parameter_of(info, std::string(info.name) + "[" + trace.label + "]"));
     }
   }
   return out;
@@ -91,28 +83,25 @@ void check_inputs(const std::vector<MeasuredCycle>& traces, const engine::Cylind
     throw ShapeError("start has " + std::to_string(start.size()) + " entries for " + std::to_string(traces.size()) +
                      " traces");
   }
-  if (!(options.step_cad >= engine::step_lower_cad && options.step_cad <= engine::step_upper_cad)) {
-    throw ParameterError("step_cad = " + text(options.step_cad) + " °CA: must be in [0.001, 5]");
-  }
+  require_within("step_cad", options.step_cad, engine::step_lower_cad, engine::step_upper_cad, "°CA");
   for (std::size_t t = 0; t < start.size(); ++t) {
     for (const auto& field : load_fields<double>()) {
-      const double value = start[t].*(field.member);
-      if (value >= field.domain.lower && value <= field.domain.upper) continue;
-      throw ParameterError("start of " + std::string(field.domain.name) + "[" + traces[t].label + "] = " + text(value) +
-                           ": must be in [" + text(field.domain.lower) + ", " + text(field.domain.upper) + "]");
+      const std::string name = "start of " + std::string(field.info.name) + "[" + traces[t].label + "]";
+      require_in(field.info.domain, name, field.in(start[t]));
     }
   }
   for (const MeasuredCycle& trace : traces) {
     engine::validate(trace.point);
     engine::check_trace(trace.angle_cad, trace.pressure_bar);
-    if (trace.angle_cad.front() < cylinder.ivc_cad - 1e-9 || trace.angle_cad.back() > cylinder.evo_cad + 1e-9) {
+    if (trace.angle_cad.front() < cylinder.geometry.ivc_cad - 1e-9 ||
+        trace.angle_cad.back() > cylinder.geometry.evo_cad + 1e-9) {
       throw DataError("trace '" + trace.label + "' spans " + text(trace.angle_cad.front()) + " to " +
-                      text(trace.angle_cad.back()) + " °CA aTDC, beyond ivc_cad = " + text(cylinder.ivc_cad) +
-                      " to evo_cad = " + text(cylinder.evo_cad) + ": cut it to the closed part");
+                      text(trace.angle_cad.back()) + " °CA aTDC, beyond ivc_cad = " + text(cylinder.geometry.ivc_cad) +
+                      " to evo_cad = " + text(cylinder.geometry.evo_cad) + ": cut it to the closed part");
     }
-    if (!trace.point.trapped_mass_g && trace.angle_cad.front() > cylinder.ivc_cad + 15.0) {
+    if (!trace.point.trapped_mass_g && trace.angle_cad.front() > cylinder.geometry.ivc_cad + 15.0) {
       throw DataError("trace '" + trace.label + "' starts at " + text(trace.angle_cad.front()) +
-                      " °CA aTDC, ivc_cad = " + text(cylinder.ivc_cad) +
+                      " °CA aTDC, ivc_cad = " + text(cylinder.geometry.ivc_cad) +
                       ": give its trapped_mass_g, which p(IVC) cannot tell here");
     }
     if (*std::min_element(trace.pressure_bar.begin(), trace.pressure_bar.end()) <= 0.0) {
@@ -134,7 +123,7 @@ double closed_imep_bar(const MeasuredCycle& trace, const std::vector<double>& pr
 LoadFit compare(const MeasuredCycle& trace, const engine::Cylinder& cylinder, CylinderResidual& residual,
                 std::size_t index, const Eigen::VectorXd& x) {
   CylinderResidual::Simulated model = residual.simulate(index, x);
-  const engine::Geometry<double> geometry(cylinder);
+  const engine::Geometry<double> geometry(cylinder.geometry);
   LoadFit fit;
   fit.burn = residual.burn(index, x);
   fit.p_max_bar = residual.p_max_bar(index);
@@ -179,7 +168,7 @@ Eigen::MatrixXd correlation_if_free(const optimize::FitReport& report, CylinderR
 std::vector<std::string> load_parameters() {
   std::vector<std::string> names;
   for (const auto& field : load_fields<double>())
-    names.emplace_back(field.domain.name);
+    names.emplace_back(field.info.name);
   return names;
 }
 
@@ -201,20 +190,20 @@ LoadBurn estimate_burn(const MeasuredCycle& trace, const engine::Cylinder& cylin
                     "cannot be fitted to it");
   }
   LoadBurn burn;
-  burn.wiebe_m = cylinder.wiebe_m;
-  burn.second_fraction = cylinder.second_fraction;
-  burn.second_delay_cad = cylinder.second_delay_cad;
-  burn.second_duration_cad = cylinder.second_duration_cad;
-  burn.second_wiebe_m = cylinder.second_wiebe_m;
+  burn.wiebe_m = cylinder.burn.wiebe_m;
+  burn.second_fraction = cylinder.burn.second_fraction;
+  burn.second_delay_cad = cylinder.burn.second_delay_cad;
+  burn.second_duration_cad = cylinder.burn.second_duration_cad;
+  burn.second_wiebe_m = cylinder.burn.second_wiebe_m;
   // Angles of 10 and 90 % of a burn that starts at 0 and lasts 1 CAD give the law's own proportions.
-  engine::Cylinder unit = cylinder;
+  engine::BurnParameters<double> unit = cylinder.burn;
   if (unit.burn_shape == engine::BurnShape::double_wiebe) unit.burn_shape = engine::BurnShape::wiebe;
   const engine::Burn<double> law(unit, 0.0, 1.0);
   const double s10 = law.angle_of(0.1);
   burn.burn_duration_cad = (a.ca90_cad - a.ca10_cad) / (law.angle_of(0.9) - s10);
   burn.soc_cad = a.ca10_cad - s10 * burn.burn_duration_cad;
   burn.fuel_heat_j = 1.1 * a.heat_net_j_total;
-  if (cylinder.burn_shape == engine::BurnShape::double_wiebe) {
+  if (cylinder.burn.burn_shape == engine::BurnShape::double_wiebe) {
     // Split the single burn into a short first and a long second part; the fit settles their shares.
     burn.second_fraction = 0.6;
     burn.second_delay_cad = 2.0;
@@ -223,7 +212,7 @@ LoadBurn estimate_burn(const MeasuredCycle& trace, const engine::Cylinder& cylin
     burn.wiebe_m = burn.second_wiebe_m = 1.0;
   }
   for (const auto& field : load_fields<double>()) {
-    burn.*(field.member) = std::clamp(burn.*(field.member), field.domain.lower, field.domain.upper);
+    field.in(burn) = field.info.domain.clamped(field.in(burn));
   }
   return burn;
 }
@@ -237,10 +226,10 @@ CylinderFit fit_cylinder(const std::vector<MeasuredCycle>& traces, const engine:
   Eigen::VectorXd x(residual.n_parameters());
   Eigen::Index i = 0;
   for (const std::size_t k : chosen.common)
-    x[i++] = cylinder.*(engine::cylinder_fields<double>()[k].member);
+    x[i++] = engine::cylinder_fields<double>()[k].in(cylinder);
   for (const LoadBurn& burn : start) {
     for (const std::size_t k : chosen.load)
-      x[i++] = burn.*(load_fields<double>()[k].member);
+      x[i++] = load_fields<double>()[k].in(burn);
   }
   optimize::LeastSquares search(describe(chosen, traces), residual.n_residuals(), options.search);
   CylinderFit fit;

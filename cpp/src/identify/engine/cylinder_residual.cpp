@@ -77,10 +77,10 @@ BasicLoadBurn<T> CylinderResidual::load_burn(std::size_t trace, const Eigen::Vec
   constexpr auto from = load_fields<double>();
   constexpr auto to = load_fields<T>();
   for (std::size_t i = 0; i < to.size(); ++i)
-    burn.*(to[i].member) = T(start_[trace].*(from[i].member));
+    to[i].in(burn) = T(from[i].in(start_[trace]));
   for (std::size_t i = 0; i < load_.size(); ++i) {
     const std::size_t active = common_.size() + i;
-    burn.*(to[load_[i]].member) = as_variable<T>(x[column(trace, active)], active, first_lane);
+    to[load_[i]].in(burn) = as_variable<T>(x[column(trace, active)], active, first_lane);
   }
   return burn;
 }
@@ -91,7 +91,7 @@ engine::BasicCylinder<T> CylinderResidual::cylinder_of(const Eigen::VectorXd& x,
   engine::BasicCylinder<T> c = engine::lift<T>(base_);
   constexpr auto fields = engine::cylinder_fields<T>();
   for (std::size_t i = 0; i < common_.size(); ++i) {
-    c.*(fields[common_[i]].member) = as_variable<T>(x[static_cast<Eigen::Index>(i)], i, first_lane);
+    fields[common_[i]].in(c) = as_variable<T>(x[static_cast<Eigen::Index>(i)], i, first_lane);
   }
   return c;
 }
@@ -104,7 +104,7 @@ engine::Charge<T> CylinderResidual::charge(const Load& load, const engine::Cycle
   const double first_pa = load.trace->pressure_bar.front() * units::pa_per_bar;
   point.intake_pressure_kpa = T(first_pa / units::pa_per_kpa);
   point.burn_duration_cad = burn.burn_duration_cad;
-  point.fuel_mg = burn.fuel_heat_j / c.lower_heating_value_mj_per_kg;
+  point.fuel_mg = burn.fuel_heat_j / c.gas.lower_heating_value_mj_per_kg;
   engine::Charge<T> charge = model.charge(point);
   charge.pressure_pa = T(first_pa);
   return charge;

@@ -34,9 +34,7 @@ constexpr std::array option_fields{
 }  // namespace
 
 Parameter parameter_of(const FieldInfo& field, std::string name) {
-  const auto off = [](bool open, double bound) {
-    return open ? off_open_bound * std::max(1.0, std::abs(bound)) : 0.0;
-  };
+  const auto off = [](bool open, double bound) { return open ? off_open_bound * std::max(1.0, std::abs(bound)) : 0.0; };
   const Domain& d = field.domain;
   return {std::move(name), d.lower + off(d.lower_open, d.lower), d.upper - off(d.upper_open, d.upper), d.log_scaled};
 }

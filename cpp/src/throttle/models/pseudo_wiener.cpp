@@ -31,14 +31,16 @@ constexpr std::array<std::pair<LagStart, std::string_view>, 2> starts{{
 
 constexpr std::array<FieldInfo, n_pw_r> pw_r_fields{{
     {"above_tau_s", "s", log_scale(0.005, 0.3), "time constant J/b above limp-home"},
-    {"above_gain_deg_per_s2_per_duty", "deg/s² per duty", log_scale(1e4, 4e5), "acceleration per duty G above limp-home"},
+    {"above_gain_deg_per_s2_per_duty", "deg/s² per duty", log_scale(1e4, 4e5),
+     "acceleration per duty G above limp-home"},
     {"above_preload_duty", "-", closed(0.0, 0.5), "preload beta above limp-home"},
     {"above_spring_duty_per_deg", "duty/deg", log_scale(1e-5, 2e-2), "spring kappa above limp-home"},
     {"above_coulomb_duty", "-", log_scale(0.003, 0.3), "dry friction delta above limp-home"},
     {"above_square_per_deg", "1/deg", closed(-5e-3, 5e-3), "c2 of the static map above limp-home"},
     {"above_cube_per_deg2", "1/deg²", closed(-5e-5, 5e-5), "c3 of the static map above limp-home"},
     {"below_tau_s", "s", log_scale(0.005, 0.3), "time constant J/b below limp-home"},
-    {"below_gain_deg_per_s2_per_duty", "deg/s² per duty", log_scale(1e4, 4e5), "acceleration per duty G below limp-home"},
+    {"below_gain_deg_per_s2_per_duty", "deg/s² per duty", log_scale(1e4, 4e5),
+     "acceleration per duty G below limp-home"},
     {"below_preload_duty", "-", closed(0.0, 0.5), "preload beta below limp-home"},
     {"below_spring_duty_per_deg", "duty/deg", log_scale(1e-5, 2e-2), "spring kappa below limp-home"},
     {"below_coulomb_duty", "-", log_scale(0.003, 0.3), "dry friction delta below limp-home"},

@@ -5,11 +5,11 @@
 
 #include <array>
 #include <string>
-#include <string_view>
 #include <vector>
 
 #include <Eigen/Core>
 
+#include "mgdd/common/field.hpp"
 #include "mgdd/engine/cycle.hpp"
 #include "mgdd/engine/cylinder.hpp"
 #include "mgdd/optimize/least_squares/fit_report.hpp"
@@ -42,31 +42,20 @@ struct BasicLoadBurn {
 };
 using LoadBurn = BasicLoadBurn<double>;
 
-/// Search domain of a parameter: bounds, and whether it is searched as a logarithm.
-struct SearchDomain {
-  std::string_view name, unit;
-  double lower, upper;
-  bool log_scaled;
-};
-
-template <class T>
-struct LoadField {
-  SearchDomain domain;
-  T BasicLoadBurn<T>::* member;
-};
-
+/// Fields of a load's burn; their domains are the bounds of the search.
 template <class T>
 constexpr auto load_fields() {
   using B = BasicLoadBurn<T>;
-  using F = LoadField<T>;
-  return std::array{F{{"soc_cad", "°CA aTDC", -30.0, engine::timing_upper_cad, false}, &B::soc_cad},
-                    F{{"burn_duration_cad", "°CA", 2.0, 150.0, true}, &B::burn_duration_cad},
-                    F{{"fuel_heat_j", "J", 1e-2, 1e6, true}, &B::fuel_heat_j},
-                    F{{"wiebe_m", "-", 0.0, 5.0, false}, &B::wiebe_m},
-                    F{{"second_fraction", "-", 0.0, 1.0, false}, &B::second_fraction},
-                    F{{"second_delay_cad", "°CA", 0.0, 40.0, false}, &B::second_delay_cad},
-                    F{{"second_duration_cad", "°CA", 5.0, 150.0, true}, &B::second_duration_cad},
-                    F{{"second_wiebe_m", "-", 0.0, 5.0, false}, &B::second_wiebe_m}};
+  return std::array{
+      field<&B::soc_cad>({"soc_cad", "°CA aTDC", closed(-30.0, engine::timing_upper_cad), "start of combustion"}),
+      field<&B::burn_duration_cad>({"burn_duration_cad", "°CA", log_scale(2.0, 150.0), "burn duration"}),
+      field<&B::fuel_heat_j>({"fuel_heat_j", "J", log_scale(1e-2, 1e6), "heat of the fuel"}),
+      field<&B::wiebe_m>({"wiebe_m", "-", closed(0.0, 5.0), "Wiebe shape, exponent m + 1"}),
+      field<&B::second_fraction>({"second_fraction", "-", closed(0.0, 1.0), "share of the second Wiebe law"}),
+      field<&B::second_delay_cad>(
+          {"second_delay_cad", "°CA", closed(0.0, 40.0), "start of the second after the first"}),
+      field<&B::second_duration_cad>({"second_duration_cad", "°CA", log_scale(5.0, 150.0), "duration of the second"}),
+      field<&B::second_wiebe_m>({"second_wiebe_m", "-", closed(0.0, 5.0), "shape of the second"})};
 }
 
 inline constexpr double wall_heat_scale_upper = 2.5;  ///< search bound offline, in textbook laws
@@ -111,11 +100,12 @@ LoadBurn estimate_burn(const MeasuredCycle& trace, const engine::Cylinder& cylin
 /// The cylinder with the shape fields of one load's burn.
 template <class T>
 engine::BasicCylinder<T> with_burn(engine::BasicCylinder<T> cylinder, const BasicLoadBurn<T>& burn) noexcept {
-  cylinder.wiebe_m = burn.wiebe_m;
-  cylinder.second_fraction = burn.second_fraction;
-  cylinder.second_delay_cad = burn.second_delay_cad;
-  cylinder.second_duration_cad = burn.second_duration_cad;
-  cylinder.second_wiebe_m = burn.second_wiebe_m;
+  engine::BurnParameters<T>& shape = cylinder.burn;
+  shape.wiebe_m = burn.wiebe_m;
+  shape.second_fraction = burn.second_fraction;
+  shape.second_delay_cad = burn.second_delay_cad;
+  shape.second_duration_cad = burn.second_duration_cad;
+  shape.second_wiebe_m = burn.second_wiebe_m;
   return cylinder;
 }
 
