@@ -9,26 +9,19 @@
 namespace mgdd::engine {
 namespace {
 
-std::string unit_text(std::string_view unit) {
-  std::string suffix;
-  if (unit != "-") suffix.append(" ").append(unit);
-  return suffix;
-}
-
 void check(const FieldInfo& info, double value) {
   const bool above = info.lower_open ? value > info.lower : value >= info.lower;
   if (above && value <= info.upper) return;  // NaN fails both comparisons
-  std::string message = std::string(info.name) + " = " + text(value) + unit_text(info.unit) + ": must be " +
-                        (info.lower_open ? "> " : ">= ") + text(info.lower);
-  if (info.upper < unbounded) message += " and <= " + text(info.upper);
+  std::string bound = (info.lower_open ? "must be > " : "must be >= ") + text(info.lower);
+  if (info.upper < unbounded) bound += " and <= " + text(info.upper);
   if (info.name == "ivc_cad" && value > 0.0) {
-    message +=
+    bound +=
         "; this looks like °bTDC: angles are °CA aTDC (firing TDC = 0, compression negative), so pass " + text(-value);
   }
   if (info.name == "evo_cad" && value > 180.0 && value <= 720.0) {
-    message += "; angles are counted from firing TDC = 0 (gas-exchange TDC = 360)";
+    bound += "; angles are counted from firing TDC = 0 (gas-exchange TDC = 360)";
   }
-  throw ParameterError(message);
+  throw ParameterError(info.name, value, bound, info.unit);
 }
 
 constexpr std::pair<GammaModel, std::string_view> gamma_names[] = {

@@ -21,13 +21,13 @@ constexpr std::pair<NoxSensor, std::string_view> sensor_names[] = {{NoxSensor::n
                                                                    {NoxSensor::soft_corrected, "soft_corrected"},
                                                                    {NoxSensor::true_value, "true_value"}};
 
-// The message of another room, with the field of the bench in front.
+// The refusal of another room, with the field of the bench in front.
 template <class Check>
-void within(const std::string& owner, Check check) {
+void check_member(const std::string& owner, Check check) {
   try {
     check();
   } catch (const ParameterError& error) {
-    throw ParameterError(owner + "." + error.what());
+    throw within(owner, error);
   }
 }
 
@@ -47,7 +47,7 @@ void validate_schedule(const BenchSettings& s) {
                                .append(": must be > ")
                                .append(std::to_string(s.schedule[i - 1].cycle)));
     }
-    within(owner, [&] { engine::validate_cycle(s.cylinder, now.point, window[1]); });
+    check_member(owner, [&] { engine::validate_cycle(s.cylinder, now.point, window[1]); });
     if (!(now.point.fuel_mg > 0.0)) {
       const std::string given = text(now.point.fuel_mg);
       throw ParameterError(
@@ -102,8 +102,8 @@ void validate(const BenchSettings& s) {
   require_within("misfire_probability", s.misfire_probability, 0.0, 1.0);
   require_within("soc_drift_cad_per_kcycle", s.soc_drift_cad_per_kcycle, -100.0, 100.0, "°CA");
   require_within("wall_heat_drift_per_kcycle", s.wall_heat_drift_per_kcycle, -100.0, 100.0);
-  within("true_nox", [&] { engine::validate(s.true_nox); });
-  within("soft_sensor", [&] { engine::validate(s.soft_sensor); });
+  check_member("true_nox", [&] { engine::validate(s.true_nox); });
+  check_member("soft_sensor", [&] { engine::validate(s.soft_sensor); });
   validate("analyser", s.analyser);
   validate("fast_sensor", s.fast_sensor);
   if (s.nox_sensor == NoxSensor::none && !s.delay_whole_objective &&

@@ -71,18 +71,12 @@ constexpr std::pair<Backlash, std::string_view> backlash_table[] = {
     {Backlash::none, "none"}, {Backlash::compliance, "compliance"}, {Backlash::hysteresis, "hysteresis"}};
 constexpr std::pair<Bridge, std::string_view> bridge_table[] = {{Bridge::brake, "brake"}, {Bridge::open, "open"}};
 
-std::string with_unit(const FieldInfo& info, double value) {
-  std::string given = std::string(info.name) + " = " + text(value);
-  if (info.unit != "-") given.append(" ").append(info.unit);
-  return given;
-}
-
 void check(const FieldInfo& info, double value) {
   const bool above = info.lower_open ? value > info.lower : value >= info.lower;
   if (above && value <= info.upper) return;  // NaN fails both comparisons
-  std::string message = with_unit(info, value) + ": must be " + (info.lower_open ? "> " : ">= ") + text(info.lower);
-  if (info.upper < most) message += " and <= " + text(info.upper);
-  throw ParameterError(message);
+  std::string bound = (info.lower_open ? "must be > " : "must be >= ") + text(info.lower);
+  if (info.upper < most) bound += " and <= " + text(info.upper);
+  throw ParameterError(info.name, value, bound, info.unit);
 }
 
 // Shape of the closing torque over the opening: largest near 75 deg, none closed or wide open.

@@ -1,9 +1,12 @@
 // Numbers as text, names of enumerators, exact units and the error tree.
 #include <array>
+#include <cmath>
+#include <limits>
 #include <type_traits>
 
 #include <gtest/gtest.h>
 
+#include "mgdd/common/bounds.hpp"
 #include "mgdd/common/error.hpp"
 #include "mgdd/common/names.hpp"
 #include "mgdd/common/text.hpp"
@@ -31,7 +34,58 @@ TEST(CommonText, NamesGoBothWaysAndListTheValidOnes) {
     FAIL();
   } catch (const ParameterError& error) {
     EXPECT_STREQ(error.what(), "colour = 'green': must be one of red, blue");
+    EXPECT_EQ(error.field, "colour");
+    EXPECT_EQ(std::get<std::string>(error.value), "green");
+    EXPECT_EQ(error.bound, "one of red, blue");
   }
+}
+
+TEST(CommonText, AnErrorCarriesFieldValueAndBoundBesideItsMessage) {
+  const ParameterError number("bore_mm", -86.0, "must be > 0", "mm");
+  EXPECT_STREQ(number.what(), "bore_mm = -86 mm: must be > 0");
+  EXPECT_EQ(number.field, "bore_mm");
+  EXPECT_EQ(std::get<double>(number.value), -86.0);
+  EXPECT_EQ(number.bound, "> 0");
+
+  const ParameterError owned = within("cylinder", number);
+  EXPECT_STREQ(owned.what(), "cylinder.bore_mm = -86 mm: must be > 0");
+  EXPECT_EQ(owned.field, "cylinder.bore_mm");
+  EXPECT_EQ(std::get<double>(owned.value), -86.0);
+  EXPECT_EQ(owned.bound, "> 0");
+
+  const ParameterError told = in_context("cycle 7: ", number);
+  EXPECT_STREQ(told.what(), "cycle 7: bore_mm = -86 mm: must be > 0");
+  EXPECT_EQ(told.field, "bore_mm");
+  EXPECT_EQ(told.bound, "> 0");
+
+  const DataError count("samples", std::size_t{3}, "needs at least 8", "-");
+  EXPECT_STREQ(count.what(), "samples = 3: needs at least 8");
+  EXPECT_EQ(std::get<double>(count.value), 3.0);
+  EXPECT_EQ(count.bound, "needs at least 8");
+
+  const ShapeError plain("J is missing");
+  EXPECT_STREQ(plain.what(), "J is missing");
+  EXPECT_TRUE(plain.field.empty() && plain.bound.empty());
+  EXPECT_TRUE(std::holds_alternative<std::monostate>(plain.value));
+}
+
+TEST(CommonText, SharedBoundsSetThemToo) {
+  const auto caught = [](auto refused) -> ParameterError {
+    try {
+      refused();
+    } catch (const ParameterError& error) {
+      return error;
+    }
+    return ParameterError("nothing thrown");
+  };
+  const ParameterError closed = caught([] { require_within("gain", 2.0, 0.0, 1.0, "deg"); });
+  EXPECT_STREQ(closed.what(), "gain = 2 deg: must be in [0, 1]");
+  EXPECT_EQ(closed.field, "gain");
+  EXPECT_EQ(closed.bound, "in [0, 1]");
+  const ParameterError nan = caught([] { require_positive("rate", std::numeric_limits<double>::quiet_NaN()); });
+  EXPECT_EQ(nan.field, "rate");
+  EXPECT_TRUE(std::isnan(std::get<double>(nan.value)));
+  EXPECT_EQ(nan.bound, "> 0 and finite");
 }
 
 TEST(CommonText, UnitsOfTheFieldAreExact) {

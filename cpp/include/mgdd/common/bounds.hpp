@@ -13,17 +13,13 @@ namespace mgdd {
 inline void require_within(std::string_view name, double value, double lower, double upper,
                            std::string_view unit = "") {
   if (value >= lower && value <= upper) return;
-  std::string message = std::string(name) + " = " + text(value);
-  if (!unit.empty()) message.append(" ").append(unit);
-  throw ParameterError(message + ": must be in [" + text(lower) + ", " + text(upper) + "]");
+  throw ParameterError(name, value, "must be in [" + text(lower) + ", " + text(upper) + "]", unit);
 }
 
 /// ParameterError `name = value unit: must be > 0 and finite`.
 inline void require_positive(std::string_view name, double value, std::string_view unit = "") {
   if (value > 0.0 && value <= 1e300) return;
-  std::string message = std::string(name) + " = " + text(value);
-  if (!unit.empty()) message.append(" ").append(unit);
-  throw ParameterError(message + ": must be > 0 and finite");
+  throw ParameterError(name, value, "must be > 0 and finite", unit);
 }
 
 }  // namespace mgdd

@@ -1,18 +1,64 @@
 // The error tree: every exception of the core, mapped one to one to `mgdd.errors` in Python.
-// Messages name the field, the value and the bound or the remedy. Not for real-time paths: those return status codes.
+// Messages name the field, the value and the bound or the remedy; the same three stand beside the text, so that nobody
+// has to read them out of it. Not for real-time paths: those return status codes.
 #pragma once
 
+#include <concepts>
 #include <stdexcept>
 #include <string>
+#include <string_view>
+#include <variant>
+
+#include "mgdd/common/text.hpp"
 
 namespace mgdd {
 
-/// Base of everything the core throws.
-struct Error : std::runtime_error {
-  using std::runtime_error::runtime_error;
+/// What was given for a refused field: a number, a name, or nothing where no single field is to blame.
+using ErrorValue = std::variant<std::monostate, double, std::string>;
+
+/// A refused value and how messages show it: numbers plain, names in quotes.
+struct GivenValue {
+  // NOLINTBEGIN(google-explicit-constructor): call sites pass the plain value
+  GivenValue(double number) : value(number), shown(text(number)) {}
+  template <std::integral Int>
+  GivenValue(Int number) : value(static_cast<double>(number)), shown(std::to_string(number)) {}
+  template <std::convertible_to<std::string_view> Name>
+  GivenValue(const Name& name) : value(std::string(std::string_view(name))) {
+    shown.append("'").append(std::get<std::string>(value)).append("'");
+  }
+  // NOLINTEND(google-explicit-constructor)
+
+  ErrorValue value;
+  std::string shown;
 };
 
-/// A parameter outside its domain, for example `bore_mm = -86.0: must be > 0`.
+/// Base of everything the core throws.
+struct Error : std::runtime_error {
+  explicit Error(const std::string& message) : std::runtime_error(message) {}
+  /// `field = value unit: requirement`, for example `bore_mm = -86 mm: must be > 0`.
+  Error(std::string_view refused_field, const GivenValue& given, std::string_view requirement,
+        std::string_view unit = "")
+      : std::runtime_error(sentence(refused_field, given, requirement, unit)),
+        field(refused_field),
+        value(given.value),
+        bound(requirement.starts_with(must_be) ? requirement.substr(must_be.size()) : requirement) {}
+
+  std::string field;   ///< name of the refused field; empty: none in particular
+  ErrorValue value{};  ///< what was given for it
+  std::string bound;   ///< what it must be, without a leading "must be ": "> 0", "in [0, 1]"
+
+ private:
+  static constexpr std::string_view must_be = "must be ";
+  static std::string sentence(std::string_view refused_field, const GivenValue& given, std::string_view requirement,
+                              std::string_view unit) {
+    std::string message(refused_field);
+    message.append(" = ").append(given.shown);
+    if (!unit.empty() && unit != "-") message.append(" ").append(unit);
+    return message.append(": ").append(requirement);
+  }
+};
+
+/// A parameter outside its domain.
 struct ParameterError : Error {
   using Error::Error;
 };
@@ -36,5 +82,23 @@ struct ConvergenceError : Error {
 struct RigError : Error {
   using Error::Error;
 };
+
+/// The same refusal with words in front of its message: `cycle 7: J = inf: must be finite`.
+template <std::derived_from<Error> E>
+[[nodiscard]] E in_context(std::string_view words, const E& inner) {
+  E outer(std::string(words) + inner.what());
+  outer.field = inner.field;
+  outer.value = inner.value;
+  outer.bound = inner.bound;
+  return outer;
+}
+
+/// The same refusal seen from the owner of the field: `owner.field = value: ...`.
+template <std::derived_from<Error> E>
+[[nodiscard]] E within(std::string_view owner, const E& inner) {
+  E outer = in_context(std::string(owner) + ".", inner);
+  if (!inner.field.empty()) outer.field = std::string(owner) + "." + inner.field;
+  return outer;
+}
 
 }  // namespace mgdd

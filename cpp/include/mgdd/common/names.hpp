@@ -29,7 +29,7 @@ Enum parse_name(Names<Enum> names, std::string_view field, std::string_view give
     if (name == given) return key;
     valid.append(valid.empty() ? "" : ", ").append(name);
   }
-  throw ParameterError(std::string(field) + " = '" + std::string(given) + "': must be one of " + valid);
+  throw ParameterError(field, given, "must be one of " + valid);
 }
 
 }  // namespace mgdd
