@@ -14,9 +14,9 @@ using namespace optimize;
 constexpr double inf = std::numeric_limits<double>::infinity();
 
 void bind_spsa(py::module_& m) {
-  using R = Recorded<Spsa>;
+  using B = BoundSeeker<Spsa>;
   const SpsaSettings d;
-  py::class_<R> cls(m, "Spsa", "Simultaneous perturbation; see mgdd.optimize.Spsa.");
+  py::class_<B> cls(m, "Spsa", "Simultaneous perturbation; see mgdd.optimize.Spsa.");
   cls.def(py::init([](const py::object& start, const py::object& lower, const py::object& upper,
                       const std::string& form, const std::string& schedule, std::optional<double> gain,
                       double stability, double gain_exponent, double perturbation, double perturbation_exponent,
@@ -47,9 +47,9 @@ void bind_spsa(py::module_& m) {
             s.maximize = maximize;
             s.limits = limits;
             s.curvature = none_as_nan(curvature);
-            R out{Spsa(s)};
-            warn_each(out.seeker.settings().advice());
-            return out;
+            Spsa made(s);
+            warn_each(made.settings().advice());
+            return bound("Spsa", std::move(made));
           }),
           py::kw_only(), py::arg("start"), py::arg("lower") = -inf, py::arg("upper") = inf,
           py::arg("form") = "first_order", py::arg("schedule") = "decreasing", py::arg("gain") = py::none(),
@@ -61,19 +61,20 @@ void bind_spsa(py::module_& m) {
           py::arg("seed") = d.seed, py::arg("maximize") = true, py::arg("limits") = std::vector<Limit>{},
           py::arg("curvature") = py::none())
       .def_property_readonly(
-          "hessian", [](const R& r) { return Eigen::MatrixXd(r.seeker.hessian()); },
+          "hessian", [](const B& b) { return Eigen::MatrixXd(b.use()->seeker().hessian()); },
           "Averaged Hessian of the second-order form, shape (inputs, inputs).")
       .def_property_readonly(
-          "iteration", [](const R& r) { return r.seeker.iteration(); }, "Iterations since the start or restart.")
+          "iteration", [](const B& b) { return b.use()->seeker().iteration(); },
+          "Iterations since the start or restart.")
       .def_property_readonly(
-          "blocked", [](const R& r) { return r.seeker.blocked(); }, "Steps that blocking refused.")
+          "blocked", [](const B& b) { return b.use()->seeker().blocked(); }, "Steps that blocking refused.")
       .def_property_readonly(
-          "measurements_per_iteration", [](const R& r) { return r.seeker.measurements_per_iteration(); },
+          "measurements_per_iteration", [](const B& b) { return b.constant().seeker().measurements_per_iteration(); },
           "Cycles that one iteration takes.")
       .def_property_readonly(
           "settings",
-          [](const R& r) {
-            const SpsaSettings& s = r.seeker.settings();
+          [](const B& b) {
+            const SpsaSettings& s = b.constant().seeker().settings();
             py::dict out = space_dict(s.space);
             out["form"] = std::string(to_string(s.form));
             out["schedule"] = std::string(to_string(s.schedule));
@@ -101,9 +102,9 @@ void bind_spsa(py::module_& m) {
 }
 
 void bind_gradient_descent(py::module_& m) {
-  using R = Recorded<GradientDescent>;
+  using B = BoundSeeker<GradientDescent>;
   const GradientDescentSettings d;
-  py::class_<R> cls(m, "GradientDescent", "Two-sided differences; see mgdd.optimize.GradientDescent.");
+  py::class_<B> cls(m, "GradientDescent", "Two-sided differences; see mgdd.optimize.GradientDescent.");
   cls.def(py::init([](const py::object& start, const py::object& lower, const py::object& upper, double step_size,
                       double difference, const py::object& rate, double tolerance, std::int64_t iterations,
                       bool maximize, const std::vector<Limit>& limits, std::optional<double> curvature) {
@@ -117,26 +118,27 @@ void bind_gradient_descent(py::module_& m) {
             s.maximize = maximize;
             s.limits = limits;
             s.curvature = none_as_nan(curvature);
-            R out{GradientDescent(s)};
+            GradientDescent made(s);
             warn_each(s.advice());
-            return out;
+            return bound("GradientDescent", std::move(made));
           }),
           py::kw_only(), py::arg("start"), py::arg("lower") = -inf, py::arg("upper") = inf,
           py::arg("step_size") = d.step_size, py::arg("difference") = d.difference, py::arg("rate") = py::none(),
           py::arg("tolerance") = d.tolerance, py::arg("iterations") = d.iterations, py::arg("maximize") = true,
           py::arg("limits") = std::vector<Limit>{}, py::arg("curvature") = py::none())
       .def_property_readonly(
-          "iteration", [](const R& r) { return r.seeker.iteration(); }, "Steps made.")
+          "iteration", [](const B& b) { return b.use()->seeker().iteration(); }, "Steps made.")
       .def_property_readonly(
           "converged_at",
-          [](const R& r) {
-            return r.seeker.converged_at() < 0 ? py::object(py::none()) : py::object(py::int_(r.seeker.converged_at()));
+          [](const B& b) {
+            const std::int64_t at = b.use()->seeker().converged_at();
+            return at < 0 ? py::object(py::none()) : py::object(py::int_(at));
           },
           "Step at which the tolerance was met first, or None.")
       .def_property_readonly(
           "settings",
-          [](const R& r) {
-            const GradientDescentSettings& s = r.seeker.settings();
+          [](const B& b) {
+            const GradientDescentSettings& s = b.constant().seeker().settings();
             py::dict out = space_dict(s.space);
             out["step_size"] = s.step_size;
             out["difference"] = s.difference;
@@ -154,9 +156,9 @@ void bind_gradient_descent(py::module_& m) {
 }
 
 void bind_golden_section(py::module_& m) {
-  using R = Recorded<GoldenSection>;
+  using B = BoundSeeker<GoldenSection>;
   const GoldenSectionSettings d;
-  py::class_<R> cls(m, "GoldenSection", "Golden-section search; see mgdd.optimize.GoldenSection.");
+  py::class_<B> cls(m, "GoldenSection", "Golden-section search; see mgdd.optimize.GoldenSection.");
   cls.def(py::init([](const py::object& start, const py::object& lower, const py::object& upper, double noise_sd,
                       double significance, int samples_max, double tolerance, bool maximize,
                       const std::vector<Limit>& limits) {
@@ -168,21 +170,25 @@ void bind_golden_section(py::module_& m) {
             s.tolerance = tolerance;
             s.maximize = maximize;
             s.limits = limits;
-            return R{GoldenSection(s)};
+            return bound("GoldenSection", GoldenSection(s));
           }),
           py::kw_only(), py::arg("start"), py::arg("lower"), py::arg("upper"), py::arg("noise_sd") = d.noise_sd,
           py::arg("significance") = d.significance, py::arg("samples_max") = d.samples_max,
           py::arg("tolerance") = d.tolerance, py::arg("maximize") = true, py::arg("limits") = std::vector<Limit>{})
       .def_property_readonly(
-          "bracket", [](const R& r) { return std::pair(r.seeker.lower(), r.seeker.upper()); },
+          "bracket",
+          [](const B& b) {
+            const auto r = b.use();
+            return std::pair(r->seeker().lower(), r->seeker().upper());
+          },
           "Present bracket, lower and upper end.")
       .def_property_readonly(
-          "converged", [](const R& r) { return r.seeker.converged(); },
+          "converged", [](const B& b) { return b.use()->seeker().converged(); },
           "Whether the bracket is as small as tolerance or noise allow.")
       .def_property_readonly(
           "settings",
-          [](const R& r) {
-            const GoldenSectionSettings& s = r.seeker.settings();
+          [](const B& b) {
+            const GoldenSectionSettings& s = b.constant().seeker().settings();
             py::dict out = space_dict(s.space);
             out["noise_sd"] = s.noise_sd;
             out["significance"] = s.significance;

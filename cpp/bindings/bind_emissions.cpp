@@ -39,7 +39,10 @@ py::dict to_dict(const SoftSensor& s) {
 }
 
 NoxFit fit(const InputArray& t_max_k, const InputArray& nox_ppm, const std::string& map, double reference_k) {
-  return fit_nox_proxy(to_column(t_max_k, "t_max_k"), to_column(nox_ppm, "nox_ppm"), parse_nox_map(map), reference_k);
+  const std::vector<double> t = to_column(t_max_k, "t_max_k"), nox = to_column(nox_ppm, "nox_ppm");
+  const NoxMap form = parse_nox_map(map);
+  const py::gil_scoped_release release;
+  return fit_nox_proxy(t, nox, form, reference_k);
 }
 
 void bind_proxy(py::module_& m) {
@@ -85,13 +88,13 @@ Examples
       .def(
           "affine_log_ppm",
           [](const NoxProxy& self, const InputArray& t) {
-            return py::vectorize([&self](double x) { return self.affine_log_ppm(x); })(t);
+            return elementwise([&self](double x) { return self.affine_log_ppm(x); }, t);
           },
           arg("t_max_k"), "NOx [ppm] by the affine-log map.")
       .def(
           "arrhenius_ppm",
           [](const NoxProxy& self, const InputArray& t) {
-            return py::vectorize([&self](double x) { return self.arrhenius_ppm(x); })(t);
+            return elementwise([&self](double x) { return self.arrhenius_ppm(x); }, t);
           },
           arg("t_max_k"), "NOx [ppm] by the Arrhenius map.");
   bind_value(proxy, "NoxProxy", [](const NoxProxy& self) { return to_dict(self); });
@@ -147,7 +150,7 @@ Examples
       .def(
           "ppm",
           [](const NoxModel& self, const InputArray& t) {
-            return py::vectorize([&self](double x) { return self.ppm(x); })(t);
+            return elementwise([&self](double x) { return self.ppm(x); }, t);
           },
           arg("t_max_k"), "NOx [ppm].");
   bind_value(model, "NoxModel", [](const NoxModel& self) { return to_dict(self); });
@@ -191,7 +194,7 @@ Examples
       .def(
           "ppm",
           [](const SoftSensor& self, const InputArray& t, double ln_bias) {
-            return py::vectorize([&](double x) { return self.corrected_ppm(x, ln_bias); })(t);
+            return elementwise([&](double x) { return self.corrected_ppm(x, ln_bias); }, t);
           },
           arg("t_max_k"), py::kw_only(), arg("ln_bias") = 0.0, "NOx [ppm] at the log-bias b.")
       .def("next_bias", &SoftSensor::next_bias, arg("ln_bias"), py::kw_only(), arg("analyser_ppm"),

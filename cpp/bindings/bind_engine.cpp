@@ -186,17 +186,17 @@ void bind_engine(py::module_& m) {
       "start_of_injection",
       [](const Cylinder& c, const OperatingPoint& p, double soc) { return to_dict(start_of_injection(c, p, soc)); },
       arg("cylinder"), arg("point"), arg("soc_cad"), "SOC to SOI.");
-  m.def("watson_delay_ms", py::vectorize(&watson_delay_ms), arg("pressure_bar"), arg("temperature_k"));
-  m.def("wolfer_delay_ms", py::vectorize(&wolfer_delay_ms), arg("pressure_bar"), arg("temperature_k"));
-  m.def("hardenberg_hase_delay_cad", py::vectorize(&hardenberg_hase_delay_cad), arg("pressure_bar"),
-        arg("temperature_k"), arg("cetane_number"), arg("piston_speed_m_per_s"));
+  m.def("watson_delay_ms", over<&watson_delay_ms>(), arg("pressure_bar"), arg("temperature_k"), "Ignition delay [ms].");
+  m.def("wolfer_delay_ms", over<&wolfer_delay_ms>(), arg("pressure_bar"), arg("temperature_k"), "Ignition delay [ms].");
+  m.def("hardenberg_hase_delay_cad", over<&hardenberg_hase_delay_cad>(), arg("pressure_bar"), arg("temperature_k"),
+        arg("cetane_number"), arg("piston_speed_m_per_s"), "Ignition delay [°CA].");
 
   m.def(
       "volume_l",
       [](const Cylinder& c, const InputArray& angle) {
         validate(c);
         const Geometry<double> g(c);
-        return py::vectorize([&g](double a) { return g.volume_m3(a) / units::m3_per_l; })(angle);
+        return elementwise([&g](double a) { return g.volume_m3(a) / units::m3_per_l; }, angle);
       },
       arg("cylinder"), arg("crank_angle_cad"), "Cylinder volume [L].");
   m.def(
@@ -204,7 +204,7 @@ void bind_engine(py::module_& m) {
       [](const Cylinder& c, const InputArray& angle) {
         validate(c);
         const Geometry<double> g(c);
-        return py::vectorize([&g](double a) { return g.wall_area_m2(g.volume_m3(a)); })(angle);
+        return elementwise([&g](double a) { return g.wall_area_m2(g.volume_m3(a)); }, angle);
       },
       arg("cylinder"), arg("crank_angle_cad"), "Wall area [m2].");
   m.def(
@@ -215,7 +215,7 @@ void bind_engine(py::module_& m) {
           throw ParameterError("burn_duration_cad = " + std::to_string(duration) + " °CA: must be > 0");
         }
         const Burn<double> burn(c, soc, duration);
-        return py::vectorize([&burn](double a) { return burn.fraction(a); })(angle);
+        return elementwise([&burn](double a) { return burn.fraction(a); }, angle);
       },
       arg("cylinder"), arg("crank_angle_cad"), arg("soc_cad"), arg("burn_duration_cad"), "Burned fraction [-].");
   m.def(
@@ -228,9 +228,9 @@ void bind_engine(py::module_& m) {
       arg("cylinder"), arg("point"), "Burn duration in force [°CA].");
   m.attr("timing_window_cad") = py::make_tuple(timing_lower_cad, timing_upper_cad);
   m.attr("woschni_c1_bar_m") = woschni_c1_bar_m;
-  m.def("woschni_coefficient", py::vectorize(&woschni_coefficient<double>), arg("c1_bar_m"), arg("bore_m"),
+  m.def("woschni_coefficient", over<&woschni_coefficient<double>>(), arg("c1_bar_m"), arg("bore_m"),
         arg("pressure_bar"), arg("temperature_k"), arg("gas_velocity_m_per_s"), "Film coefficient [W/(m2 K)].");
-  m.def("hohenberg_coefficient", py::vectorize(&hohenberg_coefficient<double>), arg("c1_bar_m3"), arg("volume_m3"),
+  m.def("hohenberg_coefficient", over<&hohenberg_coefficient<double>>(), arg("c1_bar_m3"), arg("volume_m3"),
         arg("pressure_bar"), arg("temperature_k"), arg("piston_speed_m_per_s"), "Film coefficient [W/(m2 K)].");
 }
 

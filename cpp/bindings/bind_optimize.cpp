@@ -61,6 +61,7 @@ FitReport least_squares(const py::function& fun, const Eigen::VectorXd& x0, std:
   bool have_first = true;
   const auto n_residuals = first.usable ? first.residual.shape(0) : x0.size();
   const auto model = [&](const Eigen::VectorXd& x, Eigen::VectorXd& residual, Eigen::MatrixXd* jacobian) {
+    const py::gil_scoped_acquire gil;
     const Evaluation evaluation = have_first ? std::move(first) : call(fun, x);
     have_first = false;
     if (!evaluation.usable) {
@@ -73,7 +74,7 @@ FitReport least_squares(const py::function& fun, const Eigen::VectorXd& x0, std:
     }
     return true;
   };
-  return LeastSquares(std::move(parameters), n_residuals, options).solve(model, x0);
+  return without_gil([&] { return LeastSquares(std::move(parameters), n_residuals, options).solve(model, x0); });
 }
 
 py::dict history(const FitReport& report) {

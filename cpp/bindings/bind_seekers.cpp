@@ -37,9 +37,9 @@ std::vector<ComponentLag> components_from(const std::optional<std::vector<Compon
 }
 
 void bind_extremum_seeking(py::module_& m) {
-  using R = Recorded<ExtremumSeeking>;
+  using B = BoundSeeker<ExtremumSeeking>;
   const ExtremumSeekingSettings d;
-  py::class_<R> cls(m, "ExtremumSeeking", "Extremum seeking; see mgdd.optimize.ExtremumSeeking.");
+  py::class_<B> cls(m, "ExtremumSeeking", "Extremum seeking; see mgdd.optimize.ExtremumSeeking.");
   cls.def(py::init([](const py::object& start, const py::object& lower, const py::object& upper,
                       const std::string& form, const py::object& amplitude, int period,
                       const std::optional<std::vector<int>>& harmonics, const py::object& gain, const py::object& rate,
@@ -64,9 +64,9 @@ void bind_extremum_seeking(py::module_& m) {
             s.maximize = maximize;
             s.limits = limits;
             s.curvature = none_as_nan(curvature);
-            R out{ExtremumSeeking(s)};
+            ExtremumSeeking made(s);
             warn_each(s.advice());
-            return out;
+            return bound("ExtremumSeeking", std::move(made));
           }),
           py::kw_only(), py::arg("start"), py::arg("lower") = -inf, py::arg("upper") = inf, py::arg("form") = "batch",
           py::arg("amplitude") = 1.0, py::arg("period") = d.dither.period, py::arg("harmonics") = py::none(),
@@ -77,12 +77,12 @@ void bind_extremum_seeking(py::module_& m) {
           py::arg("limit_amplitude") = d.limit_amplitude, py::arg("maximize") = true,
           py::arg("limits") = std::vector<Limit>{}, py::arg("curvature") = py::none())
       .def_property_readonly(
-          "amplitude_share", [](const R& r) { return r.seeker.amplitude_share(); },
+          "amplitude_share", [](const B& b) { return b.use()->seeker().amplitude_share(); },
           "Amplitude now over that of the settings.")
       .def_property_readonly(
           "settings",
-          [](const R& r) {
-            const ExtremumSeekingSettings& s = r.seeker.settings();
+          [](const B& b) {
+            const ExtremumSeekingSettings& s = b.constant().seeker().settings();
             py::dict out = space_dict(s.space);
             out["form"] = std::string(to_string(s.form));
             add_dither(out, s.dither);
@@ -107,9 +107,9 @@ void bind_extremum_seeking(py::module_& m) {
 }
 
 void bind_newton(py::module_& m) {
-  using R = Recorded<NewtonSeeking>;
+  using B = BoundSeeker<NewtonSeeking>;
   const NewtonSeekingSettings d;
-  py::class_<R> cls(m, "NewtonSeeking", "Newton extremum seeking; see mgdd.optimize.NewtonSeeking.");
+  py::class_<B> cls(m, "NewtonSeeking", "Newton extremum seeking; see mgdd.optimize.NewtonSeeking.");
   cls.def(py::init([](const py::object& start, const py::object& lower, const py::object& upper,
                       const py::object& amplitude, int period, const std::optional<std::vector<int>>& harmonics,
                       double time_constant_cycles, double hessian_rate, double riccati_rate,
@@ -133,9 +133,9 @@ void bind_newton(py::module_& m) {
             s.limit_amplitude = limit_amplitude;
             s.maximize = maximize;
             s.limits = limits;
-            R out{NewtonSeeking(s)};
+            NewtonSeeking made(s);
             warn_each(s.advice());
-            return out;
+            return bound("NewtonSeeking", std::move(made));
           }),
           py::kw_only(), py::arg("start"), py::arg("lower") = -inf, py::arg("upper") = inf,
           py::arg("amplitude") = d.dither.amplitude[0], py::arg("period") = d.dither.period,
@@ -147,15 +147,15 @@ void bind_newton(py::module_& m) {
           py::arg("limit_amplitude") = d.limit_amplitude, py::arg("maximize") = true,
           py::arg("limits") = std::vector<Limit>{})
       .def_property_readonly(
-          "hessian", [](const R& r) { return Eigen::MatrixXd(r.seeker.hessian()); },
+          "hessian", [](const B& b) { return Eigen::MatrixXd(b.use()->seeker().hessian()); },
           "Filtered Hessian of the maximised objective, shape (inputs, inputs).")
       .def_property_readonly(
-          "inverse_hessian", [](const R& r) { return Eigen::MatrixXd(r.seeker.inverse_hessian()); },
+          "inverse_hessian", [](const B& b) { return Eigen::MatrixXd(b.use()->seeker().inverse_hessian()); },
           "State of the Riccati filter, which tends to the inverse Hessian.")
       .def_property_readonly(
           "settings",
-          [](const R& r) {
-            const NewtonSeekingSettings& s = r.seeker.settings();
+          [](const B& b) {
+            const NewtonSeekingSettings& s = b.constant().seeker().settings();
             py::dict out = space_dict(s.space);
             add_dither(out, s.dither);
             out["time_constant_cycles"] = s.time_constant_cycles;
@@ -178,8 +178,8 @@ void bind_newton(py::module_& m) {
 }
 
 void bind_bounded(py::module_& m) {
-  using R = Recorded<BoundedSeeking>;
-  py::class_<R> cls(m, "BoundedSeeking", "Bounded extremum seeking; see mgdd.optimize.BoundedSeeking.");
+  using B = BoundSeeker<BoundedSeeking>;
+  py::class_<B> cls(m, "BoundedSeeking", "Bounded extremum seeking; see mgdd.optimize.BoundedSeeking.");
   cls.def(py::init([](const py::object& start, const py::object& lower, const py::object& upper,
                       const py::object& amplitude, int period, const std::optional<std::vector<int>>& harmonics,
                       double kappa, bool maximize, const std::vector<Limit>& limits, std::optional<double> curvature) {
@@ -190,17 +190,17 @@ void bind_bounded(py::module_& m) {
             s.maximize = maximize;
             s.limits = limits;
             s.curvature = none_as_nan(curvature);
-            R out{BoundedSeeking(s)};
+            BoundedSeeking made(s);
             warn_each(s.advice());
-            return out;
+            return bound("BoundedSeeking", std::move(made));
           }),
           py::kw_only(), py::arg("start"), py::arg("lower") = -inf, py::arg("upper") = inf, py::arg("amplitude") = 1.0,
           py::arg("period") = 10, py::arg("harmonics") = py::none(), py::arg("kappa") = 1.0, py::arg("maximize") = true,
           py::arg("limits") = std::vector<Limit>{}, py::arg("curvature") = py::none())
       .def_property_readonly(
           "settings",
-          [](const R& r) {
-            const BoundedSeekingSettings& s = r.seeker.settings();
+          [](const B& b) {
+            const BoundedSeekingSettings& s = b.constant().seeker().settings();
             py::dict out = space_dict(s.space);
             add_dither(out, s.dither);
             out["kappa"] = s.kappa;

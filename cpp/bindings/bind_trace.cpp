@@ -96,7 +96,10 @@ void bind_trace(py::module_& m) {
   m.def(
       "check_trace",
       [](const InputArray& angle, const InputArray& pressure) {
-        check_trace(to_column(angle, "crank_angle_cad"), to_column(pressure, "pressure_bar"));
+        const std::vector<double> angles = to_column(angle, "crank_angle_cad");
+        const std::vector<double> pressures = to_column(pressure, "pressure_bar");
+        const py::gil_scoped_release release;
+        check_trace(angles, pressures);
       },
       arg("crank_angle_cad"), arg("pressure_bar"), "DataError unless the trace can be analysed.");
 }

@@ -9,7 +9,7 @@ import numpy as np
 import pytest
 
 from mgdd import datasets
-from mgdd.errors import DataError, ParameterError
+from mgdd.errors import DataError, Interrupted, ParameterError
 from mgdd.identify import EngineSurrogate, fit_surrogate, random_step_records
 from mgdd.results import check_labels, to_jsonable
 from mgdd.studies import StudyResult, h2df_cases, h2df_seek, run_h2df_seek, run_study
@@ -100,7 +100,9 @@ def test_ctrl_c_keeps_the_finished_seekers(made: EngineSurrogate, monkeypatch: p
         if text.endswith("spsa"):
             raise KeyboardInterrupt
 
-    result = run_h2df_seek(seeds=1, quick=True, progress=press)
+    with pytest.raises(Interrupted) as stop:
+        run_h2df_seek(seeds=1, quick=True, progress=press)
+    result = stop.value.partial
     assert result.summary["interrupted"] is True
     assert [row["seeker"] for row in result.summary["rows"]] == ["batch", "newton"]
     assert len(result.figures) == 2

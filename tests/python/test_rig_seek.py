@@ -11,7 +11,7 @@ import numpy as np
 import pytest
 
 from mgdd.engine import OperatingPoint, Performance
-from mgdd.errors import DataError, ParameterError, RigError
+from mgdd.errors import DataError, Interrupted, ParameterError, RigError
 from mgdd.loop import EngineBench, run_seeker, summarize_cycles
 from mgdd.optimize import (
     BoundedSeeking,
@@ -197,7 +197,9 @@ def test_ctrl_c_leaves_a_usable_result() -> None:
         return hill(cycle, soc)
 
     rig, own, whole = ScriptedRig(answer), seeker(), seeker()
-    run = run_on_rig(rig, own, 400, optimum_cad=-5.6)
+    with pytest.raises(Interrupted, match="after 120 of 400 cycles") as stop:
+        run_on_rig(rig, own, 400, optimum_cad=-5.6)
+    run = stop.value.partial
     assert (run.interrupted, run.dataset.attrs["interrupted"]) == (True, 1)
     assert run.dataset.sizes["cycle"] == own.cycle == 120
     assert np.isfinite(run.summary["final_cad"])
@@ -212,7 +214,9 @@ def test_ctrl_c_before_the_first_cycle() -> None:
     def answer(_: int, __: float) -> Measurement:
         raise KeyboardInterrupt
 
-    run = run_on_rig(ScriptedRig(answer), seeker(), 10, optimum_cad=-5.6)
+    with pytest.raises(Interrupted, match="after 0 of 10 cycles") as stop:
+        run_on_rig(ScriptedRig(answer), seeker(), 10, optimum_cad=-5.6)
+    run = stop.value.partial
     assert (run.interrupted, run.dataset.sizes["cycle"]) == (True, 0)
     assert np.isnan(run.summary["final_cad"])
 

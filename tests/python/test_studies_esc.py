@@ -8,7 +8,7 @@ import math
 import numpy as np
 import pytest
 
-from mgdd.errors import ParameterError
+from mgdd.errors import Interrupted, ParameterError
 from mgdd.results import check_labels
 from mgdd.studies import StudyResult, run_ch4_esc, run_study
 
@@ -84,7 +84,9 @@ def test_ctrl_c_keeps_what_is_finished() -> None:
         if len(seen) == 3:
             raise KeyboardInterrupt
 
-    result = run_ch4_esc(seeds=2, figures=True, progress=stop_at_the_third)
+    with pytest.raises(Interrupted, match="2 finished rows") as stop:
+        run_ch4_esc(seeds=2, figures=True, progress=stop_at_the_third)
+    result = stop.value.partial
     assert result.summary["interrupted"] is True
     assert len(result.summary["rows"]) == 2
     assert len(result.figures) == 1

@@ -12,6 +12,7 @@ from collections.abc import Sequence
 
 from mgdd import _core
 from mgdd.cli import demo, doctor, engine, study, throttle
+from mgdd.cli.output import Stopped
 from mgdd.errors import ConvergenceError, Error
 
 __all__ = ["main"]
@@ -72,8 +73,9 @@ def main(argv: Sequence[str] | None = None) -> int:
     except (Error, OSError) as error:
         print(f"mgdd: error: {_as_options(str(error))}", file=sys.stderr)
         return EXIT_BAD_INPUT
-    except KeyboardInterrupt:
-        print("mgdd: interrupted", file=sys.stderr)
+    except KeyboardInterrupt as stop:
+        kept = str(stop) if isinstance(stop, Stopped) else "nothing was kept"
+        print(f"mgdd: interrupted: {kept}", file=sys.stderr)
         return EXIT_INTERRUPTED
     return EXIT_OK
 

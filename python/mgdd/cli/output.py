@@ -17,7 +17,11 @@ from mgdd.results import VARIABLES, to_jsonable
 if TYPE_CHECKING:
     import xarray as xr
 
-__all__ = ["check_figure", "check_output", "emit", "lines", "progress"]
+__all__ = ["Stopped", "check_figure", "check_output", "emit", "lines", "progress"]
+
+
+class Stopped(KeyboardInterrupt):
+    """Ctrl-C after which something was kept; the message says what."""
 
 
 def check_output(args: argparse.Namespace, *, csv: bool) -> None:

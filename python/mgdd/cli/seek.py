@@ -11,11 +11,11 @@ from contextlib import contextmanager
 from typing import TYPE_CHECKING, Any
 
 from mgdd.cli.options import add_command, add_engine, engine_of, number_pairs
-from mgdd.cli.output import check_figure, check_output, emit
+from mgdd.cli.output import Stopped, check_figure, check_output, emit
 from mgdd.cli.seekers import Task, default_cycles, make_seeker
 from mgdd.engine import Performance
-from mgdd.errors import ConvergenceError, ParameterError
-from mgdd.loop import EngineBench, LoopRun, SteadyOptimum, run_seeker, steady_optimum, summarize_cycles
+from mgdd.errors import ConvergenceError, Interrupted, ParameterError
+from mgdd.loop import EngineBench, LoopRun, SteadyOptimum, run_seeker, steady_optimum
 from mgdd.results import VARIABLES
 
 if TYPE_CHECKING:
@@ -114,13 +114,17 @@ def _seek(args: argparse.Namespace) -> None:
     above = _thresholds(best, limits)
     criteria: dict[str, Any] = {"optimum_cad": best.soc_cad, "arrival_cad": _ARRIVAL_CAD}
     criteria |= {"exceed_from": _EXCEED_FROM, "exceed_above": above or None}
-    run = run_seeker(bench, seeker, cycles, **criteria)
-    summary = summarize_cycles(run.dataset, **criteria) if run.interrupted else run.summary
-    emit(args, _payload(args, preset, run, summary, best, limits), traces=_table(run.dataset))
+    try:
+        run = run_seeker(bench, seeker, cycles, **criteria)
+    except Interrupted as stop:
+        if not isinstance(stop.partial, LoopRun):
+            raise
+        run = stop.partial
+    emit(args, _payload(args, preset, run, best, limits), traces=_table(run.dataset))
     if args.figure:
         _draw(run.dataset, best, limits, args.figure)
     if run.interrupted:
-        raise KeyboardInterrupt
+        raise Stopped(f"{run.dataset.sizes['cycle']} of {cycles} cycles are kept")
 
 
 def _check(args: argparse.Namespace) -> None:
@@ -216,10 +220,10 @@ def _payload(
     args: argparse.Namespace,
     preset: str,
     run: LoopRun,
-    summary: Mapping[str, float],
     best: SteadyOptimum,
     limits: Mapping[str, float],
 ) -> dict[str, Any]:
+    summary = run.summary
     out: dict[str, Any] = {
         "method": args.method,
         "preset": preset,

@@ -9,9 +9,9 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from mgdd.cli.options import add_command
-from mgdd.cli.output import check_output, emit, progress
-from mgdd.errors import ParameterError
-from mgdd.studies import available_studies, run_study
+from mgdd.cli.output import Stopped, check_output, emit, progress
+from mgdd.errors import Interrupted, ParameterError
+from mgdd.studies import StudyResult, available_studies, run_study
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
@@ -56,14 +56,19 @@ def run(args: argparse.Namespace) -> None:
     if folder is not None:
         folder.mkdir(parents=True, exist_ok=True)
     with progress(args, expected=10) as step:
-        result = run_study(args.name, seeds=args.seeds, quick=args.quick, figures=folder is not None, progress=step)
+        try:
+            result = run_study(args.name, seeds=args.seeds, quick=args.quick, figures=folder is not None, progress=step)
+        except Interrupted as stop:
+            if not isinstance(stop.partial, StudyResult):
+                raise
+            result = stop.partial
         paths = [] if folder is None else _write(result.figures, folder, f"{args.name}.{args.format}")
     summary: dict[str, Any] = dict(result.summary)
     if folder is not None:
         summary["figures"] = [path.as_posix() for path in paths]
     emit(args, summary, text=_text(titles[args.name], summary))
     if summary.get("interrupted"):
-        raise KeyboardInterrupt
+        raise Stopped(f"{len(summary['rows'])} finished rows are printed")
 
 
 def _write(figures: Mapping[str, Figure], folder: Path, ending: str) -> list[Path]:

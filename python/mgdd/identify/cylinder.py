@@ -12,7 +12,7 @@ import numpy as np
 from mgdd import _core
 from mgdd._core import Cylinder, OperatingPoint
 from mgdd.engine import analyze
-from mgdd.errors import DataError, ParameterError, ShapeError
+from mgdd.errors import DataError, ParameterError, ShapeError, hand_over, or_partial
 from mgdd.identify.records import CylinderFit, LoadFit
 from mgdd.optimize import FitReport
 from mgdd.results import ANGLE, labelled_dataset
@@ -76,6 +76,8 @@ def fit_cylinder(
         An unknown or repeated name in ``free`` or ``start``.
     mgdd.errors.DataError
         A trace that cannot be used, or shows no heat release.
+    mgdd.errors.Interrupted
+        Ctrl-C; ``partial`` is the fit as far as it came, with the status ``interrupted``.
 
     Notes
     -----
@@ -98,7 +100,9 @@ def fit_cylinder(
     labels = _labels(traces)
     measured = [_measured(trace, label, cylinder, point) for trace, label in zip(traces, labels, strict=True)]
     burns = _starts(measured, cylinder, start)
-    core = _core.fit_cylinder(measured, cylinder, burns, list(names), step_cad, integrator, max_iterations)
+    core, stop = or_partial(
+        lambda: _core.fit_cylinder(measured, cylinder, burns, list(names), step_cad, integrator, max_iterations)
+    )
     loads = tuple(
         _load(core.cylinder, fitted, trace, label, point)
         for fitted, trace, label in zip(core.loads, traces, labels, strict=True)
@@ -110,7 +114,7 @@ def fit_cylinder(
         warnings=(),
         correlation_if_free=np.asarray(core.correlation_if_free),
     )
-    return replace(fit, warnings=(*_doubts(traces, cylinder, point), *_warnings(fit)))
+    return hand_over(replace(fit, warnings=(*_doubts(traces, cylinder, point), *_warnings(fit))), stop)
 
 
 def default_free(cylinder: Cylinder) -> tuple[str, ...]:

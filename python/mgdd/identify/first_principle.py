@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from mgdd import _core
-from mgdd.errors import DataError, ParameterError
+from mgdd.errors import DataError, ParameterError, hand_over, or_partial
 from mgdd.identify.first_principle_model import GROUP_NAMES, FirstPrincipleModel, sample_step
 from mgdd.identify.first_principle_start import SIDE_DEG, regression_start, rest_angle, spread_starts
 from mgdd.identify.metrics import fit_percent
@@ -183,15 +183,17 @@ def fit_throttle(
         )
         if part and (fraction == 1.0 or fraction * time.size >= 200)
     ]
-    found = _core.fit_throttle_groups(
-        [(step_s, np.clip(duty, -1.0, 1.0), angle, [float(angle[0]), 0.0, 0.0], 0, False)],
-        stages=stages,
-        starts=spread_starts(values, free, bounds, n_starts, seed),
-        closed_deg=closed_deg,
-        open_deg=open_deg,
-        ramp_deg=0.25,
-        substeps=2,
-        n_threads=threads,
+    found, stop = or_partial(
+        lambda: _core.fit_throttle_groups(
+            [(step_s, np.clip(duty, -1.0, 1.0), angle, [float(angle[0]), 0.0, 0.0], 0, False)],
+            stages=stages,
+            starts=spread_starts(values, free, bounds, n_starts, seed),
+            closed_deg=closed_deg,
+            open_deg=open_deg,
+            ramp_deg=0.25,
+            substeps=2,
+            n_threads=threads,
+        )
     )
     report = FitReport.from_core(found["reports"][found["best"]], angle)
     model = FirstPrincipleModel(
@@ -220,7 +222,7 @@ def fit_throttle(
         run = model.simulate(test_time, test_duty, start_deg=float(test_angle[0]))
         fit_test, rmse_test = fit_percent(test_angle, run), float(np.sqrt(np.mean((run - test_angle) ** 2)))
     run = model.simulate(time, duty, start_deg=float(angle[0]))
-    return ThrottleFit(
+    fit = ThrottleFit(
         report=report,
         model=model,
         kind="first_principle",
@@ -232,6 +234,7 @@ def fit_throttle(
         findings=tuple(findings),
         source=str(log.attrs.get("file", "log")),
     )
+    return hand_over(fit, stop)
 
 
 def log_columns(log: xr.Dataset) -> tuple[NDArray[np.float64], NDArray[np.float64], NDArray[np.float64]]:

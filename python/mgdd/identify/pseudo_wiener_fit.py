@@ -10,7 +10,7 @@ from typing import TYPE_CHECKING, cast
 import numpy as np
 
 from mgdd import _core
-from mgdd.errors import DataError, ParameterError
+from mgdd.errors import DataError, ParameterError, hand_over, or_partial
 from mgdd.identify.metrics import fit_percent
 from mgdd.identify.throttle_fit import ThrottleFit
 from mgdd.optimize import FitReport
@@ -145,18 +145,20 @@ def fit_pseudo_wiener(
         values["map_start"] = float(lag_start == "map")
     values |= {name: float(value) for name, value in (settings or {}).items()}
     delays = [delay_samples] if isinstance(delay_samples, int) else list(delay_samples)
-    parameters, report, rmse, hits = _core.fit_pseudo_wiener(
-        kind=kind,
-        records=columns,
-        parameters=values,
-        sides=sides,
-        free=list(free),
-        delays=delays,
-        starts=_STARTS.get(kind, 1) if starts is None else starts,
-        seed=seed,
-        only_given_start=start is not None,
-        try_map_start=lag_start == "best",
-        max_iterations=max_iterations,
+    (parameters, report, rmse, hits), stop = or_partial(
+        lambda: _core.fit_pseudo_wiener(
+            kind=kind,
+            records=columns,
+            parameters=values,
+            sides=sides,
+            free=list(free),
+            delays=delays,
+            starts=_STARTS.get(kind, 1) if starts is None else starts,
+            seed=seed,
+            only_given_start=start is not None,
+            try_map_start=lag_start == "best",
+            max_iterations=max_iterations,
+        )
     )
     wrapped = FitReport.from_core(report, np.concatenate([angle for _, angle in columns]))
     model = PseudoWiener(kind, parameters)
@@ -171,7 +173,7 @@ def fit_pseudo_wiener(
             found.append("the best fit was found once only: a better one may exist, raise starts")
     if kind == "pw_r" and sides == "shared":
         found.append("one set of values serves both sides of limp-home: sides='both' fits a set each")
-    return PseudoWienerFit(
+    fit = PseudoWienerFit(
         report=wrapped,
         model=model,
         kind=kind,
@@ -183,6 +185,7 @@ def fit_pseudo_wiener(
         search_rmse_deg=tuple(rmse.tolist()),
         source=str(logs[0].attrs.get("file", "log")),
     )
+    return hand_over(fit, stop)
 
 
 def _sample(logs: Sequence[xr.Dataset]) -> float:

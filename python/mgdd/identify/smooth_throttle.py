@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from mgdd import _core
-from mgdd.errors import ShapeError
+from mgdd.errors import ShapeError, hand_over, or_partial
 from mgdd.optimize import FitReport
 
 if TYPE_CHECKING:
@@ -180,27 +180,30 @@ def fit_smooth_throttle(
     table = np.atleast_2d(np.asarray(starts, dtype=np.float64))
     if table.ndim != 2 or table.shape[1] != 10:
         raise ShapeError(f"starts has shape {table.shape}: must be (n_starts, 10)")
-    found = _core.fit_smooth_throttle(
-        np.asarray(duty, dtype=np.float64),
-        np.asarray(angle_deg, dtype=np.float64),
-        starts=table.tolist(),
-        lower=_ten(lower, "lower"),
-        upper=_ten(upper, "upper"),
-        step_s=step_s,
-        start=list(start),
-        inertia_kgm2=inertia_kgm2,
-        gear_ratio=gear_ratio,
-        inductance_h=inductance_h,
-        supply_v=supply_v,
-        cost_tolerance=cost_tolerance,
-        lanes=lanes,
+    found, stop = or_partial(
+        lambda: _core.fit_smooth_throttle(
+            np.asarray(duty, dtype=np.float64),
+            np.asarray(angle_deg, dtype=np.float64),
+            starts=table.tolist(),
+            lower=_ten(lower, "lower"),
+            upper=_ten(upper, "upper"),
+            step_s=step_s,
+            start=list(start),
+            inertia_kgm2=inertia_kgm2,
+            gear_ratio=gear_ratio,
+            inductance_h=inductance_h,
+            supply_v=supply_v,
+            cost_tolerance=cost_tolerance,
+            lanes=lanes,
+        )
     )
-    return SmoothThrottleFit(
+    fit = SmoothThrottleFit(
         reports=tuple(FitReport.from_core(report) for report in found["reports"]),
         best=found["best"],
         n_reached=found["n_reached"],
         n_sweeps=found["n_sweeps"],
     )
+    return hand_over(fit, stop)
 
 
 def _ten(values: ArrayLike, name: str) -> list[float]:

@@ -11,7 +11,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from mgdd import _core
-from mgdd.errors import ParameterError
+from mgdd.errors import ParameterError, hand_over, or_partial
 from mgdd.loop.bench import EngineBench, cycles_to_dataset
 from mgdd.results import labelled_dataset
 
@@ -55,7 +55,7 @@ class LoopRun:
         and ``cycles_stays`` (NaN: never), ``exceeded_fraction``, means of J, efficiency and true NOx over the second
         half, extremes of the estimate, misfires.
     interrupted : bool
-        The run was stopped by Ctrl-C: the cycles up to there are in the dataset, the seeker stands behind them.
+        Ctrl-C ended the run before all its cycles: it is the part that `mgdd.errors.Interrupted` carried.
 
     Examples
     --------
@@ -117,6 +117,11 @@ def run_seeker(
     ------
     mgdd.errors.ParameterError
         A seeker that does not fit the bench, or fewer than one cycle.
+    mgdd.errors.InUseError
+        Bench or seeker are in a call of another thread.
+    mgdd.errors.Interrupted
+        Ctrl-C; ``partial`` is the LoopRun of the cycles until then. Bench and seeker stand behind them, and running
+        them again goes on.
 
     Examples
     --------
@@ -127,19 +132,22 @@ def run_seeker(
     >>> run.summary["cycles_to"] < 100
     True
     """
-    raw = _core.run_loop(
-        bench,
-        seeker,
-        cycles,
-        optimum_cad=math.nan if optimum_cad is None else optimum_cad,
-        arrival_cad=arrival_cad,
-        tail_cycles=tail_cycles,
-        exceed_from=exceed_from,
-        exceed_above=_thresholds(bench, exceed_above),
+    above = _thresholds(bench, exceed_above)
+    raw, stop = or_partial(
+        lambda: _core.run_loop(
+            bench,
+            seeker,
+            cycles,
+            optimum_cad=math.nan if optimum_cad is None else optimum_cad,
+            arrival_cad=arrival_cad,
+            tail_cycles=tail_cycles,
+            exceed_from=exceed_from,
+            exceed_above=above,
+        )
     )
     dataset = cycles_to_dataset(bench, raw["columns"], estimate_cad=raw["estimate_cad"])
     dataset.attrs["interrupted"] = int(raw["interrupted"])
-    return LoopRun(dataset=dataset, summary=raw["summary"], interrupted=raw["interrupted"])
+    return hand_over(LoopRun(dataset=dataset, summary=raw["summary"], interrupted=raw["interrupted"]), stop)
 
 
 def monte_carlo(
@@ -180,13 +188,16 @@ def monte_carlo(
     Returns
     -------
     xarray.Dataset
-        Over ``bench``, ``seeker`` and ``seed``: the summary of `run_seeker`, and ``finished``, which is true everywhere
-        unless Ctrl-C stopped the work; unfinished loops are NaN.
+        Over ``bench``, ``seeker`` and ``seed``: the summary of `run_seeker`, and ``finished``, which is true.
 
     Raises
     ------
     mgdd.errors.ParameterError
         Nothing to run, or a seeker that does not fit a bench.
+    mgdd.errors.InUseError
+        A bench or seeker is in a call of another thread.
+    mgdd.errors.Interrupted
+        Ctrl-C; ``partial`` is the Dataset with ``finished`` false and NaN for every loop that did not reach its end.
 
     Examples
     --------
@@ -209,17 +220,20 @@ def monte_carlo(
         optima = [float(optimum_cad)] * len(bench_list)
     else:
         optima = [float(value) for value in optimum_cad]
-    raw = _core.monte_carlo(
-        bench_list,
-        seeker_list,
-        seed_list,
-        cycles=cycles,
-        optimum_cad=optima,
-        arrival_cad=arrival_cad,
-        tail_cycles=tail_cycles,
-        exceed_from=exceed_from,
-        exceed_above=[_thresholds(bench, exceed_above) for bench in bench_list],
-        threads=threads,
+    above = [_thresholds(bench, exceed_above) for bench in bench_list]
+    raw, stop = or_partial(
+        lambda: _core.monte_carlo(
+            bench_list,
+            seeker_list,
+            seed_list,
+            cycles=cycles,
+            optimum_cad=optima,
+            arrival_cad=arrival_cad,
+            tail_cycles=tail_cycles,
+            exceed_from=exceed_from,
+            exceed_above=above,
+            threads=threads,
+        )
     )
     shape = (len(bench_list), len(seeker_list), len(seed_list))
     dims = ("bench", "seeker", "seed")
@@ -232,7 +246,7 @@ def monte_carlo(
     }
     for name, values in raw.items():
         variables[name] = (dims, np.where(finished, values.reshape(shape), np.nan), *_SUMMARY[name])
-    return labelled_dataset(variables, attrs={"cycles": cycles})
+    return hand_over(labelled_dataset(variables, attrs={"cycles": cycles}), stop)
 
 
 def _whole_seeds(seeds: Iterable[int]) -> list[int]:

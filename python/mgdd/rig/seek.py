@@ -2,15 +2,13 @@
 
 from __future__ import annotations
 
-import logging
 import math
 from collections.abc import Mapping
-from dataclasses import dataclass, field
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING, Any, NamedTuple
 
 import numpy as np
 
-from mgdd.errors import ParameterError
+from mgdd.errors import Interrupted, ParameterError
 from mgdd.loop import LoopRun, summarize_cycles
 from mgdd.loop.bench import FLAGS
 from mgdd.results import VARIABLES, labelled_dataset
@@ -23,21 +21,18 @@ if TYPE_CHECKING:
 
 __all__ = ["run_on_rig"]
 
-_log = logging.getLogger(__name__)
-
 _CHANGED = "operating_point_changed"
 _UNKNOWN = "not given by the rig"
 _OWN = ("estimate_cad", "soc_requested_cad", "j", "misfire")  # columns that the loop itself knows
 
 
-@dataclass
-class _Log:
-    """One row per measured cycle."""
+class _Row(NamedTuple):
+    """One measured cycle."""
 
-    estimate: list[float] = field(default_factory=list)
-    applied: list[float] = field(default_factory=list)
-    void: list[bool] = field(default_factory=list)
-    measured: list[Measurement] = field(default_factory=list)
+    estimate: float
+    applied: float
+    void: bool
+    measured: Measurement
 
 
 def run_on_rig(
@@ -57,8 +52,6 @@ def run_on_rig(
     operating point restarts the seeker: before its first cycle where the rig announces it (`AnnouncingRig`), otherwise
     after the first cycle whose ``values["operating_point_changed"]`` is true; the reading of that cycle then belongs to
     neither point and counts as void. On a `SimulatedRig` the trajectory is that of `mgdd.loop.run_seeker`, bit for bit.
-
-    Ctrl-C ends the run and keeps its cycles: the result is marked ``interrupted``, and calling again goes on.
 
     Parameters
     ----------
@@ -85,6 +78,9 @@ def run_on_rig(
     mgdd.errors.DataError
         A fired cycle whose reading is not finite. Errors of the rig pass through as well; the seeker then stands before
         that cycle, and its ``history`` holds the cycles so far.
+    mgdd.errors.Interrupted
+        Ctrl-C; ``partial`` is the LoopRun of the cycles until then. Rig and seeker stand behind them, and calling again
+        goes on.
 
     Examples
     --------
@@ -110,13 +106,13 @@ def run_on_rig(
     if unknown := sorted(set(exceed_above or {}) - set(names)):
         raise ParameterError(f"exceed_above: {unknown} not among the limits of the seeker, {names}")
     announcing = rig if isinstance(rig, AnnouncingRig) else None
-    first, log, interrupted = seeker.cycle, _Log(), False
+    first, log, interrupted = seeker.cycle, list[_Row](), False
     try:
         for _ in range(cycles):
             _one_cycle(rig, announcing, seeker, log)
     except KeyboardInterrupt:
         interrupted = True
-        _log.info("interrupted after %d cycles; rig and seeker can go on from here", len(log.measured))
+        del log[seeker.cycle - first :]  # a cycle that was measured and not told: it is asked again
     dataset = _dataset(log, first)
     dataset.attrs["interrupted"] = int(interrupted)
     summary = summarize_cycles(
@@ -127,10 +123,13 @@ def run_on_rig(
         exceed_from=exceed_from,
         exceed_above=exceed_above,
     )
-    return LoopRun(dataset=dataset, summary=summary, interrupted=interrupted)
+    run = LoopRun(dataset=dataset, summary=summary, interrupted=interrupted)
+    if interrupted:
+        raise Interrupted(f"interrupted after {len(log)} of {cycles} cycles, which are in .partial", run)
+    return run
 
 
-def _one_cycle(rig: Rig, announcing: AnnouncingRig | None, seeker: Seeker, log: _Log) -> None:
+def _one_cycle(rig: Rig, announcing: AnnouncingRig | None, seeker: Seeker, log: list[_Row]) -> None:
     if announcing is not None and announcing.operating_point_changes:
         seeker.restart()
     estimate = float(seeker.estimate[0])
@@ -143,13 +142,10 @@ def _one_cycle(rig: Rig, announcing: AnnouncingRig | None, seeker: Seeker, log: 
     summed = seeker.component_count == 1
     told = measured.performance if summed else np.array(measured.components)
     limits = [measured.limits[name] for name in seeker.limit_names]
+    log.append(_Row(estimate, soc_cad, void, measured))
     seeker.tell(told, limits if limits else None, misfire=void)
     if late:
         seeker.restart()
-    log.estimate.append(estimate)
-    log.applied.append(soc_cad)
-    log.void.append(void)
-    log.measured.append(measured)
 
 
 def _require_match(seeker: Seeker, measured: Measurement) -> None:
@@ -164,20 +160,25 @@ def _require_match(seeker: Seeker, measured: Measurement) -> None:
             raise ParameterError(f"limits: {name!r} is not measured by the rig: it measures {have}")
 
 
-def _dataset(log: _Log, first: int) -> xr.Dataset:
+def _dataset(log: list[_Row], first: int) -> xr.Dataset:
     """Label what was measured; a value that is missing in some cycles is NaN there."""
-    rows = log.measured
+    rows = [row.measured for row in log]
     names = dict.fromkeys(name for row in rows for name in row.values)
     columns = {name: np.array([row.values.get(name, math.nan) for row in rows]) for name in names}
     count = columns.pop("cycle", None)
     cycle = np.arange(first, first + len(rows)) if count is None or not np.isfinite(count).all() else count
     variables: dict[str, tuple[Any, ...]] = {
         "cycle": ("cycle", cycle.astype(np.int64)),
-        "estimate_cad": ("cycle", np.array(log.estimate, np.float64)),
-        "soc_requested_cad": ("cycle", np.array(log.applied, np.float64)),
+        "estimate_cad": ("cycle", np.array([row.estimate for row in log], np.float64)),
+        "soc_requested_cad": ("cycle", np.array([row.applied for row in log], np.float64)),
         "j": ("cycle", np.array([row.performance for row in rows], np.float64)),
         "misfire": ("cycle", np.array([row.misfire for row in rows], np.bool_), "-", FLAGS["misfire"]),
-        "void": ("cycle", np.array(log.void, np.bool_), "-", "cycle whose reading the seeker did not use"),
+        "void": (
+            "cycle",
+            np.array([row.void for row in log], np.bool_),
+            "-",
+            "cycle that the seeker did not use",
+        ),
     }
     for name, values in columns.items():
         if name in FLAGS and name not in _OWN:

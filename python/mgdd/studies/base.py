@@ -6,13 +6,13 @@ from collections.abc import Callable, Iterable, Mapping
 from dataclasses import dataclass, field
 from typing import TYPE_CHECKING, Any, TypeVar
 
-from mgdd.errors import ParameterError
+from mgdd.errors import Interrupted, ParameterError
 
 if TYPE_CHECKING:
     import xarray as xr
     from matplotlib.figure import Figure
 
-__all__ = ["Progress", "StudyResult", "check_seeds", "run_parts"]
+__all__ = ["Progress", "StudyResult", "check_seeds", "finish", "run_parts"]
 
 Progress = Callable[[str], None]
 Part = TypeVar("Part")
@@ -32,7 +32,7 @@ class StudyResult:
         Figures by caption.
     summary : mapping
         Plain numbers and text, ready for JSON: at least ``study``, ``seeds`` (0 where nothing is random) and ``rows``,
-        a list of flat mappings; ``interrupted`` is true where Ctrl-C left only the parts that were finished.
+        a list of flat mappings; ``interrupted`` is true in the part that `mgdd.errors.Interrupted` carries.
 
     Examples
     --------
@@ -81,3 +81,10 @@ def run_parts(parts: Iterable[tuple[str, Callable[[], Part]]], progress: Progres
             raise
         return done, True
     return done, False
+
+
+def finish(result: StudyResult) -> StudyResult:
+    """Return a whole result; raise one that Ctrl-C has cut short, as the part that an Interrupted carries."""
+    if result.summary.get("interrupted"):
+        raise Interrupted(f"interrupted: {len(result.summary['rows'])} finished rows are in .partial", result)
+    return result

@@ -22,9 +22,9 @@ from mgdd.optimize import (
     tune,
 )
 from mgdd.results import labelled_dataset, to_jsonable
-from mgdd.studies.base import Progress, StudyResult, check_seeds, run_parts
+from mgdd.studies.base import Progress, StudyResult, check_seeds, finish, run_parts
 from mgdd.studies.load_step_learning import LAWS, Learned, learn
-from mgdd.studies.statistics import bands, finished_loops, rms, with_interval
+from mgdd.studies.statistics import bands, loops, rms, with_interval
 
 if TYPE_CHECKING:
     import xarray as xr
@@ -122,11 +122,13 @@ def run_ch3_optimizers(
         "cycles": CYCLES,
         "interrupted": interrupted,
     }
-    return StudyResult(
-        name="ch3-optimizers",
-        dataset=dataset,
-        figures=_draw(dataset) if figures else {},
-        summary=to_jsonable(summary),
+    return finish(
+        StudyResult(
+            name="ch3-optimizers",
+            dataset=dataset,
+            figures=_draw(dataset) if figures else {},
+            summary=to_jsonable(summary),
+        )
     )
 
 
@@ -189,9 +191,7 @@ def _short(tuning: Tuning) -> str:
 
 def _run(contender: _Contender, best: SteadyOptimum, seeds: int) -> _Outcome:
     seeker = contender.seeker
-    table = finished_loops(
-        EngineBench(), seeker, range(seeds), cycles=CYCLES, optimum_cad=best.soc_cad, arrival_cad=ARRIVAL_CAD
-    )
+    table = loops(EngineBench(), seeker, range(seeds), cycles=CYCLES, optimum_cad=best.soc_cad, arrival_cad=ARRIVAL_CAD)
 
     def make(seed: int) -> tuple[EngineBench, Any]:
         fresh = Spsa(**{**seeker.settings, "seed": seed}) if isinstance(seeker, Spsa) else copy.deepcopy(seeker)

@@ -10,11 +10,11 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from mgdd.engine import Performance
-from mgdd.loop import EngineBench, SensorDynamics, SteadyOptimum, steady_optimum
+from mgdd.loop import EngineBench, SensorDynamics, SteadyOptimum, run_seeker, steady_optimum
 from mgdd.optimize import ComponentLag, ExtremumSeeking
 from mgdd.results import labelled_dataset, to_jsonable
-from mgdd.studies.base import Progress, StudyResult, check_seeds, run_parts
-from mgdd.studies.statistics import bands, finished_loops, rms, run_finished, with_interval
+from mgdd.studies.base import Progress, StudyResult, check_seeds, finish, run_parts
+from mgdd.studies.statistics import bands, loops, rms, with_interval
 
 if TYPE_CHECKING:
     import xarray as xr
@@ -128,11 +128,13 @@ def run_ch4_esc(
         "slow_dither_rule_cycles": 6.0 * (_ANALYSER.delay_cycles + _ANALYSER.lag_cycles),
         "interrupted": interrupted,
     }
-    return StudyResult(
-        name="ch4-esc",
-        dataset=dataset,
-        figures=_draw(dataset) if figures else {},
-        summary=to_jsonable(summary),
+    return finish(
+        StudyResult(
+            name="ch4-esc",
+            dataset=dataset,
+            figures=_draw(dataset) if figures else {},
+            summary=to_jsonable(summary),
+        )
     )
 
 
@@ -163,7 +165,7 @@ def _run_case(case: _Case, best: SteadyOptimum) -> tuple[dict[str, Any], float, 
             hold_cycles=hold_cycles,
         )
 
-    run = run_finished(bench(), seeker(None), CYCLES, optimum_cad=best.soc_cad, arrival_cad=ARRIVAL_CAD)
+    run = run_seeker(bench(), seeker(None), CYCLES, optimum_cad=best.soc_cad, arrival_cad=ARRIVAL_CAD)
     settle = case.period * math.ceil((case.lag.delay_cycles + 20.0 * case.lag.lag_cycles) / case.period + 2.0)
     slope = _frozen_slope(bench(), seeker(settle + 2 * case.period), settle, case.period)
     stays = run.summary["cycles_stays"]
@@ -211,7 +213,7 @@ def _component_wise(
             components=[ComponentLag(), _ANALYSER],
         )
 
-    table = finished_loops(*make(0), range(seeds), cycles=CYCLES, optimum_cad=best.soc_cad)
+    table = loops(*make(0), range(seeds), cycles=CYCLES, optimum_cad=best.soc_cad)
     row = {
         "case": "analyser, NOx demodulated with its own phase",
         "period_cycles": period,

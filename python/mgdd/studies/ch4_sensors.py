@@ -13,7 +13,7 @@ from mgdd import presets
 from mgdd.engine import NoxModel, NoxProxy, OperatingPoint, SoftSensor, fit_nox_proxy, start_of_combustion
 from mgdd.loop import EngineBench, SensorDynamics
 from mgdd.results import VARIABLES, labelled_dataset, to_jsonable
-from mgdd.studies.base import Progress, StudyResult, check_seeds, run_parts
+from mgdd.studies.base import Progress, StudyResult, check_seeds, finish, run_parts
 from mgdd.studies.ch4_sensors_figures import draw
 from mgdd.studies.statistics import with_interval
 
@@ -120,11 +120,13 @@ def run_ch4_sensors(
         "correction": [_course_row(own) for own in course],
         "interrupted": interrupted,
     }
-    return StudyResult(
-        name="ch4-sensors",
-        dataset=dataset,
-        figures=draw(dataset) if figures else {},
-        summary=to_jsonable(summary),
+    return finish(
+        StudyResult(
+            name="ch4-sensors",
+            dataset=dataset,
+            figures=draw(dataset) if figures else {},
+            summary=to_jsonable(summary),
+        )
     )
 
 

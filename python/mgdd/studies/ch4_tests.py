@@ -13,8 +13,8 @@ from mgdd.engine import Performance
 from mgdd.loop import EngineBench, SteadyOptimum, steady_map, steady_optimum
 from mgdd.optimize import ComponentLag, ExtremumSeeking, Limit
 from mgdd.results import labelled_dataset, to_jsonable
-from mgdd.studies.base import Progress, StudyResult, check_seeds, run_parts
-from mgdd.studies.statistics import finished_loops, rms, run_with_slope, with_interval
+from mgdd.studies.base import Progress, StudyResult, check_seeds, finish, run_parts
+from mgdd.studies.statistics import loops, rms, run_with_slope, with_interval
 
 if TYPE_CHECKING:
     import xarray as xr
@@ -146,11 +146,13 @@ def run_ch4_tests(
         "cycles": CYCLES,
         "interrupted": interrupted,
     }
-    return StudyResult(
-        name="ch4-tests",
-        dataset=dataset,
-        figures=_draw(done, limited) if figures else {},
-        summary=to_jsonable(summary),
+    return finish(
+        StudyResult(
+            name="ch4-tests",
+            dataset=dataset,
+            figures=_draw(done, limited) if figures else {},
+            summary=to_jsonable(summary),
+        )
     )
 
 
@@ -160,7 +162,7 @@ def _run(test: _Test, seeds: int, *, limited: bool = False) -> _Outcome:
     best = steady_optimum(bench, caps)
     seeker = test.seeker(best, limited=limited)
     above = {name: cap + 3.0 * best.limit_scatter[name] for name, cap in caps.items()}
-    table = finished_loops(
+    table = loops(
         bench,
         seeker,
         range(seeds),

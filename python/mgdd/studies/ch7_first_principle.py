@@ -11,7 +11,7 @@ from mgdd import presets
 from mgdd.identify import fit_percent, fit_throttle
 from mgdd.io import throttle_log
 from mgdd.results import labelled_dataset, to_jsonable
-from mgdd.studies.base import Progress, StudyResult, check_seeds, run_parts
+from mgdd.studies.base import Progress, StudyResult, check_seeds, finish, run_parts
 from mgdd.studies.statistics import with_interval
 from mgdd.throttle import Throttle, groups, simulate
 
@@ -93,11 +93,13 @@ def run_ch7_first_principle(
         "resolution_deg": LSB_DEG,
         "interrupted": interrupted,
     }
-    return StudyResult(
-        name="ch7-first-principle",
-        dataset=dataset,
-        figures=_draw(dataset) if figures else {},
-        summary=to_jsonable(summary),
+    return finish(
+        StudyResult(
+            name="ch7-first-principle",
+            dataset=dataset,
+            figures=_draw(dataset) if figures else {},
+            summary=to_jsonable(summary),
+        )
     )
 
 

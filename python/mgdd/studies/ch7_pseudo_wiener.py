@@ -11,7 +11,7 @@ from mgdd import presets
 from mgdd.errors import ParameterError
 from mgdd.identify import fit_percent, fit_pseudo_wiener
 from mgdd.results import labelled_dataset, to_jsonable
-from mgdd.studies.base import Progress, StudyResult, run_parts
+from mgdd.studies.base import Progress, StudyResult, finish, run_parts
 from mgdd.throttle import Throttle, simulate
 
 if TYPE_CHECKING:
@@ -110,7 +110,7 @@ def run_ch7_pseudo_wiener(
         "interrupted": interrupted,
     }
     drawn = _draw(dataset) if figures else {}
-    return StudyResult(name="ch7-pseudo-wiener", dataset=dataset, figures=drawn, summary=to_jsonable(summary))
+    return finish(StudyResult(name="ch7-pseudo-wiener", dataset=dataset, figures=drawn, summary=to_jsonable(summary)))
 
 
 def study_throttle(plant: str) -> Throttle:

@@ -19,7 +19,7 @@ from mgdd.identify import (
     fit_wiener_hammerstein,
 )
 from mgdd.results import labelled_dataset
-from mgdd.studies.base import Progress, StudyResult, run_parts
+from mgdd.studies.base import Progress, StudyResult, finish, run_parts
 from mgdd.studies.identification_figures import draw
 
 if TYPE_CHECKING:
@@ -133,7 +133,7 @@ def run_identification_benchmarks(
         "interrupted": interrupted,
         "rows": [case.row for case in cases],
     }
-    return StudyResult(name=_NAME, dataset=dataset, figures=draw(dataset) if figures else {}, summary=summary)
+    return finish(StudyResult(name=_NAME, dataset=dataset, figures=draw(dataset) if figures else {}, summary=summary))
 
 
 def _fit_percent(measured: Vector, simulated: Vector) -> float:
