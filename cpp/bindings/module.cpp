@@ -30,4 +30,5 @@ PYBIND11_MODULE(_core, m) {
   bind_benchmark_models(m);
   bind_bench(m);
   bind_loop(m);
+  make_refusals_readable(m);
 }

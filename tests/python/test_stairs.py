@@ -10,7 +10,7 @@ import pytest
 
 CPP = "common > optimize > control > engine throttle > identify > guide > loop"
 PYTHON = (
-    "_core > errors > results presets > io plot > optimize > control > engine throttle > identify > guide"
+    "errors > _arguments > _core > results presets > io plot > optimize > control > engine throttle > identify > guide"
     " > loop sweep design datasets > maps > rig > studies > report > cli > __main__"
 )
 
