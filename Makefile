@@ -62,7 +62,7 @@ $(VENV)/.stamp-test: $(VENV)/.stamp-build | system-test
 
 # The package is installed again whenever a file that it is made of is new, changed or gone.
 SOURCES := CMakeLists.txt pyproject.toml README.md \
-           $(shell find cpp/include cpp/src cpp/bindings cmake python -type f \
+           $(shell find cpp/include cpp/src cpp/systems cpp/bindings cmake python -type f \
              -not -path '*/__pycache__/*' -not -name '*.so' 2>/dev/null | sort)
 MANIFEST := $(VENV)/.manifest
 .PHONY: always

@@ -29,6 +29,7 @@ from peers.peer_seekers import Contender, FinishedError, NullPlant, Plant, null_
 from support import machine
 
 from mgdd import optimize
+from mgdd.optimize.measured_map import MeasuredMap
 
 BEND, SIGMA, AWAY, NEAR = -0.0255, 0.25, 12.0, 1.0
 TAIL = 1000
@@ -93,7 +94,7 @@ def untouched(kind: Callable[..., object], **settings: object) -> Contender:
     return run
 
 
-def measured(plant: Plant, start: float) -> optimize.MeasuredMap:
+def measured(plant: Plant, start: float) -> MeasuredMap:
     at = [start + offset for offset in MEASURED_AT for _ in range(MEASURED_TIMES)]
     j = [plant(x) for x in at]
     if isinstance(plant, NullPlant):  # flat: nothing to read off, so that the time is that of the seeker alone

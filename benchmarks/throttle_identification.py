@@ -26,7 +26,8 @@ from scipy.optimize import least_squares
 from support import machine
 
 from mgdd import _core
-from mgdd.identify import fit_smooth_throttle, simulate_smooth_throttle
+from mgdd.identify import SmoothThrottle, fit_smooth_throttle
+from mgdd.optimize import FitOptions
 
 STEP_S, N, NOISE_DEG, TOLERANCE = 1e-3, 20_000, 0.05, 1e-9
 PEER_STEPS = 200  # steps after which SciPy is stopped; its finite differences are not counted
@@ -35,6 +36,13 @@ RECORDS = {  # duty offset, duty amplitude, middle angle [deg], start [rad]
     "across limp-home": (0.0, 0.35, 15.0, 0.14),
     "above limp-home only": (0.15, 0.2, 45.0, 0.7),
 }
+
+
+def simulate(duty: np.ndarray, start: tuple[float, float, float], parameters: np.ndarray = TRUTH) -> np.ndarray:
+    """Angle [deg] of the free run."""
+    model = SmoothThrottle(parameters=dict(zip(_core.smooth_throttle_names, parameters, strict=True)))
+    inputs = {"time_s": STEP_S * np.arange(duty.size), "duty": duty}
+    return model.simulate(inputs, initial_state=start)["angle_deg"].to_numpy()
 
 
 def make_record(offset: float, amplitude: float, middle_deg: float, start_rad: float) -> tuple:
@@ -46,10 +54,14 @@ def make_record(offset: float, amplitude: float, middle_deg: float, start_rad: f
     duty = offset + amplitude * wave
     start = (start_rad, 0.0, 0.0)
     for k in range(0, N, 80):  # the pull needs the angle of the run so far
-        angle = simulate_smooth_throttle(duty[: k + 1], start=start)[-1]
+        angle = simulate(duty[: k + 2], start)[k]
         duty[k : k + 80] -= 0.002 * (angle - middle_deg)
     noise = rng.normal(0.0, NOISE_DEG, N)
-    return duty, simulate_smooth_throttle(duty, start=start) + noise, start, float(np.sqrt(np.mean(noise**2)))
+    return duty, simulate(duty, start) + noise, start, float(np.sqrt(np.mean(noise**2)))
+
+
+def record(duty: np.ndarray, angle: np.ndarray) -> dict[str, np.ndarray]:
+    return {"time_s": STEP_S * np.arange(duty.size), "duty": duty, "angle_deg": angle}
 
 
 def contenders(duty, angle, start, lower, upper):
@@ -84,9 +96,10 @@ def contenders(duty, angle, start, lower, upper):
 
     def ours(p):
         fit = fit_smooth_throttle(
-            duty, angle, starts=p, lower=lower, upper=upper, start=start, cost_tolerance=TOLERANCE
-        )
-        return fit.report.rmse, fit.n_sweeps
+            record(duty, angle), start_values=p, lower=lower, upper=upper, initial_state=start,
+            options=FitOptions(tolerance=TOLERANCE),
+        )  # fmt: skip
+        return fit.report.rmse, fit.report.nfev
 
     return {"mgdd": ours, "plain LM, Numba sensitivities": plain, "SciPy trf 2-point, Numba": scipy_two_point}
 
@@ -96,7 +109,7 @@ def measure(name: str, options: argparse.Namespace) -> dict:
     lower, upper = 0.1 * TRUTH, 10.0 * TRUTH
     starts = TRUTH * np.random.default_rng(5).uniform(0.5, 1.5, (options.starts, 10))
     for p in starts[:3]:
-        ours = simulate_smooth_throttle(duty[:2000], parameters=p, start=start)
+        ours = simulate(duty[:2000], start, p)
         peer, jacobian = numba_throttle.simulate_with_sensitivities(p, duty[:2000], STEP_S, start)
         plain = numba_throttle.simulate(p, duty[:2000], STEP_S, start)
         h = 1e-6 * p
@@ -132,11 +145,13 @@ def measure(name: str, options: argparse.Namespace) -> dict:
     times = []
     for _ in range(options.repeats):
         begin = time.process_time()
-        fit = fit_smooth_throttle(duty, angle, starts=starts, lower=lower, upper=upper, start=start)
+        fit = fit_smooth_throttle(
+            record(duty, angle), start_values=starts, lower=lower, upper=upper, initial_state=start
+        )
         times.append(time.process_time() - begin)
     rows["mgdd, all starts in lanes"] = {
         "total_s": statistics.median(times),
-        "reached": int(np.sum([r.rmse <= 1.005 * floor for r in fit.reports])),
+        "reached": int(np.sum([r.rmse <= 1.005 * floor for r in fit.start_reports])),
     }
     return {
         "record": name,

@@ -20,6 +20,7 @@ extensions = [
     "sphinx.ext.autodoc",
     "sphinx.ext.autosummary",
     "sphinx.ext.mathjax",
+    "sphinx-mathjax-offline",  # carries MathJax and its fonts: equations are drawn without a network
     "sphinx_copybutton",
     "numpydoc",
     "myst_nb",

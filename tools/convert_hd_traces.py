@@ -4,7 +4,7 @@
     python tools/convert_hd_traces.py --source <folder of pExpA25 ...>
 
 reads the unmodified files of LibICE-post (two columns: crank angle [deg], pressure [Pa]) and writes into
-python/mgdd/data three files: traces, operating conditions, licence. Running it again gives the same bytes.
+python/mgdd/data four files: traces, operating conditions, source, licence. Running it again gives the same bytes.
 Without --source it looks in $MGDD_DATA_DIR/libice_hd_diesel. Standard library only.
 """
 
@@ -19,21 +19,20 @@ STEM = "hd_diesel_128x144"
 COMMIT = "c1bc6acc2a5952f28ed11f76c4a26cb506e6b5aa"
 SAMPLES = 267
 
-CITATION = f"""\
-# Heavy-duty diesel engine, bore 128 mm, stroke 144 mm: measured cylinder pressure, cycle-averaged,
-# valves closed, at four loads; crank angles in whole degrees. Converted, figures only, from LibICE-post:
-#   F. Ramognino, LibICE-post, https://github.com/RamogninoF/LibICE-post
-#   commit {COMMIT}
-#   tutorials/loadingDictionaries/data/exp/pExpA25, pExpA50, pExpA75, pExpA100
-# Licence: MIT, Copyright (c) 2018 The Python Packaging Authority; full text in {STEM}_LICENSE.txt
-# Made by tools/convert_hd_traces.py; Pa to bar is exact.
-"""
-TRACE_COLUMNS = """\
-# Columns: crank angle [deg, firing TDC = 0, compression negative]; pressure [bar] at 25, 50, 75, 100 % load
-"""
-CONDITION_COLUMNS = f"""\
-# Columns: file = column of {STEM}_traces.csv; load [%]; engine speed [rpm]; trapped mass [g per cycle];
-# start of injection [deg, firing TDC = 0, compression negative]
+SOURCE = f"""\
+Heavy-duty diesel engine, bore 128 mm, stroke 144 mm: measured cylinder pressure, cycle-averaged,
+valves closed, at four loads; crank angles in whole degrees. Converted, figures only, from LibICE-post:
+  F. Ramognino, LibICE-post, https://github.com/RamogninoF/LibICE-post
+  commit {COMMIT}
+  tutorials/loadingDictionaries/data/exp/pExpA25, pExpA50, pExpA75, pExpA100
+Licence: MIT, Copyright (c) 2018 The Python Packaging Authority; full text in {STEM}_LICENSE.txt
+Made by tools/convert_hd_traces.py; Pa to bar is exact.
+
+Columns of {STEM}_traces.csv:
+  crank angle [deg, firing TDC = 0, compression negative]; pressure [bar] at 25, 50, 75, 100 % load
+Columns of {STEM}_conditions.csv:
+  file = column of {STEM}_traces.csv; load [%]; engine speed [rpm]; trapped mass [g per cycle];
+  start of injection [deg, firing TDC = 0, compression negative]
 """
 # load [%], speed [rpm], trapped mass [g], start of injection [°CA aTDC], as in the tutorial's dictionaries
 CONDITIONS = (
@@ -82,7 +81,7 @@ def read_source(file: Path) -> tuple[list[int], list[str]]:
 
 
 def convert(source: Path, out: Path) -> list[Path]:
-    """Write the three files from folder `source` into folder `out`; an error leaves `out` as it was."""
+    """Write the four files from folder `source` into folder `out`; an error leaves `out` as it was."""
     angles: list[int] = []
     columns: list[list[str]] = []
     for load, *_ in CONDITIONS:
@@ -97,8 +96,9 @@ def convert(source: Path, out: Path) -> list[Path]:
     conditions = ["file,load_percent,speed_rpm,trapped_mass_g,soi_cad"]
     conditions += [",".join(map(str, (name, *row))) for name, row in zip(names, CONDITIONS, strict=True)]
     content = {
-        f"{STEM}_traces.csv": CITATION + TRACE_COLUMNS + "\n".join(traces) + "\n",
-        f"{STEM}_conditions.csv": CITATION + CONDITION_COLUMNS + "\n".join(conditions) + "\n",
+        f"{STEM}_traces.csv": "\n".join(traces) + "\n",
+        f"{STEM}_conditions.csv": "\n".join(conditions) + "\n",
+        f"{STEM}_SOURCE.txt": SOURCE,
         f"{STEM}_LICENSE.txt": LICENSE,
     }
     out.mkdir(parents=True, exist_ok=True)

@@ -14,10 +14,12 @@ import numpy as np
 
 from mgdd import datasets, engine, presets
 from mgdd.engine import Cylinder, OperatingPoint, analyze, simulate
-from mgdd.identify import CylinderFit, wall_heat_profile
+from mgdd.identify import best_timing, compare_laws, wall_heat_profile
+from mgdd.identify.engine.records import CylinderFit
 from mgdd.io import pressure_trace
-from mgdd.results import ANGLE, VARIABLES
-from mgdd.studies import best_timing, compare_laws, run_study
+from mgdd.results import VARIABLES
+from mgdd.results.labels import ANGLE
+from mgdd.studies import run_study
 
 __all__ = [
     "burn_laws",
@@ -118,7 +120,7 @@ def integrators() -> Rows:
             float(fired["work_booked_j"].sum()),
             *_values(fired, "work_closed_j"),
             *_values(fine, "efficiency_gross"),
-            engine.optimum(cylinder, point, integrator=name).soc_cad,
+            engine.find_optimum(cylinder, point, integrator=name)["soc_cad"],
         ]
     return rows
 
@@ -140,8 +142,8 @@ def gamma() -> Rows:
 
 def optimum() -> Rows:
     cylinder, point = single()
-    best = {s: engine.optimum(cylinder.replace(wall_heat_scale=s), point) for s in (0.0, 0.5, 1.0, 2.0)}
-    return {f"{s:g}": [b.ca50_cad, b.efficiency_gross, b.curvature_per_cad2] for s, b in best.items()}
+    best = {s: engine.find_optimum(cylinder.replace(wall_heat_scale=s), point) for s in (0.0, 0.5, 1.0, 2.0)}
+    return {f"{s:g}": [b["ca50_cad"], b["efficiency_gross"], b.curvature] for s, b in best.items()}
 
 
 def convergence() -> Rows:
@@ -165,7 +167,7 @@ def burn_laws() -> Rows:
             own.imep_closed_error_percent,
             own.onset_against_soi_cad,
             own.largest_error_bar,
-            fit.cylinder.wall_heat_scale,
+            fit.model.wall_heat_scale,
         ]
         for law, fit in fits().items()
         for load, own in zip(_LOADS, fit.loads, strict=True)
@@ -289,34 +291,36 @@ def _with_ends(row: Mapping[str, Any], *names: str) -> list[float]:
 
 def seekers() -> Rows:
     names = ("cycles_to_1_cad", "rms_cad", "final_cad", "j_lost")
-    return {f"{row['seeker']} {row['settings']}": _with_ends(row, *names) for row in study("ch3-optimizers")["rows"]}
+    return {f"{row['seeker']} {row['settings']}": _with_ends(row, *names) for row in study("seeker-comparison")["rows"]}
 
 
 def learning() -> Rows:
     names = ("sigma_max", "first_rms_cad", "third_rms_cad", "last_rms_cad")
-    return {f"`{row['law']}`": _with_ends(row, *names) for row in study("ch3-optimizers")["iterative_learning"]}
+    return {f"`{row['law']}`": _with_ends(row, *names) for row in study("seeker-comparison")["iterative_learning"]}
 
 
 def sensors() -> Rows:
     steps = ("timing_step_t90_cycles", "load_step_t90_cycles", "load_step_t90_s")
     names = ("steady_error_percent", "worst_error_percent", "scatter_percent")
-    return {row["sensor"]: [float(row[name]) for name in (*names, *steps)] for row in study("ch4-sensors")["rows"]}
+    return {row["sensor"]: [float(row[name]) for name in (*names, *steps)] for row in study("nox-sensors")["rows"]}
 
 
 def sensor_fits() -> Rows:
     names = ("reference_nox_ppm", "reference_nox_stderr_ppm", "activation_temperature_k")
     names += ("activation_temperature_stderr_k", "residual_percent")
-    return {f"`{row['map']}`": [row[name] for name in names] for row in study("ch4-sensors")["fits"]}
+    return {f"`{row['map']}`": [row[name] for name in names] for row in study("nox-sensors")["fits"]}
 
 
 def esc_cases() -> Rows:
     names = ("phase_deg", "step_sign", "cycles_stays", "final_cad")
-    return {f"{row['case']} {row['period_cycles']}": _with_ends(row, *names) for row in study("ch4-esc")["rows"]}
+    return {f"{row['case']} {row['period_cycles']}": _with_ends(row, *names) for row in study("sensor-delay")["rows"]}
 
 
 def esc_components() -> Rows:
     names = ("time_constant_cycles", "nox_gain", "rms_cad")
-    return {f"period {row['period_cycles']}": _with_ends(row, *names) for row in study("ch4-esc")["component_wise"]}
+    return {
+        f"period {row['period_cycles']}": _with_ends(row, *names) for row in study("sensor-delay")["component_wise"]
+    }
 
 
 def esc_tests() -> Rows:
@@ -324,7 +328,7 @@ def esc_tests() -> Rows:
     names += ("efficiency_after_percent", "nox_before_ppm", "nox_after_ppm", "gain_percent_points")
     means = {"efficiency_after_percent", "nox_after_ppm", "gain_percent_points"}
     rows = {}
-    for row in study("ch4-tests")["rows"]:
+    for row in study("timing-tests")["rows"]:
         kept = {name: value for name, value in row.items() if name.rpartition("_")[0] not in means}
         rows[row["test"]] = _with_ends(kept, *names)
     return rows
@@ -346,7 +350,7 @@ NUMBERS: Mapping[str, Callable[[], float]] = {
     "wiebe_imep_error_percent": _imep_error("wiebe", "linear"),
     "double_wiebe_rmse_percent": _rmse("double_wiebe", "constant"),
     "double_wiebe_imep_error_percent": _imep_error("double_wiebe", "constant"),
-    "best_ca50_cad": lambda: engine.optimum(*single()).ca50_cad,
+    "best_ca50_cad": lambda: engine.find_optimum(*single())["ca50_cad"],
     "efficiency_gross": lambda: float(simulate(*single(), soc_cad=-6.0)["efficiency_gross"]),
     "seed_motored_work_j": lambda: integrators()["`seed`"][1],
     "step_error_imep_percent": lambda: (

@@ -14,8 +14,9 @@ import matplotlib as mpl
 import numpy as np
 
 from mgdd import datasets, presets
-from mgdd.engine import analyze, optimum, timing_sweep
-from mgdd.identify import CylinderFit, fit_cylinder
+from mgdd.engine import analyze, find_optimum, timing_sweep
+from mgdd.identify import fit_cylinder
+from mgdd.identify.engine.records import CylinderFit
 
 if TYPE_CHECKING:
     import xarray as xr
@@ -54,9 +55,9 @@ def draw_timing(ax: Axes, fits: dict[float, CylinderFit]) -> None:
         sweep = timing_sweep(load.cylinder, load.point, soc_cad=np.arange(-20.0, 8.5, 0.5))
         efficiency = 100.0 * sweep["work_closed_j"] / load.fuel_heat_j
         ax.plot(sweep["soc_cad"], efficiency, dash, color=colour, label=f"wall-heat scale {scale:g}")
-        top = optimum(load.cylinder, load.point, "imep_closed_bar", step_cad=0.25)
-        best.append(top.soc_cad)
-        ax.plot(top.soc_cad, float(efficiency.interp(soc_cad=top.soc_cad)), "o", color=colour, markersize=6)
+        top = find_optimum(load.cylinder, load.point, "imep_closed_bar", step_cad=0.25)
+        best.append(top["soc_cad"])
+        ax.plot(top["soc_cad"], float(efficiency.interp(soc_cad=top["soc_cad"])), "o", color=colour, markersize=6)
     low, high = min(best), max(best)
     text = f"best: {low:.1f} to {high:.1f} °CA".replace("-", "−")
     ax.axvspan(low, high, color=ORANGE, alpha=0.25, linewidth=0, label=text)

@@ -15,11 +15,11 @@ from mgdd.studies import run_study
 OUT = Path(__file__).parents[1] / "docs" / "_static"
 # Study, number of the figure, resolution: each file stays below 100 kB.
 FIGURES = {
-    "study_seekers.png": ("ch3-optimizers", 0, 72),
-    "study_sensors.png": ("ch4-sensors", 1, 72),
-    "study_delay.png": ("ch4-esc", 0, 90),
-    "study_cures.png": ("ch4-esc", 1, 90),
-    "study_tests.png": ("ch4-tests", 3, 80),
+    "study_seekers.png": ("seeker-comparison", 0, 72),
+    "study_sensors.png": ("nox-sensors", 1, 72),
+    "study_delay.png": ("sensor-delay", 0, 90),
+    "study_cures.png": ("sensor-delay", 1, 90),
+    "study_tests.png": ("timing-tests", 3, 80),
 }
 
 

@@ -9,12 +9,12 @@
 #include <string>
 #include <vector>
 
-#include "mgdd/common/dual.hpp"
-#include "mgdd/common/fast_power.hpp"
 #include "mgdd/common/units.hpp"
 #include "mgdd/engine/burn.hpp"
 #include "mgdd/engine/cycle.hpp"
 #include "mgdd/engine/wall_heat.hpp"
+#include "mgdd/math/dual.hpp"
+#include "mgdd/math/fast_power.hpp"
 
 namespace {
 

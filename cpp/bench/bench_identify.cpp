@@ -7,8 +7,8 @@
 #include <vector>
 
 #include "mgdd/common/random.hpp"
-#include "mgdd/identify/simulation_residual.hpp"
-#include "mgdd/identify/smooth_throttle_kernel.hpp"
+#include "mgdd/identify/output_error.hpp"
+#include "mgdd/identify/throttle/smooth_kernel.hpp"
 
 namespace {
 

@@ -4,7 +4,7 @@
 #include <array>
 #include <vector>
 
-#include "mgdd/throttle/pseudo_wiener.hpp"
+#include "mgdd/throttle/models/pseudo_wiener.hpp"
 
 namespace {
 

@@ -9,6 +9,7 @@
 
 #include "bench_columns.hpp"
 #include "binding.hpp"
+#include "keywords.hpp"
 #include "mgdd/common/bounds.hpp"
 #include "mgdd/loop/cycle_fields.hpp"
 #include "mgdd/loop/engine_bench.hpp"
@@ -18,16 +19,6 @@ namespace {
 
 using namespace loop;
 using engine::indicator_fields;
-
-py::dict to_dict(const SensorDynamics& d) {
-  py::dict out;
-  out["delay_s"] = d.delay_s;
-  out["lag_s"] = d.lag_s;
-  out["noise_fraction"] = d.noise_fraction;
-  out["delay_cycles"] = d.delay_cycles;
-  out["lag_cycles"] = d.lag_cycles;
-  return out;
-}
 
 using Schedule = std::vector<std::pair<std::int64_t, engine::OperatingPoint>>;
 
@@ -193,20 +184,15 @@ Examples
 >>> SensorDynamics(delay_s=3.0, lag_s=2.0).delay_at(1500.0)
 38
 )");
+  using D = SensorDynamics;
+  bind_rows(dynamics, "SensorDynamics",
+            std::tuple{plain("delay_s", &D::delay_s, "Transport delay [s]."),
+                       plain("lag_s", &D::lag_s, "Time constant [s]."),
+                       plain("noise_fraction", &D::noise_fraction, "Relative noise [-]."),
+                       plain("delay_cycles", &D::delay_cycles, "Delay in cycles, or None."),
+                       plain("lag_cycles", &D::lag_cycles, "Time constant in cycles, or None.")},
+            [](const D& made) { validate("sensor", made); });
   dynamics
-      .def(py::init([](double delay_s, double lag_s, double noise, std::optional<std::int64_t> delay_cycles,
-                       std::optional<double> lag_cycles) {
-             const SensorDynamics made{delay_s, lag_s, noise, delay_cycles, lag_cycles};
-             validate("sensor", made);
-             return made;
-           }),
-           py::kw_only(), arg("delay_s") = 0.0, arg("lag_s") = 0.0, arg("noise_fraction") = 0.0,
-           arg("delay_cycles") = py::none(), arg("lag_cycles") = py::none())
-      .def_readonly("delay_s", &SensorDynamics::delay_s, "Transport delay [s].")
-      .def_readonly("lag_s", &SensorDynamics::lag_s, "Time constant [s].")
-      .def_readonly("noise_fraction", &SensorDynamics::noise_fraction, "Relative noise [-].")
-      .def_readonly("delay_cycles", &SensorDynamics::delay_cycles, "Delay in cycles, or None.")
-      .def_readonly("lag_cycles", &SensorDynamics::lag_cycles, "Time constant in cycles, or None.")
       .def(
           "delay_at",
           [](const SensorDynamics& self, double speed_rpm) { return self.delay_at(checked_speed(speed_rpm)); },
@@ -215,7 +201,6 @@ Examples
           "gain_at",
           [](const SensorDynamics& self, double speed_rpm) { return self.gain_at(checked_speed(speed_rpm)); },
           arg("speed_rpm"), "Gain of the lag filter per cycle [-].");
-  bind_value(dynamics, "SensorDynamics", [](const SensorDynamics& self) { return to_dict(self); });
 }
 
 }  // namespace

@@ -1,4 +1,4 @@
-// Binds the measured-benchmark models of include/mgdd/identify: drive axis, two tanks, Wiener-Hammerstein.
+// Binds the measured-benchmark models of cpp/systems: drive axis, two tanks, Wiener-Hammerstein.
 #include <stop_token>
 #include <string>
 #include <utility>
@@ -6,15 +6,16 @@
 
 #include "binding.hpp"
 #include "interruptible.hpp"
-#include "mgdd/identify/drive_axis.hpp"
 #include "mgdd/identify/free_run_fit.hpp"
-#include "mgdd/identify/two_tanks.hpp"
-#include "mgdd/identify/wiener_hammerstein.hpp"
+#include "systems/drive_axis.hpp"
+#include "systems/two_tanks.hpp"
+#include "systems/wiener_hammerstein.hpp"
 
 namespace mgdd::bindings {
 namespace {
 
 using namespace identify;
+using namespace systems;
 using py::arg;
 
 struct InputRecord {

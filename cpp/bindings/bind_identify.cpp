@@ -7,7 +7,7 @@
 
 #include "binding.hpp"
 #include "interruptible.hpp"
-#include "mgdd/identify/cylinder_fit.hpp"
+#include "mgdd/identify/engine/cylinder_fit.hpp"
 
 namespace mgdd::bindings {
 

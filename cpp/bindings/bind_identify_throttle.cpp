@@ -9,8 +9,8 @@
 #include "interruptible.hpp"
 #include "mgdd/common/bounds.hpp"
 #include "mgdd/identify/multi_start.hpp"
-#include "mgdd/identify/smooth_throttle_fit.hpp"
-#include "mgdd/identify/throttle_groups.hpp"
+#include "mgdd/identify/throttle/smooth_fit.hpp"
+#include "mgdd/identify/throttle/throttle_groups.hpp"
 
 namespace mgdd::bindings {
 namespace {

@@ -7,7 +7,7 @@
 #include "binding.hpp"
 #include "guarded.hpp"
 #include "mgdd/common/state.hpp"
-#include "mgdd/optimize/iterative_learning.hpp"
+#include "mgdd/optimize/learning/iterative_learning.hpp"
 
 namespace mgdd::bindings {
 namespace {

@@ -1,4 +1,4 @@
-// Binds include/mgdd/throttle/pseudo_wiener.hpp: the three models behind mgdd.throttle.PseudoWiener.
+// Binds include/mgdd/throttle/models/pseudo_wiener.hpp: the three models behind mgdd.throttle.PseudoWiener.
 #include <algorithm>
 #include <map>
 #include <string>
@@ -7,7 +7,7 @@
 #include "binding.hpp"
 #include "mgdd/common/error.hpp"
 #include "mgdd/common/text.hpp"
-#include "mgdd/throttle/pseudo_wiener.hpp"
+#include "mgdd/throttle/models/pseudo_wiener.hpp"
 #include "pseudo_wiener_binding.hpp"
 
 namespace mgdd::bindings {

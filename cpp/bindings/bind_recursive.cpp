@@ -1,4 +1,4 @@
-// Binds include/mgdd/identify/pseudo_wiener_fit.hpp and online_update.hpp: the fit and the on-line update.
+// Binds identify/throttle/pseudo_wiener_fit.hpp and identify/online/online_update.hpp: the fit and the on-line update.
 #include <map>
 #include <stop_token>
 #include <string>
@@ -10,8 +10,8 @@
 #include "interruptible.hpp"
 #include "mgdd/common/error.hpp"
 #include "mgdd/common/state.hpp"
-#include "mgdd/identify/online_update.hpp"
-#include "mgdd/identify/pseudo_wiener_fit.hpp"
+#include "mgdd/identify/online/online_update.hpp"
+#include "mgdd/identify/throttle/pseudo_wiener_fit.hpp"
 #include "pseudo_wiener_binding.hpp"
 
 namespace mgdd::bindings {

@@ -120,6 +120,7 @@ void bind_engine(py::module_& m);
 void bind_performance(py::module_& m);
 void bind_bench(py::module_& m);
 void bind_loop(py::module_& m);
+void bind_virtual_throttle(py::module_& m);
 void bind_trace(py::module_& m);
 void bind_identify(py::module_& m);
 void bind_pseudo_wiener(py::module_& m);

@@ -30,5 +30,6 @@ PYBIND11_MODULE(_core, m) {
   bind_benchmark_models(m);
   bind_bench(m);
   bind_loop(m);
+  bind_virtual_throttle(m);
   make_refusals_readable(m);
 }

@@ -5,7 +5,7 @@
 #include <string>
 
 #include "binding.hpp"
-#include "mgdd/throttle/pseudo_wiener.hpp"
+#include "mgdd/throttle/models/pseudo_wiener.hpp"
 
 namespace mgdd::bindings {
 

@@ -29,7 +29,9 @@ __all__ = [
     "report",
     "results",
     "rig",
+    "signals",
     "studies",
+    "surrogate",
     "throttle",
 ]
 

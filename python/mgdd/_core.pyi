@@ -369,8 +369,8 @@ class ExtremumSeeking:
         
         J: float, or one number per component; limits: one value per limit, in order or by name;
         misfire: the cycle is counted and its numbers are not read.
-        Raises ParameterError (tell without ask), ShapeError (wrong count), DataError (NaN or infinity); the
-        state is unchanged then.
+        Raises ParameterError (tell without ask), ShapeError (wrong count), DataError (not finite, or beyond
+        1e30 in magnitude); the state is unchanged then.
         """
     @property
     def amplitude_share(self) -> float:
@@ -453,8 +453,8 @@ class NewtonSeeking:
         
         J: float, or one number per component; limits: one value per limit, in order or by name;
         misfire: the cycle is counted and its numbers are not read.
-        Raises ParameterError (tell without ask), ShapeError (wrong count), DataError (NaN or infinity); the
-        state is unchanged then.
+        Raises ParameterError (tell without ask), ShapeError (wrong count), DataError (not finite, or beyond
+        1e30 in magnitude); the state is unchanged then.
         """
     @property
     def component_count(self) -> int:
@@ -542,8 +542,8 @@ class BoundedSeeking:
         
         J: float, or one number per component; limits: one value per limit, in order or by name;
         misfire: the cycle is counted and its numbers are not read.
-        Raises ParameterError (tell without ask), ShapeError (wrong count), DataError (NaN or infinity); the
-        state is unchanged then.
+        Raises ParameterError (tell without ask), ShapeError (wrong count), DataError (not finite, or beyond
+        1e30 in magnitude); the state is unchanged then.
         """
     @property
     def component_count(self) -> int:
@@ -616,8 +616,8 @@ class Spsa:
         
         J: float, or one number per component; limits: one value per limit, in order or by name;
         misfire: the cycle is counted and its numbers are not read.
-        Raises ParameterError (tell without ask), ShapeError (wrong count), DataError (NaN or infinity); the
-        state is unchanged then.
+        Raises ParameterError (tell without ask), ShapeError (wrong count), DataError (not finite, or beyond
+        1e30 in magnitude); the state is unchanged then.
         """
     @property
     def blocked(self) -> int:
@@ -715,8 +715,8 @@ class GradientDescent:
         
         J: float, or one number per component; limits: one value per limit, in order or by name;
         misfire: the cycle is counted and its numbers are not read.
-        Raises ParameterError (tell without ask), ShapeError (wrong count), DataError (NaN or infinity); the
-        state is unchanged then.
+        Raises ParameterError (tell without ask), ShapeError (wrong count), DataError (not finite, or beyond
+        1e30 in magnitude); the state is unchanged then.
         """
     @property
     def component_count(self) -> int:
@@ -804,8 +804,8 @@ class GoldenSection:
         
         J: float, or one number per component; limits: one value per limit, in order or by name;
         misfire: the cycle is counted and its numbers are not read.
-        Raises ParameterError (tell without ask), ShapeError (wrong count), DataError (NaN or infinity); the
-        state is unchanged then.
+        Raises ParameterError (tell without ask), ShapeError (wrong count), DataError (not finite, or beyond
+        1e30 in magnitude); the state is unchanged then.
         """
     @property
     def bracket(self) -> tuple[float, float]:

@@ -2,9 +2,12 @@
 
 from __future__ import annotations
 
+import functools
 import os
 import signal
+from collections.abc import Callable
 from pathlib import Path
+from typing import Any
 
 import hypothesis
 import pytest
@@ -18,6 +21,19 @@ if signal.getsignal(signal.SIGINT) is signal.SIG_IGN:
 # The same examples on every run and machine; no deadline, because sanitizer builds are slow.
 hypothesis.settings.register_profile("reproducible", derandomize=True, deadline=None, database=None)
 hypothesis.settings.load_profile("reproducible")
+
+
+@functools.cache
+def _quick_study(name: str, **options: int) -> Any:
+    from mgdd.studies.registry import function_of
+
+    return function_of(name)(quick=True, **options)
+
+
+@pytest.fixture(scope="session")
+def quick_study() -> Callable[..., Any]:
+    """Return a function that runs a study by name with quick=True, once for all tests."""
+    return _quick_study
 
 
 @pytest.fixture(scope="session")

@@ -9,8 +9,9 @@ from typing import Any
 import pytest
 
 from mgdd.cli import main
-from mgdd.cli.study import table
-from mgdd.studies import available_studies
+from mgdd.cli.output import show
+from mgdd.cli.study import rows_table
+from mgdd.studies import available_studies, sensor_delay
 
 
 def run(capsys: pytest.CaptureFixture[str], *argv: str, code: int = 0) -> tuple[str, str]:
@@ -30,32 +31,37 @@ def test_list(capsys: pytest.CaptureFixture[str]) -> None:
 @pytest.mark.parametrize("argv", [["no-such-study"], ["no-such-study", "--json"], []])
 def test_an_unknown_name_lists_the_known_ones(capsys: pytest.CaptureFixture[str], argv: list[str]) -> None:
     out, err = run(capsys, *argv, code=2)
-    assert out == ""
     assert all(name in err for name in available_studies())
+    if "--json" in argv:
+        error = json.loads(out)["error"]
+        assert error["type"] == "ParameterError"
+        assert f"mgdd: error: {error['message']}\n" == err
+    else:
+        assert out == ""
 
 
 def test_refused_before_any_work(capsys: pytest.CaptureFixture[str], tmp_path: Path) -> None:
-    assert "seeds = 0: must be >= 1" in run(capsys, "ch4-esc", "--seeds", "0", code=2)[1]
-    assert "the ending must be one of .json" in run(capsys, "ch4-esc", "-o", str(tmp_path / "a.txt"), code=2)[1]
+    assert "seeds = 0: must be >= 1" in run(capsys, "sensor-delay", "--seeds", "0", code=2)[1]
+    assert "the ending must be one of .json" in run(capsys, "sensor-delay", "-o", str(tmp_path / "a.txt"), code=2)[1]
     assert "no chance in it" in run(capsys, "measured-traces", "--seeds", "4", code=2)[1]
 
 
 def test_json_file_and_figures(capsys: pytest.CaptureFixture[str], tmp_path: Path) -> None:
     file, folder = tmp_path / "esc.json", tmp_path / "deep" / "figures"
-    argv = ("ch4-esc", "--quick", "--seeds", "2", "-o", str(file), "--figures", str(folder), "--format", "svg")
+    argv = ("sensor-delay", "--quick", "--seeds", "2", "-o", str(file), "--figures", str(folder), "--format", "svg")
     out, _ = run(capsys, *argv, "--json")
     summary = json.loads(out)
     assert summary == json.loads(file.read_text(encoding="utf-8"))
-    assert (summary["study"], summary["seeds"], len(summary["rows"])) == ("ch4-esc", 2, 7)
+    assert (summary["study"], summary["seeds"], len(summary["rows"])) == ("sensor-delay", 2, 7)
     assert summary["rows"][1]["cycles_stays"] is None
     assert summary["figures"] == [path.as_posix() for path in sorted(folder.iterdir())]
     assert all(Path(path).read_text(encoding="utf-8").startswith("<?xml") for path in summary["figures"])
 
 
 def test_readable_table(capsys: pytest.CaptureFixture[str]) -> None:
-    out, _ = run(capsys, "ch4-esc", "--quick", "--seeds", "2")
+    out, _ = run(capsys, "sensor-delay", "--quick", "--seeds", "2")
     lines = out.splitlines()
-    assert lines[0].startswith("ch4-esc: ")
+    assert lines[0].startswith("sensor-delay: ")
     assert lines[0].endswith("(2 seeds)")
     assert lines[2].split() == "case period_cycles phase_deg step_sign cycles_stays final_cad".split()
     assert len(lines) == 10
@@ -67,26 +73,25 @@ def test_table_puts_the_interval_behind_its_mean() -> None:
         {"who": "a", "x": 1.23456, "x_low": 1.0, "x_high": 1.5, "n_low": 3},
         {"who": "bcd", "x": 2.0, "x_low": None, "x_high": None, "n_low": None},
     ]
-    assert table(rows).splitlines() == [
+    assert show([rows_table(rows)]).splitlines() == [
         "who               x  n_low",
         "a    1.235 [1, 1.5]      3",
         "bcd               2      –",
     ]
-    assert table([]) == "(no rows)"
+    assert show([rows_table([])]) == "(no rows)"
 
 
 def test_ctrl_c_prints_what_is_finished(capsys: pytest.CaptureFixture[str], monkeypatch: pytest.MonkeyPatch) -> None:
-    from mgdd.studies import ch4_esc
 
-    real, count = ch4_esc.run_seeker, iter(range(100))
+    real, count = sensor_delay.run_seeker, iter(range(100))
 
     def interrupted(*args: Any, **how: Any) -> Any:
         if next(count) == 2:
             raise KeyboardInterrupt
         return real(*args, **how)
 
-    monkeypatch.setattr(ch4_esc, "run_seeker", interrupted)
-    out, err = run(capsys, "ch4-esc", "--quick", "--json", code=130)
+    monkeypatch.setattr(sensor_delay, "run_seeker", interrupted)
+    out, err = run(capsys, "sensor-delay", "--quick", "--json", code=130)
     summary = json.loads(out)
     assert summary["interrupted"] is True
     assert len(summary["rows"]) == 2

@@ -9,7 +9,7 @@ from typing import Any
 import numpy as np
 import pytest
 
-from mgdd import identify, io
+from mgdd import identify, io, signals
 from mgdd.cli import main
 from mgdd.throttle import Throttle, simulate
 
@@ -41,8 +41,8 @@ def measured(signal: Any, name: str, seed: int) -> Any:
 def files(tmp_path_factory: pytest.TempPathFactory) -> tuple[str, str]:
     """Two logs of P1 as a user would have them."""
     folder = tmp_path_factory.mktemp("logs")
-    train = measured(identify.chirp(4.0, offset=0.01, amplitude=0.34, high_hz=5.0), "train", 1)
-    test = measured(identify.amplitude_random_steps(3.0, offset=0.0, amplitude=0.33), "test", 2)
+    train = measured(signals.chirp(4.0, offset=0.01, amplitude=0.34, high_hz=5.0), "train", 1)
+    test = measured(signals.amplitude_random_steps(3.0, offset=0.0, amplitude=0.33), "test", 2)
     for name, log in (("train", train), ("test", test)):
         io.write_throttle_log(log, folder / f"{name}.csv")
     return str(folder / "train.csv"), str(folder / "test.csv")
@@ -171,11 +171,11 @@ def test_bad_logs_and_files_are_refused(
     assert "exchange --duty" in refused(
         capsys, "throttle", "identify", files[0], "--duty", "angle_deg", "--angle", "duty"
     )
-    above = measured(identify.chirp(3.0, offset=0.15, amplitude=0.15), "above", 3)
+    above = measured(signals.chirp(3.0, offset=0.15, amplitude=0.15), "above", 3)
     io.write_throttle_log(above, tmp_path / "above.csv")
     said = refused(capsys, "throttle", "identify", str(tmp_path / "above.csv"), "--two-sided")
     assert "below limp-home" in said
     assert "leave --two-sided out" in said
     bad = tmp_path / "fit.toml"
-    bad.write_text("kind = 'pw_r'\n")
+    bad.write_text("kind = 'pw_r'\nformat = 1\n")
     assert "no table [parameters]" in refused(capsys, "throttle", "validate", str(bad), files[0])

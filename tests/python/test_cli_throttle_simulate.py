@@ -10,7 +10,8 @@ import pytest
 
 from mgdd import io, presets
 from mgdd.cli import main
-from mgdd.throttle import simulate, step_summary
+from mgdd.throttle import simulate
+from mgdd.throttle.simulation import step_summary
 
 COMMAND = ("throttle", "simulate")
 
@@ -133,11 +134,11 @@ def test_bad_options_are_refused(argv: tuple[str, ...], message: str, capsys: py
             (),
             "in.csv, line 3, column 'duty': duty = 40: must be in [-1, 1]; a duty in percent",
         ),
-        ("time_s,duty\n0,0\n0,0.1\n", (), "in.csv, line 3 does not exceed the one before"),
+        ("time_s,duty\n0,0\n0,0.1\n", (), "in.csv, line 3, column 'time_s': 0 s does not exceed the time before"),
         (
             "time_s,duty\n0,0\n1,0\n2,0\n9,0\n",
             (),
-            "in.csv, line 3 is off the even grid of 3 s: resample the duty first",
+            "line 5, column 'time_s': uneven sampling: the step is 7 s and the mean 3 s: resample the duty first",
         ),
         ("time_s,duty\n0,0\n", (), "must be one column of at least two samples"),
         (

@@ -3,19 +3,26 @@
 from __future__ import annotations
 
 import hashlib
+import http.server
+import os
 import subprocess
 import sys
+import threading
+from functools import partial
+from pathlib import Path
 
 import numpy as np
 import pytest
 
 from mgdd import datasets
+from mgdd.datasets.origins import ORIGINS, Origin
 from mgdd.errors import DataError
 from mgdd.io import read_pressure
-from mgdd.results import ANGLE, check_labels
+from mgdd.results import check_labels
+from mgdd.results.labels import ANGLE
 
 NAME = "hd_diesel_128x144"
-FILES = (f"{NAME}_traces.csv", f"{NAME}_conditions.csv", f"{NAME}_LICENSE.txt")
+FILES = (f"{NAME}_traces.csv", f"{NAME}_conditions.csv", f"{NAME}_SOURCE.txt", f"{NAME}_LICENSE.txt")
 
 
 @pytest.fixture
@@ -89,10 +96,9 @@ def test_licence_and_citation_travel_with_the_data():
     licence = datasets.path(NAME, f"{NAME}_LICENSE.txt").read_text(encoding="ascii")
     assert licence.startswith("Copyright (c) 2018 The Python Packaging Authority")
     assert "Permission is hereby granted, free of charge" in licence
-    for file in FILES[:2]:
-        head = datasets.path(NAME, file).read_text(encoding="ascii")
-        assert "https://github.com/RamogninoF/LibICE-post" in head
-        assert "Licence: MIT" in head
+    source = datasets.path(NAME, f"{NAME}_SOURCE.txt").read_text(encoding="ascii")
+    assert "https://github.com/RamogninoF/LibICE-post" in source
+    assert "Licence: MIT" in source
 
 
 def test_the_data_folder_comes_first(monkeypatch, tmp_path):
@@ -102,8 +108,16 @@ def test_the_data_folder_comes_first(monkeypatch, tmp_path):
     own.parent.mkdir()
     own.write_text("mine")
     assert datasets.path(NAME, FILES[0]) == own
+
+
+def test_only_what_a_reader_reads_is_available(monkeypatch, tmp_path):
+    monkeypatch.setenv("MGDD_DATA_DIR", str(tmp_path))
     (tmp_path / "bench_7").mkdir()
-    assert datasets.available() == ("bench_7", NAME)
+    (tmp_path / "emps").mkdir()
+    (tmp_path / "emps" / "DATA_EMPS.mat").write_text("one of its two files")
+    assert datasets.available() == (NAME,)
+    (tmp_path / "emps" / "DATA_EMPS_PULSES.mat").write_text("the other")
+    assert datasets.available() == ("emps", NAME)
 
 
 def test_a_data_folder_that_is_not_there_is_no_obstacle(monkeypatch, tmp_path):
@@ -132,3 +146,88 @@ def test_a_changed_packaged_file_is_refused(monkeypatch, tmp_path):
     found = hashlib.sha256(b"tampered").hexdigest()
     with pytest.raises(DataError, match=f"SHA-256 is {found}, shipped was .*: the file was changed; reinstall"):
         datasets.path(NAME, FILES[0])
+
+
+class Quiet(http.server.SimpleHTTPRequestHandler):
+    def log_message(self, *_):
+        """Say nothing."""
+
+
+class Server:
+    """A folder on this machine, served over HTTP."""
+
+    def __init__(self, folder):
+        handler = partial(Quiet, directory=str(folder))
+        self.server = http.server.ThreadingHTTPServer(("127.0.0.1", 0), handler)
+        threading.Thread(target=self.server.serve_forever, daemon=True).start()
+        self.url = f"http://127.0.0.1:{self.server.server_port}"
+
+
+@pytest.fixture
+def served(tmp_path, monkeypatch):
+    """A set of two files with known hashes, and an empty cache."""
+    pytest.importorskip("pooch")
+    folder = tmp_path / "served"
+    folder.mkdir()
+    files = {"a.csv": b"t,u\n0,1\n", "b.csv": b"t,u\n0,2\n"}
+    for file, content in files.items():
+        (folder / file).write_bytes(content)
+    server = Server(folder)
+    origins = {
+        "moon": {f: Origin(f"{server.url}/{f}", hashlib.sha256(content).hexdigest()) for f, content in files.items()}
+    }
+    monkeypatch.setattr(sys.modules["mgdd.datasets.origins"], "ORIGINS", origins)
+    monkeypatch.setattr(datasets, "ORIGINS", origins)
+    monkeypatch.setenv("MGDD_CACHE_DIR", str(tmp_path / "cache"))
+    monkeypatch.setenv("MGDD_DATA_DIR", str(tmp_path / "own"))
+    yield folder
+    server.server.shutdown()
+    server.server.server_close()
+
+
+def test_a_set_is_fetched_once_and_found(served, tmp_path):
+    with pytest.raises(FileNotFoundError, match=r"or fetch it: mgdd\.datasets\.fetch\('moon'\)"):
+        datasets.path("moon", "a.csv")
+    assert datasets.available() == (NAME,)
+    folder = datasets.fetch("moon")
+    assert folder == tmp_path / "cache" / "moon"
+    assert datasets.path("moon", "a.csv").read_bytes() == b"t,u\n0,1\n"
+    assert datasets.available() == (NAME, "moon")
+    for file in served.iterdir():
+        file.unlink()
+    assert datasets.fetch("moon") == folder
+    own = tmp_path / "own" / "moon" / "a.csv"
+    own.parent.mkdir(parents=True)
+    own.write_text("mine")
+    assert datasets.path("moon", "a.csv") == own
+
+
+def test_another_file_is_refused_and_a_right_one_follows(served):
+    good = (served / "b.csv").read_bytes()
+    (served / "b.csv").write_bytes(b"changed")
+    with pytest.raises(DataError, match=r"b\.csv: is not the known file"):
+        datasets.fetch("moon")
+    assert "moon" not in datasets.available()
+    (served / "b.csv").unlink()
+    with pytest.raises(DataError, match=r"b\.csv: cannot be fetched: .*put the file into \$MGDD_DATA_DIR/moon by hand"):
+        datasets.fetch("moon")
+    (served / "b.csv").write_bytes(good)
+    datasets.fetch("moon")
+    assert "moon" in datasets.available()
+
+
+@pytest.mark.usefixtures("served")
+def test_without_pooch_the_extra_is_named(monkeypatch):
+    monkeypatch.setitem(sys.modules, "pooch", None)
+    with pytest.raises(ImportError, match=r"pip install 'mgdd\[datasets\]'"):
+        datasets.fetch("moon")
+    assert datasets.available() == (NAME,)
+
+
+@pytest.mark.parametrize(("name", "file"), [(name, file) for name, files in ORIGINS.items() for file in files])
+def test_the_known_hashes_are_those_of_the_records_at_hand(name, file):
+    folder = os.environ.get("MGDD_DATA_DIR")
+    if not folder or not (Path(folder) / name / file).is_file():
+        pytest.skip(f"{name}/{file} is not at hand")
+    assert hashlib.sha256((Path(folder) / name / file).read_bytes()).hexdigest() == ORIGINS[name][file].sha256
+    assert ORIGINS[name][file].url.endswith(file)

@@ -18,7 +18,7 @@ from mgdd.engine import (
     OperatingPoint,
     analyze,
     convergence,
-    optimum,
+    find_optimum,
     simulate,
     start_of_combustion,
     timing_sweep,
@@ -58,7 +58,7 @@ def run(text):
 def best(text):
     cylinder, point, words = parse(text)
     integrator = words.get("integrator", "trapezoid")
-    return optimum(cylinder, point, words.get("objective", "efficiency_gross"), integrator=integrator)
+    return find_optimum(cylinder, point, words.get("objective", "efficiency_gross"), integrator=integrator)
 
 
 def computed(text, quantity, at):
@@ -66,9 +66,11 @@ def computed(text, quantity, at):
     if quantity.startswith("optimum_"):
         name = quantity.removeprefix("optimum_")
         found = best(text)
-        if hasattr(found, name):
-            return getattr(found, name)
-        return float(simulate(cylinder, point, soc_cad=found.soc_cad)[name])
+        if name == "curvature_per_cad2":
+            return found.curvature
+        if name in (*found.inputs, *found.values):
+            return found[name]
+        return float(simulate(cylinder, point, soc_cad=found["soc_cad"])[name])
     if quantity in ("delay_cad", "ignition_soc_cad"):
         timing = start_of_combustion(cylinder, point, soi_cad=float(words["soi_cad"]))
         return getattr(timing, quantity.removeprefix("ignition_"))

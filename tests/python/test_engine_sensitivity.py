@@ -95,10 +95,10 @@ def test_adiabatic_work_is_homogeneous_in_charge_and_fuel():
 
 
 def test_best_timing_is_where_the_derivative_vanishes():
-    from mgdd.engine import optimum
+    from mgdd.engine import find_optimum
 
-    best = optimum(Cylinder(), OperatingPoint())
-    d = sensitivities(Cylinder(), OperatingPoint(), wrt=["soc_cad"], soc_cad=best.soc_cad)
+    best = find_optimum(Cylinder(), OperatingPoint())
+    d = sensitivities(Cylinder(), OperatingPoint(), wrt=["soc_cad"], soc_cad=best["soc_cad"])
     assert abs(float(d.d_efficiency_gross.squeeze())) < 1e-8
 
 

@@ -141,24 +141,24 @@ def test_measured_traces_give_their_published_figures(load):
     assert float(back.ca50_cad) == pytest.approx(own[6], abs=0.06)
     assert float(back.heat_net_j) == pytest.approx(own[7], abs=1.0)
     assert float(analyze(trace, cylinder, gamma="split").ca50_cad) == pytest.approx(own[8], abs=0.15)
-    assert back.attrs["warnings"] == ()
+    assert back.attrs["warnings"] == ""
     assert float(back.ca10_cad) < float(back.ca50_cad) < float(back.ca90_cad)
 
 
 def test_a_motored_peak_far_from_tdc_is_noticed(caplog):
     motored = simulate(CYLINDER, MOTORED)
-    assert analyze(motored, CYLINDER, point=MOTORED).attrs["warnings"] == ()
-    assert analyze(moved(motored), CYLINDER, point=MOTORED).attrs["warnings"] == ()
+    assert analyze(motored, CYLINDER, point=MOTORED).attrs["warnings"] == ""
+    assert analyze(moved(motored), CYLINDER, point=MOTORED).attrs["warnings"] == ""
     for error in (-3.0, 3.0):
         warnings = analyze(moved(motored, angle=error), CYLINDER, point=MOTORED).attrs["warnings"]
-        assert any("TDC" in text for text in warnings), error
+        assert "TDC" in warnings, error
     assert "TDC" in caplog.text
 
 
 def test_a_suspect_compression_is_noticed():
     cycle = simulate(CYLINDER, POINT)
     warnings = analyze(moved(cycle, pressure=-0.5), CYLINDER, point=POINT).attrs["warnings"]
-    assert any("polytropic exponent of compression" in text for text in warnings)
+    assert "polytropic exponent of compression" in warnings
 
 
 def test_noise_hardly_moves_work_and_middle():

@@ -8,8 +8,9 @@ import numpy as np
 import pytest
 
 from mgdd.errors import ConvergenceError, ParameterError
-from mgdd.identify import check_excitation, chirp, design_excitation, triangle
-from mgdd.identify.excitation_design import EXCITATIONS
+from mgdd.identify import check_excitation, design_excitation
+from mgdd.identify.throttle.excitation_design import EXCITATIONS
+from mgdd.signals import chirp, triangle
 from mgdd.throttle import Throttle, groups, simulate
 
 P1 = Throttle()
@@ -72,16 +73,17 @@ def test_the_check_of_the_plant_says_what_stays_open() -> None:
     slow = check_excitation(triangle(40.0, offset=0.0, amplitude=0.26), P1, angle_window_deg=(-0.5, 90.5))
     assert slow.passed
     assert slow.content.limp_home_crossings >= 2
-    assert not any("Coulomb" in text for text in slow.unanswered)
+    assert "one_way" not in {found.code for found in slow.unanswered}
     one_way = check_excitation(
         triangle(8.0, offset=0.24, amplitude=0.05, frequency_hz=1.0 / 32.0), P1, angle_window_deg=(-0.5, 90.5)
     )
-    assert any(text.startswith("the plate only opens: Coulomb torque and preload") for text in one_way.unanswered)
-    assert any("never goes below limp-home (8 deg)" in text for text in one_way.unanswered)
-    assert any("±0.25 duty" in text for text in one_way.unanswered), "breakaway is at 0.222"
+    found = {finding.code: finding for finding in one_way.unanswered}
+    assert found["one_way"].text.startswith("the plate only opens: Coulomb torque and preload")
+    assert found["side_not_visited"].names == ("below",)
+    assert "±0.25 duty" in found["one_way"].remedy, "breakaway is at 0.222"
     still = check_excitation(triangle(10.0, offset=0.0, amplitude=0.1), P1)
     assert still.passed
-    assert "hardly moves" in still.unanswered[0]
+    assert [finding.code for finding in still.unanswered] == ["no_motion"]
 
 
 def test_a_check_knows_the_current_of_the_plant() -> None:

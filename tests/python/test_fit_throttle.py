@@ -9,15 +9,16 @@ from mgdd import _core
 from mgdd.errors import DataError, ParameterError, ShapeError
 from mgdd.identify import (
     FirstPrincipleModel,
-    FittedParameters,
-    ThrottleModel,
+    SmoothThrottle,
     fit_smooth_throttle,
     fit_throttle,
     physical_parameters,
-    simulate_smooth_throttle,
-    throttle_start,
 )
+from mgdd.identify.throttle.first_principle_model import TYPICAL
+from mgdd.identify.throttle.first_principle_start import regression_start
 from mgdd.io import throttle_log
+from mgdd.optimize import FitOptions
+from mgdd.results import Model
 
 TRUTH = {
     "tau_s": 0.0197,
@@ -32,10 +33,15 @@ TRUTH = {
 }
 
 
+def simulate(time, duty, start_deg):
+    inputs = {"time_s": time, "duty": duty}
+    return FirstPrincipleModel(parameters=TRUTH).simulate(inputs, initial_state={"angle_deg": start_deg})["angle_deg"]
+
+
 def make_log(span_s=8.0, offset=0.15, amplitude=0.2, start_deg=40.0, noise_deg=0.0, seed=1, f_end=6.0):
     time = 1e-3 * np.arange(round(1e3 * span_s))
     duty = offset + amplitude * np.sin(2 * np.pi * (0.2 * time + 0.5 * (f_end - 0.2) / span_s * time**2))
-    angle = FirstPrincipleModel(parameters=TRUTH).simulate(time, duty, start_deg=start_deg)
+    angle = simulate(time, duty, start_deg)
     noise = noise_deg * np.random.default_rng(seed).standard_normal(time.size)
     return throttle_log(time, duty, angle + noise)
 
@@ -44,35 +50,52 @@ def two_sided_log(noise_deg=0.03):
     time = 1e-3 * np.arange(9000)
     levels = np.random.default_rng(3).uniform(-0.33, 0.36, 60)
     duty = np.repeat(levels, 150)
-    angle = FirstPrincipleModel(parameters=TRUTH).simulate(time, duty, start_deg=8.0)
+    angle = simulate(time, duty, 8.0)
     return throttle_log(time, duty, angle + noise_deg * np.random.default_rng(4).standard_normal(time.size))
 
 
 def test_noise_free_log_gives_the_visited_side_back():
-    fit = fit_throttle(make_log(), fixed={"limp_home_deg": 8.0}, n_starts=1, cost_tolerance=1e-14)
+    fit = fit_throttle(make_log(), fixed={"limp_home_deg": 8.0}, options=FitOptions(n_starts=1, tolerance=1e-14))
     for name in ("tau_s", "gain_deg_per_s2_per_duty", "beta_above_duty", "kappa_above_duty_per_deg", "delta_duty"):
         assert fit.parameters[name] == pytest.approx(TRUTH[name], rel=1e-5), name
-    assert fit.fit_percent_train > 99.99
+    assert fit.train.nrmse_fit_percent > 99.99
+
+
+@pytest.mark.parametrize("amplitude", [0.25, 0.4])
+def test_the_start_leaves_out_windows_that_hold_a_reversal_or_a_rest(amplitude):
+    time = 1e-3 * np.arange(6000)
+    duty = 0.15 + amplitude * np.sin(2 * np.pi * 4.0 * time) + 0.1 * np.sin(2 * np.pi * 0.4 * time)
+    run = FirstPrincipleModel(parameters=TRUTH).simulate(
+        {"time_s": time, "duty": duty}, initial_state={"angle_deg": 40.0}
+    )
+    angle = run["angle_deg"].to_numpy()
+    known = dict(TYPICAL) | {"limp_home_deg": 8.0}
+    free = [name for name in TRUTH if name not in ("limp_home_deg", "electrical_s")]
+    found = regression_start(1e-3, duty, angle, known, free, 0.0, 90.0)
+    for name in ("tau_s", "gain_deg_per_s2_per_duty", "beta_above_duty", "delta_duty"):
+        assert found[name] == pytest.approx(TRUTH[name], rel=0.025), name
 
 
 def test_a_one_sided_log_names_the_other_side_and_an_excitation():
-    fit = fit_throttle(make_log(noise_deg=0.03), fixed={"limp_home_deg": 8.0}, n_starts=1)
+    fit = fit_throttle(make_log(noise_deg=0.03), fixed={"limp_home_deg": 8.0}, options=FitOptions(n_starts=1))
     assert {"beta_below_duty", "kappa_below_duty_per_deg"} <= set(fit.unidentifiable)
-    assert any("below limp-home" in finding and "excitation" in finding for finding in fit.findings)
-    assert any("groups only" in finding for finding in fit.findings)
-    assert fit.parameters["beta_below_duty"] == throttle_start()["beta_below_duty"]
+    kept = next(finding for finding in fit.findings if finding.code == "start_value_kept")
+    assert set(kept.names) == {"beta_below_duty", "kappa_below_duty_per_deg"}
+    assert "excitation" in kept.remedy
+    assert "groups_only" in {finding.code for finding in fit.findings}
+    assert fit.parameters["beta_below_duty"] == TYPICAL["beta_below_duty"]
 
 
 def test_a_two_sided_log_with_noise_gives_both_sides_and_predicts_another_log():
-    fit = fit_throttle(two_sided_log(), test=make_log(noise_deg=0.03), n_starts=2)
-    assert isinstance(fit.model, ThrottleModel)
+    fit = fit_throttle(two_sided_log(), test=make_log(noise_deg=0.03), options=FitOptions(n_starts=2))
+    assert isinstance(fit.model, Model)
     assert fit.kind == "first_principle"
     for name in ("tau_s", "gain_deg_per_s2_per_duty", "beta_above_duty", "delta_duty", "beta_below_duty"):
         assert fit.parameters[name] == pytest.approx(TRUTH[name], rel=0.03), name
     assert fit.parameters["limp_home_deg"] == pytest.approx(8.0, abs=0.1)
-    assert fit.fit_percent_train > 98.0
-    assert fit.fit_percent_test > 90.0
-    assert FittedParameters.from_toml(fit.model.to_toml()).values == dict(fit.parameters)
+    assert fit.train.nrmse_fit_percent > 98.0
+    assert fit.test.nrmse_fit_percent > 90.0
+    assert FirstPrincipleModel.from_toml(fit.to_toml()) == fit.model
 
 
 def test_physical_numbers_come_back_from_either_known_number():
@@ -99,36 +122,43 @@ def test_wrong_calls_name_the_remedy_and_a_right_one_follows():
     with pytest.raises(ParameterError, match="no throttle group"):
         fit_throttle(log, fixed={"tau": 0.02})
     with pytest.raises(ParameterError, match="tau_s"):
-        fit_throttle(log, start={"tau_s": 9.0})
+        fit_throttle(log, start_values={"tau_s": 9.0})
     with pytest.raises(DataError, match="at least 100"):
         fit_throttle(log.isel(time_s=slice(0, 50)))
     with pytest.raises(DataError, match="drive the plate"):
         fit_throttle(log.assign(angle_deg=log.angle_deg * 0.0 + 40.0))
     with pytest.raises(ParameterError, match="horizon"):
-        FirstPrincipleModel(parameters=TRUTH).predict(log.time_s, log.duty, log.angle_deg, 0)
-    assert fit_throttle(log, fixed={"limp_home_deg": 8.0}, n_starts=1).fit_percent_train > 99.0
+        FirstPrincipleModel(parameters=TRUTH).predict(log, 0)
+    assert (
+        fit_throttle(log, fixed={"limp_home_deg": 8.0}, options=FitOptions(n_starts=1)).train.nrmse_fit_percent > 99.0
+    )
 
 
 def test_prediction_re_anchors_on_the_measurement():
     log = make_log(span_s=2.0)
     model = FirstPrincipleModel(parameters=TRUTH)
-    ahead = model.predict(log.time_s, log.duty, log.angle_deg, 20)
+    ahead = model.predict(log, 20)["angle_deg"]
     np.testing.assert_allclose(ahead, log.angle_deg.values[20:], atol=1e-9)
 
 
 def test_ten_parameters_from_python_reach_the_noise_floor():
     truth = np.array(_core.smooth_throttle_example)
     rng = np.random.default_rng(7)
-    duty = np.repeat(rng.uniform(-0.35, 0.35, 100), 80)
-    noise = rng.normal(0.0, 0.05, duty.size)
-    angle = simulate_smooth_throttle(duty) + noise
+    time = 1e-3 * np.arange(8000)
+    log = SmoothThrottle().simulate({"time_s": time, "duty": np.repeat(rng.uniform(-0.35, 0.35, 100), 80)})
+    noise = rng.normal(0.0, 0.05, time.size)
+    log["angle_deg"] = log["angle_deg"] + noise
     starts = truth * rng.uniform(0.7, 1.3, (4, 10))
-    fit = fit_smooth_throttle(duty, angle, starts=starts, lower=0.1 * truth, upper=10 * truth)
+    box = {"lower": 0.1 * truth, "upper": 10 * truth}
+    fit = fit_smooth_throttle(log, start_values=starts, **box)
     assert fit.report.rmse < 1.005 * np.sqrt(np.mean(noise**2))
-    assert "viscous_nms_per_rad" in fit.report.unidentifiable
-    alone = fit_smooth_throttle(duty, angle, starts=starts, lower=0.1 * truth, upper=10 * truth, lanes=False)
-    assert [report.cost for report in alone.reports] == [report.cost for report in fit.reports]
-    with pytest.raises(ShapeError, match="starts has shape"):
-        fit_smooth_throttle(duty, angle, starts=[1.0, 2.0], lower=truth, upper=truth)
+    assert fit.train.rmse == pytest.approx(fit.report.rmse, rel=1e-6)
+    assert "viscous_nms_per_rad" in fit.unidentifiable
+    alone = fit_smooth_throttle(log, start_values=starts, lanes=False, **box)
+    assert [report.cost for report in alone.start_reports] == [report.cost for report in fit.start_reports]
+    with pytest.raises(ShapeError, match="start_values has shape"):
+        fit_smooth_throttle(log, start_values=[1.0, 2.0], lower=truth, upper=truth)
     with pytest.raises(ParameterError, match="start torque_constant"):
-        fit_smooth_throttle(duty, angle, starts=100 * truth, lower=0.1 * truth, upper=10 * truth)
+        fit_smooth_throttle(log, start_values=100 * truth, **box)
+    with pytest.raises(ParameterError, match="seed has no effect"):
+        fit_smooth_throttle(log, start_values=truth, options=FitOptions(seed=1), **box)

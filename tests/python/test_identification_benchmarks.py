@@ -8,21 +8,16 @@ from typing import Any
 import numpy as np
 import pytest
 import xarray as xr
+from matplotlib.figure import Figure
 
 from mgdd import datasets
 from mgdd.errors import DataError, ParameterError, ShapeError
-from mgdd.identify import (
-    DriveModel,
-    TwoTanksModel,
-    drive_free_run,
-    drive_inverse_dynamics,
-    fit_drive,
-    fit_linear,
-    fit_two_tanks,
-    fit_wiener_hammerstein,
-)
+from mgdd.optimize import FitOptions
 from mgdd.results import labelled_dataset
 from mgdd.studies import run_study
+from mgdd.studies.benchmarks.drive_axis import DriveModel, drive_free_run, drive_inverse_dynamics, fit_drive
+from mgdd.studies.benchmarks.two_tanks import TwoTanksModel, fit_two_tanks
+from mgdd.studies.benchmarks.wiener_hammerstein import fit_linear, fit_wiener_hammerstein
 
 SETS = ("emps", "cascaded_tanks", "wh2009")
 needs = {
@@ -46,15 +41,8 @@ TANKS = {
 def slide_record(parameters: dict[str, float]) -> xr.Dataset:
     time = np.arange(3000) * 1e-3
     drive = 2.0 * np.sign(np.sin(4.0 * time)) + 0.5 * np.sin(11.0 * time)
-    position = DriveModel(parameters=parameters, force_n_per_v=35.0).simulate(time, drive)
-    return labelled_dataset(
-        {
-            "time_s": ("time_s", time, "s", "time"),
-            "drive_v": ("time_s", drive, "V", "voltage"),
-            "position_m": ("time_s", position, "m", "position"),
-            "force_n_per_v": ((), 35.0, "N/V", "force per volt"),
-        }
-    )
+    model = DriveModel(parameters=parameters, force_n_per_v=35.0)
+    return model.simulate({"time_s": time, "drive_v": drive}).assign(force_n_per_v=35.0)
 
 
 def rms(values: np.ndarray[Any, Any]) -> float:
@@ -62,56 +50,52 @@ def rms(values: np.ndarray[Any, Any]) -> float:
 
 
 def test_a_slide_is_found_again() -> None:
-    fit = fit_drive(slide_record(SLIDE), friction="coulomb", drift=False, starts=2)
+    fit = fit_drive(slide_record(SLIDE), friction="coulomb", drift=False, options=FitOptions(n_starts=2))
     for name, value in SLIDE.items():
         assert fit.model.parameters[name] == pytest.approx(value, rel=0.02, abs=0.05), name
-    assert fit.fit_percent > 99.8
+    assert fit.train.nrmse_fit_percent > 99.8
     assert fit.report.names[0] == "mass_kg"
-    assert fit.report.fit_percent == pytest.approx(fit.fit_percent, abs=1e-9)
-    assert fit.starts_fit_percent == tuple(sorted(fit.starts_fit_percent, reverse=True))
+    assert fit.report.nrmse_fit_percent == pytest.approx(fit.train.nrmse_fit_percent, abs=1e-9)
+    assert fit.start_rmse == tuple(sorted(fit.start_rmse))
+    assert fit.plot(ax=Figure().add_subplot()).get_ylabel() == "position, measured [m]"
 
 
 def test_a_slide_rests_under_its_friction() -> None:
     time = np.arange(100) * 1e-3
     model = DriveModel(parameters=SLIDE, force_n_per_v=35.0)
-    assert not model.simulate(time, np.full(100, 0.5)).any()
-    assert model.simulate(time, np.full(100, 0.7))[-1] > 0.0
+    weak, strong = (model.simulate({"time_s": time, "drive_v": np.full(100, v)})["position_m"] for v in (0.5, 0.7))
+    assert not weak.any()
+    assert strong[-1] > 0.0
 
 
 def test_wrong_drive_input_is_named_then_right_works() -> None:
     record = slide_record(SLIDE)
     with pytest.raises(ParameterError, match="friction = 'dry': must be one of coulomb"):
         fit_drive(record, friction="dry")
-    with pytest.raises(ParameterError, match="starts = 0"):
-        fit_drive(record, starts=0)
+    with pytest.raises(ParameterError, match="n_starts = 0"):
+        fit_drive(record, options=FitOptions(n_starts=0))
     with pytest.raises(ParameterError, match="'weight_kg': must be one of mass_kg"):
-        DriveModel(parameters={"weight_kg": 1.0}, force_n_per_v=1.0).simulate([0.0, 1.0], [0.0, 0.0])
+        DriveModel(parameters={"weight_kg": 1.0}, force_n_per_v=1.0).simulate(record)
     model = DriveModel(parameters=SLIDE, force_n_per_v=35.0)
-    with pytest.raises(DataError, match="not evenly spaced"):
-        model.simulate([0.0, 0.1, 0.3], [0.0, 0.0, 0.0])
-    with pytest.raises(ShapeError, match="must be one length"):
-        model.simulate([0.0, 0.1, 0.2], [0.0, 0.0])
-    assert model.simulate([0.0, 0.1, 0.2], [0.0, 0.0, 0.0]).shape == (3,)
+    with pytest.raises(DataError, match="uneven sampling"):
+        model.simulate({"time_s": [0.0, 0.1, 0.3], "drive_v": [0.0, 0.0, 0.0]})
+    with pytest.raises(ShapeError, match="columns of one length"):
+        model.simulate({"time_s": [0.0, 0.1, 0.2], "drive_v": [0.0, 0.0]})
+    assert model.simulate({"time_s": [0.0, 0.1, 0.2], "drive_v": [0.0, 0.0, 0.0]})["position_m"].shape == (3,)
 
 
 def test_two_tanks_know_their_start_and_their_names() -> None:
     model = TwoTanksModel(parameters=TANKS)
     pump = 2.0 + np.sin(0.05 * np.arange(300))
-    level = model.simulate(pump, dt_s=4.0, start_upper_v=7.0, start_lower_v=3.0)
-    record = labelled_dataset(
-        {
-            "time_s": ("time_s", np.arange(300) * 4.0, "s", "time"),
-            "pump_v": ("time_s", pump, "V", "pump voltage"),
-            "level_v": ("time_s", level, "V", "level"),
-        }
-    )
-    assert model.estimate_start(record) == pytest.approx((7.0, 3.0), abs=1e-4)
+    state = {"upper_level_v": 7.0, "lower_level_v": 3.0}
+    record = model.simulate({"time_s": np.arange(300) * 4.0, "pump_v": pump}, initial_state=state)
+    assert model.estimate_state(record) == pytest.approx(state, abs=1e-4)
     with pytest.raises(DataError, match="window = 400"):
-        model.estimate_start(record, window=400)
+        model.estimate_state(record, window=400)
     with pytest.raises(ParameterError, match="form = 'cube_root'"):
         fit_two_tanks(record, form="cube_root")
     with pytest.raises(ParameterError, match="unknown or missing"):
-        TwoTanksModel(parameters={"pump_per_s": 1.0}).simulate(pump, dt_s=4.0, start_upper_v=1.0, start_lower_v=1.0)
+        TwoTanksModel(parameters={"pump_per_s": 1.0}).simulate(record)
 
 
 def test_the_circuit_needs_orders_that_fit() -> None:
@@ -161,11 +145,11 @@ def test_emps_inverse_dynamics_and_free_run() -> None:
     assert found["viscous_ns_per_m"] == pytest.approx(204.08, abs=1.0)
     assert found["coulomb_n"] == pytest.approx(20.326, abs=0.1)
     assert found["offset_n"] == pytest.approx(-3.193, abs=0.02)
-    fit = fit_drive(train, friction="directional", drift=True, starts=2)
+    fit = fit_drive(train, friction="directional", drift=True, options=FitOptions(n_starts=2))
     measured = test["position_m"].to_numpy()[20:]
     error = drive_free_run(fit.model, test) - measured
     percent = 100.0 * (1.0 - np.linalg.norm(error) / np.linalg.norm(measured - measured.mean()))
-    assert fit.fit_percent > 99.3
+    assert fit.train.nrmse_fit_percent > 99.3
     assert 88.0 < percent < 97.0  # the valley between mass and friction is this wide on the other record
 
 
@@ -173,14 +157,15 @@ def test_emps_inverse_dynamics_and_free_run() -> None:
 def test_cascaded_tanks_from_the_stated_window() -> None:
     train, test = datasets.load_cascaded_tanks()
     fit = fit_two_tanks(train)
-    assert fit.rmse_v == pytest.approx(0.1537, abs=5e-4)
-    upper, lower = fit.model.estimate_start(test, window=50)
-    run = fit.model.simulate(test["pump_v"], dt_s=4.0, start_upper_v=upper, start_lower_v=lower)
-    assert rms(run - test["level_v"].to_numpy()) == pytest.approx(0.210, abs=2e-3)
+    assert fit.train.rmse == pytest.approx(0.1537, abs=5e-4)
+    assert fit.report.rmse == pytest.approx(fit.train.rmse, rel=1e-9)
+    state = fit.model.estimate_state(test, window=50)
+    run = fit.model.simulate(test, initial_state=state)["level_v"]
+    assert rms((run - test["level_v"]).to_numpy()) == pytest.approx(0.210, abs=2e-3)
     # The estimate of the start sees the window only.
     blind = test.copy(deep=True)
     blind["level_v"][50:] = 0.0
-    assert fit.model.estimate_start(blind, window=50) == (upper, lower)
+    assert fit.model.estimate_state(blind, window=50) == state
 
 
 @needs["wh2009"]
@@ -188,9 +173,9 @@ def test_the_circuit_below_a_millivolt() -> None:
     train, test = datasets.load_wiener_hammerstein()
     assert (train.sizes["time_s"], test.sizes["time_s"]) == (100_000, 78_800)
     fit = fit_wiener_hammerstein(train.isel(time_s=slice(0, 20_000)), scan_samples=8000, follow=8)
-    error = (fit.model.simulate(test["input_v"]) - test["output_v"].to_numpy())[50:]
+    error = (fit.model.simulate(test)["output_v"] - test["output_v"]).to_numpy()[50:]
     assert rms(error) < 0.5e-3
-    linear = (fit.linear.simulate(test["input_v"]) - test["output_v"].to_numpy())[50:]
+    linear = (fit.linear.simulate(test)["output_v"] - test["output_v"]).to_numpy()[50:]
     assert 0.040 < rms(linear) < 0.050
 
 

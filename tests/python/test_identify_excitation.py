@@ -10,17 +10,18 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from mgdd import identify
+from mgdd import identify, signals
 from mgdd.errors import DataError, ParameterError
-from mgdd.identify.excitation import maximum_length_sequence
+from mgdd.identify.throttle.excitation_check import _signal_of
+from mgdd.signals.excitation import maximum_length_sequence
 
 SIGNALS: dict[str, Callable[..., Any]] = {
-    "chirp": identify.chirp,
-    "multisine": identify.multisine,
-    "prbs": identify.prbs,
-    "amplitude_random_steps": identify.amplitude_random_steps,
-    "staircase": identify.staircase,
-    "triangle": identify.triangle,
+    "chirp": signals.chirp,
+    "multisine": signals.multisine,
+    "prbs": signals.prbs,
+    "amplitude_random_steps": signals.amplitude_random_steps,
+    "staircase": signals.staircase,
+    "triangle": signals.triangle,
 }
 
 
@@ -55,7 +56,7 @@ def test_a_duty_beyond_one_is_refused_with_the_largest_amplitude(name: str) -> N
 
 
 def test_the_chirp_sweeps_between_its_frequencies() -> None:
-    values = duty(identify.chirp(20.0, offset=0.1, amplitude=0.2, low_hz=0.5, high_hz=8.0)) - 0.1
+    values = duty(signals.chirp(20.0, offset=0.1, amplitude=0.2, low_hz=0.5, high_hz=8.0)) - 0.1
     rising = np.flatnonzero((values[:-1] < 0.0) & (values[1:] >= 0.0))
     period = np.diff(rising) * 1e-3
     at = 0.5 * (rising[1:] + rising[:-1]) * 1e-3
@@ -64,18 +65,18 @@ def test_the_chirp_sweeps_between_its_frequencies() -> None:
 
 def test_frequencies_above_half_the_sampling_rate_are_refused() -> None:
     with pytest.raises(ParameterError, match=r"high_hz = 6: must be below half the sampling rate, 5 Hz"):
-        identify.chirp(offset=0.0, amplitude=0.1, step_s=0.1)
-    identify.chirp(offset=0.0, amplitude=0.1, step_s=0.05)
+        signals.chirp(offset=0.0, amplitude=0.1, step_s=0.1)
+    signals.chirp(offset=0.0, amplitude=0.1, step_s=0.05)
     with pytest.raises(ParameterError, match="half the sampling rate"):
-        identify.multisine(offset=0.0, amplitude=0.1, step_s=0.1)
+        signals.multisine(offset=0.0, amplitude=0.1, step_s=0.1)
     with pytest.raises(ParameterError, match="low <= high"):
-        identify.chirp(offset=0.0, amplitude=0.1, low_hz=7.0)
+        signals.chirp(offset=0.0, amplitude=0.1, low_hz=7.0)
     with pytest.raises(ParameterError, match="hold_s"):
-        identify.prbs(offset=0.0, amplitude=0.1, hold_s=1e-4)
+        signals.prbs(offset=0.0, amplitude=0.1, hold_s=1e-4)
 
 
 def test_the_multisine_has_its_odd_lines_and_nothing_else() -> None:
-    signal = identify.multisine(10.0, offset=0.0, amplitude=0.2)
+    signal = signals.multisine(10.0, offset=0.0, amplitude=0.2)
     spectrum = np.abs(np.fft.rfft(duty(signal))) / duty(signal).size
     lines = np.flatnonzero(spectrum > 1e-3 * spectrum.max())
     assert lines.size == 20
@@ -86,9 +87,9 @@ def test_the_multisine_has_its_odd_lines_and_nothing_else() -> None:
     assert np.abs(ac).max() / np.sqrt(np.mean(ac**2)) == pytest.approx(signal.attrs["crest_factor"], rel=1e-3)
     assert signal.attrs["crest_factor"] < 2.0
     with pytest.raises(ParameterError, match=r"harmonics = 41: must be in \[1, 40\]"):
-        identify.multisine(offset=0.0, amplitude=0.2, harmonics=41)
+        signals.multisine(offset=0.0, amplitude=0.2, harmonics=41)
     with pytest.raises(ParameterError, match="one period"):
-        identify.multisine(5.0, offset=0.0, amplitude=0.2)
+        signals.multisine(5.0, offset=0.0, amplitude=0.2)
 
 
 @pytest.mark.parametrize("register", range(3, 13))
@@ -111,11 +112,11 @@ def test_long_registers_pass_every_state_once(register: int) -> None:
 
 
 def test_random_steps_follow_the_golden_ratio_or_a_seed() -> None:
-    steps = duty(identify.amplitude_random_steps(6.0, offset=0.15, amplitude=0.20))[::150]
+    steps = duty(signals.amplitude_random_steps(6.0, offset=0.15, amplitude=0.20))[::150]
     k = np.arange(steps.size)
     np.testing.assert_allclose(steps, 0.15 + 0.20 * (2.0 * np.mod(0.6180339887 * k, 1.0) - 1.0), rtol=1e-12)
     seeded = [
-        duty(identify.amplitude_random_steps(6.0, offset=0.0, amplitude=0.3, hold_s=(0.05, 0.3), seed=s))
+        duty(signals.amplitude_random_steps(6.0, offset=0.0, amplitude=0.3, hold_s=(0.05, 0.3), seed=s))
         for s in (1, 1, 2)
     ]
     assert np.array_equal(seeded[0], seeded[1])
@@ -124,16 +125,16 @@ def test_random_steps_follow_the_golden_ratio_or_a_seed() -> None:
     assert holds.min() >= 50
     assert holds.max() <= 300
     with pytest.raises(ParameterError, match="seed"):
-        identify.amplitude_random_steps(6.0, offset=0.0, amplitude=0.3, hold_s=(0.05, 0.3))
+        signals.amplitude_random_steps(6.0, offset=0.0, amplitude=0.3, hold_s=(0.05, 0.3))
     with pytest.raises(ParameterError, match="first must not exceed"):
-        identify.amplitude_random_steps(6.0, offset=0.0, amplitude=0.3, hold_s=(0.3, 0.05), seed=1)
+        signals.amplitude_random_steps(6.0, offset=0.0, amplitude=0.3, hold_s=(0.3, 0.05), seed=1)
     for seed in (-1, 1.5, True):
         with pytest.raises(ParameterError, match=f"seed = {seed}: must be a whole number >= 0"):
-            identify.amplitude_random_steps(6.0, offset=0.0, amplitude=0.3, seed=seed)  # type: ignore[arg-type]
+            signals.amplitude_random_steps(6.0, offset=0.0, amplitude=0.3, seed=seed)  # type: ignore[arg-type]
 
 
 def test_the_staircase_climbs_and_returns() -> None:
-    signal = identify.staircase(offset=0.05, amplitude=0.1, cycles=2)
+    signal = signals.staircase(offset=0.05, amplitude=0.1, cycles=2)
     levels = duty(signal)[::250]
     assert levels.size == 81
     np.testing.assert_allclose(np.abs(np.diff(levels)), 0.01, rtol=1e-9)
@@ -141,7 +142,7 @@ def test_the_staircase_climbs_and_returns() -> None:
 
 
 def test_the_triangle_is_one() -> None:
-    values = duty(identify.triangle(20.0, offset=0.1, amplitude=0.3, frequency_hz=0.1))
+    values = duty(signals.triangle(20.0, offset=0.1, amplitude=0.3, frequency_hz=0.1))
     np.testing.assert_allclose(values[[0, 2500, 5000, 7500, 10000]], [0.1, 0.4, 0.1, -0.2, 0.1], atol=1e-12)
     np.testing.assert_allclose(np.abs(np.diff(values)), 4.0 * 0.3 * 0.1 * 1e-3, rtol=1e-6, atol=1e-12)
 
@@ -153,7 +154,7 @@ def lazy(time_s: Any, duty: Any, start_deg: float) -> dict[str, Any]:
 
 
 def test_a_check_reports_what_it_simulated() -> None:
-    signal = identify.chirp(offset=0.1, amplitude=0.2)
+    signal = signals.chirp(offset=0.1, amplitude=0.2)
     check = identify.check_excitation(signal, lazy, start_deg=20.0)
     assert check.passed
     assert check.content.angle_high_deg == pytest.approx(50.0, abs=0.01)
@@ -169,23 +170,30 @@ def test_a_check_reports_what_it_simulated() -> None:
 @pytest.mark.parametrize(
     ("limits", "said"),
     [
-        ({"angle_window_deg": (1.0, 40.0)}, "opens to 50.0 deg, beyond 40: lower offset or amplitude"),
-        ({"angle_window_deg": (15.0, 60.0)}, "closes to 10.0 deg, beyond 15: raise the offset"),
-        ({"max_rate_deg_per_s": 300.0}, "deg/s, above 300: lower the amplitude"),
-        ({"max_current_a": 2.0}, "the motor takes 3.00 A, above 2: lower the amplitude"),
+        ({"angle_window_deg": (1.0, 40.0)}, "opens to 50.0 deg, beyond 40; lower offset or amplitude"),
+        ({"angle_window_deg": (15.0, 60.0)}, "closes to 10.0 deg, beyond 15; raise the offset"),
+        ({"max_rate_deg_per_s": 300.0}, "deg/s, above 300; lower the amplitude"),
+        ({"max_current_a": 2.0}, "the motor takes 3.00 A, above 2; lower the amplitude"),
     ],
 )
 def test_every_limit_is_told_with_its_remedy(limits: dict[str, Any], said: str) -> None:
-    check = identify.check_excitation(identify.chirp(offset=0.1, amplitude=0.2), lazy, start_deg=20.0, **limits)
+    check = identify.check_excitation(signals.chirp(offset=0.1, amplitude=0.2), lazy, start_deg=20.0, **limits)
     assert not check.passed
-    assert len(check.findings) == 1
-    assert said in check.findings[0]
+    (found,) = check.findings
+    assert (found.code, found.names) == ("limit_exceeded", tuple(limits))
+    assert said in str(found)
     assert "outside the limits" in check.summary()
-    assert identify.check_excitation(identify.chirp(offset=0.1, amplitude=0.05), lazy, start_deg=20.0, **limits).passed
+    assert identify.check_excitation(signals.chirp(offset=0.1, amplitude=0.05), lazy, start_deg=20.0, **limits).passed
+
+
+def test_the_columns_of_a_signal_are_a_pair_that_can_be_read_twice() -> None:
+    columns = _signal_of(signals.chirp(offset=0.1, amplitude=0.1))
+    assert isinstance(columns, tuple)
+    assert [column.dtype for column in columns] == [np.float64, np.float64]
 
 
 def test_a_check_refuses_what_it_cannot_judge() -> None:
-    signal = identify.chirp(offset=0.1, amplitude=0.2)
+    signal = signals.chirp(offset=0.1, amplitude=0.2)
     with pytest.raises(ParameterError, match=r"angle_window_deg = \(40, 10\)"):
         identify.check_excitation(signal, lazy, angle_window_deg=(40.0, 10.0))
     with pytest.raises(ParameterError, match="max_current_a = -1"):

@@ -7,20 +7,15 @@ from typing import Any
 
 import numpy as np
 import pytest
+import xarray as xr
 
 from mgdd.errors import DataError, ParameterError
-from mgdd.identify import (
-    FittedParameters,
-    ThrottleModel,
-    amplitude_random_steps,
-    chirp,
-    identify_throttle,
-    load_throttle_model,
-    triangle,
-    validate_throttle,
-)
-from mgdd.io import throttle_log
-from mgdd.throttle import Throttle, simulate
+from mgdd.identify import fit_throttle, identify_throttle, load_throttle_model, validate_throttle
+from mgdd.io import ParameterFile, throttle_log
+from mgdd.optimize import FitOptions
+from mgdd.results import Model
+from mgdd.signals import amplitude_random_steps, chirp, triangle
+from mgdd.throttle import PseudoWiener, Throttle, simulate
 
 P1 = Throttle()
 
@@ -43,58 +38,74 @@ def test_log() -> Any:
 
 @pytest.mark.parametrize("kind", ["pw_r", "first_principle"])
 def test_a_fit_says_how_good_it_is(kind: str, train: Any, test_log: Any, tmp_path: Path) -> None:
-    fit = identify_throttle(train, kind, test=test_log, starts=3)
+    fit = identify_throttle(train, kind, test=test_log, options=FitOptions(n_starts=3))
     assert fit.kind == kind
-    assert isinstance(fit.model, ThrottleModel)
-    assert fit.fit_percent_train > 98.5
-    assert fit.fit_percent_test is not None
-    assert fit.fit_percent_test > (97.0 if kind == "pw_r" else 92.0), "the groups know no inductance"
-    assert fit.rmse_test_deg is not None
-    assert fit.rmse_test_deg < 0.5
+    assert isinstance(fit.model, Model)
+    assert fit.train.nrmse_fit_percent > 98.5
+    assert fit.test.nrmse_fit_percent > (97.0 if kind == "pw_r" else 92.0), "the groups know no inductance"
+    assert fit.test.rmse < 0.5
+    assert (fit.test.unit, fit.test.n) == ("deg", test_log.sizes["time_s"] - 50)
     assert fit.source == "chirp.csv"
-    assert fit.x is fit.report.x
-    assert (fit.cost, fit.nfev, fit.message) == (fit.report.cost, fit.report.nfev, fit.report.message)
+    assert len(fit.start_rmse) == 3
     assert f"{kind} fitted to chirp.csv" in fit.summary()
     assert "<b>" in fit._repr_html_()
 
     validation = validate_throttle(fit, test_log)
-    assert validation.fit_percent == pytest.approx(fit.fit_percent_test, rel=1e-12)
+    assert validation.quality == fit.test
     ahead = validation.n_step["n_step_rms_deg"]
     assert float(ahead.sel(predictor=kind).max()) < 0.5
     assert float(ahead.sel(predictor="persistence").max()) > 1.0
 
-    saved = FittedParameters.from_toml(fit.to_toml())
-    assert FittedParameters.from_toml(saved.to_toml()) == saved
-    assert saved.source == "fitted to chirp.csv"
-    assert saved.stderr, "standard errors are saved"
+    saved = ParameterFile.from_toml(fit.to_toml())
+    assert ParameterFile.from_toml(saved.to_toml()) == saved
+    assert saved.notes["source"] == "fitted to chirp.csv"
+    assert saved.tables["fit"]["fit_percent_train"].value == fit.train.nrmse_fit_percent
+    errors = dict(zip(fit.report.names, fit.report.stderr, strict=True))
+    kept = {name: entry.stderr for name, entry in saved.tables["parameters"].items() if entry.stderr is not None}
+    assert set(kept.values()) == {error for error in errors.values() if np.isfinite(error)}
     file = tmp_path / "fit.toml"
     file.write_text(fit.to_toml(), encoding="utf-8")
     again = load_throttle_model(file)
-    time, duty = test_log["time_s"].to_numpy(), test_log["duty"].to_numpy()
-    np.testing.assert_array_equal(
-        again.simulate(time, duty, start_deg=8.0), fit.model.simulate(time, duty, start_deg=8.0)
+    start = {"angle_deg": 8.0}
+    xr.testing.assert_identical(
+        again.simulate(test_log, initial_state=start), fit.model.simulate(test_log, initial_state=start)
     )
+
+
+def test_a_lag_of_the_current_is_kept_only_where_it_pays() -> None:
+    signal = chirp(4.0, offset=0.01, amplitude=0.34, high_hz=5.0)
+    run = simulate(P1, signal["duty"], time_s=signal["time_s"])  # 1 ms of lag, worth 0.08 deg RMS
+    noise = np.random.default_rng(1).standard_normal(run.sizes["time_s"])
+    for noise_deg, kept in ((0.03, True), (0.25, True), (0.47, False)):
+        log = throttle_log(run["time_s"], run["duty"], run["angle_deg"] + noise_deg * noise)
+        without, with_lag = (
+            fit_throttle(log, electrical=lag, options=FitOptions(n_starts=1)).report.rmse for lag in (False, True)
+        )
+        assert with_lag < without
+        assert (with_lag < 0.97 * without) is kept
+        fit = identify_throttle(log, "first_principle", options=FitOptions(n_starts=1))
+        assert (fit.parameters["electrical_s"] > 0.0) is kept
+        assert fit.report.rmse == pytest.approx(with_lag if kept else without, rel=1e-9)
 
 
 def test_a_slow_opening_fits_itself_and_nothing_else(test_log: Any) -> None:
     slow = measured(triangle(8.0, offset=0.19, amplitude=0.08, frequency_hz=1.0 / 32.0), "slow", 3)
-    fit = identify_throttle(slow, test=test_log, starts=3)
-    assert fit.fit_percent_train > 99.0
-    assert fit.fit_percent_test is not None
-    assert fit.fit_percent_test < 90.0
+    fit = identify_throttle(slow, test=test_log, options=FitOptions(n_starts=3))
+    assert fit.train.nrmse_fit_percent > 99.0
+    assert fit.test.nrmse_fit_percent < 90.0
     assert {"preload_duty", "coulomb_duty"} <= set(fit.unidentifiable)
-    said = "\n".join(fit.findings)
-    assert "the plate only opens: Coulomb torque and preload push the same way and are indistinguishable" in said
-    assert "add a triangle of ±0.25 duty at 0.05 Hz across limp-home" in said
-    assert "never goes below limp-home" in said
-    assert "what it has learned does not carry over" in said
-    assert all(finding in fit.summary() for finding in fit.findings)
+    found = {finding.code: finding for finding in fit.findings}
+    assert found["one_way"].text.startswith("the plate only opens: Coulomb torque and preload push the same way")
+    assert found["one_way"].remedy.startswith("add a triangle of ±0.25 duty at 0.05 Hz across limp-home")
+    assert found["side_not_visited"].names == ("below",)
+    assert found["overfitted"].text.endswith("what it has learned does not carry over")
+    assert all(str(finding) in fit.summary() for finding in fit.findings)
 
 
 def test_each_side_gets_its_set(train: Any) -> None:
-    fit = identify_throttle(train, two_sided=True, limp_home_deg=8.0, starts=2)
+    fit = identify_throttle(train, two_sided=True, limp_home_deg=8.0, options=FitOptions(n_starts=2))
     assert {"above_coulomb_duty", "below_coulomb_duty"} <= set(fit.report.names)
-    assert fit.fit_percent_train > 98.5
+    assert fit.train.nrmse_fit_percent > 98.5
     assert fit.parameters["above_coulomb_duty"] == pytest.approx(0.0927, rel=0.05)
     with pytest.raises(ParameterError, match="only pw_r has one per side"):
         identify_throttle(train, "pw_p", two_sided=True)
@@ -102,10 +113,11 @@ def test_each_side_gets_its_set(train: Any) -> None:
 
 @pytest.mark.parametrize("kind", ["pw_w", "pw_p"])
 def test_models_without_friction_inside_are_told_so(kind: str, train: Any, test_log: Any) -> None:
-    fit = identify_throttle(train, kind, starts=2)
+    fit = identify_throttle(train, kind, options=FitOptions(n_starts=2))
     validation = validate_throttle(fit, test_log)
-    assert validation.fit_percent < 60.0
-    assert "take a model with friction" in "\n".join(validation.findings)
+    assert validation.quality.nrmse_fit_percent < 60.0
+    poor = next(finding for finding in validation.findings if finding.code == "poor_free_run")
+    assert "take a model with friction" in poor.remedy
 
 
 def test_what_cannot_be_fitted_is_refused(train: Any) -> None:
@@ -120,15 +132,25 @@ def test_what_cannot_be_fitted_is_refused(train: Any) -> None:
 
 
 def test_saved_parameters_are_checked(tmp_path: Path) -> None:
-    good = FittedParameters(kind="pw_r", values={"tau_s": 0.02}, source="me").to_toml()
-    with pytest.raises(DataError, match=r"tau_s: unit = 'ms': must be 's'"):
-        FittedParameters.from_toml(good.replace('"s"', '"ms"'))
-    with pytest.raises(DataError, match="not valid TOML"):
-        FittedParameters.from_toml("kind = ")
-    with pytest.raises(ParameterError, match=r"kind = 'arx'"):
-        FittedParameters.from_toml(good.replace("pw_r", "arx"))
-    with pytest.raises(ParameterError, match="must be finite"):
-        FittedParameters.from_toml(good.replace("0.02", "nan"))
-    assert FittedParameters.from_toml(good).values["tau_s"] == 0.02
+    model, file = PseudoWiener("pw_r", {"above_tau_s": 0.02}), tmp_path / "fit.toml"
+    good = model.to_toml()
+    for old, new, error, match in (
+        ('"s"', '"ms"', ParameterError, r"fit\.toml: \[parameters\] above_tau_s: unit = 'ms': must be 's'"),
+        ("kind = ", "kind ", DataError, "not valid TOML"),
+        ("pw_r", "arx", DataError, "kind = 'arx': must be 'first_principle' or 'pw_r'"),
+        ("value = 0.02,", "value = nan,", ParameterError, r"fit\.toml: above_tau_s = nan"),
+        ("above_tau_s", "above_tua_s", ParameterError, "above_tua_s: unknown key: did you mean 'above_tau_s'"),
+        ("switching = ", "switch = ", ParameterError, "switch: unknown key: did you mean 'switching'"),
+        ('"predicted"', '"guessed"', ParameterError, r"fit\.toml: .*guessed"),
+    ):
+        file.write_text(good.replace(old, new), encoding="utf-8")
+        with pytest.raises(error, match=match):
+            load_throttle_model(file)
+    lines = [line for line in good.splitlines() if not line.startswith("above_tau_s")]
+    file.write_text("\n".join(lines), encoding="utf-8")
+    with pytest.raises(DataError, match=r"\[parameters\] lacks above_tau_s: write above_tau_s = "):
+        load_throttle_model(file)
+    file.write_text(good, encoding="utf-8")
+    assert load_throttle_model(file) == model
     with pytest.raises(FileNotFoundError):
         load_throttle_model(tmp_path / "none.toml")

@@ -8,16 +8,10 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from mgdd.errors import DataError, ShapeError
-from mgdd.io import (
-    check_trace,
-    from_0_720,
-    from_btdc,
-    pressure_trace,
-    read_conditions,
-    read_pressure,
-    write_pressure,
-)
-from mgdd.results import ANGLE, check_labels
+from mgdd.io import from_0_720, from_btdc, pressure_trace, read_conditions, read_pressure, write_pressure
+from mgdd.io.checks import check_trace
+from mgdd.results import check_labels
+from mgdd.results.labels import ANGLE
 
 ANGLES = np.arange(-143.0, 124.0)
 BAR = 1.5 + 120.0 * np.exp(-((ANGLES - 6.0) ** 2) / 1500.0)

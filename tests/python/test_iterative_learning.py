@@ -16,7 +16,8 @@ from scipy import linalg, signal
 
 from mgdd.engine import Cylinder, OperatingPoint, simulate
 from mgdd.errors import DataError, ParameterError, ShapeError
-from mgdd.optimize import ConvergenceReport, IterativeLearning
+from mgdd.optimize import IterativeLearning
+from mgdd.optimize.iterative_learning import ConvergenceReport
 from mgdd.results import check_labels
 
 
@@ -219,8 +220,12 @@ def test_wrong_then_right():
     for bad in (np.nan, np.inf, -np.inf):
         with pytest.raises(DataError, match=r"error of trial 0, sample 1 = -?(nan|inf): must be finite"):
             learner.tell([1.0, bad, 3.0])
-    with pytest.raises(DataError, match="diverge"):
+    with pytest.raises(DataError, match=r"sample 0 = 1\.7e\+308: must be finite and at most 1e\+30 in magnitude"):
         learner.tell([1.7e308] * 3)
+    steep = IterativeLearning([0.0, 0.0, 0.0], k_p=1e300)
+    steep.ask()
+    with pytest.raises(DataError, match="the trials diverge, lower the gain"):
+        steep.tell([1e20] * 3)
     assert learner.state == before
     learner.tell(good)
     assert good.tolist() == [1.0, 2.0, 3.0]

@@ -13,9 +13,9 @@ import pytest
 from mgdd import _core, presets
 from mgdd.engine import Cylinder, NoxModel, NoxProxy, OperatingPoint, Performance, PerformanceTerm, SoftSensor, simulate
 from mgdd.errors import DataError, ParameterError, RigError, ShapeError
-from mgdd.loop import EngineBench, SensorDynamics
+from mgdd.loop import EngineBench, Measurement, SensorDynamics
 from mgdd.results import check_labels
-from mgdd.rig import Measurement, Rig, SimulatedRig
+from mgdd.rig import Rig, SimulatedRig
 
 QUIET = {"soc_scatter_cad": 0.0, "efficiency_noise_percent": 0.0}
 SILENT = SensorDynamics(delay_s=3.0, lag_s=2.0)
@@ -204,10 +204,10 @@ def test_the_rig_is_the_bench() -> None:
             rig.measure()
         for bad in (float("nan"), float("inf")):
             with pytest.raises(ParameterError, match=r"soc_cad = (nan|inf): must be finite"):
-                rig.apply(bad)
+                rig.apply({"soc_cad": bad})
         assert bench.cycle == 0
         for soc in requests(30):
-            rig.apply(soc)
+            rig.apply({"soc_cad": soc})
             measured, expected = rig.measure(), twin.step(soc)
             assert isinstance(measured, Measurement)
             assert measured.components == tuple(expected["components"])
@@ -217,7 +217,7 @@ def test_the_rig_is_the_bench() -> None:
             assert measured.values["soc_cad"] == expected["soc_cad"]
         rig.measure()  # the engine runs on at the timing applied last
         assert bench.cycle == 31
-    for call in (rig.measure, lambda: rig.apply(-6.0), rig.__enter__):
+    for call in (rig.measure, lambda: rig.apply({"soc_cad": -6.0}), rig.__enter__):
         with pytest.raises(RigError, match="the rig is closed"):
             call()
     assert issubclass(RigError, OSError)

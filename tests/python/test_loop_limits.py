@@ -7,7 +7,7 @@ import warnings
 import numpy as np
 import pytest
 
-from mgdd.loop import EngineBench, monte_carlo, steady_optimum
+from mgdd.loop import EngineBench, LoopCriteria, find_steady_optimum, monte_carlo
 from mgdd.optimize import BoundedSeeking, ExtremumSeeking, GoldenSection, GradientDescent, Limit, NewtonSeeking, Spsa
 
 SPACE = {"start": -20.0, "lower": -30.0, "upper": 10.0}
@@ -35,18 +35,18 @@ def seekers(name: str, upper: float, **more: object) -> dict[str, object]:
 def run(name: str, upper: float, chosen: dict[str, object]) -> tuple[float, dict[str, tuple[np.ndarray, np.ndarray]]]:
     """Optimum, and per seeker the exceeded fraction and the mean applied set-point of cycles 1500 to 3000, per seed."""
     bench = EngineBench(limits=[name])
-    best = steady_optimum(bench, {name: upper})
+    best = find_steady_optimum(bench, {name: upper})
     table = monte_carlo(
         bench,
         list(chosen.values()),
         SEEDS,
         cycles=CYCLES,
-        exceed_above={name: upper + 3.0 * best.limit_scatter[name]},
+        criteria=LoopCriteria(exceed_above={name: upper + 3.0 * best[f"scatter_{name}"]}),
     ).isel(bench=0)
     rows = {
         key: (table["exceeded_fraction"].values[i], table["mean_applied_cad"].values[i]) for i, key in enumerate(chosen)
     }
-    return best.soc_cad, rows
+    return best["soc_cad"], rows
 
 
 def test_p_max_is_kept_by_every_seeker_within_one_and_a_half_degrees_of_the_limit() -> None:
@@ -59,11 +59,11 @@ def test_p_max_is_kept_by_every_seeker_within_one_and_a_half_degrees_of_the_limi
 
 def test_without_the_limit_the_same_seeds_exceed_it_nearly_always() -> None:
     bench = EngineBench(limits=["p_max_bar"])
-    best = steady_optimum(bench, {"p_max_bar": 95.0})
-    assert best.free_soc_cad == pytest.approx(-5.63, abs=0.02)
+    best = find_steady_optimum(bench, {"p_max_bar": 95.0})
+    assert best.free_inputs["soc_cad"] == pytest.approx(-5.63, abs=0.02)
     free = ExtremumSeeking(**SPACE, limits=[Limit("p_max_bar", 1000.0)])
-    above = {"p_max_bar": 95.0 + 3.0 * best.limit_scatter["p_max_bar"]}
-    table = monte_carlo(bench, free, SEEDS, cycles=CYCLES, exceed_above=above)
+    above = {"p_max_bar": 95.0 + 3.0 * best["scatter_p_max_bar"]}
+    table = monte_carlo(bench, free, SEEDS, cycles=CYCLES, criteria=LoopCriteria(exceed_above=above))
     assert float(table["exceeded_fraction"].min()) > 0.9
 
 
@@ -101,12 +101,12 @@ def test_the_seeker_returns_below_the_limit_after_a_load_step() -> None:
     schedule = [(0, low), (1000, high)]
     bench = EngineBench(schedule=schedule, limits=["p_max_bar"])
     upper = 92.0
-    best = steady_optimum(bench, {"p_max_bar": upper}, cycle=1000)
+    best = find_steady_optimum(bench, {"p_max_bar": upper}, cycle=1000)
     seeker = ExtremumSeeking(**SPACE, limits=[Limit("p_max_bar", upper)])
-    above = {"p_max_bar": upper + 3.0 * best.limit_scatter["p_max_bar"]}
-    table = monte_carlo(bench, seeker, SEEDS, cycles=2500, exceed_from=1150, exceed_above=above)
+    above = {"p_max_bar": upper + 3.0 * best["scatter_p_max_bar"]}
+    table = monte_carlo(bench, seeker, SEEDS, cycles=2500, criteria=LoopCriteria(exceed_from=1150, exceed_above=above))
     assert float(table["exceeded_fraction"].max()) < 0.01
-    before = monte_carlo(bench, seeker, SEEDS, cycles=1100, exceed_from=1000, exceed_above=above)
+    before = monte_carlo(bench, seeker, SEEDS, cycles=1100, criteria=LoopCriteria(exceed_from=1000, exceed_above=above))
     assert float(before["exceeded_fraction"].mean()) > 0.005  # the step does break it for some cycles
 
 

@@ -14,9 +14,18 @@ import xarray as xr
 
 from mgdd.engine import OperatingPoint, Performance
 from mgdd.errors import Interrupted, ParameterError
-from mgdd.loop import EngineBench, monte_carlo, run_seeker, steady_map, steady_optimum
+from mgdd.loop import (
+    EngineBench,
+    LoopCriteria,
+    find_steady_optimum,
+    monte_carlo,
+    run_seeker,
+    steady_map,
+    summarize_cycles,
+)
 from mgdd.optimize import ExtremumSeeking, GoldenSection, Limit, NewtonSeeking, Spsa
 from mgdd.results import check_labels
+from mgdd.rig import SimulatedRig
 
 SPACE = {"start": -14.0, "lower": -30.0, "upper": 10.0}
 
@@ -63,7 +72,9 @@ def test_one_run_is_its_pieces_is_ask_and_tell(kind: str) -> None:
 
 def test_labels_and_history_of_a_run() -> None:
     it = seeker("batch")
-    run = run_seeker(bench(), it, 200, optimum_cad=-2.0, exceed_above={"p_max_bar": 110.0}, exceed_from=100)
+    run = run_seeker(
+        bench(), it, 200, criteria=LoopCriteria(optimum=-2.0, exceed_above={"p_max_bar": 110.0}, exceed_from=100)
+    )
     check_labels(run.dataset)
     assert run.dataset.sizes["cycle"] == 200
     assert not run.interrupted
@@ -73,14 +84,33 @@ def test_labels_and_history_of_a_run() -> None:
     np.testing.assert_array_equal(it.history["applied"].values[:, 0], run.dataset["soc_requested_cad"])
 
 
+def test_limits_are_judged_in_short_runs_too() -> None:
+    goal = LoopCriteria(exceed_above={"p_max_bar": 110.0})
+    for cycles in (1, 7, 200):
+        run = run_seeker(bench(), seeker("batch"), cycles, criteria=goal)
+        over = run.dataset["limits"].sel(limit="p_max_bar")[cycles // 2 :] > 110.0
+        assert run.summary["exceeded_fraction"] == pytest.approx(float(over.mean()), abs=1e-12)
+        assert summarize_cycles(run.dataset, goal)["exceeded_fraction"] == run.summary["exceeded_fraction"]
+    assert LoopCriteria().counted_from(5000) == 1000
+    late = LoopCriteria(exceed_from=200, exceed_above={"p_max_bar": 110.0})
+    for plant in (own := bench(), SimulatedRig(rigged := bench())):
+        with pytest.raises(ParameterError, match="exceed_from = 200: must be < cycles = 200, or no cycle counts"):
+            run_seeker(plant, seeker("batch"), 200, criteria=late)
+    with pytest.raises(ParameterError, match="exceed_from = 200"):
+        monte_carlo(own, seeker("batch"), range(2), cycles=200, criteria=late)
+    assert own.cycle == rigged.cycle == 0
+
+
 def test_monte_carlo_is_labelled_and_the_same_on_any_thread_count() -> None:
     plants = [EngineBench(), EngineBench(point=OperatingPoint(fuel_mg=30.0))]
     gains = [ExtremumSeeking(**SPACE, gain=g) for g in (0.5, 1.0)]
-    one = monte_carlo(plants, gains, range(6), cycles=300, optimum_cad=[-5.6, -8.5], threads=1)
-    two = monte_carlo(plants, gains, range(6), cycles=300, optimum_cad=[-5.6, -8.5], threads=2)
+    one = monte_carlo(plants, gains, range(6), cycles=300, threads=1, criteria=LoopCriteria(optimum=[-5.6, -8.5]))
+    two = monte_carlo(plants, gains, range(6), cycles=300, threads=2, criteria=LoopCriteria(optimum=[-5.6, -8.5]))
     check_labels(one)
     xr.testing.assert_identical(one, two)
-    alone = run_seeker(EngineBench(point=OperatingPoint(fuel_mg=30.0), seed=4), gains[1], 300, optimum_cad=-8.5)
+    alone = run_seeker(
+        EngineBench(point=OperatingPoint(fuel_mg=30.0), seed=4), gains[1], 300, criteria=LoopCriteria(optimum=-8.5)
+    )
     assert float(one["rms_cad"][1, 1, 4]) == alone.summary["rms_cad"]
 
 
@@ -133,22 +163,22 @@ def test_ctrl_c_leaves_a_usable_partial_result() -> None:
 
 
 def test_steady_optimum_agrees_with_the_model_and_with_the_long_run() -> None:
-    from mgdd.engine import Cylinder, optimum
+    from mgdd.engine import Cylinder, find_optimum
 
-    free = steady_optimum(EngineBench())
-    assert free.soc_cad == pytest.approx(optimum(Cylinder(), OperatingPoint()).soc_cad, abs=0.002)
+    free = find_steady_optimum(EngineBench())
+    assert free["soc_cad"] == pytest.approx(find_optimum(Cylinder(), OperatingPoint())["soc_cad"], abs=0.002)
     assert free.curvature == pytest.approx(-0.051, rel=0.05)
-    limited = steady_optimum(EngineBench(limits=["p_max_bar"]), {"p_max_bar": 95.0})
-    model = optimum(Cylinder(), OperatingPoint(), limits={"p_max_bar": 95.0})
-    assert limited.soc_cad == pytest.approx(model.soc_cad, abs=0.002)
-    scattered = EngineBench(limits=["p_max_bar"], efficiency_noise_percent=0.0).run(np.full(4000, limited.soc_cad))
-    assert float(scattered["p_max_bar"].std()) == pytest.approx(limited.limit_scatter["p_max_bar"], rel=0.05)
+    limited = find_steady_optimum(EngineBench(limits=["p_max_bar"]), {"p_max_bar": 95.0})
+    model = find_optimum(Cylinder(), OperatingPoint(), limits={"p_max_bar": 95.0})
+    assert limited["soc_cad"] == pytest.approx(model["soc_cad"], abs=0.002)
+    scattered = EngineBench(limits=["p_max_bar"], efficiency_noise_percent=0.0).run(np.full(4000, limited["soc_cad"]))
+    assert float(scattered["p_max_bar"].std()) == pytest.approx(limited["scatter_p_max_bar"], rel=0.05)
 
 
 @pytest.mark.parametrize(("weight", "soc"), [(0.0, -5.63), (0.002, -2.72), (0.004, -0.65), (0.008, 2.36)])
 def test_the_optimum_moves_late_with_the_weight_of_nox(weight: float, soc: float) -> None:
     plant = EngineBench(performance=Performance.efficiency_and_nox(weight), nox_sensor="true_value")
-    assert steady_optimum(plant).soc_cad == pytest.approx(soc, abs=0.03)
+    assert find_steady_optimum(plant)["soc_cad"] == pytest.approx(soc, abs=0.03)
 
 
 def test_steady_map_is_quiet_and_labelled() -> None:
@@ -168,14 +198,16 @@ def test_steady_map_is_quiet_and_labelled() -> None:
             r"limits of the seeker \[p_max_bar\] and of the bench \[\] differ",
         ),
         (
-            lambda: run_seeker(EngineBench(), GoldenSection(**SPACE), 5, exceed_above={"p_max_bar": 1.0}),
+            lambda: run_seeker(
+                EngineBench(), GoldenSection(**SPACE), 5, criteria=LoopCriteria(exceed_above={"p_max_bar": 1.0})
+            ),
             "exceed_above: .*p_max_bar",
         ),
         (lambda: monte_carlo([], ExtremumSeeking(**SPACE), [1], cycles=5), "benches is empty"),
         (lambda: monte_carlo(EngineBench(), ExtremumSeeking(**SPACE), [-1], cycles=5), "seeds: -1 must be"),
         (lambda: monte_carlo(EngineBench(), [3.0], [1], cycles=5), "3.0 is no seeker"),
-        (lambda: steady_optimum(EngineBench(), {"nonsense": 1.0}), "'nonsense' is no indicator"),
-        (lambda: steady_optimum(EngineBench(), bounds_cad=(5.0, -5.0)), "must increase"),
+        (lambda: find_steady_optimum(EngineBench(), {"nonsense": 1.0}), "'nonsense' is not an indicator"),
+        (lambda: find_steady_optimum(EngineBench(), bounds_cad=(5.0, -5.0)), "must increase"),
     ],
 )
 def test_bad_calls_name_what_is_wrong(call: Any, message: str) -> None:

@@ -69,3 +69,22 @@ def test_docs_build_without_a_warning(tmp_path: Path) -> None:
     run = subprocess.run([*command, *folders], capture_output=True, text=True, env=environment)
     assert run.returncode == 0, run.stdout + run.stderr
     assert (tmp_path / "html" / "index.html").is_file()
+    check_without_a_network(tmp_path / "html")
+
+
+def check_without_a_network(site: Path) -> None:
+    """Equations are drawn by a MathJax that lies beside the pages, and nothing else is loaded from elsewhere."""
+    loads = re.compile(
+        r"<(?:script|img|iframe)[^>]*\ssrc=\"([^\"]+)\"|<link[^>]*rel=\"stylesheet\"[^>]*href=\"([^\"]+)\""
+    )
+    pages = {page: page.read_text(encoding="utf-8") for page in site.rglob("*.html")}
+    equations = {page for page, text in pages.items() if 'class="math' in text}
+    assert len(equations) > 10
+    for page, text in pages.items():
+        files = [source or sheet for source, sheet in loads.findall(text)]
+        assert not [file for file in files if "//" in file], page.name
+        drawn = [page.parent / file for file in files if "mathjax" in file]
+        assert all(file.is_file() for file in drawn)
+        assert bool(drawn) == (page in equations), page.name
+    fonts = site / "_static" / "mathjax" / "output" / "chtml" / "fonts" / "woff-v2"
+    assert len(list(fonts.glob("*.woff"))) > 10

@@ -13,7 +13,8 @@ from scipy import optimize as scipy_optimize
 
 from mgdd import _core
 from mgdd.errors import ParameterError, ShapeError
-from mgdd.optimize import FitReport, least_squares
+from mgdd.optimize import least_squares
+from mgdd.results import FitReport
 
 OPTIONS = (
     "max_iterations",
@@ -55,7 +56,7 @@ def test_linear_problem_equals_lstsq_and_its_covariance():
     np.testing.assert_allclose(fit.stderr, np.sqrt(np.diag(covariance)), rtol=1e-9)
     np.testing.assert_allclose(fit.residual, residual, atol=1e-9)
     assert fit.rmse == pytest.approx(np.sqrt(np.mean(residual**2)))
-    assert fit.fit_percent == pytest.approx(100 * (1 - np.linalg.norm(residual) / np.linalg.norm(b - b.mean())))
+    assert fit.nrmse_fit_percent == pytest.approx(100 * (1 - np.linalg.norm(residual) / np.linalg.norm(b - b.mean())))
     assert fit.x is fit.values
     assert fit.fun is fit.residual
 
@@ -112,7 +113,8 @@ def test_optimum_beyond_a_bound_ends_on_it_and_says_so():
     assert np.isnan(fit.stderr[0])
     assert np.isnan(fit.covariance[0]).all()
     assert "a" in fit.unidentifiable
-    assert fit.findings[0] == "a stands at its upper bound 1.5"
+    assert (fit.findings[0].code, fit.findings[0].names) == ("at_bound", ("a",))
+    assert str(fit.findings[0]) == "a stands at its upper bound 1.5"
 
 
 @settings(max_examples=60, deadline=None)
@@ -154,7 +156,8 @@ def test_collinear_parameters_are_named_with_infinite_stderr():
     assert np.isinf(fit.stderr).tolist() == [True, False, True]
     np.testing.assert_allclose(fit.null_directions[:, 0], [1.0, 0.0, 1.0], atol=1e-12)
     assert fit.correlation[0, 2] == pytest.approx(1.0)
-    assert "(gain +1, loss +1)" in fit.findings[0]
+    assert (fit.findings[0].code, set(fit.findings[0].names)) == ("null_direction", {"gain", "loss"})
+    assert "(gain +1, loss +1)" in fit.findings[0].text
 
 
 def test_correlation_limit_decides_who_is_named():
@@ -184,7 +187,7 @@ def test_not_run_report_says_so():
     assert not fit.success
     assert np.isnan(fit.cost)
     assert np.isnan(fit.rmse)
-    assert fit.fit_percent is None
+    assert fit.nrmse_fit_percent is None
     assert fit.summary().startswith("not_run")
 
 
@@ -196,7 +199,7 @@ def test_start_that_cannot_be_evaluated_is_a_status(answer):
     assert not fit.success
     assert fit.values.tolist() == [1.0, 2.0]
     assert np.isnan(fit.rmse)
-    assert fit.fit_percent is None
+    assert fit.nrmse_fit_percent is None
     assert len(calls) == 1
 
 

@@ -10,7 +10,8 @@ import pytest
 
 from mgdd import datasets, plot
 from mgdd.errors import DataError
-from mgdd.results import ANGLE, labelled_dataset
+from mgdd.results import labelled_dataset
+from mgdd.results.labels import ANGLE
 
 CAD = np.arange(-120.0, 121.0)
 LITRE = 0.1 + 0.9 * (1.0 - np.cos(np.radians(CAD)))
@@ -311,7 +312,7 @@ def test_timing_says_when_the_sweep_ends_too_early():
         (plot.seeking, sought, "soc_requested_cad", "mgdd.loop.run_seeker"),
         (plot.convergence, tracks, "estimate_median_cad", "a study of mgdd.studies"),
         (plot.sensors, readings, "nox_true_ppm", "mgdd.loop.EngineBench.run"),
-        (plot.learning, learned, "ca50_error_cad", "mgdd.studies.run_ch3_optimizers"),
+        (plot.learning, learned, "ca50_error_cad", "the study seeker-comparison"),
     ],
 )
 def test_a_missing_variable_is_named_with_its_maker(function, dataset, variable, maker):

@@ -4,14 +4,17 @@ from __future__ import annotations
 
 import copy
 import pickle
+from collections.abc import Callable
 
 import numpy as np
 import pytest
+import xarray as xr
 
 from mgdd.errors import DataError, ParameterError, ShapeError
-from mgdd.identify import OnlineUpdate, ThrottleModel, fit_pseudo_wiener
-from mgdd.io import throttle_log
-from mgdd.studies import run_ch7_pseudo_wiener
+from mgdd.identify import OnlineUpdate, fit_pseudo_wiener
+from mgdd.optimize import FitOptions
+from mgdd.results import Model
+from mgdd.studies import StudyResult
 from mgdd.throttle import PseudoWiener, Throttle
 
 TIME = np.arange(4000) * 1e-3
@@ -26,9 +29,13 @@ MODELS = [
 ]
 
 
+def simulate(model: PseudoWiener, start_deg: float, time=TIME, duty=DUTY) -> xr.Dataset:
+    return model.simulate({"time_s": time, "duty": duty}, initial_state={"angle_deg": start_deg})
+
+
 @pytest.mark.parametrize("model", MODELS, ids=lambda model: f"{model.kind}-{len(model.parameters)}")
 def test_a_model_survives_every_copy(model: PseudoWiener) -> None:
-    assert isinstance(model, ThrottleModel)
+    assert isinstance(model, Model)
     for other in (
         PseudoWiener.from_toml(model.to_toml()),
         pickle.loads(pickle.dumps(model)),
@@ -42,13 +49,14 @@ def test_a_model_survives_every_copy(model: PseudoWiener) -> None:
 
 @pytest.mark.parametrize("model", MODELS, ids=lambda model: f"{model.kind}-{len(model.parameters)}")
 def test_prediction_joins_measurement_and_free_run(model: PseudoWiener) -> None:
-    free = model.simulate(TIME, DUTY, start_deg=20.0)
+    log = simulate(model, 20.0)
+    free = log["angle_deg"].to_numpy()
     assert free.shape == TIME.shape
-    ahead = model.predict(TIME, DUTY, free, 20, speed_gain_per_s=0.0, bias_gain_duty_per_deg=0.0)
+    ahead = model.predict(log, 20, speed_gain_per_s=0.0, bias_gain_duty_per_deg=0.0)["angle_deg"].to_numpy()
     assert ahead.shape == (TIME.size - 20,)
     if model.parameters["delay_samples"] == 0.0:
         np.testing.assert_allclose(ahead, free[20:], atol=1e-9)
-    angle, slope = model.slopes(np.full(30, 0.3), start_deg=20.0)
+    angle, slope = model.slopes(np.full(30, 0.3), initial_state={"angle_deg": 20.0})
     assert slope.shape == (30, 30)
     assert np.abs(np.triu(slope, 1)).max() == 0.0
     np.testing.assert_array_equal(angle[:0], [])
@@ -56,13 +64,13 @@ def test_prediction_joins_measurement_and_free_run(model: PseudoWiener) -> None:
 
 def test_slopes_are_the_differences() -> None:
     model = MODELS[0]
-    duty = np.full(24, 0.35)
-    _, slope = model.slopes(duty, start_deg=30.0)
+    duty, state = np.full(24, 0.35), {"angle_deg": 30.0}
+    _, slope = model.slopes(duty, initial_state=state)
     for k in (0, 7, 23):
         up, down = duty.copy(), duty.copy()
         up[k] += 1e-6
         down[k] -= 1e-6
-        difference = (model.slopes(up, start_deg=30.0)[0] - model.slopes(down, start_deg=30.0)[0]) / 2e-6
+        difference = (model.slopes(up, initial_state=state)[0] - model.slopes(down, initial_state=state)[0]) / 2e-6
         np.testing.assert_allclose(slope[:, k], difference, rtol=1e-5, atol=1e-5)
 
 
@@ -71,8 +79,9 @@ def test_another_sample_time_keeps_seconds_and_steps() -> None:
     coarse = model.at_sample(2e-3)
     assert coarse.parameters["delay_samples"] == 2.0
     assert coarse.parameters["substeps"] == 4.0
-    fine = model.simulate(TIME, np.repeat(DUTY[::2], 2), start_deg=8.0)
-    np.testing.assert_allclose(coarse.simulate(TIME[::2], DUTY[::2], start_deg=8.0), fine[::2], atol=1e-9)
+    fine = simulate(model, 8.0, duty=np.repeat(DUTY[::2], 2))["angle_deg"]
+    slow = simulate(coarse, 8.0, TIME[::2], DUTY[::2])["angle_deg"]
+    np.testing.assert_allclose(slow, fine[::2], atol=1e-9)
 
 
 def test_bad_input_says_what_and_leaves_things_alone() -> None:
@@ -85,33 +94,40 @@ def test_bad_input_says_what_and_leaves_things_alone() -> None:
     with pytest.raises(ParameterError, match=r"delay_samples = 1\.5: must be a whole number"):
         PseudoWiener("pw_r", {"delay_samples": 1.5})
     model = MODELS[0]
-    with pytest.raises(DataError, match="uneven"):
-        model.simulate(TIME**2, DUTY, start_deg=8.0)
-    with pytest.raises(ShapeError, match="two columns of one length"):
-        model.simulate(TIME, DUTY[:-1], start_deg=8.0)
+    with pytest.raises(DataError, match="uneven sampling"):
+        simulate(model, 8.0, time=TIME**2)
+    with pytest.raises(ShapeError, match="columns of one length"):
+        simulate(model, 8.0, duty=DUTY[:-1])
+    with pytest.raises(DataError, match="have no duty: needed are time_s, duty"):
+        model.simulate({"time_s": TIME})
+    with pytest.raises(DataError, match=r"duty: must be in \[-1, 1\]"):
+        simulate(model, 8.0, duty=10.0 * DUTY)
+    with pytest.raises(ParameterError, match="'angle' is no state: must be one of angle_deg"):
+        model.simulate({"time_s": TIME, "duty": DUTY}, initial_state={"angle": 8.0})
     with pytest.raises(ParameterError, match="horizon = 0"):
-        model.predict(TIME, DUTY, DUTY, 0)
-    with pytest.raises(DataError, match=r"unit = 'rad': must be 'deg'"):
+        model.predict(simulate(model, 8.0), 0)
+    with pytest.raises(ParameterError, match=r"unit = 'rad': must be 'deg'"):
         PseudoWiener.from_toml(model.to_toml().replace('"deg"', '"rad"'))
     with pytest.raises(DataError, match=r"no table \[parameters\]"):
-        PseudoWiener.from_toml('kind = "pw_r"')
+        PseudoWiener.from_toml('kind = "pw_r"\nformat = 1')
 
 
 def test_the_fit_recovers_a_model_of_its_own_kind() -> None:
     truth = PseudoWiener("pw_r", {"above_coulomb_duty": 0.08, "below_coulomb_duty": 0.08, "above_tau_s": 0.025})
     truth = truth.replace(below_tau_s=0.025)
-    log = throttle_log(TIME, DUTY, truth.simulate(TIME, DUTY, start_deg=8.0))
-    fit = fit_pseudo_wiener(log, starts=3)
+    log = simulate(truth, 8.0)
+    fit = fit_pseudo_wiener(log, options=FitOptions(n_starts=3))
     for name in ("above_tau_s", "above_coulomb_duty", "below_coulomb_duty"):
         assert fit.parameters[name] == pytest.approx(truth.parameters[name], rel=1e-3)
-    assert fit.fit_percent_train > 99.9
+    assert fit.train.nrmse_fit_percent > 99.9
     assert fit.model.kind == fit.kind == "pw_r"
-    assert len(fit.search_rmse_deg) == 3
-    assert any("searches ended at the best fit" in text for text in fit.findings)
+    assert len(fit.start_rmse) == 3
+    assert 1 <= fit.n_best <= 3
+    assert "shared_sides" in {finding.code for finding in fit.findings}
     assert PseudoWiener.from_toml(fit.to_toml()) == fit.model
     with pytest.raises(ParameterError, match="must be a pw_w"):
-        fit_pseudo_wiener(log, "pw_w", start=truth)
-    with pytest.raises(DataError, match="different sample times"):
+        fit_pseudo_wiener(log, "pw_w", start_values=truth)
+    with pytest.raises(DataError, match=r"log 2 is sampled every 0\.002 s, log 1 every 0\.001 s"):
         fit_pseudo_wiener([log, log.isel(time_s=slice(None, None, 2))])
 
 
@@ -120,7 +136,7 @@ def test_online_update_learns_the_gain_and_restarts(method: str) -> None:
     truth = PseudoWiener("pw_r", {"limp_home_deg": 8.0})
     time = np.arange(12000) * 1e-3
     duty = 0.14 + 0.20 * np.sin(2.0 * np.pi * 2.5 * time)
-    angle = truth.simulate(time, duty, start_deg=30.0)
+    angle = simulate(truth, 30.0, time, duty)["angle_deg"].to_numpy()
     # 15 % less gain: preload, spring and friction in duty are 15 % too high by the same factor.
     factor = 0.85
     wrong = truth.replace(
@@ -156,8 +172,8 @@ def test_online_update_refuses_what_it_cannot_do() -> None:
         OnlineUpdate(MODELS[0], free=["mass"])
 
 
-def test_the_study_ranks_the_kinds() -> None:
-    result = run_ch7_pseudo_wiener(starts=4, quick=True)
+def test_the_study_ranks_the_kinds(quick_study: Callable[..., StudyResult]) -> None:
+    result = quick_study("throttle-pseudo-wiener", starts=4)
     rows = {(row["plant"], row["model"]): row for row in result.summary["rows"] if row["lag_start"] != "best"}
     better = {(row["plant"], row["model"]): row for row in result.summary["rows"] if row["lag_start"] == "best"}
     printed = {"P1": {"pw_r": 99.4, "pw_w": 79.7, "pw_p": 53.7}, "P2": {"pw_r": 99.4, "pw_w": 92.0, "pw_p": 82.4}}

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import io
 import json
 import subprocess
 import sys
@@ -15,7 +16,8 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from mgdd.errors import ConvergenceError, DataError, Error, ParameterError, ShapeError
-from mgdd.results import ANGLE, VARIABLES, check_labels, labelled_dataset, to_jsonable
+from mgdd.results import VARIABLES, check_labels, labelled_dataset
+from mgdd.results.labels import ANGLE, to_jsonable
 
 
 def cycle(**extra):
@@ -140,3 +142,28 @@ def test_import_is_light(module):
     code = f"import sys, {module}; print(*({heavy} & set(sys.modules)))"
     done = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=False)
     assert (done.returncode, done.stdout.strip()) == (0, ""), done.stderr
+
+
+@pytest.mark.parametrize(
+    "value", ["no fault", "", 3, 2.5, float("nan"), np.float32(1.0), np.int64(7), [1.0, 2], (0.5,)]
+)
+def test_attributes_survive_a_file(value):
+    dataset = labelled_dataset(cycle(), attrs={"note": value})
+    check_labels(dataset)
+    back = xr.load_dataset(io.BytesIO(bytes(dataset.to_netcdf(engine="scipy"))), engine="scipy").attrs["note"]
+    np.testing.assert_array_equal(np.ravel(back), np.ravel(value))
+
+
+@pytest.mark.parametrize(
+    "value", [True, np.bool_(False), None, (), ("a", "b"), {"a": 1}, [True], b"ab", np.zeros((2, 2))]
+)
+def test_an_attribute_that_no_file_holds_is_refused(value):
+    with pytest.raises(DataError, match=r"(?s)attribute note of the Dataset = .*: netCDF stores text"):
+        labelled_dataset(cycle(), attrs={"note": value})
+    dataset = labelled_dataset(cycle())
+    dataset["pressure_bar"].attrs["note"] = value
+    with pytest.raises(DataError, match="attribute note of variable pressure_bar"):
+        check_labels(dataset)
+    labelled_dataset(cycle(), attrs={"note": "text"})
+    with pytest.raises(DataError, match="attribute 1 of the Dataset: its name must be text"):
+        labelled_dataset(cycle(), attrs={1: "one"})

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import copy
-from collections.abc import Callable
+from collections.abc import Callable, Mapping
 from types import TracebackType
 from typing import Any, Self
 
@@ -12,7 +12,9 @@ import pytest
 
 from mgdd.engine import OperatingPoint, Performance
 from mgdd.errors import DataError, Interrupted, ParameterError, RigError
-from mgdd.loop import EngineBench, run_seeker, summarize_cycles
+from mgdd.loop import EngineBench, LoopCriteria, Measurement, run_seeker
+from mgdd.loop.plant import AnnouncingPlant
+from mgdd.loop.summary import summarize_cycles
 from mgdd.optimize import (
     BoundedSeeking,
     ComponentLag,
@@ -24,7 +26,7 @@ from mgdd.optimize import (
     Spsa,
 )
 from mgdd.results import check_labels
-from mgdd.rig import AnnouncingRig, Measurement, Rig, SimulatedRig, run_on_rig
+from mgdd.rig import Rig, SimulatedRig
 
 CYCLES = 700
 NAMES = ["p_max_bar", "dp_max_bar_per_cad", "cov_imep_percent"]
@@ -71,8 +73,11 @@ class ScriptedRig:
     def __init__(self, answer: Callable[[int, float], Measurement]) -> None:
         self.answer, self.applied = answer, list[float]()
 
-    def apply(self, soc_cad: float) -> None:
-        self.applied.append(soc_cad)
+    input_names = ("soc_cad",)
+    limit_names = ()
+
+    def apply(self, inputs: Mapping[str, float]) -> None:
+        self.applied.append(inputs["soc_cad"])
 
     def measure(self) -> Measurement:
         return self.answer(len(self.applied) - 1, self.applied[-1])
@@ -98,12 +103,10 @@ def seeker() -> ExtremumSeeking:
 @pytest.mark.parametrize("name", SEEKERS)
 def test_the_simulated_rig_is_the_loop_of_the_core(name: str, sensor: str) -> None:
     in_core, on_rig = SEEKERS[name](), SEEKERS[name]()
-    criteria: dict[str, Any] = {
-        "optimum_cad": -1.0, "arrival_cad": 2.0, "exceed_from": 300, "exceed_above": {"p_max_bar": 121.0}
-    }  # fmt: skip
-    core = run_seeker(rough_bench(sensor), in_core, CYCLES, **criteria)
+    goal = LoopCriteria(optimum=-1.0, arrival=2.0, exceed_from=300, exceed_above={"p_max_bar": 121.0})
+    core = run_seeker(rough_bench(sensor), in_core, CYCLES, criteria=goal)
     with SimulatedRig(rough_bench(sensor)) as rig:
-        run = run_on_rig(rig, on_rig, CYCLES, **criteria)
+        run = run_seeker(rig, on_rig, CYCLES, criteria=goal)
     check_labels(run.dataset)
     assert 10 < int(run.dataset["misfire"].sum()) < 70
     assert list(np.flatnonzero(run.dataset["operating_point_changed"])) == [251, 500]
@@ -124,8 +127,8 @@ def test_a_run_in_pieces_is_one_run() -> None:
     whole = run_seeker(rough_bench(), SEEKERS["batch"](), CYCLES)
     again = SEEKERS["batch"]()
     rig = SimulatedRig(rough_bench())
-    pieces = [run_on_rig(rig, again, n) for n in (251, 1, 200)]
-    last = run_seeker(rig.bench, again, CYCLES - 452)
+    pieces = [run_seeker(rig, again, n) for n in (251, 1, 200)]
+    last = run_seeker(rig.plant, again, CYCLES - 452)
     joined = np.concatenate([piece.dataset["estimate_cad"] for piece in (*pieces, last)])
     np.testing.assert_array_equal(joined, whole.dataset["estimate_cad"])
     np.testing.assert_array_equal(pieces[2].dataset["cycle"], np.arange(252, 452))
@@ -141,7 +144,7 @@ def test_the_restart_comes_before_the_cycle() -> None:
             return False
 
     deaf = Deaf(rough_bench())
-    run = run_on_rig(deaf, SEEKERS["batch"](), CYCLES)
+    run = run_seeker(deaf, SEEKERS["batch"](), CYCLES)
     same = run.dataset["estimate_cad"].to_numpy() == core.dataset["estimate_cad"].to_numpy()
     assert same[:252].all()
     assert not same[252:].all()
@@ -155,8 +158,8 @@ def test_a_change_that_is_only_measured_costs_one_cycle() -> None:
 
     rig, own = ScriptedRig(answer), seeker()
     assert isinstance(rig, Rig)
-    assert not isinstance(rig, AnnouncingRig)
-    run = run_on_rig(rig, own, 1200)
+    assert not isinstance(rig, AnnouncingPlant)
+    run = run_seeker(rig, own, 1200)
     assert list(np.flatnonzero(run.dataset["void"])) == [305]
     assert not run.dataset["misfire"].any()
     assert np.isnan(own.history["objective"][305])
@@ -176,9 +179,9 @@ def test_a_plain_rig_gives_what_it_measures() -> None:
         values = {"boost_kpa": 150.0} if cycle % 2 else {}
         return Measurement(components=hill(cycle, soc).components, misfire=cycle == 4, values=values)
 
-    run = run_on_rig(ScriptedRig(answer), seeker(), 200, optimum_cad=-5.6)
+    run = run_seeker(ScriptedRig(answer), seeker(), 200, criteria=LoopCriteria(optimum=-5.6))
     check_labels(run.dataset)
-    assert run.dataset["boost_kpa"].attrs["units"] == "not given by the rig"
+    assert run.dataset["boost_kpa"].attrs["units"] == "not given by the plant"
     assert np.isnan(run.dataset["boost_kpa"][::2]).all()
     assert (run.dataset["boost_kpa"][1::2] == 150.0).all()
     assert run.summary["misfires"] == 1.0
@@ -198,13 +201,13 @@ def test_ctrl_c_leaves_a_usable_result() -> None:
 
     rig, own, whole = ScriptedRig(answer), seeker(), seeker()
     with pytest.raises(Interrupted, match="after 120 of 400 cycles") as stop:
-        run_on_rig(rig, own, 400, optimum_cad=-5.6)
+        run_seeker(rig, own, 400, criteria=LoopCriteria(optimum=-5.6))
     run = stop.value.partial
     assert (run.interrupted, run.dataset.attrs["interrupted"]) == (True, 1)
     assert run.dataset.sizes["cycle"] == own.cycle == 120
     assert np.isfinite(run.summary["final_cad"])
-    rest = run_on_rig(rig, own, 280)
-    straight = run_on_rig(ScriptedRig(hill), whole, 400)
+    rest = run_seeker(rig, own, 280)
+    straight = run_seeker(ScriptedRig(hill), whole, 400)
     joined = np.concatenate([run.dataset["estimate_cad"], rest.dataset["estimate_cad"]])
     np.testing.assert_array_equal(joined, straight.dataset["estimate_cad"])
     np.testing.assert_array_equal(rest.dataset["cycle"], np.arange(120, 400))
@@ -214,8 +217,8 @@ def test_ctrl_c_before_the_first_cycle() -> None:
     def answer(_: int, __: float) -> Measurement:
         raise KeyboardInterrupt
 
-    with pytest.raises(Interrupted, match="after 0 of 10 cycles") as stop:
-        run_on_rig(ScriptedRig(answer), seeker(), 10, optimum_cad=-5.6)
+    with pytest.raises(Interrupted) as stop:
+        run_seeker(ScriptedRig(answer), seeker(), 10, criteria=LoopCriteria(optimum=-5.6))
     run = stop.value.partial
     assert (run.interrupted, run.dataset.sizes["cycle"]) == (True, 0)
     assert np.isnan(run.summary["final_cad"])
@@ -226,33 +229,33 @@ def test_errors_name_the_remedy_and_change_nothing() -> None:
     before = copy.deepcopy(own.state)
     rig = ScriptedRig(hill)
     with pytest.raises(ParameterError, match="cycles = 0: must be >= 1"):
-        run_on_rig(rig, own, 0)
-    with pytest.raises(ParameterError, match="2 entries: a rig takes one input"):
-        run_on_rig(rig, Spsa(start=[0.0, 1.0]), 5)
+        run_seeker(rig, own, 0)
+    with pytest.raises(ParameterError, match="2 entries: the plant takes 1, soc_cad"):
+        run_seeker(rig, Spsa(start=[0.0, 1.0]), 5)
     assert rig.applied == []
     assert own.state == before
     limited = ExtremumSeeking(start=-12.0, lower=-30.0, upper=10.0, limits=[Limit("p_max_bar", 95.0)])
-    with pytest.raises(ParameterError, match="'p_max_bar' is not measured by the rig: it measures no limited"):
-        run_on_rig(rig, limited, 5)
+    with pytest.raises(ParameterError, match=r"limits of the seeker \['p_max_bar'\] are not all measured by the plant"):
+        run_seeker(rig, limited, 5)
     split = ExtremumSeeking(start=-12.0, lower=-30.0, upper=10.0, components=[ComponentLag()] * 3)
-    with pytest.raises(ParameterError, match="components has 3 entries: the rig measures 1"):
-        run_on_rig(rig, split, 5)
+    with pytest.raises(ParameterError, match="components has 3 entries: the plant measures 1"):
+        run_seeker(rig, split, 5)
     assert limited.cycle == split.cycle == 0
     closed = SimulatedRig(EngineBench())
     closed.close()
     with pytest.raises(RigError, match="rig is closed"):
-        run_on_rig(closed, own, 5)
+        run_seeker(closed, own, 5)
     broken = ScriptedRig(lambda cycle, _: Measurement(components=(np.nan if cycle == 7 else 50.0,)))
     with pytest.raises(DataError):
-        run_on_rig(broken, own, 20)
+        run_seeker(broken, own, 20)
     assert own.cycle == 7
     assert own.history.sizes["cycle"] == 7
-    assert run_on_rig(ScriptedRig(hill), own, 300).summary["final_cad"] == pytest.approx(-5.6, abs=0.1)
+    assert run_seeker(ScriptedRig(hill), own, 300).summary["final_cad"] == pytest.approx(-5.6, abs=0.1)
 
 
 def test_summary_of_half_a_run() -> None:
-    run = run_seeker(EngineBench(seed=2), seeker(), 500, optimum_cad=-5.63)
-    part = summarize_cycles(run.dataset.isel(cycle=slice(0, 250)), optimum_cad=-5.63)
+    run = run_seeker(EngineBench(seed=2), seeker(), 500, criteria=LoopCriteria(optimum=-5.63))
+    part = summarize_cycles(run.dataset.isel(cycle=slice(0, 250)), LoopCriteria(optimum=-5.63))
     estimate = run.dataset["estimate_cad"].to_numpy()[:250]
     assert part["final_cad"] == pytest.approx(estimate[150:].mean())
     assert part["rms_cad"] == pytest.approx(np.sqrt(np.mean((estimate[125:] + 5.63) ** 2)))

@@ -8,7 +8,8 @@ import numpy as np
 import pytest
 
 from mgdd.errors import ParameterError, ShapeError
-from mgdd.loop import EngineBench, monte_carlo, run_seeker, steady_map, steady_optimum, summarize_cycles
+from mgdd.loop import EngineBench, LoopCriteria, find_steady_optimum, monte_carlo, run_seeker, steady_map
+from mgdd.loop.summary import summarize_cycles
 from mgdd.optimize import (
     BoundedSeeking,
     ComponentLag,
@@ -20,7 +21,7 @@ from mgdd.optimize import (
     Spsa,
     tune,
 )
-from mgdd.rig import SimulatedRig, run_on_rig
+from mgdd.rig import SimulatedRig
 
 SPACE = {"start": -12.0, "lower": -30.0, "upper": 10.0}
 
@@ -40,10 +41,10 @@ def test_golden_section_finds_its_width_again() -> None:
     from mgdd.engine import OperatingPoint
 
     bench = EngineBench(point=OperatingPoint(speed_rpm=2500.0, fuel_mg=30.0))
-    best = steady_optimum(bench)
+    best = find_steady_optimum(bench)
     seeker = GoldenSection(start=-20.0, lower=-30.0, upper=10.0, noise_sd=0.25)
-    table = monte_carlo(bench, seeker, range(200), cycles=2000, optimum_cad=best.soc_cad)
-    assert np.abs(table["final_cad"].values - best.soc_cad).max() < 1.5
+    table = monte_carlo(bench, seeker, range(200), cycles=2000, criteria=LoopCriteria(optimum=best["soc_cad"]))
+    assert np.abs(table["final_cad"].values - best["soc_cad"]).max() < 1.5
 
 
 def test_a_limit_without_a_slope_does_not_hold_the_start_for_ever() -> None:
@@ -82,18 +83,18 @@ def test_criteria_that_say_nothing_are_refused_before_the_rig_moves() -> None:
     bench = EngineBench(limits=["p_max_bar"])
     rig, seeker = SimulatedRig(bench), ExtremumSeeking(**SPACE, limits=[Limit("p_max_bar", 95.0)])
     with pytest.raises(ParameterError, match=r"exceed_above: \['p_max'\]"):
-        run_on_rig(rig, seeker, 5, exceed_above={"p_max": 80.0})
+        run_seeker(rig, seeker, 5, criteria=LoopCriteria(exceed_above={"p_max": 80.0}))
     with pytest.raises(ParameterError, match="not all measured by the rig"):
-        run_on_rig(SimulatedRig(other := EngineBench()), seeker, 5)
+        run_seeker(SimulatedRig(other := EngineBench()), seeker, 5)
     with pytest.raises(ParameterError, match="wrap a bench in SimulatedRig"):
-        run_on_rig(bench, seeker, 5)  # type: ignore[arg-type]
+        run_seeker(bench, seeker, 5)  # type: ignore[arg-type]
     assert bench.cycle == other.cycle == seeker.cycle == 0
-    run = run_on_rig(rig, seeker, 5, exceed_from=0, exceed_above={"p_max_bar": 80.0})
+    run = run_seeker(rig, seeker, 5, criteria=LoopCriteria(exceed_from=0, exceed_above={"p_max_bar": 80.0}))
     assert run.summary["exceeded_fraction"] == 1.0
     with pytest.raises(ParameterError, match="p_max_bar = nan"):
-        summarize_cycles(run.dataset, exceed_above={"p_max_bar": float("nan")})
+        summarize_cycles(run.dataset, LoopCriteria(exceed_above={"p_max_bar": float("nan")}))
     with pytest.raises(ParameterError, match="exceed_above holds NaN"):
-        run_seeker(bench, seeker, 5, exceed_above={"p_max_bar": float("nan")})
+        run_seeker(bench, seeker, 5, criteria=LoopCriteria(exceed_above={"p_max_bar": float("nan")}))
 
 
 @pytest.mark.parametrize(
@@ -105,12 +106,12 @@ def test_criteria_that_say_nothing_are_refused_before_the_rig_moves() -> None:
             "-100 °CA aTDC: must be in",
         ),
         (
-            lambda: run_seeker(EngineBench(), ExtremumSeeking(**SPACE), 5, tail_cycles=0),
+            lambda: run_seeker(EngineBench(), ExtremumSeeking(**SPACE), 5, criteria=LoopCriteria(tail_cycles=0)),
             ParameterError,
             "tail_cycles = 0",
         ),
         (
-            lambda: run_seeker(EngineBench(), ExtremumSeeking(**SPACE), 5, arrival_cad=-1.0),
+            lambda: run_seeker(EngineBench(), ExtremumSeeking(**SPACE), 5, criteria=LoopCriteria(arrival=-1.0)),
             ParameterError,
             "arrival_cad",
         ),
@@ -119,10 +120,10 @@ def test_criteria_that_say_nothing_are_refused_before_the_rig_moves() -> None:
             ParameterError,
             "whole numbers",
         ),
-        (lambda: steady_optimum(EngineBench(), {"p_max_bar": float("nan")}), ParameterError, "p_max_bar = nan"),
-        (lambda: steady_optimum(EngineBench(), {"p_max_bar": None}), ParameterError, "p_max_bar = None"),  # type: ignore[dict-item]
-        (lambda: steady_optimum(EngineBench(), {"misfire": 0.0}), ParameterError, "'misfire' is no indicator"),
-        (lambda: steady_optimum(EngineBench(), cycle=-1), ParameterError, "cycle = -1"),
+        (lambda: find_steady_optimum(EngineBench(), {"p_max_bar": float("nan")}), ParameterError, "p_max_bar = nan"),
+        (lambda: find_steady_optimum(EngineBench(), {"p_max_bar": None}), ParameterError, "p_max_bar = None"),  # type: ignore[dict-item]
+        (lambda: find_steady_optimum(EngineBench(), {"misfire": 0.0}), ParameterError, "'misfire' is not an indicator"),
+        (lambda: find_steady_optimum(EngineBench(), cycle=-1), ParameterError, "cycle = -1"),
         (lambda: steady_map(EngineBench(), [[1.0, 2.0]]), ShapeError, "2 dimensions"),
         (lambda: ExtremumSeeking(start=[]), ShapeError, "start is empty"),
         (lambda: ExtremumSeeking(start=[0.0, 1.0]), ShapeError, "harmonics has 1 entry: 2 inputs need one each"),

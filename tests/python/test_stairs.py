@@ -1,18 +1,21 @@
-"""The one-way stairs: a file includes or imports only what stands on a lower stair than its own room."""
+"""The one-way stairs: a file includes or imports only what stands on a lower stair than its own room; no circles."""
 
 from __future__ import annotations
 
 import ast
 import re
+from graphlib import CycleError, TopologicalSorter
 from pathlib import Path
 
 import pytest
 
-CPP = "common > optimize > control > engine throttle > identify > guide > loop"
+CPP = "common > math > dynamics > optimize > control > engine throttle > identify > guide > loop"
 PYTHON = (
-    "errors > _arguments > _core > results presets > io plot > optimize > control > engine throttle > identify > guide"
-    " > loop sweep design datasets > maps > rig > studies > report > cli > __main__"
+    "errors > _arguments > _core > results > signals > io plot > presets > optimize > control > engine throttle"
+    " > identify > surrogate > guide > loop sweep design datasets > maps > rig > studies > report > cli > __main__"
 )
+
+STRANGERS = [("identify/engine", "identify/throttle")]  # parts of one room that do not know each other
 
 
 def levels(stairs: str) -> dict[str, int]:
@@ -80,6 +83,86 @@ def test_pybind11_stays_in_the_bindings(root: Path) -> None:
     files = [path for path, text in sources.items() if include.search(text)]
     assert files, "no binding found"
     assert [str(path) for path in files if path.relative_to(root).parts[1] != "bindings"] == []
+
+
+def include_graph(root: Path) -> dict[str, set[str]]:
+    """Which header includes which, by path below the include folder."""
+    include, base = re.compile(r'^\s*#\s*include\s*[<"]mgdd/(.+\.hpp)[>"]', re.MULTILINE), root / "cpp/include/mgdd"
+    return {
+        str(path.relative_to(base)): set(include.findall(path.read_text(encoding="utf-8")))
+        for path in sorted(base.rglob("*.hpp"))
+    }
+
+
+def import_graph(root: Path) -> dict[str, set[str]]:
+    """Which module imports which, inside functions too; what only type checkers read is left out."""
+    package = root / "python" / "mgdd"
+    paths = {
+        ".".join(["mgdd", *path.relative_to(package).with_suffix("").parts]).removesuffix(".__init__"): path
+        for path in sorted(package.rglob("*.py"))
+    }
+    return {module: run_time_imports(path, set(paths)) - {"mgdd"} for module, path in paths.items() if module != "mgdd"}
+
+
+def run_time_imports(path: Path, modules: set[str]) -> set[str]:
+    found, nodes = set(), list(ast.parse(path.read_text(encoding="utf-8")).body)
+    while nodes:
+        node = nodes.pop()
+        if isinstance(node, ast.If) and ast.unparse(node.test) == "TYPE_CHECKING":
+            nodes += node.orelse
+        elif isinstance(node, ast.Import):
+            found |= {alias.name for alias in node.names} & modules
+        elif isinstance(node, ast.ImportFrom):
+            names = [f"{node.module}.{alias.name}" for alias in node.names]
+            found |= {name if name in modules else str(node.module) for name in names} & modules
+        else:
+            nodes += list(ast.iter_child_nodes(node))
+    return found
+
+
+def circle(graph: dict[str, set[str]]) -> list[str]:
+    try:
+        TopologicalSorter(graph).prepare()
+    except CycleError as error:
+        return list(error.args[1])
+    return []
+
+
+def test_no_header_includes_itself_by_a_detour(root: Path) -> None:
+    graph = include_graph(root)
+    assert sum(map(len, graph.values())) > 100
+    assert circle(graph) == []
+
+
+def test_no_module_imports_itself_by_a_detour(root: Path) -> None:
+    graph = import_graph(root)
+    assert sum(map(len, graph.values())) > 200
+    assert circle(graph) == []
+
+
+@pytest.mark.parametrize(("one", "other"), STRANGERS)
+def test_parts_of_a_room_that_do_not_know_each_other(root: Path, one: str, other: str) -> None:
+    for own, foreign in ((one, other), (other, one)):
+        cpp = [p for base in ("cpp/include/mgdd", "cpp/src") for p in sorted((root / base / own).rglob("*.?pp"))]
+        python = sorted((root / "python/mgdd" / own).rglob("*.py"))
+        assert cpp
+        assert python
+        word = re.compile(f"mgdd/{foreign}/|mgdd\\.{foreign.replace('/', '[.]')}\\b")
+        assert [str(path) for path in cpp + python if word.search(path.read_text(encoding="utf-8"))] == []
+
+
+def test_a_circle_is_found(tmp_path: Path) -> None:
+    write(tmp_path, "cpp/include/mgdd/engine/a.hpp", '#include "mgdd/engine/b.hpp"\n')
+    write(tmp_path, "cpp/include/mgdd/engine/b.hpp", "#include <mgdd/engine/c.hpp>\n")
+    write(tmp_path, "cpp/include/mgdd/engine/c.hpp", '#include "mgdd/engine/a.hpp"\n')
+    assert set(circle(include_graph(tmp_path))) == {"engine/a.hpp", "engine/b.hpp", "engine/c.hpp"}
+    write(tmp_path, "python/mgdd/__init__.py", "")
+    write(tmp_path, "python/mgdd/io/__init__.py", "from mgdd.io.a import x\n")
+    write(tmp_path, "python/mgdd/io/a.py", "def x():\n    from mgdd.io import b\n")
+    write(tmp_path, "python/mgdd/io/b.py", "if TYPE_CHECKING:\n    from mgdd.io.a import x\n")
+    assert circle(import_graph(tmp_path)) == []
+    write(tmp_path, "python/mgdd/io/b.py", "import mgdd.io.a\n")
+    assert set(circle(import_graph(tmp_path))) == {"mgdd.io.a", "mgdd.io.b"}
 
 
 def write(root: Path, file: str, text: str) -> None:

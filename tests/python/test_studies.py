@@ -2,9 +2,11 @@
 
 from __future__ import annotations
 
+import html
 import json
 import re
 from pathlib import Path
+from typing import Any
 
 import pytest
 
@@ -74,3 +76,79 @@ def test_page_is_self_contained(result: StudyResult, tmp_path: Path) -> None:
     summary = json.loads((tmp_path / "report" / "summary.json").read_text(encoding="utf-8"))
     assert summary == json.loads(json.dumps(result.summary))
     assert len(summary["traces"]) == 4
+
+
+def columns(page: str, heading: str) -> dict[str, list[str]]:
+    """Return the first table below a heading of the page, column by column."""
+    table = page.split(f"<h2>{heading}")[1].split("<table>")[1].split("</table>")[0]
+    cells = [re.findall(r"<t[hd][^>]*>(.*?)</t[hd]>", row) for row in re.findall(r"<tr>(.*?)</tr>", table, re.DOTALL)]
+    head = [html.unescape(cell) for cell in cells[0]]
+    assert len(set(head)) == len(head)
+    return {name: [row[i] for row in cells[1:]] for i, name in enumerate(head)}
+
+
+def span(pair: list[float], digits: int) -> str:
+    low, high = (f"{value:.{digits}f}" for value in pair)
+    return low if low == high else f"{low} to {high}"
+
+
+def test_every_column_of_the_page_holds_what_its_head_says(result: StudyResult, tmp_path: Path) -> None:
+    page = write_report(result, tmp_path / "report").read_text(encoding="utf-8")
+    summary: Any = result.summary
+    best = summary["best_timing"]
+    timing = columns(page, "Best timing")
+    assert timing["trace"] == [row["file"] for row in best]
+    for head, name, digits in (
+        ("SOC as fitted [°CA aTDC]", "fitted_soc_cad", 1),
+        ("best SOC, own p_max kept [°CA aTDC]", "soc_cad", 1),
+        ("gain [%]", "gain_percent", 2),
+        ("best SOC, no limit [°CA aTDC]", "free_soc_cad", 1),
+        ("CA50, no limit [°CA aTDC]", "free_ca50_cad", 1),
+        ("gain, no limit [%]", "free_gain_percent", 2),
+    ):
+        assert timing[head] == [span(row[name], digits) for row in best], head
+    assert timing["p_max limit [bar]"] == [f"{row['p_max_limit_bar']:.1f}" for row in best]
+    assert len(timing) == 8
+    assert timing["gain [%]"] != timing["gain, no limit [%]"], "the limit costs something"
+
+    laws, law = columns(page, "Every burn law"), summary["laws"]
+    assert laws["law"][::4] == [row["law"] for row in law]
+    assert laws["RMSE [% of p_max]"] == [f"{value:.2f}" for row in law for value in row["rmse_percent"]]
+    for head, name, form in (
+        ("closed IMEP error [%]", "imep_closed_error_percent", "+.1f"),
+        ("SOC [°CA aTDC]", "soc_cad", ".1f"),
+        ("SOC minus SOI [°CA]", "onset_against_soi_cad", "+.1f"),
+        ("largest error [bar]", "largest_error_bar", "+.1f"),
+        ("at [°CA aTDC]", "largest_error_cad", ".0f"),
+    ):
+        assert laws[head] == [format(value, form) for row in law for value in row[name]], head
+
+    traces = summary["traces"]
+    burn = columns(page, "Calibrated burn")
+    for head, name, form in (
+        ("SOC [°CA aTDC]", "soc_cad", ".2f"),
+        ("duration [°CA]", "burn_duration_cad", ".1f"),
+        ("fuel heat [J]", "fuel_heat_j", ".0f"),
+        ("CA50 [°CA aTDC]", "ca50_cad", ".1f"),
+        ("RMSE [bar]", "rmse_bar", ".2f"),
+        ("wall heat over fuel heat [-]", "heat_loss_fraction", ".3f"),
+    ):
+        assert burn[head] == [format(row["calibrated"][name], form) for row in traces], head
+    analysis = columns(page, "Analysis")
+    for head, name, form in (
+        ("p_max [bar]", "p_max_bar", ".1f"),
+        ("at [°CA aTDC]", "p_max_cad", ".1f"),
+        ("closed IMEP [bar]", "imep_closed_bar", ".2f"),
+        ("CA10", "ca10_cad", ".1f"),
+        ("CA50", "ca50_cad", ".1f"),
+        ("CA90 [°CA aTDC]", "ca90_cad", ".1f"),
+        ("net heat [J]", "heat_net_j", ".0f"),
+        ("n_c", "n_compression", ".3f"),
+        ("n_e", "n_expansion", ".3f"),
+    ):
+        assert analysis[head] == [format(row["analysis"][name], form) for row in traces], head
+    wall = columns(page, "Wall heat")
+    profiles = summary["common"]["wall_heat_scale"]
+    assert wall["law"] == list(profiles)
+    assert wall["scale [-]"] == [f"{p['value']:.2f}" for p in profiles.values()]
+    assert wall["possible range [-]"] == [span((p["range_low"], p["range_high"]), 2) for p in profiles.values()]

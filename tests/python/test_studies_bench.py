@@ -5,28 +5,29 @@ from __future__ import annotations
 import itertools
 import json
 import math
+from collections.abc import Callable
 
 import numpy as np
 import pytest
 
-from mgdd.loop import EngineBench, steady_optimum
+from mgdd.loop import EngineBench, find_steady_optimum
 from mgdd.results import check_labels
-from mgdd.studies import StudyResult, available_studies, run_ch3_optimizers, run_ch4_sensors, run_ch4_tests, run_study
+from mgdd.studies import StudyResult, available_studies, run_study
 
 
 @pytest.fixture(scope="module")
-def seekers() -> StudyResult:
-    return run_ch3_optimizers(quick=True)
+def seekers(quick_study: Callable[..., StudyResult]) -> StudyResult:
+    return quick_study("seeker-comparison")
 
 
 @pytest.fixture(scope="module")
-def sensors() -> StudyResult:
-    return run_ch4_sensors(quick=True)
+def sensors(quick_study: Callable[..., StudyResult]) -> StudyResult:
+    return quick_study("nox-sensors")
 
 
 @pytest.fixture(scope="module")
-def four_tests() -> StudyResult:
-    return run_ch4_tests(quick=True)
+def four_tests(quick_study: Callable[..., StudyResult]) -> StudyResult:
+    return quick_study("timing-tests")
 
 
 @pytest.mark.parametrize("name", ["seekers", "sensors", "four_tests"])
@@ -48,7 +49,7 @@ def test_summary_dataset_and_figures(name: str, request: pytest.FixtureRequest) 
 
 
 def test_without_figures_and_with_seeds() -> None:
-    result = run_study("ch4-sensors", seeds=1, figures=False)
+    result = run_study("nox-sensors", seeds=1, figures=False)
     assert result.figures == {}
     assert result.summary["seeds"] == 1
     assert result.summary["rows"][0]["steady_error_percent_low"] is None  # one seed says nothing of its spread
@@ -59,7 +60,7 @@ def test_every_form_of_every_seeker_competes_and_arrives(seekers: StudyResult) -
     rows = {row["seeker"]: row for row in seekers.summary["rows"]}
     assert len(rows) == 13
     assert all(row["share_arrived"] == 1.0 for row in rows.values())
-    best = steady_optimum(EngineBench()).soc_cad
+    best = find_steady_optimum(EngineBench())["soc_cad"]
     assert seekers.summary["optimum_cad"] == pytest.approx(best)
     for row in rows.values():
         assert row["final_cad"] == pytest.approx(best, abs=1.0), row["seeker"]

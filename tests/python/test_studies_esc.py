@@ -4,20 +4,22 @@ from __future__ import annotations
 
 import json
 import math
+from collections.abc import Callable
 
 import numpy as np
 import pytest
 
 from mgdd.errors import Interrupted, ParameterError
 from mgdd.results import check_labels
-from mgdd.studies import StudyResult, run_ch4_esc, run_study
+from mgdd.studies import StudyResult, run_study
+from mgdd.studies.sensor_delay import run_sensor_delay
 
 KEYS = ["case", "period_cycles", "phase_deg", "step_sign", "cycles_stays", "final_cad"]
 
 
 @pytest.fixture(scope="module")
-def result() -> StudyResult:
-    return run_ch4_esc(seeds=4, quick=True)
+def result(quick_study: Callable[..., StudyResult]) -> StudyResult:
+    return quick_study("sensor-delay", seeds=4)
 
 
 def test_seven_rows_in_order(result: StudyResult) -> None:
@@ -85,7 +87,7 @@ def test_ctrl_c_keeps_what_is_finished() -> None:
             raise KeyboardInterrupt
 
     with pytest.raises(Interrupted, match="2 finished rows") as stop:
-        run_ch4_esc(seeds=2, figures=True, progress=stop_at_the_third)
+        run_sensor_delay(seeds=2, figures=True, progress=stop_at_the_third)
     result = stop.value.partial
     assert result.summary["interrupted"] is True
     assert len(result.summary["rows"]) == 2
@@ -96,13 +98,13 @@ def test_ctrl_c_keeps_what_is_finished() -> None:
         raise KeyboardInterrupt
 
     with pytest.raises(KeyboardInterrupt):
-        run_ch4_esc(progress=stop_at_once)
+        run_sensor_delay(progress=stop_at_once)
 
 
 def test_bad_requests_are_named() -> None:
-    with pytest.raises(ParameterError, match=r"study 'nothing': must be one of .*ch4-esc"):
+    with pytest.raises(ParameterError, match=r"study 'nothing': must be one of .*sensor-delay"):
         run_study("nothing")
     with pytest.raises(ParameterError, match="seeds = 0: must be >= 1"):
-        run_study("ch4-esc", seeds=0)
+        run_study("sensor-delay", seeds=0)
     with pytest.raises(ParameterError, match="'measured-traces' has no chance in it"):
         run_study("measured-traces", seeds=3)

@@ -5,12 +5,11 @@ from __future__ import annotations
 import pytest
 
 from mgdd.results import check_labels
-from mgdd.studies import run_ch2_throttle_characteristics, run_ch7_first_principle
 
 
 @pytest.fixture(scope="module")
-def habits():
-    return run_ch2_throttle_characteristics(quick=True)
+def habits(quick_study):
+    return quick_study("throttle-characteristics")
 
 
 def values(result, effect):
@@ -46,8 +45,8 @@ def test_result_is_labelled_and_drawn(habits):
     assert habits.summary["seeds"] == 0
 
 
-def test_groups_are_found_also_where_the_plant_does_more():
-    result = run_ch7_first_principle(seeds=1, quick=True)
+def test_groups_are_found_also_where_the_plant_does_more(quick_study):
+    result = quick_study("throttle-first-principle", seeds=1)
     check_labels(result.dataset)
     assert len(result.figures) == 3
     errors = {(row["case"], row["group"]): abs(row["error_percent"]) for row in result.summary["rows"]}

@@ -9,8 +9,8 @@ import pytest
 
 from mgdd import datasets
 from mgdd.errors import ConvergenceError, DataError, ParameterError
-from mgdd.identify import SurrogateEngine, fit_surrogate, random_step_records
 from mgdd.results import check_labels
+from mgdd.surrogate import SurrogateEngine, fit_surrogate, random_step_records
 
 INPUTS = ("soi_cad", "doi_main_ms", "doi_h2_ms", "p2m_us")
 AT = {"doi_main_ms": 0.42, "doi_h2_ms": 2.9, "p2m_us": 1200.0}
@@ -162,51 +162,51 @@ def test_leverage_of_the_records_sums_to_the_number_of_terms(known):
 
 def test_the_optimum_stays_out_of_the_corners_of_the_box(known):
     corner = {"doi_main_ms": 0.49, "doi_h2_ms": 3.9, "p2m_us": 1350.0}
-    best = known.optimum({"nox_ppm": -1.0}, at=corner)
-    assert best.at_edge
-    assert best.soi_cad < known.support.upper[0] - 0.1
-    assert known.predict(best.soi_cad - 1e-6, corner)["supported"]
-    assert not known.predict(best.soi_cad + 1e-6, corner)["supported"]
+    best = known.find_optimum({"nox_ppm": -1.0}, at=corner)
+    assert best.at_bound
+    assert best["soi_cad"] < known.support.upper[0] - 0.1
+    assert known.predict(best["soi_cad"] - 1e-6, corner)["supported"]
+    assert not known.predict(best["soi_cad"] + 1e-6, corner)["supported"]
 
 
 def test_optimum_is_that_of_the_law(exact):
-    best = exact.optimum("imep_bar")
-    assert best.soi_cad == pytest.approx(-4.0, abs=1e-6)
-    assert not best.at_edge
+    best = exact.find_optimum("imep_bar")
+    assert best["soi_cad"] == pytest.approx(-4.0, abs=1e-6)
+    assert not best.at_bound
     assert best.active_limits == ()
-    held = exact.optimum("imep_bar", {"mprr": 4.9}, {"doi_main_ms": 0.37, "p2m_us": 1000.0})
-    assert held.soi_cad == pytest.approx(-2.0, abs=1e-6)
+    held = exact.find_optimum("imep_bar", {"mprr": 4.9}, {"doi_main_ms": 0.37, "p2m_us": 1000.0})
+    assert held["soi_cad"] == pytest.approx(-2.0, abs=1e-6)
     assert held.active_limits == ("mprr",)
-    assert held.prediction["mprr"] == pytest.approx(4.9)
+    assert held.values["mprr"] == pytest.approx(4.9)
 
 
 def test_weighted_objective_has_its_closed_form(known):
     weight = 0.002
-    soi = np.linspace(*known.optimum().range_cad, 20001)
+    soi = np.linspace(*known.find_optimum().bounds["soi_cad"], 20001)
     table = known.predict(soi)
     goal = (table["imep_bar"] - weight * table["nox_ppm"]).to_numpy()
-    best = known.optimum({"imep_bar": 1.0, "nox_ppm": -weight})
-    assert best.soi_cad == pytest.approx(soi[goal.argmax()], abs=2e-3)
+    best = known.find_optimum({"imep_bar": 1.0, "nox_ppm": -weight})
+    assert best["soi_cad"] == pytest.approx(soi[goal.argmax()], abs=2e-3)
     assert best.value == pytest.approx(goal.max(), abs=1e-6)
 
 
 def test_an_optimum_at_the_edge_says_so(known):
-    late = known.optimum({"nox_ppm": -1.0})
-    assert late.at_edge
-    assert late.soi_cad == pytest.approx(late.range_cad[1])
-    early = known.optimum("nox_ppm")
-    assert early.at_edge
-    assert early.soi_cad == pytest.approx(early.range_cad[0])
-    for end in early.range_cad:
+    late = known.find_optimum({"nox_ppm": -1.0})
+    assert late.at_bound
+    assert late["soi_cad"] == pytest.approx(late.bounds["soi_cad"][1])
+    early = known.find_optimum("nox_ppm")
+    assert early.at_bound
+    assert early["soi_cad"] == pytest.approx(early.bounds["soi_cad"][0])
+    for end in early.bounds["soi_cad"]:
         assert known.predict(end + 1e-6 * np.sign(1.0 - end))["supported"]
         assert not known.predict(end - 1e-6 * np.sign(1.0 - end))["supported"]
 
 
 def test_limits_that_cannot_be_met(known):
     with pytest.raises(ConvergenceError, match=r"no supported soi_cad in .* each alone: mprr >= .* \(limit 1\)"):
-        known.optimum("imep_bar", {"mprr": 1.0})
+        known.find_optimum("imep_bar", {"mprr": 1.0})
     with pytest.raises(ConvergenceError, match="is supported: change the other inputs"):
-        known.optimum("imep_bar", at={"doi_h2_ms": 0.5})
+        known.find_optimum("imep_bar", at={"doi_h2_ms": 0.5})
 
 
 # --- refusals -----------------------------------------------------------------------------------------------
@@ -229,7 +229,7 @@ def test_wrong_records_are_refused():
     records = random_step_records(600)
     with pytest.raises(DataError, match="records have no mprr"):
         fit_surrogate(records.drop_vars("mprr"))
-    with pytest.raises(DataError, match="cycle must count up by one"):
+    with pytest.raises(DataError, match="cycle 301 follows 299: must count up by one"):
         fit_surrogate(records.isel(cycle=[*range(300), *range(301, 600)]))
     flat = records.assign(p2m_us=("cycle", np.full(600, 1000.0)))
     with pytest.raises(DataError, match="p2m_us does not vary"):
@@ -245,9 +245,9 @@ def test_wrong_records_are_refused():
         (lambda s: s.predict(0.0, {"p2m_us": np.nan}), "p2m_us = nan: must be finite"),
         (lambda s: s.predict(np.nan), "soi_cad: must be"),
         (lambda s: s.predict(0.0, outside="clip"), "outside = 'clip'"),
-        (lambda s: s.optimum("soot"), "objective: 'soot' is no signal"),
-        (lambda s: s.optimum("imep_bar", {"mprr": np.inf}), "limits: mprr = inf"),
-        (lambda s: s.optimum({}), "must name at least one signal"),
+        (lambda s: s.find_optimum("soot"), "objective: 'soot' is not a signal"),
+        (lambda s: s.find_optimum("imep_bar", {"mprr": np.inf}), "limits: mprr = inf"),
+        (lambda s: s.find_optimum({}), "must name at least one signal"),
         (lambda s: SurrogateEngine(s, block_cycles=0), "block_cycles = 0: must be >= 1"),
         (lambda s: SurrogateEngine(s, outside="no"), "outside = 'no'"),
     ],
@@ -365,7 +365,7 @@ def test_another_export_is_refused(monkeypatch, tmp_path):
         datasets.load_h2df_cycles()
     assert datasets.load_h2df_cycles(checked=False).sizes["cycle"] == 399
     own.write_text("\n".join([*rows[:50], *rows[51:]]) + "\n")
-    with pytest.raises(DataError, match="cycle 52 follows 50: cycles must count up by one"):
+    with pytest.raises(DataError, match="cycle 52 follows 50: must count up by one"):
         datasets.load_h2df_cycles(checked=False)
     monkeypatch.setenv("MGDD_DATA_DIR", str(tmp_path / "nowhere"))
     with pytest.raises(FileNotFoundError, match="set MGDD_DATA_DIR"):
@@ -405,15 +405,15 @@ def test_optima_of_the_measured_engine(measured):
     late, early = measured.predict([10.0, -6.0])["imep_bar"].to_numpy()
     assert (late, early) == pytest.approx((6.53, 7.30), abs=0.01)
     assert measured.predict([10.0, -7.0, -6.0])["supported"].values.tolist() == [False, False, True]
-    best = measured.optimum("imep_bar")
-    assert best.soi_cad == pytest.approx(-5.9, abs=0.1)
-    assert best.prediction["mfb50_cad"] == pytest.approx(5.0, abs=0.3)
-    assert best.soi_cad - best.range_cad[0] < 1.1
-    held = measured.optimum("imep_bar", {"mprr": 5.0})
-    assert held.soi_cad == pytest.approx(-2.2, abs=0.1)
+    best = measured.find_optimum("imep_bar")
+    assert best["soi_cad"] == pytest.approx(-5.9, abs=0.1)
+    assert best.values["mfb50_cad"] == pytest.approx(5.0, abs=0.3)
+    assert best["soi_cad"] - best.bounds["soi_cad"][0] < 1.1
+    held = measured.find_optimum("imep_bar", {"mprr": 5.0})
+    assert held["soi_cad"] == pytest.approx(-2.2, abs=0.1)
     assert held.active_limits == ("mprr",)
     for weight in (0.0005, 0.001, 0.002):
-        assert not measured.optimum({"imep_bar": 1.0, "nox_ppm": -weight}).at_edge
+        assert not measured.find_optimum({"imep_bar": 1.0, "nox_ppm": -weight}).at_bound
 
 
 def test_nox_without_hydrogen_is_refused_not_negative(measured):

@@ -9,7 +9,7 @@ import numpy as np
 import pytest
 
 from mgdd.errors import ParameterError
-from mgdd.identify import amplitude_random_steps
+from mgdd.signals import amplitude_random_steps
 from mgdd.throttle import PseudoWiener, Throttle, initial_state, simulate, to_iosystem
 
 
@@ -42,7 +42,7 @@ def test_pseudo_wiener_models_respond_as_they_simulate(kind: str, delay: int) ->
     model = PseudoWiener(kind, {"delay_samples": float(delay), "sample_s": 2e-3, **own})
     signal = amplitude_random_steps(0.6, offset=0.1, amplitude=0.4, hold_s=0.05, step_s=2e-3)
     time, duty = signal["time_s"].to_numpy(), signal["duty"].to_numpy()
-    ours = model.simulate(time, duty, start_deg=20.0)
+    ours = model.simulate(signal, initial_state={"angle_deg": 20.0})["angle_deg"].to_numpy()
     start = initial_state(model, 20.0)
     response = control.input_output_response(to_iosystem(model, sample_s=2e-3), time, duty, start)
     assert np.ptp(ours) > 5.0

@@ -6,8 +6,8 @@
 #include <vector>
 
 #include "mgdd/common/bounds.hpp"
+#include "mgdd/common/enum_names.hpp"
 #include "mgdd/common/error.hpp"
-#include "mgdd/common/names.hpp"
 #include "mgdd/common/text.hpp"
 
 namespace mgdd::engine {

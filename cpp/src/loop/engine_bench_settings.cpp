@@ -5,8 +5,8 @@
 #include <utility>
 
 #include "mgdd/common/bounds.hpp"
+#include "mgdd/common/enum_names.hpp"
 #include "mgdd/common/error.hpp"
-#include "mgdd/common/names.hpp"
 #include "mgdd/common/text.hpp"
 #include "mgdd/engine/burn.hpp"
 #include "mgdd/loop/engine_bench.hpp"

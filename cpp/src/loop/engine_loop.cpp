@@ -7,6 +7,11 @@
 #include "mgdd/common/bounds.hpp"
 
 namespace mgdd::loop {
+namespace {
+
+constexpr std::int64_t longest_settling = 1000;  // cycles that do not count for the limits unless the caller says so
+
+}  // namespace
 
 void require_match(const EngineBench& bench, const optimize::Inputs& estimate, std::size_t components,
                    const std::vector<optimize::Limit>& limits) {
@@ -36,17 +41,25 @@ void require_match(const EngineBench& bench, const optimize::Inputs& estimate, s
                        " differ: name the same ones in the same order");
 }
 
-void validate(const LoopCriteria& c) {
+std::int64_t counted_from(const LoopCriteria& criteria, std::int64_t cycles) noexcept {
+  return criteria.exceed_from.value_or(std::min(longest_settling, cycles / 2));
+}
+
+void validate(const LoopCriteria& c, std::int64_t cycles) {
   require_positive("arrival_cad", c.arrival_cad);
-  if (c.tail_cycles < 1) throw ParameterError("tail_cycles = " + std::to_string(c.tail_cycles) + ": must be >= 1");
-  if (c.exceed_from < 0) throw ParameterError("exceed_from = " + std::to_string(c.exceed_from) + ": must be >= 0");
+  if (c.tail_cycles < 1) throw ParameterError("tail_cycles", c.tail_cycles, "must be >= 1");
+  if (c.exceed_from && *c.exceed_from < 0) throw ParameterError("exceed_from", *c.exceed_from, "must be >= 0");
+  if (c.exceed_from && *c.exceed_from >= cycles && !c.exceed_above.empty()) {
+    throw ParameterError("exceed_from", *c.exceed_from,
+                         "must be < cycles = " + std::to_string(cycles) + ", or no cycle counts");
+  }
   for (const double value : c.exceed_above) {
     if (std::isnan(value)) throw ParameterError("exceed_above holds NaN: give a number, or leave the limit out");
   }
 }
 
 LoopStatistics::LoopStatistics(LoopCriteria criteria, std::int64_t cycles)
-    : criteria_(std::move(criteria)), planned_(cycles) {}
+    : criteria_(std::move(criteria)), planned_(cycles), counted_from_(loop::counted_from(criteria_, cycles)) {}
 
 void LoopStatistics::add(const LoopCycle& cycle) noexcept {
   const std::int64_t k = seen_++;
@@ -71,7 +84,7 @@ void LoopStatistics::add(const LoopCycle& cycle) noexcept {
       nox_.add(b.nox_true_ppm);
     }
   }
-  if (k >= criteria_.exceed_from && !criteria_.exceed_above.empty()) {
+  if (k >= counted_from_ && !criteria_.exceed_above.empty()) {
     ++counted_;
     bool over = false;
     for (std::size_t i = 0; i < std::min(b.limit_count, criteria_.exceed_above.size()); ++i)

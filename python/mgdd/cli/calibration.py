@@ -6,11 +6,13 @@ import argparse
 from typing import Any
 
 from mgdd.cli.options import engine_of, traces_of
-from mgdd.cli.output import check_output, emit, progress
+from mgdd.cli.output import check_output, emit
 from mgdd.errors import ConvergenceError
-from mgdd.identify import CylinderFit, WallHeatProfile, fit_cylinder, wall_heat_profile
+from mgdd.identify import compare_laws, fit_cylinder, wall_heat_profile
+from mgdd.identify.engine.profile import WallHeatProfile
+from mgdd.identify.engine.records import CylinderFit, figures_of
 from mgdd.report import write_report
-from mgdd.studies import compare_laws, run_measured_traces
+from mgdd.studies import run_measured_traces
 from mgdd.studies.measured_summary import law_row
 
 __all__ = ["calibrate"]
@@ -28,16 +30,16 @@ def calibrate(args: argparse.Namespace) -> None:
     traces = traces_of(args)
     free = [name.strip() for name in args.free.split(",")] if args.free else None
     scheme: dict[str, Any] = {"step_cad": args.step_cad, "integrator": args.integrator}
-    with progress(args, expected=25 + (45 if args.report_folder else 0)) as step:
-        step("calibrate")
-        fit = fit_cylinder(traces, cylinder, free=free, point=point, **scheme)
-        profile = None
-        if "wall_heat_scale" in fit.report.names and len(fit.report.names) > 1:
-            profile = wall_heat_profile(traces, fit, point=point, progress=step, **scheme)
-        laws = compare_laws(traces, cylinder, point=point, progress=step, **scheme)
-        if args.report_folder:
-            result = run_measured_traces(traces, cylinder, point=point, progress=step, **scheme)
-            write_report(result, args.report_folder)
+    step = args.progress.expect(25 + (45 if args.report_folder else 0))
+    step("calibrate")
+    fit = fit_cylinder(traces, cylinder, free=free, point=point, **scheme)
+    profile = None
+    if "wall_heat_scale" in fit.report.names and len(fit.report.names) > 1:
+        profile = wall_heat_profile(traces, fit, point=point, progress=step, **scheme)
+    laws = compare_laws(traces, cylinder, point=point, progress=step, **scheme)
+    if args.report_folder:
+        result = run_measured_traces(traces, cylinder, point=point, progress=step, **scheme)
+        write_report(result, args.report_folder)
     payload = {"preset": preset.name, **_payload(fit, profile, laws)}
     emit(args, payload, text=payload["report"])
     if not fit.report.success:
@@ -48,14 +50,14 @@ def _payload(fit: CylinderFit, profile: WallHeatProfile | None, laws: list[Cylin
     traces = []
     with_soi = any(load.soi_cad == load.soi_cad for load in fit.loads)
     for load in fit.loads:
-        values = load.to_dict()
+        values = figures_of(load)
         row = {name: values[name] for name in _PER_TRACE}
         if with_soi:
             row |= {"soi_cad": load.soi_cad, "onset_against_soi_cad": load.onset_against_soi_cad}
         shape = load.cylinder.to_dict()
-        row |= {name: shape[name] for name in fit.cylinder.fields() if _was_fitted(fit, name)}
+        row |= {name: shape[name] for name in fit.model.fields() if _was_fitted(fit, name)}
         traces.append(row)
-    scale: dict[str, Any] = {"value": fit.cylinder.wall_heat_scale, "stderr": None, "identifiable": None}
+    scale: dict[str, Any] = {"value": fit.model.wall_heat_scale, "stderr": None, "identifiable": None}
     unidentifiable = set(fit.report.unidentifiable)
     if profile is not None:
         scale = profile.to_dict()
@@ -71,14 +73,14 @@ def _payload(fit: CylinderFit, profile: WallHeatProfile | None, laws: list[Cylin
             }
     ordered = [name for name in fit.report.names if name in unidentifiable]
     return {
-        "law": fit.burn_law,
+        "law": fit.kind,
         "status": fit.report.status,
         "traces": traces,
         "common": common,
         "unidentifiable": ordered,
         "laws": [law_row(law) for law in laws],
-        "warnings": list(fit.warnings),
-        "cylinder": fit.cylinder.to_dict(),
+        "warnings": [str(finding) for finding in fit.findings],
+        "cylinder": fit.model.to_dict(),
         "report": _report(fit, profile, laws, ordered),
     }
 
@@ -90,7 +92,7 @@ def _was_fitted(fit: CylinderFit, name: str) -> bool:
 def _report(
     fit: CylinderFit, profile: WallHeatProfile | None, laws: list[CylinderFit], unidentifiable: list[str]
 ) -> str:
-    out = [f"Calibration with {fit.burn_law}: {fit.report.message}", ""]
+    out = [f"Calibration with {fit.kind}: {fit.report.message}", ""]
     out += _loads(fit)
     for name, value, error in zip(fit.report.names, fit.report.values, fit.report.stderr, strict=True):
         if "[" not in name and name != "wall_heat_scale":
@@ -105,12 +107,12 @@ def _report(
         ]
     if unidentifiable:
         out += ["", f"not identifiable: {', '.join(unidentifiable)}"]
-    if fit.warnings:
-        out += ["", "what to distrust:", *(f"  - {text}" for text in fit.warnings)]
+    if fit.findings:
+        out += ["", "what to distrust:", *(f"  - {text}" for text in fit.findings)]
     out += ["", "every burn law on the same traces:"]
     for law in laws:
-        out += ["", f"{law.burn_law}  (wall-heat scale {law.cylinder.wall_heat_scale:.2f})", *_loads(law)]
-        out += [f"  - {text}" for text in law.warnings]
+        out += ["", f"{law.kind}  (wall-heat scale {law.model.wall_heat_scale:.2f})", *_loads(law)]
+        out += [f"  - {text}" for text in law.findings]
     return "\n".join(out)
 
 

@@ -7,9 +7,10 @@ from pathlib import Path
 from typing import Any
 
 from mgdd.cli.options import add_command
-from mgdd.cli.output import check_output, emit, progress
+from mgdd.cli.output import check_output, emit
 from mgdd.report import write_report
 from mgdd.studies import run_measured_traces
+from mgdd.studies.sections import Table
 
 __all__ = ["add"]
 
@@ -29,36 +30,34 @@ def add(commands: Any) -> None:
 def run(args: argparse.Namespace) -> None:
     """Run the study and write the report."""
     check_output(args, csv=False)
-    with progress(args, expected=45) as step:
-        result = run_measured_traces(progress=step)
-        step("write the report")
-        page = write_report(result, Path(args.folder))
+    step = args.progress.expect(45)
+    result = run_measured_traces(progress=step)
+    step("write the report")
+    page = write_report(result, Path(args.folder))
     emit(args, result.summary, text=_text(result.summary, page))
 
 
-def _text(summary: Any, page: Path) -> str:
-    form = "{:20} {:>8} {:>7} {:>7} {:>9}  {:>24} {:>13}  {:>18} {:>13}"
-    own, free = "best SOC, own p_max kept", "best SOC, no limit"
-    out = [
-        f"{len(summary['traces'])} measured traces, calibrated with {summary['law']}.",
-        "",
-        form.format("trace", "p_max", "CA50", "RMSE", "IMEP err", own, "gain", free, "gain"),
-        form.format("", "[bar]", "[CAD]", "[%]", "[%]", "[°CA aTDC]", "[%]", "[°CA aTDC]", "[%]"),
-    ]
+def _text(summary: Any, page: Path) -> list[str | Table]:
+    columns = (
+        "trace", "p_max [bar]", "CA50 [CAD]", "RMSE [%]", "IMEP err [%]", "best SOC, own p_max kept [CAD]", "gain [%]",
+        "best SOC, no limit [CAD]", "gain [%]",
+    )  # fmt: skip
+    rows = []
     for row in summary["traces"]:
         best, fit = row["best_timing"], row["calibrated"]
-        out.append(
-            f"{row['file']:20} {row['analysis']['p_max_bar']:8.1f} {row['analysis']['ca50_cad']:7.1f} "
-            f"{fit['rmse_percent']:7.2f} {fit['imep_closed_error_percent']:+9.1f}  {_span(best['soc_cad'], 1):>24} "
-            f"{_span(best['gain_percent'], 2):>13}  {_span(best['free_soc_cad'], 1):>18} "
-            f"{_span(best['free_gain_percent'], 2):>13}"
-        )
-    out += [
-        "",
-        "Ranges: wall-heat scale 0.5 to 1, everything else refitted; these traces do not determine it.",
+        rows.append(
+            (
+                row["file"], f"{row['analysis']['p_max_bar']:.1f}", f"{row['analysis']['ca50_cad']:.1f}",
+                f"{fit['rmse_percent']:.2f}", f"{fit['imep_closed_error_percent']:+.1f}", _span(best["soc_cad"], 1),
+                _span(best["gain_percent"], 2), _span(best["free_soc_cad"], 1), _span(best["free_gain_percent"], 2),
+            )
+        )  # fmt: skip
+    return [
+        f"{len(summary['traces'])} measured traces, calibrated with {summary['law']}. Angles are °CA aTDC.\n",
+        Table(columns=columns, rows=tuple(rows)),
+        "\nRanges: wall-heat scale 0.5 to 1, everything else refitted; these traces do not determine it.",
         f"Read what to distrust in {page}",
     ]
-    return "\n".join(out)
 
 
 def _span(pair: list[float], digits: int) -> str:

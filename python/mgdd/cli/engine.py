@@ -18,11 +18,11 @@ from mgdd.cli.options import (
     number_pairs,
     traces_of,
 )
-from mgdd.cli.output import check_output, emit, lines, progress
+from mgdd.cli.output import check_output, emit, lines
 from mgdd.cli.seek import add_seek
-from mgdd.engine import analyze, optimum, simulate, start_of_combustion, start_of_injection, timing_sweep
+from mgdd.engine import analyze, find_optimum, simulate, start_of_combustion, start_of_injection, timing_sweep
 from mgdd.errors import ConvergenceError, ParameterError
-from mgdd.studies import best_timing
+from mgdd.identify import best_timing
 
 __all__ = ["add"]
 
@@ -155,7 +155,7 @@ def _analyze(args: argparse.Namespace) -> None:
         "method": result.attrs["method"],
         "gamma": named,
         "fractions": result.attrs["fractions"],
-        "warnings": list(result.attrs["warnings"]),
+        "warnings": result.attrs["warnings"].splitlines(),
     }
     emit(args, payload, traces=result)
 
@@ -223,7 +223,7 @@ def _optimum(args: argparse.Namespace) -> None:
         _optimum_of_files(args, cylinder, point, limits, preset.name)
         return
     scheme = {"step_cad": args.step_cad or 1.0, "integrator": args.integrator}
-    best = optimum(
+    best = find_optimum(
         cylinder,
         point,
         args.objective or "efficiency_gross",
@@ -231,12 +231,17 @@ def _optimum(args: argparse.Namespace) -> None:
         bounds_cad=_bounds(args),
         **scheme,
     )
-    now = simulate(cylinder, point, soc_cad=best.soc_cad, **scheme)
-    names = ("soc_cad", "ca50_cad", "efficiency_gross", "curvature_per_cad2", "objective", "value", "limits")
-    payload = {name: getattr(best, name) for name in names}
+    now = simulate(cylinder, point, soc_cad=best["soc_cad"], **scheme)
+    payload: dict[str, Any] = {name: best[name] for name in ("soc_cad", "ca50_cad", "efficiency_gross")}
+    payload |= {
+        "curvature_per_cad2": best.curvature,
+        "objective": best.objective,
+        "value": best.value,
+        "limits": limits,
+    }
     payload |= {"active_limits": list(best.active_limits), "at_bound": best.at_bound, "preset": preset.name}
     payload |= {name: float(now[name]) for name in ("imep_gross_bar", "p_max_bar", "dp_max_bar_per_cad", "t_max_k")}
-    payload["soi_cad"] = _injection_of(cylinder, point, best.soc_cad)
+    payload["soi_cad"] = _injection_of(cylinder, point, best["soc_cad"])
     sweep = timing_sweep(cylinder, point, **scheme) if args.output and args.output.endswith(".csv") else None
     emit(args, payload, traces=sweep)
 
@@ -245,18 +250,17 @@ def _optimum_of_files(
     args: argparse.Namespace, cylinder: Cylinder, point: OperatingPoint, limits: dict[str, float], preset: str
 ) -> None:
     traces = traces_of(args)
-    with progress(args, expected=2) as step:
-        rows = best_timing(
-            traces,
-            cylinder,
-            point=point,
-            objective=args.objective or "imep_closed_bar",
-            limits=limits,
-            bounds_cad=_bounds(args),
-            progress=step,
-            step_cad=args.step_cad or 0.25,
-            integrator=args.integrator,
-        )
+    rows = best_timing(
+        traces,
+        cylinder,
+        point=point,
+        objective=args.objective or "imep_closed_bar",
+        limits=limits,
+        bounds_cad=_bounds(args),
+        progress=args.progress.expect(2),
+        step_cad=args.step_cad or 0.25,
+        integrator=args.integrator,
+    )
     text = "\n\n".join(
         f"{row['file']}\n" + lines({k: f"{v[0]:.2f} to {v[1]:.2f}" for k, v in row.items() if _is_range(v)})
         for row in rows

@@ -12,7 +12,9 @@ from collections.abc import Sequence
 
 from mgdd import _core
 from mgdd.cli import demo, doctor, engine, study, throttle
-from mgdd.cli.output import Stopped
+from mgdd.cli.options import Parser, UsageError
+from mgdd.cli.output import Stopped, fail
+from mgdd.cli.progress import Progress
 from mgdd.errors import ConvergenceError, Error
 
 __all__ = ["main"]
@@ -57,25 +59,37 @@ def main(argv: Sequence[str] | None = None) -> int:
         if isinstance(stream, io.TextIOWrapper):
             stream.reconfigure(errors="replace")  # a terminal without °: a question mark, not a traceback
     parser = _parser()
-    args = parser.parse_args(argv)
+    given = sys.argv[1:] if argv is None else list(argv)
+    try:
+        args = parser.parse_args(given)
+    except UsageError as error:
+        error.parser.print_usage(sys.stderr)
+        print(f"{error.parser.prog}: error: {error}", file=sys.stderr)
+        fail(argparse.Namespace(json="--json" in given), error, str(error))
+        raise SystemExit(EXIT_BAD_INPUT) from None
     logging.basicConfig(stream=sys.stderr, format="mgdd: %(levelname)s: %(message)s", level=logging.WARNING)
     if not hasattr(args, "run"):
         args.parser.print_help(sys.stderr)
         return EXIT_BAD_INPUT
     try:
-        args.run(args)
+        with Progress(quiet=args.quiet) as args.progress:
+            args.run(args)
     except ConvergenceError as error:
         print(f"mgdd: {error}", file=sys.stderr)
+        fail(args, error, str(error))
         return EXIT_NO_CONVERGENCE
     except BrokenPipeError:
         os.dup2(os.open(os.devnull, os.O_WRONLY), sys.stdout.fileno())  # the reader has left; nothing more to say
         return EXIT_PIPE
     except (Error, OSError) as error:
-        print(f"mgdd: error: {_as_options(str(error))}", file=sys.stderr)
+        message = _as_options(str(error))
+        print(f"mgdd: error: {message}", file=sys.stderr)
+        fail(args, error, message)
         return EXIT_BAD_INPUT
-    except KeyboardInterrupt as stop:
-        kept = str(stop) if isinstance(stop, Stopped) else "nothing was kept"
-        print(f"mgdd: interrupted: {kept}", file=sys.stderr)
+    except KeyboardInterrupt as error:
+        kept = f"interrupted: {error if isinstance(error, Stopped) else 'nothing was kept'}"
+        print(f"mgdd: {kept}", file=sys.stderr)
+        fail(args, error, kept)
         return EXIT_INTERRUPTED
     return EXIT_OK
 
@@ -88,7 +102,7 @@ def _as_options(message: str) -> str:
 
 
 def _parser() -> argparse.ArgumentParser:
-    parser = argparse.ArgumentParser(
+    parser = Parser(
         prog="mgdd",
         description="Model-guided data-driven optimization and control for internal combustion engine systems.",
         epilog=_EPILOG,

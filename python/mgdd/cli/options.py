@@ -6,7 +6,7 @@ import argparse
 import logging
 from collections.abc import Callable, Sequence
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING, Any, NoReturn
 
 from mgdd import presets
 from mgdd._core import Cylinder, OperatingPoint
@@ -16,7 +16,17 @@ from mgdd.io import read_conditions, read_pressure
 if TYPE_CHECKING:
     import xarray as xr
 
-__all__ = ["add_command", "add_engine", "add_files", "add_scheme", "engine_of", "number_pairs", "traces_of"]
+__all__ = [
+    "Parser",
+    "UsageError",
+    "add_command",
+    "add_engine",
+    "add_files",
+    "add_scheme",
+    "engine_of",
+    "number_pairs",
+    "traces_of",
+]
 
 _LOG = logging.getLogger(__name__)
 _DEFAULT_PRESET = "puma_single"
@@ -27,6 +37,22 @@ _CYLINDER_CHOICES = {
     "wall_heat": "wall_heat_model",
     "ignition": "ignition_model",
 }
+
+
+class UsageError(Exception):
+    """A command line that no command takes; it carries the parser that knows the usage."""
+
+    def __init__(self, message: str, parser: argparse.ArgumentParser) -> None:
+        super().__init__(message)
+        self.parser = parser
+
+
+class Parser(argparse.ArgumentParser):
+    """An argument parser that raises usage errors, so that ``--json`` commands can print them as JSON."""
+
+    def error(self, message: str) -> NoReturn:
+        """Raise the message."""
+        raise UsageError(message, self)
 
 
 def add_command(

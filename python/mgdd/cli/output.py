@@ -1,23 +1,24 @@
-"""What a command prints and writes: JSON on stdout, or a readable table; files by their ending; progress on stderr."""
+"""What a command prints and writes: JSON on stdout, or text and tables; files by their ending; errors as JSON too."""
 
 from __future__ import annotations
 
 import argparse
 import json
 import sys
-from collections.abc import Callable, Iterator, Mapping
-from contextlib import contextmanager
+from collections.abc import Mapping, Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from mgdd.errors import ParameterError
-from mgdd.io import write_traces
-from mgdd.results import VARIABLES, to_jsonable
+from mgdd.io.traces import write_traces
+from mgdd.results import VARIABLES
+from mgdd.results.labels import to_jsonable
+from mgdd.studies.sections import Table
 
 if TYPE_CHECKING:
     import xarray as xr
 
-__all__ = ["Stopped", "check_figure", "check_output", "emit", "lines", "progress"]
+__all__ = ["Stopped", "check_figure", "check_output", "emit", "error_of", "fail", "lines", "show"]
 
 
 class Stopped(KeyboardInterrupt):
@@ -49,18 +50,23 @@ def emit(
     args: argparse.Namespace,
     payload: Mapping[str, Any],
     *,
-    text: str | None = None,
+    text: str | Sequence[str | Table] | None = None,
     traces: xr.Dataset | None = None,
 ) -> None:
     """Print the result, as one JSON object or as text, and write it to the output file."""
     plain = to_jsonable(payload)
+    args.progress.close()
     if args.output is not None:
         if Path(args.output).suffix == ".csv" and traces is not None:
             write_traces(traces, args.output)
         else:
             Path(args.output).write_text(_json(plain) + "\n", encoding="utf-8")
         print(f"wrote {args.output}", file=sys.stderr)
-    print(_json(plain) if args.json else (text or lines(plain)))
+    args.emitted = True
+    if args.json:
+        print(_json(plain))
+    else:
+        print(show([text] if isinstance(text, str) else text or [lines(plain)]))
 
 
 def lines(payload: Mapping[str, Any]) -> str:
@@ -75,23 +81,80 @@ def lines(payload: Mapping[str, Any]) -> str:
     return "\n".join(out)
 
 
-@contextmanager
-def progress(args: argparse.Namespace, *, expected: int) -> Iterator[Callable[[str], None]]:
-    """Show a bar on stderr while work is long; nothing when stderr is no terminal or the user wants quiet.
+def fail(args: argparse.Namespace, error: BaseException, message: str) -> None:
+    """Print an error as the one JSON object of a ``--json`` command, unless its result is there already."""
+    if not vars(args).get("emitted") and vars(args).get("json"):
+        print(_json({"error": error_of(error, message)}))
 
-    How many refits a profile takes is known only at its end: `expected` steps is where the bar starts from.
+
+def error_of(error: BaseException, message: str) -> dict[str, Any]:
+    """Give type, field, value, bound and message of an error; what it does not know is None."""
+    known = {name: getattr(error, name, None) for name in ("field", "value", "bound")}
+    plain = {name: _plain(value) for name, value in known.items()}
+    return {"type": type(error).__name__, **plain, "message": message}
+
+
+def _plain(value: Any) -> Any:
+    try:
+        return to_jsonable(value)
+    except TypeError:
+        return repr(value)
+
+
+def is_terminal() -> bool:
+    """Whether a person reads stdout."""
+    return sys.stdout.isatty()
+
+
+def show(blocks: Sequence[str | Table]) -> str:
+    """Lay out text and tables: by rich in a terminal, else as plain columns.
+
+    Heads and cells of tables stand as they are; numbers to the right.
     """
-    from tqdm import tqdm
+    if not is_terminal():
+        return "\n".join(block if isinstance(block, str) else _columns(block) for block in blocks)
+    from rich.console import Console
+    from rich.table import Table as RichTable
 
-    quiet = args.quiet or not sys.stderr.isatty()
-    with tqdm(total=expected, disable=quiet, file=sys.stderr, unit="step", leave=False) as bar:
+    console = Console()
+    with console.capture() as captured:
+        for block in blocks:
+            if isinstance(block, str):
+                console.print(block, markup=False, highlight=False, soft_wrap=True)
+                continue
+            grid = RichTable(box=None, header_style="bold", pad_edge=False)
+            for head, text in zip(block.columns, _are_texts(block), strict=True):
+                grid.add_column(_literal(head), justify="left" if text else "right", overflow="fold")
+            for row in block.rows:
+                grid.add_row(*map(_literal, row))
+            console.print(grid)
+    return captured.get().rstrip("\n")
 
-        def step(text: str) -> None:
-            bar.set_description(text)
-            bar.total = max(expected, bar.n + 1)
-            bar.update()
 
-        yield step
+def _literal(text: str) -> str:
+    from rich.markup import escape
+
+    return escape(text)
+
+
+def _are_texts(table: Table) -> list[bool]:
+    return [
+        all(row[place][:1].isalpha() or not row[place] for row in table.rows) for place in range(len(table.columns))
+    ]
+
+
+def _columns(table: Table) -> str:
+    if not table.rows:
+        return "(no rows)"
+    lines = [table.columns, *table.rows]
+    width = [max(len(line[place]) for line in lines) for place in range(len(table.columns))]
+    texts = _are_texts(table)
+    return "\n".join(
+        "  ".join(
+            cell.ljust(size) if text else cell.rjust(size) for cell, size, text in zip(line, width, texts, strict=True)
+        ).rstrip()
+        for line in lines
+    )
 
 
 def _json(plain: Any) -> str:

@@ -15,7 +15,9 @@ from mgdd.cli.output import Stopped, check_figure, check_output, emit
 from mgdd.cli.seekers import Task, default_cycles, make_seeker
 from mgdd.engine import Performance
 from mgdd.errors import ConvergenceError, Interrupted, ParameterError
-from mgdd.loop import EngineBench, LoopRun, SteadyOptimum, run_seeker, steady_optimum
+from mgdd.loop import EngineBench, LoopCriteria, find_steady_optimum, run_seeker
+from mgdd.loop.plant_loop import LoopRun
+from mgdd.optimize import Optimum
 from mgdd.results import VARIABLES
 
 if TYPE_CHECKING:
@@ -29,7 +31,6 @@ _LATE = ("extremum_seeking", "newton")
 _COV, _COV_CYCLES, _COV_TRIAL = "cov_imep_percent", 50, 1000
 _MOST_CYCLES = 2_000_000
 _ARRIVAL_CAD = 1.0
-_EXCEED_FROM = 1000
 # Fields that the library names in its messages, and the options that set them.
 _OPTIONS = {
     "soc_scatter_cad = ": "--soc-scatter-cad ",
@@ -112,10 +113,9 @@ def _seek(args: argparse.Namespace) -> None:
         seeker = make_seeker(task)
     cycles = default_cycles(task) if args.cycles is None else args.cycles
     above = _thresholds(best, limits)
-    criteria: dict[str, Any] = {"optimum_cad": best.soc_cad, "arrival_cad": _ARRIVAL_CAD}
-    criteria |= {"exceed_from": _EXCEED_FROM, "exceed_above": above or None}
+    goal = LoopCriteria(optimum=best["soc_cad"], arrival=_ARRIVAL_CAD, exceed_above=above)
     try:
-        run = run_seeker(bench, seeker, cycles, **criteria)
+        run = run_seeker(bench, seeker, cycles, criteria=goal)
     except Interrupted as stop:
         if not isinstance(stop.partial, LoopRun):
             raise
@@ -179,40 +179,41 @@ def _bench(args: argparse.Namespace, limits: Mapping[str, float]) -> tuple[Engin
     return bench, preset.name
 
 
-def _optimum(args: argparse.Namespace, bench: EngineBench, limits: Mapping[str, float]) -> SteadyOptimum:
+def _optimum(args: argparse.Namespace, bench: EngineBench, limits: Mapping[str, float]) -> Optimum:
     """Find where the seeker should end; COV of IMEP has no steady value, so it is judged there."""
     steady = {name: value for name, value in limits.items() if name != _COV}
     with _option_names():
-        best = steady_optimum(bench, steady, bounds_cad=(args.lower_cad, args.upper_cad))
+        best = find_steady_optimum(bench, steady, bounds_cad=(args.lower_cad, args.upper_cad))
     if not best.curvature < 0.0:
         raise ConvergenceError(
             f"the performance has no maximum near --lower-cad {args.lower_cad:g} to --upper-cad {args.upper_cad:g} "
-            f"(curvature {best.curvature:.3g} at {best.free_soc_cad:.1f}): move the bounds"
+            f"(curvature {best.curvature:.3g} at {best.free_inputs['soc_cad']:.1f}): move the bounds"
         )
     if _COV in limits:
-        trial = copy.deepcopy(bench).run([best.soc_cad] * _COV_TRIAL)
+        trial = copy.deepcopy(bench).run([best["soc_cad"]] * _COV_TRIAL)
         cov = float(trial["limits"].sel(limit=_COV)[_COV_CYCLES:].mean())
         if cov > limits[_COV]:
             raise ConvergenceError(
-                f"--limit {_COV}={limits[_COV]:g}: the bench has {cov:.3g} % at its best timing, {best.soc_cad:.1f}; "
-                "raise the limit, or lower --noise, --soc-scatter-cad or --misfire"
+                f"--limit {_COV}={limits[_COV]:g}: the bench has {cov:.3g} % at its best timing, "
+                f"{best['soc_cad']:.1f}; raise the limit, or lower --noise, --soc-scatter-cad or --misfire"
             )
     return best
 
 
 def _above(run: LoopRun, limits: Mapping[str, float]) -> float:
-    """Share of the cycles from 1000 on above a limit itself, scatter included."""
-    if not limits or run.dataset.sizes["cycle"] <= _EXCEED_FROM:
+    """Share of the cycles that count above a limit itself, scatter included."""
+    cycles = run.dataset.sizes["cycle"]
+    if not limits or cycles == 0:
         return math.nan
-    measured = run.dataset["limits"].to_numpy()[_EXCEED_FROM:]
+    measured = run.dataset["limits"].to_numpy()[LoopCriteria().counted_from(cycles) :]
     caps = [limits[str(name)] for name in run.dataset["limit"].to_numpy()]
     return float((measured > caps).any(axis=1).mean())
 
 
-def _thresholds(best: SteadyOptimum, limits: Mapping[str, float]) -> dict[str, float]:
+def _thresholds(best: Optimum, limits: Mapping[str, float]) -> dict[str, float]:
     """Limit and three standard deviations of what is compared with it; a COV of n cycles scatters by 1/sqrt(2n - 2)."""
     own = 1.0 / math.sqrt(2.0 * (_COV_CYCLES - 1))
-    scatter = {name: best.limit_scatter.get(name, own * value) for name, value in limits.items()}
+    scatter = {name: best.values.get(f"scatter_{name}", own * value) for name, value in limits.items()}
     return {name: value + 3.0 * scatter[name] for name, value in limits.items()}
 
 
@@ -220,7 +221,7 @@ def _payload(
     args: argparse.Namespace,
     preset: str,
     run: LoopRun,
-    best: SteadyOptimum,
+    best: Optimum,
     limits: Mapping[str, float],
 ) -> dict[str, Any]:
     summary = run.summary
@@ -232,8 +233,8 @@ def _payload(
         "cycles": run.dataset.sizes["cycle"],
         "start_cad": args.start_cad,
         "final_cad": summary["final_cad"],
-        "optimum_cad": best.soc_cad,
-        "free_optimum_cad": best.free_soc_cad,
+        "optimum_cad": best["soc_cad"],
+        "free_optimum_cad": best.free_inputs["soc_cad"],
         "cycles_to_1_cad": summary["cycles_to"],
         "rms_cad": summary["rms_cad"],
         "limit_exceeded_fraction": summary["exceeded_fraction"],
@@ -262,13 +263,13 @@ def _table(cycles: xr.Dataset) -> xr.Dataset:
     return table
 
 
-def _draw(cycles: xr.Dataset, best: SteadyOptimum, limits: Mapping[str, float], file: str) -> None:
+def _draw(cycles: xr.Dataset, best: Optimum, limits: Mapping[str, float], file: str) -> None:
     from matplotlib.figure import Figure
 
     from mgdd import plot
 
     figure = Figure(figsize=(8.0, 7.0), layout="constrained")
-    plot.seeking(cycles, optimum_cad=best.soc_cad, limit_values=limits, ax=figure.add_subplot())
+    plot.seeking(cycles, optimum_cad=best["soc_cad"], limit_values=limits, ax=figure.add_subplot())
     figure.savefig(file, dpi=150)
     print(f"wrote {file}", file=sys.stderr)
 

@@ -9,20 +9,12 @@ from typing import TYPE_CHECKING, Any
 
 from mgdd.errors import ParameterError
 from mgdd.loop import steady_map
-from mgdd.optimize import (
-    BoundedSeeking,
-    ComponentLag,
-    ExtremumSeeking,
-    GoldenSection,
-    Limit,
-    NewtonSeeking,
-    Spsa,
-    Tuning,
-    tune,
-)
+from mgdd.optimize import BoundedSeeking, ComponentLag, ExtremumSeeking, GoldenSection, Limit, NewtonSeeking, Spsa, tune
+from mgdd.optimize.tuning import Tuning
 
 if TYPE_CHECKING:
-    from mgdd.loop import EngineBench, SteadyOptimum
+    from mgdd.loop import EngineBench
+    from mgdd.optimize import Optimum
 
     Seeker = ExtremumSeeking | NewtonSeeking | BoundedSeeking | Spsa | GoldenSection
 
@@ -53,7 +45,7 @@ class Task:
     limit_method: str
     late: bool
     bench: EngineBench
-    best: SteadyOptimum
+    best: Optimum
 
 
 def default_cycles(task: Task) -> int:
@@ -151,7 +143,7 @@ def _late_tuning(task: Task) -> Tuning:
 
 def _limit(task: Task, name: str, upper: float) -> Limit:
     """Make a limit; penalty and barrier balance the slope of J one scatter beyond it and one scatter before it."""
-    slope_of_j = abs(task.best.curvature) * max(abs(task.best.soc_cad - task.best.free_soc_cad), 1.0)
+    slope_of_j = abs(task.best.curvature) * max(abs(task.best["soc_cad"] - task.best.free_inputs["soc_cad"]), 1.0)
     reach = max(float(task.bench.settings["soc_scatter_cad"]), 0.1)
     weight = 1.0
     if task.limit_method == "barrier":
@@ -164,5 +156,5 @@ def _limit(task: Task, name: str, upper: float) -> Limit:
 
 def _slope_of(task: Task, name: str) -> float:
     low, high = task.bench.window_cad
-    around = steady_map(task.bench, [max(task.best.soc_cad - 0.5, low), min(task.best.soc_cad + 0.5, high)])
+    around = steady_map(task.bench, [max(task.best["soc_cad"] - 0.5, low), min(task.best["soc_cad"] + 0.5, high)])
     return abs(float(around[name][1] - around[name][0])) if name in around else 0.0

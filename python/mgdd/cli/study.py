@@ -9,16 +9,18 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from mgdd.cli.options import add_command
-from mgdd.cli.output import Stopped, check_output, emit, progress
+from mgdd.cli.output import Stopped, check_output, emit
 from mgdd.errors import Interrupted, ParameterError
+from mgdd.report import write_report
 from mgdd.studies import StudyResult, available_studies, run_study
+from mgdd.studies.sections import Table, cells, column_names
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
 
 __all__ = ["add"]
 
-_ENDS = ("_low", "_high")
+_LOW = "_low"
 
 
 def add(commands: Any) -> None:
@@ -28,7 +30,7 @@ def add(commands: Any) -> None:
         "study",
         run,
         help_text="run a study of the package: a table over seeds, with figures",
-        example="mgdd study ch4-esc --figures figures",
+        example="mgdd study sensor-delay --figures figures",
     )
     parser.add_argument("name", nargs="?", metavar="NAME", help=f"one of {', '.join(available_studies())}")
     parser.add_argument("--list", action="store_true", help="list the studies and their titles")
@@ -37,6 +39,7 @@ def add(commands: Any) -> None:
     )
     parser.add_argument("--quick", action="store_true", help="a shorter study with wider intervals")
     parser.add_argument("--figures", metavar="DIR", help="write its figures into DIR")
+    parser.add_argument("--report", metavar="DIR", help="write a page with tables and figures into DIR")
     parser.add_argument("--format", choices=("png", "svg"), default="png", help="of the figures (default: png)")
 
 
@@ -55,17 +58,21 @@ def run(args: argparse.Namespace) -> None:
     folder = None if args.figures is None else Path(args.figures)
     if folder is not None:
         folder.mkdir(parents=True, exist_ok=True)
-    with progress(args, expected=10) as step:
-        try:
-            result = run_study(args.name, seeds=args.seeds, quick=args.quick, figures=folder is not None, progress=step)
-        except Interrupted as stop:
-            if not isinstance(stop.partial, StudyResult):
-                raise
-            result = stop.partial
-        paths = [] if folder is None else _write(result.figures, folder, f"{args.name}.{args.format}")
+    drawn = folder is not None or args.report is not None
+    step = args.progress.expect(10)
+    try:
+        result = run_study(args.name, seeds=args.seeds, quick=args.quick, figures=drawn, progress=step)
+    except Interrupted as stop:
+        if not isinstance(stop.partial, StudyResult):
+            raise
+        result = stop.partial
+    paths = [] if folder is None else _write(result.figures, folder, f"{args.name}.{args.format}")
+    page = None if args.report is None else write_report(result, args.report)
     summary: dict[str, Any] = dict(result.summary)
     if folder is not None:
         summary["figures"] = [path.as_posix() for path in paths]
+    if page is not None:
+        summary["report"] = page.as_posix()
     emit(args, summary, text=_text(titles[args.name], summary))
     if summary.get("interrupted"):
         raise Stopped(f"{len(summary['rows'])} finished rows are printed")
@@ -81,40 +88,20 @@ def _write(figures: Mapping[str, Figure], folder: Path, ending: str) -> list[Pat
     return paths
 
 
-def _text(title: str, summary: Mapping[str, Any]) -> str:
+def _text(title: str, summary: Mapping[str, Any]) -> list[str | Table]:
     seeds = summary["seeds"]
     chance = f" ({seeds} seed{'s' if seeds != 1 else ''})" if seeds else ""
-    out = [f"{summary['study']}: {title}{chance}", "", table(summary["rows"])]
-    if any(name.endswith(_ENDS[0]) for row in summary["rows"] for name in row):
-        out += ["", "Brackets: 95 % interval of the mean over seeds."]
+    out: list[str | Table] = [f"{summary['study']}: {title}{chance}\n", rows_table(summary["rows"])]
+    if any(name.endswith(_LOW) for row in summary["rows"] for name in row):
+        out.append("\nBrackets: 95 % interval of the mean over seeds.")
     if summary.get("figures"):
         out += ["", *summary["figures"]]
-    return "\n".join(out)
+    if summary.get("report"):
+        out += ["", f"Report: {summary['report']}"]
+    return out
 
 
-def table(rows: Sequence[Mapping[str, Any]]) -> str:
+def rows_table(rows: Sequence[Mapping[str, Any]]) -> Table:
     """Lay out flat rows: one line each, intervals behind their mean, the names of the keys as the head."""
-    if not rows:
-        return "(no rows)"
-    names = [name for name in rows[0] if not (name.endswith(_ENDS) and name.rpartition("_")[0] in rows[0])]
-    lines = [names, *([_cell(row, name) for name in names] for row in rows)]
-    width = [max(len(line[place]) for line in lines) for place in range(len(names))]
-    texts = [isinstance(rows[0][name], str) for name in names]
-    return "\n".join(
-        "  ".join(
-            cell.ljust(size) if text else cell.rjust(size) for cell, size, text in zip(line, width, texts, strict=True)
-        ).rstrip()
-        for line in lines
-    )
-
-
-def _cell(row: Mapping[str, Any], name: str) -> str:
-    ends = [row.get(name + end) for end in _ENDS]
-    own = _number(row.get(name))
-    return own if None in ends else f"{own} [{_number(ends[0])}, {_number(ends[1])}]"
-
-
-def _number(value: Any) -> str:
-    if value is None:
-        return "–"
-    return f"{value:.4g}" if isinstance(value, float) else str(value)
+    names = column_names(rows)
+    return Table(columns=tuple(names), rows=tuple(tuple(cells(row, names)) for row in rows))

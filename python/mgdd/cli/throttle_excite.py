@@ -6,16 +6,18 @@ import argparse
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
-from mgdd import identify
+from mgdd import identify, signals
 from mgdd.cli.options import add_command
 from mgdd.cli.output import emit
 from mgdd.cli.throttle_files import check_ending
 from mgdd.cli.throttle_parameters import add_throttle, throttle_of
 from mgdd.errors import ParameterError
-from mgdd.identify.excitation_design import EXCITATIONS
+from mgdd.identify.throttle.excitation_design import EXCITATIONS
 
 if TYPE_CHECKING:
     import xarray as xr
+
+    from mgdd.identify.throttle.excitation_check import ExcitationCheck
 
 __all__ = ["add"]
 
@@ -98,20 +100,20 @@ def _excite(args: argparse.Namespace) -> None:
             angle_window_deg=window, **limits,
         )  # fmt: skip
     else:
-        make = getattr(identify, args.kind)
+        make = getattr(signals, args.kind)
         signal = make(offset=args.offset, amplitude=args.amplitude, step_s=args.step_s, **given)
         check = identify.check_excitation(signal, throttle, angle_window_deg=window, **limits)
         if not check.passed:
-            raise ParameterError("this signal must not be sent: " + "; ".join(check.findings))
+            raise ParameterError("this signal must not be sent: " + "; ".join(map(str, check.findings)))
     attrs = {name: value for name, value in signal.attrs.items() if name != "kind"}
     payload = {"kind": args.kind, "preset": preset, "samples": signal.sizes["time_s"], "step_s": args.step_s}
     payload |= attrs | check.to_dict()
     emit(args, payload, text=_text(args.kind, attrs, check), traces=_table(args.output, check))
 
 
-def _text(kind: str, attrs: dict[str, Any], check: identify.ExcitationCheck) -> str:
+def _text(kind: str, attrs: dict[str, Any], check: ExcitationCheck) -> str:
     return f"{kind}, offset {attrs['offset']:.4g}, amplitude {attrs['amplitude']:.4g}\n{check.summary()}"
 
 
-def _table(output: str | None, check: identify.ExcitationCheck) -> xr.Dataset | None:
+def _table(output: str | None, check: ExcitationCheck) -> xr.Dataset | None:
     return check.prediction if output is not None and Path(output).suffix == ".csv" else None

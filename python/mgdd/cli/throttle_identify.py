@@ -12,10 +12,14 @@ from mgdd.cli.options import add_command
 from mgdd.cli.output import check_figure, emit
 from mgdd.cli.throttle_files import add_log_options, check_ending, log_of, wrote
 from mgdd.errors import ConvergenceError
-from mgdd.identify.throttle_fit import KINDS
+from mgdd.identify.throttle.fits import KINDS
+from mgdd.optimize import FitOptions
 
 if TYPE_CHECKING:
     import xarray as xr
+
+    from mgdd.identify.throttle.validation import ThrottleValidation
+    from mgdd.results import Fit
 
 __all__ = ["add"]
 
@@ -77,7 +81,8 @@ def _identify(args: argparse.Namespace) -> None:
     test = None if args.test is None else log_of(args, args.test)
     fit = identify.identify_throttle(
         log, args.model, test=test, limp_home_deg=args.limp_home_deg, two_sided=args.two_sided,
-        closed_deg=args.closed_deg, open_deg=args.open_deg, delay_samples=args.delay_samples, seed=args.seed,
+        closed_deg=args.closed_deg, open_deg=args.open_deg, delay_samples=args.delay_samples,
+        options=FitOptions(seed=args.seed),
     )  # fmt: skip
     own = args.output if args.output is not None and Path(args.output).suffix == ".toml" else None
     if own is not None:
@@ -85,14 +90,29 @@ def _identify(args: argparse.Namespace) -> None:
         wrote(own)
         args.output = None
     validation = identify.validate_throttle(fit, log if test is None else test)
-    payload = fit.to_dict() | {"validation": validation.to_dict()}
+    payload = _payload(fit) | {"validation": validation.to_dict()}
     emit(args, payload, text=f"{fit.summary()}\n\n{validation.summary()}")
     if args.figure:
-        _draw(validation, args.figure, identify.correlation_dataset(fit.report))
-    if not fit.success and fit.status not in _ENDED:
-        raise ConvergenceError(f"{args.file}: the fit has failed ({fit.message}); look at the log, or excite more")
-    if fit.status == "iteration_limit":
-        _LOG.warning("%s: the search %s; the figures hold for what it has found", args.file, fit.message)
+        _draw(validation, args.figure, fit.report.to_dataset())
+    report = fit.report
+    if not report.success and report.status not in _ENDED:
+        raise ConvergenceError(f"{args.file}: the fit has failed ({report.message}); look at the log, or excite more")
+    if report.status == "iteration_limit":
+        _LOG.warning("%s: the search %s; the figures hold for what it has found", args.file, report.message)
+
+
+def _payload(fit: Fit) -> dict[str, Any]:
+    train, test = fit.train, fit.test
+    figures = fit.to_dict()
+    same = ("source", "parameters", "stderr", "unidentifiable", "status", "success", "nit", "nfev")
+    return {
+        "model": fit.kind,
+        "fit_percent_train": None if train is None else train.nrmse_fit_percent,
+        "fit_percent_test": None if test is None else test.nrmse_fit_percent,
+        "rmse_test": None if test is None else test.rmse,
+        "findings": [str(finding) for finding in fit.findings],
+        **{name: figures[name] for name in same},
+    }
 
 
 def _validate(args: argparse.Namespace) -> None:
@@ -105,7 +125,7 @@ def _validate(args: argparse.Namespace) -> None:
         _draw(validation, args.figure, None)
 
 
-def _draw(validation: identify.ThrottleValidation, file: str, correlation: xr.Dataset | None) -> None:
+def _draw(validation: ThrottleValidation, file: str, correlation: xr.Dataset | None) -> None:
     from matplotlib.figure import Figure
 
     from mgdd import plot

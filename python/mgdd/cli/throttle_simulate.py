@@ -14,8 +14,9 @@ from mgdd.cli.throttle_parameters import add_throttle, throttle_of
 from mgdd.errors import DataError, ParameterError
 from mgdd.io.table import read_table
 from mgdd.io.throttle_checks import Place
-from mgdd.throttle import simulate, step_summary
-from mgdd.throttle.simulation import sample_time
+from mgdd.signals.even_grid import even_step
+from mgdd.throttle import simulate
+from mgdd.throttle.simulation import step_summary
 
 if TYPE_CHECKING:
     import xarray as xr
@@ -115,7 +116,7 @@ def _from_file(args: argparse.Namespace) -> dict[str, Any]:
 
 def _check_rows(columns: dict[str, Any], place: Place) -> None:
     """Refuse by line of the file what the simulation would refuse by sample."""
-    sample_time(columns["time_s"], place.row)
+    even_step(columns["time_s"], where=lambda at: place.cell(at, "time_s"), remedy="resample the duty first")
     duty = columns["duty"]
     if np.abs(duty).max() > 1.0:
         at = int(np.argmax(np.abs(duty) > 1.0))
@@ -131,9 +132,9 @@ def _check_rows(columns: dict[str, Any], place: Place) -> None:
 def _draw(run: xr.Dataset, file: str) -> None:
     from matplotlib.figure import Figure
 
-    from mgdd import plot
+    from mgdd.plot.throttle_run import throttle_run
 
     figure = Figure(figsize=(7.0, 5.4), layout="constrained")
-    plot.throttle_run(run, ax=figure.add_subplot())
+    throttle_run(run, ax=figure.add_subplot())
     figure.savefig(file, dpi=150)
     print(f"wrote {file}", file=sys.stderr)

@@ -5,37 +5,25 @@ Crank angles are °CA aTDC (firing TDC = 0, compression negative) throughout.
 
 from __future__ import annotations
 
-from mgdd._core import (
-    Cylinder,
-    NoxFit,
-    NoxModel,
-    NoxProxy,
-    OperatingPoint,
-    Performance,
-    PerformanceTerm,
-    SoftSensor,
-)
+from mgdd._core import Cylinder, NoxModel, NoxProxy, OperatingPoint, Performance, PerformanceTerm, SoftSensor
 from mgdd.engine.cycle import convergence, sensitivities, simulate, timing_sweep
-from mgdd.engine.ignition import Timing, start_of_combustion, start_of_injection
+from mgdd.engine.ignition import start_of_combustion, start_of_injection
 from mgdd.engine.nox import fit_nox_proxy
-from mgdd.engine.optimum import Optimum, optimum
+from mgdd.engine.optimum import find_optimum
 from mgdd.engine.trace import analyze
 
 __all__ = [
     "Cylinder",
-    "NoxFit",
     "NoxModel",
     "NoxProxy",
     "OperatingPoint",
-    "Optimum",
     "Performance",
     "PerformanceTerm",
     "SoftSensor",
-    "Timing",
     "analyze",
     "convergence",
+    "find_optimum",
     "fit_nox_proxy",
-    "optimum",
     "sensitivities",
     "simulate",
     "start_of_combustion",

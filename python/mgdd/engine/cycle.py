@@ -10,7 +10,8 @@ import numpy as np
 
 from mgdd import _core
 from mgdd._core import Cylinder, NoxProxy, OperatingPoint
-from mgdd.results import ANGLE, VARIABLES, labelled_dataset
+from mgdd.results import VARIABLES, labelled_dataset
+from mgdd.results.labels import ANGLE
 
 if TYPE_CHECKING:
     import xarray as xr
@@ -58,7 +59,7 @@ def simulate(
         Over ``crank_angle_cad``: ``pressure_bar``, ``volume_l``, ``temperature_k``, ``motored_pressure_bar``,
         ``burned_fraction``, and ``heat_release_j_per_cad`` and ``heat_loss_j_per_cad`` of the step that ends
         at the sample. The indicators (IMEP, efficiency, peaks, burn angles, heat loss) are scalars of it. Attribute
-        ``warnings`` names states beyond any piston engine.
+        ``warnings`` names states beyond any piston engine, one per line.
 
     Raises
     ------
@@ -98,7 +99,7 @@ def simulate(
             "step_cad": step_cad,
             "speed_rpm": point.speed_rpm,
             "trapped_mass_g": raw["trapped_mass_g"],
-            "warnings": doubts,
+            "warnings": "\n".join(doubts),
         },
     )
 

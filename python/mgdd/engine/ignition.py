@@ -6,10 +6,12 @@ from dataclasses import dataclass
 
 from mgdd import _core
 from mgdd._core import Cylinder, OperatingPoint
+from mgdd.results.describe import described
 
 __all__ = ["Timing", "start_of_combustion", "start_of_injection"]
 
 
+@described
 @dataclass(frozen=True, kw_only=True)
 class Timing:
     """An injection and its combustion.

@@ -3,16 +3,17 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Callable, Iterable, Mapping
-from dataclasses import dataclass, field
+from collections.abc import Callable, Iterable, Mapping, Sequence
 
 import numpy as np
 
 from mgdd import _core
-from mgdd._core import Cylinder, OperatingPoint
+from mgdd._core import Cylinder, Limit, OperatingPoint
 from mgdd.errors import ConvergenceError, ParameterError
+from mgdd.optimize import Optimum
+from mgdd.optimize.optimum import limits_of
 
-__all__ = ["Optimum", "optimum"]
+__all__ = ["find_optimum"]
 
 OBJECTIVES = ("efficiency_gross", "imep_gross_bar", "imep_closed_bar")
 _SCAN_CAD = 0.5
@@ -21,55 +22,12 @@ _WINDOW_CAD: tuple[float, float] = _core.timing_window_cad
 _DEFAULT_CAD = (-30.0, 10.0)
 
 
-@dataclass(frozen=True, kw_only=True)
-class Optimum:
-    """The best start of combustion and how flat the optimum is.
-
-    Parameters
-    ----------
-    soc_cad : float
-        Start of combustion [°CA aTDC].
-    ca50_cad : float
-        Angle of half burned [°CA aTDC].
-    efficiency_gross : float
-        Gross indicated efficiency there [-].
-    curvature_per_cad2 : float
-        Second difference of the objective over ±3 CAD [per °CA²]; NaN where a neighbour leaves the timing window.
-    objective : str
-        What was maximised.
-    value : float
-        The objective there, in its own unit.
-    limits : mapping of str to float
-        Limits that were kept, in the units of the names.
-    active_limits : tuple of str
-        Those that hold the optimum back.
-    at_bound : bool
-        Whether the optimum lies on the edge of the searched range.
-
-    Examples
-    --------
-    >>> from mgdd.engine import Cylinder, OperatingPoint, optimum
-    >>> round(optimum(Cylinder(), OperatingPoint()).ca50_cad, 1)
-    9.4
-    """
-
-    soc_cad: float
-    ca50_cad: float
-    efficiency_gross: float
-    curvature_per_cad2: float
-    objective: str
-    value: float
-    limits: Mapping[str, float] = field(default_factory=dict)
-    active_limits: tuple[str, ...] = ()
-    at_bound: bool = False
-
-
-def optimum(
+def find_optimum(
     cylinder: Cylinder,
     point: OperatingPoint,
     objective: str = "efficiency_gross",
     *,
-    limits: Mapping[str, float] | None = None,
+    limits: Mapping[str, float] | Sequence[Limit] | None = None,
     bounds_cad: tuple[float, float] | None = None,
     step_cad: float = 1.0,
     integrator: str = "trapezoid",
@@ -87,8 +45,8 @@ def optimum(
         Must carry fuel.
     objective : {"efficiency_gross", "imep_gross_bar", "imep_closed_bar"}
         What to maximise.
-    limits : mapping of str to float, optional
-        Upper limits on indicators, for example ``{"p_max_bar": 95.0}``.
+    limits : mapping of str to float, or sequence of Limit, optional
+        Upper limits on indicators, for example ``{"p_max_bar": 95.0}``; the margin of a `Limit` is kept.
     bounds_cad : tuple of float, optional
         Searched range of SOC [°CA aTDC]; -30 to 10, as far as the valves are closed, if left out.
     step_cad, integrator
@@ -96,8 +54,9 @@ def optimum(
 
     Returns
     -------
-    Optimum
-        With the active limits named.
+    mgdd.optimize.Optimum
+        Input ``soc_cad``; further every indicator, for example ``ca50_cad`` and ``efficiency_gross``. The curvature is
+        taken over ±3 CAD.
 
     Raises
     ------
@@ -108,14 +67,15 @@ def optimum(
 
     Examples
     --------
-    >>> from mgdd.engine import Cylinder, OperatingPoint, optimum
-    >>> best = optimum(Cylinder(), OperatingPoint(), limits={"p_max_bar": 95.0})
-    >>> round(best.soc_cad, 2), best.active_limits
+    >>> from mgdd.engine import Cylinder, OperatingPoint, find_optimum
+    >>> best = find_optimum(Cylinder(), OperatingPoint(), limits={"p_max_bar": 95.0})
+    >>> round(best["soc_cad"], 2), best.active_limits
     (-3.08, ('p_max_bar',))
     """
-    limits = dict(limits or {})
+    kept = limits_of(limits)
+    caps = {limit.name: limit.upper - limit.margin for limit in kept}
     low, high = bounds_cad or (max(_DEFAULT_CAD[0], cylinder.ivc_cad), min(_DEFAULT_CAD[1], cylinder.evo_cad - 1.0))
-    check_request(objective, limits)
+    check_request(objective, caps)
     _check(point, low, high)
 
     def indicators(soc: float | np.ndarray) -> dict[str, np.ndarray]:
@@ -128,34 +88,34 @@ def optimum(
     def excess(soc: float, names: Iterable[str]) -> float:
         """How far the worst of these limits is exceeded, relative to its size; negative when all are kept."""
         now = indicators(soc)
-        return max(float(now[name][0] - limits[name]) / max(1.0, abs(limits[name])) for name in names)
+        return max(float(now[name][0] - caps[name]) / max(1.0, abs(caps[name])) for name in names)
 
     grid = np.linspace(low, high, max(3, round((high - low) / _SCAN_CAD) + 1))
     columns = indicators(grid)
-    if limits and not _feasible(columns, limits).any():
-        grid = np.sort(np.append(grid, _least_excess(grid, columns, limits, excess)))
+    if caps and not _feasible(columns, caps).any():
+        grid = np.sort(np.append(grid, _least_excess(grid, columns, caps, excess)))
         columns = indicators(grid)
-    feasible = _feasible(columns, limits)
+    feasible = _feasible(columns, caps)
     if not feasible.any():
-        near = ", ".join(f"{name} >= {columns[name].min():.4g} (limit {limit:g})" for name, limit in limits.items())
+        near = ", ".join(f"{name} >= {columns[name].min():.4g} (limit {limit:g})" for name, limit in caps.items())
         raise ConvergenceError(
             f"no soc_cad in [{low:g}, {high:g}] meets the limits together; each alone: {near}; raise a limit or widen "
             "bounds_cad"
         )
     best = int(np.argmax(np.where(feasible, columns[objective], -np.inf)))
-    soc = _refine(grid, best, feasible, slope, lambda at, end: excess(at, _broken(indicators(end), limits)))
+    soc = _refine(grid, best, feasible, slope, lambda at, end: excess(at, _broken(indicators(end), caps)))
     now = indicators(soc)
-    active = tuple(name for name, limit in limits.items() if now[name][0] > limit - 1e-6 * max(1.0, abs(limit)))
+    active = tuple(name for name, limit in caps.items() if now[name][0] > limit - 1e-6 * max(1.0, abs(limit)))
     return Optimum(
-        soc_cad=soc,
-        ca50_cad=float(now["ca50_cad"][0]),
-        efficiency_gross=float(now["efficiency_gross"][0]),
-        curvature_per_cad2=_curvature(indicators, objective, soc, cylinder),
+        inputs={"soc_cad": soc},
         objective=objective,
         value=float(now[objective][0]),
-        limits=limits,
+        values={name: float(column[0]) for name, column in now.items() if name != "soc_cad"},
+        limits=kept,
         active_limits=active,
         at_bound=soc in (low, high),
+        bounds={"soc_cad": (low, high)},
+        curvature=_curvature(indicators, objective, soc, cylinder),
     )
 
 
@@ -222,16 +182,14 @@ def _curvature(
     return float((before - 2.0 * at + after) / _SECANT_CAD**2)
 
 
-def check_request(objective: str, limits: Mapping[str, float]) -> None:
+def check_request(objective: str, limits: Iterable[str]) -> None:
     """Refuse an unknown objective or limit before any work."""
-    known = _core.indicator_units()
     if objective not in OBJECTIVES:
         raise ParameterError(f"objective = {objective!r}: must be one of {', '.join(OBJECTIVES)}")
-    for name, value in limits.items():
+    known = _core.indicator_units()
+    for name in limits:
         if name not in known:
-            raise ParameterError(f"limits: {name!r} is no indicator: must be one of {', '.join(known)}")
-        if not math.isfinite(value):
-            raise ParameterError(f"limits: {name} = {value:g}: must be finite")
+            raise ParameterError(f"limits: {name!r} is not an indicator: must be one of {', '.join(known)}")
 
 
 def _check(point: OperatingPoint, low: float, high: float) -> None:

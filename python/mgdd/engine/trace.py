@@ -3,12 +3,14 @@
 from __future__ import annotations
 
 import logging
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
 from mgdd import _core
 from mgdd._core import Cylinder, OperatingPoint
-from mgdd.errors import DataError, ParameterError
-from mgdd.results import ANGLE, labelled_dataset
+from mgdd.errors import ParameterError
+from mgdd.io.trace_forms import as_trace
+from mgdd.results import labelled_dataset
+from mgdd.results.labels import ANGLE
 
 if TYPE_CHECKING:
     import xarray as xr
@@ -29,7 +31,7 @@ _COLUMNS = (
 
 
 def analyze(
-    trace: xr.Dataset,
+    trace: Any,
     cylinder: Cylinder,
     *,
     point: OperatingPoint | None = None,
@@ -45,9 +47,11 @@ def analyze(
 
     Parameters
     ----------
-    trace : xarray.Dataset
-        ``pressure_bar(crank_angle_cad)``, from `mgdd.io.read_pressure`, `mgdd.io.pressure_trace` or `simulate`.
-        Attributes ``speed_rpm`` and ``trapped_mass_g`` are used where present.
+    trace : Dataset, DataFrame, mapping, DataArray, Series, pair of array_like, or path-like
+        ``pressure_bar(crank_angle_cad)``, from `mgdd.io.read_pressure`, `mgdd.io.pressure_trace` or `simulate`; a table
+        with these columns [°CA aTDC, bar], a column over crank angle, angle and pressure as a pair, or a file that
+        `mgdd.io.read_pressure` reads without options. Attributes ``speed_rpm`` and ``trapped_mass_g`` are used where
+        present.
     cylinder : Cylinder
         Geometry and wall-heat law. Samples outside IVC..EVO serve only pegging.
     point : OperatingPoint, optional
@@ -77,7 +81,7 @@ def analyze(
         Traces over ``crank_angle_cad`` (rates belong to the step that ends at the sample) and scalars
         ``pegging_bar n_compression n_expansion ca10_cad ca50_cad ca90_cad heat_net_j heat_gross_j imep_closed_bar
         p_max_bar p_max_cad dp_max_bar_per_cad t_max_k``. Attributes ``method``, ``gamma``, ``fractions``,
-        ``motored`` (no burn in this trace) and ``warnings`` (what makes the figures doubtful).
+        ``motored`` (1: no burn in this trace, else 0) and ``warnings`` (what makes the figures doubtful, one per line).
 
     Raises
     ------
@@ -102,9 +106,7 @@ def analyze(
     9.4
     14.9
     """
-    for name in (ANGLE, "pressure_bar"):
-        if name not in getattr(trace, "variables", ()) or not hasattr(trace, "attrs"):
-            raise DataError(f"the trace has no {name}: read it with mgdd.io.read_pressure or make it with simulate")
+    trace = as_trace(trace)
     simulated = "motored_pressure_bar" in trace.variables
     if pegging == "inlet" and inlet_pressure_kpa is None and point is None:
         raise ParameterError("pegging 'inlet' needs inlet_pressure_kpa, or a point with its intake pressure")
@@ -140,8 +142,8 @@ def analyze(
             "method": pegging,
             "gamma": text,
             "fractions": fractions,
-            "motored": raw["motored"],
-            "warnings": tuple(raw["warnings"]),
+            "motored": int(raw["motored"]),
+            "warnings": "\n".join(raw["warnings"]),
         },
     )
 

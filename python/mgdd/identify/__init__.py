@@ -1,108 +1,49 @@
-"""Identification: fitting models to measured records, and what such a fit can and cannot tell."""
+"""Identification: fitting models to measured records, and what such a fit can and cannot tell.
+
+Engine: `fit_cylinder`, `compare_laws`, `wall_heat_profile`, `best_timing`. Throttle: `identify_throttle`,
+`validate_throttle` and the fits and excitations below them. Any ODE: `fit_ode`. Every fit answers with a
+`mgdd.results.Fit`.
+"""
 
 from __future__ import annotations
 
-from mgdd.identify.cylinder import fit_cylinder
-from mgdd.identify.drive_axis import DriveFit, DriveModel, drive_free_run, drive_inverse_dynamics, fit_drive
-from mgdd.identify.excitation import amplitude_random_steps, chirp, multisine, prbs, staircase, triangle
-from mgdd.identify.excitation_check import ExcitationCheck, check_excitation
-from mgdd.identify.excitation_design import design_excitation
-from mgdd.identify.first_principle import fit_throttle, throttle_start
-from mgdd.identify.first_principle_model import FirstPrincipleModel
-from mgdd.identify.metrics import ResidualTests, fit_percent, mse, residual_tests, rmse, vaf_percent
-from mgdd.identify.n_step import n_step_rms, split_log
-from mgdd.identify.ode_fit import OdeFit, OdeModel, fit_ode
-from mgdd.identify.online_update import OnlineUpdate
-from mgdd.identify.physical_parameters import physical_parameters
-from mgdd.identify.profile import WallHeatProfile, wall_heat_profile
-from mgdd.identify.pseudo_wiener_fit import PseudoWienerFit, fit_pseudo_wiener
-from mgdd.identify.random_steps import random_step_records
-from mgdd.identify.record_content import RecordContent
-from mgdd.identify.records import CylinderFit, LoadFit
-from mgdd.identify.response_surface import Support
-from mgdd.identify.sensor_lag import SensorLag
-from mgdd.identify.smooth_throttle import SmoothThrottleFit, fit_smooth_throttle, simulate_smooth_throttle
-from mgdd.identify.surrogate import EngineSurrogate, SignalModel
-from mgdd.identify.surrogate_engine import SurrogateEngine
-from mgdd.identify.surrogate_fit import fit_surrogate
-from mgdd.identify.surrogate_optimum import SurrogateOptimum
-from mgdd.identify.throttle_fit import FittedParameters, ThrottleFit, ThrottleModel
-from mgdd.identify.throttle_fits import load_throttle_model
-from mgdd.identify.throttle_front import identify_throttle
-from mgdd.identify.throttle_validation import ThrottleValidation, correlation_dataset, validate_throttle
-from mgdd.identify.two_tanks import TanksFit, TwoTanksModel, fit_two_tanks
-from mgdd.identify.wiener_hammerstein import (
-    LinearApproximation,
-    WienerHammersteinFit,
-    WienerHammersteinModel,
-    fit_linear,
-    fit_wiener_hammerstein,
-)
+from mgdd.identify.engine.best_timing import best_timing
+from mgdd.identify.engine.burn_laws import compare_laws
+from mgdd.identify.engine.cylinder import fit_cylinder
+from mgdd.identify.engine.profile import wall_heat_profile
+from mgdd.identify.ode_fit import OdeModel, fit_ode
+from mgdd.identify.throttle.excitation_check import check_excitation
+from mgdd.identify.throttle.excitation_design import design_excitation
+from mgdd.identify.throttle.first_principle import fit_throttle
+from mgdd.identify.throttle.first_principle_model import FirstPrincipleModel
+from mgdd.identify.throttle.fits import load_throttle_model
+from mgdd.identify.throttle.identify import identify_throttle
+from mgdd.identify.throttle.n_step import n_step_rms, split_log
+from mgdd.identify.throttle.online_update import OnlineUpdate
+from mgdd.identify.throttle.physical_parameters import physical_parameters
+from mgdd.identify.throttle.pseudo_wiener_fit import fit_pseudo_wiener
+from mgdd.identify.throttle.smooth import SmoothThrottle, fit_smooth_throttle
+from mgdd.identify.throttle.validation import validate_throttle
 
 __all__ = [
-    "CylinderFit",
-    "DriveFit",
-    "DriveModel",
-    "EngineSurrogate",
-    "ExcitationCheck",
     "FirstPrincipleModel",
-    "FittedParameters",
-    "LinearApproximation",
-    "LoadFit",
-    "OdeFit",
     "OdeModel",
     "OnlineUpdate",
-    "PseudoWienerFit",
-    "RecordContent",
-    "ResidualTests",
-    "SensorLag",
-    "SignalModel",
-    "SmoothThrottleFit",
-    "Support",
-    "SurrogateEngine",
-    "SurrogateOptimum",
-    "TanksFit",
-    "ThrottleFit",
-    "ThrottleModel",
-    "ThrottleValidation",
-    "TwoTanksModel",
-    "WallHeatProfile",
-    "WienerHammersteinFit",
-    "WienerHammersteinModel",
-    "amplitude_random_steps",
+    "SmoothThrottle",
+    "best_timing",
     "check_excitation",
-    "chirp",
-    "correlation_dataset",
+    "compare_laws",
     "design_excitation",
-    "drive_free_run",
-    "drive_inverse_dynamics",
     "fit_cylinder",
-    "fit_drive",
-    "fit_linear",
     "fit_ode",
-    "fit_percent",
     "fit_pseudo_wiener",
     "fit_smooth_throttle",
-    "fit_surrogate",
     "fit_throttle",
-    "fit_two_tanks",
-    "fit_wiener_hammerstein",
     "identify_throttle",
     "load_throttle_model",
-    "mse",
-    "multisine",
     "n_step_rms",
     "physical_parameters",
-    "prbs",
-    "random_step_records",
-    "residual_tests",
-    "rmse",
-    "simulate_smooth_throttle",
     "split_log",
-    "staircase",
-    "throttle_start",
-    "triangle",
-    "vaf_percent",
     "validate_throttle",
     "wall_heat_profile",
 ]

@@ -1,4 +1,4 @@
-"""Grey-box fit: the user's own ordinary differential equation, written in Python, on the house's least squares."""
+"""Grey-box fit: the user's own ordinary differential equation, written in Python, fitted by least squares."""
 
 from __future__ import annotations
 
@@ -10,8 +10,17 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from mgdd import _core
-from mgdd.errors import DataError, ParameterError, ShapeError
-from mgdd.optimize import FitReport, least_squares
+from mgdd.errors import ParameterError, ShapeError
+from mgdd.io.parameters import Entry, ParameterFile, Wanted, entries, wanted
+from mgdd.optimize import least_squares
+from mgdd.optimize.fit_options import FitOptions, fit_options
+from mgdd.optimize.fit_run import draw_run, fit_run, quality_of
+from mgdd.results import VARIABLES, Fit, Label
+from mgdd.results.describe import described
+from mgdd.results.fit import n_best_of
+from mgdd.results.units import unit_of
+from mgdd.signals.even_grid import even_step
+from mgdd.signals.model import RunInputs, SampledModel, columns_of
 
 if TYPE_CHECKING:
     from collections.abc import Callable, Collection, Sequence
@@ -21,14 +30,17 @@ if TYPE_CHECKING:
     Derivative = Callable[[float, NDArray[Any], NDArray[Any], NDArray[Any]], ArrayLike]
     Output = Callable[[NDArray[Any], NDArray[Any], NDArray[Any]], ArrayLike]
 
-__all__ = ["OdeFit", "OdeModel", "fit_ode"]
+__all__ = ["OdeModel", "fit_ode"]
 
 # Central differences: the truncation h^2 and the rounding eps/h meet near eps^(1/3).
 _STEP = 6e-6
+_FUNCTIONS = ("derivative", "output")
+_STATE = "unit of the state"
 
 
+@described
 @dataclass(frozen=True, kw_only=True)
-class OdeModel:
+class OdeModel(SampledModel):
     """An ordinary differential equation with its parameters, on fixed Runge-Kutta steps with the input held.
 
     Parameters
@@ -39,10 +51,14 @@ class OdeModel:
         ``output(x, u, p)`` as in `fit_ode`.
     parameters : mapping of str to float
         Values in the order that `derivative` expects.
-    start : tuple of float
-        State at the first sample.
+    initial_state : tuple of float
+        State at the first sample of a free run that is not told one.
     substeps : int
         Equal Runge-Kutta steps per sample.
+    input_names : tuple of str
+        Columns that make up the input, in order.
+    output_name : str
+        Name of the output.
 
     Examples
     --------
@@ -51,93 +67,134 @@ class OdeModel:
     ...     derivative=lambda t, x, u, p: (p[0] * u[0] - x) / p[1],
     ...     output=lambda x, u, p: x[0],
     ...     parameters={"gain": 2.0, "time_s": 0.5},
-    ...     start=(0.0,),
+    ...     initial_state=(0.0,),
     ... )
-    >>> lag.simulate([0.0, 0.1, 0.2], [1.0, 1.0, 1.0]).round(4).tolist()
+    >>> lag.simulate({"time_s": [0.0, 0.1, 0.2], "u": [1.0, 1.0, 1.0]})["y"].values.round(4).tolist()
     [0.0, 0.3625, 0.6594]
     """
 
     derivative: Derivative
     output: Output
     parameters: Mapping[str, float]
-    start: tuple[float, ...]
+    initial_state: tuple[float, ...]
     substeps: int = 1
+    input_names: tuple[str, ...] = ("u",)
+    output_name: str = "y"
 
     def __post_init__(self) -> None:
         object.__setattr__(self, "parameters", MappingProxyType(dict(self.parameters)))
+        object.__setattr__(self, "state_names", tuple(f"state_{i}" for i in range(len(self.initial_state))))
 
-    def simulate(self, time_s: ArrayLike, u: ArrayLike, *, start: ArrayLike | None = None) -> NDArray[np.float64]:
-        """Run free.
+    @property
+    def kind(self) -> str:
+        """``ode``."""
+        return "ode"
 
-        Parameters
-        ----------
-        time_s : array_like, shape (n,)
-            Constant sample time [s].
-        u : array_like, shape (n,) or (n, n_inputs)
-            Input, held from each sample to the next.
-        start : array_like, shape (n_states,), optional
-            State at the first sample; the model's own without.
+    def _rest(self) -> list[float]:
+        return list(self.initial_state)
+
+    def _run(self, run: RunInputs) -> NDArray[np.float64]:
+        p = np.array(list(self.parameters.values()))[:, None]
+        start = np.array(run.state, dtype=np.float64)[:, None]
+        return _simulate(
+            self.derivative, self.output, run.time_s, np.column_stack(run.columns), start, p, self.substeps
+        )[:, 0]
+
+    def _label(self, name: str) -> Label:
+        return VARIABLES.get(name, Label(f"unit of {name}", name))
+
+    def to_toml(self) -> str:
+        """Write parameters, initial state, columns and substeps as TOML, with the names of the two functions.
 
         Returns
         -------
-        ndarray, shape (n,)
-            Output on every sample.
+        str
+            The text of a parameter file, for `from_toml`.
         """
-        time, inputs = _record(time_s, u)
-        state = np.array(self.start if start is None else start, dtype=np.float64)[:, None]
-        p = np.array(list(self.parameters.values()))[:, None]
-        return _simulate(self.derivative, self.output, time, inputs, state, p, self.substeps)[:, 0]
+        settings = {
+            "initial_state": Entry(value=[float(x) for x in self.initial_state], unit=_STATE),
+            "substeps": Entry(value=self.substeps),
+            "input_names": Entry(value=list(self.input_names)),
+            "output_name": Entry(value=self.output_name),
+        }
+        functions = {name: _name_of(getattr(self, name)) for name in _FUNCTIONS}
+        tables = {"parameters": entries(self.parameters), "settings": settings, "functions": entries(functions)}
+        return ParameterFile(kind="ode", tables=tables).to_toml()
 
+    @classmethod
+    def from_toml(
+        cls, text: str, *, derivative: Derivative, output: Output | None = None, origin: str = "text"
+    ) -> OdeModel:
+        """Read what `to_toml` wrote; the functions are Python and are given again.
 
-@dataclass(frozen=True, kw_only=True)
-class OdeFit:
-    """Result of `fit_ode`.
+        Parameters
+        ----------
+        text : str
+            The text of a parameter file.
+        derivative, output : callable
+            The functions of the model that was written; the first state without `output`.
+        origin : str
+            Name for the messages, for example the file.
 
-    Parameters
-    ----------
-    report : mgdd.optimize.FitReport
-        Of the best start: estimates, uncertainty, what the data leave open.
-    model : OdeModel
-        With the estimates.
-    reports : tuple of mgdd.optimize.FitReport
-        One per start.
-    n_reached : int
-        Starts whose rmse is within 0.5 % of the best.
+        Returns
+        -------
+        OdeModel
+            Simulates bit for bit as the one that was written.
 
-    Examples
-    --------
-    >>> from mgdd.identify import OdeFit
-    >>> sorted(OdeFit.__dataclass_fields__)
-    ['model', 'n_reached', 'report', 'reports']
-    """
-
-    report: FitReport
-    model: OdeModel
-    reports: tuple[FitReport, ...]
-    n_reached: int
+        Raises
+        ------
+        DataError
+            Not TOML, another kind or format version, a missing table or key.
+        ParameterError
+            An unknown key, a wrong type, or functions of other names than those that were written.
+        """
+        file = ParameterFile.from_toml(text, origin=origin)
+        file.expect(kinds=("ode",), tables=("parameters", "settings", "functions"))
+        read: Output = _first_state if output is None else output
+        functions = {"derivative": derivative, "output": read}
+        for name, written in file.values("functions", wanted(_FUNCTIONS, form="text")).items():
+            if _name_of(functions[name]) != written:
+                raise ParameterError(
+                    f"{name} = {_name_of(functions[name])}: {origin} was written with {written}; give that function, "
+                    f"or change the line in [functions] if it was renamed"
+                )
+        expected = {
+            "initial_state": Wanted(_STATE, "numbers"),
+            "substeps": Wanted(form="integer"),
+            "input_names": Wanted(form="texts"),
+            "output_name": Wanted(form="text"),
+        }
+        settings = file.values("settings", expected)
+        values = file.values("parameters", {name: Wanted(unit_of(name)) for name in file.tables["parameters"]})
+        return cls(
+            derivative=derivative,
+            output=read,
+            parameters=values,
+            initial_state=tuple(float(value) for value in settings["initial_state"]),
+            substeps=settings["substeps"],
+            input_names=tuple(settings["input_names"]),
+            output_name=settings["output_name"],
+        )
 
 
 def fit_ode(
     derivative: Derivative,
-    time_s: ArrayLike,
+    record: Any,
     *,
-    u: ArrayLike,
-    y: ArrayLike,
     parameters: Mapping[str, float],
-    start: ArrayLike,
+    initial_state: ArrayLike,
+    input_names: Sequence[str] = ("u",),
+    output_name: str = "y",
     output: Output | None = None,
     free: Collection[str] | None = None,
-    free_start: Sequence[int] = (),
+    free_state: Sequence[int] = (),
     bounds: Mapping[str, tuple[float, float]] | None = None,
     log_scaled: Collection[str] = (),
     substeps: int = 1,
     skip: int = 0,
     sigma: float = 1.0,
-    n_starts: int = 1,
-    seed: int = 0,
-    max_iterations: int = 100,
-    cost_tolerance: float = 1e-9,
-) -> OdeFit:
+    options: FitOptions | None = None,
+) -> Fit:
     """Fit parameters and start of the user's own ODE to a record: output error of the free run.
 
     The function is evaluated on stacked perturbed parameters, so that a simulation and all its central differences
@@ -149,24 +206,24 @@ def fit_ode(
     derivative : callable
         ``derivative(t, x, u, p)`` [state unit per s]: time [s], state (n_states, m), input (n_inputs,), parameters
         (n_parameters, m) in the order of `parameters`; returns (n_states, m) or a sequence of n_states rows.
-    time_s : array_like, shape (n,)
-        Constant sample time [s].
-    u : array_like, shape (n,) or (n, n_inputs)
-        Input, held from each sample to the next.
-    y : array_like, shape (n,)
-        Measured output.
+    record : xarray.Dataset, DataFrame or mapping of columns
+        ``time_s`` [s], evenly spaced, the inputs, each held to the next sample, and the measured output.
     parameters : mapping of str to float
         Start values.
-    start : array_like, shape (n_states,)
+    initial_state : array_like, shape (n_states,)
         State at the first sample; for the free ones where the search starts.
+    input_names : sequence of str
+        Columns that make up the input, in order.
+    output_name : str
+        Column of the measured output.
     output : callable, optional
         ``output(x, u, p)`` to (m,); the first state without.
     free : collection of str, optional
         Parameters that are estimated; all without.
-    free_start : sequence of int
-        States whose value at the first sample is estimated; reported as ``start_0``, ...
+    free_state : sequence of int
+        States whose value at the first sample is estimated; reported as ``state_0``, ...
     bounds : mapping of str to (float, float), optional
-        Per parameter, also for ``start_0``.
+        Per parameter, also for ``state_0``.
     log_scaled : collection of str
         Parameters searched as logarithms; they need a positive lower bound.
     substeps : int
@@ -174,19 +231,14 @@ def fit_ode(
     skip : int
         First samples without a residual.
     sigma : float
-        Noise level in the unit of `y`; the residual is divided by it.
-    n_starts : int
-        Above 1: further starts from a Latin hypercube between the bounds, which must then be finite.
-    seed : int
-        Of that hypercube.
-    max_iterations : int
-        Trial steps per start.
-    cost_tolerance : float
-        Relative decrease of the cost that ends a search [-].
+        Noise level in the unit of the output; the residual is divided by it.
+    options : FitOptions, optional
+        1 start, 100 trial steps and a tolerance of 1e-9 where nothing else is said; more starts come from a Latin
+        hypercube (seed 0) between the bounds, which must then be finite.
 
     Returns
     -------
-    OdeFit
+    mgdd.results.Fit
         Report, model, and the reports of all starts.
 
     Raises
@@ -214,40 +266,37 @@ def fit_ode(
     >>> def lag(t, x, u, p):
     ...     return (p[0] * u[0] - x) / p[1]
     >>> y = 2.0 * (1.0 - np.exp(-time / 0.5))
-    >>> fit = fit_ode(lag, time, u=np.ones(201), y=y, parameters={"gain": 1.0, "time_s": 1.0}, start=[0.0])
+    >>> record = {"time_s": time, "u": np.ones(201), "y": y}
+    >>> fit = fit_ode(lag, record, parameters={"gain": 1.0, "time_s": 1.0}, initial_state=[0.0])
     >>> fit.report.values.round(3).tolist()
     [2.0, 0.5]
     """
-    time, inputs = _record(time_s, u)
-    measured = np.array(y, dtype=np.float64)
-    if measured.shape != time.shape:
-        raise ShapeError(f"y has shape {measured.shape}: must be {time.shape} as time_s")
-    if not np.isfinite(measured).all():
-        raise DataError(
-            f"y: sample {int(np.argmin(np.isfinite(measured)))} is not a number: interpolate or cut the record"
-        )
-    state = np.array(start, dtype=np.float64)
+    chosen_options = fit_options(options, n_starts=1, seed=0, max_iterations=100, tolerance=1e-9)
+    n_starts = chosen_options.n_starts
+    time, *columns, measured = columns_of(record, ("time_s", *input_names, output_name))
+    even_step(time)
+    inputs = np.column_stack(columns)
+    state = np.array(initial_state, dtype=np.float64)
     if state.ndim != 1 or not np.isfinite(state).all():
-        raise ShapeError("start: must be a vector of finite numbers, one per state")
+        raise ShapeError("initial_state: must be a vector of finite numbers, one per state")
     if not 0 <= skip < time.size:
         raise ParameterError(f"skip = {skip}: must be within [0, {time.size - 1}]")
     if not (np.isfinite(sigma) and sigma > 0.0):
         raise ParameterError(f"sigma = {sigma!r}: must be > 0")
-    for field, value in {"substeps": substeps, "n_starts": n_starts}.items():
-        if value < 1:
-            raise ParameterError(f"{field} = {value}: must be >= 1")
+    if substeps < 1:
+        raise ParameterError(f"substeps = {substeps}: must be >= 1")
     names = list(parameters)
     chosen = names if free is None else [name for name in names if name in set(free)]
-    start_names = [f"start_{i}" for i in free_start]
-    unknowns = [*chosen, *start_names]
+    free_states = [f"state_{i}" for i in free_state]
+    unknowns = [*chosen, *free_states]
     for given in (free or (), bounds or (), log_scaled):
         for name in given:
-            if name not in names and name not in start_names:
+            if name not in names and name not in free_states:
                 raise ParameterError(
-                    f"{name!r}: no parameter of this model; it has {', '.join([*names, *start_names])}"
+                    f"{name!r}: no parameter of this model; it has {', '.join([*names, *free_states])}"
                 )
-    if any(not 0 <= i < state.size for i in free_start):
-        raise ParameterError(f"free_start = {list(free_start)}: must be indices of the {state.size} states")
+    if any(not 0 <= i < state.size for i in free_state):
+        raise ParameterError(f"free_state = {list(free_state)}: must be indices of the {state.size} states")
     p0 = np.array([float(parameters[name]) for name in names])
     where = [names.index(name) for name in chosen]
     limits = [(bounds or {}).get(name, (-np.inf, np.inf)) for name in unknowns]
@@ -265,7 +314,7 @@ def fit_ode(
         p = np.repeat(p0[:, None], 2 * n + 1, axis=1)
         p[where] = columns[: len(chosen)]
         s = np.repeat(state[:, None], 2 * n + 1, axis=1)
-        s[list(free_start)] = columns[len(chosen) :]
+        s[list(free_state)] = columns[len(chosen) :]
         return p, s, columns[np.arange(n), 1 + np.arange(n)] - columns[np.arange(n), 1 + n + np.arange(n)]
 
     def residual(x: NDArray[np.float64]) -> tuple[NDArray[np.float64], NDArray[np.float64]] | None:
@@ -277,14 +326,14 @@ def fit_ode(
         difference = (simulated[:, 1 : n + 1] - simulated[:, n + 1 :]) / widths
         return (simulated[:, 0] - measured[skip:]) / sigma, difference / sigma
 
-    first = np.concatenate([p0[where], state[list(free_start)]])
+    first = np.concatenate([p0[where], state[list(free_state)]])
     starts = [first]
     if n_starts > 1:
         box = [
             _core.Parameter(name=name, lower=low, upper=high, log_scaled=log)
             for name, low, high, log in zip(unknowns, lower.tolist(), upper.tolist(), logs, strict=True)
         ]
-        starts += [np.asarray(point) for point in _core.latin_hypercube(box, n_starts - 1, seed)]
+        starts += [np.asarray(point) for point in _core.latin_hypercube(box, n_starts - 1, chosen_options.seed)]
     reports = tuple(
         least_squares(
             residual,
@@ -294,8 +343,8 @@ def fit_ode(
             upper=upper,
             log_scaled=logs,
             data=measured[skip:] / sigma,
-            max_iterations=max_iterations,
-            cost_tolerance=cost_tolerance,
+            max_iterations=chosen_options.max_iterations,
+            cost_tolerance=chosen_options.tolerance,
         )
         for point in starts
     )
@@ -303,36 +352,45 @@ def fit_ode(
         raise ParameterError("the model gives no finite simulation at the start values: change them or raise substeps")
     best = min(reports, key=lambda report: report.cost if np.isfinite(report.cost) else np.inf)
     p0[where] = best.values[: len(chosen)]
-    state[list(free_start)] = best.values[len(chosen) :]
+    state[list(free_state)] = best.values[len(chosen) :]
     model = OdeModel(
         derivative=derivative,
         output=read,
         parameters=dict(zip(names, p0.tolist(), strict=True)),
-        start=tuple(state.tolist()),
+        initial_state=tuple(state.tolist()),
         substeps=substeps,
+        input_names=tuple(input_names),
+        output_name=output_name,
     )
-    reached = sum(bool(report.rmse <= 1.005 * best.rmse) for report in reports)
-    return OdeFit(report=best, model=model, reports=reports, n_reached=reached)
+    errors = tuple(sorted(report.rmse if np.isfinite(report.rmse) else np.inf for report in reports))
+    run, quality = None, None
+    if np.isfinite(best.rmse):
+        simulated = model.simulate(record)[output_name].to_numpy()
+        run = fit_run(time, measured, simulated, model._label(output_name))
+        quality = quality_of(run.isel(time_s=slice(skip, None)))
+    return Fit(
+        report=best,
+        model=model,
+        kind=model.kind,
+        train=quality,
+        findings=best.findings,
+        unidentifiable=best.unidentifiable,
+        start_rmse=errors,
+        n_best=n_best_of(errors),
+        start_reports=reports,
+        run=run,
+        draw=draw_run,
+    )
+
+
+def _name_of(function: Any) -> str:
+    return str(getattr(function, "__qualname__", type(function).__qualname__))
 
 
 def _first_state(x: NDArray[Any], u: NDArray[Any], p: NDArray[Any]) -> NDArray[Any]:
     del u, p
     first: NDArray[Any] = x[0]
     return first
-
-
-def _record(time_s: ArrayLike, u: ArrayLike) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
-    time = np.array(time_s, dtype=np.float64)
-    inputs = np.array(u, dtype=np.float64)
-    inputs = inputs[:, None] if inputs.ndim == 1 else inputs
-    if time.ndim != 1 or time.size < 2 or inputs.ndim != 2 or len(inputs) != time.size:
-        raise ShapeError(f"time_s has shape {time.shape}, u {inputs.shape}: must be (n,) and (n,) or (n, n_inputs)")
-    steps = np.diff(time)
-    if not np.isfinite(inputs).all() or not np.isfinite(time).all():
-        raise DataError("time_s, u: must be finite numbers")
-    if not (steps > 0.0).all() or steps.max() - steps.min() > 1e-3 * steps.mean():
-        raise DataError("time_s: must rise in equal steps; resample the record first")
-    return time, inputs
 
 
 def _simulate(
@@ -345,7 +403,7 @@ def _simulate(
     substeps: int,
 ) -> NDArray[np.float64]:
     x = state.copy()
-    h = (time[-1] - time[0]) / (time.size - 1) / substeps
+    h = even_step(time) / substeps
     y = np.empty((time.size, p.shape[1]))
 
     def slope(t: float, at: NDArray[np.float64], u: NDArray[np.float64]) -> NDArray[np.float64]:

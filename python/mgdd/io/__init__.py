@@ -1,4 +1,4 @@
-"""Files in, files out: measured pressure, throttle logs (also from MATLAB) and operating conditions.
+"""Files in, files out: measured pressure, throttle logs (also from MATLAB), operating conditions, parameters.
 
 Angles are degrees of crank angle with firing TDC = 0 and compression negative (°CA aTDC); pressure is in bar.
 """
@@ -6,16 +6,15 @@ Angles are degrees of crank angle with firing TDC = 0 and compression negative (
 from __future__ import annotations
 
 from mgdd.io.angles import from_0_720, from_btdc
-from mgdd.io.checks import check_trace
 from mgdd.io.conditions import read_conditions
+from mgdd.io.parameters import ParameterFile
 from mgdd.io.pressure import pressure_trace, read_pressure, write_pressure
 from mgdd.io.throttle_checks import check_throttle_log
 from mgdd.io.throttle_log import read_throttle_log, throttle_log, write_throttle_log
-from mgdd.io.traces import write_traces
 
 __all__ = [
+    "ParameterFile",
     "check_throttle_log",
-    "check_trace",
     "from_0_720",
     "from_btdc",
     "pressure_trace",
@@ -25,5 +24,4 @@ __all__ = [
     "throttle_log",
     "write_pressure",
     "write_throttle_log",
-    "write_traces",
 ]

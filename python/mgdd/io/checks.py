@@ -9,6 +9,7 @@ import numpy as np
 
 from mgdd.errors import DataError
 from mgdd.io.angles import CONVENTION, pair
+from mgdd.signals.even_grid import wide_steps
 
 if TYPE_CHECKING:
     from collections.abc import Callable, Sequence
@@ -74,7 +75,7 @@ def check_trace(
     Examples
     --------
     >>> import numpy as np
-    >>> from mgdd.io import check_trace
+    >>> from mgdd.io.checks import check_trace
     >>> angle = np.arange(-30.0, 31.0)
     >>> _, pressure = check_trace(angle, 6e6 - 1000.0 * angle**2, unit="Pa")
     >>> float(pressure.max())
@@ -153,11 +154,9 @@ def _check_convention(degrees: NDArray[np.float64], source: str) -> None:
 
 
 def _check_gap(degrees: NDArray[np.float64], place: Callable[[int], str]) -> None:
-    step = np.diff(degrees)
-    median = float(np.median(step))
-    wide = np.flatnonzero(step > 1.5 * median * (1.0 + 1e-9))
-    if wide.size:
-        index = int(wide[0]) + 1
+    wide, median = wide_steps(degrees)
+    if wide:
+        index = wide[0]
         raise DataError(
             f"{place(index)}: gap in the crank angle from {degrees[index - 1]:g} to {degrees[index]:g}: "
             f"the usual step is {median:g}; fill it or cut the trace there"

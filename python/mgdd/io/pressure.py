@@ -11,7 +11,8 @@ from mgdd.errors import DataError
 from mgdd.io.angles import aligned_angle
 from mgdd.io.checks import ANGLE_UNITS, PRESSURE_UNITS, check_choice, check_trace
 from mgdd.io.table import read_table
-from mgdd.results import ANGLE, check_labels, labelled_dataset
+from mgdd.results import check_labels, labelled_dataset
+from mgdd.results.labels import ANGLE
 
 if TYPE_CHECKING:
     import os
@@ -180,7 +181,7 @@ def write_pressure(dataset: xr.Dataset, path: str | os.PathLike[str]) -> None:
     check_labels(dataset[["pressure_bar"]])
     measured = dataset["pressure_bar"]
     angle, pressure = check_trace(measured[ANGLE].to_numpy(), measured.to_numpy(), source="dataset")
-    lines = ["# crank angle [°CA aTDC], cylinder pressure [bar]", f"{ANGLE},pressure_bar"]
+    lines = [f"{ANGLE},pressure_bar"]
     lines += [f"{a!r},{p!r}" for a, p in zip(angle.tolist(), pressure.tolist(), strict=True)]
     Path(path).write_text("\n".join(lines) + "\n", encoding="utf-8", newline="\n")
 

@@ -189,7 +189,7 @@ def read_throttle_log(
 
 
 def write_throttle_log(log: xr.Dataset, path: str | os.PathLike[str]) -> None:
-    """Write a log as CSV with a units row that `read_throttle_log` reads back bit by bit.
+    """Write a log as plain CSV that `read_throttle_log` reads back bit by bit.
 
     Parameters
     ----------
@@ -218,7 +218,7 @@ def write_throttle_log(log: xr.Dataset, path: str | os.PathLike[str]) -> None:
     """
     check_throttle_log(log)
     names = ["time_s", "duty", "angle_deg", *(name for name in _OPTIONAL if name in log)]
-    lines = [",".join(names), ",".join(log[name].attrs["units"] for name in names)]
+    lines = [",".join(names)]
     lines += [",".join(map(repr, row)) for row in np.column_stack([log[name].to_numpy() for name in names]).tolist()]
     Path(path).write_text("\n".join(lines) + "\n", encoding="utf-8", newline="\n")
 

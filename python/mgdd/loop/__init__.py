@@ -1,25 +1,31 @@
-"""Closed loops: the virtual engine bench, a seeker on it, and thousands of such runs at once.
+"""Closed loops: plants behind one protocol, a seeker on any of them, and thousands of runs on the virtual bench.
 
-`EngineBench` is the plant with its chance and its sensors, `run_seeker` closes the loop in the core, `monte_carlo` does
-so for seeds, gains and operating points on all cores, `steady_optimum` says where a seeker should end.
+`EngineBench`, `SurrogatePlant` and `VirtualThrottle` are plants: ``apply`` inputs by name, ``measure``. `run_seeker`
+closes the loop on any of them and on a test rig, `monte_carlo` does so for seeds, gains and operating points of the
+bench on all cores, `find_steady_optimum` says where a seeker should end.
 """
 
 from __future__ import annotations
 
 from mgdd._core import SensorDynamics
 from mgdd.loop.bench import EngineBench
-from mgdd.loop.seek import LoopRun, monte_carlo, run_seeker
-from mgdd.loop.steady import SteadyOptimum, steady_map, steady_optimum
-from mgdd.loop.summary import summarize_cycles
+from mgdd.loop.criteria import LoopCriteria
+from mgdd.loop.plant import Measurement, Plant
+from mgdd.loop.seek import monte_carlo, run_seeker
+from mgdd.loop.steady import find_steady_optimum, steady_map
+from mgdd.loop.surrogate_plant import SurrogatePlant
+from mgdd.loop.virtual_throttle import VirtualThrottle
 
 __all__ = [
     "EngineBench",
-    "LoopRun",
+    "LoopCriteria",
+    "Measurement",
+    "Plant",
     "SensorDynamics",
-    "SteadyOptimum",
+    "SurrogatePlant",
+    "VirtualThrottle",
+    "find_steady_optimum",
     "monte_carlo",
     "run_seeker",
     "steady_map",
-    "steady_optimum",
-    "summarize_cycles",
 ]

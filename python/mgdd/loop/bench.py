@@ -3,14 +3,16 @@
 from __future__ import annotations
 
 from collections import Counter
-from collections.abc import Iterable, Sequence
+from collections.abc import Iterable, Mapping, Sequence
 from typing import TYPE_CHECKING, Any
 
 from mgdd import _core, presets
 from mgdd._core import Cylinder, NoxModel, OperatingPoint, Performance, SensorDynamics, SoftSensor
-from mgdd.errors import ParameterError
+from mgdd.errors import ParameterError, RigError
+from mgdd.loop.plant import Measurement, checked_inputs
 from mgdd.presets import Preset
 from mgdd.results import VARIABLES, labelled_dataset
+from mgdd.results.describe import as_html, rows_of
 
 if TYPE_CHECKING:
     import xarray as xr
@@ -142,6 +144,56 @@ class EngineBench(_core.EngineBench):
             seed=seed,
         )
 
+    @property
+    def input_names(self) -> tuple[str, ...]:
+        """The one input, ``soc_cad`` [°CA aTDC]."""
+        return ("soc_cad",)
+
+    @property
+    def limit_names(self) -> tuple[str, ...]:
+        """Names of the limited quantities that a cycle reports."""
+        return tuple(self.settings["limits"])
+
+    def apply(self, inputs: Mapping[str, float]) -> None:
+        """Set the start of combustion of the next cycle.
+
+        Parameters
+        ----------
+        inputs : mapping of str to float
+            ``soc_cad`` [°CA aTDC]; the bench clamps it to its window and says so in ``values["clamped"]``.
+
+        Raises
+        ------
+        mgdd.errors.ParameterError
+            A missing, unknown or non-finite input.
+        """
+        (self._applied_cad,) = checked_inputs(inputs, self.input_names)
+
+    def measure(self) -> Measurement:
+        """Run one cycle at the timing applied last.
+
+        Returns
+        -------
+        Measurement
+            ``values`` holds the indicators, actual SOC, NOx of every sensor and the flags as 0 or 1.
+
+        Raises
+        ------
+        mgdd.errors.RigError
+            Nothing was applied yet.
+        """
+        applied = getattr(self, "_applied_cad", None)
+        if applied is None:
+            raise RigError("measure() before apply(): apply a timing first")
+        cycle = self.step(applied)
+        components, limits = cycle.pop("components"), cycle.pop("limits")
+        return Measurement(
+            components=tuple(map(float, components)),
+            limits=limits,
+            misfire=cycle["misfire"],
+            values={name: float(value) for name, value in cycle.items()},
+        )
+
     def run(self, soc_cad: ArrayLike) -> xr.Dataset:
         """Run one cycle per requested start of combustion, without the GIL.
 
@@ -170,6 +222,9 @@ class EngineBench(_core.EngineBench):
         array([107.2, 103. ])
         """
         return cycles_to_dataset(self, self.run_columns(soc_cad))
+
+    def _repr_html_(self) -> str:
+        return as_html(f"EngineBench at cycle {self.cycle}", rows_of(self.settings))
 
 
 def cycles_to_dataset(bench: EngineBench, columns: dict[str, Any], **more: ArrayLike) -> xr.Dataset:

@@ -1,18 +1,20 @@
-"""A seeker on the virtual bench: one closed loop, or thousands."""
+"""A seeker on a plant: one closed loop, or thousands on the virtual bench."""
 
 from __future__ import annotations
 
 import math
 import operator
-from collections.abc import Iterable, Mapping, Sequence
-from dataclasses import dataclass
+from collections.abc import Iterable, Sequence
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
 from mgdd import _core
-from mgdd.errors import ParameterError, hand_over, or_partial
+from mgdd.errors import ParameterError, ShapeError, hand_over, or_partial
 from mgdd.loop.bench import EngineBench, cycles_to_dataset
+from mgdd.loop.criteria import LoopCriteria
+from mgdd.loop.plant import Plant
+from mgdd.loop.plant_loop import LoopRun, steer
 from mgdd.results import labelled_dataset
 
 if TYPE_CHECKING:
@@ -42,112 +44,78 @@ _SUMMARY = {
 }
 
 
-@dataclass(frozen=True, kw_only=True)
-class LoopRun:
-    """A closed loop, cycle by cycle, and what it came to.
-
-    Parameters
-    ----------
-    dataset : xarray.Dataset
-        Over ``cycle``: ``estimate_cad`` before the cycle and everything that the bench measured of it.
-    summary : mapping of str to float
-        ``final_cad`` (mean estimate of the last 100 cycles), ``mean_cad`` and ``rms_cad`` (second half), ``cycles_to``
-        and ``cycles_stays`` (NaN: never), ``exceeded_fraction``, means of J, efficiency and true NOx over the second
-        half, extremes of the estimate, misfires.
-    interrupted : bool
-        Ctrl-C ended the run before all its cycles: it is the part that `mgdd.errors.Interrupted` carried.
-
-    Examples
-    --------
-    >>> from mgdd.loop import EngineBench, run_seeker
-    >>> from mgdd.optimize import ExtremumSeeking
-    >>> run = run_seeker(EngineBench(seed=1), ExtremumSeeking(start=-20.0, lower=-30.0, upper=10.0), 600)
-    >>> abs(run.summary["final_cad"] + 5.63) < 2.0
-    True
-    """
-
-    dataset: xr.Dataset
-    summary: Mapping[str, float]
-    interrupted: bool = False
-
-
 def run_seeker(
-    bench: EngineBench,
+    plant: Plant,
     seeker: Seeker,
     cycles: int,
     *,
-    optimum_cad: float | None = None,
-    arrival_cad: float = 1.0,
-    tail_cycles: int = 100,
-    exceed_from: int = 1000,
-    exceed_above: Mapping[str, float] | None = None,
+    criteria: LoopCriteria | None = None,
 ) -> LoopRun:
-    """Run a seeker on the bench, in the core and without the GIL.
+    """Let a seeker steer a plant: a virtual bench, a surrogate, a rig over a bus, or one of your own.
 
-    Each cycle is one ask, one cycle of the bench and one tell; a new operating point restarts the seeker first. Driving
-    the same seeker from Python one ask/tell at a time gives the same trajectory, bit for bit. Both go on from where
-    they stand: calling again continues.
+    Each cycle is one ask, one cycle of the plant and one tell. A misfired cycle is told as such. A new operating point
+    restarts the seeker: before its first cycle where the plant announces it (`AnnouncingPlant`), otherwise after the
+    first cycle whose ``values["operating_point_changed"]`` is true; the reading of that cycle belongs to neither point
+    and counts as void. Both go on from where they stand: calling again continues. On an `EngineBench` the loop runs in
+    the core without the GIL; one ask and tell at a time from Python gives the same trajectory, bit for bit.
 
     Parameters
     ----------
-    bench : EngineBench
-        The plant; it advances by ``cycles``.
+    plant : Plant
+        It advances by ``cycles``; a rig is open and stays open.
     seeker
-        Any seeker of `mgdd.optimize` with one input, one component or as many as the performance has terms, and the
-        limits of the bench.
+        Any seeker of `mgdd.optimize` with one input for every name of ``plant.input_names``, one component or as many
+        as the plant measures, and limits that the plant measures.
     cycles : int
-        How many.
-    optimum_cad : float, optional
-        Where the estimate should go [°CA aTDC], for ``rms_cad``, ``cycles_to`` and ``cycles_stays``.
-    arrival_cad : float
-        Distance to the optimum that counts as arrived [°CA].
-    tail_cycles : int
-        Cycles behind ``final_cad``.
-    exceed_from : int
-        First cycle that counts for ``exceeded_fraction``.
-    exceed_above : mapping of str to float, optional
-        Per limit of the bench, the value above which a cycle counts.
+        How many, >= 1.
+    criteria : LoopCriteria, optional
+        Where the estimate should go and what counts as a broken limit.
 
     Returns
     -------
     LoopRun
-        Cycles and summary.
+        Cycles with everything that was measured, and their summary.
 
     Raises
     ------
     mgdd.errors.ParameterError
-        A seeker that does not fit the bench, or fewer than one cycle.
+        A seeker that does not fit the plant, or fewer than one cycle.
+    mgdd.errors.DataError
+        A fired cycle whose reading is not finite. Errors of the plant pass through as well; the seeker then stands
+        before that cycle, and its ``history`` holds the cycles so far.
     mgdd.errors.InUseError
         Bench or seeker are in a call of another thread.
     mgdd.errors.Interrupted
-        Ctrl-C; ``partial`` is the LoopRun of the cycles until then. Bench and seeker stand behind them, and running
+        Ctrl-C; ``partial`` is the LoopRun of the cycles until then. Plant and seeker stand behind them, and running
         them again goes on.
 
     Examples
     --------
-    >>> from mgdd.loop import EngineBench, run_seeker
-    >>> from mgdd.optimize import GoldenSection
-    >>> seeker = GoldenSection(start=-20.0, lower=-30.0, upper=10.0, noise_sd=0.25)
-    >>> run = run_seeker(EngineBench(seed=1), seeker, 300, optimum_cad=-5.63)
-    >>> run.summary["cycles_to"] < 100
+    >>> from mgdd.loop import EngineBench, LoopCriteria, run_seeker
+    >>> from mgdd.optimize import ExtremumSeeking
+    >>> seeker = ExtremumSeeking(start=-20.0, lower=-30.0, upper=10.0)
+    >>> run = run_seeker(EngineBench(seed=1), seeker, 600, criteria=LoopCriteria(optimum=-5.63))
+    >>> run.summary["cycles_to"] < 200
     True
     """
-    above = _thresholds(bench, exceed_above)
-    raw, stop = or_partial(
-        lambda: _core.run_loop(
-            bench,
-            seeker,
-            cycles,
-            optimum_cad=math.nan if optimum_cad is None else optimum_cad,
-            arrival_cad=arrival_cad,
-            tail_cycles=tail_cycles,
-            exceed_from=exceed_from,
-            exceed_above=above,
-        )
-    )
-    dataset = cycles_to_dataset(bench, raw["columns"], estimate_cad=raw["estimate_cad"])
+    criteria = criteria or LoopCriteria()
+    if not isinstance(plant, EngineBench):
+        return steer(plant, seeker, cycles, criteria)
+    goal = _core_criteria(plant, criteria)
+    raw, stop = or_partial(lambda: _core.run_loop(plant, seeker, cycles, **goal))
+    dataset = cycles_to_dataset(plant, raw["columns"], estimate_cad=raw["estimate_cad"])
     dataset.attrs["interrupted"] = int(raw["interrupted"])
     return hand_over(LoopRun(dataset=dataset, summary=raw["summary"], interrupted=raw["interrupted"]), stop)
+
+
+def _core_criteria(bench: EngineBench, criteria: LoopCriteria) -> dict[str, Any]:
+    return {
+        "optimum_cad": math.nan if criteria.optimum is None else criteria.optimum,
+        "arrival_cad": criteria.arrival,
+        "tail_cycles": criteria.tail_cycles,
+        "exceed_from": criteria.exceed_from,
+        "exceed_above": criteria.thresholds(bench.limit_names),
+    }
 
 
 def monte_carlo(
@@ -156,11 +124,7 @@ def monte_carlo(
     seeds: Iterable[int],
     *,
     cycles: int,
-    optimum_cad: float | Sequence[float] | None = None,
-    arrival_cad: float = 1.0,
-    tail_cycles: int = 100,
-    exceed_from: int = 1000,
-    exceed_above: Mapping[str, float] | None = None,
+    criteria: LoopCriteria | Sequence[LoopCriteria] | None = None,
     threads: int = 0,
 ) -> xr.Dataset:
     """Run every seeker on every bench with every seed, whole loops at once on all cores.
@@ -178,17 +142,16 @@ def monte_carlo(
         Of the bench, and of SPSA.
     cycles : int
         Length of each loop.
-    optimum_cad : float or sequence of float, optional
-        Per bench, where the estimate should go [°CA aTDC].
-    arrival_cad, tail_cycles, exceed_from, exceed_above
-        As in `run_seeker`.
+    criteria : LoopCriteria or sequence of LoopCriteria, optional
+        As in `run_seeker`, one for all or one per bench.
     threads : int
         0 for all cores.
 
     Returns
     -------
     xarray.Dataset
-        Over ``bench``, ``seeker`` and ``seed``: the summary of `run_seeker`, and ``finished``, which is true.
+        Over ``bench``, ``seeker`` and ``seed``: the summary of `run_seeker`, and ``finished``, true
+        everywhere.
 
     Raises
     ------
@@ -201,10 +164,10 @@ def monte_carlo(
 
     Examples
     --------
-    >>> from mgdd.loop import EngineBench, monte_carlo
+    >>> from mgdd.loop import EngineBench, LoopCriteria, monte_carlo
     >>> from mgdd.optimize import ExtremumSeeking
     >>> gains = [ExtremumSeeking(start=-12.0, lower=-30.0, upper=10.0, gain=g) for g in (0.5, 1.0)]
-    >>> table = monte_carlo(EngineBench(), gains, range(4), cycles=400, optimum_cad=-5.63)
+    >>> table = monte_carlo(EngineBench(), gains, range(4), cycles=400, criteria=LoopCriteria(optimum=-5.63))
     >>> dict(table.sizes)
     {'bench': 1, 'seeker': 2, 'seed': 4}
     """
@@ -214,24 +177,24 @@ def monte_carlo(
     for seed in seed_list:
         if not 0 <= seed < 2**64:
             raise ParameterError(f"seeds: {seed} must be in [0, 2**64)")
-    if optimum_cad is None:
-        optima = [math.nan] * len(bench_list)
-    elif isinstance(optimum_cad, int | float | np.number):
-        optima = [float(optimum_cad)] * len(bench_list)
-    else:
-        optima = [float(value) for value in optimum_cad]
-    above = [_thresholds(bench, exceed_above) for bench in bench_list]
+    given = [criteria or LoopCriteria()] * len(bench_list) if not isinstance(criteria, Sequence) else list(criteria)
+    if len(given) != len(bench_list):
+        raise ShapeError(f"criteria has {len(given)} entries: give one for all or one per bench, {len(bench_list)}")
+    each = [_core_criteria(bench, own) for bench, own in zip(bench_list, given, strict=True)]
+    for name in ("arrival_cad", "tail_cycles", "exceed_from"):
+        if len({own[name] for own in each}) > 1:
+            raise ParameterError(f"criteria: {name.removesuffix('_cad')} must be the same for all benches")
     raw, stop = or_partial(
         lambda: _core.monte_carlo(
             bench_list,
             seeker_list,
             seed_list,
             cycles=cycles,
-            optimum_cad=optima,
-            arrival_cad=arrival_cad,
-            tail_cycles=tail_cycles,
-            exceed_from=exceed_from,
-            exceed_above=above,
+            optimum_cad=[own["optimum_cad"] for own in each],
+            arrival_cad=each[0]["arrival_cad"] if each else 1.0,
+            tail_cycles=each[0]["tail_cycles"] if each else 1,
+            exceed_from=each[0]["exceed_from"] if each else None,
+            exceed_above=[own["exceed_above"] for own in each],
             threads=threads,
         )
     )
@@ -254,13 +217,3 @@ def _whole_seeds(seeds: Iterable[int]) -> list[int]:
         return [operator.index(seed) for seed in seeds]
     except TypeError as error:
         raise ParameterError(f"seeds: must be whole numbers, for example range(20): {error}") from None
-
-
-def _thresholds(bench: EngineBench, exceed_above: Mapping[str, float] | None) -> list[float]:
-    if exceed_above is None:
-        return []
-    names: list[str] = bench.settings["limits"]
-    unknown = set(exceed_above) - set(names)
-    if unknown:
-        raise ParameterError(f"exceed_above: {sorted(unknown)} not among the limits of the bench, {names}")
-    return [float(exceed_above.get(name, math.inf)) for name in names]

@@ -2,66 +2,27 @@
 
 from __future__ import annotations
 
-import math
-from collections.abc import Mapping
-from dataclasses import dataclass, field
+from collections.abc import Mapping, Sequence
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from mgdd import _core
-from mgdd._core import SensorDynamics
+from mgdd._core import Limit, SensorDynamics
+from mgdd.engine.optimum import OBJECTIVES, check_request
 from mgdd.errors import ConvergenceError, ParameterError, ShapeError
 from mgdd.loop.bench import EngineBench
+from mgdd.optimize import Optimum
+from mgdd.optimize.optimum import limits_of
 from mgdd.results import labelled_dataset
 
 if TYPE_CHECKING:
     import xarray as xr
     from numpy.typing import ArrayLike
 
-__all__ = ["SteadyOptimum", "steady_map", "steady_optimum"]
+__all__ = ["find_steady_optimum", "steady_map"]
 
 _SCAN_CAD = 0.25
 _SECANT_CAD = 3.0
-
-
-@dataclass(frozen=True, kw_only=True)
-class SteadyOptimum:
-    """The timing at which a bench without chance has its best J, limits kept.
-
-    Parameters
-    ----------
-    soc_cad : float
-        Start of combustion [°CA aTDC].
-    j : float
-        Performance there.
-    curvature : float
-        Second difference of J over ±3 CAD at the free optimum [per °CA²].
-    limits : mapping of str to float
-        Limits that were kept.
-    active_limits : tuple of str
-        Those that hold the optimum back.
-    free_soc_cad : float
-        The optimum without limits [°CA aTDC].
-    limit_scatter : mapping of str to float
-        Standard deviation of each limited quantity from cycle to cycle that the scatter of SOC causes at the optimum,
-        to first order, in its unit.
-
-    Examples
-    --------
-    >>> from mgdd.loop import EngineBench, steady_optimum
-    >>> best = steady_optimum(EngineBench(limits=["p_max_bar"]), {"p_max_bar": 95.0})
-    >>> best.active_limits, best.soc_cad > best.free_soc_cad
-    (('p_max_bar',), True)
-    """
-
-    soc_cad: float
-    j: float
-    curvature: float
-    limits: Mapping[str, float] = field(default_factory=dict)
-    active_limits: tuple[str, ...] = ()
-    free_soc_cad: float
-    limit_scatter: Mapping[str, float] = field(default_factory=dict)
 
 
 def steady_map(bench: EngineBench, soc_cad: ArrayLike, *, cycle: int = 0) -> xr.Dataset:
@@ -110,21 +71,21 @@ def steady_map(bench: EngineBench, soc_cad: ArrayLike, *, cycle: int = 0) -> xr.
     return labelled_dataset(variables)
 
 
-def steady_optimum(
+def find_steady_optimum(
     bench: EngineBench,
-    limits: Mapping[str, float] | None = None,
+    limits: Mapping[str, float] | Sequence[Limit] | None = None,
     *,
     bounds_cad: tuple[float, float] = (-30.0, 10.0),
     cycle: int = 0,
-) -> SteadyOptimum:
+) -> Optimum:
     """Find the best timing of a bench without chance: what its seekers are judged by.
 
     Parameters
     ----------
     bench : EngineBench
         Read, not run.
-    limits : mapping of str to float, optional
-        Upper limits on indicators, for example ``{"p_max_bar": 95.0}``.
+    limits : mapping of str to float, or sequence of Limit, optional
+        Upper limits on indicators, for example ``{"p_max_bar": 95.0}``; the margin of a `Limit` is kept.
     bounds_cad : tuple of float
         Searched range [°CA aTDC].
     cycle : int
@@ -132,8 +93,10 @@ def steady_optimum(
 
     Returns
     -------
-    SteadyOptimum
-        To about 0.001 CAD.
+    mgdd.optimize.Optimum
+        Input ``soc_cad``, to about 0.001 CAD; objective ``j``. ``values`` holds the indicators there and, for every
+        limited one, ``scatter_NAME``: the standard deviation from cycle to cycle that the scatter of SOC causes, to
+        first order, in its unit. The curvature is taken over ±3 CAD at the free optimum.
 
     Raises
     ------
@@ -144,13 +107,15 @@ def steady_optimum(
 
     Examples
     --------
-    >>> from mgdd.loop import EngineBench, steady_optimum
-    >>> round(steady_optimum(EngineBench()).soc_cad, 2)
+    >>> from mgdd.loop import EngineBench, find_steady_optimum
+    >>> round(find_steady_optimum(EngineBench())["soc_cad"], 2)
     -5.63
     """
     from scipy.optimize import brentq, minimize_scalar
 
-    limits = _checked_limits(limits)
+    kept_limits = limits_of(limits)
+    check_request(OBJECTIVES[0], [limit.name for limit in kept_limits])
+    caps = {limit.name: limit.upper - limit.margin for limit in kept_limits}
     if cycle < 0:
         raise ParameterError(f"cycle = {cycle}: must be >= 0")
     quiet = _quiet(bench, cycle)
@@ -166,7 +131,7 @@ def steady_optimum(
 
     def excess(soc: float) -> float:
         now = _settled(quiet, soc)
-        return max((float(now[name]) - limit for name, limit in limits.items()), default=-1.0)
+        return max((float(now[name]) - limit for name, limit in caps.items()), default=-1.0)
 
     def peak(a: float, b: float) -> float:
         return float(minimize_scalar(lambda x: -j(x), bounds=(a, b), method="bounded", options={"xatol": 1e-4}).x)
@@ -179,7 +144,7 @@ def steady_optimum(
     if excess(free) > 0.0:
         kept = np.array([excess(x) <= 0.0 for x in grid])
         if not kept.any():
-            raise ConvergenceError(f"no soc_cad in [{low:g}, {high:g}] keeps {limits}: raise a limit")
+            raise ConvergenceError(f"no soc_cad in [{low:g}, {high:g}] keeps {caps}: raise a limit")
         best = int(np.argmax(np.where(kept, values, -np.inf)))
         step = 1 if grid[best] < free else -1
         outside = grid[best + step] if abs(grid[best + step] - grid[best]) < abs(free - grid[best]) else free
@@ -188,29 +153,20 @@ def steady_optimum(
     around = [j(free - _SECANT_CAD), j(free), j(free + _SECANT_CAD)]
     scatter = float(bench.settings["soc_scatter_cad"])
     early, late = _settled(quiet, soc - 0.05), _settled(quiet, soc + 0.05)
-    return SteadyOptimum(
-        soc_cad=soc,
-        j=float(at["j"]),
+    numbers = {name: float(value) for name, value in at.items() if isinstance(value, float) and name != "soc_cad"}
+    spread = {f"scatter_{name}": abs(late[name] - early[name]) / 0.1 * scatter for name in caps}
+    return Optimum(
+        inputs={"soc_cad": soc},
+        objective="j",
+        value=float(at["j"]),
+        values={**numbers, **spread},
+        limits=kept_limits,
+        active_limits=tuple(name for name, limit in caps.items() if at[name] > limit - 1e-3 * max(1.0, abs(limit))),
+        at_bound=min(soc - low, high - soc) < 1e-3,
+        bounds={"soc_cad": (low, high)},
         curvature=(around[0] - 2.0 * around[1] + around[2]) / _SECANT_CAD**2,
-        limits=limits,
-        active_limits=tuple(name for name, limit in limits.items() if at[name] > limit - 1e-3 * max(1.0, abs(limit))),
-        free_soc_cad=free,
-        limit_scatter={name: abs(late[name] - early[name]) / 0.1 * scatter for name in limits},
+        free_inputs={"soc_cad": free},
     )
-
-
-def _checked_limits(limits: Mapping[str, float] | None) -> dict[str, float]:
-    if limits is None:
-        return {}
-    if not isinstance(limits, Mapping):
-        raise ParameterError(f"limits = {limits!r}: must map names to numbers, for example {{'p_max_bar': 95.0}}")
-    known = _core.indicator_units()
-    for name, value in limits.items():
-        if name not in known:
-            raise ParameterError(f"limits: {name!r} is no indicator of the bench, for example p_max_bar")
-        if not (isinstance(value, int | float | np.number) and math.isfinite(value)):
-            raise ParameterError(f"limits: {name} = {value!r}: must be a finite number")
-    return dict(limits)
 
 
 def _quiet(bench: EngineBench, cycle: int) -> EngineBench:

@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from mgdd.errors import ParameterError
+from mgdd.loop.criteria import LoopCriteria
 
 if TYPE_CHECKING:
     import xarray as xr
@@ -17,48 +17,44 @@ if TYPE_CHECKING:
 __all__ = ["summarize_cycles"]
 
 
-def summarize_cycles(
-    cycles: xr.Dataset,
-    *,
-    optimum_cad: float | None = None,
-    arrival_cad: float = 1.0,
-    tail_cycles: int = 100,
-    exceed_from: int = 1000,
-    exceed_above: Mapping[str, float] | None = None,
-) -> dict[str, float]:
+def summarize_cycles(cycles: xr.Dataset, criteria: LoopCriteria | None = None) -> dict[str, float]:
     """Sum up the cycles of a run, whether it came to its end or not.
 
     Parameters
     ----------
     cycles : xarray.Dataset
-        Over ``cycle``: ``estimate_cad``, ``soc_requested_cad``, ``misfire`` and ``j``; where measured also
-        ``unphysical``, ``efficiency_gross``, ``nox_true_ppm`` and ``limits`` over ``limit``.
-    optimum_cad, arrival_cad, tail_cycles, exceed_from, exceed_above
+        Over ``cycle``: ``misfire`` and ``j``, and ``estimate_cad`` and ``soc_requested_cad`` or, over ``input`` as
+        well, ``estimate`` and ``applied``; where measured also ``unphysical``, ``efficiency_gross``, ``nox_true_ppm``
+        and ``limits`` over ``limit``.
+    criteria : LoopCriteria, optional
         As in `run_seeker`; cycles are counted from the first row.
 
     Returns
     -------
     dict
         The summary of `run_seeker`, to rounding, with the halves and the tail of the cycles at hand. NaN where nothing
-        was measured.
+        was measured, and for figures of the estimate where it is not one angle.
 
     Raises
     ------
     mgdd.errors.ParameterError
-        A limit in ``exceed_above`` that was not measured, a NaN there, or a criterion out of its range.
+        A limit in ``exceed_above`` that was not measured.
 
     Examples
     --------
-    >>> from mgdd.loop import EngineBench, run_seeker, summarize_cycles
+    >>> from mgdd.loop import EngineBench, LoopCriteria, run_seeker
+    >>> from mgdd.loop.summary import summarize_cycles
     >>> from mgdd.optimize import GoldenSection
     >>> seeker = GoldenSection(start=-20.0, lower=-30.0, upper=10.0, noise_sd=0.25)
-    >>> run = run_seeker(EngineBench(seed=1), seeker, 300, optimum_cad=-5.63)
-    >>> again = summarize_cycles(run.dataset, optimum_cad=-5.63)
+    >>> run = run_seeker(EngineBench(seed=1), seeker, 300, criteria=LoopCriteria(optimum=-5.63))
+    >>> again = summarize_cycles(run.dataset, LoopCriteria(optimum=-5.63))
     >>> again["cycles_to"] == run.summary["cycles_to"]
     True
     """
-    _check_criteria(cycles, arrival_cad, tail_cycles, exceed_from, exceed_above or {})
-    estimate: NDArray[np.float64] = cycles["estimate_cad"].to_numpy()
+    criteria = criteria or LoopCriteria()
+    measured = tuple(str(name) for name in cycles["limit"].to_numpy()) if "limits" in cycles else ()
+    criteria.thresholds(measured)
+    estimate, applied = _one_angle(cycles)
     n = estimate.size
     half = np.arange(n) >= n // 2
     misfire = cycles["misfire"].to_numpy().astype(bool)
@@ -68,13 +64,13 @@ def summarize_cycles(
         return factor * _mean(cycles[name].to_numpy()[half & ~void]) if name in cycles else math.nan
 
     out = {
-        "final_cad": _mean(estimate[max(n - tail_cycles, 0) :]),
+        "final_cad": _mean(estimate[max(n - criteria.tail_cycles, 0) :]),
         "mean_cad": _mean(estimate[half]),
         "rms_cad": math.nan,
         "cycles_to": math.nan,
         "cycles_stays": math.nan,
-        "exceeded_fraction": _exceeded(cycles, exceed_from, exceed_above or {}),
-        "mean_applied_cad": _mean(cycles["soc_requested_cad"].to_numpy()[half]),
+        "exceeded_fraction": _exceeded(cycles, criteria.counted_from(n), criteria.exceed_above),
+        "mean_applied_cad": _mean(applied[half]),
         "mean_j": fired("j"),
         "mean_efficiency_percent": fired("efficiency_gross", 100.0),
         "mean_nox_ppm": fired("nox_true_ppm"),
@@ -82,11 +78,11 @@ def summarize_cycles(
         "highest_cad": float(np.max(estimate, initial=-math.inf)),
         "misfires": float(misfire.sum()),
     }
-    if optimum_cad is None or not math.isfinite(optimum_cad):
+    if criteria.optimum is None:
         return out
-    away = np.asarray(estimate - optimum_cad, dtype=np.float64)
+    away = np.asarray(estimate - criteria.optimum, dtype=np.float64)
     out["rms_cad"] = math.sqrt(_mean(away[half] ** 2))
-    near = np.abs(away) <= arrival_cad
+    near = np.abs(away) <= criteria.arrival
     if near.any():
         out["cycles_to"] = float(np.argmax(near))
     if n and near[-1]:
@@ -94,21 +90,14 @@ def summarize_cycles(
     return out
 
 
-def _check_criteria(
-    cycles: xr.Dataset, arrival_cad: float, tail_cycles: int, exceed_from: int, above: Mapping[str, float]
-) -> None:
-    if not arrival_cad > 0.0:
-        raise ParameterError(f"arrival_cad = {arrival_cad:g}: must be > 0")
-    if tail_cycles < 1:
-        raise ParameterError(f"tail_cycles = {tail_cycles}: must be >= 1")
-    if exceed_from < 0:
-        raise ParameterError(f"exceed_from = {exceed_from}: must be >= 0")
-    measured = [str(name) for name in cycles["limit"].to_numpy()] if "limits" in cycles else []
-    for name, value in above.items():
-        if name not in measured:
-            raise ParameterError(f"exceed_above: {name!r} is not among the limits that were measured, {measured}")
-        if math.isnan(value):
-            raise ParameterError(f"exceed_above: {name} = nan: give a number, or leave it out")
+def _one_angle(cycles: xr.Dataset) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
+    """Give estimate and request [°CA aTDC]; NaN where the plant has several inputs or one that is not an angle."""
+    if "estimate_cad" in cycles:
+        return cycles["estimate_cad"].to_numpy(), cycles["soc_requested_cad"].to_numpy()
+    if cycles.sizes["input"] == 1 and str(cycles["input"].to_numpy()[0]).endswith("_cad"):
+        return cycles["estimate"].to_numpy()[:, 0], cycles["applied"].to_numpy()[:, 0]
+    nothing = np.full(cycles.sizes["cycle"], math.nan)
+    return nothing, nothing
 
 
 def _exceeded(cycles: xr.Dataset, first: int, above: Mapping[str, float]) -> float:

@@ -4,7 +4,7 @@ A seeker proposes an input (``ask``) and accepts what was measured there (``tell
 never holds a plant, so simulation, replay and the test bench are the same loop. `tune` chooses amplitude, period
 and gain from noise and curvature, `measure_map` reads those off measurements, `maximize` runs the loop on a
 function. `IterativeLearning` improves the input of a repeated task from the error of each trial. `least_squares` is
-the Levenberg-Marquardt search behind every fit, which answers with a `FitReport`.
+the Levenberg-Marquardt search behind every fit, which answers with a `mgdd.results.FitReport`.
 
 Examples
 --------
@@ -34,27 +34,26 @@ from __future__ import annotations
 from mgdd._core import ComponentLag, Limit
 from mgdd.optimize.direct_seekers import GoldenSection, GradientDescent, Spsa
 from mgdd.optimize.dither_seekers import BoundedSeeking, ExtremumSeeking, NewtonSeeking
-from mgdd.optimize.fit_report import FitReport
-from mgdd.optimize.iterative_learning import ConvergenceReport, IterativeLearning
+from mgdd.optimize.fit_options import FitOptions
+from mgdd.optimize.iterative_learning import IterativeLearning
 from mgdd.optimize.least_squares import least_squares
-from mgdd.optimize.measured_map import MeasuredMap, measure_map
+from mgdd.optimize.measured_map import measure_map
+from mgdd.optimize.optimum import Optimum
 from mgdd.optimize.run import load_seeker, maximize
-from mgdd.optimize.tuning import Tuning, tune
+from mgdd.optimize.tuning import tune
 
 __all__ = [
     "BoundedSeeking",
     "ComponentLag",
-    "ConvergenceReport",
     "ExtremumSeeking",
-    "FitReport",
+    "FitOptions",
     "GoldenSection",
     "GradientDescent",
     "IterativeLearning",
     "Limit",
-    "MeasuredMap",
     "NewtonSeeking",
+    "Optimum",
     "Spsa",
-    "Tuning",
     "least_squares",
     "load_seeker",
     "maximize",

@@ -12,6 +12,7 @@ import numpy as np
 from mgdd import _core
 from mgdd.errors import ParameterError
 from mgdd.results import labelled_dataset
+from mgdd.results.describe import as_html, rows_of
 
 if TYPE_CHECKING:
     import xarray as xr
@@ -240,7 +241,8 @@ class IterativeLearning:
         mgdd.errors.ShapeError
             Not one error per sample.
         mgdd.errors.DataError
-            A value that is not finite, with trial and sample, or trials that diverge beyond the range of a float.
+            A value that is not finite or beyond 1e30 in magnitude, with trial and sample, or trials that diverge
+            beyond the range of a float.
             As after every refusal, the learner is as it was.
 
         Examples
@@ -347,6 +349,9 @@ class IterativeLearning:
         frozen = ", frozen" if self.frozen else ""
         samples = self._settings["initial"].size
         return f"<IterativeLearning law={self._settings['law']!r}, {samples} samples, trial {self.trial}{frozen}>"
+
+    def _repr_html_(self) -> str:
+        return as_html("IterativeLearning", rows_of({"trial": self.trial, "frozen": self.frozen, **self._settings}))
 
 
 def _column(value: ArrayLike, name: str) -> NDArray[np.float64]:

@@ -8,7 +8,7 @@ import numpy as np
 
 from mgdd import _core
 from mgdd.errors import ParameterError, ShapeError
-from mgdd.optimize.fit_report import FitReport
+from mgdd.results import FitReport
 
 if TYPE_CHECKING:
     from collections.abc import Callable, Sequence
@@ -55,7 +55,7 @@ def least_squares(
     log_scaled : array_like of bool, shape (n,) or scalar, optional
         Parameters searched as log(p); they need lower > 0. Everything reported stays in natural units.
     data : array_like, shape (m,), optional
-        What the residual compares with, in its unit; gives `FitReport.fit_percent`.
+        What the residual compares with, in its unit; gives `FitReport.nrmse_fit_percent`.
     max_iterations : int
         Trial steps.
     cost_tolerance, step_tolerance : float
@@ -93,8 +93,8 @@ def least_squares(
     ...     residual = [10.0 * (x[1] - x[0] ** 2), 1.0 - x[0]]
     ...     return residual, [[-20.0 * x[0], 10.0], [-1.0, 0.0]]
     >>> fit = least_squares(rosenbrock, [-1.2, 1.0], names=["a", "b"], upper=[0.5, np.inf])
-    >>> fit.values.round(6).tolist(), fit.bounds_active.tolist(), fit.findings
-    ([0.5, 0.25], [1, 0], ('a stands at its upper bound 0.5',))
+    >>> fit.values.round(6).tolist(), fit.bounds_active.tolist(), str(fit.findings[0])
+    ([0.5, 0.25], [1, 0], 'a stands at its upper bound 0.5')
     """
     start = _vector(x0, "x0")
     n = start.size

@@ -9,6 +9,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from mgdd.errors import DataError, ShapeError
+from mgdd.results.describe import described
 
 if TYPE_CHECKING:
     from numpy.typing import ArrayLike
@@ -18,6 +19,7 @@ __all__ = ["MeasuredMap", "measure_map"]
 _FEWEST_POINTS, _FEWEST_INPUTS = 5, 3
 
 
+@described
 @dataclass(frozen=True, kw_only=True)
 class MeasuredMap:
     """Noise, curvature and optimum of a measured map J(theta), each with its standard error.

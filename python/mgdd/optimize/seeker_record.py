@@ -13,6 +13,7 @@ import numpy as np
 from mgdd import _core
 from mgdd.errors import DataError, Error
 from mgdd.results import labelled_dataset
+from mgdd.results.describe import as_html, rows_of
 
 if TYPE_CHECKING:
     import os
@@ -134,6 +135,10 @@ class SeekerRecord:
 
     def __repr__(self: _CoreSeeker) -> str:
         return f"<{type(self).__name__} cycle {self.cycle}, estimate {np.array2string(self.estimate, precision=6)}>"
+
+    def _repr_html_(self: _CoreSeeker) -> str:
+        now = {"cycle": self.cycle, "estimate": self.estimate}
+        return as_html(type(self).__name__, rows_of({**now, **self.settings}))
 
 
 def read_seeker_file(path: str | os.PathLike[str]) -> tuple[str, dict[str, Any], dict[str, Any]]:

@@ -9,6 +9,7 @@ from typing import TYPE_CHECKING, Any
 from mgdd import _core
 from mgdd.optimize.direct_seekers import Spsa
 from mgdd.optimize.dither_seekers import ExtremumSeeking
+from mgdd.results.describe import described
 
 if TYPE_CHECKING:
     from collections.abc import Sequence
@@ -16,6 +17,7 @@ if TYPE_CHECKING:
 __all__ = ["Tuning", "tune"]
 
 
+@described
 @dataclass(frozen=True, kw_only=True)
 class Tuning:
     """Settings of a seeker, what averaging theory predicts for them, and whether that meets the wish.

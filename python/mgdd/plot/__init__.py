@@ -15,12 +15,9 @@ from mgdd.plot.learning import learning
 from mgdd.plot.seeking import seeking
 from mgdd.plot.sensors import sensors
 from mgdd.plot.throttle import free_run, holding_duty
-from mgdd.plot.throttle_habits import air_flow, rate_dependence
-from mgdd.plot.throttle_run import throttle_run
 from mgdd.plot.timing import timing
 
 __all__ = [
-    "air_flow",
     "calibration_overlay",
     "convergence",
     "correlation_matrix",
@@ -30,11 +27,9 @@ __all__ = [
     "learning",
     "log_pv",
     "pressure",
-    "rate_dependence",
     "residual_correlation",
     "seeking",
     "sensors",
-    "throttle_run",
     "timing",
     "wall_heat_profile",
 ]

@@ -20,7 +20,7 @@ from mgdd.plot.style import (
     panel_below,
     require,
 )
-from mgdd.results import ANGLE
+from mgdd.results.labels import ANGLE
 
 if TYPE_CHECKING:
     import xarray as xr

@@ -8,7 +8,7 @@ import numpy as np
 
 from mgdd.errors import DataError
 from mgdd.plot.style import BLACK, BLUE, GREY, ORANGE, axis_label, legend, minus, new_axes, require
-from mgdd.results import ANGLE
+from mgdd.results.labels import ANGLE
 
 if TYPE_CHECKING:
     import xarray as xr

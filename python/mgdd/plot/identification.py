@@ -92,7 +92,7 @@ def residual_correlation(correlations: xr.Dataset, *, ax: Axes | None = None) ->
     ----------
     correlations : xarray.Dataset
         ``autocorrelation`` and ``cross_correlation`` over ``lag`` and the number ``limit``, as
-        `mgdd.identify.residual_tests` gives it in ``correlations``.
+        `mgdd.signals.residual_tests` gives it in ``correlations``.
     ax : matplotlib.axes.Axes, optional
         Where to draw; it gives its lower half away. None makes a figure.
 
@@ -120,7 +120,7 @@ def residual_correlation(correlations: xr.Dataset, *, ax: Axes | None = None) ->
     'lag [samples]'
     """
     names = ("autocorrelation", "cross_correlation")
-    require(correlations, ("lag", *names, "limit"), "mgdd.identify.residual_tests")
+    require(correlations, ("lag", *names, "limit"), "mgdd.signals.residual_tests")
     ax = new_axes(ax, height=4.4)
     panels = (ax, panel_below(ax, share=0.5))
     lag, limit = correlations["lag"].to_numpy(), float(correlations["limit"])
@@ -151,7 +151,7 @@ def correlation_matrix(correlation: xr.Dataset, *, ax: Axes | None = None) -> Ax
     ----------
     correlation : xarray.Dataset
         ``correlation`` [-] over ``parameter`` and ``other``, the names; NaN for a parameter at a bound. As
-        `mgdd.identify.correlation_dataset` gives it.
+        `mgdd.results.FitReport.to_dataset` gives it.
     ax : matplotlib.axes.Axes, optional
         Where to draw; None makes a figure.
 
@@ -178,7 +178,7 @@ def correlation_matrix(correlation: xr.Dataset, *, ax: Axes | None = None) -> Ax
     >>> plot.correlation_matrix(correlation).texts[1].get_text()
     '−0.99'
     """
-    require(correlation, ("parameter", "other", "correlation"), "mgdd.identify.correlation_dataset")
+    require(correlation, ("parameter", "other", "correlation"), "mgdd.results.FitReport.to_dataset")
     names = [str(name) for name in correlation["parameter"].to_numpy()]
     values = correlation["correlation"].transpose("parameter", "other").to_numpy()
     n = len(names)

@@ -22,7 +22,7 @@ def learning(learned: xr.Dataset, *, ax: Axes | None = None) -> Axes:
     Parameters
     ----------
     learned : xarray.Dataset
-        ``ca50_error_cad`` [°CA] over ``law`` and ``trial``, as `mgdd.studies.run_ch3_optimizers` gives.
+        ``ca50_error_cad`` [°CA] over ``law`` and ``trial``, as the study seeker-comparison gives.
     ax : matplotlib.axes.Axes, optional
         Where to draw; None makes a figure.
 
@@ -47,7 +47,7 @@ def learning(learned: xr.Dataset, *, ax: Axes | None = None) -> Axes:
     >>> plot.learning(learned).get_ylabel()
     'rms error of CA50 [°CA]'
     """
-    require(learned, ("law", "trial", "ca50_error_cad"), "mgdd.studies.run_ch3_optimizers")
+    require(learned, ("law", "trial", "ca50_error_cad"), "the study seeker-comparison")
     ax = new_axes(ax)
     error = learned["ca50_error_cad"].transpose("law", "trial").to_numpy()
     lines: list[Line2D] = []

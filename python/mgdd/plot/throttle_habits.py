@@ -13,7 +13,7 @@ if TYPE_CHECKING:
 
 __all__ = ["air_flow", "rate_dependence"]
 
-_MADE_BY = "mgdd.studies.run_ch2_throttle_characteristics"
+_MADE_BY = "the study throttle-characteristics"
 
 
 def rate_dependence(dataset: xr.Dataset, *, ax: Axes | None = None) -> Axes:
@@ -23,7 +23,7 @@ def rate_dependence(dataset: xr.Dataset, *, ax: Axes | None = None) -> Axes:
     ----------
     dataset : xarray.Dataset
         ``loop_duty`` [-] and ``loop_angle_deg`` [deg] over ``frequency_hz`` [Hz] and ``phase``: one preset of the
-        study ``ch2-throttle-characteristics``.
+        study ``throttle-characteristics``.
     ax : matplotlib.axes.Axes, optional
         Where to draw; None makes a figure.
 
@@ -39,10 +39,10 @@ def rate_dependence(dataset: xr.Dataset, *, ax: Axes | None = None) -> Axes:
 
     Examples
     --------
-    >>> from mgdd import plot
+    >>> from mgdd.plot.throttle_habits import rate_dependence
     >>> from mgdd.studies import run_study
-    >>> study = run_study("ch2-throttle-characteristics", quick=True, figures=False)
-    >>> plot.rate_dependence(study.dataset.isel(preset=0)).get_xlabel()
+    >>> study = run_study("throttle-characteristics", quick=True, figures=False)
+    >>> rate_dependence(study.dataset.isel(preset=0)).get_xlabel()
     'duty [-]'
     """
     require(dataset, ("frequency_hz", "phase", "loop_duty", "loop_angle_deg"), _MADE_BY)
@@ -69,7 +69,7 @@ def air_flow(dataset: xr.Dataset, *, ax: Axes | None = None) -> Axes:
     ----------
     dataset : xarray.Dataset
         ``air_angle_deg`` [deg] over ``airflow_torque_nm`` [N m] and ``time_s`` [s]: one preset and one arrival of the
-        study ``ch2-throttle-characteristics``; attribute ``air_from_s`` marks the onset.
+        study ``throttle-characteristics``; attribute ``air_from_s`` marks the onset.
     ax : matplotlib.axes.Axes, optional
         Where to draw; None makes a figure.
 
@@ -85,10 +85,10 @@ def air_flow(dataset: xr.Dataset, *, ax: Axes | None = None) -> Axes:
 
     Examples
     --------
-    >>> from mgdd import plot
+    >>> from mgdd.plot.throttle_habits import air_flow
     >>> from mgdd.studies import run_study
-    >>> study = run_study("ch2-throttle-characteristics", quick=True, figures=False)
-    >>> plot.air_flow(study.dataset.isel(preset=0, arrival=0)).get_ylabel()
+    >>> study = run_study("throttle-characteristics", quick=True, figures=False)
+    >>> air_flow(study.dataset.isel(preset=0, arrival=0)).get_ylabel()
     'plate angle [deg]'
     """
     require(dataset, ("time_s", "airflow_torque_nm", "air_angle_deg"), _MADE_BY)

@@ -38,9 +38,9 @@ def throttle_run(run: xr.Dataset, *, ax: Axes | None = None) -> Axes:
 
     Examples
     --------
-    >>> from mgdd import plot
+    >>> from mgdd.plot.throttle_run import throttle_run
     >>> from mgdd.throttle import Throttle, simulate
-    >>> plot.throttle_run(simulate(Throttle(), 0.5, duration_s=0.2)).get_ylabel()
+    >>> throttle_run(simulate(Throttle(), 0.5, duration_s=0.2)).get_ylabel()
     'plate angle [deg]'
     """
     panels = [(name, color) for name, color in _PANELS if name == "duty" or name in run]

@@ -3,9 +3,7 @@
 from __future__ import annotations
 
 import difflib
-import json
 import os
-import tomllib
 from collections.abc import Mapping
 from dataclasses import dataclass
 from importlib import resources
@@ -15,6 +13,8 @@ from typing import Any, cast
 
 from mgdd._core import Cylinder, OperatingPoint, Throttle
 from mgdd.errors import DataError, ParameterError
+from mgdd.io.parameters import Entry, ParameterFile, Parameters, Wanted
+from mgdd.results.describe import core_rows, described
 
 __all__ = ["Preset", "available", "load"]
 
@@ -43,7 +43,7 @@ _MISSING = MappingProxyType({"engine": "an engine's geometry has no default", "t
 
 
 @dataclass(frozen=True, init=False)
-class Preset:
+class Preset(Parameters):
     """A named engine (cylinder and nominal operating point) or a named throttle, with the origin of every value.
 
     Parameters
@@ -133,33 +133,40 @@ class Preset:
             raise ParameterError(_wrong_kind(self.name, self.kind, wanted))
         return self.records[table]
 
-    def to_toml(self) -> str:
-        """Write the preset as TOML that `load` reads back equal.
-
-        Returns
-        -------
-        str
-            One line per value: ``bore_mm = { value = 86.0, unit = "mm", source = "..." }``.
-
-        Examples
-        --------
-        >>> from mgdd import presets
-        >>> "bore_mm" in presets.load("puma_single").to_toml()
-        True
-        """
-        lines = [f"name = {_quote(self.name)}", f"title = {_quote(self.title)}"]
+    def to_parameters(self) -> ParameterFile:
+        """Give the values with units and sources, as `to_toml` writes them and `load` reads them back."""
+        tables: dict[str, dict[str, Entry]] = {}
         for table, record in self.records.items():
-            lines += ["", f"[{table}]"]
             units = type(record).fields()
-            for key, value in record.to_dict().items():
-                if value is None:
-                    continue
-                text = _quote(value) if isinstance(value, str) else repr(float(value))
-                source = self.sources.get(f"{table}.{key}", "unstated")
-                lines.append(
-                    f"{key} = {{ value = {text}, unit = {_quote(units[key]['unit'])}, source = {_quote(source)} }}"
-                )
-        return "\n".join(lines) + "\n"
+            tables[table] = {
+                key: Entry(value=value, unit=units[key]["unit"], source=self.sources.get(f"{table}.{key}", "unstated"))
+                for key, value in record.to_dict().items()
+                if value is not None
+            }
+        return ParameterFile(kind=self.kind, tables=tables, notes={"name": self.name, "title": self.title})
+
+    @classmethod
+    def from_parameters(cls, file: ParameterFile) -> Preset:
+        """Make the preset of a file; what is missing and has a default keeps it."""
+        tables = _OF_KIND.get(file.kind, ())
+        file.expect(
+            kinds=tuple(_OF_KIND), tables=(*tables[:1], *(f"{t}?" for t in tables[1:])), notes=("name", "title")
+        )
+        sources: dict[str, str] = {}
+        records = {table: _record(file, table, sources) for table in tables}
+        required = _REQUIRED[file.kind]
+        missing = [name for name in required if name not in file.tables[tables[0]]]
+        if missing:
+            raise DataError(f"{file.origin}: [{tables[0]}] lacks {', '.join(missing)}: {_MISSING[file.kind]}")
+        name = str(file.notes.get("name", Path(file.origin).stem))
+        return cls(name=name, title=str(file.notes.get("title", name)), sources=MappingProxyType(sources), **records)
+
+
+described(
+    Preset,
+    title=lambda preset: f"Preset {preset.name}, {preset.kind}: {preset.title}",
+    rows=lambda preset: [row for record in preset.records.values() for row in core_rows(record)],
+)
 
 
 def _unpickled(name: str, title: str, records: Mapping[str, Any], sources: Mapping[str, str]) -> Preset:
@@ -195,7 +202,7 @@ def available(kind: str | None = None) -> tuple[str, ...]:
     _check_kind(kind)
     files = [entry for entry in resources.files("mgdd.presets").iterdir() if entry.name.endswith(".toml")]
     if kind is not None:
-        head = f"[{_OF_KIND[kind][0]}]"
+        head = f'kind = "{kind}"'
         files = [entry for entry in files if head in entry.read_text(encoding="utf-8").splitlines()]
     return tuple(sorted(entry.name[:-5] for entry in files))
 
@@ -223,7 +230,7 @@ def load(name: str | os.PathLike[str], *, kind: str | None = None) -> Preset:
     ParameterError
         An unknown name or field, a wrong unit, a value outside its domain, a preset of the other kind.
     DataError
-        A file that is not TOML or lacks its tables.
+        A file that is not TOML, or lacks its kind, its format version, its tables or a field without default.
     FileNotFoundError
         No such file.
 
@@ -244,19 +251,17 @@ def load(name: str | os.PathLike[str], *, kind: str | None = None) -> Preset:
 def _load(text: str, kind: str | None) -> Preset:
     if text.endswith(".toml"):
         try:
-            return _parse(Path(text).read_text(encoding="utf-8"), source=text)
+            return Preset.of_file(ParameterFile.read(text))
         except FileNotFoundError as error:
             raise FileNotFoundError(
                 error.errno, f"no preset file {text!r}; shipped are {', '.join(available(kind))}"
             ) from None
-        except UnicodeDecodeError as error:
-            raise DataError(f"{text}: not a UTF-8 text file: {error}") from error
     if text not in available():
         close = difflib.get_close_matches(text, available(kind), 1)
         hint = f"did you mean {close[0]!r}?" if close else "or pass a path that ends in .toml"
         raise ParameterError(f"no preset {text!r}: shipped are {', '.join(available(kind))}; {hint}")
     file = resources.files("mgdd.presets").joinpath(f"{text}.toml")
-    return _parse(file.read_text(encoding="utf-8"), source=f"preset {text}")
+    return Preset.from_toml(file.read_text(encoding="utf-8"), origin=f"preset {text}")
 
 
 def _check_kind(kind: str | None) -> None:
@@ -272,64 +277,14 @@ def _wrong_kind(name: str, kind: str, wanted: str) -> str:
     )
 
 
-def _parse(text: str, *, source: str) -> Preset:
-    try:
-        data = tomllib.loads(text)
-    except tomllib.TOMLDecodeError as error:
-        raise DataError(f"{source}: not valid TOML: {error}") from error
-    unknown = set(data) - {"name", "title", *_TABLES}
-    if unknown:
-        raise ParameterError(
-            f"{source}: unknown key {min(unknown)!r}: a preset has name, title, and [cylinder] and [point], "
-            "or [throttle]"
-        )
-    kind = "throttle" if "throttle" in data else "engine"
-    tables, required = _OF_KIND[kind], _REQUIRED[kind]
-    first = tables[0]
-    foreign = [table for table in _TABLES if table in data and table not in tables]
-    if foreign:
-        raise ParameterError(
-            f"{source}: [{foreign[0]}] beside [{first}]: a preset is an engine or a throttle, not both"
-        )
-    if first not in data:
-        raise DataError(f"{source}: no table [{first}]: it needs at least {', '.join(required)}")
-    sources: dict[str, str] = {}
-    records = {table: _record(table, data.get(table, {}), source=source, sources=sources) for table in tables}
-    missing = [name for name in required if name not in data[first]]
-    if missing:
-        raise DataError(f"{source}: [{first}] lacks {', '.join(missing)}: {_MISSING[kind]}")
-    name = data.get("name", Path(source).stem)
-    return Preset(name=str(name), title=str(data.get("title", name)), sources=MappingProxyType(sources), **records)
-
-
-def _record(table: str, entries: Any, *, source: str, sources: dict[str, str]) -> Any:
+def _record(file: ParameterFile, table: str, sources: dict[str, str]) -> Any:
     kind = _TABLES[table]
     fields = kind.fields()
-    if not isinstance(entries, dict):
-        raise DataError(f"{source}: [{table}] must be a table")
-    values: dict[str, Any] = {}
-    for key, entry in entries.items():
-        where = f"{source}: [{table}] {key}"
-        if key not in fields:
-            close = difflib.get_close_matches(key, fields, 1)
-            hint = f"did you mean {close[0]!r}?" if close else f"known are {', '.join(fields)}"
-            raise ParameterError(f"{where}: unknown key: {hint}")
-        if not isinstance(entry, dict) or "value" not in entry or not set(entry) <= {"value", "unit", "source"}:
-            raise ParameterError(f'{where}: write {{ value = ..., unit = "{fields[key]["unit"]}", source = "..." }}')
-        unit = entry.get("unit")
-        if unit != fields[key]["unit"]:
-            raise ParameterError(
-                f"{where}: unit = {unit!r}: must be {fields[key]['unit']!r}; convert the value, "
-                "units stand in the names"
-            )
-        values[key] = entry["value"]
-        if "source" in entry:
-            sources[f"{table}.{key}"] = str(entry["source"])
-    try:
-        return kind().replace(**values)
-    except ParameterError as error:
-        raise ParameterError(f"{source}: [{table}] {error}") from error
-
-
-def _quote(text: str) -> str:
-    return json.dumps(text, ensure_ascii=False)
+    wanted = {
+        key: Wanted(info["unit"], "text" if "choices" in info else "number", required=False)
+        for key, info in fields.items()
+    }
+    values = file.values(table, wanted)
+    said = file.tables.get(table, {})
+    sources.update({f"{table}.{key}": entry.source for key, entry in said.items() if entry.source is not None})
+    return kind().replace(**values)

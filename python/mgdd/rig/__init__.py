@@ -1,9 +1,11 @@
-"""Test rigs: one protocol for the simulated bench and the real one."""
+"""Test rigs: one protocol for the simulated plant and the real one.
+
+`mgdd.loop.run_seeker` steers a rig as it steers any plant.
+"""
 
 from __future__ import annotations
 
-from mgdd.rig.base import AnnouncingRig, Measurement, Rig
-from mgdd.rig.seek import run_on_rig
+from mgdd.rig.base import Rig
 from mgdd.rig.simulated import SimulatedRig
 
-__all__ = ["AnnouncingRig", "Measurement", "Rig", "SimulatedRig", "run_on_rig"]
+__all__ = ["Rig", "SimulatedRig"]

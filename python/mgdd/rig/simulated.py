@@ -1,85 +1,82 @@
-"""The virtual bench behind the protocol of a real rig."""
+"""Any plant behind the protocol of a real rig."""
 
 from __future__ import annotations
 
-import math
+from collections.abc import Mapping
 from types import TracebackType
 from typing import Self
 
-from mgdd.errors import ParameterError, RigError
-from mgdd.loop import EngineBench
-from mgdd.rig.base import Measurement
+from mgdd.errors import RigError
+from mgdd.loop import Measurement, Plant
 
 __all__ = ["SimulatedRig"]
 
 
 class SimulatedRig:
-    """A virtual engine bench as a rig.
+    """A simulated plant as a rig: the same numbers, with a connection that can be closed.
 
     Parameters
     ----------
-    bench : EngineBench
-        The bench; it advances by one cycle per measurement.
+    plant : mgdd.loop.Plant
+        A bench, a surrogate or a throttle; it advances by one cycle or sample per measurement.
 
     Examples
     --------
     >>> from mgdd.loop import EngineBench
     >>> from mgdd.rig import SimulatedRig
     >>> with SimulatedRig(EngineBench(limits=["p_max_bar"])) as rig:
-    ...     rig.apply(-6.0)
+    ...     rig.apply({"soc_cad": -6.0})
     ...     measured = rig.measure()
     >>> sorted(measured.limits), measured.misfire
     (['p_max_bar'], False)
     """
 
-    def __init__(self, bench: EngineBench) -> None:
-        self.bench = bench
-        self._soc_cad: float | None = None
+    def __init__(self, plant: Plant) -> None:
+        self.plant = plant
+        self._applied = False
         self._closed = False
 
     @property
-    def operating_point_changes(self) -> bool:
-        """Whether the next cycle brings a new operating point of the schedule.
-
-        Returns
-        -------
-        bool
-            True where speed or fuel move by more than 5 %.
-        """
-        return bool(self.bench.operating_point_changes)
+    def input_names(self) -> tuple[str, ...]:
+        """Names of the inputs."""
+        return self.plant.input_names
 
     @property
-    def limit_names(self) -> list[str]:
+    def limit_names(self) -> tuple[str, ...]:
         """Names of the limited quantities that `measure` reports."""
-        return list(self.bench.settings["limits"])
+        return self.plant.limit_names
 
-    def apply(self, soc_cad: float) -> None:
-        """Set the start of combustion of the next cycle.
+    @property
+    def operating_point_changes(self) -> bool:
+        """Whether the next cycle brings a new operating point; False for a plant that announces none."""
+        return bool(getattr(self.plant, "operating_point_changes", False))
+
+    def apply(self, inputs: Mapping[str, float]) -> None:
+        """Set the inputs of the next cycle or sample.
 
         Parameters
         ----------
-        soc_cad : float
-            Start of combustion [°CA aTDC]; the bench clamps it to its window and says so in ``values["clamped"]``.
+        inputs : mapping of str to float
+            One number per name of `input_names`.
 
         Raises
         ------
         mgdd.errors.ParameterError
-            A timing that is not finite.
+            A missing, unknown or non-finite input.
         mgdd.errors.RigError
             The rig is closed.
         """
         self._require_open()
-        if not math.isfinite(soc_cad):
-            raise ParameterError(f"soc_cad = {soc_cad}: must be finite")
-        self._soc_cad = float(soc_cad)
+        self.plant.apply(inputs)
+        self._applied = True
 
     def measure(self) -> Measurement:
-        """Run one cycle at the timing applied last.
+        """Run one cycle or sample at the inputs applied last.
 
         Returns
         -------
-        Measurement
-            ``values`` holds the indicators, actual SOC, NOx of every sensor and the flags as 0 or 1.
+        mgdd.loop.Measurement
+            As the plant gives it.
 
         Raises
         ------
@@ -87,16 +84,9 @@ class SimulatedRig:
             Nothing was applied yet, or the rig is closed.
         """
         self._require_open()
-        if self._soc_cad is None:
-            raise RigError("measure() before apply(): apply a timing first")
-        cycle = self.bench.step(self._soc_cad)
-        components, limits = cycle.pop("components"), cycle.pop("limits")
-        return Measurement(
-            components=tuple(map(float, components)),
-            limits=limits,
-            misfire=cycle["misfire"],
-            values={name: float(value) for name, value in cycle.items()},
-        )
+        if not self._applied:
+            raise RigError("measure() before apply(): apply the inputs first")
+        return self.plant.measure()
 
     def close(self) -> None:
         """Refuse further use, as a rig whose connection is gone."""

@@ -7,6 +7,8 @@ from dataclasses import dataclass, field
 from typing import TYPE_CHECKING, Any, TypeVar
 
 from mgdd.errors import Interrupted, ParameterError
+from mgdd.results.describe import described
+from mgdd.studies.sections import Section, standard_sections
 
 if TYPE_CHECKING:
     import xarray as xr
@@ -20,7 +22,7 @@ Part = TypeVar("Part")
 
 @dataclass(frozen=True, kw_only=True)
 class StudyResult:
-    """Data, figures and summary of a study.
+    """Data, figures, summary and sections of a study; `mgdd.report.write_report` makes a page of any of them.
 
     Parameters
     ----------
@@ -33,6 +35,11 @@ class StudyResult:
     summary : mapping
         Plain numbers and text, ready for JSON: at least ``study``, ``seeds`` (0 where nothing is random) and ``rows``,
         a list of flat mappings; ``interrupted`` is true in the part that `mgdd.errors.Interrupted` carries.
+    sections : tuple of Section
+        What a report of the study says, in order; made of the summary, the figures and the dataset where the study
+        writes none itself.
+    title : str
+        Heading of the report; the title in `available_studies` if left out.
 
     Examples
     --------
@@ -46,6 +53,26 @@ class StudyResult:
     dataset: xr.Dataset
     figures: Mapping[str, Figure] = field(default_factory=dict)
     summary: Mapping[str, Any] = field(default_factory=dict)
+    sections: tuple[Section, ...] = ()
+    title: str = ""
+
+    def __post_init__(self) -> None:
+        if not self.sections:
+            object.__setattr__(self, "sections", standard_sections(self.summary, self.figures, self.dataset))
+
+
+described(
+    StudyResult,
+    title=lambda result: f"StudyResult {result.name}" + (f": {result.title}" if result.title else ""),
+    rows=lambda result: {
+        "seeds": result.summary.get("seeds"),
+        "rows": len(result.summary.get("rows", ())),
+        "sections": tuple(section.title for section in result.sections),
+        "figures": len(result.figures),
+        "dataset": result.dataset,
+        "interrupted": bool(result.summary.get("interrupted", False)),
+    },
+)
 
 
 def check_seeds(seeds: int) -> int:

@@ -7,7 +7,8 @@ from typing import TYPE_CHECKING, Any
 
 from mgdd import plot
 from mgdd.engine import timing_sweep
-from mgdd.identify import CylinderFit, WallHeatProfile
+from mgdd.identify.engine.profile import WallHeatProfile
+from mgdd.identify.engine.records import CylinderFit
 
 if TYPE_CHECKING:
     import xarray as xr
@@ -28,16 +29,16 @@ def draw(
     out = {
         "Measured pressure and apparent heat release": _grid(analyses, plot.pressure),
         "log p over log V with the polytropic slopes of compression and expansion": _grid(analyses, plot.log_pv),
-        f"Calibration, {main.burn_law}": _grid([load.overlay for load in main.loads], plot.calibration_overlay),
-        f"Calibration, {best.burn_law}": _grid([load.overlay for load in best.loads], plot.calibration_overlay),
+        f"Calibration, {main.kind}": _grid([load.overlay for load in main.loads], plot.calibration_overlay),
+        f"Calibration, {best.kind}": _grid([load.overlay for load in best.loads], plot.calibration_overlay),
     }
     for law, profile in profiles.items():
         figure = _figure(1)
         plot.wall_heat_profile(profile.dataset, ax=figure.add_subplot())
         out[f"What the traces say about wall heat: refitted RMSE over the wall-heat scale, {law}"] = figure
     sweeps = [timing_sweep(load.cylinder, load.point).assign_attrs(file=load.file) for load in reference.loads]
-    scale = reference.cylinder.wall_heat_scale
-    caption = f"Efficiency and NOx proxies over timing, {reference.burn_law}, wall-heat scale held at {scale:g}"
+    scale = reference.model.wall_heat_scale
+    caption = f"Efficiency and NOx proxies over timing, {reference.kind}, wall-heat scale held at {scale:g}"
     out[caption] = _grid(sweeps, plot.timing, label=True)
     out["Best timing without a pressure limit, as a range over wall-heat scale 0.5 to 1"] = _ranges(timing)
     return out

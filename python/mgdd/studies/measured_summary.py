@@ -7,7 +7,8 @@ from collections.abc import Mapping, Sequence
 from typing import TYPE_CHECKING, Any
 
 from mgdd import _core
-from mgdd.identify import CylinderFit, LoadFit, WallHeatProfile
+from mgdd.identify.engine.profile import WallHeatProfile
+from mgdd.identify.engine.records import CylinderFit, Load, figures_of
 from mgdd.results import labelled_dataset
 
 if TYPE_CHECKING:
@@ -34,9 +35,9 @@ def summarize(
             {
                 "file": load.file,
                 "analysis": {name: float(analysis[name]) for name in _ANALYSIS},
-                "calibrated": load.to_dict(),
+                "calibrated": figures_of(load),
                 "best_timing": best,
-                "warnings": list(analysis.attrs["warnings"]),
+                "warnings": analysis.attrs["warnings"].splitlines(),
             }
         )
     return {
@@ -44,17 +45,17 @@ def summarize(
         "seeds": 0,
         "rows": [_row(load, best) for load, best in zip(main.loads, timing, strict=True)],
         "mgdd": _core.__version__,
-        "law": main.burn_law,
+        "law": main.kind,
         "traces": rows,
         "laws": [law_row(fit) for fit in fits],
         "common": {"wall_heat_scale": {law: profile.to_dict() for law, profile in profiles.items()}},
         "unidentifiable": sorted({*main.report.unidentifiable, *(["wall_heat_scale"] if _unknown(profiles) else [])}),
-        "warnings": [f"{fit.burn_law}: {text}" for fit in fits for text in fit.warnings],
+        "warnings": [f"{fit.kind}: {text}" for fit in fits for text in fit.findings],
         "best_timing": list(timing),
     }
 
 
-def _row(load: LoadFit, best: Mapping[str, Any]) -> dict[str, Any]:
+def _row(load: Load, best: Mapping[str, Any]) -> dict[str, Any]:
     """Give one trace as a flat row; best timing and gain are ranges over the wall-heat scale, its own p_max kept."""
     (early, late), (least, most) = best["soc_cad"], best["gain_percent"]
     return {
@@ -75,7 +76,7 @@ def law_row(fit: CylinderFit) -> dict[str, Any]:
     known = any(math.isfinite(load.soi_cad) for load in fit.loads)
     onset = {"onset_against_soi_cad": [load.onset_against_soi_cad for load in fit.loads]} if known else {}
     return {
-        "law": fit.burn_law,
+        "law": fit.kind,
         **onset,
         "file": [load.file for load in fit.loads],
         "rmse_percent": [load.rmse_percent for load in fit.loads],
@@ -83,8 +84,8 @@ def law_row(fit: CylinderFit) -> dict[str, Any]:
         "soc_cad": [load.soc_cad for load in fit.loads],
         "largest_error_bar": [load.largest_error_bar for load in fit.loads],
         "largest_error_cad": [load.largest_error_cad for load in fit.loads],
-        "wall_heat_scale": fit.cylinder.wall_heat_scale,
-        "warnings": list(fit.warnings),
+        "wall_heat_scale": fit.model.wall_heat_scale,
+        "warnings": [str(finding) for finding in fit.findings],
     }
 
 
@@ -95,13 +96,13 @@ def _unknown(profiles: Mapping[str, WallHeatProfile]) -> bool:
 def law_table(fits: Sequence[CylinderFit]) -> xr.Dataset:
     """Tabulate the comparison of burn laws over law and trace."""
     files = [load.file for load in fits[0].loads]
-    laws = [fit.burn_law for fit in fits]
+    laws = [fit.kind for fit in fits]
 
     def grid(name: str) -> list[list[float]]:
         return [[float(getattr(load, name)) for load in fit.loads] for fit in fits]
 
     dims = ("law", "file")
-    scales = [fit.cylinder.wall_heat_scale for fit in fits]
+    scales = [fit.model.wall_heat_scale for fit in fits]
     return labelled_dataset(
         {
             "law": ("law", laws, "-", "burn law and gamma"),

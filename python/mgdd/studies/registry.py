@@ -3,26 +3,41 @@
 from __future__ import annotations
 
 import inspect
+from collections.abc import Callable
 from importlib import import_module
-from typing import Any
+from typing import Any, NamedTuple
 
 from mgdd.errors import ParameterError
 from mgdd.studies.base import Progress, StudyResult, check_seeds
 
 __all__ = ["available_studies", "run_study"]
 
-# One line per study: "my-name" is run_my_name in mgdd.studies.my_name, imported when it is run.
-_TITLES = {
-    "measured-traces": "calibrate a cycle model to four measured traces and find their best timing",
-    "ch2-throttle-characteristics": "holding-duty hysteresis, rate dependence and air flow of a throttle",
-    "ch3-optimizers": "every seeker on the same engine, noise, start and budget",
-    "ch4-sensors": "NOx analyser, fast sensor and soft sensor, steady and in transients",
-    "ch4-esc": "what a late NOx analyser does to extremum seeking, and three cures",
-    "ch4-tests": "four tests of extremum seeking: efficiency, another start, NOx by analyser and by soft sensor",
-    "ch7-first-principle": "groups of a throttle from noisy logs, also where the plant does more than the model",
-    "ch7-pseudo-wiener": "three pseudo-Wiener models of a throttle, in free run and re-anchored",
-    "identification-benchmarks": "measured drive, tanks and circuit: fits beside published ones (needs the data sets)",
-    "h2df-seek": "seekers on a surrogate of a measured hydrogen-diesel engine (needs the data set)",
+# One line per study: "my-name" is run_my_name of mgdd.studies.my_name, or of the module that stands below.
+_MODULES = {"identification-benchmarks": "benchmarks.identification_benchmarks"}
+
+
+class _Study(NamedTuple):
+    title: str
+    chapter: int | None = None  # of Tan (2018), where the question comes from it
+
+
+_STUDIES = {
+    "measured-traces": _Study("calibrate a cycle model to four measured traces and find their best timing"),
+    "throttle-characteristics": _Study("holding-duty hysteresis, rate dependence and air flow of a throttle", 2),
+    "seeker-comparison": _Study("every seeker on the same engine, noise, start and budget", 3),
+    "nox-sensors": _Study("NOx analyser, fast sensor and soft sensor, steady and in transients", 4),
+    "sensor-delay": _Study("what a late NOx analyser does to extremum seeking, and three cures", 4),
+    "timing-tests": _Study(
+        "four tests of extremum seeking: efficiency, another start, NOx by analyser and by soft sensor", 4
+    ),
+    "throttle-first-principle": _Study(
+        "groups of a throttle from noisy logs, also where the plant does more than the model", 7
+    ),
+    "throttle-pseudo-wiener": _Study("three pseudo-Wiener models of a throttle, in free run and re-anchored", 7),
+    "identification-benchmarks": _Study(
+        "measured drive, tanks and circuit: fits beside published ones (needs the data sets)"
+    ),
+    "measured-engine-seek": _Study("seekers on a surrogate of a measured hydrogen-diesel engine (needs the data set)"),
 }
 
 
@@ -37,10 +52,10 @@ def available_studies() -> dict[str, str]:
     Examples
     --------
     >>> from mgdd.studies import available_studies
-    >>> "ch4-esc" in available_studies()
+    >>> "sensor-delay" in available_studies()
     True
     """
-    return dict(_TITLES)
+    return {name: study.title for name, study in _STUDIES.items()}
 
 
 def run_study(
@@ -79,14 +94,11 @@ def run_study(
     Examples
     --------
     >>> from mgdd.studies import run_study
-    >>> result = run_study("ch4-esc", seeds=2, quick=True, figures=False)
+    >>> result = run_study("sensor-delay", seeds=2, quick=True, figures=False)
     >>> [row["step_sign"] for row in result.summary["rows"]]
     [1, -1, -1, -1, 1, 1, 1]
     """
-    if name not in _TITLES:
-        raise ParameterError(f"study {name!r}: must be one of {', '.join(_TITLES)}")
-    module = name.replace("-", "_")
-    function = getattr(import_module(f"mgdd.studies.{module}"), f"run_{module}")
+    function = function_of(name)
     options: dict[str, Any] = {"quick": quick, "figures": figures}
     if progress is not None:
         options["progress"] = progress
@@ -96,3 +108,14 @@ def run_study(
         options["seeds"] = check_seeds(seeds)
     result: StudyResult = function(**options)
     return result
+
+
+def function_of(name: str) -> Callable[..., StudyResult]:
+    """Give the function that runs a study; ParameterError for an unknown name."""
+    if name not in _STUDIES:
+        raise ParameterError(f"study {name!r}: must be one of {', '.join(_STUDIES)}")
+    own = name.replace("-", "_")
+    function: Callable[..., StudyResult] = getattr(
+        import_module(f"mgdd.studies.{_MODULES.get(name, own)}"), f"run_{own}"
+    )
+    return function

@@ -7,11 +7,11 @@ reconstruction from public sources, not the code behind the dissertation: see th
 from __future__ import annotations
 
 from mgdd._core import Throttle
-from mgdd.throttle.characteristics import airflow_torque_nm, groups, holding_duty, linear_part, mass_flow_kg_per_s
+from mgdd.throttle.characteristics import airflow_torque_nm, groups, holding_duty, linear_part
 from mgdd.throttle.interop import initial_state, to_iosystem
 from mgdd.throttle.pseudo_wiener import PseudoWiener
 from mgdd.throttle.sensors import SensorFault, SensorPair, sense
-from mgdd.throttle.simulation import simulate, simulate_many, step_summary
+from mgdd.throttle.simulation import simulate, simulate_many
 
 __all__ = [
     "PseudoWiener",
@@ -23,10 +23,8 @@ __all__ = [
     "holding_duty",
     "initial_state",
     "linear_part",
-    "mass_flow_kg_per_s",
     "sense",
     "simulate",
     "simulate_many",
-    "step_summary",
     "to_iosystem",
 ]

@@ -248,7 +248,7 @@ def mass_flow_kg_per_s(
 
     Examples
     --------
-    >>> from mgdd.throttle import mass_flow_kg_per_s
+    >>> from mgdd.throttle.characteristics import mass_flow_kg_per_s
     >>> round(float(mass_flow_kg_per_s(1e-3, pressure_drop_kpa=2.5, discharge_coefficient=0.98)), 4)
     0.076
     """

@@ -2,30 +2,33 @@
 
 from __future__ import annotations
 
-import json
-import tomllib
 from collections.abc import Mapping
 from types import MappingProxyType
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
 from mgdd import _core
-from mgdd.errors import DataError, ParameterError, ShapeError
+from mgdd.errors import DataError
+from mgdd.io.parameters import FIT_NOTES, ParameterFile, Parameters, Wanted, entries, wanted
+from mgdd.results.describe import described, rows_of
+from mgdd.signals.even_grid import even_step, is_same_step
+from mgdd.signals.model import RunInputs, SampledModel, check_horizon, columns_of
 
 if TYPE_CHECKING:
+    import xarray as xr
     from numpy.typing import ArrayLike, NDArray
 
     from mgdd._core import Throttle
 
 __all__ = ["PseudoWiener"]
 
+_KINDS = ("pw_r", "pw_w", "pw_p")
 _STEP_S = 5e-4  # of PW-R
 _GAIN_SAMPLE_S = 1e-3  # the observer gains are per 1 ms
-_UNEVEN = 1e-3
 
 
-class PseudoWiener:
+class PseudoWiener(SampledModel, Parameters):
     """A pseudo-Wiener model of a throttle.
 
     Parameters
@@ -60,10 +63,16 @@ class PseudoWiener:
     >>> from mgdd.throttle import PseudoWiener, Throttle
     >>> model = PseudoWiener.of_throttle(Throttle())
     >>> time = np.arange(200) * 1e-3
-    >>> angle = model.simulate(time, np.full(200, 0.4), start_deg=8.0)
+    >>> run = model.simulate({"time_s": time, "duty": np.full(200, 0.4)}, initial_state={"angle_deg": 8.0})
+    >>> run["angle_deg"].units
+    'deg'
     >>> PseudoWiener.from_toml(model.to_toml()) == model
     True
     """
+
+    input_names = ("duty",)
+    output_name = observed_state = "angle_deg"
+    state_names = ("angle_deg",)
 
     def __init__(
         self,
@@ -138,7 +147,7 @@ class PseudoWiener:
             The copy, or the model itself.
         """
         old = self.parameters["sample_s"]
-        if abs(sample_s - old) <= _UNEVEN * old:
+        if is_same_step(sample_s, old):
             return self
         changes = {
             "sample_s": sample_s,
@@ -148,50 +157,27 @@ class PseudoWiener:
             changes["substeps"] = float(max(1, round(sample_s / _STEP_S)))
         return self.replace(**changes)
 
-    def simulate(self, time_s: ArrayLike, duty: ArrayLike, *, start_deg: float) -> NDArray[np.float64]:
-        """Run free from rest.
+    def _rest(self) -> list[float]:
+        return [float(self.parameters["limp_home_deg"])]
 
-        Parameters
-        ----------
-        time_s : array_like, shape (n,)
-            Even, increasing times [s].
-        duty : array_like, shape (n,)
-            Duty [-]; sample k acts from ``time_s[k]`` to ``time_s[k + 1]``.
-        start_deg : float
-            Angle at the first sample [deg].
-
-        Returns
-        -------
-        ndarray, shape (n,)
-            Angle at ``time_s`` [deg].
-
-        Raises
-        ------
-        DataError
-            An uneven time.
-        ShapeError
-            Columns of different length.
-        """
-        sample_s, u = _grid(time_s, duty)
-        return np.asarray(self.at_sample(sample_s)._core.simulate(u, start_deg=float(start_deg)))
+    def _run(self, run: RunInputs) -> NDArray[np.float64]:
+        return np.asarray(self.at_sample(run.step_s)._core.simulate(_duty(run.columns[0]), start_deg=run.state[0]))
 
     def predict(
         self,
-        time_s: ArrayLike,
-        duty: ArrayLike,
-        angle_deg: ArrayLike,
+        record: Any,
         horizon: int,
         *,
         angle_gain: float = 0.35,
         speed_gain_per_s: float = 35.0,
         bias_gain_duty_per_deg: float = 0.004,
-    ) -> NDArray[np.float64]:
-        """Predict ahead of a measured record, re-anchored at every sample.
+    ) -> xr.Dataset:
+        """Predict ahead of a measured record, corrected by the measurement at every sample.
 
         Parameters
         ----------
-        time_s, duty, angle_deg : array_like, shape (n,)
-            The record: time [s], duty [-], angle [deg].
+        record : xarray.Dataset, DataFrame or mapping of columns
+            ``time_s`` [s], ``duty`` [-] and ``angle_deg`` [deg].
         horizon : int
             Samples ahead, at least 1.
         angle_gain, speed_gain_per_s, bias_gain_duty_per_deg : float
@@ -200,36 +186,34 @@ class PseudoWiener:
 
         Returns
         -------
-        ndarray, shape (n - horizon,)
-            Entry k is the prediction of the angle at sample k + horizon from data up to k [deg].
+        xarray.Dataset
+            ``angle_deg`` over ``time_s`` from sample `horizon` on; entry k is predicted from the data up to sample k.
 
         Raises
         ------
         DataError
-            An uneven time.
+            A missing column, a value that is not finite, or times that are not even.
         ShapeError
             Columns of different length.
         ParameterError
             A horizon that does not fit into the record.
         """
-        sample_s, u = _grid(time_s, duty)
+        time, u, angle = columns_of(record, ("time_s", "duty", "angle_deg"))
+        check_horizon(horizon, angle.size)
+        sample_s = even_step(time)
         share = sample_s / _GAIN_SAMPLE_S
-        angle = np.asarray(angle_deg, dtype=np.float64)
-        if horizon < 1:
-            raise ParameterError(f"horizon = {horizon}: must be in [1, {u.size - 1}], below the samples of the log")
-        return np.asarray(
-            self.at_sample(sample_s)._core.predict(
-                u,
-                angle,
-                int(horizon),
-                angle_gain=1.0 - (1.0 - angle_gain) ** share,
-                speed_gain_per_s=speed_gain_per_s * share,
-                bias_gain_duty_per_deg=bias_gain_duty_per_deg * share,
-            )
+        ahead = self.at_sample(sample_s)._core.predict(
+            _duty(u),
+            angle,
+            int(horizon),
+            angle_gain=1.0 - (1.0 - angle_gain) ** share,
+            speed_gain_per_s=speed_gain_per_s * share,
+            bias_gain_duty_per_deg=bias_gain_duty_per_deg * share,
         )
+        return self._labelled(time[horizon:], {"angle_deg": np.asarray(ahead)})
 
     def slopes(
-        self, duty: ArrayLike, *, start_deg: float, speed_deg_per_s: float = 0.0
+        self, duty: ArrayLike, *, initial_state: Mapping[str, float]
     ) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
         """Predict a horizon from a state, with exact sensitivities to every duty.
 
@@ -237,10 +221,8 @@ class PseudoWiener:
         ----------
         duty : array_like, shape (n,)
             Duty of the horizon [-].
-        start_deg : float
-            Angle now [deg].
-        speed_deg_per_s : float
-            Speed now [deg/s], PW-R only.
+        initial_state : mapping of str to float
+            ``angle_deg`` now [deg] and, of PW-R, ``speed_deg_per_s`` [deg/s], 0 without.
 
         Returns
         -------
@@ -248,73 +230,28 @@ class PseudoWiener:
             Angle after each sample [deg], shape (n,), and d angle / d duty [deg], shape (n, n), lower triangular.
         """
         angle, slope = self._core.slopes(
-            np.asarray(duty, dtype=np.float64), start_deg=float(start_deg), speed_deg_per_s=float(speed_deg_per_s)
+            np.asarray(duty, dtype=np.float64),
+            start_deg=float(initial_state["angle_deg"]),
+            speed_deg_per_s=float(initial_state.get("speed_deg_per_s", 0.0)),
         )
         return np.asarray(angle), np.asarray(slope)
 
-    def to_toml(self, *, source: str = "mgdd") -> str:
-        """Write the model as TOML that `from_toml` reads back equal.
-
-        Parameters
-        ----------
-        source : str
-            Where the numbers come from.
-
-        Returns
-        -------
-        str
-            One line per value with its unit.
-        """
-        text = json.dumps(source, ensure_ascii=False)
-        units = self.units
-        lines = [f'kind = "{self.kind}"', f"source = {text}", "unidentifiable = []"]
-        lines += [f'{name} = "{value}"' for name, value in self._options.items()]
-        lines += ["", "[parameters]"]
-        lines += [
-            f'{name} = {{ value = {value!r}, unit = "{units[name]}", source = {text} }}'
-            for name, value in self.parameters.items()
-        ]
-        return "\n".join(lines) + "\n"
+    def to_parameters(self) -> ParameterFile:
+        """Give all numbers and choices, as `to_toml` writes them."""
+        return ParameterFile(
+            kind=self.kind,
+            tables={"parameters": entries(self.parameters, self.units), "settings": entries(self._options)},
+        )
 
     @classmethod
-    def from_toml(cls, text: str) -> PseudoWiener:
-        """Read what `to_toml` wrote, or a saved fit of these kinds.
-
-        Parameters
-        ----------
-        text : str
-            The TOML text.
-
-        Returns
-        -------
-        PseudoWiener
-            The model.
-
-        Raises
-        ------
-        DataError
-            No TOML, or no table ``[parameters]`` of values with units.
-        ParameterError
-            A kind, name or value that does not exist.
-        """
-        try:
-            data = tomllib.loads(text)
-        except tomllib.TOMLDecodeError as error:
-            raise DataError(f"not valid TOML: {error}") from error
-        table = data.get("parameters")
-        if not isinstance(table, dict) or not table:
-            raise DataError("no table [parameters]: PseudoWiener.to_toml writes one")
-        kind = str(data.get("kind", ""))
-        values = {}
-        for name, entry in table.items():
-            if not isinstance(entry, dict) or not isinstance(entry.get("value"), int | float):
-                raise DataError(f"[parameters] {name}: write {{ value = ..., unit = ... }}")
-            values[name] = float(entry["value"])
-        options = {name: str(data[name]) for name in ("switching", "friction") if name in data}
-        model = cls(kind, values, **options)
-        for name, unit in model.units.items():
-            if name in table and table[name].get("unit") != unit:
-                raise DataError(f"[parameters] {name}: unit = {table[name].get('unit')!r}: must be {unit!r}")
+    def from_parameters(cls, file: ParameterFile) -> PseudoWiener:
+        """Make the model of a file that `to_toml` or a fit wrote."""
+        file.expect(kinds=_KINDS, tables=("parameters", "settings", "fit?"), notes=FIT_NOTES)
+        units = {name: str(unit) for name, unit in _core.pseudo_wiener_units(file.kind).items()}
+        said = file.values("parameters", {name: Wanted(unit, required=False) for name, unit in units.items()})
+        options = file.values("settings", wanted(("switching", "friction"), form="text"))
+        model = cls(file.kind, said, **options)
+        file.values("parameters", wanted(model.parameters, units))  # which of them there are, the numbers say
         return model
 
     def __eq__(self, other: object) -> bool:
@@ -323,25 +260,22 @@ class PseudoWiener:
     def __hash__(self) -> int:
         return hash((self.kind, tuple(self.parameters.values()), *self._options.values()))
 
-    def __repr__(self) -> str:
-        return f"PseudoWiener({self.kind!r}, {dict(self.parameters)!r})"
-
     def __reduce__(self) -> tuple[object, ...]:
         return _rebuild, (self.kind, dict(self.parameters), dict(self._options))
+
+
+described(
+    PseudoWiener,
+    title=lambda model: f"PseudoWiener {model.kind}, " + ", ".join(f"{n} {v}" for n, v in model._options.items()),
+    rows=lambda model: rows_of(model.parameters, model.units),
+)
 
 
 def _rebuild(kind: str, parameters: Mapping[str, float], options: Mapping[str, str]) -> PseudoWiener:
     return PseudoWiener(kind, parameters, switching=options["switching"], friction=options["friction"])
 
 
-def _grid(time_s: ArrayLike, duty: ArrayLike) -> tuple[float, NDArray[np.float64]]:
-    time = np.asarray(time_s, dtype=np.float64)
-    column = np.asarray(duty, dtype=np.float64)
-    if time.ndim != 1 or time.size < 2 or column.shape != time.shape:
-        raise ShapeError(f"time_s has shape {time.shape}, duty {column.shape}: must be two columns of one length >= 2")
-    step = float(time[-1] - time[0]) / (time.size - 1)
-    if not step > 0.0 or not np.allclose(np.diff(time), step, rtol=0.0, atol=0.1 * step):
-        raise DataError("time_s is uneven: resample the record to a constant step")
-    if not (np.isfinite(column).all() and np.abs(column).max() <= 1.0):
-        raise DataError("duty: must be finite and in [-1, 1]")
-    return step, column
+def _duty(column: NDArray[np.float64]) -> NDArray[np.float64]:
+    if not np.abs(column).max() <= 1.0:
+        raise DataError("duty: must be in [-1, 1]; a duty in percent is divided by 100")
+    return column

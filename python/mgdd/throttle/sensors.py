@@ -10,9 +10,10 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from mgdd import _core
-from mgdd._core import SensorPair
 from mgdd.errors import DataError, ParameterError
+from mgdd.io.parameters import ParameterFile, Parameters, Wanted, entries, wanted
 from mgdd.results import labelled_dataset
+from mgdd.signals.even_grid import even_step
 
 if TYPE_CHECKING:
     import xarray as xr
@@ -31,6 +32,21 @@ _FLAGS = {
     "sum_fault": "sum out of tolerance",
     "fault": "a check has failed for the debounce time",
 }
+
+
+class SensorPair(Parameters, _core.SensorPair):  # noqa: D101 the core's text
+    __doc__ = _core.SensorPair.__doc__
+
+    def to_parameters(self) -> ParameterFile:
+        """Give all fields, as `to_toml` writes them."""
+        return ParameterFile(kind="sensor_pair", tables={"parameters": entries(self.to_dict())})
+
+    @classmethod
+    def from_parameters(cls, file: ParameterFile) -> SensorPair:
+        """Make the pair of a file that `to_toml` wrote."""
+        file.expect(kinds=("sensor_pair",), tables=("parameters",))
+        names = [name for name in cls().to_dict() if name != "adc_bits"]
+        return cls(**file.values("parameters", {**wanted(names), "adc_bits": Wanted(form="integer")}))
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -129,24 +145,13 @@ def sense(
     if seed < 0:
         raise ParameterError(f"seed = {seed}: must be >= 0")
     time = run["time_s"].to_numpy()
-    if time.size < 2:
-        raise DataError(f"time_s has {time.size} sample(s): at least two are needed")
-    sample = float(np.round((time[-1] - time[0]) / (time.size - 1), 9))
-    off = np.abs(time - time[0] - sample * np.arange(time.size)) > 1e-3 * sample
-    if off.any():
-        k = int(np.argmax(off))
-        raise DataError(f"time_s = {time[k]:g} s at sample {k} is off the even grid of {sample:g} s: resample first")
-    per_sensor = [("none", 0.0, 0.0), ("none", 0.0, 0.0)]
-    for fault in faults:
-        if per_sensor[fault.sensor - 1][0] != "none":
-            raise ParameterError(f"faults: sensor {fault.sensor} has two: give at most one per sensor")
-        per_sensor[fault.sensor - 1] = (fault.kind, fault.from_s, fault.size)
+    sample = even_step(time)
     raw = _core.sense_throttle(
         SensorPair() if sensors is None else sensors,
         run["angle_deg"].to_numpy(),
         sample_s=sample,
         seed=seed,
-        faults=per_sensor,
+        faults=fault_pair(faults),
     )
     onset = min((fault.from_s for fault in faults), default=0.0)
     latched = raw["fault"].any()
@@ -158,5 +163,15 @@ def sense(
             **{name: ("time_s", raw[name], "-", text) for name, text in _FLAGS.items()},
             "detected_s": ((), detected, "s", "time from onset to detection"),
         },
-        attrs={"seed": seed, "faults": tuple(f"{f.kind} of sensor {f.sensor}" for f in faults)},
+        attrs={"seed": seed, "faults": ", ".join(f"{f.kind} of sensor {f.sensor}" for f in faults)},
     )
+
+
+def fault_pair(faults: Sequence[SensorFault]) -> list[tuple[str, float, float]]:
+    """Give kind, onset [s] and size of the fault of each sensor; ParameterError for two of one sensor."""
+    per_sensor = [("none", 0.0, 0.0), ("none", 0.0, 0.0)]
+    for fault in faults:
+        if per_sensor[fault.sensor - 1][0] != "none":
+            raise ParameterError(f"faults: sensor {fault.sensor} has two: give at most one per sensor")
+        per_sensor[fault.sensor - 1] = (fault.kind, fault.from_s, fault.size)
+    return per_sensor

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Callable, Sequence
+from collections.abc import Sequence
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
@@ -12,6 +12,7 @@ from mgdd import _core
 from mgdd._core import Throttle
 from mgdd.errors import DataError, ParameterError, ShapeError
 from mgdd.results import labelled_dataset
+from mgdd.signals.even_grid import even_step
 
 if TYPE_CHECKING:
     import xarray as xr
@@ -21,8 +22,6 @@ __all__ = ["simulate", "simulate_many", "step_summary"]
 
 _DEFAULT_DURATION_S = 1.0
 _MOST_SAMPLES = 5_000_000
-# Samples may be off an even grid by this share of a sample: what six decimals of a file cost.
-_UNEVEN = 1e-3
 _MOVED_DEG = 0.01
 
 
@@ -213,7 +212,8 @@ def step_summary(run: xr.Dataset) -> dict[str, float]:
 
     Examples
     --------
-    >>> from mgdd.throttle import Throttle, simulate, step_summary
+    >>> from mgdd.throttle import Throttle, simulate
+    >>> from mgdd.throttle.simulation import step_summary
     >>> summary = step_summary(simulate(Throttle(), 1.0, duration_s=0.3))
     >>> round(summary["t10_s"], 3), round(summary["t90_s"], 3)
     (0.019, 0.078)
@@ -257,7 +257,7 @@ def _grid(
         if duration_s is not None:
             raise ParameterError(f"duration_s = {duration_s:g} s contradicts time_s: leave one out")
         times = np.asarray(time_s, dtype=np.float64)
-        sample = sample_time(times)
+        sample = even_step(times, remedy="resample the duty first")
         if column.ndim == 0:
             column = np.full(times.size, float(column))
         if column.size != times.size:
@@ -277,27 +277,6 @@ def _grid(
             f"duration_s = {duration_s:g} s: goes with a constant duty only; this one has {column.size} samples"
         )
     return np.arange(column.size, dtype=np.float64) * float(sample_s), column, float(sample_s)
-
-
-def sample_time(times: NDArray[np.float64], row: Callable[[int], str] = "sample {}".format) -> float:
-    """Give the sample time of even times [s]; `row` is how a message calls sample k."""
-    if times.ndim != 1 or times.size < 2:
-        raise ShapeError(f"time_s has shape {times.shape}: must be one column of at least two samples")
-    if not np.isfinite(times).all():
-        raise DataError(f"time_s is not finite at {row(int(np.argmin(np.isfinite(times))))}")
-    gaps = np.diff(times)
-    if not (gaps > 0.0).all():
-        k = int(np.argmax(gaps <= 0.0)) + 1
-        raise DataError(f"time_s = {times[k]:g} s at {row(k)} does not exceed the one before: sort it, drop repeats")
-    # Six digits after the point, as many tables have them: the sample time is what they mean, to a nanosecond.
-    sample = float(np.round((times[-1] - times[0]) / (times.size - 1), 9))
-    off = np.abs(times - times[0] - sample * np.arange(times.size)) > _UNEVEN * sample
-    if off.any():
-        k = int(np.argmax(off))
-        raise DataError(
-            f"time_s = {times[k]:g} s at {row(k)} is off the even grid of {sample:g} s: resample the duty first"
-        )
-    return sample
 
 
 def _signal(name: str, values: ArrayLike | None, size: int) -> NDArray[np.float64]:

@@ -7,8 +7,8 @@
 #include <gtest/gtest.h>
 
 #include "mgdd/common/bounds.hpp"
+#include "mgdd/common/enum_names.hpp"
 #include "mgdd/common/error.hpp"
-#include "mgdd/common/names.hpp"
 #include "mgdd/common/text.hpp"
 #include "mgdd/common/units.hpp"
 

@@ -8,7 +8,7 @@
 #include "mgdd/common/units.hpp"
 #include "mgdd/engine/emissions.hpp"
 #include "mgdd/engine/ignition.hpp"
-#include "mgdd/engine/trace_analysis.hpp"
+#include "mgdd/engine/pressure/trace_analysis.hpp"
 #include "support/engine_case.hpp"
 
 namespace mgdd::engine {

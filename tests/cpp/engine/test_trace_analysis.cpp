@@ -1,6 +1,6 @@
 // Analysis of traces: the way back from a simulated cycle, pegging, TDC errors, and the published figures of the
 // measured heavy-duty traces.
-#include "mgdd/engine/trace_analysis.hpp"
+#include "mgdd/engine/pressure/trace_analysis.hpp"
 
 #include <algorithm>
 #include <cmath>

@@ -1,5 +1,5 @@
 // Refusals of traces that cannot be what the caller says they are.
-#include "mgdd/engine/trace_check.hpp"
+#include "mgdd/engine/pressure/trace_check.hpp"
 
 #include <cmath>
 #include <string>
@@ -8,7 +8,7 @@
 #include <gtest/gtest.h>
 
 #include "mgdd/common/error.hpp"
-#include "mgdd/engine/trace_analysis.hpp"
+#include "mgdd/engine/pressure/trace_analysis.hpp"
 #include "support/engine_case.hpp"
 
 namespace mgdd::engine {

@@ -1,6 +1,6 @@
 // Calibration: recovers what made the data, says what the data cannot tell, and meets the reference fits of the
 // measured traces. tests/python/test_identify_cylinder.py reads the same reference rows.
-#include "mgdd/identify/cylinder_fit.hpp"
+#include "mgdd/identify/engine/cylinder_fit.hpp"
 
 #include <algorithm>
 #include <cmath>

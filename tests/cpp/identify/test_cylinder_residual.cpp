@@ -1,5 +1,5 @@
 // The residual of a calibration: its Jacobian against differences, its order of parameters, and no allocation.
-#include "mgdd/identify/cylinder_residual.hpp"
+#include "mgdd/identify/engine/cylinder_residual.hpp"
 
 #include <cmath>
 

@@ -4,7 +4,7 @@
 #include <cmath>
 #include <random>
 
-#include "mgdd/identify/pseudo_wiener_fit.hpp"
+#include "mgdd/identify/throttle/pseudo_wiener_fit.hpp"
 #include "support/throttle_records.hpp"
 
 namespace mgdd::identify {

@@ -6,10 +6,10 @@
 #include <functional>
 
 #include "mgdd/common/state.hpp"
-#include "mgdd/identify/recursive_gradient.hpp"
-#include "mgdd/identify/recursive_observer.hpp"
-#include "mgdd/identify/recursive_pw_r.hpp"
-#include "mgdd/identify/recursive_window.hpp"
+#include "mgdd/identify/online/recursive_gradient.hpp"
+#include "mgdd/identify/online/recursive_observer.hpp"
+#include "mgdd/identify/online/recursive_pw_r.hpp"
+#include "mgdd/identify/online/recursive_window.hpp"
 #include "support/no_alloc.hpp"
 #include "support/throttle_records.hpp"
 

@@ -1,4 +1,4 @@
-#include "mgdd/identify/simulation_residual.hpp"
+#include "mgdd/identify/output_error.hpp"
 
 #include <cmath>
 #include <limits>
@@ -6,7 +6,7 @@
 #include <gtest/gtest.h>
 
 #include "mgdd/common/random.hpp"
-#include "mgdd/optimize/least_squares.hpp"
+#include "mgdd/optimize/least_squares/least_squares.hpp"
 #include "support/no_alloc.hpp"
 
 namespace mgdd::identify {

@@ -6,8 +6,8 @@
 
 #include "mgdd/common/error.hpp"
 #include "mgdd/common/random.hpp"
-#include "mgdd/identify/simulation_residual.hpp"
-#include "mgdd/identify/smooth_throttle_fit.hpp"
+#include "mgdd/identify/output_error.hpp"
+#include "mgdd/identify/throttle/smooth_fit.hpp"
 #include "support/no_alloc.hpp"
 
 namespace mgdd::identify {

@@ -1,4 +1,4 @@
-#include "mgdd/identify/throttle_groups.hpp"
+#include "mgdd/identify/throttle/throttle_groups.hpp"
 
 #include <cmath>
 #include <numbers>

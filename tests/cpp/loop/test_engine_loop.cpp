@@ -121,6 +121,37 @@ TEST(LoopStatistics, CountsAsItsDefinitionsSay) {
   EXPECT_DOUBLE_EQ(s.highest_cad, 4.0);
 }
 
+TEST(LoopStatistics, LimitsAreJudgedInShortRunsToo) {
+  const LoopCriteria standard{.exceed_above = {10.0}};
+  EXPECT_EQ(counted_from(standard, 1), 0);
+  EXPECT_EQ(counted_from(standard, 1000), 500);
+  EXPECT_EQ(counted_from(standard, 1999), 999);
+  EXPECT_EQ(counted_from(standard, 2000), 1000);
+  EXPECT_EQ(counted_from(standard, 50000), 1000);
+  EXPECT_EQ(counted_from({.exceed_from = 7}, 50000), 7);
+  for (const int cycles : {1, 2, 7, 1000}) {
+    LoopStatistics statistics(standard, cycles);
+    for (int k = 0; k < cycles; ++k)
+      statistics.add(cycle_at(5.0, k < cycles / 2 ? 99.0 : k % 2 == 0 ? 11.0 : 9.0));
+    const int counted = cycles - cycles / 2;
+    const int even = (cycles + 1) / 2 - (cycles / 2 + 1) / 2;
+    EXPECT_DOUBLE_EQ(statistics.summary().exceeded_fraction, static_cast<double>(even) / counted) << cycles;
+  }
+}
+
+TEST(LoopStatistics, AWindowWithoutACycleIsRefused) {
+  EXPECT_NO_THROW(validate({.exceed_from = 299, .exceed_above = {10.0}}, 300));
+  EXPECT_NO_THROW(validate({.exceed_from = 1000}, 300));  // no threshold: nothing is judged
+  try {
+    validate({.exceed_from = 300, .exceed_above = {10.0}}, 300);
+    FAIL();
+  } catch (const ParameterError& error) {
+    EXPECT_STREQ(error.what(), "exceed_from = 300: must be < cycles = 300, or no cycle counts");
+    EXPECT_EQ(error.field, "exceed_from");
+  }
+  EXPECT_THROW(validate({.exceed_from = -1}, 300), ParameterError);
+}
+
 TEST(LoopStatistics, SaysNothingOfWhatWasNotAskedOrDidNotHappen) {
   LoopStatistics statistics({}, 4);
   for (int k = 0; k < 4; ++k)

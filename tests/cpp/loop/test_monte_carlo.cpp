@@ -5,6 +5,7 @@
 
 #include <atomic>
 #include <cstring>
+#include <stdexcept>
 
 namespace mgdd::loop {
 namespace {
@@ -81,6 +82,12 @@ TEST(MonteCarlo, StopsEarlyAndKeepsWhatIsFinished) {
     EXPECT_TRUE(!r.finished[i] || same(r.loops[i], first.loops[1])) << i;  // every seed of the long plan is 1
 }
 
+TEST(MonteCarlo, AnExceptionOfTheStopCallbackEndsTheLoops) {
+  MonteCarloPlan plan = small_plan();
+  plan.cycles = 1'000'000'000;  // would take hours
+  EXPECT_THROW(monte_carlo(plan, []() -> bool { throw std::runtime_error("signal"); }), std::runtime_error);
+}
+
 TEST(MonteCarlo, AnEmptyOrUnfittingPlanIsRefused) {
   MonteCarloPlan plan = small_plan();
   plan.seeds.clear();
@@ -91,6 +98,9 @@ TEST(MonteCarlo, AnEmptyOrUnfittingPlanIsRefused) {
   plan = small_plan();
   plan.criteria.pop_back();
   EXPECT_THROW(monte_carlo(plan, {}), ShapeError);
+  plan = small_plan();
+  plan.criteria[0].exceed_from = plan.cycles;
+  EXPECT_THROW(monte_carlo(plan, {}), ParameterError);
   plan = small_plan();
   optimize::GoldenSectionSettings golden;
   golden.space = {scalar_input(0.0), scalar_input(-20.0), scalar_input(5.0)};

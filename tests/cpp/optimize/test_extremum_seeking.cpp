@@ -166,6 +166,61 @@ TEST(ExtremumSeeking, NoiseMakesTheErrorThatAveragingPredicts) {
   }
 }
 
+// --- rates ----------------------------------------------------------------------------------------------------
+
+/// Steps of the estimate while J pulls up, with a limit at x <= 2.
+struct Steps {
+  double up = 0.0;  ///< largest
+  double down = 0.0;
+  double least_down = unlimited;  ///< smallest one above x = 8, where the way back is long
+};
+Steps steps_of(ExtremumSeekingSettings s, double start) {
+  s.space = space_at(scalar_input(start), 50.0);
+  s.limits = {{"p_max_bar", 104.0}};
+  ExtremumSeeking seeker(s);
+  Steps out;
+  for (int k = 0; k < 60; ++k) {
+    const double before = seeker.estimate()[0];
+    const double x = seeker.ask()[0];
+    const double j[] = {0.3 * x}, limited[] = {100.0 + 2.0 * x};
+    seeker.tell({j, limited, false});
+    const double step = seeker.estimate()[0] - before;
+    out.up = std::max(out.up, step);
+    out.down = std::max(out.down, -step);
+    if (step < 0.0 && seeker.estimate()[0] > 8.0) out.least_down = std::min(out.least_down, -step);
+  }
+  return out;
+}
+
+TEST(ExtremumSeeking, TheWayBackBelowALimitHasItsOwnRate) {
+  for (const MeanRemoval form : {MeanRemoval::batch, MeanRemoval::moving_average, MeanRemoval::washout}) {
+    const bool batch = form == MeanRemoval::batch;
+    const auto expect_back = [&](const ExtremumSeekingSettings& s, double rate) {
+      const Steps steps = steps_of(s, 22.0);
+      EXPECT_NEAR(steps.down, rate, 1e-12) << to_string(form);
+      EXPECT_NEAR(steps.least_down, rate, 1e-12) << to_string(form);
+    };
+    ExtremumSeekingSettings s;
+    s.form = form;
+    s.rate = scalar_input(0.02);
+    for (const double recovery : {0.11, 0.7, 2.3}) {
+      s.recovery_rate = scalar_input(recovery);
+      expect_back(s, recovery);
+      EXPECT_NEAR(steps_of(s, -20.0).up, batch ? 0.2 : 0.02, 1e-12) << to_string(form) << ": a batch moves once in ten";
+    }
+    s.recovery_rate = Inputs{};
+    expect_back(s, 0.02);
+    s.rate = Inputs{};
+    s.dither.amplitude = scalar_input(1.7);
+    expect_back(s, 1.7);
+    EXPECT_NEAR(steps_of(s, -30.0).up, batch ? 1.7 : 0.51, 1e-12) << to_string(form);
+  }
+  ExtremumSeekingSettings slow;  // a batch comes back as slowly as it is told
+  slow.rate = scalar_input(0.5);
+  slow.recovery_rate = scalar_input(0.11);
+  EXPECT_NEAR(steps_of(slow, 22.0).down, 0.11, 1e-12);
+}
+
 // --- dither that vanishes, several inputs -------------------------------------------------------------------
 
 TEST(ExtremumSeeking, DitherShrinksWhereJIsFlatAndComesBackAtANewOperatingPoint) {

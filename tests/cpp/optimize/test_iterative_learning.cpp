@@ -1,4 +1,4 @@
-#include "mgdd/optimize/iterative_learning.hpp"
+#include "mgdd/optimize/learning/iterative_learning.hpp"
 
 #include <algorithm>
 #include <cmath>
@@ -260,6 +260,29 @@ TEST(IterativeLearning, ErrorsFollowTheErrorMapToTheLimit) {
   }
 }
 
+// The limit is where learning rests: told the limit error, the learner gives the same input again. 300 samples are
+// enough for the blocked decompositions of Eigen; `make asan` runs them too.
+TEST(IterativeLearning, RestsAtThePredictedLimitInLongTrialsToo) {
+  for (const Index n : {12, 300}) {
+    LearningSettings settings{.law = LearningLaw::q_filter, .k_p = 0.15, .cutoff = 0.3};
+    settings.initial = Column(static_cast<std::size_t>(n), 0.0);
+    for (Index k = 0; k < n; ++k)
+      settings.impulse_response.push_back(std::pow(0.9, static_cast<double>(k)));
+    const ConvergenceReport report = IterativeLearning(settings).convergence();
+    ASSERT_TRUE(report.asymptotic) << report.sentence;
+    const VectorXd limit = report.limit_error_map * wave(n);
+    EXPECT_GT(limit.norm(), 1e-3);
+    VectorXd input = wave(n) - limit;  // u = G^-1 (w - e) of y(t) = 0.9 y(t-1) + u(t)
+    for (Index t = n - 1; t > 0; --t)
+      input[t] -= 0.9 * input[t - 1];
+    settings.initial = as_column(input);
+    IterativeLearning learner(settings);
+    learner.ask();
+    learner.tell(as_column(limit));
+    EXPECT_LT((as_vector(learner.ask()) - input).norm(), 1e-10 * input.norm());
+  }
+}
+
 // Closed forms of one update with relative degree 1; errors before the window are zero, behind it the last one.
 TEST(IterativeLearning, LawsReadTheErrorAsPrinted) {
   const VectorXd e = (VectorXd(5) << 7.0, 1.0, -2.0, 4.0, 3.0).finished();
@@ -363,9 +386,15 @@ TEST(IterativeLearning, ARefusedErrorChangesNothing) {
   const auto asked = learner.state();
   EXPECT_EQ(learner.try_tell(Column(3, 0.0)), LearningStatus::wrong_length);
   EXPECT_THROW(learner.tell(Column(5, 0.0)), ShapeError);
-  EXPECT_EQ(learner.try_tell(Column{1.0, nan, 0.0, 0.0}), LearningStatus::not_finite);
-  EXPECT_EQ(learner.try_tell(Column(4, 1.7e308)), LearningStatus::overflow);
+  EXPECT_EQ(learner.try_tell(Column{1.0, nan, 0.0, 0.0}), LearningStatus::not_a_reading);
+  for (const double beyond : {1.001e30, -1e31, 1.7e308})
+    EXPECT_EQ(learner.try_tell(Column{1.0, beyond, 0.0, 0.0}), LearningStatus::not_a_reading);
   EXPECT_THROW(learner.tell(Column(4, 1.7e308)), DataError);
+  IterativeLearning steep(p_type(4, 1e300));
+  steep.ask();
+  const auto flat = steep.state();
+  EXPECT_EQ(steep.try_tell(Column(4, 1e20)), LearningStatus::overflow);
+  EXPECT_EQ(steep.state(), flat);
   try {
     learner.tell(Column{1.0, 2.0, -infinity, 0.0});
     FAIL();

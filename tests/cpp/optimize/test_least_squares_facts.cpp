@@ -6,7 +6,7 @@
 #include <Eigen/Cholesky>
 
 #include "mgdd/common/random.hpp"
-#include "mgdd/optimize/least_squares.hpp"
+#include "mgdd/optimize/least_squares/least_squares.hpp"
 
 namespace mgdd::optimize {
 namespace {

@@ -143,15 +143,16 @@ TEST(EverySeeker, ARefusedReadingChangesNothing) {
     EXPECT_EQ(save_state(seeker), save_state(untouched));
     seeker.ask();
     untouched.ask();
-    for (const double bad : {std::nan(""), unlimited, -unlimited}) {
+    for (const double bad : {std::nan(""), unlimited, -unlimited, 1e308, -1e308, 1.001e30, -9.9e37}) {
       const double j[] = {bad};
       const Reading reading{j, limits, false};
-      EXPECT_EQ(seeker.tell(reading), TellStatus::not_finite);
+      EXPECT_EQ(seeker.tell(reading), TellStatus::not_a_reading);
       try {
-        require(TellStatus::not_finite, seeker.protocol(), reading, 1, limits.size());
+        require(TellStatus::not_a_reading, seeker.protocol(), reading, 1, limits.size());
         FAIL();
       } catch (const DataError& e) {
         EXPECT_NE(std::string(e.what()).find("cycle 41: J = "), std::string::npos) << e.what();
+        EXPECT_EQ(e.field, "J");
       }
     }
     const double two[] = {1.0, 2.0};
@@ -159,8 +160,10 @@ TEST(EverySeeker, ARefusedReadingChangesNothing) {
     EXPECT_EQ(seeker.tell({good, two, false}), TellStatus::wrong_limit_count);
     if (!limits.empty()) {
       std::vector<double> broken = limits;
-      broken[1] = std::nan("");
-      EXPECT_EQ(seeker.tell({good, broken, false}), TellStatus::not_finite);
+      for (const double bad : {std::nan(""), 1e308}) {
+        broken[1] = bad;
+        EXPECT_EQ(seeker.tell({good, broken, false}), TellStatus::not_a_reading);
+      }
     }
     EXPECT_EQ(save_state(seeker), save_state(untouched));
     run(seeker, scene, 60, 41);
@@ -169,6 +172,33 @@ TEST(EverySeeker, ARefusedReadingChangesNothing) {
     const double j[] = {1.0};
     EXPECT_EQ(seeker.tell({j, limits, false}), TellStatus::not_asked) << "twice";
   });
+}
+
+bool all_finite(const StateColumns& columns) {
+  for (const auto& [name, column] : columns) {
+    for (const double value : column) {
+      if (!std::isfinite(value)) return false;
+    }
+  }
+  return true;
+}
+
+TEST(EverySeeker, StaysFiniteWhateverReadingsItTakes) {
+  // Alternating signs are the worst case of every difference: 1e308 - -1e308 is no number any more.
+  for (const double size : {1e308, 1e200, 1e100, largest_reading, 1e25, 1e8}) {
+    on_every_seeker([&](auto& seeker, const Scene& scene) {
+      for (int k = 0; k < 600; ++k) {
+        const double sign = random::bits(3, 1, static_cast<std::uint64_t>(k)) >> 63 ? 1.0 : -1.0;
+        ASSERT_TRUE(seeker.ask().allFinite());
+        const double j[] = {sign * size};
+        std::vector<double> limits = limit_values(scene, scene.space.start);
+        for (double& value : limits)
+          value = k % 3 == 0 ? -sign * size : value;
+        seeker.tell({j, limits, false});
+        ASSERT_TRUE(all_finite(save_state(seeker))) << size << ", cycle " << k;
+      }
+    });
+  }
 }
 
 // --- bounds -------------------------------------------------------------------------------------------------

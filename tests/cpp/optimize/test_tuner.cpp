@@ -1,5 +1,5 @@
 // The tuner: its closed forms, the seekers that it makes, and its plain word where a wish cannot be met.
-#include "mgdd/optimize/tuner.hpp"
+#include "mgdd/optimize/seekers/tuner.hpp"
 
 #include "support/lagged_sensor.hpp"
 #include "support/seeker_case.hpp"

@@ -11,7 +11,7 @@
 #include "mgdd/engine/cycle.hpp"
 #include "mgdd/engine/cylinder.hpp"
 #include "mgdd/engine/indicators.hpp"
-#include "mgdd/identify/cylinder_fit.hpp"
+#include "mgdd/identify/engine/cylinder_fit.hpp"
 
 namespace mgdd::test_support {
 

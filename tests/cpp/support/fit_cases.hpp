@@ -10,7 +10,7 @@
 
 #include <Eigen/Dense>
 
-#include "mgdd/optimize/least_squares.hpp"
+#include "mgdd/optimize/least_squares/least_squares.hpp"
 
 namespace mgdd::optimize {
 

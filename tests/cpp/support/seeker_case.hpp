@@ -14,7 +14,7 @@
 
 #include "mgdd/common/random.hpp"
 #include "mgdd/common/state.hpp"
-#include "mgdd/optimize/seekers.hpp"
+#include "mgdd/optimize/seekers/seekers.hpp"
 #include "support/no_alloc.hpp"
 
 namespace mgdd::optimize {

@@ -10,6 +10,7 @@
 #include "mgdd/common/error.hpp"
 #include "mgdd/common/random.hpp"
 #include "mgdd/throttle/simulation.hpp"
+#include "support/asymmetric_throttle.hpp"
 #include "support/no_alloc.hpp"
 #include "support/throttle_case.hpp"
 
@@ -107,6 +108,49 @@ TEST(ThrottleOptions, LanesHoldTheBitsOfThePlainCode) {
       }
     }
   });
+}
+
+// Every number of a state reaches its lane: cases that start in the middle of a motion, with all of it different.
+TEST(ThrottleOptions, LanesStartFromTheWholeState) {
+  Throttle p = test::asymmetric_throttle();
+  p.friction = Friction::lugre;
+  p.backlash = Backlash::compliance;
+  const std::vector<double> duty = rough_duty(40);
+  std::vector<ThrottleCase> cases;
+  for (int i = 0; i < 9; ++i) {
+    ThrottleState s = at_rest(20.0 + 5.0 * i);
+    s.speed_rad_per_s = 0.5 * i - 1.0;
+    s.current_a = 1.0 - 0.3 * i;
+    s.bristle_rad = 1e-4 * (i - 3);
+    s.plate_angle_rad += test::rad(0.05 * i - 0.2);
+    s.plate_speed_rad_per_s = 0.4 * i - 1.5;
+    s.plate_bristle_rad = 2e-4 * (4 - i);
+    p.pressure_drop_kpa = i < 4 ? 0.0 : 6.0;  // without and with air flow in one call
+    cases.push_back({p, s});
+  }
+  const std::vector<double> many = simulate_many(cases, {.duty = duty}, 3, 2e-4);
+  ASSERT_EQ(many.size(), 9 * duty.size());
+  for (std::size_t i = 0; i < 9; ++i) {
+    std::vector<double> angle(duty.size());
+    ThrottleState state = cases[i].start;
+    simulate(ThrottlePlant(cases[i].throttle, 2e-4), {.duty = duty}, 3, state, {.angle_deg = angle});
+    for (std::size_t k = 0; k < duty.size(); ++k)
+      ASSERT_NEAR(many[i * duty.size() + k], angle[k], 1e-11) << i << ' ' << k;
+  }
+  EXPECT_TRUE(simulate_many({}, {.duty = duty}, 3, 2e-4).empty());
+  EXPECT_THROW(simulate_many(cases, {.duty = duty}, 3, 6e-3), ParameterError);
+  for (const bool friction : {true, false}) {
+    auto mixed = cases;
+    if (friction) {
+      mixed[5].throttle.friction = Friction::tanh;
+    } else {
+      mixed[5].throttle.backlash = Backlash::none;
+    }
+    EXPECT_THROW(simulate_many(mixed, {.duty = duty}, 3, 2e-4), ParameterError);
+  }
+  auto bad = cases;
+  bad[8].throttle.inertia_kgm2 = -1.0;
+  EXPECT_THROW(simulate_many(bad, {.duty = duty}, 3, 2e-4), ParameterError);
 }
 
 // A supply that falls below what the bridge drops drives nothing, and nothing backwards.

@@ -4,7 +4,7 @@
 #include <cmath>
 #include <random>
 
-#include "mgdd/throttle/pseudo_wiener.hpp"
+#include "mgdd/throttle/models/pseudo_wiener.hpp"
 #include "support/no_alloc.hpp"
 #include "support/throttle_records.hpp"
 
@@ -170,7 +170,7 @@ Signal played(const Signal& x, double radius) {
   Signal out;
   double p = 0.0;
   for (const double v : x)
-    out.push_back(p = play(v, radius, p));
+    out.push_back(p = dynamics::play(v, radius, p));
   return out;
 }
 

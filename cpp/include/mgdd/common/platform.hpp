@@ -1,4 +1,5 @@
-// What this build was compiled for and what this processor offers, for reports of a machine.
+// What the library was compiled for and what this processor offers, for reports of a machine.
+// Both are compiled into the library: a caller with other flags gets the library's answer, not its own.
 #pragma once
 
 #include <string>
@@ -7,31 +8,9 @@
 namespace mgdd {
 
 /// Instruction set that the compiler was allowed to use everywhere.
-inline std::string compiled_simd_level() {
-#if defined(__AVX512F__)
-  return "avx512f";
-#elif defined(__AVX2__)
-  return "avx2";
-#elif defined(__SSE2__)
-  return "sse2";
-#elif defined(__ARM_NEON)
-  return "neon";
-#else
-  return "scalar";
-#endif
-}
+std::string compiled_simd_level();
 
 /// Vector instruction sets of the processor, as far as the compiler can ask.
-inline std::vector<std::string> processor_simd_levels() {
-  std::vector<std::string> levels;
-#if defined(__x86_64__) && (defined(__GNUC__) || defined(__clang__))
-  if (__builtin_cpu_supports("sse2")) levels.emplace_back("sse2");
-  if (__builtin_cpu_supports("avx2")) levels.emplace_back("avx2");
-  if (__builtin_cpu_supports("avx512f")) levels.emplace_back("avx512f");
-#else
-  levels.push_back(compiled_simd_level());
-#endif
-  return levels;
-}
+std::vector<std::string> processor_simd_levels();
 
 }  // namespace mgdd

@@ -5,8 +5,8 @@
 #include <algorithm>
 #include <cmath>
 
-#include "mgdd/common/dual.hpp"
 #include "mgdd/engine/cylinder.hpp"
+#include "mgdd/math/dual.hpp"
 
 namespace mgdd::engine {
 

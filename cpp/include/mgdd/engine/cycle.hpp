@@ -7,11 +7,11 @@
 #include <span>
 #include <vector>
 
-#include "mgdd/common/dual.hpp"
 #include "mgdd/engine/burn.hpp"
 #include "mgdd/engine/cylinder.hpp"
 #include "mgdd/engine/geometry.hpp"
 #include "mgdd/engine/indicators.hpp"
+#include "mgdd/math/dual.hpp"
 
 namespace mgdd::engine {
 

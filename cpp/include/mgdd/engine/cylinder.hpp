@@ -9,7 +9,7 @@
 #include <string>
 #include <string_view>
 
-#include "mgdd/common/dual.hpp"
+#include "mgdd/math/dual.hpp"
 
 namespace mgdd::engine {
 

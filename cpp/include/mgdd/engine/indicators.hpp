@@ -7,7 +7,7 @@
 #include <span>
 #include <string_view>
 
-#include "mgdd/common/dual.hpp"
+#include "mgdd/math/dual.hpp"
 
 namespace mgdd::engine {
 

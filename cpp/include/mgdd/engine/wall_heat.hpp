@@ -4,11 +4,11 @@
 
 #include <cmath>
 
-#include "mgdd/common/dual.hpp"
-#include "mgdd/common/fast_power.hpp"
 #include "mgdd/common/units.hpp"
 #include "mgdd/engine/cylinder.hpp"
 #include "mgdd/engine/geometry.hpp"
+#include "mgdd/math/dual.hpp"
+#include "mgdd/math/fast_power.hpp"
 
 namespace mgdd::engine {
 

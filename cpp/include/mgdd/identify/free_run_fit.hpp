@@ -13,9 +13,9 @@
 
 #include "mgdd/common/bounds.hpp"
 #include "mgdd/common/error.hpp"
-#include "mgdd/identify/simulation_residual.hpp"
+#include "mgdd/identify/output_error.hpp"
 #include "mgdd/identify/step_model.hpp"
-#include "mgdd/optimize/least_squares.hpp"
+#include "mgdd/optimize/least_squares/least_squares.hpp"
 
 namespace mgdd::identify {
 

@@ -2,23 +2,21 @@
 // that the same seed gives the same starts on every machine; results do not depend on the number of threads. Desk-time.
 #pragma once
 
-#include <atomic>
 #include <cmath>
 #include <cstddef>
 #include <cstdint>
-#include <exception>
 #include <string>
-#include <thread>
 #include <utility>
 #include <vector>
 
 #include <Eigen/Core>
 
 #include "mgdd/common/error.hpp"
-#include "mgdd/identify/simulation_residual.hpp"
-#include "mgdd/optimize/fit_report.hpp"
-#include "mgdd/optimize/least_squares.hpp"
-#include "mgdd/optimize/parameter.hpp"
+#include "mgdd/common/parallel.hpp"
+#include "mgdd/identify/output_error.hpp"
+#include "mgdd/optimize/least_squares/fit_report.hpp"
+#include "mgdd/optimize/least_squares/least_squares.hpp"
+#include "mgdd/optimize/least_squares/parameter.hpp"
 
 namespace mgdd::identify {
 
@@ -36,35 +34,14 @@ struct MultiStartFit {
 /// Ranks finished reports.
 MultiStartFit rank(std::vector<optimize::FitReport> reports);
 
-/// `fit(start)` for every start. With several threads `fit` is called from all of them: it must not share state.
+/// `fit(start)` for every start, on `n_threads` threads (0: all cores): it must not share state then. The exception of
+/// the first start that fails comes back.
 template <class Fit>
 MultiStartFit multi_start(const std::vector<Eigen::VectorXd>& starts, Fit&& fit, std::size_t n_threads = 1) {
   if (starts.empty()) throw ShapeError("starts: must be at least one");
   std::vector<optimize::FitReport> reports(starts.size());
-  if (n_threads <= 1) {
-    for (std::size_t i = 0; i < starts.size(); ++i)
-      reports[i] = fit(starts[i]);
-    return rank(std::move(reports));
-  }
-  std::atomic<std::size_t> next{0};
-  std::vector<std::exception_ptr> failures(starts.size());
-  {
-    std::vector<std::jthread> workers;
-    for (std::size_t t = 0; t < std::min(n_threads, starts.size()); ++t) {
-      workers.emplace_back([&] {
-        for (std::size_t i = next++; i < starts.size(); i = next++) {
-          try {
-            reports[i] = fit(starts[i]);
-          } catch (...) {
-            failures[i] = std::current_exception();
-          }
-        }
-      });
-    }
-  }
-  for (const std::exception_ptr& failure : failures) {
-    if (failure) std::rethrow_exception(failure);
-  }
+  parallel_for(starts.size(), n_threads,
+               [&](std::size_t i, std::size_t, StopRequest&) { reports[i] = fit(starts[i]); });
   return rank(std::move(reports));
 }
 

@@ -5,11 +5,12 @@
 
 #include <cstdint>
 #include <limits>
+#include <optional>
 #include <string>
 #include <vector>
 
 #include "mgdd/loop/engine_bench.hpp"
-#include "mgdd/optimize/seekers.hpp"
+#include "mgdd/optimize/seekers/seekers.hpp"
 
 namespace mgdd::loop {
 
@@ -48,9 +49,13 @@ struct LoopCriteria {
   double optimum_cad = std::numeric_limits<double>::quiet_NaN();  ///< NaN: cycles and rms are not judged
   double arrival_cad = 1.0;                                       ///< |estimate - optimum| that counts as arrived
   std::int64_t tail_cycles = 100;                                 ///< behind `final_cad`
-  std::int64_t exceed_from = 1000;                                ///< first cycle that counts for the limits
-  std::vector<double> exceed_above{};                             ///< per limit of the bench: values above count
+  std::optional<std::int64_t> exceed_from{};  ///< first cycle that counts for the limits; none: see `counted_from`
+  std::vector<double> exceed_above{};         ///< per limit of the bench: values above count; empty: not judged
 };
+
+/// First cycle of a run of that length that counts for the limits: `exceed_from`, or 1000, or the middle of a run that
+/// is shorter than 2000 cycles.
+std::int64_t counted_from(const LoopCriteria& criteria, std::int64_t cycles) noexcept;
 
 /// What a run came to. "Second half" is from cycle n/2 on.
 struct LoopSummary {
@@ -60,7 +65,8 @@ struct LoopSummary {
   double rms_cad = std::numeric_limits<double>::quiet_NaN();            ///< about the optimum, second half
   double cycles_to = std::numeric_limits<double>::quiet_NaN();          ///< first estimate that has arrived; NaN: never
   double cycles_stays = std::numeric_limits<double>::quiet_NaN();       ///< from here on it never leaves again
-  double exceeded_fraction = std::numeric_limits<double>::quiet_NaN();  ///< of cycles from `exceed_from` on
+  double exceeded_fraction = std::numeric_limits<double>::quiet_NaN();  ///< of cycles from `counted_from` on; NaN: no
+                                                                        ///< threshold, or the run ended before
   double mean_applied_cad = std::numeric_limits<double>::quiet_NaN();   ///< second half
   double mean_j = std::numeric_limits<double>::quiet_NaN();             ///< second half, fired cycles
   double mean_efficiency_percent = std::numeric_limits<double>::quiet_NaN();
@@ -70,8 +76,8 @@ struct LoopSummary {
   std::int64_t misfires = 0;
 };
 
-/// ParameterError naming field, value and bound.
-void validate(const LoopCriteria& criteria);
+/// ParameterError naming field, value and bound; also where no cycle of such a run would count for the limits.
+void validate(const LoopCriteria& criteria, std::int64_t cycles);
 
 class LoopStatistics {
  public:
@@ -96,7 +102,8 @@ class LoopStatistics {
   };
 
   LoopCriteria criteria_;
-  std::int64_t planned_, seen_ = 0, counted_ = 0, exceeded_ = 0;
+  std::int64_t planned_, counted_from_;
+  std::int64_t seen_ = 0, counted_ = 0, exceeded_ = 0;
   std::int64_t first_arrival_ = -1, last_away_ = -1;
   Mean tail_, half_, square_, applied_, j_, efficiency_, nox_;
   double lowest_ = std::numeric_limits<double>::infinity(), highest_ = -std::numeric_limits<double>::infinity();

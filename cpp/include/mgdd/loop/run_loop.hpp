@@ -4,13 +4,11 @@
 
 #include <cstdint>
 #include <stop_token>
-#include <string>
-#include <utility>
 #include <vector>
 
 #include "mgdd/common/error.hpp"
 #include "mgdd/loop/engine_loop.hpp"
-#include "mgdd/optimize/seeker_history.hpp"
+#include "mgdd/optimize/seekers/seeker_history.hpp"
 
 namespace mgdd::loop {
 
@@ -24,8 +22,8 @@ struct LoopRun {
 template <optimize::AnySeeker S>
 LoopRun run_loop(EngineBench& bench, optimize::RecordedSeeker<S>& seeker, std::int64_t cycles,
                  const LoopCriteria& criteria, const std::stop_token& stop = {}) {
-  validate(criteria);
-  if (cycles < 1) throw ParameterError("cycles = " + std::to_string(cycles) + ": must be >= 1");
+  if (cycles < 1) throw ParameterError("cycles", cycles, "must be >= 1");
+  validate(criteria, cycles);
   require_match(bench, seeker.seeker());
   LoopRun run;
   run.cycles.reserve(static_cast<std::size_t>(cycles));

@@ -9,8 +9,8 @@
 #include <concepts>
 #include <cstddef>
 
-#include "mgdd/common/lanes.hpp"
 #include "mgdd/common/units.hpp"
+#include "mgdd/math/lanes.hpp"
 #include "mgdd/throttle/throttle.hpp"
 
 namespace mgdd::throttle {

@@ -5,10 +5,13 @@
 #pragma once
 
 #include <array>
+#include <cstddef>
 #include <cstdint>
 #include <optional>
+#include <string>
+#include <type_traits>
 
-#include "mgdd/common/names.hpp"
+#include "mgdd/common/enum_names.hpp"
 
 namespace mgdd::throttle {
 
@@ -77,6 +80,23 @@ class SensorSampler {
   SensorReading step(double angle_deg) noexcept;
 
   const SensorState& state() const noexcept { return state_; }
+
+  template <class Self, class V>
+  static void visit(Self& self, V& v) {
+    auto& s = self.state_;
+    v("sensor_sample", s.sample);
+    v("sensor_failing", s.failing);
+    v("sensor_fault", s.fault);
+    for (std::size_t i = 0; i < s.filtered_v.size(); ++i) {
+      const std::string which = i == 0 ? "first" : "second";
+      v(which + "_filtered_v", s.filtered_v[i]);
+      bool stuck = s.stuck_v[i].has_value();
+      double held = s.stuck_v[i].value_or(0.0);
+      v(which + "_is_stuck", stuck);
+      v(which + "_stuck_v", held);
+      if constexpr (!std::is_const_v<Self>) s.stuck_v[i] = stuck ? std::optional<double>(held) : std::nullopt;
+    }
+  }
 
  private:
   double faulty(std::size_t which, double volts, double time_s) noexcept;

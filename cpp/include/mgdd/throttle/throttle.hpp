@@ -9,7 +9,7 @@
 #include <string_view>
 #include <utility>
 
-#include "mgdd/common/names.hpp"
+#include "mgdd/common/enum_names.hpp"
 
 namespace mgdd::throttle {
 

@@ -1,0 +1,81 @@
+// A throttle as a controller or a bus sees it: inputs of a sample in, what both position sensors say at its end out.
+// Angles in deg from the closed position, duty -1..1, time in s. `step` is noexcept and allocation-free.
+// The plant is throttle/plant.hpp with sub-steps, the sensors are throttle/sensors.hpp; equal seeds give equal noise.
+#pragma once
+
+#include <array>
+#include <cstdint>
+#include <string>
+
+#include "mgdd/common/state.hpp"
+#include "mgdd/throttle/plant.hpp"
+#include "mgdd/throttle/sensors.hpp"
+
+namespace mgdd::loop {
+
+struct VirtualThrottleSettings {
+  throttle::Throttle throttle{};
+  throttle::SensorPair sensors{};
+  std::array<throttle::SensorFault, 2> faults{};
+  double sample_s = 1e-3;
+  double step_s = throttle::default_step_s;
+  double start_deg = 0.0;  ///< at rest, without current
+  throttle::Bridge bridge = throttle::Bridge::brake;
+  std::uint64_t seed = 0;
+};
+/// ParameterError naming field, value and bound.
+void validate(const VirtualThrottleSettings& settings);
+
+/// What acts during one sample.
+struct VirtualThrottleInputs {
+  double duty = 0.0;               ///< clipped to -1..1
+  double supply_v = 12.0;          ///< of the bridge
+  double airflow_torque_nm = 0.0;  ///< positive when it opens
+};
+
+/// The end of one sample: what is measured, and the truth behind it.
+struct VirtualThrottleSample {
+  std::int64_t sample = 0;  ///< samples run so far, this one included
+  throttle::SensorReading sensed{};
+  double angle_deg = 0.0;
+  double speed_deg_per_s = 0.0;
+  double current_a = 0.0;
+};
+
+class VirtualThrottle {
+ public:
+  explicit VirtualThrottle(const VirtualThrottleSettings& settings);
+
+  /// Runs one sample; inputs that are not finite repeat the last ones.
+  VirtualThrottleSample step(const VirtualThrottleInputs& inputs) noexcept;
+
+  const VirtualThrottleSettings& settings() const noexcept { return settings_; }
+  std::int64_t samples() const noexcept { return samples_; }
+
+  template <class Self, class V>
+  static void visit(Self& self, V& v) {
+    v("samples", self.samples_);
+    v("angle_rad", self.state_.angle_rad);
+    v("speed_rad_per_s", self.state_.speed_rad_per_s);
+    v("current_a", self.state_.current_a);
+    v("bristle_rad", self.state_.bristle_rad);
+    v("plate_angle_rad", self.state_.plate_angle_rad);
+    v("plate_speed_rad_per_s", self.state_.plate_speed_rad_per_s);
+    v("plate_bristle_rad", self.state_.plate_bristle_rad);
+    v("duty", self.last_.duty);
+    v("supply_v", self.last_.supply_v);
+    v("airflow_torque_nm", self.last_.airflow_torque_nm);
+    throttle::SensorSampler::visit(self.sensors_, v);
+  }
+
+ private:
+  VirtualThrottleSettings settings_;
+  throttle::ThrottlePlant plant_;
+  throttle::SensorSampler sensors_;
+  std::size_t steps_;
+  throttle::ThrottleState state_;
+  VirtualThrottleInputs last_{};
+  std::int64_t samples_ = 0;
+};
+
+}  // namespace mgdd::loop

@@ -1,0 +1,71 @@
+// Bounded extremum seeking (Scheinker and Krstic 2014): the measurement enters only the phase of an oscillation, so
+// that no step is ever larger than a omega, whatever J does. One step per cycle:
+//   theta_i <- theta_i + a_i omega_i cos(omega_i k - kappa J),    omega_i = 2 pi n_i/M     (J maximised)
+// and the mean drifts at kappa a^2 omega/2 times the slope (Lie bracket average). No mean to remove, no filter.
+// ask and tell are noexcept and allocation-free.
+#pragma once
+
+#include <string>
+#include <vector>
+
+#include "mgdd/optimize/seekers/dither.hpp"
+#include "mgdd/optimize/seekers/limit_guard.hpp"
+#include "mgdd/optimize/seekers/seeker.hpp"
+
+namespace mgdd::optimize {
+
+struct BoundedSeekingSettings {
+  SearchSpace space;
+  DitherSettings dither;  ///< amplitude is the size a of the oscillation
+  double kappa = 1.0;     ///< phase per unit of J [rad], > 0
+  bool maximize = true;
+  std::vector<Limit> limits;
+  double curvature = std::numeric_limits<double>::quiet_NaN();  ///< J'' if known
+
+  std::vector<std::string> advice() const;
+};
+
+class BoundedSeeking {
+ public:
+  explicit BoundedSeeking(BoundedSeekingSettings settings);
+
+  const Inputs& ask() noexcept;
+  TellStatus tell(const Reading& reading) noexcept;
+  /// New operating point: forget the limits; the estimate goes on.
+  void restart() noexcept { guard_.forget(); }
+
+  /// Mean of the applied input over the last window; the start before there is one.
+  const Inputs& estimate() const noexcept { return estimate_; }
+  const BoundedSeekingSettings& settings() const noexcept { return settings_; }
+  /// The input of the last ask.
+  const Inputs& applied() const noexcept { return applied_; }
+  const Protocol& protocol() const noexcept { return protocol_; }
+  std::size_t component_count() const noexcept { return 1; }
+  std::size_t limit_count() const noexcept { return settings_.limits.size(); }
+
+  /// ParameterError for a restored state that these settings do not allow.
+  void require_usable() const {
+    require_within_space("estimate", estimate_, settings_.space);
+    require_within_space("applied", applied_, settings_.space);
+  }
+
+  template <class Self, class V>
+  static void visit(Self& self, V& v) {
+    Protocol::visit(self.protocol_, v);
+    v("applied", self.applied_);
+    v("estimate", self.estimate_);
+    v("seen", self.seen_);
+    v("window", self.window_);
+    LimitGuard::visit(self.guard_, v);
+  }
+
+ private:
+  BoundedSeekingSettings settings_;
+  LimitGuard guard_;
+  Protocol protocol_;
+  Inputs applied_, estimate_, omega_;
+  std::int64_t seen_ = 0;
+  std::vector<double> window_;  // last M applied inputs
+};
+
+}  // namespace mgdd::optimize

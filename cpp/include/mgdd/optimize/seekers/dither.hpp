@@ -1,0 +1,68 @@
+// The sinusoidal perturbation of extremum seeking and the phase that sensors put between it and its echo in J.
+// d_i(k) = sin(2 pi n_i k / M): several inputs share one window of M cycles on integer frequencies n_i
+// (Ghaffari, Krstic and Nesic 2012). Each component of J may come through its own delay and lag.
+#pragma once
+
+#include <cstdint>
+#include <vector>
+
+#include "mgdd/optimize/seekers/seeker.hpp"
+
+namespace mgdd::optimize {
+
+/// What stands between the plant and one component of J: D cycles of transport, then y += (1 - exp(-1/tau)) (x - y).
+struct ComponentLag {
+  double delay_cycles = 0.0;  ///< D >= 0
+  double lag_cycles = 0.0;    ///< tau >= 0; 0 = none
+
+  bool operator==(const ComponentLag&) const = default;
+};
+
+struct DitherSettings {
+  Inputs amplitude = scalar_input(1.0);  ///< per input, in its unit, > 0
+  int period = 10;                       ///< M, cycles of the common window, >= 4
+  std::vector<int> harmonics{1};         ///< n_i, one per input
+};
+
+/// ParameterError for a period below 4, or for harmonics that mix: n_i = n_j, 2 n_j or n_j +- n_k, or 2 n_i >= M. A
+/// `hessian` also needs sums and differences of two harmonics to be distinct.
+void validate(const DitherSettings& settings, Eigen::Index inputs, bool hessian);
+void validate(const std::vector<ComponentLag>& components);
+
+/// Amplitude and phase of delay and discrete lag at n cycles per window of M.
+struct SensorResponse {
+  double gain = 1.0;
+  double phase_rad = 0.0;  ///< lag of the echo, >= 0
+};
+SensorResponse sensor_response(const ComponentLag& lag, int harmonic, int period) noexcept;
+
+/// Tables of the perturbation and of the demodulating signals; constant after construction, free of allocation in use.
+class Dither {
+ public:
+  Dither(const DitherSettings& settings, const std::vector<ComponentLag>& components, bool hessian);
+
+  int period() const noexcept { return period_; }
+  std::size_t components() const noexcept { return components_; }
+
+  /// d_i at phase k of the window.
+  double perturbation(int phase, Eigen::Index input) const noexcept {
+    return sine_[static_cast<std::size_t>(phase) * inputs_ + static_cast<std::size_t>(input)];
+  }
+  /// sin(omega_i k - psi) / gain: multiplied with the component's reading and averaged it gives A_i J'_i / 2.
+  double demodulation(int phase, std::size_t component, Eigen::Index input) const noexcept {
+    const std::size_t row = static_cast<std::size_t>(phase) * components_ + component;
+    return echo_[row * inputs_ + static_cast<std::size_t>(input)];
+  }
+  /// Averaged with the reading it gives J''_ij, for amplitudes of one; only where `hessian` was asked for.
+  double curvature_demodulation(int phase, std::size_t component, Eigen::Index i, Eigen::Index j) const noexcept {
+    const std::size_t row = static_cast<std::size_t>(phase) * components_ + component;
+    return bend_[(row * inputs_ + static_cast<std::size_t>(i)) * inputs_ + static_cast<std::size_t>(j)];
+  }
+
+ private:
+  int period_;
+  std::size_t inputs_, components_;
+  std::vector<double> sine_, echo_, bend_;
+};
+
+}  // namespace mgdd::optimize

@@ -1,0 +1,119 @@
+// Extremum seeking by a sinusoidal dither, one step per engine cycle, with the mean of J removed in one of three ways.
+// Scheme: Tan, Nesic and Mareels 2006 (one integrator, no filters); washout form: Choi, Krstic, Ariyur and Lee 2002;
+// batch form: regression over a period with the estimate held (Hunnekens et al. 2014 in spirit).
+// Near an optimum of curvature J'' the estimate approaches with time constant tau = 2/(g_r A |J''|) cycles.
+// ask and tell are noexcept and allocation-free.
+#pragma once
+
+#include <limits>
+#include <string>
+#include <string_view>
+#include <vector>
+
+#include "mgdd/optimize/seekers/dither.hpp"
+#include "mgdd/optimize/seekers/limit_guard.hpp"
+#include "mgdd/optimize/seekers/seeker.hpp"
+
+namespace mgdd::optimize {
+
+enum class MeanRemoval { batch, moving_average, washout };
+std::string_view to_string(MeanRemoval v) noexcept;
+MeanRemoval parse_mean_removal(std::string_view name);
+
+struct ExtremumSeekingSettings {
+  SearchSpace space;
+  DitherSettings dither;
+  MeanRemoval form = MeanRemoval::batch;
+  Inputs gain = scalar_input(0.98);  ///< g_r, input unit per unit of J; the default gives tau = 40 at J'' = -0.051
+  Inputs rate{};                     ///< largest change of the estimate per cycle; empty: A/M in batches, else 3 A/M
+  Inputs recovery_rate{};     ///< the same on the way back below a limit; empty: `rate` where that is given, else A
+  double washout_pole = 0.9;  ///< h of (z - 1)/(z - h)
+  double low_pass = 1.0;      ///< b of y += b (x - y) after demodulation; 1 = off
+  std::vector<ComponentLag> components{ComponentLag{}};
+  int hold_cycles = -1;  ///< estimate held at the start and after `restart`; -1 = one window
+
+  /// Vanishing dither: A shrinks to this share of the amplitude where |J'| is below `full_gradient`; 1 = off.
+  double amplitude_floor = 1.0;
+  double full_gradient = 0.0;    ///< |dJ/dtheta| at which the dither is full, > 0 where the floor is below 1
+  double limit_amplitude = 0.5;  ///< share of the amplitude while a limit holds the estimate back
+  bool maximize = true;
+  std::vector<Limit> limits;
+  double curvature = std::numeric_limits<double>::quiet_NaN();  ///< J'' if known: lets `advice` judge the gain
+
+  /// What averaging theory says against these settings, in sentences; empty if nothing (or J'' is not known).
+  std::vector<std::string> advice() const;
+};
+
+class ExtremumSeeking {
+ public:
+  /// Throws ParameterError or ShapeError naming the field.
+  explicit ExtremumSeeking(ExtremumSeekingSettings settings);
+
+  /// The input to apply in this cycle. Asking again before tell gives the same.
+  const Inputs& ask() noexcept;
+  TellStatus tell(const Reading& reading) noexcept;
+
+  /// The operating point has changed: forget window and limits, keep the estimate, hold it again.
+  void restart() noexcept;
+
+  const Inputs& estimate() const noexcept { return estimate_; }
+  /// Last estimate of dJ/dtheta of the maximised objective.
+  const Inputs& gradient() const noexcept { return gradient_; }
+  double amplitude_share() const noexcept { return share_; }
+  const ExtremumSeekingSettings& settings() const noexcept { return settings_; }
+  /// The input of the last ask.
+  const Inputs& applied() const noexcept { return applied_; }
+  const Protocol& protocol() const noexcept { return protocol_; }
+  std::size_t component_count() const noexcept { return settings_.components.size(); }
+  std::size_t limit_count() const noexcept { return settings_.limits.size(); }
+
+  /// ParameterError for a restored state that these settings do not allow.
+  void require_usable() const {
+    require_within_space("estimate", estimate_, settings_.space);
+    if (!(share_ > 0.0 && share_ <= 1.0)) throw ParameterError("state column 'share' must lie in (0, 1]");
+  }
+
+  template <class Self, class V>
+  static void visit(Self& self, V& v) {
+    Protocol::visit(self.protocol_, v);
+    v("estimate", self.estimate_);
+    v("applied", self.applied_);
+    v("gradient", self.gradient_);
+    v("phase", self.phase_, self.settings_.dither.period);
+    v("seen", self.seen_);
+    v("held", self.held_);
+    v("share", self.share_);
+    v("window", self.window_);
+    v("mean", self.mean_);
+    v("sum", self.sum_);
+    v("smooth", self.smooth_);
+    v("origin", self.origin_);
+    v("limited_cycles", self.limited_cycles_);
+    LimitGuard::visit(self.guard_, v);
+  }
+
+ private:
+  void learn(const Reading& reading) noexcept;
+  bool remove_mean(const Reading& reading) noexcept;
+  void move(Inputs step, const Inputs& rate) noexcept;
+  void end_of_window() noexcept;
+  double sign() const noexcept { return settings_.maximize ? 1.0 : -1.0; }
+
+  ExtremumSeekingSettings settings_;
+  Dither dither_;
+  LimitGuard guard_;
+  Protocol protocol_;
+  Inputs estimate_, applied_, gradient_;
+  std::int64_t phase_ = 0;      // of the window
+  std::int64_t seen_ = 0;       // cycles since the last restart
+  std::int64_t held_ = 0;       // cycles that the estimate is still held
+  double share_ = 1.0;          // amplitude now over the amplitude of the settings
+  std::vector<double> window_;  // last M readings of every component (moving average)
+  std::vector<double> mean_;    // window sum or washout state, per component
+  Inputs sum_;                  // demodulated sum of the window
+  Inputs smooth_;
+  std::vector<double> origin_;  // first reading of the window, taken off before summing
+  std::int64_t limited_cycles_ = 0;
+};
+
+}  // namespace mgdd::optimize

@@ -1,0 +1,99 @@
+// Golden-section search of one input (Kiefer 1953) that knows about noise: two inner points are measured in turns until
+// their means differ by more than chance or a budget is spent; a draw cuts both ends. Once draws say that the bracket
+// is as small as the noise allows, the search goes on as triples around the vertex of a parabola through its samples,
+// so that it keeps tracking. ask and tell are noexcept and allocation-free.
+#pragma once
+
+#include <array>
+#include <vector>
+
+#include "mgdd/optimize/seekers/limit_guard.hpp"
+#include "mgdd/optimize/seekers/seeker.hpp"
+
+namespace mgdd::optimize {
+
+struct GoldenSectionSettings {
+  SearchSpace space;          ///< one input, finite bounds: the bracket
+  double noise_sd = 0.0;      ///< of one measurement of J; 0 = exact, every comparison is believed
+  double significance = 2.0;  ///< standard errors that decide a comparison
+  int samples_max = 8;        ///< measurements of each inner point before a draw
+  double tolerance = 0.02;    ///< bracket width at which an exact search ends, input unit, > 0
+  bool maximize = true;
+  std::vector<Limit> limits;
+};
+
+class GoldenSection {
+ public:
+  explicit GoldenSection(GoldenSectionSettings settings);
+
+  const Inputs& ask() noexcept;
+  TellStatus tell(const Reading& reading) noexcept;
+  /// New operating point: back to the whole bracket, the estimate stays until the next decision.
+  void restart() noexcept;
+
+  const Inputs& estimate() const noexcept { return estimate_; }
+  double lower() const noexcept { return lower_; }  ///< of the bracket
+  double upper() const noexcept { return upper_; }
+  bool converged() const noexcept { return refining_; }
+  const GoldenSectionSettings& settings() const noexcept { return settings_; }
+  /// The input of the last ask.
+  const Inputs& applied() const noexcept { return applied_; }
+  const Protocol& protocol() const noexcept { return protocol_; }
+  std::size_t component_count() const noexcept { return 1; }
+  std::size_t limit_count() const noexcept { return settings_.limits.size(); }
+
+  /// ParameterError for a restored state that these settings do not allow.
+  void require_usable() const { require_within_space("estimate", estimate_, settings_.space); }
+
+  template <class Self, class V>
+  static void visit(Self& self, V& v) {
+    Protocol::visit(self.protocol_, v);
+    v("estimate", self.estimate_);
+    v("applied", self.applied_);
+    v("lower", self.lower_);
+    v("upper", self.upper_);
+    v("width", self.width_);
+    v("draws", self.draws_);
+    v("refining", self.refining_);
+    v("turn", self.turn_, self.refining_ ? 3 : 2);
+    v("sample_input", self.sample_input_);
+    v("sample_j", self.sample_j_);
+    v("samples", self.samples_);
+    for (std::size_t p = 0; p < 2; ++p) {
+      const std::string name = "point" + std::to_string(p);
+      v(name + "_count", self.points_[p].count);
+      v(name + "_sum", self.points_[p].sum);
+      v(name + "_excess", self.points_[p].excess);
+    }
+    LimitGuard::visit(self.guard_, v);
+  }
+
+ private:
+  struct Point {
+    double count = 0.0, sum = 0.0, excess = 0.0;  // excess: sum of the worst scaled excess over the limits
+  };
+  struct Parabola {
+    double vertex, bend;
+  };
+  double inner(std::size_t p) const noexcept;
+  void decide() noexcept;
+  void cut(double lower, double upper) noexcept;
+  Parabola parabola() const noexcept;
+  void refine() noexcept;
+  void centre_bracket(double width) noexcept;
+
+  GoldenSectionSettings settings_;
+  LimitGuard guard_;
+  Protocol protocol_;
+  Inputs estimate_, applied_;
+  double lower_, upper_;
+  double width_;           // of the bracket when the refinement began
+  std::int64_t turn_ = 0;  // which inner point, or which of a triple, is measured now
+  std::int64_t draws_ = 0;
+  bool refining_ = false;
+  std::array<Point, 2> points_;
+  std::vector<double> sample_input_, sample_j_;  // the last samples, a ring
+  std::int64_t samples_ = 0;
+};
+
+}  // namespace mgdd::optimize

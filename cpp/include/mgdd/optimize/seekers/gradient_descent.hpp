@@ -1,0 +1,76 @@
+// Gradient descent (ascent) by two-sided differences: theta <- theta + lambda [J(theta + c) - J(theta - c)]/(2c) per
+// input (Tan 2018 names lambda_c and c; Kiefer and Wolfowitz 1952 under noise). Converges on a model for
+// 0 < lambda < 2/|J''|, fastest near 1/|J''|. Two cycles per input and step; ask and tell are noexcept and
+// allocation-free.
+#pragma once
+
+#include <string>
+#include <vector>
+
+#include "mgdd/optimize/seekers/limit_guard.hpp"
+#include "mgdd/optimize/seekers/seeker.hpp"
+
+namespace mgdd::optimize {
+
+struct GradientDescentSettings {
+  SearchSpace space;
+  double step_size = 15.0;       ///< lambda_c, squared input unit per unit of J, > 0
+  double difference = 1.0;       ///< c in input units, > 0
+  Inputs rate{};                 ///< largest change per step; empty: none
+  double tolerance = 0.02;       ///< converged once every entry of a step is below it, input unit
+  std::int64_t iterations = 60;  ///< steps after which an unconverged search says so; it goes on all the same
+  bool maximize = true;
+  std::vector<Limit> limits;
+  double curvature = std::numeric_limits<double>::quiet_NaN();  ///< J'' if known
+
+  std::vector<std::string> advice() const;
+};
+
+class GradientDescent {
+ public:
+  explicit GradientDescent(GradientDescentSettings settings);
+
+  const Inputs& ask() noexcept;
+  TellStatus tell(const Reading& reading) noexcept;
+  void restart() noexcept;
+
+  const Inputs& estimate() const noexcept { return estimate_; }
+  const Inputs& gradient() const noexcept { return gradient_; }
+  std::int64_t iteration() const noexcept { return iteration_; }
+  /// The step at which the tolerance was met first, counting that step; -1 before, and after `iterations` without.
+  std::int64_t converged_at() const noexcept { return converged_at_; }
+  const GradientDescentSettings& settings() const noexcept { return settings_; }
+  /// The input of the last ask.
+  const Inputs& applied() const noexcept { return applied_; }
+  const Protocol& protocol() const noexcept { return protocol_; }
+  std::size_t component_count() const noexcept { return 1; }
+  std::size_t limit_count() const noexcept { return settings_.limits.size(); }
+
+  /// ParameterError for a restored state that these settings do not allow.
+  void require_usable() const { require_within_space("estimate", estimate_, settings_.space); }
+
+  template <class Self, class V>
+  static void visit(Self& self, V& v) {
+    Protocol::visit(self.protocol_, v);
+    v("estimate", self.estimate_);
+    v("applied", self.applied_);
+    v("gradient", self.gradient_);
+    v("above", self.above_);
+    v("stage", self.stage_, 2 * self.estimate_.size());
+    v("iteration", self.iteration_);
+    v("converged_at", self.converged_at_);
+    LimitGuard::visit(self.guard_, v);
+  }
+
+ private:
+  GradientDescentSettings settings_;
+  LimitGuard guard_;
+  Protocol protocol_;
+  Inputs estimate_, applied_, gradient_;
+  double above_ = 0.0;      // J at theta + c of the input at work
+  std::int64_t stage_ = 0;  // measurement within the step
+  std::int64_t iteration_ = 0;
+  std::int64_t converged_at_ = -1;
+};
+
+}  // namespace mgdd::optimize

@@ -1,0 +1,90 @@
+// Measured limits inside a seeker: learns how each limited quantity answers the input, from the cycles that the seeker
+// runs anyway, and lets no step pass that would knowingly carry a set-point, its dither included, over a limit.
+// Methods for the objective: none ("switching": the guard alone, the gradient of a violated limit replaces that of J),
+// quadratic penalty, or logarithmic barrier. noexcept and allocation-free after construction.
+#pragma once
+
+#include <span>
+#include <string>
+#include <string_view>
+#include <vector>
+
+#include "mgdd/optimize/seekers/local_model.hpp"
+#include "mgdd/optimize/seekers/seeker.hpp"
+
+namespace mgdd::optimize {
+
+enum class LimitMethod { switching, penalty, barrier };
+std::string_view to_string(LimitMethod v) noexcept;
+LimitMethod parse_limit_method(std::string_view name);
+
+/// value <= upper - margin, measured once per cycle. Excess is counted in units of `scale`.
+struct Limit {
+  std::string name;
+  double upper = 0.0;
+  double margin = 0.0;  ///< kept free below `upper`, same unit, >= 0
+  LimitMethod method = LimitMethod::switching;
+  double weight = 1.0;  ///< penalty: J units per squared scaled excess; barrier: J units times the logarithm
+  double scale = 0.0;   ///< > 0; 0 = abs(upper), or 1
+
+  bool operator==(const Limit&) const = default;
+};
+void validate(const std::vector<Limit>& limits);
+
+class LimitGuard {
+ public:
+  /// `memory` is the number of cycles that the learnt slopes look back.
+  LimitGuard(std::vector<Limit> limits, Eigen::Index inputs, double memory);
+
+  std::size_t size() const noexcept { return limits_.size(); }
+  const std::vector<Limit>& limits() const noexcept { return limits_; }
+
+  /// Learns from one cycle: the input that was applied and the values that it gave.
+  void record(const Inputs& applied, std::span<const double> values) noexcept;
+
+  /// What penalty and barrier add to J (to be maximised) for these values; <= 0 for penalties.
+  double shaping(std::span<const double> values) const noexcept;
+
+  /// Predicted excess of the worst point within `reach` of `at` over limit i, in the unit of the limit.
+  double excess(std::size_t i, const Inputs& at, const Inputs& reach) const noexcept;
+
+  /// What has been learnt of limit i.
+  const LocalModel& model(std::size_t i) const noexcept { return models_[i]; }
+
+  /// The nearest step to `step` that no limit forbids; where the estimate itself is over a limit, the way back:
+  /// along the learnt slope, or to the last good point while the slope is not known (with no such point the estimate
+  /// stays, unless `reach` is zero and nothing but steps explores, or the limit has been broken for long without
+  /// showing a slope: it cannot say where to go and is not waited for). Each entry stays within `rate`.
+  Inputs admit(const Inputs& estimate, const Inputs& step, const Inputs& reach, const Inputs& rate) noexcept;
+
+  /// True when the last `admit` changed its step.
+  bool active() const noexcept { return active_; }
+  /// True after three cycles in a row over the same limit: do not wait for the end of a window.
+  bool alarmed() const noexcept;
+
+  /// A new operating point: what was learnt is void, the last good point too.
+  void forget() noexcept;
+
+  template <class Self, class V>
+  static void visit(Self& self, V& v) {
+    for (std::size_t i = 0; i < self.models_.size(); ++i)
+      LocalModel::visit(self.models_[i], v, "limit" + std::to_string(i));
+    v("limit_in_a_row", self.in_a_row_);
+    v("limit_good", self.good_);
+    v("limit_has_good", self.has_good_);
+    v("limit_active", self.active_);
+  }
+
+ private:
+  bool silent(std::size_t i, double excess) const noexcept;
+
+  std::vector<Limit> limits_;
+  double patience_;                 // cycles that a broken limit is given to show its slope
+  std::vector<LocalModel> models_;  // one per limit
+  std::vector<double> in_a_row_;
+  Inputs good_;
+  bool has_good_ = false;
+  bool active_ = false;
+};
+
+}  // namespace mgdd::optimize

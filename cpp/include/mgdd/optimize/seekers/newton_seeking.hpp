@@ -1,0 +1,95 @@
+// Newton extremum seeking (Ghaffari, Krstic and Nesic 2012): dither, gradient and Hessian by demodulation, and a
+// Riccati filter Gamma -> H^-1, so that the rate of approach does not depend on the curvature of the map. The estimate
+// is held until H and Gamma have settled. ask and tell are noexcept and allocation-free.
+#pragma once
+
+#include <cmath>
+#include <limits>
+#include <string>
+#include <vector>
+
+#include "mgdd/optimize/seekers/dither.hpp"
+#include "mgdd/optimize/seekers/limit_guard.hpp"
+#include "mgdd/optimize/seekers/seeker.hpp"
+
+namespace mgdd::optimize {
+
+struct NewtonSeekingSettings {
+  SearchSpace space;
+  DitherSettings dither{.amplitude = scalar_input(2.0), .period = 10, .harmonics = {1}};
+  double time_constant_cycles = 40.0;             ///< tau of the approach
+  double hessian_rate = 0.03;                     ///< low-pass of H per cycle
+  double riccati_rate = 0.02;                     ///< w_r
+  Inputs initial_hessian = scalar_input(-0.051);  ///< diagonal of H0, < 0, J unit per squared input unit
+  Inputs initial_inverse = scalar_input(-20.0);   ///< diagonal of Gamma0, < 0
+  double largest_inverse = 100.0;                 ///< bound of |Gamma|, > 0
+  int hold_cycles = 300;                          ///< estimate held at the start
+  Inputs rate{};                                  ///< per cycle; empty: 3 A/M
+  std::vector<ComponentLag> components{ComponentLag{}};
+  double limit_amplitude = 0.5;  ///< share of the amplitude while a limit holds the estimate back
+  bool maximize = true;
+  std::vector<Limit> limits;
+
+  std::vector<std::string> advice() const;
+};
+
+class NewtonSeeking {
+ public:
+  explicit NewtonSeeking(NewtonSeekingSettings settings);
+
+  const Inputs& ask() noexcept;
+  TellStatus tell(const Reading& reading) noexcept;
+  /// New operating point: clear the window and the limits, keep estimate and Hessian, hold for one window.
+  void restart() noexcept;
+
+  const Inputs& estimate() const noexcept { return estimate_; }
+  const Inputs& gradient() const noexcept { return gradient_; }
+  const InputMatrix& hessian() const noexcept { return hessian_; }
+  const InputMatrix& inverse_hessian() const noexcept { return inverse_; }
+  const NewtonSeekingSettings& settings() const noexcept { return settings_; }
+  /// The input of the last ask.
+  const Inputs& applied() const noexcept { return applied_; }
+  const Protocol& protocol() const noexcept { return protocol_; }
+  std::size_t component_count() const noexcept { return settings_.components.size(); }
+  std::size_t limit_count() const noexcept { return settings_.limits.size(); }
+
+  /// ParameterError for a restored state that these settings do not allow.
+  void require_usable() const {
+    require_within_space("estimate", estimate_, settings_.space);
+    if (!(share_ > 0.0 && share_ <= 1.0)) throw ParameterError("state column 'share' must lie in (0, 1]");
+  }
+
+  template <class Self, class V>
+  static void visit(Self& self, V& v) {
+    Protocol::visit(self.protocol_, v);
+    v("estimate", self.estimate_);
+    v("applied", self.applied_);
+    v("gradient", self.gradient_);
+    v("hessian", self.hessian_);
+    v("inverse", self.inverse_);
+    v("phase", self.phase_, self.settings_.dither.period);
+    v("seen", self.seen_);
+    v("held", self.held_);
+    v("share", self.share_);
+    v("limited_cycles", self.limited_cycles_);
+    v("window", self.window_);
+    LimitGuard::visit(self.guard_, v);
+  }
+
+ private:
+  void learn(const Reading& reading) noexcept;
+  void update_inverse() noexcept;
+
+  NewtonSeekingSettings settings_;
+  Dither dither_;
+  LimitGuard guard_;
+  Protocol protocol_;
+  Inputs estimate_, applied_, gradient_;
+  InputMatrix hessian_, inverse_;
+  std::int64_t phase_ = 0, seen_ = 0, held_ = 0;
+  double share_ = 1.0;
+  std::int64_t limited_cycles_ = 0;
+  std::vector<double> window_;
+};
+
+}  // namespace mgdd::optimize

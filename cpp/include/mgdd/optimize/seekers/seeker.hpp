@@ -1,0 +1,102 @@
+// What every seeker shares: its inputs and their bounds, what a cycle tells it, and the ask/tell protocol.
+// A seeker proposes an input (`ask`), accepts the measurement of it (`tell`) and never holds a plant.
+// `ask` and `tell` are noexcept and allocation-free; `require` turns a status into an exception at the desk.
+#pragma once
+
+#include <Eigen/Core>
+#include <cstddef>
+#include <cstdint>
+#include <limits>
+#include <span>
+#include <string_view>
+
+#include "mgdd/common/error.hpp"
+#include "mgdd/optimize/reading.hpp"
+
+namespace mgdd::optimize {
+
+inline constexpr int max_inputs = 8;
+inline constexpr double unlimited = std::numeric_limits<double>::infinity();
+
+/// One number per input; at most eight, so that it never allocates.
+using Inputs = Eigen::Matrix<double, Eigen::Dynamic, 1, 0, max_inputs, 1>;
+using InputMatrix = Eigen::Matrix<double, Eigen::Dynamic, Eigen::Dynamic, 0, max_inputs, max_inputs>;
+
+/// A single input as a column.
+inline Inputs scalar_input(double value) {
+  return Inputs::Constant(1, value);
+}
+
+/// Where to start and what may be applied, per input; an infinite bound is no bound.
+struct SearchSpace {
+  Inputs start = scalar_input(0.0);
+  Inputs lower = scalar_input(-unlimited);
+  Inputs upper = scalar_input(unlimited);
+
+  Eigen::Index size() const noexcept { return start.size(); }
+};
+
+/// ParameterError or ShapeError naming the entry; `reach` is how far a seeker goes to either side of its estimate,
+/// which must fit between the bounds, around the start too.
+void validate(const SearchSpace& space, const Inputs& reach);
+
+/// ShapeError unless `values` has one entry per input, ParameterError unless each is inside (lower, upper].
+void validate_entries(std::string_view name, const Inputs& values, Eigen::Index inputs, double lower,
+                      double upper = unlimited);
+
+/// What one cycle returned. Components of J add up to it; a misfired cycle's numbers are not read, all others must
+/// satisfy `is_reading`.
+struct Reading {
+  std::span<const double> components;
+  std::span<const double> limits;  ///< measured values of the limited quantities, in the order of the settings
+  bool misfire = false;
+};
+
+enum class TellStatus { accepted, misfire, not_asked, wrong_component_count, wrong_limit_count, not_a_reading };
+
+/// The bookkeeping of ask and tell.
+struct Protocol {
+  std::int64_t cycle = 0;  ///< cycles told so far, misfires included
+  std::int64_t misfires = 0;
+  bool asked = false;
+
+  /// What would become of this reading; changes nothing.
+  TellStatus check(const Reading& reading, std::size_t components, std::size_t limits) const noexcept;
+
+  /// Counts an accepted or misfired reading; a refused one changes nothing.
+  void count(TellStatus status) noexcept;
+
+  template <class Self, class V>
+  static void visit(Self& self, V& v) {
+    v("cycle", self.cycle);
+    v("misfires", self.misfires);
+    v("asked", self.asked);
+  }
+};
+
+/// Throws what a refused reading deserves, naming the cycle; returns for accepted and misfired ones.
+void require(TellStatus status, const Protocol& protocol, const Reading& reading, std::size_t components,
+             std::size_t limits);
+
+/// ParameterError unless every entry of a restored column lies within the bounds of these settings.
+void require_within_space(std::string_view column, const Inputs& values, const SearchSpace& space);
+
+/// Sum of the components of J, negated where the user minimises.
+inline double objective_of(const Reading& reading, bool maximize) noexcept {
+  double sum = 0.0;
+  for (const double c : reading.components)
+    sum += c;
+  return maximize ? sum : -sum;
+}
+
+/// Moves `estimate` by `step`, keeping `reach` on either side inside the bounds.
+inline void move_within(Inputs& estimate, const Inputs& step, const SearchSpace& space, const Inputs& reach) noexcept {
+  estimate = (estimate + step).cwiseMax(space.lower + reach).cwiseMin(space.upper - reach);
+}
+
+/// Each entry clipped to +-limit.
+inline void clip_each(Inputs& values, const Inputs& limit) noexcept {
+  values = values.cwiseMax(-limit).cwiseMin(limit);
+}
+
+}  // namespace mgdd::optimize

@@ -1,0 +1,34 @@
+// Every seeker under one name, for loops that take any of them.
+#pragma once
+
+#include <concepts>
+#include <variant>
+
+#include "mgdd/optimize/seekers/bounded_seeking.hpp"
+#include "mgdd/optimize/seekers/extremum_seeking.hpp"
+#include "mgdd/optimize/seekers/golden_section.hpp"
+#include "mgdd/optimize/seekers/gradient_descent.hpp"
+#include "mgdd/optimize/seekers/newton_seeking.hpp"
+#include "mgdd/optimize/seekers/spsa.hpp"
+
+namespace mgdd::optimize {
+
+/// What a loop needs of a seeker.
+template <class S>
+concept AnySeeker = requires(S seeker, const S constant, const Reading& reading) {
+  { seeker.ask() } noexcept -> std::same_as<const Inputs&>;
+  { seeker.tell(reading) } noexcept -> std::same_as<TellStatus>;
+  { seeker.restart() } noexcept;
+  { constant.applied() } noexcept -> std::same_as<const Inputs&>;
+  { constant.estimate() } noexcept -> std::same_as<const Inputs&>;
+  { constant.protocol() } noexcept -> std::same_as<const Protocol&>;
+  { constant.component_count() } noexcept -> std::same_as<std::size_t>;
+  { constant.limit_count() } noexcept -> std::same_as<std::size_t>;
+};
+
+using Seeker = std::variant<ExtremumSeeking, NewtonSeeking, BoundedSeeking, Spsa, GradientDescent, GoldenSection>;
+
+static_assert(AnySeeker<ExtremumSeeking> && AnySeeker<NewtonSeeking> && AnySeeker<BoundedSeeking> && AnySeeker<Spsa> &&
+              AnySeeker<GradientDescent> && AnySeeker<GoldenSection>);
+
+}  // namespace mgdd::optimize

@@ -1,0 +1,131 @@
+// Simultaneous perturbation stochastic approximation: the slope in every direction from two measurements, whatever the
+// number of inputs (Spall 1992, gains after Spall 1998); one-measurement form (Spall 1997) with the trend of J taken
+// off; second-order form with four measurements (Spall 2000). One engine cycle per measurement. All randomness is a
+// function of (seed, iteration). ask and tell are noexcept and allocation-free.
+#pragma once
+
+#include <cstdint>
+#include <limits>
+#include <string>
+#include <string_view>
+#include <vector>
+
+#include "mgdd/optimize/seekers/limit_guard.hpp"
+#include "mgdd/optimize/seekers/local_model.hpp"
+#include "mgdd/optimize/seekers/seeker.hpp"
+
+namespace mgdd::optimize {
+
+enum class SpsaForm { first_order, second_order, one_measurement };
+std::string_view to_string(SpsaForm v) noexcept;
+SpsaForm parse_spsa_form(std::string_view name);
+
+/// decreasing: a_k = a/(k + 1 + A)^alpha, c_k = c/(k + 1)^gamma; constant: a_k = a, c_k = c, which goes on tracking.
+enum class GainSchedule { decreasing, constant };
+std::string_view to_string(GainSchedule v) noexcept;
+GainSchedule parse_gain_schedule(std::string_view name);
+
+struct SpsaSettings {
+  SearchSpace space;
+  SpsaForm form = SpsaForm::first_order;
+  GainSchedule schedule = GainSchedule::decreasing;
+  double gain =
+      0.0;  ///< a, squared input unit per unit of J (second order: dimensionless); 0 = 20, or 3 for the latter
+  double stability = 50.0;               ///< A
+  double gain_exponent = 0.602;          ///< alpha
+  double perturbation = 1.5;             ///< c in input units, > 0
+  double perturbation_exponent = 0.101;  ///< gamma
+  double step_max = 0.0;                 ///< largest change per iteration and input; 0 = 4/3 c, one measurement: c/5
+  int averaging = 1;                     ///< gradients per iteration
+  bool blocking =
+      false;  ///< accept a step only if J there is not below its mean around the old estimate less 2 noise_sd
+  double noise_sd = 0.0;            ///< of one measurement of J, for blocking
+  double initial_hessian = -0.051;  ///< second order: curvature before the first measurement, < 0
+  double hessian_prior = 20.0;      ///< ... and how many iterations it counts for
+  double limit_amplitude = 0.5;     ///< share of c while a limit holds the estimate back
+  std::uint64_t seed = 0;
+  bool maximize = true;
+  std::vector<Limit> limits;
+  double curvature = std::numeric_limits<double>::quiet_NaN();  ///< J'' if known
+
+  std::vector<std::string> advice() const;
+};
+
+class Spsa {
+ public:
+  explicit Spsa(SpsaSettings settings);
+
+  const Inputs& ask() noexcept;
+  TellStatus tell(const Reading& reading) noexcept;
+  /// New operating point: forget limits and what was measured of this iteration; keep the estimate, begin the gains
+  /// anew.
+  void restart() noexcept;
+  /// Other random numbers from now on; a run of many seeds starts each from the same settings.
+  void reseed(std::uint64_t seed) noexcept { settings_.seed = seed; }
+
+  const Inputs& estimate() const noexcept { return estimate_; }
+  const Inputs& gradient() const noexcept { return gradient_; }
+  const InputMatrix& hessian() const noexcept { return hessian_; }
+  std::int64_t iteration() const noexcept { return iteration_; }
+  std::int64_t blocked() const noexcept { return blocked_; }
+  int measurements_per_iteration() const noexcept;
+  const SpsaSettings& settings() const noexcept { return settings_; }
+  /// The input of the last ask.
+  const Inputs& applied() const noexcept { return applied_; }
+  const Protocol& protocol() const noexcept { return protocol_; }
+  std::size_t component_count() const noexcept { return 1; }
+  std::size_t limit_count() const noexcept { return settings_.limits.size(); }
+
+  /// ParameterError for a restored state that these settings do not allow.
+  void require_usable() const {
+    require_within_space("estimate", estimate_, settings_.space);
+    require_within_space("candidate", candidate_, settings_.space);
+    if (!(share_ > 0.0 && share_ <= 1.0)) throw ParameterError("state column 'share' must lie in (0, 1]");
+  }
+
+  template <class Self, class V>
+  static void visit(Self& self, V& v) {
+    Protocol::visit(self.protocol_, v);
+    v("estimate", self.estimate_);
+    v("candidate", self.candidate_);
+    v("applied", self.applied_);
+    v("gradient", self.gradient_);
+    v("sum", self.sum_);
+    v("hessian", self.hessian_);
+    v("hessian_sum", self.hessian_sum_);
+    v("measured", self.measured_);
+    v("iteration", self.iteration_);
+    v("draw", self.draw_);
+    v("stage", self.stage_, self.measurements_per_iteration());
+    v("blocked", self.blocked_);
+    v("share", self.share_);
+    v("around_j", self.around_j_);
+    LocalModel::visit(self.trend_, v, "trend");
+    LimitGuard::visit(self.guard_, v);
+  }
+
+ private:
+  double gain_now() const noexcept;
+  double perturbation_now() const noexcept;
+  int per_gradient() const noexcept;
+  double direction(int kind, Eigen::Index input) const noexcept;
+  void finish_gradient(double j) noexcept;
+  void finish_iteration() noexcept;
+  Inputs newton_step() noexcept;
+
+  SpsaSettings settings_;
+  LimitGuard guard_;
+  LocalModel trend_;
+  Protocol protocol_;
+  Inputs estimate_, candidate_, applied_, gradient_, sum_;
+  InputMatrix hessian_, hessian_sum_;
+  std::vector<double> measured_;  // of the gradient at work
+  std::int64_t iteration_ = 0;    // of the gains
+  std::int64_t draw_ = 0;         // gradients begun since construction: index of the random numbers
+  std::int64_t stage_ = 0;        // measurement within the iteration
+  std::int64_t blocked_ = 0;
+  double share_ = 1.0;     // perturbation now over that of the schedule
+  double around_j_ = 0.0;  // sum of J measured around the estimate in this iteration
+};
+
+}  // namespace mgdd::optimize

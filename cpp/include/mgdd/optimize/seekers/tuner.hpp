@@ -1,0 +1,58 @@
+// From measured noise, curvature and sensor delay to amplitude, period and gain of a seeker, with what averaging theory
+// predicts for them, and a plain word where the wish cannot be met. Closed forms (J = J* + J''/2 e^2, noise sigma):
+//   continuous: tau = 2/(g A |J''|),  rms = sigma/(A |J''| sqrt(tau)),  cycles = M + tau ln(e0/eps)
+//   batch:      the same rms over sqrt(1 - M/(2 tau))
+//   SPSA (constant gain): q = a |J''|, rms = sigma/(c |J''|) sqrt(q/(2 (2 - q))), cycles = 2 ln(eps/e0)/ln(1 - q)
+//   cost of the dither: |J''|/2 A^2/2 (SPSA: c^2) and of the jitter: |J''|/2 rms^2, in units of J
+// Lengths that the user leaves open scale with L = sqrt(sigma/|J''|), where J has fallen by half a noise. Desk-time
+// code.
+#pragma once
+
+#include <limits>
+#include <string>
+#include <string_view>
+#include <vector>
+
+#include "mgdd/optimize/seekers/dither.hpp"
+
+namespace mgdd::optimize {
+
+enum class TunedMethod { batch, moving_average, spsa };
+std::string_view to_string(TunedMethod v) noexcept;
+TunedMethod parse_tuned_method(std::string_view name);
+
+struct TuningWish {
+  TunedMethod method = TunedMethod::batch;
+  double noise_sd = std::numeric_limits<double>::quiet_NaN();   ///< of J from cycle to cycle, > 0
+  double curvature = std::numeric_limits<double>::quiet_NaN();  ///< J'' at the optimum; its sign is not used
+  ComponentLag lag{};                                           ///< between plant and J
+  bool compensated = true;  ///< the seeker knows the lag and turns its demodulation back
+  // NaN: left open.
+  double rms = std::numeric_limits<double>::quiet_NaN();            ///< of the estimate at the end; 0.2 L
+  double cycles = std::numeric_limits<double>::quiet_NaN();         ///< to arrive; 50, more where a lag asks for it
+  double distance = std::numeric_limits<double>::quiet_NaN();       ///< e0, at the start; 5 L
+  double arrival = std::numeric_limits<double>::quiet_NaN();        ///< eps, what counts as arrived; 0.45 L
+  double amplitude_max = std::numeric_limits<double>::quiet_NaN();  ///< 1.8 L
+};
+
+struct Tuning {
+  TunedMethod method = TunedMethod::batch;
+  double amplitude = 0.0;  ///< A, or c of SPSA
+  int period = 0;          ///< M; measurements per iteration of SPSA
+  double gain = 0.0;       ///< g_r, or the constant a of SPSA
+  double rate = 0.0;       ///< largest change per cycle (SPSA: per iteration)
+  double time_constant_cycles = 0.0;
+  double rms = 0.0;          ///< predicted
+  double cycles = 0.0;       ///< predicted, from `distance` to `arrival`
+  double dither_cost = 0.0;  ///< mean loss of J by the dither
+  double jitter_cost = 0.0;  ///< ... and by the rms error
+  double sensor_gain = 1.0;  ///< of the lag at the dither's frequency
+  double sensor_phase_rad = 0.0;
+  bool met = true;
+  std::vector<std::string> reasons;  ///< why not, with the figures that would do
+};
+
+/// ParameterError for noise or curvature that is missing or zero, or a wish that is not positive.
+Tuning tune(const TuningWish& wish);
+
+}  // namespace mgdd::optimize

@@ -1,0 +1,109 @@
+// PW-W, the strict Wiener model of a throttle: two lags, then a monotone piecewise-linear map of seven knots.
+// Units: deg, s, duty. Nine parameters. Every step is noexcept and allocation-free; T is double, Dual<N> or Lanes<N>.
+// Memoryless behind the lags, so it cannot know where friction left the plate: re-anchor it on the measurement.
+#pragma once
+
+#include <array>
+#include <cstddef>
+#include <type_traits>
+
+#include "mgdd/throttle/models/pseudo_wiener_frame.hpp"
+
+namespace mgdd::throttle {
+
+inline constexpr int wiener_knots = 7;
+
+template <class T>
+struct BasicPwW {
+  T first_s{0.05};
+  T second_s{0.5};
+  T base_deg{0.0};                                                       ///< output at the lowest knot
+  std::array<T, static_cast<std::size_t>(wiener_knots - 1)> rise_deg{};  ///< from knot to knot, >= 0
+  T limp_home_deg{8.0};                                                  ///< not part of the law; carried for the face
+  double knot_lower_duty = -0.2;
+  double knot_upper_duty = 0.6;
+  LagStart lag_start = LagStart::rest;
+  PseudoWienerFrame frame{};
+
+  bool operator==(const BasicPwW&) const = default;
+
+  void validate() const
+    requires std::is_same_v<T, double>;
+};
+using PwW = BasicPwW<double>;
+
+template <class T>
+struct BasicPwWState {
+  T first_duty{0.0};
+  T second_duty{0.0};
+  T offset_deg{0.0};  ///< what re-anchoring adds to the output
+  DelayLine<T> line{};
+};
+
+template <class T>
+class BasicPwWModel {
+ public:
+  using Parameters = BasicPwW<T>;
+  using State = BasicPwWState<T>;
+
+  explicit BasicPwWModel(const Parameters& parameters) noexcept
+      : p_(parameters),
+        lags_(parameters.first_s, parameters.second_s, parameters.frame.sample_s),
+        width_((parameters.knot_upper_duty - parameters.knot_lower_duty) / (wiener_knots - 1)) {}
+
+  MGDD_INLINE void advance(State& s, const T& duty) const noexcept {
+    lags_.step(s.first_duty, s.second_duty, s.line.pass(duty, p_.frame.delay_samples));
+  }
+
+  MGDD_INLINE T output(const State& s) const noexcept { return map(s.second_duty) + s.offset_deg; }
+
+  /// The static map; constant beyond the outer knots.
+  MGDD_INLINE T map(const T& x) const noexcept {
+    T y = p_.base_deg;
+    const T place = (x - T(p_.knot_lower_duty)) * T(1.0 / width_);
+    for (std::size_t i = 0; i < p_.rise_deg.size(); ++i) {
+      y += p_.rise_deg[i] * larger(smaller(place - T(static_cast<double>(i)), T(1.0)), T(0.0));
+    }
+    return y;
+  }
+
+  /// Start of a free run at an angle, `duty` in the delay line.
+  State at_rest(const T& angle_deg, const T& duty) const noexcept {
+    State s;
+    if (p_.lag_start == LagStart::inverse_map) s.first_duty = s.second_duty = inverse_map(angle_deg);
+    s.line.fill(duty);
+    return s;
+  }
+
+  /// With `offset_gain` 1 the prediction is y_measured(k) + sim(k + H) - sim(k).
+  MGDD_INLINE void reanchor(State& s, const T& angle_deg, const Anchor& a) const noexcept {
+    s.offset_deg += T(a.offset_gain) * (angle_deg - output(s));
+  }
+
+  const Parameters& parameters() const noexcept { return p_; }
+
+ private:
+  // Bisection for the place, one Newton step for the derivatives; the lowest such place where the map is flat.
+  T inverse_map(const T& angle_deg) const noexcept {
+    constexpr double edge = 1e-6;
+    T low(p_.knot_lower_duty);
+    T high(p_.knot_upper_duty);
+    for (int i = 0; i < 50; ++i) {
+      const T middle = T(0.5) * (low + high);
+      const auto below = map(middle) < angle_deg;
+      low = select(below, middle, low);
+      high = select(below, high, middle);
+    }
+    const T slope = (map(low + T(edge)) - map(low - T(edge))) * T(0.5 / edge);
+    const T safe = larger(slope, T(1.0));
+    return select(slope > T(1.0), low + (angle_deg - map(low)) / safe, low);
+  }
+
+  Parameters p_;
+  LagPair<T> lags_;
+  double width_;
+};
+using PwWState = BasicPwWState<double>;
+using PwWModel = BasicPwWModel<double>;
+
+}  // namespace mgdd::throttle

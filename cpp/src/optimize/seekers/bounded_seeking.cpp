@@ -1,0 +1,86 @@
+#include "mgdd/optimize/seekers/bounded_seeking.hpp"
+
+#include <cmath>
+#include <numbers>
+#include <utility>
+
+#include "mgdd/common/bounds.hpp"
+#include "mgdd/common/text.hpp"
+
+namespace mgdd::optimize {
+namespace {
+
+BoundedSeekingSettings checked(BoundedSeekingSettings s) {
+  const Eigen::Index n = s.space.size();
+  if (n < 1) throw ShapeError("start is empty: give one number per input");
+  validate(s.dither, n, false);
+  validate(s.space, Inputs::Zero(n));
+  require_positive("kappa", s.kappa);
+  return s;
+}
+
+}  // namespace
+
+std::vector<std::string> BoundedSeekingSettings::advice() const {
+  std::vector<std::string> out;
+  if (!std::isfinite(curvature) || curvature == 0.0) return out;
+  for (Eigen::Index i = 0; i < dither.amplitude.size(); ++i) {
+    const double a = dither.amplitude[i];
+    const double omega = 2.0 * std::numbers::pi * dither.harmonics[static_cast<std::size_t>(i)] / dither.period;
+    const double bound = 1.0 / (a * a * omega * std::abs(curvature) * dither.period);  // tau = 2 periods
+    if (!(kappa > bound)) continue;
+    out.push_back("kappa = " + text(kappa) + " is above " + text(bound) +
+                  ", the bound of averaging (tau of at least 2 periods); lower kappa or the amplitude");
+  }
+  return out;
+}
+
+BoundedSeeking::BoundedSeeking(BoundedSeekingSettings settings)
+    : settings_(checked(std::move(settings))),
+      guard_(settings_.limits, settings_.space.size(), 2.0 * settings_.dither.period),
+      applied_(settings_.space.start),
+      estimate_(applied_),
+      omega_(applied_),
+      window_(static_cast<std::size_t>(settings_.dither.period * applied_.size()), 0.0) {
+  for (Eigen::Index i = 0; i < omega_.size(); ++i) {
+    omega_[i] =
+        2.0 * std::numbers::pi * settings_.dither.harmonics[static_cast<std::size_t>(i)] / settings_.dither.period;
+  }
+}
+
+const Inputs& BoundedSeeking::ask() noexcept {
+  protocol_.asked = true;
+  return applied_;
+}
+
+TellStatus BoundedSeeking::tell(const Reading& reading) noexcept {
+  const TellStatus status = protocol_.check(reading, component_count(), limit_count());
+  protocol_.count(status);
+  if (status != TellStatus::accepted) return status;
+  guard_.record(applied_, reading.limits);
+  const Eigen::Index n = applied_.size();
+  const std::int64_t period = settings_.dither.period;
+  const std::int64_t phase = seen_ % period;
+  for (Eigen::Index i = 0; i < n; ++i)
+    window_[static_cast<std::size_t>(phase * n + i)] = applied_[i];
+  ++seen_;
+  if (seen_ >= period) {
+    estimate_.setZero();
+    for (std::int64_t k = 0; k < period; ++k) {
+      for (Eigen::Index i = 0; i < n; ++i)
+        estimate_[i] += window_[static_cast<std::size_t>(k * n + i)];
+    }
+    estimate_ /= static_cast<double>(period);
+  }
+  const double j = objective_of(reading, settings_.maximize) + guard_.shaping(reading.limits);
+  const Inputs largest = settings_.dither.amplitude.cwiseProduct(omega_);
+  Inputs step(n);
+  for (Eigen::Index i = 0; i < n; ++i)
+    step[i] = largest[i] * std::cos(omega_[i] * static_cast<double>(phase) - settings_.kappa * j);
+  const Inputs none = Inputs::Zero(n);
+  step = guard_.admit(applied_, step, none, largest);
+  move_within(applied_, step, settings_.space, none);
+  return status;
+}
+
+}  // namespace mgdd::optimize

@@ -1,0 +1,223 @@
+#include "mgdd/optimize/seekers/extremum_seeking.hpp"
+
+#include <algorithm>
+#include <array>
+#include <cmath>
+#include <utility>
+
+#include "mgdd/common/enum_names.hpp"
+#include "mgdd/common/text.hpp"
+
+namespace mgdd::optimize {
+namespace {
+
+constexpr std::array<std::pair<MeanRemoval, std::string_view>, 3> form_names{{
+    {MeanRemoval::batch, "batch"},
+    {MeanRemoval::moving_average, "moving_average"},
+    {MeanRemoval::washout, "washout"},
+}};
+
+constexpr double limit_memory_windows = 2.0;
+constexpr double share_rate = 0.25;  // how fast the amplitude follows its target, per window
+
+ExtremumSeekingSettings checked(ExtremumSeekingSettings s) {
+  const Eigen::Index n = s.space.size();
+  if (n < 1) throw ShapeError("start is empty: give one number per input");
+  validate(s.dither, n, false);
+  validate(s.space, s.dither.amplitude);
+  validate(s.components);
+  validate_entries("gain", s.gain, n, 0.0, 1e300);
+  if (s.recovery_rate.size() == 0) s.recovery_rate = s.rate.size() == 0 ? s.dither.amplitude : s.rate;
+  if (s.rate.size() == 0) {
+    s.rate = s.dither.amplitude * ((s.form == MeanRemoval::batch ? 1.0 : 3.0) / s.dither.period);
+  }
+  validate_entries("rate", s.rate, n, 0.0);
+  validate_entries("recovery_rate", s.recovery_rate, n, 0.0);
+  const auto inside = [](std::string_view name, double value, double lower, double upper) {
+    if (!(value > lower && value <= upper)) {
+      throw ParameterError(std::string(name) + " = " + text(value) + ": must be > " + text(lower) +
+                           " and <= " + text(upper));
+    }
+  };
+  if (!(s.washout_pole > 0.0 && s.washout_pole < 1.0)) {
+    throw ParameterError("washout_pole = " + text(s.washout_pole) + ": must lie between 0 and 1");
+  }
+  inside("low_pass", s.low_pass, 0.0, 1.0);
+  inside("amplitude_floor", s.amplitude_floor, 0.0, 1.0);
+  inside("limit_amplitude", s.limit_amplitude, 0.0, 1.0);
+  if (s.amplitude_floor < 1.0 && !(s.full_gradient > 0.0 && std::isfinite(s.full_gradient))) {
+    throw ParameterError("full_gradient = " + text(s.full_gradient) +
+                         ": must be > 0 where amplitude_floor is below 1: the slope at which the dither is full");
+  }
+  if (s.hold_cycles < -1) {
+    throw ParameterError("hold_cycles = " + std::to_string(s.hold_cycles) + ": must be >= 0, or -1 for one window");
+  }
+  if (s.hold_cycles == -1) s.hold_cycles = s.dither.period;
+  return s;
+}
+
+}  // namespace
+
+std::string_view to_string(MeanRemoval v) noexcept {
+  return name_of<MeanRemoval>(form_names, v);
+}
+MeanRemoval parse_mean_removal(std::string_view name) {
+  return parse_name<MeanRemoval>(form_names, "form", name);
+}
+
+std::vector<std::string> ExtremumSeekingSettings::advice() const {
+  std::vector<std::string> out;
+  if (!std::isfinite(curvature) || curvature == 0.0) return out;
+  const double windows = form == MeanRemoval::batch ? 1.0 : 2.0;  // a batch at tau = M steps straight to the optimum
+  for (Eigen::Index i = 0; i < gain.size(); ++i) {
+    const double bound = 2.0 / (dither.amplitude[i] * std::abs(curvature) * windows * dither.period);
+    if (!(gain[i] > bound * (1.0 + 1e-12))) continue;
+    out.push_back("gain = " + text(gain[i]) + " is above " + text(bound) + ", the bound of averaging: with it tau = " +
+                  text(2.0 / (gain[i] * dither.amplitude[i] * std::abs(curvature))) + " cycles is below " +
+                  text(windows * dither.period) + (windows > 1.0 ? " (two periods)" : " (one period)") +
+                  "; lower the gain or the period");
+  }
+  return out;
+}
+
+ExtremumSeeking::ExtremumSeeking(ExtremumSeekingSettings settings)
+    : settings_(checked(std::move(settings))),
+      dither_(settings_.dither, settings_.components, false),
+      guard_(settings_.limits, settings_.space.size(), limit_memory_windows * settings_.dither.period),
+      estimate_(settings_.space.start),
+      applied_(estimate_),
+      gradient_(Inputs::Zero(estimate_.size())),
+      held_(settings_.hold_cycles),
+      mean_(component_count(), 0.0),
+      sum_(gradient_),
+      smooth_(gradient_),
+      origin_(component_count(), 0.0) {
+  if (settings_.form == MeanRemoval::moving_average) {
+    window_.assign(component_count() * static_cast<std::size_t>(settings_.dither.period), 0.0);
+  }
+}
+
+const Inputs& ExtremumSeeking::ask() noexcept {
+  for (Eigen::Index i = 0; i < estimate_.size(); ++i) {
+    applied_[i] =
+        estimate_[i] + share_ * settings_.dither.amplitude[i] * dither_.perturbation(static_cast<int>(phase_), i);
+  }
+  protocol_.asked = true;
+  return applied_;
+}
+
+TellStatus ExtremumSeeking::tell(const Reading& reading) noexcept {
+  const TellStatus status = protocol_.check(reading, component_count(), limit_count());
+  protocol_.count(status);
+  if (status == TellStatus::accepted) learn(reading);
+  return status;
+}
+
+// Fills gradient_ (smoothed) with this cycle's demodulated reading; false while there is no mean to take off yet.
+bool ExtremumSeeking::remove_mean(const Reading& reading) noexcept {
+  const auto period = static_cast<std::size_t>(dither_.period());
+  const double shaped = guard_.shaping(reading.limits);
+  Inputs product = Inputs::Zero(estimate_.size());
+  for (std::size_t c = 0; c < component_count(); ++c) {
+    const double j = sign() * reading.components[c] + (c == 0 ? shaped : 0.0);
+    double e = 0.0;
+    if (settings_.form == MeanRemoval::moving_average) {
+      double* const ring = &window_[c * period];
+      ring[static_cast<std::size_t>(seen_) % period] = j;
+      double sum = 0.0;  // afresh every cycle: a running sum would drift
+      for (std::size_t k = 0; k < period; ++k)
+        sum += ring[k];
+      e = j - sum / static_cast<double>(period);
+    } else {
+      if (seen_ == 0) mean_[c] = j;
+      e = j - mean_[c];
+      mean_[c] += (1.0 - settings_.washout_pole) * e;
+    }
+    for (Eigen::Index i = 0; i < product.size(); ++i)
+      product[i] += e * dither_.demodulation(static_cast<int>(phase_), c, i);
+  }
+  if (settings_.form == MeanRemoval::moving_average && seen_ + 1 < dither_.period()) return false;
+  smooth_ += settings_.low_pass * (product - smooth_);
+  return true;
+}
+
+void ExtremumSeeking::move(Inputs step, const Inputs& rate) noexcept {
+  clip_each(step, rate);
+  const Inputs reach = settings_.dither.amplitude * share_;
+  step = guard_.admit(estimate_, step, reach, rate.cwiseMax(settings_.recovery_rate));
+  if (guard_.active()) ++limited_cycles_;
+  move_within(estimate_, step, settings_.space, settings_.dither.amplitude);
+}
+
+void ExtremumSeeking::learn(const Reading& reading) noexcept {
+  guard_.record(applied_, reading.limits);
+  const Inputs& a = settings_.dither.amplitude;
+  const double period = dither_.period();
+  const Inputs no_step = Inputs::Zero(estimate_.size());
+  if (held_ > 0) --held_;
+  const bool holding = held_ > 0;  // in the next cycle: after the last held one the estimate may move
+  bool moved_by_alarm = false;
+
+  if (settings_.form == MeanRemoval::batch) {
+    if (phase_ == 0) {
+      sum_.setZero();
+      std::copy(reading.components.begin(), reading.components.end(), origin_.begin());
+    }
+    const double shaped = guard_.shaping(reading.limits);
+    for (std::size_t c = 0; c < component_count(); ++c) {
+      const double j = sign() * (reading.components[c] - origin_[c]) + (c == 0 ? shaped : 0.0);
+      for (Eigen::Index i = 0; i < sum_.size(); ++i)
+        sum_[i] += j * dither_.demodulation(static_cast<int>(phase_), c, i);
+    }
+  } else if (remove_mean(reading)) {
+    gradient_ = smooth_.cwiseQuotient(a) * (2.0 / share_);
+    if (!holding) {
+      move(settings_.gain.cwiseProduct(smooth_) * share_, settings_.rate);
+      moved_by_alarm = true;
+    }
+  }
+  if (!moved_by_alarm && guard_.alarmed()) {
+    const Inputs before = estimate_;
+    move(no_step, settings_.recovery_rate);
+    if (settings_.form == MeanRemoval::batch && (estimate_ - before).squaredNorm() > 0.0) {
+      phase_ = 0;  // the window has lost its held estimate: begin it anew
+      ++seen_;
+      return;
+    }
+  }
+  ++seen_;
+  if (++phase_ < dither_.period()) return;
+  phase_ = 0;
+  if (settings_.form == MeanRemoval::batch) {
+    gradient_ = (sum_ * (2.0 / (period * share_))).cwiseQuotient(a);
+    if (!holding) {  // the mean rate of the continuous form: M g_r A/2 times the slope, smaller with a smaller dither
+      move((settings_.gain.cwiseProduct(a)).cwiseProduct(gradient_) * (0.5 * period * share_ * share_),
+           settings_.rate * period);
+    }
+  }
+  end_of_window();
+}
+
+void ExtremumSeeking::end_of_window() noexcept {
+  double target = 1.0;
+  if (settings_.amplitude_floor < 1.0) {
+    target = std::clamp(gradient_.cwiseAbs().maxCoeff() / settings_.full_gradient, settings_.amplitude_floor, 1.0);
+  }
+  const auto decisions = settings_.form == MeanRemoval::batch ? std::int64_t{1} : dither_.period() / 2;
+  if (limited_cycles_ >= decisions) target = std::min(target, settings_.limit_amplitude);
+  limited_cycles_ = 0;
+  share_ += share_rate * (target - share_);
+}
+
+void ExtremumSeeking::restart() noexcept {
+  seen_ = 0;
+  phase_ = 0;
+  held_ = settings_.hold_cycles;
+  share_ = 1.0;
+  smooth_.setZero();
+  sum_.setZero();
+  limited_cycles_ = 0;
+  guard_.forget();
+}
+
+}  // namespace mgdd::optimize

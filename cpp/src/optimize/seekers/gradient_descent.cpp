@@ -1,0 +1,81 @@
+#include "mgdd/optimize/seekers/gradient_descent.hpp"
+
+#include <cmath>
+#include <utility>
+
+#include "mgdd/common/bounds.hpp"
+#include "mgdd/common/text.hpp"
+
+namespace mgdd::optimize {
+namespace {
+
+GradientDescentSettings checked(GradientDescentSettings s) {
+  const Eigen::Index n = s.space.size();
+  require_positive("step_size", s.step_size);
+  require_positive("difference", s.difference);
+  validate(s.space, Inputs::Constant(n, s.difference));
+  if (s.rate.size() == 0) s.rate = Inputs::Constant(n, unlimited);
+  validate_entries("rate", s.rate, n, 0.0);
+  if (!(s.tolerance >= 0.0 && std::isfinite(s.tolerance))) {
+    throw ParameterError("tolerance = " + text(s.tolerance) + ": must be >= 0 and finite");
+  }
+  if (s.iterations < 1) throw ParameterError("iterations = " + std::to_string(s.iterations) + ": must be >= 1");
+  return s;
+}
+
+}  // namespace
+
+std::vector<std::string> GradientDescentSettings::advice() const {
+  const double bound = 2.0 / std::abs(curvature);
+  if (!(step_size >= bound)) return {};
+  return {"step_size = " + text(step_size) + " is not below " + text(bound) +
+          " = 2/|J''|, the bound of convergence; 1/|J''| is fastest"};
+}
+
+GradientDescent::GradientDescent(GradientDescentSettings settings)
+    : settings_(checked(std::move(settings))),
+      guard_(settings_.limits, settings_.space.size(), 8.0 * static_cast<double>(settings_.space.size())),
+      estimate_(settings_.space.start),
+      applied_(estimate_),
+      gradient_(Inputs::Zero(estimate_.size())) {}
+
+const Inputs& GradientDescent::ask() noexcept {
+  applied_ = estimate_;
+  applied_[stage_ / 2] += stage_ % 2 == 0 ? settings_.difference : -settings_.difference;
+  protocol_.asked = true;
+  return applied_;
+}
+
+TellStatus GradientDescent::tell(const Reading& reading) noexcept {
+  const TellStatus status = protocol_.check(reading, component_count(), limit_count());
+  protocol_.count(status);
+  if (status != TellStatus::accepted) return status;
+  guard_.record(applied_, reading.limits);
+  const double j = objective_of(reading, settings_.maximize) + guard_.shaping(reading.limits);
+  if (stage_ % 2 == 0) {
+    above_ = j;
+  } else {
+    gradient_[stage_ / 2] = (above_ - j) / (2.0 * settings_.difference);
+  }
+  if (++stage_ < 2 * estimate_.size()) return status;
+  stage_ = 0;
+  Inputs step = settings_.step_size * gradient_;
+  clip_each(step, settings_.rate);
+  const Inputs reach = Inputs::Constant(step.size(), settings_.difference);
+  step = guard_.admit(estimate_, step, reach, settings_.rate);
+  move_within(estimate_, step, settings_.space, reach);
+  ++iteration_;
+  if (converged_at_ < 0 && iteration_ <= settings_.iterations && step.cwiseAbs().maxCoeff() < settings_.tolerance) {
+    converged_at_ = iteration_;
+  }
+  return status;
+}
+
+void GradientDescent::restart() noexcept {
+  stage_ = 0;
+  iteration_ = 0;
+  converged_at_ = -1;
+  guard_.forget();
+}
+
+}  // namespace mgdd::optimize

@@ -1,0 +1,152 @@
+#include "mgdd/optimize/seekers/newton_seeking.hpp"
+
+#include <Eigen/Cholesky>
+#include <algorithm>
+#include <utility>
+
+#include "mgdd/common/text.hpp"
+
+namespace mgdd::optimize {
+namespace {
+
+NewtonSeekingSettings checked(NewtonSeekingSettings s) {
+  const Eigen::Index n = s.space.size();
+  if (n < 1) throw ShapeError("start is empty: give one number per input");
+  validate(s.dither, n, true);
+  validate(s.space, s.dither.amplitude);
+  validate(s.components);
+  if (s.rate.size() == 0) s.rate = s.dither.amplitude * (3.0 / s.dither.period);
+  validate_entries("rate", s.rate, n, 0.0);
+  for (const auto& [name, value, upper] :
+       {std::tuple{"time_constant_cycles", s.time_constant_cycles, 1e9},
+        std::tuple{"hessian_rate", s.hessian_rate, 1.0}, std::tuple{"riccati_rate", s.riccati_rate, 1.0},
+        std::tuple{"largest_inverse", s.largest_inverse, 1e300},
+        std::tuple{"limit_amplitude", s.limit_amplitude, 1.0}}) {
+    if (!(value > 0.0 && value <= upper)) {
+      throw ParameterError(std::string(name) + " = " + text(value) + ": must be > 0 and <= " + text(upper));
+    }
+  }
+  for (const auto& [name, values] :
+       {std::pair{"initial_hessian", &s.initial_hessian}, std::pair{"initial_inverse", &s.initial_inverse}}) {
+    if (values->size() != n) {
+      throw ShapeError(std::string(name) + " has " + std::to_string(values->size()) + " entries: must have " +
+                       std::to_string(n) + ", one per entry of start");
+    }
+    for (const double value : *values) {
+      if (!(value < 0.0 && std::isfinite(value))) {
+        throw ParameterError(std::string(name) + " = " + text(value) + ": must be < 0, the bend of a maximum");
+      }
+    }
+  }
+  if (s.hold_cycles < s.dither.period) {
+    throw ParameterError("hold_cycles = " + std::to_string(s.hold_cycles) +
+                         ": must be at least one period = " + std::to_string(s.dither.period));
+  }
+  return s;
+}
+
+}  // namespace
+
+std::vector<std::string> NewtonSeekingSettings::advice() const {
+  if (time_constant_cycles >= 2.0 * dither.period) return {};
+  return {"time_constant_cycles = " + text(time_constant_cycles) + " is below " + text(2.0 * dither.period) +
+          " (2 periods), the bound of averaging"};
+}
+
+NewtonSeeking::NewtonSeeking(NewtonSeekingSettings settings)
+    : settings_(checked(std::move(settings))),
+      dither_(settings_.dither, settings_.components, true),
+      guard_(settings_.limits, settings_.space.size(), 2.0 * settings_.dither.period),
+      estimate_(settings_.space.start),
+      applied_(estimate_),
+      gradient_(Inputs::Zero(estimate_.size())),
+      hessian_(settings_.initial_hessian.asDiagonal()),
+      inverse_(settings_.initial_inverse.asDiagonal()),
+      held_(settings_.hold_cycles),
+      window_(component_count() * static_cast<std::size_t>(settings_.dither.period), 0.0) {}
+
+const Inputs& NewtonSeeking::ask() noexcept {
+  for (Eigen::Index i = 0; i < estimate_.size(); ++i) {
+    applied_[i] =
+        estimate_[i] + share_ * settings_.dither.amplitude[i] * dither_.perturbation(static_cast<int>(phase_), i);
+  }
+  protocol_.asked = true;
+  return applied_;
+}
+
+TellStatus NewtonSeeking::tell(const Reading& reading) noexcept {
+  const TellStatus status = protocol_.check(reading, component_count(), limit_count());
+  protocol_.count(status);
+  if (status == TellStatus::accepted) learn(reading);
+  return status;
+}
+
+// Gamma stays negative definite and bounded: an update that would leave that set is not made.
+void NewtonSeeking::update_inverse() noexcept {
+  const double largest = settings_.largest_inverse;
+  InputMatrix next = inverse_ + settings_.riccati_rate * (inverse_ - inverse_ * hessian_ * inverse_);
+  if (next.size() == 1) {
+    inverse_(0, 0) = std::clamp(next(0, 0), -largest, -largest * 1e-6);
+    return;
+  }
+  next = (0.5 * (next + next.transpose())).eval();
+  const Eigen::LLT<InputMatrix> factor(-next);
+  if (factor.info() == Eigen::Success && next.norm() <= largest) inverse_ = next;
+}
+
+void NewtonSeeking::learn(const Reading& reading) noexcept {
+  guard_.record(applied_, reading.limits);
+  const auto period = static_cast<std::size_t>(dither_.period());
+  const Eigen::Index n = estimate_.size();
+  const Inputs a = settings_.dither.amplitude * share_;
+  const double shaped = guard_.shaping(reading.limits);
+  Inputs gradient = Inputs::Zero(n);
+  InputMatrix sample = InputMatrix::Zero(n, n);
+  for (std::size_t c = 0; c < component_count(); ++c) {
+    const double j = (settings_.maximize ? 1.0 : -1.0) * reading.components[c] + (c == 0 ? shaped : 0.0);
+    double* const ring = &window_[c * period];
+    ring[static_cast<std::size_t>(seen_) % period] = j;
+    double sum = 0.0;
+    for (std::size_t k = 0; k < period; ++k)
+      sum += ring[k];
+    const double e = j - sum / static_cast<double>(period);
+    for (Eigen::Index i = 0; i < n; ++i) {
+      gradient[i] += 2.0 / a[i] * e * dither_.demodulation(static_cast<int>(phase_), c, i);
+      for (Eigen::Index k = 0; k < n; ++k)
+        sample(i, k) += e / (a[i] * a[k]) * dither_.curvature_demodulation(static_cast<int>(phase_), c, i, k);
+    }
+  }
+  const bool full = seen_ + 1 >= dither_.period();
+  if (held_ > 0) --held_;
+  const bool holding = held_ > 0;  // in the next cycle: after the last held one the estimate may move
+  Inputs step = Inputs::Zero(n);
+  if (full) {
+    gradient_ = gradient;
+    hessian_ += settings_.hessian_rate * (sample - hessian_);
+    update_inverse();
+    if (!holding) step = inverse_ * gradient * (-1.0 / settings_.time_constant_cycles);
+  }
+  if ((full && !holding) || guard_.alarmed()) {
+    clip_each(step, settings_.rate);
+    step = guard_.admit(estimate_, step, a, settings_.rate);
+    if (guard_.active()) ++limited_cycles_;
+    move_within(estimate_, step, settings_.space, settings_.dither.amplitude);
+  }
+  ++seen_;
+  if (++phase_ < dither_.period()) return;
+  phase_ = 0;
+  const double target = limited_cycles_ >= dither_.period() / 2 ? settings_.limit_amplitude : 1.0;
+  share_ += 0.25 * (target - share_);
+  limited_cycles_ = 0;
+}
+
+void NewtonSeeking::restart() noexcept {
+  seen_ = 0;
+  phase_ = 0;
+  held_ = dither_.period();
+  share_ = 1.0;
+  limited_cycles_ = 0;
+  guard_.forget();
+}
+
+}  // namespace mgdd::optimize

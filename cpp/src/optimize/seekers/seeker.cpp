@@ -1,0 +1,121 @@
+#include "mgdd/optimize/seekers/seeker.hpp"
+
+#include <algorithm>
+#include <cmath>
+#include <string>
+
+#include "mgdd/common/text.hpp"
+
+namespace mgdd::optimize {
+namespace {
+
+std::string entry(std::string_view name, Eigen::Index i, Eigen::Index size) {
+  return size == 1 ? std::string(name) : std::string(name) + "[" + std::to_string(i) + "]";
+}
+
+[[noreturn]] void refuse_reading(const std::string& at, std::string_view name, double value) {
+  const DataError refusal(
+      name, value,
+      "must be finite and at most " + text(largest_reading) + " in magnitude; tell misfire=True if the cycle misfired");
+  throw in_context(at, refusal);
+}
+
+}  // namespace
+
+void validate_entries(std::string_view name, const Inputs& values, Eigen::Index inputs, double lower, double upper) {
+  if (values.size() != inputs) {
+    throw ShapeError(std::string(name) + " has " + std::to_string(values.size()) + " entries: must have " +
+                     std::to_string(inputs) + ", one per entry of start");
+  }
+  for (Eigen::Index i = 0; i < inputs; ++i) {
+    if (!(values[i] > lower && values[i] <= upper)) {
+      throw ParameterError(entry(name, i, inputs) + " = " + text(values[i]) + ": must be > " + text(lower) +
+                           (upper < unlimited ? " and <= " + text(upper) : std::string()));
+    }
+  }
+}
+
+void validate(const SearchSpace& space, const Inputs& reach) {
+  const Eigen::Index n = space.size();
+  if (n < 1) throw ShapeError("start is empty: give one number per input");
+  for (const auto& [name, values] : {std::pair{"lower", &space.lower}, std::pair{"upper", &space.upper}}) {
+    if (values->size() != n) {
+      throw ShapeError(std::string(name) + " has " + std::to_string(values->size()) + " entries: must have " +
+                       std::to_string(n) + ", one per entry of start");
+    }
+  }
+  for (Eigen::Index i = 0; i < n; ++i) {
+    if (!std::isfinite(space.start[i])) {
+      throw ParameterError(entry("start", i, n) + " = " + text(space.start[i]) + ": must be finite");
+    }
+    if (!(space.lower[i] < space.upper[i])) {
+      throw ParameterError(entry("lower", i, n) + " = " + text(space.lower[i]) +
+                           ": must be < upper = " + text(space.upper[i]));
+    }
+    const double low = space.lower[i] + reach[i];
+    const double high = space.upper[i] - reach[i];
+    if (!(low <= high)) {
+      throw ParameterError(entry("upper", i, n) + " = " + text(space.upper[i]) + ": must be at least " +
+                           text(2.0 * reach[i]) + " above lower = " + text(space.lower[i]) +
+                           ", room for the perturbation on both sides");
+    }
+    if (!(space.start[i] >= low && space.start[i] <= high)) {
+      throw ParameterError(entry("start", i, n) + " = " + text(space.start[i]) + ": must lie in [" + text(low) + ", " +
+                           text(high) + "], the bounds less the perturbation; move start or widen the bounds");
+    }
+  }
+}
+
+void require_within_space(std::string_view column, const Inputs& values, const SearchSpace& space) {
+  for (Eigen::Index i = 0; i < values.size(); ++i) {
+    if (values[i] >= space.lower[i] && values[i] <= space.upper[i]) continue;
+    throw ParameterError("state column '" + std::string(column) + "' holds " + text(values[i]) + ": must lie in [" +
+                         text(space.lower[i]) + ", " + text(space.upper[i]) + "], the bounds of these settings");
+  }
+}
+
+TellStatus Protocol::check(const Reading& reading, std::size_t components, std::size_t limits) const noexcept {
+  if (!asked) return TellStatus::not_asked;
+  if (reading.misfire) return TellStatus::misfire;
+  if (reading.components.size() != components) return TellStatus::wrong_component_count;
+  if (reading.limits.size() != limits) return TellStatus::wrong_limit_count;
+  const bool measured = std::all_of(reading.components.begin(), reading.components.end(), is_reading) &&
+                        std::all_of(reading.limits.begin(), reading.limits.end(), is_reading);
+  return measured ? TellStatus::accepted : TellStatus::not_a_reading;
+}
+
+void Protocol::count(TellStatus status) noexcept {
+  if (status != TellStatus::accepted && status != TellStatus::misfire) return;
+  asked = false;
+  ++cycle;
+  if (status == TellStatus::misfire) ++misfires;
+}
+
+void require(TellStatus status, const Protocol& protocol, const Reading& reading, std::size_t components,
+             std::size_t limits) {
+  const std::string at = "cycle " + std::to_string(protocol.cycle) + ": ";
+  switch (status) {
+    case TellStatus::accepted:
+    case TellStatus::misfire:
+      return;
+    case TellStatus::not_asked:
+      throw ParameterError(at + "tell without ask: call ask(), apply its input, then tell what was measured, once");
+    case TellStatus::wrong_component_count:
+      throw ShapeError(at + "J has " + std::to_string(reading.components.size()) + " components: must have " +
+                       std::to_string(components) + ", as the settings say");
+    case TellStatus::wrong_limit_count:
+      throw ShapeError(at + "limits has " + std::to_string(reading.limits.size()) + " values: must have " +
+                       std::to_string(limits) + ", one per limit of the settings");
+    case TellStatus::not_a_reading:
+      for (const double value : reading.components) {
+        if (!is_reading(value)) refuse_reading(at, "J", value);
+      }
+      for (std::size_t i = 0; i < reading.limits.size(); ++i) {
+        if (!is_reading(reading.limits[i])) {
+          refuse_reading(at, "limits[" + std::to_string(i) + "]", reading.limits[i]);
+        }
+      }
+  }
+}
+
+}  // namespace mgdd::optimize

@@ -1,0 +1,261 @@
+#include "mgdd/optimize/seekers/spsa.hpp"
+
+#include <Eigen/Cholesky>
+#include <algorithm>
+#include <array>
+#include <cmath>
+#include <utility>
+
+#include "mgdd/common/bounds.hpp"
+#include "mgdd/common/enum_names.hpp"
+#include "mgdd/common/random.hpp"
+#include "mgdd/common/text.hpp"
+
+namespace mgdd::optimize {
+namespace {
+
+constexpr std::array<std::pair<SpsaForm, std::string_view>, 3> form_names{{
+    {SpsaForm::first_order, "first_order"},
+    {SpsaForm::second_order, "second_order"},
+    {SpsaForm::one_measurement, "one_measurement"},
+}};
+constexpr std::array<std::pair<GainSchedule, std::string_view>, 2> schedule_names{{
+    {GainSchedule::decreasing, "decreasing"},
+    {GainSchedule::constant, "constant"},
+}};
+
+constexpr double memory = 10.0;              // measurements behind the trend and the limits
+constexpr double one_measurement_start = 6;  // measurements before the trend is trusted
+constexpr double blocking_errors = 2.0;
+constexpr double share_rate = 0.25;  // how fast the perturbation follows its target, per iteration
+
+SpsaSettings checked(SpsaSettings s) {
+  const bool second = s.form == SpsaForm::second_order;
+  if (s.gain == 0.0) s.gain = second ? 3.0 : 20.0;
+  require_positive("perturbation", s.perturbation);
+  if (s.step_max == 0.0)
+    s.step_max = s.form == SpsaForm::one_measurement ? s.perturbation / 5.0 : s.perturbation * 4.0 / 3.0;
+  require_positive("gain", s.gain);
+  if (!(s.step_max > 0.0)) throw ParameterError("step_max = " + text(s.step_max) + ": must be > 0");
+  const Eigen::Index n = s.space.size();
+  validate(s.space, Inputs::Constant(n, s.perturbation * (second ? 2.0 : 1.0)));
+  if (!(s.stability >= 0.0 && std::isfinite(s.stability))) {
+    throw ParameterError("stability = " + text(s.stability) + ": must be >= 0 and finite");
+  }
+  for (const auto& [name, value] :
+       {std::pair{"gain_exponent", s.gain_exponent}, std::pair{"perturbation_exponent", s.perturbation_exponent}}) {
+    if (!(value >= 0.0 && value <= 1.0)) {
+      throw ParameterError(std::string(name) + " = " + text(value) + ": must lie in [0, 1]");
+    }
+  }
+  if (s.schedule == GainSchedule::decreasing && !(s.gain_exponent - s.perturbation_exponent > 0.5)) {
+    throw ParameterError("gain_exponent = " + text(s.gain_exponent) + ": must exceed perturbation_exponent = " +
+                         text(s.perturbation_exponent) + " by more than 0.5, or the noise does not average out");
+  }
+  if (s.averaging < 1 || s.averaging > 1000) {
+    throw ParameterError("averaging = " + std::to_string(s.averaging) + ": must lie in [1, 1000]");
+  }
+  if (!(s.noise_sd >= 0.0 && std::isfinite(s.noise_sd))) {
+    throw ParameterError("noise_sd = " + text(s.noise_sd) + ": must be >= 0 and finite");
+  }
+  if (!(s.initial_hessian < 0.0 && std::isfinite(s.initial_hessian))) {
+    throw ParameterError("initial_hessian = " + text(s.initial_hessian) + ": must be < 0, the bend of a maximum");
+  }
+  require_positive("hessian_prior", s.hessian_prior);
+  if (!(s.limit_amplitude > 0.0 && s.limit_amplitude <= 1.0)) {
+    throw ParameterError("limit_amplitude = " + text(s.limit_amplitude) + ": must be > 0 and <= 1");
+  }
+  return s;
+}
+
+}  // namespace
+
+std::string_view to_string(SpsaForm v) noexcept {
+  return name_of<SpsaForm>(form_names, v);
+}
+SpsaForm parse_spsa_form(std::string_view name) {
+  return parse_name<SpsaForm>(form_names, "form", name);
+}
+std::string_view to_string(GainSchedule v) noexcept {
+  return name_of<GainSchedule>(schedule_names, v);
+}
+GainSchedule parse_gain_schedule(std::string_view name) {
+  return parse_name<GainSchedule>(schedule_names, "schedule", name);
+}
+
+std::vector<std::string> SpsaSettings::advice() const {
+  const double bend = form == SpsaForm::second_order ? 1.0 : std::abs(curvature);
+  const double first = gain == 0.0 ? (form == SpsaForm::second_order ? 3.0 : 20.0) : gain;
+  const double now = schedule == GainSchedule::constant ? first : first / std::pow(1.0 + stability, gain_exponent);
+  if (!(now * bend > 1.0)) return {};
+  return {"gain: the first step factor a_0 |J''| = " + text(now * bend) +
+          " is above 1, the bound beyond which every step overshoots; a gain of " + text(gain / (now * bend)) +
+          " meets it"};
+}
+
+Spsa::Spsa(SpsaSettings settings)
+    : settings_(checked(std::move(settings))),
+      guard_(settings_.limits, settings_.space.size(), 2.0 * memory),
+      trend_(settings_.space.size(), memory),
+      estimate_(settings_.space.start),
+      candidate_(estimate_),
+      applied_(estimate_),
+      gradient_(Inputs::Zero(estimate_.size())),
+      sum_(gradient_),
+      hessian_(InputMatrix::Identity(estimate_.size(), estimate_.size()) * settings_.initial_hessian),
+      hessian_sum_(InputMatrix::Zero(estimate_.size(), estimate_.size())),
+      measured_(4, 0.0) {}
+
+int Spsa::per_gradient() const noexcept {
+  switch (settings_.form) {
+    case SpsaForm::one_measurement:
+      return 1;
+    case SpsaForm::second_order:
+      return 4;
+    case SpsaForm::first_order:
+      break;
+  }
+  return 2;
+}
+
+int Spsa::measurements_per_iteration() const noexcept {
+  return per_gradient() * settings_.averaging + (settings_.blocking ? 1 : 0);
+}
+
+double Spsa::gain_now() const noexcept {
+  if (settings_.schedule == GainSchedule::constant) return settings_.gain;
+  return settings_.gain /
+         std::pow(static_cast<double>(iteration_) + 1.0 + settings_.stability, settings_.gain_exponent);
+}
+
+double Spsa::perturbation_now() const noexcept {
+  if (settings_.schedule == GainSchedule::constant) return share_ * settings_.perturbation;
+  return share_ * settings_.perturbation /
+         std::pow(static_cast<double>(iteration_) + 1.0, settings_.perturbation_exponent);
+}
+
+// +1 or -1, each with probability one half: bounded away from zero, as the proof of Spall 1992 needs.
+double Spsa::direction(int kind, Eigen::Index input) const noexcept {
+  const auto stream = static_cast<std::uint64_t>(1000 + kind * max_inputs) + static_cast<std::uint64_t>(input);
+  return random::bits(settings_.seed, stream, static_cast<std::uint64_t>(draw_)) >> 63 ? 1.0 : -1.0;
+}
+
+const Inputs& Spsa::ask() noexcept {
+  const int per = per_gradient();
+  if (stage_ == per * settings_.averaging) {
+    applied_ = candidate_;
+  } else {
+    const double c = perturbation_now();
+    const auto within = static_cast<int>(stage_) % per;
+    for (Eigen::Index i = 0; i < estimate_.size(); ++i) {
+      applied_[i] = estimate_[i] + (within % 2 == 0 ? c : -c) * direction(0, i);
+      if (within >= 2) applied_[i] += c * direction(1, i);
+    }
+  }
+  protocol_.asked = true;
+  return applied_;
+}
+
+TellStatus Spsa::tell(const Reading& reading) noexcept {
+  const TellStatus status = protocol_.check(reading, component_count(), limit_count());
+  protocol_.count(status);
+  if (status != TellStatus::accepted) return status;
+  const double j = objective_of(reading, settings_.maximize) + guard_.shaping(reading.limits);
+  guard_.record(applied_, reading.limits);
+  const int gradients_end = per_gradient() * settings_.averaging;
+  if (stage_ < gradients_end) {
+    around_j_ += j;
+    finish_gradient(j);
+    if (++stage_ < gradients_end) return status;
+    finish_iteration();
+    if (settings_.blocking) return status;
+    estimate_ = candidate_;
+  } else {  // the extra measurement of blocking, at the candidate
+    // Measured anew in every iteration, so that a plant that has changed cannot block for ever.
+    if (j >= around_j_ / gradients_end - blocking_errors * settings_.noise_sd) {
+      estimate_ = candidate_;
+    } else {
+      ++blocked_;
+    }
+  }
+  stage_ = 0;
+  around_j_ = 0.0;
+  ++iteration_;
+  return status;
+}
+
+// Takes one measurement in; at the last one of a gradient, adds that gradient to the sum of the iteration.
+void Spsa::finish_gradient(double j) noexcept {
+  const int per = per_gradient();
+  const auto within = static_cast<std::size_t>(stage_) % static_cast<std::size_t>(per);
+  const double c = perturbation_now();
+  measured_[within] = j;
+  if (settings_.form == SpsaForm::one_measurement) {
+    const bool ready = trend_.cycles() >= one_measurement_start;
+    const double surprise = j - trend_.predict(estimate_);
+    trend_.record(applied_, j);
+    for (Eigen::Index i = 0; ready && i < sum_.size(); ++i)
+      sum_[i] += surprise / (c * direction(0, i));
+    ++draw_;
+    return;
+  }
+  if (within + 1 < static_cast<std::size_t>(per)) return;
+  const double rise = (measured_[0] - measured_[1]) / (2.0 * c);
+  for (Eigen::Index i = 0; i < sum_.size(); ++i)
+    sum_[i] += rise / direction(0, i);
+  if (settings_.form == SpsaForm::second_order) {
+    const double bend = ((measured_[2] - measured_[0]) - (measured_[3] - measured_[1])) / (2.0 * c * c);
+    for (Eigen::Index i = 0; i < sum_.size(); ++i) {
+      for (Eigen::Index k = 0; k < sum_.size(); ++k) {
+        hessian_sum_(i, k) += 0.5 * bend * (direction(0, i) * direction(1, k) + direction(1, i) * direction(0, k));
+      }
+    }
+  }
+  ++draw_;
+}
+
+// -H^-1 g with H shifted until it bends down in every direction, at least a fifth as much as at the start.
+Inputs Spsa::newton_step() noexcept {
+  const double q = settings_.averaging;
+  const double seen = static_cast<double>(iteration_) + settings_.hessian_prior;
+  hessian_ += (hessian_sum_ / q - hessian_) / (seen + 1.0);
+  hessian_sum_.setZero();
+  const double least = 0.2 * std::abs(settings_.initial_hessian);
+  const auto n = hessian_.rows();
+  const InputMatrix floor = InputMatrix::Identity(n, n) * least;
+  InputMatrix bent = -hessian_;
+  for (double shift = least; Eigen::LLT<InputMatrix>(bent - floor).info() != Eigen::Success && shift < 1e300;
+       shift *= 2.0)
+    bent.diagonal().array() += shift;
+  return bent.llt().solve(gradient_);
+}
+
+void Spsa::finish_iteration() noexcept {
+  gradient_ = sum_ / settings_.averaging;
+  sum_.setZero();
+  const bool second = settings_.form == SpsaForm::second_order;
+  // The noise of a gradient grows with 1/c: the gain follows c squared, so that the estimate does not get rougher.
+  Inputs step = gain_now() * share_ * share_ * (second ? newton_step() : gradient_);
+  const Inputs most = Inputs::Constant(step.size(), settings_.step_max);
+  clip_each(step, most);
+  const Inputs reach = Inputs::Constant(step.size(), perturbation_now() * (second ? 2.0 : 1.0));
+  step = guard_.admit(estimate_, step, reach, most);
+  candidate_ = estimate_;
+  const double widest = settings_.perturbation * (second ? 2.0 : 1.0);
+  move_within(candidate_, step, settings_.space, Inputs::Constant(step.size(), widest));
+  share_ += share_rate * ((guard_.active() ? settings_.limit_amplitude : 1.0) - share_);
+}
+
+void Spsa::restart() noexcept {
+  iteration_ = 0;
+  stage_ = 0;
+  ++draw_;
+  sum_.setZero();
+  hessian_sum_.setZero();
+  around_j_ = 0.0;
+  share_ = 1.0;
+  trend_.forget();
+  guard_.forget();
+}
+
+}  // namespace mgdd::optimize

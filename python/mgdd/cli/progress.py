@@ -1,0 +1,102 @@
+"""Progress on stderr: a bar in a terminal, elsewhere a line every few seconds; no command is silent for long."""
+
+from __future__ import annotations
+
+import sys
+import threading
+import time
+from types import TracebackType
+from typing import TYPE_CHECKING, Any, Self
+
+if TYPE_CHECKING:
+    from typing import TextIO
+
+__all__ = ["Progress"]
+
+_INTERVAL_S = 12.0
+
+
+class Progress:
+    """Say what a command is doing, from its start to its end, whether it reports steps or not.
+
+    A long step in the core shows too: a thread speaks, not the step. How many steps there will be is often known only
+    at the end: `expect` says where the bar starts from.
+
+    Parameters
+    ----------
+    quiet : bool
+        Say nothing.
+    stream : text file, optional
+        Where to; stderr if left out.
+    interval_s : float
+        Longest silence where the stream is no terminal [s].
+    """
+
+    def __init__(self, *, quiet: bool, stream: TextIO | None = None, interval_s: float = _INTERVAL_S) -> None:
+        self._quiet, self._stream, self._interval_s = quiet, stream, interval_s
+        self._text, self._done, self._expected = "working", 0, 0
+        self._begun = time.monotonic()
+        self._ended = threading.Event()
+        self._bar: Any = None
+        self._task: Any = None
+        self._thread: threading.Thread | None = None
+
+    def __enter__(self) -> Self:
+        if self._quiet:
+            return self
+        out = sys.stderr if self._stream is None else self._stream
+        if out.isatty():
+            self._open_bar(out)
+        else:
+            self._thread = threading.Thread(target=self._speak, args=(out,), name="mgdd progress", daemon=True)
+            self._thread.start()
+        return self
+
+    def __exit__(
+        self, kind: type[BaseException] | None, error: BaseException | None, trace: TracebackType | None
+    ) -> None:
+        self.close()
+
+    def __call__(self, text: str) -> None:
+        """Begin a step."""
+        self._text, self._done = text, self._done + 1
+        if self._bar is not None:
+            self._bar.update(self._task, description=text, completed=self._done - 1, total=self._total())
+
+    def expect(self, steps: int) -> Self:
+        """Say how many steps there may be; returns this object, to be called before each."""
+        self._expected = steps
+        return self
+
+    def close(self) -> None:
+        """Take the bar away, or end the lines; the result is printed next."""
+        self._ended.set()
+        if self._bar is not None:
+            self._bar.stop()
+            self._bar = None
+        if self._thread is not None:
+            self._thread.join()
+            self._thread = None
+
+    def _open_bar(self, out: TextIO) -> None:
+        from rich import progress
+        from rich.console import Console
+
+        # Without redirection: what a command prints on stdout must not turn up on stderr.
+        self._bar = progress.Progress(
+            progress.SpinnerColumn(), progress.TextColumn("{task.description}"), progress.BarColumn(),
+            progress.TimeElapsedColumn(), console=Console(file=out), transient=True,
+            redirect_stdout=False, redirect_stderr=True,
+        )  # fmt: skip
+        self._task = self._bar.add_task(self._text, total=None)
+        self._bar.start()
+
+    def _total(self) -> int | None:
+        return max(self._expected, self._done) if self._expected else None
+
+    def _speak(self, out: TextIO) -> None:
+        while not self._ended.wait(self._interval_s):
+            steps = f"step {self._done}" if self._done else ""
+            steps += f" of about {self._total()}" if steps and self._expected else ""
+            spent = f"{time.monotonic() - self._begun:.0f} s"
+            print(f"mgdd: {self._text} ({', '.join(filter(None, (steps, spent)))})", file=out, flush=True)

@@ -1,0 +1,258 @@
+"""The profile of the wall-heat scale: how well the rest of the model can make up for a wrong one."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+
+from mgdd import _core
+from mgdd._core import OperatingPoint
+from mgdd.errors import ParameterError
+from mgdd.identify.engine.cylinder import fit_cylinder
+from mgdd.identify.engine.records import CylinderFit, Load
+from mgdd.optimize import FitOptions
+from mgdd.results import labelled_dataset
+from mgdd.results.describe import described
+
+if TYPE_CHECKING:
+    import xarray as xr
+
+__all__ = ["WallHeatProfile", "wall_heat_profile"]
+
+NAME = "wall_heat_scale"
+UPPER = float(_core.wall_heat_scale_upper)
+_RISE = 1.10  # a scale counts as possible while the refitted RMSE stays within 10 % of the best
+_WIDTH = 0.20  # and as identified when that range stays within 20 % of the best scale
+_CORRELATION = float(_core.correlation_limit)
+
+
+@described
+@dataclass(frozen=True, kw_only=True)
+class WallHeatProfile:
+    """What the traces say about the wall-heat scale.
+
+    Parameters
+    ----------
+    value, stderr : float
+        Estimate and standard error [-]; the latter is NaN at a bound.
+    correlation : float
+        Strongest correlation with another parameter [-]; at a bound, of the linearised problem there.
+    correlated_with : str
+        That parameter.
+    range_low, range_high : float
+        Scales whose refitted RMSE is within 10 % of the best [-], inside [0, 2.5].
+    identifiable : bool
+        Not at a bound, correlation at most 0.98, and the range within ±20 % of the value.
+    reasons : tuple of str
+        Why not, in words.
+    dataset : xarray.Dataset
+        ``rmse_percent`` of all traces together, and per trace, over ``wall_heat_scale``.
+
+    Examples
+    --------
+    >>> from mgdd import datasets, presets
+    >>> from mgdd.identify import fit_cylinder, wall_heat_profile
+    >>> traces, cylinder = datasets.load_hd_traces(), presets.load("hd_diesel_128x144").cylinder
+    >>> wall_heat_profile(traces, fit_cylinder(traces, cylinder)).identifiable
+    False
+    """
+
+    value: float
+    stderr: float
+    correlation: float
+    correlated_with: str
+    range_low: float
+    range_high: float
+    identifiable: bool
+    reasons: tuple[str, ...]
+    dataset: xr.Dataset
+
+    def to_dict(self) -> dict[str, Any]:
+        """Give everything but the Dataset as a dict.
+
+        Returns
+        -------
+        dict
+            Field names to values.
+        """
+        return {name: getattr(self, name) for name in self.__dataclass_fields__ if name != "dataset"}
+
+
+def wall_heat_profile(
+    traces: Sequence[Any],
+    fit: CylinderFit,
+    *,
+    scales: Sequence[float] = (0.0, 0.25, 0.5, 0.75, 1.0, 1.5, 2.0, 2.5),
+    point: OperatingPoint | None = None,
+    progress: Callable[[str], None] | None = None,
+    step_cad: float = 0.25,
+    integrator: str = "trapezoid",
+    options: FitOptions | None = None,
+) -> WallHeatProfile:
+    """Refit everything else at fixed wall-heat scales, and judge whether the traces determine the scale.
+
+    Parameters
+    ----------
+    traces : sequence of xarray.Dataset, or of any form of a trace that `mgdd.engine.analyze` takes
+        As given to `fit_cylinder`.
+    fit : mgdd.results.Fit
+        A fit of `fit_cylinder` in which ``wall_heat_scale`` was free.
+    scales : sequence of float
+        Scales to refit at, in [0, 2.5]; the fitted one and both ends are added.
+    point : OperatingPoint, optional
+        As given to `fit_cylinder`.
+    progress : callable, optional
+        Called with a short text before each refit.
+    step_cad, integrator, options
+        As given to `fit_cylinder`.
+
+    Returns
+    -------
+    WallHeatProfile
+        Estimate, uncertainty, range and verdict.
+
+    Raises
+    ------
+    mgdd.errors.ParameterError
+        ``wall_heat_scale`` was not free or free alone, or a scale lies outside [0, 2.5].
+
+    Examples
+    --------
+    >>> from mgdd import datasets, presets
+    >>> from mgdd.identify import fit_cylinder, wall_heat_profile
+    >>> traces, cylinder = datasets.load_hd_traces(), presets.load("hd_diesel_128x144").cylinder
+    >>> profile = wall_heat_profile(traces, fit_cylinder(traces, cylinder), scales=[0.5, 1.0])
+    >>> profile.dataset["rmse_percent"].dims
+    ('wall_heat_scale',)
+    """
+    if NAME not in fit.report.names:
+        raise ParameterError(f"{NAME} was not free in this fit: free it, then ask for its profile")
+    bad = [scale for scale in scales if not 0.0 <= scale <= UPPER]
+    if bad:
+        raise ParameterError(f"scales: {bad[0]:g} must be in [0, {UPPER:g}]")
+    free = tuple(dict.fromkeys(name.split("[")[0] for name in fit.report.names if name != NAME))
+    if not free:
+        raise ParameterError(f"{NAME} was the only free parameter: a profile refits the others")
+    value = float(fit.model.wall_heat_scale)
+    fits = {value: fit}
+
+    def refit(scale: float) -> CylinderFit:
+        if scale not in fits:
+            if progress is not None:
+                progress(f"{fit.kind}: refit at wall-heat scale {scale:.3g}")
+            near = fits[min(fits, key=lambda known: abs(known - scale))]
+            fits[scale] = fit_cylinder(
+                traces,
+                fit.model.replace(wall_heat_scale=scale),
+                free=free,
+                point=point,
+                start_values=[_start_values(load) for load in near.loads],
+                step_cad=step_cad,
+                integrator=integrator,
+                options=options,
+            )
+        return fits[scale]
+
+    if math.isfinite(fit.report.rmse):
+        for scale in sorted({*scales, 0.0, UPPER}, key=lambda s: abs(s - value)):
+            refit(float(scale))
+    best = min(fits, key=lambda scale: _rmse(fits[scale]))
+    level = _RISE * _rmse(fits[best])
+    low = _crossing(refit, fits, best, level, -1)
+    high = _crossing(refit, fits, best, level, +1)
+    correlation, partner = _correlation(fit)
+    reasons = _reasons(fit, best, _rmse(fits[best]), correlation, partner, low, high)
+    return WallHeatProfile(
+        value=value,
+        stderr=float(fit.report.stderr[fit.report.names.index(NAME)]),
+        correlation=correlation,
+        correlated_with=partner,
+        range_low=low,
+        range_high=high,
+        identifiable=not reasons,
+        reasons=reasons,
+        dataset=_dataset(fits),
+    )
+
+
+def _rmse(fit: CylinderFit) -> float:
+    return fit.report.rmse if math.isfinite(fit.report.rmse) else math.inf
+
+
+def _start_values(load: Load) -> dict[str, float]:
+    shape = load.cylinder
+    return {
+        "soc_cad": load.soc_cad,
+        "burn_duration_cad": load.burn_duration_cad,
+        "fuel_heat_j": load.fuel_heat_j,
+        "wiebe_m": shape.wiebe_m,
+        "second_fraction": shape.second_fraction,
+        "second_delay_cad": shape.second_delay_cad,
+        "second_duration_cad": shape.second_duration_cad,
+        "second_wiebe_m": shape.second_wiebe_m,
+    }
+
+
+def _crossing(
+    refit: Callable[[float], CylinderFit], fits: dict[float, CylinderFit], best: float, level: float, side: int
+) -> float:
+    """Where the profile leaves the level on one side of its best; the bound if it does not, NaN without any fit."""
+    from scipy.optimize import brentq
+
+    if not math.isfinite(level):
+        return math.nan
+    inside = best
+    for scale in sorted((s for s in fits if (s - best) * side > 0.0), key=lambda s: abs(s - best)):
+        if _rmse(fits[scale]) > level:
+            return float(brentq(lambda s: min(_rmse(refit(float(s))), 1e6) - level, inside, scale, xtol=2e-3))
+        inside = scale
+    return inside  # the outermost scale is the bound: both ends of [0, 2.5] are always refitted
+
+
+def _correlation(fit: CylinderFit) -> tuple[float, str]:
+    """Return the strongest correlation of the scale, where it is at a bound that of the linearised problem there."""
+    row = fit.correlation_if_free[fit.report.names.index(NAME)]
+    pairs = [(n, float(c)) for n, c in zip(fit.report.names, row, strict=True) if n != NAME and math.isfinite(c)]
+    name, strongest = min(pairs, key=lambda pair: -abs(pair[1]), default=("none", math.nan))
+    return strongest, name
+
+
+def _reasons(
+    fit: CylinderFit, best: float, rmse: float, correlation: float, partner: str, low: float, high: float
+) -> tuple[str, ...]:
+    value = float(fit.model.wall_heat_scale)
+    if not fit.report.success:
+        return (f"the fit itself did not converge: {fit.report.message}",)
+    out = []
+    if fit.report.bounds_active[fit.report.names.index(NAME)] != 0:
+        out.append(f"the estimate {value:.3g} lies at a bound of [0, {UPPER:g}]")
+    if rmse < fit.report.rmse * (1.0 - 1e-3):
+        out.append(f"a refit at {best:.2f} fits better than the estimate {value:.2f}: the search met a local minimum")
+    if abs(correlation) > _CORRELATION:
+        out.append(f"its correlation with {partner} is {correlation:.3f}, beyond {_CORRELATION:g}")
+    if best <= 0.0 or low < (1.0 - _WIDTH) * best or high > (1.0 + _WIDTH) * best:
+        out.append(
+            f"any scale from {low:.2f} to {high:.2f} fits within 10 % of the best RMSE once the rest is refitted"
+        )
+    return tuple(out)
+
+
+def _dataset(fits: dict[float, CylinderFit]) -> xr.Dataset:
+    scales = np.array(sorted(fits))
+    ordered = [fits[scale] for scale in scales]
+    files = [load.file for load in ordered[0].loads]
+    own = np.array([[load.rmse_percent for load in f.loads] for f in ordered])
+    error = np.array([[load.imep_closed_error_percent for load in f.loads] for f in ordered])
+    return labelled_dataset(
+        {
+            NAME: (NAME, scales),
+            "file": ("file", files, "-", "trace"),
+            "rmse_percent": (NAME, [100.0 * f.report.rmse for f in ordered]),
+            "rmse_percent_per_trace": ((NAME, "file"), own, "% of p_max", "pressure RMSE of each trace"),
+            "imep_closed_error_percent": ((NAME, "file"), error),
+        }
+    )

@@ -1,0 +1,229 @@
+"""Before a duty signal is sent: what would the plate do, does it stay inside the limits, and what would it show."""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass, field
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+
+from mgdd.errors import ParameterError
+from mgdd.identify.throttle.prior import prior_of
+from mgdd.identify.throttle.record_content import RecordContent, open_questions, record_content
+from mgdd.results import Finding, labelled_dataset
+from mgdd.results.describe import described
+from mgdd.signals.even_grid import even_step
+
+if TYPE_CHECKING:
+    import xarray as xr
+
+__all__ = ["ExcitationCheck", "check_excitation"]
+
+
+@described
+@dataclass(frozen=True, kw_only=True)
+class ExcitationCheck:
+    """What the prior model does under an excitation, and the verdict.
+
+    Parameters
+    ----------
+    passed : bool
+        Whether every limit holds.
+    findings : tuple of Finding
+        Each limit that is passed, with the remedy.
+    unanswered : tuple of Finding
+        What a log of this excitation could not tell, and which one could.
+    content : RecordContent
+        Range, speeds, directions, crossings and stops of the predicted angle.
+    peak_current_a, rms_current_a : float
+        Predicted motor current [A]; NaN if the prior model has none.
+    prediction : xarray.Dataset
+        ``duty``, ``angle_deg`` and, where the model has it, ``current_a`` over ``time_s``.
+
+    Examples
+    --------
+    >>> import numpy as np
+    >>> from mgdd.identify import check_excitation
+    >>> from mgdd.signals import chirp
+    >>> def lazy(time_s, duty, start_deg):
+    ...     return 30.0 + 100.0 * np.asarray(duty)
+    >>> check = check_excitation(chirp(offset=0.15, amplitude=0.2), lazy, angle_window_deg=(1.0, 60.0))
+    >>> check.passed, check.findings[0].text
+    (False, 'the plate opens to 65.0 deg, beyond 60')
+    """
+
+    passed: bool
+    findings: tuple[Finding, ...]
+    unanswered: tuple[Finding, ...]
+    content: RecordContent
+    peak_current_a: float
+    rms_current_a: float
+    prediction: xr.Dataset = field(repr=False)
+
+    def summary(self) -> str:
+        """Return a short summary.
+
+        Returns
+        -------
+        str
+            Verdict, predicted figures, limits passed, and what stays open.
+        """
+        c = self.content
+        lines = [
+            "inside the limits" if self.passed else "outside the limits",
+            f"angle {c.angle_low_deg:.1f} to {c.angle_high_deg:.1f} deg, at most {c.peak_speed_deg_per_s:.0f} deg/s",
+            f"{c.limp_home_crossings} limp-home crossing(s), {c.time_at_stops_s:.2f} s at the stops",
+        ]
+        if not math.isnan(self.peak_current_a):
+            lines.append(f"current up to {self.peak_current_a:.2f} A, {self.rms_current_a:.2f} A RMS")
+        lines += [f"  {text}" for text in self.findings]
+        if self.unanswered:
+            lines += ["a log of it would leave open:", *(f"  {text}" for text in self.unanswered)]
+        return "\n".join(lines)
+
+    def to_dict(self) -> dict[str, Any]:
+        """Give the figures and sentences as a dict, without the prediction.
+
+        Returns
+        -------
+        dict
+            Names to values; those of `content` stand beside the others.
+        """
+        own = {name: getattr(self, name) for name in ("passed", "peak_current_a", "rms_current_a")}
+        words = {name: [str(finding) for finding in getattr(self, name)] for name in ("findings", "unanswered")}
+        return own | {name: getattr(self.content, name) for name in RecordContent.__dataclass_fields__} | words
+
+
+def check_excitation(
+    excitation: xr.Dataset,
+    prior: Any,
+    *,
+    angle_window_deg: tuple[float, float] | None = None,
+    max_rate_deg_per_s: float | None = None,
+    max_current_a: float | None = None,
+    start_deg: float | None = None,
+) -> ExcitationCheck:
+    """Simulate an excitation on a prior model before it is sent.
+
+    Parameters
+    ----------
+    excitation : xarray.Dataset
+        ``duty`` over ``time_s``, as `chirp` and its sisters make it.
+    prior : Throttle, Model or callable
+        What is known of the throttle, for example a preset. A callable gets ``(time_s, duty, start_deg)`` and gives
+        the angle [deg], or a mapping with ``angle_deg`` and ``current_a``.
+    angle_window_deg : (float, float), optional
+        Where the plate may go [deg]; None keeps it 1 deg away from its stops.
+    max_rate_deg_per_s : float, optional
+        Highest speed [deg/s].
+    max_current_a : float, optional
+        Highest motor current [A].
+    start_deg : float, optional
+        Where the plate starts [deg]; None: at limp-home, without which in the middle of the window.
+
+    Returns
+    -------
+    ExcitationCheck
+        Figures, verdict, remedies, and what a log of it would leave open.
+
+    Raises
+    ------
+    ParameterError
+        A window that is upside down, a start outside it, a limit that is not positive, a current limit for a model
+        without current.
+    DataError
+        An excitation without ``duty`` over ``time_s``.
+
+    Examples
+    --------
+    >>> import numpy as np
+    >>> from mgdd.identify import check_excitation
+    >>> from mgdd.signals import triangle
+    >>> def lazy(time_s, duty, start_deg):
+    ...     return 30.0 + 100.0 * np.asarray(duty)
+    >>> check_excitation(triangle(offset=0.0, amplitude=0.2), lazy).passed
+    True
+    """
+    time, duty = _signal_of(excitation)
+    known = prior_of(prior)
+    window = known.window_deg if angle_window_deg is None else angle_window_deg
+    _check_limits(window, max_rate_deg_per_s, max_current_a)
+    start = start_deg
+    if start is None:
+        start = 0.5 * (window[0] + window[1]) if known.limp_home_deg is None else known.limp_home_deg
+    answer = known.simulate(time, duty, start)
+    angle, current = answer["angle_deg"], answer.get("current_a")
+    if max_current_a is not None and current is None:
+        raise ParameterError(f"max_current_a = {max_current_a:g}: the prior model has no current; leave the limit out")
+    content = record_content(time, angle, limp_home_deg=known.limp_home_deg, stops_deg=known.stops_deg)
+    peak = math.nan if current is None else float(np.abs(current).max())
+    findings = _violations(content, peak, window, max_rate_deg_per_s, max_current_a)
+    variables: dict[str, Any] = {"time_s": ("time_s", time), "duty": ("time_s", duty), "angle_deg": ("time_s", angle)}
+    if current is not None:
+        variables["current_a"] = ("time_s", current)
+    return ExcitationCheck(
+        passed=not findings,
+        findings=findings,
+        unanswered=open_questions(content, swing=known.swing),
+        content=content,
+        peak_current_a=peak,
+        rms_current_a=math.nan if current is None else float(np.sqrt(np.mean(current**2))),
+        prediction=labelled_dataset(variables, attrs=dict(excitation.attrs)),
+    )
+
+
+def _signal_of(excitation: xr.Dataset) -> tuple[np.ndarray, np.ndarray]:
+    from mgdd.errors import DataError
+
+    for name in ("time_s", "duty"):
+        if name not in excitation.variables or excitation[name].dims != ("time_s",):
+            raise DataError(f"excitation has no {name}(time_s): mgdd.signals.chirp and its sisters make one")
+    time, duty = (np.asarray(excitation[name].to_numpy(), dtype=np.float64) for name in ("time_s", "duty"))
+    even_step(time)
+    return time, duty
+
+
+def _check_limits(window: tuple[float, float], max_rate_deg_per_s: float | None, max_current_a: float | None) -> None:
+    low, high = window
+    if not low < high:
+        raise ParameterError(f"angle_window_deg = ({low:g}, {high:g}): the first must be below the second")
+    for name, value in (("max_rate_deg_per_s", max_rate_deg_per_s), ("max_current_a", max_current_a)):
+        if value is not None and not value > 0.0:
+            raise ParameterError(f"{name} = {value:g}: must be > 0")
+
+
+def _violations(
+    content: RecordContent,
+    peak_current_a: float,
+    window: tuple[float, float],
+    max_rate_deg_per_s: float | None,
+    max_current_a: float | None,
+) -> tuple[Finding, ...]:
+    out: list[Finding] = []
+
+    def add(name: str, text: str, remedy: str) -> None:
+        out.append(Finding("limit_exceeded", (name,), text, remedy))
+
+    if content.angle_high_deg > window[1]:
+        add(
+            "angle_window_deg",
+            f"the plate opens to {content.angle_high_deg:.1f} deg, beyond {window[1]:g}",
+            "lower offset or amplitude, or widen angle_window_deg if it may",
+        )
+    if content.angle_low_deg < window[0]:
+        add(
+            "angle_window_deg",
+            f"the plate closes to {content.angle_low_deg:.1f} deg, beyond {window[0]:g}",
+            "raise the offset or lower the amplitude, or widen angle_window_deg if it may",
+        )
+    if max_rate_deg_per_s is not None and content.peak_speed_deg_per_s > max_rate_deg_per_s:
+        add(
+            "max_rate_deg_per_s",
+            f"the plate moves at {content.peak_speed_deg_per_s:.0f} deg/s, above {max_rate_deg_per_s:g}",
+            "lower the amplitude",
+        )
+    if max_current_a is not None and peak_current_a > max_current_a:
+        text = f"the motor takes {peak_current_a:.2f} A, above {max_current_a:g}"
+        add("max_current_a", text, "lower the amplitude")
+    return tuple(out)

@@ -1,0 +1,114 @@
+"""The first-principle model of a throttle in the groups that duty and angle determine."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Mapping
+from dataclasses import dataclass, field
+from types import MappingProxyType
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from mgdd import _core
+from mgdd.errors import ParameterError
+from mgdd.io.parameters import FIT_NOTES, ParameterFile, Parameters, Wanted, entries, wanted
+from mgdd.results.describe import described
+from mgdd.signals.model import RunInputs, SampledModel
+
+if TYPE_CHECKING:
+    from numpy.typing import NDArray
+
+
+__all__ = ["FirstPrincipleModel"]
+
+_SETTINGS = ("closed_deg", "open_deg", "ramp_deg", "substeps")
+GROUP_NAMES = tuple(_core.throttle_group_names)
+# Groups of a typical passenger-car throttle, the start of a fit.
+TYPICAL = MappingProxyType(dict(zip(GROUP_NAMES, (0.03, 5e4, 0.1, 1e-3, 0.05, 0.1, 1e-3, 8.0, 0.0), strict=True)))
+
+
+@described
+@dataclass(frozen=True, kw_only=True)
+class FirstPrincipleModel(SampledModel, Parameters):
+    """Throttle in groups: set-valued friction, springs with preload on both sides, motor as a torque source.
+
+    Parameters
+    ----------
+    parameters : mapping of str to float, optional
+        ``tau_s``, ``gain_deg_per_s2_per_duty``, preload ``beta_above_duty`` / ``beta_below_duty``, stiffness
+        ``kappa_above_duty_per_deg`` / ``kappa_below_duty_per_deg``, friction ``delta_duty``, ``limp_home_deg`` and
+        ``electrical_s`` (L/R, 0 for none); those of a typical passenger-car throttle without.
+    closed_deg, open_deg : float
+        Mechanical stops [deg].
+    ramp_deg : float
+        Half width of the preload's ramp at limp-home [deg].
+    substeps : int
+        Steps per sample.
+
+    Examples
+    --------
+    >>> from mgdd.identify import FirstPrincipleModel
+    >>> run = FirstPrincipleModel().simulate({"time_s": [0.0, 0.001, 0.002], "duty": [0.0, 0.0, 0.0]})
+    >>> run["angle_deg"].values.tolist()
+    [8.0, 8.0, 8.0]
+    """
+
+    input_names = ("duty",)
+    output_name = observed_state = "angle_deg"
+    state_names = ("angle_deg", "speed_deg_per_s", "lagged_duty")
+
+    parameters: Mapping[str, float] = field(default_factory=lambda: dict(TYPICAL))
+    closed_deg: float = 0.0
+    open_deg: float = 90.0
+    ramp_deg: float = 0.25
+    substeps: int = 2
+
+    def __post_init__(self) -> None:
+        missing = set(GROUP_NAMES) - set(self.parameters)
+        if missing:
+            raise ParameterError(f"parameters: {', '.join(sorted(missing))} missing")
+        ordered = {name: float(self.parameters[name]) for name in GROUP_NAMES}
+        for name, value in ordered.items():
+            if not math.isfinite(value):
+                raise ParameterError(f"{name} = {value!r}: must be finite")
+            positive = name in ("tau_s", "gain_deg_per_s2_per_duty")
+            if name != "limp_home_deg" and not (value > 0.0 if positive else value >= 0.0):
+                raise ParameterError(f"{name} = {value!r}: must be {'>' if positive else '>='} 0")
+        if not self.closed_deg < self.open_deg:
+            raise ParameterError(f"open_deg = {self.open_deg!r}: must be above closed_deg = {self.closed_deg!r}")
+        object.__setattr__(self, "parameters", MappingProxyType(ordered))
+
+    @property
+    def kind(self) -> str:
+        """``first_principle``."""
+        return "first_principle"
+
+    def _rest(self) -> list[float]:
+        return [self.parameters["limp_home_deg"], 0.0, 0.0]
+
+    def _run(self, run: RunInputs) -> NDArray[np.float64]:
+        return _core.simulate_throttle_groups(
+            list(self.parameters.values()),
+            np.clip(run.columns[0], -1.0, 1.0),
+            step_s=run.step_s,
+            start=run.state,
+            closed_deg=self.closed_deg,
+            open_deg=self.open_deg,
+            ramp_deg=self.ramp_deg,
+            substeps=self.substeps,
+        )
+
+    def to_parameters(self) -> ParameterFile:
+        """Give groups and settings, as `to_toml` writes them."""
+        settings = {name: getattr(self, name) for name in _SETTINGS}
+        return ParameterFile(
+            kind=self.kind, tables={"parameters": entries(self.parameters), "settings": entries(settings)}
+        )
+
+    @classmethod
+    def from_parameters(cls, file: ParameterFile) -> FirstPrincipleModel:
+        """Make the model of a file that `to_toml` or a fit wrote."""
+        file.expect(kinds=("first_principle",), tables=("parameters", "settings", "fit?"), notes=FIT_NOTES)
+        settings = file.values("settings", {**wanted(_SETTINGS), "substeps": Wanted(form="integer")})
+        return cls(parameters=file.values("parameters", wanted(GROUP_NAMES)), **settings)

@@ -1,0 +1,74 @@
+"""The one measure of how well a throttle model meets a log: its free run, without the first 50 ms."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from typing import TYPE_CHECKING, Any, cast
+
+import numpy as np
+
+from mgdd.errors import DataError
+from mgdd.results import Fit, FitQuality, Model, labelled_dataset
+from mgdd.signals.even_grid import even_step
+from mgdd.signals.metrics import nrmse_fit_percent, rmse
+
+if TYPE_CHECKING:
+    import xarray as xr
+    from numpy.typing import NDArray
+
+__all__ = ["columns_of", "discarded", "draw_free_run", "free_run", "quality_of", "source_of"]
+
+# What the start of a free run still carries of the unknown speed and current.
+DISCARD_S = 0.05
+
+
+def columns_of(log: xr.Dataset) -> tuple[NDArray[np.float64], NDArray[np.float64], NDArray[np.float64]]:
+    """Return time [s], duty [-] and angle [deg] of a log."""
+    time, duty, angle = (np.asarray(log[n].to_numpy(), dtype=np.float64) for n in ("time_s", "duty", "angle_deg"))
+    return time, duty, angle
+
+
+def discarded(step_s: float, size: int) -> int:
+    """Return how many samples at the start a figure of merit leaves out: 50 ms, at most half of the record."""
+    return min(round(DISCARD_S / step_s), size // 2)
+
+
+def free_run(model: Model, log: xr.Dataset) -> xr.Dataset:
+    """Run a model free over a log from its first angle."""
+    time, duty, angle = columns_of(log)
+    run = model.simulate(log, initial_state={"angle_deg": float(angle[0])})["angle_deg"].to_numpy()
+    if run.shape != angle.shape or not np.isfinite(run).all():
+        raise DataError(f"the {model.kind} model runs away on {source_of(log)}: its fit has failed")
+    return labelled_dataset(
+        {
+            "time_s": ("time_s", time),
+            "duty": ("time_s", duty),
+            "angle_deg": ("time_s", angle),
+            "model_deg": ("time_s", run),
+            "residual_deg": ("time_s", run - angle, "deg", "model minus measured angle"),
+        },
+        attrs={"file": source_of(log), "kind": model.kind},
+    )
+
+
+def quality_of(runs: Sequence[xr.Dataset]) -> FitQuality:
+    """Compare free runs with their logs, all together, each without its first 50 ms."""
+    measured, modelled = [], []
+    for run in runs:
+        skip = discarded(even_step(run["time_s"]), run.sizes["time_s"])
+        measured.append(run["angle_deg"].to_numpy()[skip:])
+        modelled.append(run["model_deg"].to_numpy()[skip:])
+    y, yh = np.concatenate(measured), np.concatenate(modelled)
+    return FitQuality(nrmse_fit_percent=nrmse_fit_percent(y, yh), rmse=rmse(y, yh), unit="deg", n=y.size)
+
+
+def source_of(log: xr.Dataset) -> str:
+    """Return the name of a log."""
+    return str(log.attrs.get("file", "log"))
+
+
+def draw_free_run(fit: Fit, ax: Any) -> Any:
+    """Draw the free run of a throttle fit over its log."""
+    from mgdd import plot
+
+    return plot.free_run(cast("xr.Dataset", fit.run), ax=ax)

@@ -1,0 +1,142 @@
+"""Blocks of a throttle log, and the error of predictions that start anew at every sample."""
+
+from __future__ import annotations
+
+import itertools
+from collections.abc import Sequence
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from mgdd.errors import DataError, ParameterError
+from mgdd.identify.throttle.free_run import columns_of, discarded
+from mgdd.io import check_throttle_log
+from mgdd.results import Model, labelled_dataset
+from mgdd.signals.even_grid import even_step
+from mgdd.signals.metrics import rmse
+
+if TYPE_CHECKING:
+    import xarray as xr
+    from numpy.typing import ArrayLike
+
+__all__ = ["n_step_rms", "split_log"]
+
+HORIZONS_S = (0.005, 0.020, 0.050)
+_WHOLE = 1e-6
+
+
+def split_log(log: xr.Dataset, *, shares: Sequence[float] = (0.6, 0.2, 0.2)) -> tuple[xr.Dataset, ...]:
+    """Cut a log into blocks of time for training, validation and test; samples are never shuffled.
+
+    Parameters
+    ----------
+    log : xarray.Dataset
+        A throttle log.
+    shares : sequence of float
+        Shares of the blocks in order; together 1 [-].
+
+    Returns
+    -------
+    tuple of xarray.Dataset
+        The blocks; time keeps running.
+
+    Raises
+    ------
+    ParameterError
+        Shares that are not positive or do not add up to 1.
+    DataError
+        A block that is too short, and all of `mgdd.io.check_throttle_log`.
+
+    Examples
+    --------
+    >>> import numpy as np
+    >>> from mgdd.identify import split_log
+    >>> from mgdd.io import throttle_log
+    >>> time = np.arange(5000) * 1e-3
+    >>> log = throttle_log(time, 0.2 * np.sin(6.0 * time), 20.0 + 15.0 * np.sin(6.0 * time - 0.5))
+    >>> [part.sizes["time_s"] for part in split_log(log)]
+    [3000, 1000, 1000]
+    """
+    check_throttle_log(log)
+    if not len(shares) or min(shares) <= 0.0 or abs(sum(shares) - 1.0) > 1e-9:
+        raise ParameterError(f"shares = {tuple(shares)}: must be positive and add up to 1")
+    edges = np.rint(np.cumsum([0.0, *shares]) * log.sizes["time_s"]).astype(int).tolist()
+    blocks = tuple(log.isel(time_s=slice(a, b)) for a, b in itertools.pairwise(edges))
+    return tuple(check_throttle_log(block) for block in blocks)
+
+
+def n_step_rms(
+    model: Model,
+    log: xr.Dataset,
+    *,
+    horizons_s: Sequence[float] | None = None,
+    true_deg: ArrayLike | None = None,
+) -> xr.Dataset:
+    """Give the error of predictions that start anew from the measurement at every sample.
+
+    Parameters
+    ----------
+    model : Model
+        The model.
+    log : xarray.Dataset
+        A throttle log.
+    horizons_s : sequence of float
+        How far ahead [s]; whole numbers of samples. None: 5, 20 and 50 ms, each as the nearest whole sample.
+    true_deg : array_like, optional
+        True angle [deg] to compare with, where it is known; None compares with the measured one.
+
+    Returns
+    -------
+    xarray.Dataset
+        ``n_step_rms_deg`` [deg] over ``predictor`` (the model, and an angle that stays where it is) and ``horizon_s``.
+
+    Raises
+    ------
+    ParameterError
+        A horizon that is no whole number of samples, or longer than the log.
+
+    Examples
+    --------
+    >>> import numpy as np
+    >>> from mgdd.identify import FirstPrincipleModel, n_step_rms
+    >>> model, time = FirstPrincipleModel(), np.arange(2000) * 1e-3
+    >>> log = model.simulate({"time_s": time, "duty": 0.1 + 0.2 * np.sin(6.0 * time)})
+    >>> rms = n_step_rms(model, log)["n_step_rms_deg"]
+    >>> bool((rms[0] < 1e-9).all()), bool((rms[1] > 0.1).all())
+    (True, True)
+    """
+    time, _, angle = columns_of(log)
+    truth = angle if true_deg is None else np.asarray(true_deg, dtype=np.float64)
+    step = even_step(time)
+    horizons_s = whole_horizons(step, time.size) if horizons_s is None else horizons_s
+    skip = discarded(step, time.size)
+    table = np.empty((2, len(horizons_s)))
+    for at, horizon in enumerate(horizons_s):
+        n = samples_of(horizon, step, time.size)
+        ahead = model.predict(log, n)["angle_deg"].to_numpy()
+        if ahead.shape != (time.size - n,):
+            raise DataError(f"predict gave {ahead.shape} values {n} samples ahead: must be ({time.size - n},)")
+        target = truth[n:][skip:]
+        table[:, at] = rmse(target, ahead[skip:]), rmse(target, angle[: time.size - n][skip:])
+    return labelled_dataset(
+        {
+            "predictor": ("predictor", [str(model.kind), "persistence"], "-", "predictor"),
+            "horizon_s": ("horizon_s", np.asarray(horizons_s, dtype=np.float64), "s", "horizon"),
+            "n_step_rms_deg": (("predictor", "horizon_s"), table, "deg", "RMS error ahead"),
+        }
+    )
+
+
+def whole_horizons(step_s: float, size: int) -> tuple[float, ...]:
+    """5, 20 and 50 ms in whole samples, at least one; what a log samples too coarsely or is too short for falls out."""
+    samples = sorted({max(1, round(horizon / step_s)) for horizon in HORIZONS_S})
+    return tuple(n * step_s for n in samples if n <= max(1, size // 2))
+
+
+def samples_of(horizon_s: float, step_s: float, size: int) -> int:
+    n = round(horizon_s / step_s)
+    if n < 1 or abs(n * step_s - horizon_s) > _WHOLE * step_s * max(n, 1) + 1e-9:
+        raise ParameterError(f"horizons_s: {horizon_s:g} s is no whole number of samples of {step_s:g} s")
+    if n > size // 2:
+        raise ParameterError(f"horizons_s: {horizon_s:g} s is more than half of the log, {size * step_s:g} s")
+    return n

@@ -1,0 +1,228 @@
+"""Fit of the smooth throttle's ten parameters, from one or many starts at once."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, field, replace
+from types import MappingProxyType
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+
+from mgdd import _core
+from mgdd.errors import ParameterError, ShapeError, hand_over, or_partial
+from mgdd.io.parameters import FIT_NOTES, ParameterFile, Parameters, entries, wanted
+from mgdd.optimize.fit_options import FitOptions, fit_options
+from mgdd.optimize.fit_run import draw_run, fit_run, quality_of
+from mgdd.results import VARIABLES, Fit, FitReport
+from mgdd.results.describe import described
+from mgdd.signals.even_grid import even_step
+from mgdd.signals.model import RunInputs, SampledModel, columns_of
+
+if TYPE_CHECKING:
+    from numpy.typing import ArrayLike, NDArray
+
+__all__ = ["SmoothThrottle", "fit_smooth_throttle"]
+
+_EXAMPLE = MappingProxyType(dict(zip(_core.smooth_throttle_names, _core.smooth_throttle_example, strict=True)))
+_START_RAD = 0.14
+_CONSTANTS = ("inertia_kgm2", "gear_ratio", "inductance_h", "supply_v")
+
+
+@described
+@dataclass(frozen=True, kw_only=True)
+class SmoothThrottle(SampledModel, Parameters):
+    """The smooth throttle: tanh friction and preload, coil current, RK4 with one step per sample.
+
+    Parameters
+    ----------
+    parameters : mapping of str to float, optional
+        The ten of ``mgdd._core.smooth_throttle_names`` (SI, rad); an example throttle without.
+    inertia_kgm2, gear_ratio, inductance_h, supply_v : float
+        Known constants [kg m², -, H, V].
+
+    Raises
+    ------
+    ParameterError
+        A parameter that is missing or unknown.
+
+    Examples
+    --------
+    >>> import numpy as np
+    >>> from mgdd.identify import SmoothThrottle
+    >>> run = SmoothThrottle().simulate({"time_s": 1e-3 * np.arange(5), "duty": np.zeros(5)})
+    >>> run["angle_deg"].values.round(3).tolist()
+    [8.021, 8.021, 8.021, 8.021, 8.021]
+    """
+
+    input_names = ("duty",)
+    output_name = "angle_deg"
+    state_names = ("angle_rad", "speed_rad_per_s", "current_a")
+
+    parameters: Mapping[str, float] = field(default_factory=lambda: dict(_EXAMPLE))
+    inertia_kgm2: float = 2e-3
+    gear_ratio: float = 20.0
+    inductance_h: float = 1e-3
+    supply_v: float = 12.0
+
+    def __post_init__(self) -> None:
+        odd = set(self.parameters) ^ set(_EXAMPLE)
+        if odd:
+            raise ParameterError(
+                f"parameters: {', '.join(sorted(odd))} missing or unknown: must be {', '.join(_EXAMPLE)}"
+            )
+        ordered = {name: float(self.parameters[name]) for name in _EXAMPLE}
+        object.__setattr__(self, "parameters", MappingProxyType(ordered))
+        for name, value in {**ordered, **self.constants}.items():
+            if not (math.isfinite(value) and value > 0.0):
+                raise ParameterError(f"{name} = {value!r}: must be finite and > 0")
+
+    @property
+    def kind(self) -> str:
+        """``smooth``."""
+        return "smooth"
+
+    @property
+    def constants(self) -> dict[str, float]:
+        """The known constants by name."""
+        return {name: getattr(self, name) for name in _CONSTANTS}
+
+    def to_parameters(self) -> ParameterFile:
+        """Give parameters and constants, as `to_toml` writes them."""
+        return ParameterFile(
+            kind=self.kind, tables={"parameters": entries(self.parameters), "settings": entries(self.constants)}
+        )
+
+    @classmethod
+    def from_parameters(cls, file: ParameterFile) -> SmoothThrottle:
+        """Make the model of a file that `to_toml` or a fit wrote."""
+        file.expect(kinds=("smooth",), tables=("parameters", "settings", "fit?"), notes=FIT_NOTES)
+        return cls(
+            parameters=file.values("parameters", wanted(_EXAMPLE)), **file.values("settings", wanted(_CONSTANTS))
+        )
+
+    def _rest(self) -> list[float]:
+        return [_START_RAD, 0.0, 0.0]
+
+    def _run(self, run: RunInputs) -> NDArray[np.float64]:
+        values = list(self.parameters.values())
+        return _core.simulate_smooth_throttle(
+            values, run.columns[0], step_s=run.step_s, start=run.state, **self.constants
+        )
+
+
+def fit_smooth_throttle(
+    record: Any,
+    *,
+    start_values: ArrayLike,
+    lower: ArrayLike,
+    upper: ArrayLike,
+    initial_state: Mapping[str, float] | Sequence[float] | None = None,
+    model: SmoothThrottle | None = None,
+    options: FitOptions | None = None,
+    lanes: bool = True,
+) -> Fit:
+    """Fit the ten parameters of the smooth throttle to a record of duty and angle.
+
+    Levenberg-Marquardt on the output error of the free run with exact sensitivities, in four stages: a twentieth of
+    the record without and with the two smoothing widths, a quarter, then all of it with all ten parameters. Several
+    starts run side by side in SIMD lanes. A smoothing width that the record does not determine is named.
+
+    Parameters
+    ----------
+    record : xarray.Dataset, DataFrame or mapping of columns
+        ``duty`` [-] and ``angle_deg`` [deg] over an evenly spaced ``time_s`` [s].
+    start_values : array_like, shape (n_starts, 10) or (10,)
+        In the order of ``mgdd._core.smooth_throttle_names`` (SI, rad).
+    lower, upper : array_like, shape (10,)
+        Bounds, positive.
+    initial_state : mapping of str to float, or sequence of float, optional
+        Known ``angle_rad``, ``speed_rad_per_s`` and ``current_a`` at the first sample; that of `SmoothThrottle`
+        without.
+    model : SmoothThrottle, optional
+        Its constants are taken; those of an example throttle without.
+    options : FitOptions, optional
+        A tolerance of 1e-9 of the last stage where nothing else is said; the other options have no effect here and are
+        refused.
+    lanes : bool
+        Several starts at once; False takes one after the other and gives the same numbers.
+
+    Returns
+    -------
+    mgdd.results.Fit
+        The best start, and the reports of all (without their residual).
+
+    Raises
+    ------
+    ShapeError
+        Arrays that do not belong together.
+    ParameterError
+        A start outside its bounds, or a constant that is not positive.
+    DataError
+        A record that is not finite.
+
+    References
+    ----------
+    Nielsen (1999) for the damping; Moré (1978) for the scaling; Griewank and Walther (2008) for the sensitivities.
+
+    Examples
+    --------
+    >>> import numpy as np
+    >>> from mgdd import _core
+    >>> from mgdd.identify import SmoothThrottle, fit_smooth_throttle
+    >>> levels = 0.7 * np.random.default_rng(1).random(100) - 0.35
+    >>> time, truth = 1e-3 * np.arange(8000), np.array(_core.smooth_throttle_example)
+    >>> log = SmoothThrottle().simulate({"time_s": time, "duty": np.repeat(levels, 80)})
+    >>> log["angle_deg"] = log["angle_deg"] + np.random.default_rng(2).normal(0.0, 0.05, time.size)
+    >>> fit = fit_smooth_throttle(log, start_values=1.1 * truth, lower=0.1 * truth, upper=10 * truth)
+    >>> bool(fit.report.rmse < 0.051)
+    True
+    """
+    chosen = fit_options(options, tolerance=1e-9)
+    table = np.atleast_2d(np.asarray(start_values, dtype=np.float64))
+    if table.ndim != 2 or table.shape[1] != 10:
+        raise ShapeError(f"start_values has shape {table.shape}: must be (n_starts, 10)")
+    plant = model or SmoothThrottle()
+    time, duty, angle = columns_of(record, ("time_s", "duty", "angle_deg"))
+    state = plant.state_of(initial_state)
+    found, stop = or_partial(
+        lambda: _core.fit_smooth_throttle(
+            duty,
+            angle,
+            starts=table.tolist(),
+            lower=_ten(lower, "lower"),
+            upper=_ten(upper, "upper"),
+            step_s=even_step(time),
+            start=state,
+            **plant.constants,
+            cost_tolerance=chosen.tolerance,
+            lanes=lanes,
+        )
+    )
+    reports = tuple(FitReport.from_core(report) for report in found["reports"])
+    best = reports[found["best"]]
+    fitted = replace(plant, parameters=dict(zip(_EXAMPLE, best.values.tolist(), strict=True)))
+    modelled = fitted.simulate(record, initial_state=state)["angle_deg"].to_numpy()
+    run = fit_run(time, angle, modelled, VARIABLES["angle_deg"]) if np.isfinite(modelled).all() else None
+    fit = Fit(
+        report=best,
+        model=fitted,
+        kind=fitted.kind,
+        train=None if run is None else quality_of(run),
+        findings=best.findings,
+        unidentifiable=best.unidentifiable,
+        start_rmse=tuple(sorted(report.rmse for report in reports)),
+        n_best=int(found["n_reached"]),
+        start_reports=reports,
+        run=run,
+        draw=draw_run,
+    )
+    return hand_over(fit, stop)
+
+
+def _ten(values: ArrayLike, name: str) -> list[float]:
+    vector = np.asarray(values, dtype=np.float64)
+    if vector.shape != (10,):
+        raise ShapeError(f"{name} has shape {vector.shape}: must be (10,)")
+    return [float(value) for value in vector]

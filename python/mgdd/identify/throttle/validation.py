@@ -1,0 +1,233 @@
+"""How far a throttle model can be trusted: free run, n steps ahead, what is left, and what the log cannot tell."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Sequence
+from dataclasses import dataclass, field
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+
+from mgdd.identify.throttle.free_run import columns_of, discarded, free_run, quality_of, source_of
+from mgdd.identify.throttle.n_step import n_step_rms, samples_of, whole_horizons
+from mgdd.identify.throttle.prior import prior_of
+from mgdd.identify.throttle.record_content import open_questions, record_content
+from mgdd.io import check_throttle_log
+from mgdd.results import Finding, Fit, FitQuality, FitReport, Model
+from mgdd.results.describe import described
+from mgdd.signals.even_grid import even_step
+from mgdd.signals.metrics import ResidualTests, residual_tests, vaf_percent
+
+if TYPE_CHECKING:
+    import xarray as xr
+
+__all__ = ["ThrottleValidation", "entangled", "validate_throttle"]
+
+_CORRELATED = 0.98
+_GOOD_PERCENT = 85.0
+
+
+@described
+@dataclass(frozen=True, kw_only=True)
+class ThrottleValidation:
+    """A model against a log.
+
+    Parameters
+    ----------
+    kind : str
+        Kind of the model.
+    quality : FitQuality
+        Of the free run, without its first 50 ms.
+    vaf_percent : float
+        Variance accounted for by the same run [%].
+    n_step : xarray.Dataset
+        ``n_step_rms_deg`` [deg] of the model and of "stays where it is" over ``horizon_s`` [s].
+    tests : ResidualTests
+        On the one-step residuals.
+    free_run : xarray.Dataset
+        ``duty``, ``angle_deg``, ``model_deg`` and ``residual_deg`` over ``time_s``.
+    findings : tuple of Finding
+        What to distrust, what the log cannot tell, and which excitation would.
+    source : str
+        Name of the log.
+
+    Examples
+    --------
+    >>> from mgdd.identify.throttle.validation import ThrottleValidation
+    >>> "quality" in ThrottleValidation.__dataclass_fields__
+    True
+    """
+
+    kind: str
+    quality: FitQuality
+    vaf_percent: float
+    n_step: xr.Dataset = field(repr=False)
+    tests: ResidualTests = field(repr=False)
+    free_run: xr.Dataset = field(repr=False)
+    findings: tuple[Finding, ...] = ()
+    source: str = "log"
+
+    def summary(self) -> str:
+        """Return a short summary.
+
+        Returns
+        -------
+        str
+            Free run, n steps ahead, residual tests, findings.
+        """
+        figures = f"free-run fit {self.quality.nrmse_fit_percent:.2f} %, VAF {self.vaf_percent:.2f} %"
+        rows = [
+            f"{self.kind} on {self.source}: {figures}",
+            f"free-run error {self.quality.rmse:.4g} deg RMS, {self.quality.rmse**2:.4g} deg² mean square",
+        ]
+        for horizon, pair in zip(self.n_step["horizon_s"].to_numpy(), self._growth(), strict=True):
+            rows.append(f"{1e3 * horizon:4.0f} ms ahead {pair[0]:.4g} deg RMS (staying there: {pair[1]:.4g})")
+        words = {True: "yes", False: "no"}
+        rows.append(
+            f"one-step residual white: {words[self.tests.white]} ({100 * self.tests.share_white:.0f} % of lags), "
+            f"independent of the duty: {words[self.tests.independent]} ({100 * self.tests.share_independent:.0f} %)"
+        )
+        return "\n".join([*rows, *(f"  {finding}" for finding in self.findings)])
+
+    def to_dict(self) -> dict[str, Any]:
+        """Give figures and sentences as a dict, without the runs.
+
+        Returns
+        -------
+        dict
+            With ``n_step_rms`` by horizon in milliseconds.
+        """
+        figures = {
+            "kind": self.kind,
+            "source": self.source,
+            "fit_percent": self.quality.nrmse_fit_percent,
+            "vaf_percent": self.vaf_percent,
+            "rmse_deg": self.quality.rmse,
+            "mse_deg2": self.quality.rmse**2,
+        }
+        horizons = [f"{1e3 * h:g}" for h in self.n_step["horizon_s"].to_numpy()]
+        growth = self._growth()
+        return figures | {
+            "n_step_rms": {h: pair[0] for h, pair in zip(horizons, growth, strict=True)},
+            "n_step_rms_persistence": {h: pair[1] for h, pair in zip(horizons, growth, strict=True)},
+            "residual_white": self.tests.white,
+            "residual_independent": self.tests.independent,
+            "share_white": self.tests.share_white,
+            "share_independent": self.tests.share_independent,
+            "findings": [str(finding) for finding in self.findings],
+        }
+
+    def _growth(self) -> list[list[float]]:
+        values: list[list[float]] = (
+            self.n_step["n_step_rms_deg"].transpose("horizon_s", "predictor").to_numpy().tolist()
+        )
+        return values
+
+
+def validate_throttle(
+    model: Model | Fit,
+    log: xr.Dataset,
+    *,
+    horizons_s: Sequence[float] | None = None,
+    limp_home_deg: float | None = None,
+) -> ThrottleValidation:
+    """Validate a model, or a fit, on a log, best on one that it was not fitted to.
+
+    Parameters
+    ----------
+    model : Model or Fit
+        The model; a fit also says which of its parameters are entangled.
+    log : xarray.Dataset
+        The log.
+    horizons_s : sequence of float
+        How far ahead predictions are tested [s]. None: 5, 20 and 50 ms, each as the nearest whole sample.
+    limp_home_deg : float, optional
+        Limp-home angle [deg]; None takes the model's.
+
+    Returns
+    -------
+    ThrottleValidation
+        Free run, n steps ahead, residual tests, findings.
+
+    Raises
+    ------
+    DataError
+        All of `mgdd.io.check_throttle_log`; a model that runs away.
+    ParameterError
+        A horizon that is no whole number of samples.
+
+    Examples
+    --------
+    >>> import numpy as np
+    >>> from mgdd.identify import FirstPrincipleModel, validate_throttle
+    >>> model, time = FirstPrincipleModel(), np.arange(2000) * 1e-3
+    >>> log = model.simulate({"time_s": time, "duty": 0.2 * np.sin(6.0 * time)})
+    >>> validate_throttle(model, log).quality.nrmse_fit_percent
+    100.0
+    """
+    check_throttle_log(log)
+    fit = model if isinstance(model, Fit) else None
+    own = model.model if isinstance(model, Fit) else model
+    time, duty, angle = columns_of(log)
+    step = even_step(time)
+    horizons_s = whole_horizons(step, time.size) if horizons_s is None else horizons_s
+    for horizon in horizons_s:
+        samples_of(horizon, step, time.size)
+    run = free_run(own, log)
+    skip = discarded(step, time.size)
+    measured, modelled = angle[skip:], run["model_deg"].to_numpy()[skip:]
+    one = angle[1:] - own.predict(log, 1)["angle_deg"].to_numpy()
+    tests = residual_tests(one[skip:], duty[:-1][skip:])
+    known = prior_of(own)
+    limp_home = known.limp_home_deg if limp_home_deg is None else limp_home_deg
+    content = record_content(time, angle, limp_home_deg=limp_home, stops_deg=known.stops_deg)
+    quality = quality_of([run])
+    notes = _notes(quality, tests)
+    pairs = entangled(fit.report) if fit is not None else ()
+    return ThrottleValidation(
+        kind=own.kind,
+        quality=quality,
+        vaf_percent=vaf_percent(measured, modelled),
+        n_step=n_step_rms(own, log, horizons_s=horizons_s),
+        tests=tests,
+        free_run=run,
+        findings=(*notes, *open_questions(content, swing=known.swing, pairs=pairs)),
+        source=source_of(log),
+    )
+
+
+def entangled(report: FitReport) -> tuple[tuple[str, str, float], ...]:
+    """Return the pairs whose correlation exceeds 0.98."""
+    c = np.asarray(report.correlation)
+    return tuple(
+        (report.names[i], report.names[j], float(c[i, j]))
+        for i in range(len(report.names))
+        for j in range(i + 1, len(report.names))
+        if math.isfinite(c[i, j]) and abs(c[i, j]) > _CORRELATED
+    )
+
+
+def _notes(quality: FitQuality, tests: ResidualTests) -> list[Finding]:
+    out = []
+    fitted = math.nan if quality.nrmse_fit_percent is None else quality.nrmse_fit_percent
+    if fitted < _GOOD_PERCENT:
+        out.append(
+            Finding(
+                "poor_free_run",
+                (),
+                f"the free run reaches {fitted:.1f} %, below the {_GOOD_PERCENT:g} % that a throttle model should",
+                "look at the overlay for a wrong sign, delay or side, or take a model with friction (pw_r, "
+                "first_principle)",
+            )
+        )
+    if not tests.white:
+        out.append(
+            Finding(
+                "residual_not_white",
+                (),
+                "the one-step residual has memory: usual near stiction, where it is no reason to reject; standard "
+                "errors, which take it as white, are too small",
+            )
+        )
+    return out

@@ -1,0 +1,125 @@
+"""What to look for in a closed loop."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Mapping
+from dataclasses import dataclass, field
+
+from mgdd.errors import ParameterError
+
+__all__ = ["LoopCriteria"]
+
+_LONGEST_SETTLING = 1000  # cycles that do not count for the limits unless the caller says so; as in the core
+
+
+@dataclass(frozen=True, kw_only=True)
+class LoopCriteria:
+    """What a loop is judged by: where its estimate should go, and which limits count from when.
+
+    Parameters
+    ----------
+    optimum : float, optional
+        Where the estimate should go [unit of the input]; without it arrival and distance are not judged.
+    arrival : float
+        Distance to the optimum that counts as arrived [unit of the input].
+    tail_cycles : int
+        Cycles behind ``final_cad``.
+    exceed_from : int, optional
+        First cycle that counts for ``exceeded_fraction``; by default 1000, or the middle of a run of fewer than 2000
+        cycles.
+    exceed_above : mapping of str to float
+        Per limit, the value above which a cycle counts.
+
+    Raises
+    ------
+    mgdd.errors.ParameterError
+        A criterion outside its domain.
+
+    Examples
+    --------
+    >>> from mgdd.loop import EngineBench, LoopCriteria, run_seeker
+    >>> from mgdd.optimize import GoldenSection
+    >>> seeker = GoldenSection(start=-20.0, lower=-30.0, upper=10.0, noise_sd=0.25)
+    >>> run = run_seeker(EngineBench(seed=1), seeker, 300, criteria=LoopCriteria(optimum=-5.63))
+    >>> run.summary["cycles_to"] < 100
+    True
+    """
+
+    optimum: float | None = None
+    arrival: float = 1.0
+    tail_cycles: int = 100
+    exceed_from: int | None = None
+    exceed_above: Mapping[str, float] = field(default_factory=dict)
+
+    def __post_init__(self) -> None:
+        if self.optimum is not None and not math.isfinite(self.optimum):
+            raise ParameterError(f"optimum = {self.optimum:g}: must be finite, or None")
+        if not self.arrival > 0.0:
+            raise ParameterError(f"arrival = {self.arrival:g}: must be > 0")
+        if self.tail_cycles < 1:
+            raise ParameterError(f"tail_cycles = {self.tail_cycles}: must be >= 1")
+        if self.exceed_from is not None and self.exceed_from < 0:
+            raise ParameterError(f"exceed_from = {self.exceed_from}: must be >= 0")
+        for name, value in self.exceed_above.items():
+            if math.isnan(value):
+                raise ParameterError(f"exceed_above: {name} = nan: give a number, or leave it out")
+
+    def counted_from(self, cycles: int) -> int:
+        """Give the first cycle that counts for ``exceeded_fraction``.
+
+        Parameters
+        ----------
+        cycles : int
+            Length of the run.
+
+        Returns
+        -------
+        int
+            ``exceed_from`` or its default for that length.
+
+        Examples
+        --------
+        >>> from mgdd.loop import LoopCriteria
+        >>> [LoopCriteria().counted_from(cycles) for cycles in (300, 5000)]
+        [150, 1000]
+        """
+        return min(_LONGEST_SETTLING, cycles // 2) if self.exceed_from is None else self.exceed_from
+
+    def require_counted(self, cycles: int) -> None:
+        """Raise where no cycle of a run would count for ``exceeded_fraction``.
+
+        Parameters
+        ----------
+        cycles : int
+            Length of the run.
+
+        Raises
+        ------
+        mgdd.errors.ParameterError
+            ``exceed_from`` is not below ``cycles``.
+        """
+        if self.exceed_above and self.exceed_from is not None and self.exceed_from >= cycles:
+            raise ParameterError(f"exceed_from = {self.exceed_from}: must be < cycles = {cycles}, or no cycle counts")
+
+    def thresholds(self, names: tuple[str, ...]) -> list[float]:
+        """Give ``exceed_above`` in the order of the limits, infinite where it has none; empty if it is empty.
+
+        Parameters
+        ----------
+        names : tuple of str
+            Limits of the plant or of the seeker.
+
+        Returns
+        -------
+        list of float
+            One per name.
+
+        Raises
+        ------
+        mgdd.errors.ParameterError
+            ``exceed_above`` names another limit.
+        """
+        if unknown := sorted(set(self.exceed_above) - set(names)):
+            raise ParameterError(f"exceed_above: {unknown} not among the limits, {list(names)}")
+        return [float(self.exceed_above.get(name, math.inf)) for name in names] if self.exceed_above else []

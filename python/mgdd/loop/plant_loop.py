@@ -1,0 +1,185 @@
+"""A seeker on any plant, one ask, one cycle and one tell at a time."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Mapping
+from dataclasses import dataclass
+from typing import TYPE_CHECKING, Any, NamedTuple
+
+import numpy as np
+
+from mgdd.errors import Interrupted, ParameterError
+from mgdd.loop.bench import FLAGS
+from mgdd.loop.criteria import LoopCriteria
+from mgdd.loop.plant import AnnouncingPlant, Measurement, Plant
+from mgdd.loop.summary import summarize_cycles
+from mgdd.results import VARIABLES, labelled_dataset
+from mgdd.results.describe import described
+
+if TYPE_CHECKING:
+    import xarray as xr
+    from numpy.typing import NDArray
+
+__all__ = ["LoopRun", "steer"]
+
+_CHANGED = "operating_point_changed"
+_UNKNOWN = "not given by the plant"
+_OWN = ("estimate_cad", "soc_requested_cad", "j", "misfire")  # columns that the loop itself knows
+
+
+class _Row(NamedTuple):
+    """One measured cycle."""
+
+    estimate: NDArray[np.float64]
+    applied: NDArray[np.float64]
+    void: bool
+    measured: Measurement
+
+
+@described
+@dataclass(frozen=True, kw_only=True)
+class LoopRun:
+    """A closed loop, cycle by cycle, and what it came to.
+
+    Parameters
+    ----------
+    dataset : xarray.Dataset
+        Over ``cycle``: ``estimate_cad`` before the cycle and everything that the plant measured of it. A plant whose
+        one input is not ``soc_cad`` has ``estimate`` and ``applied`` over ``cycle`` and ``input`` instead.
+    summary : mapping of str to float
+        ``final_cad`` (mean estimate of the last 100 cycles), ``mean_cad`` and ``rms_cad`` (second half), ``cycles_to``
+        and ``cycles_stays`` (NaN: never), ``exceeded_fraction``, means of J, efficiency and true NOx over the second
+        half, extremes of the estimate, misfires. Of several inputs, or one that is not an angle, only what does not
+        need the estimate.
+    interrupted : bool
+        Ctrl-C ended the run before all its cycles: it is the part that `mgdd.errors.Interrupted` carried.
+
+    Examples
+    --------
+    >>> from mgdd.loop import EngineBench, run_seeker
+    >>> from mgdd.optimize import ExtremumSeeking
+    >>> run = run_seeker(EngineBench(seed=1), ExtremumSeeking(start=-20.0, lower=-30.0, upper=10.0), 600)
+    >>> abs(run.summary["final_cad"] + 5.63) < 2.0
+    True
+    """
+
+    dataset: xr.Dataset
+    summary: Mapping[str, float]
+    interrupted: bool = False
+
+
+def steer(plant: Plant, seeker: Any, cycles: int, criteria: LoopCriteria) -> LoopRun:
+    """Run the loop of `mgdd.loop.run_seeker` from Python."""
+    if cycles < 1:
+        raise ParameterError(f"cycles = {cycles}: must be >= 1")
+    if not isinstance(plant, Plant):
+        raise ParameterError(f"plant = {plant!r}: must have input_names, limit_names, apply() and measure()")
+    if seeker.estimate.size != len(plant.input_names):
+        raise ParameterError(
+            f"start has {seeker.estimate.size} entries: the plant takes {len(plant.input_names)}, "
+            f"{', '.join(plant.input_names)}"
+        )
+    names = tuple(seeker.limit_names)
+    if not set(names) <= set(plant.limit_names):
+        raise ParameterError(
+            f"limits of the seeker {list(names)} are not all measured by the plant, which has {list(plant.limit_names)}"
+        )
+    criteria.thresholds(names)
+    criteria.require_counted(cycles)
+    announcing = plant if isinstance(plant, AnnouncingPlant) else None
+    first, log, interrupted = seeker.cycle, list[_Row](), False
+    try:
+        for _ in range(cycles):
+            _one_cycle(plant, announcing, seeker, log)
+    except KeyboardInterrupt:
+        interrupted = True
+        del log[seeker.cycle - first :]  # a cycle that was measured and not told: it is asked again
+    dataset = _dataset(log, first, plant.input_names)
+    dataset.attrs["interrupted"] = int(interrupted)
+    run = LoopRun(dataset=dataset, summary=summarize_cycles(dataset, criteria), interrupted=interrupted)
+    if interrupted:
+        raise Interrupted(f"interrupted after {len(log)} of {cycles} cycles, which are in .partial", run)
+    return run
+
+
+def _one_cycle(plant: Plant, announcing: AnnouncingPlant | None, seeker: Any, log: list[_Row]) -> None:
+    if announcing is not None and announcing.operating_point_changes:
+        seeker.restart()
+    estimate = np.array(seeker.estimate, np.float64)
+    asked = np.array(seeker.ask(), np.float64)
+    plant.apply(dict(zip(plant.input_names, asked.tolist(), strict=True)))
+    measured = plant.measure()
+    _require_match(seeker, measured)
+    late = announcing is None and bool(measured.values.get(_CHANGED, 0.0))
+    void = measured.misfire or bool(measured.values.get("unphysical", 0.0)) or late
+    summed = seeker.component_count == 1
+    told = measured.performance if summed else np.array(measured.components)
+    limits = [measured.limits[name] for name in seeker.limit_names]
+    log.append(_Row(estimate, asked, void, measured))
+    seeker.tell(told, limits if limits else None, misfire=void)
+    if late:
+        seeker.restart()
+
+
+def _require_match(seeker: Any, measured: Measurement) -> None:
+    if seeker.component_count not in (1, len(measured.components)):
+        raise ParameterError(
+            f"components has {seeker.component_count} entries: the plant measures {len(measured.components)}; give as "
+            "many, or one for their sum"
+        )
+    for name in seeker.limit_names:
+        if name not in measured.limits:
+            have = ", ".join(measured.limits) or "no limited quantity"
+            raise ParameterError(f"limits: {name!r} is not measured by the plant: it measures {have}")
+
+
+def _steered(log: list[_Row], inputs: tuple[str, ...]) -> dict[str, tuple[Any, ...]]:
+    """Label what the seeker thought and asked for."""
+    estimate = np.array([row.estimate for row in log], np.float64).reshape(-1, len(inputs))
+    applied = np.array([row.applied for row in log], np.float64).reshape(-1, len(inputs))
+    if inputs == ("soc_cad",):
+        return {"estimate_cad": ("cycle", estimate[:, 0]), "soc_requested_cad": ("cycle", applied[:, 0])}
+    over, unit = ("cycle", "input"), "unit of the input"
+    return {
+        "input": ("input", list(inputs), "-", "input of the plant"),
+        "estimate": (over, estimate, unit, "estimate of the best input"),
+        "applied": (over, applied, unit, "input that was asked for"),
+    }
+
+
+def _dataset(log: list[_Row], first: int, inputs: tuple[str, ...]) -> xr.Dataset:
+    """Label what was measured; a value that is missing in some cycles is NaN there."""
+    rows = [row.measured for row in log]
+    names = dict.fromkeys(name for row in rows for name in row.values)
+    columns = {name: np.array([row.values.get(name, math.nan) for row in rows]) for name in names}
+    count = columns.pop("cycle", None)
+    cycle = np.arange(first, first + len(rows)) if count is None or not np.isfinite(count).all() else count
+    variables: dict[str, tuple[Any, ...]] = {
+        "cycle": ("cycle", cycle.astype(np.int64)),
+        **_steered(log, inputs),
+        "j": ("cycle", np.array([row.performance for row in rows], np.float64)),
+        "misfire": ("cycle", np.array([row.misfire for row in rows], np.bool_), "-", FLAGS["misfire"]),
+        "void": ("cycle", np.array([row.void for row in log], np.bool_), "-", "cycle that the seeker did not use"),
+    }
+    for name, values in columns.items():
+        if name in FLAGS and name not in _OWN:
+            variables[name] = ("cycle", values == 1.0, "-", FLAGS[name])
+        elif name not in _OWN:
+            variables[name] = ("cycle", values, *(() if name in VARIABLES else (_UNKNOWN, name)))
+    width = max((len(row.components) for row in rows), default=1)
+    components = np.full((len(rows), width), math.nan)
+    for at, row in enumerate(rows):
+        components[at, : len(row.components)] = row.components
+    variables["component"] = ("component", np.arange(width), "-", "term of the performance")
+    variables["components"] = (("cycle", "component"), components, "unit of J", "component of the performance")
+    limits = list(dict.fromkeys(name for row in rows for name in row.limits))
+    if limits:
+        table = np.array([[row.limits.get(name, math.nan) for name in limits] for row in rows])
+        units = [VARIABLES[name].units if name in VARIABLES else _UNKNOWN for name in limits]
+        own = "unit of the limit"
+        variables["limit"] = ("limit", limits, "-", "limited quantity")
+        variables["limit_units"] = ("limit", units, "-", own)
+        variables["limits"] = (("cycle", "limit"), table, own, "measured value of a limited quantity")
+    out = labelled_dataset(variables)
+    return out.set_coords("limit_units") if limits else out

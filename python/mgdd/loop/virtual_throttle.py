@@ -1,0 +1,143 @@
+"""A throttle with its sensors as a plant of the loop: duty in, measured angle out, one sample at a time."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+
+from mgdd import _core
+from mgdd.errors import ParameterError, RigError
+from mgdd.loop.plant import Measurement, checked_inputs
+from mgdd.throttle import SensorFault, SensorPair, Throttle
+from mgdd.throttle.sensors import fault_pair
+
+__all__ = ["VirtualThrottle"]
+
+_INPUTS = ("duty", "supply_v", "airflow_torque_nm")
+
+
+class VirtualThrottle:
+    """An electronic throttle sample by sample, with both position sensors, their noise and their faults.
+
+    Parameters
+    ----------
+    throttle : Throttle, optional
+        Its parameters; the preset ``P1`` if left out.
+    inputs : sequence of str
+        Which of ``duty`` [-], ``supply_v`` [V] and ``airflow_torque_nm`` [N m] are applied; the others stay at 0 and
+        at the supply of the throttle.
+    sensors : SensorPair, optional
+        As in `mgdd.throttle.sense`.
+    faults : sequence of SensorFault
+        At most one per sensor.
+    start_deg : float, optional
+        Angle at the start, at rest [deg]; limp-home if left out.
+    sample_s, step_s : float
+        Time between samples, and the integration step that goes into it a whole number of times [s].
+    bridge : {"brake", "open"}
+        What the bridge does at zero duty.
+    seed : int
+        Of the sensors' noise, in [0, 2**64).
+
+    Raises
+    ------
+    mgdd.errors.ParameterError
+        A setting outside its domain.
+
+    Examples
+    --------
+    >>> from mgdd.loop import VirtualThrottle
+    >>> plant = VirtualThrottle(seed=1)
+    >>> for _ in range(60):
+    ...     plant.apply({"duty": 0.6})
+    ...     measured = plant.measure()
+    >>> round(measured.values["angle_deg"], 2), abs(measured.values["sensed_angle_deg"] - 33.6) < 0.5
+    (33.6, True)
+    """
+
+    def __init__(
+        self,
+        throttle: Throttle | None = None,
+        *,
+        inputs: Sequence[str] = ("duty",),
+        sensors: SensorPair | None = None,
+        faults: Sequence[SensorFault] = (),
+        start_deg: float | None = None,
+        sample_s: float = 1e-3,
+        step_s: float = 1e-4,
+        bridge: str = "brake",
+        seed: int = 0,
+    ) -> None:
+        if not inputs or len(set(inputs)) < len(inputs) or not set(inputs) <= set(_INPUTS):
+            raise ParameterError(f"inputs = {list(inputs)}: must be some of {', '.join(_INPUTS)}, once each")
+        if not 0 <= seed < 2**64:
+            raise ParameterError(f"seed = {seed}: must be in [0, 2**64)")
+        self.throttle = Throttle() if throttle is None else throttle
+        self.sample_s = sample_s
+        self._inputs = tuple(inputs)
+        self._still = {"duty": 0.0, "supply_v": self.throttle.supply_v, "airflow_torque_nm": 0.0}
+        self._applied: dict[str, float] | None = None
+        self._core = _core.VirtualThrottle(
+            throttle=self.throttle,
+            sensors=sensors or SensorPair(),
+            faults=fault_pair(faults),
+            sample_s=sample_s,
+            step_s=step_s,
+            start_deg=self.throttle.limp_home_deg if start_deg is None else float(start_deg),
+            bridge=bridge,
+            seed=seed,
+        )
+
+    @property
+    def input_names(self) -> tuple[str, ...]:
+        """Names of the applied inputs."""
+        return self._inputs
+
+    @property
+    def limit_names(self) -> tuple[str, ...]:
+        """No limited quantities."""
+        return ()
+
+    @property
+    def state(self) -> dict[str, list[float]]:
+        """What a run needs to go on bit for bit, as lists of numbers; setting it restores the run."""
+        columns: dict[str, list[float]] = self._core.state
+        return columns
+
+    @state.setter
+    def state(self, saved: Mapping[str, Sequence[float]]) -> None:
+        self._core.state = {name: list(values) for name, values in saved.items()}
+
+    def apply(self, inputs: Mapping[str, float]) -> None:
+        """Set the inputs of the next sample.
+
+        Parameters
+        ----------
+        inputs : mapping of str to float
+            One number per name of `input_names`; a duty is clipped to -1..1.
+
+        Raises
+        ------
+        mgdd.errors.ParameterError
+            A missing, unknown or non-finite input.
+        """
+        values = checked_inputs(inputs, self._inputs)
+        self._applied = {**self._still, **dict(zip(self._inputs, values, strict=True))}
+
+    def measure(self) -> Measurement:
+        """Run one sample under the inputs applied last, and read the sensors at its end.
+
+        Returns
+        -------
+        Measurement
+            ``values``: ``time_s``, ``sensed_angle_deg``, ``first_v``, ``second_v``, ``fault`` as 0 or 1, and the truth
+            ``angle_deg``, ``speed_deg_per_s`` and ``current_a``.
+
+        Raises
+        ------
+        mgdd.errors.RigError
+            Nothing was applied yet.
+        """
+        if self._applied is None:
+            raise RigError("measure() before apply(): apply a duty first")
+        reading = self._core.step(**self._applied)
+        return Measurement(values={name: float(value) for name, value in reading.items()})

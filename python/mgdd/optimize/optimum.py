@@ -1,0 +1,136 @@
+"""The one result of a search for a best point: where it is, what holds it, and how flat it is."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, field
+from types import MappingProxyType
+from typing import Any
+
+from mgdd._core import Limit
+from mgdd.errors import ParameterError
+from mgdd.results.describe import as_html, rows_of
+from mgdd.results.labels import to_jsonable
+
+__all__ = ["Optimum", "limits_of"]
+
+
+@dataclass(frozen=True, kw_only=True, repr=False)
+class Optimum:
+    """A best point of a model, a surrogate or a bench.
+
+    Every number is read by its name, inputs first: ``best["soc_cad"]``, ``best["ca50_cad"]``.
+
+    Parameters
+    ----------
+    inputs : mapping of str to float
+        The best point, in the units of the names.
+    objective : str
+        What was maximised.
+    value : float
+        The objective there.
+    values : mapping of str to float
+        Other quantities there, in the units of the names.
+    limits : tuple of Limit
+        Limits that were kept.
+    active_limits : tuple of str
+        Those that hold the optimum back.
+    at_bound : bool
+        Whether it lies on the edge of the searched range.
+    bounds : mapping of str to (float, float)
+        Searched range of each input.
+    curvature : float
+        Second difference of the objective around the optimum [per squared unit of the input]; NaN where a neighbour
+        leaves the range.
+    free_inputs : mapping of str to float
+        The best point without limits, where it was sought.
+
+    Examples
+    --------
+    >>> from mgdd.optimize import Limit, Optimum
+    >>> best = Optimum(inputs={"soc_cad": -3.1}, objective="efficiency_gross", value=0.56,
+    ...                limits=(Limit("p_max_bar", 95.0),), active_limits=("p_max_bar",))
+    >>> best["soc_cad"]
+    -3.1
+    >>> best
+    <Optimum efficiency_gross 0.56 at soc_cad -3.1, held by p_max_bar>
+    """
+
+    inputs: Mapping[str, float]
+    objective: str
+    value: float
+    values: Mapping[str, float] = field(default_factory=dict)
+    limits: tuple[Limit, ...] = ()
+    active_limits: tuple[str, ...] = ()
+    at_bound: bool = False
+    bounds: Mapping[str, tuple[float, float]] = field(default_factory=dict)
+    curvature: float = math.nan
+    free_inputs: Mapping[str, float] = field(default_factory=dict)
+
+    def __post_init__(self) -> None:
+        for name in ("inputs", "values", "bounds", "free_inputs"):
+            object.__setattr__(self, name, MappingProxyType(dict(getattr(self, name))))
+
+    def __getitem__(self, name: str) -> float:
+        for numbers in (self.inputs, self.values):
+            if name in numbers:
+                return numbers[name]
+        raise KeyError(f"{name!r}: this optimum has {', '.join([*self.inputs, *self.values])}")
+
+    def _repr_html_(self) -> str:
+        return as_html("Optimum", rows_of({name: getattr(self, name) for name in self.__dataclass_fields__}))
+
+    def __repr__(self) -> str:
+        at = ", ".join(f"{name} {value:.4g}" for name, value in self.inputs.items())
+        held = f", held by {', '.join(self.active_limits)}" if self.active_limits else ""
+        edge = ", at the edge of the range" if self.at_bound else ""
+        return f"<Optimum {self.objective} {self.value:.4g} at {at}{held}{edge}>"
+
+    def to_dict(self) -> dict[str, Any]:
+        """Give everything as plain Python values.
+
+        Returns
+        -------
+        dict
+            Fields by name; ``limits`` as name to upper value.
+        """
+        out = {name: getattr(self, name) for name in self.__dataclass_fields__}
+        out["limits"] = {limit.name: limit.upper for limit in self.limits}
+        plain: dict[str, Any] = to_jsonable({k: dict(v) if isinstance(v, Mapping) else v for k, v in out.items()})
+        return plain
+
+
+def limits_of(limits: Mapping[str, float] | Sequence[Limit] | None) -> tuple[Limit, ...]:
+    """Read limits in either form: `Limit` objects, or upper values by name.
+
+    Parameters
+    ----------
+    limits : mapping of str to float, or sequence of Limit, optional
+        None for none.
+
+    Returns
+    -------
+    tuple of Limit
+        In the order given.
+
+    Raises
+    ------
+    ParameterError
+        Neither of the two, a name twice, or a value that is not a finite number.
+    """
+    if limits is None:
+        return ()
+    if isinstance(limits, Mapping):
+        for name, value in limits.items():
+            if isinstance(value, bool) or not isinstance(value, int | float) or not math.isfinite(value):
+                raise ParameterError(f"limits: {name} = {value!r}: must be a finite number")
+        return tuple(Limit(str(name), float(value)) for name, value in limits.items())
+    if isinstance(limits, Sequence) and all(isinstance(limit, Limit) for limit in limits):
+        names = [limit.name for limit in limits]
+        if len(set(names)) < len(names):
+            raise ParameterError(f"limits: {', '.join(names)}: each name once")
+        return tuple(limits)
+    raise ParameterError(
+        f"limits = {limits!r}: must map names to numbers, for example {{'p_max_bar': 95.0}}, or be Limit objects"
+    )

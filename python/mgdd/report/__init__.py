@@ -1,0 +1,7 @@
+"""Reports: any study as one HTML page that needs no network."""
+
+from __future__ import annotations
+
+from mgdd.report.page import write_report
+
+__all__ = ["write_report"]

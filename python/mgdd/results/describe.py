@@ -1,0 +1,239 @@
+"""What an object shows of itself: a short text and an HTML table, both from rows of name, value and unit."""
+
+from __future__ import annotations
+
+import dataclasses
+import html
+import math
+import textwrap
+from collections.abc import Callable, Iterable, Mapping, Sequence
+from types import ModuleType
+from typing import Any, NamedTuple, TypeVar
+
+import numpy as np
+
+from mgdd import _core
+from mgdd.results import VARIABLES
+from mgdd.results.units import unit_of
+
+__all__ = ["Row", "as_html", "as_text", "core_rows", "described", "rows_of"]
+
+_WIDTH, _LINES = 100, 15
+_LONG = 60  # of a text in a table
+_MANY = 60  # rows in HTML
+_DIGITS = 6
+_PLAIN = ("parameters", "summary")  # mappings whose keys need no owner in front
+T = TypeVar("T")
+
+
+class Row(NamedTuple):
+    """A name, its value as printed, and its unit."""
+
+    name: str
+    value: str
+    unit: str = "-"
+
+
+def as_text(title: str, rows: Iterable[Row]) -> str:
+    """Lay out rows as text of at most 15 lines and 100 columns.
+
+    Parameters
+    ----------
+    title : str
+        First line.
+    rows : iterable of Row
+        One per line; side by side where they are many.
+
+    Returns
+    -------
+    str
+        The text; what does not fit is counted in its last line.
+    """
+    cells = [f"{row.name} {row.value}" + ("" if row.unit == "-" else f" {row.unit}") for row in rows]
+    head = textwrap.shorten(title, _WIDTH, placeholder=" …")
+    most = _LINES - 1
+    lines = [f"  {textwrap.shorten(cell, _WIDTH - 2, placeholder=' …')}" for cell in cells]
+    if len(cells) > most:
+        flow = textwrap.wrap(", ".join(cell.replace(" ", "\0") for cell in cells), _WIDTH - 2, break_long_words=False)
+        lines = [f"  {line}".replace("\0", " ") for line in flow]
+        if len(lines) > most:
+            kept = sum(line.count(", ") + line.endswith(",") for line in flow[: most - 1])
+            lines = [*lines[: most - 1], f"  … and {len(cells) - kept} more"]
+    return "\n".join([head, *lines])
+
+
+def as_html(title: str, rows: Iterable[Row]) -> str:
+    """Lay out rows as an HTML table, for notebooks.
+
+    Parameters
+    ----------
+    title : str
+        Above the table.
+    rows : iterable of Row
+        One per line.
+
+    Returns
+    -------
+    str
+        The HTML; what does not fit is counted below.
+    """
+    known = list(rows)
+    body = "".join(
+        f"<tr><th style='text-align:left'>{html.escape(row.name)}</th>"
+        f"<td style='text-align:right'>{html.escape(row.value)}</td>"
+        f"<td style='text-align:left'>{'' if row.unit == '-' else html.escape(row.unit)}</td></tr>"
+        for row in known[:_MANY]
+    )
+    more = f"<p>… and {len(known) - _MANY} more</p>" if len(known) > _MANY else ""
+    return f"<div><p><b>{html.escape(title)}</b></p><table><tbody>{body}</tbody></table>{more}</div>"
+
+
+def rows_of(values: Mapping[str, Any], units: Mapping[str, str] | None = None) -> list[Row]:
+    """Make rows of names and values; units as given, else as the results' labels or the names say.
+
+    Parameters
+    ----------
+    values : mapping of str to object
+        Numbers and text as they stand; mappings of numbers become rows of their own; arrays, Datasets and other
+        objects are named with their size.
+    units : mapping of str to str, optional
+        Units that the names do not say.
+
+    Returns
+    -------
+    list of Row
+        In order.
+    """
+    out = []
+    for name, value in values.items():
+        if isinstance(value, Mapping) and value and all(_is_scalar(item) for item in value.values()):
+            owner, shared = "" if name in _PLAIN else f"{name}.", unit_of(name)
+            for key, item in value.items():
+                (row,) = rows_of({str(key): item}, units)
+                unit = row.unit if shared == "-" or row.value == "–" else shared
+                out.append(Row(f"{owner}{row.name}", row.value, unit))
+        else:
+            unit = (units or {}).get(name) or (VARIABLES[name].units if name in VARIABLES else unit_of(name))
+            shown = _shown(value)
+            out.append(Row(name, shown, unit if shown != "–" else "-"))
+    return out
+
+
+def described(
+    cls: type[T], *, title: Callable[[Any], str] | None = None, rows: Callable[[Any], Any] | None = None
+) -> type[T]:
+    """Give a class a short text and an HTML form.
+
+    Parameters
+    ----------
+    cls : type
+        A dataclass, or any class with `rows`.
+    title : callable, optional
+        First line of an object; its class, name and kind if left out.
+    rows : callable, optional
+        Rows of an object, or a mapping for `rows_of`; the fields of a dataclass if left out.
+
+    Returns
+    -------
+    type
+        The same class.
+    """
+    head = _title if title is None else title
+
+    def known(obj: Any) -> list[Row]:
+        found = _fields(obj) if rows is None else rows(obj)
+        return rows_of(found) if isinstance(found, Mapping) else list(found)
+
+    def text(self: Any) -> str:
+        return as_text(head(self), known(self))
+
+    def markup(self: Any) -> str:
+        return as_html(head(self), known(self))
+
+    for name, function in (("__repr__", text), ("_repr_html_", markup)):
+        function.__name__, function.__qualname__ = name, f"{cls.__name__}.{name}"
+        setattr(cls, name, function)
+    return cls
+
+
+def _title(obj: Any) -> str:
+    said = [str(value) for name in ("name", "kind") if isinstance(value := getattr(obj, name, None), str)]
+    return " ".join([type(obj).__name__, *said])
+
+
+def _fields(obj: Any) -> dict[str, Any]:
+    return {item.name: getattr(obj, item.name) for item in dataclasses.fields(obj) if item.name not in ("name", "kind")}
+
+
+def _is_scalar(value: Any) -> bool:
+    return value is None or isinstance(value, bool | int | float | str | np.generic)
+
+
+def _shown(value: Any) -> str:
+    if value is None:
+        return "–"
+    if isinstance(value, bool | np.bool_):
+        return "yes" if value else "no"
+    if isinstance(value, float | np.floating):
+        return "–" if math.isnan(value) else f"{float(value):.{_DIGITS}g}"
+    if isinstance(value, int | np.integer):
+        return str(value)
+    if isinstance(value, str):
+        return textwrap.shorten(value, _LONG, placeholder=" …") or "–"
+    if isinstance(value, np.ndarray):
+        return f"array {' × '.join(map(str, value.shape))}" if value.size > 4 else _shown(value.tolist())
+    if hasattr(value, "sizes") and hasattr(value, "dims"):
+        return "Dataset (" + ", ".join(f"{dim}: {size}" for dim, size in value.sizes.items()) + ")"
+    if isinstance(value, Sequence | set | frozenset) and value and all(_is_scalar(item) for item in value):
+        joined = ", ".join(item if isinstance(item, str) else _shown(item) for item in value)
+        short = textwrap.shorten(joined, _LONG, placeholder=" …")
+        return short if short == joined else f"{len(value)}: {short}"
+    if isinstance(value, Mapping | Sequence | set | frozenset) and not value:
+        return "none"
+    if isinstance(value, Mapping):
+        return textwrap.shorten(f"{len(value)}: {', '.join(map(str, value))}", _LONG, placeholder=" …")
+    if isinstance(value, Sequence | set | frozenset):
+        return f"{len(value)} of {type(next(iter(value))).__name__}"
+    if callable(value):
+        return getattr(value, "__qualname__", type(value).__qualname__)
+    own = repr(value)
+    return own if len(own) <= _LONG and "\n" not in own and " object at " not in own else _title(value)
+
+
+def core_rows(record: Any) -> list[Row]:
+    """Make rows of a record of the core, with the units that it states."""
+    kind = type(record)
+    if not hasattr(kind, "to_dict"):
+        return rows_of({name: getattr(record, name) for name, item in vars(kind).items() if isinstance(item, property)})
+    units = {name: str(info["unit"]) for name, info in kind.fields().items()} if hasattr(kind, "fields") else {}
+    return rows_of(record.to_dict(), units)
+
+
+def _markup_of_core(self: Any) -> str:
+    return as_html(type(self).__name__, core_rows(self))
+
+
+def _wrapped(plain: Callable[[Any], str]) -> Callable[[Any], str]:
+    def text(self: Any) -> str:
+        own = plain(self)
+        lines = textwrap.wrap(own, _WIDTH, subsequent_indent="    ", break_long_words=False, break_on_hyphens=False)
+        return own if len(own) <= _WIDTH else "\n".join(lines)
+
+    return text
+
+
+# The records of the core keep their text, which evaluates to an equal record, in lines that can be read, and get a
+# table beside it.
+def _classes(module: ModuleType) -> Iterable[Any]:
+    for member in vars(module).values():
+        if isinstance(member, ModuleType) and member.__name__.startswith(f"{module.__name__}."):
+            yield from _classes(member)
+        elif isinstance(member, type) and not issubclass(member, BaseException):
+            yield member
+
+
+for _class in _classes(_core):
+    _class._repr_html_ = _markup_of_core
+    if hasattr(_class, "to_dict"):
+        _class.__repr__ = _wrapped(_class.__repr__)
+del _class

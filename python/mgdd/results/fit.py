@@ -1,0 +1,282 @@
+"""The one result of a fit, whatever was fitted."""
+
+from __future__ import annotations
+
+import html
+import json
+from collections.abc import Callable, Mapping
+from dataclasses import dataclass, field
+from typing import TYPE_CHECKING, Any
+
+from mgdd.errors import DataError
+from mgdd.results.finding import Finding, findings_html
+from mgdd.results.fit_report import FitReport
+from mgdd.results.labels import to_jsonable
+
+if TYPE_CHECKING:
+    import os
+
+    import xarray as xr
+
+__all__ = ["Fit", "FitQuality", "n_best_of"]
+
+_ARRIVED = 1.005  # a start within 0.5 % of the best error counts as having found it
+
+
+@dataclass(frozen=True, kw_only=True)
+class FitQuality:
+    """How closely a model follows one record.
+
+    Parameters
+    ----------
+    nrmse_fit_percent : float or None
+        ``100 (1 - |y - yh| / |y - mean y|)`` [%]: 100 is perfect, 0 as good as the mean; None where it says nothing.
+    rmse : float
+        Root of the mean squared error, in `unit`.
+    unit : str
+        Unit of the error.
+    n : int
+        Samples that were compared.
+
+    Examples
+    --------
+    >>> from mgdd.results import FitQuality
+    >>> print(FitQuality(nrmse_fit_percent=97.5, rmse=0.21, unit="deg", n=11_950))
+    97.50 %, RMSE 0.21 deg
+    """
+
+    nrmse_fit_percent: float | None
+    rmse: float
+    unit: str
+    n: int
+
+    def __str__(self) -> str:
+        percent = "" if self.nrmse_fit_percent is None else f"{self.nrmse_fit_percent:.2f} %, "
+        return f"{percent}RMSE {self.rmse:.4g} {self.unit}"
+
+    def to_dict(self) -> dict[str, Any]:
+        """Give the figures as plain values.
+
+        Returns
+        -------
+        dict
+            Field names to values.
+        """
+        return {name: getattr(self, name) for name in self.__dataclass_fields__}
+
+
+@dataclass(frozen=True, kw_only=True, eq=False, repr=False)
+class Fit:
+    """The result of a fit: the model, how well it follows its records, and what the data leave open.
+
+    Parameters
+    ----------
+    report : FitReport
+        Estimates, standard errors, correlation and history of the best search.
+    model : object
+        What was fitted, ready to simulate.
+    kind : str
+        Name of the model's structure.
+    train, test : FitQuality or None
+        Free run over the record that was fitted, and over another one.
+    findings : tuple of Finding
+        What to distrust, and which measurement would settle it.
+    unidentifiable : tuple of str
+        Parameters that the data do not determine.
+    source : str
+        Name of the record.
+    start_rmse : tuple of float
+        Error of the search from every start, the best first; infinite where one failed.
+    n_best : int
+        Searches that ended at the best fit: where one of many did, a better fit may exist.
+    start_reports : tuple of FitReport
+        Reports of all searches in the order of the starts, where they are kept.
+    run : xarray.Dataset or None
+        The free run over the training record, beside the measurement.
+    draw : callable or None
+        What `plot` calls: ``draw(fit, ax)``.
+
+    See Also
+    --------
+    mgdd.identify.identify_throttle, mgdd.identify.fit_cylinder, mgdd.identify.fit_ode : make one.
+
+    Examples
+    --------
+    >>> import numpy as np
+    >>> from mgdd.identify import fit_ode
+    >>> time = np.linspace(0.0, 10.0, 201)
+    >>> y = 2.0 * (1.0 - np.exp(-time / 0.5))
+    >>> fit = fit_ode(lambda t, x, u, p: (p[0] * u[0] - x) / p[1], {"time_s": time, "u": np.ones(201), "y": y},
+    ...               parameters={"gain": 1.0, "time_s": 1.0}, initial_state=[0.0])
+    >>> round(fit.parameters["gain"], 3), fit.train.nrmse_fit_percent > 99.9
+    (2.0, True)
+    """
+
+    report: FitReport
+    model: Any
+    kind: str
+    train: FitQuality | None = None
+    test: FitQuality | None = None
+    findings: tuple[Finding, ...] = ()
+    unidentifiable: tuple[str, ...] = ()
+    source: str = "record"
+    start_rmse: tuple[float, ...] = ()
+    n_best: int = 1
+    start_reports: tuple[FitReport, ...] = ()
+    run: xr.Dataset | None = None
+    draw: Callable[[Any, Any], Any] | None = field(default=None)
+
+    @property
+    def parameters(self) -> Mapping[str, float]:
+        """All parameters of the model by name; the estimates where it does not name its own."""
+        own = getattr(self.model, "parameters", None)
+        return own if own is not None else dict(zip(self.report.names, self.report.values.tolist(), strict=True))
+
+    @property
+    def stderr(self) -> dict[str, float]:
+        """Standard errors of the estimated parameters by name."""
+        return dict(zip(self.report.names, self.report.stderr.tolist(), strict=True))
+
+    def __repr__(self) -> str:
+        quality = [f"{name} {q}" for name, q in (("train", self.train), ("test", self.test)) if q is not None]
+        return f"<Fit {', '.join([self.kind, self.report.status, *quality])}>"
+
+    def summary(self) -> str:
+        """Return a human-readable summary.
+
+        Returns
+        -------
+        str
+            Quality, the table of the report, the outcome of the starts, and the findings.
+        """
+        lines = [self._headline(), "", self.report.summary()]
+        if len(self.start_rmse) > 1:
+            lines += ["", f"{self.n_best} of {len(self.start_rmse)} searches ended at the best fit"]
+        extra = self._extra()
+        return "\n".join([*lines, *(["", "findings:", *(f"  {finding}" for finding in extra)] if extra else [])])
+
+    def plot(self, *, ax: Any = None) -> Any:
+        """Draw the measurement and the free run of the model.
+
+        Parameters
+        ----------
+        ax : matplotlib.axes.Axes, optional
+            Where to draw; None makes a figure.
+
+        Returns
+        -------
+        matplotlib.axes.Axes
+            The axes.
+
+        Raises
+        ------
+        DataError
+            A fit that keeps no run.
+        """
+        if self.draw is None:
+            raise DataError(f"a fit of {self.kind} keeps no run to draw: simulate its model")
+        return self.draw(self, ax)
+
+    def to_dict(self) -> dict[str, Any]:
+        """Give everything but residual, model and run as plain values that `json.dumps` takes.
+
+        Returns
+        -------
+        dict
+            Arrays become lists; infinite and NaN numbers become None.
+        """
+        report = {name: getattr(self.report, name) for name in ("status", "message", "success", "rmse", "nit", "nfev")}
+        plain: dict[str, Any] = to_jsonable(
+            {
+                "kind": self.kind,
+                "source": self.source,
+                "train": None if self.train is None else self.train.to_dict(),
+                "test": None if self.test is None else self.test.to_dict(),
+                "parameters": self.parameters,
+                "stderr": self.stderr,
+                "unidentifiable": self.unidentifiable,
+                "findings": [finding.to_dict() for finding in self.findings],
+                "n_best": self.n_best,
+                "start_rmse": self.start_rmse,
+                **report,
+            }
+        )
+        return plain
+
+    def to_netcdf(self, path: str | os.PathLike[str]) -> None:
+        """Write estimates, correlation and what was simulated to a netCDF file.
+
+        Parameters
+        ----------
+        path : path-like
+            The file; one that is there is overwritten.
+        """
+        import xarray as xr
+
+        dataset = self.report.to_dataset()
+        for name in self.__dataclass_fields__:
+            if isinstance(own := getattr(self, name), xr.Dataset):
+                dataset = dataset.merge(own, combine_attrs="drop")
+        dataset.attrs = {
+            name: json.dumps(value)
+            if isinstance(value, dict | list)
+            else value
+            if isinstance(value, str)
+            else str(value)
+            for name, value in self.to_dict().items()
+            if value is not None
+        }
+        dataset.to_netcdf(path)
+
+    def to_toml(self) -> str:
+        """Write the model as TOML with the standard errors, the quality and the name of the record.
+
+        Returns
+        -------
+        str
+            Text that ``from_toml`` of the model reads.
+
+        Raises
+        ------
+        DataError
+            A model that has no such file.
+        """
+        give = getattr(self.model, "to_parameters", None)
+        if give is None:
+            raise DataError(f"{type(self.model).__name__} has no parameter file: keep the parameters of to_dict()")
+        figures = {
+            "fit_percent_train": None if self.train is None else self.train.nrmse_fit_percent,
+            "fit_percent_test": None if self.test is None else self.test.nrmse_fit_percent,
+            "rmse_test": None if self.test is None else self.test.rmse,
+        }
+        units = {
+            "fit_percent_train": "%",
+            "fit_percent_test": "%",
+            "rmse_test": "-" if self.test is None else self.test.unit,
+        }
+        file = give().with_fit(
+            stderr=self.stderr,
+            figures={name: (value, units[name]) for name, value in figures.items() if value is not None},
+            source=f"fitted to {self.source}",
+            unidentifiable=self.unidentifiable,
+        )
+        text: str = file.to_toml()
+        return text
+
+    def _repr_html_(self) -> str:
+        head = f"<p><b>{html.escape(self._headline())}</b></p>"
+        return f"<div>{head}{self.report._repr_html_()}{findings_html('findings', self._extra())}</div>"
+
+    def _headline(self) -> str:
+        quality = [f"{name} {q}" for name, q in (("train", self.train), ("test", self.test)) if q is not None]
+        free_run = f": free-run fit {', '.join(quality)}" if quality else ""
+        return f"{self.kind} fitted to {self.source}{free_run}{'' if self.test else ', no test record'}"
+
+    def _extra(self) -> list[Finding]:
+        return [finding for finding in self.findings if finding not in self.report.findings]
+
+
+def n_best_of(rmse: tuple[float, ...]) -> int:
+    """Count the searches whose error is within 0.5 % of the best."""
+    best = min(rmse, default=0.0)
+    return sum(error <= _ARRIVED * best for error in rmse)

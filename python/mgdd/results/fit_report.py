@@ -1,0 +1,327 @@
+"""What a fit hands back: estimates, uncertainty, what the data leave open, and how the search went."""
+
+from __future__ import annotations
+
+import html
+from dataclasses import dataclass
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+
+from mgdd import _core
+from mgdd.errors import ShapeError
+from mgdd.results.finding import Finding, findings_html
+from mgdd.results.labels import labelled_dataset, to_jsonable
+
+if TYPE_CHECKING:
+    from collections.abc import Sequence
+
+    import xarray as xr
+    from numpy.typing import ArrayLike, NDArray
+
+__all__ = ["FitReport"]
+
+_COLUMNS = ("parameter", "value", "stderr", "lower", "upper", "remark")
+
+
+@dataclass(frozen=True, kw_only=True, eq=False, repr=False)
+class FitReport:
+    """Estimates, their uncertainty, what the data leave open, and how the search went.
+
+    Attribute names follow `scipy.optimize.OptimizeResult` where it has one. Arrays are read-only.
+
+    Attributes
+    ----------
+    names : tuple of str
+        Parameter names; every array below that has n entries follows their order.
+    values, lower, upper : ndarray, shape (n,)
+        Estimates and bounds in the units of the parameters.
+    stderr : ndarray, shape (n,)
+        Standard errors, same units. Infinite for a parameter in a null direction; NaN at a bound (it was
+        held, not estimated) and without degrees of freedom.
+    bounds_active : ndarray of int, shape (n,)
+        -1 at the lower bound, +1 at the upper, 0 free.
+    covariance, correlation : ndarray, shape (n, n)
+        Of the free parameters; NaN rows and columns for those at a bound.
+    unidentifiable : tuple of str
+        Names the data do not determine: at a bound, correlated beyond the limit, or in a null direction.
+    findings : tuple of Finding
+        One per reason behind `unidentifiable`: ``at_bound``, ``null_direction`` or ``correlated``.
+    null_directions : ndarray, shape (n, k)
+        Parameter changes, largest entry 1, that leave the residual as it is.
+    rmse : float
+        Root mean square of the residual, in its unit.
+    cost : float
+        Half the sum of squares.
+    nrmse_fit_percent : float or None
+        100 (1 - norm(residual) / norm(data - mean)), None without data [%].
+    residual : ndarray, shape (n_residuals,)
+        Residual at `values`; also as `fun`.
+    nfev, njev, nit : int
+        Residual evaluations, Jacobian evaluations, trial steps.
+    history : dict of str to ndarray
+        `cost`, `damping` [-], `step_norm` and `accepted` per trial step; entry 0 is the start.
+    status : str
+        ``not_run``, ``cost_converged``, ``step_converged``, ``gradient_converged``, ``iteration_limit``,
+        ``evaluation_failed`` or ``stalled``.
+    message : str
+        The status as a sentence.
+    success : bool
+        Whether a tolerance was met.
+
+    See Also
+    --------
+    mgdd.optimize.least_squares : makes one.
+
+    References
+    ----------
+    Bates and Watts (1988), Nonlinear Regression Analysis and Its Applications, section 2.2.
+
+    Examples
+    --------
+    >>> from mgdd import _core
+    >>> FitReport.from_core(_core.FitReport()).status
+    'not_run'
+    """
+
+    names: tuple[str, ...]
+    values: NDArray[np.float64]
+    stderr: NDArray[np.float64]
+    lower: NDArray[np.float64]
+    upper: NDArray[np.float64]
+    bounds_active: NDArray[np.int_]
+    covariance: NDArray[np.float64]
+    correlation: NDArray[np.float64]
+    unidentifiable: tuple[str, ...]
+    findings: tuple[Finding, ...]
+    null_directions: NDArray[np.float64]
+    rmse: float
+    cost: float
+    nrmse_fit_percent: float | None
+    residual: NDArray[np.float64]
+    nfev: int
+    njev: int
+    nit: int
+    history: dict[str, NDArray[Any]]
+    status: str
+    message: str
+    success: bool
+
+    @classmethod
+    def from_core(cls, core_report: _core.FitReport, data: ArrayLike | None = None) -> FitReport:
+        """Wrap a report of the core.
+
+        Parameters
+        ----------
+        core_report : _core.FitReport
+            As any fit of the core returns it.
+        data : array_like, shape (n_residuals,), optional
+            What the residual was compared with, in the unit of the residual; gives `nrmse_fit_percent`.
+
+        Returns
+        -------
+        FitReport
+            Independent of `core_report`.
+
+        Raises
+        ------
+        ShapeError
+            `data` is not one value per residual.
+
+        Examples
+        --------
+        >>> from mgdd import _core
+        >>> FitReport.from_core(_core.FitReport()).success
+        False
+        """
+        residual = _frozen(core_report.residual)
+        return cls(
+            names=tuple(core_report.names),
+            values=_frozen(core_report.values),
+            stderr=_frozen(core_report.stderr),
+            lower=_frozen(core_report.lower),
+            upper=_frozen(core_report.upper),
+            bounds_active=_frozen(np.asarray(core_report.bounds_active, dtype=np.int_)),
+            covariance=_frozen(core_report.covariance),
+            correlation=_frozen(core_report.correlation),
+            unidentifiable=tuple(core_report.unidentifiable),
+            findings=_classified(core_report),
+            null_directions=_frozen(core_report.null_directions),
+            rmse=core_report.rmse,
+            cost=core_report.cost,
+            nrmse_fit_percent=None if data is None else _fit_percent(residual, data),
+            residual=residual,
+            nfev=core_report.nfev,
+            njev=core_report.njev,
+            nit=core_report.iterations,
+            history={key: _frozen(column) for key, column in core_report.history.items()},
+            status=core_report.status,
+            message=core_report.message,
+            success=core_report.success,
+        )
+
+    @property
+    def x(self) -> NDArray[np.float64]:
+        """Estimates under SciPy's name; the same array as `values`."""
+        return self.values
+
+    @property
+    def fun(self) -> NDArray[np.float64]:
+        """Residual under SciPy's name; the same array as `residual`."""
+        return self.residual
+
+    def __repr__(self) -> str:
+        text = f"<FitReport {self.status}, {len(self.names)} parameters, rmse={self.rmse:.6g}"
+        names = f", unidentifiable={list(self.unidentifiable)}" if self.unidentifiable else ""
+        fits = len(text) + len(names) < 100
+        return f"{text}{names}>" if fits else f"{text}, {len(self.unidentifiable)} unidentifiable>"
+
+    def summary(self) -> str:
+        """Table of the fit for a terminal.
+
+        Returns
+        -------
+        str
+            The verdict, one line per parameter (value, stderr, bounds, remark), and the findings.
+
+        Examples
+        --------
+        >>> from mgdd import _core
+        >>> print(FitReport.from_core(_core.FitReport()).summary().splitlines()[0])
+        not_run: the fit has not been run
+        """
+        rows = [_COLUMNS, *self._rows()]
+        widths = [max(len(row[k]) for row in rows) for k in range(len(_COLUMNS))]
+        lines = [f"{self.status}: {self.message}", self._numbers(), ""]
+        for row in rows:
+            cells = [row[0].ljust(widths[0]), *(row[k].rjust(widths[k]) for k in range(1, 5)), row[5]]
+            lines.append("  ".join(cells).rstrip())
+        if self.findings:
+            lines += ["", "not identifiable from these data:", *(f"  {finding}" for finding in self.findings)]
+        return "\n".join(lines)
+
+    def to_dict(self) -> dict[str, Any]:
+        """Everything but the residual as plain Python values that `json.dumps` takes.
+
+        Returns
+        -------
+        dict
+            Arrays become lists; infinite and NaN numbers become None.
+
+        Examples
+        --------
+        >>> import json
+        >>> from mgdd import _core
+        >>> json.loads(json.dumps(FitReport.from_core(_core.FitReport()).to_dict()))["cost"] is None
+        True
+        """
+        own = [field for field in self.__dataclass_fields__ if field not in ("residual", "findings")]
+        plain = {field: to_jsonable(getattr(self, field)) for field in own}
+        return plain | {"findings": [finding.to_dict() for finding in self.findings]}
+
+    def to_dataset(self) -> xr.Dataset:
+        """Tabulate the estimates and their correlation.
+
+        Returns
+        -------
+        xarray.Dataset
+            ``value``, ``stderr``, ``lower``, ``upper`` and ``bound_active`` over ``parameter``, and ``correlation`` [-]
+            over ``parameter`` and ``other``; NaN for parameters at a bound.
+
+        Examples
+        --------
+        >>> from mgdd.optimize import least_squares
+        >>> report = least_squares(lambda x: ([x[0] - 1.0, x[1], x[0] + x[1]], [[1, 0], [0, 1], [1, 1]]), [0.0, 0.0])
+        >>> round(float(report.to_dataset()["correlation"][0, 1]), 3)
+        -0.5
+        """
+        names, own = list(self.names), "unit of the parameter"
+        return labelled_dataset(
+            {
+                "parameter": ("parameter", names, "-", "parameter"),
+                "other": ("other", names, "-", "parameter"),
+                "value": ("parameter", self.values, own, "estimate"),
+                "stderr": ("parameter", self.stderr, own, "standard error"),
+                "lower": ("parameter", self.lower, own, "lower bound"),
+                "upper": ("parameter", self.upper, own, "upper bound"),
+                "bound_active": ("parameter", self.bounds_active, "-", "bound reached: -1 lower, 1 upper"),
+                "correlation": (("parameter", "other"), self.correlation, "-", "correlation"),
+            }
+        )
+
+    def _repr_html_(self) -> str:
+        def line(cells: Sequence[str], tag: str) -> str:
+            return "<tr>" + "".join(f"<{tag}>{html.escape(cell)}</{tag}>" for cell in cells) + "</tr>"
+
+        body = "".join(line(row, "td") for row in self._rows())
+        notes = findings_html("not identifiable from these data", self.findings)
+        return (
+            f"<div><p><b>{html.escape(self.status)}</b>: {html.escape(self.message)}<br>"
+            f"{html.escape(self._numbers())}</p>"
+            f"<table><thead>{line(_COLUMNS, 'th')}</thead><tbody>{body}</tbody></table>{notes}</div>"
+        )
+
+    def _numbers(self) -> str:
+        fit = "" if self.nrmse_fit_percent is None else f", fit {self.nrmse_fit_percent:.4g} %"
+        return (
+            f"rmse {self.rmse:.6g}, cost {self.cost:.6g}{fit}; "
+            f"{self.nit} iterations, {self.nfev} residual and {self.njev} Jacobian evaluations"
+        )
+
+    def _rows(self) -> list[tuple[str, ...]]:
+        remarks = {-1: "at lower bound", 1: "at upper bound"}
+        rows = []
+        for i, name in enumerate(self.names):
+            numbers = (self.values[i], self.stderr[i], self.lower[i], self.upper[i])
+            remark = remarks.get(int(self.bounds_active[i]), "")
+            if not remark and name in self.unidentifiable:
+                remark = "not identifiable"
+            rows.append((name, *(f"{number:.6g}" for number in numbers), remark))
+        return rows
+
+
+def _classified(report: _core.FitReport) -> tuple[Finding, ...]:
+    """Give the sentences of the core their code and names; they stand in the order bounds, null directions, pairs."""
+    names, sentences = tuple(report.names), list(report.findings)
+    if not sentences:  # a fit that failed has bounds, but no uncertainty was described
+        return ()
+    reasons: list[tuple[str, tuple[str, ...]]] = [
+        ("at_bound", (name,)) for name, side in zip(names, report.bounds_active, strict=False) if side != 0
+    ]
+    null = np.asarray(report.null_directions)
+    reasons += [
+        ("null_direction", tuple(name for name, part in zip(names, column, strict=True) if part != 0.0))
+        for column in (null.T if null.ndim == 2 else ())
+    ]
+    reasons += [("correlated", pair) for pair in _strongest(report, len(sentences) - len(reasons))]
+    return tuple(Finding(code, own, text) for (code, own), text in zip(reasons, sentences, strict=True))
+
+
+def _strongest(report: _core.FitReport, count: int) -> list[tuple[str, str]]:
+    """Return the `count` most correlated pairs outside the null directions, in the order of the parameters."""
+    c, null = np.asarray(report.correlation), np.asarray(report.null_directions)
+    loose = [bool(np.any(row != 0.0)) for row in np.reshape(null, (len(report.names), -1))]
+    pairs = [
+        (bool(loose[i] or loose[j]), -abs(c[i, j]), i, j)
+        for i in range(len(report.names))
+        for j in range(i + 1, len(report.names))
+        if np.isfinite(c[i, j])
+    ]
+    kept = sorted((i, j) for *_, i, j in sorted(pairs)[:count])
+    return [(report.names[i], report.names[j]) for i, j in kept]
+
+
+def _frozen(array: ArrayLike) -> NDArray[Any]:
+    copy = np.array(array)
+    copy.flags.writeable = False
+    return copy
+
+
+def _fit_percent(residual: NDArray[np.float64], data: ArrayLike) -> float | None:
+    measured = np.asarray(data, dtype=np.float64)
+    if not np.isfinite(residual).all():
+        return None
+    if measured.shape != residual.shape:
+        raise ShapeError(f"data has shape {measured.shape}: must have one value per residual, {residual.shape}")
+    spread = float(np.linalg.norm(measured - measured.mean()))
+    return 100.0 * (1.0 - float(np.linalg.norm(residual)) / spread) if spread > 0.0 else None

@@ -1,0 +1,315 @@
+"""Labelled results: xarray Datasets in which every variable says its unit and its long name, ready for netCDF.
+
+The units of the names that several rooms share stand once, in `VARIABLES`.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Mapping, Sequence
+from enum import Enum
+from numbers import Real
+from pathlib import PurePath
+from types import MappingProxyType
+from typing import TYPE_CHECKING, Any, NamedTuple
+
+import numpy as np
+
+from mgdd.errors import DataError, ShapeError
+
+if TYPE_CHECKING:
+    import xarray as xr
+    from numpy.typing import ArrayLike
+
+__all__ = ["ANGLE", "VARIABLES", "Label", "check_labels", "labelled_dataset", "to_jsonable"]
+
+ANGLE = "crank_angle_cad"
+
+
+class Label(NamedTuple):
+    """Unit and long name of a variable; an axis label reads ``long_name [units]``.
+
+    Parameters
+    ----------
+    units : str
+        Unit as printed, ``"-"`` if dimensionless.
+    long_name : str
+        Name for axis labels.
+
+    Examples
+    --------
+    >>> from mgdd.results import VARIABLES
+    >>> VARIABLES["pressure_bar"].units
+    'bar'
+    """
+
+    units: str
+    long_name: str
+
+
+_CAD = "°CA aTDC"
+
+VARIABLES: Mapping[str, Label] = MappingProxyType(
+    {
+        ANGLE: Label(_CAD, "crank angle"),
+        "pressure_bar": Label("bar", "cylinder pressure"),
+        "motored_pressure_bar": Label("bar", "motored pressure"),
+        "volume_l": Label("L", "cylinder volume"),
+        "temperature_k": Label("K", "mean gas temperature"),
+        "burned_fraction": Label("-", "burned fraction"),
+        "heat_release_j_per_cad": Label("J/°CA", "heat release rate"),
+        "heat_release_net_j_per_cad": Label("J/°CA", "net heat release rate"),
+        "heat_release_gross_j_per_cad": Label("J/°CA", "gross heat release rate"),
+        "heat_net_cumulative_j": Label("J", "cumulative net heat release"),
+        "heat_gross_cumulative_j": Label("J", "cumulative gross heat release"),
+        "heat_loss_j_per_cad": Label("J/°CA", "wall heat loss rate"),
+        "imep_closed_bar": Label("bar", "closed-cycle IMEP (IVC to EVO)"),
+        "imep_gross_bar": Label("bar", "gross IMEP (-180 to 180 °CA)"),
+        "efficiency_gross": Label("-", "gross indicated efficiency"),
+        "p_max_bar": Label("bar", "maximum pressure"),
+        "p_max_cad": Label(_CAD, "angle of maximum pressure"),
+        "t_max_k": Label("K", "maximum mean gas temperature"),
+        "t_max_cad": Label(_CAD, "angle of maximum mean gas temperature"),
+        "dp_max_bar_per_cad": Label("bar/°CA", "maximum pressure rise rate"),
+        "dp_max_cad": Label(_CAD, "angle of maximum pressure rise rate"),
+        "ca10_cad": Label(_CAD, "CA10, angle of 10 % heat released"),
+        "ca50_cad": Label(_CAD, "CA50, angle of 50 % heat released"),
+        "ca90_cad": Label(_CAD, "CA90, angle of 90 % heat released"),
+        "heat_loss_j": Label("J", "wall heat loss of the closed cycle"),
+        "heat_loss_fraction": Label("-", "wall heat loss over fuel heat"),
+        "work_closed_j": Label("J", "closed-cycle work (IVC to EVO)"),
+        "work_gross_j": Label("J", "gross work (-180 to 180 °CA)"),
+        "ringing_intensity_mw_per_m2": Label("MW/m²", "ringing intensity"),
+        "soc_cad": Label(_CAD, "start of combustion"),
+        "estimate_cad": Label(_CAD, "estimate of the best timing"),
+        "soi_cad": Label(_CAD, "start of injection"),
+        "burn_duration_cad": Label("°CA", "burn duration"),
+        "fuel_heat_j": Label("J", "fuel heat"),
+        "pegging_bar": Label("bar", "pegging offset"),
+        "n_compression": Label("-", "polytropic exponent of compression"),
+        "n_expansion": Label("-", "polytropic exponent of expansion"),
+        "heat_net_j": Label("J", "net heat release"),
+        "heat_gross_j": Label("J", "gross heat release"),
+        "nox_affine_log_ppm": Label("ppm", "NOx proxy, affine-log map"),
+        "nox_arrhenius_ppm": Label("ppm", "NOx proxy, Arrhenius map"),
+        "cycle": Label("-", "engine cycle"),
+        "soc_requested_cad": Label(_CAD, "requested start of combustion"),
+        "nox_true_ppm": Label("ppm", "NOx, true value"),
+        "nox_analyser_ppm": Label("ppm", "NOx, analyser"),
+        "nox_fast_ppm": Label("ppm", "NOx, fast sensor"),
+        "nox_soft_ppm": Label("ppm", "NOx, soft sensor"),
+        "nox_soft_corrected_ppm": Label("ppm", "NOx, soft sensor held to the analyser"),
+        "j": Label("unit of J", "performance J"),
+        "cov_imep_percent": Label("%", "COV of IMEP, last 50 cycles"),
+        "measured_bar": Label("bar", "measured pressure"),
+        "model_bar": Label("bar", "model pressure"),
+        "residual_bar": Label("bar", "model minus measured pressure"),
+        "rmse_bar": Label("bar", "pressure RMSE, closed cycle"),
+        "rmse_percent": Label("% of p_max", "pressure RMSE, closed cycle"),
+        "imep_closed_error_percent": Label("%", "error of the closed-cycle IMEP"),
+        "wall_heat_scale": Label("-", "wall-heat scale"),
+        "time_s": Label("s", "time"),
+        "duty": Label("-", "duty"),
+        "angle_deg": Label("deg", "plate angle"),
+        "model_deg": Label("deg", "plate angle, model"),
+        "current_a": Label("A", "motor current"),
+        "supply_v": Label("V", "supply voltage"),
+        "airflow_torque_nm": Label("N m", "torque of the air flow on the plate"),
+        "start_angle_deg": Label("deg", "plate angle at the start"),
+        "final_angle_deg": Label("deg", "plate angle at the end"),
+        "max_angle_deg": Label("deg", "highest plate angle"),
+        "min_angle_deg": Label("deg", "lowest plate angle"),
+        "max_current_a": Label("A", "highest motor current"),
+        "duration_s": Label("s", "length of the run"),
+        "step_s": Label("s", "integration step"),
+        "t10_s": Label("s", "time to 10 % of the way"),
+        "t90_s": Label("s", "time to 90 % of the way"),
+        "speed_deg_per_s": Label("deg/s", "plate speed"),
+    }
+)
+
+
+def labelled_dataset(
+    variables: Mapping[str, Sequence[Any]],
+    *,
+    attrs: Mapping[str, Any] | None = None,
+) -> xr.Dataset:
+    """Build a Dataset in which nothing lacks a unit; the values are copied.
+
+    Parameters
+    ----------
+    variables : mapping of str to tuple
+        ``name: (dims, values)`` for a name in `VARIABLES`, otherwise
+        ``name: (dims, values, units, long_name)``. ``dims`` is a name, a tuple of names, or ``()`` for a
+        scalar. A name that is its own only dimension becomes the coordinate of that dimension. Dimensionless
+        quantities have the unit ``"-"``.
+    attrs : mapping, optional
+        Attributes of the Dataset, as netCDF stores them: text, a number, or a flat sequence of numbers.
+
+    Returns
+    -------
+    xarray.Dataset
+        With ``attrs["units"]`` and ``attrs["long_name"]`` on every variable and coordinate.
+
+    Raises
+    ------
+    DataError
+        A variable without unit or long name, a unit that contradicts `VARIABLES`, a dimension without
+        coordinate, an attribute that netCDF cannot hold.
+    ShapeError
+        Values whose shape does not fit ``dims``.
+
+    Examples
+    --------
+    >>> from mgdd.results import labelled_dataset
+    >>> ds = labelled_dataset({
+    ...     "crank_angle_cad": ("crank_angle_cad", [-1.0, 0.0, 1.0]),
+    ...     "pressure_bar": ("crank_angle_cad", [60.0, 61.0, 60.5]),
+    ...     "speed_rpm": ((), 1200.0, "rpm", "engine speed"),
+    ... })
+    >>> ds["pressure_bar"].attrs["units"], float(ds["speed_rpm"])
+    ('bar', 1200.0)
+    """
+    import xarray as xr
+
+    _check_attributes("the Dataset", attrs or {})
+    arrays: dict[str, tuple[tuple[str, ...], np.ndarray[Any, Any], dict[str, str]]] = {}
+    sizes: dict[str, tuple[int, str]] = {}
+    for name, entry in variables.items():
+        dims, values, label = _entry(name, entry)
+        array = np.array(values)
+        if array.ndim != len(dims):
+            raise ShapeError(f"{name} has shape {array.shape}: {len(dims)} dimension(s) {dims} were declared")
+        for dim, size in zip(dims, array.shape, strict=True):
+            known, first = sizes.setdefault(dim, (size, name))
+            if known != size:
+                raise ShapeError(f"{name} has {size} samples along {dim}: {first} has {known}")
+        arrays[name] = (dims, array, {"units": label.units, "long_name": label.long_name})
+    coords = {name: item for name, item in arrays.items() if item[0] == (name,)}
+    for dim, (_, name) in sizes.items():
+        if dim not in coords:
+            raise DataError(f"dimension {dim} of {name} has no coordinate: add a variable {dim!r}")
+    data = {name: item for name, item in arrays.items() if name not in coords}
+    return xr.Dataset(data_vars=data, coords=coords, attrs=dict(attrs or {}))
+
+
+def check_labels(dataset: xr.Dataset) -> None:
+    """Refuse a Dataset in which a variable lacks its unit or long name, or that netCDF cannot store.
+
+    Parameters
+    ----------
+    dataset : xarray.Dataset
+        Any Dataset; names in `VARIABLES` must also carry the unit that stands there.
+
+    Raises
+    ------
+    DataError
+        Names the first offending variable or attribute.
+
+    Examples
+    --------
+    >>> import xarray as xr
+    >>> from mgdd.errors import DataError
+    >>> from mgdd.results import check_labels
+    >>> try:
+    ...     check_labels(xr.Dataset({"pressure_bar": ((), 1.0)}))
+    ... except DataError as error:
+    ...     print(error)
+    variable pressure_bar has no units: say them ('-' if dimensionless)
+    """
+    _check_attributes("the Dataset", dataset.attrs)
+    for name, variable in dataset.variables.items():
+        _check_attributes(f"variable {name}", variable.attrs)
+        _check(str(name), variable.attrs.get("units"), variable.attrs.get("long_name"))
+    for dim in dataset.dims:
+        if dim not in dataset.coords:
+            raise DataError(f"dimension {dim} has no coordinate: its unit is unknown")
+
+
+def to_jsonable(obj: Any) -> Any:
+    """Turn results into what `json.dumps(..., allow_nan=False)` takes.
+
+    Parameters
+    ----------
+    obj : object
+        Numbers, strings, None, mappings, sequences, sets, NumPy scalars and arrays, xarray objects, paths and
+        enums, nested at will. NaN and infinities become None, arrays nested lists, Datasets mappings.
+
+    Returns
+    -------
+    object
+        Built of dict, list, str, int, float, bool and None only.
+
+    Raises
+    ------
+    TypeError
+        Anything else, with the type in the message.
+
+    Examples
+    --------
+    >>> import numpy as np
+    >>> from mgdd.results.labels import to_jsonable
+    >>> to_jsonable({"a": np.float64(1.5), "b": np.array([1.0, np.nan])})
+    {'a': 1.5, 'b': [1.0, None]}
+    """
+    if isinstance(obj, Enum):
+        return to_jsonable(obj.value)
+    if obj is None or isinstance(obj, bool | str | int):
+        return obj
+    if isinstance(obj, float):
+        return float(obj) if math.isfinite(obj) else None
+    if isinstance(obj, np.generic | np.ndarray):
+        return to_jsonable(obj.tolist())
+    if isinstance(obj, PurePath):
+        return obj.as_posix()
+    if isinstance(obj, Mapping):
+        variables = getattr(obj, "variables", obj)
+        return {str(name): to_jsonable(value) for name, value in variables.items()}
+    if isinstance(obj, Sequence) and not isinstance(obj, bytes | bytearray):
+        return [to_jsonable(item) for item in obj]
+    if isinstance(obj, set | frozenset):
+        return [to_jsonable(item) for item in sorted(obj)]
+    if hasattr(obj, "to_numpy"):
+        return to_jsonable(obj.to_numpy())
+    raise TypeError(f"{type(obj).__name__} has no JSON form")
+
+
+def _entry(name: str, entry: Sequence[Any]) -> tuple[tuple[str, ...], ArrayLike, Label]:
+    if isinstance(entry, str) or len(entry) not in (2, 4):
+        raise DataError(f"variable {name}: give (dims, values) or (dims, values, units, long_name)")
+    dims = (entry[0],) if isinstance(entry[0], str) else tuple(entry[0])
+    label = Label(entry[2], entry[3]) if len(entry) == 4 else VARIABLES.get(name, Label("", ""))
+    _check(name, label.units, label.long_name)
+    return dims, entry[1], label
+
+
+def _check(name: str, units: object, long_name: object) -> None:
+    if not isinstance(units, str) or not units.strip():
+        raise DataError(f"variable {name} has no units: say them ('-' if dimensionless)")
+    if not isinstance(long_name, str) or not long_name.strip():
+        raise DataError(f"variable {name} has no long_name: name it for axis labels")
+    known = VARIABLES.get(name)
+    if known is not None and known.units != units:
+        raise DataError(f"variable {name} has units {units!r}: this name is reserved for {known.units!r}")
+
+
+def _check_attributes(owner: str, attrs: Mapping[Any, Any]) -> None:
+    """Refuse an attribute that no netCDF file can hold; found when the file is written, the run would be lost."""
+    for name, value in attrs.items():
+        if not isinstance(name, str) or not name:
+            raise DataError(f"attribute {name!r} of {owner}: its name must be text")
+        if isinstance(value, str) or _is_number(value):
+            continue
+        if isinstance(value, Sequence | np.ndarray) and not isinstance(value, bytes):
+            items = list(value) if np.ndim(np.asarray(value, dtype=object)) == 1 else []
+            if items and all(_is_number(item) for item in items):
+                continue
+        remedy = "join the lines to one text" if isinstance(value, Sequence) else "give text, or 0 or 1 for a bool"
+        raise DataError(
+            f"attribute {name} of {owner} = {value!r}: netCDF stores text, numbers and flat, non-empty sequences of "
+            f"numbers; {remedy}"
+        )
+
+
+def _is_number(value: object) -> bool:
+    return isinstance(value, Real) and not isinstance(value, bool)

@@ -1,0 +1,263 @@
+"""Figures of merit between a measured and a modelled signal, and tests on what is left."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, field
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from mgdd.errors import DataError, ParameterError, ShapeError
+from mgdd.results import labelled_dataset
+from mgdd.results.describe import described
+
+if TYPE_CHECKING:
+    import xarray as xr
+    from numpy.typing import ArrayLike, NDArray
+
+__all__ = ["ResidualTests", "mse", "nrmse_fit_percent", "residual_tests", "rmse", "vaf_percent"]
+
+_LIMIT = 1.96
+_SHARE = 0.95
+
+
+def nrmse_fit_percent(measured: ArrayLike, model: ArrayLike) -> float:
+    """Return ``100 (1 - |y - yh| / |y - mean y|)``: 100 is perfect, 0 as good as the mean.
+
+    Parameters
+    ----------
+    measured, model : array_like
+        y and yh in one unit.
+
+    Returns
+    -------
+    float
+        Fit [%]; negative for a model worse than the mean.
+
+    Raises
+    ------
+    DataError
+        Values that are not finite, a constant measurement.
+    ShapeError
+        Arrays of different shape, or empty ones.
+
+    Examples
+    --------
+    >>> from mgdd.signals import nrmse_fit_percent
+    >>> nrmse_fit_percent([1.0, 2.0, 3.0], [1.0, 2.0, 3.0]), nrmse_fit_percent([1.0, 2.0, 3.0], [2.0, 2.0, 2.0])
+    (100.0, 0.0)
+    """
+    y, yh = _pair(measured, model)
+    return 100.0 * (1.0 - float(np.linalg.norm(y - yh)) / _spread(y))
+
+
+def vaf_percent(measured: ArrayLike, model: ArrayLike) -> float:
+    """Return 100 (1 - var(y - yh) / var(y)), which a constant offset does not change.
+
+    Parameters
+    ----------
+    measured, model : array_like
+        y and yh in one unit.
+
+    Returns
+    -------
+    float
+        Variance accounted for [%].
+
+    Raises
+    ------
+    DataError, ShapeError
+        As in `nrmse_fit_percent`.
+
+    Examples
+    --------
+    >>> from mgdd.signals import vaf_percent
+    >>> vaf_percent([1.0, 2.0, 3.0], [11.0, 12.0, 13.0])
+    100.0
+    """
+    y, yh = _pair(measured, model)
+    error = y - yh
+    return 100.0 * (1.0 - float(np.linalg.norm(error - error.mean()) / _spread(y)) ** 2)
+
+
+def mse(measured: ArrayLike, model: ArrayLike) -> float:
+    """Return the mean squared error, in the square of the unit.
+
+    Parameters
+    ----------
+    measured, model : array_like
+        y and yh in one unit.
+
+    Returns
+    -------
+    float
+        Mean squared error.
+
+    Raises
+    ------
+    DataError, ShapeError
+        Values that are not finite, arrays of different shape.
+
+    Examples
+    --------
+    >>> from mgdd.signals.metrics import mse
+    >>> mse([1.0, 2.0], [1.0, 4.0])
+    2.0
+    """
+    y, yh = _pair(measured, model)
+    return float(np.mean((y - yh) ** 2))
+
+
+def rmse(measured: ArrayLike, model: ArrayLike) -> float:
+    """Return the root of the mean squared error, in the unit.
+
+    Parameters
+    ----------
+    measured, model : array_like
+        y and yh in one unit.
+
+    Returns
+    -------
+    float
+        Root mean square of the error.
+
+    Raises
+    ------
+    DataError, ShapeError
+        As in `mse`.
+
+    Examples
+    --------
+    >>> from mgdd.signals import rmse
+    >>> rmse([1.0, 2.0], [4.0, -1.0])
+    3.0
+    """
+    return float(np.sqrt(mse(measured, model)))
+
+
+@described
+@dataclass(frozen=True, kw_only=True)
+class ResidualTests:
+    """Correlations that a residual should not have.
+
+    Parameters
+    ----------
+    white : bool
+        Whether 95 % of the autocorrelations lie within the limit.
+    independent : bool
+        The same of the correlations with the input.
+    share_white, share_independent : float
+        Those shares [-].
+    limit : float
+        1.96 / sqrt(N) [-].
+    correlations : xarray.Dataset
+        ``autocorrelation`` and ``cross_correlation`` over ``lag``.
+
+    Notes
+    -----
+    With 25 lags the rule forgives one: a residual that is white passes it in 64 of 100 records, so a failure by two
+    lags means little. Near stiction a failure is the rule and no reason to reject a model.
+
+    Examples
+    --------
+    >>> import numpy as np
+    >>> from mgdd.signals import residual_tests
+    >>> noise = np.random.default_rng(0).standard_normal((2, 4000))
+    >>> residual_tests(np.cumsum(noise[0]), noise[1]).white
+    False
+    """
+
+    white: bool
+    independent: bool
+    share_white: float
+    share_independent: float
+    limit: float
+    correlations: xr.Dataset = field(repr=False)
+
+
+def residual_tests(residual: ArrayLike, duty: ArrayLike, *, lags: int = 25) -> ResidualTests:
+    """Test a residual for memory and for what the input still explains.
+
+    Parameters
+    ----------
+    residual : array_like
+        One-step residual, measured minus predicted.
+    duty : array_like
+        Input of the same samples [-].
+    lags : int
+        Lags 1 to this; the residual against itself and against earlier duty.
+
+    Returns
+    -------
+    ResidualTests
+        Verdicts, shares and the correlations.
+
+    Raises
+    ------
+    ParameterError
+        Less than one lag.
+    DataError
+        Fewer than four samples per lag, a constant residual or input, values that are not finite.
+    ShapeError
+        Arrays of different shape.
+
+    Notes
+    -----
+    A prediction that starts from the last noisy sample carries its noise: the residual then has -0.5 at lag 1.
+
+    Examples
+    --------
+    >>> import numpy as np
+    >>> from mgdd.signals import residual_tests
+    >>> noise = np.random.default_rng(0).standard_normal((2, 4000))
+    >>> tests = residual_tests(noise[0], noise[1])
+    >>> tests.share_white >= 0.88, round(tests.limit, 3)
+    (True, 0.031)
+    """
+    if lags < 1:
+        raise ParameterError(f"lags = {lags}: must be >= 1")
+    e, u = _pair(residual, duty)
+    if e.ndim != 1 or e.size < 4 * lags:
+        raise DataError(f"residual has shape {e.shape}: {4 * lags} samples in one dimension are needed for {lags} lags")
+    e, u = e - e.mean(), u - u.mean()
+    norm_e, norm_u = float(np.linalg.norm(e)), float(np.linalg.norm(u))
+    if not norm_e > 0.0 or not norm_u > 0.0:
+        raise DataError(f"{'duty' if norm_e > 0.0 else 'residual'} is constant: it has no correlation")
+    auto = np.array([e[k:] @ e[:-k] for k in range(1, lags + 1)]) / norm_e**2
+    cross = np.array([e[k:] @ u[:-k] for k in range(1, lags + 1)]) / (norm_e * norm_u)
+    limit = _LIMIT / float(np.sqrt(e.size))
+    shares = [float(np.mean(np.abs(values) <= limit)) for values in (auto, cross)]
+    correlations = labelled_dataset(
+        {
+            "lag": ("lag", np.arange(1, lags + 1), "samples", "lag"),
+            "autocorrelation": ("lag", auto, "-", "autocorrelation of the residual"),
+            "cross_correlation": ("lag", cross, "-", "correlation of residual and earlier duty"),
+            "limit": ((), limit, "-", "95 % limit"),
+        }
+    )
+    return ResidualTests(
+        white=shares[0] >= _SHARE,
+        independent=shares[1] >= _SHARE,
+        share_white=shares[0],
+        share_independent=shares[1],
+        limit=limit,
+        correlations=correlations,
+    )
+
+
+def _pair(measured: ArrayLike, model: ArrayLike) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
+    y, yh = np.asarray(measured, dtype=np.float64), np.asarray(model, dtype=np.float64)
+    if y.shape != yh.shape or y.size == 0:
+        raise ShapeError(f"shapes {y.shape} and {yh.shape}: must be equal and not empty")
+    for name, values in (("first", y), ("second", yh)):
+        bad = np.flatnonzero(~np.isfinite(values))
+        if bad.size:
+            raise DataError(f"{name} signal, sample {int(bad[0])}: {values.flat[bad[0]]} is not finite")
+    return y, yh
+
+
+def _spread(y: NDArray[np.float64]) -> float:
+    spread = float(np.linalg.norm(y - y.mean()))
+    if not spread > 0.0:
+        raise DataError("the measured signal is constant: a fit in percent has no meaning")
+    return spread

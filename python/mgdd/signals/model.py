@@ -1,0 +1,163 @@
+"""What models with sampled inputs share: columns in, an even grid, a named state, a labelled run out."""
+
+from __future__ import annotations
+
+import math
+from abc import ABC, abstractmethod
+from collections.abc import Mapping, Sequence
+from types import MappingProxyType
+from typing import TYPE_CHECKING, Any, ClassVar, NamedTuple
+
+import numpy as np
+
+from mgdd.errors import DataError, ParameterError, ShapeError
+from mgdd.results import VARIABLES, Label, labelled_dataset
+from mgdd.signals.even_grid import even_step
+
+if TYPE_CHECKING:
+    import xarray as xr
+    from numpy.typing import NDArray
+
+__all__ = ["RunInputs", "SampledModel", "check_horizon", "columns_of"]
+
+
+class RunInputs(NamedTuple):
+    """What a free run is driven by: times [s], their step [s], the input columns, and the state at the first sample."""
+
+    time_s: NDArray[np.float64]
+    step_s: float
+    columns: list[NDArray[np.float64]]
+    state: list[float]
+
+
+class SampledModel(ABC):
+    """A model of one output: a kind gives names, labels and `_run`, and has `simulate` and `predict` of this class."""
+
+    input_names: tuple[str, ...]
+    output_name: str
+    state_names: tuple[str, ...] = ()
+    observed_state: str | None = None  # the state that a measured output shows
+    labels: ClassVar[Mapping[str, Label]] = MappingProxyType({})
+
+    @abstractmethod
+    def _run(self, run: RunInputs) -> NDArray[np.float64]:
+        """Return the output on every sample."""
+
+    @abstractmethod
+    def _rest(self) -> list[float]:
+        """Return the state of a free run that is not told one."""
+
+    def simulate(
+        self, inputs: Any, *, initial_state: Mapping[str, float] | Sequence[float] | None = None
+    ) -> xr.Dataset:
+        """Run free.
+
+        Parameters
+        ----------
+        inputs : xarray.Dataset, DataFrame or mapping of columns
+            ``time_s`` [s], evenly spaced, and the inputs of the model; sample k acts from ``time_s[k]`` to
+            ``time_s[k + 1]``.
+        initial_state : mapping of str to float, or sequence of float, optional
+            State at the first sample, by name or in the order of `state_names`; what is left out is that of the model
+            at rest.
+
+        Returns
+        -------
+        xarray.Dataset
+            Inputs and output over ``time_s``.
+
+        Raises
+        ------
+        DataError
+            A missing column, a value that is not finite, or times that are not even.
+        ShapeError
+            Columns of different length.
+        ParameterError
+            A state that the model does not have.
+        """
+        time, *columns = columns_of(inputs, ("time_s", *self.input_names))
+        run = self._run(RunInputs(time, even_step(time), columns, self.state_of(initial_state)))
+        return self._labelled(time, {**dict(zip(self.input_names, columns, strict=True)), self.output_name: run})
+
+    def predict(self, record: Any, horizon: int) -> xr.Dataset:
+        """Predict ahead: the measured output plus the change of the free run over the horizon.
+
+        Parameters
+        ----------
+        record : xarray.Dataset, DataFrame or mapping of columns
+            As `simulate` takes it, and the measured output.
+        horizon : int
+            Samples ahead, at least 1.
+
+        Returns
+        -------
+        xarray.Dataset
+            The output over ``time_s`` from sample `horizon` on; entry k is predicted from the data up to sample k.
+
+        Raises
+        ------
+        ParameterError
+            A horizon that does not fit into the record.
+        DataError, ShapeError
+            As in `simulate`.
+        """
+        time, measured = columns_of(record, ("time_s", self.output_name))
+        check_horizon(horizon, measured.size)
+        start = {} if self.observed_state is None else {self.observed_state: float(measured[0])}
+        run = self.simulate(record, initial_state=start)[self.output_name].to_numpy()
+        return self._labelled(time[horizon:], {self.output_name: measured[:-horizon] + run[horizon:] - run[:-horizon]})
+
+    def __getstate__(self) -> dict[str, Any]:
+        return {name: dict(own) if isinstance(own, MappingProxyType) else own for name, own in vars(self).items()}
+
+    def __setstate__(self, state: dict[str, Any]) -> None:
+        for name, own in state.items():
+            object.__setattr__(self, name, MappingProxyType(own) if isinstance(own, dict) else own)
+
+    def state_of(self, given: Mapping[str, float] | Sequence[float] | None) -> list[float]:
+        """Return the whole state of a free run from what is given of it."""
+        state = self._rest()
+        if given is None:
+            return state
+        if not isinstance(given, Mapping):
+            if len(given) != len(self.state_names):
+                raise ShapeError(f"initial_state has {len(given)} values: must be {', '.join(self.state_names)}")
+            given = dict(zip(self.state_names, given, strict=True))
+        for name, value in given.items():
+            if name not in self.state_names:
+                raise ParameterError(
+                    f"initial_state: {name!r} is no state: must be one of {', '.join(self.state_names)}"
+                )
+            if not math.isfinite(value):
+                raise ParameterError(f"initial_state: {name} = {value!r}: must be finite")
+            state[self.state_names.index(name)] = float(value)
+        return state
+
+    def _labelled(self, time: NDArray[np.float64], columns: Mapping[str, NDArray[np.float64]]) -> xr.Dataset:
+        named = {name: ("time_s", values, *self._label(name)) for name, values in columns.items()}
+        return labelled_dataset({"time_s": ("time_s", time), **named}, attrs={"kind": str(getattr(self, "kind", ""))})
+
+    def _label(self, name: str) -> Label:
+        return self.labels[name] if name in self.labels else VARIABLES[name]
+
+
+def columns_of(table: Any, names: Sequence[str]) -> list[NDArray[np.float64]]:
+    """Return columns of a Dataset, a DataFrame or a mapping, finite and of one length."""
+    columns = []
+    for name in names:
+        if name not in table:
+            raise DataError(f"inputs have no {name}: needed are {', '.join(names)}")
+        columns.append(np.asarray(table[name], dtype=np.float64))
+    shapes = [column.shape for column in columns]
+    if columns[0].ndim != 1 or columns[0].size < 2 or set(shapes) != {shapes[0]}:
+        raise ShapeError(f"{', '.join(names)} have shapes {shapes}: must be columns of one length >= 2")
+    for name, column in zip(names, columns, strict=True):
+        if not np.isfinite(column).all():
+            raise DataError(f"{name}: sample {int(np.argmin(np.isfinite(column)))} is not a finite number")
+    return columns
+
+
+def check_horizon(horizon: int, size: int) -> None:
+    """Refuse a horizon that does not fit into a record."""
+    if not 1 <= horizon < size:
+        raise ParameterError(f"horizon = {horizon}: must be in [1, {size - 1}], below the samples of the record")

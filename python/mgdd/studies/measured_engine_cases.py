@@ -1,0 +1,186 @@
+"""Objectives on the measured hydrogen-diesel engine, and a seeker for each that is tuned to what was measured."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Mapping
+from dataclasses import dataclass, field
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+
+from mgdd.optimize import (
+    BoundedSeeking,
+    ComponentLag,
+    ExtremumSeeking,
+    GoldenSection,
+    Limit,
+    NewtonSeeking,
+    Optimum,
+    Spsa,
+    tune,
+)
+from mgdd.optimize.tuning import Tuning
+from mgdd.surrogate import EngineSurrogate, SurrogateEngine
+
+if TYPE_CHECKING:
+    from numpy.typing import NDArray
+
+    Seeker = ExtremumSeeking | NewtonSeeking | BoundedSeeking | Spsa | GoldenSection
+
+__all__ = [
+    "ARRIVAL_CAD",
+    "LOWER_CAD",
+    "OBJECTIVES",
+    "START_CAD",
+    "UPPER_CAD",
+    "Case",
+    "Objective",
+    "held_objective",
+    "lag_of",
+    "noise_at",
+    "seeker_of",
+    "tuned_case",
+]
+
+_MPRR_LIMIT = 5.0
+_NOX_WEIGHT = 0.001  # bar per ppm; its optimum lies well inside the records
+START_CAD, LOWER_CAD, UPPER_CAD = 8.0, -9.0, 11.0  # the bounds leave the records by one or two degrees
+ARRIVAL_CAD = 1.0  # distance to the optimum that counts as arrived
+_AMPLITUDE_CAD = 2.0
+_WISHED_CYCLES = 400.0
+_HOLD_CYCLES, _HOLD_SEED = 4000, 10_000  # of the noise measurement, apart from all seeds of the runs
+_HESSIAN_RATE, _RICCATI_RATE, _NEWTON_PERIODS = 0.03, 0.02, 10  # rates of a period of ten cycles
+_SEEKERS = ("batch", "newton", "spsa", "golden", "bounded")
+_DITHERED = ("batch", "newton")
+
+
+@dataclass(frozen=True, kw_only=True)
+class Objective:
+    """What is maximised: signals by weight, their limits, and whether the seekers know of the lag."""
+
+    name: str
+    weights: Mapping[str, float]
+    limits: Mapping[str, float] = field(default_factory=dict)
+    compensated: bool = False
+    seekers: tuple[str, ...] = _SEEKERS
+
+
+_BOTH = {"imep_bar": 1.0, "nox_ppm": -_NOX_WEIGHT}
+OBJECTIVES = (
+    Objective(name="IMEP, pressure rise ≤ 5", weights={"imep_bar": 1.0}, limits={"mprr": _MPRR_LIMIT}),
+    Objective(name="IMEP − 0.001 NOx, lag known", weights=_BOTH, compensated=True, seekers=_DITHERED),
+    Objective(name="IMEP − 0.001 NOx, lag ignored", weights=_BOTH),
+)
+
+
+@dataclass(frozen=True, kw_only=True)
+class Case:
+    """One seeker on one objective, tuned."""
+
+    objective: Objective
+    seeker: str
+    best: Optimum
+    free: Optimum
+    curvature: float
+    tuning: Tuning
+    noise_sd: float
+    lags: tuple[ComponentLag, ...]
+
+
+def lag_of(surrogate: EngineSurrogate, name: str) -> ComponentLag:
+    """Return what stands between the command and a signal beyond the lag of the fastest one."""
+    signal = surrogate.signals[name]
+    first = min(model.lag_cycles for model in surrogate.signals.values())
+    tau = signal.sensor.tau_cycles if signal.sensor is not None else 0.0
+    return ComponentLag(delay_cycles=float(signal.lag_cycles - first), lag_cycles=tau)
+
+
+def tuned_case(surrogate: EngineSurrogate, objective: Objective, seeker: str, held: NDArray[np.float64]) -> Case:
+    """Tune a seeker by the curvature of the surface and by the noise of J held at the start, `held`."""
+    best = surrogate.find_optimum(objective.weights, objective.limits)
+    free = surrogate.find_optimum(objective.weights)
+    around = surrogate.predict(free["soi_cad"] + np.array([-0.5, 0.0, 0.5]))
+    j = np.sum([weight * around[name].to_numpy() for name, weight in objective.weights.items()], axis=0)
+    curvature = float(j[0] - 2.0 * j[1] + j[2]) / 0.25
+    lags = tuple(lag_of(surrogate, name) for name in objective.weights) if objective.compensated else ()
+    if seeker in ("spsa", "golden"):
+        noise = float(np.std(np.diff(held))) / math.sqrt(2.0)
+        tuning = _tuned(noise, curvature, best, ComponentLag(), "spsa")
+    else:
+        late = max(lags, key=lambda lag: lag.delay_cycles + lag.lag_cycles, default=ComponentLag())
+        period = _tuned(1.0, curvature, best, late, "batch").period
+        noise = noise_at(held, period)
+        tuning = _tuned(noise, curvature, best, late, "batch")
+    return Case(
+        objective=objective,
+        seeker=seeker,
+        best=best,
+        free=free,
+        curvature=curvature,
+        tuning=tuning,
+        noise_sd=noise,
+        lags=lags,
+    )
+
+
+def _tuned(noise: float, curvature: float, best: Optimum, lag: ComponentLag, method: str) -> Tuning:
+    return tune(
+        noise,
+        curvature,
+        method=method,
+        delay_cycles=lag.delay_cycles,
+        lag_cycles=lag.lag_cycles,
+        cycles=_WISHED_CYCLES,
+        distance=abs(START_CAD - best["soi_cad"]),
+        arrival=ARRIVAL_CAD,
+        amplitude_max=_AMPLITUDE_CAD,
+    )
+
+
+def held_objective(surrogate: EngineSurrogate, objective: Objective) -> NDArray[np.float64]:
+    """Measure J while the timing is held at the start."""
+    engine = SurrogateEngine(surrogate, start_soi_cad=START_CAD, seed=_HOLD_SEED)
+    rows = [engine.step(START_CAD) for _ in range(_HOLD_CYCLES)]
+    return np.array([sum(w * row[name] for name, w in objective.weights.items()) for row in rows])
+
+
+def noise_at(held: NDArray[np.float64], period: int) -> float:
+    """Return the white noise that would disturb a dither of this period as much as the measured one does."""
+    windows = held[: held.size // period * period].reshape(-1, period)
+    wave = np.exp(2j * np.pi * np.arange(period) / period)
+    return float(np.sqrt(np.mean(np.abs(windows @ wave) ** 2) / period))
+
+
+def seeker_of(case: Case, seed: int) -> Seeker:
+    """Make the seeker of a case; `seed` is that of SPSA."""
+    space: dict[str, Any] = {"start": START_CAD, "lower": LOWER_CAD, "upper": UPPER_CAD}
+    space["limits"] = [Limit(name, upper) for name, upper in case.objective.limits.items()]
+    t, bend = case.tuning, abs(case.curvature)
+    components = list(case.lags) or None
+    if case.seeker == "batch":
+        return ExtremumSeeking(
+            **space, amplitude=t.amplitude, period=t.period, gain=t.gain, rate=t.rate, components=components
+        )
+    if case.seeker == "newton":
+        slow = t.period / 10.0
+        return NewtonSeeking(
+            **space,
+            amplitude=t.amplitude,
+            period=t.period,
+            time_constant_cycles=t.time_constant_cycles,
+            hessian_rate=_HESSIAN_RATE / slow,
+            riccati_rate=_RICCATI_RATE / slow,
+            initial_hessian=-bend,
+            initial_inverse=-1.0 / bend,
+            largest_inverse=2.0 / bend,
+            hold_cycles=_NEWTON_PERIODS * t.period,
+            components=components,
+        )
+    if case.seeker == "spsa":
+        return Spsa(**space, schedule="constant", gain=t.gain, perturbation=t.amplitude, step_max=t.rate, seed=seed)
+    if case.seeker == "golden":
+        return GoldenSection(**space, noise_sd=case.noise_sd)
+    omega = 2.0 * math.pi / t.period
+    kappa = 2.0 / (t.amplitude**2 * omega * bend * t.time_constant_cycles)
+    return BoundedSeeking(**space, amplitude=t.amplitude, period=t.period, kappa=kappa)

@@ -1,0 +1,169 @@
+"""Report of the measured-traces study: what its page says, from the summary alone."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from typing import TYPE_CHECKING, Any
+
+from mgdd.studies.sections import Section, Table, as_number
+
+if TYPE_CHECKING:
+    from matplotlib.figure import Figure
+
+__all__ = ["measured_sections"]
+
+_ANALYSIS = {
+    "p_max_bar": ("p_max [bar]", ".1f"),
+    "p_max_cad": ("at [°CA aTDC]", ".1f"),
+    "imep_closed_bar": ("closed IMEP [bar]", ".2f"),
+    "ca10_cad": ("CA10 [°CA aTDC]", ".1f"),
+    "ca50_cad": ("CA50 [°CA aTDC]", ".1f"),
+    "ca90_cad": ("CA90 [°CA aTDC]", ".1f"),
+    "heat_net_j": ("net heat [J]", ".0f"),
+    "n_compression": ("n_c [-]", ".3f"),
+    "n_expansion": ("n_e [-]", ".3f"),
+}
+_BURN = {
+    "soc_cad": ("SOC [°CA aTDC]", ".2f"),
+    "burn_duration_cad": ("duration [°CA]", ".1f"),
+    "fuel_heat_j": ("fuel heat [J]", ".0f"),
+    "ca50_cad": ("CA50 [°CA aTDC]", ".1f"),
+    "rmse_bar": ("RMSE [bar]", ".2f"),
+    "heat_loss_fraction": ("wall heat over fuel heat [-]", ".3f"),
+}
+_WALL = {
+    "value": ("scale [-]", ".2f"),
+    "stderr": ("standard error [-]", ".3f"),
+    "correlation": ("strongest correlation [-]", ".2f"),
+}
+_TIMING = {
+    "fitted_soc_cad": ("SOC as fitted [°CA aTDC]", 1),
+    "soc_cad": ("best SOC, own p_max kept [°CA aTDC]", 1),
+    "gain_percent": ("gain [%]", 2),
+    "p_max_limit_bar": ("p_max limit [bar]", 1),
+    "free_soc_cad": ("best SOC, no limit [°CA aTDC]", 1),
+    "free_ca50_cad": ("CA50, no limit [°CA aTDC]", 1),
+    "free_gain_percent": ("gain, no limit [%]", 2),
+}
+
+_TIMING_TEXT = (
+    "The traces do not carry the wall heat, so each best timing is a range over a wall-heat scale of {span} with "
+    "everything else refitted ({law}). Gains are in closed-cycle efficiency over the measured timing."
+)
+_LAWS_TEXT = (
+    "Pressure error over the closed cycle, error of the closed IMEP, fitted burn start against injection, and the "
+    "largest local error. A small pressure error alone proves nothing."
+)
+
+
+def measured_sections(s: Mapping[str, Any], figures: Mapping[str, Figure]) -> tuple[Section, ...]:
+    """Make the sections of a report from the summary of the study."""
+    span = _span(s["best_timing"][0]["wall_heat_scale"], 1)
+    engine = ", ".join(f"{name} {value:g}" for name, value in s["engine"].items())
+    profiles = s["common"]["wall_heat_scale"]
+    return (
+        Section(
+            title="Traces",
+            text=(
+                f"{s['data']} Angles are °CA aTDC (firing TDC = 0, compression negative). mgdd {s['mgdd']}.",
+                f"Engine: {engine}.",
+            ),
+        ),
+        Section(
+            title="Best timing",
+            text=(_TIMING_TEXT.format(span=span, law=s["law"]),),
+            table=_timing(s["best_timing"]),
+        ),
+        Section(title="What to distrust", items=tuple(_distrust(s))),
+        Section(
+            title="Every burn law, side by side",
+            text=(_LAWS_TEXT,),
+            table=_laws(s["laws"]),
+        ),
+        Section(
+            title="Wall heat",
+            text=() if profiles else ("Not profiled in this quick run.",),
+            table=_wall_heat(profiles) if profiles else None,
+        ),
+        Section(
+            title=f"Calibrated burn ({s['law']})",
+            table=_per_trace(s["traces"], "calibrated", _BURN),
+        ),
+        Section(
+            title="Analysis of the measured traces",
+            text=("Net heat release with gamma 1.33 from -10 CAD on; the trace is taken as absolute.",),
+            table=_per_trace(s["traces"], "analysis", _ANALYSIS),
+        ),
+        *((Section(title="Figures", figures=figures),) if figures else ()),
+    )
+
+
+def _distrust(s: Mapping[str, Any]) -> list[str]:
+    out = []
+    for law, profile in s["common"]["wall_heat_scale"].items():
+        if not profile["identifiable"]:
+            out.append(
+                f"The wall-heat scale is not identifiable from these traces ({law}): {'; '.join(profile['reasons'])}."
+            )
+    told = "wall_heat_scale is not identifiable from these traces"
+    out += [f"{text}." for text in s["warnings"] if not (out and text.endswith(told))]
+    for row in s["traces"]:
+        out += [f"{row['file']}: {text}." for text in row["warnings"]]
+    out.append("Standard errors take the residual as white noise; it is model error, so true uncertainties are larger.")
+    errors = [abs(point["p_max_model_error_bar"]) for row in s["best_timing"] for point in row["points"]]
+    out.append(
+        f"At the measured timing the model's p_max is wrong by up to {max(errors):.1f} bar: gains of a tenth of a "
+        "percent under the trace's own p_max lie within that error."
+    )
+    out.append("NOx is a proxy from the maximum bulk gas temperature with unfitted constants: read its trend only.")
+    out.append("The gas exchange is not in these traces: gains leave out pumping work, emissions and exhaust enthalpy.")
+    return out
+
+
+def _timing(rows: Sequence[Mapping[str, Any]]) -> Table:
+    def cell(value: Any, digits: int) -> str:
+        return _span(value, digits) if isinstance(value, list) else as_number(value, f".{digits}f")
+
+    body = [(row["file"], *(cell(row[name], digits) for name, (_, digits) in _TIMING.items())) for row in rows]
+    return Table(columns=("trace", *(head for head, _ in _TIMING.values())), rows=tuple(body))
+
+
+def _laws(laws: Sequence[Mapping[str, Any]]) -> Table:
+    head = ["law", "wall-heat scale [-]", "trace", "RMSE [% of p_max]", "closed IMEP error [%]", "SOC [°CA aTDC]"]
+    onset = all("onset_against_soi_cad" in law for law in laws)
+    head += ["SOC minus SOI [°CA]"] if onset else []
+    head += ["largest error [bar]", "at [°CA aTDC]"]
+    body = []
+    for law in laws:
+        for i, file in enumerate(law["file"]):
+            row = [law["law"], f"{law['wall_heat_scale']:.2f}"] if i == 0 else ["", ""]
+            row += [file, f"{law['rmse_percent'][i]:.2f}", f"{law['imep_closed_error_percent'][i]:+.1f}"]
+            row += [f"{law['soc_cad'][i]:.1f}"]
+            row += [as_number(law["onset_against_soi_cad"][i], "+.1f")] if onset else []
+            body.append((*row, f"{law['largest_error_bar'][i]:+.1f}", f"{law['largest_error_cad'][i]:.0f}"))
+    return Table(columns=tuple(head), rows=tuple(body))
+
+
+def _wall_heat(profiles: Mapping[str, Mapping[str, Any]]) -> Table:
+    body = [
+        (
+            law,
+            *(as_number(profile[name], form) for name, (_, form) in _WALL.items()),
+            str(profile["correlated_with"]),
+            _span((profile["range_low"], profile["range_high"]), 2),
+            "yes" if profile["identifiable"] else "no",
+        )
+        for law, profile in profiles.items()
+    ]
+    heads = ("law", *(head for head, _ in _WALL.values()), "with", "possible range [-]", "identifiable")
+    return Table(columns=heads, rows=tuple(body))
+
+
+def _per_trace(rows: Sequence[Mapping[str, Any]], part: str, columns: Mapping[str, tuple[str, str]]) -> Table:
+    body = [(row["file"], *(as_number(row[part][name], form) for name, (_, form) in columns.items())) for row in rows]
+    return Table(columns=("trace", *(head for head, _ in columns.values())), rows=tuple(body))
+
+
+def _span(pair: Sequence[float], digits: int) -> str:
+    low, high = (as_number(value, f".{digits}f") for value in pair)
+    return low if low == high else f"{low} to {high}"

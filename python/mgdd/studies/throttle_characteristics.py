@@ -1,0 +1,240 @@
+"""Why a throttle needs an adaptive controller: hysteresis of the holding duty, rate dependence, and air flow."""
+
+from __future__ import annotations
+
+import math
+from functools import partial
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+
+from mgdd import presets
+from mgdd.results import labelled_dataset
+from mgdd.results.labels import to_jsonable
+from mgdd.studies.base import Progress, StudyResult, finish, run_parts
+from mgdd.throttle import Throttle, groups, holding_duty, simulate
+
+if TYPE_CHECKING:
+    import xarray as xr
+    from matplotlib.figure import Figure
+    from numpy.typing import NDArray
+
+__all__ = ["run_throttle_characteristics"]
+
+FREQUENCIES_HZ = (0.1, 0.2, 0.5, 1.0, 2.0, 5.0, 10.0)
+OFFSET, AMPLITUDE = 0.15, 0.18
+AIR_NM = (0.0, -0.1, -0.2, -0.3, -0.4)
+AIR_ANGLE_DEG, AIR_FROM_S, AIR_LENGTH_S = 45.0, 0.5, 3.0
+RAMP_PER_S, WIDTH_AT_DEG = 0.005, 45.0
+_PHASES = 400
+# How the plate came to rest decides how much of the friction band is left to a closing torque.
+_ARRIVALS = {"opening": "duty_rising", "unloaded": "duty_spring", "closing": "duty_falling"}
+
+
+def run_throttle_characteristics(
+    *,
+    quick: bool = False,
+    figures: bool = True,
+    progress: Progress | None = None,
+) -> StudyResult:
+    """Show three habits of a throttle that a fixed controller cannot know.
+
+    Hysteresis: the duty of a slow ramp differs between opening and closing by twice the friction. Rate dependence: the
+    swing under ``0.15 + 0.18 sin(2 pi f t)`` from limp-home shrinks with the frequency. Air flow: at constant duty a
+    closing torque moves the plate, and how far depends on how the plate came to rest.
+
+    Parameters
+    ----------
+    quick : bool
+        Preset P1 only.
+    figures : bool
+        Draw figures.
+    progress : callable, optional
+        Called with a short text before each part.
+
+    Returns
+    -------
+    StudyResult
+        Rows ``effect preset condition value unit closed_form``; ``closed_form`` is None where there is none.
+
+    Raises
+    ------
+    mgdd.errors.ParameterError
+        None: nothing can be chosen wrongly.
+
+    References
+    ----------
+    Tan (2018), section 2.2 and figures 2-4 and 2-5, which show both effects of a measured throttle; the numbers are
+    those of the presets of this package.
+
+    Examples
+    --------
+    >>> from mgdd.studies import run_study
+    >>> rows = run_study("throttle-characteristics", quick=True, figures=False).summary["rows"]
+    >>> [round(row["value"], 1) for row in rows if row["effect"] == "rate dependence"]
+    [82.2, 82.3, 62.0, 33.0, 16.2, 5.8, 2.4]
+    """
+    names = presets.available("throttle")[: 1 if quick else None]
+    parts = [(f"throttle {name}", partial(_one, name)) for name in names]
+    done, interrupted = run_parts(parts, progress)
+    dataset = _dataset([one for _, one in done], [str(name) for name in names[: len(done)]])
+    summary = {
+        "study": "throttle-characteristics",
+        "seeds": 0,
+        "rows": [row for rows, _ in done for row in rows],
+        "ramp_per_s": RAMP_PER_S,
+        "offset": OFFSET,
+        "amplitude": AMPLITUDE,
+        "air_angle_deg": AIR_ANGLE_DEG,
+        "interrupted": interrupted,
+    }
+    return finish(
+        StudyResult(
+            name="throttle-characteristics",
+            dataset=dataset,
+            figures=_draw(dataset) if figures else {},
+            summary=to_jsonable(summary),
+        )
+    )
+
+
+def _one(name: str) -> tuple[list[dict[str, Any]], dict[str, Any]]:
+    """Give rows and curves of one preset."""
+    throttle = presets.load(name).throttle
+    ramp, width = _ramp(throttle)
+    expected = 2.0 * float(groups(throttle)["coulomb"])
+    rows = [_row("hysteresis", name, f"width at {WIDTH_AT_DEG:g} deg", width, "-", expected)]
+    loops = []
+    for frequency in FREQUENCIES_HZ:
+        loop = _loop(throttle, frequency)
+        loops.append(loop)
+        rows.append(_row("rate dependence", name, f"span at {frequency:g} Hz", float(np.ptp(loop[1])), "deg"))
+    air = {arrival: _air(throttle, column) for arrival, column in _ARRIVALS.items()}
+    onset = round(AIR_FROM_S / 1e-3)
+    for arrival, runs in air.items():
+        for torque, angle in zip(AIR_NM, runs, strict=True):
+            condition = f"{torque:g} N m, at rest after {arrival}"
+            rows.append(_row("air flow", name, condition, float(angle[-1] - angle[onset]), "deg"))
+    return rows, {"ramp": ramp, "loops": np.array(loops), "air": np.array(list(air.values()))}
+
+
+def _row(
+    effect: str, preset: str, condition: str, value: float, unit: str, closed_form: float | None = None
+) -> dict[str, Any]:
+    return {
+        "effect": effect,
+        "preset": preset,
+        "condition": condition,
+        "value": value,
+        "unit": unit,
+        "closed_form": closed_form,
+    }
+
+
+def _ramp(throttle: Throttle) -> tuple[xr.Dataset, float]:
+    """Ramp the duty up and down slowly; give the run and the duty between both passages of one angle."""
+    top = float(holding_duty(throttle, [throttle.open_deg])["duty_breakaway_up"][0]) + 0.05
+    bottom = float(holding_duty(throttle, [throttle.closed_deg])["duty_breakaway_down"][0]) - 0.05
+    sample = 0.01
+    steps = [round(abs(way) / RAMP_PER_S / sample) for way in (top, top - bottom, bottom)]
+    duty = np.concatenate(
+        [
+            np.linspace(0.0, top, steps[0], endpoint=False),
+            np.linspace(top, bottom, steps[1], endpoint=False),
+            np.linspace(bottom, 0.0, steps[2] + 1),
+        ]
+    )
+    run = simulate(throttle, duty, sample_s=sample)
+    angle = run["angle_deg"].to_numpy()
+    rising = int(np.argmax(angle >= WIDTH_AT_DEG))
+    peak = int(np.argmax(duty))
+    falling = peak + int(np.argmax(angle[peak:] <= WIDTH_AT_DEG))
+    return run, float(duty[rising] - duty[falling])
+
+
+def _loop(throttle: Throttle, frequency_hz: float) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
+    """Give duty and angle over the last period, from 3 s or 3 periods, whichever is longer."""
+    periods = max(3, math.ceil(3.0 * frequency_hz))
+    time = np.arange(round(periods / frequency_hz / 1e-3) + 1) * 1e-3
+    duty = OFFSET + AMPLITUDE * np.sin(2.0 * np.pi * frequency_hz * time)
+    run = simulate(throttle, duty, time_s=time)
+    at = (periods - 1 + np.linspace(0.0, 1.0, _PHASES + 1)) / frequency_hz
+    return np.interp(at, time, duty), np.interp(at, time, run["angle_deg"].to_numpy())
+
+
+def _air(throttle: Throttle, column: str) -> list[NDArray[np.float64]]:
+    """Hold a constant duty at one angle, let air flow from a time on, and give the angle for each torque."""
+    duty = float(holding_duty(throttle, [AIR_ANGLE_DEG])[column][0])
+    time = np.arange(round(AIR_LENGTH_S / 1e-3) + 1) * 1e-3
+    flows = time >= AIR_FROM_S
+    return [
+        simulate(
+            throttle,
+            np.full(time.size, duty),
+            time_s=time,
+            start_deg=AIR_ANGLE_DEG,
+            airflow_torque_nm=np.where(flows, torque, 0.0),
+        )["angle_deg"].to_numpy()
+        for torque in AIR_NM
+    ]
+
+
+def _dataset(done: list[dict[str, Any]], names: list[str]) -> xr.Dataset:
+    time = np.arange(done[0]["air"].shape[-1]) * 1e-3
+    ramp = done[0]["ramp"]
+    return labelled_dataset(
+        {
+            "preset": ("preset", names, "-", "preset"),
+            "frequency_hz": ("frequency_hz", list(FREQUENCIES_HZ), "Hz", "frequency of the duty"),
+            "phase": ("phase", np.linspace(0.0, 1.0, _PHASES + 1), "-", "part of the last period"),
+            "loop_duty": (("frequency_hz", "phase"), done[0]["loops"][:, 0], "-", "duty"),
+            "loop_angle_deg": (
+                ("preset", "frequency_hz", "phase"),
+                [one["loops"][:, 1] for one in done],
+                "deg",
+                "plate angle",
+            ),
+            "arrival": ("arrival", list(_ARRIVALS), "-", "how the plate came to rest"),
+            "airflow_torque_nm": ("airflow_torque_nm", list(AIR_NM)),
+            "time_s": ("time_s", time),
+            "air_angle_deg": (
+                ("preset", "arrival", "airflow_torque_nm", "time_s"),
+                [one["air"] for one in done],
+                "deg",
+                "plate angle",
+            ),
+            "ramp_time_s": ("ramp_time_s", ramp["time_s"].to_numpy(), "s", "time of the slow ramp"),
+            "ramp_duty": ("ramp_time_s", ramp["duty"].to_numpy(), "-", f"duty of the slow ramp, {names[0]}"),
+            "ramp_angle_deg": ("ramp_time_s", ramp["angle_deg"].to_numpy(), "deg", f"plate angle, {names[0]}"),
+        },
+        attrs={"air_from_s": AIR_FROM_S},
+    )
+
+
+def _draw(dataset: xr.Dataset) -> dict[str, Figure]:
+    from matplotlib.figure import Figure
+
+    from mgdd import plot
+    from mgdd.plot.throttle_habits import air_flow, rate_dependence
+
+    out = {}
+    ramp = labelled_dataset(
+        {
+            "time_s": ("time_s", dataset["ramp_time_s"].to_numpy()),
+            "duty": ("time_s", dataset["ramp_duty"].to_numpy()),
+            "angle_deg": ("time_s", dataset["ramp_angle_deg"].to_numpy()),
+        }
+    )
+    first = str(dataset["preset"].to_numpy()[0])
+    figure = Figure(figsize=(6.8, 4.2), layout="constrained")
+    rest = presets.load(first).throttle.limp_home_deg
+    plot.holding_duty(ramp, limp_home_deg=rest, ax=figure.add_subplot())
+    out[f"Duty of a slow ramp over the angle, {first}: opening and closing differ by twice the friction"] = figure
+    for name in dataset["preset"].to_numpy():
+        figure = Figure(figsize=(6.8, 4.2), layout="constrained")
+        rate_dependence(dataset.sel(preset=name), ax=figure.add_subplot())
+        out[f"Rate dependence of {name}: the loop of angle over duty shrinks with the frequency"] = figure
+        figure = Figure(figsize=(6.8, 4.2), layout="constrained")
+        air_flow(dataset.sel(preset=name, arrival="closing"), ax=figure.add_subplot())
+        out[f"Air flow moves the plate of {name} at constant duty, at rest after closing"] = figure
+    return out

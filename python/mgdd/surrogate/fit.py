@@ -1,0 +1,242 @@
+"""Fit a surrogate to records of an engine under random steps: lags, surfaces, what is held out, what is left."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from mgdd.errors import DataError, ParameterError
+from mgdd.results import Label
+from mgdd.signals.even_grid import check_count
+from mgdd.surrogate.response_surface import QuadraticBasis, least_squares_of, r_squared, support_of
+from mgdd.surrogate.sensor_lag import SensorLag, find_sensor_lag, lagged
+from mgdd.surrogate.signal_model import SignalModel
+from mgdd.surrogate.surrogate import STEERED, EngineSurrogate
+
+if TYPE_CHECKING:
+    import xarray as xr
+    from numpy.typing import NDArray
+
+__all__ = ["fit_surrogate"]
+
+_FOLDS = 5
+_MAX_DELAY = 8  # cycles, of a slow signal
+_SETTLE = 40  # cycles of excitation that a slow signal needs before its first row counts
+
+
+@dataclass(frozen=True, kw_only=True, eq=False)
+class _Log:
+    """Terms of the command and the rows that count, by row of the log."""
+
+    terms: NDArray[np.float64]
+    commands: NDArray[np.float64]
+    excited: NDArray[np.bool_]
+    split: int  # rows from here on are held out
+
+
+def fit_surrogate(
+    records: xr.Dataset,
+    *,
+    inputs: Sequence[str] = (STEERED, "doi_main_ms", "doi_h2_ms", "p2m_us"),
+    outputs: Sequence[str] = ("imep_bar", "mfb50_cad", "mprr", "nox_ppm"),
+    slow: Sequence[str] = ("nox_ppm",),
+    nonnegative: Sequence[str] = ("mprr", "nox_ppm"),
+    max_lag: int = 5,
+    held_out: float = 0.25,
+    box: float = 0.99,
+    seed: int = 0,
+) -> EngineSurrogate:
+    """Fit quadratic surfaces of engine signals over its commands, each with its lag from command to log.
+
+    The lag of a fast signal is the one whose surface predicts best in five-fold cross-validation over contiguous
+    stretches. A slow signal gets a delay and a first-order lag, found together with its surface by least squares;
+    their uncertainty comes from resampling stretches of 250 cycles. Lags are chosen without the held-out last part
+    of the records; the surfaces that are kept use all of them.
+
+    Parameters
+    ----------
+    records : xarray.Dataset
+        Inputs and outputs over ``cycle``, which counts up by one. Rows without ``excited`` (where the records say)
+        and NaN outputs are left out.
+    inputs : sequence of str
+        Commands, ``soi_cad`` first.
+    outputs : sequence of str
+        Signals.
+    slow : sequence of str
+        Those behind a slow sensor.
+    nonnegative : sequence of str
+        Those that cannot be negative; a name that is no output is ignored.
+    max_lag : int
+        Highest lag tried for a fast signal [cycles]; 0 to this.
+    held_out : float
+        Share of the rows, at the end, on which ``r2_held_out`` is computed [-].
+    box : float
+        Central share of each input that its supported range holds, and of the leverages in it [-].
+    seed : int
+        Seed of the resampling.
+
+    Returns
+    -------
+    EngineSurrogate
+        Surfaces, support and residuals.
+
+    Raises
+    ------
+    mgdd.errors.ParameterError
+        Inputs that do not begin with ``soi_cad``, a slow signal that is no output, a share outside (0, 1).
+    mgdd.errors.DataError
+        A missing column, cycles that do not count up by one, a command that is not finite or does not vary, too few
+        usable rows.
+
+    Examples
+    --------
+    >>> from mgdd.surrogate import fit_surrogate, random_step_records
+    >>> surrogate = fit_surrogate(random_step_records(3000))
+    >>> [signal.lag_cycles for signal in surrogate.signals.values()]
+    [1, 1, 1, 3]
+    """
+    names, signals = tuple(inputs), tuple(outputs)
+    _check_request(names, signals, tuple(slow), max_lag, held_out, box)
+    commands, excited = _read(records, names, signals)
+    used = commands[excited]
+    centre, scale = used.mean(axis=0), used.std(axis=0)
+    flat = [name for name, sd in zip(names, scale, strict=True) if not sd > 0.0]
+    if flat:
+        raise DataError(f"{flat[0]} does not vary in the records: leave it out of inputs")
+    basis = QuadraticBasis(centre=centre, scale=scale)
+    split = round((1.0 - held_out) * len(commands))
+    log = _Log(terms=basis(commands), commands=commands, excited=excited, split=split)
+    models, left = {}, []
+    for name in signals:
+        values = records[name].to_numpy().astype(np.float64)
+        label = Label(records[name].attrs["units"], records[name].attrs["long_name"])
+        models[name], residual = _fit_signal(log, values, name, label, slow=name in slow, max_lag=max_lag, seed=seed)
+        left.append(residual)
+    return EngineSurrogate(
+        signals=models,
+        support=support_of(used, basis, inputs=names, share=box),
+        medians={name: float(m) for name, m in zip(names, np.median(used, axis=0), strict=True)},
+        input_labels={n: Label(records[n].attrs["units"], records[n].attrs["long_name"]) for n in names},
+        nonnegative=tuple(name for name in nonnegative if name in signals),
+        residuals=np.column_stack(left),
+        source=dict(records.attrs),
+    )
+
+
+def _fit_signal(
+    log: _Log, values: NDArray[np.float64], name: str, label: Label, *, slow: bool, max_lag: int, seed: int
+) -> tuple[SignalModel, NDArray[np.float64]]:
+    rows = np.arange(values.size)
+    early = rows < log.split
+    scores = {lag: _cross_validated(log, values, lag, early, name) for lag in range(max_lag + 1)}
+    lag = max(scores, key=lambda trial: scores[trial])
+    sensor: SensorLag | None = None
+    if slow:
+        use = _settled(log.excited) & np.isfinite(values)
+        sensor = find_sensor_lag(log.terms, values, use & early, max_delay=_MAX_DELAY, seed=seed)
+        lag = sensor.delay_cycles
+        terms = lagged(log.terms, delay_cycles=lag, tau_cycles=sensor.tau_cycles)
+    else:
+        use = _usable(log, values, lag)
+        terms = log.terms[np.maximum(rows - lag, 0)]
+    _enough(use & early, log, name)
+    _enough(use & ~early, log, name)
+    before = least_squares_of(terms[use & early], values[use & early])
+    coefficients = least_squares_of(terms[use], values[use])
+    residual = np.where(use, values - terms @ coefficients, np.nan)
+    model = SignalModel(
+        name=name,
+        label=label,
+        coefficients=coefficients,
+        lag_cycles=lag,
+        lag_scores=scores,
+        lag_at_bound=sensor.at_bound if sensor is not None else lag == max_lag,
+        sensor=sensor,
+        r2=r_squared(values[use], (terms @ coefficients)[use]),
+        r2_held_out=r_squared(values[use & ~early], (terms @ before)[use & ~early]),
+        residual_sd=float(np.nanstd(residual)),
+        cyclic_sd=_cyclic(residual, log, lag),
+    )
+    return model, residual
+
+
+def _cross_validated(log: _Log, values: NDArray[np.float64], lag: int, early: NDArray[np.bool_], name: str) -> float:
+    """Return the R² of predictions of each fifth of the rows from the other four."""
+    use = np.flatnonzero(_usable(log, values, lag) & early)
+    _enough(np.isin(np.arange(values.size), use), log, name)
+    model = np.empty(use.size)
+    for fold in np.array_split(np.arange(use.size), _FOLDS):
+        others = np.delete(use, fold)
+        model[fold] = log.terms[use[fold] - lag] @ least_squares_of(log.terms[others - lag], values[others])
+    return r_squared(values[use], model)
+
+
+def _usable(log: _Log, values: NDArray[np.float64], lag: int) -> NDArray[np.bool_]:
+    """Tell the rows with a value whose command, `lag` rows before, was excited as well."""
+    source = np.arange(values.size) - lag
+    return np.isfinite(values) & log.excited & (source >= 0) & log.excited[np.maximum(source, 0)]
+
+
+def _settled(excited: NDArray[np.bool_]) -> NDArray[np.bool_]:
+    """Tell the rows with enough excited rows behind them."""
+    rows = np.arange(excited.size)
+    last = np.maximum.accumulate(np.where(excited, -1, rows))
+    return np.asarray(excited & (rows - last > _SETTLE), dtype=np.bool_)
+
+
+def _cyclic(residual: NDArray[np.float64], log: _Log, lag: int) -> float:
+    """Scatter from cycle to cycle under a held SOI: what the surface misses is the same in both and drops out."""
+    held = np.abs(np.diff(log.commands[:, 0])) == 0.0
+    source = np.maximum(np.arange(residual.size - 1) - lag, 0)
+    step = np.diff(residual)[held[source]]
+    step = step[np.isfinite(step)]
+    return float(np.std(step) / np.sqrt(2.0)) if step.size > 1 else float("nan")
+
+
+def _enough(use: NDArray[np.bool_], log: _Log, name: str) -> None:
+    least = 10 * log.terms.shape[1]
+    if np.count_nonzero(use) < least:
+        raise DataError(
+            f"{name}: {np.count_nonzero(use)} usable cycles in a part of the records: {least} are needed; "
+            "give more cycles, fewer inputs or another held_out"
+        )
+
+
+def _check_request(
+    inputs: tuple[str, ...], outputs: tuple[str, ...], slow: tuple[str, ...], max_lag: int, held_out: float, box: float
+) -> None:
+    if not inputs or inputs[0] != STEERED or len(set(inputs)) != len(inputs):
+        raise ParameterError(f"inputs = {inputs}: must begin with {STEERED!r} and name each command once")
+    if not outputs or len(set(outputs)) != len(outputs) or set(outputs) & set(inputs):
+        raise ParameterError(f"outputs = {outputs}: must name signals, each once, and no input")
+    unknown = [name for name in slow if name not in outputs]
+    if unknown:
+        raise ParameterError(f"slow: {unknown[0]!r} is no output: must be one of {', '.join(outputs)}")
+    if max_lag < 0:
+        raise ParameterError(f"max_lag = {max_lag}: must be >= 0")
+    for what, share in (("held_out", held_out), ("box", box)):
+        if not 0.0 < share < 1.0:
+            raise ParameterError(f"{what} = {share:g}: must be in (0, 1)")
+
+
+def _read(
+    records: xr.Dataset, inputs: tuple[str, ...], outputs: tuple[str, ...]
+) -> tuple[NDArray[np.float64], NDArray[np.bool_]]:
+    for name in ("cycle", *inputs, *outputs):
+        if name not in records.variables:
+            raise DataError(f"records have no {name}: they have {', '.join(map(str, records.variables))}")
+        if records[name].dims != ("cycle",):
+            raise DataError(f"{name} has dims {records[name].dims}: must be ('cycle',)")
+    cycle = records["cycle"].to_numpy()
+    check_count(cycle)
+    commands = np.column_stack([records[name].to_numpy().astype(np.float64) for name in inputs])
+    excited = records["excited"].to_numpy().astype(np.bool_) if "excited" in records else np.ones(cycle.size, np.bool_)
+    if not np.all(np.isfinite(commands)):
+        column = int(np.argmin(np.all(np.isfinite(commands), axis=0)))
+        raise DataError(f"{inputs[column]} is not finite in every cycle: repair or cut the records")
+    if not excited.any():
+        raise DataError("excited is False in every cycle: nothing to fit")
+    return commands, excited

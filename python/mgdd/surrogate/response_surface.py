@@ -1,0 +1,142 @@
+"""Quadratic response surface: a full second-order polynomial in standardised inputs, and where it was fitted."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from functools import lru_cache
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from mgdd.results.describe import described
+
+if TYPE_CHECKING:
+    from collections.abc import Sequence
+
+    from numpy.typing import NDArray
+
+__all__ = ["QuadraticBasis", "Support", "least_squares_of", "r_squared", "support_of"]
+
+
+@dataclass(frozen=True, kw_only=True, eq=False)
+class QuadraticBasis:
+    """The terms 1, z_i and z_i z_j of the inputs z = (x - centre)/scale."""
+
+    centre: NDArray[np.float64]
+    scale: NDArray[np.float64]
+
+    def __call__(self, points: NDArray[np.float64]) -> NDArray[np.float64]:
+        """Return the terms, shape (n, 1 + m + m (m + 1)/2), of points of shape (n, m)."""
+        z = (points - self.centre) / self.scale
+        first, second = _pairs(z.shape[1])
+        return np.column_stack([np.ones(len(z)), z, z[:, first] * z[:, second]])
+
+
+@described
+@dataclass(frozen=True, kw_only=True, eq=False)
+class Support:
+    """Where a surrogate may be believed: a box of quantiles, and leverage no higher than records in it have.
+
+    Parameters
+    ----------
+    inputs : tuple of str
+        Names, in the order of the points.
+    lower, upper : ndarray, shape (m,)
+        The box, in the units of the inputs.
+    leverage_limit : float
+        Leverage that the same share of the records in the box does not exceed [-]; corners of the box do.
+    basis : QuadraticBasis
+        Turns points into terms.
+    root : ndarray, shape (p, p)
+        W, whose product with the terms has the leverage as its sum of squares; over the n records in the box its
+        mean is p/n.
+
+    Examples
+    --------
+    >>> from mgdd.surrogate import fit_surrogate, random_step_records
+    >>> support = fit_surrogate(random_step_records(1500)).support
+    >>> support.inputs
+    ('soi_cad', 'doi_main_ms', 'doi_h2_ms', 'p2m_us')
+    >>> support.contains([[0.0, 0.37, 3.2, 1000.0], [-30.0, 0.37, 3.2, 1000.0]]).tolist()
+    [True, False]
+    """
+
+    inputs: tuple[str, ...]
+    lower: NDArray[np.float64]
+    upper: NDArray[np.float64]
+    leverage_limit: float
+    basis: QuadraticBasis
+    root: NDArray[np.float64]
+
+    def __post_init__(self) -> None:
+        # One layout in memory, so that a product has the same last bits after a round trip through a file.
+        object.__setattr__(self, "root", np.ascontiguousarray(self.root))
+
+    def leverage(self, points: Sequence[Sequence[float]] | NDArray[np.float64]) -> NDArray[np.float64]:
+        """Say how far points are from the middle of the records, in the metric of the fit.
+
+        Parameters
+        ----------
+        points : array_like, shape (n, m)
+            In the units of the inputs.
+
+        Returns
+        -------
+        ndarray, shape (n,)
+            Diagonal of the hat matrix [-].
+        """
+        return self._leverage_of(self.basis(np.asarray(points, dtype=np.float64)))
+
+    def contains(self, points: Sequence[Sequence[float]] | NDArray[np.float64]) -> NDArray[np.bool_]:
+        """Tell which points lie in the box and do not exceed the leverage limit.
+
+        Parameters
+        ----------
+        points : array_like, shape (n, m)
+            In the units of the inputs.
+
+        Returns
+        -------
+        ndarray of bool, shape (n,)
+            False outside, and for NaN.
+        """
+        at = np.asarray(points, dtype=np.float64)
+        return self.contains_terms(at, self.basis(at))
+
+    def contains_terms(self, at: NDArray[np.float64], terms: NDArray[np.float64]) -> NDArray[np.bool_]:
+        """Tell the same of points whose terms are known."""
+        inside = np.all((at >= self.lower) & (at <= self.upper), axis=1)
+        return np.asarray(inside & (self._leverage_of(terms) <= self.leverage_limit * (1.0 + 1e-9)), dtype=np.bool_)
+
+    def _leverage_of(self, terms: NDArray[np.float64]) -> NDArray[np.float64]:
+        return np.asarray(np.sum((terms @ self.root.T) ** 2, axis=1), dtype=np.float64)
+
+
+@lru_cache
+def _pairs(inputs: int) -> tuple[NDArray[np.intp], NDArray[np.intp]]:
+    first, second = np.triu_indices(inputs)
+    return first, second
+
+
+def support_of(points: NDArray[np.float64], basis: QuadraticBasis, *, inputs: tuple[str, ...], share: float) -> Support:
+    """Find the support of the points that a surface was fitted to."""
+    tail = 0.5 * (1.0 - share)
+    lower, upper = np.quantile(points, [tail, 1.0 - tail], axis=0)
+    inside = points[np.all((points >= lower) & (points <= upper), axis=1)]
+    # W = R^-T of T = QR: |R^-T t|² = t' (T'T)^-1 t
+    triangle = np.linalg.qr(basis(inside), mode="r")
+    root = np.linalg.inv(triangle).T
+    bare = Support(inputs=inputs, lower=lower, upper=upper, leverage_limit=np.inf, basis=basis, root=root)
+    limit = float(np.quantile(bare.leverage(inside), share))
+    return Support(inputs=inputs, lower=lower, upper=upper, leverage_limit=limit, basis=basis, root=root)
+
+
+def least_squares_of(terms: NDArray[np.float64], values: NDArray[np.float64]) -> NDArray[np.float64]:
+    """Return the least-squares coefficients, by normal equations: the terms are standardised, so few digits go."""
+    return np.asarray(np.linalg.solve(terms.T @ terms, terms.T @ values), dtype=np.float64)
+
+
+def r_squared(values: NDArray[np.float64], model: NDArray[np.float64]) -> float:
+    """Return the coefficient of determination, NaN for values that do not vary."""
+    spread = float(np.sum((values - values.mean()) ** 2))
+    return 1.0 - float(np.sum((values - model) ** 2)) / spread if spread > 0.0 else float("nan")

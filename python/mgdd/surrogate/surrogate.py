@@ -1,0 +1,264 @@
+"""Surrogate of a measured engine: quadratic surfaces of its signals over its injection, and what they leave."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+from functools import cached_property
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from mgdd._core import Limit
+from mgdd.errors import ParameterError
+from mgdd.io.parameters import ParameterFile, Parameters
+from mgdd.optimize import Optimum
+from mgdd.optimize.optimum import limits_of
+from mgdd.results import Label, labelled_dataset
+from mgdd.results.describe import described
+from mgdd.surrogate.file import read_surrogate, surrogate_file
+from mgdd.surrogate.optimum import best_along
+from mgdd.surrogate.response_surface import QuadraticBasis, Support
+from mgdd.surrogate.signal_model import SignalModel
+
+if TYPE_CHECKING:
+    import xarray as xr
+    from numpy.typing import ArrayLike, NDArray
+
+__all__ = ["STEERED", "EngineSurrogate"]
+
+STEERED = "soi_cad"
+
+
+@described
+@dataclass(frozen=True, kw_only=True, eq=False)
+class EngineSurrogate(Parameters):
+    """Quadratic surfaces of the signals of an engine over its commands, with their support and residuals.
+
+    Parameters
+    ----------
+    signals : mapping of str to SignalModel
+        By name.
+    support : Support
+        Where the surfaces may be believed.
+    medians : mapping of str to float
+        Median of each input over the records: where a prediction stands unless told otherwise.
+    input_labels : mapping of str to Label
+        Unit and long name of each input.
+    nonnegative : tuple of str
+        Signals that cannot be negative; a surface below zero is out of its support.
+    residuals : ndarray, shape (rows, signals)
+        Record minus model by row of the log, one column per signal, NaN where a record was not used.
+    source : mapping of str to object
+        Attributes of the records.
+
+    Examples
+    --------
+    >>> from mgdd.surrogate import fit_surrogate, random_step_records
+    >>> surrogate = fit_surrogate(random_step_records(1500))
+    >>> surrogate.inputs
+    ('soi_cad', 'doi_main_ms', 'doi_h2_ms', 'p2m_us')
+    """
+
+    signals: Mapping[str, SignalModel]
+    support: Support
+    medians: Mapping[str, float]
+    input_labels: Mapping[str, Label]
+    nonnegative: tuple[str, ...]
+    residuals: NDArray[np.float64]
+    source: Mapping[str, object]
+
+    @property
+    def inputs(self) -> tuple[str, ...]:
+        """Names of the commands, in the order of `Support`."""
+        return self.support.inputs
+
+    @property
+    def basis(self) -> QuadraticBasis:
+        """The terms of the surfaces."""
+        return self.support.basis
+
+    def predict(
+        self, soi_cad: ArrayLike, at: Mapping[str, float] | None = None, *, outside: str = "flag"
+    ) -> xr.Dataset:
+        """Predict the steady value of every signal.
+
+        Parameters
+        ----------
+        soi_cad : array_like, shape () or (n,)
+            Start of injection [°CA aTDC].
+        at : mapping of str to float, optional
+            The other inputs, in their units; their medians if left out.
+        outside : {"flag", "raise"}
+            What to do outside the support: mark it in ``supported``, or refuse.
+
+        Returns
+        -------
+        xarray.Dataset
+            Every signal over ``soi_cad``, with ``supported`` and ``leverage``. A signal that cannot be negative is
+            not: the value is 0 and not supported where its surface is below.
+
+        Raises
+        ------
+        mgdd.errors.ParameterError
+            An unknown input, a value that is not finite, or a point outside the support with ``outside="raise"``.
+
+        Examples
+        --------
+        >>> from mgdd.surrogate import fit_surrogate, random_step_records
+        >>> surrogate = fit_surrogate(random_step_records(1500))
+        >>> surrogate.predict([-4.0, 0.0, 40.0])["supported"].values.tolist()
+        [True, True, False]
+        """
+        if outside not in ("flag", "raise"):
+            raise ParameterError(f"outside = {outside!r}: must be 'flag' or 'raise'")
+        soi = np.atleast_1d(np.asarray(soi_cad, dtype=np.float64))
+        points = self.points(soi, at)
+        values, supported = self.evaluate(points)
+        if outside == "raise" and not supported.all():
+            low, high = self.support.lower, self.support.upper
+            box = ", ".join(f"{n} [{a:.4g}, {b:.4g}]" for n, a, b in zip(self.inputs, low, high, strict=True))
+            worst = float(soi[int(np.argmin(supported))])
+            raise ParameterError(
+                f"soi_cad = {worst:g}: the point is outside the support of the records ({box}), has a leverage above "
+                f"{self.support.leverage_limit:.3g} or a negative {' or '.join(self.nonnegative)}; stay inside, or "
+                "pass outside='flag'"
+            )
+        variables: dict[str, tuple[object, ...]] = {
+            STEERED: (STEERED, soi, *self.input_labels[STEERED]),
+            "supported": (STEERED, supported, "-", "within the support of the records"),
+            "leverage": (STEERED, self.support.leverage(points), "-", "leverage"),
+        }
+        for column, (name, signal) in enumerate(self.signals.items()):
+            variables[name] = (STEERED, values[:, column], *signal.label)
+        held = {name: value for name, value in self.operating_point(at).items() if name != STEERED}
+        return labelled_dataset(variables, attrs=held)
+
+    def find_optimum(
+        self,
+        objective: str | Mapping[str, float] = "imep_bar",
+        limits: Mapping[str, float] | Sequence[Limit] | None = None,
+        at: Mapping[str, float] | None = None,
+    ) -> Optimum:
+        """Find the start of injection that maximises a signal, or a weighted sum, within the support.
+
+        Surfaces are quadratic along SOI, so the optimum is exact.
+
+        Parameters
+        ----------
+        objective : str or mapping of str to float
+            A signal, or the weight of each signal, for example ``{"imep_bar": 1.0, "nox_ppm": -0.002}``.
+        limits : mapping of str to float, or sequence of Limit, optional
+            Upper limits on signals, in their units; the margin of a `Limit` is kept.
+        at : mapping of str to float, optional
+            The other inputs, in their units; their medians if left out.
+
+        Returns
+        -------
+        mgdd.optimize.Optimum
+            Input ``soi_cad``; ``values`` holds every signal there, ``bounds`` the supported range around it, and
+            ``at_bound`` says that the records, not the engine, hold it.
+
+        Raises
+        ------
+        mgdd.errors.ParameterError
+            An unknown signal or input, a weight or limit that is not finite.
+        mgdd.errors.ConvergenceError
+            No supported SOI meets the limits.
+
+        Examples
+        --------
+        >>> from mgdd.surrogate import fit_surrogate, random_step_records
+        >>> best = fit_surrogate(random_step_records(1500)).find_optimum("imep_bar", {"mprr": 5.0})
+        >>> best.active_limits, best.at_bound
+        (('mprr',), False)
+        """
+        weights = {objective: 1.0} if isinstance(objective, str) else dict(objective)
+        kept = limits_of(limits)
+        if not weights:
+            raise ParameterError("objective = {}: must name at least one signal")
+        for what, numbers in (("objective", weights), ("limits", {limit.name: limit.upper for limit in kept})):
+            for name, value in numbers.items():
+                if name not in self.signals:
+                    raise ParameterError(f"{what}: {name!r} is not a signal: must be one of {', '.join(self.signals)}")
+                if not np.isfinite(value):
+                    raise ParameterError(f"{what}: {name} = {value:g}: must be finite")
+        return best_along(self, weights, kept, at)
+
+    def quality(self) -> xr.Dataset:
+        """Tabulate how well each surface does.
+
+        Returns
+        -------
+        xarray.Dataset
+            ``r2``, ``r2_held_out``, ``lag_cycles``, ``residual_sd`` and ``cyclic_sd`` over ``signal``; the last two
+            in the unit of each signal.
+        """
+        models = list(self.signals.values())
+        own = "unit of the signal"
+        return labelled_dataset(
+            {
+                "signal": ("signal", list(self.signals), "-", "signal"),
+                "r2": ("signal", [m.r2 for m in models], "-", "R² of all records"),
+                "r2_held_out": ("signal", [m.r2_held_out for m in models], "-", "R² of the held-out records"),
+                "lag_cycles": ("signal", [m.lag_cycles for m in models], "cycles", "lag from command to log"),
+                "residual_sd": ("signal", [m.residual_sd for m in models], own, "residual standard deviation"),
+                "cyclic_sd": ("signal", [m.cyclic_sd for m in models], own, "cyclic standard deviation"),
+            }
+        )
+
+    def to_parameters(self) -> ParameterFile:
+        """Give everything, residuals included, as `to_toml` writes it."""
+        return surrogate_file(self)
+
+    @classmethod
+    def from_parameters(cls, file: ParameterFile) -> EngineSurrogate:
+        """Make the surrogate of a file that `to_toml` wrote."""
+        return cls(**read_surrogate(file))
+
+    def operating_point(self, at: Mapping[str, float] | None = None) -> dict[str, float]:
+        """Complete a choice of inputs with the medians of the rest, and check it.
+
+        Parameters
+        ----------
+        at : mapping of str to float, optional
+            Inputs other than ``soi_cad``, in their units.
+
+        Returns
+        -------
+        dict
+            A value for every input.
+
+        Raises
+        ------
+        mgdd.errors.ParameterError
+            An unknown input, ``soi_cad``, or a value that is not finite.
+        """
+        for name, value in (at or {}).items():
+            if name not in self.inputs or name == STEERED:
+                others = ", ".join(n for n in self.inputs if n != STEERED)
+                raise ParameterError(f"at: {name!r} is no other input: must be one of {others}")
+            if not np.isfinite(value):
+                raise ParameterError(f"at: {name} = {value:g}: must be finite")
+        return {**self.medians, **(at or {})}
+
+    def points(self, soi_cad: NDArray[np.float64], at: Mapping[str, float] | None = None) -> NDArray[np.float64]:
+        """Return the points, shape (n, m), of SOI values [°CA aTDC] with the other inputs held."""
+        if soi_cad.ndim != 1 or not np.all(np.isfinite(soi_cad)):
+            raise ParameterError("soi_cad: must be one finite number or a one-dimensional array of them")
+        chosen = self.operating_point(at)
+        columns = [soi_cad if name == STEERED else np.full(soi_cad.size, chosen[name]) for name in self.inputs]
+        return np.column_stack(columns)
+
+    def evaluate(self, points: NDArray[np.float64]) -> tuple[NDArray[np.float64], NDArray[np.bool_]]:
+        """Return steady values, shape (n, signals), and whether each point is supported."""
+        terms = self.basis(points)
+        values = terms @ self._coefficients
+        columns = [list(self.signals).index(name) for name in self.nonnegative]
+        supported = self.support.contains_terms(points, terms) & np.all(values[:, columns] >= 0.0, axis=1)
+        values[:, columns] = np.maximum(values[:, columns], 0.0)
+        return values, supported
+
+    @cached_property
+    def _coefficients(self) -> NDArray[np.float64]:
+        return np.column_stack([signal.coefficients for signal in self.signals.values()])

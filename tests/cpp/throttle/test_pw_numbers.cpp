@@ -1,0 +1,165 @@
+// Numbers, bounds, scalars and the variant of the pseudo-Wiener models: nothing is exchanged and nothing is lost.
+#include <gtest/gtest.h>
+
+#include <array>
+#include <cmath>
+#include <limits>
+#include <string>
+#include <utility>
+
+#include "mgdd/common/error.hpp"
+#include "support/asymmetric_pseudo_wiener.hpp"
+#include "support/throttle_records.hpp"
+
+namespace mgdd::throttle {
+namespace {
+
+using test::asymmetric_pw_p;
+using test::asymmetric_pw_r;
+using test::asymmetric_pw_w;
+using test_support::Signal;
+
+template <class P>
+void expect_bounds(const P& good, PseudoWienerKind kind) {
+  EXPECT_NO_THROW(good.validate());
+  const auto rows = fields(kind);
+  ASSERT_EQ(rows.size(), numbers(good).size());
+  for (std::size_t i = 0; i < rows.size(); ++i) {
+    EXPECT_LT(rows[i].lower, rows[i].upper) << rows[i].name;
+    EXPECT_TRUE(!rows[i].log_scaled || rows[i].lower > 0.0) << rows[i].name;
+    for (const double outside : {rows[i].lower - 1e-3 * (1.0 + std::abs(rows[i].lower)), rows[i].upper * 1.01,
+                                 std::numeric_limits<double>::quiet_NaN()}) {
+      P bad = good;
+      *numbers(bad)[i] = outside;
+      try {
+        bad.validate();
+        ADD_FAILURE() << rows[i].name << " = " << outside;
+      } catch (const ParameterError& error) {
+        EXPECT_EQ(std::string(error.what()).rfind(std::string(rows[i].name) + " = ", 0), 0U) << error.what();
+      }
+    }
+  }
+}
+
+TEST(PseudoWienerNumbers, StandInTheOrderOfTheirFieldsAndAreBounded) {
+  PwR r = asymmetric_pw_r();
+  EXPECT_EQ(fields(PseudoWienerKind::pw_r)[9].name, "below_preload_duty");
+  EXPECT_EQ(*numbers(r)[9], 0.097);
+  EXPECT_EQ(fields(PseudoWienerKind::pw_r)[3].name, "above_spring_duty_per_deg");
+  EXPECT_EQ(*numbers(r)[3], 6.1e-4);
+  PwP p = asymmetric_pw_p();
+  EXPECT_EQ(fields(PseudoWienerKind::pw_p)[5].name, "radius_2_duty");
+  EXPECT_EQ(*numbers(p)[5], 0.05);
+  EXPECT_EQ(fields(PseudoWienerKind::pw_p)[8].name, "gain_3_deg_per_duty");
+  EXPECT_EQ(*numbers(p)[8], 35.0);
+  PwW w = asymmetric_pw_w();
+  EXPECT_EQ(fields(PseudoWienerKind::pw_w)[5].name, "rise_3_deg");
+  EXPECT_EQ(*numbers(w)[5], 9.0);
+  expect_bounds(r, PseudoWienerKind::pw_r);
+  expect_bounds(w, PseudoWienerKind::pw_w);
+  expect_bounds(p, PseudoWienerKind::pw_p);
+}
+
+TEST(PseudoWienerNumbers, SettingsOutsideTheirBoundsAreNamed) {
+  const auto refused = [](auto good, auto change, const std::string& part) {
+    EXPECT_NO_THROW(good.validate());
+    change(good);
+    try {
+      good.validate();
+      ADD_FAILURE() << part;
+    } catch (const ParameterError& error) {
+      EXPECT_NE(std::string(error.what()).find(part), std::string::npos) << error.what();
+    }
+  };
+  const PwR r = asymmetric_pw_r();
+  refused(r, [](PwR& p) { p.limp_home_deg = 1.0; }, "limp_home_deg = 1 deg");
+  refused(r, [](PwR& p) { p.limp_home_deg = 85.0; }, "limp_home_deg = 85 deg");
+  refused(r, [](PwR& p) { p.frame.open_deg = 10.0, p.frame.closed_deg = 10.0; }, "must be above closed_deg");
+  refused(r, [](PwR& p) { p.frame.sample_s = 0.2; }, "sample_s = 0.2");
+  refused(r, [](PwR& p) { p.frame.substeps = 0; }, "substeps = 0");
+  refused(r, [](PwR& p) { p.frame.delay_samples = -1; }, "delay_samples = -1");
+  refused(r, [](PwR& p) { p.ramp_deg = 0.0; }, "ramp_deg = 0");
+  refused(r, [](PwR& p) { p.tanh_deg_per_s = 0.0; }, "tanh_deg_per_s = 0");
+  refused(r, [](PwR& p) { p.dead_band_deg = -1.0; }, "dead_band_deg = -1");
+  // A map may fall on one side only, where only that side reaches far enough.
+  refused(r, [](PwR& p) { p.above.square_per_deg = -5e-3, p.above.cube_per_deg2 = -4e-5; }, "above_square_per_deg");
+  refused(
+      r,
+      [](PwR& p) {
+        p.frame.closed_deg = -10.0, p.limp_home_deg = 80.0, p.below.square_per_deg = 5e-3, p.below.cube_per_deg2 = 0.0;
+      },
+      "below_square_per_deg");
+  refused(asymmetric_pw_w(), [](PwW& p) { p.knot_upper_duty = -0.27; }, "must be above knot_lower_duty");
+  refused(asymmetric_pw_w(), [](PwW& p) { p.knot_lower_duty = -1.1; }, "knot_lower_duty = -1.1");
+  refused(asymmetric_pw_p(), [](PwP& p) { p.plays = 0; }, "plays = 0");
+  for (const auto& [member, name] : {std::pair{&Anchor::angle_gain, "angle_gain"},
+                                     {&Anchor::speed_gain_per_s, "speed_gain_per_s"},
+                                     {&Anchor::bias_gain_duty_per_deg, "bias_gain_duty_per_deg"},
+                                     {&Anchor::bias_limit_duty, "bias_limit_duty"},
+                                     {&Anchor::offset_gain, "offset_gain"}}) {
+    refused(Anchor{}, [member = member](Anchor& a) { a.*member = -0.1; }, std::string(name) + " = -0.1");
+    refused(Anchor{}, [member = member](Anchor& a) { a.*member = 2e4; }, std::string(name) + " = 20000");
+  }
+}
+
+TEST(PseudoWienerVariant, IsWhatItHolds) {
+  const std::array<PseudoWiener, 3> each{asymmetric_pw_r(), asymmetric_pw_w(), asymmetric_pw_p()};
+  const std::array<PseudoWienerKind, 3> kinds{PseudoWienerKind::pw_r, PseudoWienerKind::pw_w, PseudoWienerKind::pw_p};
+  for (std::size_t i = 0; i < 3; ++i) {
+    EXPECT_EQ(kind_of(each[i]), kinds[i]);
+    EXPECT_EQ(frame_of(each[i]).delay_samples, 2);
+    EXPECT_EQ(prepare(each[i]).index(), i);
+    EXPECT_EQ(pseudo_wiener_names()[i].first, kinds[i]);
+  }
+}
+
+// Lifted to another scalar nothing is lost or exchanged.
+TEST(PseudoWienerLift, KeepsEveryNumberAndState) {
+  const auto expect_same_run = [](const auto& p) {
+    const auto plain = model_of(p);
+    const auto dual = model_of(lift<Dual<2>>(p));
+    auto s = plain.at_rest(30.0, 0.1);
+    for (int k = 0; k < 40; ++k)
+      plain.advance(s, 0.4 * std::sin(0.3 * k));
+    auto d = lift<Dual<2>>(s);
+    for (int k = 0; k < 60; ++k) {
+      plain.advance(s, -0.35 + 0.01 * k);
+      dual.advance(d, Dual<2>(-0.35 + 0.01 * k));
+      ASSERT_NEAR(dual.output(d).value, plain.output(s), 1e-10) << k;
+    }
+  };
+  for (const Switching switching : {Switching::predicted, Switching::measured}) {
+    for (const DryFriction friction : {DryFriction::set_valued, DryFriction::tanh}) {
+      PwR p = asymmetric_pw_r();
+      p.switching = switching;
+      p.friction = friction;
+      expect_same_run(p);
+    }
+  }
+  for (const LagStart start : {LagStart::rest, LagStart::inverse_map}) {
+    PwW w = asymmetric_pw_w();
+    w.lag_start = start;
+    expect_same_run(w);
+    PwP p = asymmetric_pw_p();
+    p.lag_start = start;
+    expect_same_run(p);
+  }
+}
+
+TEST(PseudoWienerPrediction, EntryJIsTheAngleAfterDutyJ) {
+  const auto model = model_of(asymmetric_pw_r());
+  const auto start = model.at_rest(30.0, 0.1);
+  const Signal duty{0.3, -0.2, 0.4, 0.1, 0.35};
+  Signal ahead(5), run(5);
+  predict(model, start, std::span<const double>(duty), std::span<double>(ahead));
+  auto s = start;
+  simulate(model, s, std::span<const double>(duty), std::span<double>(run));
+  EXPECT_EQ(run[0], model.output(start));
+  for (std::size_t k = 0; k + 1 < 5; ++k)
+    EXPECT_EQ(run[k + 1], ahead[k]);
+  EXPECT_EQ(model.output(s), run[4]) << "the state ends at the last sample";
+  EXPECT_NE(ahead[4], ahead[3]);
+}
+
+}  // namespace
+}  // namespace mgdd::throttle

@@ -1,0 +1,216 @@
+// PW-R against its equations, written once more, with parameters that differ from their defaults and from side to side.
+#include <gtest/gtest.h>
+
+#include <algorithm>
+#include <array>
+#include <cmath>
+#include <numbers>
+#include <tuple>
+
+#include "mgdd/common/random.hpp"
+#include "mgdd/throttle/simulation.hpp"
+#include "support/asymmetric_pseudo_wiener.hpp"
+#include "support/asymmetric_throttle.hpp"
+#include "support/throttle_records.hpp"
+
+namespace mgdd::throttle {
+namespace {
+
+using test::asymmetric_pw_r;
+using test::asymmetric_throttle;
+using test_support::Signal;
+
+double draw(std::uint64_t index, double low, double high) {
+  return low + (high - low) * random::uniform(17, 3, index);
+}
+
+// --- from the first-principle throttle ------------------------------------------------------------------------
+
+TEST(PwRGroups, EachSideHasItsOwnSpring) {
+  const Throttle t = asymmetric_throttle();
+  const PwR p = pw_r_of(t);
+  const double g = 0.35 * (13.3 - 0.6) / (1.7 + 0.22);  // stall torque [N m]
+  const double damping = 0.0102 + 0.35 * 0.41 / (1.7 + 0.22);
+  const double deg_per_rad = 180.0 / std::numbers::pi;
+  for (const auto& [side, preload, spring] : {std::tuple{p.above, 0.31, 0.21}, {p.below, 0.24, 0.33}}) {
+    EXPECT_NEAR(side.tau_s, 0.0026 / damping, 1e-12);
+    EXPECT_NEAR(side.gain_deg_per_s2_per_duty, deg_per_rad * g / 0.0026, 1e-6);
+    EXPECT_NEAR(side.preload_duty, preload / g, 1e-12);
+    EXPECT_NEAR(side.spring_duty_per_deg, spring / (deg_per_rad * g), 1e-15);
+    EXPECT_NEAR(side.coulomb_duty, 0.17 / g, 1e-12);
+    EXPECT_EQ(side.square_per_deg, 0.0);
+    EXPECT_EQ(side.cube_per_deg2, 0.0);
+  }
+  EXPECT_EQ(p.limp_home_deg, 11.0);
+  EXPECT_EQ(p.frame.closed_deg, 1.5);
+  EXPECT_EQ(p.frame.open_deg, 86.0);
+  EXPECT_EQ(p.ramp_deg, 0.4);
+}
+
+TEST(PwRGroups, RunAsThePlantDoesOnBothSides) {
+  Throttle t = asymmetric_throttle();
+  t.inductance_mh = t.dead_band = t.pressure_drop_kpa = 0.0;  // what the groups do not hold
+  const Signal duty = test_support::chirp(0.04, 0.23, 0.5, 5.0, 4.0);
+  PwR p = pw_r_of(t);
+  p.frame.substeps = 10;
+  Signal plant(duty.size()), model(duty.size());
+  ThrottleState state = at_rest(25.0);
+  simulate(ThrottlePlant(t), {.duty = duty}, 10, state, {.angle_deg = plant});
+  const PwRModel prepared(p);
+  PwRState start = prepared.at_rest(25.0, 0.0);
+  simulate(prepared, start, std::span<const double>(duty), std::span<double>(model));
+  double worst = 0.0;
+  for (std::size_t k = 0; k < duty.size(); ++k)
+    worst = std::max(worst, std::abs(plant[k] - model[k]));
+  EXPECT_LT(worst, 1e-6);
+  const auto [low, high] = std::minmax_element(plant.begin(), plant.end());
+  EXPECT_LT(*low, 9.0);
+  EXPECT_GT(*high, 30.0);
+  EXPECT_GT(*low, t.closed_deg);
+  EXPECT_LT(*high, t.open_deg);
+}
+
+// --- PW-R -----------------------------------------------------------------------------------------------------
+
+double map_of(const PwRSide& s, double x) {
+  return x + s.square_per_deg * x * x + s.cube_per_deg2 * x * x * x;
+}
+
+/// Acceleration [deg/s^2] without dry friction if a step of h ended with the speed `next`.
+double acceleration(const PwR& p, const PwRState& s, double duty, double next, double h) {
+  const bool measured = p.switching == Switching::measured;
+  const bool up = measured ? s.above > 0.0 : s.position_deg >= 0.0;
+  const PwRSide& side = up ? p.above : p.below;
+  const double ramp = s.position_deg / p.ramp_deg;
+  const double share = measured ? s.above : std::clamp(ramp, -1.0, 1.0);
+  const double slope = measured || std::abs(ramp) > 1.0 ? 0.0 : side.preload_duty / p.ramp_deg;
+  const double load = duty - s.bias_duty - side.preload_duty * share - side.spring_duty_per_deg * s.position_deg -
+                      (side.spring_duty_per_deg + slope) * h * next;
+  return side.gain_deg_per_s2_per_duty * load - next / side.tau_s;
+}
+
+TEST(PwREquations, HoldInEveryStepOnBothSides) {
+  int holds = 0, slides = 0, ramped = 0, below = 0, stopped = 0;
+  for (const Switching switching : {Switching::predicted, Switching::measured}) {
+    for (const DryFriction friction : {DryFriction::set_valued, DryFriction::tanh}) {
+      PwR p = asymmetric_pw_r();
+      p.switching = switching;
+      p.friction = friction;
+      const double h = p.frame.sample_s / p.frame.substeps;
+      const PwRModel model(p);
+      for (std::uint64_t k = 0; k < 4000; ++k) {
+        PwRState s = model.at_rest(draw(8 * k, 1.5, 84.0), 0.0);
+        if (k % 3 == 0) s.position_deg = draw(8 * k + 1, -1.0, 1.0);
+        s.speed_deg_per_s = k % 4 == 0 ? 0.0 : draw(8 * k + 2, -150.0, 150.0);
+        s.bias_duty = draw(8 * k + 3, -0.1, 0.1);
+        s.above = draw(8 * k + 4, -1.0, 1.0) > 0.0 ? 1.0 : -1.0;
+        const double duty = draw(8 * k + 5, -0.5, 0.5);
+        const PwRState from = s;
+        model.step(s, duty);
+        const bool up = switching == Switching::measured ? from.above > 0.0 : from.position_deg >= 0.0;
+        const PwRSide& side = up ? p.above : p.below;
+        const double most = side.gain_deg_per_s2_per_duty * side.coulomb_duty;
+        const auto rest = [&](double next) {  // what is left for friction
+          return acceleration(p, from, duty, next, h) - (next - from.speed_deg_per_s) / h;
+        };
+        const double next = (s.position_deg - from.position_deg) / h;
+        if (s.speed_deg_per_s != 0.0) {
+          ASSERT_NEAR(next, s.speed_deg_per_s, 1e-6);
+        } else if (std::abs(next) > 1e-9) {  // ended at a stop
+          ++stopped;
+          continue;
+        }
+        below += up ? 0 : 1;
+        ramped += std::abs(from.position_deg) < p.ramp_deg ? 1 : 0;
+        if (friction == DryFriction::tanh) {
+          const double t = std::tanh(from.speed_deg_per_s / p.tanh_deg_per_s);
+          const double slope = (1.0 - t * t) / p.tanh_deg_per_s;
+          ASSERT_NEAR(rest(s.speed_deg_per_s), most * (t + slope * (s.speed_deg_per_s - from.speed_deg_per_s)), 1e-5);
+        } else if (std::abs(rest(0.0)) <= most) {
+          ++holds;
+          ASSERT_EQ(s.speed_deg_per_s, 0.0) << k;
+        } else {
+          ++slides;
+          ASSERT_NEAR(rest(s.speed_deg_per_s), rest(0.0) > 0.0 ? most : -most, 1e-5) << k;
+          ASSERT_GT(s.speed_deg_per_s * rest(0.0), 0.0) << k;
+        }
+      }
+    }
+  }
+  EXPECT_GT(std::min({holds, slides, ramped, below}), 300);
+  EXPECT_GT(stopped, 3);
+}
+
+TEST(PwREquations, OneSampleIsItsStepsOfTheDelayedDuty) {
+  const PwR p = asymmetric_pw_r();
+  const PwRModel model(p);
+  PwRState whole = model.at_rest(30.0, 0.05);
+  PwRState parts = whole;
+  const std::array<double, 6> duty{0.3, -0.2, 0.45, 0.1, -0.4, 0.25};
+  const std::array<double, 6> acting{0.05, 0.05, 0.3, -0.2, 0.45, 0.1};
+  for (std::size_t k = 0; k < 6; ++k) {
+    model.advance(whole, duty[k]);
+    for (int i = 0; i < 3; ++i)
+      step(p, parts, acting[k], p.frame.sample_s / 3.0);
+    EXPECT_EQ(whole.position_deg, parts.position_deg) << k;
+    EXPECT_EQ(whole.speed_deg_per_s, parts.speed_deg_per_s) << k;
+  }
+}
+
+TEST(PwREquations, EachSideHasItsOwnMapAndStop) {
+  const PwR p = asymmetric_pw_r();
+  const PwRModel model(p);
+  for (const double x : {-11.0, -4.0, -0.1, 0.0, 0.1, 20.0, 60.0}) {
+    PwRState s;
+    s.position_deg = x;
+    EXPECT_NEAR(model.output(s), 13.0 + map_of(x < 0.0 ? p.below : p.above, x), 1e-12) << x;
+    EXPECT_NEAR(model.at_rest(model.output(s), 0.0).position_deg, x, 1e-9) << x;
+  }
+  PwRState s = model.at_rest(40.0, 0.0);
+  for (int k = 0; k < 300; ++k)
+    model.advance(s, 1.0);
+  EXPECT_NEAR(model.output(s), 84.0, 1e-9);
+  EXPECT_EQ(s.speed_deg_per_s, 0.0);
+  for (int k = 0; k < 300; ++k)
+    model.advance(s, -1.0);
+  EXPECT_NEAR(model.output(s), 1.5, 1e-9);
+  EXPECT_EQ(model.at_rest(50.0, 0.2).above, 1.0);
+  EXPECT_EQ(model.at_rest(5.0, 0.2).above, -1.0);
+}
+
+TEST(PwREquations, ACorrectionPullsEveryStateItsWayAndNoFurtherThanAllowed) {
+  const PwR p = asymmetric_pw_r();
+  const PwRModel model(p);
+  const Anchor gains{
+      .angle_gain = 0.4, .speed_gain_per_s = 21.0, .bias_gain_duty_per_deg = 0.007, .bias_limit_duty = 0.03};
+  for (const double error : {2.0, -3.0}) {
+    PwRState s = model.at_rest(40.0, 0.0);
+    s.speed_deg_per_s = 5.0;
+    s.bias_duty = 0.002;
+    const double x = s.position_deg;
+    const double target = model.at_rest(40.0 + error, 0.0).position_deg - x;  // error of the position behind the map
+    model.reanchor(s, 40.0 + error, gains);
+    EXPECT_NEAR(s.position_deg, x + 0.4 * target, 1e-9);
+    EXPECT_NEAR(s.speed_deg_per_s, 5.0 + 21.0 * target, 1e-9);
+    EXPECT_NEAR(s.bias_duty, 0.002 - 0.007 * target, 1e-12);
+    for (int i = 0; i < 20; ++i) {
+      s.position_deg = x;
+      model.reanchor(s, 40.0 + error, gains);
+    }
+    EXPECT_DOUBLE_EQ(s.bias_duty, error > 0.0 ? -0.03 : 0.03);
+  }
+  const Anchor full{.angle_gain = 1.0};
+  PwRState s = model.at_rest(40.0, 0.0);
+  model.reanchor(s, 95.0, full);
+  EXPECT_NEAR(model.output(s), 84.0, 1e-9) << "inside the travel";
+  model.reanchor(s, -9.0, full);
+  EXPECT_NEAR(model.output(s), 1.5, 1e-9);
+  for (const auto& [angle, side] :
+       {std::pair{13.46, 1.0}, {13.44, 1.0}, {12.56, 1.0}, {12.54, -1.0}, {13.44, -1.0}, {13.46, 1.0}}) {
+    model.reanchor(s, angle, full);
+    EXPECT_EQ(s.above, side) << angle;
+  }
+}
+
+}  // namespace
+}  // namespace mgdd::throttle

@@ -1,0 +1,274 @@
+// Numbers of a throttle: what a user gets who says nothing, what each field allows, and rules between fields.
+#include <gtest/gtest.h>
+
+#include <array>
+#include <cmath>
+#include <string>
+#include <string_view>
+#include <utility>
+#include <vector>
+
+#include "mgdd/common/error.hpp"
+#include "mgdd/throttle/models/pseudo_wiener.hpp"
+#include "mgdd/throttle/models/smooth.hpp"
+#include "mgdd/throttle/sensors.hpp"
+#include "mgdd/throttle/simulation.hpp"
+#include "support/asymmetric_throttle.hpp"
+
+namespace mgdd::throttle {
+namespace {
+
+using test::asymmetric_throttle;
+
+std::string message(const Throttle& t) {
+  try {
+    validate(t);
+  } catch (const ParameterError& error) {
+    return error.what();
+  }
+  return "";
+}
+
+double Throttle::* member_of(std::string_view name) {
+  for (const Field& field : fields()) {
+    if (field.info.name == name) return field.member;
+  }
+  return nullptr;
+}
+
+// The preset P1: a change of one of these numbers is a breaking change.
+TEST(ThrottleNumbers, DefaultsAreThePresetP1) {
+  const std::pair<std::string_view, double> p1[] = {
+      {"inertia_kgm2", 0.0021},
+      {"viscous_nms_per_rad", 0.0088},
+      {"torque_constant_nm_per_a", 0.383},
+      {"back_emf_vs_per_rad", 0.383},
+      {"resistance_ohm", 1.5},
+      {"inductance_mh", 1.5},
+      {"supply_v", 12.0},
+      {"driver_drop_v", 0.0},
+      {"driver_resistance_ohm", 0.0},
+      {"dead_band", 0.0},
+      {"coulomb_nm", 0.284},
+      {"stiction_nm", 0.284},
+      {"stribeck_rad_per_s", 0.3},
+      {"karnopp_rad_per_s", 0.05},
+      {"tanh_rad_per_s", 0.05},
+      {"bristle_nm_per_rad", 81.0},
+      {"bristle_damping_nms_per_rad", 0.41},
+      {"limp_home_deg", 8.0},
+      {"spring_above_nm_per_rad", 0.087},
+      {"spring_below_nm_per_rad", 0.087},
+      {"preload_above_nm", 0.396},
+      {"preload_below_nm", 0.396},
+      {"preload_ramp_deg", 0.25},
+      {"closed_deg", 0.0},
+      {"open_deg", 90.0},
+      {"stop_stiffness_nm_per_rad", 5000.0},
+      {"stop_damping_nms_per_rad", 4.5},
+      {"backlash_half_deg", 0.2},
+      {"gear_stiffness_nm_per_rad", 200.0},
+      {"gear_damping_nms_per_rad", 0.2},
+      {"plate_inertia_kgm2", 0.0003},
+      {"plate_friction_share", 0.3},
+      {"bore_mm", 60.0},
+      {"pressure_drop_kpa", 0.0},
+  };
+  ASSERT_EQ(std::size(p1), fields().size());
+  for (const auto& [name, value] : p1) {
+    ASSERT_NE(member_of(name), nullptr) << name;
+    EXPECT_EQ(Throttle{}.*member_of(name), value) << name;
+  }
+  EXPECT_EQ(Throttle{}.friction, Friction::coulomb);
+  EXPECT_EQ(Throttle{}.backlash, Backlash::none);
+  EXPECT_EQ(default_step_s, 1e-4);
+}
+
+TEST(ThrottleNumbers, DefaultsOfThePseudoWienerModels) {
+  const PwR r;
+  EXPECT_EQ(r.above, r.below);
+  EXPECT_EQ(r.above, (PwRSide{0.0197, 83597.0, 0.1292, 4.96e-4, 0.0927, 0.0, 0.0}));
+  EXPECT_EQ(r.limp_home_deg, 8.0);
+  EXPECT_EQ(r.ramp_deg, 0.25);
+  EXPECT_EQ(r.tanh_deg_per_s, 30.0);
+  EXPECT_EQ(r.dead_band_deg, 0.3);
+  EXPECT_EQ(r.switching, Switching::predicted);
+  EXPECT_EQ(r.friction, DryFriction::set_valued);
+  const PseudoWienerFrame frame{
+      .closed_deg = 0.0, .open_deg = 90.0, .sample_s = 1e-3, .substeps = 2, .delay_samples = 0};
+  EXPECT_EQ(r.frame, frame);
+  const Anchor anchor{.angle_gain = 0.35,
+                      .speed_gain_per_s = 35.0,
+                      .bias_gain_duty_per_deg = 0.004,
+                      .bias_limit_duty = 0.4,
+                      .offset_gain = 1.0};
+  EXPECT_EQ(Anchor{}, anchor);
+  const PwW w;
+  EXPECT_EQ(w.first_s, 0.05);
+  EXPECT_EQ(w.second_s, 0.5);
+  EXPECT_EQ(w.base_deg, 0.0);
+  EXPECT_EQ(w.limp_home_deg, 8.0);
+  EXPECT_EQ(w.knot_lower_duty, -0.2);
+  EXPECT_EQ(w.knot_upper_duty, 0.6);
+  EXPECT_EQ(w.lag_start, LagStart::rest);
+  const PwP p;
+  EXPECT_EQ(p.first_s, 0.05);
+  EXPECT_EQ(p.second_s, 0.5);
+  EXPECT_EQ(p.offset_deg, 0.0);
+  EXPECT_EQ(p.limp_home_deg, 8.0);
+  EXPECT_EQ(p.plays, 1);
+  EXPECT_EQ(p.lag_start, LagStart::rest);
+}
+
+TEST(ThrottleNumbers, DefaultsOfTheSensorsAndTheInputs) {
+  const SensorPair pair{.closed_v = 0.5,
+                        .span_v = 4.0,
+                        .travel_deg = 90.0,
+                        .supply_v = 5.0,
+                        .noise_v = 0.002,
+                        .lag_s = 3e-4,
+                        .adc_bits = 12,
+                        .sum_tolerance_v = 0.2,
+                        .low_v = 0.2,
+                        .high_v = 4.8,
+                        .debounce_s = 0.2};
+  EXPECT_EQ(SensorPair{}, pair);
+  EXPECT_EQ(SensorFault{}.kind, SensorFaultKind::none);
+  EXPECT_EQ(SensorFault{}.from_s, 0.0);
+  EXPECT_EQ(SensorFault{}.size, 0.0);
+  const ThrottleInput input;
+  EXPECT_EQ(input.duty, 0.0);
+  EXPECT_EQ(input.supply_v, 12.0);
+  EXPECT_EQ(input.airflow_torque_nm, 0.0);
+  EXPECT_EQ(input.bridge, Bridge::brake);
+  EXPECT_EQ(ThrottleSignals{}.bridge, Bridge::brake);
+  const ThrottleState state;
+  for (const double zero : {state.angle_rad, state.speed_rad_per_s, state.current_a, state.bristle_rad,
+                            state.plate_angle_rad, state.plate_speed_rad_per_s, state.plate_bristle_rad})
+    EXPECT_EQ(zero, 0.0);
+}
+
+// --- what is allowed ------------------------------------------------------------------------------------------
+
+TEST(ThrottleNumbers, EveryFieldHasItsBoundsAndTheyBelongWhereTheySay) {
+  for (const Field& field : fields()) {
+    const FieldInfo& info = field.info;
+    const auto with = [&](double value) {
+      Throttle t = asymmetric_throttle();
+      t.*(field.member) = value;
+      return message(t);
+    };
+    const auto outside = [&](double value) { return with(value).find(": must be >") != std::string::npos; };
+    const std::string name = std::string(info.name) + " = ";
+    EXPECT_EQ(outside(info.lower), info.lower_open) << info.name;
+    EXPECT_TRUE(outside(info.lower - 1e-9 * std::fmax(1.0, std::abs(info.lower)))) << info.name;
+    EXPECT_FALSE(outside(info.upper)) << info.name;
+    EXPECT_TRUE(outside(info.upper * (1.0 + 1e-12))) << info.name;
+    EXPECT_EQ(with(info.upper * 2.0).rfind(name, 0), 0U) << with(info.upper * 2.0);
+    EXPECT_NE(with(info.upper * 2.0).find(" and <= "), std::string::npos) << info.name;
+    const bool unit = with(info.upper * 2.0).find(" " + std::string(info.unit) + ": must") != std::string::npos;
+    EXPECT_EQ(unit, info.unit != "-") << info.name;
+  }
+}
+
+TEST(ThrottleNumbers, RulesBetweenFields) {
+  const auto with = [](auto change) {
+    Throttle t = asymmetric_throttle();
+    change(t);
+    return message(t);
+  };
+  EXPECT_NE(with([](Throttle& t) { t.open_deg = t.closed_deg = t.limp_home_deg; }).find("above closed_deg"),
+            std::string::npos);
+  EXPECT_EQ(with([](Throttle& t) { t.limp_home_deg = t.closed_deg; }), "");
+  EXPECT_EQ(with([](Throttle& t) { t.limp_home_deg = t.open_deg; }), "");
+  EXPECT_NE(with([](Throttle& t) { t.limp_home_deg = t.closed_deg - 0.1; }).find("limp_home_deg"), std::string::npos);
+  EXPECT_NE(with([](Throttle& t) { t.limp_home_deg = t.open_deg + 0.1; }).find("limp_home_deg"), std::string::npos);
+  for (const auto& [form, name] : friction_names()) {
+    const bool uses = form != Friction::coulomb && form != Friction::tanh;
+    const auto friction = [form = form](double coulomb, double stiction) {
+      return [=](Throttle& t) { t.friction = form, t.coulomb_nm = coulomb, t.stiction_nm = stiction; };
+    };
+    EXPECT_EQ(with(friction(0.2, 0.2)), "") << name;
+    EXPECT_EQ(with(friction(0.2, 0.19)).empty(), !uses) << name;
+    EXPECT_EQ(with(friction(0.0, 0.1)).empty(), form != Friction::lugre) << name;
+  }
+  EXPECT_NE(with([](Throttle& t) { t.driver_drop_v = t.supply_v; }).find("driver_drop_v"), std::string::npos);
+  EXPECT_EQ(with([](Throttle& t) { t.plate_inertia_kgm2 = t.inertia_kgm2; }), "");
+  EXPECT_NE(with([](Throttle& t) {
+              t.backlash = Backlash::compliance, t.plate_inertia_kgm2 = t.inertia_kgm2;
+            }).find("plate_inertia_kgm2"),
+            std::string::npos);
+  EXPECT_EQ(with([](Throttle& t) { t.backlash = Backlash::compliance; }), "");
+}
+
+TEST(ThrottleNumbers, StepsAndColumnsHaveTheirs) {
+  EXPECT_NO_THROW(ThrottlePlant(asymmetric_throttle(), 1e-6));
+  EXPECT_NO_THROW(ThrottlePlant(asymmetric_throttle(), 5e-3));
+  EXPECT_THROW(ThrottlePlant(asymmetric_throttle(), 0.9e-6), ParameterError);
+  EXPECT_THROW(ThrottlePlant(asymmetric_throttle(), 5.1e-3), ParameterError);
+  EXPECT_EQ(steps_per_sample(1e-3, 1e-3), 1U);
+  EXPECT_EQ(steps_per_sample(3e-3, 1e-3), 3U);
+  EXPECT_EQ(steps_per_sample(1e-2 * (1.0 + 5e-10), 1e-4), 100U);
+  EXPECT_THROW(steps_per_sample(1e-2 * (1.0 + 3e-9), 1e-4), ParameterError);
+  EXPECT_THROW(steps_per_sample(4e-4, 1e-3), ParameterError) << "less than one step";
+  EXPECT_THROW(steps_per_sample(1e-2, 6e-3), ParameterError);
+  EXPECT_THROW(steps_per_sample(1e-6, 0.5e-6), ParameterError);
+  const std::vector<double> duty{0.5, -1.0, 1.0}, volts{12.0, 0.0, 9.0}, torque{0.0, -0.5, 0.5};
+  EXPECT_NO_THROW(validate(ThrottleSignals{duty, volts, torque}));
+  EXPECT_NO_THROW(validate(ThrottleSignals{.duty = duty}));
+  const auto refused = [](const ThrottleSignals& signals, const std::string& part) {
+    try {
+      validate(signals);
+      ADD_FAILURE() << part;
+    } catch (const DataError& error) {
+      EXPECT_NE(std::string(error.what()).find(part), std::string::npos) << error.what();
+    }
+  };
+  const std::vector<double> beyond{0.0, 0.0, -1.01}, negative{12.0, -0.1, 12.0}, gap{0.0, NAN, 0.0}, two{1.0, 1.0};
+  refused({.duty = beyond}, "duty = -1.01 at sample 2");
+  refused({.duty = gap}, "duty is nan at sample 1");
+  refused({.duty = duty, .supply_v = negative}, "supply_v = -0.1 V at sample 1");
+  refused({.duty = duty, .airflow_torque_nm = gap}, "airflow_torque_nm is nan at sample 1");
+  EXPECT_THROW(validate(ThrottleSignals{.duty = duty, .supply_v = two}), ShapeError);
+  EXPECT_THROW(validate(ThrottleSignals{.duty = duty, .supply_v = {}, .airflow_torque_nm = two}), ShapeError);
+}
+
+// --- air flow and the smooth twin -----------------------------------------------------------------------------
+
+TEST(ThrottleNumbers, TheClosingTorqueOfTheAirIsTheLineThroughItsTable) {
+  const std::pair<double, double> table[] = {{0.0, 0.0},    {10.0, 0.003}, {20.0, 0.008}, {30.0, 0.015},
+                                             {40.0, 0.025}, {50.0, 0.040}, {60.0, 0.060}, {70.0, 0.080},
+                                             {75.0, 0.085}, {80.0, 0.070}, {90.0, 0.0}};
+  for (std::size_t i = 0; i < std::size(table); ++i) {
+    EXPECT_NEAR(airflow_coefficient(table[i].first), table[i].second, 1e-15) << i;
+    if (i == 0) continue;
+    const auto& [a, low] = table[i - 1];
+    const auto& [b, high] = table[i];
+    EXPECT_NEAR(airflow_coefficient(0.3 * a + 0.7 * b), 0.3 * low + 0.7 * high, 1e-15) << i;
+  }
+  EXPECT_EQ(airflow_coefficient(-1.0), 0.0);
+  EXPECT_EQ(airflow_coefficient(91.0), 0.0);
+  EXPECT_EQ(airflow_coefficient(NAN), 0.0);
+  EXPECT_NEAR(airflow_torque_nm(asymmetric_throttle(), 60.0), -0.052 * 0.052 * 0.052 * 7000.0 * 0.060, 1e-15);
+}
+
+TEST(SmoothPlant, SolvesItsEquations) {
+  const SmoothPlant plant{.inertia_kgm2 = 3e-3, .gear_ratio = 17.0, .inductance_h = 2e-3, .supply_v = 13.0};
+  const std::array<double, 10> p{0.016, 4e-3, 0.12, 0.5, 0.13, 0.25, 0.02, 0.14, 0.018, 1.2};
+  for (const double away : {-0.05, -0.01, 0.01, 0.2}) {
+    for (const double speed : {-3.0, -0.2, 0.4, 2.0}) {
+      const std::array<double, 3> x{0.14 + away, speed, 0.7};
+      const auto dx = plant.derivative(p, x, {0.3});
+      const double torque = 17.0 * 0.016 * 0.7 - 4e-3 * speed - 0.12 * std::tanh(speed / 0.5) - 0.13 * away -
+                            0.25 * std::tanh(away / 0.02);
+      EXPECT_NEAR(dx[0], speed, 1e-15);
+      EXPECT_NEAR(dx[1], torque / 3e-3, 1e-9);
+      EXPECT_NEAR(dx[2], (13.0 * 0.3 - 1.2 * 0.7 - 17.0 * 0.018 * speed) / 2e-3, 1e-9);
+      EXPECT_NEAR(plant.output(p, x, {0.3}), (0.14 + away) * 180.0 / M_PI, 1e-12);
+    }
+  }
+  EXPECT_EQ(SmoothPlant{}, (SmoothPlant{2e-3, 20.0, 1e-3, 12.0}));
+}
+
+}  // namespace
+}  // namespace mgdd::throttle

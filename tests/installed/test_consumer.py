@@ -1,0 +1,106 @@
+"""A C++ project finds an installed mgdd, wherever its headers were put, and gets the same bits whatever its flags."""
+
+from __future__ import annotations
+
+import os
+import re
+import shutil
+import subprocess
+import sys
+from collections.abc import Callable
+from pathlib import Path
+
+import pytest
+
+ROOT = Path(__file__).resolve().parents[2]
+WARNINGS = "-Wall -Wextra -Wpedantic -Wconversion -Wshadow -Werror"
+
+
+def run(*command: str | Path) -> str:
+    """Run a program, which must succeed; gives what it printed, and shows it all when it fails."""
+    done = subprocess.run([str(word) for word in command], capture_output=True, text=True)
+    assert done.returncode == 0, f"{command} ended with {done.returncode}:\n{done.stdout}\n{done.stderr}"
+    return done.stdout
+
+
+def tool(name: str) -> str:
+    """Find cmake or ninja: beside the interpreter first, as the build requirements put them there."""
+    path = os.pathsep.join([str(Path(sys.executable).parent), os.environ.get("PATH", "")])
+    found = shutil.which(name, path=path)
+    assert found, f"{name} is missing"
+    return found
+
+
+def configure(source: Path, build: Path, **variables: str) -> None:
+    defines = [f"-D{name}={value}" for name, value in variables.items()]
+    run(tool("cmake"), "-G", "Ninja", f"-DCMAKE_MAKE_PROGRAM={tool('ninja')}", "-S", source, "-B", build, *defines)
+
+
+@pytest.fixture(scope="session")
+def install(tmp_path_factory: pytest.TempPathFactory) -> Callable[[str], Path]:
+    """Install the library with its headers in a folder of that name; gives the prefix."""
+    build = ROOT / "build" / "consumer"  # beside the other trees, so that a compiler cache knows the objects
+
+    def install_into(include: str) -> Path:
+        prefix = tmp_path_factory.mktemp("prefix")
+        configure(ROOT, build, CMAKE_BUILD_TYPE="Release", CMAKE_INSTALL_INCLUDEDIR=include)
+        run(tool("cmake"), "--build", build, "--target", "mgdd_core")
+        run(tool("cmake"), "--install", build, "--component", "dev", "--prefix", prefix)
+        return prefix
+
+    return install_into
+
+
+@pytest.fixture(scope="session")
+def eigen(install: Callable[[str], Path]) -> str:
+    """Give the Eigen that the library was built with."""
+    install("include")
+    found = re.search(r"^Eigen3_DIR:\w+=(.*)$", (ROOT / "build/consumer/CMakeCache.txt").read_text(), re.MULTILINE)
+    assert found
+    return found[1]
+
+
+@pytest.fixture(scope="session")
+def build(install: Callable[[str], Path], eigen: str) -> Callable[..., Path]:
+    """Build a project against a fresh prefix; gives the folder of its programs."""
+
+    def build_project(source: Path, folder: Path, *, include: str = "include", flags: str = "") -> Path:
+        prefix = install(include)
+        variables = {"CMAKE_PREFIX_PATH": str(prefix), "Eigen3_DIR": eigen, "CMAKE_CXX_FLAGS": flags}
+        configure(source, folder, CMAKE_BUILD_TYPE="Release", **variables)
+        run(tool("cmake"), "--build", folder)
+        return folder
+
+    return build_project
+
+
+@pytest.mark.parametrize("include", ["include", "include/elsewhere"])
+def test_examples_build_and_run(build: Callable[..., Path], tmp_path: Path, include: str) -> None:
+    programs = build(ROOT / "cpp" / "examples", tmp_path, include=include, flags=WARNINGS)
+
+    timing = [line.split() for line in run(programs / "engine_timing").splitlines()]
+    assert timing[0][:2] == ["soc_cad", "efficiency"]
+    efficiency = {float(row[0]): float(row[1]) for row in timing[1:]}
+    assert max(efficiency, key=efficiency.__getitem__) == -5.0
+
+    step = [line.split(",") for line in run(programs / "throttle_step", "0.3").splitlines()]
+    assert step[0] == ["time_ms", "duty", "angle_deg", "pw_r_angle_deg"]
+    angle, model = ([float(row[column]) for row in step[1:]] for column in (2, 3))
+    assert angle[0] == 8.0
+    assert max(angle) > 25.0 > angle[-1]
+    assert all(abs(a - b) < 0.2 for a, b in zip(angle, model, strict=True))
+
+    seek = [line.split() for line in run(programs / "seek_timing").splitlines()]
+    assert -3.0 < float(seek[-1][1]) < -2.0, "as early as the limit allows"
+
+
+def test_flags_of_the_consumer_do_not_change_a_bit(build: Callable[..., Path], tmp_path: Path) -> None:
+    source = ROOT / "tests" / "installed" / "consumer"
+    printed = {
+        flags: run(build(source, tmp_path / f"flags{i}", flags=flags) / "bits")
+        for i, flags in enumerate(("", "-march=native", "-march=native -O0"))
+    }
+    plain = printed[""].splitlines()
+    assert len(plain) == 8
+    for flags, text in printed.items():
+        assert text.splitlines() == plain, f"with {flags!r}"

@@ -1,0 +1,223 @@
+"""Functions that take arrays take whatever `numpy.asarray` takes, and give the same numbers for each form."""
+
+from __future__ import annotations
+
+import importlib
+import inspect
+from collections.abc import Callable, Iterable
+from typing import Any
+
+import numpy as np
+import pandas as pd
+import pytest
+import xarray as xr
+
+import mgdd
+from mgdd import identify, io, optimize, signals, surrogate, throttle
+from mgdd.engine import Cylinder, OperatingPoint, fit_nox_proxy, timing_sweep
+from mgdd.io.checks import check_trace
+from mgdd.loop import EngineBench, steady_map
+from mgdd.signals.metrics import mse
+from mgdd.throttle.characteristics import mass_flow_kg_per_s
+
+Array = np.ndarray[Any, Any]
+Call = Callable[..., Any]
+
+TIME = np.arange(600) * 1e-3
+DUTY = 0.15 + 0.2 * np.sin(2.0 * np.pi * TIME * (0.5 + 4.0 * TIME))
+MODEL = throttle.PseudoWiener("pw_r")
+ANGLE = MODEL.simulate({"time_s": TIME, "duty": DUTY})["angle_deg"].to_numpy()
+GROUPS, SMOOTH = identify.FirstPrincipleModel(), identify.SmoothThrottle()
+CRANK = np.arange(-90.0, 91.0)
+BAR = 40.0 * np.exp(-((CRANK / 40.0) ** 2)) + 1.0
+NOISE = np.random.default_rng(0).standard_normal(600)
+TEN = np.array(mgdd._core.smooth_throttle_example)
+KELVIN, PPM = np.linspace(1900.0, 2500.0, 7), np.array([60.0, 110.0, 150.0, 230.0, 320.0, 450.0, 640.0])
+SOC = np.array([-8.0, -6.0, -4.0])
+RECORDS = surrogate.fit_surrogate(surrogate.random_step_records(1500))
+SWEEP = np.linspace(-3.0, 3.0, 40)
+OPEN = np.array([10.0, 30.0, 60.0])
+
+
+def lag(_: float, x: Any, u: Any, p: Any) -> Any:
+    return (p[0] * u[0] - x) / p[1]
+
+
+def fitted(time: Any, u: Any, y: Any, start: Any) -> Any:
+    parameters = {"gain": 100.0, "lag_s": 0.1}
+    options = optimize.FitOptions(max_iterations=2)
+    record = {"time_s": time, "u": u, "y": y}
+    return identify.fit_ode(lag, record, parameters=parameters, initial_state=start, options=options).report.values
+
+
+def ode(time: Any, u: Any, start: Any) -> Any:
+    parameters = {"gain": 100.0, "lag_s": 0.1}
+    model = identify.OdeModel(derivative=lag, output=lambda x, *_: x[0], parameters=parameters, initial_state=(0.0,))
+    return model.simulate({"time_s": time, "u": u}, initial_state=start)["y"].to_numpy()
+
+
+def run(model: Any) -> Call:
+    return lambda time, duty: model.simulate({"time_s": time, "duty": duty})["angle_deg"].to_numpy()
+
+
+def ahead(model: Any) -> Call:
+    return lambda time, duty, angle: model.predict({"time_s": time, "duty": duty, "angle_deg": angle}, 5)[
+        "angle_deg"
+    ].to_numpy()
+
+
+def updated(duty: Any, angle: Any) -> Any:
+    update = identify.OnlineUpdate(MODEL)
+    update.update(duty, angle)
+    return list(update.model.parameters.values())
+
+
+def learned(initial: Any, response: Any, error: Any) -> Any:
+    learner = optimize.IterativeLearning(initial, impulse_response=response, k_p=0.5)
+    learner.ask()
+    learner.tell(error)
+    return learner.ask()
+
+
+def taps(initial: Any, function: Any) -> Any:
+    return optimize.IterativeLearning(initial, law="q_filter", learning_function=function, lead=1, guard=False).ask()
+
+
+def line(x: Array) -> tuple[Array, Array]:
+    return OPEN * x[0] - 2.0 * OPEN, OPEN[:, None]
+
+
+def searched(x0: Any, lower: Any, upper: Any, data: Any) -> Any:
+    return optimize.least_squares(line, x0, lower=lower, upper=upper, data=data).values
+
+
+def logged(*columns: Any) -> Any:
+    log = io.throttle_log(*columns[:3], current_a=columns[3], supply_v=columns[4])
+    return [log[name].to_numpy() for name in log.variables]
+
+
+def smooth(duty: Any, angle: Any, starts: Any, lower: Any, upper: Any) -> Any:
+    record = {"time_s": TIME, "duty": duty, "angle_deg": angle}
+    return identify.fit_smooth_throttle(record, start_values=starts, lower=lower, upper=upper).report.values
+
+
+def swept(**options: Any) -> Any:
+    return throttle.simulate(throttle.Throttle(), **options)["angle_deg"].to_numpy()
+
+
+def many(duty: Any, time: Any, start: Any, supply: Any, air: Any) -> Any:
+    return throttle.simulate_many(
+        throttle.Throttle(), duty, time_s=time, start_deg=start, supply_v=supply, airflow_torque_nm=air
+    )["angle_deg"].to_numpy()
+
+
+def log() -> xr.Dataset:
+    return io.throttle_log(TIME, DUTY, ANGLE)
+
+
+CALLS: dict[str, tuple[Call, tuple[Array, ...]]] = {
+    "engine.fit_nox_proxy": (lambda t, ppm: list(fit_nox_proxy(t, ppm).proxy.to_dict().values()), (KELVIN, PPM)),
+    "engine.timing_sweep": (
+        lambda soc: timing_sweep(Cylinder(), OperatingPoint(), soc_cad=soc)["imep_gross_bar"].to_numpy(), (SOC,),
+    ),
+    "identify.OnlineUpdate.update": (updated, (DUTY, ANGLE)),
+    "identify.fit_ode": (fitted, (TIME, DUTY, ANGLE, np.array([8.0]))),
+    "identify.fit_smooth_throttle": (smooth, (DUTY, ANGLE, 1.05 * TEN, 0.1 * TEN, 10.0 * TEN)),
+    "identify.n_step_rms": (
+        lambda y: identify.n_step_rms(MODEL, log(), true_deg=y)["n_step_rms_deg"].to_numpy(), (ANGLE,),
+    ),
+    "io.from_0_720": (lambda a, p: io.from_0_720(a, p, firing_tdc_deg=360.0), (CRANK + 360.0, BAR)),
+    "io.from_btdc": (io.from_btdc, (-CRANK, BAR)),
+    "io.pressure_trace": (lambda a, p: io.pressure_trace(a, p)["pressure_bar"].to_numpy(), (CRANK, BAR)),
+    "io.throttle_log": (logged, (TIME, DUTY, ANGLE, 0.1 * DUTY, 12.0 + DUTY)),
+    "loop.EngineBench.run": (lambda soc: EngineBench(seed=1).run(soc)["j"].to_numpy(), (SOC,)),
+    "loop.steady_map": (lambda soc: steady_map(EngineBench(), soc)["j"].to_numpy(), (SOC,)),
+    "optimize.IterativeLearning.__init__": (taps, (np.zeros(5), np.array([0.1, 0.5, 0.1]))),
+    "optimize.IterativeLearning.tell": (learned, (np.zeros(5), np.array([0.5, 0.3]), np.arange(5.0))),
+    "optimize.least_squares": (searched, (np.array([1.0]), np.array([0.0]), np.array([9.0]), OPEN)),
+    "optimize.measure_map": (
+        lambda x, y: optimize.measure_map(x, y).curvature, (SWEEP, -SWEEP**2),
+    ),
+    "signals.even_step": (signals.even_step, (TIME,)),
+    "signals.nrmse_fit_percent": (signals.nrmse_fit_percent, (ANGLE, ANGLE + NOISE)),
+    "signals.residual_tests": (lambda e, u: signals.residual_tests(e, u).share_white, (NOISE, DUTY)),
+    "signals.rmse": (signals.rmse, (ANGLE, ANGLE + NOISE)),
+    "signals.vaf_percent": (signals.vaf_percent, (ANGLE, ANGLE + NOISE)),
+    "surrogate.EngineSurrogate.predict": (
+        lambda soi: RECORDS.predict(soi)["imep_bar"].to_numpy(), (np.array([-4.0, 0.0]),),
+    ),
+    "throttle.PseudoWiener.slopes": (lambda u: MODEL.slopes(u, initial_state={"angle_deg": 8.0})[1], (DUTY[:20],)),
+    "throttle.airflow_torque_nm": (lambda a: throttle.airflow_torque_nm(throttle.Throttle(), a), (OPEN,)),
+    "throttle.holding_duty": (
+        lambda a: throttle.holding_duty(throttle.Throttle(), a)["duty_rising"].to_numpy(), (OPEN,),
+    ),
+    "throttle.simulate": (
+        lambda u, t, v, m: swept(duty=u, time_s=t, supply_v=v, airflow_torque_nm=m),
+        (DUTY, TIME, 12.0 + DUTY, 0.01 * DUTY),
+    ),
+    "throttle.simulate_many": (many, (DUTY, TIME, OPEN, 12.0 + DUTY, 0.01 * DUTY)),
+}  # fmt: skip
+
+# Models take columns by name; what is not exported takes arrays all the same.
+MORE: dict[str, tuple[Call, tuple[Array, ...]]] = {
+    "identify.FirstPrincipleModel.simulate": (run(GROUPS), (TIME, DUTY)),
+    "identify.FirstPrincipleModel.predict": (ahead(GROUPS), (TIME, DUTY, ANGLE)),
+    "identify.OdeModel.simulate": (ode, (TIME, DUTY, np.array([8.0]))),
+    "identify.SmoothThrottle.simulate": (run(SMOOTH), (TIME, DUTY)),
+    "throttle.PseudoWiener.simulate": (run(MODEL), (TIME, DUTY)),
+    "throttle.PseudoWiener.predict": (ahead(MODEL), (TIME, DUTY, ANGLE)),
+    "io.checks.check_trace": (check_trace, (CRANK, BAR)),
+    "signals.metrics.mse": (mse, (ANGLE, ANGLE + NOISE)),
+    "throttle.characteristics.mass_flow_kg_per_s": (
+        lambda area, drop: mass_flow_kg_per_s(area_m2=area, pressure_drop_kpa=drop), (1e-6 * OPEN, 1.0 + OPEN),
+    ),
+}  # fmt: skip
+
+
+def strided(values: Array) -> Array:
+    out = np.repeat(values, 2)[::2]
+    out.flags.writeable = False
+    return out
+
+
+FORMS: dict[str, Callable[[Array], Any]] = {
+    "list": lambda values: values.tolist(),
+    "tuple": lambda values: tuple(values.tolist()),
+    "series": lambda values: pd.Series(values, index=np.arange(values.size) + 1000),
+    "dataarray": lambda values: xr.DataArray(values, dims="sample", coords={"sample": np.arange(values.size) + 1000}),
+    "read-only strided": strided,
+    "scalars of numpy": list,
+}
+
+
+def takers() -> Iterable[str]:
+    """Public functions and methods that say ArrayLike, protocols and constructors of results left out."""
+    for module in mgdd.__all__:
+        room = importlib.import_module(f"mgdd.{module}") if module != "__version__" else None
+        for name in getattr(room, "__all__", ()):
+            thing = getattr(room, name)
+            members = vars(thing).items() if inspect.isclass(thing) else [("", thing)]
+            for key, member in members:
+                function = getattr(member, "__func__", member)
+                annotations = getattr(function, "__annotations__", {}) if callable(function) else {}
+                if any("ArrayLike" in str(note) for what, note in annotations.items() if what != "return"):
+                    yield f"{module}.{name}.{key}".rstrip(".")
+
+
+def test_every_taker_of_arrays_is_here() -> None:
+    found = {name for name in takers() if not name.startswith("results.FitReport.")}
+    assert set(CALLS) == found
+
+
+@pytest.mark.parametrize("form", FORMS)
+@pytest.mark.parametrize("name", [*CALLS, *MORE])
+def test_every_form_gives_the_same_numbers(name: str, form: str) -> None:
+    call, arrays = (CALLS | MORE)[name]
+    before = [values.copy() for values in arrays]
+    expected = call(*arrays)
+    given = [FORMS[form](values) for values in arrays]
+    found = call(*given)
+    np.testing.assert_equal(found, expected)
+    for values, copy, own in zip(arrays, before, given, strict=True):
+        np.testing.assert_array_equal(values, copy)
+        np.testing.assert_array_equal(np.asarray(own), copy)

@@ -1,0 +1,167 @@
+"""What the command line says while it works and when it fails: lines and bars on stderr, errors as JSON on stdout."""
+
+from __future__ import annotations
+
+import io
+import json
+import time
+from pathlib import Path
+from typing import Any
+
+import pytest
+
+from mgdd import cli
+from mgdd.cli import main, output
+from mgdd.cli.progress import _INTERVAL_S, Progress
+from mgdd.errors import ParameterError
+from mgdd.studies.sections import Table
+
+
+class Terminal(io.StringIO):
+    def isatty(self) -> bool:
+        return True
+
+
+def test_a_long_step_speaks_without_a_terminal() -> None:
+    out = io.StringIO()
+    with Progress(quiet=False, stream=out, interval_s=0.05) as progress:
+        time.sleep(0.12)
+        step = progress.expect(7)
+        step("fit the model")
+        time.sleep(0.2)
+    lines = out.getvalue().splitlines()
+    assert lines[0].startswith("mgdd: working (0 s)")
+    assert lines[-1].startswith("mgdd: fit the model (step 1 of about 7, ")
+    said = len(lines)
+    time.sleep(0.1)
+    assert len(out.getvalue().splitlines()) == said
+    assert _INTERVAL_S <= 15.0
+
+
+@pytest.mark.parametrize("stream", [io.StringIO(), Terminal()])
+def test_quiet_and_short_commands_say_nothing(stream: io.StringIO) -> None:
+    with Progress(quiet=True, stream=stream, interval_s=0.01) as progress:
+        progress.expect(3)("one")
+        time.sleep(0.05)
+    with Progress(quiet=False, stream=io.StringIO()) as progress:
+        progress("one")
+    assert stream.getvalue() == ""
+
+
+def test_a_terminal_gets_a_bar_that_goes_away(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setenv("TERM", "xterm")
+    monkeypatch.setenv("COLUMNS", "100")
+    out = Terminal()
+    with Progress(quiet=False, stream=out) as progress:
+        step = progress.expect(2)
+        for text in ("first", "second", "third"):
+            step(text)
+            time.sleep(0.15)
+        print("a result", file=out)
+    text = out.getvalue()
+    assert "second" in text
+    assert text.rstrip().endswith("\x1b[2K")  # the line of the bar is wiped
+
+
+def test_every_command_has_it(monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]) -> None:
+    monkeypatch.setattr(Progress.__init__, "__kwdefaults__", {"stream": None, "interval_s": 0.05})
+    assert main(["study", "sensor-delay", "--quick", "--seeds", "2", "--json"]) == 0
+    captured = capsys.readouterr()
+    assert json.loads(captured.out)["study"] == "sensor-delay"
+    assert "mgdd: " in captured.err
+    assert " of about 10, " in captured.err
+    assert main(["study", "sensor-delay", "--quick", "--seeds", "2", "--json", "--quiet"]) == 0
+    assert capsys.readouterr().err == ""
+
+
+def failed(capsys: pytest.CaptureFixture[str], *argv: str, code: int) -> dict[str, Any]:
+    assert main([*argv, "--json"]) == code
+    captured = capsys.readouterr()
+    content = json.loads(captured.out)
+    assert list(content) == ["error"]
+    error: dict[str, Any] = content["error"]
+    assert list(error) == ["type", "field", "value", "bound", "message"]
+    assert captured.err.strip().endswith(error["message"])
+    assert main(list(argv)) == code
+    assert capsys.readouterr().out == ""
+    return error
+
+
+def test_errors_of_json_commands_are_json(capsys: pytest.CaptureFixture[str], tmp_path: Path) -> None:
+    error = failed(capsys, "engine", "simulate", "--set", "bore_mm=-90", code=2)
+    assert (error["type"], error["message"]) == ("ParameterError", "bore_mm = -90 mm: must be > 0 and <= 2000")
+    error = failed(capsys, "engine", "analyze", str(tmp_path / "none.csv"), "--preset", "puma_single", code=2)
+    assert error["type"] == "FileNotFoundError"
+    error = failed(
+        capsys, "engine", "optimum", "--burn-duration-cad", "30", "--limit", "p_max_bar=10", code=3
+    )  # fmt: skip
+    assert error["type"] == "ConvergenceError"
+
+
+def test_a_wrong_command_line_too(capsys: pytest.CaptureFixture[str]) -> None:
+    for argv in (["engine", "simulate", "--soc-cad", "x", "--json"], ["engine", "simulate", "--no-such", "--json"]):
+        with pytest.raises(SystemExit) as caught:
+            main(argv)
+        assert caught.value.code == 2
+        captured = capsys.readouterr()
+        error = json.loads(captured.out)["error"]
+        assert error["type"] == "UsageError"
+        assert error["message"] in captured.err
+        assert captured.err.startswith("usage: mgdd")
+        with pytest.raises(SystemExit):
+            main(argv[:-1])
+        assert capsys.readouterr().out == ""
+
+
+def test_fields_of_an_error_are_passed_on() -> None:
+    error = ParameterError("bore_mm = -90 mm: must be > 0")
+    error.field, error.value, error.bound = "bore_mm", -90.0, "> 0"  # type: ignore[attr-defined]
+    assert output.error_of(error, "m") == {
+        "type": "ParameterError", "field": "bore_mm", "value": -90.0, "bound": "> 0", "message": "m",
+    }  # fmt: skip
+    error.value = object  # type: ignore[attr-defined]
+    assert output.error_of(error, "m")["value"] == "<class 'object'>"
+
+
+def test_a_result_that_was_printed_stands_alone(
+    monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
+) -> None:
+    from mgdd.cli import study
+    from mgdd.errors import ConvergenceError
+
+    real = study.emit
+
+    def then_fail(*args: Any, **how: Any) -> None:
+        real(*args, **how)
+        raise ConvergenceError("did not converge")
+
+    monkeypatch.setattr(study, "emit", then_fail)
+    assert main(["study", "--list", "--json"]) == 3
+    captured = capsys.readouterr()
+    assert list(json.loads(captured.out)) == ["studies"]
+    assert "did not converge" in captured.err
+
+
+def test_ctrl_c_before_a_result_is_an_error(
+    monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
+) -> None:
+    def press(*_: Any, **__: Any) -> None:
+        raise KeyboardInterrupt
+
+    monkeypatch.setattr(cli.study, "run_study", press)
+    assert main(["study", "sensor-delay", "--json"]) == 130
+    assert json.loads(capsys.readouterr().out)["error"]["type"] == "KeyboardInterrupt"
+
+
+def test_a_terminal_gets_a_table_with_every_cell(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(output, "is_terminal", lambda: True)
+    monkeypatch.setenv("COLUMNS", "60")
+    table = Table(
+        columns=("who [-]", "x"), rows=(("[bold]a", "1.5"), ("a name that is far too long for this terminal", "–"))
+    )
+    text = output.show(["head", table, "foot"])
+    flat = "".join(text.split())
+    for cell in ("head", "who[-]", "[bold]a", "1.5", "thisterminal", "foot"):
+        assert cell in flat
+    monkeypatch.setattr(output, "is_terminal", lambda: False)
+    assert output.show(["head", table]).splitlines()[1].split() == ["who", "[-]", "x"]

@@ -1,0 +1,194 @@
+"""What objects show of themselves: a short text and an HTML table, with units, for every result, preset and model."""
+
+from __future__ import annotations
+
+import html
+import re
+from collections.abc import Callable
+from html.parser import HTMLParser
+from typing import Any
+
+import numpy as np
+import pytest
+
+from mgdd import _core, datasets, presets
+from mgdd.engine import Cylinder, NoxModel, OperatingPoint, Performance, SoftSensor, find_optimum
+from mgdd.identify import (
+    FirstPrincipleModel,
+    OdeModel,
+    SmoothThrottle,
+    check_excitation,
+    fit_cylinder,
+    fit_throttle,
+    validate_throttle,
+)
+from mgdd.io import throttle_log
+from mgdd.loop import EngineBench, SensorDynamics, find_steady_optimum, run_seeker
+from mgdd.optimize import ExtremumSeeking, FitOptions, GoldenSection, Limit, tune
+from mgdd.presets import Preset
+from mgdd.results.describe import Row, as_html, as_text, rows_of
+from mgdd.results.units import unit_of
+from mgdd.signals import chirp
+from mgdd.studies import StudyResult
+from mgdd.studies.benchmarks.drive_axis import DriveModel
+from mgdd.studies.benchmarks.wiener_hammerstein import LinearApproximation
+from mgdd.surrogate import SurrogateEngine, fit_surrogate, random_step_records
+from mgdd.throttle import PseudoWiener, SensorPair, Throttle, simulate
+
+
+def objects() -> dict[str, Callable[[], Any]]:
+    def surrogate() -> Any:
+        return fit_surrogate(random_step_records(1500))
+
+    def log() -> Any:
+        signal = chirp(4.0, offset=0.01, amplitude=0.34, high_hz=5.0)
+        run = simulate(Throttle(), signal["duty"], time_s=signal["time_s"])
+        return throttle_log(run["time_s"], run["duty"], run["angle_deg"])
+
+    example = dict(zip(_core.smooth_throttle_names, _core.smooth_throttle_example, strict=True))
+    seeking = {"start": -20.0, "lower": -30.0, "upper": 10.0}
+    return {
+        "engine preset": lambda: presets.load("puma_single"),
+        "throttle preset": lambda: presets.load("P1"),
+        "cylinder": lambda: Cylinder(bore_mm=90.0),
+        "point": lambda: OperatingPoint(trapped_mass_g=0.7),
+        "throttle": lambda: Throttle(friction="stribeck", stiction_nm=0.3),
+        "sensors": lambda: SensorPair(closed_v=0.4),
+        "NOx": NoxModel,
+        "soft sensor": SoftSensor,
+        "performance": Performance.efficiency_and_nox,
+        "analyser": SensorDynamics,
+        "limit": lambda: Limit(name="p_max_bar", upper=95.0),
+        "bench": EngineBench,
+        "seeker": lambda: ExtremumSeeking(**seeking),
+        "golden": lambda: GoldenSection(**seeking, noise_sd=0.2),
+        "run": lambda: run_seeker(EngineBench(), ExtremumSeeking(**seeking), 300),
+        "steady": lambda: find_steady_optimum(EngineBench(limits=["p_max_bar"]), {"p_max_bar": 95.0}),
+        "optimum": lambda: find_optimum(Cylinder(), OperatingPoint()),
+        "tuning": lambda: tune(0.25, -0.1, method="batch", distance=10.0, arrival=1.0),
+        "pw_r": lambda: PseudoWiener("pw_r"),
+        "pw_p": lambda: PseudoWiener("pw_p", {"plays": 8.0}),
+        "first principle": FirstPrincipleModel,
+        "smooth": lambda: SmoothThrottle(parameters=example),
+        "ode": lambda: OdeModel(derivative=print, output=print, parameters={"tau_s": 1.0}, initial_state=(0.0,)),
+        "drive": lambda: DriveModel(parameters={"mass_kg": 95.0}, force_n_per_v=35.0),
+        "filter": lambda: LinearApproximation(
+            numerator=np.ones(9), denominator=np.ones(1), input_mean=0.0, output_mean=0.0, rmse=0.0
+        ),
+        "surrogate": surrogate,
+        "support": lambda: surrogate().support,
+        "signal": lambda: surrogate().signals["nox_ppm"],
+        "lag": lambda: surrogate().signals["nox_ppm"].sensor,
+        "best": lambda: surrogate().find_optimum("imep_bar"),
+        "surrogate engine": lambda: SurrogateEngine(surrogate()),
+        "fit": lambda: fit_throttle(log(), options=FitOptions(n_starts=1)),
+        "report": lambda: fit_throttle(log(), options=FitOptions(n_starts=1)).report,
+        "validation": lambda: validate_throttle(FirstPrincipleModel(), log()),
+        "check": lambda: check_excitation(chirp(4.0, offset=0.01, amplitude=0.34), Throttle()),
+        "calibration": lambda: fit_cylinder(datasets.load_hd_traces()[:1], presets.load("hd_diesel_128x144").cylinder),
+    }
+
+
+class Tags(HTMLParser):
+    def __init__(self, text: str) -> None:
+        super().__init__()
+        self.open: list[str] = []
+        self.feed(text)
+        assert self.open == []
+
+    def handle_starttag(self, tag: str, attrs: list[tuple[str, str | None]]) -> None:
+        assert all(name == "style" for name, _ in attrs)
+        if tag != "br":
+            self.open.append(tag)
+
+    def handle_endtag(self, tag: str) -> None:
+        assert self.open.pop() == tag
+
+
+@pytest.mark.parametrize("name", objects())
+def test_the_text_is_short_and_the_html_whole(name: str) -> None:
+    thing = objects()[name]()
+    lines = repr(thing).splitlines()
+    assert 1 <= len(lines) <= 15
+    assert max(map(len, lines)) <= 100
+    assert "object at 0x" not in repr(thing)
+    markup = thing._repr_html_()
+    Tags(markup)
+    assert type(thing).__name__ in markup or name in ("fit", "report", "calibration")
+    assert "<td" in markup
+
+
+def test_units_are_there() -> None:
+    text, markup = repr(presets.load("P1")), presets.load("P1")._repr_html_()
+    assert "preload_above_nm 0.396 N m" in text
+    assert re.search(r"inertia_kgm2</th><td[^>]*>0\.0021</td><td[^>]*>kg m²</td>", markup)
+    assert markup.count("<tr>") == len(Throttle.fields())
+    assert "bore_mm 86 mm" in repr(presets.load("puma_single"))
+    assert "% of p_max" in repr(objects()["calibration"]())
+
+
+def test_a_record_of_the_core_still_evaluates_to_itself() -> None:
+    for record in (SensorPair(closed_v=0.4), NoxModel(), SoftSensor(), SensorDynamics(), Cylinder(bore_mm=90.0)):
+        assert max(map(len, repr(record).splitlines())) <= 100
+    names = {"SensorPair": SensorPair, "NoxModel": _core.NoxModel, "NoxProxy": _core.NoxProxy, "SoftSensor": SoftSensor}
+    for record in (SensorPair(closed_v=0.4), NoxModel(), SoftSensor()):
+        assert eval(repr(record), names) == record
+
+
+def test_a_study_says_what_it_holds(quick_study: Callable[..., StudyResult]) -> None:
+    result = quick_study("sensor-delay", seeds=4)
+    text = repr(result)
+    assert text.startswith("StudyResult sensor-delay\n")
+    assert "rows 7" in text
+    Tags(result._repr_html_())
+
+
+def test_many_and_long_rows_are_counted_and_cut() -> None:
+    rows = [Row(f"a_rather_long_name_{i}", "123456", "N m s/rad") for i in range(100)]
+    text = as_text("title", rows).splitlines()
+    assert len(text) <= 15
+    assert max(map(len, text)) <= 100
+    assert re.fullmatch(r"  … and \d+ more", text[-1])
+    shown = " ".join(text).count("a_rather_long_name_")
+    assert text[-1] == f"  … and {100 - shown} more"
+    assert "… and 40 more" in as_html("title", rows)
+    long = as_text("t" * 300 + " end", [Row("x", "y " * 200)]).splitlines()
+    assert max(map(len, long)) <= 100
+    assert html.escape("<b> & 'c'") in as_html("<b> & 'c'", [])
+
+
+def test_rows_know_units_arrays_and_what_is_missing() -> None:
+    rows = rows_of(
+        {
+            "tau_s": 0.1234567891, "p_max_bar": np.float64(95.0), "on": True, "none_deg": None, "gone_mm": float("nan"),
+            "grid": np.zeros((3, 4)), "pair": (1.0, 2.5), "words": ("a",), "nothing": (), "map": {"a_s": 1, "b_m": 2},
+            "parameters": {"mass_kg": 95.0}, "gain_percent": {"x.csv": 1.5}, "own": 3.0,
+        },
+        {"own": "furlong"},
+    )  # fmt: skip
+    assert rows == [
+        Row("tau_s", "0.123457", "s"), Row("p_max_bar", "95", "bar"), Row("on", "yes"), Row("none_deg", "–"),
+        Row("gone_mm", "–"), Row("grid", "array 3 × 4"), Row("pair", "1, 2.5"), Row("words", "a"),
+        Row("nothing", "none"), Row("map.a_s", "1", "s"), Row("map.b_m", "2", "m"), Row("mass_kg", "95", "kg"),
+        Row("gain_percent.x.csv", "1.5", "%"), Row("own", "3", "furlong"),
+    ]  # fmt: skip
+
+
+def test_names_end_in_their_unit() -> None:
+    wrong = {
+        f"{kind.__name__}.{name}": (unit_of(name), info["unit"])
+        for kind in (Cylinder, OperatingPoint, Throttle)
+        for name, info in kind.fields().items()
+        if unit_of(name) != info["unit"]
+    }
+    # Their own field says it: differences of angles, symbols of formulas, and units that nothing else has.
+    assert set(wrong) <= {
+        "Cylinder.burn_duration_ref_cad", "Cylinder.second_delay_cad", "Cylinder.second_duration_cad",
+        "Cylinder.ignition_c0_cad", "Cylinder.gamma_linear_300k", "Cylinder.gamma_polynomial_c2_per_k2",
+        "Cylinder.woschni_cp_m_per_sk", "Cylinder.wiebe_a", "Cylinder.wiebe_m", "Cylinder.second_wiebe_m",
+        "OperatingPoint.burn_duration_cad",
+    }, wrong  # fmt: skip
+    for kind in ("pw_r", "pw_w", "pw_p"):
+        units = _core.pseudo_wiener_units(kind)
+        assert {name: unit_of(name) for name in units} == dict(units)
+    assert isinstance(presets.load("P1"), Preset)

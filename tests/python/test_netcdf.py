@@ -1,0 +1,198 @@
+"""Every Dataset that a public name hands out can be written as netCDF, and comes back with the same values."""
+
+from __future__ import annotations
+
+import importlib
+import inspect
+import io
+from collections.abc import Callable, Iterable
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pytest
+import xarray as xr
+
+import mgdd
+from mgdd import datasets, identify, optimize, presets, signals, surrogate
+from mgdd.engine import Cylinder, OperatingPoint, analyze, convergence, sensitivities, simulate, timing_sweep
+from mgdd.identify.throttle.validation import ThrottleValidation
+from mgdd.io import (
+    check_throttle_log,
+    pressure_trace,
+    read_pressure,
+    read_throttle_log,
+    throttle_log,
+    write_throttle_log,
+)
+from mgdd.loop import EngineBench, monte_carlo, run_seeker, steady_map
+from mgdd.results import FitReport, check_labels, labelled_dataset
+from mgdd.rig import SimulatedRig
+from mgdd.studies import run_measured_traces
+from mgdd.throttle import PseudoWiener, SensorFault, Throttle, groups, holding_duty, linear_part, sense, simulate_many
+from mgdd.throttle import simulate as simulate_throttle
+
+POINT = OperatingPoint()
+TIME = np.arange(2000) * 1e-3
+
+
+def log() -> xr.Dataset:
+    run = simulate_throttle(Throttle(), 0.15 + 0.3 * np.sin(6.0 * TIME), time_s=TIME)
+    return throttle_log(TIME, run["duty"], run["angle_deg"])
+
+
+def written_log(folder: Path) -> xr.Dataset:
+    write_throttle_log(log(), folder / "log.csv")
+    return read_throttle_log(folder / "log.csv")
+
+
+def pressures(folder: Path) -> xr.Dataset:
+    trace = datasets.load_hd_traces()[0]
+    columns = np.column_stack([trace["crank_angle_cad"], trace["pressure_bar"]])
+    np.savetxt(folder / "trace.csv", columns, delimiter=",")
+    return read_pressure(folder / "trace.csv")
+
+
+def bench_run() -> xr.Dataset:
+    return EngineBench(seed=1).run(np.full(20, -6.0))
+
+
+def seeker() -> optimize.ExtremumSeeking:
+    return optimize.ExtremumSeeking(start=-20.0, lower=-30.0, upper=10.0)
+
+
+def rig_run() -> xr.Dataset:
+    with SimulatedRig(EngineBench(seed=1)) as rig:
+        return run_seeker(rig, seeker(), 20).dataset
+
+
+def learned() -> xr.Dataset:
+    learner = optimize.IterativeLearning(np.zeros(10), k_p=0.5)
+    learner.ask()
+    learner.tell(np.ones(10))
+    return learner.history
+
+
+def validation() -> ThrottleValidation:
+    model = identify.FirstPrincipleModel()
+    return identify.validate_throttle(model, log())
+
+
+def of_records() -> surrogate.EngineSurrogate:
+    return surrogate.fit_surrogate(surrogate.random_step_records(1500))
+
+
+def wall_heat() -> xr.Dataset:
+    traces = datasets.load_hd_traces()[:2]
+    fit = identify.fit_cylinder(traces, presets.load("hd_diesel_128x144").cylinder)
+    return identify.wall_heat_profile(traces, fit, scales=[0.5, 1.0]).dataset
+
+
+def report() -> FitReport:
+    return optimize.least_squares(lambda x: ([x[0] - 1.0, x[1], x[0]], [[1, 0], [0, 1], [1, 0]]), [0.0, 0.0])
+
+
+def fitted_load() -> xr.Dataset:
+    fit = identify.fit_cylinder(datasets.load_hd_traces()[:1], presets.load("hd_diesel_128x144").cylinder)
+    return fit.loads[0].overlay
+
+
+SIGNALS = ("amplitude_random_steps", "chirp", "multisine", "prbs", "staircase", "triangle")
+NEEDS = {"load_cascaded_tanks": "cascaded_tanks", "load_emps": "emps", "load_h2df_cycles": "h2df_502",
+         "load_wiener_hammerstein": "wh2009"}  # fmt: skip
+MADE: dict[str, Callable[[Path], Any]] = {
+    **{f"signals.{name}": lambda _, n=name: getattr(signals, n)(offset=0.15, amplitude=0.2) for name in SIGNALS},
+    **{f"datasets.{name}": lambda _, n=name: getattr(datasets, n)() for name in (*NEEDS, "load_hd_traces")},
+    "engine.analyze": lambda _: analyze(simulate(Cylinder(), OperatingPoint(fuel_mg=0.0)), Cylinder()),
+    "engine.convergence": lambda _: convergence(Cylinder(), POINT),
+    "engine.sensitivities": lambda _: sensitivities(Cylinder(), POINT),
+    "engine.simulate": lambda _: simulate(Cylinder(), OperatingPoint(intake_pressure_kpa=700.0, fuel_mg=400.0)),
+    "engine.timing_sweep": lambda _: timing_sweep(Cylinder(), POINT),
+    "surrogate.EngineSurrogate.predict": lambda _: of_records().predict([-4.0, 0.0]),
+    "surrogate.EngineSurrogate.quality": lambda _: of_records().quality(),
+    "identify.ExcitationCheck.prediction": lambda _: identify.check_excitation(
+        signals.chirp(offset=0.15, amplitude=0.1), Throttle()
+    ).prediction,
+    "identify.fit_cylinder.overlay": lambda _: fitted_load(),
+    "signals.ResidualTests.correlations": lambda _: validation().tests.correlations,
+    "identify.validate_throttle.n_step": lambda _: validation().n_step,
+    "identify.validate_throttle.free_run": lambda _: validation().free_run,
+    "identify.WallHeatProfile.dataset": lambda _: wall_heat(),
+    "results.FitReport.to_dataset": lambda _: report().to_dataset(),
+    "results.Fit.run": lambda _: identify.fit_throttle(log(), options=optimize.FitOptions(n_starts=1)).run,
+    "throttle.PseudoWiener.predict": lambda _: PseudoWiener("pw_r").predict(log(), 5),
+    "identify.design_excitation": lambda _: identify.design_excitation("chirp", Throttle())[0],
+    "identify.n_step_rms": lambda _: validation().n_step,
+    "surrogate.random_step_records": lambda _: surrogate.random_step_records(50),
+    "identify.split_log": lambda _: identify.split_log(log(), shares=(0.5, 0.5)),
+    "io.check_throttle_log": lambda _: check_throttle_log(log()),
+    "io.pressure_trace": lambda _: pressure_trace(np.arange(-40.0, 41.0), 60.0 - 0.01 * np.arange(-40.0, 41.0) ** 2),
+    "io.read_pressure": pressures,
+    "io.read_throttle_log": written_log,
+    "io.throttle_log": lambda _: log(),
+    "loop.EngineBench.run": lambda _: bench_run(),
+    "loop.LoopRun.dataset": lambda _: [run_seeker(EngineBench(seed=1), seeker(), 20).dataset, rig_run()],
+    "loop.monte_carlo": lambda _: monte_carlo(EngineBench(), seeker(), [1, 2], cycles=20),
+    "loop.steady_map": lambda _: steady_map(EngineBench(), [-10.0, -6.0]),
+    "optimize.IterativeLearning.history": lambda _: learned(),
+    "optimize.maximize": lambda _: optimize.maximize(
+        lambda x: -float((x[0] - 2.0) ** 2), optimize.GradientDescent(start=1.0), 20
+    ),
+    "results.labelled_dataset": lambda _: labelled_dataset({"time_s": ("time_s", TIME)}),
+    "studies.StudyResult.dataset": lambda _: run_measured_traces(quick=True, figures=False).dataset,
+    "throttle.groups": lambda _: groups(Throttle()),
+    "throttle.holding_duty": lambda _: holding_duty(Throttle()),
+    "throttle.linear_part": lambda _: linear_part(Throttle()),
+    "throttle.sense": lambda _: sense(
+        simulate_throttle(Throttle(), 0.3, duration_s=0.2), faults=[SensorFault(kind="open_wire", sensor=2)]
+    ),
+    "throttle.simulate": lambda _: simulate_throttle(Throttle(), 0.3, duration_s=0.2),
+    "throttle.simulate_many": lambda _: simulate_many(Throttle(), 0.3, duration_s=0.2, start_deg=[0.0, 20.0]),
+}  # fmt: skip
+
+
+def is_dataset(annotation: Any) -> bool:
+    return "Dataset" in str(annotation)
+
+
+def sources(module: str) -> Iterable[str]:
+    """Public functions and methods that return a Dataset, and public fields that are one."""
+    room = importlib.import_module(f"mgdd.{module}")
+    for name in room.__all__:
+        thing = getattr(room, name)
+        if not inspect.isclass(thing):
+            if callable(thing) and is_dataset(getattr(thing, "__annotations__", {}).get("return", "")):
+                yield f"{module}.{name}"
+            continue
+        for key, field in getattr(thing, "__annotations__", {}).items():
+            if is_dataset(field):
+                yield f"{module}.{name}.{key}"
+        for key, member in vars(thing).items():
+            function = member.fget if isinstance(member, property) else getattr(member, "__func__", member)
+            returned = getattr(function, "__annotations__", {}).get("return", "")
+            if not key.startswith("_") and is_dataset(returned):
+                yield f"{module}.{name}.{key}"
+
+
+def test_every_public_source_of_a_dataset_is_here() -> None:
+    found = {source for module in mgdd.__all__ if module != "__version__" for source in sources(module)}
+    assert len(found) > 40
+    assert {source for source in found if not source.startswith("results.Model.")} <= set(MADE)
+
+
+@pytest.mark.parametrize("source", sorted(MADE))
+def test_written_and_read_back(source: str, tmp_path: Path) -> None:
+    needed = NEEDS.get(source.rpartition(".")[2])
+    if needed is not None and needed not in datasets.available():
+        pytest.skip(f"MGDD_DATA_DIR holds no folder {needed}")
+    made = MADE[source](tmp_path)
+    for dataset in [made] if isinstance(made, xr.Dataset) else made:
+        check_labels(dataset)
+        dataset.to_netcdf(tmp_path / "out.nc", engine="scipy")
+        with (tmp_path / "out.nc").open("rb") as file:
+            back = xr.load_dataset(io.BytesIO(file.read()), engine="scipy")
+        assert set(back.variables) == set(dataset.variables)
+        assert set(back.attrs) == set(dataset.attrs)
+        for name, variable in dataset.variables.items():
+            np.testing.assert_array_equal(back[name].to_numpy(), variable.to_numpy(), err_msg=str(name))
+            assert back[name].attrs["long_name"] == variable.attrs["long_name"]

@@ -1,0 +1,359 @@
+"""Parameter files: every kind and option there and back bit for bit, and refusals that name file, key and remedy."""
+
+from __future__ import annotations
+
+import dataclasses
+import math
+import tomllib
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pytest
+import xarray as xr
+from hypothesis import given, settings
+from hypothesis import strategies as st
+
+from mgdd import _core, presets
+from mgdd.engine import Cylinder, OperatingPoint
+from mgdd.engine import simulate as simulate_cycle
+from mgdd.errors import DataError, ParameterError
+from mgdd.identify import FirstPrincipleModel, OdeModel, SmoothThrottle, load_throttle_model
+from mgdd.identify.throttle.first_principle_model import TYPICAL
+from mgdd.io import ParameterFile
+from mgdd.io.parameters import Entry, Wanted
+from mgdd.presets import Preset
+from mgdd.studies.benchmarks.drive_axis import DriveModel
+from mgdd.studies.benchmarks.two_tanks import TwoTanksModel
+from mgdd.studies.benchmarks.wiener_hammerstein import LinearApproximation, WienerHammersteinModel
+from mgdd.surrogate import EngineSurrogate, SurrogateEngine, fit_surrogate, random_step_records
+from mgdd.throttle import PseudoWiener, SensorPair, Throttle, sense, simulate
+
+TIME = 1e-3 * np.arange(300)
+DUTY = 0.1 + 0.5 * np.sin(2.0 * np.pi * TIME * (2.0 + 20.0 * TIME))
+GROUPS = dict(TYPICAL)
+
+
+def span(low: float, high: float) -> st.SearchStrategy[float]:
+    return st.floats(low, high, allow_nan=False)
+
+
+@st.composite
+def first_principle(draw: st.DrawFn) -> FirstPrincipleModel:
+    bounds = {parameter.name: parameter for parameter in _core.throttle_group_bounds()}
+    values = {name: draw(span(bound.lower, bound.upper)) for name, bound in bounds.items()}
+    return FirstPrincipleModel(
+        parameters=values,
+        closed_deg=draw(span(-5.0, 5.0)),
+        open_deg=draw(span(30.0, 100.0)),
+        ramp_deg=draw(span(0.05, 2.0)),
+        substeps=draw(st.integers(1, 8)),
+    )
+
+
+def changed(draw: st.DrawFn, start: dict[str, float], names: list[str]) -> dict[str, float]:
+    return {name: start[name] * draw(span(0.9, 1.1)) for name in names if start[name] != 0.0}
+
+
+@st.composite
+def pseudo_wiener(draw: st.DrawFn) -> PseudoWiener:
+    kind = draw(st.sampled_from(["pw_r", "pw_w", "pw_p"]))
+    values: dict[str, float] = {
+        "delay_samples": float(draw(st.integers(0, 5))),
+        "closed_deg": draw(span(-3.0, 3.0)),
+        "open_deg": draw(span(40.0, 95.0)),
+        "sample_s": draw(st.sampled_from([5e-4, 1e-3, 2e-3])),
+    }
+    options: dict[str, Any] = {}
+    if kind == "pw_r":
+        options["switching"] = draw(st.sampled_from(["predicted", "measured"]))
+        options["friction"] = draw(st.sampled_from(["set_valued", "tanh"]))
+        values |= {"substeps": float(draw(st.integers(1, 6))), "ramp_deg": draw(span(0.05, 1.5))}
+        values |= {"tanh_deg_per_s": draw(span(0.5, 20.0)), "dead_band_deg": draw(span(0.0, 1.0))}
+    if kind == "pw_w":
+        values |= {"knot_lower_duty": draw(span(-0.5, -0.2)), "knot_upper_duty": draw(span(0.2, 0.6))}
+    if kind == "pw_p":
+        values["plays"] = float(draw(st.integers(1, 8)))
+    base = dict(PseudoWiener(kind, values, **options).parameters)
+    if "map_start" in base:
+        values["map_start"] = float(draw(st.booleans()))
+    moved = [name for name in base if name.endswith(("tau_s", "coulomb_duty", "preload_duty"))]
+    return PseudoWiener(kind, values | changed(draw, base, moved), **options)
+
+
+@st.composite
+def smooth(draw: st.DrawFn) -> SmoothThrottle:
+    example = dict(zip(_core.smooth_throttle_names, _core.smooth_throttle_example, strict=True))
+    return SmoothThrottle(
+        parameters=example | changed(draw, example, list(example)),
+        inertia_kgm2=draw(span(1e-3, 5e-3)),
+        gear_ratio=draw(span(10.0, 30.0)),
+        inductance_h=draw(span(5e-4, 3e-3)),
+        supply_v=draw(span(9.0, 15.0)),
+    )
+
+
+MODELS = st.one_of(first_principle(), pseudo_wiener(), smooth())
+
+
+@given(model=MODELS, start_deg=span(5.0, 35.0))
+@settings(max_examples=150)
+def test_a_throttle_model_simulates_bit_for_bit_after_a_file(model: Any, start_deg: float) -> None:
+    again = type(model).from_toml(model.to_toml())
+    assert again == model
+    assert again.to_toml() == model.to_toml()
+    step = TIME * (model.parameters.get("sample_s", 1e-3) / 1e-3)
+    state = [math.radians(start_deg), 0.0, 0.0] if model.kind == "smooth" else {"angle_deg": start_deg}
+    one, two = (m.simulate({"time_s": step, "duty": DUTY}, initial_state=state) for m in (again, model))
+    xr.testing.assert_identical(one, two)
+
+
+def test_stops_ramp_and_substeps_of_a_first_principle_model_come_back() -> None:
+    model = FirstPrincipleModel(parameters=GROUPS, closed_deg=2.0, open_deg=60.0, ramp_deg=1.0, substeps=5)
+    assert FirstPrincipleModel.from_toml(model.to_toml()) == model
+
+
+def test_a_value_outside_its_domain_names_the_file(tmp_path: Path) -> None:
+    model, file = FirstPrincipleModel(parameters=GROUPS), tmp_path / "model.toml"
+    file.write_text(model.to_toml().replace("tau_s = { value = 0.03", "tau_s = { value = -0.03"), encoding="utf-8")
+    with pytest.raises(ParameterError, match=r"model\.toml: tau_s = -0\.03: must be > 0"):
+        load_throttle_model(file)
+    pair = SensorPair().to_toml().replace("adc_bits = { value = 12", "adc_bits = { value = 99")
+    with pytest.raises(ParameterError, match=r"^pair\.toml: adc_bits = 99"):
+        SensorPair.from_toml(pair, origin="pair.toml")
+
+
+def test_a_file_of_a_model_is_loaded_whatever_its_kind(tmp_path: Path) -> None:
+    for model in (
+        FirstPrincipleModel(parameters=GROUPS, closed_deg=2.0, open_deg=60.0, ramp_deg=1.0, substeps=5),
+        PseudoWiener("pw_r", {"delay_samples": 2.0}, switching="measured", friction="tanh"),
+        PseudoWiener("pw_w"),
+        PseudoWiener("pw_p", {"plays": 3.0}),
+    ):
+        file = tmp_path / f"{model.kind}.toml"
+        file.write_text(model.to_toml(), encoding="utf-8")
+        assert load_throttle_model(file) == model
+
+
+@given(
+    values=st.fixed_dictionaries(
+        {
+            name: st.sampled_from(info["choices"]) if "choices" in info else span(0.95, 1.05)
+            for name, info in Throttle.fields().items()
+        }
+    )
+)
+@settings(max_examples=60)
+def test_a_throttle_preset_simulates_bit_for_bit_after_a_file(values: dict[str, Any]) -> None:
+    fields = Throttle.fields()
+    plain = {
+        name: value if "choices" in fields[name] else value * fields[name]["default"] for name, value in values.items()
+    }
+    plain["stiction_nm"] = 1.2 * plain["coulomb_nm"]
+    preset = Preset(
+        name="mine", title="a 'title' \"°CA\"", throttle=Throttle(**plain), sources={"throttle.bore_mm": "x"}
+    )
+    again = Preset.from_toml(preset.to_toml())
+    assert again.records == preset.records
+    runs = [simulate(one.throttle, 0.3, duration_s=0.1)["angle_deg"].to_numpy() for one in (preset, again)]
+    np.testing.assert_array_equal(*runs)
+
+
+def test_an_engine_preset_simulates_bit_for_bit_after_a_file() -> None:
+    cylinder = Cylinder(
+        burn_shape="double_wiebe", gamma_model="polynomial", wall_heat_model="hohenberg", bore_mm=85.123456789
+    )
+    point = OperatingPoint(trapped_mass_g=0.71234567890123, burn_duration_cad=33.3)
+    preset = Preset(name="mine", title="mine", cylinder=cylinder, point=point)
+    again = Preset.from_toml(preset.to_toml())
+    assert again.records == preset.records
+    one, two = (simulate_cycle(p.cylinder, p.point, soc_cad=-4.0)["pressure_bar"] for p in (preset, again))
+    np.testing.assert_array_equal(one, two)
+
+
+def test_a_sensor_pair_comes_back() -> None:
+    pair = SensorPair(closed_v=0.4, span_v=4.1, adc_bits=10, noise_v=0.01, lag_s=1e-3, debounce_s=0.1)
+    again = SensorPair.from_toml(pair.to_toml())
+    assert again == pair
+    run = simulate(Throttle(), 0.3, duration_s=0.2)
+    np.testing.assert_array_equal(sense(run, pair)["first_v"], sense(run, again)["first_v"])
+    with pytest.raises(ParameterError, match=r"adc_bits: value = 10\.5: must be a whole number"):
+        SensorPair.from_toml(pair.to_toml().replace("value = 10,", "value = 10.5,"))
+
+
+def lag(_: float, x: Any, u: Any, p: Any) -> Any:
+    return (p[0] * u[0] - x) / p[1]
+
+
+def second(x: Any, _: Any, p: Any) -> Any:
+    return 2.0 * x[0] + 0.0 * p[0]
+
+
+def test_an_ode_model_comes_back_with_its_functions() -> None:
+    model = OdeModel(
+        derivative=lag, output=second, parameters={"gain": 2.1, "time_s": 1 / 3}, initial_state=(0.1,), substeps=3
+    )
+    again = OdeModel.from_toml(model.to_toml(), derivative=lag, output=second)
+    assert again == model
+    inputs = {"time_s": TIME, "u": DUTY}
+    xr.testing.assert_identical(again.simulate(inputs), model.simulate(inputs))
+    with pytest.raises(ParameterError, match="output = _first_state: text was written with second; give that function"):
+        OdeModel.from_toml(model.to_toml(), derivative=lag)
+
+
+def test_benchmark_models_come_back() -> None:
+    drive = DriveModel(parameters={"mass_kg": 95.0, "coulomb_n": 20.0, "stribeck_n": 1 / 3}, force_n_per_v=35.1)
+    inputs = {"time_s": TIME, "drive_v": 3.0 * DUTY, "pump_v": 2.0 + DUTY, "input_v": DUTY}
+    xr.testing.assert_identical(drive.simulate(inputs), DriveModel.from_toml(drive.to_toml()).simulate(inputs))
+    names = _core.TwoTanks.parameter_names
+    tanks = TwoTanksModel(
+        parameters=dict(zip(names, (0.05, 0.05, 0.5, 0.05, 0.5, -0.1, 9.0, 0.4, 1.0), strict=True)), lower_brim_v=8.0
+    )
+    slow = {**inputs, "time_s": 4.0 * np.arange(TIME.size)}
+    runs = [m.simulate(slow, initial_state=[1.0, 2.0]) for m in (tanks, TwoTanksModel.from_toml(tanks.to_toml()))]
+    xr.testing.assert_identical(*runs)
+    linear = LinearApproximation(
+        numerator=np.array([0.5, 0.1]), denominator=np.array([1.0, -1 / 3]), input_mean=0.1, output_mean=1.0, rmse=0.2
+    )
+    circuit = WienerHammersteinModel(
+        first_order=1, last_order=1, n_curve=4, lower=-1.0, upper=1.0,
+        values=np.r_[-0.5, 0.5, -0.5, 0.5, -3.0, -1.0, 1.0, 1 / 3],
+    )  # fmt: skip
+    for model in (linear, circuit):
+        again = type(model).from_toml(model.to_toml())
+        xr.testing.assert_identical(again.simulate(inputs), model.simulate(inputs))
+
+
+@pytest.fixture(scope="module")
+def surrogate() -> EngineSurrogate:
+    return fit_surrogate(random_step_records(1500))
+
+
+def test_a_surrogate_predicts_and_runs_bit_for_bit_after_a_file(surrogate: EngineSurrogate) -> None:
+    again = EngineSurrogate.from_toml(surrogate.to_toml())
+    assert again.to_toml() == surrogate.to_toml()
+    grid = np.linspace(-8.0, 12.0, 41)
+    one, two = surrogate.predict(grid), again.predict(grid)
+    assert one.equals(two)
+    assert one.attrs == two.attrs
+    assert again.quality().equals(surrogate.quality())
+    assert again.source == surrogate.source
+    assert again.signals["nox_ppm"].sensor == surrogate.signals["nox_ppm"].sensor
+    first, then = (SurrogateEngine(model, seed=3) for model in (surrogate, again))
+    assert [first.step(-4.0) for _ in range(150)] == [then.step(-4.0) for _ in range(150)]
+
+
+def test_a_surrogate_file_is_checked(surrogate: EngineSurrogate) -> None:
+    text = surrogate.to_toml()
+    with pytest.raises(DataError, match=r"\[signals\] names .*: each needs its table"):
+        EngineSurrogate.from_toml(text.replace("[signal_imep_bar]", "[signal_work]"))
+    at = text.index("lower = { value = [") + len("lower = { value = [")
+    short = text[:at] + text[text.index(",", at) + 1 :]
+    with pytest.raises(DataError, match=r"mine: \[support\] lower: has shape \(3,\): must be \(4,\)"):
+        EngineSurrogate.from_toml(short, origin="mine")
+
+
+LAG = ParameterFile(
+    kind="lag",
+    tables={
+        "parameters": {
+            "tau_s": Entry(value=0.1 + 0.2, unit="s", stderr=1e-17, source='log "a", 3 °C\n'),
+            "steps": Entry(value=3),
+            "on": Entry(value=True),
+            "form": Entry(value="a\\b"),
+            "row": Entry(value=[1.0, -0.0, 5e-324, 1.7976931348623157e308], unit="m"),
+            "grid": Entry(value=[[1.0, math.inf], [2.5, -math.inf]]),
+            "names": Entry(value=["], [", "x"]),
+            "odd key": Entry(value=1.5),
+        }
+    },
+    notes={"source": "mine", "unidentifiable": ["a", "b"], "empty": []},
+)
+WANTED = {
+    "tau_s": Wanted("s"),
+    "steps": Wanted(form="integer"),
+    "on": Wanted(form="flag"),
+    "form": Wanted(form="text"),
+    "row": Wanted("m", "numbers"),
+    "grid": Wanted(form="numbers"),
+    "names": Wanted(form="texts"),
+    "odd key": Wanted(),
+}
+
+
+def test_every_form_of_value_comes_back() -> None:
+    again = ParameterFile.from_toml(LAG.to_toml(), origin="x")
+    assert again == LAG
+    assert math.copysign(1.0, again.tables["parameters"]["row"].value[1]) == -1.0
+    values = again.values("parameters", WANTED)
+    assert values == {name: entry.value for name, entry in LAG.tables["parameters"].items()}
+    text = LAG.to_toml()
+    assert tomllib.loads(text)["format"] == 1
+    assert 'tau_s = { value = 0.30000000000000004, unit = "s", stderr = 1e-17, source = ' in text
+
+
+@given(value=st.floats(allow_nan=True, allow_infinity=True), text=st.text(max_size=30))
+@settings(max_examples=200)
+def test_any_number_and_text_come_back(value: float, text: str) -> None:
+    file = dataclasses.replace(LAG, tables={"parameters": {"x": Entry(value=value, source=text)}}, notes={"name": text})
+    again = ParameterFile.from_toml(file.to_toml())
+    entry = again.tables["parameters"]["x"]
+    assert (entry.source, again.notes["name"]) == (text, text)
+    assert np.array([entry.value]).tobytes() == np.array([value]).tobytes() or math.isnan(value)
+
+
+@pytest.mark.parametrize(
+    ("old", "new", "error", "match"),
+    [
+        ('kind = "lag"\n', "", DataError, r"a\.toml: kind = None: say what the file holds"),
+        ('"lag"', '"led"', DataError, "a.toml: kind = 'led': must be 'lag'"),
+        ("format = 1", "format = 2", DataError, "a.toml: format = 2: this version of mgdd reads format = 1"),
+        ("format = 1\n", "", DataError, "format = None: .*write that line"),
+        ("tau_s", "tua_s", ParameterError, r"a\.toml: \[parameters\] tua_s: unknown key: did you mean 'tau_s'\?"),
+        ('"s"', '"ms"', ParameterError, r"tau_s: unit = 'ms': must be 's'; convert the value"),
+        (', unit = "s"', "", ParameterError, r"tau_s: unit = None: must be 's'; write tau_s = \{ value"),
+        ("value = 3", 'value = "3"', ParameterError, r"steps: value = '3': must be a whole number"),
+        ("value = 3", "value = 3.0", ParameterError, r"steps: value = 3\.0: must be a whole number"),
+        ("value = 3", "value = true", ParameterError, r"steps: value = True: must be a whole number"),
+        ("value = true", "value = 1", ParameterError, r"on: value = 1: must be true or false"),
+        ("0.30000000000000004", "[1]", ParameterError, r"tau_s: value = \[1\]: must be a number"),
+        ("1e-17", '"small"', ParameterError, r"tau_s: stderr = 'small': must be a number"),
+        ("[parameters]", "[parameter]", ParameterError, r"unknown key 'parameter': did you mean '\[parameters\]'\?"),
+        ("empty = []", "emptys = []", ParameterError, "unknown key 'emptys': did you mean 'empty'"),
+        ("[parameters]", "[parameters", DataError, "a.toml: not valid TOML"),
+    ],
+)
+def test_a_wrong_file_is_refused_with_file_key_and_remedy(old: str, new: str, error: Any, match: str) -> None:
+    text = LAG.to_toml()
+    assert old in text
+
+    def read(text: str) -> dict[str, Any]:
+        file = ParameterFile.from_toml(text, origin="a.toml")
+        file.expect(kinds=("lag",), tables=("parameters",), notes=("source", "unidentifiable", "empty"))
+        return file.values("parameters", WANTED)
+
+    with pytest.raises(error, match=match):
+        read(text.replace(old, new, 1))
+    assert read(text)["steps"] == 3
+
+
+def test_what_is_missing_is_named() -> None:
+    file = ParameterFile(kind="lag", tables={"parameters": {}}, origin="a.toml")
+    with pytest.raises(DataError, match=r'\[parameters\] lacks tau_s, n: write tau_s = \{ value = \.\.\., unit = "s"'):
+        file.values("parameters", {"tau_s": Wanted("s"), "n": Wanted(form="integer"), "m": Wanted(required=False)})
+    with pytest.raises(DataError, match=r"a\.toml: no table \[more\]"):
+        file.expect(kinds=("lag",), tables=("parameters", "more", "maybe?"))
+
+
+def test_a_file_that_is_not_there_or_not_text(tmp_path: Path) -> None:
+    with pytest.raises(FileNotFoundError, match="no such file"):
+        ParameterFile.read(tmp_path / "none.toml")
+    (tmp_path / "a.toml").write_bytes(b"\xff\xfe\x00")
+    with pytest.raises(DataError, match="not a UTF-8 text file"):
+        ParameterFile.read(tmp_path / "a.toml")
+
+
+@pytest.mark.parametrize("name", presets.available())
+def test_shipped_files_are_as_the_writer_writes_them(name: str, root: Path) -> None:
+    text = (root / "python" / "mgdd" / "presets" / f"{name}.toml").read_text(encoding="utf-8")
+    assert presets.load(name).to_toml() == text

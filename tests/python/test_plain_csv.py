@@ -1,0 +1,91 @@
+"""Every CSV file of the package is plain: `pandas.read_csv(path)` without options gives its columns as numbers."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from pathlib import Path
+
+import numpy as np
+import pandas as pd
+import pytest
+import xarray as xr
+
+import mgdd
+from mgdd import datasets, io
+from mgdd.cli.main import main
+from mgdd.engine import Cylinder, OperatingPoint, simulate, timing_sweep
+from mgdd.io.traces import write_traces
+from mgdd.throttle import Throttle, sense
+from mgdd.throttle import simulate as simulate_throttle
+
+DATA = sorted((Path(mgdd.__file__).parent / "data").glob("*.csv"))
+
+
+def throttle_run() -> xr.Dataset:
+    return simulate_throttle(Throttle(), 0.2 * np.sin(6.0 * np.arange(1500) * 1e-3), supply_v=12.0)
+
+
+def of_pressure(path: Path) -> xr.Dataset:
+    trace = datasets.load_hd_traces()[0]
+    io.write_pressure(trace, path)
+    return trace
+
+
+def of_log(path: Path) -> xr.Dataset:
+    run = throttle_run()
+    log = io.throttle_log(run["time_s"], run["duty"], run["angle_deg"], current_a=run["current_a"])
+    io.write_throttle_log(log, path)
+    return log
+
+
+def of_traces(dataset: Callable[[], xr.Dataset]) -> Callable[[Path], xr.Dataset]:
+    def write(path: Path) -> xr.Dataset:
+        made = dataset()
+        write_traces(made, path)
+        return made
+
+    return write
+
+
+WRITERS = {
+    "write_pressure": of_pressure,
+    "write_throttle_log": of_log,
+    "cycle": of_traces(lambda: simulate(Cylinder(), OperatingPoint())),
+    "throttle": of_traces(throttle_run),
+    "flags and NaN": of_traces(lambda: sense(throttle_run())),
+    "sweep": of_traces(lambda: timing_sweep(Cylinder(), OperatingPoint())),
+}
+COMMANDS = {
+    "engine simulate": ["engine", "simulate"],
+    "engine optimum": ["engine", "optimum"],
+    "throttle simulate": ["throttle", "simulate", "--duty", "0.3", "--duration-s", "0.1"],
+    "throttle excite": ["throttle", "excite", "chirp", "--preset", "P1"],
+    "engine seek": ["engine", "seek", "--cycles", "30"],
+}
+
+
+@pytest.mark.parametrize("file", DATA, ids=lambda path: path.name)
+def test_packaged_tables(file: Path) -> None:
+    table = pd.read_csv(file)
+    assert not table.isna().any(axis=None)
+    numbers = table.drop(columns="file", errors="ignore")
+    assert all(np.issubdtype(kind, np.number) for kind in numbers.dtypes)
+    assert all(name.isidentifier() for name in table.columns)
+
+
+@pytest.mark.parametrize("name", WRITERS)
+def test_written_tables(name: str, tmp_path: Path) -> None:
+    dataset = WRITERS[name](tmp_path / "out.csv")
+    table = pd.read_csv(tmp_path / "out.csv")
+    assert len(table.columns) > 1
+    for column in table.columns:
+        written = dataset[column].to_numpy().astype(np.float64)
+        np.testing.assert_allclose(table[column], written, rtol=1e-14, err_msg=column)
+
+
+@pytest.mark.parametrize("name", COMMANDS)
+def test_tables_of_the_command_line(name: str, tmp_path: Path) -> None:
+    assert main([*COMMANDS[name], "--output", str(tmp_path / "out.csv")]) == 0
+    table = pd.read_csv(tmp_path / "out.csv")
+    assert len(table) > 10
+    assert all(np.issubdtype(kind, np.number) for kind in table.dtypes)

@@ -1,0 +1,125 @@
+"""Every study as a page: complete, self-contained, escaped."""
+
+from __future__ import annotations
+
+import html
+import json
+import re
+from collections.abc import Callable
+from html.parser import HTMLParser
+from pathlib import Path
+
+import pytest
+
+from mgdd import datasets
+from mgdd.cli import main
+from mgdd.report import write_report
+from mgdd.results import labelled_dataset
+from mgdd.studies import StudyResult, available_studies
+from mgdd.studies.sections import Section, Table
+
+NEEDS = {"measured-engine-seek": "h2df_502", "identification-benchmarks": "cascaded_tanks"}
+# As other tests run them, so that each runs once.
+OPTIONS: dict[str, dict[str, int]] = {
+    "sensor-delay": {"seeds": 4},
+    "throttle-first-principle": {"seeds": 1},
+    "throttle-pseudo-wiener": {"starts": 4},
+    "measured-engine-seek": {"seeds": 1},
+}
+
+
+class Page(HTMLParser):
+    """Counts tags, checks that they close, and collects what a browser would fetch."""
+
+    def __init__(self, text: str) -> None:
+        super().__init__()
+        self.open: list[str] = []
+        self.count: dict[str, int] = {}
+        self.fetched: list[str] = []
+        self.feed(text)
+
+    def handle_starttag(self, tag: str, attrs: list[tuple[str, str | None]]) -> None:
+        self.count[tag] = self.count.get(tag, 0) + 1
+        if tag not in ("meta", "img", "br"):
+            self.open.append(tag)
+        self.fetched += [value or "" for name, value in attrs if name in ("src", "href", "srcset", "data")]
+
+    def handle_endtag(self, tag: str) -> None:
+        assert self.open.pop() == tag
+
+
+@pytest.mark.parametrize("name", available_studies())
+def test_every_study_becomes_a_page(name: str, tmp_path: Path, quick_study: Callable[..., StudyResult]) -> None:
+    if name in NEEDS and NEEDS[name] not in datasets.available():
+        pytest.skip(f"the data set {NEEDS[name]} is not at hand")
+    result = quick_study(name, **OPTIONS.get(name, {}))
+    file = write_report(result, tmp_path / "deep" / "page")
+    assert file == tmp_path / "deep" / "page" / "index.html"
+    text = file.read_text(encoding="utf-8")
+    page = Page(text)
+    assert page.open == []
+    assert all(source.startswith("data:image/png;base64,") for source in page.fetched)
+    assert not re.search(r"https?://|url\(|@import", re.sub(r"base64,[A-Za-z0-9+/=]+", "", text.split("</style>")[0]))
+    assert page.count["img"] == len(result.figures) > 0
+    assert page.count["h1"] == 1
+    assert page.count["h2"] == len(result.sections)
+    assert page.count["table"] >= 1
+    for caption in result.figures:
+        assert caption in html.unescape(text)
+    summary = json.loads((file.parent / "summary.json").read_text(encoding="utf-8"))
+    assert summary["study"] == name
+    assert len(summary["rows"]) == len(result.summary["rows"])
+    assert page.count["tr"] > len(result.summary["rows"])
+
+
+def test_sections_of_its_own_are_escaped_and_kept_in_order(tmp_path: Path) -> None:
+    result = StudyResult(
+        name="mine",
+        title="what < and & do",
+        dataset=labelled_dataset({"time_s": ("time_s", [0.0])}),
+        summary={"study": "mine", "seeds": 0, "rows": [], "value": float("nan")},
+        sections=(
+            Section(title="<b>", text=("1 < 2 & 3",), items=("<script>alert(1)</script>",)),
+            Section(title="Table", table=Table(columns=("a [<]",), rows=(("<td>",), ("-1.5",)))),
+        ),
+    )
+    text = write_report(result, tmp_path).read_text(encoding="utf-8")
+    assert "<script>" not in text
+    assert "<h1>What &lt; and &amp; do</h1>" in text
+    assert text.index("&lt;b&gt;") < text.index("1 &lt; 2 &amp; 3") < text.index("a [&lt;]")
+    assert json.loads((tmp_path / "summary.json").read_text())["value"] is None
+
+
+def test_standard_sections_say_rows_numbers_lists_and_interruption() -> None:
+    rows = [{"who": "a", "final_cad": -5.1234, "final_cad_low": -6.0, "final_cad_high": -4.0, "arrived": True}]
+    result = StudyResult(
+        name="mine",
+        dataset=labelled_dataset({"time_s": ("time_s", [0.0])}),
+        summary={
+            "study": "mine", "seeds": 3, "rows": rows, "interrupted": True, "fits": [{"rmse_bar": None}],
+            "noise_deg": 0.03, "warnings": ["look out"], "records": {"source": "here"}, "missing": [],
+        },
+    )  # fmt: skip
+    sections = {section.title: section for section in result.sections}
+    assert list(sections) == ["Results", "Fits", "Warnings", "Records", "Settings and further numbers", "Data"]
+    table = sections["Results"].table
+    assert table is not None
+    assert table.columns == ("who", "final cad [°CA aTDC]", "arrived")
+    assert table.rows == (("a", "-5.123 [-6, -4]", "yes"),)
+    assert any("interrupted" in text for text in sections["Results"].text)
+    assert any("3 seeds" in text for text in sections["Results"].text)
+    assert sections["Warnings"].items == ("look out",)
+    settings = sections["Settings and further numbers"].table
+    assert settings is not None
+    assert settings.rows == (("noise deg", "0.03", "deg"),)
+    fits = sections["Fits"].table
+    assert fits is not None
+    assert (fits.columns, fits.rows) == (("pressure RMSE, closed cycle [bar]",), (("–",),))
+
+
+def test_the_command_writes_a_page(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    argv = ["study", "sensor-delay", "--quick", "--seeds", "2", "--report", str(tmp_path / "page"), "--json"]
+    assert main(argv) == 0
+    summary = json.loads(capsys.readouterr().out)
+    assert summary["report"] == (tmp_path / "page" / "index.html").as_posix()
+    assert "data:image/png" in Path(summary["report"]).read_text(encoding="utf-8")

@@ -1,0 +1,57 @@
+"""What SciPy computes here equals the plain definitions: shift registers, polynomials, difference equations."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+from mgdd.identify.excitation import _TAPS, maximum_length_sequence
+from scipy.signal import savgol_filter
+
+from mgdd.identify import LinearApproximation
+
+
+def shift_register(register: int) -> list[int]:
+    state, out = [1] * register, []
+    for _ in range(2**register - 1):
+        out.append(state[-1])
+        new = 0
+        for tap in _TAPS[register]:
+            new ^= state[tap - 1]
+        state = [new, *state[:-1]]
+    return out
+
+
+@pytest.mark.parametrize("register", sorted(_TAPS))
+def test_a_maximum_length_sequence_is_its_shift_register(register: int) -> None:
+    bits = maximum_length_sequence(register)
+    assert bits.tolist() == shift_register(register)
+    assert int(bits.sum()) == 2 ** (register - 1)
+    signs = 2.0 * bits - 1.0
+    circular = np.fft.ifft(np.abs(np.fft.fft(signs)) ** 2).real
+    np.testing.assert_allclose(circular[1:], -1.0, atol=1e-6 * bits.size)
+
+
+@pytest.mark.parametrize(("half", "step_s"), [(3, 4e-3), (5, 2e-3), (10, 1e-3), (20, 5e-4)])
+def test_smoothing_is_a_least_squares_cubic_of_each_window(half: int, step_s: float) -> None:
+    angle = 30.0 + np.cumsum(np.random.default_rng(1).normal(0.0, 0.1, 300))
+    grid = step_s * np.arange(-half, half + 1)
+    windows = np.lib.stride_tricks.sliding_window_view(angle, 2 * half + 1)
+    cubics = np.polynomial.polynomial.polyfit(grid, windows.T, 3)
+    for order, factor in ((0, 1.0), (1, 1.0), (2, 2.0)):
+        smooth = savgol_filter(angle, 2 * half + 1, 3, deriv=order, delta=step_s)[half:-half]
+        expected = factor * cubics[order]
+        np.testing.assert_allclose(smooth, expected, rtol=0.0, atol=1e-11 * np.abs(expected).max())
+
+
+@pytest.mark.parametrize("seed", range(5))
+def test_a_filter_is_its_difference_equation(seed: int) -> None:
+    rng = np.random.default_rng(seed)
+    poles = rng.uniform(0.3, 0.95, 2) * np.exp(1j * rng.uniform(0.1, 2.5, 2))
+    a = np.real(np.poly(np.r_[poles, poles.conj(), 0.5]))
+    b, u = rng.normal(size=4), rng.normal(size=400)
+    y = np.zeros(u.size)
+    for k in range(u.size):
+        past = sum(a[i] * y[k - i] for i in range(1, a.size) if k >= i)
+        y[k] = sum(b[i] * u[k - i] for i in range(b.size) if k >= i) - past
+    model = LinearApproximation(numerator=b, denominator=a, input_mean=0.0, output_mean=0.0, rmse=0.0)
+    np.testing.assert_allclose(model.simulate(u), y, rtol=0.0, atol=1e-12 * np.abs(y).max())
