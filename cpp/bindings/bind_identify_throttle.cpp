@@ -1,9 +1,12 @@
 // Binds include/mgdd/identify: smooth throttle, throttle groups, Latin hypercube. The GIL is released while they run.
 #include <array>
+#include <stop_token>
 #include <string>
+#include <utility>
 #include <vector>
 
 #include "binding.hpp"
+#include "interruptible.hpp"
 #include "mgdd/common/bounds.hpp"
 #include "mgdd/identify/multi_start.hpp"
 #include "mgdd/identify/throttle/smooth_fit.hpp"
@@ -58,17 +61,18 @@ py::dict fit_smooth(const InputArray& duty, const InputArray& angle_deg, const s
   options.upper = upper;
   options.stages.back().cost_tolerance = cost_tolerance;
   options.lanes = lanes;
-  SmoothThrottleFit fit;
-  {
-    const py::gil_scoped_release release;
-    fit = fit_smooth_throttle(plant, {step_s, start, u, y}, starts, options);
-  }
-  py::dict result;
-  result["reports"] = fit.reports;
-  result["best"] = fit.best;
-  result["n_reached"] = fit.n_reached;
-  result["n_sweeps"] = fit.n_sweeps;
-  return result;
+  return hand_over(interruptible([&](std::stop_token stop) {
+                     options.stop = std::move(stop);
+                     return fit_smooth_throttle(plant, {step_s, start, u, y}, starts, options);
+                   }),
+                   [](const SmoothThrottleFit& fit) {
+                     py::dict result;
+                     result["reports"] = fit.reports;
+                     result["best"] = fit.best;
+                     result["n_reached"] = fit.n_reached;
+                     result["n_sweeps"] = fit.n_sweeps;
+                     return result;
+                   });
 }
 
 ThrottleGroups groups_model(double closed_deg, double open_deg, double ramp_deg, int substeps) {
@@ -106,17 +110,19 @@ py::dict fit_groups(const std::vector<RecordTuple>& records, const std::vector<S
     plan.push_back(std::move(stage));
   }
   const ThrottleGroups model = groups_model(closed_deg, open_deg, ramp_deg, substeps);
-  ThrottleGroupsFit fit;
-  {
-    const py::gil_scoped_release release;
-    fit = fit_throttle_groups(model, data, plan, starts, n_threads);
-  }
-  py::dict result;
-  result["values"] = fit.values;
-  result["reports"] = fit.starts.reports;
-  result["best"] = fit.starts.best;
-  result["n_reached"] = fit.starts.n_reached;
-  return result;
+  return hand_over(interruptible([&](const std::stop_token& stop) {
+                     for (FitStage& stage : plan)
+                       stage.search.stop = stop;
+                     return fit_throttle_groups(model, data, plan, starts, n_threads);
+                   }),
+                   [](const ThrottleGroupsFit& fit) {
+                     py::dict result;
+                     result["values"] = fit.values;
+                     result["reports"] = fit.starts.reports;
+                     result["best"] = fit.starts.best;
+                     result["n_reached"] = fit.starts.n_reached;
+                     return result;
+                   });
 }
 
 std::vector<double> simulate_groups(const Groups& values, const InputArray& duty, double step_s,
@@ -167,7 +173,7 @@ void bind_identify_throttle(py::module_& m) {
       },
       "The nine groups with their bounds.");
   m.def("latin_hypercube", &spread_starts, arg("parameters"), arg("n"), arg("seed"),
-        "Points between the bounds, one per cell of every axis.");
+        py::call_guard<py::gil_scoped_release>(), "Points between the bounds, one per cell of every axis.");
 }
 
 }  // namespace mgdd::bindings

@@ -246,7 +246,7 @@ void bind_pseudo_wiener(py::module_& m) {
           "simulate",
           [](const BoundModel& s, const InputArray& duty, double start_deg) {
             const auto column = to_column(duty, "duty");
-            return to_array(run_free(s, column, start_deg));
+            return to_array(without_gil([&] { return run_free(s, column, start_deg); }));
           },
           arg("duty"), arg("start_deg"), "Free run: angle [deg] per sample.")
       .def(
@@ -272,7 +272,7 @@ void bind_pseudo_wiener(py::module_& m) {
           [](const BoundModel& s, const InputArray& duty, double start_deg, double speed_deg_per_s) {
             const auto column = to_column(duty, "duty");
             if (column.empty()) throw ShapeError("duty is empty: a horizon needs at least one sample");
-            const auto [angle, slope] = run_slopes(s, column, start_deg, speed_deg_per_s);
+            const auto [angle, slope] = without_gil([&] { return run_slopes(s, column, start_deg, speed_deg_per_s); });
             return py::make_tuple(to_array(angle), slope);
           },
           arg("duty"), py::kw_only(), arg("start_deg"), arg("speed_deg_per_s") = 0.0,

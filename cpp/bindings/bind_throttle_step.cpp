@@ -12,6 +12,7 @@
 
 #include "binding.hpp"
 #include "mgdd/common/error.hpp"
+#include "mgdd/common/units.hpp"
 #include "mgdd/throttle/models/pseudo_wiener.hpp"
 #include "mgdd/throttle/simulation.hpp"
 #include "pseudo_wiener_binding.hpp"
@@ -28,7 +29,7 @@ void require_finite(const double* state, std::size_t size, double duty) {
   if (!std::isfinite(duty)) throw DataError("duty is not finite");
 }
 
-constexpr double rad_per_deg = 0.017453292519943295;
+using units::rad_per_deg;
 constexpr std::size_t n_states = 7;
 using Numbers = std::array<double, n_states>;
 

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import copy
+import math
 import pickle
 import threading
 
@@ -177,6 +178,8 @@ def test_a_refused_call_changes_nothing() -> None:
     del spoiled["fast"]
     with pytest.raises(DataError, match="no column 'fast'"):
         bench.state = spoiled
+    with pytest.raises(DataError, match="'last', entry 1, holds nan: must be finite"):
+        bench.state = {**state, "last": [state["last"][0], math.nan, *state["last"][2:]]}
     assert all(np.array_equal(state[name], column) for name, column in bench.state.items())
     twin = EngineBench(**RICH)
     twin.run(requests(20))

@@ -15,7 +15,7 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from mgdd.errors import DataError, ParameterError, ShapeError
+from mgdd.errors import DataError, Interrupted, ParameterError, ShapeError
 from mgdd.optimize import (
     BoundedSeeking,
     ComponentLag,
@@ -275,7 +275,9 @@ def test_maximize_takes_limits_and_misfires_and_stops_cleanly() -> None:
             raise KeyboardInterrupt
         return None if seeker.cycle % 20 == 3 else (-0.03 * x[0] ** 2, [140.0, 1.0])
 
-    history = maximize(engine, seeker, 500)
+    with pytest.raises(Interrupted, match="after cycle 60") as stop:
+        maximize(engine, seeker, 500)
+    history = stop.value.partial
     assert history.sizes["cycle"] == seeker.cycle == 60
     assert seeker.misfires == 3
     seeker.ask()

@@ -21,6 +21,11 @@ const std::vector<double>& column(const StateColumns& state, const std::string& 
     throw DataError("state column '" + name + "' has " + std::to_string(found->second.size()) + " entries: must be " +
                     std::to_string(size));
   }
+  const auto bad = std::ranges::find_if_not(found->second, [](double x) { return std::isfinite(x); });
+  if (bad != found->second.end()) {
+    throw DataError("state column '" + name + "', entry " + std::to_string(bad - found->second.begin()) + ", holds " +
+                    text(*bad) + ": must be finite, a run would not survive it");
+  }
   return found->second;
 }
 

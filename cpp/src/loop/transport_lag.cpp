@@ -68,9 +68,12 @@ std::vector<double> TransportLag::save() const {
 }
 
 void TransportLag::restore(const std::vector<double>& state) {
-  if (state.size() != state_size() || !(state[1] >= 0.0 && state[1] < static_cast<double>(line_.size()))) {
+  const bool fits = state.size() == state_size() &&
+                    std::ranges::all_of(state, [](double x) { return std::isfinite(x); }) && state[1] >= 0.0 &&
+                    state[1] < static_cast<double>(line_.size()) && state[1] == std::floor(state[1]);
+  if (!fits) {
     throw DataError("the state of a transport lag has " + std::to_string(state.size()) + " entries: must be " +
-                    std::to_string(state_size()) + ", the second an index of the line");
+                    std::to_string(state_size()) + " finite numbers, the second an index of the line");
   }
   level_ = state[0];
   at_ = static_cast<std::size_t>(state[1]);

@@ -163,7 +163,7 @@ def _rebuild(cls: type[Any], settings: dict[str, Any], state: dict[str, Any], hi
         seeker = cls(**settings)
     seeker.state = state
     if history is not None:
-        seeker._set_history_columns(**history)
+        seeker._set_history_columns(history)
     return seeker
 
 

@@ -1,5 +1,6 @@
 // What a loop relies on: the same seed gives the same run however it is cut, nothing is allocated, errors say what to
 // do.
+#include <cmath>
 #include <cstdint>
 #include <functional>
 #include <string>
@@ -112,7 +113,32 @@ TEST(EngineBenchState, ARefusedStateChangesNothing) {
   EXPECT_EQ(refused([](auto& s) { s["seed"][1] = 0.5; }), "state column 'seed' holds 0.5: must be a whole number >= 0");
   EXPECT_EQ(refused([](auto& s) { s["component_0"] = {}; }), "state has 9 columns: must be 8, it is of another bench");
   EXPECT_NE(refused([](auto& s) { s["analyser"][1] = 1e6; }), "accepted");
+  EXPECT_NE(refused([](auto& s) { s["fast"][1] = 0.5; }), "accepted");
   bench.restore(good);
+}
+
+TEST(EngineBenchState, EveryNumberThatIsNotFiniteIsRefusedByName) {
+  BenchSettings s = eventful();
+  s.delay_whole_objective = true;
+  EngineBench bench(s);
+  run(bench, 40);
+  const auto good = bench.state();
+  for (const auto& [name, values] : good) {
+    for (std::size_t i = 0; i < values.size(); ++i) {
+      for (const double spoiled : {std::nan(""), HUGE_VAL}) {
+        auto bad = good;
+        bad[name][i] = spoiled;
+        std::string message = "accepted";
+        try {
+          bench.restore(bad);
+        } catch (const DataError& error) {
+          message = error.what();
+        }
+        EXPECT_NE(message.find("'" + name + "'"), std::string::npos) << name << " " << i << ": " << message;
+      }
+    }
+  }
+  EXPECT_EQ(bench.state(), good);
 }
 
 TEST(EngineBenchState, NothingIsAllocatedWithAnyOption) {

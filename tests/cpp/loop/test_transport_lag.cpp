@@ -79,6 +79,12 @@ TEST(TransportLag, SavesAndRestoresBitForBit) {
   std::vector<double> bad = a.save();
   bad[1] = 8.0;
   EXPECT_THROW(b.restore(bad), DataError);
+  bad[1] = 2.5;
+  EXPECT_THROW(b.restore(bad), DataError);
+  bad[1] = 2.0;
+  bad[4] = std::nan("");
+  EXPECT_THROW(b.restore(bad), DataError);
+  bad[4] = 0.0;
   bad.pop_back();
   EXPECT_THROW(b.restore(bad), DataError);
   EXPECT_EQ(a.save(), b.save());

@@ -87,6 +87,7 @@ optimize::FitReport fit_in_stages(const Model& model, const std::vector<optimize
     optimize::LeastSquares search(unknowns, residual.n_residuals(), stage.search);
     report = search.solve(residual, residual.start());
     values = residual.parameters(report.values);
+    if (report.status == optimize::FitStatus::interrupted) break;
   }
   return report;
 }
