@@ -30,7 +30,7 @@ CycleTrace trace_cycle(const Cylinder& cylinder, const OperatingPoint& point, do
         &out.heat_loss_j_per_cad, &out.work_booked_j, &out.energy_change_j}) {
     column->assign(n, 0.0);
   }
-  const Burn<double> burn(cylinder, soc_cad, charge.burn_duration_cad);
+  const Burn<double> burn(cylinder.burn, soc_cad, charge.burn_duration_cad);
   for (std::size_t k = 0; k < n; ++k) {
     out.pressure_bar[k] = work.pressure_pa[k] / units::pa_per_bar;
     out.volume_l[k] = model.volume_m3()[k] / units::m3_per_l;
