@@ -109,7 +109,7 @@ def test_wrong_calls_name_the_remedy_and_a_right_one_follows():
     assert fit_throttle(log, fixed={"limp_home_deg": 8.0}, n_starts=1).fit_percent_train > 99.0
 
 
-def test_prediction_re_anchors_on_the_measurement():
+def test_prediction_is_corrected_by_the_measurement():
     log = make_log(span_s=2.0)
     model = FirstPrincipleModel(parameters=TRUTH)
     ahead = model.predict(log.time_s, log.duty, log.angle_deg, 20)

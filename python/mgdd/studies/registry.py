@@ -20,7 +20,7 @@ _TITLES = {
     "ch4-esc": "what a late NOx analyser does to extremum seeking, and three cures",
     "ch4-tests": "four tests of extremum seeking: efficiency, another start, NOx by analyser and by soft sensor",
     "ch7-first-principle": "groups of a throttle from noisy logs, also where the plant does more than the model",
-    "ch7-pseudo-wiener": "three pseudo-Wiener models of a throttle, in free run and re-anchored",
+    "ch7-pseudo-wiener": "three pseudo-Wiener models of a throttle, in free run and corrected by measurements",
     "identification-benchmarks": "measured drive, tanks and circuit: fits beside published ones (needs the data sets)",
     "h2df-seek": "seekers on a surrogate of a measured hydrogen-diesel engine (needs the data set)",
 }

@@ -20,16 +20,16 @@ constexpr std::array<std::pair<Switching, std::string_view>, 2> switchings{{
     {Switching::predicted, "predicted"},
     {Switching::measured, "measured"},
 }};
-constexpr std::array<std::pair<DryFriction, std::string_view>, 2> frictions{{
-    {DryFriction::set_valued, "set_valued"},
-    {DryFriction::tanh, "tanh"},
+constexpr std::array<std::pair<Friction, std::string_view>, 2> frictions{{
+    {Friction::coulomb, "set_valued"},
+    {Friction::tanh, "tanh"},
 }};
 constexpr std::array<std::pair<LagStart, std::string_view>, 2> starts{{
     {LagStart::rest, "rest"},
     {LagStart::inverse_map, "inverse_map"},
 }};
 
-constexpr std::array<PseudoWienerField, n_pw_r> pw_r_fields{{
+constexpr std::array<dynamics::NumberField, n_pw_r> pw_r_fields{{
     {"above_tau_s", "s", 0.005, 0.3, true, "time constant J/b above limp-home"},
     {"above_gain_deg_per_s2_per_duty", "deg/s² per duty", 1e4, 4e5, true, "acceleration per duty G above limp-home"},
     {"above_preload_duty", "-", 0.0, 0.5, false, "preload beta above limp-home"},
@@ -46,7 +46,7 @@ constexpr std::array<PseudoWienerField, n_pw_r> pw_r_fields{{
     {"below_cube_per_deg2", "1/deg²", -5e-5, 5e-5, false, "c3 of the static map below limp-home"},
     {"limp_home_deg", "deg", 0.0, 90.0, false, "limp-home angle"},
 }};
-constexpr std::array<PseudoWienerField, n_pw_w> pw_w_fields{{
+constexpr std::array<dynamics::NumberField, n_pw_w> pw_w_fields{{
     {"first_s", "s", 1e-3, 20.0, true, "first lag"},
     {"second_s", "s", 1e-3, 20.0, true, "second lag"},
     {"base_deg", "deg", -500.0, 500.0, false, "output at the lowest knot"},
@@ -58,7 +58,7 @@ constexpr std::array<PseudoWienerField, n_pw_w> pw_w_fields{{
     {"rise_6_deg", "deg", 0.0, 5000.0, false, "rise from knot 6 to 7"},
     {"limp_home_deg", "deg", 0.0, 90.0, false, "limp-home angle"},
 }};
-constexpr std::array<PseudoWienerField, n_pw_p> pw_p_fields{{
+constexpr std::array<dynamics::NumberField, n_pw_p> pw_p_fields{{
     {"first_s", "s", 1e-3, 20.0, true, "first lag"},
     {"second_s", "s", 1e-3, 20.0, true, "second lag"},
     {"offset_deg", "deg", -500.0, 500.0, false, "output at zero play, from limp-home"},
@@ -87,7 +87,7 @@ void check_numbers(const Model& p, PseudoWienerKind kind) {
   const auto rows = fields(kind);
   for (std::size_t i = 0; i < values.size(); ++i)
     require_within(rows[i].name, *values[i], rows[i].lower, rows[i].upper, rows[i].unit);
-  p.frame.validate();
+  p.validate_settings();
   if (!(p.limp_home_deg >= p.frame.closed_deg && p.limp_home_deg <= p.frame.open_deg)) {
     require_within("limp_home_deg", p.limp_home_deg, p.frame.closed_deg, p.frame.open_deg, "deg");
   }
@@ -106,6 +106,13 @@ void check_map(const PwRSide& s, double reach_deg, std::string_view side) {
   }
 }
 
+// Every kind on every scalar of the contract.
+template <class P>
+constexpr bool fulfilled =
+    dynamics::ModelFamily<PseudoWienerFamily<P>> && dynamics::on_every_scalar<PseudoWienerFamily<P>> &&
+    ThrottleModel<decltype(model_of(std::declval<const P&>()))>;
+static_assert(fulfilled<PwR> && fulfilled<PwW> && fulfilled<PwP>);
+
 }  // namespace
 
 Names<PseudoWienerKind> pseudo_wiener_names() noexcept {
@@ -114,14 +121,14 @@ Names<PseudoWienerKind> pseudo_wiener_names() noexcept {
 Names<Switching> switching_names() noexcept {
   return switchings;
 }
-Names<DryFriction> dry_friction_names() noexcept {
+Names<Friction> dry_friction_names() noexcept {
   return frictions;
 }
 Names<LagStart> lag_start_names() noexcept {
   return starts;
 }
 
-std::span<const PseudoWienerField> fields(PseudoWienerKind kind) noexcept {
+std::span<const dynamics::NumberField> fields(PseudoWienerKind kind) noexcept {
   switch (kind) {
     case PseudoWienerKind::pw_r:
       return pw_r_fields;
@@ -144,7 +151,23 @@ void PseudoWienerFrame::validate() const {
   require_within("delay_samples", delay_samples, 0.0, max_delay_samples);
 }
 
-void Anchor::validate() const {
+PseudoWienerFrame PseudoWienerFrame::at_sample(double new_sample_s) const {
+  PseudoWienerFrame frame = *this;
+  frame.sample_s = new_sample_s;
+  const double delay = delay_samples * sample_s / new_sample_s;
+  const double whole = std::round(delay);
+  frame.delay_samples = std::abs(delay - whole) < 1e-9 ? whole : delay;  // rounding makes no fraction
+  if (frame.delay_samples > max_delay_samples) {
+    throw ParameterError("delay_samples = " + text(frame.delay_samples) + " at sample_s = " + text(new_sample_s) +
+                         " s: must be in [0, " + text(max_delay_samples) + "]; for a delay of " +
+                         text(1e3 * delay_samples * sample_s) +
+                         " ms take sample_s >= " + text(delay_samples * sample_s / max_delay_samples) + " s");
+  }
+  frame.validate();
+  return frame;
+}
+
+void ObserverGains::validate() const {
   require_within("angle_gain", angle_gain, 0.0, 1.0);
   require_within("speed_gain_per_s", speed_gain_per_s, 0.0, 1e4, "1/s");
   require_within("bias_gain_duty_per_deg", bias_gain_duty_per_deg, 0.0, 1.0, "duty/deg");
@@ -152,25 +175,43 @@ void Anchor::validate() const {
   require_within("offset_gain", offset_gain, 0.0, 1.0);
 }
 
-template <>
-void PwR::validate() const {
-  check_numbers(*this, PseudoWienerKind::pw_r);
-  check_map(above, frame.open_deg - limp_home_deg, "above");
-  check_map(below, frame.closed_deg - limp_home_deg, "below");
+void check_pw_r(const PseudoWienerFrame& frame, double ramp_deg, double tanh_deg_per_s, double dead_band_deg,
+                Friction friction) {
+  frame.validate();
   require_within("ramp_deg", ramp_deg, 1e-3, 10.0, "deg");
   require_within("tanh_deg_per_s", tanh_deg_per_s, 0.1, 1e3, "deg/s");
   require_within("dead_band_deg", dead_band_deg, 0.0, 10.0, "deg");
+  if (friction != Friction::coulomb && friction != Friction::tanh) {
+    throw ParameterError("friction = '" + std::string(name_of(friction_names(), friction)) +
+                         "': must be coulomb or tanh, PW-R has one level");
+  }
 }
 
-template <>
-void PwW::validate() const {
-  check_numbers(*this, PseudoWienerKind::pw_w);
+void check_pw_w(const PseudoWienerFrame& frame, double knot_lower_duty, double knot_upper_duty) {
+  frame.validate();
   require_within("knot_lower_duty", knot_lower_duty, -1.0, 1.0);
   require_within("knot_upper_duty", knot_upper_duty, -1.0, 1.0);
   if (!(knot_upper_duty > knot_lower_duty)) {
     throw ParameterError("knot_upper_duty = " + text(knot_upper_duty) +
                          ": must be above knot_lower_duty = " + text(knot_lower_duty));
   }
+}
+
+void check_pw_p(const PseudoWienerFrame& frame, int plays) {
+  require_within("plays", plays, 1.0, max_plays);
+  frame.validate();
+}
+
+template <>
+void PwR::validate() const {
+  check_numbers(*this, PseudoWienerKind::pw_r);
+  check_map(above, frame.open_deg - limp_home_deg, "above");
+  check_map(below, frame.closed_deg - limp_home_deg, "below");
+}
+
+template <>
+void PwW::validate() const {
+  check_numbers(*this, PseudoWienerKind::pw_w);
 }
 
 template <>
@@ -199,7 +240,7 @@ PwR pw_r_of(const Throttle& t) noexcept {
   return p;
 }
 
-PseudoWienerModel prepare(const PseudoWiener& parameters) noexcept {
+PseudoWienerModel prepare(const PseudoWiener& parameters) {
   return std::visit([](const auto& p) -> PseudoWienerModel { return model_of(p); }, parameters);
 }
 
