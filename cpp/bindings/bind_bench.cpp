@@ -185,13 +185,13 @@ Examples
 38
 )");
   using D = SensorDynamics;
-  bind_rows(dynamics, "SensorDynamics",
-            std::tuple{plain("delay_s", &D::delay_s, "Transport delay [s]."),
-                       plain("lag_s", &D::lag_s, "Time constant [s]."),
-                       plain("noise_fraction", &D::noise_fraction, "Relative noise [-]."),
-                       plain("delay_cycles", &D::delay_cycles, "Delay in cycles, or None."),
-                       plain("lag_cycles", &D::lag_cycles, "Time constant in cycles, or None.")},
-            [](const D& made) { validate("sensor", made); });
+  bind_rows(
+      dynamics, "SensorDynamics",
+      std::tuple{plain("delay_s", &D::delay_s, "Transport delay [s]."), plain("lag_s", &D::lag_s, "Time constant [s]."),
+                 plain("noise_fraction", &D::noise_fraction, "Relative noise [-]."),
+                 plain("delay_cycles", &D::delay_cycles, "Delay in cycles, or None."),
+                 plain("lag_cycles", &D::lag_cycles, "Time constant in cycles, or None.")},
+      [](const D& made) { validate("sensor", made); });
   dynamics
       .def(
           "delay_at",

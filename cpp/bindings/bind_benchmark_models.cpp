@@ -26,7 +26,8 @@ struct InputRecord {
   std::size_t skip;
 };
 
-std::vector<std::string> names_of(std::span<const FieldInfo> fields) {
+template <class Fields>
+std::vector<std::string> field_names(const Fields& fields) {
   std::vector<std::string> names;
   for (const FieldInfo& field : fields)
     names.emplace_back(field.name);
@@ -34,9 +35,9 @@ std::vector<std::string> names_of(std::span<const FieldInfo> fields) {
 }
 
 template <class Model>
-void bind_step_model(py::class_<Model>& cls) {
-  cls.def_property_readonly_static("parameter_names", [](const py::object&) { return names_of(Model::parameters); });
-  cls.def_property_readonly_static("state_names", [](const py::object&) { return names_of(Model::states); });
+void bind_family(py::class_<Model>& cls) {
+  cls.def_property_readonly_static("parameter_names", [](const py::object&) { return field_names(Model::parameters); });
+  cls.def_property_readonly_static("state_names", [](const py::object&) { return field_names(Model::start_numbers); });
   cls.def(
       "free_run",
       [](const Model& model, const std::vector<double>& parameters, const std::vector<double>& start,
@@ -58,7 +59,7 @@ void bind_step_model(py::class_<Model>& cls) {
           record.start = in.start;
           record.skip = in.skip;
           for (const std::string& name : in.free_start)
-            record.free_start.push_back(field_index(Model::states, name, "state"));
+            record.free_start.push_back(field_index(Model::start_numbers, name, "state"));
           records.push_back(std::move(record));
         }
         return hand_over(interruptible([&](std::stop_token stop) {
@@ -96,7 +97,7 @@ void bind_benchmark_models(py::module_& m) {
   py::class_<DriveAxis> axis(m, "DriveAxis", "Motor-driven axis with friction.");
   axis.def(py::init([](double force_n_per_v, double centre_m) { return DriveAxis{force_n_per_v, centre_m}; }),
            py::kw_only(), arg("force_n_per_v"), arg("centre_m") = 0.0);
-  bind_step_model(axis);
+  bind_family(axis);
 
   py::class_<TwoTanks> tanks(m, "TwoTanks", "Two tanks in a row with overflow.");
   tanks.def(py::init([](double lower_brim_v) {
@@ -105,7 +106,7 @@ void bind_benchmark_models(py::module_& m) {
               return model;
             }),
             py::kw_only(), arg("lower_brim_v"));
-  bind_step_model(tanks);
+  bind_family(tanks);
 
   py::class_<WienerHammerstein>(m, "WienerHammerstein", "Filter, static curve, filter.")
       .def(py::init([](int first_order, int last_order, int n_curve, double lower, double upper) {

@@ -111,13 +111,12 @@ Examples
                        plain("intake_o2_fraction", &M::intake_o2_fraction, "Intake oxygen by volume [-]."),
                        plain("o2_exponent", &M::o2_exponent, "n [-].")},
             [](const M& made) { validate(made); });
-  model
-      .def(
-          "ppm",
-          [](const NoxModel& self, const InputArray& t) {
-            return elementwise([&self](double x) { return self.ppm(x); }, t);
-          },
-          arg("t_max_k"), "NOx [ppm].");
+  model.def(
+      "ppm",
+      [](const NoxModel& self, const InputArray& t) {
+        return elementwise([&self](double x) { return self.ppm(x); }, t);
+      },
+      arg("t_max_k"), "NOx [ppm].");
 
   py::class_<SoftSensor> sensor(m, "SoftSensor",
                                 R"(Soft NOx sensor: the value of each cycle at once, its level held to a slow analyser.

@@ -67,8 +67,7 @@ py::dict scan(const Cylinder& cylinder, const OperatingPoint& point, const Input
 py::dict bind_sensitivities(const Cylinder& cylinder, const OperatingPoint& point, double soc_cad,
                             const std::vector<std::string>& names, double step_cad, const std::string& integrator) {
   const Integrator scheme = parse_integrator(integrator);
-  const Sensitivities s =
-      without_gil([&] { return sensitivities(cylinder, point, soc_cad, names, step_cad, scheme); });
+  const Sensitivities s = without_gil([&] { return sensitivities(cylinder, point, soc_cad, names, step_cad, scheme); });
   py::dict out;
   out["crank_angle_cad"] = to_array(s.angles_cad);
   out["pressure_bar"] = s.pressure_bar;

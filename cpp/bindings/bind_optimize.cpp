@@ -135,20 +135,19 @@ void bind_parameter(py::module_& m) {
 void bind_options(py::module_& m) {
   using O = LeastSquaresOptions;
   py::class_<O> options(m, "LeastSquaresOptions", "When a least-squares search ends and what it reports.");
-  bind_rows(
-      options, "LeastSquaresOptions",
-      std::tuple{plain("max_iterations", &O::max_iterations, "Trial steps."),
-                 plain("cost_tolerance", &O::cost_tolerance, "Relative decrease of the cost [-]."),
-                 plain("step_tolerance", &O::step_tolerance, "Step over parameters, scaled [-]."),
-                 plain("gradient_tolerance", &O::gradient_tolerance,
-                       "Cosine between the residual and a free Jacobian column [-]."),
-                 plain("initial_damping", &O::initial_damping, "Relative to unit columns [-]."),
-                 plain("correlation_limit", &O::correlation_limit,
-                       "Correlation beyond which two parameters count as unidentifiable [-]."),
-                 plain("rank_tolerance", &O::rank_tolerance,
-                       "Singular value, relative to the largest, that counts as zero [-]."),
-                 plain("evaluate_together", &O::evaluate_together, "Residual and Jacobian in one call.")},
-      [](const O& made) { made.validate(); });
+  bind_rows(options, "LeastSquaresOptions",
+            std::tuple{plain("max_iterations", &O::max_iterations, "Trial steps."),
+                       plain("cost_tolerance", &O::cost_tolerance, "Relative decrease of the cost [-]."),
+                       plain("step_tolerance", &O::step_tolerance, "Step over parameters, scaled [-]."),
+                       plain("gradient_tolerance", &O::gradient_tolerance,
+                             "Cosine between the residual and a free Jacobian column [-]."),
+                       plain("initial_damping", &O::initial_damping, "Relative to unit columns [-]."),
+                       plain("correlation_limit", &O::correlation_limit,
+                             "Correlation beyond which two parameters count as unidentifiable [-]."),
+                       plain("rank_tolerance", &O::rank_tolerance,
+                             "Singular value, relative to the largest, that counts as zero [-]."),
+                       plain("evaluate_together", &O::evaluate_together, "Residual and Jacobian in one call.")},
+            [](const O& made) { made.validate(); });
 }
 
 void bind_report(py::module_& m) {

@@ -64,7 +64,7 @@ void bind_recursive(py::module_& m) {
       "fit_pseudo_wiener",
       [](const std::string& kind, const std::vector<std::pair<InputArray, InputArray>>& records,
          const Numbers& parameters, const std::string& sides, const std::vector<std::string>& free,
-         const std::vector<int>& delays, int starts, std::uint64_t seed, bool only_given_start, bool try_map_start,
+         const std::vector<double>& delays, int starts, std::uint64_t seed, bool only_given_start, bool try_map_start,
          int max_iterations) {
         std::vector<ThrottleRecord> logs;
         for (const auto& [duty, angle] : records) {

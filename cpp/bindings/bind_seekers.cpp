@@ -59,9 +59,9 @@ void bind_bounded(py::module_& m) {
   using B = BoundSeeker<BoundedSeeking>;
   using S = BoundedSeekingSettings;
   py::class_<B> cls(m, "BoundedSeeking", "Bounded extremum seeking; see mgdd.optimize.BoundedSeeking.");
-  const auto rows = std::tuple_cat(
-      dither_rows<S>(), std::tuple{plain("kappa", &S::kappa), plain("maximize", &S::maximize),
-                                   plain("limits", &S::limits), or_none("curvature", &S::curvature, nan)});
+  const auto rows = std::tuple_cat(dither_rows<S>(),
+                                   std::tuple{plain("kappa", &S::kappa), plain("maximize", &S::maximize),
+                                              plain("limits", &S::limits), or_none("curvature", &S::curvature, nan)});
   bind_settings<BoundedSeeking>(cls, "BoundedSeeking", S{}, rows, py::arg("lower") = -inf, py::arg("upper") = inf);
   bind_seeking(cls);
 }

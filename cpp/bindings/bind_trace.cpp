@@ -42,19 +42,16 @@ void bind_trace(py::module_& m) {
   using py::arg;
   using O = TraceOptions;
   py::class_<O> options(m, "TraceOptions");
-  bind_keywords(options, std::tuple{choice("pegging", &O::pegging, &parse_pegging),
-                                    plain("pegging_exponent", &O::pegging_exponent),
-                                    plain("inlet_pressure_kpa", &O::inlet_pressure_kpa),
-                                    choice("gamma_source", &O::gamma_source, &parse_analysis_gamma),
-                                    plain("gamma", &O::gamma),
-                                    plain("gamma_compression", &O::gamma_compression),
-                                    plain("gamma_combustion", &O::gamma_combustion),
-                                    plain("heat_from_cad", &O::heat_from_cad),
-                                    plain("heat_to_cad", &O::heat_to_cad),
-                                    plain("burn_from_cad", &O::burn_from_cad),
-                                    plain("total_at_end", &O::total_at_end),
-                                    plain("fractions_of_gross", &O::fractions_of_gross)},
-                [](const O&) {});
+  bind_keywords(
+      options,
+      std::tuple{choice("pegging", &O::pegging, &parse_pegging), plain("pegging_exponent", &O::pegging_exponent),
+                 plain("inlet_pressure_kpa", &O::inlet_pressure_kpa),
+                 choice("gamma_source", &O::gamma_source, &parse_analysis_gamma), plain("gamma", &O::gamma),
+                 plain("gamma_compression", &O::gamma_compression), plain("gamma_combustion", &O::gamma_combustion),
+                 plain("heat_from_cad", &O::heat_from_cad), plain("heat_to_cad", &O::heat_to_cad),
+                 plain("burn_from_cad", &O::burn_from_cad), plain("total_at_end", &O::total_at_end),
+                 plain("fractions_of_gross", &O::fractions_of_gross)},
+      [](const O&) {});
   m.def("analyze_trace", &bind_analyze, arg("crank_angle_cad"), arg("pressure_bar"), arg("cylinder"), arg("point"),
         arg("options"), "Pegging, heat release, burn angles, work.");
   m.def(

@@ -1,4 +1,4 @@
-"""Three pseudo-Wiener models on two throttles: what each can do in free run, and what re-anchored ahead of now."""
+"""Three pseudo-Wiener models on two throttles: what each can do in free run, and what corrected, ahead of now."""
 
 from __future__ import annotations
 

@@ -32,7 +32,7 @@ def fit_pseudo_wiener(
     limp_home_deg: float | None = None,
     sides: str = "shared",
     free: Sequence[str] = (),
-    delay_samples: int | Sequence[int] = 0,
+    delay_samples: float | Sequence[float] = 0,
     plays: int = 1,
     start_values: PseudoWiener | None = None,
     settings: Mapping[str, float] | None = None,
@@ -54,7 +54,7 @@ def fit_pseudo_wiener(
     free : sequence of str, optional
         Parameters to fit, for PW-R without the side: ``tau_s gain_deg_per_s2_per_duty preload_duty spring_duty_per_deg
         coulomb_duty`` without, further ``square_per_deg cube_per_deg2 limp_home_deg``; for the others all.
-    delay_samples : int or sequence of int
+    delay_samples : float or sequence of float
         Delay of the duty, 0 to 5 samples; of several the best is kept.
     plays : int
         PW-P: number of plays, 1 to 8.
@@ -118,7 +118,7 @@ def fit_pseudo_wiener(
     if lag_start != "best" and "map_start" in values:
         values["map_start"] = float(lag_start == "map")
     values |= {name: float(value) for name, value in (settings or {}).items()}
-    delays = [delay_samples] if isinstance(delay_samples, int) else list(delay_samples)
+    delays = [delay_samples] if isinstance(delay_samples, int | float) else list(delay_samples)
     (parameters, report, errors, n_best), stop = or_partial(
         lambda: _core.fit_pseudo_wiener(
             kind=kind,
