@@ -105,7 +105,9 @@ def test_models_share_one_signature(model: Model) -> None:
 
 def test_other_models_follow() -> None:
     smooth = SmoothThrottle()
-    assert smooth.simulate({"time_s": TIME, "duty": DUTY}, initial_state=[0.14, 0.0, 0.0])["angle_deg"].units == "degree"
+    assert (
+        smooth.simulate({"time_s": TIME, "duty": DUTY}, initial_state=[0.14, 0.0, 0.0])["angle_deg"].units == "degree"
+    )
     with pytest.raises(ParameterError, match="mass missing or unknown"):
         SmoothThrottle(parameters={**smooth.parameters, "mass": 1.0})
     assert TwoTanksModel.state_names == ("upper_level_v", "lower_level_v")

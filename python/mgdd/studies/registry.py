@@ -33,7 +33,9 @@ _STUDIES = {
     "throttle-first-principle": _Study(
         "groups of a throttle from noisy logs, also where the plant does more than the model", 7
     ),
-    "throttle-pseudo-wiener": _Study("three pseudo-Wiener models of a throttle, in free run and corrected by measurements", 7),
+    "throttle-pseudo-wiener": _Study(
+        "three pseudo-Wiener models of a throttle, in free run and corrected by measurements", 7
+    ),
     "identification-benchmarks": _Study(
         "measured drive, tanks and circuit: fits beside published ones (needs the data sets)"
     ),
