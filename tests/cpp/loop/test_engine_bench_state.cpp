@@ -202,7 +202,7 @@ TEST(EngineBenchSettings, EveryFieldIsCheckedByName) {
   starts("misfire_probability = 1.5: must be in [0, 1]", [](auto& s) { s.misfire_probability = 1.5; });
   starts("soc_drift_cad_per_kcycle = 200 °CA: must be", [](auto& s) { s.soc_drift_cad_per_kcycle = 200.0; });
   starts("wall_heat_drift_per_kcycle = 200: must be", [](auto& s) { s.wall_heat_drift_per_kcycle = 200.0; });
-  starts("true_nox.reference_nox_ppm = 0: must be > 0", [](auto& s) { s.true_nox.proxy.reference_nox_ppm = 0.0; });
+  starts("true_nox.reference_nox_ppm = 0 ppm: must be > 0", [](auto& s) { s.true_nox.proxy.reference_nox_ppm = 0.0; });
   starts("soft_sensor.correction_gain = 2: must be in", [](auto& s) { s.soft_sensor.correction_gain = 2.0; });
   starts("analyser.delay_s = 99 s: must be in", [](auto& s) { s.analyser.delay_s = 99.0; });
   starts("fast_sensor.lag_s = -1 s: must be in", [](auto& s) { s.fast_sensor.lag_s = -1.0; });
