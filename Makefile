@@ -8,12 +8,17 @@ VENV    ?= .venv
 JOBS    ?= 2
 PY      := $(VENV)/bin/python
 PIP     := $(PY) -m pip --disable-pip-version-check
-SUDO    := $(shell [ "$$(id -u)" = 0 ] || echo sudo)
 LOGS    := build/logs
-PRESET  := -DPython_EXECUTABLE=$(abspath $(PY))
+ALOUD   := tools/aloud.sh
+# The package as it stands in the tree: links to the Python sources, beside the module of build/dev.
+DEV     := PYTHONPATH=$(CURDIR)/build/dev/python PYTHONUNBUFFERED=1
 
+BARE_PATH := $(PATH)
+export PATH := $(abspath $(VENV))/bin:$(PATH)
 export CMAKE_BUILD_PARALLEL_LEVEL := $(JOBS)
+# Looked for in every recipe: the first one may have installed it. Paths are hashed relative to the repository.
 export CMAKE_CXX_COMPILER_LAUNCHER = $(shell command -v ccache)
+export CCACHE_BASEDIR := $(CURDIR)
 ifndef MGDD_DATA_DIR
   ifneq ($(wildcard ../shared/data),)
     export MGDD_DATA_DIR := $(abspath ../shared/data)
@@ -21,133 +26,154 @@ ifndef MGDD_DATA_DIR
 endif
 
 # --- set-up -------------------------------------------------------------------------------------------------
-# Each test looks for the thing itself, so a compiler or a Python from elsewhere is as good as Debian's.
-define INSTALL_MISSING
-[ -z "$$missing" ] && exit 0; \
-command -v apt-get >/dev/null || { echo "please install what Debian calls:$$missing" >&2; exit 1; }; \
-echo "installing:$$missing"; \
-$(SUDO) env DEBIAN_FRONTEND=noninteractive apt-get update -qq; \
-$(SUDO) env DEBIAN_FRONTEND=noninteractive apt-get install -y -qq --no-install-recommends $$missing >/dev/null
-endef
-
 .PHONY: system system-test
 system:
-	@missing=""; \
-	command -v g++ >/dev/null || missing+=" build-essential"; \
-	command -v cmake >/dev/null || missing+=" cmake"; \
-	command -v ninja >/dev/null || missing+=" ninja-build"; \
-	command -v $(PYTHON) >/dev/null || missing+=" python3"; \
-	$(PYTHON) -c "import venv, ensurepip" 2>/dev/null || missing+=" python3-venv"; \
-	$(PYTHON) -c "import sysconfig; open(sysconfig.get_path('include') + '/Python.h')" 2>/dev/null \
-	  || missing+=" python3-dev"; \
-	$(INSTALL_MISSING)
+	@PYTHON=$(PYTHON) tools/system_packages.sh build
+system-test:
+	@PYTHON=$(PYTHON) tools/system_packages.sh build test
 
-system-test: system
-	@missing=""; \
-	for package in libeigen3-dev libgtest-dev libbenchmark-dev; do \
-	  dpkg -s $$package >/dev/null 2>&1 || missing+=" $$package"; \
-	done; \
-	$(INSTALL_MISSING)
-
+# In three parts, so that the module compiles while the rest is fetched: what builds it, what it imports, what tests it.
 $(VENV)/.stamp-build: pyproject.toml | system
 	$(PYTHON) -c "import sys; sys.exit(sys.version_info < (3, 11) and 'Python 3.11 or newer is needed')"
 	[ -x $(PY) ] || $(PYTHON) -m venv $(VENV)
-	$(PIP) install -q "pip>=25.1"
-	$(PIP) install -q --group build
+	$(ALOUD) $(PIP) install "pip>=25.1"
+	$(ALOUD) $(PIP) install --group build
 	touch $@
 
-$(VENV)/.stamp-test: $(VENV)/.stamp-build | system-test
-	$(PIP) install -q --group test --group lint --group docs
+$(VENV)/.stamp-run: pyproject.toml | $(VENV)/.stamp-build
+	$(PY) -c "import tomllib as t; print(*t.load(open('$<', 'rb'))['project']['dependencies'], sep='\n')" > $@
+	$(ALOUD) $(PIP) install -r $@ || { rm -f $@; exit 1; }
+
+$(VENV)/.stamp-test: pyproject.toml | $(VENV)/.stamp-run
+	$(ALOUD) $(PIP) install --group test --group lint --group docs
 	touch $@
 
-# The package is installed again whenever a file that it is made of is new, changed or gone.
-SOURCES := CMakeLists.txt pyproject.toml README.md \
-           $(shell find cpp/include cpp/src cpp/systems cpp/bindings cmake python -type f \
-             -not -path '*/__pycache__/*' -not -name '*.so' 2>/dev/null | sort)
-MANIFEST := $(VENV)/.manifest
-.PHONY: always
-$(MANIFEST): always
-	@mkdir -p $(@D); printf '%s\n' $(SOURCES) | cmp -s - $@ || printf '%s\n' $(SOURCES) > $@
+# --- build --------------------------------------------------------------------------------------------------
+CONFIGURE = cmake -DPython_EXECUTABLE=$(abspath $(PY)) -DCMAKE_CXX_COMPILER_LAUNCHER=$(CMAKE_CXX_COMPILER_LAUNCHER) \
+  -DCMAKE_PREFIX_PATH="$$($(PY) -c 'import sysconfig; print(sysconfig.get_path("purelib"))')" --preset
+BUILD     = $(ALOUD) cmake --build --preset
 
-$(VENV)/.stamp-mgdd: $(SOURCES) $(MANIFEST) $(VENV)/.stamp-build
-	$(PIP) install -q --no-build-isolation .
-	touch $@
+.PHONY: module dev
+module: $(VENV)/.stamp-build ## compile the module alone, build/dev/python
+	[ -f build/dev/build.ninja ] || $(CONFIGURE) dev -DMGDD_BUILD_TESTS=OFF
+	$(BUILD) dev --target _core
 
-.PHONY: install
-install: $(VENV)/.stamp-mgdd ## build and install the package into .venv
+dev: $(VENV)/.stamp-build | system-test ## compile the module and the C++ tests, build/dev
+	$(CONFIGURE) dev -DMGDD_BUILD_TESTS=ON
+	$(BUILD) dev
 
 # --- the two commands ---------------------------------------------------------------------------------------
-.PHONY: demo test
-demo: $(VENV)/.stamp-mgdd ## set up, then run the main job on the measured traces
-	$(VENV)/bin/mgdd demo
+.PHONY: demo test ready wheel-check
+demo: $(VENV)/.stamp-build ## set up, then run the main job on the measured traces
+	@$(MAKE) --no-print-directory -j2 module $(VENV)/.stamp-run
+	$(DEV) $(PY) -m mgdd demo
 
-test: $(VENV)/.stamp-mgdd $(VENV)/.stamp-test ## set up, then run every test of both languages
+ready: $(VENV)/.stamp-build | system-test
+	@$(MAKE) --no-print-directory -j2 dev $(VENV)/.stamp-test
+
+test: ready ## set up, then run every test of both languages
 	@mkdir -p $(LOGS); rm -f $(LOGS)/*.log; failed=""; \
-	{ cmake --preset dev $(PRESET) && cmake --build --preset dev -j$(JOBS) && ctest --preset dev -j$(JOBS); } \
-	  2>&1 | tee $(LOGS)/ctest.log || failed+=" ctest"; \
-	$(PY) -m pytest 2>&1 | tee $(LOGS)/pytest.log || failed+=" pytest"; \
+	$(ALOUD) ctest --preset dev -j$(JOBS) | tee $(LOGS)/ctest.log || failed+=" ctest"; \
 	$(MAKE) --no-print-directory lint 2>&1 | tee $(LOGS)/lint.log || failed+=" lint"; \
+	$(DEV) $(ALOUD) $(PY) -m pytest -n $(JOBS) --dist worksteal | tee $(LOGS)/pytest.log || failed+=" pytest"; \
 	echo; echo "--- summary ---"; \
 	echo "ctest:  $$(grep -h 'tests passed' $(LOGS)/ctest.log | tail -n 1)"; \
 	echo "pytest: $$(tail -n 1 $(LOGS)/pytest.log)"; \
 	[ -z "$$failed" ] || { echo "FAILED:$$failed"; exit 1; }
 
-# --- quality ------------------------------------------------------------------------------------------------
-CPP_FILES = $(shell find cpp tests/cpp -name '*.hpp' -o -name '*.cpp')
-STUBGEN   = $(PY) -m pybind11_stubgen mgdd._core
+# As a user does: an empty environment outside the repository, plain `pip install .`. The two settings let the compiler
+# cache know the objects of build/dev again.
+wheel-check: ready ## install the package as a user does, and try it from Python, the command line and C++
+	@mkdir -p $(LOGS); rm -f $(LOGS)/wheel.log; folder="$$(mktemp -d)"; trap 'rm -rf "$$folder"' EXIT; \
+	$(PYTHON) -m venv "$$folder/venv"; \
+	PATH="$(BARE_PATH)" SKBUILD_CMAKE_DEFINE="MGDD_WERROR=ON" \
+	  $(ALOUD) "$$folder/venv/bin/python" -m pip --disable-pip-version-check install .; \
+	MGDD_INSTALLED="$$folder/venv" $(ALOUD) $(PY) -m pytest -v tests/installed | tee $(LOGS)/wheel.log
 
-.PHONY: lint format stubs asan tidy bench docs
+.PHONY: install examples
+install: $(VENV)/.stamp-run ## install the package into .venv, as `pip install .` does
+	$(ALOUD) $(PIP) install --no-build-isolation .
+
+examples: dev ## install the C++ library into build/prefix, build and run the programs of cpp/examples against it
+	cmake --install build/dev --component dev --prefix build/prefix
+	cmake -G Ninja -S cpp/examples -B build/examples -DCMAKE_PREFIX_PATH="$(CURDIR)/build/prefix" \
+	  -DEigen3_DIR="$$(sed -n 's/^Eigen3_DIR:[A-Z]*=//p' build/dev/CMakeCache.txt)"
+	$(ALOUD) cmake --build build/examples
+	for source in cpp/examples/*.cpp; do echo "--- $$source"; build/examples/$$(basename $$source .cpp); done
+
+# --- quality ------------------------------------------------------------------------------------------------
+CPP_FILES = $(shell find cpp tests -name '*.hpp' -o -name '*.cpp')
+STUBGEN   = $(DEV) $(PY) -m pybind11_stubgen mgdd._core
+
+.PHONY: lint format stubs asan tsan clang mingw-check tidy bench docs
 lint: $(VENV)/.stamp-test ## ruff, mypy --strict, clang-format, codespell: look, change nothing
-	$(VENV)/bin/ruff check .
-	$(VENV)/bin/ruff format --check .
-	$(VENV)/bin/mypy
-	$(VENV)/bin/clang-format --dry-run -Werror $(CPP_FILES)
-	$(VENV)/bin/codespell
+	ruff check .
+	ruff format --check .
+	$(ALOUD) mypy
+	clang-format --dry-run -Werror $(CPP_FILES)
+	codespell
 
 format: $(VENV)/.stamp-test ## put every file into the house style
-	$(VENV)/bin/ruff check --fix-only -q .
-	$(VENV)/bin/ruff format .
-	$(VENV)/bin/clang-format -i $(CPP_FILES)
+	ruff check --fix-only -q .
+	ruff format .
+	clang-format -i $(CPP_FILES)
 
-stubs: $(VENV)/.stamp-mgdd $(VENV)/.stamp-test ## write python/mgdd/_core.pyi from the built module
+stubs: ready ## write python/mgdd/_core.pyi from the built module
 	rm -rf build/stubs
 	$(STUBGEN) -o build/stubs
 	rm -rf python/mgdd/_core python/mgdd/_core.pyi
 	cp -r build/stubs/mgdd/_core* python/mgdd/
 
 # Both libraries must come first: libasan alone dies at the first C++ exception.
-asan: $(VENV)/.stamp-mgdd $(VENV)/.stamp-test ## ctest and pytest under AddressSanitizer and UBSan
-	cmake --preset asan $(PRESET)
-	cmake --build --preset asan -j$(JOBS)
-	ctest --preset asan -j$(JOBS)
-	PYTHONPATH=$(abspath build/asan/python) PYTHONMALLOC=malloc ASAN_OPTIONS=detect_leaks=0 \
+asan: $(VENV)/.stamp-test | system-test ## ctest and pytest under AddressSanitizer and UBSan
+	$(CONFIGURE) asan
+	$(BUILD) asan
+	$(ALOUD) ctest --preset asan -j$(JOBS)
+	PYTHONPATH=$(CURDIR)/build/asan/python PYTHONUNBUFFERED=1 PYTHONMALLOC=malloc ASAN_OPTIONS=detect_leaks=0 \
 	  UBSAN_OPTIONS=print_stacktrace=1 \
 	  LD_PRELOAD="$$(g++ -print-file-name=libasan.so) $$(g++ -print-file-name=libstdc++.so)" \
 	  $(PY) -m pytest -m "not docs"
 
-tidy: $(VENV)/.stamp-test ## clang-tidy over the core and its tests
-	$(PIP) install -q --group tidy
-	PATH="$(abspath $(VENV))/bin:$$PATH" cmake --preset tidy
-	PATH="$(abspath $(VENV))/bin:$$PATH" cmake --build --preset tidy -j$(JOBS)
+tsan: $(VENV)/.stamp-build | system-test ## the C++ tests under ThreadSanitizer
+	$(CONFIGURE) tsan
+	$(BUILD) tsan
+	$(ALOUD) ctest --preset tsan -j$(JOBS)
 
-bench: $(VENV)/.stamp-mgdd $(VENV)/.stamp-test ## C++ benchmarks, then the Python ones against peers
-	$(PIP) install -q --group bench
-	cmake --preset bench
-	cmake --build --preset bench -j$(JOBS)
+clang: $(VENV)/.stamp-build | system-test ## the module and the C++ tests by clang++
+	@tools/system_packages.sh clang
+	$(CONFIGURE) clang
+	$(BUILD) clang
+	$(ALOUD) ctest --preset clang -j$(JOBS)
+
+mingw-check: $(VENV)/.stamp-build ## compile the core for Windows
+	@tools/system_packages.sh mingw
+	$(CONFIGURE) mingw
+	$(BUILD) mingw
+
+tidy: $(VENV)/.stamp-build | system-test ## clang-tidy over the core and its tests
+	$(ALOUD) $(PIP) install --group tidy
+	$(CONFIGURE) tidy
+	$(BUILD) tidy
+
+bench: ready ## C++ benchmarks, then the Python ones against peers
+	@tools/system_packages.sh bench
+	$(ALOUD) $(PIP) install --group bench
+	$(CONFIGURE) bench
+	$(BUILD) bench
 	for program in build/bench/bench/*; do $$program; done
-	for script in benchmarks/*.py; do [ ! -e $$script ] || $(PY) $$script; done
+	for script in benchmarks/*.py; do [ ! -e $$script ] || $(DEV) $(PY) $$script; done
 
 .PHONY: mutants
 MODULE ?= throttle
-mutants: $(VENV)/.stamp-test ## changed lines that the tests notice: make mutants MODULE=throttle (Python: mgdd.throttle)
-	PATH="$(abspath $(VENV))/bin:$$PATH" $(PY) tools/mutate.py $(MODULE) --jobs $(JOBS) $(MUTANTS)
+mutants: ready ## changed lines that the tests notice: make mutants MODULE=throttle (Python: mgdd.throttle)
+	$(ALOUD) $(PY) tools/mutate.py $(MODULE) --jobs $(JOBS) $(MUTANTS)
 
-docs: $(VENV)/.stamp-mgdd $(VENV)/.stamp-test ## documentation with executed notebooks, docs/_build/html
-	MGDD_DOCS_EXECUTE=cache $(PY) -m sphinx -W -n --keep-going -q -b html docs docs/_build/html
+docs: ready ## documentation with executed notebooks, docs/_build/html
+	$(DEV) MGDD_DOCS_EXECUTE=cache $(ALOUD) $(PY) -m sphinx -W -n --keep-going -q -b html docs docs/_build/html
 
 .PHONY: clean help
 clean: ## remove what these commands made
 	rm -rf build $(VENV) docs/_build docs/generated docs/notebooks mgdd-report
 
 help: ## this list
-	@grep -hE '^[a-z-]+:.*## ' $(MAKEFILE_LIST) | sed -E 's/^([a-z-]+):.*## /\1\t/' | expand -t 10
+	@grep -hE '^[a-z-]+:.*## ' $(MAKEFILE_LIST) | sed -E 's/^([a-z-]+):.*## /\1\t/' | expand -t 14

@@ -13,6 +13,13 @@ from pathlib import Path
 import pytest
 
 ROOT = Path(__file__).resolve().parents[2]
+# As the preset `dev`, so that a compiler cache knows the objects again.
+AS_DEV = {
+    "CMAKE_BUILD_TYPE": "Release",
+    "MGDD_WERROR": "ON",
+    "MGDD_BUILD_PYTHON": "ON",
+    "Python_EXECUTABLE": sys.executable,
+}
 WARNINGS = "-Wall -Wextra -Wpedantic -Wconversion -Wshadow -Werror"
 
 
@@ -39,11 +46,11 @@ def configure(source: Path, build: Path, **variables: str) -> None:
 @pytest.fixture(scope="session")
 def install(tmp_path_factory: pytest.TempPathFactory) -> Callable[[str], Path]:
     """Install the library with its headers in a folder of that name; gives the prefix."""
-    build = ROOT / "build" / "consumer"  # beside the other trees, so that a compiler cache knows the objects
+    build = ROOT / "build" / "consumer"
 
     def install_into(include: str) -> Path:
         prefix = tmp_path_factory.mktemp("prefix")
-        configure(ROOT, build, CMAKE_BUILD_TYPE="Release", CMAKE_INSTALL_INCLUDEDIR=include)
+        configure(ROOT, build, CMAKE_INSTALL_INCLUDEDIR=include, **AS_DEV)
         run(tool("cmake"), "--build", build, "--target", "mgdd_core")
         run(tool("cmake"), "--install", build, "--component", "dev", "--prefix", prefix)
         return prefix

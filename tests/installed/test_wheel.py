@@ -1,0 +1,90 @@
+"""The package as a user installs it: `make wheel-check` puts it alone into an environment outside the repository."""
+
+from __future__ import annotations
+
+import os
+import re
+import shlex
+import subprocess
+from pathlib import Path
+
+import pytest
+
+ROOT = Path(__file__).resolve().parents[2]
+README = (ROOT / "README.md").read_text(encoding="utf-8")
+PACKAGE_FILES = re.compile(
+    r"mgdd/(.*\.pyi?|_core\..*\.so|py\.typed|presets/[^/]+\.toml|report/templates/[^/]+\.(html|css)"
+    r"|data/([^/]+/)*[^/]+\.(csv|txt)|.*\.pyc)"
+    r"|mgdd-[^/]+\.dist-info/.*|(\.\./)*bin/mgdd"
+)
+HEAVY = {"scipy", "xarray", "pandas", "matplotlib", "rich", "jinja2", "pooch", "packaging"}
+# Commands of the README that ask for no file of the reader's own.
+COMMANDS = [
+    line
+    for block in re.findall(r"```console\n(.*?)```", README, re.DOTALL)
+    for line in block.splitlines()
+    if line.startswith("mgdd ") and not re.search(r"\w+\.(csv|toml)\b(?<!output chirp\.csv)", line)
+]
+
+
+@pytest.fixture(scope="module")
+def environment() -> Path:
+    """Give the environment that holds the package."""
+    folder = os.environ.get("MGDD_INSTALLED")
+    assert folder, "no environment is named in MGDD_INSTALLED: run `make wheel-check`"
+    return Path(folder)
+
+
+def call(program: Path, *words: str, cwd: Path) -> str:
+    """Run a program of the environment in an empty folder, away from the sources."""
+    clean = {name: value for name, value in os.environ.items() if not name.startswith("PYTHON")}
+    clean |= {"MPLBACKEND": "Agg", "PYTHONWARNINGS": "error"}
+    done = subprocess.run([str(program), *words], cwd=cwd, env=clean, capture_output=True, text=True)
+    assert done.returncode == 0, f"{words} ended with {done.returncode}:\n{done.stdout}\n{done.stderr}"
+    return done.stdout
+
+
+def test_package_is_the_installed_one(environment: Path, tmp_path: Path) -> None:
+    code = (
+        "import importlib.metadata as m, mgdd, mgdd._core as c;"
+        "print(mgdd.__version__, m.version('mgdd'), mgdd.__file__, c.__file__, sep='\\n')"
+    )
+    version, recorded, package, module = call(environment / "bin" / "python", "-c", code, cwd=tmp_path).splitlines()
+    assert version == recorded
+    assert Path(package).is_relative_to(environment)
+    assert Path(module).is_relative_to(environment)
+
+
+def test_nothing_else_is_installed(environment: Path, tmp_path: Path) -> None:
+    code = "import importlib.metadata as m; print(*m.files('mgdd'), sep='\\n')"
+    files = call(environment / "bin" / "python", "-c", code, cwd=tmp_path).splitlines()
+    assert any(file.startswith("mgdd/_core.") for file in files)
+    assert "mgdd/py.typed" in files
+    assert [file for file in files if not PACKAGE_FILES.fullmatch(file)] == []
+
+
+def test_import_is_light(environment: Path, tmp_path: Path, record_property: pytest.RecordProperty) -> None:
+    """NumPy and the core, nothing else; the time is printed, not judged."""
+    code = (
+        "import numpy, sys, time; n = set(sys.modules); t = time.perf_counter(); import mgdd;"
+        "print(1e3 * (time.perf_counter() - t), *sorted({m.split('.')[0] for m in set(sys.modules) - n}))"
+    )
+    runs = [call(environment / "bin" / "python", "-c", code, cwd=tmp_path).split() for _ in range(3)]
+    print(f"import mgdd, beside numpy: {min(float(run[0]) for run in runs):.0f} ms")
+    others = {name for name in runs[0][1:] if name in HEAVY}
+    assert others == set()
+
+
+def test_python_of_the_readme_runs(environment: Path, tmp_path: Path) -> None:
+    blocks = re.findall(r"^```python\n(.*?)^```", README, re.MULTILINE | re.DOTALL)
+    assert len(blocks) >= 3
+    call(environment / "bin" / "python", "-c", "\n".join(blocks), cwd=tmp_path)
+
+
+@pytest.mark.parametrize("line", COMMANDS)
+def test_command_of_the_readme_runs(environment: Path, tmp_path: Path, line: str) -> None:
+    assert call(environment / "bin" / "mgdd", *shlex.split(line)[1:], cwd=tmp_path)
+
+
+def test_there_are_commands_to_run() -> None:
+    assert len(COMMANDS) >= 6

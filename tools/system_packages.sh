@@ -1,0 +1,45 @@
+#!/usr/bin/env bash
+# Installs what is missing of Debian's packages. Each check looks for the thing itself, so that a compiler or a Python
+# from elsewhere is as good; without apt it names what to install. Usage: tools/system_packages.sh GROUP...
+# Groups: build (compile the module), test, bench, clang, mingw.
+set -euo pipefail
+cd "$(dirname "$0")/.."
+
+python="${PYTHON:-python3}"
+missing=() # needed
+useful=()  # the work gets done without
+has() { command -v "$1" >/dev/null; }
+has_header() { echo "#include <$1>" | g++ -E -x c++ - >/dev/null 2>&1; }
+runs() { "$python" -c "$1" 2>/dev/null; }
+
+for group in "$@"; do
+  case "$group" in
+    build)
+      has g++ || missing+=(build-essential)
+      has "$python" || missing+=(python3)
+      runs "import venv, ensurepip" || missing+=(python3-venv)
+      runs "import sysconfig; open(sysconfig.get_path('include') + '/Python.h')" || missing+=(python3-dev)
+      has ccache || useful+=(ccache)
+      ;;
+    test) has_header gtest/gtest.h || missing+=(libgtest-dev) ;;
+    bench) has_header benchmark/benchmark.h || missing+=(libbenchmark-dev) ;;
+    clang) has clang++ || missing+=(clang) ;;
+    mingw) has x86_64-w64-mingw32-g++-posix || missing+=(g++-mingw-w64-x86-64-posix) ;;
+    *) echo "unknown group: $group" >&2; exit 2 ;;
+  esac
+done
+
+if has apt-get; then
+  missing+=("${useful[@]}")
+elif ((${#useful[@]})); then
+  echo "would save time: ${useful[*]}"
+fi
+((${#missing[@]})) || exit 0
+has apt-get || { echo "please install what Debian calls: ${missing[*]}" >&2; exit 1; }
+
+echo "installing: ${missing[*]}"
+sudo=()
+[[ "$(id -u)" == 0 ]] || sudo=(sudo)
+"${sudo[@]}" env DEBIAN_FRONTEND=noninteractive tools/aloud.sh apt-get update -q
+"${sudo[@]}" env DEBIAN_FRONTEND=noninteractive tools/aloud.sh \
+  apt-get install -y -q -o Dpkg::Use-Pty=0 --no-install-recommends "${missing[@]}"
