@@ -63,16 +63,15 @@ def test_nothing_else_is_installed(environment: Path, tmp_path: Path) -> None:
     assert [file for file in files if not PACKAGE_FILES.fullmatch(file)] == []
 
 
-def test_import_is_light(environment: Path, tmp_path: Path, record_property: pytest.RecordProperty) -> None:
-    """NumPy and the core, nothing else; the time is printed, not judged."""
+def test_import_is_light(environment: Path, tmp_path: Path) -> None:
+    """NumPy and the core, nothing else."""
     code = (
-        "import numpy, sys, time; n = set(sys.modules); t = time.perf_counter(); import mgdd;"
-        "print(1e3 * (time.perf_counter() - t), *sorted({m.split('.')[0] for m in set(sys.modules) - n}))"
+        "import numpy, sys; n = set(sys.modules); import mgdd;"
+        "print(*sorted({m.split('.')[0] for m in set(sys.modules) - n}))"
     )
-    runs = [call(environment / "bin" / "python", "-c", code, cwd=tmp_path).split() for _ in range(3)]
-    print(f"import mgdd, beside numpy: {min(float(run[0]) for run in runs):.0f} ms")
-    others = {name for name in runs[0][1:] if name in HEAVY}
-    assert others == set()
+    loaded = set(call(environment / "bin" / "python", "-c", code, cwd=tmp_path).split())
+    assert "mgdd" in loaded
+    assert loaded & HEAVY == set()
 
 
 def test_python_of_the_readme_runs(environment: Path, tmp_path: Path) -> None:
