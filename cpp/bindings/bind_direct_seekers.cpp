@@ -38,7 +38,8 @@ void bind_spsa(py::module_& m) {
                                plain("maximize", &S::maximize),
                                plain("limits", &S::limits),
                                or_none("curvature", &S::curvature, nan)};
-  bind_settings<Spsa>(cls, "Spsa", S{}, rows, py::arg("lower") = -inf, py::arg("upper") = inf);
+  const S standard;
+  bind_settings<Spsa>(cls, "Spsa", standard, rows, py::arg("lower") = -inf, py::arg("upper") = inf);
   cls.def_property_readonly(
          "hessian", [](const B& b) { return Eigen::MatrixXd(b.use()->seeker().hessian()); },
          "Averaged Hessian of the second-order form, shape (inputs, inputs).")
@@ -62,7 +63,9 @@ void bind_gradient_descent(py::module_& m) {
                                per_input_or_none("rate", &S::rate), plain("tolerance", &S::tolerance),
                                plain("iterations", &S::iterations), plain("maximize", &S::maximize),
                                plain("limits", &S::limits),         or_none("curvature", &S::curvature, nan)};
-  bind_settings<GradientDescent>(cls, "GradientDescent", S{}, rows, py::arg("lower") = -inf, py::arg("upper") = inf);
+  const S standard;
+  bind_settings<GradientDescent>(cls, "GradientDescent", standard, rows, py::arg("lower") = -inf,
+                                 py::arg("upper") = inf);
   cls.def_property_readonly(
          "iteration", [](const B& b) { return b.use()->seeker().iteration(); }, "Steps made.")
       .def_property_readonly(
@@ -83,7 +86,8 @@ void bind_golden_section(py::module_& m) {
   const auto rows = std::tuple{plain("noise_sd", &S::noise_sd),       plain("significance", &S::significance),
                                plain("samples_max", &S::samples_max), plain("tolerance", &S::tolerance),
                                plain("maximize", &S::maximize),       plain("limits", &S::limits)};
-  bind_settings<GoldenSection>(cls, "GoldenSection", S{}, rows, py::arg("lower"), py::arg("upper"));
+  const S standard;
+  bind_settings<GoldenSection>(cls, "GoldenSection", standard, rows, py::arg("lower"), py::arg("upper"));
   cls.def_property_readonly(
          "bracket",
          [](const B& b) {

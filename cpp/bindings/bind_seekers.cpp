@@ -24,7 +24,9 @@ void bind_extremum_seeking(py::module_& m) {
                  plain("full_gradient", &S::full_gradient), plain("limit_amplitude", &S::limit_amplitude),
                  plain("maximize", &S::maximize), plain("limits", &S::limits),
                  or_none("curvature", &S::curvature, nan)});
-  bind_settings<ExtremumSeeking>(cls, "ExtremumSeeking", S{}, rows, py::arg("lower") = -inf, py::arg("upper") = inf);
+  const S standard;
+  bind_settings<ExtremumSeeking>(cls, "ExtremumSeeking", standard, rows, py::arg("lower") = -inf,
+                                 py::arg("upper") = inf);
   cls.def_property_readonly(
       "amplitude_share", [](const B& b) { return b.use()->seeker().amplitude_share(); },
       "Amplitude now over that of the settings.");
@@ -44,7 +46,8 @@ void bind_newton(py::module_& m) {
                  plain("hold_cycles", &S::hold_cycles), per_input_or_none("rate", &S::rate),
                  or_default("components", &S::components), plain("limit_amplitude", &S::limit_amplitude),
                  plain("maximize", &S::maximize), plain("limits", &S::limits)});
-  bind_settings<NewtonSeeking>(cls, "NewtonSeeking", S{}, rows, py::arg("lower") = -inf, py::arg("upper") = inf);
+  const S standard;
+  bind_settings<NewtonSeeking>(cls, "NewtonSeeking", standard, rows, py::arg("lower") = -inf, py::arg("upper") = inf);
   cls.def_property_readonly(
          "hessian", [](const B& b) { return Eigen::MatrixXd(b.use()->seeker().hessian()); },
          "Filtered Hessian of the maximised objective, shape (inputs, inputs).")
@@ -62,7 +65,8 @@ void bind_bounded(py::module_& m) {
   const auto rows = std::tuple_cat(dither_rows<S>(),
                                    std::tuple{plain("kappa", &S::kappa), plain("maximize", &S::maximize),
                                               plain("limits", &S::limits), or_none("curvature", &S::curvature, nan)});
-  bind_settings<BoundedSeeking>(cls, "BoundedSeeking", S{}, rows, py::arg("lower") = -inf, py::arg("upper") = inf);
+  const S standard;
+  bind_settings<BoundedSeeking>(cls, "BoundedSeeking", standard, rows, py::arg("lower") = -inf, py::arg("upper") = inf);
   bind_seeking(cls);
 }
 
