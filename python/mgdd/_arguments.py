@@ -255,7 +255,7 @@ def _remedy(argument: _Argument, value: Any) -> str:
     for name in dict.fromkeys((argument.name, *(_name(choice).lower() for choice in _choices(argument.kind)))):
         try:
             part = getattr(value, name, None)
-        except Error:  # a property that refuses is no remedy
+        except Error:  # a property that refuses is not a remedy
             continue
         if part is not None and _fits(argument.kind, part) and not callable(part):
             return f"; give its .{name}"

@@ -29,7 +29,7 @@ class Progress:
     stream : text file, optional
         Where to; stderr if left out.
     interval_s : float
-        Longest silence where the stream is no terminal [s].
+        Longest silence where the stream is not a terminal [s].
     """
 
     def __init__(self, *, quiet: bool, stream: TextIO | None = None, interval_s: float = _INTERVAL_S) -> None:

@@ -86,8 +86,8 @@ def run_seeker(
     mgdd.errors.InUseError
         Bench or seeker are in a call of another thread.
     mgdd.errors.Interrupted
-        Ctrl-C; ``partial`` is the LoopRun of the cycles until then. Plant and seeker stand behind them, and running
-        them again goes on.
+        Ctrl-C; ``partial`` is the LoopRun of the cycles until then. Plant and seeker are in the state after them, and
+        running them again goes on.
 
     Examples
     --------
