@@ -118,10 +118,10 @@ TEST(NewtonSeeking, RefusesAndAdvises) {
   refused([](auto& s) { s.riccati_rate = std::nan(""); });
   refused([](auto& s) { s.largest_inverse = -1.0; });
   refused([](auto& s) { s.dither.period = 4; });
+  NewtonSeekingSettings wrong;
+  wrong.initial_hessian = inputs({-1.0, -1.0});
+  EXPECT_THROW(NewtonSeeking{wrong}, ShapeError);
   NewtonSeekingSettings s;
-  s.initial_hessian = inputs({-1.0, -1.0});
-  EXPECT_THROW(NewtonSeeking{s}, ShapeError);
-  s = {};
   EXPECT_TRUE(s.advice().empty());
   s.time_constant_cycles = 15.0;
   ASSERT_EQ(s.advice().size(), 1u);
