@@ -86,7 +86,8 @@ test: ready ## set up, then run every test of both languages
 wheel-check: ready ## install the package as a user does, and try it from Python, the command line and C++
 	@mkdir -p $(LOGS); rm -f $(LOGS)/wheel.log; folder="$$(mktemp -d)"; trap 'rm -rf "$$folder"' EXIT; \
 	$(PYTHON) -m venv "$$folder/venv"; \
-	PATH="$(BARE_PATH)" SKBUILD_CMAKE_DEFINE="MGDD_WERROR=ON" \
+	compiler="$$(sed -n 's/^CMAKE_CXX_COMPILER:[A-Z]*=//p' build/dev/CMakeCache.txt)"; \
+	PATH="$(BARE_PATH)" CXX="$$compiler" SKBUILD_CMAKE_DEFINE="MGDD_WERROR=ON" \
 	  $(ALOUD) "$$folder/venv/bin/python" -m pip --disable-pip-version-check install .; \
 	MGDD_INSTALLED="$$folder/venv" $(ALOUD) $(PY) -m pytest -v tests/installed | tee $(LOGS)/wheel.log
 
