@@ -33,7 +33,7 @@ int main(int argc, char** argv) {
       }
       for (int step = 0; step < 10; ++step)
         plant.step(state, input);
-      model.advance(predicted, input.duty);
+      model.step(predicted, input.duty);
     }
   } catch (const std::exception& error) {
     std::fprintf(stderr, "%s\n", error.what());

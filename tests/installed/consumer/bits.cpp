@@ -6,11 +6,11 @@
 #include <cstring>
 
 #include "mgdd/common/platform.hpp"
-#include "mgdd/optimize/extremum_seeking.hpp"
-#include "mgdd/optimize/recursive_least_squares.hpp"
-#include "mgdd/optimize/spsa.hpp"
+#include "mgdd/optimize/least_squares/recursive_least_squares.hpp"
+#include "mgdd/optimize/seekers/extremum_seeking.hpp"
+#include "mgdd/optimize/seekers/spsa.hpp"
+#include "mgdd/throttle/models/pw_r.hpp"
 #include "mgdd/throttle/plant.hpp"
-#include "mgdd/throttle/pw_r.hpp"
 
 namespace {
 
@@ -45,7 +45,7 @@ void pw_r() {
   auto state = model.at_rest(8.0, 0.0);
   Digest digest;
   for (int k = 0; k < 20000; ++k) {
-    model.advance(state, duty_at(k));
+    model.step(state, duty_at(k));
     digest.add(model.output(state));
   }
   digest.print("pw_r");
