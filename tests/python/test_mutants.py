@@ -103,7 +103,9 @@ def test_a_seed_gives_one_order_and_one_change_per_line(tools: Any, tmp_path: Pa
 
 def test_every_source_of_the_package_can_be_changed(tools: Any, root: Path) -> None:
     files = [*(root / "python/mgdd").rglob("*.py"), *(root / "cpp").rglob("*.[ch]pp")]
-    for mutant in tools.sample(root, files, "all")[::40]:
+    some = tools.sample(root, files, "all")[::40]
+    assert {Path(mutant.path).suffix for mutant in some} >= {".py", ".cpp", ".hpp"}
+    for mutant in some:
         if mutant.path.endswith(".py"):
             lines = (root / mutant.path).read_text(encoding="utf-8").splitlines()
             ast.parse("\n".join([*lines[: mutant.line - 1], mutant.after, *lines[mutant.line :]]))
