@@ -122,7 +122,7 @@ PseudoWiener make_pseudo_wiener(const std::string& kind, const std::map<std::str
           } else if (std::ranges::any_of(settings, [&](const Setting& s) { return name == s.name; })) {
             put_setting(p, name, value);
           } else {
-            throw ParameterError("parameters: '" + name + "' is no parameter of " + kind);
+            throw ParameterError("parameters: '" + name + "' is not a parameter of " + kind);
           }
         }
         if constexpr (requires { p.switching; }) {

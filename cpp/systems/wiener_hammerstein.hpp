@@ -2,7 +2,7 @@
 // derivatives. Sampled signals; the unit of the input and of the output are the caller's, both filters have gain 1 at
 // rest, so that the curve between them carries the unit and no gain is counted twice.
 // Structure and derivatives: Schoukens, Pintelon and Rolain 2014 (block-oriented, started from linear approximations);
-// the curve is a uniform cubic B-spline. Desk-time: allocates; the residual call is noexcept.
+// the curve is a uniform cubic B-spline. Offline: allocates; the residual call is noexcept.
 #pragma once
 
 #include <array>

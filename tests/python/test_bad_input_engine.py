@@ -204,7 +204,7 @@ def trace():
 @pytest.mark.parametrize(
     ("keyword", "error", "match"),
     [
-        ({"free": ["soc"]}, ParameterError, "'soc' is no parameter of a calibration.*soc_cad"),
+        ({"free": ["soc"]}, ParameterError, "'soc' is not a parameter of a calibration.*soc_cad"),
         ({"free": ["evo_cad"]}, ParameterError, "'evo_cad'.*except ivc_cad and evo_cad"),
         ({"free": ["soc_cad", "soc_cad"]}, ParameterError, "'soc_cad' is named twice"),
         ({"free": []}, ParameterError, "free is empty"),

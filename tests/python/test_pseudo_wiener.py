@@ -100,7 +100,7 @@ def test_a_delay_keeps_its_time_at_any_sample_time() -> None:
 def test_bad_input_says_what_and_leaves_things_alone() -> None:
     with pytest.raises(ParameterError, match=r"above_tau_s = -1 s: must be in \[0\.005, 0\.3\]"):
         PseudoWiener("pw_r", {"above_tau_s": -1.0})
-    with pytest.raises(ParameterError, match="'mass' is no parameter of pw_w"):
+    with pytest.raises(ParameterError, match="'mass' is not a parameter of pw_w"):
         PseudoWiener("pw_w", {"mass": 1.0})
     with pytest.raises(ParameterError, match="must be one of pw_r, pw_w, pw_p"):
         PseudoWiener("wiener")
@@ -181,7 +181,7 @@ def test_online_update_refuses_what_it_cannot_do() -> None:
         OnlineUpdate(MODELS[2])
     with pytest.raises(ParameterError, match="method = 'newton'"):
         OnlineUpdate(MODELS[0], method="newton")
-    with pytest.raises(ParameterError, match="'mass' is no parameter"):
+    with pytest.raises(ParameterError, match="'mass' is not a parameter"):
         OnlineUpdate(MODELS[0], free=["mass"])
 
 

@@ -35,7 +35,7 @@ static_assert(std::size(signal_units) == performance_signal_count);
 void validate(const PerformanceTerm& term, std::size_t index) {
   const std::string owner = "terms[" + std::to_string(index) + "].";
   if (static_cast<std::size_t>(term.signal) >= performance_signal_count) {
-    throw ParameterError(owner + "signal = " + std::to_string(static_cast<int>(term.signal)) + ": is no signal");
+    throw ParameterError(owner + "signal = " + std::to_string(static_cast<int>(term.signal)) + ": is not a signal");
   }
   const std::string_view unit = unit_of(term.signal);
   if (!std::isfinite(term.weight)) {

@@ -19,7 +19,7 @@ bool places_grid(std::string_view name) noexcept {
   std::string valid;
   for (const std::string& n : differentiable_inputs())
     valid.append(valid.empty() ? "" : ", ").append(n);
-  throw ParameterError("'" + std::string(name) + "' is no input with a derivative: must be one of " + valid);
+  throw ParameterError("'" + std::string(name) + "' is not an input with a derivative: must be one of " + valid);
 }
 
 template <class T>

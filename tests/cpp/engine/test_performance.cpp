@@ -83,7 +83,7 @@ TEST(Performance, RefusesWhatCannotBeATerm) {
   EXPECT_EQ(message_of({{.signal = p_max_bar, .above = -5.0}}), "terms[0].above = -5 bar: must be > 0 and finite");
   EXPECT_EQ(message_of({{.weight = std::numeric_limits<double>::quiet_NaN()}}),
             "terms[0].weight = nan: must be finite");
-  EXPECT_EQ(message_of({{.signal = static_cast<PerformanceSignal>(99)}}), "terms[0].signal = 99: is no signal");
+  EXPECT_EQ(message_of({{.signal = static_cast<PerformanceSignal>(99)}}), "terms[0].signal = 99: is not a signal");
   EXPECT_THROW(efficiency_and_nox(-0.1), ParameterError);
   EXPECT_THROW(parse_performance_signal("torque"), ParameterError);
 }

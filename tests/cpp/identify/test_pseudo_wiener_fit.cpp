@@ -181,7 +181,7 @@ TEST(PseudoWienerFit, RefusesWhatCannotBeFittedAndSaysWhy) {
   PseudoWienerFitOptions o;
   o.free = {"mass"};
   EXPECT_EQ(message([&] { static_cast<void>(fit_pseudo_wiener({{duty, angle}}, PwR{}, o)); }),
-            "free: 'mass' is no parameter of pw_r");
+            "free: 'mass' is not a parameter of pw_r");
 }
 
 }  // namespace

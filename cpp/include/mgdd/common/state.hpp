@@ -1,5 +1,5 @@
 // State of a running algorithm as named columns of numbers: what a run needs to go on bit for bit after a restart.
-// A class lists its mutable members once, in `visit`; writing and reading walk the same list. Desk-time code.
+// A class lists its mutable members once, in `visit`; writing and reading walk the same list. Offline code.
 #pragma once
 
 #include <Eigen/Core>

@@ -68,7 +68,7 @@ class CycleModel {
   /// Index of the first pressure that is not finite and positive; the number of angles if there is none.
   std::size_t first_unphysical(const CycleWorkspace<T>& work) const noexcept;
 
-  /// For desk-time callers: ConvergenceError naming the angle where the pressure leaves the physical range.
+  /// For offline callers: ConvergenceError naming the angle where the pressure leaves the physical range.
   void require_physical(const CycleWorkspace<T>& work) const;
 
   /// Scalars of the cycle that stands in the workspace.

@@ -1,5 +1,5 @@
 // Ignition delay: from start of injection (SOI) to start of combustion (SOC) and back. Angles °CA aTDC, tau in ms,
-// pressure in bar, temperature in K. Desk-time code: it allocates and throws.
+// pressure in bar, temperature in K. Offline code: it allocates and throws.
 #pragma once
 
 #include "mgdd/engine/cylinder.hpp"

@@ -1,4 +1,4 @@
-// Exact forward sensitivities of one cycle, and the step-size error of each indicator. Desk-time code.
+// Exact forward sensitivities of one cycle, and the step-size error of each indicator. Offline code.
 // Sources: Griewank and Walther 2008 (forward mode); Richardson 1911 and Roache 1994 (step-size error).
 #pragma once
 

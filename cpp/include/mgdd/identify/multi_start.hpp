@@ -1,5 +1,5 @@
 // Fits from many starts, and fits in stages. Starts come from a Latin hypercube of counter-based random numbers, so
-// that the same seed gives the same starts on every machine; results do not depend on the number of threads. Desk-time.
+// that the same seed gives the same starts on every machine; results do not depend on the number of threads. Offline.
 #pragma once
 
 #include <cmath>

@@ -1,5 +1,5 @@
 // Many whole closed loops at once: every bench with every seeker and every seed, on all cores. A loop depends on its
-// own bench, seeker and seed only, so the result is the same on any number of threads. Desk-time code.
+// own bench, seeker and seed only, so the result is the same on any number of threads. Offline code.
 #pragma once
 
 #include <cstdint>

@@ -1,4 +1,4 @@
-// A whole run of a recorded seeker on the bench: its cycles, its summary, and an end before its end. Desk-time code:
+// A whole run of a recorded seeker on the bench: its cycles, its summary, and an end before its end. Offline code:
 // room for all cycles is made first, the cycles themselves allocate nothing.
 #pragma once
 

@@ -49,7 +49,7 @@ Free resolve(const std::vector<std::string>& names) {
     std::string valid;
     for (const std::string& n : load_parameters())
       valid.append(valid.empty() ? "" : ", ").append(n);
-    throw ParameterError("free: '" + names[i] + "' is no parameter of a calibration; per load: " + valid +
+    throw ParameterError("free: '" + names[i] + "' is not a parameter of a calibration; per load: " + valid +
                          "; for all loads: any field of the cylinder except ivc_cad and evo_cad");
   }
   if (names.empty()) throw ParameterError("free is empty: name at least one parameter");

@@ -48,7 +48,7 @@ std::vector<PseudoWienerUnknown> unknowns(const PwR&, const PseudoWienerFitOptio
     std::size_t at = 0;
     while (at < numbers_per_side && rows[at].name.substr(above_prefix.size()) != name)
       ++at;
-    if (at == numbers_per_side) throw ParameterError("free: '" + name + "' is no parameter of pw_r");
+    if (at == numbers_per_side) throw ParameterError("free: '" + name + "' is not a parameter of pw_r");
     const std::size_t below = at + numbers_per_side;
     if (o.sides == Sides::shared) {
       out.push_back({parameter_of(rows[at], name), {at, below}});
@@ -72,7 +72,7 @@ std::vector<PseudoWienerUnknown> by_name(PseudoWienerKind kind, std::size_t n_de
   for (const std::string& name : o.free) {
     const auto found = std::ranges::find(rows, name, &FieldInfo::name);
     if (found == rows.end()) {
-      throw ParameterError("free: '" + name + "' is no parameter of " +
+      throw ParameterError("free: '" + name + "' is not a parameter of " +
                            std::string(name_of(throttle::pseudo_wiener_names(), kind)));
     }
     out.push_back({parameter_of(*found, name), {static_cast<std::size_t>(found - rows.begin())}});

@@ -1,5 +1,5 @@
 // Analysis of a measured pressure trace of the closed part: pegging, heat release, burn angles, work, polytropic
-// exponents. Angles °CA aTDC, pressure in bar at the border. Desk-time code: it allocates and throws.
+// exponents. Angles °CA aTDC, pressure in bar at the border. Offline code: it allocates and throws.
 // Sources: Heywood 1988, chapter 9; Randolph 1990, Brunt and Pond 1997 (pegging); Krieger and Borman 1966 (heat
 // release).
 #pragma once

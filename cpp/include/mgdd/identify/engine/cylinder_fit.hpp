@@ -1,6 +1,6 @@
 // Calibration of the cycle model to measured pressure traces: per load the burn (start, duration, heat, shape), for all
 // loads together the cylinder (wall heat and whatever else is freed). Residual: (model - measured)/p_max per trace.
-// Angles °CA aTDC, pressure bar, heat J. Desk-time code; the search itself allocates nothing.
+// Angles °CA aTDC, pressure bar, heat J. Offline code; the search itself allocates nothing.
 #pragma once
 
 #include <array>

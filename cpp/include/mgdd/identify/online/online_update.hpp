@@ -29,7 +29,7 @@ inline std::array<bool, 5> free_groups(const std::vector<std::string>& names) {
   for (const std::string& name : names) {
     const auto found = std::ranges::find(pw_r_groups, name);
     if (found == pw_r_groups.end()) {
-      throw ParameterError("free: '" + name + "' is no parameter of pw_r that can be updated");
+      throw ParameterError("free: '" + name + "' is not a parameter of pw_r that can be updated");
     }
     free[static_cast<std::size_t>(found - pw_r_groups.begin())] = true;
   }

@@ -1,5 +1,5 @@
 // Output-error fit of a pseudo-Wiener model to throttle logs: free run from the first measured angle, exact forward
-// sensitivities, Levenberg-Marquardt from several starts, the delay by a grid. Units: deg, s, duty. Desk-time code;
+// sensitivities, Levenberg-Marquardt from several starts, the delay by a grid. Units: deg, s, duty. Offline code;
 // the residual itself allocates nothing.
 #pragma once
 

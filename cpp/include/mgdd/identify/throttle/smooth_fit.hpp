@@ -1,7 +1,7 @@
 // Fit of the smooth throttle's ten parameters to a duty and angle record, from one or many starts. Staged: a short
 // beginning of the record first, then all of it, so that far starts are pulled in cheaply and a free run cannot drift
 // away. Searches run side by side in SIMD lanes; each sees only condensed normal equations (n + 1 rows with the same
-// J'J, J'r and r'r). SI and rad, residual in deg. Desk-time code.
+// J'J, J'r and r'r). SI and rad, residual in deg. Offline code.
 #pragma once
 
 #include <array>

@@ -1,5 +1,5 @@
 // What a seeker was told, cycle by cycle, and a seeker that keeps such a history of itself. Columns stand in the unit
-// of the input and of J. Desk-time code: recording allocates, in blocks.
+// of the input and of J. Offline code: recording allocates, in blocks.
 #pragma once
 
 #include <cmath>

@@ -4,7 +4,7 @@
 //   batch:      the same rms over sqrt(1 - M/(2 tau))
 //   SPSA (constant gain): q = a |J''|, rms = sigma/(c |J''|) sqrt(q/(2 (2 - q))), cycles = 2 ln(eps/e0)/ln(1 - q)
 //   cost of the dither: |J''|/2 A^2/2 (SPSA: c^2) and of the jitter: |J''|/2 rms^2, in units of J
-// Lengths that the user leaves open scale with L = sqrt(sigma/|J''|), where J has fallen by half a noise. Desk-time
+// Lengths that the user leaves open scale with L = sqrt(sigma/|J''|), where J has fallen by half a noise. Offline
 // code.
 #pragma once
 
