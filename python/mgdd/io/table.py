@@ -11,7 +11,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from mgdd.errors import DataError
+from mgdd.errors import DataError, argument
 
 if TYPE_CHECKING:
     import os
@@ -67,7 +67,7 @@ class TextTable:
             if number is None:
                 remedy = "correct it or start the line with #"
                 if "," in row[index] and self.decimal == ".":
-                    remedy = "pass decimal=',' if the comma is a decimal mark"
+                    remedy = f"pass {argument('decimal', repr(','))} if the comma is a decimal mark"
                 raise DataError(f"{where}: {row[index]!r} is not a number: {remedy}")
             if not np.isfinite(number):
                 raise DataError(f"{where}: {row[index]!r} is not finite: remove or repair it")

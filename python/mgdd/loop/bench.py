@@ -116,7 +116,7 @@ class EngineBench(_core.EngineBench):
         if isinstance(limits, str):
             raise ParameterError(f"limits = {limits!r}: must be a sequence of names")
         if not 0 <= seed < 2**64:
-            raise ParameterError(f"seed = {seed}: must be in [0, 2**64)")
+            raise ParameterError.of("seed", seed, "in [0, 2**64)")
         if isinstance(engine, str):
             engine = presets.load(engine, kind="engine")
         if isinstance(engine, Preset):

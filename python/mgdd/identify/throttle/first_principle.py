@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from mgdd import _core
-from mgdd.errors import DataError, ParameterError, hand_over, or_partial
+from mgdd.errors import DataError, ParameterError, argument, hand_over, or_partial
 from mgdd.identify.throttle.first_principle_model import GROUP_NAMES, TYPICAL, FirstPrincipleModel
 from mgdd.identify.throttle.first_principle_start import SIDE_DEG, regression_start, rest_angle, spread_starts
 from mgdd.identify.throttle.free_run import draw_free_run, free_run, quality_of, source_of
@@ -109,7 +109,7 @@ def fit_throttle(
     time, duty, angle = _columns(log)
     if test is not None:
         _columns(test)
-    step_s = even_step(time, remedy="read_throttle_log(..., step_s={step:g}) resamples")
+    step_s = even_step(time, remedy=f"read_throttle_log(..., {argument('step_s', '{step:g}')}) resamples")
     for name in [*(start_values or {}), *(fixed or {})]:
         if name not in GROUP_NAMES:
             raise ParameterError(f"{name!r}: no throttle group; they are {', '.join(GROUP_NAMES)}")
