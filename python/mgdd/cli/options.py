@@ -248,7 +248,7 @@ def _value(name: str, text: str) -> float | str:
         return float(text)
     except ValueError:
         if name in fields:
-            raise ParameterError(f"{name} = {text!r}: must be a number [{fields[name]['unit']}]") from None
+            raise ParameterError.of(name, text, f"a number [{fields[name]['unit']}]") from None
         return text
 
 

@@ -80,7 +80,7 @@ def read_table(
 ) -> TextTable:
     """Read a text table; `delimiter` None detects it from the first row that is not a comment."""
     if decimal not in (".", ","):
-        raise DataError(f"decimal = {decimal!r}: must be '.' or ','")
+        raise DataError.of("decimal", decimal, "'.' or ','")
     if delimiter is not None and delimiter in ("", decimal):
         raise DataError(f"delimiter = {delimiter!r}: must not be empty or the decimal mark {decimal!r}")
     file = Path(path)

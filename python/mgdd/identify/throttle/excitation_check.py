@@ -191,7 +191,7 @@ def _check_limits(window: tuple[float, float], max_rate_deg_per_s: float | None,
         raise ParameterError(f"{named} = ({low:g}, {high:g}): the first must be below the second")
     for name, value in (("max_rate_deg_per_s", max_rate_deg_per_s), ("max_current_a", max_current_a)):
         if value is not None and not value > 0.0:
-            raise ParameterError(f"{name} = {value:g}: must be > 0")
+            raise ParameterError.of(name, value, "> 0")
 
 
 def _violations(

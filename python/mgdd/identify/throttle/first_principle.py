@@ -114,7 +114,7 @@ def fit_throttle(
         if name not in GROUP_NAMES:
             raise ParameterError(f"{name!r}: no throttle group; they are {', '.join(GROUP_NAMES)}")
     if threads < 1:
-        raise ParameterError(f"threads = {threads}: must be >= 1")
+        raise ParameterError.of("threads", threads, ">= 1")
     if np.ptp(angle) < 1.0:
         raise DataError(f"angle_deg moves by {np.ptp(angle):.3g} deg: drive the plate, mgdd.identify.design_excitation")
     values = dict(TYPICAL)
@@ -149,7 +149,7 @@ def fit_throttle(
     for name, value in values.items():
         low, high = bounds[name].lower, bounds[name].upper
         if (name in (start_values or {}) or name in (fixed or {})) and not low <= value <= high:
-            raise ParameterError(f"{name} = {value!r}: must be within [{low:g}, {high:g}]")
+            raise ParameterError.of(name, value, f"within [{low:g}, {high:g}]")
         values[name] = min(max(value, low), high)
     index = {name: i for i, name in enumerate(GROUP_NAMES)}
     static = [index[name] for name in free if name not in ("tau_s", "gain_deg_per_s2_per_duty", "electrical_s")]
