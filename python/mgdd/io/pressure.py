@@ -139,7 +139,7 @@ def read_pressure(
         try:
             order, degrees = aligned_angle(degrees, firing_tdc_deg)
         except DataError as error:
-            raise DataError(f"{table.source}: {error}") from None
+            raise error.reworded(f"{table.source}: {error}") from None
         angle, pressure, rows = degrees[order], pressure[order], [rows[i] for i in order]
         angle_unit = "deg"
     angle, pressure = check_trace(
