@@ -2,9 +2,8 @@
 #include <algorithm>
 #include <cstddef>
 #include <span>
-#include <stdexcept>
 #include <string>
-#include <utility>
+#include <tuple>
 #include <vector>
 
 #include "binding.hpp"
@@ -19,77 +18,9 @@ namespace {
 
 using namespace throttle;
 
-constexpr std::size_t field_count = 34;
 constexpr std::size_t steps_between_looks = 200'000;
 
-py::dict to_dict(const Throttle& t) {
-  py::dict out;
-  for (const auto& field : fields())
-    out[as_str(field.info.name)] = field.in(t);
-  out["friction"] = as_str(name_of(friction_names(), t.friction));
-  out["backlash"] = as_str(name_of(backlash_names(), t.backlash));
-  return out;
-}
-
-// One keyword of __init__ per number, with the C++ default.
-template <std::size_t>
-using Number = double;
-
-template <std::size_t... I>
-void bind_init(py::class_<Throttle>& cls, std::index_sequence<I...>) {
-  const Throttle d;
-  cls.def(py::init([](const std::string& friction, const std::string& backlash, Number<I>... values) {
-            Throttle t;
-            ((fields()[I].in(t) = values), ...);
-            t.friction = parse_name(friction_names(), "friction", friction);
-            t.backlash = parse_name(backlash_names(), "backlash", backlash);
-            validate(t);
-            return t;
-          }),
-          py::kw_only(), py::arg("friction") = std::string(name_of(friction_names(), d.friction)),
-          py::arg("backlash") = std::string(name_of(backlash_names(), d.backlash)),
-          (py::arg(fields()[I].info.name.data()) = fields()[I].in(d))...);
-}
-
-Throttle replaced(const Throttle& from, const py::kwargs& changes) {
-  Throttle t = from;
-  for (const auto& [key, value] : changes) {
-    const auto name = key.cast<std::string>();
-    if (name == "friction") {
-      t.friction = parse_name(friction_names(), name, as_name(key, value));
-    } else if (name == "backlash") {
-      t.backlash = parse_name(backlash_names(), name, as_name(key, value));
-    } else {
-      const auto all = fields();
-      const auto field = find_field(all, name);
-      if (field == all.end()) unknown_field("Throttle", key, to_dict(from));
-      field->in(t) = as_number(key, value);
-    }
-  }
-  validate(t);
-  return t;
-}
-
-template <class Enum>
-py::dict describe_names(Names<Enum> names, Enum chosen, std::string_view meaning) {
-  std::vector<std::string_view> valid;
-  for (const auto& [value, name] : names)
-    valid.push_back(name);
-  return describe_choice(name_of(names, chosen), valid, meaning);
-}
-
-py::dict describe_fields() {
-  const Throttle d;
-  py::dict out;
-  for (const auto& field : fields())
-    out[as_str(field.info.name)] = describe(field.info, py::float_(field.in(d)));
-  out["friction"] = describe_names(friction_names(), d.friction, "law of the dry friction");
-  out["backlash"] = describe_names(backlash_names(), d.backlash, "play between gear and plate");
-  return out;
-}
-
-void bind_record(py::module_& m) {
-  if (fields().size() != field_count) throw std::logic_error("bind_throttle.cpp: field_count is out of date");
+void bind_throttle_record(py::module_& m) {
   py::class_<Throttle> cls(m, "Throttle",
                            R"(Parameters of an electronic throttle body, seen from the plate shaft.
 
@@ -110,24 +41,14 @@ Throttle(stiction_nm=0.3, limp_home_deg=10.0, friction='stribeck')
 >>> t.replace(supply_v=14.4).supply_v
 14.4
 )");
-  bind_init(cls, std::make_index_sequence<field_count>{});
-  for (const auto& field : fields()) {
-    cls.def_property_readonly(
-        field.info.name.data(), [field](const Throttle& t) { return field.in(t); },
-        (std::string(field.info.meaning) + " [" + std::string(field.info.unit) + "]").c_str());
-  }
-  cls.def_property_readonly(
-      "friction", [](const Throttle& t) { return std::string(name_of(friction_names(), t.friction)); },
-      "Law of the dry friction.");
-  cls.def_property_readonly(
-      "backlash", [](const Throttle& t) { return std::string(name_of(backlash_names(), t.backlash)); },
-      "Play between gear and plate.");
+  bind_record<n_throttle_fields>(
+      cls, "Throttle", fields(),
+      std::tuple{named("friction", &Throttle::friction, &friction_names, "law of the dry friction"),
+                 named("backlash", &Throttle::backlash, &backlash_names, "play between gear and plate")});
   cls.def_property_readonly("stall_torque_nm", &Throttle::stall_torque_nm,
                             "Stall torque per unit duty, g = K (V - V_drop)/R [N m].");
   cls.def_property_readonly("damping_nms_per_rad", &Throttle::damping_nms_per_rad,
                             "Viscous friction and braking by the shorted motor, b = K_v + K K_e/R [N m s/rad].");
-  cls.def_static("fields", &describe_fields, "Every field by name: unit, bounds or choices, meaning, default.");
-  bind_parameters(cls, "Throttle", [](const Throttle& t) { return to_dict(t); }, &replaced);
 }
 
 // Columns that live as long as a run; an empty one stands for "not given".
@@ -238,7 +159,7 @@ py::array_t<double> air_torque(const Throttle& t, const InputArray& angle_deg) {
 }  // namespace
 
 void bind_throttle(py::module_& m) {
-  bind_record(m);
+  bind_throttle_record(m);
   m.def("simulate_throttle", &simulate_one, py::arg("throttle"), py::arg("duty"), py::kw_only(), py::arg("sample_s"),
         py::arg("start_deg"), py::arg("bridge"), py::arg("supply_v"), py::arg("airflow_torque_nm"), py::arg("step_s"),
         "One throttle over columns, from rest; behind mgdd.throttle.simulate.");

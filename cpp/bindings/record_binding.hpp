@@ -1,11 +1,17 @@
-// What the bindings of parameter records share: description of fields, reading of one changed value, short text.
+// Parameter records from their tables of fields: description, reading of one changed value, short text, and the class.
 #pragma once
 
+#include <cstddef>
+#include <optional>
 #include <string>
 #include <string_view>
+#include <tuple>
+#include <utility>
 #include <vector>
 
 #include "binding.hpp"
+#include "keywords.hpp"
+#include "mgdd/common/enum_names.hpp"
 #include "mgdd/common/field.hpp"
 
 namespace mgdd::bindings {
@@ -38,10 +44,119 @@ std::string as_name(const py::handle& key, const py::handle& value);
 /// ParameterError that proposes the closest known name.
 [[noreturn]] void unknown_field(const char* owner, const py::handle& key, const py::dict& known);
 
-/// What parameter records share: `replace`, comparison, hashing, short text, dict, and pickle through `replaced`.
-template <class Record, class ToDict, class Replaced>
-void bind_parameters(py::class_<Record>& cls, const char* name, ToDict to_dict, Replaced replaced) {
-  cls.def("to_dict", [to_dict](const Record& self) { return to_dict(self); }, "All fields as a new dict.");
+/// A choice of a parameter record, by name; `doc` is its meaning.
+template <class Place>
+struct Named : Row<Place> {
+  using typename Row<Place>::Record;
+  using Enum = typename Row<Place>::Value;
+  using Argument = std::string;
+  Names<Enum> (*names)() noexcept;
+
+  void put(Record& record, const std::string& chosen) const {
+    this->at(record) = parse_name(names(), this->name, chosen);
+  }
+  void read(Record& record, const py::handle& key, const py::handle& value) const { put(record, as_name(key, value)); }
+  Argument get(const Record& record) const { return std::string(name_of(names(), this->at(record))); }
+  py::dict described(const Record& standard) const {
+    std::vector<std::string_view> valid;
+    for (const auto& [value, name] : names())
+      valid.push_back(name);
+    return describe_choice(get(standard), valid, this->doc);
+  }
+};
+template <class Place>
+Named<Place> named(const char* name, Place place, Names<typename PlaceOf<Place>::Value> (*names)() noexcept,
+                   const char* meaning) {
+  return {{name, place, meaning}, names};
+}
+
+/// A number of a parameter record that may be left open.
+template <class Place>
+struct Open : Row<Place> {
+  using typename Row<Place>::Record;
+  using Argument = std::optional<double>;
+  const FieldInfo* info;
+
+  void put(Record& record, Argument given) const { this->at(record) = given; }
+  void read(Record& record, const py::handle& key, const py::handle& value) const {
+    put(record, value.is_none() ? Argument() : Argument(as_number(key, value)));
+  }
+  Argument get(const Record& record) const { return this->at(record); }
+  py::dict described(const Record&) const { return describe(*info, py::none()); }
+};
+template <class Place>
+Open<Place> open_number(const FieldInfo& info, Place place) {
+  return {{info.name.data(), place, info.meaning.data()}, &info};
+}
+
+template <std::size_t>
+using Number = double;
+
+/// A parameter record from its table of numbers and the rows that are none: __init__, properties, `fields`, `to_dict`,
+/// `replace`, comparison, hash, short text and pickle. Checked by `validate`.
+template <class Record, class Fields, class... Rows, std::size_t... I>
+void bind_record(py::class_<Record>& cls, const char* name, const Fields& fields, const std::tuple<Rows...>& rows,
+                 std::index_sequence<I...>) {
+  const Record standard{};
+  std::apply(
+      [&](const Rows&... row) {
+        cls.def(py::init([fields, rows](Number<I>... values, typename Rows::Argument... given) {
+                  Record made;
+                  ((fields[I].in(made) = values), ...);
+                  std::apply([&](const Rows&... each) { (each.put(made, std::move(given)), ...); }, rows);
+                  validate(made);
+                  return made;
+                }),
+                py::kw_only(), (py::arg(fields[I].info.name.data()) = fields[I].in(standard))...,
+                keyword(row, standard)...);
+        (cls.def_property_readonly(row.name, [row](const Record& self) { return row.get(self); }, row.doc), ...);
+      },
+      rows);
+  for (const auto& field : fields) {
+    const std::string doc = std::string(field.info.meaning) + " [" + std::string(field.info.unit) + "]";
+    cls.def_property_readonly(
+        field.info.name.data(), [field](const Record& self) { return field.in(self); }, doc.c_str());
+  }
+  const auto to_dict = [fields, rows](const Record& self) {
+    py::dict out;
+    for (const auto& field : fields)
+      out[as_str(field.info.name)] = field.in(self);
+    std::apply([&](const Rows&... row) { ((out[row.name] = row.get(self)), ...); }, rows);
+    return out;
+  };
+  const auto replaced = [name, fields, rows, to_dict](const Record& from, const py::dict& changes) {
+    Record made = from;
+    for (const auto& [key, value] : changes) {
+      const auto given = key.cast<std::string>();
+      const auto field = find_field(fields, given);
+      if (field != fields.end()) {
+        field->in(made) = as_number(key, value);
+        continue;
+      }
+      const auto take = [&](const auto& row) {
+        if (given != row.name) return false;
+        row.read(made, key, value);
+        return true;
+      };
+      if (!std::apply([&](const Rows&... row) { return (take(row) || ...); }, rows)) {
+        unknown_field(name, key, to_dict(from));
+      }
+    }
+    validate(made);
+    return made;
+  };
+  cls.def_static(
+      "fields",
+      [fields, rows] {
+        const Record plain{};
+        py::dict out;
+        for (const auto& field : fields)
+          out[as_str(field.info.name)] = describe(field.info, py::float_(field.in(plain)));
+        std::apply([&](const Rows&... row) { ((out[row.name] = row.described(plain)), ...); }, rows);
+        return out;
+      },
+      "Every field by name: unit, bounds or choices, meaning, default.");
+  cls.def("to_dict", to_dict, "All fields as a new dict.");
   cls.def(
       "replace", [replaced](const Record& self, const py::kwargs& changes) { return replaced(self, changes); },
       "A validated copy with some fields changed; an unknown name is a ParameterError.");
@@ -54,8 +169,13 @@ void bind_parameters(py::class_<Record>& cls, const char* name, ToDict to_dict, 
   cls.def(py::pickle([to_dict](const Record& self) { return py::make_tuple(1, to_dict(self)); },
                      [replaced](const py::tuple& state) {
                        require_pickle_version(state);
-                       return replaced(Record{}, py::kwargs(state[1].cast<py::dict>()));
+                       return replaced(Record{}, state[1].cast<py::dict>());
                      }));
+}
+
+template <std::size_t n, class Record, class Fields, class... Rows>
+void bind_record(py::class_<Record>& cls, const char* name, const Fields& fields, const std::tuple<Rows...>& rows) {
+  bind_record(cls, name, fields, rows, std::make_index_sequence<n>{});
 }
 
 }  // namespace mgdd::bindings

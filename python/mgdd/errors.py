@@ -12,7 +12,9 @@ Examples
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Iterator
+from contextlib import contextmanager
+from contextvars import ContextVar
 from typing import Any, Self, TypeVar
 
 Result = TypeVar("Result")
@@ -68,6 +70,33 @@ class Error(Exception):
     ) -> None:
         super().__init__(message)
         self.field, self.value, self.bound = field, value, bound
+
+    @classmethod
+    def of(cls, field: str, value: Any, bound: str) -> Self:
+        """Make the error of one refused field: ``field = value: must be bound``.
+
+        Parameters
+        ----------
+        field : str
+            Its name.
+        value : object
+            What was given.
+        bound : str
+            What it must be, with a remedy where there is one.
+
+        Returns
+        -------
+        Error
+            Of this class, with message and attributes.
+
+        Examples
+        --------
+        >>> from mgdd.errors import ParameterError
+        >>> ParameterError.of("cycles", 0, ">= 1")
+        ParameterError('cycles = 0: must be >= 1')
+        """
+        shown = f"{value:g}" if isinstance(value, float) else repr(value) if isinstance(value, str) else f"{value}"
+        return cls(f"{field} = {shown}: must be {bound}", field=field, value=value, bound=bound)
 
     def reworded(self, message: str) -> Self:
         """Give the same error with another message, for callers that know more of where it happened.
@@ -167,3 +196,24 @@ def hand_over(result: Result, stop: Interrupted | None) -> Result:
     if stop is not None:
         raise Interrupted(str(stop), result)
     return result
+
+
+_written: ContextVar[Callable[[str, str | None], str] | None] = ContextVar("written", default=None)
+
+
+def argument(name: str, text: str | None = None) -> str:
+    """Write an argument as the reader of a message would give it: ``step_s=0.001`` in Python, or as an option."""
+    write = _written.get()
+    if write is not None:
+        return write(name, text)
+    return name if text is None else f"{name}={text}"
+
+
+@contextmanager
+def arguments_written(write: Callable[[str, str | None], str]) -> Iterator[None]:
+    """Let `argument` write in another way, for the command line."""
+    token = _written.set(write)
+    try:
+        yield
+    finally:
+        _written.reset(token)

@@ -178,7 +178,7 @@ def test_bad_logs_and_files_are_refused(
     io.write_throttle_log(above, tmp_path / "above.csv")
     said = refused(capsys, "throttle", "identify", str(tmp_path / "above.csv"), "--two-sided")
     assert "below limp-home" in said
-    assert "leave --two-sided out" in said
+    assert "fit one side with --two-sided left out" in said
     bad = tmp_path / "fit.toml"
     bad.write_text("kind = 'pw_r'\nformat = 1\n")
     assert "no table [parameters]" in refused(capsys, "throttle", "validate", str(bad), files[0])

@@ -92,6 +92,18 @@ void validate_timing(std::string_view name, double value, const Cylinder& c) {
   }
 }
 
+Names<GammaModel> gamma_model_names() noexcept {
+  return gamma_names;
+}
+Names<BurnShape> burn_shape_names() noexcept {
+  return burn_names;
+}
+Names<WallHeatModel> wall_heat_model_names() noexcept {
+  return wall_heat_names;
+}
+Names<IgnitionModel> ignition_model_names() noexcept {
+  return ignition_names;
+}
 std::string_view to_string(GammaModel v) noexcept {
   return name_of<GammaModel>(gamma_names, v);
 }

@@ -84,7 +84,11 @@ void validate_limits(const BenchSettings& s) {
   };
   const auto stranger = std::find_if_not(s.limits.begin(), s.limits.end(), measured);
   if (stranger == s.limits.end()) return;
-  throw ParameterError("limits: '" + *stranger + "' is not measured: must be one of " + known);
+  ParameterError refusal("limits: '" + *stranger + "' is not measured: must be one of " + known);
+  refusal.field = "limits";
+  refusal.value = *stranger;
+  refusal.bound = "one of " + known;
+  throw refusal;
 }
 
 }  // namespace

@@ -78,7 +78,7 @@ constexpr std::array<double, 11> air_coefficient{0.0,   0.003, 0.008, 0.015, 0.0
 
 }  // namespace
 
-std::span<const Field<Throttle>> fields() noexcept {
+std::span<const Field<Throttle>, n_throttle_fields> fields() noexcept {
   return field_table;
 }
 Names<Friction> friction_names() noexcept {

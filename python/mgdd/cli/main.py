@@ -6,24 +6,19 @@ import argparse
 import io
 import logging
 import os
-import re
 import sys
 from collections.abc import Sequence
 
 from mgdd import _core
 from mgdd.cli import demo, doctor, engine, study, throttle
-from mgdd.cli.options import Parser, UsageError
+from mgdd.cli.options import Parser, UsageError, as_option
 from mgdd.cli.output import Stopped, fail
 from mgdd.cli.progress import Progress
-from mgdd.errors import ConvergenceError, Error
+from mgdd.errors import ConvergenceError, Error, arguments_written
 
 __all__ = ["main"]
 
 EXIT_OK, EXIT_BAD_INPUT, EXIT_NO_CONVERGENCE, EXIT_INTERRUPTED, EXIT_PIPE = 0, 2, 3, 130, 141
-_ARGUMENT = re.compile(
-    r"\b(pressure_unit|angle_unit|duty_unit|time_unit|decimal|delimiter|firing_tdc_deg|start_s|stop_s|step_s|duty|angle)"
-    r"=('[^']*'|[\d.]*)"
-)
 
 _EPILOG = """exit codes: 0 done, 2 bad input or usage, 3 no convergence or no feasible answer, 130 interrupted.
 
@@ -72,7 +67,7 @@ def main(argv: Sequence[str] | None = None) -> int:
         args.parser.print_help(sys.stderr)
         return EXIT_BAD_INPUT
     try:
-        with Progress(quiet=args.quiet) as args.progress:
+        with Progress(quiet=args.quiet) as args.progress, arguments_written(as_option):
             args.run(args)
     except ConvergenceError as error:
         print(f"mgdd: {error}", file=sys.stderr)
@@ -82,9 +77,8 @@ def main(argv: Sequence[str] | None = None) -> int:
         os.dup2(os.open(os.devnull, os.O_WRONLY), sys.stdout.fileno())  # the reader has left; nothing more to say
         return EXIT_PIPE
     except (Error, OSError) as error:
-        message = _as_options(str(error))
-        print(f"mgdd: error: {message}", file=sys.stderr)
-        fail(args, error, message)
+        print(f"mgdd: error: {error}", file=sys.stderr)
+        fail(args, error, str(error))
         return EXIT_BAD_INPUT
     except KeyboardInterrupt as error:
         kept = f"interrupted: {error if isinstance(error, Stopped) else 'nothing was kept'}"
@@ -92,13 +86,6 @@ def main(argv: Sequence[str] | None = None) -> int:
         fail(args, error, kept)
         return EXIT_INTERRUPTED
     return EXIT_OK
-
-
-def _as_options(message: str) -> str:
-    """Turn the remedies of the library, which name arguments, into those of the command line."""
-    message = message.replace("fit one side with two_sided=False", "leave --two-sided out for one side")
-    message = message.replace("angle_window_deg", "--angle-window-deg").replace("limp_home_deg =", "--limp-home-deg =")
-    return _ARGUMENT.sub(lambda m: f"--{m[1].replace('_', '-')} {m[2]}".rstrip(), message)
 
 
 def _parser() -> argparse.ArgumentParser:

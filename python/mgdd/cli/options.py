@@ -23,6 +23,7 @@ __all__ = [
     "add_engine",
     "add_files",
     "add_scheme",
+    "as_option",
     "engine_of",
     "number_pairs",
     "traces_of",
@@ -53,6 +54,14 @@ class Parser(argparse.ArgumentParser):
     def error(self, message: str) -> NoReturn:
         """Raise the message."""
         raise UsageError(message, self)
+
+
+def as_option(name: str, text: str | None = None) -> str:
+    """Write an argument of the library as the option that sets it."""
+    option = f"--{name.replace('_', '-')}"
+    if text == "False":
+        return f"{option} left out"
+    return f"{option} {text}" if text else option
 
 
 def add_command(
@@ -239,7 +248,7 @@ def _value(name: str, text: str) -> float | str:
         return float(text)
     except ValueError:
         if name in fields:
-            raise ParameterError(f"{name} = {text!r}: must be a number [{fields[name]['unit']}]") from None
+            raise ParameterError.of(name, text, f"a number [{fields[name]['unit']}]") from None
         return text
 
 

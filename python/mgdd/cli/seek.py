@@ -32,15 +32,9 @@ _LATE = ("extremum_seeking", "newton")
 _COV, _COV_CYCLES, _COV_TRIAL = "cov_imep_percent", 50, 1000
 _MOST_CYCLES = 2_000_000
 _ARRIVAL_CAD = 1.0
-# Fields that the library names in its messages, and the options that set them.
-_OPTIONS = {
-    "soc_scatter_cad = ": "--soc-scatter-cad ",
-    "efficiency_noise_percent = ": "--noise ",
-    "misfire_probability = ": "--misfire ",
-    "seed = ": "--seed ",
-    "start = ": "--start-cad ",
-    "limits: ": "--limit ",
-}
+# Fields of the library and the options that set them.
+_OPTIONS = {"efficiency_noise_percent": "--noise", "misfire_probability": "--misfire", "start": "--start-cad",
+            "limits": "--limit", "soc_scatter_cad": "--soc-scatter-cad", "seed": "--seed"}  # fmt: skip
 
 
 def add_seek(verbs: Any) -> None:
@@ -281,7 +275,8 @@ def _option_names() -> Iterator[None]:
     try:
         yield
     except (ParameterError, ConvergenceError) as error:
-        text = str(error)
-        for field, option in _OPTIONS.items():
-            text = text.replace(field, option) if text.startswith(field) else text
-        raise type(error)(text) from error
+        option = _OPTIONS.get(error.field or "")
+        if option is None:
+            raise
+        said = str(error).removeprefix(error.field or "").removeprefix(" =").removeprefix(":")
+        raise error.reworded(option + said) from error

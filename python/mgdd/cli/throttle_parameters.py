@@ -52,4 +52,4 @@ def _number(name: str, text: str, unit: str) -> float:
     try:
         return float(text)
     except ValueError:
-        raise ParameterError(f"{name} = {text!r}: must be a number [{unit}]") from None
+        raise ParameterError.of(name, text, f"a number [{unit}]") from None

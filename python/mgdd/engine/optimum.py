@@ -185,7 +185,7 @@ def _curvature(
 def check_request(objective: str, limits: Iterable[str]) -> None:
     """Refuse an unknown objective or limit before any work."""
     if objective not in OBJECTIVES:
-        raise ParameterError(f"objective = {objective!r}: must be one of {', '.join(OBJECTIVES)}")
+        raise ParameterError.of("objective", objective, f"one of {', '.join(OBJECTIVES)}")
     known = _core.indicator_units()
     for name in limits:
         if name not in known:

@@ -113,7 +113,7 @@ def analyze(
     point = _conditions(trace, point)
     window = heat_window_cad or ((cylinder.ivc_cad, cylinder.evo_cad) if simulated else (-10.0, 90.0))
     if fractions not in ("net", "gross"):
-        raise ParameterError(f"fractions = {fractions!r}: must be net or gross")
+        raise ParameterError.of("fractions", fractions, "net or gross")
     source, number, text = _gamma(gamma if gamma is not None else ("cylinder" if simulated else 1.33))
     inlet = point.intake_pressure_kpa if inlet_pressure_kpa is None else inlet_pressure_kpa
     options = _core.TraceOptions(
@@ -158,6 +158,6 @@ def _conditions(trace: xr.Dataset, point: OperatingPoint | None) -> OperatingPoi
 def _gamma(gamma: float | str) -> tuple[str, float, float | str]:
     if isinstance(gamma, str):
         if gamma not in ("split", "cylinder"):
-            raise ParameterError(f"gamma = {gamma!r}: must be a number, split or cylinder")
+            raise ParameterError.of("gamma", gamma, "a number, split or cylinder")
         return gamma, 1.33, gamma
     return "constant", float(gamma), float(gamma)

@@ -280,11 +280,11 @@ def fit_ode(
     if state.ndim != 1 or not np.isfinite(state).all():
         raise ShapeError("initial_state: must be a vector of finite numbers, one per state")
     if not 0 <= skip < time.size:
-        raise ParameterError(f"skip = {skip}: must be within [0, {time.size - 1}]")
+        raise ParameterError.of("skip", skip, f"within [0, {time.size - 1}]")
     if not (np.isfinite(sigma) and sigma > 0.0):
-        raise ParameterError(f"sigma = {sigma!r}: must be > 0")
+        raise ParameterError.of("sigma", sigma, "> 0")
     if substeps < 1:
-        raise ParameterError(f"substeps = {substeps}: must be >= 1")
+        raise ParameterError.of("substeps", substeps, ">= 1")
     names = list(parameters)
     chosen = names if free is None else [name for name in names if name in set(free)]
     free_states = [f"state_{i}" for i in free_state]
@@ -296,7 +296,7 @@ def fit_ode(
                     f"{name!r}: no parameter of this model; it has {', '.join([*names, *free_states])}"
                 )
     if any(not 0 <= i < state.size for i in free_state):
-        raise ParameterError(f"free_state = {list(free_state)}: must be indices of the {state.size} states")
+        raise ParameterError.of("free_state", list(free_state), f"indices of the {state.size} states")
     p0 = np.array([float(parameters[name]) for name in names])
     where = [names.index(name) for name in chosen]
     limits = [(bounds or {}).get(name, (-np.inf, np.inf)) for name in unknowns]

@@ -104,7 +104,7 @@ def aligned_angle(
 ) -> tuple[NDArray[np.intp], NDArray[np.float64]]:
     """Return the order that sorts a 0..720 record, and its angles in °CA aTDC (still unsorted)."""
     if not 0.0 <= firing_tdc_deg <= 720.0:
-        raise DataError(f"firing_tdc_deg = {firing_tdc_deg}: must be in [0, 720]")
+        raise DataError.of("firing_tdc_deg", firing_tdc_deg, "in [0, 720]")
     step = np.diff(angle_deg)
     if not np.all(step > 0.0):
         index = int(np.argmin(step > 0.0)) + 1

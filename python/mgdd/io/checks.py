@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from mgdd.errors import DataError
+from mgdd.errors import DataError, argument
 from mgdd.io.angles import CONVENTION, pair
 from mgdd.signals.even_grid import wide_steps
 
@@ -27,7 +27,6 @@ PEAK_BAR = (4.0, 500.0)
 FLOOR_BAR = 0.2
 # A four-stroke cycle is 4 pi = 12.57 rad.
 RADIAN_SPAN = 13.0
-_REMEDY_0_720 = "pass firing_tdc_deg= to read_pressure, or convert with mgdd.io.from_0_720"
 
 
 def check_trace(
@@ -107,21 +106,27 @@ def check_trace(
     return degrees, bar
 
 
+def _remedy_0_720() -> str:
+    return f"pass {argument('firing_tdc_deg', '')} to read_pressure, or convert with mgdd.io.from_0_720"
+
+
 def check_choice(name: str, value: object, allowed: tuple[str, ...]) -> None:
     """Refuse a keyword value outside its list, naming both."""
     if value not in allowed:
-        raise DataError(f"{name} = {value!r}: must be one of {', '.join(map(repr, allowed))}")
+        raise DataError.of(name, value, f"one of {', '.join(map(repr, allowed))}")
 
 
 def _check_span(degrees: NDArray[np.float64], angle_unit: str, source: str) -> None:
     span = float(np.ptp(degrees))
     if angle_unit == "deg" and 0.0 < span < RADIAN_SPAN:
         raise DataError(
-            f"{source}: crank angles span only {span:g} degrees: this looks like radians; pass angle_unit='rad'"
+            f"{source}: crank angles span only {span:g} degrees: this looks like radians; pass "
+            f"{argument('angle_unit', repr('rad'))}"
         )
     if angle_unit == "rad" and span > math.degrees(RADIAN_SPAN):
         raise DataError(
-            f"{source}: crank angles span {math.radians(span):g} rad: this looks like degrees; pass angle_unit='deg'"
+            f"{source}: crank angles span {math.radians(span):g} rad: this looks like degrees; pass "
+            f"{argument('angle_unit', repr('deg'))}"
         )
 
 
@@ -149,7 +154,7 @@ def _check_convention(degrees: NDArray[np.float64], source: str) -> None:
     if first < -360.5 or last > 360.5:
         raise DataError(
             f"{source}: crank angles run from {first:g} to {last:g}: this looks like a 0..720 record; "
-            f"{CONVENTION}; {_REMEDY_0_720}"
+            f"{CONVENTION}; {_remedy_0_720()}"
         )
 
 
@@ -173,7 +178,7 @@ def _check_unit(degrees: NDArray[np.float64], values: NDArray[np.float64], unit:
         other for other, per_bar in PRESSURE_UNITS.items() if other != unit and low <= peak / per_bar <= PEAK_BAR[1]
     ]
     if likely:
-        hint = " or ".join(f"pressure_unit={other!r}" for other in likely)
+        hint = " or ".join(argument("pressure_unit", repr(other)) for other in likely)
         remedy = f"this looks like {' or '.join(likely)}; pass {hint}"
     else:
         remedy = f"no unit of {', '.join(PRESSURE_UNITS)} fits a cylinder pressure; check column and scale"
@@ -189,5 +194,5 @@ def _check_peak(degrees: NDArray[np.float64], bar: NDArray[np.float64], source: 
     if np.ptp(degrees) >= 180.0 and bar[top] > 2.0 * near:
         raise DataError(
             f"{source}: the highest pressure {bar[top]:g} bar stands at {degrees[top]:g}, far from firing "
-            f"TDC: {CONVENTION}; {_REMEDY_0_720}"
+            f"TDC: {CONVENTION}; {_remedy_0_720()}"
         )

@@ -284,7 +284,7 @@ class Parameters:
         except ParameterError as error:
             if str(error).startswith(f"{file.origin}: "):
                 raise
-            raise ParameterError(f"{file.origin}: {error}") from error
+            raise error.reworded(f"{file.origin}: {error}") from error
 
 
 def _example(key: str, unit: str) -> str:

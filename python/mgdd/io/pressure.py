@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from mgdd.errors import DataError
+from mgdd.errors import DataError, argument
 from mgdd.io.angles import aligned_angle
 from mgdd.io.checks import ANGLE_UNITS, PRESSURE_UNITS, check_choice, check_trace
 from mgdd.io.table import read_table
@@ -129,8 +129,8 @@ def read_pressure(
         )
     if said and said != pressure_unit:
         raise DataError(
-            f"{table.source}: the units row says {said!r} for the pressure: pass pressure_unit={said!r} "
-            f"instead of {pressure_unit!r}"
+            f"{table.source}: the units row says {said!r} for the pressure: pass "
+            f"{argument('pressure_unit', repr(said))} instead of {pressure_unit!r}"
         )
     angle, pressure = table.numbers(angle_index), table.numbers(pressure_index)
     rows = list(table.lines)
@@ -139,7 +139,7 @@ def read_pressure(
         try:
             order, degrees = aligned_angle(degrees, firing_tdc_deg)
         except DataError as error:
-            raise DataError(f"{table.source}: {error}") from None
+            raise error.reworded(f"{table.source}: {error}") from None
         angle, pressure, rows = degrees[order], pressure[order], [rows[i] for i in order]
         angle_unit = "deg"
     angle, pressure = check_trace(

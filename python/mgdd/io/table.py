@@ -11,7 +11,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from mgdd.errors import DataError
+from mgdd.errors import DataError, argument
 
 if TYPE_CHECKING:
     import os
@@ -67,7 +67,7 @@ class TextTable:
             if number is None:
                 remedy = "correct it or start the line with #"
                 if "," in row[index] and self.decimal == ".":
-                    remedy = "pass decimal=',' if the comma is a decimal mark"
+                    remedy = f"pass {argument('decimal', repr(','))} if the comma is a decimal mark"
                 raise DataError(f"{where}: {row[index]!r} is not a number: {remedy}")
             if not np.isfinite(number):
                 raise DataError(f"{where}: {row[index]!r} is not finite: remove or repair it")
@@ -80,7 +80,7 @@ def read_table(
 ) -> TextTable:
     """Read a text table; `delimiter` None detects it from the first row that is not a comment."""
     if decimal not in (".", ","):
-        raise DataError(f"decimal = {decimal!r}: must be '.' or ','")
+        raise DataError.of("decimal", decimal, "'.' or ','")
     if delimiter is not None and delimiter in ("", decimal):
         raise DataError(f"delimiter = {delimiter!r}: must not be empty or the decimal mark {decimal!r}")
     file = Path(path)

@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from mgdd.errors import DataError, ParameterError
+from mgdd.errors import DataError, ParameterError, argument
 from mgdd.results import check_labels
 from mgdd.signals.even_grid import even_step, wide_steps
 
@@ -32,7 +32,6 @@ STILL_DUTY = 1e-3
 MANY_FALLS = 0.1
 GAP_WINDOW = 20
 SIDE_DEG, SIDE_S = 0.5, 0.1
-_WINDOW = "keep one part with start_s= or stop_s="
 
 
 @dataclass(frozen=True)
@@ -123,7 +122,7 @@ def check_finite(columns: Mapping[str, NDArray[np.float64]], place: Place) -> No
             at = int(bad[0])
             more = f" ({bad.size} such cells)" if bad.size > 1 else ""
             raise DataError(
-                f"{place.cell(at, name)}: {values[at]} is not finite{more}: repair it or cut the log; {_WINDOW}"
+                f"{place.cell(at, name)}: {values[at]} is not finite{more}: repair it or cut the log; {_window()}"
             )
 
 
@@ -149,7 +148,8 @@ def check_time(columns: Mapping[str, NDArray[np.float64]], place: Place) -> None
     wide, usual = wide_steps(time)
     if not STEP_S[0] <= usual <= STEP_S[1]:
         milliseconds = usual > STEP_S[1]
-        looks = "milliseconds; pass time_unit='ms'" if milliseconds else "seconds already; pass time_unit='s'"
+        unit = argument("time_unit", "'ms'" if milliseconds else "'s'")
+        looks = f"milliseconds; pass {unit}" if milliseconds else f"seconds already; pass {unit}"
         raise DataError(
             f"{place.source}, {column}: the usual step is {usual:g} s; a throttle needs {STEP_S[0]:g} to "
             f"{STEP_S[1]:g} s: this looks like {looks}"
@@ -160,8 +160,8 @@ def check_time(columns: Mapping[str, NDArray[np.float64]], place: Place) -> None
         missing = round(step[at - 1] / usual) - 1
         raise DataError(
             f"{place.cell(at, 'time_s')}: gap from {time[at - 1]:.6g} to {time[at]:.6g} s where the usual step is "
-            f"{usual:.3g} s, about {max(missing, 1)} sample(s) missing: pass stop_s={time[at - 1]:.6g} or "
-            f"start_s={time[at]:.6g} to keep one side"
+            f"{usual:.3g} s, about {max(missing, 1)} sample(s) missing: pass "
+            f"{argument('stop_s', f'{time[at - 1]:.6g}')} or {argument('start_s', f'{time[at]:.6g}')} to keep one side"
         )
     if time[-1] - time[0] < MIN_DURATION_S:
         raise DataError(
@@ -188,17 +188,19 @@ def _check_time_exchanged(columns: Mapping[str, NDArray[np.float64]], place: Pla
         if name != "time_s" and np.all(np.diff(values) > 0.0):
             option = name.partition("_")[0]
             raise DataError(
-                f"{what}, and {place.column(name)} rises throughout: the columns look exchanged; exchange time= and "
-                f"{option}="
+                f"{what}, and {place.column(name)} rises throughout: the columns look exchanged; exchange "
+                f"{argument('time', '')} and {argument(option, '')}"
             )
     raise DataError(
-        f"{what}: columns exchanged? check time=, duty= and angle=; if they are right, sort the rows by time"
+        f"{what}: columns exchanged? check {argument('time', '')}, {argument('duty', '')} and {argument('angle', '')}; "
+        "if they are right, sort the rows by time"
     )
 
 
 def check_even(time: NDArray[np.float64], place: Place) -> None:
     """Refuse uneven sampling: the models step evenly."""
-    even_step(time, where=lambda at: place.cell(at, "time_s"), remedy="pass step_s={step:g} to resample")
+    remedy = f"pass {argument('step_s', '{step:g}')} to resample"
+    even_step(time, where=lambda at: place.cell(at, "time_s"), remedy=remedy)
 
 
 def check_signals(
@@ -229,9 +231,10 @@ def _check_exchanged(duty: NDArray[np.float64], angle: NDArray[np.float64], duty
     like_angle = np.ptp(duty) > STILL_DEG and duty.min() > -5.0 and 3.0 < duty.max() <= 100.5
     like_duty = np.abs(angle).max() <= 1.0 and np.ptp(angle) > 1e-3
     if duty_unit == "-" and like_angle and like_duty:
-        hint = "exchange duty= and angle="
+        hint = _exchange()
         if angle.min() > -0.1:
-            hint += ", or, if they are right, pass duty_unit='%' and angle_unit='rad'"
+            percent, radians = argument("duty_unit", "'%'"), argument("angle_unit", "'rad'")
+            hint += f", or, if they are right, pass {percent} and {radians}"
         raise DataError(
             f"{place.cell(top, 'duty')}: {duty[top]:g} beside angles within {angle.min():.3g} to {angle.max():.3g}: "
             f"the columns look exchanged; {hint}"
@@ -240,7 +243,7 @@ def _check_exchanged(duty: NDArray[np.float64], angle: NDArray[np.float64], duty
     if duty_unit == "%" and angle.min() < ANGLE_DEG[0] and angle.max() <= 100.0 and duty.min() > -5.0:
         raise DataError(
             f"{place.cell(lowest, 'angle_deg')}: {angle[lowest]:g} is not an opening, and the duty never pulls closed: "
-            "the columns look exchanged; exchange duty= and angle="
+            f"the columns look exchanged; {_exchange()}"
         )
 
 
@@ -251,7 +254,7 @@ def _check_duty(duty: NDArray[np.float64], unit: str, place: Place) -> None:
         if 0.0 < largest <= 1.0:
             raise DataError(
                 f"{place.cell(top, 'duty')}: the largest duty is {largest:g} %: this looks like a fraction; "
-                "pass duty_unit='-'"
+                f"pass {argument('duty_unit', repr('-'))}"
             )
         limit = 100.0
     else:
@@ -261,7 +264,7 @@ def _check_duty(duty: NDArray[np.float64], unit: str, place: Place) -> None:
     at = int(np.argmax(np.abs(duty) > limit * (1.0 + 1e-9)))
     remedy = "convert it to -1 to 1 first (volts: divide by the supply)"
     if unit == "-" and 3.0 < largest <= 100.0:
-        remedy = "this looks like percent; pass duty_unit='%'"
+        remedy = f"this looks like percent; pass {argument('duty_unit', repr('%'))}"
     elif largest <= 1.05 * limit:
         remedy = "the driver cuts there: clip it"
     raise DataError(f"{place.cell(at, 'duty')}: duty {duty[at]:g} is beyond ±{limit:g}: {remedy}")
@@ -271,19 +274,20 @@ def _check_angle(angle: NDArray[np.float64], raw: NDArray[np.float64], unit: str
     top, lowest = int(np.argmax(raw)), int(np.argmin(raw))
     span = float(np.ptp(angle))
     if unit == "deg" and np.ptp(raw) > 0.01 and np.abs(raw).max() <= RADIANS:
-        remedy = "this looks like radians; pass angle_unit='rad'"
+        remedy = f"this looks like radians; pass {argument('angle_unit', repr('rad'))}"
         if raw[lowest] >= -0.1 and raw[top] <= 1.1:
-            remedy += "; or like a fraction of the travel; multiply it by 100 and pass angle_unit='%'"
+            percent = argument("angle_unit", "'%'")
+            remedy += f"; or like a fraction of the travel; multiply it by 100 and pass {percent}"
         raise DataError(f"{place.cell(top, 'angle_deg')}: the highest angle is {raw[top]:.4g} deg: {remedy}")
     if unit == "rad" and raw[top] > RADIANS:
         raise DataError(
             f"{place.cell(top, 'angle_deg')}: the highest angle is {raw[top]:.4g} rad, "
-            f"{math.degrees(raw[top]):.0f} deg: this looks like degrees; pass angle_unit='deg'"
+            f"{math.degrees(raw[top]):.0f} deg: this looks like degrees; pass {argument('angle_unit', repr('deg'))}"
         )
     if angle[top] > ANGLE_DEG[1]:
         remedy = "convert it to degrees of the plate first"
         if unit == "deg" and raw[top] <= 105.0:
-            remedy = "this looks like percent of travel; pass angle_unit='%'"
+            remedy = f"this looks like percent of travel; pass {argument('angle_unit', repr('%'))}"
         raise DataError(
             f"{place.cell(top, 'angle_deg')}: the highest angle is {angle[top]:.4g} deg, beyond "
             f"{ANGLE_DEG[1]:g}: {remedy}"
@@ -291,7 +295,7 @@ def _check_angle(angle: NDArray[np.float64], raw: NDArray[np.float64], unit: str
     if angle[lowest] < ANGLE_DEG[0]:
         raise DataError(
             f"{place.cell(lowest, 'angle_deg')}: the lowest angle is {angle[lowest]:.4g} deg, below {ANGLE_DEG[0]:g}: "
-            "count from the closed plate, opening positive; if this is the duty, exchange duty= and angle="
+            f"count from the closed plate, opening positive; if this is the duty, {_exchange()}"
         )
     if span < STILL_DEG:
         raise DataError(
@@ -300,11 +304,19 @@ def _check_angle(angle: NDArray[np.float64], raw: NDArray[np.float64], unit: str
         )
 
 
+def _window() -> str:
+    return f"keep one part with {argument('start_s', '')} or {argument('stop_s', '')}"
+
+
+def _exchange() -> str:
+    return f"exchange {argument('duty', '')} and {argument('angle', '')}"
+
+
 def _check_sides(
     time: NDArray[np.float64], angle: NDArray[np.float64], limp_home_deg: float | None, place: Place
 ) -> None:
     if limp_home_deg is None:
-        raise ParameterError("limp_home_deg = None: a two-sided check needs the limp-home angle [deg]")
+        raise ParameterError(f"{argument('limp_home_deg')} = None: a two-sided check needs the limp-home angle [deg]")
     step = even_step(time)
     for side, inside, extreme in (
         ("below", angle < limp_home_deg - SIDE_DEG, int(np.argmin(angle))),
@@ -317,5 +329,6 @@ def _check_sides(
             raise DataError(
                 f"{place.cell(extreme, 'angle_deg')}: {spent:.2g} s {side} limp-home ({limp_home_deg:g} deg; the {end} "
                 f"angle is {angle[extreme]:.4g} deg): a two-sided fit needs both sides; add {sign} duty until "
-                "the plate crosses (mgdd.identify.design_excitation), or fit one side with two_sided=False"
+                "the plate crosses (mgdd.identify.design_excitation), or fit one side with "
+                f"{argument('two_sided', 'False')}"
             )

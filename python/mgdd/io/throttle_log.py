@@ -170,7 +170,7 @@ def read_throttle_log(
     check_choice("duty_unit", duty_unit, _DUTY_UNITS)
     check_choice("angle_unit", angle_unit, _ANGLE_UNITS)
     if not 0.0 < travel_deg <= 95.0:
-        raise ParameterError(f"travel_deg = {travel_deg:g}: must be in (0, 95]")
+        raise ParameterError.of("travel_deg", travel_deg, "in (0, 95]")
     wanted = {"time_s": time, "duty": duty, "angle_deg": angle, "current_a": current, "supply_v": supply}
     columns, place = _read(path, wanted, delimiter=delimiter, decimal=decimal)
     scales = {"time_s": 1.0 / _TIME_UNITS[time_unit], "duty": 0.01 if duty_unit == "%" else 1.0}
@@ -316,7 +316,7 @@ def _resampled(
 ) -> tuple[dict[str, NDArray[np.float64]], Place]:
     time = columns["time_s"]
     if not 0.0 < step_s <= 0.1:
-        raise ParameterError(f"step_s = {step_s:g}: must be in (0, 0.1] s")
+        raise ParameterError.of("step_s", step_s, "in (0, 0.1] s")
     even = time[0] + step_s * np.arange(math.floor((time[-1] - time[0]) / step_s * (1.0 + 1e-12)) + 1)
     held = np.clip(np.searchsorted(time, even + 1e-9 * step_s, side="right") - 1, 0, time.size - 1)
     out = {key: np.interp(even, time, values) for key, values in columns.items()}

@@ -114,9 +114,9 @@ class EngineBench(_core.EngineBench):
         if schedule is not None and point is not None:
             raise ParameterError("point and schedule were both given: name the operating points in one of them")
         if isinstance(limits, str):
-            raise ParameterError(f"limits = {limits!r}: must be a sequence of names")
+            raise ParameterError.of("limits", limits, "a sequence of names")
         if not 0 <= seed < 2**64:
-            raise ParameterError(f"seed = {seed}: must be in [0, 2**64)")
+            raise ParameterError.of("seed", seed, "in [0, 2**64)")
         if isinstance(engine, str):
             engine = presets.load(engine, kind="engine")
         if isinstance(engine, Preset):

@@ -55,13 +55,13 @@ class LoopCriteria:
     def __post_init__(self) -> None:
         number = isinstance(self.optimum, int | float) and math.isfinite(self.optimum)
         if self.optimum is not None and not number:
-            raise ParameterError(f"optimum = {self.optimum!r}: must be one finite number, or None")
+            raise ParameterError.of("optimum", self.optimum, "one finite number, or None")
         if not self.arrival > 0.0:
-            raise ParameterError(f"arrival = {self.arrival:g}: must be > 0")
+            raise ParameterError.of("arrival", self.arrival, "> 0")
         if self.tail_cycles < 1:
-            raise ParameterError(f"tail_cycles = {self.tail_cycles}: must be >= 1")
+            raise ParameterError.of("tail_cycles", self.tail_cycles, ">= 1")
         if self.exceed_from is not None and self.exceed_from < 0:
-            raise ParameterError(f"exceed_from = {self.exceed_from}: must be >= 0")
+            raise ParameterError.of("exceed_from", self.exceed_from, ">= 0")
         for name, value in self.exceed_above.items():
             if math.isnan(value):
                 raise ParameterError(f"exceed_above: {name} = nan: give a number, or leave it out")
@@ -101,7 +101,7 @@ class LoopCriteria:
             ``exceed_from`` is not below ``cycles``.
         """
         if self.exceed_above and self.exceed_from is not None and self.exceed_from >= cycles:
-            raise ParameterError(f"exceed_from = {self.exceed_from}: must be < cycles = {cycles}, or no cycle counts")
+            raise ParameterError.of("exceed_from", self.exceed_from, f"< cycles = {cycles}, or no cycle counts")
 
     def thresholds(self, names: tuple[str, ...]) -> list[float]:
         """Give ``exceed_above`` in the order of the limits, infinite where it has none; empty if it is empty.

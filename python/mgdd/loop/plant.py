@@ -139,5 +139,5 @@ def checked_inputs(inputs: Mapping[str, float], names: tuple[str, ...]) -> tuple
         raise ParameterError(f"inputs = {', '.join(map(str, inputs)) or 'none'}: must be {', '.join(names)}")
     for name in names:
         if not math.isfinite(inputs[name]):
-            raise ParameterError(f"{name} = {inputs[name]}: must be finite")
+            raise ParameterError.of(name, inputs[name], "finite")
     return tuple(float(inputs[name]) for name in names)

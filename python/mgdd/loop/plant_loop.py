@@ -72,7 +72,7 @@ class LoopRun:
 def steer(plant: Plant, seeker: Any, cycles: int, criteria: LoopCriteria) -> LoopRun:
     """Run the loop of `mgdd.loop.run_seeker` from Python."""
     if cycles < 1:
-        raise ParameterError(f"cycles = {cycles}: must be >= 1")
+        raise ParameterError.of("cycles", cycles, ">= 1")
     if not isinstance(plant, Plant):
         raise ParameterError(f"plant = {plant!r}: must have input_names, limit_names, apply() and measure()")
     if seeker.estimate.size != len(plant.input_names):

@@ -117,7 +117,7 @@ def find_steady_optimum(
     check_request(OBJECTIVES[0], [limit.name for limit in kept_limits])
     caps = {limit.name: limit.upper - limit.margin for limit in kept_limits}
     if cycle < 0:
-        raise ParameterError(f"cycle = {cycle}: must be >= 0")
+        raise ParameterError.of("cycle", cycle, ">= 0")
     quiet = _quiet(bench, cycle)
     low, high = bounds_cad
     window = quiet.window_cad

@@ -68,9 +68,9 @@ class VirtualThrottle:
         seed: int = 0,
     ) -> None:
         if not inputs or len(set(inputs)) < len(inputs) or not set(inputs) <= set(_INPUTS):
-            raise ParameterError(f"inputs = {list(inputs)}: must be some of {', '.join(_INPUTS)}, once each")
+            raise ParameterError.of("inputs", list(inputs), f"some of {', '.join(_INPUTS)}, once each")
         if not 0 <= seed < 2**64:
-            raise ParameterError(f"seed = {seed}: must be in [0, 2**64)")
+            raise ParameterError.of("seed", seed, "in [0, 2**64)")
         self.throttle = Throttle() if throttle is None else throttle
         self.sample_s = sample_s
         self._inputs = tuple(inputs)

@@ -45,9 +45,9 @@ class FitOptions:
         for name, least in (("n_starts", 1), ("seed", 0), ("max_iterations", 1)):
             value = getattr(self, name)
             if value is not None and not value >= least:
-                raise ParameterError(f"{name} = {value!r}: must be >= {least}")
+                raise ParameterError.of(name, value, f">= {least}")
         if self.tolerance is not None and not self.tolerance > 0.0:
-            raise ParameterError(f"tolerance = {self.tolerance!r}: must be > 0")
+            raise ParameterError.of("tolerance", self.tolerance, "> 0")
 
 
 @dataclass(frozen=True, kw_only=True)

@@ -358,5 +358,5 @@ def _column(value: ArrayLike, name: str) -> NDArray[np.float64]:
     try:
         column = np.array(value, dtype=np.float64)
     except (TypeError, ValueError) as error:
-        raise ParameterError(f"{name} = {value!r}: must be one column of numbers") from error
+        raise ParameterError.of(name, value, "one column of numbers") from error
     return column

@@ -101,7 +101,7 @@ def least_squares(
     if names is None:
         names = [f"x{i}" for i in range(n)]
     elif isinstance(names, str) or len(names) != n:
-        raise ShapeError(f"names = {names!r}: must be {n} names, one per value of x0")
+        raise ShapeError.of("names", names, f"{n} names, one per value of x0")
     lowers = _per_parameter(-np.inf if lower is None else lower, "lower", n)
     uppers = _per_parameter(np.inf if upper is None else upper, "upper", n)
     logs = _per_parameter(False if log_scaled is None else log_scaled, "log_scaled", n)
@@ -126,7 +126,7 @@ def _vector(value: ArrayLike, name: str) -> NDArray[np.float64]:
     try:
         vector = np.array(value, dtype=np.float64)
     except (TypeError, ValueError) as error:
-        raise ParameterError(f"{name} = {value!r}: must be numbers") from error
+        raise ParameterError.of(name, value, "numbers") from error
     if vector.ndim != 1:
         raise ShapeError(f"{name} has {vector.ndim} dimensions: must have 1")
     return vector

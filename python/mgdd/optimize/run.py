@@ -104,7 +104,7 @@ def maximize(
     3.0
     """
     if cycles < 0:
-        raise ParameterError(f"cycles = {cycles}: must be >= 0")
+        raise ParameterError.of("cycles", cycles, ">= 0")
     try:
         for _ in range(cycles):
             answer = fun(seeker.ask())

@@ -266,7 +266,7 @@ def _load(text: str, kind: str | None) -> Preset:
 
 def _check_kind(kind: str | None) -> None:
     if kind is not None and kind not in _OF_KIND:
-        raise ParameterError(f"kind = {kind!r}: must be one of {', '.join(_OF_KIND)}")
+        raise ParameterError.of("kind", kind, f"one of {', '.join(_OF_KIND)}")
 
 
 def _wrong_kind(name: str, kind: str, wanted: str) -> str:

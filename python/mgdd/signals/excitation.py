@@ -122,9 +122,8 @@ def multisine(
     _check_band(fundamental_hz, high_hz, step_s)
     odd = np.arange(1, math.floor(high_hz / fundamental_hz * (1.0 + 1e-12)) + 1, 2)
     if not 1 <= harmonics <= odd.size:
-        raise ParameterError(
-            f"harmonics = {harmonics}: must be in [1, {odd.size}], the odd ones of {fundamental_hz:g} Hz up to "
-            f"{high_hz:g} Hz"
+        raise ParameterError.of(
+            "harmonics", harmonics, f"in [1, {odd.size}], the odd ones of {fundamental_hz:g} Hz up to {high_hz:g} Hz"
         )
     if duration_s * fundamental_hz < 1.0 - 1e-9:
         raise ParameterError(
@@ -188,7 +187,7 @@ def prbs(
     (3100, [-0.05, 0.35])
     """
     if register not in _TAPS:
-        raise ParameterError(f"register = {register}: must be in [3, 16]")
+        raise ParameterError.of("register", register, "in [3, 16]")
     held = _hold(hold_s, step_s)
     bits = maximum_length_sequence(register)
     time = _time(bits.size * held * step_s if duration_s is None else duration_s, step_s)
@@ -254,7 +253,7 @@ def amplitude_random_steps(
         levels, holds = 2.0 * np.mod(_GOLDEN * np.arange(count), 1.0) - 1.0, np.full(count, least)
     else:
         if isinstance(seed, bool) or not isinstance(seed, int | np.integer) or seed < 0:
-            raise ParameterError(f"seed = {seed!r}: must be a whole number >= 0")
+            raise ParameterError.of("seed", seed, "a whole number >= 0")
         rng = np.random.default_rng(seed)
         levels, holds = rng.uniform(-1.0, 1.0, count), rng.integers(least, most + 1, count)
     wave = np.repeat(levels, holds)[: time.size]
@@ -307,9 +306,9 @@ def staircase(
     _check_swing(offset, amplitude)
     held = _hold(hold_s, step_s)
     if not (math.isfinite(rise) and rise > 0.0):
-        raise ParameterError(f"rise = {rise:g}: must be > 0")
+        raise ParameterError.of("rise", rise, "> 0")
     if cycles < 1:
-        raise ParameterError(f"cycles = {cycles}: must be >= 1")
+        raise ParameterError.of("cycles", cycles, ">= 1")
     count = max(math.ceil(2.0 * amplitude / rise * (1.0 - 1e-9)), 1)
     up = np.linspace(-1.0, 1.0, count + 1)
     levels = np.r_[up, np.tile(np.r_[up[-2::-1], up[1:]], cycles - 1), up[-2::-1]]
@@ -372,9 +371,9 @@ def maximum_length_sequence(register: int) -> NDArray[np.int_]:
 
 def _time(duration_s: float, step_s: float) -> NDArray[np.float64]:
     if not (math.isfinite(step_s) and step_s > 0.0):
-        raise ParameterError(f"step_s = {step_s:g}: must be finite and > 0")
+        raise ParameterError.of("step_s", step_s, "finite and > 0")
     if not (math.isfinite(duration_s) and duration_s >= 2.0 * step_s):
-        raise ParameterError(f"duration_s = {duration_s:g}: must be finite and at least two samples of {step_s:g} s")
+        raise ParameterError.of("duration_s", duration_s, f"finite and at least two samples of {step_s:g} s")
     if duration_s / step_s > _MOST_SAMPLES:
         raise ParameterError(f"duration_s = {duration_s:g}: {_MOST_SAMPLES} samples of {step_s:g} s are the most")
     return np.arange(round(duration_s / step_s), dtype=np.float64) * step_s
@@ -382,7 +381,7 @@ def _time(duration_s: float, step_s: float) -> NDArray[np.float64]:
 
 def _hold(hold_s: float, step_s: float) -> int:
     if not (step_s > 0.0 and math.isfinite(hold_s) and hold_s >= step_s * (1.0 - 1e-9)):
-        raise ParameterError(f"hold_s = {hold_s:g}: must be at least one sample, step_s = {step_s:g}")
+        raise ParameterError.of("hold_s", hold_s, f"at least one sample, step_s = {step_s:g}")
     return max(round(hold_s / step_s), 1)
 
 
@@ -391,9 +390,8 @@ def _check_band(low_hz: float, high_hz: float, step_s: float) -> None:
     if not 0.0 <= low_hz <= high_hz or not high_hz > 0.0:
         raise ParameterError(f"low_hz = {low_hz:g}, high_hz = {high_hz:g}: must be 0 <= low <= high, high > 0")
     if high_hz >= nyquist:
-        raise ParameterError(
-            f"high_hz = {high_hz:g}: must be below half the sampling rate, {nyquist:g} Hz; lower it or step_s = "
-            f"{step_s:g}"
+        raise ParameterError.of(
+            "high_hz", high_hz, f"below half the sampling rate, {nyquist:g} Hz; lower it or step_s = {step_s:g}"
         )
 
 

@@ -215,7 +215,7 @@ def residual_tests(residual: ArrayLike, duty: ArrayLike, *, lags: int = 25) -> R
     (True, 0.031)
     """
     if lags < 1:
-        raise ParameterError(f"lags = {lags}: must be >= 1")
+        raise ParameterError.of("lags", lags, ">= 1")
     e, u = _pair(residual, duty)
     if e.ndim != 1 or e.size < 4 * lags:
         raise DataError(f"residual has shape {e.shape}: {4 * lags} samples in one dimension are needed for {lags} lags")

@@ -160,4 +160,4 @@ def columns_of(table: Any, names: Sequence[str]) -> list[NDArray[np.float64]]:
 def check_horizon(horizon: int, size: int) -> None:
     """Refuse a horizon that does not fit into a record."""
     if not 1 <= horizon < size:
-        raise ParameterError(f"horizon = {horizon}: must be in [1, {size - 1}], below the samples of the record")
+        raise ParameterError.of("horizon", horizon, f"in [1, {size - 1}], below the samples of the record")

@@ -78,7 +78,7 @@ described(
 def check_seeds(seeds: int) -> int:
     """Refuse a number of seeds that is none."""
     if seeds < 1:
-        raise ParameterError(f"seeds = {seeds}: must be >= 1")
+        raise ParameterError.of("seeds", seeds, ">= 1")
     return seeds
 
 

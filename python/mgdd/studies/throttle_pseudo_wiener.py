@@ -78,7 +78,7 @@ def run_throttle_pseudo_wiener(
     ('pw_r', True)
     """
     if starts < 1:
-        raise ParameterError(f"starts = {starts}: must be >= 1")
+        raise ParameterError.of("starts", starts, ">= 1")
     count = min(starts, 6) if quick else starts
     cases = [(kind, "rest") for kind in KINDS] + [("pw_w", "best"), ("pw_p", "best")]
     parts = [

@@ -75,9 +75,9 @@ class SurrogateEngine:
         outside: str = "flag",
     ) -> None:
         if outside not in ("flag", "raise"):
-            raise ParameterError(f"outside = {outside!r}: must be 'flag' or 'raise'")
+            raise ParameterError.of("outside", outside, "'flag' or 'raise'")
         if block_cycles < 1:
-            raise ParameterError(f"block_cycles = {block_cycles}: must be >= 1")
+            raise ParameterError.of("block_cycles", block_cycles, ">= 1")
         self.surrogate = surrogate
         self._at = dict(at or {})
         self._outside = outside

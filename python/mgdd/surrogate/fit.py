@@ -217,10 +217,10 @@ def _check_request(
     if unknown:
         raise ParameterError(f"slow: {unknown[0]!r} is not an output: must be one of {', '.join(outputs)}")
     if max_lag < 0:
-        raise ParameterError(f"max_lag = {max_lag}: must be >= 0")
+        raise ParameterError.of("max_lag", max_lag, ">= 0")
     for what, share in (("held_out", held_out), ("box", box)):
         if not 0.0 < share < 1.0:
-            raise ParameterError(f"{what} = {share:g}: must be in (0, 1)")
+            raise ParameterError.of(what, share, "in (0, 1)")
 
 
 def _read(

@@ -71,9 +71,9 @@ def random_step_records(cycles: int = 4000, *, seed: int = 0, noise: float = 1.0
     ('cycle',)
     """
     if cycles < 10:
-        raise ParameterError(f"cycles = {cycles}: must be >= 10")
+        raise ParameterError.of("cycles", cycles, ">= 10")
     if not 0.0 <= noise < np.inf:
-        raise ParameterError(f"noise = {noise:g}: must be finite and >= 0")
+        raise ParameterError.of("noise", noise, "finite and >= 0")
     generator = np.random.default_rng(seed)
     holds = generator.integers(1, 31, size=cycles)
     which = np.repeat(np.arange(cycles), holds)[:cycles]

@@ -111,7 +111,7 @@ class EngineSurrogate(Parameters):
         [True, True, False]
         """
         if outside not in ("flag", "raise"):
-            raise ParameterError(f"outside = {outside!r}: must be 'flag' or 'raise'")
+            raise ParameterError.of("outside", outside, "'flag' or 'raise'")
         soi = np.atleast_1d(np.asarray(soi_cad, dtype=np.float64))
         points = self.points(soi, at)
         values, supported = self.evaluate(points)

@@ -158,7 +158,7 @@ def linear_part(throttle: Throttle, *, side: str = "above") -> xr.Dataset:
     [-0.83, -49.929]
     """
     if side not in ("above", "below"):
-        raise ParameterError(f"side = {side!r}: must be 'above' or 'below'")
+        raise ParameterError.of("side", side, "'above' or 'below'")
     spring = throttle.spring_above_nm_per_rad if side == "above" else throttle.spring_below_nm_per_rad
     inertia, damping = throttle.inertia_kgm2, throttle.damping_nms_per_rad
     poles = np.asarray(np.roots([inertia, damping, spring]), dtype=np.complex128)
@@ -257,11 +257,11 @@ def mass_flow_kg_per_s(
     for name, values in (("area_m2", area), ("pressure_drop_kpa", drop)):
         bad = ~(np.isfinite(values) & (values >= 0.0))
         if bad.any():
-            raise ParameterError(f"{name} = {values[bad].flat[0]:g}: must be finite and >= 0")
+            raise ParameterError.of(name, values[bad].flat[0], "finite and >= 0")
     if not 0.0 < discharge_coefficient <= 1.5:
-        raise ParameterError(f"discharge_coefficient = {discharge_coefficient:g}: must be > 0 and <= 1.5")
+        raise ParameterError.of("discharge_coefficient", discharge_coefficient, "> 0 and <= 1.5")
     if not (math.isfinite(density_kg_per_m3) and density_kg_per_m3 > 0.0):
-        raise ParameterError(f"density_kg_per_m3 = {density_kg_per_m3:g}: must be > 0 and finite")
+        raise ParameterError.of("density_kg_per_m3", density_kg_per_m3, "> 0 and finite")
     return np.asarray(discharge_coefficient * area * np.sqrt(2.0 * density_kg_per_m3 * 1e3 * drop))
 
 

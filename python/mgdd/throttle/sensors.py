@@ -85,9 +85,9 @@ class SensorFault:
         """Refuse what cannot be."""
         kinds = [kind for kind in _core.sensor_fault_kinds if kind != "none"]
         if self.kind not in kinds:
-            raise ParameterError(f"kind = {self.kind!r}: must be one of {', '.join(kinds)}")
+            raise ParameterError.of("kind", self.kind, f"one of {', '.join(kinds)}")
         if self.sensor not in (1, 2):
-            raise ParameterError(f"sensor = {self.sensor}: must be 1 or 2")
+            raise ParameterError.of("sensor", self.sensor, "1 or 2")
         if (self.kind in ("offset", "gain")) != (self.size != 0.0):
             raise ParameterError(f"size = {self.size:g}: goes with kind 'offset' [V] or 'gain' [-], which need it")
 
@@ -143,7 +143,7 @@ def sense(
         if name not in run.variables:
             raise DataError(f"run has no variable {name!r}: mgdd.throttle.simulate makes it")
     if seed < 0:
-        raise ParameterError(f"seed = {seed}: must be >= 0")
+        raise ParameterError.of("seed", seed, ">= 0")
     time = run["time_s"].to_numpy()
     sample = even_step(time)
     raw = _core.sense_throttle(

@@ -10,6 +10,7 @@
 #include <string>
 #include <string_view>
 
+#include "mgdd/common/enum_names.hpp"
 #include "mgdd/common/field.hpp"
 #include "mgdd/math/dual.hpp"
 
@@ -219,6 +220,10 @@ inline constexpr double timing_lower_cad = -60.0;
 inline constexpr double timing_upper_cad = 20.0;
 
 /// Names of the variants as the field types them, and back; an unknown name is a ParameterError listing the valid ones.
+Names<GammaModel> gamma_model_names() noexcept;
+Names<BurnShape> burn_shape_names() noexcept;
+Names<WallHeatModel> wall_heat_model_names() noexcept;
+Names<IgnitionModel> ignition_model_names() noexcept;
 std::string_view to_string(GammaModel v) noexcept;
 std::string_view to_string(BurnShape v) noexcept;
 std::string_view to_string(WallHeatModel v) noexcept;

@@ -5,6 +5,7 @@
 #pragma once
 
 #include <array>
+#include <cstddef>
 #include <span>
 #include <string_view>
 #include <utility>
@@ -93,7 +94,8 @@ struct Throttle {
 };
 
 /// All numbers of a throttle, in the order of the struct.
-std::span<const Field<Throttle>> fields() noexcept;
+inline constexpr std::size_t n_throttle_fields = 34;
+std::span<const Field<Throttle>, n_throttle_fields> fields() noexcept;
 
 Names<Friction> friction_names() noexcept;
 Names<Backlash> backlash_names() noexcept;

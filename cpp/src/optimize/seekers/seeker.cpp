@@ -29,8 +29,8 @@ void validate_entries(std::string_view name, const Inputs& values, Eigen::Index 
   }
   for (Eigen::Index i = 0; i < inputs; ++i) {
     if (!(values[i] > lower && values[i] <= upper)) {
-      throw ParameterError(entry(name, i, inputs) + " = " + text(values[i]) + ": must be > " + text(lower) +
-                           (upper < unlimited ? " and <= " + text(upper) : std::string()));
+      throw ParameterError(entry(name, i, inputs), values[i],
+                           "must be > " + text(lower) + (upper < unlimited ? " and <= " + text(upper) : std::string()));
     }
   }
 }
@@ -46,22 +46,22 @@ void validate(const SearchSpace& space, const Inputs& reach) {
   }
   for (Eigen::Index i = 0; i < n; ++i) {
     if (!std::isfinite(space.start[i])) {
-      throw ParameterError(entry("start", i, n) + " = " + text(space.start[i]) + ": must be finite");
+      throw ParameterError(entry("start", i, n), space.start[i], "must be finite");
     }
     if (!(space.lower[i] < space.upper[i])) {
-      throw ParameterError(entry("lower", i, n) + " = " + text(space.lower[i]) +
-                           ": must be < upper = " + text(space.upper[i]));
+      throw ParameterError(entry("lower", i, n), space.lower[i], "must be < upper = " + text(space.upper[i]));
     }
     const double low = space.lower[i] + reach[i];
     const double high = space.upper[i] - reach[i];
     if (!(low <= high)) {
-      throw ParameterError(entry("upper", i, n) + " = " + text(space.upper[i]) + ": must be at least " +
-                           text(2.0 * reach[i]) + " above lower = " + text(space.lower[i]) +
-                           ", room for the perturbation on both sides");
+      throw ParameterError(entry("upper", i, n), space.upper[i],
+                           "must be at least " + text(2.0 * reach[i]) + " above lower = " + text(space.lower[i]) +
+                               ", room for the perturbation on both sides");
     }
     if (!(space.start[i] >= low && space.start[i] <= high)) {
-      throw ParameterError(entry("start", i, n) + " = " + text(space.start[i]) + ": must lie in [" + text(low) + ", " +
-                           text(high) + "], the bounds less the perturbation; move start or widen the bounds");
+      throw ParameterError(entry("start", i, n), space.start[i],
+                           "must lie in [" + text(low) + ", " + text(high) +
+                               "], the bounds less the perturbation; move start or widen the bounds");
     }
   }
 }

@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from mgdd.errors import ParameterError
+from mgdd.errors import ParameterError, argument
 from mgdd.identify.throttle.prior import prior_of
 from mgdd.identify.throttle.record_content import RecordContent, open_questions, record_content
 from mgdd.results import Finding, labelled_dataset
@@ -187,10 +187,11 @@ def _signal_of(excitation: xr.Dataset) -> tuple[np.ndarray, np.ndarray]:
 def _check_limits(window: tuple[float, float], max_rate_deg_per_s: float | None, max_current_a: float | None) -> None:
     low, high = window
     if not low < high:
-        raise ParameterError(f"angle_window_deg = ({low:g}, {high:g}): the first must be below the second")
+        named = argument("angle_window_deg")
+        raise ParameterError(f"{named} = ({low:g}, {high:g}): the first must be below the second")
     for name, value in (("max_rate_deg_per_s", max_rate_deg_per_s), ("max_current_a", max_current_a)):
         if value is not None and not value > 0.0:
-            raise ParameterError(f"{name} = {value:g}: must be > 0")
+            raise ParameterError.of(name, value, "> 0")
 
 
 def _violations(
@@ -209,13 +210,13 @@ def _violations(
         add(
             "angle_window_deg",
             f"the plate opens to {content.angle_high_deg:.1f} deg, beyond {window[1]:g}",
-            "lower offset or amplitude, or widen angle_window_deg if it may",
+            f"lower offset or amplitude, or widen {argument('angle_window_deg')} if it may",
         )
     if content.angle_low_deg < window[0]:
         add(
             "angle_window_deg",
             f"the plate closes to {content.angle_low_deg:.1f} deg, beyond {window[0]:g}",
-            "raise the offset or lower the amplitude, or widen angle_window_deg if it may",
+            f"raise the offset or lower the amplitude, or widen {argument('angle_window_deg')} if it may",
         )
     if max_rate_deg_per_s is not None and content.peak_speed_deg_per_s > max_rate_deg_per_s:
         add(

@@ -87,9 +87,9 @@ def design_excitation(
     (True, True)
     """
     if kind not in EXCITATIONS:
-        raise ParameterError(f"kind = {kind!r}: must be one of {', '.join(map(repr, EXCITATIONS))}")
+        raise ParameterError.of("kind", kind, f"one of {', '.join(map(repr, EXCITATIONS))}")
     if side not in ("above", "below", "both"):
-        raise ParameterError(f"side = {side!r}: must be one of 'above', 'below', 'both'")
+        raise ParameterError.of("side", side, "one of 'above', 'below', 'both'")
     known = prior_of(prior)
     if known.groups is None or known.limp_home_deg is None:
         raise ParameterError("prior: knows no limp-home angle and friction; pass a Throttle, for example a preset")

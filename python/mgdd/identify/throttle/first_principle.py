@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from mgdd import _core
-from mgdd.errors import DataError, ParameterError, hand_over, or_partial
+from mgdd.errors import DataError, ParameterError, argument, hand_over, or_partial
 from mgdd.identify.throttle.first_principle_model import GROUP_NAMES, TYPICAL, FirstPrincipleModel
 from mgdd.identify.throttle.first_principle_start import SIDE_DEG, regression_start, rest_angle, spread_starts
 from mgdd.identify.throttle.free_run import draw_free_run, free_run, quality_of, source_of
@@ -109,12 +109,12 @@ def fit_throttle(
     time, duty, angle = _columns(log)
     if test is not None:
         _columns(test)
-    step_s = even_step(time, remedy="read_throttle_log(..., step_s={step:g}) resamples")
+    step_s = even_step(time, remedy=f"read_throttle_log(..., {argument('step_s', '{step:g}')}) resamples")
     for name in [*(start_values or {}), *(fixed or {})]:
         if name not in GROUP_NAMES:
             raise ParameterError(f"{name!r}: no throttle group; they are {', '.join(GROUP_NAMES)}")
     if threads < 1:
-        raise ParameterError(f"threads = {threads}: must be >= 1")
+        raise ParameterError.of("threads", threads, ">= 1")
     if np.ptp(angle) < 1.0:
         raise DataError(f"angle_deg moves by {np.ptp(angle):.3g} deg: drive the plate, mgdd.identify.design_excitation")
     values = dict(TYPICAL)
@@ -149,7 +149,7 @@ def fit_throttle(
     for name, value in values.items():
         low, high = bounds[name].lower, bounds[name].upper
         if (name in (start_values or {}) or name in (fixed or {})) and not low <= value <= high:
-            raise ParameterError(f"{name} = {value!r}: must be within [{low:g}, {high:g}]")
+            raise ParameterError.of(name, value, f"within [{low:g}, {high:g}]")
         values[name] = min(max(value, low), high)
     index = {name: i for i, name in enumerate(GROUP_NAMES)}
     static = [index[name] for name in free if name not in ("tau_s", "gain_deg_per_s2_per_duty", "electrical_s")]

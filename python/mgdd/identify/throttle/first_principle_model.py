@@ -71,12 +71,12 @@ class FirstPrincipleModel(SampledModel, Parameters):
         ordered = {name: float(self.parameters[name]) for name in GROUP_NAMES}
         for name, value in ordered.items():
             if not math.isfinite(value):
-                raise ParameterError(f"{name} = {value!r}: must be finite")
+                raise ParameterError.of(name, value, "finite")
             positive = name in ("tau_s", "gain_deg_per_s2_per_duty")
             if name != "limp_home_deg" and not (value > 0.0 if positive else value >= 0.0):
-                raise ParameterError(f"{name} = {value!r}: must be {'>' if positive else '>='} 0")
+                raise ParameterError.of(name, value, f"{('>' if positive else '>=')} 0")
         if not self.closed_deg < self.open_deg:
-            raise ParameterError(f"open_deg = {self.open_deg!r}: must be above closed_deg = {self.closed_deg!r}")
+            raise ParameterError.of("open_deg", self.open_deg, f"above closed_deg = {self.closed_deg!r}")
         object.__setattr__(self, "parameters", MappingProxyType(ordered))
 
     @property

@@ -96,10 +96,10 @@ def identify_throttle(
     ('pw_r', True)
     """
     if model not in KINDS:
-        raise ParameterError(f"model = {model!r}: must be one of {', '.join(map(repr, KINDS))}")
+        raise ParameterError.of("model", model, f"one of {', '.join(map(repr, KINDS))}")
     check_kind(model, two_sided=two_sided, delay_samples=delay_samples)
     if not closed_deg < open_deg:
-        raise ParameterError(f"open_deg = {open_deg!r}: must be above closed_deg = {closed_deg!r}")
+        raise ParameterError.of("open_deg", open_deg, f"above closed_deg = {closed_deg!r}")
     check_throttle_log(log)
     if test is not None:
         check_throttle_log(test)

@@ -59,7 +59,7 @@ def split_log(log: xr.Dataset, *, shares: Sequence[float] = (0.6, 0.2, 0.2)) -> 
     """
     check_throttle_log(log)
     if not len(shares) or min(shares) <= 0.0 or abs(sum(shares) - 1.0) > 1e-9:
-        raise ParameterError(f"shares = {tuple(shares)}: must be positive and add up to 1")
+        raise ParameterError.of("shares", tuple(shares), "positive and add up to 1")
     edges = np.rint(np.cumsum([0.0, *shares]) * log.sizes["time_s"]).astype(int).tolist()
     blocks = tuple(log.isel(time_s=slice(a, b)) for a, b in itertools.pairwise(edges))
     return tuple(check_throttle_log(block) for block in blocks)

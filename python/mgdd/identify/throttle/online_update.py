@@ -97,7 +97,7 @@ class OnlineUpdate:
         elif method == "gradient":
             self._core = _core.GradientPwR(values, free=names, adaptation_gain=adaptation_gain, noise_deg=noise_deg)
         else:
-            raise ParameterError(f"method = {method!r}: must be one of 'recursive_least_squares', 'window', 'gradient'")
+            raise ParameterError.of("method", method, "one of 'recursive_least_squares', 'window', 'gradient'")
 
     def update(self, duty: ArrayLike, angle_deg: ArrayLike) -> int:
         """Take one or many samples in order.

@@ -56,7 +56,7 @@ def physical_parameters(
     }
     for name, value in known.items():
         if value is not None and not (math.isfinite(value) and value > 0.0):
-            raise ParameterError(f"{name} = {value!r}: must be > 0")
+            raise ParameterError.of(name, value, "> 0")
     if (inertia_kgm2 is None) == (torque_constant_nm_per_a is None):
         raise ParameterError("inertia_kgm2, torque_constant_nm_per_a: give exactly one of them")
     p = model.parameters

@@ -114,7 +114,7 @@ def fit_pseudo_wiener(
     if kind == "pw_p" and start_values is None:
         values["plays"] = float(plays)
     if lag_start not in ("best", "rest", "map"):
-        raise ParameterError(f"lag_start = {lag_start!r}: must be one of best, rest, map")
+        raise ParameterError.of("lag_start", lag_start, "one of best, rest, map")
     if lag_start != "best" and "map_start" in values:
         values["map_start"] = float(lag_start == "map")
     values |= {name: float(value) for name, value in (settings or {}).items()}

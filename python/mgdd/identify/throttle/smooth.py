@@ -76,7 +76,7 @@ class SmoothThrottle(SampledModel, Parameters):
         object.__setattr__(self, "parameters", MappingProxyType(ordered))
         for name, value in {**ordered, **self.constants}.items():
             if not (math.isfinite(value) and value > 0.0):
-                raise ParameterError(f"{name} = {value!r}: must be finite and > 0")
+                raise ParameterError.of(name, value, "finite and > 0")
 
     @property
     def kind(self) -> str:

@@ -277,7 +277,7 @@ def fit_drive(
     90
     """
     if friction not in _FORMS:
-        raise ParameterError(f"friction = {friction!r}: must be one of {', '.join(_FORMS)}")
+        raise ParameterError.of("friction", friction, f"one of {', '.join(_FORMS)}")
     chosen = fit_options(options, n_starts=48, seed=1, max_iterations=60, tolerance=1e-6)
     starts = chosen.n_starts
     names = tuple(_core.DriveAxis.parameter_names)

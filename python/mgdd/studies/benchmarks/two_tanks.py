@@ -152,7 +152,7 @@ class TwoTanksModel(SampledModel, Parameters):
         """
         n = record.sizes["time_s"]
         if not 3 <= window <= n:
-            raise DataError(f"window = {window}: must be in [3, {n}], the samples of the record")
+            raise DataError.of("window", window, f"in [3, {n}], the samples of the record")
         known = record.isel(time_s=slice(0, window))
         # The upper level is not seen directly: the best of a few starts, since its brim makes hollows.
         brim = float(self.parameters["upper_brim_v"])
@@ -203,7 +203,7 @@ def fit_two_tanks(record: xr.Dataset, *, form: str = "grey_box", options: FitOpt
     ...     assert fit.train.rmse < 0.16
     """
     if form not in _FORMS:
-        raise ParameterError(f"form = {form!r}: must be one of {', '.join(_FORMS)}")
+        raise ParameterError.of("form", form, f"one of {', '.join(_FORMS)}")
     chosen = fit_options(options, n_starts=4, seed=1, max_iterations=200, tolerance=1e-9)
     base, free = _FORMS[form]
     rng = np.random.default_rng(chosen.seed)

@@ -251,7 +251,7 @@ def fit_linear(record: xr.Dataset, *, order: int = 6, iterations: int = 15) -> L
     ...     assert fit_linear(datasets.load_wiener_hammerstein()[0], order=2, iterations=3).rmse > 0.04
     """
     if not 1 <= order <= 10:
-        raise ParameterError(f"order = {order}: must be in [1, 10]")
+        raise ParameterError.of("order", order, "in [1, 10]")
     u, y = _signals(record)
     mean_u, mean_y = float(u.mean()), float(y.mean())
     u, y = u - mean_u, y - mean_y
@@ -350,7 +350,7 @@ def fit_wiener_hammerstein(
     True
     """
     if not 1 <= follow <= 1000:
-        raise ParameterError(f"follow = {follow}: must be in [1, 1000]")
+        raise ParameterError.of("follow", follow, "in [1, 1000]")
     chosen = fit_options(options, max_iterations=30, tolerance=1e-7)
     u, y = _signals(record)
     linear = fit_linear(record, order=linear_order)
