@@ -262,9 +262,10 @@ void bind_bench(py::module_& m) {
           "reset", [](EngineBench& self, std::optional<std::uint64_t> seed) { self.reset(seed.value_or(self.seed())); },
           arg("seed") = py::none(), "Back to cycle 0, with another seed if given.")
       .def_property(
-          "state", &EngineBench::state, &EngineBench::restore,
+          "state", [](const EngineBench& self) { return save_state(self); },
+          [](EngineBench& self, const StateColumns& columns) { restore_state(self, columns); },
           "State of the run between two cycles: named lists of numbers, JSON-able. Setting it continues that\n"
-          "run bit for bit; a state of another bench raises DataError and changes nothing.")
+          "run bit for bit; a state of another bench raises ParameterError and changes nothing.")
       .def("point_at", &EngineBench::point_at, arg("cycle"), "Operating point of a cycle.")
       .def_property_readonly(
           "point", [](const EngineBench& self) { return self.point(); }, "Operating point of the next cycle.")
@@ -285,14 +286,15 @@ void bind_bench(py::module_& m) {
            [](const EngineBench& self) {
              return py::str("<EngineBench at cycle {}, {!r}>").format(self.cycle(), self.point());
            })
-      .def(py::pickle([](const EngineBench& self) { return py::make_tuple(1, to_dict(self.settings()), self.state()); },
-                      [](const py::tuple& state) {
-                        require_pickle_version(state);
-                        const py::object type = py::type::of<EngineBench>();
-                        auto bench = type(**state[1].cast<py::dict>()).cast<EngineBench>();
-                        bench.restore(state[2].cast<StateColumns>());
-                        return bench;
-                      }));
+      .def(py::pickle(
+          [](const EngineBench& self) { return py::make_tuple(1, to_dict(self.settings()), save_state(self)); },
+          [](const py::tuple& state) {
+            require_pickle_version(state);
+            const py::object type = py::type::of<EngineBench>();
+            auto bench = type(**state[1].cast<py::dict>()).cast<EngineBench>();
+            restore_state(bench, state[2].cast<StateColumns>());
+            return bench;
+          }));
 }
 
 }  // namespace mgdd::bindings

@@ -79,7 +79,8 @@ void bind_learning(py::module_& m) {
           "tell", [](IterativeLearning& learner, const InputArray& error) { learner.tell(to_column(error, "error")); },
           py::arg("error"), "Error of this trial; makes the next input.")
       .def("convergence", &convergence, "Findings of the linear theory, by name.")
-      .def("state", &IterativeLearning::state, "Columns by name.")
+      .def(
+          "state", [](const IterativeLearning& learner) { return save_state(learner); }, "Columns by name.")
       .def("restore", &IterativeLearning::restore, py::arg("state"), "Go on from the columns of `state`.")
       .def_property_readonly("trial", &IterativeLearning::trial, "Number of the trial to come.")
       .def_property_readonly("frozen", &IterativeLearning::frozen, "Whether the guard stopped learning.")
