@@ -137,6 +137,11 @@ bench: $(VENV)/.stamp-mgdd $(VENV)/.stamp-test ## C++ benchmarks, then the Pytho
 	for program in build/bench/bench/*; do $$program; done
 	for script in benchmarks/*.py; do [ ! -e $$script ] || $(PY) $$script; done
 
+.PHONY: mutants
+MODULE ?= throttle
+mutants: $(VENV)/.stamp-test ## changed lines that the tests notice: make mutants MODULE=throttle (Python: mgdd.throttle)
+	PATH="$(abspath $(VENV))/bin:$$PATH" $(PY) tools/mutate.py $(MODULE) --jobs $(JOBS) $(MUTANTS)
+
 docs: $(VENV)/.stamp-mgdd $(VENV)/.stamp-test ## documentation with executed notebooks, docs/_build/html
 	MGDD_DOCS_EXECUTE=cache $(PY) -m sphinx -W -n --keep-going -q -b html docs docs/_build/html
 

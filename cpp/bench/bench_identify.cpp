@@ -29,12 +29,12 @@ struct Log {
 const Log& log() {
   static const Log made = [] {
     Log l;
-    const Rk4<SmoothPlant> model{};
+    const auto model = dynamics::Rk4<SmoothPlant>{}.prepare(smooth_plant_example, 1e-3);
     Values<double, 3> x{0.14, 0.0, 0.0};
     for (std::size_t k = 0; k < n_samples; ++k) {
       l.duty.push_back(0.7 * random::uniform(1, 0, k / 80) - 0.35 - 0.1 * (x[0] - 0.26));
-      l.angle_deg.push_back(model.output<double>(smooth_plant_example, x, {}) + 0.05 * random::normal(1, 1, k));
-      x = model.step<double>(smooth_plant_example, x, {l.duty.back()}, 1e-3);
+      l.angle_deg.push_back(model.output(x) + 0.05 * random::normal(1, 1, k));
+      model.step(x, Values<double, 1>{l.duty.back()});
     }
     return l;
   }();
@@ -48,13 +48,14 @@ Set shifted(double factor) {
   return set;
 }
 
-SimulationResidual<Rk4<SmoothPlant>> dual_residual() {
+OutputError<dynamics::Rk4<SmoothPlant>> dual_residual() {
   SimulationRecord record;
   record.dt_s = 1e-3;
   record.input = log().duty;
   record.output = log().angle_deg;
   record.start = {0.14, 0.0, 0.0};
-  return {Rk4<SmoothPlant>{}, shifted(1.02), {0, 1, 2, 3, 4, 5, 6, 7, 8, 9}, {record}};
+  return {
+      dynamics::Rk4<SmoothPlant>{}, shifted(1.02), std::vector<std::size_t>{0, 1, 2, 3, 4, 5, 6, 7, 8, 9}, {record}};
 }
 
 bool agree() {

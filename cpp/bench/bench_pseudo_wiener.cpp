@@ -4,6 +4,7 @@
 #include <array>
 #include <vector>
 
+#include "mgdd/dynamics/predict.hpp"
 #include "mgdd/math/dispatch.hpp"
 #include "mgdd/throttle/models/pseudo_wiener.hpp"
 
@@ -30,7 +31,7 @@ void sample(benchmark::State& state) {
   auto s = model.at_rest(T(20.0), T(0.0));
   double duty = 0.1;
   for (auto _ : state) {
-    model.advance(s, T(duty));
+    model.step(s, T(duty));
     duty = 0.5 - duty;
     benchmark::DoNotOptimize(s);
   }
@@ -43,7 +44,7 @@ BENCHMARK(sample<PwR, Dual<5>>);
 // Lanes pay off only in a function that is compiled per instruction set.
 MGDD_INLINE void run_lanes(const BasicPwRModel<Lanes<8>>& model, BasicPwRState<Lanes<8>>& state, int samples) noexcept {
   for (int k = 0; k < samples; ++k)
-    model.advance(state, Lanes<8>(k % 200 < 100 ? 0.35 : 0.1));
+    model.step(state, Lanes<8>(k % 200 < 100 ? 0.35 : 0.1));
 }
 void eight_lanes(benchmark::State& state) {
   const auto model = model_of(lift<Lanes<8>>(example<PwR>()));
@@ -63,14 +64,14 @@ template <class P>
 void horizon(benchmark::State& state) {
   P p = example<P>();
   p.frame.sample_s = 2e-3;
-  const auto model = model_of(lift<Dual<3>>(p));
-  const auto start = model_of(p).at_rest(20.0, 0.0);
+  const auto model = model_of(p);
+  const auto start = model.at_rest(20.0, 0.0);
   const std::array<double, 3> moves{0.4, 0.2, 0.25};
   const std::array<int, 3> lengths{4, 6, 10};
   std::array<double, 20> angle{};
   std::array<std::array<double, 3>, 20> slope{};
   for (auto _ : state) {
-    predict_moves<3>(model, start, moves, lengths, angle, slope);
+    dynamics::predict<3>(model, start, moves, lengths, angle, slope);
     benchmark::DoNotOptimize(slope);
   }
   state.counters["ns_per_step"] = benchmark::Counter(20.0 * static_cast<double>(state.iterations()) * 1e-9,

@@ -1,12 +1,15 @@
-// Cycles of the bench as columns, for every binding that returns them.
+// The bench as Python holds it, and its cycles as columns, for every binding that returns them.
 #pragma once
 
 #include <vector>
 
 #include "binding.hpp"
+#include "guarded.hpp"
 #include "mgdd/loop/engine_bench.hpp"
 
 namespace mgdd::bindings {
+
+using BoundBench = Guarded<loop::EngineBench>;
 
 /// One array per measured quantity, by name; `components` and `limits` are tables.
 py::dict bench_columns(const std::vector<loop::BenchCycle>& rows, const loop::BenchSettings& settings);

@@ -9,7 +9,9 @@
 
 #include "bench_columns.hpp"
 #include "binding.hpp"
+#include "keywords.hpp"
 #include "mgdd/common/bounds.hpp"
+#include "mgdd/loop/cycle_fields.hpp"
 #include "mgdd/loop/engine_bench.hpp"
 
 namespace mgdd::bindings {
@@ -17,16 +19,6 @@ namespace {
 
 using namespace loop;
 using engine::indicator_fields;
-
-py::dict to_dict(const SensorDynamics& d) {
-  py::dict out;
-  out["delay_s"] = d.delay_s;
-  out["lag_s"] = d.lag_s;
-  out["noise_fraction"] = d.noise_fraction;
-  out["delay_cycles"] = d.delay_cycles;
-  out["lag_cycles"] = d.lag_cycles;
-  return out;
-}
 
 using Schedule = std::vector<std::pair<std::int64_t, engine::OperatingPoint>>;
 
@@ -56,35 +48,13 @@ py::dict to_dict(const BenchSettings& s) {
   return out;
 }
 
-// Scalars of one cycle that are no indicator; flags count as 0 or 1 where they stand in a column.
-struct Column {
-  const char* name;
-  double (*of)(const BenchCycle&);
-};
-constexpr Column numbers[] = {{"soc_requested_cad", [](const BenchCycle& c) { return c.soc_requested_cad; }},
-                              {"soc_cad", [](const BenchCycle& c) { return c.soc_cad; }},
-                              {"nox_true_ppm", [](const BenchCycle& c) { return c.nox_true_ppm; }},
-                              {"nox_analyser_ppm", [](const BenchCycle& c) { return c.nox_analyser_ppm; }},
-                              {"nox_fast_ppm", [](const BenchCycle& c) { return c.nox_fast_ppm; }},
-                              {"nox_soft_ppm", [](const BenchCycle& c) { return c.nox_soft_ppm; }},
-                              {"nox_soft_corrected_ppm", [](const BenchCycle& c) { return c.nox_soft_corrected_ppm; }},
-                              {"j", [](const BenchCycle& c) { return c.j; }}};
-struct Flag {
-  const char* name;
-  bool BenchCycle::* member;
-};
-constexpr Flag flags[] = {{"misfire", &BenchCycle::misfire},
-                          {"clamped", &BenchCycle::clamped},
-                          {"unphysical", &BenchCycle::unphysical},
-                          {"operating_point_changed", &BenchCycle::operating_point_changed}};
-
 py::dict to_dict(const BenchCycle& c, const std::vector<std::string>& limit_names) {
   py::dict out;
   out["cycle"] = c.cycle;
-  for (const Column& column : numbers)
-    out[column.name] = column.of(c);
-  for (const Flag& flag : flags)
-    out[flag.name] = c.*(flag.member);
+  for (const auto& number : bench_cycle_numbers)
+    out[as_str(number.name)] = number.of(c);
+  for (const BenchFlag& flag : bench_flags)
+    out[as_str(flag.name)] = c.*(flag.member);
   for (const auto& field : indicator_fields<double>())
     out[as_str(field.name)] = c.indicators.*(field.member);
   const auto components = c.component_values();
@@ -116,13 +86,15 @@ py::array_t<double> table_of(const std::vector<BenchCycle>& rows, std::size_t wi
   return out;
 }
 
-py::dict to_columns(const std::vector<BenchCycle>& rows, const BenchSettings& s) {
+}  // namespace
+
+py::dict bench_columns(const std::vector<BenchCycle>& rows, const BenchSettings& s) {
   py::dict out;
   out["cycle"] = column_of<std::int64_t>(rows, [](const BenchCycle& c) { return c.cycle; });
-  for (const Column& column : numbers)
-    out[column.name] = column_of<double>(rows, column.of);
-  for (const Flag& flag : flags)
-    out[flag.name] = column_of<bool>(rows, [&flag](const BenchCycle& c) { return c.*(flag.member); });
+  for (const auto& number : bench_cycle_numbers)
+    out[as_str(number.name)] = column_of<double>(rows, number.of);
+  for (const BenchFlag& flag : bench_flags)
+    out[as_str(flag.name)] = column_of<bool>(rows, [&flag](const BenchCycle& c) { return c.*(flag.member); });
   for (const auto& field : indicator_fields<double>()) {
     out[as_str(field.name)] =
         column_of<double>(rows, [&field](const BenchCycle& c) { return c.indicators.*(field.member); });
@@ -132,25 +104,28 @@ py::dict to_columns(const std::vector<BenchCycle>& rows, const BenchSettings& s)
   return out;
 }
 
-py::dict run(EngineBench& bench, const InputArray& soc_cad) {
+namespace {
+
+py::dict run(BoundBench& bound, const InputArray& soc_cad) {
   const std::vector<double> requests = to_column(soc_cad, "soc_cad");
   std::vector<BenchCycle> rows;
   rows.reserve(requests.size());
   {
+    const auto bench = bound.use();
     const py::gil_scoped_release release;
     for (const double soc : requests)
-      rows.push_back(bench.step(soc));
+      rows.push_back(bench->step(soc));
   }
-  return to_columns(rows, bench.settings());
+  return bench_columns(rows, bound.constant().settings());
 }
 
-EngineBench make(const engine::Cylinder& cylinder, const Schedule& schedule,
-                 const std::optional<engine::Performance>& performance, const std::string& nox_sensor,
-                 const std::vector<std::string>& limits, double soc_scatter_cad, double efficiency_noise_percent,
-                 double misfire_probability, double soc_drift_cad_per_kcycle, double wall_heat_drift_per_kcycle,
-                 const std::optional<engine::NoxModel>& true_nox, const std::optional<engine::SoftSensor>& soft_sensor,
-                 const std::optional<SensorDynamics>& analyser, const std::optional<SensorDynamics>& fast_sensor,
-                 bool delay_whole_objective, double step_cad, const std::string& integrator, std::uint64_t seed) {
+BoundBench make(const engine::Cylinder& cylinder, const Schedule& schedule,
+                const std::optional<engine::Performance>& performance, const std::string& nox_sensor,
+                const std::vector<std::string>& limits, double soc_scatter_cad, double efficiency_noise_percent,
+                double misfire_probability, double soc_drift_cad_per_kcycle, double wall_heat_drift_per_kcycle,
+                const std::optional<engine::NoxModel>& true_nox, const std::optional<engine::SoftSensor>& soft_sensor,
+                const std::optional<SensorDynamics>& analyser, const std::optional<SensorDynamics>& fast_sensor,
+                bool delay_whole_objective, double step_cad, const std::string& integrator, std::uint64_t seed) {
   BenchSettings s;
   s.cylinder = cylinder;
   s.schedule.clear();
@@ -172,7 +147,7 @@ EngineBench make(const engine::Cylinder& cylinder, const Schedule& schedule,
   s.step_cad = step_cad;
   s.integrator = engine::parse_integrator(integrator);
   s.seed = seed;
-  return EngineBench(s);
+  return {"EngineBench", EngineBench(s)};
 }
 
 double checked_speed(double speed_rpm) {
@@ -209,20 +184,15 @@ Examples
 >>> SensorDynamics(delay_s=3.0, lag_s=2.0).delay_at(1500.0)
 38
 )");
+  using D = SensorDynamics;
+  bind_rows(
+      dynamics, "SensorDynamics",
+      std::tuple{plain("delay_s", &D::delay_s, "Transport delay [s]."), plain("lag_s", &D::lag_s, "Time constant [s]."),
+                 plain("noise_fraction", &D::noise_fraction, "Relative noise [-]."),
+                 plain("delay_cycles", &D::delay_cycles, "Delay in cycles, or None."),
+                 plain("lag_cycles", &D::lag_cycles, "Time constant in cycles, or None.")},
+      [](const D& made) { validate("sensor", made); });
   dynamics
-      .def(py::init([](double delay_s, double lag_s, double noise, std::optional<std::int64_t> delay_cycles,
-                       std::optional<double> lag_cycles) {
-             const SensorDynamics made{delay_s, lag_s, noise, delay_cycles, lag_cycles};
-             validate("sensor", made);
-             return made;
-           }),
-           py::kw_only(), arg("delay_s") = 0.0, arg("lag_s") = 0.0, arg("noise_fraction") = 0.0,
-           arg("delay_cycles") = py::none(), arg("lag_cycles") = py::none())
-      .def_readonly("delay_s", &SensorDynamics::delay_s, "Transport delay [s].")
-      .def_readonly("lag_s", &SensorDynamics::lag_s, "Time constant [s].")
-      .def_readonly("noise_fraction", &SensorDynamics::noise_fraction, "Relative noise [-].")
-      .def_readonly("delay_cycles", &SensorDynamics::delay_cycles, "Delay in cycles, or None.")
-      .def_readonly("lag_cycles", &SensorDynamics::lag_cycles, "Time constant in cycles, or None.")
       .def(
           "delay_at",
           [](const SensorDynamics& self, double speed_rpm) { return self.delay_at(checked_speed(speed_rpm)); },
@@ -231,20 +201,16 @@ Examples
           "gain_at",
           [](const SensorDynamics& self, double speed_rpm) { return self.gain_at(checked_speed(speed_rpm)); },
           arg("speed_rpm"), "Gain of the lag filter per cycle [-].");
-  bind_value(dynamics, "SensorDynamics", [](const SensorDynamics& self) { return to_dict(self); });
 }
 
 }  // namespace
-
-py::dict bench_columns(const std::vector<BenchCycle>& rows, const BenchSettings& settings) {
-  return to_columns(rows, settings);
-}
 
 void bind_bench(py::module_& m) {
   using py::arg;
   bind_dynamics(m);
   const BenchSettings d;
-  py::class_<EngineBench>(m, "EngineBench", "The virtual engine bench; use mgdd.loop.EngineBench.")
+  using B = BoundBench;
+  py::class_<B>(m, "EngineBench", "The virtual engine bench; use mgdd.loop.EngineBench.")
       .def(py::init(&make), py::kw_only(), arg("cylinder"), arg("schedule"), arg("performance") = py::none(),
            arg("nox_sensor") = std::string(to_string(d.nox_sensor)), arg("limits") = std::vector<std::string>{},
            arg("soc_scatter_cad") = d.soc_scatter_cad, arg("efficiency_noise_percent") = d.efficiency_noise_percent,
@@ -255,45 +221,70 @@ void bind_bench(py::module_& m) {
            arg("delay_whole_objective") = d.delay_whole_objective, arg("step_cad") = d.step_cad,
            arg("integrator") = std::string(to_string(d.integrator)), arg("seed") = d.seed)
       .def(
-          "step", [](EngineBench& self, double soc_cad) { return to_dict(self.step(soc_cad), self.settings().limits); },
+          "step",
+          [](B& b, double soc_cad) {
+            const BenchCycle cycle = b.use()->step(soc_cad);
+            return to_dict(cycle, b.constant().settings().limits);
+          },
           arg("soc_cad"), "Run one cycle: what was measured, by name.")
       .def("run_columns", &run, arg("soc_cad"), "Run one cycle per request, without the GIL: columns by name.")
       .def(
-          "reset", [](EngineBench& self, std::optional<std::uint64_t> seed) { self.reset(seed.value_or(self.seed())); },
+          "reset",
+          [](B& b, std::optional<std::uint64_t> seed) {
+            const auto bench = b.use();
+            bench->reset(seed.value_or(bench->seed()));
+          },
           arg("seed") = py::none(), "Back to cycle 0, with another seed if given.")
       .def_property(
-          "state", [](const EngineBench& self) { return save_state(self); },
-          [](EngineBench& self, const StateColumns& columns) { restore_state(self, columns); },
+          "state", [](const B& b) { return save_state(*b.use()); },
+          [](B& b, const StateColumns& state) { restore_state(*b.use(), state); },
           "State of the run between two cycles: named lists of numbers, JSON-able. Setting it continues that\n"
           "run bit for bit; a state of another bench raises ParameterError and changes nothing.")
-      .def("point_at", &EngineBench::point_at, arg("cycle"), "Operating point of a cycle.")
+      .def(
+          "point_at", [](const B& b, std::int64_t cycle) { return b.constant().point_at(cycle); }, arg("cycle"),
+          "Operating point of a cycle.")
       .def_property_readonly(
-          "point", [](const EngineBench& self) { return self.point(); }, "Operating point of the next cycle.")
-      .def_property_readonly("cycle", &EngineBench::cycle, "Index of the next cycle.")
+          "point", [](const B& b) { return b.use()->point(); }, "Operating point of the next cycle.")
       .def_property_readonly(
-          "operating_point_changes", [](const EngineBench& self) { return self.point_changes_at(self.cycle()); },
+          "cycle", [](const B& b) { return b.use()->cycle(); }, "Index of the next cycle.")
+      .def_property_readonly(
+          "operating_point_changes",
+          [](const B& b) {
+            const auto bench = b.use();
+            return bench->point_changes_at(bench->cycle());
+          },
           "Whether speed or fuel of the next cycle differ by more than 5 % from those of the last one.")
-      .def_property_readonly("seed", &EngineBench::seed, "Seed of the run.")
-      .def_property_readonly("window_cad", &EngineBench::window_cad, "Earliest and latest SOC that is not clamped.")
-      .def_property_readonly("analyser_delay_cycles", &EngineBench::analyser_delay_cycles,
-                             "Delay of the analyser at the next cycle.")
-      .def_property_readonly("analyser_gain", &EngineBench::analyser_gain,
-                             "Gain of the analyser's lag filter at the next cycle [-].")
       .def_property_readonly(
-          "settings", [](const EngineBench& self) { return to_dict(self.settings()); },
+          "seed", [](const B& b) { return b.use()->seed(); }, "Seed of the run.")
+      .def_property_readonly(
+          "window_cad", [](const B& b) { return b.constant().window_cad(); },
+          "Earliest and latest SOC that is not clamped.")
+      .def_property_readonly(
+          "analyser_delay_cycles", [](const B& b) { return b.use()->analyser_delay_cycles(); },
+          "Delay of the analyser at the next cycle.")
+      .def_property_readonly(
+          "analyser_gain", [](const B& b) { return b.use()->analyser_gain(); },
+          "Gain of the analyser's lag filter at the next cycle [-].")
+      .def_property_readonly(
+          "settings", [](const B& b) { return to_dict(b.constant().settings()); },
           "Constructor keywords as a new dict.")
       .def("__repr__",
-           [](const EngineBench& self) {
-             return py::str("<EngineBench at cycle {}, {!r}>").format(self.cycle(), self.point());
+           [](const B& b) {
+             const std::int64_t cycle = b.use()->cycle();
+             return py::str("<EngineBench at cycle {}, {!r}>").format(cycle, b.constant().point_at(cycle));
            })
       .def(py::pickle(
-          [](const EngineBench& self) { return py::make_tuple(1, to_dict(self.settings()), save_state(self)); },
+          [](const B& b) {
+            const StateColumns state = save_state(*b.use());
+            return py::make_tuple(1, to_dict(b.constant().settings()), state);
+          },
           [](const py::tuple& state) {
             require_pickle_version(state);
-            const py::object type = py::type::of<EngineBench>();
-            auto bench = type(**state[1].cast<py::dict>()).cast<EngineBench>();
-            restore_state(bench, state[2].cast<StateColumns>());
-            return bench;
+            const auto columns = state[2].cast<StateColumns>();
+            const py::object made = py::type::of<B>()(**state[1].cast<py::dict>());
+            B& bench = made.cast<B&>();
+            restore_state(*bench.use(), columns);
+            return std::move(bench);
           }));
 }
 

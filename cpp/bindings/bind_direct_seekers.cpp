@@ -1,8 +1,10 @@
 // Binds include/mgdd/optimize: SPSA, gradient descent, golden section, and the tuner.
 #include <limits>
+#include <numbers>
 #include <optional>
 #include <string>
-#include <vector>
+#include <tuple>
+#include <utility>
 
 #include "mgdd/optimize/seekers/tuner.hpp"
 #include "seeker_binding.hpp"
@@ -11,188 +13,87 @@ namespace mgdd::bindings {
 namespace {
 
 using namespace optimize;
+constexpr double nan = std::numeric_limits<double>::quiet_NaN();
 constexpr double inf = std::numeric_limits<double>::infinity();
 
 void bind_spsa(py::module_& m) {
-  using R = Recorded<Spsa>;
-  const SpsaSettings d;
-  py::class_<R> cls(m, "Spsa", "Simultaneous perturbation; see mgdd.optimize.Spsa.");
-  cls.def(py::init([](const py::object& start, const py::object& lower, const py::object& upper,
-                      const std::string& form, const std::string& schedule, std::optional<double> gain,
-                      double stability, double gain_exponent, double perturbation, double perturbation_exponent,
-                      std::optional<double> step_max, int averaging, bool blocking, double noise_sd,
-                      double initial_hessian, double hessian_prior, double limit_amplitude, std::uint64_t seed,
-                      bool maximize, const std::vector<Limit>& limits, std::optional<double> curvature) {
-            SpsaSettings s;
-            s.space = space_from(start, lower, upper);
-            s.form = parse_spsa_form(form);
-            s.schedule = parse_gain_schedule(schedule);
-            s.gain = gain.value_or(0.0);
-            if (gain && !(*gain > 0.0)) throw ParameterError("gain = " + std::to_string(*gain) + ": must be > 0");
-            s.stability = stability;
-            s.gain_exponent = gain_exponent;
-            s.perturbation = perturbation;
-            s.perturbation_exponent = perturbation_exponent;
-            s.step_max = step_max.value_or(0.0);
-            if (step_max && !(*step_max > 0.0)) {
-              throw ParameterError("step_max = " + std::to_string(*step_max) + ": must be > 0");
-            }
-            s.averaging = averaging;
-            s.blocking = blocking;
-            s.noise_sd = noise_sd;
-            s.initial_hessian = initial_hessian;
-            s.hessian_prior = hessian_prior;
-            s.limit_amplitude = limit_amplitude;
-            s.seed = seed;
-            s.maximize = maximize;
-            s.limits = limits;
-            s.curvature = none_as_nan(curvature);
-            R out{Spsa(s)};
-            warn_each(out.seeker.settings().advice());
-            return out;
-          }),
-          py::kw_only(), py::arg("start"), py::arg("lower") = -inf, py::arg("upper") = inf,
-          py::arg("form") = "first_order", py::arg("schedule") = "decreasing", py::arg("gain") = py::none(),
-          py::arg("stability") = d.stability, py::arg("gain_exponent") = d.gain_exponent,
-          py::arg("perturbation") = d.perturbation, py::arg("perturbation_exponent") = d.perturbation_exponent,
-          py::arg("step_max") = py::none(), py::arg("averaging") = d.averaging, py::arg("blocking") = d.blocking,
-          py::arg("noise_sd") = d.noise_sd, py::arg("initial_hessian") = d.initial_hessian,
-          py::arg("hessian_prior") = d.hessian_prior, py::arg("limit_amplitude") = d.limit_amplitude,
-          py::arg("seed") = d.seed, py::arg("maximize") = true, py::arg("limits") = std::vector<Limit>{},
-          py::arg("curvature") = py::none())
+  using B = BoundSeeker<Spsa>;
+  using S = SpsaSettings;
+  py::class_<B> cls(m, "Spsa", "Simultaneous perturbation; see mgdd.optimize.Spsa.");
+  const auto rows = std::tuple{choice("form", &S::form, &parse_spsa_form),
+                               choice("schedule", &S::schedule, &parse_gain_schedule),
+                               positive_or_own("gain", &S::gain),
+                               plain("stability", &S::stability),
+                               plain("gain_exponent", &S::gain_exponent),
+                               plain("perturbation", &S::perturbation),
+                               plain("perturbation_exponent", &S::perturbation_exponent),
+                               positive_or_own("step_max", &S::step_max),
+                               plain("averaging", &S::averaging),
+                               plain("blocking", &S::blocking),
+                               plain("noise_sd", &S::noise_sd),
+                               plain("initial_hessian", &S::initial_hessian),
+                               plain("hessian_prior", &S::hessian_prior),
+                               plain("limit_amplitude", &S::limit_amplitude),
+                               plain("seed", &S::seed),
+                               plain("maximize", &S::maximize),
+                               plain("limits", &S::limits),
+                               or_none("curvature", &S::curvature, nan)};
+  bind_settings<Spsa>(cls, "Spsa", S{}, rows, py::arg("lower") = -inf, py::arg("upper") = inf);
+  cls.def_property_readonly(
+         "hessian", [](const B& b) { return Eigen::MatrixXd(b.use()->seeker().hessian()); },
+         "Averaged Hessian of the second-order form, shape (inputs, inputs).")
       .def_property_readonly(
-          "hessian", [](const R& r) { return Eigen::MatrixXd(r.seeker.hessian()); },
-          "Averaged Hessian of the second-order form, shape (inputs, inputs).")
+          "iteration", [](const B& b) { return b.use()->seeker().iteration(); },
+          "Iterations since the start or restart.")
       .def_property_readonly(
-          "iteration", [](const R& r) { return r.seeker.iteration(); }, "Iterations since the start or restart.")
+          "blocked", [](const B& b) { return b.use()->seeker().blocked(); }, "Steps that blocking refused.")
       .def_property_readonly(
-          "blocked", [](const R& r) { return r.seeker.blocked(); }, "Steps that blocking refused.")
-      .def_property_readonly(
-          "measurements_per_iteration", [](const R& r) { return r.seeker.measurements_per_iteration(); },
-          "Cycles that one iteration takes.")
-      .def_property_readonly(
-          "settings",
-          [](const R& r) {
-            const SpsaSettings& s = r.seeker.settings();
-            py::dict out = space_dict(s.space);
-            out["form"] = std::string(to_string(s.form));
-            out["schedule"] = std::string(to_string(s.schedule));
-            out["gain"] = s.gain;
-            out["stability"] = s.stability;
-            out["gain_exponent"] = s.gain_exponent;
-            out["perturbation"] = s.perturbation;
-            out["perturbation_exponent"] = s.perturbation_exponent;
-            out["step_max"] = s.step_max;
-            out["averaging"] = s.averaging;
-            out["blocking"] = s.blocking;
-            out["noise_sd"] = s.noise_sd;
-            out["initial_hessian"] = s.initial_hessian;
-            out["hessian_prior"] = s.hessian_prior;
-            out["limit_amplitude"] = s.limit_amplitude;
-            out["seed"] = s.seed;
-            out["maximize"] = s.maximize;
-            out["limits"] = s.limits;
-            out["curvature"] = nan_as_none(s.curvature);
-            return out;
-          },
-          "Arguments that make this seeker again.");
+          "measurements_per_iteration", [](const B& b) { return b.constant().seeker().measurements_per_iteration(); },
+          "Cycles that one iteration takes.");
   bind_seeking(cls);
   bind_gradient(cls);
 }
 
 void bind_gradient_descent(py::module_& m) {
-  using R = Recorded<GradientDescent>;
-  const GradientDescentSettings d;
-  py::class_<R> cls(m, "GradientDescent", "Two-sided differences; see mgdd.optimize.GradientDescent.");
-  cls.def(py::init([](const py::object& start, const py::object& lower, const py::object& upper, double step_size,
-                      double difference, const py::object& rate, double tolerance, std::int64_t iterations,
-                      bool maximize, const std::vector<Limit>& limits, std::optional<double> curvature) {
-            GradientDescentSettings s;
-            s.space = space_from(start, lower, upper);
-            s.step_size = step_size;
-            s.difference = difference;
-            if (!rate.is_none()) s.rate = inputs_from(rate, "rate", s.space.size());
-            s.tolerance = tolerance;
-            s.iterations = iterations;
-            s.maximize = maximize;
-            s.limits = limits;
-            s.curvature = none_as_nan(curvature);
-            R out{GradientDescent(s)};
-            warn_each(s.advice());
-            return out;
-          }),
-          py::kw_only(), py::arg("start"), py::arg("lower") = -inf, py::arg("upper") = inf,
-          py::arg("step_size") = d.step_size, py::arg("difference") = d.difference, py::arg("rate") = py::none(),
-          py::arg("tolerance") = d.tolerance, py::arg("iterations") = d.iterations, py::arg("maximize") = true,
-          py::arg("limits") = std::vector<Limit>{}, py::arg("curvature") = py::none())
-      .def_property_readonly(
-          "iteration", [](const R& r) { return r.seeker.iteration(); }, "Steps made.")
+  using B = BoundSeeker<GradientDescent>;
+  using S = GradientDescentSettings;
+  py::class_<B> cls(m, "GradientDescent", "Two-sided differences; see mgdd.optimize.GradientDescent.");
+  const auto rows = std::tuple{plain("step_size", &S::step_size),   plain("difference", &S::difference),
+                               per_input_or_none("rate", &S::rate), plain("tolerance", &S::tolerance),
+                               plain("iterations", &S::iterations), plain("maximize", &S::maximize),
+                               plain("limits", &S::limits),         or_none("curvature", &S::curvature, nan)};
+  bind_settings<GradientDescent>(cls, "GradientDescent", S{}, rows, py::arg("lower") = -inf, py::arg("upper") = inf);
+  cls.def_property_readonly(
+         "iteration", [](const B& b) { return b.use()->seeker().iteration(); }, "Steps made.")
       .def_property_readonly(
           "converged_at",
-          [](const R& r) {
-            return r.seeker.converged_at() < 0 ? py::object(py::none()) : py::object(py::int_(r.seeker.converged_at()));
+          [](const B& b) {
+            const std::int64_t at = b.use()->seeker().converged_at();
+            return at < 0 ? std::nullopt : std::optional(at);
           },
-          "Step at which the tolerance was met first, or None.")
-      .def_property_readonly(
-          "settings",
-          [](const R& r) {
-            const GradientDescentSettings& s = r.seeker.settings();
-            py::dict out = space_dict(s.space);
-            out["step_size"] = s.step_size;
-            out["difference"] = s.difference;
-            out["rate"] = list_of(s.rate);
-            out["tolerance"] = s.tolerance;
-            out["iterations"] = s.iterations;
-            out["maximize"] = s.maximize;
-            out["limits"] = s.limits;
-            out["curvature"] = nan_as_none(s.curvature);
-            return out;
-          },
-          "Arguments that make this seeker again.");
+          "Step at which the tolerance was met first, or None.");
   bind_seeking(cls);
   bind_gradient(cls);
 }
 
 void bind_golden_section(py::module_& m) {
-  using R = Recorded<GoldenSection>;
-  const GoldenSectionSettings d;
-  py::class_<R> cls(m, "GoldenSection", "Golden-section search; see mgdd.optimize.GoldenSection.");
-  cls.def(py::init([](const py::object& start, const py::object& lower, const py::object& upper, double noise_sd,
-                      double significance, int samples_max, double tolerance, bool maximize,
-                      const std::vector<Limit>& limits) {
-            GoldenSectionSettings s;
-            s.space = space_from(start, lower, upper);
-            s.noise_sd = noise_sd;
-            s.significance = significance;
-            s.samples_max = samples_max;
-            s.tolerance = tolerance;
-            s.maximize = maximize;
-            s.limits = limits;
-            return R{GoldenSection(s)};
-          }),
-          py::kw_only(), py::arg("start"), py::arg("lower"), py::arg("upper"), py::arg("noise_sd") = d.noise_sd,
-          py::arg("significance") = d.significance, py::arg("samples_max") = d.samples_max,
-          py::arg("tolerance") = d.tolerance, py::arg("maximize") = true, py::arg("limits") = std::vector<Limit>{})
+  using B = BoundSeeker<GoldenSection>;
+  using S = GoldenSectionSettings;
+  py::class_<B> cls(m, "GoldenSection", "Golden-section search; see mgdd.optimize.GoldenSection.");
+  const auto rows = std::tuple{plain("noise_sd", &S::noise_sd),       plain("significance", &S::significance),
+                               plain("samples_max", &S::samples_max), plain("tolerance", &S::tolerance),
+                               plain("maximize", &S::maximize),       plain("limits", &S::limits)};
+  bind_settings<GoldenSection>(cls, "GoldenSection", S{}, rows, py::arg("lower"), py::arg("upper"));
+  cls.def_property_readonly(
+         "bracket",
+         [](const B& b) {
+           const auto r = b.use();
+           return std::pair(r->seeker().lower(), r->seeker().upper());
+         },
+         "Present bracket, lower and upper end.")
       .def_property_readonly(
-          "bracket", [](const R& r) { return std::pair(r.seeker.lower(), r.seeker.upper()); },
-          "Present bracket, lower and upper end.")
-      .def_property_readonly(
-          "converged", [](const R& r) { return r.seeker.converged(); },
-          "Whether the bracket is as small as tolerance or noise allow.")
-      .def_property_readonly(
-          "settings",
-          [](const R& r) {
-            const GoldenSectionSettings& s = r.seeker.settings();
-            py::dict out = space_dict(s.space);
-            out["noise_sd"] = s.noise_sd;
-            out["significance"] = s.significance;
-            out["samples_max"] = s.samples_max;
-            out["tolerance"] = s.tolerance;
-            out["maximize"] = s.maximize;
-            out["limits"] = s.limits;
-            return out;
-          },
-          "Arguments that make this seeker again.");
+          "converged", [](const B& b) { return b.use()->seeker().converged(); },
+          "Whether the bracket is as small as tolerance or noise allow.");
   bind_seeking(cls);
 }
 
@@ -208,11 +109,11 @@ void bind_tuner(py::module_& m) {
         w.curvature = curvature;
         w.lag = {delay_cycles, lag_cycles};
         w.compensated = compensated;
-        w.rms = none_as_nan(rms);
-        w.cycles = none_as_nan(cycles);
-        w.distance = none_as_nan(distance);
-        w.arrival = none_as_nan(arrival);
-        w.amplitude_max = none_as_nan(amplitude_max);
+        w.rms = rms.value_or(nan);
+        w.cycles = cycles.value_or(nan);
+        w.distance = distance.value_or(nan);
+        w.arrival = arrival.value_or(nan);
+        w.amplitude_max = amplitude_max.value_or(nan);
         const Tuning t = tune(w);
         py::dict out;
         out["method"] = std::string(to_string(t.method));
@@ -226,7 +127,7 @@ void bind_tuner(py::module_& m) {
         out["dither_cost"] = t.dither_cost;
         out["jitter_cost"] = t.jitter_cost;
         out["sensor_gain"] = t.sensor_gain;
-        out["sensor_phase_deg"] = t.sensor_phase_rad * 180.0 / 3.14159265358979323846;
+        out["sensor_phase_deg"] = t.sensor_phase_rad * 180.0 / std::numbers::pi;
         out["met"] = t.met;
         out["reasons"] = t.reasons;
         return out;

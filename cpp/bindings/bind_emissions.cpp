@@ -6,6 +6,7 @@
 #include <vector>
 
 #include "binding.hpp"
+#include "keywords.hpp"
 #include "mgdd/common/error.hpp"
 #include "mgdd/engine/emissions.hpp"
 
@@ -14,32 +15,11 @@ namespace {
 
 using namespace engine;
 
-py::dict to_dict(const NoxProxy& p) {
-  py::dict out;
-  out["reference_temperature_k"] = p.reference_temperature_k;
-  out["reference_nox_ppm"] = p.reference_nox_ppm;
-  out["activation_temperature_k"] = p.activation_temperature_k;
-  return out;
-}
-
-py::dict to_dict(const NoxModel& m) {
-  py::dict out;
-  out["proxy"] = m.proxy;
-  out["map"] = as_str(to_string(m.map));
-  out["intake_o2_fraction"] = m.intake_o2_fraction;
-  out["o2_exponent"] = m.o2_exponent;
-  return out;
-}
-
-py::dict to_dict(const SoftSensor& s) {
-  py::dict out;
-  out["model"] = s.model;
-  out["correction_gain"] = s.correction_gain;
-  return out;
-}
-
 NoxFit fit(const InputArray& t_max_k, const InputArray& nox_ppm, const std::string& map, double reference_k) {
-  return fit_nox_proxy(to_column(t_max_k, "t_max_k"), to_column(nox_ppm, "nox_ppm"), parse_nox_map(map), reference_k);
+  const std::vector<double> t = to_column(t_max_k, "t_max_k"), nox = to_column(nox_ppm, "nox_ppm");
+  const NoxMap form = parse_nox_map(map);
+  const py::gil_scoped_release release;
+  return fit_nox_proxy(t, nox, form, reference_k);
 }
 
 void bind_proxy(py::module_& m) {
@@ -70,31 +50,25 @@ Examples
 >>> float(NoxProxy().arrhenius_ppm(1900.0))
 1200.0
 )");
+  using P = NoxProxy;
+  bind_rows(proxy, "NoxProxy",
+            std::tuple{plain("reference_temperature_k", &P::reference_temperature_k, "T0 [K]."),
+                       plain("reference_nox_ppm", &P::reference_nox_ppm, "NOx0 [ppm]."),
+                       plain("activation_temperature_k", &P::activation_temperature_k, "b [K].")},
+            [](const P& made) { validate(made); });
   proxy
-      .def(py::init([](double t0, double nox0, double b) {
-             const NoxProxy made{t0, nox0, b};
-             validate(made);
-             return made;
-           }),
-           py::kw_only(), arg("reference_temperature_k") = NoxProxy{}.reference_temperature_k,
-           arg("reference_nox_ppm") = NoxProxy{}.reference_nox_ppm,
-           arg("activation_temperature_k") = NoxProxy{}.activation_temperature_k)
-      .def_readonly("reference_temperature_k", &NoxProxy::reference_temperature_k, "T0 [K].")
-      .def_readonly("reference_nox_ppm", &NoxProxy::reference_nox_ppm, "NOx0 [ppm].")
-      .def_readonly("activation_temperature_k", &NoxProxy::activation_temperature_k, "b [K].")
       .def(
           "affine_log_ppm",
           [](const NoxProxy& self, const InputArray& t) {
-            return py::vectorize([&self](double x) { return self.affine_log_ppm(x); })(t);
+            return elementwise([&self](double x) { return self.affine_log_ppm(x); }, t);
           },
           arg("t_max_k"), "NOx [ppm] by the affine-log map.")
       .def(
           "arrhenius_ppm",
           [](const NoxProxy& self, const InputArray& t) {
-            return py::vectorize([&self](double x) { return self.arrhenius_ppm(x); })(t);
+            return elementwise([&self](double x) { return self.arrhenius_ppm(x); }, t);
           },
           arg("t_max_k"), "NOx [ppm] by the Arrhenius map.");
-  bind_value(proxy, "NoxProxy", [](const NoxProxy& self) { return to_dict(self); });
 }
 
 }  // namespace
@@ -130,27 +104,19 @@ Examples
 >>> float(NoxModel(intake_o2_fraction=0.1045).ppm(1900.0))
 150.0
 )");
-  model
-      .def(py::init([](const std::optional<NoxProxy>& proxy, const std::string& map, double o2, double exponent) {
-             const NoxModel made{proxy.value_or(NoxProxy{}), parse_nox_map(map), o2, exponent};
-             validate(made);
-             return made;
-           }),
-           py::kw_only(), arg("proxy") = py::none(), arg("map") = std::string(to_string(NoxModel{}.map)),
-           arg("intake_o2_fraction") = NoxModel{}.intake_o2_fraction, arg("o2_exponent") = NoxModel{}.o2_exponent)
-      .def_property_readonly(
-          "proxy", [](const NoxModel& self) { return self.proxy; }, "Constants of the map.")
-      .def_property_readonly(
-          "map", [](const NoxModel& self) { return as_str(to_string(self.map)); }, "Name of the map.")
-      .def_readonly("intake_o2_fraction", &NoxModel::intake_o2_fraction, "Intake oxygen by volume [-].")
-      .def_readonly("o2_exponent", &NoxModel::o2_exponent, "n [-].")
-      .def(
-          "ppm",
-          [](const NoxModel& self, const InputArray& t) {
-            return py::vectorize([&self](double x) { return self.ppm(x); })(t);
-          },
-          arg("t_max_k"), "NOx [ppm].");
-  bind_value(model, "NoxModel", [](const NoxModel& self) { return to_dict(self); });
+  using M = NoxModel;
+  bind_rows(model, "NoxModel",
+            std::tuple{or_default("proxy", &M::proxy, "Constants of the map."),
+                       choice("map", &M::map, &parse_nox_map, "Name of the map."),
+                       plain("intake_o2_fraction", &M::intake_o2_fraction, "Intake oxygen by volume [-]."),
+                       plain("o2_exponent", &M::o2_exponent, "n [-].")},
+            [](const M& made) { validate(made); });
+  model.def(
+      "ppm",
+      [](const NoxModel& self, const InputArray& t) {
+        return elementwise([&self](double x) { return self.ppm(x); }, t);
+      },
+      arg("t_max_k"), "NOx [ppm].");
 
   py::class_<SoftSensor> sensor(m, "SoftSensor",
                                 R"(Soft NOx sensor: the value of each cycle at once, its level held to a slow analyser.
@@ -178,25 +144,20 @@ Examples
 >>> round(float(sensor.ppm(1900.0, ln_bias=bias)), 1)
 1258.6
 )");
+  using S = SoftSensor;
+  bind_rows(sensor, "SoftSensor",
+            std::tuple{or_default("model", &S::model, "NOx from T_max."),
+                       plain("correction_gain", &S::correction_gain, "c per cycle [-].")},
+            [](const S& soft) { validate(soft); });
   sensor
-      .def(py::init([](const std::optional<NoxModel>& made, double gain) {
-             const SoftSensor soft{made.value_or(NoxModel{}), gain};
-             validate(soft);
-             return soft;
-           }),
-           py::kw_only(), arg("model") = py::none(), arg("correction_gain") = SoftSensor{}.correction_gain)
-      .def_property_readonly(
-          "model", [](const SoftSensor& self) { return self.model; }, "NOx from T_max.")
-      .def_readonly("correction_gain", &SoftSensor::correction_gain, "c per cycle [-].")
       .def(
           "ppm",
           [](const SoftSensor& self, const InputArray& t, double ln_bias) {
-            return py::vectorize([&](double x) { return self.corrected_ppm(x, ln_bias); })(t);
+            return elementwise([&](double x) { return self.corrected_ppm(x, ln_bias); }, t);
           },
           arg("t_max_k"), py::kw_only(), arg("ln_bias") = 0.0, "NOx [ppm] at the log-bias b.")
       .def("next_bias", &SoftSensor::next_bias, arg("ln_bias"), py::kw_only(), arg("analyser_ppm"),
            arg("delayed_soft_ppm"), "The log-bias after one reading; values that are not positive leave it alone.");
-  bind_value(sensor, "SoftSensor", [](const SoftSensor& self) { return to_dict(self); });
 
   py::class_<NoxFit>(m, "NoxFit", R"(A NOx proxy fitted to a sweep, with its spread: what `fit_nox_proxy` returns.
 

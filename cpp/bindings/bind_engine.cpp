@@ -1,15 +1,12 @@
 // Binds include/mgdd/engine: the cycle, its sensitivities and ignition delay.
-#include <algorithm>
-#include <cstddef>
-#include <optional>
 #include <string>
-#include <utility>
 #include <vector>
 
 #include "binding.hpp"
 #include "mgdd/common/error.hpp"
 #include "mgdd/common/units.hpp"
 #include "mgdd/engine/cycle.hpp"
+#include "mgdd/engine/cycle_trace.hpp"
 #include "mgdd/engine/ignition.hpp"
 #include "mgdd/engine/sensitivity.hpp"
 #include "mgdd/engine/wall_heat.hpp"
@@ -26,78 +23,30 @@ py::dict to_dict(const Indicators<double>& indicators) {
   return out;
 }
 
-// Parsed and checked with the GIL, computed without: the release ends with the scope or by reset().
-using FreeGil = std::optional<py::gil_scoped_release>;
-
 // Traces of one cycle; rates belong to the step that ends at the sample, and are zero at the first.
 py::dict simulate(const Cylinder& cylinder, const OperatingPoint& point, double soc_cad, double step_cad,
                   const std::string& integrator) {
-  validate_cycle(cylinder, point, soc_cad);
   const Integrator scheme = parse_integrator(integrator);
-  FreeGil free_gil(std::in_place);
-  const CycleModel<double> model(cylinder, crank_grid(cylinder, step_cad), scheme);
-  CycleWorkspace<double> work = model.make_workspace();
-  const Charge<double> charge = model.charge(point);
-  model.run(charge, soc_cad, work);
-  model.require_physical(work);
-  const Indicators<double> indicators = model.indicators(charge, soc_cad, work);
-  const std::vector<double> angle(model.angles_cad().begin(), model.angles_cad().end());
-  const std::size_t n = angle.size();
-  std::vector<double> pressure(n), volume(n), temperature(n), burned(n, 0.0), release(n, 0.0), loss(n, 0.0),
-      booked(n, 0.0), energy(n, 0.0);
-  const Burn<double> burn(cylinder.burn, soc_cad, charge.burn_duration_cad);
-  const bool fired = charge.fuel_heat_j > 0.0;
-  for (std::size_t k = 0; k < n; ++k) {
-    pressure[k] = work.pressure_pa[k] / units::pa_per_bar;
-    volume[k] = model.volume_m3()[k] / units::m3_per_l;
-    temperature[k] = work.pressure_pa[k] * model.volume_m3()[k] / charge.gas_j_per_k;
-    if (fired) burned[k] = burn.fraction(angle[k]);
-    if (k == 0) continue;
-    const double step = angle[k] - angle[k - 1];
-    release[k] = work.heat_release_j[k - 1] / step;
-    loss[k] = work.heat_loss_j[k - 1] / step;
-    booked[k] = model.booked_work_j(k - 1, work);
-    energy[k] = model.energy_change_j(k - 1, work);
-  }
-  free_gil.reset();
+  const CycleTrace t = without_gil([&] { return trace_cycle(cylinder, point, soc_cad, step_cad, scheme); });
   py::dict out;
-  out["indicators"] = to_dict(indicators);
-  out["trapped_mass_g"] =
-      charge.gas_j_per_k * units::air_molar_mass_kg_per_mol / (units::gas_constant_j_per_molk * units::kg_per_g);
-  out["fuel_heat_j"] = charge.fuel_heat_j;
-  out["burn_duration_cad"] = charge.burn_duration_cad;
-  out["crank_angle_cad"] = to_array(angle);
-  out["pressure_bar"] = to_array(pressure);
-  out["volume_l"] = to_array(volume);
-  out["temperature_k"] = to_array(temperature);
-  out["burned_fraction"] = to_array(burned);
-  out["heat_release_j_per_cad"] = to_array(release);
-  out["heat_loss_j_per_cad"] = to_array(loss);
-  out["work_booked_j"] = to_array(booked);
-  out["energy_change_j"] = to_array(energy);
+  out["indicators"] = to_dict(t.indicators);
+  out["trapped_mass_g"] = t.trapped_mass_g;
+  out["fuel_heat_j"] = t.fuel_heat_j;
+  out["burn_duration_cad"] = t.burn_duration_cad;
+  out["crank_angle_cad"] = to_array(t.angle_cad);
+  out["pressure_bar"] = to_array(t.pressure_bar);
+  out["volume_l"] = to_array(t.volume_l);
+  out["temperature_k"] = to_array(t.temperature_k);
+  out["burned_fraction"] = to_array(t.burned_fraction);
+  out["heat_release_j_per_cad"] = to_array(t.heat_release_j_per_cad);
+  out["heat_loss_j_per_cad"] = to_array(t.heat_loss_j_per_cad);
+  out["work_booked_j"] = to_array(t.work_booked_j);
+  out["energy_change_j"] = to_array(t.energy_change_j);
   return out;
 }
 
-// Indicators over many timings at one operating point, without the GIL.
-py::dict scan(const Cylinder& cylinder, const OperatingPoint& point, const InputArray& soc_cad, double step_cad,
-              const std::string& integrator) {
-  const std::vector<double> timings = to_column(soc_cad, "soc_cad");
-  for (const double soc : timings)
-    validate_timing("soc_cad", soc, cylinder);
-  if (!timings.empty()) validate_cycle(cylinder, point, *std::min_element(timings.begin(), timings.end()));
-  const Integrator scheme = parse_integrator(integrator);
-  std::vector<Indicators<double>> rows(timings.size());
-  {
-    const py::gil_scoped_release release;
-    const CycleModel<double> model(cylinder, crank_grid(cylinder, step_cad), scheme);
-    CycleWorkspace<double> work = model.make_workspace();
-    const Charge<double> charge = model.charge(point);
-    for (std::size_t i = 0; i < timings.size(); ++i) {
-      model.run(charge, timings[i], work);
-      model.require_physical(work);
-      rows[i] = model.indicators(charge, timings[i], work);
-    }
-  }
+// One column per indicator.
+py::dict to_columns(const std::vector<Indicators<double>>& rows) {
   py::dict out;
   for (const auto& f : indicator_fields<double>()) {
     std::vector<double> column;
@@ -108,23 +57,21 @@ py::dict scan(const Cylinder& cylinder, const OperatingPoint& point, const Input
   return out;
 }
 
+py::dict scan(const Cylinder& cylinder, const OperatingPoint& point, const InputArray& soc_cad, double step_cad,
+              const std::string& integrator) {
+  const std::vector<double> timings = to_column(soc_cad, "soc_cad");
+  const Integrator scheme = parse_integrator(integrator);
+  return to_columns(without_gil([&] { return scan_timings(cylinder, point, timings, step_cad, scheme); }));
+}
+
 py::dict bind_sensitivities(const Cylinder& cylinder, const OperatingPoint& point, double soc_cad,
                             const std::vector<std::string>& names, double step_cad, const std::string& integrator) {
   const Integrator scheme = parse_integrator(integrator);
-  FreeGil free_gil(std::in_place);
-  const Sensitivities s = sensitivities(cylinder, point, soc_cad, names, step_cad, scheme);
-  free_gil.reset();
-  py::dict indicators;
-  for (const auto& f : indicator_fields<double>()) {
-    std::vector<double> column;
-    for (const Indicators<double>& direction : s.indicators)
-      column.push_back(direction.*(f.member));
-    indicators[as_str(f.name)] = to_array(column);
-  }
+  const Sensitivities s = without_gil([&] { return sensitivities(cylinder, point, soc_cad, names, step_cad, scheme); });
   py::dict out;
   out["crank_angle_cad"] = to_array(s.angles_cad);
   out["pressure_bar"] = s.pressure_bar;
-  out["indicators"] = indicators;
+  out["indicators"] = to_columns(s.indicators);
   out["value"] = to_dict(s.value);
   return out;
 }
@@ -132,13 +79,9 @@ py::dict bind_sensitivities(const Cylinder& cylinder, const OperatingPoint& poin
 py::dict bind_convergence(const Cylinder& cylinder, const OperatingPoint& point, double soc_cad, double step_cad,
                           const std::string& integrator) {
   const Integrator scheme = parse_integrator(integrator);
-  FreeGil free_gil(std::in_place);
-  const std::vector<ConvergenceEstimate> estimates = convergence(cylinder, point, soc_cad, step_cad, scheme);
-  free_gil.reset();
   py::dict out;
-  for (const auto& e : estimates) {
+  for (const auto& e : without_gil([&] { return convergence(cylinder, point, soc_cad, step_cad, scheme); }))
     out[as_str(e.name)] = py::make_tuple(e.value, e.extrapolated, e.error, e.order, as_str(e.unit));
-  }
   return out;
 }
 
@@ -186,17 +129,17 @@ void bind_engine(py::module_& m) {
       "start_of_injection",
       [](const Cylinder& c, const OperatingPoint& p, double soc) { return to_dict(start_of_injection(c, p, soc)); },
       arg("cylinder"), arg("point"), arg("soc_cad"), "SOC to SOI.");
-  m.def("watson_delay_ms", py::vectorize(&watson_delay_ms), arg("pressure_bar"), arg("temperature_k"));
-  m.def("wolfer_delay_ms", py::vectorize(&wolfer_delay_ms), arg("pressure_bar"), arg("temperature_k"));
-  m.def("hardenberg_hase_delay_cad", py::vectorize(&hardenberg_hase_delay_cad), arg("pressure_bar"),
-        arg("temperature_k"), arg("cetane_number"), arg("piston_speed_m_per_s"));
+  m.def("watson_delay_ms", over<&watson_delay_ms>(), arg("pressure_bar"), arg("temperature_k"), "Ignition delay [ms].");
+  m.def("wolfer_delay_ms", over<&wolfer_delay_ms>(), arg("pressure_bar"), arg("temperature_k"), "Ignition delay [ms].");
+  m.def("hardenberg_hase_delay_cad", over<&hardenberg_hase_delay_cad>(), arg("pressure_bar"), arg("temperature_k"),
+        arg("cetane_number"), arg("piston_speed_m_per_s"), "Ignition delay [°CA].");
 
   m.def(
       "volume_l",
       [](const Cylinder& c, const InputArray& angle) {
         validate(c);
         const Geometry<double> g(c.geometry);
-        return py::vectorize([&g](double a) { return g.volume_m3(a) / units::m3_per_l; })(angle);
+        return elementwise([&g](double a) { return g.volume_m3(a) / units::m3_per_l; }, angle);
       },
       arg("cylinder"), arg("crank_angle_cad"), "Cylinder volume [L].");
   m.def(
@@ -204,7 +147,7 @@ void bind_engine(py::module_& m) {
       [](const Cylinder& c, const InputArray& angle) {
         validate(c);
         const Geometry<double> g(c.geometry);
-        return py::vectorize([&g](double a) { return g.wall_area_m2(g.volume_m3(a)); })(angle);
+        return elementwise([&g](double a) { return g.wall_area_m2(g.volume_m3(a)); }, angle);
       },
       arg("cylinder"), arg("crank_angle_cad"), "Wall area [m2].");
   m.def(
@@ -215,7 +158,7 @@ void bind_engine(py::module_& m) {
           throw ParameterError("burn_duration_cad = " + std::to_string(duration) + " °CA: must be > 0");
         }
         const Burn<double> burn(c.burn, soc, duration);
-        return py::vectorize([&burn](double a) { return burn.fraction(a); })(angle);
+        return elementwise([&burn](double a) { return burn.fraction(a); }, angle);
       },
       arg("cylinder"), arg("crank_angle_cad"), arg("soc_cad"), arg("burn_duration_cad"), "Burned fraction [-].");
   m.def(
@@ -228,9 +171,9 @@ void bind_engine(py::module_& m) {
       arg("cylinder"), arg("point"), "Burn duration in force [°CA].");
   m.attr("timing_window_cad") = py::make_tuple(timing_lower_cad, timing_upper_cad);
   m.attr("woschni_c1_bar_m") = woschni_c1_bar_m;
-  m.def("woschni_coefficient", py::vectorize(&woschni_coefficient<double>), arg("c1_bar_m"), arg("bore_m"),
+  m.def("woschni_coefficient", over<&woschni_coefficient<double>>(), arg("c1_bar_m"), arg("bore_m"),
         arg("pressure_bar"), arg("temperature_k"), arg("gas_velocity_m_per_s"), "Film coefficient [W/(m2 K)].");
-  m.def("hohenberg_coefficient", py::vectorize(&hohenberg_coefficient<double>), arg("c1_bar_m3"), arg("volume_m3"),
+  m.def("hohenberg_coefficient", over<&hohenberg_coefficient<double>>(), arg("c1_bar_m3"), arg("volume_m3"),
         arg("pressure_bar"), arg("temperature_k"), arg("piston_speed_m_per_s"), "Film coefficient [W/(m2 K)].");
 }
 

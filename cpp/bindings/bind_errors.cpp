@@ -1,70 +1,73 @@
-// The exception table: C++ errors become Python classes that also derive from the builtin a user would catch.
+// The exception table: C++ errors become the classes of mgdd.errors.
 #include <exception>
 
 #include "binding.hpp"
+#include "guarded.hpp"
+#include "interruptible.hpp"
 #include "mgdd/common/error.hpp"
 
 namespace mgdd::bindings {
 namespace {
 
-py::object make(const char* name, const py::object& bases, const char* doc) {
-  const std::string qualified = std::string("mgdd._core.") + name;
-  py::object type =
-      py::reinterpret_steal<py::object>(PyErr_NewExceptionWithDoc(qualified.c_str(), doc, bases.ptr(), nullptr));
-  if (!type) throw py::error_already_set();
-  return type;
+// Held for the life of the process: translators outlive the module object.
+const py::object& errors() {
+  static const auto* held = new py::object(py::module_::import("mgdd.errors"));
+  return *held;
 }
 
-// Held for the life of the process: translators outlive the module object.
-struct Types {
-  py::object error, parameter, shape, data, convergence, rig;
-};
-Types& types() {
-  static Types* held = new Types;
-  return *held;
+void raise(const char* name, const Error& error) {
+  const py::object type = errors().attr(name);
+  const py::object field = error.field.empty() ? py::object(py::none()) : py::str(error.field);
+  const py::object bound = error.bound.empty() ? py::object(py::none()) : py::str(error.bound);
+  const py::object made =
+      type(py::str(error.what()), py::arg("field") = field, py::arg("value") = error.value, py::arg("bound") = bound);
+  PyErr_SetObject(type.ptr(), made.ptr());
 }
 
 }  // namespace
 
-void bind_errors(py::module_& m) {
-  Types& t = types();
-  const py::object value_error = py::reinterpret_borrow<py::object>(PyExc_ValueError);
-  const py::object runtime_error = py::reinterpret_borrow<py::object>(PyExc_RuntimeError);
-  t.error = make("Error", py::reinterpret_borrow<py::object>(PyExc_Exception), "Base of everything mgdd raises.");
-  t.parameter = make("ParameterError", py::make_tuple(t.error, value_error),
-                     "A parameter outside its domain; the message names field, value and bound.");
-  t.shape = make("ShapeError", py::make_tuple(t.error, value_error), "An array of the wrong length or dimension.");
-  t.data = make("DataError", py::make_tuple(t.error, value_error),
-                "Measured data that cannot be what the caller says they are.");
-  t.convergence = make("ConvergenceError", py::make_tuple(t.error, runtime_error),
-                       "A numerical method that did not reach its tolerance.");
-  t.rig = make("RigError", py::make_tuple(t.error, py::reinterpret_borrow<py::object>(PyExc_OSError)),
-               "A test rig that cannot do what was asked.");
-  m.attr("Error") = t.error;
-  m.attr("ParameterError") = t.parameter;
-  m.attr("ShapeError") = t.shape;
-  m.attr("DataError") = t.data;
-  m.attr("ConvergenceError") = t.convergence;
-  m.attr("RigError") = t.rig;
-
-  py::register_exception_translator([](std::exception_ptr pointer) {
+void bind_errors(py::module_&) {
+  static_cast<void>(errors());
+  py::register_local_exception_translator([](std::exception_ptr pointer) {
     if (!pointer) return;
     try {
       std::rethrow_exception(pointer);
     } catch (const ParameterError& e) {
-      PyErr_SetString(types().parameter.ptr(), e.what());
+      raise("ParameterError", e);
     } catch (const ShapeError& e) {
-      PyErr_SetString(types().shape.ptr(), e.what());
+      raise("ShapeError", e);
     } catch (const DataError& e) {
-      PyErr_SetString(types().data.ptr(), e.what());
+      raise("DataError", e);
     } catch (const ConvergenceError& e) {
-      PyErr_SetString(types().convergence.ptr(), e.what());
+      raise("ConvergenceError", e);
     } catch (const RigError& e) {
-      PyErr_SetString(types().rig.ptr(), e.what());
+      raise("RigError", e);
     } catch (const Error& e) {
-      PyErr_SetString(types().error.ptr(), e.what());
+      raise("Error", e);
+    } catch (const InUse& e) {
+      raise("InUseError", Error(e.what()));
     }
   });
+}
+
+std::optional<py::error_already_set> raised_by_a_signal() {
+  if (PyErr_CheckSignals() == 0) return std::nullopt;
+  return py::error_already_set();
+}
+
+void refuse(const std::string& name, const py::handle& value, const std::string& bound) {
+  const py::object type = errors().attr("ParameterError");
+  const py::str message =
+      py::str("{} = {}: must be {}").format(name, py::module_::import("mgdd._arguments").attr("shown")(value), bound);
+  const py::object made = type(message, py::arg("field") = name, py::arg("value") = value, py::arg("bound") = bound);
+  PyErr_SetObject(type.ptr(), made.ptr());
+  throw py::error_already_set();
+}
+
+void raise_interrupted(const std::string& kept, const py::object& partial) {
+  const py::object type = errors().attr("Interrupted");
+  PyErr_SetObject(type.ptr(), type(kept, partial).ptr());
+  throw py::error_already_set();
 }
 
 std::vector<double> to_column(const InputArray& array, std::string_view name) {

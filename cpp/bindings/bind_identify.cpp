@@ -1,9 +1,12 @@
 // Binds include/mgdd/identify: the calibration of the cycle model to measured traces.
 #include <optional>
+#include <stop_token>
 #include <string>
+#include <utility>
 #include <vector>
 
 #include "binding.hpp"
+#include "interruptible.hpp"
 #include "mgdd/identify/engine/cylinder_fit.hpp"
 
 namespace mgdd::bindings {
@@ -52,7 +55,8 @@ void bind_identify(py::module_& m) {
   m.attr("correlation_limit") = optimize::LeastSquaresOptions{}.correlation_limit;
   m.def("load_parameters", &load_parameters, "Names that may be freed per load.");
   m.def("common_parameters", &common_parameters, "Cylinder fields that may be freed for all loads.");
-  m.def("estimate_burn", &estimate_burn, arg("trace"), arg("cylinder"), "A start from the trace's heat release.");
+  m.def("estimate_burn", &estimate_burn, arg("trace"), arg("cylinder"), py::call_guard<py::gil_scoped_release>(),
+        "A start from the trace's heat release.");
   m.def("with_burn", &with_burn<double>, arg("cylinder"), arg("burn"), "The cylinder with one load's shape fields.");
   m.def(
       "fit_cylinder",
@@ -62,8 +66,10 @@ void bind_identify(py::module_& m) {
         options.step_cad = step_cad;
         options.integrator = engine::parse_integrator(integrator);
         options.search.max_iterations = max_iterations;
-        const py::gil_scoped_release release;
-        return fit_cylinder(traces, cylinder, start, free, options);
+        return hand_over(interruptible([&](std::stop_token stop) {
+          options.search.stop = std::move(stop);
+          return fit_cylinder(traces, cylinder, start, free, options);
+        }));
       },
       arg("traces"), arg("cylinder"), arg("start"), arg("free"), arg("step_cad"), arg("integrator"),
       arg("max_iterations"), "Levenberg-Marquardt with exact sensitivities; releases the GIL.");

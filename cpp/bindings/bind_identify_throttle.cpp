@@ -1,19 +1,24 @@
 // Binds include/mgdd/identify: smooth throttle, throttle groups, Latin hypercube. The GIL is released while they run.
 #include <array>
+#include <stop_token>
 #include <string>
+#include <utility>
 #include <vector>
 
 #include "binding.hpp"
+#include "interruptible.hpp"
 #include "mgdd/common/bounds.hpp"
+#include "mgdd/identify/free_run_fit.hpp"
 #include "mgdd/identify/multi_start.hpp"
+#include "mgdd/identify/throttle/first_principle_fit.hpp"
 #include "mgdd/identify/throttle/smooth_fit.hpp"
-#include "mgdd/identify/throttle/throttle_groups.hpp"
 #include "mgdd/math/dispatch.hpp"
 
 namespace mgdd::bindings {
 namespace {
 
 using namespace identify;  // NOLINT(google-build-using-namespace): this file binds that room
+using throttle::FirstPrinciple;
 using throttle::SmoothPlant;
 using Set = std::array<double, 10>;
 using Groups = std::array<double, 9>;
@@ -34,17 +39,11 @@ SmoothPlant smooth_plant(double inertia_kgm2, double gear_ratio, double inductan
 std::vector<double> simulate_smooth(const Set& parameters, const InputArray& duty, double step_s,
                                     const std::array<double, 3>& start, double inertia_kgm2, double gear_ratio,
                                     double inductance_h, double supply_v) {
-  const Rk4<SmoothPlant> model{smooth_plant(inertia_kgm2, gear_ratio, inductance_h, supply_v), 1};
+  const dynamics::Rk4<SmoothPlant> family{smooth_plant(inertia_kgm2, gear_ratio, inductance_h, supply_v), 1};
   const std::vector<double> u = to_column(duty, "duty");
   require_positive("step_s", step_s, "s");
-  std::vector<double> angle(u.size());
-  Values<double, 3> x = start;
   const py::gil_scoped_release release;
-  for (std::size_t k = 0; k < u.size(); ++k) {
-    angle[k] = model.output<double>(parameters, x, {u[k]});
-    x = model.step<double>(parameters, x, {u[k]}, step_s);
-  }
-  return angle;
+  return free_run(family, {parameters.begin(), parameters.end()}, {start.begin(), start.end()}, u, step_s);
 }
 
 py::dict fit_smooth(const InputArray& duty, const InputArray& angle_deg, const std::vector<Set>& starts,
@@ -58,21 +57,22 @@ py::dict fit_smooth(const InputArray& duty, const InputArray& angle_deg, const s
   options.upper = upper;
   options.stages.back().cost_tolerance = cost_tolerance;
   options.lanes = lanes;
-  SmoothThrottleFit fit;
-  {
-    const py::gil_scoped_release release;
-    fit = fit_smooth_throttle(plant, {step_s, start, u, y}, starts, options);
-  }
-  py::dict result;
-  result["reports"] = fit.reports;
-  result["best"] = fit.best;
-  result["n_reached"] = fit.n_reached;
-  result["n_sweeps"] = fit.n_sweeps;
-  return result;
+  return hand_over(interruptible([&](std::stop_token stop) {
+                     options.stop = std::move(stop);
+                     return fit_smooth_throttle(plant, {step_s, start, u, y}, starts, options);
+                   }),
+                   [](const SmoothThrottleFit& fit) {
+                     py::dict result;
+                     result["reports"] = fit.reports;
+                     result["best"] = fit.best;
+                     result["n_reached"] = fit.n_reached;
+                     result["n_sweeps"] = fit.n_sweeps;
+                     return result;
+                   });
 }
 
-ThrottleGroups groups_model(double closed_deg, double open_deg, double ramp_deg, int substeps) {
-  ThrottleGroups model;
+FirstPrinciple groups_model(double closed_deg, double open_deg, double ramp_deg, int substeps) {
+  FirstPrinciple model;
   model.closed_deg = closed_deg;
   model.open_deg = open_deg;
   model.ramp_deg = ramp_deg;
@@ -105,35 +105,29 @@ py::dict fit_groups(const std::vector<RecordTuple>& records, const std::vector<S
     stage.search.max_iterations = max_iterations;
     plan.push_back(std::move(stage));
   }
-  const ThrottleGroups model = groups_model(closed_deg, open_deg, ramp_deg, substeps);
-  ThrottleGroupsFit fit;
-  {
-    const py::gil_scoped_release release;
-    fit = fit_throttle_groups(model, data, plan, starts, n_threads);
-  }
-  py::dict result;
-  result["values"] = fit.values;
-  result["reports"] = fit.starts.reports;
-  result["best"] = fit.starts.best;
-  result["n_reached"] = fit.starts.n_reached;
-  return result;
+#include "mgdd/math/dispatch.hpp"
 }
 
 std::vector<double> simulate_groups(const Groups& values, const InputArray& duty, double step_s,
                                     const std::array<double, 3>& start, double closed_deg, double open_deg,
                                     double ramp_deg, int substeps) {
   const std::vector<double> u = to_column(duty, "duty");
+  const FirstPrinciple family = groups_model(closed_deg, open_deg, ramp_deg, substeps);
+  family.validate();
   const py::gil_scoped_release release;
-  return simulate(groups_model(closed_deg, open_deg, ramp_deg, substeps), values, step_s, start, u);
+  return free_run(family, {values.begin(), values.end()}, {start.begin(), start.end()}, u, step_s);
 }
 
 }  // namespace
 
 void bind_identify_throttle(py::module_& m) {
   using py::arg;
+  std::vector<std::string> group_names;
+  for (const FieldInfo& field : FirstPrinciple::parameters)
+    group_names.emplace_back(field.name);
   m.attr("smooth_throttle_names") = py::tuple(py::cast(names_of(SmoothPlant::parameter_names)));
   m.attr("smooth_throttle_example") = py::tuple(py::cast(throttle::smooth_plant_example));
-  m.attr("throttle_group_names") = py::tuple(py::cast(names_of(ThrottleGroups::parameter_names)));
+  m.attr("throttle_group_names") = py::tuple(py::cast(group_names));
   m.def(
       "smooth_throttle_instruction_set", [] { return as_str(to_string(instruction_set())); },
       "Instruction set that the kernel chose on this machine.");
@@ -161,13 +155,13 @@ void bind_identify_throttle(py::module_& m) {
       "throttle_group_bounds",
       [] {
         py::list rows;
-        for (const auto& p : throttle_group_parameters())
+        for (const auto& p : first_principle_parameters())
           rows.append(p);
         return rows;
       },
       "The nine groups with their bounds.");
   m.def("latin_hypercube", &spread_starts, arg("parameters"), arg("n"), arg("seed"),
-        "Points between the bounds, one per cell of every axis.");
+        py::call_guard<py::gil_scoped_release>(), "Points between the bounds, one per cell of every axis.");
 }
 
 }  // namespace mgdd::bindings

@@ -5,20 +5,23 @@
 #include <vector>
 
 #include "binding.hpp"
+#include "guarded.hpp"
+#include "mgdd/common/state.hpp"
 #include "mgdd/optimize/learning/iterative_learning.hpp"
 
 namespace mgdd::bindings {
 namespace {
 
+using BoundLearner = Guarded<optimize::IterativeLearning>;
 using optimize::ConvergenceReport;
 using optimize::IterativeLearning;
 using optimize::LearningSettings;
 
-IterativeLearning make(const InputArray& initial, const std::string& law, const InputArray& impulse_response,
-                       std::optional<int> relative_degree, std::optional<double> k_p, std::optional<double> k_d,
-                       const InputArray& learning_function, std::optional<int> lead, std::optional<double> cutoff,
-                       std::optional<double> error_weight, std::optional<double> input_weight,
-                       std::optional<double> change_weight, double lower, double upper, double rate, bool guard) {
+BoundLearner make(const InputArray& initial, const std::string& law, const InputArray& impulse_response,
+                  std::optional<int> relative_degree, std::optional<double> k_p, std::optional<double> k_d,
+                  const InputArray& learning_function, std::optional<int> lead, std::optional<double> cutoff,
+                  std::optional<double> error_weight, std::optional<double> input_weight,
+                  std::optional<double> change_weight, double lower, double upper, double rate, bool guard) {
   LearningSettings settings{.initial = to_column(initial, "initial"),
                             .law = optimize::parse_learning_law(law),
                             .impulse_response = to_column(impulse_response, "impulse_response"),
@@ -36,13 +39,15 @@ IterativeLearning make(const InputArray& initial, const std::string& law, const 
                             .rate = rate,
                             .guard = guard};
   const py::gil_scoped_release free_gil;
-  return IterativeLearning(std::move(settings));
+  return {"IterativeLearning", IterativeLearning(std::move(settings))};
 }
 
-py::dict convergence(const IterativeLearning& learner) {
-  std::optional<py::gil_scoped_release> free_gil(std::in_place);
-  const ConvergenceReport report = learner.convergence();
-  free_gil.reset();
+py::dict convergence(const BoundLearner& learner) {
+  const ConvergenceReport report = [&] {
+    const auto held = learner.use();
+    const py::gil_scoped_release free_gil;
+    return held->convergence();
+  }();
   py::dict out;
   out["spectral_radius"] = report.spectral_radius;
   out["radius_is_exact"] = report.radius_is_exact;
@@ -61,7 +66,8 @@ py::dict convergence(const IterativeLearning& learner) {
 
 void bind_learning(py::module_& m) {
   const LearningSettings d;
-  py::class_<IterativeLearning>(m, "IterativeLearning", "Iterative learning control, ask and tell.")
+  using B = BoundLearner;
+  py::class_<B>(m, "IterativeLearning", "Iterative learning control, ask and tell.")
       .def(py::init(&make), py::arg("initial"), py::kw_only(), py::arg("law"), py::arg("impulse_response"),
            py::arg("relative_degree") = py::none(), py::arg("k_p") = py::none(), py::arg("k_d") = py::none(),
            py::arg("learning_function"), py::arg("lead") = py::none(), py::arg("cutoff") = py::none(),
@@ -70,29 +76,42 @@ void bind_learning(py::module_& m) {
            py::arg("rate") = d.rate, py::arg("guard") = d.guard)
       .def(
           "ask",
-          [](IterativeLearning& learner) {
-            const auto input = learner.ask();
+          [](B& b) {
+            const auto learner = b.use();
+            const auto input = learner->ask();
             return to_array({input.begin(), input.end()});
           },
           "Input of this trial.")
       .def(
-          "tell", [](IterativeLearning& learner, const InputArray& error) { learner.tell(to_column(error, "error")); },
-          py::arg("error"), "Error of this trial; makes the next input.")
-      .def("convergence", &convergence, "Findings of the linear theory, by name.")
+          "tell",
+          [](B& b, const InputArray& error) {
+            const std::vector<double> column = to_column(error, "error");
+            const auto learner = b.use();
+            const py::gil_scoped_release free_gil;
+            learner->tell(column);
+          },
+          py::arg("error"), "Error of this trial; makes the next input. Releases the GIL.")
+      .def("convergence", &convergence, "Findings of the linear theory, by name. Releases the GIL.")
       .def(
-          "state", [](const IterativeLearning& learner) { return save_state(learner); }, "Columns by name.")
-      .def("restore", &IterativeLearning::restore, py::arg("state"), "Go on from the columns of `state`.")
-      .def_property_readonly("trial", &IterativeLearning::trial, "Number of the trial to come.")
-      .def_property_readonly("frozen", &IterativeLearning::frozen, "Whether the guard stopped learning.")
-      .def_property_readonly("best_trial", &IterativeLearning::best_trial, "Trial of the least error norm.")
-      .def_property_readonly("best_norm", &IterativeLearning::best_norm, "Its error norm.")
+          "state", [](const B& b) { return save_state(*b.use()); }, "Columns by name.")
+      .def(
+          "restore", [](B& b, const StateColumns& state) { b.use()->restore(state); }, py::arg("state"),
+          "Go on from the columns of `state`.")
       .def_property_readonly(
-          "best_input", [](const IterativeLearning& learner) { return to_array(learner.best_input()); }, "Its input.")
+          "trial", [](const B& b) { return b.use()->trial(); }, "Number of the trial to come.")
       .def_property_readonly(
-          "error_norms", [](const IterativeLearning& learner) { return to_array(learner.error_norms()); },
+          "frozen", [](const B& b) { return b.use()->frozen(); }, "Whether the guard stopped learning.")
+      .def_property_readonly(
+          "best_trial", [](const B& b) { return b.use()->best_trial(); }, "Trial of the least error norm.")
+      .def_property_readonly(
+          "best_norm", [](const B& b) { return b.use()->best_norm(); }, "Its error norm.")
+      .def_property_readonly(
+          "best_input", [](const B& b) { return to_array(b.use()->best_input()); }, "Its input.")
+      .def_property_readonly(
+          "error_norms", [](const B& b) { return to_array(b.use()->error_norms()); },
           "Error norms of the latest trials.")
       .def_property_readonly(
-          "relative_degree", [](const IterativeLearning& learner) { return learner.law().relative_degree(); },
+          "relative_degree", [](const B& b) { return b.constant().law().relative_degree(); },
           "Samples until an input acts.");
 }
 

@@ -1,4 +1,5 @@
 // Binds include/mgdd/optimize: measured limits, and what stands between the plant and a component of J.
+#include <numbers>
 #include <string>
 #include <utility>
 #include <vector>
@@ -110,7 +111,7 @@ Examples
           [](const ComponentLag& self, int period, int harmonic) {
             if (period < 1 || harmonic < 1) throw ParameterError("period and harmonic: must be >= 1");
             const SensorResponse r = sensor_response(self, harmonic, period);
-            return std::pair(r.gain, r.phase_rad * 180.0 / 3.14159265358979323846);
+            return std::pair(r.gain, r.phase_rad * 180.0 / std::numbers::pi);
           },
           py::kw_only(), py::arg("period"), py::arg("harmonic") = 1,
           "Gain [-] and phase lag [deg] at `harmonic` oscillations per `period` cycles.")

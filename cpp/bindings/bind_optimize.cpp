@@ -2,6 +2,7 @@
 #include <string>
 
 #include "binding.hpp"
+#include "keywords.hpp"
 #include "mgdd/common/error.hpp"
 #include "mgdd/optimize/least_squares/least_squares.hpp"
 
@@ -61,6 +62,7 @@ FitReport least_squares(const py::function& fun, const Eigen::VectorXd& x0, std:
   bool have_first = true;
   const auto n_residuals = first.usable ? first.residual.shape(0) : x0.size();
   const auto model = [&](const Eigen::VectorXd& x, Eigen::VectorXd& residual, Eigen::MatrixXd* jacobian) {
+    const py::gil_scoped_acquire gil;
     const Evaluation evaluation = have_first ? std::move(first) : call(fun, x);
     have_first = false;
     if (!evaluation.usable) {
@@ -73,7 +75,7 @@ FitReport least_squares(const py::function& fun, const Eigen::VectorXd& x0, std:
     }
     return true;
   };
-  return LeastSquares(std::move(parameters), n_residuals, options).solve(model, x0);
+  return without_gil([&] { return LeastSquares(std::move(parameters), n_residuals, options).solve(model, x0); });
 }
 
 py::dict history(const FitReport& report) {
@@ -107,20 +109,6 @@ py::tuple parameter_state(const Parameter& p) {
   return py::make_tuple(p.name, p.lower, p.upper, p.log_scaled);
 }
 
-py::tuple options_state(const LeastSquaresOptions& o) {
-  return py::make_tuple(o.max_iterations, o.cost_tolerance, o.step_tolerance, o.gradient_tolerance, o.initial_damping,
-                        o.correlation_limit, o.rank_tolerance, o.evaluate_together);
-}
-
-LeastSquaresOptions options_from(int max_iterations, double cost_tolerance, double step_tolerance,
-                                 double gradient_tolerance, double initial_damping, double correlation_limit,
-                                 double rank_tolerance, bool evaluate_together) {
-  const LeastSquaresOptions options{max_iterations,  cost_tolerance,    step_tolerance, gradient_tolerance,
-                                    initial_damping, correlation_limit, rank_tolerance, evaluate_together};
-  options.validate();
-  return options;
-}
-
 void bind_parameter(py::module_& m) {
   py::class_<Parameter>(m, "Parameter", "One unknown of a fit: name, bounds, and whether it is searched as its log.")
       .def(py::init([](std::string name, double lower, double upper, bool log_scaled) {
@@ -145,39 +133,21 @@ void bind_parameter(py::module_& m) {
 }
 
 void bind_options(py::module_& m) {
-  const LeastSquaresOptions d;
-  py::class_<LeastSquaresOptions>(m, "LeastSquaresOptions", "When a least-squares search ends and what it reports.")
-      .def(py::init(&options_from), py::kw_only(), py::arg("max_iterations") = d.max_iterations,
-           py::arg("cost_tolerance") = d.cost_tolerance, py::arg("step_tolerance") = d.step_tolerance,
-           py::arg("gradient_tolerance") = d.gradient_tolerance, py::arg("initial_damping") = d.initial_damping,
-           py::arg("correlation_limit") = d.correlation_limit, py::arg("rank_tolerance") = d.rank_tolerance,
-           py::arg("evaluate_together") = d.evaluate_together)
-      .def_readonly("max_iterations", &LeastSquaresOptions::max_iterations, "Trial steps.")
-      .def_readonly("cost_tolerance", &LeastSquaresOptions::cost_tolerance, "Relative decrease of the cost [-].")
-      .def_readonly("step_tolerance", &LeastSquaresOptions::step_tolerance, "Step over parameters, scaled [-].")
-      .def_readonly("gradient_tolerance", &LeastSquaresOptions::gradient_tolerance,
-                    "Cosine between the residual and a free Jacobian column [-].")
-      .def_readonly("initial_damping", &LeastSquaresOptions::initial_damping, "Relative to unit columns [-].")
-      .def_readonly("correlation_limit", &LeastSquaresOptions::correlation_limit,
-                    "Correlation beyond which two parameters count as unidentifiable [-].")
-      .def_readonly("rank_tolerance", &LeastSquaresOptions::rank_tolerance,
-                    "Singular value, relative to the largest, that counts as zero [-].")
-      .def_readonly("evaluate_together", &LeastSquaresOptions::evaluate_together, "Residual and Jacobian in one call.")
-      .def(
-          "__eq__", [](const LeastSquaresOptions& a, const LeastSquaresOptions& b) { return a == b; },
-          py::is_operator())
-      .def("__repr__",
-           [](const LeastSquaresOptions& o) {
-             return py::str(
-                        "LeastSquaresOptions(max_iterations={!r}, cost_tolerance={!r}, step_tolerance={!r}, "
-                        "gradient_tolerance={!r}, initial_damping={!r}, correlation_limit={!r}, "
-                        "rank_tolerance={!r}, evaluate_together={!r})")
-                 .format(*options_state(o));
-           })
-      .def(py::pickle(&options_state, [](const py::tuple& t) {
-        return options_from(t[0].cast<int>(), t[1].cast<double>(), t[2].cast<double>(), t[3].cast<double>(),
-                            t[4].cast<double>(), t[5].cast<double>(), t[6].cast<double>(), t[7].cast<bool>());
-      }));
+  using O = LeastSquaresOptions;
+  py::class_<O> options(m, "LeastSquaresOptions", "When a least-squares search ends and what it reports.");
+  bind_rows(options, "LeastSquaresOptions",
+            std::tuple{plain("max_iterations", &O::max_iterations, "Trial steps."),
+                       plain("cost_tolerance", &O::cost_tolerance, "Relative decrease of the cost [-]."),
+                       plain("step_tolerance", &O::step_tolerance, "Step over parameters, scaled [-]."),
+                       plain("gradient_tolerance", &O::gradient_tolerance,
+                             "Cosine between the residual and a free Jacobian column [-]."),
+                       plain("initial_damping", &O::initial_damping, "Relative to unit columns [-]."),
+                       plain("correlation_limit", &O::correlation_limit,
+                             "Correlation beyond which two parameters count as unidentifiable [-]."),
+                       plain("rank_tolerance", &O::rank_tolerance,
+                             "Singular value, relative to the largest, that counts as zero [-]."),
+                       plain("evaluate_together", &O::evaluate_together, "Residual and Jacobian in one call.")},
+            [](const O& made) { made.validate(); });
 }
 
 void bind_report(py::module_& m) {

@@ -6,6 +6,7 @@
 #include "binding.hpp"
 #include "mgdd/common/error.hpp"
 #include "mgdd/engine/performance.hpp"
+#include "record_binding.hpp"
 
 namespace mgdd::bindings {
 namespace {
@@ -38,7 +39,7 @@ PerformanceSignals signals_of(const Performance& p, const py::dict& given) {
     if (!given.contains(name)) {
       throw ParameterError("signals lack '" + std::string(name) + "': a term of the performance uses it");
     }
-    signals[term.signal] = given[name].cast<double>();
+    signals[term.signal] = as_number(name, given[name]);
   }
   return signals;
 }

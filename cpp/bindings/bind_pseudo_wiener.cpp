@@ -1,12 +1,14 @@
 // Binds include/mgdd/throttle/models/pseudo_wiener.hpp: the three models behind mgdd.throttle.PseudoWiener.
 #include <algorithm>
 #include <map>
+#include <optional>
 #include <string>
 #include <vector>
 
 #include "binding.hpp"
 #include "mgdd/common/error.hpp"
 #include "mgdd/common/text.hpp"
+#include "mgdd/dynamics/simulate.hpp"
 #include "mgdd/throttle/models/pseudo_wiener.hpp"
 #include "pseudo_wiener_binding.hpp"
 
@@ -70,7 +72,7 @@ void put_setting(P& p, std::string_view name, double value) {
   if (name == "closed_deg") p.frame.closed_deg = value;
   if (name == "open_deg") p.frame.open_deg = value;
   if (name == "sample_s") p.frame.sample_s = value;
-  if (name == "delay_samples") p.frame.delay_samples = whole(name, value);
+  if (name == "delay_samples") p.frame.delay_samples = value;
   if (name == "substeps") p.frame.substeps = whole(name, value);
   if constexpr (requires { p.ramp_deg; }) {
     if (name == "ramp_deg") p.ramp_deg = value;
@@ -161,15 +163,15 @@ std::vector<double> run_free(const BoundModel& self, const std::vector<double>& 
   std::visit(
       [&](const auto& model) {
         auto state = model.at_rest(start_deg, 0.0);
-        simulate(model, state, std::span<const double>(duty), std::span<double>(angle));
+        dynamics::simulate(model, state, std::span<const double>(duty), std::span<double>(angle));
       },
       prepare(self.parameters));
   return angle;
 }
 
 std::vector<double> run_ahead(const BoundModel& self, const std::vector<double>& duty, const std::vector<double>& angle,
-                              std::size_t horizon, const Anchor& anchor) {
-  anchor.validate();
+                              std::size_t horizon, const ObserverGains& gains) {
+  gains.validate();
   if (duty.size() != angle.size()) {
     throw ShapeError("duty has " + std::to_string(duty.size()) + " samples: angle_deg has " +
                      std::to_string(angle.size()));
@@ -183,12 +185,12 @@ std::vector<double> run_ahead(const BoundModel& self, const std::vector<double>&
       [&](const auto& model) {
         auto state = model.at_rest(angle.front(), 0.0);
         for (std::size_t k = 0; k < out.size(); ++k) {
-          model.reanchor(state, angle[k], anchor);
+          model.correct(state, angle[k], gains);
           auto ahead = state;
           for (std::size_t j = 0; j < horizon; ++j)
-            model.advance(ahead, duty[k + j]);
+            model.step(ahead, duty[k + j]);
           out[k] = model.output(ahead);
-          model.advance(state, duty[k]);
+          model.step(state, duty[k]);
         }
       },
       prepare(self.parameters));
@@ -212,7 +214,7 @@ std::pair<std::vector<double>, Eigen::MatrixXd> run_slopes(const BoundModel& sel
           for (std::size_t k = 0; k < n; ++k) {
             D u(duty[k]);
             if (k >= first && k - first < lanes) u.grad[k - first] = 1.0;
-            model.advance(state, u);
+            model.step(state, u);
             const D y = model.output(state);
             angle[k] = y.value;
             for (std::size_t i = 0; i < lanes && first + i < n; ++i)
@@ -243,17 +245,32 @@ void bind_pseudo_wiener(py::module_& m) {
              return py::isinstance<BoundModel>(other) && s == other.cast<const BoundModel&>();
            })
       .def(
+          "at_sample",
+          [](const BoundModel& s, double sample_s, std::optional<int> substeps) {
+            BoundModel other = s;
+            std::visit(
+                [&](auto& p) {
+                  p.frame = p.frame.at_sample(sample_s);
+                  if (substeps) p.frame.substeps = *substeps;
+                },
+                other.parameters);
+            validate(other.parameters);
+            return parameters_of(other.parameters);
+          },
+          arg("sample_s"), py::kw_only(), arg("substeps") = std::nullopt,
+          "Parameters for another sample time, the delay in seconds kept.")
+      .def(
           "simulate",
           [](const BoundModel& s, const InputArray& duty, double start_deg) {
             const auto column = to_column(duty, "duty");
-            return to_array(run_free(s, column, start_deg));
+            return to_array(without_gil([&] { return run_free(s, column, start_deg); }));
           },
           arg("duty"), arg("start_deg"), "Free run: angle [deg] per sample.")
       .def(
           "predict",
           [](const BoundModel& s, const InputArray& duty, const InputArray& angle, std::size_t horizon,
              double angle_gain, double speed_gain_per_s, double bias_gain_duty_per_deg, double offset_gain) {
-            Anchor a;
+            ObserverGains a;
             a.angle_gain = angle_gain;
             a.speed_gain_per_s = speed_gain_per_s;
             a.bias_gain_duty_per_deg = bias_gain_duty_per_deg;
@@ -263,16 +280,17 @@ void bind_pseudo_wiener(py::module_& m) {
             const py::gil_scoped_release release;
             return run_ahead(s, u, y, horizon, a);
           },
-          arg("duty"), arg("angle_deg"), arg("horizon"), py::kw_only(), arg("angle_gain") = Anchor{}.angle_gain,
-          arg("speed_gain_per_s") = Anchor{}.speed_gain_per_s,
-          arg("bias_gain_duty_per_deg") = Anchor{}.bias_gain_duty_per_deg, arg("offset_gain") = Anchor{}.offset_gain,
-          "Re-anchored prediction `horizon` samples ahead [deg].")
+          arg("duty"), arg("angle_deg"), arg("horizon"), py::kw_only(), arg("angle_gain") = ObserverGains{}.angle_gain,
+          arg("speed_gain_per_s") = ObserverGains{}.speed_gain_per_s,
+          arg("bias_gain_duty_per_deg") = ObserverGains{}.bias_gain_duty_per_deg,
+          arg("offset_gain") = ObserverGains{}.offset_gain,
+          "Prediction, corrected at every sample, `horizon` samples ahead [deg].")
       .def(
           "slopes",
           [](const BoundModel& s, const InputArray& duty, double start_deg, double speed_deg_per_s) {
             const auto column = to_column(duty, "duty");
             if (column.empty()) throw ShapeError("duty is empty: a horizon needs at least one sample");
-            const auto [angle, slope] = run_slopes(s, column, start_deg, speed_deg_per_s);
+            const auto [angle, slope] = without_gil([&] { return run_slopes(s, column, start_deg, speed_deg_per_s); });
             return py::make_tuple(to_array(angle), slope);
           },
           arg("duty"), py::kw_only(), arg("start_deg"), arg("speed_deg_per_s") = 0.0,

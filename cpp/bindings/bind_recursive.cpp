@@ -1,17 +1,16 @@
-// Binds include/mgdd/identify/throttle/pseudo_wiener_fit.hpp and recursive_*.hpp: the fit and the on-line update.
-#include <algorithm>
-#include <array>
-#include <cmath>
+// Binds identify/throttle/pseudo_wiener_fit.hpp and identify/online/online_update.hpp: the fit and the on-line update.
 #include <map>
+#include <stop_token>
 #include <string>
+#include <utility>
 #include <vector>
 
 #include "binding.hpp"
+#include "guarded.hpp"
+#include "interruptible.hpp"
 #include "mgdd/common/error.hpp"
 #include "mgdd/common/state.hpp"
-#include "mgdd/identify/online/recursive_gradient.hpp"
-#include "mgdd/identify/online/recursive_pw_r.hpp"
-#include "mgdd/identify/online/recursive_window.hpp"
+#include "mgdd/identify/online/online_update.hpp"
 #include "mgdd/identify/throttle/pseudo_wiener_fit.hpp"
 #include "pseudo_wiener_binding.hpp"
 
@@ -25,18 +24,6 @@ throttle::PwR pw_r(const Numbers& parameters) {
   return std::get<throttle::PwR>(make_pseudo_wiener("pw_r", parameters, "predicted", "set_valued"));
 }
 
-std::array<bool, 5> free_flags(const std::vector<std::string>& names) {
-  constexpr std::array<std::string_view, 5> known{"tau_s", "gain_deg_per_s2_per_duty", "preload_duty",
-                                                  "spring_duty_per_deg", "coulomb_duty"};
-  std::array<bool, 5> flags{};
-  for (const std::string& name : names) {
-    const auto found = std::find(known.begin(), known.end(), name);
-    if (found == known.end()) throw ParameterError("free: '" + name + "' is no parameter of pw_r that can be updated");
-    flags[static_cast<std::size_t>(found - known.begin())] = true;
-  }
-  return flags;
-}
-
 std::pair<std::vector<double>, std::vector<double>> columns(const InputArray& duty, const InputArray& angle) {
   auto u = to_column(duty, "duty");
   auto y = to_column(angle, "angle_deg");
@@ -46,48 +33,26 @@ std::pair<std::vector<double>, std::vector<double>> columns(const InputArray& du
   return {std::move(u), std::move(y)};
 }
 
-struct WindowUpdate {
-  WindowPwR core;
-  std::int64_t iterate_every;
-  std::int64_t count = 0;
-
-  template <class Self, class V>
-  static void visit(Self& self, V& v) {
-    WindowPwR::visit(self.core, v);
-    v("calls", self.count);
-  }
-};
-struct GradientUpdate {
-  GradientPwR core;
-  bool started = false;
-  double duty = 0.0;
-
-  template <class Self, class V>
-  static void visit(Self& self, V& v) {
-    GradientPwR::visit(self.core, v);
-    v("started", self.started);
-    v("last_duty", self.duty);
-  }
-};
-
-// `update(self, duty, angle) -> count` over whole columns, parameters and state: the same face for all three.
-template <class Online, class Update, class Model>
-void bind_online(py::class_<Online>& cls, Update update, Model model) {
+// Whole columns without the GIL, parameters and state: the same face for all three.
+template <class Update>
+void bind_online(py::class_<Guarded<Update>>& cls) {
   using py::arg;
+  using B = Guarded<Update>;
   cls.def(
       "update",
-      [update](Online& self, const InputArray& duty, const InputArray& angle) {
+      [](B& b, const InputArray& duty, const InputArray& angle) {
         const auto [u, y] = columns(duty, angle);
-        std::int64_t changed = 0;
-        for (std::size_t k = 0; k < u.size(); ++k)
-          changed += update(self, u[k], y[k]) ? 1 : 0;
-        return changed;
+        const auto update = b.use();
+        const py::gil_scoped_release release;
+        return take(*update, u, y);
       },
-      arg("duty"), arg("angle_deg"), "Takes samples in order; returns how many changed the model.");
-  cls.def_property_readonly("parameters",
-                            [model](const Online& self) { return parameters_of(throttle::PseudoWiener(model(self))); });
-  cls.def("state", [](const Online& self) { return save_state(self); });
-  cls.def("restore", [](Online& self, const StateColumns& state) { restore_state(self, state); }, arg("state"));
+      arg("duty"), arg("angle_deg"), "Takes samples in order, without the GIL; returns how many changed the model.");
+  cls.def_property_readonly("parameters", [](const B& b) {
+    const throttle::PseudoWiener model = b.use()->model();
+    return parameters_of(model);
+  });
+  cls.def("state", [](const B& b) { return save_state(*b.use()); });
+  cls.def("restore", [](B& b, const StateColumns& state) { restore_state(*b.use(), state); }, arg("state"));
 }
 
 }  // namespace
@@ -99,7 +64,7 @@ void bind_recursive(py::module_& m) {
       "fit_pseudo_wiener",
       [](const std::string& kind, const std::vector<std::pair<InputArray, InputArray>>& records,
          const Numbers& parameters, const std::string& sides, const std::vector<std::string>& free,
-         const std::vector<int>& delays, int starts, std::uint64_t seed, bool only_given_start, bool try_map_start,
+         const std::vector<double>& delays, int starts, std::uint64_t seed, bool only_given_start, bool try_map_start,
          int max_iterations) {
         std::vector<ThrottleRecord> logs;
         for (const auto& [duty, angle] : records) {
@@ -116,84 +81,63 @@ void bind_recursive(py::module_& m) {
         o.try_lag_starts = try_map_start;
         o.search.max_iterations = max_iterations;
         const auto base = make_pseudo_wiener(kind, parameters, "predicted", "set_valued");
-        PseudoWienerFit fit;
-        {
-          const py::gil_scoped_release release;
-          fit = fit_pseudo_wiener(logs, base, o);
-        }
-        return py::make_tuple(parameters_of(fit.model), fit.report, to_array(fit.rmse_deg), fit.hits);
+        return hand_over(interruptible([&](std::stop_token stop) {
+                           o.search.stop = std::move(stop);
+                           return fit_pseudo_wiener(logs, base, o);
+                         }),
+                         [](const PseudoWienerFit& fit) {
+                           return py::make_tuple(parameters_of(fit.model), fit.report, to_array(fit.rmse_deg),
+                                                 fit.hits);
+                         });
       },
       py::kw_only(), arg("kind"), arg("records"), arg("parameters"), arg("sides"), arg("free"), arg("delays"),
       arg("starts"), arg("seed"), arg("only_given_start"), arg("try_map_start"), arg("max_iterations"),
       "Output-error fit from several starts: parameters, report, RMSE of every search, hits of the best.");
 
-  py::class_<RecursivePwR> rls(m, "RecursivePwR", "Recursive least squares of PW-R; use mgdd.identify.OnlineUpdate.");
+  py::class_<Guarded<RecursiveUpdate>> rls(m, "RecursivePwR",
+                                           "Recursive least squares of PW-R; use mgdd.identify.OnlineUpdate.");
   rls.def(py::init([](const Numbers& parameters, const std::vector<std::string>& free, int every, double noise_deg,
                       double forgetting) {
             RecursivePwRSettings s;
             s.model = pw_r(parameters);
-            s.free = free_flags(free);
+            s.free = free_groups(free);
             s.every = every;
             s.noise_deg = noise_deg;
             s.forgetting = forgetting;
-            return RecursivePwR(s);
+            return Guarded<RecursiveUpdate>("OnlineUpdate", RecursiveUpdate(s));
           }),
           arg("parameters"), py::kw_only(), arg("free"), arg("every"), arg("noise_deg"), arg("forgetting"));
-  bind_online(
-      rls, [](RecursivePwR& o, double u, double y) { return o.update(u, y) == UpdateGate::updated; },
-      [](const RecursivePwR& o) { return o.model(); });
+  bind_online(rls);
 
-  py::class_<WindowUpdate> window(m, "WindowPwR", "Sliding-window fit of PW-R; use mgdd.identify.OnlineUpdate.");
+  py::class_<Guarded<WindowUpdate>> window(m, "WindowPwR",
+                                           "Sliding-window fit of PW-R; use mgdd.identify.OnlineUpdate.");
   window.def(py::init([](const Numbers& parameters, const std::vector<std::string>& free, int every, double noise_deg,
                          double prior_spread, std::int64_t iterate_every) {
                WindowPwRSettings s;
                s.model = pw_r(parameters);
-               s.free = free_flags(free);
+               s.free = free_groups(free);
                s.every = every;
                s.noise_deg = noise_deg;
                s.prior_spread = prior_spread;
-               if (iterate_every < 1) {
-                 throw ParameterError("iterate_every = " + std::to_string(iterate_every) + " samples: must be >= 1");
-               }
-               return WindowUpdate{WindowPwR(s), iterate_every};
+               return Guarded<WindowUpdate>("OnlineUpdate", WindowUpdate(s, iterate_every));
              }),
              arg("parameters"), py::kw_only(), arg("free"), arg("every"), arg("noise_deg"), arg("prior_spread"),
              arg("iterate_every"));
-  bind_online(
-      window,
-      [](WindowUpdate& o, double u, double y) {
-        static_cast<void>(o.core.update(u, y));
-        return ++o.count % o.iterate_every == 0 && o.core.iterate();
-      },
-      [](const WindowUpdate& o) { return o.core.model(); });
+  bind_online(window);
 
-  py::class_<GradientUpdate> gradient(m, "GradientPwR", "Gradient update of PW-R; use mgdd.identify.OnlineUpdate.");
+  py::class_<Guarded<GradientUpdate>> gradient(m, "GradientPwR",
+                                               "Gradient update of PW-R; use mgdd.identify.OnlineUpdate.");
   gradient.def(py::init([](const Numbers& parameters, const std::vector<std::string>& free, double adaptation_gain,
                            double noise_deg) {
                  GradientPwRSettings s;
                  s.model = pw_r(parameters);
-                 s.free = free_flags(free);
+                 s.free = free_groups(free);
                  s.adaptation_gain = adaptation_gain;
-                 s.least_error_deg = 3.0 * noise_deg;
-                 return GradientUpdate{GradientPwR(s)};
+                 s.least_error_deg = noise_sigmas * noise_deg;
+                 return Guarded<GradientUpdate>("OnlineUpdate", GradientUpdate(s));
                }),
                arg("parameters"), py::kw_only(), arg("free"), arg("adaptation_gain"), arg("noise_deg"));
-  bind_online(
-      gradient,
-      [](GradientUpdate& o, double u, double y) {
-        if (!o.started) {
-          if (!std::isfinite(y) || !std::isfinite(u)) return false;  // a dropped sample is nowhere to start
-          o.core.start(y, u);
-          o.started = true;
-          o.duty = u;
-          return false;
-        }
-        const auto before = o.core.factors();
-        static_cast<void>(o.core.update(o.duty, y));
-        o.duty = u;
-        return o.core.factors() != before;
-      },
-      [](const GradientUpdate& o) { return o.core.model(); });
+  bind_online(gradient);
 }
 
 }  // namespace mgdd::bindings

@@ -7,28 +7,13 @@
 #include <vector>
 
 #include "binding.hpp"
+#include "keywords.hpp"
 #include "mgdd/throttle/sensors.hpp"
 
 namespace mgdd::bindings {
 namespace {
 
 using namespace throttle;
-
-py::dict to_dict(const SensorPair& p) {
-  py::dict out;
-  out["closed_v"] = p.closed_v;
-  out["span_v"] = p.span_v;
-  out["travel_deg"] = p.travel_deg;
-  out["supply_v"] = p.supply_v;
-  out["noise_v"] = p.noise_v;
-  out["lag_s"] = p.lag_s;
-  out["adc_bits"] = p.adc_bits;
-  out["sum_tolerance_v"] = p.sum_tolerance_v;
-  out["low_v"] = p.low_v;
-  out["high_v"] = p.high_v;
-  out["debounce_s"] = p.debounce_s;
-  return out;
-}
 
 template <class Of>
 py::array_t<double> volts(const std::vector<SensorReading>& rows, Of of) {
@@ -79,7 +64,6 @@ py::dict sense(const SensorPair& pair, const InputArray& angle_deg, double sampl
 }  // namespace
 
 void bind_sensors(py::module_& m) {
-  const SensorPair d;
   py::class_<SensorPair> cls(m, "SensorPair",
                              R"(Two redundant position sensors of a throttle with opposite slopes, and their check.
 
@@ -117,30 +101,21 @@ Examples
 >>> SensorPair().adc_bits
 12
 )");
-  cls.def(py::init([](double closed_v, double span_v, double travel_deg, double supply_v, double noise_v, double lag_s,
-                      int adc_bits, double sum_tolerance_v, double low_v, double high_v, double debounce_s) {
-            const SensorPair p{closed_v, span_v,          travel_deg, supply_v, noise_v,   lag_s,
-                               adc_bits, sum_tolerance_v, low_v,      high_v,   debounce_s};
-            validate(p);
-            return p;
-          }),
-          py::kw_only(), py::arg("closed_v") = d.closed_v, py::arg("span_v") = d.span_v,
-          py::arg("travel_deg") = d.travel_deg, py::arg("supply_v") = d.supply_v, py::arg("noise_v") = d.noise_v,
-          py::arg("lag_s") = d.lag_s, py::arg("adc_bits") = d.adc_bits, py::arg("sum_tolerance_v") = d.sum_tolerance_v,
-          py::arg("low_v") = d.low_v, py::arg("high_v") = d.high_v, py::arg("debounce_s") = d.debounce_s);
-  cls.def_readonly("closed_v", &SensorPair::closed_v, "First sensor at 0 deg [V].");
-  cls.def_readonly("span_v", &SensorPair::span_v, "Rise of the first sensor over the travel [V].");
-  cls.def_readonly("travel_deg", &SensorPair::travel_deg, "Angle of the full span [deg].");
-  cls.def_readonly("supply_v", &SensorPair::supply_v, "Supply of sensors and converter [V].");
-  cls.def_readonly("noise_v", &SensorPair::noise_v, "Noise of each sensor, rms [V].");
-  cls.def_readonly("lag_s", &SensorPair::lag_s, "Time constant of the anti-alias filter [s].");
-  cls.def_readonly("adc_bits", &SensorPair::adc_bits, "Bits of the converter.");
-  cls.def_readonly("sum_tolerance_v", &SensorPair::sum_tolerance_v, "Tolerance of the sum [V].");
-  cls.def_readonly("low_v", &SensorPair::low_v, "Lowest healthy voltage [V].");
-  cls.def_readonly("high_v", &SensorPair::high_v, "Highest healthy voltage [V].");
-  cls.def_readonly("debounce_s", &SensorPair::debounce_s, "Time a check must fail [s].");
-  cls.def_property_readonly("lsb_v", &SensorPair::lsb_v, "Step of the converter [V].");
-  bind_value(cls, "SensorPair", [](const SensorPair& p) { return to_dict(p); });
+  using P = SensorPair;
+  bind_rows(cls, "SensorPair",
+            std::tuple{plain("closed_v", &P::closed_v, "First sensor at 0 deg [V]."),
+                       plain("span_v", &P::span_v, "Rise of the first sensor over the travel [V]."),
+                       plain("travel_deg", &P::travel_deg, "Angle of the full span [deg]."),
+                       plain("supply_v", &P::supply_v, "Supply of sensors and converter [V]."),
+                       plain("noise_v", &P::noise_v, "Noise of each sensor, rms [V]."),
+                       plain("lag_s", &P::lag_s, "Time constant of the anti-alias filter [s]."),
+                       plain("adc_bits", &P::adc_bits, "Bits of the converter."),
+                       plain("sum_tolerance_v", &P::sum_tolerance_v, "Tolerance of the sum [V]."),
+                       plain("low_v", &P::low_v, "Lowest healthy voltage [V]."),
+                       plain("high_v", &P::high_v, "Highest healthy voltage [V]."),
+                       plain("debounce_s", &P::debounce_s, "Time a check must fail [s].")},
+            [](const P& pair) { validate(pair); });
+  cls.def_property_readonly("lsb_v", &P::lsb_v, "Step of the converter [V].");
   py::list kinds;
   for (const auto& [kind, name] : sensor_fault_names())
     kinds.append(as_str(name));

@@ -227,8 +227,11 @@ py::array_t<double> simulate_lanes(const std::vector<Throttle>& throttles, const
 
 py::array_t<double> air_torque(const Throttle& t, const InputArray& angle_deg) {
   std::vector<double> torque = to_column(angle_deg, "angle_deg");
-  for (double& value : torque)
-    value = airflow_torque_nm(t, value);
+  {
+    const py::gil_scoped_release release;
+    for (double& value : torque)
+      value = airflow_torque_nm(t, value);
+  }
   return to_array(torque);
 }
 

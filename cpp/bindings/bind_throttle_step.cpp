@@ -2,7 +2,6 @@
 // mgdd.throttle.to_iosystem.
 #include <array>
 #include <cmath>
-#include <cstring>
 #include <map>
 #include <string>
 #include <type_traits>
@@ -12,6 +11,7 @@
 
 #include "binding.hpp"
 #include "mgdd/common/error.hpp"
+#include "mgdd/common/units.hpp"
 #include "mgdd/throttle/models/pseudo_wiener.hpp"
 #include "mgdd/throttle/simulation.hpp"
 #include "pseudo_wiener_binding.hpp"
@@ -28,7 +28,7 @@ void require_finite(const double* state, std::size_t size, double duty) {
   if (!std::isfinite(duty)) throw DataError("duty is not finite");
 }
 
-constexpr double rad_per_deg = 0.017453292519943295;
+using units::rad_per_deg;
 constexpr std::size_t n_states = 7;
 using Numbers = std::array<double, n_states>;
 
@@ -62,23 +62,24 @@ struct Stepper {
   }
 };
 
-// The states of pseudo-Wiener models are nothing but doubles, so they go out and in as such.
-template <class State>
-std::vector<double> numbers_of(const State& s) {
-  static_assert(std::is_trivially_copyable_v<State> && sizeof(State) % sizeof(double) == 0);
-  std::vector<double> out(sizeof(State) / sizeof(double));
-  std::memcpy(out.data(), &s, sizeof(State));
+template <class M>
+std::vector<double> numbers_of(const typename M::State& s) {
+  std::vector<double> out;
+  for (const double* number : M::numbers(s))
+    out.push_back(*number);
   return out;
 }
 
-template <class State>
-State state_of(const std::vector<double>& numbers) {
-  if (numbers.size() != sizeof(State) / sizeof(double)) {
+template <class M>
+typename M::State state_of(const std::vector<double>& numbers) {
+  typename M::State s;
+  const auto places = M::numbers(s);
+  if (numbers.size() != places.size()) {
     throw ShapeError("state has " + std::to_string(numbers.size()) + " values: must have " +
-                     std::to_string(sizeof(State) / sizeof(double)));
+                     std::to_string(places.size()));
   }
-  State s;
-  std::memcpy(static_cast<void*>(&s), numbers.data(), sizeof(State));
+  for (std::size_t i = 0; i < places.size(); ++i)
+    *places[i] = numbers[i];
   return s;
 }
 
@@ -89,21 +90,22 @@ struct PseudoWienerStepper {
   explicit PseudoWienerStepper(PseudoWiener p) : parameters(std::move(p)), model(prepare(parameters)) {}
 
   std::vector<double> at_rest(double angle_deg) const {
-    return std::visit([&](const auto& m) { return numbers_of(m.at_rest(angle_deg, 0.0)); }, model);
+    return std::visit([&](const auto& m) { return numbers_of<std::decay_t<decltype(m)>>(m.at_rest(angle_deg, 0.0)); },
+                      model);
   }
   std::vector<double> advance(const std::vector<double>& state, double duty) const {
     require_finite(state.data(), state.size(), duty);
     return std::visit(
         [&](const auto& m) {
-          auto s = state_of<typename std::decay_t<decltype(m)>::State>(state);
-          m.advance(s, duty);
-          return numbers_of(s);
+          using M = std::decay_t<decltype(m)>;
+          auto s = state_of<M>(state);
+          m.step(s, duty);
+          return numbers_of<M>(s);
         },
         model);
   }
   double output(const std::vector<double>& state) const {
-    return std::visit(
-        [&](const auto& m) { return m.output(state_of<typename std::decay_t<decltype(m)>::State>(state)); }, model);
+    return std::visit([&](const auto& m) { return m.output(state_of<std::decay_t<decltype(m)>>(state)); }, model);
   }
 };
 

@@ -10,6 +10,8 @@
 #include <cstddef>
 #include <string>
 #include <string_view>
+#include <type_traits>
+#include <utility>
 #include <vector>
 
 namespace mgdd::bindings {
@@ -20,6 +22,9 @@ namespace py = pybind11;
 using InputArray = py::array_t<double, py::array::c_style | py::array::forcecast>;
 
 std::vector<double> to_column(const InputArray& array, std::string_view name);
+
+/// mgdd.errors.ParameterError `name = value: must be bound`, for what only Python can show.
+[[noreturn]] void refuse(const std::string& name, const py::handle& value, const std::string& bound);
 
 /// Text of a name in the core.
 inline py::str as_str(std::string_view s) {
@@ -52,6 +57,56 @@ void bind_value(py::class_<Record>& cls, const char* name, ToDict to_dict) {
 
 /// A new NumPy array that owns a copy of the numbers.
 py::array_t<double> to_array(const std::vector<double>& column);
+
+/// What `work()` gives, computed without the GIL.
+template <class Work>
+auto without_gil(Work work) {
+  const py::gil_scoped_release release;
+  return work();
+}
+
+/// `f(x)` of every element, without the GIL; a number gives a number, an array one of its shape.
+template <class F>
+py::object elementwise(F f, const InputArray& x) {
+  if (x.ndim() == 0) return py::float_(f(*x.data()));
+  py::array_t<double> out(std::vector<py::ssize_t>(x.shape(), x.shape() + x.ndim()));
+  const double* from = x.data();
+  double* to = out.mutable_data();
+  {
+    const py::gil_scoped_release release;
+    for (py::ssize_t i = 0; i < x.size(); ++i)
+      to[i] = f(from[i]);
+  }
+  return out;
+}
+
+/// The same of several arrays that NumPy broadcasts together.
+template <class F, class... Arrays>
+py::object elementwise(F f, const InputArray& first, const Arrays&... rest) {
+  const py::tuple wide(py::module_::import("numpy").attr("broadcast_arrays")(first, rest...));
+  std::vector<InputArray> columns;
+  for (const py::handle& array : wide)
+    columns.emplace_back(py::reinterpret_borrow<py::object>(array));
+  std::size_t element = 0;
+  const auto at = [&]<std::size_t... I>(std::index_sequence<I...>) { return f(columns[I].data()[element]...); };
+  const auto next = [&](double) {
+    const double value = at(std::make_index_sequence<1 + sizeof...(rest)>{});
+    ++element;
+    return value;
+  };
+  return elementwise(next, columns.front());
+}
+
+/// A function of numbers as one of arrays.
+template <auto f>
+auto over() {
+  return []<class... Number>(double (*)(Number...)) {
+    return [](const std::conditional_t<true, InputArray, Number>&... x) { return elementwise(f, x...); };
+  }(+f);
+}
+
+/// Errors of mgdd in place of pybind11's list of signatures, for every function and class of the module; call it last.
+void make_refusals_readable(const py::module_& m);
 
 void bind_errors(py::module_& m);
 void bind_optimize(py::module_& m);

@@ -31,4 +31,5 @@ PYBIND11_MODULE(_core, m) {
   bind_bench(m);
   bind_loop(m);
   bind_virtual_throttle(m);
+  make_refusals_readable(m);
 }

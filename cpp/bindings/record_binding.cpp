@@ -28,23 +28,18 @@ py::str short_representation(const char* name, const py::dict& now, const py::di
 }
 
 std::string as_name(const py::handle& key, const py::handle& value) {
-  if (!py::isinstance<py::str>(value)) {
-    throw ParameterError(std::string(py::str(key)) + " = " + std::string(py::str(py::repr(value))) +
-                         ": must be a name");
-  }
+  if (!py::isinstance<py::str>(value)) refuse(std::string(py::str(key)), value, "a name");
   return value.cast<std::string>();
 }
 
 double as_number(const py::handle& key, const py::handle& value) {
-  if (py::isinstance<py::bool_>(value) || !(py::isinstance<py::float_>(value) || PyNumber_Check(value.ptr()))) {
-    throw ParameterError(std::string(py::str(key)) + " = " + std::string(py::str(py::repr(value))) +
-                         ": must be a number");
+  if (py::isinstance<py::bool_>(value) || py::isinstance<py::str>(value)) {
+    refuse(std::string(py::str(key)), value, "one number");
   }
   const py::object number = py::reinterpret_steal<py::object>(PyNumber_Float(value.ptr()));
   if (!number) {
     PyErr_Clear();
-    throw ParameterError(std::string(py::str(key)) + " = " + std::string(py::str(py::repr(value))) +
-                         ": must be one real number");
+    refuse(std::string(py::str(key)), value, "one number");
   }
   return number.cast<double>();
 }

@@ -1,30 +1,43 @@
-// What the bindings of all seekers share: inputs from Python, the recorded run, ask and tell, state and history.
+// What the bindings of all seekers share: inputs from Python, ask and tell, state and history.
 #pragma once
 
 #include <cmath>
 #include <cstdint>
+#include <limits>
+#include <map>
+#include <optional>
 #include <string>
+#include <tuple>
 #include <utility>
 #include <vector>
 
 #include "binding.hpp"
+#include "guarded.hpp"
+#include "keywords.hpp"
 #include "mgdd/common/error.hpp"
 #include "mgdd/common/state.hpp"
+#include "mgdd/optimize/seekers/seeker_history.hpp"
 #include "mgdd/optimize/seekers/seekers.hpp"
+#include "record_binding.hpp"
 
 namespace mgdd::bindings {
 
-/// A seeker with what it was told: the history that `.history` shows.
+/// A seeker as Python holds it.
 template <class S>
-struct Recorded {
-  S seeker;
-  std::vector<double> applied{}, estimate{}, objective{};  // one row per told cycle; estimate before the tell
-  std::vector<double> misfire{}, cycle{};
-};
+using BoundSeeker = Guarded<optimize::RecordedSeeker<S>>;
+
+template <class S>
+BoundSeeker<S> bound(const char* name, S seeker) {
+  return {name, optimize::RecordedSeeker<S>(std::move(seeker))};
+}
 
 /// A number (of any kind that NumPy takes) as a column of one, or a column.
 inline std::vector<double> numbers_from(const py::object& value, std::string_view name) {
-  const InputArray array(value);
+  const InputArray array = InputArray::ensure(value);
+  if (!array) {
+    PyErr_Clear();
+    refuse(std::string(name), value, "one number or a sequence of numbers");
+  }
   if (array.ndim() == 0) return {*array.data()};
   return to_column(array, name);
 }
@@ -32,7 +45,7 @@ inline std::vector<double> numbers_from(const py::object& value, std::string_vie
 /// A number for every input, or one number per input.
 inline optimize::Inputs inputs_from(const py::object& value, std::string_view name, Eigen::Index inputs) {
   if (py::isinstance<py::float_>(value) || py::isinstance<py::int_>(value)) {
-    return optimize::Inputs::Constant(inputs, value.cast<double>());
+    return optimize::Inputs::Constant(inputs, as_number(py::str(name.data(), name.size()), value));
   }
   const std::vector<double> column = numbers_from(value, name);
   if (column.size() > optimize::max_inputs) {
@@ -68,13 +81,6 @@ inline py::dict space_dict(const optimize::SearchSpace& space) {
   return out;
 }
 
-inline py::object nan_as_none(double value) {
-  return std::isnan(value) ? py::object(py::none()) : py::object(py::float_(value));
-}
-inline double none_as_nan(const std::optional<double>& value) {
-  return value.value_or(std::numeric_limits<double>::quiet_NaN());
-}
-
 /// Each sentence of advice becomes a UserWarning of the caller.
 inline void warn_each(const std::vector<std::string>& advice) {
   for (const std::string& sentence : advice) {
@@ -94,7 +100,7 @@ optimize::Reading reading_from(const S& seeker, const py::object& j, const py::o
   if (j.is_none() && !misfire) throw ShapeError("J is missing: tell what was measured, or misfire=True");
   if (!j.is_none()) {
     if (py::isinstance<py::float_>(j) || py::isinstance<py::int_>(j)) {
-      buffer.components.assign(1, j.cast<double>());
+      buffer.components.assign(1, as_number(py::str("J"), j));
     } else {
       buffer.components = numbers_from(j, "J");
     }
@@ -109,7 +115,7 @@ optimize::Reading reading_from(const S& seeker, const py::object& j, const py::o
       if (!by_name.contains(limit.name)) {
         throw ShapeError("limits: '" + limit.name + "' is missing: tell one value for every limit of the settings");
       }
-      buffer.limits.push_back(by_name[limit.name.c_str()].template cast<double>());
+      buffer.limits.push_back(as_number(py::str(limit.name), by_name[limit.name.c_str()]));
     }
   } else if (!limits.is_none()) {
     buffer.limits = numbers_from(limits, "limits");
@@ -117,32 +123,131 @@ optimize::Reading reading_from(const S& seeker, const py::object& j, const py::o
   return {buffer.components, buffer.limits, misfire};
 }
 
+/// One number for all inputs, or one per input; the space of the settings stands already.
+template <class Place>
+struct PerInput : Row<Place> {
+  using typename Row<Place>::Record;
+  using Argument = py::object;
+
+  void put(Record& settings, const py::object& given) const {
+    this->at(settings) = inputs_from(given, this->name, settings.space.size());
+  }
+  std::vector<double> get(const Record& settings) const { return list_of(this->at(settings)); }
+};
+template <class Place>
+PerInput<Place> per_input(const char* name, Place place) {
+  return {{name, place}};
+}
+template <class Place>
+py::arg_v keyword(const PerInput<Place>& row, const typename PlaceOf<Place>::Record& standard) {
+  return py::arg_v(row.name, row.at(standard)[0]);
+}
+
+/// The same, empty where Python writes None.
+template <class Place>
+struct PerInputOrNone : PerInput<Place> {
+  using typename Row<Place>::Record;
+
+  void put(Record& settings, const py::object& given) const {
+    if (!given.is_none()) PerInput<Place>::put(settings, given);
+  }
+};
+template <class Place>
+PerInputOrNone<Place> per_input_or_none(const char* name, Place place) {
+  return {{{name, place}}};
+}
+template <class Place>
+py::arg_v keyword(const PerInputOrNone<Place>& row, const typename PlaceOf<Place>::Record&) {
+  return py::arg_v(row.name, py::none());
+}
+
+/// A number > 0; None leaves the choice to the seeker.
+template <class Place>
+struct PositiveOrOwn : Row<Place> {
+  using typename Row<Place>::Record;
+  using Argument = std::optional<double>;
+
+  void put(Record& settings, Argument given) const {
+    if (given && !(*given > 0.0)) throw ParameterError(this->name, *given, "must be > 0");
+    if (given) this->at(settings) = *given;
+  }
+  double get(const Record& settings) const { return this->at(settings); }
+};
+template <class Place>
+PositiveOrOwn<Place> positive_or_own(const char* name, Place place) {
+  return {{name, place}};
+}
+template <class Place>
+py::arg_v keyword(const PositiveOrOwn<Place>& row, const typename PlaceOf<Place>::Record&) {
+  return py::arg_v(row.name, py::none());
+}
+
+/// Amplitude, period and harmonics of a dithering seeker.
+template <class Settings>
+auto dither_rows() {
+  using Dither = optimize::DitherSettings;
+  const auto place = [](auto member) { return Path{&Settings::dither, member}; };
+  return std::tuple{per_input("amplitude", place(&Dither::amplitude)), plain("period", place(&Dither::period)),
+                    or_default("harmonics", place(&Dither::harmonics))};
+}
+
+/// __init__ of start, bounds and the rows, all keyword-only, and `settings`, which makes the seeker again.
+template <class S, class Settings, class... Rows, class Lower, class Upper>
+void bind_settings(py::class_<BoundSeeker<S>>& cls, const char* name, const Settings& standard,
+                   const std::tuple<Rows...>& rows, const Lower& lower, const Upper& upper) {
+  const auto make = [name, rows](const py::object& start, const py::object& low, const py::object& high,
+                                 typename Rows::Argument... values) {
+    Settings settings;
+    settings.space = space_from(start, low, high);
+    std::apply([&](const Rows&... row) { (row.put(settings, std::move(values)), ...); }, rows);
+    S made(std::move(settings));
+    if constexpr (requires { made.settings().advice(); }) warn_each(made.settings().advice());
+    return bound(name, std::move(made));
+  };
+  std::apply(
+      [&](const Rows&... row) {
+        cls.def(py::init(make), py::kw_only(), py::arg("start"), lower, upper, keyword(row, standard)...);
+      },
+      rows);
+  cls.def_property_readonly(
+      "settings",
+      [rows](const BoundSeeker<S>& b) {
+        const auto& settings = b.constant().seeker().settings();
+        py::dict out = space_dict(settings.space);
+        std::apply([&](const Rows&... row) { ((out[row.name] = row.get(settings)), ...); }, rows);
+        return out;
+      },
+      "Arguments that make this seeker again.");
+}
+
+/// The columns of a history; `applied` and `estimate` have one column per input.
+inline py::dict history_columns(const StateColumns& history, Eigen::Index inputs) {
+  py::dict out;
+  for (const auto& [name, values] : history) {
+    const bool table = name == "applied" || name == "estimate";
+    const py::ssize_t width = table ? inputs : 1;
+    const py::ssize_t rows = static_cast<py::ssize_t>(values.size()) / width;
+    out[as_str(name)] = table ? py::array_t<double>({rows, width}, values.data()) : to_array(values);
+  }
+  return out;
+}
+
 /// ask, tell, restart, estimate, state and history of one seeker class.
 template <class S>
-void bind_seeking(py::class_<Recorded<S>>& cls) {
-  using R = Recorded<S>;
+void bind_seeking(py::class_<BoundSeeker<S>>& cls) {
+  using B = BoundSeeker<S>;
   cls.def(
-         "ask", [](R& r) { return input_array(r.seeker.ask()); },
+         "ask", [](B& b) { return input_array(b.use()->ask()); },
          "The input to apply in this cycle, shape (inputs,). Asking again before tell gives the same.")
       .def(
           "tell",
-          [](R& r, const py::object& j, const py::object& limits, bool misfire) {
+          [](B& b, const py::object& j, const py::object& limits, bool misfire) {
             ReadingBuffer buffer;
-            const optimize::Reading reading = reading_from(r.seeker, j, limits, misfire, buffer);
-            const optimize::Inputs before = r.seeker.estimate();
-            const optimize::Inputs applied = r.seeker.applied();  // a seeker may move it while it learns
-            const auto cycle = static_cast<double>(r.seeker.protocol().cycle);
-            const optimize::TellStatus status = r.seeker.tell(reading);
-            optimize::require(status, r.seeker.protocol(), reading, r.seeker.component_count(), r.seeker.limit_count());
-            const bool fired = status == optimize::TellStatus::accepted;
-            double sum = fired ? 0.0 : std::numeric_limits<double>::quiet_NaN();
-            for (const double c : reading.components)
-              sum += c;
-            r.applied.insert(r.applied.end(), applied.data(), applied.data() + applied.size());
-            r.estimate.insert(r.estimate.end(), before.data(), before.data() + before.size());
-            r.objective.push_back(sum);
-            r.misfire.push_back(fired ? 0.0 : 1.0);
-            r.cycle.push_back(cycle);
+            const optimize::Reading reading = reading_from(b.constant().seeker(), j, limits, misfire, buffer);
+            const auto r = b.use();
+            const S& seeker = r->seeker();
+            optimize::require(r->tell(reading), seeker.protocol(), reading, seeker.component_count(),
+                              seeker.limit_count());
           },
           py::arg("J") = py::none(), py::arg("limits") = py::none(), py::kw_only(), py::arg("misfire") = false,
           "Accept what was measured at the input of the last ask.\n\n"
@@ -151,81 +256,57 @@ void bind_seeking(py::class_<Recorded<S>>& cls) {
           "Raises ParameterError (tell without ask), ShapeError (wrong count), DataError (not finite, or beyond\n"
           "1e30 in magnitude); the state is unchanged then.")
       .def(
-          "restart", [](R& r) { r.seeker.restart(); },
+          "restart", [](B& b) { b.use()->restart(); },
           "The operating point has changed: forget the window, keep the estimate.")
       .def_property_readonly(
-          "estimate", [](const R& r) { return input_array(r.seeker.estimate()); },
+          "estimate", [](const B& b) { return input_array(b.use()->estimate()); },
           "Present estimate of the optimum, shape (inputs,).")
       .def_property_readonly(
-          "cycle", [](const R& r) { return r.seeker.protocol().cycle; }, "Cycles told so far, misfires included.")
+          "cycle", [](const B& b) { return b.use()->seeker().protocol().cycle; },
+          "Cycles told so far, misfires included.")
       .def_property_readonly(
-          "misfires", [](const R& r) { return r.seeker.protocol().misfires; }, "Misfired cycles told so far.")
+          "misfires", [](const B& b) { return b.use()->seeker().protocol().misfires; }, "Misfired cycles told so far.")
       .def_property_readonly(
-          "component_count", [](const R& r) { return r.seeker.component_count(); }, "Components of J that tell takes.")
+          "component_count", [](const B& b) { return b.constant().component_count(); },
+          "Components of J that tell takes.")
       .def_property_readonly(
           "limit_names",
-          [](const R& r) {
+          [](const B& b) {
             std::vector<std::string> names;
-            for (const optimize::Limit& limit : r.seeker.settings().limits)
+            for (const optimize::Limit& limit : b.constant().seeker().settings().limits)
               names.push_back(limit.name);
             return names;
           },
           "Names of the limits, in the order of tell.")
       .def_property(
-          "state", [](const R& r) { return save_state(r.seeker); },
-          [](R& r, const StateColumns& columns) { restore_state(r.seeker, columns); },
+          "state", [](const B& b) { return save_state(b.use()->seeker()); },
+          [](B& b, const StateColumns& columns) { b.use()->restore(columns); },
           "What the run needs to go on bit for bit: named lists of numbers, JSON-able. Setting it restores the run;\n"
           "a state of another kind or size raises ParameterError and changes nothing.")
       .def(
           "_history_columns",
-          [](const R& r) {
-            py::dict out;
-            const auto rows = static_cast<py::ssize_t>(r.objective.size());
-            const py::ssize_t inputs = r.seeker.estimate().size();
-            out["applied"] = py::array_t<double>({rows, inputs}, r.applied.data());
-            out["estimate"] = py::array_t<double>({rows, inputs}, r.estimate.data());
-            out["objective"] = to_array(r.objective);
-            out["misfire"] = to_array(r.misfire);
-            out["cycle"] = to_array(r.cycle);
-            return out;
+          [](const B& b) {
+            const StateColumns history = b.use()->history().save();
+            return history_columns(history, b.constant().seeker().settings().space.size());
           },
           "Columns behind .history.")
       .def(
           "_set_history_columns",
-          [](R& r, const InputArray& applied, const InputArray& estimate, const InputArray& objective,
-             const InputArray& misfire, const InputArray& cycle) {
-            const py::ssize_t rows = objective.size();
-            const py::ssize_t entries = rows * r.seeker.estimate().size();
-            if (applied.size() != entries || estimate.size() != entries || misfire.size() != rows ||
-                cycle.size() != rows) {
-              throw ShapeError("history: its columns do not belong together, or to another number of inputs");
-            }
-            const auto column = [](const InputArray& a) { return std::vector<double>(a.data(), a.data() + a.size()); };
-            r.applied = column(applied);
-            r.estimate = column(estimate);
-            r.objective = column(objective);
-            r.misfire = column(misfire);
-            r.cycle = column(cycle);
+          [](B& b, const std::map<std::string, InputArray>& given) {
+            StateColumns columns;
+            for (const auto& [name, values] : given)
+              columns[name].assign(values.data(), values.data() + values.size());
+            b.use()->history().restore(columns);
           },
-          py::kw_only(), py::arg("applied"), py::arg("estimate"), py::arg("objective"), py::arg("misfire"),
-          py::arg("cycle"), "Columns behind .history, as _history_columns gave them.")
-      .def(
-          "_clear_history",
-          [](R& r) {
-            r.applied.clear();
-            r.estimate.clear();
-            r.objective.clear();
-            r.misfire.clear();
-            r.cycle.clear();
-          },
-          "Forget the history, keep the state.");
+          py::arg("columns"), "Columns behind .history, as _history_columns gave them.")
+      .def("_clear_history", [](B& b) { b.use()->history().clear(); }, "Forget the history, keep the state.");
 }
 
 /// The slope that the seeker estimates.
 template <class S>
-void bind_gradient(py::class_<Recorded<S>>& cls) {
+void bind_gradient(py::class_<BoundSeeker<S>>& cls) {
   cls.def_property_readonly(
-      "gradient", [](const Recorded<S>& r) { return input_array(r.seeker.gradient()); },
+      "gradient", [](const BoundSeeker<S>& b) { return input_array(b.use()->seeker().gradient()); },
       "Last estimate of the slope of the maximised objective, shape (inputs,).");
 }
 

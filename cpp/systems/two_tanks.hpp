@@ -1,27 +1,81 @@
 // Two tanks in a row under a pump, with overflow: levels in the unit of the level sensor (V), pump input V, time s.
-// A StepModel: step() is noexcept and heap-free. Balance of a tank: Torricelli's law with a free exponent and a free
+// step() is noexcept and heap-free. Balance of a tank: Torricelli's law with a free exponent and a free
 // datum instead of the square root, because outlet pipes are neither sharp-edged nor level with the sensor's zero.
 // Overflow as in Schoukens and Noël 2017: what leaves the upper tank over its brim lands in the lower one in part.
 #pragma once
 
 #include <array>
-#include <cmath>
-#include <cstddef>
 
 #include "mgdd/common/field.hpp"
-#include "mgdd/identify/free_run_fit.hpp"
-#include "mgdd/identify/step_model.hpp"
-#include "mgdd/math/dual.hpp"
+#include "mgdd/dynamics/delay_line.hpp"
+#include "mgdd/dynamics/discrete_model.hpp"
 
 namespace mgdd::systems {
 
-using identify::StepModel;
-using identify::Values;
+using dynamics::Values;
+
+template <class T>
+struct TankState {
+  T upper_v{0.0};
+  T lower_v{0.0};
+  dynamics::DelayLine<T, 2> pump{};
+};
+
+/// Prepared: coefficients C on states of T, the same or plain numbers on duals.
+template <class T, class C = T>
+struct TankModel {
+  using Scalar = T;
+  using State = TankState<T>;
+  using Input = T;
+  static constexpr int n_observed = 2;
+
+  Values<C, 9> parameters;
+  C lower_brim;
+  int substeps;
+  double sample;
+
+  MGDD_INLINE void step(State& s, const T& pump_v) const noexcept {
+    const auto& [pump, k_upper, e_upper, k_lower, e_lower, datum, brim, share, delay] = parameters;
+    const T zero(0.0);
+    const T voltage = s.pump.at(pump_v, T(delay));
+    const T inflow = select(voltage > zero, pump * voltage, zero);
+    const C h = C(sample / substeps);
+    for (int k = 0; k < substeps; ++k) {
+      const T out_upper = outflow(k_upper, s.upper_v, e_upper);
+      const T out_lower = outflow(k_lower, s.lower_v - datum, e_lower);
+      s.upper_v += h * (inflow - out_upper);
+      const T gain = h * (out_upper - out_lower);
+      const auto over = s.upper_v > T(brim);
+      s.lower_v += select(over, gain + share * (s.upper_v - brim), gain);
+      s.upper_v = select(over, T(brim), s.upper_v);
+      s.upper_v = select(s.upper_v < zero, zero, s.upper_v);
+      s.lower_v = smaller(s.lower_v, T(lower_brim));
+    }
+    s.pump.push(pump_v);
+  }
+  MGDD_INLINE T output(const State& s) const noexcept { return s.lower_v; }
+  double sample_s() const noexcept { return sample; }
+  /// The level of the lower tank as it is, the upper one empty, the pump off.
+  State at_rest(const T& lower_v) const noexcept { return {T(0.0), lower_v, {}}; }
+
+  template <class U>
+  TankModel<U, C> over() const noexcept {
+    return {parameters, lower_brim, substeps, sample};
+  }
+  template <class S>
+  static auto numbers(S& s) noexcept {
+    return std::array{&s.upper_v, &s.lower_v, &s.pump.before[0], &s.pump.before[1]};
+  }
+
+ private:
+  MGDD_INLINE static T outflow(const C& factor, const T& level, const C& exponent) noexcept {
+    return select(level > T(0.0), factor * pow_of(level, exponent), T(0.0));
+  }
+};
 
 struct TwoTanks {
-  static constexpr int n_states = 4;
-  static constexpr int n_inputs = 1;
   static constexpr int n_parameters = 9;
+  static constexpr int n_start = 4;
 
   static constexpr std::array<FieldInfo, 9> parameters = {{
       {"pump_per_s", "1/s", closed(1e-5, 10.0), "level rate per pump volt"},
@@ -35,7 +89,7 @@ struct TwoTanks {
       {"delay_samples", "samples", closed(0.0, 2.0), "delay of the pump, interpolated"},
   }};
   /// The upper level is not measured: its unit is that of the lower level times the ratio of the floor areas.
-  static constexpr std::array<FieldInfo, 4> states = {
+  static constexpr std::array<FieldInfo, 4> start_numbers = {
       {{"upper_level_v", "V", closed(0.0, 200.0), "level of the upper tank"},
        {"lower_level_v", "V", closed(-5.0, 20.0), "level of the lower tank"},
        {"pump_before_v", "V", closed(-100.0, 100.0), "input of the sample before"},
@@ -45,44 +99,16 @@ struct TwoTanks {
   int substeps = 10;           ///< of the explicit Euler step; the tanks' time constants are minutes
 
   template <class T>
-  Values<T, 4> step(const Values<T, 9>& p, const Values<T, 4>& state, const Values<double, 1>& input,
-                    double dt_s) const noexcept {
-    const auto& [pump, k_upper, e_upper, k_lower, e_lower, datum, brim, share, delay] = p;
-    auto [upper, lower, before, before_that] = state;
-    const bool within_one = value_of(delay) <= 1.0;
-    const T voltage =
-        within_one ? input[0] + delay * (before - input[0]) : before + (delay - 1.0) * (before_that - before);
-    const T inflow = value_of(voltage) > 0.0 ? pump * voltage : T(0.0);
-    const double h = dt_s / substeps;
-    for (int k = 0; k < substeps; ++k) {
-      const T out_upper = outflow<T>(k_upper, upper, e_upper);
-      const T out_lower = outflow<T>(k_lower, lower - datum, e_lower);
-      upper += h * (inflow - out_upper);
-      T gain = h * (out_upper - out_lower);
-      if (upper > brim) {
-        gain += share * (upper - brim);
-        upper = brim;
-      }
-      if (value_of(upper) < 0.0) upper = T(0.0);
-      lower += gain;
-      if (value_of(lower) > lower_brim_v) lower = T(lower_brim_v);
-    }
-    return {upper, lower, T(input[0]), before};
+  TankModel<T> prepare(const Values<T, 9>& p, double sample_s) const noexcept {
+    return {p, T(lower_brim_v), substeps, sample_s};
   }
-
-  template <class T>
-  T output(const Values<T, 9>&, const Values<T, 4>& state, const Values<double, 1>&) const noexcept {
-    return state[1];
-  }
-
- private:
-  template <class T>
-  static T outflow(const T& factor, const T& level, const T& exponent) noexcept {
-    using std::pow;
-    return value_of(level) > 0.0 ? factor * pow(level, exponent) : T(0.0);
+  template <class T, class Model>
+  auto start(const Model&, const Values<T, 4>& stated) const noexcept {
+    return typename Model::State{stated[0], stated[1], {{stated[2], stated[3]}}};
   }
 };
 
-static_assert(StepModel<TwoTanks>);
+static_assert(dynamics::DescribedFamily<TwoTanks> && dynamics::on_every_scalar<TwoTanks> &&
+              dynamics::StartsAtRest<TankModel<double>>);
 
 }  // namespace mgdd::systems

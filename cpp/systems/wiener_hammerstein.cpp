@@ -12,7 +12,7 @@
 namespace mgdd::systems {
 namespace {
 
-constexpr int order_ceiling = 10;
+constexpr int order_ceiling = WienerHammersteinModel<double>::order_ceiling;
 
 struct Filter {
   Eigen::VectorXd b, a;
@@ -150,6 +150,43 @@ Eigen::VectorXd WienerHammerstein::simulate(const Eigen::VectorXd& parameters, c
   unpack(parameters, 2 * first_order, last_order, last);
   return filter_series(last.b, last.a, curve(parameters, filter_series(first.b, first.a, input)));
 }
+
+CurveTable::Point CurveTable::at(double x) const noexcept {
+  const Basis basis = basis_at(model, x);
+  Point point{0.0, 0.0};
+  for (std::size_t j = 0; j < 4; ++j) {
+    const double c = coefficients[basis.cell + static_cast<Eigen::Index>(j)];
+    point.value += basis.value[j] * c;
+    point.slope += basis.slope[j] * c;
+  }
+  return point;
+}
+
+template <class T>
+WienerHammersteinModel<T>::WienerHammersteinModel(const WienerHammerstein& model, const Eigen::VectorXd& parameters) {
+  model.validate();
+  check_length(model, parameters);
+  if (!parameters.allFinite()) throw ParameterError("parameters: must be finite numbers");
+  const auto take = [&](Eigen::Index from, int order, Coefficients& b, Coefficients& a) {
+    Filter filter;
+    unpack(parameters, from, order, filter);
+    std::copy(filter.b.begin(), filter.b.end(), b.begin());
+    std::copy(filter.a.begin(), filter.a.end(), a.begin());
+  };
+  take(0, model.first_order, first_b_, first_a_);
+  take(2 * static_cast<Eigen::Index>(model.first_order), model.last_order, last_b_, last_a_);
+  curve_ = std::make_shared<const CurveTable>(CurveTable{model, parameters.tail(model.n_curve)});
+}
+
+template class WienerHammersteinModel<double>;
+template class WienerHammersteinModel<float>;
+template class WienerHammersteinModel<Dual<3>>;
+template class WienerHammersteinModel<Lanes<8>>;
+static_assert(dynamics::StartsAtRest<WienerHammersteinModel<double>> &&
+              dynamics::StartsAtRest<WienerHammersteinModel<float>> &&
+              dynamics::StartsAtRest<WienerHammersteinModel<Dual<3>>> &&
+              dynamics::StartsAtRest<WienerHammersteinModel<Lanes<8>>> &&
+              dynamics::Liftable<WienerHammersteinModel<double>, Dual<3>>);
 
 WienerHammersteinResidual::WienerHammersteinResidual(const WienerHammerstein& model, Eigen::VectorXd input,
                                                      Eigen::VectorXd output, Eigen::Index skip)

@@ -5,12 +5,16 @@
 // the curve is a uniform cubic B-spline. Desk-time: allocates; the residual call is noexcept.
 #pragma once
 
+#include <array>
 #include <cstddef>
+#include <memory>
 #include <string>
+#include <tuple>
 #include <vector>
 
 #include <Eigen/Core>
 
+#include "mgdd/dynamics/discrete_model.hpp"
 #include "mgdd/optimize/least_squares/least_squares.hpp"
 
 namespace mgdd::systems {
@@ -46,6 +50,84 @@ struct WienerHammerstein {
   [[nodiscard]] Eigen::VectorXd curve(const Eigen::VectorXd& parameters, const Eigen::VectorXd& x) const;
 
   bool operator==(const WienerHammerstein&) const = default;
+};
+
+/// A static curve with its coefficients.
+struct CurveTable {
+  struct Point {
+    double value, slope;
+  };
+  WienerHammerstein model;
+  Eigen::VectorXd coefficients;
+
+  [[nodiscard]] Point at(double x) const noexcept;
+};
+
+/// The model as it runs, sample by sample: both filters and the present output are the state, which starts at rest.
+/// What the input does within its own sample shows in the output after the step. Coefficients are plain numbers.
+template <class T>
+class WienerHammersteinModel {
+ public:
+  static constexpr int order_ceiling = 10;
+  using Scalar = T;
+  using Input = T;
+  struct State {
+    T output{0.0};
+    std::array<T, order_ceiling> first{}, last{};
+  };
+  static constexpr int n_observed = 1;
+
+  /// ParameterError or ShapeError for what `model` and its numbers cannot be.
+  WienerHammersteinModel(const WienerHammerstein& model, const Eigen::VectorXd& parameters);
+
+  void step(State& s, const T& input) const noexcept {
+    s.output = filtered(last_b_, last_a_, s.last, curve(filtered(first_b_, first_a_, s.first, input)));
+  }
+  T output(const State& s) const noexcept { return s.output; }
+  double sample_s() const noexcept { return 1.0; }  ///< the model knows samples, not seconds
+  State at_rest(const T& output) const noexcept { return {output, {}, {}}; }
+
+  template <class U>
+  WienerHammersteinModel<U> over() const noexcept {
+    return WienerHammersteinModel<U>(*this);
+  }
+  template <class S>
+  static auto numbers(S& s) noexcept {
+    return std::apply(
+        [&](auto&... first) {
+          return std::apply([&](auto&... last) { return std::array{&s.output, &first..., &last...}; }, s.last);
+        },
+        s.first);
+  }
+
+ private:
+  using Coefficients = std::array<double, order_ceiling + 1>;
+  template <class>
+  friend class WienerHammersteinModel;
+  template <class V>
+  explicit WienerHammersteinModel(const WienerHammersteinModel<V>& o) noexcept
+      : first_b_(o.first_b_), first_a_(o.first_a_), last_b_(o.last_b_), last_a_(o.last_a_), curve_(o.curve_) {}
+
+  static T filtered(const Coefficients& b, const Coefficients& a, std::array<T, order_ceiling>& s,
+                    const T& in) noexcept {
+    const T out = T(b[0]) * in + s[0];
+    for (std::size_t i = 1; i < s.size(); ++i)
+      s[i - 1] = T(b[i]) * in - T(a[i]) * out + s[i];
+    s.back() = T(b.back()) * in - T(a.back()) * out;
+    return out;
+  }
+  T curve(const T& x) const noexcept {
+    if constexpr (is_dual_v<T>) {
+      using S = typename T::Scalar;
+      const auto [value, slope] = curve_->at(static_cast<double>(x.value));
+      return chain(static_cast<S>(value), static_cast<S>(slope), x);
+    } else {
+      return each(x, [this](auto v) { return static_cast<decltype(v)>(curve_->at(static_cast<double>(v)).value); });
+    }
+  }
+
+  Coefficients first_b_{}, first_a_{}, last_b_{}, last_a_{};
+  std::shared_ptr<const CurveTable> curve_;  // shared by copies: a model is copied without the heap
 };
 
 /// The first `skip` samples are left out: the filters start from rest, the record did not.

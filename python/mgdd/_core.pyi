@@ -6,31 +6,7 @@ import collections.abc
 import numpy
 import numpy.typing
 import typing
-__all__: list[str] = ['BoundedSeeking', 'ComponentLag', 'ConvergenceError', 'Cylinder', 'CylinderFit', 'DataError', 'DriveAxis', 'EngineBench', 'Error', 'ExtremumSeeking', 'FitReport', 'FreeRunFit', 'FreeRunRecord', 'GoldenSection', 'GradientDescent', 'GradientPwR', 'IterativeLearning', 'LeastSquaresOptions', 'Limit', 'LoadBurn', 'LoadFit', 'MeasuredCycle', 'NewtonSeeking', 'NoxFit', 'NoxModel', 'NoxProxy', 'OperatingPoint', 'Parameter', 'ParameterError', 'Performance', 'PerformanceTerm', 'PseudoWienerModel', 'PseudoWienerStepper', 'RecursivePwR', 'RigError', 'SensorDynamics', 'SensorPair', 'ShapeError', 'SoftSensor', 'Spsa', 'Throttle', 'ThrottleStepper', 'TraceOptions', 'TwoTanks', 'WienerHammerstein', 'WindowPwR', 'analyze_trace', 'burn_duration_cad', 'burned_fraction', 'check_trace', 'common_parameters', 'compiled_simd_level', 'compiler', 'convergence', 'correlation_limit', 'differentiable_inputs', 'estimate_burn', 'filter_series', 'fit_cylinder', 'fit_nox_proxy', 'fit_pseudo_wiener', 'fit_smooth_throttle', 'fit_throttle_groups', 'hardenberg_hase_delay_cad', 'hohenberg_coefficient', 'indicator_units', 'input_unit', 'latin_hypercube', 'least_squares', 'load_parameters', 'monte_carlo', 'processor_simd_levels', 'pseudo_wiener_of', 'pseudo_wiener_units', 'run_loop', 'scan', 'sense_throttle', 'sensitivities', 'sensor_fault_kinds', 'simulate', 'simulate_smooth_throttle', 'simulate_throttle', 'simulate_throttle_groups', 'simulate_throttle_many', 'smooth_throttle_example', 'smooth_throttle_instruction_set', 'smooth_throttle_names', 'start_of_combustion', 'start_of_injection', 'throttle_airflow_torque', 'throttle_group_bounds', 'throttle_group_names', 'timing_window_cad', 'tune', 'volume_l', 'wall_area_m2', 'wall_heat_scale_upper', 'watson_delay_ms', 'with_burn', 'wolfer_delay_ms', 'woschni_c1_bar_m', 'woschni_coefficient']
-class Error(Exception):
-    """
-    Base of everything mgdd raises.
-    """
-class ParameterError(Error, ValueError):
-    """
-    A parameter outside its domain; the message names field, value and bound.
-    """
-class ShapeError(Error, ValueError):
-    """
-    An array of the wrong length or dimension.
-    """
-class DataError(Error, ValueError):
-    """
-    Measured data that cannot be what the caller says they are.
-    """
-class ConvergenceError(Error, RuntimeError):
-    """
-    A numerical method that did not reach its tolerance.
-    """
-class RigError(Error, OSError):
-    """
-    A test rig that cannot do what was asked.
-    """
+__all__: list[str] = ['BoundedSeeking', 'ComponentLag', 'Cylinder', 'CylinderFit', 'DriveAxis', 'EngineBench', 'ExtremumSeeking', 'FitReport', 'FreeRunFit', 'FreeRunRecord', 'GoldenSection', 'GradientDescent', 'GradientPwR', 'IterativeLearning', 'LeastSquaresOptions', 'Limit', 'LoadBurn', 'LoadFit', 'MeasuredCycle', 'NewtonSeeking', 'NoxFit', 'NoxModel', 'NoxProxy', 'OperatingPoint', 'Parameter', 'Performance', 'PerformanceTerm', 'PseudoWienerModel', 'PseudoWienerStepper', 'RecursivePwR', 'SensorDynamics', 'SensorPair', 'SoftSensor', 'Spsa', 'Throttle', 'ThrottleStepper', 'TraceOptions', 'TwoTanks', 'WienerHammerstein', 'WindowPwR', 'analyze_trace', 'burn_duration_cad', 'burned_fraction', 'check_trace', 'common_parameters', 'compiled_simd_level', 'compiler', 'convergence', 'correlation_limit', 'differentiable_inputs', 'estimate_burn', 'filter_series', 'fit_cylinder', 'fit_nox_proxy', 'fit_pseudo_wiener', 'fit_smooth_throttle', 'fit_throttle_groups', 'hardenberg_hase_delay_cad', 'hohenberg_coefficient', 'indicator_units', 'input_unit', 'latin_hypercube', 'least_squares', 'load_parameters', 'monte_carlo', 'processor_simd_levels', 'pseudo_wiener_of', 'pseudo_wiener_units', 'run_loop', 'scan', 'sense_throttle', 'sensitivities', 'sensor_fault_kinds', 'simulate', 'simulate_smooth_throttle', 'simulate_throttle', 'simulate_throttle_groups', 'simulate_throttle_many', 'smooth_throttle_example', 'smooth_throttle_instruction_set', 'smooth_throttle_names', 'start_of_combustion', 'start_of_injection', 'throttle_airflow_torque', 'throttle_group_bounds', 'throttle_group_names', 'timing_window_cad', 'tune', 'volume_l', 'wall_area_m2', 'wall_heat_scale_upper', 'watson_delay_ms', 'with_burn', 'wolfer_delay_ms', 'woschni_c1_bar_m', 'woschni_coefficient']
 class Parameter:
     """
     One unknown of a fit: name, bounds, and whether it is searched as its log.
@@ -375,7 +351,7 @@ class ExtremumSeeking:
         """
         Columns behind .history.
         """
-    def _set_history_columns(self, *, applied: typing.Annotated[numpy.typing.ArrayLike, numpy.float64], estimate: typing.Annotated[numpy.typing.ArrayLike, numpy.float64], objective: typing.Annotated[numpy.typing.ArrayLike, numpy.float64], misfire: typing.Annotated[numpy.typing.ArrayLike, numpy.float64], cycle: typing.Annotated[numpy.typing.ArrayLike, numpy.float64]) -> None:
+    def _set_history_columns(self, columns: collections.abc.Mapping[str, typing.Annotated[numpy.typing.ArrayLike, numpy.float64]]) -> None:
         """
         Columns behind .history, as _history_columns gave them.
         """
@@ -459,7 +435,7 @@ class NewtonSeeking:
         """
         Columns behind .history.
         """
-    def _set_history_columns(self, *, applied: typing.Annotated[numpy.typing.ArrayLike, numpy.float64], estimate: typing.Annotated[numpy.typing.ArrayLike, numpy.float64], objective: typing.Annotated[numpy.typing.ArrayLike, numpy.float64], misfire: typing.Annotated[numpy.typing.ArrayLike, numpy.float64], cycle: typing.Annotated[numpy.typing.ArrayLike, numpy.float64]) -> None:
+    def _set_history_columns(self, columns: collections.abc.Mapping[str, typing.Annotated[numpy.typing.ArrayLike, numpy.float64]]) -> None:
         """
         Columns behind .history, as _history_columns gave them.
         """
@@ -548,7 +524,7 @@ class BoundedSeeking:
         """
         Columns behind .history.
         """
-    def _set_history_columns(self, *, applied: typing.Annotated[numpy.typing.ArrayLike, numpy.float64], estimate: typing.Annotated[numpy.typing.ArrayLike, numpy.float64], objective: typing.Annotated[numpy.typing.ArrayLike, numpy.float64], misfire: typing.Annotated[numpy.typing.ArrayLike, numpy.float64], cycle: typing.Annotated[numpy.typing.ArrayLike, numpy.float64]) -> None:
+    def _set_history_columns(self, columns: collections.abc.Mapping[str, typing.Annotated[numpy.typing.ArrayLike, numpy.float64]]) -> None:
         """
         Columns behind .history, as _history_columns gave them.
         """
@@ -622,7 +598,7 @@ class Spsa:
         """
         Columns behind .history.
         """
-    def _set_history_columns(self, *, applied: typing.Annotated[numpy.typing.ArrayLike, numpy.float64], estimate: typing.Annotated[numpy.typing.ArrayLike, numpy.float64], objective: typing.Annotated[numpy.typing.ArrayLike, numpy.float64], misfire: typing.Annotated[numpy.typing.ArrayLike, numpy.float64], cycle: typing.Annotated[numpy.typing.ArrayLike, numpy.float64]) -> None:
+    def _set_history_columns(self, columns: collections.abc.Mapping[str, typing.Annotated[numpy.typing.ArrayLike, numpy.float64]]) -> None:
         """
         Columns behind .history, as _history_columns gave them.
         """
@@ -721,7 +697,7 @@ class GradientDescent:
         """
         Columns behind .history.
         """
-    def _set_history_columns(self, *, applied: typing.Annotated[numpy.typing.ArrayLike, numpy.float64], estimate: typing.Annotated[numpy.typing.ArrayLike, numpy.float64], objective: typing.Annotated[numpy.typing.ArrayLike, numpy.float64], misfire: typing.Annotated[numpy.typing.ArrayLike, numpy.float64], cycle: typing.Annotated[numpy.typing.ArrayLike, numpy.float64]) -> None:
+    def _set_history_columns(self, columns: collections.abc.Mapping[str, typing.Annotated[numpy.typing.ArrayLike, numpy.float64]]) -> None:
         """
         Columns behind .history, as _history_columns gave them.
         """
@@ -810,7 +786,7 @@ class GoldenSection:
         """
         Columns behind .history.
         """
-    def _set_history_columns(self, *, applied: typing.Annotated[numpy.typing.ArrayLike, numpy.float64], estimate: typing.Annotated[numpy.typing.ArrayLike, numpy.float64], objective: typing.Annotated[numpy.typing.ArrayLike, numpy.float64], misfire: typing.Annotated[numpy.typing.ArrayLike, numpy.float64], cycle: typing.Annotated[numpy.typing.ArrayLike, numpy.float64]) -> None:
+    def _set_history_columns(self, columns: collections.abc.Mapping[str, typing.Annotated[numpy.typing.ArrayLike, numpy.float64]]) -> None:
         """
         Columns behind .history, as _history_columns gave them.
         """
@@ -892,7 +868,7 @@ class IterativeLearning:
         """
     def convergence(self) -> dict:
         """
-        Findings of the linear theory, by name.
+        Findings of the linear theory, by name. Releases the GIL.
         """
     def restore(self, state: collections.abc.Mapping[str, collections.abc.Sequence[typing.SupportsFloat | typing.SupportsIndex]]) -> None:
         """
@@ -904,7 +880,7 @@ class IterativeLearning:
         """
     def tell(self, error: typing.Annotated[numpy.typing.ArrayLike, numpy.float64]) -> None:
         """
-        Error of this trial; makes the next input.
+        Error of this trial; makes the next input. Releases the GIL.
         """
     @property
     def best_input(self) -> numpy.typing.NDArray[numpy.float64]:
@@ -2176,7 +2152,7 @@ class RecursivePwR:
         ...
     def update(self, duty: typing.Annotated[numpy.typing.ArrayLike, numpy.float64], angle_deg: typing.Annotated[numpy.typing.ArrayLike, numpy.float64]) -> int:
         """
-        Takes samples in order; returns how many changed the model.
+        Takes samples in order, without the GIL; returns how many changed the model.
         """
     @property
     def parameters(self) -> dict:
@@ -2193,7 +2169,7 @@ class WindowPwR:
         ...
     def update(self, duty: typing.Annotated[numpy.typing.ArrayLike, numpy.float64], angle_deg: typing.Annotated[numpy.typing.ArrayLike, numpy.float64]) -> int:
         """
-        Takes samples in order; returns how many changed the model.
+        Takes samples in order, without the GIL; returns how many changed the model.
         """
     @property
     def parameters(self) -> dict:
@@ -2210,7 +2186,7 @@ class GradientPwR:
         ...
     def update(self, duty: typing.Annotated[numpy.typing.ArrayLike, numpy.float64], angle_deg: typing.Annotated[numpy.typing.ArrayLike, numpy.float64]) -> int:
         """
-        Takes samples in order; returns how many changed the model.
+        Takes samples in order, without the GIL; returns how many changed the model.
         """
     @property
     def parameters(self) -> dict:
@@ -2515,7 +2491,9 @@ def fit_throttle_groups(records: collections.abc.Sequence[tuple[typing.SupportsF
     Staged multi-start fit of the throttle groups; releases the GIL.
     """
 def hardenberg_hase_delay_cad(pressure_bar: typing.Annotated[numpy.typing.ArrayLike, numpy.float64], temperature_k: typing.Annotated[numpy.typing.ArrayLike, numpy.float64], cetane_number: typing.Annotated[numpy.typing.ArrayLike, numpy.float64], piston_speed_m_per_s: typing.Annotated[numpy.typing.ArrayLike, numpy.float64]) -> typing.Any:
-    ...
+    """
+    Ignition delay [°CA].
+    """
 def hohenberg_coefficient(c1_bar_m3: typing.Annotated[numpy.typing.ArrayLike, numpy.float64], volume_m3: typing.Annotated[numpy.typing.ArrayLike, numpy.float64], pressure_bar: typing.Annotated[numpy.typing.ArrayLike, numpy.float64], temperature_k: typing.Annotated[numpy.typing.ArrayLike, numpy.float64], piston_speed_m_per_s: typing.Annotated[numpy.typing.ArrayLike, numpy.float64]) -> typing.Any:
     """
     Film coefficient [W/(m2 K)].
@@ -2651,13 +2629,17 @@ def wall_area_m2(cylinder: Cylinder, crank_angle_cad: typing.Annotated[numpy.typ
     Wall area [m2].
     """
 def watson_delay_ms(pressure_bar: typing.Annotated[numpy.typing.ArrayLike, numpy.float64], temperature_k: typing.Annotated[numpy.typing.ArrayLike, numpy.float64]) -> typing.Any:
-    ...
+    """
+    Ignition delay [ms].
+    """
 def with_burn(cylinder: Cylinder, burn: LoadBurn) -> Cylinder:
     """
     The cylinder with one load's shape fields.
     """
 def wolfer_delay_ms(pressure_bar: typing.Annotated[numpy.typing.ArrayLike, numpy.float64], temperature_k: typing.Annotated[numpy.typing.ArrayLike, numpy.float64]) -> typing.Any:
-    ...
+    """
+    Ignition delay [ms].
+    """
 def woschni_coefficient(c1_bar_m: typing.Annotated[numpy.typing.ArrayLike, numpy.float64], bore_m: typing.Annotated[numpy.typing.ArrayLike, numpy.float64], pressure_bar: typing.Annotated[numpy.typing.ArrayLike, numpy.float64], temperature_k: typing.Annotated[numpy.typing.ArrayLike, numpy.float64], gas_velocity_m_per_s: typing.Annotated[numpy.typing.ArrayLike, numpy.float64]) -> typing.Any:
     """
     Film coefficient [W/(m2 K)].

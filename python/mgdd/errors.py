@@ -1,6 +1,7 @@
 """The exceptions of mgdd: one tree, raised alike by the C++ core and by the Python layer.
 
-Every message names the field or file, the value, and the bound or the remedy.
+Every message names the field or file, the value, and the bound or the remedy; where one field is to blame, the error
+carries the three as attributes too.
 
 Examples
 --------
@@ -11,10 +12,158 @@ Examples
 
 from __future__ import annotations
 
-from mgdd._core import ConvergenceError, DataError, Error, ParameterError, RigError, ShapeError
+from collections.abc import Callable
+from typing import Any, Self, TypeVar
 
-__all__ = ["ConvergenceError", "DataError", "Error", "ParameterError", "RigError", "ShapeError"]
+Result = TypeVar("Result")
 
-for _error in (ConvergenceError, DataError, Error, ParameterError, RigError, ShapeError):
-    _error.__module__ = __name__  # the public home, as tracebacks and pickles should name it
-del _error
+__all__ = [
+    "ConvergenceError",
+    "DataError",
+    "Error",
+    "InUseError",
+    "Interrupted",
+    "ParameterError",
+    "RigError",
+    "ShapeError",
+]
+
+
+class Error(Exception):
+    """Base of everything mgdd raises, Ctrl-C apart.
+
+    Parameters
+    ----------
+    message : str
+        What is wrong and what to do.
+    field : str, optional
+        Name of the field or argument to blame.
+    value : object, optional
+        What it was.
+    bound : str, optional
+        What it must be.
+
+    Attributes
+    ----------
+    field, value, bound
+        As given; None where no single field is to blame.
+
+    Examples
+    --------
+    >>> from mgdd.engine import Cylinder
+    >>> from mgdd.errors import Error
+    >>> try:
+    ...     Cylinder(bore_mm=-86.0)
+    ... except Error as error:
+    ...     print(error)
+    bore_mm = -86 mm: must be > 0
+    """
+
+    field: str | None
+    value: Any
+    bound: str | None
+
+    def __init__(
+        self, message: str = "", *, field: str | None = None, value: Any = None, bound: str | None = None
+    ) -> None:
+        super().__init__(message)
+        self.field, self.value, self.bound = field, value, bound
+
+    def reworded(self, message: str) -> Self:
+        """Give the same error with another message, for callers that know more of where it happened.
+
+        Parameters
+        ----------
+        message : str
+            The new message.
+
+        Returns
+        -------
+        Error
+            Of the same class, with the same field, value and bound.
+
+        Examples
+        --------
+        >>> from mgdd.errors import ParameterError
+        >>> error = ParameterError("must be > 0", field="bore_mm", value=-86.0, bound="> 0")
+        >>> error.reworded("engine.toml: bore_mm must be > 0").field
+        'bore_mm'
+        """
+        return type(self)(message, field=self.field, value=self.value, bound=self.bound)
+
+
+class ParameterError(Error, ValueError):
+    """A parameter outside its domain; the message names field, value and bound."""
+
+
+class ShapeError(Error, ValueError):
+    """An array of the wrong length or dimension."""
+
+
+class DataError(Error, ValueError):
+    """Measured data that cannot be what the caller says they are."""
+
+
+class ConvergenceError(Error, RuntimeError):
+    """A numerical method that did not reach its tolerance."""
+
+
+class RigError(Error, OSError):
+    """A test rig that cannot do what was asked."""
+
+
+class InUseError(Error, RuntimeError):
+    """A bench, seeker or learner that a call in another thread is running.
+
+    An object that changes serves one call at a time. While a long call runs it without the interpreter's lock, any
+    other call to it is refused with this error at once, and changes nothing: wait for that call, or give each thread
+    its own copy (``copy.deepcopy``).
+    """
+
+
+class Interrupted(KeyboardInterrupt):
+    """Ctrl-C during a long call, with what was finished until then.
+
+    Code that catches `KeyboardInterrupt` catches it too; what is caught by ``except Exception`` is not.
+
+    Parameters
+    ----------
+    message : str
+        What was kept.
+    partial : object, optional
+        What the call would have returned, as far as it came; None where nothing was finished.
+
+    Examples
+    --------
+    >>> from mgdd.errors import Interrupted
+    >>> from mgdd.loop import EngineBench, run_seeker
+    >>> from mgdd.optimize import GoldenSection
+    >>> seeker = GoldenSection(start=-20.0, lower=-30.0, upper=10.0, noise_sd=0.25)
+    >>> try:
+    ...     run = run_seeker(EngineBench(), seeker, 300)
+    ... except Interrupted as stop:
+    ...     run = stop.partial
+    >>> run.dataset.sizes["cycle"]
+    300
+    """
+
+    def __init__(self, message: str = "interrupted", partial: Any = None) -> None:
+        super().__init__(message)
+        self.partial = partial
+
+
+def or_partial(call: Callable[[], Result]) -> tuple[Result, Interrupted | None]:
+    """Call the core: what it returns, or the part that Ctrl-C left with the Interrupted that brought it."""
+    try:
+        return call(), None
+    except Interrupted as stop:
+        if stop.partial is None:
+            raise
+        return stop.partial, stop
+
+
+def hand_over(result: Result, stop: Interrupted | None) -> Result:
+    """Return a whole result; raise one made of a part, as `or_partial` gave it, in an Interrupted."""
+    if stop is not None:
+        raise Interrupted(str(stop), result)
+    return result

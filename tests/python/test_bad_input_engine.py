@@ -211,7 +211,7 @@ def trace():
         ({"step_cad": 0.0}, ParameterError, "step_cad = 0"),
         ({"integrator": "rk4"}, ParameterError, "integrator = 'rk4'"),
         ({"options": FitOptions(seed=1)}, ParameterError, "seed has no effect on this fit"),
-        ({"start_values": [{"fuel": 3.0}]}, ParameterError, "'fuel' is no parameter of a trace.*fuel_heat_j"),
+        ({"start_values": [{"fuel": 3.0}]}, ParameterError, "'fuel' is not a parameter of a trace.*fuel_heat_j"),
         ({"start_values": [{"fuel_heat_j": -3.0}]}, ParameterError, r"fuel_heat_j\[trace\] = -3"),
         ({"start_values": [{"soc_cad": math.nan}]}, ParameterError, r"soc_cad\[trace\] = -?nan"),
         ({"start_values": []}, ParameterError, "start_values has 0 entries for 1 traces"),

@@ -83,16 +83,16 @@ def test_table_puts_the_interval_behind_its_mean() -> None:
 
 def test_ctrl_c_prints_what_is_finished(capsys: pytest.CaptureFixture[str], monkeypatch: pytest.MonkeyPatch) -> None:
 
-    real, count = sensor_delay.run_finished, iter(range(100))
+    real, count = sensor_delay.run_seeker, iter(range(100))
 
     def interrupted(*args: Any, **how: Any) -> Any:
         if next(count) == 2:
             raise KeyboardInterrupt
         return real(*args, **how)
 
-    monkeypatch.setattr(sensor_delay, "run_finished", interrupted)
+    monkeypatch.setattr(sensor_delay, "run_seeker", interrupted)
     out, err = run(capsys, "sensor-delay", "--quick", "--json", code=130)
     summary = json.loads(out)
     assert summary["interrupted"] is True
     assert len(summary["rows"]) == 2
-    assert "interrupted" in err
+    assert "interrupted: 2 finished rows are printed" in err

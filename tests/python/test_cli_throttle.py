@@ -91,7 +91,10 @@ def test_excite_refuses_what_leaves_the_window(capsys: pytest.CaptureFixture[str
     ("argv", "said"),
     [
         (("--offset", "0.1"), "--offset and --amplitude belong together"),
-        (("--offset", "0.1", "--amplitude", "0.1", "--hold-s", "0.1"), "--hold-s is no option of a chirp, which has"),
+        (
+            ("--offset", "0.1", "--amplitude", "0.1", "--hold-s", "0.1"),
+            "--hold-s is not an option of a chirp",
+        ),
         (("--low-hz", "0.5"), "--low-hz acts on a signal of your own only"),
         (("--offset", "0.5", "--amplitude", "0.9"), "the duty passes ±1"),
         (("--angle-window-deg", "50", "10"), "--angle-window-deg = (50, 10)"),

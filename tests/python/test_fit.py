@@ -99,13 +99,15 @@ def test_models_share_one_signature(model: Model) -> None:
     assert float(run["angle_deg"][0]) == 8.0, "at rest at limp-home"
     ahead = model.predict(run, 20)
     np.testing.assert_array_equal(ahead["time_s"], TIME[20:])
-    with pytest.raises(ParameterError, match="is no state: must be one of angle_deg"):
+    with pytest.raises(ParameterError, match="is not a state: must be one of angle_deg"):
         model.simulate(inputs, initial_state={"plate": 8.0})
 
 
 def test_other_models_follow() -> None:
     smooth = SmoothThrottle()
-    assert smooth.simulate({"time_s": TIME, "duty": DUTY}, initial_state=[0.14, 0.0, 0.0])["angle_deg"].units == "deg"
+    assert (
+        smooth.simulate({"time_s": TIME, "duty": DUTY}, initial_state=[0.14, 0.0, 0.0])["angle_deg"].units == "degree"
+    )
     with pytest.raises(ParameterError, match="mass missing or unknown"):
         SmoothThrottle(parameters={**smooth.parameters, "mass": 1.0})
     assert TwoTanksModel.state_names == ("upper_level_v", "lower_level_v")

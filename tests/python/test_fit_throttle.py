@@ -134,7 +134,7 @@ def test_wrong_calls_name_the_remedy_and_a_right_one_follows():
     )
 
 
-def test_prediction_re_anchors_on_the_measurement():
+def test_prediction_is_corrected_by_the_measurement():
     log = make_log(span_s=2.0)
     model = FirstPrincipleModel(parameters=TRUTH)
     ahead = model.predict(log, 20)["angle_deg"]

@@ -40,7 +40,7 @@ def test_every_signal_keeps_its_swing_and_its_clock(name: str, offset: float, sh
     assert np.abs(values - offset).max() >= 0.85 * amplitude
     np.testing.assert_allclose(signal["time_s"], 2e-3 * np.arange(values.size), rtol=1e-12)
     assert signal.attrs["kind"] == name
-    assert signal["duty"].attrs["units"] == "-"
+    assert signal["duty"].attrs["units"] == "1"
 
 
 @pytest.mark.parametrize("name", SIGNALS)

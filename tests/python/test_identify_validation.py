@@ -1,4 +1,4 @@
-"""Figures of merit, residual tests, blocks of time, and sentences about what a log cannot tell."""
+"""Figures of merit, residual tests, blocks of time, and sentences about what a log does not identify."""
 
 from __future__ import annotations
 
@@ -208,7 +208,7 @@ def test_n_steps_can_be_compared_with_the_truth() -> None:
     noisy = log()["angle_deg"].to_numpy() + 0.05 * RNG.standard_normal(TIME.size)
     rms = identify.n_step_rms(Proportional(), log(noisy), true_deg=log()["angle_deg"])["n_step_rms_deg"]
     assert rms.sel(predictor="pw_r").to_numpy() == pytest.approx(0.05, rel=0.1)
-    with pytest.raises(ParameterError, match="no whole number of samples"):
+    with pytest.raises(ParameterError, match="not a whole number of samples"):
         identify.n_step_rms(Proportional(), log(), horizons_s=(0.0055,))
     with pytest.raises(ParameterError, match="more than half"):
         identify.n_step_rms(Proportional(), log(), horizons_s=(5.0,))
@@ -226,7 +226,7 @@ def test_a_model_that_runs_away_is_an_error() -> None:
         identify.validate_throttle(Runaway(), log())
 
 
-# --- what a log cannot tell --------------------------------------------------------------------------------------
+# --- what a log does not identify ---------------------------------------------------------------------------------
 
 
 def questions(angle: np.ndarray, **options: Any) -> str:

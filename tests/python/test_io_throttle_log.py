@@ -37,7 +37,7 @@ def test_arrays_are_copied_and_labelled() -> None:
     made["duty"][:] = 0.0
     assert DUTY.any()
     assert {name: made[name].attrs["units"] for name in made.variables} == {
-        "time_s": "s", "duty": "-", "angle_deg": "deg", "current_a": "A", "supply_v": "V",
+        "time_s": "s", "duty": "1", "angle_deg": "degree", "current_a": "A", "supply_v": "V",
     }  # fmt: skip
     assert made.attrs["file"] == "bench 3"
 

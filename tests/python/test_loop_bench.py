@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import copy
+import math
 import pickle
 import threading
 
@@ -174,9 +175,11 @@ def test_a_refused_call_changes_nothing() -> None:
     with pytest.raises(ShapeError, match="soc_cad has 2 dimensions"):
         bench.run(np.zeros((3, 3)))
     spoiled = dict(state)
-    del spoiled["fast"]
-    with pytest.raises(DataError, match="no column 'fast'"):
+    del spoiled["fast_line"]
+    with pytest.raises(ParameterError, match="column 'fast_line' is missing"):
         bench.state = spoiled
+    with pytest.raises(DataError, match="'last', entry 1, holds nan: must be finite"):
+        bench.state = {**state, "last_t_max_k": [math.nan]}
     assert all(np.array_equal(state[name], column) for name, column in bench.state.items())
     twin = EngineBench(**RICH)
     twin.run(requests(20))

@@ -13,7 +13,7 @@ import pytest
 import xarray as xr
 
 from mgdd.engine import OperatingPoint, Performance
-from mgdd.errors import ParameterError
+from mgdd.errors import Interrupted, ParameterError
 from mgdd.loop import (
     EngineBench,
     LoopCriteria,
@@ -138,10 +138,14 @@ def test_ctrl_c_leaves_a_usable_partial_result() -> None:
     plant, it = EngineBench(seed=2), ExtremumSeeking(**SPACE)
     timer = threading.Timer(0.3, os.kill, (os.getpid(), signal.SIGINT))
     timer.start()
-    run = run_seeker(plant, it, 3_000_000)
+    with pytest.raises(Interrupted, match=r"what was finished is in \.partial") as stop:
+        run_seeker(plant, it, 200_000)
+    run = stop.value.partial
     assert run.interrupted
     n = run.dataset.sizes["cycle"]
-    assert 0 < n < 3_000_000
+    assert 0 < n < 200_000
+    whole = run_seeker(EngineBench(seed=2), ExtremumSeeking(**SPACE), n)
+    np.testing.assert_equal(dict(run.summary), dict(whole.summary))
     assert plant.cycle == it.cycle == n
     twin = run_seeker(EngineBench(seed=2), ExtremumSeeking(**SPACE), n + 50)
     more = run_seeker(plant, it, 50)
@@ -149,7 +153,9 @@ def test_ctrl_c_leaves_a_usable_partial_result() -> None:
 
     timer = threading.Timer(0.3, os.kill, (os.getpid(), signal.SIGINT))
     timer.start()
-    table = monte_carlo(EngineBench(), it, range(20_000), cycles=1000)
+    with pytest.raises(Interrupted) as stop:
+        monte_carlo(EngineBench(), it, range(20_000), cycles=1000)
+    table = stop.value.partial
     finished = table["finished"].values
     assert 0 < finished.sum() < finished.size
     assert np.isfinite(table["mean_cad"].values[finished]).all()

@@ -9,7 +9,7 @@ import numpy as np
 import pytest
 
 from mgdd import datasets
-from mgdd.errors import DataError, ParameterError
+from mgdd.errors import DataError, Interrupted, ParameterError
 from mgdd.results import check_labels
 from mgdd.results.labels import to_jsonable
 from mgdd.studies import StudyResult, measured_engine_cases, measured_engine_seek, run_study
@@ -106,7 +106,9 @@ def test_ctrl_c_keeps_the_finished_seekers(made: EngineSurrogate, monkeypatch: p
         if text.endswith("spsa"):
             raise KeyboardInterrupt
 
-    result = run_measured_engine_seek(seeds=1, quick=True, progress=press)
+    with pytest.raises(Interrupted) as stop:
+        run_measured_engine_seek(seeds=1, quick=True, progress=press)
+    result = stop.value.partial
     assert result.summary["interrupted"] is True
     assert [row["seeker"] for row in result.summary["rows"]] == ["batch", "newton"]
     assert len(result.figures) == 2

@@ -1,4 +1,4 @@
-"""Every Dataset that a public name hands out can be written as netCDF, and comes back with the same values."""
+"""Every Dataset that a public name hands out can be written as netCDF, and pint reads its units."""
 
 from __future__ import annotations
 
@@ -10,6 +10,7 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
+import pint
 import pytest
 import xarray as xr
 
@@ -33,6 +34,7 @@ from mgdd.throttle import PseudoWiener, SensorFault, Throttle, groups, holding_d
 from mgdd.throttle import simulate as simulate_throttle
 
 POINT = OperatingPoint()
+REGISTRY = pint.UnitRegistry()
 TIME = np.arange(2000) * 1e-3
 
 
@@ -196,3 +198,4 @@ def test_written_and_read_back(source: str, tmp_path: Path) -> None:
         for name, variable in dataset.variables.items():
             np.testing.assert_array_equal(back[name].to_numpy(), variable.to_numpy(), err_msg=str(name))
             assert back[name].attrs["long_name"] == variable.attrs["long_name"]
+            REGISTRY.parse_units(back[name].attrs["units"])

@@ -4,7 +4,9 @@ from __future__ import annotations
 
 import copy
 import math
+import multiprocessing
 import pickle
+from concurrent.futures import ProcessPoolExecutor
 
 import pytest
 from hypothesis import given, settings
@@ -66,6 +68,28 @@ def test_records_are_immutable_and_equal_to_their_own_kind_only():
     assert len({cylinder, Cylinder(), Cylinder(bore_mm=90.0)}) == 2
     with pytest.raises(TypeError):
         Cylinder(90.0)
+
+
+@pytest.mark.parametrize("name", presets.available())
+def test_a_preset_survives_pickle_copy_and_a_worker(name):
+    preset = presets.load(name)
+    with ProcessPoolExecutor(1, mp_context=multiprocessing.get_context("spawn")) as workers:
+        returned = workers.submit(presets.load, name).result()
+    for back in (pickle.loads(pickle.dumps(preset)), copy.copy(preset), copy.deepcopy(preset), returned):
+        assert back == preset
+        assert back.sources == preset.sources
+        assert back.to_toml() == preset.to_toml()
+        with pytest.raises(TypeError):
+            back.sources["cylinder.bore_mm"] = "elsewhere"
+        with pytest.raises(TypeError):
+            back.records["point"] = OperatingPoint()
+
+
+def test_a_preset_keeps_its_own_sources():
+    sources = {"cylinder.bore_mm": "drawing"}
+    preset = Preset(name="mine", title="mine", cylinder=Cylinder(), sources=sources)
+    sources["cylinder.bore_mm"] = "guess"
+    assert preset.sources == {"cylinder.bore_mm": "drawing"}
 
 
 @given(

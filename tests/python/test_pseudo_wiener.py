@@ -84,6 +84,19 @@ def test_another_sample_time_keeps_seconds_and_steps() -> None:
     np.testing.assert_allclose(slow, fine[::2], atol=1e-9)
 
 
+def test_a_delay_keeps_its_time_at_any_sample_time() -> None:
+    for kind in ("pw_r", "pw_w", "pw_p"):
+        model = PseudoWiener(kind, {"delay_samples": 3.0})
+        coarse = model.at_sample(2e-3)
+        assert coarse.parameters["delay_samples"] == 1.5
+        assert coarse.at_sample(1e-3) == model
+        with pytest.raises(ParameterError, match=r"delay_samples = 6 .* take sample_s >= 0\.0006 s"):
+            model.at_sample(5e-4)
+    whole, half = PseudoWiener("pw_r", {"delay_samples": 1.0}), PseudoWiener("pw_r", {"delay_samples": 1.5})
+    mixed = 0.5 * (DUTY + np.concatenate([[0.0], DUTY[:-1]]))
+    np.testing.assert_array_equal(half.simulate(TIME, DUTY, start_deg=8.0), whole.simulate(TIME, mixed, start_deg=8.0))
+
+
 def test_bad_input_says_what_and_leaves_things_alone() -> None:
     with pytest.raises(ParameterError, match=r"above_tau_s = -1 s: must be in \[0\.005, 0\.3\]"):
         PseudoWiener("pw_r", {"above_tau_s": -1.0})
@@ -91,8 +104,8 @@ def test_bad_input_says_what_and_leaves_things_alone() -> None:
         PseudoWiener("pw_w", {"mass": 1.0})
     with pytest.raises(ParameterError, match="must be one of pw_r, pw_w, pw_p"):
         PseudoWiener("wiener")
-    with pytest.raises(ParameterError, match=r"delay_samples = 1\.5: must be a whole number"):
-        PseudoWiener("pw_r", {"delay_samples": 1.5})
+    with pytest.raises(ParameterError, match=r"delay_samples = 5\.5: must be in \[0, 5\]"):
+        PseudoWiener("pw_r", {"delay_samples": 5.5})
     model = MODELS[0]
     with pytest.raises(DataError, match="uneven sampling"):
         simulate(model, 8.0, time=TIME**2)
@@ -102,7 +115,7 @@ def test_bad_input_says_what_and_leaves_things_alone() -> None:
         model.simulate({"time_s": TIME})
     with pytest.raises(DataError, match=r"duty: must be in \[-1, 1\]"):
         simulate(model, 8.0, duty=10.0 * DUTY)
-    with pytest.raises(ParameterError, match="'angle' is no state: must be one of angle_deg"):
+    with pytest.raises(ParameterError, match="'angle' is not a state: must be one of angle_deg"):
         model.simulate({"time_s": TIME, "duty": DUTY}, initial_state={"angle": 8.0})
     with pytest.raises(ParameterError, match="horizon = 0"):
         model.predict(simulate(model, 8.0), 0)

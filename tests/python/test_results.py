@@ -10,14 +10,16 @@ from enum import Enum
 from pathlib import PurePosixPath
 
 import numpy as np
+import pint
 import pytest
 import xarray as xr
 from hypothesis import given
 from hypothesis import strategies as st
 
 from mgdd.errors import ConvergenceError, DataError, Error, ParameterError, ShapeError
-from mgdd.results import VARIABLES, check_labels, labelled_dataset
+from mgdd.results import VARIABLES, Label, check_labels, labelled_dataset
 from mgdd.results.labels import ANGLE, to_jsonable
+from mgdd.results.units import _UNITS, attribute_units, printed_units, unit_attributes, unit_of
 
 
 def cycle(**extra):
@@ -48,7 +50,7 @@ def test_dataset_carries_values_units_and_attributes():
     check_labels(dataset)
     assert dataset["pressure_bar"].dims == (ANGLE,)
     assert ANGLE in dataset.indexes
-    assert dataset[ANGLE].attrs == {"units": "°CA aTDC", "long_name": "crank angle"}
+    assert dataset[ANGLE].attrs == {"units": "degree", "long_name": "crank angle, °CA aTDC"}
     assert dataset["speed_rpm"].attrs == {"units": "rpm", "long_name": "engine speed"}
     assert dataset.attrs == {"file": "a.csv"}
 
@@ -167,3 +169,59 @@ def test_an_attribute_that_no_file_holds_is_refused(value):
     labelled_dataset(cycle(), attrs={"note": "text"})
     with pytest.raises(DataError, match="attribute 1 of the Dataset: its name must be text"):
         labelled_dataset(cycle(), attrs={1: "one"})
+
+
+@pytest.mark.parametrize("name", VARIABLES)
+def test_units_of_the_known_names_are_read_by_pint_and_printed_as_before(name):
+    label = VARIABLES[name]
+    attributes = unit_attributes(*label)
+    pint.application_registry.parse_units(attributes["units"])
+    assert Label(*printed_units(**attributes)) == label
+
+
+@pytest.mark.parametrize(
+    ("printed", "units", "remark"),
+    [
+        ("°CA aTDC", "degree", "°CA aTDC"),
+        ("°CA", "degree", "°CA"),
+        ("deg/s²", "degree/second**2", None),
+        ("J/°CA", "J/degree", "J/°CA"),
+        ("MW/m²", "MW/m**2", None),
+        ("mg/m³", "mg/m**3", None),
+        ("N m s/rad", "N*m*s/rad", None),
+        ("N·m", "N*m", "N·m"),
+        ("1/deg", "1/degree", None),
+        ("%/°CA", "percent/degree", "%/°CA"),
+        ("% of p_max", "percent", "% of p_max"),
+        ("bar/°CA (not documented)", "bar/degree", "bar/°CA (not documented)"),
+        ("°CA aTDC per unit of the parameter", "degree", "°CA aTDC per unit of the parameter"),
+        ("- per unit of the parameter", "1", "- per unit of the parameter"),
+        ("unit of J", "1", "unit of J"),
+        ("not given by the plant", "1", "not given by the plant"),
+        ("samples", "1", "samples"),
+        ("µs", "µs", None),
+        ("-", "1", None),
+        ("1", "1", None),
+        ("m/s**2", "m/s**2", None),
+    ],
+)
+def test_printed_units_become_expressions_and_come_back(printed, units, remark):
+    attributes = unit_attributes(printed, "name, part")
+    assert attributes == {"units": units, "long_name": f"name, part, {remark}" if remark else "name, part"}
+    pint.application_registry.parse_units(units)
+    back, name = printed_units(**attributes)
+    assert name == "name, part"
+    assert attribute_units(back) == units
+    assert unit_attributes(back, name) == attributes
+
+
+@pytest.mark.parametrize("units", ["3 bar", "a+b", "bar/", "[bar]", "last 50 cycles"])
+def test_what_is_no_unit_is_refused(units):
+    with pytest.raises(DataError, match=r"variable x has units .* is not a product or quotient of units, such as N\*m"):
+        labelled_dataset({"x": ((), 1.0, units, "quantity")})
+    assert labelled_dataset({"x": ((), 1.0, "bar", f"quantity, {units}")})["x"].attrs["units"] == "bar"
+
+
+@pytest.mark.parametrize("ending", sorted(_UNITS))
+def test_the_unit_at_the_end_of_a_name_is_read_by_pint(ending):
+    pint.application_registry.parse_units(attribute_units(unit_of(f"x{ending}")))

@@ -181,7 +181,7 @@ def test_a_plain_rig_gives_what_it_measures() -> None:
 
     run = run_seeker(ScriptedRig(answer), seeker(), 200, criteria=LoopCriteria(optimum=-5.6))
     check_labels(run.dataset)
-    assert run.dataset["boost_kpa"].attrs["units"] == "not given by the plant"
+    assert run.dataset["boost_kpa"].attrs["long_name"] == "boost_kpa, not given by the plant"
     assert np.isnan(run.dataset["boost_kpa"][::2]).all()
     assert (run.dataset["boost_kpa"][1::2] == 150.0).all()
     assert run.summary["misfires"] == 1.0

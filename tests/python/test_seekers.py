@@ -15,7 +15,7 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from mgdd.errors import DataError, ParameterError, ShapeError
+from mgdd.errors import DataError, Interrupted, ParameterError, ShapeError
 from mgdd.optimize import (
     BoundedSeeking,
     ComponentLag,
@@ -29,6 +29,7 @@ from mgdd.optimize import (
     maximize,
 )
 from mgdd.results import check_labels
+from mgdd.results.labels import label_of
 
 LIMITS = [Limit("p_max_bar", 150.0, margin=1.0), Limit("rise", 4.0, method="penalty", weight=2.0, scale=1.0)]
 PAIR = {"start": [3.0, -4.0], "lower": [-20.0, -np.inf], "upper": 20.0}
@@ -161,7 +162,7 @@ def test_history_holds_what_was_applied_and_told(make: Any) -> None:
     np.testing.assert_array_equal(history["estimate"][0], estimate)
     assert history["misfire"].values.sum() == seeker.misfires == 1
     assert np.isnan(history["objective"]).values.tolist() == [k == 17 for k in range(50)]
-    assert {history[name].attrs["units"] for name in ("applied", "estimate")} == {"unit of the input"}
+    assert {label_of(history[name]).units for name in ("applied", "estimate")} == {"unit of the input"}
     seeker.clear_history()
     run(seeker, 3)
     assert seeker.history["cycle"].values.tolist() == [50, 51, 52]
@@ -274,7 +275,9 @@ def test_maximize_takes_limits_and_misfires_and_stops_cleanly() -> None:
             raise KeyboardInterrupt
         return None if seeker.cycle % 20 == 3 else (-0.03 * x[0] ** 2, [140.0, 1.0])
 
-    history = maximize(engine, seeker, 500)
+    with pytest.raises(Interrupted, match="after cycle 60") as stop:
+        maximize(engine, seeker, 500)
+    history = stop.value.partial
     assert history.sizes["cycle"] == seeker.cycle == 60
     assert seeker.misfires == 3
     seeker.ask()

@@ -11,8 +11,8 @@ import pytest
 
 CPP = "common > math > dynamics > optimize > control > engine throttle > identify > guide > loop"
 PYTHON = (
-    "_core > errors > results > signals > io plot > presets > optimize > control > engine throttle > identify"
-    " > surrogate > guide > loop sweep design datasets > maps > rig > studies > report > cli > __main__"
+    "errors > _arguments > _core > results > signals > io plot > presets > optimize > control > engine throttle"
+    " > identify > surrogate > guide > loop sweep design datasets > maps > rig > studies > report > cli > __main__"
 )
 
 STRANGERS = [("identify/engine", "identify/throttle")]  # parts of one room that do not know each other

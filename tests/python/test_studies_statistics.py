@@ -7,9 +7,9 @@ import math
 import numpy as np
 import pytest
 
-from mgdd.loop import EngineBench, run_seeker
+from mgdd.loop import EngineBench, monte_carlo, run_seeker
 from mgdd.optimize import ExtremumSeeking, Spsa
-from mgdd.studies.statistics import bands, finished_loops, mean_interval, rms, run_with_slope, with_interval
+from mgdd.studies.statistics import bands, loops, mean_interval, rms, run_with_slope, with_interval
 
 
 def test_interval_by_hand() -> None:
@@ -64,16 +64,9 @@ def test_slope_belongs_to_the_same_trajectory(form: str) -> None:
     assert float(run["gradient_per_cad"][-1]) == pytest.approx(rise, rel=0.02)
 
 
-def test_ctrl_c_in_the_core_is_raised_again(monkeypatch: pytest.MonkeyPatch) -> None:
-    from mgdd.studies import statistics
-
-    real = statistics.monte_carlo
-
-    def cut_short(*args: object, **how: object) -> object:
-        table = real(*args, **how)
-        table["finished"][..., -1] = False
-        return table
-
-    monkeypatch.setattr(statistics, "monte_carlo", cut_short)
-    with pytest.raises(KeyboardInterrupt):
-        finished_loops(EngineBench(), Spsa(start=-12.0, lower=-30.0, upper=10.0), range(2), cycles=50)
+def test_loops_are_those_of_the_monte_carlo_over_seeds_alone() -> None:
+    seeker = Spsa(start=-12.0, lower=-30.0, upper=10.0)
+    table = loops(EngineBench(), seeker, range(3), cycles=50)
+    assert dict(table.sizes) == {"seed": 3}
+    whole = monte_carlo(EngineBench(), seeker, range(3), cycles=50)
+    np.testing.assert_array_equal(table["mean_cad"], whole["mean_cad"][0, 0])

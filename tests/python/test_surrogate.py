@@ -214,7 +214,7 @@ def test_limits_that_cannot_be_met(known):
     ("options", "message"),
     [
         ({"inputs": ("doi_main_ms",)}, "must begin with 'soi_cad'"),
-        ({"slow": ("soot",)}, "slow: 'soot' is no output"),
+        ({"slow": ("soot",)}, "slow: 'soot' is not an output"),
         ({"held_out": 1.0}, r"held_out = 1: must be in \(0, 1\)"),
         ({"max_lag": -1}, "max_lag = -1: must be >= 0"),
         ({"outputs": ("soi_cad",)}, "must name signals, each once, and no input"),
@@ -241,7 +241,7 @@ def test_wrong_records_are_refused():
 @pytest.mark.parametrize(
     ("call", "message"),
     [
-        (lambda s: s.predict(0.0, {"soi_cad": 1.0}), "at: 'soi_cad' is no other input"),
+        (lambda s: s.predict(0.0, {"soi_cad": 1.0}), "at: 'soi_cad' is not another input"),
         (lambda s: s.predict(0.0, {"p2m_us": np.nan}), "p2m_us = nan: must be finite"),
         (lambda s: s.predict(np.nan), "soi_cad: must be"),
         (lambda s: s.predict(0.0, outside="clip"), "outside = 'clip'"),

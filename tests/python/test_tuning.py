@@ -113,10 +113,10 @@ def test_the_seeker_carries_what_was_tuned() -> None:
 
 def test_summary_says_plainly_whether_the_wish_is_met() -> None:
     text = tune(SIGMA, BEND, distance=12.0, arrival=1.0, cycles=100.0).summary()
-    assert text.endswith("The wish is met.")
+    assert text.endswith("The specification is met.")
     hopeless = tune(SIGMA, BEND, rms=0.01, amplitude_max=1.0, cycles=20.0)
     assert not hopeless.met
-    assert "The wish cannot be met:" in hopeless.summary()
+    assert "The specification cannot be met:" in hopeless.summary()
     assert "out of reach with amplitude_max = 1" in hopeless.summary()
     assert "cycles = 20 is too few" in hopeless.summary()
     assert "turned back" in tune(SIGMA, BEND, delay_cycles=5.0).summary()

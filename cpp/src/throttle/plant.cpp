@@ -14,6 +14,12 @@ double checked_step(const Throttle& throttle, double step_s) {
   return step_s;
 }
 
+// Every option on every scalar of the contract.
+static_assert(dynamics::StartsAtRest<ThrottlePlant> && dynamics::StartsAtRest<BasicThrottlePlant<float>> &&
+              dynamics::StartsAtRest<BasicThrottlePlant<Dual<3>>> &&
+              dynamics::StartsAtRest<BasicThrottlePlant<Dual<3, float>, float>> &&
+              dynamics::StartsAtRest<BasicThrottlePlant<Lanes<8>>>);
+
 }  // namespace
 
 PlantCoefficients<double> plant_coefficients(const Throttle& t, double h) noexcept {
@@ -22,28 +28,24 @@ PlantCoefficients<double> plant_coefficients(const Throttle& t, double h) noexce
   const double plate = t.plate_friction_share;
   const double bore_m = t.bore_mm * units::m_per_mm;
   PlantCoefficients<double> c{};
-  c.whole = {t.viscous_nms_per_rad, t.coulomb_nm, t.stiction_nm};
-  c.motor_side = {(1.0 - plate) * t.viscous_nms_per_rad, (1.0 - plate) * t.coulomb_nm, (1.0 - plate) * t.stiction_nm};
-  c.plate_side = {plate * t.viscous_nms_per_rad, plate * t.coulomb_nm, plate * t.stiction_nm};
+  c.whole = {t.viscous_nms_per_rad, {t.coulomb_nm, t.stiction_nm}};
+  c.motor_side = {(1.0 - plate) * t.viscous_nms_per_rad, {(1.0 - plate) * t.coulomb_nm, (1.0 - plate) * t.stiction_nm}};
+  c.plate_side = {plate * t.viscous_nms_per_rad, {plate * t.coulomb_nm, plate * t.stiction_nm}};
   c.inertia_over_h = t.inertia_kgm2 / h;
   c.motor_inertia_over_h = (t.inertia_kgm2 - t.plate_inertia_kgm2) / h;
   c.plate_inertia_over_h = t.plate_inertia_kgm2 / h;
   c.torque_constant = t.torque_constant_nm_per_a;
   c.back_emf = t.back_emf_vs_per_rad;
   c.inductance_over_h = inductance_over_h;
+  c.resistance = resistance;
   c.inverse_impedance = 1.0 / (inductance_over_h + resistance);
   c.drop = t.driver_drop_v;
   c.dead_band = t.dead_band;
-  c.inverse_stribeck = 1.0 / t.stribeck_rad_per_s;
-  c.karnopp = t.karnopp_rad_per_s;
-  c.inverse_tanh = 1.0 / t.tanh_rad_per_s;
-  c.bristle = t.bristle_nm_per_rad;
-  c.bristle_damping = t.bristle_damping_nms_per_rad;
+  c.shape = {1.0 / t.stribeck_rad_per_s, t.karnopp_rad_per_s, 1.0 / t.tanh_rad_per_s, t.bristle_nm_per_rad,
+             t.bristle_damping_nms_per_rad};
   c.limp_home = t.limp_home_deg * rad_per_deg;
-  c.spring_above = t.spring_above_nm_per_rad;
-  c.spring_below = t.spring_below_nm_per_rad;
-  c.preload_above = t.preload_above_nm;
-  c.preload_below = t.preload_below_nm;
+  c.above = {t.spring_above_nm_per_rad, t.preload_above_nm};
+  c.below = {t.spring_below_nm_per_rad, t.preload_below_nm};
   c.inverse_ramp = 1.0 / (t.preload_ramp_deg * rad_per_deg);
   c.closed = t.closed_deg * rad_per_deg;
   c.open = t.open_deg * rad_per_deg;
@@ -59,7 +61,7 @@ PlantCoefficients<double> plant_coefficients(const Throttle& t, double h) noexce
 }
 
 template <>
-BasicThrottlePlant<double>::BasicThrottlePlant(const Throttle& throttle, double step_s)
+BasicThrottlePlant<double, double>::BasicThrottlePlant(const Throttle& throttle, double step_s)
     : BasicThrottlePlant(plant_coefficients(throttle, checked_step(throttle, step_s)), throttle, step_s) {}
 
 ThrottleState at_rest(double angle_deg) noexcept {

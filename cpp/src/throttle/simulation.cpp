@@ -10,6 +10,7 @@
 #include "mgdd/common/error.hpp"
 #include "mgdd/common/text.hpp"
 #include "mgdd/common/units.hpp"
+#include "mgdd/dynamics/simulate.hpp"
 #include "mgdd/math/dispatch.hpp"
 
 namespace mgdd::throttle {
@@ -20,7 +21,7 @@ using Wide = Lanes<width>;
 using WidePlant = BasicThrottlePlant<Wide>;
 using Coefficients = PlantCoefficients<double>;
 
-constexpr std::size_t count = sizeof(Coefficients) / sizeof(double);
+constexpr std::size_t count = n_plant_coefficients;
 static_assert(sizeof(PlantCoefficients<Wide>) == count * sizeof(Wide));
 
 void check_column(std::string_view name, std::span<const double> column, std::size_t n, bool may_be_empty) {
@@ -47,35 +48,35 @@ PlantCoefficients<Wide> packed(const std::array<Coefficients, width>& lanes) noe
   return std::bit_cast<PlantCoefficients<Wide>>(columns);
 }
 
+template <class Plant>
+MGDD_INLINE typename Plant::Input input_at(const Plant& plant, const ThrottleSignals& signals, std::size_t k) noexcept {
+  using T = typename Plant::Scalar;
+  typename Plant::Input input = plant.input(T(signals.duty[k]));
+  input.bridge = signals.bridge;
+  if (!signals.supply_v.empty()) input.supply_v = T(signals.supply_v[k]);
+  if (!signals.airflow_torque_nm.empty()) input.airflow_torque_nm = T(signals.airflow_torque_nm[k]);
+  return input;
+}
+
 // The hot loop of many runs: rows of `width` angles per sample.
 MGDD_INLINE void run_lanes(const WidePlant& plant, const ThrottleSignals& signals, std::size_t steps,
                            BasicThrottleState<Wide>& state, double* rows) noexcept {
-  BasicThrottleInput<Wide> input;
+  const dynamics::Repeated<WidePlant> sampled{plant, static_cast<int>(steps)};
   BasicThrottleState<Wide> s = state;
-  input.bridge = signals.bridge;
-  input.supply_v = plant.coefficients().supply;
-  const Wide to_deg(1.0 / units::rad_per_deg);
-  const std::size_t n = signals.duty.size();
-  for (std::size_t k = 0; k < n; ++k) {
-    (s.plate_angle_rad * to_deg).store(rows + k * static_cast<std::size_t>(width));
-    if (k + 1 == n) break;
-    input.duty = Wide(signals.duty[k]);
-    if (!signals.supply_v.empty()) input.supply_v = Wide(signals.supply_v[k]);
-    input.airflow_torque_nm = Wide(signals.airflow_torque_nm.empty() ? 0.0 : signals.airflow_torque_nm[k]);
-    for (std::size_t i = 0; i < steps; ++i)
-      plant.step(s, input);
-  }
+  const auto input = [&] [[gnu::always_inline]] (std::size_t k) { return input_at(plant, signals, k); };
+  const auto store = [rows] [[gnu::always_inline]] (std::size_t k, const Wide& angle_deg) {
+    angle_deg.store(rows + k * static_cast<std::size_t>(width));
+    return true;
+  };
+  dynamics::run(sampled, s, signals.duty.size(), input, store);
   state = s;
 }
 
 void put(BasicThrottleState<Wide>& wide, int lane, const ThrottleState& one) noexcept {
-  wide.angle_rad.set(lane, one.angle_rad);
-  wide.speed_rad_per_s.set(lane, one.speed_rad_per_s);
-  wide.current_a.set(lane, one.current_a);
-  wide.bristle_rad.set(lane, one.bristle_rad);
-  wide.plate_angle_rad.set(lane, one.plate_angle_rad);
-  wide.plate_speed_rad_per_s.set(lane, one.plate_speed_rad_per_s);
-  wide.plate_bristle_rad.set(lane, one.plate_bristle_rad);
+  const auto to = WidePlant::numbers(wide);
+  const auto from = WidePlant::numbers(one);
+  for (std::size_t i = 0; i < to.size(); ++i)
+    to[i]->set(lane, *from[i]);
 }
 
 }  // namespace
@@ -111,22 +112,16 @@ void validate(const ThrottleSignals& signals) {
 void simulate(const ThrottlePlant& plant, const ThrottleSignals& signals, std::size_t steps, ThrottleState& state,
               const ThrottleColumns& columns) noexcept {
   constexpr double to_deg = 1.0 / units::rad_per_deg;
-  ThrottleInput input;
+  const dynamics::Repeated<ThrottlePlant> sampled{plant, static_cast<int>(steps)};
   ThrottleState s = state;
-  input.bridge = signals.bridge;
-  input.supply_v = plant.coefficients().supply;
-  const std::size_t n = signals.duty.size();
-  for (std::size_t k = 0; k < n; ++k) {
-    if (!columns.angle_deg.empty()) columns.angle_deg[k] = s.plate_angle_rad * to_deg;
-    if (!columns.speed_deg_per_s.empty()) columns.speed_deg_per_s[k] = s.plate_speed_rad_per_s * to_deg;
-    if (!columns.current_a.empty()) columns.current_a[k] = s.current_a;
-    if (k + 1 == n) break;
-    input.duty = signals.duty[k];
-    if (!signals.supply_v.empty()) input.supply_v = signals.supply_v[k];
-    if (!signals.airflow_torque_nm.empty()) input.airflow_torque_nm = signals.airflow_torque_nm[k];
-    for (std::size_t i = 0; i < steps; ++i)
-      plant.step(s, input);
-  }
+  dynamics::run(
+      sampled, s, signals.duty.size(), [&](std::size_t k) { return input_at(plant, signals, k); },
+      [&](std::size_t k, double angle_deg) {
+        if (!columns.angle_deg.empty()) columns.angle_deg[k] = angle_deg;
+        if (!columns.speed_deg_per_s.empty()) columns.speed_deg_per_s[k] = s.plate_speed_rad_per_s * to_deg;
+        if (!columns.current_a.empty()) columns.current_a[k] = s.current_a;
+        return true;
+      });
   state = s;
 }
 

@@ -119,13 +119,19 @@ void validate(const Throttle& t) {
   }
 }
 
-double airflow_coefficient(double angle_deg) noexcept {
-  if (!(angle_deg > air_angle_deg.front() && angle_deg < air_angle_deg.back())) return 0.0;
+AirflowPoint airflow_point(double angle_deg) noexcept {
+  if (!(angle_deg > air_angle_deg.front() && angle_deg < air_angle_deg.back())) return {0.0, 0.0};
   std::size_t i = 1;
   while (air_angle_deg[i] < angle_deg)
     ++i;
-  const double share = (angle_deg - air_angle_deg[i - 1]) / (air_angle_deg[i] - air_angle_deg[i - 1]);
-  return air_coefficient[i - 1] + share * (air_coefficient[i] - air_coefficient[i - 1]);
+  const double width = air_angle_deg[i] - air_angle_deg[i - 1];
+  const double share = (angle_deg - air_angle_deg[i - 1]) / width;
+  const double rise = air_coefficient[i] - air_coefficient[i - 1];
+  return {air_coefficient[i - 1] + share * rise, rise / width};
+}
+
+double airflow_coefficient(double angle_deg) noexcept {
+  return airflow_point(angle_deg).coefficient;
 }
 
 double airflow_torque_nm(const Throttle& t, double angle_deg) noexcept {

@@ -170,7 +170,7 @@ def _check_pegging(args: argparse.Namespace) -> None:
 def _add_calibrate(verbs: Any) -> None:
     parser = add_command(
         verbs, "calibrate", calibrate,
-        help_text="calibrate the cycle model to measured traces, and say what the fit cannot tell",
+        help_text="calibrate the cycle model to measured traces, and name what the traces do not identify",
         example="mgdd engine calibrate a25.csv a50.csv --preset hd_diesel_128x144 --conditions conditions.csv --json",
     )  # fmt: skip
     add_files(parser, nargs="+")

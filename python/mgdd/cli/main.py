@@ -13,7 +13,7 @@ from collections.abc import Sequence
 from mgdd import _core
 from mgdd.cli import demo, doctor, engine, study, throttle
 from mgdd.cli.options import Parser, UsageError
-from mgdd.cli.output import fail
+from mgdd.cli.output import Stopped, fail
 from mgdd.cli.progress import Progress
 from mgdd.errors import ConvergenceError, Error
 
@@ -87,8 +87,9 @@ def main(argv: Sequence[str] | None = None) -> int:
         fail(args, error, message)
         return EXIT_BAD_INPUT
     except KeyboardInterrupt as error:
-        print("mgdd: interrupted", file=sys.stderr)
-        fail(args, error, "interrupted")
+        kept = f"interrupted: {error if isinstance(error, Stopped) else 'nothing was kept'}"
+        print(f"mgdd: {kept}", file=sys.stderr)
+        fail(args, error, kept)
         return EXIT_INTERRUPTED
     return EXIT_OK
 

@@ -213,7 +213,7 @@ def number_pairs(items: Sequence[str], option: str) -> dict[str, float]:
         name, value = _pair(item, option, "NAME=NUMBER")
         number = _value(name, value)
         if isinstance(number, str):
-            raise ParameterError(f"{option} {item}: {value!r} is no number")
+            raise ParameterError(f"{option} {item}: {value!r} is not a number")
         if name in out:
             raise ParameterError(f"{option} {name} is given twice: give it once")
         out[name] = number

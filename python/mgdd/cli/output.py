@@ -18,7 +18,11 @@ from mgdd.studies.sections import Table
 if TYPE_CHECKING:
     import xarray as xr
 
-__all__ = ["check_figure", "check_output", "emit", "error_of", "fail", "lines", "show"]
+__all__ = ["Stopped", "check_figure", "check_output", "emit", "error_of", "fail", "lines", "show"]
+
+
+class Stopped(KeyboardInterrupt):
+    """Ctrl-C after which something was kept; the message says what."""
 
 
 def check_output(args: argparse.Namespace, *, csv: bool) -> None:

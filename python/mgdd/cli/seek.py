@@ -19,6 +19,7 @@ from mgdd.loop import EngineBench, LoopCriteria, find_steady_optimum, run_seeker
 from mgdd.loop.plant_loop import LoopRun
 from mgdd.optimize import Optimum
 from mgdd.results import VARIABLES
+from mgdd.results.units import unit_attributes
 
 if TYPE_CHECKING:
     import xarray as xr
@@ -59,7 +60,7 @@ def add_seek(verbs: Any) -> None:
         "--cycles", type=int, metavar="N",
         help="length of the run (default: 2000; with --sensor analyser 16 time constants of the seeker, 4000 at least)",
     )  # fmt: skip
-    parser.add_argument("--seed", type=int, default=0, metavar="N", help="of all chance (default: 0)")
+    parser.add_argument("--seed", type=int, default=0, metavar="N", help="of all noise (default: 0)")
     parser.add_argument(
         "--limit", action="append", default=[], metavar="NAME=X",
         help=f"keep an indicator, or {_COV}, below X; repeatable",
@@ -259,7 +260,7 @@ def _table(cycles: xr.Dataset) -> xr.Dataset:
     table = cycles.drop_dims([dim for dim in cycles.dims if dim != "cycle"])
     if "limit" in cycles.dims and _COV in cycles["limit"].to_numpy():
         cov = cycles["limits"].sel(limit=_COV, drop=True).drop_vars("limit_units", errors="ignore")
-        table[_COV] = cov.assign_attrs(VARIABLES[_COV]._asdict())
+        table[_COV] = cov.assign_attrs(unit_attributes(*VARIABLES[_COV]))
     return table
 
 

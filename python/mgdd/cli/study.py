@@ -9,10 +9,10 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from mgdd.cli.options import add_command
-from mgdd.cli.output import check_output, emit
-from mgdd.errors import ParameterError
+from mgdd.cli.output import Stopped, check_output, emit
+from mgdd.errors import Interrupted, ParameterError
 from mgdd.report import write_report
-from mgdd.studies import available_studies, run_study
+from mgdd.studies import StudyResult, available_studies, run_study
 from mgdd.studies.sections import Table, cells, column_names
 
 if TYPE_CHECKING:
@@ -60,7 +60,12 @@ def run(args: argparse.Namespace) -> None:
         folder.mkdir(parents=True, exist_ok=True)
     drawn = folder is not None or args.report is not None
     step = args.progress.expect(10)
-    result = run_study(args.name, seeds=args.seeds, quick=args.quick, figures=drawn, progress=step)
+    try:
+        result = run_study(args.name, seeds=args.seeds, quick=args.quick, figures=drawn, progress=step)
+    except Interrupted as stop:
+        if not isinstance(stop.partial, StudyResult):
+            raise
+        result = stop.partial
     paths = [] if folder is None else _write(result.figures, folder, f"{args.name}.{args.format}")
     page = None if args.report is None else write_report(result, args.report)
     summary: dict[str, Any] = dict(result.summary)
@@ -70,7 +75,7 @@ def run(args: argparse.Namespace) -> None:
         summary["report"] = page.as_posix()
     emit(args, summary, text=_text(titles[args.name], summary))
     if summary.get("interrupted"):
-        raise KeyboardInterrupt
+        raise Stopped(f"{len(summary['rows'])} finished rows are printed")
 
 
 def _write(figures: Mapping[str, Figure], folder: Path, ending: str) -> list[Path]:

@@ -86,7 +86,7 @@ def _excite(args: argparse.Namespace) -> None:
     for name in given:
         if name not in _OF_KIND[args.kind]:
             have = ", ".join("--" + n.replace("_", "-") for n in _OF_KIND[args.kind])
-            raise ParameterError(f"--{name.replace('_', '-')} is no option of a {args.kind}, which has {have}")
+            raise ParameterError(f"--{name.replace('_', '-')} is not an option of a {args.kind}, which has {have}")
     if (args.offset is None) != (args.amplitude is None):
         raise ParameterError("--offset and --amplitude belong together: give both, or none for a designed signal")
     if args.offset is None:

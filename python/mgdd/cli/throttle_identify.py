@@ -33,7 +33,7 @@ def add(verbs: Any) -> None:
     """Add both commands."""
     fit = add_command(
         verbs, "identify", _identify,
-        help_text="fit a model to a log, test it on another, and say what the log cannot tell",
+        help_text="fit a model to a log, test it on another, and name the parameters that the log does not identify",
         example="mgdd throttle identify chirp.csv --model pw_r --test steps.csv --output fit.toml --json",
         endings=".toml, the parameters, or .json",
     )  # fmt: skip

@@ -30,7 +30,7 @@ def throttle_of(args: argparse.Namespace) -> tuple[Throttle, str]:
     preset = presets.load(args.preset or _DEFAULT_PRESET)
     throttle = getattr(preset, "throttle", None)
     if throttle is None:
-        raise ParameterError(f"--preset {args.preset}: is no throttle; P1, P2 and P3 are")
+        raise ParameterError(f"--preset {args.preset}: is not a throttle; P1, P2 and P3 are")
     fields = Throttle.fields()
     values: dict[str, Any] = {}
     for item in args.set:

@@ -224,7 +224,7 @@ def load_h2df_cycles(*, checked: bool = True, mask_held: bool = True) -> xr.Data
         reads an export of your own with the same columns.
     mask_held : bool
         Set the burn angles to NaN in the cycles where the log repeats all three of the cycle before: such a
-        repeat is no measurement.
+        repeat is not a measurement.
 
     Returns
     -------
@@ -321,7 +321,7 @@ def _emps_record(file: Path) -> xr.Dataset:
     content = loadmat(file)
     missing = [name for name in ("t", "qg", "qm", "vir", "gtau") if name not in content]
     if missing:
-        raise DataError(f"{file}: lacks {', '.join(missing)}: this is no record of the EMPS benchmark")
+        raise DataError(f"{file}: lacks {', '.join(missing)}: this is not a record of the EMPS benchmark")
     n = content["qm"].size
     return labelled_dataset(
         {

@@ -12,6 +12,7 @@ from mgdd import _core
 from mgdd._core import Cylinder, NoxProxy, OperatingPoint
 from mgdd.results import VARIABLES, labelled_dataset
 from mgdd.results.labels import ANGLE
+from mgdd.results.units import unit_attributes
 
 if TYPE_CHECKING:
     import xarray as xr
@@ -229,7 +230,7 @@ def sensitivities(
     for name, (dims, values) in columns.items():
         label = VARIABLES[name]
         units = f"{label.units} per unit of the parameter"
-        out[f"d_{name}"] = (dims, values, {"units": units, "long_name": f"sensitivity of {label.long_name}"})
+        out[f"d_{name}"] = (dims, values, unit_attributes(units, f"sensitivity of {label.long_name}"))
     return out
 
 

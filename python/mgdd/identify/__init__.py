@@ -1,4 +1,4 @@
-"""Identification: fitting models to measured records, and what such a fit can and cannot tell.
+"""Identification: fitting models to measured records, and which parameters the data do not identify.
 
 Engine: `fit_cylinder`, `compare_laws`, `wall_heat_profile`, `best_timing`. Throttle: `identify_throttle`,
 `validate_throttle` and the fits and excitations below them. Any ODE: `fit_ode`. Every fit answers with a

@@ -52,7 +52,7 @@ class OdeModel(SampledModel):
     parameters : mapping of str to float
         Values in the order that `derivative` expects.
     initial_state : tuple of float
-        State at the first sample of a free run that is not told one.
+        State at the first sample of a free run that is not given one.
     substeps : int
         Equal Runge-Kutta steps per sample.
     input_names : tuple of str

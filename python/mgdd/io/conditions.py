@@ -43,7 +43,7 @@ def read_conditions(path: str | os.PathLike[str]) -> dict[str, dict[str, float]]
     FileNotFoundError
         No such file.
     DataError
-        No column ``file``, an unknown column, a trace named twice, a value that is no number or out of
+        No column ``file``, an unknown column, a trace named twice, a value that is not a number or out of
         bounds.
 
     Examples

@@ -28,7 +28,7 @@ class MatColumns:
     matrix: NDArray[Any] | None
 
     def has(self, column: str) -> bool:
-        """Tell whether a column of that name is there."""
+        """Return whether a column of that name is there."""
         return column in self.columns
 
     def numbers(self, column: int | str) -> NDArray[np.float64]:

@@ -94,7 +94,7 @@ def entry_of(entry: Any) -> Entry:
 
 
 def fits(value: Any, form: str) -> bool:
-    """Tell whether a value is of a form."""
+    """Return whether a value is of a form."""
     if form == "numbers":
         rows = value if isinstance(value, list) else [None]
         return all(fits(row, "numbers" if isinstance(row, list) else "number") for row in rows)

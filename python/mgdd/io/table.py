@@ -116,7 +116,7 @@ def read_table(
 
 
 def _like_number(cell: str) -> bool:
-    """Tell a cell of data, even a misspelt one, from a name: a header must not swallow a row."""
+    """Return whether a cell holds data, even misspelt, and not a name: a header must not swallow a row."""
     return parse_number(cell) is not None or re.match(r"[+-]?[.,]?\d", cell) is not None
 
 

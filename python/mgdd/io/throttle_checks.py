@@ -130,7 +130,7 @@ def check_finite(columns: Mapping[str, NDArray[np.float64]], place: Place) -> No
 def check_time(columns: Mapping[str, NDArray[np.float64]], place: Place) -> None:
     """Refuse time that does not rise, leaves gaps, cannot be in seconds, or is too short.
 
-    The other columns tell whether one of them is the time.
+    The other columns show whether one of them is the time.
     """
     time = columns["time_s"]
     column = place.column("time_s")
@@ -218,7 +218,7 @@ def check_signals(
     if np.ptp(duty) < STILL_DUTY:
         raise DataError(
             f"{place.span(0, duty.size - 1)}, {place.column('duty')}: the duty stays at {raw_duty[0]:.4g}: check the "
-            "column; a duty that stands still tells nothing about the throttle: log a varied one "
+            "column; a constant duty identifies nothing of the throttle: log a varied one "
             "(mgdd.identify.design_excitation)"
         )
     _check_angle(angle, raw_angle, angle_unit, place)
@@ -239,7 +239,7 @@ def _check_exchanged(duty: NDArray[np.float64], angle: NDArray[np.float64], duty
     lowest = int(np.argmin(angle))
     if duty_unit == "%" and angle.min() < ANGLE_DEG[0] and angle.max() <= 100.0 and duty.min() > -5.0:
         raise DataError(
-            f"{place.cell(lowest, 'angle_deg')}: {angle[lowest]:g} is no opening, and the duty never pulls closed: "
+            f"{place.cell(lowest, 'angle_deg')}: {angle[lowest]:g} is not an opening, and the duty never pulls closed: "
             "the columns look exchanged; exchange duty= and angle="
         )
 

@@ -82,7 +82,7 @@ def throttle_log(
     >>> time = np.arange(1000) * 1e-3
     >>> log = throttle_log(time, 0.2 * np.sin(6.0 * time), 20.0 + 15.0 * np.sin(6.0 * time - 0.5))
     >>> log["angle_deg"].attrs["units"], log.sizes["time_s"]
-    ('deg', 1000)
+    ('degree', 1000)
     """
     columns = _columns({"time_s": time_s, "duty": duty, "angle_deg": angle_deg}, name)
     for key, values in (("current_a", current_a), ("supply_v", supply_v)):
@@ -147,7 +147,7 @@ def read_throttle_log(
     FileNotFoundError
         No such file.
     DataError
-        No such column, a cell that is no number, and all of `check_throttle_log`; the message gives file, line,
+        No such column, a cell that is not a number, and all of `check_throttle_log`; the message gives file, line,
         column and remedy.
     ParameterError
         An empty window, a step that is not positive.

@@ -29,11 +29,11 @@ FLAGS = {
 
 
 class EngineBench(_core.EngineBench):
-    """A virtual engine bench: the cycle model with chance, drift and the sensors of a real one.
+    """A virtual engine bench: the cycle model with noise, drift and the sensors of a real one.
 
     The plant scatters, misfires and drifts as asked, and runs through a schedule of operating points. Its sensors are
     a NOx analyser (late and slow), a fast NOx sensor and a soft sensor that maps the maximum gas temperature. All
-    chance is a function of seed and cycle: the same seed gives the same run, however it is cut. A bench can be
+    noise is a function of seed and cycle: the same seed gives the same run, however it is cut. A bench can be
     pickled and copied at any cycle; one bench must not be stepped from two threads at once.
 
     Parameters
@@ -69,7 +69,7 @@ class EngineBench(_core.EngineBench):
     step_cad, integrator
         As in `mgdd.engine.simulate`.
     seed : int
-        Of all chance, in [0, 2**64).
+        Of all noise, in [0, 2**64).
 
     Raises
     ------
@@ -212,7 +212,7 @@ class EngineBench(_core.EngineBench):
         Raises
         ------
         mgdd.errors.ShapeError
-            Requests that are no column.
+            Requests that are not a column.
 
         Examples
         --------

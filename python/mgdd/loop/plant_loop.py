@@ -4,8 +4,8 @@ from __future__ import annotations
 
 import math
 from collections.abc import Mapping
-from dataclasses import dataclass, field
-from typing import TYPE_CHECKING, Any
+from dataclasses import dataclass
+from typing import TYPE_CHECKING, Any, NamedTuple
 
 import numpy as np
 
@@ -28,14 +28,13 @@ _UNKNOWN = "not given by the plant"
 _OWN = ("estimate_cad", "soc_requested_cad", "j", "misfire")  # columns that the loop itself knows
 
 
-@dataclass
-class _Log:
-    """One row per measured cycle."""
+class _Row(NamedTuple):
+    """One measured cycle."""
 
-    estimate: list[NDArray[np.float64]] = field(default_factory=list)
-    applied: list[NDArray[np.float64]] = field(default_factory=list)
-    void: list[bool] = field(default_factory=list)
-    measured: list[Measurement] = field(default_factory=list)
+    estimate: NDArray[np.float64]
+    applied: NDArray[np.float64]
+    void: bool
+    measured: Measurement
 
 
 @described
@@ -89,21 +88,22 @@ def steer(plant: Plant, seeker: Any, cycles: int, criteria: LoopCriteria) -> Loo
     criteria.thresholds(names)
     criteria.require_counted(cycles)
     announcing = plant if isinstance(plant, AnnouncingPlant) else None
-    first, log, interrupted = seeker.cycle, _Log(), False
+    first, log, interrupted = seeker.cycle, list[_Row](), False
     try:
         for _ in range(cycles):
             _one_cycle(plant, announcing, seeker, log)
     except KeyboardInterrupt:
         interrupted = True
+        del log[seeker.cycle - first :]  # a cycle that was measured and not told: it is asked again
     dataset = _dataset(log, first, plant.input_names)
     dataset.attrs["interrupted"] = int(interrupted)
     run = LoopRun(dataset=dataset, summary=summarize_cycles(dataset, criteria), interrupted=interrupted)
     if interrupted:
-        raise Interrupted(f"interrupted after {len(log.measured)} of {cycles} cycles, which are in .partial", run)
+        raise Interrupted(f"interrupted after {len(log)} of {cycles} cycles, which are in .partial", run)
     return run
 
 
-def _one_cycle(plant: Plant, announcing: AnnouncingPlant | None, seeker: Any, log: _Log) -> None:
+def _one_cycle(plant: Plant, announcing: AnnouncingPlant | None, seeker: Any, log: list[_Row]) -> None:
     if announcing is not None and announcing.operating_point_changes:
         seeker.restart()
     estimate = np.array(seeker.estimate, np.float64)
@@ -116,13 +116,10 @@ def _one_cycle(plant: Plant, announcing: AnnouncingPlant | None, seeker: Any, lo
     summed = seeker.component_count == 1
     told = measured.performance if summed else np.array(measured.components)
     limits = [measured.limits[name] for name in seeker.limit_names]
+    log.append(_Row(estimate, asked, void, measured))
     seeker.tell(told, limits if limits else None, misfire=void)
     if late:
         seeker.restart()
-    log.estimate.append(estimate)
-    log.applied.append(asked)
-    log.void.append(void)
-    log.measured.append(measured)
 
 
 def _require_match(seeker: Any, measured: Measurement) -> None:
@@ -137,10 +134,10 @@ def _require_match(seeker: Any, measured: Measurement) -> None:
             raise ParameterError(f"limits: {name!r} is not measured by the plant: it measures {have}")
 
 
-def _steered(log: _Log, inputs: tuple[str, ...]) -> dict[str, tuple[Any, ...]]:
+def _steered(log: list[_Row], inputs: tuple[str, ...]) -> dict[str, tuple[Any, ...]]:
     """Label what the seeker thought and asked for."""
-    estimate = np.array(log.estimate, np.float64).reshape(-1, len(inputs))
-    applied = np.array(log.applied, np.float64).reshape(-1, len(inputs))
+    estimate = np.array([row.estimate for row in log], np.float64).reshape(-1, len(inputs))
+    applied = np.array([row.applied for row in log], np.float64).reshape(-1, len(inputs))
     if inputs == ("soc_cad",):
         return {"estimate_cad": ("cycle", estimate[:, 0]), "soc_requested_cad": ("cycle", applied[:, 0])}
     over, unit = ("cycle", "input"), "unit of the input"
@@ -151,9 +148,9 @@ def _steered(log: _Log, inputs: tuple[str, ...]) -> dict[str, tuple[Any, ...]]:
     }
 
 
-def _dataset(log: _Log, first: int, inputs: tuple[str, ...]) -> xr.Dataset:
+def _dataset(log: list[_Row], first: int, inputs: tuple[str, ...]) -> xr.Dataset:
     """Label what was measured; a value that is missing in some cycles is NaN there."""
-    rows = log.measured
+    rows = [row.measured for row in log]
     names = dict.fromkeys(name for row in rows for name in row.values)
     columns = {name: np.array([row.values.get(name, math.nan) for row in rows]) for name in names}
     count = columns.pop("cycle", None)
@@ -163,7 +160,7 @@ def _dataset(log: _Log, first: int, inputs: tuple[str, ...]) -> xr.Dataset:
         **_steered(log, inputs),
         "j": ("cycle", np.array([row.performance for row in rows], np.float64)),
         "misfire": ("cycle", np.array([row.misfire for row in rows], np.bool_), "-", FLAGS["misfire"]),
-        "void": ("cycle", np.array(log.void, np.bool_), "-", "cycle whose reading the seeker did not use"),
+        "void": ("cycle", np.array([row.void for row in log], np.bool_), "-", "cycle that the seeker did not use"),
     }
     for name, values in columns.items():
         if name in FLAGS and name not in _OWN:

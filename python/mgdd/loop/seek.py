@@ -10,7 +10,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from mgdd import _core
-from mgdd.errors import ParameterError, ShapeError, keep_partial
+from mgdd.errors import ParameterError, ShapeError, hand_over, or_partial
 from mgdd.loop.bench import EngineBench, cycles_to_dataset
 from mgdd.loop.criteria import LoopCriteria
 from mgdd.loop.plant import Plant
@@ -101,10 +101,11 @@ def run_seeker(
     criteria = criteria or LoopCriteria()
     if not isinstance(plant, EngineBench):
         return steer(plant, seeker, cycles, criteria)
-    return keep_partial(
-        lambda: _core.run_loop(plant, seeker, cycles, **_core_criteria(plant, criteria)),
-        lambda raw: _loop_run(plant, raw),
-    )
+    goal = _core_criteria(plant, criteria)
+    raw, stop = or_partial(lambda: _core.run_loop(plant, seeker, cycles, **goal))
+    dataset = cycles_to_dataset(plant, raw["columns"], estimate_cad=raw["estimate_cad"])
+    dataset.attrs["interrupted"] = int(raw["interrupted"])
+    return hand_over(LoopRun(dataset=dataset, summary=raw["summary"], interrupted=raw["interrupted"]), stop)
 
 
 def _core_criteria(bench: EngineBench, criteria: LoopCriteria) -> dict[str, Any]:
@@ -115,12 +116,6 @@ def _core_criteria(bench: EngineBench, criteria: LoopCriteria) -> dict[str, Any]
         "exceed_from": criteria.exceed_from,
         "exceed_above": criteria.thresholds(bench.limit_names),
     }
-
-
-def _loop_run(bench: EngineBench, raw: dict[str, Any]) -> LoopRun:
-    dataset = cycles_to_dataset(bench, raw["columns"], estimate_cad=raw["estimate_cad"])
-    dataset.attrs["interrupted"] = int(raw["interrupted"])
-    return LoopRun(dataset=dataset, summary=raw["summary"], interrupted=raw["interrupted"])
 
 
 def monte_carlo(
@@ -134,7 +129,7 @@ def monte_carlo(
 ) -> xr.Dataset:
     """Run every seeker on every bench with every seed, whole loops at once on all cores.
 
-    Each loop starts from cycle 0 of its bench and from where its seeker stands. Chance depends on the seed alone, so
+    Each loop starts from cycle 0 of its bench and from where its seeker stands. Noise depends on the seed alone, so
     the numbers are the same on any number of threads.
 
     Parameters
@@ -189,7 +184,7 @@ def monte_carlo(
     for name in ("arrival_cad", "tail_cycles", "exceed_from"):
         if len({own[name] for own in each}) > 1:
             raise ParameterError(f"criteria: {name.removesuffix('_cad')} must be the same for all benches")
-    return keep_partial(
+    raw, stop = or_partial(
         lambda: _core.monte_carlo(
             bench_list,
             seeker_list,
@@ -201,24 +196,20 @@ def monte_carlo(
             exceed_from=each[0]["exceed_from"] if each else None,
             exceed_above=[own["exceed_above"] for own in each],
             threads=threads,
-        ),
-        lambda raw: _table(raw, len(bench_list), len(seeker_list), seed_list, cycles),
+        )
     )
-
-
-def _table(raw: dict[str, Any], n_benches: int, n_seekers: int, seeds: list[int], cycles: int) -> xr.Dataset:
-    shape = (n_benches, n_seekers, len(seeds))
+    shape = (len(bench_list), len(seeker_list), len(seed_list))
     dims = ("bench", "seeker", "seed")
     finished = raw.pop("finished").reshape(shape)
     variables: dict[str, tuple[Any, ...]] = {
         "bench": ("bench", np.arange(shape[0]), "-", "bench"),
         "seeker": ("seeker", np.arange(shape[1]), "-", "seeker"),
-        "seed": ("seed", np.array(seeds, np.uint64), "-", "seed"),
+        "seed": ("seed", np.array(seed_list, np.uint64), "-", "seed"),
         "finished": (dims, finished, "-", "whether the loop ran to its end"),
     }
     for name, values in raw.items():
         variables[name] = (dims, np.where(finished, values.reshape(shape), np.nan), *_SUMMARY[name])
-    return labelled_dataset(variables, attrs={"cycles": cycles})
+    return hand_over(labelled_dataset(variables, attrs={"cycles": cycles}), stop)
 
 
 def _whole_seeds(seeds: Iterable[int]) -> list[int]:

@@ -1,4 +1,4 @@
-"""What a bench would show without chance and without waiting: steady maps of J and limits, and their optimum."""
+"""What a bench would show noise-free and without waiting: steady maps of J and limits, and their optimum."""
 
 from __future__ import annotations
 
@@ -78,7 +78,7 @@ def find_steady_optimum(
     bounds_cad: tuple[float, float] = (-30.0, 10.0),
     cycle: int = 0,
 ) -> Optimum:
-    """Find the best timing of a bench without chance: what its seekers are judged by.
+    """Find the best timing of a noise-free bench: what its seekers are judged by.
 
     Parameters
     ----------
@@ -101,7 +101,7 @@ def find_steady_optimum(
     Raises
     ------
     mgdd.errors.ParameterError
-        Bounds outside the window of the bench, or a limit that is no indicator.
+        Bounds outside the window of the bench, or a limit that is not an indicator.
     mgdd.errors.ConvergenceError
         No timing in the range meets the limits.
 

@@ -143,8 +143,8 @@ class GradientDescent(SeekerRecord, _core.GradientDescent):
 class GoldenSection(SeekerRecord, _core.GoldenSection):
     """Golden-section search of one input that believes a comparison only beyond the noise.
 
-    Two inner points are measured in turns until their means differ by more than chance; a draw cuts both ends.
-    When the bracket is as small as the noise allows, the search goes on as triples around the vertex of a
+    Two inner points are measured in turns until their means differ by more than noise; if inconclusive, both ends are
+    trimmed. When the bracket is as small as the noise allows, the search goes on as triples around the vertex of a
     parabola and keeps tracking. All arguments are keywords.
 
     Parameters

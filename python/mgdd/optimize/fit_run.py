@@ -5,6 +5,7 @@ from __future__ import annotations
 from typing import TYPE_CHECKING, Any, cast
 
 from mgdd.results import Fit, FitQuality, Label, labelled_dataset
+from mgdd.results.labels import label_of
 from mgdd.signals.metrics import nrmse_fit_percent, rmse
 
 if TYPE_CHECKING:
@@ -30,7 +31,7 @@ def quality_of(run: xr.Dataset) -> FitQuality:
     measured, model = run["measured"].to_numpy(), run["model"].to_numpy()
     percent = nrmse_fit_percent(measured, model) if measured.min() < measured.max() else None
     error = rmse(measured, model)
-    return FitQuality(nrmse_fit_percent=percent, rmse=error, unit=str(run["measured"].attrs["units"]), n=measured.size)
+    return FitQuality(nrmse_fit_percent=percent, rmse=error, unit=label_of(run["measured"]).units, n=measured.size)
 
 
 def draw_run(fit: Fit, ax: Any) -> Any:

@@ -26,7 +26,7 @@ class ConvergenceReport:
     """What a learning law will do on the model, known before the first trial.
 
     For ``y = G u + d``, with G the lower-triangular Toeplitz matrix of the impulse response from its first
-    non-zero value on, and the law ``u_{j+1} = Q (u_j + L e_j)``. Bounds, rate and guard are no part of it.
+    non-zero value on, and the law ``u_{j+1} = Q (u_j + L e_j)``. Bounds, rate and guard are not part of it.
 
     Attributes
     ----------
@@ -52,7 +52,7 @@ class ConvergenceReport:
     limit_error_gain : float
         Its largest singular value [-]: 0 if no error remains, NaN if the trials diverge.
     sentence : str
-        All of it for people.
+        Human-readable summary.
 
     See Also
     --------
@@ -212,7 +212,7 @@ class IterativeLearning:
             warnings.warn(f"law {law!r} {self.convergence().sentence}", UserWarning, stacklevel=2)
 
     def ask(self) -> NDArray[np.float64]:
-        """Tell the input of this trial.
+        """Return the input of this trial.
 
         Returns
         -------

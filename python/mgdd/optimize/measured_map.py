@@ -76,7 +76,7 @@ def measure_map(theta: ArrayLike, J: ArrayLike, *, maximize: bool = True) -> Mea
     Raises
     ------
     DataError
-        Too few points or inputs, values that are not finite, or no bend towards an optimum.
+        Too few points or inputs, values that are not finite, or no curvature towards an optimum.
     ShapeError
         Not one J per input.
 
@@ -103,7 +103,7 @@ def measure_map(theta: ArrayLike, J: ArrayLike, *, maximize: bool = True) -> Mea
     middle, half = 0.5 * (x.min() + x.max()), 0.5 * (x.max() - x.min())
     design = np.vander((x - middle) / half, 3, increasing=True)
     if np.linalg.cond(design) > 1e8:
-        raise DataError("theta: its distinct inputs are too close to each other to show a bend; spread them")
+        raise DataError("theta: its distinct inputs are too close to each other to show a curvature; spread them")
     level = y.mean()
     c, *_ = np.linalg.lstsq(design, y - level, rcond=None)
     if not (c[2] < 0.0 if maximize else c[2] > 0.0):

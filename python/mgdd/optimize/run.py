@@ -2,12 +2,11 @@
 
 from __future__ import annotations
 
-import logging
 import math
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
-from mgdd.errors import DataError, ParameterError
+from mgdd.errors import DataError, Interrupted, ParameterError
 from mgdd.optimize.direct_seekers import GoldenSection, GradientDescent, Spsa
 from mgdd.optimize.dither_seekers import BoundedSeeking, ExtremumSeeking, NewtonSeeking
 from mgdd.optimize.seeker_record import read_seeker_file
@@ -21,8 +20,6 @@ if TYPE_CHECKING:
     from numpy.typing import NDArray
 
 __all__ = ["load_seeker", "maximize"]
-
-_log = logging.getLogger(__name__)
 
 AnySeeker = ExtremumSeeking | NewtonSeeking | BoundedSeeking | Spsa | GradientDescent | GoldenSection
 _KINDS: dict[str, type[AnySeeker]] = {
@@ -74,8 +71,6 @@ def maximize(
 ) -> xr.Dataset:
     """Let a seeker run on a Python function for a number of cycles.
 
-    Ctrl-C ends the run, not the seeker: the interrupted cycle is asked again when the run is continued.
-
     Parameters
     ----------
     fun : callable
@@ -98,6 +93,8 @@ def maximize(
         `cycles` is negative.
     DataError, ShapeError
         `fun` returned what the seeker refuses; the seeker is unchanged by that cycle.
+    Interrupted
+        Ctrl-C; ``partial`` is the history so far. The interrupted cycle is asked again when the run is continued.
 
     Examples
     --------
@@ -119,5 +116,6 @@ def maximize(
             else:
                 seeker.tell(answer)
     except KeyboardInterrupt:
-        _log.info("interrupted after cycle %d; the seeker can go on from here", seeker.cycle)
+        done = f"interrupted after cycle {seeker.cycle}; the history is in .partial, and the seeker can go on from here"
+        raise Interrupted(done, seeker.history) from None
     return seeker.history

@@ -1,4 +1,4 @@
-"""What every seeker of the Python face adds to the core: history, files and pickles."""
+"""What the Python interface of every seeker adds to the core: history, files and pickles."""
 
 from __future__ import annotations
 
@@ -149,11 +149,11 @@ def read_seeker_file(path: str | os.PathLike[str]) -> tuple[str, dict[str, Any],
         found = content["format"]
         kind, settings, state = content["kind"], content["settings"], content["state"]
     except (ValueError, KeyError, TypeError) as error:
-        raise DataError(f"{file}: is no seeker written by save(): {error!r}") from error
+        raise DataError(f"{file}: is not a seeker written by save(): {error!r}") from error
     if found != _FORMAT:
         raise DataError(f"{file}: has format {found!r}: this version of mgdd reads format {_FORMAT}")
     if not (isinstance(kind, str) and isinstance(settings, dict) and isinstance(state, dict)):
-        raise DataError(f"{file}: is no seeker written by save(): kind, settings or state are not what they must be")
+        raise DataError(f"{file}: is not a seeker written by save(): kind, settings or state are not what they must be")
     return kind, settings, state
 
 
@@ -163,7 +163,7 @@ def _rebuild(cls: type[Any], settings: dict[str, Any], state: dict[str, Any], hi
         seeker = cls(**settings)
     seeker.state = state
     if history is not None:
-        seeker._set_history_columns(**history)
+        seeker._set_history_columns(history)
     return seeker
 
 

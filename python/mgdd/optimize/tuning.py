@@ -1,4 +1,4 @@
-"""From noise, curvature and sensor delay to a tuned seeker, with a plain word where a wish cannot be met."""
+"""From noise, curvature and sensor delay to a tuned seeker, and why a specification is infeasible, where it is."""
 
 from __future__ import annotations
 
@@ -20,7 +20,7 @@ __all__ = ["Tuning", "tune"]
 @described
 @dataclass(frozen=True, kw_only=True)
 class Tuning:
-    """Settings of a seeker, what averaging theory predicts for them, and whether that meets the wish.
+    """Settings of a seeker, what averaging theory predicts for them, and whether that meets the specification.
 
     Attributes
     ----------
@@ -39,13 +39,13 @@ class Tuning:
     rms : float
         Predicted error of the estimate once arrived [unit of the input].
     cycles : float
-        Predicted cycles from `distance` to `arrival` of the wish.
+        Predicted cycles from `distance` to `arrival` of the specification.
     dither_cost, jitter_cost : float
         Mean loss of J by the perturbation and by that error [unit of J].
     sensor_gain, sensor_phase_deg : float
         What delay and lag leave of the dither's echo [-], and how far they turn it [deg].
     met : bool
-        Whether the wish is met.
+        Whether the specification is met.
     reasons : tuple of str
         Why not, with the figures that would do.
     noise_sd, curvature : float
@@ -93,13 +93,13 @@ class Tuning:
         Returns
         -------
         str
-            A few lines; the last ones say what of the wish cannot be met.
+            A few lines; the last ones say why the specification is infeasible.
 
         Examples
         --------
         >>> from mgdd.optimize import tune
         >>> print(tune(0.25, -0.051, cycles=10.0).summary().splitlines()[-2])
-        The wish cannot be met:
+        The specification cannot be met:
         """
         spsa = self.method == "spsa"
         period = f"{self.period} measurements per iteration" if spsa else f"period {self.period} cycles"
@@ -117,9 +117,9 @@ class Tuning:
                 f"{self.sensor_phase_deg:.0f} deg ({known})"
             )
         if self.met:
-            lines.append("The wish is met.")
+            lines.append("The specification is met.")
         else:
-            lines += ["The wish cannot be met:", *(f"  {reason}" for reason in self.reasons)]
+            lines += ["The specification cannot be met:", *(f"  {reason}" for reason in self.reasons)]
         return "\n".join(lines)
 
     def seeker(
@@ -247,12 +247,12 @@ def tune(
     Returns
     -------
     Tuning
-        Settings and prediction; `met` and `reasons` say whether the wish is met.
+        Settings and prediction; `met` and `reasons` say whether the specification is met.
 
     Raises
     ------
     ParameterError
-        Noise, curvature or a wish that is not positive; SPSA behind a delayed sensor.
+        Noise, curvature or a specification that is not positive; SPSA behind a delayed sensor.
 
     References
     ----------
@@ -264,7 +264,7 @@ def tune(
     >>> from mgdd.optimize import tune
     >>> tuning = tune(0.25, -0.051, distance=12.0, arrival=1.0, cycles=80.0)
     >>> print(tuning.summary().splitlines()[-1])
-    The wish is met.
+    The specification is met.
     """
     found = _core.tune(
         noise_sd=noise_sd,

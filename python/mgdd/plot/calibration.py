@@ -20,7 +20,7 @@ from mgdd.plot.style import (
     panel_below,
     require,
 )
-from mgdd.results.labels import ANGLE
+from mgdd.results.labels import ANGLE, label_of
 
 if TYPE_CHECKING:
     import xarray as xr
@@ -85,7 +85,7 @@ def calibration_overlay(overlay: xr.Dataset, *, ax: Axes | None = None) -> Axes:
         if name in overlay and np.isfinite(overlay[name]):
             at = float(overlay[name])
             panel.axvline(at, linestyle=dash, color=color)
-            label = minus(f"{overlay[name].attrs['long_name']} {at:.1f}")
+            label = minus(f"{label_of(overlay[name]).long_name} {at:.1f}")
             lines.append(ax.axvline(at, linestyle=dash, color=color, label=label))
     ax.set_ylabel("cylinder pressure [bar]")
     ax.tick_params(labelbottom=False)

@@ -17,7 +17,7 @@ if TYPE_CHECKING:
 __all__ = ["convergence"]
 
 _BAND = ("estimate_low_cad", "estimate_high_cad")
-# Two colours-and-dashes more than the house has: a comparison of seekers needs them.
+# Two colours-and-dashes more than the shared style has: a comparison of seekers needs them.
 _STYLES = (*LINE_STYLES, ("-", ORANGE), ("--", GREEN), ("-.", BLUE), (":", BLACK))
 
 
@@ -67,7 +67,7 @@ def convergence(tracks: xr.Dataset, *, ax: Axes | None = None) -> Axes:
         raise DataError(f"estimate_median_cad has dimensions {median.dims}: must be cycle and one more")
     names = [str(name) for name in tracks[others[0]].to_numpy()]
     if len(names) > len(_STYLES):
-        raise DataError(f"{others[0]} has {len(names)} entries: at most {len(_STYLES)} lines can be told apart")
+        raise DataError(f"{others[0]} has {len(names)} entries: at most {len(_STYLES)} lines can be distinguished")
     ax = new_axes(ax, height=4.2)
     cycle = tracks["cycle"].to_numpy()
     handles: list[Artist] = []

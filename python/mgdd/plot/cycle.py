@@ -8,7 +8,7 @@ import numpy as np
 
 from mgdd.errors import DataError
 from mgdd.plot.style import BLACK, BLUE, GREY, ORANGE, axis_label, legend, minus, new_axes, require
-from mgdd.results.labels import ANGLE
+from mgdd.results.labels import ANGLE, label_of
 
 if TYPE_CHECKING:
     import xarray as xr
@@ -65,14 +65,14 @@ def pressure(dataset: xr.Dataset, *, ax: Axes | None = None) -> Axes:
     lines: list[Line2D] = ax.plot(angle, dataset["pressure_bar"], "-", color=BLACK, label=_name(dataset))
     if "motored_pressure_bar" in dataset:
         motored = dataset["motored_pressure_bar"]
-        lines += ax.plot(angle, motored, "--", color=GREY, label=motored.attrs["long_name"])
+        lines += ax.plot(angle, motored, "--", color=GREY, label=label_of(motored).long_name)
     ax.set(xlabel=axis_label(dataset, ANGLE), ylabel=axis_label(dataset, "pressure_bar"))
     ax.set_xlim(float(angle[0]), float(angle[-1]))
     if rates:
         twin = ax.twinx()
         for name in rates:
             dash, color = _RATES[name]
-            label = dataset[name].attrs["long_name"]
+            label = label_of(dataset[name]).long_name
             lines += twin.plot(angle, dataset[name], dash, color=color, linewidth=1.2, label=label)
         twin.set_ylabel(axis_label(dataset, rates[0]) if len(rates) == 1 else "heat release rate [J/°CA]")
     legend(ax, lines)
@@ -149,7 +149,7 @@ def log_pv(dataset: xr.Dataset, *, ax: Axes | None = None) -> Axes:
 def _name(dataset: xr.Dataset) -> str:
     """Return the legend entry of the pressure: with the trace's name where it has one."""
     file = dataset.attrs.get("file")
-    long_name = str(dataset["pressure_bar"].attrs["long_name"])
+    long_name = label_of(dataset["pressure_bar"]).long_name
     return f"{long_name}, {file}" if file else long_name
 
 

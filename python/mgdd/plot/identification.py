@@ -70,7 +70,7 @@ def error_growth(n_step: xr.Dataset, *, ax: Axes | None = None) -> Axes:
     require(n_step, ("predictor", "horizon_s", "n_step_rms_deg"), "mgdd.identify.n_step_rms")
     names = [str(name).replace("_", " ") for name in n_step["predictor"].to_numpy()]
     if len(names) > len(LINE_STYLES):
-        raise DataError(f"predictor has {len(names)} entries: at most {len(LINE_STYLES)} lines can be told apart")
+        raise DataError(f"predictor has {len(names)} entries: at most {len(LINE_STYLES)} lines can be distinguished")
     ax = new_axes(ax)
     horizon = 1e3 * n_step["horizon_s"].to_numpy()
     rms = n_step["n_step_rms_deg"].transpose("predictor", "horizon_s").to_numpy()
@@ -145,7 +145,7 @@ def residual_correlation(correlations: xr.Dataset, *, ax: Axes | None = None) ->
 
 
 def correlation_matrix(correlation: xr.Dataset, *, ax: Axes | None = None) -> Axes:
-    """Draw how the estimates of a fit depend on each other; pairs beyond 0.98 cannot be told apart.
+    """Draw how the estimates of a fit depend on each other; pairs beyond 0.98 cannot be separated.
 
     Parameters
     ----------

@@ -9,6 +9,7 @@ import numpy as np
 
 from mgdd.errors import DataError
 from mgdd.plot.style import BLACK, BLUE, GREY, LINE_STYLES, ORANGE, axis_label, legend, minus, new_axes, require
+from mgdd.results.labels import label_of
 
 if TYPE_CHECKING:
     import xarray as xr
@@ -97,7 +98,7 @@ def seeking(
     handles += panels[1].plot(
         cycle, _running_mean(j, mean_cycles), "-", color=ORANGE, linewidth=1.4, label=f"mean of {mean_cycles} cycles"
     )
-    panels[1].set_ylabel(f"J [{run['j'].attrs['units']}]")
+    panels[1].set_ylabel(f"J [{label_of(run['j']).units}]")
     if third:
         panels[2].plot(cycle, run[third], color=BLACK, linewidth=0.8)
         if third == _SLOPE:
@@ -125,9 +126,10 @@ def seeking(
 
 def _short(run: xr.Dataset, name: str) -> str:
     if name == _SLOPE:
-        return f"slope [{run[name].attrs['units']}]"
-    long_name = str(run[name].attrs["long_name"]).replace(", ", ",\n")
-    return f"{long_name} [{run[name].attrs['units']}]"
+        return f"slope [{label_of(run[name]).units}]"
+    label = label_of(run[name])
+    long_name = label.long_name.replace(", ", ",\n")
+    return f"{long_name} [{label.units}]"
 
 
 def _limit_label(run: xr.Dataset, names: list[str]) -> str:

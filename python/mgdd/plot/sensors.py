@@ -6,6 +6,7 @@ from typing import TYPE_CHECKING, Any
 
 from mgdd.errors import DataError
 from mgdd.plot.style import BLACK, BLUE, GREEN, GREY, ORANGE, axis_label, legend, new_axes, require
+from mgdd.results.labels import label_of
 
 if TYPE_CHECKING:
     import xarray as xr
@@ -73,7 +74,7 @@ def sensors(readings: xr.Dataset, *, ax: Axes | None = None) -> Axes:
             style |= {"marker": marker, "markersize": _MARKER_SIZES.get(name, 4.0), "markerfacecolor": "none"}
             if name in _MARKER_SIZES:  # these lie on the true value: open markers of different size keep all in sight
                 style["linestyle"] = "none"
-        label = str(readings[name].attrs["long_name"]).removeprefix("NOx, ").removeprefix("NOx proxy, ")
+        label = label_of(readings[name]).long_name.removeprefix("NOx, ").removeprefix("NOx proxy, ")
         lines += ax.plot(readings[over], readings[name], label=label, **style)
     ax.set(xlabel=axis_label(readings, over), ylabel="NOx [ppm]")
     if over == "cycle":

@@ -6,6 +6,7 @@ from typing import TYPE_CHECKING
 
 from mgdd.errors import DataError
 from mgdd.results import check_labels
+from mgdd.results.labels import label_of
 
 if TYPE_CHECKING:
     from collections.abc import Sequence
@@ -72,8 +73,8 @@ def require(dataset: xr.Dataset, names: tuple[str, ...], made_by: str) -> None:
 
 def axis_label(dataset: xr.Dataset, name: str) -> str:
     """Return "long name [units]" of a variable."""
-    attrs = dataset[name].attrs
-    return f"{attrs['long_name']} [{attrs['units']}]"
+    label = label_of(dataset[name])
+    return f"{label.long_name} [{label.units}]"
 
 
 def minus(text: str) -> str:

@@ -5,6 +5,7 @@ from __future__ import annotations
 from typing import TYPE_CHECKING
 
 from mgdd.plot.style import BLACK, BLUE, GREY, ORANGE, axis_label, legend, new_axes, panel_below, require
+from mgdd.results.labels import label_of
 
 if TYPE_CHECKING:
     import xarray as xr
@@ -47,7 +48,7 @@ def throttle_run(run: xr.Dataset, *, ax: Axes | None = None) -> Axes:
     require(run, ("time_s", "angle_deg", *(name for name, _ in panels)), "mgdd.throttle.simulate")
     ax = new_axes(ax, height=4.8)
     time = run["time_s"].to_numpy()
-    lines = ax.plot(time, run["angle_deg"], "-", color=BLACK, linewidth=1.4, label=run["angle_deg"].attrs["long_name"])
+    lines = ax.plot(time, run["angle_deg"], "-", color=BLACK, linewidth=1.4, label=label_of(run["angle_deg"]).long_name)
     if "limp_home_deg" in run.attrs:
         rest = float(run.attrs["limp_home_deg"])
         lines.append(

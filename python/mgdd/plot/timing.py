@@ -8,6 +8,7 @@ import numpy as np
 
 from mgdd.errors import DataError
 from mgdd.plot.style import BLACK, BLUE, ORANGE, axis_label, legend, minus, new_axes, require
+from mgdd.results.labels import label_of
 
 if TYPE_CHECKING:
     import xarray as xr
@@ -60,7 +61,9 @@ def timing(sweep: xr.Dataset, *, ax: Axes | None = None) -> Axes:
     if soc.ndim != 1 or soc.size < 3:
         raise DataError(f"soc_cad has shape {soc.shape}: at least three timings are needed")
     ax = new_axes(ax)
-    lines: list[Line2D] = ax.plot(soc, efficiency, "-", color=BLACK, label=sweep["efficiency_gross"].attrs["long_name"])
+    lines: list[Line2D] = ax.plot(
+        soc, efficiency, "-", color=BLACK, label=label_of(sweep["efficiency_gross"]).long_name
+    )
     best, top, at_end = _vertex(soc, efficiency)
     where = "best at the end of the sweep" if at_end else "best"
     lines += ax.plot(
@@ -69,7 +72,7 @@ def timing(sweep: xr.Dataset, *, ax: Axes | None = None) -> Axes:
     ax.axvline(best, color=BLACK, linewidth=0.8, linestyle=":")
     twin = ax.twinx()
     for name, (dash, color) in _NOX.items():
-        label = sweep[name].attrs["long_name"]
+        label = label_of(sweep[name]).long_name
         lines += twin.plot(soc, sweep[name], linestyle=dash, color=color, label=label)
     twin.set_ylabel("NOx proxy [ppm]")
     twin.set_ylim(bottom=0.0)

@@ -101,8 +101,11 @@ class Preset(Parameters):
             records = {"throttle": throttle}
         object.__setattr__(self, "name", name)
         object.__setattr__(self, "title", title)
-        object.__setattr__(self, "records", records)
-        object.__setattr__(self, "sources", sources)
+        object.__setattr__(self, "records", MappingProxyType(records))
+        object.__setattr__(self, "sources", MappingProxyType(dict(sources)))
+
+    def __reduce__(self) -> tuple[Any, ...]:
+        return _unpickled, (self.name, self.title, dict(self.records), dict(self.sources))
 
     @property
     def kind(self) -> str:
@@ -164,6 +167,10 @@ described(
     title=lambda preset: f"Preset {preset.name}, {preset.kind}: {preset.title}",
     rows=lambda preset: [row for record in preset.records.values() for row in core_rows(record)],
 )
+
+
+def _unpickled(name: str, title: str, records: Mapping[str, Any], sources: Mapping[str, str]) -> Preset:
+    return Preset(name=name, title=title, sources=sources, **records)
 
 
 def available(kind: str | None = None) -> tuple[str, ...]:

@@ -1,6 +1,6 @@
 """Labelled results: xarray Datasets in which every variable says its unit and its long name, ready for netCDF.
 
-The units of the names that several rooms share stand once, in `VARIABLES`.
+The units of the names that several modules share stand once, in `VARIABLES`.
 """
 
 from __future__ import annotations
@@ -16,12 +16,13 @@ from typing import TYPE_CHECKING, Any, NamedTuple
 import numpy as np
 
 from mgdd.errors import DataError, ShapeError
+from mgdd.results.units import attribute_units, printed_units, unit_attributes
 
 if TYPE_CHECKING:
     import xarray as xr
     from numpy.typing import ArrayLike
 
-__all__ = ["ANGLE", "VARIABLES", "Label", "check_labels", "labelled_dataset", "to_jsonable"]
+__all__ = ["ANGLE", "VARIABLES", "Label", "check_labels", "label_of", "labelled_dataset", "to_jsonable"]
 
 ANGLE = "crank_angle_cad"
 
@@ -32,7 +33,7 @@ class Label(NamedTuple):
     Parameters
     ----------
     units : str
-        Unit as printed, ``"-"`` if dimensionless.
+        Unit as figures print it, ``"-"`` if dimensionless; attributes hold it as `labelled_dataset` says.
     long_name : str
         Name for axis labels.
 
@@ -141,15 +142,17 @@ def labelled_dataset(
     variables : mapping of str to tuple
         ``name: (dims, values)`` for a name in `VARIABLES`, otherwise
         ``name: (dims, values, units, long_name)``. ``dims`` is a name, a tuple of names, or ``()`` for a
-        scalar. A name that is its own only dimension becomes the coordinate of that dimension. Dimensionless
-        quantities have the unit ``"-"``.
+        scalar. A name that is its own only dimension becomes the coordinate of that dimension. ``units`` are as
+        figures print them (``"-"`` if dimensionless) or an expression that pint parses.
     attrs : mapping, optional
         Attributes of the Dataset, as netCDF stores them: text, a number, or a flat sequence of numbers.
 
     Returns
     -------
     xarray.Dataset
-        With ``attrs["units"]`` and ``attrs["long_name"]`` on every variable and coordinate.
+        With ``attrs["units"]`` and ``attrs["long_name"]`` on every variable and coordinate. The units are expressions
+        that pint parses (``degree``, ``percent``, ``N*m``, ``1``); a convention that they cannot hold ends the long
+        name: ``crank angle, °CA aTDC``.
 
     Raises
     ------
@@ -167,8 +170,8 @@ def labelled_dataset(
     ...     "pressure_bar": ("crank_angle_cad", [60.0, 61.0, 60.5]),
     ...     "speed_rpm": ((), 1200.0, "rpm", "engine speed"),
     ... })
-    >>> ds["pressure_bar"].attrs["units"], float(ds["speed_rpm"])
-    ('bar', 1200.0)
+    >>> ds["pressure_bar"].attrs["units"], ds["crank_angle_cad"].attrs["long_name"]
+    ('bar', 'crank angle, °CA aTDC')
     """
     import xarray as xr
 
@@ -184,13 +187,36 @@ def labelled_dataset(
             known, first = sizes.setdefault(dim, (size, name))
             if known != size:
                 raise ShapeError(f"{name} has {size} samples along {dim}: {first} has {known}")
-        arrays[name] = (dims, array, {"units": label.units, "long_name": label.long_name})
+        arrays[name] = (dims, array, unit_attributes(label.units, label.long_name))
     coords = {name: item for name, item in arrays.items() if item[0] == (name,)}
     for dim, (_, name) in sizes.items():
         if dim not in coords:
             raise DataError(f"dimension {dim} of {name} has no coordinate: add a variable {dim!r}")
     data = {name: item for name, item in arrays.items() if name not in coords}
     return xr.Dataset(data_vars=data, coords=coords, attrs=dict(attrs or {}))
+
+
+def label_of(variable: xr.DataArray | xr.Variable) -> Label:
+    """Return unit and name of a variable as figures print them.
+
+    Parameters
+    ----------
+    variable : xarray.DataArray
+        With the attributes ``units`` and ``long_name``.
+
+    Returns
+    -------
+    Label
+        The printed unit, and the name without the convention behind it.
+
+    Examples
+    --------
+    >>> from mgdd.results import labelled_dataset
+    >>> from mgdd.results.labels import label_of
+    >>> label_of(labelled_dataset({"ca50_cad": ((), 8.0)})["ca50_cad"])
+    Label(units='°CA aTDC', long_name='CA50, angle of 50 % heat released')
+    """
+    return Label(*printed_units(str(variable.attrs["units"]), str(variable.attrs["long_name"])))
 
 
 def check_labels(dataset: xr.Dataset) -> None:
@@ -289,7 +315,11 @@ def _check(name: str, units: object, long_name: object) -> None:
     if not isinstance(long_name, str) or not long_name.strip():
         raise DataError(f"variable {name} has no long_name: name it for axis labels")
     known = VARIABLES.get(name)
-    if known is not None and known.units != units:
+    try:
+        written = attribute_units(units)
+    except ValueError as error:
+        raise DataError(f"variable {name} has units {error}") from None
+    if known is not None and attribute_units(known.units) != written:
         raise DataError(f"variable {name} has units {units!r}: this name is reserved for {known.units!r}")
 
 

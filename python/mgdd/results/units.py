@@ -1,8 +1,33 @@
-"""Units by name: a physical name ends in its unit, as ``tau_s``, ``bore_mm`` or ``spring_above_nm_per_rad`` do."""
+"""Units: what a name says by its ending, what a figure prints, and what stands in the attributes of a Dataset.
+
+A physical name ends in its unit, as ``tau_s``, ``bore_mm`` or ``spring_above_nm_per_rad`` do. Figures and tables print
+units as they are typeset; attributes hold them as an expression that a units library such as pint parses.
+"""
 
 from __future__ import annotations
 
-__all__ = ["unit_of"]
+import re
+
+__all__ = ["attribute_units", "printed_units", "unit_attributes", "unit_of"]
+
+# Printed units that only say whose unit it is, and counts: without a dimension in an attribute.
+_WHOSE = ("unit of ", "in the unit of ", "not given")
+_COUNTS = frozenset({"-", "cycle", "cycles", "sample", "samples"})
+_REMARK = re.compile(r" per unit of .*$| of .*$| \([^)]*\)$| per duty$")
+_WRITTEN = (
+    (re.compile(r"°CA aTDC|°CA|\bdeg\b"), "degree"),
+    (re.compile(r"^duty/"), "1/"),
+    (re.compile(r"/duty$"), ""),
+    (re.compile(r"%"), "percent"),
+    (re.compile(r"²"), "**2"),
+    (re.compile(r"³"), "**3"),
+    (re.compile(r"\^"), "**"),
+    (re.compile(r"[ ·]+"), "*"),
+    (re.compile(r"(?<=degree/)s\b"), "second"),
+)
+_TYPESET = (("**2", "²"), ("**3", "³"), ("*", " "), ("degree", "deg"), ("second", "s"), ("percent", "%"))
+_FACTOR = r"[A-Za-zµ]+(\*\*\d)?"
+_EXPRESSION = re.compile(rf"(1|{_FACTOR})([*/]{_FACTOR})*")
 
 _UNITS = {
     "_deg_per_s2_per_duty": "deg/s² per duty",
@@ -93,3 +118,102 @@ def unit_of(name: str) -> str:
     """
     whole = f"_{name}"
     return next((_UNITS[ending] for ending in _LONGEST_FIRST if whole.endswith(ending)), "-")
+
+
+def attribute_units(printed: str) -> str:
+    """Return a printed unit as an expression that pint parses.
+
+    Parameters
+    ----------
+    printed : str
+        As figures print it, ``"-"`` if dimensionless; an expression stays as it is.
+
+    Returns
+    -------
+    str
+        For example ``degree``, ``percent``, ``N*m`` or ``degree/second**2``; ``"1"`` if dimensionless, a count, or the
+        unit of something else.
+
+    Raises
+    ------
+    ValueError
+        Text that is not a product or quotient of units.
+
+    Examples
+    --------
+    >>> from mgdd.results.units import attribute_units
+    >>> [attribute_units(unit) for unit in ("°CA aTDC", "N m", "deg/s²", "% of p_max", "-", "unit of J")]
+    ['degree', 'N*m', 'degree/second**2', 'percent', '1', '1']
+    """
+    text = printed.strip()
+    if text.startswith(_WHOSE):
+        return "1"
+    text = _REMARK.sub("", text)
+    if text in _COUNTS:
+        return "1"
+    for pattern, written in _WRITTEN:
+        text = pattern.sub(written, text)
+    if not _EXPRESSION.fullmatch(text):
+        raise ValueError(f"{printed!r} is not a product or quotient of units, such as N*m or degree/second**2")
+    return text
+
+
+def unit_attributes(printed: str, long_name: str) -> dict[str, str]:
+    """Return the attributes ``units`` and ``long_name``; what the expression loses, ends the long name.
+
+    Parameters
+    ----------
+    printed : str
+        Unit as figures print it.
+    long_name : str
+        Name of the quantity.
+
+    Returns
+    -------
+    dict
+        The two attributes.
+
+    Examples
+    --------
+    >>> from mgdd.results.units import unit_attributes
+    >>> unit_attributes("°CA aTDC", "crank angle")
+    {'units': 'degree', 'long_name': 'crank angle, °CA aTDC'}
+    """
+    units = attribute_units(printed)
+    whole = printed in (units, _typeset(units))
+    return {"units": units, "long_name": long_name if whole else f"{long_name}, {printed}"}
+
+
+def printed_units(units: str, long_name: str) -> tuple[str, str]:
+    """Turn the two attributes back into the unit that figures print, and the name.
+
+    Parameters
+    ----------
+    units, long_name : str
+        As `unit_attributes` gives them.
+
+    Returns
+    -------
+    tuple of str
+        Printed unit and name.
+
+    Examples
+    --------
+    >>> from mgdd.results.units import printed_units
+    >>> printed_units("degree", "crank angle, °CA aTDC"), printed_units("degree", "plate angle")
+    (('°CA aTDC', 'crank angle'), ('deg', 'plate angle'))
+    """
+    name, _, remark = long_name.rpartition(", ")
+    if name and remark not in (units, _typeset(units)):
+        try:
+            if attribute_units(remark) == units:
+                return remark, name
+        except ValueError:
+            pass  # the last part of a name is not a unit
+    return _typeset(units), long_name
+
+
+def _typeset(units: str) -> str:
+    for written, printed in _TYPESET:
+        units = units.replace(written, printed)
+    return "-" if units == "1" else units

@@ -45,7 +45,7 @@ class SampledModel(ABC):
 
     @abstractmethod
     def _rest(self) -> list[float]:
-        """Return the state of a free run that is not told one."""
+        """Return the state of a free run that is not given one."""
 
     def simulate(
         self, inputs: Any, *, initial_state: Mapping[str, float] | Sequence[float] | None = None
@@ -126,7 +126,7 @@ class SampledModel(ABC):
         for name, value in given.items():
             if name not in self.state_names:
                 raise ParameterError(
-                    f"initial_state: {name!r} is no state: must be one of {', '.join(self.state_names)}"
+                    f"initial_state: {name!r} is not a state: must be one of {', '.join(self.state_names)}"
                 )
             if not math.isfinite(value):
                 raise ParameterError(f"initial_state: {name} = {value!r}: must be finite")

@@ -6,7 +6,7 @@ from collections.abc import Callable, Iterable, Mapping
 from dataclasses import dataclass, field
 from typing import TYPE_CHECKING, Any, TypeVar
 
-from mgdd.errors import ParameterError
+from mgdd.errors import Interrupted, ParameterError
 from mgdd.results.describe import described
 from mgdd.studies.sections import Section, standard_sections
 
@@ -14,7 +14,7 @@ if TYPE_CHECKING:
     import xarray as xr
     from matplotlib.figure import Figure
 
-__all__ = ["Progress", "StudyResult", "check_seeds", "run_parts"]
+__all__ = ["Progress", "StudyResult", "check_seeds", "finish", "run_parts"]
 
 Progress = Callable[[str], None]
 Part = TypeVar("Part")
@@ -34,7 +34,7 @@ class StudyResult:
         Figures by caption.
     summary : mapping
         Plain numbers and text, ready for JSON: at least ``study``, ``seeds`` (0 where nothing is random) and ``rows``,
-        a list of flat mappings; ``interrupted`` is true where Ctrl-C left only the parts that were finished.
+        a list of flat mappings; ``interrupted`` is true in the part that `mgdd.errors.Interrupted` carries.
     sections : tuple of Section
         What a report of the study says, in order; made of the summary, the figures and the dataset where the study
         writes none itself.
@@ -108,3 +108,10 @@ def run_parts(parts: Iterable[tuple[str, Callable[[], Part]]], progress: Progres
             raise
         return done, True
     return done, False
+
+
+def finish(result: StudyResult) -> StudyResult:
+    """Return a whole result; raise one that Ctrl-C has cut short, as the part that an Interrupted carries."""
+    if result.summary.get("interrupted"):
+        raise Interrupted(f"interrupted: {len(result.summary['rows'])} finished rows are in .partial", result)
+    return result

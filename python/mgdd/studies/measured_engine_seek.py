@@ -14,7 +14,7 @@ from mgdd import datasets
 from mgdd.errors import DataError
 from mgdd.loop import SurrogatePlant, run_seeker
 from mgdd.results import labelled_dataset
-from mgdd.studies.base import Progress, StudyResult, check_seeds, run_parts
+from mgdd.studies.base import Progress, StudyResult, check_seeds, finish, run_parts
 from mgdd.studies.measured_engine_cases import (
     ARRIVAL_CAD,
     LOWER_CAD,
@@ -132,7 +132,7 @@ def run_measured_engine_seek(
         "interrupted": interrupted,
         "rows": [_row(case, run) for case, run in zip(cases, runs, strict=True)],
     }
-    return StudyResult(name=_NAME, dataset=dataset, figures=draw(dataset) if figures else {}, summary=summary)
+    return finish(StudyResult(name=_NAME, dataset=dataset, figures=draw(dataset) if figures else {}, summary=summary))
 
 
 def _surrogate() -> EngineSurrogate:

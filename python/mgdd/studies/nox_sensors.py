@@ -14,7 +14,7 @@ from mgdd.engine import NoxModel, NoxProxy, OperatingPoint, SoftSensor, fit_nox_
 from mgdd.loop import EngineBench, SensorDynamics
 from mgdd.results import VARIABLES, labelled_dataset
 from mgdd.results.labels import to_jsonable
-from mgdd.studies.base import Progress, StudyResult, check_seeds, run_parts
+from mgdd.studies.base import Progress, StudyResult, check_seeds, finish, run_parts
 from mgdd.studies.nox_sensors_figures import draw
 from mgdd.studies.statistics import with_interval
 
@@ -121,11 +121,13 @@ def run_nox_sensors(
         "correction": [_course_row(own) for own in course],
         "interrupted": interrupted,
     }
-    return StudyResult(
-        name="nox-sensors",
-        dataset=dataset,
-        figures=draw(dataset) if figures else {},
-        summary=to_jsonable(summary),
+    return finish(
+        StudyResult(
+            name="nox-sensors",
+            dataset=dataset,
+            figures=draw(dataset) if figures else {},
+            summary=to_jsonable(summary),
+        )
     )
 
 

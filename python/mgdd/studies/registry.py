@@ -33,7 +33,9 @@ _STUDIES = {
     "throttle-first-principle": _Study(
         "groups of a throttle from noisy logs, also where the plant does more than the model", 7
     ),
-    "throttle-pseudo-wiener": _Study("three pseudo-Wiener models of a throttle, in free run and re-anchored", 7),
+    "throttle-pseudo-wiener": _Study(
+        "three pseudo-Wiener models of a throttle, in free run and corrected by measurements", 7
+    ),
     "identification-benchmarks": _Study(
         "measured drive, tanks and circuit: fits beside published ones (needs the data sets)"
     ),
@@ -89,7 +91,7 @@ def run_study(
     Raises
     ------
     mgdd.errors.ParameterError
-        An unknown name, fewer than one seed, or seeds for a study without chance.
+        An unknown name, fewer than one seed, or seeds for a deterministic study.
 
     Examples
     --------
@@ -104,7 +106,7 @@ def run_study(
         options["progress"] = progress
     if seeds is not None:
         if "seeds" not in inspect.signature(function).parameters:
-            raise ParameterError(f"seeds = {seeds}: study {name!r} has no chance in it; leave them out")
+            raise ParameterError(f"seeds = {seeds}: study {name!r} is deterministic; leave them out")
         options["seeds"] = check_seeds(seeds)
     result: StudyResult = function(**options)
     return result

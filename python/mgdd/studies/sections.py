@@ -7,6 +7,7 @@ from dataclasses import dataclass, field
 from typing import TYPE_CHECKING, Any
 
 from mgdd.results import VARIABLES
+from mgdd.results.labels import label_of
 from mgdd.results.units import unit_of
 
 if TYPE_CHECKING:
@@ -141,7 +142,7 @@ def standard_sections(
 
 def _data(dataset: xr.Dataset) -> Section:
     rows = [
-        (str(name), " × ".join(map(str, array.dims)) or "–", str(array.attrs["units"]), str(array.attrs["long_name"]))
+        (str(name), " × ".join(map(str, array.dims)) or "–", *label_of(array))
         for name, array in dataset.variables.items()
     ]
     sizes = ", ".join(f"{size} along {dim}" for dim, size in dataset.sizes.items())
@@ -176,8 +177,8 @@ def _head(name: str, dataset: xr.Dataset | None) -> str:
     if label is not None:
         return _with_unit(label.long_name, label.units)
     if dataset is not None and name in dataset.variables:
-        attrs = dataset[name].attrs
-        return _with_unit(str(attrs["long_name"]), str(attrs["units"]))
+        own = label_of(dataset[name])
+        return _with_unit(own.long_name, own.units)
     return _with_unit(name.replace("_", " "), unit_of(name))
 
 

@@ -24,9 +24,9 @@ from mgdd.optimize import (
 from mgdd.optimize.tuning import Tuning
 from mgdd.results import labelled_dataset
 from mgdd.results.labels import to_jsonable
-from mgdd.studies.base import Progress, StudyResult, check_seeds, run_parts
+from mgdd.studies.base import Progress, StudyResult, check_seeds, finish, run_parts
 from mgdd.studies.load_step_learning import LAWS, Learned, learn
-from mgdd.studies.statistics import bands, finished_loops, rms, with_interval
+from mgdd.studies.statistics import bands, loops, rms, with_interval
 
 if TYPE_CHECKING:
     import xarray as xr
@@ -62,7 +62,7 @@ def run_seeker_comparison(
 ) -> StudyResult:
     """Compare every seeker on the same engine, noise, start and budget of 2000 cycles.
 
-    The problem is the gross efficiency of the virtual bench with its default chance (0.3 CAD scatter of combustion,
+    The problem is the gross efficiency of the virtual bench with its default noise (0.3 CAD scatter of combustion,
     0.25 points of efficiency), from SOC -20 °CA aTDC, without limits. Every seeker has its default settings except
     where ``settings`` says so; those called tuned are what `mgdd.optimize.tune` makes of noise, curvature and
     distance. Iterative learning solves another task, a load step that is repeated, and has a table of its own.
@@ -124,11 +124,13 @@ def run_seeker_comparison(
         "cycles": CYCLES,
         "interrupted": interrupted,
     }
-    return StudyResult(
-        name="seeker-comparison",
-        dataset=dataset,
-        figures=_draw(dataset) if figures else {},
-        summary=to_jsonable(summary),
+    return finish(
+        StudyResult(
+            name="seeker-comparison",
+            dataset=dataset,
+            figures=_draw(dataset) if figures else {},
+            summary=to_jsonable(summary),
+        )
     )
 
 
@@ -191,7 +193,7 @@ def _short(tuning: Tuning) -> str:
 
 def _run(contender: _Contender, best: Optimum, seeds: int) -> _Outcome:
     seeker = contender.seeker
-    table = finished_loops(
+    table = loops(
         EngineBench(),
         seeker,
         range(seeds),

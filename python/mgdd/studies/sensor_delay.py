@@ -10,12 +10,13 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from mgdd.engine import Performance
-from mgdd.loop import EngineBench, LoopCriteria, SensorDynamics, find_steady_optimum
+from mgdd.loop import EngineBench, LoopCriteria, SensorDynamics, find_steady_optimum, run_seeker
 from mgdd.optimize import ComponentLag, ExtremumSeeking, Optimum
 from mgdd.results import labelled_dataset
 from mgdd.results.labels import to_jsonable
-from mgdd.studies.base import Progress, StudyResult, check_seeds, run_parts
-from mgdd.studies.statistics import bands, finished_loops, rms, run_finished, with_interval
+from mgdd.results.units import unit_attributes
+from mgdd.studies.base import Progress, StudyResult, check_seeds, finish, run_parts
+from mgdd.studies.statistics import bands, loops, rms, with_interval
 
 if TYPE_CHECKING:
     import xarray as xr
@@ -129,11 +130,13 @@ def run_sensor_delay(
         "slow_dither_rule_cycles": 6.0 * (_ANALYSER.delay_cycles + _ANALYSER.lag_cycles),
         "interrupted": interrupted,
     }
-    return StudyResult(
-        name="sensor-delay",
-        dataset=dataset,
-        figures=_draw(dataset) if figures else {},
-        summary=to_jsonable(summary),
+    return finish(
+        StudyResult(
+            name="sensor-delay",
+            dataset=dataset,
+            figures=_draw(dataset) if figures else {},
+            summary=to_jsonable(summary),
+        )
     )
 
 
@@ -164,9 +167,7 @@ def _run_case(case: _Case, best: Optimum) -> tuple[dict[str, Any], float, NDArra
             hold_cycles=hold_cycles,
         )
 
-    run = run_finished(
-        bench(), seeker(None), CYCLES, criteria=LoopCriteria(optimum=best["soc_cad"], arrival=ARRIVAL_CAD)
-    )
+    run = run_seeker(bench(), seeker(None), CYCLES, criteria=LoopCriteria(optimum=best["soc_cad"], arrival=ARRIVAL_CAD))
     settle = case.period * math.ceil((case.lag.delay_cycles + 20.0 * case.lag.lag_cycles) / case.period + 2.0)
     slope = _frozen_slope(bench(), seeker(settle + 2 * case.period), settle, case.period)
     stays = run.summary["cycles_stays"]
@@ -214,7 +215,7 @@ def _component_wise(
             components=[ComponentLag(), _ANALYSER],
         )
 
-    table = finished_loops(*make(0), range(seeds), cycles=CYCLES, criteria=LoopCriteria(optimum=best["soc_cad"]))
+    table = loops(*make(0), range(seeds), cycles=CYCLES, criteria=LoopCriteria(optimum=best["soc_cad"]))
     row = {
         "case": "analyser, NOx demodulated with its own phase",
         "period_cycles": period,
@@ -284,7 +285,7 @@ def _draw(dataset: xr.Dataset) -> dict[str, Figure]:
         names = {f"component_{name}_cad": f"estimate_{name}_cad" for name in ("median", "low", "high")}
         own = own.rename({**names, "component_period": "case"})
         labels = [f"period {int(period)}" for period in own["case"].to_numpy()]
-        own = own.assign_coords(case=("case", labels, {"units": "-", "long_name": "case"}))
+        own = own.assign_coords(case=("case", labels, unit_attributes("-", "case")))
         figure = Figure(figsize=(7.4, 4.2), layout="constrained")
         plot.convergence(own.isel(cycle=slice(2000)), ax=figure.add_subplot())
         out["Only NOx is late, each component demodulated with its own phase; default noise"] = figure

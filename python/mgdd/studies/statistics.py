@@ -10,7 +10,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from mgdd.loop import EngineBench, monte_carlo, run_seeker
-from mgdd.loop.plant_loop import LoopRun
+from mgdd.results.units import unit_attributes
 
 if TYPE_CHECKING:
     from collections.abc import Callable
@@ -18,7 +18,7 @@ if TYPE_CHECKING:
     import xarray as xr
     from numpy.typing import ArrayLike, NDArray
 
-__all__ = ["bands", "finished_loops", "mean_interval", "rms", "run_finished", "run_with_slope", "with_interval"]
+__all__ = ["bands", "loops", "mean_interval", "rms", "run_with_slope", "with_interval"]
 
 _CONFIDENCE = 0.95
 
@@ -60,25 +60,14 @@ def rms(values: ArrayLike) -> float:
     return float(np.sqrt(np.nanmean(np.square(np.asarray(values, float)))))
 
 
-def finished_loops(bench: EngineBench, seeker: Any, seeds: Iterable[int], **how: Any) -> xr.Dataset:
-    """Run `monte_carlo` of one bench and one seeker, over ``seed`` alone; Ctrl-C is raised again, not returned."""
-    table = monte_carlo(bench, seeker, seeds, **how)
-    if not bool(table["finished"].all()):
-        raise KeyboardInterrupt
-    return table.isel(bench=0, seeker=0, drop=True)
-
-
-def run_finished(bench: EngineBench, seeker: Any, cycles: int, **how: Any) -> LoopRun:
-    """Run `run_seeker`; Ctrl-C is raised again, not returned."""
-    run = run_seeker(bench, seeker, cycles, **how)
-    if run.interrupted:
-        raise KeyboardInterrupt
-    return run
+def loops(bench: EngineBench, seeker: Any, seeds: Iterable[int], **how: Any) -> xr.Dataset:
+    """Run `monte_carlo` of one bench and one seeker, over ``seed`` alone."""
+    return monte_carlo(bench, seeker, seeds, **how).isel(bench=0, seeker=0, drop=True)
 
 
 def bands(make: Callable[[int], tuple[EngineBench, Any]], seeds: Iterable[int], cycles: int) -> NDArray[np.float64]:
     """Give median, 10 % and 90 % quantile of the estimate over seeds, cycle by cycle, shape (3, cycles) [°CA aTDC]."""
-    runs = [run_finished(*make(seed), cycles).dataset["estimate_cad"].to_numpy() for seed in seeds]
+    runs = [run_seeker(*make(seed), cycles).dataset["estimate_cad"].to_numpy() for seed in seeds]
     return np.asarray(np.quantile(np.stack(runs), [0.5, 0.1, 0.9], axis=0))
 
 
@@ -89,7 +78,7 @@ def run_with_slope(bench: EngineBench, seeker: Any, cycles: int) -> xr.Dataset:
     trajectory bit for bit.
     """
     twin, listener = copy.deepcopy(bench), copy.deepcopy(seeker)
-    run = run_finished(bench, seeker, cycles).dataset
+    run = run_seeker(bench, seeker, cycles).dataset
     slope = np.empty(cycles)
     for cycle in range(cycles):
         measured = twin.step(float(listener.ask()[0]))
@@ -100,5 +89,5 @@ def run_with_slope(bench: EngineBench, seeker: Any, cycles: int) -> xr.Dataset:
     settings = listener.settings
     period = 1 if settings.get("form") == "batch" else int(settings["period"])  # a batch is such a mean itself
     mean = np.convolve(slope, np.full(period, 1.0 / period))[:cycles]
-    attrs = {"units": "%/°CA", "long_name": "estimated slope of J"}
+    attrs = unit_attributes("%/°CA", "estimated slope of J")
     return run.assign(gradient_per_cad=("cycle", mean, attrs))

@@ -11,7 +11,7 @@ import numpy as np
 from mgdd import presets
 from mgdd.results import labelled_dataset
 from mgdd.results.labels import to_jsonable
-from mgdd.studies.base import Progress, StudyResult, run_parts
+from mgdd.studies.base import Progress, StudyResult, finish, run_parts
 from mgdd.throttle import Throttle, groups, holding_duty, simulate
 
 if TYPE_CHECKING:
@@ -88,11 +88,13 @@ def run_throttle_characteristics(
         "air_angle_deg": AIR_ANGLE_DEG,
         "interrupted": interrupted,
     }
-    return StudyResult(
-        name="throttle-characteristics",
-        dataset=dataset,
-        figures=_draw(dataset) if figures else {},
-        summary=to_jsonable(summary),
+    return finish(
+        StudyResult(
+            name="throttle-characteristics",
+            dataset=dataset,
+            figures=_draw(dataset) if figures else {},
+            summary=to_jsonable(summary),
+        )
     )
 
 

@@ -14,7 +14,7 @@ from mgdd.optimize import FitOptions
 from mgdd.results import labelled_dataset
 from mgdd.results.labels import to_jsonable
 from mgdd.signals import nrmse_fit_percent
-from mgdd.studies.base import Progress, StudyResult, check_seeds, run_parts
+from mgdd.studies.base import Progress, StudyResult, check_seeds, finish, run_parts
 from mgdd.studies.statistics import with_interval
 from mgdd.throttle import Throttle, groups, simulate
 
@@ -96,11 +96,13 @@ def run_throttle_first_principle(
         "resolution_deg": LSB_DEG,
         "interrupted": interrupted,
     }
-    return StudyResult(
-        name="throttle-first-principle",
-        dataset=dataset,
-        figures=_draw(dataset) if figures else {},
-        summary=to_jsonable(summary),
+    return finish(
+        StudyResult(
+            name="throttle-first-principle",
+            dataset=dataset,
+            figures=_draw(dataset) if figures else {},
+            summary=to_jsonable(summary),
+        )
     )
 
 

@@ -1,4 +1,4 @@
-"""Three pseudo-Wiener models on two throttles: what each can do in free run, and what re-anchored ahead of now."""
+"""Three pseudo-Wiener models on two throttles: what each can do in free run, and what corrected, ahead of now."""
 
 from __future__ import annotations
 
@@ -14,7 +14,7 @@ from mgdd.optimize import FitOptions
 from mgdd.results import labelled_dataset
 from mgdd.results.labels import to_jsonable
 from mgdd.signals import nrmse_fit_percent
-from mgdd.studies.base import Progress, StudyResult, run_parts
+from mgdd.studies.base import Progress, StudyResult, finish, run_parts
 from mgdd.throttle import Throttle, simulate
 
 if TYPE_CHECKING:
@@ -113,7 +113,9 @@ def run_throttle_pseudo_wiener(
         "interrupted": interrupted,
     }
     drawn = _draw(dataset) if figures else {}
-    return StudyResult(name="throttle-pseudo-wiener", dataset=dataset, figures=drawn, summary=to_jsonable(summary))
+    return finish(
+        StudyResult(name="throttle-pseudo-wiener", dataset=dataset, figures=drawn, summary=to_jsonable(summary))
+    )
 
 
 def study_throttle(plant: str) -> Throttle:

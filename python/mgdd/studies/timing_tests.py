@@ -14,8 +14,8 @@ from mgdd.loop import EngineBench, LoopCriteria, find_steady_optimum, steady_map
 from mgdd.optimize import ComponentLag, ExtremumSeeking, Limit, Optimum
 from mgdd.results import labelled_dataset
 from mgdd.results.labels import to_jsonable
-from mgdd.studies.base import Progress, StudyResult, check_seeds, run_parts
-from mgdd.studies.statistics import finished_loops, rms, run_with_slope, with_interval
+from mgdd.studies.base import Progress, StudyResult, check_seeds, finish, run_parts
+from mgdd.studies.statistics import loops, rms, run_with_slope, with_interval
 
 if TYPE_CHECKING:
     import xarray as xr
@@ -147,11 +147,13 @@ def run_timing_tests(
         "cycles": CYCLES,
         "interrupted": interrupted,
     }
-    return StudyResult(
-        name="timing-tests",
-        dataset=dataset,
-        figures=_draw(done, limited) if figures else {},
-        summary=to_jsonable(summary),
+    return finish(
+        StudyResult(
+            name="timing-tests",
+            dataset=dataset,
+            figures=_draw(done, limited) if figures else {},
+            summary=to_jsonable(summary),
+        )
     )
 
 
@@ -161,7 +163,7 @@ def _run(test: _Test, seeds: int, *, limited: bool = False) -> _Outcome:
     best = find_steady_optimum(bench, caps)
     seeker = test.seeker(best, limited=limited)
     above = {name: cap + 3.0 * best[f"scatter_{name}"] for name, cap in caps.items()}
-    table = finished_loops(
+    table = loops(
         bench,
         seeker,
         range(seeds),

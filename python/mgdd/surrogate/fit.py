@@ -10,6 +10,7 @@ import numpy as np
 
 from mgdd.errors import DataError, ParameterError
 from mgdd.results import Label
+from mgdd.results.labels import label_of
 from mgdd.signals.even_grid import check_count
 from mgdd.surrogate.response_surface import QuadraticBasis, least_squares_of, r_squared, support_of
 from mgdd.surrogate.sensor_lag import SensorLag, find_sensor_lag, lagged
@@ -68,7 +69,7 @@ def fit_surrogate(
     slow : sequence of str
         Those behind a slow sensor.
     nonnegative : sequence of str
-        Those that cannot be negative; a name that is no output is ignored.
+        Those that cannot be negative; a name that is not an output is ignored.
     max_lag : int
         Highest lag tried for a fast signal [cycles]; 0 to this.
     held_out : float
@@ -86,7 +87,7 @@ def fit_surrogate(
     Raises
     ------
     mgdd.errors.ParameterError
-        Inputs that do not begin with ``soi_cad``, a slow signal that is no output, a share outside (0, 1).
+        Inputs that do not begin with ``soi_cad``, a slow signal that is not an output, a share outside (0, 1).
     mgdd.errors.DataError
         A missing column, cycles that do not count up by one, a command that is not finite or does not vary, too few
         usable rows.
@@ -112,14 +113,14 @@ def fit_surrogate(
     models, left = {}, []
     for name in signals:
         values = records[name].to_numpy().astype(np.float64)
-        label = Label(records[name].attrs["units"], records[name].attrs["long_name"])
+        label = label_of(records[name])
         models[name], residual = _fit_signal(log, values, name, label, slow=name in slow, max_lag=max_lag, seed=seed)
         left.append(residual)
     return EngineSurrogate(
         signals=models,
         support=support_of(used, basis, inputs=names, share=box),
         medians={name: float(m) for name, m in zip(names, np.median(used, axis=0), strict=True)},
-        input_labels={n: Label(records[n].attrs["units"], records[n].attrs["long_name"]) for n in names},
+        input_labels={n: label_of(records[n]) for n in names},
         nonnegative=tuple(name for name in nonnegative if name in signals),
         residuals=np.column_stack(left),
         source=dict(records.attrs),
@@ -175,13 +176,13 @@ def _cross_validated(log: _Log, values: NDArray[np.float64], lag: int, early: ND
 
 
 def _usable(log: _Log, values: NDArray[np.float64], lag: int) -> NDArray[np.bool_]:
-    """Tell the rows with a value whose command, `lag` rows before, was excited as well."""
+    """Return the rows with a value whose command, `lag` rows before, was excited as well."""
     source = np.arange(values.size) - lag
     return np.isfinite(values) & log.excited & (source >= 0) & log.excited[np.maximum(source, 0)]
 
 
 def _settled(excited: NDArray[np.bool_]) -> NDArray[np.bool_]:
-    """Tell the rows with enough excited rows behind them."""
+    """Return the rows with enough excited rows behind them."""
     rows = np.arange(excited.size)
     last = np.maximum.accumulate(np.where(excited, -1, rows))
     return np.asarray(excited & (rows - last > _SETTLE), dtype=np.bool_)
@@ -214,7 +215,7 @@ def _check_request(
         raise ParameterError(f"outputs = {outputs}: must name signals, each once, and no input")
     unknown = [name for name in slow if name not in outputs]
     if unknown:
-        raise ParameterError(f"slow: {unknown[0]!r} is no output: must be one of {', '.join(outputs)}")
+        raise ParameterError(f"slow: {unknown[0]!r} is not an output: must be one of {', '.join(outputs)}")
     if max_lag < 0:
         raise ParameterError(f"max_lag = {max_lag}: must be >= 0")
     for what, share in (("held_out", held_out), ("box", box)):

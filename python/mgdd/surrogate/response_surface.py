@@ -88,7 +88,7 @@ class Support:
         return self._leverage_of(self.basis(np.asarray(points, dtype=np.float64)))
 
     def contains(self, points: Sequence[Sequence[float]] | NDArray[np.float64]) -> NDArray[np.bool_]:
-        """Tell which points lie in the box and do not exceed the leverage limit.
+        """Return which points lie in the box and do not exceed the leverage limit.
 
         Parameters
         ----------
@@ -104,7 +104,7 @@ class Support:
         return self.contains_terms(at, self.basis(at))
 
     def contains_terms(self, at: NDArray[np.float64], terms: NDArray[np.float64]) -> NDArray[np.bool_]:
-        """Tell the same of points whose terms are known."""
+        """Return the same of points whose terms are known."""
         inside = np.all((at >= self.lower) & (at <= self.upper), axis=1)
         return np.asarray(inside & (self._leverage_of(terms) <= self.leverage_limit * (1.0 + 1e-9)), dtype=np.bool_)
 

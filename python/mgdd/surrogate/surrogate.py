@@ -42,7 +42,7 @@ class EngineSurrogate(Parameters):
     support : Support
         Where the surfaces may be believed.
     medians : mapping of str to float
-        Median of each input over the records: where a prediction stands unless told otherwise.
+        Median of each input over the records: where a prediction stands unless given otherwise.
     input_labels : mapping of str to Label
         Unit and long name of each input.
     nonnegative : tuple of str
@@ -237,7 +237,7 @@ class EngineSurrogate(Parameters):
         for name, value in (at or {}).items():
             if name not in self.inputs or name == STEERED:
                 others = ", ".join(n for n in self.inputs if n != STEERED)
-                raise ParameterError(f"at: {name!r} is no other input: must be one of {others}")
+                raise ParameterError(f"at: {name!r} is not another input: must be one of {others}")
             if not np.isfinite(value):
                 raise ParameterError(f"at: {name} = {value:g}: must be finite")
         return {**self.medians, **(at or {})}

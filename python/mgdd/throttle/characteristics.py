@@ -23,7 +23,7 @@ AIR_KG_PER_M3 = 1.2041  # dry air at 20 degC and 101.325 kPa
 
 
 def groups(throttle: Throttle) -> xr.Dataset:
-    """Give the groups of parameters that duty and angle can tell apart.
+    """Give the groups of parameters that duty and angle identify.
 
     Parameters
     ----------
@@ -44,7 +44,7 @@ def groups(throttle: Throttle) -> xr.Dataset:
 
     Notes
     -----
-    Inertia, torque constant and resistance cannot be told apart from duty and angle alone; these groups can.
+    Inertia, torque constant and resistance cannot be identified separately from duty and angle alone; these groups can.
 
     Examples
     --------

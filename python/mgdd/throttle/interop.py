@@ -87,7 +87,7 @@ def to_iosystem(
     ImportError
         python-control is not installed: ``pip install mgdd[control]``.
     mgdd.errors.ParameterError
-        A sample that is no whole number of steps, a step outside its domain.
+        A sample that is not a whole number of steps, a step outside its domain.
 
     Notes
     -----

@@ -44,7 +44,7 @@ class PseudoWiener(SampledModel, Parameters):
     switching : {"predicted", "measured"}
         PW-R: side of limp-home by the predicted position, or frozen by the measurement.
     friction : {"set_valued", "tanh"}
-        PW-R: exact sticking, or smooth for gradients; the smooth one creeps under load at up to ``tanh_deg_per_s
+        PW-R: exact stiction, or smooth for gradients; the smooth one creeps under load at up to ``tanh_deg_per_s
         atanh(load / friction)``.
 
     Raises
@@ -65,7 +65,7 @@ class PseudoWiener(SampledModel, Parameters):
     >>> time = np.arange(200) * 1e-3
     >>> run = model.simulate({"time_s": time, "duty": np.full(200, 0.4)}, initial_state={"angle_deg": 8.0})
     >>> run["angle_deg"].units
-    'deg'
+    'degree'
     >>> PseudoWiener.from_toml(model.to_toml()) == model
     True
     """
@@ -144,18 +144,24 @@ class PseudoWiener(SampledModel, Parameters):
         Returns
         -------
         PseudoWiener
-            The copy, or the model itself.
+            The copy, or the model itself. Its ``delay_samples`` need not be whole: between two duties the one that acts
+            is their mean by time.
+
+        Raises
+        ------
+        ParameterError
+            The delay would be longer than five samples.
+
+        Examples
+        --------
+        >>> PseudoWiener("pw_r", {"delay_samples": 3.0}).at_sample(2e-3).parameters["delay_samples"]
+        1.5
         """
         old = self.parameters["sample_s"]
         if is_same_step(sample_s, old):
             return self
-        changes = {
-            "sample_s": sample_s,
-            "delay_samples": float(round(self.parameters["delay_samples"] * old / sample_s)),
-        }
-        if self.kind == "pw_r":
-            changes["substeps"] = float(max(1, round(sample_s / _STEP_S)))
-        return self.replace(**changes)
+        substeps = max(1, round(sample_s / _STEP_S)) if self.kind == "pw_r" else None
+        return PseudoWiener(self.kind, self._core.at_sample(sample_s, substeps=substeps), **self._options)
 
     def _rest(self) -> list[float]:
         return [float(self.parameters["limp_home_deg"])]
@@ -172,7 +178,7 @@ class PseudoWiener(SampledModel, Parameters):
         speed_gain_per_s: float = 35.0,
         bias_gain_duty_per_deg: float = 0.004,
     ) -> xr.Dataset:
-        """Predict ahead of a measured record, corrected by the measurement at every sample.
+        """Predict ahead of a measured record, the state corrected by every measured angle.
 
         Parameters
         ----------

@@ -4,6 +4,7 @@
 #include <cmath>
 #include <random>
 
+#include "mgdd/dynamics/simulate.hpp"
 #include "mgdd/identify/throttle/pseudo_wiener_fit.hpp"
 #include "support/throttle_records.hpp"
 
@@ -41,7 +42,7 @@ Signal free_run(const P& p, const Signal& duty, double start_deg) {
   const auto model = throttle::model_of(p);
   auto state = model.at_rest(start_deg, 0.0);
   Signal y(duty.size());
-  throttle::simulate(model, state, std::span<const double>(duty), std::span<double>(y));
+  dynamics::simulate(model, state, std::span<const double>(duty), std::span<double>(y));
   return y;
 }
 Signal free_run(const throttle::PseudoWiener& p, const Signal& duty, double start_deg) {
@@ -155,7 +156,7 @@ TEST(PseudoWienerFit, RanksTheKindsOnP1) {
   const double persistence = test_support::ahead_rms(chirp, Signal(chirp.duty.size(), 0.0), 20);
   EXPECT_NEAR(persistence, 1.548, 0.01);
   EXPECT_LT(r.ahead, 0.25 * std::min(w.ahead, p.ahead));
-  EXPECT_LT(std::max(w.ahead, p.ahead), 0.75);  // re-anchored, both are good enough to guide
+  EXPECT_LT(std::max(w.ahead, p.ahead), 0.75);  // corrected, both are good enough to guide
 }
 
 TEST(PseudoWienerFit, RefusesWhatCannotBeFittedAndSaysWhy) {

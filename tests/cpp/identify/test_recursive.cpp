@@ -6,8 +6,8 @@
 #include <functional>
 
 #include "mgdd/common/state.hpp"
+#include "mgdd/dynamics/observer.hpp"
 #include "mgdd/identify/online/recursive_gradient.hpp"
-#include "mgdd/identify/online/recursive_observer.hpp"
 #include "mgdd/identify/online/recursive_pw_r.hpp"
 #include "mgdd/identify/online/recursive_window.hpp"
 #include "support/no_alloc.hpp"
@@ -18,6 +18,7 @@ namespace {
 
 using test_support::Signal;
 using throttle::PwR;
+using Observer = dynamics::FixedGainObserver<throttle::PwRModel, throttle::ObserverGains>;
 
 // P1 with a supply that rises by 20 % after `step_s`; every torque over g falls by as much.
 test_support::ThrottleLog supply_step(double duration_s, double step_s) {
@@ -171,10 +172,10 @@ TEST(GradientPwR, MovesTheGainTowardTheTruthAndKeepsItAtRest) {
   EXPECT_NEAR(still.model().above.gain_deg_per_s2_per_duty / 83597.0, 1.0, 0.01);
 }
 
-TEST(ReanchoringObserver, FollowsThePlantBehindASupplyStep) {
+TEST(FixedGainObserver, FollowsThePlantBehindASupplyStep) {
   const auto log = supply_step(6.0, 3.0);
-  ReanchoringObserver<throttle::PwRModel> observer(throttle::PwRModel{PwR{}}, {});
-  observer.start(log.angle_deg[0]);
+  Observer observer(throttle::PwRModel{PwR{}}, {});
+  observer.start(observer.model().at_rest(log.angle_deg[0]));
   double worst = 0.0;
   for (std::size_t k = 1; k < log.duty.size(); ++k) {
     static_cast<void>(observer.update(log.duty[k - 1], log.angle_deg[k]));
@@ -265,9 +266,9 @@ TEST(RecursiveRealTime, NothingIsAllocated) {
   RecursivePwR rls(RecursivePwRSettings{});
   WindowPwR window(WindowPwRSettings{});
   GradientPwR gradient(GradientPwRSettings{});
-  ReanchoringObserver<throttle::PwRModel> observer(throttle::PwRModel{PwR{}}, {});
+  Observer observer(throttle::PwRModel{PwR{}}, {});
   gradient.start(40.0);
-  observer.start(40.0);
+  observer.start(observer.model().at_rest(40.0));
   const test_support::AllocationCounter counter;
   for (int k = 0; k < 1200; ++k) {
     const double angle = 40.0 + 20.0 * std::sin(0.02 * k);

@@ -6,6 +6,7 @@
 #include <gtest/gtest.h>
 
 #include "mgdd/common/random.hpp"
+#include "mgdd/dynamics/rk4.hpp"
 #include "mgdd/optimize/least_squares/least_squares.hpp"
 #include "support/no_alloc.hpp"
 
@@ -27,48 +28,59 @@ struct Pendulum {
     return {x[1], p[0] * u[0] - p[1] * x[1] - p[2] * sin(x[0])};
   }
   template <class T>
-  T output(const Values<T, 4>& p, const Values<T, 2>& x, const Values<double, 1>&) const noexcept {
+  T output(const Values<T, 4>& p, const Values<T, 2>& x) const noexcept {
     return x[0] + p[3];
   }
 };
-static_assert(Ode<Pendulum> && StepModel<Rk4<Pendulum>> && !HasStart<Rk4<Pendulum>>);
+using dynamics::Rk4;
+static_assert(dynamics::Ode<Pendulum> && dynamics::ModelFamily<Rk4<Pendulum>>);
 
 // First-order lag with its exact discrete step; starts where the parameter says.
 struct Lag {
-  static constexpr int n_states = 1;
-  static constexpr int n_inputs = 1;
+  static constexpr int n_start = 1;
   static constexpr int n_parameters = 3;  // gain, time constant [s], start
 
   template <class T>
-  Values<T, 1> step(const Values<T, 3>& p, const Values<T, 1>& x, const Values<double, 1>& u,
-                    double dt_s) const noexcept {
+  struct Model {
+    using Scalar = T;
+    using State = Values<T, 1>;
+    using Input = T;
+    static constexpr int n_observed = 1;
+    T gain, keep, begin;
+    double dt_s;
+
+    void step(State& x, const T& u) const noexcept { x[0] = keep * x[0] + (1.0 - keep) * (gain * u); }
+    T output(const State& x) const noexcept { return x[0]; }
+    double sample_s() const noexcept { return dt_s; }
+    template <class S>
+    static auto numbers(S& x) noexcept {
+      return std::array{&x[0]};
+    }
+  };
+  template <class T>
+  Model<T> prepare(const Values<T, 3>& p, double dt_s) const noexcept {
     using std::exp;
-    const T keep = exp(-dt_s / p[1]);
-    return {keep * x[0] + (1.0 - keep) * (p[0] * u[0])};
+    return {p[0], exp(-dt_s / p[1]), p[2], dt_s};
   }
   template <class T>
-  T output(const Values<T, 3>&, const Values<T, 1>& x, const Values<double, 1>&) const noexcept {
-    return x[0];
-  }
-  template <class T>
-  Values<T, 1> start(const Values<T, 3>& p, const Values<T, 1>&) const noexcept {
-    return {p[2]};
+  Values<T, 1> start(const Model<T>& model, const Values<T, 1>&) const noexcept {
+    return {model.begin};
   }
 };
-static_assert(StepModel<Lag> && HasStart<Lag>);
+static_assert(dynamics::ModelFamily<Lag>);
 
 constexpr Values<double, 4> pendulum_truth{3.0, 0.4, 2.0, 0.1};
 
 SimulationRecord pendulum_record(std::uint64_t seed, std::size_t n, double noise = 0.0) {
   SimulationRecord record{
       .dt_s = 0.02, .input = {}, .output = {}, .start = {0.2, -0.1}, .free_start = {}, .weight = {}};
-  const Rk4<Pendulum> model{};
+  const auto model = Rk4<Pendulum>{}.prepare<double>(pendulum_truth, record.dt_s);
   Values<double, 2> x{0.2, -0.1};
   for (std::size_t k = 0; k < n; ++k) {
     const Values<double, 1> u{2.0 * random::uniform(seed, 0, k / 20) - 1.0};
     record.input.push_back(u[0]);
-    record.output.push_back(model.output<double>(pendulum_truth, x, u) + noise * random::normal(seed, 1, k));
-    x = model.step<double>(pendulum_truth, x, u, record.dt_s);
+    record.output.push_back(model.output(x) + noise * random::normal(seed, 1, k));
+    model.step(x, u);
   }
   return record;
 }
@@ -91,44 +103,44 @@ double largest_difference_error(Residual& residual, const VectorXd& x) {
   return worst;
 }
 
-TEST(SimulationResidual, SensitivitiesAgreeWithCentralDifferences) {
+TEST(OutputError, SensitivitiesAgreeWithCentralDifferences) {
   std::vector<SimulationRecord> records{pendulum_record(1, 300), pendulum_record(2, 200)};
   records[0].free_start = {0, 1};
   records[1].free_start = {1};
   records[1].skip = 30;
   records[1].sigma = 0.05;
   records[1].weight.assign(200, 0.5);
-  SimulationResidual residual(Rk4<Pendulum>{{}, 2}, {2.5, 0.5, 1.5, 0.0}, {0, 1, 2, 3}, records);
+  OutputError residual(Rk4<Pendulum>{{}, 2}, {2.5, 0.5, 1.5, 0.0}, std::vector<std::size_t>{0, 1, 2, 3}, records);
   EXPECT_EQ(residual.n_unknowns(), 7);
   EXPECT_EQ(residual.n_residuals(), 300 + 170);
   EXPECT_LT(largest_difference_error(residual, residual.start()), 1e-8);
 }
 
-TEST(SimulationResidual, AnyNumberOfUnknownsGivesTheSameColumns) {
+TEST(OutputError, AnyNumberOfUnknownsGivesTheSameColumns) {
   // One to six free columns pass through different dual widths; a column never depends on its neighbours.
   auto record = pendulum_record(3, 100);
   record.free_start = {0, 1};
-  SimulationResidual all(Rk4<Pendulum>{}, pendulum_truth, {0, 1, 2, 3}, {record});
+  OutputError all(Rk4<Pendulum>{}, pendulum_truth, std::vector<std::size_t>{0, 1, 2, 3}, std::vector{record});
   VectorXd r(all.n_residuals());
   MatrixXd j(all.n_residuals(), 6);
   ASSERT_TRUE(all(all.start(), r, &j));
   record.free_start = {};
   for (std::size_t p = 0; p < 4; ++p) {
-    SimulationResidual one(Rk4<Pendulum>{}, pendulum_truth, {p}, {record});
+    OutputError one(Rk4<Pendulum>{}, pendulum_truth, std::vector<std::size_t>{p}, std::vector{record});
     MatrixXd single(one.n_residuals(), 1);
     ASSERT_TRUE(one(one.start(), r, &single));
     EXPECT_LT((single.col(0) - j.col(static_cast<Eigen::Index>(p))).norm(), 1e-13 * single.norm());
   }
 }
 
-TEST(SimulationResidual, ALinearLagMatchesItsClosedFormAndStartsWhereItsParameterSays) {
+TEST(OutputError, ALinearLagMatchesItsClosedFormAndStartsWhereItsParameterSays) {
   SimulationRecord record{.dt_s = 0.01,
                           .input = std::vector<double>(200, 1.0),
                           .output = std::vector<double>(200, 0.0),
                           .start = {0.0},
                           .free_start = {},
                           .weight = {}};
-  SimulationResidual residual(Lag{}, {2.0, 0.3, 0.5}, {0, 1, 2}, {record});
+  OutputError residual(Lag{}, {2.0, 0.3, 0.5}, std::vector<std::size_t>{0, 1, 2}, std::vector{record});
   VectorXd y(200);
   MatrixXd j(200, 3);
   ASSERT_TRUE(residual(residual.start(), y, &j));
@@ -142,10 +154,10 @@ TEST(SimulationResidual, ALinearLagMatchesItsClosedFormAndStartsWhereItsParamete
   }
 }
 
-TEST(SimulationResidual, ARecordWithoutUnknownsLeavesNoStaleRows) {
+TEST(OutputError, ARecordWithoutUnknownsLeavesNoStaleRows) {
   std::vector<SimulationRecord> records{pendulum_record(6, 60), pendulum_record(7, 40)};
   records[1].free_start = {0};
-  SimulationResidual residual(Rk4<Pendulum>{{}, 2}, pendulum_truth, {}, records);
+  OutputError residual(Rk4<Pendulum>{{}, 2}, pendulum_truth, std::vector<std::size_t>{}, records);
   VectorXd r(100);
   MatrixXd j = MatrixXd::Constant(100, 1, 7.0);  // what an earlier call or the allocator left there
   ASSERT_TRUE(residual(residual.start(), r, &j));
@@ -153,12 +165,13 @@ TEST(SimulationResidual, ARecordWithoutUnknownsLeavesNoStaleRows) {
   EXPECT_EQ(j(60, 0), 1.0);
 }
 
-TEST(SimulationResidual, AUsersFunctorIsFittedByLeastSquares) {
+TEST(OutputError, AUsersFunctorIsFittedByLeastSquares) {
   auto record = pendulum_record(4, 1500, 0.01);
   record.start = {record.output[0], 0.0};
   record.free_start = {0, 1};
   record.sigma = 0.01;
-  SimulationResidual residual(Rk4<Pendulum>{}, {2.0, 0.2, 1.0, 0.0}, {0, 1, 2, 3}, {record});
+  OutputError residual(Rk4<Pendulum>{}, {2.0, 0.2, 1.0, 0.0}, std::vector<std::size_t>{0, 1, 2, 3},
+                       std::vector{record});
   std::vector<optimize::Parameter> unknowns{{"gain", 0.1, 20.0, true},      {"damping", 0.01, 5.0, true},
                                             {"stiffness", 0.1, 20.0, true}, {"offset", -1.0, 1.0},
                                             {"angle_0", -3.0, 3.0},         {"rate_0", -3.0, 3.0}};
@@ -169,10 +182,10 @@ TEST(SimulationResidual, AUsersFunctorIsFittedByLeastSquares) {
     EXPECT_NEAR(fit.values[i], pendulum_truth[static_cast<std::size_t>(i)], 4.0 * fit.standard_error[i]);
 }
 
-TEST(SimulationResidual, EvaluatesWithoutTheHeapAndRefusesAnEscape) {
+TEST(OutputError, EvaluatesWithoutTheHeapAndRefusesAnEscape) {
   auto record = pendulum_record(5, 200);
   record.free_start = {0, 1};
-  SimulationResidual residual(Rk4<Pendulum>{}, pendulum_truth, {0, 1, 2, 3}, {record});
+  OutputError residual(Rk4<Pendulum>{}, pendulum_truth, std::vector<std::size_t>{0, 1, 2, 3}, std::vector{record});
   static_assert(noexcept(residual(std::declval<const VectorXd&>(), std::declval<VectorXd&>(), nullptr)));
   VectorXd x = residual.start(), r(200);
   MatrixXd j(200, 6);
@@ -185,11 +198,11 @@ TEST(SimulationResidual, EvaluatesWithoutTheHeapAndRefusesAnEscape) {
   EXPECT_FALSE(residual(x, r, nullptr));
 }
 
-TEST(SimulationResidual, NamesWhatDoesNotBelongTogether) {
+TEST(OutputError, NamesWhatDoesNotBelongTogether) {
   const auto build = [](auto change, std::vector<std::size_t> free = {0}) {
     auto record = pendulum_record(6, 50);
     change(record);
-    return SimulationResidual(Rk4<Pendulum>{}, pendulum_truth, std::move(free), {record});
+    return OutputError(Rk4<Pendulum>{}, pendulum_truth, free, std::vector{record});
   };
   EXPECT_THROW(build([](SimulationRecord& r) { r.input.pop_back(); }), ShapeError);
   EXPECT_THROW(build([](SimulationRecord& r) { r.start.pop_back(); }), ShapeError);

@@ -16,7 +16,7 @@ namespace {
 using throttle::smooth_plant_example;
 using throttle::SmoothPlant;
 using Set = std::array<double, 10>;
-using Model = Rk4<SmoothPlant>;
+using Model = dynamics::Rk4<SmoothPlant>;
 
 struct Log {
   std::array<double, 3> start;
@@ -29,7 +29,7 @@ struct Log {
 // Random levels held 80 samples, then a linear chirp 0.2 to 6 Hz, with a slow pull towards the middle angle.
 Log make_log(std::size_t n, double offset, double amplitude, double middle_deg, double start_rad) {
   Log log{{start_rad, 0.0, 0.0}, {}, {}};
-  const Model model{};
+  const auto model = Model{}.prepare(smooth_plant_example, 1e-3);
   Values<double, 3> x = log.start;
   double trim = 0.0, squares = 0.0;
   for (std::size_t k = 0; k < n; ++k) {
@@ -41,8 +41,8 @@ Log make_log(std::size_t n, double offset, double amplitude, double middle_deg, 
     const double noise = 0.05 * random::normal(1, 1, k);
     squares += noise * noise;
     log.duty.push_back(trim + offset + amplitude * wave);
-    log.angle_deg.push_back(model.output<double>(smooth_plant_example, x, {}) + noise);
-    x = model.step<double>(smooth_plant_example, x, {log.duty.back()}, 1e-3);
+    log.angle_deg.push_back(model.output(x) + noise);
+    model.step(x, Values<double, 1>{log.duty.back()});
   }
   log.noise_deg = std::sqrt(squares / static_cast<double>(n));
   return log;
@@ -64,7 +64,7 @@ TEST(SmoothThrottle, TheOnePassKernelHasTheNormalEquationsOfTheDualModel) {
                           .start = {0.14, 0.0, 0.0},
                           .free_start = {},
                           .weight = {}};
-  SimulationResidual residual(Model{}, set, {0, 1, 2, 3, 4, 5, 6, 7, 8, 9}, {record});
+  OutputError residual(Model{}, set, std::vector<std::size_t>{0, 1, 2, 3, 4, 5, 6, 7, 8, 9}, std::vector{record});
   Eigen::VectorXd r(1500);
   Eigen::MatrixXd j(1500, 10);
   ASSERT_TRUE(residual(residual.start(), r, &j));

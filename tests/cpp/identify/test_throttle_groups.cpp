@@ -1,4 +1,4 @@
-#include "mgdd/identify/throttle/throttle_groups.hpp"
+#include "mgdd/identify/throttle/first_principle_fit.hpp"
 
 #include <cmath>
 #include <numbers>
@@ -7,10 +7,13 @@
 
 #include "mgdd/common/error.hpp"
 #include "mgdd/common/random.hpp"
+#include "mgdd/identify/free_run_fit.hpp"
 #include "support/throttle_records.hpp"
 
 namespace mgdd::identify {
 namespace {
+
+using throttle::FirstPrinciple;
 
 // A passenger-car throttle: preload above friction, weak springs; the lower spring is another part.
 constexpr Values<double, 9> truth{0.0197, 83'597.0, 0.1292, 4.96e-4, 0.0927, 0.14, 8e-4, 8.0, 0.0};
@@ -28,30 +31,31 @@ SimulationRecord chirp_record(std::size_t n, double noise_deg, std::uint64_t see
     const double phase = 2.0 * std::numbers::pi * (0.2 * t + 0.5 * 5.8 / span_s * t * t);
     record.input.push_back(offset + amplitude * std::sin(phase));
   }
-  record.output = simulate(ThrottleGroups{}, p, record.dt_s, {8.5, 0.0, 0.0}, record.input);
+  record.output = free_run(FirstPrinciple{}, {p.begin(), p.end()}, record.start, record.input, record.dt_s);
   for (std::size_t k = 0; k < n; ++k)
     record.output[k] += noise_deg * random::normal(seed, 0, k);
   return record;
 }
 
 TEST(ThrottleGroups, SticksExactlyAndHoldsUnderLoad) {
-  Values<double, 3> x{40.0, 0.0, 0.0};
+  const auto model = FirstPrinciple{}.prepare<double>(truth, 1e-3);
+  auto state = model.at_rest(40.0);
   const double hold = truth[2] + truth[3] * 32.0 + 0.5 * truth[4];  // half the friction torque off balance
   for (int k = 0; k < 1000; ++k)
-    x = ThrottleGroups{}.step<double>(truth, x, {hold}, 1e-3);
-  EXPECT_EQ(x[0], 40.0);
-  EXPECT_EQ(x[1], 0.0);
+    model.step(state, hold);
+  EXPECT_EQ(state.angle_deg, 40.0);
+  EXPECT_EQ(state.speed_deg_per_s, 0.0);
 }
 
 TEST(ThrottleGroups, SensitivitiesOfTheSmoothFormAgreeWithCentralDifferences) {
-  ThrottleGroups model;
-  model.tanh_deg_per_s = 30.0;
+  FirstPrinciple model;
+  model.friction = throttle::Friction::tanh;
   auto p = truth;
   p[8] = 1e-3;
   auto record = chirp_record(3000, 0.0, 0);
   record.output.assign(3000, 0.0);
   record.start = {30.0, 0.0, 0.0};
-  SimulationResidual residual(model, p, {0, 1, 2, 3, 4, 7, 8}, {record});
+  OutputError residual(model, p, std::vector<std::size_t>{0, 1, 2, 3, 4, 7, 8}, {record});
   Eigen::VectorXd x = residual.start(), r(3000), up(3000), down(3000);
   Eigen::MatrixXd j(3000, 7);
   ASSERT_TRUE(residual(x, r, &j));
@@ -71,19 +75,20 @@ TEST(ThrottleGroups, SensitivityVanishesWhileThePlateSticks) {
   Values<D, 9> p;
   for (std::size_t i = 0; i < 9; ++i)
     p[i] = D::seeded(truth[i], static_cast<int>(i));
-  Values<D, 3> x{D(40.0), D(0.0), D(0.0)};
-  x = ThrottleGroups{}.step<D>(p, x, {0.15}, 1e-3);
-  EXPECT_EQ(x[0], D(40.0));
-  EXPECT_EQ(x[1], D(0.0));
+  const auto model = FirstPrinciple{}.prepare<D>(p, 1e-3);
+  auto state = model.at_rest(D(40.0));
+  model.step(state, D(0.15));
+  EXPECT_EQ(state.angle_deg, D(40.0));
+  EXPECT_EQ(state.speed_deg_per_s, D(0.0));
 }
 
 TEST(ThrottleGroups, ExactDataGiveTheGroupsBackExactly) {
   FitStage stage{upper_groups, {}, 1.0, {}};
   stage.search.cost_tolerance = 1e-14;
   auto base = start;
-  const auto fit = fit_throttle_groups({}, {chirp_record(12'000, 0.0, 0)}, {stage}, {base}, 1);
+  const auto fit = fit_first_principle({}, {chirp_record(12'000, 0.0, 0)}, {stage}, {base}, 1);
   for (const std::size_t i : upper_groups)
-    EXPECT_NEAR(fit.values[i] / truth[i], 1.0, 1e-6) << ThrottleGroups::parameter_names[i];
+    EXPECT_NEAR(fit.values[i] / truth[i], 1.0, 1e-6) << FirstPrinciple::parameters[i].name;
 }
 
 TEST(ThrottleGroups, APlantWithInductanceAndStribeckFrictionIsFollowedClosely) {
@@ -96,10 +101,10 @@ TEST(ThrottleGroups, APlantWithInductanceAndStribeckFrictionIsFollowedClosely) {
   auto base = start;
   base[5] = truth[2];  // the side below is not visited
   base[6] = truth[3];
-  const auto fit = fit_throttle_groups({}, {record}, {{upper_groups, {}, 1.0, {}}}, {base}, 1);
+  const auto fit = fit_first_principle({}, {record}, {{upper_groups, {}, 1.0, {}}}, {base}, 1);
   const Values<double, 5> tolerance{0.08, 0.05, 0.01, 0.08, 0.04};
   for (const std::size_t i : upper_groups)
-    EXPECT_NEAR(fit.values[i] / truth[i], 1.0, tolerance[i]) << ThrottleGroups::parameter_names[i];
+    EXPECT_NEAR(fit.values[i] / truth[i], 1.0, tolerance[i]) << FirstPrinciple::parameters[i].name;
   double mean = 0.0, spread = 0.0;
   for (const double y : log.angle_deg)
     mean += y / static_cast<double>(log.angle_deg.size());
@@ -111,7 +116,7 @@ TEST(ThrottleGroups, APlantWithInductanceAndStribeckFrictionIsFollowedClosely) {
   // With the electrical time free the unmodelled lag goes: L/R is 1 ms, blurred by implicit steps of 0.5 ms.
   auto electrical = fit.values;
   electrical[8] = 5e-4;
-  const auto with = fit_throttle_groups({}, {record}, {{{0, 1, 2, 3, 4, 8}, {}, 1.0, {}}}, {electrical}, 1);
+  const auto with = fit_first_principle({}, {record}, {{{0, 1, 2, 3, 4, 8}, {}, 1.0, {}}}, {electrical}, 1);
   EXPECT_NEAR(with.values[8], 1e-3, 5e-4);
   EXPECT_LT(with.starts.reports[0].cost, fit.starts.reports[0].cost);
 }
@@ -120,7 +125,7 @@ TEST(ThrottleGroups, NinetyFivePercentIntervalsCoverTheTruth) {
   std::array<int, 5> covered{};
   const FitStage stage{upper_groups, {}, 1.0, {}};
   for (std::uint64_t seed = 0; seed < 60; ++seed) {
-    const auto fit = fit_throttle_groups({}, {chirp_record(3000, 0.05, seed)}, {stage}, {truth}, 1);
+    const auto fit = fit_first_principle({}, {chirp_record(3000, 0.05, seed)}, {stage}, {truth}, 1);
     const optimize::FitReport& report = fit.starts.reports[0];
     for (std::size_t i = 0; i < 5; ++i) {
       const auto k = static_cast<Eigen::Index>(i);
@@ -128,7 +133,7 @@ TEST(ThrottleGroups, NinetyFivePercentIntervalsCoverTheTruth) {
     }
   }
   for (std::size_t i = 0; i < 5; ++i)
-    EXPECT_GE(covered[i], 50) << ThrottleGroups::parameter_names[i];
+    EXPECT_GE(covered[i], 50) << FirstPrinciple::parameters[i].name;
 }
 
 TEST(ThrottleGroups, StagesAndThreadsReachTheSameBest) {
@@ -136,8 +141,8 @@ TEST(ThrottleGroups, StagesAndThreadsReachTheSameBest) {
   const std::vector<FitStage> stages{{{0, 1}, {0}, 0.5, {}}, {{2, 3, 4}, {0}, 1.0, {}}, {upper_groups, {}, 1.0, {}}};
   auto other = start;
   other[4] = 0.08;
-  const auto one = fit_throttle_groups({}, records, stages, {start, other}, 1);
-  const auto two = fit_throttle_groups({}, records, stages, {start, other}, 2);
+  const auto one = fit_first_principle({}, records, stages, {start, other}, 1);
+  const auto two = fit_first_principle({}, records, stages, {start, other}, 2);
   EXPECT_EQ(one.values, two.values);
   EXPECT_EQ(one.starts.n_reached, two.starts.n_reached);
   EXPECT_NEAR(one.starts.reports[one.starts.best].rmse, 0.03, 0.002);
@@ -147,10 +152,10 @@ TEST(ThrottleGroups, NamesWrongInput) {
   auto outside = truth;
   outside[0] = 5.0;
   const FitStage stage{upper_groups, {}, 1.0, {}};
-  EXPECT_THROW((void)fit_throttle_groups({}, {chirp_record(100, 0.0, 0)}, {stage}, {outside}, 1), ParameterError);
-  EXPECT_THROW((void)fit_throttle_groups({}, {chirp_record(100, 0.0, 0)}, {}, {truth}, 1), ShapeError);
-  EXPECT_THROW((void)fit_throttle_groups({}, {}, {stage}, {truth}, 1), ShapeError);
-  EXPECT_NO_THROW((void)fit_throttle_groups({}, {chirp_record(100, 0.0, 0)}, {stage}, {truth}, 1));
+  EXPECT_THROW((void)fit_first_principle({}, {chirp_record(100, 0.0, 0)}, {stage}, {outside}, 1), ParameterError);
+  EXPECT_THROW((void)fit_first_principle({}, {chirp_record(100, 0.0, 0)}, {}, {truth}, 1), ShapeError);
+  EXPECT_THROW((void)fit_first_principle({}, {}, {stage}, {truth}, 1), ShapeError);
+  EXPECT_NO_THROW((void)fit_first_principle({}, {chirp_record(100, 0.0, 0)}, {stage}, {truth}, 1));
 }
 
 TEST(SpreadStarts, HasOnePointPerCellOfEveryAxis) {

@@ -1,5 +1,6 @@
 // What a loop relies on: the same seed gives the same run however it is cut, nothing is allocated, errors say what to
 // do.
+#include <cmath>
 #include <cstdint>
 #include <functional>
 #include <string>

@@ -4,10 +4,14 @@
 
 #include <gtest/gtest.h>
 
+#include "mgdd/identify/free_run_fit.hpp"
 #include "support/no_alloc.hpp"
+#include "support/stepped.hpp"
 
 namespace mgdd::systems {
 namespace {
+
+using test_support::stepped;
 
 constexpr Values<double, 9> slide{95.0, 200.0, -37.0, 20.0, 2.0, 0.03, -0.5, -0.02, 3.0};
 constexpr DriveAxis axis{35.0, 0.1};
@@ -15,10 +19,10 @@ constexpr DriveAxis axis{35.0, 0.1};
 TEST(DriveAxis, StandsStillBelowStaticFrictionAndDoesNotCreep) {
   Values<double, 3> state{0.1, 0.0, 0.0};
   for (int k = 0; k < 1000; ++k)
-    state = axis.step<double>(slide, state, {0.5}, 1e-3);  // 17.5 N against 22 N
+    state = stepped(axis, slide, state, 0.5, 1e-3);  // 17.5 N against 22 N
   EXPECT_EQ(state[0], 0.1);
   EXPECT_EQ(state[1], 0.0);
-  state = axis.step<double>(slide, state, {0.65}, 1e-3);  // 22.75 N, and the offset pushes
+  state = stepped(axis, slide, state, 0.65, 1e-3);  // 22.75 N, and the offset pushes
   EXPECT_GT(state[1], 0.0);
 }
 
@@ -28,7 +32,7 @@ TEST(DriveAxis, SteadySpeedBalancesTheForces) {
   for (const double voltage : {2.0, -2.0}) {
     Values<double, 3> state{0.1, 0.0, 0.0};
     for (int k = 0; k < 20000; ++k)
-      state = axis.step<double>(p, state, {voltage}, 1e-3);
+      state = stepped(axis, p, state, voltage, 1e-3);
     const double v = state[1];
     const double sign = v > 0.0 ? 1.0 : -1.0;
     EXPECT_GT(v * voltage, 0.0);
@@ -42,7 +46,7 @@ TEST(DriveAxis, BrakesToRestAndStays) {
   Values<double, 9> p = slide;
   p[6] = p[7] = p[8] = 0.0;
   for (int k = 0; k < 3000; ++k) {
-    state = axis.step<double>(p, state, {0.0}, 1e-3);
+    state = stepped(axis, p, state, 0.0, 1e-3);
     EXPECT_GE(state[1], 0.0);  // no chatter through zero
   }
   EXPECT_EQ(state[1], 0.0);
@@ -57,11 +61,11 @@ TEST(DriveAxis, SensitivitiesAreThoseOfDifferences) {
   const auto run = [&](const Values<double, 9>& q) {
     Values<double, 3> s = start;
     for (int k = 0; k < 200; ++k)
-      s = axis.step<double>(q, s, {1.2}, 1e-3);
+      s = stepped(axis, q, s, 1.2, 1e-3);
     return s[0];
   };
   for (int k = 0; k < 200; ++k)
-    state = axis.step<Dual<9>>(p, state, {1.2}, 1e-3);
+    state = stepped(axis, p, state, 1.2, 1e-3);
   for (std::size_t i = 0; i < 9; ++i) {
     const double h = 1e-5 * std::max(1.0, std::abs(slide[i])) * (i == 5 ? 1e-2 : 1.0);
     Values<double, 9> up = slide;
@@ -77,23 +81,22 @@ TEST(DriveAxis, StepAllocatesNothing) {
   Values<double, 3> state{0.0, 0.0, 0.0};
   const test_support::AllocationCounter counter;
   for (int k = 0; k < 100; ++k)
-    state = axis.step<double>(slide, state, {k % 2 == 0 ? 3.0 : -3.0}, 1e-3);
+    state = stepped(axis, slide, state, k % 2 == 0 ? 3.0 : -3.0, 1e-3);
   EXPECT_EQ(counter.count(), 0U);
-  static_assert(noexcept(axis.step<double>(slide, Values<double, 3>{}, {0.0}, 1e-3)));
 }
 
 TEST(DriveAxis, FitNamesWhatItDoesNotKnow) {
   const std::vector<double> base(slide.begin(), slide.end());
-  SimulationRecord record;
+  identify::SimulationRecord record;
   record.input.assign(50, 1.0);
   record.output.assign(50, 0.1);
   record.start = {0.1, 0.0, 0.0};
-  EXPECT_THROW((void)fit_free_run(axis, base, {"weight_kg"}, {record}, {}), ParameterError);
-  EXPECT_THROW((void)fit_free_run(axis, {1.0}, {"mass_kg"}, {record}, {}), ShapeError);
+  EXPECT_THROW((void)identify::fit_free_run(axis, base, {"weight_kg"}, {record}, {}), ParameterError);
+  EXPECT_THROW((void)identify::fit_free_run(axis, {1.0}, {"mass_kg"}, {record}, {}), ShapeError);
   std::vector<double> wrong = base;
   wrong[0] = -1.0;
-  EXPECT_THROW((void)fit_free_run(axis, wrong, {"coulomb_n"}, {record}, {}), ParameterError);
-  EXPECT_NO_THROW((void)fit_free_run(axis, base, {"mass_kg"}, {record}, {}));
+  EXPECT_THROW((void)identify::fit_free_run(axis, wrong, {"coulomb_n"}, {record}, {}), ParameterError);
+  EXPECT_NO_THROW((void)identify::fit_free_run(axis, base, {"mass_kg"}, {record}, {}));
 }
 
 }  // namespace

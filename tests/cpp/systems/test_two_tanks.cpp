@@ -5,16 +5,19 @@
 #include <gtest/gtest.h>
 
 #include "support/no_alloc.hpp"
+#include "support/stepped.hpp"
 
 namespace mgdd::systems {
 namespace {
+
+using test_support::stepped;
 
 constexpr Values<double, 9> tanks{0.05, 0.01, 1.0, 0.05, 0.5, 1.0, 12.0, 0.5, 1.0};
 
 Values<double, 4> settled(const Values<double, 9>& p, double voltage, int samples = 5000) {
   Values<double, 4> state{1.0, 2.0, voltage, voltage};
   for (int k = 0; k < samples; ++k)
-    state = TwoTanks{}.step<double>(p, state, {voltage}, 4.0);
+    state = stepped(TwoTanks{}, p, state, voltage, 4.0);
   return state;
 }
 
@@ -39,8 +42,8 @@ TEST(TwoTanks, DelayShiftsThePump) {
     p[8] = delay;
     Values<double, 9> none = tanks;
     none[8] = 0.0;
-    const auto delayed = TwoTanks{}.step<double>(p, before, {3.0}, 4.0);
-    const auto direct = TwoTanks{}.step<double>(none, before, {voltage}, 4.0);
+    const auto delayed = stepped(TwoTanks{}, p, before, 3.0, 4.0);
+    const auto direct = stepped(TwoTanks{}, none, before, voltage, 4.0);
     EXPECT_NEAR(delayed[0], direct[0], 1e-12);
     EXPECT_EQ(delayed[2], 3.0);
     EXPECT_EQ(delayed[3], 2.0);
@@ -56,11 +59,11 @@ TEST(TwoTanks, SensitivitiesAreThoseOfDifferences) {
   const auto run = [&](const Values<double, 9>& q) {
     Values<double, 4> s{11.0, 4.0, 2.5, 2.5};
     for (int k = 0; k < 100; ++k)
-      s = TwoTanks{}.step<double>(q, s, {input(k)}, 4.0);
+      s = stepped(TwoTanks{}, q, s, input(k), 4.0);
     return s[1];
   };
   for (int k = 0; k < 100; ++k)
-    state = TwoTanks{}.step<Dual<9>>(p, state, {input(k)}, 4.0);
+    state = stepped(TwoTanks{}, p, state, input(k), 4.0);
   for (std::size_t i = 0; i + 1 < 9; ++i) {  // the delay stands on a kink at 1
     Values<double, 9> up = tanks;
     Values<double, 9> down = tanks;
@@ -76,7 +79,7 @@ TEST(TwoTanks, StepAllocatesNothing) {
   Values<double, 4> state{1.0, 2.0, 0.0, 0.0};
   const test_support::AllocationCounter counter;
   for (int k = 0; k < 100; ++k)
-    state = TwoTanks{}.step<double>(tanks, state, {3.0}, 4.0);
+    state = stepped(TwoTanks{}, tanks, state, 3.0, 4.0);
   EXPECT_EQ(counter.count(), 0U);
 }
 

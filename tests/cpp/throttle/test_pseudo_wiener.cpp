@@ -4,6 +4,8 @@
 #include <cmath>
 #include <random>
 
+#include "mgdd/dynamics/predict.hpp"
+#include "mgdd/dynamics/simulate.hpp"
 #include "mgdd/throttle/models/pseudo_wiener.hpp"
 #include "support/no_alloc.hpp"
 #include "support/throttle_records.hpp"
@@ -29,7 +31,7 @@ Signal run(const P& p, const Signal& duty, double start_deg) {
   const auto model = model_of(p);
   auto state = model.at_rest(start_deg, 0.0);
   Signal y(duty.size());
-  simulate(model, state, std::span<const double>(duty), std::span<double>(y));
+  dynamics::simulate(model, state, std::span<const double>(duty), std::span<double>(y));
   return y;
 }
 
@@ -88,7 +90,7 @@ TEST(PseudoWienerPwR, SetValuedFrictionSticksExactlyAndTheSmoothOneCreepsAsState
   const double hold = p.above.preload_duty + p.above.spring_duty_per_deg * 32.0 + share * p.above.coulomb_duty;
   const Signal duty(1000, hold);
   EXPECT_EQ(run(p, duty, 40.0).back(), 40.0);
-  p.friction = DryFriction::tanh;
+  p.friction = Friction::tanh;
   for (PwRSide* s : {&p.above, &p.below})
     s->spring_duty_per_deg = 1e-5;  // so that the spring takes nothing back on the way
   const Signal weak(1000, p.above.preload_duty + 1e-5 * 32.0 + share * p.above.coulomb_duty);
@@ -130,6 +132,51 @@ TEST(PseudoWienerPwR, DelayShiftsTheDuty) {
     ASSERT_EQ(late[k], now[k - 3]);
 }
 
+TEST(PseudoWienerPwR, AnImpossibleDelayIsRefusedByTheModelItself) {
+  PwR p;
+  p.frame.delay_samples = 50.0;
+  EXPECT_THROW(static_cast<void>(PwRModel(p)), ParameterError);
+  EXPECT_THROW(static_cast<void>(model_of(lift<Dual<3>>(p))), ParameterError);
+  EXPECT_THROW(static_cast<void>(prepare(p)), ParameterError);
+  PwW w;
+  w.frame.delay_samples = -1.0;
+  EXPECT_THROW(static_cast<void>(PwWModel(w)), ParameterError);
+  PwP many;
+  many.plays = 9;
+  EXPECT_THROW(static_cast<void>(PwPModel(many)), ParameterError);
+}
+
+TEST(PseudoWienerPwR, ADelayKeepsItsTimeWhenTheSampleTimeChanges) {
+  PwR p;
+  p.frame.delay_samples = 3.0;
+  EXPECT_DOUBLE_EQ(p.frame.at_sample(2e-3).delay_samples, 1.5);
+  p.frame.delay_samples = 1.0;
+  EXPECT_DOUBLE_EQ(p.frame.at_sample(2e-3).delay_samples, 0.5);
+  EXPECT_EQ(p.frame.at_sample(5e-4).delay_samples, 2.0);
+  p.frame.delay_samples = 4.0;
+  try {
+    static_cast<void>(p.frame.at_sample(5e-4));
+    FAIL();
+  } catch (const ParameterError& error) {
+    EXPECT_EQ(
+        std::string(error.what()),
+        "delay_samples = 8 at sample_s = 0.0005 s: must be in [0, 5]; for a delay of 4 ms take sample_s >= 0.0008 s");
+  }
+}
+
+TEST(PseudoWienerPwR, AFractionalDelayActsWithTheMeanOfTwoDuties) {
+  PwR p;
+  const Signal duty = test_support::chirp(0.15, 0.2, 1.0, 6.0, 1.0);
+  p.frame.delay_samples = 2.25;
+  const Signal late = run(p, duty, 8.0);
+  p.frame.delay_samples = 0.0;
+  Signal mixed(duty.size(), 0.0);
+  const auto at = [&](std::size_t k, std::size_t ago) { return k >= ago ? duty[k - ago] : 0.0; };
+  for (std::size_t k = 0; k < duty.size(); ++k)
+    mixed[k] = at(k, 2) + 0.25 * (at(k, 3) - at(k, 2));
+  EXPECT_EQ(late, run(p, mixed, 8.0));
+}
+
 TEST(PseudoWienerPwR, MeasuredSwitchingKeepsItsSideInsideTheDeadBandAndHandsOverWithoutABump) {
   PwR p;
   p.switching = Switching::measured;
@@ -137,29 +184,29 @@ TEST(PseudoWienerPwR, MeasuredSwitchingKeepsItsSideInsideTheDeadBandAndHandsOver
   const PwRModel model(p);
   PwRState s = model.at_rest(12.0, 0.0);
   s.bias_duty = 0.05;
-  const Anchor reset{.angle_gain = 1.0, .speed_gain_per_s = 0.0, .bias_gain_duty_per_deg = 0.0};
-  model.reanchor(s, 7.8, reset);
+  const ObserverGains reset{.angle_gain = 1.0, .speed_gain_per_s = 0.0, .bias_gain_duty_per_deg = 0.0};
+  model.correct(s, 7.8, reset);
   EXPECT_EQ(s.above, 1.0);
-  model.reanchor(s, 7.6, reset);
+  model.correct(s, 7.6, reset);
   EXPECT_EQ(s.above, -1.0);
   EXPECT_NEAR(model.output(s), 7.6, 1e-9);
   EXPECT_EQ(s.bias_duty, 0.05);
-  model.reanchor(s, 8.2, reset);
+  model.correct(s, 8.2, reset);
   EXPECT_EQ(s.above, -1.0);
-  model.reanchor(s, 8.4, reset);
+  model.correct(s, 8.4, reset);
   EXPECT_EQ(s.above, 1.0);
 }
 
-TEST(PseudoWienerPwR, ReanchoringFollowsTheStatedGains) {
+TEST(PseudoWienerPwR, CorrectionFollowsTheStatedGains) {
   const PwRModel model{PwR{}};
   PwRState s = model.at_rest(40.0, 0.0);
-  model.reanchor(s, 41.0, {});
+  model.correct(s, 41.0, {});
   EXPECT_DOUBLE_EQ(model.output(s), 40.35);
   EXPECT_DOUBLE_EQ(s.speed_deg_per_s, 35.0);
   EXPECT_DOUBLE_EQ(s.bias_duty, -0.004);
   for (int i = 0; i < 1000; ++i) {
     s.position_deg = 0.0;
-    model.reanchor(s, 60.0, {});
+    model.correct(s, 60.0, {});
   }
   EXPECT_DOUBLE_EQ(s.bias_duty, -0.4);
 }
@@ -230,29 +277,28 @@ PwP some_pw_p(int plays = 1) {
 }
 PwR smooth_pw_r() {
   PwR p;
-  p.friction = DryFriction::tanh;
+  p.friction = Friction::tanh;
   return p;
 }
 
 template <class P>
 void expect_exact_move_slopes(const P& p) {
   const auto model = model_of(p);
-  const auto dual = model_of(lift<Dual<3>>(p));
   auto state = model.at_rest(30.0, 0.2);
   for (int i = 0; i < 50; ++i)
-    model.advance(state, 0.3);
+    model.step(state, 0.3);
   const std::array<double, 3> moves{0.35, 0.1, 0.3};
   const std::array<int, 3> lengths{8, 12, 20};
   std::vector<double> y(40), up(40), down(40);
   std::vector<std::array<double, 3>> slope(40), ignored(40);
-  predict_moves<3>(dual, state, moves, lengths, y, slope);
+  dynamics::predict<3>(model, state, moves, lengths, y, slope);
   for (std::size_t m = 0; m < 3; ++m) {
     auto plus = moves;
     auto minus = moves;
     plus[m] += 1e-6;
     minus[m] -= 1e-6;
-    predict_moves<3>(dual, state, plus, lengths, up, ignored);
-    predict_moves<3>(dual, state, minus, lengths, down, ignored);
+    dynamics::predict<3>(model, state, plus, lengths, up, ignored);
+    dynamics::predict<3>(model, state, minus, lengths, down, ignored);
     for (std::size_t k = 0; k < 40; ++k)
       ASSERT_NEAR(slope[k][m], (up[k] - down[k]) / 2e-6, 1e-4 * (1.0 + std::abs(slope[k][m]))) << m << " " << k;
   }
@@ -275,8 +321,7 @@ void expect_exact_parameter_slopes(const P& p, std::size_t number, double step) 
   const auto model = model_of(seeded);
   auto state = model.at_rest(Dual<1>(20.0), Dual<1>(0.0));
   std::vector<Dual<1>> y(duty.size());
-  std::vector<Dual<1>> u(duty.begin(), duty.end());
-  simulate(model, state, std::span<const Dual<1>>(u), std::span<Dual<1>>(y));
+  dynamics::simulate(model, state, std::span<const double>(duty), std::span<Dual<1>>(y));
   P up = p;
   P down = p;
   *numbers(up)[number] += step;
@@ -323,7 +368,7 @@ void expect_equal_lanes(const P& p) {
     const L y = model.output(state);
     for (std::size_t i = 0; i < 4; ++i)
       ASSERT_EQ(y[static_cast<int>(i)], plain[i][k]) << k;
-    model.advance(state, L(duty[k]));
+    model.step(state, L(duty[k]));
   }
 }
 
@@ -336,7 +381,7 @@ TEST(PseudoWienerLanes, HoldTheBitsOfThePlainCode) {
 
 template <class M>
 constexpr bool cannot_throw =
-    noexcept(std::declval<const M&>().advance(std::declval<typename M::State&>(), std::declval<M>().output({}))) &&
+    noexcept(std::declval<const M&>().step(std::declval<typename M::State&>(), std::declval<M>().output({}))) &&
     noexcept(std::declval<const M&>().output(std::declval<const typename M::State&>()));
 static_assert(cannot_throw<PwRModel> && cannot_throw<PwWModel> && cannot_throw<PwPModel>);
 static_assert(cannot_throw<BasicPwRModel<Dual<5>>> && cannot_throw<BasicPwWModel<Dual<5>>> &&
@@ -349,8 +394,8 @@ std::size_t allocations(const P& p) {
   const auto model = model_of(lift<T>(p));
   auto state = model.at_rest(T(20.0), T(0.1));
   for (int k = 0; k < 50; ++k) {
-    model.advance(state, T(0.3));
-    model.reanchor(state, T(21.0), {});
+    model.step(state, T(0.3));
+    model.correct(state, T(21.0), {});
   }
   volatile double sink = 0.0;
   if constexpr (std::is_same_v<T, double>) sink = model.output(state);
@@ -366,8 +411,8 @@ TEST(PseudoWienerRealTime, NothingIsAllocatedInAnyKindAndOption) {
     EXPECT_EQ((allocations<Lanes<4>>(p)), 0u);
     ++variants;
   };
-  for (const int delay : {0, 5}) {
-    for (const auto friction : {DryFriction::set_valued, DryFriction::tanh}) {
+  for (const double delay : {0.0, 2.5, 5.0}) {
+    for (const auto friction : {Friction::coulomb, Friction::tanh}) {
       for (const auto switching : {Switching::predicted, Switching::measured}) {
         PwR p;
         p.frame.delay_samples = delay;
@@ -389,7 +434,7 @@ TEST(PseudoWienerRealTime, NothingIsAllocatedInAnyKindAndOption) {
       }
     }
   }
-  EXPECT_EQ(variants, 20);
+  EXPECT_EQ(variants, 30);
 }
 
 // --- the others -----------------------------------------------------------------------------------------------
@@ -408,18 +453,18 @@ TEST(PseudoWienerStart, TheInverseMapGivesTheAngle) {
 TEST(PseudoWienerStart, AFullOffsetGainGivesMeasuredPlusTheSimulatedDifference) {
   const PwWModel model(some_pw_w());
   auto free = model.at_rest(20.0, 0.0);
-  auto anchored = free;
+  auto corrected = free;
   for (int k = 0; k < 100; ++k) {
-    model.advance(free, 0.4);
-    model.advance(anchored, 0.4);
+    model.step(free, 0.4);
+    model.step(corrected, 0.4);
   }
   const double before = model.output(free);
-  model.reanchor(anchored, 33.0, {});
+  model.correct(corrected, 33.0, {});
   for (int k = 0; k < 20; ++k) {
-    model.advance(free, 0.1);
-    model.advance(anchored, 0.1);
+    model.step(free, 0.1);
+    model.step(corrected, 0.1);
   }
-  EXPECT_NEAR(model.output(anchored), 33.0 + model.output(free) - before, 1e-12);
+  EXPECT_NEAR(model.output(corrected), 33.0 + model.output(free) - before, 1e-12);
 }
 
 TEST(PseudoWienerChecks, NameFieldValueAndBound) {
@@ -447,7 +492,7 @@ TEST(PseudoWienerChecks, NameFieldValueAndBound) {
   w.rise_deg[2] = -1.0;
   EXPECT_EQ(message(w), "rise_3_deg = -1 deg: must be in [0, 5000]");
   w = some_pw_w();
-  w.frame.delay_samples = 6;
+  w.frame.delay_samples = 6.0;
   EXPECT_EQ(message(w), "delay_samples = 6: must be in [0, 5]");
 }
 

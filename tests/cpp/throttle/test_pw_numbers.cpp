@@ -1,6 +1,8 @@
 // Numbers, bounds, scalars and the variant of the pseudo-Wiener models: nothing is exchanged and nothing is lost.
 #include <gtest/gtest.h>
 
+#include "mgdd/dynamics/simulate.hpp"
+
 #include <array>
 #include <cmath>
 #include <limits>
@@ -93,13 +95,13 @@ TEST(PseudoWienerNumbers, SettingsOutsideTheirBoundsAreNamed) {
   refused(asymmetric_pw_w(), [](PwW& p) { p.knot_upper_duty = -0.27; }, "must be above knot_lower_duty");
   refused(asymmetric_pw_w(), [](PwW& p) { p.knot_lower_duty = -1.1; }, "knot_lower_duty = -1.1");
   refused(asymmetric_pw_p(), [](PwP& p) { p.plays = 0; }, "plays = 0");
-  for (const auto& [member, name] : {std::pair{&Anchor::angle_gain, "angle_gain"},
-                                     {&Anchor::speed_gain_per_s, "speed_gain_per_s"},
-                                     {&Anchor::bias_gain_duty_per_deg, "bias_gain_duty_per_deg"},
-                                     {&Anchor::bias_limit_duty, "bias_limit_duty"},
-                                     {&Anchor::offset_gain, "offset_gain"}}) {
-    refused(Anchor{}, [member = member](Anchor& a) { a.*member = -0.1; }, std::string(name) + " = -0.1");
-    refused(Anchor{}, [member = member](Anchor& a) { a.*member = 2e4; }, std::string(name) + " = 20000");
+  for (const auto& [member, name] : {std::pair{&ObserverGains::angle_gain, "angle_gain"},
+                                     {&ObserverGains::speed_gain_per_s, "speed_gain_per_s"},
+                                     {&ObserverGains::bias_gain_duty_per_deg, "bias_gain_duty_per_deg"},
+                                     {&ObserverGains::bias_limit_duty, "bias_limit_duty"},
+                                     {&ObserverGains::offset_gain, "offset_gain"}}) {
+    refused(ObserverGains{}, [member = member](ObserverGains& a) { a.*member = -0.1; }, std::string(name) + " = -0.1");
+    refused(ObserverGains{}, [member = member](ObserverGains& a) { a.*member = 2e4; }, std::string(name) + " = 20000");
   }
 }
 
@@ -121,16 +123,16 @@ TEST(PseudoWienerLift, KeepsEveryNumberAndState) {
     const auto dual = model_of(lift<Dual<2>>(p));
     auto s = plain.at_rest(30.0, 0.1);
     for (int k = 0; k < 40; ++k)
-      plain.advance(s, 0.4 * std::sin(0.3 * k));
-    auto d = lift<Dual<2>>(s);
+      plain.step(s, 0.4 * std::sin(0.3 * k));
+    auto d = dynamics::lifted<std::remove_const_t<decltype(dual)>>(s);
     for (int k = 0; k < 60; ++k) {
-      plain.advance(s, -0.35 + 0.01 * k);
-      dual.advance(d, Dual<2>(-0.35 + 0.01 * k));
+      plain.step(s, -0.35 + 0.01 * k);
+      dual.step(d, Dual<2>(-0.35 + 0.01 * k));
       ASSERT_NEAR(dual.output(d).value, plain.output(s), 1e-10) << k;
     }
   };
   for (const Switching switching : {Switching::predicted, Switching::measured}) {
-    for (const DryFriction friction : {DryFriction::set_valued, DryFriction::tanh}) {
+    for (const Friction friction : {Friction::coulomb, Friction::tanh}) {
       PwR p = asymmetric_pw_r();
       p.switching = switching;
       p.friction = friction;
@@ -152,9 +154,13 @@ TEST(PseudoWienerPrediction, EntryJIsTheAngleAfterDutyJ) {
   const auto start = model.at_rest(30.0, 0.1);
   const Signal duty{0.3, -0.2, 0.4, 0.1, 0.35};
   Signal ahead(5), run(5);
-  predict(model, start, std::span<const double>(duty), std::span<double>(ahead));
+  auto later = start;
+  for (std::size_t k = 0; k < 5; ++k) {
+    model.step(later, duty[k]);
+    ahead[k] = model.output(later);
+  }
   auto s = start;
-  simulate(model, s, std::span<const double>(duty), std::span<double>(run));
+  dynamics::simulate(model, s, std::span<const double>(duty), std::span<double>(run));
   EXPECT_EQ(run[0], model.output(start));
   for (std::size_t k = 0; k + 1 < 5; ++k)
     EXPECT_EQ(run[k + 1], ahead[k]);

@@ -1,6 +1,8 @@
 // PW-R against its equations, written once more, with parameters that differ from their defaults and from side to side.
 #include <gtest/gtest.h>
 
+#include "mgdd/dynamics/simulate.hpp"
+
 #include <algorithm>
 #include <array>
 #include <cmath>
@@ -58,7 +60,7 @@ TEST(PwRGroups, RunAsThePlantDoesOnBothSides) {
   simulate(ThrottlePlant(t), {.duty = duty}, 10, state, {.angle_deg = plant});
   const PwRModel prepared(p);
   PwRState start = prepared.at_rest(25.0, 0.0);
-  simulate(prepared, start, std::span<const double>(duty), std::span<double>(model));
+  dynamics::simulate(prepared, start, std::span<const double>(duty), std::span<double>(model));
   double worst = 0.0;
   for (std::size_t k = 0; k < duty.size(); ++k)
     worst = std::max(worst, std::abs(plant[k] - model[k]));
@@ -92,11 +94,12 @@ double acceleration(const PwR& p, const PwRState& s, double duty, double next, d
 TEST(PwREquations, HoldInEveryStepOnBothSides) {
   int holds = 0, slides = 0, ramped = 0, below = 0, stopped = 0;
   for (const Switching switching : {Switching::predicted, Switching::measured}) {
-    for (const DryFriction friction : {DryFriction::set_valued, DryFriction::tanh}) {
+    for (const Friction friction : {Friction::coulomb, Friction::tanh}) {
       PwR p = asymmetric_pw_r();
       p.switching = switching;
       p.friction = friction;
       const double h = p.frame.sample_s / p.frame.substeps;
+      p.frame = {.closed_deg = p.frame.closed_deg, .open_deg = p.frame.open_deg, .sample_s = h, .substeps = 1};
       const PwRModel model(p);
       for (std::uint64_t k = 0; k < 4000; ++k) {
         PwRState s = model.at_rest(draw(8 * k, 1.5, 84.0), 0.0);
@@ -122,7 +125,7 @@ TEST(PwREquations, HoldInEveryStepOnBothSides) {
         }
         below += up ? 0 : 1;
         ramped += std::abs(from.position_deg) < p.ramp_deg ? 1 : 0;
-        if (friction == DryFriction::tanh) {
+        if (friction == Friction::tanh) {
           const double t = std::tanh(from.speed_deg_per_s / p.tanh_deg_per_s);
           const double slope = (1.0 - t * t) / p.tanh_deg_per_s;
           ASSERT_NEAR(rest(s.speed_deg_per_s), most * (t + slope * (s.speed_deg_per_s - from.speed_deg_per_s)), 1e-5);
@@ -144,14 +147,19 @@ TEST(PwREquations, HoldInEveryStepOnBothSides) {
 TEST(PwREquations, OneSampleIsItsStepsOfTheDelayedDuty) {
   const PwR p = asymmetric_pw_r();
   const PwRModel model(p);
+  PwR third = p;
+  third.frame.sample_s = p.frame.sample_s / 3.0;
+  third.frame.substeps = 1;
+  third.frame.delay_samples = 0.0;
+  const PwRModel one_step(third);
   PwRState whole = model.at_rest(30.0, 0.05);
   PwRState parts = whole;
   const std::array<double, 6> duty{0.3, -0.2, 0.45, 0.1, -0.4, 0.25};
   const std::array<double, 6> acting{0.05, 0.05, 0.3, -0.2, 0.45, 0.1};
   for (std::size_t k = 0; k < 6; ++k) {
-    model.advance(whole, duty[k]);
+    model.step(whole, duty[k]);
     for (int i = 0; i < 3; ++i)
-      step(p, parts, acting[k], p.frame.sample_s / 3.0);
+      one_step.step(parts, acting[k]);
     EXPECT_EQ(whole.position_deg, parts.position_deg) << k;
     EXPECT_EQ(whole.speed_deg_per_s, parts.speed_deg_per_s) << k;
   }
@@ -168,11 +176,11 @@ TEST(PwREquations, EachSideHasItsOwnMapAndStop) {
   }
   PwRState s = model.at_rest(40.0, 0.0);
   for (int k = 0; k < 300; ++k)
-    model.advance(s, 1.0);
+    model.step(s, 1.0);
   EXPECT_NEAR(model.output(s), 84.0, 1e-9);
   EXPECT_EQ(s.speed_deg_per_s, 0.0);
   for (int k = 0; k < 300; ++k)
-    model.advance(s, -1.0);
+    model.step(s, -1.0);
   EXPECT_NEAR(model.output(s), 1.5, 1e-9);
   EXPECT_EQ(model.at_rest(50.0, 0.2).above, 1.0);
   EXPECT_EQ(model.at_rest(5.0, 0.2).above, -1.0);
@@ -181,7 +189,7 @@ TEST(PwREquations, EachSideHasItsOwnMapAndStop) {
 TEST(PwREquations, ACorrectionPullsEveryStateItsWayAndNoFurtherThanAllowed) {
   const PwR p = asymmetric_pw_r();
   const PwRModel model(p);
-  const Anchor gains{
+  const ObserverGains gains{
       .angle_gain = 0.4, .speed_gain_per_s = 21.0, .bias_gain_duty_per_deg = 0.007, .bias_limit_duty = 0.03};
   for (const double error : {2.0, -3.0}) {
     PwRState s = model.at_rest(40.0, 0.0);
@@ -189,25 +197,25 @@ TEST(PwREquations, ACorrectionPullsEveryStateItsWayAndNoFurtherThanAllowed) {
     s.bias_duty = 0.002;
     const double x = s.position_deg;
     const double target = model.at_rest(40.0 + error, 0.0).position_deg - x;  // error of the position behind the map
-    model.reanchor(s, 40.0 + error, gains);
+    model.correct(s, 40.0 + error, gains);
     EXPECT_NEAR(s.position_deg, x + 0.4 * target, 1e-9);
     EXPECT_NEAR(s.speed_deg_per_s, 5.0 + 21.0 * target, 1e-9);
     EXPECT_NEAR(s.bias_duty, 0.002 - 0.007 * target, 1e-12);
     for (int i = 0; i < 20; ++i) {
       s.position_deg = x;
-      model.reanchor(s, 40.0 + error, gains);
+      model.correct(s, 40.0 + error, gains);
     }
     EXPECT_DOUBLE_EQ(s.bias_duty, error > 0.0 ? -0.03 : 0.03);
   }
-  const Anchor full{.angle_gain = 1.0};
+  const ObserverGains full{.angle_gain = 1.0};
   PwRState s = model.at_rest(40.0, 0.0);
-  model.reanchor(s, 95.0, full);
+  model.correct(s, 95.0, full);
   EXPECT_NEAR(model.output(s), 84.0, 1e-9) << "inside the travel";
-  model.reanchor(s, -9.0, full);
+  model.correct(s, -9.0, full);
   EXPECT_NEAR(model.output(s), 1.5, 1e-9);
   for (const auto& [angle, side] :
        {std::pair{13.46, 1.0}, {13.44, 1.0}, {12.56, 1.0}, {12.54, -1.0}, {13.44, -1.0}, {13.46, 1.0}}) {
-    model.reanchor(s, angle, full);
+    model.correct(s, angle, full);
     EXPECT_EQ(s.above, side) << angle;
   }
 }

@@ -43,7 +43,7 @@ TEST(PwWEquations, TwoLagsAndADelayStandBeforeTheMap) {
     const double acting = sent[sent.size() - 3];
     first += (1.0 - std::exp(-2e-3 / 0.031)) * (acting - first);
     second += (1.0 - std::exp(-2e-3 / 0.11)) * (first - second);
-    model.advance(s, duty);
+    model.step(s, duty);
     ASSERT_NEAR(s.first_duty, first, 1e-12);
     ASSERT_NEAR(s.second_duty, second, 1e-12);
     ASSERT_NEAR(model.output(s), model.map(second), 1e-9);
@@ -62,20 +62,22 @@ TEST(PwWEquations, AStartOnTheMapIsTheLowestPlaceWithThatAngle) {
     EXPECT_EQ(s.line.before[1], 0.3);
   }
   EXPECT_NEAR(model.at_rest(7.5, 0.0).second_duty, -0.27 + 2.0 * 0.13, 1e-6);
+  EXPECT_EQ(model.at_rest(-5.0, 0.0).second_duty, -0.27) << "beyond the map: its end";
+  EXPECT_EQ(model.at_rest(99.0, 0.0).second_duty, 0.51);
 }
 
 TEST(PwWEquations, ACorrectionMovesTheOffsetByItsShare) {
   const PwWModel w(asymmetric_pw_w());
   auto s = w.at_rest(20.0, 0.0);
   const double before = w.output(s);
-  w.reanchor(s, before + 4.0, {.offset_gain = 0.3});
+  w.correct(s, before + 4.0, {.offset_gain = 0.3});
   EXPECT_NEAR(w.output(s), before + 1.2, 1e-12);
-  w.reanchor(s, before, {.offset_gain = 0.5});
+  w.correct(s, before, {.offset_gain = 0.5});
   EXPECT_NEAR(w.output(s), before + 0.6, 1e-12);
   const PwPModel p(asymmetric_pw_p());
   auto q = p.at_rest(20.0, 0.0);
   EXPECT_NEAR(p.output(q), 13.0 + 3.0, 1e-12);
-  p.reanchor(q, 20.0, {.offset_gain = 0.3});
+  p.correct(q, 20.0, {.offset_gain = 0.3});
   EXPECT_NEAR(p.output(q), 16.0 + 1.2, 1e-12);
 }
 
@@ -99,7 +101,7 @@ TEST(PwPEquations, PlaysAddUpBehindTheLags) {
       played[i] = std::clamp(played[i], second - p.radius_duty[i], second + p.radius_duty[i]);
       angle += p.gain_deg_per_duty[i] * played[i];
     }
-    model.advance(s, duty);
+    model.step(s, duty);
     ASSERT_NEAR(model.output(s), std::clamp(angle, 1.5, 84.0), 1e-9) << k;
     at_stop = at_stop || angle < 1.5 || angle > 84.0;
   }

@@ -89,16 +89,16 @@ TEST(ThrottleNumbers, DefaultsOfThePseudoWienerModels) {
   EXPECT_EQ(r.tanh_deg_per_s, 30.0);
   EXPECT_EQ(r.dead_band_deg, 0.3);
   EXPECT_EQ(r.switching, Switching::predicted);
-  EXPECT_EQ(r.friction, DryFriction::set_valued);
+  EXPECT_EQ(r.friction, Friction::coulomb);
   const PseudoWienerFrame frame{
       .closed_deg = 0.0, .open_deg = 90.0, .sample_s = 1e-3, .substeps = 2, .delay_samples = 0};
   EXPECT_EQ(r.frame, frame);
-  const Anchor anchor{.angle_gain = 0.35,
-                      .speed_gain_per_s = 35.0,
-                      .bias_gain_duty_per_deg = 0.004,
-                      .bias_limit_duty = 0.4,
-                      .offset_gain = 1.0};
-  EXPECT_EQ(Anchor{}, anchor);
+  const ObserverGains anchor{.angle_gain = 0.35,
+                             .speed_gain_per_s = 35.0,
+                             .bias_gain_duty_per_deg = 0.004,
+                             .bias_limit_duty = 0.4,
+                             .offset_gain = 1.0};
+  EXPECT_EQ(ObserverGains{}, anchor);
   const PwW w;
   EXPECT_EQ(w.first_s, 0.05);
   EXPECT_EQ(w.second_s, 0.5);
@@ -253,19 +253,23 @@ TEST(ThrottleNumbers, TheClosingTorqueOfTheAirIsTheLineThroughItsTable) {
 TEST(SmoothPlant, SolvesItsEquations) {
   const SmoothPlant plant{.inertia_kgm2 = 3e-3, .gear_ratio = 17.0, .inductance_h = 2e-3, .supply_v = 13.0};
   const std::array<double, 10> p{0.016, 4e-3, 0.12, 0.5, 0.13, 0.25, 0.02, 0.14, 0.018, 1.2};
+  const auto c = plant.coefficients(p);
   for (const double away : {-0.05, -0.01, 0.01, 0.2}) {
     for (const double speed : {-3.0, -0.2, 0.4, 2.0}) {
       const std::array<double, 3> x{0.14 + away, speed, 0.7};
-      const auto dx = plant.derivative(p, x, {0.3});
+      const auto dx = plant.derivative(c, x, std::array<double, 1>{0.3});
       const double torque = 17.0 * 0.016 * 0.7 - 4e-3 * speed - 0.12 * std::tanh(speed / 0.5) - 0.13 * away -
                             0.25 * std::tanh(away / 0.02);
       EXPECT_NEAR(dx[0], speed, 1e-15);
       EXPECT_NEAR(dx[1], torque / 3e-3, 1e-9);
       EXPECT_NEAR(dx[2], (13.0 * 0.3 - 1.2 * 0.7 - 17.0 * 0.018 * speed) / 2e-3, 1e-9);
-      EXPECT_NEAR(plant.output(p, x, {0.3}), (0.14 + away) * 180.0 / M_PI, 1e-12);
+      EXPECT_NEAR(plant.output(c, x), (0.14 + away) * 180.0 / M_PI, 1e-12);
     }
   }
   EXPECT_EQ(SmoothPlant{}, (SmoothPlant{2e-3, 20.0, 1e-3, 12.0}));
+  EXPECT_EQ(SmoothPlant::n_states, 3);
+  EXPECT_EQ(SmoothPlant::n_inputs, 1);
+  EXPECT_EQ(SmoothPlant::n_parameters, 10);
 }
 
 }  // namespace

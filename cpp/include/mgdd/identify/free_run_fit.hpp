@@ -1,5 +1,5 @@
-// Fit of a step model to measured records by its free run: names and bounds come from the model, unknowns are named.
-// Units are the model's own. Desk-time: allocates and throws. The search is optimize/least_squares.hpp.
+// Fit of a model family to measured records by its free run: names and bounds come from the family, unknowns are named.
+// Units are the model's own. Allocates and throws. The search is optimize/least_squares.hpp.
 #pragma once
 
 #include <algorithm>
@@ -15,20 +15,20 @@
 #include "mgdd/common/error.hpp"
 #include "mgdd/common/field.hpp"
 #include "mgdd/identify/output_error.hpp"
-#include "mgdd/identify/step_model.hpp"
 #include "mgdd/optimize/least_squares/least_squares.hpp"
 
 namespace mgdd::identify {
 
+/// What a fit of free runs gives back.
 struct FreeRunFit {
   optimize::FitReport report;
   std::vector<double> parameters;            ///< all of them, the fixed ones included
-  std::vector<std::vector<double>> starts;   ///< state at the first sample of every record
+  std::vector<std::vector<double>> starts;   ///< start numbers of every record
   std::vector<std::vector<double>> outputs;  ///< free run on every sample of every record
 };
 
-/// Place of a parameter or state; ParameterError that lists the names where there is none of that name.
-inline std::size_t field_index(std::span<const FieldInfo> fields, std::string_view name, std::string_view what) {
+template <class Fields>
+std::size_t field_index(const Fields& fields, std::string_view name, std::string_view what) {
   const auto found = std::ranges::find(fields, name, &FieldInfo::name);
   if (found != fields.end()) return static_cast<std::size_t>(found - fields.begin());
   std::string known;
@@ -39,7 +39,7 @@ inline std::size_t field_index(std::span<const FieldInfo> fields, std::string_vi
 
 /// Throws ParameterError for an unknown name or a value outside its bounds, ShapeError for records that do not fit. An
 /// empty `free` fits the free start states alone.
-template <StepModel Model>
+template <dynamics::DescribedFamily Model>
 FreeRunFit fit_free_run(const Model& model, const std::vector<double>& base, const std::vector<std::string>& free,
                         std::vector<SimulationRecord> records, const optimize::LeastSquaresOptions& options) {
   Values<double, Model::n_parameters> parameters{};
@@ -48,7 +48,8 @@ FreeRunFit fit_free_run(const Model& model, const std::vector<double>& base, con
                      std::to_string(parameters.size()));
   }
   for (std::size_t i = 0; i < parameters.size(); ++i) {
-    require_in(Model::parameters[i].domain, Model::parameters[i].name, base[i]);
+    const FieldInfo& domain = Model::parameters[i];
+    require_in(domain, base[i]);
     parameters[i] = base[i];
   }
   std::vector<std::size_t> indices;
@@ -60,44 +61,43 @@ FreeRunFit fit_free_run(const Model& model, const std::vector<double>& base, con
   }
   for (std::size_t r = 0; r < records.size(); ++r) {
     for (const std::size_t s : records[r].free_start) {
-      if (s >= Model::states.size()) throw ShapeError("free_start: no such state");
-      const FieldInfo& state = Model::states[s];
+      if (s >= Model::start_numbers.size()) throw ShapeError("free_start: no such state");
+      const FieldInfo& state = Model::start_numbers[s];
       const std::string suffix = records.size() > 1 ? "_" + std::to_string(r) : "";
       unknowns.push_back(optimize::parameter_of(state, "start_" + std::string(state.name) + suffix));
     }
   }
-  SimulationResidual<Model> residual(model, parameters, std::move(indices), std::move(records));
+  OutputError<Model> residual(model, parameters, std::move(indices), std::move(records));
   optimize::LeastSquares search(std::move(unknowns), residual.n_residuals(), options);
   FreeRunFit fit;
   fit.report = search.solve(residual, residual.start());
   const auto found = residual.parameters(fit.report.values);
   fit.parameters.assign(found.begin(), found.end());
   for (std::size_t r = 0; r < residual.records().size(); ++r) {
-    const auto start = residual.start_state(r, fit.report.values);
+    const auto start = residual.start_numbers(r, fit.report.values);
     fit.starts.emplace_back(start.begin(), start.end());
     fit.outputs.push_back(residual.simulate(r, fit.report.values));
   }
   return fit;
 }
 
-/// Free run of `input` from `start`: the output at every sample.
-template <StepModel Model>
-std::vector<double> free_run(const Model& model, const std::vector<double>& parameters,
+/// Free run of `input` from the start numbers `start`: the output at every sample.
+template <dynamics::ModelFamily Family>
+std::vector<double> free_run(const Family& family, const std::vector<double>& parameters,
                              const std::vector<double>& start, const std::vector<double>& input, double dt_s) {
-  Values<double, Model::n_parameters> p{};
-  Values<double, Model::n_states> state{};
-  if (parameters.size() != p.size() || start.size() != state.size()) {
-    throw ShapeError("free run: " + std::to_string(p.size()) + " parameters and " + std::to_string(state.size()) +
+  Values<double, Family::n_parameters> p{};
+  Values<double, Family::n_start> stated{};
+  if (parameters.size() != p.size() || start.size() != stated.size()) {
+    throw ShapeError("free run: " + std::to_string(p.size()) + " parameters and " + std::to_string(stated.size()) +
                      " start values are needed");
   }
+  require_positive("dt_s", dt_s, "s");
   std::ranges::copy(parameters, p.begin());
-  std::ranges::copy(start, state.begin());
+  std::ranges::copy(start, stated.begin());
+  const auto model = family.template prepare<double>(p, dt_s);
+  auto state = family.template start<double>(model, stated);
   std::vector<double> output(input.size());
-  for (std::size_t k = 0; k < input.size(); ++k) {
-    const Values<double, 1> u = {input[k]};
-    output[k] = model.template output<double>(p, state, u);
-    state = model.template step<double>(p, state, u, dt_s);
-  }
+  dynamics::simulate(model, state, std::span<const double>(input), std::span<double>(output));
   return output;
 }
 

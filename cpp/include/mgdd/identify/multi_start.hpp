@@ -55,7 +55,7 @@ struct FitStage {
 
 /// Stages one after the other, each from where the last one ended. `parameters` describes every model parameter;
 /// `values` comes in as the start and goes out as the estimate. Returns the report of the last stage.
-template <StepModel Model>
+template <dynamics::ModelFamily Model>
 optimize::FitReport fit_in_stages(const Model& model, const std::vector<optimize::Parameter>& parameters,
                                   const std::vector<SimulationRecord>& records, const std::vector<FitStage>& stages,
                                   Values<double, Model::n_parameters>& values) {
@@ -72,7 +72,7 @@ optimize::FitReport fit_in_stages(const Model& model, const std::vector<optimize
       SimulationRecord record = records[r];
       const auto n = static_cast<std::size_t>(std::llround(stage.fraction * static_cast<double>(record.output.size())));
       record.output.resize(n);
-      record.input.resize(n * static_cast<std::size_t>(Model::n_inputs));
+      record.input.resize(n * input_size<dynamics::FamilyModel<Model, double>>());
       if (!record.weight.empty()) record.weight.resize(n);
       chosen.push_back(std::move(record));
     }
@@ -83,10 +83,11 @@ optimize::FitReport fit_in_stages(const Model& model, const std::vector<optimize
       for (const std::size_t s : chosen[r].free_start)
         unknowns.push_back({.name = "start_" + std::to_string(s) + "[" + std::to_string(r) + "]"});
     }
-    SimulationResidual<Model> residual(model, values, stage.free, std::move(chosen));
+    OutputError<Model> residual(model, values, stage.free, std::move(chosen));
     optimize::LeastSquares search(unknowns, residual.n_residuals(), stage.search);
     report = search.solve(residual, residual.start());
     values = residual.parameters(report.values);
+    if (report.status == optimize::FitStatus::interrupted) break;
   }
   return report;
 }

@@ -30,9 +30,9 @@ void require_match(const EngineBench& bench, const S& seeker) {
   require_match(bench, seeker.estimate(), seeker.component_count(), seeker.settings().limits);
 }
 
-/// One cycle; a new operating point restarts the seeker before it asks.
-template <optimize::AnySeeker S>
-LoopCycle loop_step(EngineBench& bench, S& seeker) noexcept {
+/// One cycle; a new operating point restarts the seeker before it asks. Noexcept as the seeker's `tell` is.
+template <class S>
+LoopCycle loop_step(EngineBench& bench, S& seeker) noexcept(noexcept(seeker.tell(optimize::Reading{}))) {
   if (bench.point_changes_at(bench.cycle())) seeker.restart();
   LoopCycle out;
   out.estimate_cad = seeker.estimate()[0];

@@ -5,6 +5,7 @@
 
 #include <array>
 #include <cmath>
+#include <concepts>
 #include <cstddef>
 #include <cstdint>
 
@@ -76,7 +77,8 @@ template <int N>
 MGDD_INLINE Lanes<N> select(const LaneMask<N>& mask, const Lanes<N>& yes, const Lanes<N>& no) noexcept {
   return Lanes<N>(mask.bits ? yes.v : no.v);
 }
-MGDD_INLINE double select(bool condition, double yes, double no) noexcept {
+template <std::floating_point S>
+MGDD_INLINE S select(bool condition, S yes, S no) noexcept {
   return condition ? yes : no;
 }
 
@@ -93,10 +95,12 @@ template <int N>
 MGDD_INLINE Lanes<N> larger(const Lanes<N>& a, const Lanes<N>& b) noexcept {
   return select(a < b, b, a);
 }
-MGDD_INLINE double smaller(double a, double b) noexcept {
+template <std::floating_point S>
+MGDD_INLINE S smaller(S a, S b) noexcept {
   return b < a ? b : a;
 }
-MGDD_INLINE double larger(double a, double b) noexcept {
+template <std::floating_point S>
+MGDD_INLINE S larger(S a, S b) noexcept {
   return a < b ? b : a;
 }
 /// |magnitude| with the sign of `from`; zero counts as positive.
@@ -104,8 +108,9 @@ template <int N>
 MGDD_INLINE Lanes<N> with_sign(const Lanes<N>& magnitude, const Lanes<N>& from) noexcept {
   return select(from < Lanes<N>(0.0), -magnitude, magnitude);
 }
-MGDD_INLINE double with_sign(double magnitude, double from) noexcept {
-  return from < 0.0 ? -magnitude : magnitude;
+template <std::floating_point S>
+MGDD_INLINE S with_sign(S magnitude, S from) noexcept {
+  return from < S(0) ? -magnitude : magnitude;
 }
 
 /// A function of one number on every lane, for what has no vector instruction.
@@ -116,8 +121,8 @@ MGDD_INLINE Lanes<N> each(const Lanes<N>& a, Function function) noexcept {
     result.v[i] = function(a.v[i]);
   return result;
 }
-template <class Function>
-MGDD_INLINE double each(double a, Function function) noexcept {
+template <std::floating_point S, class Function>
+MGDD_INLINE S each(S a, Function function) noexcept {
   return function(a);
 }
 

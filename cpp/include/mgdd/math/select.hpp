@@ -2,51 +2,104 @@
 // follows the value, as the plain code does; the derivative is that of the branch taken.
 #pragma once
 
+#include <type_traits>
+
 #include "mgdd/math/dual.hpp"
 #include "mgdd/math/lanes.hpp"
 
 namespace mgdd {
 
-template <int N>
-constexpr Dual<N> select(bool condition, const Dual<N>& yes, const Dual<N>& no) noexcept {
+template <int N, class S>
+constexpr Dual<N, S> select(bool condition, const Dual<N, S>& yes, const Dual<N, S>& no) noexcept {
   return condition ? yes : no;
 }
-template <int N>
-constexpr Dual<N> smaller(const Dual<N>& a, const Dual<N>& b) noexcept {
+template <int N, class S>
+constexpr Dual<N, S> smaller(const Dual<N, S>& a, const Dual<N, S>& b) noexcept {
   return b < a ? b : a;
 }
-template <int N>
-constexpr Dual<N> larger(const Dual<N>& a, const Dual<N>& b) noexcept {
+template <int N, class S>
+constexpr Dual<N, S> larger(const Dual<N, S>& a, const Dual<N, S>& b) noexcept {
   return a < b ? b : a;
 }
 /// `magnitude`, negated where `from` is negative; zero counts as positive.
-template <int N>
-constexpr Dual<N> with_sign(const Dual<N>& magnitude, const Dual<N>& from) noexcept {
-  return from.value < 0.0 ? -magnitude : magnitude;
+template <int N, class S>
+constexpr Dual<N, S> with_sign(const Dual<N, S>& magnitude, const Dual<N, S>& from) noexcept {
+  return from.value < S(0) ? -magnitude : magnitude;
 }
 
-/// exp and tanh of double, Dual and Lanes under one name.
-inline double exp_of(double x) noexcept {
+/// The plain number under a dual; another scalar is its own.
+template <class T>
+struct PlainScalar {
+  using type = T;
+};
+template <int N, class S>
+struct PlainScalar<Dual<N, S>> {
+  using type = S;
+};
+
+/// A coefficient as the scalar of a state: itself where they are the same.
+template <class T, class C>
+MGDD_INLINE decltype(auto) widened(const C& c) noexcept {
+  if constexpr (std::is_same_v<T, C>) {
+    return (c);
+  } else {
+    return T(c);
+  }
+}
+
+/// A constant as a scalar, or in every element of a raw vector of the compiler.
+template <class T>
+MGDD_INLINE T constant_of(double value) noexcept {
+  if constexpr (std::is_class_v<T> || std::is_floating_point_v<T>) {
+    return T(value);
+  } else {
+    return T{} + value;
+  }
+}
+
+/// Functions of every scalar under one name.
+template <std::floating_point S>
+S exp_of(S x) noexcept {
   return std::exp(x);
 }
-template <int N>
-Dual<N> exp_of(const Dual<N>& x) noexcept {
-  return exp(x);
-}
-template <int N>
-Lanes<N> exp_of(const Lanes<N>& x) noexcept {
-  return each(x, [](double v) { return std::exp(v); });
-}
-inline double tanh_of(double x) noexcept {
+template <std::floating_point S>
+S tanh_of(S x) noexcept {
   return std::tanh(x);
 }
-template <int N>
-Dual<N> tanh_of(const Dual<N>& x) noexcept {
+template <std::floating_point S>
+S pow_of(S x, S exponent) noexcept {
+  return std::pow(x, exponent);
+}
+template <int N, class S>
+Dual<N, S> exp_of(const Dual<N, S>& x) noexcept {
+  return exp(x);
+}
+template <int N, class S>
+Dual<N, S> tanh_of(const Dual<N, S>& x) noexcept {
   return tanh(x);
 }
+template <int N, class S>
+Dual<N, S> pow_of(const Dual<N, S>& x, const Dual<N, S>& exponent) noexcept {
+  return pow(x, exponent);
+}
+template <int N, class S>
+Dual<N, S> pow_of(const Dual<N, S>& x, std::type_identity_t<S> exponent) noexcept {
+  return pow(x, exponent);
+}
 template <int N>
-Lanes<N> tanh_of(const Lanes<N>& x) noexcept {
+MGDD_INLINE Lanes<N> exp_of(const Lanes<N>& x) noexcept {
+  return each(x, [](double v) { return std::exp(v); });
+}
+template <int N>
+MGDD_INLINE Lanes<N> tanh_of(const Lanes<N>& x) noexcept {
   return each(x, [](double v) { return std::tanh(v); });
+}
+template <int N>
+MGDD_INLINE Lanes<N> pow_of(const Lanes<N>& x, const Lanes<N>& exponent) noexcept {
+  Lanes<N> result(0.0);
+  for (int i = 0; i < N; ++i)
+    result.v[i] = std::pow(x.v[i], exponent.v[i]);
+  return result;
 }
 
 }  // namespace mgdd

@@ -11,18 +11,11 @@
 
 #include "mgdd/common/enum_names.hpp"
 #include "mgdd/common/field.hpp"
+#include "mgdd/dynamics/dry_friction.hpp"
 
 namespace mgdd::throttle {
 
-/// Law of the dry friction; the viscous part is separate.
-enum class Friction {
-  coulomb,   ///< set-valued: sticks exactly, one level
-  stiction,  ///< set-valued, a higher level while it sticks
-  stribeck,  ///< set-valued, the level falls from stiction to Coulomb with speed
-  karnopp,   ///< sticks inside a speed band (Karnopp 1985)
-  tanh,      ///< smooth, for gradients only: it creeps under load
-  lugre,     ///< bristles: presliding displacement (Canudas de Wit et al. 1995)
-};
+using dynamics::Friction;
 /// Play between gear and plate.
 enum class Backlash {
   none,
@@ -112,6 +105,11 @@ void validate(const Throttle& throttle);
 
 /// Coefficient C_T of that torque over the opening [-]: none closed or wide open, largest near 75 deg.
 double airflow_coefficient(double angle_deg) noexcept;
+/// C_T with its slope.
+struct AirflowPoint {
+  double coefficient, slope_per_deg;
+};
+AirflowPoint airflow_point(double angle_deg) noexcept;
 
 /// Torque of the air flow [N m], closing, so <= 0: -D^3 dp C_T(angle) with C_T from a table over 0 to 90 deg.
 double airflow_torque_nm(const Throttle& throttle, double angle_deg) noexcept;

@@ -67,7 +67,7 @@ RecursivePwR::RecursivePwR(const RecursivePwRSettings& settings)
 UpdateGate RecursivePwR::update(double duty, double angle_deg) noexcept {
   const bool has_duty = std::isfinite(duty);
   const bool has_angle = std::isfinite(angle_deg);
-  const int delay = settings_.model.frame.delay_samples;
+  const dynamics::Delay delay = settings_.model.frame.delay();
   UpdateGate gate = has_duty && has_angle ? UpdateGate::filling : UpdateGate::not_finite;
   if (count_ % settings_.every == 0) {
     const double now = has_angle ? angle_deg - settings_.model.limp_home_deg : position_[2];
@@ -78,7 +78,7 @@ UpdateGate RecursivePwR::update(double duty, double angle_deg) noexcept {
     if (gate == UpdateGate::filling && count_ >= clean_from_ + 2 * settings_.every) gate = learn();
   }
   // A dropped sample keeps its place in time: a clock that stood still would turn the gap into a jump of the plate.
-  if (!has_duty) clean_from_ = std::max(clean_from_, count_ + delay + 1);
+  if (!has_duty) clean_from_ = std::max(clean_from_, count_ + delay.reach + 1);
   duty_sum_ += line_.pass(has_duty ? duty : 0.0, delay);
   ++count_;
   return gate;

@@ -7,6 +7,7 @@
 #include <Eigen/Dense>
 
 #include "mgdd/common/bounds.hpp"
+#include "mgdd/dynamics/simulate.hpp"
 #include "mgdd/identify/online/pw_r_factors.hpp"
 
 namespace mgdd::identify {
@@ -34,7 +35,7 @@ bool WindowPwR::update(double duty, double angle_deg) noexcept {
     if (point > 0) duty_[(point - 1) % points] = duty_sum_ / settings_.every;
     duty_sum_ = 0.0;
   }
-  duty_sum_ += line_.pass(last_duty_, settings_.model.frame.delay_samples);
+  duty_sum_ += line_.pass(last_duty_, settings_.model.frame.delay());
   ++count_;
   return adds && has_angle;
 }
@@ -42,7 +43,7 @@ bool WindowPwR::update(double duty, double angle_deg) noexcept {
 template <class T>
 throttle::BasicPwR<T> WindowPwR::seeded(const Column& z) const noexcept {
   auto p = with_factors<T>(settings_.model, z);
-  p.frame.delay_samples = 0;  // the window holds the duty that acts
+  p.frame.delay_samples = 0.0;  // the window holds the duty that acts
   p.frame.sample_s *= settings_.every;
   p.frame.substeps *= settings_.every;
   return p;
@@ -50,7 +51,7 @@ throttle::BasicPwR<T> WindowPwR::seeded(const Column& z) const noexcept {
 
 double WindowPwR::evaluate(const Column& z, Square* normal, Column* gradient) const noexcept {
   using D = Dual<unknowns>;
-  const auto model = throttle::model_of(seeded<D>(z));
+  const auto model = throttle::model_of(seeded<D>(z), throttle::unchecked);
   auto state = model.at_rest(D(settings_.model.limp_home_deg + z[5]), D(0.0));
   state.position_deg.grad[5] = 1.0;
   state.speed_deg_per_s = D::seeded(z[6], 6);
@@ -61,18 +62,20 @@ double WindowPwR::evaluate(const Column& z, Square* normal, Column* gradient) co
     normal->setZero();
     gradient->setZero();
   }
-  for (int i = 0; i < points; ++i) {
-    const std::int64_t at = (last + 1 + i) % points;
-    const D y = model.output(state);
-    const double r = (y.value - angle_[at]) * over_sigma;
-    if (known_[at] > 0.0) cost += r * r;
-    if (normal != nullptr && known_[at] > 0.0) {
-      const Eigen::Map<const Column> slope(y.grad.data());
-      *normal += slope * slope.transpose() * (over_sigma * over_sigma);
-      *gradient += slope * (r * over_sigma);
-    }
-    if (i + 1 < points) model.advance(state, D(duty_[at]));
-  }
+  const auto at = [&](std::size_t i) { return (last + 1 + static_cast<std::int64_t>(i)) % points; };
+  dynamics::run(
+      model, state, points, [&](std::size_t i) { return D(duty_[at(i)]); },
+      [&](std::size_t i, const D& y) {
+        if (!(known_[at(i)] > 0.0)) return true;
+        const double r = (y.value - angle_[at(i)]) * over_sigma;
+        cost += r * r;
+        if (normal != nullptr) {
+          const Eigen::Map<const Column> slope(y.grad.data());
+          *normal += slope * slope.transpose() * (over_sigma * over_sigma);
+          *gradient += slope * (r * over_sigma);
+        }
+        return true;
+      });
   const double weight = 1.0 / (settings_.prior_spread * settings_.prior_spread);
   for (int i = 0; i < 5; ++i) {
     cost += weight * z[i] * z[i];

@@ -9,6 +9,7 @@
 
 #include "mgdd/common/bounds.hpp"
 #include "mgdd/common/error.hpp"
+#include "mgdd/identify/output_error.hpp"
 #include "mgdd/math/latin_hypercube.hpp"
 #include "mgdd/optimize/least_squares/least_squares.hpp"
 
@@ -85,72 +86,42 @@ std::vector<PseudoWienerUnknown> unknowns(const PwP& p, const PseudoWienerFitOpt
   return by_name(PseudoWienerKind::pw_p, 3 + 2 * static_cast<std::size_t>(p.plays), o);
 }
 
-/// Residual model minus measured [deg] with its exact Jacobian.
+/// The five numbers of one side are one pass, those of both are another.
 template <class P>
-class Residual {
- public:
-  Residual(const std::vector<ThrottleRecord>& records, const P& base, const std::vector<PseudoWienerUnknown>& unknowns)
-      : records_(records), base_(base), unknowns_(unknowns) {}
+using Residual = OutputError<throttle::PseudoWienerFamily<P>, dynamics::Passes<5, 10>>;
 
-  bool operator()(const Eigen::VectorXd& x, Eigen::VectorXd& residual, Eigen::MatrixXd* jacobian) const noexcept {
-    if (jacobian == nullptr) return run<double>(x, 0, residual, nullptr);
-    bool finite = true;
-    const std::size_t n = unknowns_.size();
-    for (std::size_t first = 0; first < n && finite;) {
-      if (n - first <= 5) {
-        finite = run<Dual<5>>(x, first, residual, jacobian);
-        first += 5;
-      } else {
-        finite = run<Dual<10>>(x, first, residual, jacobian);
-        first += 10;
-      }
-    }
-    return finite;
+template <class P>
+Residual<P> residual_of(const std::vector<ThrottleRecord>& logs, const P& base,
+                        const std::vector<PseudoWienerUnknown>& unknowns) {
+  std::vector<SimulationRecord> records;
+  for (const ThrottleRecord& log : logs) {
+    records.push_back({.dt_s = base.frame.sample_s,
+                       .input = log.duty,
+                       .output = log.angle_deg,
+                       .start = {log.angle_deg.front()},
+                       .free_start = {},
+                       .weight = {}});
   }
+  std::vector<SharedNumbers> free;
+  for (const PseudoWienerUnknown& unknown : unknowns)
+    free.push_back(unknown.numbers);
+  typename Residual<P>::Parameters numbers{};
+  const auto places = throttle::numbers(base);
+  for (std::size_t i = 0; i < numbers.size(); ++i)
+    numbers[i] = *places[i];
+  return {{base}, numbers, std::move(free), std::move(records)};
+}
 
-  P at(const Eigen::VectorXd& x) const noexcept { return seeded<double>(x, 0); }
-
- private:
-  template <class T>
-  auto seeded(const Eigen::VectorXd& x, std::size_t first) const noexcept {
-    auto p = throttle::lift<T>(base_);
-    const auto places = throttle::numbers(p);
-    for (std::size_t i = 0; i < unknowns_.size(); ++i) {
-      T value(x[static_cast<Eigen::Index>(i)]);
-      if constexpr (is_dual_v<T>) {
-        if (i >= first && i - first < value.grad.size()) value.grad[i - first] = 1.0;
-      }
-      for (const std::size_t number : unknowns_[i].numbers)
-        *places[number] = value;
-    }
-    return p;
-  }
-
-  template <class T>
-  bool run(const Eigen::VectorXd& x, std::size_t first, Eigen::VectorXd& residual,
-           Eigen::MatrixXd* jacobian) const noexcept {
-    const auto model = throttle::model_of(seeded<T>(x, first));
-    Eigen::Index row = 0;
-    for (const ThrottleRecord& record : records_) {
-      auto state = model.at_rest(T(record.angle_deg.front()), T(0.0));
-      for (std::size_t k = 0; k < record.duty.size(); ++k, ++row) {
-        const T y = model.output(state);
-        residual[row] = value_of(y) - record.angle_deg[k];
-        if (!std::isfinite(residual[row])) return false;
-        if constexpr (is_dual_v<T>) {
-          for (std::size_t i = 0; i < y.grad.size() && first + i < unknowns_.size(); ++i)
-            (*jacobian)(row, static_cast<Eigen::Index>(first + i)) = y.grad[i];
-        }
-        model.advance(state, T(record.duty[k]));
-      }
-    }
-    return true;
-  }
-
-  const std::vector<ThrottleRecord>& records_;
-  P base_;
-  const std::vector<PseudoWienerUnknown>& unknowns_;
-};
+/// The model at the unknowns x.
+template <class P>
+P model_at(const Residual<P>& residual, const Eigen::VectorXd& x) {
+  P p = residual.family().base;
+  const auto numbers = residual.parameters(x);
+  const auto places = throttle::numbers(p);
+  for (std::size_t i = 0; i < numbers.size(); ++i)
+    *places[i] = numbers[i];
+  return p;
+}
 
 double between(double share, double lower, double upper) {
   return lower * std::pow(upper / lower, share);
@@ -164,14 +135,16 @@ Eigen::VectorXd inner_signal(const P& p, const std::vector<ThrottleRecord>& reco
   Eigen::Index row = 0;
   for (const ThrottleRecord& record : records) {
     auto state = model.at_rest(record.angle_deg.front(), 0.0);
-    for (const double duty : record.duty) {
-      if constexpr (std::is_same_v<P, PwP>) {
-        x[row++] = state.play_duty[0];
-      } else {
-        x[row++] = state.second_duty;
-      }
-      model.advance(state, duty);
-    }
+    dynamics::run(
+        model, state, record.duty.size(), [&](std::size_t k) { return record.duty[k]; },
+        [&](std::size_t, double) {
+          if constexpr (std::is_same_v<P, PwP>) {
+            x[row++] = state.play_duty[0];
+          } else {
+            x[row++] = state.second_duty;
+          }
+          return true;
+        });
   }
   return x;
 }
@@ -274,7 +247,7 @@ std::vector<PwP> starts(const PwP& base, const std::vector<ThrottleRecord>& reco
 template <class P>
 std::vector<P> variants(const P& base, const PseudoWienerFitOptions& o) {
   std::vector<P> out;
-  for (const int delay : o.delays) {
+  for (const double delay : o.delays) {
     P p = base;
     p.frame.delay_samples = delay;
     if constexpr (!std::is_same_v<P, PwR>) {
@@ -308,7 +281,7 @@ PseudoWienerFit fit(const std::vector<ThrottleRecord>& records, const P& base, c
   PseudoWienerFit best;
   double best_cost = std::numeric_limits<double>::infinity();
   for (const P& variant : variants(base, o)) {
-    const Residual<P> residual(records, variant, free);
+    Residual<P> residual = residual_of(records, variant, free);
     const std::vector<P> from = o.only_given_start ? std::vector<P>{variant} : starts(variant, records, n, o, o.starts);
     for (const P& start : from) {
       const auto values = throttle::numbers(start);
@@ -322,7 +295,7 @@ PseudoWienerFit fit(const std::vector<ThrottleRecord>& records, const P& base, c
       best.rmse_deg.push_back(usable ? report.rmse : std::numeric_limits<double>::infinity());
       if (usable && report.cost < best_cost) {
         best_cost = report.cost;
-        best.model = residual.at(report.values);
+        best.model = model_at<P>(residual, report.values);
         best.report = std::move(report);
       }
     }
@@ -366,7 +339,7 @@ void PseudoWienerFitOptions::validate() const {
   require_within("starts", starts, 1.0, 10000.0);
   require_positive("same_cost", same_cost);
   if (delays.empty()) throw ParameterError("delays is empty: name at least one, 0 for none");
-  for (const int delay : delays)
+  for (const double delay : delays)
     require_within("delays", delay, 0.0, throttle::max_delay_samples, "samples");
   search.validate();
 }

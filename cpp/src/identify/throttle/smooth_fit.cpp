@@ -278,6 +278,7 @@ SmoothThrottleFit fit_smooth_throttle(const SmoothPlant& plant, const SmoothThro
     search_options.cost_tolerance = stage.cost_tolerance;
     search_options.max_iterations = stage.max_iterations;
     search_options.initial_damping = stage.initial_damping;
+    search_options.stop = options.stop;
     const auto n_free = static_cast<Eigen::Index>(stage.free.size());
 
     std::vector<Search> searches;
@@ -311,6 +312,7 @@ SmoothThrottleFit fit_smooth_throttle(const SmoothPlant& plant, const SmoothThro
       sets[i] = searches[i].best;
       fit.reports.push_back(describe(searches[i], stage, options, n_samples));
     }
+    if (options.stop.stop_requested()) break;
   }
   const auto better = [](double a, double b) { return a < b || !std::isfinite(b); };
   for (std::size_t i = 0; i < fit.reports.size(); ++i) {

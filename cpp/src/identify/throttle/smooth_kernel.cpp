@@ -1,3 +1,6 @@
+// Vectors are handed over inside one inlined function: no calling convention is involved.
+#pragma GCC diagnostic ignored "-Wpsabi"
+
 #include "mgdd/identify/throttle/smooth_kernel.hpp"
 
 #include <numbers>
@@ -58,14 +61,8 @@ MGDD_INLINE void both_tanh(const double& a, const double& b, double& ta, double&
   tb = t[1];
 }
 
-// Coefficients that stay over the record, divided by inertia or inductance once.
 template <class V>
-struct Constants {
-  V torque, viscous, coulomb, over_width, spring, preload, over_preload_width, limp_home, emf, resistance;
-  V current_to_speed;  // N/J
-  V speed_to_current;  // N/L
-  V over_inertia, over_inductance, supply;
-};
+using Constants = throttle::SmoothCoefficients<V>;
 
 // Right-hand side with its non-zero partial derivatives at one stage.
 template <class V>
@@ -85,10 +82,8 @@ MGDD_INLINE void evaluate(const Constants<V>& c, const V& angle, const V& speed,
   V friction, preload;
   both_tanh(s, z, friction, preload);
   f.d_angle = speed;
-  // The tangents come last: they are the longest chain of dependent operations.
-  f.d_speed =
-      ((c.torque * current - c.viscous * speed) - c.spring * deflection) - (c.coulomb * friction + c.preload * preload);
-  f.d_current = drive - c.resistance * current - c.emf * speed;
+  f.d_speed = throttle::SmoothPlant::acceleration<V, V>(c, speed, current, {deflection, friction, preload});
+  f.d_current = throttle::SmoothPlant::current_rise<V, V, V>(c, speed, current, drive);
   const V friction_slope = c.coulomb * c.over_width * (1.0 - friction * friction);
   const V preload_slope = c.preload * c.over_preload_width * (1.0 - preload * preload);
   f.a10 = -(c.spring + preload_slope);
@@ -173,22 +168,10 @@ MGDD_INLINE void sweep(const throttle::SmoothPlant& plant, const SmoothThrottleR
   using Current = typename Layout<V>::Current;
   const double h = record.dt_s;
   const V zero{};
-  Constants<V> c;
-  c.over_inertia = zero + 1.0 / plant.inertia_kgm2;
-  c.over_inductance = zero + 1.0 / plant.inductance_h;
-  c.current_to_speed = zero + plant.gear_ratio / plant.inertia_kgm2;
-  c.speed_to_current = zero + plant.gear_ratio / plant.inductance_h;
-  c.supply = zero + plant.supply_v / plant.inductance_h;
-  c.torque = p[0] * c.current_to_speed;
-  c.viscous = p[1] * c.over_inertia;
-  c.coulomb = p[2] * c.over_inertia;
-  c.over_width = 1.0 / p[3];
-  c.spring = p[4] * c.over_inertia;
-  c.preload = p[5] * c.over_inertia;
-  c.over_preload_width = 1.0 / p[6];
-  c.limp_home = p[7];
-  c.emf = p[8] * c.speed_to_current;
-  c.resistance = p[9] * c.over_inductance;
+  std::array<V, 10> numbers{};
+  for (std::size_t i = 0; i < 10; ++i)
+    numbers[i] = p[i];
+  const Constants<V> c = plant.coefficients(numbers);
 
   V angle = zero + record.start[0], speed = zero + record.start[1], current = zero + record.start[2];
   Speed angle_by_s{}, speed_by_s{}, current_by_s{};

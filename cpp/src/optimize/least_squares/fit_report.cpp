@@ -130,6 +130,8 @@ std::string_view to_string(FitStatus status) noexcept {
       return "evaluation_failed";
     case FitStatus::stalled:
       return "stalled";
+    case FitStatus::interrupted:
+      return "interrupted";
   }
   return "unknown";
 }
@@ -152,6 +154,8 @@ std::string_view explain(FitStatus status) noexcept {
       return "no step lowers the cost although the gradient is not zero (a wrong Jacobian, a noisy "
              "residual "
              "or the edge of where the model can be evaluated)";
+    case FitStatus::interrupted:
+      return "interrupted before a tolerance was met";
   }
   return "unknown";
 }

@@ -259,6 +259,13 @@ void LeastSquares::settle(bool accepted) noexcept {
   }
 }
 
+bool LeastSquares::is_stopped() noexcept {
+  const bool running = phase_ == Phase::start || phase_ == Phase::search;
+  if (!running || !options_.stop.stop_requested()) return false;
+  finish(FitStatus::interrupted);
+  return true;
+}
+
 void LeastSquares::finish(FitStatus status) noexcept {
   status_ = status;
   phase_ = Phase::done;

@@ -20,9 +20,9 @@ constexpr std::array<std::pair<Switching, std::string_view>, 2> switchings{{
     {Switching::predicted, "predicted"},
     {Switching::measured, "measured"},
 }};
-constexpr std::array<std::pair<DryFriction, std::string_view>, 2> frictions{{
-    {DryFriction::set_valued, "set_valued"},
-    {DryFriction::tanh, "tanh"},
+constexpr std::array<std::pair<Friction, std::string_view>, 2> frictions{{
+    {Friction::coulomb, "set_valued"},
+    {Friction::tanh, "tanh"},
 }};
 constexpr std::array<std::pair<LagStart, std::string_view>, 2> starts{{
     {LagStart::rest, "rest"},
@@ -108,6 +108,13 @@ void check_map(const PwRSide& s, double reach_deg, std::string_view side) {
   }
 }
 
+// Every kind on every scalar of the contract.
+template <class P>
+constexpr bool fulfilled =
+    dynamics::ModelFamily<PseudoWienerFamily<P>> && dynamics::on_every_scalar<PseudoWienerFamily<P>> &&
+    ThrottleModel<decltype(model_of(std::declval<const P&>()))>;
+static_assert(fulfilled<PwR> && fulfilled<PwW> && fulfilled<PwP>);
+
 }  // namespace
 
 Names<PseudoWienerKind> pseudo_wiener_names() noexcept {
@@ -116,7 +123,7 @@ Names<PseudoWienerKind> pseudo_wiener_names() noexcept {
 Names<Switching> switching_names() noexcept {
   return switchings;
 }
-Names<DryFriction> dry_friction_names() noexcept {
+Names<Friction> dry_friction_names() noexcept {
   return frictions;
 }
 Names<LagStart> lag_start_names() noexcept {
@@ -146,7 +153,23 @@ void PseudoWienerFrame::validate() const {
   require_within("delay_samples", delay_samples, 0.0, max_delay_samples);
 }
 
-void Anchor::validate() const {
+PseudoWienerFrame PseudoWienerFrame::at_sample(double new_sample_s) const {
+  PseudoWienerFrame frame = *this;
+  frame.sample_s = new_sample_s;
+  const double delay = delay_samples * sample_s / new_sample_s;
+  const double whole = std::round(delay);
+  frame.delay_samples = std::abs(delay - whole) < 1e-9 ? whole : delay;  // rounding makes no fraction
+  if (frame.delay_samples > max_delay_samples) {
+    throw ParameterError("delay_samples = " + text(frame.delay_samples) + " at sample_s = " + text(new_sample_s) +
+                         " s: must be in [0, " + text(max_delay_samples) + "]; for a delay of " +
+                         text(1e3 * delay_samples * sample_s) +
+                         " ms take sample_s >= " + text(delay_samples * sample_s / max_delay_samples) + " s");
+  }
+  frame.validate();
+  return frame;
+}
+
+void ObserverGains::validate() const {
   require_within("angle_gain", angle_gain, 0.0, 1.0);
   require_within("speed_gain_per_s", speed_gain_per_s, 0.0, 1e4, "1/s");
   require_within("bias_gain_duty_per_deg", bias_gain_duty_per_deg, 0.0, 1.0, "duty/deg");
@@ -154,25 +177,43 @@ void Anchor::validate() const {
   require_within("offset_gain", offset_gain, 0.0, 1.0);
 }
 
-template <>
-void PwR::validate() const {
-  check_numbers(*this, PseudoWienerKind::pw_r);
-  check_map(above, frame.open_deg - limp_home_deg, "above");
-  check_map(below, frame.closed_deg - limp_home_deg, "below");
+void check_pw_r(const PseudoWienerFrame& frame, double ramp_deg, double tanh_deg_per_s, double dead_band_deg,
+                Friction friction) {
+  frame.validate();
   require_within("ramp_deg", ramp_deg, 1e-3, 10.0, "deg");
   require_within("tanh_deg_per_s", tanh_deg_per_s, 0.1, 1e3, "deg/s");
   require_within("dead_band_deg", dead_band_deg, 0.0, 10.0, "deg");
+  if (friction != Friction::coulomb && friction != Friction::tanh) {
+    throw ParameterError("friction = '" + std::string(name_of(friction_names(), friction)) +
+                         "': must be coulomb or tanh, PW-R has one level");
+  }
 }
 
-template <>
-void PwW::validate() const {
-  check_numbers(*this, PseudoWienerKind::pw_w);
+void check_pw_w(const PseudoWienerFrame& frame, double knot_lower_duty, double knot_upper_duty) {
+  frame.validate();
   require_within("knot_lower_duty", knot_lower_duty, -1.0, 1.0);
   require_within("knot_upper_duty", knot_upper_duty, -1.0, 1.0);
   if (!(knot_upper_duty > knot_lower_duty)) {
     throw ParameterError("knot_upper_duty = " + text(knot_upper_duty) +
                          ": must be above knot_lower_duty = " + text(knot_lower_duty));
   }
+}
+
+void check_pw_p(const PseudoWienerFrame& frame, int plays) {
+  require_within("plays", plays, 1.0, max_plays);
+  frame.validate();
+}
+
+template <>
+void PwR::validate() const {
+  check_numbers(*this, PseudoWienerKind::pw_r);
+  check_map(above, frame.open_deg - limp_home_deg, "above");
+  check_map(below, frame.closed_deg - limp_home_deg, "below");
+}
+
+template <>
+void PwW::validate() const {
+  check_numbers(*this, PseudoWienerKind::pw_w);
 }
 
 template <>
@@ -201,7 +242,7 @@ PwR pw_r_of(const Throttle& t) noexcept {
   return p;
 }
 
-PseudoWienerModel prepare(const PseudoWiener& parameters) noexcept {
+PseudoWienerModel prepare(const PseudoWiener& parameters) {
   return std::visit([](const auto& p) -> PseudoWienerModel { return model_of(p); }, parameters);
 }
 

@@ -91,7 +91,7 @@ def _timing(
 ) -> dict[str, float]:
     scheme = {"step_cad": search["step_cad"], "integrator": search["integrator"]}
     now = simulate(load.cylinder, load.point, soc_cad=load.soc_cad, **scheme)
-    # The model's own error in p_max at the measured timing is no violation of the limit.
+    # The model's own error in p_max at the measured timing is not a violation of the limit.
     ceiling = max(load.p_max_bar, float(now["p_max_bar"]) * (1.0 + 1e-9))
     own = {**limits, "p_max_bar": min(ceiling, limits.get("p_max_bar", math.inf))}
     free = find_optimum(load.cylinder, load.point, objective, limits=limits, **search)

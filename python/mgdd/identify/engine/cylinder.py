@@ -13,7 +13,7 @@ import numpy as np
 from mgdd import _core
 from mgdd._core import Cylinder, OperatingPoint
 from mgdd.engine import analyze
-from mgdd.errors import DataError, ParameterError, ShapeError
+from mgdd.errors import DataError, ParameterError, ShapeError, hand_over, or_partial
 from mgdd.identify.engine.records import CylinderFit, Load, burn_law, load_table
 from mgdd.io.trace_forms import as_trace
 from mgdd.optimize.fit_options import FitOptions, fit_options
@@ -82,6 +82,8 @@ def fit_cylinder(
         An unknown or repeated name in ``free`` or ``start_values``.
     mgdd.errors.DataError
         A trace that cannot be used, or shows no heat release.
+    mgdd.errors.Interrupted
+        Ctrl-C; ``partial`` is the fit as far as it came, with the status ``interrupted``.
 
     Notes
     -----
@@ -106,7 +108,9 @@ def fit_cylinder(
     measured = [_measured(trace, label, cylinder, point) for trace, label in zip(traces, labels, strict=True)]
     burns = _starts(measured, cylinder, start_values)
     chosen = fit_options(options, max_iterations=200)
-    core = _core.fit_cylinder(measured, cylinder, burns, list(names), step_cad, integrator, chosen.max_iterations)
+    core, stop = or_partial(
+        lambda: _core.fit_cylinder(measured, cylinder, burns, list(names), step_cad, integrator, chosen.max_iterations)
+    )
     loads = tuple(
         _load(core.cylinder, fitted, trace, label, point)
         for fitted, trace, label in zip(core.loads, traces, labels, strict=True)
@@ -124,7 +128,7 @@ def fit_cylinder(
         table=load_table(loads),
         correlation_if_free=np.asarray(core.correlation_if_free),
     )
-    return replace(fit, findings=(*_doubts(traces, cylinder, point), *_findings(fit)))
+    return hand_over(replace(fit, findings=(*_doubts(traces, cylinder, point), *_findings(fit))), stop)
 
 
 def _draw(fit: CylinderFit, ax: Any) -> Any:
@@ -187,7 +191,7 @@ def _starts(
         for name, value in values.items():
             if name not in known:
                 raise ParameterError(
-                    f"start_values: {name!r} is no parameter of a trace: must be one of {', '.join(known)}"
+                    f"start_values: {name!r} is not a parameter of a trace: must be one of {', '.join(known)}"
                 )
             setattr(burn, name, float(value))
     return burns
@@ -275,7 +279,7 @@ def _findings(fit: CylinderFit) -> tuple[Finding, ...]:
                 "early_onset",
                 tuple(load.file for load in early),
                 f"the fitted burn starts before the injection (SOC minus SOI in °CA: {each}): the burn law bends to "
-                "make up for another error of the model, so its start is no physical onset",
+                "make up for another error of the model, so its start is not a physical onset",
             )
         )
     errors = [load.imep_closed_error_percent for load in fit.loads]

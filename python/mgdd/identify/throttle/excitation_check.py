@@ -33,7 +33,7 @@ class ExcitationCheck:
     findings : tuple of Finding
         Each limit that is passed, with the remedy.
     unanswered : tuple of Finding
-        What a log of this excitation could not tell, and which one could.
+        Parameters that a log of this excitation would not identify, and which one would.
     content : RecordContent
         Range, speeds, directions, crossings and stops of the predicted angle.
     peak_current_a, rms_current_a : float

@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from mgdd import _core
-from mgdd.errors import DataError, ParameterError
+from mgdd.errors import DataError, ParameterError, hand_over, or_partial
 from mgdd.identify.throttle.first_principle_model import GROUP_NAMES, TYPICAL, FirstPrincipleModel
 from mgdd.identify.throttle.first_principle_start import SIDE_DEG, regression_start, rest_angle, spread_starts
 from mgdd.identify.throttle.free_run import draw_free_run, free_run, quality_of, source_of
@@ -167,15 +167,17 @@ def fit_throttle(
         )
         if part and (fraction == 1.0 or fraction * time.size >= 200)
     ]
-    found = _core.fit_throttle_groups(
-        [(step_s, np.clip(duty, -1.0, 1.0), angle, [float(angle[0]), 0.0, 0.0], 0, False)],
-        stages=stages,
-        starts=spread_starts(values, free, bounds, n_starts, chosen.seed),
-        closed_deg=closed_deg,
-        open_deg=open_deg,
-        ramp_deg=0.25,
-        substeps=2,
-        n_threads=threads,
+    found, stop = or_partial(
+        lambda: _core.fit_throttle_groups(
+            [(step_s, np.clip(duty, -1.0, 1.0), angle, [float(angle[0]), 0.0, 0.0], 0, False)],
+            stages=stages,
+            starts=spread_starts(values, free, bounds, n_starts, chosen.seed),
+            closed_deg=closed_deg,
+            open_deg=open_deg,
+            ramp_deg=0.25,
+            substeps=2,
+            n_threads=threads,
+        )
     )
     report = FitReport.from_core(found["reports"][found["best"]], angle)
     model = FirstPrincipleModel(
@@ -202,7 +204,7 @@ def fit_throttle(
         text = "physical numbers: " + ", ".join(f"{name} {value:.4g}" for name, value in physical.items())
         findings.append(Finding("physical_parameters", tuple(physical), text))
     run = free_run(model, log)
-    return Fit(
+    fit = Fit(
         report=report,
         model=model,
         kind=model.kind,
@@ -216,6 +218,7 @@ def fit_throttle(
         run=run,
         draw=draw_free_run,
     )
+    return hand_over(fit, stop)
 
 
 def _columns(log: xr.Dataset) -> list[NDArray[np.float64]]:

@@ -33,7 +33,7 @@ def fit_kind(
     *,
     limp_home_deg: float | None,
     two_sided: bool,
-    delay_samples: int | Sequence[int],
+    delay_samples: float | Sequence[float],
     stops_deg: tuple[float, float],
     options: FitOptions | None,
 ) -> Fit:
@@ -56,7 +56,7 @@ def fit_kind(
     )  # fmt: skip
 
 
-def check_kind(kind: str, *, two_sided: bool, delay_samples: int | Sequence[int]) -> None:
+def check_kind(kind: str, *, two_sided: bool, delay_samples: float | Sequence[float]) -> None:
     """Refuse what the kind does not have, before the log is looked at."""
     if two_sided and kind in ("pw_w", "pw_p"):
         raise ParameterError(f"two_sided = True: {kind} has one set of parameters; only pw_r has one per side")

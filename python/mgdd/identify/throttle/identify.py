@@ -43,7 +43,7 @@ def identify_throttle(
     two_sided: bool = False,
     closed_deg: float = 0.0,
     open_deg: float = 90.0,
-    delay_samples: int | Sequence[int] = 0,
+    delay_samples: float | Sequence[float] = 0,
     options: FitOptions | None = None,
 ) -> Fit:
     """Fit a throttle model to a log and test it on another.
@@ -64,7 +64,7 @@ def identify_throttle(
         Fit a set of parameters above and one below limp-home; the log must have been on both sides.
     closed_deg, open_deg : float
         Mechanical stops [deg].
-    delay_samples : int or sequence of int
+    delay_samples : float or sequence of float
         Samples, 0 to 5, until the duty acts; of several the best is kept. Pseudo-Wiener models only.
     options : FitOptions, optional
         How hard to search; the number of starts is the model's own, the seed 0 without.

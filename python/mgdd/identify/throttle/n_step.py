@@ -93,7 +93,7 @@ def n_step_rms(
     Raises
     ------
     ParameterError
-        A horizon that is no whole number of samples, or longer than the log.
+        A horizon that is not a whole number of samples, or longer than the log.
 
     Examples
     --------
@@ -136,7 +136,7 @@ def whole_horizons(step_s: float, size: int) -> tuple[float, ...]:
 def samples_of(horizon_s: float, step_s: float, size: int) -> int:
     n = round(horizon_s / step_s)
     if n < 1 or abs(n * step_s - horizon_s) > _WHOLE * step_s * max(n, 1) + 1e-9:
-        raise ParameterError(f"horizons_s: {horizon_s:g} s is no whole number of samples of {step_s:g} s")
+        raise ParameterError(f"horizons_s: {horizon_s:g} s is not a whole number of samples of {step_s:g} s")
     if n > size // 2:
         raise ParameterError(f"horizons_s: {horizon_s:g} s is more than half of the log, {size * step_s:g} s")
     return n

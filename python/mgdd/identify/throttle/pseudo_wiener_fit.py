@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING, cast
 import numpy as np
 
 from mgdd import _core
-from mgdd.errors import DataError, ParameterError
+from mgdd.errors import DataError, ParameterError, hand_over, or_partial
 from mgdd.identify.throttle.free_run import draw_free_run, free_run, quality_of, source_of
 from mgdd.optimize.fit_options import FitOptions, fit_options
 from mgdd.results import Finding, Fit, FitReport
@@ -32,7 +32,7 @@ def fit_pseudo_wiener(
     limp_home_deg: float | None = None,
     sides: str = "shared",
     free: Sequence[str] = (),
-    delay_samples: int | Sequence[int] = 0,
+    delay_samples: float | Sequence[float] = 0,
     plays: int = 1,
     start_values: PseudoWiener | None = None,
     settings: Mapping[str, float] | None = None,
@@ -54,7 +54,7 @@ def fit_pseudo_wiener(
     free : sequence of str, optional
         Parameters to fit, for PW-R without the side: ``tau_s gain_deg_per_s2_per_duty preload_duty spring_duty_per_deg
         coulomb_duty`` without, further ``square_per_deg cube_per_deg2 limp_home_deg``; for the others all.
-    delay_samples : int or sequence of int
+    delay_samples : float or sequence of float
         Delay of the duty, 0 to 5 samples; of several the best is kept.
     plays : int
         PW-P: number of plays, 1 to 8.
@@ -84,7 +84,7 @@ def fit_pseudo_wiener(
     Notes
     -----
     Output error with exact forward sensitivities on Levenberg-Marquardt. Only groups of the physical parameters can be
-    told from duty and angle: tau = J/b, G = g/J, and preload, spring and friction over the stall torque g.
+    identified from duty and angle: tau = J/b, G = g/J, and preload, spring and friction over the stall torque g.
 
     Examples
     --------
@@ -118,19 +118,21 @@ def fit_pseudo_wiener(
     if lag_start != "best" and "map_start" in values:
         values["map_start"] = float(lag_start == "map")
     values |= {name: float(value) for name, value in (settings or {}).items()}
-    delays = [delay_samples] if isinstance(delay_samples, int) else list(delay_samples)
-    parameters, report, errors, n_best = _core.fit_pseudo_wiener(
-        kind=kind,
-        records=columns,
-        parameters=values,
-        sides=sides,
-        free=list(free),
-        delays=delays,
-        starts=chosen.n_starts,
-        seed=chosen.seed,
-        only_given_start=start_values is not None,
-        try_map_start=lag_start == "best",
-        max_iterations=chosen.max_iterations,
+    delays = [delay_samples] if isinstance(delay_samples, int | float) else list(delay_samples)
+    (parameters, report, errors, n_best), stop = or_partial(
+        lambda: _core.fit_pseudo_wiener(
+            kind=kind,
+            records=columns,
+            parameters=values,
+            sides=sides,
+            free=list(free),
+            delays=delays,
+            starts=chosen.n_starts,
+            seed=chosen.seed,
+            only_given_start=start_values is not None,
+            try_map_start=lag_start == "best",
+            max_iterations=chosen.max_iterations,
+        )
     )
     wrapped = FitReport.from_core(report, np.concatenate([angle for _, angle in columns]))
     model = PseudoWiener(kind, parameters)
@@ -142,7 +144,7 @@ def fit_pseudo_wiener(
     if kind == "pw_r" and sides == "shared":
         text = "one set of values serves both sides of limp-home"
         found.append(Finding("shared_sides", (), text, "sides='both' fits a set each"))
-    return Fit(
+    fit = Fit(
         report=wrapped,
         model=model,
         kind=kind,
@@ -155,6 +157,7 @@ def fit_pseudo_wiener(
         run=runs[0],
         draw=draw_free_run,
     )
+    return hand_over(fit, stop)
 
 
 def _sample(logs: Sequence[xr.Dataset]) -> float:

@@ -1,4 +1,4 @@
-"""What a record of duty and angle contains: sides, directions, speeds, stops; and what it therefore cannot tell."""
+"""What a record of duty and angle contains: sides, directions, speeds, stops; and what it does not identify."""
 
 from __future__ import annotations
 
@@ -184,7 +184,7 @@ def open_questions(
         share = 100.0 * content.time_at_stops_s / content.duration_s
         add(
             "on_stop",
-            f"the plate rests on an end stop {share:.0f} % of the time, which tells nothing",
+            f"the plate rests on an end stop {share:.0f} % of the time, which identifies nothing",
             "lower offset or amplitude",
         )
     return tuple(out)

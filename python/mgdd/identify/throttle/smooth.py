@@ -11,7 +11,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from mgdd import _core
-from mgdd.errors import ParameterError, ShapeError
+from mgdd.errors import ParameterError, ShapeError, hand_over, or_partial
 from mgdd.io.parameters import FIT_NOTES, ParameterFile, Parameters, entries, wanted
 from mgdd.optimize.fit_options import FitOptions, fit_options
 from mgdd.optimize.fit_run import draw_run, fit_run, quality_of
@@ -186,24 +186,26 @@ def fit_smooth_throttle(
     plant = model or SmoothThrottle()
     time, duty, angle = columns_of(record, ("time_s", "duty", "angle_deg"))
     state = plant.state_of(initial_state)
-    found = _core.fit_smooth_throttle(
-        duty,
-        angle,
-        starts=table.tolist(),
-        lower=_ten(lower, "lower"),
-        upper=_ten(upper, "upper"),
-        step_s=even_step(time),
-        start=state,
-        **plant.constants,
-        cost_tolerance=chosen.tolerance,
-        lanes=lanes,
+    found, stop = or_partial(
+        lambda: _core.fit_smooth_throttle(
+            duty,
+            angle,
+            starts=table.tolist(),
+            lower=_ten(lower, "lower"),
+            upper=_ten(upper, "upper"),
+            step_s=even_step(time),
+            start=state,
+            **plant.constants,
+            cost_tolerance=chosen.tolerance,
+            lanes=lanes,
+        )
     )
     reports = tuple(FitReport.from_core(report) for report in found["reports"])
     best = reports[found["best"]]
     fitted = replace(plant, parameters=dict(zip(_EXAMPLE, best.values.tolist(), strict=True)))
     modelled = fitted.simulate(record, initial_state=state)["angle_deg"].to_numpy()
     run = fit_run(time, angle, modelled, VARIABLES["angle_deg"]) if np.isfinite(modelled).all() else None
-    return Fit(
+    fit = Fit(
         report=best,
         model=fitted,
         kind=fitted.kind,
@@ -216,6 +218,7 @@ def fit_smooth_throttle(
         run=run,
         draw=draw_run,
     )
+    return hand_over(fit, stop)
 
 
 def _ten(values: ArrayLike, name: str) -> list[float]:

@@ -1,4 +1,4 @@
-"""How far a throttle model can be trusted: free run, n steps ahead, what is left, and what the log cannot tell."""
+"""How far a throttle model can be trusted: free run, n steps ahead, residuals, and what the log does not identify."""
 
 from __future__ import annotations
 
@@ -48,7 +48,7 @@ class ThrottleValidation:
     free_run : xarray.Dataset
         ``duty``, ``angle_deg``, ``model_deg`` and ``residual_deg`` over ``time_s``.
     findings : tuple of Finding
-        What to distrust, what the log cannot tell, and which excitation would.
+        What to distrust, what the log does not identify, and which excitation would.
     source : str
         Name of the log.
 
@@ -155,7 +155,7 @@ def validate_throttle(
     DataError
         All of `mgdd.io.check_throttle_log`; a model that runs away.
     ParameterError
-        A horizon that is no whole number of samples.
+        A horizon that is not a whole number of samples.
 
     Examples
     --------
@@ -226,7 +226,7 @@ def _notes(quality: FitQuality, tests: ResidualTests) -> list[Finding]:
             Finding(
                 "residual_not_white",
                 (),
-                "the one-step residual has memory: usual near stiction, where it is no reason to reject; standard "
+                "the one-step residual has memory: usual near stiction, where it is not a reason to reject; standard "
                 "errors, which take it as white, are too small",
             )
         )

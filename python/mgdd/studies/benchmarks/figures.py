@@ -5,6 +5,7 @@ from __future__ import annotations
 from typing import TYPE_CHECKING
 
 from mgdd.plot.style import BLACK, BLUE, axis_label, legend
+from mgdd.results.labels import label_of
 
 if TYPE_CHECKING:
     import xarray as xr
@@ -38,6 +39,6 @@ def _overlay(dataset: xr.Dataset, name: str) -> Figure:
     legend(top, lines)
     bottom.plot(time, simulated - measured, color=BLACK)
     bottom.axhline(0.0, color=BLUE, linewidth=0.8)
-    bottom.set_ylabel(f"residual [{measured.attrs['units']}]")
+    bottom.set_ylabel(f"residual [{label_of(measured).units}]")
     bottom.set_xlabel("time [s]")
     return figure

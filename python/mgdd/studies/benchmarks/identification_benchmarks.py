@@ -14,7 +14,7 @@ from mgdd.errors import DataError
 from mgdd.optimize import FitOptions
 from mgdd.results import labelled_dataset
 from mgdd.signals import nrmse_fit_percent, rmse
-from mgdd.studies.base import Progress, StudyResult, run_parts
+from mgdd.studies.base import Progress, StudyResult, finish, run_parts
 from mgdd.studies.benchmarks.drive_axis import drive_free_run, fit_drive
 from mgdd.studies.benchmarks.figures import draw
 from mgdd.studies.benchmarks.two_tanks import fit_two_tanks
@@ -131,7 +131,7 @@ def run_identification_benchmarks(
         "interrupted": interrupted,
         "rows": [case.row for case in cases],
     }
-    return StudyResult(name=_NAME, dataset=dataset, figures=draw(dataset) if figures else {}, summary=summary)
+    return finish(StudyResult(name=_NAME, dataset=dataset, figures=draw(dataset) if figures else {}, summary=summary))
 
 
 def _row(name: str, model: str, train: float, test: float, metric: str, unit: str, **more: Any) -> dict[str, Any]:

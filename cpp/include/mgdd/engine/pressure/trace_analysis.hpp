@@ -4,6 +4,7 @@
 // release).
 #pragma once
 
+#include <array>
 #include <string>
 #include <string_view>
 #include <vector>
@@ -57,7 +58,34 @@ struct TraceAnalysis {
   double t_max_k = undefined<double>();
   bool motored = false;               ///< expansion runs on the compression line: no burn in this trace
   std::vector<std::string> warnings;  ///< what makes these figures doubtful
+
+  /// Heat of each step over its length [J/°CA], zero at the first sample; gross is net and the loss to the wall.
+  std::vector<double> heat_release_net_j_per_cad() const;
+  std::vector<double> heat_release_gross_j_per_cad() const;
+  std::vector<double> heat_loss_j_per_cad() const;
 };
+
+/// The single figures of an analysis by name.
+struct TraceFigure {
+  std::string_view name;
+  double TraceAnalysis::* member;
+};
+inline constexpr std::array<TraceFigure, 14> trace_figures{{
+    {"pegging_bar", &TraceAnalysis::pegging_bar},
+    {"n_compression", &TraceAnalysis::n_compression},
+    {"n_expansion", &TraceAnalysis::n_expansion},
+    {"ca10_cad", &TraceAnalysis::ca10_cad},
+    {"ca50_cad", &TraceAnalysis::ca50_cad},
+    {"ca90_cad", &TraceAnalysis::ca90_cad},
+    {"heat_net_j", &TraceAnalysis::heat_net_j_total},
+    {"heat_gross_j", &TraceAnalysis::heat_gross_j_total},
+    {"imep_closed_bar", &TraceAnalysis::imep_closed_bar},
+    {"work_closed_j", &TraceAnalysis::work_closed_j},
+    {"p_max_bar", &TraceAnalysis::p_max_bar},
+    {"p_max_cad", &TraceAnalysis::p_max_cad},
+    {"dp_max_bar_per_cad", &TraceAnalysis::dp_max_bar_per_cad},
+    {"t_max_k", &TraceAnalysis::t_max_k},
+}};
 
 /// Offset to add to a relative trace [bar] (engine analysis calls it; here for use on its own). DataError where the
 /// trace does not cover the angles that the method reads.

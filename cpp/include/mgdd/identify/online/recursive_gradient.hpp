@@ -1,4 +1,4 @@
-// On-line update of PW-R along the gradient of its own re-anchored prediction, with the adaptation gain g_r of
+// On-line update of PW-R along the gradient of its own corrected prediction, with the adaptation gain g_r of
 // Tan (2018): q <- q + g_r s e/(1 + s's), e = measured minus predicted, s = d prediction/d q, q = log of the parameter
 // over its start. The law is ours. Units: deg, s, duty. noexcept, allocation-free.
 #pragma once
@@ -11,6 +11,7 @@
 #include <Eigen/Core>
 
 #include "mgdd/common/bounds.hpp"
+#include "mgdd/dynamics/observer.hpp"
 #include "mgdd/identify/online/pw_r_factors.hpp"
 #include "mgdd/throttle/models/pseudo_wiener.hpp"
 
@@ -21,12 +22,12 @@ struct GradientPwRSettings {
   double adaptation_gain = 0.05;  ///< g_r, 0.01 to 0.1
   double reach = 0.7;             ///< largest |q|: a factor of two either way
   double least_error_deg = 0.09;  ///< 3 sigma of the sensor
-  throttle::Anchor anchor{.angle_gain = 0.05, .speed_gain_per_s = 2.0, .bias_gain_duty_per_deg = 0.0};
+  throttle::ObserverGains gains{.angle_gain = 0.05, .speed_gain_per_s = 2.0, .bias_gain_duty_per_deg = 0.0};
   std::array<bool, 5> free{false, true, true, false, false};  ///< tau, G, beta, kappa, delta; both sides alike
 
   void validate() const {
     model.validate();
-    anchor.validate();
+    gains.validate();
     require_within("adaptation_gain", adaptation_gain, 1e-6, 1.0);
     require_within("reach", reach, 0.01, 3.0);
     require_within("least_error_deg", least_error_deg, 0.0, 10.0, "deg");
@@ -38,7 +39,7 @@ class GradientPwR {
   explicit GradientPwR(const GradientPwRSettings& settings) : settings_(settings) { settings_.validate(); }
 
   void start(double angle_deg, double duty = 0.0) noexcept {
-    state_ = throttle::model_of(seeded<Scalar>()).at_rest(Scalar(angle_deg), Scalar(duty));
+    state_ = throttle::model_of(seeded<Scalar>(), throttle::unchecked).at_rest(Scalar(angle_deg), Scalar(duty));
     last_duty_ = duty;
   }
 
@@ -47,8 +48,8 @@ class GradientPwR {
   double update(double duty, double angle_deg) noexcept {
     const bool has_duty = std::isfinite(duty);
     if (has_duty) last_duty_ = duty;
-    const auto model = throttle::model_of(seeded<Scalar>());
-    model.advance(state_, Scalar(last_duty_));
+    const auto model = throttle::model_of(seeded<Scalar>(), throttle::unchecked);
+    model.step(state_, Scalar(last_duty_));
     if (!std::isfinite(angle_deg)) return 0.0;
     const Scalar y = model.output(state_);
     const double error = angle_deg - y.value;
@@ -62,7 +63,7 @@ class GradientPwR {
         factors_[static_cast<int>(i)] = std::clamp(moved, -settings_.reach, settings_.reach);
       }
     }
-    model.reanchor(state_, Scalar(angle_deg), settings_.anchor);
+    model.correct(state_, Scalar(angle_deg), settings_.gains);
     return has_duty ? error : 0.0;
   }
 
@@ -74,17 +75,7 @@ class GradientPwR {
   static void visit(Self& self, V& v) {
     v("factors", self.factors_);
     v("held_duty", self.last_duty_);
-    const auto dual = [&v](const std::string& name, auto& x) {
-      v(name, x.value);
-      for (std::size_t i = 0; i < x.grad.size(); ++i)
-        v(name + "_" + std::to_string(i), x.grad[i]);
-    };
-    dual("position_deg", self.state_.position_deg);
-    dual("speed_deg_per_s", self.state_.speed_deg_per_s);
-    dual("bias_duty", self.state_.bias_duty);
-    dual("above", self.state_.above);
-    for (std::size_t i = 0; i < self.state_.line.before.size(); ++i)
-      v("before_" + std::to_string(i), self.state_.line.before[i].value);
+    dynamics::visit_numbers<throttle::BasicPwRModel<Scalar>>(self.state_, v);
   }
 
  private:

@@ -95,7 +95,7 @@ class RecursivePwR {
 
   RecursivePwRSettings settings_;
   Core above_, below_;
-  throttle::DelayLine<double> line_;
+  throttle::DutyLine<double> line_;
   Eigen::Vector3d position_ = Eigen::Vector3d::Zero();   // x(k-1), x(k), x(k+1), from limp-home
   Eigen::Vector2d duty_mean_ = Eigen::Vector2d::Zero();  // over the difference before and the present one
   double duty_sum_ = 0.0;

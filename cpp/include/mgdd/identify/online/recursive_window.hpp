@@ -67,7 +67,7 @@ class WindowPwR {
   Eigen::Matrix<double, points, 1> duty_ = Eigen::Matrix<double, points, 1>::Zero();   // acts from a point to the next
   Eigen::Matrix<double, points, 1> angle_ = Eigen::Matrix<double, points, 1>::Zero();  // ring, oldest at count_
   Eigen::Matrix<double, points, 1> known_ = Eigen::Matrix<double, points, 1>::Zero();  // 1, or 0 for a dropped angle
-  throttle::DelayLine<double> line_;
+  throttle::DutyLine<double> line_;
   double last_duty_ = 0.0;
   double duty_sum_ = 0.0;
   double damping_ = 1e-2;

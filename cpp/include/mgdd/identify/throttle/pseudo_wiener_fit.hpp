@@ -39,7 +39,7 @@ struct PseudoWienerFitOptions {
   std::uint64_t seed = 1;  ///< of the Latin hypercube
   Sides sides = Sides::shared;
   std::vector<std::string> free;  ///< names without the side; empty: the kind's own
-  std::vector<int> delays{0};     ///< samples, tried one by one
+  std::vector<double> delays{0};  ///< samples, whole or not, tried one by one
   bool try_lag_starts = true;     ///< PW-W, PW-P: both rules for the start of the lags; false keeps the model's own
   bool only_given_start = false;  ///< one search, from the numbers of the model itself
   double same_cost = 1e-3;        ///< relative difference of cost that counts as the same optimum

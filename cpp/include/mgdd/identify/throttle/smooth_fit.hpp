@@ -6,6 +6,7 @@
 
 #include <array>
 #include <cstddef>
+#include <stop_token>
 #include <string>
 #include <vector>
 
@@ -38,6 +39,7 @@ struct SmoothThrottleFitOptions {
   std::vector<SmoothThrottleStage> stages;
   bool lanes = true;                 ///< several starts side by side; false: one after the other
   double undetermined_error = 0.25;  ///< a width with a larger relative standard error is named
+  std::stop_token stop{};            ///< a request ends all searches; their reports say so
 };
 
 /// Bounds 0.1 and 10 times the centre, and four stages: a twentieth of the record without and with the widths, a

@@ -22,6 +22,7 @@ enum class FitStatus {
   iteration_limit,     ///< stopped before a tolerance was met
   evaluation_failed,   ///< the model could not be evaluated at the start
   stalled,             ///< no step lowers the cost although the gradient is not zero
+  interrupted,         ///< stopped by request; what was found until then is in the report
 };
 
 [[nodiscard]] std::string_view to_string(FitStatus status) noexcept;

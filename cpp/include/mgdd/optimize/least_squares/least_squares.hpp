@@ -43,6 +43,7 @@ class LeastSquares {
   /// The first call evaluates the start, every further one tries one step. False when the search has ended.
   template <class Model>
   bool iterate(Model&& model) {
+    if (is_stopped()) return false;
     if (phase_ == Phase::start) {
       begin(evaluate(model, x_, residual_, &jacobian_));
     } else if (phase_ == Phase::search) {
@@ -77,7 +78,7 @@ class LeastSquares {
     } else if (phase_ == Phase::search) {
       settle(judge(evaluate(given, trial_x_, trial_residual_, &trial_jacobian_)));
     }
-    return phase_ == Phase::search;
+    return !is_stopped() && phase_ == Phase::search;
   }
 
   /// State of the search, by value. Between iterations the status reads iteration_limit: stopped by the
@@ -108,6 +109,7 @@ class LeastSquares {
   void solve_damped() noexcept;
   bool clip_to_box() noexcept;
   bool is_stationary() noexcept;
+  bool is_stopped() noexcept;
   void finish(FitStatus status) noexcept;
 
   std::vector<Parameter> parameters_;

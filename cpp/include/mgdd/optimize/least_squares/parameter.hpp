@@ -3,6 +3,7 @@
 #pragma once
 
 #include <limits>
+#include <stop_token>
 #include <string>
 #include <vector>
 
@@ -48,6 +49,8 @@ struct LeastSquaresOptions {
   double rank_tolerance = 1e-10;
   /// Ask for residual and Jacobian in one call. False asks for the Jacobian only after a step was accepted.
   bool evaluate_together = true;
+  /// A request ends the search before its next evaluation.
+  std::stop_token stop{};
 
   /// Throws ParameterError naming the field, its value and its bound.
   void validate() const;

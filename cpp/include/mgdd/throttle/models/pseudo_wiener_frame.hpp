@@ -1,11 +1,12 @@
-// What the three pseudo-Wiener models share: travel, sampling, delay line, the pair of lags, and how a measurement
-// re-anchors them. Units: deg, s, duty. Everything here is noexcept and allocation-free but the desk-time checks.
+// What the throttle models that run in real time share: travel, sampling, delay, and the gains of their observer.
+// Units: deg, s, duty.
 #pragma once
 
 #include <array>
 #include <cstddef>
 
-#include "mgdd/math/select.hpp"
+#include "mgdd/dynamics/delay_line.hpp"
+#include "mgdd/dynamics/lag.hpp"
 
 namespace mgdd::throttle {
 
@@ -21,60 +22,48 @@ enum class LagStart {
 struct PseudoWienerFrame {
   double closed_deg = 0.0;
   double open_deg = 90.0;
-  double sample_s = 1e-3;  ///< the duty is held that long
-  int substeps = 2;        ///< steps of PW-R per sample; the two others are exact for a held duty
-  int delay_samples = 0;   ///< d: computing and sampling delay, 0..5
+  double sample_s = 1e-3;      ///< the duty is held that long
+  int substeps = 2;            ///< steps of PW-R per sample; the two others are exact for a held duty
+  double delay_samples = 0.0;  ///< d: computing and sampling delay, 0..5, whole or not
 
   bool operator==(const PseudoWienerFrame&) const = default;
 
   /// ParameterError naming field, value and bound.
   void validate() const;
+  /// For another sample time: the delay keeps its seconds. ParameterError when the line would be too short for it.
+  PseudoWienerFrame at_sample(double new_sample_s) const;
+  dynamics::Delay delay() const noexcept { return dynamics::Delay(delay_samples); }
 };
 
 /// How a measured angle corrects a model, per sample of 1 ms; for other samples the caller scales.
-struct Anchor {
+struct ObserverGains {
   double angle_gain = 0.35;               ///< l1: 1 is a full reset, 0 a free run
-  double speed_gain_per_s = 35.0;         ///< l2 (PW-R)
-  double bias_gain_duty_per_deg = 0.004;  ///< l3 (PW-R)
+  double speed_gain_per_s = 35.0;         ///< l2 (models with a speed)
+  double bias_gain_duty_per_deg = 0.004;  ///< l3 (models with a speed)
   double bias_limit_duty = 0.4;
   double offset_gain = 1.0;  ///< PW-W, PW-P: share of the error that moves the output offset
 
-  bool operator==(const Anchor&) const = default;
+  bool operator==(const ObserverGains&) const = default;
 
   void validate() const;
 };
 
-/// The duties that have been sent and do not act yet; `before[0]` is the last one.
+/// Position, speed and bias after a correction by `error`, measured minus predicted position.
 template <class T>
-struct DelayLine {
-  std::array<T, static_cast<std::size_t>(max_delay_samples)> before{};
+MGDD_INLINE void pull(T& position, T& speed, T& bias, const T& error, const ObserverGains& gains) noexcept {
+  const T limit = T(gains.bias_limit_duty);
+  position += T(gains.angle_gain) * error;
+  speed += T(gains.speed_gain_per_s) * error;
+  bias = larger(smaller(bias - T(gains.bias_gain_duty_per_deg) * error, limit), -limit);
+}
 
-  /// Takes the newest duty, gives the one of `delay` samples ago.
-  MGDD_INLINE T pass(const T& duty, int delay) noexcept {
-    if (delay == 0) return duty;
-    const T acting = before[static_cast<std::size_t>(delay - 1)];
-    for (int i = delay - 1; i > 0; --i)
-      before[static_cast<std::size_t>(i)] = before[static_cast<std::size_t>(i - 1)];
-    before[0] = duty;
-    return acting;
-  }
-  void fill(const T& duty) noexcept { before.fill(duty); }
-};
+/// For on-line code whose parameters were checked before: makes a model without another check.
+struct Unchecked {};
+inline constexpr Unchecked unchecked{};
 
-/// Two first-order lags in a row with unit DC gain, exact for a held input.
+/// The delay of the frame and the line that it needs.
 template <class T>
-struct LagPair {
-  T first_share{1.0};  ///< 1 - exp(-sample/tau)
-  T second_share{1.0};
-
-  LagPair() noexcept = default;
-  LagPair(const T& first_s, const T& second_s, double sample_s) noexcept
-      : first_share(T(1.0) - exp_of(T(-sample_s) / first_s)), second_share(T(1.0) - exp_of(T(-sample_s) / second_s)) {}
-
-  MGDD_INLINE void step(T& first, T& second, const T& input) const noexcept {
-    first += first_share * (input - first);
-    second += second_share * (first - second);
-  }
-};
+using DutyLine = dynamics::DelayLine<T, max_delay_samples>;
+using dynamics::LagPair;
 
 }  // namespace mgdd::throttle

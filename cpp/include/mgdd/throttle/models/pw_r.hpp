@@ -4,10 +4,14 @@
 // Every step is noexcept and allocation-free. The scalar T is double, Dual<N> (sensitivities) or Lanes<N> (many runs).
 #pragma once
 
+#include <array>
 #include <cstddef>
+#include <string_view>
+#include <tuple>
 #include <type_traits>
 
-#include "mgdd/math/select.hpp"
+#include "mgdd/dynamics/dry_friction.hpp"
+#include "mgdd/throttle/limp_home_spring.hpp"
 #include "mgdd/throttle/models/pseudo_wiener_frame.hpp"
 #include "mgdd/throttle/throttle.hpp"
 
@@ -18,13 +22,6 @@ enum class Switching {
   predicted,  ///< by the sign of the predicted position, the preload ramped over +-`ramp_deg`
   measured,   ///< frozen at what the last measurement said, with a dead band
 };
-enum class DryFriction {
-  set_valued,  ///< sticks exactly (proximal step)
-  /// Smooth, for gradients: under a load of a share r of the friction it creeps at up to w_e atanh(r) (half: 0.55 w_e);
-  /// the level is right within 0.5 % above 3 w_e.
-  tanh,
-};
-
 template <class T>
 struct BasicPwRSide {
   T tau_s{0.0197};
@@ -38,6 +35,10 @@ struct BasicPwRSide {
   bool operator==(const BasicPwRSide&) const = default;
 };
 
+/// ParameterError for settings of PW-R outside their domain.
+void check_pw_r(const PseudoWienerFrame& frame, double ramp_deg, double tanh_deg_per_s, double dead_band_deg,
+                Friction friction);
+
 template <class T>
 struct BasicPwR {
   BasicPwRSide<T> above{};
@@ -48,13 +49,38 @@ struct BasicPwR {
   double tanh_deg_per_s = 30.0;
   double dead_band_deg = 0.3;  ///< of the measured switching
   Switching switching = Switching::predicted;
-  DryFriction friction = DryFriction::set_valued;
+  /// `coulomb`, or `tanh` for gradients: under a load of a share r of the friction that one creeps at up to
+  /// w_e atanh(r) (half: 0.55 w_e); the level is right within 0.5 % above 3 w_e.
+  Friction friction = Friction::coulomb;
 
   bool operator==(const BasicPwR&) const = default;
 
   /// ParameterError naming field, value and bound.
   void validate() const
     requires std::is_same_v<T, double>;
+  void validate_settings() const { check_pw_r(frame, ramp_deg, tanh_deg_per_s, dead_band_deg, friction); }
+
+  /// The numbers in the order of `fields`.
+  template <class Self>
+  static auto numbers(Self& p) noexcept {
+    auto& a = p.above;
+    auto& b = p.below;
+    return std::array{&a.tau_s,
+                      &a.gain_deg_per_s2_per_duty,
+                      &a.preload_duty,
+                      &a.spring_duty_per_deg,
+                      &a.coulomb_duty,
+                      &a.square_per_deg,
+                      &a.cube_per_deg2,
+                      &b.tau_s,
+                      &b.gain_deg_per_s2_per_duty,
+                      &b.preload_duty,
+                      &b.spring_duty_per_deg,
+                      &b.coulomb_duty,
+                      &b.square_per_deg,
+                      &b.cube_per_deg2,
+                      &p.limp_home_deg};
+  }
 };
 using PwRSide = BasicPwRSide<double>;
 using PwR = BasicPwR<double>;
@@ -65,65 +91,51 @@ struct BasicPwRState {
   T speed_deg_per_s{0.0};
   T bias_duty{0.0};  ///< b, what an observer subtracts from the duty
   T above{1.0};      ///< side of the measured switching: 1 above, -1 below
-  DelayLine<T> line{};
+  DutyLine<T> line{};
 };
 
 /// The five groups of a first-principle throttle, both sides.
 PwR pw_r_of(const Throttle& throttle) noexcept;
 
-/// A model with everything prepared that a step of `step_s` needs.
-template <class T>
+/// What a step needs of one side.
+template <class C>
+struct PreparedSide {
+  SpringSide<C> spring;
+  C decay;      ///< 1 + h/tau
+  C step_gain;  ///< h G
+  C friction;   ///< h G delta
+};
+
+/// Prepared: coefficients C on states of T, the same or plain numbers on duals.
+template <class T, class C = T>
 class BasicPwRModel {
  public:
-  using Parameters = BasicPwR<T>;
+  using Scalar = T;
+  using Parameters = BasicPwR<C>;
   using State = BasicPwRState<T>;
+  using Input = T;
+  static constexpr int n_observed = 3;
 
-  explicit BasicPwRModel(const Parameters& parameters) noexcept
-      : BasicPwRModel(parameters, parameters.frame.sample_s / parameters.frame.substeps) {}
-  BasicPwRModel(const Parameters& parameters, double step_s) noexcept
-      : p_(parameters), h_(step_s), above_(side(parameters.above)), below_(side(parameters.below)) {
-    lowest_ = inverse_map(p_.below, T(p_.frame.closed_deg) - p_.limp_home_deg);
-    highest_ = inverse_map(p_.above, T(p_.frame.open_deg) - p_.limp_home_deg);
+  /// ParameterError for settings that no model can work with (`validate_settings`); bounds of numbers are a search's.
+  explicit BasicPwRModel(const Parameters& parameters)
+      : BasicPwRModel((parameters.validate_settings(), parameters), unchecked) {}
+  BasicPwRModel(const Parameters& parameters, Unchecked) noexcept
+      : p_(parameters),
+        delay_(parameters.frame.delay()),
+        h_(parameters.frame.sample_s / parameters.frame.substeps),
+        over_ramp_(1.0 / parameters.ramp_deg),
+        over_tanh_(1.0 / parameters.tanh_deg_per_s),
+        above_(side(parameters.above)),
+        below_(side(parameters.below)) {
+    lowest_ = inverse_map(p_.below, C(p_.frame.closed_deg) - p_.limp_home_deg);
+    highest_ = inverse_map(p_.above, C(p_.frame.open_deg) - p_.limp_home_deg);
   }
 
-  /// One proximal step with the duty that acts now.
-  MGDD_INLINE void step(State& s, const T& acting_duty) const noexcept {
-    const T zero(0.0);
-    const T one(1.0);
-    const T x = s.position_deg;
-    const T w = s.speed_deg_per_s;
-    const bool follows = p_.switching == Switching::predicted;
-    const auto up = follows ? x >= zero : s.above >= zero;
-    const T preload = select(up, above_.preload, below_.preload);
-    const T spring = select(up, above_.spring, below_.spring);
-    const T gain = select(up, above_.step_gain, below_.step_gain);
-    const T friction = select(up, above_.friction, below_.friction);
-    const T ramp = x * T(1.0 / p_.ramp_deg);
-    const T clipped = larger(smaller(ramp, one), -one);
-    const T share = follows ? clipped : s.above;
-    const T slope = follows ? select(clipped == ramp, preload * T(1.0 / p_.ramp_deg), zero) : zero;
-    const T divisor = select(up, above_.decay, below_.decay) + T(h_) * gain * (spring + slope);
-    const T drive = w + gain * (acting_duty - s.bias_duty - preload * share - spring * x);
-    T next = zero;
-    if (p_.friction == DryFriction::set_valued) {
-      const T size = larger(drive, -drive);
-      next = select(size <= friction, zero, (drive - with_sign(friction, drive)) / divisor);
-    } else {
-      const T t = tanh_of(w * T(1.0 / p_.tanh_deg_per_s));
-      const T steep = friction * (one - t * t) * T(1.0 / p_.tanh_deg_per_s);
-      next = (drive - friction * t + steep * w) / (divisor + steep);
-    }
-    const T moved = x + T(h_) * next;
-    const T held = larger(smaller(moved, highest_), lowest_);
-    s.speed_deg_per_s = select(held == moved, next, zero);
-    s.position_deg = held;
-  }
-
-  /// One sample: delay line, then the steps of the frame.
-  MGDD_INLINE void advance(State& s, const T& duty) const noexcept {
-    const T acting = s.line.pass(duty, p_.frame.delay_samples);
+  /// One sample: delay line, then the proximal steps of the frame.
+  MGDD_INLINE void step(State& s, const T& duty) const noexcept {
+    const T acting = s.line.pass(duty, delay_);
     for (int i = 0; i < p_.frame.substeps; ++i)
-      step(s, acting);
+      advance(s, acting);
   }
 
   /// Angle [deg].
@@ -133,9 +145,10 @@ class BasicPwRModel {
     return p_.limp_home_deg + x * (T(1.0) + x * (select(up, p_.above.square_per_deg, p_.below.square_per_deg) +
                                                  x * select(up, p_.above.cube_per_deg2, p_.below.cube_per_deg2)));
   }
+  double sample_s() const noexcept { return p_.frame.sample_s; }
 
   /// At rest at an angle, `duty` in the delay line.
-  State at_rest(const T& angle_deg, const T& duty) const noexcept {
+  State at_rest(const T& angle_deg, const T& duty = T(0.0)) const noexcept {
     State s;
     s.position_deg = position_of(angle_deg);
     s.above = select(s.position_deg >= T(0.0), T(1.0), T(-1.0));
@@ -145,37 +158,117 @@ class BasicPwRModel {
 
   /// Pulls the state toward a measured angle: x += l1 e, w += l2 e, b -= l3 e; switches the measured side outside the
   /// dead band (position, speed and bias carry over).
-  MGDD_INLINE void reanchor(State& s, const T& angle_deg, const Anchor& a) const noexcept {
+  MGDD_INLINE void correct(State& s, const T& angle_deg, const ObserverGains& gains) const noexcept {
     const T x = position_of(angle_deg);
     const T error = x - s.position_deg;
-    const T limit(a.bias_limit_duty);
-    s.position_deg = larger(smaller(s.position_deg + T(a.angle_gain) * error, highest_), lowest_);
-    s.speed_deg_per_s += T(a.speed_gain_per_s) * error;
-    s.bias_duty = larger(smaller(s.bias_duty - T(a.bias_gain_duty_per_deg) * error, limit), -limit);
+    pull(s.position_deg, s.speed_deg_per_s, s.bias_duty, error, gains);
+    confine(s);
+    see(s, angle_deg);
+  }
+  /// Keeps a corrected position inside the travel.
+  MGDD_INLINE void confine(State& s) const noexcept {
+    s.position_deg = larger(smaller(s.position_deg, T(highest_)), T(lowest_));
+  }
+  /// Takes the side of the measured switching from a measured angle.
+  MGDD_INLINE void see(State& s, const T& angle_deg) const noexcept {
     const T away = angle_deg - p_.limp_home_deg;
-    const T band(p_.dead_band_deg);
+    const T band = T(p_.dead_band_deg);
     s.above = select(away > band, T(1.0), select(away < -band, T(-1.0), s.above));
   }
 
+  /// Whether the plate stands still.
+  auto stuck(const State& s) const noexcept {
+    return larger(s.speed_deg_per_s, -s.speed_deg_per_s) < T(dynamics::rest_speed);
+  }
+  /// Held duty at which the plate would begin to move from the position of a state, were it at rest there.
+  dynamics::Breakaway<T> breakaway(const State& s) const noexcept {
+    const auto up = side_of(s);
+    const SpringLoad<T, C> load = spring(s, up);
+    const T balance = s.bias_duty + load.preload + load.elastic;
+    const T level =
+        T(p_.friction == Friction::tanh ? C(0.0) : select(up, p_.above.coulomb_duty, p_.below.coulomb_duty));
+    return {balance - level, balance + level};
+  }
+
   const Parameters& parameters() const noexcept { return p_; }
+  template <class U>
+  BasicPwRModel<U, C> over() const noexcept {
+    return BasicPwRModel<U, C>(*this);
+  }
+  template <class S>
+  static auto numbers(S& s) noexcept {
+    return std::apply(
+        [&](auto&... before) {
+          return std::array{&s.position_deg, &s.speed_deg_per_s, &s.bias_duty, &s.above, &before...};
+        },
+        s.line.before);
+  }
+  static constexpr std::array<std::string_view, 4 + max_delay_samples> number_names{
+      "position_deg", "speed_deg_per_s", "bias_duty", "above",   "before_0",
+      "before_1",     "before_2",        "before_3",  "before_4"};
 
  private:
-  struct Side {
-    T decay;      // 1 + h/tau
-    T step_gain;  // h G
-    T preload, spring;
-    T friction;  // h G delta
-  };
-  Side side(const BasicPwRSide<T>& s) const noexcept {
-    const T gain = T(h_) * s.gain_deg_per_s2_per_duty;
-    return {T(1.0) + T(h_) / s.tau_s, gain, s.preload_duty, s.spring_duty_per_deg, gain * s.coulomb_duty};
+  template <class, class>
+  friend class BasicPwRModel;
+  template <class V>
+  explicit BasicPwRModel(const BasicPwRModel<V, C>& o) noexcept
+      : p_(o.p_),
+        delay_(o.delay_),
+        h_(o.h_),
+        over_ramp_(o.over_ramp_),
+        over_tanh_(o.over_tanh_),
+        above_(o.above_),
+        below_(o.below_),
+        lowest_(o.lowest_),
+        highest_(o.highest_) {}
+
+  PreparedSide<C> side(const BasicPwRSide<C>& s) const noexcept {
+    const C gain = C(h_) * s.gain_deg_per_s2_per_duty;
+    return {{s.spring_duty_per_deg, s.preload_duty}, C(1.0) + C(h_) / s.tau_s, gain, gain * s.coulomb_duty};
+  }
+  MGDD_INLINE auto side_of(const State& s) const noexcept {
+    return p_.switching == Switching::predicted ? s.position_deg >= T(0.0) : s.above >= T(0.0);
+  }
+  template <class Mask>
+  MGDD_INLINE SpringLoad<T, C> spring(const State& s, const Mask& up) const noexcept {
+    if (p_.switching == Switching::predicted) {
+      return limp_home_spring(s.position_deg, above_.spring, below_.spring, C(over_ramp_));
+    }
+    return spring_of_side(s.position_deg, s.above, select(up, above_.spring.stiffness, below_.spring.stiffness),
+                          select(up, above_.spring.preload, below_.spring.preload), C(0.0));
+  }
+  /// One proximal step with the duty that acts now.
+  MGDD_INLINE void advance(State& s, const T& acting_duty) const noexcept {
+    const T x = s.position_deg;
+    const T w = s.speed_deg_per_s;
+    const auto up = side_of(s);
+    const bool follows = p_.switching == Switching::predicted;
+    const C preload = select(up, above_.spring.preload, below_.spring.preload);
+    const C stiffness = select(up, above_.spring.stiffness, below_.spring.stiffness);
+    const C gain = select(up, above_.step_gain, below_.step_gain);
+    const C friction = select(up, above_.friction, below_.friction);
+    const T ratio = x * T(over_ramp_);
+    const T clipped = linear_share(ratio);
+    const T share = follows ? clipped : s.above;
+    const C slope = follows ? select(clipped == ratio, preload * C(over_ramp_), C(0.0)) : C(0.0);
+    const C divisor = select(up, above_.decay, below_.decay) + C(h_) * gain * (stiffness + slope);
+    const T drive = w + gain * (acting_duty - s.bias_duty - preload * share - stiffness * x);
+    T next(0.0);
+    if (p_.friction == Friction::coulomb) {
+      next = dynamics::stick_or_slide(drive, friction, friction, divisor);
+    } else {
+      next = dynamics::creep(w, drive, friction, C(over_tanh_), divisor);
+    }
+    const T moved = x + T(h_) * next;
+    dynamics::stop_at_ends(s.position_deg, s.speed_deg_per_s, moved, next, lowest_, highest_);
   }
   /// x with h(x) = y: Newton from x = y; monotone because h' >= 0.2 over the travel.
-  MGDD_INLINE static T inverse_map(const BasicPwRSide<T>& s, const T& y) noexcept {
-    T x = y;
+  template <class U>
+  MGDD_INLINE static U inverse_map(const BasicPwRSide<C>& s, const U& y) noexcept {
+    U x = y;
     for (int i = 0; i < 6; ++i) {
-      const T value = x * (T(1.0) + x * (s.square_per_deg + x * s.cube_per_deg2)) - y;
-      const T slope = T(1.0) + x * (T(2.0) * s.square_per_deg + T(3.0) * x * s.cube_per_deg2);
+      const U value = x * (U(1.0) + x * (s.square_per_deg + x * s.cube_per_deg2)) - y;
+      const U slope = U(1.0) + x * (C(2.0) * s.square_per_deg + C(3.0) * x * s.cube_per_deg2);
       x = x - value / slope;
     }
     return x;
@@ -186,17 +279,12 @@ class BasicPwRModel {
   }
 
   Parameters p_;
-  double h_;
-  Side above_, below_;
-  T lowest_, highest_;
+  dynamics::Delay delay_;
+  double h_, over_ramp_, over_tanh_;
+  PreparedSide<C> above_, below_;
+  C lowest_, highest_;
 };
 using PwRState = BasicPwRState<double>;
 using PwRModel = BasicPwRModel<double>;
-
-/// One proximal step of length `dt_s` from bare parameters; a loop prepares a model once instead.
-template <class T>
-void step(const BasicPwR<T>& parameters, BasicPwRState<T>& state, const T& duty, double dt_s) noexcept {
-  BasicPwRModel<T>(parameters, dt_s).step(state, duty);
-}
 
 }  // namespace mgdd::throttle

@@ -9,7 +9,25 @@
 #include <numbers>
 #include <string_view>
 
+#include "mgdd/dynamics/rk4.hpp"
+#include "mgdd/throttle/limp_home_spring.hpp"
+
 namespace mgdd::throttle {
+
+/// Coefficients of the right-hand side, divided by inertia or inductance once.
+template <class C>
+struct SmoothCoefficients {
+  C torque, viscous, coulomb, over_width, spring, preload, over_preload_width, limp_home, emf, resistance;
+  C current_to_speed;  ///< N/J
+  C speed_to_current;  ///< N/L
+  C over_inertia, over_inductance, supply;
+};
+
+/// Deflection from limp-home and the two tangents of a state.
+template <class T>
+struct SmoothRatios {
+  T deflection, friction, preload;
+};
 
 /// J dw/dt = N Km i - Kv w - Tc tanh(w/ws) - ks (theta - thLH) - Tpd tanh((theta - thLH)/ths)
 /// L di/dt = Vb u - R i - N Ke w,  dtheta/dt = w.  No end stops: keep the record inside the travel.
@@ -34,20 +52,52 @@ struct SmoothPlant {
   double inductance_h = 1e-3;
   double supply_v = 12.0;
 
-  template <class T>
-  std::array<T, 3> derivative(const std::array<T, 10>& p, const std::array<T, 3>& x,
-                              const std::array<double, 1>& duty) const noexcept {
-    using std::tanh;
-    const T deflection = x[0] - p[7];
-    const T torque = gear_ratio * (p[0] * x[2]) - p[1] * x[1] - p[2] * tanh(x[1] / p[3]) - p[4] * deflection -
-                     p[5] * tanh(deflection / p[6]);
-    return {x[1], torque / inertia_kgm2,
-            (supply_v * duty[0] - p[9] * x[2] - gear_ratio * (p[8] * x[1])) / inductance_h};
+  template <class C>
+  MGDD_INLINE SmoothCoefficients<C> coefficients(const std::array<C, 10>& p) const noexcept {
+    SmoothCoefficients<C> c{};
+    c.over_inertia = constant_of<C>(1.0 / inertia_kgm2);
+    c.over_inductance = constant_of<C>(1.0 / inductance_h);
+    c.current_to_speed = constant_of<C>(gear_ratio / inertia_kgm2);
+    c.speed_to_current = constant_of<C>(gear_ratio / inductance_h);
+    c.supply = constant_of<C>(supply_v / inductance_h);
+    c.torque = p[0] * c.current_to_speed;
+    c.viscous = p[1] * c.over_inertia;
+    c.coulomb = p[2] * c.over_inertia;
+    c.over_width = constant_of<C>(1.0) / p[3];
+    c.spring = p[4] * c.over_inertia;
+    c.preload = p[5] * c.over_inertia;
+    c.over_preload_width = constant_of<C>(1.0) / p[6];
+    c.limp_home = p[7];
+    c.emf = p[8] * c.speed_to_current;
+    c.resistance = p[9] * c.over_inductance;
+    return c;
   }
 
-  template <class T>
-  T output(const std::array<T, 10>&, const std::array<T, 3>& x, const std::array<double, 1>&) const noexcept {
-    return x[0] * (180.0 / std::numbers::pi);
+  /// The law, of which the fit's kernel makes its hand-written derivatives: acceleration and rise of the current, with
+  /// the tangents given. They come last: they are the longest chain of dependent operations.
+  template <class T, class C>
+  MGDD_INLINE static T acceleration(const SmoothCoefficients<C>& c, const T& speed, const T& current,
+                                    const SmoothRatios<T>& r) noexcept {
+    const SmoothSpring<T> spring = smooth_spring(r.deflection, r.preload, c.spring, c.preload);
+    return ((c.torque * current - c.viscous * speed) - spring.elastic) - (c.coulomb * r.friction + spring.preload);
+  }
+  template <class T, class C, class D>
+  MGDD_INLINE static T current_rise(const SmoothCoefficients<C>& c, const T& speed, const T& current,
+                                    const D& drive) noexcept {
+    return drive - c.resistance * current - c.emf * speed;
+  }
+
+  template <class T, class C, class U>
+  MGDD_INLINE std::array<T, 3> derivative(const SmoothCoefficients<C>& c, const std::array<T, 3>& x,
+                                          const std::array<U, 1>& duty) const noexcept {
+    const T deflection = x[0] - c.limp_home;
+    const SmoothRatios<T> ratios{deflection, tanh_of(x[1] * c.over_width), tanh_of(deflection * c.over_preload_width)};
+    return {x[1], acceleration(c, x[1], x[2], ratios), current_rise(c, x[1], x[2], T(duty[0]) * c.supply)};
+  }
+
+  template <class T, class C>
+  MGDD_INLINE T output(const SmoothCoefficients<C>&, const std::array<T, 3>& x) const noexcept {
+    return x[0] * T(180.0 / std::numbers::pi);
   }
 
   bool operator==(const SmoothPlant&) const = default;

@@ -1,0 +1,130 @@
+// Calls with arguments that no signature takes. pybind11 then lists signatures; here mgdd._arguments names the argument
+// that does not fit. The functions of the module get a dispatcher that looks at their error; a call that fits costs
+// nothing.
+#include <cstddef>
+#include <string>
+#include <string_view>
+#include <unordered_map>
+
+#include "binding.hpp"
+
+namespace mgdd::bindings {
+namespace {
+
+using Fast = PyObject* (*)(PyObject*, PyObject* const*, Py_ssize_t, PyObject*);
+using Plain = PyObject* (*)(PyObject*, PyObject*, PyObject*);
+
+// pybind11 has one dispatcher for all functions; how it is called depends on its version.
+Fast fast_dispatcher = nullptr;
+Plain plain_dispatcher = nullptr;
+
+// Setters have no name of their own: the name of the property by their function record.
+std::unordered_map<PyObject*, std::string>& setter_names() {
+  static auto* names = new std::unordered_map<PyObject*, std::string>;
+  return *names;
+}
+
+bool is_refusal() {
+  if (PyErr_ExceptionMatches(PyExc_TypeError) == 0) return false;
+  py::error_already_set error;
+  const bool ours = std::string_view(error.what()).find("(): incompatible ") != std::string_view::npos;
+  error.restore();
+  return ours;
+}
+
+// Replaces the TypeError of pybind11; `given` are all arguments by place, `self` included.
+void explain(PyObject* function, const py::list& given, const py::dict& keywords) {
+  try {
+    py::error_already_set original;
+    const py::detail::function_record* record = py::detail::function_record_ptr_from_PyObject(function);
+    py::list signatures;
+    for (const py::detail::function_record* at = record; at != nullptr; at = at->next)
+      signatures.append(py::str(at->signature));
+    const bool method = record->is_method && py::len(given) > 0;
+    const py::object own = method ? given[py::slice(1, std::nullopt, std::nullopt)] : py::object(given);
+    const auto setter = setter_names().find(function);
+    py::object name = py::str(setter != setter_names().end() ? setter->second : std::string(record->name));
+    if (record->is_constructor && method) name = py::type::of(given[0]).attr("__name__");
+    const py::object owner = record->is_method ? py::reinterpret_borrow<py::object>(record->scope) : py::none();
+    if (record->is_method && (!method || !py::isinstance(given[0], owner))) {
+      const auto text = py::str("{}() is a method of {}: call it on one").format(name, owner.attr("__name__"));
+      PyErr_SetObject(PyExc_TypeError, text.ptr());
+      return;
+    }
+    const py::object error =
+        py::module_::import("mgdd._arguments").attr("refusal")(name, signatures, own, keywords, record->is_method);
+    PyErr_SetObject(py::type::of(error).ptr(), error.ptr());
+  } catch (py::error_already_set& error) {
+    error.restore();
+  }
+}
+
+PyObject* call_fast(PyObject* self, PyObject* const* arguments, Py_ssize_t count, PyObject* names) {
+  PyObject* result = fast_dispatcher(self, arguments, count, names);
+  if (result != nullptr || !is_refusal()) return result;
+  const Py_ssize_t places = PyVectorcall_NARGS(static_cast<std::size_t>(count));
+  py::list given;
+  for (Py_ssize_t i = 0; i < places; ++i)
+    given.append(py::handle(arguments[i]));
+  py::dict keywords;
+  const Py_ssize_t named = names == nullptr ? 0 : PyTuple_GET_SIZE(names);
+  for (Py_ssize_t i = 0; i < named; ++i)
+    keywords[py::handle(PyTuple_GET_ITEM(names, i))] = py::handle(arguments[places + i]);
+  explain(self, given, keywords);
+  return nullptr;
+}
+
+PyObject* call_plain(PyObject* self, PyObject* arguments, PyObject* named) {
+  PyObject* result = plain_dispatcher(self, arguments, named);
+  if (result != nullptr || !is_refusal()) return result;
+  explain(self, py::list(py::reinterpret_borrow<py::tuple>(arguments)),
+          named == nullptr ? py::dict() : py::reinterpret_borrow<py::dict>(named));
+  return nullptr;
+}
+
+void wrap(PyObject* object, const std::string& setter = "") {
+  if (PyInstanceMethod_Check(object)) object = PyInstanceMethod_GET_FUNCTION(object);
+  if (!PyCFunction_Check(object) || PyCFunction_GET_SELF(object) == nullptr ||
+      py::detail::function_record_ptr_from_PyObject(PyCFunction_GET_SELF(object)) == nullptr) {
+    return;
+  }
+  if (!setter.empty()) setter_names()[PyCFunction_GET_SELF(object)] = setter;
+  PyMethodDef* method = reinterpret_cast<PyCFunctionObject*>(object)->m_ml;
+  void (*const now)() = reinterpret_cast<void (*)()>(method->ml_meth);
+  if ((method->ml_flags & METH_FASTCALL) != 0) {
+    if (now == reinterpret_cast<void (*)()>(&call_fast)) return;
+    fast_dispatcher = reinterpret_cast<Fast>(now);
+    method->ml_meth = reinterpret_cast<PyCFunction>(reinterpret_cast<void (*)()>(&call_fast));
+  } else {
+    if (now == reinterpret_cast<void (*)()>(&call_plain)) return;
+    plain_dispatcher = reinterpret_cast<Plain>(now);
+    method->ml_meth = reinterpret_cast<PyCFunction>(reinterpret_cast<void (*)()>(&call_plain));
+  }
+}
+
+void wrap_members(const py::handle& owner) {
+  for (const auto& [name, member] : py::dict(owner.attr("__dict__"))) {
+    if (py::isinstance<py::type>(member)) {
+      if (py::hasattr(member, "__module__") && member.attr("__module__").equal(owner.attr("__name__"))) {
+        wrap_members(member);
+      }
+    } else if (py::isinstance<py::module_>(member)) {
+      wrap_members(member);
+    } else if (Py_TYPE(member.ptr()) == &PyProperty_Type) {
+      wrap(member.attr("fget").ptr());
+      wrap(member.attr("fset").ptr(), name.cast<std::string>());
+    } else if (Py_TYPE(member.ptr()) == &PyStaticMethod_Type) {
+      wrap(member.attr("__func__").ptr());
+    } else {
+      wrap(member.ptr());
+    }
+  }
+}
+
+}  // namespace
+
+void make_refusals_readable(const py::module_& m) {
+  wrap_members(m);
+}
+
+}  // namespace mgdd::bindings

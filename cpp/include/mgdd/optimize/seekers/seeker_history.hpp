@@ -1,0 +1,76 @@
+// What a seeker was told, cycle by cycle, and a seeker that keeps such a history of itself. Columns stand in the unit
+// of the input and of J. Desk-time code: recording allocates, in blocks.
+#pragma once
+
+#include <cmath>
+#include <cstddef>
+#include <cstdint>
+#include <utility>
+#include <vector>
+
+#include "mgdd/common/state.hpp"
+#include "mgdd/optimize/seekers/seeker.hpp"
+
+namespace mgdd::optimize {
+
+class SeekerHistory {
+ public:
+  explicit SeekerHistory(Eigen::Index inputs) : inputs_(static_cast<std::size_t>(inputs)) {}
+
+  /// Makes the next `cycles` calls of `add` free of allocation.
+  void make_room(std::size_t cycles);
+
+  /// One told cycle: what was applied, the estimate before it was told, J as told, NaN where the cycle misfired.
+  void add(std::int64_t cycle, const Inputs& applied, const Inputs& estimate, double objective, bool misfire);
+  void clear() noexcept { rows_.clear(); }
+
+  std::size_t size() const noexcept { return rows_.size() / width(); }
+  std::size_t inputs() const noexcept { return inputs_; }
+
+  /// Columns `cycle`, `objective`, `misfire` (0 or 1) and, row by row, `applied` and `estimate`.
+  StateColumns save() const;
+  /// The history as `save` gave it; ShapeError or ParameterError name the column, and nothing is changed then.
+  void restore(const StateColumns& columns);
+
+ private:
+  std::size_t width() const noexcept { return 3 + 2 * inputs_; }
+
+  std::size_t inputs_;
+  std::vector<double> rows_;  // cycle, objective, misfire, applied, estimate of one cycle after the other
+};
+
+/// A seeker with its history, for loops and for the desk. `ask` and `tell` are those of the seeker, bit for bit.
+template <class S>
+class RecordedSeeker {
+ public:
+  explicit RecordedSeeker(S seeker) : seeker_(std::move(seeker)), history_(seeker_.estimate().size()) {}
+
+  const Inputs& ask() noexcept { return seeker_.ask(); }
+  /// Records what the seeker accepts or counts as misfired, nothing else.
+  TellStatus tell(const Reading& reading) {
+    history_.make_room(1);  // before the seeker learns: without memory nothing has happened
+    const std::int64_t cycle = seeker_.protocol().cycle;
+    const Inputs applied = seeker_.applied();  // a seeker may move both while it learns
+    const Inputs estimate = seeker_.estimate();
+    const TellStatus status = seeker_.tell(reading);
+    if (status == TellStatus::accepted || status == TellStatus::misfire) {
+      const bool misfire = status == TellStatus::misfire;
+      history_.add(cycle, applied, estimate, misfire ? std::nan("") : objective_of(reading, true), misfire);
+    }
+    return status;
+  }
+  void restart() noexcept { seeker_.restart(); }
+  void restore(const StateColumns& state) { restore_state(seeker_, state); }
+
+  const Inputs& estimate() const noexcept { return seeker_.estimate(); }
+  std::size_t component_count() const noexcept { return seeker_.component_count(); }
+  const S& seeker() const noexcept { return seeker_; }
+  SeekerHistory& history() noexcept { return history_; }
+  const SeekerHistory& history() const noexcept { return history_; }
+
+ private:
+  S seeker_;
+  SeekerHistory history_;
+};
+
+}  // namespace mgdd::optimize

@@ -1,0 +1,42 @@
+#include "mgdd/identify/throttle/first_principle_fit.hpp"
+
+#include <string>
+
+#include "mgdd/common/field.hpp"
+
+namespace mgdd::identify {
+
+using throttle::FirstPrinciple;
+
+std::vector<optimize::Parameter> first_principle_parameters() {
+  std::vector<optimize::Parameter> out;
+  for (const FieldInfo& field : FirstPrinciple::parameters)
+    out.push_back(optimize::parameter_of(field, std::string(field.name)));
+  return out;
+}
+
+FirstPrincipleFit fit_first_principle(const FirstPrinciple& model, const std::vector<SimulationRecord>& records,
+                                      const std::vector<FitStage>& stages, const std::vector<Values<double, 9>>& starts,
+                                      std::size_t n_threads) {
+  model.validate();
+  const std::vector<optimize::Parameter> parameters = first_principle_parameters();
+  for (const Values<double, 9>& start : starts) {
+    for (std::size_t i = 0; i < start.size(); ++i)
+      require_in(FirstPrinciple::parameters[i], start[i]);
+  }
+  std::vector<Eigen::VectorXd> indices;  // which start: each thread then owns its entry of `ends`
+  std::vector<Values<double, 9>> ends = starts;
+  for (std::size_t i = 0; i < starts.size(); ++i)
+    indices.push_back(Eigen::VectorXd::Constant(1, static_cast<double>(i)));
+  FirstPrincipleFit fit;
+  fit.starts = multi_start(
+      indices,
+      [&](const Eigen::VectorXd& index) {
+        return fit_in_stages(model, parameters, records, stages, ends[static_cast<std::size_t>(index[0])]);
+      },
+      n_threads);
+  fit.values = ends[fit.starts.best];
+  return fit;
+}
+
+}  // namespace mgdd::identify

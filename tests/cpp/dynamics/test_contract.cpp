@@ -1,0 +1,184 @@
+// Every model of the library on every scalar of the contract: the same run on double, float, duals and lanes, whole and
+// fractional delays, saved and restored states.
+#include <gtest/gtest.h>
+
+#include <cmath>
+#include <span>
+#include <vector>
+
+#include "mgdd/common/state.hpp"
+#include "mgdd/dynamics/observer.hpp"
+#include "mgdd/dynamics/simulate.hpp"
+#include "mgdd/throttle/models/first_principle.hpp"
+#include "mgdd/throttle/models/pseudo_wiener.hpp"
+#include "mgdd/throttle/models/smooth.hpp"
+#include "mgdd/throttle/plant.hpp"
+#include "support/no_alloc.hpp"
+#include "support/throttle_records.hpp"
+#include "systems/drive_axis.hpp"
+#include "systems/two_tanks.hpp"
+#include "systems/wiener_hammerstein.hpp"
+
+namespace mgdd::dynamics {
+namespace {
+
+constexpr std::size_t samples = 300;
+
+std::vector<double> inputs(double offset, double amplitude) {
+  std::vector<double> u(samples);
+  for (std::size_t k = 0; k < samples; ++k)
+    u[k] = offset + amplitude * std::sin(0.05 * static_cast<double>(k) + 1e-4 * static_cast<double>(k * k));
+  return u;
+}
+
+template <class M>
+std::vector<typename M::Scalar> outputs(const M& model, typename M::State state, const std::vector<double>& u) {
+  std::vector<typename M::Scalar> y(u.size(), typename M::Scalar(0.0));
+  const test_support::AllocationCounter counter;
+  simulate(model, state, std::span<const double>(u), std::span<typename M::Scalar>(y));
+  EXPECT_EQ(counter.count(), 0U);
+  return y;
+}
+
+/// `make(T)` gives a model and a state on that scalar.
+template <class Make>
+void expect_one_law(Make make, const std::vector<double>& u, double float_tolerance) {
+  const auto run = [&]<class T>(T) {
+    const auto [model, state] = make(T(0.0));
+    static_assert(DiscreteModel<std::remove_cvref_t<decltype(model)>>);
+    return outputs(model, state, u);
+  };
+  const std::vector<double> plain = run(double{});
+  const auto narrow = run(float{});
+  const auto dual = run(Dual<3>{});
+  const auto wide = run(Lanes<8>(0.0));
+  double spread = 0.0;
+  for (std::size_t k = 0; k < u.size(); ++k) {
+    spread = std::max(spread, std::abs(plain[k] - plain[0]));
+    ASSERT_NEAR(static_cast<double>(narrow[k]), plain[k], float_tolerance) << k;
+    ASSERT_NEAR(dual[k].value, plain[k], 1e-10 * (1.0 + std::abs(plain[k]))) << k;
+    for (int lane = 0; lane < 8; ++lane)
+      ASSERT_EQ(wide[k][lane], plain[k]) << k;
+  }
+  EXPECT_GT(spread, 0.0);
+}
+
+template <class F, std::size_t n, std::size_t n_start>
+auto from_family(const F& family, const std::array<double, n>& numbers, const std::array<double, n_start>& stated,
+                 double sample_s) {
+  return [=]<class T>(T) {
+    std::array<T, n> p{};
+    std::array<T, n_start> s{};
+    for (std::size_t i = 0; i < n; ++i)
+      p[i] = T(numbers[i]);
+    for (std::size_t i = 0; i < n_start; ++i)
+      s[i] = T(stated[i]);
+    const auto model = family.template prepare<T>(p, sample_s);
+    return std::pair(model, family.template start<T>(model, s));
+  };
+}
+
+template <class P>
+std::array<double, static_cast<std::size_t>(throttle::PseudoWienerFamily<P>::n_parameters)> values_of(const P& p) {
+  std::array<double, static_cast<std::size_t>(throttle::PseudoWienerFamily<P>::n_parameters)> out{};
+  const auto places = throttle::numbers(p);
+  for (std::size_t i = 0; i < out.size(); ++i)
+    out[i] = *places[i];
+  return out;
+}
+
+TEST(ModelContract, ThrottleModelsOnEveryScalar) {
+  using namespace throttle;
+  const auto u = inputs(0.15, 0.3);
+  for (const double delay : {0.0, 2.0, 1.75}) {
+    for (const auto friction : {Friction::coulomb, Friction::tanh}) {
+      FirstPrinciple groups;
+      groups.delay_samples = delay;
+      groups.friction = friction;
+      Throttle t;
+      t.preload_below_nm = 0.5;
+      expect_one_law(from_family(groups, first_principle_of(t), std::array{20.0, 0.0, 0.0}, 1e-3), u, 2e-2);
+      PwR r = pw_r_of(t);
+      r.frame.delay_samples = delay;
+      r.friction = friction;
+      expect_one_law(from_family(PseudoWienerFamily<PwR>{r}, values_of(r), std::array{20.0}, 1e-3), u, 2e-2);
+    }
+    PwW w;
+    w.rise_deg.fill(12.0);
+    w.frame.delay_samples = delay;
+    expect_one_law(from_family(PseudoWienerFamily<PwW>{w}, values_of(w), std::array{20.0}, 1e-3), u, 1e-3);
+    PwP p;
+    p.radius_duty[0] = 0.05;
+    p.gain_deg_per_duty[0] = 150.0;
+    p.frame.delay_samples = delay;
+    expect_one_law(from_family(PseudoWienerFamily<PwP>{p}, values_of(p), std::array{20.0}, 1e-3), u, 1e-3);
+  }
+  expect_one_law(from_family(Rk4<SmoothPlant>{}, smooth_plant_example, std::array{0.3, 0.0, 0.0}, 1e-3), u, 1e-2);
+}
+
+TEST(ModelContract, ThePlantOnEveryScalarWithEveryOption) {
+  using namespace throttle;
+  const auto u = inputs(0.15, 0.4);
+  for (const auto friction : {Friction::coulomb, Friction::stiction, Friction::stribeck, Friction::karnopp,
+                              Friction::tanh, Friction::lugre}) {
+    for (const auto backlash : {Backlash::none, Backlash::compliance, Backlash::hysteresis}) {
+      Throttle t;
+      t.friction = friction;
+      t.backlash = backlash;
+      t.stiction_nm = 0.31;
+      t.pressure_drop_kpa = 3.0;
+      const auto make = [&]<class T>(T) {
+        const BasicThrottlePlant<T> plant(coefficients_over<T>(plant_coefficients(t, 1e-4)), t, 1e-4);
+        return std::pair(Repeated<BasicThrottlePlant<T>>{plant, 10}, plant.at_rest(T(20.0)));
+      };
+      expect_one_law([&]<class T>(T zero) { return make(zero); }, u, 0.3);
+    }
+  }
+}
+
+TEST(ModelContract, BenchmarkSystemsOnEveryScalar) {
+  using namespace systems;
+  const std::array<double, 9> slide{95.0, 200.0, -37.0, 20.0, 2.0, 0.03, -0.5, -0.02, 3.0};
+  expect_one_law(from_family(DriveAxis{35.0, 0.1}, slide, std::array{0.1, 0.0, 0.0}, 1e-3), inputs(0.2, 2.0), 1e-4);
+  const std::array<double, 9> tanks{0.05, 0.01, 1.0, 0.05, 0.5, 1.0, 6.0, 0.5, 1.5};
+  expect_one_law(from_family(TwoTanks{}, tanks, std::array{5.0, 2.0, 0.0, 0.0}, 4.0), inputs(2.0, 1.0), 1e-3);
+  const WienerHammerstein circuit{.first_order = 1, .last_order = 2, .n_curve = 7, .lower = -1.5, .upper = 1.5};
+  Eigen::VectorXd x(circuit.n_parameters());
+  x << -0.6, 0.1, -1.1, 0.4, 0.05, 0.1, -2.0, -1.3, -0.9, 0.1, 0.5, 0.6, 0.65;
+  const auto u = inputs(0.0, 1.2);
+  const auto make = [&]<class T>(T zero) {
+    const WienerHammersteinModel<T> model(circuit, x);
+    return std::pair(model, model.at_rest(zero));
+  };
+  expect_one_law(make, u, 1e-4);
+  // The same signal as the whole record through the filters at once.
+  const WienerHammersteinModel<double> model(circuit, x);
+  auto state = model.at_rest(0.0);
+  std::vector<double> y(u.size());
+  respond(model, state, std::span<const double>(u), std::span<double>(y));
+  const Eigen::VectorXd whole = circuit.simulate(x, Eigen::Map<const Eigen::VectorXd>(u.data(), samples));
+  for (std::size_t k = 0; k < samples; ++k)
+    ASSERT_NEAR(y[k], whole[static_cast<Eigen::Index>(k)], 1e-13);
+}
+
+TEST(ModelContract, NumbersCarryTheWholeState) {
+  using namespace throttle;
+  PwR p;
+  p.frame.delay_samples = 2.5;
+  const PwRModel model(p);
+  auto state = model.at_rest(30.0, 0.2);
+  for (int k = 0; k < 20; ++k)
+    model.step(state, 0.3);
+  auto copy = lifted<PwRModel>(state);
+  auto narrow = lifted<BasicPwRModel<float>>(state);
+  for (int k = 0; k < 20; ++k) {
+    model.step(state, 0.1);
+    model.step(copy, 0.1);
+    BasicPwRModel<float>(lift<float>(p)).step(narrow, 0.1F);
+  }
+  EXPECT_EQ(model.output(copy), model.output(state));
+  EXPECT_NEAR(static_cast<double>(BasicPwRModel<float>(lift<float>(p)).output(narrow)), model.output(state), 1e-3);
+}
+
+}  // namespace
+}  // namespace mgdd::dynamics

@@ -1,0 +1,154 @@
+// A horizon under moves: slopes to moves, state numbers, bias and parameters against differences, nothing allocated.
+#include <gtest/gtest.h>
+
+#include <cmath>
+#include <span>
+
+#include "mgdd/dynamics/predict.hpp"
+#include "mgdd/throttle/models/first_principle.hpp"
+#include "mgdd/throttle/models/pseudo_wiener.hpp"
+#include "mgdd/throttle/plant.hpp"
+#include "support/no_alloc.hpp"
+
+namespace mgdd::dynamics {
+namespace {
+
+using throttle::FirstPrinciple;
+using throttle::PwR;
+
+constexpr std::size_t horizon = 20;
+const std::array<double, 3> moves{0.42, 0.21, 0.3};
+const std::array<int, 3> lengths{4, 6, 10};
+
+template <class M>
+std::array<double, horizon> angles(const M& model, typename M::State state, const std::array<double, 3>& u) {
+  std::array<double, horizon> out{};
+  std::size_t k = 0;
+  for (std::size_t m = 0; m < 3; ++m) {
+    for (int i = 0; i < lengths[m]; ++i, ++k) {
+      model.step(state, input_of(model, u[m]));
+      out[k] = model.output(state);
+    }
+  }
+  return out;
+}
+
+template <int n_states, class M>
+void expect_exact(const M& model, const typename M::State& state) {
+  constexpr Slopes slopes{n_states, 0};
+  std::array<double, horizon> y{};
+  std::array<std::array<double, 3 + n_states>, horizon> slope{};
+  const test_support::AllocationCounter counter;
+  predict<3, slopes>(model, state, moves, lengths, y, slope);
+  EXPECT_EQ(counter.count(), 0U);
+  static_assert(noexcept(predict<3, slopes>(model, state, moves, lengths, y, slope)));
+  const auto plain = angles(model, state, moves);
+  for (std::size_t k = 0; k < horizon; ++k)
+    ASSERT_NEAR(y[k], plain[k], 1e-10);
+  for (std::size_t d = 0; d < 3 + n_states; ++d) {
+    auto up = moves, down = moves;
+    auto above = state, below = state;
+    double h = 1e-6;
+    if (d < 3) {
+      up[d] += h;
+      down[d] -= h;
+    } else {
+      h = 1e-6 * (1.0 + std::abs(*M::numbers(above)[d - 3]));
+      *M::numbers(above)[d - 3] += h;
+      *M::numbers(below)[d - 3] -= h;
+    }
+    const auto high = angles(model, above, up);
+    const auto low = angles(model, below, down);
+    for (std::size_t k = 0; k < horizon; ++k) {
+      const double expected = (high[k] - low[k]) / (2.0 * h);
+      ASSERT_NEAR(slope[k][d], expected, 1e-5 * (1.0 + std::abs(expected))) << d << " at " << k;
+    }
+  }
+}
+
+template <class M>
+typename M::State moving(const M& model) {
+  typename M::State state{};
+  if constexpr (requires { model.model; }) {
+    state = model.model.at_rest(25.0);
+  } else {
+    state = model.at_rest(25.0);
+  }
+  for (int k = 0; k < 15; ++k)
+    model.step(state, input_of(model, 0.45));
+  return state;
+}
+
+TEST(Predict, SlopesToMovesStateAndBiasAreExact) {
+  for (const double delay : {0.0, 1.5}) {
+    PwR p;
+    p.frame.sample_s = 2e-3;
+    p.frame.delay_samples = delay;
+    const throttle::PwRModel pw_r(p);
+    expect_exact<3>(pw_r, moving(pw_r));  // position, speed, bias
+    FirstPrinciple family;
+    family.delay_samples = delay;
+    auto groups = throttle::first_principle_of(throttle::Throttle{});
+    const auto model = family.prepare<double>(groups, 2e-3);
+    expect_exact<4>(model, moving(model));  // angle, speed, torque, bias
+  }
+  const Repeated<throttle::ThrottlePlant> plant{throttle::ThrottlePlant{throttle::Throttle{}}, 20};
+  expect_exact<2>(plant, moving(plant));
+}
+
+TEST(Predict, SlopesToParametersAreExact) {
+  constexpr Slopes slopes{1, 2};
+  const auto values = throttle::first_principle_of(throttle::Throttle{});
+  const FirstPrinciple family;
+  const std::array<std::size_t, 2> free{1, 8};  // gain and electrical time
+  const auto model = family.prepare(seeded_parameters<3, slopes>(values, free), 2e-3);
+  const auto plain = family.prepare(values, 2e-3);
+  const auto state = moving(plain);
+  std::array<double, horizon> y{};
+  std::array<std::array<double, 6>, horizon> slope{};
+  predict<3, slopes>(model, state, moves, lengths, y, slope);
+  for (std::size_t j = 0; j < 2; ++j) {
+    auto up = values, down = values;
+    const double h = 1e-6 * values[free[j]];
+    up[free[j]] += h;
+    down[free[j]] -= h;
+    const auto high = angles(family.prepare(up, 2e-3), state, moves);
+    const auto low = angles(family.prepare(down, 2e-3), state, moves);
+    for (std::size_t k = 0; k < horizon; ++k) {
+      const double expected = (high[k] - low[k]) / (2.0 * h);
+      ASSERT_NEAR(slope[k][4 + j], expected, 1e-5 * (std::abs(expected) + 1e-3)) << j << " at " << k;
+    }
+  }
+}
+
+template <class Model64, class Model32>
+void expect_float_follows(const Model64& wide, const Model32& narrow) {
+  const auto state = moving(wide);
+  std::array<double, horizon> y{};
+  std::array<std::array<double, 3>, horizon> slope{};
+  predict<3>(wide, state, moves, lengths, y, slope);
+  std::array<float, horizon> y32{};
+  std::array<std::array<float, 3>, horizon> slope32{};
+  const test_support::AllocationCounter counter;
+  predict<3>(narrow, lifted<Model32>(state), std::array<float, 3>{0.42F, 0.21F, 0.3F}, lengths, y32, slope32);
+  EXPECT_EQ(counter.count(), 0U);
+  for (std::size_t k = 0; k < horizon; ++k) {
+    EXPECT_NEAR(static_cast<double>(y32[k]), y[k], 1e-3);
+    for (std::size_t m = 0; m < 3; ++m)
+      EXPECT_NEAR(static_cast<double>(slope32[k][m]), slope[k][m], 1e-3 * (1.0 + std::abs(slope[k][m])));
+  }
+}
+
+TEST(Predict, FloatFollowsDouble) {
+  PwR p;
+  p.frame.sample_s = 2e-3;
+  expect_float_follows(throttle::PwRModel(p), throttle::BasicPwRModel<float>(throttle::lift<float>(p)));
+  const auto values = throttle::first_principle_of(throttle::Throttle{});
+  std::array<float, 9> narrow{};
+  for (std::size_t i = 0; i < 9; ++i)
+    narrow[i] = static_cast<float>(values[i]);
+  expect_float_follows(FirstPrinciple{}.prepare(values, 2e-3), FirstPrinciple{}.prepare(narrow, 2e-3));
+}
+
+}  // namespace
+}  // namespace mgdd::dynamics

@@ -1,0 +1,99 @@
+// The history of a seeker: rows as they were told, back from its columns bit for bit, refused as a whole.
+#include "mgdd/optimize/seekers/seeker_history.hpp"
+
+#include <gtest/gtest.h>
+
+#include <cmath>
+#include <functional>
+#include <string>
+
+#include "mgdd/common/error.hpp"
+#include "support/seeker_case.hpp"
+
+namespace mgdd::optimize {
+namespace {
+
+RecordedSeeker<Spsa> two_inputs() {
+  SpsaSettings settings;
+  settings.space = space_at(inputs({8.0, -6.0}), 20.0);
+  settings.seed = 4;
+  return RecordedSeeker<Spsa>(Spsa(settings));
+}
+
+TEST(SeekerHistory, KeepsWhatWasToldAndNothingElse) {
+  RecordedSeeker<Spsa> seeker = two_inputs();
+  Spsa plain = seeker.seeker();
+  EXPECT_EQ(seeker.tell({}), TellStatus::not_asked);
+  EXPECT_EQ(seeker.history().size(), 0u);
+  for (int k = 0; k < 30; ++k) {
+    const Inputs asked = seeker.ask();
+    EXPECT_EQ(asked, plain.ask());
+    const Inputs before = seeker.estimate();
+    const double j[] = {-0.02 * asked[0] * asked[0] - 0.03 * asked[1] * asked[1]};
+    const double useless[] = {std::nan("")};
+    EXPECT_EQ(seeker.tell({useless, {}, false}), TellStatus::not_finite);
+    const bool misfire = k % 7 == 3;
+    EXPECT_EQ(seeker.tell({j, {}, misfire}), misfire ? TellStatus::misfire : TellStatus::accepted);
+    plain.tell({j, {}, misfire});
+    const StateColumns columns = seeker.history().save();
+    ASSERT_EQ(seeker.history().size(), static_cast<std::size_t>(k) + 1);
+    EXPECT_EQ(columns.at("cycle").back(), k);
+    EXPECT_EQ(columns.at("misfire").back(), misfire ? 1.0 : 0.0);
+    if (misfire) {
+      EXPECT_TRUE(std::isnan(columns.at("objective").back()));
+    } else {
+      EXPECT_EQ(columns.at("objective").back(), j[0]);
+    }
+    EXPECT_EQ(columns.at("applied").back(), asked[1]);
+    EXPECT_EQ(*(columns.at("applied").end() - 2), asked[0]);
+    EXPECT_EQ(columns.at("estimate").back(), before[1]);
+    EXPECT_EQ(*(columns.at("estimate").end() - 2), before[0]);
+  }
+  EXPECT_EQ(save_state(seeker.seeker()), save_state(plain));
+  seeker.history().clear();
+  EXPECT_EQ(seeker.history().size(), 0u);
+}
+
+TEST(SeekerHistory, RoomThatWasMadeIsNotAllocatedAgain) {
+  RecordedSeeker<Spsa> seeker = two_inputs();
+  seeker.history().make_room(200);
+  const double j[] = {1.0};
+  const test_support::AllocationCounter counter;
+  for (int k = 0; k < 200; ++k) {
+    seeker.ask();
+    seeker.tell({j, {}, false});
+  }
+  EXPECT_EQ(counter.count(), 0u);
+}
+
+TEST(SeekerHistory, ComesBackFromItsColumnsOrChangesNothing) {
+  RecordedSeeker<Spsa> seeker = two_inputs();
+  for (int k = 0; k < 5; ++k)
+    cycle_of(seeker, [](const Inputs& x) { return x[0]; });
+  const StateColumns good = seeker.history().save();
+  RecordedSeeker<Spsa> other = two_inputs();
+  other.history().restore(good);
+  EXPECT_EQ(other.history().save(), good);
+
+  const auto refusal = [&](const std::function<void(StateColumns&)>& spoil) -> std::string {
+    StateColumns bad = good;
+    spoil(bad);
+    try {
+      other.history().restore(bad);
+    } catch (const Error& error) {
+      EXPECT_EQ(other.history().save(), good);
+      return error.what();
+    }
+    return "accepted";
+  };
+  EXPECT_EQ(refusal([](auto& c) { c.erase("applied"); }), "history has no column 'applied'");
+  EXPECT_EQ(refusal([](auto& c) { c["applied"].pop_back(); }),
+            "history column 'applied' has 9 entries: must have 10, as the others and the inputs of the seeker say");
+  EXPECT_EQ(refusal([](auto& c) { c["misfire"][2] = 0.5; }),
+            "history column 'misfire', entry 2, holds 0.5: must be 0 or 1");
+  EXPECT_EQ(refusal([](auto& c) { c["cycle"][1] = std::nan(""); }),
+            "history column 'cycle', entry 1, holds nan: must be a whole number >= 0");
+}
+
+}  // namespace
+}  // namespace mgdd::optimize

@@ -1,0 +1,141 @@
+"""Arguments of the wrong kind: the error names the argument, what was given and the remedy, whoever checks it."""
+
+from __future__ import annotations
+
+import inspect
+import re
+from collections.abc import Callable, Iterator
+from typing import Any
+
+import numpy as np
+import pytest
+
+from mgdd import _core, presets
+from mgdd._arguments import refusal
+from mgdd.engine import Cylinder, NoxModel, NoxProxy, OperatingPoint, Performance, PerformanceTerm
+from mgdd.errors import Error, ParameterError
+from mgdd.loop import EngineBench, SensorDynamics, monte_carlo, run_seeker
+from mgdd.optimize import ExtremumSeeking, Limit, Spsa
+from mgdd.throttle import SensorPair, Throttle
+
+PRESET = presets.load("puma_single")
+SEEKER = ExtremumSeeking(start=-12.0, lower=-30.0, upper=10.0)
+LEAK = re.compile(r"incompatible (function|constructor) arguments|Unable to cast|instance has no|pybind11")
+
+
+def functions(owner: Any, seen: set[int] | None = None) -> Iterator[tuple[str, Callable[..., Any]]]:
+    """Every function, method and constructor that the core exports, by name."""
+    seen = set() if seen is None else seen
+    for name, member in inspect.getmembers(owner):
+        if id(member) in seen:
+            continue
+        if inspect.ismodule(member) and member.__name__.startswith("mgdd._core"):
+            yield from functions(member, seen)
+        elif inspect.isclass(member) and member.__module__.startswith("mgdd._core"):
+            seen.add(id(member))
+            yield from functions(member, seen)
+        elif callable(member) and re.match(rf"{name}\(.*\) -> ", getattr(member, "__doc__", None) or ""):
+            yield f"{owner.__name__}.{name}", member
+
+
+FUNCTIONS = dict(functions(_core))
+
+
+class Strange:
+    """Nothing that any function takes."""
+
+
+def answer(call: Callable[[], Any]) -> str:
+    """What the error of a call says, or nothing."""
+    try:
+        call()
+    except (Error, TypeError, ValueError, AttributeError) as error:
+        return str(error)
+    return ""
+
+
+@pytest.mark.parametrize("name", FUNCTIONS)
+def test_no_call_leaks_the_signatures_of_the_core(name: str) -> None:
+    function = FUNCTIONS[name]
+    for given in ((Strange(),), (Strange(),) * 3, (Strange(),) * 40, ([[], {}],), ()):
+        for keywords in ({}, {"no_such_argument": Strange()}):
+            said = answer(lambda: function(*given, **keywords))  # noqa: B023
+            assert not LEAK.search(said), said
+            assert "mgdd._core" not in said, said
+            assert len(said) < 600
+
+
+@pytest.mark.parametrize(
+    ("call", "field", "message"),
+    [
+        (lambda: Cylinder(bore_mm=[86.0]), "bore_mm", r"bore_mm = \[86.0\], a list: must be one number"),
+        (lambda: Cylinder(bore_mm="86"), "bore_mm", "bore_mm = '86': must be one number"),
+        (lambda: Cylinder(burn_shape=2), "burn_shape", "burn_shape = 2: must be a name"),
+        (lambda: Cylinder().replace(bore_mm=[86.0]), "bore_mm", "bore_mm"),
+        (
+            lambda: OperatingPoint(fuel_mg=np.ones(3)),
+            "fuel_mg",
+            r"fuel_mg = array\(.*\): must be one number; call",
+        ),
+        (lambda: Throttle(inertia_kgm2=None), "inertia_kgm2", "inertia_kgm2 = None: must be one number"),
+        (lambda: NoxModel(proxy=1.0), "proxy", "proxy = 1.0: must be a NoxProxy or None"),
+        (lambda: NoxProxy().affine_log_ppm("hot"), "t_max_k", "t_max_k = 'hot': must be numbers in one array"),
+        (lambda: PerformanceTerm(3), "signal", "signal = 3: must be a name"),
+        (lambda: Performance([1.0]), "terms", "terms = .*: must be a sequence of PerformanceTerms or None"),
+        (lambda: SensorPair(adc_bits=12.5), "adc_bits", "adc_bits = 12.5: must be a whole number"),
+        (lambda: SensorDynamics(delay_s=[3.0]), "delay_s", "delay_s"),
+        (lambda: Limit("p_max_bar", [95.0]), "upper", "upper = .*: must be one number"),
+        (lambda: ExtremumSeeking(start=0.0, period="x"), "period", "period = 'x': must be a whole number"),
+        (lambda: ExtremumSeeking(start="x"), "start", "start = 'x': must be"),
+        (lambda: Spsa(start=0.0, limits=[3.0]), "limits", r"limits = \[3.0\], a list: must be a sequence of Limits"),
+        (lambda: EngineBench([Cylinder()]), "cylinder", "cylinder = .*: must be a Cylinder"),
+        (lambda: EngineBench(point=[OperatingPoint()]), None, "OperatingPoint"),
+        (lambda: EngineBench().step([-6.0]), "soc_cad", r"soc_cad = \[-6.0\], a list: must be one number"),
+        (lambda: EngineBench().run("late"), "soc_cad", "soc_cad = 'late': must be numbers in one array"),
+        (lambda: setattr(EngineBench(), "state", 3), "state", "state = 3: must be a mapping of names to"),
+        (lambda: run_seeker(SEEKER, SEEKER, 10), None, "bench"),
+        (lambda: run_seeker(EngineBench(), EngineBench(), 10), "seeker", "seeker = .*: must be an ExtremumSeeking or"),
+        (lambda: run_seeker(EngineBench(), SEEKER, 10.5), "cycles", "cycles = 10.5: must be a whole number"),
+        (lambda: monte_carlo(EngineBench(), EngineBench(), [1], cycles=5), None, "is no seeker of mgdd.optimize"),
+        (
+            lambda: _core.volume_l(PRESET, 0.0),
+            "cylinder",
+            r"Preset\(.*: must be a Cylinder; give its .cylinder",
+        ),
+        (
+            lambda: _core.volume_l("puma_single", 0.0),
+            "cylinder",
+            r"must be a Cylinder; mgdd.presets.load\(name\)",
+        ),
+    ],
+)
+def test_the_argument_is_named(call: Callable[[], Any], field: str | None, message: str) -> None:
+    with pytest.raises(ParameterError, match=message) as error:
+        call()
+    if field is not None:
+        assert error.value.field == field
+        assert error.value.bound is not None
+
+
+@pytest.mark.parametrize(
+    ("call", "message"),
+    [
+        (lambda: Cylinder(bore=86.0), r"Cylinder\(\) has no argument 'bore': did you mean 'bore_mm'\?"),
+        (lambda: Cylinder(86.0), r"Cylinder\(\) takes 0 positional arguments, 1 were given; give .* by name"),
+        (lambda: ExtremumSeeking(strat=1.0), r"ExtremumSeeking\(\) has no argument 'strat': did you mean 'start'\?"),
+        (ExtremumSeeking, r"ExtremumSeeking\(\) lacks start"),
+        (lambda: Limit("p_max_bar", 95.0, name="x"), r"Limit\(\) got 'name' twice"),
+    ],
+)
+def test_a_call_of_the_wrong_form_is_a_type_error_as_in_python(call: Callable[[], Any], message: str) -> None:
+    with pytest.raises(TypeError, match=message):
+        call()
+
+
+def test_overloads_that_fail_at_the_same_argument_are_named_together() -> None:
+    signatures = ["(a: int, b: mgdd._core.Cat) -> None", "(a: int, b: mgdd._core.Dog) -> None"]
+    error = refusal("f", signatures, (1, 2), {})
+    assert str(error) == "b = 2: must be a Cat or a Dog"
+    unknown = refusal("f", ["(a: object) -> None"], (1,), {})
+    assert isinstance(unknown, TypeError)
+    assert str(unknown) == "f() does not take these arguments: it is f(a: object) -> None"
