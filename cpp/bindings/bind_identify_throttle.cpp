@@ -105,7 +105,20 @@ py::dict fit_groups(const std::vector<RecordTuple>& records, const std::vector<S
     stage.search.max_iterations = max_iterations;
     plan.push_back(std::move(stage));
   }
-#include "mgdd/math/dispatch.hpp"
+  const FirstPrinciple model = groups_model(closed_deg, open_deg, ramp_deg, substeps);
+  return hand_over(interruptible([&](const std::stop_token& stop) {
+                     for (FitStage& stage : plan)
+                       stage.search.stop = stop;
+                     return fit_first_principle(model, data, plan, starts, n_threads);
+                   }),
+                   [](const FirstPrincipleFit& fit) {
+                     py::dict result;
+                     result["values"] = fit.values;
+                     result["reports"] = fit.starts.reports;
+                     result["best"] = fit.starts.best;
+                     result["n_reached"] = fit.starts.n_reached;
+                     return result;
+                   });
 }
 
 std::vector<double> simulate_groups(const Groups& values, const InputArray& duty, double step_s,

@@ -6,7 +6,7 @@ import collections.abc
 import numpy
 import numpy.typing
 import typing
-__all__: list[str] = ['BoundedSeeking', 'ComponentLag', 'Cylinder', 'CylinderFit', 'DriveAxis', 'EngineBench', 'ExtremumSeeking', 'FitReport', 'FreeRunFit', 'FreeRunRecord', 'GoldenSection', 'GradientDescent', 'GradientPwR', 'IterativeLearning', 'LeastSquaresOptions', 'Limit', 'LoadBurn', 'LoadFit', 'MeasuredCycle', 'NewtonSeeking', 'NoxFit', 'NoxModel', 'NoxProxy', 'OperatingPoint', 'Parameter', 'Performance', 'PerformanceTerm', 'PseudoWienerModel', 'PseudoWienerStepper', 'RecursivePwR', 'SensorDynamics', 'SensorPair', 'SoftSensor', 'Spsa', 'Throttle', 'ThrottleStepper', 'TraceOptions', 'TwoTanks', 'WienerHammerstein', 'WindowPwR', 'analyze_trace', 'burn_duration_cad', 'burned_fraction', 'check_trace', 'common_parameters', 'compiled_simd_level', 'compiler', 'convergence', 'correlation_limit', 'differentiable_inputs', 'estimate_burn', 'filter_series', 'fit_cylinder', 'fit_nox_proxy', 'fit_pseudo_wiener', 'fit_smooth_throttle', 'fit_throttle_groups', 'hardenberg_hase_delay_cad', 'hohenberg_coefficient', 'indicator_units', 'input_unit', 'latin_hypercube', 'least_squares', 'load_parameters', 'monte_carlo', 'processor_simd_levels', 'pseudo_wiener_of', 'pseudo_wiener_units', 'run_loop', 'scan', 'sense_throttle', 'sensitivities', 'sensor_fault_kinds', 'simulate', 'simulate_smooth_throttle', 'simulate_throttle', 'simulate_throttle_groups', 'simulate_throttle_many', 'smooth_throttle_example', 'smooth_throttle_instruction_set', 'smooth_throttle_names', 'start_of_combustion', 'start_of_injection', 'throttle_airflow_torque', 'throttle_group_bounds', 'throttle_group_names', 'timing_window_cad', 'tune', 'volume_l', 'wall_area_m2', 'wall_heat_scale_upper', 'watson_delay_ms', 'with_burn', 'wolfer_delay_ms', 'woschni_c1_bar_m', 'woschni_coefficient']
+__all__: list[str] = ['BoundedSeeking', 'ComponentLag', 'Cylinder', 'CylinderFit', 'DriveAxis', 'EngineBench', 'ExtremumSeeking', 'FitReport', 'FreeRunFit', 'FreeRunRecord', 'GoldenSection', 'GradientDescent', 'GradientPwR', 'IterativeLearning', 'LeastSquaresOptions', 'Limit', 'LoadBurn', 'LoadFit', 'MeasuredCycle', 'NewtonSeeking', 'NoxFit', 'NoxModel', 'NoxProxy', 'OperatingPoint', 'Parameter', 'Performance', 'PerformanceTerm', 'PseudoWienerModel', 'PseudoWienerStepper', 'RecursivePwR', 'SensorDynamics', 'SensorPair', 'SoftSensor', 'Spsa', 'Throttle', 'ThrottleStepper', 'TraceOptions', 'TwoTanks', 'VirtualThrottle', 'WienerHammerstein', 'WindowPwR', 'analyze_trace', 'burn_duration_cad', 'burned_fraction', 'check_trace', 'common_parameters', 'compiled_simd_level', 'compiler', 'convergence', 'correlation_limit', 'differentiable_inputs', 'estimate_burn', 'filter_series', 'fit_cylinder', 'fit_nox_proxy', 'fit_pseudo_wiener', 'fit_smooth_throttle', 'fit_throttle_groups', 'hardenberg_hase_delay_cad', 'hohenberg_coefficient', 'indicator_units', 'input_unit', 'latin_hypercube', 'least_squares', 'load_parameters', 'monte_carlo', 'processor_simd_levels', 'pseudo_wiener_of', 'pseudo_wiener_units', 'run_loop', 'scan', 'sense_throttle', 'sensitivities', 'sensor_fault_kinds', 'simulate', 'simulate_smooth_throttle', 'simulate_throttle', 'simulate_throttle_groups', 'simulate_throttle_many', 'smooth_throttle_example', 'smooth_throttle_instruction_set', 'smooth_throttle_names', 'start_of_combustion', 'start_of_injection', 'throttle_airflow_torque', 'throttle_group_bounds', 'throttle_group_names', 'timing_window_cad', 'tune', 'volume_l', 'wall_area_m2', 'wall_heat_scale_upper', 'watson_delay_ms', 'with_burn', 'wolfer_delay_ms', 'woschni_c1_bar_m', 'woschni_coefficient']
 class Parameter:
     """
     One unknown of a fit: name, bounds, and whether it is searched as its log.
@@ -46,10 +46,11 @@ class LeastSquaresOptions:
     """
     When a least-squares search ends and what it reports.
     """
-    __hash__: typing.ClassVar[None] = None
-    def __eq__(self, arg0: LeastSquaresOptions) -> bool:
+    def __eq__(self, arg0: typing.Any) -> bool:
         ...
-    def __getstate__(self) -> tuple:
+    def __getstate__(self) -> tuple[int, dict]:
+        ...
+    def __hash__(self) -> int:
         ...
     def __init__(self, *, max_iterations: typing.SupportsInt | typing.SupportsIndex = 200, cost_tolerance: typing.SupportsFloat | typing.SupportsIndex = 1e-12, step_tolerance: typing.SupportsFloat | typing.SupportsIndex = 1e-10, gradient_tolerance: typing.SupportsFloat | typing.SupportsIndex = 1e-12, initial_damping: typing.SupportsFloat | typing.SupportsIndex = 0.001, correlation_limit: typing.SupportsFloat | typing.SupportsIndex = 0.98, rank_tolerance: typing.SupportsFloat | typing.SupportsIndex = 1e-10, evaluate_together: bool = True) -> None:
         ...
@@ -57,6 +58,10 @@ class LeastSquaresOptions:
         ...
     def __setstate__(self, arg0: tuple) -> None:
         ...
+    def to_dict(self) -> dict:
+        """
+        Constructor keywords as a new dict.
+        """
     @property
     def correlation_limit(self) -> float:
         """
@@ -724,7 +729,7 @@ class GradientDescent:
         Components of J that tell takes.
         """
     @property
-    def converged_at(self) -> typing.Any:
+    def converged_at(self) -> int | None:
         """
         Step at which the tolerance was met first, or None.
         """
@@ -1623,6 +1628,42 @@ class Performance:
 class TraceOptions:
     def __init__(self, *, pegging: str = 'none', pegging_exponent: typing.SupportsFloat | typing.SupportsIndex = 1.35, inlet_pressure_kpa: typing.SupportsFloat | typing.SupportsIndex = 0.0, gamma_source: str = 'constant', gamma: typing.SupportsFloat | typing.SupportsIndex = 1.33, gamma_compression: typing.SupportsFloat | typing.SupportsIndex = 1.37, gamma_combustion: typing.SupportsFloat | typing.SupportsIndex = 1.3, heat_from_cad: typing.SupportsFloat | typing.SupportsIndex = -10.0, heat_to_cad: typing.SupportsFloat | typing.SupportsIndex = 90.0, burn_from_cad: typing.SupportsFloat | typing.SupportsIndex = -10.0, total_at_end: bool = False, fractions_of_gross: bool = False) -> None:
         ...
+    @property
+    def burn_from_cad(self) -> float:
+        ...
+    @property
+    def fractions_of_gross(self) -> bool:
+        ...
+    @property
+    def gamma(self) -> float:
+        ...
+    @property
+    def gamma_combustion(self) -> float:
+        ...
+    @property
+    def gamma_compression(self) -> float:
+        ...
+    @property
+    def gamma_source(self) -> str:
+        ...
+    @property
+    def heat_from_cad(self) -> float:
+        ...
+    @property
+    def heat_to_cad(self) -> float:
+        ...
+    @property
+    def inlet_pressure_kpa(self) -> float:
+        ...
+    @property
+    def pegging(self) -> str:
+        ...
+    @property
+    def pegging_exponent(self) -> float:
+        ...
+    @property
+    def total_at_end(self) -> bool:
+        ...
 class Throttle:
     """
     Parameters of an electronic throttle body, seen from the plate shaft.
@@ -2018,9 +2059,13 @@ class PseudoWienerModel:
         ...
     def __init__(self, kind: str, parameters: collections.abc.Mapping[str, typing.SupportsFloat | typing.SupportsIndex], *, switching: str = 'predicted', friction: str = 'set_valued') -> None:
         ...
+    def at_sample(self, sample_s: typing.SupportsFloat | typing.SupportsIndex, *, substeps: typing.SupportsInt | typing.SupportsIndex | None = None) -> dict:
+        """
+        Parameters for another sample time, the delay in seconds kept.
+        """
     def predict(self, duty: typing.Annotated[numpy.typing.ArrayLike, numpy.float64], angle_deg: typing.Annotated[numpy.typing.ArrayLike, numpy.float64], horizon: typing.SupportsInt | typing.SupportsIndex, *, angle_gain: typing.SupportsFloat | typing.SupportsIndex = 0.35, speed_gain_per_s: typing.SupportsFloat | typing.SupportsIndex = 35.0, bias_gain_duty_per_deg: typing.SupportsFloat | typing.SupportsIndex = 0.004, offset_gain: typing.SupportsFloat | typing.SupportsIndex = 1.0) -> list[float]:
         """
-        Re-anchored prediction `horizon` samples ahead [deg].
+        Prediction, corrected at every sample, `horizon` samples ahead [deg].
         """
     def simulate(self, duty: typing.Annotated[numpy.typing.ArrayLike, numpy.float64], start_deg: typing.SupportsFloat | typing.SupportsIndex) -> numpy.typing.NDArray[numpy.float64]:
         """
@@ -2426,6 +2471,29 @@ class EngineBench:
         """
         Earliest and latest SOC that is not clamped.
         """
+class VirtualThrottle:
+    """
+    A throttle with its sensors, sample by sample; behind mgdd.loop.VirtualThrottle.
+    """
+    def __init__(self, *, throttle: Throttle, sensors: SensorPair, faults: typing.Annotated[collections.abc.Sequence[tuple[str, typing.SupportsFloat | typing.SupportsIndex, typing.SupportsFloat | typing.SupportsIndex]], "FixedSize(2)"], sample_s: typing.SupportsFloat | typing.SupportsIndex, step_s: typing.SupportsFloat | typing.SupportsIndex, start_deg: typing.SupportsFloat | typing.SupportsIndex, bridge: str, seed: typing.SupportsInt | typing.SupportsIndex) -> None:
+        ...
+    def step(self, duty: typing.SupportsFloat | typing.SupportsIndex, supply_v: typing.SupportsFloat | typing.SupportsIndex, airflow_torque_nm: typing.SupportsFloat | typing.SupportsIndex) -> dict:
+        """
+        Run one sample.
+        """
+    @property
+    def samples(self) -> int:
+        """
+        Samples run so far.
+        """
+    @property
+    def state(self) -> dict[str, list[float]]:
+        """
+        What a run needs to go on bit for bit.
+        """
+    @state.setter
+    def state(self, arg1: collections.abc.Mapping[str, collections.abc.Sequence[typing.SupportsFloat | typing.SupportsIndex]]) -> None:
+        ...
 def analyze_trace(crank_angle_cad: typing.Annotated[numpy.typing.ArrayLike, numpy.float64], pressure_bar: typing.Annotated[numpy.typing.ArrayLike, numpy.float64], cylinder: Cylinder, point: OperatingPoint, options: TraceOptions) -> dict:
     """
     Pegging, heat release, burn angles, work.
@@ -2478,7 +2546,7 @@ def fit_nox_proxy(t_max_k: typing.Annotated[numpy.typing.ArrayLike, numpy.float6
     """
     Least squares on ln NOx; use mgdd.engine.fit_nox_proxy.
     """
-def fit_pseudo_wiener(*, kind: str, records: collections.abc.Sequence[tuple[typing.Annotated[numpy.typing.ArrayLike, numpy.float64], typing.Annotated[numpy.typing.ArrayLike, numpy.float64]]], parameters: collections.abc.Mapping[str, typing.SupportsFloat | typing.SupportsIndex], sides: str, free: collections.abc.Sequence[str], delays: collections.abc.Sequence[typing.SupportsInt | typing.SupportsIndex], starts: typing.SupportsInt | typing.SupportsIndex, seed: typing.SupportsInt | typing.SupportsIndex, only_given_start: bool, try_map_start: bool, max_iterations: typing.SupportsInt | typing.SupportsIndex) -> tuple[dict, FitReport, numpy.typing.NDArray[numpy.float64], int]:
+def fit_pseudo_wiener(*, kind: str, records: collections.abc.Sequence[tuple[typing.Annotated[numpy.typing.ArrayLike, numpy.float64], typing.Annotated[numpy.typing.ArrayLike, numpy.float64]]], parameters: collections.abc.Mapping[str, typing.SupportsFloat | typing.SupportsIndex], sides: str, free: collections.abc.Sequence[str], delays: collections.abc.Sequence[typing.SupportsFloat | typing.SupportsIndex], starts: typing.SupportsInt | typing.SupportsIndex, seed: typing.SupportsInt | typing.SupportsIndex, only_given_start: bool, try_map_start: bool, max_iterations: typing.SupportsInt | typing.SupportsIndex) -> tuple[dict, FitReport, numpy.typing.NDArray[numpy.float64], int]:
     """
     Output-error fit from several starts: parameters, report, RMSE of every search, hits of the best.
     """
@@ -2518,7 +2586,7 @@ def load_parameters() -> list[str]:
     """
     Names that may be freed per load.
     """
-def monte_carlo(benches: collections.abc.Sequence[EngineBench], seekers: list, seeds: collections.abc.Sequence[typing.SupportsInt | typing.SupportsIndex], *, cycles: typing.SupportsInt | typing.SupportsIndex, optimum_cad: collections.abc.Sequence[typing.SupportsFloat | typing.SupportsIndex], arrival_cad: typing.SupportsFloat | typing.SupportsIndex, tail_cycles: typing.SupportsInt | typing.SupportsIndex, exceed_from: typing.SupportsInt | typing.SupportsIndex, exceed_above: collections.abc.Sequence[collections.abc.Sequence[typing.SupportsFloat | typing.SupportsIndex]], threads: typing.SupportsInt | typing.SupportsIndex) -> dict:
+def monte_carlo(benches: collections.abc.Sequence[EngineBench], seekers: list, seeds: collections.abc.Sequence[typing.SupportsInt | typing.SupportsIndex], *, cycles: typing.SupportsInt | typing.SupportsIndex, optimum_cad: collections.abc.Sequence[typing.SupportsFloat | typing.SupportsIndex], arrival_cad: typing.SupportsFloat | typing.SupportsIndex, tail_cycles: typing.SupportsInt | typing.SupportsIndex, exceed_from: typing.SupportsInt | typing.SupportsIndex | None, exceed_above: collections.abc.Sequence[collections.abc.Sequence[typing.SupportsFloat | typing.SupportsIndex]], threads: typing.SupportsInt | typing.SupportsIndex) -> dict:
     """
     Whole loops on all cores; behind mgdd.loop.monte_carlo.
     """
@@ -2535,32 +2603,32 @@ def pseudo_wiener_units(kind: str) -> dict:
     Unit of every parameter.
     """
 @typing.overload
-def run_loop(bench: EngineBench, seeker: ExtremumSeeking, cycles: typing.SupportsInt | typing.SupportsIndex, *, optimum_cad: typing.SupportsFloat | typing.SupportsIndex, arrival_cad: typing.SupportsFloat | typing.SupportsIndex, tail_cycles: typing.SupportsInt | typing.SupportsIndex, exceed_from: typing.SupportsInt | typing.SupportsIndex, exceed_above: collections.abc.Sequence[typing.SupportsFloat | typing.SupportsIndex]) -> dict:
+def run_loop(bench: EngineBench, seeker: ExtremumSeeking, cycles: typing.SupportsInt | typing.SupportsIndex, *, optimum_cad: typing.SupportsFloat | typing.SupportsIndex, arrival_cad: typing.SupportsFloat | typing.SupportsIndex, tail_cycles: typing.SupportsInt | typing.SupportsIndex, exceed_from: typing.SupportsInt | typing.SupportsIndex | None, exceed_above: collections.abc.Sequence[typing.SupportsFloat | typing.SupportsIndex]) -> dict:
     """
     Run a seeker on the bench without the GIL; behind mgdd.loop.run_seeker.
     """
 @typing.overload
-def run_loop(bench: EngineBench, seeker: NewtonSeeking, cycles: typing.SupportsInt | typing.SupportsIndex, *, optimum_cad: typing.SupportsFloat | typing.SupportsIndex, arrival_cad: typing.SupportsFloat | typing.SupportsIndex, tail_cycles: typing.SupportsInt | typing.SupportsIndex, exceed_from: typing.SupportsInt | typing.SupportsIndex, exceed_above: collections.abc.Sequence[typing.SupportsFloat | typing.SupportsIndex]) -> dict:
+def run_loop(bench: EngineBench, seeker: NewtonSeeking, cycles: typing.SupportsInt | typing.SupportsIndex, *, optimum_cad: typing.SupportsFloat | typing.SupportsIndex, arrival_cad: typing.SupportsFloat | typing.SupportsIndex, tail_cycles: typing.SupportsInt | typing.SupportsIndex, exceed_from: typing.SupportsInt | typing.SupportsIndex | None, exceed_above: collections.abc.Sequence[typing.SupportsFloat | typing.SupportsIndex]) -> dict:
     """
     Run a seeker on the bench without the GIL; behind mgdd.loop.run_seeker.
     """
 @typing.overload
-def run_loop(bench: EngineBench, seeker: BoundedSeeking, cycles: typing.SupportsInt | typing.SupportsIndex, *, optimum_cad: typing.SupportsFloat | typing.SupportsIndex, arrival_cad: typing.SupportsFloat | typing.SupportsIndex, tail_cycles: typing.SupportsInt | typing.SupportsIndex, exceed_from: typing.SupportsInt | typing.SupportsIndex, exceed_above: collections.abc.Sequence[typing.SupportsFloat | typing.SupportsIndex]) -> dict:
+def run_loop(bench: EngineBench, seeker: BoundedSeeking, cycles: typing.SupportsInt | typing.SupportsIndex, *, optimum_cad: typing.SupportsFloat | typing.SupportsIndex, arrival_cad: typing.SupportsFloat | typing.SupportsIndex, tail_cycles: typing.SupportsInt | typing.SupportsIndex, exceed_from: typing.SupportsInt | typing.SupportsIndex | None, exceed_above: collections.abc.Sequence[typing.SupportsFloat | typing.SupportsIndex]) -> dict:
     """
     Run a seeker on the bench without the GIL; behind mgdd.loop.run_seeker.
     """
 @typing.overload
-def run_loop(bench: EngineBench, seeker: Spsa, cycles: typing.SupportsInt | typing.SupportsIndex, *, optimum_cad: typing.SupportsFloat | typing.SupportsIndex, arrival_cad: typing.SupportsFloat | typing.SupportsIndex, tail_cycles: typing.SupportsInt | typing.SupportsIndex, exceed_from: typing.SupportsInt | typing.SupportsIndex, exceed_above: collections.abc.Sequence[typing.SupportsFloat | typing.SupportsIndex]) -> dict:
+def run_loop(bench: EngineBench, seeker: Spsa, cycles: typing.SupportsInt | typing.SupportsIndex, *, optimum_cad: typing.SupportsFloat | typing.SupportsIndex, arrival_cad: typing.SupportsFloat | typing.SupportsIndex, tail_cycles: typing.SupportsInt | typing.SupportsIndex, exceed_from: typing.SupportsInt | typing.SupportsIndex | None, exceed_above: collections.abc.Sequence[typing.SupportsFloat | typing.SupportsIndex]) -> dict:
     """
     Run a seeker on the bench without the GIL; behind mgdd.loop.run_seeker.
     """
 @typing.overload
-def run_loop(bench: EngineBench, seeker: GradientDescent, cycles: typing.SupportsInt | typing.SupportsIndex, *, optimum_cad: typing.SupportsFloat | typing.SupportsIndex, arrival_cad: typing.SupportsFloat | typing.SupportsIndex, tail_cycles: typing.SupportsInt | typing.SupportsIndex, exceed_from: typing.SupportsInt | typing.SupportsIndex, exceed_above: collections.abc.Sequence[typing.SupportsFloat | typing.SupportsIndex]) -> dict:
+def run_loop(bench: EngineBench, seeker: GradientDescent, cycles: typing.SupportsInt | typing.SupportsIndex, *, optimum_cad: typing.SupportsFloat | typing.SupportsIndex, arrival_cad: typing.SupportsFloat | typing.SupportsIndex, tail_cycles: typing.SupportsInt | typing.SupportsIndex, exceed_from: typing.SupportsInt | typing.SupportsIndex | None, exceed_above: collections.abc.Sequence[typing.SupportsFloat | typing.SupportsIndex]) -> dict:
     """
     Run a seeker on the bench without the GIL; behind mgdd.loop.run_seeker.
     """
 @typing.overload
-def run_loop(bench: EngineBench, seeker: GoldenSection, cycles: typing.SupportsInt | typing.SupportsIndex, *, optimum_cad: typing.SupportsFloat | typing.SupportsIndex, arrival_cad: typing.SupportsFloat | typing.SupportsIndex, tail_cycles: typing.SupportsInt | typing.SupportsIndex, exceed_from: typing.SupportsInt | typing.SupportsIndex, exceed_above: collections.abc.Sequence[typing.SupportsFloat | typing.SupportsIndex]) -> dict:
+def run_loop(bench: EngineBench, seeker: GoldenSection, cycles: typing.SupportsInt | typing.SupportsIndex, *, optimum_cad: typing.SupportsFloat | typing.SupportsIndex, arrival_cad: typing.SupportsFloat | typing.SupportsIndex, tail_cycles: typing.SupportsInt | typing.SupportsIndex, exceed_from: typing.SupportsInt | typing.SupportsIndex | None, exceed_above: collections.abc.Sequence[typing.SupportsFloat | typing.SupportsIndex]) -> dict:
     """
     Run a seeker on the bench without the GIL; behind mgdd.loop.run_seeker.
     """

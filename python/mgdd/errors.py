@@ -56,7 +56,7 @@ class Error(Exception):
     ...     Cylinder(bore_mm=-86.0)
     ... except Error as error:
     ...     print(error)
-    bore_mm = -86 mm: must be > 0
+    bore_mm = -86 mm: must be > 0 and <= 2000
     """
 
     field: str | None

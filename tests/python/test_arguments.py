@@ -93,14 +93,14 @@ def test_no_call_leaks_the_signatures_of_the_core(name: str) -> None:
         (lambda: EngineBench().step([-6.0]), "soc_cad", r"soc_cad = \[-6.0\], a list: must be one number"),
         (lambda: EngineBench().run("late"), "soc_cad", "soc_cad = 'late': must be numbers in one array"),
         (lambda: setattr(EngineBench(), "state", 3), "state", "state = 3: must be a mapping of names to"),
-        (lambda: run_seeker(SEEKER, SEEKER, 10), None, "bench"),
+        (lambda: run_seeker(SEEKER, SEEKER, 10), None, "plant"),
         (lambda: run_seeker(EngineBench(), EngineBench(), 10), "seeker", "seeker = .*: must be an ExtremumSeeking or"),
         (lambda: run_seeker(EngineBench(), SEEKER, 10.5), "cycles", "cycles = 10.5: must be a whole number"),
         (lambda: monte_carlo(EngineBench(), EngineBench(), [1], cycles=5), None, "is no seeker of mgdd.optimize"),
         (
             lambda: _core.volume_l(PRESET, 0.0),
             "cylinder",
-            r"Preset\(.*: must be a Cylinder; give its .cylinder",
+            r"Preset .*: must be a Cylinder; give its .cylinder",
         ),
         (
             lambda: _core.volume_l("puma_single", 0.0),

@@ -17,8 +17,9 @@ from mgdd import identify, io, optimize, signals, surrogate, throttle
 from mgdd.engine import Cylinder, OperatingPoint, fit_nox_proxy, timing_sweep
 from mgdd.io.checks import check_trace
 from mgdd.loop import EngineBench, steady_map
+from mgdd.signals.even_grid import even_step
 from mgdd.signals.metrics import mse
-from mgdd.throttle.characteristics import mass_flow_kg_per_s
+from mgdd.throttle.characteristics import airflow_torque_nm, mass_flow_kg_per_s
 
 Array = np.ndarray[Any, Any]
 Call = Callable[..., Any]
@@ -138,7 +139,6 @@ CALLS: dict[str, tuple[Call, tuple[Array, ...]]] = {
     "optimize.measure_map": (
         lambda x, y: optimize.measure_map(x, y).curvature, (SWEEP, -SWEEP**2),
     ),
-    "signals.even_step": (signals.even_step, (TIME,)),
     "signals.nrmse_fit_percent": (signals.nrmse_fit_percent, (ANGLE, ANGLE + NOISE)),
     "signals.residual_tests": (lambda e, u: signals.residual_tests(e, u).share_white, (NOISE, DUTY)),
     "signals.rmse": (signals.rmse, (ANGLE, ANGLE + NOISE)),
@@ -147,7 +147,6 @@ CALLS: dict[str, tuple[Call, tuple[Array, ...]]] = {
         lambda soi: RECORDS.predict(soi)["imep_bar"].to_numpy(), (np.array([-4.0, 0.0]),),
     ),
     "throttle.PseudoWiener.slopes": (lambda u: MODEL.slopes(u, initial_state={"angle_deg": 8.0})[1], (DUTY[:20],)),
-    "throttle.airflow_torque_nm": (lambda a: throttle.airflow_torque_nm(throttle.Throttle(), a), (OPEN,)),
     "throttle.holding_duty": (
         lambda a: throttle.holding_duty(throttle.Throttle(), a)["duty_rising"].to_numpy(), (OPEN,),
     ),
@@ -160,6 +159,8 @@ CALLS: dict[str, tuple[Call, tuple[Array, ...]]] = {
 
 # Models take columns by name; what is not exported takes arrays all the same.
 MORE: dict[str, tuple[Call, tuple[Array, ...]]] = {
+    "signals.even_grid.even_step": (even_step, (TIME,)),
+    "throttle.airflow_torque_nm": (lambda a: airflow_torque_nm(throttle.Throttle(), a), (OPEN,)),
     "identify.FirstPrincipleModel.simulate": (run(GROUPS), (TIME, DUTY)),
     "identify.FirstPrincipleModel.predict": (ahead(GROUPS), (TIME, DUTY, ANGLE)),
     "identify.OdeModel.simulate": (ode, (TIME, DUTY, np.array([8.0]))),

@@ -43,7 +43,7 @@ def test_an_unknown_name_lists_the_known_ones(capsys: pytest.CaptureFixture[str]
 def test_refused_before_any_work(capsys: pytest.CaptureFixture[str], tmp_path: Path) -> None:
     assert "seeds = 0: must be >= 1" in run(capsys, "sensor-delay", "--seeds", "0", code=2)[1]
     assert "the ending must be one of .json" in run(capsys, "sensor-delay", "-o", str(tmp_path / "a.txt"), code=2)[1]
-    assert "no chance in it" in run(capsys, "measured-traces", "--seeds", "4", code=2)[1]
+    assert "is deterministic" in run(capsys, "measured-traces", "--seeds", "4", code=2)[1]
 
 
 def test_json_file_and_figures(capsys: pytest.CaptureFixture[str], tmp_path: Path) -> None:

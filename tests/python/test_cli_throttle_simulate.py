@@ -107,7 +107,7 @@ def test_a_file_drives_the_run_and_the_run_becomes_a_file(tmp_path, capsys: pyte
         (("--duty", "1", "--set", "foo=1"), "no field 'foo'; the fields are "),
         (("--duty", "1", "--set", "foo=1"), ", coulomb_nm, "),
         (("--duty", "1", "--duration-s", "1e9"), "duration_s = 1e+09 s: 5000000 samples of 0.001 s are the most"),
-        (("--duty", "1", "--set", "coulomb_nm=-1"), "coulomb_nm = -1 N m: must be >= 0"),
+        (("--duty", "1", "--set", "coulomb_nm=-1"), "coulomb_nm = -1 N m: must be in [0, 100]"),
         (("--duty", "1", "--set", "coulomb_nm=much"), "coulomb_nm = 'much': must be a number [N m]"),
         (("--duty", "1", "--set", "friction=rough"), "friction = 'rough': must be one of coulomb, stiction"),
         (("--duty", "1", "--set", "coulomb_nm"), "--set coulomb_nm: write FIELD=VALUE"),

@@ -155,7 +155,8 @@ def test_a_learner_refuses_a_second_trial_at_the_same_time() -> None:
 def test_an_online_update_takes_a_column_once_or_not_at_all() -> None:
     model = PseudoWiener.of_throttle(presets.load("P1").throttle)
     duty = np.tile(np.repeat([0.2, 0.35], 500), 60)
-    angle = model.simulate(1e-3 * np.arange(duty.size), duty, start_deg=10.0)
+    record = {"time_s": 1e-3 * np.arange(duty.size), "duty": duty}
+    angle = model.simulate(record, initial_state={"angle_deg": 10.0})["angle_deg"].to_numpy()
     for method in ("recursive_least_squares", "window", "gradient"):
         update, twin = OnlineUpdate(model, method=method), OnlineUpdate(model, method=method)
         results = together(*[partial(update.update, duty, angle)] * 3)

@@ -21,8 +21,8 @@ from mgdd.loop import (
     monte_carlo,
     run_seeker,
     steady_map,
-    summarize_cycles,
 )
+from mgdd.loop.summary import summarize_cycles
 from mgdd.optimize import ExtremumSeeking, GoldenSection, Limit, NewtonSeeking, Spsa
 from mgdd.results import check_labels
 from mgdd.rig import SimulatedRig
@@ -104,8 +104,9 @@ def test_limits_are_judged_in_short_runs_too() -> None:
 def test_monte_carlo_is_labelled_and_the_same_on_any_thread_count() -> None:
     plants = [EngineBench(), EngineBench(point=OperatingPoint(fuel_mg=30.0))]
     gains = [ExtremumSeeking(**SPACE, gain=g) for g in (0.5, 1.0)]
-    one = monte_carlo(plants, gains, range(6), cycles=300, threads=1, criteria=LoopCriteria(optimum=[-5.6, -8.5]))
-    two = monte_carlo(plants, gains, range(6), cycles=300, threads=2, criteria=LoopCriteria(optimum=[-5.6, -8.5]))
+    goals = [LoopCriteria(optimum=-5.6), LoopCriteria(optimum=-8.5)]
+    one = monte_carlo(plants, gains, range(6), cycles=300, threads=1, criteria=goals)
+    two = monte_carlo(plants, gains, range(6), cycles=300, threads=2, criteria=goals)
     check_labels(one)
     xr.testing.assert_identical(one, two)
     alone = run_seeker(

@@ -203,7 +203,7 @@ def spoilt(old, new):
         (
             '[throttle]\ncoulomb_nm = { value = -0.3, unit = "N m", source = "mine" }',
             ParameterError,
-            "coulomb_nm = -0.3 N m: must be >= 0",
+            r"coulomb_nm = -0.3 N m: must be in \[0, 100\]",
         ),
         ("[point]\n", DataError, r"no table \[cylinder\]"),
         ("cylinder = 3", ParameterError, r"unknown key 'cylinder': did you mean '\[cylinder\]'"),

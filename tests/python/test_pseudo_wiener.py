@@ -94,7 +94,7 @@ def test_a_delay_keeps_its_time_at_any_sample_time() -> None:
             model.at_sample(5e-4)
     whole, half = PseudoWiener("pw_r", {"delay_samples": 1.0}), PseudoWiener("pw_r", {"delay_samples": 1.5})
     mixed = 0.5 * (DUTY + np.concatenate([[0.0], DUTY[:-1]]))
-    np.testing.assert_array_equal(half.simulate(TIME, DUTY, start_deg=8.0), whole.simulate(TIME, mixed, start_deg=8.0))
+    np.testing.assert_array_equal(simulate(half, 8.0)["angle_deg"], simulate(whole, 8.0, duty=mixed)["angle_deg"])
 
 
 def test_bad_input_says_what_and_leaves_things_alone() -> None:

@@ -4,10 +4,10 @@ from __future__ import annotations
 
 import numpy as np
 import pytest
-from mgdd.identify.excitation import _TAPS, maximum_length_sequence
 from scipy.signal import savgol_filter
 
-from mgdd.identify import LinearApproximation
+from mgdd.signals.excitation import _TAPS, maximum_length_sequence
+from mgdd.studies.benchmarks.wiener_hammerstein import LinearApproximation
 
 
 def shift_register(register: int) -> list[int]:
@@ -54,4 +54,5 @@ def test_a_filter_is_its_difference_equation(seed: int) -> None:
         past = sum(a[i] * y[k - i] for i in range(1, a.size) if k >= i)
         y[k] = sum(b[i] * u[k - i] for i in range(b.size) if k >= i) - past
     model = LinearApproximation(numerator=b, denominator=a, input_mean=0.0, output_mean=0.0, rmse=0.0)
-    np.testing.assert_allclose(model.simulate(u), y, rtol=0.0, atol=1e-12 * np.abs(y).max())
+    record = {"time_s": np.arange(u.size) * 1e-3, "input_v": u}
+    np.testing.assert_allclose(model.simulate(record)["output_v"], y, rtol=0.0, atol=1e-12 * np.abs(y).max())

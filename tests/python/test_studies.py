@@ -139,12 +139,12 @@ def test_every_column_of_the_page_holds_what_its_head_says(result: StudyResult, 
         ("p_max [bar]", "p_max_bar", ".1f"),
         ("at [°CA aTDC]", "p_max_cad", ".1f"),
         ("closed IMEP [bar]", "imep_closed_bar", ".2f"),
-        ("CA10", "ca10_cad", ".1f"),
-        ("CA50", "ca50_cad", ".1f"),
+        ("CA10 [°CA aTDC]", "ca10_cad", ".1f"),
+        ("CA50 [°CA aTDC]", "ca50_cad", ".1f"),
         ("CA90 [°CA aTDC]", "ca90_cad", ".1f"),
         ("net heat [J]", "heat_net_j", ".0f"),
-        ("n_c", "n_compression", ".3f"),
-        ("n_e", "n_expansion", ".3f"),
+        ("n_c [-]", "n_compression", ".3f"),
+        ("n_e [-]", "n_expansion", ".3f"),
     ):
         assert analysis[head] == [format(row["analysis"][name], form) for row in traces], head
     wall = columns(page, "Wall heat")

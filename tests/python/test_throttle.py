@@ -14,7 +14,6 @@ from mgdd.throttle import (
     SensorFault,
     SensorPair,
     Throttle,
-    airflow_torque_nm,
     groups,
     holding_duty,
     linear_part,
@@ -22,7 +21,7 @@ from mgdd.throttle import (
     simulate,
     simulate_many,
 )
-from mgdd.throttle.characteristics import mass_flow_kg_per_s
+from mgdd.throttle.characteristics import airflow_torque_nm, mass_flow_kg_per_s
 from mgdd.throttle.simulation import step_summary
 
 P1 = Throttle()

@@ -53,8 +53,9 @@ class LoopCriteria:
     exceed_above: Mapping[str, float] = field(default_factory=dict)
 
     def __post_init__(self) -> None:
-        if self.optimum is not None and not math.isfinite(self.optimum):
-            raise ParameterError(f"optimum = {self.optimum:g}: must be finite, or None")
+        number = isinstance(self.optimum, int | float) and math.isfinite(self.optimum)
+        if self.optimum is not None and not number:
+            raise ParameterError(f"optimum = {self.optimum!r}: must be one finite number, or None")
         if not self.arrival > 0.0:
             raise ParameterError(f"arrival = {self.arrival:g}: must be > 0")
         if self.tail_cycles < 1:

@@ -71,7 +71,7 @@ class Plant(Protocol):
     (True, ('soc_cad',))
     >>> bench.apply({"soc_cad": -6.0})
     >>> round(bench.measure().values["imep_gross_bar"], 1)
-    9.0
+    9.6
     """
 
     @property

@@ -5,14 +5,12 @@ Numbers in, numbers out; units are those of the caller.
 
 from __future__ import annotations
 
-from mgdd.signals.even_grid import even_step
 from mgdd.signals.excitation import amplitude_random_steps, chirp, multisine, prbs, staircase, triangle
 from mgdd.signals.metrics import nrmse_fit_percent, residual_tests, rmse, vaf_percent
 
 __all__ = [
     "amplitude_random_steps",
     "chirp",
-    "even_step",
     "multisine",
     "nrmse_fit_percent",
     "prbs",

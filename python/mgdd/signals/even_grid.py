@@ -61,7 +61,7 @@ def even_step(
 
     Examples
     --------
-    >>> from mgdd.signals import even_step
+    >>> from mgdd.signals.even_grid import even_step
     >>> even_step([0.0, 0.001, 0.00205, 0.003])
     0.001
     """

@@ -7,7 +7,7 @@ reconstruction from public sources, not the code behind the dissertation: see th
 from __future__ import annotations
 
 from mgdd._core import Throttle
-from mgdd.throttle.characteristics import airflow_torque_nm, groups, holding_duty, linear_part
+from mgdd.throttle.characteristics import groups, holding_duty, linear_part
 from mgdd.throttle.interop import initial_state, to_iosystem
 from mgdd.throttle.pseudo_wiener import PseudoWiener
 from mgdd.throttle.sensors import SensorFault, SensorPair, sense
@@ -18,7 +18,6 @@ __all__ = [
     "SensorFault",
     "SensorPair",
     "Throttle",
-    "airflow_torque_nm",
     "groups",
     "holding_duty",
     "initial_state",

@@ -202,7 +202,8 @@ def airflow_torque_nm(throttle: Throttle, angle_deg: ArrayLike) -> NDArray[np.fl
 
     Examples
     --------
-    >>> from mgdd.throttle import Throttle, airflow_torque_nm
+    >>> from mgdd.throttle import Throttle
+    >>> from mgdd.throttle.characteristics import airflow_torque_nm
     >>> airflow_torque_nm(Throttle(pressure_drop_kpa=10.0), [0.0, 55.0, 90.0]).round(3).tolist()
     [-0.0, -0.108, -0.0]
     """
