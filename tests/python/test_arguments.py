@@ -122,7 +122,7 @@ def test_the_argument_is_named(call: Callable[[], Any], field: str | None, messa
     [
         (lambda: Cylinder(bore=86.0), r"Cylinder\(\) has no argument 'bore': did you mean 'bore_mm'\?"),
         (lambda: Cylinder(86.0), r"Cylinder\(\) takes 0 positional arguments, 1 were given; give .* by name"),
-        (lambda: ExtremumSeeking(strat=1.0), r"ExtremumSeeking\(\) has no argument 'strat': did you mean 'start'\?"),
+        (lambda: ExtremumSeeking(stort=1.0), r"ExtremumSeeking\(\) has no argument 'stort': did you mean 'start'\?"),
         (ExtremumSeeking, r"ExtremumSeeking\(\) lacks start"),
         (lambda: Limit("p_max_bar", 95.0, name="x"), r"Limit\(\) got 'name' twice"),
     ],

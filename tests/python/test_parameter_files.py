@@ -309,7 +309,7 @@ def test_any_number_and_text_come_back(value: float, text: str) -> None:
         ('"lag"', '"led"', DataError, "a.toml: kind = 'led': must be 'lag'"),
         ("format = 1", "format = 2", DataError, "a.toml: format = 2: this version of mgdd reads format = 1"),
         ("format = 1\n", "", DataError, "format = None: .*write that line"),
-        ("tau_s", "tua_s", ParameterError, r"a\.toml: \[parameters\] tua_s: unknown key: did you mean 'tau_s'\?"),
+        ("tau_s", "tau_ss", ParameterError, r"a\.toml: \[parameters\] tau_ss: unknown key: did you mean 'tau_s'\?"),
         ('"s"', '"ms"', ParameterError, r"tau_s: unit = 'ms': must be 's'; convert the value"),
         (', unit = "s"', "", ParameterError, r"tau_s: unit = None: must be 's'; write tau_s = \{ value"),
         ("value = 3", 'value = "3"', ParameterError, r"steps: value = '3': must be a whole number"),

@@ -51,7 +51,7 @@ VirtualThrottleSample VirtualThrottle::step(const VirtualThrottleInputs& inputs)
   ++samples_;
   VirtualThrottleSample out;
   out.sample = samples_;
-  out.angle_deg = state_.plate_angle_rad / units::rad_per_deg;
+  out.angle_deg = plant_.output(state_);
   out.speed_deg_per_s = state_.plate_speed_rad_per_s / units::rad_per_deg;
   out.current_a = state_.current_a;
   out.sensed = sensors_.step(out.angle_deg);

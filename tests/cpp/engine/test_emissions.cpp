@@ -61,13 +61,13 @@ TEST(SoftSensor, RefusesConstantsOutsideTheirDomain) {
   EXPECT_EQ(message_of([&] { validate(s); }), "correction_gain = 1.5: must be in [0, 1]");
   s = {};
   s.model.intake_o2_fraction = 0.0;
-  EXPECT_EQ(message_of([&] { validate(s); }), "intake_o2_fraction = 0: must be in (0, 1]");
+  EXPECT_EQ(message_of([&] { validate(s); }), "intake_o2_fraction = 0: must be > 0 and <= 1");
   s = {};
   s.model.o2_exponent = -1.0;
   EXPECT_EQ(message_of([&] { validate(s); }), "o2_exponent = -1: must be in [0, 10]");
   s = {};
   s.model.proxy.reference_nox_ppm = -1.0;
-  EXPECT_EQ(message_of([&] { validate(s); }), "reference_nox_ppm = -1: must be > 0 and finite");
+  EXPECT_EQ(message_of([&] { validate(s); }), "reference_nox_ppm = -1 ppm: must be > 0 and finite");
 }
 
 const std::vector<double> sweep_k{1834.0, 1881.0, 1959.0, 2026.0, 2126.0, 2236.0};

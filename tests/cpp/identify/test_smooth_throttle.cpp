@@ -8,6 +8,7 @@
 #include "mgdd/common/random.hpp"
 #include "mgdd/identify/output_error.hpp"
 #include "mgdd/identify/throttle/smooth_fit.hpp"
+#include "mgdd/math/dispatch.hpp"
 #include "support/no_alloc.hpp"
 
 namespace mgdd::identify {
@@ -69,6 +70,7 @@ TEST(SmoothThrottle, TheOnePassKernelHasTheNormalEquationsOfTheDualModel) {
   Eigen::MatrixXd j(1500, 10);
   ASSERT_TRUE(residual(residual.start(), r, &j));
   NormalSums sums;
+  (void)instruction_set();  // its first call reads the environment, which may allocate
   const test_support::AllocationCounter counter;
   accumulate(SmoothPlant{}, log.record(), 1500, set, sums);
   EXPECT_EQ(counter.count(), 0U);

@@ -79,7 +79,12 @@ TEST(VirtualThrottle, GoesOnBitForBitAfterARestoreAlsoWithAStuckSensor) {
     EXPECT_EQ(a.sensed.fault, b.sensed.fault);
     EXPECT_EQ(a.angle_deg, b.angle_deg);
   }
-  EXPECT_TRUE(first.step({0.0, 12.0, 0.0}).sensed.fault);
+  for (int k = 0; k < 300; ++k) {  // far from the voltage that the stuck sensor holds
+    (void)first.step({0.9, 12.0, 0.0});
+    (void)second.step({0.9, 12.0, 0.0});
+  }
+  EXPECT_TRUE(first.step({0.9, 12.0, 0.0}).sensed.fault);
+  EXPECT_TRUE(second.step({0.9, 12.0, 0.0}).sensed.fault);
 }
 
 TEST(VirtualThrottle, NoAllocationAndARefusedSettingNamesItself) {

@@ -283,7 +283,7 @@ TEST(LeastSquares, BadInputIsRefusedByName) {
   EXPECT_EQ(build(good, 1), "S n_residuals = 1: must be >= the 2 parameters");
   LeastSquaresOptions options;
   options.initial_damping = -1.0;
-  EXPECT_EQ(message([&] { LeastSquares(good, 5, options); }), "P initial_damping = -1: must be in [1e-24, 1e30]");
+  EXPECT_EQ(message([&] { LeastSquares(good, 5, options); }), "P initial_damping = -1: must be in [1e-24, 1e+30]");
   for (double LeastSquaresOptions::* const field :
        {&LeastSquaresOptions::cost_tolerance, &LeastSquaresOptions::step_tolerance,
         &LeastSquaresOptions::gradient_tolerance, &LeastSquaresOptions::initial_damping,

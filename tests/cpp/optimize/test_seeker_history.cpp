@@ -31,7 +31,7 @@ TEST(SeekerHistory, KeepsWhatWasToldAndNothingElse) {
     const Inputs before = seeker.estimate();
     const double j[] = {-0.02 * asked[0] * asked[0] - 0.03 * asked[1] * asked[1]};
     const double useless[] = {std::nan("")};
-    EXPECT_EQ(seeker.tell({useless, {}, false}), TellStatus::not_finite);
+    EXPECT_EQ(seeker.tell({useless, {}, false}), TellStatus::not_a_reading);
     const bool misfire = k % 7 == 3;
     EXPECT_EQ(seeker.tell({j, {}, misfire}), misfire ? TellStatus::misfire : TellStatus::accepted);
     plain.tell({j, {}, misfire});

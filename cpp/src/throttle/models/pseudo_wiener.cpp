@@ -206,6 +206,7 @@ void check_pw_p(const PseudoWienerFrame& frame, int plays) {
 
 template <>
 void PwR::validate() const {
+  validate_settings();
   check_numbers(*this, PseudoWienerKind::pw_r);
   check_map(above, frame.open_deg - limp_home_deg, "above");
   check_map(below, frame.closed_deg - limp_home_deg, "below");
@@ -213,12 +214,14 @@ void PwR::validate() const {
 
 template <>
 void PwW::validate() const {
+  validate_settings();
   check_numbers(*this, PseudoWienerKind::pw_w);
 }
 
 template <>
 void PwP::validate() const {
   require_within("plays", plays, 1.0, max_plays);
+  validate_settings();
   check_numbers(*this, PseudoWienerKind::pw_p);
 }
 
