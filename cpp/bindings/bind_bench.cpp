@@ -236,10 +236,10 @@ void bind_bench(py::module_& m) {
           },
           arg("seed") = py::none(), "Back to cycle 0, with another seed if given.")
       .def_property(
-          "state", [](const B& b) { return b.use()->state(); },
-          [](B& b, const StateColumns& state) { b.use()->restore(state); },
+          "state", [](const B& b) { return save_state(*b.use()); },
+          [](B& b, const StateColumns& state) { restore_state(*b.use(), state); },
           "State of the run between two cycles: named lists of numbers, JSON-able. Setting it continues that\n"
-          "run bit for bit; a state of another bench raises DataError and changes nothing.")
+          "run bit for bit; a state of another bench raises ParameterError and changes nothing.")
       .def(
           "point_at", [](const B& b, std::int64_t cycle) { return b.constant().point_at(cycle); }, arg("cycle"),
           "Operating point of a cycle.")
@@ -275,7 +275,7 @@ void bind_bench(py::module_& m) {
            })
       .def(py::pickle(
           [](const B& b) {
-            const StateColumns state = b.use()->state();
+            const StateColumns state = save_state(*b.use());
             return py::make_tuple(1, to_dict(b.constant().settings()), state);
           },
           [](const py::tuple& state) {
@@ -283,7 +283,7 @@ void bind_bench(py::module_& m) {
             const auto columns = state[2].cast<StateColumns>();
             const py::object made = py::type::of<B>()(**state[1].cast<py::dict>());
             B& bench = made.cast<B&>();
-            bench.use()->restore(columns);
+            restore_state(*bench.use(), columns);
             return std::move(bench);
           }));
 }

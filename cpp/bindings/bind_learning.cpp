@@ -93,7 +93,7 @@ void bind_learning(py::module_& m) {
           py::arg("error"), "Error of this trial; makes the next input. Releases the GIL.")
       .def("convergence", &convergence, "Findings of the linear theory, by name. Releases the GIL.")
       .def(
-          "state", [](const B& b) { return b.use()->state(); }, "Columns by name.")
+          "state", [](const B& b) { return save_state(*b.use()); }, "Columns by name.")
       .def(
           "restore", [](B& b, const StateColumns& state) { b.use()->restore(state); }, py::arg("state"),
           "Go on from the columns of `state`.")

@@ -2461,7 +2461,7 @@ class EngineBench:
     def state(self) -> dict[str, list[float]]:
         """
         State of the run between two cycles: named lists of numbers, JSON-able. Setting it continues that
-        run bit for bit; a state of another bench raises DataError and changes nothing.
+        run bit for bit; a state of another bench raises ParameterError and changes nothing.
         """
     @state.setter
     def state(self, arg1: collections.abc.Mapping[str, collections.abc.Sequence[typing.SupportsFloat | typing.SupportsIndex]]) -> None:

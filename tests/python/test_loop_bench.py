@@ -12,7 +12,7 @@ import pytest
 
 from mgdd import _core, presets
 from mgdd.engine import Cylinder, NoxModel, NoxProxy, OperatingPoint, Performance, PerformanceTerm, SoftSensor, simulate
-from mgdd.errors import DataError, ParameterError, RigError, ShapeError
+from mgdd.errors import ParameterError, RigError, ShapeError
 from mgdd.loop import EngineBench, Measurement, SensorDynamics
 from mgdd.results import check_labels
 from mgdd.rig import Rig, SimulatedRig
@@ -175,11 +175,11 @@ def test_a_refused_call_changes_nothing() -> None:
     with pytest.raises(ShapeError, match="soc_cad has 2 dimensions"):
         bench.run(np.zeros((3, 3)))
     spoiled = dict(state)
-    del spoiled["fast"]
-    with pytest.raises(DataError, match="no column 'fast'"):
+    del spoiled["fast_line"]
+    with pytest.raises(ParameterError, match="column 'fast_line' is missing"):
         bench.state = spoiled
-    with pytest.raises(DataError, match="'last', entry 1, holds nan: must be finite"):
-        bench.state = {**state, "last": [state["last"][0], math.nan, *state["last"][2:]]}
+    with pytest.raises(ParameterError, match="'last_t_max_k' holds nan: must be finite"):
+        bench.state = {**state, "last_t_max_k": [math.nan]}
     assert all(np.array_equal(state[name], column) for name, column in bench.state.items())
     twin = EngineBench(**RICH)
     twin.run(requests(20))

@@ -54,30 +54,12 @@ void TransportLag::fill(double steady) noexcept {
 
 double TransportLag::step(double x, std::size_t delay, double gain) noexcept {
   const std::size_t n = line_.size();
-  at_ = at_ + 1 < n ? at_ + 1 : 0;
-  line_[at_] = x;
-  const double inlet = line_[at_ >= delay ? at_ - delay : at_ + n - delay];
+  const auto at = static_cast<std::size_t>(at_) + 1 < n ? static_cast<std::size_t>(at_) + 1 : 0;
+  at_ = static_cast<std::int64_t>(at);
+  line_[at] = x;
+  const double inlet = line_[at >= delay ? at - delay : at + n - delay];
   level_ = gain < 1.0 ? level_ + gain * (inlet - level_) : inlet;
   return level_;
-}
-
-std::vector<double> TransportLag::save() const {
-  std::vector<double> state{level_, static_cast<double>(at_)};
-  state.insert(state.end(), line_.begin(), line_.end());
-  return state;
-}
-
-void TransportLag::restore(const std::vector<double>& state) {
-  const bool fits = state.size() == state_size() &&
-                    std::ranges::all_of(state, [](double x) { return std::isfinite(x); }) && state[1] >= 0.0 &&
-                    state[1] < static_cast<double>(line_.size()) && state[1] == std::floor(state[1]);
-  if (!fits) {
-    throw DataError("the state of a transport lag has " + std::to_string(state.size()) + " entries: must be " +
-                    std::to_string(state_size()) + " finite numbers, the second an index of the line");
-  }
-  level_ = state[0];
-  at_ = static_cast<std::size_t>(state[1]);
-  std::copy(state.begin() + 2, state.end(), line_.begin());
 }
 
 }  // namespace mgdd::loop

@@ -10,6 +10,7 @@
 #include <gtest/gtest.h>
 
 #include "mgdd/common/error.hpp"
+#include "mgdd/common/state.hpp"
 
 namespace mgdd::loop {
 namespace {
@@ -68,26 +69,28 @@ TEST(TransportLag, ADelayThatChangesReadsAnotherPlaceOfTheLine) {
   EXPECT_EQ(lag.step(21.0, 10, 1.0), 11.0);
 }
 
+struct Line {  // a lag as the part of a state
+  TransportLag lag;
+
+  template <class Self, class V>
+  static void visit(Self& self, V& v) {
+    TransportLag::visit(self.lag, v, "line");
+  }
+};
+
 TEST(TransportLag, SavesAndRestoresBitForBit) {
-  TransportLag a(7), b(7);
-  a.fill(1.0);
+  Line a{TransportLag(7)}, b{TransportLag(7)}, shorter{TransportLag(6)};
+  a.lag.fill(1.0);
   for (int k = 0; k < 12; ++k)
-    a.step(std::sqrt(k), 5, 0.3);
-  b.restore(a.save());
+    a.lag.step(std::sqrt(k), 5, 0.3);
+  restore_state(b, save_state(a));
   for (int k = 0; k < 30; ++k)
-    EXPECT_EQ(a.step(std::cos(k), 6, 0.3), b.step(std::cos(k), 6, 0.3));
-  std::vector<double> bad = a.save();
-  bad[1] = 8.0;
-  EXPECT_THROW(b.restore(bad), DataError);
-  bad[1] = 2.5;
-  EXPECT_THROW(b.restore(bad), DataError);
-  bad[1] = 2.0;
-  bad[4] = std::nan("");
-  EXPECT_THROW(b.restore(bad), DataError);
-  bad[4] = 0.0;
-  bad.pop_back();
-  EXPECT_THROW(b.restore(bad), DataError);
-  EXPECT_EQ(a.save(), b.save());
+    EXPECT_EQ(a.lag.step(std::cos(k), 6, 0.3), b.lag.step(std::cos(k), 6, 0.3));
+  StateColumns bad = save_state(a);
+  EXPECT_THROW(restore_state(shorter, bad), ParameterError);
+  bad["line_at"] = {8.0};
+  EXPECT_THROW(restore_state(b, bad), ParameterError);
+  EXPECT_EQ(save_state(a), save_state(b));
 }
 
 TEST(SensorDynamics, SecondsBecomeCyclesAtTheSpeed) {

@@ -3,27 +3,44 @@
 #pragma once
 
 #include <Eigen/Core>
+#include <array>
 #include <cmath>
+#include <cstddef>
 #include <cstdint>
 #include <map>
+#include <optional>
 #include <string>
 #include <string_view>
 #include <vector>
 
 #include "mgdd/common/error.hpp"
+#include "mgdd/common/text.hpp"
 
 namespace mgdd {
 
 using StateColumns = std::map<std::string, std::vector<double>>;
 
-/// Collects members into columns. Integers below 2^53 and booleans are exact as doubles.
+/// Collects members into columns. Integers below 2^53 and booleans are exact as doubles, a full word as its halves.
 class StateWriter {
  public:
   void operator()(std::string_view name, const double& value) { put(name, {value}); }
   void operator()(std::string_view name, const bool& value) { put(name, {value ? 1.0 : 0.0}); }
   void operator()(std::string_view name, const std::int64_t& value) { put(name, {static_cast<double>(value)}); }
   void operator()(std::string_view name, const std::int64_t& value, std::int64_t) { (*this)(name, value); }
+  void operator()(std::string_view name, const std::uint64_t& value) {
+    put(name, {static_cast<double>(value >> 32), static_cast<double>(value & 0xFFFFFFFFu)});
+  }
+  /// One entry, or none.
+  void operator()(std::string_view name, const std::optional<double>& value) {
+    put(name, value ? std::vector<double>{*value} : std::vector<double>{});
+  }
   void operator()(std::string_view name, const std::vector<double>& value) { put(name, value); }
+  /// A column whose length the members visited before it tell.
+  void operator()(std::string_view name, const std::vector<double>& value, std::size_t) { put(name, value); }
+  template <std::size_t N>
+  void operator()(std::string_view name, const std::array<double, N>& value) {
+    put(name, {value.begin(), value.end()});
+  }
   template <class Derived>
   void operator()(std::string_view name, const Eigen::PlainObjectBase<Derived>& value) {
     put(name, std::vector<double>(value.data(), value.data() + value.size()));
@@ -35,17 +52,20 @@ class StateWriter {
   void put(std::string_view name, std::vector<double> values) { columns[std::string(name)] = std::move(values); }
 };
 
-/// Fills members from columns; ParameterError naming the column that is missing, unknown or of the wrong length.
+/// Fills members from columns; ParameterError naming the column that is missing, unknown, of the wrong length or not
+/// finite.
 class StateReader {
  public:
   explicit StateReader(const StateColumns& columns) : columns_(columns) {}
 
-  void operator()(std::string_view name, double& value) { value = numbers(name, 1)[0]; }
-  void operator()(std::string_view name, bool& value) { value = column(name, 1)[0] != 0.0; }
-  void operator()(std::string_view name, std::int64_t& value) {
+  void operator()(std::string_view name, double& value) { value = column(name, 1)[0]; }
+  void operator()(std::string_view name, bool& value) {
     const double stored = column(name, 1)[0];
-    if (!(std::abs(stored) <= 0x1p53) || stored != std::trunc(stored)) refuse(name, "must hold a whole number");
-    value = static_cast<std::int64_t>(stored);
+    if (stored != 0.0 && stored != 1.0) refuse(name, "holds " + text(stored) + ": must be 0 or 1");
+    value = stored == 1.0;
+  }
+  void operator()(std::string_view name, std::int64_t& value) {
+    value = static_cast<std::int64_t>(whole(name, column(name, 1)[0], -0x1p53, 0x1p53));
   }
   /// A counter that indexes a table: 0 <= value < end.
   void operator()(std::string_view name, std::int64_t& value, std::int64_t end) {
@@ -57,12 +77,26 @@ class StateReader {
     }
     value = stored;
   }
-  void operator()(std::string_view name, std::vector<double>& value) { value = numbers(name, value.size()); }
+  void operator()(std::string_view name, std::uint64_t& value) {
+    const std::vector<double>& halves = column(name, 2);
+    const auto half = [&](double x) { return static_cast<std::uint64_t>(whole(name, x, 0.0, 0x1p32 - 1.0)); };
+    value = half(halves[0]) << 32 | half(halves[1]);
+  }
+  void operator()(std::string_view name, std::optional<double>& value) {
+    const std::vector<double>& stored = known(name);
+    if (stored.size() > 1) require_size(name, stored, 1);
+    value = stored.empty() ? std::nullopt : std::optional(column(name, 1)[0]);
+    if (stored.empty()) ++used_;
+  }
+  void operator()(std::string_view name, std::vector<double>& value) { value = column(name, value.size()); }
+  void operator()(std::string_view name, std::vector<double>& value, std::size_t size) { value = column(name, size); }
+  template <std::size_t N>
+  void operator()(std::string_view name, std::array<double, N>& value) {
+    copy(column(name, N), value.data());
+  }
   template <class Derived>
   void operator()(std::string_view name, Eigen::PlainObjectBase<Derived>& value) {
-    const std::vector<double>& stored = numbers(name, static_cast<std::size_t>(value.size()));
-    for (Eigen::Index i = 0; i < value.size(); ++i)
-      value.data()[i] = stored[static_cast<std::size_t>(i)];
+    copy(column(name, static_cast<std::size_t>(value.size())), value.data());
   }
 
   /// Call last: refuses columns that nobody asked for.
@@ -73,25 +107,39 @@ class StateReader {
   }
 
  private:
-  const std::vector<double>& numbers(std::string_view name, std::size_t size) {
-    const std::vector<double>& stored = column(name, size);
-    for (const double value : stored) {
-      if (std::isnan(value)) refuse(name, "holds NaN: a run would not survive it");
-    }
-    return stored;
-  }
-  const std::vector<double>& column(std::string_view name, std::size_t size) {
+  const std::vector<double>& known(std::string_view name) const {
     const auto found = columns_.find(std::string(name));
     if (found == columns_.end()) refuse(name, "is missing: it belongs to another kind of object");
-    if (found->second.size() != size) {
-      refuse(name, "has " + std::to_string(found->second.size()) + " entries: must have " + std::to_string(size) +
-                       ", as these settings say");
-    }
-    ++used_;
     return found->second;
   }
+  static void require_size(std::string_view name, const std::vector<double>& stored, std::size_t size) {
+    if (stored.size() == size) return;
+    refuse(name, "has " + std::to_string(stored.size()) + " entries: must have " + std::to_string(size) +
+                     ", as these settings say");
+  }
+  const std::vector<double>& column(std::string_view name, std::size_t size) {
+    const std::vector<double>& stored = known(name);
+    require_size(name, stored, size);
+    for (const double value : stored) {
+      if (!std::isfinite(value)) refuse(name, "holds " + text(value) + ": must be finite");
+    }
+    ++used_;
+    return stored;
+  }
+  static double whole(std::string_view name, double value, double lower, double upper) {
+    if (!(value >= lower && value <= upper) || value != std::trunc(value)) {
+      refuse(name, "holds " + text(value) + ": must be a whole number" + (lower < 0.0 ? "" : " >= 0"));
+    }
+    return value;
+  }
+  static void copy(const std::vector<double>& from, double* to) {
+    for (const double value : from)
+      *to++ = value;
+  }
   [[noreturn]] static void refuse(std::string_view name, const std::string& why) {
-    throw ParameterError("state column '" + std::string(name) + "' " + why);
+    ParameterError error("state column '" + std::string(name) + "' " + why);
+    error.field = name;
+    throw error;
   }
 
   const StateColumns& columns_;

@@ -114,10 +114,23 @@ class EngineBench {
   void reset(std::uint64_t seed) noexcept;
   void reset() noexcept { reset(seed_); }
 
-  /// Everything a run depends on besides the settings; `restore` is bit for bit. DataError for columns that do not
-  /// belong to this bench, which then is unchanged.
-  StateColumns state() const;
-  void restore(const StateColumns& state);
+  /// Everything a run depends on besides the settings, for `save_state` and `restore_state`: bit for bit.
+  template <class Self, class V>
+  static void visit(Self& self, V& v) {
+    v("cycle", self.cycle_, std::int64_t{1} << 53);
+    v("seed", self.seed_);
+    v("last_soc_cad", self.last_soc_cad_);
+    v("last_t_max_k", self.last_t_max_k_);
+    v("last_imep_bar", self.last_imep_bar_);
+    v("ln_bias", self.ln_bias_);
+    v("last_components", self.last_components_);
+    v("imep_gross_bar", self.imep_bar_);
+    TransportLag::visit(self.analyser_, v, "analyser");
+    TransportLag::visit(self.fast_, v, "fast");
+    TransportLag::visit(self.soft_through_analyser_, v, "soft_through_analyser");
+    for (std::size_t i = 0; i < self.component_lags_.size(); ++i)
+      TransportLag::visit(self.component_lags_[i], v, "component" + std::to_string(i));
+  }
 
   const BenchSettings& settings() const noexcept { return settings_; }
   std::int64_t cycle() const noexcept { return cycle_; }  ///< index of the next cycle

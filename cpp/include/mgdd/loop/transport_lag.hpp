@@ -6,6 +6,7 @@
 #include <cstddef>
 #include <cstdint>
 #include <optional>
+#include <string>
 #include <string_view>
 #include <vector>
 
@@ -40,14 +41,16 @@ class TransportLag {
   double step(double x, std::size_t delay, double gain) noexcept;
   double level() const noexcept { return level_; }
 
-  /// The whole state: level, position, line; `restore` takes what `save` gave for the same size.
-  std::vector<double> save() const;
-  void restore(const std::vector<double>& state);
-  std::size_t state_size() const noexcept { return line_.size() + 2; }
+  template <class Self, class V>
+  static void visit(Self& self, V& v, const std::string& name) {
+    v(name + "_level", self.level_);
+    v(name + "_at", self.at_, static_cast<std::int64_t>(self.line_.size()));
+    v(name + "_line", self.line_);
+  }
 
  private:
   std::vector<double> line_;
-  std::size_t at_ = 0;
+  std::int64_t at_ = 0;
   double level_ = 0.0;
 };
 

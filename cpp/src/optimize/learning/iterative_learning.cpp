@@ -4,13 +4,13 @@
 #include <cmath>
 #include <utility>
 
-#include "mgdd/common/error.hpp"
+#include "mgdd/common/bounds.hpp"
 #include "mgdd/common/text.hpp"
 
 namespace mgdd::optimize {
 namespace {
 
-constexpr double largest_count = 9007199254740992.0;  // 2^53: beyond it a double no longer counts
+constexpr Domain at_least_zero{.lower = 0.0};
 
 bool is_finite(std::span<const double> column) noexcept {
   return std::all_of(column.begin(), column.end(), [](double value) { return std::isfinite(value); });
@@ -28,19 +28,6 @@ double norm_of(std::span<const double> column) noexcept {
     sum += (value / largest) * (value / largest);
   }
   return largest * std::sqrt(sum);
-}
-
-struct Scalar {
-  const char* name;
-  double largest;
-};
-
-void check_count(const IterativeLearning::State& state, const Scalar& scalar) {
-  const double value = state.at(scalar.name).front();
-  if (!(value >= 0.0 && value <= scalar.largest && value == std::floor(value))) {
-    throw ParameterError("state: " + std::string(scalar.name) + " = " + text(value) +
-                         ": must be a whole number in [0, " + text(scalar.largest) + "]");
-  }
 }
 
 }  // namespace
@@ -75,7 +62,7 @@ LearningStatus IterativeLearning::try_tell(std::span<const double> error) noexce
     limit(learned);
     std::fill(next_.begin() + static_cast<std::ptrdiff_t>(learned.size()), next_.end(), learned.back());
   }
-  if (norm < best_norm_) {
+  if (!best_norm_ || norm < *best_norm_) {
     best_norm_ = norm;
     best_trial_ = trial_;
     std::copy(input_.begin(), input_.end(), best_input_.begin());
@@ -127,72 +114,22 @@ void IterativeLearning::limit(std::span<double> input) const noexcept {
   }
 }
 
-IterativeLearning::State IterativeLearning::state() const {
-  const bool started = !norms_.empty();
-  return {{"trial", {static_cast<double>(trial_)}},
-          {"asked", {asked_ ? 1.0 : 0.0}},
-          {"frozen", {frozen_ ? 1.0 : 0.0}},
-          {"best_trial", {static_cast<double>(best_trial_)}},
-          {"best_norm", started ? std::vector<double>{best_norm_} : std::vector<double>{}},
-          {"input", input_},
-          {"best_input", best_input_},
-          {"error_norms", norms_}};
+void IterativeLearning::restore(const StateColumns& columns) {
+  restore_state(*this, columns);
+  norms_.reserve(history_length);
 }
 
-void IterativeLearning::restore(const State& state) {
-  const State own = this->state();
-  for (const auto& [name, column] : state) {
-    if (!own.contains(name)) throw ParameterError("state has a column '" + name + "' that no learner writes");
-    for (std::size_t i = 0; i < column.size(); ++i) {
-      if (!std::isfinite(column[i])) {
-        throw ParameterError("state: " + name + "[" + std::to_string(i) + "] = " + text(column[i]) +
-                             ": must be finite");
-      }
-    }
+void IterativeLearning::require_usable() const {
+  if (best_norm_.has_value() != (trial_ > 0)) {
+    throw ParameterError("state column 'best_norm' must have one entry once a trial was told, and none before");
   }
-  for (const auto& [name, column] : own) {
-    if (!state.contains(name)) throw ParameterError("state lacks the column '" + name + "'");
+  if (best_norm_) require_in(at_least_zero, "state column 'best_norm'", *best_norm_);
+  for (const double norm : norms_)
+    require_in(at_least_zero, "state column 'error_norms'", norm);
+  for (const auto& [name, column] : {std::pair{"input", &input_}, std::pair{"best_input", &best_input_}}) {
+    for (const double value : *column)
+      require_within("state column '" + std::string(name) + "'", value, settings_.lower, settings_.upper);
   }
-  const auto require_length = [&](const char* name, std::size_t length) {
-    const std::size_t found = state.at(name).size();
-    if (found != length) {
-      throw ShapeError("state: " + std::string(name) + " has " + std::to_string(found) + " values: must have " +
-                       std::to_string(length));
-    }
-  };
-  for (const char* name : {"trial", "asked", "frozen", "best_trial"}) {
-    require_length(name, 1);
-  }
-  for (const Scalar& scalar : {Scalar{"trial", largest_count}, {"asked", 1.0}, {"frozen", 1.0}}) {
-    check_count(state, scalar);
-  }
-  const double trial = state.at("trial").front();
-  check_count(state, {"best_trial", std::max(trial - 1.0, 0.0)});
-  require_length("input", input_.size());
-  require_length("best_input", input_.size());
-  require_length("best_norm", trial > 0.0 ? 1 : 0);
-  require_length("error_norms", static_cast<std::size_t>(std::min(trial, static_cast<double>(history_length))));
-  for (const char* name : {"best_norm", "error_norms"}) {
-    for (const double norm : state.at(name)) {
-      if (norm < 0.0) throw ParameterError("state: " + std::string(name) + " = " + text(norm) + ": must be >= 0");
-    }
-  }
-  for (const char* name : {"input", "best_input"}) {
-    for (const double value : state.at(name)) {
-      if (value < settings_.lower || value > settings_.upper) {
-        throw ParameterError("state: " + std::string(name) + " = " + text(value) + ": must be in [" +
-                             text(settings_.lower) + ", " + text(settings_.upper) + "] of this learner");
-      }
-    }
-  }
-  input_ = state.at("input");
-  best_input_ = state.at("best_input");
-  norms_.assign(state.at("error_norms").begin(), state.at("error_norms").end());
-  best_norm_ = trial > 0.0 ? state.at("best_norm").front() : std::numeric_limits<double>::infinity();
-  trial_ = static_cast<std::size_t>(trial);
-  best_trial_ = static_cast<std::size_t>(state.at("best_trial").front());
-  asked_ = state.at("asked").front() != 0.0;
-  frozen_ = state.at("frozen").front() != 0.0;
 }
 
 }  // namespace mgdd::optimize

@@ -1,10 +1,14 @@
 // Iterative learning control: improves the input trajectory of a task that is repeated trial by trial.
 // Ask for the input of the trial, apply it, tell the error e = r - y: sample t of both belongs to the same instant.
-// Units are the caller's. `ask` and `try_tell` neither throw nor allocate; `tell`, `restore` and `state` are for the
-// desk. Source of the laws: Bristow, Tharayil and Alleyne (2006).
+// Units are the caller's. `ask` and `try_tell` neither throw nor allocate; `tell` and `restore` are not real-time
+// safe. Source of the laws: Bristow, Tharayil and Alleyne (2006).
 #pragma once
 
+#include <algorithm>
 #include <cstddef>
+#include <cstdint>
+#include <limits>
+#include <optional>
 #include <span>
 #include <string>
 #include <vector>
@@ -33,9 +37,6 @@ enum class LearningStatus {
 /// With the guard, two rises of the norm in a row end learning and bring the input of the best trial back.
 class IterativeLearning {
  public:
-  /// Numbers by name, enough to go on bit for bit.
-  using State = StateColumns;
-
   /// Norms kept; older ones are forgotten.
   static constexpr std::size_t history_length = 1000;
 
@@ -53,18 +54,34 @@ class IterativeLearning {
   /// Linear theory of the law; needs an impulse response. Independent of what has been told.
   [[nodiscard]] ConvergenceReport convergence() const { return optimize::convergence(law_); }
 
-  [[nodiscard]] State state() const;
+  /// For `save_state`; restore through `restore`, which also keeps room for the norms to come.
+  template <class Self, class V>
+  static void visit(Self& self, V& v) {
+    v("trial", self.trial_, std::int64_t{1} << 53);
+    v("asked", self.asked_);
+    v("frozen", self.frozen_);
+    v("best_trial", self.best_trial_, std::max(self.trial_, std::int64_t{1}));
+    v("best_norm", self.best_norm_);
+    v("input", self.input_);
+    v("best_input", self.best_input_);
+    v("error_norms", self.norms_, std::min(static_cast<std::size_t>(self.trial_), history_length));
+  }
 
-  /// Checks names, lengths and values before it touches anything. The settings must be those of the saved learner.
-  void restore(const State& state);
+  /// Goes on from saved columns, or throws and changes nothing. The settings must be those of the saved learner.
+  void restore(const StateColumns& columns);
+
+  /// ParameterError for a restored state that these settings do not allow.
+  void require_usable() const;
 
   [[nodiscard]] const LearningSettings& settings() const noexcept { return settings_; }
   [[nodiscard]] const LearningUpdate& law() const noexcept { return law_; }
-  [[nodiscard]] std::size_t trial() const noexcept { return trial_; }  ///< trials told, and number of the one to come
+  [[nodiscard]] std::int64_t trial() const noexcept { return trial_; }  ///< trials told, and number of the one to come
   [[nodiscard]] bool asked() const noexcept { return asked_; }
   [[nodiscard]] bool frozen() const noexcept { return frozen_; }
-  [[nodiscard]] std::size_t best_trial() const noexcept { return best_trial_; }  ///< least norm; 0 before the first
-  [[nodiscard]] double best_norm() const noexcept { return best_norm_; }         ///< infinite before the first
+  [[nodiscard]] std::int64_t best_trial() const noexcept { return best_trial_; }  ///< least norm; 0 before the first
+  [[nodiscard]] double best_norm() const noexcept {                               ///< infinite before the first
+    return best_norm_.value_or(std::numeric_limits<double>::infinity());
+  }
   [[nodiscard]] const std::vector<double>& best_input() const noexcept { return best_input_; }
   [[nodiscard]] const std::vector<double>& error_norms() const noexcept { return norms_; }  ///< of the latest trials
 
@@ -76,9 +93,9 @@ class IterativeLearning {
   LearningUpdate law_;
   std::vector<double> input_, next_, best_input_;
   std::vector<double> norms_;
-  std::size_t trial_ = 0;
-  std::size_t best_trial_ = 0;
-  double best_norm_ = std::numeric_limits<double>::infinity();
+  std::int64_t trial_ = 0;
+  std::int64_t best_trial_ = 0;
+  std::optional<double> best_norm_;
   bool asked_ = false;
   bool frozen_ = false;
 };
