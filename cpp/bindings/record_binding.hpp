@@ -59,8 +59,8 @@ struct Named : Row<Place> {
   Argument get(const Record& record) const { return std::string(name_of(names(), this->at(record))); }
   py::dict described(const Record& standard) const {
     std::vector<std::string_view> valid;
-    for (const auto& [value, name] : names())
-      valid.push_back(name);
+    for (const auto& [value, text] : names())
+      valid.push_back(text);
     return describe_choice(get(standard), valid, this->doc);
   }
 };
@@ -127,7 +127,7 @@ void bind_record(py::class_<Record>& cls, const char* name, const Fields& fields
   const auto replaced = [name, fields, rows, to_dict](const Record& from, const py::dict& changes) {
     Record made = from;
     for (const auto& [key, value] : changes) {
-      const auto given = key.cast<std::string>();
+      const auto given = py::cast<std::string>(key);
       const auto field = find_field(fields, given);
       if (field != fields.end()) {
         field->in(made) = as_number(key, value);
