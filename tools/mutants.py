@@ -7,6 +7,7 @@ import io
 import random
 import re
 import tokenize
+from collections import Counter
 from collections.abc import Iterable, Iterator, Sequence
 from dataclasses import dataclass
 from pathlib import Path
@@ -305,7 +306,12 @@ def sample(root: Path, paths: Iterable[Path], seed: str, skip: Sequence[re.Patte
         name = path.relative_to(root).as_posix()
         for mutant in candidates(name, path.read_text(encoding="utf-8"), skip=skip):
             lines.setdefault((mutant.path, mutant.line), []).append(mutant)
-    chance = random.Random(seed)
-    pool = [chance.choice(choices) for choices in lines.values()]
-    chance.shuffle(pool)
-    return pool
+    # A line's own text decides its place and change, so that the rest of the sample stays when another line changes.
+    drawn: list[tuple[float, Mutant]] = []
+    met: Counter[str] = Counter()
+    for (name, _), choices in lines.items():
+        text = f"{seed} {name} {choices[0].before}"
+        chance = random.Random(f"{text} {met[text]}")
+        met[text] += 1
+        drawn.append((chance.random(), chance.choice(choices)))
+    return [mutant for _, mutant in sorted(drawn, key=lambda pair: pair[0])]

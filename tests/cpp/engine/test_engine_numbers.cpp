@@ -1,0 +1,282 @@
+// Numbers of the engine: what a user gets who says nothing, which bounds belong to the domain, rules between fields.
+#include <gtest/gtest.h>
+
+#include <cmath>
+#include <limits>
+#include <string>
+#include <string_view>
+#include <utility>
+#include <vector>
+
+#include "mgdd/common/error.hpp"
+#include "mgdd/engine/cycle.hpp"
+#include "mgdd/engine/emissions.hpp"
+#include "mgdd/engine/ignition.hpp"
+#include "mgdd/engine/performance.hpp"
+#include "mgdd/engine/sensitivity.hpp"
+#include "mgdd/engine/trace_analysis.hpp"
+#include "mgdd/engine/trace_check.hpp"
+
+namespace mgdd::engine {
+namespace {
+
+constexpr double infinity = std::numeric_limits<double>::infinity();
+constexpr double nan = std::numeric_limits<double>::quiet_NaN();
+
+template <class Call>
+std::string refusal(Call call) {
+  try {
+    call();
+  } catch (const Error& error) {
+    return error.what();
+  }
+  return "";
+}
+
+template <class Record>
+void expect_numbers(const Record& record, const auto& fields,
+                    const std::vector<std::pair<std::string_view, double>>& numbers) {
+  ASSERT_EQ(numbers.size(), fields.size());
+  for (std::size_t i = 0; i < fields.size(); ++i) {
+    EXPECT_EQ(fields[i].info.name, numbers[i].first);
+    EXPECT_EQ(record.*(fields[i].member), numbers[i].second) << numbers[i].first;
+  }
+}
+
+// The preset `puma_single`: a change of one of these numbers is a breaking change.
+TEST(EngineNumbers, DefaultsAreTheLightDutyDiesel) {
+  expect_numbers(Cylinder{}, cylinder_fields<double>(),
+                 {{"bore_mm", 86.0},
+                  {"stroke_mm", 86.0},
+                  {"connecting_rod_mm", 155.0},
+                  {"compression_ratio", 18.2},
+                  {"ivc_cad", -140.0},
+                  {"evo_cad", 130.0},
+                  {"bowl_area_factor", 1.0},
+                  {"ivc_pressure_rise_kpa", 0.0},
+                  {"volumetric_efficiency", 0.90},
+                  {"lower_heating_value_mj_per_kg", 42.8},
+                  {"gamma", 1.37},
+                  {"gamma_linear_300k", 1.38},
+                  {"gamma_linear_slope_per_k", -8.0e-5},
+                  {"gamma_polynomial_c0", 1.338},
+                  {"gamma_polynomial_c1_per_k", -6.0e-5},
+                  {"gamma_polynomial_c2_per_k2", 1.0e-8},
+                  {"wall_heat_scale", 0.5},
+                  {"woschni_c2", 2.28},
+                  {"woschni_cp_m_per_sk", 3.24e-3},
+                  {"wall_temperature_k", 450.0},
+                  {"burn_duration_ref_cad", 30.0},
+                  {"burn_fuel_ref_mg", 20.0},
+                  {"burn_speed_ref_rpm", 1500.0},
+                  {"burn_fuel_exponent", 0.6},
+                  {"burn_speed_exponent", 0.3},
+                  {"wiebe_a", 6.908},
+                  {"wiebe_m", 1.5},
+                  {"second_fraction", 0.6},
+                  {"second_delay_cad", 3.0},
+                  {"second_duration_cad", 50.0},
+                  {"second_wiebe_m", 0.8},
+                  {"cetane_number", 45.0},
+                  {"ignition_c0_cad", 4.0},
+                  {"ignition_c1", 0.0},
+                  {"ignition_c2_per_cad", 0.0}});
+  expect_numbers(
+      OperatingPoint{}, operating_point_fields<double>(),
+      {{"speed_rpm", 1500.0}, {"fuel_mg", 20.0}, {"intake_pressure_kpa", 150.0}, {"intake_temperature_k", 313.0}});
+  EXPECT_FALSE(OperatingPoint{}.burn_duration_cad.has_value());
+  EXPECT_FALSE(OperatingPoint{}.trapped_mass_g.has_value());
+  EXPECT_EQ(Cylinder{}.burn_shape, BurnShape::triangle);
+  EXPECT_EQ(Cylinder{}.gamma_model, GammaModel::constant);
+  EXPECT_EQ(Cylinder{}.wall_heat_model, WallHeatModel::woschni);
+  EXPECT_EQ(Cylinder{}.ignition_model, IgnitionModel::watson);
+}
+
+TEST(EngineNumbers, DefaultsOfAnalysisAndEmissions) {
+  const TraceOptions o;
+  EXPECT_EQ(o.pegging, Pegging::none);
+  EXPECT_EQ(o.pegging_exponent, 1.35);
+  EXPECT_EQ(o.inlet_pressure_kpa, 0.0);
+  EXPECT_EQ(o.gamma_source, AnalysisGamma::constant);
+  EXPECT_EQ(o.gamma, 1.33);
+  EXPECT_EQ(o.gamma_compression, 1.37);
+  EXPECT_EQ(o.gamma_combustion, 1.30);
+  EXPECT_EQ(o.heat_from_cad, -10.0);
+  EXPECT_EQ(o.heat_to_cad, 90.0);
+  EXPECT_EQ(o.burn_from_cad, -10.0);
+  EXPECT_FALSE(o.total_at_end);
+  EXPECT_FALSE(o.fractions_of_gross);
+  EXPECT_EQ(NoxProxy{}, (NoxProxy{1900.0, 1200.0, 16000.0}));
+  EXPECT_EQ(NoxModel{}, (NoxModel{NoxProxy{}, NoxMap::affine_log, 0.209, 3.0}));
+  EXPECT_EQ(SoftSensor{}, (SoftSensor{NoxModel{}, 0.01}));
+}
+
+// --- what is allowed ------------------------------------------------------------------------------------------
+
+template <class Record>
+void expect_edges(const auto& fields) {
+  for (const auto& field : fields) {
+    const auto message = [&](double value) {
+      Record record;
+      record.*(field.member) = value;
+      return refusal([&] { validate(record); });
+    };
+    const std::string bound = std::string(field.info.name) + " = ";
+    const auto outside = [&](double value) {
+      const std::string told = message(value);
+      return told.rfind(bound, 0) == 0 && told.find("must be >") != std::string::npos;
+    };
+    EXPECT_FALSE(outside(field.info.upper)) << field.info.name;
+    const double past = field.info.upper == 0.0 ? 1e-12 : field.info.upper * (1.0 + 1e-12);
+    EXPECT_TRUE(outside(past)) << field.info.name;
+    const bool order = field.info.name == "evo_cad";  // then IVC stands after EVO, which is said as such
+    EXPECT_EQ(outside(field.info.lower), field.info.lower_open || order) << field.info.name;
+  }
+}
+
+TEST(EngineNumbers, BoundsBelongToTheDomainWhereTheySay) {
+  expect_edges<Cylinder>(cylinder_fields<double>());
+  expect_edges<OperatingPoint>(operating_point_fields<double>());
+  for (const auto& [member, info] : {std::pair{&OperatingPoint::burn_duration_cad, burn_duration_info},
+                                     {&OperatingPoint::trapped_mass_g, trapped_mass_info}}) {
+    OperatingPoint p;
+    p.*member = info.upper;
+    EXPECT_EQ(refusal([&] { validate(p); }), "");
+    p.*member = info.upper * 1.001;
+    EXPECT_NE(refusal([&] { validate(p); }).find(std::string(info.name) + " = "), std::string::npos);
+    p.*member = 0.0;
+    EXPECT_NE(refusal([&] { validate(p); }), "");
+  }
+}
+
+TEST(EngineNumbers, GammaStaysAboveOneInEveryModelThatUsesIt) {
+  Cylinder c;
+  c.gamma_model = GammaModel::polynomial;
+  EXPECT_EQ(refusal([&] { validate(c); }), "");
+  c.gamma_polynomial_c1_per_k = -2e-4;
+  EXPECT_NE(refusal([&] { validate(c); }).find("gamma_polynomial_c1_per_k = -0.0002"), std::string::npos);
+  c.gamma_model = GammaModel::linear;
+  EXPECT_EQ(refusal([&] { validate(c); }), "") << "the polynomial is not in use";
+  c.gamma_linear_slope_per_k = 1e-4;
+  EXPECT_EQ(refusal([&] { validate(c); }), "") << "it may rise";
+  c.gamma_linear_300k = 1.004;
+  EXPECT_NE(refusal([&] { validate(c); }).find("is 0.999 at 250 K"), std::string::npos) << "the cold end counts";
+}
+
+TEST(EngineNumbers, ACycleRefusesEachOfItsInputs) {
+  const Cylinder good;
+  const OperatingPoint point;
+  const auto cycle = [&](const Cylinder& c, const OperatingPoint& p, double soc) {
+    return refusal([&] { validate_cycle(c, p, soc); });
+  };
+  EXPECT_EQ(cycle(good, point, -6.0), "");
+  Cylinder c = good;
+  c.bore_mm = -1.0;
+  EXPECT_EQ(cycle(c, point, -6.0).rfind("bore_mm = -1", 0), 0U);
+  OperatingPoint p = point;
+  p.speed_rpm = 0.0;
+  EXPECT_EQ(cycle(good, p, -6.0).rfind("speed_rpm = 0", 0), 0U);
+  EXPECT_EQ(cycle(good, point, 21.0).rfind("soc_cad = 21", 0), 0U);
+  c = good;
+  c.ivc_pressure_rise_kpa = -150.0;
+  EXPECT_EQ(cycle(c, point, -6.0).rfind("ivc_pressure_rise_kpa = -150 kPa: p(IVC) is 0 kPa", 0), 0U);
+  c.ivc_pressure_rise_kpa = -149.9;
+  EXPECT_EQ(cycle(c, point, -6.0), "");
+  c = good;
+  c.burn_shape = BurnShape::double_wiebe;
+  c.ivc_cad = -50.0;
+  c.second_delay_cad = -5.0;
+  EXPECT_EQ(cycle(c, point, -45.0), "") << "at IVC it may start";
+  EXPECT_EQ(cycle(c, point, -45.1).rfind("second_delay_cad = -5", 0), 0U);
+  EXPECT_EQ(crank_grid(good, 0.001).size(), 270001U);
+  EXPECT_EQ(crank_grid(good, 5.0).size(), 55U);
+  const std::vector<double> grid = crank_grid(good, 0.7);
+  EXPECT_EQ(grid.size(), 387U);
+  EXPECT_DOUBLE_EQ(grid[100], -70.0);
+  EXPECT_EQ(crank_grid(good, 0.9 * (1.0 + 1e-12)).size(), 301U) << "a remainder from rounding makes no step";
+}
+
+TEST(EngineNumbers, TimingsHaveTheirEdges) {
+  Cylinder c;
+  c.ivc_cad = -50.0;
+  c.evo_cad = 15.0;
+  const auto at = [&](double value) { return refusal([&] { validate_timing("soi_cad", value, c); }); };
+  EXPECT_EQ(at(-50.0), "");
+  EXPECT_NE(at(-50.1).find("closed part, from ivc_cad = -50 to evo_cad = 15"), std::string::npos);
+  EXPECT_EQ(at(14.9), "");
+  EXPECT_NE(at(15.0).find("closed part"), std::string::npos);
+  EXPECT_NE(at(90.0).find("looks like °bTDC"), std::string::npos);
+  EXPECT_EQ(at(90.1).find("looks like °bTDC"), std::string::npos);
+  EXPECT_NE(at(90.1).find("must be in [-60, 20]"), std::string::npos);
+}
+
+TEST(EngineNumbers, EmissionsRefuseEachOfTheirs) {
+  const auto refused = [](auto change, const std::string& part) {
+    SoftSensor s;
+    EXPECT_NO_THROW(validate(s));
+    change(s);
+    EXPECT_EQ(refusal([&] { validate(s); }).rfind(part, 0), 0U) << part;
+  };
+  refused([](SoftSensor& s) { s.model.proxy.reference_temperature_k = 0.0; }, "reference_temperature_k = 0");
+  refused([](SoftSensor& s) { s.model.proxy.reference_nox_ppm = infinity; }, "reference_nox_ppm = inf");
+  refused([](SoftSensor& s) { s.model.proxy.activation_temperature_k = -1.0; }, "activation_temperature_k = -1");
+  refused([](SoftSensor& s) { s.model.intake_o2_fraction = 1.01; }, "intake_o2_fraction = 1.01");
+  refused([](SoftSensor& s) { s.model.o2_exponent = 10.1; }, "o2_exponent = 10.1");
+  refused([](SoftSensor& s) { s.correction_gain = -0.1; }, "correction_gain = -0.1");
+  SoftSensor edge;
+  edge.model.intake_o2_fraction = 1.0;
+  edge.correction_gain = 1.0;
+  EXPECT_EQ(refusal([&] { validate(edge); }), "");
+
+  const std::vector<double> t{1800.0, 1900.0, 2000.0, 2100.0, 2200.0}, nox{700.0, 1200.0, 1900.0, 2900.0, 4100.0};
+  const auto fit = [&](std::vector<double> temperatures, std::vector<double> values, double reference = 1900.0) {
+    return refusal([&] { fit_nox_proxy(temperatures, values, NoxMap::arrhenius, reference); });
+  };
+  EXPECT_EQ(fit(t, nox), "") << "five points are enough";
+  for (const double bad : {0.0, -1.0, nan, infinity}) {
+    auto column = t;
+    column[2] = bad;
+    EXPECT_EQ(fit(column, nox).rfind("t_max_k[2] = ", 0), 0U) << bad;
+    column = nox;
+    column[4] = bad;
+    EXPECT_EQ(fit(t, column).rfind("nox_ppm[4] = ", 0), 0U) << bad;
+    EXPECT_EQ(fit(t, nox, bad).rfind("reference_temperature_k = ", 0), 0U) << bad;
+  }
+}
+
+// Two points on each side of a line: slope, level and spread by hand.
+TEST(EngineNumbers, TheFitOfNoxIsThatOfTheBook) {
+  const double t0 = 1950.0, b = 15000.0, level = 900.0;
+  const std::vector<double> off{0.02, -0.05, 0.01, 0.06, -0.03, 0.0};
+  std::vector<double> t, nox;
+  double xx = 0.0, x_mean = 0.0;
+  for (std::size_t i = 0; i < off.size(); ++i) {
+    t.push_back(1800.0 + 70.0 * static_cast<double>(i));
+    x_mean += (1.0 / t0 - 1.0 / t[i]) / 6.0;
+  }
+  double y_mean = 0.0, xy = 0.0;
+  for (std::size_t i = 0; i < off.size(); ++i) {
+    const double x = 1.0 / t0 - 1.0 / t[i];
+    nox.push_back(level * std::exp(b * x + off[i]));
+    xx += (x - x_mean) * (x - x_mean);
+    xy += (x - x_mean) * std::log(nox[i]);
+    y_mean += std::log(nox[i]) / 6.0;
+  }
+  const double slope = xy / xx;
+  double squares = 0.0;
+  for (std::size_t i = 0; i < off.size(); ++i)
+    squares += std::pow(std::log(nox[i]) - y_mean - slope * (1.0 / t0 - 1.0 / t[i] - x_mean), 2);
+  const NoxFit fit = fit_nox_proxy(t, nox, NoxMap::arrhenius, t0);
+  const double sd = std::sqrt(squares / 4.0);
+  EXPECT_EQ(fit.map, NoxMap::arrhenius);
+  EXPECT_EQ(fit.proxy.reference_temperature_k, t0);
+  EXPECT_NEAR(fit.proxy.activation_temperature_k, slope, 1e-6);
+  EXPECT_NEAR(fit.proxy.reference_nox_ppm, std::exp(y_mean - slope * x_mean), 1e-8);
+  EXPECT_NEAR(fit.residual_ln, sd, 1e-12);
+  EXPECT_NEAR(fit.activation_temperature_stderr_k, sd / std::sqrt(xx), 1e-6);
+  EXPECT_NEAR(fit.reference_nox_stderr_ppm,
+              fit.proxy.reference_nox_ppm * sd * std::sqrt(1.0 / 6.0 + x_mean * x_mean / xx), 1e-8);
+}
+
+}  // namespace
+}  // namespace mgdd::engine
