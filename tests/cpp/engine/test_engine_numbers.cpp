@@ -14,8 +14,8 @@
 #include "mgdd/engine/ignition.hpp"
 #include "mgdd/engine/performance.hpp"
 #include "mgdd/engine/sensitivity.hpp"
-#include "mgdd/engine/trace_analysis.hpp"
-#include "mgdd/engine/trace_check.hpp"
+#include "mgdd/engine/pressure/trace_analysis.hpp"
+#include "mgdd/engine/pressure/trace_check.hpp"
 
 namespace mgdd::engine {
 namespace {
@@ -39,7 +39,7 @@ void expect_numbers(const Record& record, const auto& fields,
   ASSERT_EQ(numbers.size(), fields.size());
   for (std::size_t i = 0; i < fields.size(); ++i) {
     EXPECT_EQ(fields[i].info.name, numbers[i].first);
-    EXPECT_EQ(record.*(fields[i].member), numbers[i].second) << numbers[i].first;
+    EXPECT_EQ(fields[i].in(record), numbers[i].second) << numbers[i].first;
   }
 }
 
@@ -86,10 +86,10 @@ TEST(EngineNumbers, DefaultsAreTheLightDutyDiesel) {
       {{"speed_rpm", 1500.0}, {"fuel_mg", 20.0}, {"intake_pressure_kpa", 150.0}, {"intake_temperature_k", 313.0}});
   EXPECT_FALSE(OperatingPoint{}.burn_duration_cad.has_value());
   EXPECT_FALSE(OperatingPoint{}.trapped_mass_g.has_value());
-  EXPECT_EQ(Cylinder{}.burn_shape, BurnShape::triangle);
-  EXPECT_EQ(Cylinder{}.gamma_model, GammaModel::constant);
-  EXPECT_EQ(Cylinder{}.wall_heat_model, WallHeatModel::woschni);
-  EXPECT_EQ(Cylinder{}.ignition_model, IgnitionModel::watson);
+  EXPECT_EQ(Cylinder{}.burn.burn_shape, BurnShape::triangle);
+  EXPECT_EQ(Cylinder{}.gas.gamma_model, GammaModel::constant);
+  EXPECT_EQ(Cylinder{}.wall_heat.wall_heat_model, WallHeatModel::woschni);
+  EXPECT_EQ(Cylinder{}.ignition.ignition_model, IgnitionModel::watson);
 }
 
 TEST(EngineNumbers, DefaultsOfAnalysisAndEmissions) {
@@ -118,7 +118,7 @@ void expect_edges(const auto& fields) {
   for (const auto& field : fields) {
     const auto message = [&](double value) {
       Record record;
-      record.*(field.member) = value;
+      field.in(record) = value;
       return refusal([&] { validate(record); });
     };
     const std::string bound = std::string(field.info.name) + " = ";
@@ -126,11 +126,11 @@ void expect_edges(const auto& fields) {
       const std::string told = message(value);
       return told.rfind(bound, 0) == 0 && told.find("must be >") != std::string::npos;
     };
-    EXPECT_FALSE(outside(field.info.upper)) << field.info.name;
-    const double past = field.info.upper == 0.0 ? 1e-12 : field.info.upper * (1.0 + 1e-12);
+    EXPECT_FALSE(outside(field.info.domain.upper)) << field.info.name;
+    const double past = field.info.domain.upper == 0.0 ? 1e-12 : field.info.domain.upper * (1.0 + 1e-12);
     EXPECT_TRUE(outside(past)) << field.info.name;
     const bool order = field.info.name == "evo_cad";  // then IVC stands after EVO, which is said as such
-    EXPECT_EQ(outside(field.info.lower), field.info.lower_open || order) << field.info.name;
+    EXPECT_EQ(outside(field.info.domain.lower), field.info.domain.lower_open || order) << field.info.name;
   }
 }
 
@@ -140,9 +140,9 @@ TEST(EngineNumbers, BoundsBelongToTheDomainWhereTheySay) {
   for (const auto& [member, info] : {std::pair{&OperatingPoint::burn_duration_cad, burn_duration_info},
                                      {&OperatingPoint::trapped_mass_g, trapped_mass_info}}) {
     OperatingPoint p;
-    p.*member = info.upper;
+    p.*member = info.domain.upper;
     EXPECT_EQ(refusal([&] { validate(p); }), "");
-    p.*member = info.upper * 1.001;
+    p.*member = info.domain.upper * 1.001;
     EXPECT_NE(refusal([&] { validate(p); }).find(std::string(info.name) + " = "), std::string::npos);
     p.*member = 0.0;
     EXPECT_NE(refusal([&] { validate(p); }), "");
@@ -151,15 +151,15 @@ TEST(EngineNumbers, BoundsBelongToTheDomainWhereTheySay) {
 
 TEST(EngineNumbers, GammaStaysAboveOneInEveryModelThatUsesIt) {
   Cylinder c;
-  c.gamma_model = GammaModel::polynomial;
+  c.gas.gamma_model = GammaModel::polynomial;
   EXPECT_EQ(refusal([&] { validate(c); }), "");
-  c.gamma_polynomial_c1_per_k = -2e-4;
+  c.gas.gamma_polynomial_c1_per_k = -2e-4;
   EXPECT_NE(refusal([&] { validate(c); }).find("gamma_polynomial_c1_per_k = -0.0002"), std::string::npos);
-  c.gamma_model = GammaModel::linear;
+  c.gas.gamma_model = GammaModel::linear;
   EXPECT_EQ(refusal([&] { validate(c); }), "") << "the polynomial is not in use";
-  c.gamma_linear_slope_per_k = 1e-4;
+  c.gas.gamma_linear_slope_per_k = 1e-4;
   EXPECT_EQ(refusal([&] { validate(c); }), "") << "it may rise";
-  c.gamma_linear_300k = 1.004;
+  c.gas.gamma_linear_300k = 1.004;
   EXPECT_NE(refusal([&] { validate(c); }).find("is 0.999 at 250 K"), std::string::npos) << "the cold end counts";
 }
 
@@ -171,21 +171,21 @@ TEST(EngineNumbers, ACycleRefusesEachOfItsInputs) {
   };
   EXPECT_EQ(cycle(good, point, -6.0), "");
   Cylinder c = good;
-  c.bore_mm = -1.0;
+  c.geometry.bore_mm = -1.0;
   EXPECT_EQ(cycle(c, point, -6.0).rfind("bore_mm = -1", 0), 0U);
   OperatingPoint p = point;
   p.speed_rpm = 0.0;
   EXPECT_EQ(cycle(good, p, -6.0).rfind("speed_rpm = 0", 0), 0U);
   EXPECT_EQ(cycle(good, point, 21.0).rfind("soc_cad = 21", 0), 0U);
   c = good;
-  c.ivc_pressure_rise_kpa = -150.0;
+  c.gas.ivc_pressure_rise_kpa = -150.0;
   EXPECT_EQ(cycle(c, point, -6.0).rfind("ivc_pressure_rise_kpa = -150 kPa: p(IVC) is 0 kPa", 0), 0U);
-  c.ivc_pressure_rise_kpa = -149.9;
+  c.gas.ivc_pressure_rise_kpa = -149.9;
   EXPECT_EQ(cycle(c, point, -6.0), "");
   c = good;
-  c.burn_shape = BurnShape::double_wiebe;
-  c.ivc_cad = -50.0;
-  c.second_delay_cad = -5.0;
+  c.burn.burn_shape = BurnShape::double_wiebe;
+  c.geometry.ivc_cad = -50.0;
+  c.burn.second_delay_cad = -5.0;
   EXPECT_EQ(cycle(c, point, -45.0), "") << "at IVC it may start";
   EXPECT_EQ(cycle(c, point, -45.1).rfind("second_delay_cad = -5", 0), 0U);
   EXPECT_EQ(crank_grid(good, 0.001).size(), 270001U);
@@ -198,8 +198,8 @@ TEST(EngineNumbers, ACycleRefusesEachOfItsInputs) {
 
 TEST(EngineNumbers, TimingsHaveTheirEdges) {
   Cylinder c;
-  c.ivc_cad = -50.0;
-  c.evo_cad = 15.0;
+  c.geometry.ivc_cad = -50.0;
+  c.geometry.evo_cad = 15.0;
   const auto at = [&](double value) { return refusal([&] { validate_timing("soi_cad", value, c); }); };
   EXPECT_EQ(at(-50.0), "");
   EXPECT_NE(at(-50.1).find("closed part, from ivc_cad = -50 to evo_cad = 15"), std::string::npos);

@@ -4,11 +4,11 @@
 
 #include <cmath>
 
-#include "mgdd/optimize/iterative_learning.hpp"
-#include "mgdd/optimize/least_squares.hpp"
-#include "mgdd/optimize/recursive_least_squares.hpp"
-#include "mgdd/optimize/seekers.hpp"
-#include "mgdd/optimize/tuner.hpp"
+#include "mgdd/optimize/learning/iterative_learning.hpp"
+#include "mgdd/optimize/least_squares/least_squares.hpp"
+#include "mgdd/optimize/least_squares/recursive_least_squares.hpp"
+#include "mgdd/optimize/seekers/seekers.hpp"
+#include "mgdd/optimize/seekers/tuner.hpp"
 
 namespace mgdd::optimize {
 namespace {

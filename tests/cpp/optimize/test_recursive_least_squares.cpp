@@ -1,5 +1,5 @@
 // Recursive least squares against the weighted problem that it solves, its box, its cap, and what it keeps and refuses.
-#include "mgdd/optimize/recursive_least_squares.hpp"
+#include "mgdd/optimize/least_squares/recursive_least_squares.hpp"
 
 #include <gtest/gtest.h>
 

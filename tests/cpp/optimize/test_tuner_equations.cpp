@@ -4,7 +4,7 @@
 #include <algorithm>
 #include <cmath>
 
-#include "mgdd/optimize/tuner.hpp"
+#include "mgdd/optimize/seekers/tuner.hpp"
 
 namespace mgdd::optimize {
 namespace {
