@@ -119,10 +119,10 @@ format: $(VENV)/.stamp-test ## put every file into the house style
 	ruff format .
 	clang-format -i $(CPP_FILES)
 
-stubs: ready ## write python/mgdd/_core.pyi from the built module
+stubs: ready ## write python/mgdd/_core/*.pyi from the built module
 	rm -rf build/stubs
 	$(STUBGEN) -o build/stubs
-	rm -rf python/mgdd/_core python/mgdd/_core.pyi
+	rm -rf python/mgdd/_core
 	cp -r build/stubs/mgdd/_core* python/mgdd/
 
 # Both libraries must come first: libasan alone dies at the first C++ exception.

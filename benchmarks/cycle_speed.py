@@ -47,15 +47,15 @@ def arguments() -> argparse.Namespace:
 
 def contenders() -> dict[str, Callable[[], np.ndarray]]:
     """Name to a call that returns the indicators of all timings; the Numba ones are compiled here."""
-    cylinder, point = _core.Cylinder(), _core.OperatingPoint()
+    cylinder, point = _core.engine.Cylinder(), _core.engine.OperatingPoint()
     timings = np.linspace(-6.5, -5.5, CYCLES)
 
     def scan() -> np.ndarray:
-        columns = _core.scan(cylinder, point, timings, 1.0, "trapezoid")
+        columns = _core.engine.scan(cylinder, point, timings, 1.0, "trapezoid")
         return np.column_stack([columns[name] for name in INDICATORS])
 
     calls = {"mgdd": scan}
-    model = engine(cylinder, point, _core.burn_duration_cad(cylinder, point))
+    model = engine(cylinder, point, _core.engine.burn_duration_cad(cylinder, point))
     for form in FORMS:
         sweep = compile_form(form, model)
         sweep(timings)

@@ -31,7 +31,7 @@ from mgdd.optimize import FitOptions
 
 STEP_S, N, NOISE_DEG, TOLERANCE = 1e-3, 20_000, 0.05, 1e-9
 PEER_STEPS = 200  # steps after which SciPy is stopped; its finite differences are not counted
-TRUTH = np.array(_core.smooth_throttle_example)
+TRUTH = np.array(_core.identify.smooth_example)
 RECORDS = {  # duty offset, duty amplitude, middle angle [deg], start [rad]
     "across limp-home": (0.0, 0.35, 15.0, 0.14),
     "above limp-home only": (0.15, 0.2, 45.0, 0.7),
@@ -40,7 +40,7 @@ RECORDS = {  # duty offset, duty amplitude, middle angle [deg], start [rad]
 
 def simulate(duty: np.ndarray, start: tuple[float, float, float], parameters: np.ndarray = TRUTH) -> np.ndarray:
     """Angle [deg] of the free run."""
-    model = SmoothThrottle(parameters=dict(zip(_core.smooth_throttle_names, parameters, strict=True)))
+    model = SmoothThrottle(parameters=dict(zip(_core.identify.smooth_names, parameters, strict=True)))
     inputs = {"time_s": STEP_S * np.arange(duty.size), "duty": duty}
     return model.simulate(inputs, initial_state=start)["angle_deg"].to_numpy()
 
@@ -170,7 +170,7 @@ def main() -> None:
     parser.add_argument("--json", type=Path, metavar="FILE", help="also write the figures to FILE")
     options = parser.parse_args()
     machine.pin()
-    head = {**machine.versions(), "instruction set": _core.smooth_throttle_instruction_set()}
+    head = {**machine.versions(), "instruction set": _core.identify.smooth_throttle_instruction_set()}
     for key, value in head.items():
         print(f"{key}: {value}")
     results = [measure(name, options) for name in RECORDS]

@@ -109,26 +109,28 @@ auto over() {
 void make_refusals_readable(const py::module_& m);
 
 void bind_errors(py::module_& m);
-void bind_optimize(py::module_& m);
+
+// One function per noun; module.cpp says in which submodule.
+void bind_least_squares(py::module_& m);
 void bind_limits(py::module_& m);
 void bind_seekers(py::module_& m);
 void bind_direct_seekers(py::module_& m);
 void bind_learning(py::module_& m);
 void bind_cylinder(py::module_& m);
 void bind_emissions(py::module_& m);
-void bind_engine(py::module_& m);
+void bind_cycle(py::module_& m);
 void bind_performance(py::module_& m);
-void bind_bench(py::module_& m);
-void bind_loop(py::module_& m);
-void bind_virtual_throttle(py::module_& m);
-void bind_trace(py::module_& m);
-void bind_identify(py::module_& m);
-void bind_pseudo_wiener(py::module_& m);
-void bind_recursive(py::module_& m);
-void bind_benchmark_models(py::module_& m);
+void bind_pressure(py::module_& m);
 void bind_throttle(py::module_& m);
 void bind_sensors(py::module_& m);
-void bind_throttle_step(py::module_& m);
-void bind_identify_throttle(py::module_& m);
+void bind_stepper(py::module_& m);
+void bind_pseudo_wiener(py::module_& m);
+void bind_cylinder_fit(py::module_& m);
+void bind_throttle_fit(py::module_& m);
+void bind_online(py::module_& m);
+void bind_benchmark_models(py::module_& m);
+void bind_engine_bench(py::module_& m);
+void bind_loop(py::module_& m);
+void bind_virtual_throttle(py::module_& m);
 
 }  // namespace mgdd::bindings

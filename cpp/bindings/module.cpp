@@ -1,35 +1,47 @@
+#include <vector>
+
 #include "binding.hpp"
 #include "mgdd/common/platform.hpp"
 
+namespace {
+
+/// A submodule and its nouns; a later room may use the classes of an earlier one.
+struct Room {
+  const char* name;
+  const char* doc;
+  std::vector<void (*)(pybind11::module_&)> nouns;
+};
+
+}  // namespace
+
 PYBIND11_MODULE(_core, m) {
   using namespace mgdd::bindings;
-  m.doc() =
-      "The C++ core of mgdd. Use it through mgdd.engine, mgdd.throttle, mgdd.identify, mgdd.optimize and mgdd.loop.";
+  m.doc() = "The C++ core of mgdd, a submodule per room. Use it through mgdd.engine, mgdd.throttle and so on.";
   m.attr("__version__") = MGDD_VERSION;
   m.def("compiled_simd_level", &mgdd::compiled_simd_level, "Instruction set of this build.");
   m.def("processor_simd_levels", &mgdd::processor_simd_levels, "Vector instruction sets of this processor.");
   m.def("compiler", [] { return std::string(MGDD_COMPILER); }, "Compiler of this build.");
   bind_errors(m);
-  bind_optimize(m);
-  bind_limits(m);
-  bind_seekers(m);
-  bind_direct_seekers(m);
-  bind_learning(m);
-  bind_cylinder(m);
-  bind_emissions(m);
-  bind_engine(m);
-  bind_performance(m);
-  bind_trace(m);
-  bind_throttle(m);
-  bind_sensors(m);
-  bind_throttle_step(m);
-  bind_pseudo_wiener(m);
-  bind_identify(m);
-  bind_recursive(m);
-  bind_identify_throttle(m);
-  bind_benchmark_models(m);
-  bind_bench(m);
-  bind_loop(m);
-  bind_virtual_throttle(m);
+  const std::vector<Room> rooms{
+      {"optimize",
+       "Fits, seekers and learners.",
+       {&bind_least_squares, &bind_limits, &bind_seekers, &bind_direct_seekers, &bind_learning}},
+      {"engine",
+       "Cycle model of one cylinder, emissions, performance, measured pressure.",
+       {&bind_cylinder, &bind_emissions, &bind_cycle, &bind_performance, &bind_pressure}},
+      {"throttle",
+       "Throttle body, its sensors, pseudo-Wiener models.",
+       {&bind_throttle, &bind_sensors, &bind_stepper, &bind_pseudo_wiener}},
+      {"identify",
+       "Fits of the cylinder and the throttle, update while running.",
+       {&bind_cylinder_fit, &bind_throttle_fit, &bind_online}},
+      {"systems", "Models of measured benchmarks.", {&bind_benchmark_models}},
+      {"loop", "Virtual benches and the loops over them.", {&bind_engine_bench, &bind_loop, &bind_virtual_throttle}},
+  };
+  for (const Room& room : rooms) {
+    auto submodule = m.def_submodule(room.name, room.doc);
+    for (const auto bind : room.nouns)
+      bind(submodule);
+  }
   make_refusals_readable(m);
 }

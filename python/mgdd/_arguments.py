@@ -54,7 +54,7 @@ def refusal(
     name : str
         Of the function or class.
     signatures : sequence of str
-        As pybind11 writes them: ``(cylinder: mgdd._core.Cylinder, step_cad: typing.SupportsFloat = 1.0) -> dict``.
+        As pybind11 writes them: ``(point: mgdd._core.engine.OperatingPoint, soc_cad: typing.SupportsFloat) -> dict``.
     given, keywords : sequence, mapping
         The arguments, without ``self``.
     method : bool

@@ -95,7 +95,7 @@ class Error(Exception):
         >>> ParameterError.of("cycles", 0, ">= 1")
         ParameterError('cycles = 0: must be >= 1')
         """
-        shown = f"{value:g}" if isinstance(value, float) else repr(value) if isinstance(value, str) else f"{value}"
+        shown = f"{value:.12g}" if isinstance(value, float) else repr(value) if isinstance(value, str) else f"{value}"
         return cls(f"{field} = {shown}: must be {bound}", field=field, value=value, bound=bound)
 
     def reworded(self, message: str) -> Self:

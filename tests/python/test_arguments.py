@@ -98,12 +98,12 @@ def test_no_call_leaks_the_signatures_of_the_core(name: str) -> None:
         (lambda: run_seeker(EngineBench(), SEEKER, 10.5), "cycles", "cycles = 10.5: must be a whole number"),
         (lambda: monte_carlo(EngineBench(), EngineBench(), [1], cycles=5), None, "is not a seeker of mgdd.optimize"),
         (
-            lambda: _core.volume_l(PRESET, 0.0),
+            lambda: _core.engine.volume_l(PRESET, 0.0),
             "cylinder",
             r"Preset .*: must be a Cylinder; give its .cylinder",
         ),
         (
-            lambda: _core.volume_l("puma_single", 0.0),
+            lambda: _core.engine.volume_l("puma_single", 0.0),
             "cylinder",
             r"must be a Cylinder; mgdd.presets.load\(name\)",
         ),

@@ -134,7 +134,7 @@ def test_other_arguments():
     with pytest.raises(ParameterError, match="reference_nox_ppm"):
         NoxProxy(reference_nox_ppm=-1.0)
     with pytest.raises(ParameterError, match="burn_duration_cad"):
-        _core.burned_fraction(CYLINDER, np.array([0.0]), -6.0, 0.0)
+        _core.engine.burned_fraction(CYLINDER, np.array([0.0]), -6.0, 0.0)
     with pytest.raises(TypeError):
         simulate(CYLINDER)
     with pytest.raises(ParameterError, match=r"cylinder = OperatingPoint\(\): must be a Cylinder"):
@@ -181,9 +181,9 @@ def test_traces_that_cannot_be_what_they_say(spoil, match):
     with pytest.raises(Error, match=match):
         pressure_trace(angle, pressure)
     with pytest.raises(Error, match=match):
-        _core.check_trace(angle, pressure)
+        _core.engine.check_trace(angle, pressure)
     with pytest.raises(Error, match=match):
-        _core.analyze_trace(angle, pressure, CYLINDER, POINT, _core.TraceOptions())
+        _core.engine.analyze(angle, pressure, CYLINDER, POINT, _core.engine.TraceOptions())
     np.testing.assert_array_equal(angle, before[0])
     np.testing.assert_array_equal(pressure, before[1])
 

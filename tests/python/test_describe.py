@@ -45,7 +45,7 @@ def objects() -> dict[str, Callable[[], Any]]:
         run = simulate(Throttle(), signal["duty"], time_s=signal["time_s"])
         return throttle_log(run["time_s"], run["duty"], run["angle_deg"])
 
-    example = dict(zip(_core.smooth_throttle_names, _core.smooth_throttle_example, strict=True))
+    example = dict(zip(_core.identify.smooth_names, _core.identify.smooth_example, strict=True))
     seeking = {"start": -20.0, "lower": -30.0, "upper": 10.0}
     return {
         "engine preset": lambda: presets.load("puma_single"),
@@ -130,7 +130,12 @@ def test_units_are_there() -> None:
 def test_a_record_of_the_core_still_evaluates_to_itself() -> None:
     for record in (SensorPair(closed_v=0.4), NoxModel(), SoftSensor(), SensorDynamics(), Cylinder(bore_mm=90.0)):
         assert max(map(len, repr(record).splitlines())) <= 100
-    names = {"SensorPair": SensorPair, "NoxModel": _core.NoxModel, "NoxProxy": _core.NoxProxy, "SoftSensor": SoftSensor}
+    names = {
+        "SensorPair": SensorPair,
+        "NoxModel": _core.engine.NoxModel,
+        "NoxProxy": _core.engine.NoxProxy,
+        "SoftSensor": SoftSensor,
+    }
     for record in (SensorPair(closed_v=0.4), NoxModel(), SoftSensor()):
         assert eval(repr(record), names) == record
 
@@ -189,6 +194,6 @@ def test_names_end_in_their_unit() -> None:
         "OperatingPoint.burn_duration_cad",
     }, wrong  # fmt: skip
     for kind in ("pw_r", "pw_w", "pw_p"):
-        units = _core.pseudo_wiener_units(kind)
+        units = _core.throttle.pseudo_wiener_units(kind)
         assert {name: unit_of(name) for name in units} == dict(units)
     assert isinstance(presets.load("P1"), Preset)

@@ -116,7 +116,7 @@ def test_gil_is_free_while_the_core_computes() -> None:
     thread = threading.Thread(target=tick)
     thread.start()
     began = time.perf_counter()
-    sensitivities(Cylinder(), POINT, wrt=_core.differentiable_inputs()[:12], step_cad=0.005)
+    sensitivities(Cylinder(), POINT, wrt=_core.engine.differentiable_inputs()[:12], step_cad=0.005)
     ended = time.perf_counter()
     stop.set()
     thread.join()

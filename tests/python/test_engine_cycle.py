@@ -77,9 +77,9 @@ def computed(text, quantity, at):
     if quantity in ("swept_volume_l", "clearance_volume_l"):
         return getattr(cylinder, quantity)
     if quantity == "volume_l":
-        return float(_core.volume_l(cylinder, at))
+        return float(_core.engine.volume_l(cylinder, at))
     if quantity == "wall_area_mm2":
-        return float(_core.wall_area_m2(cylinder, at)) * 1e6
+        return float(_core.engine.wall_area_m2(cylinder, at)) * 1e6
     cycle = run(text)
     if quantity in ("pressure_bar", "temperature_k"):
         return float(cycle[quantity].sel(crank_angle_cad=at))
@@ -186,7 +186,7 @@ def test_advance_raises_the_peaks_strictly():
 @settings(max_examples=40)
 def test_an_earlier_burn_never_peaks_lower(a, b, fuel, speed):
     point = OperatingPoint(fuel_mg=fuel, speed_rpm=speed)
-    early, late = _core.scan(Cylinder(), point, np.array([min(a, b), max(a, b)]), 1.0, "trapezoid")["p_max_bar"]
+    early, late = _core.engine.scan(Cylinder(), point, np.array([min(a, b), max(a, b)]), 1.0, "trapezoid")["p_max_bar"]
     assert early >= late - 1e-3  # the parabola between samples
 
 
@@ -195,7 +195,7 @@ INDICATORS = ("imep_closed_bar", "p_max_bar", "t_max_k")
 
 def step_errors(point, soc, step=1.0):
     def at(h):
-        columns = _core.scan(Cylinder(), point, np.array([soc]), h, "trapezoid")
+        columns = _core.engine.scan(Cylinder(), point, np.array([soc]), h, "trapezoid")
         return np.array([columns[name][0] for name in INDICATORS])
 
     return 100.0 * (at(step) / at(0.01) - 1.0)
@@ -261,7 +261,7 @@ def test_a_scan_lets_other_threads_work():
     ticks = []
 
     def scan():
-        _core.scan(Cylinder(), OperatingPoint(), timings_cad, 1.0, "trapezoid")
+        _core.engine.scan(Cylinder(), OperatingPoint(), timings_cad, 1.0, "trapezoid")
         done.set()
 
     worker = threading.Thread(target=scan)

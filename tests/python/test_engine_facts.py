@@ -29,21 +29,23 @@ def test_volume_is_that_of_the_mechanism(bore, stroke, rod, ratio, angle):
     crank = stroke / 2.0
     pin = crank * np.cos(np.radians(angle)) + np.sqrt((rod * stroke) ** 2 - (crank * np.sin(np.radians(angle))) ** 2)
     expected = swept / (ratio - 1.0) + np.pi / 4.0 * bore**2 * (rod * stroke + crank - pin) * 1e-6
-    assert float(_core.volume_l(cylinder, angle)) == pytest.approx(expected, rel=1e-9)
-    top, bottom = _core.volume_l(cylinder, np.array([0.0, 180.0]))
+    assert float(_core.engine.volume_l(cylinder, angle)) == pytest.approx(expected, rel=1e-9)
+    top, bottom = _core.engine.volume_l(cylinder, np.array([0.0, 180.0]))
     assert bottom / top == pytest.approx(ratio, rel=1e-9)
     assert cylinder.swept_volume_l == pytest.approx(swept, rel=1e-12)
 
 
 def test_triangle_of_heat():
     cylinder, soc, duration = Cylinder(), -6.0, 30.0
-    x = _core.burned_fraction(cylinder, np.array([soc, soc + duration / 2.0, soc + duration]), soc, duration)
+    x = _core.engine.burned_fraction(cylinder, np.array([soc, soc + duration / 2.0, soc + duration]), soc, duration)
     np.testing.assert_allclose(x, [0.0, 0.5, 1.0], atol=1e-15)
     cycle = simulate(cylinder, FIXED, soc_cad=soc)
     assert float(cycle.ca50_cad) - soc == pytest.approx(15.0, rel=1e-12)
     assert float(cycle.ca90_cad - cycle.ca10_cad) == pytest.approx(duration * (1.0 - 2.0 * np.sqrt(0.05)), rel=1e-12)
     h = 1e-4
-    slope = np.diff(_core.burned_fraction(cylinder, np.array([soc + 15.0 - h, soc + 15.0]), soc, duration))[0] / h
+    slope = (
+        np.diff(_core.engine.burned_fraction(cylinder, np.array([soc + 15.0 - h, soc + 15.0]), soc, duration))[0] / h
+    )
     assert 856.0 * slope == pytest.approx(2.0 * 856.0 / duration, rel=1e-5)
 
 
@@ -100,10 +102,10 @@ def test_grid_error_of_efficiency_by_integrator():
 
 def test_woschni_constants_of_all_unit_systems():
     w = 17.0
-    h = _core.woschni_coefficient(_core.woschni_c1_bar_m, 0.086, 80.0, 1700.0, w)
-    assert _core.woschni_coefficient(3.26, 0.086, 8000.0, 1700.0, w) == pytest.approx(h, rel=5e-4)
-    assert _core.woschni_coefficient(516.8, 86.0, 80.0, 1700.0, w) == pytest.approx(h, rel=5e-4)
-    assert _core.woschni_coefficient(0.01298, 0.086, 80e5, 1700.0, w) == pytest.approx(h, rel=5e-4)
+    h = _core.engine.woschni_coefficient(_core.engine.woschni_c1_bar_m, 0.086, 80.0, 1700.0, w)
+    assert _core.engine.woschni_coefficient(3.26, 0.086, 8000.0, 1700.0, w) == pytest.approx(h, rel=5e-4)
+    assert _core.engine.woschni_coefficient(516.8, 86.0, 80.0, 1700.0, w) == pytest.approx(h, rel=5e-4)
+    assert _core.engine.woschni_coefficient(0.01298, 0.086, 80e5, 1700.0, w) == pytest.approx(h, rel=5e-4)
 
 
 @pytest.mark.parametrize("model", ["woschni", "hohenberg"])
@@ -119,7 +121,7 @@ def test_wall_heat_is_the_printed_formula(model):
         film = 0.7 * 129.8 * 0.086**-0.2 * p**0.8 * t**-0.55 * velocity**0.8
     else:
         film = 0.7 * 130.0 * (volume * 1e-3) ** -0.06 * p**0.8 * t**-0.4 * (4.3 + 1.4) ** 0.8
-    loss = film * _core.wall_area_m2(cylinder, angle) * (t - 450.0) / (6.0 * 1500.0)
+    loss = film * _core.engine.wall_area_m2(cylinder, angle) * (t - 450.0) / (6.0 * 1500.0)
     np.testing.assert_allclose(cycle.heat_loss_j_per_cad[1:], loss[:-1], rtol=1e-10, atol=1e-12)
     assert float(cycle.heat_loss_j) == pytest.approx(loss[:-1].sum(), rel=1e-12)
 
@@ -137,7 +139,7 @@ def test_gamma_laws_bend_the_compression():
 
 def test_gross_work_adds_the_ideal_remainder():
     cycle = simulate(Cylinder(), FIXED)
-    bottom = float(_core.volume_l(Cylinder(), 180.0))
+    bottom = float(_core.engine.volume_l(Cylinder(), 180.0))
     first, last = float(cycle.volume_l[0]), float(cycle.volume_l[-1])
     rest = 1.5 * (first - bottom) + 0.5 * (float(cycle.pressure_bar[-1]) + 1.5) * (bottom - last)
     assert float(cycle.work_gross_j - cycle.work_closed_j) == pytest.approx(100.0 * rest, rel=1e-12)
@@ -171,6 +173,6 @@ def test_nox_maps_agree_in_value_and_slope_where_they_meet():
 
 
 def test_duration_law():
-    law = _core.burn_duration_cad(Cylinder(), OperatingPoint(fuel_mg=40.0, speed_rpm=3000.0))
+    law = _core.engine.burn_duration_cad(Cylinder(), OperatingPoint(fuel_mg=40.0, speed_rpm=3000.0))
     assert law == pytest.approx(30.0 * 2.0**0.9, rel=1e-14)
-    assert _core.burn_duration_cad(Cylinder(), OperatingPoint(fuel_mg=40.0, burn_duration_cad=17.0)) == 17.0
+    assert _core.engine.burn_duration_cad(Cylinder(), OperatingPoint(fuel_mg=40.0, burn_duration_cad=17.0)) == 17.0

@@ -17,18 +17,20 @@ MODELS = ("watson", "wolfer", "hardenberg_hase", "polynomial")
 
 
 def test_correlations_at_sixty_bar():
-    assert _core.watson_delay_ms(60.0, 900.0) == pytest.approx(0.553, rel=5e-3)
-    assert _core.wolfer_delay_ms(60.0, 900.0) == pytest.approx(0.591, rel=5e-3)
-    assert _core.hardenberg_hase_delay_cad(60.0, 900.0, 45.0, 4.3) == pytest.approx(1.950, rel=5e-3)
-    assert math.isinf(_core.hardenberg_hase_delay_cad(12.4, 900.0, 45.0, 4.3))
-    assert _core.hardenberg_hase_delay_cad(60.0, 900.0, 55.0, 4.3) < 1.950  # a higher cetane number ignites sooner
+    assert _core.engine.watson_delay_ms(60.0, 900.0) == pytest.approx(0.553, rel=5e-3)
+    assert _core.engine.wolfer_delay_ms(60.0, 900.0) == pytest.approx(0.591, rel=5e-3)
+    assert _core.engine.hardenberg_hase_delay_cad(60.0, 900.0, 45.0, 4.3) == pytest.approx(1.950, rel=5e-3)
+    assert math.isinf(_core.engine.hardenberg_hase_delay_cad(12.4, 900.0, 45.0, 4.3))
+    assert (
+        _core.engine.hardenberg_hase_delay_cad(60.0, 900.0, 55.0, 4.3) < 1.950
+    )  # a higher cetane number ignites sooner
 
 
 @pytest.mark.parametrize("model", ["watson", "wolfer"])
 @pytest.mark.parametrize("soi", [-25.0, -12.0, -3.0, 6.0])
 def test_delay_is_where_the_integral_reaches_one(model, soi):
     motored = simulate(CYLINDER, POINT.replace(fuel_mg=0.0), step_cad=0.05)
-    tau_ms = {"watson": _core.watson_delay_ms, "wolfer": _core.wolfer_delay_ms}[model](
+    tau_ms = {"watson": _core.engine.watson_delay_ms, "wolfer": _core.engine.wolfer_delay_ms}[model](
         motored.pressure_bar, motored.temperature_k
     )
     soc = start_of_combustion(CYLINDER.replace(ignition_model=model), POINT, soi_cad=soi).soc_cad

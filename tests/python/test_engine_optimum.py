@@ -19,7 +19,7 @@ CYLINDER, POINT = Cylinder(), OperatingPoint()
 
 
 def value(cylinder, point, soc, name="efficiency_gross"):
-    return float(_core.scan(cylinder, point, np.array([soc]), 1.0, "trapezoid")[name][0])
+    return float(_core.engine.scan(cylinder, point, np.array([soc]), 1.0, "trapezoid")[name][0])
 
 
 @given(

@@ -108,7 +108,7 @@ def test_one_degree_of_tdc_costs_nine_percent_of_imep():
         angle = cycle.crank_angle_cad.values
 
         def work(offset, angle=angle, pressure=cycle.pressure_bar.values):
-            return np.trapezoid(pressure, _core.volume_l(CYLINDER, angle + offset))
+            return np.trapezoid(pressure, _core.engine.volume_l(CYLINDER, angle + offset))
 
         assert 100.0 * (work(1.0) / work(0.0) - 1.0) == pytest.approx(percent, abs=0.1)
         if soc == -6.0:

@@ -78,7 +78,7 @@ def test_many_starts_report_how_many_arrived():
 
 
 def test_python_and_the_core_agree_on_one_problem():
-    truth = np.array(_core.smooth_throttle_example)
+    truth = np.array(_core.identify.smooth_example)
     rng = np.random.default_rng(4)
     duty = np.repeat(rng.uniform(-0.35, 0.35, 13), 80)[:1000]
     log = SmoothThrottle().simulate({"time_s": 1e-3 * np.arange(duty.size), "duty": duty})
@@ -93,7 +93,7 @@ def test_python_and_the_core_agree_on_one_problem():
         return x[1], torque / 2e-3, (12.0 * u[0] - r * x[2] - 20 * ke * x[1]) / 1e-3
 
     free = ["torque_constant_nm_per_a", "coulomb_nm", "preload_nm", "limp_home_rad"]
-    names = list(_core.smooth_throttle_names)
+    names = list(_core.identify.smooth_names)
     found = fit_ode(
         throttle,
         log,

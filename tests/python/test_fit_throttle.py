@@ -142,7 +142,7 @@ def test_prediction_is_corrected_by_the_measurement():
 
 
 def test_ten_parameters_from_python_reach_the_noise_floor():
-    truth = np.array(_core.smooth_throttle_example)
+    truth = np.array(_core.identify.smooth_example)
     rng = np.random.default_rng(7)
     time = 1e-3 * np.arange(8000)
     log = SmoothThrottle().simulate({"time_s": time, "duty": np.repeat(rng.uniform(-0.35, 0.35, 100), 80)})

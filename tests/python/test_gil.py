@@ -38,7 +38,7 @@ def seeker() -> ExtremumSeeking:
 
 
 def pseudo_wiener() -> Any:
-    return _core.PseudoWienerModel("pw_r", {})
+    return _core.throttle.PseudoWienerModel("pw_r", {})
 
 
 @batch
@@ -58,48 +58,48 @@ def many_loops() -> Call:
 
 @batch
 def scan() -> Call:
-    return partial(_core.scan, CYLINDER, POINT, np.full(20_000, -6.0), 1.0, "trapezoid")
+    return partial(_core.engine.scan, CYLINDER, POINT, np.full(20_000, -6.0), 1.0, "trapezoid")
 
 
 @batch
 def cycle() -> Call:
-    return partial(_core.simulate, CYLINDER, POINT, -6.0, 0.001, "trapezoid")
+    return partial(_core.engine.simulate, CYLINDER, POINT, -6.0, 0.001, "trapezoid")
 
 
 @batch
 def sensitivities() -> Call:
-    names = _core.differentiable_inputs()[:12]
-    return partial(_core.sensitivities, CYLINDER, POINT, -6.0, names, 0.005, "trapezoid")
+    names = _core.engine.differentiable_inputs()[:12]
+    return partial(_core.engine.sensitivities, CYLINDER, POINT, -6.0, names, 0.005, "trapezoid")
 
 
 @batch
 def convergence() -> Call:
-    return partial(_core.convergence, CYLINDER, POINT, -6.0, 0.004, "trapezoid")
+    return partial(_core.engine.convergence, CYLINDER, POINT, -6.0, 0.004, "trapezoid")
 
 
 @batch
 def volume() -> Call:
-    return partial(_core.volume_l, CYLINDER, ANGLE)
+    return partial(_core.engine.volume_l, CYLINDER, ANGLE)
 
 
 @batch
 def wall_area() -> Call:
-    return partial(_core.wall_area_m2, CYLINDER, ANGLE)
+    return partial(_core.engine.wall_area_m2, CYLINDER, ANGLE)
 
 
 @batch
 def burned_fraction() -> Call:
-    return partial(_core.burned_fraction, CYLINDER, ANGLE, -6.0, 40.0)
+    return partial(_core.engine.burned_fraction, CYLINDER, ANGLE, -6.0, 40.0)
 
 
 @batch
 def ignition_delay() -> Call:
-    return partial(_core.watson_delay_ms, 60.0, np.full(MANY, 900.0))
+    return partial(_core.engine.watson_delay_ms, 60.0, np.full(MANY, 900.0))
 
 
 @batch
 def film_coefficient() -> Call:
-    return partial(_core.woschni_coefficient, 3.26, 0.086, np.full(MANY, 80.0), 1700.0, 10.0)
+    return partial(_core.engine.woschni_coefficient, 3.26, 0.086, np.full(MANY, 80.0), 1700.0, 10.0)
 
 
 @batch
@@ -110,19 +110,19 @@ def nox() -> Call:
 @batch
 def nox_fit() -> Call:
     t = np.linspace(1700.0, 2100.0, MANY)
-    return partial(_core.fit_nox_proxy, t, NoxProxy().arrhenius_ppm(t), "arrhenius", 1900.0)
+    return partial(_core.engine.fit_nox_proxy, t, NoxProxy().arrhenius_ppm(t), "arrhenius", 1900.0)
 
 
 @batch
 def trace_check() -> Call:
-    return partial(_core.check_trace, ANGLE, 20.0 + np.sin(0.01 * ANGLE))
+    return partial(_core.engine.check_trace, ANGLE, 20.0 + np.sin(0.01 * ANGLE))
 
 
 @batch
 def trace_analysis() -> Call:
     angle = np.linspace(-139.0, 100.0, SOME)
     pressure = 1.0 + 50.0 * np.exp(-((angle - 5.0) ** 2) / 800.0)
-    return partial(_core.analyze_trace, angle, pressure, CYLINDER, POINT, _core.TraceOptions())
+    return partial(_core.engine.analyze, angle, pressure, CYLINDER, POINT, _core.engine.TraceOptions())
 
 
 @batch
@@ -138,7 +138,7 @@ def learning() -> Call:
 
 @batch
 def learning_theory() -> Call:
-    core = _core.IterativeLearning(
+    core = _core.optimize.IterativeLearning(
         np.zeros(400), law="p", impulse_response=0.9 ** np.arange(400.0), learning_function=NONE, k_p=0.5
     )
     return core.convergence
@@ -146,20 +146,24 @@ def learning_theory() -> Call:
 
 @batch
 def update_by_least_squares() -> Call:
-    update = _core.RecursivePwR(pseudo_wiener().parameters, free=FREE, every=5, noise_deg=0.03, forgetting=0.998)
+    update = _core.identify.RecursivePwR(
+        pseudo_wiener().parameters, free=FREE, every=5, noise_deg=0.03, forgetting=0.998
+    )
     return partial(update.update, np.tile(DUTY, 5), np.tile(pseudo_wiener().simulate(DUTY, 10.0), 5))
 
 
 @batch
 def update_by_window() -> Call:
     parameters = pseudo_wiener().parameters
-    update = _core.WindowPwR(parameters, free=FREE, every=5, noise_deg=0.03, prior_spread=0.2, iterate_every=500)
+    update = _core.identify.WindowPwR(
+        parameters, free=FREE, every=5, noise_deg=0.03, prior_spread=0.2, iterate_every=500
+    )
     return partial(update.update, DUTY, pseudo_wiener().simulate(DUTY, 10.0))
 
 
 @batch
 def update_by_gradient() -> Call:
-    update = _core.GradientPwR(pseudo_wiener().parameters, free=FREE, adaptation_gain=0.05, noise_deg=0.03)
+    update = _core.identify.GradientPwR(pseudo_wiener().parameters, free=FREE, adaptation_gain=0.05, noise_deg=0.03)
     return partial(update.update, DUTY[:30_000], pseudo_wiener().simulate(DUTY[:30_000], 10.0))
 
 
@@ -182,60 +186,62 @@ def pseudo_wiener_slopes() -> Call:
 def pseudo_wiener_fit() -> Call:
     angle = pseudo_wiener().simulate(DUTY[:20_000], 10.0)
     return partial(
-        _core.fit_pseudo_wiener, kind="pw_r", records=[(DUTY[:20_000], angle)], parameters={}, sides="shared", free=[],
-        delays=[0], starts=2, seed=1, only_given_start=False, try_map_start=False, max_iterations=20,
+        _core.identify.fit_pseudo_wiener, kind="pw_r", records=[(DUTY[:20_000], angle)], parameters={}, sides="shared",
+        free=[], delays=[0], starts=2, seed=1, only_given_start=False, try_map_start=False, max_iterations=20,
     )  # fmt: skip
 
 
 @batch
 def throttle() -> Call:
-    return partial(_core.simulate_throttle, THROTTLE, DUTY, start_deg=10.0, **RUN)
+    return partial(_core.throttle.simulate, THROTTLE, DUTY, start_deg=10.0, **RUN)
 
 
 @batch
 def throttles() -> Call:
-    return partial(_core.simulate_throttle_many, [THROTTLE] * 8, DUTY[:20_000], start_deg=[10.0] * 8, **RUN)
+    return partial(_core.throttle.simulate_many, [THROTTLE] * 8, DUTY[:20_000], start_deg=[10.0] * 8, **RUN)
 
 
 @batch
 def air_torque() -> Call:
-    return partial(_core.throttle_airflow_torque, THROTTLE, np.linspace(5.0, 80.0, MANY))
+    return partial(_core.throttle.airflow_torque, THROTTLE, np.linspace(5.0, 80.0, MANY))
 
 
 @batch
 def sensors() -> Call:
     angle, faults = np.full(SOME, 10.0), [("none", 0.0, 0.0)] * 2
-    return partial(_core.sense_throttle, _core.SensorPair(), angle, sample_s=1e-3, seed=1, faults=faults)
+    return partial(_core.throttle.sense, _core.throttle.SensorPair(), angle, sample_s=1e-3, seed=1, faults=faults)
 
 
 @batch
 def smooth_throttle() -> Call:
     constants = {"inertia_kgm2": 0.002, "gear_ratio": 20.0, "inductance_h": 1e-3, "supply_v": 12.0}
-    values = list(_core.smooth_throttle_example)
-    return partial(_core.simulate_smooth_throttle, values, DUTY, step_s=1e-3, start=[0.1, 0.0, 0.0], **constants)
+    values = list(_core.identify.smooth_example)
+    return partial(
+        _core.identify.simulate_smooth_throttle, values, DUTY, step_s=1e-3, start=[0.1, 0.0, 0.0], **constants
+    )
 
 
 @batch
 def throttle_groups() -> Call:
-    values = [0.5 * (bound.lower + bound.upper) for bound in _core.throttle_group_bounds()]
+    values = [0.5 * (bound.lower + bound.upper) for bound in _core.identify.throttle_group_bounds()]
     frame = {"closed_deg": 0.0, "open_deg": 90.0, "ramp_deg": 0.25, "substeps": 2}
-    return partial(_core.simulate_throttle_groups, values, DUTY, step_s=1e-3, start=[10.0, 0.0, 0.0], **frame)
+    return partial(_core.identify.simulate_throttle_groups, values, DUTY, step_s=1e-3, start=[10.0, 0.0, 0.0], **frame)
 
 
 @batch
 def latin_hypercube() -> Call:
-    return partial(_core.latin_hypercube, _core.throttle_group_bounds(), 50_000, 1)
+    return partial(_core.identify.latin_hypercube, _core.identify.throttle_group_bounds(), 50_000, 1)
 
 
 @batch
 def digital_filter() -> Call:
-    return partial(_core.filter_series, np.ones(4), np.array([1.0, -0.5]), np.ones(MANY))
+    return partial(_core.systems.filter_series, np.ones(4), np.array([1.0, -0.5]), np.ones(MANY))
 
 
 @batch
 def tanks() -> Call:
     values = [0.05, 0.05, 0.5, 0.05, 0.5, 0.0, 10.0, 0.5, 0.0]
-    model = _core.TwoTanks(lower_brim_v=10.0)
+    model = _core.systems.TwoTanks(lower_brim_v=10.0)
     return partial(model.free_run, parameters=values, start=[1.0, 1.0, 2.0, 2.0], input=np.full(SOME, 2.0), dt_s=1.0)
 
 

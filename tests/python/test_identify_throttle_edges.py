@@ -102,7 +102,7 @@ def test_what_a_kind_lacks_is_refused_first(p1: Throttle) -> None:
         identify_throttle(log, "first_principle", delay_samples=2)
     with pytest.raises(ParameterError, match=r"seed = -1: must be >= 0"):
         identify_throttle(log, options=FitOptions(seed=-1))
-    with pytest.raises(ParameterError, match=r"open_deg = -5.0: must be above closed_deg"):
+    with pytest.raises(ParameterError, match=r"open_deg = -5: must be above closed_deg"):
         identify_throttle(log, open_deg=-5.0)
 
 

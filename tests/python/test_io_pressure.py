@@ -241,7 +241,7 @@ FILE_FAULTS = {
     "gap": (text(*without(9), header="# c\na,p\n"), {}, "line 12: gap in the crank angle from -135 to -133"),
     "unsorted": (text(replaced(ANGLES, 4, -150.0)), {}, "line 5: crank angle -150 follows -140"),
     "pascal": (text(pressure=BAR * 1e5), {}, "looks like Pa; pass pressure_unit='Pa'"),
-    "firing TDC": (text(), {"firing_tdc_deg": -1.0}, r"firing_tdc_deg = -1.0: must be in \[0, 720\]"),
+    "firing TDC": (text(), {"firing_tdc_deg": -1.0}, r"firing_tdc_deg = -1: must be in \[0, 720\]"),
     "two cycles": (text(np.arange(0.0, 1440.0), np.ones(1440)), {"firing_tdc_deg": 360}, "span 1439 degrees"),
     "unsorted 0..720": (text(ANGLES[::-1]), {"firing_tdc_deg": 0.0}, "must rise"),
 }  # fmt: skip

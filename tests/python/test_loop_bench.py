@@ -102,11 +102,13 @@ def test_steps_chunks_copies_and_pickles_give_one_run() -> None:
 
 def test_settings_build_the_same_bench_again() -> None:
     bench = EngineBench(**RICH, analyser=SensorDynamics(delay_cycles=3, lag_cycles=1.5))
-    again = _core.EngineBench(**bench.settings)
+    again = _core.loop.EngineBench(**bench.settings)
     assert again.settings == bench.settings
     assert again.step(-3.0)["j"] == bench.step(-3.0)["j"]
     # The Python constructor repeats the defaults of the core.
-    assert EngineBench().settings == _core.EngineBench(cylinder=Cylinder(), schedule=[(0, OperatingPoint())]).settings
+    assert (
+        EngineBench().settings == _core.loop.EngineBench(cylinder=Cylinder(), schedule=[(0, OperatingPoint())]).settings
+    )
 
 
 def test_a_run_leaves_the_interpreter_free() -> None:

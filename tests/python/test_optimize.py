@@ -182,7 +182,7 @@ def test_stderr_covers_the_truth_as_often_as_it_promises():
 
 
 def test_not_run_report_says_so():
-    fit = FitReport.from_core(_core.FitReport())
+    fit = FitReport.from_core(_core.optimize.FitReport())
     assert fit.status == "not_run"
     assert not fit.success
     assert np.isnan(fit.cost)
@@ -357,7 +357,7 @@ def test_summary_html_and_json_tell_the_same_story():
 
 
 def test_defaults_are_those_of_the_core():
-    options = _core.LeastSquaresOptions()
+    options = _core.optimize.LeastSquaresOptions()
     for name in OPTIONS:
         assert least_squares.__kwdefaults__[name] == getattr(options, name)
 
@@ -365,8 +365,8 @@ def test_defaults_are_those_of_the_core():
 @pytest.mark.parametrize(
     "value",
     [
-        _core.Parameter(name="a", lower=1e-3, upper=2.0, log_scaled=True),
-        _core.LeastSquaresOptions(max_iterations=7, rank_tolerance=1e-9, evaluate_together=False),
+        _core.optimize.Parameter(name="a", lower=1e-3, upper=2.0, log_scaled=True),
+        _core.optimize.LeastSquaresOptions(max_iterations=7, rank_tolerance=1e-9, evaluate_together=False),
     ],
 )
 def test_parameter_structs_pickle_compare_and_print(value):
@@ -374,14 +374,14 @@ def test_parameter_structs_pickle_compare_and_print(value):
     assert copy == value
     assert repr(copy) == repr(value)
     shown = "name='a', lower=0.001, upper=2.0, log_scaled=True"
-    if isinstance(value, _core.LeastSquaresOptions):
+    if isinstance(value, _core.optimize.LeastSquaresOptions):
         shown = "rank_tolerance=1e-09, evaluate_together=False"
     assert shown in " ".join(repr(value).split())
-    assert value != type(value)(**({"name": "a"} if isinstance(value, _core.Parameter) else {}))
+    assert value != type(value)(**({"name": "a"} if isinstance(value, _core.optimize.Parameter) else {}))
 
 
 def test_options_are_keyword_only():
     with pytest.raises(TypeError):
-        _core.LeastSquaresOptions(7)
+        _core.optimize.LeastSquaresOptions(7)
     with pytest.raises(TypeError):
-        _core.Parameter("a")
+        _core.optimize.Parameter("a")

@@ -40,7 +40,7 @@ def span(low: float, high: float) -> st.SearchStrategy[float]:
 
 @st.composite
 def first_principle(draw: st.DrawFn) -> FirstPrincipleModel:
-    bounds = {parameter.name: parameter for parameter in _core.throttle_group_bounds()}
+    bounds = {parameter.name: parameter for parameter in _core.identify.throttle_group_bounds()}
     values = {name: draw(span(bound.lower, bound.upper)) for name, bound in bounds.items()}
     return FirstPrincipleModel(
         parameters=values,
@@ -83,7 +83,7 @@ def pseudo_wiener(draw: st.DrawFn) -> PseudoWiener:
 
 @st.composite
 def smooth(draw: st.DrawFn) -> SmoothThrottle:
-    example = dict(zip(_core.smooth_throttle_names, _core.smooth_throttle_example, strict=True))
+    example = dict(zip(_core.identify.smooth_names, _core.identify.smooth_example, strict=True))
     return SmoothThrottle(
         parameters=example | changed(draw, example, list(example)),
         inertia_kgm2=draw(span(1e-3, 5e-3)),
@@ -205,7 +205,7 @@ def test_benchmark_models_come_back() -> None:
     drive = DriveModel(parameters={"mass_kg": 95.0, "coulomb_n": 20.0, "stribeck_n": 1 / 3}, force_n_per_v=35.1)
     inputs = {"time_s": TIME, "drive_v": 3.0 * DUTY, "pump_v": 2.0 + DUTY, "input_v": DUTY}
     xr.testing.assert_identical(drive.simulate(inputs), DriveModel.from_toml(drive.to_toml()).simulate(inputs))
-    names = _core.TwoTanks.parameter_names
+    names = _core.systems.TwoTanks.parameter_names
     tanks = TwoTanksModel(
         parameters=dict(zip(names, (0.05, 0.05, 0.5, 0.05, 0.5, -0.1, 9.0, 0.4, 1.0), strict=True)), lower_brim_v=8.0
     )

@@ -7,7 +7,7 @@ import math
 from typing import Any
 
 from mgdd import _core
-from mgdd._core import Cylinder, OperatingPoint
+from mgdd._core.engine import Cylinder, OperatingPoint
 from mgdd.cli.calibration import calibrate
 from mgdd.cli.options import (
     add_command,
@@ -96,7 +96,7 @@ def _start_of_combustion(args: argparse.Namespace, cylinder: Cylinder, point: Op
     timing = start_of_combustion(cylinder, point, soi_cad=args.soi_cad)
     if not timing.ignites:
         raise ConvergenceError(f"soi_cad = {args.soi_cad:g} does not ignite before EVO: inject earlier")
-    latest = _core.timing_window_cad[1]
+    latest = _core.engine.timing_window_cad[1]
     if timing.soc_cad > latest:
         raise ParameterError(
             f"soi_cad = {args.soi_cad:g} ignites at {timing.soc_cad:.1f} °CA aTDC, later than {latest:g}, the latest "

@@ -9,7 +9,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any, NoReturn
 
 from mgdd import presets
-from mgdd._core import Cylinder, OperatingPoint
+from mgdd._core.engine import Cylinder, OperatingPoint
 from mgdd.errors import DataError, ParameterError
 from mgdd.io import read_conditions, read_pressure
 

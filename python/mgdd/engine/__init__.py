@@ -5,7 +5,7 @@ Crank angles are °CA aTDC (firing TDC = 0, compression negative) throughout.
 
 from __future__ import annotations
 
-from mgdd._core import Cylinder, NoxModel, NoxProxy, OperatingPoint, Performance, PerformanceTerm, SoftSensor
+from mgdd._core.engine import Cylinder, NoxModel, NoxProxy, OperatingPoint, Performance, PerformanceTerm, SoftSensor
 from mgdd.engine.cycle import convergence, sensitivities, simulate, timing_sweep
 from mgdd.engine.ignition import start_of_combustion, start_of_injection
 from mgdd.engine.nox import fit_nox_proxy

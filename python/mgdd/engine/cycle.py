@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from mgdd import _core
-from mgdd._core import Cylinder, NoxProxy, OperatingPoint
+from mgdd._core.engine import Cylinder, NoxProxy, OperatingPoint
 from mgdd.results import VARIABLES, labelled_dataset
 from mgdd.results.labels import ANGLE
 from mgdd.results.units import unit_attributes
@@ -78,8 +78,8 @@ def simulate(
     >>> round(float(cycle["imep_gross_bar"]), 2), round(float(cycle["p_max_bar"]), 1)
     (9.63, 107.2)
     """
-    raw = _core.simulate(cylinder, point, soc_cad, step_cad, integrator)
-    motored = _core.simulate(cylinder, point.replace(fuel_mg=0.0), soc_cad, step_cad, integrator)
+    raw = _core.engine.simulate(cylinder, point, soc_cad, step_cad, integrator)
+    motored = _core.engine.simulate(cylinder, point.replace(fuel_mg=0.0), soc_cad, step_cad, integrator)
     scalars = {**raw["indicators"], "soc_cad": soc_cad}
     for name in ("fuel_heat_j", "burn_duration_cad"):
         scalars[name] = raw[name]
@@ -159,7 +159,7 @@ def timing_sweep(
     [4261.0, 1545.0, 889.0]
     """
     timings = np.arange(-30.0, 10.25, 0.5) if soc_cad is None else np.atleast_1d(np.asarray(soc_cad, float))
-    columns = _core.scan(cylinder, point, timings, step_cad, integrator)
+    columns = _core.engine.scan(cylinder, point, timings, step_cad, integrator)
     proxy = NoxProxy() if nox is None else nox
     columns["nox_affine_log_ppm"] = proxy.affine_log_ppm(columns["t_max_k"])
     columns["nox_arrhenius_ppm"] = proxy.arrhenius_ppm(columns["t_max_k"])
@@ -212,14 +212,14 @@ def sensitivities(
     1.0
     """
     names = [wrt] if isinstance(wrt, str) else list(wrt)
-    raw = _core.sensitivities(cylinder, point, soc_cad, names, step_cad, integrator)
+    raw = _core.engine.sensitivities(cylinder, point, soc_cad, names, step_cad, integrator)
     out = labelled_dataset(
         {
             ANGLE: (ANGLE, raw[ANGLE]),
             "parameter": ("parameter", names, "-", "input that is varied"),
             "parameter_units": (
                 "parameter",
-                [_core.input_unit(name) for name in names],
+                [_core.engine.input_unit(name) for name in names],
                 "-",
                 "unit of the input",
             ),
@@ -272,7 +272,7 @@ def convergence(
     >>> abs(float(c["error"].sel(indicator="efficiency_gross"))) < 2e-4
     True
     """
-    raw = _core.convergence(cylinder, point, soc_cad, step_cad, integrator)
+    raw = _core.engine.convergence(cylinder, point, soc_cad, step_cad, integrator)
     value, extrapolated, error, order, units = zip(*raw.values(), strict=True)
     own = "unit of the indicator"
     return labelled_dataset(

@@ -5,7 +5,7 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 from mgdd import _core
-from mgdd._core import Cylinder, OperatingPoint
+from mgdd._core.engine import Cylinder, OperatingPoint
 from mgdd.results.describe import described
 
 __all__ = ["Timing", "start_of_combustion", "start_of_injection"]
@@ -74,7 +74,7 @@ def start_of_combustion(cylinder: Cylinder, point: OperatingPoint, *, soi_cad: f
     >>> round(start_of_combustion(Cylinder(), OperatingPoint(), soi_cad=-20.0).delay_cad, 1)
     8.1
     """
-    return Timing(**_core.start_of_combustion(cylinder, point, soi_cad))
+    return Timing(**_core.engine.start_of_combustion(cylinder, point, soi_cad))
 
 
 def start_of_injection(cylinder: Cylinder, point: OperatingPoint, *, soc_cad: float) -> Timing:
@@ -104,4 +104,4 @@ def start_of_injection(cylinder: Cylinder, point: OperatingPoint, *, soc_cad: fl
     >>> round(timing.soi_cad, 1), timing.clipped
     (-10.8, False)
     """
-    return Timing(**_core.start_of_injection(cylinder, point, soc_cad))
+    return Timing(**_core.engine.start_of_injection(cylinder, point, soc_cad))

@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from mgdd import _core
-from mgdd._core import NoxFit
+from mgdd._core.engine import NoxFit
 
 if TYPE_CHECKING:
     from numpy.typing import ArrayLike
@@ -57,4 +57,6 @@ def fit_nox_proxy(
     >>> round(fit.proxy.activation_temperature_k)
     16000
     """
-    return _core.fit_nox_proxy(np.asarray(t_max_k, float), np.asarray(nox_ppm, float), map, reference_temperature_k)
+    return _core.engine.fit_nox_proxy(
+        np.asarray(t_max_k, float), np.asarray(nox_ppm, float), map, reference_temperature_k
+    )

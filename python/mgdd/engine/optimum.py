@@ -8,7 +8,8 @@ from collections.abc import Callable, Iterable, Mapping, Sequence
 import numpy as np
 
 from mgdd import _core
-from mgdd._core import Cylinder, Limit, OperatingPoint
+from mgdd._core.engine import Cylinder, OperatingPoint
+from mgdd._core.optimize import Limit
 from mgdd.errors import ConvergenceError, ParameterError
 from mgdd.optimize import Optimum
 from mgdd.optimize.optimum import limits_of
@@ -18,7 +19,7 @@ __all__ = ["find_optimum"]
 OBJECTIVES = ("efficiency_gross", "imep_gross_bar", "imep_closed_bar")
 _SCAN_CAD = 0.5
 _SECANT_CAD = 3.0
-_WINDOW_CAD: tuple[float, float] = _core.timing_window_cad
+_WINDOW_CAD: tuple[float, float] = _core.engine.timing_window_cad
 _DEFAULT_CAD = (-30.0, 10.0)
 
 
@@ -79,10 +80,10 @@ def find_optimum(
     _check(point, low, high)
 
     def indicators(soc: float | np.ndarray) -> dict[str, np.ndarray]:
-        return _core.scan(cylinder, point, np.atleast_1d(np.asarray(soc, float)), step_cad, integrator)
+        return _core.engine.scan(cylinder, point, np.atleast_1d(np.asarray(soc, float)), step_cad, integrator)
 
     def slope(soc: float) -> float:
-        raw = _core.sensitivities(cylinder, point, soc, ["soc_cad"], step_cad, integrator)
+        raw = _core.engine.sensitivities(cylinder, point, soc, ["soc_cad"], step_cad, integrator)
         return float(raw["indicators"][objective][0])
 
     def excess(soc: float, names: Iterable[str]) -> float:
@@ -186,7 +187,7 @@ def check_request(objective: str, limits: Iterable[str]) -> None:
     """Refuse an unknown objective or limit before any work."""
     if objective not in OBJECTIVES:
         raise ParameterError.of("objective", objective, f"one of {', '.join(OBJECTIVES)}")
-    known = _core.indicator_units()
+    known = _core.engine.indicator_units()
     for name in limits:
         if name not in known:
             raise ParameterError(f"limits: {name!r} is not an indicator: must be one of {', '.join(known)}")

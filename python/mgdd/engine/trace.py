@@ -6,7 +6,7 @@ import logging
 from typing import TYPE_CHECKING, Any
 
 from mgdd import _core
-from mgdd._core import Cylinder, OperatingPoint
+from mgdd._core.engine import Cylinder, OperatingPoint
 from mgdd.errors import ParameterError
 from mgdd.io.trace_forms import as_trace
 from mgdd.results import labelled_dataset
@@ -116,7 +116,7 @@ def analyze(
         raise ParameterError.of("fractions", fractions, "net or gross")
     source, number, text = _gamma(gamma if gamma is not None else ("cylinder" if simulated else 1.33))
     inlet = point.intake_pressure_kpa if inlet_pressure_kpa is None else inlet_pressure_kpa
-    options = _core.TraceOptions(
+    options = _core.engine.TraceOptions(
         pegging=pegging,
         pegging_exponent=pegging_exponent,
         inlet_pressure_kpa=inlet,
@@ -128,7 +128,7 @@ def analyze(
         total_at_end=simulated,
         fractions_of_gross=fractions == "gross",
     )
-    raw = _core.analyze_trace(trace[ANGLE].values, trace["pressure_bar"].values, cylinder, point, options)
+    raw = _core.engine.analyze(trace[ANGLE].values, trace["pressure_bar"].values, cylinder, point, options)
     for warning in () if quiet else raw["warnings"]:
         _LOG.warning("%s: %s", trace.attrs.get("file", "trace"), warning)
     return labelled_dataset(

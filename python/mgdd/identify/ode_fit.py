@@ -330,10 +330,12 @@ def fit_ode(
     starts = [first]
     if n_starts > 1:
         box = [
-            _core.Parameter(name=name, lower=low, upper=high, log_scaled=log)
+            _core.optimize.Parameter(name=name, lower=low, upper=high, log_scaled=log)
             for name, low, high, log in zip(unknowns, lower.tolist(), upper.tolist(), logs, strict=True)
         ]
-        starts += [np.asarray(point) for point in _core.latin_hypercube(box, n_starts - 1, chosen_options.seed)]
+        starts += [
+            np.asarray(point) for point in _core.identify.latin_hypercube(box, n_starts - 1, chosen_options.seed)
+        ]
     reports = tuple(
         least_squares(
             residual,

@@ -7,7 +7,7 @@ bench on all cores, `find_steady_optimum` says where a seeker should end.
 
 from __future__ import annotations
 
-from mgdd._core import SensorDynamics
+from mgdd._core.loop import SensorDynamics
 from mgdd.loop.bench import EngineBench
 from mgdd.loop.criteria import LoopCriteria
 from mgdd.loop.plant import Measurement, Plant

@@ -7,7 +7,8 @@ from collections.abc import Iterable, Mapping, Sequence
 from typing import TYPE_CHECKING, Any
 
 from mgdd import _core, presets
-from mgdd._core import Cylinder, NoxModel, OperatingPoint, Performance, SensorDynamics, SoftSensor
+from mgdd._core.engine import Cylinder, NoxModel, OperatingPoint, Performance, SoftSensor
+from mgdd._core.loop import SensorDynamics
 from mgdd.errors import ParameterError, RigError
 from mgdd.loop.plant import Measurement, checked_inputs
 from mgdd.presets import Preset
@@ -28,7 +29,7 @@ FLAGS = {
 }
 
 
-class EngineBench(_core.EngineBench):
+class EngineBench(_core.loop.EngineBench):
     """A virtual engine bench: the cycle model with noise, drift and the sensors of a real one.
 
     The plant scatters, misfires and drifts as asked, and runs through a schedule of operating points. Its sensors are

@@ -102,7 +102,7 @@ def run_seeker(
     if not isinstance(plant, EngineBench):
         return steer(plant, seeker, cycles, criteria)
     goal = _core_criteria(plant, criteria)
-    raw, stop = or_partial(lambda: _core.run_loop(plant, seeker, cycles, **goal))
+    raw, stop = or_partial(lambda: _core.loop.run_loop(plant, seeker, cycles, **goal))
     dataset = cycles_to_dataset(plant, raw["columns"], estimate_cad=raw["estimate_cad"])
     dataset.attrs["interrupted"] = int(raw["interrupted"])
     return hand_over(LoopRun(dataset=dataset, summary=raw["summary"], interrupted=raw["interrupted"]), stop)
@@ -185,7 +185,7 @@ def monte_carlo(
         if len({own[name] for own in each}) > 1:
             raise ParameterError(f"criteria: {name.removesuffix('_cad')} must be the same for all benches")
     raw, stop = or_partial(
-        lambda: _core.monte_carlo(
+        lambda: _core.loop.monte_carlo(
             bench_list,
             seeker_list,
             seed_list,

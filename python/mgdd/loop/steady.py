@@ -7,7 +7,8 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from mgdd._core import Limit, SensorDynamics
+from mgdd._core.loop import SensorDynamics
+from mgdd._core.optimize import Limit
 from mgdd.engine.optimum import OBJECTIVES, check_request
 from mgdd.errors import ConvergenceError, ParameterError, ShapeError
 from mgdd.loop.bench import EngineBench

@@ -76,7 +76,7 @@ class VirtualThrottle:
         self._inputs = tuple(inputs)
         self._still = {"duty": 0.0, "supply_v": self.throttle.supply_v, "airflow_torque_nm": 0.0}
         self._applied: dict[str, float] | None = None
-        self._core = _core.VirtualThrottle(
+        self._core = _core.loop.VirtualThrottle(
             throttle=self.throttle,
             sensors=sensors or SensorPair(),
             faults=fault_pair(faults),

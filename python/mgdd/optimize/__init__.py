@@ -31,7 +31,7 @@ np.True_
 
 from __future__ import annotations
 
-from mgdd._core import ComponentLag, Limit
+from mgdd._core.optimize import ComponentLag, Limit
 from mgdd.optimize.direct_seekers import GoldenSection, GradientDescent, Spsa
 from mgdd.optimize.dither_seekers import BoundedSeeking, ExtremumSeeking, NewtonSeeking
 from mgdd.optimize.fit_options import FitOptions

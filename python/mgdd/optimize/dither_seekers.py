@@ -10,7 +10,7 @@ from mgdd.optimize.seeker_record import SeekerRecord
 __all__ = ["BoundedSeeking", "ExtremumSeeking", "NewtonSeeking"]
 
 
-class ExtremumSeeking(SeekerRecord, _core.ExtremumSeeking):
+class ExtremumSeeking(SeekerRecord, _core.optimize.ExtremumSeeking):
     """Extremum seeking by a sinusoidal dither, one measurement of J per engine cycle.
 
     ``ask()`` gives the input of the next cycle, ``tell(J)`` takes what was measured there. Near an optimum of
@@ -93,7 +93,7 @@ class ExtremumSeeking(SeekerRecord, _core.ExtremumSeeking):
     kind: ClassVar[str] = "ExtremumSeeking"
 
 
-class NewtonSeeking(SeekerRecord, _core.NewtonSeeking):
+class NewtonSeeking(SeekerRecord, _core.optimize.NewtonSeeking):
     """Newton extremum seeking: the rate of approach does not depend on the curvature of J.
 
     Gradient and Hessian are demodulated from the same dither, and a Riccati filter tends to the inverse of the
@@ -158,7 +158,7 @@ class NewtonSeeking(SeekerRecord, _core.NewtonSeeking):
     kind: ClassVar[str] = "NewtonSeeking"
 
 
-class BoundedSeeking(SeekerRecord, _core.BoundedSeeking):
+class BoundedSeeking(SeekerRecord, _core.optimize.BoundedSeeking):
     """Bounded extremum seeking: J enters only the phase, so no step is larger than amplitude times omega.
 
     With omega = 2 pi harmonic/period the mean input drifts at kappa amplitude^2 omega/2 times the slope of J.

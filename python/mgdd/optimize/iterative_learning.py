@@ -206,7 +206,7 @@ class IterativeLearning:
             "rate": np.inf if rate is None else rate,
             "guard": guard,
         }
-        self._core = _core.IterativeLearning(**self._settings)
+        self._core = _core.optimize.IterativeLearning(**self._settings)
         self._report: ConvergenceReport | None = None
         if self._settings["impulse_response"].size and not self.convergence().asymptotic:
             warnings.warn(f"law {law!r} {self.convergence().sentence}", UserWarning, stacklevel=2)
@@ -341,7 +341,7 @@ class IterativeLearning:
 
     def __setstate__(self, pickled: dict[str, Any]) -> None:
         self._settings = pickled["settings"]
-        self._core = _core.IterativeLearning(**self._settings)
+        self._core = _core.optimize.IterativeLearning(**self._settings)
         self._report = None
         self.state = pickled["state"]
 

@@ -106,10 +106,10 @@ def least_squares(
     uppers = _per_parameter(np.inf if upper is None else upper, "upper", n)
     logs = _per_parameter(False if log_scaled is None else log_scaled, "log_scaled", n)
     parameters = [
-        _core.Parameter(name=name, lower=low, upper=high, log_scaled=bool(log))
+        _core.optimize.Parameter(name=name, lower=low, upper=high, log_scaled=bool(log))
         for name, low, high, log in zip(names, lowers.tolist(), uppers.tolist(), logs.tolist(), strict=True)
     ]
-    options = _core.LeastSquaresOptions(
+    options = _core.optimize.LeastSquaresOptions(
         max_iterations=max_iterations,
         cost_tolerance=cost_tolerance,
         step_tolerance=step_tolerance,
@@ -119,7 +119,9 @@ def least_squares(
         rank_tolerance=rank_tolerance,
     )
     measured = None if data is None else _vector(data, "data")
-    return FitReport.from_core(_core.least_squares(fun, start, parameters=parameters, options=options), measured)
+    return FitReport.from_core(
+        _core.optimize.least_squares(fun, start, parameters=parameters, options=options), measured
+    )
 
 
 def _vector(value: ArrayLike, name: str) -> NDArray[np.float64]:

@@ -8,7 +8,7 @@ from dataclasses import dataclass, field
 from types import MappingProxyType
 from typing import Any
 
-from mgdd._core import Limit
+from mgdd._core.optimize import Limit
 from mgdd.errors import ParameterError
 from mgdd.results.describe import as_html, rows_of
 from mgdd.results.labels import to_jsonable

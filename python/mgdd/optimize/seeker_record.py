@@ -171,9 +171,9 @@ def _encode(value: Any) -> Any:
     """JSON has no infinities and no objects: both become tagged mappings."""
     if isinstance(value, float) and not math.isfinite(value):
         return {"number": repr(value)}
-    if isinstance(value, _core.ComponentLag):
+    if isinstance(value, _core.optimize.ComponentLag):
         return {"component_lag": {"delay_cycles": value.delay_cycles, "lag_cycles": value.lag_cycles}}
-    if isinstance(value, _core.Limit):
+    if isinstance(value, _core.optimize.Limit):
         names = ("name", "upper", "margin", "method", "weight", "scale")
         return {"limit": {name: getattr(value, name) for name in names}}
     if isinstance(value, dict):
@@ -187,7 +187,7 @@ def _decode(item: dict[str, Any]) -> Any:
     if set(item) == {"number"}:
         return float(item["number"])
     if set(item) == {"component_lag"}:
-        return _core.ComponentLag(**item["component_lag"])
+        return _core.optimize.ComponentLag(**item["component_lag"])
     if set(item) == {"limit"}:
-        return _core.Limit(**item["limit"])
+        return _core.optimize.Limit(**item["limit"])
     return item

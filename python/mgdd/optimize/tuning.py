@@ -129,7 +129,7 @@ class Tuning:
         lower: float = -math.inf,
         upper: float = math.inf,
         maximize: bool = True,
-        limits: Sequence[_core.Limit] = (),
+        limits: Sequence[_core.optimize.Limit] = (),
         hold_cycles: int | None = None,
         seed: int = 0,
     ) -> ExtremumSeeking | Spsa:
@@ -181,10 +181,10 @@ class Tuning:
                 limits=list(limits),
                 curvature=self.curvature,
             )
-        lag = _core.ComponentLag()
+        lag = _core.optimize.ComponentLag()
         seen = self.curvature
         if self.compensated:
-            lag = _core.ComponentLag(delay_cycles=self.delay_cycles, lag_cycles=self.lag_cycles)
+            lag = _core.optimize.ComponentLag(delay_cycles=self.delay_cycles, lag_cycles=self.lag_cycles)
         else:  # the demodulation sees what the sensor leaves in phase
             seen *= self.sensor_gain * math.cos(math.radians(self.sensor_phase_deg))
         return ExtremumSeeking(
@@ -266,7 +266,7 @@ def tune(
     >>> print(tuning.summary().splitlines()[-1])
     The specification is met.
     """
-    found = _core.tune(
+    found = _core.optimize.tune(
         noise_sd=noise_sd,
         curvature=curvature,
         method=method,

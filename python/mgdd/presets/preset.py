@@ -11,7 +11,8 @@ from pathlib import Path
 from types import MappingProxyType
 from typing import Any, cast
 
-from mgdd._core import Cylinder, OperatingPoint, Throttle
+from mgdd._core.engine import Cylinder, OperatingPoint
+from mgdd._core.throttle import Throttle
 from mgdd.errors import DataError, ParameterError
 from mgdd.io.parameters import Entry, ParameterFile, Parameters, Wanted
 from mgdd.results.describe import core_rows, described

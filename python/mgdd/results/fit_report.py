@@ -80,7 +80,7 @@ class FitReport:
     Examples
     --------
     >>> from mgdd import _core
-    >>> FitReport.from_core(_core.FitReport()).status
+    >>> FitReport.from_core(_core.optimize.FitReport()).status
     'not_run'
     """
 
@@ -108,12 +108,12 @@ class FitReport:
     success: bool
 
     @classmethod
-    def from_core(cls, core_report: _core.FitReport, data: ArrayLike | None = None) -> FitReport:
+    def from_core(cls, core_report: _core.optimize.FitReport, data: ArrayLike | None = None) -> FitReport:
         """Wrap a report of the core.
 
         Parameters
         ----------
-        core_report : _core.FitReport
+        core_report : _core.optimize.FitReport
             As any fit of the core returns it.
         data : array_like, shape (n_residuals,), optional
             What the residual was compared with, in the unit of the residual; gives `nrmse_fit_percent`.
@@ -131,7 +131,7 @@ class FitReport:
         Examples
         --------
         >>> from mgdd import _core
-        >>> FitReport.from_core(_core.FitReport()).success
+        >>> FitReport.from_core(_core.optimize.FitReport()).success
         False
         """
         residual = _frozen(core_report.residual)
@@ -187,7 +187,7 @@ class FitReport:
         Examples
         --------
         >>> from mgdd import _core
-        >>> print(FitReport.from_core(_core.FitReport()).summary().splitlines()[0])
+        >>> print(FitReport.from_core(_core.optimize.FitReport()).summary().splitlines()[0])
         not_run: the fit has not been run
         """
         rows = [_COLUMNS, *self._rows()]
@@ -212,7 +212,7 @@ class FitReport:
         --------
         >>> import json
         >>> from mgdd import _core
-        >>> json.loads(json.dumps(FitReport.from_core(_core.FitReport()).to_dict()))["cost"] is None
+        >>> json.loads(json.dumps(FitReport.from_core(_core.optimize.FitReport()).to_dict()))["cost"] is None
         True
         """
         own = [field for field in self.__dataclass_fields__ if field not in ("residual", "findings")]
@@ -280,7 +280,7 @@ class FitReport:
         return rows
 
 
-def _classified(report: _core.FitReport) -> tuple[Finding, ...]:
+def _classified(report: _core.optimize.FitReport) -> tuple[Finding, ...]:
     """Give the sentences of the core their code and names; they stand in the order bounds, null directions, pairs."""
     names, sentences = tuple(report.names), list(report.findings)
     if not sentences:  # a fit that failed has bounds, but no uncertainty was described
@@ -297,7 +297,7 @@ def _classified(report: _core.FitReport) -> tuple[Finding, ...]:
     return tuple(Finding(code, own, text) for (code, own), text in zip(reasons, sentences, strict=True))
 
 
-def _strongest(report: _core.FitReport, count: int) -> list[tuple[str, str]]:
+def _strongest(report: _core.optimize.FitReport, count: int) -> list[tuple[str, str]]:
     """Return the `count` most correlated pairs outside the null directions, in the order of the parameters."""
     c, null = np.asarray(report.correlation), np.asarray(report.null_directions)
     loose = [bool(np.any(row != 0.0)) for row in np.reshape(null, (len(report.names), -1))]

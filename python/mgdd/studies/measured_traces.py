@@ -6,7 +6,7 @@ from collections.abc import Callable, Sequence
 from typing import TYPE_CHECKING, Any
 
 from mgdd import presets
-from mgdd._core import Cylinder, OperatingPoint
+from mgdd._core.engine import Cylinder, OperatingPoint
 from mgdd.datasets import load_hd_traces
 from mgdd.engine import analyze
 from mgdd.identify import best_timing, compare_laws, fit_cylinder, wall_heat_profile

@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 from numpy.polynomial import Polynomial
 
-from mgdd._core import Limit
+from mgdd._core.optimize import Limit
 from mgdd.errors import ConvergenceError
 from mgdd.optimize import Optimum
 

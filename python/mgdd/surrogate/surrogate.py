@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from mgdd._core import Limit
+from mgdd._core.optimize import Limit
 from mgdd.errors import ParameterError
 from mgdd.io.parameters import ParameterFile, Parameters
 from mgdd.optimize import Optimum

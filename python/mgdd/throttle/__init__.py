@@ -6,7 +6,7 @@ reconstruction from public sources, not the code behind the dissertation: see th
 
 from __future__ import annotations
 
-from mgdd._core import Throttle
+from mgdd._core.throttle import Throttle
 from mgdd.throttle.characteristics import groups, holding_duty, linear_part
 from mgdd.throttle.interop import initial_state, to_iosystem
 from mgdd.throttle.pseudo_wiener import PseudoWiener

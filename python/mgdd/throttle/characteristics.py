@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from mgdd import _core
-from mgdd._core import Throttle
+from mgdd._core.throttle import Throttle
 from mgdd.errors import ParameterError
 from mgdd.results import labelled_dataset
 
@@ -111,7 +111,7 @@ def holding_duty(throttle: Throttle, angle_deg: ArrayLike | None = None) -> xr.D
     share = np.clip((angle - t.limp_home_deg) / t.preload_ramp_deg, -1.0, 1.0)
     spring = np.where(above, t.spring_above_nm_per_rad, t.spring_below_nm_per_rad) * x
     preload = np.where(above, t.preload_above_nm, t.preload_below_nm) * share
-    balance = spring + preload - _core.throttle_airflow_torque(t, angle)
+    balance = spring + preload - _core.throttle.airflow_torque(t, angle)
     slow = t.stiction_nm if t.friction in ("stribeck", "lugre") else t.coulomb_nm
     leave = _breakaway_nm(t)
     columns = {
@@ -210,7 +210,7 @@ def airflow_torque_nm(throttle: Throttle, angle_deg: ArrayLike) -> NDArray[np.fl
     angle = np.asarray(angle_deg, dtype=np.float64)
     if not np.isfinite(angle).all():
         raise ParameterError("angle_deg holds a value that is not finite")
-    return np.asarray(_core.throttle_airflow_torque(throttle, angle.ravel())).reshape(angle.shape)
+    return np.asarray(_core.throttle.airflow_torque(throttle, angle.ravel())).reshape(angle.shape)
 
 
 def mass_flow_kg_per_s(

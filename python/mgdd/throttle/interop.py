@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from mgdd import _core
-from mgdd._core import Throttle
+from mgdd._core.throttle import Throttle
 from mgdd.errors import ParameterError
 from mgdd.throttle.pseudo_wiener import PseudoWiener
 
@@ -56,7 +56,7 @@ def initial_state(model: Throttle | PseudoWiener, start_deg: float | None = None
     start = limp_home if start_deg is None else float(start_deg)
     if not closed <= start <= opened:
         raise ParameterError(f"start_deg = {start:g}: must lie within the travel, {closed:g} to {opened:g} deg")
-    rest = _stepper(model).at_rest(start) if isinstance(model, PseudoWiener) else _core.ThrottleStepper.at_rest(start)
+    rest = _stepper(model).at_rest(start) if isinstance(model, PseudoWiener) else _core.throttle.Stepper.at_rest(start)
     return np.asarray(rest, dtype=np.float64)
 
 
@@ -109,7 +109,7 @@ def to_iosystem(
         stepper = _stepper(model.at_sample(sample_s))
         states = [f"state_{i}" for i in range(initial_state(model).size)]
     else:
-        stepper = _core.ThrottleStepper(model, sample_s=sample_s, step_s=step_s)
+        stepper = _core.throttle.Stepper(model, sample_s=sample_s, step_s=step_s)
         states = list(_STATES)
 
     def update(_time: float, state: Any, inputs: Any, _params: dict[str, Any]) -> NDArray[np.float64]:
@@ -123,4 +123,4 @@ def to_iosystem(
 
 
 def _stepper(model: PseudoWiener) -> Any:
-    return _core.PseudoWienerStepper(model.kind, dict(model.parameters), **model._options)
+    return _core.throttle.PseudoWienerStepper(model.kind, dict(model.parameters), **model._options)

@@ -19,7 +19,7 @@ if TYPE_CHECKING:
     import xarray as xr
     from numpy.typing import ArrayLike, NDArray
 
-    from mgdd._core import Throttle
+    from mgdd._core.throttle import Throttle
 
 __all__ = ["PseudoWiener"]
 
@@ -83,7 +83,7 @@ class PseudoWiener(SampledModel, Parameters):
         friction: str = "set_valued",
     ) -> None:
         given = {str(name): float(value) for name, value in (parameters or {}).items()}
-        self._core = _core.PseudoWienerModel(kind, given, switching=switching, friction=friction)
+        self._core = _core.throttle.PseudoWienerModel(kind, given, switching=switching, friction=friction)
         self._options = {"switching": switching, "friction": friction}
 
     @classmethod
@@ -100,7 +100,7 @@ class PseudoWiener(SampledModel, Parameters):
         PseudoWiener
             Without inductance, stiction and the softness of the stops, which PW-R does not have.
         """
-        return cls("pw_r", _core.pseudo_wiener_of(throttle).parameters)
+        return cls("pw_r", _core.throttle.pseudo_wiener_of(throttle).parameters)
 
     @property
     def kind(self) -> str:
@@ -115,7 +115,7 @@ class PseudoWiener(SampledModel, Parameters):
     @property
     def units(self) -> Mapping[str, str]:
         """Unit of every parameter."""
-        known = _core.pseudo_wiener_units(self.kind)
+        known = _core.throttle.pseudo_wiener_units(self.kind)
         return MappingProxyType({name: str(known[name]) for name in self.parameters})
 
     def replace(self, **changes: float) -> PseudoWiener:
@@ -253,7 +253,7 @@ class PseudoWiener(SampledModel, Parameters):
     def from_parameters(cls, file: ParameterFile) -> PseudoWiener:
         """Make the model of a file that `to_toml` or a fit wrote."""
         file.expect(kinds=_KINDS, tables=("parameters", "settings", "fit?"), notes=FIT_NOTES)
-        units = {name: str(unit) for name, unit in _core.pseudo_wiener_units(file.kind).items()}
+        units = {name: str(unit) for name, unit in _core.throttle.pseudo_wiener_units(file.kind).items()}
         said = file.values("parameters", {name: Wanted(unit, required=False) for name, unit in units.items()})
         options = file.values("settings", wanted(("switching", "friction"), form="text"))
         model = cls(file.kind, said, **options)

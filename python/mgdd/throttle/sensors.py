@@ -34,8 +34,8 @@ _FLAGS = {
 }
 
 
-class SensorPair(Parameters, _core.SensorPair):  # noqa: D101 the core's text
-    __doc__ = _core.SensorPair.__doc__
+class SensorPair(Parameters, _core.throttle.SensorPair):  # noqa: D101 the core's text
+    __doc__ = _core.throttle.SensorPair.__doc__
 
     def to_parameters(self) -> ParameterFile:
         """Give all fields, as `to_toml` writes them."""
@@ -83,7 +83,7 @@ class SensorFault:
 
     def __post_init__(self) -> None:
         """Refuse what cannot be."""
-        kinds = [kind for kind in _core.sensor_fault_kinds if kind != "none"]
+        kinds = [kind for kind in _core.throttle.sensor_fault_kinds if kind != "none"]
         if self.kind not in kinds:
             raise ParameterError.of("kind", self.kind, f"one of {', '.join(kinds)}")
         if self.sensor not in (1, 2):
@@ -146,7 +146,7 @@ def sense(
         raise ParameterError.of("seed", seed, ">= 0")
     time = run["time_s"].to_numpy()
     sample = even_step(time)
-    raw = _core.sense_throttle(
+    raw = _core.throttle.sense(
         SensorPair() if sensors is None else sensors,
         run["angle_deg"].to_numpy(),
         sample_s=sample,

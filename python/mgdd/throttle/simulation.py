@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from mgdd import _core
-from mgdd._core import Throttle
+from mgdd._core.throttle import Throttle
 from mgdd.errors import DataError, ParameterError, ShapeError
 from mgdd.results import labelled_dataset
 from mgdd.signals.even_grid import even_step
@@ -95,7 +95,7 @@ def simulate(
     start = throttle.limp_home_deg if start_deg is None else float(start_deg)
     supply = _signal("supply_v", supply_v, column.size)
     air = _signal("airflow_torque_nm", airflow_torque_nm, column.size)
-    raw = _core.simulate_throttle(
+    raw = _core.throttle.simulate(
         throttle,
         column,
         sample_s=sample,
@@ -168,7 +168,7 @@ def simulate_many(
         starts = np.atleast_1d(np.asarray(start_deg, dtype=np.float64))
         if starts.size == 1:
             starts = np.repeat(starts, len(cases))
-    angle = _core.simulate_throttle_many(
+    angle = _core.throttle.simulate_many(
         cases,
         column,
         sample_s=sample,

@@ -3,6 +3,8 @@
 #include <gtest/gtest.h>
 
 #include <cmath>
+#include <span>
+#include <vector>
 
 #include <Eigen/Dense>
 
@@ -10,6 +12,7 @@
 #include "mgdd/common/state.hpp"
 #include "mgdd/dynamics/observer.hpp"
 #include "mgdd/dynamics/rk4.hpp"
+#include "mgdd/dynamics/simulate.hpp"
 #include "mgdd/throttle/models/first_principle.hpp"
 #include "mgdd/throttle/models/pseudo_wiener.hpp"
 #include "support/no_alloc.hpp"
@@ -171,6 +174,31 @@ TEST(KalmanObserver, NamesWrongVariances) {
   EXPECT_THROW(Observer(model, {.process = {-1.0, 0.0, 0.0}}), ParameterError);
   EXPECT_THROW(Observer(model, {.measurement = 0.0}), ParameterError);
   EXPECT_NO_THROW(Observer(model, {}));
+}
+
+// The same corrections as one observer makes sample by sample; from each of its states a plain run.
+TEST(PredictAhead, IsARunFromEachStateOfTheObserver) {
+  throttle::PwR p;
+  p.frame.delay_samples = 1.5;
+  const throttle::PwRModel model(p);
+  const throttle::ObserverGains gains{.angle_gain = 0.2, .speed_gain_per_s = 21.0, .bias_gain_duty_per_deg = 0.003};
+  constexpr std::size_t n = 60, horizon = 7;
+  std::vector<double> duty(n), angle(n), ahead(n - horizon);
+  for (std::size_t k = 0; k < n; ++k) {
+    duty[k] = 0.25 + 0.2 * std::sin(0.3 * static_cast<double>(k));
+    angle[k] = 20.0 + 3.0 * std::cos(0.11 * static_cast<double>(k));
+  }
+  predict_ahead(model, model.at_rest(19.0), gains, horizon, duty, angle, ahead);
+  auto state = model.at_rest(19.0);
+  for (std::size_t k = 0; k < n - horizon; ++k) {
+    if (k > 0) model.step(state, duty[k - 1]);
+    model.correct(state, angle[k], gains);
+    auto copy = state;
+    std::vector<double> out(horizon);
+    respond(model, copy, std::span<const double>(duty).subspan(k, horizon), std::span<double>(out));
+    ASSERT_EQ(ahead[k], out.back()) << k;
+  }
+  EXPECT_NE(ahead[10], ahead[11]);
 }
 
 }  // namespace

@@ -3,8 +3,10 @@
 
 #include <cmath>
 #include <span>
+#include <vector>
 
 #include "mgdd/dynamics/predict.hpp"
+#include "mgdd/dynamics/simulate.hpp"
 #include "mgdd/throttle/models/first_principle.hpp"
 #include "mgdd/throttle/models/pseudo_wiener.hpp"
 #include "mgdd/throttle/plant.hpp"
@@ -94,6 +96,40 @@ TEST(Predict, SlopesToMovesStateAndBiasAreExact) {
   }
   const Repeated<throttle::ThrottlePlant> plant{throttle::ThrottlePlant{throttle::Throttle{}}, 20};
   expect_exact<2>(plant, moving(plant));
+}
+
+TEST(Predict, SlopesToEverySampleAreExact) {
+  PwR p;
+  p.frame.sample_s = 2e-3;
+  p.frame.delay_samples = 1.5;
+  const throttle::PwRModel model(p);
+  const auto state = moving(model);
+  std::vector<double> input{0.42, 0.21, 0.3, 0.47, 0.19, 0.33, 0.4, 0.26, 0.38};  // not a multiple of the lanes
+  const std::size_t n = input.size();
+  const auto run = [&](const std::vector<double>& u) {
+    std::vector<double> out(n);
+    auto s = state;
+    respond(model, s, std::span<const double>(u), std::span<double>(out));
+    return out;
+  };
+  std::vector<double> output(n), slopes(n * n, 1e9);
+  const test_support::AllocationCounter counter;
+  predict_every_sample(model, state, input, output,
+                       [&](std::size_t k, std::size_t i, double slope) { slopes[k * n + i] = slope; });
+  EXPECT_EQ(counter.count(), 0U);
+  EXPECT_EQ(output, run(input));
+  for (std::size_t i = 0; i < n; ++i) {
+    auto up = input, down = input;
+    up[i] += 1e-6;
+    down[i] -= 1e-6;
+    const auto high = run(up), low = run(down);
+    for (std::size_t k = 0; k < n; ++k) {
+      const double expected = (high[k] - low[k]) / 2e-6;
+      EXPECT_NEAR(slopes[k * n + i], expected, 1e-5 * (1.0 + std::abs(expected))) << i << " at " << k;
+      if (k >= i) continue;
+      EXPECT_EQ(slopes[k * n + i], 0.0) << "no input acts before its time";
+    }
+  }
 }
 
 TEST(Predict, SlopesToParametersAreExact) {

@@ -8,6 +8,7 @@
 #include <cmath>
 #include <concepts>
 #include <cstddef>
+#include <span>
 #include <string>
 
 #include "mgdd/common/bounds.hpp"
@@ -216,5 +217,22 @@ class KalmanObserver {
   Column gain_{};
   Scalar innovation_variance_{};
 };
+
+/// What an observer with fixed gains would have told: entry k is the output `horizon` samples after sample k, from the
+/// state corrected by the measurements up to k. `state` is that at the first sample, before its correction; as many
+/// entries as inputs less `horizon`.
+template <DiscreteModel M, class Gains>
+void predict_ahead(const M& model, typename M::State state, const Gains& gains, std::size_t horizon,
+                   std::span<const typename M::Scalar> input, std::span<const typename M::Scalar> measured,
+                   std::span<typename M::Scalar> output) noexcept {
+  for (std::size_t k = 0; k + horizon < input.size(); ++k) {
+    model.correct(state, measured[k], gains);
+    auto ahead = state;
+    for (std::size_t j = 0; j < horizon; ++j)
+      model.step(ahead, input_of(model, input[k + j]));
+    output[k] = model.output(ahead);
+    model.step(state, input_of(model, input[k]));
+  }
+}
 
 }  // namespace mgdd::dynamics

@@ -67,4 +67,26 @@ void predict(const M& model, const PlainState& state, const std::array<S, static
   }
 }
 
+/// The horizon of a model of one input that is free at every sample: `output[k]` after sample k, and
+/// `slope(k, i, d output[k] / d input[i])` for every pair, in passes of some inputs. Heap-free.
+template <DiscreteModel M, class Slope>
+void predict_every_sample(const M& model, const typename M::State& state, std::span<const typename M::Scalar> input,
+                          std::span<typename M::Scalar> output, Slope&& slope) noexcept {
+  constexpr std::size_t lanes = 4;
+  using D = Dual<static_cast<int>(lanes), typename M::Scalar>;
+  const auto dual = model.template over<D>();
+  using Lifted = std::remove_const_t<decltype(dual)>;
+  for (std::size_t first = 0; first < input.size(); first += lanes) {
+    auto s = lifted<Lifted>(state);
+    for (std::size_t k = 0; k < input.size(); ++k) {
+      const bool seeded = k >= first && k - first < lanes;
+      dual.step(s, input_of(dual, seeded ? D::seeded(input[k], static_cast<int>(k - first)) : D(input[k])));
+      const D y = dual.output(s);
+      output[k] = y.value;
+      for (std::size_t i = 0; i < lanes && first + i < input.size(); ++i)
+        slope(k, first + i, y.grad[i]);
+    }
+  }
+}
+
 }  // namespace mgdd::dynamics

@@ -6,7 +6,7 @@ import math
 from collections.abc import Callable, Sequence
 from typing import TYPE_CHECKING, Any
 
-from mgdd._core import Cylinder, OperatingPoint
+from mgdd._core.engine import Cylinder, OperatingPoint
 from mgdd.engine import find_optimum, simulate
 from mgdd.engine.optimum import check_request
 from mgdd.errors import ConvergenceError

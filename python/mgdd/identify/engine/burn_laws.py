@@ -6,7 +6,7 @@ from collections.abc import Callable, Sequence
 from typing import TYPE_CHECKING
 
 from mgdd import _core
-from mgdd._core import Cylinder, OperatingPoint
+from mgdd._core.engine import Cylinder, OperatingPoint
 from mgdd.identify.engine.cylinder import fit_cylinder
 from mgdd.identify.engine.records import CylinderFit
 
@@ -61,7 +61,9 @@ def compare_laws(
     """
     fits = []
     for shape, gamma in laws:
-        start = min(cylinder.wall_heat_scale, _core.wall_heat_scale_upper)  # a held scale may lie beyond the search
+        start = min(
+            cylinder.wall_heat_scale, _core.identify.wall_heat_scale_upper
+        )  # a held scale may lie beyond the search
         law = cylinder.replace(burn_shape=shape, gamma_model=gamma, wall_heat_scale=start)
         if progress is not None:
             progress(f"calibrate {shape}, {gamma} gamma")

@@ -11,7 +11,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from mgdd import _core
-from mgdd._core import Cylinder, OperatingPoint
+from mgdd._core.engine import Cylinder, OperatingPoint
 from mgdd.engine import analyze
 from mgdd.errors import DataError, ParameterError, ShapeError, hand_over, or_partial
 from mgdd.identify.engine.records import CylinderFit, Load, burn_law, load_table
@@ -109,7 +109,9 @@ def fit_cylinder(
     burns = _starts(measured, cylinder, start_values)
     chosen = fit_options(options, max_iterations=200)
     core, stop = or_partial(
-        lambda: _core.fit_cylinder(measured, cylinder, burns, list(names), step_cad, integrator, chosen.max_iterations)
+        lambda: _core.identify.fit_cylinder(
+            measured, cylinder, burns, list(names), step_cad, integrator, chosen.max_iterations
+        )
     )
     loads = tuple(
         _load(core.cylinder, fitted, trace, label, point)
@@ -169,24 +171,30 @@ def _closed(trace: xr.Dataset, cylinder: Cylinder) -> tuple[np.ndarray, np.ndarr
     return angle[inside], trace["pressure_bar"].to_numpy()[inside]
 
 
-def _measured(trace: xr.Dataset, label: str, cylinder: Cylinder, point: OperatingPoint | None) -> _core.MeasuredCycle:
+def _measured(
+    trace: xr.Dataset, label: str, cylinder: Cylinder, point: OperatingPoint | None
+) -> _core.identify.MeasuredCycle:
     angle, pressure = _closed(trace, cylinder)
-    return _core.MeasuredCycle(
+    return _core.identify.MeasuredCycle(
         label=label, crank_angle_cad=angle, pressure_bar=pressure, point=conditions(trace, point)
     )
 
 
 def _starts(
-    measured: Sequence[_core.MeasuredCycle], cylinder: Cylinder, start_values: Sequence[Mapping[str, float]] | None
-) -> list[_core.LoadBurn]:
+    measured: Sequence[_core.identify.MeasuredCycle],
+    cylinder: Cylinder,
+    start_values: Sequence[Mapping[str, float]] | None,
+) -> list[_core.identify.LoadBurn]:
     if start_values is None:
-        return [_core.estimate_burn(trace, cylinder) for trace in measured]
+        return [_core.identify.estimate_burn(trace, cylinder) for trace in measured]
     if len(start_values) != len(measured):
         raise ParameterError(f"start_values has {len(start_values)} entries for {len(measured)} traces")
-    known = _core.load_parameters()
+    known = _core.identify.load_parameters()
     burns = []
     for trace, values in zip(measured, start_values, strict=True):
-        burns.append(_core.LoadBurn() if set(known) <= set(values) else _core.estimate_burn(trace, cylinder))
+        burns.append(
+            _core.identify.LoadBurn() if set(known) <= set(values) else _core.identify.estimate_burn(trace, cylinder)
+        )
         burn = burns[-1]
         for name, value in values.items():
             if name not in known:
@@ -198,7 +206,7 @@ def _starts(
 
 
 def _load(
-    cylinder: Cylinder, fitted: _core.LoadFit, trace: xr.Dataset, label: str, point: OperatingPoint | None
+    cylinder: Cylinder, fitted: _core.identify.LoadFit, trace: xr.Dataset, label: str, point: OperatingPoint | None
 ) -> Load:
     angle, pressure = _closed(trace, cylinder)
     burn = fitted.burn
@@ -233,7 +241,7 @@ def _load(
     return Load(
         file=label,
         point=own,
-        cylinder=_core.with_burn(cylinder, burn),
+        cylinder=_core.identify.with_burn(cylinder, burn),
         soc_cad=burn.soc_cad,
         burn_duration_cad=burn.burn_duration_cad,
         fuel_heat_j=burn.fuel_heat_j,

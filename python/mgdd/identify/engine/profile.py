@@ -10,7 +10,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from mgdd import _core
-from mgdd._core import OperatingPoint
+from mgdd._core.engine import OperatingPoint
 from mgdd.errors import ParameterError
 from mgdd.identify.engine.cylinder import fit_cylinder
 from mgdd.identify.engine.records import CylinderFit, Load
@@ -24,10 +24,10 @@ if TYPE_CHECKING:
 __all__ = ["WallHeatProfile", "wall_heat_profile"]
 
 NAME = "wall_heat_scale"
-UPPER = float(_core.wall_heat_scale_upper)
+UPPER = float(_core.identify.wall_heat_scale_upper)
 _RISE = 1.10  # a scale counts as possible while the refitted RMSE stays within 10 % of the best
 _WIDTH = 0.20  # and as identified when that range stays within 20 % of the best scale
-_CORRELATION = float(_core.correlation_limit)
+_CORRELATION = float(_core.identify.correlation_limit)
 
 
 @described

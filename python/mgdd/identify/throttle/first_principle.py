@@ -145,7 +145,7 @@ def fit_throttle(
             )
     if start_values is None:
         values |= regression_start(step_s, duty, angle, values, free, closed_deg, open_deg)
-    bounds = {parameter.name: parameter for parameter in _core.throttle_group_bounds()}
+    bounds = {parameter.name: parameter for parameter in _core.identify.throttle_group_bounds()}
     for name, value in values.items():
         low, high = bounds[name].lower, bounds[name].upper
         if (name in (start_values or {}) or name in (fixed or {})) and not low <= value <= high:
@@ -168,7 +168,7 @@ def fit_throttle(
         if part and (fraction == 1.0 or fraction * time.size >= 200)
     ]
     found, stop = or_partial(
-        lambda: _core.fit_throttle_groups(
+        lambda: _core.identify.fit_throttle_groups(
             [(step_s, np.clip(duty, -1.0, 1.0), angle, [float(angle[0]), 0.0, 0.0], 0, False)],
             stages=stages,
             starts=spread_starts(values, free, bounds, n_starts, chosen.seed),

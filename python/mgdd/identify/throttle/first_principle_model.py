@@ -23,7 +23,7 @@ if TYPE_CHECKING:
 __all__ = ["FirstPrincipleModel"]
 
 _SETTINGS = ("closed_deg", "open_deg", "ramp_deg", "substeps")
-GROUP_NAMES = tuple(_core.throttle_group_names)
+GROUP_NAMES = tuple(_core.identify.group_names)
 # Groups of a typical passenger-car throttle, the start of a fit.
 TYPICAL = MappingProxyType(dict(zip(GROUP_NAMES, (0.03, 5e4, 0.1, 1e-3, 0.05, 0.1, 1e-3, 8.0, 0.0), strict=True)))
 
@@ -76,7 +76,7 @@ class FirstPrincipleModel(SampledModel, Parameters):
             if name != "limp_home_deg" and not (value > 0.0 if positive else value >= 0.0):
                 raise ParameterError.of(name, value, f"{('>' if positive else '>=')} 0")
         if not self.closed_deg < self.open_deg:
-            raise ParameterError.of("open_deg", self.open_deg, f"above closed_deg = {self.closed_deg!r}")
+            raise ParameterError.of("open_deg", self.open_deg, f"above closed_deg = {self.closed_deg:.12g}")
         object.__setattr__(self, "parameters", MappingProxyType(ordered))
 
     @property
@@ -88,7 +88,7 @@ class FirstPrincipleModel(SampledModel, Parameters):
         return [self.parameters["limp_home_deg"], 0.0, 0.0]
 
     def _run(self, run: RunInputs) -> NDArray[np.float64]:
-        return _core.simulate_throttle_groups(
+        return _core.identify.simulate_throttle_groups(
             list(self.parameters.values()),
             np.clip(run.columns[0], -1.0, 1.0),
             step_s=run.step_s,

@@ -89,7 +89,11 @@ def regression_start(
 
 
 def spread_starts(
-    values: Mapping[str, float], free: list[str], bounds: Mapping[str, _core.Parameter], n_starts: int, seed: int
+    values: Mapping[str, float],
+    free: list[str],
+    bounds: Mapping[str, _core.optimize.Parameter],
+    n_starts: int,
+    seed: int,
 ) -> list[list[float]]:
     """Draw the further starts from a Latin hypercube around the first one, the free groups only."""
     first = [values[name] for name in GROUP_NAMES]
@@ -97,7 +101,7 @@ def spread_starts(
         return [first]
     around = [name for name in free if bounds[name].log_scaled]
     box = [
-        _core.Parameter(
+        _core.optimize.Parameter(
             name=name,
             lower=max(bounds[name].lower, 0.5 * values[name]),
             upper=min(bounds[name].upper, 2.0 * values[name]),
@@ -106,7 +110,7 @@ def spread_starts(
         for name in around
     ]
     starts = [first]
-    for point in _core.latin_hypercube(box, n_starts - 1, seed):
+    for point in _core.identify.latin_hypercube(box, n_starts - 1, seed):
         other = dict(values) | dict(zip(around, np.asarray(point).tolist(), strict=True))
         starts.append([other[name] for name in GROUP_NAMES])
     return starts

@@ -99,7 +99,7 @@ def identify_throttle(
         raise ParameterError.of("model", model, f"one of {', '.join(map(repr, KINDS))}")
     check_kind(model, two_sided=two_sided, delay_samples=delay_samples)
     if not closed_deg < open_deg:
-        raise ParameterError.of("open_deg", open_deg, f"above closed_deg = {closed_deg!r}")
+        raise ParameterError.of("open_deg", open_deg, f"above closed_deg = {closed_deg:.12g}")
     check_throttle_log(log)
     if test is not None:
         check_throttle_log(test)

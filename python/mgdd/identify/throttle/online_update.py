@@ -82,11 +82,13 @@ class OnlineUpdate:
         self._start = model
         names = list(free if free is not None else (_ALL if method == "window" else _ALL[1:3]))
         values = dict(model.parameters)
-        self._core: _core.RecursivePwR | _core.WindowPwR | _core.GradientPwR
+        self._core: _core.identify.RecursivePwR | _core.identify.WindowPwR | _core.identify.GradientPwR
         if method == "recursive_least_squares":
-            self._core = _core.RecursivePwR(values, free=names, every=every, noise_deg=noise_deg, forgetting=forgetting)
+            self._core = _core.identify.RecursivePwR(
+                values, free=names, every=every, noise_deg=noise_deg, forgetting=forgetting
+            )
         elif method == "window":
-            self._core = _core.WindowPwR(
+            self._core = _core.identify.WindowPwR(
                 values,
                 free=names,
                 every=every,
@@ -95,7 +97,9 @@ class OnlineUpdate:
                 iterate_every=iterate_every,
             )
         elif method == "gradient":
-            self._core = _core.GradientPwR(values, free=names, adaptation_gain=adaptation_gain, noise_deg=noise_deg)
+            self._core = _core.identify.GradientPwR(
+                values, free=names, adaptation_gain=adaptation_gain, noise_deg=noise_deg
+            )
         else:
             raise ParameterError.of("method", method, "one of 'recursive_least_squares', 'window', 'gradient'")
 

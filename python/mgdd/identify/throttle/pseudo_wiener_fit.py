@@ -120,7 +120,7 @@ def fit_pseudo_wiener(
     values |= {name: float(value) for name, value in (settings or {}).items()}
     delays = [delay_samples] if isinstance(delay_samples, int | float) else list(delay_samples)
     (parameters, report, errors, n_best), stop = or_partial(
-        lambda: _core.fit_pseudo_wiener(
+        lambda: _core.identify.fit_pseudo_wiener(
             kind=kind,
             records=columns,
             parameters=values,

@@ -25,7 +25,7 @@ if TYPE_CHECKING:
 
 __all__ = ["SmoothThrottle", "fit_smooth_throttle"]
 
-_EXAMPLE = MappingProxyType(dict(zip(_core.smooth_throttle_names, _core.smooth_throttle_example, strict=True)))
+_EXAMPLE = MappingProxyType(dict(zip(_core.identify.smooth_names, _core.identify.smooth_example, strict=True)))
 _START_RAD = 0.14
 _CONSTANTS = ("inertia_kgm2", "gear_ratio", "inductance_h", "supply_v")
 
@@ -38,7 +38,7 @@ class SmoothThrottle(SampledModel, Parameters):
     Parameters
     ----------
     parameters : mapping of str to float, optional
-        The ten of ``mgdd._core.smooth_throttle_names`` (SI, rad); an example throttle without.
+        The ten of ``mgdd._core.identify.smooth_names`` (SI, rad); an example throttle without.
     inertia_kgm2, gear_ratio, inductance_h, supply_v : float
         Known constants [kg m², -, H, V].
 
@@ -107,7 +107,7 @@ class SmoothThrottle(SampledModel, Parameters):
 
     def _run(self, run: RunInputs) -> NDArray[np.float64]:
         values = list(self.parameters.values())
-        return _core.simulate_smooth_throttle(
+        return _core.identify.simulate_smooth_throttle(
             values, run.columns[0], step_s=run.step_s, start=run.state, **self.constants
         )
 
@@ -134,7 +134,7 @@ def fit_smooth_throttle(
     record : xarray.Dataset, DataFrame or mapping of columns
         ``duty`` [-] and ``angle_deg`` [deg] over an evenly spaced ``time_s`` [s].
     start_values : array_like, shape (n_starts, 10) or (10,)
-        In the order of ``mgdd._core.smooth_throttle_names`` (SI, rad).
+        In the order of ``mgdd._core.identify.smooth_names`` (SI, rad).
     lower, upper : array_like, shape (10,)
         Bounds, positive.
     initial_state : mapping of str to float, or sequence of float, optional
@@ -172,7 +172,7 @@ def fit_smooth_throttle(
     >>> from mgdd import _core
     >>> from mgdd.identify import SmoothThrottle, fit_smooth_throttle
     >>> levels = 0.7 * np.random.default_rng(1).random(100) - 0.35
-    >>> time, truth = 1e-3 * np.arange(8000), np.array(_core.smooth_throttle_example)
+    >>> time, truth = 1e-3 * np.arange(8000), np.array(_core.identify.smooth_example)
     >>> log = SmoothThrottle().simulate({"time_s": time, "duty": np.repeat(levels, 80)})
     >>> log["angle_deg"] = log["angle_deg"] + np.random.default_rng(2).normal(0.0, 0.05, time.size)
     >>> fit = fit_smooth_throttle(log, start_values=1.1 * truth, lower=0.1 * truth, upper=10 * truth)
@@ -187,7 +187,7 @@ def fit_smooth_throttle(
     time, duty, angle = columns_of(record, ("time_s", "duty", "angle_deg"))
     state = plant.state_of(initial_state)
     found, stop = or_partial(
-        lambda: _core.fit_smooth_throttle(
+        lambda: _core.identify.fit_smooth_throttle(
             duty,
             angle,
             starts=table.tolist(),

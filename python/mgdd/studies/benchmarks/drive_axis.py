@@ -93,7 +93,7 @@ class DriveModel(SampledModel, Parameters):
 
     def _run(self, run: RunInputs) -> NDArray[np.float64]:
         return np.asarray(
-            _core.DriveAxis(force_n_per_v=self.force_n_per_v).free_run(
+            _core.systems.DriveAxis(force_n_per_v=self.force_n_per_v).free_run(
                 parameters=_row(self.parameters),
                 start=[*run.state, float(run.time_s[0])],
                 input=run.columns[0],
@@ -103,7 +103,7 @@ class DriveModel(SampledModel, Parameters):
 
     def to_parameters(self) -> ParameterFile:
         """Give all parameters, as `to_toml` writes them."""
-        values = dict(zip(_core.DriveAxis.parameter_names, _row(self.parameters), strict=True))
+        values = dict(zip(_core.systems.DriveAxis.parameter_names, _row(self.parameters), strict=True))
         tables = {"parameters": entries(values), "settings": entries({"force_n_per_v": float(self.force_n_per_v)})}
         return ParameterFile(kind="drive", tables=tables)
 
@@ -112,7 +112,7 @@ class DriveModel(SampledModel, Parameters):
         """Make the slide of a file that `to_toml` wrote."""
         file.expect(kinds=("drive",), tables=("parameters", "settings"))
         return cls(
-            parameters=file.values("parameters", wanted(_core.DriveAxis.parameter_names)),
+            parameters=file.values("parameters", wanted(_core.systems.DriveAxis.parameter_names)),
             force_n_per_v=file.values("settings", wanted(("force_n_per_v",)))["force_n_per_v"],
         )
 
@@ -280,13 +280,13 @@ def fit_drive(
         raise ParameterError.of("friction", friction, f"one of {', '.join(_FORMS)}")
     chosen = fit_options(options, n_starts=48, seed=1, max_iterations=60, tolerance=1e-6)
     starts = chosen.n_starts
-    names = tuple(_core.DriveAxis.parameter_names)
+    names = tuple(_core.systems.DriveAxis.parameter_names)
     free = ["mass_kg", "viscous_ns_per_m", *_FORMS[friction]]
     free += ["offset_drift_n_per_s"] if drift else []
     first = _core_record(record)
     dt_s = even_step(record["time_s"])
-    axis = _core.DriveAxis(force_n_per_v=float(record["force_n_per_v"]))
-    search = _core.LeastSquaresOptions(max_iterations=chosen.max_iterations, cost_tolerance=chosen.tolerance)
+    axis = _core.systems.DriveAxis(force_n_per_v=float(record["force_n_per_v"]))
+    search = _core.optimize.LeastSquaresOptions(max_iterations=chosen.max_iterations, cost_tolerance=chosen.tolerance)
     base = dict(drive_inverse_dynamics(record) if start_values is None else start_values)
     if friction == "coulomb":
         base["viscous_asymmetry_ns_per_m"] = 0.0
@@ -334,7 +334,7 @@ def fit_drive(
 
 
 def _row(parameters: Mapping[str, float]) -> list[float]:
-    names = tuple(_core.DriveAxis.parameter_names)
+    names = tuple(_core.systems.DriveAxis.parameter_names)
     unknown = [name for name in parameters if name not in names]
     if unknown:
         raise ParameterError(f"parameter {unknown[0]!r}: must be one of {', '.join(names)}")
@@ -359,7 +359,7 @@ def _scattered(
 def _core_record(record: xr.Dataset) -> Any:
     position, speed = drive_start(record)
     first = _WINDOW - 1
-    return _core.FreeRunRecord(
+    return _core.systems.FreeRunRecord(
         input=record["drive_v"].to_numpy()[first:],
         output=record["position_m"].to_numpy()[first:],
         start=[position, speed, float(record["time_s"][first])],

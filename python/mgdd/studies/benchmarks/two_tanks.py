@@ -112,12 +112,12 @@ class TwoTanksModel(SampledModel, Parameters):
     def _run(self, run: RunInputs) -> NDArray[np.float64]:
         pump = run.columns[0]
         start = [*run.state, float(pump[0]), float(pump[0])]
-        model = _core.TwoTanks(lower_brim_v=self.lower_brim_v)
+        model = _core.systems.TwoTanks(lower_brim_v=self.lower_brim_v)
         return np.asarray(model.free_run(parameters=_row(self.parameters), start=start, input=pump, dt_s=run.step_s))
 
     def to_parameters(self) -> ParameterFile:
         """Give all parameters, as `to_toml` writes them."""
-        values = dict(zip(_core.TwoTanks.parameter_names, _row(self.parameters), strict=True))
+        values = dict(zip(_core.systems.TwoTanks.parameter_names, _row(self.parameters), strict=True))
         tables = {"parameters": entries(values), "settings": entries({"lower_brim_v": float(self.lower_brim_v)})}
         return ParameterFile(kind="two_tanks", tables=tables)
 
@@ -126,7 +126,7 @@ class TwoTanksModel(SampledModel, Parameters):
         """Make the tanks of a file that `to_toml` wrote."""
         file.expect(kinds=("two_tanks",), tables=("parameters", "settings"))
         return cls(
-            parameters=file.values("parameters", wanted(_core.TwoTanks.parameter_names)),
+            parameters=file.values("parameters", wanted(_core.systems.TwoTanks.parameter_names)),
             lower_brim_v=file.values("settings", wanted(("lower_brim_v",)))["lower_brim_v"],
         )
 
@@ -216,7 +216,7 @@ def fit_two_tanks(record: xr.Dataset, *, form: str = "grey_box", options: FitOpt
         upper = min(0.8 * point["upper_brim_v"], 25.0) if form.startswith("grey_box") else 4.0
         fits.append(_fit(point, list(free), record, upper, 10.0, chosen.max_iterations, chosen.tolerance))
     best = min(fits, key=lambda fit: float(fit.report.cost))
-    names = tuple(_core.TwoTanks.parameter_names)
+    names = tuple(_core.systems.TwoTanks.parameter_names)
     report = FitReport.from_core(best.report, record["level_v"].to_numpy())
     model = TwoTanksModel(parameters=dict(zip(names, best.parameters, strict=True)))
     modelled = model.simulate(record, initial_state=[float(x) for x in best.starts[0][:2]])["level_v"]
@@ -244,24 +244,24 @@ def _fit(
     lower_brim_v: float,
     max_iterations: int,
     tolerance: float = 1e-9,
-) -> _core.FreeRunFit:
+) -> _core.systems.FreeRunFit:
     time = record["time_s"].to_numpy()
     dt_s = even_step(time)
     pump, level = record["pump_v"].to_numpy(), record["level_v"].to_numpy()
-    data = _core.FreeRunRecord(
+    data = _core.systems.FreeRunRecord(
         input=pump,
         output=level,
         start=[upper_v, float(level[0]), float(pump[0]), float(pump[0])],
         free_start=_UNKNOWN_LEVELS,
     )
-    options = _core.LeastSquaresOptions(max_iterations=max_iterations, cost_tolerance=tolerance)
-    return _core.TwoTanks(lower_brim_v=lower_brim_v).fit(
+    options = _core.optimize.LeastSquaresOptions(max_iterations=max_iterations, cost_tolerance=tolerance)
+    return _core.systems.TwoTanks(lower_brim_v=lower_brim_v).fit(
         base=_row(parameters), free=free, records=[data], dt_s=dt_s, options=options
     )
 
 
 def _row(parameters: Mapping[str, float]) -> list[float]:
-    names = tuple(_core.TwoTanks.parameter_names)
+    names = tuple(_core.systems.TwoTanks.parameter_names)
     if set(parameters) != set(names):
         odd = sorted(set(parameters) ^ set(names))[0]
         raise ParameterError(f"parameter {odd!r} is unknown or missing: needed are {', '.join(names)}")

@@ -91,7 +91,7 @@ class LinearApproximation(SampledModel, Parameters):
 
     def _run(self, run: RunInputs) -> Vector:
         deviation = run.columns[0] - self.input_mean
-        return np.asarray(_core.filter_series(self.numerator, self.denominator, deviation)) + self.output_mean
+        return np.asarray(_core.systems.filter_series(self.numerator, self.denominator, deviation)) + self.output_mean
 
     def to_parameters(self) -> ParameterFile:
         """Give filter and means, as `to_toml` writes them."""
@@ -428,8 +428,8 @@ def _signals(record: xr.Dataset) -> tuple[Vector, Vector]:
     return u, y
 
 
-def _core_model(model: WienerHammersteinModel) -> _core.WienerHammerstein:
-    return _core.WienerHammerstein(
+def _core_model(model: WienerHammersteinModel) -> _core.systems.WienerHammerstein:
+    return _core.systems.WienerHammerstein(
         first_order=model.first_order,
         last_order=model.last_order,
         n_curve=model.n_curve,
@@ -439,9 +439,14 @@ def _core_model(model: WienerHammersteinModel) -> _core.WienerHammerstein:
 
 
 def _fit(
-    model: _core.WienerHammerstein, start: Vector, u: Vector, y: Vector, iterations: int, tolerance: float = 1e-7
-) -> _core.FitReport:
-    options = _core.LeastSquaresOptions(max_iterations=iterations, cost_tolerance=tolerance)
+    model: _core.systems.WienerHammerstein,
+    start: Vector,
+    u: Vector,
+    y: Vector,
+    iterations: int,
+    tolerance: float = 1e-7,
+) -> _core.optimize.FitReport:
+    options = _core.optimize.LeastSquaresOptions(max_iterations=iterations, cost_tolerance=tolerance)
     return model.fit(start=start, input=u, output=y, skip=_SKIP, options=options)
 
 
@@ -493,13 +498,15 @@ def _padded(b: Vector, a: Vector, order: int) -> tuple[Vector, Vector]:
 
 def _start(
     candidate: Candidate, first: int, last: int, n_curve: int, u: Vector
-) -> tuple[_core.WienerHammerstein, Vector]:
+) -> tuple[_core.systems.WienerHammerstein, Vector]:
     _, b1, a1, b2, a2, curve, scale = candidate
     (b1, a1), (b2, a2) = _padded(b1, a1, first), _padded(b2, a2, last)
     between = np.asarray(_filtered(b1, a1, u))
     margin = _MARGIN * float(np.ptp(between))
     lower, upper = float(between.min()) - margin, float(between.max()) + margin
-    model = _core.WienerHammerstein(first_order=first, last_order=last, n_curve=n_curve, lower=lower, upper=upper)
+    model = _core.systems.WienerHammerstein(
+        first_order=first, last_order=last, n_curve=n_curve, lower=lower, upper=upper
+    )
     grid = np.linspace(lower, upper, 20 * n_curve)
     filters = np.r_[a1[1:], b1[:-1], a2[1:], b2[:-1]]
     unit = np.eye(n_curve)

@@ -38,7 +38,7 @@ py::dict bind_analyze(const InputArray& angle, const InputArray& pressure, const
 
 }  // namespace
 
-void bind_trace(py::module_& m) {
+void bind_pressure(py::module_& m) {
   using py::arg;
   using O = TraceOptions;
   py::class_<O> options(m, "TraceOptions");
@@ -52,7 +52,7 @@ void bind_trace(py::module_& m) {
                  plain("burn_from_cad", &O::burn_from_cad), plain("total_at_end", &O::total_at_end),
                  plain("fractions_of_gross", &O::fractions_of_gross)},
       [](const O&) {});
-  m.def("analyze_trace", &bind_analyze, arg("crank_angle_cad"), arg("pressure_bar"), arg("cylinder"), arg("point"),
+  m.def("analyze", &bind_analyze, arg("crank_angle_cad"), arg("pressure_bar"), arg("cylinder"), arg("point"),
         arg("options"), "Pegging, heat release, burn angles, work.");
   m.def(
       "check_trace",

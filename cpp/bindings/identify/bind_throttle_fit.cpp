@@ -133,14 +133,14 @@ std::vector<double> simulate_groups(const Groups& values, const InputArray& duty
 
 }  // namespace
 
-void bind_identify_throttle(py::module_& m) {
+void bind_throttle_fit(py::module_& m) {
   using py::arg;
   std::vector<std::string> group_names;
   for (const FieldInfo& field : FirstPrinciple::parameters)
     group_names.emplace_back(field.name);
-  m.attr("smooth_throttle_names") = py::tuple(py::cast(names_of(SmoothPlant::parameter_names)));
-  m.attr("smooth_throttle_example") = py::tuple(py::cast(throttle::smooth_plant_example));
-  m.attr("throttle_group_names") = py::tuple(py::cast(group_names));
+  m.attr("smooth_names") = py::tuple(py::cast(names_of(SmoothPlant::parameter_names)));
+  m.attr("smooth_example") = py::tuple(py::cast(throttle::smooth_plant_example));
+  m.attr("group_names") = py::tuple(py::cast(group_names));
   m.def(
       "smooth_throttle_instruction_set", [] { return as_str(to_string(instruction_set())); },
       "Instruction set that the kernel chose on this machine.");

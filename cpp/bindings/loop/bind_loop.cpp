@@ -6,12 +6,12 @@
 #include <variant>
 #include <vector>
 
-#include "bench_columns.hpp"
 #include "interruptible.hpp"
+#include "loop/bench_columns.hpp"
 #include "mgdd/loop/cycle_fields.hpp"
 #include "mgdd/loop/monte_carlo.hpp"
 #include "mgdd/loop/run_loop.hpp"
-#include "seeker_binding.hpp"
+#include "optimize/seeker_binding.hpp"
 
 namespace mgdd::bindings {
 namespace {

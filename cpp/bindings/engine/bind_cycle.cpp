@@ -97,7 +97,7 @@ py::dict to_dict(const IgnitionTiming& t) {
 
 }  // namespace
 
-void bind_engine(py::module_& m) {
+void bind_cycle(py::module_& m) {
   using py::arg;
   m.def("simulate", &simulate, arg("cylinder"), arg("point"), arg("soc_cad"), arg("step_cad"), arg("integrator"),
         "One cycle: traces and indicators.");

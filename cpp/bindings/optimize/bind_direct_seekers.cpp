@@ -7,7 +7,7 @@
 #include <utility>
 
 #include "mgdd/optimize/seekers/tuner.hpp"
-#include "seeker_binding.hpp"
+#include "optimize/seeker_binding.hpp"
 
 namespace mgdd::bindings {
 namespace {

@@ -7,9 +7,9 @@
 #include <utility>
 #include <vector>
 
-#include "bench_columns.hpp"
 #include "binding.hpp"
 #include "keywords.hpp"
+#include "loop/bench_columns.hpp"
 #include "mgdd/common/bounds.hpp"
 #include "mgdd/loop/cycle_fields.hpp"
 #include "mgdd/loop/engine_bench.hpp"
@@ -205,7 +205,7 @@ Examples
 
 }  // namespace
 
-void bind_bench(py::module_& m) {
+void bind_engine_bench(py::module_& m) {
   using py::arg;
   bind_dynamics(m);
   const BenchSettings d;

@@ -160,13 +160,13 @@ py::array_t<double> air_torque(const Throttle& t, const InputArray& angle_deg) {
 
 void bind_throttle(py::module_& m) {
   bind_throttle_record(m);
-  m.def("simulate_throttle", &simulate_one, py::arg("throttle"), py::arg("duty"), py::kw_only(), py::arg("sample_s"),
+  m.def("simulate", &simulate_one, py::arg("throttle"), py::arg("duty"), py::kw_only(), py::arg("sample_s"),
         py::arg("start_deg"), py::arg("bridge"), py::arg("supply_v"), py::arg("airflow_torque_nm"), py::arg("step_s"),
         "One throttle over columns, from rest; behind mgdd.throttle.simulate.");
-  m.def("simulate_throttle_many", &simulate_lanes, py::arg("throttles"), py::arg("duty"), py::kw_only(),
-        py::arg("sample_s"), py::arg("start_deg"), py::arg("bridge"), py::arg("supply_v"), py::arg("airflow_torque_nm"),
-        py::arg("step_s"), "Many throttles under one input, in lanes; behind mgdd.throttle.simulate_many.");
-  m.def("throttle_airflow_torque", &air_torque, py::arg("throttle"), py::arg("angle_deg"),
+  m.def("simulate_many", &simulate_lanes, py::arg("throttles"), py::arg("duty"), py::kw_only(), py::arg("sample_s"),
+        py::arg("start_deg"), py::arg("bridge"), py::arg("supply_v"), py::arg("airflow_torque_nm"), py::arg("step_s"),
+        "Many throttles under one input, in lanes; behind mgdd.throttle.simulate_many.");
+  m.def("airflow_torque", &air_torque, py::arg("throttle"), py::arg("angle_deg"),
         "Torque of the modelled air flow [N m]; behind mgdd.throttle.airflow_torque_nm.");
 }
 

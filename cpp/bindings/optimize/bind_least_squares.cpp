@@ -185,7 +185,7 @@ void bind_report(py::module_& m) {
 
 }  // namespace
 
-void bind_optimize(py::module_& m) {
+void bind_least_squares(py::module_& m) {
   bind_parameter(m);
   bind_options(m);
   bind_report(m);

@@ -120,8 +120,8 @@ Examples
   for (const auto& [kind, name] : sensor_fault_names())
     kinds.append(as_str(name));
   m.attr("sensor_fault_kinds") = py::tuple(kinds);
-  m.def("sense_throttle", &sense, py::arg("pair"), py::arg("angle_deg"), py::kw_only(), py::arg("sample_s"),
-        py::arg("seed"), py::arg("faults"), "Samples of both sensors; behind mgdd.throttle.sense.");
+  m.def("sense", &sense, py::arg("pair"), py::arg("angle_deg"), py::kw_only(), py::arg("sample_s"), py::arg("seed"),
+        py::arg("faults"), "Samples of both sensors; behind mgdd.throttle.sense.");
 }
 
 }  // namespace mgdd::bindings

@@ -12,7 +12,8 @@
 #include "mgdd/common/state.hpp"
 #include "mgdd/identify/online/online_update.hpp"
 #include "mgdd/identify/throttle/pseudo_wiener_fit.hpp"
-#include "pseudo_wiener_binding.hpp"
+#include "mgdd/throttle/models/pseudo_wiener_numbers.hpp"
+#include "throttle/pseudo_wiener_binding.hpp"
 
 namespace mgdd::bindings {
 namespace {
@@ -21,7 +22,7 @@ using namespace mgdd::identify;
 using Numbers = std::map<std::string, double>;
 
 throttle::PwR pw_r(const Numbers& parameters) {
-  return std::get<throttle::PwR>(make_pseudo_wiener("pw_r", parameters, "predicted", "set_valued"));
+  return std::get<throttle::PwR>(throttle::pseudo_wiener_from("pw_r", parameters));
 }
 
 std::pair<std::vector<double>, std::vector<double>> columns(const InputArray& duty, const InputArray& angle) {
@@ -57,7 +58,7 @@ void bind_online(py::class_<Guarded<Update>>& cls) {
 
 }  // namespace
 
-void bind_recursive(py::module_& m) {
+void bind_online(py::module_& m) {
   using py::arg;
 
   m.def(
@@ -80,7 +81,7 @@ void bind_recursive(py::module_& m) {
         o.only_given_start = only_given_start;
         o.try_lag_starts = try_map_start;
         o.search.max_iterations = max_iterations;
-        const auto base = make_pseudo_wiener(kind, parameters, "predicted", "set_valued");
+        const auto base = throttle::pseudo_wiener_from(kind, parameters);
         return hand_over(interruptible([&](std::stop_token stop) {
                            o.search.stop = std::move(stop);
                            return fit_pseudo_wiener(logs, base, o);

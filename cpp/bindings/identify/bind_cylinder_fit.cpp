@@ -11,7 +11,7 @@
 
 namespace mgdd::bindings {
 
-void bind_identify(py::module_& m) {
+void bind_cylinder_fit(py::module_& m) {
   using namespace identify;
   using py::arg;
 

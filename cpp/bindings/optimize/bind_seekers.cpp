@@ -2,7 +2,7 @@
 #include <limits>
 #include <tuple>
 
-#include "seeker_binding.hpp"
+#include "optimize/seeker_binding.hpp"
 
 namespace mgdd::bindings {
 namespace {

@@ -1,0 +1,24 @@
+"""
+The C++ core of mgdd, a submodule per room. Use it through mgdd.engine, mgdd.throttle and so on.
+"""
+from __future__ import annotations
+from . import optimize
+from . import engine
+from . import throttle
+from . import identify
+from . import systems
+from . import loop
+__all__: list[str] = ['compiled_simd_level', 'compiler', 'engine', 'identify', 'loop', 'optimize', 'processor_simd_levels', 'systems', 'throttle']
+def compiled_simd_level() -> str:
+    """
+    Instruction set of this build.
+    """
+def compiler() -> str:
+    """
+    Compiler of this build.
+    """
+def processor_simd_levels() -> list[str]:
+    """
+    Vector instruction sets of this processor.
+    """
+__version__: str = '0.1.0'

@@ -1,0 +1,223 @@
+"""
+Virtual benches and the loops over them.
+"""
+from __future__ import annotations
+import collections.abc
+import mgdd._core.engine
+import mgdd._core.optimize
+import mgdd._core.throttle
+import numpy
+import numpy.typing
+import typing
+__all__: list[str] = ['EngineBench', 'SensorDynamics', 'VirtualThrottle', 'monte_carlo', 'run_loop']
+class SensorDynamics:
+    """
+    Transport delay, first-order lag and noise of a gas sensor.
+    
+    Parameters
+    ----------
+    delay_s : float
+        Transport delay of the sample line [s], in [0, 60].
+    lag_s : float
+        Time constant [s], in [0, 60]; t10-90 is 2.2 times it.
+    noise_fraction : float
+        Standard deviation of a reading over the reading [-], in [0, 0.2].
+    delay_cycles : int, optional
+        Delay in engine cycles instead; it does not follow the speed.
+    lag_cycles : float, optional
+        Time constant in engine cycles instead.
+    
+    Raises
+    ------
+    mgdd.errors.ParameterError
+        A value outside its domain.
+    
+    Examples
+    --------
+    >>> from mgdd.loop import SensorDynamics
+    >>> SensorDynamics(delay_s=3.0, lag_s=2.0).delay_at(1500.0)
+    38
+    """
+    def __eq__(self, arg0: typing.Any) -> bool:
+        ...
+    def __getstate__(self) -> tuple[int, dict]:
+        ...
+    def __hash__(self) -> int:
+        ...
+    def __init__(self, *, delay_s: typing.SupportsFloat | typing.SupportsIndex = 0.0, lag_s: typing.SupportsFloat | typing.SupportsIndex = 0.0, noise_fraction: typing.SupportsFloat | typing.SupportsIndex = 0.0, delay_cycles: typing.SupportsInt | typing.SupportsIndex | None = None, lag_cycles: typing.SupportsFloat | typing.SupportsIndex | None = None) -> None:
+        ...
+    def __repr__(self) -> str:
+        ...
+    def __setstate__(self, arg0: tuple) -> None:
+        ...
+    def delay_at(self, speed_rpm: typing.SupportsFloat | typing.SupportsIndex) -> int:
+        """
+        Delay in whole cycles at a speed.
+        """
+    def gain_at(self, speed_rpm: typing.SupportsFloat | typing.SupportsIndex) -> float:
+        """
+        Gain of the lag filter per cycle [-].
+        """
+    def to_dict(self) -> dict:
+        """
+        Constructor keywords as a new dict.
+        """
+    @property
+    def delay_cycles(self) -> int | None:
+        """
+        Delay in cycles, or None.
+        """
+    @property
+    def delay_s(self) -> float:
+        """
+        Transport delay [s].
+        """
+    @property
+    def lag_cycles(self) -> float | None:
+        """
+        Time constant in cycles, or None.
+        """
+    @property
+    def lag_s(self) -> float:
+        """
+        Time constant [s].
+        """
+    @property
+    def noise_fraction(self) -> float:
+        """
+        Relative noise [-].
+        """
+class EngineBench:
+    """
+    The virtual engine bench; use mgdd.loop.EngineBench.
+    """
+    def __getstate__(self) -> tuple[int, dict, dict[str, list[float]]]:
+        ...
+    def __init__(self, *, cylinder: mgdd._core.engine.Cylinder, schedule: collections.abc.Sequence[tuple[typing.SupportsInt | typing.SupportsIndex, mgdd._core.engine.OperatingPoint]], performance: mgdd._core.engine.Performance | None = None, nox_sensor: str = 'soft', limits: collections.abc.Sequence[str] = [], soc_scatter_cad: typing.SupportsFloat | typing.SupportsIndex = 0.3, efficiency_noise_percent: typing.SupportsFloat | typing.SupportsIndex = 0.25, misfire_probability: typing.SupportsFloat | typing.SupportsIndex = 0.0, soc_drift_cad_per_kcycle: typing.SupportsFloat | typing.SupportsIndex = 0.0, wall_heat_drift_per_kcycle: typing.SupportsFloat | typing.SupportsIndex = 0.0, true_nox: mgdd._core.engine.NoxModel | None = None, soft_sensor: mgdd._core.engine.SoftSensor | None = None, analyser: SensorDynamics | None = None, fast_sensor: SensorDynamics | None = None, delay_whole_objective: bool = False, step_cad: typing.SupportsFloat | typing.SupportsIndex = 1.0, integrator: str = 'trapezoid', seed: typing.SupportsInt | typing.SupportsIndex = 0) -> None:
+        ...
+    def __repr__(self) -> str:
+        ...
+    def __setstate__(self, arg0: tuple) -> None:
+        ...
+    def point_at(self, cycle: typing.SupportsInt | typing.SupportsIndex) -> mgdd._core.engine.OperatingPoint:
+        """
+        Operating point of a cycle.
+        """
+    def reset(self, seed: typing.SupportsInt | typing.SupportsIndex | None = None) -> None:
+        """
+        Back to cycle 0, with another seed if given.
+        """
+    def run_columns(self, soc_cad: typing.Annotated[numpy.typing.ArrayLike, numpy.float64]) -> dict:
+        """
+        Run one cycle per request, without the GIL: columns by name.
+        """
+    def step(self, soc_cad: typing.SupportsFloat | typing.SupportsIndex) -> dict:
+        """
+        Run one cycle: what was measured, by name.
+        """
+    @property
+    def analyser_delay_cycles(self) -> int:
+        """
+        Delay of the analyser at the next cycle.
+        """
+    @property
+    def analyser_gain(self) -> float:
+        """
+        Gain of the analyser's lag filter at the next cycle [-].
+        """
+    @property
+    def cycle(self) -> int:
+        """
+        Index of the next cycle.
+        """
+    @property
+    def operating_point_changes(self) -> bool:
+        """
+        Whether speed or fuel of the next cycle differ by more than 5 % from those of the last one.
+        """
+    @property
+    def point(self) -> mgdd._core.engine.OperatingPoint:
+        """
+        Operating point of the next cycle.
+        """
+    @property
+    def seed(self) -> int:
+        """
+        Seed of the run.
+        """
+    @property
+    def settings(self) -> dict:
+        """
+        Constructor keywords as a new dict.
+        """
+    @property
+    def state(self) -> dict[str, list[float]]:
+        """
+        State of the run between two cycles: named lists of numbers, JSON-able. Setting it continues that
+        run bit for bit; a state of another bench raises ParameterError and changes nothing.
+        """
+    @state.setter
+    def state(self, arg1: collections.abc.Mapping[str, collections.abc.Sequence[typing.SupportsFloat | typing.SupportsIndex]]) -> None:
+        ...
+    @property
+    def window_cad(self) -> typing.Annotated[list[float], "FixedSize(2)"]:
+        """
+        Earliest and latest SOC that is not clamped.
+        """
+class VirtualThrottle:
+    """
+    A throttle with its sensors, sample by sample; behind mgdd.loop.VirtualThrottle.
+    """
+    def __init__(self, *, throttle: mgdd._core.throttle.Throttle, sensors: mgdd._core.throttle.SensorPair, faults: typing.Annotated[collections.abc.Sequence[tuple[str, typing.SupportsFloat | typing.SupportsIndex, typing.SupportsFloat | typing.SupportsIndex]], "FixedSize(2)"], sample_s: typing.SupportsFloat | typing.SupportsIndex, step_s: typing.SupportsFloat | typing.SupportsIndex, start_deg: typing.SupportsFloat | typing.SupportsIndex, bridge: str, seed: typing.SupportsInt | typing.SupportsIndex) -> None:
+        ...
+    def step(self, duty: typing.SupportsFloat | typing.SupportsIndex, supply_v: typing.SupportsFloat | typing.SupportsIndex, airflow_torque_nm: typing.SupportsFloat | typing.SupportsIndex) -> dict:
+        """
+        Run one sample.
+        """
+    @property
+    def samples(self) -> int:
+        """
+        Samples run so far.
+        """
+    @property
+    def state(self) -> dict[str, list[float]]:
+        """
+        What a run needs to go on bit for bit.
+        """
+    @state.setter
+    def state(self, arg1: collections.abc.Mapping[str, collections.abc.Sequence[typing.SupportsFloat | typing.SupportsIndex]]) -> None:
+        ...
+def monte_carlo(benches: collections.abc.Sequence[EngineBench], seekers: list, seeds: collections.abc.Sequence[typing.SupportsInt | typing.SupportsIndex], *, cycles: typing.SupportsInt | typing.SupportsIndex, optimum_cad: collections.abc.Sequence[typing.SupportsFloat | typing.SupportsIndex], arrival_cad: typing.SupportsFloat | typing.SupportsIndex, tail_cycles: typing.SupportsInt | typing.SupportsIndex, exceed_from: typing.SupportsInt | typing.SupportsIndex | None, exceed_above: collections.abc.Sequence[collections.abc.Sequence[typing.SupportsFloat | typing.SupportsIndex]], threads: typing.SupportsInt | typing.SupportsIndex) -> dict:
+    """
+    Whole loops on all cores; behind mgdd.loop.monte_carlo.
+    """
+@typing.overload
+def run_loop(bench: EngineBench, seeker: mgdd._core.optimize.ExtremumSeeking, cycles: typing.SupportsInt | typing.SupportsIndex, *, optimum_cad: typing.SupportsFloat | typing.SupportsIndex, arrival_cad: typing.SupportsFloat | typing.SupportsIndex, tail_cycles: typing.SupportsInt | typing.SupportsIndex, exceed_from: typing.SupportsInt | typing.SupportsIndex | None, exceed_above: collections.abc.Sequence[typing.SupportsFloat | typing.SupportsIndex]) -> dict:
+    """
+    Run a seeker on the bench without the GIL; behind mgdd.loop.run_seeker.
+    """
+@typing.overload
+def run_loop(bench: EngineBench, seeker: mgdd._core.optimize.NewtonSeeking, cycles: typing.SupportsInt | typing.SupportsIndex, *, optimum_cad: typing.SupportsFloat | typing.SupportsIndex, arrival_cad: typing.SupportsFloat | typing.SupportsIndex, tail_cycles: typing.SupportsInt | typing.SupportsIndex, exceed_from: typing.SupportsInt | typing.SupportsIndex | None, exceed_above: collections.abc.Sequence[typing.SupportsFloat | typing.SupportsIndex]) -> dict:
+    """
+    Run a seeker on the bench without the GIL; behind mgdd.loop.run_seeker.
+    """
+@typing.overload
+def run_loop(bench: EngineBench, seeker: mgdd._core.optimize.BoundedSeeking, cycles: typing.SupportsInt | typing.SupportsIndex, *, optimum_cad: typing.SupportsFloat | typing.SupportsIndex, arrival_cad: typing.SupportsFloat | typing.SupportsIndex, tail_cycles: typing.SupportsInt | typing.SupportsIndex, exceed_from: typing.SupportsInt | typing.SupportsIndex | None, exceed_above: collections.abc.Sequence[typing.SupportsFloat | typing.SupportsIndex]) -> dict:
+    """
+    Run a seeker on the bench without the GIL; behind mgdd.loop.run_seeker.
+    """
+@typing.overload
+def run_loop(bench: EngineBench, seeker: mgdd._core.optimize.Spsa, cycles: typing.SupportsInt | typing.SupportsIndex, *, optimum_cad: typing.SupportsFloat | typing.SupportsIndex, arrival_cad: typing.SupportsFloat | typing.SupportsIndex, tail_cycles: typing.SupportsInt | typing.SupportsIndex, exceed_from: typing.SupportsInt | typing.SupportsIndex | None, exceed_above: collections.abc.Sequence[typing.SupportsFloat | typing.SupportsIndex]) -> dict:
+    """
+    Run a seeker on the bench without the GIL; behind mgdd.loop.run_seeker.
+    """
+@typing.overload
+def run_loop(bench: EngineBench, seeker: mgdd._core.optimize.GradientDescent, cycles: typing.SupportsInt | typing.SupportsIndex, *, optimum_cad: typing.SupportsFloat | typing.SupportsIndex, arrival_cad: typing.SupportsFloat | typing.SupportsIndex, tail_cycles: typing.SupportsInt | typing.SupportsIndex, exceed_from: typing.SupportsInt | typing.SupportsIndex | None, exceed_above: collections.abc.Sequence[typing.SupportsFloat | typing.SupportsIndex]) -> dict:
+    """
+    Run a seeker on the bench without the GIL; behind mgdd.loop.run_seeker.
+    """
+@typing.overload
+def run_loop(bench: EngineBench, seeker: mgdd._core.optimize.GoldenSection, cycles: typing.SupportsInt | typing.SupportsIndex, *, optimum_cad: typing.SupportsFloat | typing.SupportsIndex, arrival_cad: typing.SupportsFloat | typing.SupportsIndex, tail_cycles: typing.SupportsInt | typing.SupportsIndex, exceed_from: typing.SupportsInt | typing.SupportsIndex | None, exceed_above: collections.abc.Sequence[typing.SupportsFloat | typing.SupportsIndex]) -> dict:
+    """
+    Run a seeker on the bench without the GIL; behind mgdd.loop.run_seeker.
+    """

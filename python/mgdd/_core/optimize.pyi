@@ -1,0 +1,932 @@
+"""
+Fits, seekers and learners.
+"""
+from __future__ import annotations
+import collections.abc
+import numpy
+import numpy.typing
+import typing
+__all__: list[str] = ['BoundedSeeking', 'ComponentLag', 'ExtremumSeeking', 'FitReport', 'GoldenSection', 'GradientDescent', 'IterativeLearning', 'LeastSquaresOptions', 'Limit', 'NewtonSeeking', 'Parameter', 'Spsa', 'least_squares', 'tune']
+class Parameter:
+    """
+    One unknown of a fit: name, bounds, and whether it is searched as its log.
+    """
+    __hash__: typing.ClassVar[None] = None
+    def __eq__(self, arg0: Parameter) -> bool:
+        ...
+    def __getstate__(self) -> tuple:
+        ...
+    def __init__(self, *, name: str, lower: typing.SupportsFloat | typing.SupportsIndex = ..., upper: typing.SupportsFloat | typing.SupportsIndex = ..., log_scaled: bool = False) -> None:
+        ...
+    def __repr__(self) -> str:
+        ...
+    def __setstate__(self, arg0: tuple) -> None:
+        ...
+    @property
+    def log_scaled(self) -> bool:
+        """
+        Searched as log(p); needs lower > 0.
+        """
+    @property
+    def lower(self) -> float:
+        """
+        Lower bound, -inf for none.
+        """
+    @property
+    def name(self) -> str:
+        """
+        Name in reports and messages.
+        """
+    @property
+    def upper(self) -> float:
+        """
+        Upper bound, inf for none.
+        """
+class LeastSquaresOptions:
+    """
+    When a least-squares search ends and what it reports.
+    """
+    def __eq__(self, arg0: typing.Any) -> bool:
+        ...
+    def __getstate__(self) -> tuple[int, dict]:
+        ...
+    def __hash__(self) -> int:
+        ...
+    def __init__(self, *, max_iterations: typing.SupportsInt | typing.SupportsIndex = 200, cost_tolerance: typing.SupportsFloat | typing.SupportsIndex = 1e-12, step_tolerance: typing.SupportsFloat | typing.SupportsIndex = 1e-10, gradient_tolerance: typing.SupportsFloat | typing.SupportsIndex = 1e-12, initial_damping: typing.SupportsFloat | typing.SupportsIndex = 0.001, correlation_limit: typing.SupportsFloat | typing.SupportsIndex = 0.98, rank_tolerance: typing.SupportsFloat | typing.SupportsIndex = 1e-10, evaluate_together: bool = True) -> None:
+        ...
+    def __repr__(self) -> str:
+        ...
+    def __setstate__(self, arg0: tuple) -> None:
+        ...
+    def to_dict(self) -> dict:
+        """
+        Constructor keywords as a new dict.
+        """
+    @property
+    def correlation_limit(self) -> float:
+        """
+        Correlation beyond which two parameters count as unidentifiable [-].
+        """
+    @property
+    def cost_tolerance(self) -> float:
+        """
+        Relative decrease of the cost [-].
+        """
+    @property
+    def evaluate_together(self) -> bool:
+        """
+        Residual and Jacobian in one call.
+        """
+    @property
+    def gradient_tolerance(self) -> float:
+        """
+        Cosine between the residual and a free Jacobian column [-].
+        """
+    @property
+    def initial_damping(self) -> float:
+        """
+        Relative to unit columns [-].
+        """
+    @property
+    def max_iterations(self) -> int:
+        """
+        Trial steps.
+        """
+    @property
+    def rank_tolerance(self) -> float:
+        """
+        Singular value, relative to the largest, that counts as zero [-].
+        """
+    @property
+    def step_tolerance(self) -> float:
+        """
+        Step over parameters, scaled [-].
+        """
+class FitReport:
+    """
+    Result of a fit as the core gives it; `mgdd.optimize.FitReport` wraps it.
+    """
+    def __init__(self) -> None:
+        """
+        A fit that has not been run.
+        """
+    def __repr__(self) -> str:
+        ...
+    @property
+    def bounds_active(self) -> typing.Annotated[numpy.typing.NDArray[numpy.int32], "[m, 1]"]:
+        """
+        -1 lower, +1 upper, 0 free.
+        """
+    @property
+    def correlation(self) -> typing.Annotated[numpy.typing.NDArray[numpy.float64], "[m, n]"]:
+        """
+        Correlation of the estimates.
+        """
+    @property
+    def cost(self) -> float:
+        """
+        Half the sum of squares.
+        """
+    @property
+    def covariance(self) -> typing.Annotated[numpy.typing.NDArray[numpy.float64], "[m, n]"]:
+        """
+        Covariance of the estimates.
+        """
+    @property
+    def findings(self) -> list[str]:
+        """
+        Reasons behind `unidentifiable`.
+        """
+    @property
+    def history(self) -> dict:
+        """
+        Arrays cost, damping, step_norm, accepted per trial step.
+        """
+    @property
+    def iterations(self) -> int:
+        """
+        Trial steps.
+        """
+    @property
+    def lower(self) -> typing.Annotated[numpy.typing.NDArray[numpy.float64], "[m, 1]"]:
+        """
+        Lower bounds.
+        """
+    @property
+    def message(self) -> str:
+        """
+        The status as a sentence.
+        """
+    @property
+    def n_residuals(self) -> int:
+        """
+        Number of residuals.
+        """
+    @property
+    def names(self) -> list[str]:
+        """
+        Parameter names.
+        """
+    @property
+    def nfev(self) -> int:
+        """
+        Residual evaluations.
+        """
+    @property
+    def njev(self) -> int:
+        """
+        Jacobian evaluations.
+        """
+    @property
+    def null_directions(self) -> typing.Annotated[numpy.typing.NDArray[numpy.float64], "[m, n]"]:
+        """
+        Columns: parameter changes that leave the residual as it is.
+        """
+    @property
+    def residual(self) -> typing.Annotated[numpy.typing.NDArray[numpy.float64], "[m, 1]"]:
+        """
+        Residual at the estimates.
+        """
+    @property
+    def rmse(self) -> float:
+        """
+        Root mean square residual.
+        """
+    @property
+    def status(self) -> str:
+        """
+        Why the search ended.
+        """
+    @property
+    def stderr(self) -> typing.Annotated[numpy.typing.NDArray[numpy.float64], "[m, 1]"]:
+        """
+        Standard errors.
+        """
+    @property
+    def success(self) -> bool:
+        """
+        Whether a tolerance was met.
+        """
+    @property
+    def unidentifiable(self) -> list[str]:
+        """
+        Names the data leave open.
+        """
+    @property
+    def upper(self) -> typing.Annotated[numpy.typing.NDArray[numpy.float64], "[m, 1]"]:
+        """
+        Upper bounds.
+        """
+    @property
+    def values(self) -> typing.Annotated[numpy.typing.NDArray[numpy.float64], "[m, 1]"]:
+        """
+        Estimates.
+        """
+class Limit:
+    """
+    An upper limit on a measured quantity, kept by a seeker.
+    
+    Parameters
+    ----------
+    name : str
+        What is limited, for example ``p_max_bar``.
+    upper : float
+        The limit, in the unit of the quantity.
+    margin : float
+        Kept free below the limit, same unit.
+    method : {"switching", "penalty", "barrier"}
+        How J knows of the limit: not at all (the guard alone turns the steps), by a quadratic penalty on the excess, or
+        by a logarithmic barrier. The guard acts in all three.
+    weight : float
+        Penalty: J units per squared scaled excess; barrier: J units times the logarithm of the scaled room.
+    scale : float
+        Unit of the excess; 0 stands for the limit itself.
+    
+    Raises
+    ------
+    mgdd.errors.ParameterError
+        When a seeker is made with it: limit not finite, negative margin, weight not > 0.
+    
+    Examples
+    --------
+    >>> from mgdd.optimize import Limit
+    >>> Limit("p_max_bar", 95.0, margin=1.0)
+    Limit('p_max_bar', 95.0, margin=1.0, method='switching', weight=1.0, scale=0.0)
+    """
+    __hash__: typing.ClassVar[None] = None
+    def __eq__(self, arg0: Limit) -> bool:
+        ...
+    def __getstate__(self) -> tuple[str, float, float, str, float, float]:
+        ...
+    def __init__(self, name: str, upper: typing.SupportsFloat | typing.SupportsIndex, *, margin: typing.SupportsFloat | typing.SupportsIndex = 0.0, method: str = 'switching', weight: typing.SupportsFloat | typing.SupportsIndex = 1.0, scale: typing.SupportsFloat | typing.SupportsIndex = 0.0) -> None:
+        ...
+    def __repr__(self) -> str:
+        ...
+    def __setstate__(self, arg0: tuple) -> None:
+        ...
+    @property
+    def margin(self) -> float:
+        """
+        Kept free below the limit.
+        """
+    @property
+    def method(self) -> str:
+        """
+        How J knows of the limit.
+        """
+    @property
+    def name(self) -> str:
+        """
+        What is limited.
+        """
+    @property
+    def scale(self) -> float:
+        """
+        Unit of the excess.
+        """
+    @property
+    def upper(self) -> float:
+        """
+        The limit.
+        """
+    @property
+    def weight(self) -> float:
+        """
+        Of penalty or barrier.
+        """
+class ComponentLag:
+    """
+    What stands between the plant and one measured component of J.
+    
+    Parameters
+    ----------
+    delay_cycles : float
+        Transport delay [cycles].
+    lag_cycles : float
+        Time constant of the first-order lag y += (1 - exp(-1/tau)) (x - y) [cycles]; 0 for none.
+    
+    Raises
+    ------
+    mgdd.errors.ParameterError
+        A negative delay or lag.
+    
+    Examples
+    --------
+    >>> from mgdd.optimize import ComponentLag
+    >>> gain, phase_deg = ComponentLag(delay_cycles=42, lag_cycles=25).response(period=10)
+    >>> round(gain, 4), round(phase_deg % 360.0, 1)
+    (0.0646, 140.5)
+    """
+    __hash__: typing.ClassVar[None] = None
+    def __eq__(self, arg0: ComponentLag) -> bool:
+        ...
+    def __getstate__(self) -> tuple[float, float]:
+        ...
+    def __init__(self, *, delay_cycles: typing.SupportsFloat | typing.SupportsIndex = 0.0, lag_cycles: typing.SupportsFloat | typing.SupportsIndex = 0.0) -> None:
+        ...
+    def __repr__(self) -> str:
+        ...
+    def __setstate__(self, arg0: tuple) -> None:
+        ...
+    def response(self, *, period: typing.SupportsInt | typing.SupportsIndex, harmonic: typing.SupportsInt | typing.SupportsIndex = 1) -> tuple[float, float]:
+        """
+        Gain [-] and phase lag [deg] at `harmonic` oscillations per `period` cycles.
+        """
+    @property
+    def delay_cycles(self) -> float:
+        """
+        Transport delay [cycles].
+        """
+    @property
+    def lag_cycles(self) -> float:
+        """
+        Time constant of the lag [cycles].
+        """
+class ExtremumSeeking:
+    """
+    Extremum seeking; see mgdd.optimize.ExtremumSeeking.
+    """
+    def __init__(self, *, start: typing.Any, lower: typing.Any = ..., upper: typing.Any = ..., form: str = 'batch', amplitude: typing.Any = 1.0, period: typing.SupportsInt | typing.SupportsIndex = 10, harmonics: collections.abc.Sequence[typing.SupportsInt | typing.SupportsIndex] | None = None, gain: typing.Any = 0.98, rate: typing.Any = None, recovery_rate: typing.Any = None, washout_pole: typing.SupportsFloat | typing.SupportsIndex = 0.9, low_pass: typing.SupportsFloat | typing.SupportsIndex = 1.0, components: collections.abc.Sequence[ComponentLag] | None = None, hold_cycles: typing.SupportsInt | typing.SupportsIndex | None = None, amplitude_floor: typing.SupportsFloat | typing.SupportsIndex = 1.0, full_gradient: typing.SupportsFloat | typing.SupportsIndex = 0.0, limit_amplitude: typing.SupportsFloat | typing.SupportsIndex = 0.5, maximize: bool = True, limits: collections.abc.Sequence[Limit] = [], curvature: typing.SupportsFloat | typing.SupportsIndex | None = None) -> None:
+        ...
+    def _clear_history(self) -> None:
+        """
+        Forget the history, keep the state.
+        """
+    def _history_columns(self) -> dict:
+        """
+        Columns behind .history.
+        """
+    def _set_history_columns(self, columns: collections.abc.Mapping[str, typing.Annotated[numpy.typing.ArrayLike, numpy.float64]]) -> None:
+        """
+        Columns behind .history, as _history_columns gave them.
+        """
+    def ask(self) -> numpy.typing.NDArray[numpy.float64]:
+        """
+        The input to apply in this cycle, shape (inputs,). Asking again before tell gives the same.
+        """
+    def restart(self) -> None:
+        """
+        The operating point has changed: forget the window, keep the estimate.
+        """
+    def tell(self, J: typing.Any = None, limits: typing.Any = None, *, misfire: bool = False) -> None:
+        """
+        Accept what was measured at the input of the last ask.
+        
+        J: float, or one number per component; limits: one value per limit, in order or by name;
+        misfire: the cycle is counted and its numbers are not read.
+        Raises ParameterError (tell without ask), ShapeError (wrong count), DataError (not finite, or beyond
+        1e30 in magnitude); the state is unchanged then.
+        """
+    @property
+    def amplitude_share(self) -> float:
+        """
+        Amplitude now over that of the settings.
+        """
+    @property
+    def component_count(self) -> int:
+        """
+        Components of J that tell takes.
+        """
+    @property
+    def cycle(self) -> int:
+        """
+        Cycles told so far, misfires included.
+        """
+    @property
+    def estimate(self) -> numpy.typing.NDArray[numpy.float64]:
+        """
+        Present estimate of the optimum, shape (inputs,).
+        """
+    @property
+    def gradient(self) -> numpy.typing.NDArray[numpy.float64]:
+        """
+        Last estimate of the slope of the maximised objective, shape (inputs,).
+        """
+    @property
+    def limit_names(self) -> list[str]:
+        """
+        Names of the limits, in the order of tell.
+        """
+    @property
+    def misfires(self) -> int:
+        """
+        Misfired cycles told so far.
+        """
+    @property
+    def settings(self) -> dict:
+        """
+        Arguments that make this seeker again.
+        """
+    @property
+    def state(self) -> dict[str, list[float]]:
+        """
+        What the run needs to go on bit for bit: named lists of numbers, JSON-able. Setting it restores the run;
+        a state of another kind or size raises ParameterError and changes nothing.
+        """
+    @state.setter
+    def state(self, arg1: collections.abc.Mapping[str, collections.abc.Sequence[typing.SupportsFloat | typing.SupportsIndex]]) -> None:
+        ...
+class NewtonSeeking:
+    """
+    Newton extremum seeking; see mgdd.optimize.NewtonSeeking.
+    """
+    def __init__(self, *, start: typing.Any, lower: typing.Any = ..., upper: typing.Any = ..., amplitude: typing.Any = 2.0, period: typing.SupportsInt | typing.SupportsIndex = 10, harmonics: collections.abc.Sequence[typing.SupportsInt | typing.SupportsIndex] | None = None, time_constant_cycles: typing.SupportsFloat | typing.SupportsIndex = 40.0, hessian_rate: typing.SupportsFloat | typing.SupportsIndex = 0.03, riccati_rate: typing.SupportsFloat | typing.SupportsIndex = 0.02, initial_hessian: typing.Any = -0.051, initial_inverse: typing.Any = -20.0, largest_inverse: typing.SupportsFloat | typing.SupportsIndex = 100.0, hold_cycles: typing.SupportsInt | typing.SupportsIndex = 300, rate: typing.Any = None, components: collections.abc.Sequence[ComponentLag] | None = None, limit_amplitude: typing.SupportsFloat | typing.SupportsIndex = 0.5, maximize: bool = True, limits: collections.abc.Sequence[Limit] = []) -> None:
+        ...
+    def _clear_history(self) -> None:
+        """
+        Forget the history, keep the state.
+        """
+    def _history_columns(self) -> dict:
+        """
+        Columns behind .history.
+        """
+    def _set_history_columns(self, columns: collections.abc.Mapping[str, typing.Annotated[numpy.typing.ArrayLike, numpy.float64]]) -> None:
+        """
+        Columns behind .history, as _history_columns gave them.
+        """
+    def ask(self) -> numpy.typing.NDArray[numpy.float64]:
+        """
+        The input to apply in this cycle, shape (inputs,). Asking again before tell gives the same.
+        """
+    def restart(self) -> None:
+        """
+        The operating point has changed: forget the window, keep the estimate.
+        """
+    def tell(self, J: typing.Any = None, limits: typing.Any = None, *, misfire: bool = False) -> None:
+        """
+        Accept what was measured at the input of the last ask.
+        
+        J: float, or one number per component; limits: one value per limit, in order or by name;
+        misfire: the cycle is counted and its numbers are not read.
+        Raises ParameterError (tell without ask), ShapeError (wrong count), DataError (not finite, or beyond
+        1e30 in magnitude); the state is unchanged then.
+        """
+    @property
+    def component_count(self) -> int:
+        """
+        Components of J that tell takes.
+        """
+    @property
+    def cycle(self) -> int:
+        """
+        Cycles told so far, misfires included.
+        """
+    @property
+    def estimate(self) -> numpy.typing.NDArray[numpy.float64]:
+        """
+        Present estimate of the optimum, shape (inputs,).
+        """
+    @property
+    def gradient(self) -> numpy.typing.NDArray[numpy.float64]:
+        """
+        Last estimate of the slope of the maximised objective, shape (inputs,).
+        """
+    @property
+    def hessian(self) -> typing.Annotated[numpy.typing.NDArray[numpy.float64], "[m, n]"]:
+        """
+        Filtered Hessian of the maximised objective, shape (inputs, inputs).
+        """
+    @property
+    def inverse_hessian(self) -> typing.Annotated[numpy.typing.NDArray[numpy.float64], "[m, n]"]:
+        """
+        State of the Riccati filter, which tends to the inverse Hessian.
+        """
+    @property
+    def limit_names(self) -> list[str]:
+        """
+        Names of the limits, in the order of tell.
+        """
+    @property
+    def misfires(self) -> int:
+        """
+        Misfired cycles told so far.
+        """
+    @property
+    def settings(self) -> dict:
+        """
+        Arguments that make this seeker again.
+        """
+    @property
+    def state(self) -> dict[str, list[float]]:
+        """
+        What the run needs to go on bit for bit: named lists of numbers, JSON-able. Setting it restores the run;
+        a state of another kind or size raises ParameterError and changes nothing.
+        """
+    @state.setter
+    def state(self, arg1: collections.abc.Mapping[str, collections.abc.Sequence[typing.SupportsFloat | typing.SupportsIndex]]) -> None:
+        ...
+class BoundedSeeking:
+    """
+    Bounded extremum seeking; see mgdd.optimize.BoundedSeeking.
+    """
+    def __init__(self, *, start: typing.Any, lower: typing.Any = ..., upper: typing.Any = ..., amplitude: typing.Any = 1.0, period: typing.SupportsInt | typing.SupportsIndex = 10, harmonics: collections.abc.Sequence[typing.SupportsInt | typing.SupportsIndex] | None = None, kappa: typing.SupportsFloat | typing.SupportsIndex = 1.0, maximize: bool = True, limits: collections.abc.Sequence[Limit] = [], curvature: typing.SupportsFloat | typing.SupportsIndex | None = None) -> None:
+        ...
+    def _clear_history(self) -> None:
+        """
+        Forget the history, keep the state.
+        """
+    def _history_columns(self) -> dict:
+        """
+        Columns behind .history.
+        """
+    def _set_history_columns(self, columns: collections.abc.Mapping[str, typing.Annotated[numpy.typing.ArrayLike, numpy.float64]]) -> None:
+        """
+        Columns behind .history, as _history_columns gave them.
+        """
+    def ask(self) -> numpy.typing.NDArray[numpy.float64]:
+        """
+        The input to apply in this cycle, shape (inputs,). Asking again before tell gives the same.
+        """
+    def restart(self) -> None:
+        """
+        The operating point has changed: forget the window, keep the estimate.
+        """
+    def tell(self, J: typing.Any = None, limits: typing.Any = None, *, misfire: bool = False) -> None:
+        """
+        Accept what was measured at the input of the last ask.
+        
+        J: float, or one number per component; limits: one value per limit, in order or by name;
+        misfire: the cycle is counted and its numbers are not read.
+        Raises ParameterError (tell without ask), ShapeError (wrong count), DataError (not finite, or beyond
+        1e30 in magnitude); the state is unchanged then.
+        """
+    @property
+    def component_count(self) -> int:
+        """
+        Components of J that tell takes.
+        """
+    @property
+    def cycle(self) -> int:
+        """
+        Cycles told so far, misfires included.
+        """
+    @property
+    def estimate(self) -> numpy.typing.NDArray[numpy.float64]:
+        """
+        Present estimate of the optimum, shape (inputs,).
+        """
+    @property
+    def limit_names(self) -> list[str]:
+        """
+        Names of the limits, in the order of tell.
+        """
+    @property
+    def misfires(self) -> int:
+        """
+        Misfired cycles told so far.
+        """
+    @property
+    def settings(self) -> dict:
+        """
+        Arguments that make this seeker again.
+        """
+    @property
+    def state(self) -> dict[str, list[float]]:
+        """
+        What the run needs to go on bit for bit: named lists of numbers, JSON-able. Setting it restores the run;
+        a state of another kind or size raises ParameterError and changes nothing.
+        """
+    @state.setter
+    def state(self, arg1: collections.abc.Mapping[str, collections.abc.Sequence[typing.SupportsFloat | typing.SupportsIndex]]) -> None:
+        ...
+class Spsa:
+    """
+    Simultaneous perturbation; see mgdd.optimize.Spsa.
+    """
+    def __init__(self, *, start: typing.Any, lower: typing.Any = ..., upper: typing.Any = ..., form: str = 'first_order', schedule: str = 'decreasing', gain: typing.SupportsFloat | typing.SupportsIndex | None = None, stability: typing.SupportsFloat | typing.SupportsIndex = 50.0, gain_exponent: typing.SupportsFloat | typing.SupportsIndex = 0.602, perturbation: typing.SupportsFloat | typing.SupportsIndex = 1.5, perturbation_exponent: typing.SupportsFloat | typing.SupportsIndex = 0.101, step_max: typing.SupportsFloat | typing.SupportsIndex | None = None, averaging: typing.SupportsInt | typing.SupportsIndex = 1, blocking: bool = False, noise_sd: typing.SupportsFloat | typing.SupportsIndex = 0.0, initial_hessian: typing.SupportsFloat | typing.SupportsIndex = -0.051, hessian_prior: typing.SupportsFloat | typing.SupportsIndex = 20.0, limit_amplitude: typing.SupportsFloat | typing.SupportsIndex = 0.5, seed: typing.SupportsInt | typing.SupportsIndex = 0, maximize: bool = True, limits: collections.abc.Sequence[Limit] = [], curvature: typing.SupportsFloat | typing.SupportsIndex | None = None) -> None:
+        ...
+    def _clear_history(self) -> None:
+        """
+        Forget the history, keep the state.
+        """
+    def _history_columns(self) -> dict:
+        """
+        Columns behind .history.
+        """
+    def _set_history_columns(self, columns: collections.abc.Mapping[str, typing.Annotated[numpy.typing.ArrayLike, numpy.float64]]) -> None:
+        """
+        Columns behind .history, as _history_columns gave them.
+        """
+    def ask(self) -> numpy.typing.NDArray[numpy.float64]:
+        """
+        The input to apply in this cycle, shape (inputs,). Asking again before tell gives the same.
+        """
+    def restart(self) -> None:
+        """
+        The operating point has changed: forget the window, keep the estimate.
+        """
+    def tell(self, J: typing.Any = None, limits: typing.Any = None, *, misfire: bool = False) -> None:
+        """
+        Accept what was measured at the input of the last ask.
+        
+        J: float, or one number per component; limits: one value per limit, in order or by name;
+        misfire: the cycle is counted and its numbers are not read.
+        Raises ParameterError (tell without ask), ShapeError (wrong count), DataError (not finite, or beyond
+        1e30 in magnitude); the state is unchanged then.
+        """
+    @property
+    def blocked(self) -> int:
+        """
+        Steps that blocking refused.
+        """
+    @property
+    def component_count(self) -> int:
+        """
+        Components of J that tell takes.
+        """
+    @property
+    def cycle(self) -> int:
+        """
+        Cycles told so far, misfires included.
+        """
+    @property
+    def estimate(self) -> numpy.typing.NDArray[numpy.float64]:
+        """
+        Present estimate of the optimum, shape (inputs,).
+        """
+    @property
+    def gradient(self) -> numpy.typing.NDArray[numpy.float64]:
+        """
+        Last estimate of the slope of the maximised objective, shape (inputs,).
+        """
+    @property
+    def hessian(self) -> typing.Annotated[numpy.typing.NDArray[numpy.float64], "[m, n]"]:
+        """
+        Averaged Hessian of the second-order form, shape (inputs, inputs).
+        """
+    @property
+    def iteration(self) -> int:
+        """
+        Iterations since the start or restart.
+        """
+    @property
+    def limit_names(self) -> list[str]:
+        """
+        Names of the limits, in the order of tell.
+        """
+    @property
+    def measurements_per_iteration(self) -> int:
+        """
+        Cycles that one iteration takes.
+        """
+    @property
+    def misfires(self) -> int:
+        """
+        Misfired cycles told so far.
+        """
+    @property
+    def settings(self) -> dict:
+        """
+        Arguments that make this seeker again.
+        """
+    @property
+    def state(self) -> dict[str, list[float]]:
+        """
+        What the run needs to go on bit for bit: named lists of numbers, JSON-able. Setting it restores the run;
+        a state of another kind or size raises ParameterError and changes nothing.
+        """
+    @state.setter
+    def state(self, arg1: collections.abc.Mapping[str, collections.abc.Sequence[typing.SupportsFloat | typing.SupportsIndex]]) -> None:
+        ...
+class GradientDescent:
+    """
+    Two-sided differences; see mgdd.optimize.GradientDescent.
+    """
+    def __init__(self, *, start: typing.Any, lower: typing.Any = ..., upper: typing.Any = ..., step_size: typing.SupportsFloat | typing.SupportsIndex = 15.0, difference: typing.SupportsFloat | typing.SupportsIndex = 1.0, rate: typing.Any = None, tolerance: typing.SupportsFloat | typing.SupportsIndex = 0.02, iterations: typing.SupportsInt | typing.SupportsIndex = 60, maximize: bool = True, limits: collections.abc.Sequence[Limit] = [], curvature: typing.SupportsFloat | typing.SupportsIndex | None = None) -> None:
+        ...
+    def _clear_history(self) -> None:
+        """
+        Forget the history, keep the state.
+        """
+    def _history_columns(self) -> dict:
+        """
+        Columns behind .history.
+        """
+    def _set_history_columns(self, columns: collections.abc.Mapping[str, typing.Annotated[numpy.typing.ArrayLike, numpy.float64]]) -> None:
+        """
+        Columns behind .history, as _history_columns gave them.
+        """
+    def ask(self) -> numpy.typing.NDArray[numpy.float64]:
+        """
+        The input to apply in this cycle, shape (inputs,). Asking again before tell gives the same.
+        """
+    def restart(self) -> None:
+        """
+        The operating point has changed: forget the window, keep the estimate.
+        """
+    def tell(self, J: typing.Any = None, limits: typing.Any = None, *, misfire: bool = False) -> None:
+        """
+        Accept what was measured at the input of the last ask.
+        
+        J: float, or one number per component; limits: one value per limit, in order or by name;
+        misfire: the cycle is counted and its numbers are not read.
+        Raises ParameterError (tell without ask), ShapeError (wrong count), DataError (not finite, or beyond
+        1e30 in magnitude); the state is unchanged then.
+        """
+    @property
+    def component_count(self) -> int:
+        """
+        Components of J that tell takes.
+        """
+    @property
+    def converged_at(self) -> int | None:
+        """
+        Step at which the tolerance was met first, or None.
+        """
+    @property
+    def cycle(self) -> int:
+        """
+        Cycles told so far, misfires included.
+        """
+    @property
+    def estimate(self) -> numpy.typing.NDArray[numpy.float64]:
+        """
+        Present estimate of the optimum, shape (inputs,).
+        """
+    @property
+    def gradient(self) -> numpy.typing.NDArray[numpy.float64]:
+        """
+        Last estimate of the slope of the maximised objective, shape (inputs,).
+        """
+    @property
+    def iteration(self) -> int:
+        """
+        Steps made.
+        """
+    @property
+    def limit_names(self) -> list[str]:
+        """
+        Names of the limits, in the order of tell.
+        """
+    @property
+    def misfires(self) -> int:
+        """
+        Misfired cycles told so far.
+        """
+    @property
+    def settings(self) -> dict:
+        """
+        Arguments that make this seeker again.
+        """
+    @property
+    def state(self) -> dict[str, list[float]]:
+        """
+        What the run needs to go on bit for bit: named lists of numbers, JSON-able. Setting it restores the run;
+        a state of another kind or size raises ParameterError and changes nothing.
+        """
+    @state.setter
+    def state(self, arg1: collections.abc.Mapping[str, collections.abc.Sequence[typing.SupportsFloat | typing.SupportsIndex]]) -> None:
+        ...
+class GoldenSection:
+    """
+    Golden-section search; see mgdd.optimize.GoldenSection.
+    """
+    def __init__(self, *, start: typing.Any, lower: typing.Any, upper: typing.Any, noise_sd: typing.SupportsFloat | typing.SupportsIndex = 0.0, significance: typing.SupportsFloat | typing.SupportsIndex = 2.0, samples_max: typing.SupportsInt | typing.SupportsIndex = 8, tolerance: typing.SupportsFloat | typing.SupportsIndex = 0.02, maximize: bool = True, limits: collections.abc.Sequence[Limit] = []) -> None:
+        ...
+    def _clear_history(self) -> None:
+        """
+        Forget the history, keep the state.
+        """
+    def _history_columns(self) -> dict:
+        """
+        Columns behind .history.
+        """
+    def _set_history_columns(self, columns: collections.abc.Mapping[str, typing.Annotated[numpy.typing.ArrayLike, numpy.float64]]) -> None:
+        """
+        Columns behind .history, as _history_columns gave them.
+        """
+    def ask(self) -> numpy.typing.NDArray[numpy.float64]:
+        """
+        The input to apply in this cycle, shape (inputs,). Asking again before tell gives the same.
+        """
+    def restart(self) -> None:
+        """
+        The operating point has changed: forget the window, keep the estimate.
+        """
+    def tell(self, J: typing.Any = None, limits: typing.Any = None, *, misfire: bool = False) -> None:
+        """
+        Accept what was measured at the input of the last ask.
+        
+        J: float, or one number per component; limits: one value per limit, in order or by name;
+        misfire: the cycle is counted and its numbers are not read.
+        Raises ParameterError (tell without ask), ShapeError (wrong count), DataError (not finite, or beyond
+        1e30 in magnitude); the state is unchanged then.
+        """
+    @property
+    def bracket(self) -> tuple[float, float]:
+        """
+        Present bracket, lower and upper end.
+        """
+    @property
+    def component_count(self) -> int:
+        """
+        Components of J that tell takes.
+        """
+    @property
+    def converged(self) -> bool:
+        """
+        Whether the bracket is as small as tolerance or noise allow.
+        """
+    @property
+    def cycle(self) -> int:
+        """
+        Cycles told so far, misfires included.
+        """
+    @property
+    def estimate(self) -> numpy.typing.NDArray[numpy.float64]:
+        """
+        Present estimate of the optimum, shape (inputs,).
+        """
+    @property
+    def limit_names(self) -> list[str]:
+        """
+        Names of the limits, in the order of tell.
+        """
+    @property
+    def misfires(self) -> int:
+        """
+        Misfired cycles told so far.
+        """
+    @property
+    def settings(self) -> dict:
+        """
+        Arguments that make this seeker again.
+        """
+    @property
+    def state(self) -> dict[str, list[float]]:
+        """
+        What the run needs to go on bit for bit: named lists of numbers, JSON-able. Setting it restores the run;
+        a state of another kind or size raises ParameterError and changes nothing.
+        """
+    @state.setter
+    def state(self, arg1: collections.abc.Mapping[str, collections.abc.Sequence[typing.SupportsFloat | typing.SupportsIndex]]) -> None:
+        ...
+class IterativeLearning:
+    """
+    Iterative learning control, ask and tell.
+    """
+    def __init__(self, initial: typing.Annotated[numpy.typing.ArrayLike, numpy.float64], *, law: str, impulse_response: typing.Annotated[numpy.typing.ArrayLike, numpy.float64], relative_degree: typing.SupportsInt | typing.SupportsIndex | None = None, k_p: typing.SupportsFloat | typing.SupportsIndex | None = None, k_d: typing.SupportsFloat | typing.SupportsIndex | None = None, learning_function: typing.Annotated[numpy.typing.ArrayLike, numpy.float64], lead: typing.SupportsInt | typing.SupportsIndex | None = None, cutoff: typing.SupportsFloat | typing.SupportsIndex | None = None, error_weight: typing.SupportsFloat | typing.SupportsIndex | None = None, input_weight: typing.SupportsFloat | typing.SupportsIndex | None = None, change_weight: typing.SupportsFloat | typing.SupportsIndex | None = None, lower: typing.SupportsFloat | typing.SupportsIndex = ..., upper: typing.SupportsFloat | typing.SupportsIndex = ..., rate: typing.SupportsFloat | typing.SupportsIndex = ..., guard: bool = True) -> None:
+        ...
+    def ask(self) -> numpy.typing.NDArray[numpy.float64]:
+        """
+        Input of this trial.
+        """
+    def convergence(self) -> dict:
+        """
+        Findings of the linear theory, by name. Releases the GIL.
+        """
+    def restore(self, state: collections.abc.Mapping[str, collections.abc.Sequence[typing.SupportsFloat | typing.SupportsIndex]]) -> None:
+        """
+        Go on from the columns of `state`.
+        """
+    def state(self) -> dict[str, list[float]]:
+        """
+        Columns by name.
+        """
+    def tell(self, error: typing.Annotated[numpy.typing.ArrayLike, numpy.float64]) -> None:
+        """
+        Error of this trial; makes the next input. Releases the GIL.
+        """
+    @property
+    def best_input(self) -> numpy.typing.NDArray[numpy.float64]:
+        """
+        Its input.
+        """
+    @property
+    def best_norm(self) -> float:
+        """
+        Its error norm.
+        """
+    @property
+    def best_trial(self) -> int:
+        """
+        Trial of the least error norm.
+        """
+    @property
+    def error_norms(self) -> numpy.typing.NDArray[numpy.float64]:
+        """
+        Error norms of the latest trials.
+        """
+    @property
+    def frozen(self) -> bool:
+        """
+        Whether the guard stopped learning.
+        """
+    @property
+    def relative_degree(self) -> int:
+        """
+        Samples until an input acts.
+        """
+    @property
+    def trial(self) -> int:
+        """
+        Number of the trial to come.
+        """
+def least_squares(fun: collections.abc.Callable, x0: typing.Annotated[numpy.typing.ArrayLike, numpy.float64, "[m, 1]"], *, parameters: collections.abc.Sequence[Parameter], options: LeastSquaresOptions) -> FitReport:
+    """
+    Minimise sum(residual^2) / 2 for `fun(x) -> (residual, jacobian)`; None refuses a point.
+    """
+def tune(*, noise_sd: typing.SupportsFloat | typing.SupportsIndex, curvature: typing.SupportsFloat | typing.SupportsIndex, method: str, delay_cycles: typing.SupportsFloat | typing.SupportsIndex, lag_cycles: typing.SupportsFloat | typing.SupportsIndex, compensated: bool, rms: typing.SupportsFloat | typing.SupportsIndex | None, cycles: typing.SupportsFloat | typing.SupportsIndex | None, distance: typing.SupportsFloat | typing.SupportsIndex | None, arrival: typing.SupportsFloat | typing.SupportsIndex | None, amplitude_max: typing.SupportsFloat | typing.SupportsIndex | None) -> dict:
+    """
+    Behind mgdd.optimize.tune.
+    """
