@@ -72,7 +72,8 @@ void raise_interrupted(const std::string& kept, const py::object& partial) {
 
 std::vector<double> to_column(const InputArray& array, std::string_view name) {
   if (array.ndim() != 1) {
-    throw ShapeError(std::string(name) + " has " + std::to_string(array.ndim()) + " dimensions: must be one column");
+    throw about(name, ShapeError(std::string(name) + " has " + std::to_string(array.ndim()) +
+                                 " dimensions: must be one column"));
   }
   return {array.data(), array.data() + array.size()};
 }

@@ -48,7 +48,7 @@ void unknown_field(const char* owner, const py::handle& key, const py::dict& kno
   const py::object close = py::module_::import("difflib").attr("get_close_matches")(key, known.attr("keys")(), 1);
   std::string hint = "one of " + std::string(py::str(py::str(", ").attr("join")(known.attr("keys")())));
   if (py::len(close) > 0) hint = "did you mean '" + close[py::int_(0)].cast<std::string>() + "'?";
-  throw ParameterError(std::string(owner) + " has no field '" + std::string(py::str(key)) + "': " + hint);
+  throw about(owner, ParameterError(std::string(owner) + " has no field '" + std::string(py::str(key)) + "': " + hint));
 }
 
 }  // namespace mgdd::bindings

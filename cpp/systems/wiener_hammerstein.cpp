@@ -75,8 +75,8 @@ Basis basis_at(const WienerHammerstein& model, double x) noexcept {
 
 void check_length(const WienerHammerstein& model, const Eigen::VectorXd& parameters) {
   if (parameters.size() != model.n_parameters()) {
-    throw ShapeError("parameters has " + std::to_string(parameters.size()) + " values: must have " +
-                     std::to_string(model.n_parameters()));
+    throw about("parameters", ShapeError("parameters has " + std::to_string(parameters.size()) + " values: must have " +
+                                         std::to_string(model.n_parameters())));
   }
 }
 
@@ -87,7 +87,7 @@ Eigen::VectorXd filter_series(const Eigen::VectorXd& b, const Eigen::VectorXd& a
   if (a.size() < 1 || b.size() < 1 || a.size() > limit || b.size() > limit) {
     throw ShapeError("a, b: must have 1 to " + std::to_string(limit) + " values");
   }
-  if (a[0] != 1.0) throw ParameterError("a[0] = " + text(a[0]) + ": must be 1");
+  if (a[0] != 1.0) throw ParameterError("a[0]", a[0], "must be 1");
   Eigen::VectorXd y(u.size());
   run_filter(b, a, u, y);
   return y;
@@ -166,7 +166,7 @@ template <class T>
 WienerHammersteinModel<T>::WienerHammersteinModel(const WienerHammerstein& model, const Eigen::VectorXd& parameters) {
   model.validate();
   check_length(model, parameters);
-  if (!parameters.allFinite()) throw ParameterError("parameters: must be finite numbers");
+  if (!parameters.allFinite()) throw about("parameters", ParameterError("parameters: must be finite numbers"));
   const auto take = [&](Eigen::Index from, int order, Coefficients& b, Coefficients& a) {
     Filter filter;
     unpack(parameters, from, order, filter);
@@ -195,8 +195,8 @@ WienerHammersteinResidual::WienerHammersteinResidual(const WienerHammerstein& mo
   if (output_.size() != input_.size()) throw ShapeError("input and output differ in length");
   if (!input_.allFinite() || !output_.allFinite()) throw ParameterError("input, output: must be finite numbers");
   if (skip_ < 0 || input_.size() - skip_ <= model_.n_parameters()) {
-    throw ShapeError("skip = " + std::to_string(skip_) + ": must leave more samples than the " +
-                     std::to_string(model_.n_parameters()) + " parameters");
+    throw ShapeError("skip", skip_,
+                     "must leave more samples than the " + std::to_string(model_.n_parameters()) + " parameters");
   }
   for (Eigen::VectorXd* v : {&between_, &curved_, &slope_, &all_pole_, &work_, &work_out_, &model_out_})
     v->resize(input_.size());

@@ -155,7 +155,7 @@ void bind_cycle(py::module_& m) {
       [](const Cylinder& c, const InputArray& angle, double soc, double duration) {
         validate(c);
         if (!(duration > 0.0)) {
-          throw ParameterError("burn_duration_cad = " + std::to_string(duration) + " °CA: must be > 0");
+          throw ParameterError("burn_duration_cad", duration, "must be > 0", "°CA");
         }
         const Burn<double> burn(c.burn, soc, duration);
         return elementwise([&burn](double a) { return burn.fraction(a); }, angle);

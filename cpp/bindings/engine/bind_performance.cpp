@@ -37,7 +37,8 @@ PerformanceSignals signals_of(const Performance& p, const py::dict& given) {
   for (const PerformanceTerm& term : p.terms()) {
     const py::str name = as_str(to_string(term.signal));
     if (!given.contains(name)) {
-      throw ParameterError("signals lack '" + std::string(name) + "': a term of the performance uses it");
+      throw about("signals",
+                  ParameterError("signals lack '" + std::string(name) + "': a term of the performance uses it"));
     }
     signals[term.signal] = as_number(name, given[name]);
   }

@@ -29,7 +29,8 @@ std::pair<std::vector<double>, std::vector<double>> columns(const InputArray& du
   auto u = to_column(duty, "duty");
   auto y = to_column(angle, "angle_deg");
   if (u.size() != y.size()) {
-    throw ShapeError("duty has " + std::to_string(u.size()) + " samples: angle_deg has " + std::to_string(y.size()));
+    throw about("duty", ShapeError("duty has " + std::to_string(u.size()) + " samples: angle_deg has " +
+                                   std::to_string(y.size())));
   }
   return {std::move(u), std::move(y)};
 }

@@ -69,7 +69,8 @@ template <class... S>
 optimize::Seeker seeker_of(const py::handle& object, const std::variant<S...>*) {
   std::vector<optimize::Seeker> found;
   if ((take<S>(object, found) || ...)) return found.front();
-  throw ParameterError("seekers: " + std::string(py::repr(object)) + " is not a seeker of mgdd.optimize");
+  throw about("seekers",
+              ParameterError("seekers: " + std::string(py::repr(object)) + " is not a seeker of mgdd.optimize"));
 }
 
 py::dict to_dict(const MonteCarloResult& result) {

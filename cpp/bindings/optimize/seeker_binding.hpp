@@ -49,8 +49,8 @@ inline optimize::Inputs inputs_from(const py::object& value, std::string_view na
   }
   const std::vector<double> column = numbers_from(value, name);
   if (column.size() > optimize::max_inputs) {
-    throw ShapeError(std::string(name) + " has " + std::to_string(column.size()) + " entries: at most " +
-                     std::to_string(optimize::max_inputs) + " inputs are possible");
+    throw about(name, ShapeError(std::string(name) + " has " + std::to_string(column.size()) + " entries: at most " +
+                                 std::to_string(optimize::max_inputs) + " inputs are possible"));
   }
   if (column.size() == 1 && inputs > 1) return optimize::Inputs::Constant(inputs, column[0]);
   return Eigen::Map<const Eigen::VectorXd>(column.data(), static_cast<Eigen::Index>(column.size()));
@@ -97,7 +97,7 @@ struct ReadingBuffer {
 template <class S>
 optimize::Reading reading_from(const S& seeker, const py::object& j, const py::object& limits, bool misfire,
                                ReadingBuffer& buffer) {
-  if (j.is_none() && !misfire) throw ShapeError("J is missing: tell what was measured, or misfire=True");
+  if (j.is_none() && !misfire) throw about("J", ShapeError("J is missing: tell what was measured, or misfire=True"));
   if (!j.is_none()) {
     if (py::isinstance<py::float_>(j) || py::isinstance<py::int_>(j)) {
       buffer.components.assign(1, as_number(py::str("J"), j));
@@ -108,12 +108,13 @@ optimize::Reading reading_from(const S& seeker, const py::object& j, const py::o
   if (py::isinstance<py::dict>(limits)) {
     const auto by_name = py::reinterpret_borrow<py::dict>(limits);
     if (by_name.size() > seeker.settings().limits.size()) {
-      throw ShapeError("limits has " + std::to_string(by_name.size()) + " names: the settings have " +
-                       std::to_string(seeker.settings().limits.size()));
+      throw about("limits", ShapeError("limits has " + std::to_string(by_name.size()) + " names: the settings have " +
+                                       std::to_string(seeker.settings().limits.size())));
     }
     for (const optimize::Limit& limit : seeker.settings().limits) {
       if (!by_name.contains(limit.name)) {
-        throw ShapeError("limits: '" + limit.name + "' is missing: tell one value for every limit of the settings");
+        throw about("limits", ShapeError("limits: '" + limit.name +
+                                         "' is missing: tell one value for every limit of the settings"));
       }
       buffer.limits.push_back(as_number(py::str(limit.name), by_name[limit.name.c_str()]));
     }

@@ -45,12 +45,12 @@ std::vector<double> run_ahead(const BoundModel& self, const std::vector<double>&
                               std::size_t horizon, const ObserverGains& gains) {
   gains.validate();
   if (duty.size() != angle.size()) {
-    throw ShapeError("duty has " + std::to_string(duty.size()) + " samples: angle_deg has " +
-                     std::to_string(angle.size()));
+    throw about("duty", ShapeError("duty has " + std::to_string(duty.size()) + " samples: angle_deg has " +
+                                   std::to_string(angle.size())));
   }
   if (horizon < 1 || horizon >= duty.size()) {
-    throw ParameterError("horizon = " + std::to_string(horizon) + ": must be in [1, " +
-                         std::to_string(duty.size() - 1) + "], below the samples of the log");
+    throw ParameterError("horizon", horizon,
+                         "must be in [1, " + std::to_string(duty.size() - 1) + "], below the samples of the log");
   }
   std::vector<double> out(duty.size() - horizon);
   std::visit(
@@ -142,7 +142,7 @@ void bind_pseudo_wiener(py::module_& m) {
           "slopes",
           [](const BoundModel& s, const InputArray& duty, double start_deg, double speed_deg_per_s) {
             const auto column = to_column(duty, "duty");
-            if (column.empty()) throw ShapeError("duty is empty: a horizon needs at least one sample");
+            if (column.empty()) throw about("duty", ShapeError("duty is empty: a horizon needs at least one sample"));
             const auto [angle, slope] = without_gil([&] { return run_slopes(s, column, start_deg, speed_deg_per_s); });
             return py::make_tuple(to_array(angle), slope);
           },

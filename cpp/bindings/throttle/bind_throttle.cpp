@@ -58,7 +58,7 @@ struct Inputs {
         supply_column(to_column(supply, "supply_v")),
         air_column(to_column(air, "airflow_torque_nm")),
         bridge(parse_name(bridge_names(), "bridge", bridge_name)) {
-    if (duty_column.empty()) throw ShapeError("duty has no samples");
+    if (duty_column.empty()) throw about("duty", ShapeError("duty has no samples"));
     validate({duty_column, supply_column, air_column, bridge});  // whole columns: `part` cuts what is checked
   }
   ThrottleSignals part(std::size_t from, std::size_t count) const {
@@ -118,8 +118,8 @@ py::array_t<double> simulate_lanes(const std::vector<Throttle>& throttles, const
   const std::size_t steps = steps_per_sample(sample_s, step_s);
   const std::vector<double> starts = to_column(start_deg, "start_deg");
   if (starts.size() != throttles.size()) {
-    throw ShapeError("start_deg has " + std::to_string(starts.size()) + " entries, there are " +
-                     std::to_string(throttles.size()) + " throttles");
+    throw about("start_deg", ShapeError("start_deg has " + std::to_string(starts.size()) + " entries, there are " +
+                                        std::to_string(throttles.size()) + " throttles"));
   }
   std::vector<ThrottleCase> cases;
   for (std::size_t i = 0; i < throttles.size(); ++i) {

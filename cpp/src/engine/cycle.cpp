@@ -19,7 +19,8 @@ template <class T>
 CycleModel<T>::CycleModel(const BasicCylinder<T>& cylinder, std::vector<double> angles_cad, Integrator integrator)
     : cylinder_(cylinder), geometry_(cylinder.geometry), integrator_(integrator), angles_(std::move(angles_cad)) {
   const std::size_t n = angles_.size();
-  if (n < 3) throw ShapeError("angles_cad has " + std::to_string(n) + " entries: a cycle needs at least 3");
+  if (n < 3)
+    throw about("angles_cad", ShapeError("angles_cad has " + std::to_string(n) + " entries: a cycle needs at least 3"));
   for (std::size_t k = 1; k < n; ++k) {
     if (!(angles_[k] > angles_[k - 1])) {
       throw DataError("angles_cad[" + std::to_string(k) + "] = " + std::to_string(angles_[k]) +

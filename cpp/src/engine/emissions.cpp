@@ -66,18 +66,20 @@ NoxFit fit_nox_proxy(std::span<const double> t_max_k, std::span<const double> no
                      double reference_temperature_k) {
   const std::size_t n = t_max_k.size();
   if (nox_ppm.size() != n) {
-    throw ShapeError("nox_ppm has " + std::to_string(nox_ppm.size()) + " entries: t_max_k has " + std::to_string(n));
+    throw about("nox_ppm", ShapeError("nox_ppm has " + std::to_string(nox_ppm.size()) + " entries: t_max_k has " +
+                                      std::to_string(n)));
   }
   require_positive("reference_temperature_k", reference_temperature_k, "K");
   if (n < fewest_points) {
-    throw DataError("t_max_k has " + std::to_string(n) + " points: a fit needs at least " +
-                    std::to_string(fewest_points));
+    throw about("t_max_k", DataError("t_max_k has " + std::to_string(n) + " points: a fit needs at least " +
+                                     std::to_string(fewest_points)));
   }
   require_positive_column("t_max_k", t_max_k);
   require_positive_column("nox_ppm", nox_ppm);
   const auto [coldest, hottest] = std::minmax_element(t_max_k.begin(), t_max_k.end());
   if (!(*hottest - *coldest > 1e-6 * *hottest)) {
-    throw DataError("t_max_k is " + text(*coldest) + " at every point: a slope needs temperatures that differ");
+    throw about("t_max_k",
+                DataError("t_max_k is " + text(*coldest) + " at every point: a slope needs temperatures that differ"));
   }
 
   // ln NOx = a + b x, with x = (T - T0)/T0^2 or 1/T0 - 1/T: the slope is the activation temperature in both.
@@ -97,8 +99,8 @@ NoxFit fit_nox_proxy(std::span<const double> t_max_k, std::span<const double> no
   }
   const double slope = xy / xx;
   if (!(slope > 0.0)) {
-    throw DataError("nox_ppm does not rise with t_max_k (activation temperature " + text(slope) +
-                    " K): check the order of the points and that oxygen, fuel and boost stood still");
+    throw about("nox_ppm", DataError("nox_ppm does not rise with t_max_k (activation temperature " + text(slope) +
+                                     " K): check the order of the points and that oxygen, fuel and boost stood still"));
   }
   double squares = 0.0;
   for (std::size_t i = 0; i < n; ++i) {

@@ -35,11 +35,11 @@ static_assert(std::size(signal_units) == performance_signal_count);
 void validate(const PerformanceTerm& term, std::size_t index) {
   const std::string owner = "terms[" + std::to_string(index) + "].";
   if (static_cast<std::size_t>(term.signal) >= performance_signal_count) {
-    throw ParameterError(owner + "signal = " + std::to_string(static_cast<int>(term.signal)) + ": is not a signal");
+    throw ParameterError(owner + "signal", static_cast<int>(term.signal), "is not a signal");
   }
   const std::string_view unit = unit_of(term.signal);
   if (!std::isfinite(term.weight)) {
-    throw ParameterError(owner + "weight = " + text(term.weight) + ": must be finite");
+    throw ParameterError(owner + "weight", term.weight, "must be finite");
   }
   require_positive(owner + "reference", term.reference, unit);
   if (term.above) require_positive(owner + "above", *term.above, unit);
@@ -67,8 +67,8 @@ Performance::Performance() noexcept = default;
 
 Performance::Performance(std::span<const PerformanceTerm> terms) : count_(terms.size()) {
   if (terms.empty() || terms.size() > max_terms) {
-    throw ParameterError("terms has " + std::to_string(terms.size()) + " entries: must be 1 to " +
-                         std::to_string(max_terms));
+    throw about("terms", ParameterError("terms has " + std::to_string(terms.size()) + " entries: must be 1 to " +
+                                        std::to_string(max_terms)));
   }
   for (std::size_t i = 0; i < terms.size(); ++i)
     validate(terms[i], i);

@@ -145,8 +145,7 @@ std::vector<ConvergenceEstimate> convergence(const Cylinder& cylinder, const Ope
                                              double step_cad, Integrator integrator) {
   validate_cycle(cylinder, point, soc_cad);
   if (!(step_cad >= 4.0 * step_lower_cad)) {
-    throw ParameterError("step_cad = " + std::to_string(step_cad) +
-                         " °CA: the estimate also runs a quarter of it, so it must be >= 0.004");
+    throw ParameterError("step_cad", step_cad, "the estimate also runs a quarter of it, so it must be >= 0.004", "°CA");
   }
   const Indicators<double> coarse = simulate_indicators(cylinder, point, soc_cad, step_cad, integrator);
   const Indicators<double> middle = simulate_indicators(cylinder, point, soc_cad, step_cad / 2, integrator);

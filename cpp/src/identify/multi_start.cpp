@@ -15,8 +15,8 @@ std::vector<Eigen::VectorXd> spread_starts(const std::vector<optimize::Parameter
   for (Eigen::Index j = 0; j < cube.cols(); ++j) {
     const optimize::Parameter& p = parameters[static_cast<std::size_t>(j)];
     if (!std::isfinite(p.lower) || !std::isfinite(p.upper)) {
-      throw ParameterError(p.name + ": a Latin hypercube needs finite bounds, has [" + text(p.lower) + ", " +
-                           text(p.upper) + "]");
+      throw about(p.name, ParameterError(p.name + ": a Latin hypercube needs finite bounds, has [" + text(p.lower) +
+                                         ", " + text(p.upper) + "]"));
     }
     const double lower = p.log_scaled ? std::log(p.lower) : p.lower;
     const double upper = p.log_scaled ? std::log(p.upper) : p.upper;

@@ -45,34 +45,29 @@ void check_member(const std::string& owner, Check check) {
 }
 
 void validate_schedule(const BenchSettings& s) {
-  if (s.schedule.empty()) throw ParameterError("schedule is empty: must have an operating point for cycle 0");
+  if (s.schedule.empty())
+    throw about("schedule", ParameterError("schedule is empty: must have an operating point for cycle 0"));
   if (s.schedule.front().cycle != 0) {
-    throw ParameterError("schedule[0].cycle = " + std::to_string(s.schedule.front().cycle) + ": must be 0");
+    throw ParameterError("schedule[0].cycle", s.schedule.front().cycle, "must be 0");
   }
   const std::array<double, 2> window = timing_window(s.cylinder);
   for (std::size_t i = 0; i < s.schedule.size(); ++i) {
     const ScheduledPoint& now = s.schedule[i];
     const std::string owner = "schedule[" + std::to_string(i) + "]";
     if (i > 0 && now.cycle <= s.schedule[i - 1].cycle) {
-      throw ParameterError(std::string(owner)
-                               .append(".cycle = ")
-                               .append(std::to_string(now.cycle))
-                               .append(": must be > ")
-                               .append(std::to_string(s.schedule[i - 1].cycle)));
+      throw ParameterError(owner + ".cycle", now.cycle, "must be > " + std::to_string(s.schedule[i - 1].cycle));
     }
     check_member(owner, [&] { engine::validate_cycle(s.cylinder, now.point, window[1]); });
     if (!(now.point.fuel_mg > 0.0)) {
-      const std::string given = text(now.point.fuel_mg);
-      throw ParameterError(
-          std::string(owner).append(".fuel_mg = ").append(given).append(" mg: must be > 0, a bench fires"));
+      throw ParameterError(owner + ".fuel_mg", now.point.fuel_mg, "must be > 0, a bench fires", "mg");
     }
   }
 }
 
 void validate_limits(const BenchSettings& s) {
   if (s.limits.size() > max_limits) {
-    throw ParameterError("limits has " + std::to_string(s.limits.size()) + " entries: must be at most " +
-                         std::to_string(max_limits));
+    throw about("limits", ParameterError("limits has " + std::to_string(s.limits.size()) +
+                                         " entries: must be at most " + std::to_string(max_limits)));
   }
   constexpr auto fields = engine::indicator_fields<double>();
   std::string known(cov_imep_name);
@@ -122,7 +117,8 @@ void validate(const BenchSettings& s) {
   validate("fast_sensor", s.fast_sensor);
   if (s.nox_sensor == NoxSensor::none && !s.delay_whole_objective &&
       s.performance.uses(engine::PerformanceSignal::nox_ppm)) {
-    throw ParameterError("nox_sensor = 'none': the performance uses nox_ppm, name the sensor that measures it");
+    throw about("nox_sensor",
+                ParameterError("nox_sensor = 'none': the performance uses nox_ppm, name the sensor that measures it"));
   }
   validate_limits(s);
 }

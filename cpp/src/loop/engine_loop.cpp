@@ -16,16 +16,16 @@ constexpr std::int64_t longest_settling = 1000;  // cycles that do not count for
 void require_match(const EngineBench& bench, const optimize::Inputs& estimate, std::size_t components,
                    const std::vector<optimize::Limit>& limits) {
   if (estimate.size() != 1) {
-    throw ParameterError("start has " + std::to_string(estimate.size()) +
-                         " entries: the bench takes one input, soc_cad");
+    throw about("start", ParameterError("start has " + std::to_string(estimate.size()) +
+                                        " entries: the bench takes one input, soc_cad"));
   }
   const auto [earliest, latest] = bench.window_cad();
   require_within("estimate of the seeker", estimate[0], earliest, latest, "°CA aTDC");
   const std::size_t terms = bench.settings().performance.size();
   if (components != 1 && components != terms) {
-    throw ParameterError("components has " + std::to_string(components) +
-                         " entries: the performance of the bench has " + std::to_string(terms) +
-                         " terms; give as many, or one for their sum");
+    throw about("components", ParameterError("components has " + std::to_string(components) +
+                                             " entries: the performance of the bench has " + std::to_string(terms) +
+                                             " terms; give as many, or one for their sum"));
   }
   std::vector<std::string> names;
   for (const optimize::Limit& limit : limits)
@@ -54,7 +54,8 @@ void validate(const LoopCriteria& c, std::int64_t cycles) {
                          "must be < cycles = " + std::to_string(cycles) + ", or no cycle counts");
   }
   for (const double value : c.exceed_above) {
-    if (std::isnan(value)) throw ParameterError("exceed_above holds NaN: give a number, or leave the limit out");
+    if (std::isnan(value))
+      throw about("exceed_above", ParameterError("exceed_above holds NaN: give a number, or leave the limit out"));
   }
 }
 

@@ -15,11 +15,11 @@ void check(const MonteCarloPlan& plan) {
   for (const auto& [name, empty] :
        {std::pair{"benches", plan.benches.empty()}, std::pair{"seekers", plan.seekers.empty()},
         std::pair{"seeds", plan.seeds.empty()}}) {
-    if (empty) throw ParameterError(std::string(name) + " is empty: give at least one");
+    if (empty) throw about(name, ParameterError(std::string(name) + " is empty: give at least one"));
   }
   if (plan.criteria.size() != plan.benches.size()) {
-    throw ShapeError("criteria has " + std::to_string(plan.criteria.size()) + " entries: one per bench, " +
-                     std::to_string(plan.benches.size()));
+    throw about("criteria", ShapeError("criteria has " + std::to_string(plan.criteria.size()) +
+                                       " entries: one per bench, " + std::to_string(plan.benches.size())));
   }
   if (plan.cycles < 1) throw ParameterError("cycles", plan.cycles, "must be >= 1");
   if (plan.threads < 0) throw ParameterError("threads", plan.threads, "must be >= 0 (0: all)");

@@ -10,10 +10,10 @@ namespace mgdd {
 
 ZeroPhaseLowPass::ZeroPhaseLowPass(std::size_t samples, double cutoff) {
   if (samples < 1) {
-    throw ParameterError("samples = 0: must be >= 1");
+    throw about("samples", ParameterError("samples = 0: must be >= 1"));
   }
   if (!(cutoff >= least_cutoff && cutoff <= largest_cutoff)) {
-    throw ParameterError("cutoff = " + text(cutoff) + ": must be in [0.01, 0.99] of Nyquist");
+    throw ParameterError("cutoff", cutoff, "must be in [0.01, 0.99] of Nyquist");
   }
   // Bilinear transform of the analogue filter, its cutoff prewarped.
   const double k = std::tan(0.5 * std::numbers::pi * cutoff);

@@ -27,13 +27,13 @@ static_assert(sizeof(PlantCoefficients<Wide>) == count * sizeof(Wide));
 void check_column(std::string_view name, std::span<const double> column, std::size_t n, bool may_be_empty) {
   if (may_be_empty && column.empty()) return;
   if (column.size() != n) {
-    throw ShapeError(std::string(name) + " has " + std::to_string(column.size()) + " samples, duty has " +
-                     std::to_string(n));
+    throw about(name, ShapeError(std::string(name) + " has " + std::to_string(column.size()) + " samples, duty has " +
+                                 std::to_string(n)));
   }
   for (std::size_t k = 0; k < n; ++k) {
     if (!std::isfinite(column[k])) {
-      throw DataError(std::string(name) + " is " + text(column[k]) + " at sample " + std::to_string(k) +
-                      ": must be finite");
+      throw about(name, DataError(std::string(name) + " is " + text(column[k]) + " at sample " + std::to_string(k) +
+                                  ": must be finite"));
     }
   }
 }
@@ -86,8 +86,8 @@ std::size_t steps_per_sample(double sample_s, double step_s) {
   const double ratio = sample_s / step_s;
   const double whole = std::round(ratio);
   if (!(whole >= 1.0 && whole <= 1e9 && std::abs(ratio - whole) <= 1e-9 * whole)) {
-    throw ParameterError("step_s = " + text(step_s) + " s: must go a whole number of times into the sample time of " +
-                         text(sample_s) + " s");
+    throw ParameterError("step_s", step_s,
+                         "must go a whole number of times into the sample time of " + text(sample_s) + " s", "s");
   }
   return static_cast<std::size_t>(whole);
 }
@@ -99,12 +99,12 @@ void validate(const ThrottleSignals& signals) {
   check_column("airflow_torque_nm", signals.airflow_torque_nm, n, true);
   for (std::size_t k = 0; k < n; ++k) {
     if (!(std::abs(signals.duty[k]) <= 1.0)) {
-      throw DataError("duty = " + text(signals.duty[k]) + " at sample " + std::to_string(k) +
-                      ": must be in [-1, 1]; a duty in percent is divided by 100");
+      throw about("duty", DataError("duty = " + text(signals.duty[k]) + " at sample " + std::to_string(k) +
+                                    ": must be in [-1, 1]; a duty in percent is divided by 100"));
     }
     if (!signals.supply_v.empty() && !(signals.supply_v[k] >= 0.0)) {
-      throw DataError("supply_v = " + text(signals.supply_v[k]) + " V at sample " + std::to_string(k) +
-                      ": must be >= 0");
+      throw about("supply_v", DataError("supply_v = " + text(signals.supply_v[k]) + " V at sample " +
+                                        std::to_string(k) + ": must be >= 0"));
     }
   }
 }

@@ -17,8 +17,8 @@ using units::rad_per_deg;
 
 void require_finite(std::span<const double> state, double duty) {
   for (const double number : state)
-    if (!std::isfinite(number)) throw DataError("state holds a value that is not finite");
-  if (!std::isfinite(duty)) throw DataError("duty is not finite");
+    if (!std::isfinite(number)) throw about("state", DataError("state holds a value that is not finite"));
+  if (!std::isfinite(duty)) throw about("duty", DataError("duty is not finite"));
 }
 
 ThrottleStepper::Numbers outside(const ThrottleState& s) {
@@ -45,8 +45,8 @@ typename M::State state_of(const std::vector<double>& numbers) {
   typename M::State s;
   const auto places = M::numbers(s);
   if (numbers.size() != places.size()) {
-    throw ShapeError("state has " + std::to_string(numbers.size()) + " values: must have " +
-                     std::to_string(places.size()));
+    throw about("state", ShapeError("state has " + std::to_string(numbers.size()) + " values: must have " +
+                                    std::to_string(places.size())));
   }
   for (std::size_t i = 0; i < places.size(); ++i)
     *places[i] = numbers[i];

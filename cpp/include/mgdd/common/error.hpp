@@ -83,6 +83,13 @@ struct RigError : Error {
   using Error::Error;
 };
 
+/// A refusal whose message has a form of its own, with the field it is about: `duty has 3 samples, angle_deg has 4`.
+template <std::derived_from<Error> E>
+[[nodiscard]] E about(std::string_view field, E error) {
+  error.field = field;
+  return error;
+}
+
 /// The same refusal with words in front of its message: `cycle 7: J = inf: must be finite`.
 template <std::derived_from<Error> E>
 [[nodiscard]] E in_context(std::string_view words, const E& inner) {

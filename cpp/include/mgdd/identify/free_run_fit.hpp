@@ -44,8 +44,8 @@ FreeRunFit fit_free_run(const Model& model, const std::vector<double>& base, con
                         std::vector<SimulationRecord> records, const optimize::LeastSquaresOptions& options) {
   Values<double, Model::n_parameters> parameters{};
   if (base.size() != parameters.size()) {
-    throw ShapeError("base has " + std::to_string(base.size()) + " values: must have " +
-                     std::to_string(parameters.size()));
+    throw about("base", ShapeError("base has " + std::to_string(base.size()) + " values: must have " +
+                                   std::to_string(parameters.size())));
   }
   for (std::size_t i = 0; i < parameters.size(); ++i) {
     const FieldInfo& domain = Model::parameters[i];
@@ -61,7 +61,7 @@ FreeRunFit fit_free_run(const Model& model, const std::vector<double>& base, con
   }
   for (std::size_t r = 0; r < records.size(); ++r) {
     for (const std::size_t s : records[r].free_start) {
-      if (s >= Model::start_numbers.size()) throw ShapeError("free_start: no such state");
+      if (s >= Model::start_numbers.size()) throw about("free_start", ShapeError("free_start: no such state"));
       const FieldInfo& state = Model::start_numbers[s];
       const std::string suffix = records.size() > 1 ? "_" + std::to_string(r) : "";
       unknowns.push_back(optimize::parameter_of(state, "start_" + std::string(state.name) + suffix));

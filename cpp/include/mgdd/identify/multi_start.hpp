@@ -38,7 +38,7 @@ MultiStartFit rank(std::vector<optimize::FitReport> reports);
 /// the first start that fails comes back.
 template <class Fit>
 MultiStartFit multi_start(const std::vector<Eigen::VectorXd>& starts, Fit&& fit, std::size_t n_threads = 1) {
-  if (starts.empty()) throw ShapeError("starts: must be at least one");
+  if (starts.empty()) throw about("starts", ShapeError("starts: must be at least one"));
   std::vector<optimize::FitReport> reports(starts.size());
   parallel_for(starts.size(), n_threads,
                [&](std::size_t i, std::size_t, StopRequest&) { reports[i] = fit(starts[i]); });
@@ -60,10 +60,10 @@ optimize::FitReport fit_in_stages(const Model& model, const std::vector<optimize
                                   const std::vector<SimulationRecord>& records, const std::vector<FitStage>& stages,
                                   Values<double, Model::n_parameters>& values) {
   if (parameters.size() != values.size()) {
-    throw ShapeError("parameters has " + std::to_string(parameters.size()) + " entries: must have " +
-                     std::to_string(values.size()));
+    throw about("parameters", ShapeError("parameters has " + std::to_string(parameters.size()) +
+                                         " entries: must have " + std::to_string(values.size())));
   }
-  if (stages.empty()) throw ShapeError("stages: must be at least one");
+  if (stages.empty()) throw about("stages", ShapeError("stages: must be at least one"));
   optimize::FitReport report;
   for (const FitStage& stage : stages) {
     std::vector<SimulationRecord> chosen;

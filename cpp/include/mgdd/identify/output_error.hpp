@@ -220,8 +220,7 @@ class OutputError {
       check_size(name + "start", record.start.size(), static_cast<std::size_t>(Family::n_start));
       if (!record.weight.empty()) check_size(name + "weight", record.weight.size(), n);
       if (record.skip >= n) {
-        throw ShapeError(name + "skip = " + std::to_string(record.skip) + ": must be below the " + std::to_string(n) +
-                         " samples");
+        throw in_context(name, ShapeError("skip", record.skip, "must be below the " + std::to_string(n) + " samples"));
       }
       check_indices(name + "free_start", record.free_start, static_cast<std::size_t>(Family::n_start));
       require_positive(name + "dt_s", record.dt_s);

@@ -61,7 +61,7 @@ double net_heat_j(double gamma, double p0, double v0, double p1, double v1) {
 
 void check_options(const TraceOptions& o) {
   const auto refuse = [](const char* name, double value, const char* bound) {
-    throw ParameterError(std::string(name) + " = " + text(value) + ": must be " + bound);
+    throw ParameterError(name, value, std::string("must be ") + bound);
   };
   if (!(o.pegging_exponent > 1.0 && o.pegging_exponent < 1.7)) {
     refuse("pegging_exponent", o.pegging_exponent, "in (1, 1.7)");

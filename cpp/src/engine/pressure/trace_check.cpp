@@ -21,28 +21,32 @@ std::string sample(const char* name, std::size_t k, double value) {
 
 void check_trace(const std::vector<double>& angle, const std::vector<double>& pressure) {
   if (angle.size() != pressure.size()) {
-    throw ShapeError("crank_angle_cad has " + std::to_string(angle.size()) + " entries and pressure_bar " +
-                     std::to_string(pressure.size()) + ": they must be equally long");
+    throw about("crank_angle_cad",
+                ShapeError("crank_angle_cad has " + std::to_string(angle.size()) + " entries and pressure_bar " +
+                           std::to_string(pressure.size()) + ": they must be equally long"));
   }
   if (angle.size() < 20) {
     throw DataError("the trace has " + std::to_string(angle.size()) + " samples: at least 20 are needed");
   }
   for (std::size_t k = 0; k < angle.size(); ++k) {
-    if (!std::isfinite(angle[k])) throw DataError(sample("crank_angle_cad", k, angle[k]) + ": must be finite");
+    if (!std::isfinite(angle[k]))
+      throw about("crank_angle_cad", DataError(sample("crank_angle_cad", k, angle[k]) + ": must be finite"));
     if (!std::isfinite(pressure[k])) {
-      throw DataError(sample("pressure_bar", k, pressure[k]) + " at " + text(angle[k]) +
-                      " °CA aTDC: must be finite; drop or repair the sample");
+      throw about("pressure_bar", DataError(sample("pressure_bar", k, pressure[k]) + " at " + text(angle[k]) +
+                                            " °CA aTDC: must be finite; drop or repair the sample"));
     }
   }
   std::vector<double> steps(angle.size() - 1);
   for (std::size_t k = 0; k + 1 < angle.size(); ++k) {
     steps[k] = angle[k + 1] - angle[k];
     if (steps[k] == 0.0) {
-      throw DataError(sample("crank_angle_cad", k + 1, angle[k + 1]) + ": repeated; keep one sample per angle");
+      throw about("crank_angle_cad",
+                  DataError(sample("crank_angle_cad", k + 1, angle[k + 1]) + ": repeated; keep one sample per angle"));
     }
     if (steps[k] < 0.0) {
-      throw DataError(sample("crank_angle_cad", k + 1, angle[k + 1]) + " after " + text(angle[k]) +
-                      ": angles must increase; sort the trace or cut it to one cycle");
+      throw about("crank_angle_cad",
+                  DataError(sample("crank_angle_cad", k + 1, angle[k + 1]) + " after " + text(angle[k]) +
+                            ": angles must increase; sort the trace or cut it to one cycle"));
     }
   }
   std::vector<double> sorted = steps;
@@ -58,8 +62,9 @@ void check_trace(const std::vector<double>& angle, const std::vector<double>& pr
   const double highest = *std::max_element(pressure.begin(), pressure.end());
   if (highest > highest_bar) {
     const char* unit = highest > 1e5 ? "Pa" : "kPa";
-    throw DataError("pressure_bar reaches " + text(highest) + " bar, above " + text(highest_bar) +
-                    ": this looks like " + unit + "; convert it or say pressure_unit='" + unit + "'");
+    throw about("pressure_bar",
+                DataError("pressure_bar reaches " + text(highest) + " bar, above " + text(highest_bar) +
+                          ": this looks like " + unit + "; convert it or say pressure_unit='" + unit + "'"));
   }
 }
 

@@ -34,7 +34,7 @@ Free resolve(const std::vector<std::string>& names) {
   for (std::size_t i = 0; i < names.size(); ++i) {
     if (std::find(names.begin(), names.begin() + static_cast<std::ptrdiff_t>(i), names[i]) !=
         names.begin() + static_cast<std::ptrdiff_t>(i)) {
-      throw ParameterError("free: '" + names[i] + "' is named twice");
+      throw about("free", ParameterError("free: '" + names[i] + "' is named twice"));
     }
     bool found = false;
     const auto loads = load_fields<double>();
@@ -49,10 +49,11 @@ Free resolve(const std::vector<std::string>& names) {
     std::string valid;
     for (const std::string& n : load_parameters())
       valid.append(valid.empty() ? "" : ", ").append(n);
-    throw ParameterError("free: '" + names[i] + "' is not a parameter of a calibration; per load: " + valid +
-                         "; for all loads: any field of the cylinder except ivc_cad and evo_cad");
+    throw about("free",
+                ParameterError("free: '" + names[i] + "' is not a parameter of a calibration; per load: " + valid +
+                               "; for all loads: any field of the cylinder except ivc_cad and evo_cad"));
   }
-  if (names.empty()) throw ParameterError("free is empty: name at least one parameter");
+  if (names.empty()) throw about("free", ParameterError("free is empty: name at least one parameter"));
   return free;
 }
 
@@ -78,10 +79,10 @@ std::vector<optimize::Parameter> describe(const Free& free, const std::vector<Me
 void check_inputs(const std::vector<MeasuredCycle>& traces, const engine::Cylinder& cylinder,
                   const std::vector<LoadBurn>& start, const CylinderFitOptions& options) {
   engine::validate(cylinder);
-  if (traces.empty()) throw ShapeError("traces is empty: a calibration needs at least one");
+  if (traces.empty()) throw about("traces", ShapeError("traces is empty: a calibration needs at least one"));
   if (start.size() != traces.size()) {
-    throw ShapeError("start has " + std::to_string(start.size()) + " entries for " + std::to_string(traces.size()) +
-                     " traces");
+    throw about("start", ShapeError("start has " + std::to_string(start.size()) + " entries for " +
+                                    std::to_string(traces.size()) + " traces"));
   }
   require_within("step_cad", options.step_cad, engine::step_lower_cad, engine::step_upper_cad, "°CA");
   for (std::size_t t = 0; t < start.size(); ++t) {

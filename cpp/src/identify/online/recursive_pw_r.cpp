@@ -55,7 +55,7 @@ void RecursivePwRSettings::validate() const {
   require_positive("noise_deg", noise_deg, "deg");
   require_within("error_gate", error_gate, 0.0, 100.0);
   if (std::ranges::none_of(free, [](bool f) { return f; })) {
-    throw ParameterError("free holds no true: name at least one of tau, G, beta, kappa, delta");
+    throw about("free", ParameterError("free holds no true: name at least one of tau, G, beta, kappa, delta"));
   }
 }
 

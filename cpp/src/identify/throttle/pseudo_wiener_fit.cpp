@@ -48,7 +48,7 @@ std::vector<PseudoWienerUnknown> unknowns(const PwR&, const PseudoWienerFitOptio
     std::size_t at = 0;
     while (at < numbers_per_side && rows[at].name.substr(above_prefix.size()) != name)
       ++at;
-    if (at == numbers_per_side) throw ParameterError("free: '" + name + "' is not a parameter of pw_r");
+    if (at == numbers_per_side) throw about("free", ParameterError("free: '" + name + "' is not a parameter of pw_r"));
     const std::size_t below = at + numbers_per_side;
     if (o.sides == Sides::shared) {
       out.push_back({parameter_of(rows[at], name), {at, below}});
@@ -72,8 +72,8 @@ std::vector<PseudoWienerUnknown> by_name(PseudoWienerKind kind, std::size_t n_de
   for (const std::string& name : o.free) {
     const auto found = std::ranges::find(rows, name, &FieldInfo::name);
     if (found == rows.end()) {
-      throw ParameterError("free: '" + name + "' is not a parameter of " +
-                           std::string(name_of(throttle::pseudo_wiener_names(), kind)));
+      throw about("free", ParameterError("free: '" + name + "' is not a parameter of " +
+                                         std::string(name_of(throttle::pseudo_wiener_names(), kind))));
     }
     out.push_back({parameter_of(*found, name), {static_cast<std::size_t>(found - rows.begin())}});
   }
@@ -310,7 +310,7 @@ PseudoWienerFit fit(const std::vector<ThrottleRecord>& records, const P& base, c
 }
 
 void check(const std::vector<ThrottleRecord>& records) {
-  if (records.empty()) throw ShapeError("records is empty: a fit needs at least one log");
+  if (records.empty()) throw about("records", ShapeError("records is empty: a fit needs at least one log"));
   for (std::size_t i = 0; i < records.size(); ++i) {
     const ThrottleRecord& r = records[i];
     const std::string name = "records[" + std::to_string(i) + "]";
@@ -338,7 +338,7 @@ Names<Sides> sides_names() noexcept {
 void PseudoWienerFitOptions::validate() const {
   require_within("starts", starts, 1.0, 10000.0);
   require_positive("same_cost", same_cost);
-  if (delays.empty()) throw ParameterError("delays is empty: name at least one, 0 for none");
+  if (delays.empty()) throw about("delays", ParameterError("delays is empty: name at least one, 0 for none"));
   for (const double delay : delays)
     require_within("delays", delay, 0.0, throttle::max_delay_samples, "samples");
   search.validate();

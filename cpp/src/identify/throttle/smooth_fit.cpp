@@ -95,15 +95,15 @@ void validate(const SmoothPlant& plant, const SmoothThrottleRecord& record, cons
   require_positive("supply_v", plant.supply_v);
   require_positive("dt_s", record.dt_s);
   if (record.duty.size() != record.angle_deg.size() || record.duty.size() < 20) {
-    throw ShapeError("duty has " + std::to_string(record.duty.size()) + " samples, angle_deg " +
-                     std::to_string(record.angle_deg.size()) + ": must be equal and at least 20");
+    throw about("duty", ShapeError("duty has " + std::to_string(record.duty.size()) + " samples, angle_deg " +
+                                   std::to_string(record.angle_deg.size()) + ": must be equal and at least 20"));
   }
   const auto finite = [](double v) { return std::isfinite(v); };
   if (!std::ranges::all_of(record.duty, finite) || !std::ranges::all_of(record.angle_deg, finite) ||
       !std::ranges::all_of(record.start, finite)) {
     throw DataError("duty, angle_deg, start: must be finite numbers");
   }
-  if (starts.empty()) throw ShapeError("starts: must be at least one");
+  if (starts.empty()) throw about("starts", ShapeError("starts: must be at least one"));
   for (std::size_t i = 0; i < 10; ++i) {
     const std::string name(SmoothPlant::parameter_names[i]);
     require_positive("lower " + name, options.lower[i]);
@@ -111,7 +111,7 @@ void validate(const SmoothPlant& plant, const SmoothThrottleRecord& record, cons
     for (const Set& start : starts)
       require_within("start " + name, start[i], options.lower[i], options.upper[i]);
   }
-  if (options.stages.empty()) throw ShapeError("stages: must be at least one");
+  if (options.stages.empty()) throw about("stages", ShapeError("stages: must be at least one"));
   for (const SmoothThrottleStage& stage : options.stages) {
     require_within("fraction", stage.fraction, 1e-6, 1.0);
     require_positive("cost_tolerance", stage.cost_tolerance);

@@ -217,7 +217,7 @@ std::string describe(const ConvergenceReport& r) {
 
 ConvergenceReport convergence(const LearningUpdate& law) {
   if (law.response().size() == 0) {
-    throw ParameterError("impulse_response is missing: the convergence test needs a model");
+    throw about("impulse_response", ParameterError("impulse_response is missing: the convergence test needs a model"));
   }
   ConvergenceReport report;
   if (law.is_norm_optimal()) {

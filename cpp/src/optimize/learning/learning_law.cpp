@@ -28,21 +28,21 @@ constexpr double least_condition = 1e-13;  // of G^T We G + Wu + Wd: below, its 
 void require_finite(const std::vector<double>& column, const char* name) {
   for (std::size_t i = 0; i < column.size(); ++i) {
     if (!std::isfinite(column[i])) {
-      throw ParameterError(std::string(name) + "[" + std::to_string(i) + "] = " + text(column[i]) + ": must be finite");
+      throw ParameterError(std::string(name) + "[" + std::to_string(i) + "]", column[i], "must be finite");
     }
   }
 }
 
 void require_finite(std::optional<double> value, const char* name) {
   if (value && !std::isfinite(*value)) {
-    throw ParameterError(std::string(name) + " = " + text(*value) + ": must be finite");
+    throw ParameterError(name, *value, "must be finite");
   }
 }
 
 void require_unused(bool given, const char* name, LearningLaw law) {
   if (given) {
-    throw ParameterError(std::string(name) + " does nothing for law '" + std::string(to_string(law)) +
-                         "': leave it out, or choose another law");
+    throw about(name, ParameterError(std::string(name) + " does nothing for law '" + std::string(to_string(law)) +
+                                     "': leave it out, or choose another law"));
   }
 }
 
@@ -58,32 +58,32 @@ void check_use(const LearningSettings& s) {
   require_unused(s.input_weight && !optimal, "input_weight", s.law);
   require_unused(s.change_weight && !optimal, "change_weight", s.law);
   if (s.k_p && !s.learning_function.empty()) {
-    throw ParameterError("k_p = " + text(*s.k_p) + ": give k_p or learning_function, not both");
+    throw ParameterError("k_p", *s.k_p, "give k_p or learning_function, not both");
   }
   if (s.lead && s.learning_function.empty()) {
-    throw ParameterError("lead = " + std::to_string(*s.lead) + ": needs a learning_function");
+    throw ParameterError("lead", *s.lead, "needs a learning_function");
   }
 }
 
 void check_input(const LearningSettings& s) {
   if (s.initial.empty()) {
-    throw ShapeError("initial is empty: give the input of trial 0, one value per sample");
+    throw about("initial", ShapeError("initial is empty: give the input of trial 0, one value per sample"));
   }
   require_finite(s.initial, "initial");
   if (!(s.lower < s.upper)) {
-    throw ParameterError("lower = " + text(s.lower) + ": must be < upper = " + text(s.upper));
+    throw ParameterError("lower", s.lower, "must be < upper = " + text(s.upper));
   }
   if (!(s.rate > 0.0)) {
-    throw ParameterError("rate = " + text(s.rate) + ": must be > 0, the largest change from sample to sample");
+    throw ParameterError("rate", s.rate, "must be > 0, the largest change from sample to sample");
   }
   for (std::size_t i = 0; i < s.initial.size(); ++i) {
     const double value = s.initial[i];
     const std::string name = "initial[" + std::to_string(i) + "] = " + text(value);
     if (value < s.lower || value > s.upper) {
-      throw ParameterError(name + ": must be in [" + text(s.lower) + ", " + text(s.upper) + "]");
+      throw about(name, ParameterError(name + ": must be in [" + text(s.lower) + ", " + text(s.upper) + "]"));
     }
     if (i > 0 && std::abs(value - s.initial[i - 1]) > s.rate * (1.0 + 1e-12)) {
-      throw ParameterError(name + ": differs from the sample before by more than rate = " + text(s.rate));
+      throw about(name, ParameterError(name + ": differs from the sample before by more than rate = " + text(s.rate)));
     }
   }
 }
@@ -123,8 +123,9 @@ void LearningUpdate::resolve_model(const LearningSettings& s) {
   const std::vector<double>& h = s.impulse_response;
   require_finite(h, "impulse_response");
   if (s.relative_degree && !(*s.relative_degree >= 0 && static_cast<std::size_t>(*s.relative_degree) < samples)) {
-    throw ParameterError("relative_degree = " + std::to_string(*s.relative_degree) + ": must be in 0.." +
-                         std::to_string(samples - 1) + " for trials of " + std::to_string(samples) + " samples");
+    throw ParameterError(
+        "relative_degree", *s.relative_degree,
+        "must be in 0.." + std::to_string(samples - 1) + " for trials of " + std::to_string(samples) + " samples");
   }
   m_ = static_cast<std::size_t>(s.relative_degree.value_or(0));
   if (!h.empty()) {
@@ -137,20 +138,22 @@ void LearningUpdate::resolve_model(const LearningSettings& s) {
       ++first;
     }
     if (first >= h.size() || first >= samples) {
-      throw ParameterError("impulse_response is zero over the " + std::to_string(samples) +
-                           " samples of a trial: the input would never act");
+      throw about("impulse_response", ParameterError("impulse_response is zero over the " + std::to_string(samples) +
+                                                     " samples of a trial: the input would never act"));
     }
     if (s.relative_degree && m_ != first) {
-      throw ParameterError("relative_degree = " + std::to_string(m_) + ": impulse_response first acts after " +
-                           std::to_string(first) + " samples");
+      throw ParameterError("relative_degree", m_,
+                           "impulse_response first acts after " + std::to_string(first) + " samples");
     }
     m_ = first;
   }
   n_ = samples - m_;
   if (!h.empty()) {
     if (n_ > lifted_ceiling) {
-      throw ParameterError("initial has " + std::to_string(samples) + " samples: with an impulse_response at most " +
-                           std::to_string(lifted_ceiling) + ", because matrices of that size are built");
+      throw about(
+          "initial",
+          ParameterError("initial has " + std::to_string(samples) + " samples: with an impulse_response at most " +
+                         std::to_string(lifted_ceiling) + ", because matrices of that size are built"));
     }
     h_ = Eigen::VectorXd::Zero(static_cast<Eigen::Index>(n_));
     for (std::size_t k = 0; k < n_ && m_ + k < h.size(); ++k) {
@@ -165,7 +168,8 @@ void LearningUpdate::resolve_gains(const LearningSettings& s) {
   require_finite(s.learning_function, "learning_function");
   const auto gain = [&](std::optional<double> given, const char* name) {
     if (!given && h_.size() == 0) {
-      throw ParameterError(std::string(name) + " is missing: give it, or impulse_response for the default 0.5 / h_m");
+      throw about(name, ParameterError(std::string(name) +
+                                       " is missing: give it, or impulse_response for the default 0.5 / h_m"));
     }
     return given ? *given : default_gain / h_[0];
   };
@@ -174,7 +178,7 @@ void LearningUpdate::resolve_gains(const LearningSettings& s) {
     taps_ = {k_d, -k_d};
   } else if (s.law == LearningLaw::pd) {
     if (!s.k_d) {
-      throw ParameterError("k_d is missing: law 'pd' needs it");
+      throw about("k_d", ParameterError("k_d is missing: law 'pd' needs it"));
     }
     const double k_p = gain(s.k_p, "k_p");
     taps_ = {*s.k_d, k_p - *s.k_d};
@@ -183,7 +187,7 @@ void LearningUpdate::resolve_gains(const LearningSettings& s) {
     taps_ = s.learning_function;
     const int lead = s.lead.value_or(0);
     if (!(lead >= 0 && static_cast<std::size_t>(lead) < n_)) {
-      throw ParameterError("lead = " + std::to_string(lead) + ": must be in 0.." + std::to_string(n_ - 1));
+      throw ParameterError("lead", lead, "must be in 0.." + std::to_string(n_ - 1));
     }
     lead_ = static_cast<std::size_t>(lead);
   } else {
@@ -195,7 +199,7 @@ void LearningUpdate::resolve_gains(const LearningSettings& s) {
 
 void LearningUpdate::resolve_weights(const LearningSettings& s) {
   if (h_.size() == 0) {
-    throw ParameterError("impulse_response is missing: law 'norm_optimal' needs a model");
+    throw about("impulse_response", ParameterError("impulse_response is missing: law 'norm_optimal' needs a model"));
   }
   norm_optimal_ = true;
   const Eigen::MatrixXd g = toeplitz(h_);
@@ -209,19 +213,19 @@ void LearningUpdate::resolve_weights(const LearningSettings& s) {
     change_weight_ = default_change * solver.eigenvalues().maxCoeff();
   }
   if (!(error_weight_ > 0.0 && std::isfinite(error_weight_))) {
-    throw ParameterError("error_weight = " + text(error_weight_) + ": must be > 0 and finite");
+    throw ParameterError("error_weight", error_weight_, "must be > 0 and finite");
   }
   for (const auto& [name, value] : {std::pair{"input_weight", input_weight_}, {"change_weight", change_weight_}}) {
     if (!(value >= 0.0 && std::isfinite(value))) {
-      throw ParameterError(std::string(name) + " = " + text(value) + ": must be >= 0 and finite");
+      throw ParameterError(name, value, "must be >= 0 and finite");
     }
   }
   Eigen::MatrixXd normal = error_weight_ * square;
   normal.diagonal().array() += input_weight_ + change_weight_;
   factor_.compute(normal);
   if (factor_.info() != Eigen::Success || !(factor_.rcond() > least_condition)) {
-    throw ParameterError("change_weight = " + text(change_weight_) +
-                         ": too small for this impulse_response, some inputs hardly act: enlarge it");
+    throw ParameterError("change_weight", change_weight_,
+                         "too small for this impulse_response, some inputs hardly act: enlarge it");
   }
   work_.resize(h_.size());
 }

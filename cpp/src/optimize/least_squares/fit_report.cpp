@@ -65,9 +65,10 @@ void check_shapes(const FitReport& report, const Eigen::MatrixXd& triangle, cons
   const auto n = static_cast<Eigen::Index>(report.names.size());
   if (triangle.cols() != n || triangle.rows() < n || column_scale.size() != n || report.values.size() != n ||
       report.bounds_active.size() != n) {
-    throw ShapeError("describe_uncertainty: triangle is " + std::to_string(triangle.rows()) + " x " +
-                     std::to_string(triangle.cols()) + " and column_scale has " + std::to_string(column_scale.size()) +
-                     " values for " + std::to_string(n) + " parameters");
+    throw about("describe_uncertainty",
+                ShapeError("describe_uncertainty: triangle is " + std::to_string(triangle.rows()) + " x " +
+                           std::to_string(triangle.cols()) + " and column_scale has " +
+                           std::to_string(column_scale.size()) + " values for " + std::to_string(n) + " parameters"));
   }
 }
 

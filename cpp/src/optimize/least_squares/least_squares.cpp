@@ -46,8 +46,7 @@ LeastSquares::LeastSquares(std::vector<Parameter> parameters, Eigen::Index n_res
   options_.validate();
   validate(parameters_);
   if (n_residuals_ < n_) {
-    throw ShapeError("n_residuals = " + std::to_string(n_residuals_) + ": must be >= the " + std::to_string(n_) +
-                     " parameters");
+    throw ShapeError("n_residuals", n_residuals_, "must be >= the " + std::to_string(n_) + " parameters");
   }
   lower_.resize(n_);
   upper_.resize(n_);

@@ -46,7 +46,7 @@ void LeastSquaresOptions::validate() const {
 
 void validate(const std::vector<Parameter>& parameters) {
   if (parameters.empty()) {
-    throw ParameterError("parameters is empty: name at least one");
+    throw about("parameters", ParameterError("parameters is empty: name at least one"));
   }
   for (std::size_t i = 0; i < parameters.size(); ++i) {
     const Parameter& p = parameters[i];
@@ -59,25 +59,27 @@ void validate(const std::vector<Parameter>& parameters) {
       }
     }
     if (!(p.lower < p.upper)) {
-      throw ParameterError(p.name + ": lower = " + text(p.lower) + " must be < upper = " + text(p.upper));
+      throw about(p.name,
+                  ParameterError(p.name + ": lower = " + text(p.lower) + " must be < upper = " + text(p.upper)));
     }
     if (p.log_scaled && !(p.lower > 0.0)) {
-      throw ParameterError(p.name + ": lower = " + text(p.lower) + " must be > 0 for a log-scaled parameter");
+      throw about(p.name,
+                  ParameterError(p.name + ": lower = " + text(p.lower) + " must be > 0 for a log-scaled parameter"));
     }
   }
 }
 
 void validate_start(const std::vector<Parameter>& parameters, const Eigen::VectorXd& start) {
   if (start.size() != static_cast<Eigen::Index>(parameters.size())) {
-    throw ShapeError("start has " + std::to_string(start.size()) + " values for " + std::to_string(parameters.size()) +
-                     " parameters");
+    throw about("start", ShapeError("start has " + std::to_string(start.size()) + " values for " +
+                                    std::to_string(parameters.size()) + " parameters"));
   }
   for (std::size_t i = 0; i < parameters.size(); ++i) {
     const Parameter& p = parameters[i];
     const double value = start[static_cast<Eigen::Index>(i)];
     if (!std::isfinite(value) || value < p.lower || value > p.upper) {
-      throw ParameterError("start of " + p.name + " = " + text(value) + ": must be finite and in [" + text(p.lower) +
-                           ", " + text(p.upper) + "]");
+      throw about(p.name, ParameterError("start of " + p.name + " = " + text(value) + ": must be finite and in [" +
+                                         text(p.lower) + ", " + text(p.upper) + "]"));
     }
   }
 }

@@ -12,7 +12,7 @@ namespace {
 
 BoundedSeekingSettings checked(BoundedSeekingSettings s) {
   const Eigen::Index n = s.space.size();
-  if (n < 1) throw ShapeError("start is empty: give one number per input");
+  if (n < 1) throw about("start", ShapeError("start is empty: give one number per input"));
   validate(s.dither, n, false);
   validate(s.space, Inputs::Zero(n));
   require_positive("kappa", s.kappa);

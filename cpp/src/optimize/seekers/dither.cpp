@@ -16,7 +16,7 @@ constexpr double turn = 2.0 * std::numbers::pi;
 constexpr int longest_period = 1'000'000;
 
 [[noreturn]] void refuse_harmonics(const std::string& why) {
-  throw ParameterError("harmonics: " + why + "; for example period 40 with harmonics 4, 5, 7");
+  throw about("harmonics", ParameterError("harmonics: " + why + "; for example period 40 with harmonics 4, 5, 7"));
 }
 
 }  // namespace
@@ -24,17 +24,18 @@ constexpr int longest_period = 1'000'000;
 void validate(const DitherSettings& settings, Eigen::Index inputs, bool hessian) {
   validate_entries("amplitude", settings.amplitude, inputs, 0.0, 1e12);
   if (settings.period < 4 || settings.period > longest_period) {
-    throw ParameterError("period = " + std::to_string(settings.period) +
-                         ": must be at least 4 cycles (and at most 1000000) to tell a slope from a mean");
+    throw ParameterError("period", settings.period,
+                         "must be at least 4 cycles (and at most 1000000) to tell a slope from a mean");
   }
   const std::vector<int>& n = settings.harmonics;
   if (n.size() == 1 && inputs > 1) {
-    throw ShapeError("harmonics has 1 entry: " + std::to_string(inputs) +
-                     " inputs need one each, on a longer period; for example period 40 with harmonics 4, 5, 7");
+    throw about("harmonics",
+                ShapeError("harmonics has 1 entry: " + std::to_string(inputs) +
+                           " inputs need one each, on a longer period; for example period 40 with harmonics 4, 5, 7"));
   }
   if (static_cast<Eigen::Index>(n.size()) != inputs) {
-    throw ShapeError("harmonics has " + std::to_string(n.size()) + " entries: must have " + std::to_string(inputs) +
-                     ", one per entry of start");
+    throw about("harmonics", ShapeError("harmonics has " + std::to_string(n.size()) + " entries: must have " +
+                                        std::to_string(inputs) + ", one per entry of start"));
   }
   for (std::size_t i = 0; i < n.size(); ++i) {
     if (n[i] < 1 || 2 * n[i] >= settings.period) {
@@ -78,13 +79,12 @@ void validate(const DitherSettings& settings, Eigen::Index inputs, bool hessian)
 }
 
 void validate(const std::vector<ComponentLag>& components) {
-  if (components.empty()) throw ShapeError("components is empty: J has at least one component");
+  if (components.empty()) throw about("components", ShapeError("components is empty: J has at least one component"));
   for (std::size_t c = 0; c < components.size(); ++c) {
     for (const auto& [name, value] :
          {std::pair{"delay_cycles", components[c].delay_cycles}, std::pair{"lag_cycles", components[c].lag_cycles}}) {
       if (!(value >= 0.0 && value <= 1e6)) {
-        throw ParameterError("components[" + std::to_string(c) + "]." + name + " = " + text(value) +
-                             ": must lie in [0, 1e6]");
+        throw ParameterError("components[" + std::to_string(c) + "]." + name, value, "must lie in [0, 1e6]");
       }
     }
   }

@@ -22,7 +22,7 @@ constexpr double share_rate = 0.25;  // how fast the amplitude follows its targe
 
 ExtremumSeekingSettings checked(ExtremumSeekingSettings s) {
   const Eigen::Index n = s.space.size();
-  if (n < 1) throw ShapeError("start is empty: give one number per input");
+  if (n < 1) throw about("start", ShapeError("start is empty: give one number per input"));
   validate(s.dither, n, false);
   validate(s.space, s.dither.amplitude);
   validate(s.components);
@@ -35,22 +35,21 @@ ExtremumSeekingSettings checked(ExtremumSeekingSettings s) {
   validate_entries("recovery_rate", s.recovery_rate, n, 0.0);
   const auto inside = [](std::string_view name, double value, double lower, double upper) {
     if (!(value > lower && value <= upper)) {
-      throw ParameterError(std::string(name) + " = " + text(value) + ": must be > " + text(lower) +
-                           " and <= " + text(upper));
+      throw ParameterError(name, value, "must be > " + text(lower) + " and <= " + text(upper));
     }
   };
   if (!(s.washout_pole > 0.0 && s.washout_pole < 1.0)) {
-    throw ParameterError("washout_pole = " + text(s.washout_pole) + ": must lie between 0 and 1");
+    throw ParameterError("washout_pole", s.washout_pole, "must lie between 0 and 1");
   }
   inside("low_pass", s.low_pass, 0.0, 1.0);
   inside("amplitude_floor", s.amplitude_floor, 0.0, 1.0);
   inside("limit_amplitude", s.limit_amplitude, 0.0, 1.0);
   if (s.amplitude_floor < 1.0 && !(s.full_gradient > 0.0 && std::isfinite(s.full_gradient))) {
-    throw ParameterError("full_gradient = " + text(s.full_gradient) +
-                         ": must be > 0 where amplitude_floor is below 1: the slope at which the dither is full");
+    throw ParameterError("full_gradient", s.full_gradient,
+                         "must be > 0 where amplitude_floor is below 1: the slope at which the dither is full");
   }
   if (s.hold_cycles < -1) {
-    throw ParameterError("hold_cycles = " + std::to_string(s.hold_cycles) + ": must be >= 0, or -1 for one window");
+    throw ParameterError("hold_cycles", s.hold_cycles, "must be >= 0, or -1 for one window");
   }
   if (s.hold_cycles == -1) s.hold_cycles = s.dither.period;
   return s;

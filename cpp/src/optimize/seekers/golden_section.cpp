@@ -24,20 +24,21 @@ constexpr std::int64_t last_draws = 2;          // in a row: the bracket is as s
 
 GoldenSectionSettings checked(GoldenSectionSettings s) {
   if (s.space.size() != 1) {
-    throw ShapeError("start has " + std::to_string(s.space.size()) + " entries: golden section takes one input");
+    throw about("start",
+                ShapeError("start has " + std::to_string(s.space.size()) + " entries: golden section takes one input"));
   }
   validate(s.space, scalar_input(0.0));
   for (const auto& [name, value] : {std::pair{"lower", s.space.lower[0]}, std::pair{"upper", s.space.upper[0]}}) {
     if (!std::isfinite(value)) {
-      throw ParameterError(std::string(name) + " = " + text(value) + ": must be finite, the bracket starts there");
+      throw ParameterError(name, value, "must be finite, the bracket starts there");
     }
   }
   if (!(s.noise_sd >= 0.0 && std::isfinite(s.noise_sd))) {
-    throw ParameterError("noise_sd = " + text(s.noise_sd) + ": must be >= 0 and finite");
+    throw ParameterError("noise_sd", s.noise_sd, "must be >= 0 and finite");
   }
   require_positive("significance", s.significance);
   require_positive("tolerance", s.tolerance);
-  if (s.samples_max < 1) throw ParameterError("samples_max = " + std::to_string(s.samples_max) + ": must be >= 1");
+  if (s.samples_max < 1) throw ParameterError("samples_max", s.samples_max, "must be >= 1");
   return s;
 }
 

@@ -17,9 +17,9 @@ GradientDescentSettings checked(GradientDescentSettings s) {
   if (s.rate.size() == 0) s.rate = Inputs::Constant(n, unlimited);
   validate_entries("rate", s.rate, n, 0.0);
   if (!(s.tolerance >= 0.0 && std::isfinite(s.tolerance))) {
-    throw ParameterError("tolerance = " + text(s.tolerance) + ": must be >= 0 and finite");
+    throw ParameterError("tolerance", s.tolerance, "must be >= 0 and finite");
   }
-  if (s.iterations < 1) throw ParameterError("iterations = " + std::to_string(s.iterations) + ": must be >= 1");
+  if (s.iterations < 1) throw ParameterError("iterations", s.iterations, "must be >= 1");
   return s;
 }
 

@@ -34,19 +34,19 @@ LimitMethod parse_limit_method(std::string_view name) {
 void validate(const std::vector<Limit>& limits) {
   for (const Limit& limit : limits) {
     const std::string at = "limit " + limit.name + ": ";
-    if (limit.name.empty()) throw ParameterError("limit: name is empty: say what is limited");
+    if (limit.name.empty()) throw about("limit", ParameterError("limit: name is empty: say what is limited"));
     if (std::count_if(limits.begin(), limits.end(), [&](const Limit& l) { return l.name == limit.name; }) > 1) {
       throw ParameterError(at + "is given twice: give it once");
     }
-    if (!std::isfinite(limit.upper)) throw ParameterError(at + "upper = " + text(limit.upper) + ": must be finite");
+    if (!std::isfinite(limit.upper)) throw in_context(at, ParameterError("upper", limit.upper, "must be finite"));
     if (!(limit.margin >= 0.0 && std::isfinite(limit.margin))) {
-      throw ParameterError(at + "margin = " + text(limit.margin) + ": must be >= 0 and finite");
+      throw in_context(at, ParameterError("margin", limit.margin, "must be >= 0 and finite"));
     }
     if (!(limit.weight > 0.0 && std::isfinite(limit.weight))) {
-      throw ParameterError(at + "weight = " + text(limit.weight) + ": must be > 0 and finite");
+      throw in_context(at, ParameterError("weight", limit.weight, "must be > 0 and finite"));
     }
     if (!(limit.scale >= 0.0 && std::isfinite(limit.scale))) {
-      throw ParameterError(at + "scale = " + text(limit.scale) + ": must be >= 0 (0: the limit itself) and finite");
+      throw in_context(at, ParameterError("scale", limit.scale, "must be >= 0 (0: the limit itself) and finite"));
     }
   }
 }

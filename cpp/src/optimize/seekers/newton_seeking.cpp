@@ -11,7 +11,7 @@ namespace {
 
 NewtonSeekingSettings checked(NewtonSeekingSettings s) {
   const Eigen::Index n = s.space.size();
-  if (n < 1) throw ShapeError("start is empty: give one number per input");
+  if (n < 1) throw about("start", ShapeError("start is empty: give one number per input"));
   validate(s.dither, n, true);
   validate(s.space, s.dither.amplitude);
   validate(s.components);
@@ -23,24 +23,24 @@ NewtonSeekingSettings checked(NewtonSeekingSettings s) {
         std::tuple{"largest_inverse", s.largest_inverse, 1e300},
         std::tuple{"limit_amplitude", s.limit_amplitude, 1.0}}) {
     if (!(value > 0.0 && value <= upper)) {
-      throw ParameterError(std::string(name) + " = " + text(value) + ": must be > 0 and <= " + text(upper));
+      throw ParameterError(name, value, "must be > 0 and <= " + text(upper));
     }
   }
   for (const auto& [name, values] :
        {std::pair{"initial_hessian", &s.initial_hessian}, std::pair{"initial_inverse", &s.initial_inverse}}) {
     if (values->size() != n) {
-      throw ShapeError(std::string(name) + " has " + std::to_string(values->size()) + " entries: must have " +
-                       std::to_string(n) + ", one per entry of start");
+      throw about(name, ShapeError(std::string(name) + " has " + std::to_string(values->size()) +
+                                   " entries: must have " + std::to_string(n) + ", one per entry of start"));
     }
     for (const double value : *values) {
       if (!(value < 0.0 && std::isfinite(value))) {
-        throw ParameterError(std::string(name) + " = " + text(value) + ": must be < 0, the bend of a maximum");
+        throw ParameterError(name, value, "must be < 0, the bend of a maximum");
       }
     }
   }
   if (s.hold_cycles < s.dither.period) {
-    throw ParameterError("hold_cycles = " + std::to_string(s.hold_cycles) +
-                         ": must be at least one period = " + std::to_string(s.dither.period));
+    throw ParameterError("hold_cycles", s.hold_cycles,
+                         "must be at least one period = " + std::to_string(s.dither.period));
   }
   return s;
 }

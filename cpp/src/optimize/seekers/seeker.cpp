@@ -24,8 +24,8 @@ std::string entry(std::string_view name, Eigen::Index i, Eigen::Index size) {
 
 void validate_entries(std::string_view name, const Inputs& values, Eigen::Index inputs, double lower, double upper) {
   if (values.size() != inputs) {
-    throw ShapeError(std::string(name) + " has " + std::to_string(values.size()) + " entries: must have " +
-                     std::to_string(inputs) + ", one per entry of start");
+    throw about(name, ShapeError(std::string(name) + " has " + std::to_string(values.size()) + " entries: must have " +
+                                 std::to_string(inputs) + ", one per entry of start"));
   }
   for (Eigen::Index i = 0; i < inputs; ++i) {
     if (!(values[i] > lower && values[i] <= upper)) {
@@ -37,11 +37,11 @@ void validate_entries(std::string_view name, const Inputs& values, Eigen::Index 
 
 void validate(const SearchSpace& space, const Inputs& reach) {
   const Eigen::Index n = space.size();
-  if (n < 1) throw ShapeError("start is empty: give one number per input");
+  if (n < 1) throw about("start", ShapeError("start is empty: give one number per input"));
   for (const auto& [name, values] : {std::pair{"lower", &space.lower}, std::pair{"upper", &space.upper}}) {
     if (values->size() != n) {
-      throw ShapeError(std::string(name) + " has " + std::to_string(values->size()) + " entries: must have " +
-                       std::to_string(n) + ", one per entry of start");
+      throw about(name, ShapeError(std::string(name) + " has " + std::to_string(values->size()) +
+                                   " entries: must have " + std::to_string(n) + ", one per entry of start"));
     }
   }
   for (Eigen::Index i = 0; i < n; ++i) {
@@ -69,8 +69,9 @@ void validate(const SearchSpace& space, const Inputs& reach) {
 void require_within_space(std::string_view column, const Inputs& values, const SearchSpace& space) {
   for (Eigen::Index i = 0; i < values.size(); ++i) {
     if (values[i] >= space.lower[i] && values[i] <= space.upper[i]) continue;
-    throw ParameterError("state column '" + std::string(column) + "' holds " + text(values[i]) + ": must lie in [" +
-                         text(space.lower[i]) + ", " + text(space.upper[i]) + "], the bounds of these settings");
+    throw about(column, ParameterError("state column '" + std::string(column) + "' holds " + text(values[i]) +
+                                       ": must lie in [" + text(space.lower[i]) + ", " + text(space.upper[i]) +
+                                       "], the bounds of these settings"));
   }
 }
 
@@ -101,11 +102,13 @@ void require(TellStatus status, const Protocol& protocol, const Reading& reading
     case TellStatus::not_asked:
       throw ParameterError(at + "tell without ask: call ask(), apply its input, then tell what was measured, once");
     case TellStatus::wrong_component_count:
-      throw ShapeError(at + "J has " + std::to_string(reading.components.size()) + " components: must have " +
-                       std::to_string(components) + ", as the settings say");
+      throw in_context(
+          at, about("J", ShapeError("J has " + std::to_string(reading.components.size()) + " components: must have " +
+                                    std::to_string(components) + ", as the settings say")));
     case TellStatus::wrong_limit_count:
-      throw ShapeError(at + "limits has " + std::to_string(reading.limits.size()) + " values: must have " +
-                       std::to_string(limits) + ", one per limit of the settings");
+      throw in_context(
+          at, about("limits", ShapeError("limits has " + std::to_string(reading.limits.size()) + " values: must have " +
+                                         std::to_string(limits) + ", one per limit of the settings")));
     case TellStatus::not_a_reading:
       for (const double value : reading.components) {
         if (!is_reading(value)) refuse_reading(at, "J", value);

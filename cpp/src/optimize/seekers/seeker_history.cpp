@@ -23,8 +23,8 @@ const std::vector<double>& column(const StateColumns& columns, const std::string
 }
 
 [[noreturn]] void refuse(const std::string& name, std::size_t at, double value, const char* must) {
-  throw ParameterError("history column '" + name + "', entry " + std::to_string(at) + ", holds " + text(value) +
-                       ": must be " + must);
+  throw about(name, ParameterError("history column '" + name + "', entry " + std::to_string(at) + ", holds " +
+                                   text(value) + ": must be " + must));
 }
 
 }  // namespace

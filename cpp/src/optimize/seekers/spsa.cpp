@@ -36,34 +36,35 @@ SpsaSettings checked(SpsaSettings s) {
   if (s.step_max == 0.0)
     s.step_max = s.form == SpsaForm::one_measurement ? s.perturbation / 5.0 : s.perturbation * 4.0 / 3.0;
   require_positive("gain", s.gain);
-  if (!(s.step_max > 0.0)) throw ParameterError("step_max = " + text(s.step_max) + ": must be > 0");
+  if (!(s.step_max > 0.0)) throw ParameterError("step_max", s.step_max, "must be > 0");
   const Eigen::Index n = s.space.size();
   validate(s.space, Inputs::Constant(n, s.perturbation * (second ? 2.0 : 1.0)));
   if (!(s.stability >= 0.0 && std::isfinite(s.stability))) {
-    throw ParameterError("stability = " + text(s.stability) + ": must be >= 0 and finite");
+    throw ParameterError("stability", s.stability, "must be >= 0 and finite");
   }
   for (const auto& [name, value] :
        {std::pair{"gain_exponent", s.gain_exponent}, std::pair{"perturbation_exponent", s.perturbation_exponent}}) {
     if (!(value >= 0.0 && value <= 1.0)) {
-      throw ParameterError(std::string(name) + " = " + text(value) + ": must lie in [0, 1]");
+      throw ParameterError(name, value, "must lie in [0, 1]");
     }
   }
   if (s.schedule == GainSchedule::decreasing && !(s.gain_exponent - s.perturbation_exponent > 0.5)) {
-    throw ParameterError("gain_exponent = " + text(s.gain_exponent) + ": must exceed perturbation_exponent = " +
-                         text(s.perturbation_exponent) + " by more than 0.5, or the noise does not average out");
+    throw ParameterError("gain_exponent", s.gain_exponent,
+                         "must exceed perturbation_exponent = " + text(s.perturbation_exponent) +
+                             " by more than 0.5, or the noise does not average out");
   }
   if (s.averaging < 1 || s.averaging > 1000) {
-    throw ParameterError("averaging = " + std::to_string(s.averaging) + ": must lie in [1, 1000]");
+    throw ParameterError("averaging", s.averaging, "must lie in [1, 1000]");
   }
   if (!(s.noise_sd >= 0.0 && std::isfinite(s.noise_sd))) {
-    throw ParameterError("noise_sd = " + text(s.noise_sd) + ": must be >= 0 and finite");
+    throw ParameterError("noise_sd", s.noise_sd, "must be >= 0 and finite");
   }
   if (!(s.initial_hessian < 0.0 && std::isfinite(s.initial_hessian))) {
-    throw ParameterError("initial_hessian = " + text(s.initial_hessian) + ": must be < 0, the bend of a maximum");
+    throw ParameterError("initial_hessian", s.initial_hessian, "must be < 0, the bend of a maximum");
   }
   require_positive("hessian_prior", s.hessian_prior);
   if (!(s.limit_amplitude > 0.0 && s.limit_amplitude <= 1.0)) {
-    throw ParameterError("limit_amplitude = " + text(s.limit_amplitude) + ": must be > 0 and <= 1");
+    throw ParameterError("limit_amplitude", s.limit_amplitude, "must be > 0 and <= 1");
   }
   return s;
 }

@@ -28,7 +28,7 @@ constexpr double delays_per_tau = 3.0;  // an integrator with delay D is well da
 TuningWish filled(TuningWish w) {
   const auto positive = [](std::string_view name, double value, std::string_view remedy) {
     if (!(value > 0.0 && std::isfinite(value))) {
-      throw ParameterError(std::string(name) + " = " + text(value) + ": must be > 0" + std::string(remedy));
+      throw ParameterError(name, value, "must be > 0" + std::string(remedy));
     }
   };
   positive("noise_sd", w.noise_sd, "; repeat one set-point some twenty times and take the standard deviation of J");
@@ -46,7 +46,7 @@ TuningWish filled(TuningWish w) {
   fill("amplitude_max", w.amplitude_max, default_amplitude_max * length);
   if (!std::isnan(w.cycles)) positive("cycles", w.cycles, "");
   if (!(w.arrival < w.distance)) {
-    throw ParameterError("arrival = " + text(w.arrival) + ": must be below distance = " + text(w.distance));
+    throw ParameterError("arrival", w.arrival, "must be below distance = " + text(w.distance));
   }
   return w;
 }
@@ -56,9 +56,10 @@ Tuning tune_spsa(const TuningWish& w) {
   t.method = TunedMethod::spsa;
   t.period = 2;
   if (w.lag.delay_cycles > 0.0 || w.lag.lag_cycles > 0.0) {
-    throw ParameterError(
-        "method = 'spsa': takes a measurement without delay and lag; hold each set-point until the "
-        "sensor has settled, or use 'batch'");
+    throw about(
+        "method",
+        ParameterError("method = 'spsa': takes a measurement without delay and lag; hold each set-point until the "
+                       "sensor has settled, or use 'batch'"));
   }
   const double wished = std::isnan(w.cycles) ? default_cycles : w.cycles;
   const double ratio = w.arrival / w.distance;
@@ -83,9 +84,10 @@ Tuning tune_spsa(const TuningWish& w) {
 Tuning tune_dither(const TuningWish& w) {
   const bool batch = w.method == TunedMethod::batch;
   if (!batch && !w.compensated && (w.lag.delay_cycles > 0.0 || w.lag.lag_cycles > 0.0)) {
-    throw ParameterError(
-        "method = 'moving_average': behind a lag that is not compensated its window slows the approach by "
-        "more than these forms say; use 'batch', or compensate");
+    throw about("method",
+                ParameterError(
+                    "method = 'moving_average': behind a lag that is not compensated its window slows the approach by "
+                    "more than these forms say; use 'batch', or compensate"));
   }
   const bool lagged = w.lag.delay_cycles > 0.0 || w.lag.lag_cycles > 0.0;
   const double whole_lag = w.lag.delay_cycles + w.lag.lag_cycles;

@@ -20,8 +20,8 @@ void FirstPrinciple::validate() const {
   require_within("delay_samples", delay_samples, 0.0, max_delay_samples);
   require_positive("tanh_deg_per_s", tanh_deg_per_s, "deg/s");
   if (friction != Friction::coulomb && friction != Friction::tanh) {
-    throw ParameterError("friction = '" + std::string(name_of(friction_names(), friction)) +
-                         "': must be coulomb or tanh, the groups have one level");
+    throw ParameterError("friction", name_of(friction_names(), friction),
+                         "must be coulomb or tanh, the groups have one level");
   }
 }
 

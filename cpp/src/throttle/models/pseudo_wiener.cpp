@@ -146,7 +146,7 @@ void PseudoWienerFrame::validate() const {
   require_within("closed_deg", closed_deg, -10.0, 90.0, "deg");
   require_within("open_deg", open_deg, 10.0, 120.0, "deg");
   if (!(open_deg > closed_deg)) {
-    throw ParameterError("open_deg = " + text(open_deg) + " deg: must be above closed_deg = " + text(closed_deg));
+    throw ParameterError("open_deg", open_deg, "must be above closed_deg = " + text(closed_deg), "deg");
   }
   require_within("sample_s", sample_s, 1e-5, 0.1, "s");
   require_within("substeps", substeps, 1.0, 1000.0);
@@ -160,10 +160,11 @@ PseudoWienerFrame PseudoWienerFrame::at_sample(double new_sample_s) const {
   const double whole = std::round(delay);
   frame.delay_samples = std::abs(delay - whole) < 1e-9 ? whole : delay;  // rounding makes no fraction
   if (frame.delay_samples > max_delay_samples) {
-    throw ParameterError("delay_samples = " + text(frame.delay_samples) + " at sample_s = " + text(new_sample_s) +
-                         " s: must be in [0, " + text(max_delay_samples) + "]; for a delay of " +
-                         text(1e3 * delay_samples * sample_s) +
-                         " ms take sample_s >= " + text(delay_samples * sample_s / max_delay_samples) + " s");
+    throw about("delay_samples",
+                ParameterError("delay_samples = " + text(frame.delay_samples) + " at sample_s = " + text(new_sample_s) +
+                               " s: must be in [0, " + text(max_delay_samples) + "]; for a delay of " +
+                               text(1e3 * delay_samples * sample_s) +
+                               " ms take sample_s >= " + text(delay_samples * sample_s / max_delay_samples) + " s"));
   }
   frame.validate();
   return frame;
@@ -184,8 +185,8 @@ void check_pw_r(const PseudoWienerFrame& frame, double ramp_deg, double tanh_deg
   require_within("tanh_deg_per_s", tanh_deg_per_s, 0.1, 1e3, "deg/s");
   require_within("dead_band_deg", dead_band_deg, 0.0, 10.0, "deg");
   if (friction != Friction::coulomb && friction != Friction::tanh) {
-    throw ParameterError("friction = '" + std::string(name_of(friction_names(), friction)) +
-                         "': must be coulomb or tanh, PW-R has one level");
+    throw ParameterError("friction", name_of(friction_names(), friction),
+                         "must be coulomb or tanh, PW-R has one level");
   }
 }
 
@@ -194,8 +195,8 @@ void check_pw_w(const PseudoWienerFrame& frame, double knot_lower_duty, double k
   require_within("knot_lower_duty", knot_lower_duty, -1.0, 1.0);
   require_within("knot_upper_duty", knot_upper_duty, -1.0, 1.0);
   if (!(knot_upper_duty > knot_lower_duty)) {
-    throw ParameterError("knot_upper_duty = " + text(knot_upper_duty) +
-                         ": must be above knot_lower_duty = " + text(knot_lower_duty));
+    throw ParameterError("knot_upper_duty", knot_upper_duty,
+                         "must be above knot_lower_duty = " + text(knot_lower_duty));
   }
 }
 

@@ -29,7 +29,7 @@ inline std::array<bool, 5> free_groups(const std::vector<std::string>& names) {
   for (const std::string& name : names) {
     const auto found = std::ranges::find(pw_r_groups, name);
     if (found == pw_r_groups.end()) {
-      throw ParameterError("free: '" + name + "' is not a parameter of pw_r that can be updated");
+      throw about("free", ParameterError("free: '" + name + "' is not a parameter of pw_r that can be updated"));
     }
     free[static_cast<std::size_t>(found - pw_r_groups.begin())] = true;
   }
@@ -59,7 +59,7 @@ class WindowUpdate {
   WindowUpdate(const WindowPwRSettings& settings, std::int64_t iterate_every)
       : core_(settings), iterate_every_(iterate_every) {
     if (iterate_every < 1) {
-      throw ParameterError("iterate_every = " + std::to_string(iterate_every) + " samples: must be >= 1");
+      throw ParameterError("iterate_every", iterate_every, "must be >= 1", "samples");
     }
   }
 
