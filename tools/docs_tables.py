@@ -17,8 +17,7 @@ from mgdd.engine import Cylinder, OperatingPoint, analyze, simulate
 from mgdd.identify import best_timing, compare_laws, wall_heat_profile
 from mgdd.identify.engine.records import CylinderFit
 from mgdd.io import pressure_trace
-from mgdd.results import VARIABLES
-from mgdd.results.labels import ANGLE
+from mgdd.results.labels import ANGLE, VARIABLES
 from mgdd.studies import run_study
 
 __all__ = [
@@ -68,7 +67,7 @@ def single() -> tuple[Cylinder, OperatingPoint]:
 
 @cache
 def measured() -> tuple[list[Any], Cylinder]:
-    return datasets.load_hd_traces(), presets.load("hd_diesel_128x144").cylinder
+    return datasets.load("hd_diesel_128x144"), presets.load("hd_diesel_128x144").cylinder
 
 
 @cache

@@ -85,7 +85,9 @@ def objects() -> dict[str, Callable[[], Any]]:
         "report": lambda: fit_throttle(log(), options=FitOptions(n_starts=1)).report,
         "validation": lambda: validate_throttle(FirstPrincipleModel(), log()),
         "check": lambda: check_excitation(chirp(4.0, offset=0.01, amplitude=0.34), Throttle()),
-        "calibration": lambda: fit_cylinder(datasets.load_hd_traces()[:1], presets.load("hd_diesel_128x144").cylinder),
+        "calibration": lambda: fit_cylinder(
+            datasets.load("hd_diesel_128x144")[:1], presets.load("hd_diesel_128x144").cylinder
+        ),
     }
 
 

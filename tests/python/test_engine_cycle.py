@@ -23,7 +23,7 @@ from mgdd.engine import (
     start_of_combustion,
     timing_sweep,
 )
-from mgdd.results import check_labels
+from mgdd.results.labels import check_labels
 
 R = 8.314462618
 WORDS = ("soc_cad", "soi_cad", "integrator", "step_cad", "objective")

@@ -18,7 +18,7 @@ from mgdd import identify
 from mgdd.errors import DataError, ShapeError
 from mgdd.io import throttle_log
 from mgdd.optimize import FitOptions
-from mgdd.results import labelled_dataset
+from mgdd.results.labels import labelled_dataset
 from mgdd.signals.even_grid import check_count, common_step, even_step
 from mgdd.studies.benchmarks.drive_axis import drive_inverse_dynamics
 from mgdd.studies.benchmarks.two_tanks import fit_two_tanks

@@ -10,8 +10,7 @@ from hypothesis import strategies as st
 from mgdd.errors import DataError, ShapeError
 from mgdd.io import from_0_720, from_btdc, pressure_trace, read_conditions, read_pressure, write_pressure
 from mgdd.io.checks import check_trace
-from mgdd.results import check_labels
-from mgdd.results.labels import ANGLE
+from mgdd.results.labels import ANGLE, check_labels
 
 ANGLES = np.arange(-143.0, 124.0)
 BAR = 1.5 + 120.0 * np.exp(-((ANGLES - 6.0) ** 2) / 1500.0)

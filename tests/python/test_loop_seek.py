@@ -24,7 +24,7 @@ from mgdd.loop import (
 )
 from mgdd.loop.summary import summarize_cycles
 from mgdd.optimize import ExtremumSeeking, GoldenSection, Limit, NewtonSeeking, Spsa
-from mgdd.results import check_labels
+from mgdd.results.labels import check_labels
 from mgdd.rig import SimulatedRig
 
 SPACE = {"start": -14.0, "lower": -30.0, "upper": 10.0}

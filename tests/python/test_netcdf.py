@@ -27,7 +27,8 @@ from mgdd.io import (
     write_throttle_log,
 )
 from mgdd.loop import EngineBench, monte_carlo, run_seeker, steady_map
-from mgdd.results import FitReport, check_labels, labelled_dataset
+from mgdd.results import FitReport
+from mgdd.results.labels import check_labels
 from mgdd.rig import SimulatedRig
 from mgdd.studies import run_measured_traces
 from mgdd.throttle import PseudoWiener, SensorFault, Throttle, groups, holding_duty, linear_part, sense, simulate_many
@@ -49,7 +50,7 @@ def written_log(folder: Path) -> xr.Dataset:
 
 
 def pressures(folder: Path) -> xr.Dataset:
-    trace = datasets.load_hd_traces()[0]
+    trace = datasets.load("hd_diesel_128x144")[0]
     columns = np.column_stack([trace["crank_angle_cad"], trace["pressure_bar"]])
     np.savetxt(folder / "trace.csv", columns, delimiter=",")
     return read_pressure(folder / "trace.csv")
@@ -85,7 +86,7 @@ def of_records() -> surrogate.EngineSurrogate:
 
 
 def wall_heat() -> xr.Dataset:
-    traces = datasets.load_hd_traces()[:2]
+    traces = datasets.load("hd_diesel_128x144")[:2]
     fit = identify.fit_cylinder(traces, presets.load("hd_diesel_128x144").cylinder)
     return identify.wall_heat_profile(traces, fit, scales=[0.5, 1.0]).dataset
 
@@ -95,16 +96,16 @@ def report() -> FitReport:
 
 
 def fitted_load() -> xr.Dataset:
-    fit = identify.fit_cylinder(datasets.load_hd_traces()[:1], presets.load("hd_diesel_128x144").cylinder)
+    fit = identify.fit_cylinder(datasets.load("hd_diesel_128x144")[:1], presets.load("hd_diesel_128x144").cylinder)
     return fit.loads[0].overlay
 
 
 SIGNALS = ("amplitude_random_steps", "chirp", "multisine", "prbs", "staircase", "triangle")
-NEEDS = {"load_cascaded_tanks": "cascaded_tanks", "load_emps": "emps", "load_h2df_cycles": "h2df_502",
-         "load_wiener_hammerstein": "wh2009"}  # fmt: skip
+NEEDS = ("cascaded_tanks", "emps", "h2df_502", "wh2009")
 MADE: dict[str, Callable[[Path], Any]] = {
     **{f"signals.{name}": lambda _, n=name: getattr(signals, n)(offset=0.15, amplitude=0.2) for name in SIGNALS},
-    **{f"datasets.{name}": lambda _, n=name: getattr(datasets, n)() for name in (*NEEDS, "load_hd_traces")},
+    "datasets.load": lambda _: datasets.load("hd_diesel_128x144"),
+    **{f"datasets.load.{name}": lambda _, n=name: datasets.load(n) for name in NEEDS},
     "engine.analyze": lambda _: analyze(simulate(Cylinder(), OperatingPoint(fuel_mg=0.0)), Cylinder()),
     "engine.convergence": lambda _: convergence(Cylinder(), POINT),
     "engine.sensitivities": lambda _: sensitivities(Cylinder(), POINT),
@@ -140,7 +141,6 @@ MADE: dict[str, Callable[[Path], Any]] = {
     "optimize.maximize": lambda _: optimize.maximize(
         lambda x: -float((x[0] - 2.0) ** 2), optimize.GradientDescent(start=1.0), 20
     ),
-    "results.labelled_dataset": lambda _: labelled_dataset({"time_s": ("time_s", TIME)}),
     "studies.StudyResult.dataset": lambda _: run_measured_traces(quick=True, figures=False).dataset,
     "throttle.groups": lambda _: groups(Throttle()),
     "throttle.holding_duty": lambda _: holding_duty(Throttle()),
@@ -184,8 +184,8 @@ def test_every_public_source_of_a_dataset_is_here() -> None:
 
 @pytest.mark.parametrize("source", sorted(MADE))
 def test_written_and_read_back(source: str, tmp_path: Path) -> None:
-    needed = NEEDS.get(source.rpartition(".")[2])
-    if needed is not None and needed not in datasets.available():
+    needed = source.rpartition(".")[2]
+    if needed in NEEDS and needed not in datasets.available():
         pytest.skip(f"MGDD_DATA_DIR holds no folder {needed}")
     made = MADE[source](tmp_path)
     for dataset in [made] if isinstance(made, xr.Dataset) else made:

@@ -26,7 +26,7 @@ def throttle_run() -> xr.Dataset:
 
 
 def of_pressure(path: Path) -> xr.Dataset:
-    trace = datasets.load_hd_traces()[0]
+    trace = datasets.load("hd_diesel_128x144")[0]
     io.write_pressure(trace, path)
     return trace
 

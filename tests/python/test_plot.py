@@ -10,8 +10,7 @@ import pytest
 
 from mgdd import datasets, plot
 from mgdd.errors import DataError
-from mgdd.results import labelled_dataset
-from mgdd.results.labels import ANGLE
+from mgdd.results.labels import ANGLE, labelled_dataset
 
 CAD = np.arange(-120.0, 121.0)
 LITRE = 0.1 + 0.9 * (1.0 - np.cos(np.radians(CAD)))
@@ -116,7 +115,7 @@ PLOTS = {
     "learning": (plot.learning, learned),
     "pressure of a simulation": (plot.pressure, simulated),
     "pressure of an analysis": (plot.pressure, analysed),
-    "pressure of a measurement": (plot.pressure, lambda: datasets.load_hd_traces()[3]),
+    "pressure of a measurement": (plot.pressure, lambda: datasets.load("hd_diesel_128x144")[3]),
     "log p-V": (plot.log_pv, analysed),
     "overlay": (plot.calibration_overlay, overlay),
     "profile": (plot.wall_heat_profile, profile),
@@ -222,7 +221,7 @@ def test_pressure_of_an_analysis_has_net_and_gross():
 
 
 def test_pressure_of_a_measurement_is_named_and_alone():
-    ax = plot.pressure(datasets.load_hd_traces()[0])
+    ax = plot.pressure(datasets.load("hd_diesel_128x144")[0])
     assert entries(ax) == ["cylinder pressure, pressure_a25_bar"]
     assert ax.figure.axes == [ax]
 

@@ -8,7 +8,7 @@ import pytest
 
 from mgdd import plot
 from mgdd.errors import DataError
-from mgdd.results import labelled_dataset
+from mgdd.results.labels import labelled_dataset
 
 TIME = np.arange(400) * 0.05
 DUTY = 0.3 * np.sin(0.6 * TIME)

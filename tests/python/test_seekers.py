@@ -28,8 +28,7 @@ from mgdd.optimize import (
     load_seeker,
     maximize,
 )
-from mgdd.results import check_labels
-from mgdd.results.labels import label_of
+from mgdd.results.labels import check_labels, label_of
 
 LIMITS = [Limit("p_max_bar", 150.0, margin=1.0), Limit("rise", 4.0, method="penalty", weight=2.0, scale=1.0)]
 PAIR = {"start": [3.0, -4.0], "lower": [-20.0, -np.inf], "upper": 20.0}

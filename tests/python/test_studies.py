@@ -10,8 +10,8 @@ from typing import Any
 
 import pytest
 
-from mgdd import results
 from mgdd.report import write_report
+from mgdd.results.labels import check_labels
 from mgdd.studies import StudyResult, run_measured_traces
 
 
@@ -62,7 +62,7 @@ def test_best_timing_is_a_range_within_the_pressure_limit(result: StudyResult) -
 
 
 def test_dataset_is_labelled(result: StudyResult) -> None:
-    results.check_labels(result.dataset)
+    check_labels(result.dataset)
     assert result.dataset.sizes == {"law": 5, "file": 4}
 
 

@@ -11,7 +11,7 @@ import numpy as np
 import pytest
 
 from mgdd.loop import EngineBench, find_steady_optimum
-from mgdd.results import check_labels
+from mgdd.results.labels import check_labels
 from mgdd.studies import StudyResult, available_studies, run_study
 
 

@@ -10,7 +10,7 @@ import numpy as np
 import pytest
 
 from mgdd.errors import Interrupted, ParameterError
-from mgdd.results import check_labels
+from mgdd.results.labels import check_labels
 from mgdd.studies import StudyResult, run_study
 from mgdd.studies.sensor_delay import run_sensor_delay
 

@@ -9,7 +9,7 @@ import pytest
 
 from mgdd import datasets
 from mgdd.errors import ConvergenceError, DataError, ParameterError
-from mgdd.results import check_labels
+from mgdd.results.labels import check_labels
 from mgdd.surrogate import SurrogateEngine, fit_surrogate, random_step_records
 
 INPUTS = ("soi_cad", "doi_main_ms", "doi_h2_ms", "p2m_us")
@@ -40,7 +40,7 @@ def exact():
 @pytest.fixture(scope="module")
 def cycles():
     try:
-        return datasets.load_h2df_cycles()
+        return datasets.load("h2df_502")
     except FileNotFoundError as reason:
         pytest.skip(str(reason))
 
@@ -343,7 +343,7 @@ def test_the_set_is_read_with_its_units_and_signs(cycles):
 
 
 def test_held_burn_angles_are_no_measurements(cycles):
-    raw = datasets.load_h2df_cycles(mask_held=False)
+    raw = datasets.load("h2df_502", mask_held=False)
     held = cycles["burn_angles_held"].to_numpy()
     assert held.sum() == 2962
     assert np.isnan(cycles["mfb50_cad"].to_numpy()[held]).all()
@@ -362,14 +362,14 @@ def test_another_export_is_refused(monkeypatch, tmp_path):
     own.write_text("\n".join(rows) + "\n")
     monkeypatch.setenv("MGDD_DATA_DIR", str(tmp_path))
     with pytest.raises(DataError, match="the file is another export; pass checked=False"):
-        datasets.load_h2df_cycles()
-    assert datasets.load_h2df_cycles(checked=False).sizes["cycle"] == 399
+        datasets.load("h2df_502")
+    assert datasets.load("h2df_502", checked=False).sizes["cycle"] == 399
     own.write_text("\n".join([*rows[:50], *rows[51:]]) + "\n")
     with pytest.raises(DataError, match="cycle 52 follows 50: must count up by one"):
-        datasets.load_h2df_cycles(checked=False)
+        datasets.load("h2df_502", checked=False)
     monkeypatch.setenv("MGDD_DATA_DIR", str(tmp_path / "nowhere"))
     with pytest.raises(FileNotFoundError, match="set MGDD_DATA_DIR"):
-        datasets.load_h2df_cycles()
+        datasets.load("h2df_502")
 
 
 def test_quality_of_the_measured_surfaces(measured):

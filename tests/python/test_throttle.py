@@ -9,7 +9,7 @@ import pytest
 
 from mgdd import presets
 from mgdd.errors import DataError, ParameterError, ShapeError
-from mgdd.results import check_labels, labelled_dataset
+from mgdd.results.labels import check_labels, labelled_dataset
 from mgdd.throttle import (
     SensorFault,
     SensorPair,

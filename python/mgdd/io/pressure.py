@@ -11,8 +11,7 @@ from mgdd.errors import DataError, argument
 from mgdd.io.angles import aligned_angle
 from mgdd.io.checks import ANGLE_UNITS, PRESSURE_UNITS, check_choice, check_trace
 from mgdd.io.table import read_table
-from mgdd.results import check_labels, labelled_dataset
-from mgdd.results.labels import ANGLE
+from mgdd.results.labels import ANGLE, check_labels, labelled_dataset
 
 if TYPE_CHECKING:
     import os

@@ -10,7 +10,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from mgdd.errors import DataError, ParameterError, argument
-from mgdd.results import check_labels
+from mgdd.results.labels import check_labels
 from mgdd.signals.even_grid import even_step, wide_steps
 
 if TYPE_CHECKING:

@@ -20,7 +20,7 @@ from mgdd.io.throttle_checks import (
     check_throttle_log,
     check_time,
 )
-from mgdd.results import labelled_dataset
+from mgdd.results.labels import labelled_dataset
 
 if TYPE_CHECKING:
     import os

@@ -12,8 +12,8 @@ from mgdd._core.loop import SensorDynamics
 from mgdd.errors import ParameterError, RigError
 from mgdd.loop.plant import Measurement, checked_inputs
 from mgdd.presets import Preset
-from mgdd.results import VARIABLES, labelled_dataset
 from mgdd.results.describe import as_html, rows_of
+from mgdd.results.labels import VARIABLES, labelled_dataset
 
 if TYPE_CHECKING:
     import xarray as xr

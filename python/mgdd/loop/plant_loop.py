@@ -14,8 +14,8 @@ from mgdd.loop.bench import FLAGS
 from mgdd.loop.criteria import LoopCriteria
 from mgdd.loop.plant import AnnouncingPlant, Measurement, Plant
 from mgdd.loop.summary import summarize_cycles
-from mgdd.results import VARIABLES, labelled_dataset
 from mgdd.results.describe import described
+from mgdd.results.labels import VARIABLES, labelled_dataset
 
 if TYPE_CHECKING:
     import xarray as xr

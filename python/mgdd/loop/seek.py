@@ -15,7 +15,7 @@ from mgdd.loop.bench import EngineBench, cycles_to_dataset
 from mgdd.loop.criteria import LoopCriteria
 from mgdd.loop.plant import Plant
 from mgdd.loop.plant_loop import LoopRun, steer
-from mgdd.results import labelled_dataset
+from mgdd.results.labels import labelled_dataset
 
 if TYPE_CHECKING:
     import xarray as xr

@@ -14,7 +14,7 @@ from mgdd.errors import ConvergenceError, ParameterError, ShapeError
 from mgdd.loop.bench import EngineBench
 from mgdd.optimize import Optimum
 from mgdd.optimize.optimum import limits_of
-from mgdd.results import labelled_dataset
+from mgdd.results.labels import labelled_dataset
 
 if TYPE_CHECKING:
     import xarray as xr

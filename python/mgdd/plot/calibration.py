@@ -58,7 +58,7 @@ def calibration_overlay(overlay: xr.Dataset, *, ax: Axes | None = None) -> Axes:
     --------
     >>> import numpy as np
     >>> from mgdd import plot
-    >>> from mgdd.results import labelled_dataset
+    >>> from mgdd.results.labels import labelled_dataset
     >>> angle = np.arange(-30.0, 31.0)
     >>> measured = 60.0 - 0.01 * angle**2
     >>> overlay = labelled_dataset({
@@ -122,7 +122,7 @@ def wall_heat_profile(profile: xr.Dataset, *, ax: Axes | None = None) -> Axes:
     Examples
     --------
     >>> from mgdd import plot
-    >>> from mgdd.results import labelled_dataset
+    >>> from mgdd.results.labels import labelled_dataset
     >>> profile = labelled_dataset({
     ...     "wall_heat_scale": ("wall_heat_scale", [0.0, 0.5, 1.0, 2.0]),
     ...     "rmse_percent": ("wall_heat_scale", [0.30, 0.21, 0.20, 0.33]),

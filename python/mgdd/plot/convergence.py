@@ -47,7 +47,7 @@ def convergence(tracks: xr.Dataset, *, ax: Axes | None = None) -> Axes:
     --------
     >>> import numpy as np
     >>> from mgdd import plot
-    >>> from mgdd.results import labelled_dataset
+    >>> from mgdd.results.labels import labelled_dataset
     >>> cycle = np.arange(200)
     >>> tracks = labelled_dataset({
     ...     "cycle": ("cycle", cycle),

@@ -52,7 +52,7 @@ def pressure(dataset: xr.Dataset, *, ax: Axes | None = None) -> Axes:
     Examples
     --------
     >>> from mgdd import datasets, plot
-    >>> ax = plot.pressure(datasets.load_hd_traces()[0])
+    >>> ax = plot.pressure(datasets.load("hd_diesel_128x144")[0])
     >>> ax.get_xlabel()
     'crank angle [°CA aTDC]'
     """
@@ -105,7 +105,7 @@ def log_pv(dataset: xr.Dataset, *, ax: Axes | None = None) -> Axes:
     --------
     >>> import numpy as np
     >>> from mgdd import plot
-    >>> from mgdd.results import labelled_dataset
+    >>> from mgdd.results.labels import labelled_dataset
     >>> angle = np.arange(-120.0, 121.0)
     >>> volume = 0.03 + 0.2 * (1 - np.cos(np.radians(angle)))
     >>> cycle = labelled_dataset({

@@ -56,7 +56,7 @@ def error_growth(n_step: xr.Dataset, *, ax: Axes | None = None) -> Axes:
     Examples
     --------
     >>> from mgdd import plot
-    >>> from mgdd.results import labelled_dataset
+    >>> from mgdd.results.labels import labelled_dataset
     >>> n_step = labelled_dataset({
     ...     "predictor": ("predictor", ["pw_r", "persistence"], "-", "predictor"),
     ...     "horizon_s": ("horizon_s", [0.005, 0.02, 0.05], "s", "horizon"),
@@ -109,7 +109,7 @@ def residual_correlation(correlations: xr.Dataset, *, ax: Axes | None = None) ->
     Examples
     --------
     >>> from mgdd import plot
-    >>> from mgdd.results import labelled_dataset
+    >>> from mgdd.results.labels import labelled_dataset
     >>> correlations = labelled_dataset({
     ...     "lag": ("lag", [1, 2, 3], "samples", "lag"),
     ...     "autocorrelation": ("lag", [0.3, 0.1, 0.0], "-", "autocorrelation of the residual"),
@@ -168,7 +168,7 @@ def correlation_matrix(correlation: xr.Dataset, *, ax: Axes | None = None) -> Ax
     Examples
     --------
     >>> from mgdd import plot
-    >>> from mgdd.results import labelled_dataset
+    >>> from mgdd.results.labels import labelled_dataset
     >>> names = ["preload", "coulomb"]
     >>> correlation = labelled_dataset({
     ...     "parameter": ("parameter", names, "-", "parameter"),

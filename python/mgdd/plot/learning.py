@@ -39,7 +39,7 @@ def learning(learned: xr.Dataset, *, ax: Axes | None = None) -> Axes:
     Examples
     --------
     >>> from mgdd import plot
-    >>> from mgdd.results import labelled_dataset
+    >>> from mgdd.results.labels import labelled_dataset
     >>> learned = labelled_dataset({
     ...     "law": ("law", ["p"], "-", "learning law"), "trial": ("trial", [0, 1, 2], "-", "trial"),
     ...     "ca50_error_cad": (("law", "trial"), [[8.0, 4.0, 2.0]], "°CA", "rms error of CA50"),

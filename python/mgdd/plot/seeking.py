@@ -66,7 +66,7 @@ def seeking(
     --------
     >>> import numpy as np
     >>> from mgdd import plot
-    >>> from mgdd.results import labelled_dataset
+    >>> from mgdd.results.labels import labelled_dataset
     >>> cycle = np.arange(60)
     >>> run = labelled_dataset({
     ...     "cycle": ("cycle", cycle), "estimate_cad": ("cycle", -6.0 - 10.0 * 0.9**cycle),

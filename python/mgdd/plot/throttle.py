@@ -45,7 +45,7 @@ def holding_duty(log: xr.Dataset, *, limp_home_deg: float | None = None, ax: Axe
     --------
     >>> import numpy as np
     >>> from mgdd import plot
-    >>> from mgdd.results import labelled_dataset
+    >>> from mgdd.results.labels import labelled_dataset
     >>> time = np.arange(1000) * 0.02
     >>> duty = 0.3 * np.sin(0.3 * time)
     >>> log = labelled_dataset({
@@ -103,7 +103,7 @@ def free_run(run: xr.Dataset, *, ax: Axes | None = None) -> Axes:
     --------
     >>> import numpy as np
     >>> from mgdd import plot
-    >>> from mgdd.results import labelled_dataset
+    >>> from mgdd.results.labels import labelled_dataset
     >>> time = np.arange(100) * 0.01
     >>> run = labelled_dataset({
     ...     "time_s": ("time_s", time),

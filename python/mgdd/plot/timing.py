@@ -46,7 +46,7 @@ def timing(sweep: xr.Dataset, *, ax: Axes | None = None) -> Axes:
     Examples
     --------
     >>> from mgdd import plot
-    >>> from mgdd.results import labelled_dataset
+    >>> from mgdd.results.labels import labelled_dataset
     >>> sweep = labelled_dataset({
     ...     "soc_cad": ("soc_cad", [-10.0, -6.0, 0.0]),
     ...     "efficiency_gross": ("soc_cad", [0.5568, 0.5618, 0.5543]),

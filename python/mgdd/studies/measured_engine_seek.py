@@ -13,7 +13,7 @@ import numpy as np
 from mgdd import datasets
 from mgdd.errors import DataError
 from mgdd.loop import SurrogatePlant, run_seeker
-from mgdd.results import labelled_dataset
+from mgdd.results.labels import labelled_dataset
 from mgdd.studies.base import Progress, StudyResult, check_seeds, finish, run_parts
 from mgdd.studies.measured_engine_cases import (
     ARRIVAL_CAD,
@@ -137,7 +137,7 @@ def run_measured_engine_seek(
 
 def _surrogate() -> EngineSurrogate:
     try:
-        records = datasets.load_h2df_cycles()
+        records = datasets.load("h2df_502")
     except FileNotFoundError as error:
         raise DataError(
             f"the study {_NAME} needs the records of the hydrogen-diesel engine: {error.strerror}; the page "

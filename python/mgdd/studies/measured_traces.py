@@ -5,9 +5,8 @@ from __future__ import annotations
 from collections.abc import Callable, Sequence
 from typing import TYPE_CHECKING, Any
 
-from mgdd import presets
+from mgdd import datasets, presets
 from mgdd._core.engine import Cylinder, OperatingPoint
-from mgdd.datasets import load_hd_traces
 from mgdd.engine import analyze
 from mgdd.identify import best_timing, compare_laws, fit_cylinder, wall_heat_profile
 from mgdd.identify.engine.best_timing import WALL_HEAT_RANGE
@@ -76,7 +75,7 @@ def run_measured_traces(
     """
     preset = presets.load("hd_diesel_128x144")
     own = traces is None
-    traces = load_hd_traces() if traces is None else list(traces)
+    traces = datasets.load("hd_diesel_128x144") if traces is None else list(traces)
     cylinder = cylinder or preset.cylinder
     point = point or preset.point
     progress("analyse the traces")

@@ -12,8 +12,7 @@ import numpy as np
 from mgdd import presets
 from mgdd.engine import NoxModel, NoxProxy, OperatingPoint, SoftSensor, fit_nox_proxy, start_of_combustion
 from mgdd.loop import EngineBench, SensorDynamics
-from mgdd.results import VARIABLES, labelled_dataset
-from mgdd.results.labels import to_jsonable
+from mgdd.results.labels import VARIABLES, labelled_dataset, to_jsonable
 from mgdd.studies.base import Progress, StudyResult, check_seeds, finish, run_parts
 from mgdd.studies.nox_sensors_figures import draw
 from mgdd.studies.statistics import with_interval

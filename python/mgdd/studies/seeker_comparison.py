@@ -22,8 +22,7 @@ from mgdd.optimize import (
     tune,
 )
 from mgdd.optimize.tuning import Tuning
-from mgdd.results import labelled_dataset
-from mgdd.results.labels import to_jsonable
+from mgdd.results.labels import labelled_dataset, to_jsonable
 from mgdd.studies.base import Progress, StudyResult, check_seeds, finish, run_parts
 from mgdd.studies.load_step_learning import LAWS, Learned, learn
 from mgdd.studies.statistics import bands, loops, rms, with_interval

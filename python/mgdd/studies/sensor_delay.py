@@ -12,8 +12,7 @@ import numpy as np
 from mgdd.engine import Performance
 from mgdd.loop import EngineBench, LoopCriteria, SensorDynamics, find_steady_optimum, run_seeker
 from mgdd.optimize import ComponentLag, ExtremumSeeking, Optimum
-from mgdd.results import labelled_dataset
-from mgdd.results.labels import to_jsonable
+from mgdd.results.labels import labelled_dataset, to_jsonable
 from mgdd.results.units import unit_attributes
 from mgdd.studies.base import Progress, StudyResult, check_seeds, finish, run_parts
 from mgdd.studies.statistics import bands, loops, rms, with_interval

@@ -11,8 +11,7 @@ from mgdd import presets
 from mgdd.identify import fit_throttle
 from mgdd.io import throttle_log
 from mgdd.optimize import FitOptions
-from mgdd.results import labelled_dataset
-from mgdd.results.labels import to_jsonable
+from mgdd.results.labels import labelled_dataset, to_jsonable
 from mgdd.signals import nrmse_fit_percent
 from mgdd.studies.base import Progress, StudyResult, check_seeds, finish, run_parts
 from mgdd.studies.statistics import with_interval

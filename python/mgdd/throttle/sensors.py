@@ -12,7 +12,7 @@ import numpy as np
 from mgdd import _core
 from mgdd.errors import DataError, ParameterError
 from mgdd.io.parameters import ParameterFile, Parameters, Wanted, entries, wanted
-from mgdd.results import labelled_dataset
+from mgdd.results.labels import labelled_dataset
 from mgdd.signals.even_grid import even_step
 
 if TYPE_CHECKING:

@@ -11,7 +11,7 @@ import numpy as np
 from mgdd import _core
 from mgdd._core.throttle import Throttle
 from mgdd.errors import DataError, ParameterError, ShapeError
-from mgdd.results import labelled_dataset
+from mgdd.results.labels import labelled_dataset
 from mgdd.signals.even_grid import even_step
 
 if TYPE_CHECKING:

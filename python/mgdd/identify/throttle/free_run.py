@@ -8,7 +8,9 @@ from typing import TYPE_CHECKING, Any, cast
 import numpy as np
 
 from mgdd.errors import DataError
-from mgdd.results import Fit, FitQuality, Model, labelled_dataset
+from mgdd.results import Fit, Model
+from mgdd.results.fit import FitQuality
+from mgdd.results.labels import labelled_dataset
 from mgdd.signals.even_grid import even_step
 from mgdd.signals.metrics import nrmse_fit_percent, rmse
 

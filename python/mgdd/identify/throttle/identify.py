@@ -14,8 +14,9 @@ from mgdd.identify.throttle.prior import prior_of
 from mgdd.identify.throttle.record_content import open_questions, record_content
 from mgdd.identify.throttle.validation import entangled
 from mgdd.io import check_throttle_log
-from mgdd.results import Finding, Fit, FitQuality
+from mgdd.results import Finding, Fit
 from mgdd.results.finding import unique
+from mgdd.results.fit import FitQuality
 
 if TYPE_CHECKING:
     from collections.abc import Sequence

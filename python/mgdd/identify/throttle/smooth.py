@@ -15,8 +15,9 @@ from mgdd.errors import ParameterError, ShapeError, hand_over, or_partial
 from mgdd.io.parameters import FIT_NOTES, ParameterFile, Parameters, entries, wanted
 from mgdd.optimize.fit_options import FitOptions, fit_options
 from mgdd.optimize.fit_run import draw_run, fit_run, quality_of
-from mgdd.results import VARIABLES, Fit, FitReport
+from mgdd.results import Fit, FitReport
 from mgdd.results.describe import described
+from mgdd.results.labels import VARIABLES
 from mgdd.signals.even_grid import even_step
 from mgdd.signals.model import RunInputs, SampledModel, columns_of
 
