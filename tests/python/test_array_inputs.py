@@ -99,7 +99,7 @@ def logged(*columns: Any) -> Any:
 
 def smooth(duty: Any, angle: Any, starts: Any, lower: Any, upper: Any) -> Any:
     record = {"time_s": TIME, "duty": duty, "angle_deg": angle}
-    return identify.fit_smooth_throttle(record, start_values=starts, lower=lower, upper=upper).report.values
+    return SMOOTH.fit(record, start_values=starts, lower=lower, upper=upper).report.values
 
 
 def swept(**options: Any) -> Any:
@@ -123,12 +123,7 @@ CALLS: dict[str, tuple[Call, tuple[Array, ...]]] = {
     ),
     "identify.OnlineUpdate.update": (updated, (DUTY, ANGLE)),
     "identify.fit_ode": (fitted, (TIME, DUTY, ANGLE, np.array([8.0]))),
-    "identify.fit_smooth_throttle": (smooth, (DUTY, ANGLE, 1.05 * TEN, 0.1 * TEN, 10.0 * TEN)),
-    "identify.n_step_rms": (
-        lambda y: identify.n_step_rms(MODEL, log(), true_deg=y)["n_step_rms_deg"].to_numpy(), (ANGLE,),
-    ),
-    "io.from_0_720": (lambda a, p: io.from_0_720(a, p, firing_tdc_deg=360.0), (CRANK + 360.0, BAR)),
-    "io.from_btdc": (io.from_btdc, (-CRANK, BAR)),
+    "identify.SmoothThrottle.fit": (smooth, (DUTY, ANGLE, 1.05 * TEN, 0.1 * TEN, 10.0 * TEN)),
     "io.pressure_trace": (lambda a, p: io.pressure_trace(a, p)["pressure_bar"].to_numpy(), (CRANK, BAR)),
     "io.throttle_log": (logged, (TIME, DUTY, ANGLE, 0.1 * DUTY, 12.0 + DUTY)),
     "loop.EngineBench.run": (lambda soc: EngineBench(seed=1).run(soc)["j"].to_numpy(), (SOC,)),

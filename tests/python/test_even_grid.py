@@ -16,6 +16,7 @@ from scipy.signal import lfilter
 
 from mgdd import identify
 from mgdd.errors import DataError, ShapeError
+from mgdd.identify.throttle.n_step import n_step_rms
 from mgdd.io import throttle_log
 from mgdd.optimize import FitOptions
 from mgdd.results.labels import labelled_dataset
@@ -84,8 +85,7 @@ USERS: dict[str, Callable[[np.ndarray[Any, Any]], object]] = {
     "fit_pseudo_wiener": lambda time: identify.fit_pseudo_wiener(log(time), start_values=MODEL, options=ONCE),
     "identify_throttle": lambda time: identify.identify_throttle(log(time), options=FitOptions(n_starts=1)),
     "validate_throttle": lambda time: identify.validate_throttle(MODEL, log(time)),
-    "n_step_rms": lambda time: identify.n_step_rms(MODEL, log(time)),
-    "split_log": lambda time: identify.split_log(log(time), shares=(0.5, 0.5)),
+    "n_step_rms": lambda time: n_step_rms(MODEL, log(time)),
     "check_excitation": lambda time: identify.check_excitation(
         log(time), lambda _, duty, __: 30.0 + 100.0 * np.asarray(duty)
     ),

@@ -10,9 +10,7 @@ from mgdd.errors import DataError, ParameterError, ShapeError
 from mgdd.identify import (
     FirstPrincipleModel,
     SmoothThrottle,
-    fit_smooth_throttle,
     fit_throttle,
-    physical_parameters,
 )
 from mgdd.identify.throttle.first_principle_model import TYPICAL
 from mgdd.identify.throttle.first_principle_start import regression_start
@@ -100,21 +98,21 @@ def test_a_two_sided_log_with_noise_gives_both_sides_and_predicts_another_log():
 
 def test_physical_numbers_come_back_from_either_known_number():
     model = FirstPrincipleModel(parameters=TRUTH)
-    one = physical_parameters(model, resistance_ohm=1.5, supply_v=12.0, inertia_kgm2=0.0021)
+    one = model.physical_parameters(resistance_ohm=1.5, supply_v=12.0, inertia_kgm2=0.0021)
     # A passenger-car throttle with 0.383 N m/A, 0.0088 N m s/rad, 0.087 N m/rad, 0.396 and 0.284 N m.
     assert one["torque_constant_nm_per_a"] == pytest.approx(0.383, rel=2e-3)
     assert one["viscous_nms_per_rad"] == pytest.approx(0.0088, rel=0.05)
     assert one["spring_above_nm_per_rad"] == pytest.approx(0.087, rel=5e-3)
     assert one["preload_above_nm"] == pytest.approx(0.396, rel=5e-3)
     assert one["coulomb_nm"] == pytest.approx(0.284, rel=5e-3)
-    other = physical_parameters(
-        model, resistance_ohm=1.5, supply_v=12.0, torque_constant_nm_per_a=one["torque_constant_nm_per_a"]
+    other = model.physical_parameters(
+        resistance_ohm=1.5, supply_v=12.0, torque_constant_nm_per_a=one["torque_constant_nm_per_a"]
     )
     assert other == pytest.approx(one)
     with pytest.raises(ParameterError, match="exactly one"):
-        physical_parameters(model, resistance_ohm=1.5, supply_v=12.0)
+        model.physical_parameters(resistance_ohm=1.5, supply_v=12.0)
     with pytest.raises(ParameterError, match="resistance_ohm"):
-        physical_parameters(model, resistance_ohm=-1.0, supply_v=12.0, inertia_kgm2=0.002)
+        model.physical_parameters(resistance_ohm=-1.0, supply_v=12.0, inertia_kgm2=0.002)
 
 
 def test_wrong_calls_name_the_remedy_and_a_right_one_follows():
@@ -150,15 +148,15 @@ def test_ten_parameters_from_python_reach_the_noise_floor():
     log["angle_deg"] = log["angle_deg"] + noise
     starts = truth * rng.uniform(0.7, 1.3, (4, 10))
     box = {"lower": 0.1 * truth, "upper": 10 * truth}
-    fit = fit_smooth_throttle(log, start_values=starts, **box)
+    fit = SmoothThrottle().fit(log, start_values=starts, **box)
     assert fit.report.rmse < 1.005 * np.sqrt(np.mean(noise**2))
     assert fit.train.rmse == pytest.approx(fit.report.rmse, rel=1e-6)
     assert "viscous_nms_per_rad" in fit.unidentifiable
-    alone = fit_smooth_throttle(log, start_values=starts, lanes=False, **box)
+    alone = SmoothThrottle().fit(log, start_values=starts, lanes=False, **box)
     assert [report.cost for report in alone.start_reports] == [report.cost for report in fit.start_reports]
     with pytest.raises(ShapeError, match="start_values has shape"):
-        fit_smooth_throttle(log, start_values=[1.0, 2.0], lower=truth, upper=truth)
+        SmoothThrottle().fit(log, start_values=[1.0, 2.0], lower=truth, upper=truth)
     with pytest.raises(ParameterError, match="start torque_constant"):
-        fit_smooth_throttle(log, start_values=100 * truth, **box)
+        SmoothThrottle().fit(log, start_values=100 * truth, **box)
     with pytest.raises(ParameterError, match="seed has no effect"):
-        fit_smooth_throttle(log, start_values=truth, options=FitOptions(seed=1), **box)
+        SmoothThrottle().fit(log, start_values=truth, options=FitOptions(seed=1), **box)

@@ -11,7 +11,8 @@ import xarray as xr
 
 from mgdd.errors import DataError, ParameterError
 from mgdd.identify import fit_throttle, identify_throttle, load_throttle_model, validate_throttle
-from mgdd.io import ParameterFile, throttle_log
+from mgdd.io import throttle_log
+from mgdd.io.parameters import ParameterFile
 from mgdd.optimize import FitOptions
 from mgdd.results import Model
 from mgdd.signals import amplitude_random_steps, chirp, triangle

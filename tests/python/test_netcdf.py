@@ -18,14 +18,7 @@ import mgdd
 from mgdd import datasets, identify, optimize, presets, signals, surrogate
 from mgdd.engine import Cylinder, OperatingPoint, analyze, convergence, sensitivities, simulate, timing_sweep
 from mgdd.identify.throttle.validation import ThrottleValidation
-from mgdd.io import (
-    check_throttle_log,
-    pressure_trace,
-    read_pressure,
-    read_throttle_log,
-    throttle_log,
-    write_throttle_log,
-)
+from mgdd.io import pressure_trace, read_pressure, read_throttle_log, throttle_log, write_throttle_log
 from mgdd.loop import EngineBench, monte_carlo, run_seeker, steady_map
 from mgdd.results import FitReport
 from mgdd.results.labels import check_labels
@@ -125,10 +118,7 @@ MADE: dict[str, Callable[[Path], Any]] = {
     "results.Fit.run": lambda _: identify.fit_throttle(log(), options=optimize.FitOptions(n_starts=1)).run,
     "throttle.PseudoWiener.predict": lambda _: PseudoWiener("pw_r").predict(log(), 5),
     "identify.design_excitation": lambda _: identify.design_excitation("chirp", Throttle())[0],
-    "identify.n_step_rms": lambda _: validation().n_step,
     "surrogate.random_step_records": lambda _: surrogate.random_step_records(50),
-    "identify.split_log": lambda _: identify.split_log(log(), shares=(0.5, 0.5)),
-    "io.check_throttle_log": lambda _: check_throttle_log(log()),
     "io.pressure_trace": lambda _: pressure_trace(np.arange(-40.0, 41.0), 60.0 - 0.01 * np.arange(-40.0, 41.0) ** 2),
     "io.read_pressure": pressures,
     "io.read_throttle_log": written_log,

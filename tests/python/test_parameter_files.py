@@ -20,8 +20,7 @@ from mgdd.engine import simulate as simulate_cycle
 from mgdd.errors import DataError, ParameterError
 from mgdd.identify import FirstPrincipleModel, OdeModel, SmoothThrottle, load_throttle_model
 from mgdd.identify.throttle.first_principle_model import TYPICAL
-from mgdd.io import ParameterFile
-from mgdd.io.parameters import Entry, Wanted
+from mgdd.io.parameters import Entry, ParameterFile, Wanted
 from mgdd.presets import Preset
 from mgdd.studies.benchmarks.drive_axis import DriveModel
 from mgdd.studies.benchmarks.two_tanks import TwoTanksModel

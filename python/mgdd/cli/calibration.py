@@ -8,7 +8,8 @@ from typing import Any
 from mgdd.cli.options import engine_of, traces_of
 from mgdd.cli.output import check_output, emit
 from mgdd.errors import ConvergenceError
-from mgdd.identify import compare_laws, fit_cylinder, wall_heat_profile
+from mgdd.identify import fit_cylinder, wall_heat_profile
+from mgdd.identify.engine.burn_laws import compare_laws
 from mgdd.identify.engine.profile import WallHeatProfile
 from mgdd.identify.engine.records import CylinderFit, figures_of
 from mgdd.report import write_report

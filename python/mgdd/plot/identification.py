@@ -38,8 +38,8 @@ def error_growth(n_step: xr.Dataset, *, ax: Axes | None = None) -> Axes:
     Parameters
     ----------
     n_step : xarray.Dataset
-        ``n_step_rms_deg`` [deg] over ``predictor`` and ``horizon_s`` [s], as `mgdd.identify.n_step_rms` gives it; at
-        most five predictors.
+        ``n_step_rms_deg`` [deg] over ``predictor`` and ``horizon_s`` [s], as in the `n_step` of `validate_throttle`;
+        at most five predictors.
     ax : matplotlib.axes.Axes, optional
         Where to draw; None makes a figure.
 
@@ -67,7 +67,7 @@ def error_growth(n_step: xr.Dataset, *, ax: Axes | None = None) -> Axes:
     >>> plot.error_growth(n_step).get_ylabel()
     'RMS error ahead [deg]'
     """
-    require(n_step, ("predictor", "horizon_s", "n_step_rms_deg"), "mgdd.identify.n_step_rms")
+    require(n_step, ("predictor", "horizon_s", "n_step_rms_deg"), "mgdd.identify.validate_throttle")
     names = [str(name).replace("_", " ") for name in n_step["predictor"].to_numpy()]
     if len(names) > len(LINE_STYLES):
         raise DataError(f"predictor has {len(names)} entries: at most {len(LINE_STYLES)} lines can be distinguished")

@@ -8,9 +8,9 @@ from typing import TYPE_CHECKING, Any
 from mgdd import datasets, presets
 from mgdd._core.engine import Cylinder, OperatingPoint
 from mgdd.engine import analyze
-from mgdd.identify import best_timing, compare_laws, fit_cylinder, wall_heat_profile
+from mgdd.identify import best_timing, fit_cylinder, wall_heat_profile
 from mgdd.identify.engine.best_timing import WALL_HEAT_RANGE
-from mgdd.identify.engine.burn_laws import LAWS
+from mgdd.identify.engine.burn_laws import LAWS, compare_laws
 from mgdd.identify.engine.cylinder import BURN_FIELDS
 from mgdd.results.labels import to_jsonable
 from mgdd.studies.base import StudyResult

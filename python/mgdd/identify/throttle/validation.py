@@ -13,7 +13,7 @@ from mgdd.identify.throttle.free_run import columns_of, discarded, free_run, qua
 from mgdd.identify.throttle.n_step import n_step_rms, samples_of, whole_horizons
 from mgdd.identify.throttle.prior import prior_of
 from mgdd.identify.throttle.record_content import open_questions, record_content
-from mgdd.io import check_throttle_log
+from mgdd.io.throttle_checks import check_throttle_log
 from mgdd.results import Finding, Fit, FitReport, Model
 from mgdd.results.describe import described
 from mgdd.results.fit import FitQuality
@@ -154,7 +154,7 @@ def validate_throttle(
     Raises
     ------
     DataError
-        All of `mgdd.io.check_throttle_log`; a model that runs away.
+        As in `mgdd.io.throttle_log`; a model that runs away.
     ParameterError
         A horizon that is not a whole number of samples.
 
