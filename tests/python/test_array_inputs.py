@@ -107,7 +107,7 @@ def swept(**options: Any) -> Any:
 
 
 def many(duty: Any, time: Any, start: Any, supply: Any, air: Any) -> Any:
-    return throttle.simulate_many(
+    return throttle.simulate(
         throttle.Throttle(), duty, time_s=time, start_deg=start, supply_v=supply, airflow_torque_nm=air
     )["angle_deg"].to_numpy()
 
@@ -149,11 +149,11 @@ CALLS: dict[str, tuple[Call, tuple[Array, ...]]] = {
         lambda u, t, v, m: swept(duty=u, time_s=t, supply_v=v, airflow_torque_nm=m),
         (DUTY, TIME, 12.0 + DUTY, 0.01 * DUTY),
     ),
-    "throttle.simulate_many": (many, (DUTY, TIME, OPEN, 12.0 + DUTY, 0.01 * DUTY)),
 }  # fmt: skip
 
 # Models take columns by name; what is not exported takes arrays all the same.
 MORE: dict[str, tuple[Call, tuple[Array, ...]]] = {
+    "throttle.simulate, many cases": (many, (DUTY, TIME, OPEN, 12.0 + DUTY, 0.01 * DUTY)),
     "signals.even_grid.even_step": (even_step, (TIME,)),
     "throttle.airflow_torque_nm": (lambda a: airflow_torque_nm(throttle.Throttle(), a), (OPEN,)),
     "identify.FirstPrincipleModel.simulate": (run(GROUPS), (TIME, DUTY)),

@@ -24,7 +24,7 @@ from mgdd.signals.even_grid import check_count, common_step, even_step
 from mgdd.studies.benchmarks.drive_axis import drive_inverse_dynamics
 from mgdd.studies.benchmarks.two_tanks import fit_two_tanks
 from mgdd.studies.benchmarks.wiener_hammerstein import fit_linear
-from mgdd.throttle import PseudoWiener, Throttle, sense, simulate
+from mgdd.throttle import PseudoWiener, SensorPair, Throttle, simulate
 
 STEP = 1e-3
 ONCE = FitOptions(n_starts=1, max_iterations=1)
@@ -77,7 +77,7 @@ def lag(_: float, x: Any, u: Any, p: Any) -> Any:
 USERS: dict[str, Callable[[np.ndarray[Any, Any]], object]] = {
     "throttle_log": lambda time: throttle_log(time, DUTY, ANGLE),
     "simulate": lambda time: simulate(Throttle(), DUTY, time_s=time),
-    "sense": lambda time: sense(log(time)),
+    "sense": lambda time: SensorPair().sense(log(time)),
     "pseudo-Wiener run": lambda time: MODEL.simulate(log(time)),
     "pseudo-Wiener prediction": lambda time: MODEL.predict(log(time), 5),
     "first-principle run": lambda time: identify.FirstPrincipleModel().simulate(log(time)),

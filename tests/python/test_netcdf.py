@@ -24,7 +24,7 @@ from mgdd.results import FitReport
 from mgdd.results.labels import check_labels
 from mgdd.rig import SimulatedRig
 from mgdd.studies import run_measured_traces
-from mgdd.throttle import PseudoWiener, SensorFault, Throttle, groups, holding_duty, linear_part, sense, simulate_many
+from mgdd.throttle import PseudoWiener, SensorFault, SensorPair, Throttle, characteristics, holding_duty
 from mgdd.throttle import simulate as simulate_throttle
 
 POINT = OperatingPoint()
@@ -132,14 +132,14 @@ MADE: dict[str, Callable[[Path], Any]] = {
         lambda x: -float((x[0] - 2.0) ** 2), optimize.GradientDescent(start=1.0), 20
     ),
     "studies.StudyResult.dataset": lambda _: run_measured_traces(quick=True, figures=False).dataset,
-    "throttle.groups": lambda _: groups(Throttle()),
+    "throttle.characteristics": lambda _: characteristics(Throttle()),
     "throttle.holding_duty": lambda _: holding_duty(Throttle()),
-    "throttle.linear_part": lambda _: linear_part(Throttle()),
-    "throttle.sense": lambda _: sense(
+    "throttle.SensorPair.sense": lambda _: SensorPair().sense(
         simulate_throttle(Throttle(), 0.3, duration_s=0.2), faults=[SensorFault(kind="open_wire", sensor=2)]
     ),
-    "throttle.simulate": lambda _: simulate_throttle(Throttle(), 0.3, duration_s=0.2),
-    "throttle.simulate_many": lambda _: simulate_many(Throttle(), 0.3, duration_s=0.2, start_deg=[0.0, 20.0]),
+    "throttle.simulate": lambda _: [
+        simulate_throttle(Throttle(), 0.3, duration_s=0.2, start_deg=start) for start in (None, [0.0, 20.0])
+    ],
 }  # fmt: skip
 
 

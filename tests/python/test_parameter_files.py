@@ -26,7 +26,7 @@ from mgdd.studies.benchmarks.drive_axis import DriveModel
 from mgdd.studies.benchmarks.two_tanks import TwoTanksModel
 from mgdd.studies.benchmarks.wiener_hammerstein import LinearApproximation, WienerHammersteinModel
 from mgdd.surrogate import EngineSurrogate, SurrogateEngine, fit_surrogate, random_step_records
-from mgdd.throttle import PseudoWiener, SensorPair, Throttle, sense, simulate
+from mgdd.throttle import PseudoWiener, SensorPair, Throttle, simulate
 
 TIME = 1e-3 * np.arange(300)
 DUTY = 0.1 + 0.5 * np.sin(2.0 * np.pi * TIME * (2.0 + 20.0 * TIME))
@@ -175,7 +175,7 @@ def test_a_sensor_pair_comes_back() -> None:
     again = SensorPair.from_toml(pair.to_toml())
     assert again == pair
     run = simulate(Throttle(), 0.3, duration_s=0.2)
-    np.testing.assert_array_equal(sense(run, pair)["first_v"], sense(run, again)["first_v"])
+    np.testing.assert_array_equal(pair.sense(run)["first_v"], again.sense(run)["first_v"])
     with pytest.raises(ParameterError, match=r"adc_bits: value = 10\.5: must be a whole number"):
         SensorPair.from_toml(pair.to_toml().replace("value = 10,", "value = 10.5,"))
 

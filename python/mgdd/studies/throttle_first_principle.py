@@ -15,7 +15,7 @@ from mgdd.results.labels import labelled_dataset, to_jsonable
 from mgdd.signals import nrmse_fit_percent
 from mgdd.studies.base import Progress, StudyResult, check_seeds, finish, run_parts
 from mgdd.studies.statistics import with_interval
-from mgdd.throttle import Throttle, groups, simulate
+from mgdd.throttle import Throttle, characteristics, simulate
 
 if TYPE_CHECKING:
     import xarray as xr
@@ -140,7 +140,7 @@ def _case(
     name: str, throttle: Throttle, seeds: int
 ) -> tuple[list[dict[str, Any]], dict[str, Any], dict[str, NDArray[np.float64]]]:
     """Give the rows of the groups, the row of the fits, and the last free run over the random steps."""
-    truth = groups(throttle)
+    truth = characteristics(throttle)
     records = _records()
     errors: dict[str, list[float]] = {fitted: [] for _, fitted, _ in _GROUPS}
     quality: dict[str, list[float]] = {record: [] for record in records}
