@@ -155,7 +155,7 @@ def convergence() -> Rows:
 
 def ignition() -> Rows:
     soi = [-30.0, -20.0, -15.0, -10.0, -5.0, 0.0, 5.0, 10.0]
-    delay = [engine.start_of_combustion(*single(), soi_cad=s).delay_cad for s in soi]
+    delay = [engine.ignition_delay(*single(), soi_cad=s).delay_cad for s in soi]
     return {"SOI [°CA aTDC]": soi, "delay [°CA]": delay}
 
 

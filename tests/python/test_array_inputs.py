@@ -16,7 +16,7 @@ import mgdd
 from mgdd import identify, io, optimize, signals, surrogate, throttle
 from mgdd.engine import Cylinder, OperatingPoint, fit_nox_proxy, timing_sweep
 from mgdd.io.checks import check_trace
-from mgdd.loop import EngineBench, steady_map
+from mgdd.loop import EngineBench
 from mgdd.signals.even_grid import even_step
 from mgdd.signals.metrics import mse
 from mgdd.throttle.characteristics import airflow_torque_nm, mass_flow_kg_per_s
@@ -127,7 +127,7 @@ CALLS: dict[str, tuple[Call, tuple[Array, ...]]] = {
     "io.pressure_trace": (lambda a, p: io.pressure_trace(a, p)["pressure_bar"].to_numpy(), (CRANK, BAR)),
     "io.throttle_log": (logged, (TIME, DUTY, ANGLE, 0.1 * DUTY, 12.0 + DUTY)),
     "loop.EngineBench.run": (lambda soc: EngineBench(seed=1).run(soc)["j"].to_numpy(), (SOC,)),
-    "loop.steady_map": (lambda soc: steady_map(EngineBench(), soc)["j"].to_numpy(), (SOC,)),
+    "loop.EngineBench.steady_map": (lambda soc: EngineBench().steady_map(soc)["j"].to_numpy(), (SOC,)),
     "optimize.IterativeLearning.__init__": (taps, (np.zeros(5), np.array([0.1, 0.5, 0.1]))),
     "optimize.IterativeLearning.tell": (learned, (np.zeros(5), np.array([0.5, 0.3]), np.arange(5.0))),
     "optimize.least_squares": (searched, (np.array([1.0]), np.array([0.0]), np.array([9.0]), OPEN)),

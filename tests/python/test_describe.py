@@ -23,7 +23,7 @@ from mgdd.identify import (
     validate_throttle,
 )
 from mgdd.io import throttle_log
-from mgdd.loop import EngineBench, SensorDynamics, find_steady_optimum, run_seeker
+from mgdd.loop import EngineBench, SensorDynamics, run_seeker
 from mgdd.optimize import ExtremumSeeking, FitOptions, GoldenSection, Limit, tune
 from mgdd.presets import Preset
 from mgdd.results.describe import Row, as_html, as_text, rows_of
@@ -63,7 +63,7 @@ def objects() -> dict[str, Callable[[], Any]]:
         "seeker": lambda: ExtremumSeeking(**seeking),
         "golden": lambda: GoldenSection(**seeking, noise_sd=0.2),
         "run": lambda: run_seeker(EngineBench(), ExtremumSeeking(**seeking), 300),
-        "steady": lambda: find_steady_optimum(EngineBench(limits=["p_max_bar"]), {"p_max_bar": 95.0}),
+        "steady": lambda: EngineBench(limits=["p_max_bar"]).find_optimum({"p_max_bar": 95.0}),
         "optimum": lambda: find_optimum(Cylinder(), OperatingPoint()),
         "tuning": lambda: tune(0.25, -0.1, method="batch", distance=10.0, arrival=1.0),
         "pw_r": lambda: PseudoWiener("pw_r"),

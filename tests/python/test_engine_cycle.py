@@ -19,8 +19,8 @@ from mgdd.engine import (
     analyze,
     convergence,
     find_optimum,
+    ignition_delay,
     simulate,
-    start_of_combustion,
     timing_sweep,
 )
 from mgdd.results.labels import check_labels
@@ -72,7 +72,7 @@ def computed(text, quantity, at):
             return found[name]
         return float(simulate(cylinder, point, soc_cad=found["soc_cad"])[name])
     if quantity in ("delay_cad", "ignition_soc_cad"):
-        timing = start_of_combustion(cylinder, point, soi_cad=float(words["soi_cad"]))
+        timing = ignition_delay(cylinder, point, soi_cad=float(words["soi_cad"]))
         return getattr(timing, quantity.removeprefix("ignition_"))
     if quantity in ("swept_volume_l", "clearance_volume_l"):
         return getattr(cylinder, quantity)

@@ -19,7 +19,7 @@ from mgdd import datasets, identify, optimize, presets, signals, surrogate
 from mgdd.engine import Cylinder, OperatingPoint, analyze, convergence, sensitivities, simulate, timing_sweep
 from mgdd.identify.throttle.validation import ThrottleValidation
 from mgdd.io import pressure_trace, read_pressure, read_throttle_log, throttle_log, write_throttle_log
-from mgdd.loop import EngineBench, monte_carlo, run_seeker, steady_map
+from mgdd.loop import EngineBench, monte_carlo, run_seeker
 from mgdd.results import FitReport
 from mgdd.results.labels import check_labels
 from mgdd.rig import SimulatedRig
@@ -126,11 +126,10 @@ MADE: dict[str, Callable[[Path], Any]] = {
     "loop.EngineBench.run": lambda _: bench_run(),
     "loop.LoopRun.dataset": lambda _: [run_seeker(EngineBench(seed=1), seeker(), 20).dataset, rig_run()],
     "loop.monte_carlo": lambda _: monte_carlo(EngineBench(), seeker(), [1, 2], cycles=20),
-    "loop.steady_map": lambda _: steady_map(EngineBench(), [-10.0, -6.0]),
+    "loop.EngineBench.steady_map": lambda _: EngineBench().steady_map([-10.0, -6.0]),
     "optimize.IterativeLearning.history": lambda _: learned(),
-    "optimize.maximize": lambda _: optimize.maximize(
-        lambda x: -float((x[0] - 2.0) ** 2), optimize.GradientDescent(start=1.0), 20
-    ),
+    "optimize.Seeker.history": lambda _: optimize.Spsa(start=1.0).history,
+    "optimize.Seeker.run": lambda _: optimize.GradientDescent(start=1.0).run(lambda x: -float((x[0] - 2.0) ** 2), 20),
     "studies.StudyResult.dataset": lambda _: run_measured_traces(quick=True, figures=False).dataset,
     "throttle.characteristics": lambda _: characteristics(Throttle()),
     "throttle.holding_duty": lambda _: holding_duty(Throttle()),

@@ -8,7 +8,6 @@ from dataclasses import dataclass
 from typing import TYPE_CHECKING, Any
 
 from mgdd.errors import ParameterError
-from mgdd.loop import steady_map
 from mgdd.optimize import BoundedSeeking, ComponentLag, ExtremumSeeking, GoldenSection, Limit, NewtonSeeking, Spsa, tune
 from mgdd.optimize.tuning import Tuning
 
@@ -156,5 +155,5 @@ def _limit(task: Task, name: str, upper: float) -> Limit:
 
 def _slope_of(task: Task, name: str) -> float:
     low, high = task.bench.window_cad
-    around = steady_map(task.bench, [max(task.best["soc_cad"] - 0.5, low), min(task.best["soc_cad"] + 0.5, high)])
+    around = task.bench.steady_map([max(task.best["soc_cad"] - 0.5, low), min(task.best["soc_cad"] + 0.5, high)])
     return abs(float(around[name][1] - around[name][0])) if name in around else 0.0

@@ -10,7 +10,7 @@ from typing import TYPE_CHECKING, Any, NamedTuple
 import numpy as np
 
 from mgdd.errors import Interrupted, ParameterError
-from mgdd.loop.bench import FLAGS
+from mgdd.loop.bench_record import FLAGS
 from mgdd.loop.criteria import LoopCriteria
 from mgdd.loop.plant import AnnouncingPlant, Measurement, Plant
 from mgdd.loop.summary import summarize_cycles

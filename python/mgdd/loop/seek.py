@@ -11,7 +11,8 @@ import numpy as np
 
 from mgdd import _core
 from mgdd.errors import ParameterError, ShapeError, hand_over, or_partial
-from mgdd.loop.bench import EngineBench, cycles_to_dataset
+from mgdd.loop.bench import EngineBench
+from mgdd.loop.bench_record import cycles_to_dataset
 from mgdd.loop.criteria import LoopCriteria
 from mgdd.loop.plant import Plant
 from mgdd.loop.plant_loop import LoopRun, steer

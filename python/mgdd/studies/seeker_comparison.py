@@ -10,7 +10,7 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from mgdd.loop import EngineBench, LoopCriteria, find_steady_optimum
+from mgdd.loop import EngineBench, LoopCriteria
 from mgdd.optimize import (
     BoundedSeeking,
     ExtremumSeeking,
@@ -102,7 +102,7 @@ def run_seeker_comparison(
     1.0
     """
     seeds = min(check_seeds(seeds), 6) if quick else check_seeds(seeds)
-    best = find_steady_optimum(EngineBench())
+    best = EngineBench().find_optimum()
     contenders = _contenders(best)
     parts = [(c.name, partial(_run, c, best, seeds)) for c in contenders]
     done, interrupted = run_parts(parts, progress)

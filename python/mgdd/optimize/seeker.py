@@ -1,4 +1,4 @@
-"""What the Python interface of every seeker adds to the core: history, files and pickles."""
+"""What the Python interface of every seeker adds to the core: runs, history, files and pickles."""
 
 from __future__ import annotations
 
@@ -11,24 +11,25 @@ from typing import TYPE_CHECKING, Any, ClassVar, Protocol, Self
 import numpy as np
 
 from mgdd import _core
-from mgdd.errors import DataError, Error
+from mgdd.errors import DataError, Error, Interrupted, ParameterError
 from mgdd.results.describe import as_html, rows_of
 from mgdd.results.labels import labelled_dataset
 
 if TYPE_CHECKING:
     import os
+    from collections.abc import Callable
 
     import xarray as xr
     from numpy.typing import NDArray
 
-__all__ = ["SeekerRecord", "read_seeker_file"]
+__all__ = ["Seeker"]
 
 _FORMAT = 1
 _INPUT_UNIT, _J_UNIT = "unit of the input", "unit of J"
 
 
 class _CoreSeeker(Protocol):
-    """What `SeekerRecord` needs of the class of the core that it is mixed into."""
+    """What `Seeker` needs of the class of the core that it is mixed into."""
 
     kind: ClassVar[str]
 
@@ -40,14 +41,90 @@ class _CoreSeeker(Protocol):
     def estimate(self) -> NDArray[np.float64]: ...
     @property
     def cycle(self) -> int: ...
+    @property
+    def history(self) -> xr.Dataset: ...
+    def ask(self) -> NDArray[np.float64]: ...
+    def tell(self, J: Any = None, limits: Any = None, *, misfire: bool = False) -> None: ...  # noqa: N803
     def _history_columns(self) -> dict[str, Any]: ...
     def _clear_history(self) -> None: ...
 
 
-class SeekerRecord:
-    """History, files and pickles of a seeker; mixed into every seeker of `mgdd.optimize`."""
+class Seeker:
+    """What every seeker of `mgdd.optimize` has beside ``ask`` and ``tell``; `Seeker.load` reads a file of any kind.
+
+    Examples
+    --------
+    >>> import tempfile
+    >>> from pathlib import Path
+    >>> from mgdd.optimize import Seeker, Spsa
+    >>> with tempfile.TemporaryDirectory() as folder:
+    ...     file = Path(folder) / "spsa.json"
+    ...     Spsa(start=3.0).save(file)
+    ...     Seeker.load(file)
+    <Spsa cycle 0, estimate [3.]>
+    """
 
     kind: ClassVar[str]
+
+    if TYPE_CHECKING:
+
+        @property
+        def estimate(self) -> NDArray[np.float64]: ...  # noqa: D102
+        @property
+        def cycle(self) -> int: ...  # noqa: D102
+        def ask(self) -> NDArray[np.float64]: ...  # noqa: D102
+        def tell(self, J: Any = None, limits: Any = None, *, misfire: bool = False) -> None: ...  # noqa: D102, N803
+
+    def run(self: _CoreSeeker, fun: Callable[[NDArray[np.float64]], Any], cycles: int) -> xr.Dataset:
+        """Seek the optimum of a Python function for a number of cycles; `mgdd.loop.run_seeker` does so on a plant.
+
+        Parameters
+        ----------
+        fun : callable
+            ``fun(input) -> J`` with the input of shape (inputs,), or ``-> (J, limits)`` where the seeker keeps
+            limits; None says that the cycle misfired. J is a number, or an array with one entry per component.
+            Exceptions of `fun` pass through and leave the seeker as before that cycle.
+        cycles : int
+            Calls of `fun`, >= 0.
+
+        Returns
+        -------
+        xarray.Dataset
+            The `history`, earlier runs included.
+
+        Raises
+        ------
+        ParameterError
+            `cycles` is negative.
+        DataError, ShapeError
+            `fun` returned what the seeker refuses; the seeker is unchanged by that cycle.
+        Interrupted
+            Ctrl-C; ``partial`` is the history so far. The interrupted cycle is asked again when the run is continued.
+
+        Examples
+        --------
+        >>> from mgdd.optimize import GradientDescent
+        >>> history = GradientDescent(start=0.0).run(lambda x: -0.02 * (x[0] - 3.0) ** 2, 40)
+        >>> round(float(history["estimate"][-1, 0]), 3)
+        3.0
+        """
+        if cycles < 0:
+            raise ParameterError.of("cycles", cycles, ">= 0")
+        try:
+            for _ in range(cycles):
+                answer = fun(self.ask())
+                if answer is None:
+                    self.tell(math.nan, misfire=True)
+                elif isinstance(answer, tuple):
+                    self.tell(*answer)
+                else:
+                    self.tell(answer)
+        except KeyboardInterrupt:
+            done = (
+                f"interrupted after cycle {self.cycle}; the history is in .partial, and the seeker can go on from here"
+            )
+            raise Interrupted(done, self.history) from None
+        return self.history
 
     @property
     def history(self: _CoreSeeker) -> xr.Dataset:
@@ -111,7 +188,7 @@ class SeekerRecord:
         Returns
         -------
         seeker
-            Of this class.
+            Of this class; of any kind for `Seeker` itself.
 
         Raises
         ------
@@ -120,11 +197,12 @@ class SeekerRecord:
         OSError
             The file cannot be read.
         """
-        kind, settings, state = read_seeker_file(path)
-        if kind != cls.kind:
-            raise DataError(f"{Path(path)}: holds a {kind}, not a {cls.kind}; load_seeker reads any kind")
+        kind, settings, state = _read(path)
+        known = {one.kind: one for one in (Seeker.__subclasses__() if cls is Seeker else [cls])}
+        if kind not in known:
+            raise DataError(f"{Path(path)}: holds a {kind}, not a {' or '.join(known)}")
         try:
-            seeker: Self = _rebuild(cls, settings, state, None)
+            seeker: Self = _rebuild(known[kind], settings, state, None)
         except (Error, TypeError, KeyError) as error:
             raise DataError(f"{Path(path)}: settings and state do not make a {kind}: {error}") from error
         return seeker
@@ -141,8 +219,8 @@ class SeekerRecord:
         return as_html(type(self).__name__, rows_of({**now, **self.settings}))
 
 
-def read_seeker_file(path: str | os.PathLike[str]) -> tuple[str, dict[str, Any], dict[str, Any]]:
-    """Read kind, settings and state of a file that `SeekerRecord.save` wrote; DataError if it is none."""
+def _read(path: str | os.PathLike[str]) -> tuple[str, dict[str, Any], dict[str, Any]]:
+    """Read kind, settings and state of a file that `Seeker.save` wrote; DataError if it is none."""
     file = Path(path)
     try:
         content = json.loads(file.read_text(encoding="utf-8"), object_hook=_decode)
