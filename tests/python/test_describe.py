@@ -23,7 +23,7 @@ from mgdd.identify import (
     validate_throttle,
 )
 from mgdd.io import throttle_log
-from mgdd.loop import EngineBench, SensorDynamics, run_seeker
+from mgdd.loop import EngineBench, SensorDynamics, SurrogatePlant, run_seeker
 from mgdd.optimize import ExtremumSeeking, FitOptions, GoldenSection, Limit, tune
 from mgdd.presets import Preset
 from mgdd.results.describe import Row, as_html, as_text, rows_of
@@ -32,7 +32,7 @@ from mgdd.signals import chirp
 from mgdd.studies import StudyResult
 from mgdd.studies.benchmarks.drive_axis import DriveModel
 from mgdd.studies.benchmarks.wiener_hammerstein import LinearApproximation
-from mgdd.surrogate import SurrogateEngine, fit_surrogate, random_step_records
+from mgdd.surrogate import fit_surrogate, random_step_records
 from mgdd.throttle import PseudoWiener, SensorPair, Throttle, simulate
 
 
@@ -80,7 +80,7 @@ def objects() -> dict[str, Callable[[], Any]]:
         "signal": lambda: surrogate().signals["nox_ppm"],
         "lag": lambda: surrogate().signals["nox_ppm"].sensor,
         "best": lambda: surrogate().find_optimum("imep_bar"),
-        "surrogate engine": lambda: SurrogateEngine(surrogate()),
+        "surrogate engine": lambda: SurrogatePlant(surrogate()),
         "fit": lambda: fit_throttle(log(), options=FitOptions(n_starts=1)),
         "report": lambda: fit_throttle(log(), options=FitOptions(n_starts=1)).report,
         "validation": lambda: validate_throttle(FirstPrincipleModel(), log()),

@@ -21,11 +21,12 @@ from mgdd.errors import DataError, ParameterError
 from mgdd.identify import FirstPrincipleModel, OdeModel, SmoothThrottle, load_throttle_model
 from mgdd.identify.throttle.first_principle_model import TYPICAL
 from mgdd.io.parameters import Entry, ParameterFile, Wanted
+from mgdd.loop import SurrogatePlant
 from mgdd.presets import Preset
 from mgdd.studies.benchmarks.drive_axis import DriveModel
 from mgdd.studies.benchmarks.two_tanks import TwoTanksModel
 from mgdd.studies.benchmarks.wiener_hammerstein import LinearApproximation, WienerHammersteinModel
-from mgdd.surrogate import EngineSurrogate, SurrogateEngine, fit_surrogate, random_step_records
+from mgdd.surrogate import EngineSurrogate, fit_surrogate, random_step_records
 from mgdd.throttle import PseudoWiener, SensorPair, Throttle, simulate
 
 TIME = 1e-3 * np.arange(300)
@@ -238,7 +239,7 @@ def test_a_surrogate_predicts_and_runs_bit_for_bit_after_a_file(surrogate: Engin
     assert again.quality().equals(surrogate.quality())
     assert again.source == surrogate.source
     assert again.signals["nox_ppm"].sensor == surrogate.signals["nox_ppm"].sensor
-    first, then = (SurrogateEngine(model, seed=3) for model in (surrogate, again))
+    first, then = (SurrogatePlant(model, seed=3) for model in (surrogate, again))
     assert [first.step(-4.0) for _ in range(150)] == [then.step(-4.0) for _ in range(150)]
 
 

@@ -29,7 +29,7 @@ from mgdd.studies.measured_engine_cases import (
 )
 from mgdd.studies.measured_engine_figures import draw
 from mgdd.studies.statistics import mean_interval, with_interval
-from mgdd.surrogate import EngineSurrogate, SurrogateEngine, fit_surrogate
+from mgdd.surrogate import EngineSurrogate, fit_surrogate
 
 if TYPE_CHECKING:
     import xarray as xr
@@ -150,8 +150,9 @@ def _run(surrogate: EngineSurrogate, case: Case, seeds: int, cycles: int) -> _Ru
     estimate, outside = np.empty((seeds, cycles)), np.empty((seeds, cycles))
     signals = {name: np.empty((seeds, cycles)) for name in surrogate.signals}
     for seed in range(seeds):
-        engine = SurrogateEngine(surrogate, start_soi_cad=START_CAD, seed=seed)
-        plant = SurrogatePlant(engine, case.objective.weights, limits=list(case.objective.limits))
+        plant = SurrogatePlant(
+            surrogate, case.objective.weights, limits=list(case.objective.limits), start_soi_cad=START_CAD, seed=seed
+        )
         run = run_seeker(plant, seeker_of(case, seed), cycles).dataset
         estimate[seed] = run["estimate"][:, 0]
         outside[seed] = 1.0 - run["supported"]
