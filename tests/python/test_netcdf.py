@@ -23,7 +23,7 @@ from mgdd.loop import EngineBench, monte_carlo, run_seeker
 from mgdd.results import FitReport
 from mgdd.results.labels import check_labels
 from mgdd.rig import SimulatedRig
-from mgdd.studies import run_measured_traces
+from mgdd.studies import run_study
 from mgdd.throttle import PseudoWiener, SensorFault, SensorPair, Throttle, characteristics, holding_duty
 from mgdd.throttle import simulate as simulate_throttle
 
@@ -130,7 +130,7 @@ MADE: dict[str, Callable[[Path], Any]] = {
     "optimize.IterativeLearning.history": lambda _: learned(),
     "optimize.Seeker.history": lambda _: optimize.Spsa(start=1.0).history,
     "optimize.Seeker.run": lambda _: optimize.GradientDescent(start=1.0).run(lambda x: -float((x[0] - 2.0) ** 2), 20),
-    "studies.StudyResult.dataset": lambda _: run_measured_traces(quick=True, figures=False).dataset,
+    "studies.StudyResult.dataset": lambda _: run_study("measured-traces", quick=True, figures=False).dataset,
     "throttle.characteristics": lambda _: characteristics(Throttle()),
     "throttle.holding_duty": lambda _: holding_duty(Throttle()),
     "throttle.SensorPair.sense": lambda _: SensorPair().sense(

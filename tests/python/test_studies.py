@@ -12,12 +12,12 @@ import pytest
 
 from mgdd.report import write_report
 from mgdd.results.labels import check_labels
-from mgdd.studies import StudyResult, run_measured_traces
+from mgdd.studies import StudyResult, run_study
 
 
 @pytest.fixture(scope="module")
 def result() -> StudyResult:
-    return run_measured_traces()
+    return run_study("measured-traces")
 
 
 def test_every_bar_of_the_calibration(result: StudyResult) -> None:

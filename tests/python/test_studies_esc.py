@@ -106,5 +106,7 @@ def test_bad_requests_are_named() -> None:
         run_study("nothing")
     with pytest.raises(ParameterError, match="seeds = 0: must be >= 1"):
         run_study("sensor-delay", seeds=0)
+    with pytest.raises(ParameterError, match="traces: study 'sensor-delay' takes seeds"):
+        run_study("sensor-delay", traces=[])
     with pytest.raises(ParameterError, match="'measured-traces' is deterministic"):
         run_study("measured-traces", seeds=3)

@@ -55,7 +55,7 @@ def error_growth(n_step: xr.Dataset, *, ax: Axes | None = None) -> Axes:
 
     Examples
     --------
-    >>> from mgdd import plot
+    >>> from mgdd.plot.identification import error_growth
     >>> from mgdd.results.labels import labelled_dataset
     >>> n_step = labelled_dataset({
     ...     "predictor": ("predictor", ["pw_r", "persistence"], "-", "predictor"),
@@ -64,7 +64,7 @@ def error_growth(n_step: xr.Dataset, *, ax: Axes | None = None) -> Axes:
     ...         ("predictor", "horizon_s"), [[0.03, 0.05, 0.08], [0.41, 1.55, 3.98]], "deg", "RMS error ahead"
     ...     ),
     ... })
-    >>> plot.error_growth(n_step).get_ylabel()
+    >>> error_growth(n_step).get_ylabel()
     'RMS error ahead [deg]'
     """
     require(n_step, ("predictor", "horizon_s", "n_step_rms_deg"), "mgdd.identify.validate_throttle")
@@ -108,7 +108,7 @@ def residual_correlation(correlations: xr.Dataset, *, ax: Axes | None = None) ->
 
     Examples
     --------
-    >>> from mgdd import plot
+    >>> from mgdd.plot.identification import residual_correlation
     >>> from mgdd.results.labels import labelled_dataset
     >>> correlations = labelled_dataset({
     ...     "lag": ("lag", [1, 2, 3], "samples", "lag"),
@@ -116,7 +116,7 @@ def residual_correlation(correlations: xr.Dataset, *, ax: Axes | None = None) ->
     ...     "cross_correlation": ("lag", [0.0, 0.02, 0.01], "-", "correlation of residual and earlier duty"),
     ...     "limit": ((), 0.05, "-", "95 % limit"),
     ... })
-    >>> plot.residual_correlation(correlations).figure.axes[-1].get_xlabel()
+    >>> residual_correlation(correlations).figure.axes[-1].get_xlabel()
     'lag [samples]'
     """
     names = ("autocorrelation", "cross_correlation")
@@ -168,15 +168,10 @@ def correlation_matrix(correlation: xr.Dataset, *, ax: Axes | None = None) -> Ax
     Examples
     --------
     >>> from mgdd import plot
-    >>> from mgdd.results.labels import labelled_dataset
-    >>> names = ["preload", "coulomb"]
-    >>> correlation = labelled_dataset({
-    ...     "parameter": ("parameter", names, "-", "parameter"),
-    ...     "other": ("other", names, "-", "parameter"),
-    ...     "correlation": (("parameter", "other"), [[1.0, -0.99], [-0.99, 1.0]], "-", "correlation"),
-    ... })
-    >>> plot.correlation_matrix(correlation).texts[1].get_text()
-    '−0.99'
+    >>> from mgdd.optimize import least_squares
+    >>> fit = least_squares(lambda x: ([x[0] + x[1], x[0]], [[1, 1], [1, 0]]), [1.0, 1.0], names=["preload", "coulomb"])
+    >>> plot.correlation_matrix(fit.to_dataset()).texts[1].get_text()
+    '−0.71'
     """
     require(correlation, ("parameter", "other", "correlation"), "mgdd.results.FitReport.to_dataset")
     names = [str(name) for name in correlation["parameter"].to_numpy()]

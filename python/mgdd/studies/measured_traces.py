@@ -68,8 +68,8 @@ def run_measured_traces(
 
     Examples
     --------
-    >>> from mgdd.studies import run_measured_traces
-    >>> result = run_measured_traces(quick=True, figures=False)
+    >>> from mgdd.studies import run_study
+    >>> result = run_study("measured-traces", quick=True, figures=False)
     >>> [round(row["analysis"]["ca50_cad"], 1) for row in result.summary["traces"]]
     [5.0, 6.9, 9.4, 14.9]
     """

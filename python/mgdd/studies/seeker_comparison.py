@@ -251,6 +251,7 @@ def _draw(dataset: xr.Dataset) -> dict[str, Figure]:
     from matplotlib.figure import Figure
 
     from mgdd import plot
+    from mgdd.plot.learning import learning as learning_curves
 
     names = dataset["seeker"].to_numpy()
     columns = 4
@@ -272,6 +273,6 @@ def _draw(dataset: xr.Dataset) -> dict[str, Figure]:
     out = {"Estimate over cycles: median of the seeds, with the band that holds 80 % of them": figure}
     if "law" in dataset:
         learning = Figure(figsize=(6.6, 3.8), layout="constrained")
-        plot.learning(dataset, ax=learning.add_subplot())
+        learning_curves(dataset, ax=learning.add_subplot())
         out["Iterative learning of a repeated load step"] = learning
     return out

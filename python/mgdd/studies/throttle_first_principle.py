@@ -190,11 +190,11 @@ def _dataset(runs: list[dict[str, NDArray[np.float64]]], names: list[str]) -> xr
 def _draw(dataset: xr.Dataset) -> dict[str, Figure]:
     from matplotlib.figure import Figure
 
-    from mgdd import plot
+    from mgdd.plot.throttle import free_run
 
     out = {}
     for name in dataset["case"].to_numpy():
         figure = Figure(figsize=(7.2, 4.8), layout="constrained")
-        plot.free_run(dataset.sel(case=name), ax=figure.add_subplot())
+        free_run(dataset.sel(case=name), ax=figure.add_subplot())
         out[f"Free run over random steps of 150 ms, {name}"] = figure
     return out

@@ -136,9 +136,7 @@ def fit_cylinder(
 
 def _draw(fit: CylinderFit, ax: Any) -> Any:
     """Draw the trace that the model meets worst."""
-    from mgdd import plot
-
-    return plot.calibration_overlay(max(fit.loads, key=lambda load: load.rmse_percent).overlay, ax=ax)
+    return max(fit.loads, key=lambda load: load.rmse_percent).plot(ax=ax)
 
 
 def default_free(cylinder: Cylinder) -> tuple[str, ...]:

@@ -71,6 +71,23 @@ class WallHeatProfile:
     reasons: tuple[str, ...]
     dataset: xr.Dataset
 
+    def plot(self, *, ax: Any = None) -> Any:
+        """Draw the best reachable RMSE over the scale: a flat curve means the traces do not fix it.
+
+        Parameters
+        ----------
+        ax : matplotlib.axes.Axes, optional
+            Where to draw; None makes a figure.
+
+        Returns
+        -------
+        matplotlib.axes.Axes
+            The axes; the shaded band holds the scales within 10 % of the best RMSE.
+        """
+        from mgdd.plot.calibration import wall_heat_profile as draw
+
+        return draw(self.dataset, ax=ax)
+
     def to_dict(self) -> dict[str, Any]:
         """Give everything but the Dataset as a dict.
 

@@ -81,6 +81,23 @@ class Load:
     heat_loss_fraction: float
     overlay: xr.Dataset = field(repr=False)
 
+    def plot(self, *, ax: Any = None) -> Any:
+        """Draw measured points under the model's line, and their difference in a panel below.
+
+        Parameters
+        ----------
+        ax : matplotlib.axes.Axes, optional
+            Where to draw; None makes a figure.
+
+        Returns
+        -------
+        matplotlib.axes.Axes
+            The upper axes; the residual panel is ``ax.figure.axes[-1]``.
+        """
+        from mgdd.plot.calibration import calibration_overlay
+
+        return calibration_overlay(self.overlay, ax=ax)
+
 
 @dataclass(frozen=True, kw_only=True, eq=False, repr=False)
 class CylinderFit(Fit):

@@ -71,6 +71,6 @@ def source_of(log: xr.Dataset) -> str:
 
 def draw_free_run(fit: Fit, ax: Any) -> Any:
     """Draw the free run of a throttle fit over its log."""
-    from mgdd import plot
+    from mgdd.plot.throttle import free_run as draw
 
-    return plot.free_run(cast("xr.Dataset", fit.run), ax=ax)
+    return draw(cast("xr.Dataset", fit.run), ax=ax)
