@@ -19,7 +19,7 @@ from mgdd.identify import (
     SmoothThrottle,
     check_excitation,
     fit_cylinder,
-    fit_throttle,
+    fit_first_principle,
     validate_throttle,
 )
 from mgdd.io import throttle_log
@@ -81,8 +81,8 @@ def objects() -> dict[str, Callable[[], Any]]:
         "lag": lambda: surrogate().signals["nox_ppm"].sensor,
         "best": lambda: surrogate().find_optimum("imep_bar"),
         "surrogate engine": lambda: SurrogatePlant(surrogate()),
-        "fit": lambda: fit_throttle(log(), options=FitOptions(n_starts=1)),
-        "report": lambda: fit_throttle(log(), options=FitOptions(n_starts=1)).report,
+        "fit": lambda: fit_first_principle(log(), options=FitOptions(n_starts=1)),
+        "report": lambda: fit_first_principle(log(), options=FitOptions(n_starts=1)).report,
         "validation": lambda: validate_throttle(FirstPrincipleModel(), log()),
         "check": lambda: check_excitation(chirp(4.0, offset=0.01, amplitude=0.34), Throttle()),
         "calibration": lambda: fit_cylinder(

@@ -81,7 +81,7 @@ USERS: dict[str, Callable[[np.ndarray[Any, Any]], object]] = {
     "pseudo-Wiener run": lambda time: MODEL.simulate(log(time)),
     "pseudo-Wiener prediction": lambda time: MODEL.predict(log(time), 5),
     "first-principle run": lambda time: identify.FirstPrincipleModel().simulate(log(time)),
-    "fit_throttle": lambda time: identify.fit_throttle(log(time), options=ONCE),
+    "fit_first_principle": lambda time: identify.fit_first_principle(log(time), options=ONCE),
     "fit_pseudo_wiener": lambda time: identify.fit_pseudo_wiener(log(time), start_values=MODEL, options=ONCE),
     "identify_throttle": lambda time: identify.identify_throttle(log(time), options=FitOptions(n_starts=1)),
     "validate_throttle": lambda time: identify.validate_throttle(MODEL, log(time)),

@@ -13,7 +13,7 @@ from mgdd.identify.engine.profile import wall_heat_profile
 from mgdd.identify.ode_fit import OdeModel, fit_ode
 from mgdd.identify.throttle.excitation_check import check_excitation
 from mgdd.identify.throttle.excitation_design import design_excitation
-from mgdd.identify.throttle.first_principle import fit_throttle
+from mgdd.identify.throttle.first_principle import fit_first_principle
 from mgdd.identify.throttle.first_principle_model import FirstPrincipleModel
 from mgdd.identify.throttle.fits import load_throttle_model
 from mgdd.identify.throttle.identify import identify_throttle
@@ -31,9 +31,9 @@ __all__ = [
     "check_excitation",
     "design_excitation",
     "fit_cylinder",
+    "fit_first_principle",
     "fit_ode",
     "fit_pseudo_wiener",
-    "fit_throttle",
     "identify_throttle",
     "load_throttle_model",
     "validate_throttle",

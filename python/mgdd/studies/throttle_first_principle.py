@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from mgdd import presets
-from mgdd.identify import fit_throttle
+from mgdd.identify import fit_first_principle
 from mgdd.io import throttle_log
 from mgdd.optimize import FitOptions
 from mgdd.results.labels import labelled_dataset, to_jsonable
@@ -148,7 +148,7 @@ def _case(
     for seed in range(seeds):
         rng = np.random.default_rng(seed)
         logs = {record: _log(throttle, duty, rng) for record, duty in records.items()}
-        fit = fit_throttle(logs["train"], options=FitOptions(seed=seed))
+        fit = fit_first_principle(logs["train"], options=FitOptions(seed=seed))
         for own, fitted, _ in _GROUPS:
             errors[fitted].append(100.0 * (fit.parameters[fitted] / float(truth[own]) - 1.0))
         for record, log in logs.items():

@@ -21,14 +21,14 @@ if TYPE_CHECKING:
     import xarray as xr
     from numpy.typing import NDArray
 
-__all__ = ["fit_throttle"]
+__all__ = ["fit_first_principle"]
 
 ABOVE = ("beta_above_duty", "kappa_above_duty_per_deg")
 BELOW = ("beta_below_duty", "kappa_below_duty_per_deg")
 SIDE_S = 0.3  # shorter visits cannot settle a side's two parameters
 
 
-def fit_throttle(
+def fit_first_principle(
     log: xr.Dataset,
     *,
     test: xr.Dataset | None = None,
@@ -95,12 +95,12 @@ def fit_throttle(
     Examples
     --------
     >>> import numpy as np
-    >>> from mgdd.identify import FirstPrincipleModel, fit_throttle
+    >>> from mgdd.identify import FirstPrincipleModel, fit_first_principle
     >>> from mgdd.optimize import FitOptions
     >>> time = 1e-3 * np.arange(4000)
     >>> duty = 0.12 + 0.2 * np.sin(2 * np.pi * time * (0.5 + time))
     >>> log = FirstPrincipleModel().simulate({"time_s": time, "duty": duty}, initial_state={"angle_deg": 30.0})
-    >>> fit = fit_throttle(log, options=FitOptions(n_starts=1))
+    >>> fit = fit_first_principle(log, options=FitOptions(n_starts=1))
     >>> fit.train.nrmse_fit_percent > 99.0
     True
     """
