@@ -224,6 +224,15 @@ def test_bad_files(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
     assert "--pressure-unit 'Pa'" in refused(capsys, "engine", "analyze", str(pascal), *HD)
 
 
+def test_angles_before_tdc(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    trace, turned = datasets.load("hd_diesel_128x144")[0], tmp_path / "turned.csv"
+    columns = trace["crank_angle_cad"].values.tolist(), trace["pressure_bar"].values.tolist()
+    turned.write_text("".join(f"{-a!r} {p!r}\n" for a, p in zip(*columns, strict=True)))
+    assert refused(capsys, "engine", "analyze", str(turned), *HD).rstrip().endswith("pass --before-tdc")
+    out = run_json(capsys, "engine", "analyze", str(turned), *HD, "--before-tdc")
+    assert out["ca50_cad"] == pytest.approx(5.0, abs=0.1)
+
+
 def test_conditions_of_a_campaign(
     tmp_path: Path, files: tuple[list[str], str], capsys: pytest.CaptureFixture[str]
 ) -> None:

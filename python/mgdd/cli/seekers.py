@@ -13,9 +13,7 @@ from mgdd.optimize.tuning import Tuning
 
 if TYPE_CHECKING:
     from mgdd.loop import EngineBench
-    from mgdd.optimize import Optimum
-
-    Seeker = ExtremumSeeking | NewtonSeeking | BoundedSeeking | Spsa | GoldenSection
+    from mgdd.optimize import Optimum, Seeker
 
 __all__ = ["Task", "default_cycles", "make_seeker"]
 

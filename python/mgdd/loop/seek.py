@@ -21,9 +21,7 @@ from mgdd.results.labels import labelled_dataset
 if TYPE_CHECKING:
     import xarray as xr
 
-    from mgdd.optimize import BoundedSeeking, ExtremumSeeking, GoldenSection, GradientDescent, NewtonSeeking, Spsa
-
-    Seeker = ExtremumSeeking | NewtonSeeking | BoundedSeeking | Spsa | GradientDescent | GoldenSection
+    from mgdd.optimize import Seeker
 
 __all__ = ["LoopRun", "monte_carlo", "run_seeker"]
 
@@ -103,7 +101,8 @@ def run_seeker(
     if not isinstance(plant, EngineBench):
         return steer(plant, seeker, cycles, criteria)
     goal = _core_criteria(plant, criteria)
-    raw, stop = or_partial(lambda: _core.loop.run_loop(plant, seeker, cycles, **goal))
+    run: Any = _core.loop.run_loop  # one overload for each class of seeker
+    raw, stop = or_partial(lambda: run(plant, seeker, cycles, **goal))
     dataset = cycles_to_dataset(plant, raw["columns"], estimate_cad=raw["estimate_cad"])
     dataset.attrs["interrupted"] = int(raw["interrupted"])
     return hand_over(LoopRun(dataset=dataset, summary=raw["summary"], interrupted=raw["interrupted"]), stop)

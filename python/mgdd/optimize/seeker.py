@@ -6,7 +6,7 @@ import json
 import math
 import warnings
 from pathlib import Path
-from typing import TYPE_CHECKING, Any, ClassVar, Protocol, Self
+from typing import TYPE_CHECKING, Any, ClassVar, Self
 
 import numpy as np
 
@@ -28,28 +28,35 @@ _FORMAT = 1
 _INPUT_UNIT, _J_UNIT = "unit of the input", "unit of J"
 
 
-class _CoreSeeker(Protocol):
-    """What `Seeker` needs of the class of the core that it is mixed into."""
+if TYPE_CHECKING:
 
-    kind: ClassVar[str]
+    class _CoreSeeker:
+        """What every seeker has of its class of the core."""
 
-    @property
-    def settings(self) -> dict[str, Any]: ...
-    @property
-    def state(self) -> dict[str, list[float]]: ...
-    @property
-    def estimate(self) -> NDArray[np.float64]: ...
-    @property
-    def cycle(self) -> int: ...
-    @property
-    def history(self) -> xr.Dataset: ...
-    def ask(self) -> NDArray[np.float64]: ...
-    def tell(self, J: Any = None, limits: Any = None, *, misfire: bool = False) -> None: ...  # noqa: N803
-    def _history_columns(self) -> dict[str, Any]: ...
-    def _clear_history(self) -> None: ...
+        @property
+        def settings(self) -> dict[str, Any]: ...
+        @property
+        def state(self) -> dict[str, list[float]]: ...
+        @state.setter
+        def state(self, saved: Any) -> None: ...
+        @property
+        def estimate(self) -> NDArray[np.float64]: ...
+        @property
+        def cycle(self) -> int: ...
+        @property
+        def component_count(self) -> int: ...
+        @property
+        def limit_names(self) -> list[str]: ...
+        def ask(self) -> NDArray[np.float64]: ...
+        def tell(self, J: Any = None, limits: Any = None, *, misfire: bool = False) -> None: ...  # noqa: N803
+        def restart(self) -> None: ...
+        def _history_columns(self) -> dict[str, Any]: ...
+        def _clear_history(self) -> None: ...
+else:
+    _CoreSeeker = object
 
 
-class Seeker:
+class Seeker(_CoreSeeker):
     """What every seeker of `mgdd.optimize` has beside ``ask`` and ``tell``; `Seeker.load` reads a file of any kind.
 
     Examples
@@ -66,16 +73,7 @@ class Seeker:
 
     kind: ClassVar[str]
 
-    if TYPE_CHECKING:
-
-        @property
-        def estimate(self) -> NDArray[np.float64]: ...  # noqa: D102
-        @property
-        def cycle(self) -> int: ...  # noqa: D102
-        def ask(self) -> NDArray[np.float64]: ...  # noqa: D102
-        def tell(self, J: Any = None, limits: Any = None, *, misfire: bool = False) -> None: ...  # noqa: D102, N803
-
-    def run(self: _CoreSeeker, fun: Callable[[NDArray[np.float64]], Any], cycles: int) -> xr.Dataset:
+    def run(self, fun: Callable[[NDArray[np.float64]], Any], cycles: int) -> xr.Dataset:
         """Seek the optimum of a Python function for a number of cycles; `mgdd.loop.run_seeker` does so on a plant.
 
         Parameters
@@ -127,7 +125,7 @@ class Seeker:
         return self.history
 
     @property
-    def history(self: _CoreSeeker) -> xr.Dataset:
+    def history(self) -> xr.Dataset:
         """What was applied and told, cycle by cycle.
 
         Dimensions `cycle` and `input`; variables `applied` and `estimate` (before the cycle was told), both
@@ -147,11 +145,11 @@ class Seeker:
             attrs={"seeker": self.kind},
         )
 
-    def clear_history(self: _CoreSeeker) -> None:
+    def clear_history(self) -> None:
         """Forget the history; the run goes on."""
         self._clear_history()
 
-    def save(self: _CoreSeeker, path: str | os.PathLike[str]) -> None:
+    def save(self, path: str | os.PathLike[str]) -> None:
         """Write settings and state as JSON; the history is not part of the file.
 
         Parameters
@@ -207,14 +205,14 @@ class Seeker:
             raise DataError(f"{Path(path)}: settings and state do not make a {kind}: {error}") from error
         return seeker
 
-    def __reduce__(self: _CoreSeeker) -> tuple[Any, ...]:
+    def __reduce__(self) -> tuple[Any, ...]:
         columns = {name: np.asarray(column) for name, column in self._history_columns().items()}
         return _rebuild, (type(self), self.settings, self.state, columns), self.__dict__ or None
 
-    def __repr__(self: _CoreSeeker) -> str:
+    def __repr__(self) -> str:
         return f"<{type(self).__name__} cycle {self.cycle}, estimate {np.array2string(self.estimate, precision=6)}>"
 
-    def _repr_html_(self: _CoreSeeker) -> str:
+    def _repr_html_(self) -> str:
         now = {"cycle": self.cycle, "estimate": self.estimate}
         return as_html(type(self).__name__, rows_of({**now, **self.settings}))
 

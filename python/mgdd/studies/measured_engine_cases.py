@@ -18,6 +18,7 @@ from mgdd.optimize import (
     Limit,
     NewtonSeeking,
     Optimum,
+    Seeker,
     Spsa,
     tune,
 )
@@ -26,8 +27,6 @@ from mgdd.surrogate import EngineSurrogate
 
 if TYPE_CHECKING:
     from numpy.typing import NDArray
-
-    Seeker = ExtremumSeeking | NewtonSeeking | BoundedSeeking | Spsa | GoldenSection
 
 __all__ = [
     "ARRIVAL_CAD",
