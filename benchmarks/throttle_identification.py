@@ -26,7 +26,7 @@ from scipy.optimize import least_squares
 from support import machine
 
 from mgdd import _core
-from mgdd.identify import SmoothThrottle, fit_smooth_throttle
+from mgdd.identify import SmoothThrottle
 from mgdd.optimize import FitOptions
 
 STEP_S, N, NOISE_DEG, TOLERANCE = 1e-3, 20_000, 0.05, 1e-9
@@ -95,7 +95,7 @@ def contenders(duty, angle, start, lower, upper):
         return np.sqrt(cost / N), evaluations
 
     def ours(p):
-        fit = fit_smooth_throttle(
+        fit = SmoothThrottle().fit(
             record(duty, angle), start_values=p, lower=lower, upper=upper, initial_state=start,
             options=FitOptions(tolerance=TOLERANCE),
         )  # fmt: skip
@@ -145,7 +145,7 @@ def measure(name: str, options: argparse.Namespace) -> dict:
     times = []
     for _ in range(options.repeats):
         begin = time.process_time()
-        fit = fit_smooth_throttle(
+        fit = SmoothThrottle().fit(
             record(duty, angle), start_values=starts, lower=lower, upper=upper, initial_state=start
         )
         times.append(time.process_time() - begin)

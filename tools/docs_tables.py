@@ -14,11 +14,11 @@ import numpy as np
 
 from mgdd import datasets, engine, presets
 from mgdd.engine import Cylinder, OperatingPoint, analyze, simulate
-from mgdd.identify import best_timing, compare_laws, wall_heat_profile
+from mgdd.identify import best_timing, wall_heat_profile
+from mgdd.identify.engine.burn_laws import compare_laws
 from mgdd.identify.engine.records import CylinderFit
 from mgdd.io import pressure_trace
-from mgdd.results import VARIABLES
-from mgdd.results.labels import ANGLE
+from mgdd.results.labels import ANGLE, VARIABLES
 from mgdd.studies import run_study
 
 __all__ = [
@@ -68,7 +68,7 @@ def single() -> tuple[Cylinder, OperatingPoint]:
 
 @cache
 def measured() -> tuple[list[Any], Cylinder]:
-    return datasets.load_hd_traces(), presets.load("hd_diesel_128x144").cylinder
+    return datasets.load("hd_diesel_128x144"), presets.load("hd_diesel_128x144").cylinder
 
 
 @cache
@@ -155,7 +155,7 @@ def convergence() -> Rows:
 
 def ignition() -> Rows:
     soi = [-30.0, -20.0, -15.0, -10.0, -5.0, 0.0, 5.0, 10.0]
-    delay = [engine.start_of_combustion(*single(), soi_cad=s).delay_cad for s in soi]
+    delay = [engine.ignition_delay(*single(), soi_cad=s).delay_cad for s in soi]
     return {"SOI [°CA aTDC]": soi, "delay [°CA]": delay}
 
 

@@ -72,7 +72,7 @@ def main() -> None:
     import matplotlib.pyplot as plt
 
     out = Path(sys.argv[1]) if len(sys.argv) > 1 else OUT
-    traces, cylinder = datasets.load_hd_traces(), presets.load("hd_diesel_128x144").cylinder
+    traces, cylinder = datasets.load("hd_diesel_128x144"), presets.load("hd_diesel_128x144").cylinder
     double = fit_cylinder(traces, cylinder.replace(burn_shape="double_wiebe", gamma_model="constant"))
     single = {scale: fit_cylinder(traces, cylinder.replace(wall_heat_scale=scale), free=BURN) for scale in (0.5, 1.0)}
     plt.rcParams |= {"font.size": 9.5, "axes.titlesize": 9.5, "legend.fontsize": 9.0, "svg.hashsalt": "mgdd"}

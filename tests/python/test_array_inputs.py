@@ -16,7 +16,7 @@ import mgdd
 from mgdd import identify, io, optimize, signals, surrogate, throttle
 from mgdd.engine import Cylinder, OperatingPoint, fit_nox_proxy, timing_sweep
 from mgdd.io.checks import check_trace
-from mgdd.loop import EngineBench, steady_map
+from mgdd.loop import EngineBench
 from mgdd.signals.even_grid import even_step
 from mgdd.signals.metrics import mse
 from mgdd.throttle.characteristics import airflow_torque_nm, mass_flow_kg_per_s
@@ -99,7 +99,7 @@ def logged(*columns: Any) -> Any:
 
 def smooth(duty: Any, angle: Any, starts: Any, lower: Any, upper: Any) -> Any:
     record = {"time_s": TIME, "duty": duty, "angle_deg": angle}
-    return identify.fit_smooth_throttle(record, start_values=starts, lower=lower, upper=upper).report.values
+    return SMOOTH.fit(record, start_values=starts, lower=lower, upper=upper).report.values
 
 
 def swept(**options: Any) -> Any:
@@ -107,7 +107,7 @@ def swept(**options: Any) -> Any:
 
 
 def many(duty: Any, time: Any, start: Any, supply: Any, air: Any) -> Any:
-    return throttle.simulate_many(
+    return throttle.simulate(
         throttle.Throttle(), duty, time_s=time, start_deg=start, supply_v=supply, airflow_torque_nm=air
     )["angle_deg"].to_numpy()
 
@@ -123,16 +123,11 @@ CALLS: dict[str, tuple[Call, tuple[Array, ...]]] = {
     ),
     "identify.OnlineUpdate.update": (updated, (DUTY, ANGLE)),
     "identify.fit_ode": (fitted, (TIME, DUTY, ANGLE, np.array([8.0]))),
-    "identify.fit_smooth_throttle": (smooth, (DUTY, ANGLE, 1.05 * TEN, 0.1 * TEN, 10.0 * TEN)),
-    "identify.n_step_rms": (
-        lambda y: identify.n_step_rms(MODEL, log(), true_deg=y)["n_step_rms_deg"].to_numpy(), (ANGLE,),
-    ),
-    "io.from_0_720": (lambda a, p: io.from_0_720(a, p, firing_tdc_deg=360.0), (CRANK + 360.0, BAR)),
-    "io.from_btdc": (io.from_btdc, (-CRANK, BAR)),
+    "identify.SmoothThrottle.fit": (smooth, (DUTY, ANGLE, 1.05 * TEN, 0.1 * TEN, 10.0 * TEN)),
     "io.pressure_trace": (lambda a, p: io.pressure_trace(a, p)["pressure_bar"].to_numpy(), (CRANK, BAR)),
     "io.throttle_log": (logged, (TIME, DUTY, ANGLE, 0.1 * DUTY, 12.0 + DUTY)),
     "loop.EngineBench.run": (lambda soc: EngineBench(seed=1).run(soc)["j"].to_numpy(), (SOC,)),
-    "loop.steady_map": (lambda soc: steady_map(EngineBench(), soc)["j"].to_numpy(), (SOC,)),
+    "loop.EngineBench.steady_map": (lambda soc: EngineBench().steady_map(soc)["j"].to_numpy(), (SOC,)),
     "optimize.IterativeLearning.__init__": (taps, (np.zeros(5), np.array([0.1, 0.5, 0.1]))),
     "optimize.IterativeLearning.tell": (learned, (np.zeros(5), np.array([0.5, 0.3]), np.arange(5.0))),
     "optimize.least_squares": (searched, (np.array([1.0]), np.array([0.0]), np.array([9.0]), OPEN)),
@@ -154,11 +149,11 @@ CALLS: dict[str, tuple[Call, tuple[Array, ...]]] = {
         lambda u, t, v, m: swept(duty=u, time_s=t, supply_v=v, airflow_torque_nm=m),
         (DUTY, TIME, 12.0 + DUTY, 0.01 * DUTY),
     ),
-    "throttle.simulate_many": (many, (DUTY, TIME, OPEN, 12.0 + DUTY, 0.01 * DUTY)),
 }  # fmt: skip
 
 # Models take columns by name; what is not exported takes arrays all the same.
 MORE: dict[str, tuple[Call, tuple[Array, ...]]] = {
+    "throttle.simulate, many cases": (many, (DUTY, TIME, OPEN, 12.0 + DUTY, 0.01 * DUTY)),
     "signals.even_grid.even_step": (even_step, (TIME,)),
     "throttle.airflow_torque_nm": (lambda a: airflow_torque_nm(throttle.Throttle(), a), (OPEN,)),
     "identify.FirstPrincipleModel.simulate": (run(GROUPS), (TIME, DUTY)),

@@ -14,9 +14,8 @@ from mgdd.engine import (
     OperatingPoint,
     analyze,
     convergence,
+    ignition_delay,
     simulate,
-    start_of_combustion,
-    start_of_injection,
     timing_sweep,
 )
 from mgdd.errors import DataError, Error, ParameterError
@@ -92,7 +91,7 @@ TIMED = [
     lambda soc: simulate(CYLINDER, POINT, soc_cad=soc),
     lambda soc: timing_sweep(CYLINDER, POINT, soc_cad=[-6.0, soc]),
     lambda soc: convergence(CYLINDER, POINT, soc_cad=soc),
-    lambda soc: start_of_injection(CYLINDER, POINT, soc_cad=soc),
+    lambda soc: ignition_delay(CYLINDER, POINT, soc_cad=soc),
 ]
 
 
@@ -117,7 +116,7 @@ def test_timings_outside_the_closed_part():
     with pytest.raises(ParameterError, match=r"soc_cad = -40 °CA aTDC: must lie in the closed part.*-30"):
         simulate(late, POINT, soc_cad=-40.0)
     with pytest.raises(ParameterError, match=r"soi_cad = 21.*°bTDC"):
-        start_of_combustion(CYLINDER, POINT, soi_cad=21.0)
+        ignition_delay(CYLINDER, POINT, soi_cad=21.0)
 
 
 @pytest.mark.parametrize("step", [0.0, -1.0, 0.0005, 5.5, math.nan, math.inf])

@@ -16,7 +16,7 @@ import pytest
 
 from mgdd.cli import main
 from mgdd.engine import Performance
-from mgdd.loop import EngineBench, LoopCriteria, find_steady_optimum, run_seeker
+from mgdd.loop import EngineBench, LoopCriteria, run_seeker
 from mgdd.optimize import ExtremumSeeking
 
 METHODS = ("extremum_seeking", "newton", "bounded", "spsa", "golden")
@@ -39,7 +39,7 @@ def refused(capsys: pytest.CaptureFixture[str], *argv: str, code: int = 2) -> st
 
 @pytest.mark.parametrize("method", METHODS)
 def test_every_method_finds_the_steady_optimum(method: str, capsys: pytest.CaptureFixture[str]) -> None:
-    best = find_steady_optimum(EngineBench())
+    best = EngineBench().find_optimum()
     runs = [seek(capsys, "--method", method, "--seed", str(seed)) for seed in SEEDS]
     for run in runs:
         assert run["optimum_cad"] == best["soc_cad"]
@@ -79,7 +79,7 @@ def test_seekers_behind_the_analyser_arrive(method: str, form: str | None, capsy
     bench = EngineBench(performance=Performance.efficiency_and_nox(), nox_sensor="analyser")
     option = [] if form is None else ["--form", form]
     run = seek(capsys, "--sensor", "analyser", "--method", method, *option)
-    assert run["optimum_cad"] == find_steady_optimum(bench)["soc_cad"]
+    assert run["optimum_cad"] == bench.find_optimum()["soc_cad"]
     assert run["cycles"] == 4000
     assert run["final_cad"] == pytest.approx(run["optimum_cad"], abs=1.0)
     assert run["rms_cad"] < 0.6
@@ -105,7 +105,7 @@ def test_it_is_the_library_run(capsys: pytest.CaptureFixture[str], tmp_path: Pat
     argv = ("--seed", "7", "--cycles", "1500", "--start-cad", "-12", "--form", "moving_average", "-o", str(file))
     out = seek(capsys, *argv)
     bench = EngineBench(seed=7)
-    best = find_steady_optimum(bench)
+    best = bench.find_optimum()
     seeker = ExtremumSeeking(
         start=-12.0, lower=-30.0, upper=10.0, form="moving_average", gain=2.0 / (abs(best.curvature) * 40.0)
     )

@@ -16,10 +16,9 @@ import pytest
 
 from mgdd import datasets
 from mgdd.datasets.origins import ORIGINS, Origin
-from mgdd.errors import DataError
+from mgdd.errors import DataError, ParameterError
 from mgdd.io import read_pressure
-from mgdd.results import check_labels
-from mgdd.results.labels import ANGLE
+from mgdd.results.labels import ANGLE, check_labels
 
 NAME = "hd_diesel_128x144"
 FILES = (f"{NAME}_traces.csv", f"{NAME}_conditions.csv", f"{NAME}_SOURCE.txt", f"{NAME}_LICENSE.txt")
@@ -40,7 +39,7 @@ def source():
 
 @pytest.mark.usefixtures("alone")
 def test_the_four_traces():
-    traces = datasets.load_hd_traces()
+    traces = datasets.load("hd_diesel_128x144")
     assert [trace.attrs["load_percent"] for trace in traces] == [25, 50, 75, 100]
     assert [trace.attrs["trapped_mass_g"] for trace in traces] == [3.0858, 4.13863, 5.39428, 6.193]
     assert [trace.attrs["soi_cad"] for trace in traces] == [-5.06, -4.73, -4.75, -2.00]
@@ -61,7 +60,7 @@ def test_indicated_work_of_the_traces():
     swept = np.pi / 4.0 * bore**2 * 2.0 * crank
     lift = rod + crank - crank * np.cos(phi) - np.sqrt(rod**2 - (crank * np.sin(phi)) ** 2)
     volume = swept / (ratio - 1.0) + np.pi / 4.0 * bore**2 * lift
-    pascal = [1e5 * trace["pressure_bar"].to_numpy() for trace in datasets.load_hd_traces()]
+    pascal = [1e5 * trace["pressure_bar"].to_numpy() for trace in datasets.load("hd_diesel_128x144")]
     work = [float(np.sum(0.5 * (p[1:] + p[:-1]) * np.diff(volume))) for p in pascal]
     np.testing.assert_allclose(work, [1331.6, 2540.1, 3737.3, 4857.5], atol=0.05)
 
@@ -77,7 +76,7 @@ def test_the_source_gives_the_same_bytes(root, source, tmp_path):
 @pytest.mark.parametrize("load", [25, 50, 75, 100])
 def test_the_conversion_is_exact(source, load):
     original = read_pressure(source / f"pExpA{load}", pressure_unit="Pa")
-    packaged = next(t for t in datasets.load_hd_traces() if t.attrs["load_percent"] == load)
+    packaged = next(t for t in datasets.load("hd_diesel_128x144") if t.attrs["load_percent"] == load)
     np.testing.assert_array_equal(original["pressure_bar"], packaged["pressure_bar"])
 
 
@@ -142,10 +141,17 @@ def test_both_places_are_named(monkeypatch, tmp_path):
 @pytest.mark.usefixtures("alone")
 def test_a_changed_packaged_file_is_refused(monkeypatch, tmp_path):
     (tmp_path / FILES[0]).write_text("tampered")
-    monkeypatch.setattr(datasets, "_PACKAGE", tmp_path)
+    monkeypatch.setattr(sys.modules["mgdd.datasets.files"], "_PACKAGE", tmp_path)
     found = hashlib.sha256(b"tampered").hexdigest()
     with pytest.raises(DataError, match=f"SHA-256 is {found}, shipped was .*: the file was changed; reinstall"):
         datasets.path(NAME, FILES[0])
+
+
+def test_an_unknown_set_and_an_option_of_another_are_refused():
+    with pytest.raises(ParameterError, match="data set 'moon': must be one of cascaded_tanks, emps, h2df_502"):
+        datasets.load("moon")
+    with pytest.raises(ParameterError, match="only 'h2df_502' has them"):
+        datasets.load(NAME, mask_held=False)
 
 
 class Quiet(http.server.SimpleHTTPRequestHandler):
@@ -177,7 +183,7 @@ def served(tmp_path, monkeypatch):
         "moon": {f: Origin(f"{server.url}/{f}", hashlib.sha256(content).hexdigest()) for f, content in files.items()}
     }
     monkeypatch.setattr(sys.modules["mgdd.datasets.origins"], "ORIGINS", origins)
-    monkeypatch.setattr(datasets, "ORIGINS", origins)
+    monkeypatch.setattr(sys.modules["mgdd.datasets.files"], "ORIGINS", origins)
     monkeypatch.setenv("MGDD_CACHE_DIR", str(tmp_path / "cache"))
     monkeypatch.setenv("MGDD_DATA_DIR", str(tmp_path / "own"))
     yield folder

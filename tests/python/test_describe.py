@@ -19,11 +19,11 @@ from mgdd.identify import (
     SmoothThrottle,
     check_excitation,
     fit_cylinder,
-    fit_throttle,
+    fit_first_principle,
     validate_throttle,
 )
 from mgdd.io import throttle_log
-from mgdd.loop import EngineBench, SensorDynamics, find_steady_optimum, run_seeker
+from mgdd.loop import EngineBench, SensorDynamics, SurrogatePlant, run_seeker
 from mgdd.optimize import ExtremumSeeking, FitOptions, GoldenSection, Limit, tune
 from mgdd.presets import Preset
 from mgdd.results.describe import Row, as_html, as_text, rows_of
@@ -32,7 +32,7 @@ from mgdd.signals import chirp
 from mgdd.studies import StudyResult
 from mgdd.studies.benchmarks.drive_axis import DriveModel
 from mgdd.studies.benchmarks.wiener_hammerstein import LinearApproximation
-from mgdd.surrogate import SurrogateEngine, fit_surrogate, random_step_records
+from mgdd.surrogate import fit_surrogate, random_step_records
 from mgdd.throttle import PseudoWiener, SensorPair, Throttle, simulate
 
 
@@ -63,7 +63,7 @@ def objects() -> dict[str, Callable[[], Any]]:
         "seeker": lambda: ExtremumSeeking(**seeking),
         "golden": lambda: GoldenSection(**seeking, noise_sd=0.2),
         "run": lambda: run_seeker(EngineBench(), ExtremumSeeking(**seeking), 300),
-        "steady": lambda: find_steady_optimum(EngineBench(limits=["p_max_bar"]), {"p_max_bar": 95.0}),
+        "steady": lambda: EngineBench(limits=["p_max_bar"]).find_optimum({"p_max_bar": 95.0}),
         "optimum": lambda: find_optimum(Cylinder(), OperatingPoint()),
         "tuning": lambda: tune(0.25, -0.1, method="batch", distance=10.0, arrival=1.0),
         "pw_r": lambda: PseudoWiener("pw_r"),
@@ -80,12 +80,14 @@ def objects() -> dict[str, Callable[[], Any]]:
         "signal": lambda: surrogate().signals["nox_ppm"],
         "lag": lambda: surrogate().signals["nox_ppm"].sensor,
         "best": lambda: surrogate().find_optimum("imep_bar"),
-        "surrogate engine": lambda: SurrogateEngine(surrogate()),
-        "fit": lambda: fit_throttle(log(), options=FitOptions(n_starts=1)),
-        "report": lambda: fit_throttle(log(), options=FitOptions(n_starts=1)).report,
+        "surrogate engine": lambda: SurrogatePlant(surrogate()),
+        "fit": lambda: fit_first_principle(log(), options=FitOptions(n_starts=1)),
+        "report": lambda: fit_first_principle(log(), options=FitOptions(n_starts=1)).report,
         "validation": lambda: validate_throttle(FirstPrincipleModel(), log()),
         "check": lambda: check_excitation(chirp(4.0, offset=0.01, amplitude=0.34), Throttle()),
-        "calibration": lambda: fit_cylinder(datasets.load_hd_traces()[:1], presets.load("hd_diesel_128x144").cylinder),
+        "calibration": lambda: fit_cylinder(
+            datasets.load("hd_diesel_128x144")[:1], presets.load("hd_diesel_128x144").cylinder
+        ),
     }
 
 

@@ -18,7 +18,7 @@ from pathlib import Path
 import pytest
 
 import mgdd
-from mgdd.results import VARIABLES
+from mgdd.results.labels import VARIABLES
 
 ROOT = Path(__file__).resolve().parents[2]
 _SPEC = importlib.util.spec_from_file_location("docs_tables", ROOT / "tools" / "docs_tables.py")

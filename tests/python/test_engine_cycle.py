@@ -19,11 +19,11 @@ from mgdd.engine import (
     analyze,
     convergence,
     find_optimum,
+    ignition_delay,
     simulate,
-    start_of_combustion,
     timing_sweep,
 )
-from mgdd.results import check_labels
+from mgdd.results.labels import check_labels
 
 R = 8.314462618
 WORDS = ("soc_cad", "soi_cad", "integrator", "step_cad", "objective")
@@ -72,7 +72,7 @@ def computed(text, quantity, at):
             return found[name]
         return float(simulate(cylinder, point, soc_cad=found["soc_cad"])[name])
     if quantity in ("delay_cad", "ignition_soc_cad"):
-        timing = start_of_combustion(cylinder, point, soi_cad=float(words["soi_cad"]))
+        timing = ignition_delay(cylinder, point, soi_cad=float(words["soi_cad"]))
         return getattr(timing, quantity.removeprefix("ignition_"))
     if quantity in ("swept_volume_l", "clearance_volume_l"):
         return getattr(cylinder, quantity)

@@ -10,7 +10,7 @@ import pytest
 from mgdd import _core
 from mgdd.engine import Cylinder, OperatingPoint, sensitivities, simulate
 from mgdd.errors import ParameterError
-from mgdd.results import check_labels
+from mgdd.results.labels import check_labels
 
 # Away from kinks: start, joint and end of the burn lie between grid angles.
 SOC = -6.37

@@ -11,7 +11,7 @@ from mgdd import _core, datasets, presets
 from mgdd.engine import Cylinder, OperatingPoint, analyze, simulate
 from mgdd.errors import DataError, ParameterError
 from mgdd.io import pressure_trace
-from mgdd.results import check_labels
+from mgdd.results.labels import check_labels
 
 CYLINDER, POINT = Cylinder(), OperatingPoint()
 ADIABATIC = Cylinder(wall_heat_scale=0.0)
@@ -126,7 +126,11 @@ FIGURES = [  # p_max, its angle, n_c, n_e, work, IMEP, CA50, net heat, CA50 with
 
 @pytest.mark.parametrize("load", range(4))
 def test_measured_traces_give_their_published_figures(load):
-    cylinder, trace, own = presets.load("hd_diesel_128x144").cylinder, datasets.load_hd_traces()[load], FIGURES[load]
+    cylinder, trace, own = (
+        presets.load("hd_diesel_128x144").cylinder,
+        datasets.load("hd_diesel_128x144")[load],
+        FIGURES[load],
+    )
     back = analyze(trace, cylinder)
     check_labels(back)
     assert trace.sizes["crank_angle_cad"] == 267
@@ -173,7 +177,7 @@ def test_noise_hardly_moves_work_and_middle():
 
 
 def test_conditions_come_from_the_trace_before_the_point():
-    trace = datasets.load_hd_traces()[0]
+    trace = datasets.load("hd_diesel_128x144")[0]
     cylinder = presets.load("hd_diesel_128x144").cylinder
     here = analyze(trace, cylinder)
     there = analyze(trace, cylinder, point=OperatingPoint(speed_rpm=5000.0, trapped_mass_g=1.0))

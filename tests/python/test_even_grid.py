@@ -16,14 +16,15 @@ from scipy.signal import lfilter
 
 from mgdd import identify
 from mgdd.errors import DataError, ShapeError
+from mgdd.identify.throttle.n_step import n_step_rms
 from mgdd.io import throttle_log
 from mgdd.optimize import FitOptions
-from mgdd.results import labelled_dataset
+from mgdd.results.labels import labelled_dataset
 from mgdd.signals.even_grid import check_count, common_step, even_step
 from mgdd.studies.benchmarks.drive_axis import drive_inverse_dynamics
 from mgdd.studies.benchmarks.two_tanks import fit_two_tanks
 from mgdd.studies.benchmarks.wiener_hammerstein import fit_linear
-from mgdd.throttle import PseudoWiener, Throttle, sense, simulate
+from mgdd.throttle import PseudoWiener, SensorPair, Throttle, simulate
 
 STEP = 1e-3
 ONCE = FitOptions(n_starts=1, max_iterations=1)
@@ -76,16 +77,15 @@ def lag(_: float, x: Any, u: Any, p: Any) -> Any:
 USERS: dict[str, Callable[[np.ndarray[Any, Any]], object]] = {
     "throttle_log": lambda time: throttle_log(time, DUTY, ANGLE),
     "simulate": lambda time: simulate(Throttle(), DUTY, time_s=time),
-    "sense": lambda time: sense(log(time)),
+    "sense": lambda time: SensorPair().sense(log(time)),
     "pseudo-Wiener run": lambda time: MODEL.simulate(log(time)),
     "pseudo-Wiener prediction": lambda time: MODEL.predict(log(time), 5),
     "first-principle run": lambda time: identify.FirstPrincipleModel().simulate(log(time)),
-    "fit_throttle": lambda time: identify.fit_throttle(log(time), options=ONCE),
+    "fit_first_principle": lambda time: identify.fit_first_principle(log(time), options=ONCE),
     "fit_pseudo_wiener": lambda time: identify.fit_pseudo_wiener(log(time), start_values=MODEL, options=ONCE),
     "identify_throttle": lambda time: identify.identify_throttle(log(time), options=FitOptions(n_starts=1)),
     "validate_throttle": lambda time: identify.validate_throttle(MODEL, log(time)),
-    "n_step_rms": lambda time: identify.n_step_rms(MODEL, log(time)),
-    "split_log": lambda time: identify.split_log(log(time), shares=(0.5, 0.5)),
+    "n_step_rms": lambda time: n_step_rms(MODEL, log(time)),
     "check_excitation": lambda time: identify.check_excitation(
         log(time), lambda _, duty, __: 30.0 + 100.0 * np.asarray(duty)
     ),

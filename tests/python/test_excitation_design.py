@@ -11,7 +11,7 @@ from mgdd.errors import ConvergenceError, ParameterError
 from mgdd.identify import check_excitation, design_excitation
 from mgdd.identify.throttle.excitation_design import EXCITATIONS
 from mgdd.signals import chirp, triangle
-from mgdd.throttle import Throttle, groups, simulate
+from mgdd.throttle import Throttle, characteristics, simulate
 
 P1 = Throttle()
 STIFF = Throttle(
@@ -41,11 +41,11 @@ def test_designed_signals_move_the_plate_inside_its_limits(throttle: Throttle, k
 
 
 def test_offset_and_amplitude_follow_the_groups() -> None:
-    g = {name: float(value) for name, value in groups(P1).items()}
+    g = characteristics(P1)
+    balance = float(g["preload_above"] + g["spring_above_per_deg"] * (0.5 * (89.0 + 8.0) - 8.0))
     signal, _ = design_excitation("multisine", P1)
-    middle = 0.5 * (89.0 + 8.0) - 8.0
-    assert signal.attrs["offset"] == pytest.approx(g["preload_above"] + g["spring_above_per_deg"] * middle, rel=1e-9)
-    assert signal.attrs["amplitude"] == pytest.approx(2.2 * g["coulomb"], rel=1e-9)
+    assert signal.attrs["offset"] == pytest.approx(balance, rel=1e-9)
+    assert signal.attrs["amplitude"] == pytest.approx(float(2.2 * g["coulomb"]), rel=1e-9)
 
 
 def test_a_drifting_plate_is_centred() -> None:

@@ -14,10 +14,18 @@ from matplotlib.figure import Figure
 
 from mgdd import datasets, presets
 from mgdd.errors import DataError, ParameterError
-from mgdd.identify import FirstPrincipleModel, SmoothThrottle, fit_cylinder, fit_ode, fit_throttle, identify_throttle
+from mgdd.identify import (
+    FirstPrincipleModel,
+    SmoothThrottle,
+    fit_cylinder,
+    fit_first_principle,
+    fit_ode,
+    identify_throttle,
+)
 from mgdd.optimize import FitOptions, least_squares
 from mgdd.optimize.fit_options import fit_options
-from mgdd.results import Finding, Fit, FitQuality, Model
+from mgdd.results import Finding, Fit, Model
+from mgdd.results.fit import FitQuality
 from mgdd.studies.benchmarks.two_tanks import TwoTanksModel
 from mgdd.throttle import PseudoWiener
 
@@ -40,10 +48,10 @@ def fits() -> dict[str, Fit]:
     record = {"time_s": TIME, "u": np.ones(TIME.size), "y": y}
     start = {"parameters": {"gain": 1.0, "tau_s": 1.0}, "initial_state": [0.0]}
     return {
-        "first_principle": fit_throttle(log(), test=log(), options=once),
+        "first_principle": fit_first_principle(log(), test=log(), options=once),
         "pw_r": identify_throttle(log(), test=log(), limp_home_deg=8.0, options=once),
         "ode": fit_ode(lag, record, **start),
-        "cylinder": fit_cylinder(datasets.load_hd_traces()[:2], presets.load("hd_diesel_128x144").cylinder),
+        "cylinder": fit_cylinder(datasets.load("hd_diesel_128x144")[:2], presets.load("hd_diesel_128x144").cylinder),
     }
 
 

@@ -7,7 +7,7 @@ import pytest
 
 from mgdd import _core
 from mgdd.errors import DataError, ParameterError, ShapeError
-from mgdd.identify import OdeModel, SmoothThrottle, fit_ode, fit_smooth_throttle
+from mgdd.identify import OdeModel, SmoothThrottle, fit_ode
 from mgdd.optimize import FitOptions
 
 
@@ -109,7 +109,7 @@ def test_python_and_the_core_agree_on_one_problem():
     run = SmoothThrottle(parameters=found.model.parameters).simulate(log)["angle_deg"]
     assert float(((run - log["angle_deg"]) ** 2).sum()) == pytest.approx(2 * found.report.cost, rel=1e-9)
     # The core's ten-parameter fit cannot be worse than four parameters at the same place.
-    core = fit_smooth_throttle(log, start_values=values, lower=0.1 * truth, upper=10 * truth)
+    core = SmoothThrottle().fit(log, start_values=values, lower=0.1 * truth, upper=10 * truth)
     assert core.report.cost <= found.report.cost
 
 

@@ -10,9 +10,7 @@ from mgdd.errors import DataError, ParameterError, ShapeError
 from mgdd.identify import (
     FirstPrincipleModel,
     SmoothThrottle,
-    fit_smooth_throttle,
-    fit_throttle,
-    physical_parameters,
+    fit_first_principle,
 )
 from mgdd.identify.throttle.first_principle_model import TYPICAL
 from mgdd.identify.throttle.first_principle_start import regression_start
@@ -55,7 +53,7 @@ def two_sided_log(noise_deg=0.03):
 
 
 def test_noise_free_log_gives_the_visited_side_back():
-    fit = fit_throttle(make_log(), fixed={"limp_home_deg": 8.0}, options=FitOptions(n_starts=1, tolerance=1e-14))
+    fit = fit_first_principle(make_log(), fixed={"limp_home_deg": 8.0}, options=FitOptions(n_starts=1, tolerance=1e-14))
     for name in ("tau_s", "gain_deg_per_s2_per_duty", "beta_above_duty", "kappa_above_duty_per_deg", "delta_duty"):
         assert fit.parameters[name] == pytest.approx(TRUTH[name], rel=1e-5), name
     assert fit.train.nrmse_fit_percent > 99.99
@@ -77,7 +75,7 @@ def test_the_start_leaves_out_windows_that_hold_a_reversal_or_a_rest(amplitude):
 
 
 def test_a_one_sided_log_names_the_other_side_and_an_excitation():
-    fit = fit_throttle(make_log(noise_deg=0.03), fixed={"limp_home_deg": 8.0}, options=FitOptions(n_starts=1))
+    fit = fit_first_principle(make_log(noise_deg=0.03), fixed={"limp_home_deg": 8.0}, options=FitOptions(n_starts=1))
     assert {"beta_below_duty", "kappa_below_duty_per_deg"} <= set(fit.unidentifiable)
     kept = next(finding for finding in fit.findings if finding.code == "start_value_kept")
     assert set(kept.names) == {"beta_below_duty", "kappa_below_duty_per_deg"}
@@ -87,7 +85,7 @@ def test_a_one_sided_log_names_the_other_side_and_an_excitation():
 
 
 def test_a_two_sided_log_with_noise_gives_both_sides_and_predicts_another_log():
-    fit = fit_throttle(two_sided_log(), test=make_log(noise_deg=0.03), options=FitOptions(n_starts=2))
+    fit = fit_first_principle(two_sided_log(), test=make_log(noise_deg=0.03), options=FitOptions(n_starts=2))
     assert isinstance(fit.model, Model)
     assert fit.kind == "first_principle"
     for name in ("tau_s", "gain_deg_per_s2_per_duty", "beta_above_duty", "delta_duty", "beta_below_duty"):
@@ -100,37 +98,38 @@ def test_a_two_sided_log_with_noise_gives_both_sides_and_predicts_another_log():
 
 def test_physical_numbers_come_back_from_either_known_number():
     model = FirstPrincipleModel(parameters=TRUTH)
-    one = physical_parameters(model, resistance_ohm=1.5, supply_v=12.0, inertia_kgm2=0.0021)
+    one = model.physical_parameters(resistance_ohm=1.5, supply_v=12.0, inertia_kgm2=0.0021)
     # A passenger-car throttle with 0.383 N m/A, 0.0088 N m s/rad, 0.087 N m/rad, 0.396 and 0.284 N m.
     assert one["torque_constant_nm_per_a"] == pytest.approx(0.383, rel=2e-3)
     assert one["viscous_nms_per_rad"] == pytest.approx(0.0088, rel=0.05)
     assert one["spring_above_nm_per_rad"] == pytest.approx(0.087, rel=5e-3)
     assert one["preload_above_nm"] == pytest.approx(0.396, rel=5e-3)
     assert one["coulomb_nm"] == pytest.approx(0.284, rel=5e-3)
-    other = physical_parameters(
-        model, resistance_ohm=1.5, supply_v=12.0, torque_constant_nm_per_a=one["torque_constant_nm_per_a"]
+    other = model.physical_parameters(
+        resistance_ohm=1.5, supply_v=12.0, torque_constant_nm_per_a=one["torque_constant_nm_per_a"]
     )
     assert other == pytest.approx(one)
     with pytest.raises(ParameterError, match="exactly one"):
-        physical_parameters(model, resistance_ohm=1.5, supply_v=12.0)
+        model.physical_parameters(resistance_ohm=1.5, supply_v=12.0)
     with pytest.raises(ParameterError, match="resistance_ohm"):
-        physical_parameters(model, resistance_ohm=-1.0, supply_v=12.0, inertia_kgm2=0.002)
+        model.physical_parameters(resistance_ohm=-1.0, supply_v=12.0, inertia_kgm2=0.002)
 
 
 def test_wrong_calls_name_the_remedy_and_a_right_one_follows():
     log = make_log(span_s=1.0)
     with pytest.raises(ParameterError, match="no throttle group"):
-        fit_throttle(log, fixed={"tau": 0.02})
+        fit_first_principle(log, fixed={"tau": 0.02})
     with pytest.raises(ParameterError, match="tau_s"):
-        fit_throttle(log, start_values={"tau_s": 9.0})
+        fit_first_principle(log, start_values={"tau_s": 9.0})
     with pytest.raises(DataError, match="at least 100"):
-        fit_throttle(log.isel(time_s=slice(0, 50)))
+        fit_first_principle(log.isel(time_s=slice(0, 50)))
     with pytest.raises(DataError, match="drive the plate"):
-        fit_throttle(log.assign(angle_deg=log.angle_deg * 0.0 + 40.0))
+        fit_first_principle(log.assign(angle_deg=log.angle_deg * 0.0 + 40.0))
     with pytest.raises(ParameterError, match="horizon"):
         FirstPrincipleModel(parameters=TRUTH).predict(log, 0)
     assert (
-        fit_throttle(log, fixed={"limp_home_deg": 8.0}, options=FitOptions(n_starts=1)).train.nrmse_fit_percent > 99.0
+        fit_first_principle(log, fixed={"limp_home_deg": 8.0}, options=FitOptions(n_starts=1)).train.nrmse_fit_percent
+        > 99.0
     )
 
 
@@ -150,15 +149,15 @@ def test_ten_parameters_from_python_reach_the_noise_floor():
     log["angle_deg"] = log["angle_deg"] + noise
     starts = truth * rng.uniform(0.7, 1.3, (4, 10))
     box = {"lower": 0.1 * truth, "upper": 10 * truth}
-    fit = fit_smooth_throttle(log, start_values=starts, **box)
+    fit = SmoothThrottle().fit(log, start_values=starts, **box)
     assert fit.report.rmse < 1.005 * np.sqrt(np.mean(noise**2))
     assert fit.train.rmse == pytest.approx(fit.report.rmse, rel=1e-6)
     assert "viscous_nms_per_rad" in fit.unidentifiable
-    alone = fit_smooth_throttle(log, start_values=starts, lanes=False, **box)
+    alone = SmoothThrottle().fit(log, start_values=starts, lanes=False, **box)
     assert [report.cost for report in alone.start_reports] == [report.cost for report in fit.start_reports]
     with pytest.raises(ShapeError, match="start_values has shape"):
-        fit_smooth_throttle(log, start_values=[1.0, 2.0], lower=truth, upper=truth)
+        SmoothThrottle().fit(log, start_values=[1.0, 2.0], lower=truth, upper=truth)
     with pytest.raises(ParameterError, match="start torque_constant"):
-        fit_smooth_throttle(log, start_values=100 * truth, **box)
+        SmoothThrottle().fit(log, start_values=100 * truth, **box)
     with pytest.raises(ParameterError, match="seed has no effect"):
-        fit_smooth_throttle(log, start_values=truth, options=FitOptions(seed=1), **box)
+        SmoothThrottle().fit(log, start_values=truth, options=FitOptions(seed=1), **box)

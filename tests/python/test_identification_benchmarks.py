@@ -13,7 +13,7 @@ from matplotlib.figure import Figure
 from mgdd import datasets
 from mgdd.errors import DataError, ParameterError, ShapeError
 from mgdd.optimize import FitOptions
-from mgdd.results import labelled_dataset
+from mgdd.results.labels import labelled_dataset
 from mgdd.studies import run_study
 from mgdd.studies.benchmarks.drive_axis import DriveModel, drive_free_run, drive_inverse_dynamics, fit_drive
 from mgdd.studies.benchmarks.two_tanks import TwoTanksModel, fit_two_tanks
@@ -117,9 +117,9 @@ def test_the_circuit_needs_orders_that_fit() -> None:
 
 def test_missing_sets_are_named(monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.delenv("MGDD_DATA_DIR", raising=False)
-    for load in (datasets.load_emps, datasets.load_cascaded_tanks, datasets.load_wiener_hammerstein):
+    for name in ("emps", "cascaded_tanks", "wh2009"):
         with pytest.raises(FileNotFoundError, match="MGDD_DATA_DIR"):
-            load()
+            datasets.load(name)
     with pytest.raises(DataError, match="at least one of emps, cascaded_tanks, wh2009"):
         run_study("identification-benchmarks", quick=True)
 
@@ -130,15 +130,15 @@ def test_a_file_that_is_another_is_refused(tmp_path: Path, monkeypatch: pytest.M
     file = tmp_path / "wh2009" / "WienerHammerBenchmark.csv"
     file.write_text("a,b\n1,2\n")
     with pytest.raises(DataError, match="uBenchMark, yBenchMark were expected"):
-        datasets.load_wiener_hammerstein()
+        datasets.load("wh2009")
     file.write_text('"uBenchMark","yBenchMark",\n1,2,\n1,2,\n')
     with pytest.raises(DataError, match="needs 184000"):
-        datasets.load_wiener_hammerstein()
+        datasets.load("wh2009")
 
 
 @needs["emps"]
 def test_emps_inverse_dynamics_and_free_run() -> None:
-    train, test = datasets.load_emps()
+    train, test = datasets.load("emps")
     found = drive_inverse_dynamics(train, directional=False)
     # Figures of an independent inverse-dynamics fit with the same filter.
     assert found["mass_kg"] == pytest.approx(95.138, abs=0.1)
@@ -155,7 +155,7 @@ def test_emps_inverse_dynamics_and_free_run() -> None:
 
 @needs["cascaded_tanks"]
 def test_cascaded_tanks_from_the_stated_window() -> None:
-    train, test = datasets.load_cascaded_tanks()
+    train, test = datasets.load("cascaded_tanks")
     fit = fit_two_tanks(train)
     assert fit.train.rmse == pytest.approx(0.1537, abs=5e-4)
     assert fit.report.rmse == pytest.approx(fit.train.rmse, rel=1e-9)
@@ -170,7 +170,7 @@ def test_cascaded_tanks_from_the_stated_window() -> None:
 
 @needs["wh2009"]
 def test_the_circuit_below_a_millivolt() -> None:
-    train, test = datasets.load_wiener_hammerstein()
+    train, test = datasets.load("wh2009")
     assert (train.sizes["time_s"], test.sizes["time_s"]) == (100_000, 78_800)
     fit = fit_wiener_hammerstein(train.isel(time_s=slice(0, 20_000)), scan_samples=8000, follow=8)
     error = (fit.model.simulate(test)["output_v"] - test["output_v"]).to_numpy()[50:]

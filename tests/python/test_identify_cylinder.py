@@ -14,7 +14,7 @@ from mgdd.engine import Cylinder, OperatingPoint, simulate
 from mgdd.errors import DataError, ParameterError
 from mgdd.identify import fit_cylinder, wall_heat_profile
 from mgdd.io import pressure_trace
-from mgdd.results import check_labels
+from mgdd.results.labels import check_labels
 
 BURN = ("soc_cad", "burn_duration_cad", "fuel_heat_j")
 HD = presets.load("hd_diesel_128x144").cylinder
@@ -42,12 +42,12 @@ def plant(noise_bar=0.0, seed=0):
 
 @functools.cache
 def measured(law):
-    return fit_cylinder(datasets.load_hd_traces(), HD.replace(**LAWS[law]))
+    return fit_cylinder(datasets.load("hd_diesel_128x144"), HD.replace(**LAWS[law]))
 
 
 @functools.cache
 def profile(law):
-    return wall_heat_profile(datasets.load_hd_traces(), measured(law))
+    return wall_heat_profile(datasets.load("hd_diesel_128x144"), measured(law))
 
 
 def true_values():
@@ -100,7 +100,7 @@ def test_measured_traces_meet_the_reference_fits(root):
     lines = (root / "tests/data/engine_golden.csv").read_text().splitlines()
     rows = [line.split(",") for line in lines if ",fit_" in line]
     assert len(rows) > 30
-    with_mass, fits, wrong = datasets.load_hd_traces(), {}, []
+    with_mass, fits, wrong = datasets.load("hd_diesel_128x144"), {}, []
     # Without a mass the point's temperature and the cylinder's volumetric efficiency give the charge.
     without = [t.drop_attrs().assign_attrs(file=t.file, speed_rpm=1200.0) for t in with_mass]
     for text, name, value, tolerance in rows:
@@ -190,7 +190,7 @@ def test_a_profile_needs_a_free_scale():
     with pytest.raises(ParameterError, match="wall_heat_scale was not free"):
         wall_heat_profile(plant(), fit)
     with pytest.raises(ParameterError, match=r"scales: 3 must be in \[0, 2\.5\]"):
-        wall_heat_profile(datasets.load_hd_traces(), measured("wiebe, gamma linear"), scales=[1.0, 3.0])
+        wall_heat_profile(datasets.load("hd_diesel_128x144"), measured("wiebe, gamma linear"), scales=[1.0, 3.0])
 
 
 def test_a_load_carries_what_a_simulation_needs():

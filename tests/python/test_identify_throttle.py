@@ -10,8 +10,9 @@ import pytest
 import xarray as xr
 
 from mgdd.errors import DataError, ParameterError
-from mgdd.identify import fit_throttle, identify_throttle, load_throttle_model, validate_throttle
-from mgdd.io import ParameterFile, throttle_log
+from mgdd.identify import fit_first_principle, identify_throttle, load_throttle_model, validate_throttle
+from mgdd.io import throttle_log
+from mgdd.io.parameters import ParameterFile
 from mgdd.optimize import FitOptions
 from mgdd.results import Model
 from mgdd.signals import amplitude_random_steps, chirp, triangle
@@ -79,7 +80,8 @@ def test_a_lag_of_the_current_is_kept_only_where_it_pays() -> None:
     for noise_deg, kept in ((0.03, True), (0.25, True), (0.47, False)):
         log = throttle_log(run["time_s"], run["duty"], run["angle_deg"] + noise_deg * noise)
         without, with_lag = (
-            fit_throttle(log, electrical=lag, options=FitOptions(n_starts=1)).report.rmse for lag in (False, True)
+            fit_first_principle(log, electrical=lag, options=FitOptions(n_starts=1)).report.rmse
+            for lag in (False, True)
         )
         assert with_lag < without
         assert (with_lag < 0.97 * without) is kept

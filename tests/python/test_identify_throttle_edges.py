@@ -16,7 +16,7 @@ from mgdd.identify import FirstPrincipleModel, design_excitation, identify_throt
 from mgdd.io import throttle_log, write_throttle_log
 from mgdd.optimize import FitOptions
 from mgdd.signals import amplitude_random_steps, chirp
-from mgdd.throttle import Throttle, groups, simulate
+from mgdd.throttle import Throttle, characteristics, simulate
 
 NOISE_DEG = 0.03
 
@@ -66,7 +66,7 @@ def test_limp_home_is_read_off_a_record_that_starts_there() -> None:
     signal, _ = design_excitation("chirp", p3)
     fit = identify_throttle(measured(p3, signal["duty"].to_numpy()), "first_principle")
     assert fit.parameters["limp_home_deg"] == pytest.approx(12.0, abs=0.1)
-    truth = groups(p3)
+    truth = characteristics(p3)
     assert fit.parameters["gain_deg_per_s2_per_duty"] == pytest.approx(float(truth["gain_deg_per_s2"]), rel=0.03)
 
 

@@ -12,6 +12,7 @@ from hypothesis.extra.numpy import arrays
 
 from mgdd import identify, signals
 from mgdd.errors import DataError, ParameterError, ShapeError
+from mgdd.identify.throttle.n_step import n_step_rms
 from mgdd.identify.throttle.record_content import open_questions, record_content
 from mgdd.identify.throttle.validation import ThrottleValidation
 from mgdd.io import throttle_log
@@ -98,14 +99,12 @@ def log(angle: np.ndarray | None = None, duty: np.ndarray | None = None) -> Any:
 
 
 def test_a_log_is_split_by_time() -> None:
-    parts = identify.split_log(log())
-    assert [part.sizes["time_s"] for part in parts] == [3600, 1200, 1200]
-    np.testing.assert_array_equal(np.concatenate([part["time_s"] for part in parts]), TIME)
-    assert [part.sizes["time_s"] for part in identify.split_log(log(), shares=(0.5, 0.5))] == [3000, 3000]
-    with pytest.raises(ParameterError, match="add up to 1"):
-        identify.split_log(log(), shares=(0.5, 0.4))
+    for block in (slice(0, 3600), slice(3600, 4800), slice(4800, None)):
+        part = log().isel(time_s=block)
+        np.testing.assert_array_equal(part["time_s"], TIME[block])
+        assert identify.validate_throttle(Proportional(), part).quality.nrmse_fit_percent == pytest.approx(100.0)
     with pytest.raises(DataError, match="log more"):
-        identify.split_log(log(), shares=(0.95, 0.05))
+        identify.validate_throttle(Proportional(), log().isel(time_s=slice(5700, None)))
 
 
 class Proportional(SampledModel):
@@ -206,12 +205,12 @@ def test_the_residual_is_compared_with_the_duty_that_was_held_while_it_arose() -
 
 def test_n_steps_can_be_compared_with_the_truth() -> None:
     noisy = log()["angle_deg"].to_numpy() + 0.05 * RNG.standard_normal(TIME.size)
-    rms = identify.n_step_rms(Proportional(), log(noisy), true_deg=log()["angle_deg"])["n_step_rms_deg"]
+    rms = n_step_rms(Proportional(), log(noisy), true_deg=log()["angle_deg"])["n_step_rms_deg"]
     assert rms.sel(predictor="pw_r").to_numpy() == pytest.approx(0.05, rel=0.1)
     with pytest.raises(ParameterError, match="not a whole number of samples"):
-        identify.n_step_rms(Proportional(), log(), horizons_s=(0.0055,))
+        n_step_rms(Proportional(), log(), horizons_s=(0.0055,))
     with pytest.raises(ParameterError, match="more than half"):
-        identify.n_step_rms(Proportional(), log(), horizons_s=(5.0,))
+        n_step_rms(Proportional(), log(), horizons_s=(5.0,))
 
 
 def test_a_poor_fit_is_named() -> None:
@@ -277,7 +276,7 @@ def test_crossings_are_counted_with_a_band() -> None:
     assert content.time_above_s == pytest.approx(content.time_below_s, abs=0.05)
 
 
-@pytest.mark.parametrize("how", ["identify_throttle", "fit_throttle", "fit_pseudo_wiener"])
+@pytest.mark.parametrize("how", ["identify_throttle", "fit_first_principle", "fit_pseudo_wiener"])
 def test_a_fit_in_percent_has_one_definition(how: str) -> None:
     """Every way to a fit says the figure that its validation says: the free run without its first 50 ms."""
     rng = np.random.default_rng(0)
@@ -290,7 +289,7 @@ def test_a_fit_in_percent_has_one_definition(how: str) -> None:
     once = FitOptions(n_starts=1)
     fits = {
         "identify_throttle": lambda: identify.identify_throttle(train, test=test, options=once),
-        "fit_throttle": lambda: identify.fit_throttle(train, test=test, options=once),
+        "fit_first_principle": lambda: identify.fit_first_principle(train, test=test, options=once),
         "fit_pseudo_wiener": lambda: identify.fit_pseudo_wiener(train, limp_home_deg=8.0, options=once),
     }
     fit = fits[how]()

@@ -8,10 +8,9 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from mgdd.errors import DataError, ShapeError
-from mgdd.io import from_0_720, from_btdc, pressure_trace, read_conditions, read_pressure, write_pressure
+from mgdd.io import pressure_trace, read_conditions, read_pressure, write_pressure
 from mgdd.io.checks import check_trace
-from mgdd.results import check_labels
-from mgdd.results.labels import ANGLE
+from mgdd.results.labels import ANGLE, check_labels
 
 ANGLES = np.arange(-143.0, 124.0)
 BAR = 1.5 + 120.0 * np.exp(-((ANGLES - 6.0) ** 2) / 1500.0)
@@ -103,20 +102,22 @@ def test_nothing_of_the_caller_is_changed_or_kept():
     angle.flags.writeable = bar.flags.writeable = False
     trace = pressure_trace(angle, bar)
     trace["pressure_bar"][0] = 99.0
-    shifted = from_0_720(np.arange(0.0, 720.0), np.ones(720), firing_tdc_deg=0.0)
-    assert shifted[0].base is not angle
+    turned = pressure_trace(angle + 360.0, bar, firing_tdc_deg=360.0)
+    turned["pressure_bar"][0] = 99.0
+    np.testing.assert_array_equal(angle, ANGLES)
     np.testing.assert_array_equal(bar, BAR)
 
 
 @given(st.floats(0.0, 720.0))
 def test_0_720_puts_firing_tdc_at_zero(tdc):
     angle = np.arange(0.0, 720.0, 1.0)
-    pressure = np.cos(np.deg2rad(angle - tdc) / 2.0) ** 2
-    cad, reordered = from_0_720(angle, pressure, firing_tdc_deg=tdc)
+    past = (angle - tdc + 360.0) % 720.0 - 360.0
+    trace = pressure_trace(angle, 2.0 + 100.0 * np.cos(np.deg2rad(past) / 4.0) ** 2, firing_tdc_deg=tdc)
+    cad, reordered = trace[ANGLE].to_numpy(), trace["pressure_bar"].to_numpy()
     assert cad.min() >= -360.0
     assert cad.max() <= 360.0
     assert np.all(np.diff(cad) >= 0.0)
-    np.testing.assert_allclose(reordered, np.cos(np.deg2rad(cad) / 2.0) ** 2, atol=1e-9)
+    np.testing.assert_allclose(reordered, 2.0 + 100.0 * np.cos(np.deg2rad(cad) / 4.0) ** 2, atol=1e-9)
 
 
 def test_reading_a_0_720_record(file):
@@ -129,10 +130,13 @@ def test_reading_a_0_720_record(file):
     assert late.equals(trace)
 
 
-def test_btdc_converts():
-    cad, pressure = from_btdc(-ANGLES, BAR)
-    np.testing.assert_array_equal(cad, ANGLES)
-    np.testing.assert_array_equal(pressure, BAR)
+def test_btdc_converts(file):
+    trace = pressure_trace(-ANGLES, BAR, before_tdc=True)
+    np.testing.assert_array_equal(trace[ANGLE], ANGLES)
+    np.testing.assert_array_equal(trace["pressure_bar"], BAR)
+    assert read_pressure(file(text(-ANGLES)), before_tdc=True).drop_attrs(deep=False).equals(trace)
+    with pytest.raises(DataError, match="one convention: give one of them"):
+        pressure_trace(ANGLES, BAR, firing_tdc_deg=0.0, before_tdc=True)
 
 
 def replaced(array, index, value):
@@ -167,9 +171,9 @@ ARRAY_FAULTS = {
         -ANGLES,
         BAR,
         {},
-        "looks like °bTDC; .*firing TDC = 0, compression negative; mgdd.io.from_btdc",
+        "looks like °bTDC; .*firing TDC = 0, compression negative; pass before_tdc=True",
     ),
-    "0..720": (ANGLES + 360.0, BAR, {}, "run from 217 to 483: .*0..720 record; .*from_0_720"),
+    "0..720": (ANGLES + 360.0, BAR, {}, "run from 217 to 483: .*0..720 record; .*firing_tdc_deg="),
     "wrong TDC": (
         np.arange(0.0, 361.0),
         2.0 + 100.0 * np.exp(-((np.arange(0.0, 361.0) - 355.0) ** 2) / 900.0),

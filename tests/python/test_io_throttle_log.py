@@ -9,7 +9,8 @@ import numpy as np
 import pytest
 
 from mgdd.errors import DataError, ParameterError, ShapeError
-from mgdd.io import check_throttle_log, read_throttle_log, throttle_log, write_throttle_log
+from mgdd.io import read_throttle_log, throttle_log, write_throttle_log
+from mgdd.io.throttle_checks import check_throttle_log
 
 TIME = np.arange(1200) * 1e-3
 DUTY = 0.25 * np.sin(2.0 * np.pi * 2.0 * TIME)

@@ -18,7 +18,7 @@ from mgdd.engine import Cylinder, OperatingPoint, simulate
 from mgdd.errors import DataError, ParameterError, ShapeError
 from mgdd.optimize import IterativeLearning
 from mgdd.optimize.iterative_learning import ConvergenceReport
-from mgdd.results import check_labels
+from mgdd.results.labels import check_labels
 
 
 def lifted(h, n):

@@ -14,7 +14,7 @@ from mgdd import _core, presets
 from mgdd.engine import Cylinder, NoxModel, NoxProxy, OperatingPoint, Performance, PerformanceTerm, SoftSensor, simulate
 from mgdd.errors import ParameterError, RigError, ShapeError
 from mgdd.loop import EngineBench, Measurement, SensorDynamics
-from mgdd.results import check_labels
+from mgdd.results.labels import check_labels
 from mgdd.rig import Rig, SimulatedRig
 
 QUIET = {"soc_scatter_cad": 0.0, "efficiency_noise_percent": 0.0}

@@ -7,7 +7,7 @@ import warnings
 import numpy as np
 import pytest
 
-from mgdd.loop import EngineBench, LoopCriteria, find_steady_optimum, monte_carlo
+from mgdd.loop import EngineBench, LoopCriteria, monte_carlo
 from mgdd.optimize import BoundedSeeking, ExtremumSeeking, GoldenSection, GradientDescent, Limit, NewtonSeeking, Spsa
 
 SPACE = {"start": -20.0, "lower": -30.0, "upper": 10.0}
@@ -35,7 +35,7 @@ def seekers(name: str, upper: float, **more: object) -> dict[str, object]:
 def run(name: str, upper: float, chosen: dict[str, object]) -> tuple[float, dict[str, tuple[np.ndarray, np.ndarray]]]:
     """Optimum, and per seeker the exceeded fraction and the mean applied set-point of cycles 1500 to 3000, per seed."""
     bench = EngineBench(limits=[name])
-    best = find_steady_optimum(bench, {name: upper})
+    best = bench.find_optimum({name: upper})
     table = monte_carlo(
         bench,
         list(chosen.values()),
@@ -59,7 +59,7 @@ def test_p_max_is_kept_by_every_seeker_within_one_and_a_half_degrees_of_the_limi
 
 def test_without_the_limit_the_same_seeds_exceed_it_nearly_always() -> None:
     bench = EngineBench(limits=["p_max_bar"])
-    best = find_steady_optimum(bench, {"p_max_bar": 95.0})
+    best = bench.find_optimum({"p_max_bar": 95.0})
     assert best.free_inputs["soc_cad"] == pytest.approx(-5.63, abs=0.02)
     free = ExtremumSeeking(**SPACE, limits=[Limit("p_max_bar", 1000.0)])
     above = {"p_max_bar": 95.0 + 3.0 * best["scatter_p_max_bar"]}
@@ -101,7 +101,7 @@ def test_the_seeker_returns_below_the_limit_after_a_load_step() -> None:
     schedule = [(0, low), (1000, high)]
     bench = EngineBench(schedule=schedule, limits=["p_max_bar"])
     upper = 92.0
-    best = find_steady_optimum(bench, {"p_max_bar": upper}, cycle=1000)
+    best = bench.find_optimum({"p_max_bar": upper}, cycle=1000)
     seeker = ExtremumSeeking(**SPACE, limits=[Limit("p_max_bar", upper)])
     above = {"p_max_bar": upper + 3.0 * best["scatter_p_max_bar"]}
     table = monte_carlo(bench, seeker, SEEDS, cycles=2500, criteria=LoopCriteria(exceed_from=1150, exceed_above=above))

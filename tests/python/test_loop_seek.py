@@ -17,14 +17,12 @@ from mgdd.errors import Interrupted, ParameterError
 from mgdd.loop import (
     EngineBench,
     LoopCriteria,
-    find_steady_optimum,
     monte_carlo,
     run_seeker,
-    steady_map,
 )
 from mgdd.loop.summary import summarize_cycles
 from mgdd.optimize import ExtremumSeeking, GoldenSection, Limit, NewtonSeeking, Spsa
-from mgdd.results import check_labels
+from mgdd.results.labels import check_labels
 from mgdd.rig import SimulatedRig
 
 SPACE = {"start": -14.0, "lower": -30.0, "upper": 10.0}
@@ -166,10 +164,10 @@ def test_ctrl_c_leaves_a_usable_partial_result() -> None:
 def test_steady_optimum_agrees_with_the_model_and_with_the_long_run() -> None:
     from mgdd.engine import Cylinder, find_optimum
 
-    free = find_steady_optimum(EngineBench())
+    free = EngineBench().find_optimum()
     assert free["soc_cad"] == pytest.approx(find_optimum(Cylinder(), OperatingPoint())["soc_cad"], abs=0.002)
     assert free.curvature == pytest.approx(-0.051, rel=0.05)
-    limited = find_steady_optimum(EngineBench(limits=["p_max_bar"]), {"p_max_bar": 95.0})
+    limited = EngineBench(limits=["p_max_bar"]).find_optimum({"p_max_bar": 95.0})
     model = find_optimum(Cylinder(), OperatingPoint(), limits={"p_max_bar": 95.0})
     assert limited["soc_cad"] == pytest.approx(model["soc_cad"], abs=0.002)
     scattered = EngineBench(limits=["p_max_bar"], efficiency_noise_percent=0.0).run(np.full(4000, limited["soc_cad"]))
@@ -179,15 +177,15 @@ def test_steady_optimum_agrees_with_the_model_and_with_the_long_run() -> None:
 @pytest.mark.parametrize(("weight", "soc"), [(0.0, -5.63), (0.002, -2.72), (0.004, -0.65), (0.008, 2.36)])
 def test_the_optimum_moves_late_with_the_weight_of_nox(weight: float, soc: float) -> None:
     plant = EngineBench(performance=Performance.efficiency_and_nox(weight), nox_sensor="true_value")
-    assert find_steady_optimum(plant)["soc_cad"] == pytest.approx(soc, abs=0.03)
+    assert plant.find_optimum()["soc_cad"] == pytest.approx(soc, abs=0.03)
 
 
 def test_steady_map_is_quiet_and_labelled() -> None:
-    table = steady_map(EngineBench(soc_scatter_cad=2.0, misfire_probability=0.5), [-10.0, -6.0, 0.0])
+    table = EngineBench(soc_scatter_cad=2.0, misfire_probability=0.5).steady_map([-10.0, -6.0, 0.0])
     check_labels(table)
     np.testing.assert_allclose(table["efficiency_gross"], [0.5568, 0.5618, 0.5543], rtol=5e-4)
     with pytest.raises(ParameterError, match="soc_cad = 45: must lie in"):
-        steady_map(EngineBench(), [45.0])
+        EngineBench().steady_map([45.0])
 
 
 @pytest.mark.parametrize(
@@ -207,8 +205,8 @@ def test_steady_map_is_quiet_and_labelled() -> None:
         (lambda: monte_carlo([], ExtremumSeeking(**SPACE), [1], cycles=5), "benches is empty"),
         (lambda: monte_carlo(EngineBench(), ExtremumSeeking(**SPACE), [-1], cycles=5), "seeds: -1 must be"),
         (lambda: monte_carlo(EngineBench(), [3.0], [1], cycles=5), "3.0 is not a seeker"),
-        (lambda: find_steady_optimum(EngineBench(), {"nonsense": 1.0}), "'nonsense' is not an indicator"),
-        (lambda: find_steady_optimum(EngineBench(), bounds_cad=(5.0, -5.0)), "must increase"),
+        (lambda: EngineBench().find_optimum({"nonsense": 1.0}), "'nonsense' is not an indicator"),
+        (lambda: EngineBench().find_optimum(bounds_cad=(5.0, -5.0)), "must increase"),
     ],
 )
 def test_bad_calls_name_what_is_wrong(call: Any, message: str) -> None:

@@ -10,8 +10,7 @@ import pytest
 
 from mgdd import datasets
 from mgdd.errors import DataError, Interrupted, ParameterError
-from mgdd.results import check_labels
-from mgdd.results.labels import to_jsonable
+from mgdd.results.labels import check_labels, to_jsonable
 from mgdd.studies import StudyResult, measured_engine_cases, measured_engine_seek, run_study
 from mgdd.studies.measured_engine_seek import run_measured_engine_seek
 from mgdd.surrogate import EngineSurrogate, fit_surrogate, random_step_records

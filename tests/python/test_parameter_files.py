@@ -20,14 +20,14 @@ from mgdd.engine import simulate as simulate_cycle
 from mgdd.errors import DataError, ParameterError
 from mgdd.identify import FirstPrincipleModel, OdeModel, SmoothThrottle, load_throttle_model
 from mgdd.identify.throttle.first_principle_model import TYPICAL
-from mgdd.io import ParameterFile
-from mgdd.io.parameters import Entry, Wanted
+from mgdd.io.parameters import Entry, ParameterFile, Wanted
+from mgdd.loop import SurrogatePlant
 from mgdd.presets import Preset
 from mgdd.studies.benchmarks.drive_axis import DriveModel
 from mgdd.studies.benchmarks.two_tanks import TwoTanksModel
 from mgdd.studies.benchmarks.wiener_hammerstein import LinearApproximation, WienerHammersteinModel
-from mgdd.surrogate import EngineSurrogate, SurrogateEngine, fit_surrogate, random_step_records
-from mgdd.throttle import PseudoWiener, SensorPair, Throttle, sense, simulate
+from mgdd.surrogate import EngineSurrogate, fit_surrogate, random_step_records
+from mgdd.throttle import PseudoWiener, SensorPair, Throttle, simulate
 
 TIME = 1e-3 * np.arange(300)
 DUTY = 0.1 + 0.5 * np.sin(2.0 * np.pi * TIME * (2.0 + 20.0 * TIME))
@@ -176,7 +176,7 @@ def test_a_sensor_pair_comes_back() -> None:
     again = SensorPair.from_toml(pair.to_toml())
     assert again == pair
     run = simulate(Throttle(), 0.3, duration_s=0.2)
-    np.testing.assert_array_equal(sense(run, pair)["first_v"], sense(run, again)["first_v"])
+    np.testing.assert_array_equal(pair.sense(run)["first_v"], again.sense(run)["first_v"])
     with pytest.raises(ParameterError, match=r"adc_bits: value = 10\.5: must be a whole number"):
         SensorPair.from_toml(pair.to_toml().replace("value = 10,", "value = 10.5,"))
 
@@ -239,7 +239,7 @@ def test_a_surrogate_predicts_and_runs_bit_for_bit_after_a_file(surrogate: Engin
     assert again.quality().equals(surrogate.quality())
     assert again.source == surrogate.source
     assert again.signals["nox_ppm"].sensor == surrogate.signals["nox_ppm"].sensor
-    first, then = (SurrogateEngine(model, seed=3) for model in (surrogate, again))
+    first, then = (SurrogatePlant(model, seed=3) for model in (surrogate, again))
     assert [first.step(-4.0) for _ in range(150)] == [then.step(-4.0) for _ in range(150)]
 
 

@@ -15,7 +15,7 @@ from mgdd import datasets, io
 from mgdd.cli.main import main
 from mgdd.engine import Cylinder, OperatingPoint, simulate, timing_sweep
 from mgdd.io.traces import write_traces
-from mgdd.throttle import Throttle, sense
+from mgdd.throttle import SensorPair, Throttle
 from mgdd.throttle import simulate as simulate_throttle
 
 DATA = sorted((Path(mgdd.__file__).parent / "data").glob("*.csv"))
@@ -26,7 +26,7 @@ def throttle_run() -> xr.Dataset:
 
 
 def of_pressure(path: Path) -> xr.Dataset:
-    trace = datasets.load_hd_traces()[0]
+    trace = datasets.load("hd_diesel_128x144")[0]
     io.write_pressure(trace, path)
     return trace
 
@@ -52,7 +52,7 @@ WRITERS = {
     "write_throttle_log": of_log,
     "cycle": of_traces(lambda: simulate(Cylinder(), OperatingPoint())),
     "throttle": of_traces(throttle_run),
-    "flags and NaN": of_traces(lambda: sense(throttle_run())),
+    "flags and NaN": of_traces(lambda: SensorPair().sense(throttle_run())),
     "sweep": of_traces(lambda: timing_sweep(Cylinder(), OperatingPoint())),
 }
 COMMANDS = {

@@ -10,8 +10,9 @@ import pytest
 
 from mgdd import datasets, plot
 from mgdd.errors import DataError
-from mgdd.results import labelled_dataset
-from mgdd.results.labels import ANGLE
+from mgdd.plot.calibration import calibration_overlay, wall_heat_profile
+from mgdd.plot.learning import learning
+from mgdd.results.labels import ANGLE, labelled_dataset
 
 CAD = np.arange(-120.0, 121.0)
 LITRE = 0.1 + 0.9 * (1.0 - np.cos(np.radians(CAD)))
@@ -113,13 +114,13 @@ PLOTS = {
     "convergence": (plot.convergence, tracks),
     "sensors over cycles": (plot.sensors, readings),
     "sensors over timing": (plot.sensors, lambda: readings("soc_cad")),
-    "learning": (plot.learning, learned),
+    "learning": (learning, learned),
     "pressure of a simulation": (plot.pressure, simulated),
     "pressure of an analysis": (plot.pressure, analysed),
-    "pressure of a measurement": (plot.pressure, lambda: datasets.load_hd_traces()[3]),
+    "pressure of a measurement": (plot.pressure, lambda: datasets.load("hd_diesel_128x144")[3]),
     "log p-V": (plot.log_pv, analysed),
-    "overlay": (plot.calibration_overlay, overlay),
-    "profile": (plot.wall_heat_profile, profile),
+    "overlay": (calibration_overlay, overlay),
+    "profile": (wall_heat_profile, profile),
     "timing": (plot.timing, sweep),
 }
 
@@ -222,7 +223,7 @@ def test_pressure_of_an_analysis_has_net_and_gross():
 
 
 def test_pressure_of_a_measurement_is_named_and_alone():
-    ax = plot.pressure(datasets.load_hd_traces()[0])
+    ax = plot.pressure(datasets.load("hd_diesel_128x144")[0])
     assert entries(ax) == ["cylinder pressure, pressure_a25_bar"]
     assert ax.figure.axes == [ax]
 
@@ -250,7 +251,7 @@ def test_a_pure_polytrope_lies_on_its_slope():
 
 def test_overlay_and_its_residual_panel():
     data = overlay()
-    ax = plot.calibration_overlay(data)
+    ax = calibration_overlay(data)
     panel = ax.figure.axes[-1]
     np.testing.assert_array_equal(line(ax, "measured").get_data(), [CAD, BAR])
     np.testing.assert_array_equal(line(ax, "model, double Wiebe").get_ydata(), data["model_bar"])
@@ -265,14 +266,14 @@ def test_overlay_and_its_residual_panel():
 def test_overlay_without_soi_and_on_free_axes():
     data = overlay().assign(soi_cad=((), np.nan, overlay()["soi_cad"].attrs))
     free = plt.figure().add_axes((0.2, 0.2, 0.7, 0.6))
-    ax = plot.calibration_overlay(data, ax=free)
+    ax = calibration_overlay(data, ax=free)
     assert not any("injection" in entry for entry in entries(ax))
     assert ax.figure.axes[-1].get_position().y0 == pytest.approx(0.2)
 
 
 def test_profile_marks_what_the_traces_cannot_tell_apart():
     data = profile()
-    ax = plot.wall_heat_profile(data)
+    ax = wall_heat_profile(data)
     for index, name in enumerate(("a25", "a100")):
         expected = [data["wall_heat_scale"], data["rmse_percent"][index]]
         np.testing.assert_array_equal(line(ax, name).get_data(), expected)
@@ -281,7 +282,7 @@ def test_profile_marks_what_the_traces_cannot_tell_apart():
     band = ax.patches[0].get_extents().transformed(ax.transData.inverted())
     ends = np.interp([band.x0, band.x1], data["wall_heat_scale"], together)
     np.testing.assert_allclose(ends, 1.1 * together.min(), rtol=5e-3)
-    single = plot.wall_heat_profile(data.isel(file=0, drop=True))
+    single = wall_heat_profile(data.isel(file=0, drop=True))
     assert entries(single)[0] == "best fit"
 
 
@@ -306,13 +307,13 @@ def test_timing_says_when_the_sweep_ends_too_early():
     [
         (plot.pressure, simulated, "pressure_bar", "mgdd.io.read_pressure or mgdd.engine.simulate"),
         (plot.log_pv, simulated, "volume_l", "mgdd.engine.analyze or mgdd.engine.simulate"),
-        (plot.calibration_overlay, overlay, "residual_bar", "mgdd.identify.fit_cylinder"),
-        (plot.wall_heat_profile, profile, "rmse_percent", "mgdd.identify.wall_heat_profile"),
+        (calibration_overlay, overlay, "residual_bar", "mgdd.identify.fit_cylinder"),
+        (wall_heat_profile, profile, "rmse_percent", "mgdd.identify.wall_heat_profile"),
         (plot.timing, sweep, "nox_arrhenius_ppm", "mgdd.engine.timing_sweep"),
         (plot.seeking, sought, "soc_requested_cad", "mgdd.loop.run_seeker"),
         (plot.convergence, tracks, "estimate_median_cad", "a study of mgdd.studies"),
         (plot.sensors, readings, "nox_true_ppm", "mgdd.loop.EngineBench.run"),
-        (plot.learning, learned, "ca50_error_cad", "the study seeker-comparison"),
+        (learning, learned, "ca50_error_cad", "the study seeker-comparison"),
     ],
 )
 def test_a_missing_variable_is_named_with_its_maker(function, dataset, variable, maker):
@@ -337,7 +338,7 @@ def test_values_that_cannot_be_drawn_are_refused():
     with pytest.raises(DataError, match=r"soc_cad has shape \(2,\): at least three timings"):
         plot.timing(sweep().isel(soc_cad=slice(2)))
     with pytest.raises(DataError, match="rmse_percent has dimensions"):
-        plot.wall_heat_profile(profile().assign(rmse_percent=profile()["rmse_percent"].isel(wall_heat_scale=0)))
+        wall_heat_profile(profile().assign(rmse_percent=profile()["rmse_percent"].isel(wall_heat_scale=0)))
 
 
 def test_seeking_has_four_panels_in_order():

@@ -8,7 +8,9 @@ import pytest
 
 from mgdd import plot
 from mgdd.errors import DataError
-from mgdd.results import labelled_dataset
+from mgdd.plot.identification import error_growth, residual_correlation
+from mgdd.plot.throttle import free_run
+from mgdd.results.labels import labelled_dataset
 
 TIME = np.arange(400) * 0.05
 DUTY = 0.3 * np.sin(0.6 * TIME)
@@ -56,9 +58,9 @@ def matrix(value=-0.99):
 
 ALL = {
     plot.holding_duty: (log, "plate angle [deg]", "duty [-]"),
-    plot.free_run: (run, "", "plate angle [deg]"),
-    plot.error_growth: (n_step, "horizon [ms]", "RMS error ahead [deg]"),
-    plot.residual_correlation: (correlations, "", "residual with itself [-]"),
+    free_run: (run, "", "plate angle [deg]"),
+    error_growth: (n_step, "horizon [ms]", "RMS error ahead [deg]"),
+    residual_correlation: (correlations, "", "residual with itself [-]"),
     plot.correlation_matrix: (matrix, "", ""),
 }
 
@@ -112,7 +114,7 @@ def test_a_model_lies_over_the_branches():
 
 
 def test_the_free_run_has_its_residual_below():
-    ax = plot.free_run(run())
+    ax = free_run(run())
     panel = ax.figure.axes[-1]
     assert panel.get_xlabel() == "time [s]"
     np.testing.assert_allclose(panel.lines[0].get_ydata(), 0.1)
@@ -120,7 +122,7 @@ def test_the_free_run_has_its_residual_below():
 
 
 def test_lags_outside_the_limit_are_squares():
-    ax = plot.residual_correlation(correlations())
+    ax = residual_correlation(correlations())
     lower = ax.figure.axes[-1]
     assert ax.lines[1].get_xdata().tolist() == [1, 2, 3, 4, 5]
     assert ax.lines[1].get_marker() == "s"
@@ -148,5 +150,5 @@ def test_the_matrix_frames_what_cannot_be_told_apart():
 
 def test_five_lines_are_the_most():
     with pytest.raises(DataError, match="at most 5"):
-        plot.error_growth(n_step(tuple("abcdef")))
-    assert len(plot.error_growth(n_step(tuple("abcde"))).lines) == 5
+        error_growth(n_step(tuple("abcdef")))
+    assert len(error_growth(n_step(tuple("abcde"))).lines) == 5

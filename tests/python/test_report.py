@@ -14,7 +14,7 @@ import pytest
 from mgdd import datasets
 from mgdd.cli import main
 from mgdd.report import write_report
-from mgdd.results import labelled_dataset
+from mgdd.results.labels import labelled_dataset
 from mgdd.studies import StudyResult, available_studies
 from mgdd.studies.sections import Section, Table
 

@@ -17,8 +17,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from mgdd.errors import ConvergenceError, DataError, Error, ParameterError, ShapeError
-from mgdd.results import VARIABLES, Label, check_labels, labelled_dataset
-from mgdd.results.labels import ANGLE, to_jsonable
+from mgdd.results.labels import ANGLE, VARIABLES, Label, check_labels, labelled_dataset, to_jsonable
 from mgdd.results.units import _UNITS, attribute_units, printed_units, unit_attributes, unit_of
 
 

@@ -25,7 +25,7 @@ from mgdd.optimize import (
     NewtonSeeking,
     Spsa,
 )
-from mgdd.results import check_labels
+from mgdd.results.labels import check_labels
 from mgdd.rig import Rig, SimulatedRig
 
 CYCLES = 700

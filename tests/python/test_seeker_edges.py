@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 
 from mgdd.errors import ParameterError, ShapeError
-from mgdd.loop import EngineBench, LoopCriteria, find_steady_optimum, monte_carlo, run_seeker, steady_map
+from mgdd.loop import EngineBench, LoopCriteria, monte_carlo, run_seeker
 from mgdd.loop.summary import summarize_cycles
 from mgdd.optimize import (
     BoundedSeeking,
@@ -41,7 +41,7 @@ def test_golden_section_finds_its_width_again() -> None:
     from mgdd.engine import OperatingPoint
 
     bench = EngineBench(point=OperatingPoint(speed_rpm=2500.0, fuel_mg=30.0))
-    best = find_steady_optimum(bench)
+    best = bench.find_optimum()
     seeker = GoldenSection(start=-20.0, lower=-30.0, upper=10.0, noise_sd=0.25)
     table = monte_carlo(bench, seeker, range(200), cycles=2000, criteria=LoopCriteria(optimum=best["soc_cad"]))
     assert np.abs(table["final_cad"].values - best["soc_cad"]).max() < 1.5
@@ -120,11 +120,11 @@ def test_criteria_that_say_nothing_are_refused_before_the_rig_moves() -> None:
             ParameterError,
             "whole numbers",
         ),
-        (lambda: find_steady_optimum(EngineBench(), {"p_max_bar": float("nan")}), ParameterError, "p_max_bar = nan"),
-        (lambda: find_steady_optimum(EngineBench(), {"p_max_bar": None}), ParameterError, "p_max_bar = None"),  # type: ignore[dict-item]
-        (lambda: find_steady_optimum(EngineBench(), {"misfire": 0.0}), ParameterError, "'misfire' is not an indicator"),
-        (lambda: find_steady_optimum(EngineBench(), cycle=-1), ParameterError, "cycle = -1"),
-        (lambda: steady_map(EngineBench(), [[1.0, 2.0]]), ShapeError, "2 dimensions"),
+        (lambda: EngineBench().find_optimum({"p_max_bar": float("nan")}), ParameterError, "p_max_bar = nan"),
+        (lambda: EngineBench().find_optimum({"p_max_bar": None}), ParameterError, "p_max_bar = None"),  # type: ignore[dict-item]
+        (lambda: EngineBench().find_optimum({"misfire": 0.0}), ParameterError, "'misfire' is not an indicator"),
+        (lambda: EngineBench().find_optimum(cycle=-1), ParameterError, "cycle = -1"),
+        (lambda: EngineBench().steady_map([[1.0, 2.0]]), ShapeError, "2 dimensions"),
         (lambda: ExtremumSeeking(start=[]), ShapeError, "start is empty"),
         (lambda: ExtremumSeeking(start=[0.0, 1.0]), ShapeError, "harmonics has 1 entry: 2 inputs need one each"),
         (lambda: Spsa(**SPACE, limits=[Limit("a", 1.0), Limit("a", 2.0)]), ParameterError, "limit a: is given twice"),

@@ -24,12 +24,10 @@ from mgdd.optimize import (
     GradientDescent,
     Limit,
     NewtonSeeking,
+    Seeker,
     Spsa,
-    load_seeker,
-    maximize,
 )
-from mgdd.results import check_labels
-from mgdd.results.labels import label_of
+from mgdd.results.labels import check_labels, label_of
 
 LIMITS = [Limit("p_max_bar", 150.0, margin=1.0), Limit("rise", 4.0, method="penalty", weight=2.0, scale=1.0)]
 PAIR = {"start": [3.0, -4.0], "lower": [-20.0, -np.inf], "upper": 20.0}
@@ -173,9 +171,9 @@ CONTINUE = """
 import json, pickle, sys
 sys.path.insert(0, {folder!r})
 from test_seekers import run
-from mgdd.optimize import load_seeker
+from mgdd.optimize import Seeker
 path = {path!r}
-seeker = load_seeker(path) if path.endswith("json") else pickle.loads(open(path, "rb").read())
+seeker = Seeker.load(path) if path.endswith("json") else pickle.loads(open(path, "rb").read())
 print(json.dumps([run(seeker, 120), seeker.state]))
 """
 
@@ -249,11 +247,11 @@ def test_files_that_are_no_seekers_are_refused_by_name(tmp_path: Path) -> None:
     ):
         path.write_text(json.dumps(good | change))
         with pytest.raises(DataError, match=r"x\.json"):
-            load_seeker(path)
+            Seeker.load(path)
     for text in ("", "[]", "{}", "no json", '{"number": "abc"}'):
         path.write_text(text)
         with pytest.raises(DataError, match=r"x\.json"):
-            load_seeker(path)
+            Seeker.load(path)
 
 
 def test_a_state_of_another_kind_is_refused_and_changes_nothing() -> None:
@@ -267,7 +265,7 @@ def test_a_state_of_another_kind_is_refused_and_changes_nothing() -> None:
 
 
 # --- the loop -----------------------------------------------------------------------------------------------
-def test_maximize_takes_limits_and_misfires_and_stops_cleanly() -> None:
+def test_a_run_takes_limits_and_misfires_and_stops_cleanly() -> None:
     seeker = ExtremumSeeking(start=8.0, limits=LIMITS)
 
     def engine(x: Any) -> Any:
@@ -276,14 +274,14 @@ def test_maximize_takes_limits_and_misfires_and_stops_cleanly() -> None:
         return None if seeker.cycle % 20 == 3 else (-0.03 * x[0] ** 2, [140.0, 1.0])
 
     with pytest.raises(Interrupted, match="after cycle 60") as stop:
-        maximize(engine, seeker, 500)
+        seeker.run(engine, 500)
     history = stop.value.partial
     assert history.sizes["cycle"] == seeker.cycle == 60
     assert seeker.misfires == 3
     seeker.ask()
     seeker.tell(1.0, [140.0, 1.0])
     with pytest.raises(ParameterError, match="cycles = -1"):
-        maximize(engine, seeker, -1)
+        seeker.run(engine, -1)
 
 
 # --- properties ---------------------------------------------------------------------------------------------

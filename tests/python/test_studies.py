@@ -10,14 +10,14 @@ from typing import Any
 
 import pytest
 
-from mgdd import results
 from mgdd.report import write_report
-from mgdd.studies import StudyResult, run_measured_traces
+from mgdd.results.labels import check_labels
+from mgdd.studies import StudyResult, run_study
 
 
 @pytest.fixture(scope="module")
 def result() -> StudyResult:
-    return run_measured_traces()
+    return run_study("measured-traces")
 
 
 def test_every_bar_of_the_calibration(result: StudyResult) -> None:
@@ -62,7 +62,7 @@ def test_best_timing_is_a_range_within_the_pressure_limit(result: StudyResult) -
 
 
 def test_dataset_is_labelled(result: StudyResult) -> None:
-    results.check_labels(result.dataset)
+    check_labels(result.dataset)
     assert result.dataset.sizes == {"law": 5, "file": 4}
 
 

@@ -10,8 +10,8 @@ from collections.abc import Callable
 import numpy as np
 import pytest
 
-from mgdd.loop import EngineBench, find_steady_optimum
-from mgdd.results import check_labels
+from mgdd.loop import EngineBench
+from mgdd.results.labels import check_labels
 from mgdd.studies import StudyResult, available_studies, run_study
 
 
@@ -60,7 +60,7 @@ def test_every_form_of_every_seeker_competes_and_arrives(seekers: StudyResult) -
     rows = {row["seeker"]: row for row in seekers.summary["rows"]}
     assert len(rows) == 13
     assert all(row["share_arrived"] == 1.0 for row in rows.values())
-    best = find_steady_optimum(EngineBench())["soc_cad"]
+    best = EngineBench().find_optimum()["soc_cad"]
     assert seekers.summary["optimum_cad"] == pytest.approx(best)
     for row in rows.values():
         assert row["final_cad"] == pytest.approx(best, abs=1.0), row["seeker"]

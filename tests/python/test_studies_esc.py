@@ -10,7 +10,7 @@ import numpy as np
 import pytest
 
 from mgdd.errors import Interrupted, ParameterError
-from mgdd.results import check_labels
+from mgdd.results.labels import check_labels
 from mgdd.studies import StudyResult, run_study
 from mgdd.studies.sensor_delay import run_sensor_delay
 
@@ -106,5 +106,7 @@ def test_bad_requests_are_named() -> None:
         run_study("nothing")
     with pytest.raises(ParameterError, match="seeds = 0: must be >= 1"):
         run_study("sensor-delay", seeds=0)
+    with pytest.raises(ParameterError, match="traces: study 'sensor-delay' takes seeds"):
+        run_study("sensor-delay", traces=[])
     with pytest.raises(ParameterError, match="'measured-traces' is deterministic"):
         run_study("measured-traces", seeds=3)

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import pytest
 
-from mgdd.results import check_labels
+from mgdd.results.labels import check_labels
 
 
 @pytest.fixture(scope="module")

@@ -9,8 +9,9 @@ import pytest
 
 from mgdd import datasets
 from mgdd.errors import ConvergenceError, DataError, ParameterError
-from mgdd.results import check_labels
-from mgdd.surrogate import SurrogateEngine, fit_surrogate, random_step_records
+from mgdd.loop import SurrogatePlant
+from mgdd.results.labels import check_labels
+from mgdd.surrogate import fit_surrogate, random_step_records
 
 INPUTS = ("soi_cad", "doi_main_ms", "doi_h2_ms", "p2m_us")
 AT = {"doi_main_ms": 0.42, "doi_h2_ms": 2.9, "p2m_us": 1200.0}
@@ -40,7 +41,7 @@ def exact():
 @pytest.fixture(scope="module")
 def cycles():
     try:
-        return datasets.load_h2df_cycles()
+        return datasets.load("h2df_502")
     except FileNotFoundError as reason:
         pytest.skip(str(reason))
 
@@ -248,8 +249,8 @@ def test_wrong_records_are_refused():
         (lambda s: s.find_optimum("soot"), "objective: 'soot' is not a signal"),
         (lambda s: s.find_optimum("imep_bar", {"mprr": np.inf}), "limits: mprr = inf"),
         (lambda s: s.find_optimum({}), "must name at least one signal"),
-        (lambda s: SurrogateEngine(s, block_cycles=0), "block_cycles = 0: must be >= 1"),
-        (lambda s: SurrogateEngine(s, outside="no"), "outside = 'no'"),
+        (lambda s: SurrogatePlant(s, block_cycles=0), "block_cycles = 0: must be >= 1"),
+        (lambda s: SurrogatePlant(s, outside="no"), "outside = 'no'"),
     ],
 )
 def test_a_wrong_question_is_refused(known, call, message):
@@ -259,7 +260,7 @@ def test_a_wrong_question_is_refused(known, call, message):
 
 # --- the virtual engine -------------------------------------------------------------------------------------
 def test_engine_without_residuals_is_surface_and_lag(known):
-    engine = SurrogateEngine(known, start_soi_cad=4.0, residuals=False)
+    engine = SurrogatePlant(known, start_soi_cad=4.0, residuals=False)
     before, after = (known.predict(soi)["nox_ppm"].item() for soi in (4.0, -2.0))
     readings = [engine.step(-2.0) for _ in range(40)]
     model = known.signals["nox_ppm"]
@@ -271,8 +272,8 @@ def test_engine_without_residuals_is_surface_and_lag(known):
 
 
 def test_engine_draws_rows_of_the_log_for_all_signals_together(known):
-    block, still = 50, SurrogateEngine(known, residuals=False)
-    engine = SurrogateEngine(known, seed=3, block_cycles=block)
+    block, still = 50, SurrogatePlant(known, residuals=False)
+    engine = SurrogatePlant(known, seed=3, block_cycles=block)
     drawn = []
     for _ in range(4 * block):
         noisy, clean = engine.step(0.0), still.step(0.0)
@@ -287,11 +288,11 @@ def test_engine_is_reproducible_and_resumes(known):
         return [engine.step(soi) for soi in commands]
 
     commands = np.linspace(5.0, -5.0, 120)
-    first, other = SurrogateEngine(known, seed=1), SurrogateEngine(known, seed=2)
+    first, other = SurrogatePlant(known, seed=1), SurrogatePlant(known, seed=2)
     whole = run(first, commands)
-    assert whole == run(SurrogateEngine(known, seed=1), commands)
+    assert whole == run(SurrogatePlant(known, seed=1), commands)
     assert whole != run(other, commands)
-    half = SurrogateEngine(known, seed=1)
+    half = SurrogatePlant(known, seed=1)
     run(half, commands[:70])
     saved = json.loads(json.dumps(half.state))
     assert saved["cycles"] == half.cycles == 70
@@ -301,7 +302,7 @@ def test_engine_is_reproducible_and_resumes(known):
 
 
 def test_a_refused_command_or_state_changes_nothing(known):
-    engine = SurrogateEngine(known, outside="raise")
+    engine = SurrogatePlant(known, outside="raise")
     engine.step(0.0)
     saved = engine.state
     with pytest.raises(ParameterError, match="soi_cad = 30: outside the support"):
@@ -313,16 +314,16 @@ def test_a_refused_command_or_state_changes_nothing(known):
     with pytest.raises(ParameterError, match="state: row = "):
         engine.state = {**saved, "row": 10**7}
     assert engine.state == saved
-    assert SurrogateEngine(known).step(30.0)["supported"] is False
+    assert SurrogatePlant(known).step(30.0)["supported"] is False
 
 
 def test_a_stretch_longer_than_the_records_is_refused(known):
     with pytest.raises(DataError, match="no 5000 cycles in a row"):
-        SurrogateEngine(known, block_cycles=5000)
+        SurrogatePlant(known, block_cycles=5000)
 
 
 def test_readings_that_cannot_be_negative_are_not(known):
-    engine = SurrogateEngine(known, {"doi_main_ms": 0.0}, start_soi_cad=30.0, residuals=False)
+    engine = SurrogatePlant(known, at={"doi_main_ms": 0.0}, start_soi_cad=30.0, residuals=False)
     reading = engine.step(30.0)
     assert reading["supported"] is False
     assert min(reading["nox_ppm"], reading["mprr"]) >= 0.0
@@ -343,7 +344,7 @@ def test_the_set_is_read_with_its_units_and_signs(cycles):
 
 
 def test_held_burn_angles_are_no_measurements(cycles):
-    raw = datasets.load_h2df_cycles(mask_held=False)
+    raw = datasets.load("h2df_502", mask_held=False)
     held = cycles["burn_angles_held"].to_numpy()
     assert held.sum() == 2962
     assert np.isnan(cycles["mfb50_cad"].to_numpy()[held]).all()
@@ -362,14 +363,14 @@ def test_another_export_is_refused(monkeypatch, tmp_path):
     own.write_text("\n".join(rows) + "\n")
     monkeypatch.setenv("MGDD_DATA_DIR", str(tmp_path))
     with pytest.raises(DataError, match="the file is another export; pass checked=False"):
-        datasets.load_h2df_cycles()
-    assert datasets.load_h2df_cycles(checked=False).sizes["cycle"] == 399
+        datasets.load("h2df_502")
+    assert datasets.load("h2df_502", checked=False).sizes["cycle"] == 399
     own.write_text("\n".join([*rows[:50], *rows[51:]]) + "\n")
     with pytest.raises(DataError, match="cycle 52 follows 50: must count up by one"):
-        datasets.load_h2df_cycles(checked=False)
+        datasets.load("h2df_502", checked=False)
     monkeypatch.setenv("MGDD_DATA_DIR", str(tmp_path / "nowhere"))
     with pytest.raises(FileNotFoundError, match="set MGDD_DATA_DIR"):
-        datasets.load_h2df_cycles()
+        datasets.load("h2df_502")
 
 
 def test_quality_of_the_measured_surfaces(measured):
@@ -425,7 +426,7 @@ def test_nox_without_hydrogen_is_refused_not_negative(measured):
 
 
 def test_the_virtual_engine_scatters_like_the_log(measured):
-    engine, still = SurrogateEngine(measured, seed=5), SurrogateEngine(measured, residuals=False)
+    engine, still = SurrogatePlant(measured, seed=5), SurrogatePlant(measured, residuals=False)
     drawn = []
     for _ in range(4000):
         noisy, clean = engine.step(0.0), still.step(0.0)

@@ -9,17 +9,14 @@ import pytest
 
 from mgdd import presets
 from mgdd.errors import DataError, ParameterError, ShapeError
-from mgdd.results import check_labels, labelled_dataset
+from mgdd.results.labels import check_labels, labelled_dataset
 from mgdd.throttle import (
     SensorFault,
     SensorPair,
     Throttle,
-    groups,
+    characteristics,
     holding_duty,
-    linear_part,
-    sense,
     simulate,
-    simulate_many,
 )
 from mgdd.throttle.characteristics import airflow_torque_nm, mass_flow_kg_per_s
 from mgdd.throttle.simulation import step_summary
@@ -45,7 +42,7 @@ def first_time(run, condition):
 @pytest.mark.parametrize("name", ["P1", "P2", "P3"])
 def test_without_duty_the_plate_goes_home(name, bridge):
     throttle = presets.load(name).throttle
-    runs = simulate_many(throttle, 0.0, duration_s=5.0, start_deg=[0.0, 30.0, 90.0], bridge=bridge)
+    runs = simulate(throttle, 0.0, duration_s=5.0, start_deg=[0.0, 30.0, 90.0], bridge=bridge)
     np.testing.assert_allclose(runs["angle_deg"][:, -1], throttle.limp_home_deg, atol=0.25)
 
 
@@ -53,14 +50,14 @@ def test_where_friction_exceeds_the_preload_there_is_a_band_of_rest():
     throttle = P1.replace(preload_above_nm=0.2, preload_below_nm=0.2, spring_above_nm_per_rad=0.819)
     edge = np.degrees((0.284 - 0.2) / 0.819)
     assert edge == pytest.approx(5.88, abs=0.005)
-    runs = simulate_many(throttle, 0.0, duration_s=5.0, start_deg=[8.0 + 10.0, 8.0 + 20.0, 8.0 + edge - 0.1])
+    runs = simulate(throttle, 0.0, duration_s=5.0, start_deg=[8.0 + 10.0, 8.0 + 20.0, 8.0 + edge - 0.1])
     np.testing.assert_allclose(runs["angle_deg"][:2, -1] - 8.0, edge, atol=0.1)
     assert float(runs["angle_deg"][2, -1]) == 8.0 + edge - 0.1
 
 
 @pytest.mark.parametrize("sign", [1.0, -1.0])
 def test_breakaway_from_limp_home(sign):
-    expected = float(groups(P1)["preload_above"] + groups(P1)["stiction"])
+    expected = float(characteristics(P1)["preload_above"] + characteristics(P1)["stiction"])
     assert expected == pytest.approx(0.2219, abs=5e-5)
     run = simulate(P1, sign * ramp(0.01, 0.3))
     left = np.abs(run["angle_deg"] - 8.0) > 0.3
@@ -69,7 +66,7 @@ def test_breakaway_from_limp_home(sign):
 
 @pytest.mark.parametrize(("supply_v", "expected"), [(10.0, 0.2663), (12.0, 0.2219), (14.4, 0.1849)])
 def test_breakaway_scales_with_the_supply(supply_v, expected):
-    g = groups(P1.replace(supply_v=supply_v))
+    g = characteristics(P1.replace(supply_v=supply_v))
     assert float(g["preload_above"] + g["coulomb"]) == pytest.approx(expected, rel=5e-4)
     given, built = (
         simulate(P1, ramp(0.02, 0.3), supply_v=supply_v),
@@ -84,7 +81,7 @@ def test_holding_duty_has_twice_the_friction_between_its_branches():
     curve = holding_duty(P1)
     check_labels(curve)
     width = curve["duty_rising"] - curve["duty_falling"]
-    np.testing.assert_allclose(width, 2.0 * float(groups(P1)["coulomb"]), rtol=1e-12)
+    np.testing.assert_allclose(width, 2.0 * float(characteristics(P1)["coulomb"]), rtol=1e-12)
     assert float(width[0]) == pytest.approx(0.1854, abs=5e-5)
     at_45 = float(holding_duty(P1, [45.0])["duty_spring"][0])
     assert at_45 == pytest.approx((0.396 + 0.087 * np.radians(37.0)) / 3.064, rel=1e-12)
@@ -107,14 +104,14 @@ def test_the_plate_stays_within_the_holding_band_and_leaves_it():
     half = np.degrees(0.1 / 0.819)
     middle = float(curve["duty_spring"][0])
     starts = [45.0 - half + 0.05, 45.0 + half - 0.05, 45.0 - half - 0.2, 45.0 + half + 0.2]
-    runs = simulate_many(throttle.replace(inductance_mh=0.0), middle, start_deg=starts, duration_s=0.5)
+    runs = simulate(throttle.replace(inductance_mh=0.0), middle, start_deg=starts, duration_s=0.5)
     moved = np.abs(runs["angle_deg"][:, -1].to_numpy() - starts)
     assert (moved < 1e-9).tolist() == [True, True, False, False]
     assert np.degrees(2.0 * 0.284 / 0.087) > 82.0
 
 
 def test_without_friction_and_preload_the_plate_follows_the_closed_form():
-    slow, fast = linear_part(BARE)["pole_real_per_s"].values
+    slow, fast = characteristics(BARE)["pole_real_per_s"].sel(side="above").values
     time = np.arange(5001) * 1e-3
     exact = 8.0 + 1.8 * (fast * np.exp(slow * time) - slow * np.exp(fast * time)) / (fast - slow)
     for step_s, tolerance in ((1e-4, 4e-5), (1e-3, 3.5e-4)):
@@ -123,17 +120,15 @@ def test_without_friction_and_preload_the_plate_follows_the_closed_form():
 
 
 def test_linear_part():
-    part = linear_part(P1)
+    part = characteristics(P1).sel(side="above")
     check_labels(part)
     np.testing.assert_allclose(part["pole_real_per_s"], [-0.8298, -49.929], rtol=1e-4)
     assert not part["pole_imag_rad_per_s"].any()
     assert float(part["gain_deg_per_duty"]) == pytest.approx(2017.9, rel=1e-4)
     assert float(part["natural_frequency_rad_per_s"]) == pytest.approx(6.437, rel=1e-3)
     assert float(part["damping_ratio"]) == pytest.approx(3.943, rel=1e-3)
-    soft = linear_part(P1.replace(spring_below_nm_per_rad=0.0), side="below")
+    soft = characteristics(P1.replace(spring_below_nm_per_rad=0.0)).sel(side="below")
     assert np.isinf(soft["gain_deg_per_duty"])
-    with pytest.raises(ParameterError, match="side = 'left': must be 'above' or 'below'"):
-        linear_part(P1, side="left")
 
 
 def test_mirrored_duty_gives_the_mirrored_angle():
@@ -199,14 +194,14 @@ def test_a_long_run_in_pieces_is_the_same_run():
     # More steps than between two looks for Ctrl-C.
     duty = 0.15 + 0.2 * np.sin(np.arange(45_000) * 2e-3)
     whole = simulate(P1, duty)
-    halves = simulate_many([P1, P1], duty)
+    halves = simulate([P1, P1], duty)
     np.testing.assert_array_equal(whole["angle_deg"], halves["angle_deg"][1])
 
 
 def test_lanes_give_the_bits_of_single_runs():
     throttles = [P1.replace(coulomb_nm=0.2 + 0.01 * i, limp_home_deg=8.0 + i) for i in range(11)]
     duty = 0.3 * np.sin(np.arange(1500) * 0.02)
-    runs = simulate_many(throttles, duty, airflow_torque_nm=-0.05, supply_v=13.0)
+    runs = simulate(throttles, duty, airflow_torque_nm=-0.05, supply_v=13.0)
     assert runs["start_deg"].values.tolist() == [8.0 + i for i in range(11)]
     check_labels(runs)
     for i, throttle in enumerate(throttles):
@@ -222,7 +217,7 @@ def test_ctrl_c_ends_a_long_run():
     try:
         for run in (
             lambda: simulate(P1, np.full(4_000_000, 0.1), step_s=1e-5),
-            lambda: simulate_many([P1] * 20_000, np.full(2000, 0.1), step_s=1e-5),
+            lambda: simulate([P1] * 20_000, np.full(2000, 0.1), step_s=1e-5),
         ):
             signal.setitimer(signal.ITIMER_REAL, 0.3)
             with pytest.raises(KeyboardInterrupt):
@@ -293,18 +288,18 @@ def test_bad_input_is_refused_by_one_and_many(options, error, message):
     with pytest.raises(error, match=message):
         simulate(P1, **options)
     with pytest.raises(error, match=message):
-        simulate_many([P1, P1], **options)
+        simulate([P1, P1], **options)
     assert simulate(P1, 0.0, duration_s=0.01).sizes["time_s"] == 11
 
 
 def test_bad_cases_of_many_are_refused():
-    with pytest.raises(ParameterError, match="throttles is empty"):
-        simulate_many([], 0.1)
+    with pytest.raises(ParameterError, match="there is no case: give at least one"):
+        simulate([], 0.1)
     with pytest.raises(ShapeError, match="start_deg has 3 entries, there are 2 throttles"):
-        simulate_many([P1, P1], 0.1, start_deg=[1.0, 2.0, 3.0])
+        simulate([P1, P1], 0.1, start_deg=[1.0, 2.0, 3.0])
     with pytest.raises(ParameterError, match="throttle 1: friction and backlash must have the same form"):
-        simulate_many([P1, P1.replace(friction="tanh")], 0.1)
-    assert simulate_many([P1, P1], 0.1, start_deg=5.0)["start_deg"].values.tolist() == [5.0, 5.0]
+        simulate([P1, P1.replace(friction="tanh")], 0.1)
+    assert simulate([P1, P1], 0.1, start_deg=5.0)["start_deg"].values.tolist() == [5.0, 5.0]
     with pytest.raises(ParameterError, match="angle_deg = 91 deg: must lie within the travel, 0 to 90 deg"):
         holding_duty(P1, [91.0])
 
@@ -318,15 +313,15 @@ def sweep():
 
 
 def test_healthy_sensors_follow_the_plate(sweep):
-    seen = sense(sweep)
+    seen = SensorPair().sense(sweep)
     check_labels(seen)
     assert not seen["fault"].any()
     assert np.isnan(seen["detected_s"])
     np.testing.assert_allclose(seen["sum_error_v"], 0.0, atol=0.0138)
     error = seen["sensed_angle_deg"] - sweep["angle_deg"]
     assert float(error.std()) == pytest.approx(0.045, abs=0.02)
-    assert seen.identical(sense(sweep, SensorPair(), seed=0))
-    assert not seen["first_v"].equals(sense(sweep, seed=1)["first_v"])
+    assert seen.identical(SensorPair().sense(sweep, seed=0))
+    assert not seen["first_v"].equals(SensorPair().sense(sweep, seed=1)["first_v"])
 
 
 @pytest.mark.parametrize("sensor", [1, 2])
@@ -334,7 +329,7 @@ def test_healthy_sensors_follow_the_plate(sweep):
     ("kind", "size"), [("open_wire", 0.0), ("short_to_ground", 0.0), ("short_to_supply", 0.0), ("offset", 0.25)]
 )
 def test_faults_are_detected_in_200_ms(sweep, kind, size, sensor):
-    seen = sense(sweep, faults=[SensorFault(kind=kind, sensor=sensor, from_s=0.4, size=size)])
+    seen = SensorPair().sense(sweep, faults=[SensorFault(kind=kind, sensor=sensor, from_s=0.4, size=size)])
     assert float(seen["detected_s"]) <= 0.2 + 1e-9
     assert bool(seen["fault"][-1])
     assert not seen["fault"][:400].any()
@@ -345,7 +340,7 @@ def test_small_faults_stay_unseen(sweep):
     for angle, failing in ((70.0, False), (85.0, True)):
         still = sweep.assign(angle_deg=sweep["angle_deg"] * 0.0 + angle)
         still["angle_deg"].attrs = sweep["angle_deg"].attrs
-        seen = sense(still, faults=[SensorFault(kind="gain", size=0.05)])
+        seen = SensorPair().sense(still, faults=[SensorFault(kind="gain", size=0.05)])
         assert bool(seen["fault"].any()) == failing
 
 
@@ -360,17 +355,17 @@ def test_bad_sensors_and_faults_are_refused(sweep):
             SensorFault(**bad)
     stuck = SensorFault(kind="stuck")
     with pytest.raises(ParameterError, match="sensor 1 has two"):
-        sense(sweep, faults=[stuck, stuck])
+        SensorPair().sense(sweep, faults=[stuck, stuck])
     with pytest.raises(ParameterError, match="from_s = -1 s"):
-        sense(sweep, faults=[SensorFault(kind="stuck", from_s=-1.0)])
+        SensorPair().sense(sweep, faults=[SensorFault(kind="stuck", from_s=-1.0)])
     with pytest.raises(ParameterError, match="seed = -1"):
-        sense(sweep, seed=-1)
+        SensorPair().sense(sweep, seed=-1)
     with pytest.raises(DataError, match="run has no variable 'angle_deg'"):
-        sense(sweep.drop_vars("angle_deg"))
+        SensorPair().sense(sweep.drop_vars("angle_deg"))
     with pytest.raises(ShapeError, match="at least two"):
-        sense(sweep.isel(time_s=[0]))
+        SensorPair().sense(sweep.isel(time_s=[0]))
     with pytest.raises(DataError, match="uneven sampling"):
-        sense(sweep.isel(time_s=[0, 1, 3]))
+        SensorPair().sense(sweep.isel(time_s=[0, 1, 3]))
     with pytest.raises(ParameterError, match="adc_bits = 2: must be in"):
         SensorPair(adc_bits=2)
     assert SensorPair(closed_v=0.0, span_v=5.0) == SensorPair(span_v=5.0, closed_v=0.0)

@@ -10,7 +10,7 @@ import pytest
 
 from mgdd.errors import ParameterError
 from mgdd.signals import amplitude_random_steps
-from mgdd.throttle import PseudoWiener, Throttle, initial_state, simulate, to_iosystem
+from mgdd.throttle import PseudoWiener, Throttle, simulate, to_iosystem
 
 
 @pytest.mark.parametrize(
@@ -23,8 +23,8 @@ def test_the_response_is_our_simulation(throttle: Throttle) -> None:
     signal = amplitude_random_steps(0.6, offset=0.1, amplitude=0.4, hold_s=0.05)
     time, duty = signal["time_s"].to_numpy(), signal["duty"].to_numpy()
     ours = simulate(throttle, duty, time_s=time, start_deg=20.0)["angle_deg"].to_numpy()
-    system = to_iosystem(throttle)
-    response = control.input_output_response(system, time, duty, initial_state(throttle, 20.0))
+    system, start = to_iosystem(throttle, start_deg=20.0)
+    response = control.input_output_response(system, time, duty, start)
     assert system.dt == 1e-3
     assert np.ptp(ours) > 5.0
     np.testing.assert_allclose(response.outputs, ours, rtol=0.0, atol=1e-9)
@@ -43,21 +43,20 @@ def test_pseudo_wiener_models_respond_as_they_simulate(kind: str, delay: int) ->
     signal = amplitude_random_steps(0.6, offset=0.1, amplitude=0.4, hold_s=0.05, step_s=2e-3)
     time, duty = signal["time_s"].to_numpy(), signal["duty"].to_numpy()
     ours = model.simulate(signal, initial_state={"angle_deg": 20.0})["angle_deg"].to_numpy()
-    start = initial_state(model, 20.0)
-    response = control.input_output_response(to_iosystem(model, sample_s=2e-3), time, duty, start)
+    system, start = to_iosystem(model, sample_s=2e-3, start_deg=20.0)
+    response = control.input_output_response(system, time, duty, start)
     assert np.ptp(ours) > 5.0
     np.testing.assert_array_equal(response.outputs, ours)
 
 
 def test_a_loop_closes_around_it() -> None:
     control = pytest.importorskip("control")
-    throttle = Throttle()
-    plant = to_iosystem(throttle, sample_s=2e-3)
+    plant, rest = to_iosystem(Throttle(), sample_s=2e-3)
     gain = control.tf([0.02], [1.0], 2e-3, inputs=["error"], outputs=["duty"], name="gain")
     add = control.summing_junction(inputs=["reference", "-angle_deg"], output="error", name="add", dt=2e-3)
     loop = control.interconnect([plant, gain, add], inputs=["reference"], outputs=["angle_deg"], dt=2e-3)
     time = np.arange(400) * 2e-3
-    start = np.concatenate([initial_state(throttle), np.zeros(loop.nstates - 7)])
+    start = np.concatenate([rest, np.zeros(loop.nstates - 7)])
     angle = control.input_output_response(loop, time, np.full(time.size, 40.0), start).outputs
     assert angle[0] == pytest.approx(8.0)
     assert 25.0 < angle[-1] < 40.0, "a proportional loop stops where friction and spring hold it"
@@ -68,7 +67,7 @@ def test_bad_samples_and_starts_are_refused() -> None:
     with pytest.raises(ParameterError, match="sample"):
         to_iosystem(Throttle(), sample_s=1.5e-4)
     with pytest.raises(ParameterError, match=r"start_deg = 95: must lie within the travel"):
-        initial_state(Throttle(), 95.0)
+        to_iosystem(Throttle(), start_deg=95.0)
 
 
 def test_the_missing_package_is_named_with_its_extra(monkeypatch: pytest.MonkeyPatch) -> None:

@@ -18,7 +18,7 @@ from mgdd.identify import fit_cylinder
 from mgdd.io import write_pressure
 
 CYLINDER = presets.load("hd_diesel_128x144").cylinder
-TRACE = datasets.load_hd_traces()[0]
+TRACE = datasets.load("hd_diesel_128x144")[0]
 ANGLE, BAR = TRACE["crank_angle_cad"].to_numpy(), TRACE["pressure_bar"].to_numpy()
 TABLE = pd.DataFrame({"crank_angle_cad": ANGLE, "pressure_bar": BAR})
 

@@ -11,7 +11,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from mgdd.errors import DataError, ParameterError, ShapeError
-from mgdd.optimize import ExtremumSeeking, Limit, Spsa, maximize, measure_map, tune
+from mgdd.optimize import ExtremumSeeking, Limit, Spsa, measure_map, tune
 
 SIGMA, BEND = 0.25, -0.051
 METHODS = ["batch", "moving_average", "spsa"]
@@ -76,7 +76,7 @@ def test_the_tuned_seeker_arrives_as_predicted(method: str) -> None:
     for seed in range(40):
         rng = np.random.default_rng(seed)
         seeker = tuning.seeker(start=12.0 if seed % 2 else -12.0, seed=seed)
-        history = maximize(lambda x, rng=rng: 0.5 * BEND * x[0] ** 2 + rng.normal(0.0, SIGMA), seeker, 1200)
+        history = seeker.run(lambda x, rng=rng: 0.5 * BEND * x[0] ** 2 + rng.normal(0.0, SIGMA), 1200)
         path = history["estimate"].values[:, 0]
         counts.append(int(np.argmax(np.abs(path) <= 1.0)))
         squares.append(float(np.mean(path[400:] ** 2)))

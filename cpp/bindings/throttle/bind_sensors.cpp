@@ -121,7 +121,7 @@ Examples
     kinds.append(as_str(name));
   m.attr("sensor_fault_kinds") = py::tuple(kinds);
   m.def("sense", &sense, py::arg("pair"), py::arg("angle_deg"), py::kw_only(), py::arg("sample_s"), py::arg("seed"),
-        py::arg("faults"), "Samples of both sensors; behind mgdd.throttle.sense.");
+        py::arg("faults"), "Samples of both sensors; behind mgdd.throttle.SensorPair.sense.");
 }
 
 }  // namespace mgdd::bindings

@@ -438,7 +438,7 @@ def pseudo_wiener_units(kind: str) -> dict:
     """
 def sense(pair: SensorPair, angle_deg: typing.Annotated[numpy.typing.ArrayLike, numpy.float64], *, sample_s: typing.SupportsFloat | typing.SupportsIndex, seed: typing.SupportsInt | typing.SupportsIndex, faults: typing.Annotated[collections.abc.Sequence[tuple[str, typing.SupportsFloat | typing.SupportsIndex, typing.SupportsFloat | typing.SupportsIndex]], "FixedSize(2)"]) -> dict:
     """
-    Samples of both sensors; behind mgdd.throttle.sense.
+    Samples of both sensors; behind mgdd.throttle.SensorPair.sense.
     """
 def simulate(throttle: Throttle, duty: typing.Annotated[numpy.typing.ArrayLike, numpy.float64], *, sample_s: typing.SupportsFloat | typing.SupportsIndex, start_deg: typing.SupportsFloat | typing.SupportsIndex, bridge: str, supply_v: typing.Annotated[numpy.typing.ArrayLike, numpy.float64], airflow_torque_nm: typing.Annotated[numpy.typing.ArrayLike, numpy.float64], step_s: typing.SupportsFloat | typing.SupportsIndex) -> dict:
     """
@@ -446,6 +446,6 @@ def simulate(throttle: Throttle, duty: typing.Annotated[numpy.typing.ArrayLike, 
     """
 def simulate_many(throttles: collections.abc.Sequence[Throttle], duty: typing.Annotated[numpy.typing.ArrayLike, numpy.float64], *, sample_s: typing.SupportsFloat | typing.SupportsIndex, start_deg: typing.Annotated[numpy.typing.ArrayLike, numpy.float64], bridge: str, supply_v: typing.Annotated[numpy.typing.ArrayLike, numpy.float64], airflow_torque_nm: typing.Annotated[numpy.typing.ArrayLike, numpy.float64], step_s: typing.SupportsFloat | typing.SupportsIndex) -> numpy.typing.NDArray[numpy.float64]:
     """
-    Many throttles under one input, in lanes; behind mgdd.throttle.simulate_many.
+    Many throttles under one input, in lanes; behind mgdd.throttle.simulate.
     """
 sensor_fault_kinds: tuple = ('none', 'open_wire', 'short_to_ground', 'short_to_supply', 'offset', 'gain', 'stuck')

@@ -8,11 +8,12 @@ from typing import Any
 from mgdd.cli.options import engine_of, traces_of
 from mgdd.cli.output import check_output, emit
 from mgdd.errors import ConvergenceError
-from mgdd.identify import compare_laws, fit_cylinder, wall_heat_profile
+from mgdd.identify import fit_cylinder, wall_heat_profile
+from mgdd.identify.engine.burn_laws import compare_laws
 from mgdd.identify.engine.profile import WallHeatProfile
 from mgdd.identify.engine.records import CylinderFit, figures_of
 from mgdd.report import write_report
-from mgdd.studies import run_measured_traces
+from mgdd.studies import run_study
 from mgdd.studies.measured_summary import law_row
 
 __all__ = ["calibrate"]
@@ -38,7 +39,7 @@ def calibrate(args: argparse.Namespace) -> None:
         profile = wall_heat_profile(traces, fit, point=point, progress=step, **scheme)
     laws = compare_laws(traces, cylinder, point=point, progress=step, **scheme)
     if args.report_folder:
-        result = run_measured_traces(traces, cylinder, point=point, progress=step, **scheme)
+        result = run_study("measured-traces", traces=traces, cylinder=cylinder, point=point, progress=step, **scheme)
         write_report(result, args.report_folder)
     payload = {"preset": preset.name, **_payload(fit, profile, laws)}
     emit(args, payload, text=payload["report"])

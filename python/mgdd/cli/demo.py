@@ -9,7 +9,7 @@ from typing import Any
 from mgdd.cli.options import add_command
 from mgdd.cli.output import check_output, emit
 from mgdd.report import write_report
-from mgdd.studies import run_measured_traces
+from mgdd.studies import run_study
 from mgdd.studies.sections import Table
 
 __all__ = ["add"]
@@ -31,7 +31,7 @@ def run(args: argparse.Namespace) -> None:
     """Run the study and write the report."""
     check_output(args, csv=False)
     step = args.progress.expect(45)
-    result = run_measured_traces(progress=step)
+    result = run_study("measured-traces", progress=step)
     step("write the report")
     page = write_report(result, Path(args.folder))
     emit(args, result.summary, text=_text(result.summary, page))

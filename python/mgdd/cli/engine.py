@@ -20,7 +20,7 @@ from mgdd.cli.options import (
 )
 from mgdd.cli.output import check_output, emit, lines
 from mgdd.cli.seek import add_seek
-from mgdd.engine import analyze, find_optimum, simulate, start_of_combustion, start_of_injection, timing_sweep
+from mgdd.engine import analyze, find_optimum, ignition_delay, simulate, timing_sweep
 from mgdd.errors import ConvergenceError, ParameterError
 from mgdd.identify import best_timing
 
@@ -86,14 +86,14 @@ def _simulate(args: argparse.Namespace) -> None:
 
 
 def _injection_of(cylinder: Cylinder, point: OperatingPoint, soc: float) -> float:
-    timing = start_of_injection(cylinder, point, soc_cad=soc)
+    timing = ignition_delay(cylinder, point, soc_cad=soc)
     return math.nan if timing.clipped else timing.soi_cad
 
 
 def _start_of_combustion(args: argparse.Namespace, cylinder: Cylinder, point: OperatingPoint) -> float:
     if args.soi_cad is None:
         return _DEFAULT_SOC_CAD if args.soc_cad is None else float(args.soc_cad)
-    timing = start_of_combustion(cylinder, point, soi_cad=args.soi_cad)
+    timing = ignition_delay(cylinder, point, soi_cad=args.soi_cad)
     if not timing.ignites:
         raise ConvergenceError(f"soi_cad = {args.soi_cad:g} does not ignite before EVO: inject earlier")
     latest = _core.engine.timing_window_cad[1]

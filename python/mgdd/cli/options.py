@@ -59,8 +59,8 @@ class Parser(argparse.ArgumentParser):
 def as_option(name: str, text: str | None = None) -> str:
     """Write an argument of the library as the option that sets it."""
     option = f"--{name.replace('_', '-')}"
-    if text == "False":
-        return f"{option} left out"
+    if text in ("True", "False"):
+        return option if text == "True" else f"{option} left out"
     return f"{option} {text}" if text else option
 
 
@@ -140,6 +140,7 @@ def add_files(parser: argparse.ArgumentParser, *, nargs: int | str) -> None:
         metavar="X",
         help="angle of firing TDC in files that count from elsewhere",
     )
+    group.add_argument("--before-tdc", action="store_true", help="angles count degrees before firing TDC")
     group.add_argument(
         "--conditions",
         metavar="FILE.csv",
@@ -196,6 +197,7 @@ def traces_of(args: argparse.Namespace) -> list[xr.Dataset]:
             angle_unit=args.angle_unit,
             pressure_unit=args.pressure_unit,
             firing_tdc_deg=args.firing_tdc_deg,
+            before_tdc=args.before_tdc,
             delimiter=args.delimiter,
             decimal=args.decimal,
         )

@@ -11,8 +11,7 @@ from typing import TYPE_CHECKING, Any
 
 from mgdd.errors import ParameterError
 from mgdd.io.traces import write_traces
-from mgdd.results import VARIABLES
-from mgdd.results.labels import to_jsonable
+from mgdd.results.labels import VARIABLES, to_jsonable
 from mgdd.studies.sections import Table
 
 if TYPE_CHECKING:

@@ -15,10 +15,10 @@ from mgdd.cli.output import Stopped, check_figure, check_output, emit
 from mgdd.cli.seekers import Task, default_cycles, make_seeker
 from mgdd.engine import Performance
 from mgdd.errors import ConvergenceError, Interrupted, ParameterError
-from mgdd.loop import EngineBench, LoopCriteria, find_steady_optimum, run_seeker
+from mgdd.loop import EngineBench, LoopCriteria, run_seeker
 from mgdd.loop.plant_loop import LoopRun
 from mgdd.optimize import Optimum
-from mgdd.results import VARIABLES
+from mgdd.results.labels import VARIABLES
 from mgdd.results.units import unit_attributes
 
 if TYPE_CHECKING:
@@ -178,7 +178,7 @@ def _optimum(args: argparse.Namespace, bench: EngineBench, limits: Mapping[str, 
     """Find where the seeker should end; COV of IMEP has no steady value, so it is judged there."""
     steady = {name: value for name, value in limits.items() if name != _COV}
     with _option_names():
-        best = find_steady_optimum(bench, steady, bounds_cad=(args.lower_cad, args.upper_cad))
+        best = bench.find_optimum(steady, bounds_cad=(args.lower_cad, args.upper_cad))
     if not best.curvature < 0.0:
         raise ConvergenceError(
             f"the performance has no maximum near --lower-cad {args.lower_cad:g} to --upper-cad {args.upper_cad:g} "

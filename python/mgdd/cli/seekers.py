@@ -8,15 +8,12 @@ from dataclasses import dataclass
 from typing import TYPE_CHECKING, Any
 
 from mgdd.errors import ParameterError
-from mgdd.loop import steady_map
 from mgdd.optimize import BoundedSeeking, ComponentLag, ExtremumSeeking, GoldenSection, Limit, NewtonSeeking, Spsa, tune
 from mgdd.optimize.tuning import Tuning
 
 if TYPE_CHECKING:
     from mgdd.loop import EngineBench
-    from mgdd.optimize import Optimum
-
-    Seeker = ExtremumSeeking | NewtonSeeking | BoundedSeeking | Spsa | GoldenSection
+    from mgdd.optimize import Optimum, Seeker
 
 __all__ = ["Task", "default_cycles", "make_seeker"]
 
@@ -156,5 +153,5 @@ def _limit(task: Task, name: str, upper: float) -> Limit:
 
 def _slope_of(task: Task, name: str) -> float:
     low, high = task.bench.window_cad
-    around = steady_map(task.bench, [max(task.best["soc_cad"] - 0.5, low), min(task.best["soc_cad"] + 0.5, high)])
+    around = task.bench.steady_map([max(task.best["soc_cad"] - 0.5, low), min(task.best["soc_cad"] + 0.5, high)])
     return abs(float(around[name][1] - around[name][0])) if name in around else 0.0

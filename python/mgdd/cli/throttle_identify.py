@@ -133,9 +133,8 @@ def _draw(validation: ThrottleValidation, file: str, correlation: xr.Dataset | N
     rows = 1 if correlation is None else 2
     figure = Figure(figsize=(12.0, 4.6 * rows), layout="constrained")
     axes = figure.subplots(rows, 3 if rows == 1 else 2).ravel()
-    plot.free_run(validation.free_run, ax=axes[0])
-    plot.error_growth(validation.n_step, ax=axes[1])
-    plot.residual_correlation(validation.tests.correlations, ax=axes[2])
+    for pane, what in zip(axes, ("free_run", "n_step", "residuals"), strict=False):
+        validation.plot(what, ax=pane)
     if correlation is not None:
         plot.correlation_matrix(correlation, ax=axes[3])
     figure.savefig(file, dpi=150)

@@ -7,7 +7,7 @@ from __future__ import annotations
 
 from mgdd._core.engine import Cylinder, NoxModel, NoxProxy, OperatingPoint, Performance, PerformanceTerm, SoftSensor
 from mgdd.engine.cycle import convergence, sensitivities, simulate, timing_sweep
-from mgdd.engine.ignition import start_of_combustion, start_of_injection
+from mgdd.engine.ignition import ignition_delay
 from mgdd.engine.nox import fit_nox_proxy
 from mgdd.engine.optimum import find_optimum
 from mgdd.engine.trace import analyze
@@ -24,9 +24,8 @@ __all__ = [
     "convergence",
     "find_optimum",
     "fit_nox_proxy",
+    "ignition_delay",
     "sensitivities",
     "simulate",
-    "start_of_combustion",
-    "start_of_injection",
     "timing_sweep",
 ]

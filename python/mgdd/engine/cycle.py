@@ -10,8 +10,7 @@ import numpy as np
 
 from mgdd import _core
 from mgdd._core.engine import Cylinder, NoxProxy, OperatingPoint
-from mgdd.results import VARIABLES, labelled_dataset
-from mgdd.results.labels import ANGLE
+from mgdd.results.labels import ANGLE, VARIABLES, labelled_dataset
 from mgdd.results.units import unit_attributes
 
 if TYPE_CHECKING:

@@ -6,9 +6,10 @@ from dataclasses import dataclass
 
 from mgdd import _core
 from mgdd._core.engine import Cylinder, OperatingPoint
+from mgdd.errors import ParameterError
 from mgdd.results.describe import described
 
-__all__ = ["Timing", "start_of_combustion", "start_of_injection"]
+__all__ = ["Timing", "ignition_delay"]
 
 
 @described
@@ -29,8 +30,8 @@ class Timing:
 
     Examples
     --------
-    >>> from mgdd.engine import Cylinder, OperatingPoint, start_of_combustion
-    >>> start_of_combustion(Cylinder(), OperatingPoint(), soi_cad=-10.0).ignites
+    >>> from mgdd.engine import Cylinder, OperatingPoint, ignition_delay
+    >>> ignition_delay(Cylinder(), OperatingPoint(), soi_cad=-10.0).ignites
     True
     """
 
@@ -41,8 +42,10 @@ class Timing:
     clipped: bool
 
 
-def start_of_combustion(cylinder: Cylinder, point: OperatingPoint, *, soi_cad: float) -> Timing:
-    """Find the start of combustion of an injection.
+def ignition_delay(
+    cylinder: Cylinder, point: OperatingPoint, *, soi_cad: float | None = None, soc_cad: float | None = None
+) -> Timing:
+    """Find the start of combustion of an injection, or the injection that ignites at a wanted start of combustion.
 
     Parameters
     ----------
@@ -51,18 +54,19 @@ def start_of_combustion(cylinder: Cylinder, point: OperatingPoint, *, soi_cad: f
         cycle, ``hardenberg_hase`` at the state of SOI, or ``polynomial`` in SOI.
     point : OperatingPoint
         Its fuel does not matter.
-    soi_cad : float
-        Start of injection [°CA aTDC], in [-60, 20].
+    soi_cad, soc_cad : float
+        Start of injection or wanted start of combustion [°CA aTDC], in [-60, 20]; exactly one of them.
 
     Returns
     -------
     Timing
-        ``ignites`` is False where the charge stays below ignition until EVO.
+        Both, and the delay. ``ignites`` is False where the charge stays below ignition until EVO; ``clipped`` is True
+        for a wanted SOC beyond the reachable range, SOI in [-60, 20], and the timing then its edge.
 
     Raises
     ------
     mgdd.errors.ParameterError
-        A timing outside its window.
+        A timing outside its window, or not exactly one.
 
     References
     ----------
@@ -70,38 +74,15 @@ def start_of_combustion(cylinder: Cylinder, point: OperatingPoint, *, soi_cad: f
 
     Examples
     --------
-    >>> from mgdd.engine import Cylinder, OperatingPoint, start_of_combustion
-    >>> round(start_of_combustion(Cylinder(), OperatingPoint(), soi_cad=-20.0).delay_cad, 1)
+    >>> from mgdd.engine import Cylinder, OperatingPoint, ignition_delay
+    >>> round(ignition_delay(Cylinder(), OperatingPoint(), soi_cad=-20.0).delay_cad, 1)
     8.1
-    """
-    return Timing(**_core.engine.start_of_combustion(cylinder, point, soi_cad))
-
-
-def start_of_injection(cylinder: Cylinder, point: OperatingPoint, *, soc_cad: float) -> Timing:
-    """Find the injection that ignites at a wanted start of combustion.
-
-    Parameters
-    ----------
-    cylinder, point
-        As in `start_of_combustion`.
-    soc_cad : float
-        Wanted start of combustion [°CA aTDC], in [-60, 20].
-
-    Returns
-    -------
-    Timing
-        With ``clipped=True`` at the edge of the reachable range, SOI in [-60, 20].
-
-    Raises
-    ------
-    mgdd.errors.ParameterError
-        A timing outside its window.
-
-    Examples
-    --------
-    >>> from mgdd.engine import Cylinder, OperatingPoint, start_of_injection
-    >>> timing = start_of_injection(Cylinder(), OperatingPoint(), soc_cad=-6.0)
+    >>> timing = ignition_delay(Cylinder(), OperatingPoint(), soc_cad=-6.0)
     >>> round(timing.soi_cad, 1), timing.clipped
     (-10.8, False)
     """
-    return Timing(**_core.engine.start_of_injection(cylinder, point, soc_cad))
+    if soi_cad is not None and soc_cad is None:
+        return Timing(**_core.engine.start_of_combustion(cylinder, point, soi_cad))
+    if soc_cad is not None and soi_cad is None:
+        return Timing(**_core.engine.start_of_injection(cylinder, point, soc_cad))
+    raise ParameterError("soi_cad, soc_cad: give exactly one of them")

@@ -9,8 +9,7 @@ from mgdd import _core
 from mgdd._core.engine import Cylinder, OperatingPoint
 from mgdd.errors import ParameterError
 from mgdd.io.trace_forms import as_trace
-from mgdd.results import labelled_dataset
-from mgdd.results.labels import ANGLE
+from mgdd.results.labels import ANGLE, labelled_dataset
 
 if TYPE_CHECKING:
     import xarray as xr
@@ -99,7 +98,7 @@ def analyze(
     >>> from mgdd import datasets, presets
     >>> from mgdd.engine import analyze
     >>> cylinder = presets.load("hd_diesel_128x144").cylinder
-    >>> for trace in datasets.load_hd_traces():
+    >>> for trace in datasets.load("hd_diesel_128x144"):
     ...     print(round(float(analyze(trace, cylinder)["ca50_cad"]), 1))
     5.0
     6.9

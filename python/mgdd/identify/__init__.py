@@ -1,6 +1,6 @@
 """Identification: fitting models to measured records, and which parameters the data do not identify.
 
-Engine: `fit_cylinder`, `compare_laws`, `wall_heat_profile`, `best_timing`. Throttle: `identify_throttle`,
+Engine: `fit_cylinder`, `wall_heat_profile`, `best_timing`. Throttle: `identify_throttle`,
 `validate_throttle` and the fits and excitations below them. Any ODE: `fit_ode`. Every fit answers with a
 `mgdd.results.Fit`.
 """
@@ -8,21 +8,18 @@ Engine: `fit_cylinder`, `compare_laws`, `wall_heat_profile`, `best_timing`. Thro
 from __future__ import annotations
 
 from mgdd.identify.engine.best_timing import best_timing
-from mgdd.identify.engine.burn_laws import compare_laws
 from mgdd.identify.engine.cylinder import fit_cylinder
 from mgdd.identify.engine.profile import wall_heat_profile
 from mgdd.identify.ode_fit import OdeModel, fit_ode
 from mgdd.identify.throttle.excitation_check import check_excitation
 from mgdd.identify.throttle.excitation_design import design_excitation
-from mgdd.identify.throttle.first_principle import fit_throttle
+from mgdd.identify.throttle.first_principle import fit_first_principle
 from mgdd.identify.throttle.first_principle_model import FirstPrincipleModel
 from mgdd.identify.throttle.fits import load_throttle_model
 from mgdd.identify.throttle.identify import identify_throttle
-from mgdd.identify.throttle.n_step import n_step_rms, split_log
 from mgdd.identify.throttle.online_update import OnlineUpdate
-from mgdd.identify.throttle.physical_parameters import physical_parameters
 from mgdd.identify.throttle.pseudo_wiener_fit import fit_pseudo_wiener
-from mgdd.identify.throttle.smooth import SmoothThrottle, fit_smooth_throttle
+from mgdd.identify.throttle.smooth import SmoothThrottle
 from mgdd.identify.throttle.validation import validate_throttle
 
 __all__ = [
@@ -32,18 +29,13 @@ __all__ = [
     "SmoothThrottle",
     "best_timing",
     "check_excitation",
-    "compare_laws",
     "design_excitation",
     "fit_cylinder",
+    "fit_first_principle",
     "fit_ode",
     "fit_pseudo_wiener",
-    "fit_smooth_throttle",
-    "fit_throttle",
     "identify_throttle",
     "load_throttle_model",
-    "n_step_rms",
-    "physical_parameters",
-    "split_log",
     "validate_throttle",
     "wall_heat_profile",
 ]

@@ -15,9 +15,10 @@ from mgdd.io.parameters import Entry, ParameterFile, Wanted, entries, wanted
 from mgdd.optimize import least_squares
 from mgdd.optimize.fit_options import FitOptions, fit_options
 from mgdd.optimize.fit_run import draw_run, fit_run, quality_of
-from mgdd.results import VARIABLES, Fit, Label
+from mgdd.results import Fit
 from mgdd.results.describe import described
 from mgdd.results.fit import n_best_of
+from mgdd.results.labels import VARIABLES, Label
 from mgdd.results.units import unit_of
 from mgdd.signals.even_grid import even_step
 from mgdd.signals.model import RunInputs, SampledModel, columns_of

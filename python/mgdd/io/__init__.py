@@ -5,18 +5,11 @@ Angles are degrees of crank angle with firing TDC = 0 and compression negative (
 
 from __future__ import annotations
 
-from mgdd.io.angles import from_0_720, from_btdc
 from mgdd.io.conditions import read_conditions
-from mgdd.io.parameters import ParameterFile
 from mgdd.io.pressure import pressure_trace, read_pressure, write_pressure
-from mgdd.io.throttle_checks import check_throttle_log
 from mgdd.io.throttle_log import read_throttle_log, throttle_log, write_throttle_log
 
 __all__ = [
-    "ParameterFile",
-    "check_throttle_log",
-    "from_0_720",
-    "from_btdc",
     "pressure_trace",
     "read_conditions",
     "read_pressure",

@@ -107,7 +107,7 @@ def check_trace(
 
 
 def _remedy_0_720() -> str:
-    return f"pass {argument('firing_tdc_deg', '')} to read_pressure, or convert with mgdd.io.from_0_720"
+    return f"pass {argument('firing_tdc_deg', '')} with the angle of firing TDC"
 
 
 def check_choice(name: str, value: object, allowed: tuple[str, ...]) -> None:
@@ -137,7 +137,7 @@ def _check_order(degrees: NDArray[np.float64], place: Callable[[int], str]) -> N
     if np.all(step < 0.0):
         raise DataError(
             f"{place(0)}: crank angles fall from {degrees[0]:g} to {degrees[-1]:g}: this looks like °bTDC; "
-            f"{CONVENTION}; mgdd.io.from_btdc converts"
+            f"{CONVENTION}; pass {argument('before_tdc', 'True')}"
         )
     index = int(np.argmin(step > 0.0)) + 1
     before, here = degrees[index - 1], degrees[index]

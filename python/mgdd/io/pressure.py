@@ -8,11 +8,10 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from mgdd.errors import DataError, argument
-from mgdd.io.angles import aligned_angle
+from mgdd.io.angles import pair, turned
 from mgdd.io.checks import ANGLE_UNITS, PRESSURE_UNITS, check_choice, check_trace
 from mgdd.io.table import read_table
-from mgdd.results import check_labels, labelled_dataset
-from mgdd.results.labels import ANGLE
+from mgdd.results.labels import ANGLE, check_labels, labelled_dataset
 
 if TYPE_CHECKING:
     import os
@@ -23,7 +22,14 @@ if TYPE_CHECKING:
 __all__ = ["pressure_trace", "read_pressure", "write_pressure"]
 
 
-def pressure_trace(crank_angle_cad: ArrayLike, pressure_bar: ArrayLike, *, name: str = "trace") -> xr.Dataset:
+def pressure_trace(
+    crank_angle_cad: ArrayLike,
+    pressure_bar: ArrayLike,
+    *,
+    firing_tdc_deg: float | None = None,
+    before_tdc: bool = False,
+    name: str = "trace",
+) -> xr.Dataset:
     """Check two arrays and make the Dataset of a measured trace from copies of them.
 
     Parameters
@@ -32,6 +38,8 @@ def pressure_trace(crank_angle_cad: ArrayLike, pressure_bar: ArrayLike, *, name:
         Crank angle [°CA aTDC], firing TDC = 0, compression negative, strictly rising.
     pressure_bar : array_like
         Cylinder pressure [bar].
+    firing_tdc_deg, before_tdc
+        For angles in another convention, as in `read_pressure`.
     name : str
         What tables and figures call the trace; stored as ``attrs["file"]``.
 
@@ -53,8 +61,12 @@ def pressure_trace(crank_angle_cad: ArrayLike, pressure_bar: ArrayLike, *, name:
     >>> trace = pressure_trace(angle, 60.0 - 0.01 * angle**2, name="bench 7")
     >>> trace.attrs["file"], trace["pressure_bar"].attrs["units"]
     ('bench 7', 'bar')
+    >>> pressure_trace(-angle, 60.0 - 0.01 * angle**2, before_tdc=True, name="bench 7").equals(trace)
+    True
     """
-    angle, pressure = check_trace(crank_angle_cad, pressure_bar, unit="bar", source=name)
+    given, values = pair(crank_angle_cad, pressure_bar)
+    order, cad = turned(given, firing_tdc_deg, before_tdc)
+    angle, pressure = check_trace(cad, values[order], unit="bar", source=name)
     return _dataset(angle, pressure, name)
 
 
@@ -66,6 +78,7 @@ def read_pressure(
     angle_unit: str = "deg",
     pressure_unit: str = "bar",
     firing_tdc_deg: float | None = None,
+    before_tdc: bool = False,
     delimiter: str | None = None,
     decimal: str = ".",
 ) -> xr.Dataset:
@@ -85,8 +98,10 @@ def read_pressure(
     pressure_unit : {"bar", "kPa", "Pa"}
         Unit of the pressure column; a unit that the magnitude excludes is refused.
     firing_tdc_deg : float, optional
-        For 0..720 records: the angle [deg] at which firing TDC stands, see `from_0_720`.
-        None: the file is in °CA aTDC already.
+        For 0..720 records: the angle [deg] at which firing TDC stands: 360 when the record starts at gas-exchange TDC,
+        0 when it starts at firing TDC. It is never guessed; None for other files.
+    before_tdc : bool
+        Angles count degrees *before* firing TDC, compression positive.
     delimiter : str, optional
         Column separator; None detects it.
     decimal : {".", ","}
@@ -134,13 +149,13 @@ def read_pressure(
         )
     angle, pressure = table.numbers(angle_index), table.numbers(pressure_index)
     rows = list(table.lines)
-    if firing_tdc_deg is not None:
+    if firing_tdc_deg is not None or before_tdc:
         degrees = np.rad2deg(angle) if angle_unit == "rad" else angle
         try:
-            order, degrees = aligned_angle(degrees, firing_tdc_deg)
+            order, angle = turned(degrees, firing_tdc_deg, before_tdc)
         except DataError as error:
             raise error.reworded(f"{table.source}: {error}") from None
-        angle, pressure, rows = degrees[order], pressure[order], [rows[i] for i in order]
+        pressure, rows = pressure[order], [rows[i] for i in order]
         angle_unit = "deg"
     angle, pressure = check_trace(
         angle, pressure, unit=pressure_unit, angle_unit=angle_unit, source=table.source, rows=rows

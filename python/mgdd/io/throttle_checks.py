@@ -10,7 +10,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from mgdd.errors import DataError, ParameterError, argument
-from mgdd.results import check_labels
+from mgdd.results.labels import check_labels
 from mgdd.signals.even_grid import even_step, wide_steps
 
 if TYPE_CHECKING:
@@ -90,7 +90,8 @@ def check_throttle_log(log: xr.Dataset, *, two_sided: bool = False, limp_home_de
     Examples
     --------
     >>> import numpy as np
-    >>> from mgdd.io import check_throttle_log, throttle_log
+    >>> from mgdd.io import throttle_log
+    >>> from mgdd.io.throttle_checks import check_throttle_log
     >>> time = np.arange(2000) * 1e-3
     >>> log = throttle_log(time, 0.2 * np.sin(6.0 * time), 20.0 + 15.0 * np.sin(6.0 * time - 0.5))
     >>> check_throttle_log(log, two_sided=True, limp_home_deg=8.0) is log

@@ -20,7 +20,7 @@ from mgdd.io.throttle_checks import (
     check_throttle_log,
     check_time,
 )
-from mgdd.results import labelled_dataset
+from mgdd.results.labels import labelled_dataset
 
 if TYPE_CHECKING:
     import os
@@ -71,7 +71,8 @@ def throttle_log(
     Raises
     ------
     DataError, ShapeError
-        As in `check_throttle_log`; arrays that do not belong together.
+        A log that no throttle can be identified from: the page "File formats" lists why; arrays that do not belong
+        together.
     ParameterError
         A step that is not positive.
 
@@ -147,7 +148,7 @@ def read_throttle_log(
     FileNotFoundError
         No such file.
     DataError
-        No such column, a cell that is not a number, and all of `check_throttle_log`; the message gives file, line,
+        No such column, a cell that is not a number, and all that `throttle_log` refuses; the message gives file, line,
         column and remedy.
     ParameterError
         An empty window, a step that is not positive.
@@ -201,7 +202,7 @@ def write_throttle_log(log: xr.Dataset, path: str | os.PathLike[str]) -> None:
     Raises
     ------
     DataError
-        All of `check_throttle_log`.
+        As in `throttle_log`.
 
     Examples
     --------

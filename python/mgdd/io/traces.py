@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from mgdd.errors import ShapeError
-from mgdd.results import check_labels
+from mgdd.results.labels import check_labels
 
 if TYPE_CHECKING:
     import xarray as xr

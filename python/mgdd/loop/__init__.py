@@ -2,7 +2,7 @@
 
 `EngineBench`, `SurrogatePlant` and `VirtualThrottle` are plants: ``apply`` inputs by name, ``measure``. `run_seeker`
 closes the loop on any of them and on a test rig, `monte_carlo` does so for seeds, gains and operating points of the
-bench on all cores, `find_steady_optimum` says where a seeker should end.
+bench on all cores, `EngineBench.find_optimum` says where a seeker should end.
 """
 
 from __future__ import annotations
@@ -12,7 +12,6 @@ from mgdd.loop.bench import EngineBench
 from mgdd.loop.criteria import LoopCriteria
 from mgdd.loop.plant import Measurement, Plant
 from mgdd.loop.seek import monte_carlo, run_seeker
-from mgdd.loop.steady import find_steady_optimum, steady_map
 from mgdd.loop.surrogate_plant import SurrogatePlant
 from mgdd.loop.virtual_throttle import VirtualThrottle
 
@@ -24,8 +23,6 @@ __all__ = [
     "SensorDynamics",
     "SurrogatePlant",
     "VirtualThrottle",
-    "find_steady_optimum",
     "monte_carlo",
     "run_seeker",
-    "steady_map",
 ]

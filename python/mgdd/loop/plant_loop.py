@@ -10,16 +10,18 @@ from typing import TYPE_CHECKING, Any, NamedTuple
 import numpy as np
 
 from mgdd.errors import Interrupted, ParameterError
-from mgdd.loop.bench import FLAGS
+from mgdd.loop.bench_record import FLAGS
 from mgdd.loop.criteria import LoopCriteria
 from mgdd.loop.plant import AnnouncingPlant, Measurement, Plant
 from mgdd.loop.summary import summarize_cycles
-from mgdd.results import VARIABLES, labelled_dataset
 from mgdd.results.describe import described
+from mgdd.results.labels import VARIABLES, labelled_dataset
 
 if TYPE_CHECKING:
     import xarray as xr
     from numpy.typing import NDArray
+
+    from mgdd.optimize import Seeker
 
 __all__ = ["LoopRun", "steer"]
 
@@ -69,7 +71,7 @@ class LoopRun:
     interrupted: bool = False
 
 
-def steer(plant: Plant, seeker: Any, cycles: int, criteria: LoopCriteria) -> LoopRun:
+def steer(plant: Plant, seeker: Seeker, cycles: int, criteria: LoopCriteria) -> LoopRun:
     """Run the loop of `mgdd.loop.run_seeker` from Python."""
     if cycles < 1:
         raise ParameterError.of("cycles", cycles, ">= 1")
@@ -103,7 +105,7 @@ def steer(plant: Plant, seeker: Any, cycles: int, criteria: LoopCriteria) -> Loo
     return run
 
 
-def _one_cycle(plant: Plant, announcing: AnnouncingPlant | None, seeker: Any, log: list[_Row]) -> None:
+def _one_cycle(plant: Plant, announcing: AnnouncingPlant | None, seeker: Seeker, log: list[_Row]) -> None:
     if announcing is not None and announcing.operating_point_changes:
         seeker.restart()
     estimate = np.array(seeker.estimate, np.float64)
@@ -122,7 +124,7 @@ def _one_cycle(plant: Plant, announcing: AnnouncingPlant | None, seeker: Any, lo
         seeker.restart()
 
 
-def _require_match(seeker: Any, measured: Measurement) -> None:
+def _require_match(seeker: Seeker, measured: Measurement) -> None:
     if seeker.component_count not in (1, len(measured.components)):
         raise ParameterError(
             f"components has {seeker.component_count} entries: the plant measures {len(measured.components)}; give as "

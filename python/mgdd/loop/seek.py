@@ -11,18 +11,17 @@ import numpy as np
 
 from mgdd import _core
 from mgdd.errors import ParameterError, ShapeError, hand_over, or_partial
-from mgdd.loop.bench import EngineBench, cycles_to_dataset
+from mgdd.loop.bench import EngineBench
+from mgdd.loop.bench_record import cycles_to_dataset
 from mgdd.loop.criteria import LoopCriteria
 from mgdd.loop.plant import Plant
 from mgdd.loop.plant_loop import LoopRun, steer
-from mgdd.results import labelled_dataset
+from mgdd.results.labels import labelled_dataset
 
 if TYPE_CHECKING:
     import xarray as xr
 
-    from mgdd.optimize import BoundedSeeking, ExtremumSeeking, GoldenSection, GradientDescent, NewtonSeeking, Spsa
-
-    Seeker = ExtremumSeeking | NewtonSeeking | BoundedSeeking | Spsa | GradientDescent | GoldenSection
+    from mgdd.optimize import Seeker
 
 __all__ = ["LoopRun", "monte_carlo", "run_seeker"]
 
@@ -102,7 +101,8 @@ def run_seeker(
     if not isinstance(plant, EngineBench):
         return steer(plant, seeker, cycles, criteria)
     goal = _core_criteria(plant, criteria)
-    raw, stop = or_partial(lambda: _core.loop.run_loop(plant, seeker, cycles, **goal))
+    run: Any = _core.loop.run_loop  # one overload for each class of seeker
+    raw, stop = or_partial(lambda: run(plant, seeker, cycles, **goal))
     dataset = cycles_to_dataset(plant, raw["columns"], estimate_cad=raw["estimate_cad"])
     dataset.attrs["interrupted"] = int(raw["interrupted"])
     return hand_over(LoopRun(dataset=dataset, summary=raw["summary"], interrupted=raw["interrupted"]), stop)

@@ -11,50 +11,24 @@ from mgdd._core.loop import SensorDynamics
 from mgdd._core.optimize import Limit
 from mgdd.engine.optimum import OBJECTIVES, check_request
 from mgdd.errors import ConvergenceError, ParameterError, ShapeError
-from mgdd.loop.bench import EngineBench
 from mgdd.optimize import Optimum
 from mgdd.optimize.optimum import limits_of
-from mgdd.results import labelled_dataset
+from mgdd.results.labels import labelled_dataset
 
 if TYPE_CHECKING:
     import xarray as xr
     from numpy.typing import ArrayLike
 
-__all__ = ["find_steady_optimum", "steady_map"]
+    from mgdd.loop.bench import EngineBench
+
+__all__ = ["find_optimum", "steady_map"]
 
 _SCAN_CAD = 0.25
 _SECANT_CAD = 3.0
 
 
-def steady_map(bench: EngineBench, soc_cad: ArrayLike, *, cycle: int = 0) -> xr.Dataset:
-    """Measure a bench without scatter, noise, misfire and drift, each sensor settled.
-
-    Parameters
-    ----------
-    bench : EngineBench
-        Read, not run: the map is made on a quiet copy.
-    soc_cad : array_like
-        Starts of combustion [°CA aTDC], one-dimensional.
-    cycle : int
-        The operating point is that of this cycle of the schedule.
-
-    Returns
-    -------
-    xarray.Dataset
-        Over ``soc_cad``: ``j``, ``efficiency_gross``, ``imep_gross_bar``, ``p_max_bar``, ``dp_max_bar_per_cad``,
-        ``t_max_k``, ``nox_true_ppm``, ``nox_soft_ppm``.
-
-    Raises
-    ------
-    mgdd.errors.ParameterError
-        A timing outside the window of the bench.
-
-    Examples
-    --------
-    >>> from mgdd.loop import EngineBench, steady_map
-    >>> steady_map(EngineBench(), [-10.0, -5.0])["efficiency_gross"].values.round(3)
-    array([0.557, 0.562])
-    """
+def steady_map(bench: EngineBench, soc_cad: ArrayLike, cycle: int) -> xr.Dataset:
+    """Measure a quiet copy of a bench, each sensor settled."""
     quiet = _quiet(bench, cycle)
     timings = np.atleast_1d(np.asarray(soc_cad, float))
     if timings.ndim != 1:
@@ -72,46 +46,13 @@ def steady_map(bench: EngineBench, soc_cad: ArrayLike, *, cycle: int = 0) -> xr.
     return labelled_dataset(variables)
 
 
-def find_steady_optimum(
+def find_optimum(
     bench: EngineBench,
-    limits: Mapping[str, float] | Sequence[Limit] | None = None,
-    *,
-    bounds_cad: tuple[float, float] = (-30.0, 10.0),
-    cycle: int = 0,
+    limits: Mapping[str, float] | Sequence[Limit] | None,
+    bounds_cad: tuple[float, float],
+    cycle: int,
 ) -> Optimum:
-    """Find the best timing of a noise-free bench: what its seekers are judged by.
-
-    Parameters
-    ----------
-    bench : EngineBench
-        Read, not run.
-    limits : mapping of str to float, or sequence of Limit, optional
-        Upper limits on indicators, for example ``{"p_max_bar": 95.0}``; the margin of a `Limit` is kept.
-    bounds_cad : tuple of float
-        Searched range [°CA aTDC].
-    cycle : int
-        The operating point is that of this cycle of the schedule.
-
-    Returns
-    -------
-    mgdd.optimize.Optimum
-        Input ``soc_cad``, to about 0.001 CAD; objective ``j``. ``values`` holds the indicators there and, for every
-        limited one, ``scatter_NAME``: the standard deviation from cycle to cycle that the scatter of SOC causes, to
-        first order, in its unit. The curvature is taken over ±3 CAD at the free optimum.
-
-    Raises
-    ------
-    mgdd.errors.ParameterError
-        Bounds outside the window of the bench, or a limit that is not an indicator.
-    mgdd.errors.ConvergenceError
-        No timing in the range meets the limits.
-
-    Examples
-    --------
-    >>> from mgdd.loop import EngineBench, find_steady_optimum
-    >>> round(find_steady_optimum(EngineBench())["soc_cad"], 2)
-    -5.63
-    """
+    """Find the best timing of a quiet copy of a bench."""
     from scipy.optimize import brentq, minimize_scalar
 
     kept_limits = limits_of(limits)
@@ -183,7 +124,7 @@ def _quiet(bench: EngineBench, cycle: int) -> EngineBench:
         ),
         0.0,
     )  # fmt: skip
-    return EngineBench(cylinder, bench.point_at(cycle), **{**settings, **silent, **still})
+    return type(bench)(cylinder, bench.point_at(cycle), **{**settings, **silent, **still})
 
 
 def _settled(quiet: EngineBench, soc_cad: float) -> dict[str, Any]:

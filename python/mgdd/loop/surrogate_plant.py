@@ -1,42 +1,72 @@
-"""A surrogate of a measured engine as a plant of the loop."""
+"""A surrogate of a measured engine, run cycle by cycle with its sensor lag and recorded residuals, as a plant."""
 
 from __future__ import annotations
 
+import copy
 from collections.abc import Mapping, Sequence
+from typing import TYPE_CHECKING, Any
 
-from mgdd.errors import ParameterError, RigError
+import numpy as np
+
+from mgdd.errors import DataError, ParameterError, RigError
 from mgdd.loop.plant import Measurement, checked_inputs
-from mgdd.surrogate import SurrogateEngine
+from mgdd.results.describe import described
+from mgdd.surrogate import EngineSurrogate
+from mgdd.surrogate.sensor_lag import decay_of
+
+if TYPE_CHECKING:
+    from numpy.typing import NDArray
 
 __all__ = ["SurrogatePlant"]
 
 
 class SurrogatePlant:
-    """A virtual measured engine that a seeker can steer: inputs of its injection, an objective of its signals.
+    """A virtual measured engine: a surrogate run cycle by cycle, by `step` or, as a plant, by a seeker.
+
+    A fast signal answers in the cycle of its command; a signal with a longer lag comes later by the difference, and
+    a slow sensor adds its first-order lag. Residuals are drawn as stretches of the log, the same row for all
+    signals, so that they keep their correlation with each other and in time. They hold cyclic scatter *and* what
+    the surfaces miss (compare `SignalModel.residual_sd` with ``cyclic_sd``).
 
     Parameters
     ----------
-    engine : SurrogateEngine
-        The engine; it advances by one cycle per measurement.
+    surrogate : EngineSurrogate
+        The surfaces.
     objective : str or mapping of str to float
         A signal, or the weight of each signal; every weighted signal is one component of J.
     limits : sequence of str
         Signals to report as limits.
     inputs : sequence of str
-        Which inputs of the surrogate are steered, ``soi_cad`` first; the others keep the engine's values.
+        Which inputs of the surrogate are steered, ``soi_cad`` first; the others keep the values of `at`.
+    at : mapping of str to float, optional
+        The other inputs, in their units; their medians if left out.
+    start_soi_cad : float, optional
+        Command of all cycles before the first [°CA aTDC]; its median if left out.
+    seed : int
+        Seed of the stretches.
+    residuals : bool
+        Whether to add them; without, readings are those of the surfaces.
+    block_cycles : int
+        Length of a stretch [cycles]; at its end the next begins, with a jump in slow residuals.
+    outside : {"flag", "raise"}
+        What to do with a command outside the support.
 
     Raises
     ------
     mgdd.errors.ParameterError
-        An unknown signal or input.
+        A value outside its domain, an unknown signal or input.
+    mgdd.errors.DataError
+        No stretch of that length without a gap in the residuals.
 
     Examples
     --------
-    >>> from mgdd.loop import SurrogatePlant, run_seeker
-    >>> from mgdd.optimize import GradientDescent
-    >>> from mgdd.surrogate import SurrogateEngine, fit_surrogate, random_step_records
-    >>> engine = SurrogateEngine(fit_surrogate(random_step_records(1500)), residuals=False)
-    >>> plant = SurrogatePlant(engine, "imep_bar", limits=["mprr"])
+    >>> from mgdd.loop import SurrogatePlant
+    >>> from mgdd.surrogate import fit_surrogate, random_step_records
+    >>> surrogate = fit_surrogate(random_step_records(1500))
+    >>> plant = SurrogatePlant(surrogate, "imep_bar", limits=["mprr"], residuals=False)
+    >>> reading = plant.step(-4.0)
+    >>> sorted(reading), round(reading["imep_bar"], 1)
+    (['imep_bar', 'mfb50_cad', 'mprr', 'nox_ppm', 'supported'], 7.2)
     >>> plant.apply({"soi_cad": -4.0})
     >>> sorted(plant.measure().limits)
     ['mprr']
@@ -44,13 +74,22 @@ class SurrogatePlant:
 
     def __init__(
         self,
-        engine: SurrogateEngine,
+        surrogate: EngineSurrogate,
         objective: str | Mapping[str, float] = "imep_bar",
         *,
         limits: Sequence[str] = (),
         inputs: Sequence[str] = ("soi_cad",),
+        at: Mapping[str, float] | None = None,
+        start_soi_cad: float | None = None,
+        seed: int = 0,
+        residuals: bool = True,
+        block_cycles: int = 100,
+        outside: str = "flag",
     ) -> None:
-        surrogate = engine.surrogate
+        if outside not in ("flag", "raise"):
+            raise ParameterError.of("outside", outside, "'flag' or 'raise'")
+        if block_cycles < 1:
+            raise ParameterError.of("block_cycles", block_cycles, ">= 1")
         self._weights = {objective: 1.0} if isinstance(objective, str) else dict(objective)
         if not self._weights:
             raise ParameterError("objective = {}: must name at least one signal")
@@ -63,9 +102,24 @@ class SurrogatePlant:
             raise ParameterError(
                 f"inputs = {list(inputs)}: must begin with soi_cad and be among {list(known)}, once each"
             )
-        self.engine = engine
         self._limits, self._inputs = tuple(limits), tuple(inputs)
         self._applied: tuple[float, ...] | None = None
+        self.surrogate = surrogate
+        self._at = dict(at or {})
+        self._outside = outside
+        self._names = tuple(surrogate.signals)
+        models = list(surrogate.signals.values())
+        first = min(model.lag_cycles for model in models)
+        self._delays = np.array([model.lag_cycles - first for model in models])
+        self._decays = np.array([decay_of(m.sensor.tau_cycles) if m.sensor is not None else 0.0 for m in models])
+        self._floor = np.array([0.0 if name in surrogate.nonnegative else -np.inf for name in self._names])
+        self._block = block_cycles
+        self._starts = _starts(surrogate.residuals, block_cycles) if residuals else None
+        self._generator = np.random.default_rng(seed)
+        steady, _ = self._steady(surrogate.medians["soi_cad"] if start_soi_cad is None else start_soi_cad)
+        self._history = np.tile(steady, (int(self._delays.max()) + 1, 1))
+        self._sensor = steady.copy()
+        self._row = self._left = self._cycles = 0
 
     @property
     def input_names(self) -> tuple[str, ...]:
@@ -105,14 +159,121 @@ class SurrogatePlant:
         mgdd.errors.RigError
             Nothing was applied yet.
         mgdd.errors.ParameterError
-            Inputs outside the support, for an engine with ``outside="raise"``.
+            Inputs outside the support, with ``outside="raise"``.
         """
         if self._applied is None:
             raise RigError("measure() before apply(): apply the inputs first")
         soi, *others = self._applied
-        reading = self.engine.step(soi, dict(zip(self._inputs[1:], others, strict=True)))
+        reading = self.step(soi, dict(zip(self._inputs[1:], others, strict=True)))
         return Measurement(
             components=tuple(weight * float(reading[name]) for name, weight in self._weights.items()),
             limits={name: float(reading[name]) for name in self._limits},
             values={name: float(value) for name, value in reading.items()},
         )
+
+    def step(self, soi_cad: float, at: Mapping[str, float] | None = None) -> dict[str, float | bool]:
+        """Run one cycle.
+
+        Parameters
+        ----------
+        soi_cad : float
+            Command of this cycle [°CA aTDC].
+        at : mapping of str to float, optional
+            Other inputs of this cycle, in their units, instead of the plant's own.
+
+        Returns
+        -------
+        dict
+            The reading of every signal in its unit, and ``supported``: whether the command lies where the surrogate
+            was fitted.
+
+        Raises
+        ------
+        mgdd.errors.ParameterError
+            A command that is not finite, or outside the support with ``outside="raise"``; the plant has not moved.
+        """
+        steady, supported = self._steady(soi_cad, at)
+        if not supported and self._outside == "raise":
+            raise ParameterError(f"soi_cad = {soi_cad:g}: outside the support of the records; stay inside")
+        self._history = np.vstack([steady, self._history[:-1]])
+        arriving = self._history[self._delays, np.arange(self._delays.size)]
+        self._sensor = self._decays * self._sensor + (1.0 - self._decays) * arriving
+        self._cycles += 1
+        reading = np.maximum(self._sensor + self._residual(), self._floor)
+        return {**{name: float(v) for name, v in zip(self._names, reading, strict=True)}, "supported": supported}
+
+    @property
+    def cycles(self) -> int:
+        """Cycles run so far."""
+        return self._cycles
+
+    @property
+    def state(self) -> dict[str, Any]:
+        """All that changes from cycle to cycle, as plain numbers that JSON can hold.
+
+        Setting it resumes a run of a plant with the same surrogate and options.
+        """
+        return {
+            "cycles": self._cycles,
+            "row": self._row,
+            "left": self._left,
+            "history": self._history.tolist(),
+            "sensor": self._sensor.tolist(),
+            "generator": copy.deepcopy(dict(self._generator.bit_generator.state)),
+        }
+
+    @state.setter
+    def state(self, saved: Mapping[str, Any]) -> None:
+        missing = [name for name in self.state if name not in saved]
+        if missing:
+            raise ParameterError(f"state: {missing[0]} is missing: give what .state returned")
+        history, sensor = np.array(saved["history"], dtype=float), np.array(saved["sensor"], dtype=float)
+        if history.shape != self._history.shape or sensor.shape != self._sensor.shape:
+            raise ParameterError(f"state: history has shape {history.shape}: must be {self._history.shape}")
+        row, left = int(saved["row"]), int(saved["left"])
+        if not 0 <= left <= self._block or not 0 <= row <= len(self.surrogate.residuals) - left:
+            raise ParameterError(f"state: row = {row}, left = {left}: must lie in the residuals, for this block_cycles")
+        generator = np.random.default_rng()
+        generator.bit_generator.state = copy.deepcopy(dict(saved["generator"]))
+        self._history, self._sensor, self._generator = history, sensor, generator
+        self._row, self._left, self._cycles = row, left, int(saved["cycles"])
+
+    def _steady(self, soi_cad: float, at: Mapping[str, float] | None = None) -> tuple[NDArray[np.float64], bool]:
+        values, supported = self.surrogate.evaluate(
+            self.surrogate.points(np.array([float(soi_cad)]), {**self._at, **(at or {})})
+        )
+        return values[0], bool(supported[0])
+
+    def _residual(self) -> NDArray[np.float64]:
+        if self._starts is None:
+            return np.zeros(len(self._names))
+        if self._left == 0:
+            self._row = int(self._generator.choice(self._starts))
+            self._left = self._block
+        row: NDArray[np.float64] = self.surrogate.residuals[self._row]
+        self._row += 1
+        self._left -= 1
+        return row
+
+
+described(
+    SurrogatePlant,
+    rows=lambda plant: {
+        "signals": tuple(plant.surrogate.signals),
+        "inputs": plant.surrogate.inputs,
+        "cycles": plant.cycles,
+        "block_cycles": plant._block,
+        "residuals": plant._starts is not None,
+        "outside": plant._outside,
+    },
+)
+
+
+def _starts(residuals: NDArray[np.float64], block: int) -> NDArray[np.intp]:
+    """Rows from which a stretch of the given length has every residual of every signal."""
+    whole = np.all(np.isfinite(residuals), axis=1).astype(np.int64)
+    total = np.r_[0, np.cumsum(whole)]
+    starts = np.flatnonzero(total[block:] - total[:-block] == block)
+    if starts.size == 0:
+        raise DataError(f"no {block} cycles in a row have all residuals: take a smaller block_cycles")
+    return starts

@@ -26,7 +26,7 @@ class VirtualThrottle:
         Which of ``duty`` [-], ``supply_v`` [V] and ``airflow_torque_nm`` [N m] are applied; the others stay at 0 and
         at the supply of the throttle.
     sensors : SensorPair, optional
-        As in `mgdd.throttle.sense`.
+        As in `mgdd.throttle.SensorPair.sense`.
     faults : sequence of SensorFault
         At most one per sensor.
     start_deg : float, optional

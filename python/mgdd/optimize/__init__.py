@@ -2,16 +2,16 @@
 
 A seeker proposes an input (``ask``) and accepts what was measured there (``tell``), one engine cycle at a time; it
 never holds a plant, so simulation, replay and the test bench are the same loop. `tune` chooses amplitude, period
-and gain from noise and curvature, `measure_map` reads those off measurements, `maximize` runs the loop on a
+and gain from noise and curvature, `measure_map` reads those off measurements, ``run`` of a seeker closes the loop on a
 function. `IterativeLearning` improves the input of a repeated task from the error of each trial. `least_squares` is
 the Levenberg-Marquardt search behind every fit, which answers with a `mgdd.results.FitReport`.
 
 Examples
 --------
->>> from mgdd.optimize import maximize, tune
+>>> from mgdd.optimize import tune
 >>> tuning = tune(0.25, -0.051, distance=12.0, arrival=1.0)
 >>> seeker = tuning.seeker(start=-18.0, lower=-30.0, upper=10.0)
->>> history = maximize(lambda soi: 56.0 - 0.0255 * (soi[0] + 6.0) ** 2, seeker, 300)
+>>> history = seeker.run(lambda soi: 56.0 - 0.0255 * (soi[0] + 6.0) ** 2, 300)
 >>> abs(seeker.estimate[0] + 6.0) < 0.1
 np.True_
 
@@ -39,7 +39,7 @@ from mgdd.optimize.iterative_learning import IterativeLearning
 from mgdd.optimize.least_squares import least_squares
 from mgdd.optimize.measured_map import measure_map
 from mgdd.optimize.optimum import Optimum
-from mgdd.optimize.run import load_seeker, maximize
+from mgdd.optimize.seeker import Seeker
 from mgdd.optimize.tuning import tune
 
 __all__ = [
@@ -53,10 +53,9 @@ __all__ = [
     "Limit",
     "NewtonSeeking",
     "Optimum",
+    "Seeker",
     "Spsa",
     "least_squares",
-    "load_seeker",
-    "maximize",
     "measure_map",
     "tune",
 ]

@@ -5,12 +5,12 @@ from __future__ import annotations
 from typing import ClassVar
 
 from mgdd import _core
-from mgdd.optimize.seeker_record import SeekerRecord
+from mgdd.optimize.seeker import Seeker
 
 __all__ = ["GoldenSection", "GradientDescent", "Spsa"]
 
 
-class Spsa(SeekerRecord, _core.optimize.Spsa):
+class Spsa(Seeker, _core.optimize.Spsa):
     """Simultaneous perturbation: the slope in every direction from two measurements.
 
     Each iteration measures J at estimate +- c Delta, with random signs Delta, one cycle each, whatever the
@@ -86,7 +86,7 @@ class Spsa(SeekerRecord, _core.optimize.Spsa):
     kind: ClassVar[str] = "Spsa"
 
 
-class GradientDescent(SeekerRecord, _core.optimize.GradientDescent):
+class GradientDescent(Seeker, _core.optimize.GradientDescent):
     """Gradient steps by two-sided differences, two cycles per input and step.
 
     Converges on a noise-free J for 0 < step_size < 2/abs(J''), fastest near 1/abs(J''). All arguments are
@@ -140,7 +140,7 @@ class GradientDescent(SeekerRecord, _core.optimize.GradientDescent):
     kind: ClassVar[str] = "GradientDescent"
 
 
-class GoldenSection(SeekerRecord, _core.optimize.GoldenSection):
+class GoldenSection(Seeker, _core.optimize.GoldenSection):
     """Golden-section search of one input that believes a comparison only beyond the noise.
 
     Two inner points are measured in turns until their means differ by more than noise; if inconclusive, both ends are

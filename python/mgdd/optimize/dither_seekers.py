@@ -5,12 +5,12 @@ from __future__ import annotations
 from typing import ClassVar
 
 from mgdd import _core
-from mgdd.optimize.seeker_record import SeekerRecord
+from mgdd.optimize.seeker import Seeker
 
 __all__ = ["BoundedSeeking", "ExtremumSeeking", "NewtonSeeking"]
 
 
-class ExtremumSeeking(SeekerRecord, _core.optimize.ExtremumSeeking):
+class ExtremumSeeking(Seeker, _core.optimize.ExtremumSeeking):
     """Extremum seeking by a sinusoidal dither, one measurement of J per engine cycle.
 
     ``ask()`` gives the input of the next cycle, ``tell(J)`` takes what was measured there. Near an optimum of
@@ -93,7 +93,7 @@ class ExtremumSeeking(SeekerRecord, _core.optimize.ExtremumSeeking):
     kind: ClassVar[str] = "ExtremumSeeking"
 
 
-class NewtonSeeking(SeekerRecord, _core.optimize.NewtonSeeking):
+class NewtonSeeking(Seeker, _core.optimize.NewtonSeeking):
     """Newton extremum seeking: the rate of approach does not depend on the curvature of J.
 
     Gradient and Hessian are demodulated from the same dither, and a Riccati filter tends to the inverse of the
@@ -158,7 +158,7 @@ class NewtonSeeking(SeekerRecord, _core.optimize.NewtonSeeking):
     kind: ClassVar[str] = "NewtonSeeking"
 
 
-class BoundedSeeking(SeekerRecord, _core.optimize.BoundedSeeking):
+class BoundedSeeking(Seeker, _core.optimize.BoundedSeeking):
     """Bounded extremum seeking: J enters only the phase, so no step is larger than amplitude times omega.
 
     With omega = 2 pi harmonic/period the mean input drifts at kappa amplitude^2 omega/2 times the slope of J.

@@ -4,8 +4,9 @@ from __future__ import annotations
 
 from typing import TYPE_CHECKING, Any, cast
 
-from mgdd.results import Fit, FitQuality, Label, labelled_dataset
-from mgdd.results.labels import label_of
+from mgdd.results import Fit
+from mgdd.results.fit import FitQuality
+from mgdd.results.labels import Label, label_of, labelled_dataset
 from mgdd.signals.metrics import nrmse_fit_percent, rmse
 
 if TYPE_CHECKING:

@@ -7,29 +7,21 @@ title use the figure's `suptitle`.
 
 from __future__ import annotations
 
-from mgdd.plot.calibration import calibration_overlay, wall_heat_profile
 from mgdd.plot.convergence import convergence
 from mgdd.plot.cycle import log_pv, pressure
-from mgdd.plot.identification import correlation_matrix, error_growth, residual_correlation
-from mgdd.plot.learning import learning
+from mgdd.plot.identification import correlation_matrix
 from mgdd.plot.seeking import seeking
 from mgdd.plot.sensors import sensors
-from mgdd.plot.throttle import free_run, holding_duty
+from mgdd.plot.throttle import holding_duty
 from mgdd.plot.timing import timing
 
 __all__ = [
-    "calibration_overlay",
     "convergence",
     "correlation_matrix",
-    "error_growth",
-    "free_run",
     "holding_duty",
-    "learning",
     "log_pv",
     "pressure",
-    "residual_correlation",
     "seeking",
     "sensors",
     "timing",
-    "wall_heat_profile",
 ]

@@ -57,8 +57,8 @@ def calibration_overlay(overlay: xr.Dataset, *, ax: Axes | None = None) -> Axes:
     Examples
     --------
     >>> import numpy as np
-    >>> from mgdd import plot
-    >>> from mgdd.results import labelled_dataset
+    >>> from mgdd.plot.calibration import calibration_overlay
+    >>> from mgdd.results.labels import labelled_dataset
     >>> angle = np.arange(-30.0, 31.0)
     >>> measured = 60.0 - 0.01 * angle**2
     >>> overlay = labelled_dataset({
@@ -67,7 +67,7 @@ def calibration_overlay(overlay: xr.Dataset, *, ax: Axes | None = None) -> Axes:
     ...     "model_bar": ("crank_angle_cad", measured + 0.2),
     ...     "residual_bar": ("crank_angle_cad", 0.2 + 0.0 * angle),
     ... })
-    >>> ax = plot.calibration_overlay(overlay)
+    >>> ax = calibration_overlay(overlay)
     >>> ax.figure.axes[-1].get_xlabel()
     'crank angle [°CA aTDC]'
     """
@@ -121,13 +121,13 @@ def wall_heat_profile(profile: xr.Dataset, *, ax: Axes | None = None) -> Axes:
 
     Examples
     --------
-    >>> from mgdd import plot
-    >>> from mgdd.results import labelled_dataset
+    >>> from mgdd.plot.calibration import wall_heat_profile
+    >>> from mgdd.results.labels import labelled_dataset
     >>> profile = labelled_dataset({
     ...     "wall_heat_scale": ("wall_heat_scale", [0.0, 0.5, 1.0, 2.0]),
     ...     "rmse_percent": ("wall_heat_scale", [0.30, 0.21, 0.20, 0.33]),
     ... })
-    >>> plot.wall_heat_profile(profile).get_ylabel()
+    >>> wall_heat_profile(profile).get_ylabel()
     'pressure RMSE, closed cycle [% of p_max]'
     """
     require(profile, ("wall_heat_scale", "rmse_percent"), "mgdd.identify.wall_heat_profile")

@@ -46,16 +46,17 @@ def convergence(tracks: xr.Dataset, *, ax: Axes | None = None) -> Axes:
     Examples
     --------
     >>> import numpy as np
+    >>> import xarray as xr
     >>> from mgdd import plot
-    >>> from mgdd.results import labelled_dataset
-    >>> cycle = np.arange(200)
-    >>> tracks = labelled_dataset({
-    ...     "cycle": ("cycle", cycle),
-    ...     "case": ("case", ["slow", "fast"], "-", "case"),
-    ...     "estimate_median_cad": (
-    ...         ("case", "cycle"), [-14.0 * np.exp(-cycle / t) - 6.0 for t in (80.0, 20.0)], "°CA aTDC", "estimate"
-    ...     ),
-    ... })
+    >>> cycle, angle = np.arange(200), {"units": "degree", "long_name": "estimate, °CA aTDC"}
+    >>> estimates = [-14.0 * np.exp(-cycle / t) - 6.0 for t in (80.0, 20.0)]
+    >>> tracks = xr.Dataset(
+    ...     {"estimate_median_cad": (("case", "cycle"), estimates, angle)},
+    ...     {
+    ...         "cycle": ("cycle", cycle, {"units": "1", "long_name": "engine cycle"}),
+    ...         "case": ("case", ["slow", "fast"], {"units": "1", "long_name": "case"}),
+    ...     },
+    ... )
     >>> plot.convergence(tracks).get_ylabel()
     'estimate [°CA aTDC]'
     """

@@ -52,7 +52,7 @@ def pressure(dataset: xr.Dataset, *, ax: Axes | None = None) -> Axes:
     Examples
     --------
     >>> from mgdd import datasets, plot
-    >>> ax = plot.pressure(datasets.load_hd_traces()[0])
+    >>> ax = plot.pressure(datasets.load("hd_diesel_128x144")[0])
     >>> ax.get_xlabel()
     'crank angle [°CA aTDC]'
     """
@@ -103,18 +103,9 @@ def log_pv(dataset: xr.Dataset, *, ax: Axes | None = None) -> Axes:
 
     Examples
     --------
-    >>> import numpy as np
     >>> from mgdd import plot
-    >>> from mgdd.results import labelled_dataset
-    >>> angle = np.arange(-120.0, 121.0)
-    >>> volume = 0.03 + 0.2 * (1 - np.cos(np.radians(angle)))
-    >>> cycle = labelled_dataset({
-    ...     "crank_angle_cad": ("crank_angle_cad", angle),
-    ...     "volume_l": ("crank_angle_cad", volume),
-    ...     "pressure_bar": ("crank_angle_cad", 0.5 * volume**-1.37),
-    ...     "n_compression": ((), 1.37),
-    ... })
-    >>> plot.log_pv(cycle).get_xlabel()
+    >>> from mgdd.engine import Cylinder, OperatingPoint, simulate
+    >>> plot.log_pv(simulate(Cylinder(), OperatingPoint())).get_xlabel()
     'cylinder volume [L]'
     """
     require(dataset, (ANGLE, "pressure_bar", "volume_l"), "mgdd.engine.analyze or mgdd.engine.simulate")

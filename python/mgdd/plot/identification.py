@@ -38,8 +38,8 @@ def error_growth(n_step: xr.Dataset, *, ax: Axes | None = None) -> Axes:
     Parameters
     ----------
     n_step : xarray.Dataset
-        ``n_step_rms_deg`` [deg] over ``predictor`` and ``horizon_s`` [s], as `mgdd.identify.n_step_rms` gives it; at
-        most five predictors.
+        ``n_step_rms_deg`` [deg] over ``predictor`` and ``horizon_s`` [s], as in the `n_step` of `validate_throttle`;
+        at most five predictors.
     ax : matplotlib.axes.Axes, optional
         Where to draw; None makes a figure.
 
@@ -55,8 +55,8 @@ def error_growth(n_step: xr.Dataset, *, ax: Axes | None = None) -> Axes:
 
     Examples
     --------
-    >>> from mgdd import plot
-    >>> from mgdd.results import labelled_dataset
+    >>> from mgdd.plot.identification import error_growth
+    >>> from mgdd.results.labels import labelled_dataset
     >>> n_step = labelled_dataset({
     ...     "predictor": ("predictor", ["pw_r", "persistence"], "-", "predictor"),
     ...     "horizon_s": ("horizon_s", [0.005, 0.02, 0.05], "s", "horizon"),
@@ -64,10 +64,10 @@ def error_growth(n_step: xr.Dataset, *, ax: Axes | None = None) -> Axes:
     ...         ("predictor", "horizon_s"), [[0.03, 0.05, 0.08], [0.41, 1.55, 3.98]], "deg", "RMS error ahead"
     ...     ),
     ... })
-    >>> plot.error_growth(n_step).get_ylabel()
+    >>> error_growth(n_step).get_ylabel()
     'RMS error ahead [deg]'
     """
-    require(n_step, ("predictor", "horizon_s", "n_step_rms_deg"), "mgdd.identify.n_step_rms")
+    require(n_step, ("predictor", "horizon_s", "n_step_rms_deg"), "mgdd.identify.validate_throttle")
     names = [str(name).replace("_", " ") for name in n_step["predictor"].to_numpy()]
     if len(names) > len(LINE_STYLES):
         raise DataError(f"predictor has {len(names)} entries: at most {len(LINE_STYLES)} lines can be distinguished")
@@ -108,15 +108,15 @@ def residual_correlation(correlations: xr.Dataset, *, ax: Axes | None = None) ->
 
     Examples
     --------
-    >>> from mgdd import plot
-    >>> from mgdd.results import labelled_dataset
+    >>> from mgdd.plot.identification import residual_correlation
+    >>> from mgdd.results.labels import labelled_dataset
     >>> correlations = labelled_dataset({
     ...     "lag": ("lag", [1, 2, 3], "samples", "lag"),
     ...     "autocorrelation": ("lag", [0.3, 0.1, 0.0], "-", "autocorrelation of the residual"),
     ...     "cross_correlation": ("lag", [0.0, 0.02, 0.01], "-", "correlation of residual and earlier duty"),
     ...     "limit": ((), 0.05, "-", "95 % limit"),
     ... })
-    >>> plot.residual_correlation(correlations).figure.axes[-1].get_xlabel()
+    >>> residual_correlation(correlations).figure.axes[-1].get_xlabel()
     'lag [samples]'
     """
     names = ("autocorrelation", "cross_correlation")
@@ -168,15 +168,10 @@ def correlation_matrix(correlation: xr.Dataset, *, ax: Axes | None = None) -> Ax
     Examples
     --------
     >>> from mgdd import plot
-    >>> from mgdd.results import labelled_dataset
-    >>> names = ["preload", "coulomb"]
-    >>> correlation = labelled_dataset({
-    ...     "parameter": ("parameter", names, "-", "parameter"),
-    ...     "other": ("other", names, "-", "parameter"),
-    ...     "correlation": (("parameter", "other"), [[1.0, -0.99], [-0.99, 1.0]], "-", "correlation"),
-    ... })
-    >>> plot.correlation_matrix(correlation).texts[1].get_text()
-    '−0.99'
+    >>> from mgdd.optimize import least_squares
+    >>> fit = least_squares(lambda x: ([x[0] + x[1], x[0]], [[1, 1], [1, 0]]), [1.0, 1.0], names=["preload", "coulomb"])
+    >>> plot.correlation_matrix(fit.to_dataset()).texts[1].get_text()
+    '−0.71'
     """
     require(correlation, ("parameter", "other", "correlation"), "mgdd.results.FitReport.to_dataset")
     names = [str(name) for name in correlation["parameter"].to_numpy()]

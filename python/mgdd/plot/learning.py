@@ -38,13 +38,13 @@ def learning(learned: xr.Dataset, *, ax: Axes | None = None) -> Axes:
 
     Examples
     --------
-    >>> from mgdd import plot
-    >>> from mgdd.results import labelled_dataset
+    >>> from mgdd.plot.learning import learning
+    >>> from mgdd.results.labels import labelled_dataset
     >>> learned = labelled_dataset({
     ...     "law": ("law", ["p"], "-", "learning law"), "trial": ("trial", [0, 1, 2], "-", "trial"),
     ...     "ca50_error_cad": (("law", "trial"), [[8.0, 4.0, 2.0]], "°CA", "rms error of CA50"),
     ... })
-    >>> plot.learning(learned).get_ylabel()
+    >>> learning(learned).get_ylabel()
     'rms error of CA50 [°CA]'
     """
     require(learned, ("law", "trial", "ca50_error_cad"), "the study seeker-comparison")

@@ -38,7 +38,7 @@ def measured_and_model(run: xr.Dataset, *, ax: Axes | None = None) -> Axes:
     --------
     >>> from matplotlib.figure import Figure
     >>> from mgdd.plot.measured import measured_and_model
-    >>> from mgdd.results import labelled_dataset
+    >>> from mgdd.results.labels import labelled_dataset
     >>> run = labelled_dataset({
     ...     "time_s": ("time_s", [0.0, 1.0]),
     ...     "measured": ("time_s", [0.0, 1.0], "V", "level, measured"),

@@ -64,15 +64,10 @@ def seeking(
 
     Examples
     --------
-    >>> import numpy as np
     >>> from mgdd import plot
-    >>> from mgdd.results import labelled_dataset
-    >>> cycle = np.arange(60)
-    >>> run = labelled_dataset({
-    ...     "cycle": ("cycle", cycle), "estimate_cad": ("cycle", -6.0 - 10.0 * 0.9**cycle),
-    ...     "soc_requested_cad": ("cycle", -6.0 - 10.0 * 0.9**cycle + np.sin(0.6 * cycle)),
-    ...     "j": ("cycle", 56.0 - 0.9**cycle),
-    ... })
+    >>> from mgdd.loop import EngineBench, run_seeker
+    >>> from mgdd.optimize import ExtremumSeeking
+    >>> run = run_seeker(EngineBench(nox_sensor="none"), ExtremumSeeking(start=-16.0), 60).dataset
     >>> [panel.get_ylabel() for panel in plot.seeking(run).figure.axes]
     ['timing [°CA aTDC]', 'J [unit of J]']
     """

@@ -5,8 +5,7 @@ from __future__ import annotations
 from typing import TYPE_CHECKING
 
 from mgdd.errors import DataError
-from mgdd.results import check_labels
-from mgdd.results.labels import label_of
+from mgdd.results.labels import check_labels, label_of
 
 if TYPE_CHECKING:
     from collections.abc import Sequence

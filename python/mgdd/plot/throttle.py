@@ -43,15 +43,11 @@ def holding_duty(log: xr.Dataset, *, limp_home_deg: float | None = None, ax: Axe
 
     Examples
     --------
-    >>> import numpy as np
     >>> from mgdd import plot
-    >>> from mgdd.results import labelled_dataset
-    >>> time = np.arange(1000) * 0.02
-    >>> duty = 0.3 * np.sin(0.3 * time)
-    >>> log = labelled_dataset({
-    ...     "time_s": ("time_s", time), "duty": ("time_s", duty), "angle_deg": ("time_s", 40.0 + 100.0 * duty)
-    ... })
-    >>> plot.holding_duty(log).get_xlabel()
+    >>> from mgdd.signals import triangle
+    >>> from mgdd.throttle import Throttle, simulate
+    >>> ramp = triangle(8.0, offset=0.15, amplitude=0.2, frequency_hz=0.125)
+    >>> plot.holding_duty(simulate(Throttle(), ramp["duty"], time_s=ramp["time_s"])).get_xlabel()
     'plate angle [deg]'
     """
     has_model = "model_deg" in log
@@ -102,8 +98,8 @@ def free_run(run: xr.Dataset, *, ax: Axes | None = None) -> Axes:
     Examples
     --------
     >>> import numpy as np
-    >>> from mgdd import plot
-    >>> from mgdd.results import labelled_dataset
+    >>> from mgdd.plot.throttle import free_run
+    >>> from mgdd.results.labels import labelled_dataset
     >>> time = np.arange(100) * 0.01
     >>> run = labelled_dataset({
     ...     "time_s": ("time_s", time),
@@ -111,7 +107,7 @@ def free_run(run: xr.Dataset, *, ax: Axes | None = None) -> Axes:
     ...     "model_deg": ("time_s", 20.1 + time),
     ...     "residual_deg": ("time_s", 0.1 + 0.0 * time, "deg", "model minus measured angle"),
     ... })
-    >>> plot.free_run(run).figure.axes[-1].get_xlabel()
+    >>> free_run(run).figure.axes[-1].get_xlabel()
     'time [s]'
     """
     require(run, ("time_s", "angle_deg", "model_deg", "residual_deg"), "mgdd.identify.validate_throttle")

@@ -46,14 +46,8 @@ def timing(sweep: xr.Dataset, *, ax: Axes | None = None) -> Axes:
     Examples
     --------
     >>> from mgdd import plot
-    >>> from mgdd.results import labelled_dataset
-    >>> sweep = labelled_dataset({
-    ...     "soc_cad": ("soc_cad", [-10.0, -6.0, 0.0]),
-    ...     "efficiency_gross": ("soc_cad", [0.5568, 0.5618, 0.5543]),
-    ...     "nox_affine_log_ppm": ("soc_cad", [1740.0, 1300.0, 920.0]),
-    ...     "nox_arrhenius_ppm": ("soc_cad", [2026.0, 1540.0, 1100.0]),
-    ... })
-    >>> plot.timing(sweep).get_xlabel()
+    >>> from mgdd.engine import Cylinder, OperatingPoint, timing_sweep
+    >>> plot.timing(timing_sweep(Cylinder(), OperatingPoint(), soc_cad=[-10.0, -6.0, 0.0])).get_xlabel()
     'start of combustion [°CA aTDC]'
     """
     require(sweep, ("soc_cad", "efficiency_gross", *_NOX), "mgdd.engine.timing_sweep")

@@ -13,7 +13,7 @@ from typing import Any, NamedTuple, TypeVar
 import numpy as np
 
 from mgdd import _core
-from mgdd.results import VARIABLES
+from mgdd.results.labels import VARIABLES
 from mgdd.results.units import unit_of
 
 __all__ = ["Row", "as_html", "as_text", "core_rows", "described", "rows_of"]

@@ -40,7 +40,7 @@ class FitQuality:
 
     Examples
     --------
-    >>> from mgdd.results import FitQuality
+    >>> from mgdd.results.fit import FitQuality
     >>> print(FitQuality(nrmse_fit_percent=97.5, rmse=0.21, unit="deg", n=11_950))
     97.50 %, RMSE 0.21 deg
     """

@@ -39,7 +39,7 @@ class Label(NamedTuple):
 
     Examples
     --------
-    >>> from mgdd.results import VARIABLES
+    >>> from mgdd.results.labels import VARIABLES
     >>> VARIABLES["pressure_bar"].units
     'bar'
     """
@@ -164,7 +164,7 @@ def labelled_dataset(
 
     Examples
     --------
-    >>> from mgdd.results import labelled_dataset
+    >>> from mgdd.results.labels import labelled_dataset
     >>> ds = labelled_dataset({
     ...     "crank_angle_cad": ("crank_angle_cad", [-1.0, 0.0, 1.0]),
     ...     "pressure_bar": ("crank_angle_cad", [60.0, 61.0, 60.5]),
@@ -211,7 +211,7 @@ def label_of(variable: xr.DataArray | xr.Variable) -> Label:
 
     Examples
     --------
-    >>> from mgdd.results import labelled_dataset
+    >>> from mgdd.results.labels import labelled_dataset
     >>> from mgdd.results.labels import label_of
     >>> label_of(labelled_dataset({"ca50_cad": ((), 8.0)})["ca50_cad"])
     Label(units='°CA aTDC', long_name='CA50, angle of 50 % heat released')
@@ -236,7 +236,7 @@ def check_labels(dataset: xr.Dataset) -> None:
     --------
     >>> import xarray as xr
     >>> from mgdd.errors import DataError
-    >>> from mgdd.results import check_labels
+    >>> from mgdd.results.labels import check_labels
     >>> try:
     ...     check_labels(xr.Dataset({"pressure_bar": ((), 1.0)}))
     ... except DataError as error:

@@ -14,7 +14,7 @@ __all__ = ["Rig"]
 class Rig(Plant, Protocol):
     """A plant behind a connection, used as a context manager; `mgdd.loop.run_seeker` steers it like any other.
 
-    A rig that knows of a new operating point before its cycle is a `mgdd.loop.AnnouncingPlant` as well.
+    A rig that knows of a new operating point before its cycle says so in a property ``operating_point_changes``.
 
     Examples
     --------

@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from mgdd.errors import ParameterError
-from mgdd.results import labelled_dataset
+from mgdd.results.labels import labelled_dataset
 
 if TYPE_CHECKING:
     import xarray as xr

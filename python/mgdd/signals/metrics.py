@@ -8,8 +8,8 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from mgdd.errors import DataError, ParameterError, ShapeError
-from mgdd.results import labelled_dataset
 from mgdd.results.describe import described
+from mgdd.results.labels import labelled_dataset
 
 if TYPE_CHECKING:
     import xarray as xr

@@ -11,7 +11,7 @@ from typing import TYPE_CHECKING, Any, ClassVar, NamedTuple
 import numpy as np
 
 from mgdd.errors import DataError, ParameterError, ShapeError
-from mgdd.results import VARIABLES, Label, labelled_dataset
+from mgdd.results.labels import VARIABLES, Label, labelled_dataset
 from mgdd.signals.even_grid import even_step
 
 if TYPE_CHECKING:

@@ -1,18 +1,16 @@
 """Studies: whole pieces of work that end in a table, figures and a summary.
 
-`available_studies` lists them, `run_study` runs one by name and returns a `StudyResult`. `run_measured_traces` is the
-study of the user's own traces.
+`available_studies` lists them, `run_study` runs one by name and returns a `StudyResult`. The study
+``measured-traces`` takes the user's own traces.
 """
 
 from __future__ import annotations
 
 from mgdd.studies.base import StudyResult
-from mgdd.studies.measured_traces import run_measured_traces
 from mgdd.studies.registry import available_studies, run_study
 
 __all__ = [
     "StudyResult",
     "available_studies",
-    "run_measured_traces",
     "run_study",
 ]

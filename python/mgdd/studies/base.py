@@ -43,8 +43,8 @@ class StudyResult:
 
     Examples
     --------
-    >>> from mgdd.studies import run_measured_traces
-    >>> result = run_measured_traces(quick=True, figures=False)
+    >>> from mgdd.studies import run_study
+    >>> result = run_study("measured-traces", quick=True, figures=False)
     >>> len(result.summary["traces"])
     4
     """

@@ -9,6 +9,7 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
+from mgdd.loop import SurrogatePlant
 from mgdd.optimize import (
     BoundedSeeking,
     ComponentLag,
@@ -17,16 +18,15 @@ from mgdd.optimize import (
     Limit,
     NewtonSeeking,
     Optimum,
+    Seeker,
     Spsa,
     tune,
 )
 from mgdd.optimize.tuning import Tuning
-from mgdd.surrogate import EngineSurrogate, SurrogateEngine
+from mgdd.surrogate import EngineSurrogate
 
 if TYPE_CHECKING:
     from numpy.typing import NDArray
-
-    Seeker = ExtremumSeeking | NewtonSeeking | BoundedSeeking | Spsa | GoldenSection
 
 __all__ = [
     "ARRIVAL_CAD",
@@ -140,7 +140,7 @@ def _tuned(noise: float, curvature: float, best: Optimum, lag: ComponentLag, met
 
 def held_objective(surrogate: EngineSurrogate, objective: Objective) -> NDArray[np.float64]:
     """Measure J while the timing is held at the start."""
-    engine = SurrogateEngine(surrogate, start_soi_cad=START_CAD, seed=_HOLD_SEED)
+    engine = SurrogatePlant(surrogate, start_soi_cad=START_CAD, seed=_HOLD_SEED)
     rows = [engine.step(START_CAD) for _ in range(_HOLD_CYCLES)]
     return np.array([sum(w * row[name] for name, w in objective.weights.items()) for row in rows])
 

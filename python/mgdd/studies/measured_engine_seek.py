@@ -13,7 +13,7 @@ import numpy as np
 from mgdd import datasets
 from mgdd.errors import DataError
 from mgdd.loop import SurrogatePlant, run_seeker
-from mgdd.results import labelled_dataset
+from mgdd.results.labels import labelled_dataset
 from mgdd.studies.base import Progress, StudyResult, check_seeds, finish, run_parts
 from mgdd.studies.measured_engine_cases import (
     ARRIVAL_CAD,
@@ -29,7 +29,7 @@ from mgdd.studies.measured_engine_cases import (
 )
 from mgdd.studies.measured_engine_figures import draw
 from mgdd.studies.statistics import mean_interval, with_interval
-from mgdd.surrogate import EngineSurrogate, SurrogateEngine, fit_surrogate
+from mgdd.surrogate import EngineSurrogate, fit_surrogate
 
 if TYPE_CHECKING:
     import xarray as xr
@@ -137,7 +137,7 @@ def run_measured_engine_seek(
 
 def _surrogate() -> EngineSurrogate:
     try:
-        records = datasets.load_h2df_cycles()
+        records = datasets.load("h2df_502")
     except FileNotFoundError as error:
         raise DataError(
             f"the study {_NAME} needs the records of the hydrogen-diesel engine: {error.strerror}; the page "
@@ -150,8 +150,9 @@ def _run(surrogate: EngineSurrogate, case: Case, seeds: int, cycles: int) -> _Ru
     estimate, outside = np.empty((seeds, cycles)), np.empty((seeds, cycles))
     signals = {name: np.empty((seeds, cycles)) for name in surrogate.signals}
     for seed in range(seeds):
-        engine = SurrogateEngine(surrogate, start_soi_cad=START_CAD, seed=seed)
-        plant = SurrogatePlant(engine, case.objective.weights, limits=list(case.objective.limits))
+        plant = SurrogatePlant(
+            surrogate, case.objective.weights, limits=list(case.objective.limits), start_soi_cad=START_CAD, seed=seed
+        )
         run = run_seeker(plant, seeker_of(case, seed), cycles).dataset
         estimate[seed] = run["estimate"][:, 0]
         outside[seed] = 1.0 - run["supported"]

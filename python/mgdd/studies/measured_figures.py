@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING, Any
 from mgdd import plot
 from mgdd.engine import timing_sweep
 from mgdd.identify.engine.profile import WallHeatProfile
-from mgdd.identify.engine.records import CylinderFit
+from mgdd.identify.engine.records import CylinderFit, Load
 
 if TYPE_CHECKING:
     import xarray as xr
@@ -29,12 +29,12 @@ def draw(
     out = {
         "Measured pressure and apparent heat release": _grid(analyses, plot.pressure),
         "log p over log V with the polytropic slopes of compression and expansion": _grid(analyses, plot.log_pv),
-        f"Calibration, {main.kind}": _grid([load.overlay for load in main.loads], plot.calibration_overlay),
-        f"Calibration, {best.kind}": _grid([load.overlay for load in best.loads], plot.calibration_overlay),
+        f"Calibration, {main.kind}": _grid(main.loads, Load.plot),
+        f"Calibration, {best.kind}": _grid(best.loads, Load.plot),
     }
     for law, profile in profiles.items():
         figure = _figure(1)
-        plot.wall_heat_profile(profile.dataset, ax=figure.add_subplot())
+        profile.plot(ax=figure.add_subplot())
         out[f"What the traces say about wall heat: refitted RMSE over the wall-heat scale, {law}"] = figure
     sweeps = [timing_sweep(load.cylinder, load.point).assign_attrs(file=load.file) for load in reference.loads]
     scale = reference.model.wall_heat_scale
@@ -50,7 +50,7 @@ def _figure(rows: int) -> Figure:
     return Figure(figsize=(13.0, 4.8 * rows), layout="constrained")
 
 
-def _grid(datasets: Sequence[xr.Dataset], function: Any, *, label: bool = False) -> Figure:
+def _grid(datasets: Sequence[Any], function: Any, *, label: bool = False) -> Figure:
     columns = min(2, len(datasets))
     rows = -(-len(datasets) // columns)
     figure = _figure(rows)

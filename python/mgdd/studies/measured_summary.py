@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING, Any
 from mgdd import _core
 from mgdd.identify.engine.profile import WallHeatProfile
 from mgdd.identify.engine.records import CylinderFit, Load, figures_of
-from mgdd.results import labelled_dataset
+from mgdd.results.labels import labelled_dataset
 
 if TYPE_CHECKING:
     import xarray as xr

@@ -5,13 +5,12 @@ from __future__ import annotations
 from collections.abc import Callable, Sequence
 from typing import TYPE_CHECKING, Any
 
-from mgdd import presets
+from mgdd import datasets, presets
 from mgdd._core.engine import Cylinder, OperatingPoint
-from mgdd.datasets import load_hd_traces
 from mgdd.engine import analyze
-from mgdd.identify import best_timing, compare_laws, fit_cylinder, wall_heat_profile
+from mgdd.identify import best_timing, fit_cylinder, wall_heat_profile
 from mgdd.identify.engine.best_timing import WALL_HEAT_RANGE
-from mgdd.identify.engine.burn_laws import LAWS
+from mgdd.identify.engine.burn_laws import LAWS, compare_laws
 from mgdd.identify.engine.cylinder import BURN_FIELDS
 from mgdd.results.labels import to_jsonable
 from mgdd.studies.base import StudyResult
@@ -69,14 +68,14 @@ def run_measured_traces(
 
     Examples
     --------
-    >>> from mgdd.studies import run_measured_traces
-    >>> result = run_measured_traces(quick=True, figures=False)
+    >>> from mgdd.studies import run_study
+    >>> result = run_study("measured-traces", quick=True, figures=False)
     >>> [round(row["analysis"]["ca50_cad"], 1) for row in result.summary["traces"]]
     [5.0, 6.9, 9.4, 14.9]
     """
     preset = presets.load("hd_diesel_128x144")
     own = traces is None
-    traces = load_hd_traces() if traces is None else list(traces)
+    traces = datasets.load("hd_diesel_128x144") if traces is None else list(traces)
     cylinder = cylinder or preset.cylinder
     point = point or preset.point
     progress("analyse the traces")

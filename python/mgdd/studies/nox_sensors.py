@@ -10,10 +10,9 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from mgdd import presets
-from mgdd.engine import NoxModel, NoxProxy, OperatingPoint, SoftSensor, fit_nox_proxy, start_of_combustion
+from mgdd.engine import NoxModel, NoxProxy, OperatingPoint, SoftSensor, fit_nox_proxy, ignition_delay
 from mgdd.loop import EngineBench, SensorDynamics
-from mgdd.results import VARIABLES, labelled_dataset
-from mgdd.results.labels import to_jsonable
+from mgdd.results.labels import VARIABLES, labelled_dataset, to_jsonable
 from mgdd.studies.base import Progress, StudyResult, check_seeds, finish, run_parts
 from mgdd.studies.nox_sensors_figures import draw
 from mgdd.studies.statistics import with_interval
@@ -133,7 +132,7 @@ def run_nox_sensors(
 
 def _sweep(seeds: int) -> _Sweep:
     preset = presets.load("puma_single")
-    soc = np.array([start_of_combustion(preset.cylinder, preset.point, soi_cad=soi).soc_cad for soi in SOI_CAD])
+    soc = np.array([ignition_delay(preset.cylinder, preset.point, soi_cad=soi).soc_cad for soi in SOI_CAD])
     names = ("true", *_SENSORS)
     means = {name: np.empty((seeds, soc.size)) for name in names}
     temperature = np.empty((seeds, soc.size))

@@ -67,6 +67,7 @@ def run_study(
     quick: bool = False,
     figures: bool = True,
     progress: Progress | None = None,
+    **options: Any,
 ) -> StudyResult:
     """Run a study by its name.
 
@@ -82,6 +83,10 @@ def run_study(
         Draw its figures.
     progress : callable, optional
         Called with a short text before each part.
+    **options
+        What one study takes beside these. ``measured-traces``: measured ``traces``, their ``cylinder``, the ``point``
+        of what a trace does not carry, and ``step_cad`` and ``integrator`` as in `mgdd.identify.fit_cylinder`; the four
+        heavy-duty diesel traces and the preset ``hd_diesel_128x144`` if left out.
 
     Returns
     -------
@@ -91,7 +96,7 @@ def run_study(
     Raises
     ------
     mgdd.errors.ParameterError
-        An unknown name, fewer than one seed, or seeds for a deterministic study.
+        An unknown name, fewer than one seed, seeds for a deterministic study, or an option that it does not take.
 
     Examples
     --------
@@ -101,11 +106,14 @@ def run_study(
     [1, -1, -1, -1, 1, 1, 1]
     """
     function = function_of(name)
-    options: dict[str, Any] = {"quick": quick, "figures": figures}
+    taken = inspect.signature(function).parameters
+    if unknown := [option for option in options if option not in taken]:
+        raise ParameterError(f"{', '.join(unknown)}: study {name!r} takes {', '.join(taken)}")
+    options |= {"quick": quick, "figures": figures}
     if progress is not None:
         options["progress"] = progress
     if seeds is not None:
-        if "seeds" not in inspect.signature(function).parameters:
+        if "seeds" not in taken:
             raise ParameterError(f"seeds = {seeds}: study {name!r} is deterministic; leave them out")
         options["seeds"] = check_seeds(seeds)
     result: StudyResult = function(**options)

@@ -6,8 +6,7 @@ from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
 from typing import TYPE_CHECKING, Any
 
-from mgdd.results import VARIABLES
-from mgdd.results.labels import label_of
+from mgdd.results.labels import VARIABLES, label_of
 from mgdd.results.units import unit_of
 
 if TYPE_CHECKING:

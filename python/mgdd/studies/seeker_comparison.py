@@ -10,7 +10,7 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from mgdd.loop import EngineBench, LoopCriteria, find_steady_optimum
+from mgdd.loop import EngineBench, LoopCriteria
 from mgdd.optimize import (
     BoundedSeeking,
     ExtremumSeeking,
@@ -22,8 +22,7 @@ from mgdd.optimize import (
     tune,
 )
 from mgdd.optimize.tuning import Tuning
-from mgdd.results import labelled_dataset
-from mgdd.results.labels import to_jsonable
+from mgdd.results.labels import labelled_dataset, to_jsonable
 from mgdd.studies.base import Progress, StudyResult, check_seeds, finish, run_parts
 from mgdd.studies.load_step_learning import LAWS, Learned, learn
 from mgdd.studies.statistics import bands, loops, rms, with_interval
@@ -103,7 +102,7 @@ def run_seeker_comparison(
     1.0
     """
     seeds = min(check_seeds(seeds), 6) if quick else check_seeds(seeds)
-    best = find_steady_optimum(EngineBench())
+    best = EngineBench().find_optimum()
     contenders = _contenders(best)
     parts = [(c.name, partial(_run, c, best, seeds)) for c in contenders]
     done, interrupted = run_parts(parts, progress)
@@ -252,6 +251,7 @@ def _draw(dataset: xr.Dataset) -> dict[str, Figure]:
     from matplotlib.figure import Figure
 
     from mgdd import plot
+    from mgdd.plot.learning import learning as learning_curves
 
     names = dataset["seeker"].to_numpy()
     columns = 4
@@ -273,6 +273,6 @@ def _draw(dataset: xr.Dataset) -> dict[str, Figure]:
     out = {"Estimate over cycles: median of the seeds, with the band that holds 80 % of them": figure}
     if "law" in dataset:
         learning = Figure(figsize=(6.6, 3.8), layout="constrained")
-        plot.learning(dataset, ax=learning.add_subplot())
+        learning_curves(dataset, ax=learning.add_subplot())
         out["Iterative learning of a repeated load step"] = learning
     return out

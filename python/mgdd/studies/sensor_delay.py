@@ -10,10 +10,9 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from mgdd.engine import Performance
-from mgdd.loop import EngineBench, LoopCriteria, SensorDynamics, find_steady_optimum, run_seeker
+from mgdd.loop import EngineBench, LoopCriteria, SensorDynamics, run_seeker
 from mgdd.optimize import ComponentLag, ExtremumSeeking, Optimum
-from mgdd.results import labelled_dataset
-from mgdd.results.labels import to_jsonable
+from mgdd.results.labels import labelled_dataset, to_jsonable
 from mgdd.results.units import unit_attributes
 from mgdd.studies.base import Progress, StudyResult, check_seeds, finish, run_parts
 from mgdd.studies.statistics import bands, loops, rms, with_interval
@@ -102,7 +101,7 @@ def run_sensor_delay(
     """
     seeds = min(check_seeds(seeds), 4) if quick else check_seeds(seeds)
     performance = Performance.efficiency_and_nox()
-    best = find_steady_optimum(EngineBench(**_QUIET, performance=performance, nox_sensor="true_value"))
+    best = EngineBench(**_QUIET, performance=performance, nox_sensor="true_value").find_optimum()
     parts = [(f"{case.name}, period {case.period}", partial(_run_case, case, best)) for case in CASES]
     done, interrupted = run_parts(parts, progress)
     rows = [row for row, _, _ in done]

@@ -9,10 +9,9 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from mgdd import presets
-from mgdd.results import labelled_dataset
-from mgdd.results.labels import to_jsonable
+from mgdd.results.labels import labelled_dataset, to_jsonable
 from mgdd.studies.base import Progress, StudyResult, finish, run_parts
-from mgdd.throttle import Throttle, groups, holding_duty, simulate
+from mgdd.throttle import Throttle, characteristics, holding_duty, simulate
 
 if TYPE_CHECKING:
     import xarray as xr
@@ -102,7 +101,7 @@ def _one(name: str) -> tuple[list[dict[str, Any]], dict[str, Any]]:
     """Give rows and curves of one preset."""
     throttle = presets.load(name).throttle
     ramp, width = _ramp(throttle)
-    expected = 2.0 * float(groups(throttle)["coulomb"])
+    expected = 2.0 * float(characteristics(throttle)["coulomb"])
     rows = [_row("hysteresis", name, f"width at {WIDTH_AT_DEG:g} deg", width, "-", expected)]
     loops = []
     for frequency in FREQUENCIES_HZ:

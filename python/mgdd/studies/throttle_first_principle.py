@@ -8,15 +8,14 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from mgdd import presets
-from mgdd.identify import fit_throttle
+from mgdd.identify import fit_first_principle
 from mgdd.io import throttle_log
 from mgdd.optimize import FitOptions
-from mgdd.results import labelled_dataset
-from mgdd.results.labels import to_jsonable
+from mgdd.results.labels import labelled_dataset, to_jsonable
 from mgdd.signals import nrmse_fit_percent
 from mgdd.studies.base import Progress, StudyResult, check_seeds, finish, run_parts
 from mgdd.studies.statistics import with_interval
-from mgdd.throttle import Throttle, groups, simulate
+from mgdd.throttle import Throttle, characteristics, simulate
 
 if TYPE_CHECKING:
     import xarray as xr
@@ -141,7 +140,7 @@ def _case(
     name: str, throttle: Throttle, seeds: int
 ) -> tuple[list[dict[str, Any]], dict[str, Any], dict[str, NDArray[np.float64]]]:
     """Give the rows of the groups, the row of the fits, and the last free run over the random steps."""
-    truth = groups(throttle)
+    truth = characteristics(throttle)
     records = _records()
     errors: dict[str, list[float]] = {fitted: [] for _, fitted, _ in _GROUPS}
     quality: dict[str, list[float]] = {record: [] for record in records}
@@ -149,7 +148,7 @@ def _case(
     for seed in range(seeds):
         rng = np.random.default_rng(seed)
         logs = {record: _log(throttle, duty, rng) for record, duty in records.items()}
-        fit = fit_throttle(logs["train"], options=FitOptions(seed=seed))
+        fit = fit_first_principle(logs["train"], options=FitOptions(seed=seed))
         for own, fitted, _ in _GROUPS:
             errors[fitted].append(100.0 * (fit.parameters[fitted] / float(truth[own]) - 1.0))
         for record, log in logs.items():
@@ -191,11 +190,11 @@ def _dataset(runs: list[dict[str, NDArray[np.float64]]], names: list[str]) -> xr
 def _draw(dataset: xr.Dataset) -> dict[str, Figure]:
     from matplotlib.figure import Figure
 
-    from mgdd import plot
+    from mgdd.plot.throttle import free_run
 
     out = {}
     for name in dataset["case"].to_numpy():
         figure = Figure(figsize=(7.2, 4.8), layout="constrained")
-        plot.free_run(dataset.sel(case=name), ax=figure.add_subplot())
+        free_run(dataset.sel(case=name), ax=figure.add_subplot())
         out[f"Free run over random steps of 150 ms, {name}"] = figure
     return out

@@ -10,10 +10,9 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from mgdd.engine import Performance
-from mgdd.loop import EngineBench, LoopCriteria, find_steady_optimum, steady_map
+from mgdd.loop import EngineBench, LoopCriteria
 from mgdd.optimize import ComponentLag, ExtremumSeeking, Limit, Optimum
-from mgdd.results import labelled_dataset
-from mgdd.results.labels import to_jsonable
+from mgdd.results.labels import labelled_dataset, to_jsonable
 from mgdd.studies.base import Progress, StudyResult, check_seeds, finish, run_parts
 from mgdd.studies.statistics import loops, rms, run_with_slope, with_interval
 
@@ -160,7 +159,7 @@ def run_timing_tests(
 def _run(test: _Test, seeds: int, *, limited: bool = False) -> _Outcome:
     bench = test.bench(limited=limited)
     caps = {"p_max_bar": P_MAX_BAR} if limited else {}
-    best = find_steady_optimum(bench, caps)
+    best = bench.find_optimum(caps)
     seeker = test.seeker(best, limited=limited)
     above = {name: cap + 3.0 * best[f"scatter_{name}"] for name, cap in caps.items()}
     table = loops(
@@ -170,7 +169,7 @@ def _run(test: _Test, seeds: int, *, limited: bool = False) -> _Outcome:
         cycles=CYCLES,
         criteria=LoopCriteria(optimum=best["soc_cad"], arrival=ARRIVAL_CAD, tail_cycles=TAIL, exceed_above=above),
     )
-    before = steady_map(bench, [test.start_cad])
+    before = bench.steady_map([test.start_cad])
     efficiency = 100.0 * float(before["efficiency_gross"][0])
     nox = float(before["nox_true_ppm"][0])
     weight = 0.0 if test.nox_sensor == "none" else NOX_WEIGHT

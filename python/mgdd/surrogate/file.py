@@ -9,7 +9,7 @@ import numpy as np
 
 from mgdd.errors import DataError
 from mgdd.io.parameters import Entry, ParameterFile, Wanted, wanted
-from mgdd.results import Label
+from mgdd.results.labels import Label
 from mgdd.surrogate.response_surface import QuadraticBasis, Support
 from mgdd.surrogate.sensor_lag import SensorLag
 from mgdd.surrogate.signal_model import SignalModel

@@ -9,8 +9,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from mgdd.errors import DataError, ParameterError
-from mgdd.results import Label
-from mgdd.results.labels import label_of
+from mgdd.results.labels import Label, label_of
 from mgdd.signals.even_grid import check_count
 from mgdd.surrogate.response_surface import QuadraticBasis, least_squares_of, r_squared, support_of
 from mgdd.surrogate.sensor_lag import SensorLag, find_sensor_lag, lagged

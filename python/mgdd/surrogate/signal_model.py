@@ -6,8 +6,8 @@ from collections.abc import Mapping
 from dataclasses import dataclass
 from typing import TYPE_CHECKING
 
-from mgdd.results import Label
 from mgdd.results.describe import described
+from mgdd.results.labels import Label
 from mgdd.surrogate.sensor_lag import SensorLag
 
 if TYPE_CHECKING:

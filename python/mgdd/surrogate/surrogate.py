@@ -14,8 +14,8 @@ from mgdd.errors import ParameterError
 from mgdd.io.parameters import ParameterFile, Parameters
 from mgdd.optimize import Optimum
 from mgdd.optimize.optimum import limits_of
-from mgdd.results import Label, labelled_dataset
 from mgdd.results.describe import described
+from mgdd.results.labels import Label, labelled_dataset
 from mgdd.surrogate.file import read_surrogate, surrogate_file
 from mgdd.surrogate.optimum import best_along
 from mgdd.surrogate.response_surface import QuadraticBasis, Support

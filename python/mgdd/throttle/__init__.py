@@ -7,23 +7,19 @@ reconstruction from public sources, not the code behind the dissertation: see th
 from __future__ import annotations
 
 from mgdd._core.throttle import Throttle
-from mgdd.throttle.characteristics import groups, holding_duty, linear_part
-from mgdd.throttle.interop import initial_state, to_iosystem
+from mgdd.throttle.characteristics import characteristics, holding_duty
+from mgdd.throttle.interop import to_iosystem
 from mgdd.throttle.pseudo_wiener import PseudoWiener
-from mgdd.throttle.sensors import SensorFault, SensorPair, sense
-from mgdd.throttle.simulation import simulate, simulate_many
+from mgdd.throttle.sensors import SensorFault, SensorPair
+from mgdd.throttle.simulation import simulate
 
 __all__ = [
     "PseudoWiener",
     "SensorFault",
     "SensorPair",
     "Throttle",
-    "groups",
+    "characteristics",
     "holding_duty",
-    "initial_state",
-    "linear_part",
-    "sense",
     "simulate",
-    "simulate_many",
     "to_iosystem",
 ]

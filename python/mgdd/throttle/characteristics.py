@@ -10,20 +10,20 @@ import numpy as np
 from mgdd import _core
 from mgdd._core.throttle import Throttle
 from mgdd.errors import ParameterError
-from mgdd.results import labelled_dataset
+from mgdd.results.labels import labelled_dataset
 
 if TYPE_CHECKING:
     import xarray as xr
     from numpy.typing import ArrayLike, NDArray
 
-__all__ = ["airflow_torque_nm", "groups", "holding_duty", "linear_part", "mass_flow_kg_per_s"]
+__all__ = ["airflow_torque_nm", "characteristics", "holding_duty", "mass_flow_kg_per_s"]
 
 _DEG = math.radians(1.0)
 AIR_KG_PER_M3 = 1.2041  # dry air at 20 degC and 101.325 kPa
 
 
-def groups(throttle: Throttle) -> xr.Dataset:
-    """Give the groups of parameters that duty and angle identify.
+def characteristics(throttle: Throttle) -> xr.Dataset:
+    """Give the groups of parameters that duty and angle identify, and the linear part on each side of limp-home.
 
     Parameters
     ----------
@@ -35,31 +35,31 @@ def groups(throttle: Throttle) -> xr.Dataset:
     xarray.Dataset
         Scalars: ``stall_torque_nm`` g = K (V - V_drop)/R, ``damping_nms_per_rad`` b = K_v + K K_e/R, ``tau_s`` = J/b,
         ``gain_deg_per_s2`` = g/J per duty, and in units of duty ``preload_above``, ``preload_below``, ``coulomb`` and
-        ``stiction`` (torque over g), and ``spring_above_per_deg``, ``spring_below_per_deg`` [1/deg].
-
-    Raises
-    ------
-    mgdd.errors.ParameterError
-        None for a valid throttle.
+        ``stiction`` (torque over g), and ``spring_above_per_deg``, ``spring_below_per_deg`` [1/deg]. The linear part,
+        without dry friction, preload and inductance, over ``side`` ("above", "below"): ``pole_real_per_s`` and
+        ``pole_imag_rad_per_s`` over ``pole``, slow one first, ``gain_deg_per_duty``, ``natural_frequency_rad_per_s``
+        and ``damping_ratio`` [-]; without a spring the gain is infinite and the ratio is not a number.
 
     Notes
     -----
-    Inertia, torque constant and resistance cannot be identified separately from duty and angle alone; these groups can.
+    Inertia, torque constant and resistance cannot be identified separately from duty and angle alone; the groups can.
 
     Examples
     --------
-    >>> from mgdd.throttle import Throttle, groups
-    >>> g = groups(Throttle())
-    >>> round(float(g["tau_s"]), 4), round(float(g["preload_above"]), 4), round(float(g["coulomb"]), 4)
+    >>> from mgdd.throttle import Throttle, characteristics
+    >>> c = characteristics(Throttle())
+    >>> round(float(c["tau_s"]), 4), round(float(c["preload_above"]), 4), round(float(c["coulomb"]), 4)
     (0.0197, 0.1292, 0.0927)
+    >>> c["pole_real_per_s"].sel(side="above").values.round(3).tolist()
+    [-0.83, -49.929]
     """
-    stall, damping = throttle.stall_torque_nm, throttle.damping_nms_per_rad
-    tau = throttle.inertia_kgm2 / damping if damping > 0.0 else math.inf
+    stall, damping, inertia = throttle.stall_torque_nm, throttle.damping_nms_per_rad, throttle.inertia_kgm2
+    tau = inertia / damping if damping > 0.0 else math.inf
     scalars = {
         "stall_torque_nm": (stall, "N m", "stall torque per unit duty"),
         "damping_nms_per_rad": (damping, "N m s/rad", "viscous friction and braking by the motor"),
         "tau_s": (tau, "s", "time constant of the speed"),
-        "gain_deg_per_s2": (stall / throttle.inertia_kgm2 / _DEG, "deg/s²", "acceleration per unit duty"),
+        "gain_deg_per_s2": (stall / inertia / _DEG, "deg/s²", "acceleration per unit duty"),
         "preload_above": (throttle.preload_above_nm / stall, "-", "preload above limp-home, in duty"),
         "preload_below": (throttle.preload_below_nm / stall, "-", "preload below limp-home, in duty"),
         "coulomb": (throttle.coulomb_nm / stall, "-", "Coulomb friction, in duty"),
@@ -67,7 +67,24 @@ def groups(throttle: Throttle) -> xr.Dataset:
         "spring_above_per_deg": (throttle.spring_above_nm_per_rad * _DEG / stall, "1/deg", "spring above, in duty"),
         "spring_below_per_deg": (throttle.spring_below_nm_per_rad * _DEG / stall, "1/deg", "spring below, in duty"),
     }
-    return labelled_dataset({name: ((), *entry) for name, entry in scalars.items()})
+    springs = np.array([throttle.spring_above_nm_per_rad, throttle.spring_below_nm_per_rad])
+    poles = np.array([np.roots([inertia, damping, spring]) for spring in springs], dtype=np.complex128)
+    poles = np.take_along_axis(poles, np.argsort(np.abs(poles), axis=1, kind="stable"), axis=1)
+    with np.errstate(divide="ignore", invalid="ignore"):
+        ratio = np.where(springs > 0.0, damping / (2.0 * np.sqrt(springs * inertia)), np.nan)
+        gain = np.where(springs > 0.0, stall / springs / _DEG, np.inf)
+    return labelled_dataset(
+        {
+            **{name: ((), *entry) for name, entry in scalars.items()},
+            "side": ("side", ["above", "below"], "-", "side of limp-home"),
+            "pole": ("pole", np.arange(2), "-", "pole"),
+            "pole_real_per_s": (("side", "pole"), poles.real, "1/s", "real part of the pole"),
+            "pole_imag_rad_per_s": (("side", "pole"), poles.imag, "rad/s", "imaginary part of the pole"),
+            "gain_deg_per_duty": ("side", gain, "deg", "angle per unit duty at rest"),
+            "natural_frequency_rad_per_s": ("side", np.sqrt(springs / inertia), "rad/s", "natural frequency"),
+            "damping_ratio": ("side", ratio, "-", "damping ratio"),
+        }
+    )
 
 
 def holding_duty(throttle: Throttle, angle_deg: ArrayLike | None = None) -> xr.Dataset:
@@ -126,56 +143,6 @@ def holding_duty(throttle: Throttle, angle_deg: ArrayLike | None = None) -> xr.D
             "angle_deg": ("angle_deg", angle),
             **{name: ("angle_deg", _duty_of(t, torque), "-", text) for name, (torque, text) in columns.items()},
         }
-    )
-
-
-def linear_part(throttle: Throttle, *, side: str = "above") -> xr.Dataset:
-    """Give the linear part on one side of limp-home: no dry friction, no preload, no inductance.
-
-    Parameters
-    ----------
-    throttle : Throttle
-        Its parameters.
-    side : {"above", "below"}
-        Whose spring.
-
-    Returns
-    -------
-    xarray.Dataset
-        ``pole_real_per_s`` and ``pole_imag_rad_per_s`` over ``pole``, slow one first, ``gain_deg_per_duty``,
-        ``natural_frequency_rad_per_s`` and ``damping_ratio`` [-]; without a spring the gain is infinite and the ratio
-        is not a number.
-
-    Raises
-    ------
-    mgdd.errors.ParameterError
-        A side that does not exist.
-
-    Examples
-    --------
-    >>> from mgdd.throttle import Throttle, linear_part
-    >>> linear_part(Throttle())["pole_real_per_s"].values.round(3).tolist()
-    [-0.83, -49.929]
-    """
-    if side not in ("above", "below"):
-        raise ParameterError.of("side", side, "'above' or 'below'")
-    spring = throttle.spring_above_nm_per_rad if side == "above" else throttle.spring_below_nm_per_rad
-    inertia, damping = throttle.inertia_kgm2, throttle.damping_nms_per_rad
-    poles = np.asarray(np.roots([inertia, damping, spring]), dtype=np.complex128)
-    poles = poles[np.argsort(np.abs(poles), kind="stable")]
-    frequency = math.sqrt(spring / inertia)
-    ratio = damping / (2.0 * math.sqrt(spring * inertia)) if spring > 0.0 else math.nan
-    gain = throttle.stall_torque_nm / spring / _DEG if spring > 0.0 else math.inf
-    return labelled_dataset(
-        {
-            "pole": ("pole", np.arange(poles.size), "-", "pole"),
-            "pole_real_per_s": ("pole", poles.real, "1/s", "real part of the pole"),
-            "pole_imag_rad_per_s": ("pole", poles.imag, "rad/s", "imaginary part of the pole"),
-            "gain_deg_per_duty": ((), gain, "deg", "angle per unit duty at rest"),
-            "natural_frequency_rad_per_s": ((), frequency, "rad/s", "natural frequency"),
-            "damping_ratio": ((), ratio, "-", "damping ratio"),
-        },
-        attrs={"side": side},
     )
 
 

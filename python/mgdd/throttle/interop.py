@@ -14,7 +14,7 @@ from mgdd.throttle.pseudo_wiener import PseudoWiener
 if TYPE_CHECKING:
     from numpy.typing import NDArray
 
-__all__ = ["initial_state", "to_iosystem"]
+__all__ = ["to_iosystem"]
 
 # The order of the core's state; angles of motor and gear at plate scale, then of the plate.
 _STATES = (
@@ -24,46 +24,15 @@ _STATES = (
 _ANGLE = _STATES.index("plate_angle_deg")
 
 
-def initial_state(model: Throttle | PseudoWiener, start_deg: float | None = None) -> NDArray[np.float64]:
-    """Give the state of a throttle at rest, as systems of `to_iosystem` start from it.
-
-    Parameters
-    ----------
-    model : Throttle or PseudoWiener
-        The throttle.
-    start_deg : float, optional
-        Angle [deg], within the travel; limp-home if left out.
-
-    Returns
-    -------
-    ndarray
-        Of a Throttle angle [deg], speed [deg/s], current [A] and bristle [deg] of motor and gear, then angle, speed
-        and bristle of the plate; of a PseudoWiener the states of its block in deg, s and duty.
-
-    Raises
-    ------
-    mgdd.errors.ParameterError
-        A start outside the travel.
-
-    Examples
-    --------
-    >>> from mgdd.throttle import Throttle, initial_state
-    >>> initial_state(Throttle(), 20.0).round(6).tolist()
-    [20.0, 0.0, 0.0, 0.0, 20.0, 0.0, 0.0]
-    """
-    values = model.parameters if isinstance(model, PseudoWiener) else model.to_dict()
-    limp_home, closed, opened = (float(values[name]) for name in ("limp_home_deg", "closed_deg", "open_deg"))
-    start = limp_home if start_deg is None else float(start_deg)
-    if not closed <= start <= opened:
-        raise ParameterError(f"start_deg = {start:g}: must lie within the travel, {closed:g} to {opened:g} deg")
-    rest = _stepper(model).at_rest(start) if isinstance(model, PseudoWiener) else _core.throttle.Stepper.at_rest(start)
-    return np.asarray(rest, dtype=np.float64)
-
-
 def to_iosystem(
-    model: Throttle | PseudoWiener, *, sample_s: float = 1e-3, step_s: float = 1e-4, name: str = "throttle"
-) -> Any:
-    """Give a throttle as a discrete-time `control.NonlinearIOSystem`: duty in, plate angle out.
+    model: Throttle | PseudoWiener,
+    *,
+    sample_s: float = 1e-3,
+    step_s: float = 1e-4,
+    start_deg: float | None = None,
+    name: str = "throttle",
+) -> tuple[Any, NDArray[np.float64]]:
+    """Give a throttle as a discrete-time `control.NonlinearIOSystem`, duty in, plate angle out, and its state at rest.
 
     Parameters
     ----------
@@ -73,6 +42,8 @@ def to_iosystem(
         Time between samples, the time base of the system [s]; the duty holds in between.
     step_s : float
         Integration step of a Throttle [s], a whole number of times in the sample time.
+    start_deg : float, optional
+        Angle at the start [deg], within the travel; limp-home if left out.
     name : str
         Name of the system.
 
@@ -80,14 +51,17 @@ def to_iosystem(
     -------
     control.NonlinearIOSystem
         Input ``duty`` [-], clipped to -1..1; output ``angle_deg`` [deg] at the sample; the bridge brakes at zero duty.
-        `initial_state` gives its start. Time comes last in its arrays, as everywhere in python-control.
+        Time comes last in its arrays, as everywhere in python-control.
+    ndarray
+        The state at rest. Of a Throttle angle [deg], speed [deg/s], current [A] and bristle [deg] of motor and gear,
+        then angle, speed and bristle of the plate; of a PseudoWiener the states of its block in deg, s and duty.
 
     Raises
     ------
     ImportError
         python-control is not installed: ``pip install mgdd[control]``.
     mgdd.errors.ParameterError
-        A sample that is not a whole number of steps, a step outside its domain.
+        A sample that is not a whole number of steps, a step outside its domain, a start outside the travel.
 
     Notes
     -----
@@ -98,16 +72,19 @@ def to_iosystem(
     >>> import importlib.util
     >>> from mgdd.throttle import Throttle, to_iosystem
     >>> if importlib.util.find_spec("control"):
-    ...     assert to_iosystem(Throttle()).dt == 0.001
+    ...     system, rest = to_iosystem(Throttle(), start_deg=20.0)
+    ...     assert system.dt == 0.001
+    ...     assert rest.round(6).tolist() == [20.0, 0.0, 0.0, 0.0, 20.0, 0.0, 0.0]
     """
     try:
         import control
     except ImportError as error:
         raise ImportError("to_iosystem needs python-control: pip install 'mgdd[control]'") from error
+    rest = _at_rest(model, start_deg)
     stepper: Any
     if isinstance(model, PseudoWiener):
         stepper = _stepper(model.at_sample(sample_s))
-        states = [f"state_{i}" for i in range(initial_state(model).size)]
+        states = [f"state_{i}" for i in range(rest.size)]
     else:
         stepper = _core.throttle.Stepper(model, sample_s=sample_s, step_s=step_s)
         states = list(_STATES)
@@ -119,7 +96,20 @@ def to_iosystem(
         column = np.asarray(state, dtype=np.float64)
         return np.asarray([stepper.output(column) if isinstance(model, PseudoWiener) else column[_ANGLE]])
 
-    return control.nlsys(update, output, inputs=["duty"], outputs=["angle_deg"], states=states, dt=sample_s, name=name)
+    system = control.nlsys(
+        update, output, inputs=["duty"], outputs=["angle_deg"], states=states, dt=sample_s, name=name
+    )
+    return system, rest
+
+
+def _at_rest(model: Throttle | PseudoWiener, start_deg: float | None) -> NDArray[np.float64]:
+    values = model.parameters if isinstance(model, PseudoWiener) else model.to_dict()
+    limp_home, closed, opened = (float(values[name]) for name in ("limp_home_deg", "closed_deg", "open_deg"))
+    start = limp_home if start_deg is None else float(start_deg)
+    if not closed <= start <= opened:
+        raise ParameterError(f"start_deg = {start:g}: must lie within the travel, {closed:g} to {opened:g} deg")
+    rest = _stepper(model).at_rest(start) if isinstance(model, PseudoWiener) else _core.throttle.Stepper.at_rest(start)
+    return np.asarray(rest, dtype=np.float64)
 
 
 def _stepper(model: PseudoWiener) -> Any:

@@ -1,4 +1,4 @@
-"""Runs of a throttle: one with all its signals, or many at once, and the summary of a step."""
+"""Runs of throttles: one with all its signals, or many at once, and the summary of a step."""
 
 from __future__ import annotations
 
@@ -11,14 +11,14 @@ import numpy as np
 from mgdd import _core
 from mgdd._core.throttle import Throttle
 from mgdd.errors import DataError, ParameterError, ShapeError
-from mgdd.results import labelled_dataset
+from mgdd.results.labels import labelled_dataset
 from mgdd.signals.even_grid import even_step
 
 if TYPE_CHECKING:
     import xarray as xr
     from numpy.typing import ArrayLike, NDArray
 
-__all__ = ["simulate", "simulate_many", "step_summary"]
+__all__ = ["simulate", "step_summary"]
 
 _DEFAULT_DURATION_S = 1.0
 _MOST_SAMPLES = 5_000_000
@@ -26,24 +26,24 @@ _MOVED_DEG = 0.01
 
 
 def simulate(
-    throttle: Throttle,
+    throttle: Throttle | Sequence[Throttle],
     duty: ArrayLike,
     *,
     time_s: ArrayLike | None = None,
     sample_s: float = 1e-3,
     duration_s: float | None = None,
-    start_deg: float | None = None,
+    start_deg: ArrayLike | None = None,
     bridge: str = "brake",
     supply_v: ArrayLike | None = None,
     airflow_torque_nm: ArrayLike = 0.0,
     step_s: float = 1e-4,
 ) -> xr.Dataset:
-    """Simulate one throttle from rest, without current, under a duty signal.
+    """Simulate a throttle from rest, without current, under a duty signal; or many cases at once in vector lanes.
 
     Parameters
     ----------
-    throttle : Throttle
-        Its parameters.
+    throttle : Throttle or sequence of Throttle
+        Its parameters; a sequence is one case each, with friction and backlash of the same form.
     duty : float or array_like, shape (n,)
         Duty [-], -1 to 1, positive opens. Sample k acts from ``time_s[k]`` to ``time_s[k + 1]``.
     time_s : array_like, shape (n,), optional
@@ -52,8 +52,8 @@ def simulate(
         Time between samples [s]; not used where `time_s` is given.
     duration_s : float, optional
         Length of the run [s], for a constant duty only, rounded to whole samples; 1 s if left out.
-    start_deg : float, optional
-        Angle at the start [deg], within the travel; limp-home if left out.
+    start_deg : float or array_like, shape (cases,), optional
+        Angle at the start [deg], within the travel; limp-home if left out. Several starts are one case each.
     bridge : {"brake", "open"}
         What the bridge does at zero duty: short the motor, which brakes, or let go of it.
     supply_v : float or array_like, shape (n,), optional
@@ -67,12 +67,13 @@ def simulate(
     -------
     xarray.Dataset
         ``duty`` [-], ``angle_deg`` [deg], ``speed_deg_per_s`` and ``current_a`` over ``time_s``, and ``supply_v`` and
-        ``airflow_torque_nm`` where they were given. Its attributes are the run's settings and every parameter.
+        ``airflow_torque_nm`` where they were given. Its attributes are the run's settings and every parameter. Of many
+        cases ``angle_deg(case, time_s)``, with the bits of single runs, ``duty(time_s)`` and ``start_deg(case)``.
 
     Raises
     ------
     mgdd.errors.ParameterError
-        A start outside the travel, a step or a bridge that does not exist.
+        A start outside the travel, a step or a bridge that does not exist, no throttle at all.
     mgdd.errors.DataError
         A duty beyond 1, a value that is not finite, an uneven time.
     mgdd.errors.ShapeError
@@ -90,104 +91,45 @@ def simulate(
     >>> run = simulate(presets.load("P1").throttle, 0.6, duration_s=0.06)
     >>> round(float(run["angle_deg"][-1]), 2)
     33.6
+    >>> runs = simulate(presets.load("P1").throttle, 0.0, duration_s=0.5, start_deg=[0.0, 30.0, 90.0], bridge="open")
+    >>> runs["angle_deg"][:, -1].values.round(1).tolist()
+    [7.9, 8.0, 7.9]
     """
     times, column, sample = _grid(duty, time_s=time_s, sample_s=sample_s, duration_s=duration_s)
-    start = throttle.limp_home_deg if start_deg is None else float(start_deg)
     supply = _signal("supply_v", supply_v, column.size)
     air = _signal("airflow_torque_nm", airflow_torque_nm, column.size)
-    raw = _core.throttle.simulate(
-        throttle,
-        column,
-        sample_s=sample,
-        start_deg=start,
-        bridge=bridge,
-        supply_v=supply,
-        airflow_torque_nm=air,
-        step_s=step_s,
-    )
+    given = None if start_deg is None else np.asarray(start_deg, dtype=np.float64)
+    settings = {"bridge": bridge, "sample_s": sample, "step_s": step_s}
+    options: dict[str, Any] = {**settings, "supply_v": supply, "airflow_torque_nm": air}
+    if not isinstance(throttle, Throttle) or (given is not None and given.ndim):
+        starts = np.empty(0) if given is None else np.atleast_1d(given)
+        cases = [throttle] * starts.size if isinstance(throttle, Throttle) else list(throttle)
+        if not cases:
+            raise ParameterError("throttle, start_deg: there is no case: give at least one")
+        if given is None:
+            starts = np.array([one.limp_home_deg for one in cases])
+        elif starts.size == 1:
+            starts = np.repeat(starts, len(cases))
+        angle = _core.throttle.simulate_many(cases, column, start_deg=starts, **options)
+        return labelled_dataset(
+            {
+                "time_s": ("time_s", times),
+                "case": ("case", np.arange(len(cases)), "-", "case"),
+                "duty": ("time_s", column),
+                "start_deg": ("case", starts, "deg", "plate angle at the start"),
+                "angle_deg": (("case", "time_s"), angle),
+            },
+            attrs=settings,
+        )
+    start = throttle.limp_home_deg if given is None else float(given)
+    raw = _core.throttle.simulate(throttle, column, start_deg=start, **options)
     variables: dict[str, tuple[Any, ...]] = {"time_s": ("time_s", times), "duty": ("time_s", column)}
     variables |= {name: ("time_s", values) for name, values in raw.items()}
     if supply.size:
         variables["supply_v"] = ("time_s", supply)
     if air.any():
         variables["airflow_torque_nm"] = ("time_s", air)
-    settings = {"start_deg": start, "bridge": bridge, "sample_s": sample, "step_s": step_s}
-    return labelled_dataset(variables, attrs={**settings, **throttle.to_dict()})
-
-
-def simulate_many(
-    throttles: Throttle | Sequence[Throttle],
-    duty: ArrayLike,
-    *,
-    time_s: ArrayLike | None = None,
-    sample_s: float = 1e-3,
-    duration_s: float | None = None,
-    start_deg: ArrayLike | None = None,
-    bridge: str = "brake",
-    supply_v: ArrayLike | None = None,
-    airflow_torque_nm: ArrayLike = 0.0,
-    step_s: float = 1e-4,
-) -> xr.Dataset:
-    """Simulate many throttles, or many starts of one, under the same signals, several at once in vector lanes.
-
-    Parameters
-    ----------
-    throttles : Throttle or sequence of Throttle
-        One for all starts, or one per case; friction and backlash have the same form in all.
-    duty, time_s, sample_s, duration_s, bridge, supply_v, airflow_torque_nm, step_s
-        As in `simulate`.
-    start_deg : float or array_like, shape (cases,), optional
-        Angle of each case at the start [deg]; its limp-home if left out.
-
-    Returns
-    -------
-    xarray.Dataset
-        ``angle_deg(case, time_s)`` [deg], with the bits that `simulate` gives case by case; ``duty(time_s)`` and
-        ``start_deg(case)``.
-
-    Raises
-    ------
-    mgdd.errors.ParameterError, mgdd.errors.DataError, mgdd.errors.ShapeError
-        As in `simulate`; also no throttle at all, and as many starts as there are no throttles.
-
-    Examples
-    --------
-    >>> from mgdd.throttle import Throttle, simulate_many
-    >>> runs = simulate_many(Throttle(), 0.0, duration_s=0.5, start_deg=[0.0, 30.0, 90.0], bridge="open")
-    >>> runs["angle_deg"][:, -1].values.round(1).tolist()
-    [7.9, 8.0, 7.9]
-    """
-    times, column, sample = _grid(duty, time_s=time_s, sample_s=sample_s, duration_s=duration_s)
-    wanted = 1 if start_deg is None else np.atleast_1d(np.asarray(start_deg, dtype=np.float64)).size
-    cases = [throttles] * wanted if isinstance(throttles, Throttle) else list(throttles)
-    if not cases:
-        raise ParameterError("throttles is empty: give at least one")
-    if start_deg is None:
-        starts = np.array([one.limp_home_deg for one in cases])
-    else:
-        starts = np.atleast_1d(np.asarray(start_deg, dtype=np.float64))
-        if starts.size == 1:
-            starts = np.repeat(starts, len(cases))
-    angle = _core.throttle.simulate_many(
-        cases,
-        column,
-        sample_s=sample,
-        start_deg=starts,
-        bridge=bridge,
-        supply_v=_signal("supply_v", supply_v, column.size),
-        airflow_torque_nm=_signal("airflow_torque_nm", airflow_torque_nm, column.size),
-        step_s=step_s,
-    )
-    return labelled_dataset(
-        {
-            "time_s": ("time_s", times),
-            "case": ("case", np.arange(len(cases)), "-", "case"),
-            "duty": ("time_s", column),
-            "start_deg": ("case", starts, "deg", "plate angle at the start"),
-            "angle_deg": (("case", "time_s"), angle),
-        },
-        attrs={"bridge": bridge, "sample_s": sample, "step_s": step_s},
-    )
+    return labelled_dataset(variables, attrs={"start_deg": start, **settings, **throttle.to_dict()})
 
 
 def step_summary(run: xr.Dataset) -> dict[str, float]:

@@ -65,7 +65,7 @@ def best_timing(
     --------
     >>> from mgdd import datasets, presets
     >>> from mgdd.identify import best_timing
-    >>> rows = best_timing(datasets.load_hd_traces()[:1], presets.load("hd_diesel_128x144").cylinder)
+    >>> rows = best_timing(datasets.load("hd_diesel_128x144")[:1], presets.load("hd_diesel_128x144").cylinder)
     >>> [round(soc) for soc in rows[0]["free_soc_cad"]]
     [-6, -4]
     """

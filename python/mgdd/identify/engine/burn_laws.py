@@ -54,8 +54,8 @@ def compare_laws(
     Examples
     --------
     >>> from mgdd import datasets, presets
-    >>> from mgdd.identify import compare_laws
-    >>> fits = compare_laws(datasets.load_hd_traces(), presets.load("hd_diesel_128x144").cylinder)
+    >>> from mgdd.identify.engine.burn_laws import compare_laws
+    >>> fits = compare_laws(datasets.load("hd_diesel_128x144"), presets.load("hd_diesel_128x144").cylinder)
     >>> [fit.kind for fit in fits][:2]
     ['triangle, gamma 1.37', 'wiebe, gamma 1.37']
     """

@@ -17,8 +17,9 @@ from mgdd.errors import DataError, ParameterError, ShapeError, hand_over, or_par
 from mgdd.identify.engine.records import CylinderFit, Load, burn_law, load_table
 from mgdd.io.trace_forms import as_trace
 from mgdd.optimize.fit_options import FitOptions, fit_options
-from mgdd.results import Finding, FitQuality, FitReport, labelled_dataset
-from mgdd.results.labels import ANGLE
+from mgdd.results import Finding, FitReport
+from mgdd.results.fit import FitQuality
+from mgdd.results.labels import ANGLE, labelled_dataset
 
 if TYPE_CHECKING:
     import xarray as xr
@@ -93,8 +94,8 @@ def fit_cylinder(
     --------
     >>> from mgdd import datasets, presets
     >>> from mgdd.identify import fit_cylinder
-    >>> cylinder = presets.load("hd_diesel_128x144").cylinder
-    >>> fit = fit_cylinder(datasets.load_hd_traces(), cylinder, free=["soc_cad", "burn_duration_cad", "fuel_heat_j"])
+    >>> traces, cylinder = datasets.load("hd_diesel_128x144"), presets.load("hd_diesel_128x144").cylinder
+    >>> fit = fit_cylinder(traces, cylinder, free=["soc_cad", "burn_duration_cad", "fuel_heat_j"])
     >>> fit.report.success
     True
     """
@@ -135,9 +136,7 @@ def fit_cylinder(
 
 def _draw(fit: CylinderFit, ax: Any) -> Any:
     """Draw the trace that the model meets worst."""
-    from mgdd import plot
-
-    return plot.calibration_overlay(max(fit.loads, key=lambda load: load.rmse_percent).overlay, ax=ax)
+    return max(fit.loads, key=lambda load: load.rmse_percent).plot(ax=ax)
 
 
 def default_free(cylinder: Cylinder) -> tuple[str, ...]:

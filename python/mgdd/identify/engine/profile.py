@@ -15,8 +15,8 @@ from mgdd.errors import ParameterError
 from mgdd.identify.engine.cylinder import fit_cylinder
 from mgdd.identify.engine.records import CylinderFit, Load
 from mgdd.optimize import FitOptions
-from mgdd.results import labelled_dataset
 from mgdd.results.describe import described
+from mgdd.results.labels import labelled_dataset
 
 if TYPE_CHECKING:
     import xarray as xr
@@ -56,7 +56,7 @@ class WallHeatProfile:
     --------
     >>> from mgdd import datasets, presets
     >>> from mgdd.identify import fit_cylinder, wall_heat_profile
-    >>> traces, cylinder = datasets.load_hd_traces(), presets.load("hd_diesel_128x144").cylinder
+    >>> traces, cylinder = datasets.load("hd_diesel_128x144"), presets.load("hd_diesel_128x144").cylinder
     >>> wall_heat_profile(traces, fit_cylinder(traces, cylinder)).identifiable
     False
     """
@@ -70,6 +70,23 @@ class WallHeatProfile:
     identifiable: bool
     reasons: tuple[str, ...]
     dataset: xr.Dataset
+
+    def plot(self, *, ax: Any = None) -> Any:
+        """Draw the best reachable RMSE over the scale: a flat curve means the traces do not fix it.
+
+        Parameters
+        ----------
+        ax : matplotlib.axes.Axes, optional
+            Where to draw; None makes a figure.
+
+        Returns
+        -------
+        matplotlib.axes.Axes
+            The axes; the shaded band holds the scales within 10 % of the best RMSE.
+        """
+        from mgdd.plot.calibration import wall_heat_profile as draw
+
+        return draw(self.dataset, ax=ax)
 
     def to_dict(self) -> dict[str, Any]:
         """Give everything but the Dataset as a dict.
@@ -124,7 +141,7 @@ def wall_heat_profile(
     --------
     >>> from mgdd import datasets, presets
     >>> from mgdd.identify import fit_cylinder, wall_heat_profile
-    >>> traces, cylinder = datasets.load_hd_traces(), presets.load("hd_diesel_128x144").cylinder
+    >>> traces, cylinder = datasets.load("hd_diesel_128x144"), presets.load("hd_diesel_128x144").cylinder
     >>> profile = wall_heat_profile(traces, fit_cylinder(traces, cylinder), scales=[0.5, 1.0])
     >>> profile.dataset["rmse_percent"].dims
     ('wall_heat_scale',)

@@ -6,8 +6,9 @@ from dataclasses import dataclass, field
 from typing import TYPE_CHECKING, Any
 
 from mgdd._core.engine import Cylinder, OperatingPoint
-from mgdd.results import VARIABLES, Fit, labelled_dataset
+from mgdd.results import Fit
 from mgdd.results.describe import described
+from mgdd.results.labels import VARIABLES, labelled_dataset
 
 if TYPE_CHECKING:
     from collections.abc import Sequence
@@ -56,7 +57,7 @@ class Load:
     --------
     >>> from mgdd import datasets, presets
     >>> from mgdd.identify import fit_cylinder
-    >>> fit = fit_cylinder(datasets.load_hd_traces()[:1], presets.load("hd_diesel_128x144").cylinder)
+    >>> fit = fit_cylinder(datasets.load("hd_diesel_128x144")[:1], presets.load("hd_diesel_128x144").cylinder)
     >>> fit.loads[0].rmse_percent < 1.0
     True
     """
@@ -80,6 +81,23 @@ class Load:
     heat_loss_fraction: float
     overlay: xr.Dataset = field(repr=False)
 
+    def plot(self, *, ax: Any = None) -> Any:
+        """Draw measured points under the model's line, and their difference in a panel below.
+
+        Parameters
+        ----------
+        ax : matplotlib.axes.Axes, optional
+            Where to draw; None makes a figure.
+
+        Returns
+        -------
+        matplotlib.axes.Axes
+            The upper axes; the residual panel is ``ax.figure.axes[-1]``.
+        """
+        from mgdd.plot.calibration import calibration_overlay
+
+        return calibration_overlay(self.overlay, ax=ax)
+
 
 @dataclass(frozen=True, kw_only=True, eq=False, repr=False)
 class CylinderFit(Fit):
@@ -101,7 +119,7 @@ class CylinderFit(Fit):
     --------
     >>> from mgdd import datasets, presets
     >>> from mgdd.identify import fit_cylinder
-    >>> fit = fit_cylinder(datasets.load_hd_traces(), presets.load("hd_diesel_128x144").cylinder)
+    >>> fit = fit_cylinder(datasets.load("hd_diesel_128x144"), presets.load("hd_diesel_128x144").cylinder)
     >>> max(load.rmse_percent for load in fit.loads) < 1.0
     True
     >>> "wall_heat_scale" in fit.unidentifiable

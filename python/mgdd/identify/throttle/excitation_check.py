@@ -11,8 +11,9 @@ import numpy as np
 from mgdd.errors import ParameterError, argument
 from mgdd.identify.throttle.prior import prior_of
 from mgdd.identify.throttle.record_content import RecordContent, open_questions, record_content
-from mgdd.results import Finding, labelled_dataset
+from mgdd.results import Finding
 from mgdd.results.describe import described
+from mgdd.results.labels import labelled_dataset
 from mgdd.signals.even_grid import even_step
 
 if TYPE_CHECKING:

@@ -12,7 +12,6 @@ from mgdd.errors import DataError, ParameterError, argument, hand_over, or_parti
 from mgdd.identify.throttle.first_principle_model import GROUP_NAMES, TYPICAL, FirstPrincipleModel
 from mgdd.identify.throttle.first_principle_start import SIDE_DEG, regression_start, rest_angle, spread_starts
 from mgdd.identify.throttle.free_run import draw_free_run, free_run, quality_of, source_of
-from mgdd.identify.throttle.physical_parameters import physical_parameters
 from mgdd.optimize.fit_options import FitOptions, fit_options
 from mgdd.results import Finding, Fit, FitReport
 from mgdd.signals.even_grid import even_step
@@ -22,14 +21,14 @@ if TYPE_CHECKING:
     import xarray as xr
     from numpy.typing import NDArray
 
-__all__ = ["fit_throttle"]
+__all__ = ["fit_first_principle"]
 
 ABOVE = ("beta_above_duty", "kappa_above_duty_per_deg")
 BELOW = ("beta_below_duty", "kappa_below_duty_per_deg")
 SIDE_S = 0.3  # shorter visits cannot settle a side's two parameters
 
 
-def fit_throttle(
+def fit_first_principle(
     log: xr.Dataset,
     *,
     test: xr.Dataset | None = None,
@@ -52,7 +51,8 @@ def fit_throttle(
     per unit duty and b all viscous damping. A regression on the torque balance of the moving samples gives the start;
     the free run is then fitted in stages (dynamics, static groups, all), from several starts. A side of limp-home
     the log does not visit keeps its start values and is named. With a resistance, a supply and one of inertia or
-    torque constant the physical numbers are computed back (`physical_parameters`) and said in `findings`.
+    torque constant the physical numbers are computed back (`FirstPrincipleModel.physical_parameters`) and said in
+    `findings`.
 
     Parameters
     ----------
@@ -74,7 +74,7 @@ def fit_throttle(
     threads : int
         Threads over starts.
     resistance_ohm, supply_v, inertia_kgm2, torque_constant_nm_per_a : float, optional
-        Known numbers, for `physical_parameters`; their absence is said in `findings`.
+        Known numbers, for `FirstPrincipleModel.physical_parameters`; their absence is said in `findings`.
 
     Returns
     -------
@@ -95,12 +95,12 @@ def fit_throttle(
     Examples
     --------
     >>> import numpy as np
-    >>> from mgdd.identify import FirstPrincipleModel, fit_throttle
+    >>> from mgdd.identify import FirstPrincipleModel, fit_first_principle
     >>> from mgdd.optimize import FitOptions
     >>> time = 1e-3 * np.arange(4000)
     >>> duty = 0.12 + 0.2 * np.sin(2 * np.pi * time * (0.5 + time))
     >>> log = FirstPrincipleModel().simulate({"time_s": time, "duty": duty}, initial_state={"angle_deg": 30.0})
-    >>> fit = fit_throttle(log, options=FitOptions(n_starts=1))
+    >>> fit = fit_first_principle(log, options=FitOptions(n_starts=1))
     >>> fit.train.nrmse_fit_percent > 99.0
     True
     """
@@ -194,8 +194,7 @@ def fit_throttle(
             )
         )
     else:
-        physical = physical_parameters(
-            model,
+        physical = model.physical_parameters(
             resistance_ohm=resistance_ohm,
             supply_v=supply_v,
             inertia_kgm2=inertia_kgm2,

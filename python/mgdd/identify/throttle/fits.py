@@ -6,7 +6,7 @@ from dataclasses import replace
 from typing import TYPE_CHECKING
 
 from mgdd.errors import ParameterError
-from mgdd.identify.throttle.first_principle import fit_throttle
+from mgdd.identify.throttle.first_principle import fit_first_principle
 from mgdd.identify.throttle.first_principle_model import FirstPrincipleModel
 from mgdd.identify.throttle.pseudo_wiener_fit import fit_pseudo_wiener
 from mgdd.io.parameters import ParameterFile
@@ -42,7 +42,7 @@ def fit_kind(
     if kind == "first_principle":
         fixed = None if limp_home_deg is None else {"limp_home_deg": limp_home_deg}
         fits = [
-            fit_throttle(
+            fit_first_principle(
                 log, fixed=fixed, electrical=electrical, options=options, closed_deg=closed, open_deg=opened,
             )
             for electrical in (False, True)

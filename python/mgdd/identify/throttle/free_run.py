@@ -8,7 +8,9 @@ from typing import TYPE_CHECKING, Any, cast
 import numpy as np
 
 from mgdd.errors import DataError
-from mgdd.results import Fit, FitQuality, Model, labelled_dataset
+from mgdd.results import Fit, Model
+from mgdd.results.fit import FitQuality
+from mgdd.results.labels import labelled_dataset
 from mgdd.signals.even_grid import even_step
 from mgdd.signals.metrics import nrmse_fit_percent, rmse
 
@@ -69,6 +71,6 @@ def source_of(log: xr.Dataset) -> str:
 
 def draw_free_run(fit: Fit, ax: Any) -> Any:
     """Draw the free run of a throttle fit over its log."""
-    from mgdd import plot
+    from mgdd.plot.throttle import free_run as draw
 
-    return plot.free_run(cast("xr.Dataset", fit.run), ax=ax)
+    return draw(cast("xr.Dataset", fit.run), ax=ax)

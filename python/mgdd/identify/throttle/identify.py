@@ -13,9 +13,10 @@ from mgdd.identify.throttle.free_run import free_run, quality_of, source_of
 from mgdd.identify.throttle.prior import prior_of
 from mgdd.identify.throttle.record_content import open_questions, record_content
 from mgdd.identify.throttle.validation import entangled
-from mgdd.io import check_throttle_log
-from mgdd.results import Finding, Fit, FitQuality
+from mgdd.io.throttle_checks import check_throttle_log
+from mgdd.results import Finding, Fit
 from mgdd.results.finding import unique
+from mgdd.results.fit import FitQuality
 
 if TYPE_CHECKING:
     from collections.abc import Sequence
@@ -77,7 +78,7 @@ def identify_throttle(
     Raises
     ------
     DataError
-        All of `mgdd.io.check_throttle_log`.
+        As in `mgdd.io.throttle_log`.
     ParameterError
         An unknown model; a record that does not start at rest, without `limp_home_deg`.
 

@@ -1,8 +1,7 @@
-"""Blocks of a throttle log, and the error of predictions that start anew at every sample."""
+"""The error of predictions that start anew at every sample."""
 
 from __future__ import annotations
 
-import itertools
 from collections.abc import Sequence
 from typing import TYPE_CHECKING
 
@@ -10,8 +9,8 @@ import numpy as np
 
 from mgdd.errors import DataError, ParameterError
 from mgdd.identify.throttle.free_run import columns_of, discarded
-from mgdd.io import check_throttle_log
-from mgdd.results import Model, labelled_dataset
+from mgdd.results import Model
+from mgdd.results.labels import labelled_dataset
 from mgdd.signals.even_grid import even_step
 from mgdd.signals.metrics import rmse
 
@@ -19,50 +18,10 @@ if TYPE_CHECKING:
     import xarray as xr
     from numpy.typing import ArrayLike
 
-__all__ = ["n_step_rms", "split_log"]
+__all__ = ["n_step_rms"]
 
 HORIZONS_S = (0.005, 0.020, 0.050)
 _WHOLE = 1e-6
-
-
-def split_log(log: xr.Dataset, *, shares: Sequence[float] = (0.6, 0.2, 0.2)) -> tuple[xr.Dataset, ...]:
-    """Cut a log into blocks of time for training, validation and test; samples are never shuffled.
-
-    Parameters
-    ----------
-    log : xarray.Dataset
-        A throttle log.
-    shares : sequence of float
-        Shares of the blocks in order; together 1 [-].
-
-    Returns
-    -------
-    tuple of xarray.Dataset
-        The blocks; time keeps running.
-
-    Raises
-    ------
-    ParameterError
-        Shares that are not positive or do not add up to 1.
-    DataError
-        A block that is too short, and all of `mgdd.io.check_throttle_log`.
-
-    Examples
-    --------
-    >>> import numpy as np
-    >>> from mgdd.identify import split_log
-    >>> from mgdd.io import throttle_log
-    >>> time = np.arange(5000) * 1e-3
-    >>> log = throttle_log(time, 0.2 * np.sin(6.0 * time), 20.0 + 15.0 * np.sin(6.0 * time - 0.5))
-    >>> [part.sizes["time_s"] for part in split_log(log)]
-    [3000, 1000, 1000]
-    """
-    check_throttle_log(log)
-    if not len(shares) or min(shares) <= 0.0 or abs(sum(shares) - 1.0) > 1e-9:
-        raise ParameterError.of("shares", tuple(shares), "positive and add up to 1")
-    edges = np.rint(np.cumsum([0.0, *shares]) * log.sizes["time_s"]).astype(int).tolist()
-    blocks = tuple(log.isel(time_s=slice(a, b)) for a, b in itertools.pairwise(edges))
-    return tuple(check_throttle_log(block) for block in blocks)
 
 
 def n_step_rms(
@@ -98,7 +57,8 @@ def n_step_rms(
     Examples
     --------
     >>> import numpy as np
-    >>> from mgdd.identify import FirstPrincipleModel, n_step_rms
+    >>> from mgdd.identify import FirstPrincipleModel
+    >>> from mgdd.identify.throttle.n_step import n_step_rms
     >>> model, time = FirstPrincipleModel(), np.arange(2000) * 1e-3
     >>> log = model.simulate({"time_s": time, "duty": 0.1 + 0.2 * np.sin(6.0 * time)})
     >>> rms = n_step_rms(model, log)["n_step_rms_deg"]

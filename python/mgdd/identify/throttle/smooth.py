@@ -1,4 +1,4 @@
-"""Fit of the smooth throttle's ten parameters, from one or many starts at once."""
+"""The smooth throttle, and the fit of its ten parameters from one or many starts at once."""
 
 from __future__ import annotations
 
@@ -15,15 +15,16 @@ from mgdd.errors import ParameterError, ShapeError, hand_over, or_partial
 from mgdd.io.parameters import FIT_NOTES, ParameterFile, Parameters, entries, wanted
 from mgdd.optimize.fit_options import FitOptions, fit_options
 from mgdd.optimize.fit_run import draw_run, fit_run, quality_of
-from mgdd.results import VARIABLES, Fit, FitReport
+from mgdd.results import Fit, FitReport
 from mgdd.results.describe import described
+from mgdd.results.labels import VARIABLES
 from mgdd.signals.even_grid import even_step
 from mgdd.signals.model import RunInputs, SampledModel, columns_of
 
 if TYPE_CHECKING:
     from numpy.typing import ArrayLike, NDArray
 
-__all__ = ["SmoothThrottle", "fit_smooth_throttle"]
+__all__ = ["SmoothThrottle"]
 
 _EXAMPLE = MappingProxyType(dict(zip(_core.identify.smooth_names, _core.identify.smooth_example, strict=True)))
 _START_RAD = 0.14
@@ -38,7 +39,8 @@ class SmoothThrottle(SampledModel, Parameters):
     Parameters
     ----------
     parameters : mapping of str to float, optional
-        The ten of ``mgdd._core.identify.smooth_names`` (SI, rad); an example throttle without.
+        Torque and friction in SI and rad, by name and in the order of `SmoothThrottle().parameters`; an example
+        throttle without.
     inertia_kgm2, gear_ratio, inductance_h, supply_v : float
         Known constants [kg m², -, H, V].
 
@@ -111,114 +113,108 @@ class SmoothThrottle(SampledModel, Parameters):
             values, run.columns[0], step_s=run.step_s, start=run.state, **self.constants
         )
 
+    def fit(
+        self,
+        record: Any,
+        *,
+        start_values: ArrayLike,
+        lower: ArrayLike,
+        upper: ArrayLike,
+        initial_state: Mapping[str, float] | Sequence[float] | None = None,
+        options: FitOptions | None = None,
+        lanes: bool = True,
+    ) -> Fit:
+        """Fit the ten parameters to a record of duty and angle; the known constants are those of this model.
 
-def fit_smooth_throttle(
-    record: Any,
-    *,
-    start_values: ArrayLike,
-    lower: ArrayLike,
-    upper: ArrayLike,
-    initial_state: Mapping[str, float] | Sequence[float] | None = None,
-    model: SmoothThrottle | None = None,
-    options: FitOptions | None = None,
-    lanes: bool = True,
-) -> Fit:
-    """Fit the ten parameters of the smooth throttle to a record of duty and angle.
+        Levenberg-Marquardt on the output error of the free run with exact sensitivities, in four stages: a twentieth of
+        the record without and with the two smoothing widths, a quarter, then all of it with all ten parameters. Several
+        starts run side by side in SIMD lanes. A smoothing width that the record does not determine is named.
 
-    Levenberg-Marquardt on the output error of the free run with exact sensitivities, in four stages: a twentieth of
-    the record without and with the two smoothing widths, a quarter, then all of it with all ten parameters. Several
-    starts run side by side in SIMD lanes. A smoothing width that the record does not determine is named.
+        Parameters
+        ----------
+        record : xarray.Dataset, DataFrame or mapping of columns
+            ``duty`` [-] and ``angle_deg`` [deg] over an evenly spaced ``time_s`` [s].
+        start_values : array_like, shape (n_starts, 10) or (10,)
+            In the order of `parameters`.
+        lower, upper : array_like, shape (10,)
+            Bounds, positive.
+        initial_state : mapping of str to float, or sequence of float, optional
+            Known ``angle_rad``, ``speed_rad_per_s`` and ``current_a`` at the first sample; at rest without.
+        options : FitOptions, optional
+            A tolerance of 1e-9 of the last stage where nothing else is said; the other options have no effect here and
+            are refused.
+        lanes : bool
+            Several starts at once; False takes one after the other and gives the same numbers.
 
-    Parameters
-    ----------
-    record : xarray.Dataset, DataFrame or mapping of columns
-        ``duty`` [-] and ``angle_deg`` [deg] over an evenly spaced ``time_s`` [s].
-    start_values : array_like, shape (n_starts, 10) or (10,)
-        In the order of ``mgdd._core.identify.smooth_names`` (SI, rad).
-    lower, upper : array_like, shape (10,)
-        Bounds, positive.
-    initial_state : mapping of str to float, or sequence of float, optional
-        Known ``angle_rad``, ``speed_rad_per_s`` and ``current_a`` at the first sample; that of `SmoothThrottle`
-        without.
-    model : SmoothThrottle, optional
-        Its constants are taken; those of an example throttle without.
-    options : FitOptions, optional
-        A tolerance of 1e-9 of the last stage where nothing else is said; the other options have no effect here and are
-        refused.
-    lanes : bool
-        Several starts at once; False takes one after the other and gives the same numbers.
+        Returns
+        -------
+        mgdd.results.Fit
+            The best start, and the reports of all (without their residual).
 
-    Returns
-    -------
-    mgdd.results.Fit
-        The best start, and the reports of all (without their residual).
+        Raises
+        ------
+        ShapeError
+            Arrays that do not belong together.
+        ParameterError
+            A start outside its bounds, or a constant that is not positive.
+        DataError
+            A record that is not finite.
 
-    Raises
-    ------
-    ShapeError
-        Arrays that do not belong together.
-    ParameterError
-        A start outside its bounds, or a constant that is not positive.
-    DataError
-        A record that is not finite.
+        References
+        ----------
+        Nielsen (1999) for the damping; Moré (1978) for the scaling; Griewank and Walther (2008) for the sensitivities.
 
-    References
-    ----------
-    Nielsen (1999) for the damping; Moré (1978) for the scaling; Griewank and Walther (2008) for the sensitivities.
-
-    Examples
-    --------
-    >>> import numpy as np
-    >>> from mgdd import _core
-    >>> from mgdd.identify import SmoothThrottle, fit_smooth_throttle
-    >>> levels = 0.7 * np.random.default_rng(1).random(100) - 0.35
-    >>> time, truth = 1e-3 * np.arange(8000), np.array(_core.identify.smooth_example)
-    >>> log = SmoothThrottle().simulate({"time_s": time, "duty": np.repeat(levels, 80)})
-    >>> log["angle_deg"] = log["angle_deg"] + np.random.default_rng(2).normal(0.0, 0.05, time.size)
-    >>> fit = fit_smooth_throttle(log, start_values=1.1 * truth, lower=0.1 * truth, upper=10 * truth)
-    >>> bool(fit.report.rmse < 0.051)
-    True
-    """
-    chosen = fit_options(options, tolerance=1e-9)
-    table = np.atleast_2d(np.asarray(start_values, dtype=np.float64))
-    if table.ndim != 2 or table.shape[1] != 10:
-        raise ShapeError(f"start_values has shape {table.shape}: must be (n_starts, 10)")
-    plant = model or SmoothThrottle()
-    time, duty, angle = columns_of(record, ("time_s", "duty", "angle_deg"))
-    state = plant.state_of(initial_state)
-    found, stop = or_partial(
-        lambda: _core.identify.fit_smooth_throttle(
-            duty,
-            angle,
-            starts=table.tolist(),
-            lower=_ten(lower, "lower"),
-            upper=_ten(upper, "upper"),
-            step_s=even_step(time),
-            start=state,
-            **plant.constants,
-            cost_tolerance=chosen.tolerance,
-            lanes=lanes,
+        Examples
+        --------
+        >>> import numpy as np
+        >>> from mgdd.identify import SmoothThrottle
+        >>> levels = 0.7 * np.random.default_rng(1).random(100) - 0.35
+        >>> time, truth = 1e-3 * np.arange(8000), np.array(list(SmoothThrottle().parameters.values()))
+        >>> log = SmoothThrottle().simulate({"time_s": time, "duty": np.repeat(levels, 80)})
+        >>> log["angle_deg"] = log["angle_deg"] + np.random.default_rng(2).normal(0.0, 0.05, time.size)
+        >>> fit = SmoothThrottle().fit(log, start_values=1.1 * truth, lower=0.1 * truth, upper=10 * truth)
+        >>> bool(fit.report.rmse < 0.051)
+        True
+        """
+        chosen = fit_options(options, tolerance=1e-9)
+        table = np.atleast_2d(np.asarray(start_values, dtype=np.float64))
+        if table.ndim != 2 or table.shape[1] != 10:
+            raise ShapeError(f"start_values has shape {table.shape}: must be (n_starts, 10)")
+        time, duty, angle = columns_of(record, ("time_s", "duty", "angle_deg"))
+        state = self.state_of(initial_state)
+        found, stop = or_partial(
+            lambda: _core.identify.fit_smooth_throttle(
+                duty,
+                angle,
+                starts=table.tolist(),
+                lower=_ten(lower, "lower"),
+                upper=_ten(upper, "upper"),
+                step_s=even_step(time),
+                start=state,
+                **self.constants,
+                cost_tolerance=chosen.tolerance,
+                lanes=lanes,
+            )
         )
-    )
-    reports = tuple(FitReport.from_core(report) for report in found["reports"])
-    best = reports[found["best"]]
-    fitted = replace(plant, parameters=dict(zip(_EXAMPLE, best.values.tolist(), strict=True)))
-    modelled = fitted.simulate(record, initial_state=state)["angle_deg"].to_numpy()
-    run = fit_run(time, angle, modelled, VARIABLES["angle_deg"]) if np.isfinite(modelled).all() else None
-    fit = Fit(
-        report=best,
-        model=fitted,
-        kind=fitted.kind,
-        train=None if run is None else quality_of(run),
-        findings=best.findings,
-        unidentifiable=best.unidentifiable,
-        start_rmse=tuple(sorted(report.rmse for report in reports)),
-        n_best=int(found["n_reached"]),
-        start_reports=reports,
-        run=run,
-        draw=draw_run,
-    )
-    return hand_over(fit, stop)
+        reports = tuple(FitReport.from_core(report) for report in found["reports"])
+        best = reports[found["best"]]
+        fitted = replace(self, parameters=dict(zip(_EXAMPLE, best.values.tolist(), strict=True)))
+        modelled = fitted.simulate(record, initial_state=state)["angle_deg"].to_numpy()
+        run = fit_run(time, angle, modelled, VARIABLES["angle_deg"]) if np.isfinite(modelled).all() else None
+        fit = Fit(
+            report=best,
+            model=fitted,
+            kind=fitted.kind,
+            train=None if run is None else quality_of(run),
+            findings=best.findings,
+            unidentifiable=best.unidentifiable,
+            start_rmse=tuple(sorted(report.rmse for report in reports)),
+            n_best=int(found["n_reached"]),
+            start_reports=reports,
+            run=run,
+            draw=draw_run,
+        )
+        return hand_over(fit, stop)
 
 
 def _ten(values: ArrayLike, name: str) -> list[float]:

@@ -9,13 +9,15 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
+from mgdd.errors import ParameterError
 from mgdd.identify.throttle.free_run import columns_of, discarded, free_run, quality_of, source_of
 from mgdd.identify.throttle.n_step import n_step_rms, samples_of, whole_horizons
 from mgdd.identify.throttle.prior import prior_of
 from mgdd.identify.throttle.record_content import open_questions, record_content
-from mgdd.io import check_throttle_log
-from mgdd.results import Finding, Fit, FitQuality, FitReport, Model
+from mgdd.io.throttle_checks import check_throttle_log
+from mgdd.results import Finding, Fit, FitReport, Model
 from mgdd.results.describe import described
+from mgdd.results.fit import FitQuality
 from mgdd.signals.even_grid import even_step
 from mgdd.signals.metrics import ResidualTests, residual_tests, vaf_percent
 
@@ -90,6 +92,40 @@ class ThrottleValidation:
         )
         return "\n".join([*rows, *(f"  {finding}" for finding in self.findings)])
 
+    def plot(self, what: str = "free_run", *, ax: Any = None) -> Any:
+        """Draw one part of the validation.
+
+        Parameters
+        ----------
+        what : {"free_run", "n_step", "residuals"}
+            Measured and modelled angle and their difference; how the error grows with the horizon; or what the
+            one-step residual remembers of itself and of the duty.
+        ax : matplotlib.axes.Axes, optional
+            Where to draw; None makes a figure.
+
+        Returns
+        -------
+        matplotlib.axes.Axes
+            The upper axes; a panel below them is ``ax.figure.axes[-1]``.
+
+        Raises
+        ------
+        ParameterError
+            Another part.
+        """
+        from mgdd.plot.identification import error_growth, residual_correlation
+        from mgdd.plot.throttle import free_run
+
+        parts = {
+            "free_run": (free_run, self.free_run),
+            "n_step": (error_growth, self.n_step),
+            "residuals": (residual_correlation, self.tests.correlations),
+        }
+        if what not in parts:
+            raise ParameterError.of("what", what, f"one of {', '.join(parts)}")
+        draw, dataset = parts[what]
+        return draw(dataset, ax=ax)
+
     def to_dict(self) -> dict[str, Any]:
         """Give figures and sentences as a dict, without the runs.
 
@@ -153,7 +189,7 @@ def validate_throttle(
     Raises
     ------
     DataError
-        All of `mgdd.io.check_throttle_log`; a model that runs away.
+        As in `mgdd.io.throttle_log`; a model that runs away.
     ParameterError
         A horizon that is not a whole number of samples.
 

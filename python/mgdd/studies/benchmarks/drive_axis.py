@@ -14,9 +14,10 @@ from mgdd.errors import ParameterError
 from mgdd.io.parameters import ParameterFile, Parameters, entries, wanted
 from mgdd.optimize.fit_options import FitOptions, fit_options
 from mgdd.optimize.fit_run import draw_run, fit_run, quality_of
-from mgdd.results import Fit, FitReport, Label
+from mgdd.results import Fit, FitReport
 from mgdd.results.describe import described
 from mgdd.results.fit import n_best_of
+from mgdd.results.labels import Label
 from mgdd.signals.even_grid import even_step
 from mgdd.signals.model import RunInputs, SampledModel
 
@@ -152,7 +153,7 @@ def drive_inverse_dynamics(
     >>> from mgdd import datasets
     >>> from mgdd.studies.benchmarks.drive_axis import drive_inverse_dynamics
     >>> if "emps" in datasets.available():
-    ...     found = drive_inverse_dynamics(datasets.load_emps()[0], directional=False)
+    ...     found = drive_inverse_dynamics(datasets.load("emps")[0], directional=False)
     ...     assert round(found["mass_kg"], 1) == 95.1
     """
     from scipy.signal import butter, filtfilt
@@ -204,7 +205,7 @@ def drive_free_run(model: DriveModel, record: xr.Dataset) -> NDArray[np.float64]
     >>> from mgdd import datasets
     >>> from mgdd.studies.benchmarks.drive_axis import DriveModel, drive_free_run, drive_inverse_dynamics
     >>> if "emps" in datasets.available():
-    ...     train, test = datasets.load_emps()
+    ...     train, test = datasets.load("emps")
     ...     slide = DriveModel(parameters=drive_inverse_dynamics(train), force_n_per_v=float(train["force_n_per_v"]))
     ...     assert drive_free_run(slide, test).size == 24821
     """
@@ -232,7 +233,7 @@ def fit_drive(
     ----------
     record : xarray.Dataset
         ``drive_v`` [V], ``position_m`` [m] over an evenly spaced ``time_s`` [s], and ``force_n_per_v``, as
-        `mgdd.datasets.load_emps` returns it.
+        `mgdd.datasets.load` returns ``emps``.
     friction : str
         ``coulomb``: viscous and Coulomb friction and an offset; ``directional``: another viscous friction in each
         direction; ``stiction``: that, and more friction at rest than in motion; ``stribeck``: the same with a gradual

@@ -5,14 +5,14 @@ from __future__ import annotations
 import time
 from dataclasses import dataclass, field
 from functools import partial
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING, Any, Literal
 
 import numpy as np
 
 from mgdd import datasets
 from mgdd.errors import DataError
 from mgdd.optimize import FitOptions
-from mgdd.results import labelled_dataset
+from mgdd.results.labels import labelled_dataset
 from mgdd.signals import nrmse_fit_percent, rmse
 from mgdd.studies.base import Progress, StudyResult, finish, run_parts
 from mgdd.studies.benchmarks.drive_axis import drive_free_run, fit_drive
@@ -104,15 +104,15 @@ def run_identification_benchmarks(
     ...     result = run_identification_benchmarks(quick=True, figures=False)
     ...     assert {"set", "train", "test"} <= set(result.summary["rows"][0])
     """
-    loaders = {
-        "emps": (datasets.load_emps, _drive_parts),
-        "cascaded_tanks": (datasets.load_cascaded_tanks, _tank_parts),
-        "wh2009": (datasets.load_wiener_hammerstein, _circuit_parts),
+    makers: dict[Literal["emps", "cascaded_tanks", "wh2009"], Any] = {
+        "emps": _drive_parts,
+        "cascaded_tanks": _tank_parts,
+        "wh2009": _circuit_parts,
     }
     parts, missing, reason = [], [], ""
-    for name, (load, make) in loaders.items():
+    for name, make in makers.items():
         try:
-            train, test = load()
+            train, test = datasets.load(name)
         except FileNotFoundError as error:
             missing.append(name)
             reason = str(error.strerror)

@@ -14,9 +14,10 @@ from mgdd.errors import DataError, ParameterError
 from mgdd.io.parameters import ParameterFile, Parameters, entries, wanted
 from mgdd.optimize.fit_options import FitOptions, fit_options
 from mgdd.optimize.fit_run import draw_run, fit_run, quality_of
-from mgdd.results import Fit, FitReport, Label
+from mgdd.results import Fit, FitReport
 from mgdd.results.describe import described
 from mgdd.results.fit import n_best_of
+from mgdd.results.labels import Label
 from mgdd.signals.even_grid import even_step
 from mgdd.signals.model import RunInputs, SampledModel
 
@@ -199,7 +200,7 @@ def fit_two_tanks(record: xr.Dataset, *, form: str = "grey_box", options: FitOpt
     >>> from mgdd.optimize import FitOptions
     >>> from mgdd.studies.benchmarks.two_tanks import fit_two_tanks
     >>> if "cascaded_tanks" in datasets.available():
-    ...     fit = fit_two_tanks(datasets.load_cascaded_tanks()[0], options=FitOptions(n_starts=1))
+    ...     fit = fit_two_tanks(datasets.load("cascaded_tanks")[0], options=FitOptions(n_starts=1))
     ...     assert fit.train.rmse < 0.16
     """
     if form not in _FORMS:

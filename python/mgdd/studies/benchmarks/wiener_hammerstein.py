@@ -14,9 +14,10 @@ from mgdd.errors import DataError, ParameterError
 from mgdd.io.parameters import ParameterFile, Parameters, entries, wanted
 from mgdd.optimize.fit_options import FitOptions, fit_options
 from mgdd.optimize.fit_run import draw_run, fit_run, quality_of
-from mgdd.results import Fit, FitReport, Label
+from mgdd.results import Fit, FitReport
 from mgdd.results.describe import described
 from mgdd.results.fit import n_best_of
+from mgdd.results.labels import Label
 from mgdd.signals.even_grid import even_step
 from mgdd.signals.model import RunInputs, SampledModel
 
@@ -206,7 +207,7 @@ class WienerHammersteinFit(Fit):
     >>> from mgdd.optimize import FitOptions
     >>> from mgdd.studies.benchmarks.wiener_hammerstein import fit_wiener_hammerstein
     >>> if "wh2009" in datasets.available():
-    ...     some = datasets.load_wiener_hammerstein()[0].isel(time_s=slice(0, 5000))
+    ...     some = datasets.load("wh2009")[0].isel(time_s=slice(0, 5000))
     ...     options = FitOptions(max_iterations=10)
     ...     fit = fit_wiener_hammerstein(some, scan_samples=5000, follow=3, options=options)
     ...     assert fit.train.rmse <= fit.linear.rmse
@@ -248,7 +249,7 @@ def fit_linear(record: xr.Dataset, *, order: int = 6, iterations: int = 15) -> L
     >>> from mgdd import datasets
     >>> from mgdd.studies.benchmarks.wiener_hammerstein import fit_linear
     >>> if "wh2009" in datasets.available():
-    ...     assert fit_linear(datasets.load_wiener_hammerstein()[0], order=2, iterations=3).rmse > 0.04
+    ...     assert fit_linear(datasets.load("wh2009")[0], order=2, iterations=3).rmse > 0.04
     """
     if not 1 <= order <= 10:
         raise ParameterError.of("order", order, "in [1, 10]")
@@ -332,7 +333,7 @@ def fit_wiener_hammerstein(
     >>> import numpy as np
     >>> from mgdd.optimize import FitOptions
     >>> from mgdd.studies.benchmarks.wiener_hammerstein import fit_wiener_hammerstein
-    >>> from mgdd.results import labelled_dataset
+    >>> from mgdd.results.labels import labelled_dataset
     >>> rng = np.random.default_rng(1)
     >>> u = np.convolve(rng.standard_normal(6003), np.ones(4) / 4.0, "valid")
     >>> x, w, y = np.zeros(6000), np.zeros(6000), np.zeros(6000)

@@ -1,4 +1,4 @@
-"""What the Python interface of every seeker adds to the core: history, files and pickles."""
+"""What the Python interface of every seeker adds to the core: runs, history, files and pickles."""
 
 from __future__ import annotations
 
@@ -6,51 +6,126 @@ import json
 import math
 import warnings
 from pathlib import Path
-from typing import TYPE_CHECKING, Any, ClassVar, Protocol, Self
+from typing import TYPE_CHECKING, Any, ClassVar, Self
 
 import numpy as np
 
 from mgdd import _core
-from mgdd.errors import DataError, Error
-from mgdd.results import labelled_dataset
+from mgdd.errors import DataError, Error, Interrupted, ParameterError
 from mgdd.results.describe import as_html, rows_of
+from mgdd.results.labels import labelled_dataset
 
 if TYPE_CHECKING:
     import os
+    from collections.abc import Callable
 
     import xarray as xr
     from numpy.typing import NDArray
 
-__all__ = ["SeekerRecord", "read_seeker_file"]
+__all__ = ["Seeker"]
 
 _FORMAT = 1
 _INPUT_UNIT, _J_UNIT = "unit of the input", "unit of J"
 
 
-class _CoreSeeker(Protocol):
-    """What `SeekerRecord` needs of the class of the core that it is mixed into."""
+if TYPE_CHECKING:
+
+    class _CoreSeeker:
+        """What every seeker has of its class of the core."""
+
+        @property
+        def settings(self) -> dict[str, Any]: ...
+        @property
+        def state(self) -> dict[str, list[float]]: ...
+        @state.setter
+        def state(self, saved: Any) -> None: ...
+        @property
+        def estimate(self) -> NDArray[np.float64]: ...
+        @property
+        def cycle(self) -> int: ...
+        @property
+        def component_count(self) -> int: ...
+        @property
+        def limit_names(self) -> list[str]: ...
+        def ask(self) -> NDArray[np.float64]: ...
+        def tell(self, J: Any = None, limits: Any = None, *, misfire: bool = False) -> None: ...  # noqa: N803
+        def restart(self) -> None: ...
+        def _history_columns(self) -> dict[str, Any]: ...
+        def _clear_history(self) -> None: ...
+else:
+    _CoreSeeker = object
+
+
+class Seeker(_CoreSeeker):
+    """What every seeker of `mgdd.optimize` has beside ``ask`` and ``tell``; `Seeker.load` reads a file of any kind.
+
+    Examples
+    --------
+    >>> import tempfile
+    >>> from pathlib import Path
+    >>> from mgdd.optimize import Seeker, Spsa
+    >>> with tempfile.TemporaryDirectory() as folder:
+    ...     file = Path(folder) / "spsa.json"
+    ...     Spsa(start=3.0).save(file)
+    ...     Seeker.load(file)
+    <Spsa cycle 0, estimate [3.]>
+    """
 
     kind: ClassVar[str]
 
-    @property
-    def settings(self) -> dict[str, Any]: ...
-    @property
-    def state(self) -> dict[str, list[float]]: ...
-    @property
-    def estimate(self) -> NDArray[np.float64]: ...
-    @property
-    def cycle(self) -> int: ...
-    def _history_columns(self) -> dict[str, Any]: ...
-    def _clear_history(self) -> None: ...
+    def run(self, fun: Callable[[NDArray[np.float64]], Any], cycles: int) -> xr.Dataset:
+        """Seek the optimum of a Python function for a number of cycles; `mgdd.loop.run_seeker` does so on a plant.
 
+        Parameters
+        ----------
+        fun : callable
+            ``fun(input) -> J`` with the input of shape (inputs,), or ``-> (J, limits)`` where the seeker keeps
+            limits; None says that the cycle misfired. J is a number, or an array with one entry per component.
+            Exceptions of `fun` pass through and leave the seeker as before that cycle.
+        cycles : int
+            Calls of `fun`, >= 0.
 
-class SeekerRecord:
-    """History, files and pickles of a seeker; mixed into every seeker of `mgdd.optimize`."""
+        Returns
+        -------
+        xarray.Dataset
+            The `history`, earlier runs included.
 
-    kind: ClassVar[str]
+        Raises
+        ------
+        ParameterError
+            `cycles` is negative.
+        DataError, ShapeError
+            `fun` returned what the seeker refuses; the seeker is unchanged by that cycle.
+        Interrupted
+            Ctrl-C; ``partial`` is the history so far. The interrupted cycle is asked again when the run is continued.
+
+        Examples
+        --------
+        >>> from mgdd.optimize import GradientDescent
+        >>> history = GradientDescent(start=0.0).run(lambda x: -0.02 * (x[0] - 3.0) ** 2, 40)
+        >>> round(float(history["estimate"][-1, 0]), 3)
+        3.0
+        """
+        if cycles < 0:
+            raise ParameterError.of("cycles", cycles, ">= 0")
+        try:
+            for _ in range(cycles):
+                answer = fun(self.ask())
+                if answer is None:
+                    self.tell(math.nan, misfire=True)
+                elif isinstance(answer, tuple):
+                    self.tell(*answer)
+                else:
+                    self.tell(answer)
+        except KeyboardInterrupt:
+            done = (
+                f"interrupted after cycle {self.cycle}; the history is in .partial, and the seeker can go on from here"
+            )
+            raise Interrupted(done, self.history) from None
+        return self.history
 
     @property
-    def history(self: _CoreSeeker) -> xr.Dataset:
+    def history(self) -> xr.Dataset:
         """What was applied and told, cycle by cycle.
 
         Dimensions `cycle` and `input`; variables `applied` and `estimate` (before the cycle was told), both
@@ -70,11 +145,11 @@ class SeekerRecord:
             attrs={"seeker": self.kind},
         )
 
-    def clear_history(self: _CoreSeeker) -> None:
+    def clear_history(self) -> None:
         """Forget the history; the run goes on."""
         self._clear_history()
 
-    def save(self: _CoreSeeker, path: str | os.PathLike[str]) -> None:
+    def save(self, path: str | os.PathLike[str]) -> None:
         """Write settings and state as JSON; the history is not part of the file.
 
         Parameters
@@ -111,7 +186,7 @@ class SeekerRecord:
         Returns
         -------
         seeker
-            Of this class.
+            Of this class; of any kind for `Seeker` itself.
 
         Raises
         ------
@@ -120,29 +195,30 @@ class SeekerRecord:
         OSError
             The file cannot be read.
         """
-        kind, settings, state = read_seeker_file(path)
-        if kind != cls.kind:
-            raise DataError(f"{Path(path)}: holds a {kind}, not a {cls.kind}; load_seeker reads any kind")
+        kind, settings, state = _read(path)
+        known = {one.kind: one for one in (Seeker.__subclasses__() if cls is Seeker else [cls])}
+        if kind not in known:
+            raise DataError(f"{Path(path)}: holds a {kind}, not a {' or '.join(known)}")
         try:
-            seeker: Self = _rebuild(cls, settings, state, None)
+            seeker: Self = _rebuild(known[kind], settings, state, None)
         except (Error, TypeError, KeyError) as error:
             raise DataError(f"{Path(path)}: settings and state do not make a {kind}: {error}") from error
         return seeker
 
-    def __reduce__(self: _CoreSeeker) -> tuple[Any, ...]:
+    def __reduce__(self) -> tuple[Any, ...]:
         columns = {name: np.asarray(column) for name, column in self._history_columns().items()}
         return _rebuild, (type(self), self.settings, self.state, columns), self.__dict__ or None
 
-    def __repr__(self: _CoreSeeker) -> str:
+    def __repr__(self) -> str:
         return f"<{type(self).__name__} cycle {self.cycle}, estimate {np.array2string(self.estimate, precision=6)}>"
 
-    def _repr_html_(self: _CoreSeeker) -> str:
+    def _repr_html_(self) -> str:
         now = {"cycle": self.cycle, "estimate": self.estimate}
         return as_html(type(self).__name__, rows_of({**now, **self.settings}))
 
 
-def read_seeker_file(path: str | os.PathLike[str]) -> tuple[str, dict[str, Any], dict[str, Any]]:
-    """Read kind, settings and state of a file that `SeekerRecord.save` wrote; DataError if it is none."""
+def _read(path: str | os.PathLike[str]) -> tuple[str, dict[str, Any], dict[str, Any]]:
+    """Read kind, settings and state of a file that `Seeker.save` wrote; DataError if it is none."""
     file = Path(path)
     try:
         content = json.loads(file.read_text(encoding="utf-8"), object_hook=_decode)

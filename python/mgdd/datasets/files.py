@@ -1,0 +1,117 @@
+"""Where the files of a data set are: in MGDD_DATA_DIR, then (hash-checked) in the package, then what was fetched."""
+
+from __future__ import annotations
+
+import errno
+import hashlib
+import os
+from pathlib import Path
+
+from mgdd.datasets.origins import ORIGINS, fetched, find_fetched
+from mgdd.errors import DataError
+
+__all__ = ["FILES", "HD", "available", "path"]
+
+_VARIABLE = "MGDD_DATA_DIR"
+_PACKAGE = Path(__file__).parents[1] / "data"
+HD = "hd_diesel_128x144"
+
+# SHA-256 of every file that the package carries.
+_PACKAGED = {
+    HD: {
+        f"{HD}_traces.csv": "47e92d491a838de2aceeb7b84b62375613c465c5a109fae0122babf65024cadb",
+        f"{HD}_conditions.csv": "599f36c318f968fd3894d1d44f56995ed7cad5e18daf19ef320f92532c5cb9a4",
+        f"{HD}_SOURCE.txt": "23b966d613723032f57cb31ccafbfd6ebe920f3d95709b2e0901209f8c0f4e8a",
+        f"{HD}_LICENSE.txt": "ec423cc5506eea1ffbfc9955c3ec8f86139996963d84ff306a5ee41eda8a4ff1",
+    }
+}
+
+# The sets that `load` reads, and the files that each needs.
+FILES: dict[str, tuple[str, ...]] = {
+    "cascaded_tanks": ("dataBenchmark.csv",),
+    "emps": ("DATA_EMPS.mat", "DATA_EMPS_PULSES.mat"),
+    "h2df_502": ("h2df_test502_cycles.csv",),
+    HD: (f"{HD}_conditions.csv", f"{HD}_traces.csv"),
+    "wh2009": ("WienerHammerBenchmark.csv",),
+}
+
+
+def available() -> tuple[str, ...]:
+    """Name the data sets that can be read now.
+
+    Returns
+    -------
+    tuple of str
+        The sets whose files are all in the package or in ``MGDD_DATA_DIR``, and those that were fetched, sorted.
+
+    Examples
+    --------
+    >>> from mgdd import datasets
+    >>> "hd_diesel_128x144" in datasets.available()
+    True
+    """
+    folder = _data_dir()
+
+    def there(name: str, file: str) -> bool:
+        return file in _PACKAGED.get(name, {}) or (folder is not None and (folder / name / file).is_file())
+
+    found = {name for name, files in FILES.items() if all(there(name, file) for file in files)}
+    return tuple(sorted({*found, *fetched()}))
+
+
+def path(name: str, file: str) -> Path:
+    """Find a file of a data set: ``$MGDD_DATA_DIR/name/file`` first, then the package, then what `fetch` has kept.
+
+    Parameters
+    ----------
+    name : str
+        The data set, see `available`.
+    file : str
+        The file in it.
+
+    Returns
+    -------
+    pathlib.Path
+        An existing file; one from the package has passed its SHA-256 check.
+
+    Raises
+    ------
+    FileNotFoundError
+        It is in none of these places; the message names them.
+    DataError
+        The packaged file differs from what was shipped.
+
+    Examples
+    --------
+    >>> from mgdd import datasets
+    >>> datasets.path("hd_diesel_128x144", "hd_diesel_128x144_traces.csv").suffix
+    '.csv'
+    """
+    folder = _data_dir()
+    if folder is not None and (folder / name / file).is_file():
+        return folder / name / file
+    if (kept := find_fetched(name, file)) is not None:
+        return kept
+    packaged = _PACKAGE / file
+    digest = _PACKAGED.get(name, {}).get(file)
+    if digest is None or not packaged.is_file():
+        first = f"looked for {folder / name / file}" if folder else f"{_VARIABLE} is not set"
+        fetching = f", or fetch it: mgdd.datasets.fetch({name!r})" if name in ORIGINS else ""
+        raise FileNotFoundError(
+            errno.ENOENT,
+            f"no file {file!r} of data set {name!r}: {first}, and the package ({_PACKAGE}) lacks it; "
+            f"set {_VARIABLE} to a folder that holds {name}/{file}{fetching}; "
+            f"data sets at hand: {', '.join(available())}",
+        )
+    found = hashlib.sha256(packaged.read_bytes()).hexdigest()
+    if found != digest:
+        raise DataError(
+            f"{packaged}: SHA-256 is {found}, shipped was {digest}: the file was changed; reinstall mgdd, or "
+            f"put your own version under {_VARIABLE}/{name}"
+        )
+    return packaged
+
+
+def _data_dir() -> Path | None:
+    value = os.environ.get(_VARIABLE)
+    return Path(value) if value else None

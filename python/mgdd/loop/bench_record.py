@@ -1,0 +1,56 @@
+"""The cycles of the virtual bench as a labelled Dataset."""
+
+from __future__ import annotations
+
+from collections import Counter
+from collections.abc import Sequence
+from typing import TYPE_CHECKING, Any
+
+from mgdd import _core
+from mgdd.results.labels import VARIABLES, labelled_dataset
+
+if TYPE_CHECKING:
+    import xarray as xr
+    from numpy.typing import ArrayLike
+
+__all__ = ["FLAGS", "cycles_to_dataset"]
+
+FLAGS = {
+    "misfire": "nothing burned",
+    "clamped": "request outside the timing window",
+    "unphysical": "no such cycle exists",
+    "operating_point_changed": "speed or fuel moved by more than 5 %",
+}
+
+
+def cycles_to_dataset(bench: _core.loop.EngineBench, columns: dict[str, Any], **more: ArrayLike) -> xr.Dataset:
+    """Label the columns of a run, with further columns of names that `VARIABLES` knows."""
+    settings = bench.settings
+    terms = _unique([term.signal for term in settings["performance"].terms])
+    variables: dict[str, tuple[Any, ...]] = {"cycle": ("cycle", columns.pop("cycle"))}
+    variables |= {name: ("cycle", values) for name, values in more.items()}
+    components, limits = columns.pop("components"), columns.pop("limits")
+    for name, values in columns.items():
+        label = (("-", FLAGS[name]) if name in FLAGS else ()) if name not in VARIABLES else ()
+        variables[name] = ("cycle", values, *label)
+    variables["component"] = ("component", terms, "-", "term of the performance")
+    variables["components"] = (("cycle", "component"), components, "unit of J", "component of the performance")
+    names = settings["limits"]
+    if names:
+        units = {name: label.units for name, label in VARIABLES.items()}
+        own = "unit of the limit"
+        variables["limit"] = ("limit", names, "-", "limited quantity")
+        variables["limit_units"] = ("limit", [units[name] for name in names], "-", own)
+        variables["limits"] = (("cycle", "limit"), limits, own, "measured value of a limited quantity")
+    out = labelled_dataset(variables, attrs={"seed": bench.seed, "nox_sensor": settings["nox_sensor"]})
+    return out.set_coords("limit_units") if names else out
+
+
+def _unique(names: Sequence[str]) -> list[str]:
+    """Add a number to the names that occur more than once."""
+    total, seen = Counter(names), Counter[str]()
+    out = []
+    for name in names:
+        seen[name] += 1
+        out.append(name if total[name] == 1 else f"{name}_{seen[name]}")
+    return out
