@@ -12,11 +12,12 @@ Examples
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterator
+from collections.abc import Callable, Iterable, Iterator
 from contextlib import contextmanager
 from contextvars import ContextVar
 from typing import Any, Self, TypeVar
 
+Item = TypeVar("Item")
 Result = TypeVar("Result")
 
 __all__ = [
@@ -189,6 +190,27 @@ def or_partial(call: Callable[[], Result]) -> tuple[Result, Interrupted | None]:
         if stop.partial is None:
             raise
         return stop.partial, stop
+
+
+def keep_finished(call: Callable[[Item], Result], items: Iterable[Item], done: list[Result]) -> Interrupted | None:
+    """Call the core for one item after the other and append to `done`, the part that Ctrl-C left included.
+
+    Returns
+    -------
+    Interrupted or None
+        What ended it, for `hand_over`; raised at once where `done` is empty. `items` may look at `done` as it grows.
+    """
+    try:
+        for item in items:
+            done += [call(item)]
+    except KeyboardInterrupt as stop:
+        part = getattr(stop, "partial", None)
+        if part is not None:
+            done.append(part)
+        if not done:
+            raise
+        return Interrupted("interrupted: what was finished is in .partial", done[-1])
+    return None
 
 
 def hand_over(result: Result, stop: Interrupted | None) -> Result:

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Iterator, Mapping
 from dataclasses import dataclass
 from types import MappingProxyType
 from typing import TYPE_CHECKING, Any
@@ -10,7 +10,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from mgdd import _core
-from mgdd.errors import ParameterError
+from mgdd.errors import ParameterError, hand_over, keep_finished
 from mgdd.io.parameters import ParameterFile, Parameters, entries, wanted
 from mgdd.optimize.fit_options import FitOptions, fit_options
 from mgdd.optimize.fit_run import draw_run, fit_run, quality_of
@@ -255,6 +255,8 @@ def fit_drive(
         An unknown form of friction or parameter.
     mgdd.errors.DataError
         Uneven times, or fewer than 100 samples.
+    mgdd.errors.Interrupted
+        Ctrl-C; ``partial`` is the best fit so far.
 
     References
     ----------
@@ -298,20 +300,25 @@ def fit_drive(
     base = dict(zip(names, _row(base), strict=True))
     rng = np.random.default_rng(chosen.seed)
     measured = record["position_m"].to_numpy()[_WINDOW:]
-    found: list[tuple[float, Any]] = []
-    for index in range(starts):
-        if index == 0:
-            point = base
-        elif index < (starts + 5) // 6:
-            point = _scattered(base, free, 1.0, rng)
-        else:
-            near = min(found, key=lambda entry: entry[0])[1].parameters
-            point = _scattered(dict(zip(names, near, strict=True)), free, _NEAR, rng)
-        result = axis.fit(base=list(point.values()), free=free, records=[first], dt_s=dt_s, options=search)
-        found.append((float(result.report.cost), result))
-    found.sort(key=lambda entry: entry[0])
-    best = found[0][1]
-    errors = tuple(float(np.sqrt(2.0 * cost / measured.size)) for cost, _ in found)
+    found: list[_core.systems.FreeRunFit] = []
+
+    def points() -> Iterator[dict[str, float]]:
+        yield base
+        for index in range(1, starts):
+            if index < (starts + 5) // 6:
+                yield _scattered(base, free, 1.0, rng)
+            else:
+                near = min(found, key=_cost).parameters
+                yield _scattered(dict(zip(names, near, strict=True)), free, _NEAR, rng)
+
+    stop = keep_finished(
+        lambda point: axis.fit(base=list(point.values()), free=free, records=[first], dt_s=dt_s, options=search),
+        points(),
+        found,
+    )
+    found.sort(key=_cost)
+    best = found[0]
+    errors = tuple(float(np.sqrt(2.0 * _cost(one) / measured.size)) for one in found)
     model = DriveModel(
         parameters=dict(zip(names, best.parameters, strict=True)), force_n_per_v=float(record["force_n_per_v"])
     )
@@ -319,7 +326,7 @@ def fit_drive(
     run = fit_run(
         record["time_s"].to_numpy()[_WINDOW:], measured, drive_free_run(model, record), model.labels["position_m"]
     )
-    return Fit(
+    fit = Fit(
         report=report,
         model=model,
         kind=model.kind,
@@ -331,6 +338,11 @@ def fit_drive(
         run=run,
         draw=draw_run,
     )
+    return hand_over(fit, stop)
+
+
+def _cost(found: _core.systems.FreeRunFit) -> float:
+    return float(found.report.cost)
 
 
 def _row(parameters: Mapping[str, float]) -> list[float]:

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Iterator, Mapping
 from dataclasses import dataclass
 from types import MappingProxyType
 from typing import TYPE_CHECKING
@@ -10,7 +10,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from mgdd import _core
-from mgdd.errors import DataError, ParameterError
+from mgdd.errors import DataError, ParameterError, hand_over, keep_finished
 from mgdd.io.parameters import ParameterFile, Parameters, entries, wanted
 from mgdd.optimize.fit_options import FitOptions, fit_options
 from mgdd.optimize.fit_run import draw_run, fit_run, quality_of
@@ -149,6 +149,8 @@ class TwoTanksModel(SampledModel, Parameters):
         ------
         mgdd.errors.DataError
             A window outside the record, or times that are not even.
+        mgdd.errors.Interrupted
+            Ctrl-C; ``partial`` is the best estimate so far.
         """
         n = record.sizes["time_s"]
         if not 3 <= window <= n:
@@ -156,9 +158,12 @@ class TwoTanksModel(SampledModel, Parameters):
         known = record.isel(time_s=slice(0, window))
         # The upper level is not seen directly: the best of a few starts, since its brim makes hollows.
         brim = float(self.parameters["upper_brim_v"])
-        fits = [_fit(self.parameters, [], known, share * brim, self.lower_brim_v, 100) for share in (0.2, 0.5, 0.9)]
-        best = min(fits, key=lambda fit: float(fit.report.cost))
-        return dict(zip(self.state_names, map(float, best.starts[0][:2]), strict=True))
+        found: list[_core.systems.FreeRunFit] = []
+        stop = keep_finished(
+            lambda share: _fit(self.parameters, [], known, share * brim, self.lower_brim_v, 100), (0.2, 0.5, 0.9), found
+        )
+        best = min(found, key=_cost)
+        return hand_over(dict(zip(self.state_names, map(float, best.starts[0][:2]), strict=True)), stop)
 
 
 def fit_two_tanks(record: xr.Dataset, *, form: str = "grey_box", options: FitOptions | None = None) -> Fit:
@@ -188,6 +193,8 @@ def fit_two_tanks(record: xr.Dataset, *, form: str = "grey_box", options: FitOpt
         An unknown form.
     mgdd.errors.DataError
         Times that are not even.
+    mgdd.errors.Interrupted
+        Ctrl-C; ``partial`` is the best fit so far.
 
     References
     ----------
@@ -207,22 +214,29 @@ def fit_two_tanks(record: xr.Dataset, *, form: str = "grey_box", options: FitOpt
     chosen = fit_options(options, n_starts=4, seed=1, max_iterations=200, tolerance=1e-9)
     base, free = _FORMS[form]
     rng = np.random.default_rng(chosen.seed)
-    fits = []
-    for index in range(chosen.n_starts):
-        point = dict(base)
-        for name in free if index else ():
-            point[name] *= float(np.exp(0.15 * rng.standard_normal()))
-        point["overflow_share"] = min(point["overflow_share"], 1.0)
+
+    def points() -> Iterator[dict[str, float]]:
+        for index in range(chosen.n_starts):
+            point = dict(base)
+            for name in free if index else ():
+                point[name] *= float(np.exp(0.15 * rng.standard_normal()))
+            point["overflow_share"] = min(point["overflow_share"], 1.0)
+            yield point
+
+    def search(point: Mapping[str, float]) -> _core.systems.FreeRunFit:
         upper = min(0.8 * point["upper_brim_v"], 25.0) if form.startswith("grey_box") else 4.0
-        fits.append(_fit(point, list(free), record, upper, 10.0, chosen.max_iterations, chosen.tolerance))
-    best = min(fits, key=lambda fit: float(fit.report.cost))
+        return _fit(point, list(free), record, upper, 10.0, chosen.max_iterations, chosen.tolerance)
+
+    found: list[_core.systems.FreeRunFit] = []
+    stop = keep_finished(search, points(), found)
+    best = min(found, key=_cost)
     names = tuple(_core.systems.TwoTanks.parameter_names)
     report = FitReport.from_core(best.report, record["level_v"].to_numpy())
     model = TwoTanksModel(parameters=dict(zip(names, best.parameters, strict=True)))
     modelled = model.simulate(record, initial_state=[float(x) for x in best.starts[0][:2]])["level_v"]
     run = fit_run(record["time_s"].to_numpy(), record["level_v"].to_numpy(), modelled, model.labels["level_v"])
-    errors = tuple(sorted(float(fit.report.rmse) for fit in fits))
-    return Fit(
+    errors = tuple(sorted(float(one.report.rmse) for one in found))
+    fit = Fit(
         report=report,
         model=model,
         kind=model.kind,
@@ -234,6 +248,11 @@ def fit_two_tanks(record: xr.Dataset, *, form: str = "grey_box", options: FitOpt
         run=run,
         draw=draw_run,
     )
+    return hand_over(fit, stop)
+
+
+def _cost(found: _core.systems.FreeRunFit) -> float:
+    return float(found.report.cost)
 
 
 def _fit(

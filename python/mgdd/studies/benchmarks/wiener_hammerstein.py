@@ -10,7 +10,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from mgdd import _core
-from mgdd.errors import DataError, ParameterError
+from mgdd.errors import DataError, ParameterError, hand_over, keep_finished
 from mgdd.io.parameters import ParameterFile, Parameters, entries, wanted
 from mgdd.optimize.fit_options import FitOptions, fit_options
 from mgdd.optimize.fit_run import draw_run, fit_run, quality_of
@@ -321,6 +321,8 @@ def fit_wiener_hammerstein(
         An order or a number outside its range.
     mgdd.errors.DataError
         Fewer than 1000 samples, or no partition that fits the orders.
+    mgdd.errors.Interrupted
+        Ctrl-C; ``partial`` is the best fit so far, to the first `scan_samples` until one partition has won.
 
     References
     ----------
@@ -361,15 +363,24 @@ def fit_wiener_hammerstein(
             f"no partition of {linear_order} poles fits first_order = {first_order} and last_order = {last_order}: "
             "raise the orders"
         )
-    short = []
-    for candidate in candidates:
+    models: list[_core.systems.WienerHammerstein] = []
+    reports: list[_core.optimize.FitReport] = []
+
+    def short(candidate: Candidate) -> _core.optimize.FitReport:
         model, start = _start(candidate, first_order, last_order, n_curve, some_u)
-        report = _fit(model, start, some_u, some_y, 40)
-        short.append((float(report.rmse), model, report))
-    short.sort(key=lambda entry: entry[0])
-    _, model, report = short[0]
-    report = _fit(model, report.values, u, y, chosen.max_iterations, chosen.tolerance)
-    wrapped = FitReport.from_core(report, y[_SKIP:])
+        models.append(model)
+        return _fit(model, start, some_u, some_y, 40)
+
+    stop = keep_finished(short, candidates, reports)
+    ranked = sorted(zip(reports, models, strict=False), key=lambda pair: float(pair[0].rmse))
+    best, model = ranked[0]
+    last = [best]
+    if stop is None:
+        stop = keep_finished(
+            lambda start: _fit(model, start, u, y, chosen.max_iterations, chosen.tolerance), [best.values], last
+        )
+    report, seen = last[-1], y if len(last) > 1 else some_y
+    wrapped = FitReport.from_core(report, seen[_SKIP:])
     fitted = WienerHammersteinModel(
         first_order=first_order,
         last_order=last_order,
@@ -380,8 +391,8 @@ def fit_wiener_hammerstein(
     )
     modelled = fitted.simulate(record)["output_v"].to_numpy()
     run = fit_run(record["time_s"].to_numpy()[_SKIP:], y[_SKIP:], modelled[_SKIP:], _LABELS["output_v"])
-    errors = tuple(entry[0] for entry in short)
-    return WienerHammersteinFit(
+    errors = tuple(float(one.rmse) for one, _ in ranked)
+    fit = WienerHammersteinFit(
         report=wrapped,
         model=fitted,
         kind=fitted.kind,
@@ -394,6 +405,7 @@ def fit_wiener_hammerstein(
         draw=draw_run,
         linear=linear,
     )
+    return hand_over(fit, stop)
 
 
 def _saved(kind: str, model: object, names: tuple[str, ...]) -> ParameterFile:
