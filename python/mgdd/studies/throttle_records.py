@@ -7,7 +7,8 @@ from typing import TYPE_CHECKING, cast
 import numpy as np
 
 from mgdd.identify.throttle.free_run import free_run, quality_of
-from mgdd.results import Model, labelled_dataset
+from mgdd.results.labels import labelled_dataset
+from mgdd.results.model import Model
 from mgdd.signals import amplitude_random_steps, chirp
 from mgdd.throttle import Throttle, simulate
 

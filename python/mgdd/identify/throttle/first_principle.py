@@ -10,7 +10,7 @@ import numpy as np
 from mgdd import _core
 from mgdd.errors import DataError, ParameterError, argument, hand_over, or_partial
 from mgdd.identify.throttle.first_principle_model import GROUP_NAMES, TYPICAL, FirstPrincipleModel
-from mgdd.identify.throttle.first_principle_start import SIDE_DEG, regression_start, rest_angle, spread_starts
+from mgdd.identify.throttle.first_principle_start import SIDE_DEG, group_starts, regression_start, rest_angle
 from mgdd.identify.throttle.free_run import draw_free_run, free_run, quality_of, source_of
 from mgdd.identify.throttle.physical_parameters import physical_parameters
 from mgdd.optimize.fit_options import FitOptions, fit_options
@@ -171,7 +171,7 @@ def fit_throttle(
         lambda: _core.identify.fit_throttle_groups(
             [(step_s, np.clip(duty, -1.0, 1.0), angle, [float(angle[0]), 0.0, 0.0], 0, False)],
             stages=stages,
-            starts=spread_starts(values, free, bounds, n_starts, chosen.seed),
+            starts=group_starts(values, free, bounds, n_starts, chosen.seed),
             closed_deg=closed_deg,
             open_deg=open_deg,
             ramp_deg=0.25,
