@@ -132,7 +132,7 @@ def run_measured_engine_seek(
         "interrupted": interrupted,
         "rows": [_row(case, run) for case, run in zip(cases, runs, strict=True)],
     }
-    return finish(StudyResult(name=_NAME, dataset=dataset, figures=draw(dataset) if figures else {}, summary=summary))
+    return finish(dataset, summary, draw if figures else None)
 
 
 def _surrogate() -> EngineSurrogate:

@@ -9,6 +9,7 @@ from mgdd import plot
 from mgdd.engine import timing_sweep
 from mgdd.identify.engine.profile import WallHeatProfile
 from mgdd.identify.engine.records import CylinderFit
+from mgdd.plot.style import drawn
 
 if TYPE_CHECKING:
     import xarray as xr
@@ -33,9 +34,9 @@ def draw(
         f"Calibration, {best.kind}": _grid([load.overlay for load in best.loads], plot.calibration_overlay),
     }
     for law, profile in profiles.items():
-        figure = _figure(1)
-        plot.wall_heat_profile(profile.dataset, ax=figure.add_subplot())
-        out[f"What the traces say about wall heat: refitted RMSE over the wall-heat scale, {law}"] = figure
+        out[f"What the traces say about wall heat: refitted RMSE over the wall-heat scale, {law}"] = drawn(
+            plot.wall_heat_profile, profile.dataset, size=(13.0, 4.8)
+        )
     sweeps = [timing_sweep(load.cylinder, load.point).assign_attrs(file=load.file) for load in reference.loads]
     scale = reference.model.wall_heat_scale
     caption = f"Efficiency and NOx proxies over timing, {reference.kind}, wall-heat scale held at {scale:g}"

@@ -121,14 +121,7 @@ def run_nox_sensors(
         "correction": [_course_row(own) for own in course],
         "interrupted": interrupted,
     }
-    return finish(
-        StudyResult(
-            name="nox-sensors",
-            dataset=dataset,
-            figures=draw(dataset) if figures else {},
-            summary=to_jsonable(summary),
-        )
-    )
+    return finish(dataset, to_jsonable(summary), draw if figures else None)
 
 
 def _sweep(seeds: int) -> _Sweep:

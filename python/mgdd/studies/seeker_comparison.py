@@ -22,6 +22,7 @@ from mgdd.optimize import (
     tune,
 )
 from mgdd.optimize.tuning import Tuning
+from mgdd.plot.style import drawn
 from mgdd.results import labelled_dataset
 from mgdd.results.labels import to_jsonable
 from mgdd.studies.base import Progress, StudyResult, check_seeds, finish, run_parts
@@ -124,14 +125,7 @@ def run_seeker_comparison(
         "cycles": CYCLES,
         "interrupted": interrupted,
     }
-    return finish(
-        StudyResult(
-            name="seeker-comparison",
-            dataset=dataset,
-            figures=_draw(dataset) if figures else {},
-            summary=to_jsonable(summary),
-        )
-    )
+    return finish(dataset, to_jsonable(summary), _draw if figures else None)
 
 
 def _contenders(best: Optimum) -> list[_Contender]:
@@ -272,7 +266,5 @@ def _draw(dataset: xr.Dataset) -> dict[str, Figure]:
     figure.supxlabel("engine cycle [-]", fontsize="medium")
     out = {"Estimate over cycles: median of the seeds, with the band that holds 80 % of them": figure}
     if "law" in dataset:
-        learning = Figure(figsize=(6.6, 3.8), layout="constrained")
-        plot.learning(dataset, ax=learning.add_subplot())
-        out["Iterative learning of a repeated load step"] = learning
+        out["Iterative learning of a repeated load step"] = drawn(plot.learning, dataset, size=(6.6, 3.8))
     return out

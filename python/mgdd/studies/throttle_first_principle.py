@@ -10,6 +10,7 @@ import numpy as np
 from mgdd import presets
 from mgdd.identify import fit_throttle
 from mgdd.optimize import FitOptions
+from mgdd.plot.style import drawn
 from mgdd.results import labelled_dataset
 from mgdd.results.labels import to_jsonable
 from mgdd.studies.base import Progress, StudyResult, check_seeds, finish, run_parts
@@ -92,14 +93,7 @@ def run_throttle_first_principle(
         "resolution_deg": LSB_DEG,
         "interrupted": interrupted,
     }
-    return finish(
-        StudyResult(
-            name="throttle-first-principle",
-            dataset=dataset,
-            figures=_draw(dataset) if figures else {},
-            summary=to_jsonable(summary),
-        )
-    )
+    return finish(dataset, to_jsonable(summary), _draw if figures else None)
 
 
 def _cases() -> dict[str, Throttle]:
@@ -156,13 +150,9 @@ def _dataset(runs: list[xr.Dataset], names: list[str]) -> xr.Dataset:
 
 
 def _draw(dataset: xr.Dataset) -> dict[str, Figure]:
-    from matplotlib.figure import Figure
-
     from mgdd import plot
 
-    out = {}
-    for name in dataset["case"].to_numpy():
-        figure = Figure(figsize=(7.2, 4.8), layout="constrained")
-        plot.free_run(dataset.sel(case=name), ax=figure.add_subplot())
-        out[f"Free run over random steps of 150 ms, {name}"] = figure
-    return out
+    return {
+        f"Free run over random steps of 150 ms, {name}": drawn(plot.free_run, dataset.sel(case=name), size=(7.2, 4.8))
+        for name in dataset["case"].to_numpy()
+    }

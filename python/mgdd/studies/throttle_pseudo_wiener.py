@@ -109,10 +109,7 @@ def run_throttle_pseudo_wiener(
         "noise_deg": NOISE_DEG,
         "interrupted": interrupted,
     }
-    drawn = _draw(dataset) if figures else {}
-    return finish(
-        StudyResult(name="throttle-pseudo-wiener", dataset=dataset, figures=drawn, summary=to_jsonable(summary))
-    )
+    return finish(dataset, to_jsonable(summary), _draw if figures else None)
 
 
 def study_throttle(plant: str) -> Throttle:

@@ -12,6 +12,7 @@ import numpy as np
 from mgdd.engine import Performance
 from mgdd.loop import EngineBench, LoopCriteria, find_steady_optimum, steady_map
 from mgdd.optimize import ComponentLag, ExtremumSeeking, Limit, Optimum
+from mgdd.plot.style import drawn
 from mgdd.results import labelled_dataset
 from mgdd.results.labels import to_jsonable
 from mgdd.studies.base import Progress, StudyResult, check_seeds, finish, run_parts
@@ -147,14 +148,7 @@ def run_timing_tests(
         "cycles": CYCLES,
         "interrupted": interrupted,
     }
-    return finish(
-        StudyResult(
-            name="timing-tests",
-            dataset=dataset,
-            figures=_draw(done, limited) if figures else {},
-            summary=to_jsonable(summary),
-        )
-    )
+    return finish(dataset, to_jsonable(summary), (lambda _: _draw(done, limited)) if figures else None)
 
 
 def _run(test: _Test, seeds: int, *, limited: bool = False) -> _Outcome:
@@ -225,15 +219,13 @@ def _dataset(done: Sequence[_Outcome]) -> xr.Dataset:
 
 
 def _draw(done: Sequence[_Outcome], limited: Sequence[_Outcome]) -> dict[str, Figure]:
-    from matplotlib.figure import Figure
-
     from mgdd import plot
 
     out = {}
     for outcome, caps in [*((o, None) for o in done), *((o, {"p_max_bar": P_MAX_BAR}) for o in limited)]:
-        figure = Figure(figsize=(7.4, 8.0 if caps else 6.4), layout="constrained")
-        run = outcome.run.isel(cycle=slice(_SHOWN))
-        plot.seeking(run, optimum_cad=outcome.row["optimum_cad"], limit_values=caps, ax=figure.add_subplot())
+        run, best = outcome.run.isel(cycle=slice(_SHOWN)), outcome.row["optimum_cad"]
         under = f", maximum pressure at most {P_MAX_BAR:g} bar" if caps else ""
-        out[f"Test {outcome.row['test']}{under} (one seed)"] = figure
+        out[f"Test {outcome.row['test']}{under} (one seed)"] = drawn(
+            plot.seeking, run, size=(7.4, 8.0 if caps else 6.4), optimum_cad=best, limit_values=caps
+        )
     return out

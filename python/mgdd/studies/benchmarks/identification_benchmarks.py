@@ -131,7 +131,7 @@ def run_identification_benchmarks(
         "interrupted": interrupted,
         "rows": [case.row for case in cases],
     }
-    return finish(StudyResult(name=_NAME, dataset=dataset, figures=draw(dataset) if figures else {}, summary=summary))
+    return finish(dataset, summary, draw if figures else None)
 
 
 def _row(name: str, model: str, train: float, test: float, metric: str, unit: str, **more: Any) -> dict[str, Any]:
