@@ -175,6 +175,12 @@ def test_ctrl_c_leaves_the_fit_so_far(monkeypatch: pytest.MonkeyPatch, name: str
 
 
 @pytest.mark.parametrize("name", FITS)
+def test_a_model_reads_what_its_fit_wrote(name: str) -> None:
+    fit = FITS[name][1]()
+    assert type(fit.model).from_toml(fit.to_toml()).to_toml() == fit.model.to_toml()
+
+
+@pytest.mark.parametrize("name", FITS)
 def test_ctrl_c_before_anything_is_found_leaves_nothing(monkeypatch: pytest.MonkeyPatch, name: str) -> None:
     system, call, _ = FITS[name]
     press_ctrl_c(monkeypatch, system, 1, within=False)

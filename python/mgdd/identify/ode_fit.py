@@ -9,13 +9,12 @@ import numpy as np
 
 from mgdd import _core
 from mgdd.errors import ParameterError, ShapeError, hand_over, keep_finished
-from mgdd.identify.ode_model import OdeModel, first_state, run_in_lockstep
+from mgdd.identify.ode_model import OdeModel, output_or_first_state, run_in_lockstep
 from mgdd.identify.starts import spread_starts
 from mgdd.optimize import least_squares
 from mgdd.optimize.fit_options import FitOptions, fit_options
-from mgdd.optimize.fit_run import draw_run, fit_run, quality_of
+from mgdd.optimize.fit_run import fit_of, fit_run, quality_of
 from mgdd.results import Fit, FitReport
-from mgdd.results.fit import n_best_of
 from mgdd.signals.even_grid import even_step
 from mgdd.signals.model import columns_of
 
@@ -163,7 +162,7 @@ def fit_ode(
     lower = np.array([low for low, _ in limits], dtype=np.float64)
     upper = np.array([high for _, high in limits], dtype=np.float64)
     logs = [name in set(log_scaled) for name in unknowns]
-    read = output if output is not None else first_state
+    read = output_or_first_state(output)
     n = len(unknowns)
 
     def stack(x: NDArray[np.float64]) -> tuple[NDArray[np.float64], NDArray[np.float64], NDArray[np.float64]]:
@@ -220,23 +219,11 @@ def fit_ode(
         input_names=tuple(input_names),
         output_name=output_name,
     )
-    errors = tuple(sorted(report.rmse if np.isfinite(report.rmse) else np.inf for report in reports))
+    errors = [report.rmse if np.isfinite(report.rmse) else np.inf for report in reports]
     run, quality = None, None
     if np.isfinite(best.rmse):
         simulated = model.simulate(record)[output_name].to_numpy()
         run = fit_run(time, measured, simulated, model._label(output_name))
         quality = quality_of(run.isel(time_s=slice(skip, None)))
-    fit = Fit(
-        report=best,
-        model=model,
-        kind=model.kind,
-        train=quality,
-        findings=best.findings,
-        unidentifiable=best.unidentifiable,
-        start_rmse=errors,
-        n_best=n_best_of(errors),
-        start_reports=tuple(reports),
-        run=run,
-        draw=draw_run,
-    )
+    fit = fit_of(best, model, run, errors, train=quality, start_reports=tuple(reports))
     return hand_over(fit, stop)

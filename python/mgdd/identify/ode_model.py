@@ -25,7 +25,7 @@ if TYPE_CHECKING:
     Derivative = Callable[[float, NDArray[Any], NDArray[Any], NDArray[Any]], ArrayLike]
     Output = Callable[[NDArray[Any], NDArray[Any], NDArray[Any]], ArrayLike]
 
-__all__ = ["OdeModel", "first_state", "run_in_lockstep"]
+__all__ = ["OdeModel", "output_or_first_state", "run_in_lockstep"]
 
 _FUNCTIONS = ("derivative", "output")
 _STATE = "unit of the state"
@@ -66,6 +66,8 @@ class OdeModel(SampledModel):
     [0.0, 0.3625, 0.6594]
     """
 
+    kind = "ode"
+
     derivative: Derivative
     output: Output
     parameters: Mapping[str, float]
@@ -77,11 +79,6 @@ class OdeModel(SampledModel):
     def __post_init__(self) -> None:
         object.__setattr__(self, "parameters", MappingProxyType(dict(self.parameters)))
         object.__setattr__(self, "state_names", tuple(f"state_{i}" for i in range(len(self.initial_state))))
-
-    @property
-    def kind(self) -> str:
-        """``ode``."""
-        return "ode"
 
     def _rest(self) -> list[float]:
         return list(self.initial_state)
@@ -143,7 +140,7 @@ class OdeModel(SampledModel):
         """
         file = ParameterFile.from_toml(text, origin=origin)
         file.expect(kinds=("ode",), tables=("parameters", "settings", "functions"))
-        read: Output = first_state if output is None else output
+        read = output_or_first_state(output)
         functions = {"derivative": derivative, "output": read}
         for name, written in file.values("functions", wanted(_FUNCTIONS, form="text")).items():
             if _name_of(functions[name]) != written:
@@ -174,8 +171,12 @@ def _name_of(function: Any) -> str:
     return str(getattr(function, "__qualname__", type(function).__qualname__))
 
 
-def first_state(x: NDArray[Any], u: NDArray[Any], p: NDArray[Any]) -> NDArray[Any]:
-    """Give the output of an equation that has none of its own."""
+def output_or_first_state(output: Output | None) -> Output:
+    """Give the output of an equation; the first state where it has none of its own."""
+    return _first_state if output is None else output
+
+
+def _first_state(x: NDArray[Any], u: NDArray[Any], p: NDArray[Any]) -> NDArray[Any]:
     del u, p
     first: NDArray[Any] = x[0]
     return first

@@ -11,12 +11,12 @@ import numpy as np
 
 from mgdd import _core
 from mgdd.errors import ParameterError, hand_over, keep_finished
-from mgdd.io.parameters import ParameterFile, Parameters, entries, wanted
+from mgdd.io.model_parameters import ModelParameters
+from mgdd.io.parameters import wanted
 from mgdd.optimize.fit_options import FitOptions, fit_options
-from mgdd.optimize.fit_run import draw_run, fit_run, quality_of
+from mgdd.optimize.fit_run import fit_of, fit_run
 from mgdd.results import Fit, FitReport, Label
 from mgdd.results.describe import described
-from mgdd.results.fit import n_best_of
 from mgdd.signals.even_grid import even_step
 from mgdd.signals.model import RunInputs, SampledModel
 
@@ -49,7 +49,7 @@ _FILTER_ORDER, _DECIMATION = 4, 10
 
 @described
 @dataclass(frozen=True, kw_only=True)
-class DriveModel(SampledModel, Parameters):
+class DriveModel(SampledModel, ModelParameters):
     """A slide with mass, friction and offset, driven by a voltage.
 
     Parameters
@@ -75,6 +75,9 @@ class DriveModel(SampledModel, Parameters):
     [0.0, 0.0, 0.0]
     """
 
+    kind = "drive"
+    parameter_names = tuple(_core.systems.DriveAxis.parameter_names)
+    settings = MappingProxyType(wanted(("force_n_per_v",)))
     input_names = ("drive_v",)
     output_name = observed_state = "position_m"
     state_names = ("position_m", "speed_m_per_s")
@@ -82,11 +85,6 @@ class DriveModel(SampledModel, Parameters):
 
     parameters: Mapping[str, float]
     force_n_per_v: float
-
-    @property
-    def kind(self) -> str:
-        """``drive``."""
-        return "drive"
 
     def _rest(self) -> list[float]:
         return [0.0, 0.0]
@@ -101,20 +99,8 @@ class DriveModel(SampledModel, Parameters):
             )
         )
 
-    def to_parameters(self) -> ParameterFile:
-        """Give all parameters, as `to_toml` writes them."""
-        values = dict(zip(_core.systems.DriveAxis.parameter_names, _row(self.parameters), strict=True))
-        tables = {"parameters": entries(values), "settings": entries({"force_n_per_v": float(self.force_n_per_v)})}
-        return ParameterFile(kind="drive", tables=tables)
-
-    @classmethod
-    def from_parameters(cls, file: ParameterFile) -> DriveModel:
-        """Make the slide of a file that `to_toml` wrote."""
-        file.expect(kinds=("drive",), tables=("parameters", "settings"))
-        return cls(
-            parameters=file.values("parameters", wanted(_core.systems.DriveAxis.parameter_names)),
-            force_n_per_v=file.values("settings", wanted(("force_n_per_v",)))["force_n_per_v"],
-        )
+    def _written(self) -> Mapping[str, float]:
+        return dict(zip(self.parameter_names, _row(self.parameters), strict=True))
 
 
 def drive_inverse_dynamics(
@@ -316,9 +302,8 @@ def fit_drive(
         points(),
         found,
     )
-    found.sort(key=_cost)
-    best = found[0]
-    errors = tuple(float(np.sqrt(2.0 * _cost(one) / measured.size)) for one in found)
+    best = min(found, key=_cost)
+    errors = [float(np.sqrt(2.0 * _cost(one) / measured.size)) for one in found]
     model = DriveModel(
         parameters=dict(zip(names, best.parameters, strict=True)), force_n_per_v=float(record["force_n_per_v"])
     )
@@ -326,19 +311,7 @@ def fit_drive(
     run = fit_run(
         record["time_s"].to_numpy()[_WINDOW:], measured, drive_free_run(model, record), model.labels["position_m"]
     )
-    fit = Fit(
-        report=report,
-        model=model,
-        kind=model.kind,
-        train=quality_of(run),
-        findings=report.findings,
-        unidentifiable=report.unidentifiable,
-        start_rmse=errors,
-        n_best=n_best_of(errors),
-        run=run,
-        draw=draw_run,
-    )
-    return hand_over(fit, stop)
+    return hand_over(fit_of(report, model, run, errors), stop)
 
 
 def _cost(found: _core.systems.FreeRunFit) -> float:

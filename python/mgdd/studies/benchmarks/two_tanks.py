@@ -11,12 +11,12 @@ import numpy as np
 
 from mgdd import _core
 from mgdd.errors import DataError, ParameterError, hand_over, keep_finished
-from mgdd.io.parameters import ParameterFile, Parameters, entries, wanted
+from mgdd.io.model_parameters import ModelParameters
+from mgdd.io.parameters import wanted
 from mgdd.optimize.fit_options import FitOptions, fit_options
-from mgdd.optimize.fit_run import draw_run, fit_run, quality_of
+from mgdd.optimize.fit_run import fit_of, fit_run
 from mgdd.results import Fit, FitReport, Label
 from mgdd.results.describe import described
-from mgdd.results.fit import n_best_of
 from mgdd.signals.even_grid import even_step
 from mgdd.signals.model import RunInputs, SampledModel
 
@@ -63,7 +63,7 @@ _FORMS: dict[str, tuple[dict[str, float], tuple[str, ...]]] = {
 
 @described
 @dataclass(frozen=True, kw_only=True)
-class TwoTanksModel(SampledModel, Parameters):
+class TwoTanksModel(SampledModel, ModelParameters):
     """Two tanks in a row: a pump fills the upper one, its outlet and part of its overflow the lower one.
 
     Parameters
@@ -92,6 +92,9 @@ class TwoTanksModel(SampledModel, Parameters):
     4.0
     """
 
+    kind = "two_tanks"
+    parameter_names = tuple(_core.systems.TwoTanks.parameter_names)
+    settings = MappingProxyType(wanted(("lower_brim_v",)))
     input_names = ("pump_v",)
     output_name = "level_v"
     state_names = ("upper_level_v", "lower_level_v")
@@ -100,11 +103,6 @@ class TwoTanksModel(SampledModel, Parameters):
 
     parameters: Mapping[str, float]
     lower_brim_v: float = 10.0
-
-    @property
-    def kind(self) -> str:
-        """``two_tanks``."""
-        return "two_tanks"
 
     def _rest(self) -> list[float]:
         return [0.0, 0.0]
@@ -115,20 +113,8 @@ class TwoTanksModel(SampledModel, Parameters):
         model = _core.systems.TwoTanks(lower_brim_v=self.lower_brim_v)
         return np.asarray(model.free_run(parameters=_row(self.parameters), start=start, input=pump, dt_s=run.step_s))
 
-    def to_parameters(self) -> ParameterFile:
-        """Give all parameters, as `to_toml` writes them."""
-        values = dict(zip(_core.systems.TwoTanks.parameter_names, _row(self.parameters), strict=True))
-        tables = {"parameters": entries(values), "settings": entries({"lower_brim_v": float(self.lower_brim_v)})}
-        return ParameterFile(kind="two_tanks", tables=tables)
-
-    @classmethod
-    def from_parameters(cls, file: ParameterFile) -> TwoTanksModel:
-        """Make the tanks of a file that `to_toml` wrote."""
-        file.expect(kinds=("two_tanks",), tables=("parameters", "settings"))
-        return cls(
-            parameters=file.values("parameters", wanted(_core.systems.TwoTanks.parameter_names)),
-            lower_brim_v=file.values("settings", wanted(("lower_brim_v",)))["lower_brim_v"],
-        )
+    def _written(self) -> Mapping[str, float]:
+        return dict(zip(self.parameter_names, _row(self.parameters), strict=True))
 
     def estimate_state(self, record: xr.Dataset, *, window: int = 50) -> dict[str, float]:
         """Estimate the two levels at the first sample from the first samples of a record, parameters held.
@@ -235,20 +221,7 @@ def fit_two_tanks(record: xr.Dataset, *, form: str = "grey_box", options: FitOpt
     model = TwoTanksModel(parameters=dict(zip(names, best.parameters, strict=True)))
     modelled = model.simulate(record, initial_state=[float(x) for x in best.starts[0][:2]])["level_v"]
     run = fit_run(record["time_s"].to_numpy(), record["level_v"].to_numpy(), modelled, model.labels["level_v"])
-    errors = tuple(sorted(float(one.report.rmse) for one in found))
-    fit = Fit(
-        report=report,
-        model=model,
-        kind=model.kind,
-        train=quality_of(run),
-        findings=report.findings,
-        unidentifiable=report.unidentifiable,
-        start_rmse=errors,
-        n_best=n_best_of(errors),
-        run=run,
-        draw=draw_run,
-    )
-    return hand_over(fit, stop)
+    return hand_over(fit_of(report, model, run, (float(one.report.rmse) for one in found)), stop)
 
 
 def _cost(found: _core.systems.FreeRunFit) -> float:

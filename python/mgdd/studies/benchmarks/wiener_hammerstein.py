@@ -11,12 +11,11 @@ import numpy as np
 
 from mgdd import _core
 from mgdd.errors import DataError, ParameterError, hand_over, keep_finished
-from mgdd.io.parameters import ParameterFile, Parameters, entries, wanted
+from mgdd.io.parameters import FIT_NOTES, ParameterFile, Parameters, entries, wanted
 from mgdd.optimize.fit_options import FitOptions, fit_options
-from mgdd.optimize.fit_run import draw_run, fit_run, quality_of
+from mgdd.optimize.fit_run import fit_of, fit_run
 from mgdd.results import Fit, FitReport, Label
 from mgdd.results.describe import described
-from mgdd.results.fit import n_best_of
 from mgdd.signals.even_grid import even_step
 from mgdd.signals.model import RunInputs, SampledModel
 
@@ -65,6 +64,7 @@ class LinearApproximation(SampledModel, Parameters):
     [1.5, 1.75, 1.875]
     """
 
+    kind = "linear_filter"
     input_names = ("input_v",)
     output_name = "output_v"
     labels = _LABELS
@@ -74,11 +74,6 @@ class LinearApproximation(SampledModel, Parameters):
     input_mean: float
     output_mean: float
     rmse: float
-
-    @property
-    def kind(self) -> str:
-        """``linear_filter``."""
-        return "linear_filter"
 
     @property
     def parameters(self) -> dict[str, float]:
@@ -95,13 +90,13 @@ class LinearApproximation(SampledModel, Parameters):
 
     def to_parameters(self) -> ParameterFile:
         """Give filter and means, as `to_toml` writes them."""
-        return _saved("linear_filter", self, ("numerator", "denominator", "input_mean", "output_mean", "rmse"))
+        return _saved(self, ("numerator", "denominator", "input_mean", "output_mean", "rmse"))
 
     @classmethod
     def from_parameters(cls, file: ParameterFile) -> LinearApproximation:
-        """Make the filter of a file that `to_toml` wrote."""
+        """Make the filter of a file that `to_toml` or a fit wrote."""
         numbers, vectors = ("input_mean", "output_mean", "rmse"), ("numerator", "denominator")
-        return cls(**_read("linear_filter", file, numbers=numbers, vectors=vectors))
+        return cls(**_read(cls.kind, file, numbers=numbers, vectors=vectors))
 
 
 @described
@@ -130,6 +125,7 @@ class WienerHammersteinModel(SampledModel, Parameters):
     [0.25, 0.5, 0.6875]
     """
 
+    kind = "wiener_hammerstein"
     input_names = ("input_v",)
     output_name = "output_v"
     labels = _LABELS
@@ -140,11 +136,6 @@ class WienerHammersteinModel(SampledModel, Parameters):
     lower: float
     upper: float
     values: Vector
-
-    @property
-    def kind(self) -> str:
-        """``wiener_hammerstein``."""
-        return "wiener_hammerstein"
 
     @property
     def parameters(self) -> dict[str, float]:
@@ -159,21 +150,13 @@ class WienerHammersteinModel(SampledModel, Parameters):
 
     def to_parameters(self) -> ParameterFile:
         """Give orders, grid and coefficients, as `to_toml` writes them."""
-        names = ("first_order", "last_order", "n_curve", "lower", "upper", "values")
-        return _saved("wiener_hammerstein", self, names)
+        return _saved(self, ("first_order", "last_order", "n_curve", "lower", "upper", "values"))
 
     @classmethod
     def from_parameters(cls, file: ParameterFile) -> WienerHammersteinModel:
-        """Make the model of a file that `to_toml` wrote."""
-        return cls(
-            **_read(
-                "wiener_hammerstein",
-                file,
-                numbers=("lower", "upper"),
-                vectors=("values",),
-                integers=("first_order", "last_order", "n_curve"),
-            )
-        )
+        """Make the model of a file that `to_toml` or a fit wrote."""
+        orders = ("first_order", "last_order", "n_curve")
+        return cls(**_read(cls.kind, file, numbers=("lower", "upper"), vectors=("values",), integers=orders))
 
     def curve(self, signal: ArrayLike) -> Vector:
         """Evaluate the static curve.
@@ -391,25 +374,12 @@ def fit_wiener_hammerstein(
     )
     modelled = fitted.simulate(record)["output_v"].to_numpy()
     run = fit_run(record["time_s"].to_numpy()[_SKIP:], y[_SKIP:], modelled[_SKIP:], _LABELS["output_v"])
-    errors = tuple(float(one.rmse) for one, _ in ranked)
-    fit = WienerHammersteinFit(
-        report=wrapped,
-        model=fitted,
-        kind=fitted.kind,
-        train=quality_of(run),
-        findings=wrapped.findings,
-        unidentifiable=wrapped.unidentifiable,
-        start_rmse=errors,
-        n_best=n_best_of(errors),
-        run=run,
-        draw=draw_run,
-        linear=linear,
-    )
-    return hand_over(fit, stop)
+    fit = fit_of(wrapped, fitted, run, (float(one.rmse) for one in reports))
+    return hand_over(WienerHammersteinFit(**vars(fit), linear=linear), stop)
 
 
-def _saved(kind: str, model: object, names: tuple[str, ...]) -> ParameterFile:
-    return ParameterFile(kind=kind, tables={"parameters": entries({n: getattr(model, n) for n in names}, _UNITS)})
+def _saved(model: LinearApproximation | WienerHammersteinModel, names: tuple[str, ...]) -> ParameterFile:
+    return ParameterFile(kind=model.kind, tables={"parameters": entries({n: getattr(model, n) for n in names}, _UNITS)})
 
 
 def _read(
@@ -420,7 +390,7 @@ def _read(
     vectors: tuple[str, ...],
     integers: tuple[str, ...] = (),
 ) -> dict[str, Any]:
-    file.expect(kinds=(kind,), tables=("parameters",))
+    file.expect(kinds=(kind,), tables=("parameters", "fit?"), notes=FIT_NOTES)
     expected = {**wanted(numbers, _UNITS), **wanted(vectors, form="numbers"), **wanted(integers, form="integer")}
     values = file.values("parameters", expected)
     return values | {name: np.array(values[name], dtype=np.float64) for name in vectors}
