@@ -12,6 +12,7 @@ Examples
 
 from __future__ import annotations
 
+import difflib
 from collections.abc import Callable, Iterable, Iterator
 from contextlib import contextmanager
 from contextvars import ContextVar
@@ -218,6 +219,12 @@ def hand_over(result: Result, stop: Interrupted | None) -> Result:
     if stop is not None:
         raise Interrupted(str(stop), result)
     return result
+
+
+def did_you_mean(name: str, known: Iterable[str]) -> str:
+    """Ask for the nearest of the known names, or say nothing where none is near."""
+    close = difflib.get_close_matches(name, list(known), 1)
+    return f"did you mean {close[0]!r}?" if close else ""
 
 
 _written: ContextVar[Callable[[str, str | None], str] | None] = ContextVar("written", default=None)

@@ -13,6 +13,7 @@ from mgdd.cli.options import (
     add_command,
     add_engine,
     add_files,
+    add_group,
     add_scheme,
     engine_of,
     number_pairs,
@@ -31,14 +32,11 @@ _DEFAULT_SOC_CAD = -6.0
 
 def add(commands: Any) -> None:
     """Add the group and its commands."""
-    group = commands.add_parser(
-        "engine",
-        help="one cycle: simulate, analyze, calibrate, optimum; many: seek",
-        epilog="example:\n  mgdd engine simulate --preset puma_single --soc-cad -6 --json",
-        formatter_class=argparse.RawDescriptionHelpFormatter,
-    )
-    group.set_defaults(parser=group)
-    verbs = group.add_subparsers(title="commands", metavar="COMMAND")
+    verbs = add_group(
+        commands, "engine",
+        help_text="one cycle: simulate, analyze, calibrate, optimum; many: seek",
+        example="mgdd engine simulate --preset puma_single --soc-cad -6 --json",
+    )  # fmt: skip
     _add_simulate(verbs)
     _add_analyze(verbs)
     _add_calibrate(verbs)
@@ -68,7 +66,7 @@ def _add_simulate(verbs: Any) -> None:
 
 
 def _simulate(args: argparse.Namespace) -> None:
-    check_output(args, csv=True)
+    check_output(args, ".json", ".csv")
     cylinder, point, preset = engine_of(args)
     soc = _start_of_combustion(args, cylinder, point)
     cycle = simulate(cylinder, point, soc_cad=soc, step_cad=args.step_cad, integrator=args.integrator)
@@ -127,7 +125,7 @@ def _add_analyze(verbs: Any) -> None:
 
 
 def _analyze(args: argparse.Namespace) -> None:
-    check_output(args, csv=True)
+    check_output(args, ".json", ".csv")
     cylinder, point, preset = engine_of(args)
     _check_pegging(args)
     (trace,) = traces_of(args)
@@ -216,7 +214,7 @@ def _bounds(args: argparse.Namespace) -> tuple[float, float] | None:
 
 
 def _optimum(args: argparse.Namespace) -> None:
-    check_output(args, csv=not args.files)
+    check_output(args, *((".json",) if args.files else (".json", ".csv")))
     cylinder, point, preset = engine_of(args)
     limits = number_pairs(args.limit, "--limit")
     if args.files:

@@ -9,8 +9,8 @@ from typing import TYPE_CHECKING, Any
 
 from mgdd import identify
 from mgdd.cli.options import add_command
-from mgdd.cli.output import check_figure, emit
-from mgdd.cli.throttle_files import add_log_options, check_ending, log_of, wrote
+from mgdd.cli.output import check_figure, check_output, emit, save_figure, wrote
+from mgdd.cli.throttle_files import add_log_options, log_of
 from mgdd.errors import ConvergenceError
 from mgdd.identify.throttle.fits import KINDS
 from mgdd.optimize import FitOptions
@@ -75,7 +75,7 @@ def _counts(text: str) -> list[int]:
 
 
 def _identify(args: argparse.Namespace) -> None:
-    check_ending(args.output, (".toml", ".json"))
+    check_output(args, ".toml", ".json")
     check_figure(args.figure)
     log = log_of(args, args.file)
     test = None if args.test is None else log_of(args, args.test)
@@ -116,7 +116,7 @@ def _payload(fit: Fit) -> dict[str, Any]:
 
 
 def _validate(args: argparse.Namespace) -> None:
-    check_ending(args.output, (".json",))
+    check_output(args)
     check_figure(args.figure)
     model = identify.load_throttle_model(args.fit)
     validation = identify.validate_throttle(model, log_of(args, args.file))
@@ -138,5 +138,4 @@ def _draw(validation: ThrottleValidation, file: str, correlation: xr.Dataset | N
     plot.residual_correlation(validation.tests.correlations, ax=axes[2])
     if correlation is not None:
         plot.correlation_matrix(correlation, ax=axes[3])
-    figure.savefig(file, dpi=150)
-    wrote(file)
+    save_figure(figure, file)

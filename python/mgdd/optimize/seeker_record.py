@@ -12,6 +12,7 @@ import numpy as np
 
 from mgdd import _core
 from mgdd.errors import DataError, Error
+from mgdd.io.existing_file import existing_file
 from mgdd.results import labelled_dataset
 from mgdd.results.describe import as_html, rows_of
 
@@ -143,7 +144,7 @@ class SeekerRecord:
 
 def read_seeker_file(path: str | os.PathLike[str]) -> tuple[str, dict[str, Any], dict[str, Any]]:
     """Read kind, settings and state of a file that `SeekerRecord.save` wrote; DataError if it is none."""
-    file = Path(path)
+    file = existing_file(path)
     try:
         content = json.loads(file.read_text(encoding="utf-8"), object_hook=_decode)
         found = content["format"]
