@@ -53,10 +53,7 @@ def _add_simulate(verbs: Any) -> None:
     )  # fmt: skip
     timing = parser.add_mutually_exclusive_group()
     timing.add_argument(
-        "--soc-cad",
-        type=float,
-        metavar="X",
-        help=f"start of combustion [°CA aTDC] (default: {_DEFAULT_SOC_CAD:g})",
+        "--soc-cad", type=float, metavar="X", help=f"start of combustion [°CA aTDC] (default: {_DEFAULT_SOC_CAD:g})"
     )
     timing.add_argument(
         "--soi-cad", type=float, metavar="X", help="start of injection [°CA aTDC]; the delay model adds on"
@@ -196,11 +193,7 @@ def _add_optimum(verbs: Any) -> None:
         help="default: efficiency_gross; with files imep_closed_bar, the work that a closed-valve trace carries",
     )  # fmt: skip
     parser.add_argument(
-        "--limit",
-        action="append",
-        default=[],
-        metavar="NAME=X",
-        help="upper limit on an indicator, repeatable",
+        "--limit", action="append", default=[], metavar="NAME=X", help="upper limit on an indicator, repeatable"
     )
     parser.add_argument(
         "--bounds-cad", type=float, nargs=2, metavar=("LOW", "HIGH"), help="searched range of SOC (default: -30 10)"
@@ -222,12 +215,7 @@ def _optimum(args: argparse.Namespace) -> None:
         return
     scheme = {"step_cad": args.step_cad or 1.0, "integrator": args.integrator}
     best = find_optimum(
-        cylinder,
-        point,
-        args.objective or "efficiency_gross",
-        limits=limits,
-        bounds_cad=_bounds(args),
-        **scheme,
+        cylinder, point, args.objective or "efficiency_gross", limits=limits, bounds_cad=_bounds(args), **scheme
     )
     now = simulate(cylinder, point, soc_cad=best["soc_cad"], **scheme)
     payload: dict[str, Any] = {name: best[name] for name in ("soc_cad", "ca50_cad", "efficiency_gross")}

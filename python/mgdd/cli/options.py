@@ -147,15 +147,10 @@ def add_files(parser: argparse.ArgumentParser, *, nargs: int | str) -> None:
     group.add_argument("--decimal", choices=(".", ","), default=".", help="decimal mark (default: .)")
     group.add_argument("--delimiter", metavar="CHAR", help="column separator (default: found in the file)")
     group.add_argument(
-        "--firing-tdc-deg",
-        type=float,
-        metavar="X",
-        help="angle of firing TDC in files that count from elsewhere",
+        "--firing-tdc-deg", type=float, metavar="X", help="angle of firing TDC in files that count from elsewhere"
     )
     group.add_argument(
-        "--conditions",
-        metavar="FILE.csv",
-        help="columns file,speed_rpm,trapped_mass_g,soi_cad: one row per trace",
+        "--conditions", metavar="FILE.csv", help="columns file,speed_rpm,trapped_mass_g,soi_cad: one row per trace"
     )
 
 

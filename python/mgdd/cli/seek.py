@@ -213,11 +213,7 @@ def _thresholds(best: Optimum, limits: Mapping[str, float]) -> dict[str, float]:
 
 
 def _payload(
-    args: argparse.Namespace,
-    preset: str,
-    run: LoopRun,
-    best: Optimum,
-    limits: Mapping[str, float],
+    args: argparse.Namespace, preset: str, run: LoopRun, best: Optimum, limits: Mapping[str, float]
 ) -> dict[str, Any]:
     summary = run.summary
     out: dict[str, Any] = {

@@ -142,12 +142,7 @@ def wall_heat_profile(profile: xr.Dataset, *, ax: Axes | None = None) -> Axes:
     fine = np.linspace(float(scale.min()), float(scale.max()), 2001)
     inside = fine[np.interp(fine, scale, together) <= 1.1 * together.min()]
     span = ax.axvspan(
-        float(inside.min()),
-        float(inside.max()),
-        color=GREY,
-        alpha=0.2,
-        linewidth=0,
-        label="within 10 % of the best",
+        float(inside.min()), float(inside.max()), color=GREY, alpha=0.2, linewidth=0, label="within 10 % of the best"
     )
     ax.set_ylim(bottom=0.0)
     return finished(ax, profile, "wall_heat_scale", "rmse_percent", [*lines, span], grid=False)

@@ -7,19 +7,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from mgdd.errors import DataError
-from mgdd.plot.style import (
-    BLACK,
-    BLUE,
-    GREY,
-    LINE_STYLES,
-    ORANGE,
-    axis_label,
-    divide,
-    legend,
-    minus,
-    new_axes,
-    require,
-)
+from mgdd.plot.style import BLACK, BLUE, GREY, LINE_STYLES, ORANGE, axis_label, divide, legend, minus, new_axes, require
 
 if TYPE_CHECKING:
     import xarray as xr

@@ -60,10 +60,7 @@ def holding_duty(log: xr.Dataset, *, limp_home_deg: float | None = None, ax: Axe
     duty, angle = log["duty"].to_numpy(), log["angle_deg"].to_numpy()
     rising = _rising(duty)
     lines: list[Line2D] = []
-    for chosen, dash, color, label in (
-        (rising, "-", BLACK, "duty rising"),
-        (~rising, "--", BLUE, "duty falling"),
-    ):
+    for chosen, dash, color, label in ((rising, "-", BLACK, "duty rising"), (~rising, "--", BLUE, "duty falling")):
         lines += ax.plot(
             _only(angle, chosen), _only(duty, chosen), linestyle=dash, color=color, linewidth=1.3, label=label
         )

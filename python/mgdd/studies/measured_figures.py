@@ -69,11 +69,7 @@ def _ranges(timing: Sequence[Mapping[str, Any]]) -> Figure:
     places = range(len(timing))
     for ax, names, label in (
         (left, ("free_soc_cad", "fitted_soc_cad"), "start of combustion [°CA aTDC]"),
-        (
-            right,
-            ("free_gain_percent", "gain_percent"),
-            "gain in closed-cycle efficiency over the measured timing [%]",
-        ),
+        (right, ("free_gain_percent", "gain_percent"), "gain in closed-cycle efficiency over the measured timing [%]"),
     ):
         first, second = names
         ax.hlines(places, [r[first][0] for r in timing], [r[first][1] for r in timing], lw=6, color="0.35")

@@ -53,11 +53,7 @@ class _Sweep:
 
 
 def run_nox_sensors(
-    *,
-    seeds: int = 20,
-    quick: bool = False,
-    figures: bool = True,
-    progress: Progress | None = None,
+    *, seeds: int = 20, quick: bool = False, figures: bool = True, progress: Progress | None = None
 ) -> StudyResult:
     """Compare a NOx analyser, a fast sensor and soft sensors, steady and in transients.
 

@@ -61,12 +61,7 @@ def available_studies() -> dict[str, str]:
 
 
 def run_study(
-    name: str,
-    *,
-    seeds: int | None = None,
-    quick: bool = False,
-    figures: bool = True,
-    progress: Progress | None = None,
+    name: str, *, seeds: int | None = None, quick: bool = False, figures: bool = True, progress: Progress | None = None
 ) -> StudyResult:
     """Run a study by its name.
 

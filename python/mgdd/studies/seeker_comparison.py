@@ -55,11 +55,7 @@ class _Outcome:
 
 
 def run_seeker_comparison(
-    *,
-    seeds: int = 50,
-    quick: bool = False,
-    figures: bool = True,
-    progress: Progress | None = None,
+    *, seeds: int = 50, quick: bool = False, figures: bool = True, progress: Progress | None = None
 ) -> StudyResult:
     """Compare every seeker on the same engine, noise, start and budget of 2000 cycles.
 
@@ -166,9 +162,7 @@ def _contenders(best: Optimum) -> list[_Contender]:
             name="SPSA, second order", settings="a 3, c 1.5, decreasing", seeker=Spsa(**box, form="second_order")
         ),
         _Contender(
-            name="SPSA, one measurement",
-            settings="a 20, c 1.5, decreasing",
-            seeker=Spsa(**box, form="one_measurement"),
+            name="SPSA, one measurement", settings="a 20, c 1.5, decreasing", seeker=Spsa(**box, form="one_measurement")
         ),
         _Contender(name="two-sided differences", settings="step size 15, c 1", seeker=GradientDescent(**box)),
         _Contender(

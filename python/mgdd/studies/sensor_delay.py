@@ -55,11 +55,7 @@ CASES = (
 
 
 def run_sensor_delay(
-    *,
-    seeds: int = 20,
-    quick: bool = False,
-    figures: bool = True,
-    progress: Progress | None = None,
+    *, seeds: int = 20, quick: bool = False, figures: bool = True, progress: Progress | None = None
 ) -> StudyResult:
     """Show why the delay of an analyser defeats extremum seeking of efficiency and NOx, and what helps.
 

@@ -33,10 +33,7 @@ _ARRIVALS = {"opening": "duty_rising", "unloaded": "duty_spring", "closing": "du
 
 
 def run_throttle_characteristics(
-    *,
-    quick: bool = False,
-    figures: bool = True,
-    progress: Progress | None = None,
+    *, quick: bool = False, figures: bool = True, progress: Progress | None = None
 ) -> StudyResult:
     """Show three habits of a throttle that a fixed controller cannot know.
 

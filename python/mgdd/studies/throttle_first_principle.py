@@ -36,11 +36,7 @@ _FITS = {"train": "train_percent", "chirp": "chirp_percent", "steps": "random_st
 
 
 def run_throttle_first_principle(
-    *,
-    seeds: int = 5,
-    quick: bool = False,
-    figures: bool = True,
-    progress: Progress | None = None,
+    *, seeds: int = 5, quick: bool = False, figures: bool = True, progress: Progress | None = None
 ) -> StudyResult:
     """Fit the groups of the first-principle model to a chirp above limp-home, and test them on two other records.
 

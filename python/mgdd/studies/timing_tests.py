@@ -66,11 +66,7 @@ TESTS = (
     _Test(name="1: efficiency", start_cad=-20.0),
     _Test(name="2: efficiency, another start", start_cad=5.0),
     _Test(
-        name="3: efficiency and NOx, analyser",
-        start_cad=-20.0,
-        nox_sensor="analyser",
-        period=60,
-        time_constant=240.0,
+        name="3: efficiency and NOx, analyser", start_cad=-20.0, nox_sensor="analyser", period=60, time_constant=240.0
     ),
     _Test(name="4: efficiency and NOx, soft sensor", start_cad=-20.0, nox_sensor="soft"),
 )
@@ -84,11 +80,7 @@ class _Outcome:
 
 
 def run_timing_tests(
-    *,
-    seeds: int = 50,
-    quick: bool = False,
-    figures: bool = True,
-    progress: Progress | None = None,
+    *, seeds: int = 50, quick: bool = False, figures: bool = True, progress: Progress | None = None
 ) -> StudyResult:
     """Run four tests of extremum seeking as an engine test cell would, each over many seeds.
 

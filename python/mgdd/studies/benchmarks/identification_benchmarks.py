@@ -256,9 +256,7 @@ def _linear(train: xr.Dataset, test: xr.Dataset) -> _Case:
         test["output_v"].to_numpy()[_CIRCUIT_WINDOW:],
     )
     more = {"n_parameters": 13, "seconds": seconds, "status": "best of 15 passes"}
-    return _Case(
-        row=_row("wh2009", "linear, order 6", 1e3 * fit.rmse, 1e3 * rmse(truth, run), _RMSE, "mV", **more),
-    )
+    return _Case(row=_row("wh2009", "linear, order 6", 1e3 * fit.rmse, 1e3 * rmse(truth, run), _RMSE, "mV", **more))
 
 
 def _circuit(train: xr.Dataset, test: xr.Dataset, quick: bool) -> _Case:
