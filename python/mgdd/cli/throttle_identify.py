@@ -14,6 +14,7 @@ from mgdd.cli.throttle_files import add_log_options, log_of
 from mgdd.errors import ConvergenceError
 from mgdd.identify.throttle.fits import KINDS
 from mgdd.optimize import FitOptions
+from mgdd.results.fit import figures_of
 
 if TYPE_CHECKING:
     import xarray as xr
@@ -102,14 +103,11 @@ def _identify(args: argparse.Namespace) -> None:
 
 
 def _payload(fit: Fit) -> dict[str, Any]:
-    train, test = fit.train, fit.test
     figures = fit.to_dict()
     same = ("source", "parameters", "stderr", "unidentifiable", "status", "success", "nit", "nfev")
     return {
         "model": fit.kind,
-        "fit_percent_train": None if train is None else train.nrmse_fit_percent,
-        "fit_percent_test": None if test is None else test.nrmse_fit_percent,
-        "rmse_test": None if test is None else test.rmse,
+        **figures_of(fit),
         "findings": [str(finding) for finding in fit.findings],
         **{name: figures[name] for name in same},
     }

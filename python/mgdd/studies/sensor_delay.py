@@ -12,6 +12,7 @@ import numpy as np
 from mgdd.engine import Performance
 from mgdd.loop import EngineBench, LoopCriteria, SensorDynamics, find_steady_optimum, run_seeker
 from mgdd.optimize import ComponentLag, ExtremumSeeking, Optimum
+from mgdd.optimize.by_curvature import approach_gain
 from mgdd.plot.style import drawn
 from mgdd.results import labelled_dataset
 from mgdd.results.labels import to_jsonable
@@ -151,7 +152,7 @@ def _run_case(case: _Case, best: Optimum) -> tuple[dict[str, Any], float, NDArra
             upper=BOUNDS_CAD[1],
             form="moving_average",
             period=case.period,
-            gain=2.0 / (abs(best.curvature) * case.time_constant),
+            gain=approach_gain(best.curvature, case.time_constant),
             rate=math.inf,
             components=[case.lag] if case.compensated else None,
             hold_cycles=hold_cycles,
@@ -200,7 +201,7 @@ def _component_wise(
             upper=BOUNDS_CAD[1],
             form="moving_average",
             period=period,
-            gain=2.0 / (abs(best.curvature) * time_constant),
+            gain=approach_gain(best.curvature, time_constant),
             rate=math.inf,
             components=[ComponentLag(), _ANALYSER],
         )

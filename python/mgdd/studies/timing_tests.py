@@ -12,6 +12,7 @@ import numpy as np
 from mgdd.engine import Performance
 from mgdd.loop import EngineBench, LoopCriteria, find_steady_optimum, steady_map
 from mgdd.optimize import ComponentLag, ExtremumSeeking, Limit, Optimum
+from mgdd.optimize.by_curvature import approach_gain
 from mgdd.plot.style import drawn
 from mgdd.results import labelled_dataset
 from mgdd.results.labels import to_jsonable
@@ -55,7 +56,7 @@ class _Test:
             lower=BOUNDS_CAD[0],
             upper=BOUNDS_CAD[1],
             period=self.period,
-            gain=2.0 / (abs(best.curvature) * self.time_constant),
+            gain=approach_gain(best.curvature, self.time_constant),
             rate=_LATE_RATE if late else None,
             components=[ComponentLag(), ComponentLag(delay_cycles=38, lag_cycles=25)] if late else None,
             limits=[Limit("p_max_bar", P_MAX_BAR)] if limited else [],

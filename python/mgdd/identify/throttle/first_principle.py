@@ -11,7 +11,7 @@ from mgdd import _core
 from mgdd.errors import DataError, ParameterError, argument, hand_over, or_partial
 from mgdd.identify.throttle.first_principle_model import GROUP_NAMES, TYPICAL, FirstPrincipleModel
 from mgdd.identify.throttle.first_principle_start import SIDE_DEG, group_starts, regression_start, rest_angle
-from mgdd.identify.throttle.free_run import draw_free_run, free_run, quality_of, source_of
+from mgdd.identify.throttle.free_run import LOG_COLUMNS, draw_free_run, free_run, quality_of, source_of
 from mgdd.identify.throttle.physical_parameters import physical_parameters
 from mgdd.optimize.fit_options import FitOptions, fit_options
 from mgdd.results import Finding, Fit, FitReport
@@ -222,7 +222,7 @@ def fit_throttle(
 
 
 def _columns(log: xr.Dataset) -> list[NDArray[np.float64]]:
-    columns = columns_of(log, ("time_s", "duty", "angle_deg"))
+    columns = columns_of(log, LOG_COLUMNS)
     if columns[0].size < 100:
         raise DataError(f"log has {columns[0].size} samples: at least 100 are needed")
     return columns
