@@ -14,7 +14,8 @@ from matplotlib.figure import Figure
 from mgdd import _core, datasets
 from mgdd.errors import DataError, Interrupted, ParameterError, ShapeError
 from mgdd.optimize import FitOptions
-from mgdd.results import Fit, labelled_dataset
+from mgdd.results import Fit
+from mgdd.results.labels import labelled_dataset
 from mgdd.studies import run_study
 from mgdd.studies.benchmarks.drive_axis import DriveModel, drive_free_run, drive_inverse_dynamics, fit_drive
 from mgdd.studies.benchmarks.two_tanks import TwoTanksModel, fit_two_tanks

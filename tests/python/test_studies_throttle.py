@@ -5,7 +5,7 @@ from __future__ import annotations
 import pytest
 
 from mgdd.identify.throttle.free_run import quality_of
-from mgdd.results import check_labels
+from mgdd.results.labels import check_labels
 
 
 @pytest.fixture(scope="module")

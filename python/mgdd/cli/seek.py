@@ -18,7 +18,7 @@ from mgdd.loop import EngineBench, LoopCriteria, find_steady_optimum, run_seeker
 from mgdd.loop.plant_loop import LoopRun
 from mgdd.optimize import Optimum
 from mgdd.plot.style import drawn
-from mgdd.results import VARIABLES
+from mgdd.results.labels import VARIABLES
 from mgdd.results.units import unit_attributes
 
 if TYPE_CHECKING:

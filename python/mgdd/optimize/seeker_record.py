@@ -13,8 +13,8 @@ import numpy as np
 from mgdd import _core
 from mgdd.errors import DataError, Error
 from mgdd.io.existing_file import existing_file
-from mgdd.results import labelled_dataset
 from mgdd.results.describe import as_html, rows_of
+from mgdd.results.labels import labelled_dataset
 
 if TYPE_CHECKING:
     import os

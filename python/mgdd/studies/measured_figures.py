@@ -9,6 +9,7 @@ from mgdd import plot
 from mgdd.engine import timing_sweep
 from mgdd.identify.engine.profile import WallHeatProfile
 from mgdd.identify.engine.records import CylinderFit
+from mgdd.plot.calibration import wall_heat_profile
 from mgdd.plot.style import drawn
 
 if TYPE_CHECKING:
@@ -35,7 +36,7 @@ def draw(
     }
     for law, profile in profiles.items():
         out[f"What the traces say about wall heat: refitted RMSE over the wall-heat scale, {law}"] = drawn(
-            plot.wall_heat_profile, profile.dataset, size=(13.0, 4.8)
+            wall_heat_profile, profile.dataset, size=(13.0, 4.8)
         )
     sweeps = [timing_sweep(load.cylinder, load.point).assign_attrs(file=load.file) for load in reference.loads]
     scale = reference.model.wall_heat_scale

@@ -23,8 +23,7 @@ from mgdd.optimize import (
 )
 from mgdd.optimize.tuning import Tuning
 from mgdd.plot.style import drawn
-from mgdd.results import labelled_dataset
-from mgdd.results.labels import to_jsonable
+from mgdd.results.labels import labelled_dataset, to_jsonable
 from mgdd.studies.base import Progress, StudyResult, check_seeds, finish, run_parts
 from mgdd.studies.load_step_learning import LAWS, Learned, learn
 from mgdd.studies.statistics import bands, loops, rms, with_interval
@@ -240,6 +239,7 @@ def _draw(dataset: xr.Dataset) -> dict[str, Figure]:
     from matplotlib.figure import Figure
 
     from mgdd import plot
+    from mgdd.plot.learning import learning
 
     names = dataset["seeker"].to_numpy()
     columns = 4
@@ -260,5 +260,5 @@ def _draw(dataset: xr.Dataset) -> dict[str, Figure]:
     figure.supxlabel("engine cycle [-]", fontsize="medium")
     out = {"Estimate over cycles: median of the seeds, with the band that holds 80 % of them": figure}
     if "law" in dataset:
-        out["Iterative learning of a repeated load step"] = drawn(plot.learning, dataset, size=(6.6, 3.8))
+        out["Iterative learning of a repeated load step"] = drawn(learning, dataset, size=(6.6, 3.8))
     return out

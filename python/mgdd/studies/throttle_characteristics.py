@@ -10,8 +10,7 @@ import numpy as np
 
 from mgdd import presets
 from mgdd.plot.style import drawn
-from mgdd.results import labelled_dataset
-from mgdd.results.labels import to_jsonable
+from mgdd.results.labels import labelled_dataset, to_jsonable
 from mgdd.studies.base import Progress, StudyResult, finish, run_parts
 from mgdd.throttle import Throttle, groups, holding_duty, simulate
 

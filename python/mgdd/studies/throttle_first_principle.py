@@ -11,8 +11,7 @@ from mgdd import presets
 from mgdd.identify import fit_throttle
 from mgdd.optimize import FitOptions
 from mgdd.plot.style import drawn
-from mgdd.results import labelled_dataset
-from mgdd.results.labels import to_jsonable
+from mgdd.results.labels import labelled_dataset, to_jsonable
 from mgdd.studies.base import Progress, StudyResult, check_seeds, finish, run_parts
 from mgdd.studies.statistics import with_interval
 from mgdd.studies.throttle_records import LSB_DEG, NOISE_DEG, judged_run, noisy_records
@@ -146,9 +145,9 @@ def _dataset(runs: list[xr.Dataset], names: list[str]) -> xr.Dataset:
 
 
 def _draw(dataset: xr.Dataset) -> dict[str, Figure]:
-    from mgdd import plot
+    from mgdd.plot.throttle import free_run
 
     return {
-        f"Free run over random steps of 150 ms, {name}": drawn(plot.free_run, dataset.sel(case=name), size=(7.2, 4.8))
+        f"Free run over random steps of 150 ms, {name}": drawn(free_run, dataset.sel(case=name), size=(7.2, 4.8))
         for name in dataset["case"].to_numpy()
     }

@@ -11,8 +11,7 @@ from mgdd import presets
 from mgdd.errors import ParameterError
 from mgdd.identify import fit_pseudo_wiener
 from mgdd.optimize import FitOptions
-from mgdd.results import labelled_dataset
-from mgdd.results.labels import to_jsonable
+from mgdd.results.labels import labelled_dataset, to_jsonable
 from mgdd.studies.base import Progress, StudyResult, finish, run_parts
 from mgdd.studies.throttle_records import DURATION_S, NOISE_DEG, RECORDS, SAMPLE_S, judged_run, noisy_records
 from mgdd.throttle import Throttle

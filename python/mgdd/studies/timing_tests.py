@@ -14,8 +14,7 @@ from mgdd.loop import EngineBench, LoopCriteria, find_steady_optimum, steady_map
 from mgdd.optimize import ComponentLag, ExtremumSeeking, Limit, Optimum
 from mgdd.optimize.by_curvature import approach_gain
 from mgdd.plot.style import drawn
-from mgdd.results import labelled_dataset
-from mgdd.results.labels import to_jsonable
+from mgdd.results.labels import labelled_dataset, to_jsonable
 from mgdd.studies.base import Progress, StudyResult, check_seeds, finish, run_parts
 from mgdd.studies.statistics import loops, rms, run_with_slope, with_interval
 

@@ -11,7 +11,8 @@ import numpy as np
 from mgdd.errors import DataError, ParameterError
 from mgdd.identify.throttle.free_run import LOG_COLUMNS, discarded
 from mgdd.io import check_throttle_log
-from mgdd.results import Model, labelled_dataset
+from mgdd.results import Model
+from mgdd.results.labels import labelled_dataset
 from mgdd.signals.even_grid import even_step
 from mgdd.signals.metrics import rmse
 from mgdd.signals.model import columns_of

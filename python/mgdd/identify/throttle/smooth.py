@@ -16,8 +16,9 @@ from mgdd.io.model_parameters import ModelParameters
 from mgdd.io.parameters import wanted
 from mgdd.optimize.fit_options import FitOptions, fit_options
 from mgdd.optimize.fit_run import fit_of, fit_run
-from mgdd.results import VARIABLES, Fit, FitReport
+from mgdd.results import Fit, FitReport
 from mgdd.results.describe import described
+from mgdd.results.labels import VARIABLES
 from mgdd.signals.even_grid import even_step
 from mgdd.signals.model import RunInputs, SampledModel, columns_of
 

@@ -14,8 +14,9 @@ from mgdd.identify.throttle.n_step import n_step_rms, samples_of, whole_horizons
 from mgdd.identify.throttle.prior import prior_of
 from mgdd.identify.throttle.record_content import open_questions, record_content
 from mgdd.io import check_throttle_log
-from mgdd.results import Finding, Fit, FitQuality, FitReport, Model
+from mgdd.results import Finding, Fit, FitReport, Model
 from mgdd.results.describe import described
+from mgdd.results.fit import FitQuality
 from mgdd.signals.even_grid import even_step
 from mgdd.signals.metrics import ResidualTests, residual_tests, vaf_percent
 from mgdd.signals.model import columns_of

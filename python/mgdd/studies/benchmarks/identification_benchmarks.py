@@ -12,7 +12,7 @@ import numpy as np
 from mgdd import datasets
 from mgdd.errors import DataError
 from mgdd.optimize import FitOptions
-from mgdd.results import labelled_dataset
+from mgdd.results.labels import labelled_dataset
 from mgdd.signals import nrmse_fit_percent, rmse
 from mgdd.studies.base import Progress, StudyResult, finish, run_parts
 from mgdd.studies.benchmarks.drive_axis import drive_free_run, fit_drive
