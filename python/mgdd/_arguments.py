@@ -6,13 +6,12 @@ The core calls `refusal` where pybind11 would list its signatures. No public par
 from __future__ import annotations
 
 import ast
-import difflib
 import operator
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from typing import Any
 
-from mgdd.errors import Error, ParameterError
+from mgdd.errors import Error, ParameterError, did_you_mean
 
 __all__ = ["refusal", "shown"]
 
@@ -135,8 +134,7 @@ def _bound(
     known = [argument.name for argument in arguments]
     for keyword, value in keywords.items():
         if keyword not in known:
-            close = difflib.get_close_matches(keyword, known, 1)
-            hint = f"did you mean {close[0]!r}?" if close else f"known are {', '.join(known)}"
+            hint = did_you_mean(keyword, known) or f"known are {', '.join(known)}"
             return TypeError(f"{name}() has no argument {keyword!r}: {hint}")
         if keyword in bound:
             return TypeError(f"{name}() got {keyword!r} twice, by place and by name")

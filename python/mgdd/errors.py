@@ -12,11 +12,13 @@ Examples
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterator
+import difflib
+from collections.abc import Callable, Iterable, Iterator
 from contextlib import contextmanager
 from contextvars import ContextVar
 from typing import Any, Self, TypeVar
 
+Item = TypeVar("Item")
 Result = TypeVar("Result")
 
 __all__ = [
@@ -191,11 +193,38 @@ def or_partial(call: Callable[[], Result]) -> tuple[Result, Interrupted | None]:
         return stop.partial, stop
 
 
+def keep_finished(call: Callable[[Item], Result], items: Iterable[Item], done: list[Result]) -> Interrupted | None:
+    """Call the core for one item after the other and append to `done`, the part that Ctrl-C left included.
+
+    Returns
+    -------
+    Interrupted or None
+        What ended it, for `hand_over`; raised at once where `done` is empty. `items` may look at `done` as it grows.
+    """
+    try:
+        for item in items:
+            done += [call(item)]
+    except KeyboardInterrupt as stop:
+        part = getattr(stop, "partial", None)
+        if part is not None:
+            done.append(part)
+        if not done:
+            raise
+        return Interrupted("interrupted: what was finished is in .partial", done[-1])
+    return None
+
+
 def hand_over(result: Result, stop: Interrupted | None) -> Result:
     """Return a whole result; raise one made of a part, as `or_partial` gave it, in an Interrupted."""
     if stop is not None:
         raise Interrupted(str(stop), result)
     return result
+
+
+def did_you_mean(name: str, known: Iterable[str]) -> str:
+    """Ask for the nearest of the known names, or say nothing where none is near."""
+    close = difflib.get_close_matches(name, list(known), 1)
+    return f"did you mean {close[0]!r}?" if close else ""
 
 
 _written: ContextVar[Callable[[str, str | None], str] | None] = ContextVar("written", default=None)

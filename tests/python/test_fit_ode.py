@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from mgdd import _core
-from mgdd.errors import DataError, ParameterError, ShapeError
+from mgdd.errors import DataError, Interrupted, ParameterError, ShapeError
 from mgdd.identify import OdeModel, SmoothThrottle, fit_ode
 from mgdd.optimize import FitOptions
 
@@ -75,6 +75,37 @@ def test_many_starts_report_how_many_arrived():
     )
     assert len(found.start_reports) == len(found.start_rmse) == 3
     assert 1 <= found.n_best <= 3
+
+
+def test_ctrl_c_leaves_the_best_of_the_finished_starts():
+    time, u, y = record(n=200)
+    calls = []
+
+    def counted(*arguments):
+        calls.append(None)
+        if len(calls) == most + 1:
+            raise KeyboardInterrupt
+        return pendulum(*arguments)
+
+    box = {"gain": (1.0, 5.0), "damping": (0.1, 1.0), "stiffness": (1.0, 3.0)}
+    settings = {
+        "parameters": {"gain": 2.0, "damping": 0.2, "stiffness": 1.0},
+        "initial_state": [0.2, -0.1],
+        "bounds": box,
+    }
+    most = 10**9
+    alone = fit_ode(counted, {"time_s": time, "u": u, "y": y}, **settings)
+    searched, most = len(calls), 10
+    calls.clear()
+    with pytest.raises(KeyboardInterrupt) as nothing:
+        fit_ode(counted, {"time_s": time, "u": u, "y": y}, **settings)
+    assert not isinstance(nothing.value, Interrupted)
+    calls.clear()
+    most = searched
+    with pytest.raises(Interrupted) as stop:
+        fit_ode(counted, {"time_s": time, "u": u, "y": y}, **settings, options=FitOptions(n_starts=3))
+    np.testing.assert_array_equal(stop.value.partial.report.values, alone.report.values)
+    assert len(stop.value.partial.start_reports) == 1
 
 
 def test_python_and_the_core_agree_on_one_problem():

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from pathlib import Path
 from typing import Any
 
@@ -10,14 +11,15 @@ import pytest
 import xarray as xr
 from matplotlib.figure import Figure
 
-from mgdd import datasets
-from mgdd.errors import DataError, ParameterError, ShapeError
+from mgdd import _core, datasets
+from mgdd.errors import DataError, Interrupted, ParameterError, ShapeError
 from mgdd.optimize import FitOptions
+from mgdd.results import Fit
 from mgdd.results.labels import labelled_dataset
 from mgdd.studies import run_study
 from mgdd.studies.benchmarks.drive_axis import DriveModel, drive_free_run, drive_inverse_dynamics, fit_drive
 from mgdd.studies.benchmarks.two_tanks import TwoTanksModel, fit_two_tanks
-from mgdd.studies.benchmarks.wiener_hammerstein import fit_linear, fit_wiener_hammerstein
+from mgdd.studies.benchmarks.wiener_hammerstein import WienerHammersteinFit, fit_linear, fit_wiener_hammerstein
 
 SETS = ("emps", "cascaded_tanks", "wh2009")
 needs = {
@@ -36,6 +38,23 @@ TANKS = {
     "overflow_share": 0.5,
     "delay_samples": 0.0,
 }
+LEVELS = {"upper_level_v": 7.0, "lower_level_v": 3.0}
+THREE = FitOptions(n_starts=3)
+FITS: dict[str, tuple[Any, Callable[[], Fit], type[Fit]]] = {
+    "drive": (
+        _core.systems.DriveAxis,
+        lambda: fit_drive(slide_record(SLIDE), friction="coulomb", drift=False, options=THREE),
+        Fit,
+    ),
+    "tanks": (_core.systems.TwoTanks, lambda: fit_two_tanks(tanks_record(), options=THREE), Fit),
+    "circuit": (
+        _core.systems.WienerHammerstein,
+        lambda: fit_wiener_hammerstein(
+            circuit_record(), linear_order=2, first_order=1, last_order=1, n_curve=6, scan_samples=1500
+        ),
+        WienerHammersteinFit,
+    ),
+}
 
 
 def slide_record(parameters: dict[str, float]) -> xr.Dataset:
@@ -43,6 +62,22 @@ def slide_record(parameters: dict[str, float]) -> xr.Dataset:
     drive = 2.0 * np.sign(np.sin(4.0 * time)) + 0.5 * np.sin(11.0 * time)
     model = DriveModel(parameters=parameters, force_n_per_v=35.0)
     return model.simulate({"time_s": time, "drive_v": drive}).assign(force_n_per_v=35.0)
+
+
+def tanks_record() -> xr.Dataset:
+    pump = 2.0 + np.sin(0.05 * np.arange(300))
+    inputs = {"time_s": np.arange(300) * 4.0, "pump_v": pump}
+    return TwoTanksModel(parameters=TANKS).simulate(inputs, initial_state=LEVELS)
+
+
+def circuit_record() -> xr.Dataset:
+    u = np.convolve(np.random.default_rng(1).standard_normal(2003), np.ones(4) / 4.0, "valid")
+    x, y = np.zeros(2000), np.zeros(2000)
+    for k in range(1, 2000):
+        x[k] = 0.9 * x[k - 1] + 0.1 * u[k]
+        y[k] = 0.3 * y[k - 1] + 0.7 * np.tanh(4.0 * x[k])
+    values = {"input_v": ("time_s", u, "V", "input"), "output_v": ("time_s", y, "V", "output")}
+    return labelled_dataset({"time_s": ("time_s", np.arange(2000) * 1e-3, "s", "time"), **values})
 
 
 def rms(values: np.ndarray[Any, Any]) -> float:
@@ -85,11 +120,8 @@ def test_wrong_drive_input_is_named_then_right_works() -> None:
 
 
 def test_two_tanks_know_their_start_and_their_names() -> None:
-    model = TwoTanksModel(parameters=TANKS)
-    pump = 2.0 + np.sin(0.05 * np.arange(300))
-    state = {"upper_level_v": 7.0, "lower_level_v": 3.0}
-    record = model.simulate({"time_s": np.arange(300) * 4.0, "pump_v": pump}, initial_state=state)
-    assert model.estimate_state(record) == pytest.approx(state, abs=1e-4)
+    model, record = TwoTanksModel(parameters=TANKS), tanks_record()
+    assert model.estimate_state(record) == pytest.approx(LEVELS, abs=1e-4)
     with pytest.raises(DataError, match="window = 400"):
         model.estimate_state(record, window=400)
     with pytest.raises(ParameterError, match="form = 'cube_root'"):
@@ -113,6 +145,70 @@ def test_the_circuit_needs_orders_that_fit() -> None:
         fit_wiener_hammerstein(record, linear_order=6, first_order=1, last_order=1)
     with pytest.raises(DataError, match="at least 1000"):
         fit_linear(record.isel(time_s=slice(0, 500)))
+
+
+def press_ctrl_c(monkeypatch: pytest.MonkeyPatch, system: Any, at: int, *, within: bool) -> None:
+    """Let the search of a number be cut short, with its part or before it has any."""
+    whole, calls = system.fit, []
+
+    def fit(self: Any, **how: Any) -> Any:
+        calls.append(how)
+        if len(calls) < at:
+            return whole(self, **how)
+        raise Interrupted("interrupted", whole(self, **how) if within else None)
+
+    monkeypatch.setattr(system, "fit", fit)
+
+
+@pytest.mark.parametrize("within", [True, False])
+@pytest.mark.parametrize("name", FITS)
+def test_ctrl_c_leaves_the_fit_so_far(monkeypatch: pytest.MonkeyPatch, name: str, within: bool) -> None:
+    system, call, kind = FITS[name]
+    press_ctrl_c(monkeypatch, system, 2, within=within)
+    with pytest.raises(Interrupted, match=r"what was finished is in \.partial") as stop:
+        call()
+    fit = stop.value.partial
+    assert type(fit) is kind
+    assert len(fit.start_rmse) == (2 if within else 1)
+    assert fit.run is not None
+    assert fit.summary()
+    assert fit.to_toml()
+
+
+@pytest.mark.parametrize("name", FITS)
+def test_a_model_reads_what_its_fit_wrote(name: str) -> None:
+    fit = FITS[name][1]()
+    assert type(fit.model).from_toml(fit.to_toml()).to_toml() == fit.model.to_toml()
+
+
+@pytest.mark.parametrize("name", FITS)
+def test_ctrl_c_before_anything_is_found_leaves_nothing(monkeypatch: pytest.MonkeyPatch, name: str) -> None:
+    system, call, _ = FITS[name]
+    press_ctrl_c(monkeypatch, system, 1, within=False)
+    with pytest.raises(Interrupted) as stop:
+        call()
+    assert stop.value.partial is None
+    monkeypatch.undo()
+    assert call().report.success
+
+
+def test_ctrl_c_in_the_last_fit_of_the_circuit(monkeypatch: pytest.MonkeyPatch) -> None:
+    system, call, kind = FITS["circuit"]
+    searches = len(call().start_rmse) + 1
+    for within in (True, False):
+        press_ctrl_c(monkeypatch, system, searches, within=within)
+        with pytest.raises(Interrupted) as stop:
+            call()
+        monkeypatch.undo()
+        assert type(stop.value.partial) is kind
+        assert stop.value.partial.report.residual.size == (1900 if within else 1400)
+
+
+def test_ctrl_c_leaves_the_levels_so_far(monkeypatch: pytest.MonkeyPatch) -> None:
+    press_ctrl_c(monkeypatch, _core.systems.TwoTanks, 2, within=False)
+    with pytest.raises(Interrupted) as stop:
+        TwoTanksModel(parameters=TANKS).estimate_state(tanks_record())
+    assert set(stop.value.partial) == set(LEVELS)
 
 
 def test_missing_sets_are_named(monkeypatch: pytest.MonkeyPatch) -> None:

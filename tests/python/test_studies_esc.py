@@ -95,10 +95,11 @@ def test_ctrl_c_keeps_what_is_finished() -> None:
     check_labels(result.dataset)
 
     def stop_at_once(_: str) -> None:
-        raise KeyboardInterrupt
+        raise Interrupted("interrupted: a part of a part", "half a loop")
 
-    with pytest.raises(KeyboardInterrupt):
+    with pytest.raises(Interrupted, match="nothing was finished") as stop:
         run_sensor_delay(progress=stop_at_once)
+    assert stop.value.partial is None
 
 
 def test_bad_requests_are_named() -> None:

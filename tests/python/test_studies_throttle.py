@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import pytest
 
+from mgdd.identify.throttle.free_run import quality_of
 from mgdd.results.labels import check_labels
 
 
@@ -61,3 +62,18 @@ def test_groups_are_found_also_where_the_plant_does_more(quick_study):
         assert errors["P1 with inductance and Stribeck friction", group] <= bound, group
     for fit in result.summary["fits"]:
         assert fit["train_percent"] >= 98.0, fit["case"]
+
+
+@pytest.mark.parametrize(
+    ("study", "options"), [("throttle-first-principle", {"seeds": 1}), ("throttle-pseudo-wiener", {"starts": 4})]
+)
+def test_a_fit_in_percent_is_that_of_every_throttle_fit(quick_study, study, options):
+    """The last record of a study is in its dataset: its stated fit leaves out the first 50 ms, like any other."""
+    result = quick_study(study, **options)
+    if study == "throttle-first-principle":
+        stated = {fit["case"]: fit["random_steps_percent"] for fit in result.summary["fits"]}
+    else:
+        rows = [row for row in result.summary["rows"] if row["lag_start"] == "rest"]
+        stated = {f"{row['plant']} {row['model']}": row["fit_steps_percent"] for row in rows}
+    for case, percent in stated.items():
+        assert percent == quality_of([result.dataset.sel(case=case)]).nrmse_fit_percent, case

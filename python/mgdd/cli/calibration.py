@@ -26,7 +26,7 @@ _PER_TRACE = (
 
 def calibrate(args: argparse.Namespace) -> None:
     """Fit, judge, compare, print."""
-    check_output(args, csv=False)
+    check_output(args)
     cylinder, point, preset = engine_of(args)
     traces = traces_of(args)
     free = [name.strip() for name in args.free.split(",")] if args.free else None

@@ -29,7 +29,7 @@ def add(commands: Any) -> None:
 
 def run(args: argparse.Namespace) -> None:
     """Run the study and write the report."""
-    check_output(args, csv=False)
+    check_output(args)
     step = args.progress.expect(45)
     result = run_study("measured-traces", progress=step)
     step("write the report")

@@ -28,7 +28,7 @@ def add(commands: Any) -> None:
 
 def run(args: argparse.Namespace) -> None:
     """Collect and print."""
-    check_output(args, csv=False)
+    check_output(args)
     report = {
         "mgdd": _core.__version__,
         "python": platform.python_version(),

@@ -13,6 +13,7 @@ from mgdd.cli.options import (
     add_command,
     add_engine,
     add_files,
+    add_group,
     add_scheme,
     engine_of,
     number_pairs,
@@ -31,14 +32,11 @@ _DEFAULT_SOC_CAD = -6.0
 
 def add(commands: Any) -> None:
     """Add the group and its commands."""
-    group = commands.add_parser(
-        "engine",
-        help="one cycle: simulate, analyze, calibrate, optimum; many: seek",
-        epilog="example:\n  mgdd engine simulate --preset puma_single --soc-cad -6 --json",
-        formatter_class=argparse.RawDescriptionHelpFormatter,
-    )
-    group.set_defaults(parser=group)
-    verbs = group.add_subparsers(title="commands", metavar="COMMAND")
+    verbs = add_group(
+        commands, "engine",
+        help_text="one cycle: simulate, analyze, calibrate, optimum; many: seek",
+        example="mgdd engine simulate --preset puma_single --soc-cad -6 --json",
+    )  # fmt: skip
     _add_simulate(verbs)
     _add_analyze(verbs)
     _add_calibrate(verbs)
@@ -55,10 +53,7 @@ def _add_simulate(verbs: Any) -> None:
     )  # fmt: skip
     timing = parser.add_mutually_exclusive_group()
     timing.add_argument(
-        "--soc-cad",
-        type=float,
-        metavar="X",
-        help=f"start of combustion [°CA aTDC] (default: {_DEFAULT_SOC_CAD:g})",
+        "--soc-cad", type=float, metavar="X", help=f"start of combustion [°CA aTDC] (default: {_DEFAULT_SOC_CAD:g})"
     )
     timing.add_argument(
         "--soi-cad", type=float, metavar="X", help="start of injection [°CA aTDC]; the delay model adds on"
@@ -68,7 +63,7 @@ def _add_simulate(verbs: Any) -> None:
 
 
 def _simulate(args: argparse.Namespace) -> None:
-    check_output(args, csv=True)
+    check_output(args, ".json", ".csv")
     cylinder, point, preset = engine_of(args)
     soc = _start_of_combustion(args, cylinder, point)
     cycle = simulate(cylinder, point, soc_cad=soc, step_cad=args.step_cad, integrator=args.integrator)
@@ -127,7 +122,7 @@ def _add_analyze(verbs: Any) -> None:
 
 
 def _analyze(args: argparse.Namespace) -> None:
-    check_output(args, csv=True)
+    check_output(args, ".json", ".csv")
     cylinder, point, preset = engine_of(args)
     _check_pegging(args)
     (trace,) = traces_of(args)
@@ -198,11 +193,7 @@ def _add_optimum(verbs: Any) -> None:
         help="default: efficiency_gross; with files imep_closed_bar, the work that a closed-valve trace carries",
     )  # fmt: skip
     parser.add_argument(
-        "--limit",
-        action="append",
-        default=[],
-        metavar="NAME=X",
-        help="upper limit on an indicator, repeatable",
+        "--limit", action="append", default=[], metavar="NAME=X", help="upper limit on an indicator, repeatable"
     )
     parser.add_argument(
         "--bounds-cad", type=float, nargs=2, metavar=("LOW", "HIGH"), help="searched range of SOC (default: -30 10)"
@@ -216,7 +207,7 @@ def _bounds(args: argparse.Namespace) -> tuple[float, float] | None:
 
 
 def _optimum(args: argparse.Namespace) -> None:
-    check_output(args, csv=not args.files)
+    check_output(args, *((".json",) if args.files else (".json", ".csv")))
     cylinder, point, preset = engine_of(args)
     limits = number_pairs(args.limit, "--limit")
     if args.files:
@@ -224,12 +215,7 @@ def _optimum(args: argparse.Namespace) -> None:
         return
     scheme = {"step_cad": args.step_cad or 1.0, "integrator": args.integrator}
     best = find_optimum(
-        cylinder,
-        point,
-        args.objective or "efficiency_gross",
-        limits=limits,
-        bounds_cad=_bounds(args),
-        **scheme,
+        cylinder, point, args.objective or "efficiency_gross", limits=limits, bounds_cad=_bounds(args), **scheme
     )
     now = simulate(cylinder, point, soc_cad=best["soc_cad"], **scheme)
     payload: dict[str, Any] = {name: best[name] for name in ("soc_cad", "ca50_cad", "efficiency_gross")}

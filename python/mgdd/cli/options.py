@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import argparse
 import logging
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, NoReturn
 
@@ -22,8 +22,11 @@ __all__ = [
     "add_command",
     "add_engine",
     "add_files",
+    "add_group",
     "add_scheme",
     "as_option",
+    "assignments",
+    "column_of",
     "engine_of",
     "number_pairs",
     "traces_of",
@@ -64,6 +67,15 @@ def as_option(name: str, text: str | None = None) -> str:
     return f"{option} {text}" if text else option
 
 
+def add_group(commands: Any, name: str, *, help_text: str, example: str) -> Any:
+    """Add a group of commands, and return what they are added to."""
+    group = commands.add_parser(
+        name, help=help_text, epilog=f"example:\n  {example}", formatter_class=argparse.RawDescriptionHelpFormatter
+    )
+    group.set_defaults(parser=group)
+    return group.add_subparsers(title="commands", metavar="COMMAND")
+
+
 def add_command(
     commands: Any,
     name: str,
@@ -102,11 +114,11 @@ def add_engine(parser: argparse.ArgumentParser) -> None:
     for field, info in OperatingPoint.fields().items():
         unit = "" if info["unit"] == "-" else f" [{info['unit']}]"
         meaning = info["meaning"].replace("; none = ", "; left out: ")
-        group.add_argument(_dashed(field), type=float, metavar="X", help=f"{meaning}{unit}")
+        group.add_argument(as_option(field), type=float, metavar="X", help=f"{meaning}{unit}")
     group.add_argument("--motored", action="store_true", help="no fuel")
     for option, field in _CYLINDER_CHOICES.items():
         info = Cylinder.fields()[field]
-        group.add_argument(_dashed(option), choices=info["choices"], help=info["meaning"])
+        group.add_argument(as_option(option), choices=info["choices"], help=info["meaning"])
 
 
 def add_scheme(parser: argparse.ArgumentParser, *, step_cad: float | None) -> None:
@@ -135,16 +147,11 @@ def add_files(parser: argparse.ArgumentParser, *, nargs: int | str) -> None:
     group.add_argument("--decimal", choices=(".", ","), default=".", help="decimal mark (default: .)")
     group.add_argument("--delimiter", metavar="CHAR", help="column separator (default: found in the file)")
     group.add_argument(
-        "--firing-tdc-deg",
-        type=float,
-        metavar="X",
-        help="angle of firing TDC in files that count from elsewhere",
+        "--firing-tdc-deg", type=float, metavar="X", help="angle of firing TDC in files that count from elsewhere"
     )
     group.add_argument("--before-tdc", action="store_true", help="angles count degrees before firing TDC")
     group.add_argument(
-        "--conditions",
-        metavar="FILE.csv",
-        help="columns file,speed_rpm,trapped_mass_g,soi_cad: one row per trace",
+        "--conditions", metavar="FILE.csv", help="columns file,speed_rpm,trapped_mass_g,soi_cad: one row per trace"
     )
 
 
@@ -157,23 +164,18 @@ def engine_of(args: argparse.Namespace) -> tuple[Cylinder, OperatingPoint, prese
             "no --preset: the traces are read with the geometry of %s (%g x %g mm, compression ratio %g)",
             preset.name, c.bore_mm, c.stroke_mm, c.compression_ratio,
         )  # fmt: skip
-    cylinder: dict[str, Any] = {}
-    point: dict[str, Any] = {}
-    for item in args.set:
-        name, value = _pair(item, "--set", "FIELD=VALUE")
-        chosen = point if name in _POINT else cylinder
-        if name in chosen:
-            raise ParameterError(f"--set {name} is given twice: give it once")
-        chosen[name] = _value(name, value)
+    given = assignments(args.set, {**Cylinder.fields(), **OperatingPoint.fields()})
+    point = {name: value for name, value in given.items() if name in _POINT}
+    cylinder = {name: value for name, value in given.items() if name not in _POINT}
     for option, field in _CYLINDER_CHOICES.items():
         if getattr(args, option) is not None:
             if field in cylinder:
-                raise ParameterError(f"{_dashed(option)} and --set {field} contradict each other: give one")
+                raise ParameterError(f"{as_option(option)} and --set {field} contradict each other: give one")
             cylinder[field] = getattr(args, option)
     for field in _POINT:
         if getattr(args, field) is not None:
             if field in point:
-                raise ParameterError(f"{_dashed(field)} and --set {field} contradict each other: give one")
+                raise ParameterError(f"{as_option(field)} and --set {field} contradict each other: give one")
             point[field] = getattr(args, field)
     if args.motored:
         if point.get("fuel_mg"):
@@ -192,8 +194,8 @@ def traces_of(args: argparse.Namespace) -> list[xr.Dataset]:
     for file in args.files:
         trace = read_pressure(
             file,
-            angle_column=_column(args.angle_column),
-            pressure_column=_column(args.pressure_column),
+            angle_column=column_of(args.angle_column),
+            pressure_column=column_of(args.pressure_column),
             angle_unit=args.angle_unit,
             pressure_unit=args.pressure_unit,
             firing_tdc_deg=args.firing_tdc_deg,
@@ -219,20 +221,30 @@ def traces_of(args: argparse.Namespace) -> list[xr.Dataset]:
 
 def number_pairs(items: Sequence[str], option: str) -> dict[str, float]:
     """Read repeated NAME=NUMBER options."""
-    out = {}
+    out: dict[str, float] = {}
     for item in items:
         name, value = _pair(item, option, "NAME=NUMBER")
-        number = _value(name, value)
+        number = _value(name, value, {})
         if isinstance(number, str):
             raise ParameterError(f"{option} {item}: {value!r} is not a number")
-        if name in out:
-            raise ParameterError(f"{option} {name} is given twice: give it once")
+        _once(name, option, out)
         out[name] = number
     return out
 
 
-def _dashed(name: str) -> str:
-    return "--" + name.replace("_", "-")
+def assignments(items: Sequence[str], fields: Mapping[str, Mapping[str, Any]]) -> dict[str, Any]:
+    """Read repeated --set FIELD=VALUE; a name that is no field is for whoever takes the values."""
+    out: dict[str, Any] = {}
+    for item in items:
+        name, value = _pair(item, "--set", "FIELD=VALUE")
+        _once(name, "--set", out)
+        out[name] = _value(name, value, fields)
+    return out
+
+
+def _once(name: str, option: str, known: Mapping[str, Any]) -> None:
+    if name in known:
+        raise ParameterError(f"{option} {name} is given twice: give it once")
 
 
 def _pair(item: str, option: str, form: str) -> tuple[str, str]:
@@ -242,8 +254,7 @@ def _pair(item: str, option: str, form: str) -> tuple[str, str]:
     return name.strip().replace("-", "_"), value.strip()
 
 
-def _value(name: str, text: str) -> float | str:
-    fields = {**Cylinder.fields(), **OperatingPoint.fields()}
+def _value(name: str, text: str, fields: Mapping[str, Mapping[str, Any]]) -> float | str:
     if "choices" in fields.get(name, {}):
         return text
     try:
@@ -254,5 +265,6 @@ def _value(name: str, text: str) -> float | str:
         return text
 
 
-def _column(text: str) -> int | str:
-    return int(text) if text.isdigit() else text
+def column_of(text: str | None) -> Any:
+    """Read a column, by name or by number from 0; None where none is named."""
+    return int(text) if text is not None and text.isdigit() else text

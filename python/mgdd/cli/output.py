@@ -16,33 +16,54 @@ from mgdd.studies.sections import Table
 
 if TYPE_CHECKING:
     import xarray as xr
+    from matplotlib.figure import Figure
 
-__all__ = ["Stopped", "check_figure", "check_output", "emit", "error_of", "fail", "lines", "show"]
+__all__ = [
+    "Stopped",
+    "check_figure",
+    "check_output",
+    "emit",
+    "error_of",
+    "fail",
+    "lines",
+    "save_figure",
+    "show",
+    "wrote",
+]
 
 
 class Stopped(KeyboardInterrupt):
     """Ctrl-C after which something was kept; the message says what."""
 
 
-def check_output(args: argparse.Namespace, *, csv: bool) -> None:
-    """Refuse an output file of unknown kind before any work is done."""
-    if args.output is None:
-        return
-    allowed = (".json", ".csv") if csv else (".json",)
-    if Path(args.output).suffix not in allowed:
-        raise ParameterError(f"-o {args.output}: the ending must be one of {', '.join(allowed)}")
-    if not Path(args.output).resolve().parent.is_dir():
-        raise ParameterError(f"-o {args.output}: there is no folder {Path(args.output).parent}")
+def check_output(args: argparse.Namespace, *endings: str) -> None:
+    """Refuse an output file of unknown kind before any work is done; JSON is known where nothing is said."""
+    _check_file("-o", args.output, endings or (".json",))
 
 
 def check_figure(file: str | None) -> None:
     """Refuse a figure of unknown kind before any work is done."""
+    _check_file("--figure", file, (".png", ".svg", ".pdf"))
+
+
+def _check_file(option: str, file: str | None, endings: tuple[str, ...]) -> None:
     if file is None:
         return
-    if Path(file).suffix not in (".png", ".svg", ".pdf"):
-        raise ParameterError(f"--figure {file}: the ending must be one of .png, .svg, .pdf")
+    if Path(file).suffix not in endings:
+        raise ParameterError(f"{option} {file}: the ending must be one of {', '.join(endings)}")
     if not Path(file).resolve().parent.is_dir():
-        raise ParameterError(f"--figure {file}: there is no folder {Path(file).parent}")
+        raise ParameterError(f"{option} {file}: there is no folder {Path(file).parent}")
+
+
+def save_figure(figure: Figure, file: str) -> None:
+    """Write a figure and say so."""
+    figure.savefig(file, dpi=150)
+    wrote(file)
+
+
+def wrote(file: str) -> None:
+    """Say on stderr that a file was written."""
+    print(f"wrote {file}", file=sys.stderr)
 
 
 def emit(
@@ -60,7 +81,7 @@ def emit(
             write_traces(traces, args.output)
         else:
             Path(args.output).write_text(_json(plain) + "\n", encoding="utf-8")
-        print(f"wrote {args.output}", file=sys.stderr)
+        wrote(args.output)
     args.emitted = True
     if args.json:
         print(_json(plain))

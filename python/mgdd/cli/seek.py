@@ -5,19 +5,19 @@ from __future__ import annotations
 import argparse
 import copy
 import math
-import sys
 from collections.abc import Iterator, Mapping
 from contextlib import contextmanager
 from typing import TYPE_CHECKING, Any
 
 from mgdd.cli.options import add_command, add_engine, engine_of, number_pairs
-from mgdd.cli.output import Stopped, check_figure, check_output, emit
+from mgdd.cli.output import Stopped, check_figure, check_output, emit, save_figure
 from mgdd.cli.seekers import Task, default_cycles, make_seeker
 from mgdd.engine import Performance
 from mgdd.errors import ConvergenceError, Interrupted, ParameterError
 from mgdd.loop import EngineBench, LoopCriteria, run_seeker
 from mgdd.loop.plant_loop import LoopRun
 from mgdd.optimize import Optimum
+from mgdd.plot.style import drawn
 from mgdd.results.labels import VARIABLES
 from mgdd.results.units import unit_attributes
 
@@ -81,7 +81,7 @@ def add_seek(verbs: Any) -> None:
 
 
 def _seek(args: argparse.Namespace) -> None:
-    check_output(args, csv=True)
+    check_output(args, ".json", ".csv")
     check_figure(args.figure)
     _check(args)
     limits = number_pairs(args.limit, "--limit")
@@ -213,11 +213,7 @@ def _thresholds(best: Optimum, limits: Mapping[str, float]) -> dict[str, float]:
 
 
 def _payload(
-    args: argparse.Namespace,
-    preset: str,
-    run: LoopRun,
-    best: Optimum,
-    limits: Mapping[str, float],
+    args: argparse.Namespace, preset: str, run: LoopRun, best: Optimum, limits: Mapping[str, float]
 ) -> dict[str, Any]:
     summary = run.summary
     out: dict[str, Any] = {
@@ -259,14 +255,10 @@ def _table(cycles: xr.Dataset) -> xr.Dataset:
 
 
 def _draw(cycles: xr.Dataset, best: Optimum, limits: Mapping[str, float], file: str) -> None:
-    from matplotlib.figure import Figure
-
     from mgdd import plot
 
-    figure = Figure(figsize=(8.0, 7.0), layout="constrained")
-    plot.seeking(cycles, optimum_cad=best["soc_cad"], limit_values=limits, ax=figure.add_subplot())
-    figure.savefig(file, dpi=150)
-    print(f"wrote {file}", file=sys.stderr)
+    how = {"optimum_cad": best["soc_cad"], "limit_values": limits}
+    save_figure(drawn(plot.seeking, cycles, size=(8.0, 7.0), **how), file)
 
 
 @contextmanager

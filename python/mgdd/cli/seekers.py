@@ -9,6 +9,7 @@ from typing import TYPE_CHECKING, Any
 
 from mgdd.errors import ParameterError
 from mgdd.optimize import BoundedSeeking, ComponentLag, ExtremumSeeking, GoldenSection, Limit, NewtonSeeking, Spsa, tune
+from mgdd.optimize.by_curvature import approach_gain, newton_settings
 from mgdd.optimize.tuning import Tuning
 
 if TYPE_CHECKING:
@@ -25,7 +26,7 @@ _CYCLES, _LATE_CYCLES, _LATE_TIME_CONSTANTS = 2000, 4000, 16
 # Dimensionless, from settings that were tuned to a curvature of 0.051: gain of SPSA and kappa times that curvature.
 _SPSA_GAIN, _BOUNDED_KAPPA = 20.0 * 0.051, 0.051
 _NEWTON_HOLD_PERIODS = 5
-_HESSIAN_RATE, _RICCATI_RATE, _HOLD = 0.03, 0.02, 300
+_HOLD = 300
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -83,17 +84,11 @@ def make_seeker(task: Task) -> Seeker:
         period, time_constant = max(_PERIOD, tuning.period), tuning.time_constant_cycles
         components = [ComponentLag(), _lag(task)]  # the order of Performance.efficiency_and_nox
     if task.method == "newton":
-        slow = period / _PERIOD
         return NewtonSeeking(
             **space,
             amplitude=amplitude,
-            period=period,
+            **newton_settings(curvature, period, reach=5.0),
             time_constant_cycles=time_constant,
-            hessian_rate=_HESSIAN_RATE / slow,
-            riccati_rate=_RICCATI_RATE / slow,
-            initial_hessian=-curvature,
-            initial_inverse=-1.0 / curvature,
-            largest_inverse=5.0 / curvature,
             hold_cycles=_NEWTON_HOLD_PERIODS * period if task.late else _HOLD,
             components=components,
             limits=limits,
@@ -103,7 +98,7 @@ def make_seeker(task: Task) -> Seeker:
         form=task.form,
         amplitude=amplitude,
         period=period,
-        gain=2.0 / (amplitude * curvature * time_constant),
+        gain=approach_gain(curvature, time_constant, amplitude=amplitude),
         components=components,
         limits=limits,
     )

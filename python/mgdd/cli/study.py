@@ -45,7 +45,7 @@ def add(commands: Any) -> None:
 
 def run(args: argparse.Namespace) -> None:
     """List the studies, or run one."""
-    check_output(args, csv=False)
+    check_output(args)
     titles = available_studies()
     if args.list:
         width = max(map(len, titles))

@@ -2,24 +2,21 @@
 
 from __future__ import annotations
 
-import argparse
 from typing import Any
 
 from mgdd.cli import throttle_excite, throttle_identify, throttle_simulate
+from mgdd.cli.options import add_group
 
 __all__ = ["add"]
 
 
 def add(commands: Any) -> None:
     """Add the group and its commands."""
-    group = commands.add_parser(
-        "throttle",
-        help="an electronic throttle: simulate, excite, identify, validate",
-        epilog="example:\n  mgdd throttle identify chirp.csv --model pw_r --test steps.csv --json",
-        formatter_class=argparse.RawDescriptionHelpFormatter,
-    )
-    group.set_defaults(parser=group)
-    verbs = group.add_subparsers(title="commands", metavar="COMMAND")
+    verbs = add_group(
+        commands, "throttle",
+        help_text="an electronic throttle: simulate, excite, identify, validate",
+        example="mgdd throttle identify chirp.csv --model pw_r --test steps.csv --json",
+    )  # fmt: skip
     throttle_simulate.add(verbs)
     throttle_excite.add(verbs)
     throttle_identify.add(verbs)

@@ -7,9 +7,8 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from mgdd import identify, signals
-from mgdd.cli.options import add_command
-from mgdd.cli.output import emit
-from mgdd.cli.throttle_files import check_ending
+from mgdd.cli.options import add_command, as_option
+from mgdd.cli.output import check_output, emit
 from mgdd.cli.throttle_parameters import add_throttle, throttle_of
 from mgdd.errors import ParameterError
 from mgdd.identify.throttle.excitation_design import EXCITATIONS
@@ -65,7 +64,7 @@ def add(verbs: Any) -> None:
     )
     group.add_argument("--amplitude", type=float, metavar="X", help="half the swing of the duty")
     for name, (kind, text) in _HELP.items():
-        group.add_argument("--" + name.replace("_", "-"), type=kind, metavar="X", help=text)
+        group.add_argument(as_option(name), type=kind, metavar="X", help=text)
     group.add_argument("--step-s", type=float, default=1e-3, metavar="X", help="sample time [s] (default: 0.001)")
     limits = parser.add_argument_group("limits")
     limits.add_argument(
@@ -78,22 +77,22 @@ def add(verbs: Any) -> None:
 
 
 def _excite(args: argparse.Namespace) -> None:
-    check_ending(args.output, (".csv", ".json"))
+    check_output(args, ".csv", ".json")
     throttle, preset = throttle_of(args)
     window = None if args.angle_window_deg is None else tuple(args.angle_window_deg)
     limits = {name: getattr(args, name) for name in ("max_rate_deg_per_s", "max_current_a", "start_deg")}
     given = {name: getattr(args, name) for name in _HELP if getattr(args, name) is not None}
     for name in given:
         if name not in _OF_KIND[args.kind]:
-            have = ", ".join("--" + n.replace("_", "-") for n in _OF_KIND[args.kind])
-            raise ParameterError(f"--{name.replace('_', '-')} is not an option of a {args.kind}, which has {have}")
+            have = ", ".join(as_option(n) for n in _OF_KIND[args.kind])
+            raise ParameterError(f"{as_option(name)} is not an option of a {args.kind}, which has {have}")
     if (args.offset is None) != (args.amplitude is None):
         raise ParameterError("--offset and --amplitude belong together: give both, or none for a designed signal")
     if args.offset is None:
         others = [name for name in given if name != "duration_s"]
         if others:
             raise ParameterError(
-                f"--{others[0].replace('_', '-')} acts on a signal of your own only: give --offset and --amplitude too"
+                f"{as_option(others[0])} acts on a signal of your own only: give --offset and --amplitude too"
             )
         signal, check = identify.design_excitation(
             args.kind, throttle, side=args.side, duration_s=args.duration_s, step_s=args.step_s,

@@ -3,17 +3,21 @@
 from __future__ import annotations
 
 import argparse
-import sys
-from pathlib import Path
 from typing import TYPE_CHECKING
 
-from mgdd.errors import ParameterError
+from mgdd.cli.options import column_of
 from mgdd.io import read_throttle_log
 
 if TYPE_CHECKING:
     import xarray as xr
 
-__all__ = ["add_log_options", "check_ending", "log_of", "wrote"]
+__all__ = ["add_log_options", "log_of"]
+
+# Options and arguments of `mgdd.io.read_throttle_log` of one name.
+_COLUMNS = ("time", "duty", "angle", "current", "supply")
+_READING = (
+    "time_unit", "duty_unit", "angle_unit", "travel_deg", "start_s", "stop_s", "step_s", "delimiter", "decimal",
+)  # fmt: skip
 
 
 def add_log_options(parser: argparse.ArgumentParser) -> None:
@@ -39,37 +43,6 @@ def log_of(args: argparse.Namespace, file: str) -> xr.Dataset:
     """Read a log with the options of `add_log_options`."""
     return read_throttle_log(
         file,
-        time=_column(args.time),
-        duty=_column(args.duty),
-        angle=_column(args.angle),
-        current=None if args.current is None else _column(args.current),
-        supply=None if args.supply is None else _column(args.supply),
-        time_unit=args.time_unit,
-        duty_unit=args.duty_unit,
-        angle_unit=args.angle_unit,
-        travel_deg=args.travel_deg,
-        start_s=args.start_s,
-        stop_s=args.stop_s,
-        step_s=args.step_s,
-        delimiter=args.delimiter,
-        decimal=args.decimal,
+        **{name: column_of(getattr(args, name)) for name in _COLUMNS},
+        **{name: getattr(args, name) for name in _READING},
     )
-
-
-def check_ending(file: str | None, endings: tuple[str, ...]) -> None:
-    """Refuse an output of unknown kind, or into a folder that is not there, before any work is done."""
-    if file is None:
-        return
-    if Path(file).suffix not in endings:
-        raise ParameterError(f"-o {file}: the ending must be one of {', '.join(endings)}")
-    if not Path(file).resolve().parent.is_dir():
-        raise ParameterError(f"-o {file}: there is no folder {Path(file).parent}")
-
-
-def wrote(file: str) -> None:
-    """Say on stderr that a file was written."""
-    print(f"wrote {file}", file=sys.stderr)
-
-
-def _column(text: str) -> int | str:
-    return int(text) if text.isdigit() else text

@@ -9,11 +9,12 @@ from typing import TYPE_CHECKING, Any
 
 from mgdd import identify
 from mgdd.cli.options import add_command
-from mgdd.cli.output import check_figure, emit
-from mgdd.cli.throttle_files import add_log_options, check_ending, log_of, wrote
+from mgdd.cli.output import check_figure, check_output, emit, save_figure, wrote
+from mgdd.cli.throttle_files import add_log_options, log_of
 from mgdd.errors import ConvergenceError
 from mgdd.identify.throttle.fits import KINDS
 from mgdd.optimize import FitOptions
+from mgdd.results.fit import figures_of
 
 if TYPE_CHECKING:
     import xarray as xr
@@ -75,7 +76,7 @@ def _counts(text: str) -> list[int]:
 
 
 def _identify(args: argparse.Namespace) -> None:
-    check_ending(args.output, (".toml", ".json"))
+    check_output(args, ".toml", ".json")
     check_figure(args.figure)
     log = log_of(args, args.file)
     test = None if args.test is None else log_of(args, args.test)
@@ -102,21 +103,18 @@ def _identify(args: argparse.Namespace) -> None:
 
 
 def _payload(fit: Fit) -> dict[str, Any]:
-    train, test = fit.train, fit.test
     figures = fit.to_dict()
     same = ("source", "parameters", "stderr", "unidentifiable", "status", "success", "nit", "nfev")
     return {
         "model": fit.kind,
-        "fit_percent_train": None if train is None else train.nrmse_fit_percent,
-        "fit_percent_test": None if test is None else test.nrmse_fit_percent,
-        "rmse_test": None if test is None else test.rmse,
+        **figures_of(fit),
         "findings": [str(finding) for finding in fit.findings],
         **{name: figures[name] for name in same},
     }
 
 
 def _validate(args: argparse.Namespace) -> None:
-    check_ending(args.output, (".json",))
+    check_output(args)
     check_figure(args.figure)
     model = identify.load_throttle_model(args.fit)
     validation = identify.validate_throttle(model, log_of(args, args.file))
@@ -137,5 +135,4 @@ def _draw(validation: ThrottleValidation, file: str, correlation: xr.Dataset | N
         validation.plot(what, ax=pane)
     if correlation is not None:
         plot.correlation_matrix(correlation, ax=axes[3])
-    figure.savefig(file, dpi=150)
-    wrote(file)
+    save_figure(figure, file)

@@ -3,11 +3,10 @@
 from __future__ import annotations
 
 import argparse
-import difflib
-from typing import Any
 
 from mgdd import presets
-from mgdd.errors import ParameterError
+from mgdd.cli.options import assignments
+from mgdd.errors import ParameterError, did_you_mean
 from mgdd.throttle import Throttle
 
 __all__ = ["add_throttle", "throttle_of"]
@@ -32,24 +31,11 @@ def throttle_of(args: argparse.Namespace) -> tuple[Throttle, str]:
     if throttle is None:
         raise ParameterError(f"--preset {args.preset}: is not a throttle; P1, P2 and P3 are")
     fields = Throttle.fields()
-    values: dict[str, Any] = {}
-    for item in args.set:
-        name, sign, text = (part.strip() for part in item.partition("="))
-        name = name.replace("-", "_")
-        if not (sign and name and text):
-            raise ParameterError(f"--set {item}: write FIELD=VALUE")
+    values = assignments(args.set, fields)
+    for name in values:
         if name not in fields:
-            close = difflib.get_close_matches(name, fields, 1)
-            guess = f"; did you mean {close[0]!r}?" if close else ""
-            raise ParameterError(f"--set {item}: no field {name!r}{guess}; the fields are {', '.join(fields)}")
-        if name in values:
-            raise ParameterError(f"--set {name} is given twice: give it once")
-        values[name] = text if "choices" in fields[name] else _number(name, text, str(fields[name]["unit"]))
+            guess = did_you_mean(name, fields)
+            raise ParameterError(
+                f"--set {name}: no field {name!r}; {guess + '; ' if guess else ''}the fields are {', '.join(fields)}"
+            )
     return throttle.replace(**values), str(preset.name)
-
-
-def _number(name: str, text: str, unit: str) -> float:
-    try:
-        return float(text)
-    except ValueError:
-        raise ParameterError.of(name, text, f"a number [{unit}]") from None

@@ -3,23 +3,20 @@
 from __future__ import annotations
 
 import argparse
-import sys
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 import numpy as np
 
-from mgdd.cli.options import add_command
-from mgdd.cli.output import check_figure, check_output, emit
+from mgdd.cli.options import add_command, as_option
+from mgdd.cli.output import check_figure, check_output, emit, save_figure
 from mgdd.cli.throttle_parameters import add_throttle, throttle_of
 from mgdd.errors import DataError, ParameterError
 from mgdd.io.table import read_table
 from mgdd.io.throttle_checks import Place
+from mgdd.plot.style import drawn
 from mgdd.signals.even_grid import even_step
 from mgdd.throttle import simulate
 from mgdd.throttle.simulation import step_summary
-
-if TYPE_CHECKING:
-    import xarray as xr
 
 __all__ = ["add"]
 
@@ -61,7 +58,7 @@ def add(verbs: Any) -> None:
 
 
 def _simulate(args: argparse.Namespace) -> None:
-    check_output(args, csv=True)
+    check_output(args, ".json", ".csv")
     check_figure(args.figure)
     throttle, preset = throttle_of(args)
     run = simulate(
@@ -83,7 +80,9 @@ def _simulate(args: argparse.Namespace) -> None:
         "parameters": throttle.to_dict(),
     }
     if args.figure is not None:
-        _draw(run, args.figure)
+        from mgdd.plot.throttle_run import throttle_run
+
+        save_figure(drawn(throttle_run, run, size=(7.0, 5.4)), args.figure)
     emit(args, payload, traces=run)
 
 
@@ -96,7 +95,7 @@ def _constant(args: argparse.Namespace) -> dict[str, Any]:
 def _from_file(args: argparse.Namespace) -> dict[str, Any]:
     for name in ("duration_s", "sample_s"):
         if getattr(args, name) is not None:
-            raise ParameterError(f"--{name.replace('_', '-')} goes with --duty: the times of --input are its own")
+            raise ParameterError(f"{as_option(name)} goes with --duty: the times of --input are its own")
     table = read_table(args.input)
     header = table.header
     if header is None:
@@ -127,14 +126,3 @@ def _check_rows(columns: dict[str, Any], place: Place) -> None:
     if supply.ndim and supply.min() < 0.0:
         at = int(np.argmax(supply < 0.0))
         raise DataError(f"{place.cell(at, 'supply_v')}: supply_v = {supply[at]:g} V: must be >= 0")
-
-
-def _draw(run: xr.Dataset, file: str) -> None:
-    from matplotlib.figure import Figure
-
-    from mgdd.plot.throttle_run import throttle_run
-
-    figure = Figure(figsize=(7.0, 5.4), layout="constrained")
-    throttle_run(run, ax=figure.add_subplot())
-    figure.savefig(file, dpi=150)
-    print(f"wrote {file}", file=sys.stderr)

@@ -10,7 +10,8 @@ from __future__ import annotations
 from mgdd.identify.engine.best_timing import best_timing
 from mgdd.identify.engine.cylinder import fit_cylinder
 from mgdd.identify.engine.profile import wall_heat_profile
-from mgdd.identify.ode_fit import OdeModel, fit_ode
+from mgdd.identify.ode_fit import fit_ode
+from mgdd.identify.ode_model import OdeModel
 from mgdd.identify.throttle.excitation_check import check_excitation
 from mgdd.identify.throttle.excitation_design import design_excitation
 from mgdd.identify.throttle.first_principle import fit_first_principle

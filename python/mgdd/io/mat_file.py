@@ -2,14 +2,13 @@
 
 from __future__ import annotations
 
-import errno
 from dataclasses import dataclass
-from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
 from mgdd.errors import DataError
+from mgdd.io.existing_file import existing_file
 
 if TYPE_CHECKING:
     import os
@@ -53,9 +52,7 @@ def read_mat(path: str | os.PathLike[str]) -> MatColumns:
     """Read a MATLAB file of version 5 to 7; the fields of a struct are called ``struct.field``."""
     from scipy.io import loadmat
 
-    file = Path(path)
-    if not file.exists():
-        raise FileNotFoundError(errno.ENOENT, "no such file: check the path", str(file))
+    file = existing_file(path)
     try:
         content = loadmat(file, squeeze_me=True, struct_as_record=False)
     except NotImplementedError:

@@ -6,17 +6,15 @@ The one reader and writer of such files. It knows mappings only; presets, models
 
 from __future__ import annotations
 
-import difflib
-import errno
 import tomllib
 from collections.abc import Collection, Iterable, Mapping
 from dataclasses import dataclass, field, replace
-from pathlib import Path
 from typing import TYPE_CHECKING, Any, Self
 
 import numpy as np
 
-from mgdd.errors import DataError, ParameterError
+from mgdd.errors import DataError, ParameterError, did_you_mean
+from mgdd.io.existing_file import existing_file
 from mgdd.io.parameter_entries import FORMS, PARTS, Entry, Wanted, entries, entry_of, fits, key_line, quoted, wanted
 
 if TYPE_CHECKING:
@@ -147,9 +145,7 @@ class ParameterFile:
     @classmethod
     def read(cls, path: str | os.PathLike[str]) -> ParameterFile:
         """Read a file; FileNotFoundError or DataError name it."""
-        file = Path(path)
-        if not file.exists():
-            raise FileNotFoundError(errno.ENOENT, "no such file: check the path", str(file))
+        file = existing_file(path)
         try:
             text = file.read_text(encoding="utf-8")
         except UnicodeDecodeError as error:
@@ -293,8 +289,7 @@ def _example(key: str, unit: str) -> str:
 
 def _near(name: str, known: Iterable[str]) -> str:
     names = list(known)
-    close = difflib.get_close_matches(name, names, 1)
-    return f"did you mean {close[0]!r}?" if close else f"known are {', '.join(names)}"
+    return did_you_mean(name, names) or f"known are {', '.join(names)}"
 
 
 def _short(value: Any) -> str:

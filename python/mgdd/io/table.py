@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import codecs
-import errno
 import re
 from dataclasses import dataclass
 from pathlib import Path
@@ -12,6 +11,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from mgdd.errors import DataError, argument
+from mgdd.io.existing_file import existing_file
 
 if TYPE_CHECKING:
     import os
@@ -83,7 +83,7 @@ def read_table(
         raise DataError.of("decimal", decimal, "'.' or ','")
     if delimiter is not None and delimiter in ("", decimal):
         raise DataError(f"delimiter = {delimiter!r}: must not be empty or the decimal mark {decimal!r}")
-    file = Path(path)
+    file = existing_file(path)
     content = [
         (number, line.strip())
         for number, line in enumerate(_text(file).splitlines(), start=1)
@@ -121,8 +121,6 @@ def _like_number(cell: str) -> bool:
 
 
 def _text(file: Path) -> str:
-    if not file.exists():
-        raise FileNotFoundError(errno.ENOENT, "no such file: check the path", str(file))
     raw = file.read_bytes()
     if raw.startswith((codecs.BOM_UTF16_LE, codecs.BOM_UTF16_BE)):
         return raw.decode("utf-16", errors="replace")

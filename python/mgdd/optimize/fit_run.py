@@ -5,15 +5,19 @@ from __future__ import annotations
 from typing import TYPE_CHECKING, Any, cast
 
 from mgdd.results import Fit
-from mgdd.results.fit import FitQuality
+from mgdd.results.fit import FitQuality, n_best_of
 from mgdd.results.labels import Label, label_of, labelled_dataset
 from mgdd.signals.metrics import nrmse_fit_percent, rmse
 
 if TYPE_CHECKING:
+    from collections.abc import Iterable
+
     import xarray as xr
     from numpy.typing import ArrayLike
 
-__all__ = ["draw_run", "fit_run", "quality_of"]
+    from mgdd.results import FitReport
+
+__all__ = ["draw_run", "fit_of", "fit_run", "quality_of"]
 
 
 def fit_run(time_s: ArrayLike, measured: ArrayLike, model: ArrayLike, label: Label) -> xr.Dataset:
@@ -33,6 +37,19 @@ def quality_of(run: xr.Dataset) -> FitQuality:
     percent = nrmse_fit_percent(measured, model) if measured.min() < measured.max() else None
     error = rmse(measured, model)
     return FitQuality(nrmse_fit_percent=percent, rmse=error, unit=label_of(run["measured"]).units, n=measured.size)
+
+
+def fit_of(report: FitReport, model: Any, run: xr.Dataset | None, errors: Iterable[float], **more: Any) -> Fit:
+    """Make a fit of the best report, its model and free run, the errors of all searches, and what else is known."""
+    ranked = tuple(sorted(errors))
+    known = {
+        "kind": model.kind,
+        "train": None if run is None else quality_of(run),
+        "findings": report.findings,
+        "unidentifiable": report.unidentifiable,
+        "n_best": n_best_of(ranked),
+    }
+    return Fit(report=report, model=model, run=run, draw=draw_run, start_rmse=ranked, **{**known, **more})
 
 
 def draw_run(fit: Fit, ax: Any) -> Any:

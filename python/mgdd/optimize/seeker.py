@@ -12,6 +12,7 @@ import numpy as np
 
 from mgdd import _core
 from mgdd.errors import DataError, Error, Interrupted, ParameterError
+from mgdd.io.existing_file import existing_file
 from mgdd.results.describe import as_html, rows_of
 from mgdd.results.labels import labelled_dataset
 
@@ -219,7 +220,7 @@ class Seeker(_CoreSeeker):
 
 def _read(path: str | os.PathLike[str]) -> tuple[str, dict[str, Any], dict[str, Any]]:
     """Read kind, settings and state of a file that `Seeker.save` wrote; DataError if it is none."""
-    file = Path(path)
+    file = existing_file(path)
     try:
         content = json.loads(file.read_text(encoding="utf-8"), object_hook=_decode)
         found = content["format"]

@@ -13,13 +13,13 @@ from mgdd.plot.style import (
     GREY,
     LINE_STYLES,
     ORANGE,
-    axis_label,
+    finished,
     legend,
     minus,
     new_axes,
-    panel_below,
     require,
-)
+    residual_below,
+)  # fmt: skip
 from mgdd.results.labels import ANGLE, label_of
 
 if TYPE_CHECKING:
@@ -75,12 +75,10 @@ def calibration_overlay(overlay: xr.Dataset, *, ax: Axes | None = None) -> Axes:
     optional = (*_EVENTS, "rmse_percent", "imep_closed_error_percent")
     require(overlay, (*needed, *(name for name in optional if name in overlay)), "mgdd.identify.fit_cylinder")
     ax = new_axes(ax, height=4.8)
-    panel = panel_below(ax)
+    panel = residual_below(ax, overlay, ANGLE, "residual_bar")
     angle = overlay[ANGLE].to_numpy()
     lines: list[Line2D] = ax.plot(angle, overlay["measured_bar"], ".", color=GREY, markersize=4, label="measured")
     lines += ax.plot(angle, overlay["model_bar"], "-", color=BLACK, linewidth=1.2, label=_model_name(overlay))
-    panel.plot(angle, overlay["residual_bar"], "-", color=BLACK, linewidth=1.0)
-    panel.axhline(0.0, color=GREY, linewidth=0.8)
     for name, (dash, color) in _EVENTS.items():
         if name in overlay and np.isfinite(overlay[name]):
             at = float(overlay[name])
@@ -88,9 +86,6 @@ def calibration_overlay(overlay: xr.Dataset, *, ax: Axes | None = None) -> Axes:
             label = minus(f"{label_of(overlay[name]).long_name} {at:.1f}")
             lines.append(ax.axvline(at, linestyle=dash, color=color, label=label))
     ax.set_ylabel("cylinder pressure [bar]")
-    ax.tick_params(labelbottom=False)
-    ax.set_xlim(float(angle[0]), float(angle[-1]))
-    panel.set(xlabel=axis_label(overlay, ANGLE), ylabel="model −\nmeasured\n[bar]")
     quality = _quality(overlay)
     if quality:
         ax.text(0.02, 0.95, quality, transform=ax.transAxes, va="top", fontsize="small")
@@ -147,17 +142,10 @@ def wall_heat_profile(profile: xr.Dataset, *, ax: Axes | None = None) -> Axes:
     fine = np.linspace(float(scale.min()), float(scale.max()), 2001)
     inside = fine[np.interp(fine, scale, together) <= 1.1 * together.min()]
     span = ax.axvspan(
-        float(inside.min()),
-        float(inside.max()),
-        color=GREY,
-        alpha=0.2,
-        linewidth=0,
-        label="within 10 % of the best",
+        float(inside.min()), float(inside.max()), color=GREY, alpha=0.2, linewidth=0, label="within 10 % of the best"
     )
-    ax.set(xlabel=axis_label(profile, "wall_heat_scale"), ylabel=axis_label(profile, "rmse_percent"))
     ax.set_ylim(bottom=0.0)
-    legend(ax, [*lines, span])
-    return ax
+    return finished(ax, profile, "wall_heat_scale", "rmse_percent", [*lines, span], grid=False)
 
 
 def _model_name(overlay: xr.Dataset) -> str:

@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from mgdd.errors import DataError
-from mgdd.plot.style import BLACK, BLUE, GREEN, GREY, LINE_STYLES, ORANGE, axis_label, legend, minus, new_axes, require
+from mgdd.plot.style import BLACK, BLUE, GREEN, GREY, LINE_STYLES, ORANGE, finished, minus, new_axes, require
 
 if TYPE_CHECKING:
     import xarray as xr
@@ -83,8 +83,5 @@ def convergence(tracks: xr.Dataset, *, ax: Axes | None = None) -> Axes:
         best = float(tracks["optimum_cad"])
         label = minus(f"optimum {best:.2f}")
         handles.append(ax.axhline(best, color=GREY, linewidth=0.9, linestyle=(0, (1, 1)), label=label))
-    ax.set(xlabel=axis_label(tracks, "cycle"), ylabel=axis_label(tracks, "estimate_median_cad"))
     ax.set_xlim(float(cycle[0]), float(cycle[-1]))
-    ax.grid(alpha=0.3)
-    legend(ax, handles)
-    return ax
+    return finished(ax, tracks, "cycle", "estimate_median_cad", handles)

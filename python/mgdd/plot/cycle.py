@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from mgdd.errors import DataError
-from mgdd.plot.style import BLACK, BLUE, GREY, ORANGE, axis_label, legend, minus, new_axes, require
+from mgdd.plot.style import BLACK, BLUE, GREY, ORANGE, axis_label, finished, minus, new_axes, require
 from mgdd.results.labels import ANGLE, label_of
 
 if TYPE_CHECKING:
@@ -66,7 +66,6 @@ def pressure(dataset: xr.Dataset, *, ax: Axes | None = None) -> Axes:
     if "motored_pressure_bar" in dataset:
         motored = dataset["motored_pressure_bar"]
         lines += ax.plot(angle, motored, "--", color=GREY, label=label_of(motored).long_name)
-    ax.set(xlabel=axis_label(dataset, ANGLE), ylabel=axis_label(dataset, "pressure_bar"))
     ax.set_xlim(float(angle[0]), float(angle[-1]))
     if rates:
         twin = ax.twinx()
@@ -75,8 +74,7 @@ def pressure(dataset: xr.Dataset, *, ax: Axes | None = None) -> Axes:
             label = label_of(dataset[name]).long_name
             lines += twin.plot(angle, dataset[name], dash, color=color, linewidth=1.2, label=label)
         twin.set_ylabel(axis_label(dataset, rates[0]) if len(rates) == 1 else "heat release rate [J/°CA]")
-    legend(ax, lines)
-    return ax
+    return finished(ax, dataset, ANGLE, "pressure_bar", lines, grid=False)
 
 
 def log_pv(dataset: xr.Dataset, *, ax: Axes | None = None) -> Axes:
@@ -130,11 +128,9 @@ def log_pv(dataset: xr.Dataset, *, ax: Axes | None = None) -> Axes:
         dash, color = _SLOPE_STYLES[name]
         label = minus(f"{name.removeprefix('n_')} n = {exponent:.3f} ({low:g} to {high:g} °CA aTDC)")
         lines += ax.plot(ends, constant * ends**-exponent, dash, color=color, linewidth=2.4, label=label)
-    ax.set(xscale="log", yscale="log", xlabel=axis_label(dataset, "volume_l"))
-    ax.set_ylabel(axis_label(dataset, "pressure_bar"))
+    ax.set(xscale="log", yscale="log")
     _plain_ticks(ax)
-    legend(ax, lines, columns=1)
-    return ax
+    return finished(ax, dataset, "volume_l", "pressure_bar", lines, columns=1, grid=False)
 
 
 def _name(dataset: xr.Dataset) -> str:

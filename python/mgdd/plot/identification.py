@@ -7,19 +7,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from mgdd.errors import DataError
-from mgdd.plot.style import (
-    BLACK,
-    BLUE,
-    GREY,
-    LINE_STYLES,
-    ORANGE,
-    axis_label,
-    legend,
-    minus,
-    new_axes,
-    panel_below,
-    require,
-)
+from mgdd.plot.style import BLACK, BLUE, GREY, LINE_STYLES, ORANGE, axis_label, divide, legend, minus, new_axes, require
 
 if TYPE_CHECKING:
     import xarray as xr
@@ -122,7 +110,7 @@ def residual_correlation(correlations: xr.Dataset, *, ax: Axes | None = None) ->
     names = ("autocorrelation", "cross_correlation")
     require(correlations, ("lag", *names, "limit"), "mgdd.signals.residual_tests")
     ax = new_axes(ax, height=4.4)
-    panels = (ax, panel_below(ax, share=0.5))
+    panels = divide(ax, (1.0, 1.0))
     lag, limit = correlations["lag"].to_numpy(), float(correlations["limit"])
     lines: list[Artist] = []
     for panel, name in zip(panels, names, strict=True):
@@ -138,7 +126,6 @@ def residual_correlation(correlations: xr.Dataset, *, ax: Axes | None = None) ->
         panel.grid(alpha=0.3)
         lines = lines or [band, inside, outside]
     ax.set_ylabel("residual with itself [-]")
-    ax.tick_params(labelbottom=False)
     panels[1].set(xlabel=axis_label(correlations, "lag"), ylabel="with earlier duty [-]")
     legend(ax, lines, columns=3)
     return ax

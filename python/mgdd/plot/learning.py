@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from typing import TYPE_CHECKING
 
-from mgdd.plot.style import LINE_STYLES, axis_label, legend, new_axes, require
+from mgdd.plot.style import LINE_STYLES, finished, new_axes, require
 
 if TYPE_CHECKING:
     import xarray as xr
@@ -57,9 +57,7 @@ def learning(learned: xr.Dataset, *, ax: Axes | None = None) -> Axes:
             learned["trial"], error[index], linestyle=dash, color=color, marker=_MARKERS[index % len(_MARKERS)],
             markersize=4, label=str(law),
         )  # fmt: skip
-    ax.set(xlabel=axis_label(learned, "trial"), ylabel=axis_label(learned, "ca50_error_cad"))
     ax.yaxis.set_major_formatter("{x:g}")
     ax.yaxis.set_minor_formatter("{x:g}")
     ax.grid(alpha=0.3, which="both")
-    legend(ax, lines, columns=3)
-    return ax
+    return finished(ax, learned, "trial", "ca50_error_cad", lines, columns=3, grid=False)

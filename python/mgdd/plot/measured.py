@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from typing import TYPE_CHECKING
 
-from mgdd.plot.style import BLACK, BLUE, axis_label, legend, new_axes, require
+from mgdd.plot.style import BLACK, BLUE, finished, new_axes, require
 
 if TYPE_CHECKING:
     import xarray as xr
@@ -52,7 +52,4 @@ def measured_and_model(run: xr.Dataset, *, ax: Axes | None = None) -> Axes:
     lines: list[Artist] = []
     lines += ax.plot(run["time_s"], run["measured"], color=BLACK, label="measured")
     lines += ax.plot(run["time_s"], run["model"], color=BLUE, linestyle="--", label="free run")
-    ax.set(xlabel=axis_label(run, "time_s"), ylabel=axis_label(run, "measured"))
-    ax.grid(alpha=0.3)
-    legend(ax, lines)
-    return ax
+    return finished(ax, run, "time_s", "measured", lines)

@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from mgdd.errors import DataError
-from mgdd.plot.style import BLACK, BLUE, GREY, LINE_STYLES, ORANGE, axis_label, legend, minus, new_axes, require
+from mgdd.plot.style import BLACK, BLUE, GREY, LINE_STYLES, ORANGE, axis_label, divide, legend, minus, new_axes, require
 from mgdd.results.labels import label_of
 
 if TYPE_CHECKING:
@@ -79,7 +79,7 @@ def seeking(
         if name not in limited:
             raise DataError(f"limit_values: {name!r} was not measured as a limit in this run, which has {limited}")
     ax = new_axes(ax, height=2.0 + 1.6 * (1 + bool(third) + bool(limited)))
-    panels = _divide(ax, 2 + bool(third) + bool(limited))
+    panels = divide(ax, [1.4] + [1.0] * (1 + bool(third) + bool(limited)))
     cycle = run["cycle"].to_numpy()
     handles: list[Artist] = []
     handles += ax.plot(cycle, run["soc_requested_cad"], color=GREY, linewidth=0.6, label="with dither")
@@ -111,7 +111,6 @@ def seeking(
         panels[-1].set_ylabel(_limit_label(run, limited))
     for panel in panels:
         panel.grid(alpha=0.3)
-        panel.tick_params(labelbottom=panel is panels[-1])
     ax.set_xlim(float(cycle[0]), float(cycle[-1]))
     panels[-1].set_xlabel(axis_label(run, "cycle"))
     ax.figure.align_ylabels(panels)
@@ -142,17 +141,3 @@ def _running_mean(values: NDArray[np.float64], window: int) -> NDArray[np.float6
     last = np.arange(1, values.size + 1)
     first = np.maximum(last - window, 0)
     return np.asarray((total[last] - total[first]) / np.maximum(count[last] - count[first], 1))
-
-
-def _divide(ax: Axes, panels: int) -> list[Axes]:
-    """Divide axes into panels one above the other; the given ones become the uppermost."""
-    spec = ax.get_subplotspec()
-    if spec is not None:
-        inner = spec.subgridspec(panels, 1, height_ratios=[1.4] + [1.0] * (panels - 1), hspace=0.08)
-        ax.set_subplotspec(inner[0])
-        return [ax, *(ax.figure.add_subplot(inner[place], sharex=ax) for place in range(1, panels))]
-    left, bottom, width, height = ax.get_position().bounds
-    part = height / panels
-    ax.set_position((left, bottom + (panels - 1) * part, width, 0.92 * part))
-    places = [bottom + (panels - 1 - place) * part for place in range(1, panels)]
-    return [ax, *(ax.figure.add_axes((left, place, width, 0.92 * part), sharex=ax) for place in places)]

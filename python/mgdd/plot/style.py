@@ -2,17 +2,18 @@
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
 from mgdd.errors import DataError
 from mgdd.results.labels import check_labels, label_of
 
 if TYPE_CHECKING:
-    from collections.abc import Sequence
+    from collections.abc import Callable, Sequence
 
     import xarray as xr
     from matplotlib.artist import Artist
     from matplotlib.axes import Axes
+    from matplotlib.figure import Figure
 
 __all__ = [
     "BLACK",
@@ -22,11 +23,14 @@ __all__ = [
     "LINE_STYLES",
     "ORANGE",
     "axis_label",
+    "divide",
+    "drawn",
+    "finished",
     "legend",
     "minus",
     "new_axes",
-    "panel_below",
     "require",
+    "residual_below",
 ]
 
 # Okabe and Ito's palette: apart for colour-blind eyes, and of different lightness in print.
@@ -49,16 +53,42 @@ def new_axes(ax: Axes | None, *, height: float = 3.8) -> Axes:
     return plt.subplots(figsize=(6.6, height), layout="constrained")[1]
 
 
-def panel_below(ax: Axes, *, share: float = 0.25) -> Axes:
-    """Give the lower `share` of `ax` to new axes with the same x axis, and return them."""
-    spec = ax.get_subplotspec()
+def drawn(draw: Callable[..., Axes], data: xr.Dataset, *, size: tuple[float, float], **how: Any) -> Figure:
+    """Draw data on the only axes of a new figure of `size` inches, which pyplot does not know."""
+    from matplotlib.figure import Figure
+
+    figure = Figure(figsize=size, layout="constrained")
+    draw(data, ax=figure.add_subplot(), **how)
+    return figure
+
+
+def divide(ax: Axes, heights: Sequence[float]) -> list[Axes]:
+    """Divide axes into panels of these heights on one x axis, one above the other; `ax` becomes the uppermost."""
+    spec, count = ax.get_subplotspec(), len(heights)
     if spec is not None:
-        inner = spec.subgridspec(2, 1, height_ratios=(1.0 - share, share), hspace=0.06)
+        inner = spec.subgridspec(count, 1, height_ratios=heights, hspace=0.07)
         ax.set_subplotspec(inner[0])
-        return ax.figure.add_subplot(inner[1], sharex=ax)
-    left, bottom, width, height = ax.get_position().bounds
-    ax.set_position((left, bottom + (share + 0.02) * height, width, (0.98 - share) * height))
-    return ax.figure.add_axes((left, bottom, width, (share - 0.01) * height), sharex=ax)
+        panels = [ax, *(ax.figure.add_subplot(inner[place], sharex=ax) for place in range(1, count))]
+    else:
+        left, bottom, width, height = ax.get_position().bounds
+        scale, gap = height / sum(heights), 0.02 * height
+        feet = [bottom + scale * sum(heights[place + 1 :]) + gap for place in range(count - 1)] + [bottom]
+        boxes = [(left, foot, width, scale * own - gap) for foot, own in zip(feet, heights, strict=True)]
+        ax.set_position(boxes[0])
+        panels = [ax, *(ax.figure.add_axes(box, sharex=ax) for box in boxes[1:])]
+    for panel in panels[:-1]:
+        panel.tick_params(labelbottom=False)
+    return panels
+
+
+def residual_below(ax: Axes, data: xr.Dataset, x: str, residual: str) -> Axes:
+    """Give the lower quarter of `ax` to a residual, model minus measured, over the whole of x; return its panel."""
+    over, panel = data[x].to_numpy(), divide(ax, (3.0, 1.0))[1]
+    panel.plot(over, data[residual], "-", color=BLACK, linewidth=0.8)
+    panel.axhline(0.0, color=GREY, linewidth=0.8)
+    panel.set(xlabel=axis_label(data, x), ylabel=minus(f"model -\nmeasured\n[{label_of(data[residual]).units}]"))
+    ax.set_xlim(float(over[0]), float(over[-1]))
+    return panel
 
 
 def require(dataset: xr.Dataset, names: tuple[str, ...], made_by: str) -> None:
@@ -93,3 +123,14 @@ def legend(ax: Axes, lines: Sequence[Artist], *, columns: int = 2) -> None:
         borderaxespad=0.0,
         fontsize="small",
     )
+
+
+def finished(
+    ax: Axes, data: xr.Dataset, x: str, y: str, lines: Sequence[Artist], *, columns: int = 2, grid: bool = True
+) -> Axes:
+    """Label both axes by variables of the Dataset, add grid and legend, and return the axes."""
+    ax.set(xlabel=axis_label(data, x), ylabel=axis_label(data, y))
+    if grid:
+        ax.grid(alpha=0.3)
+    legend(ax, lines, columns=columns)
+    return ax

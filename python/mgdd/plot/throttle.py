@@ -6,7 +6,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from mgdd.plot.style import BLACK, BLUE, GREY, ORANGE, axis_label, legend, minus, new_axes, panel_below, require
+from mgdd.plot.style import BLACK, BLUE, GREY, ORANGE, axis_label, finished, legend, new_axes, require, residual_below
 
 if TYPE_CHECKING:
     import xarray as xr
@@ -56,10 +56,7 @@ def holding_duty(log: xr.Dataset, *, limp_home_deg: float | None = None, ax: Axe
     duty, angle = log["duty"].to_numpy(), log["angle_deg"].to_numpy()
     rising = _rising(duty)
     lines: list[Line2D] = []
-    for chosen, dash, color, label in (
-        (rising, "-", BLACK, "duty rising"),
-        (~rising, "--", BLUE, "duty falling"),
-    ):
+    for chosen, dash, color, label in ((rising, "-", BLACK, "duty rising"), (~rising, "--", BLUE, "duty falling")):
         lines += ax.plot(
             _only(angle, chosen), _only(duty, chosen), linestyle=dash, color=color, linewidth=1.3, label=label
         )
@@ -68,10 +65,7 @@ def holding_duty(log: xr.Dataset, *, limp_home_deg: float | None = None, ax: Axe
     if limp_home_deg is not None:
         label = f"limp-home {limp_home_deg:g} deg"
         lines.append(ax.axvline(limp_home_deg, color=GREY, linewidth=0.9, linestyle=(0, (1, 1)), label=label))
-    ax.set(xlabel=axis_label(log, "angle_deg"), ylabel=axis_label(log, "duty"))
-    ax.grid(alpha=0.3)
-    legend(ax, lines)
-    return ax
+    return finished(ax, log, "angle_deg", "duty", lines)
 
 
 def free_run(run: xr.Dataset, *, ax: Axes | None = None) -> Axes:
@@ -112,20 +106,14 @@ def free_run(run: xr.Dataset, *, ax: Axes | None = None) -> Axes:
     """
     require(run, ("time_s", "angle_deg", "model_deg", "residual_deg"), "mgdd.identify.validate_throttle")
     ax = new_axes(ax, height=4.4)
-    panel = panel_below(ax)
+    residual_below(ax, run, "time_s", "residual_deg").grid(alpha=0.3)
     time = run["time_s"].to_numpy()
     name = str(run.attrs.get("kind", "")).replace("_", " ")
     lines: list[Line2D] = ax.plot(time, run["angle_deg"], "-", color=GREY, linewidth=2.4, label="measured")
     label = f"model, free run ({name})" if name else "model, free run"
     lines += ax.plot(time, run["model_deg"], "--", color=BLACK, linewidth=1.0, label=label)
-    panel.plot(time, run["residual_deg"], "-", color=BLACK, linewidth=0.8)
-    panel.axhline(0.0, color=GREY, linewidth=0.8)
     ax.set_ylabel(axis_label(run, "angle_deg"))
-    ax.tick_params(labelbottom=False)
-    ax.set_xlim(float(time[0]), float(time[-1]))
     ax.grid(alpha=0.3)
-    panel.grid(alpha=0.3)
-    panel.set(xlabel=axis_label(run, "time_s"), ylabel=minus("model -\nmeasured\n[deg]"))
     legend(ax, lines)
     return ax
 

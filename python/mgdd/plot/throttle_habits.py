@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from typing import TYPE_CHECKING
 
-from mgdd.plot.style import GREY, LINE_STYLES, axis_label, legend, minus, new_axes, require
+from mgdd.plot.style import GREY, LINE_STYLES, finished, minus, new_axes, require
 
 if TYPE_CHECKING:
     import xarray as xr
@@ -56,10 +56,7 @@ def rate_dependence(dataset: xr.Dataset, *, ax: Axes | None = None) -> Axes:
         lines += ax.plot(
             one["loop_duty"], one["loop_angle_deg"], linestyle=dash, color=color, linewidth=width, label=label
         )
-    ax.set(xlabel=axis_label(dataset, "loop_duty"), ylabel=axis_label(dataset, "loop_angle_deg"))
-    ax.grid(alpha=0.3)
-    legend(ax, lines, columns=4)
-    return ax
+    return finished(ax, dataset, "loop_duty", "loop_angle_deg", lines, columns=4)
 
 
 def air_flow(dataset: xr.Dataset, *, ax: Axes | None = None) -> Axes:
@@ -109,7 +106,4 @@ def air_flow(dataset: xr.Dataset, *, ax: Axes | None = None) -> Axes:
                 label="air flow from here",
             )
         )
-    ax.set(xlabel=axis_label(dataset, "time_s"), ylabel=axis_label(dataset, "air_angle_deg"))
-    ax.grid(alpha=0.3)
-    legend(ax, lines, columns=3)
-    return ax
+    return finished(ax, dataset, "time_s", "air_angle_deg", lines, columns=3)

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from typing import TYPE_CHECKING
 
-from mgdd.plot.style import BLACK, BLUE, GREY, ORANGE, axis_label, legend, new_axes, panel_below, require
+from mgdd.plot.style import BLACK, BLUE, GREY, ORANGE, axis_label, divide, legend, new_axes, require
 from mgdd.results.labels import label_of
 
 if TYPE_CHECKING:
@@ -56,7 +56,7 @@ def throttle_run(run: xr.Dataset, *, ax: Axes | None = None) -> Axes:
         )
     ax.set_ylabel(axis_label(run, "angle_deg"))
     ax.set_xlim(float(time[0]), float(time[-1]))
-    below = _panels_below(ax, len(panels))
+    below = divide(ax, [1.0] + [0.5] * len(panels))[1:]
     for panel, (name, color) in zip(below, panels, strict=True):
         # The input of a sample holds until the next one.
         panel.plot(time, run[name], color=color, linewidth=1.1, drawstyle="steps-post" if name == "duty" else "default")
@@ -65,17 +65,6 @@ def throttle_run(run: xr.Dataset, *, ax: Axes | None = None) -> Axes:
     below[-1].set_xlabel(axis_label(run, "time_s"))
     for one in (ax, *below):
         one.grid(alpha=0.3)
-        one.tick_params(labelbottom=one is below[-1])
     ax.figure.align_ylabels([ax, *below])
     legend(ax, lines)
     return ax
-
-
-def _panels_below(ax: Axes, count: int) -> list[Axes]:
-    """Give the lower half of `ax` to `count` panels with the same time axis."""
-    spec = ax.get_subplotspec()
-    if spec is None:
-        return [panel_below(ax, share=share) for share in (0.5, 0.25)[2 - count :]]
-    inner = spec.subgridspec(count + 1, 1, height_ratios=(1.0, *[0.5] * count), hspace=0.08)
-    ax.set_subplotspec(inner[0])
-    return [ax.figure.add_subplot(inner[place + 1], sharex=ax) for place in range(count)]

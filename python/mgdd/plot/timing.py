@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from mgdd.errors import DataError
-from mgdd.plot.style import BLACK, BLUE, ORANGE, axis_label, legend, minus, new_axes, require
+from mgdd.plot.style import BLACK, BLUE, ORANGE, finished, minus, new_axes, require
 from mgdd.results.labels import label_of
 
 if TYPE_CHECKING:
@@ -70,9 +70,7 @@ def timing(sweep: xr.Dataset, *, ax: Axes | None = None) -> Axes:
         lines += twin.plot(soc, sweep[name], linestyle=dash, color=color, label=label)
     twin.set_ylabel("NOx proxy [ppm]")
     twin.set_ylim(bottom=0.0)
-    ax.set(xlabel=axis_label(sweep, "soc_cad"), ylabel=axis_label(sweep, "efficiency_gross"))
-    legend(ax, lines)
-    return ax
+    return finished(ax, sweep, "soc_cad", "efficiency_gross", lines, grid=False)
 
 
 def _vertex(x: NDArray[np.float64], y: NDArray[np.float64]) -> tuple[float, float, bool]:

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import difflib
 import os
 from collections.abc import Mapping
 from dataclasses import dataclass
@@ -13,7 +12,7 @@ from typing import Any, cast
 
 from mgdd._core.engine import Cylinder, OperatingPoint
 from mgdd._core.throttle import Throttle
-from mgdd.errors import DataError, ParameterError
+from mgdd.errors import DataError, ParameterError, did_you_mean
 from mgdd.io.parameters import Entry, ParameterFile, Parameters, Wanted
 from mgdd.results.describe import core_rows, described
 
@@ -254,12 +253,12 @@ def _load(text: str, kind: str | None) -> Preset:
         try:
             return Preset.of_file(ParameterFile.read(text))
         except FileNotFoundError as error:
+            hint = str(error.strerror).removeprefix("no such file: ")
             raise FileNotFoundError(
-                error.errno, f"no preset file {text!r}; shipped are {', '.join(available(kind))}"
+                error.errno, f"no preset file {text!r}: {hint}; shipped are {', '.join(available(kind))}"
             ) from None
     if text not in available():
-        close = difflib.get_close_matches(text, available(kind), 1)
-        hint = f"did you mean {close[0]!r}?" if close else "or pass a path that ends in .toml"
+        hint = did_you_mean(text, available(kind)) or "or pass a path that ends in .toml"
         raise ParameterError(f"no preset {text!r}: shipped are {', '.join(available(kind))}; {hint}")
     file = resources.files("mgdd.presets").joinpath(f"{text}.toml")
     return Preset.from_toml(file.read_text(encoding="utf-8"), origin=f"preset {text}")

@@ -18,7 +18,7 @@ if TYPE_CHECKING:
 
     import xarray as xr
 
-__all__ = ["Fit", "FitQuality", "n_best_of"]
+__all__ = ["Fit", "FitQuality", "figures_of", "n_best_of"]
 
 _ARRIVED = 1.005  # a start within 0.5 % of the best error counts as having found it
 
@@ -244,19 +244,11 @@ class Fit:
         give = getattr(self.model, "to_parameters", None)
         if give is None:
             raise DataError(f"{type(self.model).__name__} has no parameter file: keep the parameters of to_dict()")
-        figures = {
-            "fit_percent_train": None if self.train is None else self.train.nrmse_fit_percent,
-            "fit_percent_test": None if self.test is None else self.test.nrmse_fit_percent,
-            "rmse_test": None if self.test is None else self.test.rmse,
-        }
-        units = {
-            "fit_percent_train": "%",
-            "fit_percent_test": "%",
-            "rmse_test": "-" if self.test is None else self.test.unit,
-        }
+        units = dict.fromkeys(("fit_percent_train", "fit_percent_test"), "%")
+        units["rmse_test"] = "-" if self.test is None else self.test.unit
         file = give().with_fit(
             stderr=self.stderr,
-            figures={name: (value, units[name]) for name, value in figures.items() if value is not None},
+            figures={name: (value, units[name]) for name, value in figures_of(self).items() if value is not None},
             source=f"fitted to {self.source}",
             unidentifiable=self.unidentifiable,
         )
@@ -274,6 +266,16 @@ class Fit:
 
     def _extra(self) -> list[Finding]:
         return [finding for finding in self.findings if finding not in self.report.findings]
+
+
+def figures_of(fit: Fit) -> dict[str, float | None]:
+    """Give the quality of a fit in the words of its file and of the command line."""
+    train, test = fit.train, fit.test
+    return {
+        "fit_percent_train": None if train is None else train.nrmse_fit_percent,
+        "fit_percent_test": None if test is None else test.nrmse_fit_percent,
+        "rmse_test": None if test is None else test.rmse,
+    }
 
 
 def n_best_of(rmse: tuple[float, ...]) -> int:

@@ -104,14 +104,18 @@ def run_parts(parts: Iterable[tuple[str, Callable[[], Part]]], progress: Progres
                 progress(text)
             done.append(work())
     except KeyboardInterrupt:
-        if not done:
-            raise
+        if not done:  # what the part itself may have kept is no result of a study
+            raise Interrupted("interrupted: nothing was finished") from None
         return done, True
     return done, False
 
 
-def finish(result: StudyResult) -> StudyResult:
+def finish(
+    dataset: xr.Dataset, summary: Mapping[str, Any], draw: Callable[[xr.Dataset], Mapping[str, Figure]] | None
+) -> StudyResult:
     """Return a whole result; raise one that Ctrl-C has cut short, as the part that an Interrupted carries."""
-    if result.summary.get("interrupted"):
-        raise Interrupted(f"interrupted: {len(result.summary['rows'])} finished rows are in .partial", result)
+    figures = {} if draw is None else draw(dataset)
+    result = StudyResult(name=summary["study"], dataset=dataset, figures=figures, summary=summary)
+    if summary["interrupted"]:
+        raise Interrupted(f"interrupted: {len(summary['rows'])} finished rows are in .partial", result)
     return result

@@ -22,6 +22,7 @@ from mgdd.optimize import (
     Spsa,
     tune,
 )
+from mgdd.optimize.by_curvature import newton_settings
 from mgdd.optimize.tuning import Tuning
 from mgdd.surrogate import EngineSurrogate
 
@@ -50,7 +51,7 @@ ARRIVAL_CAD = 1.0  # distance to the optimum that counts as arrived
 _AMPLITUDE_CAD = 2.0
 _WISHED_CYCLES = 400.0
 _HOLD_CYCLES, _HOLD_SEED = 4000, 10_000  # of the noise measurement, apart from all seeds of the runs
-_HESSIAN_RATE, _RICCATI_RATE, _NEWTON_PERIODS = 0.03, 0.02, 10  # rates of a period of ten cycles
+_NEWTON_PERIODS = 10
 _SEEKERS = ("batch", "newton", "spsa", "golden", "bounded")
 _DITHERED = ("batch", "newton")
 
@@ -163,17 +164,11 @@ def seeker_of(case: Case, seed: int) -> Seeker:
             **space, amplitude=t.amplitude, period=t.period, gain=t.gain, rate=t.rate, components=components
         )
     if case.seeker == "newton":
-        slow = t.period / 10.0
         return NewtonSeeking(
             **space,
             amplitude=t.amplitude,
-            period=t.period,
+            **newton_settings(bend, t.period, reach=2.0),
             time_constant_cycles=t.time_constant_cycles,
-            hessian_rate=_HESSIAN_RATE / slow,
-            riccati_rate=_RICCATI_RATE / slow,
-            initial_hessian=-bend,
-            initial_inverse=-1.0 / bend,
-            largest_inverse=2.0 / bend,
             hold_cycles=_NEWTON_PERIODS * t.period,
             components=components,
         )

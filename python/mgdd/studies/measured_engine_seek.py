@@ -52,11 +52,7 @@ class _Runs:
 
 
 def run_measured_engine_seek(
-    *,
-    seeds: int = 20,
-    quick: bool = False,
-    figures: bool = True,
-    progress: Progress | None = None,
+    *, seeds: int = 20, quick: bool = False, figures: bool = True, progress: Progress | None = None
 ) -> StudyResult:
     """Let every seeker look for the best injection timing of the measured hydrogen-diesel engine.
 
@@ -132,7 +128,7 @@ def run_measured_engine_seek(
         "interrupted": interrupted,
         "rows": [_row(case, run) for case, run in zip(cases, runs, strict=True)],
     }
-    return finish(StudyResult(name=_NAME, dataset=dataset, figures=draw(dataset) if figures else {}, summary=summary))
+    return finish(dataset, summary, draw if figures else None)
 
 
 def _surrogate() -> EngineSurrogate:
@@ -213,12 +209,7 @@ def _dataset(cases: list[Case], runs: list[_Runs], surrogate: EngineSurrogate) -
         "objective": ("case", [case.objective.name for case in cases], "-", "objective"),
         "seeker": ("case", [case.seeker for case in cases], "-", "seeker"),
         "optimum_soi_cad": ("case", [case.best["soi_cad"] for case in cases], cad, "optimum of the surrogate"),
-        "supported_low_cad": (
-            "case",
-            [low for low, _ in ranges],
-            cad,
-            "earliest supported SOI",
-        ),
+        "supported_low_cad": ("case", [low for low, _ in ranges], cad, "earliest supported SOI"),
         "supported_high_cad": ("case", [high for _, high in ranges], cad, "latest supported SOI"),
         "final_soi_cad": (every, finals, cad, "mean estimate of the last 100 cycles"),
         "final_soi_interval_cad": (

@@ -9,6 +9,8 @@ from mgdd import plot
 from mgdd.engine import timing_sweep
 from mgdd.identify.engine.profile import WallHeatProfile
 from mgdd.identify.engine.records import CylinderFit, Load
+from mgdd.plot.calibration import wall_heat_profile
+from mgdd.plot.style import drawn
 
 if TYPE_CHECKING:
     import xarray as xr
@@ -33,9 +35,9 @@ def draw(
         f"Calibration, {best.kind}": _grid(best.loads, Load.plot),
     }
     for law, profile in profiles.items():
-        figure = _figure(1)
-        profile.plot(ax=figure.add_subplot())
-        out[f"What the traces say about wall heat: refitted RMSE over the wall-heat scale, {law}"] = figure
+        out[f"What the traces say about wall heat: refitted RMSE over the wall-heat scale, {law}"] = drawn(
+            wall_heat_profile, profile.dataset, size=(13.0, 4.8)
+        )
     sweeps = [timing_sweep(load.cylinder, load.point).assign_attrs(file=load.file) for load in reference.loads]
     scale = reference.model.wall_heat_scale
     caption = f"Efficiency and NOx proxies over timing, {reference.kind}, wall-heat scale held at {scale:g}"
@@ -68,11 +70,7 @@ def _ranges(timing: Sequence[Mapping[str, Any]]) -> Figure:
     places = range(len(timing))
     for ax, names, label in (
         (left, ("free_soc_cad", "fitted_soc_cad"), "start of combustion [°CA aTDC]"),
-        (
-            right,
-            ("free_gain_percent", "gain_percent"),
-            "gain in closed-cycle efficiency over the measured timing [%]",
-        ),
+        (right, ("free_gain_percent", "gain_percent"), "gain in closed-cycle efficiency over the measured timing [%]"),
     ):
         first, second = names
         ax.hlines(places, [r[first][0] for r in timing], [r[first][1] for r in timing], lw=6, color="0.35")

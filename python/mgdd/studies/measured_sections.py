@@ -70,25 +70,16 @@ def measured_sections(s: Mapping[str, Any], figures: Mapping[str, Figure]) -> tu
             ),
         ),
         Section(
-            title="Best timing",
-            text=(_TIMING_TEXT.format(span=span, law=s["law"]),),
-            table=_timing(s["best_timing"]),
+            title="Best timing", text=(_TIMING_TEXT.format(span=span, law=s["law"]),), table=_timing(s["best_timing"])
         ),
         Section(title="What to distrust", items=tuple(_distrust(s))),
-        Section(
-            title="Every burn law, side by side",
-            text=(_LAWS_TEXT,),
-            table=_laws(s["laws"]),
-        ),
+        Section(title="Every burn law, side by side", text=(_LAWS_TEXT,), table=_laws(s["laws"])),
         Section(
             title="Wall heat",
             text=() if profiles else ("Not profiled in this quick run.",),
             table=_wall_heat(profiles) if profiles else None,
         ),
-        Section(
-            title=f"Calibrated burn ({s['law']})",
-            table=_per_trace(s["traces"], "calibrated", _BURN),
-        ),
+        Section(title=f"Calibrated burn ({s['law']})", table=_per_trace(s["traces"], "calibrated", _BURN)),
         Section(
             title="Analysis of the measured traces",
             text=("Net heat release with gamma 1.33 from -10 CAD on; the trace is taken as absolute.",),

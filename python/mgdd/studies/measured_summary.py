@@ -110,24 +110,9 @@ def law_table(fits: Sequence[CylinderFit]) -> xr.Dataset:
             "rmse_percent": (dims, grid("rmse_percent")),
             "imep_closed_error_percent": (dims, grid("imep_closed_error_percent")),
             "soc_cad": (dims, grid("soc_cad")),
-            "onset_against_soi_cad": (
-                dims,
-                grid("onset_against_soi_cad"),
-                "°CA",
-                "fitted burn start minus SOI",
-            ),
-            "largest_error_bar": (
-                dims,
-                grid("largest_error_bar"),
-                "bar",
-                "largest local error, model minus measured",
-            ),
-            "largest_error_cad": (
-                dims,
-                grid("largest_error_cad"),
-                "°CA aTDC",
-                "angle of the largest local error",
-            ),
+            "onset_against_soi_cad": (dims, grid("onset_against_soi_cad"), "°CA", "fitted burn start minus SOI"),
+            "largest_error_bar": (dims, grid("largest_error_bar"), "bar", "largest local error, model minus measured"),
+            "largest_error_cad": (dims, grid("largest_error_cad"), "°CA aTDC", "angle of the largest local error"),
             "wall_heat_scale": ("law", scales),
         }
     )

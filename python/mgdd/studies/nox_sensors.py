@@ -52,11 +52,7 @@ class _Sweep:
 
 
 def run_nox_sensors(
-    *,
-    seeds: int = 20,
-    quick: bool = False,
-    figures: bool = True,
-    progress: Progress | None = None,
+    *, seeds: int = 20, quick: bool = False, figures: bool = True, progress: Progress | None = None
 ) -> StudyResult:
     """Compare a NOx analyser, a fast sensor and soft sensors, steady and in transients.
 
@@ -120,14 +116,7 @@ def run_nox_sensors(
         "correction": [_course_row(own) for own in course],
         "interrupted": interrupted,
     }
-    return finish(
-        StudyResult(
-            name="nox-sensors",
-            dataset=dataset,
-            figures=draw(dataset) if figures else {},
-            summary=to_jsonable(summary),
-        )
-    )
+    return finish(dataset, to_jsonable(summary), draw if figures else None)
 
 
 def _sweep(seeds: int) -> _Sweep:

@@ -22,6 +22,7 @@ from mgdd.optimize import (
     tune,
 )
 from mgdd.optimize.tuning import Tuning
+from mgdd.plot.style import drawn
 from mgdd.results.labels import labelled_dataset, to_jsonable
 from mgdd.studies.base import Progress, StudyResult, check_seeds, finish, run_parts
 from mgdd.studies.load_step_learning import LAWS, Learned, learn
@@ -53,11 +54,7 @@ class _Outcome:
 
 
 def run_seeker_comparison(
-    *,
-    seeds: int = 50,
-    quick: bool = False,
-    figures: bool = True,
-    progress: Progress | None = None,
+    *, seeds: int = 50, quick: bool = False, figures: bool = True, progress: Progress | None = None
 ) -> StudyResult:
     """Compare every seeker on the same engine, noise, start and budget of 2000 cycles.
 
@@ -123,14 +120,7 @@ def run_seeker_comparison(
         "cycles": CYCLES,
         "interrupted": interrupted,
     }
-    return finish(
-        StudyResult(
-            name="seeker-comparison",
-            dataset=dataset,
-            figures=_draw(dataset) if figures else {},
-            summary=to_jsonable(summary),
-        )
-    )
+    return finish(dataset, to_jsonable(summary), _draw if figures else None)
 
 
 def _contenders(best: Optimum) -> list[_Contender]:
@@ -171,9 +161,7 @@ def _contenders(best: Optimum) -> list[_Contender]:
             name="SPSA, second order", settings="a 3, c 1.5, decreasing", seeker=Spsa(**box, form="second_order")
         ),
         _Contender(
-            name="SPSA, one measurement",
-            settings="a 20, c 1.5, decreasing",
-            seeker=Spsa(**box, form="one_measurement"),
+            name="SPSA, one measurement", settings="a 20, c 1.5, decreasing", seeker=Spsa(**box, form="one_measurement")
         ),
         _Contender(name="two-sided differences", settings="step size 15, c 1", seeker=GradientDescent(**box)),
         _Contender(
@@ -272,7 +260,5 @@ def _draw(dataset: xr.Dataset) -> dict[str, Figure]:
     figure.supxlabel("engine cycle [-]", fontsize="medium")
     out = {"Estimate over cycles: median of the seeds, with the band that holds 80 % of them": figure}
     if "law" in dataset:
-        learning = Figure(figsize=(6.6, 3.8), layout="constrained")
-        learning_curves(dataset, ax=learning.add_subplot())
-        out["Iterative learning of a repeated load step"] = learning
+        out["Iterative learning of a repeated load step"] = drawn(learning_curves, dataset, size=(6.6, 3.8))
     return out

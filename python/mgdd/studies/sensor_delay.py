@@ -12,6 +12,8 @@ import numpy as np
 from mgdd.engine import Performance
 from mgdd.loop import EngineBench, LoopCriteria, SensorDynamics, run_seeker
 from mgdd.optimize import ComponentLag, ExtremumSeeking, Optimum
+from mgdd.optimize.by_curvature import approach_gain
+from mgdd.plot.style import drawn
 from mgdd.results.labels import labelled_dataset, to_jsonable
 from mgdd.results.units import unit_attributes
 from mgdd.studies.base import Progress, StudyResult, check_seeds, finish, run_parts
@@ -53,11 +55,7 @@ CASES = (
 
 
 def run_sensor_delay(
-    *,
-    seeds: int = 20,
-    quick: bool = False,
-    figures: bool = True,
-    progress: Progress | None = None,
+    *, seeds: int = 20, quick: bool = False, figures: bool = True, progress: Progress | None = None
 ) -> StudyResult:
     """Show why the delay of an analyser defeats extremum seeking of efficiency and NOx, and what helps.
 
@@ -129,14 +127,7 @@ def run_sensor_delay(
         "slow_dither_rule_cycles": 6.0 * (_ANALYSER.delay_cycles + _ANALYSER.lag_cycles),
         "interrupted": interrupted,
     }
-    return finish(
-        StudyResult(
-            name="sensor-delay",
-            dataset=dataset,
-            figures=_draw(dataset) if figures else {},
-            summary=to_jsonable(summary),
-        )
-    )
+    return finish(dataset, to_jsonable(summary), _draw if figures else None)
 
 
 def _run_case(case: _Case, best: Optimum) -> tuple[dict[str, Any], float, NDArray[np.float64]]:
@@ -160,7 +151,7 @@ def _run_case(case: _Case, best: Optimum) -> tuple[dict[str, Any], float, NDArra
             upper=BOUNDS_CAD[1],
             form="moving_average",
             period=case.period,
-            gain=2.0 / (abs(best.curvature) * case.time_constant),
+            gain=approach_gain(best.curvature, case.time_constant),
             rate=math.inf,
             components=[case.lag] if case.compensated else None,
             hold_cycles=hold_cycles,
@@ -209,7 +200,7 @@ def _component_wise(
             upper=BOUNDS_CAD[1],
             form="moving_average",
             period=period,
-            gain=2.0 / (abs(best.curvature) * time_constant),
+            gain=approach_gain(best.curvature, time_constant),
             rate=math.inf,
             components=[ComponentLag(), _ANALYSER],
         )
@@ -264,8 +255,6 @@ def _dataset(
 
 
 def _draw(dataset: xr.Dataset) -> dict[str, Figure]:
-    from matplotlib.figure import Figure
-
     from mgdd import plot
 
     groups = (
@@ -276,16 +265,14 @@ def _draw(dataset: xr.Dataset) -> dict[str, Figure]:
     for caption, places, cycles in groups:
         kept = [place for place in places if place < dataset.sizes["case"]]
         if kept:
-            figure = Figure(figsize=(7.4, 4.2), layout="constrained")
-            plot.convergence(dataset.isel(case=kept, cycle=slice(cycles)), ax=figure.add_subplot())
-            out[caption] = figure
+            out[caption] = drawn(plot.convergence, dataset.isel(case=kept, cycle=slice(cycles)), size=(7.4, 4.2))
     if "component_median_cad" in dataset:
         own = dataset[["component_median_cad", "component_low_cad", "component_high_cad", "optimum_cad"]]
         names = {f"component_{name}_cad": f"estimate_{name}_cad" for name in ("median", "low", "high")}
         own = own.rename({**names, "component_period": "case"})
         labels = [f"period {int(period)}" for period in own["case"].to_numpy()]
         own = own.assign_coords(case=("case", labels, unit_attributes("-", "case")))
-        figure = Figure(figsize=(7.4, 4.2), layout="constrained")
-        plot.convergence(own.isel(cycle=slice(2000)), ax=figure.add_subplot())
-        out["Only NOx is late, each component demodulated with its own phase; default noise"] = figure
+        out["Only NOx is late, each component demodulated with its own phase; default noise"] = drawn(
+            plot.convergence, own.isel(cycle=slice(2000)), size=(7.4, 4.2)
+        )
     return out

@@ -9,6 +9,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from mgdd import presets
+from mgdd.plot.style import drawn
 from mgdd.results.labels import labelled_dataset, to_jsonable
 from mgdd.studies.base import Progress, StudyResult, finish, run_parts
 from mgdd.throttle import Throttle, characteristics, holding_duty, simulate
@@ -31,10 +32,7 @@ _ARRIVALS = {"opening": "duty_rising", "unloaded": "duty_spring", "closing": "du
 
 
 def run_throttle_characteristics(
-    *,
-    quick: bool = False,
-    figures: bool = True,
-    progress: Progress | None = None,
+    *, quick: bool = False, figures: bool = True, progress: Progress | None = None
 ) -> StudyResult:
     """Show three habits of a throttle that a fixed controller cannot know.
 
@@ -87,14 +85,7 @@ def run_throttle_characteristics(
         "air_angle_deg": AIR_ANGLE_DEG,
         "interrupted": interrupted,
     }
-    return finish(
-        StudyResult(
-            name="throttle-characteristics",
-            dataset=dataset,
-            figures=_draw(dataset) if figures else {},
-            summary=to_jsonable(summary),
-        )
-    )
+    return finish(dataset, to_jsonable(summary), _draw if figures else None)
 
 
 def _one(name: str) -> tuple[list[dict[str, Any]], dict[str, Any]]:
@@ -211,12 +202,10 @@ def _dataset(done: list[dict[str, Any]], names: list[str]) -> xr.Dataset:
 
 
 def _draw(dataset: xr.Dataset) -> dict[str, Figure]:
-    from matplotlib.figure import Figure
-
     from mgdd import plot
     from mgdd.plot.throttle_habits import air_flow, rate_dependence
 
-    out = {}
+    size = (6.8, 4.2)
     ramp = labelled_dataset(
         {
             "time_s": ("time_s", dataset["ramp_time_s"].to_numpy()),
@@ -225,15 +214,17 @@ def _draw(dataset: xr.Dataset) -> dict[str, Figure]:
         }
     )
     first = str(dataset["preset"].to_numpy()[0])
-    figure = Figure(figsize=(6.8, 4.2), layout="constrained")
     rest = presets.load(first).throttle.limp_home_deg
-    plot.holding_duty(ramp, limp_home_deg=rest, ax=figure.add_subplot())
-    out[f"Duty of a slow ramp over the angle, {first}: opening and closing differ by twice the friction"] = figure
+    held = drawn(plot.holding_duty, ramp, size=size, limp_home_deg=rest)
+    out = {f"Duty of a slow ramp over the angle, {first}: opening and closing differ by twice the friction": held}
     for name in dataset["preset"].to_numpy():
-        figure = Figure(figsize=(6.8, 4.2), layout="constrained")
-        rate_dependence(dataset.sel(preset=name), ax=figure.add_subplot())
-        out[f"Rate dependence of {name}: the loop of angle over duty shrinks with the frequency"] = figure
-        figure = Figure(figsize=(6.8, 4.2), layout="constrained")
-        air_flow(dataset.sel(preset=name, arrival="closing"), ax=figure.add_subplot())
-        out[f"Air flow moves the plate of {name} at constant duty, at rest after closing"] = figure
+        own = dataset.sel(preset=name)
+        out |= {
+            f"Rate dependence of {name}: the loop of angle over duty shrinks with the frequency": (
+                drawn(rate_dependence, own, size=size)
+            ),
+            f"Air flow moves the plate of {name} at constant duty, at rest after closing": (
+                drawn(air_flow, own.sel(arrival="closing"), size=size)
+            ),
+        }
     return out

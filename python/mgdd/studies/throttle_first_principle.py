@@ -9,23 +9,20 @@ import numpy as np
 
 from mgdd import presets
 from mgdd.identify import fit_first_principle
-from mgdd.io import throttle_log
 from mgdd.optimize import FitOptions
+from mgdd.plot.style import drawn
 from mgdd.results.labels import labelled_dataset, to_jsonable
-from mgdd.signals import nrmse_fit_percent
 from mgdd.studies.base import Progress, StudyResult, check_seeds, finish, run_parts
 from mgdd.studies.statistics import with_interval
-from mgdd.throttle import Throttle, characteristics, simulate
+from mgdd.studies.throttle_records import LSB_DEG, NOISE_DEG, judged_run, noisy_records
+from mgdd.throttle import Throttle, characteristics
 
 if TYPE_CHECKING:
     import xarray as xr
     from matplotlib.figure import Figure
-    from numpy.typing import NDArray
 
 __all__ = ["run_throttle_first_principle"]
 
-SAMPLE_S = 1e-3
-NOISE_DEG, LSB_DEG = 0.03, 90.0 / 4096.0
 # Name in mgdd.throttle.groups, name of the fitted parameter, unit.
 _GROUPS = (
     ("tau_s", "tau_s", "s"),
@@ -34,15 +31,11 @@ _GROUPS = (
     ("spring_above_per_deg", "kappa_above_duty_per_deg", "1/deg"),
     ("coulomb", "delta_duty", "-"),
 )
-_TESTS = ("chirp", "random steps")
+_FITS = {"train": "train_percent", "chirp": "chirp_percent", "steps": "random_steps_percent"}
 
 
 def run_throttle_first_principle(
-    *,
-    seeds: int = 5,
-    quick: bool = False,
-    figures: bool = True,
-    progress: Progress | None = None,
+    *, seeds: int = 5, quick: bool = False, figures: bool = True, progress: Progress | None = None
 ) -> StudyResult:
     """Fit the groups of the first-principle model to a chirp above limp-home, and test them on two other records.
 
@@ -64,7 +57,7 @@ def run_throttle_first_principle(
     -------
     StudyResult
         Rows ``case group unit true error_percent``, the mean error over seeds with its interval; ``summary["fits"]``
-        has the free-run fit of the training record and of both test records in percent.
+        has the free-run fit of the training record and of both test records in percent, without their first 50 ms.
 
     Raises
     ------
@@ -95,14 +88,7 @@ def run_throttle_first_principle(
         "resolution_deg": LSB_DEG,
         "interrupted": interrupted,
     }
-    return finish(
-        StudyResult(
-            name="throttle-first-principle",
-            dataset=dataset,
-            figures=_draw(dataset) if figures else {},
-            summary=to_jsonable(summary),
-        )
-    )
+    return finish(dataset, to_jsonable(summary), _draw if figures else None)
 
 
 def _cases() -> dict[str, Throttle]:
@@ -114,48 +100,19 @@ def _cases() -> dict[str, Throttle]:
     }
 
 
-def _records() -> dict[str, NDArray[np.float64]]:
-    """Give the duty of the training chirp and of both tests."""
-    steps = 0.15 + 0.20 * (2.0 * np.modf(0.6180339887 * np.arange(80))[0] - 1.0)
-    return {
-        "train": _chirp(0.20, 0.2, 6.0, 12.0),
-        "chirp": _chirp(0.18, 0.3, 5.0, 12.0),
-        "random steps": np.repeat(steps, round(0.15 / SAMPLE_S)),
-    }
-
-
-def _chirp(amplitude: float, low_hz: float, high_hz: float, duration_s: float) -> NDArray[np.float64]:
-    time = np.arange(round(duration_s / SAMPLE_S)) * SAMPLE_S
-    phase = 2.0 * np.pi * (low_hz * time + 0.5 * (high_hz - low_hz) / duration_s * time**2)
-    return np.asarray(0.15 + amplitude * np.sin(phase))
-
-
-def _log(throttle: Throttle, duty: NDArray[np.float64], rng: np.random.Generator) -> xr.Dataset:
-    run = simulate(throttle, duty, sample_s=SAMPLE_S)
-    noisy = run["angle_deg"].to_numpy() + NOISE_DEG * rng.standard_normal(duty.size)
-    return throttle_log(run["time_s"].to_numpy(), duty, np.round(noisy / LSB_DEG) * LSB_DEG)
-
-
-def _case(
-    name: str, throttle: Throttle, seeds: int
-) -> tuple[list[dict[str, Any]], dict[str, Any], dict[str, NDArray[np.float64]]]:
+def _case(name: str, throttle: Throttle, seeds: int) -> tuple[list[dict[str, Any]], dict[str, Any], xr.Dataset]:
     """Give the rows of the groups, the row of the fits, and the last free run over the random steps."""
     truth = characteristics(throttle)
-    records = _records()
     errors: dict[str, list[float]] = {fitted: [] for _, fitted, _ in _GROUPS}
-    quality: dict[str, list[float]] = {record: [] for record in records}
-    run: dict[str, NDArray[np.float64]] = {}
+    quality: dict[str, list[float]] = {record: [] for record in _FITS}
     for seed in range(seeds):
-        rng = np.random.default_rng(seed)
-        logs = {record: _log(throttle, duty, rng) for record, duty in records.items()}
+        logs = noisy_records(throttle, [np.random.default_rng(seed)] * len(_FITS))
         fit = fit_first_principle(logs["train"], options=FitOptions(seed=seed))
         for own, fitted, _ in _GROUPS:
             errors[fitted].append(100.0 * (fit.parameters[fitted] / float(truth[own]) - 1.0))
         for record, log in logs.items():
-            time, measured = log["time_s"].to_numpy(), log["angle_deg"].to_numpy()
-            model = fit.model.simulate(log, initial_state={"angle_deg": float(measured[0])})["angle_deg"].to_numpy()
-            quality[record].append(nrmse_fit_percent(measured, model))
-            run = {"time_s": time, "angle_deg": measured, "model_deg": model}
+            run, percent = judged_run(fit.model, log)
+            quality[record].append(percent)
     rows = [
         {
             "case": name,
@@ -168,17 +125,17 @@ def _case(
     ]
     fits: dict[str, Any] = {"case": name}
     for record, values in quality.items():
-        fits |= with_interval(f"{record.replace(' ', '_')}_percent", np.array(values))
+        fits |= with_interval(_FITS[record], np.array(values))
     return rows, fits, run
 
 
-def _dataset(runs: list[dict[str, NDArray[np.float64]]], names: list[str]) -> xr.Dataset:
-    stacked = {key: np.array([run[key] for run in runs]) for key in ("angle_deg", "model_deg")}
+def _dataset(runs: list[xr.Dataset], names: list[str]) -> xr.Dataset:
+    stacked = {key: np.array([run[key].to_numpy() for run in runs]) for key in ("angle_deg", "model_deg")}
     both = ("case", "time_s")
     return labelled_dataset(
         {
             "case": ("case", names, "-", "case"),
-            "time_s": ("time_s", runs[0]["time_s"]),
+            "time_s": ("time_s", runs[0]["time_s"].to_numpy()),
             "angle_deg": (both, stacked["angle_deg"]),
             "model_deg": (both, stacked["model_deg"]),
             "residual_deg": (both, stacked["model_deg"] - stacked["angle_deg"], "deg", "model minus measured angle"),
@@ -188,13 +145,9 @@ def _dataset(runs: list[dict[str, NDArray[np.float64]]], names: list[str]) -> xr
 
 
 def _draw(dataset: xr.Dataset) -> dict[str, Figure]:
-    from matplotlib.figure import Figure
-
     from mgdd.plot.throttle import free_run
 
-    out = {}
-    for name in dataset["case"].to_numpy():
-        figure = Figure(figsize=(7.2, 4.8), layout="constrained")
-        free_run(dataset.sel(case=name), ax=figure.add_subplot())
-        out[f"Free run over random steps of 150 ms, {name}"] = figure
-    return out
+    return {
+        f"Free run over random steps of 150 ms, {name}": drawn(free_run, dataset.sel(case=name), size=(7.2, 4.8))
+        for name in dataset["case"].to_numpy()
+    }

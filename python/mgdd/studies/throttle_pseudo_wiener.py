@@ -12,9 +12,9 @@ from mgdd.errors import ParameterError
 from mgdd.identify import fit_pseudo_wiener
 from mgdd.optimize import FitOptions
 from mgdd.results.labels import labelled_dataset, to_jsonable
-from mgdd.signals import nrmse_fit_percent
 from mgdd.studies.base import Progress, StudyResult, finish, run_parts
-from mgdd.throttle import Throttle, simulate
+from mgdd.studies.throttle_records import DURATION_S, NOISE_DEG, RECORDS, SAMPLE_S, judged_run, noisy_records
+from mgdd.throttle import Throttle
 
 if TYPE_CHECKING:
     import xarray as xr
@@ -24,11 +24,8 @@ if TYPE_CHECKING:
 __all__ = ["run_throttle_pseudo_wiener"]
 
 KINDS = {"pw_r": "PW-R, friction inside", "pw_w": "PW-W, strict Wiener", "pw_p": "PW-P, Wiener with play"}
-RECORDS = ("train", "chirp", "steps")
 HORIZONS = (5, 20, 50)
 GROWTH = (1, 2, 5, 10, 20, 35, 50, 75, 100)
-DURATION_S, SAMPLE_S = 12.0, 1e-3
-_LSB_DEG, _NOISE_DEG = 90.0 / 4096.0, 0.03
 # A higher level of friction at rest than in the models, and the inductance: neither is in a pseudo-Wiener model.
 _STICTION_NM = {"P1": 0.30, "P2": 0.11}
 
@@ -54,11 +51,11 @@ def run_throttle_pseudo_wiener(
     -------
     StudyResult
         Rows ``plant model lag_start fit_train_percent fit_chirp_percent fit_steps_percent ahead_5_ms_deg
-        ahead_20_ms_deg ahead_50_ms_deg starts hits``: free-run fits, and the RMS error against the true angle of the
-        prediction ``measured(k) + simulated(k + H) - simulated(k)`` on the validation chirp. ``hits`` counts the
-        searches that ended at the best fit. Every record starts at limp-home without duty, so ``lag_start`` is *rest*
-        in the first rows; *best* also lets the lags start from the first angle. The row *persistence* predicts that
-        nothing moves.
+        ahead_20_ms_deg ahead_50_ms_deg starts hits``: free-run fits without the first 50 ms, and the RMS error against
+        the true angle of the prediction ``measured(k) + simulated(k + H) - simulated(k)`` on the validation chirp.
+        ``hits`` counts the searches that ended at the best fit. Every record starts at limp-home without duty, so
+        ``lag_start`` is *rest* in the first rows; *best* also lets the lags start from the first angle. The row
+        *persistence* predicts that nothing moves.
 
     Raises
     ------
@@ -108,13 +105,10 @@ def run_throttle_pseudo_wiener(
         "rows": rows,
         "parameters": [{"plant": row["plant"], "model": row["model"], **extra["parameters"]} for row, extra in done],
         "duration_s": DURATION_S,
-        "noise_deg": _NOISE_DEG,
+        "noise_deg": NOISE_DEG,
         "interrupted": interrupted,
     }
-    drawn = _draw(dataset) if figures else {}
-    return finish(
-        StudyResult(name="throttle-pseudo-wiener", dataset=dataset, figures=drawn, summary=to_jsonable(summary))
-    )
+    return finish(dataset, to_jsonable(summary), _draw if figures else None)
 
 
 def study_throttle(plant: str) -> Throttle:
@@ -124,33 +118,7 @@ def study_throttle(plant: str) -> Throttle:
 
 
 def _records(plant: str) -> dict[str, xr.Dataset]:
-    """Simulate the three logs from rest at limp-home, through a noisy 12-bit sensor."""
-    time = np.arange(round(DURATION_S / SAMPLE_S), dtype=np.float64) * SAMPLE_S
-    step = np.arange(time.size) // 150
-    duties = {
-        "train": _chirp(0.20, 0.2, 6.0, time),
-        "chirp": _chirp(0.18, 0.3, 5.0, time),
-        "steps": 0.15 + 0.20 * (2.0 * (0.6180339887 * step % 1.0) - 1.0),
-    }
-    out = {}
-    for seed, (name, duty) in enumerate(duties.items()):
-        run = simulate(study_throttle(plant), duty, time_s=time)
-        true = run["angle_deg"].to_numpy()
-        noisy = true + _NOISE_DEG * np.random.default_rng(seed).standard_normal(true.size)
-        out[name] = labelled_dataset(
-            {
-                "time_s": ("time_s", time, "s", "time"),
-                "duty": ("time_s", duty, "-", "duty"),
-                "angle_deg": ("time_s", np.round(noisy / _LSB_DEG) * _LSB_DEG, "deg", "measured angle"),
-                "true_deg": ("time_s", true, "deg", "true angle"),
-            }
-        )
-    return out
-
-
-def _chirp(amplitude: float, low_hz: float, high_hz: float, time: NDArray[np.floating[Any]]) -> NDArray[np.float64]:
-    phase = low_hz * time + (high_hz - low_hz) * time**2 / (2.0 * DURATION_S)
-    return np.asarray(0.15 + amplitude * np.sin(2.0 * np.pi * phase))
+    return noisy_records(study_throttle(plant), [np.random.default_rng(seed) for seed in range(len(RECORDS))])
 
 
 def _judge(plant: str, kind: str, rule: str, starts: int) -> tuple[dict[str, Any], dict[str, Any]]:
@@ -161,11 +129,9 @@ def _judge(plant: str, kind: str, rule: str, starts: int) -> tuple[dict[str, Any
     fit = fit_pseudo_wiener(
         logs["train"], kind, limp_home_deg=limp_home, lag_start=rule, options=FitOptions(n_starts=count)
     )
-    runs = {
-        name: fit.model.simulate(log, initial_state={"angle_deg": float(log["angle_deg"][0])})["angle_deg"].to_numpy()
-        for name, log in logs.items()
-    }
-    free = {name: nrmse_fit_percent(logs[name]["angle_deg"], runs[name]) for name in RECORDS}
+    judged = {name: judged_run(fit.model, log) for name, log in logs.items()}
+    runs = {name: run["model_deg"].to_numpy() for name, (run, _) in judged.items()}
+    free = {name: percent for name, (_, percent) in judged.items()}
     ahead = _ahead(logs["chirp"], runs["chirp"], HORIZONS)
     row = {
         "plant": plant,

@@ -12,6 +12,8 @@ import numpy as np
 from mgdd.engine import Performance
 from mgdd.loop import EngineBench, LoopCriteria
 from mgdd.optimize import ComponentLag, ExtremumSeeking, Limit, Optimum
+from mgdd.optimize.by_curvature import approach_gain
+from mgdd.plot.style import drawn
 from mgdd.results.labels import labelled_dataset, to_jsonable
 from mgdd.studies.base import Progress, StudyResult, check_seeds, finish, run_parts
 from mgdd.studies.statistics import loops, rms, run_with_slope, with_interval
@@ -53,7 +55,7 @@ class _Test:
             lower=BOUNDS_CAD[0],
             upper=BOUNDS_CAD[1],
             period=self.period,
-            gain=2.0 / (abs(best.curvature) * self.time_constant),
+            gain=approach_gain(best.curvature, self.time_constant),
             rate=_LATE_RATE if late else None,
             components=[ComponentLag(), ComponentLag(delay_cycles=38, lag_cycles=25)] if late else None,
             limits=[Limit("p_max_bar", P_MAX_BAR)] if limited else [],
@@ -64,11 +66,7 @@ TESTS = (
     _Test(name="1: efficiency", start_cad=-20.0),
     _Test(name="2: efficiency, another start", start_cad=5.0),
     _Test(
-        name="3: efficiency and NOx, analyser",
-        start_cad=-20.0,
-        nox_sensor="analyser",
-        period=60,
-        time_constant=240.0,
+        name="3: efficiency and NOx, analyser", start_cad=-20.0, nox_sensor="analyser", period=60, time_constant=240.0
     ),
     _Test(name="4: efficiency and NOx, soft sensor", start_cad=-20.0, nox_sensor="soft"),
 )
@@ -82,11 +80,7 @@ class _Outcome:
 
 
 def run_timing_tests(
-    *,
-    seeds: int = 50,
-    quick: bool = False,
-    figures: bool = True,
-    progress: Progress | None = None,
+    *, seeds: int = 50, quick: bool = False, figures: bool = True, progress: Progress | None = None
 ) -> StudyResult:
     """Run four tests of extremum seeking as an engine test cell would, each over many seeds.
 
@@ -146,14 +140,7 @@ def run_timing_tests(
         "cycles": CYCLES,
         "interrupted": interrupted,
     }
-    return finish(
-        StudyResult(
-            name="timing-tests",
-            dataset=dataset,
-            figures=_draw(done, limited) if figures else {},
-            summary=to_jsonable(summary),
-        )
-    )
+    return finish(dataset, to_jsonable(summary), (lambda _: _draw(done, limited)) if figures else None)
 
 
 def _run(test: _Test, seeds: int, *, limited: bool = False) -> _Outcome:
@@ -224,15 +211,13 @@ def _dataset(done: Sequence[_Outcome]) -> xr.Dataset:
 
 
 def _draw(done: Sequence[_Outcome], limited: Sequence[_Outcome]) -> dict[str, Figure]:
-    from matplotlib.figure import Figure
-
     from mgdd import plot
 
     out = {}
     for outcome, caps in [*((o, None) for o in done), *((o, {"p_max_bar": P_MAX_BAR}) for o in limited)]:
-        figure = Figure(figsize=(7.4, 8.0 if caps else 6.4), layout="constrained")
-        run = outcome.run.isel(cycle=slice(_SHOWN))
-        plot.seeking(run, optimum_cad=outcome.row["optimum_cad"], limit_values=caps, ax=figure.add_subplot())
+        run, best = outcome.run.isel(cycle=slice(_SHOWN)), outcome.row["optimum_cad"]
         under = f", maximum pressure at most {P_MAX_BAR:g} bar" if caps else ""
-        out[f"Test {outcome.row['test']}{under} (one seed)"] = figure
+        out[f"Test {outcome.row['test']}{under} (one seed)"] = drawn(
+            plot.seeking, run, size=(7.4, 8.0 if caps else 6.4), optimum_cad=best, limit_values=caps
+        )
     return out

@@ -10,8 +10,13 @@ import numpy as np
 from mgdd import _core
 from mgdd.errors import DataError, ParameterError, argument, hand_over, or_partial
 from mgdd.identify.throttle.first_principle_model import GROUP_NAMES, TYPICAL, FirstPrincipleModel
-from mgdd.identify.throttle.first_principle_start import SIDE_DEG, regression_start, rest_angle, spread_starts
-from mgdd.identify.throttle.free_run import draw_free_run, free_run, quality_of, source_of
+from mgdd.identify.throttle.first_principle_start import (
+    SIDE_DEG,
+    group_starts,
+    regression_start,
+    rest_angle,
+)
+from mgdd.identify.throttle.free_run import LOG_COLUMNS, draw_free_run, free_run, quality_of, source_of
 from mgdd.optimize.fit_options import FitOptions, fit_options
 from mgdd.results import Finding, Fit, FitReport
 from mgdd.signals.even_grid import even_step
@@ -171,7 +176,7 @@ def fit_first_principle(
         lambda: _core.identify.fit_throttle_groups(
             [(step_s, np.clip(duty, -1.0, 1.0), angle, [float(angle[0]), 0.0, 0.0], 0, False)],
             stages=stages,
-            starts=spread_starts(values, free, bounds, n_starts, chosen.seed),
+            starts=group_starts(values, free, bounds, n_starts, chosen.seed),
             closed_deg=closed_deg,
             open_deg=open_deg,
             ramp_deg=0.25,
@@ -221,7 +226,7 @@ def fit_first_principle(
 
 
 def _columns(log: xr.Dataset) -> list[NDArray[np.float64]]:
-    columns = columns_of(log, ("time_s", "duty", "angle_deg"))
+    columns = columns_of(log, LOG_COLUMNS)
     if columns[0].size < 100:
         raise DataError(f"log has {columns[0].size} samples: at least 100 are needed")
     return columns

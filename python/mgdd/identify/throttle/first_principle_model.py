@@ -12,7 +12,8 @@ import numpy as np
 
 from mgdd import _core
 from mgdd.errors import ParameterError
-from mgdd.io.parameters import FIT_NOTES, ParameterFile, Parameters, Wanted, entries, wanted
+from mgdd.io.model_parameters import ModelParameters
+from mgdd.io.parameters import Wanted, wanted
 from mgdd.results.describe import described
 from mgdd.signals.model import RunInputs, SampledModel
 
@@ -22,7 +23,6 @@ if TYPE_CHECKING:
 
 __all__ = ["FirstPrincipleModel"]
 
-_SETTINGS = ("closed_deg", "open_deg", "ramp_deg", "substeps")
 GROUP_NAMES = tuple(_core.identify.group_names)
 # Groups of a typical passenger-car throttle, the start of a fit.
 TYPICAL = MappingProxyType(dict(zip(GROUP_NAMES, (0.03, 5e4, 0.1, 1e-3, 0.05, 0.1, 1e-3, 8.0, 0.0), strict=True)))
@@ -30,7 +30,7 @@ TYPICAL = MappingProxyType(dict(zip(GROUP_NAMES, (0.03, 5e4, 0.1, 1e-3, 0.05, 0.
 
 @described
 @dataclass(frozen=True, kw_only=True)
-class FirstPrincipleModel(SampledModel, Parameters):
+class FirstPrincipleModel(SampledModel, ModelParameters):
     """Throttle in groups: set-valued friction, springs with preload on both sides, motor as a torque source.
 
     Parameters
@@ -54,6 +54,9 @@ class FirstPrincipleModel(SampledModel, Parameters):
     [8.0, 8.0, 8.0]
     """
 
+    kind = "first_principle"
+    parameter_names = GROUP_NAMES
+    settings = MappingProxyType(wanted(("closed_deg", "open_deg", "ramp_deg")) | {"substeps": Wanted(form="integer")})
     input_names = ("duty",)
     output_name = observed_state = "angle_deg"
     state_names = ("angle_deg", "speed_deg_per_s", "lagged_duty")
@@ -79,11 +82,6 @@ class FirstPrincipleModel(SampledModel, Parameters):
             raise ParameterError.of("open_deg", self.open_deg, f"above closed_deg = {self.closed_deg:.12g}")
         object.__setattr__(self, "parameters", MappingProxyType(ordered))
 
-    @property
-    def kind(self) -> str:
-        """``first_principle``."""
-        return "first_principle"
-
     def _rest(self) -> list[float]:
         return [self.parameters["limp_home_deg"], 0.0, 0.0]
 
@@ -93,10 +91,7 @@ class FirstPrincipleModel(SampledModel, Parameters):
             np.clip(run.columns[0], -1.0, 1.0),
             step_s=run.step_s,
             start=run.state,
-            closed_deg=self.closed_deg,
-            open_deg=self.open_deg,
-            ramp_deg=self.ramp_deg,
-            substeps=self.substeps,
+            **{name: getattr(self, name) for name in self.settings},
         )
 
     def physical_parameters(
@@ -163,17 +158,3 @@ class FirstPrincipleModel(SampledModel, Parameters):
             "preload_below_nm": p["beta_below_duty"] * stall,
             "coulomb_nm": p["delta_duty"] * stall,
         }
-
-    def to_parameters(self) -> ParameterFile:
-        """Give groups and settings, as `to_toml` writes them."""
-        settings = {name: getattr(self, name) for name in _SETTINGS}
-        return ParameterFile(
-            kind=self.kind, tables={"parameters": entries(self.parameters), "settings": entries(settings)}
-        )
-
-    @classmethod
-    def from_parameters(cls, file: ParameterFile) -> FirstPrincipleModel:
-        """Make the model of a file that `to_toml` or a fit wrote."""
-        file.expect(kinds=("first_principle",), tables=("parameters", "settings", "fit?"), notes=FIT_NOTES)
-        settings = file.values("settings", {**wanted(_SETTINGS), "substeps": Wanted(form="integer")})
-        return cls(parameters=file.values("parameters", wanted(GROUP_NAMES)), **settings)

@@ -8,6 +8,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from mgdd import _core
+from mgdd.identify.starts import spread_starts
 from mgdd.identify.throttle.first_principle_model import GROUP_NAMES
 
 if TYPE_CHECKING:
@@ -88,18 +89,14 @@ def regression_start(
     return found
 
 
-def spread_starts(
+def group_starts(
     values: Mapping[str, float],
     free: list[str],
     bounds: Mapping[str, _core.optimize.Parameter],
     n_starts: int,
     seed: int,
 ) -> list[list[float]]:
-    """Draw the further starts from a Latin hypercube around the first one, the free groups only."""
-    first = [values[name] for name in GROUP_NAMES]
-    if n_starts == 1:
-        return [first]
-    around = [name for name in free if bounds[name].log_scaled]
+    """Spread the free groups that are searched as logarithms from half to twice their first value."""
     box = [
         _core.optimize.Parameter(
             name=name,
@@ -107,10 +104,7 @@ def spread_starts(
             upper=min(bounds[name].upper, 2.0 * values[name]),
             log_scaled=True,
         )
-        for name in around
+        for name in free
+        if bounds[name].log_scaled
     ]
-    starts = [first]
-    for point in _core.identify.latin_hypercube(box, n_starts - 1, seed):
-        other = dict(values) | dict(zip(around, np.asarray(point).tolist(), strict=True))
-        starts.append([other[name] for name in GROUP_NAMES])
-    return starts
+    return [[start[name] for name in GROUP_NAMES] for start in spread_starts(values, box, n_starts, seed)]

@@ -13,21 +13,16 @@ from mgdd.results.fit import FitQuality
 from mgdd.results.labels import labelled_dataset
 from mgdd.signals.even_grid import even_step
 from mgdd.signals.metrics import nrmse_fit_percent, rmse
+from mgdd.signals.model import columns_of
 
 if TYPE_CHECKING:
     import xarray as xr
-    from numpy.typing import NDArray
 
-__all__ = ["columns_of", "discarded", "draw_free_run", "free_run", "quality_of", "source_of"]
+__all__ = ["LOG_COLUMNS", "discarded", "draw_free_run", "free_run", "quality_of", "source_of"]
 
 # What the start of a free run still carries of the unknown speed and current.
 DISCARD_S = 0.05
-
-
-def columns_of(log: xr.Dataset) -> tuple[NDArray[np.float64], NDArray[np.float64], NDArray[np.float64]]:
-    """Return time [s], duty [-] and angle [deg] of a log."""
-    time, duty, angle = (np.asarray(log[n].to_numpy(), dtype=np.float64) for n in ("time_s", "duty", "angle_deg"))
-    return time, duty, angle
+LOG_COLUMNS = ("time_s", "duty", "angle_deg")
 
 
 def discarded(step_s: float, size: int) -> int:
@@ -37,7 +32,7 @@ def discarded(step_s: float, size: int) -> int:
 
 def free_run(model: Model, log: xr.Dataset) -> xr.Dataset:
     """Run a model free over a log from its first angle."""
-    time, duty, angle = columns_of(log)
+    time, duty, angle = columns_of(log, LOG_COLUMNS)
     run = model.simulate(log, initial_state={"angle_deg": float(angle[0])})["angle_deg"].to_numpy()
     if run.shape != angle.shape or not np.isfinite(run).all():
         raise DataError(f"the {model.kind} model runs away on {source_of(log)}: its fit has failed")

@@ -8,11 +8,12 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from mgdd.errors import DataError, ParameterError
-from mgdd.identify.throttle.free_run import columns_of, discarded
+from mgdd.identify.throttle.free_run import LOG_COLUMNS, discarded
 from mgdd.results import Model
 from mgdd.results.labels import labelled_dataset
 from mgdd.signals.even_grid import even_step
 from mgdd.signals.metrics import rmse
+from mgdd.signals.model import columns_of
 
 if TYPE_CHECKING:
     import xarray as xr
@@ -65,7 +66,7 @@ def n_step_rms(
     >>> bool((rms[0] < 1e-9).all()), bool((rms[1] > 0.1).all())
     (True, True)
     """
-    time, _, angle = columns_of(log)
+    time, _, angle = columns_of(log, LOG_COLUMNS)
     truth = angle if true_deg is None else np.asarray(true_deg, dtype=np.float64)
     step = even_step(time)
     horizons_s = whole_horizons(step, time.size) if horizons_s is None else horizons_s

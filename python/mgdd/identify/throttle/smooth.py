@@ -12,9 +12,10 @@ import numpy as np
 
 from mgdd import _core
 from mgdd.errors import ParameterError, ShapeError, hand_over, or_partial
-from mgdd.io.parameters import FIT_NOTES, ParameterFile, Parameters, entries, wanted
+from mgdd.io.model_parameters import ModelParameters
+from mgdd.io.parameters import wanted
 from mgdd.optimize.fit_options import FitOptions, fit_options
-from mgdd.optimize.fit_run import draw_run, fit_run, quality_of
+from mgdd.optimize.fit_run import fit_of, fit_run
 from mgdd.results import Fit, FitReport
 from mgdd.results.describe import described
 from mgdd.results.labels import VARIABLES
@@ -28,12 +29,11 @@ __all__ = ["SmoothThrottle"]
 
 _EXAMPLE = MappingProxyType(dict(zip(_core.identify.smooth_names, _core.identify.smooth_example, strict=True)))
 _START_RAD = 0.14
-_CONSTANTS = ("inertia_kgm2", "gear_ratio", "inductance_h", "supply_v")
 
 
 @described
 @dataclass(frozen=True, kw_only=True)
-class SmoothThrottle(SampledModel, Parameters):
+class SmoothThrottle(SampledModel, ModelParameters):
     """The smooth throttle: tanh friction and preload, coil current, RK4 with one step per sample.
 
     Parameters
@@ -58,6 +58,9 @@ class SmoothThrottle(SampledModel, Parameters):
     [8.021, 8.021, 8.021, 8.021, 8.021]
     """
 
+    kind = "smooth"
+    parameter_names = tuple(_EXAMPLE)
+    settings = MappingProxyType(wanted(("inertia_kgm2", "gear_ratio", "inductance_h", "supply_v")))
     input_names = ("duty",)
     output_name = "angle_deg"
     state_names = ("angle_rad", "speed_rad_per_s", "current_a")
@@ -81,28 +84,9 @@ class SmoothThrottle(SampledModel, Parameters):
                 raise ParameterError.of(name, value, "finite and > 0")
 
     @property
-    def kind(self) -> str:
-        """``smooth``."""
-        return "smooth"
-
-    @property
     def constants(self) -> dict[str, float]:
         """The known constants by name."""
-        return {name: getattr(self, name) for name in _CONSTANTS}
-
-    def to_parameters(self) -> ParameterFile:
-        """Give parameters and constants, as `to_toml` writes them."""
-        return ParameterFile(
-            kind=self.kind, tables={"parameters": entries(self.parameters), "settings": entries(self.constants)}
-        )
-
-    @classmethod
-    def from_parameters(cls, file: ParameterFile) -> SmoothThrottle:
-        """Make the model of a file that `to_toml` or a fit wrote."""
-        file.expect(kinds=("smooth",), tables=("parameters", "settings", "fit?"), notes=FIT_NOTES)
-        return cls(
-            parameters=file.values("parameters", wanted(_EXAMPLE)), **file.values("settings", wanted(_CONSTANTS))
-        )
+        return {name: getattr(self, name) for name in self.settings}
 
     def _rest(self) -> list[float]:
         return [_START_RAD, 0.0, 0.0]
@@ -201,20 +185,8 @@ class SmoothThrottle(SampledModel, Parameters):
         fitted = replace(self, parameters=dict(zip(_EXAMPLE, best.values.tolist(), strict=True)))
         modelled = fitted.simulate(record, initial_state=state)["angle_deg"].to_numpy()
         run = fit_run(time, angle, modelled, VARIABLES["angle_deg"]) if np.isfinite(modelled).all() else None
-        fit = Fit(
-            report=best,
-            model=fitted,
-            kind=fitted.kind,
-            train=None if run is None else quality_of(run),
-            findings=best.findings,
-            unidentifiable=best.unidentifiable,
-            start_rmse=tuple(sorted(report.rmse for report in reports)),
-            n_best=int(found["n_reached"]),
-            start_reports=reports,
-            run=run,
-            draw=draw_run,
-        )
-        return hand_over(fit, stop)
+        errors, reached = (report.rmse for report in reports), int(found["n_reached"])
+        return hand_over(fit_of(best, fitted, run, errors, n_best=reached, start_reports=reports), stop)
 
 
 def _ten(values: ArrayLike, name: str) -> list[float]:

@@ -10,7 +10,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from mgdd.errors import ParameterError
-from mgdd.identify.throttle.free_run import columns_of, discarded, free_run, quality_of, source_of
+from mgdd.identify.throttle.free_run import LOG_COLUMNS, discarded, free_run, quality_of, source_of
 from mgdd.identify.throttle.n_step import n_step_rms, samples_of, whole_horizons
 from mgdd.identify.throttle.prior import prior_of
 from mgdd.identify.throttle.record_content import open_questions, record_content
@@ -20,6 +20,7 @@ from mgdd.results.describe import described
 from mgdd.results.fit import FitQuality
 from mgdd.signals.even_grid import even_step
 from mgdd.signals.metrics import ResidualTests, residual_tests, vaf_percent
+from mgdd.signals.model import columns_of
 
 if TYPE_CHECKING:
     import xarray as xr
@@ -205,7 +206,7 @@ def validate_throttle(
     check_throttle_log(log)
     fit = model if isinstance(model, Fit) else None
     own = model.model if isinstance(model, Fit) else model
-    time, duty, angle = columns_of(log)
+    time, duty, angle = columns_of(log, LOG_COLUMNS)
     step = even_step(time)
     horizons_s = whole_horizons(step, time.size) if horizons_s is None else horizons_s
     for horizon in horizons_s:

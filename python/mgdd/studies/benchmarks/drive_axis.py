@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Iterator, Mapping
 from dataclasses import dataclass
 from types import MappingProxyType
 from typing import TYPE_CHECKING, Any
@@ -10,13 +10,13 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from mgdd import _core
-from mgdd.errors import ParameterError
-from mgdd.io.parameters import ParameterFile, Parameters, entries, wanted
+from mgdd.errors import ParameterError, hand_over, keep_finished
+from mgdd.io.model_parameters import ModelParameters
+from mgdd.io.parameters import wanted
 from mgdd.optimize.fit_options import FitOptions, fit_options
-from mgdd.optimize.fit_run import draw_run, fit_run, quality_of
+from mgdd.optimize.fit_run import fit_of, fit_run
 from mgdd.results import Fit, FitReport
 from mgdd.results.describe import described
-from mgdd.results.fit import n_best_of
 from mgdd.results.labels import Label
 from mgdd.signals.even_grid import even_step
 from mgdd.signals.model import RunInputs, SampledModel
@@ -50,7 +50,7 @@ _FILTER_ORDER, _DECIMATION = 4, 10
 
 @described
 @dataclass(frozen=True, kw_only=True)
-class DriveModel(SampledModel, Parameters):
+class DriveModel(SampledModel, ModelParameters):
     """A slide with mass, friction and offset, driven by a voltage.
 
     Parameters
@@ -76,6 +76,9 @@ class DriveModel(SampledModel, Parameters):
     [0.0, 0.0, 0.0]
     """
 
+    kind = "drive"
+    parameter_names = tuple(_core.systems.DriveAxis.parameter_names)
+    settings = MappingProxyType(wanted(("force_n_per_v",)))
     input_names = ("drive_v",)
     output_name = observed_state = "position_m"
     state_names = ("position_m", "speed_m_per_s")
@@ -83,11 +86,6 @@ class DriveModel(SampledModel, Parameters):
 
     parameters: Mapping[str, float]
     force_n_per_v: float
-
-    @property
-    def kind(self) -> str:
-        """``drive``."""
-        return "drive"
 
     def _rest(self) -> list[float]:
         return [0.0, 0.0]
@@ -102,20 +100,8 @@ class DriveModel(SampledModel, Parameters):
             )
         )
 
-    def to_parameters(self) -> ParameterFile:
-        """Give all parameters, as `to_toml` writes them."""
-        values = dict(zip(_core.systems.DriveAxis.parameter_names, _row(self.parameters), strict=True))
-        tables = {"parameters": entries(values), "settings": entries({"force_n_per_v": float(self.force_n_per_v)})}
-        return ParameterFile(kind="drive", tables=tables)
-
-    @classmethod
-    def from_parameters(cls, file: ParameterFile) -> DriveModel:
-        """Make the slide of a file that `to_toml` wrote."""
-        file.expect(kinds=("drive",), tables=("parameters", "settings"))
-        return cls(
-            parameters=file.values("parameters", wanted(_core.systems.DriveAxis.parameter_names)),
-            force_n_per_v=file.values("settings", wanted(("force_n_per_v",)))["force_n_per_v"],
-        )
+    def _written(self) -> Mapping[str, float]:
+        return dict(zip(self.parameter_names, _row(self.parameters), strict=True))
 
 
 def drive_inverse_dynamics(
@@ -256,6 +242,8 @@ def fit_drive(
         An unknown form of friction or parameter.
     mgdd.errors.DataError
         Uneven times, or fewer than 100 samples.
+    mgdd.errors.Interrupted
+        Ctrl-C; ``partial`` is the best fit so far.
 
     References
     ----------
@@ -299,20 +287,24 @@ def fit_drive(
     base = dict(zip(names, _row(base), strict=True))
     rng = np.random.default_rng(chosen.seed)
     measured = record["position_m"].to_numpy()[_WINDOW:]
-    found: list[tuple[float, Any]] = []
-    for index in range(starts):
-        if index == 0:
-            point = base
-        elif index < (starts + 5) // 6:
-            point = _scattered(base, free, 1.0, rng)
-        else:
-            near = min(found, key=lambda entry: entry[0])[1].parameters
-            point = _scattered(dict(zip(names, near, strict=True)), free, _NEAR, rng)
-        result = axis.fit(base=list(point.values()), free=free, records=[first], dt_s=dt_s, options=search)
-        found.append((float(result.report.cost), result))
-    found.sort(key=lambda entry: entry[0])
-    best = found[0][1]
-    errors = tuple(float(np.sqrt(2.0 * cost / measured.size)) for cost, _ in found)
+    found: list[_core.systems.FreeRunFit] = []
+
+    def points() -> Iterator[dict[str, float]]:
+        yield base
+        for index in range(1, starts):
+            if index < (starts + 5) // 6:
+                yield _scattered(base, free, 1.0, rng)
+            else:
+                near = min(found, key=_cost).parameters
+                yield _scattered(dict(zip(names, near, strict=True)), free, _NEAR, rng)
+
+    stop = keep_finished(
+        lambda point: axis.fit(base=list(point.values()), free=free, records=[first], dt_s=dt_s, options=search),
+        points(),
+        found,
+    )
+    best = min(found, key=_cost)
+    errors = [float(np.sqrt(2.0 * _cost(one) / measured.size)) for one in found]
     model = DriveModel(
         parameters=dict(zip(names, best.parameters, strict=True)), force_n_per_v=float(record["force_n_per_v"])
     )
@@ -320,18 +312,11 @@ def fit_drive(
     run = fit_run(
         record["time_s"].to_numpy()[_WINDOW:], measured, drive_free_run(model, record), model.labels["position_m"]
     )
-    return Fit(
-        report=report,
-        model=model,
-        kind=model.kind,
-        train=quality_of(run),
-        findings=report.findings,
-        unidentifiable=report.unidentifiable,
-        start_rmse=errors,
-        n_best=n_best_of(errors),
-        run=run,
-        draw=draw_run,
-    )
+    return hand_over(fit_of(report, model, run, errors), stop)
+
+
+def _cost(found: _core.systems.FreeRunFit) -> float:
+    return float(found.report.cost)
 
 
 def _row(parameters: Mapping[str, float]) -> list[float]:

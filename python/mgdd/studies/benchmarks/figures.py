@@ -4,8 +4,8 @@ from __future__ import annotations
 
 from typing import TYPE_CHECKING
 
-from mgdd.plot.style import BLACK, BLUE, axis_label, legend
-from mgdd.results.labels import label_of
+from mgdd.plot.measured import measured_and_model
+from mgdd.plot.style import residual_below
 
 if TYPE_CHECKING:
     import xarray as xr
@@ -29,16 +29,11 @@ def draw(dataset: xr.Dataset) -> dict[str, Figure]:
 def _overlay(dataset: xr.Dataset, name: str) -> Figure:
     from matplotlib.figure import Figure
 
-    part = dataset.isel({f"{name}_time_s": _SHOWN.get(name, slice(None))})
-    time, measured, simulated = part[f"{name}_time_s"], part[f"{name}_measured"], part[f"{name}_simulated"]
+    own = {f"{name}_{column}": column for column in ("time_s", "measured", "simulated")}
+    run = dataset[list(own)].rename(own).rename(simulated="model").isel(time_s=_SHOWN.get(name, slice(None)))
+    residual = (run["model"] - run["measured"]).assign_attrs(run["measured"].attrs)
     figure = Figure(figsize=(8.0, 5.0), layout="constrained")
-    top, bottom = figure.subplots(2, 1, sharex=True, height_ratios=[2, 1])
-    lines = top.plot(time, measured, color=BLACK, label="measured")
-    lines += top.plot(time, simulated, color=BLUE, linestyle="--", label="free run")
-    top.set_ylabel(axis_label(part, f"{name}_measured"))
-    legend(top, lines)
-    bottom.plot(time, simulated - measured, color=BLACK)
-    bottom.axhline(0.0, color=BLUE, linewidth=0.8)
-    bottom.set_ylabel(f"residual [{label_of(measured).units}]")
-    bottom.set_xlabel("time [s]")
+    ax = figure.add_subplot()
+    measured_and_model(run, ax=ax).set_xlabel("")
+    residual_below(ax, run.assign(residual=residual), "time_s", "residual")
     return figure

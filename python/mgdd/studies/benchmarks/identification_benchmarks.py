@@ -5,7 +5,7 @@ from __future__ import annotations
 import time
 from dataclasses import dataclass, field
 from functools import partial
-from typing import TYPE_CHECKING, Any, Literal
+from typing import TYPE_CHECKING, Any, Literal, TypeVar
 
 import numpy as np
 
@@ -21,12 +21,16 @@ from mgdd.studies.benchmarks.two_tanks import fit_two_tanks
 from mgdd.studies.benchmarks.wiener_hammerstein import fit_linear, fit_wiener_hammerstein
 
 if TYPE_CHECKING:
+    from collections.abc import Callable
+
     import xarray as xr
     from numpy.typing import NDArray
 
     Vector = NDArray[np.float64]
 
 __all__ = ["run_identification_benchmarks"]
+
+Result = TypeVar("Result")
 
 _NAME = "identification-benchmarks"
 _DRIVE_WINDOW, _TANKS_WINDOW, _CIRCUIT_WINDOW = 20, 50, 50
@@ -131,7 +135,7 @@ def run_identification_benchmarks(
         "interrupted": interrupted,
         "rows": [case.row for case in cases],
     }
-    return finish(StudyResult(name=_NAME, dataset=dataset, figures=draw(dataset) if figures else {}, summary=summary))
+    return finish(dataset, summary, draw if figures else None)
 
 
 def _row(name: str, model: str, train: float, test: float, metric: str, unit: str, **more: Any) -> dict[str, Any]:
@@ -146,6 +150,12 @@ def _row(name: str, model: str, train: float, test: float, metric: str, unit: st
         "window": _WINDOWS[name],
         **more,
     }
+
+
+def _timed(fit: Callable[[], Result]) -> tuple[Result, float]:
+    """Give what a fit returns and its processor time [s]."""
+    began = time.process_time()
+    return fit(), time.process_time() - began
 
 
 def _drive_parts(train: xr.Dataset, test: xr.Dataset, quick: bool) -> list[tuple[str, partial[_Case]]]:
@@ -176,10 +186,8 @@ def _hold_out(train: xr.Dataset, friction: str, drift: bool) -> float:
 
 
 def _drive(train: xr.Dataset, test: xr.Dataset, text: str, friction: str, drift: bool, quick: bool) -> _Case:
-    began = time.process_time()
     options = FitOptions(n_starts=_QUICK_STARTS if quick else _DRIVE_STARTS)
-    fit = fit_drive(train, friction=friction, drift=drift, options=options)
-    seconds = time.process_time() - began
+    fit, seconds = _timed(partial(fit_drive, train, friction=friction, drift=drift, options=options))
     runs = {key: drive_free_run(fit.model, record) for key, record in (("train", train), ("test", test))}
     truth = {key: record["position_m"].to_numpy()[_DRIVE_WINDOW:] for key, record in (("train", train), ("test", test))}
     scores = {key: nrmse_fit_percent(truth[key], runs[key]) for key in runs}
@@ -218,9 +226,7 @@ def _tank_parts(train: xr.Dataset, test: xr.Dataset, quick: bool) -> list[tuple[
 
 
 def _tanks(train: xr.Dataset, test: xr.Dataset, text: str, form: str) -> _Case:
-    began = time.process_time()
-    fit = fit_two_tanks(train, form=form)
-    seconds = time.process_time() - began
+    fit, seconds = _timed(partial(fit_two_tanks, train, form=form))
     state = fit.model.estimate_state(test, window=_TANKS_WINDOW)
     run = fit.model.simulate(test, initial_state=state)["level_v"].to_numpy()
     truth = test["level_v"].to_numpy()
@@ -248,27 +254,15 @@ def _circuit_parts(train: xr.Dataset, test: xr.Dataset, quick: bool) -> list[tup
 
 
 def _linear(train: xr.Dataset, test: xr.Dataset) -> _Case:
-    began = time.process_time()
-    fit = fit_linear(train)
-    seconds = time.process_time() - began
-    run, truth = (
-        fit.simulate(test)["output_v"].to_numpy()[_CIRCUIT_WINDOW:],
-        test["output_v"].to_numpy()[_CIRCUIT_WINDOW:],
-    )
+    fit, seconds = _timed(partial(fit_linear, train))
+    run, truth = (one["output_v"].to_numpy()[_CIRCUIT_WINDOW:] for one in (fit.simulate(test), test))
     more = {"n_parameters": 13, "seconds": seconds, "status": "best of 15 passes"}
-    return _Case(
-        row=_row("wh2009", "linear, order 6", 1e3 * fit.rmse, 1e3 * rmse(truth, run), _RMSE, "mV", **more),
-    )
+    return _Case(row=_row("wh2009", "linear, order 6", 1e3 * fit.rmse, 1e3 * rmse(truth, run), _RMSE, "mV", **more))
 
 
 def _circuit(train: xr.Dataset, test: xr.Dataset, quick: bool) -> _Case:
-    began = time.process_time()
-    fit = fit_wiener_hammerstein(train, scan_samples=8000 if quick else 15_000)
-    seconds = time.process_time() - began
-    run, truth = (
-        fit.model.simulate(test)["output_v"].to_numpy()[_CIRCUIT_WINDOW:],
-        test["output_v"].to_numpy()[_CIRCUIT_WINDOW:],
-    )
+    fit, seconds = _timed(partial(fit_wiener_hammerstein, train, scan_samples=8000 if quick else 15_000))
+    run, truth = (one["output_v"].to_numpy()[_CIRCUIT_WINDOW:] for one in (fit.model.simulate(test), test))
     row = _row(
         "wh2009",
         "filter of order 3, cubic spline, filter of order 4",

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Iterator, Mapping
 from dataclasses import dataclass
 from types import MappingProxyType
 from typing import TYPE_CHECKING
@@ -10,13 +10,13 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from mgdd import _core
-from mgdd.errors import DataError, ParameterError
-from mgdd.io.parameters import ParameterFile, Parameters, entries, wanted
+from mgdd.errors import DataError, ParameterError, hand_over, keep_finished
+from mgdd.io.model_parameters import ModelParameters
+from mgdd.io.parameters import wanted
 from mgdd.optimize.fit_options import FitOptions, fit_options
-from mgdd.optimize.fit_run import draw_run, fit_run, quality_of
+from mgdd.optimize.fit_run import fit_of, fit_run
 from mgdd.results import Fit, FitReport
 from mgdd.results.describe import described
-from mgdd.results.fit import n_best_of
 from mgdd.results.labels import Label
 from mgdd.signals.even_grid import even_step
 from mgdd.signals.model import RunInputs, SampledModel
@@ -64,7 +64,7 @@ _FORMS: dict[str, tuple[dict[str, float], tuple[str, ...]]] = {
 
 @described
 @dataclass(frozen=True, kw_only=True)
-class TwoTanksModel(SampledModel, Parameters):
+class TwoTanksModel(SampledModel, ModelParameters):
     """Two tanks in a row: a pump fills the upper one, its outlet and part of its overflow the lower one.
 
     Parameters
@@ -93,6 +93,9 @@ class TwoTanksModel(SampledModel, Parameters):
     4.0
     """
 
+    kind = "two_tanks"
+    parameter_names = tuple(_core.systems.TwoTanks.parameter_names)
+    settings = MappingProxyType(wanted(("lower_brim_v",)))
     input_names = ("pump_v",)
     output_name = "level_v"
     state_names = ("upper_level_v", "lower_level_v")
@@ -101,11 +104,6 @@ class TwoTanksModel(SampledModel, Parameters):
 
     parameters: Mapping[str, float]
     lower_brim_v: float = 10.0
-
-    @property
-    def kind(self) -> str:
-        """``two_tanks``."""
-        return "two_tanks"
 
     def _rest(self) -> list[float]:
         return [0.0, 0.0]
@@ -116,20 +114,8 @@ class TwoTanksModel(SampledModel, Parameters):
         model = _core.systems.TwoTanks(lower_brim_v=self.lower_brim_v)
         return np.asarray(model.free_run(parameters=_row(self.parameters), start=start, input=pump, dt_s=run.step_s))
 
-    def to_parameters(self) -> ParameterFile:
-        """Give all parameters, as `to_toml` writes them."""
-        values = dict(zip(_core.systems.TwoTanks.parameter_names, _row(self.parameters), strict=True))
-        tables = {"parameters": entries(values), "settings": entries({"lower_brim_v": float(self.lower_brim_v)})}
-        return ParameterFile(kind="two_tanks", tables=tables)
-
-    @classmethod
-    def from_parameters(cls, file: ParameterFile) -> TwoTanksModel:
-        """Make the tanks of a file that `to_toml` wrote."""
-        file.expect(kinds=("two_tanks",), tables=("parameters", "settings"))
-        return cls(
-            parameters=file.values("parameters", wanted(_core.systems.TwoTanks.parameter_names)),
-            lower_brim_v=file.values("settings", wanted(("lower_brim_v",)))["lower_brim_v"],
-        )
+    def _written(self) -> Mapping[str, float]:
+        return dict(zip(self.parameter_names, _row(self.parameters), strict=True))
 
     def estimate_state(self, record: xr.Dataset, *, window: int = 50) -> dict[str, float]:
         """Estimate the two levels at the first sample from the first samples of a record, parameters held.
@@ -150,6 +136,8 @@ class TwoTanksModel(SampledModel, Parameters):
         ------
         mgdd.errors.DataError
             A window outside the record, or times that are not even.
+        mgdd.errors.Interrupted
+            Ctrl-C; ``partial`` is the best estimate so far.
         """
         n = record.sizes["time_s"]
         if not 3 <= window <= n:
@@ -157,9 +145,12 @@ class TwoTanksModel(SampledModel, Parameters):
         known = record.isel(time_s=slice(0, window))
         # The upper level is not seen directly: the best of a few starts, since its brim makes hollows.
         brim = float(self.parameters["upper_brim_v"])
-        fits = [_fit(self.parameters, [], known, share * brim, self.lower_brim_v, 100) for share in (0.2, 0.5, 0.9)]
-        best = min(fits, key=lambda fit: float(fit.report.cost))
-        return dict(zip(self.state_names, map(float, best.starts[0][:2]), strict=True))
+        found: list[_core.systems.FreeRunFit] = []
+        stop = keep_finished(
+            lambda share: _fit(self.parameters, [], known, share * brim, self.lower_brim_v, 100), (0.2, 0.5, 0.9), found
+        )
+        best = min(found, key=_cost)
+        return hand_over(dict(zip(self.state_names, map(float, best.starts[0][:2]), strict=True)), stop)
 
 
 def fit_two_tanks(record: xr.Dataset, *, form: str = "grey_box", options: FitOptions | None = None) -> Fit:
@@ -189,6 +180,8 @@ def fit_two_tanks(record: xr.Dataset, *, form: str = "grey_box", options: FitOpt
         An unknown form.
     mgdd.errors.DataError
         Times that are not even.
+    mgdd.errors.Interrupted
+        Ctrl-C; ``partial`` is the best fit so far.
 
     References
     ----------
@@ -208,33 +201,32 @@ def fit_two_tanks(record: xr.Dataset, *, form: str = "grey_box", options: FitOpt
     chosen = fit_options(options, n_starts=4, seed=1, max_iterations=200, tolerance=1e-9)
     base, free = _FORMS[form]
     rng = np.random.default_rng(chosen.seed)
-    fits = []
-    for index in range(chosen.n_starts):
-        point = dict(base)
-        for name in free if index else ():
-            point[name] *= float(np.exp(0.15 * rng.standard_normal()))
-        point["overflow_share"] = min(point["overflow_share"], 1.0)
+
+    def points() -> Iterator[dict[str, float]]:
+        for index in range(chosen.n_starts):
+            point = dict(base)
+            for name in free if index else ():
+                point[name] *= float(np.exp(0.15 * rng.standard_normal()))
+            point["overflow_share"] = min(point["overflow_share"], 1.0)
+            yield point
+
+    def search(point: Mapping[str, float]) -> _core.systems.FreeRunFit:
         upper = min(0.8 * point["upper_brim_v"], 25.0) if form.startswith("grey_box") else 4.0
-        fits.append(_fit(point, list(free), record, upper, 10.0, chosen.max_iterations, chosen.tolerance))
-    best = min(fits, key=lambda fit: float(fit.report.cost))
+        return _fit(point, list(free), record, upper, 10.0, chosen.max_iterations, chosen.tolerance)
+
+    found: list[_core.systems.FreeRunFit] = []
+    stop = keep_finished(search, points(), found)
+    best = min(found, key=_cost)
     names = tuple(_core.systems.TwoTanks.parameter_names)
     report = FitReport.from_core(best.report, record["level_v"].to_numpy())
     model = TwoTanksModel(parameters=dict(zip(names, best.parameters, strict=True)))
     modelled = model.simulate(record, initial_state=[float(x) for x in best.starts[0][:2]])["level_v"]
     run = fit_run(record["time_s"].to_numpy(), record["level_v"].to_numpy(), modelled, model.labels["level_v"])
-    errors = tuple(sorted(float(fit.report.rmse) for fit in fits))
-    return Fit(
-        report=report,
-        model=model,
-        kind=model.kind,
-        train=quality_of(run),
-        findings=report.findings,
-        unidentifiable=report.unidentifiable,
-        start_rmse=errors,
-        n_best=n_best_of(errors),
-        run=run,
-        draw=draw_run,
-    )
+    return hand_over(fit_of(report, model, run, (float(one.report.rmse) for one in found)), stop)
+
+
+def _cost(found: _core.systems.FreeRunFit) -> float:
+    return float(found.report.cost)
 
 
 def _fit(

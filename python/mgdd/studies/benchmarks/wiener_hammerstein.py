@@ -10,13 +10,12 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from mgdd import _core
-from mgdd.errors import DataError, ParameterError
-from mgdd.io.parameters import ParameterFile, Parameters, entries, wanted
+from mgdd.errors import DataError, ParameterError, hand_over, keep_finished
+from mgdd.io.parameters import FIT_NOTES, ParameterFile, Parameters, entries, wanted
 from mgdd.optimize.fit_options import FitOptions, fit_options
-from mgdd.optimize.fit_run import draw_run, fit_run, quality_of
+from mgdd.optimize.fit_run import fit_of, fit_run
 from mgdd.results import Fit, FitReport
 from mgdd.results.describe import described
-from mgdd.results.fit import n_best_of
 from mgdd.results.labels import Label
 from mgdd.signals.even_grid import even_step
 from mgdd.signals.model import RunInputs, SampledModel
@@ -66,6 +65,7 @@ class LinearApproximation(SampledModel, Parameters):
     [1.5, 1.75, 1.875]
     """
 
+    kind = "linear_filter"
     input_names = ("input_v",)
     output_name = "output_v"
     labels = _LABELS
@@ -75,11 +75,6 @@ class LinearApproximation(SampledModel, Parameters):
     input_mean: float
     output_mean: float
     rmse: float
-
-    @property
-    def kind(self) -> str:
-        """``linear_filter``."""
-        return "linear_filter"
 
     @property
     def parameters(self) -> dict[str, float]:
@@ -96,13 +91,13 @@ class LinearApproximation(SampledModel, Parameters):
 
     def to_parameters(self) -> ParameterFile:
         """Give filter and means, as `to_toml` writes them."""
-        return _saved("linear_filter", self, ("numerator", "denominator", "input_mean", "output_mean", "rmse"))
+        return _saved(self, ("numerator", "denominator", "input_mean", "output_mean", "rmse"))
 
     @classmethod
     def from_parameters(cls, file: ParameterFile) -> LinearApproximation:
-        """Make the filter of a file that `to_toml` wrote."""
+        """Make the filter of a file that `to_toml` or a fit wrote."""
         numbers, vectors = ("input_mean", "output_mean", "rmse"), ("numerator", "denominator")
-        return cls(**_read("linear_filter", file, numbers=numbers, vectors=vectors))
+        return cls(**_read(cls.kind, file, numbers=numbers, vectors=vectors))
 
 
 @described
@@ -131,6 +126,7 @@ class WienerHammersteinModel(SampledModel, Parameters):
     [0.25, 0.5, 0.6875]
     """
 
+    kind = "wiener_hammerstein"
     input_names = ("input_v",)
     output_name = "output_v"
     labels = _LABELS
@@ -141,11 +137,6 @@ class WienerHammersteinModel(SampledModel, Parameters):
     lower: float
     upper: float
     values: Vector
-
-    @property
-    def kind(self) -> str:
-        """``wiener_hammerstein``."""
-        return "wiener_hammerstein"
 
     @property
     def parameters(self) -> dict[str, float]:
@@ -160,21 +151,13 @@ class WienerHammersteinModel(SampledModel, Parameters):
 
     def to_parameters(self) -> ParameterFile:
         """Give orders, grid and coefficients, as `to_toml` writes them."""
-        names = ("first_order", "last_order", "n_curve", "lower", "upper", "values")
-        return _saved("wiener_hammerstein", self, names)
+        return _saved(self, ("first_order", "last_order", "n_curve", "lower", "upper", "values"))
 
     @classmethod
     def from_parameters(cls, file: ParameterFile) -> WienerHammersteinModel:
-        """Make the model of a file that `to_toml` wrote."""
-        return cls(
-            **_read(
-                "wiener_hammerstein",
-                file,
-                numbers=("lower", "upper"),
-                vectors=("values",),
-                integers=("first_order", "last_order", "n_curve"),
-            )
-        )
+        """Make the model of a file that `to_toml` or a fit wrote."""
+        orders = ("first_order", "last_order", "n_curve")
+        return cls(**_read(cls.kind, file, numbers=("lower", "upper"), vectors=("values",), integers=orders))
 
     def curve(self, signal: ArrayLike) -> Vector:
         """Evaluate the static curve.
@@ -322,6 +305,8 @@ def fit_wiener_hammerstein(
         An order or a number outside its range.
     mgdd.errors.DataError
         Fewer than 1000 samples, or no partition that fits the orders.
+    mgdd.errors.Interrupted
+        Ctrl-C; ``partial`` is the best fit so far, to the first `scan_samples` until one partition has won.
 
     References
     ----------
@@ -362,15 +347,24 @@ def fit_wiener_hammerstein(
             f"no partition of {linear_order} poles fits first_order = {first_order} and last_order = {last_order}: "
             "raise the orders"
         )
-    short = []
-    for candidate in candidates:
+    models: list[_core.systems.WienerHammerstein] = []
+    reports: list[_core.optimize.FitReport] = []
+
+    def short(candidate: Candidate) -> _core.optimize.FitReport:
         model, start = _start(candidate, first_order, last_order, n_curve, some_u)
-        report = _fit(model, start, some_u, some_y, 40)
-        short.append((float(report.rmse), model, report))
-    short.sort(key=lambda entry: entry[0])
-    _, model, report = short[0]
-    report = _fit(model, report.values, u, y, chosen.max_iterations, chosen.tolerance)
-    wrapped = FitReport.from_core(report, y[_SKIP:])
+        models.append(model)
+        return _fit(model, start, some_u, some_y, 40)
+
+    stop = keep_finished(short, candidates, reports)
+    ranked = sorted(zip(reports, models, strict=False), key=lambda pair: float(pair[0].rmse))
+    best, model = ranked[0]
+    last = [best]
+    if stop is None:
+        stop = keep_finished(
+            lambda start: _fit(model, start, u, y, chosen.max_iterations, chosen.tolerance), [best.values], last
+        )
+    report, seen = last[-1], y if len(last) > 1 else some_y
+    wrapped = FitReport.from_core(report, seen[_SKIP:])
     fitted = WienerHammersteinModel(
         first_order=first_order,
         last_order=last_order,
@@ -381,24 +375,12 @@ def fit_wiener_hammerstein(
     )
     modelled = fitted.simulate(record)["output_v"].to_numpy()
     run = fit_run(record["time_s"].to_numpy()[_SKIP:], y[_SKIP:], modelled[_SKIP:], _LABELS["output_v"])
-    errors = tuple(entry[0] for entry in short)
-    return WienerHammersteinFit(
-        report=wrapped,
-        model=fitted,
-        kind=fitted.kind,
-        train=quality_of(run),
-        findings=wrapped.findings,
-        unidentifiable=wrapped.unidentifiable,
-        start_rmse=errors,
-        n_best=n_best_of(errors),
-        run=run,
-        draw=draw_run,
-        linear=linear,
-    )
+    fit = fit_of(wrapped, fitted, run, (float(one.rmse) for one in reports))
+    return hand_over(WienerHammersteinFit(**vars(fit), linear=linear), stop)
 
 
-def _saved(kind: str, model: object, names: tuple[str, ...]) -> ParameterFile:
-    return ParameterFile(kind=kind, tables={"parameters": entries({n: getattr(model, n) for n in names}, _UNITS)})
+def _saved(model: LinearApproximation | WienerHammersteinModel, names: tuple[str, ...]) -> ParameterFile:
+    return ParameterFile(kind=model.kind, tables={"parameters": entries({n: getattr(model, n) for n in names}, _UNITS)})
 
 
 def _read(
@@ -409,7 +391,7 @@ def _read(
     vectors: tuple[str, ...],
     integers: tuple[str, ...] = (),
 ) -> dict[str, Any]:
-    file.expect(kinds=(kind,), tables=("parameters",))
+    file.expect(kinds=(kind,), tables=("parameters", "fit?"), notes=FIT_NOTES)
     expected = {**wanted(numbers, _UNITS), **wanted(vectors, form="numbers"), **wanted(integers, form="integer")}
     values = file.values("parameters", expected)
     return values | {name: np.array(values[name], dtype=np.float64) for name in vectors}
