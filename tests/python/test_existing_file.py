@@ -12,7 +12,7 @@ from mgdd import io, presets
 from mgdd.cli.main import main
 from mgdd.identify import load_throttle_model
 from mgdd.io.parameters import ParameterFile
-from mgdd.optimize import load_seeker
+from mgdd.optimize import Seeker
 
 READERS: dict[str, tuple[Callable[[Path], Any], str, str]] = {
     "pressure": (io.read_pressure, "mean.csv", "maen.csv"),
@@ -22,7 +22,7 @@ READERS: dict[str, tuple[Callable[[Path], Any], str, str]] = {
     "parameters": (ParameterFile.read, "lag.toml", "lagg.toml"),
     "model": (load_throttle_model, "fit.toml", "fits.toml"),
     "preset": (presets.load, "mine.toml", "mime.toml"),
-    "seeker": (load_seeker, "seeker.json", "seker.json"),
+    "seeker": (Seeker.load, "seeker.json", "seker.json"),
 }
 
 
