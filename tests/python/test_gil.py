@@ -230,7 +230,7 @@ def throttle_groups() -> Call:
 
 @batch
 def latin_hypercube() -> Call:
-    return partial(_core.identify.latin_hypercube, _core.identify.throttle_group_bounds(), 50_000, 1)
+    return partial(_core.optimize.latin_hypercube, _core.identify.throttle_group_bounds(), 50_000, 1)
 
 
 @batch

@@ -1,4 +1,4 @@
-// Binds include/mgdd/identify: smooth throttle, throttle groups, Latin hypercube. The GIL is released while they run.
+// Binds include/mgdd/identify/throttle: smooth throttle, throttle groups. The GIL is released while they run.
 #include <array>
 #include <stop_token>
 #include <string>
@@ -9,7 +9,6 @@
 #include "interruptible.hpp"
 #include "mgdd/common/bounds.hpp"
 #include "mgdd/identify/free_run_fit.hpp"
-#include "mgdd/identify/multi_start.hpp"
 #include "mgdd/identify/throttle/first_principle_fit.hpp"
 #include "mgdd/identify/throttle/smooth_fit.hpp"
 #include "mgdd/math/dispatch.hpp"
@@ -173,8 +172,6 @@ void bind_throttle_fit(py::module_& m) {
         return rows;
       },
       "The nine groups with their bounds.");
-  m.def("latin_hypercube", &spread_starts, arg("parameters"), arg("n"), arg("seed"),
-        py::call_guard<py::gil_scoped_release>(), "Points between the bounds, one per cell of every axis.");
 }
 
 }  // namespace mgdd::bindings

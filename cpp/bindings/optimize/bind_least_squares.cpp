@@ -5,6 +5,7 @@
 #include "keywords.hpp"
 #include "mgdd/common/error.hpp"
 #include "mgdd/optimize/least_squares/least_squares.hpp"
+#include "mgdd/optimize/least_squares/multi_start.hpp"
 
 namespace mgdd::bindings {
 namespace {
@@ -191,6 +192,8 @@ void bind_least_squares(py::module_& m) {
   bind_report(m);
   m.def("least_squares", &least_squares, py::arg("fun"), py::arg("x0"), py::kw_only(), py::arg("parameters"),
         py::arg("options"), "Minimise sum(residual^2) / 2 for `fun(x) -> (residual, jacobian)`; None refuses a point.");
+  m.def("latin_hypercube", &optimize::spread_starts, py::arg("parameters"), py::arg("n"), py::arg("seed"),
+        py::call_guard<py::gil_scoped_release>(), "Points between the bounds, one per cell of every axis.");
 }
 
 }  // namespace mgdd::bindings

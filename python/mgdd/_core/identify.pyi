@@ -8,7 +8,7 @@ import mgdd._core.optimize
 import numpy
 import numpy.typing
 import typing
-__all__: list[str] = ['CylinderFit', 'GradientPwR', 'LoadBurn', 'LoadFit', 'MeasuredCycle', 'RecursivePwR', 'WindowPwR', 'common_parameters', 'correlation_limit', 'estimate_burn', 'fit_cylinder', 'fit_pseudo_wiener', 'fit_smooth_throttle', 'fit_throttle_groups', 'group_names', 'latin_hypercube', 'load_parameters', 'simulate_smooth_throttle', 'simulate_throttle_groups', 'smooth_example', 'smooth_names', 'smooth_throttle_instruction_set', 'throttle_group_bounds', 'wall_heat_scale_upper', 'with_burn']
+__all__: list[str] = ['CylinderFit', 'GradientPwR', 'LoadBurn', 'LoadFit', 'MeasuredCycle', 'RecursivePwR', 'WindowPwR', 'common_parameters', 'correlation_limit', 'estimate_burn', 'fit_cylinder', 'fit_pseudo_wiener', 'fit_smooth_throttle', 'fit_throttle_groups', 'group_names', 'load_parameters', 'simulate_smooth_throttle', 'simulate_throttle_groups', 'smooth_example', 'smooth_names', 'smooth_throttle_instruction_set', 'throttle_group_bounds', 'wall_heat_scale_upper', 'with_burn']
 class MeasuredCycle:
     def __init__(self, *, label: str, crank_angle_cad: typing.Annotated[numpy.typing.ArrayLike, numpy.float64], pressure_bar: typing.Annotated[numpy.typing.ArrayLike, numpy.float64], point: mgdd._core.engine.OperatingPoint) -> None:
         ...
@@ -187,10 +187,6 @@ def fit_smooth_throttle(duty: typing.Annotated[numpy.typing.ArrayLike, numpy.flo
 def fit_throttle_groups(records: collections.abc.Sequence[tuple[typing.SupportsFloat | typing.SupportsIndex, typing.Annotated[numpy.typing.ArrayLike, numpy.float64], typing.Annotated[numpy.typing.ArrayLike, numpy.float64], collections.abc.Sequence[typing.SupportsFloat | typing.SupportsIndex], typing.SupportsInt | typing.SupportsIndex, bool]], *, stages: collections.abc.Sequence[tuple[collections.abc.Sequence[typing.SupportsInt | typing.SupportsIndex], collections.abc.Sequence[typing.SupportsInt | typing.SupportsIndex], typing.SupportsFloat | typing.SupportsIndex, typing.SupportsFloat | typing.SupportsIndex, typing.SupportsInt | typing.SupportsIndex]], starts: collections.abc.Sequence[typing.Annotated[collections.abc.Sequence[typing.SupportsFloat | typing.SupportsIndex], "FixedSize(9)"]], closed_deg: typing.SupportsFloat | typing.SupportsIndex, open_deg: typing.SupportsFloat | typing.SupportsIndex, ramp_deg: typing.SupportsFloat | typing.SupportsIndex, substeps: typing.SupportsInt | typing.SupportsIndex, n_threads: typing.SupportsInt | typing.SupportsIndex) -> dict:
     """
     Staged multi-start fit of the throttle groups; releases the GIL.
-    """
-def latin_hypercube(parameters: collections.abc.Sequence[mgdd._core.optimize.Parameter], n: typing.SupportsInt | typing.SupportsIndex, seed: typing.SupportsInt | typing.SupportsIndex) -> list[typing.Annotated[numpy.typing.NDArray[numpy.float64], "[m, 1]"]]:
-    """
-    Points between the bounds, one per cell of every axis.
     """
 def load_parameters() -> list[str]:
     """

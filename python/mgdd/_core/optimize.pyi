@@ -6,7 +6,7 @@ import collections.abc
 import numpy
 import numpy.typing
 import typing
-__all__: list[str] = ['BoundedSeeking', 'ComponentLag', 'ExtremumSeeking', 'FitReport', 'GoldenSection', 'GradientDescent', 'IterativeLearning', 'LeastSquaresOptions', 'Limit', 'NewtonSeeking', 'Parameter', 'Spsa', 'least_squares', 'tune']
+__all__: list[str] = ['BoundedSeeking', 'ComponentLag', 'ExtremumSeeking', 'FitReport', 'GoldenSection', 'GradientDescent', 'IterativeLearning', 'LeastSquaresOptions', 'Limit', 'NewtonSeeking', 'Parameter', 'Spsa', 'latin_hypercube', 'least_squares', 'tune']
 class Parameter:
     """
     One unknown of a fit: name, bounds, and whether it is searched as its log.
@@ -922,6 +922,10 @@ class IterativeLearning:
         """
         Number of the trial to come.
         """
+def latin_hypercube(parameters: collections.abc.Sequence[Parameter], n: typing.SupportsInt | typing.SupportsIndex, seed: typing.SupportsInt | typing.SupportsIndex) -> list[typing.Annotated[numpy.typing.NDArray[numpy.float64], "[m, 1]"]]:
+    """
+    Points between the bounds, one per cell of every axis.
+    """
 def least_squares(fun: collections.abc.Callable, x0: typing.Annotated[numpy.typing.ArrayLike, numpy.float64, "[m, 1]"], *, parameters: collections.abc.Sequence[Parameter], options: LeastSquaresOptions) -> FitReport:
     """
     Minimise sum(residual^2) / 2 for `fun(x) -> (residual, jacobian)`; None refuses a point.

@@ -43,6 +43,6 @@ def spread_starts(
     >>> [sorted(start) for start in spread_starts({"gain": 0.5, "time_s": 2.0}, [gain], 2, 0)]
     [['gain', 'time_s'], ['gain', 'time_s']]
     """
-    further = _core.identify.latin_hypercube(box, n_starts - 1, seed) if n_starts > 1 else []
+    further = _core.optimize.latin_hypercube(box, n_starts - 1, seed) if n_starts > 1 else []
     names = [parameter.name for parameter in box]
     return [dict(first), *({**first, **dict(zip(names, point.tolist(), strict=True))} for point in further)]

@@ -158,22 +158,5 @@ TEST(ThrottleGroups, NamesWrongInput) {
   EXPECT_NO_THROW((void)fit_first_principle({}, {chirp_record(100, 0.0, 0)}, {stage}, {truth}, 1));
 }
 
-TEST(SpreadStarts, HasOnePointPerCellOfEveryAxis) {
-  const std::vector<optimize::Parameter> box{{"a", -1.0, 3.0}, {"b", 1e-3, 10.0, true}};
-  const auto points = spread_starts(box, 16, 5);
-  std::array<int, 16> a{}, b{};
-  for (const Eigen::VectorXd& point : points) {
-    ++a[static_cast<std::size_t>(16.0 * (point[0] + 1.0) / 4.0)];
-    ++b[static_cast<std::size_t>(16.0 * std::log(point[1] / 1e-3) / std::log(1e4))];
-  }
-  for (std::size_t i = 0; i < 16; ++i) {
-    EXPECT_EQ(a[i], 1);
-    EXPECT_EQ(b[i], 1);
-  }
-  EXPECT_EQ(spread_starts(box, 16, 5)[3], points[3]);
-  EXPECT_NE(spread_starts(box, 16, 6)[3], points[3]);
-  EXPECT_THROW((void)spread_starts({{"a"}}, 4, 1), ParameterError);
-}
-
 }  // namespace
 }  // namespace mgdd::identify

@@ -29,7 +29,7 @@ FirstPrincipleFit fit_first_principle(const FirstPrinciple& model, const std::ve
   for (std::size_t i = 0; i < starts.size(); ++i)
     indices.push_back(Eigen::VectorXd::Constant(1, static_cast<double>(i)));
   FirstPrincipleFit fit;
-  fit.starts = multi_start(
+  fit.starts = optimize::multi_start(
       indices,
       [&](const Eigen::VectorXd& index) {
         return fit_in_stages(model, parameters, records, stages, ends[static_cast<std::size_t>(index[0])]);

@@ -5,7 +5,8 @@
 #include <cstddef>
 #include <vector>
 
-#include "mgdd/identify/multi_start.hpp"
+#include "mgdd/identify/staged.hpp"
+#include "mgdd/optimize/least_squares/multi_start.hpp"
 #include "mgdd/throttle/models/first_principle.hpp"
 
 namespace mgdd::identify {
@@ -16,7 +17,7 @@ std::vector<optimize::Parameter> first_principle_parameters();
 /// Staged fit from every start; values of the best start and all reports (last stage).
 struct FirstPrincipleFit {
   Values<double, 9> values{};
-  MultiStartFit starts;
+  optimize::MultiStartFit starts;
 };
 FirstPrincipleFit fit_first_principle(const throttle::FirstPrinciple& model,
                                       const std::vector<SimulationRecord>& records, const std::vector<FitStage>& stages,

@@ -1,19 +1,21 @@
-#include "mgdd/identify/multi_start.hpp"
+#include "mgdd/optimize/least_squares/multi_start.hpp"
 
 #include <algorithm>
+#include <cmath>
+#include <string>
 
 #include "mgdd/common/text.hpp"
 #include "mgdd/math/latin_hypercube.hpp"
 
-namespace mgdd::identify {
+namespace mgdd::optimize {
 
-std::vector<Eigen::VectorXd> spread_starts(const std::vector<optimize::Parameter>& parameters, std::size_t n,
+std::vector<Eigen::VectorXd> spread_starts(const std::vector<Parameter>& parameters, std::size_t n,
                                            std::uint64_t seed) {
-  optimize::validate(parameters);
+  validate(parameters);
   const Eigen::MatrixXd cube = latin_hypercube(n, parameters.size(), seed);
   std::vector<Eigen::VectorXd> points(n, Eigen::VectorXd(cube.cols()));
   for (Eigen::Index j = 0; j < cube.cols(); ++j) {
-    const optimize::Parameter& p = parameters[static_cast<std::size_t>(j)];
+    const Parameter& p = parameters[static_cast<std::size_t>(j)];
     if (!std::isfinite(p.lower) || !std::isfinite(p.upper)) {
       throw about(p.name, ParameterError(p.name + ": a Latin hypercube needs finite bounds, has [" + text(p.lower) +
                                          ", " + text(p.upper) + "]"));
@@ -28,16 +30,16 @@ std::vector<Eigen::VectorXd> spread_starts(const std::vector<optimize::Parameter
   return points;
 }
 
-MultiStartFit rank(std::vector<optimize::FitReport> reports) {
+MultiStartFit rank(std::vector<FitReport> reports) {
   constexpr double reached_factor = 1.005;
   MultiStartFit fit{std::move(reports), 0, 0};
   for (std::size_t i = 1; i < fit.reports.size(); ++i) {
     const double best = fit.reports[fit.best].cost;
     if (fit.reports[i].cost < best || !std::isfinite(best)) fit.best = i;
   }
-  for (const optimize::FitReport& report : fit.reports)
+  for (const FitReport& report : fit.reports)
     fit.n_reached += report.rmse <= reached_factor * fit.reports[fit.best].rmse ? 1U : 0U;
   return fit;
 }
 
-}  // namespace mgdd::identify
+}  // namespace mgdd::optimize
