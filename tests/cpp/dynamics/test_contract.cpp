@@ -4,6 +4,7 @@
 
 #include <cmath>
 #include <span>
+#include <type_traits>
 #include <vector>
 
 #include "mgdd/common/state.hpp"
@@ -178,6 +179,31 @@ TEST(ModelContract, NumbersCarryTheWholeState) {
   }
   EXPECT_EQ(model.output(copy), model.output(state));
   EXPECT_NEAR(static_cast<double>(BasicPwRModel<float>(lift<float>(p)).output(narrow)), model.output(state), 1e-3);
+}
+
+/// PW-R, but on one scalar it gives no model.
+template <class Missing>
+struct LacksOne {
+  using Whole = throttle::PseudoWienerFamily<throttle::PwR>;
+  static constexpr int n_parameters = Whole::n_parameters;
+
+  template <class T>
+  auto prepare(const Values<T, n_parameters>& values, double sample_s) const noexcept {
+    if constexpr (std::is_same_v<T, Missing>) {
+      return 0;
+    } else {
+      return Whole{}.prepare(values, sample_s);
+    }
+  }
+};
+
+TEST(Contract, AScalarThatIsLeftOutIsSeen) {
+  EXPECT_TRUE((on_every_scalar<LacksOne<void>>));
+  EXPECT_FALSE((on_every_scalar<LacksOne<double>>));
+  EXPECT_FALSE((on_every_scalar<LacksOne<float>>));
+  EXPECT_FALSE((on_every_scalar<LacksOne<Dual<3>>>));
+  EXPECT_FALSE((on_every_scalar<LacksOne<Dual<3, float>>>));
+  EXPECT_FALSE((on_every_scalar<LacksOne<Lanes<8>>>));
 }
 
 }  // namespace

@@ -176,6 +176,39 @@ TEST(KalmanObserver, NamesWrongVariances) {
   EXPECT_NO_THROW(Observer(model, {}));
 }
 
+// Column by column: names, derivatives beside their values, and a run that goes on as if nothing had been.
+TEST(FixedGainObserver, ARestartGoesOnBitForBitOnDualsToo) {
+  using D = Dual<3>;
+  throttle::PwR p;
+  p.frame.delay_samples = 2.5;
+  auto lifted_p = throttle::lift<D>(p);
+  lifted_p.above.gain_deg_per_s2_per_duty.grad = {1.0, 0.0, 0.0};
+  lifted_p.above.coulomb_duty.grad = {0.0, 1.0, 0.0};
+  const throttle::BasicPwRModel<D> model(lifted_p);
+  using Observer = FixedGainObserver<throttle::BasicPwRModel<D>, throttle::ObserverGains>;
+  const throttle::ObserverGains gains{.angle_gain = 0.3, .speed_gain_per_s = 20.0, .bias_gain_duty_per_deg = 0.002};
+  Observer observer(model, gains);
+  observer.start(model.at_rest(D(30.0)));
+  const auto measured = [](int k) { return D(30.0 + 0.4 * k); };
+  for (int k = 0; k < 12; ++k)
+    static_cast<void>(observer.update(D(0.4), measured(k)));
+  const StateColumns saved = save_state(observer);
+  EXPECT_EQ(saved.size(), 9U * 4U);
+  EXPECT_EQ(saved.at("position_deg"), std::vector{observer.state().position_deg.value});
+  EXPECT_EQ(saved.at("position_deg_0"), std::vector{observer.state().position_deg.grad[0]});
+  EXPECT_EQ(saved.at("speed_deg_per_s_1"), std::vector{observer.state().speed_deg_per_s.grad[1]});
+  EXPECT_NE(saved.at("speed_deg_per_s_1").front(), 0.0);
+  EXPECT_TRUE(saved.contains("before_4_2"));
+
+  Observer copy(model, gains);
+  restore_state(copy, saved);
+  for (int k = 12; k < 20; ++k) {
+    const D a = observer.update(D(0.3), measured(k)), b = copy.update(D(0.3), measured(k));
+    EXPECT_EQ(a.value, b.value);
+    EXPECT_EQ(a.grad, b.grad);
+  }
+}
+
 // The same corrections as one observer makes sample by sample; from each of its states a plain run.
 TEST(PredictAhead, IsARunFromEachStateOfTheObserver) {
   throttle::PwR p;
