@@ -147,7 +147,7 @@ Eigen::VectorXd WienerHammerstein::simulate(const Eigen::VectorXd& parameters, c
   Filter first;
   Filter last;
   unpack(parameters, 0, first_order, first);
-  unpack(parameters, 2 * first_order, last_order, last);
+  unpack(parameters, Eigen::Index{2} * first_order, last_order, last);
   return filter_series(last.b, last.a, curve(parameters, filter_series(first.b, first.a, input)));
 }
 

@@ -21,7 +21,7 @@ namespace {
 
 const VirtualThrottleSettings& checked(const VirtualThrottleSettings& settings) {
   validate(settings);
-  return settings;
+  return settings;  // NOLINT(bugprone-return-const-ref-from-parameter): the caller holds it
 }
 
 double finite_or(double value, double otherwise) noexcept {

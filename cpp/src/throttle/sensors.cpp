@@ -86,7 +86,7 @@ double SensorSampler::faulty(std::size_t which, double volts, double time_s) noe
       return volts * (1.0 + fault.size);
     case SensorFaultKind::stuck:
       if (!state_.stuck_v[which]) state_.stuck_v[which] = volts;
-      return *state_.stuck_v[which];
+      return state_.stuck_v[which].value_or(volts);
   }
   return volts;
 }

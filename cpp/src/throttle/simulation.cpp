@@ -63,8 +63,8 @@ MGDD_INLINE void run_lanes(const WidePlant& plant, const ThrottleSignals& signal
                            BasicThrottleState<Wide>& state, double* rows) noexcept {
   const dynamics::Repeated<WidePlant> sampled{plant, static_cast<int>(steps)};
   BasicThrottleState<Wide> s = state;
-  const auto input = [&] [[gnu::always_inline]] (std::size_t k) { return input_at(plant, signals, k); };
-  const auto store = [rows] [[gnu::always_inline]] (std::size_t k, const Wide& angle_deg) {
+  const auto input = [&](std::size_t k) __attribute__((always_inline)) { return input_at(plant, signals, k); };
+  const auto store = [rows](std::size_t k, const Wide& angle_deg) __attribute__((always_inline)) {
     angle_deg.store(rows + k * static_cast<std::size_t>(width));
     return true;
   };

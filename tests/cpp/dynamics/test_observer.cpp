@@ -40,7 +40,7 @@ struct Oscillator {
 TEST(KalmanObserver, SteadyGainIsThatOfAnIndependentRiccatiSolution) {
   const auto model = Rk4<Oscillator>{}.prepare(std::array{4.0, 0.5}, 0.1);
   using Observer = KalmanObserver<std::remove_const_t<decltype(model)>>;
-  Observer::Settings settings{.process = {1e-4, 4e-3}, .start = {1.0, 1.0}, .measurement = 0.02};
+  const Observer::Settings settings{.process = {1e-4, 4e-3}, .start = {1.0, 1.0}, .measurement = 0.02};
   Observer observer(model, settings);
   for (int k = 0; k < 2000; ++k)
     static_cast<void>(observer.update(0.0, 0.0));
@@ -174,6 +174,24 @@ TEST(KalmanObserver, NamesWrongVariances) {
   EXPECT_THROW(Observer(model, {.process = {-1.0, 0.0, 0.0}}), ParameterError);
   EXPECT_THROW(Observer(model, {.measurement = 0.0}), ParameterError);
   EXPECT_NO_THROW(Observer(model, {}));
+}
+
+TEST(KalmanObserver, AStartForgetsAndAnotherModelIsTakenWhole) {
+  using Model = std::remove_const_t<decltype(Rk4<Oscillator>{}.prepare(std::array{4.0, 0.5}, 0.1))>;
+  const Model model = Rk4<Oscillator>{}.prepare(std::array{4.0, 0.5}, 0.1);
+  const Model other = Rk4<Oscillator>{}.prepare(std::array{9.0, 0.1}, 0.1);
+  const KalmanSettings<double, 2> settings{.process = {1e-4, 4e-3}, .start = {1.0, 0.5}, .measurement = 0.02};
+  KalmanObserver<Model> used(model, settings), fresh(other, settings);
+  for (int k = 0; k < 40; ++k)
+    static_cast<void>(used.update(0.2, 0.1 * k));
+  used.set_model(other);
+  used.start({0.3, -0.2});
+  fresh.start({0.3, -0.2});
+  EXPECT_EQ(used.covariance(), fresh.covariance());
+  for (int k = 0; k < 20; ++k) {
+    EXPECT_EQ(used.update(0.2, 0.1 * k), fresh.update(0.2, 0.1 * k));
+    EXPECT_EQ(used.covariance(), fresh.covariance());
+  }
 }
 
 // Column by column: names, derivatives beside their values, and a run that goes on as if nothing had been.

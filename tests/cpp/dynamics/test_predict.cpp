@@ -90,7 +90,7 @@ TEST(Predict, SlopesToMovesStateAndBiasAreExact) {
     expect_exact<3>(pw_r, moving(pw_r));  // position, speed, bias
     FirstPrinciple family;
     family.delay_samples = delay;
-    auto groups = throttle::first_principle_of(throttle::Throttle{});
+    const auto groups = throttle::first_principle_of(throttle::Throttle{});
     const auto model = family.prepare<double>(groups, 2e-3);
     expect_exact<4>(model, moving(model));  // angle, speed, torque, bias
   }

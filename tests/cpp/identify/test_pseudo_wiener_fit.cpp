@@ -132,7 +132,7 @@ TEST(PseudoWienerFit, RanksTheKindsOnP1) {
   struct Result {
     double train, chirp, steps, ahead;
   };
-  const auto judge = [&](const throttle::PseudoWiener& base, PseudoWienerFitOptions o) {
+  const auto judge = [&](const throttle::PseudoWiener& base, const PseudoWienerFitOptions& o) {
     const auto fit = fit_pseudo_wiener({{train.duty, train.angle_deg}}, base, o);
     const auto percent = [&](const auto& log) {
       return test_support::fit_percent(log.angle_deg, free_run(fit.model, log.duty, log.angle_deg[0]));

@@ -134,12 +134,12 @@ TEST(OutputError, AnyNumberOfUnknownsGivesTheSameColumns) {
 }
 
 TEST(OutputError, ALinearLagMatchesItsClosedFormAndStartsWhereItsParameterSays) {
-  SimulationRecord record{.dt_s = 0.01,
-                          .input = std::vector<double>(200, 1.0),
-                          .output = std::vector<double>(200, 0.0),
-                          .start = {0.0},
-                          .free_start = {},
-                          .weight = {}};
+  const SimulationRecord record{.dt_s = 0.01,
+                                .input = std::vector<double>(200, 1.0),
+                                .output = std::vector<double>(200, 0.0),
+                                .start = {0.0},
+                                .free_start = {},
+                                .weight = {}};
   OutputError residual(Lag{}, {2.0, 0.3, 0.5}, std::vector<std::size_t>{0, 1, 2}, std::vector{record});
   VectorXd y(200);
   MatrixXd j(200, 3);
@@ -172,9 +172,9 @@ TEST(OutputError, AUsersFunctorIsFittedByLeastSquares) {
   record.sigma = 0.01;
   OutputError residual(Rk4<Pendulum>{}, {2.0, 0.2, 1.0, 0.0}, std::vector<std::size_t>{0, 1, 2, 3},
                        std::vector{record});
-  std::vector<optimize::Parameter> unknowns{{"gain", 0.1, 20.0, true},      {"damping", 0.01, 5.0, true},
-                                            {"stiffness", 0.1, 20.0, true}, {"offset", -1.0, 1.0},
-                                            {"angle_0", -3.0, 3.0},         {"rate_0", -3.0, 3.0}};
+  const std::vector<optimize::Parameter> unknowns{{"gain", 0.1, 20.0, true},      {"damping", 0.01, 5.0, true},
+                                                  {"stiffness", 0.1, 20.0, true}, {"offset", -1.0, 1.0},
+                                                  {"angle_0", -3.0, 3.0},         {"rate_0", -3.0, 3.0}};
   const auto fit = optimize::LeastSquares(unknowns, residual.n_residuals()).solve(residual, residual.start());
   ASSERT_TRUE(fit.success()) << fit.brief();
   EXPECT_NEAR(fit.rmse, 1.0, 0.05);
@@ -199,7 +199,7 @@ TEST(OutputError, EvaluatesWithoutTheHeapAndRefusesAnEscape) {
 }
 
 TEST(OutputError, NamesWhatDoesNotBelongTogether) {
-  const auto build = [](auto change, std::vector<std::size_t> free = {0}) {
+  const auto build = [](auto change, const std::vector<std::size_t>& free = {0}) {
     auto record = pendulum_record(6, 50);
     change(record);
     return OutputError(Rk4<Pendulum>{}, pendulum_truth, free, std::vector{record});

@@ -59,12 +59,12 @@ Set near_truth(std::uint64_t seed, double half_width) {
 TEST(SmoothThrottle, TheOnePassKernelHasTheNormalEquationsOfTheDualModel) {
   const Log log = make_log(1500, 0.0, 0.35, 15.0, 0.14);
   const Set set = near_truth(3, 0.2);
-  SimulationRecord record{.dt_s = 1e-3,
-                          .input = log.duty,
-                          .output = log.angle_deg,
-                          .start = {0.14, 0.0, 0.0},
-                          .free_start = {},
-                          .weight = {}};
+  const SimulationRecord record{.dt_s = 1e-3,
+                                .input = log.duty,
+                                .output = log.angle_deg,
+                                .start = {0.14, 0.0, 0.0},
+                                .free_start = {},
+                                .weight = {}};
   OutputError residual(Model{}, set, std::vector<std::size_t>{0, 1, 2, 3, 4, 5, 6, 7, 8, 9}, std::vector{record});
   Eigen::VectorXd r(1500);
   Eigen::MatrixXd j(1500, 10);
@@ -89,7 +89,7 @@ TEST(SmoothThrottle, TheOnePassKernelHasTheNormalEquationsOfTheDualModel) {
 
 TEST(SmoothThrottle, EveryLaneHasTheBitsOfASetAlone) {
   const Log log = make_log(400, 0.0, 0.35, 15.0, 0.14);
-  std::array<Set, smooth_throttle_lanes> sets;
+  std::array<Set, smooth_throttle_lanes> sets{};
   for (std::size_t lane = 0; lane < sets.size(); ++lane)
     sets[lane] = near_truth(10 + lane, 0.3);
   std::array<NormalSums, smooth_throttle_lanes> together;
@@ -133,10 +133,11 @@ TEST(SmoothThrottle, FarStartsReachTheNoiseFloorAndLanesChangeNothing) {
   const optimize::FitReport& best = fit.reports[fit.best];
   EXPECT_LT(best.rmse, 1.005 * log.noise_deg);
   EXPECT_EQ(best.n_residuals, 20'000);
-  for (Eigen::Index i = 0; i < 10; ++i)
+  for (Eigen::Index i = 0; i < 10; ++i) {
     EXPECT_LT(std::abs(best.values[i] - smooth_plant_example[static_cast<std::size_t>(i)]),
               4.5 * best.standard_error[i])
         << best.names[static_cast<std::size_t>(i)];
+  }
   // Viscous friction and back-EMF of a motor with little inductance cannot be told apart.
   EXPECT_NE(std::ranges::find(best.unidentifiable, "viscous_nms_per_rad"), best.unidentifiable.end());
   EXPECT_EQ(std::ranges::find(best.unidentifiable, "preload_width_rad"), best.unidentifiable.end());

@@ -85,7 +85,7 @@ TEST(ThrottleGroups, SensitivityVanishesWhileThePlateSticks) {
 TEST(ThrottleGroups, ExactDataGiveTheGroupsBackExactly) {
   FitStage stage{upper_groups, {}, 1.0, {}};
   stage.search.cost_tolerance = 1e-14;
-  auto base = start;
+  const auto base = start;
   const auto fit = fit_first_principle({}, {chirp_record(12'000, 0.0, 0)}, {stage}, {base}, 1);
   for (const std::size_t i : upper_groups)
     EXPECT_NEAR(fit.values[i] / truth[i], 1.0, 1e-6) << FirstPrinciple::parameters[i].name;

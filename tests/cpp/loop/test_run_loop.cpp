@@ -58,7 +58,7 @@ TEST(RunLoop, ARequestEndsItBetweenTwoCycles) {
   EngineBench bench(bench_with_misfires());
   Recorded s = seeker();
   std::stop_source source;
-  std::jthread soon([&] {
+  const std::jthread soon([&] {
     std::this_thread::sleep_for(std::chrono::milliseconds(20));
     source.request_stop();
   });

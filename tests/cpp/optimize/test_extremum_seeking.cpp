@@ -291,7 +291,7 @@ TEST(ExtremumSeeking, RefusesSettingsByName) {
     ExtremumSeekingSettings s;
     change(s);
     try {
-      ExtremumSeeking seeker(s);
+      const ExtremumSeeking seeker(s);
     } catch (const Error& e) {
       return e.what();
     }

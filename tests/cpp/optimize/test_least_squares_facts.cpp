@@ -66,7 +66,8 @@ TEST(LeastSquaresFacts, ATrialCostThatIsNotFiniteIsARejectedStep) {
   int calls = 0;
   const auto model = [&](const VectorXd& x, VectorXd& r, MatrixXd* j) {
     rosenbrock(x, r, j);
-    if (++calls == 2 || calls == 3) r[0] = std::numeric_limits<double>::quiet_NaN();
+    ++calls;
+    if (calls == 2 || calls == 3) r[0] = std::numeric_limits<double>::quiet_NaN();
     return true;
   };
   const FitReport fit = LeastSquares({{"a"}, {"b"}}, 2, tight()).solve(model, VectorXd{{-1.2, 1.0}});

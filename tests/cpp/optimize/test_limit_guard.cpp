@@ -154,7 +154,7 @@ TEST(LimitGuard, AlarmsAfterThreeCyclesInARowOverTheSameLimit) {
 // --- what it adds to J --------------------------------------------------------------------------------------
 
 double shaping(Limit limit, double value) {
-  LimitGuard guard({std::move(limit)}, 1, 10.0);
+  const LimitGuard guard({std::move(limit)}, 1, 10.0);
   const double values[] = {value};
   return guard.shaping(values);
 }

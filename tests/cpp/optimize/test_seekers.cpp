@@ -123,7 +123,7 @@ TEST(EverySeeker, AMisfireOnlyCounts) {
     EXPECT_EQ(seeker.protocol().cycle, 58);
     EXPECT_EQ(seeker.protocol().misfires, 1);
     EXPECT_EQ(seeker.ask(), x);
-    StateColumns after = save_state(seeker);
+    const StateColumns after = save_state(seeker);
     other.ask();
     StateColumns before = save_state(other);
     before["cycle"] = {58.0};
@@ -260,7 +260,7 @@ TEST(EverySeeker, AStateOfAnotherKindOrSizeIsRefusedAndChangesNothing) {
         [&](auto& seeker) {
           run(seeker, all[0], 15);
           const StateColumns before = save_state(seeker);
-          const auto refused = [&](StateColumns other) {
+          const auto refused = [&](const StateColumns& other) {
             EXPECT_THROW(restore_state(seeker, other), ParameterError) << one[i].first;
             EXPECT_EQ(save_state(seeker), before);
           };

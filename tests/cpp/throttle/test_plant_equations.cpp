@@ -28,7 +28,7 @@ double sign_of(double x) {
 /// What acts on a shaft during one step, as functions of the speed at its end.
 struct Equations {
   const Throttle& p;
-  double h;
+  double h = 0.0;
   ThrottleState from;
   ThrottleInput in;
 

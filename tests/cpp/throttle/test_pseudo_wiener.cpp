@@ -102,7 +102,7 @@ TEST(PseudoWienerPwR, SetValuedFrictionSticksExactlyAndTheSmoothOneCreepsAsState
 }
 
 TEST(PseudoWienerPwR, StaysInsideTheTravelAndReleasesAtOnce) {
-  PwR p;
+  const PwR p;
   Signal duty(600, 1.0);
   std::fill(duty.begin() + 300, duty.end(), -1.0);
   const Signal y = run(p, duty, 8.0);
@@ -397,7 +397,7 @@ std::size_t allocations(const P& p) {
     model.step(state, T(0.3));
     model.correct(state, T(21.0), {});
   }
-  volatile double sink = 0.0;
+  volatile double sink = 0.0;  // NOLINT(misc-const-correctness): written on double
   if constexpr (std::is_same_v<T, double>) sink = model.output(state);
   static_cast<void>(sink);
   return counter.count();

@@ -59,6 +59,7 @@ struct DelayLine {
 
  private:
   MGDD_INLINE const T& sent(const T& newest, int samples_ago) const noexcept {
+    // NOLINTNEXTLINE(bugprone-return-const-ref-from-parameter): the caller holds `newest`
     return samples_ago == 0 ? newest : before[static_cast<std::size_t>(samples_ago - 1)];
   }
 };

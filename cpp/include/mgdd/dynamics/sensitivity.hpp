@@ -52,12 +52,12 @@ bool sweep(const M& model, typename M::State& state, std::size_t n, std::size_t 
   using T = typename M::Scalar;
   return run(model, state, n, input, [&](std::size_t k, const T& y) {
     if (k < skip) return true;
-    bool finite = std::isfinite(value_of(y));
+    if (!std::isfinite(value_of(y))) return false;
     if constexpr (is_dual_v<T>) {
       for (std::size_t i = 0; i < std::min(lanes, y.grad.size()); ++i)
-        finite = finite && std::isfinite(y.grad[i]);
+        if (!std::isfinite(y.grad[i])) return false;
     }
-    return finite && visit(k, y);
+    return visit(k, y);
   });
 }
 

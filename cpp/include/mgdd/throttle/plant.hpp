@@ -149,8 +149,9 @@ class BasicThrottlePlant {
   /// Whether motor and plate stand still (with tanh and LuGre friction they creep).
   auto stuck(const State& s) const noexcept {
     const T rest = T(dynamics::rest_speed);
-    return (larger(s.speed_rad_per_s, -s.speed_rad_per_s) < rest) &
-           (larger(s.plate_speed_rad_per_s, -s.plate_speed_rad_per_s) < rest);
+    const auto motor_rests = larger(s.speed_rad_per_s, -s.speed_rad_per_s) < rest;
+    const auto plate_rests = larger(s.plate_speed_rad_per_s, -s.plate_speed_rad_per_s) < rest;
+    return motor_rests & plate_rests;
   }
   /// Held duty at which the throttle would begin to move from the angle of a state, were it at rest there: the gear
   /// against the plate, the current settled. With LuGre friction the end of presliding.
@@ -310,7 +311,9 @@ void BasicThrottlePlant<T, C>::step_two_masses(State& s, const Input& in, Torque
   const T approach =
       select(gap < zero, s.plate_speed_rad_per_s - s.speed_rad_per_s, s.speed_rad_per_s - s.plate_speed_rad_per_s);
   // Teeth push and never pull.
-  const auto touches = (over > zero) & (c_.gear * over + c_.gear_damping * approach > zero);
+  const auto closed = over > zero;
+  const auto pushes = c_.gear * over + c_.gear_damping * approach > zero;
+  const auto touches = closed & pushes;
   const T contact = select(touches, elastic, zero);
   const C coupling = select(touches, c_.gear_implicit, C(0.0));
 

@@ -90,8 +90,8 @@ class SensorSampler {
     for (std::size_t i = 0; i < s.filtered_v.size(); ++i) {
       const std::string which = i == 0 ? "first" : "second";
       v(which + "_filtered_v", s.filtered_v[i]);
-      bool stuck = s.stuck_v[i].has_value();
-      double held = s.stuck_v[i].value_or(0.0);
+      bool stuck = s.stuck_v[i].has_value();     // NOLINT(misc-const-correctness): a reader writes both
+      double held = s.stuck_v[i].value_or(0.0);  // NOLINT(misc-const-correctness)
       v(which + "_is_stuck", stuck);
       v(which + "_stuck_v", held);
       if constexpr (!std::is_const_v<Self>) s.stuck_v[i] = stuck ? std::optional<double>(held) : std::nullopt;

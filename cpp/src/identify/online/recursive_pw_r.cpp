@@ -75,7 +75,7 @@ UpdateGate RecursivePwR::update(double duty, double angle_deg) noexcept {
     duty_mean_ = Eigen::Vector2d(duty_mean_[1], duty_sum_ / settings_.every);
     duty_sum_ = 0.0;
     if (!has_angle) clean_from_ = std::max(clean_from_, count_ + 1);
-    if (gate == UpdateGate::filling && count_ >= clean_from_ + 2 * settings_.every) gate = learn();
+    if (gate == UpdateGate::filling && count_ >= clean_from_ + std::int64_t{2} * settings_.every) gate = learn();
   }
   // A dropped sample keeps its place in time: a clock that stood still would turn the gap into a jump of the plate.
   if (!has_duty) clean_from_ = std::max(clean_from_, count_ + delay.reach + 1);

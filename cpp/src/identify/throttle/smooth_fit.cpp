@@ -124,7 +124,7 @@ void validate(const SmoothPlant& plant, const SmoothThrottleRecord& record, cons
 void evaluate(const SmoothPlant& plant, const SmoothThrottleRecord& record, std::size_t n_samples,
               std::span<Search*> group, const std::vector<std::size_t>& free, const SmoothThrottleFitOptions& options) {
   constexpr std::size_t width = smooth_throttle_lanes;
-  std::array<Set, width> sets;
+  std::array<Set, width> sets{};
   std::array<NormalSums, width> sums;
   for (std::size_t lane = 0; lane < group.size(); ++lane) {
     Search& search = *group[lane];

@@ -14,8 +14,10 @@
 namespace mgdd::identify {
 namespace {
 
-typedef double Lanes2 __attribute__((vector_size(16)));
-typedef double Lanes8 __attribute__((vector_size(64)));
+// NOLINTBEGIN(cppcoreguidelines-pro-type-member-init): every element is written before it is read
+
+using Lanes2 = double __attribute__((vector_size(16)));
+using Lanes8 = double __attribute__((vector_size(64)));
 
 constexpr double deg_per_rad = 180.0 / std::numbers::pi;
 
@@ -273,6 +275,8 @@ MGDD_INLINE void lanes(const throttle::SmoothPlant& plant, const SmoothThrottleR
     out[lane].sum_squares = squared_deg * sums.rr[lane];
   }
 }
+
+// NOLINTEND(cppcoreguidelines-pro-type-member-init)
 
 }  // namespace
 

@@ -40,7 +40,7 @@ void fold_rows(Eigen::MatrixXd& triangle, Eigen::Ref<Eigen::MatrixXd> rows) {
 
 LeastSquares::LeastSquares(std::vector<Parameter> parameters, Eigen::Index n_residuals, LeastSquaresOptions options)
     : parameters_(std::move(parameters)),
-      options_(options),
+      options_(std::move(options)),
       n_(static_cast<Eigen::Index>(parameters_.size())),
       n_residuals_(n_residuals) {
   options_.validate();

@@ -143,7 +143,7 @@ double Spsa::direction(int kind, Eigen::Index input) const noexcept {
 
 const Inputs& Spsa::ask() noexcept {
   const int per = per_gradient();
-  if (stage_ == per * settings_.averaging) {
+  if (stage_ == std::int64_t{per} * settings_.averaging) {
     applied_ = candidate_;
   } else {
     const double c = perturbation_now();

@@ -258,6 +258,7 @@ PseudoWienerKind kind_of(const PseudoWiener& parameters) noexcept {
   return static_cast<PseudoWienerKind>(parameters.index());
 }
 
+// NOLINTNEXTLINE(bugprone-exception-escape): a variant of numbers always holds one of them
 const PseudoWienerFrame& frame_of(const PseudoWiener& parameters) noexcept {
   return std::visit([](const auto& p) -> const PseudoWienerFrame& { return p.frame; }, parameters);
 }

@@ -112,9 +112,10 @@ PseudoWiener pseudo_wiener_from(std::string_view kind, const std::map<std::strin
             assign(setting, member, value);
             known = true;
           });
-          if (!known)
+          if (!known) {
             throw about("parameters",
                         ParameterError("parameters: '" + name + "' is not a parameter of " + std::string(kind)));
+          }
         }
         if constexpr (requires { p.switching; }) {
           p.switching = parse_name(switching_names(), "switching", switching);
