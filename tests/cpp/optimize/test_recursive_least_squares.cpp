@@ -140,10 +140,12 @@ TEST(RecursiveLeastSquares, SettingsAndStatesHaveTheirBounds) {
   s.trace_cap = 1.0;
   EXPECT_NO_THROW(Rls{s});
   Rls rls(s);
-  StateColumns state = save_state(rls);
-  state["estimate"][1] = 3.0;
-  EXPECT_THROW(restore_state(rls, state), ParameterError);
-  EXPECT_EQ(rls.estimate(), s.start);
+  for (std::size_t i = 0; i < 3; ++i) {
+    StateColumns state = save_state(rls);
+    state["estimate"][i] = s.upper[static_cast<Eigen::Index>(i)] + 3.0;
+    EXPECT_THROW(restore_state(rls, state), ParameterError) << i;
+    EXPECT_EQ(rls.estimate(), s.start);
+  }
 }
 
 }  // namespace

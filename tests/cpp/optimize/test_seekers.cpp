@@ -243,6 +243,7 @@ TEST(EverySeeker, AStateInTheMiddleContinuesToTheLastBit) {
       const StateColumns saved = save_state(seeker);
       restore_state(fresh, saved);
       EXPECT_EQ(save_state(fresh), saved);
+      EXPECT_EQ(fresh.applied(), seeker.applied());
       auto ahead = seeker;
       run(ahead, scene, 200, 1000);
       run(fresh, scene, 200, 1000);

@@ -123,8 +123,7 @@ struct Repeated {
   Input input(const Scalar& value) const noexcept { return input_of(model, value); }
   template <class U>
   auto over() const noexcept {
-    auto lifted_model = model.template over<U>();
-    return Repeated<decltype(lifted_model)>{lifted_model, steps};
+    return Repeated<decltype(model.template over<U>())>{model.template over<U>(), steps};
   }
   template <class S>
   static auto numbers(S& state) noexcept {

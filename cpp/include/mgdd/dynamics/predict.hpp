@@ -53,8 +53,8 @@ void predict(const M& model, const PlainState& state, const std::array<S, static
   auto s = lifted<Lifted>(state);
   const auto places = Lifted::numbers(s);
   static_assert(slopes.states <= static_cast<int>(n_numbers<Lifted>));
-  for (int i = 0; i < slopes.states; ++i)
-    places[static_cast<std::size_t>(i)]->grad[static_cast<std::size_t>(n_moves + i)] = S(1);
+  for (std::size_t i = 0; i < static_cast<std::size_t>(slopes.states); ++i)
+    places[i]->grad[static_cast<std::size_t>(n_moves) + i] = S(1);
   std::size_t k = 0;
   for (std::size_t m = 0; m < moves.size(); ++m) {
     const auto input = input_of(dual, D::seeded(moves[m], static_cast<int>(m)));

@@ -260,9 +260,8 @@ void LeastSquares::settle(bool accepted) noexcept {
 
 bool LeastSquares::is_stopped() noexcept {
   const bool running = phase_ == Phase::start || phase_ == Phase::search;
-  if (!running || !options_.stop.stop_requested()) return false;
-  finish(FitStatus::interrupted);
-  return true;
+  if (running && options_.stop.stop_requested()) finish(FitStatus::interrupted);
+  return phase_ == Phase::done;
 }
 
 void LeastSquares::finish(FitStatus status) noexcept {
