@@ -14,12 +14,19 @@ namespace {
 
 using Pass = std::pair<std::size_t, std::size_t>;  // first direction, lanes (0: plain)
 
+template <class T>
+std::size_t lanes_of() {
+  if constexpr (is_dual_v<T>) {
+    return T{}.grad.size();
+  } else {
+    return 0;
+  }
+}
+
 std::vector<Pass> passes(std::size_t n, std::size_t stop_after = 99) {
   std::vector<Pass> made;
   DefaultPasses::each(n, [&]<class T>(std::size_t first) {
-    std::size_t lanes = 0;
-    if constexpr (is_dual_v<T>) lanes = T{}.grad.size();
-    made.emplace_back(first, lanes);
+    made.emplace_back(first, lanes_of<T>());
     return made.size() < stop_after;
   });
   return made;

@@ -19,7 +19,9 @@ TEST(GoldenSection, BracketShrinksByTheGoldenRatioWithOneNewMeasurementEach) {
   double width = 40.0 * ratio;
   EXPECT_NEAR(seeker.upper() - seeker.lower(), width, 1e-12);
   while (!seeker.converged()) {
+    const double lower = seeker.lower(), upper = seeker.upper();
     search(seeker, j, 1);
+    EXPECT_TRUE(seeker.lower() == lower || seeker.upper() == upper) << "a cut moves one end only, the last one too";
     width *= ratio;
     EXPECT_NEAR(seeker.upper() - seeker.lower(), width, 1e-9);
     EXPECT_LE(seeker.lower(), -5.6);
@@ -47,6 +49,17 @@ TEST(GoldenSection, NoiseIsAveragedUntilADifferenceIsMoreThanChance) {
     square += path.back() * path.back() / 100.0;
   }
   EXPECT_LT(std::sqrt(square), 0.8);
+}
+
+// Ends of the last bracket lie one noise_sd below the top: width sqrt(8 sd/|J''|), about the vertex.
+TEST(GoldenSection, TheLastBracketIsAsWideAsTheNoiseAsks) {
+  GoldenSection seeker(between(-30.0, 10.0, 0.25));
+  const auto j = [](double x) { return -0.04 * (x + 5.6) * (x + 5.6); };
+  for (int k = 0; k < 2000 && !seeker.converged(); ++k)
+    search(seeker, j, 1);
+  ASSERT_TRUE(seeker.converged());
+  EXPECT_NEAR(seeker.upper() - seeker.lower(), std::sqrt(8.0 * 0.25 / 0.08), 1e-6);
+  EXPECT_NEAR(0.5 * (seeker.upper() + seeker.lower()), -5.6, 1e-6);
 }
 
 TEST(GoldenSection, ADrawCutsBothEnds) {

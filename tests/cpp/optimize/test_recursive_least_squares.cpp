@@ -140,6 +140,9 @@ TEST(RecursiveLeastSquares, SettingsAndStatesHaveTheirBounds) {
   s.trace_cap = 1.0;
   EXPECT_NO_THROW(Rls{s});
   Rls rls(s);
+  s.lower = s.start.array() - 0.1;
+  s.upper = s.start.array() + 0.2;
+  rls = Rls(s);
   for (std::size_t i = 0; i < 3; ++i) {
     StateColumns state = save_state(rls);
     state["estimate"][i] = s.upper[static_cast<Eigen::Index>(i)] + 3.0;

@@ -201,6 +201,22 @@ TEST(EverySeeker, StaysFiniteWhateverReadingsItTakes) {
   }
 }
 
+TEST(EverySeeker, ARestartForgetsWhatItLearntOfTheLimits) {
+  on_every_seeker([](auto& seeker, const Scene& scene) {
+    const StateColumns fresh = save_state(seeker);
+    const auto active = [&] { return save_state(seeker).at("limit_active").front() == 1.0; };
+    run(seeker, scene, 333);
+    for (std::uint64_t k = 333; k < 700 && !active(); ++k)
+      run(seeker, scene, 1, k);
+    seeker.restart();
+    for (const auto& [name, column] : save_state(seeker)) {
+      if (!name.starts_with("limit") || name == "limit_good")
+        continue;  // the good point has no meaning without its flag
+      EXPECT_EQ(column, fresh.at(name)) << name;
+    }
+  });
+}
+
 // --- bounds -------------------------------------------------------------------------------------------------
 
 TEST(EverySeeker, StaysWithinTightBoundsWhateverItIsTold) {

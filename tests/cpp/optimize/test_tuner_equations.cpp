@@ -78,6 +78,11 @@ TEST(TunerEquations, ADitherBehindALag) {
   w.lag = {70.0, 1.0};
   const SensorResponse late = sensor_response(w.lag, 1, 6);
   expect_dithered(w, {6, 213.0, late.gain, late.phase_rad});  // three delays per time constant
+  w.cycles = 30.0;
+  w.lag = {0.0, 0.8};  // a lag below one cycle is one too
+  const SensorResponse quick = sensor_response(w.lag, 1, 6);
+  expect_dithered(w, {6, 24.0, quick.gain, quick.phase_rad});
+  w.cycles = 900.0;
   w.lag = {7.0, 11.0};
   w.compensated = false;
   const SensorResponse blind = sensor_response(w.lag, 1, 108);  // six of both
