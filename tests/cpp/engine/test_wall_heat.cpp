@@ -22,6 +22,13 @@ TEST(EngineWallHeat, WoschniConstantsOfAllUnitSystemsAgree) {
   EXPECT_NEAR(3.26 * std::pow(100.0, 0.8), woschni_c1_bar_m, 0.05);
 }
 
+// By hand: 2.28 x 8.6 m/s, and 3.24e-3 x 0.9 x 320 K x 1.5 on top while combustion lifts the pressure.
+TEST(EngineWallHeat, WoschniVelocityGrowsWithThePressureOfCombustionOnly) {
+  EXPECT_DOUBLE_EQ(woschni_velocity(2.28, 3.24e-3, 8.6, 0.9, 320.0, 0.0), 19.608);
+  EXPECT_DOUBLE_EQ(woschni_velocity(2.28, 3.24e-3, 8.6, 0.9, 320.0, -0.4), 19.608);
+  EXPECT_NEAR(woschni_velocity(2.28, 3.24e-3, 8.6, 0.9, 320.0, 1.5), 19.608 + 1.39968, 1e-12);
+}
+
 // The burning term acts from SOC on and never below the motored pressure; a hot wall lifts p above it before SOC.
 TEST(EngineWallHeat, StepEqualsThePrintedWoschniFormula) {
   for (const auto& [settings, wall_k] : {std::pair{"", 450.0}, std::pair{"wall_temperature_k=1900 soc_cad=-6", 1900.0},
