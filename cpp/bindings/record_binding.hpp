@@ -126,7 +126,8 @@ void bind_record(py::class_<Record>& cls, const char* name, const Fields& fields
   };
   const auto replaced = [name, fields, rows, to_dict](const Record& from, const py::dict& changes) {
     Record made = from;
-    for (const auto& [key, value] : changes) {
+    for (const auto& change : changes) {
+      const py::handle key = change.first, value = change.second;
       const auto given = py::cast<std::string>(key);
       const auto field = find_field(fields, given);
       if (field != fields.end()) {

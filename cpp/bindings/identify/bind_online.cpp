@@ -89,12 +89,12 @@ void bind_online(py::module_& m) {
                          }),
                          [](const PseudoWienerFit& fit) {
                            return py::make_tuple(parameters_of(fit.model), fit.report, to_array(fit.rmse_deg),
-                                                 fit.hits);
+                                                 fit.n_best);
                          });
       },
       py::kw_only(), arg("kind"), arg("records"), arg("parameters"), arg("sides"), arg("free"), arg("delays"),
       arg("starts"), arg("seed"), arg("only_given_start"), arg("try_map_start"), arg("max_iterations"),
-      "Output-error fit from several starts: parameters, report, RMSE of every search, hits of the best.");
+      "Output-error fit from several starts: parameters, report, RMSE of every search, count that reached the best.");
 
   py::class_<Guarded<RecursiveUpdate>> rls(m, "RecursivePwR",
                                            "Recursive least squares of PW-R; use mgdd.identify.OnlineUpdate.");

@@ -107,7 +107,7 @@ void bind_tuner(py::module_& m) {
       [](double noise_sd, double curvature, const std::string& method, double delay_cycles, double lag_cycles,
          bool compensated, std::optional<double> rms, std::optional<double> cycles, std::optional<double> distance,
          std::optional<double> arrival, std::optional<double> amplitude_max) {
-        TuningWish w;
+        TuningSpec w;
         w.method = parse_tuned_method(method);
         w.noise_sd = noise_sd;
         w.curvature = curvature;

@@ -5,8 +5,8 @@
 #include <vector>
 
 #include "binding.hpp"
+#include "mgdd/optimize/seekers/constraint_filter.hpp"
 #include "mgdd/optimize/seekers/dither.hpp"
-#include "mgdd/optimize/seekers/limit_guard.hpp"
 
 namespace mgdd::bindings {
 namespace {

@@ -233,7 +233,7 @@ def number_pairs(items: Sequence[str], option: str) -> dict[str, float]:
 
 
 def assignments(items: Sequence[str], fields: Mapping[str, Mapping[str, Any]]) -> dict[str, Any]:
-    """Read repeated --set FIELD=VALUE; a name that is no field is for whoever takes the values."""
+    """Read repeated --set FIELD=VALUE; the caller judges a name that is not a field."""
     out: dict[str, Any] = {}
     for item in items:
         name, value = _pair(item, "--set", "FIELD=VALUE")

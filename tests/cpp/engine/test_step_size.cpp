@@ -89,6 +89,10 @@ TEST(EngineStepSize, EstimateAgreesWithTheTrueError) {
   }
   EXPECT_EQ(compared, 4);
   EXPECT_THROW(convergence(c.cylinder, c.point, c.soc_cad, 0.003), ParameterError);
+  EXPECT_THROW(convergence(c.cylinder, c.point, 90.0), ParameterError);
+  Cylinder bad = c.cylinder;
+  bad.geometry.bore_mm = -86.0;
+  EXPECT_THROW(convergence(bad, c.point, c.soc_cad), ParameterError);
 }
 
 }  // namespace

@@ -198,6 +198,21 @@ TEST(EngineTrace, ASoundTraceRaisesNoWarning) {
   }
 }
 
+// A steep flank is not a spike: what counts is the distance from the mean of both neighbours.
+TEST(EngineTrace, ASpikeIsToldFromASteepFlank) {
+  const EngineCase c("step_cad=5 soc_cad=-2");
+  const Cycle cycle = run(c);
+  std::vector<double> pressure = cycle.pressures_bar();
+  const double top = *std::ranges::max_element(pressure);
+  double steepest = 0.0;
+  for (std::size_t k = 1; k < pressure.size(); ++k)
+    steepest = std::max(steepest, pressure[k] - pressure[k - 1]);
+  ASSERT_GT(steepest, 0.12 * top);
+  EXPECT_FALSE(says(analyze_trace(cycle.angles(), pressure, c.cylinder, c.point, {}), "neighbours"));
+  pressure[pressure.size() / 3] += 0.15 * top;
+  EXPECT_TRUE(says(analyze_trace(cycle.angles(), pressure, c.cylinder, c.point, {}), "neighbours"));
+}
+
 TEST(EngineTrace, PolytropicExponentOfAPolytropicTrace) {
   const Geometry<double> g{GeometryParameters<double>{}};
   std::vector<double> angle, p;

@@ -100,6 +100,7 @@ TEST(Limits, TwoLimitsInTwoInputs) {
                                   {"b", 3.0, 0.0, LimitMethod::switching, 1.0, 10.0}};
   for (auto& [name, any] : every_seeker(space_at(inputs({-4.0, -3.0}), 30.0), 0.0, 1, limits)) {
     if (name == "spsa_one_measurement") continue;  // its steps are as coarse as this corner
+    SCOPED_TRACE(name);
     std::visit(
         [&](auto& seeker) {
           double worst = 0.0;
@@ -109,9 +110,9 @@ TEST(Limits, TwoLimitsInTwoInputs) {
             seeker.tell({j, values, false});
             if (k > 4000) worst = std::max({worst, values[0] - 1.0, values[1] - 3.0});
           }
-          EXPECT_LE(worst, 0.5) << name;
-          EXPECT_GT(seeker.estimate().sum(), -3.0) << name;
-          EXPECT_LT(seeker.estimate().sum(), 3.0) << name;
+          EXPECT_LE(worst, 0.5);
+          EXPECT_GT(seeker.estimate().sum(), -3.0);
+          EXPECT_LT(seeker.estimate().sum(), 3.0);
         },
         any);
   }

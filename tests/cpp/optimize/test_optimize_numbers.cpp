@@ -136,7 +136,7 @@ TEST(OptimizeNumbers, DefaultsOfLearningAndOfAWish) {
   EXPECT_EQ(law.relative_degree(), 2u);
   EXPECT_EQ(law.samples(), 18u);
   EXPECT_EQ(law.taps(), std::vector<double>{0.5 / 0.4});
-  const TuningWish w;
+  const TuningSpec w;
   EXPECT_EQ(w.method, TunedMethod::batch);
   EXPECT_TRUE(w.compensated);
   for (const double open : {w.noise_sd, w.curvature, w.rms, w.cycles, w.distance, w.arrival, w.amplitude_max})

@@ -222,11 +222,12 @@ TEST(EverySeeker, ARestartForgetsWhatItLearntOfTheLimits) {
 TEST(EverySeeker, StaysWithinTightBoundsWhateverItIsTold) {
   for (const double bound : {6.0, 9.0}) {
     for (auto& [name, any] : every_seeker(space_at(scalar_input(1.0), bound), 0.25)) {
+      SCOPED_TRACE(name);
       std::visit(
           [&](auto& seeker) {
             for (int k = 0; k < 400; ++k) {
               const double x = seeker.ask()[0];
-              ASSERT_LE(std::abs(x), bound * (1.0 + 1e-15)) << name;
+              ASSERT_LE(std::abs(x), bound * (1.0 + 1e-15));
               const double j[] = {1e3 * random::normal(9, 2, static_cast<std::uint64_t>(k)) + 50.0 * x};
               seeker.tell({j, {}, false});
             }

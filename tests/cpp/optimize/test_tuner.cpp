@@ -9,8 +9,8 @@ namespace {
 
 constexpr double sigma = 0.25;
 
-TuningWish default_wish(TunedMethod method = TunedMethod::batch) {
-  TuningWish w;
+TuningSpec default_wish(TunedMethod method = TunedMethod::batch) {
+  TuningSpec w;
   w.method = method;
   w.noise_sd = sigma;
   w.curvature = bend;
@@ -63,7 +63,7 @@ TEST(Tuner, PredictionsAreTheClosedForms) {
 
 TEST(Tuner, WhatItPredictsHappens) {
   for (const TunedMethod method : {TunedMethod::batch, TunedMethod::moving_average, TunedMethod::spsa}) {
-    TuningWish w = default_wish(method);
+    TuningSpec w = default_wish(method);
     w.cycles = 100.0;
     const Tuning t = tune(w);
     EXPECT_TRUE(t.met);
@@ -82,7 +82,7 @@ TEST(Tuner, WhatItPredictsHappens) {
 }
 
 TEST(Tuner, AKnownLagIsTurnedBackAndArrives) {
-  TuningWish w = default_wish();
+  TuningSpec w = default_wish();
   w.lag = {38.0, 25.0};
   const Tuning t = tune(w);
   EXPECT_GE(t.period, 60);
@@ -101,7 +101,7 @@ TEST(Tuner, AKnownLagIsTurnedBackAndArrives) {
 }
 
 TEST(Tuner, AnUnknownLagAsksForADitherSlowEnoughToKeepTheSign) {
-  TuningWish w = default_wish();
+  TuningSpec w = default_wish();
   w.lag = {38.0, 25.0};
   w.compensated = false;
   const Tuning t = tune(w);
@@ -115,7 +115,7 @@ TEST(Tuner, AnUnknownLagAsksForADitherSlowEnoughToKeepTheSign) {
 }
 
 TEST(Tuner, SaysPlainlyWhatCannotBeMet) {
-  TuningWish w = default_wish();
+  TuningSpec w = default_wish();
   w.cycles = 10.0;
   Tuning t = tune(w);
   EXPECT_FALSE(t.met);
@@ -133,7 +133,7 @@ TEST(Tuner, SaysPlainlyWhatCannotBeMet) {
 
 TEST(Tuner, RefusesByName) {
   const auto message = [](auto change) -> std::string {
-    TuningWish w = default_wish();
+    TuningSpec w = default_wish();
     change(w);
     try {
       tune(w);

@@ -9,8 +9,8 @@
 namespace mgdd::optimize {
 namespace {
 
-TuningWish full_wish(TunedMethod method) {
-  TuningWish w;
+TuningSpec full_wish(TunedMethod method) {
+  TuningSpec w;
   w.method = method;
   w.noise_sd = 0.31;
   w.curvature = -0.083;
@@ -27,7 +27,7 @@ struct Dithered {
   double tau_least, gain, phase;  // of the sensor at the dither
 };
 
-void expect_dithered(const TuningWish& w, const Dithered& known) {
+void expect_dithered(const TuningSpec& w, const Dithered& known) {
   const Tuning t = tune(w);
   const bool batch = w.method == TunedMethod::batch;
   const double bend = std::abs(w.curvature);
@@ -56,7 +56,7 @@ TEST(TunerEquations, ADitherWithoutLag) {
   expect_dithered(full_wish(TunedMethod::batch), {6, 12.0, 1.0, 0.0});
   expect_dithered(full_wish(TunedMethod::moving_average), {10, 20.0, 1.0, 0.0});
   for (const TunedMethod method : {TunedMethod::batch, TunedMethod::moving_average}) {
-    TuningWish short_wish = full_wish(method);
+    TuningSpec short_wish = full_wish(method);
     short_wish.cycles = 30.0;  // then the least time constant holds, and the wish is not met
     expect_dithered(short_wish,
                     method == TunedMethod::batch ? Dithered{6, 12.0, 1.0, 0.0} : Dithered{10, 20.0, 1.0, 0.0});
@@ -70,7 +70,7 @@ TEST(TunerEquations, ADitherWithoutLag) {
 }
 
 TEST(TunerEquations, ADitherBehindALag) {
-  TuningWish w = full_wish(TunedMethod::batch);
+  TuningSpec w = full_wish(TunedMethod::batch);
   w.cycles = 900.0;
   w.lag = {7.0, 11.0};
   const SensorResponse known = sensor_response(w.lag, 1, 27);  // 2.4 x 11 cycles, rounded up
@@ -99,7 +99,7 @@ TEST(TunerEquations, ADitherBehindALag) {
 
 TEST(TunerEquations, SpsaWithAConstantGain) {
   for (const double cycles : {240.0, 4.0}) {  // the second asks for more than half of the way per iteration
-    TuningWish w = full_wish(TunedMethod::spsa);
+    TuningSpec w = full_wish(TunedMethod::spsa);
     w.cycles = cycles;
     const Tuning t = tune(w);
     const double q = std::min(0.5, 1.0 - std::pow(0.8 / 9.0, 2.0 / (0.85 * cycles)));
@@ -117,19 +117,19 @@ TEST(TunerEquations, SpsaWithAConstantGain) {
     EXPECT_EQ(t.met, t.reasons.empty());
     EXPECT_EQ(t.reasons.empty(), t.cycles <= cycles && t.rms <= 0.9 * (1.0 + 1e-9));
   }
-  TuningWish late = full_wish(TunedMethod::spsa);
+  TuningSpec late = full_wish(TunedMethod::spsa);
   late.lag.delay_cycles = 1.0;
   EXPECT_THROW(tune(late), ParameterError);
 }
 
 TEST(TunerEquations, WhatIsLeftOpenScalesWithTheLengthOfTheNoise) {
   for (const TunedMethod method : {TunedMethod::batch, TunedMethod::moving_average, TunedMethod::spsa}) {
-    TuningWish open;
+    TuningSpec open;
     open.method = method;
     open.noise_sd = 0.4;
     open.curvature = 0.1;
     const double length = 2.0;
-    TuningWish said = open;
+    TuningSpec said = open;
     said.rms = 0.2 * length;
     said.distance = 5.0 * length;
     said.arrival = 0.45 * length;
@@ -142,7 +142,7 @@ TEST(TunerEquations, WhatIsLeftOpenScalesWithTheLengthOfTheNoise) {
     EXPECT_EQ(a.cycles, b.cycles);
     EXPECT_EQ(a.rms, b.rms);
   }
-  TuningWish open;  // behind a lag the cycles follow from the least time constant
+  TuningSpec open;  // behind a lag the cycles follow from the least time constant
   open.noise_sd = 0.4;
   open.curvature = 0.1;
   open.lag = {7.0, 11.0};

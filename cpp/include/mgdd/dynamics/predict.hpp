@@ -20,7 +20,7 @@ struct Slopes {
 };
 
 /// Directions of a horizon: moves first, then state numbers, then parameters.
-template <int n_moves, Slopes slopes = {}>
+template <int n_moves, Slopes slopes = Slopes{}>
 inline constexpr int n_directions = n_moves + slopes.states + slopes.parameters;
 
 /// Parameters on the dual numbers of a horizon: `free[j]` carries direction n_moves + slopes.states + j. Prepare the
@@ -39,7 +39,7 @@ std::array<Dual<n_directions<n_moves, slopes>, S>, n> seeded_parameters(
 /// The horizon of a model of one input: moves[m] is held for lengths[m] samples. `output[k]` is the output after sample
 /// k, `slope[k]` its derivatives in the order of `n_directions`. The model is a plain one, or for slopes to parameters
 /// one on dual numbers whose parameters are seeded.
-template <int n_moves, Slopes slopes = {}, DiscreteModel M, class PlainState, std::floating_point S>
+template <int n_moves, Slopes slopes = Slopes{}, DiscreteModel M, class PlainState, std::floating_point S>
 void predict(const M& model, const PlainState& state, const std::array<S, static_cast<std::size_t>(n_moves)>& moves,
              const std::array<int, static_cast<std::size_t>(n_moves)>& lengths,
              std::type_identity_t<std::span<S>> output,

@@ -1,5 +1,5 @@
-// Whole cycles at the desk: the traces of one, and the indicators of many timings at one operating point. Field units,
-// angles in °CA aTDC. Allocates and throws; loops use CycleModel.
+// Whole cycles: the traces of one, and the indicators of many timings at one operating point. Conventional units,
+// angles in °CA aTDC. Not real-time safe: allocates and throws; loops use CycleModel.
 #pragma once
 
 #include <span>

@@ -7,7 +7,6 @@
 
 #include <array>
 #include <bit>
-#include <concepts>
 #include <cstddef>
 
 #include "mgdd/common/units.hpp"
@@ -101,9 +100,8 @@ class BasicThrottlePlant {
   using Torques = BasicThrottleTorques<T>;
   static constexpr int n_observed = 5;
 
-  /// ParameterError for a bad parameter or a step outside [1e-6, 5e-3] s.
-  explicit BasicThrottlePlant(const Throttle& throttle, double step_s = default_step_s)
-    requires std::same_as<C, double> && std::same_as<T, double>;
+  /// ParameterError for a bad parameter or a step outside [1e-6, 5e-3] s; on double only.
+  explicit BasicThrottlePlant(const Throttle& throttle, double step_s = default_step_s);
 
   /// From prepared coefficients; `options` gives the forms of friction and backlash, the same in every lane.
   BasicThrottlePlant(const PlantCoefficients<C>& coefficients, const Throttle& options, double step_s) noexcept

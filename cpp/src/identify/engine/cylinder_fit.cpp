@@ -103,7 +103,7 @@ void check_inputs(const std::vector<MeasuredCycle>& traces, const engine::Cylind
     if (!trace.point.trapped_mass_g && trace.angle_cad.front() > cylinder.geometry.ivc_cad + 15.0) {
       throw DataError("trace '" + trace.label + "' starts at " + text(trace.angle_cad.front()) +
                       " °CA aTDC, ivc_cad = " + text(cylinder.geometry.ivc_cad) +
-                      ": give its trapped_mass_g, which p(IVC) cannot tell here");
+                      ": give its trapped_mass_g, which p(IVC) does not determine here");
     }
     if (*std::min_element(trace.pressure_bar.begin(), trace.pressure_bar.end()) <= 0.0) {
       throw DataError("trace '" + trace.label + "' has a pressure <= 0 bar: peg it to absolute pressure first");

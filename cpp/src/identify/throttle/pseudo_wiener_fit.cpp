@@ -305,7 +305,7 @@ PseudoWienerFit fit(const std::vector<ThrottleRecord>& records, const P& base, c
   }
   std::ranges::sort(best.rmse_deg);
   const double limit = best.rmse_deg.front() * std::sqrt(1.0 + o.same_cost);
-  best.hits = static_cast<int>(std::ranges::count_if(best.rmse_deg, [&](double rmse) { return rmse <= limit; }));
+  best.n_best = static_cast<int>(std::ranges::count_if(best.rmse_deg, [&](double rmse) { return rmse <= limit; }));
   return best;
 }
 

@@ -37,7 +37,7 @@ std::vector<std::string> BoundedSeekingSettings::advice() const {
 
 BoundedSeeking::BoundedSeeking(BoundedSeekingSettings settings)
     : settings_(checked(std::move(settings))),
-      guard_(settings_.limits, settings_.space.size(), 2.0 * settings_.dither.period),
+      filter_(settings_.limits, settings_.space.size(), 2.0 * settings_.dither.period),
       applied_(settings_.space.start),
       estimate_(applied_),
       omega_(applied_),
@@ -57,7 +57,7 @@ TellStatus BoundedSeeking::tell(const Reading& reading) noexcept {
   const TellStatus status = protocol_.check(reading, component_count(), limit_count());
   protocol_.count(status);
   if (status != TellStatus::accepted) return status;
-  guard_.record(applied_, reading.limits);
+  filter_.record(applied_, reading.limits);
   const Eigen::Index n = applied_.size();
   const std::int64_t period = settings_.dither.period;
   const std::int64_t phase = seen_ % period;
@@ -72,13 +72,13 @@ TellStatus BoundedSeeking::tell(const Reading& reading) noexcept {
     }
     estimate_ /= static_cast<double>(period);
   }
-  const double j = objective_of(reading, settings_.maximize) + guard_.shaping(reading.limits);
+  const double j = objective_of(reading, settings_.maximize) + filter_.shaping(reading.limits);
   const Inputs largest = settings_.dither.amplitude.cwiseProduct(omega_);
   Inputs step(n);
   for (Eigen::Index i = 0; i < n; ++i)
     step[i] = largest[i] * std::cos(omega_[i] * static_cast<double>(phase) - settings_.kappa * j);
   const Inputs none = Inputs::Zero(n);
-  step = guard_.admit(applied_, step, none, largest);
+  step = filter_.project(applied_, step, none, largest);
   move_within(applied_, step, settings_.space, none);
   return status;
 }

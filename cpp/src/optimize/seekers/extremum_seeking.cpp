@@ -82,7 +82,7 @@ std::vector<std::string> ExtremumSeekingSettings::advice() const {
 ExtremumSeeking::ExtremumSeeking(ExtremumSeekingSettings settings)
     : settings_(checked(std::move(settings))),
       dither_(settings_.dither, settings_.components, false),
-      guard_(settings_.limits, settings_.space.size(), limit_memory_windows * settings_.dither.period),
+      filter_(settings_.limits, settings_.space.size(), limit_memory_windows * settings_.dither.period),
       estimate_(settings_.space.start),
       applied_(estimate_),
       gradient_(Inputs::Zero(estimate_.size())),
@@ -115,7 +115,7 @@ TellStatus ExtremumSeeking::tell(const Reading& reading) noexcept {
 // Fills gradient_ (smoothed) with this cycle's demodulated reading; false while there is no mean to take off yet.
 bool ExtremumSeeking::remove_mean(const Reading& reading) noexcept {
   const auto period = static_cast<std::size_t>(dither_.period());
-  const double shaped = guard_.shaping(reading.limits);
+  const double shaped = filter_.shaping(reading.limits);
   Inputs product = Inputs::Zero(estimate_.size());
   for (std::size_t c = 0; c < component_count(); ++c) {
     const double j = sign() * reading.components[c] + (c == 0 ? shaped : 0.0);
@@ -143,13 +143,13 @@ bool ExtremumSeeking::remove_mean(const Reading& reading) noexcept {
 void ExtremumSeeking::move(Inputs step, const Inputs& rate) noexcept {
   clip_each(step, rate);
   const Inputs reach = settings_.dither.amplitude * share_;
-  step = guard_.admit(estimate_, step, reach, rate.cwiseMax(settings_.recovery_rate));
-  if (guard_.active()) ++limited_cycles_;
+  step = filter_.project(estimate_, step, reach, rate.cwiseMax(settings_.recovery_rate));
+  if (filter_.active()) ++limited_cycles_;
   move_within(estimate_, step, settings_.space, settings_.dither.amplitude);
 }
 
 void ExtremumSeeking::learn(const Reading& reading) noexcept {
-  guard_.record(applied_, reading.limits);
+  filter_.record(applied_, reading.limits);
   const Inputs& a = settings_.dither.amplitude;
   const double period = dither_.period();
   const Inputs no_step = Inputs::Zero(estimate_.size());
@@ -162,7 +162,7 @@ void ExtremumSeeking::learn(const Reading& reading) noexcept {
       sum_.setZero();
       std::copy(reading.components.begin(), reading.components.end(), origin_.begin());
     }
-    const double shaped = guard_.shaping(reading.limits);
+    const double shaped = filter_.shaping(reading.limits);
     for (std::size_t c = 0; c < component_count(); ++c) {
       const double j = sign() * (reading.components[c] - origin_[c]) + (c == 0 ? shaped : 0.0);
       for (Eigen::Index i = 0; i < sum_.size(); ++i)
@@ -175,7 +175,7 @@ void ExtremumSeeking::learn(const Reading& reading) noexcept {
       moved_by_alarm = true;
     }
   }
-  if (!moved_by_alarm && guard_.alarmed()) {
+  if (!moved_by_alarm && filter_.alarmed()) {
     const Inputs before = estimate_;
     move(no_step, settings_.recovery_rate);
     if (settings_.form == MeanRemoval::batch && (estimate_ - before).squaredNorm() > 0.0) {
@@ -216,7 +216,7 @@ void ExtremumSeeking::restart() noexcept {
   smooth_.setZero();
   sum_.setZero();
   limited_cycles_ = 0;
-  guard_.forget();
+  filter_.forget();
 }
 
 }  // namespace mgdd::optimize

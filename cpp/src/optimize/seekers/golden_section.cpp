@@ -46,7 +46,7 @@ GoldenSectionSettings checked(GoldenSectionSettings s) {
 
 GoldenSection::GoldenSection(GoldenSectionSettings settings)
     : settings_(checked(std::move(settings))),
-      guard_(settings_.limits, 1, 20.0),
+      filter_(settings_.limits, 1, 20.0),
       estimate_(settings_.space.start),
       applied_(estimate_),
       lower_(settings_.space.lower[0]),
@@ -76,8 +76,8 @@ TellStatus GoldenSection::tell(const Reading& reading) noexcept {
   const TellStatus status = protocol_.check(reading, component_count(), limit_count());
   protocol_.count(status);
   if (status != TellStatus::accepted) return status;
-  const double j = objective_of(reading, settings_.maximize) + guard_.shaping(reading.limits);
-  guard_.record(applied_, reading.limits);
+  const double j = objective_of(reading, settings_.maximize) + filter_.shaping(reading.limits);
+  filter_.record(applied_, reading.limits);
   const auto slot = static_cast<std::size_t>(samples_++) % ring;
   sample_input_[slot] = applied_[0];
   sample_j_[slot] = j;
@@ -91,7 +91,7 @@ TellStatus GoldenSection::tell(const Reading& reading) noexcept {
   point.sum += j;
   double worst = 0.0;
   for (std::size_t i = 0; i < limit_count(); ++i) {
-    const Limit& limit = guard_.limits()[i];
+    const Limit& limit = filter_.limits()[i];
     const double over = (reading.limits[i] + limit.margin - limit.upper) / limit.scale;
     worst = i == 0 ? over : std::max(worst, over);
   }
@@ -188,12 +188,12 @@ void GoldenSection::refine() noexcept {
   const Parabola fit = parabola();
   Inputs step = scalar_input(fit.vertex - estimate_[0]);
   clip_each(step, scalar_input(0.25 * reach));
-  step = guard_.admit(estimate_, step, scalar_input(reach), scalar_input(reach));
+  step = filter_.project(estimate_, step, scalar_input(reach), scalar_input(reach));
   move_within(estimate_, step, settings_.space, scalar_input(0.0));
   const double most = widest_share * (settings_.space.upper[0] - settings_.space.lower[0]);
   const double wide = fit.bend < 0.0 ? std::sqrt(8.0 * settings_.noise_sd / -fit.bend) : most;
   width_ += width_rate * (std::clamp(wide, settings_.tolerance, most) - width_);
-  const double target = guard_.active() ? narrow_share * width_ : width_;
+  const double target = filter_.active() ? narrow_share * width_ : width_;
   centre_bracket(upper_ - lower_ + 0.1 * (target - (upper_ - lower_)));
 }
 
@@ -211,7 +211,7 @@ void GoldenSection::restart() noexcept {
   draws_ = 0;
   samples_ = 0;
   refining_ = false;
-  guard_.forget();
+  filter_.forget();
 }
 
 }  // namespace mgdd::optimize

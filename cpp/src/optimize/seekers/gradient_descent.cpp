@@ -34,7 +34,7 @@ std::vector<std::string> GradientDescentSettings::advice() const {
 
 GradientDescent::GradientDescent(GradientDescentSettings settings)
     : settings_(checked(std::move(settings))),
-      guard_(settings_.limits, settings_.space.size(), 8.0 * static_cast<double>(settings_.space.size())),
+      filter_(settings_.limits, settings_.space.size(), 8.0 * static_cast<double>(settings_.space.size())),
       estimate_(settings_.space.start),
       applied_(estimate_),
       gradient_(Inputs::Zero(estimate_.size())) {}
@@ -50,8 +50,8 @@ TellStatus GradientDescent::tell(const Reading& reading) noexcept {
   const TellStatus status = protocol_.check(reading, component_count(), limit_count());
   protocol_.count(status);
   if (status != TellStatus::accepted) return status;
-  guard_.record(applied_, reading.limits);
-  const double j = objective_of(reading, settings_.maximize) + guard_.shaping(reading.limits);
+  filter_.record(applied_, reading.limits);
+  const double j = objective_of(reading, settings_.maximize) + filter_.shaping(reading.limits);
   if (stage_ % 2 == 0) {
     above_ = j;
   } else {
@@ -62,7 +62,7 @@ TellStatus GradientDescent::tell(const Reading& reading) noexcept {
   Inputs step = settings_.step_size * gradient_;
   clip_each(step, settings_.rate);
   const Inputs reach = Inputs::Constant(step.size(), settings_.difference);
-  step = guard_.admit(estimate_, step, reach, settings_.rate);
+  step = filter_.project(estimate_, step, reach, settings_.rate);
   move_within(estimate_, step, settings_.space, reach);
   ++iteration_;
   if (converged_at_ < 0 && iteration_ <= settings_.iterations && step.cwiseAbs().maxCoeff() < settings_.tolerance) {
@@ -75,7 +75,7 @@ void GradientDescent::restart() noexcept {
   stage_ = 0;
   iteration_ = 0;
   converged_at_ = -1;
-  guard_.forget();
+  filter_.forget();
 }
 
 }  // namespace mgdd::optimize

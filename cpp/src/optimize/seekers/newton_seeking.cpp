@@ -56,7 +56,7 @@ std::vector<std::string> NewtonSeekingSettings::advice() const {
 NewtonSeeking::NewtonSeeking(NewtonSeekingSettings settings)
     : settings_(checked(std::move(settings))),
       dither_(settings_.dither, settings_.components, true),
-      guard_(settings_.limits, settings_.space.size(), 2.0 * settings_.dither.period),
+      filter_(settings_.limits, settings_.space.size(), 2.0 * settings_.dither.period),
       estimate_(settings_.space.start),
       applied_(estimate_),
       gradient_(Inputs::Zero(estimate_.size())),
@@ -95,11 +95,11 @@ void NewtonSeeking::update_inverse() noexcept {
 }
 
 void NewtonSeeking::learn(const Reading& reading) noexcept {
-  guard_.record(applied_, reading.limits);
+  filter_.record(applied_, reading.limits);
   const auto period = static_cast<std::size_t>(dither_.period());
   const Eigen::Index n = estimate_.size();
   const Inputs a = settings_.dither.amplitude * share_;
-  const double shaped = guard_.shaping(reading.limits);
+  const double shaped = filter_.shaping(reading.limits);
   Inputs gradient = Inputs::Zero(n);
   InputMatrix sample = InputMatrix::Zero(n, n);
   for (std::size_t c = 0; c < component_count(); ++c) {
@@ -126,10 +126,10 @@ void NewtonSeeking::learn(const Reading& reading) noexcept {
     update_inverse();
     if (!holding) step = inverse_ * gradient * (-1.0 / settings_.time_constant_cycles);
   }
-  if ((full && !holding) || guard_.alarmed()) {
+  if ((full && !holding) || filter_.alarmed()) {
     clip_each(step, settings_.rate);
-    step = guard_.admit(estimate_, step, a, settings_.rate);
-    if (guard_.active()) ++limited_cycles_;
+    step = filter_.project(estimate_, step, a, settings_.rate);
+    if (filter_.active()) ++limited_cycles_;
     move_within(estimate_, step, settings_.space, settings_.dither.amplitude);
   }
   ++seen_;
@@ -146,7 +146,7 @@ void NewtonSeeking::restart() noexcept {
   held_ = dither_.period();
   share_ = 1.0;
   limited_cycles_ = 0;
-  guard_.forget();
+  filter_.forget();
 }
 
 }  // namespace mgdd::optimize

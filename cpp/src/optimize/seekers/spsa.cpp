@@ -96,7 +96,7 @@ std::vector<std::string> SpsaSettings::advice() const {
 
 Spsa::Spsa(SpsaSettings settings)
     : settings_(checked(std::move(settings))),
-      guard_(settings_.limits, settings_.space.size(), 2.0 * memory),
+      filter_(settings_.limits, settings_.space.size(), 2.0 * memory),
       trend_(settings_.space.size(), memory),
       estimate_(settings_.space.start),
       candidate_(estimate_),
@@ -161,8 +161,8 @@ TellStatus Spsa::tell(const Reading& reading) noexcept {
   const TellStatus status = protocol_.check(reading, component_count(), limit_count());
   protocol_.count(status);
   if (status != TellStatus::accepted) return status;
-  const double j = objective_of(reading, settings_.maximize) + guard_.shaping(reading.limits);
-  guard_.record(applied_, reading.limits);
+  const double j = objective_of(reading, settings_.maximize) + filter_.shaping(reading.limits);
+  filter_.record(applied_, reading.limits);
   const int gradients_end = per_gradient() * settings_.averaging;
   if (stage_ < gradients_end) {
     around_j_ += j;
@@ -240,11 +240,11 @@ void Spsa::finish_iteration() noexcept {
   const Inputs most = Inputs::Constant(step.size(), settings_.step_max);
   clip_each(step, most);
   const Inputs reach = Inputs::Constant(step.size(), perturbation_now() * (second ? 2.0 : 1.0));
-  step = guard_.admit(estimate_, step, reach, most);
+  step = filter_.project(estimate_, step, reach, most);
   candidate_ = estimate_;
   const double widest = settings_.perturbation * (second ? 2.0 : 1.0);
   move_within(candidate_, step, settings_.space, Inputs::Constant(step.size(), widest));
-  share_ += share_rate * ((guard_.active() ? settings_.limit_amplitude : 1.0) - share_);
+  share_ += share_rate * ((filter_.active() ? settings_.limit_amplitude : 1.0) - share_);
 }
 
 void Spsa::restart() noexcept {
@@ -256,7 +256,7 @@ void Spsa::restart() noexcept {
   around_j_ = 0.0;
   share_ = 1.0;
   trend_.forget();
-  guard_.forget();
+  filter_.forget();
 }
 
 }  // namespace mgdd::optimize

@@ -25,7 +25,7 @@ constexpr double periods_of_lag = 2.4;  // a compensated period of 2.4 tau still
 constexpr double slow_periods = 6.0;    // uncompensated: omega (D + tau) <= 60 degrees
 constexpr double delays_per_tau = 3.0;  // an integrator with delay D is well damped for tau >= 3 D
 
-TuningWish filled(TuningWish w) {
+TuningSpec filled(TuningSpec w) {
   const auto positive = [](std::string_view name, double value, std::string_view remedy) {
     if (!(value > 0.0 && std::isfinite(value))) {
       throw ParameterError(name, value, "must be > 0" + std::string(remedy));
@@ -51,7 +51,7 @@ TuningWish filled(TuningWish w) {
   return w;
 }
 
-Tuning tune_spsa(const TuningWish& w) {
+Tuning tune_spsa(const TuningSpec& w) {
   Tuning t;
   t.method = TunedMethod::spsa;
   t.period = 2;
@@ -81,7 +81,7 @@ Tuning tune_spsa(const TuningWish& w) {
   return t;
 }
 
-Tuning tune_dither(const TuningWish& w) {
+Tuning tune_dither(const TuningSpec& w) {
   const bool batch = w.method == TunedMethod::batch;
   if (!batch && !w.compensated && (w.lag.delay_cycles > 0.0 || w.lag.lag_cycles > 0.0)) {
     throw about("method",
@@ -140,8 +140,8 @@ TunedMethod parse_tuned_method(std::string_view name) {
   return parse_name<TunedMethod>(method_names, "method", name);
 }
 
-Tuning tune(const TuningWish& wish) {
-  const TuningWish w = filled(wish);
+Tuning tune(const TuningSpec& spec) {
+  const TuningSpec w = filled(spec);
   Tuning t = w.method == TunedMethod::spsa ? tune_spsa(w) : tune_dither(w);
   t.jitter_cost = 0.5 * w.curvature * t.rms * t.rms;
   if (t.rms > w.rms * (1.0 + 1e-9)) {

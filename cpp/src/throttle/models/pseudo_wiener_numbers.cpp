@@ -100,7 +100,9 @@ PseudoWiener pseudo_wiener_from(std::string_view kind, const std::map<std::strin
   std::visit(
       [&](auto& p) {
         const auto places = numbers(p);
-        for (const auto& [name, value] : given) {
+        for (const auto& entry : given) {
+          const std::string& name = entry.first;
+          const double value = entry.second;
           bool known = false;
           for (std::size_t i = 0; i < rows.size(); ++i) {
             if (rows[i].name != name) continue;

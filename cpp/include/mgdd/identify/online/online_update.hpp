@@ -1,5 +1,5 @@
-// The three on-line updates of PW-R behind one face: `update(duty, angle)` takes one sample and says whether the model
-// changed. Units: duty, deg. noexcept, allocation-free; `take` runs whole columns.
+// The three on-line updates of PW-R with one interface: `update(duty, angle)` takes one sample and says whether the
+// model changed. Units: duty, deg. noexcept, allocation-free; `take` runs whole columns.
 #pragma once
 
 #include <algorithm>

@@ -52,7 +52,7 @@ struct PseudoWienerFit {
   throttle::PseudoWiener model;
   optimize::FitReport report;
   std::vector<double> rmse_deg;  ///< of every search, best first; infinite where a search failed
-  int hits = 0;                  ///< searches that ended at the best cost
+  int n_best = 0;                ///< searches that ended at the best cost
 };
 
 /// ShapeError, DataError or ParameterError for what cannot be fitted. `base` carries the kind, the frame, and every

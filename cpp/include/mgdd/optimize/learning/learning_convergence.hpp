@@ -1,7 +1,7 @@
 // What a learning law will do, told before the first trial: whether it converges, whether every trial is better than
 // the one before, and which error remains. Bounds, rate and guard are not part of the linear theory.
 // Errors in the unit of the caller, frequencies as fractions of Nyquist. Source: Bristow, Tharayil and Alleyne (2006).
-// For the desk: builds dense matrices of n = samples - m rows.
+// Not real-time safe: builds dense matrices of n = samples - m rows.
 #pragma once
 
 #include <limits>

@@ -1,5 +1,5 @@
-// What a fit hands back: estimates, their uncertainty, what the data cannot tell, and how the search went.
-// Values stand in the units of the caller's parameters. Built at the desk: reports allocate, the search does
+// Result of a fit: estimates, their uncertainty, parameters that the data do not identify, and the course of the
+// search. Values stand in the units of the caller's parameters. Not real-time safe: reports allocate, the search does
 // not.
 #pragma once
 

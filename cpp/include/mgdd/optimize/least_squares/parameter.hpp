@@ -1,5 +1,5 @@
 // What a least-squares search is told: its unknowns with their bounds, and the options of the search.
-// Values stand in the units of the caller. Checks throw at the desk.
+// Values stand in the units of the caller. Not real-time safe: checks throw.
 #pragma once
 
 #include <limits>

@@ -8,8 +8,8 @@
 #include <string>
 #include <vector>
 
+#include "mgdd/optimize/seekers/constraint_filter.hpp"
 #include "mgdd/optimize/seekers/dither.hpp"
-#include "mgdd/optimize/seekers/limit_guard.hpp"
 #include "mgdd/optimize/seekers/seeker.hpp"
 
 namespace mgdd::optimize {
@@ -32,7 +32,7 @@ class BoundedSeeking {
   const Inputs& ask() noexcept;
   TellStatus tell(const Reading& reading) noexcept;
   /// New operating point: forget the limits; the estimate goes on.
-  void restart() noexcept { guard_.forget(); }
+  void restart() noexcept { filter_.forget(); }
 
   /// Mean of the applied input over the last window; the start before there is one.
   const Inputs& estimate() const noexcept { return estimate_; }
@@ -56,12 +56,12 @@ class BoundedSeeking {
     v("estimate", self.estimate_);
     v("seen", self.seen_);
     v("window", self.window_);
-    LimitGuard::visit(self.guard_, v);
+    ConstraintFilter::visit(self.filter_, v);
   }
 
  private:
   BoundedSeekingSettings settings_;
-  LimitGuard guard_;
+  ConstraintFilter filter_;
   Protocol protocol_;
   Inputs applied_, estimate_, omega_;
   std::int64_t seen_ = 0;

@@ -10,8 +10,8 @@
 #include <string_view>
 #include <vector>
 
+#include "mgdd/optimize/seekers/constraint_filter.hpp"
 #include "mgdd/optimize/seekers/dither.hpp"
-#include "mgdd/optimize/seekers/limit_guard.hpp"
 #include "mgdd/optimize/seekers/seeker.hpp"
 
 namespace mgdd::optimize {
@@ -89,7 +89,7 @@ class ExtremumSeeking {
     v("smooth", self.smooth_);
     v("origin", self.origin_);
     v("limited_cycles", self.limited_cycles_);
-    LimitGuard::visit(self.guard_, v);
+    ConstraintFilter::visit(self.filter_, v);
   }
 
  private:
@@ -101,7 +101,7 @@ class ExtremumSeeking {
 
   ExtremumSeekingSettings settings_;
   Dither dither_;
-  LimitGuard guard_;
+  ConstraintFilter filter_;
   Protocol protocol_;
   Inputs estimate_, applied_, gradient_;
   std::int64_t phase_ = 0;      // of the window

@@ -7,7 +7,7 @@
 #include <array>
 #include <vector>
 
-#include "mgdd/optimize/seekers/limit_guard.hpp"
+#include "mgdd/optimize/seekers/constraint_filter.hpp"
 #include "mgdd/optimize/seekers/seeker.hpp"
 
 namespace mgdd::optimize {
@@ -65,7 +65,7 @@ class GoldenSection {
       v(name + "_sum", self.points_[p].sum);
       v(name + "_excess", self.points_[p].excess);
     }
-    LimitGuard::visit(self.guard_, v);
+    ConstraintFilter::visit(self.filter_, v);
   }
 
  private:
@@ -83,7 +83,7 @@ class GoldenSection {
   void centre_bracket(double width) noexcept;
 
   GoldenSectionSettings settings_;
-  LimitGuard guard_;
+  ConstraintFilter filter_;
   Protocol protocol_;
   Inputs estimate_, applied_;
   double lower_, upper_;

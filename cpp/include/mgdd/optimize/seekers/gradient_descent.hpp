@@ -7,7 +7,7 @@
 #include <string>
 #include <vector>
 
-#include "mgdd/optimize/seekers/limit_guard.hpp"
+#include "mgdd/optimize/seekers/constraint_filter.hpp"
 #include "mgdd/optimize/seekers/seeker.hpp"
 
 namespace mgdd::optimize {
@@ -59,12 +59,12 @@ class GradientDescent {
     v("stage", self.stage_, 2 * self.estimate_.size());
     v("iteration", self.iteration_);
     v("converged_at", self.converged_at_);
-    LimitGuard::visit(self.guard_, v);
+    ConstraintFilter::visit(self.filter_, v);
   }
 
  private:
   GradientDescentSettings settings_;
-  LimitGuard guard_;
+  ConstraintFilter filter_;
   Protocol protocol_;
   Inputs estimate_, applied_, gradient_;
   double above_ = 0.0;      // J at theta + c of the input at work

@@ -8,8 +8,8 @@
 #include <string>
 #include <vector>
 
+#include "mgdd/optimize/seekers/constraint_filter.hpp"
 #include "mgdd/optimize/seekers/dither.hpp"
-#include "mgdd/optimize/seekers/limit_guard.hpp"
 #include "mgdd/optimize/seekers/seeker.hpp"
 
 namespace mgdd::optimize {
@@ -73,7 +73,7 @@ class NewtonSeeking {
     v("share", self.share_);
     v("limited_cycles", self.limited_cycles_);
     v("window", self.window_);
-    LimitGuard::visit(self.guard_, v);
+    ConstraintFilter::visit(self.filter_, v);
   }
 
  private:
@@ -82,7 +82,7 @@ class NewtonSeeking {
 
   NewtonSeekingSettings settings_;
   Dither dither_;
-  LimitGuard guard_;
+  ConstraintFilter filter_;
   Protocol protocol_;
   Inputs estimate_, applied_, gradient_;
   InputMatrix hessian_, inverse_;

@@ -1,6 +1,6 @@
 // What every seeker shares: its inputs and their bounds, what a cycle tells it, and the ask/tell protocol.
 // A seeker proposes an input (`ask`), accepts the measurement of it (`tell`) and never holds a plant.
-// `ask` and `tell` are noexcept and allocation-free; `require` turns a status into an exception at the desk.
+// `ask` and `tell` are noexcept and allocation-free; `require` turns a status into an exception.
 #pragma once
 
 #include <Eigen/Core>

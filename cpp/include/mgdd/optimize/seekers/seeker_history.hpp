@@ -39,7 +39,7 @@ class SeekerHistory {
   std::vector<double> rows_;  // cycle, objective, misfire, applied, estimate of one cycle after the other
 };
 
-/// A seeker with its history, for loops and for the desk. `ask` and `tell` are those of the seeker, bit for bit.
+/// A seeker with its history, for loops and for Python. `ask` and `tell` are those of the seeker, bit for bit.
 template <class S>
 class RecordedSeeker {
  public:

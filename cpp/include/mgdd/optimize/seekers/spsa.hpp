@@ -10,7 +10,7 @@
 #include <string_view>
 #include <vector>
 
-#include "mgdd/optimize/seekers/limit_guard.hpp"
+#include "mgdd/optimize/seekers/constraint_filter.hpp"
 #include "mgdd/optimize/seekers/local_model.hpp"
 #include "mgdd/optimize/seekers/seeker.hpp"
 
@@ -101,7 +101,7 @@ class Spsa {
     v("share", self.share_);
     v("around_j", self.around_j_);
     LocalModel::visit(self.trend_, v, "trend");
-    LimitGuard::visit(self.guard_, v);
+    ConstraintFilter::visit(self.filter_, v);
   }
 
  private:
@@ -114,7 +114,7 @@ class Spsa {
   Inputs newton_step() noexcept;
 
   SpsaSettings settings_;
-  LimitGuard guard_;
+  ConstraintFilter filter_;
   LocalModel trend_;
   Protocol protocol_;
   Inputs estimate_, candidate_, applied_, gradient_, sum_;

@@ -1,5 +1,6 @@
 // From measured noise, curvature and sensor delay to amplitude, period and gain of a seeker, with what averaging theory
-// predicts for them, and a plain word where the wish cannot be met. Closed forms (J = J* + J''/2 e^2, noise sigma):
+// predicts for them, and the reasons where a specification is infeasible. Closed forms (J = J* + J''/2 e^2, noise
+// sigma):
 //   continuous: tau = 2/(g A |J''|),  rms = sigma/(A |J''| sqrt(tau)),  cycles = M + tau ln(e0/eps)
 //   batch:      the same rms over sqrt(1 - M/(2 tau))
 //   SPSA (constant gain): q = a |J''|, rms = sigma/(c |J''|) sqrt(q/(2 (2 - q))), cycles = 2 ln(eps/e0)/ln(1 - q)
@@ -21,7 +22,7 @@ enum class TunedMethod { batch, moving_average, spsa };
 std::string_view to_string(TunedMethod v) noexcept;
 TunedMethod parse_tuned_method(std::string_view name);
 
-struct TuningWish {
+struct TuningSpec {
   TunedMethod method = TunedMethod::batch;
   double noise_sd = std::numeric_limits<double>::quiet_NaN();   ///< of J from cycle to cycle, > 0
   double curvature = std::numeric_limits<double>::quiet_NaN();  ///< J'' at the optimum; its sign is not used
@@ -52,7 +53,8 @@ struct Tuning {
   std::vector<std::string> reasons;  ///< why not, with the figures that would do
 };
 
-/// ParameterError for noise or curvature that is missing or zero, or a wish that is not positive.
-Tuning tune(const TuningWish& wish);
+/// ParameterError for noise or curvature that is missing or zero, or a number of the specification that is not
+/// positive.
+Tuning tune(const TuningSpec& spec);
 
 }  // namespace mgdd::optimize

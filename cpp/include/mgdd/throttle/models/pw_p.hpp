@@ -36,8 +36,8 @@ struct BasicPwP {
 
   bool operator==(const BasicPwP&) const = default;
 
-  void validate() const
-    requires std::is_same_v<T, double>;
+  /// ParameterError naming field, value and bound; on double only.
+  void validate() const;
   void validate_settings() const { check_pw_p(frame, plays); }
 
   /// The numbers in the order of `fields`; all eight plays, those beyond `plays` do nothing.

@@ -55,9 +55,8 @@ struct BasicPwR {
 
   bool operator==(const BasicPwR&) const = default;
 
-  /// ParameterError naming field, value and bound.
-  void validate() const
-    requires std::is_same_v<T, double>;
+  /// ParameterError naming field, value and bound; on double only.
+  void validate() const;
   void validate_settings() const { check_pw_r(frame, ramp_deg, tanh_deg_per_s, dead_band_deg, friction); }
 
   /// The numbers in the order of `fields`.

@@ -31,8 +31,8 @@ struct BasicPwW {
 
   bool operator==(const BasicPwW&) const = default;
 
-  void validate() const
-    requires std::is_same_v<T, double>;
+  /// ParameterError naming field, value and bound; on double only.
+  void validate() const;
   void validate_settings() const { check_pw_w(frame, knot_lower_duty, knot_upper_duty); }
 
   /// The numbers in the order of `fields`.

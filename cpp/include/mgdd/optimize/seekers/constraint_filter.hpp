@@ -1,6 +1,6 @@
 // Measured limits inside a seeker: learns how each limited quantity answers the input, from the cycles that the seeker
-// runs anyway, and lets no step pass that would knowingly carry a set-point, its dither included, over a limit.
-// Methods for the objective: none ("switching": the guard alone, the gradient of a violated limit replaces that of J),
+// runs anyway, and rejects steps predicted to violate a limit, the dither of the set-point included.
+// Methods for the objective: none ("switching": the filter alone, the gradient of a violated limit replaces that of J),
 // quadratic penalty, or logarithmic barrier. noexcept and allocation-free after construction.
 #pragma once
 
@@ -31,10 +31,10 @@ struct Limit {
 };
 void validate(const std::vector<Limit>& limits);
 
-class LimitGuard {
+class ConstraintFilter {
  public:
   /// `memory` is the number of cycles that the learnt slopes look back.
-  LimitGuard(std::vector<Limit> limits, Eigen::Index inputs, double memory);
+  ConstraintFilter(std::vector<Limit> limits, Eigen::Index inputs, double memory);
 
   std::size_t size() const noexcept { return limits_.size(); }
   const std::vector<Limit>& limits() const noexcept { return limits_; }
@@ -55,9 +55,9 @@ class LimitGuard {
   /// along the learnt slope, or to the last good point while the slope is not known (with no such point the estimate
   /// stays, unless `reach` is zero and nothing but steps explores, or the limit has been broken for long without
   /// showing a slope: it cannot say where to go and is not waited for). Each entry stays within `rate`.
-  Inputs admit(const Inputs& estimate, const Inputs& step, const Inputs& reach, const Inputs& rate) noexcept;
+  Inputs project(const Inputs& estimate, const Inputs& step, const Inputs& reach, const Inputs& rate) noexcept;
 
-  /// True when the last `admit` changed its step.
+  /// True when the last `project` changed its step.
   bool active() const noexcept { return active_; }
   /// True after three cycles in a row over the same limit: do not wait for the end of a window.
   bool alarmed() const noexcept;

@@ -1,4 +1,4 @@
-// The guard of measured limits: what it learns, what it lets pass, the way back, and what it adds to J.
+// The filter of measured limits: what it learns, what it lets pass, the way back, and what it adds to J.
 #include "support/seeker_case.hpp"
 
 namespace mgdd::optimize {
@@ -45,10 +45,10 @@ TEST(LocalModel, DoesNotClaimASlopeThatNoiseExplains) {
 
 // --- what it lets pass --------------------------------------------------------------------------------------
 
-/// A guard that knows planes value = level + slope x, from exact measurements around `at`.
-LimitGuard taught(const std::vector<Limit>& limits, const std::vector<Inputs>& slopes,
-                  const std::vector<double>& levels, const Inputs& at) {
-  LimitGuard guard(limits, at.size(), 30.0);
+/// A filter that knows planes value = level + slope x, from exact measurements around `at`.
+ConstraintFilter taught(const std::vector<Limit>& limits, const std::vector<Inputs>& slopes,
+                        const std::vector<double>& levels, const Inputs& at) {
+  ConstraintFilter filter(limits, at.size(), 30.0);
   std::vector<double> values(limits.size());
   for (std::uint64_t k = 0; k < 40; ++k) {
     Inputs x = at;
@@ -56,12 +56,12 @@ LimitGuard taught(const std::vector<Limit>& limits, const std::vector<Inputs>& s
       x[i] += uniform(k * 10 + static_cast<std::uint64_t>(i), -1.0, 1.0);
     for (std::size_t l = 0; l < limits.size(); ++l)
       values[l] = levels[l] + slopes[l].dot(x);
-    guard.record(x, values);
+    filter.record(x, values);
   }
-  return guard;
+  return filter;
 }
 
-TEST(LimitGuard, NeverAdmitsAStepWhosePredictionIsOverALimit) {
+TEST(ConstraintFilter, NeverAdmitsAStepWhosePredictionIsOverALimit) {
   int turned = 0;
   for (std::uint64_t trial = 0; trial < 3000; ++trial) {
     const auto n = static_cast<Eigen::Index>(1 + trial % 3);
@@ -84,13 +84,13 @@ TEST(LimitGuard, NeverAdmitsAStepWhosePredictionIsOverALimit) {
       levels.push_back(uniform(draw++, -50.0, 50.0));
       limits.push_back({"l" + std::to_string(l), levels[l] + slopes[l].dot(at) + room + 0.5, 0.5});
     }
-    LimitGuard guard = taught(limits, slopes, levels, at);
-    const Inputs out = guard.admit(at, step, reach, rate);
+    ConstraintFilter filter = taught(limits, slopes, levels, at);
+    const Inputs out = filter.project(at, step, reach, rate);
     for (std::size_t l = 0; l < count; ++l)
-      ASSERT_LE(guard.excess(l, at + out, reach), 1e-6) << "trial " << trial;
+      ASSERT_LE(filter.excess(l, at + out, reach), 1e-6) << "trial " << trial;
     const Inputs cap = rate.cwiseMax(step.cwiseAbs());
     ASSERT_TRUE(((cap - out.cwiseAbs()).array() > -1e-12).all()) << "trial " << trial;
-    if (guard.active()) {
+    if (filter.active()) {
       ++turned;
     } else {
       ASSERT_EQ(out, step);
@@ -100,46 +100,47 @@ TEST(LimitGuard, NeverAdmitsAStepWhosePredictionIsOverALimit) {
   EXPECT_LT(turned, 2700);
 }
 
-TEST(LimitGuard, SlidesAlongALimitInSeveralInputs) {
+TEST(ConstraintFilter, SlidesAlongALimitInSeveralInputs) {
   const Inputs slope = inputs({3.0, 4.0}), at = inputs({0.0, 0.0});
-  LimitGuard guard = taught({{"l", 10.0}}, {slope}, {10.0}, at);
-  const Inputs out = guard.admit(at, inputs({1.0, 1.0}), Inputs::Zero(2), Inputs::Constant(2, 5.0));
+  ConstraintFilter filter = taught({{"l", 10.0}}, {slope}, {10.0}, at);
+  const Inputs out = filter.project(at, inputs({1.0, 1.0}), Inputs::Zero(2), Inputs::Constant(2, 5.0));
   EXPECT_NEAR(slope.dot(out), 0.0, 1e-6);
   EXPECT_LT((out - inputs({0.16, -0.12})).norm(), 1e-6);  // the step less its part along the slope
-  EXPECT_TRUE(guard.active());
+  EXPECT_TRUE(filter.active());
 }
 
-TEST(LimitGuard, ComesBackAlongTheSlopeNoFasterThanTheRate) {
+TEST(ConstraintFilter, ComesBackAlongTheSlopeNoFasterThanTheRate) {
   const Inputs slope = scalar_input(2.0), at = scalar_input(5.0), reach = scalar_input(1.0);
-  LimitGuard guard = taught({{"l", 10.0, 1.0}}, {slope}, {0.0}, at);  // 2 (x + 1) <= 9: x <= 3.5
-  EXPECT_NEAR(guard.excess(0, at, reach), 3.0, 1e-6);
-  EXPECT_NEAR(guard.admit(at, scalar_input(0.4), reach, scalar_input(10.0))[0], -1.5, 1e-6);
-  EXPECT_NEAR(guard.admit(at, scalar_input(0.4), reach, scalar_input(0.3))[0], -0.3, 1e-12);
-  EXPECT_TRUE(guard.active());
+  ConstraintFilter filter = taught({{"l", 10.0, 1.0}}, {slope}, {0.0}, at);  // 2 (x + 1) <= 9: x <= 3.5
+  EXPECT_NEAR(filter.excess(0, at, reach), 3.0, 1e-6);
+  EXPECT_NEAR(filter.project(at, scalar_input(0.4), reach, scalar_input(10.0))[0], -1.5, 1e-6);
+  EXPECT_NEAR(filter.project(at, scalar_input(0.4), reach, scalar_input(0.3))[0], -0.3, 1e-12);
+  EXPECT_TRUE(filter.active());
 }
 
-TEST(LimitGuard, GoesToTheLastGoodPointWhileTheSlopeIsNotKnown) {
-  LimitGuard guard({{"l", 10.0}}, 1, 30.0);
+TEST(ConstraintFilter, GoesToTheLastGoodPointWhileTheSlopeIsNotKnown) {
+  ConstraintFilter filter({{"l", 10.0}}, 1, 30.0);
   const Inputs none = scalar_input(0.0), rate = scalar_input(0.5);
-  EXPECT_EQ(guard.admit(scalar_input(3.0), scalar_input(7.0), none, rate)[0], 7.0) << "nothing is known yet";
+  EXPECT_EQ(filter.project(scalar_input(3.0), scalar_input(7.0), none, rate)[0], 7.0) << "nothing is known yet";
   const double low[] = {9.0}, high[] = {40.0};
-  guard.record(scalar_input(3.0), low);
-  EXPECT_EQ(guard.admit(scalar_input(3.0), none, none, rate)[0], 0.0);
-  guard.record(scalar_input(3.0), high);
-  EXPECT_NEAR(guard.admit(scalar_input(3.2), scalar_input(0.3), none, rate)[0], -0.2, 1e-12);
-  EXPECT_EQ(guard.admit(scalar_input(9.0), scalar_input(0.3), none, rate)[0], -0.5);
-  guard.forget();
-  guard.record(scalar_input(3.0), high);
-  EXPECT_EQ(guard.admit(scalar_input(9.0), scalar_input(0.3), scalar_input(1.0), rate)[0], 0.0) << "the dither looks";
-  EXPECT_EQ(guard.admit(scalar_input(9.0), scalar_input(0.3), none, rate)[0], 0.3) << "no dither: the steps look";
+  filter.record(scalar_input(3.0), low);
+  EXPECT_EQ(filter.project(scalar_input(3.0), none, none, rate)[0], 0.0);
+  filter.record(scalar_input(3.0), high);
+  EXPECT_NEAR(filter.project(scalar_input(3.2), scalar_input(0.3), none, rate)[0], -0.2, 1e-12);
+  EXPECT_EQ(filter.project(scalar_input(9.0), scalar_input(0.3), none, rate)[0], -0.5);
+  filter.forget();
+  filter.record(scalar_input(3.0), high);
+  EXPECT_EQ(filter.project(scalar_input(9.0), scalar_input(0.3), scalar_input(1.0), rate)[0], 0.0)
+      << "the dither looks";
+  EXPECT_EQ(filter.project(scalar_input(9.0), scalar_input(0.3), none, rate)[0], 0.3) << "no dither: the steps look";
 }
 
-TEST(LimitGuard, AlarmsAfterThreeCyclesInARowOverTheSameLimit) {
-  LimitGuard guard({{"a", 10.0, 1.0}, {"b", 5.0}}, 1, 30.0);
+TEST(ConstraintFilter, AlarmsAfterThreeCyclesInARowOverTheSameLimit) {
+  ConstraintFilter filter({{"a", 10.0, 1.0}, {"b", 5.0}}, 1, 30.0);
   const auto record = [&](double a, double b) {
     const double values[] = {a, b};
-    guard.record(scalar_input(0.0), values);
-    return guard.alarmed();
+    filter.record(scalar_input(0.0), values);
+    return filter.alarmed();
   };
   EXPECT_FALSE(record(9.5, 1.0));
   EXPECT_FALSE(record(9.5, 6.0));
@@ -147,19 +148,19 @@ TEST(LimitGuard, AlarmsAfterThreeCyclesInARowOverTheSameLimit) {
   EXPECT_FALSE(record(9.0, 6.0));
   EXPECT_FALSE(record(9.5, 6.0));
   EXPECT_TRUE(record(9.5, 6.0));
-  guard.forget();
-  EXPECT_FALSE(guard.alarmed());
+  filter.forget();
+  EXPECT_FALSE(filter.alarmed());
 }
 
 // --- what it adds to J --------------------------------------------------------------------------------------
 
 double shaping(Limit limit, double value) {
-  const LimitGuard guard({std::move(limit)}, 1, 10.0);
+  const ConstraintFilter filter({std::move(limit)}, 1, 10.0);
   const double values[] = {value};
-  return guard.shaping(values);
+  return filter.shaping(values);
 }
 
-TEST(LimitGuard, PenaltyIsTheSquareOfTheScaledExcess) {
+TEST(ConstraintFilter, PenaltyIsTheSquareOfTheScaledExcess) {
   const Limit limit{"l", 100.0, 2.0, LimitMethod::penalty, 3.0, 10.0};
   EXPECT_EQ(shaping(limit, 97.9), 0.0);
   EXPECT_NEAR(shaping(limit, 118.0), -3.0 * 4.0, 1e-12);
@@ -167,7 +168,7 @@ TEST(LimitGuard, PenaltyIsTheSquareOfTheScaledExcess) {
   EXPECT_EQ(shaping({"l", 100.0}, 500.0), 0.0) << "switching leaves J alone";
 }
 
-TEST(LimitGuard, BarrierIsTheLogarithmOfTheRoomAndGoesOnAsItsTangent) {
+TEST(ConstraintFilter, BarrierIsTheLogarithmOfTheRoomAndGoesOnAsItsTangent) {
   const Limit limit{"l", 100.0, 0.0, LimitMethod::barrier, 2.0, 10.0};
   EXPECT_NEAR(shaping(limit, 90.0), 0.0, 1e-12);
   EXPECT_NEAR(shaping(limit, 95.0), 2.0 * std::log(0.5), 1e-12);
@@ -177,7 +178,7 @@ TEST(LimitGuard, BarrierIsTheLogarithmOfTheRoomAndGoesOnAsItsTangent) {
   EXPECT_NEAR(shaping(limit, 120.0), 2.0 * (std::log(0.01) - 2.01 / 0.01), 1e-9);
 }
 
-TEST(LimitGuard, RefusesLimitsByName) {
+TEST(ConstraintFilter, RefusesLimitsByName) {
   const auto message = [](Limit limit) -> std::string {
     try {
       validate({std::move(limit)});

@@ -1,4 +1,4 @@
-#include "mgdd/optimize/seekers/limit_guard.hpp"
+#include "mgdd/optimize/seekers/constraint_filter.hpp"
 
 #include <algorithm>
 #include <array>
@@ -51,7 +51,7 @@ void validate(const std::vector<Limit>& limits) {
   }
 }
 
-LimitGuard::LimitGuard(std::vector<Limit> limits, Eigen::Index inputs, double memory)
+ConstraintFilter::ConstraintFilter(std::vector<Limit> limits, Eigen::Index inputs, double memory)
     : limits_(std::move(limits)),
       patience_(patience_share * memory),
       models_(limits_.size(), LocalModel(inputs, memory)),
@@ -63,14 +63,14 @@ LimitGuard::LimitGuard(std::vector<Limit> limits, Eigen::Index inputs, double me
   }
 }
 
-void LimitGuard::record(const Inputs& applied, std::span<const double> values) noexcept {
+void ConstraintFilter::record(const Inputs& applied, std::span<const double> values) noexcept {
   for (std::size_t i = 0; i < limits_.size(); ++i) {
     models_[i].record(applied, values[i]);
     in_a_row_[i] = values[i] > limits_[i].upper - limits_[i].margin ? in_a_row_[i] + 1.0 : 0.0;
   }
 }
 
-double LimitGuard::shaping(std::span<const double> values) const noexcept {
+double ConstraintFilter::shaping(std::span<const double> values) const noexcept {
   double sum = 0.0;
   for (std::size_t i = 0; i < limits_.size(); ++i) {
     const Limit& limit = limits_[i];
@@ -84,12 +84,13 @@ double LimitGuard::shaping(std::span<const double> values) const noexcept {
   return sum;
 }
 
-double LimitGuard::excess(std::size_t i, const Inputs& at, const Inputs& reach) const noexcept {
+double ConstraintFilter::excess(std::size_t i, const Inputs& at, const Inputs& reach) const noexcept {
   if (!(models_[i].cycles() > 0.0)) return -unlimited;
   return models_[i].predict(at) + models_[i].slope().cwiseAbs().dot(reach) + limits_[i].margin - limits_[i].upper;
 }
 
-Inputs LimitGuard::admit(const Inputs& estimate, const Inputs& step, const Inputs& reach, const Inputs& rate) noexcept {
+Inputs ConstraintFilter::project(const Inputs& estimate, const Inputs& step, const Inputs& reach,
+                                 const Inputs& rate) noexcept {
   active_ = false;
   if (limits_.empty() || !(models_.front().cycles() > 0.0)) return step;
   std::size_t worst = 0;
@@ -147,15 +148,15 @@ Inputs LimitGuard::admit(const Inputs& estimate, const Inputs& step, const Input
 }
 
 // Broken, looked at for long, and without a slope that stands out of its noise: it cannot say where to go.
-bool LimitGuard::silent(std::size_t i, double excess) const noexcept {
+bool ConstraintFilter::silent(std::size_t i, double excess) const noexcept {
   return excess > 0.0 && models_[i].cycles() >= patience_ && !models_[i].slope_known(significance);
 }
 
-bool LimitGuard::alarmed() const noexcept {
+bool ConstraintFilter::alarmed() const noexcept {
   return std::any_of(in_a_row_.begin(), in_a_row_.end(), [](double n) { return n >= alarm_cycles; });
 }
 
-void LimitGuard::forget() noexcept {
+void ConstraintFilter::forget() noexcept {
   for (LocalModel& model : models_)
     model.forget();
   std::fill(in_a_row_.begin(), in_a_row_.end(), 0.0);
