@@ -71,7 +71,8 @@ TEST(EngineRealTime, NothingIsAllocatedInAnyVariant) {
 TEST(EngineRealTime, TheCounterSeesAnAllocation) {
   const AllocationCounter counter;
   const std::vector<double> column(1000);
-  EXPECT_EQ(column.size(), 1000u);
+  const double* volatile seen = column.data();  // a compiler may leave out an allocation that nobody looks at
+  EXPECT_NE(seen, nullptr);
   EXPECT_GE(counter.count(), 1u);
 }
 
