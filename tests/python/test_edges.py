@@ -12,11 +12,12 @@ import pytest
 from mgdd import _core, datasets, io, presets
 from mgdd.engine import Cylinder, OperatingPoint, analyze, convergence, find_optimum, sensitivities, simulate
 from mgdd.errors import ConvergenceError, DataError, ParameterError, ShapeError
-from mgdd.identify import best_timing, fit_cylinder, wall_heat_profile
+from mgdd.identify import ModelFamily, best_timing, fit_cylinder, wall_heat_profile
 from mgdd.optimize import FitOptions
 
 HD = presets.load("hd_diesel_128x144").cylinder
 POINT = OperatingPoint(burn_duration_cad=30.0)
+FEW = ModelFamily(gammas=[("linear", 1.40)], wall_heat_scales=[0.5, 1.0])
 
 
 def test_no_piston_speed_term_still_has_derivatives() -> None:
@@ -126,7 +127,7 @@ def test_gil_is_free_while_the_core_computes() -> None:
 def test_profile_follows_the_fit_and_never_invents_its_range() -> None:
     trace = datasets.load("hd_diesel_128x144")[1:2]
     fit = fit_cylinder(trace, HD, free=["soc_cad", "burn_duration_cad", "fuel_heat_j", "wiebe_m", "wall_heat_scale"])
-    profile = wall_heat_profile(trace, fit, scales=[0.5])
+    profile = wall_heat_profile(fit, scales=[0.5])
     scales = profile.dataset["wall_heat_scale"].values
     assert {0.0, 2.5} <= set(scales.round(12))
     best = float(profile.dataset["rmse_percent"].min())
@@ -140,12 +141,12 @@ def test_profile_of_an_unfinished_fit_says_so() -> None:
     bad = fit_cylinder(
         trace, HD.replace(burn_shape="double_wiebe", gamma_model="constant"), options=FitOptions(max_iterations=2)
     )
-    profile = wall_heat_profile(trace, bad, scales=[0.5, 1.0])
+    profile = wall_heat_profile(bad, scales=[0.5, 1.0])
     assert not profile.identifiable
     assert "did not converge" in profile.reasons[0]
     only = fit_cylinder(trace, HD, free=["wall_heat_scale"])
     with pytest.raises(ParameterError, match="only free parameter"):
-        wall_heat_profile(trace, only)
+        wall_heat_profile(only)
 
 
 def test_start_is_checked_before_the_fit() -> None:
@@ -186,6 +187,6 @@ def test_best_timing_refuses_a_wrong_limit_before_any_fit() -> None:
     with pytest.raises(ParameterError, match="'pmax' is not an indicator"):
         best_timing(datasets.load("hd_diesel_128x144")[:1], HD, limits={"pmax": 90.0}, progress=seen.append)
     assert seen == []
-    (row,) = best_timing(datasets.load("hd_diesel_128x144")[:1], HD, bounds_cad=(-4.0, -3.5))
-    assert all(-4.0 <= p["free_soc_cad"] <= -3.5 for p in row["points"])
-    assert any(p["at_bound"] for p in row["points"])
+    (row,) = best_timing(datasets.load("hd_diesel_128x144")[:1], HD, bounds_cad=(-1.0, 2.0), family=FEW)
+    assert all(-1.0 <= answer.free_soc_cad <= 2.0 for answer in row.members)
+    assert any(answer.at_bound for answer in row.members)

@@ -11,7 +11,7 @@ import pytest
 
 from mgdd import datasets, presets
 from mgdd.engine import Cylinder, OperatingPoint, simulate
-from mgdd.errors import DataError, ParameterError
+from mgdd.errors import DataError, ParameterError, ShapeError
 from mgdd.identify import fit_cylinder, wall_heat_profile
 from mgdd.io import pressure_trace
 from mgdd.results.labels import check_labels
@@ -21,6 +21,7 @@ HD = presets.load("hd_diesel_128x144").cylinder
 TRUTH = Cylinder(burn_shape="wiebe", wall_heat_scale=0.8)
 START = TRUTH.replace(wall_heat_scale=0.3)
 LOADS = ((14.0, -5.0), (24.0, -9.0))
+ANY_START = {"soc_cad": (None, None)}  # published reference fits let a burn start before the injection
 LAWS = {
     "triangle, gamma 1.37": {"burn_shape": "triangle", "gamma_model": "constant"},
     "wiebe, gamma linear": {"burn_shape": "wiebe", "gamma_model": "linear"},
@@ -42,12 +43,12 @@ def plant(noise_bar=0.0, seed=0):
 
 @functools.cache
 def measured(law):
-    return fit_cylinder(datasets.load("hd_diesel_128x144"), HD.replace(**LAWS[law]))
+    return fit_cylinder(datasets.load("hd_diesel_128x144"), HD.replace(**LAWS[law]), bounds=ANY_START)
 
 
 @functools.cache
 def profile(law):
-    return wall_heat_profile(datasets.load("hd_diesel_128x144"), measured(law))
+    return wall_heat_profile(measured(law))
 
 
 def true_values():
@@ -68,12 +69,30 @@ def test_recovers_the_truth_without_noise():
 def test_standard_errors_cover_the_truth_under_noise():
     z = []
     for seed in range(10):
-        report = fit_cylinder(plant(0.1, seed), START).report
+        report = fit_cylinder(plant(0.1, seed), START, free=("wall_heat_scale", *BURN)).report
         assert report.success
         z.append((report.values - true_values()) / report.stderr)
     assert np.abs(z).max() < 4.0
     assert (np.abs(z) > 3.0).sum() <= 1
     assert 0.7 < np.std(z) < 1.3  # neither too small nor too large
+
+
+def test_one_noisy_first_sample_does_not_scale_the_cycle():
+    traces = plant(0.05, 4)
+    for trace, error in zip(traces, (0.09, -0.07), strict=True):
+        trace["pressure_bar"][0] += error  # of 1.2 bar
+    fit = fit_cylinder(traces, START)
+    assert "start_pressure_bar[14 mg]" in fit.report.names
+    values = dict(zip(fit.report.names, zip(fit.report.values, fit.report.stderr, strict=True), strict=True))
+    for name, truth in (("wall_heat_scale", 0.8), ("fuel_heat_j[24 mg]", 42.8 * 24.0)):
+        value, stderr = values[name]
+        assert value == pytest.approx(truth, abs=3.5 * stderr)
+    blind = fit_cylinder(traces, START, free=("wall_heat_scale", *BURN))
+    assert blind.report.rmse > 2.0 * fit.report.rmse
+    assert "start_pressure_bar[14 mg]" not in fit_cylinder(plant(), START).report.names
+    load = fit.loads[0]
+    again = simulate(load.cylinder, load.point, soc_cad=load.soc_cad, step_cad=0.25)
+    np.testing.assert_allclose(again.pressure_bar.values[:-2], load.overlay.model_bar.values[:-2], rtol=1e-6)
 
 
 def test_wall_heat_is_identifiable_with_known_fuel_and_then_its_profile_is_narrow():
@@ -108,7 +127,7 @@ def test_measured_traces_meet_the_reference_fits(root):
             words = dict(word.split("=") for word in text.split())
             traces = with_mass if words.pop("traces") == "hd" else without
             free = ("wall_heat_scale", *BURN, *([words.pop("free")] if "free" in words else []))
-            fits[text] = fit_cylinder(traces, HD.replace(**words), free=free)
+            fits[text] = fit_cylinder(traces, HD.replace(**words), free=free, bounds=ANY_START)
         quantity, at = name.removeprefix("fit_").split("@")
         found = getattr(fits[text].loads[int(at) // 25 - 1], quantity)
         if not abs(found - float(value)) <= float(tolerance):
@@ -179,18 +198,89 @@ def test_the_profile_of_a_plant_with_known_fuel_identifies_the_scale():
     traces, free = plant(0.02, 1), ("wall_heat_scale", "soc_cad", "burn_duration_cad")
     known = [{"fuel_heat_j": 42.8 * fuel} for fuel, _ in LOADS]
     fit = fit_cylinder(traces, START, free=free, start_values=known)
-    found = wall_heat_profile(traces, fit, scales=[0.5, 1.2])
+    found = wall_heat_profile(fit, scales=[0.5, 1.2], widths={"gamma": 0.0, "pegging_bar": 0.0, "tdc_cad": 0.0})
     assert found.identifiable, found.reasons
     assert found.range_low < 0.8 < found.range_high
     assert found.range_high - found.range_low < 0.1
+    assert (found.moved, found.possible_low, found.possible_high) == ({}, found.range_low, found.range_high)
+    doubted = wall_heat_profile(fit, scales=[0.5, 1.2])  # nobody said that gamma, pegging and TDC are known
+    assert not doubted.identifiable
+    assert "gamma is 0.03 off" in doubted.reasons[-1]
+    assert doubted.possible_low < found.possible_low
+    assert doubted.possible_high > found.possible_high
+    low, high = doubted.moved["gamma"]
+    refit = fit_cylinder(
+        traces, START.replace(gamma=START.gamma + 0.03), free=free, fuel_heat_j=[42.8 * fuel for fuel, _ in LOADS]
+    )
+    assert high == pytest.approx(refit.model.wall_heat_scale, abs=1e-4)
+    assert low < 0.8 < high or high < 0.8 < low
 
 
 def test_a_profile_needs_a_free_scale():
     fit = fit_cylinder(plant(), START, free=BURN)
     with pytest.raises(ParameterError, match="wall_heat_scale was not free"):
-        wall_heat_profile(plant(), fit)
+        wall_heat_profile(fit)
     with pytest.raises(ParameterError, match=r"scales: 3 must be in \[0, 2\.5\]"):
-        wall_heat_profile(datasets.load("hd_diesel_128x144"), measured("wiebe, gamma linear"), scales=[1.0, 3.0])
+        wall_heat_profile(measured("wiebe, gamma linear"), scales=[1.0, 3.0])
+    with pytest.raises(ParameterError, match="widths: 'tdc' is none of gamma, pegging_bar, tdc_cad"):
+        wall_heat_profile(measured("wiebe, gamma linear"), widths={"tdc": 0.1})
+    with pytest.raises(ParameterError, match=r"widths: gamma = -0\.1: must be >= 0"):
+        wall_heat_profile(measured("wiebe, gamma linear"), widths={"gamma": -0.1})
+
+
+def test_a_known_fuel_is_held_and_said_once():
+    heats = [42.8 * fuel for fuel, _ in LOADS]
+    held = fit_cylinder(plant(), START, fuel_heat_j=heats)
+    assert [load.fuel_heat_j for load in held.loads] == heats
+    assert "fuel_heat_j[14 mg]" not in held.report.names
+    assert held.model.wall_heat_scale == pytest.approx(0.8, rel=1e-6)
+    lhv = TRUTH.lower_heating_value_mj_per_kg
+    said = [trace.assign_attrs(fuel_mg=fuel * 42.8 / lhv) for trace, (fuel, _) in zip(plant(), LOADS, strict=True)]
+    by_trace = fit_cylinder(said, START)
+    np.testing.assert_allclose([load.fuel_heat_j for load in by_trace.loads], heats, rtol=1e-14)
+    assert "fuel_heat_j[14 mg]" in fit_cylinder(said, START, free=(*BURN, "wall_heat_scale")).report.names
+    with pytest.raises(ParameterError, match="fuel_heat_j is free and given"):
+        fit_cylinder(plant(), START, free=BURN, fuel_heat_j=600.0)
+    with pytest.raises(ParameterError, match="known for some traces only"):
+        fit_cylinder(plant(), START, fuel_heat_j=[600.0, None])
+    with pytest.raises(ShapeError, match="fuel_heat_j has 3 entries for 2 traces"):
+        fit_cylinder(plant(), START, fuel_heat_j=[600.0, 700.0, 800.0])
+
+
+def test_gamma_names_the_parameter_of_the_law_in_use():
+    linear = START.replace(gamma_model="linear", gamma_linear_300k=1.39)
+    fit = fit_cylinder(plant(), linear, free=("gamma", *BURN))
+    assert fit.report.names[0] == "gamma_linear_300k"
+    assert fit.model.gamma == linear.gamma
+    wrong = START.replace(gamma=1.34, wall_heat_scale=0.8)
+    assert fit_cylinder(plant(), wrong, free=("gamma", *BURN)).model.gamma == pytest.approx(TRUTH.gamma, rel=1e-6)
+
+
+def test_a_burn_starts_at_the_earliest_at_its_injection_or_spark():
+    late = [trace.assign_attrs(soi_cad=soc + 1.0) for trace, (_, soc) in zip(plant(), LOADS, strict=True)]
+    fit = fit_cylinder(late, START)
+    assert [load.soc_cad for load in fit.loads] == [soc + 1.0 for _, soc in LOADS]
+    held = next(finding for finding in fit.findings if finding.code == "early_onset")
+    assert "held at the injection" in held.text
+    spark = [late[0].drop_attrs().assign_attrs(file="14 mg", spark_cad=-7.0), plant()[1]]
+    assert [load.soc_cad for load in fit_cylinder(spark, START).loads] == pytest.approx([-5.0, -9.0], abs=1e-5)
+    one = fit_cylinder(late, START, bounds={"soc_cad[14 mg]": (None, None)})
+    assert one.loads[0].soc_cad < LOADS[0][1] + 1.0 - 1e-3
+    assert one.loads[1].soc_cad == LOADS[1][1] + 1.0
+    with pytest.raises(ParameterError, match="bounds: 'wiebe_m' is not free"):
+        fit_cylinder(plant(), START, bounds={"wiebe_m": (0.0, 1.0)})
+    with pytest.raises(ParameterError, match="burn_duration_cad from 10 to 5 leaves nothing"):
+        fit_cylinder(plant(), START, bounds={"burn_duration_cad": (10.0, 5.0)})
+
+
+def test_pegging_comes_before_the_fit():
+    low = [trace.assign(pressure_bar=trace.pressure_bar - 0.4) for trace in plant()]
+    for new, old in zip(low, plant(), strict=True):
+        new["pressure_bar"].attrs.update(old["pressure_bar"].attrs)
+    by_inlet = fit_cylinder(low, START, pegging="two_point", pegging_exponent=TRUTH.gamma)
+    raw = fit_cylinder(low, START)
+    assert by_inlet.report.rmse < 0.2 * raw.report.rmse
+    assert by_inlet.loads[0].overlay.measured_bar.values - low[0].pressure_bar.values == pytest.approx(0.4, abs=0.1)
 
 
 def test_a_load_carries_what_a_simulation_needs():

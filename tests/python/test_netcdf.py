@@ -81,7 +81,7 @@ def of_records() -> surrogate.EngineSurrogate:
 def wall_heat() -> xr.Dataset:
     traces = datasets.load("hd_diesel_128x144")[:2]
     fit = identify.fit_cylinder(traces, presets.load("hd_diesel_128x144").cylinder)
-    return identify.wall_heat_profile(traces, fit, scales=[0.5, 1.0]).dataset
+    return identify.wall_heat_profile(fit, scales=[0.5, 1.0]).dataset
 
 
 def report() -> FitReport:

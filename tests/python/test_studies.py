@@ -33,8 +33,9 @@ def test_every_bar_of_the_calibration(result: StudyResult) -> None:
 
 def test_the_report_says_what_to_distrust(result: StudyResult) -> None:
     text = "\n".join(result.summary["warnings"])
-    assert re.search(r"triangle, gamma 1\.37: closed IMEP is 4\.9 to 11\.1 % low", text)
-    assert re.search(r"triangle, gamma 1\.37: the fitted burn starts before the injection", text)
+    assert (
+        "held at the injection or spark and would start before (SOC minus SOI in °CA: pressure_a100_bar +0.0)" in text
+    )
     for profile in result.summary["common"]["wall_heat_scale"].values():
         assert profile["identifiable"] is False
         assert profile["reasons"]
@@ -42,23 +43,55 @@ def test_the_report_says_what_to_distrust(result: StudyResult) -> None:
     assert "wall_heat_scale" in result.summary["unidentifiable"]
 
 
-def test_profile_of_the_double_wiebe_is_flat(result: StudyResult) -> None:
-    profile = result.summary["common"]["wall_heat_scale"]["double_wiebe, gamma 1.37"]
-    assert profile["range_low"] < 0.8 * profile["value"]
-    assert profile["range_high"] > 1.2 * profile["value"]
+def test_gamma_and_wall_heat_stand_in_for_each_other(result: StudyResult) -> None:
+    profiles = result.summary["common"]["wall_heat_scale"]
+    held = profiles["double_wiebe, linear gamma held"]
+    free = profiles["double_wiebe, linear gamma refitted"]
+    assert held["range_low"] < 0.8 * held["value"]
+    assert held["range_high"] > 1.2 * held["value"]
+    assert free["range_high"] - free["range_low"] > 2.0 * (held["range_high"] - held["range_low"])
+    assert held["moved"]["gamma"] == [0.0, 2.5]  # 0.03 of gamma moves the estimate over the whole search
+    assert "gamma" not in free["moved"]
 
 
-def test_best_timing_is_a_range_within_the_pressure_limit(result: StudyResult) -> None:
-    expected = {0: (-5.9, -3.7), 3: (-13.9, -11.2)}
+def test_the_headline_is_plausible_and_the_range_holds_every_plausible_answer(result: StudyResult) -> None:
     rows = result.summary["best_timing"]
-    for index, span in expected.items():
-        assert rows[index]["free_soc_cad"] == pytest.approx(span, abs=0.1)
-    assert rows[3]["free_gain_percent"] == pytest.approx([1.2, 2.8], abs=0.1)
+    assert len(rows) == 4
     for row in rows:
-        for point in row["points"]:
-            assert point["gain_percent"] >= -1e-9
-            assert point["gain_percent"] <= point["free_gain_percent"] + 1e-9
-            assert point["soc_cad"] >= point["free_soc_cad"] - 1e-6  # a pressure limit only delays
+        best, members = row["best"], row["members"]
+        kept = [member for member in members if member["plausible"]]
+        assert len(kept) >= 2
+        assert best in kept
+        assert best["efficiency_gross"] <= 0.53
+        assert best["soc_minus_soi_cad"] >= 0.0
+        assert abs(best["wall_heat_scale"] - 1.0) <= 0.25
+        for name in ("soc_cad", "ca50_cad", "gain_percent", "free_soc_cad", "free_ca50_cad", "free_gain_percent"):
+            values = [member[name] for member in kept]
+            assert row[name] == [min(values), max(values)], name
+        for member in members:
+            assert bool(member["why_not"]) != member["plausible"]
+            assert member["gain_percent"] >= -1e-9
+            assert member["gain_percent"] <= member["free_gain_percent"] + 1e-9
+            assert member["soc_cad"] >= member["free_soc_cad"] - 1e-6  # a pressure limit only delays
+
+
+def test_what_a_plausibility_check_leaves_is_what_was_published(result: StudyResult) -> None:
+    # Best CA50 without a limit of four published double Wiebe members, wall heat 0.5 and 1.0, loads 25 to 100 %.
+    published = {
+        ("constant", 1.37, 0.5): (4.2, 5.7, 6.5, 7.6),
+        ("constant", 1.37, 1.0): (8.2, 9.9, 10.7, 12.0),
+        ("linear", 1.40, 0.5): (4.1, 5.0, 5.6, 6.2),
+        ("linear", 1.40, 1.0): (7.6, 8.6, 9.2, 10.0),
+    }
+    found = {}
+    for row in result.summary["best_timing"]:
+        for member in row["members"]:
+            if member["law"] == "double_wiebe" and member["fitted"] == "nothing":
+                key = (member["gamma_model"], member["gamma"], member["wall_heat_scale"])
+                found.setdefault(key, []).append(member["free_ca50_cad"])
+    for key, angles in published.items():
+        # A burn bounded by the injection, and another end of the search, move the answers by half a degree.
+        assert found[key] == pytest.approx(angles, abs=0.6), key
 
 
 def test_dataset_is_labelled(result: StudyResult) -> None:
@@ -70,7 +103,7 @@ def test_page_is_self_contained(result: StudyResult, tmp_path: Path) -> None:
     page = write_report(result, tmp_path / "report")
     text = page.read_text(encoding="utf-8")
     assert not re.search(r"(src|href)=[\"'](?!data:)", text)
-    assert text.count("data:image/png;base64,") == len(result.figures) == 8
+    assert text.count("data:image/png;base64,") == len(result.figures) == 7
     assert "What to distrust" in text
     assert "not identifiable" in text
     summary = json.loads((tmp_path / "report" / "summary.json").read_text(encoding="utf-8"))
@@ -99,17 +132,31 @@ def test_every_column_of_the_page_holds_what_its_head_says(result: StudyResult, 
     timing = columns(page, "Best timing")
     assert timing["trace"] == [row["file"] for row in best]
     for head, name, digits in (
-        ("SOC as fitted [°CA aTDC]", "fitted_soc_cad", 1),
         ("best SOC, own p_max kept [°CA aTDC]", "soc_cad", 1),
+        ("best CA50, own p_max kept [°CA aTDC]", "ca50_cad", 1),
         ("gain [%]", "gain_percent", 2),
         ("best SOC, no limit [°CA aTDC]", "free_soc_cad", 1),
-        ("CA50, no limit [°CA aTDC]", "free_ca50_cad", 1),
+        ("best CA50, no limit [°CA aTDC]", "free_ca50_cad", 1),
         ("gain, no limit [%]", "free_gain_percent", 2),
     ):
-        assert timing[head] == [span(row[name], digits) for row in best], head
-    assert timing["p_max limit [bar]"] == [f"{row['p_max_limit_bar']:.1f}" for row in best]
-    assert len(timing) == 8
+        assert timing[head] == [f"{row['best'][name]:.{digits}f} ({span(row[name], digits)})" for row in best], head
+    assert len(timing) == 7
     assert timing["gain [%]"] != timing["gain, no limit [%]"], "the limit costs something"
+
+    family = columns(page, "Every member")
+    assert len(family["model"]) == 4 * len(best[0]["members"])
+    assert family["model"][::4] == [html.escape(member["name"]) for member in best[0]["members"]]
+    for head, name, form in (
+        ("RMSE [% of p_max]", "rmse_percent", ".2f"),
+        ("closed IMEP error [%]", "imep_closed_error_percent", "+.1f"),
+        ("SOC minus SOI [°CA]", "soc_minus_soi_cad", "+.1f"),
+        ("gross efficiency [-]", "efficiency_gross", ".3f"),
+        ("best CA50, own p_max kept [°CA aTDC]", "ca50_cad", ".1f"),
+        ("best CA50, no limit [°CA aTDC]", "free_ca50_cad", ".1f"),
+    ):
+        for at, row in enumerate(best):
+            assert family[head][at::4] == [format(member[name], form) for member in row["members"]], head
+    assert family["plausible"][::4] == [html.escape(member["why_not"]) or "yes" for member in best[0]["members"]]
 
     laws, law = columns(page, "Every burn law"), summary["laws"]
     assert laws["law"][::4] == [row["law"] for row in law]
@@ -151,4 +198,5 @@ def test_every_column_of_the_page_holds_what_its_head_says(result: StudyResult, 
     profiles = summary["common"]["wall_heat_scale"]
     assert wall["law"] == list(profiles)
     assert wall["scale [-]"] == [f"{p['value']:.2f}" for p in profiles.values()]
-    assert wall["possible range [-]"] == [span((p["range_low"], p["range_high"]), 2) for p in profiles.values()]
+    for head, name in (("as good within 10 % [-]", "range"), ("possible in all [-]", "possible")):
+        assert wall[head] == [span((p[f"{name}_low"], p[f"{name}_high"]), 2) for p in profiles.values()]

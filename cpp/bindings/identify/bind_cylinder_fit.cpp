@@ -1,4 +1,5 @@
 // Binds include/mgdd/identify: the calibration of the cycle model to measured traces.
+#include <map>
 #include <optional>
 #include <stop_token>
 #include <string>
@@ -61,8 +62,11 @@ void bind_cylinder_fit(py::module_& m) {
   m.def(
       "fit_cylinder",
       [](const std::vector<MeasuredCycle>& traces, const engine::Cylinder& cylinder, const std::vector<LoadBurn>& start,
-         const std::vector<std::string>& free, double step_cad, const std::string& integrator, int max_iterations) {
+         const std::vector<std::string>& free, double step_cad, const std::string& integrator, int max_iterations,
+         const std::map<std::string, std::pair<double, double>>& bounds) {
         CylinderFitOptions options;
+        for (const auto& [name, range] : bounds)
+          options.bounds.push_back({name, range.first, range.second});
         options.step_cad = step_cad;
         options.integrator = engine::parse_integrator(integrator);
         options.search.max_iterations = max_iterations;
@@ -72,7 +76,7 @@ void bind_cylinder_fit(py::module_& m) {
         }));
       },
       arg("traces"), arg("cylinder"), arg("start"), arg("free"), arg("step_cad"), arg("integrator"),
-      arg("max_iterations"), "Levenberg-Marquardt with exact sensitivities; releases the GIL.");
+      arg("max_iterations"), arg("bounds"), "Levenberg-Marquardt with exact sensitivities; releases the GIL.");
 }
 
 }  // namespace mgdd::bindings

@@ -58,6 +58,12 @@ class LoadBurn:
     def soc_cad(self, arg1: typing.SupportsFloat | typing.SupportsIndex) -> None:
         ...
     @property
+    def start_pressure_bar(self) -> float:
+        ...
+    @start_pressure_bar.setter
+    def start_pressure_bar(self, arg1: typing.SupportsFloat | typing.SupportsIndex) -> None:
+        ...
+    @property
     def wiebe_m(self) -> float:
         ...
     @wiebe_m.setter
@@ -172,7 +178,7 @@ def estimate_burn(trace: MeasuredCycle, cylinder: mgdd._core.engine.Cylinder) ->
     """
     A start from the trace's heat release.
     """
-def fit_cylinder(traces: collections.abc.Sequence[MeasuredCycle], cylinder: mgdd._core.engine.Cylinder, start: collections.abc.Sequence[LoadBurn], free: collections.abc.Sequence[str], step_cad: typing.SupportsFloat | typing.SupportsIndex, integrator: str, max_iterations: typing.SupportsInt | typing.SupportsIndex) -> CylinderFit:
+def fit_cylinder(traces: collections.abc.Sequence[MeasuredCycle], cylinder: mgdd._core.engine.Cylinder, start: collections.abc.Sequence[LoadBurn], free: collections.abc.Sequence[str], step_cad: typing.SupportsFloat | typing.SupportsIndex, integrator: str, max_iterations: typing.SupportsInt | typing.SupportsIndex, bounds: collections.abc.Mapping[str, tuple[typing.SupportsFloat | typing.SupportsIndex, typing.SupportsFloat | typing.SupportsIndex]]) -> CylinderFit:
     """
     Levenberg-Marquardt with exact sensitivities; releases the GIL.
     """

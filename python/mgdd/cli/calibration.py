@@ -5,9 +5,10 @@ from __future__ import annotations
 import argparse
 from typing import Any
 
+from mgdd._core.engine import Cylinder
 from mgdd.cli.options import engine_of, traces_of
 from mgdd.cli.output import check_output, emit
-from mgdd.errors import ConvergenceError
+from mgdd.errors import ConvergenceError, ParameterError
 from mgdd.identify import fit_cylinder, wall_heat_profile
 from mgdd.identify.engine.burn_laws import compare_laws
 from mgdd.identify.engine.profile import WallHeatProfile
@@ -16,12 +17,39 @@ from mgdd.report import write_report
 from mgdd.studies import run_study
 from mgdd.studies.measured_summary import law_row
 
-__all__ = ["calibrate"]
+__all__ = ["add_calibration", "calibrate", "calibration_arguments"]
 
 _PER_TRACE = (
     "file p_max_bar rmse_bar rmse_percent imep_closed_error_percent soc_cad burn_duration_cad fuel_heat_j ca50_cad "
     "largest_error_bar largest_error_cad heat_loss_fraction"
 ).split()
+
+
+def add_calibration(parser: argparse.ArgumentParser) -> None:
+    """Add how the traces of a calibration are made absolute."""
+    group = parser.add_argument_group("pressure of the traces")
+    group.add_argument("--pegging", choices=("none", "inlet", "two_point", "least_squares"), default="none")
+    group.add_argument("--pegging-exponent", type=float, metavar="X", help="default: 1.35")
+    group.add_argument("--inlet-pressure-kpa", type=float, metavar="X", help="for pegging inlet (default: the point's)")
+
+
+def check_pegging(args: argparse.Namespace) -> None:
+    """Refuse options of pegging that would act on nothing."""
+    if args.pegging_exponent is not None and args.pegging not in ("two_point", "least_squares"):
+        raise ParameterError("--pegging-exponent acts with --pegging two_point or least_squares only: choose one")
+    if args.inlet_pressure_kpa is not None and args.pegging != "inlet":
+        raise ParameterError("--inlet-pressure-kpa acts with --pegging inlet only: choose it")
+
+
+def calibration_arguments(args: argparse.Namespace, cylinder: Cylinder) -> dict[str, Any]:
+    """Give pegging, and the fuel heat where the fuel was said, as arguments of `fit_cylinder` and `best_timing`."""
+    check_pegging(args)
+    return {
+        "pegging": args.pegging,
+        "pegging_exponent": args.pegging_exponent or 1.35,
+        "inlet_pressure_kpa": args.inlet_pressure_kpa,
+        "fuel_heat_j": None if args.fuel_mg is None else args.fuel_mg * cylinder.lower_heating_value_mj_per_kg,
+    }
 
 
 def calibrate(args: argparse.Namespace) -> None:
@@ -31,13 +59,15 @@ def calibrate(args: argparse.Namespace) -> None:
     traces = traces_of(args)
     free = [name.strip() for name in args.free.split(",")] if args.free else None
     scheme: dict[str, Any] = {"step_cad": args.step_cad, "integrator": args.integrator}
-    step = args.progress.expect(25 + (45 if args.report_folder else 0))
+    step = args.progress.expect(25 + (90 if args.report_folder else 0))
     step("calibrate")
-    fit = fit_cylinder(traces, cylinder, free=free, point=point, **scheme)
+    pegging = calibration_arguments(args, cylinder)
+    fit = fit_cylinder(traces, cylinder, free=free, point=point, **pegging, **scheme)
+    traces = list(fit.request.traces)  # absolute from here on
     profile = None
     if "wall_heat_scale" in fit.report.names and len(fit.report.names) > 1:
-        profile = wall_heat_profile(traces, fit, point=point, progress=step, **scheme)
-    laws = compare_laws(traces, cylinder, point=point, progress=step, **scheme)
+        profile = wall_heat_profile(fit, progress=step)
+    laws = compare_laws(traces, cylinder, fuel_heat_j=pegging["fuel_heat_j"], point=point, progress=step, **scheme)
     if args.report_folder:
         result = run_study("measured-traces", traces=traces, cylinder=cylinder, point=point, progress=step, **scheme)
         write_report(result, args.report_folder)

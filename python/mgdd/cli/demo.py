@@ -30,7 +30,7 @@ def add(commands: Any) -> None:
 def run(args: argparse.Namespace) -> None:
     """Run the study and write the report."""
     check_output(args)
-    step = args.progress.expect(45)
+    step = args.progress.expect(90)
     result = run_study("measured-traces", progress=step)
     step("write the report")
     page = write_report(result, Path(args.folder))
@@ -39,8 +39,8 @@ def run(args: argparse.Namespace) -> None:
 
 def _text(summary: Any, page: Path) -> list[str | Table]:
     columns = (
-        "trace", "p_max [bar]", "CA50 [CAD]", "RMSE [%]", "IMEP err [%]", "best SOC, own p_max kept [CAD]", "gain [%]",
-        "best SOC, no limit [CAD]", "gain [%]",
+        "trace", "p_max [bar]", "CA50 [CAD]", "RMSE [%]", "closed IMEP err [%]", "best CA50, own p_max kept [CAD]",
+        "gain [%]", "best CA50, no limit [CAD]", "gain [%]",
     )  # fmt: skip
     rows = []
     for row in summary["traces"]:
@@ -48,17 +48,28 @@ def _text(summary: Any, page: Path) -> list[str | Table]:
         rows.append(
             (
                 row["file"], f"{row['analysis']['p_max_bar']:.1f}", f"{row['analysis']['ca50_cad']:.1f}",
-                f"{fit['rmse_percent']:.2f}", f"{fit['imep_closed_error_percent']:+.1f}", _span(best["soc_cad"], 1),
-                _span(best["gain_percent"], 2), _span(best["free_soc_cad"], 1), _span(best["free_gain_percent"], 2),
+                f"{fit['rmse_percent']:.2f}", f"{fit['imep_closed_error_percent']:+.1f}", _span(best, "ca50_cad", 1),
+                _span(best, "gain_percent", 2), _span(best, "free_ca50_cad", 1), _span(best, "free_gain_percent", 2),
             )
         )  # fmt: skip
+    members = summary["best_timing"][0]["members"]
+    kept = sum(any(row["members"][at]["plausible"] for row in summary["best_timing"]) for at in range(len(members)))
     return [
-        f"{len(summary['traces'])} measured traces, calibrated with {summary['law']}. Angles are °CA aTDC.\n",
+        (
+            f"{len(summary['traces'])} measured traces, calibrated with {kept} plausible models of {len(members)}. "
+            "Angles are °CA aTDC.\n"
+        ),
         Table(columns=columns, rows=tuple(rows)),
-        "\nRanges: wall-heat scale 0.5 to 1, everything else refitted; these traces do not determine it.",
-        f"Read what to distrust in {page}",
+        (
+            f"\nFirst number: the headline model, {summary['law']}. In brackets: the range over all plausible models;\n"
+            "wall heat and gamma stand in for each other in these traces, so one best timing would be false precision."
+        ),
+        f"Every model's answer, and what to distrust: {page}",
     ]
 
 
-def _span(pair: list[float], digits: int) -> str:
-    return f"{pair[0]:.{digits}f} to {pair[1]:.{digits}f}"
+def _span(best: Any, name: str, digits: int) -> str:
+    if best["best"] is None:
+        return "not known: no plausible model"
+    low, high = best[name]
+    return f"{best['best'][name]:.{digits}f} ({low:.{digits}f} to {high:.{digits}f})"

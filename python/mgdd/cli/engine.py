@@ -8,7 +8,7 @@ from typing import Any
 
 from mgdd import _core
 from mgdd._core.engine import Cylinder, OperatingPoint
-from mgdd.cli.calibration import calibrate
+from mgdd.cli.calibration import add_calibration, calibrate, calibration_arguments, check_pegging
 from mgdd.cli.options import (
     add_command,
     add_engine,
@@ -24,10 +24,12 @@ from mgdd.cli.seek import add_seek
 from mgdd.engine import analyze, find_optimum, ignition_delay, simulate, timing_sweep
 from mgdd.errors import ConvergenceError, ParameterError
 from mgdd.identify import best_timing
+from mgdd.identify.engine.best_timing import headline_of
 
 __all__ = ["add"]
 
 _DEFAULT_SOC_CAD = -6.0
+_RANGED = ("soc_cad", "ca50_cad", "gain_percent", "free_soc_cad", "free_ca50_cad", "free_gain_percent")
 
 
 def add(commands: Any) -> None:
@@ -124,7 +126,9 @@ def _add_analyze(verbs: Any) -> None:
 def _analyze(args: argparse.Namespace) -> None:
     check_output(args, ".json", ".csv")
     cylinder, point, preset = engine_of(args)
-    _check_pegging(args)
+    check_pegging(args)
+    if args.fuel_mg is not None:
+        raise ParameterError("--fuel-mg does not act on the analysis of a trace: leave it out")
     (trace,) = traces_of(args)
     gamma: float | str = 1.33 if args.gamma is None else "cylinder"
     if args.analysis_gamma is not None:
@@ -155,13 +159,6 @@ def _analyze(args: argparse.Namespace) -> None:
     emit(args, payload, traces=result)
 
 
-def _check_pegging(args: argparse.Namespace) -> None:
-    if args.pegging_exponent is not None and args.pegging not in ("two_point", "least_squares"):
-        raise ParameterError("--pegging-exponent acts with --pegging two_point or least_squares only: choose one")
-    if args.inlet_pressure_kpa is not None and args.pegging != "inlet":
-        raise ParameterError("--inlet-pressure-kpa acts with --pegging inlet only: choose it")
-
-
 def _add_calibrate(verbs: Any) -> None:
     parser = add_command(
         verbs, "calibrate", calibrate,
@@ -173,9 +170,10 @@ def _add_calibrate(verbs: Any) -> None:
         "--free",
         metavar="NAME[,NAME]",
         help="parameters to fit (default: soc_cad,burn_duration_cad,fuel_heat_j per trace and wall_heat_scale; "
-        "the double Wiebe also its shape)",
+        "the double Wiebe also its shape); gamma is that of the gamma law in use; with --fuel-mg the heat is held",
     )
     parser.add_argument("--report-folder", metavar="DIR", help="also write index.html and summary.json there")
+    add_calibration(parser)
     add_engine(parser)
     add_scheme(parser, step_cad=0.25)
 
@@ -198,6 +196,7 @@ def _add_optimum(verbs: Any) -> None:
     parser.add_argument(
         "--bounds-cad", type=float, nargs=2, metavar=("LOW", "HIGH"), help="searched range of SOC (default: -30 10)"
     )
+    add_calibration(parser)
     add_engine(parser)
     add_scheme(parser, step_cad=None)
 
@@ -243,16 +242,23 @@ def _optimum_of_files(
         objective=args.objective or "imep_closed_bar",
         limits=limits,
         bounds_cad=_bounds(args),
-        progress=args.progress.expect(2),
+        progress=args.progress.expect(34),
         step_cad=args.step_cad or 0.25,
         integrator=args.integrator,
+        **calibration_arguments(args, cylinder),
     )
-    text = "\n\n".join(
-        f"{row['file']}\n" + lines({k: f"{v[0]:.2f} to {v[1]:.2f}" for k, v in row.items() if _is_range(v)})
-        for row in rows
-    )
-    emit(args, {"preset": preset, "wall_heat_scale": rows[0]["wall_heat_scale"], "traces": rows}, text=text)
-
-
-def _is_range(value: object) -> bool:
-    return isinstance(value, list) and len(value) == 2 and all(isinstance(v, float) for v in value)
+    main = headline_of(rows)
+    parts = []
+    for row in rows:
+        if row.best is None:
+            near = next(answer for answer in row.members if answer.member is main)
+            parts.append(f"{row.file}\n  no plausible model; {main.name}: {near.why_not}")
+            continue
+        answers = {name: (getattr(row.best, name), *getattr(row, name)) for name in _RANGED}
+        parts.append(
+            f"{row.file}: {row.best.member.name}\n"
+            + lines({name: f"{own:.2f} ({low:.2f} to {high:.2f})" for name, (own, low, high) in answers.items()})
+        )
+    parts.append("In brackets: the range over the plausible models of the family; --json lists every one.")
+    payload = {"preset": preset, "law": main.name, "traces": [row.to_dict() for row in rows]}
+    emit(args, payload, text="\n\n".join(parts))

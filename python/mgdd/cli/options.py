@@ -186,8 +186,8 @@ def engine_of(args: argparse.Namespace) -> tuple[Cylinder, OperatingPoint, prese
 
 def traces_of(args: argparse.Namespace) -> list[xr.Dataset]:
     """Read the pressure files, with their conditions as attributes."""
-    if args.files and (args.motored or args.fuel_mg is not None):
-        raise ParameterError("--motored and --fuel-mg do not act on measured traces: leave them out")
+    if args.files and args.motored:
+        raise ParameterError("--motored does not act on measured traces: leave it out")
     conditions = read_conditions(args.conditions) if args.conditions else {}
     used: dict[str, str] = {}
     traces = []

@@ -9,7 +9,9 @@ from __future__ import annotations
 
 from mgdd.identify.engine.best_timing import best_timing
 from mgdd.identify.engine.cylinder import fit_cylinder
+from mgdd.identify.engine.family import ModelFamily
 from mgdd.identify.engine.profile import wall_heat_profile
+from mgdd.identify.engine.tdc import estimate_tdc
 from mgdd.identify.ode_fit import fit_ode
 from mgdd.identify.ode_model import OdeModel
 from mgdd.identify.throttle.excitation_check import check_excitation
@@ -25,12 +27,14 @@ from mgdd.identify.throttle.validation import validate_throttle
 
 __all__ = [
     "FirstPrincipleModel",
+    "ModelFamily",
     "OdeModel",
     "OnlineUpdate",
     "SmoothThrottle",
     "best_timing",
     "check_excitation",
     "design_excitation",
+    "estimate_tdc",
     "fit_cylinder",
     "fit_first_principle",
     "fit_ode",

@@ -27,7 +27,7 @@ if TYPE_CHECKING:
     from matplotlib.axes import Axes
     from matplotlib.lines import Line2D
 
-__all__ = ["calibration_overlay", "wall_heat_profile"]
+__all__ = ["calibration_overlay", "tdc_scan", "wall_heat_profile"]
 
 _EVENTS = {"soi_cad": (":", ORANGE), "soc_cad": ("--", BLUE)}
 
@@ -151,6 +151,50 @@ def wall_heat_profile(profile: xr.Dataset, *, ax: Axes | None = None) -> Axes:
 def _model_name(overlay: xr.Dataset) -> str:
     burn = overlay.attrs.get("burn")
     return f"model, {str(burn).replace('_', ' ').replace('wiebe', 'Wiebe')}" if burn else "model"
+
+
+def tdc_scan(scan: xr.Dataset, possible: tuple[float, float], *, ax: Axes | None = None) -> Axes:
+    """Draw the least RMSE over the TDC offset, and the range of offsets that are possible.
+
+    Parameters
+    ----------
+    scan : xarray.Dataset
+        ``rmse_percent`` [% of p_max] over ``tdc_offset_cad`` [°CA], as `mgdd.identify.estimate_tdc` gives.
+    possible : tuple of float
+        Lowest and highest possible offset [°CA].
+    ax : matplotlib.axes.Axes, optional
+        Where to draw; None makes a figure.
+
+    Returns
+    -------
+    matplotlib.axes.Axes
+        The axes.
+
+    Raises
+    ------
+    DataError
+        A variable is missing or has no unit.
+
+    Examples
+    --------
+    >>> from mgdd.plot.calibration import tdc_scan
+    >>> from mgdd.results.labels import labelled_dataset
+    >>> scan = labelled_dataset({
+    ...     "tdc_offset_cad": ("tdc_offset_cad", [-0.5, 0.0, 0.5], "°CA", "angle added to the trace"),
+    ...     "rmse_percent": ("tdc_offset_cad", [0.30, 0.10, 0.25]),
+    ... })
+    >>> tdc_scan(scan, (-0.1, 0.1)).get_xlabel()
+    'angle added to the trace [°CA]'
+    """
+    require(scan, ("tdc_offset_cad", "rmse_percent"), "mgdd.identify.estimate_tdc")
+    ax = new_axes(ax, height=4.2)
+    lines: list[Line2D] = ax.plot(
+        scan["tdc_offset_cad"], scan["rmse_percent"], "o-", color=BLACK, markersize=3, label="calibrated at each offset"
+    )
+    span = ax.axvspan(*possible, color=GREY, alpha=0.2, linewidth=0, label="within a quarter of the least")
+    ax.axvline(0.0, color=BLUE, linestyle="--", linewidth=1.0)
+    ax.set_ylim(bottom=0.0)
+    return finished(ax, scan, "tdc_offset_cad", "rmse_percent", [*lines, span], grid=False)
 
 
 def _quality(overlay: xr.Dataset) -> str:

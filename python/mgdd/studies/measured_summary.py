@@ -14,6 +14,9 @@ from mgdd.results.labels import labelled_dataset
 if TYPE_CHECKING:
     import xarray as xr
 
+    from mgdd.identify.engine.best_timing import BestTiming
+    from mgdd.identify.engine.family import Member
+
 __all__ = ["law_row", "law_table", "summarize"]
 
 _ANALYSIS = (
@@ -24,40 +27,55 @@ _ANALYSIS = (
 def summarize(
     analyses: Sequence[xr.Dataset],
     fits: Sequence[CylinderFit],
-    main: CylinderFit,
+    main: Member,
     profiles: Mapping[str, WallHeatProfile],
-    timing: Sequence[dict[str, Any]],
+    timing: Sequence[BestTiming],
 ) -> dict[str, Any]:
     """Collect the numbers of a calibration as plain values."""
     rows = []
-    for analysis, load, best in zip(analyses, main.loads, timing, strict=True):
+    for analysis, load, best in zip(analyses, main.fit.loads, timing, strict=True):
         rows.append(
             {
                 "file": load.file,
                 "analysis": {name: float(analysis[name]) for name in _ANALYSIS},
                 "calibrated": figures_of(load),
-                "best_timing": best,
+                "best_timing": {name: value for name, value in best.to_dict().items() if name != "members"},
                 "warnings": analysis.attrs["warnings"].splitlines(),
             }
         )
     return {
         "study": "measured-traces",
         "seeds": 0,
-        "rows": [_row(load, best) for load, best in zip(main.loads, timing, strict=True)],
+        "rows": [_row(load, best) for load, best in zip(main.fit.loads, timing, strict=True)],
         "mgdd": _core.__version__,
-        "law": main.kind,
+        "law": main.name,
+        "headline": main_row(main),
         "traces": rows,
         "laws": [law_row(fit) for fit in fits],
         "common": {"wall_heat_scale": {law: profile.to_dict() for law, profile in profiles.items()}},
-        "unidentifiable": sorted({*main.report.unidentifiable, *(["wall_heat_scale"] if _unknown(profiles) else [])}),
-        "warnings": [f"{fit.kind}: {text}" for fit in fits for text in fit.findings],
-        "best_timing": list(timing),
+        "unidentifiable": sorted(
+            {*main.fit.report.unidentifiable, *(["wall_heat_scale"] if _unknown(profiles) else [])}
+        ),
+        "warnings": [str(finding) for finding in main.fit.findings],
+        "best_timing": [row.to_dict() for row in timing],
     }
 
 
-def _row(load: Load, best: Mapping[str, Any]) -> dict[str, Any]:
-    """Give one trace as a flat row; best timing and gain are ranges over the wall-heat scale, its own p_max kept."""
-    (early, late), (least, most) = best["soc_cad"], best["gain_percent"]
+def main_row(main: Member) -> dict[str, Any]:
+    """Give the headline member as plain values."""
+    return {
+        "law": main.law,
+        "gamma_model": main.gamma_model,
+        "gamma": main.gamma,
+        "wall_heat_scale": main.wall_heat_scale,
+        "fitted": main.fitted,
+        "plausible": [not why for why in main.why_not],
+    }
+
+
+def _row(load: Load, best: BestTiming) -> dict[str, Any]:
+    """Give one trace as a flat row; best timing and gain are ranges over the plausible models, its own p_max kept."""
+    (early, late), (least, most) = best.soc_cad, best.gain_percent
     return {
         "trace": load.file,
         "p_max_bar": load.p_max_bar,

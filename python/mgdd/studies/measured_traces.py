@@ -3,15 +3,20 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Sequence
+from dataclasses import replace
 from typing import TYPE_CHECKING, Any
 
 from mgdd import datasets, presets
 from mgdd._core.engine import Cylinder, OperatingPoint
 from mgdd.engine import analyze
-from mgdd.identify import best_timing, fit_cylinder, wall_heat_profile
-from mgdd.identify.engine.best_timing import WALL_HEAT_RANGE
-from mgdd.identify.engine.burn_laws import LAWS, compare_laws
-from mgdd.identify.engine.cylinder import BURN_FIELDS
+from mgdd.identify import best_timing, wall_heat_profile
+from mgdd.identify.engine.best_timing import headline_of
+from mgdd.identify.engine.burn_laws import compare_laws
+from mgdd.identify.engine.cylinder import fit_request
+from mgdd.identify.engine.family import Member
+from mgdd.identify.engine.profile import WallHeatProfile
+from mgdd.identify.engine.records import starts_of
+from mgdd.identify.engine.request import GAMMA_PARAMETER
 from mgdd.results.labels import to_jsonable
 from mgdd.studies.base import StudyResult
 from mgdd.studies.measured_figures import draw
@@ -81,22 +86,15 @@ def run_measured_traces(
     progress("analyse the traces")
     analyses = [analyze(trace, cylinder, point=point, quiet=True) for trace in traces]
     scheme: dict[str, Any] = {"step_cad": step_cad, "integrator": integrator}
+    timing = best_timing(traces, cylinder, point=point, progress=progress, **scheme)
+    main = headline_of(timing)
     fits = compare_laws(traces, cylinder, point=point, progress=progress, **scheme)
-    by_law = dict(zip(LAWS, fits, strict=True))
-    main, best = by_law["wiebe", "linear"], by_law["double_wiebe", "constant"]
-    profiles = {}
-    if not quick:
-        for fit in (main, best):
-            profiles[fit.kind] = wall_heat_profile(traces, fit, point=point, progress=progress, **scheme)
-    timing_law = cylinder.replace(burn_shape="wiebe", gamma_model="linear")
-    timing = best_timing(traces, timing_law, point=point, progress=progress, **scheme)
-    held = timing_law.replace(wall_heat_scale=WALL_HEAT_RANGE[0])
-    reference = fit_cylinder(traces, held, free=BURN_FIELDS, point=point, **scheme)
+    profiles = {} if quick else _profiles(main, progress)
     summary = summarize(analyses, fits, main, profiles, timing)
     summary["engine"] = {name: getattr(cylinder, name) for name in _GEOMETRY}
     summary["data"] = _PROVENANCE if own else "Files of the user."
     plain = to_jsonable(summary)
-    drawn = draw(analyses, main, best, reference, profiles, timing) if figures else {}
+    drawn = draw(analyses, main, profiles, timing) if figures else {}
     return StudyResult(
         name="measured-traces",
         title="Measured pressure, calibrated cycle model, best timing",
@@ -105,6 +103,18 @@ def run_measured_traces(
         summary=plain,
         sections=measured_sections(plain, drawn),
     )
+
+
+def _profiles(main: Member, progress: Progress) -> dict[str, WallHeatProfile]:
+    """Profile the wall heat with the law of the headline: gamma held at its value, and gamma refitted."""
+    request = replace(main.fit.request, cylinder=main.fit.model, start_values=starts_of(main.fit))
+    gamma = GAMMA_PARAMETER[main.gamma_model]
+    burn = tuple(name for name in request.free if name not in (gamma, "wall_heat_scale"))
+    out = {}
+    for text, common in (("held", ()), ("refitted", (gamma,))):
+        fit = fit_request(replace(request, free=("wall_heat_scale", *common, *burn)))
+        out[f"{main.law}, {main.gamma_model} gamma {text}"] = wall_heat_profile(fit, progress=progress)
+    return out
 
 
 _PROVENANCE = (

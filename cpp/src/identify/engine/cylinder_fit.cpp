@@ -76,6 +76,27 @@ std::vector<optimize::Parameter> describe(const Free& free, const std::vector<Me
   return out;
 }
 
+// A bound that no parameter bears would be a limit that nobody keeps, so it is refused.
+void narrow(std::vector<optimize::Parameter>& parameters, const std::vector<SearchBound>& bounds) {
+  for (const SearchBound& bound : bounds) {
+    bool found = false;
+    for (optimize::Parameter& p : parameters) {
+      if (p.name != bound.name && p.name.substr(0, p.name.find('[')) != bound.name) continue;
+      found = true;
+      p.lower = std::max(p.lower, bound.lower);
+      p.upper = std::min(p.upper, bound.upper);
+      if (!(p.lower < p.upper)) {
+        throw about("bounds", ParameterError("bounds: " + bound.name + " from " + text(bound.lower) + " to " +
+                                             text(bound.upper) + " leaves nothing of the parameter's own domain"));
+      }
+    }
+    if (!found) {
+      throw about("bounds", ParameterError("bounds: '" + bound.name + "' is not free in this fit: free it, or leave " +
+                                           "its bound out"));
+    }
+  }
+}
+
 void check_inputs(const std::vector<MeasuredCycle>& traces, const engine::Cylinder& cylinder,
                   const std::vector<LoadBurn>& start, const CylinderFitOptions& options) {
   engine::validate(cylinder);
@@ -191,6 +212,7 @@ LoadBurn estimate_burn(const MeasuredCycle& trace, const engine::Cylinder& cylin
                     "cannot be fitted to it");
   }
   LoadBurn burn;
+  burn.start_pressure_bar = trace.pressure_bar.front();
   burn.wiebe_m = cylinder.burn.wiebe_m;
   burn.second_fraction = cylinder.burn.second_fraction;
   burn.second_delay_cad = cylinder.burn.second_delay_cad;
@@ -219,9 +241,13 @@ LoadBurn estimate_burn(const MeasuredCycle& trace, const engine::Cylinder& cylin
 }
 
 CylinderFit fit_cylinder(const std::vector<MeasuredCycle>& traces, const engine::Cylinder& cylinder,
-                         const std::vector<LoadBurn>& start, const std::vector<std::string>& free,
+                         const std::vector<LoadBurn>& given, const std::vector<std::string>& free,
                          const CylinderFitOptions& options) {
-  check_inputs(traces, cylinder, start, options);
+  check_inputs(traces, cylinder, given, options);
+  std::vector<LoadBurn> start = given;
+  for (std::size_t t = 0; t < traces.size(); ++t) {
+    if (start[t].start_pressure_bar == 0.0) start[t].start_pressure_bar = traces[t].pressure_bar.front();
+  }
   const Free chosen = resolve(free);
   CylinderResidual residual(traces, cylinder, start, chosen.common, chosen.load, options.step_cad, options.integrator);
   Eigen::VectorXd x(residual.n_parameters());
@@ -232,7 +258,13 @@ CylinderFit fit_cylinder(const std::vector<MeasuredCycle>& traces, const engine:
     for (const std::size_t k : chosen.load)
       x[i++] = load_fields<double>()[k].in(burn);
   }
-  optimize::LeastSquares search(describe(chosen, traces), residual.n_residuals(), options.search);
+  std::vector<optimize::Parameter> parameters = describe(chosen, traces);
+  narrow(parameters, options.bounds);
+  for (std::size_t k = 0; k < parameters.size(); ++k) {
+    double& own = x[static_cast<Eigen::Index>(k)];
+    own = std::clamp(own, parameters[k].lower, parameters[k].upper);
+  }
+  optimize::LeastSquares search(std::move(parameters), residual.n_residuals(), options.search);
   CylinderFit fit;
   fit.report = search.solve(residual, x);
   fit.correlation_if_free = correlation_if_free(fit.report, residual, options.search);

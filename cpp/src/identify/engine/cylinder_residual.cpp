@@ -101,12 +101,12 @@ engine::Charge<T> CylinderResidual::charge(const Load& load, const engine::Cycle
                                            const engine::BasicCylinder<T>& c,
                                            const BasicLoadBurn<T>& burn) const noexcept {
   engine::BasicOperatingPoint<T> point = engine::lift<T>(load.trace->point);
-  const double first_pa = load.trace->pressure_bar.front() * units::pa_per_bar;
-  point.intake_pressure_kpa = T(first_pa / units::pa_per_kpa);
+  const T first_pa = burn.start_pressure_bar * units::pa_per_bar;
+  point.intake_pressure_kpa = first_pa / units::pa_per_kpa;
   point.burn_duration_cad = burn.burn_duration_cad;
   point.fuel_mg = burn.fuel_heat_j / c.gas.lower_heating_value_mj_per_kg;
   engine::Charge<T> charge = model.charge(point);
-  charge.pressure_pa = T(first_pa);
+  charge.pressure_pa = first_pa;
   return charge;
 }
 

@@ -1,49 +1,195 @@
-"""Best timing and gain of measured loads, as a range over the wall heat that their traces do not determine."""
+"""Best timing of measured loads: the answer of every plausible model of a family, and of the best one."""
 
 from __future__ import annotations
 
 import math
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import dataclass, field
 from typing import TYPE_CHECKING, Any
 
 from mgdd._core.engine import Cylinder, OperatingPoint
 from mgdd.engine import find_optimum, simulate
 from mgdd.engine.optimum import check_request
 from mgdd.errors import ConvergenceError
-from mgdd.identify.engine.cylinder import BURN_FIELDS, SHAPE_FIELDS, fit_cylinder
+from mgdd.identify.engine.family import Member, ModelFamily, fit_family
 from mgdd.identify.engine.records import Load
+from mgdd.identify.engine.request import Bounds, Request
+from mgdd.optimize import Optimum
+from mgdd.results.describe import described
 
 if TYPE_CHECKING:
-    import xarray as xr
+    from matplotlib.axes import Axes
 
-__all__ = ["WALL_HEAT_RANGE", "best_timing"]
+__all__ = ["BestTiming", "MemberTiming", "best_timing", "headline_of"]
 
-WALL_HEAT_RANGE = (0.5, 1.0)
+_RANGED = ("soc_cad", "ca50_cad", "gain_percent", "free_soc_cad", "free_ca50_cad", "free_gain_percent")
 
 
-def best_timing(
-    traces: Sequence[xr.Dataset],
-    cylinder: Cylinder,
-    *,
-    point: OperatingPoint | None = None,
-    scales: Sequence[float] = WALL_HEAT_RANGE,
-    objective: str = "imep_closed_bar",
-    limits: dict[str, float] | None = None,
-    bounds_cad: tuple[float, float] | None = None,
-    progress: Callable[[str], None] | None = None,
-    step_cad: float = 0.25,
-    integrator: str = "trapezoid",
-) -> list[dict[str, Any]]:
-    """Give each load's best timing and gain as a range over the wall-heat scale, the rest refitted at each.
-
-    The traces do not determine the wall heat, so a single best timing would be false precision.
+@described
+@dataclass(frozen=True, kw_only=True)
+class MemberTiming:
+    """What one member of the family answers for one load.
 
     Parameters
     ----------
-    traces, cylinder, point, step_cad, integrator
-        As in `mgdd.identify.fit_cylinder`; the cylinder's burn shape and gamma law are used.
-    scales : sequence of float
-        Wall-heat scales to refit at [-].
+    member : Member
+        The model; its fit has the burn of every load.
+    plausible : bool
+        Whether it counts for this load.
+    why_not : str
+        Why not; empty if it does.
+    rmse_percent, left_out_percent, imep_closed_error_percent : float
+        Pressure RMSE, the same with gamma and wall heat of the other loads [% of p_max]; error of closed IMEP [%].
+    fitted_soc_cad, fitted_ca50_cad, soc_minus_soi_cad : float
+        Fitted start and half of the burn [°CA aTDC]; the start after the injection [°CA], NaN where none is stated.
+    efficiency_gross : float
+        Gross efficiency at the measured timing [-].
+    soc_cad, ca50_cad, gain_percent : float
+        Best timing with the load's own p_max kept [°CA aTDC], and its gain over the measured timing [%].
+    free_soc_cad, free_ca50_cad, free_gain_percent : float
+        The same without that limit. All are NaN for a member that is not plausible and has no timing within the limits.
+    free_p_max_bar : float
+        Peak pressure there [bar].
+    p_max_model_error_bar : float
+        Peak pressure of the model minus the measured one, at the measured timing [bar].
+    p_max_limit_bar : float
+        The limit kept: the trace's own highest sample, or the model's at the measured timing where that is higher
+        [bar].
+    at_bound : bool
+        Whether a best timing lies at the end of the searched range.
+    """
+
+    member: Member = field(repr=False)
+    plausible: bool
+    why_not: str
+    rmse_percent: float
+    left_out_percent: float
+    imep_closed_error_percent: float
+    fitted_soc_cad: float
+    fitted_ca50_cad: float
+    soc_minus_soi_cad: float
+    efficiency_gross: float
+    soc_cad: float
+    ca50_cad: float
+    gain_percent: float
+    free_soc_cad: float
+    free_ca50_cad: float
+    free_gain_percent: float
+    free_p_max_bar: float
+    p_max_model_error_bar: float
+    p_max_limit_bar: float
+    at_bound: bool
+
+    def to_dict(self) -> dict[str, Any]:
+        """Give law, gamma and wall heat of the member and its answer as plain values.
+
+        Returns
+        -------
+        dict
+            Names to values.
+        """
+        model = {name: getattr(self.member, name) for name in ("law", "gamma_model", "gamma", "wall_heat_scale")}
+        own = {name: getattr(self, name) for name in self.__dataclass_fields__ if name != "member"}
+        return {"name": self.member.name, **model, "fitted": self.member.fitted, "score": self.member.score, **own}
+
+
+@described
+@dataclass(frozen=True, kw_only=True)
+class BestTiming:
+    """Best timing of one load, over a family of models.
+
+    Parameters
+    ----------
+    file : str
+        Name of the trace.
+    members : tuple of MemberTiming
+        Every member's answer, in the order of the family.
+    best : MemberTiming or None
+        The plausible one with the least score; None if no member is plausible for this load.
+    soc_cad, ca50_cad, gain_percent, free_soc_cad, free_ca50_cad, free_gain_percent : tuple of float
+        Lowest and highest answer of the plausible members, as in `MemberTiming`; NaN without any.
+
+    Examples
+    --------
+    >>> from mgdd import datasets, presets
+    >>> from mgdd.identify import best_timing
+    >>> rows = best_timing(datasets.load("hd_diesel_128x144"), presets.load("hd_diesel_128x144").cylinder)
+    >>> [round(angle) for angle in rows[1].free_ca50_cad], round(rows[1].best.free_ca50_cad)
+    ([5, 12], 8)
+    """
+
+    file: str
+    members: tuple[MemberTiming, ...] = field(repr=False)
+    best: MemberTiming | None
+    soc_cad: tuple[float, float]
+    ca50_cad: tuple[float, float]
+    gain_percent: tuple[float, float]
+    free_soc_cad: tuple[float, float]
+    free_ca50_cad: tuple[float, float]
+    free_gain_percent: tuple[float, float]
+
+    def to_dict(self) -> dict[str, Any]:
+        """Give file, ranges, best member and all members as plain values.
+
+        Returns
+        -------
+        dict
+            Names to values; ranges as lists.
+        """
+        return {
+            "file": self.file,
+            **{name: list(getattr(self, name)) for name in _RANGED},
+            "best": None if self.best is None else self.best.to_dict(),
+            "members": [member.to_dict() for member in self.members],
+        }
+
+    def plot(self, *, ax: Axes | None = None) -> Axes:
+        """Draw each member's best CA50 as a strip: filled where plausible, ringed the best.
+
+        Parameters
+        ----------
+        ax : matplotlib.axes.Axes, optional
+            Where to draw; None makes a figure.
+
+        Returns
+        -------
+        matplotlib.axes.Axes
+            One row per member; the shaded band is the range of the plausible ones.
+        """
+        from mgdd.plot.family import family_strip
+
+        return family_strip(self, ax=ax)
+
+
+def best_timing(
+    traces: Sequence[Any],
+    cylinder: Cylinder,
+    *,
+    family: ModelFamily | None = None,
+    fuel_heat_j: float | Sequence[float | None] | None = None,
+    bounds: Bounds | None = None,
+    point: OperatingPoint | None = None,
+    objective: str = "imep_closed_bar",
+    limits: Mapping[str, float] | None = None,
+    bounds_cad: tuple[float, float] | None = None,
+    pegging: str = "none",
+    pegging_exponent: float = 1.35,
+    inlet_pressure_kpa: float | None = None,
+    progress: Callable[[str], None] | None = None,
+    step_cad: float = 0.25,
+    integrator: str = "trapezoid",
+) -> list[BestTiming]:
+    """Give each load's best timing by every model of a family, and the range of the plausible ones.
+
+    Traces alone do not determine wall heat and gamma, so one model's best timing would be false precision: the range
+    says what the plausible models leave open, the best member what to try first.
+
+    Parameters
+    ----------
+    traces, cylinder, fuel_heat_j, bounds, point, pegging, pegging_exponent, inlet_pressure_kpa, step_cad, integrator
+        As in `mgdd.identify.fit_cylinder`.
+    family : ModelFamily, optional
+        Which models, and what is plausible; `ModelFamily()` if left out.
     objective : str
         As in `mgdd.engine.find_optimum`. Closed-cycle work is the default because a closed-valve trace carries no more.
     limits : dict, optional
@@ -51,80 +197,119 @@ def best_timing(
     bounds_cad : tuple of float, optional
         Searched range of SOC, as in `mgdd.engine.find_optimum`.
     progress : callable, optional
-        Called with a short text before each fit.
+        Called with a short text after each fit.
 
     Returns
     -------
-    list of dict
-        Per trace: ``file``, ``p_max_limit_bar`` (the trace's own highest sample, or the model's where that is higher at
-        the measured timing), ``points`` (one per scale) and the ranges ``soc_cad``, ``ca50_cad``, ``gain_percent``
-        under that limit and ``free_soc_cad``, ``free_ca50_cad``, ``free_gain_percent`` without. A gain is the
-        objective's relative rise over the fitted timing [%].
+    list of BestTiming
+        One per trace.
+
+    Raises
+    ------
+    mgdd.errors.ConvergenceError
+        No member of the family could be fitted, or a plausible one has no timing within the limits.
+    mgdd.errors.ParameterError, mgdd.errors.DataError
+        As in `fit_cylinder` and `find_optimum`.
 
     Examples
     --------
     >>> from mgdd import datasets, presets
-    >>> from mgdd.identify import best_timing
-    >>> rows = best_timing(datasets.load("hd_diesel_128x144")[:1], presets.load("hd_diesel_128x144").cylinder)
-    >>> [round(soc) for soc in rows[0]["free_soc_cad"]]
-    [-6, -4]
+    >>> from mgdd.identify import ModelFamily, best_timing
+    >>> family = ModelFamily(burn_shapes=["double_wiebe"], gammas=[("linear", None)])  # wall heat 0.5, 1.0 and 1.5
+    >>> cylinder = presets.load("hd_diesel_128x144").cylinder
+    >>> rows = best_timing(datasets.load("hd_diesel_128x144"), cylinder, family=family)
+    >>> [(member.member.wall_heat_scale, round(member.free_ca50_cad)) for member in rows[0].members if member.plausible]
+    [(0.5, 4), (1.0, 7), (1.5, 10)]
     """
     limits = limits or {}
     check_request(objective, limits)
-    search: dict[str, Any] = {"bounds_cad": bounds_cad, "step_cad": step_cad, "integrator": integrator}
-    names = BURN_FIELDS + (SHAPE_FIELDS if cylinder.burn_shape == "double_wiebe" else ())
-    points: list[list[dict[str, float]]] = [[] for _ in traces]
-    for scale in scales:
-        if progress is not None:
-            progress(f"best timing at wall-heat scale {scale:g}")
-        held = cylinder.replace(wall_heat_scale=scale)
-        fit = fit_cylinder(traces, held, free=names, point=point, step_cad=step_cad, integrator=integrator)
-        if not math.isfinite(fit.report.rmse):
-            raise ConvergenceError(f"no calibration at wall-heat scale {scale:g}: {fit.report.message}")
-        for own, load in zip(points, fit.loads, strict=True):
-            own.append({**_timing(load, scale, objective, limits, search), "converged": fit.report.success})
-    return [_as_range(load.file, own) for load, own in zip(fit.loads, points, strict=True)]
+    request = Request.of(
+        traces, cylinder, free=None, fuel_heat_j=fuel_heat_j, bounds=bounds, point=point, start_values=None,
+        step_cad=step_cad, integrator=integrator, options=None,
+        pegging=pegging, pegging_exponent=pegging_exponent, inlet_pressure_kpa=inlet_pressure_kpa,
+    )  # fmt: skip
+    members = [m for m in fit_family(request, family or ModelFamily(), progress) if math.isfinite(m.fit.report.rmse)]
+    if not members:
+        raise ConvergenceError("no model of the family could be fitted to these traces: check geometry, TDC, pegging")
+    scheme: dict[str, Any] = {"step_cad": step_cad, "integrator": integrator}
+    answers = [
+        tuple(_answer(member, at, objective, limits, bounds_cad, scheme) for member in members)
+        for at in range(len(request.traces))
+    ]
+    return [_over_family(label, own) for label, own in zip(request.labels, answers, strict=True)]
 
 
-def _timing(
-    load: Load, scale: float, objective: str, limits: dict[str, float], search: dict[str, Any]
-) -> dict[str, float]:
-    scheme = {"step_cad": search["step_cad"], "integrator": search["integrator"]}
+def _answer(
+    member: Member,
+    at: int,
+    objective: str,
+    limits: Mapping[str, float],
+    bounds_cad: tuple[float, float] | None,
+    scheme: dict[str, Any],
+) -> MemberTiming:
+    load: Load = member.fit.loads[at]
+    free: Optimum | None
+    kept: Optimum | None
     now = simulate(load.cylinder, load.point, soc_cad=load.soc_cad, **scheme)
     # The model's own error in p_max at the measured timing is not a violation of the limit.
     ceiling = max(load.p_max_bar, float(now["p_max_bar"]) * (1.0 + 1e-9))
     own = {**limits, "p_max_bar": min(ceiling, limits.get("p_max_bar", math.inf))}
-    free = find_optimum(load.cylinder, load.point, objective, limits=limits, **search)
-    kept = find_optimum(load.cylinder, load.point, objective, limits=own, **search)
+    search: dict[str, Any] = {"bounds_cad": bounds_cad, **scheme}
+    try:
+        free = find_optimum(load.cylinder, load.point, objective, limits=limits, **search)
+        kept = find_optimum(load.cylinder, load.point, objective, limits=own, **search)
+    except ConvergenceError:
+        if not member.why_not[at]:
+            raise
+        free = kept = None  # an implausible member has no say, so it must not stop the others
     base = float(now[objective])
-    return {
-        "wall_heat_scale": scale,
-        "fitted_soc_cad": load.soc_cad,
-        "p_max_limit_bar": ceiling,
-        "soc_cad": kept["soc_cad"],
-        "ca50_cad": kept["ca50_cad"],
-        "gain_percent": 100.0 * (kept.value / base - 1.0),
-        "free_soc_cad": free["soc_cad"],
-        "free_ca50_cad": free["ca50_cad"],
-        "free_gain_percent": 100.0 * (free.value / base - 1.0),
-        "free_p_max_bar": float(simulate(load.cylinder, load.point, soc_cad=free["soc_cad"], **scheme)["p_max_bar"]),
-        "at_bound": free.at_bound or kept.at_bound,
-        "p_max_model_error_bar": float(now["p_max_bar"]) - load.p_max_bar,
-        "efficiency_gross": float(now["efficiency_gross"]),
-        "curvature_per_cad2": free.curvature,
-    }
+    return MemberTiming(
+        member=member,
+        plausible=not member.why_not[at],
+        why_not=member.why_not[at],
+        rmse_percent=load.rmse_percent,
+        left_out_percent=member.left_out_percent[at],
+        imep_closed_error_percent=load.imep_closed_error_percent,
+        fitted_soc_cad=load.soc_cad,
+        fitted_ca50_cad=load.ca50_cad,
+        soc_minus_soi_cad=load.onset_against_soi_cad,
+        efficiency_gross=float(now["efficiency_gross"]),
+        **_best_of(kept, base, ""),
+        **_best_of(free, base, "free_"),
+        free_p_max_bar=math.nan if free is None else float(free["p_max_bar"]),
+        p_max_model_error_bar=float(now["p_max_bar"]) - load.p_max_bar,
+        p_max_limit_bar=ceiling,
+        at_bound=any(found is not None and found.at_bound for found in (free, kept)),
+    )
 
 
-def _as_range(file: str, points: list[dict[str, float]]) -> dict[str, Any]:
-    def span(name: str) -> list[float]:
-        values = [p[name] for p in points]
-        return [min(values), max(values)]
+def _best_of(found: Optimum | None, base: float, prefix: str) -> dict[str, float]:
+    soc, half, gain = (
+        (math.nan,) * 3 if found is None else (found["soc_cad"], found["ca50_cad"], 100.0 * (found.value / base - 1.0))
+    )
+    return {f"{prefix}soc_cad": soc, f"{prefix}ca50_cad": half, f"{prefix}gain_percent": gain}
 
-    ranged = "soc_cad ca50_cad gain_percent free_soc_cad free_ca50_cad free_gain_percent fitted_soc_cad".split()
-    return {
-        "file": file,
-        "wall_heat_scale": span("wall_heat_scale"),
-        "p_max_limit_bar": max(p["p_max_limit_bar"] for p in points),
-        **{name: span(name) for name in ranged},
-        "points": points,
-    }
+
+def _over_family(file: str, answers: tuple[MemberTiming, ...]) -> BestTiming:
+    kept = [answer for answer in answers if answer.plausible]
+
+    def span(name: str) -> tuple[float, float]:
+        values = [float(getattr(answer, name)) for answer in kept]
+        return (min(values), max(values)) if values else (math.nan, math.nan)
+
+    return BestTiming(
+        file=file,
+        members=answers,
+        best=min(kept, key=lambda answer: answer.member.score, default=None),
+        **{name: span(name) for name in _RANGED},
+    )
+
+
+def headline_of(rows: Sequence[BestTiming]) -> Member:
+    """Give the member that stands for all loads: plausible for the most of them, then with the least score."""
+
+    def rank(at: int) -> tuple[int, float]:
+        own = [row.members[at] for row in rows]
+        return -sum(answer.plausible for answer in own), own[0].member.score
+
+    return rows[0].members[min(range(len(rows[0].members)), key=rank)].member

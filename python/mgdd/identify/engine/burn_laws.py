@@ -31,15 +31,18 @@ def compare_laws(
     *,
     point: OperatingPoint | None = None,
     laws: Sequence[tuple[str, str]] = LAWS,
+    fuel_heat_j: float | Sequence[float | None] | None = None,
     progress: Callable[[str], None] | None = None,
     step_cad: float = 0.25,
     integrator: str = "trapezoid",
 ) -> list[CylinderFit]:
-    """Fit every burn law to the same traces.
+    """Fit every burn law to the same traces, each free to start before the injection if that fits better.
+
+    What a law does with that freedom shows how wrong it is; `mgdd.identify.best_timing` bounds it.
 
     Parameters
     ----------
-    traces, cylinder, point, step_cad, integrator
+    traces, cylinder, point, fuel_heat_j, step_cad, integrator
         As in `mgdd.identify.fit_cylinder`.
     laws : sequence of (burn_shape, gamma_model)
         Laws to compare.
@@ -67,5 +70,15 @@ def compare_laws(
         law = cylinder.replace(burn_shape=shape, gamma_model=gamma, wall_heat_scale=start)
         if progress is not None:
             progress(f"calibrate {shape}, {gamma} gamma")
-        fits.append(fit_cylinder(traces, law, point=point, step_cad=step_cad, integrator=integrator))
+        fits.append(
+            fit_cylinder(
+                traces,
+                law,
+                fuel_heat_j=fuel_heat_j,
+                bounds={"soc_cad": (None, None)},
+                point=point,
+                step_cad=step_cad,
+                integrator=integrator,
+            )
+        )
     return fits

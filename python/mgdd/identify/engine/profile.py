@@ -3,30 +3,34 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Callable, Sequence
-from dataclasses import dataclass
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import dataclass, replace
+from types import MappingProxyType
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
 from mgdd import _core
-from mgdd._core.engine import OperatingPoint
 from mgdd.errors import ParameterError
-from mgdd.identify.engine.cylinder import fit_cylinder
-from mgdd.identify.engine.records import CylinderFit, Load
-from mgdd.optimize import FitOptions
+from mgdd.identify.engine.cylinder import fit_request
+from mgdd.identify.engine.records import CylinderFit, starts_of
+from mgdd.identify.engine.request import GAMMA_PARAMETER, Request
 from mgdd.results.describe import described
 from mgdd.results.labels import labelled_dataset
 
 if TYPE_CHECKING:
     import xarray as xr
 
-__all__ = ["WallHeatProfile", "wall_heat_profile"]
+__all__ = ["WIDTHS", "WallHeatProfile", "wall_heat_profile"]
 
 NAME = "wall_heat_scale"
 UPPER = float(_core.identify.wall_heat_scale_upper)
 _RISE = 1.10  # a scale counts as possible while the refitted RMSE stays within 10 % of the best
 _WIDTH = 0.20  # and as identified when that range stays within 20 % of the best scale
+# How far gamma, pressure and angle of a usual bench may be off, where nobody has said better.
+WIDTHS: Mapping[str, float] = MappingProxyType({"gamma": 0.03, "pegging_bar": 0.1, "tdc_cad": 0.3})
+_NAMES = {"gamma": "gamma", "pegging_bar": "pegging", "tdc_cad": "TDC"}
+_UNITS = {"gamma": "", "pegging_bar": " bar", "tdc_cad": " CAD"}
 _CORRELATION = float(_core.identify.correlation_limit)
 
 
@@ -45,8 +49,13 @@ class WallHeatProfile:
         That parameter.
     range_low, range_high : float
         Scales whose refitted RMSE is within 10 % of the best [-], inside [0, 2.5].
+    moved : dict of str to pair
+        Per uncertain quantity (``gamma``, ``pegging_bar``, ``tdc_cad``): the estimates with it lower and higher by its
+        width [-].
+    possible_low, possible_high : float
+        The range with those moves added in squares [-], inside [0, 2.5].
     identifiable : bool
-        Not at a bound, correlation at most 0.98, and the range within ±20 % of the value.
+        Not at a bound, correlation at most 0.98, and the possible range within ±20 % of the value.
     reasons : tuple of str
         Why not, in words.
     dataset : xarray.Dataset
@@ -57,7 +66,7 @@ class WallHeatProfile:
     >>> from mgdd import datasets, presets
     >>> from mgdd.identify import fit_cylinder, wall_heat_profile
     >>> traces, cylinder = datasets.load("hd_diesel_128x144"), presets.load("hd_diesel_128x144").cylinder
-    >>> wall_heat_profile(traces, fit_cylinder(traces, cylinder)).identifiable
+    >>> wall_heat_profile(fit_cylinder(traces, cylinder)).identifiable
     False
     """
 
@@ -67,6 +76,9 @@ class WallHeatProfile:
     correlated_with: str
     range_low: float
     range_high: float
+    moved: Mapping[str, tuple[float, float]]
+    possible_low: float
+    possible_high: float
     identifiable: bool
     reasons: tuple[str, ...]
     dataset: xr.Dataset
@@ -100,32 +112,28 @@ class WallHeatProfile:
 
 
 def wall_heat_profile(
-    traces: Sequence[Any],
     fit: CylinderFit,
     *,
     scales: Sequence[float] = (0.0, 0.25, 0.5, 0.75, 1.0, 1.5, 2.0, 2.5),
-    point: OperatingPoint | None = None,
+    widths: Mapping[str, float] | None = None,
     progress: Callable[[str], None] | None = None,
-    step_cad: float = 0.25,
-    integrator: str = "trapezoid",
-    options: FitOptions | None = None,
 ) -> WallHeatProfile:
     """Refit everything else at fixed wall-heat scales, and judge whether the traces determine the scale.
 
+    Gamma, pegging and TDC are held in a fit as if they were known. Here the scale is estimated again with each of them
+    lower and higher by its width, and the verdict counts how far it moves.
+
     Parameters
     ----------
-    traces : sequence of xarray.Dataset, or of any form of a trace that `mgdd.engine.analyze` takes
-        As given to `fit_cylinder`.
     fit : mgdd.results.Fit
         A fit of `fit_cylinder` in which ``wall_heat_scale`` was free.
     scales : sequence of float
         Scales to refit at, in [0, 2.5]; the fitted one and both ends are added.
-    point : OperatingPoint, optional
-        As given to `fit_cylinder`.
+    widths : mapping, optional
+        How far ``gamma`` [-], ``pegging_bar`` [bar] and ``tdc_cad`` [°CA] may be off, each >= 0: 0.03, 0.1 and 0.3
+        where nothing is said, 0 for one that is known. A gamma that was free in the fit is not moved.
     progress : callable, optional
         Called with a short text before each refit.
-    step_cad, integrator, options
-        As given to `fit_cylinder`.
 
     Returns
     -------
@@ -135,14 +143,14 @@ def wall_heat_profile(
     Raises
     ------
     mgdd.errors.ParameterError
-        ``wall_heat_scale`` was not free or free alone, or a scale lies outside [0, 2.5].
+        ``wall_heat_scale`` was not free or free alone, a scale outside [0, 2.5], an unknown or negative width.
 
     Examples
     --------
     >>> from mgdd import datasets, presets
     >>> from mgdd.identify import fit_cylinder, wall_heat_profile
     >>> traces, cylinder = datasets.load("hd_diesel_128x144"), presets.load("hd_diesel_128x144").cylinder
-    >>> profile = wall_heat_profile(traces, fit_cylinder(traces, cylinder), scales=[0.5, 1.0])
+    >>> profile = wall_heat_profile(fit_cylinder(traces, cylinder), scales=[0.5, 1.0])
     >>> profile.dataset["rmse_percent"].dims
     ('wall_heat_scale',)
     """
@@ -151,9 +159,10 @@ def wall_heat_profile(
     bad = [scale for scale in scales if not 0.0 <= scale <= UPPER]
     if bad:
         raise ParameterError(f"scales: {bad[0]:g} must be in [0, {UPPER:g}]")
-    free = tuple(dict.fromkeys(name.split("[")[0] for name in fit.report.names if name != NAME))
+    free = tuple(name for name in fit.request.free if name != NAME)
     if not free:
         raise ParameterError(f"{NAME} was the only free parameter: a profile refits the others")
+    used = _widths(widths)
     value = float(fit.model.wall_heat_scale)
     fits = {value: fit}
 
@@ -162,16 +171,8 @@ def wall_heat_profile(
             if progress is not None:
                 progress(f"{fit.kind}: refit at wall-heat scale {scale:.3g}")
             near = fits[min(fits, key=lambda known: abs(known - scale))]
-            fits[scale] = fit_cylinder(
-                traces,
-                fit.model.replace(wall_heat_scale=scale),
-                free=free,
-                point=point,
-                start_values=[_start_values(load) for load in near.loads],
-                step_cad=step_cad,
-                integrator=integrator,
-                options=options,
-            )
+            held = near.model.replace(wall_heat_scale=scale)
+            fits[scale] = fit_request(replace(fit.request, cylinder=held, free=free, start_values=starts_of(near)))
         return fits[scale]
 
     if math.isfinite(fit.report.rmse):
@@ -181,8 +182,16 @@ def wall_heat_profile(
     level = _RISE * _rmse(fits[best])
     low = _crossing(refit, fits, best, level, -1)
     high = _crossing(refit, fits, best, level, +1)
+    moved = _moved(fit, used, progress) if math.isfinite(fit.report.rmse) else {}
+    possible = (
+        max(0.0, best - math.hypot(best - low, *(max(0.0, value - min(pair)) for pair in moved.values()))),
+        min(UPPER, best + math.hypot(high - best, *(max(0.0, max(pair) - value) for pair in moved.values()))),
+    )
     correlation, partner = _correlation(fit)
-    reasons = _reasons(fit, best, _rmse(fits[best]), correlation, partner, low, high)
+    reasons = (
+        *_reasons(fit, best, _rmse(fits[best]), correlation, partner, low, high),
+        *_reasons_of_moves(moved, used, best, value, possible),
+    )
     return WallHeatProfile(
         value=value,
         stderr=float(fit.report.stderr[fit.report.names.index(NAME)]),
@@ -190,28 +199,54 @@ def wall_heat_profile(
         correlated_with=partner,
         range_low=low,
         range_high=high,
+        moved=moved,
+        possible_low=possible[0],
+        possible_high=possible[1],
         identifiable=not reasons,
         reasons=reasons,
         dataset=_dataset(fits),
     )
 
 
+def _widths(given: Mapping[str, float] | None) -> dict[str, float]:
+    used = {**WIDTHS, **(given or {})}
+    unknown = [name for name in used if name not in WIDTHS]
+    if unknown:
+        raise ParameterError(f"widths: {unknown[0]!r} is none of {', '.join(WIDTHS)}")
+    for name, width in used.items():
+        if not (math.isfinite(width) and width >= 0.0):
+            raise ParameterError(f"widths: {name} = {width:g}: must be >= 0")
+    return {name: float(width) for name, width in used.items() if width > 0.0}
+
+
+def _moved(
+    fit: CylinderFit, widths: Mapping[str, float], progress: Callable[[str], None] | None
+) -> dict[str, tuple[float, float]]:
+    """Estimate the scale again with one assumption lower and higher by its width."""
+    start = replace(fit.request, cylinder=fit.model, start_values=starts_of(fit))
+    gamma = GAMMA_PARAMETER[fit.model.gamma_model]
+    out = {}
+    for name, width in widths.items():
+        if name == "gamma" and gamma in fit.request.free:
+            continue
+        pair = []
+        for side in (-width, width):
+            if progress is not None:
+                progress(f"{fit.kind}: refit with {_NAMES[name]} {side:+g}{_UNITS[name]}")
+            pair.append(float(fit_request(_with_offset(start, name, side, gamma)).model.wall_heat_scale))
+        out[name] = (pair[0], pair[1])
+    return out
+
+
+def _with_offset(request: Request, name: str, offset: float, gamma: str) -> Request:
+    if name == "gamma":
+        value = float(getattr(request.cylinder, gamma)) + offset
+        return replace(request, cylinder=request.cylinder.replace(**{gamma: value}))
+    return request.shifted(pressure_bar=offset) if name == "pegging_bar" else request.shifted(angle_cad=offset)
+
+
 def _rmse(fit: CylinderFit) -> float:
     return fit.report.rmse if math.isfinite(fit.report.rmse) else math.inf
-
-
-def _start_values(load: Load) -> dict[str, float]:
-    shape = load.cylinder
-    return {
-        "soc_cad": load.soc_cad,
-        "burn_duration_cad": load.burn_duration_cad,
-        "fuel_heat_j": load.fuel_heat_j,
-        "wiebe_m": shape.wiebe_m,
-        "second_fraction": shape.second_fraction,
-        "second_delay_cad": shape.second_delay_cad,
-        "second_duration_cad": shape.second_duration_cad,
-        "second_wiebe_m": shape.second_wiebe_m,
-    }
 
 
 def _crossing(
@@ -256,6 +291,22 @@ def _reasons(
             f"any scale from {low:.2f} to {high:.2f} fits within 10 % of the best RMSE once the rest is refitted"
         )
     return tuple(out)
+
+
+def _reasons_of_moves(
+    moved: Mapping[str, tuple[float, float]],
+    widths: Mapping[str, float],
+    best: float,
+    value: float,
+    possible: tuple[float, float],
+) -> tuple[str, ...]:
+    if not moved or ((1.0 - _WIDTH) * best <= possible[0] and possible[1] <= (1.0 + _WIDTH) * best):
+        return ()
+    parts = [
+        f"{min(*pair, value):.2f} to {max(*pair, value):.2f} if {_NAMES[name]} is {widths[name]:g}{_UNITS[name]} off"
+        for name, pair in moved.items()
+    ]
+    return (f"the estimate {value:.2f} becomes {', '.join(parts)}: {possible[0]:.2f} to {possible[1]:.2f} in all",)
 
 
 def _dataset(fits: dict[float, CylinderFit]) -> xr.Dataset:

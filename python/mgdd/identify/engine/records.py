@@ -16,7 +16,9 @@ if TYPE_CHECKING:
     import numpy as np
     import xarray as xr
 
-__all__ = ["CylinderFit", "Load", "burn_law", "figures_of", "load_table"]
+    from mgdd.identify.engine.request import Request
+
+__all__ = ["CylinderFit", "Load", "burn_law", "figures_of", "load_table", "starts_of"]
 
 
 @described
@@ -114,6 +116,8 @@ class CylinderFit(Fit):
         The figures of all loads over ``file``.
     correlation_if_free : ndarray, shape (n, n)
         As the report's correlation, but with parameters at a bound taken as free there.
+    request : object
+        What was asked for, so that `wall_heat_profile` can ask again.
 
     Examples
     --------
@@ -129,12 +133,25 @@ class CylinderFit(Fit):
     loads: tuple[Load, ...]
     table: xr.Dataset
     correlation_if_free: np.ndarray
+    request: Request
 
 
 def burn_law(cylinder: Cylinder) -> str:
     """Name burn shape and gamma law, for tables."""
     gamma = f"{cylinder.gamma:g}" if cylinder.gamma_model == "constant" else cylinder.gamma_model
     return f"{cylinder.burn_shape}, gamma {gamma}"
+
+
+def starts_of(fit: CylinderFit) -> tuple[dict[str, float], ...]:
+    """Give the burn of each load as start values of another fit."""
+    shape = ("wiebe_m", "second_fraction", "second_delay_cad", "second_duration_cad", "second_wiebe_m")
+    burn = ("soc_cad", "burn_duration_cad", "fuel_heat_j")
+    return tuple(
+        {name: float(getattr(load, name)) for name in burn}
+        | {name: float(getattr(load.cylinder, name)) for name in shape}
+        | {"start_pressure_bar": float(load.point.intake_pressure_kpa) / 100.0}
+        for load in fit.loads
+    )
 
 
 def figures_of(load: Load) -> dict[str, Any]:

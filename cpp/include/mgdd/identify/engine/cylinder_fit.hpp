@@ -17,8 +17,8 @@
 
 namespace mgdd::identify {
 
-/// One measured closed cycle with its conditions. The first sample is p(IVC); the trapped amount is the point's mass,
-/// or eta_V p(IVC) V_s/(R T_in). Fuel and intake pressure of `point` are not used.
+/// One measured closed cycle with its conditions. The first sample is p(IVC) unless that is freed; the trapped amount
+/// is the point's mass, or eta_V p(IVC) V_s/(R T_in). Fuel and intake pressure of `point` are not used.
 struct MeasuredCycle {
   std::string label;
   std::vector<double> angle_cad;
@@ -37,6 +37,7 @@ struct BasicLoadBurn {
   T second_delay_cad{3.0};
   T second_duration_cad{50.0};
   T second_wiebe_m{0.8};
+  T start_pressure_bar{0.0};  ///< at the first sample; 0: as measured there
 
   bool operator==(const BasicLoadBurn&) const = default;
 };
@@ -47,7 +48,8 @@ template <class T>
 constexpr auto load_fields() {
   using B = BasicLoadBurn<T>;
   return std::array{
-      field<&B::soc_cad>({"soc_cad", "°CA aTDC", closed(-30.0, engine::timing_upper_cad), "start of combustion"}),
+      field<&B::soc_cad>(
+          {"soc_cad", "°CA aTDC", closed(engine::timing_lower_cad, engine::timing_upper_cad), "start of combustion"}),
       field<&B::burn_duration_cad>({"burn_duration_cad", "°CA", log_scale(2.0, 150.0), "burn duration"}),
       field<&B::fuel_heat_j>({"fuel_heat_j", "J", log_scale(1e-2, 1e6), "heat of the fuel"}),
       field<&B::wiebe_m>({"wiebe_m", "-", closed(0.0, 5.0), "Wiebe shape, exponent m + 1"}),
@@ -55,14 +57,24 @@ constexpr auto load_fields() {
       field<&B::second_delay_cad>(
           {"second_delay_cad", "°CA", closed(0.0, 40.0), "start of the second after the first"}),
       field<&B::second_duration_cad>({"second_duration_cad", "°CA", log_scale(5.0, 150.0), "duration of the second"}),
-      field<&B::second_wiebe_m>({"second_wiebe_m", "-", closed(0.0, 5.0), "shape of the second"})};
+      field<&B::second_wiebe_m>({"second_wiebe_m", "-", closed(0.0, 5.0), "shape of the second"}),
+      field<&B::start_pressure_bar>(
+          {"start_pressure_bar", "bar", closed(0.0, 100.0), "pressure that the model starts from"})};
 }
 
 inline constexpr double wall_heat_scale_upper = 2.5;  ///< search bound offline, in textbook laws
 
+/// Narrows the search of one free parameter: `name` of all traces, or `name[label]` of one.
+struct SearchBound {
+  std::string name;
+  double lower;
+  double upper;
+};
+
 struct CylinderFitOptions {
   double step_cad = 0.25;  ///< largest step of the model; measured steps are divided evenly
   engine::Integrator integrator = engine::Integrator::trapezoid;
+  std::vector<SearchBound> bounds{};  ///< inside the domains of the fields; a start outside is moved to the bound
   optimize::LeastSquaresOptions search{};
 };
 

@@ -1,0 +1,99 @@
+"""What a calibration must be distrusted for."""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING
+
+from mgdd.engine import analyze
+from mgdd.identify.engine.request import Request, earliest_burn_cad
+from mgdd.results import Finding
+
+if TYPE_CHECKING:
+    from collections.abc import Iterator
+
+    from mgdd.identify.engine.records import CylinderFit
+
+__all__ = ["findings_of"]
+
+# An IMEP error beyond this share makes efficiency and timing doubtful, whatever the pressure RMSE says.
+_IMEP_LIMIT_PERCENT = 3.0
+_RMSE_LIMIT_PERCENT = 2.0
+
+
+def findings_of(fit: CylinderFit, request: Request) -> tuple[Finding, ...]:
+    """Collect the doubts of the traces, then those of the fit."""
+    return (
+        *_of_traces(request),
+        *_poor(fit),
+        *_not_converged(fit),
+        *_early(fit, request),
+        *_work(fit),
+        *(
+            Finding("unidentifiable", (name,), f"{name} is not identifiable from these traces")
+            for name in fit.report.unidentifiable
+        ),
+    )
+
+
+def _of_traces(request: Request) -> Iterator[Finding]:
+    """Give what the analysis of each trace finds suspicious: TDC, pegging, unit, missing angles."""
+    for trace, label in zip(request.traces, request.labels, strict=True):
+        analysis = analyze(trace, request.cylinder, point=request.point, quiet=True)
+        for text in analysis.attrs["warnings"].splitlines():
+            yield Finding("doubtful_trace", (label,), f"{label}: {text}")
+
+
+def _poor(fit: CylinderFit) -> Iterator[Finding]:
+    poor = [load for load in fit.loads if load.rmse_percent > _RMSE_LIMIT_PERCENT]
+    if poor:
+        each = ", ".join(f"{load.file} {load.rmse_percent:.1f} %" for load in poor)
+        yield Finding(
+            "poor_fit",
+            tuple(load.file for load in poor),
+            f"the model does not meet the measurement (pressure RMSE in % of p_max: {each})",
+            "suspect geometry, TDC, pegging or the preset",
+        )
+
+
+def _not_converged(fit: CylinderFit) -> Iterator[Finding]:
+    if not fit.report.success:
+        yield Finding("not_converged", (), f"the search ended without converging: {fit.report.message}")
+
+
+def _early(fit: CylinderFit, request: Request) -> Iterator[Finding]:
+    earliest = [earliest_burn_cad(trace) for trace in request.traces]
+    for held in (False, True):
+        early = [
+            (load, first)
+            for load, first in zip(fit.loads, earliest, strict=True)
+            if (abs(load.soc_cad - first) <= 1e-6 if held else load.soc_cad < first - 1e-6)
+        ]
+        if not early:
+            continue
+        each = ", ".join(f"{load.file} {load.soc_cad - first:+.1f}" for load, first in early)
+        starts = "is held at the injection or spark and would start before" if held else "starts before the injection"
+        yield Finding(
+            "early_onset",
+            tuple(load.file for load, _ in early),
+            f"the fitted burn {starts} (SOC minus SOI in °CA: {each}): the burn law bends to make up for another error "
+            "of the model, so its start is not a physical onset",
+        )
+
+
+def _work(fit: CylinderFit) -> Iterator[Finding]:
+    errors = [load.imep_closed_error_percent for load in fit.loads]
+    if max(map(abs, errors)) <= _IMEP_LIMIT_PERCENT:
+        return
+    if max(errors) < 0.0 or min(errors) > 0.0:
+        low, high = (f"{size:.1f}" for size in (min(map(abs, errors)), max(map(abs, errors))))
+        size = low if low == high else f"{low} to {high}"
+        what = f"closed IMEP is {size} % {'low' if errors[0] < 0.0 else 'high'}"
+    else:
+        what = f"closed IMEP is wrong by {min(errors):+.1f} to {max(errors):+.1f} %"
+    yield Finding(
+        "imep_error",
+        tuple(load.file for load in fit.loads),
+        f"{what} although the pressure RMSE is at most {max(load.rmse_percent for load in fit.loads):.2f} % of p_max: "
+        "a small RMSE proves nothing here",
+        "do not read efficiency or fuel heat from this fit",
+    )

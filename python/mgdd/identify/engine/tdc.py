@@ -1,0 +1,243 @@
+"""Top dead centre from pressure: by the peak of motored traces, by the residual of a calibration of fired ones."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass, field, replace
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+
+from mgdd._core.engine import Cylinder, OperatingPoint
+from mgdd.engine import analyze, simulate
+from mgdd.errors import ConvergenceError, DataError, ParameterError
+from mgdd.identify.engine.cylinder import fit_request
+from mgdd.identify.engine.family import of_law
+from mgdd.identify.engine.records import CylinderFit, starts_of
+from mgdd.identify.engine.request import GAMMA_PARAMETER, Bounds, Request, closed, conditions
+from mgdd.results.describe import described
+from mgdd.results.labels import labelled_dataset
+
+if TYPE_CHECKING:
+    import xarray as xr
+    from matplotlib.axes import Axes
+
+__all__ = ["TdcEstimate", "estimate_tdc"]
+
+_SCALES = (0.3, 1.0, 1.5)  # of the wall heat, for the loss angle: the plausible range of a ModelFamily
+_RISE = 1.25  # an offset counts as possible while the RMSE stays within a quarter of the least
+_PEAK_CAD = 5.0
+_STEP_CAD = 0.25
+_NOISE_CAD, _LEAK_CAD = 0.1, 0.3  # what noise and a leak past the rings add to the modelled loss angle
+
+
+@described
+@dataclass(frozen=True, kw_only=True)
+class TdcEstimate:
+    """Where top dead centre stands in the angles of a trace.
+
+    Parameters
+    ----------
+    offset_cad : float
+        What must be added to the angles so that firing TDC is at 0 [°CA].
+    low_cad, high_cad : float
+        Range of offsets that the traces do not tell apart [°CA].
+    method : {"motored peak", "residual of the calibration"}
+        How it was found.
+    loss_angle_cad : tuple of float
+        Motored: lowest, textbook and highest angle by which wall heat puts the peak before TDC [°CA]; empty if fired.
+    others_cad : tuple of float
+        Fired: further minima of the residual that are as possible [°CA aTDC].
+    dataset : xarray.Dataset
+        Fired: ``rmse_percent`` over ``tdc_offset_cad``; motored: empty.
+
+    Examples
+    --------
+    >>> from mgdd import datasets, presets
+    >>> from mgdd.identify import estimate_tdc
+    >>> found = estimate_tdc(datasets.load("hd_diesel_128x144")[1:2], presets.load("hd_diesel_128x144").cylinder)
+    >>> found.suspect
+    False
+    """
+
+    offset_cad: float
+    low_cad: float
+    high_cad: float
+    method: str
+    loss_angle_cad: tuple[float, ...] = ()
+    others_cad: tuple[float, ...] = ()
+    dataset: xr.Dataset = field(repr=False)
+
+    @property
+    def suspect(self) -> bool:
+        """Whether the angles as they stand are outside the range."""
+        return not self.low_cad <= 0.0 <= self.high_cad
+
+    def plot(self, *, ax: Axes | None = None) -> Axes:
+        """Draw the least RMSE over the TDC offset.
+
+        Parameters
+        ----------
+        ax : matplotlib.axes.Axes, optional
+            Where to draw; None makes a figure.
+
+        Returns
+        -------
+        matplotlib.axes.Axes
+            The band is the range of possible offsets.
+
+        Raises
+        ------
+        mgdd.errors.DataError
+            A motored estimate, which has no scan.
+        """
+        from mgdd.plot.calibration import tdc_scan
+
+        if "rmse_percent" not in self.dataset:
+            raise DataError("a motored estimate has no scan to draw: its peak and loss angle say all")
+        return tdc_scan(self.dataset, (self.low_cad, self.high_cad), ax=ax)
+
+
+def estimate_tdc(
+    traces: Sequence[Any],
+    cylinder: Cylinder,
+    *,
+    point: OperatingPoint | None = None,
+    fuel_heat_j: float | Sequence[float | None] | None = None,
+    bounds: Bounds | None = None,
+    span_cad: float = 3.0,
+    progress: Callable[[str], None] | None = None,
+) -> TdcEstimate:
+    """Estimate where firing TDC stands in the angles of traces from one encoder.
+
+    Parameters
+    ----------
+    traces, point, fuel_heat_j, bounds
+        As in `mgdd.identify.fit_cylinder`; absolute pressure, all motored or all fired.
+    cylinder : Cylinder
+        Geometry; of a fired trace also the gamma law, whose parameter is fitted.
+    span_cad : float
+        Offsets up to this size are tried on fired traces, 0.5 to 10 [°CA].
+    progress : callable, optional
+        Called with a short text before each offset.
+
+    Returns
+    -------
+    TdcEstimate
+        Offset, its range, and how it was found.
+
+    Raises
+    ------
+    mgdd.errors.DataError
+        Motored and fired traces together, or a trace without its peak.
+    mgdd.errors.ParameterError
+        A span outside its range.
+    mgdd.errors.ConvergenceError
+        No offset could be fitted.
+
+    Notes
+    -----
+    Motored: the peak of a parabola through ±5 CAD, plus the loss angle that the cycle model has for this geometry and
+    speed with 0.3 to 1.5 of the textbook wall heat; measured loss angles are 0.4 to 1.3 CAD (Pipitone and Beccari, SAE
+    2007-24-0052, discuss the accuracy). Fired: the double Wiebe law with gamma and wall heat fitted at each offset;
+    offsets whose RMSE stays within a quarter of the least are possible.
+    """
+    if not 0.5 <= span_cad <= 10.0:
+        raise ParameterError.of("span_cad", span_cad, "0.5 to 10 °CA")
+    request = Request.of(
+        traces, cylinder.replace(burn_shape="double_wiebe"), free=None, fuel_heat_j=fuel_heat_j, bounds=bounds,
+        point=point, start_values=None, step_cad=0.5, integrator="trapezoid", options=None,
+    )  # fmt: skip
+    kinds = [bool(analyze(t, cylinder, point=point, quiet=True).attrs["motored"]) for t in request.traces]
+    if all(kinds):
+        return _of_motored(request)
+    if any(kinds):
+        names = ", ".join(label for label, motored in zip(request.labels, kinds, strict=True) if motored)
+        raise DataError(f"motored and fired traces together ({names} motored): estimate TDC from one kind")
+    return _of_fired(request, span_cad, progress)
+
+
+def _of_motored(request: Request) -> TdcEstimate:
+    offsets, losses = [], []
+    for trace, label in zip(request.traces, request.labels, strict=True):
+        angle, pressure = closed(trace, request.cylinder)
+        peak = _peak_cad(angle, pressure, label)
+        point = conditions(trace, request.point)
+        point = point.replace(fuel_mg=0.0, intake_pressure_kpa=100.0 * float(pressure[0]))
+        loss = [
+            -float(simulate(request.cylinder.replace(wall_heat_scale=scale), point, soc_cad=0.0)["p_max_cad"])
+            for scale in _SCALES
+        ]
+        losses.append(loss)
+        offsets.append([-peak - own for own in loss])
+    low, middle, high = (float(np.mean([own[k] for own in offsets])) for k in (2, 1, 0))
+    return TdcEstimate(
+        offset_cad=middle,
+        low_cad=low - _NOISE_CAD,
+        high_cad=high + _NOISE_CAD + _LEAK_CAD,
+        method="motored peak",
+        loss_angle_cad=tuple(float(value) for value in np.mean(losses, axis=0)),
+        dataset=labelled_dataset({}),
+    )
+
+
+def _peak_cad(angle: np.ndarray, pressure: np.ndarray, label: str) -> float:
+    at = float(angle[int(np.argmax(pressure))])
+    near = np.abs(angle - at) <= _PEAK_CAD
+    if near.sum() < 5 or at - angle[0] < _PEAK_CAD or angle[-1] - at < _PEAK_CAD:
+        raise DataError(f"{label}: the peak at {at:g} °CA aTDC has too few samples within {_PEAK_CAD:g} CAD around it")
+    bend, slope, _ = np.polyfit(angle[near] - at, pressure[near], 2)
+    return at - float(slope / (2.0 * bend))
+
+
+def _of_fired(request: Request, span_cad: float, progress: Callable[[str], None] | None) -> TdcEstimate:
+    gamma = GAMMA_PARAMETER[request.cylinder.gamma_model]
+    request = of_law(request, request.cylinder, (gamma, "wall_heat_scale"))
+    fits: dict[float, CylinderFit] = {}
+    count = round(span_cad / _STEP_CAD)
+    for step in sorted(range(-count, count + 1), key=abs):
+        offset = step * _STEP_CAD
+        if progress is not None:
+            progress(f"calibrate with TDC moved by {offset:+.2f} CAD")
+        fits[offset] = _best_at(request, offset, fits)
+    offsets = np.array(sorted(fits))
+    rmse = np.array([100.0 * fits[offset].report.rmse for offset in offsets])
+    if not np.isfinite(rmse).any():
+        raise ConvergenceError("no calibration at any TDC offset: check geometry, pegging, speed and trapped mass")
+    rmse = np.where(np.isfinite(rmse), rmse, np.inf)
+    best = int(np.argmin(rmse))
+    level = _RISE * rmse[best]
+    fine = np.linspace(offsets[0], offsets[-1], 20 * (offsets.size - 1) + 1)
+    inside = fine[np.interp(fine, offsets, rmse) <= level]
+    inner = np.arange(1, offsets.size - 1)
+    minima = inner[(rmse[inner] <= rmse[inner - 1]) & (rmse[inner] <= rmse[inner + 1]) & (rmse[inner] <= level)]
+    return TdcEstimate(
+        offset_cad=_vertex(offsets, rmse, best),
+        low_cad=float(inside.min()),
+        high_cad=float(inside.max()),
+        method="residual of the calibration",
+        others_cad=tuple(float(offsets[k]) for k in minima if k != best),
+        dataset=labelled_dataset(
+            {
+                "tdc_offset_cad": ("tdc_offset_cad", offsets, "°CA", "angle added to the trace"),
+                "rmse_percent": ("tdc_offset_cad", rmse, "% of p_max", "pressure RMSE of the calibration"),
+            }
+        ),
+    )
+
+
+def _best_at(request: Request, offset: float, known: dict[float, CylinderFit]) -> CylinderFit:
+    """Fit at one offset, from the heat release and from the neighbour that is fitted: the better of both."""
+    moved = request.shifted(angle_cad=offset)
+    found = [fit_request(moved)]
+    if known:
+        near = known[min(known, key=lambda other: abs(other - offset))]
+        found.append(fit_request(replace(moved, cylinder=near.model, start_values=starts_of(near))))
+    return min(found, key=lambda fit: fit.report.rmse if np.isfinite(fit.report.rmse) else np.inf)
+
+
+def _vertex(x: np.ndarray, y: np.ndarray, at: int) -> float:
+    if at in (0, y.size - 1) or not np.isfinite(y[at - 1 : at + 2]).all():
+        return float(x[at])
+    bend = y[at - 1] - 2.0 * y[at] + y[at + 1]
+    return float(x[at] + (0.5 * (y[at - 1] - y[at + 1]) / bend * (x[at + 1] - x[at]) if bend > 0.0 else 0.0))

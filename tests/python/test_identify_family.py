@@ -1,0 +1,154 @@
+"""Families of models and top dead centre: the truth is inside, what contradicts physics is out and says why."""
+
+from __future__ import annotations
+
+import functools
+import math
+
+import numpy as np
+import pytest
+import xarray as xr
+
+from mgdd import datasets, presets
+from mgdd.engine import OperatingPoint, find_optimum, simulate
+from mgdd.errors import DataError, ParameterError
+from mgdd.identify import ModelFamily, best_timing, estimate_tdc
+from mgdd.identify.engine.best_timing import BestTiming
+from mgdd.io import pressure_trace
+from mgdd.results.labels import check_labels
+
+PRESET = presets.load("hd_diesel_128x144")
+# Nothing of the truth stands in the family: another gamma, another wall heat.
+TRUTH = PRESET.cylinder.replace(
+    burn_shape="double_wiebe", gamma_model="linear", gamma_linear_300k=1.392, wall_heat_scale=0.85,
+    wiebe_m=1.2, second_fraction=0.55, second_delay_cad=4.0, second_duration_cad=60.0, second_wiebe_m=0.7,
+)  # fmt: skip
+FAMILY = ModelFamily(
+    burn_shapes=["triangle", "double_wiebe"], gammas=[("linear", None), ("constant", 1.30)],
+    wall_heat_scales=[0.5, 1.0, 1.5],
+)  # fmt: skip
+LOADS = ((55.0, -2.0, 150.0), (120.0, -4.0, 235.0))
+
+
+def measured(
+    fuel_mg: float, soc_cad: float, inlet_kpa: float, *, tdc_cad: float = 0.0, noise_bar: float = 0.05
+) -> xr.Dataset:
+    """One load of the truth; its angles are `tdc_cad` too large."""
+    point = OperatingPoint(speed_rpm=1200.0, fuel_mg=fuel_mg, burn_duration_cad=18.0, intake_pressure_kpa=inlet_kpa)
+    cycle = simulate(TRUTH, point, soc_cad=soc_cad, step_cad=0.5)
+    noise = noise_bar * np.random.default_rng(int(fuel_mg)).standard_normal(cycle.sizes["crank_angle_cad"])
+    noise[0] = 0.0  # the first sample is the start of the model
+    trace = pressure_trace(cycle["crank_angle_cad"].values + tdc_cad, cycle["pressure_bar"].values + noise)
+    mass = float(cycle.attrs["trapped_mass_g"])
+    said = {"speed_rpm": 1200.0, "trapped_mass_g": mass, "soi_cad": soc_cad - 1.5 + tdc_cad}
+    return trace.assign_attrs(file=f"{fuel_mg:g} mg", **said)
+
+
+@functools.cache
+def rows() -> tuple[BestTiming, ...]:
+    return tuple(best_timing([measured(*load) for load in LOADS], PRESET.cylinder, family=FAMILY))
+
+
+def test_the_range_of_the_plausible_models_holds_the_true_best_timing() -> None:
+    for row, (fuel, _, inlet) in zip(rows(), LOADS, strict=True):
+        point = OperatingPoint(speed_rpm=1200.0, fuel_mg=fuel, burn_duration_cad=18.0, intake_pressure_kpa=inlet)
+        true = find_optimum(TRUTH, point, "imep_closed_bar", step_cad=0.5)
+        low, high = row.free_ca50_cad
+        assert low < true["ca50_cad"] < high
+        assert row.best is not None
+        assert abs(row.best.free_ca50_cad - true["ca50_cad"]) < 1.5  # the scale of 1.0 stands in for 0.85
+        assert row.best.member.wall_heat_scale == 1.0
+        assert row.best.member.gamma == pytest.approx(1.392, abs=0.004)
+        assert row.best.rmse_percent < 0.15
+
+
+def test_a_model_that_contradicts_physics_is_not_in_the_range_and_says_why() -> None:
+    wrong = [m for row in rows() for m in row.members if m.member.law == "triangle" or m.member.gamma == 1.30]
+    assert len(wrong) > 10
+    for answer in wrong:
+        assert not answer.plausible
+        assert "RMSE" in answer.why_not or "IMEP" in answer.why_not, answer.why_not
+    for row in rows():
+        kept = [m for m in row.members if m.plausible]
+        assert {m.member.law for m in kept} == {"double_wiebe"}
+        assert row.best is min(kept, key=lambda m: m.member.score)
+        assert all(m.soc_minus_soi_cad >= 0.0 for m in row.members)  # bounded, so nobody starts before
+
+
+def test_the_score_weighs_misfit_and_prior_in_standard_deviations() -> None:
+    (first, *_) = rows()
+    kept = [m.member for m in first.members if m.plausible]
+    least = min(member.fit.report.rmse for member in kept)
+    for member in kept:
+        misfit = (member.fit.report.rmse / least - 1.0) / 0.25
+        prior = (member.wall_heat_scale - 1.0) / 0.25
+        assert member.score == pytest.approx(misfit**2 + prior**2, rel=1e-12)
+
+
+def test_the_family_is_the_product_without_gamma_and_wall_heat_together() -> None:
+    only = ModelFamily(burn_shapes=["wiebe"], gammas=[("linear", None), ("linear", 1.38)], wall_heat_scales=[None, 1.0])
+    (row,) = best_timing([measured(*LOADS[0])], PRESET.cylinder, family=only)
+    kinds = [(m.member.fitted, m.member.gamma_model) for m in row.members]
+    assert kinds == [("gamma", "linear"), ("wall heat", "linear"), ("nothing", "linear")]
+    assert all(m.left_out_percent == m.rmse_percent for m in row.members)  # nobody is left out of one
+    assert row.members[2].member.name == "wiebe, linear gamma 1.38 at 300 K, wall heat 1.00"
+    check_labels(row.members[0].member.fit.table)
+
+
+def test_without_a_plausible_model_there_is_no_answer() -> None:
+    narrow = ModelFamily(burn_shapes=["wiebe"], gammas=[("constant", 1.30)], wall_heat_scales=[1.0], imep_percent=0.01)
+    (row,) = best_timing([measured(*LOADS[0])], PRESET.cylinder, family=narrow)
+    assert row.best is None
+    assert all(math.isnan(end) for end in (*row.soc_cad, *row.free_ca50_cad, *row.gain_percent))
+    assert all(answer.why_not for answer in row.members)
+    assert row.to_dict()["best"] is None
+
+
+def test_a_family_is_checked() -> None:
+    with pytest.raises(ParameterError, match="gammas is empty"):
+        ModelFamily(gammas=[])
+    with pytest.raises(ParameterError, match=r"wall_heat_range = \(1\.5, 0\.3\): must be a pair that rises"):
+        ModelFamily(wall_heat_range=(1.5, 0.3))
+    with pytest.raises(ParameterError, match="rmse_factor = 1"):
+        ModelFamily(rmse_factor=1.0)
+
+
+@pytest.mark.parametrize("offset", [-1.4, 0.0, 0.9])
+def test_the_residual_of_a_fired_trace_finds_tdc(offset: float) -> None:
+    traces = [measured(*load, tdc_cad=offset) for load in LOADS]
+    found = estimate_tdc(traces, PRESET.cylinder, span_cad=2.0)
+    assert found.method == "residual of the calibration"
+    assert found.offset_cad == pytest.approx(-offset, abs=0.15)
+    assert found.low_cad <= -offset <= found.high_cad
+    assert found.suspect == (offset != 0.0)
+    check_labels(found.dataset)
+
+
+def test_the_peak_of_a_motored_trace_finds_tdc() -> None:
+    point = PRESET.point.replace(fuel_mg=0.0)
+    for scale, offset in ((0.4, -0.8), (1.4, 1.1)):
+        cycle = simulate(TRUTH.replace(wall_heat_scale=scale), point, soc_cad=0.0, step_cad=0.2)
+        trace = pressure_trace(cycle["crank_angle_cad"].values + offset, cycle["pressure_bar"].values)
+        found = estimate_tdc([trace], TRUTH, point=point)
+        assert found.method == "motored peak"
+        assert found.low_cad < -offset < found.high_cad
+        assert found.loss_angle_cad[0] < found.loss_angle_cad[1] < found.loss_angle_cad[2]
+        assert found.suspect
+        with pytest.raises(DataError, match="no scan to draw"):
+            found.plot()
+
+
+def test_tdc_of_one_kind_of_trace_only() -> None:
+    motored = simulate(TRUTH, PRESET.point.replace(fuel_mg=0.0), soc_cad=0.0)
+    cold = pressure_trace(motored["crank_angle_cad"].values, motored["pressure_bar"].values, name="cold")
+    with pytest.raises(DataError, match=r"cold motored"):
+        estimate_tdc([measured(*LOADS[0]), cold], PRESET.cylinder)
+    with pytest.raises(ParameterError, match=r"span_cad = 20: must be 0\.5 to 10"):
+        estimate_tdc([measured(*LOADS[0])], PRESET.cylinder, span_cad=20.0)
+
+
+def test_the_measured_engine_has_its_tdc_where_it_says() -> None:
+    found = estimate_tdc(datasets.load("hd_diesel_128x144"), PRESET.cylinder, span_cad=1.5)
+    assert not found.suspect
+    assert abs(found.offset_cad) < 0.3
+    assert found.plot().get_ylim()[0] == 0.0
