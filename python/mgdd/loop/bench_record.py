@@ -11,8 +11,8 @@ from mgdd.loop.limit_figures import noise_free_variable
 from mgdd.results.labels import VARIABLES, labelled_dataset
 
 if TYPE_CHECKING:
-    import xarray as xr
     import numpy as np
+    import xarray as xr
     from numpy.typing import ArrayLike, NDArray
 
 __all__ = ["FLAGS", "cycles_to_dataset"]

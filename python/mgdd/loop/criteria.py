@@ -33,11 +33,11 @@ class LoopCriteria:
         First cycle that counts for ``exceeded_fraction`` and the figures ``judged_...``; by default 1000, or the middle
         of a run of fewer than 2000 cycles. The summary repeats it as ``judged_from``.
     exceed_above : mapping of str to float
-        Per limit, the value above which a cycle counts for ``exceeded_fraction``, for example the limit and a margin for
-        its scatter; the summary repeats it as ``exceed_above_NAME``.
+        Per limit, the value above which a cycle counts for ``exceeded_fraction``, for example the limit and a margin
+        for its scatter; the summary repeats it as ``exceed_above_NAME``.
     limits : mapping of str to float, optional
-        Limits of which the summary tells ``worst_NAME``, ``above_fraction_NAME`` and so on, without any margin; those of
-        the seeker if left out.
+        Limits of which the summary tells ``worst_NAME``, ``above_fraction_NAME`` and so on, without any margin; those
+        of the seeker if left out.
 
     Raises
     ------

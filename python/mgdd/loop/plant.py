@@ -29,7 +29,7 @@ class Measurement:
     values : mapping of str to float
         Everything else that was measured, by name.
     noise_free_limits : mapping of str to float
-        Limited quantities at these inputs without scatter and noise; empty where the plant does not know them, as a rig.
+        Limited quantities at these inputs without scatter and noise; empty where the plant does not know them.
 
     Examples
     --------
