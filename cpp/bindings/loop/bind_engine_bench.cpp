@@ -121,7 +121,7 @@ py::dict run(BoundBench& bound, const InputArray& soc_cad) {
 }
 
 py::array_t<double> noise_free_limits(BoundBench& bound, const InputArray& soc_cad,
-                                     const std::vector<std::int64_t>& cycles) {
+                                      const std::vector<std::int64_t>& cycles) {
   const std::vector<double> requests = to_column(soc_cad, "soc_cad");
   if (cycles.size() != requests.size()) {
     throw ShapeError("cycle has " + std::to_string(cycles.size()) + " entries: give one per soc_cad, " +
@@ -250,7 +250,8 @@ void bind_engine_bench(py::module_& m) {
           arg("soc_cad"), "Run one cycle: what was measured, by name.")
       .def("run_columns", &run, arg("soc_cad"), "Run one cycle per request, without the GIL: columns by name.")
       .def("noise_free_limits", &noise_free_limits, arg("soc_cad"), arg("cycle"),
-           "Limited quantities without scatter, noise and misfire, drift included: one row per request and its cycle, in\n"
+           "Limited quantities without scatter, noise and misfire, drift included: one row per request and its cycle, "
+           "in\n"
            "the order of limit_names. NaN for the COV of IMEP, which has no such value. The bench itself does not run.")
       .def(
           "reset",

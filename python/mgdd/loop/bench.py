@@ -170,7 +170,8 @@ class EngineBench(_core.loop.EngineBench):
         Returns
         -------
         Measurement
-            ``values`` holds the indicators, actual SOC, NOx of every sensor and the flags as 0 or 1.
+            ``values`` holds the indicators, actual SOC, NOx of every sensor and the flags as 0 or 1;
+            ``noise_free_limits`` are the limits at this timing without scatter, noise and misfire, COV of IMEP as NaN.
 
         Raises
         ------

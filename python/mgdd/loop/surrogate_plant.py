@@ -152,7 +152,8 @@ class SurrogatePlant:
         Returns
         -------
         Measurement
-            ``values`` holds the reading of every signal, and ``supported`` as 0 or 1.
+            ``values`` holds the reading of every signal, and ``supported`` as 0 or 1; ``noise_free_limits`` are the
+            limits without the residuals, lags included.
 
         Raises
         ------
