@@ -44,7 +44,7 @@ def test_every_method_finds_the_steady_optimum(method: str, capsys: pytest.Captu
     for run in runs:
         assert run["optimum_cad"] == best["soc_cad"]
         assert run["cycles"] == 2000
-        assert run["limit_exceeded_fraction"] is None
+        assert (run["limit_report"], run["warnings"], run["start_reason"]) == ({}, [], "default")
         assert run["mean_j"] == run["mean_efficiency_percent"] < best.value
         assert 0 < run["cycles_to_1_cad"] < 1000
         assert run["rms_cad"] < 1.2
@@ -58,7 +58,8 @@ def test_every_method_keeps_the_pressure_limit(method: str, capsys: pytest.Captu
     assert runs[0]["optimum_cad"] == pytest.approx(-3.08, abs=0.01)
     assert runs[0]["free_optimum_cad"] == pytest.approx(-5.63, abs=0.01)
     assert runs[0]["limits"] == {"p_max_bar": 95.0}
-    assert np.mean([run["limit_exceeded_fraction"] for run in runs]) < 0.01
+    kept = [run["limit_report"]["p_max_bar"] for run in runs]
+    assert np.mean([own["judged_above_threshold_fraction"] for own in kept]) < 0.01
     # The dither stays below the limit, so its mean lies on the late side.
     assert -0.1 < np.mean([run["final_cad"] - run["optimum_cad"] for run in runs]) < 1.25
 
@@ -66,7 +67,11 @@ def test_every_method_keeps_the_pressure_limit(method: str, capsys: pytest.Captu
 @pytest.mark.parametrize("how", ["penalty", "barrier"])
 def test_limits_known_to_j_are_kept_as_well(how: str, capsys: pytest.CaptureFixture[str]) -> None:
     run = seek(capsys, "--limit", "p_max_bar=95", "--limit", "dp_max_bar_per_cad=8", "--limit-method", how)
-    assert (run["limit_method"], run["limit_exceeded_fraction"]) == (how, 0.0)
+    assert run["limit_method"] == how
+    assert {name: own["judged_above_threshold_fraction"] for name, own in run["limit_report"].items()} == {
+        "p_max_bar": 0.0,
+        "dp_max_bar_per_cad": 0.0,
+    }
     assert abs(run["final_cad"] - run["optimum_cad"]) < 1.5
     plain = seek(capsys, "--limit", "p_max_bar=95", "--limit", "dp_max_bar_per_cad=8")
     assert run["final_cad"] != plain["final_cad"]
@@ -131,10 +136,85 @@ def test_cov_of_imep_can_be_a_limit(capsys: pytest.CaptureFixture[str], tmp_path
     file = tmp_path / "run.csv"
     out = seek(capsys, "--limit", "cov-imep-percent=1.0", "-o", str(file))
     assert out["limits"] == {"cov_imep_percent": 1.0}
-    assert out["limit_exceeded_fraction"] < 0.02
+    own = out["limit_report"]["cov_imep_percent"]
+    assert own["judged_above_threshold_fraction"] < 0.02
+    assert own["threshold_with_margin"] == pytest.approx(1.0 + 3.0 / math.sqrt(98.0))
+    assert own["noise_free"] is None
+    assert (out["start_cad"], out["start_reason"]) == (-20.0, "default; no limit has a noise-free value to choose by")
     assert file.read_text().splitlines()[0].endswith(",cov_imep_percent")
     message = refused(capsys, "--limit", "cov_imep_percent=0.1", code=3)
     assert "cov_imep_percent=0.1: the bench has 0.4" in message
+
+
+def test_an_explicit_start_above_a_limit_counts_from_the_first_cycle_and_is_doubted(
+    capsys: pytest.CaptureFixture[str], caplog: pytest.LogCaptureFixture, tmp_path: Path
+) -> None:
+    file = tmp_path / "run.csv"
+    argv = ("--start-cad", "-20", "--limit", "p_max_bar=95", "--limit", "dp_max_bar_per_cad=2.6", "-o", str(file))
+    out = seek(capsys, *argv)
+    header, *rows = file.read_text().splitlines()
+    pressure = np.array([float(row.split(",")[header.split(",").index("p_max_bar")]) for row in rows])
+    own = out["limit_report"]["p_max_bar"]
+    assert own["worst"] == pressure.max() > 150.0
+    assert own["worst_cycle"] == pressure.argmax() < 20
+    assert (own["above_cycles"], own["above_fraction"]) == ((pressure > 95.0).sum(), (pressure > 95.0).mean())
+    assert out["judged_from"] == 1000
+    assert own["judged_above_fraction"] == (pressure[1000:] > 95.0).mean() < own["above_fraction"]
+    assert own["threshold_with_margin"] == 95.0 + own["scatter_margin"] > 97.0
+    assert own["judged_above_threshold_fraction"] == (pressure[1000:] > own["threshold_with_margin"]).mean()
+    assert own["noise_free"]["worst"] == pytest.approx(EngineBench().steady_map([-20.0])["p_max_bar"].item(), rel=1e-12)
+    assert own["noise_free"]["judged_above_cycles"] < own["judged_above_cycles"]
+    assert out["limit_report"]["dp_max_bar_per_cad"]["above_cycles"] > 10
+    assert out["start_reason"] == "as given"
+    assert [text.split(" = ")[0] for text in out["warnings"]] == [
+        "the first reading has p_max_bar",
+        "the first reading has dp_max_bar_per_cad",
+    ]
+    assert f"{pressure[0]:.6g}, above the limit 95, at -20.00 °CA aTDC: leave --start-cad out" in caplog.text
+
+
+def test_the_text_names_worst_cycle_share_and_what_is_left_out(capsys: pytest.CaptureFixture[str]) -> None:
+    assert main(["engine", "seek", "--start-cad", "-20", "--limit", "p_max_bar=95", "--cycles", "300"]) == 0
+    measured, free = capsys.readouterr().out.splitlines()[-2:]
+    assert measured.startswith("p_max_bar as measured: worst 159.953 in cycle 0; above 95 in ")
+    for part in (" %), from cycle 150 on in ", " % above 98.65", "plus 3 standard deviations of the scatter"):
+        assert part in measured
+    assert free.startswith("p_max_bar noise-free at the applied timing: worst 161.019 in cycle 0; above 95 in ")
+
+
+@pytest.mark.parametrize(("method", "move"), [("extremum_seeking", 1.0), ("newton", 1.2), ("bounded", 0.0)])
+def test_a_limit_moves_the_default_start_to_the_late_side(
+    method: str, move: float, capsys: pytest.CaptureFixture[str]
+) -> None:
+    out = seek(capsys, "--method", method, "--limit", "p_max_bar=95", "--cycles", "100")
+    start = out["start_cad"]
+    early, earlier = EngineBench().steady_map([start - move, start - move - 0.1])["p_max_bar"].to_numpy()
+    assert early <= 0.9 * 95.0 < earlier  # the earliest timing that keeps the margin with its dither
+    assert start > out["optimum_cad"]
+    assert "earliest start from which on the noise-free values stay 10 % below" in out["start_reason"]
+    assert out["warnings"] == []
+    assert out["limit_report"]["p_max_bar"]["worst_cycle"] > 0
+
+
+@pytest.mark.parametrize(
+    ("argv", "start", "reason"),
+    [
+        (["--limit", "p_max_bar=200"], -20.0, "default; the noise-free values stay 10 % below"),
+        (["--limit", "p_max_bar=175"], -17.8, "earliest start from which on"),
+        (["--limit", "p_max_bar=75"], None, "start with the lowest values; there is none"),
+        (["--limit", "p_max_bar=95", "--method", "golden"], -20.0, "golden section tries the whole range"),
+        (["--limit", "p_max_bar=95", "--start-cad", "-8"], -8.0, "as given"),
+    ],
+)
+def test_where_a_run_under_a_limit_starts(
+    argv: list[str], start: float | None, reason: str | None, capsys: pytest.CaptureFixture[str]
+) -> None:
+    out = seek(capsys, *argv, "--cycles", "40")
+    if start is not None:
+        assert out["start_cad"] == start
+    if reason is not None:
+        assert reason in out["start_reason"]
+    assert len(out["warnings"]) == (argv[-1] in ("golden", "-8"))
 
 
 def test_figure(capsys: pytest.CaptureFixture[str], tmp_path: Path) -> None:

@@ -1,4 +1,5 @@
 // Binds loop/engine_bench.hpp: the virtual engine bench and the dynamics of its sensors.
+#include <algorithm>
 #include <cstddef>
 #include <cstdint>
 #include <optional>
@@ -119,6 +120,26 @@ py::dict run(BoundBench& bound, const InputArray& soc_cad) {
   return bench_columns(rows, bound.constant().settings());
 }
 
+py::array_t<double> noise_free_limits(BoundBench& bound, const InputArray& soc_cad,
+                                      const std::vector<std::int64_t>& cycles) {
+  const std::vector<double> requests = to_column(soc_cad, "soc_cad");
+  if (cycles.size() != requests.size()) {
+    throw ShapeError("cycle has " + std::to_string(cycles.size()) + " entries: give one per soc_cad, " +
+                     std::to_string(requests.size()));
+  }
+  for (const std::int64_t cycle : cycles) {
+    if (cycle < 0) throw ParameterError("cycle", cycle, "must be >= 0");
+  }
+  const std::size_t width = bound.constant().settings().limits.size();
+  py::array_t<double> out({static_cast<py::ssize_t>(requests.size()), static_cast<py::ssize_t>(width)});
+  double* at = out.mutable_data();
+  const auto bench = bound.use();
+  const py::gil_scoped_release release;
+  for (std::size_t k = 0; k < requests.size() && width > 0; ++k)
+    at = std::copy_n(bench->noise_free_limits(cycles[k], requests[k]).begin(), width, at);
+  return out;
+}
+
 BoundBench make(const engine::Cylinder& cylinder, const Schedule& schedule,
                 const std::optional<engine::Performance>& performance, const std::string& nox_sensor,
                 const std::vector<std::string>& limits, double soc_scatter_cad, double efficiency_noise_percent,
@@ -228,6 +249,10 @@ void bind_engine_bench(py::module_& m) {
           },
           arg("soc_cad"), "Run one cycle: what was measured, by name.")
       .def("run_columns", &run, arg("soc_cad"), "Run one cycle per request, without the GIL: columns by name.")
+      .def("noise_free_limits", &noise_free_limits, arg("soc_cad"), arg("cycle"),
+           "Limited quantities without scatter, noise and misfire, drift included: one row per request and its cycle, "
+           "in\n"
+           "the order of limit_names. NaN for the COV of IMEP, which has no such value. The bench itself does not run.")
       .def(
           "reset",
           [](B& b, std::optional<std::uint64_t> seed) {

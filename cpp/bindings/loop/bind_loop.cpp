@@ -3,6 +3,7 @@
 #include <cstdint>
 #include <optional>
 #include <string>
+#include <string_view>
 #include <variant>
 #include <vector>
 
@@ -18,6 +19,10 @@ namespace {
 
 using namespace loop;
 
+std::string name_of(std::string_view figure, const std::string& limit) {
+  return std::string(figure) + "_" + limit;
+}
+
 py::dict to_dict(const LoopRun& run, const BenchSettings& settings) {
   std::vector<BenchCycle> rows;
   std::vector<double> estimate;
@@ -28,6 +33,10 @@ py::dict to_dict(const LoopRun& run, const BenchSettings& settings) {
   py::dict summary;
   for (const auto& number : loop_summary_numbers)
     summary[as_str(number.name)] = number.of(run.summary);
+  for (std::size_t i = 0; i < settings.limits.size(); ++i) {
+    for (const auto& number : limit_figure_numbers)
+      summary[py::str(name_of(number.name, settings.limits[i]))] = number.of(run.summary.limits[i]);
+  }
   py::dict out;
   out["columns"] = bench_columns(rows, settings);
   out["estimate_cad"] = to_array(estimate);
@@ -39,8 +48,8 @@ py::dict to_dict(const LoopRun& run, const BenchSettings& settings) {
 template <class S>
 py::dict run(BoundBench& bound_bench, BoundSeeker<S>& bound_seeker, std::int64_t cycles, double optimum_cad,
              double arrival_cad, std::int64_t tail_cycles, std::optional<std::int64_t> exceed_from,
-             const std::vector<double>& exceed_above) {
-  const LoopCriteria criteria{optimum_cad, arrival_cad, tail_cycles, exceed_from, exceed_above};
+             const std::vector<double>& exceed_above, const std::vector<double>& limits) {
+  const LoopCriteria criteria{optimum_cad, arrival_cad, tail_cycles, exceed_from, exceed_above, limits};
   auto outcome = [&] {
     const auto bench = bound_bench.use();
     const auto seeker = bound_seeker.use();
@@ -55,7 +64,8 @@ template <class S>
 void bind_run(py::module_& m) {
   m.def("run_loop", &run<S>, py::arg("bench"), py::arg("seeker"), py::arg("cycles"), py::kw_only(),
         py::arg("optimum_cad"), py::arg("arrival_cad"), py::arg("tail_cycles"), py::arg("exceed_from"),
-        py::arg("exceed_above"), "Run a seeker on the bench without the GIL; behind mgdd.loop.run_seeker.");
+        py::arg("exceed_above"), py::arg("limits"),
+        "Run a seeker on the bench without the GIL; behind mgdd.loop.run_seeker.");
 }
 
 template <class S>
@@ -73,12 +83,19 @@ optimize::Seeker seeker_of(const py::handle& object, const std::variant<S...>*) 
               ParameterError("seekers: " + std::string(py::repr(object)) + " is not a seeker of mgdd.optimize"));
 }
 
-py::dict to_dict(const MonteCarloResult& result) {
+py::dict to_dict(const MonteCarloResult& result, const std::vector<std::string>& limit_names) {
   py::dict out;
+  std::vector<double> column(result.loops.size());
   for (const auto& number : loop_summary_numbers) {
-    std::vector<double> column(result.loops.size());
     std::ranges::transform(result.loops, column.begin(), number.of);
     out[as_str(number.name)] = to_array(column);
+  }
+  for (std::size_t i = 0; i < limit_names.size(); ++i) {
+    for (const auto& number : limit_figure_numbers) {
+      std::ranges::transform(result.loops, column.begin(),
+                             [&](const LoopSummary& loop) { return number.of(loop.limits[i]); });
+      out[py::str(name_of(number.name, limit_names[i]))] = to_array(column);
+    }
   }
   py::array_t<bool> finished(static_cast<py::ssize_t>(result.finished.size()));
   std::copy(result.finished.begin(), result.finished.end(), finished.mutable_data());
@@ -89,24 +106,27 @@ py::dict to_dict(const MonteCarloResult& result) {
 py::dict run_many(const std::vector<BoundBench*>& benches, const py::list& seekers,
                   const std::vector<std::uint64_t>& seeds, std::int64_t cycles, const std::vector<double>& optimum_cad,
                   double arrival_cad, std::int64_t tail_cycles, std::optional<std::int64_t> exceed_from,
-                  const std::vector<std::vector<double>>& exceed_above, int threads) {
-  if (optimum_cad.size() != benches.size() || exceed_above.size() != benches.size()) {
-    throw ShapeError("optimum_cad and exceed_above: give one entry per bench");
+                  const std::vector<std::vector<double>>& exceed_above, const std::vector<std::vector<double>>& limits,
+                  int threads) {
+  if (optimum_cad.size() != benches.size() || exceed_above.size() != benches.size() ||
+      limits.size() != benches.size()) {
+    throw ShapeError("optimum_cad, exceed_above and limits: give one entry per bench");
   }
   MonteCarloPlan plan;
   for (std::size_t i = 0; i < benches.size(); ++i) {
     plan.benches.push_back(*benches[i]->use());
-    plan.criteria.push_back({optimum_cad[i], arrival_cad, tail_cycles, exceed_from, exceed_above[i]});
+    plan.criteria.push_back({optimum_cad[i], arrival_cad, tail_cycles, exceed_from, exceed_above[i], limits[i]});
   }
   for (const py::handle& object : seekers)
     plan.seekers.push_back(seeker_of(object, static_cast<const optimize::Seeker*>(nullptr)));
   plan.seeds = seeds;
   plan.cycles = cycles;
   plan.threads = threads;
-  return hand_over(interruptible([&plan](const std::stop_token& stop) {
-                     return monte_carlo(plan, [&stop] { return stop.stop_requested(); });
-                   }),
-                   [](const MonteCarloResult& result) { return to_dict(result); });
+  return hand_over(
+      interruptible([&plan](const std::stop_token& stop) {
+        return monte_carlo(plan, [&stop] { return stop.stop_requested(); });
+      }),
+      [&plan](const MonteCarloResult& result) { return to_dict(result, plan.benches.front().settings().limits); });
 }
 
 template <class... S>
@@ -120,7 +140,7 @@ void bind_loop(py::module_& m) {
   bind_runs(m, static_cast<const optimize::Seeker*>(nullptr));
   m.def("monte_carlo", &run_many, py::arg("benches"), py::arg("seekers"), py::arg("seeds"), py::kw_only(),
         py::arg("cycles"), py::arg("optimum_cad"), py::arg("arrival_cad"), py::arg("tail_cycles"),
-        py::arg("exceed_from"), py::arg("exceed_above"), py::arg("threads"),
+        py::arg("exceed_from"), py::arg("exceed_above"), py::arg("limits"), py::arg("threads"),
         "Whole loops on all cores; behind mgdd.loop.monte_carlo.");
 }
 

@@ -2,6 +2,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <limits>
 
 #include "mgdd/common/random.hpp"
 #include "mgdd/common/units.hpp"
@@ -16,6 +17,10 @@ constexpr double wall_heat_upper = 100.0;  // of the field, which drift must not
 
 using engine::Indicators;
 using Member = double Indicators<double>::*;
+
+double kcycles(std::int64_t cycles) noexcept {
+  return static_cast<double>(cycles) / cycles_per_kcycle;
+}
 
 BenchSettings checked(BenchSettings settings) {
   validate(settings);
@@ -138,8 +143,31 @@ double EngineBench::noise(BenchStream stream) const noexcept {
   return random::normal(seed_, static_cast<std::uint64_t>(stream), static_cast<std::uint64_t>(cycle_));
 }
 
-double EngineBench::elapsed_kcycles() const noexcept {
-  return static_cast<double>(cycle_) / cycles_per_kcycle;
+void EngineBench::drift_to(std::int64_t cycle) noexcept {
+  if (settings_.wall_heat_drift_per_kcycle == 0.0) return;
+  engine::Cylinder drifted = settings_.cylinder;
+  drifted.wall_heat.wall_heat_scale = std::clamp(
+      drifted.wall_heat.wall_heat_scale + settings_.wall_heat_drift_per_kcycle * kcycles(cycle), 0.0, wall_heat_upper);
+  model_.set_cylinder(drifted);
+}
+
+double EngineBench::drifted_soc_cad(double soc_cad, std::int64_t cycle) const noexcept {
+  return soc_cad + settings_.soc_drift_cad_per_kcycle * kcycles(cycle);
+}
+
+std::array<double, max_limits> EngineBench::noise_free_limits(std::int64_t cycle, double soc_cad) noexcept {
+  std::array<double, max_limits> out;
+  out.fill(std::numeric_limits<double>::quiet_NaN());
+  if (std::isnan(soc_cad)) return out;
+  drift_to(cycle);
+  const double applied = std::clamp(soc_cad, window_[0], window_[1]);
+  const double burning = std::clamp(drifted_soc_cad(applied, cycle), closed_[0], closed_[1]);
+  bool unphysical = false;
+  const Indicators<double> steady = burn(prepared_[index_at(cycle)], burning, false, unphysical);
+  for (std::size_t i = 0; i < limit_members_.size() && !unphysical; ++i) {
+    if (limit_members_[i]) out[i] = steady.*(limit_members_[i]);
+  }
+  return out;
 }
 
 Indicators<double> EngineBench::burn(const Prepared& at, double soc_cad, bool misfire, bool& unphysical) noexcept {
@@ -178,16 +206,10 @@ BenchCycle EngineBench::step(double soc_cad) noexcept {
   c.clamped = applied != soc_cad;
   last_soc_cad_ = applied;
 
-  if (settings_.wall_heat_drift_per_kcycle != 0.0) {
-    engine::Cylinder drifted = settings_.cylinder;
-    drifted.wall_heat.wall_heat_scale =
-        std::clamp(drifted.wall_heat.wall_heat_scale + settings_.wall_heat_drift_per_kcycle * elapsed_kcycles(), 0.0,
-                   wall_heat_upper);
-    model_.set_cylinder(drifted);
-  }
+  drift_to(cycle_);
   if (cycle_ == 0) start(at, applied);
 
-  c.soc_cad = applied + settings_.soc_drift_cad_per_kcycle * elapsed_kcycles();
+  c.soc_cad = drifted_soc_cad(applied, cycle_);
   if (settings_.soc_scatter_cad > 0.0) c.soc_cad += settings_.soc_scatter_cad * noise(BenchStream::soc);
   c.soc_cad = std::clamp(c.soc_cad, closed_[0], closed_[1]);  // drift must not carry the burn out of the cycle
   c.misfire = random::bernoulli(settings_.misfire_probability, seed_, static_cast<std::uint64_t>(BenchStream::misfire),

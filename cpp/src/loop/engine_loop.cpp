@@ -53,14 +53,32 @@ void validate(const LoopCriteria& c, std::int64_t cycles) {
     throw ParameterError("exceed_from", *c.exceed_from,
                          "must be < cycles = " + std::to_string(cycles) + ", or no cycle counts");
   }
-  for (const double value : c.exceed_above) {
-    if (std::isnan(value))
-      throw about("exceed_above", ParameterError("exceed_above holds NaN: give a number, or leave the limit out"));
+  for (const auto& [name, values] : {std::pair{"exceed_above", &c.exceed_above}, std::pair{"limits", &c.limits}}) {
+    for (const double value : *values) {
+      if (std::isnan(value))
+        throw about(name, ParameterError(std::string(name) + " holds NaN: give a number, or leave the limit out"));
+    }
   }
 }
 
+void LimitFigures::add(double reading, std::int64_t cycle, bool judged) noexcept {
+  if (std::isnan(reading)) return;
+  ++read_cycles;
+  if (judged) ++judged_read_cycles;
+  if (!(reading <= worst)) {
+    worst = reading;
+    worst_cycle = static_cast<double>(cycle);
+  }
+  if (reading <= limit) return;
+  ++above_cycles;
+  if (judged) ++judged_above_cycles;
+}
+
 LoopStatistics::LoopStatistics(LoopCriteria criteria, std::int64_t cycles)
-    : criteria_(std::move(criteria)), planned_(cycles), counted_from_(loop::counted_from(criteria_, cycles)) {}
+    : criteria_(std::move(criteria)), planned_(cycles), counted_from_(loop::counted_from(criteria_, cycles)) {
+  for (std::size_t i = 0; i < std::min(limits_.size(), criteria_.limits.size()); ++i)
+    limits_[i].limit = criteria_.limits[i];
+}
 
 void LoopStatistics::add(const LoopCycle& cycle) noexcept {
   const std::int64_t k = seen_++;
@@ -85,6 +103,8 @@ void LoopStatistics::add(const LoopCycle& cycle) noexcept {
       nox_.add(b.nox_true_ppm);
     }
   }
+  for (std::size_t i = 0; i < std::min(b.limit_count, criteria_.limits.size()); ++i)
+    limits_[i].add(b.limit_values[i], k, k >= counted_from_);
   if (k >= counted_from_ && !criteria_.exceed_above.empty()) {
     ++counted_;
     bool over = false;
@@ -106,6 +126,8 @@ LoopSummary LoopStatistics::summary() const noexcept {
   out.lowest_cad = lowest_;
   out.highest_cad = highest_;
   out.misfires = misfires_;
+  out.judged_from = counted_from_;
+  out.limits = limits_;
   if (counted_ > 0) out.exceeded_fraction = static_cast<double>(exceeded_) / static_cast<double>(counted_);
   if (!std::isfinite(criteria_.optimum_cad)) return out;
   out.rms_cad = std::sqrt(square_.value());

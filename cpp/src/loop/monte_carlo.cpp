@@ -46,17 +46,17 @@ MonteCarloResult monte_carlo(const MonteCarloPlan& plan, const std::function<boo
     const std::uint64_t seed = plan.seeds[job % seeds];
     optimize::Seeker seeker = plan.seekers[job % per_bench / seeds];
     bench.reset(seed);
-    LoopStatistics statistics(plan.criteria[job / per_bench], plan.cycles);
     std::visit(
         [&](auto& s) {
+          LoopStatistics statistics(with_limits_of(plan.criteria[job / per_bench], s), plan.cycles);
           if constexpr (requires { s.reseed(seed); }) s.reseed(seed);
           for (std::int64_t k = 0; k < plan.cycles; ++k) {
             if (k % cycles_between_looks == 0 && stopped()) return;
             statistics.add(loop_step(bench, s));
           }
+          if (!stopped.obeyed()) result.loops[job] = statistics.summary();
         },
         seeker);
-    if (!stopped.obeyed()) result.loops[job] = statistics.summary();
   };
   result.finished = parallel_for(jobs, threads, run, stop);
   return result;

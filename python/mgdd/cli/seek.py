@@ -4,13 +4,16 @@ from __future__ import annotations
 
 import argparse
 import copy
+import logging
 import math
 from collections.abc import Iterator, Mapping
 from contextlib import contextmanager
+from dataclasses import replace
 from typing import TYPE_CHECKING, Any
 
 from mgdd.cli.options import add_command, add_engine, engine_of, number_pairs
-from mgdd.cli.output import Stopped, check_figure, check_output, emit, save_figure
+from mgdd.cli.output import Stopped, check_figure, check_output, emit, lines, save_figure
+from mgdd.cli.seek_limits import COV, COV_CYCLES, choose_start, doubts_of, limit_report, limit_text
 from mgdd.cli.seekers import Task, default_cycles, make_seeker
 from mgdd.engine import Performance
 from mgdd.errors import ConvergenceError, Interrupted, ParameterError
@@ -18,7 +21,7 @@ from mgdd.loop import EngineBench, LoopCriteria, run_seeker
 from mgdd.loop.plant_loop import LoopRun
 from mgdd.optimize import Optimum
 from mgdd.plot.style import drawn
-from mgdd.results.labels import VARIABLES
+from mgdd.results.labels import VARIABLES, to_jsonable
 from mgdd.results.units import unit_attributes
 
 if TYPE_CHECKING:
@@ -26,10 +29,12 @@ if TYPE_CHECKING:
 
 __all__ = ["add_seek"]
 
+_LOG = logging.getLogger(__name__)
 _METHODS = ("extremum_seeking", "newton", "bounded", "spsa", "golden")
 _FORMS = ("batch", "moving_average", "washout")
 _LATE = ("extremum_seeking", "newton")
-_COV, _COV_CYCLES, _COV_TRIAL = "cov_imep_percent", 50, 1000
+_COV_TRIAL = 1000
+_START_CAD = -20.0
 _MOST_CYCLES = 2_000_000
 _ARRIVAL_CAD = 1.0
 # Fields of the library and the options that set them.
@@ -42,12 +47,15 @@ def add_seek(verbs: Any) -> None:
     parser = add_command(
         verbs, "seek", _seek,
         help_text="let a seeker find the best start of combustion on the virtual bench, one cycle at a time",
-        example="mgdd engine seek --method extremum_seeking --start-cad -20 --limit p_max_bar=95 --json",
+        example="mgdd engine seek --method extremum_seeking --limit p_max_bar=95 --json",
         endings=".json or .csv, the cycles",
     )  # fmt: skip
     parser.add_argument("--method", choices=_METHODS, default="extremum_seeking", help="default: extremum_seeking")
     parser.add_argument("--form", choices=_FORMS, help="of extremum_seeking (default: batch)")
-    parser.add_argument("--start-cad", type=float, default=-20.0, metavar="X", help="first SOC (default: -20)")
+    parser.add_argument(
+        "--start-cad", type=float, metavar="X",
+        help="first SOC (default: -20; with --limit a start whose noise-free values stay below the limits)",
+    )  # fmt: skip
     parser.add_argument("--lower-cad", type=float, default=-30.0, metavar="X", help="earliest SOC (default: -30)")
     parser.add_argument("--upper-cad", type=float, default=10.0, metavar="X", help="latest SOC (default: 10)")
     parser.add_argument(
@@ -57,7 +65,7 @@ def add_seek(verbs: Any) -> None:
     parser.add_argument("--seed", type=int, default=0, metavar="N", help="of all noise (default: 0)")
     parser.add_argument(
         "--limit", action="append", default=[], metavar="NAME=X",
-        help=f"keep an indicator, or {_COV}, below X; repeatable",
+        help=f"keep an indicator, or {COV}, below X; repeatable",
     )  # fmt: skip
     parser.add_argument(
         "--limit-method", choices=("switching", "penalty", "barrier"),
@@ -94,7 +102,7 @@ def _seek(args: argparse.Namespace) -> None:
     task = Task(
         method=args.method,
         form=args.form or "batch",
-        start_cad=args.start_cad,
+        start_cad=_START_CAD if args.start_cad is None else args.start_cad,
         bounds_cad=(args.lower_cad, args.upper_cad),
         seed=args.seed,
         noise_sd=args.noise,
@@ -104,18 +112,30 @@ def _seek(args: argparse.Namespace) -> None:
         bench=bench,
         best=best,
     )
+    reason = "default" if args.start_cad is None else "as given"
+    if args.start_cad is None and limits:
+        start, reason = choose_start(task)
+        task = replace(task, start_cad=start)
     with _option_names():
         seeker = make_seeker(task)
     cycles = default_cycles(task) if args.cycles is None else args.cycles
-    above = _thresholds(best, limits)
-    goal = LoopCriteria(optimum=best["soc_cad"], arrival=_ARRIVAL_CAD, exceed_above=above)
+    goal = LoopCriteria(optimum=best["soc_cad"], arrival=_ARRIVAL_CAD)
     try:
         run = run_seeker(bench, seeker, cycles, criteria=goal)
     except Interrupted as stop:
         if not isinstance(stop.partial, LoopRun):
             raise
         run = stop.partial
-    emit(args, _payload(args, preset, run, best, limits), traces=_table(run.dataset))
+    bracketing = args.start_cad is None or args.method == "golden"
+    remedy = "narrow --lower-cad to --upper-cad" if bracketing else "leave --start-cad out or move it"
+    doubts = doubts_of(run, limits, remedy)
+    for doubt in doubts:
+        _LOG.warning("%s", doubt)
+    payload = _payload(args, preset, run, best, limits)
+    payload |= {"start_cad": task.start_cad, "start_reason": reason, "warnings": doubts}
+    report = payload["limit_report"]
+    text = [lines(to_jsonable(payload)), *limit_text(report, int(run.summary["judged_from"]))]
+    emit(args, payload, text=text, traces=_table(run.dataset))
     if args.figure:
         _draw(run.dataset, best, limits, args.figure)
     if run.interrupted:
@@ -131,9 +151,9 @@ def _check(args: argparse.Namespace) -> None:
         raise ParameterError(
             f"--cycles {args.cycles}: must be in [1, {_MOST_CYCLES}]; mgdd.loop.run_seeker continues longer runs"
         )
-    if args.method == "bounded" and any(item.partition("=")[0] == _COV for item in args.limit):
+    if args.method == "bounded" and any(item.partition("=")[0] == COV for item in args.limit):
         raise ParameterError(
-            f"--method bounded reads limits off its own oscillation, and {_COV} looks back {_COV_CYCLES} cycles: use "
+            f"--method bounded reads limits off its own oscillation, and {COV} looks back {COV_CYCLES} cycles: use "
             "another method"
         )
     if args.sensor == "analyser" and args.method not in _LATE:
@@ -176,7 +196,7 @@ def _bench(args: argparse.Namespace, limits: Mapping[str, float]) -> tuple[Engin
 
 def _optimum(args: argparse.Namespace, bench: EngineBench, limits: Mapping[str, float]) -> Optimum:
     """Find where the seeker should end; COV of IMEP has no steady value, so it is judged there."""
-    steady = {name: value for name, value in limits.items() if name != _COV}
+    steady = {name: value for name, value in limits.items() if name != COV}
     with _option_names():
         best = bench.find_optimum(steady, bounds_cad=(args.lower_cad, args.upper_cad))
     if not best.curvature < 0.0:
@@ -184,32 +204,15 @@ def _optimum(args: argparse.Namespace, bench: EngineBench, limits: Mapping[str, 
             f"the performance has no maximum near --lower-cad {args.lower_cad:g} to --upper-cad {args.upper_cad:g} "
             f"(curvature {best.curvature:.3g} at {best.free_inputs['soc_cad']:.1f}): move the bounds"
         )
-    if _COV in limits:
+    if COV in limits:
         trial = copy.deepcopy(bench).run([best["soc_cad"]] * _COV_TRIAL)
-        cov = float(trial["limits"].sel(limit=_COV)[_COV_CYCLES:].mean())
-        if cov > limits[_COV]:
+        cov = float(trial["limits"].sel(limit=COV)[COV_CYCLES:].mean())
+        if cov > limits[COV]:
             raise ConvergenceError(
-                f"--limit {_COV}={limits[_COV]:g}: the bench has {cov:.3g} % at its best timing, "
+                f"--limit {COV}={limits[COV]:g}: the bench has {cov:.3g} % at its best timing, "
                 f"{best['soc_cad']:.1f}; raise the limit, or lower --noise, --soc-scatter-cad or --misfire"
             )
     return best
-
-
-def _above(run: LoopRun, limits: Mapping[str, float]) -> float:
-    """Share of the cycles that count above a limit itself, scatter included."""
-    cycles = run.dataset.sizes["cycle"]
-    if not limits or cycles == 0:
-        return math.nan
-    measured = run.dataset["limits"].to_numpy()[LoopCriteria().counted_from(cycles) :]
-    caps = [limits[str(name)] for name in run.dataset["limit"].to_numpy()]
-    return float((measured > caps).any(axis=1).mean())
-
-
-def _thresholds(best: Optimum, limits: Mapping[str, float]) -> dict[str, float]:
-    """Limit and three standard deviations of what is compared with it; a COV of n cycles scatters by 1/sqrt(2n - 2)."""
-    own = 1.0 / math.sqrt(2.0 * (_COV_CYCLES - 1))
-    scatter = {name: best.values.get(f"scatter_{name}", own * value) for name, value in limits.items()}
-    return {name: value + 3.0 * scatter[name] for name, value in limits.items()}
 
 
 def _payload(
@@ -222,20 +225,20 @@ def _payload(
         "sensor": args.sensor,
         "seed": args.seed,
         "cycles": run.dataset.sizes["cycle"],
-        "start_cad": args.start_cad,
+        "start_cad": None,
+        "start_reason": None,
         "final_cad": summary["final_cad"],
         "optimum_cad": best["soc_cad"],
         "free_optimum_cad": best.free_inputs["soc_cad"],
         "cycles_to_1_cad": summary["cycles_to"],
         "rms_cad": summary["rms_cad"],
-        "limit_exceeded_fraction": summary["exceeded_fraction"],
-        "limit_above_fraction": _above(run, limits),
         "mean_j": summary["mean_j"],
         "mean_efficiency_percent": summary["mean_efficiency_percent"],
         "mean_nox_ppm": summary["mean_nox_ppm"],
         "misfires": int(summary["misfires"]),
         "limits": dict(limits),
-        "limit_thresholds": _thresholds(best, limits),
+        "judged_from": int(summary["judged_from"]),
+        "limit_report": limit_report(run, best, limits),
         "interrupted": run.interrupted,
     }
     if args.method == "extremum_seeking":
@@ -248,9 +251,9 @@ def _payload(
 def _table(cycles: xr.Dataset) -> xr.Dataset:
     """Leave the columns over cycles; limited indicators are among them, COV is added."""
     table = cycles.drop_dims([dim for dim in cycles.dims if dim != "cycle"])
-    if "limit" in cycles.dims and _COV in cycles["limit"].to_numpy():
-        cov = cycles["limits"].sel(limit=_COV, drop=True).drop_vars("limit_units", errors="ignore")
-        table[_COV] = cov.assign_attrs(unit_attributes(*VARIABLES[_COV]))
+    if "limit" in cycles.dims and COV in cycles["limit"].to_numpy():
+        cov = cycles["limits"].sel(limit=COV, drop=True).drop_vars("limit_units", errors="ignore")
+        table[COV] = cov.assign_attrs(unit_attributes(*VARIABLES[COV]))
     return table
 
 

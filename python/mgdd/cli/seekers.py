@@ -16,7 +16,7 @@ if TYPE_CHECKING:
     from mgdd.loop import EngineBench
     from mgdd.optimize import Optimum, Seeker
 
-__all__ = ["Task", "default_cycles", "make_seeker"]
+__all__ = ["Task", "amplitude_of", "default_cycles", "make_seeker"]
 
 _AMPLITUDE_CAD, _NEWTON_AMPLITUDE_CAD, _LATE_AMPLITUDE_CAD = 1.0, 2.0, 2.0
 _NEWTON_LIMITED_CAD = 1.2  # a wide dither keeps its mean far from a limit
@@ -56,7 +56,7 @@ def default_cycles(task: Task) -> int:
 def make_seeker(task: Task) -> Seeker:
     """Make the seeker; its gain follows from the curvature of the steady map, its period from the lag."""
     low, high = task.bounds_cad
-    amplitude = _amplitude(task)
+    amplitude = amplitude_of(task)
     if low + amplitude > high - amplitude:
         raise ParameterError(
             f"--upper-cad {high:g}: must be at least {2.0 * amplitude:g} °CA above --lower-cad {low:g}, room for what "
@@ -104,7 +104,8 @@ def make_seeker(task: Task) -> Seeker:
     )
 
 
-def _amplitude(task: Task) -> float:
+def amplitude_of(task: Task) -> float:
+    """Return how far the method moves to both sides of its estimate [°CA]."""
     if task.method in ("bounded", "golden"):
         return 0.0
     if task.method == "spsa":

@@ -170,7 +170,8 @@ class EngineBench(_core.loop.EngineBench):
         Returns
         -------
         Measurement
-            ``values`` holds the indicators, actual SOC, NOx of every sensor and the flags as 0 or 1.
+            ``values`` holds the indicators, actual SOC, NOx of every sensor and the flags as 0 or 1;
+            ``noise_free_limits`` are the limits at this timing without scatter, noise and misfire, COV of IMEP as NaN.
 
         Raises
         ------
@@ -180,6 +181,7 @@ class EngineBench(_core.loop.EngineBench):
         applied = getattr(self, "_applied_cad", None)
         if applied is None:
             raise RigError("measure() before apply(): apply a timing first")
+        noise_free = self.noise_free_limits([applied], [self.cycle])[0] if self.limit_names else []
         cycle = self.step(applied)
         components, limits = cycle.pop("components"), cycle.pop("limits")
         return Measurement(
@@ -187,6 +189,7 @@ class EngineBench(_core.loop.EngineBench):
             limits=limits,
             misfire=cycle["misfire"],
             values={name: float(value) for name, value in cycle.items()},
+            noise_free_limits=dict(zip(self.limit_names, map(float, noise_free), strict=True)),
         )
 
     def run(self, soc_cad: ArrayLike) -> xr.Dataset:

@@ -7,11 +7,13 @@ from collections.abc import Sequence
 from typing import TYPE_CHECKING, Any
 
 from mgdd import _core
+from mgdd.loop.limit_figures import noise_free_variable
 from mgdd.results.labels import VARIABLES, labelled_dataset
 
 if TYPE_CHECKING:
+    import numpy as np
     import xarray as xr
-    from numpy.typing import ArrayLike
+    from numpy.typing import ArrayLike, NDArray
 
 __all__ = ["FLAGS", "cycles_to_dataset"]
 
@@ -23,7 +25,13 @@ FLAGS = {
 }
 
 
-def cycles_to_dataset(bench: _core.loop.EngineBench, columns: dict[str, Any], **more: ArrayLike) -> xr.Dataset:
+def cycles_to_dataset(
+    bench: _core.loop.EngineBench,
+    columns: dict[str, Any],
+    *,
+    noise_free_limits: NDArray[np.float64] | None = None,
+    **more: ArrayLike,
+) -> xr.Dataset:
     """Label the columns of a run, with further columns of names that `VARIABLES` knows."""
     settings = bench.settings
     terms = _unique([term.signal for term in settings["performance"].terms])
@@ -42,6 +50,8 @@ def cycles_to_dataset(bench: _core.loop.EngineBench, columns: dict[str, Any], **
         variables["limit"] = ("limit", names, "-", "limited quantity")
         variables["limit_units"] = ("limit", [units[name] for name in names], "-", own)
         variables["limits"] = (("cycle", "limit"), limits, own, "measured value of a limited quantity")
+        if noise_free_limits is not None:
+            variables["noise_free_limits"] = noise_free_variable(noise_free_limits)
     out = labelled_dataset(variables, attrs={"seed": bench.seed, "nox_sensor": settings["nox_sensor"]})
     return out.set_coords("limit_units") if names else out
 

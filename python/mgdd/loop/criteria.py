@@ -5,8 +5,12 @@ from __future__ import annotations
 import math
 from collections.abc import Mapping
 from dataclasses import dataclass, field
+from typing import TYPE_CHECKING
 
 from mgdd.errors import ParameterError
+
+if TYPE_CHECKING:
+    from mgdd.optimize import Seeker
 
 __all__ = ["LoopCriteria"]
 
@@ -26,10 +30,14 @@ class LoopCriteria:
     tail_cycles : int
         Cycles behind ``final_cad``.
     exceed_from : int, optional
-        First cycle that counts for ``exceeded_fraction``; by default 1000, or the middle of a run of fewer than 2000
-        cycles.
+        First cycle that counts for ``exceeded_fraction`` and the figures ``judged_...``; by default 1000, or the middle
+        of a run of fewer than 2000 cycles. The summary repeats it as ``judged_from``.
     exceed_above : mapping of str to float
-        Per limit, the value above which a cycle counts.
+        Per limit, the value above which a cycle counts for ``exceeded_fraction``, for example the limit and a margin
+        for its scatter; the summary repeats it as ``exceed_above_NAME``.
+    limits : mapping of str to float, optional
+        Limits of which the summary tells ``worst_NAME``, ``above_fraction_NAME`` and so on, without any margin; those
+        of the seeker if left out.
 
     Raises
     ------
@@ -51,6 +59,7 @@ class LoopCriteria:
     tail_cycles: int = 100
     exceed_from: int | None = None
     exceed_above: Mapping[str, float] = field(default_factory=dict)
+    limits: Mapping[str, float] | None = None
 
     def __post_init__(self) -> None:
         number = isinstance(self.optimum, int | float) and math.isfinite(self.optimum)
@@ -62,9 +71,10 @@ class LoopCriteria:
             raise ParameterError.of("tail_cycles", self.tail_cycles, ">= 1")
         if self.exceed_from is not None and self.exceed_from < 0:
             raise ParameterError.of("exceed_from", self.exceed_from, ">= 0")
-        for name, value in self.exceed_above.items():
-            if math.isnan(value):
-                raise ParameterError(f"exceed_above: {name} = nan: give a number, or leave it out")
+        for what, values in (("exceed_above", self.exceed_above), ("limits", self.limits or {})):
+            for name, value in values.items():
+                if math.isnan(value):
+                    raise ParameterError(f"{what}: {name} = nan: give a number, or leave it out")
 
     def counted_from(self, cycles: int) -> int:
         """Give the first cycle that counts for ``exceeded_fraction``.
@@ -121,6 +131,34 @@ class LoopCriteria:
         mgdd.errors.ParameterError
             ``exceed_above`` names another limit.
         """
-        if unknown := sorted(set(self.exceed_above) - set(names)):
-            raise ParameterError(f"exceed_above: {unknown} not among the limits, {list(names)}")
-        return [float(self.exceed_above.get(name, math.inf)) for name in names] if self.exceed_above else []
+        return _in_order("exceed_above", self.exceed_above, names) if self.exceed_above else []
+
+    def limits_of(self, names: tuple[str, ...], seeker: Seeker | None = None) -> list[float]:
+        """Give ``limits`` or those of the seeker in the order of the names, infinite where there is none.
+
+        Parameters
+        ----------
+        names : tuple of str
+            Limited quantities that are measured.
+        seeker : optional
+            Any seeker of `mgdd.optimize`.
+
+        Returns
+        -------
+        list of float
+            One per name.
+
+        Raises
+        ------
+        mgdd.errors.ParameterError
+            ``limits`` names another quantity.
+        """
+        if self.limits is not None or seeker is None:
+            return _in_order("limits", self.limits or {}, names)
+        return _in_order("limits", {limit.name: limit.upper for limit in seeker.settings["limits"]}, names)
+
+
+def _in_order(what: str, values: Mapping[str, float], names: tuple[str, ...]) -> list[float]:
+    if unknown := sorted(set(values) - set(names)):
+        raise ParameterError(f"{what}: {unknown} not among the limits, {list(names)}")
+    return [float(values.get(name, math.inf)) for name in names]

@@ -28,6 +28,8 @@ class Measurement:
         Whether the cycle burned nothing: its performance says nothing about the inputs.
     values : mapping of str to float
         Everything else that was measured, by name.
+    noise_free_limits : mapping of str to float
+        Limited quantities at these inputs without scatter and noise; empty where the plant does not know them.
 
     Examples
     --------
@@ -40,6 +42,7 @@ class Measurement:
     limits: Mapping[str, float] = field(default_factory=dict)
     misfire: bool = False
     values: Mapping[str, float] = field(default_factory=dict)
+    noise_free_limits: Mapping[str, float] = field(default_factory=dict)
 
     @property
     def performance(self) -> float:

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import TYPE_CHECKING, Any, NamedTuple
 
 import numpy as np
@@ -12,6 +12,7 @@ import numpy as np
 from mgdd.errors import Interrupted, ParameterError
 from mgdd.loop.bench_record import FLAGS
 from mgdd.loop.criteria import LoopCriteria
+from mgdd.loop.limit_figures import noise_free_variable
 from mgdd.loop.plant import AnnouncingPlant, Measurement, Plant
 from mgdd.loop.summary import summarize_cycles
 from mgdd.results.describe import described
@@ -51,9 +52,13 @@ class LoopRun:
         one input is not ``soc_cad`` has ``estimate`` and ``applied`` over ``cycle`` and ``input`` instead.
     summary : mapping of str to float
         ``final_cad`` (mean estimate of the last 100 cycles), ``mean_cad`` and ``rms_cad`` (second half), ``cycles_to``
-        and ``cycles_stays`` (NaN: never), ``exceeded_fraction``, means of J, efficiency and true NOx over the second
-        half, extremes of the estimate, misfires. Of several inputs, or one that is not an angle, only what does not
-        need the estimate.
+        and ``cycles_stays`` (NaN: never), means of J, efficiency and true NOx over the second half, extremes of the
+        estimate, misfires. Of several inputs, or one that is not an angle, only what does not need the estimate.
+        For every limit, as measured and without any margin: ``limit_NAME``, ``worst_NAME`` and ``worst_cycle_NAME``,
+        ``above_cycles_NAME`` and ``above_fraction_NAME`` from the first cycle on, ``judged_above_cycles_NAME`` and
+        ``judged_above_fraction_NAME`` from cycle ``judged_from`` on. The same with ``noise_free_`` in front, where the
+        plant knows the value at the applied inputs without scatter and noise. ``exceeded_fraction`` is the share of
+        cycles from ``judged_from`` on above any of the thresholds ``exceed_above_NAME``.
     interrupted : bool
         Ctrl-C ended the run before all its cycles: it is the part that `mgdd.errors.Interrupted` carried.
 
@@ -88,6 +93,9 @@ def steer(plant: Plant, seeker: Seeker, cycles: int, criteria: LoopCriteria) -> 
             f"limits of the seeker {list(names)} are not all measured by the plant, which has {list(plant.limit_names)}"
         )
     criteria.thresholds(names)
+    uppers = criteria.limits_of(tuple(plant.limit_names), seeker)
+    judged = {name: upper for name, upper in zip(plant.limit_names, uppers, strict=True) if math.isfinite(upper)}
+    criteria = replace(criteria, limits=judged)
     criteria.require_counted(cycles)
     announcing = plant if isinstance(plant, AnnouncingPlant) else None
     first, log, interrupted = seeker.cycle, list[_Row](), False
@@ -183,5 +191,8 @@ def _dataset(log: list[_Row], first: int, inputs: tuple[str, ...]) -> xr.Dataset
         variables["limit"] = ("limit", limits, "-", "limited quantity")
         variables["limit_units"] = ("limit", units, "-", own)
         variables["limits"] = (("cycle", "limit"), table, own, "measured value of a limited quantity")
+        if any(row.noise_free_limits for row in rows):
+            known = np.array([[row.noise_free_limits.get(name, math.nan) for name in limits] for row in rows])
+            variables["noise_free_limits"] = noise_free_variable(known)
     out = labelled_dataset(variables)
     return out.set_coords("limit_units") if limits else out

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import math
 import operator
-from collections.abc import Iterable, Sequence
+from collections.abc import Iterable, Mapping, Sequence
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
@@ -14,6 +14,7 @@ from mgdd.errors import ParameterError, ShapeError, hand_over, or_partial
 from mgdd.loop.bench import EngineBench
 from mgdd.loop.bench_record import cycles_to_dataset
 from mgdd.loop.criteria import LoopCriteria
+from mgdd.loop.limit_figures import FIGURES, NOISE_FREE, limit_figures, limit_label
 from mgdd.loop.plant import Plant
 from mgdd.loop.plant_loop import LoopRun, steer
 from mgdd.results.labels import labelled_dataset
@@ -32,7 +33,7 @@ _SUMMARY = {
     "rms_cad": ("°CA", "rms distance of the estimate to the optimum, second half"),
     "cycles_to": ("cycle", "first cycle at which the estimate has arrived"),
     "cycles_stays": ("cycle", "cycle from which the estimate stays"),
-    "exceeded_fraction": ("-", "share of cycles over a limit"),
+    "exceeded_fraction": ("-", "share of the cycles from judged_from on above a threshold exceed_above_..."),
     "mean_applied_cad": (_CAD, "mean applied timing, second half"),
     "mean_j": ("unit of J", "mean performance, second half"),
     "mean_efficiency_percent": ("%", "mean gross efficiency, second half"),
@@ -40,6 +41,7 @@ _SUMMARY = {
     "lowest_cad": (_CAD, "lowest estimate"),
     "highest_cad": (_CAD, "highest estimate"),
     "misfires": ("-", "misfired cycles"),
+    "judged_from": ("cycle", "first cycle of exceeded_fraction and of the figures judged_..."),
 }
 
 
@@ -103,9 +105,21 @@ def run_seeker(
     goal = _core_criteria(plant, criteria)
     run: Any = _core.loop.run_loop  # one overload for each class of seeker
     raw, stop = or_partial(lambda: run(plant, seeker, cycles, **goal))
-    dataset = cycles_to_dataset(plant, raw["columns"], estimate_cad=raw["estimate_cad"])
+    columns, names = raw["columns"], plant.limit_names
+    known = plant.noise_free_limits(columns["soc_requested_cad"], columns["cycle"])
+    dataset = cycles_to_dataset(plant, columns, estimate_cad=raw["estimate_cad"], noise_free_limits=known)
     dataset.attrs["interrupted"] = int(raw["interrupted"])
-    return hand_over(LoopRun(dataset=dataset, summary=raw["summary"], interrupted=raw["interrupted"]), stop)
+    summary = _with_a_limit(raw["summary"], names)
+    summary |= {f"exceed_above_{name}": float(value) for name, value in criteria.exceed_above.items()}
+    uppers = criteria.limits_of(names, seeker)
+    summary |= limit_figures(known, names, uppers, int(summary["judged_from"]), NOISE_FREE)
+    return hand_over(LoopRun(dataset=dataset, summary=summary, interrupted=raw["interrupted"]), stop)
+
+
+def _with_a_limit(raw: Mapping[str, Any], names: Sequence[str]) -> dict[str, Any]:
+    """Leave out what the core says of a limited quantity without a limit."""
+    free = {f"{figure}_{name}" for name in names if not np.isfinite(raw[f"limit_{name}"]).any() for figure in FIGURES}
+    return {key: value for key, value in raw.items() if key not in free}
 
 
 def _core_criteria(bench: EngineBench, criteria: LoopCriteria) -> dict[str, Any]:
@@ -115,6 +129,7 @@ def _core_criteria(bench: EngineBench, criteria: LoopCriteria) -> dict[str, Any]
         "tail_cycles": criteria.tail_cycles,
         "exceed_from": criteria.exceed_from,
         "exceed_above": criteria.thresholds(bench.limit_names),
+        "limits": [] if criteria.limits is None else criteria.limits_of(bench.limit_names),
     }
 
 
@@ -150,8 +165,8 @@ def monte_carlo(
     Returns
     -------
     xarray.Dataset
-        Over ``bench``, ``seeker`` and ``seed``: the summary of `run_seeker`, and ``finished``, true
-        everywhere.
+        Over ``bench``, ``seeker`` and ``seed``: the summary of `run_seeker` without its noise-free figures, which would
+        double the work, and ``finished``, true everywhere.
 
     Raises
     ------
@@ -195,6 +210,7 @@ def monte_carlo(
             tail_cycles=each[0]["tail_cycles"] if each else 1,
             exceed_from=each[0]["exceed_from"] if each else None,
             exceed_above=[own["exceed_above"] for own in each],
+            limits=[own["limits"] for own in each],
             threads=threads,
         )
     )
@@ -207,8 +223,13 @@ def monte_carlo(
         "seed": ("seed", np.array(seed_list, np.uint64), "-", "seed"),
         "finished": (dims, finished, "-", "whether the loop ran to its end"),
     }
-    for name, values in raw.items():
-        variables[name] = (dims, np.where(finished, values.reshape(shape), np.nan), *_SUMMARY[name])
+    names = bench_list[0].limit_names
+    for name, values in _with_a_limit(raw, names).items():
+        label = _SUMMARY.get(name) or limit_label(name, names)
+        variables[name] = (dims, np.where(finished, values.reshape(shape), np.nan), *label)
+    for name in dict.fromkeys(name for own in given for name in own.exceed_above):
+        above = [float(own.exceed_above.get(name, np.nan)) for own in given]
+        variables[f"exceed_above_{name}"] = ("bench", above, *limit_label(f"exceed_above_{name}", names))
     return hand_over(labelled_dataset(variables, attrs={"cycles": cycles}), stop)
 
 

@@ -3,12 +3,13 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from typing import TYPE_CHECKING
 
 import numpy as np
 
 from mgdd.loop.criteria import LoopCriteria
+from mgdd.loop.limit_figures import NOISE_FREE, limit_figures
 
 if TYPE_CHECKING:
     import xarray as xr
@@ -25,9 +26,10 @@ def summarize_cycles(cycles: xr.Dataset, criteria: LoopCriteria | None = None) -
     cycles : xarray.Dataset
         Over ``cycle``: ``misfire`` and ``j``, and ``estimate_cad`` and ``soc_requested_cad`` or, over ``input`` as
         well, ``estimate`` and ``applied``; where measured also ``unphysical``, ``efficiency_gross``, ``nox_true_ppm``
-        and ``limits`` over ``limit``.
+        ``limits`` and ``noise_free_limits`` over ``limit``.
     criteria : LoopCriteria, optional
-        As in `run_seeker`; cycles are counted from the first row.
+        As in `run_seeker`; cycles are counted from the first row. No seeker is at hand, so ``limits`` must be named for
+        their figures.
 
     Returns
     -------
@@ -38,7 +40,7 @@ def summarize_cycles(cycles: xr.Dataset, criteria: LoopCriteria | None = None) -
     Raises
     ------
     mgdd.errors.ParameterError
-        A limit in ``exceed_above`` that was not measured.
+        A limit in ``exceed_above`` or ``limits`` that was not measured.
 
     Examples
     --------
@@ -53,7 +55,10 @@ def summarize_cycles(cycles: xr.Dataset, criteria: LoopCriteria | None = None) -
     """
     criteria = criteria or LoopCriteria()
     measured = tuple(str(name) for name in cycles["limit"].to_numpy()) if "limits" in cycles else ()
-    criteria.thresholds(measured)
+    uppers = list[float]()
+    if cycles.sizes["cycle"]:  # a run that was interrupted before its first cycle has measured nothing
+        criteria.thresholds(measured)
+        uppers = criteria.limits_of(measured)
     estimate, applied = _one_angle(cycles)
     n = estimate.size
     half = np.arange(n) >= n // 2
@@ -77,6 +82,9 @@ def summarize_cycles(cycles: xr.Dataset, criteria: LoopCriteria | None = None) -
         "lowest_cad": float(np.min(estimate, initial=math.inf)),
         "highest_cad": float(np.max(estimate, initial=-math.inf)),
         "misfires": float(misfire.sum()),
+        "judged_from": float(criteria.counted_from(n)),
+        **{f"exceed_above_{name}": float(value) for name, value in criteria.exceed_above.items()},
+        **_of_limits(cycles, uppers, criteria.counted_from(n)),
     }
     if criteria.optimum is None:
         return out
@@ -87,6 +95,16 @@ def summarize_cycles(cycles: xr.Dataset, criteria: LoopCriteria | None = None) -
         out["cycles_to"] = float(np.argmax(near))
     if n and near[-1]:
         out["cycles_stays"] = float(n - np.argmin(near[::-1])) if not near.all() else 0.0
+    return out
+
+
+def _of_limits(cycles: xr.Dataset, uppers: Sequence[float], judged_from: int) -> dict[str, float]:
+    """Sum up the limits of a run as measured and, where the plant knows them, noise-free; `uppers` as in `limit`."""
+    out: dict[str, float] = {}
+    for variable, prefix in (("limits", ""), ("noise_free_limits", NOISE_FREE)):
+        if variable in cycles:
+            names = [str(name) for name in cycles["limit"].to_numpy()]
+            out |= limit_figures(cycles[variable].to_numpy(), names, uppers, judged_from, prefix)
     return out
 
 

@@ -152,7 +152,8 @@ class SurrogatePlant:
         Returns
         -------
         Measurement
-            ``values`` holds the reading of every signal, and ``supported`` as 0 or 1.
+            ``values`` holds the reading of every signal, and ``supported`` as 0 or 1; ``noise_free_limits`` are the
+            limits without the residuals, lags included.
 
         Raises
         ------
@@ -169,6 +170,7 @@ class SurrogatePlant:
             components=tuple(weight * float(reading[name]) for name, weight in self._weights.items()),
             limits={name: float(reading[name]) for name in self._limits},
             values={name: float(value) for name, value in reading.items()},
+            noise_free_limits={name: self._noise_free[name] for name in self._limits},
         )
 
     def step(self, soi_cad: float, at: Mapping[str, float] | None = None) -> dict[str, float | bool]:
@@ -199,6 +201,7 @@ class SurrogatePlant:
         arriving = self._history[self._delays, np.arange(self._delays.size)]
         self._sensor = self._decays * self._sensor + (1.0 - self._decays) * arriving
         self._cycles += 1
+        self._noise_free = dict(zip(self._names, np.maximum(self._sensor, self._floor).tolist(), strict=True))
         reading = np.maximum(self._sensor + self._residual(), self._floor)
         return {**{name: float(v) for name, v in zip(self._names, reading, strict=True)}, "supported": supported}
 

@@ -105,7 +105,9 @@ def run_timing_tests(
     StudyResult
         One row per test: start, optimum of its J, mean estimate of the last 300 cycles, first cycle within 1 CAD,
         each with its 95 % interval over seeds, efficiency and true NOx before (steady, at the start) and after (mean
-        of cycles 1500 to 3000, dither included), and the gain in J by true NOx.
+        of cycles 1500 to 3000, dither included), and the gain in J by true NOx. The limited row adds the worst
+        pressure, the share of all cycles and of those from ``judged_from`` on above the limit, and of the latter also
+        above ``exceed_above_bar``, the limit and three standard deviations of its scatter.
 
     Raises
     ------
@@ -177,7 +179,14 @@ def _run(test: _Test, seeds: int, *, limited: bool = False) -> _Outcome:
         **with_interval("gain_percent_points", after - (efficiency - weight * nox)),
     }
     if limited:
-        row |= {"exceeded_share": float(table["exceeded_fraction"].mean())}
+        row |= {
+            "worst_p_max_bar": float(table["worst_p_max_bar"].max()),
+            "above_share": float(table["above_fraction_p_max_bar"].mean()),
+            "judged_from": int(table["judged_from"].max()),
+            "judged_above_share": float(table["judged_above_fraction_p_max_bar"].mean()),
+            "exceed_above_bar": above["p_max_bar"],
+            "exceeded_share": float(table["exceeded_fraction"].mean()),
+        }
     run = run_with_slope(test.bench(limited=limited), seeker, CYCLES)
     return _Outcome(row=row, run=run, table=table)
 

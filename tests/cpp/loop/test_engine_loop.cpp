@@ -139,6 +139,34 @@ TEST(LoopStatistics, LimitsAreJudgedInShortRunsToo) {
   }
 }
 
+TEST(LoopStatistics, LimitsAreToldFromTheFirstCycleOnAndWithoutAMargin) {
+  LoopStatistics statistics({.exceed_from = 4, .limits = {10.0}}, 9);
+  const double none = std::numeric_limits<double>::quiet_NaN();
+  for (const double value : {11.0, 99.0, 10.0, 10.1, 10.0, 10.1, none, 99.0, 9.0})
+    statistics.add(cycle_at(0.0, value));
+  const LoopSummary s = statistics.summary();
+  EXPECT_EQ(s.judged_from, 4);
+  const LimitFigures& f = s.limits[0];
+  EXPECT_DOUBLE_EQ(f.limit, 10.0);
+  EXPECT_DOUBLE_EQ(f.worst, 99.0);
+  EXPECT_DOUBLE_EQ(f.worst_cycle, 1.0);
+  EXPECT_EQ(f.read_cycles, 8);
+  EXPECT_EQ(f.above_cycles, 5);
+  EXPECT_EQ(f.judged_read_cycles, 4);
+  EXPECT_EQ(f.judged_above_cycles, 2);
+  EXPECT_TRUE(std::isnan(s.limits[1].worst));  // the bench has one limit
+  EXPECT_TRUE(std::isnan(s.exceeded_fraction));
+  EXPECT_THROW(validate({.limits = {none}}, 9), ParameterError);
+}
+
+TEST(LoopStatistics, TheLimitsAreThoseOfTheSeekerUnlessNamed) {
+  optimize::ExtremumSeekingSettings s = batch(-12.0);
+  s.limits = {{.name = "p_max_bar", .upper = 110.0, .margin = 3.0}, {.name = "cov_imep_percent", .upper = 5.0}};
+  const optimize::ExtremumSeeking seeker(s);
+  EXPECT_EQ(with_limits_of({}, seeker).limits, (std::vector{110.0, 5.0}));
+  EXPECT_EQ(with_limits_of({.limits = {90.0, 4.0}}, seeker).limits, (std::vector{90.0, 4.0}));
+}
+
 TEST(LoopStatistics, AWindowWithoutACycleIsRefused) {
   EXPECT_NO_THROW(validate({.exceed_from = 299, .exceed_above = {10.0}}, 300));
   EXPECT_NO_THROW(validate({.exceed_from = 1000}, 300));  // no threshold: nothing is judged

@@ -56,7 +56,7 @@ TEST(MonteCarlo, IsTheSameLoopsOnAnyNumberOfThreads) {
   bench.reset(4);
   auto spsa = std::get<optimize::Spsa>(plan.seekers[1]);
   spsa.reseed(4);
-  LoopStatistics alone(plan.criteria[1], plan.cycles);
+  LoopStatistics alone(with_limits_of(plan.criteria[1], spsa), plan.cycles);
   for (int k = 0; k < plan.cycles; ++k)
     alone.add(loop_step(bench, spsa));
   EXPECT_TRUE(same(alone.summary(), one.loops[11]));

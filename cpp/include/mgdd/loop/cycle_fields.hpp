@@ -39,7 +39,7 @@ inline constexpr std::array<BenchFlag, 4> bench_flags{{
 }};
 
 /// What a run came to, the number of its cycles apart.
-inline constexpr std::array<NamedNumber<LoopSummary>, 13> loop_summary_numbers{{
+inline constexpr std::array<NamedNumber<LoopSummary>, 14> loop_summary_numbers{{
     {"final_cad", [](const LoopSummary& s) noexcept { return s.final_cad; }},
     {"mean_cad", [](const LoopSummary& s) noexcept { return s.mean_cad; }},
     {"rms_cad", [](const LoopSummary& s) noexcept { return s.rms_cad; }},
@@ -53,6 +53,24 @@ inline constexpr std::array<NamedNumber<LoopSummary>, 13> loop_summary_numbers{{
     {"lowest_cad", [](const LoopSummary& s) noexcept { return s.lowest_cad; }},
     {"highest_cad", [](const LoopSummary& s) noexcept { return s.highest_cad; }},
     {"misfires", [](const LoopSummary& s) noexcept { return static_cast<double>(s.misfires); }},
+    {"judged_from", [](const LoopSummary& s) noexcept { return static_cast<double>(s.judged_from); }},
+}};
+
+/// Of one limit; written out as NAME_LIMIT. A share of no cycle is NaN.
+inline constexpr std::array<NamedNumber<LimitFigures>, 7> limit_figure_numbers{{
+    {"limit", [](const LimitFigures& f) noexcept { return f.limit; }},
+    {"worst", [](const LimitFigures& f) noexcept { return f.worst; }},
+    {"worst_cycle", [](const LimitFigures& f) noexcept { return f.worst_cycle; }},
+    {"above_cycles", [](const LimitFigures& f) noexcept { return static_cast<double>(f.above_cycles); }},
+    {"above_fraction",
+     [](const LimitFigures& f) noexcept {
+       return static_cast<double>(f.above_cycles) / static_cast<double>(f.read_cycles);
+     }},
+    {"judged_above_cycles", [](const LimitFigures& f) noexcept { return static_cast<double>(f.judged_above_cycles); }},
+    {"judged_above_fraction",
+     [](const LimitFigures& f) noexcept {
+       return static_cast<double>(f.judged_above_cycles) / static_cast<double>(f.judged_read_cycles);
+     }},
 }};
 
 }  // namespace mgdd::loop

@@ -110,6 +110,10 @@ class EngineBench {
   /// sensor stands at its steady value for the first request.
   BenchCycle step(double soc_cad) noexcept;
 
+  /// Limited quantities of a cycle at that request without scatter, noise and misfire, drift included: in the order of
+  /// BenchSettings::limits, NaN for the COV of IMEP, for NaN requests and where no such cycle exists. Nothing moves.
+  std::array<double, max_limits> noise_free_limits(std::int64_t cycle, double soc_cad) noexcept;
+
   /// Back to cycle 0, with another seed.
   void reset(std::uint64_t seed) noexcept;
   void reset() noexcept { reset(seed_); }
@@ -160,7 +164,8 @@ class EngineBench {
   void judge(const Prepared& at, BenchCycle& c) noexcept;
   void measure_limits(BenchCycle& c) noexcept;
   double cov_imep_percent() const noexcept;
-  double elapsed_kcycles() const noexcept;
+  void drift_to(std::int64_t cycle) noexcept;
+  double drifted_soc_cad(double soc_cad, std::int64_t cycle) const noexcept;
   double noise(BenchStream stream) const noexcept;
 
   BenchSettings settings_;

@@ -3,6 +3,8 @@
 // ask/tell at a time goes the same way, bit for bit. Angles in °CA aTDC.
 #pragma once
 
+#include <array>
+#include <cstddef>
 #include <cstdint>
 #include <limits>
 #include <optional>
@@ -51,15 +53,33 @@ struct LoopCriteria {
   std::int64_t tail_cycles = 100;                                 ///< behind `final_cad`
   std::optional<std::int64_t> exceed_from{};  ///< first cycle that counts for the limits; none: see `counted_from`
   std::vector<double> exceed_above{};         ///< per limit of the bench: values above count; empty: not judged
+  std::vector<double> limits{};  ///< per limit of the bench: what `LoopSummary::limits` are of; infinite: of no limit;
+                                 ///< empty: those of the seeker
 };
 
 /// First cycle of a run of that length that counts for the limits: `exceed_from`, or 1000, or the middle of a run that
 /// is shorter than 2000 cycles.
 std::int64_t counted_from(const LoopCriteria& criteria, std::int64_t cycles) noexcept;
 
+/// One limit over a run, as measured: above is above the limit itself, and every cycle counts that has a reading.
+/// Cycles are counted from the first of the run; "judged" are those from `counted_from` on.
+struct LimitFigures {
+  double limit = std::numeric_limits<double>::quiet_NaN();
+  double worst = std::numeric_limits<double>::quiet_NaN();        ///< largest reading
+  double worst_cycle = std::numeric_limits<double>::quiet_NaN();  ///< first cycle with it
+  std::int64_t read_cycles = 0;
+  std::int64_t above_cycles = 0;
+  std::int64_t judged_read_cycles = 0;
+  std::int64_t judged_above_cycles = 0;
+
+  void add(double reading, std::int64_t cycle, bool judged) noexcept;
+};
+
 /// What a run came to. "Second half" is from cycle n/2 on.
 struct LoopSummary {
   std::int64_t cycles = 0;
+  std::int64_t judged_from = 0;                                         ///< first cycle that counts as judged
+  std::array<LimitFigures, max_limits> limits{};                        ///< in the order of the bench
   double final_cad = std::numeric_limits<double>::quiet_NaN();          ///< mean estimate of the last cycles
   double mean_cad = std::numeric_limits<double>::quiet_NaN();           ///< mean estimate, second half
   double rms_cad = std::numeric_limits<double>::quiet_NaN();            ///< about the optimum, second half
@@ -78,6 +98,16 @@ struct LoopSummary {
 
 /// ParameterError naming field, value and bound; also where no cycle of such a run would count for the limits.
 void validate(const LoopCriteria& criteria, std::int64_t cycles);
+
+/// The criteria with the limits of the seeker, where they name none.
+template <optimize::AnySeeker S>
+LoopCriteria with_limits_of(LoopCriteria criteria, const S& seeker) {
+  if (criteria.limits.empty()) {
+    for (const optimize::Limit& limit : seeker.settings().limits)
+      criteria.limits.push_back(limit.upper);
+  }
+  return criteria;
+}
 
 class LoopStatistics {
  public:
@@ -108,6 +138,7 @@ class LoopStatistics {
   Mean tail_, half_, square_, applied_, j_, efficiency_, nox_;
   double lowest_ = std::numeric_limits<double>::infinity(), highest_ = -std::numeric_limits<double>::infinity();
   std::int64_t misfires_ = 0;
+  std::array<LimitFigures, max_limits> limits_{};
 };
 
 }  // namespace mgdd::loop

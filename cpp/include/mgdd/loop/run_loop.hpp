@@ -31,7 +31,7 @@ LoopRun run_loop(EngineBench& bench, optimize::RecordedSeeker<S>& seeker, std::i
   for (std::int64_t k = 0; k < cycles && !stop.stop_requested(); ++k)
     run.cycles.push_back(loop_step(bench, seeker));
   const auto done = static_cast<std::int64_t>(run.cycles.size());
-  LoopStatistics statistics(criteria, done);
+  LoopStatistics statistics(with_limits_of(criteria, seeker.seeker()), done);
   for (const LoopCycle& cycle : run.cycles)
     statistics.add(cycle);
   run.summary = statistics.summary();
