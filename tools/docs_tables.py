@@ -15,6 +15,7 @@ import numpy as np
 from mgdd import datasets, engine, presets
 from mgdd.engine import Cylinder, OperatingPoint, analyze, simulate
 from mgdd.identify import best_timing, wall_heat_profile
+from mgdd.identify.engine.best_timing import BestTiming
 from mgdd.identify.engine.burn_laws import compare_laws
 from mgdd.identify.engine.records import CylinderFit
 from mgdd.io import pressure_trace
@@ -33,6 +34,7 @@ __all__ = [
     "ignition",
     "integrators",
     "learning",
+    "members",
     "optimum",
     "pegging",
     "profile",
@@ -77,7 +79,7 @@ def fits() -> dict[tuple[str, str], CylinderFit]:
 
 
 @cache
-def ranges() -> list[dict[str, Any]]:
+def ranges() -> list[BestTiming]:
     return best_timing(*measured())
 
 
@@ -180,23 +182,40 @@ def profile() -> Rows:
         ("wiebe", "linear"): r"Wiebe, linear $\gamma$",
         ("double_wiebe", "constant"): r"double Wiebe, $\gamma$ 1.37",
     }.items():
-        own = wall_heat_profile(measured()[0], fits()[law])
-        rows[label] = [own.value, own.correlation, own.range_low, own.range_high]
+        own = wall_heat_profile(fits()[law])
+        moves = [end for name in ("gamma", "pegging_bar", "tdc_cad") for end in sorted(own.moved[name])]
+        rows[label] = [own.value, own.correlation, own.range_low, own.range_high, *moves]
     return rows
 
 
+_ANSWERS = ("ca50_cad", "gain_percent", "free_ca50_cad", "free_gain_percent")
+
+
+def _answers(row: BestTiming) -> list[float]:
+    return [value for name in _ANSWERS for value in (getattr(row.best, name), *getattr(row, name))]
+
+
 def timing() -> Rows:
-    names = ("fitted_soc_cad", "free_soc_cad", "free_gain_percent", "soc_cad", "gain_percent")
-    return {load: [end for name in names for end in row[name]] for load, row in zip(_LOADS, ranges(), strict=True)}
+    return {load: _answers(row) for load, row in zip(_LOADS, ranges(), strict=True)}
+
+
+def members() -> Rows:
+    """Set the plausible members side by side: RMSE and best CA50 of each load, and the span of the efficiencies."""
+    rows: dict[str, list[float]] = {}
+    for at, answer in enumerate(ranges()[0].members):
+        own = [row.members[at] for row in ranges()]
+        if all(one.plausible for one in own):
+            eta = [one.efficiency_gross for one in own]
+            values = [one.rmse_percent for one in own] + [one.free_ca50_cad for one in own]
+            rows[answer.member.name.replace("_", " ")] = [*values, min(eta), max(eta)]
+    return rows
 
 
 def demo() -> Rows:
-    names = ("soc_cad", "gain_percent", "free_soc_cad", "free_gain_percent")
-    fit = fits()["wiebe", "linear"]
     rows = {}
-    for load, own, best in zip(_LOADS, fit.loads, ranges(), strict=True):
-        ends = [end for name in names for end in best[name]]
-        rows[load] = [own.rmse_percent, own.imep_closed_error_percent, *ends]
+    for load, row in zip(_LOADS, ranges(), strict=True):
+        assert row.best is not None
+        rows[load] = [row.best.rmse_percent, row.best.imep_closed_error_percent, *_answers(row)]
     return rows
 
 

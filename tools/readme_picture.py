@@ -14,9 +14,10 @@ import matplotlib as mpl
 import numpy as np
 
 from mgdd import datasets, presets
-from mgdd.engine import analyze, find_optimum, timing_sweep
-from mgdd.identify import fit_cylinder
-from mgdd.identify.engine.records import CylinderFit
+from mgdd.engine import analyze, timing_sweep
+from mgdd.identify import best_timing
+from mgdd.identify.engine.best_timing import BestTiming
+from mgdd.identify.engine.records import Load
 
 if TYPE_CHECKING:
     import xarray as xr
@@ -24,13 +25,11 @@ if TYPE_CHECKING:
 
 OUT = Path(__file__).parents[1] / "docs" / "_static" / "engine_cycle.png"
 LOAD = 1  # the trace at 50 % load
-BURN = ("soc_cad", "burn_duration_cad", "fuel_heat_j")
 BLACK, BLUE, ORANGE, GREY = "#000000", "#0072B2", "#D55E00", "#777777"
 
 
-def draw_trace(ax: Axes, heat: xr.Dataset, fit: CylinderFit) -> None:
+def draw_trace(ax: Axes, heat: xr.Dataset, load: Load) -> None:
     """Measured points, the calibrated line through them, and the measured heat release below."""
-    load = fit.loads[LOAD]
     overlay = load.overlay
     angle = overlay["crank_angle_cad"]
     lines = ax.plot(angle, overlay["measured_bar"], "o", color=GREY, markersize=3.2, label="measured pressure")
@@ -47,23 +46,23 @@ def draw_trace(ax: Axes, heat: xr.Dataset, fit: CylinderFit) -> None:
     ax.set_title(f"Calibrated, double Wiebe: RMSE {load.rmse_percent:.2f} % of p_max", loc="left")
 
 
-def draw_timing(ax: Axes, fits: dict[float, CylinderFit]) -> None:
-    """Closed-cycle efficiency over timing, the rest refitted at each wall-heat scale, and the range of the best."""
-    best = []
-    for (scale, fit), (dash, colour) in zip(fits.items(), (("-", BLACK), ("--", BLUE)), strict=True):
-        load = fit.loads[LOAD]
-        sweep = timing_sweep(load.cylinder, load.point, soc_cad=np.arange(-20.0, 8.5, 0.5))
+def draw_timing(ax: Axes, row: BestTiming) -> None:
+    """Closed-cycle efficiency over the angle of half burned, for plausible models of three wall heats."""
+    assert row.best is not None
+    like = [m for m in row.members if m.plausible and m.member.fitted == "gamma" and m.member.gamma_model == "linear"]
+    for answer, (dash, colour) in zip(like, (("--", BLUE), ("-", BLACK), ("-.", GREY)), strict=True):
+        load = answer.member.fit.loads[LOAD]
+        sweep = timing_sweep(load.cylinder, load.point, soc_cad=np.arange(-15.0, 10.5, 0.5))
         efficiency = 100.0 * sweep["work_closed_j"] / load.fuel_heat_j
-        ax.plot(sweep["soc_cad"], efficiency, dash, color=colour, label=f"wall-heat scale {scale:g}")
-        top = find_optimum(load.cylinder, load.point, "imep_closed_bar", step_cad=0.25)
-        best.append(top["soc_cad"])
-        ax.plot(top["soc_cad"], float(efficiency.interp(soc_cad=top["soc_cad"])), "o", color=colour, markersize=6)
-    low, high = min(best), max(best)
-    text = f"best: {low:.1f} to {high:.1f} °CA".replace("-", "−")
-    ax.axvspan(low, high, color=ORANGE, alpha=0.25, linewidth=0, label=text)
-    ax.set(xlabel="start of combustion [°CA aTDC]", ylabel="efficiency, closed cycle [%]", xlim=(-20, 8))
-    ax.legend(loc="lower right", frameon=False)
-    ax.set_title("Best timing, single Wiebe: wall heat is unknown", loc="left")
+        name = f"wall heat {answer.member.wall_heat_scale:g}, RMSE {answer.rmse_percent:.2f} %"
+        ax.plot(sweep["ca50_cad"], efficiency, dash, color=colour, label=name)
+        at = float(np.interp(answer.free_ca50_cad, sweep["ca50_cad"], efficiency))
+        ax.plot(answer.free_ca50_cad, at, "o", color=colour, markersize=6)
+    low, high = row.free_ca50_cad
+    ax.axvspan(low, high, color=ORANGE, alpha=0.2, linewidth=0, label=f"plausible: {low:.1f} to {high:.1f}")
+    ax.set(xlabel="half burned, CA50 [°CA aTDC]", ylabel="efficiency, closed cycle [%]", xlim=(-4, 20))
+    ax.legend(loc="lower center", frameon=False, fontsize=8.0)
+    ax.set_title("Best timing: equally good models disagree", loc="left")
 
 
 def main() -> None:
@@ -73,12 +72,12 @@ def main() -> None:
 
     out = Path(sys.argv[1]) if len(sys.argv) > 1 else OUT
     traces, cylinder = datasets.load("hd_diesel_128x144"), presets.load("hd_diesel_128x144").cylinder
-    double = fit_cylinder(traces, cylinder.replace(burn_shape="double_wiebe", gamma_model="constant"))
-    single = {scale: fit_cylinder(traces, cylinder.replace(wall_heat_scale=scale), free=BURN) for scale in (0.5, 1.0)}
+    row = best_timing(traces, cylinder)[LOAD]
+    assert row.best is not None
     plt.rcParams |= {"font.size": 9.5, "axes.titlesize": 9.5, "legend.fontsize": 9.0, "svg.hashsalt": "mgdd"}
     fig, (left, right) = plt.subplots(1, 2, figsize=(8.8, 3.5), layout="constrained")
-    draw_trace(left, analyze(traces[LOAD], cylinder), double)
-    draw_timing(right, single)
+    draw_trace(left, analyze(traces[LOAD], cylinder), row.best.member.fit.loads[LOAD])
+    draw_timing(right, row)
     out.parent.mkdir(parents=True, exist_ok=True)
     metadata = {"Date": None} if out.suffix == ".svg" else {"Software": None}
     fig.savefig(out, dpi=200, metadata=metadata)

@@ -9,16 +9,18 @@ from mgdd._core.engine import Cylinder
 from mgdd.cli.options import engine_of, traces_of
 from mgdd.cli.output import check_output, emit
 from mgdd.errors import ConvergenceError, ParameterError
-from mgdd.identify import fit_cylinder, wall_heat_profile
+from mgdd.identify import estimate_tdc, fit_cylinder, wall_heat_profile
 from mgdd.identify.engine.burn_laws import compare_laws
 from mgdd.identify.engine.profile import WallHeatProfile
 from mgdd.identify.engine.records import CylinderFit, figures_of
+from mgdd.identify.engine.tdc import TdcEstimate
 from mgdd.report import write_report
 from mgdd.studies import run_study
 from mgdd.studies.measured_summary import law_row
 
 __all__ = ["add_calibration", "calibrate", "calibration_arguments"]
 
+_TDC_SPAN_CAD = 2.0
 _PER_TRACE = (
     "file p_max_bar rmse_bar rmse_percent imep_closed_error_percent soc_cad burn_duration_cad fuel_heat_j ca50_cad "
     "largest_error_bar largest_error_cad heat_loss_fraction"
@@ -59,7 +61,7 @@ def calibrate(args: argparse.Namespace) -> None:
     traces = traces_of(args)
     free = [name.strip() for name in args.free.split(",")] if args.free else None
     scheme: dict[str, Any] = {"step_cad": args.step_cad, "integrator": args.integrator}
-    step = args.progress.expect(25 + (90 if args.report_folder else 0))
+    step = args.progress.expect(45 + (90 if args.report_folder else 0))
     step("calibrate")
     pegging = calibration_arguments(args, cylinder)
     fit = fit_cylinder(traces, cylinder, free=free, point=point, **pegging, **scheme)
@@ -67,17 +69,22 @@ def calibrate(args: argparse.Namespace) -> None:
     profile = None
     if "wall_heat_scale" in fit.report.names and len(fit.report.names) > 1:
         profile = wall_heat_profile(fit, progress=step)
+    tdc = estimate_tdc(
+        traces, cylinder, point=point, fuel_heat_j=pegging["fuel_heat_j"], span_cad=_TDC_SPAN_CAD, progress=step
+    )
     laws = compare_laws(traces, cylinder, fuel_heat_j=pegging["fuel_heat_j"], point=point, progress=step, **scheme)
     if args.report_folder:
         result = run_study("measured-traces", traces=traces, cylinder=cylinder, point=point, progress=step, **scheme)
         write_report(result, args.report_folder)
-    payload = {"preset": preset.name, **_payload(fit, profile, laws)}
+    payload = {"preset": preset.name, **_payload(fit, profile, laws, tdc)}
     emit(args, payload, text=payload["report"])
     if not fit.report.success:
         raise ConvergenceError(f"the calibration did not converge: {fit.report.message}")
 
 
-def _payload(fit: CylinderFit, profile: WallHeatProfile | None, laws: list[CylinderFit]) -> dict[str, Any]:
+def _payload(
+    fit: CylinderFit, profile: WallHeatProfile | None, laws: list[CylinderFit], tdc: TdcEstimate
+) -> dict[str, Any]:
     traces = []
     with_soi = any(load.soi_cad == load.soi_cad for load in fit.loads)
     for load in fit.loads:
@@ -110,10 +117,26 @@ def _payload(fit: CylinderFit, profile: WallHeatProfile | None, laws: list[Cylin
         "common": common,
         "unidentifiable": ordered,
         "laws": [law_row(law) for law in laws],
-        "warnings": [str(finding) for finding in fit.findings],
+        "tdc": {
+            "offset_cad": tdc.offset_cad,
+            "low_cad": tdc.low_cad,
+            "high_cad": tdc.high_cad,
+            "others_cad": list(tdc.others_cad),
+            "suspect": tdc.suspect,
+        },
+        "warnings": [*(str(finding) for finding in fit.findings), *_doubt_of(tdc)],
         "cylinder": fit.model.to_dict(),
-        "report": _report(fit, profile, laws, ordered),
+        "report": _report(fit, profile, laws, ordered, tdc),
     }
+
+
+def _doubt_of(tdc: TdcEstimate) -> list[str]:
+    if not tdc.suspect:
+        return []
+    return [
+        f"the residual is least with {tdc.offset_cad:+.2f} CAD added to the angles ({tdc.low_cad:+.2f} to "
+        f"{tdc.high_cad:+.2f} are possible): suspect TDC"
+    ]
 
 
 def _was_fitted(fit: CylinderFit, name: str) -> bool:
@@ -121,7 +144,11 @@ def _was_fitted(fit: CylinderFit, name: str) -> bool:
 
 
 def _report(
-    fit: CylinderFit, profile: WallHeatProfile | None, laws: list[CylinderFit], unidentifiable: list[str]
+    fit: CylinderFit,
+    profile: WallHeatProfile | None,
+    laws: list[CylinderFit],
+    unidentifiable: list[str],
+    tdc: TdcEstimate,
 ) -> str:
     out = [f"Calibration with {fit.kind}: {fit.report.message}", ""]
     out += _loads(fit)
@@ -138,8 +165,10 @@ def _report(
         ]
     if unidentifiable:
         out += ["", f"not identifiable: {', '.join(unidentifiable)}"]
-    if fit.findings:
-        out += ["", "what to distrust:", *(f"  - {text}" for text in fit.findings)]
+    out += ["", f"TDC offset {tdc.offset_cad:+.2f} CAD, {tdc.low_cad:+.2f} to {tdc.high_cad:+.2f} possible"]
+    doubts = [*map(str, fit.findings), *_doubt_of(tdc)]
+    if doubts:
+        out += ["", "what to distrust:", *(f"  - {text}" for text in doubts)]
     out += ["", "every burn law on the same traces:"]
     for law in laws:
         out += ["", f"{law.kind}  (wall-heat scale {law.model.wall_heat_scale:.2f})", *_loads(law)]
