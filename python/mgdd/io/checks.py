@@ -157,8 +157,8 @@ def _check_order(degrees: NDArray[np.float64], place: Callable[[int], str]) -> N
         )
     if np.mean(step < 0.0) > 0.9:
         raise DataError(
-            f"{place(0)}: crank angles fall, and jump back: this looks like °bTDC in several cycles; {CONVENTION}; pass "
-            f"{argument('before_tdc', 'True')}"
+            f"{place(0)}: crank angles fall, and jump back: this looks like °bTDC in several cycles; {CONVENTION}; "
+            f"pass {argument('before_tdc', 'True')}"
         )
     index = int(np.argmin(step > 0.0)) + 1
     before, here = degrees[index - 1], degrees[index]
@@ -208,8 +208,9 @@ def _check_tdc(degrees: NDArray[np.float64], bar: NDArray[np.float64], source: s
     sustained = np.lib.stride_tricks.sliding_window_view(bar, 5).min(axis=1)
     low, peak, here = float(bar.min()), float(sustained.max()), float(np.interp(0.0, degrees, bar))
     if here - low < TDC_SHARE * (peak - low):
+        at = degrees[int(np.argmax(sustained)) + 2]
+        milliseconds = f"{argument('angle_unit', repr('ms'))} and {argument('speed_rpm', '')}"
         raise DataError(
-            f"{source}: the pressure at angle 0 is {here:.3g} bar, the peak of {peak:.3g} bar stands at "
-            f"{degrees[int(np.argmax(sustained)) + 2]:g}: 0 cannot be firing TDC; {_remedy_0_720()}; a column of milliseconds "
-            f"needs {argument('angle_unit', repr('ms'))} and {argument('speed_rpm', '')}"
+            f"{source}: the pressure at angle 0 is {here:.3g} bar, the peak of {peak:.3g} bar stands at {at:g}: 0 "
+            f"cannot be firing TDC; {_remedy_0_720()}; a column of milliseconds needs {milliseconds}"
         )

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import itertools
 from typing import TYPE_CHECKING, NamedTuple
 
 import numpy as np
@@ -19,6 +20,8 @@ __all__ = ["Cycles", "arranged"]
 
 # Share of a step by which the angles of two cycles may differ and still be one grid.
 _SAME = 0.01
+# Sums of steps end this much [deg] beside the angle that was meant.
+_ROUNDING = 1e-6
 
 
 class Cycles(NamedTuple):
@@ -96,8 +99,8 @@ def arranged(
         pressure, runs_on = pressure[:, keep].reshape(1, -1), True
     if runs_on:
         _check_tdc(degrees, firing_tdc_deg, source)
-        degrees, pressure, rows, more = _running(degrees, pressure[0], rows, float(firing_tdc_deg or 0.0), place, source)
-        notes += more
+        cut = _running(degrees, pressure[0], rows, float(firing_tdc_deg or 0.0), place, source)
+        return cut._replace(notes=notes + cut.notes)
     return Cycles(*_turned(degrees, pressure, rows, firing_tdc_deg, source), notes)
 
 
@@ -117,7 +120,7 @@ def _turned(
 
 def _seam(start: float, firing_tdc_deg: float) -> float:
     """Return where a cycle of 720 degrees that starts there is cut, in °CA aTDC within -360 to 360."""
-    return (start - firing_tdc_deg + 360.0) % 720.0 - 360.0
+    return (start - firing_tdc_deg + 360.0 + _ROUNDING) % 720.0 - 360.0 - _ROUNDING
 
 
 def _splits_a_burn(degrees: NDArray[np.float64], firing_tdc_deg: float) -> bool:
@@ -147,14 +150,14 @@ def _stacked(
 ) -> Cycles:
     """Cut where the angle returns to its start."""
     edges = [0, *falls.tolist(), degrees.size]
-    blocks = [slice(a, b) for a, b in zip(edges[:-1], edges[1:], strict=True)]
+    blocks = [slice(a, b) for a, b in itertools.pairwise(edges)]
     step = float(np.median(np.abs(np.diff(degrees))))
     low, high = min(degrees[b.start] for b in blocks), max(degrees[b.stop - 1] for b in blocks)
     whole = [degrees[b.start] < low + 0.5 * step and degrees[b.stop - 1] > high - 0.5 * step for b in blocks]
     if not any(whole):
         raise DataError(
-            f"{source}: the angle returns at {place(int(falls[0]))}, and no cycle from {low:g} to {high:g} is complete: "
-            "give at least one"
+            f"{source}: the angle returns at {place(int(falls[0]))}, and no cycle from {low:g} to {high:g} is complete"
+            ": give at least one"
         )
     dropped = [k + 1 for k, complete in enumerate(whole) if not complete]
     inner = [k for k in dropped if 1 < k < len(blocks)]
@@ -189,8 +192,8 @@ def _running(
     if wide:
         k = wide[0]
         raise DataError(
-            f"{place(int(rows[k]))}: gap in the crank angle from {degrees[k - 1]:g} to {degrees[k]:g}: the usual step is "
-            f"{step:g}; fill it or cut the record there"
+            f"{place(int(rows[k]))}: gap in the crank angle from {degrees[k - 1]:g} to {degrees[k]:g}: the usual step "
+            f"is {step:g}; fill it or cut the record there"
         )
     first = float(degrees[0])
     if _splits_a_burn(degrees, firing_tdc_deg):
@@ -217,9 +220,10 @@ def _running(
         at = at[at[:, -1] <= degrees[-1] + _SAME * step]
         values = np.interp(at, degrees, pressure)
         notes.append("the step does not divide 720 degrees: cycles interpolated linearly to the angles of the first")
-    # Whole turns off, so that the first sample stands within 360 degrees of firing TDC.
-    turns = np.round((grid[0] - firing_tdc_deg - _seam(float(grid[0]), firing_tdc_deg)) / 720.0)
-    return Cycles(grid - 720.0 * turns, values, rows[starts[0] : starts[1]], tuple(notes))
+    past = grid - grid[0] + _seam(float(grid[0]), firing_tdc_deg)
+    cad = np.where(past > 360.0 - _SAME * step, past - 720.0, past)
+    order = np.argsort(cad, kind="stable")
+    return Cycles(cad[order], np.ascontiguousarray(values[:, order]), rows[starts[0] : starts[1]][order], tuple(notes))
 
 
 def _numbered(cycles: list[int]) -> str:

@@ -16,7 +16,15 @@ if TYPE_CHECKING:
     from mgdd.io.column_names import Heading
     from mgdd.io.table import TextTable
 
-__all__ = ["ANGLE_UNITS", "TIME_UNITS", "check_alike", "choose_angle", "choose_pressure", "unit_of_pressure"]
+__all__ = [
+    "ANGLE_UNITS",
+    "TIME_UNITS",
+    "check_alike",
+    "choose_angle",
+    "choose_pressure",
+    "odd_shape",
+    "unit_of_pressure",
+]
 
 TIME_UNITS = {"s": 1.0, "ms": 1e3, "us": 1e6}
 ANGLE_UNITS = ("deg", "rad", *TIME_UNITS)
@@ -47,7 +55,7 @@ def choose_angle(
     if head.quantity == "time":
         raise DataError(
             f"{called} looks like a time: {hint}, or pass {argument('angle_unit', repr('s'))} or "
-            f"{argument('angle_unit', repr('ms'))} and {argument('speed_rpm', '')} to turn it into one"
+            f"{argument('angle_unit', repr('ms'))} and {argument('speed_rpm', '')} to turn it into an angle"
         )
     if head.quantity == "counter":
         raise DataError(f"{called} counts samples: {hint}, or pass {step} with the degrees between samples")
@@ -71,25 +79,37 @@ def choose_pressure(
         return named
     first = 0 if angle is None else angle + 1
     possible = [i for i in range(first, table.width) if heads[i].quantity in (None, "pressure")]
-    possible = table.numeric(possible)
-    if not possible:
-        if table.width == 1 and angle == 0:
-            table.index(1)
+    possible = [i for i in table.numeric(possible) if angle is not None or not _counts(table.numbers(i))]
+    if not possible and table.width == 1:
         raise DataError(
-            f"{table.source}: no pressure behind the angle column: name it, {argument('pressure_column', '')}"
+            f"{table.source}: one column only: give angle and pressure, or for a pressure without an angle column pass "
+            f"{argument('angle_step_deg', '')} with the degrees between samples"
         )
+    if not possible:
+        names = [heads[i].name for i in range(table.width) if i != angle and heads[i].quantity == "pressure"]
+        column = argument("pressure_column", repr(names[0]) if names else "")
+        raise DataError(f"{table.source}: no pressure behind the angle column: name it, {column}")
     exact = [i for i in possible if heads[i].name == "pressure_bar"]
     if len(possible) == 1 or len(exact) == 1:
         return exact or possible
     cylinders = {heads[i].cylinder for i in possible}
     if table.header is not None and (len(cylinders) > 1 or len({heads[i].series for i in possible}) > 1):
-        what = "several cylinders" if len(cylinders) > 1 else "names of no one series"
-        raise _doubtful(table, possible, f"columns with {what}")
+        raise _doubtful(table, possible, "are of several cylinders" if len(cylinders) > 1 else "have unlike names")
     return possible
 
 
-def check_alike(table: TextTable, columns: Sequence[int], degrees: NDArray[np.float64], rows: NDArray[np.float64]) -> None:
+def check_alike(
+    table: TextTable, columns: Sequence[int], degrees: NDArray[np.float64], rows: NDArray[np.float64]
+) -> None:
     """Refuse columns of which one differs in shape from the first as no other cycle of the cylinder would."""
+    odd = odd_shape(degrees, rows)
+    if odd is not None:
+        names = f"{table.called(columns[odd])} has another shape than {table.called(columns[0])}"
+        raise _doubtful(table, columns, f"may not be cycles of one cylinder ({names})")
+
+
+def odd_shape(degrees: NDArray[np.float64], rows: NDArray[np.float64]) -> int | None:
+    """Return the first row that is not of the shape of row 0: another cylinder, or another quantity."""
     step = float(np.median(np.abs(np.diff(degrees))))
     spread = rows - rows.mean(axis=1, keepdims=True)
     norms = np.sqrt((spread**2).sum(axis=1))
@@ -98,9 +118,7 @@ def check_alike(table: TextTable, columns: Sequence[int], degrees: NDArray[np.fl
     away = np.abs(rows.argmax(axis=1) - rows[0].argmax()) * step
     away = np.minimum(away, np.abs(720.0 - away))
     odd = np.flatnonzero(~((alike >= _MIN_CORRELATION) & (away <= _PEAK_WITHIN_CAD)))
-    if odd.size:
-        name = table.called(columns[int(odd[0])])
-        raise _doubtful(table, columns, f"{name} has not the shape of a cycle beside {table.called(columns[0])}, columns")
+    return int(odd[0]) if odd.size else None
 
 
 def unit_of_pressure(
@@ -115,7 +133,9 @@ def unit_of_pressure(
             f"{', '.join(PRESSURE_UNITS)} first"
         )
     if len(said) > 1:
-        raise DataError(f"{table.source}: pressures in {', '.join(map(str, sorted(said, key=str)))}: name columns of one unit")
+        raise DataError(
+            f"{table.source}: pressures in {', '.join(map(str, sorted(said, key=str)))}: name columns of one unit"
+        )
     (known,) = said
     volts = known in ("V", "mV")
     if volts and not gain:
@@ -134,14 +154,22 @@ def unit_of_pressure(
             f"{argument('pressure_unit', repr(known))} instead of {unit!r}, or correct the file"
         )
     if known is not None and known not in PRESSURE_UNITS and not volts:
-        raise DataError(f"{table.source}: {table.called(columns[0])} is in {known}, which is not a pressure: name another")
+        raise DataError(
+            f"{table.source}: {table.called(columns[0])} is in {known}, which is not a pressure: name another"
+        )
     return (known or "V") if gain else (unit or known or "bar"), known is not None
+
+
+def _counts(values: NDArray[np.float64]) -> bool:
+    """Return whether a column only counts up: samples or a time."""
+    steps = np.diff(values)
+    return bool(steps.size and steps[0] > 0.0 and np.allclose(steps, steps[0], rtol=1e-3, atol=0.0))
 
 
 def _doubtful(table: TextTable, columns: Sequence[int], what: str) -> DataError:
     names = [repr(table.header[i]) if table.header else str(i) for i in columns]
     shown = ", ".join(names if len(names) <= 8 else [*names[:6], "...", names[-1]])
     return DataError(
-        f"{table.source}: {what} {shown}: it is not clear which are cycles of one cylinder: name the pressure, for "
-        f"example {argument('pressure_column', names[0])}"
+        f"{table.source}: columns {shown} {what}: name the pressure, for example "
+        f"{argument('pressure_column', names[0])}; all cycles of one cylinder are given by all their names"
     )

@@ -23,8 +23,6 @@ from mgdd.io.pressure_columns import (
 from mgdd.io.pressure_units import PRESSURE_UNITS, level_warning
 
 if TYPE_CHECKING:
-    from collections.abc import Callable
-
     from numpy.typing import NDArray
 
     from mgdd.io.column_names import Heading
@@ -71,9 +69,7 @@ class Reading:
                 )
 
 
-def cycles_of(
-    table: TextTable, how: Reading
-) -> tuple[NDArray[np.float64], NDArray[np.float64], list[str]]:
+def cycles_of(table: TextTable, how: Reading) -> tuple[NDArray[np.float64], NDArray[np.float64], list[str]]:
     """Return angle [°CA aTDC], pressures [bar] as (cycle, angle), and warnings."""
     heads = headings(table)
     index, degrees, unit, made = _angle(table, heads, how)
@@ -145,15 +141,16 @@ def _angle(
 ) -> tuple[int | None, NDArray[np.float64], str, bool]:
     """Return column, degrees, the unit that they came in, and whether they were made from a step or a time."""
     if how.angle_step_deg is not None:
-        _check_start(table.source, "samples without an angle", how)
-        return None, (how.angle_start_deg or 0.0) + how.angle_step_deg * np.arange(len(table.lines)), "deg", True
+        _check_start(table.source, "a count of samples", how)
+        count = np.arange(len(table.lines), dtype=np.float64)
+        return None, (how.angle_start_deg or 0.0) + how.angle_step_deg * count, "deg", True
     index, unit = choose_angle(table, heads, how.angle_column, how.angle_unit)
     called = f"{table.source}: {table.called(index)}"
     if unit not in TIME_UNITS:
         if how.angle_start_deg is not None:
             raise DataError(
-                f"{called} holds angles: {argument('angle_start_deg')} is for a time or a file without an angle column: "
-                "leave it out"
+                f"{called} holds angles: {argument('angle_start_deg')} is for a time or a file without an angle column"
+                ": leave it out"
             )
         values = table.numbers(index)
         return index, np.rad2deg(values) if unit == "rad" else values, unit, False

@@ -82,10 +82,8 @@ def level_warning(degrees: NDArray[np.float64], values: NDArray[np.float64], uni
         if other != unit and there and _peak_fits(peak, other, low) and _level_fits(there):
             fitting.append(f"{argument('pressure_unit', repr(other))} would make it {there[1]:.3g} bar")
     remedy = f"; {' or '.join(fitting)}" if fitting else ": check unit and offset"
-    return [
-        f"the pressure at {angle:g} °CA aTDC is {bar:.3g} bar, an intake pressure of {LEVEL_BAR[0]:g} to "
-        f"{LEVEL_BAR[1]:g} bar is usual{remedy}"
-    ]
+    usual = f"{LEVEL_BAR[0]:g} to {LEVEL_BAR[1]:g} bar"
+    return [f"the pressure at {angle:g} °CA aTDC is {bar:.3g} bar, an intake pressure of {usual} is usual{remedy}"]
 
 
 def _low(degrees: NDArray[np.float64]) -> float:

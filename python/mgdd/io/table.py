@@ -89,8 +89,17 @@ class TextTable:
         fast = self._fast(indices)
         return np.stack([self._slow(index) for index in indices]) if fast is None else fast
 
+    @cached_property
+    def _body(self) -> NDArray[np.float64] | None:
+        """Read all columns in one go; None where a cell is not a number."""
+        return self._parsed(None)
+
     def _fast(self, indices: Sequence[int]) -> NDArray[np.float64] | None:
-        """Read the columns in one go; None where a cell needs the judgement of `_slow`."""
+        """Return columns without looking at single cells; None where one needs the judgement of `_slow`."""
+        values = self._parsed(indices) if self._body is None else self._body[list(indices)]
+        return None if values is None or not np.isfinite(values).all() else values
+
+    def _parsed(self, indices: Sequence[int] | None) -> NDArray[np.float64] | None:
         texts = self.texts
         if self.mark is not None and len(self.mark) != 1:
             return None
@@ -99,10 +108,9 @@ class TextTable:
                 return None
             texts = tuple(text.replace(",", ".") for text in texts)
         try:
-            values = np.loadtxt(texts, delimiter=self.mark, usecols=indices, comments=None, ndmin=2).T
+            return np.loadtxt(texts, delimiter=self.mark, usecols=indices, comments=None, ndmin=2).T
         except ValueError:
             return None
-        return np.ascontiguousarray(values) if np.isfinite(values).all() else None
 
     def _slow(self, index: int) -> NDArray[np.float64]:
         values = np.empty(len(self.rows))

@@ -15,7 +15,7 @@ from mgdd._core.engine import Cylinder, OperatingPoint
 from mgdd.engine import analyze
 from mgdd.errors import DataError, ParameterError, ShapeError, hand_over, or_partial
 from mgdd.identify.engine.records import CylinderFit, Load, burn_law, load_table
-from mgdd.io.trace_forms import as_trace
+from mgdd.io.trace_forms import one_cycle
 from mgdd.optimize.fit_options import FitOptions, fit_options
 from mgdd.results import Finding, FitReport
 from mgdd.results.fit import FitQuality
@@ -102,7 +102,7 @@ def fit_cylinder(
     names = default_free(cylinder) if free is None else tuple([free] if isinstance(free, str) else free)
     if isinstance(traces, str | os.PathLike | Mapping) or hasattr(traces, "to_numpy") or hasattr(traces, "variables"):
         raise ShapeError(f"traces is one {type(traces).__name__}: pass a list of traces, [trace] for a single one")
-    traces = [as_trace(trace) for trace in traces]
+    traces = [one_cycle(trace) for trace in traces]
     if not traces:
         raise DataError("no traces: a calibration needs at least one")
     labels = _labels(traces)
