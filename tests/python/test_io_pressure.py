@@ -282,6 +282,21 @@ def test_conditions(file):
     }
 
 
+def test_conditions_of_the_whole_bench(file):
+    path = file(
+        "file,spark_cad,intake_pressure_kpa,intake_temperature_k,fuel_mg,bmep_bar,brake_torque_nm\n"
+        "a.csv,-25,95,313,0,-0.6,-12\n"
+    )
+    assert read_conditions(path)["a.csv"] == {
+        "spark_cad": -25.0,
+        "intake_pressure_kpa": 95.0,
+        "intake_temperature_k": 313.0,
+        "fuel_mg": 0.0,
+        "bmep_bar": -0.6,
+        "brake_torque_nm": -12.0,
+    }
+
+
 @pytest.mark.parametrize(
     ("content", "message"),
     [
@@ -293,6 +308,10 @@ def test_conditions(file):
         ("file,speed_rpm\na.csv,1\na.csv,2\n", "line 3: file = 'a.csv': name every trace, each once"),
         ("file,speed_rpm\na.csv,1\nb.csv,fast\n", "line 3: speed_rpm = 'fast': must be a finite number"),
         ("file,speed_rpm\na.csv,-1200\n", "line 2: speed_rpm = -1200: must be between 0 and 30000"),
+        ("file,spark_cad\na.csv,335\n", "spark_cad = 335: must be between -90 and 40; .*firing TDC = 0"),
+        ("file,intake_temperature_k\na.csv,40\n", "intake_temperature_k = 40: must be between 200 and 1000"),
+        ("file,fuel_mg\na.csv,-1\n", "fuel_mg = -1: must be between 0 and 100000"),
+        ("file,intake_pressure_kpa\na.csv,0\n", "intake_pressure_kpa = 0: must be between 0 and 2000"),
         ("file,soi_cad\na.csv,355\n", "soi_cad = 355: .*firing TDC = 0, compression negative"),
     ],
 )

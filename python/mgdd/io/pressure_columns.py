@@ -29,7 +29,7 @@ __all__ = [
 TIME_UNITS = {"s": 1.0, "ms": 1e3, "us": 1e6}
 ANGLE_UNITS = ("deg", "rad", *TIME_UNITS)
 # Cycles of one cylinder, fired or not, share their compression; another cylinder has its peak elsewhere.
-_MIN_CORRELATION = 0.8
+_MIN_CORRELATION = 0.5
 _PEAK_WITHIN_CAD = 40.0
 
 

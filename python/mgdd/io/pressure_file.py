@@ -20,7 +20,7 @@ from mgdd.io.pressure_columns import (
     choose_pressure,
     unit_of_pressure,
 )
-from mgdd.io.pressure_units import PRESSURE_UNITS, level_warning
+from mgdd.io.pressure_units import PRESSURE_UNITS, level_warning, steep_warning
 
 if TYPE_CHECKING:
     from numpy.typing import NDArray
@@ -133,7 +133,8 @@ def checked(
         notes = []  # check_trace names what is not finite or too short
     one = values[0] if len(values) == 1 else values
     angle, bar = check_trace(degrees, one, unit=unit, source=source, rows=rows, unit_of_file=unit_of_file)
-    return angle, np.atleast_2d(bar), notes + (level_warning(angle, values, unit) if level else [])
+    doubts = [*level_warning(angle, values, unit), *steep_warning(angle, bar)] if level else []
+    return angle, np.atleast_2d(bar), notes + doubts
 
 
 def _angle(

@@ -11,7 +11,7 @@ from mgdd.errors import DataError, argument
 if TYPE_CHECKING:
     from numpy.typing import NDArray
 
-__all__ = ["PRESSURE_UNITS", "check_unit", "level_bar", "level_warning", "to_bar"]
+__all__ = ["PRESSURE_UNITS", "check_unit", "level_bar", "level_warning", "steep_warning", "to_bar"]
 
 # An exact integer keeps the value in bar correctly rounded: units per bar here, bar per unit below.
 _PER_BAR = {"bar": 1.0, "mbar": 1000.0, "kPa": 100.0, "Pa": 100000.0}
@@ -25,6 +25,8 @@ FLOOR_BAR = 0.2
 LEVEL_BAR = (0.25, 6.0)
 # Later than this [°CA aTDC] compression has raised the pressure too far to judge the unit by it.
 _EARLY_CAD = -120.0
+# Combustion before TDC raises the pressure by less than this factor; a pressure below this [bar] may be an offset.
+_BURNT, _PRESSED_BAR = 3.0, 0.5
 
 
 def to_bar(values: NDArray[np.float64], unit: str) -> NDArray[np.float64]:
@@ -84,6 +86,22 @@ def level_warning(degrees: NDArray[np.float64], values: NDArray[np.float64], uni
     remedy = f"; {' or '.join(fitting)}" if fitting else ": check unit and offset"
     usual = f"{LEVEL_BAR[0]:g} to {LEVEL_BAR[1]:g} bar"
     return [f"the pressure at {angle:g} °CA aTDC is {bar:.3g} bar, an intake pressure of {usual} is usual{remedy}"]
+
+
+def steep_warning(degrees: NDArray[np.float64], bar: NDArray[np.float64]) -> list[str]:
+    """Doubt an angle over which a short trace rises more than any compression; one line, or none."""
+    first, start = float(np.atleast_2d(bar).mean(axis=0)[0]), float(degrees[0])
+    if not -60.0 <= start <= -5.0 or degrees[-1] < 0.0 or first < _PRESSED_BAR:
+        return []
+    rise = float(np.interp(0.0, degrees, np.atleast_2d(bar).mean(axis=0))) / first
+    # Volume over clearance volume is at most 1 + (r - 1)/2 (1 + 1/R) (1 - cos), here with r = 25 and R = 3.3.
+    volumes = 1.0 + 12.0 * 1.3 * (1.0 - np.cos(np.deg2rad(start)))
+    if rise <= _BURNT * volumes**1.4:
+        return []
+    return [
+        f"the pressure rises {rise:.3g} times from {start:g} to 0 °CA aTDC, more than compression can: if the column is "
+        f"a time, pass {argument('angle_unit', repr('ms'))} and {argument('speed_rpm', '')}"
+    ]
 
 
 def _low(degrees: NDArray[np.float64]) -> float:
