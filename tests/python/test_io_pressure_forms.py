@@ -375,6 +375,16 @@ def test_what_a_heading_says(name: str, row: str | None, unit: str | None, quant
     assert (said.unit, said.quantity) == (unit, quantity)
 
 
+def test_gauge_pressure_is_read_and_told(write: Write) -> None:
+    trace = read_pressure(write([CLOSED, BAR - 1.0], "angle,p_barg"))
+    np.testing.assert_array_equal(trace["pressure_bar"], BAR - 1.0)
+    assert trace.attrs["warnings"] == "the file says gauge pressure, 1 atmosphere below the absolute one: peg it"
+    psi = read_pressure(write([CLOSED, (BAR - 1.0) * PER_BAR["psi"]], "angle,p\ndeg,psig"))
+    np.testing.assert_allclose(psi["pressure_bar"], BAR - 1.0, rtol=1e-7)
+    assert "gauge" in psi.attrs["warnings"]
+    assert read_pressure(write([CLOSED, BAR], "angle,p [bar abs]")).attrs["warnings"] == ""
+
+
 def test_header_and_units_row_that_differ(write: Write) -> None:
     with pytest.raises(DataError, match="column 'p_bar': the header says bar and the units row 'kPa'"):
         read_pressure(write([CLOSED, BAR], "angle,p_bar\ndeg,kPa"))

@@ -20,7 +20,12 @@ def pair(angle: ArrayLike, pressure: ArrayLike) -> tuple[NDArray[np.float64], ND
     """Return new float64 arrays: the angle, and the pressure over it or (cycle, angle); or raise ShapeError."""
     first = np.array(angle, dtype=np.float64)
     second = np.array(pressure, dtype=np.float64)
-    if first.ndim != 1 or second.ndim not in (1, 2) or second.shape[-1:] != first.shape or second.size == 0:
+    if (
+        first.ndim != 1
+        or second.ndim not in (1, 2)
+        or second.shape[-1:] != first.shape
+        or second.shape[0] == 0 < first.size
+    ):
         remedy = "give two one-dimensional arrays of one length, or one row of pressures per cycle"
         if second.ndim == 2 and second.shape[:1] == first.shape:
             remedy = "one row per cycle is needed: pass the transpose"

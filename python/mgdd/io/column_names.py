@@ -13,7 +13,8 @@ if TYPE_CHECKING:
 __all__ = ["Heading", "heading", "headings"]
 
 _UNITS = {
-    "bar": "bar", "bara": "bar", "barg": "bar", "mbar": "mbar", "hpa": "mbar", "kpa": "kPa", "pa": "Pa", "mpa": "MPa",
+    "bar": "bar", "bara": "bar", "bar abs": "bar", "kpaa": "kPa", "kpa abs": "kPa", "barg": "bar",
+    "mbar": "mbar", "hpa": "mbar", "kpa": "kPa", "pa": "Pa", "mpa": "MPa",
     "psi": "psi", "psia": "psi", "psig": "psi",
     "v": "V", "volt": "V", "volts": "V", "mv": "mV",
     "s": "s", "sec": "s", "seconds": "s", "ms": "ms", "us": "us", "µs": "us", "μs": "us",
@@ -40,6 +41,7 @@ _WORDS = {
     "counter": "sample samples index idx row nr count counter",
 }
 _BRACKETS = re.compile(r"[\[({]([^\[\](){}]*)[\])}]")
+_GAUGE = re.compile(r"(?<![a-z])(barg|psig|gauge)(?![a-z])", re.IGNORECASE)
 _CYLINDER = re.compile(r"(?:cyl\w*?|zyl\w*?)[\s_.\-#]*(\d+)")
 
 
@@ -52,6 +54,7 @@ class Heading(NamedTuple):
     series: str
     cylinder: str | None
     strange: str | None
+    gauge: bool
 
 
 def heading(name: str, units_row: str | None = None, *, where: str = "column") -> Heading:
@@ -75,6 +78,7 @@ def heading(name: str, units_row: str | None = None, *, where: str = "column") -
         quantity=quantity,
         series=" ".join(re.findall(r"[^\W\d_]+", name.lower())),
         cylinder=cylinder[1] if cylinder else None,
+        gauge=bool(_GAUGE.search(f"{name} {units_row}")),
         strange=next((text for text in said if text.strip(" -") and _known(text) is None), None),
     )
 

@@ -80,7 +80,9 @@ def cycles_of(table: TextTable, how: Reading) -> tuple[NDArray[np.float64], NDAr
     if how.pressure_column is None and len(columns) > 1:
         check_alike(table, columns, degrees, values)
     warnings = []
-    level = True
+    level = not any(heads[i].gauge for i in columns)
+    if not level:
+        warnings.append("the file says gauge pressure, 1 atmosphere below the absolute one: peg it")
     if gain is not None:
         values = values * (gain * (1e-3 if pressure_unit == "mV" else 1.0)) + (how.offset_bar or 0.0)
         pressure_unit, unit_of_file, level = "bar", False, how.offset_bar is not None

@@ -98,10 +98,9 @@ def steep_warning(degrees: NDArray[np.float64], bar: NDArray[np.float64]) -> lis
     volumes = 1.0 + 12.0 * 1.3 * (1.0 - np.cos(np.deg2rad(start)))
     if rise <= _BURNT * volumes**1.4:
         return []
-    return [
-        f"the pressure rises {rise:.3g} times from {start:g} to 0 °CA aTDC, more than compression can: if the column is "
-        f"a time, pass {argument('angle_unit', repr('ms'))} and {argument('speed_rpm', '')}"
-    ]
+    remedy = f"pass {argument('angle_unit', repr('ms'))} and {argument('speed_rpm', '')}"
+    what = f"the pressure rises {rise:.3g} times from {start:g} to 0 °CA aTDC, more than compression can"
+    return [f"{what}: if the column is a time, {remedy}"]
 
 
 def _low(degrees: NDArray[np.float64]) -> float:
