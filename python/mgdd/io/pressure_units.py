@@ -74,7 +74,7 @@ def check_unit(
 def level_warning(degrees: NDArray[np.float64], values: NDArray[np.float64], unit: str) -> list[str]:
     """Doubt a unit that the peak allows and the intake level does not; one line, or none."""
     level = level_bar(degrees, to_bar(values, unit))
-    if level is None or level[1] <= 0.0 or _level_fits(level):
+    if level is None or _level_fits(level):
         return []
     angle, bar = level
     peak, low = float(values.max()), _low(degrees)
