@@ -15,7 +15,8 @@ from mgdd import datasets, presets
 from mgdd.engine import analyze
 from mgdd.errors import DataError, ShapeError
 from mgdd.identify import fit_cylinder
-from mgdd.io import write_pressure
+from mgdd.io import pressure_trace, write_pressure
+from mgdd.io.trace_forms import as_trace
 
 CYLINDER = presets.load("hd_diesel_128x144").cylinder
 TRACE = datasets.load("hd_diesel_128x144")[0]
@@ -57,6 +58,47 @@ def test_every_form_gives_the_same_analysis(form: str, tmp_path: Path) -> None:
         np.testing.assert_array_equal(found[name], wanted[name], err_msg=str(name))
 
 
+TWO = np.stack([BAR, 1.02 * BAR])
+CYCLES = pd.DataFrame(TWO.T, index=pd.Index(ANGLE, name="crank_angle_cad"), columns=["p_1", "p_2"])
+
+
+def several_written(folder: Path) -> Path:
+    write_pressure(pressure_trace(ANGLE, TWO), folder / "cycles.csv")
+    return folder / "cycles.csv"
+
+
+SEVERAL: dict[str, Callable[[Path], Any]] = {
+    "pair": lambda _: (ANGLE, TWO),
+    "list of columns": lambda _: (ANGLE, [BAR.tolist(), (1.02 * BAR).tolist()]),
+    "pair with a frame": lambda _: (ANGLE, CYCLES),
+    "frame over angle": lambda _: CYCLES,
+    "frame": lambda _: CYCLES.reset_index(),
+    "frame of numbered columns": lambda _: CYCLES.set_axis([7, 8], axis="columns"),
+    "dataset": lambda _: pressure_trace(ANGLE, TWO),
+    "dataset, angle first": lambda _: pressure_trace(ANGLE, TWO).transpose(),
+    "array": lambda _: pressure_trace(ANGLE, TWO)["pressure_bar"],
+    "array, angle first": lambda _: pressure_trace(ANGLE, TWO)["pressure_bar"].transpose(),
+    "path": several_written,
+}
+
+
+@pytest.mark.parametrize("form", SEVERAL)
+def test_every_form_of_several_cycles(form: str, tmp_path: Path) -> None:
+    found = as_trace(SEVERAL[form](tmp_path))
+    assert found["pressure_bar"].dims == ("cycle", "crank_angle_cad")
+    np.testing.assert_array_equal(found["cycle"], [1, 2])
+    np.testing.assert_array_equal(found["crank_angle_cad"], ANGLE)
+    np.testing.assert_array_equal(found["pressure_bar"], TWO)
+
+
+def test_a_calibration_refuses_several_cycles_with_the_remedy() -> None:
+    trace = pressure_trace(ANGLE, TWO, name="bench 7")
+    with pytest.raises(DataError, match=r"bench 7: 2 cycles, .* trace.mean\('cycle', keep_attrs=True\), .*column"):
+        fit_cylinder([trace], CYLINDER)
+    mean = trace.mean("cycle", keep_attrs=True)
+    assert fit_cylinder([mean], CYLINDER, free=["soc_cad", "burn_duration_cad", "fuel_heat_j"]).report.success
+
+
 def test_attributes_of_a_table_are_used() -> None:
     TABLE.attrs.clear()
     table = TABLE.copy()
@@ -91,6 +133,8 @@ def test_a_calibration_takes_a_list_of_any_forms() -> None:
         (pd.Series(BAR), "the trace has no crank_angle_cad, it has an index that counts samples, pressure_bar"),
         (xr.DataArray(BAR, dims="sample"), "the trace has no crank_angle_cad, it has pressure_bar"),
         (xr.Dataset(), "the trace has no crank_angle_cad, it has nothing"),
+        (CYCLES.assign(torque_nm=200.0), "and torque_nm is not a cycle in bar of the cylinder of p_1"),
+        (CYCLES.assign(p_2=np.roll(BAR, 90)), "and p_2 is not a cycle in bar"),
         ((ANGLE, 1e5 * BAR), r"pressure_unit='Pa'"),
         ((ANGLE[::-1], BAR), "°bTDC"),
     ],

@@ -12,6 +12,9 @@ from mgdd import presets
 from mgdd._core.engine import Cylinder, OperatingPoint
 from mgdd.errors import DataError, ParameterError
 from mgdd.io import read_conditions, read_pressure
+from mgdd.io.conditions import CONDITIONS
+from mgdd.io.pressure_columns import ANGLE_UNITS
+from mgdd.io.pressure_units import PRESSURE_UNITS
 
 if TYPE_CHECKING:
     import xarray as xr
@@ -136,23 +139,51 @@ def add_scheme(parser: argparse.ArgumentParser, *, step_cad: float | None) -> No
 
 def add_files(parser: argparse.ArgumentParser, *, nargs: int | str) -> None:
     """Add pressure files and how to read them."""
-    parser.add_argument("files", nargs=nargs, metavar="FILE", help="pressure trace: CSV or two plain columns")
-    group = parser.add_argument_group("files")
-    group.add_argument("--pressure-unit", choices=("bar", "kPa", "Pa"), default="bar", help="default: bar")
+    parser.add_argument(
+        "files", nargs=nargs, metavar="FILE",
+        help="measured pressure as text: one column of crank angle [°CA aTDC: firing TDC = 0, compression negative] "
+        "and one of pressure, or one per cycle; several cycles may also stand below each other",
+    )  # fmt: skip
+    group = parser.add_argument_group("files", "what the files hold, where they do not say it or say it otherwise")
     group.add_argument(
-        "--pressure-column", default="1", metavar="NAME", help="column name, or number from 0 (default: 1)"
+        "--pressure-column", action="append", metavar="NAME",
+        help="column name, or number from 0; repeat it for several cycles (default: all behind the angle, if they are "
+        "cycles of one cylinder)",
+    )  # fmt: skip
+    group.add_argument(
+        "--pressure-unit", choices=PRESSURE_UNITS, help="default: what header or units row say, else bar"
     )
-    group.add_argument("--angle-column", default="0", metavar="NAME", help="column name, or number from 0 (default: 0)")
-    group.add_argument("--angle-unit", choices=("deg", "rad"), default="deg", help="default: deg")
+    group.add_argument(
+        "--gain-bar-per-v",
+        type=float,
+        metavar="X",
+        help="the pressure is in volts: bar per volt of the charge amplifier",
+    )
+    group.add_argument(
+        "--offset-bar", type=float, metavar="X", help="bar at 0 V (left out: relative pressure, use --pegging)"
+    )
+    group.add_argument("--angle-column", metavar="NAME", help="column name, or number from 0 (default: 0)")
+    group.add_argument(
+        "--angle-unit", choices=ANGLE_UNITS,
+        help="s, ms and us are a time, which needs --speed-rpm (default: what header or units row say, else deg)",
+    )  # fmt: skip
+    group.add_argument(
+        "--firing-tdc-deg", type=float, metavar="X",
+        help="angle of firing TDC in files that count 0 to 720 or run on: 360 if they start at gas-exchange TDC, 0 if "
+        "at firing TDC",
+    )  # fmt: skip
+    group.add_argument("--before-tdc", action="store_true", help="angles count degrees before firing TDC")
+    group.add_argument("--angle-step-deg", type=float, metavar="X", help="no angle column: degrees between two samples")
+    group.add_argument(
+        "--angle-start-deg", type=float, metavar="X",
+        help="no angle column, or a time: angle of the first sample [°CA aTDC, or as --firing-tdc-deg counts]",
+    )  # fmt: skip
     group.add_argument("--decimal", choices=(".", ","), default=".", help="decimal mark (default: .)")
     group.add_argument("--delimiter", metavar="CHAR", help="column separator (default: found in the file)")
     group.add_argument(
-        "--firing-tdc-deg", type=float, metavar="X", help="angle of firing TDC in files that count from elsewhere"
-    )
-    group.add_argument("--before-tdc", action="store_true", help="angles count degrees before firing TDC")
-    group.add_argument(
-        "--conditions", metavar="FILE.csv", help="columns file,speed_rpm,trapped_mass_g,soi_cad: one row per trace"
-    )
+        "--conditions", metavar="FILE.csv",
+        help=f"operating conditions, one row per trace, columns file and any of {', '.join(CONDITIONS)}",
+    )  # fmt: skip
 
 
 def engine_of(args: argparse.Namespace) -> tuple[Cylinder, OperatingPoint, presets.Preset]:
@@ -189,34 +220,50 @@ def traces_of(args: argparse.Namespace) -> list[xr.Dataset]:
     if args.files and args.motored:
         raise ParameterError("--motored does not act on measured traces: leave it out")
     conditions = read_conditions(args.conditions) if args.conditions else {}
-    used: dict[str, str] = {}
+    rows = _rows_of(args.files, conditions, args.conditions)
+    speed = args.speed_rpm or assignments(args.set, OperatingPoint.fields()).get("speed_rpm")
+    columns = [column_of(name) for name in args.pressure_column or ()]
     traces = []
     for file in args.files:
         trace = read_pressure(
             file,
             angle_column=column_of(args.angle_column),
-            pressure_column=column_of(args.pressure_column),
+            pressure_column=columns or None,
             angle_unit=args.angle_unit,
             pressure_unit=args.pressure_unit,
             firing_tdc_deg=args.firing_tdc_deg,
             before_tdc=args.before_tdc,
+            angle_step_deg=args.angle_step_deg,
+            angle_start_deg=args.angle_start_deg,
+            speed_rpm=rows[file].get("speed_rpm", speed),
+            gain_bar_per_v=args.gain_bar_per_v,
+            offset_bar=args.offset_bar,
             delimiter=args.delimiter,
             decimal=args.decimal,
         )
-        if conditions:
-            key = next((k for k in (file, Path(file).name, Path(file).stem) if k in conditions), None)
-            if key is None:
-                raise DataError(
-                    f"{args.conditions}: no row for {file}: its column 'file' holds {', '.join(map(repr, conditions))}"
-                )
-            if key in used:
-                raise DataError(
-                    f"{args.conditions}: row {key!r} fits both {used[key]} and {file}: write their paths as given here"
-                )
-            used[key] = file
-            trace = trace.assign_attrs(**conditions[key])
-        traces.append(trace)
+        for warning in trace.attrs["warnings"].splitlines():
+            _LOG.warning("%s: %s", trace.attrs["file"], warning)
+        traces.append(trace.assign_attrs(**rows[file]))
     return traces
+
+
+def _rows_of(
+    files: Sequence[str], conditions: Mapping[str, dict[str, float]], table: str | None
+) -> dict[str, dict[str, float]]:
+    """Give each file its row of the conditions, by path, name or stem; nothing where there is no table."""
+    used: dict[str, str] = {}
+    rows: dict[str, dict[str, float]] = {}
+    for file in files:
+        if not conditions:
+            rows[file] = {}
+            continue
+        key = next((k for k in (file, Path(file).name, Path(file).stem) if k in conditions), None)
+        if key is None:
+            raise DataError(f"{table}: no row for {file}: its column 'file' holds {', '.join(map(repr, conditions))}")
+        if key in used:
+            raise DataError(f"{table}: row {key!r} fits both {used[key]} and {file}: write their paths as given here")
+        used[key], rows[file] = file, conditions[key]
+    return rows
 
 
 def number_pairs(items: Sequence[str], option: str) -> dict[str, float]:

@@ -17,14 +17,19 @@ CONVENTION = "crank angle is in °CA aTDC: firing TDC = 0, compression negative"
 
 
 def pair(angle: ArrayLike, pressure: ArrayLike) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
-    """Return two new float64 arrays, one-dimensional and equally long, or raise ShapeError."""
+    """Return new float64 arrays: the angle, and the pressure over it or (cycle, angle); or raise ShapeError."""
     first = np.array(angle, dtype=np.float64)
     second = np.array(pressure, dtype=np.float64)
-    if first.ndim != 1 or first.shape != second.shape:
-        raise ShapeError(
-            f"crank angle has shape {first.shape} and pressure {second.shape}: "
-            "give two one-dimensional arrays of one length"
-        )
+    if (
+        first.ndim != 1
+        or second.ndim not in (1, 2)
+        or second.shape[-1:] != first.shape
+        or second.shape[0] == 0 < first.size
+    ):
+        remedy = "give two one-dimensional arrays of one length, or one row of pressures per cycle"
+        if second.ndim == 2 and second.shape[:1] == first.shape:
+            remedy = "one row per cycle is needed: pass the transpose"
+        raise ShapeError(f"crank angle has shape {first.shape} and pressure {second.shape}: {remedy}")
     return first, second
 
 

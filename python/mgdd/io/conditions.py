@@ -12,15 +12,25 @@ from mgdd.io.table import parse_number, read_table
 if TYPE_CHECKING:
     import os
 
-__all__ = ["read_conditions"]
+__all__ = ["CONDITIONS", "read_conditions"]
 
-# Open bounds of what a bench can mean; an injection far outside is another angle convention.
+# Open bounds of what a bench can mean, closed where zero means something; an injection or spark far outside is another
+# angle convention.
 _BOUNDS = {
     "load_percent": (-math.inf, math.inf),
     "speed_rpm": (0.0, 30000.0),
     "trapped_mass_g": (0.0, 1000.0),
     "soi_cad": (-60.0, 20.0),
+    "spark_cad": (-90.0, 40.0),
+    "intake_pressure_kpa": (0.0, 2000.0),
+    "intake_temperature_k": (200.0, 1000.0),
+    "fuel_mg": (0.0, 100000.0),
+    "bmep_bar": (-20.0, 100.0),
+    "brake_torque_nm": (-1e6, 1e6),
 }
+CONDITIONS = tuple(_BOUNDS)
+_ANGLES = ("soi_cad", "spark_cad")
+_CLOSED = (*_ANGLES, "fuel_mg")
 
 
 def read_conditions(path: str | os.PathLike[str]) -> dict[str, dict[str, float]]:
@@ -30,8 +40,9 @@ def read_conditions(path: str | os.PathLike[str]) -> dict[str, dict[str, float]]
     ----------
     path : path-like
         CSV with a header. Column ``file`` names the trace; ``load_percent`` [%], ``speed_rpm`` [rpm],
-        ``trapped_mass_g`` [g per cycle] and ``soi_cad`` (start of injection [°CA aTDC]) are optional, and so
-        is every cell in them.
+        ``trapped_mass_g`` [g per cycle], ``soi_cad`` and ``spark_cad`` (start of injection, spark timing [°CA aTDC]),
+        ``intake_pressure_kpa`` [kPa], ``intake_temperature_k`` [K], ``fuel_mg`` [mg per cycle, 0 = motored],
+        ``bmep_bar`` [bar] and ``brake_torque_nm`` [N m] are optional, and so is every cell in them.
 
     Returns
     -------
@@ -81,8 +92,8 @@ def _value(cell: str, column: str, where: str) -> float:
     if value is None or not math.isfinite(value):
         raise DataError(f"{where}: {column} = {cell!r}: must be a finite number; leave it empty if unknown")
     low, high = _BOUNDS[column]
-    inside = low <= value <= high if column == "soi_cad" else low < value < high
+    inside = low <= value <= high if column in _CLOSED else low < value < high
     if not inside:
-        hint = f"; {CONVENTION}" if column == "soi_cad" else ""
+        hint = f"; {CONVENTION}" if column in _ANGLES else ""
         raise DataError(f"{where}: {column} = {value:g}: must be between {low:g} and {high:g}{hint}")
     return value

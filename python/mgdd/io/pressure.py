@@ -7,19 +7,23 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from mgdd.errors import DataError, argument
-from mgdd.io.angles import pair, turned
-from mgdd.io.checks import ANGLE_UNITS, PRESSURE_UNITS, check_choice, check_trace
+from mgdd.errors import DataError
+from mgdd.io.angles import pair
+from mgdd.io.checks import check_trace
+from mgdd.io.pressure_file import Reading, checked, cycles_of
 from mgdd.io.table import read_table
 from mgdd.results.labels import ANGLE, check_labels, labelled_dataset
 
 if TYPE_CHECKING:
     import os
+    from collections.abc import Sequence
 
     import xarray as xr
-    from numpy.typing import ArrayLike
+    from numpy.typing import ArrayLike, NDArray
 
-__all__ = ["pressure_trace", "read_pressure", "write_pressure"]
+__all__ = ["CYCLE", "pressure_trace", "read_pressure", "write_pressure"]
+
+CYCLE = "cycle"
 
 
 def pressure_trace(
@@ -30,28 +34,30 @@ def pressure_trace(
     before_tdc: bool = False,
     name: str = "trace",
 ) -> xr.Dataset:
-    """Check two arrays and make the Dataset of a measured trace from copies of them.
+    """Check arrays and make the Dataset of a measured trace from copies of them.
 
     Parameters
     ----------
     crank_angle_cad : array_like
-        Crank angle [°CA aTDC], firing TDC = 0, compression negative, strictly rising.
+        Crank angle [°CA aTDC], firing TDC = 0, compression negative, strictly rising; it may return to its start, or
+        run on with `firing_tdc_deg`, where several cycles follow each other.
     pressure_bar : array_like
-        Cylinder pressure [bar].
+        Cylinder pressure [bar]: over the angle, (cycle, angle), a list of one column per cycle, or a DataFrame with one
+        column per cycle.
     firing_tdc_deg, before_tdc
-        For angles in another convention, as in `read_pressure`.
+        For angles in another convention, and for angles that run on, as in `read_pressure`.
     name : str
         What tables and figures call the trace; stored as ``attrs["file"]``.
 
     Returns
     -------
     xarray.Dataset
-        ``pressure_bar(crank_angle_cad)``.
+        As of `read_pressure`.
 
     Raises
     ------
     DataError, ShapeError
-        As in `check_trace`.
+        As in `check_trace`; cycles of different angles, no complete cycle.
 
     Examples
     --------
@@ -64,44 +70,66 @@ def pressure_trace(
     >>> pressure_trace(-angle, 60.0 - 0.01 * angle**2, before_tdc=True, name="bench 7").equals(trace)
     True
     """
+    if hasattr(pressure_bar, "columns") and hasattr(pressure_bar, "to_numpy"):  # a DataFrame: a column per cycle
+        pressure_bar = pressure_bar.to_numpy().T
     given, values = pair(crank_angle_cad, pressure_bar)
-    order, cad = turned(given, firing_tdc_deg, before_tdc)
-    angle, pressure = check_trace(cad, values[order], unit="bar", source=name)
-    return _dataset(angle, pressure, name)
+    angle, pressure, warnings = checked(
+        given, np.atleast_2d(values), firing_tdc_deg=firing_tdc_deg, before_tdc=before_tdc, source=name
+    )
+    return _dataset(angle, pressure, {"file": name, "warnings": "\n".join(warnings)})
 
 
 def read_pressure(
     path: str | os.PathLike[str],
     *,
-    angle_column: int | str = 0,
-    pressure_column: int | str = 1,
-    angle_unit: str = "deg",
-    pressure_unit: str = "bar",
+    angle_column: int | str | None = None,
+    pressure_column: int | str | Sequence[int | str] | None = None,
+    angle_unit: str | None = None,
+    pressure_unit: str | None = None,
     firing_tdc_deg: float | None = None,
     before_tdc: bool = False,
+    angle_step_deg: float | None = None,
+    angle_start_deg: float | None = None,
+    speed_rpm: float | None = None,
+    gain_bar_per_v: float | None = None,
+    offset_bar: float | None = None,
     delimiter: str | None = None,
     decimal: str = ".",
 ) -> xr.Dataset:
-    r"""Read one measured pressure trace from a text file.
+    r"""Read the measured pressure of one cylinder, one cycle or many, from a text file.
 
     The file holds columns separated by comma, semicolon, tab or blanks; a header line and a line of units
-    may come first; empty lines and lines that start with ``#`` are skipped.
+    may come first; empty lines and lines that start with ``#`` are skipped. Several cycles stand in columns, one below
+    the other (the angle returns to its start), or with angles that run on. The page "Formats" has a table of forms.
 
     Parameters
     ----------
     path : path-like
         The file.
-    angle_column, pressure_column : int or str
-        Position from 0, or the name in the header.
-    angle_unit : {"deg", "rad"}
-        Unit of the angle column.
-    pressure_unit : {"bar", "kPa", "Pa"}
-        Unit of the pressure column; a unit that the magnitude excludes is refused.
+    angle_column : int or str, optional
+        Position from 0, or the name in the header; None is the first column.
+    pressure_column : int, str or sequence of them, optional
+        One column, or one per cycle. None takes all numeric columns behind the angle, if header and shape say that they
+        are cycles of one cylinder, and leaves out what the header calls another quantity.
+    angle_unit : {"deg", "rad", "s", "ms", "us"}, optional
+        Unit of the angle column; None takes the unit that the file says, else degrees. A time needs `speed_rpm`.
+    pressure_unit : {"bar", "mbar", "kPa", "Pa", "MPa", "psi"}, optional
+        Unit of the pressure; None takes the unit that header or units row say, else bar. A unit that contradicts the
+        file or that the magnitude excludes is refused.
     firing_tdc_deg : float, optional
-        For 0..720 records: the angle [deg] at which firing TDC stands: 360 when the record starts at gas-exchange TDC,
-        0 when it starts at firing TDC. It is never guessed; None for other files.
+        For 0..720 records and angles that run on: the angle [deg], 0 to 720, at which firing TDC stands: 360 when the
+        record starts at gas-exchange TDC, 0 when it starts at firing TDC. It is never guessed; None for other files.
     before_tdc : bool
         Angles count degrees *before* firing TDC, compression positive.
+    angle_step_deg : float, optional
+        For files without an angle column: degrees between two samples.
+    angle_start_deg : float, optional
+        With `angle_step_deg` or a time: angle of the first sample [deg], in °CA aTDC, or counted as `firing_tdc_deg`
+        is, where that is given; 0 then if left out.
+    speed_rpm : float, optional
+        Engine speed [rpm], which turns a time into an angle: first angle + 6 n t; stored as ``attrs["speed_rpm"]``.
+    gain_bar_per_v, offset_bar : float, optional
+        For a pressure in volts: bar per volt, and bar at 0 V. Without `offset_bar` the pressure is relative.
     delimiter : str, optional
         Column separator; None detects it.
     decimal : {".", ","}
@@ -110,57 +138,49 @@ def read_pressure(
     Returns
     -------
     xarray.Dataset
-        ``pressure_bar(crank_angle_cad)``; ``attrs["file"]`` is the file's name without its folder.
+        ``pressure_bar(crank_angle_cad)`` of one cycle, ``pressure_bar(cycle, crank_angle_cad)`` of several, ``cycle``
+        counted from 1. ``attrs["file"]`` is the file's name without its folder, ``attrs["warnings"]`` what is doubtful
+        or was left out, one per line.
 
     Raises
     ------
     FileNotFoundError
         No such file.
     DataError
-        An empty file, no such column, a cell that is not a finite number, and all of `check_trace`; the
-        message gives file, line, column, value and remedy.
+        An empty file, no such column, a cell that is not a finite number, columns that may be of other cylinders or
+        quantities, a unit that contradicts the file, and all of `check_trace`; the message gives file, line, column,
+        value and remedy.
 
     Examples
     --------
     >>> import pathlib, tempfile
     >>> from mgdd.io import read_pressure
-    >>> rows = "".join(f"{a},{6e6 - 1000 * a * a}\n" for a in range(-30, 31))
+    >>> rows = "".join(f"{a},{6e6 - 1000 * a * a},{5.9e6 - 1000 * a * a}\n" for a in range(-30, 31))
     >>> with tempfile.TemporaryDirectory() as folder:
-    ...     file = pathlib.Path(folder) / "mean.csv"
-    ...     _ = file.write_text("angle,p\n" + rows)
-    ...     trace = read_pressure(file, pressure_column="p", pressure_unit="Pa")
-    >>> float(trace["pressure_bar"].max())
-    60.0
+    ...     file = pathlib.Path(folder) / "cycles.csv"
+    ...     _ = file.write_text("angle,p_1 [Pa],p_2 [Pa]\n" + rows)
+    ...     trace = read_pressure(file)
+    >>> trace["pressure_bar"].max("crank_angle_cad").values.tolist()
+    [60.0, 59.0]
     """
-    check_choice("pressure_unit", pressure_unit, tuple(PRESSURE_UNITS))
-    check_choice("angle_unit", angle_unit, ANGLE_UNITS)
-    table = read_table(path, delimiter=delimiter, decimal=decimal)
-    angle_index, pressure_index = table.index(angle_column), table.index(pressure_column)
-    said = table.unit(pressure_index)
-    if said and said != pressure_unit and said not in PRESSURE_UNITS:
-        raise DataError(
-            f"{table.source}: the units row says {said!r} for the pressure: convert it to one of "
-            f"{', '.join(PRESSURE_UNITS)} first"
-        )
-    if said and said != pressure_unit:
-        raise DataError(
-            f"{table.source}: the units row says {said!r} for the pressure: pass "
-            f"{argument('pressure_unit', repr(said))} instead of {pressure_unit!r}"
-        )
-    angle, pressure = table.numbers(angle_index), table.numbers(pressure_index)
-    rows = list(table.lines)
-    if firing_tdc_deg is not None or before_tdc:
-        degrees = np.rad2deg(angle) if angle_unit == "rad" else angle
-        try:
-            order, angle = turned(degrees, firing_tdc_deg, before_tdc)
-        except DataError as error:
-            raise error.reworded(f"{table.source}: {error}") from None
-        pressure, rows = pressure[order], [rows[i] for i in order]
-        angle_unit = "deg"
-    angle, pressure = check_trace(
-        angle, pressure, unit=pressure_unit, angle_unit=angle_unit, source=table.source, rows=rows
+    how = Reading(
+        angle_column=angle_column,
+        pressure_column=pressure_column,
+        angle_unit=angle_unit,
+        pressure_unit=pressure_unit,
+        firing_tdc_deg=firing_tdc_deg,
+        before_tdc=before_tdc,
+        angle_step_deg=angle_step_deg,
+        angle_start_deg=angle_start_deg,
+        speed_rpm=speed_rpm,
+        gain_bar_per_v=gain_bar_per_v,
+        offset_bar=offset_bar,
     )
-    return _dataset(angle, pressure, Path(path).name)
+    angle, pressure, warnings = cycles_of(read_table(path, delimiter=delimiter, decimal=decimal), how)
+    attrs: dict[str, str | float] = {"file": Path(path).name, "warnings": "\n".join(warnings)}
+    if speed_rpm is not None:
+        attrs["speed_rpm"] = float(speed_rpm)
+    return _dataset(angle, pressure, attrs)
 
 
 def write_pressure(dataset: xr.Dataset, path: str | os.PathLike[str]) -> None:
@@ -169,7 +189,8 @@ def write_pressure(dataset: xr.Dataset, path: str | os.PathLike[str]) -> None:
     Parameters
     ----------
     dataset : xarray.Dataset
-        With ``pressure_bar(crank_angle_cad)``; other variables are not written.
+        With ``pressure_bar(crank_angle_cad)`` or ``pressure_bar(cycle, crank_angle_cad)``, which becomes a column per
+        cycle, counted from 1; other variables and attributes are not written.
     path : path-like
         The file; an existing one is replaced once the Dataset has passed its checks.
 
@@ -191,16 +212,23 @@ def write_pressure(dataset: xr.Dataset, path: str | os.PathLike[str]) -> None:
     ...     read_pressure(file).equals(trace)
     True
     """
-    if "pressure_bar" not in dataset or dataset["pressure_bar"].dims != (ANGLE,):
+    if "pressure_bar" not in dataset or set(dataset["pressure_bar"].dims) not in ({ANGLE}, {CYCLE, ANGLE}):
         raise DataError(f"dataset has no pressure_bar({ANGLE}): make one with mgdd.io.pressure_trace")
     check_labels(dataset[["pressure_bar"]])
-    measured = dataset["pressure_bar"]
+    measured = dataset["pressure_bar"].transpose(..., ANGLE)
     angle, pressure = check_trace(measured[ANGLE].to_numpy(), measured.to_numpy(), source="dataset")
-    lines = [f"{ANGLE},pressure_bar"]
-    lines += [f"{a!r},{p!r}" for a, p in zip(angle.tolist(), pressure.tolist(), strict=True)]
+    names = ["pressure_bar"] if pressure.ndim == 1 else [f"pressure_bar_{k + 1}" for k in range(len(pressure))]
+    lines = [",".join([ANGLE, *names])]
+    lines += [",".join(map(repr, row)) for row in np.vstack([angle, np.atleast_2d(pressure)]).T.tolist()]
     Path(path).write_text("\n".join(lines) + "\n", encoding="utf-8", newline="\n")
 
 
-def _dataset(angle: ArrayLike, pressure: ArrayLike, name: str) -> xr.Dataset:
-    variables = {ANGLE: (ANGLE, angle), "pressure_bar": (ANGLE, pressure)}
-    return labelled_dataset(variables, attrs={"file": name})
+def _dataset(angle: NDArray[np.float64], pressure: NDArray[np.float64], attrs: dict[str, str | float]) -> xr.Dataset:
+    if len(pressure) == 1:
+        return labelled_dataset({ANGLE: (ANGLE, angle), "pressure_bar": (ANGLE, pressure[0])}, attrs=attrs)
+    variables = {
+        CYCLE: (CYCLE, np.arange(1, len(pressure) + 1), "-", "cycle"),
+        ANGLE: (ANGLE, angle),
+        "pressure_bar": ((CYCLE, ANGLE), pressure),
+    }
+    return labelled_dataset(variables, attrs=attrs)

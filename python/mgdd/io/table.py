@@ -3,8 +3,10 @@
 from __future__ import annotations
 
 import codecs
+import itertools
 import re
 from dataclasses import dataclass
+from functools import cached_property
 from pathlib import Path
 from typing import TYPE_CHECKING
 
@@ -15,6 +17,7 @@ from mgdd.io.existing_file import existing_file
 
 if TYPE_CHECKING:
     import os
+    from collections.abc import Sequence
 
     from numpy.typing import NDArray
 
@@ -23,30 +26,41 @@ __all__ = ["TextTable", "parse_number", "read_table"]
 
 @dataclass(frozen=True)
 class TextTable:
-    """Cells as text, with the line number (from 1) of each row."""
+    """Rows as text, with the line number (from 1) of each."""
 
     source: str
     decimal: str
     header: tuple[str, ...] | None
     units: tuple[str, ...] | None
-    rows: tuple[tuple[str, ...], ...]
+    mark: str | None
+    texts: tuple[str, ...]
     lines: tuple[int, ...]
+
+    @cached_property
+    def rows(self) -> tuple[tuple[str, ...], ...]:
+        """Return the cells as text."""
+        return tuple(_cells(text, self.mark) for text in self.texts)
+
+    @cached_property
+    def width(self) -> int:
+        """Return the number of columns, which every row has."""
+        return len(_cells(self.texts[0], self.mark))
 
     def index(self, column: int | str) -> int:
         """Return the position of a column given by position (from 0) or header name."""
-        width = len(self.rows[0])
         if isinstance(column, str):
             if self.header is None:
                 raise DataError(
-                    f"{self.source}: no header, so there is no column {column!r}: give its number, 0 to {width - 1}"
+                    f"{self.source}: no header, so there is no column {column!r}: give its number, 0 to "
+                    f"{self.width - 1}"
                 )
             if self.header.count(column) != 1:
                 what = "no column" if column not in self.header else "more than one column"
                 names = ", ".join(map(repr, self.header))
                 raise DataError(f"{self.source}: {what} {column!r}: the header has {names}")
             column = self.header.index(column)
-        if isinstance(column, bool) or not 0 <= column < width:
-            raise DataError(f"{self.source}: no column {column}: the {width} column(s) are numbered from 0")
+        if isinstance(column, bool) or not 0 <= column < self.width:
+            raise DataError(f"{self.source}: no column {column}: the {self.width} column(s) are numbered from 0")
         return column
 
     def unit(self, index: int) -> str | None:
@@ -55,12 +69,53 @@ class TextTable:
             return None
         return self.units[index].strip("[]() ")
 
+    def called(self, index: int) -> str:
+        """Return what a message calls a column: its name in the header, or its number."""
+        return f"column {index}" if self.header is None else f"column {self.header[index]!r}"
+
+    def numeric(self, indices: Sequence[int]) -> list[int]:
+        """Return the columns in which any cell holds a number."""
+        if not indices or self._fast(indices) is not None:
+            return list(indices)
+        return [i for i in indices if any(parse_number(row[i], self.decimal) is not None for row in self.rows)]
+
     def numbers(self, index: int) -> NDArray[np.float64]:
         """Return a column as float64, or name the first bad cell with line, column and value."""
+        values: NDArray[np.float64] = self.matrix([index])[0]
+        return values
+
+    def matrix(self, indices: Sequence[int]) -> NDArray[np.float64]:
+        """Return columns as the rows of an array, or name the first bad cell."""
+        fast = self._fast(indices)
+        return np.stack([self._slow(index) for index in indices]) if fast is None else fast
+
+    @cached_property
+    def _body(self) -> NDArray[np.float64] | None:
+        """Read all columns in one go; None where a cell is not a number."""
+        return self._parsed(None)
+
+    def _fast(self, indices: Sequence[int]) -> NDArray[np.float64] | None:
+        """Return columns without looking at single cells; None where one needs the judgement of `_slow`."""
+        values = self._parsed(indices) if self._body is None else self._body[list(indices)]
+        return None if values is None or not np.isfinite(values).all() else values
+
+    def _parsed(self, indices: Sequence[int] | None) -> NDArray[np.float64] | None:
+        texts = self.texts
+        if self.mark is not None and len(self.mark) != 1:
+            return None
+        if self.decimal == ",":
+            if any("." in text for text in texts):
+                return None
+            texts = tuple(text.replace(",", ".") for text in texts)
+        try:
+            return np.loadtxt(texts, delimiter=self.mark, usecols=indices, comments=None, ndmin=2).T
+        except ValueError:
+            return None
+
+    def _slow(self, index: int) -> NDArray[np.float64]:
         values = np.empty(len(self.rows))
         for position, (line, row) in enumerate(zip(self.lines, self.rows, strict=True)):
-            name = f"column {index}" if self.header is None else f"column {self.header[index]!r}"
-            where = f"{self.source}, line {line}, {name}"
+            where = f"{self.source}, line {line}, {self.called(index)}"
             if index >= len(row) or not row[index]:
                 raise DataError(f"{where}: the cell is empty: fill it or remove the row")
             number = parse_number(row[index], self.decimal)
@@ -92,27 +147,46 @@ def read_table(
     if not content:
         raise DataError(f"{file}: the file is empty: rows of numbers are needed")
     mark = delimiter if delimiter is not None else _detect(content[0][1], decimal)
-    cells = [(line, tuple(cell.strip().strip('"') for cell in text.split(mark))) for line, text in content]
     heads: list[tuple[str, ...]] = []
-    if not units_row and cells:
-        heads.append(cells.pop(0)[1])  # the caller's tables always have a header, and a row of empty cells is data
-    while cells and units_row and len(heads) < 2 and not any(_like_number(cell) for cell in cells[0][1]):
-        heads.append(cells.pop(0)[1])
-    if not cells and not units_row:
-        return TextTable(str(file), decimal, heads[0], None, (), ())
-    if not cells:
+    start = 0
+    if not units_row:
+        heads.append(_cells(content[0][1], mark))  # the caller's tables have a header, and a row of empty cells is data
+        start = 1
+    while units_row and start < min(2, len(content)) and _is_head(_cells(content[start][1], mark)):
+        heads.append(_cells(content[start][1], mark))
+        start += 1
+    body = content[start:]
+    if not body and units_row:
         raise DataError(f"{file}: no numeric rows below the header: rows of numbers are needed")
-    width = len(cells[0][1])
-    for number, row in cells:
-        if len(row) != width:
+    width = _width(body[0][1], mark) if body else len(heads[0])
+    for number, text in body:
+        if _width(text, mark) != width:
             raise DataError(
-                f"{file}, line {number}: {len(row)} cell(s) where line {cells[0][0]} has {width}: "
+                f"{file}, line {number}: {_width(text, mark)} cell(s) where line {body[0][0]} has {width}: "
                 "every row needs the same columns"
             )
     header = heads[0] if heads and len(heads[0]) == width else None
     units = heads[1] if len(heads) == 2 else None
-    lines, rows = zip(*cells, strict=True)
-    return TextTable(str(file), decimal, header, units, rows, lines)
+    lines, texts = zip(*body, strict=True) if body else ((), ())
+    return TextTable(str(file), decimal, header, units, mark, texts, lines)
+
+
+def _cells(text: str, mark: str | None) -> tuple[str, ...]:
+    return tuple(cell.strip().strip('"') for cell in text.split(mark))
+
+
+def _width(text: str, mark: str | None) -> int:
+    return len(text.split()) if mark is None else text.count(mark) + 1
+
+
+def _is_head(cells: tuple[str, ...]) -> bool:
+    """Return whether a row holds names: no numbers, or behind a first name nothing but a count of columns."""
+    if not any(_like_number(cell) for cell in cells):
+        return True
+    counted = [int(cell) for cell in cells[1:] if cell.isdecimal()]
+    others = [cell for cell in cells[1:] if not cell.isdecimal()]
+    counts_up = all(b - a == 1 for a, b in itertools.pairwise(counted)) and (not counted or not others)
+    return not _like_number(cells[0]) and counts_up and all(parse_number(cell) is None for cell in others)
 
 
 def _like_number(cell: str) -> bool:

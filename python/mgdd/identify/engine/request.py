@@ -14,7 +14,7 @@ from mgdd import _core
 from mgdd._core.engine import Cylinder, OperatingPoint
 from mgdd.engine import analyze
 from mgdd.errors import DataError, ParameterError, ShapeError
-from mgdd.io.trace_forms import as_trace
+from mgdd.io.trace_forms import one_cycle
 from mgdd.optimize.fit_options import FitOptions
 from mgdd.results.labels import ANGLE
 
@@ -71,7 +71,7 @@ class Request:
         """Check the arguments of `fit_cylinder` against each other."""
         if isinstance(traces, str | os.PathLike | Mapping) or hasattr(traces, "to_numpy") or hasattr(traces, "sizes"):
             raise ShapeError(f"traces is one {type(traces).__name__}: pass a list of traces, [trace] for a single one")
-        given = [as_trace(trace) for trace in traces]
+        given = [one_cycle(trace) for trace in traces]
         if not given:
             raise DataError("no traces: a calibration needs at least one")
         chosen = None if free is None else (free,) if isinstance(free, str) else tuple(free)
@@ -223,11 +223,6 @@ def closed(trace: xr.Dataset, cylinder: Cylinder) -> tuple[NDArray[np.float64], 
     for name in (ANGLE, "pressure_bar"):
         if name not in trace.variables:
             raise DataError(f"the trace has no {name}: read it with mgdd.io.read_pressure")
-    if trace["pressure_bar"].ndim != 1:
-        raise ShapeError(
-            f"pressure_bar has the dimensions {trace['pressure_bar'].dims}: a calibration takes one cycle per trace; "
-            "give the mean, trace.mean('cycle'), or each cycle as a trace"
-        )
     angle = trace[ANGLE].to_numpy()
     inside = (angle >= cylinder.ivc_cad - 1e-9) & (angle <= cylinder.evo_cad + 1e-9)
     return angle[inside], trace["pressure_bar"].to_numpy()[inside]

@@ -55,7 +55,7 @@ class TdcEstimate:
     --------
     >>> from mgdd import datasets, presets
     >>> from mgdd.identify import estimate_tdc
-    >>> found = estimate_tdc(datasets.load("hd_diesel_128x144")[1:2], presets.load("hd_diesel_128x144").cylinder)
+    >>> found = estimate_tdc(datasets.load("hd_diesel_128x144"), presets.load("hd_diesel_128x144").cylinder, span_cad=1.0)
     >>> found.suspect
     False
     """
@@ -138,9 +138,21 @@ def estimate_tdc(
     Notes
     -----
     Motored: the peak of a parabola through ±5 CAD, plus the loss angle that the cycle model has for this geometry and
-    speed with 0.3 to 1.5 of the textbook wall heat; measured loss angles are 0.4 to 1.3 CAD (Pipitone and Beccari, SAE
-    2007-24-0052, discuss the accuracy). Fired: the double Wiebe law with gamma and wall heat fitted at each offset;
+    speed with 0.3 to 1.5 of the textbook wall heat; measured loss angles are 0.4 to 1.3 CAD. Fired: the double Wiebe law with gamma and wall heat fitted at each offset;
     offsets whose RMSE stays within a quarter of the least are possible.
+
+    References
+    ----------
+    Pipitone et al. (2007) on the accuracy that TDC needs, 0.1 CAD.
+
+    Examples
+    --------
+    >>> from mgdd import datasets, presets
+    >>> from mgdd.identify import estimate_tdc
+    >>> traces, cylinder = datasets.load("hd_diesel_128x144")[1:2], presets.load("hd_diesel_128x144").cylinder
+    >>> found = estimate_tdc(traces, cylinder, span_cad=1.0)
+    >>> found.low_cad < 0.0 < found.high_cad
+    True
     """
     if not 0.5 <= span_cad <= 10.0:
         raise ParameterError.of("span_cad", span_cad, "0.5 to 10 °CA")

@@ -1,0 +1,230 @@
+"""Records of several engine cycles, one below the other or running on, cut into cycles of one angle grid."""
+
+from __future__ import annotations
+
+import itertools
+from typing import TYPE_CHECKING, NamedTuple
+
+import numpy as np
+
+from mgdd.errors import DataError, argument
+from mgdd.io.angles import turned
+from mgdd.signals.even_grid import wide_steps
+
+if TYPE_CHECKING:
+    from collections.abc import Callable
+
+    from numpy.typing import NDArray
+
+__all__ = ["Cycles", "arranged"]
+
+# Share of a step by which the angles of two cycles may differ and still be one grid.
+_SAME = 0.01
+# Sums of steps end this much [deg] beside the angle that was meant.
+_ROUNDING = 1e-6
+
+
+class Cycles(NamedTuple):
+    """Angle [deg], pressures (cycle, angle), the row of each sample of the first cycle, and notes for the user."""
+
+    degrees: NDArray[np.float64]
+    pressure: NDArray[np.float64]
+    rows: NDArray[np.intp]
+    notes: tuple[str, ...]
+
+
+def arranged(
+    degrees: NDArray[np.float64],
+    pressure: NDArray[np.float64],
+    *,
+    firing_tdc_deg: float | None,
+    before_tdc: bool,
+    place: Callable[[int], str],
+    source: str,
+) -> Cycles:
+    """Turn angles to °CA aTDC and cut what holds several cycles.
+
+    Parameters
+    ----------
+    degrees : ndarray, shape (n,)
+        Angle as in the file [deg].
+    pressure : ndarray, shape (columns, n)
+        Pressure, one row per column of the file.
+    firing_tdc_deg, before_tdc
+        As in `mgdd.io.read_pressure`.
+    place : callable
+        What a message calls sample k.
+    source : str
+        What a message calls the record.
+
+    Returns
+    -------
+    Cycles
+        One row of `pressure` per complete cycle.
+
+    Raises
+    ------
+    DataError
+        Two conventions, several cycles in several columns, no complete cycle, cycles of different angles, angles that
+        run on without `firing_tdc_deg`, a gap.
+    """
+    rows = np.arange(degrees.size)
+    if before_tdc and firing_tdc_deg is not None:
+        turned(degrees, firing_tdc_deg, before_tdc)
+    if before_tdc:
+        degrees = 0.0 - degrees
+        if np.all(np.diff(degrees) < 0.0):
+            degrees, pressure, rows = degrees[::-1], pressure[:, ::-1], rows[::-1]
+    span = float(np.ptp(degrees))
+    falls = np.flatnonzero(np.diff(degrees) < -0.5 * span) + 1
+    rises = bool(np.all(np.diff(degrees) > 0.0))
+    runs_on = rises and span > 720.0 + _SAME
+    if (falls.size or runs_on) and len(pressure) > 1:
+        raise DataError(
+            f"{source}: several pressure columns, and several cycles below each other: name one column, "
+            f"{argument('pressure_column', '')}"
+        )
+    notes: tuple[str, ...] = ()
+    if falls.size:
+        stack = _stacked(degrees, pressure[0], rows, falls, place, source)
+        degrees, pressure, rows, notes = stack
+        if firing_tdc_deg is None or not _splits_a_burn(degrees, firing_tdc_deg) or len(pressure) == 1:
+            return Cycles(*_turned(degrees, pressure, rows, firing_tdc_deg, source), notes)
+    if firing_tdc_deg is not None and len(pressure) > 1 and _splits_a_burn(degrees, firing_tdc_deg):
+        # The columns follow each other: end of compression in one, its combustion at the head of the next.
+        whole = degrees[-1] - degrees[0] >= 720.0 - 1e-3
+        keep = slice(0, degrees.size - 1 if whole else degrees.size)
+        degrees = np.concatenate([degrees[keep] + 720.0 * k for k in range(len(pressure))])
+        rows = np.tile(rows[keep], len(pressure))
+        pressure, runs_on = pressure[:, keep].reshape(1, -1), True
+    if runs_on:
+        _check_tdc(degrees, firing_tdc_deg, source)
+        cut = _running(degrees, pressure[0], rows, float(firing_tdc_deg or 0.0), place, source)
+        return cut._replace(notes=notes + cut.notes)
+    return Cycles(*_turned(degrees, pressure, rows, firing_tdc_deg, source), notes)
+
+
+def _turned(
+    degrees: NDArray[np.float64],
+    pressure: NDArray[np.float64],
+    rows: NDArray[np.intp],
+    firing_tdc_deg: float | None,
+    source: str,
+) -> tuple[NDArray[np.float64], NDArray[np.float64], NDArray[np.intp]]:
+    try:
+        order, cad = turned(degrees, firing_tdc_deg, before_tdc=False)
+    except DataError as error:
+        raise error.reworded(f"{source}: {error}") from None
+    return cad, np.ascontiguousarray(pressure[:, order]), rows[order]
+
+
+def _seam(start: float, firing_tdc_deg: float) -> float:
+    """Return where a cycle of 720 degrees that starts there is cut, in °CA aTDC within -360 to 360."""
+    return (start - firing_tdc_deg + 360.0 + _ROUNDING) % 720.0 - 360.0 - _ROUNDING
+
+
+def _splits_a_burn(degrees: NDArray[np.float64], firing_tdc_deg: float) -> bool:
+    """Return whether cycles of 720 degrees start between compression and expansion, not in the gas exchange."""
+    step = float(np.median(np.diff(degrees)))
+    return degrees[-1] - degrees[0] + 1.5 * step >= 720.0 and abs(_seam(float(degrees[0]), firing_tdc_deg)) < 180.0
+
+
+def _check_tdc(degrees: NDArray[np.float64], firing_tdc_deg: float | None, source: str) -> None:
+    if firing_tdc_deg is None:
+        span = degrees[-1] - degrees[0]
+        raise DataError(
+            f"{source}: crank angles run on from {degrees[0]:g} to {degrees[-1]:g}, {span / 720.0:.3g} cycles: pass "
+            f"{argument('firing_tdc_deg', '')} with the angle of firing TDC in the first of them, 0 to 720"
+        )
+    if not 0.0 <= firing_tdc_deg <= 720.0:
+        raise DataError.of("firing_tdc_deg", firing_tdc_deg, "in [0, 720]")
+
+
+def _stacked(
+    degrees: NDArray[np.float64],
+    pressure: NDArray[np.float64],
+    rows: NDArray[np.intp],
+    falls: NDArray[np.intp],
+    place: Callable[[int], str],
+    source: str,
+) -> Cycles:
+    """Cut where the angle returns to its start."""
+    edges = [0, *falls.tolist(), degrees.size]
+    blocks = [slice(a, b) for a, b in itertools.pairwise(edges)]
+    step = float(np.median(np.abs(np.diff(degrees))))
+    low, high = min(degrees[b.start] for b in blocks), max(degrees[b.stop - 1] for b in blocks)
+    whole = [degrees[b.start] < low + 0.5 * step and degrees[b.stop - 1] > high - 0.5 * step for b in blocks]
+    if not any(whole):
+        raise DataError(
+            f"{source}: the angle returns at {place(int(falls[0]))}, and no cycle from {low:g} to {high:g} is complete"
+            ": give at least one"
+        )
+    dropped = [k + 1 for k, complete in enumerate(whole) if not complete]
+    inner = [k for k in dropped if 1 < k < len(blocks)]
+    if inner:
+        b = blocks[inner[0] - 1]
+        raise DataError(
+            f"{place(b.start)}: cycle {inner[0]} of {len(blocks)} runs from {degrees[b.start]:g} to "
+            f"{degrees[b.stop - 1]:g}, the others from {low:g} to {high:g}: repair it or remove its rows"
+        )
+    kept = [b for b, complete in zip(blocks, whole, strict=True) if complete]
+    grid = degrees[kept[0]]
+    for b in kept:
+        if b.stop - b.start != grid.size or np.abs(degrees[b] - grid).max() > _SAME * step:
+            raise DataError(
+                f"{place(b.start)}: the cycle that starts here has other crank angles than the one at "
+                f"{place(kept[0].start)}: give all cycles the same angles"
+            )
+    notes = [f"{_numbered(dropped)} of {len(blocks)} left out: incomplete"] if dropped else []
+    return Cycles(grid, np.stack([pressure[b] for b in kept]), rows[kept[0]], tuple(notes))
+
+
+def _running(
+    degrees: NDArray[np.float64],
+    pressure: NDArray[np.float64],
+    rows: NDArray[np.intp],
+    firing_tdc_deg: float,
+    place: Callable[[int], str],
+    source: str,
+) -> Cycles:
+    """Cut angles that run on into cycles of 720 degrees, at the start of the record or at gas-exchange TDC."""
+    wide, step = wide_steps(degrees)
+    if wide:
+        k = wide[0]
+        raise DataError(
+            f"{place(int(rows[k]))}: gap in the crank angle from {degrees[k - 1]:g} to {degrees[k]:g}: the usual step "
+            f"is {step:g}; fill it or cut the record there"
+        )
+    first = float(degrees[0])
+    if _splits_a_burn(degrees, firing_tdc_deg):
+        first += (-360.0 - _seam(first, firing_tdc_deg)) % 720.0
+    count = int((degrees[-1] + step * (1.0 + _SAME) - first) // 720.0)
+    if count < 1:
+        raise DataError(
+            f"{source}: no complete cycle between {degrees[0]:g} and {degrees[-1]:g} with firing TDC at "
+            f"{firing_tdc_deg:g}: 720 degrees from gas-exchange TDC on are needed"
+        )
+    starts = np.searchsorted(degrees, first + 720.0 * np.arange(count + 1) - _SAME * step)
+    head, tail = int(starts[0]), degrees.size - int(starts[-1])
+    grid = degrees[starts[0] : starts[1]]
+    at = grid + 720.0 * np.arange(count)[:, None]
+    notes = []
+    parts = [f"{n * step:.4g} degrees at the {end}" for n, end in ((head, "start"), (tail, "end")) if n > 1]
+    if parts:
+        notes.append(f"{' and '.join(parts)} of the record left out: incomplete cycles")
+    same = np.all(np.diff(starts) == grid.size)
+    cut = degrees[starts[0] : starts[0] + at.size].reshape(at.shape) if same else at
+    if same and np.abs(cut - at).max() <= _SAME * step:
+        values = pressure[starts[0] : starts[0] + at.size].reshape(at.shape)
+    else:
+        at = at[at[:, -1] <= degrees[-1] + _SAME * step]
+        values = np.interp(at, degrees, pressure)
+        notes.append("the step does not divide 720 degrees: cycles interpolated linearly to the angles of the first")
+    past = grid - grid[0] + _seam(float(grid[0]), firing_tdc_deg)
+    cad = np.where(past > 360.0 - _SAME * step, past - 720.0, past)
+    order = np.argsort(cad, kind="stable")
+    return Cycles(cad[order], np.ascontiguousarray(values[:, order]), rows[starts[0] : starts[1]][order], tuple(notes))
+
+
+def _numbered(cycles: list[int]) -> str:
+    return f"cycle{'s' if len(cycles) > 1 else ''} {' and '.join(map(str, cycles))}"
