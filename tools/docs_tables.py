@@ -214,8 +214,8 @@ def members() -> Rows:
 def demo() -> Rows:
     rows = {}
     for load, row in zip(_LOADS, ranges(), strict=True):
-        assert row.best is not None
-        rows[load] = [row.best.rmse_percent, row.best.imep_closed_error_percent, *_answers(row)]
+        best: Any = row.best
+        rows[load] = [best.rmse_percent, best.imep_closed_error_percent, *_answers(row)]
     return rows
 
 

@@ -48,7 +48,6 @@ def draw_trace(ax: Axes, heat: xr.Dataset, load: Load) -> None:
 
 def draw_timing(ax: Axes, row: BestTiming) -> None:
     """Closed-cycle efficiency over the angle of half burned, for plausible models of three wall heats."""
-    assert row.best is not None
     like = [m for m in row.members if m.plausible and m.member.fitted == "gamma" and m.member.gamma_model == "linear"]
     for answer, (dash, colour) in zip(like, (("--", BLUE), ("-", BLACK), ("-.", GREY)), strict=True):
         load = answer.member.fit.loads[LOAD]
@@ -73,7 +72,8 @@ def main() -> None:
     out = Path(sys.argv[1]) if len(sys.argv) > 1 else OUT
     traces, cylinder = datasets.load("hd_diesel_128x144"), presets.load("hd_diesel_128x144").cylinder
     row = best_timing(traces, cylinder)[LOAD]
-    assert row.best is not None
+    if row.best is None:
+        raise SystemExit("no plausible model: there is nothing to draw")
     plt.rcParams |= {"font.size": 9.5, "axes.titlesize": 9.5, "legend.fontsize": 9.0, "svg.hashsalt": "mgdd"}
     fig, (left, right) = plt.subplots(1, 2, figsize=(8.8, 3.5), layout="constrained")
     draw_trace(left, analyze(traces[LOAD], cylinder), row.best.member.fit.loads[LOAD])

@@ -129,7 +129,8 @@ def test_calibrate_reports_what_it_cannot_tell(
     files: tuple[list[str], str], capsys: pytest.CaptureFixture[str]
 ) -> None:
     out = run_json(capsys, "engine", "calibrate", *files[0], *HD, "--conditions", files[1])
-    assert all(row["rmse_percent"] <= 1.0 and abs(row["imep_closed_error_percent"]) <= 3.0 for row in out["traces"])
+    assert all(row["rmse_percent"] <= 1.5 and abs(row["imep_closed_error_percent"]) <= 3.0 for row in out["traces"])
+    assert all(row["onset_against_soi_cad"] >= 0.0 for row in out["traces"])
     assert {
         "file",
         "p_max_bar",
@@ -146,6 +147,22 @@ def test_calibrate_reports_what_it_cannot_tell(
     assert "before the injection" in out["report"]
     assert "% low" in out["report"]  # of the laws that miss the IMEP
     assert len(out["laws"]) == 5
+    assert out["tdc"]["low_cad"] < 0.0 < out["tdc"]["high_cad"]
+    assert not out["tdc"]["suspect"]
+
+
+def test_calibrate_with_known_fuel_and_free_gamma_and_pegging(
+    files: tuple[list[str], str], capsys: pytest.CaptureFixture[str]
+) -> None:
+    common = ["engine", "calibrate", files[0][1], *HD, "--conditions", _one_row(files[1], 2)]
+    free = "gamma,wall_heat_scale,soc_cad,burn_duration_cad,wiebe_m"
+    out = run_json(capsys, *common, "--fuel-mg", "115", "--free", free)
+    assert out["traces"][0]["fuel_heat_j"] == pytest.approx(115.0 * 42.8)
+    assert out["common"]["gamma_linear_300k"]["stderr"] > 0.0
+    pegged = run_json(capsys, *common, "--pegging", "two_point", "--pegging-exponent", "1.375")
+    plain = run_json(capsys, *common)
+    assert pegged["traces"][0]["rmse_percent"] != plain["traces"][0]["rmse_percent"]
+    assert "loads" not in refused(capsys, *common, "--free", "soc_cad", "--pegging-exponent", "1.3")
 
 
 def test_calibrate_without_conditions_has_no_onset_column(
@@ -169,8 +186,12 @@ def test_optimum_matches_the_library(capsys: pytest.CaptureFixture[str]) -> None
 def test_optimum_of_files_is_a_range(files: tuple[list[str], str], capsys: pytest.CaptureFixture[str]) -> None:
     out = run_json(capsys, "engine", "optimum", files[0][3], *HD, "--conditions", _one_row(files[1], 4))
     (row,) = out["traces"]
-    assert row["free_soc_cad"] == pytest.approx([-13.9, -11.2], abs=0.1)
-    assert row["free_gain_percent"] == pytest.approx([1.2, 2.8], abs=0.1)
+    kept = [member for member in row["members"] if member["plausible"]]
+    assert len(kept) >= 2
+    assert row["best"] in kept
+    assert row["free_ca50_cad"] == [min(m["free_ca50_cad"] for m in kept), max(m["free_ca50_cad"] for m in kept)]
+    assert row["free_gain_percent"][0] > 0.3  # its own peak pressure holds the full load back
+    assert row["best"]["free_p_max_bar"] > row["best"]["p_max_limit_bar"]
 
 
 def _one_row(conditions: str, row: int) -> str:
@@ -297,7 +318,8 @@ def test_a_held_scale_beyond_the_search_is_still_compared(
     [
         (["--pegging-exponent", "1.3"], "two_point or least_squares"),
         (["--inlet-pressure-kpa", "150"], "--pegging inlet"),
-        (["--motored"], "do not act on measured traces"),
+        (["--motored"], "does not act on measured traces"),
+        (["--fuel-mg", "20"], "does not act on the analysis"),
         (["--set", "bore_mm=90", "--set", "bore_mm=80"], "given twice"),
         (["--burn", "wiebe", "--set", "burn_shape=triangle"], "contradict"),
         (["--speed-rpm", "1000", "--set", "speed_rpm=2000"], "contradict"),

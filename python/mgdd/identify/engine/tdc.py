@@ -26,6 +26,7 @@ __all__ = ["TdcEstimate", "estimate_tdc"]
 
 _SCALES = (0.3, 1.0, 1.5)  # of the wall heat, for the loss angle: the plausible range of a ModelFamily
 _RISE = 1.25  # an offset counts as possible while the RMSE stays within a quarter of the least
+_MODEL_CAD = 0.3  # what another burn law or gamma law moves the least RMSE, seen on simulated and measured traces
 _PEAK_CAD = 5.0
 _STEP_CAD = 0.25
 _NOISE_CAD, _LEAK_CAD = 0.1, 0.3  # what noise and a leak past the rings add to the modelled loss angle
@@ -139,7 +140,8 @@ def estimate_tdc(
     -----
     Motored: the peak of a parabola through ±5 CAD, plus the loss angle that the cycle model has for this geometry and
     speed with 0.3 to 1.5 of the textbook wall heat; measured loss angles are 0.4 to 1.3 CAD. Fired: the double Wiebe law with gamma and wall heat fitted at each offset;
-    offsets whose RMSE stays within a quarter of the least are possible.
+    offsets whose RMSE stays within a quarter of the least are possible, and 0.3 CAD to each side, by which another burn
+    or gamma law moves the least.
 
     References
     ----------
@@ -225,8 +227,8 @@ def _of_fired(request: Request, span_cad: float, progress: Callable[[str], None]
     minima = inner[(rmse[inner] <= rmse[inner - 1]) & (rmse[inner] <= rmse[inner + 1]) & (rmse[inner] <= level)]
     return TdcEstimate(
         offset_cad=_vertex(offsets, rmse, best),
-        low_cad=float(inside.min()),
-        high_cad=float(inside.max()),
+        low_cad=float(inside.min()) - _MODEL_CAD,
+        high_cad=float(inside.max()) + _MODEL_CAD,
         method="residual of the calibration",
         others_cad=tuple(float(offsets[k]) for k in minima if k != best),
         dataset=labelled_dataset(
