@@ -165,6 +165,7 @@ def main() -> int:
             row = ledger.find(mutant)
             if row is None:
                 if lock is None:
+                    lock = _alone(scratch)
                     print(
                         f"{args.module}: {len(pool)} lines can change; preparing {scratch.relative_to(ROOT)}",
                         flush=True,
