@@ -5,10 +5,12 @@
 #include <cstddef>
 #include <limits>
 #include <string>
+#include <type_traits>
 #include <vector>
 
 #include "mgdd/common/error.hpp"
 #include "mgdd/common/random.hpp"
+#include "mgdd/math/dual.hpp"
 #include "mgdd/throttle/simulation.hpp"
 #include "support/asymmetric_throttle.hpp"
 #include "support/no_alloc.hpp"
@@ -106,6 +108,29 @@ TEST(ThrottleOptions, LanesHoldTheBitsOfThePlainCode) {
         ASSERT_EQ(many[i * duty.size() + k], angle[k])
             << "case " << i << " sample " << k << " friction " << name_of(friction_names(), base.friction);
       }
+    }
+  });
+}
+
+// What observers and predictions take derivatives of is the same plant, with its friction, its backlash and its air.
+TEST(ThrottleOptions, AnotherScalarKeepsTheOptions) {
+  using D = Dual<2>;
+  const std::vector<double> duty = rough_duty(150);
+  every_combination([&](const Throttle& t, Bridge bridge) {
+    const ThrottlePlant plant(t);
+    const auto dual = plant.over<D>();
+    ThrottleState state = at_rest(30.0);
+    state.speed_rad_per_s = state.plate_speed_rad_per_s = 4.0;
+    auto other = dynamics::lifted<std::remove_const_t<decltype(dual)>>(state);
+    for (const double u : duty) {
+      for (int k = 0; k < 10; ++k) {
+        ThrottleInput input = plant.input(u);
+        auto its = dual.input(D(u));
+        input.bridge = its.bridge = bridge;
+        plant.step(state, input);
+        dual.step(other, its);
+      }
+      ASSERT_NEAR(dual.output(other).value, plant.output(state), 1e-9) << name_of(friction_names(), t.friction);
     }
   });
 }
