@@ -124,6 +124,7 @@ def _alone(scratch: Path) -> IO[str]:
     try:
         fcntl.flock(lock, fcntl.LOCK_EX | fcntl.LOCK_NB)
     except BlockingIOError:
+        lock.close()
         raise RuntimeError(f"another run uses {scratch}: wait for its end") from None
     return lock
 
@@ -179,6 +180,8 @@ def main() -> int:
             ledger.save(head, rows)
         head["equivalent"] = pool.index(batch[-1]) + 1 - len(rows)
     ledger.save(head, rows)
+    if lock is not None:
+        lock.close()
     print(table(head, rows))
     return 0
 

@@ -135,9 +135,8 @@ def test_the_interval_and_what_a_run_keeps(tools: Any, tmp_path: Path, monkeypat
     assert mutate.Ledger(tmp_path / "x.json", "tests of today").find(died) is None
 
 
-def test_a_run_prepares_once_and_has_its_copy_alone(
-    tools: Any, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
-) -> None:
+@pytest.mark.usefixtures("tools")
+def test_a_run_prepares_once_and_has_its_copy_alone(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     mutate = importlib.import_module("mutate")
     runs = importlib.import_module("mutant_runs")
     source = tmp_path / "a.py"
@@ -145,7 +144,7 @@ def test_a_run_prepares_once_and_has_its_copy_alone(
     prepared = []
 
     class Runner:
-        def __init__(self, root: Path, scratch: Path, *_: Any) -> None:
+        def __init__(self, _root: Path, scratch: Path, *_: Any) -> None:
             self.scratch = scratch
 
         def sources(self) -> list[Path]:
@@ -159,7 +158,7 @@ def test_a_run_prepares_once_and_has_its_copy_alone(
             with pytest.raises(RuntimeError, match="another run uses"):
                 mutate._alone(self.scratch)
 
-        def run(self, mutant: Any) -> Any:
+        def run(self, _mutant: Any) -> Any:
             return runs.Outcome("killed", "t", 1.0)
 
     monkeypatch.setattr(mutate, "ROOT", tmp_path)
