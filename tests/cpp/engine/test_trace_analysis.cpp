@@ -213,6 +213,23 @@ TEST(EngineTrace, ASpikeIsToldFromASteepFlank) {
   EXPECT_TRUE(says(analyze_trace(cycle.angles(), pressure, c.cylinder, c.point, {}), "neighbours"));
 }
 
+// The window ends while the burn goes on: the last step holds more than the last tenth of the heat, and CA90 lies in
+// it.
+TEST(EngineTrace, TheLastStepOfTheHeatBelongsToTheBurn) {
+  for (const bool gross : {false, true}) {
+    TraceOptions o = whole(-6.0);
+    o.heat_to_cad = 5.0;
+    o.fractions_of_gross = gross;
+    const TraceAnalysis a = analyze(EngineCase("step_cad=2.5"), o);
+    const std::vector<double>& heat = gross ? a.heat_gross_cumulative_j : a.heat_net_cumulative_j;
+    const auto last = static_cast<std::size_t>(std::ranges::find(a.angle_cad, 5.0) - a.angle_cad.begin());
+    ASSERT_LT(last, a.angle_cad.size());
+    const double level = 0.9 * heat[last];
+    ASSERT_LT(heat[last - 1], level);
+    EXPECT_NEAR(a.ca90_cad, 2.5 + 2.5 * (level - heat[last - 1]) / (heat[last] - heat[last - 1]), 1e-9) << gross;
+  }
+}
+
 TEST(EngineTrace, PolytropicExponentOfAPolytropicTrace) {
   const Geometry<double> g{GeometryParameters<double>{}};
   std::vector<double> angle, p;
