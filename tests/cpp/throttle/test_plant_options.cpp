@@ -164,6 +164,9 @@ TEST(ThrottleOptions, LanesStartFromTheWholeState) {
   }
   EXPECT_TRUE(simulate_many({}, {.duty = duty}, 3, 2e-4).empty());
   EXPECT_THROW(simulate_many(cases, {.duty = duty}, 3, 6e-3), ParameterError);
+  const std::vector<double> percent(duty.size(), 35.0), short_supply(2, 12.0);
+  EXPECT_THROW(simulate_many(cases, {.duty = percent}, 3, 2e-4), DataError);
+  EXPECT_THROW(simulate_many(cases, {.duty = duty, .supply_v = short_supply}, 3, 2e-4), ShapeError);
   for (const bool friction : {true, false}) {
     auto mixed = cases;
     if (friction) {
