@@ -95,12 +95,13 @@ TEST(EngineTrace, InletPeggingTakesTheMeanAroundBottomDeadCentre) {
   std::vector<double> angle, p;
   for (double a = -200.0; a <= 130.0; a += 1.0) {
     angle.push_back(a);
-    p.push_back(a < -160.0 ? 0.9 + 0.01 * (a + 180.0) : 3.0);
+    const double away = a + 180.0;  // the mean of its square over -5 ... 5 is 10
+    p.push_back(a < -160.0 ? 0.9 + 0.01 * away + 1e-3 * away * away : 3.0);
   }
   TraceOptions o;
   o.pegging = Pegging::inlet;
   o.inlet_pressure_kpa = 150.0;
-  EXPECT_NEAR(pegging_offset_bar(angle, p, Cylinder{}, o), 0.6, 1e-12);
+  EXPECT_NEAR(pegging_offset_bar(angle, p, Cylinder{}, o), 1.5 - 0.91, 1e-12);
   angle.erase(angle.begin(), angle.begin() + 30);
   p.erase(p.begin(), p.begin() + 30);
   EXPECT_THROW(pegging_offset_bar(angle, p, Cylinder{}, o), DataError);
@@ -228,6 +229,30 @@ TEST(EngineTrace, TheLastStepOfTheHeatBelongsToTheBurn) {
     ASSERT_LT(heat[last - 1], level);
     EXPECT_NEAR(a.ca90_cad, 2.5 + 2.5 * (level - heat[last - 1]) / (heat[last] - heat[last - 1]), 1e-9) << gross;
   }
+}
+
+// Of an expansion alone the pressure rises nowhere: its largest rate is the least fall, at the end.
+TEST(EngineTrace, TheLargestRateOfAFallingTraceIsNegative) {
+  const Geometry<double> g{GeometryParameters<double>{}};
+  std::vector<double> angle, p;
+  for (double a = 30.0; a <= 130.0; a += 1.0) {
+    angle.push_back(a);
+    p.push_back(30.0 * std::pow(g.volume_m3(a) / g.volume_m3(30.0), -1.3));
+  }
+  const std::size_t n = p.size();
+  const TraceAnalysis found = analyze_trace(angle, p, Cylinder{}, OperatingPoint{}, TraceOptions{});
+  EXPECT_NEAR(found.dp_max_bar_per_cad, 0.5 * (p[n - 1] - p[n - 3]), 1e-12);
+  EXPECT_LT(found.dp_max_bar_per_cad, 0.0);
+}
+
+TEST(EngineTrace, RatesAreTheHeatOfAStepByItsLength) {
+  TraceAnalysis a;
+  a.angle_cad = {-3.0, -2.0, 0.5};
+  a.heat_net_j = {0.0, 4.0, -10.0};
+  a.heat_loss_j = {0.0, 1.0, 5.0};
+  EXPECT_EQ(a.heat_release_net_j_per_cad(), (std::vector{0.0, 4.0, -4.0}));
+  EXPECT_EQ(a.heat_loss_j_per_cad(), (std::vector{0.0, 1.0, 2.0}));
+  EXPECT_EQ(a.heat_release_gross_j_per_cad(), (std::vector{0.0, 5.0, -2.0}));
 }
 
 TEST(EngineTrace, PolytropicExponentOfAPolytropicTrace) {
