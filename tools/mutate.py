@@ -124,6 +124,7 @@ def _alone(scratch: Path) -> IO[str]:
     try:
         fcntl.flock(lock, fcntl.LOCK_EX | fcntl.LOCK_NB)
     except BlockingIOError:
+        lock.close()
         raise RuntimeError(f"another run uses {scratch}: wait for its end") from None
     return lock
 
@@ -165,6 +166,7 @@ def main() -> int:
             row = ledger.find(mutant)
             if row is None:
                 if lock is None:
+                    lock = _alone(scratch)
                     print(
                         f"{args.module}: {len(pool)} lines can change; preparing {scratch.relative_to(ROOT)}",
                         flush=True,
@@ -178,6 +180,8 @@ def main() -> int:
             ledger.save(head, rows)
         head["equivalent"] = pool.index(batch[-1]) + 1 - len(rows)
     ledger.save(head, rows)
+    if lock is not None:
+        lock.close()
     print(table(head, rows))
     return 0
 

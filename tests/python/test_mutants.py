@@ -133,3 +133,37 @@ def test_the_interval_and_what_a_run_keeps(tools: Any, tmp_path: Path, monkeypat
     assert better.find(lived) is None, "but may kill this one too"
     (tmp_path / "a.py").write_text(PYTHON + "\n", encoding="utf-8")
     assert mutate.Ledger(tmp_path / "x.json", "tests of today").find(died) is None
+
+
+@pytest.mark.usefixtures("tools")
+def test_a_run_prepares_once_and_has_its_copy_alone(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    mutate = importlib.import_module("mutate")
+    runs = importlib.import_module("mutant_runs")
+    source = tmp_path / "a.py"
+    source.write_text(PYTHON, encoding="utf-8")
+    prepared = []
+
+    class Runner:
+        def __init__(self, _root: Path, scratch: Path, *_: Any) -> None:
+            self.scratch = scratch
+
+        def sources(self) -> list[Path]:
+            return [source]
+
+        def tests(self) -> list[Path]:
+            return []
+
+        def prepare(self) -> None:
+            prepared.append(self.scratch)
+            with pytest.raises(RuntimeError, match="another run uses"):
+                mutate._alone(self.scratch)
+
+        def run(self, _mutant: Any) -> Any:
+            return runs.Outcome("killed", "t", 1.0)
+
+    monkeypatch.setattr(mutate, "ROOT", tmp_path)
+    monkeypatch.setattr(mutate, "FOLDER", tmp_path / "mutants")
+    monkeypatch.setattr(mutate, "Python", Runner)
+    monkeypatch.setattr("sys.argv", ["mutate.py", "mgdd.a", "-n", "4"])
+    assert mutate.main() == 0
+    assert prepared == [tmp_path / "mutants" / "python"]

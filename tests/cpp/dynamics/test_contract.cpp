@@ -206,5 +206,14 @@ TEST(Contract, AScalarThatIsLeftOutIsSeen) {
   EXPECT_FALSE((on_every_scalar<LacksOne<Lanes<8>>>));
 }
 
+// A model of any smooth equation does not know a state at rest for an output.
+TEST(Contract, ARequirementThatIsNotMetIsSeen) {
+  using Smooth = decltype(Rk4<throttle::SmoothPlant>{}.prepare<double>(throttle::smooth_plant_example, 1e-3));
+  EXPECT_TRUE(DiscreteModel<Smooth>);
+  EXPECT_FALSE(StartsAtRest<Smooth>);
+  EXPECT_TRUE(StartsAtRest<throttle::PwRModel>);
+  EXPECT_FALSE(DiscreteModel<double>);
+}
+
 }  // namespace
 }  // namespace mgdd::dynamics

@@ -69,6 +69,41 @@ TEST(KalmanObserver, SteadyGainIsThatOfAnIndependentRiccatiSolution) {
   EXPECT_NEAR(observer.gain()[1], gain[1], 1e-12);
 }
 
+// Without process noise the filter is least squares: the start that best fits what was stated of it, with its
+// variances, and every measurement so far, carried forward by the model.
+TEST(KalmanObserver, WithoutProcessNoiseItIsLeastSquaresFromItsStart) {
+  const auto model = Rk4<Oscillator>{}.prepare(std::array{4.0, 0.5}, 0.1);
+  using Observer = KalmanObserver<std::remove_const_t<decltype(model)>>;
+  Observer observer(model, {.process = {}, .start = {0.7, 0.09}, .measurement = 0.02});
+  const Eigen::Vector2d stated(0.3, -0.2);
+  observer.start({stated[0], stated[1]});
+  Eigen::Matrix2d f;
+  for (int j = 0; j < 2; ++j) {
+    std::array<double, 2> x{j == 0 ? 1.0 : 0.0, j == 1 ? 1.0 : 0.0};
+    model.step(x, std::array{0.0});
+    f.col(j) << x[0], x[1];
+  }
+  Eigen::Matrix2d normal = Eigen::Vector2d(1.0 / 0.7, 1.0 / 0.09).asDiagonal();
+  Eigen::Vector2d right = normal * stated;
+  Eigen::Matrix2d ahead = Eigen::Matrix2d::Identity();
+  for (int k = 0; k < 25; ++k) {
+    const double y = 1.3 * std::cos(0.4 * k) - 0.5;
+    static_cast<void>(observer.update(0.0, y));
+    ahead = f * ahead;
+    const Eigen::RowVector2d row = Eigen::RowVector2d(1.0, 0.3) * ahead;
+    normal += row.transpose() * row / 0.02;
+    right += row.transpose() * y / 0.02;
+    const Eigen::Vector2d now = ahead * normal.inverse() * right;
+    const Eigen::Matrix2d spread = ahead * normal.inverse() * ahead.transpose();
+    for (int i = 0; i < 2; ++i) {
+      const auto at = static_cast<std::size_t>(i);
+      EXPECT_NEAR(observer.state()[at], now[i], 1e-12) << k;
+      for (int j = 0; j < 2; ++j)
+        EXPECT_NEAR(observer.covariance()[at][static_cast<std::size_t>(j)], spread(i, j), 1e-13) << k;
+    }
+  }
+}
+
 template <class M>
 void expect_white(const M& model, typename KalmanObserver<M>::Settings settings, double noise, double angle_deg) {
   KalmanObserver<M> observer(model, settings);

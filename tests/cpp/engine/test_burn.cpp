@@ -56,6 +56,24 @@ TEST(EngineBurn, SlopeIntegratesToOne) {
   }
 }
 
+TEST(EngineBurn, SlopeIsThatOfTheFraction) {
+  Cylinder c;
+  c.burn.wiebe_a = 5.3;
+  c.burn.wiebe_m = 2.2;
+  c.burn.second_fraction = 0.35;
+  c.burn.second_delay_cad = 4.5;
+  c.burn.second_duration_cad = 43.0;
+  c.burn.second_wiebe_m = 1.1;
+  for (const BurnShape shape : {BurnShape::triangle, BurnShape::wiebe, BurnShape::double_wiebe}) {
+    c.burn.burn_shape = shape;
+    const Burn<double> burn(c.burn, -6.3, 31.7);
+    for (const double a : {-4.0, 1.0, 6.5, 14.0, 21.0}) {
+      const double difference = (burn.fraction(a + 1e-4) - burn.fraction(a - 1e-4)) / 2e-4;
+      EXPECT_NEAR(burn.slope_at(a), difference, 1e-8) << static_cast<int>(shape) << " at " << a;
+    }
+  }
+}
+
 TEST(EngineBurn, TriangleByHand) {
   const Burn<double> burn(Cylinder{}.burn, -6.0, 30.0);
   EXPECT_NEAR(burn.angle_of(0.5) + 6.0, 15.0, 1e-12);

@@ -3,6 +3,7 @@
 
 #include <cmath>
 #include <limits>
+#include <optional>
 #include <string>
 #include <string_view>
 #include <utility>
@@ -16,6 +17,7 @@
 #include "mgdd/engine/pressure/trace_analysis.hpp"
 #include "mgdd/engine/pressure/trace_check.hpp"
 #include "mgdd/engine/sensitivity.hpp"
+#include "support/names.hpp"
 
 namespace mgdd::engine {
 namespace {
@@ -109,6 +111,40 @@ TEST(EngineNumbers, DefaultsOfAnalysisAndEmissions) {
   EXPECT_EQ(NoxProxy{}, (NoxProxy{1900.0, 1200.0, 16000.0}));
   EXPECT_EQ(NoxModel{}, (NoxModel{NoxProxy{}, NoxMap::affine_log, 0.209, 3.0}));
   EXPECT_EQ(SoftSensor{}, (SoftSensor{NoxModel{}, 0.01}));
+  EXPECT_EQ(PerformanceTerm{}, (PerformanceTerm{PerformanceSignal::efficiency_percent, 1.0, 1.0, std::nullopt}));
+}
+
+TEST(EngineNumbers, NamesOfTheOptions) {
+  test::expect_names(
+      parse_gamma_model,
+      {{GammaModel::constant, "constant"}, {GammaModel::linear, "linear"}, {GammaModel::polynomial, "polynomial"}});
+  test::expect_names(
+      parse_burn_shape,
+      {{BurnShape::triangle, "triangle"}, {BurnShape::wiebe, "wiebe"}, {BurnShape::double_wiebe, "double_wiebe"}});
+  test::expect_names(parse_wall_heat_model,
+                     {{WallHeatModel::woschni, "woschni"}, {WallHeatModel::hohenberg, "hohenberg"}});
+  test::expect_names(parse_ignition_model, {{IgnitionModel::watson, "watson"},
+                                            {IgnitionModel::wolfer, "wolfer"},
+                                            {IgnitionModel::hardenberg_hase, "hardenberg_hase"},
+                                            {IgnitionModel::polynomial, "polynomial"}});
+  test::expect_names(
+      parse_integrator,
+      {{Integrator::trapezoid, "trapezoid"}, {Integrator::split, "split"}, {Integrator::euler, "euler"}});
+  test::expect_names(parse_pegging, {{Pegging::none, "none"},
+                                     {Pegging::inlet, "inlet"},
+                                     {Pegging::two_point, "two_point"},
+                                     {Pegging::least_squares, "least_squares"}});
+  test::expect_names(
+      parse_analysis_gamma,
+      {{AnalysisGamma::constant, "constant"}, {AnalysisGamma::split, "split"}, {AnalysisGamma::cylinder, "cylinder"}});
+  test::expect_names(parse_performance_signal, {{PerformanceSignal::efficiency_percent, "efficiency_percent"},
+                                                {PerformanceSignal::imep_gross_bar, "imep_gross_bar"},
+                                                {PerformanceSignal::imep_closed_bar, "imep_closed_bar"},
+                                                {PerformanceSignal::nox_ppm, "nox_ppm"},
+                                                {PerformanceSignal::p_max_bar, "p_max_bar"},
+                                                {PerformanceSignal::dp_max_bar_per_cad, "dp_max_bar_per_cad"},
+                                                {PerformanceSignal::t_max_k, "t_max_k"}});
+  test::expect_names(parse_nox_map, {{NoxMap::affine_log, "affine_log"}, {NoxMap::arrhenius, "arrhenius"}});
 }
 
 // --- what is allowed ------------------------------------------------------------------------------------------

@@ -164,5 +164,30 @@ TEST(EngineSensitivity, UnknownInputIsRefusedByName) {
   EXPECT_THROW(input_unit("evo_cad"), ParameterError);
 }
 
+// What a cycle refuses neither derivatives nor the estimate of convergence let pass.
+TEST(EngineSensitivity, InputsOfACycleAreChecked) {
+  const auto refused = [](const EngineCase& c, const std::string& part) {
+    const auto expect = [&](auto call) {
+      try {
+        call();
+        ADD_FAILURE() << part;
+      } catch (const ParameterError& error) {
+        EXPECT_EQ(std::string(error.what()).find(part), 0U) << error.what();
+      }
+    };
+    expect([&] { sensitivities(c.cylinder, c.point, c.soc_cad, {"fuel_mg"}); });
+    expect([&] { convergence(c.cylinder, c.point, c.soc_cad); });
+  };
+  EngineCase c;
+  c.soc_cad = 21.0;
+  refused(c, "soc_cad = 21");
+  c = {};
+  c.point.speed_rpm = 0.0;
+  refused(c, "speed_rpm = 0");
+  c = {};
+  c.cylinder.wall_heat.wall_heat_scale = -0.5;
+  refused(c, "wall_heat_scale = -0.5");
+}
+
 }  // namespace
 }  // namespace mgdd::engine

@@ -95,12 +95,13 @@ TEST(EngineTrace, InletPeggingTakesTheMeanAroundBottomDeadCentre) {
   std::vector<double> angle, p;
   for (double a = -200.0; a <= 130.0; a += 1.0) {
     angle.push_back(a);
-    p.push_back(a < -160.0 ? 0.9 + 0.01 * (a + 180.0) : 3.0);
+    const double away = a + 180.0;  // the mean of its square over -5 ... 5 is 10
+    p.push_back(a < -160.0 ? 0.9 + 0.01 * away + 1e-3 * away * away : 3.0);
   }
   TraceOptions o;
   o.pegging = Pegging::inlet;
   o.inlet_pressure_kpa = 150.0;
-  EXPECT_NEAR(pegging_offset_bar(angle, p, Cylinder{}, o), 0.6, 1e-12);
+  EXPECT_NEAR(pegging_offset_bar(angle, p, Cylinder{}, o), 1.5 - 0.91, 1e-12);
   angle.erase(angle.begin(), angle.begin() + 30);
   p.erase(p.begin(), p.begin() + 30);
   EXPECT_THROW(pegging_offset_bar(angle, p, Cylinder{}, o), DataError);
@@ -211,6 +212,47 @@ TEST(EngineTrace, ASpikeIsToldFromASteepFlank) {
   EXPECT_FALSE(says(analyze_trace(cycle.angles(), pressure, c.cylinder, c.point, {}), "neighbours"));
   pressure[pressure.size() / 3] += 0.15 * top;
   EXPECT_TRUE(says(analyze_trace(cycle.angles(), pressure, c.cylinder, c.point, {}), "neighbours"));
+}
+
+// The window ends while the burn goes on: the last step holds more than the last tenth of the heat, and CA90 lies in
+// it.
+TEST(EngineTrace, TheLastStepOfTheHeatBelongsToTheBurn) {
+  for (const bool gross : {false, true}) {
+    TraceOptions o = whole(-6.0);
+    o.heat_to_cad = 5.0;
+    o.fractions_of_gross = gross;
+    const TraceAnalysis a = analyze(EngineCase("step_cad=2.5"), o);
+    const std::vector<double>& heat = gross ? a.heat_gross_cumulative_j : a.heat_net_cumulative_j;
+    const auto last = static_cast<std::size_t>(std::ranges::find(a.angle_cad, 5.0) - a.angle_cad.begin());
+    ASSERT_LT(last, a.angle_cad.size());
+    const double level = 0.9 * heat[last];
+    ASSERT_LT(heat[last - 1], level);
+    EXPECT_NEAR(a.ca90_cad, 2.5 + 2.5 * (level - heat[last - 1]) / (heat[last] - heat[last - 1]), 1e-9) << gross;
+  }
+}
+
+// Of an expansion alone the pressure rises nowhere: its largest rate is the least fall, at the end.
+TEST(EngineTrace, TheLargestRateOfAFallingTraceIsNegative) {
+  const Geometry<double> g{GeometryParameters<double>{}};
+  std::vector<double> angle, p;
+  for (double a = 30.0; a <= 130.0; a += 1.0) {
+    angle.push_back(a);
+    p.push_back(30.0 * std::pow(g.volume_m3(a) / g.volume_m3(30.0), -1.3));
+  }
+  const std::size_t n = p.size();
+  const TraceAnalysis found = analyze_trace(angle, p, Cylinder{}, OperatingPoint{}, TraceOptions{});
+  EXPECT_NEAR(found.dp_max_bar_per_cad, 0.5 * (p[n - 1] - p[n - 3]), 1e-12);
+  EXPECT_LT(found.dp_max_bar_per_cad, 0.0);
+}
+
+TEST(EngineTrace, RatesAreTheHeatOfAStepByItsLength) {
+  TraceAnalysis a;
+  a.angle_cad = {-3.0, -2.0, 0.5};
+  a.heat_net_j = {0.0, 4.0, -10.0};
+  a.heat_loss_j = {0.0, 1.0, 5.0};
+  EXPECT_EQ(a.heat_release_net_j_per_cad(), (std::vector{0.0, 4.0, -4.0}));
+  EXPECT_EQ(a.heat_loss_j_per_cad(), (std::vector{0.0, 1.0, 2.0}));
+  EXPECT_EQ(a.heat_release_gross_j_per_cad(), (std::vector{0.0, 5.0, -2.0}));
 }
 
 TEST(EngineTrace, PolytropicExponentOfAPolytropicTrace) {

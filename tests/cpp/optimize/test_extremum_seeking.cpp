@@ -243,6 +243,23 @@ TEST(ExtremumSeeking, DitherShrinksWhereJIsFlatAndComesBackAtANewOperatingPoint)
   EXPECT_NEAR(seeker.estimate()[0], 12.0, 0.5);
 }
 
+// A hold of two windows and a half, at the start and again after a restart in the middle of a window: a batch then
+// moves at the end of the third window, the moving average as soon as the hold is over.
+TEST(ExtremumSeeking, ARestartHoldsTheEstimateAsTheStartDoes) {
+  for (const auto& [form, first_move] : {std::pair{MeanRemoval::batch, 30U}, {MeanRemoval::moving_average, 25U}}) {
+    ExtremumSeekingSettings s = plain_seeking(6.0);
+    s.form = form;
+    s.hold_cycles = 25;
+    ExtremumSeeking seeker(s);
+    for (const bool again : {false, true}) {
+      const std::vector<double> path = search(seeker, quadratic, 37);
+      EXPECT_EQ(std::ranges::count(path, path.front()), first_move) << to_string(form) << again;
+      EXPECT_LT(path.back(), path[first_move - 1]);
+      seeker.restart();
+    }
+  }
+}
+
 TEST(ExtremumSeeking, ThreeInputsOnOneWindowFindTheirGradientAndOptimum) {
   InputMatrix h(3, 3);
   h << -0.06, 0.02, 0.0, 0.02, -0.05, -0.01, 0.0, -0.01, -0.08;

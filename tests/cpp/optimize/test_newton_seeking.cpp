@@ -123,6 +123,8 @@ TEST(NewtonSeeking, RefusesAndAdvises) {
   EXPECT_THROW(NewtonSeeking{wrong}, ShapeError);
   NewtonSeekingSettings s;
   EXPECT_TRUE(s.advice().empty());
+  s.time_constant_cycles = 20.0;
+  EXPECT_TRUE(s.advice().empty()) << "two periods are enough";
   s.time_constant_cycles = 15.0;
   ASSERT_EQ(s.advice().size(), 1u);
   EXPECT_NE(s.advice()[0].find("20"), std::string::npos);

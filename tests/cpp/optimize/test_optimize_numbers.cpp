@@ -9,6 +9,7 @@
 #include "mgdd/optimize/least_squares/recursive_least_squares.hpp"
 #include "mgdd/optimize/seekers/seekers.hpp"
 #include "mgdd/optimize/seekers/tuner.hpp"
+#include "support/names.hpp"
 
 namespace mgdd::optimize {
 namespace {
@@ -141,6 +142,28 @@ TEST(OptimizeNumbers, DefaultsOfLearningAndOfAWish) {
   EXPECT_TRUE(w.compensated);
   for (const double open : {w.noise_sd, w.curvature, w.rms, w.cycles, w.distance, w.arrival, w.amplitude_max})
     EXPECT_TRUE(std::isnan(open));
+}
+
+TEST(OptimizeNumbers, NamesOfTheOptions) {
+  test::expect_names(parse_mean_removal, {{MeanRemoval::batch, "batch"},
+                                          {MeanRemoval::moving_average, "moving_average"},
+                                          {MeanRemoval::washout, "washout"}});
+  test::expect_names(parse_spsa_form, {{SpsaForm::first_order, "first_order"},
+                                       {SpsaForm::second_order, "second_order"},
+                                       {SpsaForm::one_measurement, "one_measurement"}});
+  test::expect_names(parse_gain_schedule,
+                     {{GainSchedule::decreasing, "decreasing"}, {GainSchedule::constant, "constant"}});
+  test::expect_names(
+      parse_limit_method,
+      {{LimitMethod::switching, "switching"}, {LimitMethod::penalty, "penalty"}, {LimitMethod::barrier, "barrier"}});
+  test::expect_names(
+      parse_tuned_method,
+      {{TunedMethod::batch, "batch"}, {TunedMethod::moving_average, "moving_average"}, {TunedMethod::spsa, "spsa"}});
+  test::expect_names(parse_learning_law, {{LearningLaw::p, "p"},
+                                          {LearningLaw::d, "d"},
+                                          {LearningLaw::pd, "pd"},
+                                          {LearningLaw::q_filter, "q_filter"},
+                                          {LearningLaw::norm_optimal, "norm_optimal"}});
 }
 
 }  // namespace

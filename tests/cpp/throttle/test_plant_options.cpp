@@ -5,10 +5,12 @@
 #include <cstddef>
 #include <limits>
 #include <string>
+#include <type_traits>
 #include <vector>
 
 #include "mgdd/common/error.hpp"
 #include "mgdd/common/random.hpp"
+#include "mgdd/math/dual.hpp"
 #include "mgdd/throttle/simulation.hpp"
 #include "support/asymmetric_throttle.hpp"
 #include "support/no_alloc.hpp"
@@ -110,6 +112,29 @@ TEST(ThrottleOptions, LanesHoldTheBitsOfThePlainCode) {
   });
 }
 
+// What observers and predictions take derivatives of is the same plant, with its friction, its backlash and its air.
+TEST(ThrottleOptions, AnotherScalarKeepsTheOptions) {
+  using D = Dual<2>;
+  const std::vector<double> duty = rough_duty(150);
+  every_combination([&](const Throttle& t, Bridge bridge) {
+    const ThrottlePlant plant(t);
+    const auto dual = plant.over<D>();
+    ThrottleState state = at_rest(30.0);
+    state.speed_rad_per_s = state.plate_speed_rad_per_s = 4.0;
+    auto other = dynamics::lifted<std::remove_const_t<decltype(dual)>>(state);
+    for (const double u : duty) {
+      for (int k = 0; k < 10; ++k) {
+        ThrottleInput input = plant.input(u);
+        auto its = dual.input(D(u));
+        input.bridge = its.bridge = bridge;
+        plant.step(state, input);
+        dual.step(other, its);
+      }
+      ASSERT_NEAR(dual.output(other).value, plant.output(state), 1e-9) << name_of(friction_names(), t.friction);
+    }
+  });
+}
+
 // Every number of a state reaches its lane: cases that start in the middle of a motion, with all of it different.
 TEST(ThrottleOptions, LanesStartFromTheWholeState) {
   Throttle p = test::asymmetric_throttle();
@@ -139,6 +164,9 @@ TEST(ThrottleOptions, LanesStartFromTheWholeState) {
   }
   EXPECT_TRUE(simulate_many({}, {.duty = duty}, 3, 2e-4).empty());
   EXPECT_THROW(simulate_many(cases, {.duty = duty}, 3, 6e-3), ParameterError);
+  const std::vector<double> percent(duty.size(), 35.0), short_supply(2, 12.0);
+  EXPECT_THROW(simulate_many(cases, {.duty = percent}, 3, 2e-4), DataError);
+  EXPECT_THROW(simulate_many(cases, {.duty = duty, .supply_v = short_supply}, 3, 2e-4), ShapeError);
   for (const bool friction : {true, false}) {
     auto mixed = cases;
     if (friction) {

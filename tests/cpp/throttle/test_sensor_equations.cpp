@@ -5,9 +5,11 @@
 #include <cmath>
 #include <string>
 #include <utility>
+#include <vector>
 
 #include "mgdd/common/error.hpp"
 #include "mgdd/common/random.hpp"
+#include "mgdd/common/state.hpp"
 #include "mgdd/throttle/sensors.hpp"
 
 namespace mgdd::throttle {
@@ -165,6 +167,37 @@ TEST(SensorEquations, TheFaultStandsAfterTheDebounceTimeOfEachCheck) {
   SensorSampler sampler(at_once, sample_s, 3, {range, none});
   for (int k = 0; k < 4; ++k)
     EXPECT_EQ(sampler.step(30.0).fault, k >= 2) << k;
+}
+
+// Restarted before any sample - filter charged, sensor stuck, check failing, fault latched - the rest is the same.
+TEST(SensorEquations, ARestartGoesOnWithTheSameReadings) {
+  const std::array<SensorFault, 2> faults{SensorFault{SensorFaultKind::stuck, 3 * sample_s, 0.0}, SensorFault{}};
+  const auto angle = [](int k) { return k == 6 || k == 7 ? 50.0 : k >= 14 && k < 22 ? 65.0 : 30.0 + 0.1 * k; };
+  const auto read = [&](SensorSampler& sampler, int from) {
+    std::vector<double> out;
+    for (int k = from; k < 28; ++k) {
+      const SensorReading r = sampler.step(angle(k));
+      out.insert(out.end(), {r.volts[0], r.volts[1], r.angle_deg, r.sum_fault ? 1.0 : 0.0, r.fault ? 1.0 : 0.0});
+    }
+    return out;
+  };
+  for (int restart = 0; restart < 28; ++restart) {
+    SensorSampler whole(other_pair(), sample_s, 3, faults), other(other_pair(), sample_s, 3, faults);
+    for (int k = 0; k < restart; ++k)
+      whole.step(angle(k));
+    for (int k = 0; k < 11; ++k)
+      other.step(70.0);  // stuck elsewhere, and failing
+    restore_state(other, save_state(whole));
+    EXPECT_EQ(read(other, restart), read(whole, restart)) << restart;
+  }
+  SensorSampler sampler(other_pair(), sample_s, 3, faults);
+  std::vector<int> latched;
+  for (int k = 0; k < 28; ++k) {
+    if (sampler.step(angle(k)).fault) latched.push_back(k);
+  }
+  ASSERT_FALSE(latched.empty());
+  EXPECT_GT(latched.front(), 14) << "the first failure is too short";
+  EXPECT_LT(latched.front(), 22);
 }
 
 TEST(SensorEquations, EverySettingHasItsBounds) {

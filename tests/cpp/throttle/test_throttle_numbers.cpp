@@ -1,6 +1,7 @@
 // Numbers of a throttle: what a user gets who says nothing, what each field allows, and rules between fields.
 #include <gtest/gtest.h>
 
+#include <algorithm>
 #include <array>
 #include <cmath>
 #include <string>
@@ -142,6 +143,38 @@ TEST(ThrottleNumbers, DefaultsOfTheSensorsAndTheInputs) {
   for (const double zero : {state.angle_rad, state.speed_rad_per_s, state.current_a, state.bristle_rad,
                             state.plate_angle_rad, state.plate_speed_rad_per_s, state.plate_bristle_rad})
     EXPECT_EQ(zero, 0.0);
+  const ThrottleTorques torques;
+  for (const double zero :
+       {torques.motor_nm, torques.viscous_nm, torques.friction_nm, torques.spring_nm, torques.stop_nm, torques.air_nm})
+    EXPECT_EQ(zero, 0.0);
+}
+
+// The name that a user types for an option is part of the interface.
+TEST(ThrottleNumbers, NamesOfTheOptions) {
+  const auto expect = []<class Enum>(Names<Enum> names, const std::vector<std::pair<Enum, std::string_view>>& all) {
+    EXPECT_TRUE(std::ranges::equal(names, all)) << all.back().second;
+  };
+  expect(friction_names(), {{Friction::coulomb, "coulomb"},
+                            {Friction::stiction, "stiction"},
+                            {Friction::stribeck, "stribeck"},
+                            {Friction::karnopp, "karnopp"},
+                            {Friction::tanh, "tanh"},
+                            {Friction::lugre, "lugre"}});
+  expect(backlash_names(),
+         {{Backlash::none, "none"}, {Backlash::compliance, "compliance"}, {Backlash::hysteresis, "hysteresis"}});
+  expect(bridge_names(), {{Bridge::brake, "brake"}, {Bridge::open, "open"}});
+  expect(pseudo_wiener_names(),
+         {{PseudoWienerKind::pw_r, "pw_r"}, {PseudoWienerKind::pw_w, "pw_w"}, {PseudoWienerKind::pw_p, "pw_p"}});
+  expect(switching_names(), {{Switching::predicted, "predicted"}, {Switching::measured, "measured"}});
+  expect(dry_friction_names(), {{Friction::coulomb, "set_valued"}, {Friction::tanh, "tanh"}});
+  expect(lag_start_names(), {{LagStart::rest, "rest"}, {LagStart::inverse_map, "inverse_map"}});
+  expect(sensor_fault_names(), {{SensorFaultKind::none, "none"},
+                                {SensorFaultKind::open_wire, "open_wire"},
+                                {SensorFaultKind::short_to_ground, "short_to_ground"},
+                                {SensorFaultKind::short_to_supply, "short_to_supply"},
+                                {SensorFaultKind::offset, "offset"},
+                                {SensorFaultKind::gain, "gain"},
+                                {SensorFaultKind::stuck, "stuck"}});
 }
 
 // --- what is allowed ------------------------------------------------------------------------------------------
