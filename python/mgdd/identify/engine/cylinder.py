@@ -236,6 +236,7 @@ def _load(
         intake_pressure_kpa=float(pressure[0]) * 100.0,
         fuel_mg=burn.fuel_heat_j / cylinder.lower_heating_value_mj_per_kg,
         burn_duration_cad=burn.burn_duration_cad,
+        trapped_mass_g=fitted.trapped_mass_g,
     )
     return Load(
         file=label,

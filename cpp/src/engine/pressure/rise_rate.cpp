@@ -1,0 +1,62 @@
+#include "mgdd/engine/pressure/rise_rate.hpp"
+
+#include <algorithm>
+#include <cmath>
+#include <cstddef>
+#include <limits>
+
+namespace mgdd::engine {
+namespace {
+
+using Column = std::vector<double>;
+
+constexpr double coarsest_cad = 0.25;
+
+// Cubic through the four samples around [k, k + 1] (Lagrange); a parabola in the first and last interval.
+double interpolate(const Column& x, const Column& y, std::size_t k, double at) {
+  const std::size_t low = k > 0 ? k - 1 : 0, high = std::min(k + 2, x.size() - 1);
+  double sum = 0.0;
+  for (std::size_t i = low; i <= high; ++i) {
+    double term = y[i];
+    for (std::size_t j = low; j <= high; ++j) {
+      if (j != i) term *= (at - x[j]) / (x[i] - x[j]);
+    }
+    sum += term;
+  }
+  return sum;
+}
+
+}  // namespace
+
+double steepest_rise_bar_per_cad(const Column& angle, const Column& pressure) {
+  Column x, y;
+  for (std::size_t k = 0; k + 1 < angle.size(); ++k) {
+    const double step = angle[k + 1] - angle[k];
+    const int parts = std::max(1, static_cast<int>(std::ceil(step / coarsest_cad - 1e-6)));
+    for (int i = 0; i < parts; ++i) {
+      x.push_back(angle[k] + step * i / parts);
+      y.push_back(i == 0 ? pressure[k] : interpolate(angle, pressure, k, x.back()));
+    }
+  }
+  x.push_back(angle.back()), y.push_back(pressure.back());
+
+  double steepest = -std::numeric_limits<double>::infinity();
+  std::size_t low = 0, high = 0;
+  for (std::size_t k = 0; k < x.size(); ++k) {
+    const double from = x[k] - 0.5 * rise_rate_width_cad - 1e-9, to = x[k] + 0.5 * rise_rate_width_cad + 1e-9;
+    if (from < x.front() - 1e-6 || to > x.back() + 1e-6) continue;  // only whole windows
+    while (x[low] < from)
+      ++low;
+    while (high + 1 < x.size() && x[high + 1] <= to)
+      ++high;
+    double n = 0.0, sx = 0.0, sy = 0.0, sxx = 0.0, sxy = 0.0;
+    for (std::size_t i = low; i <= high; ++i) {  // half weight at both ends: the sums are trapezoids of the integrals
+      const double w = i == low || i == high ? 0.5 : 1.0, u = x[i] - x[k], v = y[i] - y[k];
+      n += w, sx += w * u, sy += w * v, sxx += w * u * u, sxy += w * u * v;
+    }
+    steepest = std::max(steepest, (n * sxy - sx * sy) / (n * sxx - sx * sx));
+  }
+  return steepest;
+}
+
+}  // namespace mgdd::engine
