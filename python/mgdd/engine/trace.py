@@ -114,8 +114,9 @@ def analyze(
         ``motored`` (1: no burn in this trace, else 0) and ``warnings`` (what makes the figures doubtful, one per line).
 
         Of a record of cycles, traces and scalars have the dimension ``cycle``; beside each scalar stand its
-        ``mean_NAME``, ``std_NAME`` and ``cov_NAME_percent`` (not of angles and offsets), ``lnv_imep_closed_percent`` is the lowest IMEP over the
-        mean, ``cycle_mean_NAME`` is the figure of the averaged pressure, and ``motored`` counts cycles.
+        ``mean_NAME``, ``std_NAME`` and ``cov_NAME_percent`` (not of angles and offsets). ``lnv_imep_closed_percent``
+        is the lowest IMEP over the mean, ``cycle_mean_NAME`` is the figure of the averaged pressure, and ``motored``
+        counts cycles.
 
     Raises
     ------

@@ -85,7 +85,20 @@ TEST(EngineBurnWindow, NothingIsFoundBeforeTheStatedInjection) {
   const EngineCase c("soc_cad=-20 step_cad=0.5");
   const Trace t = trace(c);
   EXPECT_LT(find_burn(t.angle, t.pressure, t.volume, {}).start_cad, -17.0);
-  EXPECT_GE(find_burn(t.angle, t.pressure, t.volume, -12.0).start_cad, -12.0);
+  const BurnWindow late = find_burn(t.angle, t.pressure, t.volume, -12.0);
+  EXPECT_GE(late.start_cad, -12.0);
+  EXPECT_EQ(late.unbounded_start_cad, find_burn(t.angle, t.pressure, t.volume, {}).start_cad);
+  // An injection 22 CAD before TDC written as +22 would cut the burn: it is doubted.
+  TraceOptions o;
+  o.earliest_burn_cad = 22.0;
+  const auto told = [&] {
+    const auto a = analyze_trace(t.angle, t.pressure, c.cylinder, c.point, o);
+    return std::count_if(a.warnings.begin(), a.warnings.end(),
+                         [](const TraceWarning& w) { return w.kind == "early_burn"; });
+  };
+  EXPECT_EQ(told(), 1);
+  o.earliest_burn_cad = -22.0;
+  EXPECT_EQ(told(), 0);
 }
 
 TEST(EngineBurnWindow, AMotoredTraceHasNone) {

@@ -5,6 +5,8 @@
 #include <cstddef>
 
 #include "mgdd/engine/pressure/heat.hpp"
+#include "mgdd/engine/pressure/pegging.hpp"
+#include "mgdd/math/line_fit.hpp"
 
 namespace mgdd::engine {
 namespace {
@@ -20,17 +22,6 @@ struct Range {
   bool holds(double angle) const { return angle >= from - 1e-9 && angle <= to + 1e-9; }
 };
 
-// Exponent of p V^n = const over a range; NaN with fewer than five samples.
-double exponent(const Column& angle, const Column& pressure, const Column& volume, Range range) {
-  double n = 0.0, sx = 0.0, sy = 0.0, sxx = 0.0, sxy = 0.0;
-  for (std::size_t k = 0; k < angle.size(); ++k) {
-    if (!range.holds(angle[k]) || !(pressure[k] > 0.0)) continue;
-    const double x = std::log(volume[k]), y = std::log(pressure[k]);
-    n += 1.0, sx += x, sy += y, sxx += x * x, sxy += x * y;
-  }
-  return n < 5.0 ? undefined<double>() : -(n * sxy - sx * sy) / (n * sxx - sx * sx);
-}
-
 // Heat release rate [bar L/CAD] at gamma: slope of the least-squares line through the cumulative heat around each
 // sample, over the samples within `burn_rate_half_cad` or the two neighbours. Zero at both ends.
 Column heat_rate(const Column& angle, const Column& pressure, const Column& volume, double gamma) {
@@ -44,13 +35,10 @@ Column heat_rate(const Column& angle, const Column& pressure, const Column& volu
       --low;
     while (high + 1 < n && angle[high + 1] <= angle[k] + burn_rate_half_cad + 1e-9)
       ++high;
-    const auto m = static_cast<double>(high - low + 1);
-    double sx = 0.0, sy = 0.0, sxx = 0.0, sxy = 0.0;
-    for (std::size_t i = low; i <= high; ++i) {
-      const double x = angle[i] - angle[k], y = heat[i] - heat[k];
-      sx += x, sy += y, sxx += x * x, sxy += x * y;
-    }
-    rate[k] = (m * sxy - sx * sy) / (m * sxx - sx * sx);
+    LineFit line;
+    for (std::size_t i = low; i <= high; ++i)
+      line.add(angle[i] - angle[k], heat[i] - heat[k]);
+    rate[k] = line.slope();
   }
   return rate;
 }
@@ -72,9 +60,9 @@ BurnWindow find_burn(const Column& angle, const Column& pressure, const Column& 
   const double before = std::min(latest_compression_cad, earliest_cad.value_or(0.0) - 5.0);
   Range compression{std::max(-100.0, first), before};
   if (compression.to - compression.from < 20.0) compression.from = first;
-  const double n_compression = exponent(angle, pressure, volume, compression);
+  const double n_compression = polytropic_exponent(angle, pressure, volume, compression.from, compression.to);
   Range expansion{std::max(60.0, angle.back() - expansion_fit_cad), last};
-  const double n_expansion = exponent(angle, pressure, volume, expansion);
+  const double n_expansion = polytropic_exponent(angle, pressure, volume, expansion.from, expansion.to);
   if (!(n_compression > 1.0 && n_expansion > 1.0)) return {};
 
   const Column early = heat_rate(angle, pressure, volume, n_compression);
@@ -83,28 +71,28 @@ BurnWindow find_burn(const Column& angle, const Column& pressure, const Column& 
   const std::size_t n = angle.size();
   std::size_t peak = n;
   for (std::size_t k = 0; k < n; ++k) {
-    if (angle[k] >= search_from && angle[k] <= expansion.to - 20.0 && (peak == n || early[k] > early[peak])) peak = k;
+    if (angle[k] >= before && angle[k] <= expansion.to - 20.0 && (peak == n || early[k] > early[peak])) peak = k;
   }
   if (peak == n || !(early[peak] > early_scatter * volume[peak])) return {};
   const double level = burn_threshold * early[peak];
 
   // First stretch of at least `burn_rate_half_cad` above the threshold, seen from compression.
-  BurnWindow burn{true, angle[peak], angle[peak]};
-  std::size_t run = n;
-  for (std::size_t k = 0; k <= peak; ++k) {
-    const bool on = angle[k] >= search_from && early[k] > std::max(level, early_scatter * volume[k]);
-    if (!on) run = n;
-    if (on && run == n) run = k;
-    if (run != n && (angle[k] - angle[run] >= burn_rate_half_cad - 1e-9 || k == peak)) {
-      burn.start_cad = angle[run];
-      break;
+  const auto start_from = [&](double from) {
+    std::size_t run = n;
+    for (std::size_t k = 0; k <= peak; ++k) {
+      const bool on = angle[k] >= from && early[k] > std::max(level, early_scatter * volume[k]);
+      if (!on) run = n;
+      if (on && run == n) run = k;
+      if (run != n && (angle[k] - angle[run] >= burn_rate_half_cad - 1e-9 || k == peak)) return angle[run];
     }
-  }
+    return std::max(from, angle[peak]);
+  };
+  BurnWindow burn{true, start_from(search_from), angle[peak], start_from(before)};
   // The last such stretch, seen from expansion.
+  std::size_t run = n;
   const Column late = heat_rate(angle, pressure, volume, n_expansion);
   const Range quiet{std::max(expansion.from, angle.back() - 30.0), last};
   const double late_scatter = scatter_factor * scatter_per_volume(angle, late, volume, quiet);
-  run = n;
   for (std::size_t k = n; k-- > peak;) {
     const bool on = late[k] > std::max(level, late_scatter * volume[k]);
     if (!on) run = n;
@@ -128,15 +116,12 @@ Symmetry compare_strokes(const Column& angle, const Column& pressure, const Geom
     const double share = (at - angle[k - 1]) / (angle[k] - angle[k - 1]);
     return (1.0 - share) * std::log(pressure[k - 1]) + share * std::log(pressure[k]);
   };
-  double n = 0.0, sx = 0.0, sy = 0.0, sxx = 0.0, sxy = 0.0;
+  LineFit line;
   for (double d = nearest_cad; d <= reach + 1e-9; d += step_cad) {
     const double at = std::min(d, reach);
-    const double x = geometry.volume_slope_m3_per_cad(at) / geometry.volume_m3(at);
-    const double y = log_pressure(at) - log_pressure(-at);
-    n += 1.0, sx += x, sy += y, sxx += x * x, sxy += x * y;
+    line.add(geometry.volume_slope_m3_per_cad(at) / geometry.volume_m3(at), log_pressure(at) - log_pressure(-at));
   }
-  const double slope = (n * sxy - sx * sy) / (n * sxx - sx * sx);
-  return {(sy - slope * sx) / n, slope / (2.0 * exponent_between)};
+  return {line.intercept(), line.slope() / (2.0 * exponent_between)};
 }
 
 }  // namespace mgdd::engine

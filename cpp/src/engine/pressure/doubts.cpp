@@ -128,6 +128,12 @@ void doubt_window(TraceAnalysis& a, const TraceOptions& o, const BurnWindow& bur
                                          shown(a.heat_from_cad) + " to " + shown(a.heat_to_cad) +
                                          " °CA aTDC; give heat_window_cad"});
   }
+  if (burn.found && o.earliest_burn_cad && burn.unbounded_start_cad < *o.earliest_burn_cad - burn_rate_half_cad) {
+    a.warnings.push_back(
+        {"early_burn", "heat release begins at " + shown(burn.unbounded_start_cad) +
+                           " °CA aTDC, before the stated injection or spark at " + shown(*o.earliest_burn_cad) +
+                           ": angles are °CA aTDC, negative before TDC; correct soi_cad or spark_cad"});
+  }
   if (burn.found && o.heat_from_cad && burn.start_cad < a.heat_from_cad - burn_rate_half_cad) {
     a.warnings.push_back({"window", "heat release has begun at " + shown(burn.start_cad) +
                                         " °CA aTDC, before heat_from_cad = " + shown(a.heat_from_cad) +

@@ -10,6 +10,7 @@
 #include "mgdd/common/text.hpp"
 #include "mgdd/common/units.hpp"
 #include "mgdd/engine/geometry.hpp"
+#include "mgdd/math/line_fit.hpp"
 
 namespace mgdd::engine {
 namespace {
@@ -32,18 +33,23 @@ double mean_around(const Column& angle, const Column& pressure, double centre, d
 
 }  // namespace
 
+double polytropic_exponent(const Column& angle, const Column& pressure, const Column& volume, double from_cad,
+                           double to_cad) {
+  LineFit line;
+  for (std::size_t k = 0; k < angle.size(); ++k) {
+    if (angle[k] < from_cad - 1e-9 || angle[k] > to_cad + 1e-9 || !(pressure[k] > 0.0)) continue;
+    line.add(std::log(volume[k]), std::log(pressure[k]));
+  }
+  return line.n < 3.0 ? undefined<double>() : -line.slope();
+}
+
 double polytropic_exponent(const Column& angle, const Column& pressure, const Cylinder& cylinder, double from_cad,
                            double to_cad) {
   const Geometry<double> geometry(cylinder.geometry);
-  double n = 0.0, sx = 0.0, sy = 0.0, sxx = 0.0, sxy = 0.0;
-  for (std::size_t k = 0; k < angle.size(); ++k) {
-    if (angle[k] < from_cad - 1e-9 || angle[k] > to_cad + 1e-9 || !(pressure[k] > 0.0)) continue;
-    const double x = std::log(geometry.volume_m3(angle[k]));
-    const double y = std::log(pressure[k]);
-    n += 1.0, sx += x, sy += y, sxx += x * x, sxy += x * y;
-  }
-  if (n < 3.0) return undefined<double>();
-  return -(n * sxy - sx * sy) / (n * sxx - sx * sx);
+  Column volume;
+  for (const double a : angle)
+    volume.push_back(geometry.volume_m3(a));
+  return polytropic_exponent(angle, pressure, volume, from_cad, to_cad);
 }
 
 double pegging_offset_bar(const Column& angle, const Column& pressure, const Cylinder& cylinder,
@@ -67,18 +73,16 @@ double pegging_offset_bar(const Column& angle, const Column& pressure, const Cyl
       break;
   }
   // Linear regression p = -offset + C V^-n over -100..-50 CAD (Brunt and Pond 1997).
-  double m = 0.0, sx = 0.0, sy = 0.0, sxx = 0.0, sxy = 0.0;
+  LineFit line;
   for (std::size_t k = 0; k < angle.size(); ++k) {
     if (angle[k] < -100.0 - 1e-9 || angle[k] > -50.0 + 1e-9) continue;
-    const double x = std::pow(geometry.volume_m3(angle[k]) / geometry.volume_m3(-100.0), -n);
-    m += 1.0, sx += x, sy += pressure[k], sxx += x * x, sxy += x * pressure[k];
+    line.add(std::pow(geometry.volume_m3(angle[k]) / geometry.volume_m3(-100.0), -n), pressure[k]);
   }
-  if (m < 5.0) {
+  if (line.n < 5.0) {
     throw DataError("pegging 'least_squares' needs at least 5 samples in -100..-50 °CA aTDC, found " +
-                    std::to_string(static_cast<int>(m)));
+                    std::to_string(static_cast<int>(line.n)));
   }
-  const double slope = (m * sxy - sx * sy) / (m * sxx - sx * sx);
-  return -(sy - slope * sx) / m;
+  return -line.intercept();
 }
 
 FreePolytrope free_polytrope(const Column& angle, const Column& pressure, const Column& volume, double from_cad,

@@ -5,6 +5,8 @@
 #include <cstddef>
 #include <limits>
 
+#include "mgdd/math/line_fit.hpp"
+
 namespace mgdd::engine {
 namespace {
 
@@ -49,12 +51,11 @@ double steepest_rise_bar_per_cad(const Column& angle, const Column& pressure) {
       ++low;
     while (high + 1 < x.size() && x[high + 1] <= to)
       ++high;
-    double n = 0.0, sx = 0.0, sy = 0.0, sxx = 0.0, sxy = 0.0;
+    LineFit line;
     for (std::size_t i = low; i <= high; ++i) {  // half weight at both ends: the sums are trapezoids of the integrals
-      const double w = i == low || i == high ? 0.5 : 1.0, u = x[i] - x[k], v = y[i] - y[k];
-      n += w, sx += w * u, sy += w * v, sxx += w * u * u, sxy += w * u * v;
+      line.add(x[i] - x[k], y[i] - y[k], i == low || i == high ? 0.5 : 1.0);
     }
-    steepest = std::max(steepest, (n * sxy - sx * sy) / (n * sxx - sx * sx));
+    steepest = std::max(steepest, line.slope());
   }
   return steepest;
 }

@@ -187,8 +187,8 @@ TraceAnalysis TraceAnalyzer::operator()(const std::vector<double>& pressure_bar)
   release_heat(a, model, charge, smooth_bar, burn_from, options);
   sum_heat(a, options);
 
-  a.n_compression = polytropic_exponent(a.angle_cad, a.pressure_bar, cylinder, -100.0, -40.0);
-  a.n_expansion = polytropic_exponent(a.angle_cad, a.pressure_bar, cylinder, 60.0, 120.0);
+  a.n_compression = polytropic_exponent(a.angle_cad, a.pressure_bar, a.volume_l, -100.0, -40.0);
+  a.n_expansion = polytropic_exponent(a.angle_cad, a.pressure_bar, a.volume_l, 60.0, 120.0);
   add_warnings(a, cylinder, options, burn);
   return a;
 }

@@ -63,7 +63,7 @@ void validate(const TraceOptions& o) {
   }
   if (o.earliest_burn_cad) {
     require(*o.earliest_burn_cad >= -180.0 && *o.earliest_burn_cad <= 90.0, "earliest_burn_cad", *o.earliest_burn_cad,
-            "in [-180, 90] °CA aTDC");
+            "in [-180, 90] °CA aTDC; it is soi_cad or spark_cad of the trace");
   }
   require(o.smoothing_width_cad > 0.0 && o.smoothing_width_cad <= 30.0, "smoothing_width_cad", o.smoothing_width_cad,
           "in (0, 30] °CA");

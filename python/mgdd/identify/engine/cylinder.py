@@ -49,8 +49,9 @@ def fit_cylinder(
     Parameters
     ----------
     traces : sequence of xarray.Dataset, or of any form of a trace that `mgdd.engine.analyze` takes
-        ``pressure_bar(crank_angle_cad)`` each, absolute. Attributes ``speed_rpm``, ``trapped_mass_g`` and
-        ``soi_cad`` are used where present; ``file`` names the trace. Samples outside IVC..EVO are dropped.
+        ``pressure_bar(crank_angle_cad)`` each, absolute. Attributes ``speed_rpm``, ``trapped_mass_g``,
+        ``ivc_temperature_k`` and ``soi_cad`` are used where present; ``file`` names the trace. Samples outside
+        IVC..EVO are dropped.
     cylinder : Cylinder
         Start and constants; its ``burn_shape`` and ``gamma_model`` choose the laws.
     free : sequence of str, optional
@@ -147,7 +148,8 @@ def default_free(cylinder: Cylinder) -> tuple[str, ...]:
 
 def conditions(trace: xr.Dataset, point: OperatingPoint | None) -> OperatingPoint:
     """Give the operating point of a trace: its own attributes over ``point``."""
-    own = {n: float(trace.attrs[n]) for n in ("speed_rpm", "trapped_mass_g") if trace.attrs.get(n) is not None}
+    names = ("speed_rpm", "trapped_mass_g", "ivc_temperature_k")
+    own = {n: float(trace.attrs[n]) for n in names if trace.attrs.get(n) is not None}
     return (point or OperatingPoint()).replace(**own)
 
 

@@ -21,6 +21,7 @@ struct BurnWindow {
   bool found = false;  ///< heat release stands out of its scatter
   double start_cad = undefined<double>();
   double end_cad = undefined<double>();
+  double unbounded_start_cad = undefined<double>();  ///< the start without `earliest_cad`, for a check of it
 };
 
 /// Start: net heat release with gamma set to the fitted exponent of compression, so that compression releases nothing,

@@ -19,6 +19,10 @@ double pegging_offset_bar(const std::vector<double>& angle_cad, const std::vecto
 double polytropic_exponent(const std::vector<double>& angle_cad, const std::vector<double>& pressure_bar,
                            const Cylinder& cylinder, double from_cad, double to_cad);
 
+/// The same with the volume of every sample at hand, in any unit.
+double polytropic_exponent(const std::vector<double>& angle_cad, const std::vector<double>& pressure_bar,
+                           const std::vector<double>& volume, double from_cad, double to_cad);
+
 /// Compression fitted by p + offset = C V^-n with offset and n both free (Gauss-Newton).
 struct FreePolytrope {
   double exponent = undefined<double>();
