@@ -28,6 +28,9 @@ TEST(LineFit, MinimisesTheSquares) {
   weighted.add(1.0, 0.0), twice.add(1.0, 0.0);
   weighted.add(3.0, 5.0), twice.add(3.0, 5.0);
   EXPECT_DOUBLE_EQ(weighted.slope(), twice.slope());
+  line.add(9.0, -40.0);
+  line.add(9.0, -40.0, -1.0);
+  EXPECT_NEAR(line.slope(), 1.5, 1e-12);
 }
 
 }  // namespace

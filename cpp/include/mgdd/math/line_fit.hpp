@@ -6,6 +6,7 @@ namespace mgdd {
 struct LineFit {
   double n = 0.0, sx = 0.0, sy = 0.0, sxx = 0.0, sxy = 0.0;
 
+  /// A weight of -1 takes a point away again.
   constexpr void add(double x, double y, double weight = 1.0) noexcept {
     n += weight, sx += weight * x, sy += weight * y, sxx += weight * x * x, sxy += weight * x * y;
   }

@@ -29,15 +29,13 @@ Column heat_rate(const Column& angle, const Column& pressure, const Column& volu
   Column heat(n, 0.0), rate(n, 0.0);
   for (std::size_t k = 1; k < n; ++k)
     heat[k] = heat[k - 1] + net_heat(gamma, pressure[k - 1], volume[k - 1], pressure[k], volume[k]);
+  LineFit line;  // of the samples low to high - 1, which move along
+  std::size_t low = 0, high = 0;
   for (std::size_t k = 1; k + 1 < n; ++k) {
-    std::size_t low = k - 1, high = k + 1;
-    while (low > 0 && angle[low - 1] >= angle[k] - burn_rate_half_cad - 1e-9)
-      --low;
-    while (high + 1 < n && angle[high + 1] <= angle[k] + burn_rate_half_cad + 1e-9)
-      ++high;
-    LineFit line;
-    for (std::size_t i = low; i <= high; ++i)
-      line.add(angle[i] - angle[k], heat[i] - heat[k]);
+    for (; high < n && (high <= k + 1 || angle[high] <= angle[k] + burn_rate_half_cad + 1e-9); ++high)
+      line.add(angle[high], heat[high]);
+    for (; low + 1 < k && angle[low] < angle[k] - burn_rate_half_cad - 1e-9; ++low)
+      line.add(angle[low], heat[low], -1.0);
     rate[k] = line.slope();
   }
   return rate;

@@ -43,19 +43,19 @@ double steepest_rise_bar_per_cad(const Column& angle, const Column& pressure) {
   x.push_back(angle.back()), y.push_back(pressure.back());
 
   double steepest = -std::numeric_limits<double>::infinity();
+  LineFit line;  // of the samples low to high - 1, which move along
   std::size_t low = 0, high = 0;
   for (std::size_t k = 0; k < x.size(); ++k) {
     const double from = x[k] - 0.5 * rise_rate_width_cad - 1e-9, to = x[k] + 0.5 * rise_rate_width_cad + 1e-9;
     if (from < x.front() - 1e-6 || to > x.back() + 1e-6) continue;  // only whole windows
-    while (x[low] < from)
-      ++low;
-    while (high + 1 < x.size() && x[high + 1] <= to)
-      ++high;
-    LineFit line;
-    for (std::size_t i = low; i <= high; ++i) {  // half weight at both ends: the sums are trapezoids of the integrals
-      line.add(x[i] - x[k], y[i] - y[k], i == low || i == high ? 0.5 : 1.0);
-    }
-    steepest = std::max(steepest, line.slope());
+    for (; high < x.size() && x[high] <= to; ++high)
+      line.add(x[high], y[high]);
+    for (; x[low] < from; ++low)
+      line.add(x[low], y[low], -1.0);
+    LineFit trapezoid = line;  // half weight at both ends: the sums are trapezoids of the integrals
+    trapezoid.add(x[low], y[low], -0.5);
+    trapezoid.add(x[high - 1], y[high - 1], -0.5);
+    steepest = std::max(steepest, trapezoid.slope());
   }
   return steepest;
 }

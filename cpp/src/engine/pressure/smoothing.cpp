@@ -20,25 +20,28 @@ double median_step(const std::vector<double>& angle) {
   return *middle;
 }
 
-// Weights that give the value at 0 of the least-squares parabola through samples at x: the first row of
-// (A^T A)^-1 A^T with A = [1 x x^2], by Cramer's rule (Savitzky and Golay 1964 for even steps).
-std::vector<double> parabola_weights(const std::vector<double>& x) {
-  double s0 = 0.0, s1 = 0.0, s2 = 0.0, s3 = 0.0, s4 = 0.0;
-  for (const double v : x) {
-    const double v2 = v * v;
-    s0 += 1.0, s1 += v, s2 += v2, s3 += v2 * v, s4 += v2 * v2;
+// Value at the centre of the least-squares parabola through the samples within `reach` of it, by Cramer's rule.
+double parabola_at(const std::vector<double>& x, const std::vector<double>& y, std::size_t centre, std::size_t reach) {
+  double s0 = 0.0, s1 = 0.0, s2 = 0.0, s3 = 0.0, s4 = 0.0, t0 = 0.0, t1 = 0.0, t2 = 0.0;
+  for (std::size_t i = centre - reach; i <= centre + reach; ++i) {
+    const double u = x[i] - x[centre], u2 = u * u;
+    s0 += 1.0, s1 += u, s2 += u2, s3 += u2 * u, s4 += u2 * u2;
+    t0 += y[i], t1 += u * y[i], t2 += u2 * y[i];
   }
   const double c0 = s2 * s4 - s3 * s3, c1 = s2 * s3 - s1 * s4, c2 = s1 * s3 - s2 * s2;
-  const double determinant = s0 * c0 + s1 * c1 + s2 * c2;
-  std::vector<double> weight(x.size());
-  for (std::size_t i = 0; i < x.size(); ++i)
-    weight[i] = (c0 + c1 * x[i] + c2 * x[i] * x[i]) / determinant;
-  return weight;
+  return (c0 * t0 + c1 * t1 + c2 * t2) / (s0 * c0 + s1 * c1 + s2 * c2);
+}
+
+bool is_even(const std::vector<double>& angle, double step, double tolerance) {
+  for (std::size_t k = 0; k + 1 < angle.size(); ++k) {
+    if (std::abs(angle[k + 1] - angle[k] - step) > tolerance * step) return false;
+  }
+  return true;
 }
 
 }  // namespace
 
-Smoother::Smoother(const std::vector<double>& angle, double speed_rpm, const TraceOptions& o) {
+Smoother::Smoother(const std::vector<double>& angle, double speed_rpm, const TraceOptions& o) : angle_(angle) {
   const double step = median_step(angle);
   const auto reach = static_cast<std::size_t>(0.5 * o.smoothing_width_cad / step + 1e-6);
   const std::size_t samples = 2 * reach + 1;
@@ -48,11 +51,9 @@ Smoother::Smoother(const std::vector<double>& angle, double speed_rpm, const Tra
   }
   if (kind == Smoothing::none) return;
   if (kind == Smoothing::low_pass) {
-    for (std::size_t k = 0; k + 1 < angle.size(); ++k) {
-      if (std::abs(angle[k + 1] - angle[k] - step) <= 0.01 * step) continue;
-      throw DataError("smoothing 'low_pass' needs even angles, but the step at crank_angle_cad[" + std::to_string(k) +
-                      "] = " + text(angle[k]) + " is " + text(angle[k + 1] - angle[k]) + " °CA, elsewhere " +
-                      text(step) + ": take savitzky_golay or angle_window");
+    if (!is_even(angle, step, 0.01)) {
+      throw DataError("smoothing 'low_pass' needs even angles, but the steps of crank_angle_cad differ from " +
+                      text(step) + " °CA by more than 1 %: take savitzky_golay or angle_window");
     }
     const double nyquist_hz = 0.5 * units::cad_per_s_per_rpm * speed_rpm / step;
     const double lowest = ZeroPhaseLowPass::least_cutoff * nyquist_hz;
@@ -73,16 +74,15 @@ Smoother::Smoother(const std::vector<double>& angle, double speed_rpm, const Tra
                              " or more, or smoothing 'none'",
                          "°CA");
   }
-  windows_.reserve(angle.size());
-  for (std::size_t k = 0; k < angle.size(); ++k) {
-    const std::size_t r = std::min({reach, k, angle.size() - 1 - k});
-    std::vector<double> weight(2 * r + 1, 1.0 / static_cast<double>(2 * r + 1));
-    if (kind == Smoothing::savitzky_golay && r > 0) {
-      for (std::size_t i = 0; i < weight.size(); ++i)
-        weight[i] = angle[k - r + i] - angle[k];
-      weight = parabola_weights(weight);
+  reach_ = reach;
+  mean_ = kind == Smoothing::angle_window;
+  if (!mean_ && is_even(angle, step, 1e-6)) {  // the weights are those of one unit sample after the other
+    std::vector<double> x(angle.begin(), angle.begin() + static_cast<std::ptrdiff_t>(samples)), unit(samples, 0.0);
+    for (std::size_t i = 0; i < samples; ++i) {
+      unit[i] = 1.0;
+      weights_.push_back(parabola_at(x, unit, reach, reach));
+      unit[i] = 0.0;
     }
-    windows_.push_back({k - r, std::move(weight)});
   }
   name_ = std::string(to_string(kind)) + " over " + text(o.smoothing_width_cad) + " °CA (" + std::to_string(samples) +
           " samples)";
@@ -95,10 +95,18 @@ std::vector<double> Smoother::operator()(const std::vector<double>& column) cons
     filter.apply(out);
     return out;
   }
-  for (std::size_t k = 0; k < windows_.size(); ++k) {
-    const Window& w = windows_[k];
-    out[k] = std::inner_product(w.weight.begin(), w.weight.end(), column.begin() + static_cast<std::ptrdiff_t>(w.first),
-                                0.0);
+  for (std::size_t k = 0; k < column.size(); ++k) {
+    const std::size_t r = std::min({reach_, k, column.size() - 1 - k});
+    if (r == 0) continue;
+    const auto first = column.begin() + static_cast<std::ptrdiff_t>(k - r);
+    if (mean_) {
+      const auto n = static_cast<std::ptrdiff_t>(2 * r + 1);
+      out[k] = std::accumulate(first, first + n, 0.0) / static_cast<double>(n);
+    } else if (r == reach_ && !weights_.empty()) {
+      out[k] = std::inner_product(weights_.begin(), weights_.end(), first, 0.0);
+    } else {
+      out[k] = parabola_at(angle_, column, k, r);
+    }
   }
   return out;
 }

@@ -28,12 +28,10 @@ class Smoother {
   const std::string& name() const noexcept { return name_; }
 
  private:
-  // Weighted sum of the samples `first` on; the windows shrink towards both ends and stay symmetric.
-  struct Window {
-    std::size_t first;
-    std::vector<double> weight;
-  };
-  std::vector<Window> windows_;
+  // Windows shrink towards both ends and stay symmetric in samples.
+  std::vector<double> angle_, weights_;  // the weights of even angles
+  std::size_t reach_ = 0;                // samples to each side
+  bool mean_ = false;
   std::optional<ZeroPhaseLowPass> low_pass_;
   std::string name_ = "none";
 };
