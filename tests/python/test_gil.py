@@ -126,6 +126,14 @@ def trace_analysis() -> Call:
 
 
 @batch
+def trace_cycles() -> Call:
+    angle = np.linspace(-139.0, 100.0, 5_000)
+    pressure = 1.0 + 50.0 * np.exp(-((angle - 5.0) ** 2) / 800.0)
+    records = np.tile(pressure, (40, 1))
+    return partial(_core.engine.analyze_cycles, angle, records, CYLINDER, POINT, _core.engine.TraceOptions(), 1)
+
+
+@batch
 def learning() -> Call:
     learner = IterativeLearning(np.zeros(MANY), law="q_filter", k_p=0.5)
 

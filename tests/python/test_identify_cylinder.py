@@ -37,7 +37,7 @@ def plant(noise_bar=0.0, seed=0):
         noise = noise_bar * random.standard_normal(cycle.sizes["crank_angle_cad"])
         noise[0] = 0.0
         trace = pressure_trace(cycle.crank_angle_cad.values, cycle.pressure_bar.values + noise)
-        traces.append(trace.assign_attrs(file=f"{fuel:g} mg"))
+        traces.append(trace.assign_attrs(file=f"{fuel:g} mg", trapped_mass_g=cycle.attrs["trapped_mass_g"]))
     return traces
 
 

@@ -59,8 +59,9 @@ Examples
 
   py::class_<OperatingPoint> point(m, "OperatingPoint", R"(What changes from cycle to cycle: speed, fuel, intake state.
 
-Keyword-only and immutable. `burn_duration_cad=None` is the cylinder's duration law; `trapped_mass_g=None` its
-volumetric efficiency.
+Keyword-only and immutable. `burn_duration_cad=None` is the cylinder's duration law. Without `trapped_mass_g` the mass
+is p V/(R T) at IVC where `ivc_temperature_k` is given, else a simulation takes the volumetric efficiency, and a
+measured trace p V/(R T) with the intake temperature + 40 K.
 
 Raises
 ------
@@ -76,7 +77,8 @@ OperatingPoint(speed_rpm=2000.0, fuel_mg=12.0)
   constexpr auto point_fields = operating_point_fields<double>();
   bind_record<point_fields.size()>(point, "OperatingPoint", point_fields,
                                    std::tuple{open_number(burn_duration_info, &P::burn_duration_cad),
-                                              open_number(trapped_mass_info, &P::trapped_mass_g)});
+                                              open_number(trapped_mass_info, &P::trapped_mass_g),
+                                              open_number(ivc_temperature_info, &P::ivc_temperature_k)});
 }
 
 }  // namespace mgdd::bindings

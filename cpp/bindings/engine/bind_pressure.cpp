@@ -1,9 +1,14 @@
-// Binds engine/trace_analysis.hpp and engine/trace_check.hpp: the analysis of measured pressure.
+// Binds engine/pressure: the analysis of measured pressure, one cycle or many, and the check of a trace.
+#include <algorithm>
+#include <cstddef>
+#include <string>
 #include <tuple>
+#include <utility>
 #include <vector>
 
 #include "binding.hpp"
 #include "keywords.hpp"
+#include "mgdd/common/error.hpp"
 #include "mgdd/engine/pressure/trace_analysis.hpp"
 #include "mgdd/engine/pressure/trace_check.hpp"
 
@@ -12,27 +17,81 @@ namespace {
 
 using namespace engine;
 
+// The traces of an analysis over crank angle, by name.
+std::vector<std::pair<const char*, std::vector<double>>> columns(const TraceAnalysis& a) {
+  return {{"pressure_bar", a.pressure_bar},
+          {"temperature_k", a.temperature_k},
+          {"heat_release_net_j_per_cad", a.heat_release_net_j_per_cad()},
+          {"heat_release_gross_j_per_cad", a.heat_release_gross_j_per_cad()},
+          {"heat_loss_j_per_cad", a.heat_loss_j_per_cad()},
+          {"heat_net_cumulative_j", a.heat_net_cumulative_j},
+          {"heat_gross_cumulative_j", a.heat_gross_cumulative_j}};
+}
+
+// What does not differ from cycle to cycle of one record.
+py::dict common_part(const TraceAnalysis& a) {
+  py::dict out;
+  out["crank_angle_cad"] = to_array(a.angle_cad);
+  out["volume_l"] = to_array(a.volume_l);
+  out["mass_source"] = a.mass_source;
+  out["smoothing"] = a.smoothing;
+  return out;
+}
+
 py::dict bind_analyze(const InputArray& angle, const InputArray& pressure, const Cylinder& cylinder,
                       const OperatingPoint& point, const TraceOptions& options) {
   const std::vector<double> angles = to_column(angle, "crank_angle_cad");
   const std::vector<double> pressures = to_column(pressure, "pressure_bar");
   const TraceAnalysis a = without_gil([&] { return analyze_trace(angles, pressures, cylinder, point, options); });
-  py::dict out;
-  out["crank_angle_cad"] = to_array(a.angle_cad);
-  out["pressure_bar"] = to_array(a.pressure_bar);
-  out["volume_l"] = to_array(a.volume_l);
-  out["temperature_k"] = to_array(a.temperature_k);
-  out["heat_release_net_j_per_cad"] = to_array(a.heat_release_net_j_per_cad());
-  out["heat_release_gross_j_per_cad"] = to_array(a.heat_release_gross_j_per_cad());
-  out["heat_loss_j_per_cad"] = to_array(a.heat_loss_j_per_cad());
-  out["heat_net_cumulative_j"] = to_array(a.heat_net_cumulative_j);
-  out["heat_gross_cumulative_j"] = to_array(a.heat_gross_cumulative_j);
+  py::dict out = common_part(a);
+  for (const auto& [name, column] : columns(a))
+    out[name] = to_array(column);
   py::dict scalars;
   for (const TraceFigure& figure : trace_figures)
     scalars[as_str(figure.name)] = a.*(figure.member);
   out["scalars"] = scalars;
   out["motored"] = a.motored;
-  out["warnings"] = a.warnings;
+  out["window_found"] = a.window_found;
+  std::vector<std::string> warnings;
+  for (const TraceWarning& warning : a.warnings)
+    warnings.push_back(warning.text);
+  out["warnings"] = warnings;
+  return out;
+}
+
+// Rows are cycles.
+py::dict bind_analyze_cycles(const InputArray& angle, const InputArray& pressure, const Cylinder& cylinder,
+                             const OperatingPoint& point, const TraceOptions& options, std::size_t threads) {
+  const std::vector<double> angles = to_column(angle, "crank_angle_cad");
+  if (pressure.ndim() != 2) throw about("pressure_bar", ShapeError("pressure_bar must have one row per cycle"));
+  const auto n = static_cast<std::size_t>(pressure.shape(0)), width = static_cast<std::size_t>(pressure.shape(1));
+  std::vector<std::vector<double>> rows(n);
+  for (std::size_t c = 0; c < n; ++c)
+    rows[c].assign(pressure.data() + c * width, pressure.data() + (c + 1) * width);
+  const std::vector<TraceAnalysis> all =
+      without_gil([&] { return analyze_cycles(angles, rows, cylinder, point, options, threads); });
+  py::dict out = common_part(all.front());
+  const auto samples = static_cast<py::ssize_t>(all.front().angle_cad.size());
+  for (std::size_t c = 0; c < n; ++c) {
+    for (const auto& [name, column] : columns(all[c])) {
+      if (c == 0) out[name] = py::array_t<double>({static_cast<py::ssize_t>(n), samples});
+      auto matrix = out[name].cast<py::array_t<double>>();
+      std::copy(column.begin(), column.end(), matrix.mutable_data(static_cast<py::ssize_t>(c), 0));
+    }
+  }
+  py::dict scalars;
+  for (const TraceFigure& figure : trace_figures) {
+    std::vector<double> row(n);
+    std::transform(all.begin(), all.end(), row.begin(), [&](const TraceAnalysis& a) { return a.*(figure.member); });
+    scalars[as_str(figure.name)] = to_array(row);
+  }
+  out["scalars"] = scalars;
+  py::list motored, found;
+  for (const TraceAnalysis& a : all)
+    motored.append(a.motored), found.append(a.window_found);
+  out["motored"] = motored;
+  out["window_found"] = found;
+  out["warnings"] = count_warnings(all);
   return out;
 }
 
@@ -44,16 +103,22 @@ void bind_pressure(py::module_& m) {
   py::class_<O> options(m, "TraceOptions");
   bind_keywords(
       options,
-      std::tuple{choice("pegging", &O::pegging, &parse_pegging), plain("pegging_exponent", &O::pegging_exponent),
-                 plain("inlet_pressure_kpa", &O::inlet_pressure_kpa),
-                 choice("gamma_source", &O::gamma_source, &parse_analysis_gamma), plain("gamma", &O::gamma),
-                 plain("gamma_compression", &O::gamma_compression), plain("gamma_combustion", &O::gamma_combustion),
-                 plain("heat_from_cad", &O::heat_from_cad), plain("heat_to_cad", &O::heat_to_cad),
-                 plain("burn_from_cad", &O::burn_from_cad), plain("total_at_end", &O::total_at_end),
-                 plain("fractions_of_gross", &O::fractions_of_gross)},
+      std::tuple{
+          choice("pegging", &O::pegging, &parse_pegging), plain("pegging_exponent", &O::pegging_exponent),
+          plain("inlet_pressure_kpa", &O::inlet_pressure_kpa),
+          choice("gamma_source", &O::gamma_source, &parse_analysis_gamma), plain("gamma", &O::gamma),
+          plain("gamma_compression", &O::gamma_compression), plain("gamma_combustion", &O::gamma_combustion),
+          plain("heat_from_cad", &O::heat_from_cad), plain("heat_to_cad", &O::heat_to_cad),
+          plain("earliest_burn_cad", &O::earliest_burn_cad), plain("burn_from_cad", &O::burn_from_cad),
+          plain("total_at_end", &O::total_at_end), plain("fractions_of_gross", &O::fractions_of_gross),
+          choice("smoothing", &O::smoothing, &parse_smoothing), plain("smoothing_width_cad", &O::smoothing_width_cad),
+          plain("smoothing_cutoff_hz", &O::smoothing_cutoff_hz), plain("intake_pressure_kpa", &O::intake_pressure_kpa),
+          plain("intake_factor", &O::intake_factor), plain("bmep_bar", &O::bmep_bar)},
       [](const O&) {});
   m.def("analyze", &bind_analyze, arg("crank_angle_cad"), arg("pressure_bar"), arg("cylinder"), arg("point"),
         arg("options"), "Pegging, heat release, burn angles, work.");
+  m.def("analyze_cycles", &bind_analyze_cycles, arg("crank_angle_cad"), arg("pressure_bar"), arg("cylinder"),
+        arg("point"), arg("options"), arg("threads") = 0, "The same of every row; warnings counted together.");
   m.def(
       "check_trace",
       [](const InputArray& angle, const InputArray& pressure) {

@@ -44,7 +44,8 @@ void bind_cylinder_fit(py::module_& m) {
       .def_readonly("largest_error_bar", &LoadFit::largest_error_bar)
       .def_readonly("largest_error_cad", &LoadFit::largest_error_cad)
       .def_readonly("ca50_cad", &LoadFit::ca50_cad)
-      .def_readonly("heat_loss_fraction", &LoadFit::heat_loss_fraction);
+      .def_readonly("heat_loss_fraction", &LoadFit::heat_loss_fraction)
+      .def_readonly("trapped_mass_g", &LoadFit::trapped_mass_g);
 
   py::class_<CylinderFit>(m, "CylinderFit")
       .def_property_readonly("cylinder", [](const CylinderFit& f) { return f.cylinder; })

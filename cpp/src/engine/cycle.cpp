@@ -106,11 +106,7 @@ Charge<T> CycleModel<T>::charge(const BasicOperatingPoint<T>& point) const noexc
   Charge<T> c;
   c.intake_pa = point.intake_pressure_kpa * units::pa_per_kpa;
   c.pressure_pa = c.intake_pa + cylinder_.gas.ivc_pressure_rise_kpa * units::pa_per_kpa;
-  c.gas_j_per_k =
-      point.trapped_mass_g
-          ? *point.trapped_mass_g *
-                (units::kg_per_g * units::gas_constant_j_per_molk / units::air_molar_mass_kg_per_mol)
-          : cylinder_.gas.volumetric_efficiency * c.intake_pa * geometry_.swept_m3 / point.intake_temperature_k;
+  c.gas_j_per_k = simulated_gas_j_per_k(cylinder_, geometry_, point, c.intake_pa, c.pressure_pa);
   c.fuel_heat_j = engine::fuel_heat_j(cylinder_.gas, point);
   c.burn_duration_cad = engine::burn_duration_cad(cylinder_.burn, point);
   c.speed_rpm = point.speed_rpm;

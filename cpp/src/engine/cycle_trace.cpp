@@ -19,8 +19,7 @@ CycleTrace trace_cycle(const Cylinder& cylinder, const OperatingPoint& point, do
 
   CycleTrace out;
   out.indicators = model.indicators(charge, soc_cad, work);
-  out.trapped_mass_g =
-      charge.gas_j_per_k * units::air_molar_mass_kg_per_mol / (units::gas_constant_j_per_molk * units::kg_per_g);
+  out.trapped_mass_g = mass_of_gas_g(charge.gas_j_per_k);
   out.fuel_heat_j = charge.fuel_heat_j;
   out.burn_duration_cad = charge.burn_duration_cad;
   out.angle_cad.assign(model.angles_cad().begin(), model.angles_cad().end());

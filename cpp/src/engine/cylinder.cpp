@@ -73,6 +73,7 @@ void validate(const OperatingPoint& p) {
   require_fields(operating_point_fields<double>(), p);
   if (p.burn_duration_cad) require_in(burn_duration_info, *p.burn_duration_cad);
   if (p.trapped_mass_g) require_in(trapped_mass_info, *p.trapped_mass_g);
+  if (p.ivc_temperature_k) require_in(ivc_temperature_info, *p.ivc_temperature_k);
 }
 
 void validate_timing(std::string_view name, double value, const Cylinder& c) {

@@ -34,10 +34,10 @@ T& find_input(CycleInputs<T>& inputs, std::string_view name) {
   if (name == "trapped_mass_g") {
     if (!inputs.point.trapped_mass_g) {
       const Geometry<T> geometry(inputs.cylinder.geometry);
-      const T amount_mol = inputs.cylinder.gas.volumetric_efficiency * inputs.point.intake_pressure_kpa *
-                           units::pa_per_kpa * geometry.swept_m3 /
-                           (inputs.point.intake_temperature_k * units::gas_constant_j_per_molk);
-      inputs.point.trapped_mass_g = amount_mol * (units::air_molar_mass_kg_per_mol / units::kg_per_g);
+      const T intake_pa = inputs.point.intake_pressure_kpa * units::pa_per_kpa;
+      const T ivc_pa = intake_pa + inputs.cylinder.gas.ivc_pressure_rise_kpa * units::pa_per_kpa;
+      inputs.point.trapped_mass_g =
+          mass_of_gas_g(simulated_gas_j_per_k(inputs.cylinder, geometry, inputs.point, intake_pa, ivc_pa));
     }
     return *inputs.point.trapped_mass_g;
   }

@@ -6,7 +6,7 @@ import collections.abc
 import numpy
 import numpy.typing
 import typing
-__all__: list[str] = ['Cylinder', 'NoxFit', 'NoxModel', 'NoxProxy', 'OperatingPoint', 'Performance', 'PerformanceTerm', 'SoftSensor', 'TraceOptions', 'analyze', 'burn_duration_cad', 'burned_fraction', 'check_trace', 'convergence', 'differentiable_inputs', 'fit_nox_proxy', 'hardenberg_hase_delay_cad', 'hohenberg_coefficient', 'indicator_units', 'input_unit', 'scan', 'sensitivities', 'simulate', 'start_of_combustion', 'start_of_injection', 'timing_window_cad', 'volume_l', 'wall_area_m2', 'watson_delay_ms', 'wolfer_delay_ms', 'woschni_c1_bar_m', 'woschni_coefficient']
+__all__: list[str] = ['Cylinder', 'NoxFit', 'NoxModel', 'NoxProxy', 'OperatingPoint', 'Performance', 'PerformanceTerm', 'SoftSensor', 'TraceOptions', 'analyze', 'analyze_cycles', 'burn_duration_cad', 'burned_fraction', 'check_trace', 'convergence', 'differentiable_inputs', 'fit_nox_proxy', 'hardenberg_hase_delay_cad', 'hohenberg_coefficient', 'indicator_units', 'input_unit', 'scan', 'sensitivities', 'simulate', 'start_of_combustion', 'start_of_injection', 'timing_window_cad', 'volume_l', 'wall_area_m2', 'watson_delay_ms', 'wolfer_delay_ms', 'woschni_c1_bar_m', 'woschni_coefficient']
 class Cylinder:
     """
     Parameters of one cylinder: geometry, charge, gas, wall heat, burn law, ignition delay.
@@ -262,8 +262,9 @@ class OperatingPoint:
     """
     What changes from cycle to cycle: speed, fuel, intake state.
     
-    Keyword-only and immutable. `burn_duration_cad=None` is the cylinder's duration law; `trapped_mass_g=None` its
-    volumetric efficiency.
+    Keyword-only and immutable. `burn_duration_cad=None` is the cylinder's duration law. Without `trapped_mass_g` the mass
+    is p V/(R T) at IVC where `ivc_temperature_k` is given, else a simulation takes the volumetric efficiency, and a
+    measured trace p V/(R T) with the intake temperature + 40 K.
     
     Raises
     ------
@@ -287,7 +288,7 @@ class OperatingPoint:
         ...
     def __hash__(self) -> int:
         ...
-    def __init__(self, *, speed_rpm: typing.SupportsFloat | typing.SupportsIndex = 1500.0, fuel_mg: typing.SupportsFloat | typing.SupportsIndex = 20.0, intake_pressure_kpa: typing.SupportsFloat | typing.SupportsIndex = 150.0, intake_temperature_k: typing.SupportsFloat | typing.SupportsIndex = 313.0, burn_duration_cad: typing.SupportsFloat | typing.SupportsIndex | None = None, trapped_mass_g: typing.SupportsFloat | typing.SupportsIndex | None = None) -> None:
+    def __init__(self, *, speed_rpm: typing.SupportsFloat | typing.SupportsIndex = 1500.0, fuel_mg: typing.SupportsFloat | typing.SupportsIndex = 20.0, intake_pressure_kpa: typing.SupportsFloat | typing.SupportsIndex = 150.0, intake_temperature_k: typing.SupportsFloat | typing.SupportsIndex = 313.0, burn_duration_cad: typing.SupportsFloat | typing.SupportsIndex | None = None, trapped_mass_g: typing.SupportsFloat | typing.SupportsIndex | None = None, ivc_temperature_k: typing.SupportsFloat | typing.SupportsIndex | None = None) -> None:
         ...
     def __repr__(self) -> str:
         ...
@@ -322,6 +323,11 @@ class OperatingPoint:
         intake temperature [K]
         """
     @property
+    def ivc_temperature_k(self) -> float | None:
+        """
+        charge at IVC; none = volumetric efficiency, for a measured trace the intake temperature + 40 K
+        """
+    @property
     def speed_rpm(self) -> float:
         """
         engine speed [rpm]
@@ -329,7 +335,7 @@ class OperatingPoint:
     @property
     def trapped_mass_g(self) -> float | None:
         """
-        trapped charge; none = volumetric efficiency
+        trapped charge; none = from ivc_temperature_k or volumetric efficiency
         """
 class NoxProxy:
     """
@@ -723,10 +729,16 @@ class Performance:
         The terms, in order.
         """
 class TraceOptions:
-    def __init__(self, *, pegging: str = 'none', pegging_exponent: typing.SupportsFloat | typing.SupportsIndex = 1.35, inlet_pressure_kpa: typing.SupportsFloat | typing.SupportsIndex = 0.0, gamma_source: str = 'constant', gamma: typing.SupportsFloat | typing.SupportsIndex = 1.33, gamma_compression: typing.SupportsFloat | typing.SupportsIndex = 1.37, gamma_combustion: typing.SupportsFloat | typing.SupportsIndex = 1.3, heat_from_cad: typing.SupportsFloat | typing.SupportsIndex = -10.0, heat_to_cad: typing.SupportsFloat | typing.SupportsIndex = 90.0, burn_from_cad: typing.SupportsFloat | typing.SupportsIndex = -10.0, total_at_end: bool = False, fractions_of_gross: bool = False) -> None:
+    def __init__(self, *, pegging: str = 'none', pegging_exponent: typing.SupportsFloat | typing.SupportsIndex = 1.35, inlet_pressure_kpa: typing.SupportsFloat | typing.SupportsIndex = 0.0, gamma_source: str = 'constant', gamma: typing.SupportsFloat | typing.SupportsIndex = 1.33, gamma_compression: typing.SupportsFloat | typing.SupportsIndex = 1.37, gamma_combustion: typing.SupportsFloat | typing.SupportsIndex = 1.3, heat_from_cad: typing.SupportsFloat | typing.SupportsIndex | None = None, heat_to_cad: typing.SupportsFloat | typing.SupportsIndex | None = None, earliest_burn_cad: typing.SupportsFloat | typing.SupportsIndex | None = None, burn_from_cad: typing.SupportsFloat | typing.SupportsIndex | None = None, total_at_end: bool = False, fractions_of_gross: bool = False, smoothing: str = 'automatic', smoothing_width_cad: typing.SupportsFloat | typing.SupportsIndex = 4.0, smoothing_cutoff_hz: typing.SupportsFloat | typing.SupportsIndex = 3000.0, intake_pressure_kpa: typing.SupportsFloat | typing.SupportsIndex | None = None, intake_factor: typing.SupportsFloat | typing.SupportsIndex = 1.5, bmep_bar: typing.SupportsFloat | typing.SupportsIndex | None = None) -> None:
         ...
     @property
-    def burn_from_cad(self) -> float:
+    def bmep_bar(self) -> float | None:
+        ...
+    @property
+    def burn_from_cad(self) -> float | None:
+        ...
+    @property
+    def earliest_burn_cad(self) -> float | None:
         ...
     @property
     def fractions_of_gross(self) -> bool:
@@ -744,13 +756,19 @@ class TraceOptions:
     def gamma_source(self) -> str:
         ...
     @property
-    def heat_from_cad(self) -> float:
+    def heat_from_cad(self) -> float | None:
         ...
     @property
-    def heat_to_cad(self) -> float:
+    def heat_to_cad(self) -> float | None:
         ...
     @property
     def inlet_pressure_kpa(self) -> float:
+        ...
+    @property
+    def intake_factor(self) -> float:
+        ...
+    @property
+    def intake_pressure_kpa(self) -> float | None:
         ...
     @property
     def pegging(self) -> str:
@@ -759,11 +777,24 @@ class TraceOptions:
     def pegging_exponent(self) -> float:
         ...
     @property
+    def smoothing(self) -> str:
+        ...
+    @property
+    def smoothing_cutoff_hz(self) -> float:
+        ...
+    @property
+    def smoothing_width_cad(self) -> float:
+        ...
+    @property
     def total_at_end(self) -> bool:
         ...
 def analyze(crank_angle_cad: typing.Annotated[numpy.typing.ArrayLike, numpy.float64], pressure_bar: typing.Annotated[numpy.typing.ArrayLike, numpy.float64], cylinder: Cylinder, point: OperatingPoint, options: TraceOptions) -> dict:
     """
     Pegging, heat release, burn angles, work.
+    """
+def analyze_cycles(crank_angle_cad: typing.Annotated[numpy.typing.ArrayLike, numpy.float64], pressure_bar: typing.Annotated[numpy.typing.ArrayLike, numpy.float64], cylinder: Cylinder, point: OperatingPoint, options: TraceOptions, threads: typing.SupportsInt | typing.SupportsIndex = 0) -> dict:
+    """
+    The same of every row; warnings counted together.
     """
 def burn_duration_cad(cylinder: Cylinder, point: OperatingPoint) -> float:
     """

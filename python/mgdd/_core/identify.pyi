@@ -106,6 +106,9 @@ class LoadFit:
     @property
     def rmse_percent(self) -> float:
         ...
+    @property
+    def trapped_mass_g(self) -> float:
+        ...
 class CylinderFit:
     @property
     def correlation_if_free(self) -> typing.Annotated[numpy.typing.NDArray[numpy.float64], "[m, n]"]:

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import argparse
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 from mgdd._core.engine import Cylinder
 from mgdd.cli.options import engine_of, traces_of
@@ -14,11 +14,15 @@ from mgdd.identify.engine.burn_laws import compare_laws
 from mgdd.identify.engine.profile import WallHeatProfile
 from mgdd.identify.engine.records import CylinderFit, figures_of
 from mgdd.identify.engine.tdc import TdcEstimate
+from mgdd.io.trace_forms import mean_cycle
 from mgdd.report import write_report
 from mgdd.studies import run_study
 from mgdd.studies.measured_summary import law_row
 
-__all__ = ["add_calibration", "calibrate", "calibration_arguments"]
+if TYPE_CHECKING:
+    import xarray as xr
+
+__all__ = ["add_calibration", "calibrate", "calibration_arguments", "check_pegging", "traces_for"]
 
 _TDC_SPAN_CAD = 2.0
 _PER_TRACE = (
@@ -33,6 +37,15 @@ def add_calibration(parser: argparse.ArgumentParser) -> None:
     group.add_argument("--pegging", choices=("none", "inlet", "two_point", "least_squares"), default="none")
     group.add_argument("--pegging-exponent", type=float, metavar="X", help="default: 1.35")
     group.add_argument("--inlet-pressure-kpa", type=float, metavar="X", help="for pegging inlet (default: the point's)")
+    group.add_argument(
+        "--mean-cycle", action="store_true", help="calibrate to the mean of a file's cycles (one cycle is needed)"
+    )
+
+
+def traces_for(args: argparse.Namespace) -> list[xr.Dataset]:
+    """Read the traces; with --mean-cycle the mean of each file's cycles."""
+    traces = traces_of(args)
+    return [mean_cycle(trace) for trace in traces] if args.mean_cycle else traces
 
 
 def check_pegging(args: argparse.Namespace) -> None:
@@ -58,7 +71,7 @@ def calibrate(args: argparse.Namespace) -> None:
     """Fit, judge, compare, print."""
     check_output(args)
     cylinder, point, preset = engine_of(args)
-    traces = traces_of(args)
+    traces = traces_for(args)
     free = [name.strip() for name in args.free.split(",")] if args.free else None
     scheme: dict[str, Any] = {"step_cad": args.step_cad, "integrator": args.integrator}
     step = args.progress.expect(45 + (90 if args.report_folder else 0))
@@ -133,9 +146,9 @@ def _payload(
 def _doubt_of(tdc: TdcEstimate) -> list[str]:
     if not tdc.suspect:
         return []
+    possible = f"{tdc.low_cad:+.2f} to {tdc.high_cad:+.2f}"
     return [
-        f"the residual is least with {tdc.offset_cad:+.2f} CAD added to the angles ({tdc.low_cad:+.2f} to "
-        f"{tdc.high_cad:+.2f} are possible): suspect TDC"
+        f"the residual is least with {tdc.offset_cad:+.2f} CAD added to the angles ({possible} possible): suspect TDC"
     ]
 
 

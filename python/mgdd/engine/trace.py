@@ -1,12 +1,14 @@
-"""Analysis of a measured or simulated pressure trace."""
+"""Analysis of measured or simulated pressure traces, one cycle or many."""
 
 from __future__ import annotations
 
 import logging
+import math
 from typing import TYPE_CHECKING, Any
 
 from mgdd import _core
 from mgdd._core.engine import Cylinder, OperatingPoint
+from mgdd.engine.trace_cycles import is_of_cycles, of_cycles
 from mgdd.errors import ParameterError
 from mgdd.io.trace_forms import as_trace
 from mgdd.results.labels import ANGLE, labelled_dataset
@@ -14,12 +16,12 @@ from mgdd.results.labels import ANGLE, labelled_dataset
 if TYPE_CHECKING:
     import xarray as xr
 
-__all__ = ["analyze"]
+__all__ = ["analyze", "conditions"]
 
+_CONDITIONS = ("speed_rpm", "trapped_mass_g", "intake_temperature_k", "ivc_temperature_k")
 _LOG = logging.getLogger(__name__)
 _COLUMNS = (
     "pressure_bar",
-    "volume_l",
     "temperature_k",
     "heat_release_net_j_per_cad",
     "heat_release_gross_j_per_cad",
@@ -27,6 +29,9 @@ _COLUMNS = (
     "heat_net_cumulative_j",
     "heat_gross_cumulative_j",
 )
+# A point's intake pressure is often that of a preset at another load; what the caller states is judged closer.
+_POINT_FACTOR, _STATED_FACTOR = 3.0, 1.5
+_DP_MAX = "slope of the least-squares line over 2 °CA"
 
 
 def analyze(
@@ -40,37 +45,61 @@ def analyze(
     gamma: float | str | None = None,
     heat_window_cad: tuple[float, float] | None = None,
     fractions: str = "net",
+    smoothing: str | None = None,
+    smoothing_width_cad: float = 4.0,
+    smoothing_cutoff_hz: float = 3000.0,
+    bmep_bar: float | None = None,
+    brake_torque_nm: float | None = None,
+    n_cylinders: int = 1,
     quiet: bool = False,
 ) -> xr.Dataset:
-    """Analyse a pressure trace: pegging, heat release, burn angles, work, polytropic exponents.
+    """Analyse pressure: pegging, heat release, burn angles, work, polytropic exponents, of one cycle or of many.
 
     Parameters
     ----------
     trace : Dataset, DataFrame, mapping, DataArray, Series, pair of array_like, or path-like
-        ``pressure_bar(crank_angle_cad)``, from `mgdd.io.read_pressure`, `mgdd.io.pressure_trace` or `simulate`; a table
-        with these columns [°CA aTDC, bar], a column over crank angle, angle and pressure as a pair, or a file that
-        `mgdd.io.read_pressure` reads without options. Attributes ``speed_rpm`` and ``trapped_mass_g`` are used where
-        present.
+        ``pressure_bar(crank_angle_cad)``, or ``pressure_bar(cycle, crank_angle_cad)`` for a record of cycles, from
+        `mgdd.io.read_pressure`, `mgdd.io.pressure_trace` or `simulate`; a table with these columns [°CA aTDC, bar], a
+        column over crank angle, angle and pressure as a pair, or a file that `mgdd.io.read_pressure` reads without
+        options. The attributes ``speed_rpm trapped_mass_g ivc_temperature_k intake_pressure_kpa soi_cad spark_cad
+        bmep_bar brake_torque_nm n_cylinders`` are used where present.
     cylinder : Cylinder
         Geometry and wall-heat law. Samples outside IVC..EVO serve only pegging.
     point : OperatingPoint, optional
-        Speed, intake temperature and trapped mass where the trace does not say. Without a mass the trapped amount is
-        ``volumetric_efficiency p(first) V_s/(R T_in)``.
+        Speed, temperatures and trapped mass where the trace does not say. Without a mass it is p V/(R T) at IVC, with
+        ``ivc_temperature_k`` or the intake temperature + 40 K.
     pegging : {"none", "inlet", "two_point", "least_squares"}
         ``none`` takes the trace as absolute. ``inlet`` sets the mean within ±5 CAD of intake bottom dead centre to
         ``inlet_pressure_kpa``; the other two fit compression with ``pegging_exponent``.
     pegging_exponent : float
         Polytropic exponent of compression [-].
     inlet_pressure_kpa : float, optional
-        For ``inlet``; the point's intake pressure if only a point is given.
+        For ``inlet`` (there the point's intake pressure if only a point is given). With any pegging, p(IVC) beyond a
+        factor of 1.5 of it is a warning.
     gamma : float or {"split", "cylinder"}, optional
         1.33 for a measured trace and ``cylinder`` for a simulated one if left out. A number is a constant [-];
-        ``split`` is 1.37 before the heat window and 1.30 from there on; ``cylinder`` is the cylinder's own law.
+        ``split`` is 1.37 before the burn and 1.30 from its start on, and falls to first order in the crank step at
+        the jump; ``cylinder`` is the cylinder's own law.
     heat_window_cad : tuple of float, optional
-        Window of the cumulative heat [°CA aTDC]; -10 to 90 for a measured trace, the whole for a simulated one. The
-        heat is the peak of the cumulative value for a measured trace, its end for a simulated one.
+        Window of the cumulative heat [°CA aTDC]. Left out, it is found: from 5 CAD before the burn, searched from
+        ``soi_cad`` or ``spark_cad`` on where the trace has it, to 20 CAD after its end; for a simulated trace it is the
+        whole. The heat is the peak of the cumulative value for a measured trace, its end for a simulated one.
     fractions : {"net", "gross"}
         Heat that CA10, CA50 and CA90 refer to. Gross is net plus the modelled wall heat.
+    smoothing : {"none", "savitzky_golay", "low_pass", "angle_window"}, optional
+        Of the pressure before it is differentiated for the heat, without shift of phase; peak, work and temperature
+        keep the measured pressure. Left out: ``savitzky_golay`` where at least 9 samples fall into the width, else
+        none; a simulated trace is not smoothed.
+    smoothing_width_cad : float
+        Whole width [°CA] of ``savitzky_golay`` (a local parabola) and ``angle_window`` (a mean).
+    smoothing_cutoff_hz : float
+        Of ``low_pass`` [Hz]: a second-order Butterworth forward and backward, gain 1/2 there.
+    bmep_bar : float, optional
+        Measured brake mean effective pressure [bar]. A cycle whose gross IMEP cannot reach it is refused.
+    brake_torque_nm : float, optional
+        Measured torque of the engine [N m], turned into ``bmep_bar`` by the swept volume (four-stroke).
+    n_cylinders : int
+        Cylinders behind ``brake_torque_nm``.
     quiet : bool
         Leave the warnings to the attribute instead of logging them too.
 
@@ -78,20 +107,30 @@ def analyze(
     -------
     xarray.Dataset
         Traces over ``crank_angle_cad`` (rates belong to the step that ends at the sample) and scalars
-        ``pegging_bar n_compression n_expansion ca10_cad ca50_cad ca90_cad heat_net_j heat_gross_j imep_closed_bar
-        p_max_bar p_max_cad dp_max_bar_per_cad t_max_k``. Attributes ``method``, ``gamma``, ``fractions``,
+        ``pegging_bar n_compression n_expansion ca10_cad ca50_cad ca90_cad heat_from_cad heat_to_cad heat_net_j
+        heat_gross_j imep_closed_bar p_max_bar p_max_cad dp_max_bar_per_cad t_max_k trapped_mass_g tdc_offset_cad
+        compression_offset_bar``. Burn angles are NaN for a motored trace, ``tdc_offset_cad`` (what its angles are too
+        large by, good to 0.7 CAD) for a fired one. Attributes ``method``, ``gamma``, ``fractions``, ``smoothing``,
+        ``dp_max``, ``mass_source``, ``heat_window`` (``found``, ``given``, ``whole`` or ``no burn found``),
         ``motored`` (1: no burn in this trace, else 0) and ``warnings`` (what makes the figures doubtful, one per line).
+
+        Of a record of cycles, traces and scalars have the dimension ``cycle``; beside each scalar stand its
+        ``mean_NAME``, ``std_NAME`` and ``cov_NAME_percent`` (not of angles and offsets). ``lnv_imep_closed_percent``
+        is the lowest IMEP over the mean, ``cycle_mean_NAME`` is the figure of the averaged pressure, and ``motored``
+        counts cycles.
 
     Raises
     ------
     mgdd.errors.DataError
-        A trace with gaps, NaN, unsorted or repeated angles, a wrong unit, or without the angles that pegging reads.
+        A trace with gaps, NaN, unsorted or repeated angles, a wrong unit, without the angles that pegging reads, or
+        whose gross IMEP cannot reach the stated BMEP.
     mgdd.errors.ParameterError
-        An unknown option or a value outside its domain.
+        An unknown option, a value outside its domain, or a trapped mass that cannot be.
 
     References
     ----------
-    Heywood (1988), chapter 9; Krieger and Borman (1966); Randolph (1990); Brunt and Pond (1997).
+    Heywood (1988), chapter 9; Krieger and Borman (1966); Randolph (1990); Brunt and Pond (1997); Savitzky and Golay
+    (1964).
 
     Examples
     --------
@@ -105,53 +144,115 @@ def analyze(
     9.4
     14.9
     """
-    trace = as_trace(trace)
+    trace = trace if is_of_cycles(trace) else as_trace(trace)
     simulated = "motored_pressure_bar" in trace.variables
     if pegging == "inlet" and inlet_pressure_kpa is None and point is None:
         raise ParameterError("pegging 'inlet' needs inlet_pressure_kpa, or a point with its intake pressure")
-    point = _conditions(trace, point)
-    window = heat_window_cad or ((cylinder.ivc_cad, cylinder.evo_cad) if simulated else (-10.0, 90.0))
     if fractions not in ("net", "gross"):
         raise ParameterError.of("fractions", fractions, "net or gross")
+    own = conditions(trace, point)
     source, number, text = _gamma(gamma if gamma is not None else ("cylinder" if simulated else 1.33))
-    inlet = point.intake_pressure_kpa if inlet_pressure_kpa is None else inlet_pressure_kpa
+    window = heat_window_cad or ((cylinder.ivc_cad, cylinder.evo_cad) if simulated else None)
+    stated = _number(trace, "intake_pressure_kpa", inlet_pressure_kpa)
     options = _core.engine.TraceOptions(
         pegging=pegging,
         pegging_exponent=pegging_exponent,
-        inlet_pressure_kpa=inlet,
+        inlet_pressure_kpa=own.intake_pressure_kpa if inlet_pressure_kpa is None else inlet_pressure_kpa,
         gamma_source=source,
         gamma=number,
-        heat_from_cad=window[0],
-        heat_to_cad=window[1],
-        burn_from_cad=float(trace["soc_cad"]) if simulated else window[0],
+        heat_from_cad=window[0] if window else None,
+        heat_to_cad=window[1] if window else None,
+        earliest_burn_cad=_number(trace, "soi_cad", _number(trace, "spark_cad")),
+        burn_from_cad=float(trace["soc_cad"]) if simulated else None,
         total_at_end=simulated,
         fractions_of_gross=fractions == "gross",
+        smoothing=_smoothing(smoothing, simulated),
+        smoothing_width_cad=smoothing_width_cad,
+        smoothing_cutoff_hz=smoothing_cutoff_hz,
+        intake_pressure_kpa=stated if stated is not None or point is None else point.intake_pressure_kpa,
+        intake_factor=_POINT_FACTOR if stated is None else _STATED_FACTOR,
+        bmep_bar=_bmep(trace, cylinder, bmep_bar, brake_torque_nm, n_cylinders),
     )
+    attrs = {
+        "file": trace.attrs.get("file", "trace"),
+        "method": pegging,
+        "gamma": text,
+        "fractions": fractions,
+        "dp_max": _DP_MAX,
+    }
+    given = "given" if heat_window_cad else "whole" if simulated else None
+    if is_of_cycles(trace):
+        result = of_cycles(trace, cylinder, own, options, attrs, given)
+    else:
+        result = _one(trace, cylinder, own, options, attrs, given)
+    for warning in () if quiet else result.attrs["warnings"].splitlines():
+        _LOG.warning("%s: %s", attrs["file"], warning)
+    read = str(trace.attrs.get("warnings", ""))  # what reading doubted was logged by the reader
+    return result.assign_attrs(warnings="\n".join(filter(None, (read, result.attrs["warnings"]))))
+
+
+def _one(
+    trace: xr.Dataset,
+    cylinder: Cylinder,
+    point: OperatingPoint,
+    options: _core.engine.TraceOptions,
+    attrs: dict[str, Any],
+    given: str | None,
+) -> xr.Dataset:
     raw = _core.engine.analyze(trace[ANGLE].values, trace["pressure_bar"].values, cylinder, point, options)
-    for warning in () if quiet else raw["warnings"]:
-        _LOG.warning("%s: %s", trace.attrs.get("file", "trace"), warning)
     return labelled_dataset(
         {
             ANGLE: (ANGLE, raw[ANGLE]),
+            "volume_l": (ANGLE, raw["volume_l"]),
             **{name: (ANGLE, raw[name]) for name in _COLUMNS},
             **{name: ((), value) for name, value in raw["scalars"].items()},
         },
         attrs={
-            "file": trace.attrs.get("file", "trace"),
-            "method": pegging,
-            "gamma": text,
-            "fractions": fractions,
+            **attrs,
+            "smoothing": raw["smoothing"],
+            "mass_source": raw["mass_source"],
+            "heat_window": given or ("found" if raw["window_found"] else "no burn found"),
             "motored": int(raw["motored"]),
             "warnings": "\n".join(raw["warnings"]),
         },
     )
 
 
-def _conditions(trace: xr.Dataset, point: OperatingPoint | None) -> OperatingPoint:
-    changes = {
-        name: float(trace.attrs[name]) for name in ("speed_rpm", "trapped_mass_g") if trace.attrs.get(name) is not None
-    }
-    return (point or OperatingPoint()).replace(**changes)
+def _number(trace: xr.Dataset, name: str, given: float | None = None) -> float | None:
+    """Return what the caller gives, else the trace's own attribute, where it is a number."""
+    if given is not None:
+        return float(given)
+    value = trace.attrs.get(name)
+    return None if value is None or math.isnan(float(value)) else float(value)
+
+
+def conditions(trace: xr.Dataset, point: OperatingPoint | None) -> OperatingPoint:
+    """Give the operating point of a trace: its own attributes over ``point``."""
+    changes = {name: _number(trace, name) for name in _CONDITIONS}
+    return (point or OperatingPoint()).replace(**{k: v for k, v in changes.items() if v is not None})
+
+
+def _smoothing(smoothing: str | None, simulated: bool) -> str:
+    if smoothing == "automatic":
+        raise ParameterError.of("smoothing", smoothing, "none, savitzky_golay, low_pass or angle_window")
+    return smoothing or ("none" if simulated else "automatic")
+
+
+def _bmep(
+    trace: xr.Dataset, cylinder: Cylinder, bmep: float | None, torque: float | None, cylinders: int
+) -> float | None:
+    """BMEP [bar] as given, or 4 pi torque over the displacement of a four-stroke engine."""
+    if bmep is not None and torque is not None:
+        raise ParameterError("bmep_bar and brake_torque_nm both say the brake work: give one")
+    if torque is None and (own := _number(trace, "bmep_bar", bmep)) is not None:
+        return own
+    torque = _number(trace, "brake_torque_nm", torque)
+    if torque is None:
+        return None
+    cylinders = int(trace.attrs.get("n_cylinders", cylinders)) if cylinders == 1 else cylinders
+    if cylinders < 1:
+        raise ParameterError.of("n_cylinders", cylinders, ">= 1")
+    return 4.0 * math.pi * torque / (cylinder.swept_volume_l * 1e-3 * cylinders) / 1e5
 
 
 def _gamma(gamma: float | str) -> tuple[str, float, float | str]:

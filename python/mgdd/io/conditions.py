@@ -24,9 +24,11 @@ _BOUNDS = {
     "spark_cad": (-90.0, 40.0),
     "intake_pressure_kpa": (0.0, 2000.0),
     "intake_temperature_k": (200.0, 1000.0),
+    "ivc_temperature_k": (200.0, 1000.0),
     "fuel_mg": (0.0, 100000.0),
     "bmep_bar": (-20.0, 100.0),
     "brake_torque_nm": (-1e6, 1e6),
+    "n_cylinders": (0.0, 100.0),
 }
 CONDITIONS = tuple(_BOUNDS)
 _ANGLES = ("soi_cad", "spark_cad")
@@ -41,8 +43,9 @@ def read_conditions(path: str | os.PathLike[str]) -> dict[str, dict[str, float]]
     path : path-like
         CSV with a header. Column ``file`` names the trace; ``load_percent`` [%], ``speed_rpm`` [rpm],
         ``trapped_mass_g`` [g per cycle], ``soi_cad`` and ``spark_cad`` (start of injection, spark timing [°CA aTDC]),
-        ``intake_pressure_kpa`` [kPa], ``intake_temperature_k`` [K], ``fuel_mg`` [mg per cycle, 0 = motored],
-        ``bmep_bar`` [bar] and ``brake_torque_nm`` [N m] are optional, and so is every cell in them.
+        ``intake_pressure_kpa`` [kPa], ``intake_temperature_k`` and ``ivc_temperature_k`` [K], ``fuel_mg`` [mg per
+        cycle, 0 = motored], ``bmep_bar`` [bar], ``brake_torque_nm`` [N m] of all ``n_cylinders`` are optional, and so
+        is every cell in them.
 
     Returns
     -------

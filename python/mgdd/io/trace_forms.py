@@ -17,7 +17,7 @@ from mgdd.results.labels import ANGLE
 if TYPE_CHECKING:
     import xarray as xr
 
-__all__ = ["as_trace", "one_cycle"]
+__all__ = ["as_trace", "mean_cycle", "one_cycle"]
 
 _PRESSURE = "pressure_bar"
 _FORMS = (
@@ -35,6 +35,11 @@ def one_cycle(trace: Any) -> xr.Dataset:
             f"trace.mean('cycle', keep_attrs=True), or one column, {argument('pressure_column', '')}"
         )
     return made
+
+
+def mean_cycle(trace: xr.Dataset) -> xr.Dataset:
+    """Give the mean of a trace's cycles; one of one cycle stays as it is."""
+    return trace.mean(CYCLE, keep_attrs=True) if CYCLE in trace.dims else trace
 
 
 def as_trace(trace: Any) -> xr.Dataset:

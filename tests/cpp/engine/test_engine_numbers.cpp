@@ -88,6 +88,7 @@ TEST(EngineNumbers, DefaultsAreTheLightDutyDiesel) {
       {{"speed_rpm", 1500.0}, {"fuel_mg", 20.0}, {"intake_pressure_kpa", 150.0}, {"intake_temperature_k", 313.0}});
   EXPECT_FALSE(OperatingPoint{}.burn_duration_cad.has_value());
   EXPECT_FALSE(OperatingPoint{}.trapped_mass_g.has_value());
+  EXPECT_FALSE(OperatingPoint{}.ivc_temperature_k.has_value());
   EXPECT_EQ(Cylinder{}.burn.burn_shape, BurnShape::triangle);
   EXPECT_EQ(Cylinder{}.gas.gamma_model, GammaModel::constant);
   EXPECT_EQ(Cylinder{}.wall_heat.wall_heat_model, WallHeatModel::woschni);
@@ -103,9 +104,12 @@ TEST(EngineNumbers, DefaultsOfAnalysisAndEmissions) {
   EXPECT_EQ(o.gamma, 1.33);
   EXPECT_EQ(o.gamma_compression, 1.37);
   EXPECT_EQ(o.gamma_combustion, 1.30);
-  EXPECT_EQ(o.heat_from_cad, -10.0);
-  EXPECT_EQ(o.heat_to_cad, 90.0);
-  EXPECT_EQ(o.burn_from_cad, -10.0);
+  EXPECT_FALSE(o.heat_from_cad || o.heat_to_cad || o.earliest_burn_cad || o.burn_from_cad);
+  EXPECT_EQ(o.smoothing, Smoothing::automatic);
+  EXPECT_EQ(o.smoothing_width_cad, 4.0);
+  EXPECT_EQ(o.smoothing_cutoff_hz, 3000.0);
+  EXPECT_EQ(o.intake_factor, 1.5);
+  EXPECT_FALSE(o.intake_pressure_kpa || o.bmep_bar);
   EXPECT_FALSE(o.total_at_end);
   EXPECT_FALSE(o.fractions_of_gross);
   EXPECT_EQ(NoxProxy{}, (NoxProxy{1900.0, 1200.0, 16000.0}));
@@ -176,7 +180,8 @@ TEST(EngineNumbers, BoundsBelongToTheDomainWhereTheySay) {
   expect_edges<Cylinder>(cylinder_fields<double>());
   expect_edges<OperatingPoint>(operating_point_fields<double>());
   for (const auto& [member, info] : {std::pair{&OperatingPoint::burn_duration_cad, burn_duration_info},
-                                     {&OperatingPoint::trapped_mass_g, trapped_mass_info}}) {
+                                     {&OperatingPoint::trapped_mass_g, trapped_mass_info},
+                                     {&OperatingPoint::ivc_temperature_k, ivc_temperature_info}}) {
     OperatingPoint p;
     p.*member = info.domain.upper;
     EXPECT_EQ(refusal([&] { validate(p); }), "");

@@ -59,6 +59,7 @@ struct Plant {
       truth.soc_cad = soc;
       MeasuredCycle t{"at " + std::to_string(static_cast<int>(fuel)), {}, {}, truth.point};
       const auto cycle = run(truth);
+      t.point.trapped_mass_g = engine::mass_of_gas_g(cycle.charge.gas_j_per_k);
       t.angle_cad = cycle.angles();
       t.pressure_bar = cycle.pressures_bar();
       // p(IVC) fixes the charge and is not a residual: noise there is another experiment.

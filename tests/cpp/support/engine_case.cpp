@@ -51,6 +51,8 @@ void set(EngineCase& c, const std::string& name, const std::string& value) {
     c.point.burn_duration_cad = std::stod(value);
   } else if (name == "trapped_mass_g") {
     c.point.trapped_mass_g = std::stod(value);
+  } else if (name == "ivc_temperature_k") {
+    c.point.ivc_temperature_k = std::stod(value);
   } else {
     for (const auto& field : engine::operating_point_fields<double>()) {
       if (field.info.name == name) {

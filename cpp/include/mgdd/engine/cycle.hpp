@@ -8,6 +8,7 @@
 #include <vector>
 
 #include "mgdd/engine/burn.hpp"
+#include "mgdd/engine/charge.hpp"
 #include "mgdd/engine/cylinder.hpp"
 #include "mgdd/engine/geometry.hpp"
 #include "mgdd/engine/indicators.hpp"
@@ -59,7 +60,7 @@ class CycleModel {
   /// wall-heat law changed. IVC and EVO do not move the grid.
   void set_cylinder(const BasicCylinder<T>& cylinder) noexcept;
 
-  /// Trapped amount from mass, or N = eta_V p_in V_s/(R T_in) (Tan 2018, eq. 2-3); p(IVC) = p_in + rise.
+  /// Trapped amount by `simulated_gas_j_per_k`; p(IVC) = p_in + rise.
   Charge<T> charge(const BasicOperatingPoint<T>& point) const noexcept;
 
   /// Integrates one cycle into the workspace.

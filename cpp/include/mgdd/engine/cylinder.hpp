@@ -113,7 +113,8 @@ struct BasicOperatingPoint {
   T intake_pressure_kpa{150.0};
   T intake_temperature_k{313.0};
   std::optional<T> burn_duration_cad{};  ///< none: the cylinder's duration law
-  std::optional<T> trapped_mass_g{};     ///< none: volumetric efficiency (Tan 2018, eq. 2-3)
+  std::optional<T> trapped_mass_g{};     ///< none: see `charge.hpp`
+  std::optional<T> ivc_temperature_k{};  ///< of the charge; gives the trapped mass where that is not stated
 
   bool operator==(const BasicOperatingPoint&) const = default;
 };
@@ -203,11 +204,14 @@ constexpr auto operating_point_fields() {
   };
 }
 
-/// The two optional fields of an operating point, with the same kind of record.
+/// The optional fields of an operating point, with the same kind of record.
 inline constexpr FieldInfo burn_duration_info{"burn_duration_cad", "°CA", above(0.0, 360.0),
                                               "burn duration; none = the duration law"};
 inline constexpr FieldInfo trapped_mass_info{"trapped_mass_g", "g", above(0.0, 1e4),
-                                             "trapped charge; none = volumetric efficiency"};
+                                             "trapped charge; none = from ivc_temperature_k or volumetric efficiency"};
+inline constexpr FieldInfo ivc_temperature_info{
+    "ivc_temperature_k", "K", above(0.0, 1500.0),
+    "charge at IVC; none = volumetric efficiency, for a measured trace the intake temperature + 40 K"};
 
 /// Throws ParameterError naming the first field outside its domain, its value and the bound.
 void validate(const Cylinder& cylinder);
@@ -258,6 +262,7 @@ BasicOperatingPoint<T> lift(const OperatingPoint& from) {
     target[i].in(to) = T(source[i].in(from));
   if (from.burn_duration_cad) to.burn_duration_cad = T(*from.burn_duration_cad);
   if (from.trapped_mass_g) to.trapped_mass_g = T(*from.trapped_mass_g);
+  if (from.ivc_temperature_k) to.ivc_temperature_k = T(*from.ivc_temperature_k);
   return to;
 }
 

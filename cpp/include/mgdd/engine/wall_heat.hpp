@@ -17,7 +17,8 @@ inline constexpr double woschni_c1_bar_m = 129.8;
 /// Hohenberg's constant with pressure in bar and volume in m3 (Hohenberg 1979).
 inline constexpr double hohenberg_c1_bar_m3 = 130.0;
 
-/// h = C1 B^-0.2 p^0.8 T^-0.55 w^0.8 (Woschni 1967; Tan 2018, eq. 2-5). The exponent -0.55 belongs to this C1.
+/// h = C1 B^-0.2 p^0.8 T^-0.55 w^0.8 (Tan 2018, eq. 2-5; Heywood 1988, chapter 12). Woschni 1967 is quoted with -0.53
+/// and the same constant: 15 % more at 1000 K.
 template <class T>
 T woschni_coefficient(const T& c1_bar_m, const T& bore_m, const T& pressure_bar, const T& temperature_k,
                       const T& gas_velocity_m_per_s) noexcept {

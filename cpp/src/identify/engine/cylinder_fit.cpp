@@ -121,7 +121,7 @@ void check_inputs(const std::vector<MeasuredCycle>& traces, const engine::Cylind
                       text(trace.angle_cad.back()) + " °CA aTDC, beyond ivc_cad = " + text(cylinder.geometry.ivc_cad) +
                       " to evo_cad = " + text(cylinder.geometry.evo_cad) + ": cut it to the closed part");
     }
-    if (!trace.point.trapped_mass_g && trace.angle_cad.front() > cylinder.geometry.ivc_cad + 15.0) {
+    if (!trace.point.trapped_mass_g && trace.angle_cad.front() > cylinder.geometry.ivc_cad + engine::ivc_carry_cad) {
       throw DataError("trace '" + trace.label + "' starts at " + text(trace.angle_cad.front()) +
                       " °CA aTDC, ivc_cad = " + text(cylinder.geometry.ivc_cad) +
                       ": give its trapped_mass_g, which p(IVC) does not determine here");
@@ -167,6 +167,7 @@ LoadFit compare(const MeasuredCycle& trace, const engine::Cylinder& cylinder, Cy
   fit.imep_closed_error_percent = 100.0 * (fit.imep_closed_model_bar / fit.imep_closed_bar - 1.0);
   fit.ca50_cad = model.indicators.ca50_cad;
   fit.heat_loss_fraction = model.indicators.heat_loss_fraction;
+  fit.trapped_mass_g = model.trapped_mass_g;
   fit.model_bar = std::move(model.pressure_bar);
   return fit;
 }

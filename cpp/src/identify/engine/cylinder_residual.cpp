@@ -107,6 +107,8 @@ engine::Charge<T> CylinderResidual::charge(const Load& load, const engine::Cycle
   point.fuel_mg = burn.fuel_heat_j / c.gas.lower_heating_value_mj_per_kg;
   engine::Charge<T> charge = model.charge(point);
   charge.pressure_pa = first_pa;
+  charge.gas_j_per_k = engine::measured_gas_j_per_k<T>(load.trace->angle_cad, load.trace->pressure_bar,
+                                                       model.geometry(), base_.geometry.ivc_cad, point);
   return charge;
 }
 
@@ -167,7 +169,9 @@ CylinderResidual::Simulated CylinderResidual::simulate(std::size_t trace, const 
   for (const std::size_t k : load.sample) {
     out.pressure_bar.push_back(load.plain.work.pressure_pa[k] / units::pa_per_bar);
   }
-  out.indicators = load.plain.model.indicators(charge(load, load.plain.model, c, at), at.soc_cad, load.plain.work);
+  const engine::Charge<double> own = charge(load, load.plain.model, c, at);
+  out.indicators = load.plain.model.indicators(own, at.soc_cad, load.plain.work);
+  out.trapped_mass_g = engine::mass_of_gas_g(own.gas_j_per_k);
   return out;
 }
 

@@ -11,10 +11,11 @@ import numpy as np
 
 from mgdd import _core
 from mgdd._core.engine import Cylinder, OperatingPoint
+from mgdd.engine.trace import conditions
 from mgdd.errors import hand_over, or_partial
 from mgdd.identify.engine.findings import findings_of
 from mgdd.identify.engine.records import CylinderFit, Load, burn_law, load_table
-from mgdd.identify.engine.request import Bounds, Request, closed, conditions
+from mgdd.identify.engine.request import Bounds, Request, closed
 from mgdd.optimize.fit_options import FitOptions, fit_options
 from mgdd.results import FitReport
 from mgdd.results.fit import FitQuality
@@ -47,8 +48,9 @@ def fit_cylinder(
     Parameters
     ----------
     traces : sequence of xarray.Dataset, or of any form of a trace that `mgdd.engine.analyze` takes
-        ``pressure_bar(crank_angle_cad)`` each. Attributes ``speed_rpm``, ``trapped_mass_g``, ``fuel_mg``, ``soi_cad``
-        and ``spark_cad`` are used where present; ``file`` names the trace. Samples outside IVC..EVO are dropped.
+        ``pressure_bar(crank_angle_cad)`` each. Attributes ``speed_rpm``, ``trapped_mass_g``, ``ivc_temperature_k``,
+        ``fuel_mg``, ``soi_cad`` and ``spark_cad`` are used where present; ``file`` names the trace. Samples outside
+        IVC..EVO are dropped.
     cylinder : Cylinder
         Start and constants; its ``burn_shape`` and ``gamma_model`` choose the laws.
     free : sequence of str, optional
@@ -200,6 +202,7 @@ def _load(
         intake_pressure_kpa=burn.start_pressure_bar * 100.0,
         fuel_mg=burn.fuel_heat_j / cylinder.lower_heating_value_mj_per_kg,
         burn_duration_cad=burn.burn_duration_cad,
+        trapped_mass_g=fitted.trapped_mass_g,
     )
     return Load(
         file=label,

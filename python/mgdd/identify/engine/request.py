@@ -13,6 +13,7 @@ import numpy as np
 from mgdd import _core
 from mgdd._core.engine import Cylinder, OperatingPoint
 from mgdd.engine import analyze
+from mgdd.engine.trace import conditions
 from mgdd.errors import DataError, ParameterError, ShapeError
 from mgdd.io.trace_forms import one_cycle
 from mgdd.optimize.fit_options import FitOptions
@@ -22,11 +23,10 @@ if TYPE_CHECKING:
     import xarray as xr
     from numpy.typing import NDArray
 
-__all__ = ["BURN_FIELDS", "GAMMA_PARAMETER", "SHAPE_FIELDS", "Request", "conditions", "default_free", "pegged"]
+__all__ = ["BURN_FIELDS", "GAMMA_PARAMETER", "SHAPE_FIELDS", "Request", "default_free", "pegged"]
 
 SHAPE_FIELDS = ("wiebe_m", "second_fraction", "second_delay_cad", "second_duration_cad", "second_wiebe_m")
 BURN_FIELDS = ("soc_cad", "burn_duration_cad", "fuel_heat_j")
-_CONDITIONS = ("speed_rpm", "trapped_mass_g")
 _EARLIEST = ("soi_cad", "spark_cad")
 # "gamma" names the parameter of whichever gamma law is in use.
 GAMMA_PARAMETER = {"constant": "gamma", "linear": "gamma_linear_300k", "polynomial": "gamma_polynomial_c0"}
@@ -200,12 +200,6 @@ def default_free(cylinder: Cylinder) -> tuple[str, ...]:
     """Name what `fit_cylinder` frees for a burn law when nothing is said."""
     shape = SHAPE_FIELDS if cylinder.burn_shape == "double_wiebe" else ()
     return ("wall_heat_scale", *BURN_FIELDS, *shape)
-
-
-def conditions(trace: xr.Dataset, point: OperatingPoint | None) -> OperatingPoint:
-    """Give the operating point of a trace: its own attributes over ``point``."""
-    own = {name: float(trace.attrs[name]) for name in _CONDITIONS if trace.attrs.get(name) is not None}
-    return (point or OperatingPoint()).replace(**own)
 
 
 def earliest_burn_cad(trace: xr.Dataset) -> float:

@@ -10,11 +10,12 @@ import numpy as np
 
 from mgdd._core.engine import Cylinder, OperatingPoint
 from mgdd.engine import analyze, simulate
+from mgdd.engine.trace import conditions
 from mgdd.errors import ConvergenceError, DataError, ParameterError
 from mgdd.identify.engine.cylinder import fit_request
 from mgdd.identify.engine.family import of_law
 from mgdd.identify.engine.records import CylinderFit, starts_of
-from mgdd.identify.engine.request import GAMMA_PARAMETER, Bounds, Request, closed, conditions
+from mgdd.identify.engine.request import GAMMA_PARAMETER, Bounds, Request, closed
 from mgdd.results.describe import described
 from mgdd.results.labels import labelled_dataset
 
@@ -56,7 +57,8 @@ class TdcEstimate:
     --------
     >>> from mgdd import datasets, presets
     >>> from mgdd.identify import estimate_tdc
-    >>> found = estimate_tdc(datasets.load("hd_diesel_128x144"), presets.load("hd_diesel_128x144").cylinder, span_cad=1.0)
+    >>> cylinder = presets.load("hd_diesel_128x144").cylinder
+    >>> found = estimate_tdc(datasets.load("hd_diesel_128x144"), cylinder, span_cad=1.0)
     >>> found.suspect
     False
     """
@@ -139,7 +141,8 @@ def estimate_tdc(
     Notes
     -----
     Motored: the peak of a parabola through ±5 CAD, plus the loss angle that the cycle model has for this geometry and
-    speed with 0.3 to 1.5 of the textbook wall heat; measured loss angles are 0.4 to 1.3 CAD. Fired: the double Wiebe law with gamma and wall heat fitted at each offset;
+    speed with 0.3 to 1.5 of the textbook wall heat; measured loss angles are 0.4 to 1.3 CAD. Fired: the double
+    Wiebe law with gamma and wall heat fitted at each offset;
     offsets whose RMSE stays within a quarter of the least are possible, and 0.3 CAD to each side, by which another burn
     or gamma law moves the least.
 

@@ -5,37 +5,25 @@
 #pragma once
 
 #include <array>
+#include <cstddef>
+#include <memory>
 #include <string>
 #include <string_view>
 #include <vector>
 
 #include "mgdd/engine/cylinder.hpp"
+#include "mgdd/engine/pressure/pegging.hpp"
+#include "mgdd/engine/pressure/trace_options.hpp"
+#include "mgdd/math/dual.hpp"
 
 namespace mgdd::engine {
 
-enum class Pegging { none, inlet, two_point, least_squares };
-enum class AnalysisGamma { constant, split, cylinder };
+/// What makes the figures of a trace doubtful. Warnings of one kind are counted together over many cycles.
+struct TraceWarning {
+  std::string_view kind;  ///< "pegging", "tdc", "spike" ...
+  std::string text;
 
-std::string_view to_string(Pegging v) noexcept;
-std::string_view to_string(AnalysisGamma v) noexcept;
-Pegging parse_pegging(std::string_view name);
-AnalysisGamma parse_analysis_gamma(std::string_view name);
-
-struct TraceOptions {
-  Pegging pegging = Pegging::none;
-  double pegging_exponent = 1.35;   ///< [-] polytropic exponent of compression, 1.32 to 1.37 in a diesel
-  double inlet_pressure_kpa = 0.0;  ///< for `inlet`: the pressure at intake bottom dead centre
-
-  AnalysisGamma gamma_source = AnalysisGamma::constant;
-  double gamma = 1.33;              ///< [-] constant over the window
-  double gamma_compression = 1.37;  ///< [-] `split`: before `burn_from_cad`
-  double gamma_combustion = 1.30;   ///< [-] `split`: from the burn start on
-
-  double heat_from_cad = -10.0;  ///< window of the cumulative heat
-  double heat_to_cad = 90.0;
-  double burn_from_cad = -10.0;     ///< Woschni's combustion term acts from here on
-  bool total_at_end = false;        ///< report the heat at the window's end, not its peak; burn angles keep the peak
-  bool fractions_of_gross = false;  ///< CA10/50/90 of gross heat instead of net
+  bool operator==(const TraceWarning&) const = default;
 };
 
 struct TraceAnalysis {
@@ -48,16 +36,24 @@ struct TraceAnalysis {
   double ca10_cad = undefined<double>();
   double ca50_cad = undefined<double>();
   double ca90_cad = undefined<double>();
+  double heat_from_cad = undefined<double>();     ///< window of the cumulative heat
+  double heat_to_cad = undefined<double>();       ///< its end
   double heat_net_j_total = undefined<double>();  ///< peak of the cumulative heat, or its end where options say so
   double heat_gross_j_total = undefined<double>();
   double imep_closed_bar = undefined<double>();
   double work_closed_j = undefined<double>();
   double p_max_bar = undefined<double>();
   double p_max_cad = undefined<double>();
-  double dp_max_bar_per_cad = undefined<double>();
+  double dp_max_bar_per_cad = undefined<double>();  ///< slope of the steepest line over 2 CAD
   double t_max_k = undefined<double>();
-  bool motored = false;               ///< expansion runs on the compression line: no burn in this trace
-  std::vector<std::string> warnings;  ///< what makes these figures doubtful
+  double trapped_mass_g = undefined<double>();
+  double tdc_offset_cad = undefined<double>();          ///< motored: what the angles are too large by, good to 0.7 CAD
+  double compression_offset_bar = undefined<double>();  ///< what p + offset = C V^-n would still add to the trace
+  bool motored = false;                                 ///< expansion runs on the compression line: no burn
+  bool window_found = false;                            ///< the window is from the trace, not from the options
+  std::string mass_source;                              ///< "given", or the temperature at IVC it was computed with
+  std::string smoothing;                                ///< what acted on the pressure before the heat release
+  std::vector<TraceWarning> warnings;
 
   /// Heat of each step over its length [J/°CA], zero at the first sample; gross is net and the loss to the wall.
   std::vector<double> heat_release_net_j_per_cad() const;
@@ -70,13 +66,15 @@ struct TraceFigure {
   std::string_view name;
   double TraceAnalysis::* member;
 };
-inline constexpr std::array<TraceFigure, 14> trace_figures{{
+inline constexpr std::array<TraceFigure, 19> trace_figures{{
     {"pegging_bar", &TraceAnalysis::pegging_bar},
     {"n_compression", &TraceAnalysis::n_compression},
     {"n_expansion", &TraceAnalysis::n_expansion},
     {"ca10_cad", &TraceAnalysis::ca10_cad},
     {"ca50_cad", &TraceAnalysis::ca50_cad},
     {"ca90_cad", &TraceAnalysis::ca90_cad},
+    {"heat_from_cad", &TraceAnalysis::heat_from_cad},
+    {"heat_to_cad", &TraceAnalysis::heat_to_cad},
     {"heat_net_j", &TraceAnalysis::heat_net_j_total},
     {"heat_gross_j", &TraceAnalysis::heat_gross_j_total},
     {"imep_closed_bar", &TraceAnalysis::imep_closed_bar},
@@ -85,20 +83,39 @@ inline constexpr std::array<TraceFigure, 14> trace_figures{{
     {"p_max_cad", &TraceAnalysis::p_max_cad},
     {"dp_max_bar_per_cad", &TraceAnalysis::dp_max_bar_per_cad},
     {"t_max_k", &TraceAnalysis::t_max_k},
+    {"trapped_mass_g", &TraceAnalysis::trapped_mass_g},
+    {"tdc_offset_cad", &TraceAnalysis::tdc_offset_cad},
+    {"compression_offset_bar", &TraceAnalysis::compression_offset_bar},
 }};
 
-/// Offset to add to a relative trace [bar] (engine analysis calls it; here for use on its own). DataError where the
-/// trace does not cover the angles that the method reads.
-double pegging_offset_bar(const std::vector<double>& angle_cad, const std::vector<double>& pressure_bar,
-                          const Cylinder& cylinder, const TraceOptions& options);
-
-/// Exponent of p V^n = const by regression of ln p on ln V over [from, to]; NaN with fewer than three samples there.
-double polytropic_exponent(const std::vector<double>& angle_cad, const std::vector<double>& pressure_bar,
-                           const Cylinder& cylinder, double from_cad, double to_cad);
-
-/// Analyses the samples between IVC and EVO. The trapped amount is the point's mass or eta_V p(first) V_s/(R T_in);
-/// the point's intake pressure is not used for it.
+/// Analyses the samples between IVC and EVO. The trapped amount is that of `measured_gas_j_per_k`. ParameterError for
+/// an option, a mass or a speed that cannot be; DataError for a trace that cannot be analysed, or whose work is below
+/// the stated brake work.
 TraceAnalysis analyze_trace(const std::vector<double>& angle_cad, const std::vector<double>& pressure_bar,
                             const Cylinder& cylinder, const OperatingPoint& point, const TraceOptions& options);
+
+/// What all cycles on the same angles share: geometry, tables of the wall heat, weights of the smoothing. Constant
+/// after construction; several threads may use one.
+class TraceAnalyzer {
+ public:
+  /// `angle_cad` must have passed `check_trace`. Throws as `analyze_trace`.
+  TraceAnalyzer(const std::vector<double>& angle_cad, const Cylinder& cylinder, const OperatingPoint& point,
+                const TraceOptions& options);
+  TraceAnalysis operator()(const std::vector<double>& pressure_bar) const;
+
+ private:
+  struct Shared;
+  std::shared_ptr<const Shared> shared_;
+};
+
+/// Every cycle of a record on the same angles, shared out over `threads` (0: one per core). An error names its cycle,
+/// counted from 1.
+std::vector<TraceAnalysis> analyze_cycles(const std::vector<double>& angle_cad,
+                                          const std::vector<std::vector<double>>& pressure_bar,
+                                          const Cylinder& cylinder, const OperatingPoint& point,
+                                          const TraceOptions& options, std::size_t threads = 0);
+
+/// One line per kind of warning, in the order of their first cycle: "12 of 60 cycles: ... (cycle 3)".
+std::vector<std::string> count_warnings(const std::vector<TraceAnalysis>& cycles);
 
 }  // namespace mgdd::engine

@@ -17,8 +17,8 @@
 
 namespace mgdd::identify {
 
-/// One measured closed cycle with its conditions. The first sample is p(IVC) unless that is freed; the trapped amount
-/// is the point's mass, or eta_V p(IVC) V_s/(R T_in). Fuel and intake pressure of `point` are not used.
+/// One measured closed cycle with its conditions. The cycle starts at the first sample, with its pressure unless that is
+/// freed; the trapped amount is that of `engine::measured_gas_j_per_k`. Fuel and intake pressure of `point` are not used.
 struct MeasuredCycle {
   std::string label;
   std::vector<double> angle_cad;
@@ -92,6 +92,7 @@ struct LoadFit {
   double largest_error_cad = undefined<double>();
   double ca50_cad = undefined<double>();            ///< of the burn law
   double heat_loss_fraction = undefined<double>();  ///< of the fuel heat
+  double trapped_mass_g = undefined<double>();      ///< stated, or from p, V and T at IVC
 };
 
 struct CylinderFit {

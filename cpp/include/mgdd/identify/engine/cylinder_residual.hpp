@@ -37,6 +37,7 @@ class CylinderResidual {
   struct Simulated {
     std::vector<double> pressure_bar;  ///< on the measured angles
     engine::Indicators<double> indicators;
+    double trapped_mass_g = undefined<double>();
   };
   Simulated simulate(std::size_t trace, const Eigen::VectorXd& x);
 

@@ -1,0 +1,82 @@
+#include "mgdd/engine/pressure/trace_options.hpp"
+
+#include <string>
+#include <utility>
+
+#include "mgdd/common/enum_names.hpp"
+#include "mgdd/common/error.hpp"
+#include "mgdd/common/text.hpp"
+
+namespace mgdd::engine {
+namespace {
+
+constexpr std::pair<Pegging, std::string_view> pegging_names[] = {{Pegging::none, "none"},
+                                                                  {Pegging::inlet, "inlet"},
+                                                                  {Pegging::two_point, "two_point"},
+                                                                  {Pegging::least_squares, "least_squares"}};
+constexpr std::pair<AnalysisGamma, std::string_view> gamma_names[] = {
+    {AnalysisGamma::constant, "constant"}, {AnalysisGamma::split, "split"}, {AnalysisGamma::cylinder, "cylinder"}};
+constexpr std::pair<Smoothing, std::string_view> smoothing_names[] = {{Smoothing::automatic, "automatic"},
+                                                                      {Smoothing::none, "none"},
+                                                                      {Smoothing::savitzky_golay, "savitzky_golay"},
+                                                                      {Smoothing::low_pass, "low_pass"},
+                                                                      {Smoothing::angle_window, "angle_window"}};
+
+void require(bool holds, const char* name, double value, const std::string& bound, const char* unit = "") {
+  if (!holds) throw ParameterError(name, value, "must be " + bound, unit);
+}
+
+}  // namespace
+
+std::string_view to_string(Pegging v) noexcept {
+  return name_of<Pegging>(pegging_names, v);
+}
+std::string_view to_string(AnalysisGamma v) noexcept {
+  return name_of<AnalysisGamma>(gamma_names, v);
+}
+std::string_view to_string(Smoothing v) noexcept {
+  return name_of<Smoothing>(smoothing_names, v);
+}
+Pegging parse_pegging(std::string_view t) {
+  return parse_name<Pegging>(pegging_names, "pegging", t);
+}
+AnalysisGamma parse_analysis_gamma(std::string_view t) {
+  return parse_name<AnalysisGamma>(gamma_names, "gamma", t);
+}
+Smoothing parse_smoothing(std::string_view t) {
+  return parse_name<Smoothing>(smoothing_names, "smoothing", t);
+}
+
+void validate(const TraceOptions& o) {
+  require(o.pegging_exponent > 1.0 && o.pegging_exponent < 1.7, "pegging_exponent", o.pegging_exponent, "in (1, 1.7)");
+  require(o.pegging != Pegging::inlet || o.inlet_pressure_kpa > 0.0, "inlet_pressure_kpa", o.inlet_pressure_kpa,
+          "> 0 kPa for pegging 'inlet'");
+  for (const auto& [name, value] : {std::pair{"gamma", o.gamma}, std::pair{"gamma_compression", o.gamma_compression},
+                                    std::pair{"gamma_combustion", o.gamma_combustion}}) {
+    require(value > 1.0 && value < 1.7, name, value, "in (1, 1.7)");
+  }
+  if (o.heat_from_cad.has_value() != o.heat_to_cad.has_value()) {
+    throw ParameterError("heat_from_cad and heat_to_cad must be given together, or neither");
+  }
+  if (o.heat_from_cad) {
+    require(*o.heat_from_cad < *o.heat_to_cad, "heat_from_cad", *o.heat_from_cad, "before heat_to_cad");
+  }
+  if (o.earliest_burn_cad) {
+    require(*o.earliest_burn_cad >= -180.0 && *o.earliest_burn_cad <= 90.0, "earliest_burn_cad", *o.earliest_burn_cad,
+            "in [-180, 90] °CA aTDC; it is soi_cad or spark_cad of the trace");
+  }
+  require(o.smoothing_width_cad > 0.0 && o.smoothing_width_cad <= 30.0, "smoothing_width_cad", o.smoothing_width_cad,
+          "in (0, 30] °CA");
+  require(o.smoothing_cutoff_hz > 0.0 && o.smoothing_cutoff_hz <= 1e6, "smoothing_cutoff_hz", o.smoothing_cutoff_hz,
+          "in (0, 1e6] Hz");
+  if (o.intake_pressure_kpa) {
+    require(*o.intake_pressure_kpa > 0.0 && *o.intake_pressure_kpa <= 2000.0, "intake_pressure_kpa",
+            *o.intake_pressure_kpa, "in (0, 2000] kPa");
+  }
+  if (o.bmep_bar) {
+    require(*o.bmep_bar >= 0.0 && *o.bmep_bar <= 100.0, "bmep_bar", *o.bmep_bar,
+            "in [0, 100] bar; a torque is brake_torque_nm", "bar");
+  }
+}
+
+}  // namespace mgdd::engine

@@ -1,0 +1,192 @@
+// Warnings and refusals of the analysis: each is raised by what it names, and by nothing else.
+#include "mgdd/engine/pressure/doubts.hpp"
+
+#include <algorithm>
+#include <cmath>
+#include <functional>
+#include <random>
+#include <string>
+#include <vector>
+
+#include <gtest/gtest.h>
+
+#include "mgdd/common/error.hpp"
+#include "mgdd/engine/charge.hpp"
+#include "support/engine_case.hpp"
+
+namespace mgdd::engine {
+namespace {
+
+using test_support::EngineCase;
+
+OperatingPoint with_mass(const EngineCase& c) {
+  OperatingPoint point = c.point;
+  point.trapped_mass_g = mass_of_gas_g(run(c).charge.gas_j_per_k);
+  return point;
+}
+
+// Analysis of a simulated cycle: pressure times `factor` plus `offset_bar`, angles plus `angle_error`, noise of 0.05.
+TraceAnalysis analyze(const EngineCase& c, double offset_bar = 0.0, double angle_error = 0.0, double factor = 1.0,
+                      const TraceOptions& options = {}, unsigned seed = 4) {
+  const auto cycle = run(c);
+  std::vector<double> angle = cycle.angles(), pressure = cycle.pressures_bar();
+  std::mt19937_64 random(seed);
+  std::normal_distribution<double> noise(0.0, 0.05);
+  for (std::size_t k = 0; k < angle.size(); ++k) {
+    angle[k] += angle_error;
+    pressure[k] = factor * (pressure[k] + noise(random)) + offset_bar;
+  }
+  return analyze_trace(angle, pressure, c.cylinder, with_mass(c), options);
+}
+
+std::string kinds(const TraceAnalysis& a) {
+  std::string all;
+  for (const TraceWarning& w : a.warnings)
+    all += std::string(w.kind) + " ";
+  return all;
+}
+std::string text_of(const TraceAnalysis& a, std::string_view kind) {
+  for (const TraceWarning& w : a.warnings) {
+    if (w.kind == kind) return w.text;
+  }
+  return "";
+}
+
+const char* const engines[] = {
+    "step_cad=0.5", "step_cad=0.5 gamma_model=linear wall_heat_scale=1.2 intake_pressure_kpa=110 fuel_mg=9",
+    "step_cad=0.5 gamma=1.34 intake_pressure_kpa=240 fuel_mg=45 soc_cad=-12 wall_heat_scale=0.3"};
+
+TEST(EngineDoubts, CleanTracesRaiseNone) {
+  for (const char* settings : engines)
+    EXPECT_EQ(kinds(analyze(EngineCase(settings))), "") << settings;
+}
+
+// p + offset = C V^-n holds exactly for an adiabatic compression of constant gamma: the error comes back, reversed.
+TEST(EngineDoubts, TheFreePolytropeGivesBackTheErrorOfLevel) {
+  const EngineCase c("wall_heat_scale=0 step_cad=0.5 fuel_mg=0");
+  const auto cycle = run(c);
+  const Geometry<double> g(c.cylinder.geometry);
+  std::vector<double> p = cycle.pressures_bar(), v;
+  for (const double a : cycle.angles())
+    v.push_back(g.volume_m3(a));
+  for (const double error : {-0.25, 0.0, 0.4}) {
+    std::vector<double> q = p;
+    for (double& x : q)
+      x += error;
+    const FreePolytrope f = free_polytrope(cycle.angles(), q, v, -110.0, -30.0);
+    EXPECT_NEAR(f.offset_bar, -error, 2e-3);
+    EXPECT_NEAR(f.exponent, 1.37, 2e-3);
+  }
+  EXPECT_TRUE(std::isnan(free_polytrope(cycle.angles(), p, v, -70.0, -31.0).offset_bar));  // less than 40 CAD
+}
+
+TEST(EngineDoubts, AnErrorOfLevelOfThirtyKilopascalIsSeen) {
+  for (const char* settings : {engines[0], engines[1]}) {
+    for (const double error : {-0.3, 0.35}) {
+      EXPECT_NE(text_of(analyze(EngineCase(settings), error), "pegging"), "") << settings << error;
+    }
+  }
+}
+
+TEST(EngineDoubts, AMotoredPeakIsJudgedByTheLimitsThatTheWarningNames) {
+  const EngineCase c("fuel_mg=0 step_cad=0.5");
+  for (const double error : {-3.0, 1.0, 3.0}) {
+    const TraceAnalysis a = analyze(c, 0.0, error);
+    EXPECT_NE(text_of(a, "tdc").find("not at -1.5 to 0.1"), std::string::npos) << error;
+    EXPECT_NEAR(a.tdc_offset_cad, error, 0.7);
+  }
+  for (const double error : {-1.0, 0.0})
+    EXPECT_EQ(text_of(analyze(c, 0.0, error), "tdc"), "") << error;
+}
+
+TEST(EngineDoubts, LevelNamesTheUnitThatWouldFit) {
+  TraceOptions o;
+  o.intake_pressure_kpa = 150.0;
+  const EngineCase c("step_cad=0.5");
+  EXPECT_EQ(kinds(analyze(c, 0.0, 0.0, 1.0, o)), "");
+  const auto told = [&](double factor) {
+    const auto cycle = run(c);
+    std::vector<double> p = cycle.pressures_bar();
+    for (double& x : p)
+      x *= factor;
+    return text_of(analyze_trace(cycle.angles(), p, c.cylinder, c.point, o), "level");
+  };
+  EXPECT_NE(told(0.1).find("looks like MPa"), std::string::npos);
+  EXPECT_NE(told(4.0).find("no common unit"), std::string::npos);
+  EXPECT_EQ(told(1.4), "");
+  o.intake_pressure_kpa = 30.0;
+  o.intake_factor = 1.5;
+  EXPECT_NE(told(4.3).find("but the stated intake pressure is 0.3 bar: the trace looks like psi"), std::string::npos);
+  o.intake_pressure_kpa.reset();
+  EXPECT_NE(told(0.1).find("outside 0.2..8 bar"), std::string::npos);
+  const EngineCase low("step_cad=0.5 fuel_mg=1 intake_pressure_kpa=100 compression_ratio=9");
+  o.intake_pressure_kpa = 100.0;
+  const auto cycle = run(low);
+  std::vector<double> psi = cycle.pressures_bar();
+  for (double& x : psi)
+    x *= 14.504;
+  EXPECT_NE(text_of(analyze_trace(cycle.angles(), psi, low.cylinder, low.point, o), "level").find("psi"),
+            std::string::npos);
+}
+
+TEST(EngineDoubts, AMassInAnotherUnitIsRefusedByName) {
+  const EngineCase c("step_cad=0.5");
+  const auto cycle = run(c);
+  const double right = *with_mass(c).trapped_mass_g;
+  const auto with = [&](double mass) {
+    OperatingPoint point = c.point;
+    point.trapped_mass_g = mass;
+    return analyze_trace(cycle.angles(), cycle.pressures_bar(), c.cylinder, point, {});
+  };
+  for (const auto& [factor, unit] : {std::pair{1e-3, "not kg"}, std::pair{1e3, "not mg"}}) {
+    try {
+      with(right * factor);
+      FAIL() << factor;
+    } catch (const ParameterError& error) {
+      EXPECT_EQ(error.field, "trapped_mass_g");
+      EXPECT_NE(std::string(error.what()).find(unit), std::string::npos) << error.what();
+    }
+  }
+  EXPECT_EQ(kinds(with(right)), "");
+  EXPECT_NE(text_of(with(right * 1.5), "mass").find("at IVC is 225"), std::string::npos);  // 337 K / 1.5
+  EXPECT_NE(text_of(with(right / 1.5), "mass"), "");
+}
+
+// Gross IMEP of the simulation lies between the closed one and the bound on what is open.
+TEST(EngineDoubts, TheOpenPartIsBoundedFromAbove) {
+  for (const char* settings : engines) {
+    const EngineCase c(settings);
+    const auto cycle = run(c);
+    const auto a = analyze_trace(cycle.angles(), cycle.pressures_bar(), c.cylinder, with_mass(c), {});
+    const double open = cycle.indicators.imep_gross_bar - cycle.indicators.imep_closed_bar;
+    EXPECT_GT(open_part_at_most_bar(a, c.cylinder), open) << settings;
+    EXPECT_LT(open_part_at_most_bar(a, c.cylinder), open + 0.6) << settings;
+  }
+}
+
+TEST(EngineDoubts, ABrakeWorkAboveTheGasIsRefused) {
+  const EngineCase c("step_cad=0.5");
+  TraceOptions o;
+  o.bmep_bar = 9.0;  // of 9.6 gross
+  EXPECT_EQ(kinds(analyze(c, 0.0, 0.0, 1.0, o)), "");
+  o.bmep_bar = 10.5;
+  try {
+    analyze(c, 0.0, 0.0, 1.0, o);
+    FAIL();
+  } catch (const DataError& error) {
+    EXPECT_EQ(error.field, "bmep_bar");
+    EXPECT_NE(std::string(error.what()).find("below bmep_bar = 10.5"), std::string::npos) << error.what();
+    EXPECT_NE(std::string(error.what()).find("closed IMEP is"), std::string::npos) << error.what();
+  }
+}
+
+TEST(EngineDoubts, ACa50ThatHangsOnItsWindowIsNamed) {
+  TraceOptions o;
+  o.heat_from_cad = -20.0;
+  o.heat_to_cad = 10.0;  // in the middle of the burn, which ends at 24
+  EXPECT_NE(text_of(analyze(EngineCase("step_cad=0.5"), 0.0, 0.0, 1.0, o), "window_sensitivity").find("CA50 moves by"),
+            std::string::npos);
+}
+
+}  // namespace
+}  // namespace mgdd::engine

@@ -1,0 +1,103 @@
+"""`mgdd engine analyze`: window, smoothing, brake work, and files of several cycles."""
+
+from __future__ import annotations
+
+import json
+from pathlib import Path
+
+import numpy as np
+import pytest
+import xarray as xr
+
+from mgdd import datasets, io
+from mgdd.cli import main
+from mgdd.engine import Cylinder, OperatingPoint, analyze, simulate
+
+HD = ("--preset", "hd_diesel_128x144")
+
+
+@pytest.fixture(scope="module")
+def file(tmp_path_factory: pytest.TempPathFactory) -> str:
+    path = tmp_path_factory.mktemp("trace") / "a50.csv"
+    io.write_pressure(datasets.load("hd_diesel_128x144")[1], path)
+    return str(path)
+
+
+def run_json(capsys: pytest.CaptureFixture[str], *argv: str) -> dict[str, object]:
+    code = main(["engine", "analyze", *argv, "--json"])
+    captured = capsys.readouterr()
+    assert code == 0, captured.err
+    return json.loads(captured.out)
+
+
+def refused(capsys: pytest.CaptureFixture[str], *argv: str) -> str:
+    assert main(["engine", "analyze", *argv]) == 2
+    return capsys.readouterr().err
+
+
+def test_the_payload_says_how_it_was_computed(file: str, capsys: pytest.CaptureFixture[str]) -> None:
+    out = run_json(capsys, file, *HD)
+    assert out["heat_window"] == "found"
+    assert out["smoothing"] == "none"
+    assert out["mass_source"] == "p, V, T at IVC with T = 353 K, the intake temperature + 40 K"
+    assert out["trapped_mass_g"] == pytest.approx(4.13863, rel=0.03)
+    assert out["motored"] == 0
+    assert out["tdc_offset_cad"] is None
+    assert out["warnings"] == []
+    given = run_json(capsys, file, *HD, "--heat-window-cad", "-10", "90", "--smoothing", "savitzky_golay")
+    assert given["heat_window"] == "given"
+    assert (given["heat_from_cad"], given["heat_to_cad"]) == (-10.0, 90.0)
+    assert given["smoothing"] == "savitzky_golay over 4 °CA (5 samples)"
+    assert given["imep_closed_bar"] == out["imep_closed_bar"]
+
+
+def test_a_stated_intake_pressure_is_judged(file: str, capsys: pytest.CaptureFixture[str]) -> None:
+    (line,) = run_json(capsys, file, *HD, "--intake-pressure-kpa", "100")["warnings"]
+    assert "the stated intake pressure is 1 bar" in line
+    assert run_json(capsys, file, *HD, "--intake-pressure-kpa", "230")["warnings"] == []
+
+
+def test_brake_work_beyond_the_gas_is_refused(file: str, capsys: pytest.CaptureFixture[str]) -> None:
+    assert run_json(capsys, file, *HD, "--bmep-bar", "12.5")["warnings"] == []  # closed IMEP is 13.7 bar
+    assert "below bmep_bar = 16" in refused(capsys, file, *HD, "--bmep-bar", "16")
+    # Six cylinders of 1.853 L at 16 bar: p V/(4 pi) = 1415.6 N m.
+    assert "below bmep_bar = 16" in refused(capsys, file, *HD, "--brake-torque-nm", "1415.6", "--cylinders", "6")
+
+
+@pytest.mark.parametrize(
+    ("argv", "words"),
+    [
+        (["--smoothing", "low_pass", "--smoothing-width-cad", "3"], "savitzky_golay or angle_window"),
+        (["--smoothing-cutoff-hz", "2000"], "--smoothing low_pass"),
+        (["--cylinders", "4"], "--brake-torque-nm"),
+        (["--smoothing", "savitzky_golay", "--smoothing-width-cad", "2"], "take 4 or more"),
+    ],
+)
+def test_options_that_cannot_act_are_refused(
+    argv: list[str], words: str, file: str, capsys: pytest.CaptureFixture[str]
+) -> None:
+    assert words in refused(capsys, file, *HD, *argv)
+
+
+def test_a_file_of_cycles_adds_their_scatter(
+    monkeypatch: pytest.MonkeyPatch, tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    cycles = [simulate(Cylinder(), OperatingPoint(), soc_cad=soc) for soc in (-9.0, -6.0, -5.0, 1.0)]
+    record = xr.Dataset(
+        {"pressure_bar": (("cycle", "crank_angle_cad"), np.stack([c.pressure_bar.values for c in cycles]))},
+        coords={"cycle": np.arange(1, 5), "crank_angle_cad": cycles[0].crank_angle_cad.values},
+    )
+    monkeypatch.setattr("mgdd.cli.engine.traces_of", lambda _: [record])
+    table = tmp_path / "figures.csv"
+    out = run_json(capsys, "record.csv", "--preset", "puma_single", "-o", str(table))
+    direct = analyze(record, Cylinder(), point=OperatingPoint())
+    assert out["cycles"] == 4
+    assert out["ca50_cad"] == float(direct.mean_ca50_cad)
+    assert out["std_ca50_cad"] == pytest.approx(np.std(direct.ca50_cad.values, ddof=1))
+    assert out["cov_imep_closed_bar_percent"] == float(direct.cov_imep_closed_bar_percent)
+    assert out["cycle_mean_ca50_cad"] != out["ca50_cad"]
+    assert "mean_ca50_cad" not in out
+    rows = table.read_text().splitlines()
+    assert rows[0].startswith("cycle,")
+    assert "imep_closed_bar" in rows[0]
+    assert len(rows) == 5
