@@ -262,7 +262,7 @@ def test_a_burn_starts_at_the_earliest_at_its_injection_or_spark():
     assert [load.soc_cad for load in fit.loads] == [soc + 1.0 for _, soc in LOADS]
     held = next(finding for finding in fit.findings if finding.code == "early_onset")
     assert "held at the injection" in held.text
-    spark = [late[0].drop_attrs().assign_attrs(file="14 mg", spark_cad=-7.0), plant()[1]]
+    spark = [plant()[0].assign_attrs(spark_cad=-7.0), plant()[1]]
     assert [load.soc_cad for load in fit_cylinder(spark, START).loads] == pytest.approx([-5.0, -9.0], abs=1e-5)
     one = fit_cylinder(late, START, bounds={"soc_cad[14 mg]": (None, None)})
     assert one.loads[0].soc_cad < LOADS[0][1] + 1.0 - 1e-3

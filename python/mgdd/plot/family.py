@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
@@ -14,14 +14,12 @@ if TYPE_CHECKING:
     from matplotlib.axes import Axes
     from matplotlib.figure import Figure
 
-    from mgdd.identify.engine.best_timing import BestTiming
-
 __all__ = ["family_strip", "family_strips"]
 
 _LABEL = "best CA50, no pressure limit [°CA aTDC]"
 
 
-def family_strip(timing: BestTiming, *, ax: Axes | None = None) -> Axes:
+def family_strip(timing: Any, *, ax: Axes | None = None) -> Axes:
     """Draw each member's best CA50 without a pressure limit, one row per member.
 
     Parameters
@@ -79,7 +77,7 @@ def family_strip(timing: BestTiming, *, ax: Axes | None = None) -> Axes:
     return ax
 
 
-def family_strips(rows: Sequence[BestTiming]) -> Figure:
+def family_strips(rows: Sequence[Any]) -> Figure:
     """Draw one strip per load, side by side over one list of members."""
     from matplotlib.figure import Figure
 

@@ -97,7 +97,7 @@ def measured_sections(s: Mapping[str, Any], figures: Mapping[str, Figure]) -> tu
         Section(title=f"Calibrated burn ({s['law']})", table=_per_trace(s["traces"], "calibrated", _BURN)),
         Section(
             title="Analysis of the measured traces",
-            text=("Net heat release with gamma 1.33 from -10 CAD on; the trace is taken as absolute.",),
+            text=("Net heat release with gamma 1.33 in the window found from each trace, which is taken as absolute.",),
             table=_per_trace(s["traces"], "analysis", _ANALYSIS),
         ),
         *((Section(title="Figures", figures=figures),) if figures else ()),

@@ -48,15 +48,16 @@ struct Problem {
 
   explicit Problem(BurnShape shape)
       : traces(two()),
-        residual(traces, cylinder(shape), starts(), common(), {0, 1, 2, 3, 4, 5, 6, 7}, 0.5,
+        residual(traces, cylinder(shape), starts(), common(), {0, 1, 2, 3, 4, 5, 6, 7, 8}, 0.5,
                  engine::Integrator::trapezoid) {
     x.resize(residual.n_parameters());
     x[0] = 1.38;  // fields come in the order of the record: gamma before the wall heat
     x[1] = 0.6;
     for (Index t = 0; t < 2; ++t) {
       const LoadBurn b = starts()[static_cast<std::size_t>(t)];
-      x.segment(2 + 8 * t, 8) << b.soc_cad, b.burn_duration_cad, b.fuel_heat_j, b.wiebe_m, b.second_fraction,
-          b.second_delay_cad, b.second_duration_cad, b.second_wiebe_m;
+      x.segment(2 + 9 * t, 9) << b.soc_cad, b.burn_duration_cad, b.fuel_heat_j, b.wiebe_m, b.second_fraction,
+          b.second_delay_cad, b.second_duration_cad, b.second_wiebe_m,
+          1.07 * traces[static_cast<std::size_t>(t)].pressure_bar.front();
     }
   }
   static std::vector<MeasuredCycle> two() {
@@ -75,7 +76,7 @@ TEST(IdentifyResidual, JacobianAgreesWithDifferences) {
     Problem p(shape);
     const Index n = p.residual.n_residuals(), m = p.residual.n_parameters();
     ASSERT_EQ(n, 2 * 267);
-    ASSERT_EQ(m, 2 + 2 * 8);
+    ASSERT_EQ(m, 2 + 2 * 9);
     VectorXd r(n), moved(n);
     MatrixXd jacobian(n, m);
     ASSERT_TRUE(p.residual(p.x, r, &jacobian));
@@ -93,7 +94,7 @@ TEST(IdentifyResidual, JacobianAgreesWithDifferences) {
       const double scale = std::max(jacobian.col(j).cwiseAbs().maxCoeff(), 1e-3 / std::abs(p.x[j]));
       EXPECT_LT((slope - jacobian.col(j)).cwiseAbs().maxCoeff(), 1e-6 * scale) << j;
     }
-    EXPECT_EQ(jacobian.block(267, 2, 267, 8).cwiseAbs().maxCoeff(), 0.0);  // a load does not touch the other trace
+    EXPECT_EQ(jacobian.block(267, 2, 267, 9).cwiseAbs().maxCoeff(), 0.0);  // a load does not touch the other trace
   }
 }
 
@@ -108,7 +109,9 @@ TEST(IdentifyResidual, IsModelMinusMeasuredOverPeak) {
       const double expected = (model[k] - p.traces[t].pressure_bar[k]) / p.residual.p_max_bar(t);
       EXPECT_NEAR(r[static_cast<Index>(t * 267 + k)], expected, 1e-14);
     }
-    EXPECT_EQ(r[static_cast<Index>(t * 267)], 0.0);  // the first sample is p(IVC)
+    const double first = p.traces[t].pressure_bar.front();  // the start pressure is 7 % above it
+    EXPECT_NEAR(r[static_cast<Index>(t * 267)], 0.07 * first / p.residual.p_max_bar(t), 1e-15);
+    EXPECT_EQ(p.residual.start(t).start_pressure_bar, first);  // where none is given
   }
   EXPECT_EQ(p.residual.cylinder(p.x).wall_heat.wall_heat_scale, 0.6);
   EXPECT_EQ(p.residual.burn(1, p.x).fuel_heat_j, 5000.0);

@@ -242,22 +242,18 @@ LoadBurn estimate_burn(const MeasuredCycle& trace, const engine::Cylinder& cylin
 }
 
 CylinderFit fit_cylinder(const std::vector<MeasuredCycle>& traces, const engine::Cylinder& cylinder,
-                         const std::vector<LoadBurn>& given, const std::vector<std::string>& free,
+                         const std::vector<LoadBurn>& start, const std::vector<std::string>& free,
                          const CylinderFitOptions& options) {
-  check_inputs(traces, cylinder, given, options);
-  std::vector<LoadBurn> start = given;
-  for (std::size_t t = 0; t < traces.size(); ++t) {
-    if (start[t].start_pressure_bar == 0.0) start[t].start_pressure_bar = traces[t].pressure_bar.front();
-  }
+  check_inputs(traces, cylinder, start, options);
   const Free chosen = resolve(free);
   CylinderResidual residual(traces, cylinder, start, chosen.common, chosen.load, options.step_cad, options.integrator);
   Eigen::VectorXd x(residual.n_parameters());
   Eigen::Index i = 0;
   for (const std::size_t k : chosen.common)
     x[i++] = engine::cylinder_fields<double>()[k].in(cylinder);
-  for (const LoadBurn& burn : start) {
+  for (std::size_t t = 0; t < traces.size(); ++t) {
     for (const std::size_t k : chosen.load)
-      x[i++] = load_fields<double>()[k].in(burn);
+      x[i++] = load_fields<double>()[k].in(residual.start(t));
   }
   std::vector<optimize::Parameter> parameters = describe(chosen, traces);
   narrow(parameters, options.bounds);

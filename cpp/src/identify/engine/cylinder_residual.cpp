@@ -27,7 +27,9 @@ CylinderResidual::CylinderResidual(const std::vector<MeasuredCycle>& traces, con
                                    std::vector<LoadBurn> start, std::vector<std::size_t> common,
                                    std::vector<std::size_t> load, double step_cad, engine::Integrator integrator)
     : base_(cylinder), start_(std::move(start)), common_(std::move(common)), load_(std::move(load)) {
-  for (const MeasuredCycle& trace : traces) {
+  for (std::size_t t = 0; t < traces.size(); ++t) {
+    const MeasuredCycle& trace = traces[t];
+    if (start_[t].start_pressure_bar == 0.0) start_[t].start_pressure_bar = trace.pressure_bar.front();
     std::vector<double> grid;
     std::vector<std::size_t> sample;
     for (std::size_t k = 0; k < trace.angle_cad.size(); ++k) {

@@ -77,11 +77,9 @@ class Request:
         chosen = None if free is None else (free,) if isinstance(free, str) else tuple(free)
         heats = _known_heats(given, cylinder, fuel_heat_j, chosen)
         noisy = any(_scatter_of_start(trace, cylinder) > _NOISY_START for trace in given)
-        names = chosen or tuple(
-            name
-            for name in (*default_free(cylinder), *(("start_pressure_bar",) if noisy else ()))
-            if name != "fuel_heat_j" or not _all_known(heats)
-        )
+        default = (*default_free(cylinder), *(("start_pressure_bar",) if noisy else ()))
+        known = _all_known(heats)
+        names = chosen if chosen is not None else tuple(n for n in default if n != "fuel_heat_j" or not known)
         names = tuple(GAMMA_PARAMETER[cylinder.gamma_model] if name == "gamma" else name for name in names)
         if start_values is not None and len(start_values) != len(given):
             raise ParameterError(f"start_values has {len(start_values)} entries for {len(given)} traces")

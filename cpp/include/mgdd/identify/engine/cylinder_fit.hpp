@@ -17,8 +17,9 @@
 
 namespace mgdd::identify {
 
-/// One measured closed cycle with its conditions. The cycle starts at the first sample, with its pressure unless that is
-/// freed; the trapped amount is that of `engine::measured_gas_j_per_k`. Fuel and intake pressure of `point` are not used.
+/// One measured closed cycle with its conditions. The cycle starts at the first sample, with its pressure unless that
+/// is freed; the trapped amount is that of `engine::measured_gas_j_per_k`. Fuel and intake pressure of `point` are not
+/// used.
 struct MeasuredCycle {
   std::string label;
   std::vector<double> angle_cad;

@@ -31,6 +31,9 @@ class CylinderResidual {
   LoadBurn burn(std::size_t trace, const Eigen::VectorXd& x) const noexcept;
   engine::Cylinder cylinder(const Eigen::VectorXd& x) const noexcept;
 
+  /// Burn of a load before the search, with the measured start pressure where none was given.
+  const LoadBurn& start(std::size_t trace) const noexcept { return start_[trace]; }
+
   /// Measured highest sample [bar] that scales the residual of a trace.
   double p_max_bar(std::size_t trace) const noexcept { return loads_[trace].p_max_bar; }
 
