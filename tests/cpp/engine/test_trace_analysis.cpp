@@ -45,7 +45,12 @@ TEST(EngineTrace, AnalysisInvertsTheSimulation) {
     const TraceAnalysis a = analyze(c, whole(soc));
     EXPECT_NEAR(a.heat_gross_cumulative_j.back() / 856.0, 1.0, 1e-9);
     EXPECT_NEAR(a.heat_net_cumulative_j.back() + run(c).indicators.heat_loss_j, 856.0, 1e-9 * 856.0);
+    // A triangle over 30 CAD has burned a tenth after sqrt(0.05) and nine tenths after 1 - sqrt(0.05) of it.
+    EXPECT_NEAR(a.ca10_cad, soc + 30.0 * std::sqrt(0.05), 0.1);
     EXPECT_NEAR(a.ca50_cad, soc + 15.0, 0.1);
+    EXPECT_NEAR(a.ca90_cad, soc + 30.0 * (1.0 - std::sqrt(0.05)), 0.1);
+    EXPECT_NEAR(a.p_max_bar, run(c).indicators.p_max_bar, 1e-9);  // vertex of the same parabola
+    EXPECT_NEAR(a.p_max_cad, run(c).indicators.p_max_cad, 1e-9);
     EXPECT_NEAR(a.work_closed_j, run(c).indicators.work_closed_j, 1e-9);
   }
 }

@@ -56,6 +56,12 @@ TEST(EngineTraceCheck, NamesPlaceValueAndRemedy) {
   t.angle.erase(t.angle.begin() + 50, t.angle.begin() + 55);
   t.pressure.erase(t.pressure.begin() + 50, t.pressure.begin() + 55);
   expect_refusal<DataError>(t, {"gap of 6", "-91", "-85"});
+  // In the middle of the trace too, where the gap itself stands in the place of the usual step.
+  t = good();
+  const auto middle = static_cast<std::ptrdiff_t>(t.angle.size() / 2);
+  t.angle.erase(t.angle.begin() + middle - 2, t.angle.begin() + middle + 3);
+  t.pressure.erase(t.pressure.begin() + middle - 2, t.pressure.begin() + middle + 3);
+  expect_refusal<DataError>(t, {"gap of 6", "usual step is 1"});
   for (const auto& [factor, unit] : {std::pair{1e5, "Pa"}, std::pair{100.0, "kPa"}}) {
     t = good();
     for (double& p : t.pressure) {

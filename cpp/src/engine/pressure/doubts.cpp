@@ -132,7 +132,7 @@ void doubt_window(TraceAnalysis& a, const TraceOptions& o, const BurnWindow& bur
     a.warnings.push_back(
         {"early_burn", "heat release begins at " + shown(burn.unbounded_start_cad) +
                            " °CA aTDC, before the stated injection or spark at " + shown(*o.earliest_burn_cad) +
-                           ": angles are °CA aTDC, negative before TDC; correct soi_cad or spark_cad"});
+                           ": soi_cad is the first injection, a pilot too, in °CA aTDC, negative before TDC"});
   }
   if (burn.found && o.heat_from_cad && burn.start_cad < a.heat_from_cad - burn_rate_half_cad) {
     a.warnings.push_back({"window", "heat release has begun at " + shown(burn.start_cad) +
