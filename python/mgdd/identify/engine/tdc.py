@@ -246,7 +246,12 @@ def _of_fired(request: Request, span_cad: float, progress: Callable[[str], None]
 def _best_at(request: Request, offset: float, known: dict[float, CylinderFit]) -> CylinderFit:
     """Fit at one offset, from the heat release and from the neighbour that is fitted: the better of both."""
     moved = request.shifted(angle_cad=offset)
-    found = [fit_request(moved)]
+    found = []
+    try:
+        found.append(fit_request(moved))
+    except DataError:  # a wrong angle may leave no heat release to start from; the neighbour has a burn
+        if not known:
+            raise
     if known:
         near = known[min(known, key=lambda other: abs(other - offset))]
         found.append(fit_request(replace(moved, cylinder=near.model, start_values=starts_of(near))))

@@ -1,0 +1,228 @@
+"""Measure which faults of a pressure file are found or doubted: the table of docs/validation.md.
+
+Each case puts one fault into simulated traces of both engine presets and asks whether the answer is right, or whether
+an error or a doubt names the cause. Run: python tools/measure_trace_faults.py [--cycles N] [--only NAME]
+"""
+
+from __future__ import annotations
+
+import argparse
+import logging
+import re
+import tempfile
+from pathlib import Path
+
+import numpy as np
+from measure_trace_analysis import NOISE_BAR, draw_cycle
+
+from mgdd import errors, presets
+from mgdd.engine import OperatingPoint, analyze, simulate
+from mgdd.identify import estimate_tdc
+from mgdd.io import pressure_trace, read_pressure
+
+LEVEL = r"level|pegging|offset of the pressure"
+TDC = r"TDC|top dead centre"
+MASS = r"mass|temperature"
+UNIT = r"MPa|psi|kPa|unit"
+
+
+def trace_of(random, cycle, *, angle_cad=0.0, level_bar=0.0, noise_bar=NOISE_BAR, mass=1.0):
+    """Give a simulated cycle as a measured one, with errors."""
+    noise = noise_bar * random.standard_normal(cycle.sizes["crank_angle_cad"])
+    made = pressure_trace(cycle.crank_angle_cad.values + angle_cad, cycle.pressure_bar.values + noise + level_bar)
+    said = {"speed_rpm": cycle.attrs["speed_rpm"], "trapped_mass_g": cycle.attrs["trapped_mass_g"] * mass}
+    return made.assign_attrs(said)
+
+
+def outcome(call, is_right, cause):
+    """Return right, found (an error or a doubt names the cause), other (another doubt), or silent (wrong, no word)."""
+    try:
+        result = call()
+    except errors.Error as error:
+        return "found" if re.search(cause, str(error)) else "other"
+    except Exception:
+        return "other"
+    doubts = str(getattr(result, "attrs", {}).get("warnings", ""))
+    if is_right(result):
+        return "right" if not doubts else "other"
+    return "found" if re.search(cause, doubts) else "other" if doubts else "silent"
+
+
+def never(_):
+    """Return that no figure of a faulty trace is right."""
+    return False
+
+
+def errored(random, cause, *, motored=False, **error):
+    """Analyse a cycle with an error of level, angle or mass."""
+    cylinder, point, cycle = draw_cycle(random, motored=motored)
+    trace = trace_of(random, cycle, **error)
+    return outcome(lambda: analyze(trace, cylinder, point=point, quiet=True), never, cause)
+
+
+def clean(random, *, motored=False):
+    """Analyse a clean cycle: a doubt is a false one."""
+    cylinder, point, cycle = draw_cycle(random, motored=motored)
+    trace = trace_of(random, cycle)
+    return outcome(lambda: analyze(trace, cylinder, point=point, quiet=True), lambda _: True, "$^")
+
+
+def calibrated(random, angle_cad, *, motored=False):
+    """Estimate TDC of a cycle whose angles are off: found if the true offset is in the range and zero is not."""
+    cylinder, point, cycle = draw_cycle(random, motored=motored, step_cad=0.5)
+    trace = trace_of(random, cycle, angle_cad=angle_cad)
+    found = estimate_tdc([trace], cylinder, point=point, span_cad=4.0)
+    inside = found.low_cad <= -angle_cad <= found.high_cad
+    if angle_cad == 0.0:
+        return "right" if not found.suspect else "other"
+    return "found" if inside and found.suspect else "silent" if not found.suspect else "other"
+
+
+def without_mass(random):
+    """Leave the trapped mass out: the peak temperature must come within 12 %."""
+    cylinder, point, cycle = draw_cycle(random)
+    trace = trace_of(random, cycle).drop_attrs().assign_attrs(speed_rpm=cycle.attrs["speed_rpm"])
+    true = float(cycle["t_max_k"])
+    hot = analyze(trace, cylinder, point=point, quiet=True)["t_max_k"]
+    return "right" if abs(float(hot) / true - 1.0) < 0.12 else "silent"
+
+
+def early_burn(random):
+    """Burn a spark-ignition charge early, spark stated or not: CA50 within 1 CAD of that of the same analysis given the
+    true window."""
+    cylinder = presets.load("puma_single").cylinder.replace(
+        burn_shape="wiebe", compression_ratio=10.5, gamma=1.33, wall_heat_scale=random.uniform(0.5, 1.2)
+    )
+    soc = random.uniform(-40.0, -30.0)
+    point = OperatingPoint(
+        speed_rpm=1500.0, fuel_mg=18.0, intake_pressure_kpa=70.0, burn_duration_cad=random.uniform(35.0, 55.0)
+    )
+    cycle = simulate(cylinder, point, soc_cad=soc, step_cad=0.5)
+    trace = trace_of(random, cycle, noise_bar=0.02)
+    end = soc + point.burn_duration_cad + 5.0
+    true = float(analyze(trace, cylinder, point=point, heat_window_cad=(soc, end), quiet=True)["ca50_cad"])
+    call = {"point": point, "quiet": True}
+    return outcome(lambda: analyze(trace, cylinder, **call), lambda r: abs(float(r["ca50_cad"]) - true) < 1.0, "window")
+
+
+def low_load(random):
+    """Fire little: it must not be called motored."""
+    cylinder, point, _ = draw_cycle(random)
+    cold = simulate(cylinder, point.replace(fuel_mg=0.0), soc_cad=0.0)
+    heat = 1.0e2 * cylinder.swept_volume_l * random.uniform(0.5, 1.0) / 0.45  # 0.5 to 1 bar of work at 45 %
+    weak = point.replace(fuel_mg=heat / cylinder.lower_heating_value_mj_per_kg)
+    cycle = simulate(cylinder, weak, soc_cad=random.uniform(-8.0, 2.0), step_cad=0.5)
+    assert float(cycle["imep_closed_bar"]) > float(cold["imep_closed_bar"])
+    result = analyze(trace_of(random, cycle), cylinder, point=weak, quiet=True)
+    return "right" if not result.attrs["motored"] else "silent"
+
+
+def impossible_work(random):
+    """State a BMEP of 1.08 times what the cylinder gave."""
+    cylinder, point, cycle = draw_cycle(random)
+    trace = trace_of(random, cycle).assign_attrs(bmep_bar=1.08 * float(cycle["imep_gross_bar"]))
+    return outcome(lambda: analyze(trace, cylinder, point=point, quiet=True), never, "IMEP|BMEP|bmep")
+
+
+def of_file(random, write, cause, *, cycles=1, **options):
+    """Write a file, read and analyse it with what its header does not say left out."""
+    cylinder, point, cycle = draw_cycle(random, step_cad=0.5)
+    angle, pressure = cycle.crank_angle_cad.values, cycle.pressure_bar.values
+    many = np.array([pressure + NOISE_BAR * random.standard_normal(angle.size) for _ in range(cycles)])
+    true = float(np.max(pressure))
+    with tempfile.TemporaryDirectory() as folder:
+        file = Path(folder) / "bench.csv"
+        write(file, angle, many)
+
+        def right(result):
+            found = np.atleast_1d(np.asarray(result["p_max_bar"], float))
+            return found.size == cycles and bool(np.all(np.abs(found / true - 1.0) < 0.02))
+
+        return outcome(
+            lambda: analyze(read_pressure(file, **options), cylinder, point=point, quiet=True), right, cause
+        )
+
+
+def columns(head, scale=1.0, angle_of=lambda angle: angle):
+    """Return a writer of one angle column and the cycles beside it."""
+
+    def write(file, angle, many):
+        rows = np.column_stack([angle_of(angle), *(scale * many)])
+        names = ",".join([head[0], *(head[1] if len(many) == 1 else f"{head[1]}_{k + 1}" for k in range(len(many)))])
+        np.savetxt(file, rows, delimiter=",", header=names, comments="", fmt="%.6f")
+
+    return write
+
+
+def whole(angle, pressure):
+    """Close a simulated part to 720 degrees at its first pressure."""
+    step = float(np.median(np.diff(angle)))
+    full = np.arange(-360.0, 360.0, step)
+    return full, np.interp(full, angle, pressure, left=pressure[0], right=pressure[0])
+
+
+def stacked(running):
+    """Return a writer of cycles of 720 degrees one below the other, or with angles that run on."""
+
+    def write(file, angle, many):
+        parts = []
+        for k, pressure in enumerate(many):
+            full, values = whole(angle, pressure)
+            parts.append(np.column_stack([full + (720.0 * k if running else 0.0) + (360.0 if running else 0.0), values]))
+        np.savetxt(file, np.vstack(parts), delimiter=",", header="angle_deg,p_bar", comments="", fmt="%.6f")
+
+    return write
+
+
+CASES = {
+    "clean, fired": clean,
+    "clean, motored": lambda r: clean(r, motored=True),
+    **{f"pegging {x:+.1f} bar, fired": lambda r, x=x: errored(r, LEVEL, level_bar=x) for x in (-0.3, 0.3)},
+    **{
+        f"TDC {x:+.1f} CAD, motored": lambda r, x=x: errored(r, TDC, motored=True, angle_cad=x)
+        for x in (-3.0, -1.0, -0.2, 0.2, 1.0, 3.0)
+    },
+    **{f"TDC {x:+.1f} CAD, fired": lambda r, x=x: errored(r, TDC, angle_cad=x) for x in (-3.0, -1.0, 1.0, 3.0)},
+    **{
+        f"estimate_tdc {x:+.1f} CAD, motored": lambda r, x=x: calibrated(r, x, motored=True)
+        for x in (-3.0, -1.0, -0.2, 0.0, 0.2, 1.0, 3.0)
+    },
+    **{f"estimate_tdc {x:+.1f} CAD, fired": lambda r, x=x: calibrated(r, x) for x in (-3.0, -1.0, 0.0, 1.0, 3.0)},
+    "trapped mass in kg": lambda r: errored(r, MASS, mass=1e-3),
+    "trapped mass in mg": lambda r: errored(r, MASS, mass=1e3),
+    "no trapped mass": without_mass,
+    "early burn, -40 to -30": early_burn,
+    "low load, 0.5 to 1 bar": low_load,
+    "BMEP above the gross IMEP": impossible_work,
+    "60 cycle columns": lambda r: of_file(r, columns(("angle_deg", "p_bar")), "cycle|column", cycles=60),
+    "five cycles stacked": lambda r: of_file(r, stacked(False), "cycle", cycles=5),
+    "angles running to 3600": lambda r: of_file(r, stacked(True), "cycle|firing_tdc", cycles=5),
+    "MPa in the header": lambda r: of_file(r, columns(("angle_deg", "p [MPa]"), 0.1), UNIT),
+    "MPa without a word": lambda r: of_file(r, columns(("angle", "p"), 0.1), UNIT),
+    "psi without a word": lambda r: of_file(r, columns(("angle", "p"), 14.5038), UNIT),
+    "time_s": lambda r: of_file(r, columns(("time_s", "p_bar"), 1.0, lambda a: (a + 360.0) / 9000.0), "time|speed"),
+    "time_ms": lambda r: of_file(r, columns(("time_ms", "p_bar"), 1.0, lambda a: (a + 360.0) / 9.0), "time|speed"),
+}
+
+
+def main():
+    """Print one row per case: right or found, other doubts, silent."""
+    parser = argparse.ArgumentParser(description=__doc__)
+    parser.add_argument("--cycles", type=int, default=100)
+    parser.add_argument("--only", default="")
+    args = parser.parse_args()
+    logging.disable(logging.WARNING)
+    for name, case in CASES.items():
+        if args.only not in name:
+            continue
+        random = np.random.default_rng(11)
+        n = 5 * args.cycles if name == "clean, fired" else min(args.cycles, 20) if "60" in name or "_tdc" in name else args.cycles
+        counts = dict.fromkeys(("right", "found", "other", "silent"), 0)
+        for _ in range(n):
+            counts[case(random)] += 1
+        text = ", ".join(f"{word} {100.0 * count / n:.1f} %" for word, count in counts.items())
+        print(f"{name:28} {text}", flush=True)
+
+
+if __name__ == "__main__":
+    main()
