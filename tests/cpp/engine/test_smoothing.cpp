@@ -113,6 +113,8 @@ TEST(EngineSmoothing, RefusalsNameTheRemedy) {
   // Steps of 1 CAD at 1500 rpm: Nyquist is 4500 Hz, the highest cutoff 99 % of it.
   EXPECT_NE(message(grid(-90.0, 90.0, 1.0), choose(Smoothing::low_pass, 4.0, 4500.0)).find("4455] Hz"),
             std::string::npos);
+  // Steps of 0.1 CAD: 1 % of 45 kHz is the lowest.
+  EXPECT_NE(message(grid(-90.0, 90.0, 0.1), choose(Smoothing::low_pass, 4.0, 440.0)).find("[450, "), std::string::npos);
   Column uneven = grid(-90.0, 90.0, 1.0);
   uneven[30] += 0.2;
   EXPECT_NE(message(uneven, choose(Smoothing::low_pass)).find("even angles"), std::string::npos);

@@ -88,6 +88,22 @@ TEST(EngineDoubts, AnErrorOfLevelOfThirtyKilopascalIsSeen) {
   }
 }
 
+// A compression of p V^n = const has exactly this n: 1.24 and 1.43 lie outside of the limits, 1.26 and 1.41 inside.
+TEST(EngineDoubts, TheExponentOfCompressionHasTwoLimits) {
+  const Geometry<double> g{GeometryParameters<double>{}};
+  for (const auto& [exponent, doubted] :
+       {std::pair{1.24, true}, std::pair{1.26, false}, std::pair{1.41, false}, std::pair{1.43, true}}) {
+    std::vector<double> angle, pressure;
+    for (double a = -140.0; a <= 130.0; a += 1.0) {
+      angle.push_back(a);
+      pressure.push_back(1.5 * std::pow(g.volume_m3(a) / g.volume_m3(-140.0), -exponent));
+    }
+    const auto a = analyze_trace(angle, pressure, Cylinder{}, OperatingPoint{}, {});
+    EXPECT_EQ(text_of(a, "compression") != "", doubted) << exponent;
+    EXPECT_NEAR(a.n_compression, exponent, 1e-12);
+  }
+}
+
 TEST(EngineDoubts, AMotoredPeakIsJudgedByTheLimitsThatTheWarningNames) {
   const EngineCase c("fuel_mg=0 step_cad=0.5");
   for (const double error : {-3.0, 1.0, 3.0}) {
