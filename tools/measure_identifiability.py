@@ -75,7 +75,9 @@ def main():
         right = np.abs(rows[:, 1] / rows[:, 0] - 1.0) <= 0.2
         said = rows[:, 2] > 0.0
         true = f"{int((right & said).sum())} of {int(said.sum())}" if said.any() else "none"
-        print(f"{label}: identifiable in {int(said.sum())} of {n}, within 20 % {true}; all {int(right.sum())}", flush=True)
+        print(
+            f"{label}: identifiable in {int(said.sum())} of {n}, within 20 % {true}; all {int(right.sum())}", flush=True
+        )
 
 
 if __name__ == "__main__":

@@ -89,13 +89,14 @@ def without_mass(random):
 
 def early_burn(random):
     """Burn a spark-ignition charge early, spark stated or not: CA50 within 1 CAD of that of the same analysis given the
-    true window."""
+    true window.
+    """
     cylinder = presets.load("puma_single").cylinder.replace(
         burn_shape="wiebe", compression_ratio=10.5, gamma=1.33, wall_heat_scale=random.uniform(0.5, 1.2)
     )
     soc = random.uniform(-40.0, -30.0)
     point = OperatingPoint(
-        speed_rpm=1500.0, fuel_mg=18.0, intake_pressure_kpa=70.0, burn_duration_cad=random.uniform(35.0, 55.0)
+        speed_rpm=1500.0, fuel_mg=15.0, intake_pressure_kpa=70.0, burn_duration_cad=random.uniform(35.0, 55.0)
     )
     cycle = simulate(cylinder, point, soc_cad=soc, step_cad=0.5)
     trace = trace_of(random, cycle, noise_bar=0.02)
@@ -138,9 +139,7 @@ def of_file(random, write, cause, *, cycles=1, **options):
             found = np.atleast_1d(np.asarray(result["p_max_bar"], float))
             return found.size == cycles and bool(np.all(np.abs(found / true - 1.0) < 0.02))
 
-        return outcome(
-            lambda: analyze(read_pressure(file, **options), cylinder, point=point, quiet=True), right, cause
-        )
+        return outcome(lambda: analyze(read_pressure(file, **options), cylinder, point=point, quiet=True), right, cause)
 
 
 def columns(head, scale=1.0, angle_of=lambda angle: angle):
@@ -168,7 +167,9 @@ def stacked(running):
         parts = []
         for k, pressure in enumerate(many):
             full, values = whole(angle, pressure)
-            parts.append(np.column_stack([full + (720.0 * k if running else 0.0) + (360.0 if running else 0.0), values]))
+            parts.append(
+                np.column_stack([full + (720.0 * k if running else 0.0) + (360.0 if running else 0.0), values])
+            )
         np.savetxt(file, np.vstack(parts), delimiter=",", header="angle_deg,p_bar", comments="", fmt="%.6f")
 
     return write
@@ -216,7 +217,13 @@ def main():
         if args.only not in name:
             continue
         random = np.random.default_rng(11)
-        n = 5 * args.cycles if name == "clean, fired" else min(args.cycles, 20) if "60" in name or "_tdc" in name else args.cycles
+        n = (
+            5 * args.cycles
+            if name == "clean, fired"
+            else min(args.cycles, 20)
+            if "60" in name or "_tdc" in name
+            else args.cycles
+        )
         counts = dict.fromkeys(("right", "found", "other", "silent"), 0)
         for _ in range(n):
             counts[case(random)] += 1

@@ -5,7 +5,8 @@ from __future__ import annotations
 import functools
 import os
 import signal
-from collections.abc import Callable
+import sys
+from collections.abc import Callable, Iterator
 from pathlib import Path
 from typing import Any
 
@@ -28,6 +29,15 @@ def _quick_study(name: str, **options: int) -> Any:
     from mgdd.studies.registry import function_of
 
     return function_of(name)(quick=True, **options)
+
+
+@pytest.fixture(autouse=True)
+def _figures_are_closed() -> Iterator[None]:
+    """Close what a test or an example drew: one process runs hundreds of them."""
+    yield
+    pyplot = sys.modules.get("matplotlib.pyplot")
+    if pyplot is not None:
+        pyplot.close("all")
 
 
 @pytest.fixture(scope="session")

@@ -235,6 +235,50 @@ TEST(IdentifyFit, BadInputIsRefusedByNameAndChangesNothing) {
   EXPECT_THROW(fit_cylinder(plant.traces, plant.start(), start, burn_names, options), ParameterError);
 }
 
+TEST(IdentifyFit, ABoundNarrowsTheSearchOfOneTraceOrOfAll) {
+  const Plant plant;
+  const auto start = estimates(plant.traces, plant.start());
+  const auto free = with(burn_names, {"wall_heat_scale"});
+  CylinderFitOptions options;
+  options.bounds = {{"soc_cad[at 24]", -8.0, 20.0}};  // the truth is -9; the other load stays free
+  const CylinderFit one = fit_cylinder(plant.traces, plant.start(), start, free, options);
+  EXPECT_EQ(one.loads[1].burn.soc_cad, -8.0);
+  EXPECT_LT(one.loads[0].burn.soc_cad, -4.0);
+  options.bounds = {{"burn_duration_cad", 10.0, 41.0}, {"wall_heat_scale", 0.9, 1.5}};
+  const CylinderFit all = fit_cylinder(plant.traces, plant.start(), start, free, options);
+  for (const LoadFit& load : all.loads)
+    EXPECT_LE(load.burn.burn_duration_cad, 41.0);
+  EXPECT_GE(all.cylinder.wall_heat.wall_heat_scale, 0.9);
+  options.bounds = {{"burn_duration_cad", 30.0, 60.0}};  // where nothing holds, nothing changes
+  const CylinderFit wide = fit_cylinder(plant.traces, plant.start(), start, free, options);
+  EXPECT_NEAR(wide.cylinder.wall_heat.wall_heat_scale, 0.8, 1e-6);
+  for (const SearchBound& bad : {SearchBound{"wiebe_m", 0.0, 1.0}, SearchBound{"soc_cad[at 99]", 0.0, 1.0},
+                                 SearchBound{"soc_cad", 5.0, 5.0}, SearchBound{"burn_duration_cad", 200.0, 300.0}}) {
+    options.bounds = {bad};
+    EXPECT_THROW(fit_cylinder(plant.traces, plant.start(), start, free, options), ParameterError) << bad.name;
+  }
+}
+
+TEST(IdentifyFit, AFreedStartPressureUndoesTheErrorOfTheFirstSample) {
+  Plant plant;
+  std::vector<double> right;
+  double factor = 1.04;
+  for (MeasuredCycle& t : plant.traces) {
+    right.push_back(t.pressure_bar.front());
+    t.pressure_bar.front() *= factor;
+    factor = 0.97;
+  }
+  const auto start = estimates(plant.traces, plant.start());
+  const auto names = with(burn_names, {"wall_heat_scale", "start_pressure_bar"});
+  const CylinderFit found = fit_cylinder(plant.traces, plant.start(), start, names);
+  EXPECT_NEAR(found.cylinder.wall_heat.wall_heat_scale, 0.8, 1e-4);  // the wrong sample itself stays a residual
+  for (std::size_t i = 0; i < right.size(); ++i)
+    EXPECT_NEAR(found.loads[i].burn.start_pressure_bar / right[i], 1.0, 1e-4);
+  const CylinderFit held = fit_cylinder(plant.traces, plant.start(), start, with(burn_names, {"wall_heat_scale"}));
+  EXPECT_EQ(held.loads[0].burn.start_pressure_bar, plant.traces[0].pressure_bar.front());
+  EXPECT_GT(held.report.rmse, 5.0 * found.report.rmse);
+}
+
 TEST(IdentifyFit, AMotoredTraceHasNoBurnToEstimate) {
   const auto cycle = run(EngineCase("fuel_mg=0"));
   const MeasuredCycle motored{"motored", cycle.angles(), cycle.pressures_bar(), {}};

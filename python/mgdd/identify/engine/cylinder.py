@@ -64,7 +64,8 @@ def fit_cylinder(
         says it where present, and it is fitted otherwise.
     bounds : mapping of str to pair, optional
         Lower and upper bound of a free parameter, ``NAME`` for all traces or ``NAME[file]`` for one; None leaves a side
-        open. Unless said here, a burn starts at the earliest at the injection or spark of its trace.
+        open. Unless said here, a burn starts at the earliest at the injection or spark of its trace, and gamma stays in
+        1.15 to 1.45 (linear law at 300 K: 1.28 to 1.45).
     point : OperatingPoint, optional
         Conditions that a trace does not carry.
     start_values : sequence of mapping, optional

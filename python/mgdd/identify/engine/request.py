@@ -31,6 +31,8 @@ _EARLIEST = ("soi_cad", "spark_cad")
 # "gamma" names the parameter of whichever gamma law is in use.
 GAMMA_PARAMETER = {"constant": "gamma", "linear": "gamma_linear_300k", "polynomial": "gamma_polynomial_c0"}
 
+# What air and burned gas can have; the linear law must also stay above 1 in the hottest gas.
+_GAMMA_BOUNDS = {"gamma": (1.15, 1.45), "gamma_linear_300k": (1.28, 1.45), "gamma_polynomial_c0": (1.25, 1.45)}
 _START_CAD, _NOISY_START = 30.0, 0.01  # noise above this share would scale the cycle through its first sample
 
 Bounds = Mapping[str, tuple[float | None, float | None]]
@@ -135,6 +137,7 @@ class Request:
             name: (-math.inf if low is None else float(low), math.inf if high is None else float(high))
             for name, (low, high) in self.bounds.items()
         }
+        out = {name: _GAMMA_BOUNDS[name] for name in _GAMMA_BOUNDS if name in self.free} | out
         for trace, label in zip(self.traces, self.labels, strict=True):
             name = f"soc_cad[{label}]"
             earliest = earliest_burn_cad(trace)
