@@ -40,7 +40,7 @@ def outcome(call, is_right, cause):
         result = call()
     except errors.Error as error:
         return "found" if re.search(cause, str(error)) else "other"
-    except Exception:
+    except (TypeError, ValueError, IndexError):  # no error of the package: nothing that a user could use
         return "other"
     doubts = str(getattr(result, "attrs", {}).get("warnings", ""))
     if is_right(result):
@@ -88,9 +88,7 @@ def without_mass(random):
 
 
 def early_burn(random):
-    """Burn a spark-ignition charge early, spark stated or not: CA50 within 1 CAD of that of the same analysis given the
-    true window.
-    """
+    """Burn a spark-ignition charge early: CA50 within 1 CAD of that of the same analysis given the true window."""
     cylinder = presets.load("puma_single").cylinder.replace(
         burn_shape="wiebe", compression_ratio=10.5, gamma=1.33, wall_heat_scale=random.uniform(0.5, 1.2)
     )
@@ -109,11 +107,9 @@ def early_burn(random):
 def low_load(random):
     """Fire little: it must not be called motored."""
     cylinder, point, _ = draw_cycle(random)
-    cold = simulate(cylinder, point.replace(fuel_mg=0.0), soc_cad=0.0)
     heat = 1.0e2 * cylinder.swept_volume_l * random.uniform(0.5, 1.0) / 0.45  # 0.5 to 1 bar of work at 45 %
     weak = point.replace(fuel_mg=heat / cylinder.lower_heating_value_mj_per_kg)
     cycle = simulate(cylinder, weak, soc_cad=random.uniform(-8.0, 2.0), step_cad=0.5)
-    assert float(cycle["imep_closed_bar"]) > float(cold["imep_closed_bar"])
     result = analyze(trace_of(random, cycle), cylinder, point=weak, quiet=True)
     return "right" if not result.attrs["motored"] else "silent"
 

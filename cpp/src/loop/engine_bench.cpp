@@ -156,7 +156,7 @@ double EngineBench::drifted_soc_cad(double soc_cad, std::int64_t cycle) const no
 }
 
 std::array<double, max_limits> EngineBench::noise_free_limits(std::int64_t cycle, double soc_cad) noexcept {
-  std::array<double, max_limits> out;
+  std::array<double, max_limits> out{};
   out.fill(std::numeric_limits<double>::quiet_NaN());
   if (std::isnan(soc_cad)) return out;
   drift_to(cycle);

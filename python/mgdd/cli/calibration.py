@@ -192,14 +192,14 @@ def _report(
 def _loads(fit: CylinderFit) -> list[str]:
     onset = any(load.soi_cad == load.soi_cad for load in fit.loads)
     last = f" {'SOC - SOI':>10}" if onset else ""
-    form = "  {:24} {:>9} {:>13} {:>7} {:>9} {:>9} {:>7} {:>20}"
-    head = ("trace", "RMSE [%]", "IMEP err [%]", "SOC", "duration", "heat [J]", "CA50", "largest error")
+    form = "  {:24} {:>9} {:>15} {:>7} {:>9} {:>9} {:>7} {:>20}"
+    head = ("trace", "RMSE [%]", "closed IMEP [%]", "SOC", "duration", "heat [J]", "CA50", "largest error")
     out = [form.format(*head) + last]
     for load in fit.loads:
         error = f"{load.largest_error_bar:+.1f} bar at {load.largest_error_cad:.0f}"
         late = f" {load.onset_against_soi_cad:+10.1f}" if onset else ""
         out.append(
-            f"  {load.file:24} {load.rmse_percent:9.2f} {load.imep_closed_error_percent:+13.1f} {load.soc_cad:7.2f} "
+            f"  {load.file:24} {load.rmse_percent:9.2f} {load.imep_closed_error_percent:+15.1f} {load.soc_cad:7.2f} "
             f"{load.burn_duration_cad:9.1f} {load.fuel_heat_j:9.0f} {load.ca50_cad:7.1f} {error:>20}{late}"
         )
     return out

@@ -59,7 +59,7 @@ BurnWindow find_burn(const Column& angle, const Column& pressure, const Column& 
   Range compression{std::max(-100.0, first), before};
   if (compression.to - compression.from < 20.0) compression.from = first;
   const double n_compression = polytropic_exponent(angle, pressure, volume, compression.from, compression.to);
-  Range expansion{std::max(60.0, angle.back() - expansion_fit_cad), last};
+  const Range expansion{std::max(60.0, angle.back() - expansion_fit_cad), last};
   const double n_expansion = polytropic_exponent(angle, pressure, volume, expansion.from, expansion.to);
   if (!(n_compression > 1.0 && n_expansion > 1.0)) return {};
 

@@ -77,7 +77,8 @@ Smoother::Smoother(const std::vector<double>& angle, double speed_rpm, const Tra
   reach_ = reach;
   mean_ = kind == Smoothing::angle_window;
   if (!mean_ && is_even(angle, step, 1e-6)) {  // the weights are those of one unit sample after the other
-    std::vector<double> x(angle.begin(), angle.begin() + static_cast<std::ptrdiff_t>(samples)), unit(samples, 0.0);
+    const std::vector<double> x(angle.begin(), angle.begin() + static_cast<std::ptrdiff_t>(samples));
+    std::vector<double> unit(samples, 0.0);
     for (std::size_t i = 0; i < samples; ++i) {
       unit[i] = 1.0;
       weights_.push_back(parabola_at(x, unit, reach, reach));
