@@ -66,7 +66,8 @@ TEST(EngineDoubts, TheFreePolytropeGivesBackTheErrorOfLevel) {
   const EngineCase c("wall_heat_scale=0 step_cad=0.5 fuel_mg=0");
   const auto cycle = run(c);
   const Geometry<double> g(c.cylinder.geometry);
-  std::vector<double> p = cycle.pressures_bar(), v;
+  const std::vector<double> p = cycle.pressures_bar();
+  std::vector<double> v;
   for (const double a : cycle.angles())
     v.push_back(g.volume_m3(a));
   for (const double error : {-0.25, 0.0, 0.4}) {
@@ -99,7 +100,7 @@ TEST(EngineDoubts, TheExponentOfCompressionHasTwoLimits) {
       pressure.push_back(1.5 * std::pow(g.volume_m3(a) / g.volume_m3(-140.0), -exponent));
     }
     const auto a = analyze_trace(angle, pressure, Cylinder{}, OperatingPoint{}, {});
-    EXPECT_EQ(text_of(a, "compression") != "", doubted) << exponent;
+    EXPECT_EQ(!text_of(a, "compression").empty(), doubted) << exponent;
     EXPECT_NEAR(a.n_compression, exponent, 1e-12);
   }
 }
@@ -148,7 +149,7 @@ TEST(EngineDoubts, LevelNamesTheUnitThatWouldFit) {
 TEST(EngineDoubts, AMassInAnotherUnitIsRefusedByName) {
   const EngineCase c("step_cad=0.5");
   const auto cycle = run(c);
-  const double right = *with_mass(c).trapped_mass_g;
+  const double right = with_mass(c).trapped_mass_g.value();
   const auto with = [&](double mass) {
     OperatingPoint point = c.point;
     point.trapped_mass_g = mass;
