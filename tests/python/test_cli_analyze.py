@@ -7,7 +7,6 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-import xarray as xr
 
 from mgdd import datasets, io
 from mgdd.cli import main
@@ -79,18 +78,13 @@ def test_options_that_cannot_act_are_refused(
     assert words in refused(capsys, file, *HD, *argv)
 
 
-def test_a_file_of_cycles_adds_their_scatter(
-    monkeypatch: pytest.MonkeyPatch, tmp_path: Path, capsys: pytest.CaptureFixture[str]
-) -> None:
+def test_a_file_of_cycles_adds_their_scatter(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
     cycles = [simulate(Cylinder(), OperatingPoint(), soc_cad=soc) for soc in (-9.0, -6.0, -5.0, 1.0)]
-    record = xr.Dataset(
-        {"pressure_bar": (("cycle", "crank_angle_cad"), np.stack([c.pressure_bar.values for c in cycles]))},
-        coords={"cycle": np.arange(1, 5), "crank_angle_cad": cycles[0].crank_angle_cad.values},
-    )
-    monkeypatch.setattr("mgdd.cli.engine.traces_of", lambda _: [record])
-    table = tmp_path / "figures.csv"
-    out = run_json(capsys, "record.csv", "--preset", "puma_single", "-o", str(table))
-    direct = analyze(record, Cylinder(), point=OperatingPoint())
+    file, table = tmp_path / "record.csv", tmp_path / "figures.csv"
+    columns = [cycles[0].crank_angle_cad.values, *(cycle.pressure_bar.values for cycle in cycles)]
+    np.savetxt(file, np.column_stack(columns), delimiter=",", header="angle,p_1,p_2,p_3,p_4", comments="", fmt="%.17g")
+    out = run_json(capsys, str(file), "--preset", "puma_single", "-o", str(table))
+    direct = analyze(io.read_pressure(file), Cylinder(), point=OperatingPoint())
     assert out["cycles"] == 4
     assert out["ca50_cad"] == float(direct.mean_ca50_cad)
     assert out["std_ca50_cad"] == pytest.approx(np.std(direct.ca50_cad.values, ddof=1))
@@ -101,3 +95,7 @@ def test_a_file_of_cycles_adds_their_scatter(
     assert rows[0].startswith("cycle,")
     assert "imep_closed_bar" in rows[0]
     assert len(rows) == 5
+    assert main(["engine", "analyze", str(file), "--preset", "puma_single"]) == 0
+    (line,) = (row for row in capsys.readouterr().out.splitlines() if row.startswith("ca50_cad"))
+    shown = [float(word) for word in line.split()[1:3]]  # mean and standard deviation, side by side
+    assert shown == pytest.approx([out["ca50_cad"], out["std_ca50_cad"]], rel=1e-4)

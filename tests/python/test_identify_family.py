@@ -56,6 +56,7 @@ def test_the_range_of_the_plausible_models_holds_the_true_best_timing() -> None:
         true = find_optimum(TRUTH, point, "imep_closed_bar", step_cad=0.5)
         low, high = row.free_ca50_cad
         assert low < true["ca50_cad"] < high
+        assert all(answer.free_gain_percent >= -1e-9 for answer in row.members)  # of the best over the measured one
         assert row.best is not None
         assert abs(row.best.free_ca50_cad - true["ca50_cad"]) < 1.5  # the scale of 1.0 stands in for 0.85
         assert row.best.member.wall_heat_scale == 1.0

@@ -22,7 +22,7 @@ from mgdd.studies.measured_summary import law_row
 if TYPE_CHECKING:
     import xarray as xr
 
-__all__ = ["add_calibration", "calibrate", "calibration_arguments", "check_pegging", "traces_for"]
+__all__ = ["add_calibration", "add_pegging", "calibrate", "calibration_arguments", "check_pegging", "traces_for"]
 
 _TDC_SPAN_CAD = 2.0
 _PER_TRACE = (
@@ -34,12 +34,17 @@ _PER_TRACE = (
 def add_calibration(parser: argparse.ArgumentParser) -> None:
     """Add how the traces of a calibration are made absolute."""
     group = parser.add_argument_group("pressure of the traces")
-    group.add_argument("--pegging", choices=("none", "inlet", "two_point", "least_squares"), default="none")
-    group.add_argument("--pegging-exponent", type=float, metavar="X", help="default: 1.35")
-    group.add_argument("--inlet-pressure-kpa", type=float, metavar="X", help="for pegging inlet (default: the point's)")
+    add_pegging(group)
     group.add_argument(
         "--mean-cycle", action="store_true", help="calibrate to the mean of a file's cycles (one cycle is needed)"
     )
+
+
+def add_pegging(group: Any) -> None:
+    """Add how pressure is made absolute."""
+    group.add_argument("--pegging", choices=("none", "inlet", "two_point", "least_squares"), default="none")
+    group.add_argument("--pegging-exponent", type=float, metavar="X", help="default: 1.35")
+    group.add_argument("--inlet-pressure-kpa", type=float, metavar="X", help="for pegging inlet (default: the point's)")
 
 
 def traces_for(args: argparse.Namespace) -> list[xr.Dataset]:

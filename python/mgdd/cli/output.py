@@ -95,7 +95,8 @@ def lines(payload: Mapping[str, Any]) -> str:
     for name, value in payload.items():
         if isinstance(value, dict | list):
             continue
-        unit = VARIABLES[name].units if name in VARIABLES else ""
+        plain = name.removeprefix("free_")  # the same figure without the limit of p_max
+        unit = VARIABLES[plain].units if plain in VARIABLES else ""
         shown = f"{value:.6g}" if isinstance(value, float) else "–" if value is None else str(value)
         out.append(f"{name:28} {shown:>14} {'' if unit == '-' else unit}".rstrip())
     return "\n".join(out)
