@@ -15,6 +15,7 @@ from mgdd.engine import OperatingPoint, find_optimum, simulate
 from mgdd.errors import DataError, ParameterError
 from mgdd.identify import ModelFamily, best_timing, estimate_tdc
 from mgdd.identify.engine.best_timing import BestTiming
+from mgdd.identify.engine.request import Request
 from mgdd.io import pressure_trace
 from mgdd.results.labels import check_labels
 
@@ -147,6 +148,19 @@ def test_tdc_of_one_kind_of_trace_only() -> None:
         estimate_tdc([measured(*LOADS[0]), cold], PRESET.cylinder)
     with pytest.raises(ParameterError, match=r"span_cad = 20: must be 0\.5 to 10"):
         estimate_tdc([measured(*LOADS[0])], PRESET.cylinder, span_cad=20.0)
+
+
+def test_a_shift_moves_angles_pressure_and_injection_together() -> None:
+    trace = measured(*LOADS[0]).assign_attrs(spark_cad=-8.0)
+    plain = {"fuel_heat_j": None, "bounds": None, "point": None, "start_values": None, "options": None}
+    request = Request.of([trace], PRESET.cylinder, free=None, step_cad=0.5, integrator="trapezoid", **plain)
+    (moved,) = request.shifted(angle_cad=1.5, pressure_bar=-0.2).traces
+    np.testing.assert_allclose(moved["crank_angle_cad"].values, trace["crank_angle_cad"].values + 1.5)
+    np.testing.assert_allclose(moved["pressure_bar"].values, trace["pressure_bar"].values - 0.2)
+    assert moved.attrs["soi_cad"] == trace.attrs["soi_cad"] + 1.5
+    assert moved.attrs["spark_cad"] == -6.5
+    assert moved["pressure_bar"].attrs == trace["pressure_bar"].attrs
+    assert request.traces[0].attrs["spark_cad"] == -8.0
 
 
 def test_the_measured_engine_has_its_tdc_where_it_says() -> None:
