@@ -215,7 +215,9 @@ def demo() -> Rows:
     rows = {}
     for load, row in zip(_LOADS, ranges(), strict=True):
         best: Any = row.best
-        rows[load] = [best.rmse_percent, best.imep_closed_error_percent, *_answers(row)]
+        names = ("free_ca50_cad", "free_shift_cad", "free_gain_percent", "shift_cad", "gain_percent")
+        answers = [value for name in names for value in (getattr(best, name), *getattr(row, name))]
+        rows[load] = [best.rmse_percent, best.imep_closed_error_percent, *answers]
     return rows
 
 

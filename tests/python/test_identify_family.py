@@ -13,8 +13,8 @@ from matplotlib.figure import Figure
 from mgdd import datasets, presets
 from mgdd.engine import OperatingPoint, find_optimum, simulate
 from mgdd.errors import DataError, ParameterError
-from mgdd.identify import ModelFamily, best_timing, estimate_tdc
-from mgdd.identify.engine.best_timing import BestTiming
+from mgdd.identify import ModelFamily, best_timing, estimate_tdc, fit_cylinder
+from mgdd.identify.engine.best_timing import BestTiming, doubts_of
 from mgdd.identify.engine.request import Request
 from mgdd.io import pressure_trace
 from mgdd.results.labels import check_labels
@@ -105,6 +105,30 @@ def test_without_a_plausible_model_there_is_no_answer() -> None:
     assert all(math.isnan(end) for end in (*row.soc_cad, *row.free_ca50_cad, *row.gain_percent))
     assert all(answer.why_not for answer in row.members)
     assert row.to_dict()["best"] is None
+
+
+def test_an_engine_that_is_timed_far_out_is_searched_there_and_a_lost_tdc_is_doubted() -> None:
+    late = measured(*LOADS[0], tdc_cad=-34.0).drop_attrs().assign_attrs(speed_rpm=1200.0, file="lost")
+    rows = best_timing([late], PRESET.cylinder, family=FAMILY)
+    for answer in rows[0].members:
+        low, high = answer.member.fit.loads[0].soc_cad, answer.fitted_soc_cad
+        assert low == high
+        # Staying put is in the search; at the end of the simulated window half a step may be missing.
+        assert answer.free_gain_percent > -0.05 or math.isnan(answer.free_gain_percent)
+    told = " ".join(doubts_of(rows))
+    assert "no model is plausible" in told or "TDC" in told
+
+
+def test_what_was_assumed_and_what_cannot_be_is_said() -> None:
+    trace = measured(*LOADS[0])
+    silent = trace.drop_attrs().assign_attrs(file="silent", trapped_mass_g=trace.attrs["trapped_mass_g"])
+    found = {finding.code: finding for finding in fit_cylinder([silent], PRESET.cylinder).findings}
+    assert "1500 rpm are assumed" in found["assumed_speed"].text
+    assert "assumed_speed" not in {f.code for f in fit_cylinder([trace], PRESET.cylinder).findings}
+    little = {f.code: f for f in fit_cylinder([trace.assign_attrs(fuel_mg=20.0)], PRESET.cylinder).findings}
+    assert "more than the 856 J of the stated fuel" in little["fuel_too_small"].text
+    with pytest.raises(DataError, match=r"injection or spark at 40 °CA aTDC is later"):
+        fit_cylinder([trace.assign_attrs(soi_cad=40.0)], PRESET.cylinder)
 
 
 def test_a_family_is_checked() -> None:

@@ -14,8 +14,8 @@ ROOT = Path(__file__).parents[2]
 README = (ROOT / "README.md").read_text(encoding="utf-8")
 
 
-def span(pair: list[float], digits: int) -> str:
-    return f"{pair[0]:.{digits}f} to {pair[1]:.{digits}f}"
+def span(pair: list[float], form: str) -> str:
+    return f"{pair[0]:{form}} to {pair[1]:{form}}"
 
 
 def test_table_of_the_demo() -> None:
@@ -26,8 +26,14 @@ def test_table_of_the_demo() -> None:
     for load, row in zip((25, 50, 75, 100), summary["traces"], strict=True):
         best, fit = row["best_timing"], row["calibrated"]
         cells = (
-            f"{best['best'][name]:.{digits}f} ({span(best[name], digits)})"
-            for name, digits in (("ca50_cad", 1), ("gain_percent", 2), ("free_ca50_cad", 1), ("free_gain_percent", 2))
+            f"{best['best'][name]:{form}} ({span(best[name], form)})"
+            for name, form in (
+                ("free_ca50_cad", ".1f"),
+                ("free_shift_cad", "+.1f"),
+                ("free_gain_percent", ".2f"),
+                ("shift_cad", "+.1f"),
+                ("gain_percent", ".2f"),
+            )
         )
         computed.append(
             f"| {load} % | {fit['rmse_percent']:.2f} | {fit['imep_closed_error_percent']:+.1f} | {' | '.join(cells)} |"

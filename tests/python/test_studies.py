@@ -45,7 +45,7 @@ def test_the_report_says_what_to_distrust(result: StudyResult) -> None:
 
 def test_gamma_and_wall_heat_stand_in_for_each_other(result: StudyResult) -> None:
     profiles = result.summary["common"]["wall_heat_scale"]
-    held = profiles["double_wiebe, linear gamma held"]
+    held = profiles["double_wiebe, linear gamma held at 1.396"]
     free = profiles["double_wiebe, linear gamma refitted"]
     assert held["range_low"] < 0.8 * held["value"]
     assert held["range_high"] > 1.2 * held["value"]
@@ -65,12 +65,13 @@ def test_the_headline_is_plausible_and_the_range_holds_every_plausible_answer(re
         assert best["efficiency_gross"] <= 0.53
         assert best["soc_minus_soi_cad"] >= 0.0
         assert abs(best["wall_heat_scale"] - 1.0) <= 0.25
-        for name in ("soc_cad", "ca50_cad", "gain_percent", "free_soc_cad", "free_ca50_cad", "free_gain_percent"):
+        for name in ("soc_cad", "ca50_cad", "gain_percent", "free_soc_cad", "free_ca50_cad", "free_shift_cad"):
             values = [member[name] for member in kept]
             assert row[name] == [min(values), max(values)], name
         for member in members:
             assert bool(member["why_not"]) != member["plausible"]
             assert member["gain_percent"] >= -1e-9
+            assert member["shift_cad"] == pytest.approx(member["soc_cad"] - member["fitted_soc_cad"], abs=1e-12)
             assert member["gain_percent"] <= member["free_gain_percent"] + 1e-9
             assert member["soc_cad"] >= member["free_soc_cad"] - 1e-6  # a pressure limit only delays
 
@@ -134,13 +135,15 @@ def test_every_column_of_the_page_holds_what_its_head_says(result: StudyResult, 
     for head, name, digits in (
         ("best SOC, own p_max kept [°CA aTDC]", "soc_cad", 1),
         ("best CA50, own p_max kept [°CA aTDC]", "ca50_cad", 1),
+        ("move by, own p_max kept [°CA]", "shift_cad", 1),
         ("gain [%]", "gain_percent", 2),
+        ("move by, no limit [°CA]", "free_shift_cad", 1),
         ("best SOC, no limit [°CA aTDC]", "free_soc_cad", 1),
         ("best CA50, no limit [°CA aTDC]", "free_ca50_cad", 1),
         ("gain, no limit [%]", "free_gain_percent", 2),
     ):
         assert timing[head] == [f"{row['best'][name]:.{digits}f} ({span(row[name], digits)})" for row in best], head
-    assert len(timing) == 7
+    assert len(timing) == 9
     assert timing["gain [%]"] != timing["gain, no limit [%]"], "the limit costs something"
 
     family = columns(page, "Every member")

@@ -6,7 +6,7 @@ import argparse
 from typing import TYPE_CHECKING, Any
 
 from mgdd.cli.calibration import add_pegging, check_pegging
-from mgdd.cli.options import add_command, add_engine, add_files, engine_of, traces_of
+from mgdd.cli.options import add_command, add_engine, add_files, engine_of, refuse_idle, traces_of
 from mgdd.cli.output import check_output, emit, lines
 from mgdd.engine import analyze
 from mgdd.errors import ParameterError
@@ -65,8 +65,7 @@ def _analyze(args: argparse.Namespace) -> None:
     cylinder, point, preset = engine_of(args)
     check_pegging(args)
     _check_analysis(args)
-    if args.fuel_mg is not None:
-        raise ParameterError("--fuel-mg does not act on the analysis of a trace: leave it out")
+    refuse_idle(args, "fuel_mg", "burn", "burn_duration_cad", "ignition", why="an analysis takes no burn: leave it out")
     (trace,) = traces_of(args)
     gamma: float | str = 1.33 if args.gamma is None else "cylinder"
     if args.analysis_gamma is not None:

@@ -22,9 +22,17 @@ from mgdd.studies.measured_summary import law_row
 if TYPE_CHECKING:
     import xarray as xr
 
-__all__ = ["add_calibration", "add_pegging", "calibrate", "calibration_arguments", "check_pegging", "traces_for"]
+__all__ = [
+    "TDC_SPAN_CAD",
+    "add_calibration",
+    "add_pegging",
+    "calibrate",
+    "calibration_arguments",
+    "check_pegging",
+    "traces_for",
+]
 
-_TDC_SPAN_CAD = 2.0
+TDC_SPAN_CAD = 2.0
 _PER_TRACE = (
     "file p_max_bar rmse_bar rmse_percent imep_closed_error_percent soc_cad burn_duration_cad fuel_heat_j ca50_cad "
     "largest_error_bar largest_error_cad heat_loss_fraction"
@@ -88,7 +96,7 @@ def calibrate(args: argparse.Namespace) -> None:
     if "wall_heat_scale" in fit.report.names and len(fit.report.names) > 1:
         profile = wall_heat_profile(fit, progress=step)
     tdc = estimate_tdc(
-        traces, cylinder, point=point, fuel_heat_j=pegging["fuel_heat_j"], span_cad=_TDC_SPAN_CAD, progress=step
+        traces, cylinder, point=point, fuel_heat_j=pegging["fuel_heat_j"], span_cad=TDC_SPAN_CAD, progress=step
     )
     laws = compare_laws(traces, cylinder, fuel_heat_j=pegging["fuel_heat_j"], point=point, progress=step, **scheme)
     if args.report_folder:
@@ -142,18 +150,22 @@ def _payload(
             "others_cad": list(tdc.others_cad),
             "suspect": tdc.suspect,
         },
-        "warnings": [*(str(finding) for finding in fit.findings), *_doubt_of(tdc)],
+        "warnings": [*(str(finding) for finding in fit.findings), *tdc.doubts(), *_better_laws(fit, laws)],
         "cylinder": fit.model.to_dict(),
         "report": _report(fit, profile, laws, ordered, tdc),
     }
 
 
-def _doubt_of(tdc: TdcEstimate) -> list[str]:
-    if not tdc.suspect:
+def _better_laws(fit: CylinderFit, laws: list[CylinderFit]) -> list[str]:
+    """Name a law that meets the traces much better than the one that was asked for."""
+    best = min(laws, key=lambda law: law.report.rmse if law.report.rmse == law.report.rmse else float("inf"))
+    if not best.report.rmse < 0.7 * fit.report.rmse:
         return []
-    possible = f"{tdc.low_cad:+.2f} to {tdc.high_cad:+.2f}"
+    rmse, own = 100.0 * best.report.rmse, 100.0 * fit.report.rmse
     return [
-        f"the residual is least with {tdc.offset_cad:+.2f} CAD added to the angles ({possible} possible): suspect TDC"
+        f"{best.kind} meets the traces with an RMSE of {rmse:.2f} % against {own:.2f} % of {fit.kind}; "
+        "do not read burn, fuel heat or wall heat from the latter: --burn and --gamma choose the law, "
+        "mgdd engine optimum compares a family"
     ]
 
 
@@ -174,17 +186,18 @@ def _report(
         if "[" not in name and name != "wall_heat_scale":
             out.append(f"  {name} = {value:.6g} +- {error:.2g} (all traces)")
     if profile is not None:
+        error = f" +- {profile.stderr:.3f}" if profile.stderr == profile.stderr else ", at a bound"
         verdict = "identifiable" if profile.identifiable else "not identifiable from these traces"
         out += [
             "",
-            f"wall-heat scale {profile.value:.3f} +- {profile.stderr:.3f}: {verdict}",
+            f"wall-heat scale {profile.value:.3f}{error}: {verdict}",
             f"  strongest correlation {profile.correlation:+.2f}, with {profile.correlated_with}",
             *(f"  {reason}" for reason in profile.reasons),
         ]
     if unidentifiable:
         out += ["", f"not identifiable: {', '.join(unidentifiable)}"]
     out += ["", f"TDC offset {tdc.offset_cad:+.2f} CAD, {tdc.low_cad:+.2f} to {tdc.high_cad:+.2f} possible"]
-    doubts = [*map(str, fit.findings), *_doubt_of(tdc)]
+    doubts = [*map(str, fit.findings), *tdc.doubts(), *_better_laws(fit, laws)]
     if doubts:
         out += ["", "what to distrust:", *(f"  - {text}" for text in doubts)]
     out += ["", "every burn law on the same traces:"]

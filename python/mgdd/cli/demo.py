@@ -30,7 +30,7 @@ def add(commands: Any) -> None:
 def run(args: argparse.Namespace) -> None:
     """Run the study and write the report."""
     check_output(args)
-    step = args.progress.expect(90)
+    step = args.progress.expect(120)
     result = run_study("measured-traces", progress=step)
     step("write the report")
     page = write_report(result, Path(args.folder))
@@ -39,17 +39,17 @@ def run(args: argparse.Namespace) -> None:
 
 def _text(summary: Any, page: Path) -> list[str | Table]:
     columns = (
-        "trace", "p_max [bar]", "CA50 [CAD]", "RMSE [%]", "closed IMEP err [%]", "best CA50, own p_max kept [CAD]",
-        "gain [%]", "best CA50, no limit [CAD]", "gain [%]",
+        "trace", "RMSE [%]", "closed IMEP err [%]", "best CA50, no limit [CAD]", "move by [CAD]", "gain [%]",
+        "own p_max kept: move by [CAD]", "gain [%]",
     )  # fmt: skip
     rows = []
     for row in summary["traces"]:
         best, fit = row["best_timing"], row["calibrated"]
         rows.append(
             (
-                row["file"], f"{row['analysis']['p_max_bar']:.1f}", f"{row['analysis']['ca50_cad']:.1f}",
-                f"{fit['rmse_percent']:.2f}", f"{fit['imep_closed_error_percent']:+.1f}", _span(best, "ca50_cad", 1),
-                _span(best, "gain_percent", 2), _span(best, "free_ca50_cad", 1), _span(best, "free_gain_percent", 2),
+                row["file"], f"{fit['rmse_percent']:.2f}", f"{fit['imep_closed_error_percent']:+.1f}",
+                _span(best, "free_ca50_cad", 1), _span(best, "free_shift_cad", 1), _span(best, "free_gain_percent", 2),
+                _span(best, "shift_cad", 1), _span(best, "gain_percent", 2),
             )
         )  # fmt: skip
     members = summary["best_timing"][0]["members"]
@@ -61,8 +61,9 @@ def _text(summary: Any, page: Path) -> list[str | Table]:
         ),
         Table(columns=columns, rows=tuple(rows)),
         (
-            f"\nFirst number: the headline model, {summary['law']}. In brackets: the range over all plausible models;\n"
-            "wall heat and gamma stand in for each other in these traces, so one best timing would be false precision."
+            f"\nFirst number: the headline model, {summary['law']}. In brackets: the range over all plausible ones;\n"
+            "wall heat and gamma stand in for each other here, so one best timing would be false precision.\n"
+            "Positive moves are later."
         ),
         f"Every model's answer, and what to distrust: {page}",
     ]
@@ -72,4 +73,7 @@ def _span(best: Any, name: str, digits: int) -> str:
     if best["best"] is None:
         return "not known: no plausible model"
     low, high = best[name]
-    return f"{best['best'][name]:.{digits}f} ({low:.{digits}f} to {high:.{digits}f})"
+    own = best["best"][name]
+    if name.endswith("shift_cad"):
+        return f"{own:+.{digits}f} ({low:+.{digits}f} to {high:+.{digits}f})"
+    return f"{own:.{digits}f} ({low:.{digits}f} to {high:.{digits}f})"

@@ -9,7 +9,7 @@ from typing import Any
 from mgdd import _core
 from mgdd._core.engine import Cylinder, OperatingPoint
 from mgdd.cli.analyze import add_analyze
-from mgdd.cli.calibration import add_calibration, calibrate, calibration_arguments, traces_for
+from mgdd.cli.calibration import TDC_SPAN_CAD, add_calibration, calibrate, calibration_arguments, traces_for
 from mgdd.cli.options import (
     add_command,
     add_engine,
@@ -18,18 +18,19 @@ from mgdd.cli.options import (
     add_scheme,
     engine_of,
     number_pairs,
+    refuse_idle,
 )
 from mgdd.cli.output import check_output, emit, lines
 from mgdd.cli.seek import add_seek
 from mgdd.engine import find_optimum, ignition_delay, simulate, timing_sweep
 from mgdd.errors import ConvergenceError, ParameterError
-from mgdd.identify import best_timing
-from mgdd.identify.engine.best_timing import headline_of
+from mgdd.identify import best_timing, estimate_tdc
+from mgdd.identify.engine.best_timing import BestTiming, MemberTiming, doubts_of, headline_of
 
 __all__ = ["add"]
 
 _DEFAULT_SOC_CAD = -6.0
-_RANGED = ("soc_cad", "ca50_cad", "gain_percent", "free_soc_cad", "free_ca50_cad", "free_gain_percent")
+_RANGED = ("soc_cad", "ca50_cad", "shift_cad", "gain_percent")
 
 
 def add(commands: Any) -> None:
@@ -177,6 +178,7 @@ def _optimum(args: argparse.Namespace) -> None:
 def _optimum_of_files(
     args: argparse.Namespace, cylinder: Cylinder, point: OperatingPoint, limits: dict[str, float], preset: str
 ) -> None:
+    refuse_idle(args, "burn", "burn_duration_cad", why="the family tries its own burn laws: leave it out")
     traces = traces_for(args)
     rows = best_timing(
         traces,
@@ -185,23 +187,40 @@ def _optimum_of_files(
         objective=args.objective or "imep_closed_bar",
         limits=limits,
         bounds_cad=_bounds(args),
-        progress=args.progress.expect(34),
+        progress=args.progress.expect(70),
         step_cad=args.step_cad or 0.25,
         integrator=args.integrator,
         **calibration_arguments(args, cylinder),
     )
     main = headline_of(rows)
+    pegging = calibration_arguments(args, cylinder)
+    tdc = estimate_tdc(
+        list(main.fit.request.traces), cylinder, point=point, fuel_heat_j=pegging["fuel_heat_j"], span_cad=TDC_SPAN_CAD,
+        progress=args.progress,
+    )  # fmt: skip
+    warnings = doubts_of(rows, tdc)
+    kept = "given limits kept" if limits else "no limit"
     parts = []
     for row in rows:
         if row.best is None:
             near = next(answer for answer in row.members if answer.member is main)
-            parts.append(f"{row.file}\n  no plausible model; {main.name}: {near.why_not}")
+            parts.append(f"{row.file}\n  no plausible model; the nearest, {main.name}: {near.why_not}")
             continue
-        answers = {name: (getattr(row.best, name), *getattr(row, name)) for name in _RANGED}
+        best = row.best
+
+        def told(name: str, best: MemberTiming = best, row: BestTiming = row) -> str:
+            low, high = getattr(row, name)
+            return f"{getattr(best, name):.2f} ({low:.2f} to {high:.2f})"
+
         parts.append(
-            f"{row.file}: {row.best.member.name}\n"
-            + lines({name: f"{own:.2f} ({low:.2f} to {high:.2f})" for name, (own, low, high) in answers.items()})
+            f"{row.file}: {best.member.name}\n own p_max kept\n"
+            + lines({name: told(name) for name in _RANGED})
+            + f"\n {kept}\n"
+            + lines({f"free_{name}": told(f"free_{name}") for name in _RANGED})
         )
     parts.append("In brackets: the range over the plausible models of the family; --json lists every one.")
-    payload = {"preset": preset, "law": main.name, "traces": [row.to_dict() for row in rows]}
+    parts += ["what to distrust:\n" + "\n".join(f"  - {text}" for text in warnings)] if warnings else []
+    payload = {"preset": preset, "law": main.name, "traces": [row.to_dict() for row in rows], "warnings": warnings}
     emit(args, payload, text="\n\n".join(parts))
+    if all(row.best is None for row in rows):
+        raise ConvergenceError("no model of the family is plausible for any trace: see what each of them fails")

@@ -266,6 +266,13 @@ def _rows_of(
     return rows
 
 
+def refuse_idle(args: argparse.Namespace, *names: str, why: str) -> None:
+    """Refuse options that were given and would act on nothing."""
+    for name in names:
+        if getattr(args, name, None) is not None:
+            raise ParameterError(f"{as_option(name)} does not act here; {why}")
+
+
 def number_pairs(items: Sequence[str], option: str) -> dict[str, float]:
     """Read repeated NAME=NUMBER options."""
     out: dict[str, float] = {}

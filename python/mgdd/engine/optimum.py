@@ -20,7 +20,7 @@ OBJECTIVES = ("efficiency_gross", "imep_gross_bar", "imep_closed_bar")
 _SCAN_CAD = 0.5
 _SECANT_CAD = 3.0
 _WINDOW_CAD: tuple[float, float] = _core.engine.timing_window_cad
-_DEFAULT_CAD = (-30.0, 10.0)
+DEFAULT_CAD = (-30.0, 10.0)
 
 
 def find_optimum(
@@ -75,7 +75,7 @@ def find_optimum(
     """
     kept = limits_of(limits)
     caps = {limit.name: limit.upper - limit.margin for limit in kept}
-    low, high = bounds_cad or (max(_DEFAULT_CAD[0], cylinder.ivc_cad), min(_DEFAULT_CAD[1], cylinder.evo_cad - 1.0))
+    low, high = bounds_cad or (max(DEFAULT_CAD[0], cylinder.ivc_cad), min(DEFAULT_CAD[1], cylinder.evo_cad - 1.0))
     check_request(objective, caps)
     _check(point, low, high)
 

@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING, Any
 from mgdd import _core
 from mgdd._core.engine import Cylinder, OperatingPoint
 from mgdd.engine.trace_cycles import is_of_cycles, of_cycles
-from mgdd.errors import ParameterError
+from mgdd.errors import DataError, ParameterError
 from mgdd.io.trace_forms import as_trace
 from mgdd.results.labels import ANGLE, labelled_dataset
 
@@ -181,10 +181,13 @@ def analyze(
         "dp_max": _DP_MAX,
     }
     given = "given" if heat_window_cad else "whole" if simulated else None
-    if is_of_cycles(trace):
-        result = of_cycles(trace, cylinder, own, options, attrs, given)
-    else:
-        result = _one(trace, cylinder, own, options, attrs, given)
+    run = of_cycles if is_of_cycles(trace) else _one
+    try:
+        result = run(trace, cylinder, own, options, attrs, given)
+    except DataError as error:
+        if error.field != "bmep_bar" or _number(trace, "brake_torque_nm", brake_torque_nm) is None:
+            raise
+        raise error.reworded(f"{error}; the torque was taken as that of its cylinders: see n_cylinders") from None
     for warning in () if quiet else result.attrs["warnings"].splitlines():
         _LOG.warning("%s: %s", attrs["file"], warning)
     read = str(trace.attrs.get("warnings", ""))  # what reading doubted was logged by the reader

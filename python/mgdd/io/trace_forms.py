@@ -32,7 +32,8 @@ def one_cycle(trace: Any) -> xr.Dataset:
     if CYCLE in made[_PRESSURE].dims:
         raise DataError(
             f"{made.attrs.get('file', 'trace')}: {made.sizes[CYCLE]} cycles, and one is needed: give their mean, "
-            f"trace.mean('cycle', keep_attrs=True), or one column, {argument('pressure_column', '')}"
+            f"trace.mean('cycle', keep_attrs=True), --mean-cycle on the command line, or one column, "
+            f"{argument('pressure_column', '')}"
         )
     return made
 

@@ -39,9 +39,11 @@ _WALL = {
 _TIMING = {
     "soc_cad": ("best SOC, own p_max kept [°CA aTDC]", 1),
     "ca50_cad": ("best CA50, own p_max kept [°CA aTDC]", 1),
+    "shift_cad": ("move by, own p_max kept [°CA]", 1),
     "gain_percent": ("gain [%]", 2),
     "free_soc_cad": ("best SOC, no limit [°CA aTDC]", 1),
     "free_ca50_cad": ("best CA50, no limit [°CA aTDC]", 1),
+    "free_shift_cad": ("move by, no limit [°CA]", 1),
     "free_gain_percent": ("gain, no limit [%]", 2),
 }
 _MEMBERS = {
@@ -56,7 +58,9 @@ _MEMBERS = {
 _TIMING_TEXT = (
     "{kept} of {n} models are plausible for at least one load. Each cell: the answer of the headline model, then the "
     "range over all plausible ones. Where the range is wide, these traces do not tell the best timing: wall heat and "
-    "gamma stand in for each other. Gains are in closed-cycle work over the measured timing."
+    "gamma stand in for each other. What to set is 'move by': later than measured if positive. CA50 is that of the "
+    "modelled burn, some tenths later than that of the net heat below. Own p_max is the highest measured sample, or "
+    "the model's where that is higher at the measured timing. Gains are in closed-cycle work over the measured timing."
 )
 _HEADLINE_TEXT = (
     "Headline: {law}. It has the least distance from the best fit and from the textbook wall heat (1 ± 0.25) of the "
@@ -64,8 +68,8 @@ _HEADLINE_TEXT = (
 )
 _MEMBERS_TEXT = (
     "Every model is fitted to all loads together, the burn bounded by the injection. Plausible: wall heat 0.3 to 1.5 "
-    "of the textbook law, closed IMEP within 2 %, RMSE at most twice the least, no burn before the injection, and wall "
-    "heat and gamma of the other loads serve the one left out."
+    "of the textbook law, closed IMEP within 2 %, RMSE at most twice the least, no burn before the injection, a fit "
+    "that converged, and wall heat and gamma of the other loads serve the one left out."
 )
 _LAWS_TEXT = (
     "Pressure error over the closed cycle, error of the closed IMEP, fitted burn start against injection, and the "

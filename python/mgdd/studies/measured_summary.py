@@ -56,7 +56,6 @@ def summarize(
         "unidentifiable": sorted(
             {*main.fit.report.unidentifiable, *(["wall_heat_scale"] if _unknown(profiles) else [])}
         ),
-        "warnings": [str(finding) for finding in main.fit.findings],
         "best_timing": [row.to_dict() for row in timing],
     }
 

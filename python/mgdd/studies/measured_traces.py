@@ -9,8 +9,8 @@ from typing import TYPE_CHECKING, Any
 from mgdd import datasets, presets
 from mgdd._core.engine import Cylinder, OperatingPoint
 from mgdd.engine import analyze
-from mgdd.identify import best_timing, wall_heat_profile
-from mgdd.identify.engine.best_timing import headline_of
+from mgdd.identify import best_timing, estimate_tdc, wall_heat_profile
+from mgdd.identify.engine.best_timing import doubts_of, headline_of
 from mgdd.identify.engine.burn_laws import compare_laws
 from mgdd.identify.engine.cylinder import fit_request
 from mgdd.identify.engine.family import Member
@@ -29,6 +29,7 @@ if TYPE_CHECKING:
 __all__ = ["run_measured_traces"]
 
 _GEOMETRY = ("bore_mm", "stroke_mm", "connecting_rod_mm", "compression_ratio", "ivc_cad", "evo_cad")
+_TDC_SPAN_CAD = 2.0
 Progress = Callable[[str], None]
 
 
@@ -88,9 +89,11 @@ def run_measured_traces(
     scheme: dict[str, Any] = {"step_cad": step_cad, "integrator": integrator}
     timing = best_timing(traces, cylinder, point=point, progress=progress, **scheme)
     main = headline_of(timing)
+    tdc = None if quick else estimate_tdc(traces, cylinder, point=point, span_cad=_TDC_SPAN_CAD, progress=progress)
     fits = compare_laws(traces, cylinder, point=point, progress=progress, **scheme)
     profiles = {} if quick else _profiles(main, progress)
     summary = summarize(analyses, fits, main, profiles, timing)
+    summary["warnings"] = doubts_of(timing, tdc)
     summary["engine"] = {name: getattr(cylinder, name) for name in _GEOMETRY}
     summary["data"] = _PROVENANCE if own else "Files of the user."
     plain = to_jsonable(summary)
@@ -113,7 +116,8 @@ def _profiles(main: Member, progress: Progress) -> dict[str, WallHeatProfile]:
     out = {}
     for text, common in (("held", ()), ("refitted", (gamma,))):
         fit = fit_request(replace(request, free=("wall_heat_scale", *common, *burn)))
-        out[f"{main.law}, {main.gamma_model} gamma {text}"] = wall_heat_profile(fit, progress=progress)
+        value = f" at {main.gamma:.4g}" if text == "held" else ""
+        out[f"{main.law}, {main.gamma_model} gamma {text}{value}"] = wall_heat_profile(fit, progress=progress)
     return out
 
 

@@ -7,9 +7,10 @@ from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, field
 from typing import TYPE_CHECKING, Any
 
+from mgdd import _core
 from mgdd._core.engine import Cylinder, OperatingPoint
 from mgdd.engine import find_optimum, simulate
-from mgdd.engine.optimum import check_request
+from mgdd.engine.optimum import DEFAULT_CAD, check_request
 from mgdd.errors import ConvergenceError
 from mgdd.identify.engine.family import Member, ModelFamily, fit_family
 from mgdd.identify.engine.records import Load
@@ -20,9 +21,15 @@ from mgdd.results.describe import described
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
 
-__all__ = ["BestTiming", "MemberTiming", "best_timing", "headline_of"]
+    from mgdd.identify.engine.tdc import TdcEstimate
 
-_RANGED = ("soc_cad", "ca50_cad", "gain_percent", "free_soc_cad", "free_ca50_cad", "free_gain_percent")
+__all__ = ["BestTiming", "MemberTiming", "best_timing", "doubts_of", "headline_of"]
+
+_RANGED = (
+    "soc_cad", "ca50_cad", "shift_cad", "gain_percent",
+    "free_soc_cad", "free_ca50_cad", "free_shift_cad", "free_gain_percent",
+)  # fmt: skip
+_MARGIN_CAD = 5.0  # the search reaches this far beyond the fitted timing
 
 
 @described
@@ -44,9 +51,10 @@ class MemberTiming:
         Fitted start and half of the burn [°CA aTDC]; the start after the injection [°CA], NaN where none is stated.
     efficiency_gross : float
         Gross efficiency at the measured timing [-].
-    soc_cad, ca50_cad, gain_percent : float
-        Best timing with the load's own p_max kept [°CA aTDC], and its gain over the measured timing [%].
-    free_soc_cad, free_ca50_cad, free_gain_percent : float
+    soc_cad, ca50_cad, shift_cad, gain_percent : float
+        Best timing with the load's own p_max kept [°CA aTDC], how far that is from the measured one [°CA, positive =
+        later], and its gain over it [%].
+    free_soc_cad, free_ca50_cad, free_shift_cad, free_gain_percent : float
         The same without that limit. All are NaN for a member that is not plausible and has no timing within the limits.
     free_p_max_bar : float
         Peak pressure there [bar].
@@ -71,9 +79,11 @@ class MemberTiming:
     efficiency_gross: float
     soc_cad: float
     ca50_cad: float
+    shift_cad: float
     gain_percent: float
     free_soc_cad: float
     free_ca50_cad: float
+    free_shift_cad: float
     free_gain_percent: float
     free_p_max_bar: float
     p_max_model_error_bar: float
@@ -106,8 +116,10 @@ class BestTiming:
         Every member's answer, in the order of the family.
     best : MemberTiming or None
         The plausible one with the least score; None if no member is plausible for this load.
-    soc_cad, ca50_cad, gain_percent, free_soc_cad, free_ca50_cad, free_gain_percent : tuple of float
+    soc_cad, ca50_cad, shift_cad, gain_percent : tuple of float
         Lowest and highest answer of the plausible members, as in `MemberTiming`; NaN without any.
+    free_soc_cad, free_ca50_cad, free_shift_cad, free_gain_percent : tuple of float
+        The same without the limit of the load's own p_max.
 
     Examples
     --------
@@ -123,9 +135,11 @@ class BestTiming:
     best: MemberTiming | None
     soc_cad: tuple[float, float]
     ca50_cad: tuple[float, float]
+    shift_cad: tuple[float, float]
     gain_percent: tuple[float, float]
     free_soc_cad: tuple[float, float]
     free_ca50_cad: tuple[float, float]
+    free_shift_cad: tuple[float, float]
     free_gain_percent: tuple[float, float]
 
     def to_dict(self) -> dict[str, Any]:
@@ -195,7 +209,8 @@ def best_timing(
     limits : dict, optional
         Further limits, as in `mgdd.engine.find_optimum`; they hold beside the trace's own p_max.
     bounds_cad : tuple of float, optional
-        Searched range of SOC, as in `mgdd.engine.find_optimum`.
+        Searched range of SOC, as in `mgdd.engine.find_optimum`; where nothing is said it reaches 5 °CA beyond the
+        fitted timing.
     progress : callable, optional
         Called with a short text after each fit.
 
@@ -254,7 +269,7 @@ def _answer(
     # The model's own error in p_max at the measured timing is not a violation of the limit.
     ceiling = max(load.p_max_bar, float(now["p_max_bar"]) * (1.0 + 1e-9))
     own = {**limits, "p_max_bar": min(ceiling, limits.get("p_max_bar", math.inf))}
-    search: dict[str, Any] = {"bounds_cad": bounds_cad, **scheme}
+    search: dict[str, Any] = {"bounds_cad": bounds_cad or _search(load), **scheme}
     try:
         free = find_optimum(load.cylinder, load.point, objective, limits=limits, **search)
         kept = find_optimum(load.cylinder, load.point, objective, limits=own, **search)
@@ -274,8 +289,8 @@ def _answer(
         fitted_ca50_cad=load.ca50_cad,
         soc_minus_soi_cad=load.onset_against_soi_cad,
         efficiency_gross=float(now["efficiency_gross"]),
-        **_best_of(kept, base, ""),
-        **_best_of(free, base, "free_"),
+        **_best_of(kept, base, load.soc_cad, ""),
+        **_best_of(free, base, load.soc_cad, "free_"),
         free_p_max_bar=math.nan if free is None else float(free["p_max_bar"]),
         p_max_model_error_bar=float(now["p_max_bar"]) - load.p_max_bar,
         p_max_limit_bar=ceiling,
@@ -283,11 +298,21 @@ def _answer(
     )
 
 
-def _best_of(found: Optimum | None, base: float, prefix: str) -> dict[str, float]:
+def _search(load: Load) -> tuple[float, float]:
+    """Give the range to search: the usual one, and the fitted timing well inside it."""
+    low, high = _core.engine.timing_window_cad
+    cylinder = load.cylinder
+    first = min(DEFAULT_CAD[0], load.soc_cad - _MARGIN_CAD)
+    last = max(DEFAULT_CAD[1], load.soc_cad + _MARGIN_CAD)
+    return max(first, low, cylinder.ivc_cad), min(last, high, cylinder.evo_cad - 1.0)
+
+
+def _best_of(found: Optimum | None, base: float, fitted: float, prefix: str) -> dict[str, float]:
     soc, half, gain = (
         (math.nan,) * 3 if found is None else (found["soc_cad"], found["ca50_cad"], 100.0 * (found.value / base - 1.0))
     )
-    return {f"{prefix}soc_cad": soc, f"{prefix}ca50_cad": half, f"{prefix}gain_percent": gain}
+    values = {"soc_cad": soc, "ca50_cad": half, "shift_cad": soc - fitted, "gain_percent": gain}
+    return {prefix + name: value for name, value in values.items()}
 
 
 def _over_family(file: str, answers: tuple[MemberTiming, ...]) -> BestTiming:
@@ -313,3 +338,18 @@ def headline_of(rows: Sequence[BestTiming]) -> Member:
         return -sum(answer.plausible for answer in own), own[0].member.score
 
     return rows[0].members[min(range(len(rows[0].members)), key=rank)].member
+
+
+def doubts_of(rows: Sequence[BestTiming], tdc: TdcEstimate | None = None) -> list[str]:
+    """Say what makes the answers doubtful: the headline's findings, answers at an end of the search, TDC."""
+    out = [str(finding) for finding in headline_of(rows).fit.findings]
+    for row in rows:
+        ends = sum(answer.plausible and answer.at_bound for answer in row.members)
+        if ends:
+            out.append(
+                f"{row.file}: the best timing of {ends} plausible model(s) lies at the end of the searched range: "
+                "widen bounds_cad, or suspect TDC"
+            )
+        if row.best is None:
+            out.append(f"{row.file}: no model is plausible: suspect geometry, TDC, pegging, speed or trapped mass")
+    return out + (tdc.doubts() if tdc is not None else [])

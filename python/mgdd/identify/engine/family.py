@@ -232,7 +232,7 @@ def _judged(member: Member, family: ModelFamily, least: float) -> Iterator[str]:
 
 def _reasons_for_all(member: Member, family: ModelFamily, least: float) -> Iterator[str]:
     if not member.fit.report.success:
-        yield f"the fit did not converge: {member.fit.report.message}"
+        yield "the fit did not converge"
     low, high = family.wall_heat_range
     if not low <= member.wall_heat_scale <= high:
         yield f"wall heat {member.wall_heat_scale:.2f} outside {low:g} to {high:g}"

@@ -4,12 +4,15 @@ from __future__ import annotations
 
 from typing import TYPE_CHECKING
 
+from mgdd._core.engine import OperatingPoint
 from mgdd.engine import analyze
 from mgdd.identify.engine.request import Request, earliest_burn_cad
 from mgdd.results import Finding
 
 if TYPE_CHECKING:
     from collections.abc import Iterator
+
+    import xarray as xr
 
     from mgdd.identify.engine.records import CylinderFit
 
@@ -36,11 +39,32 @@ def findings_of(fit: CylinderFit, request: Request) -> tuple[Finding, ...]:
 
 
 def _of_traces(request: Request) -> Iterator[Finding]:
-    """Give what the analysis of each trace finds suspicious: TDC, pegging, unit, missing angles."""
-    for trace, label in zip(request.traces, request.labels, strict=True):
+    """Give what the analysis of each trace finds suspicious: TDC, pegging, unit, missing angles, fuel, speed."""
+    silent = [label for trace, label in zip(request.traces, request.labels, strict=True) if not _has_speed(trace)]
+    if silent and request.point is None:
+        yield Finding(
+            "assumed_speed",
+            tuple(silent),
+            f"no speed is stated for {', '.join(silent)}: {OperatingPoint().speed_rpm:g} rpm are assumed, and wall "
+            "heat per degree depends on it",
+            "give point=, or the attribute speed_rpm",
+        )
+    for trace, label, known in zip(request.traces, request.labels, request.known_heat_j, strict=True):
         analysis = analyze(trace, request.cylinder, point=request.point, quiet=True)
+        net = float(analysis["heat_net_j"])
+        if known is not None and net > known:
+            yield Finding(
+                "fuel_too_small",
+                (label,),
+                f"{label}: the gas shows {net:.0f} J of net heat, more than the {known:.0f} J of the stated fuel",
+                "suspect fuel_mg, TDC, the pressure unit or the displacement",
+            )
         for text in analysis.attrs["warnings"].splitlines():
             yield Finding("doubtful_trace", (label,), f"{label}: {text}")
+
+
+def _has_speed(trace: xr.Dataset) -> bool:
+    return trace.attrs.get("speed_rpm") is not None
 
 
 def _poor(fit: CylinderFit) -> Iterator[Finding]:

@@ -300,7 +300,9 @@ def _reasons_of_moves(
     value: float,
     possible: tuple[float, float],
 ) -> tuple[str, ...]:
-    if not moved or ((1.0 - _WIDTH) * best <= possible[0] and possible[1] <= (1.0 + _WIDTH) * best):
+    if not any(pair != (value, value) for pair in moved.values()) or (
+        (1.0 - _WIDTH) * best <= possible[0] and possible[1] <= (1.0 + _WIDTH) * best
+    ):
         return ()
     parts = [
         f"{min(*pair, value):.2f} to {max(*pair, value):.2f} if {_NAMES[name]} is {widths[name]:g}{_UNITS[name]} off"

@@ -141,6 +141,11 @@ class Request:
         for trace, label in zip(self.traces, self.labels, strict=True):
             name = f"soc_cad[{label}]"
             earliest = earliest_burn_cad(trace)
+            if earliest >= _core.engine.timing_window_cad[1]:
+                raise DataError(
+                    f"{label}: injection or spark at {earliest:g} °CA aTDC is later than any burn that is simulated "
+                    f"({_core.engine.timing_window_cad[1]:g}): angles are °CA aTDC, negative before firing TDC"
+                )
             if "soc_cad" in self.free and math.isfinite(earliest) and not {"soc_cad", name} & set(self.bounds):
                 out[name] = (earliest, math.inf)
         return out

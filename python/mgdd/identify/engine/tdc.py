@@ -76,6 +76,26 @@ class TdcEstimate:
         """Whether the angles as they stand are outside the range."""
         return not self.low_cad <= 0.0 <= self.high_cad
 
+    def doubts(self) -> list[str]:
+        """Say in words that the angles are outside the range.
+
+        Returns
+        -------
+        list of str
+            Empty where they are inside.
+        """
+        if not self.suspect:
+            return []
+        edge = "tdc_offset_cad" in self.dataset and abs(self.offset_cad) >= abs(
+            float(self.dataset["tdc_offset_cad"][0])
+        )
+        how = (
+            "at the end of the search: it may be more"
+            if edge
+            else f"{self.low_cad:+.2f} to {self.high_cad:+.2f} possible"
+        )
+        return [f"the {self.method} asks for {self.offset_cad:+.2f} °CA to be added to the angles ({how}): suspect TDC"]
+
     def plot(self, *, ax: Axes | None = None) -> Axes:
         """Draw the least RMSE over the TDC offset.
 
