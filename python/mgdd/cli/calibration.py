@@ -162,11 +162,9 @@ def _better_laws(fit: CylinderFit, laws: list[CylinderFit]) -> list[str]:
     if not best.report.rmse < 0.7 * fit.report.rmse:
         return []
     rmse, own = 100.0 * best.report.rmse, 100.0 * fit.report.rmse
-    return [
-        f"{best.kind} meets the traces with an RMSE of {rmse:.2f} % against {own:.2f} % of {fit.kind}; "
-        "do not read burn, fuel heat or wall heat from the latter: --burn and --gamma choose the law, "
-        "mgdd engine optimum compares a family"
-    ]
+    met = f"{best.kind} meets the traces with an RMSE of {rmse:.2f} % against {own:.2f} % of {fit.kind}"
+    remedy = "--burn and --gamma choose the law, mgdd engine optimum compares a family"
+    return [f"{met}: do not read burn, fuel heat or wall heat from the latter; {remedy}"]
 
 
 def _was_fitted(fit: CylinderFit, name: str) -> bool:
