@@ -99,3 +99,17 @@ def test_a_file_of_cycles_adds_their_scatter(tmp_path: Path, capsys: pytest.Capt
     (line,) = (row for row in capsys.readouterr().out.splitlines() if row.startswith("ca50_cad"))
     shown = [float(word) for word in line.split()[1:3]]  # mean and standard deviation, side by side
     assert shown == pytest.approx([out["ca50_cad"], out["std_ca50_cad"]], rel=1e-4)
+
+
+def test_tdc_is_estimated_and_doubted_when_asked(file: str, tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    trace = datasets.load("hd_diesel_128x144")[1]
+    angle, pressure = trace["crank_angle_cad"].values + 3.0, trace["pressure_bar"].values
+    late = tmp_path / "late.csv"
+    np.savetxt(late, np.column_stack([angle, pressure]), delimiter=",", header="angle,p_bar", comments="", fmt="%.17g")
+    said = ("--speed-rpm", "1200", "--trapped-mass-g", "4.13863")
+    out = run_json(capsys, str(late), *HD, *said, "--tdc")
+    assert -3.6 < out["tdc"]["offset_cad"] < -2.4
+    assert any("suspect TDC" in text for text in out["warnings"])
+    assert "tdc" not in run_json(capsys, str(late), *HD, *said)
+    right = run_json(capsys, file, *HD, *said, "--tdc")
+    assert not right["tdc"]["suspect"]

@@ -3,13 +3,16 @@
 from __future__ import annotations
 
 import argparse
+import logging
 from typing import TYPE_CHECKING, Any
 
-from mgdd.cli.calibration import add_pegging, check_pegging
+from mgdd.cli.calibration import add_pegging, check_pegging, tdc_payload
 from mgdd.cli.options import add_command, add_engine, add_files, engine_of, refuse_idle, traces_of
 from mgdd.cli.output import check_output, emit, lines
 from mgdd.engine import analyze
 from mgdd.errors import ParameterError
+from mgdd.identify import estimate_tdc
+from mgdd.io.trace_forms import mean_cycle
 from mgdd.results.labels import VARIABLES
 from mgdd.results.units import unit_of
 from mgdd.studies.sections import Table
@@ -18,6 +21,8 @@ if TYPE_CHECKING:
     import xarray as xr
 
 __all__ = ["add_analyze"]
+
+_LOG = logging.getLogger(__name__)
 
 # Columns of a record: what stands before and after the name of a figure.
 _COLUMNS = {
@@ -56,6 +61,10 @@ def add_analyze(verbs: Any) -> None:
     brake.add_argument("--bmep-bar", type=float, metavar="X", help="measured BMEP: a gross IMEP below it is refused")
     brake.add_argument("--brake-torque-nm", type=float, metavar="X", help="measured torque, in place of the BMEP")
     group.add_argument("--cylinders", type=int, default=1, metavar="N", help="behind the torque (default: 1)")
+    group.add_argument(
+        "--tdc", action="store_true",
+        help="also estimate TDC, of a fired trace by calibrations over a scan of the angle (seconds), and doubt it",
+    )  # fmt: skip
     group.add_argument("--fractions", choices=("net", "gross"), default="net", help="heat that CA10/50/90 refer to")
     add_engine(parser)
 
@@ -99,9 +108,27 @@ def _analyze(args: argparse.Namespace) -> None:
         **{name: result.attrs[name] for name in ("fractions", "smoothing", "heat_window", "mass_source", "motored")},
         "warnings": result.attrs["warnings"].splitlines(),
     }
+    if args.tdc:
+        found = estimate_tdc([_absolute(trace, float(payload["pegging_bar"]))], cylinder, point=point, span_cad=4.0)
+        payload["tdc"] = tdc_payload(found)
+        payload["warnings"] += found.doubts()
+        for text in found.doubts():
+            _LOG.warning("%s: %s", payload["file"], text)
     if "cycles" in result.attrs:  # a CSV holds the figures of every cycle then
         result = result[[name for name, v in result.data_vars.items() if v.dims == ("cycle",)]]
-    emit(args, payload, text=_table(payload) if "cycles" in payload else None, traces=result)
+    text = _table(payload) if "cycles" in payload else [lines(payload)]
+    if args.tdc:
+        low, high = payload["tdc"]["low_cad"], payload["tdc"]["high_cad"]
+        text.append(f"TDC offset {payload['tdc']['offset_cad']:+.2f} °CA, {low:+.2f} to {high:+.2f} possible")
+    emit(args, payload, text=text, traces=result)
+
+
+def _absolute(trace: xr.Dataset, offset_bar: float) -> xr.Dataset:
+    """Give the trace, or the mean of its cycles, with the pegging that was found."""
+    one = mean_cycle(trace)
+    moved = one.assign(pressure_bar=one["pressure_bar"] + offset_bar)
+    moved["pressure_bar"].attrs.update(one["pressure_bar"].attrs)
+    return moved
 
 
 def _figures(result: xr.Dataset) -> dict[str, float]:

@@ -143,17 +143,17 @@ def _payload(
         "common": common,
         "unidentifiable": ordered,
         "laws": [law_row(law) for law in laws],
-        "tdc": {
-            "offset_cad": tdc.offset_cad,
-            "low_cad": tdc.low_cad,
-            "high_cad": tdc.high_cad,
-            "others_cad": list(tdc.others_cad),
-            "suspect": tdc.suspect,
-        },
+        "tdc": tdc_payload(tdc),
         "warnings": [*(str(finding) for finding in fit.findings), *tdc.doubts(), *_better_laws(fit, laws)],
         "cylinder": fit.model.to_dict(),
         "report": _report(fit, profile, laws, ordered, tdc),
     }
+
+
+def tdc_payload(tdc: TdcEstimate) -> dict[str, Any]:
+    """Give an estimate of TDC as plain values."""
+    names = ("method", "offset_cad", "low_cad", "high_cad", "suspect")
+    return {**{name: getattr(tdc, name) for name in names}, "others_cad": list(tdc.others_cad)}
 
 
 def _better_laws(fit: CylinderFit, laws: list[CylinderFit]) -> list[str]:
