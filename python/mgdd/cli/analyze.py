@@ -112,11 +112,11 @@ def _analyze(args: argparse.Namespace) -> None:
         found = estimate_tdc([_absolute(trace, float(payload["pegging_bar"]))], cylinder, point=point, span_cad=4.0)
         payload["tdc"] = tdc_payload(found)
         payload["warnings"] += found.doubts()
-        for text in found.doubts():
-            _LOG.warning("%s: %s", payload["file"], text)
+        for doubt in found.doubts():
+            _LOG.warning("%s: %s", payload["file"], doubt)
     if "cycles" in result.attrs:  # a CSV holds the figures of every cycle then
         result = result[[name for name, v in result.data_vars.items() if v.dims == ("cycle",)]]
-    text = _table(payload) if "cycles" in payload else [lines(payload)]
+    text: list[str | Table] = _table(payload) if "cycles" in payload else [lines(payload)]
     if args.tdc:
         low, high = payload["tdc"]["low_cad"], payload["tdc"]["high_cad"]
         text.append(f"TDC offset {payload['tdc']['offset_cad']:+.2f} °CA, {low:+.2f} to {high:+.2f} possible")
