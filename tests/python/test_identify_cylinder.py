@@ -214,6 +214,9 @@ def test_the_profile_of_a_plant_with_known_fuel_identifies_the_scale():
     )
     assert high == pytest.approx(refit.model.wall_heat_scale, abs=1e-4)
     assert low < 0.8 < high or high < 0.8 < low
+    raised = [trace.assign(pressure_bar=trace.pressure_bar + 0.1) for trace in traces]
+    refit = fit_cylinder(raised, START, free=free, fuel_heat_j=[42.8 * fuel for fuel, _ in LOADS])
+    assert doubted.moved["pegging_bar"][1] == pytest.approx(refit.model.wall_heat_scale, abs=1e-4)
 
 
 def test_a_profile_needs_a_free_scale():
@@ -264,6 +267,8 @@ def test_a_burn_starts_at_the_earliest_at_its_injection_or_spark():
     assert "held at the injection" in held.text
     spark = [plant()[0].assign_attrs(spark_cad=-7.0), plant()[1]]
     assert [load.soc_cad for load in fit_cylinder(spark, START).loads] == pytest.approx([-5.0, -9.0], abs=1e-5)
+    both = fit_cylinder([trace.assign_attrs(spark_cad=-20.0) for trace in late], START)  # the earlier of the two counts
+    assert both.loads[1].soc_cad == pytest.approx(-9.0, abs=1e-5)
     one = fit_cylinder(late, START, bounds={"soc_cad[14 mg]": (None, None)})
     assert one.loads[0].soc_cad < LOADS[0][1] + 1.0 - 1e-3
     assert one.loads[1].soc_cad == LOADS[1][1] + 1.0

@@ -131,6 +131,18 @@ def test_what_was_assumed_and_what_cannot_be_is_said() -> None:
         fit_cylinder([trace.assign_attrs(soi_cad=40.0)], PRESET.cylinder)
 
 
+def test_the_load_left_out_takes_gamma_of_the_others() -> None:
+    member = next(m.member for m in rows()[0].members if m.member.fitted == "gamma" and m.member.law == "double_wiebe")
+    traces = [measured(*load) for load in LOADS]
+    start = PRESET.cylinder.replace(burn_shape="double_wiebe", wall_heat_scale=member.wall_heat_scale)
+    burn = ["soc_cad", "burn_duration_cad", "fuel_heat_j", "wiebe_m", "second_fraction", "second_delay_cad"]
+    burn += ["second_duration_cad", "second_wiebe_m", "start_pressure_bar"]
+    for own, other in ((0, 1), (1, 0)):
+        gamma = fit_cylinder([traces[other]], start, free=["gamma", *burn]).model.gamma_linear_300k
+        held = fit_cylinder([traces[own]], start.replace(gamma_linear_300k=gamma), free=burn)
+        assert member.left_out_percent[own] == pytest.approx(held.loads[0].rmse_percent, rel=1e-6)
+
+
 def test_a_family_is_checked() -> None:
     with pytest.raises(ParameterError, match="gammas is empty"):
         ModelFamily(gammas=[])

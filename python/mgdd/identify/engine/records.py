@@ -143,13 +143,14 @@ def burn_law(cylinder: Cylinder) -> str:
 
 
 def starts_of(fit: CylinderFit) -> tuple[dict[str, float], ...]:
-    """Give the burn of each load as start values of another fit."""
+    """Give the burn of each load as start values of another fit; a start pressure that was held stays the trace's."""
     shape = ("wiebe_m", "second_fraction", "second_delay_cad", "second_duration_cad", "second_wiebe_m")
     burn = ("soc_cad", "burn_duration_cad", "fuel_heat_j")
+    free = "start_pressure_bar" in fit.request.free
     return tuple(
         {name: float(getattr(load, name)) for name in burn}
         | {name: float(getattr(load.cylinder, name)) for name in shape}
-        | {"start_pressure_bar": float(load.point.intake_pressure_kpa) / 100.0}
+        | ({"start_pressure_bar": float(load.point.intake_pressure_kpa) / 100.0} if free else {})
         for load in fit.loads
     )
 

@@ -121,7 +121,7 @@ class Request:
                     raise ParameterError(
                         f"start_values: {name!r} is not a parameter of a trace: must be one of {', '.join(known)}"
                     )
-            full = set(known) <= set(said)  # then nothing is left to estimate
+            full = set(known) - {"start_pressure_bar"} <= set(said)  # then nothing is left to estimate
             burn = _core.identify.LoadBurn() if full else _core.identify.estimate_burn(trace, self.cylinder)
             for name, value in said.items():
                 setattr(burn, name, float(value))
