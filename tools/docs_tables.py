@@ -15,9 +15,9 @@ import numpy as np
 from mgdd import datasets, engine, presets
 from mgdd.engine import Cylinder, OperatingPoint, analyze, simulate
 from mgdd.identify import best_timing, wall_heat_profile
-from mgdd.identify.engine.best_timing import BestTiming
 from mgdd.identify.engine.burn_laws import compare_laws
 from mgdd.identify.engine.records import CylinderFit
+from mgdd.identify.engine.timing_records import BestTiming
 from mgdd.io import pressure_trace
 from mgdd.results.labels import ANGLE, VARIABLES
 from mgdd.studies import run_study

@@ -16,8 +16,8 @@ import numpy as np
 from mgdd import datasets, presets
 from mgdd.engine import analyze, timing_sweep
 from mgdd.identify import best_timing
-from mgdd.identify.engine.best_timing import BestTiming
 from mgdd.identify.engine.records import Load
+from mgdd.identify.engine.timing_records import BestTiming
 
 if TYPE_CHECKING:
     import xarray as xr

@@ -102,4 +102,8 @@ def test_motored_cycles_are_counted():
 def test_the_record_survives_json():
     from mgdd.results.labels import to_jsonable
 
-    json.dumps(to_jsonable(analyze(record(), CYLINDER, point=POINT)), allow_nan=False)
+    many = analyze(record(), CYLINDER, point=POINT)
+    again = json.loads(json.dumps(to_jsonable(many), allow_nan=False))
+    told = again.get("data_vars", again)["ca50_cad"]
+    values = told["data"] if isinstance(told, dict) else told
+    np.testing.assert_array_equal(values, many["ca50_cad"].values)

@@ -14,8 +14,9 @@ from mgdd import datasets, presets
 from mgdd.engine import OperatingPoint, find_optimum, simulate
 from mgdd.errors import DataError, ParameterError
 from mgdd.identify import ModelFamily, best_timing, estimate_tdc, fit_cylinder
-from mgdd.identify.engine.best_timing import BestTiming, doubts_of
+from mgdd.identify.engine.best_timing import doubts_of
 from mgdd.identify.engine.request import Request
+from mgdd.identify.engine.timing_records import BestTiming
 from mgdd.io import pressure_trace
 from mgdd.results.labels import check_labels
 

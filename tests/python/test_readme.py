@@ -29,9 +29,9 @@ def test_table_of_the_demo() -> None:
             f"{best['best'][name]:{form}} ({span(best[name], form)})"
             for name, form in (
                 ("free_ca50_cad", ".1f"),
-                ("free_shift_cad", "+.1f"),
+                ("free_shift_cad", "+z.1f"),
                 ("free_gain_percent", ".2f"),
-                ("shift_cad", "+.1f"),
+                ("shift_cad", "+z.1f"),
                 ("gain_percent", ".2f"),
             )
         )

@@ -122,7 +122,7 @@ def columns(page: str, heading: str) -> dict[str, list[str]]:
 
 
 def span(pair: list[float], digits: int) -> str:
-    low, high = (f"{value:.{digits}f}" for value in pair)
+    low, high = (f"{value:z.{digits}f}" for value in pair)
     return low if low == high else f"{low} to {high}"
 
 
@@ -142,7 +142,7 @@ def test_every_column_of_the_page_holds_what_its_head_says(result: StudyResult, 
         ("best CA50, no limit [°CA aTDC]", "free_ca50_cad", 1),
         ("gain, no limit [%]", "free_gain_percent", 2),
     ):
-        assert timing[head] == [f"{row['best'][name]:.{digits}f} ({span(row[name], digits)})" for row in best], head
+        assert timing[head] == [f"{row['best'][name]:z.{digits}f} ({span(row[name], digits)})" for row in best], head
     assert len(timing) == 9
     assert timing["gain [%]"] != timing["gain, no limit [%]"], "the limit costs something"
 

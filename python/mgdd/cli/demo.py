@@ -75,5 +75,5 @@ def _span(best: Any, name: str, digits: int) -> str:
     low, high = best[name]
     own = best["best"][name]
     if name.endswith("shift_cad"):
-        return f"{own:+.{digits}f} ({low:+.{digits}f} to {high:+.{digits}f})"
-    return f"{own:.{digits}f} ({low:.{digits}f} to {high:.{digits}f})"
+        return f"{own:+z.{digits}f} ({low:+z.{digits}f} to {high:+z.{digits}f})"
+    return f"{own:z.{digits}f} ({low:z.{digits}f} to {high:z.{digits}f})"

@@ -25,7 +25,8 @@ from mgdd.cli.seek import add_seek
 from mgdd.engine import find_optimum, ignition_delay, simulate, timing_sweep
 from mgdd.errors import ConvergenceError, ParameterError
 from mgdd.identify import best_timing, estimate_tdc
-from mgdd.identify.engine.best_timing import BestTiming, MemberTiming, doubts_of, headline_of
+from mgdd.identify.engine.best_timing import doubts_of, headline_of
+from mgdd.identify.engine.timing_records import BestTiming, MemberTiming
 
 __all__ = ["add"]
 
@@ -210,7 +211,7 @@ def _optimum_of_files(
 
         def told(name: str, best: MemberTiming = best, row: BestTiming = row) -> str:
             low, high = getattr(row, name)
-            return f"{getattr(best, name):.2f} ({low:.2f} to {high:.2f})"
+            return f"{getattr(best, name):z.2f} ({low:z.2f} to {high:z.2f})"
 
         parts.append(
             f"{row.file}: {best.member.name}\n own p_max kept\n"

@@ -250,7 +250,7 @@ def traces_of(args: argparse.Namespace) -> list[xr.Dataset]:
 def _rows_of(
     files: Sequence[str], conditions: Mapping[str, dict[str, float]], table: str | None
 ) -> dict[str, dict[str, float]]:
-    """Give each file its row of the conditions, by path, name or stem; nothing where there is no table."""
+    """Give each file its row of the conditions, by path, name or stem; an empty row without a table."""
     used: dict[str, str] = {}
     rows: dict[str, dict[str, float]] = {}
     for file in files:

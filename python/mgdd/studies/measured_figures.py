@@ -17,8 +17,8 @@ if TYPE_CHECKING:
     import xarray as xr
     from matplotlib.figure import Figure
 
-    from mgdd.identify.engine.best_timing import BestTiming
     from mgdd.identify.engine.family import Member
+    from mgdd.identify.engine.timing_records import BestTiming
 
 __all__ = ["draw"]
 

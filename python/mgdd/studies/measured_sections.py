@@ -148,7 +148,7 @@ def _timing(rows: Sequence[Mapping[str, Any]]) -> Table:
     def cell(row: Mapping[str, Any], name: str, digits: int) -> str:
         if row["best"] is None:
             return "not known"
-        return f"{as_number(row['best'][name], f'.{digits}f')} ({_span(row[name], digits)})"
+        return f"{as_number(row['best'][name], f'z.{digits}f')} ({_span(row[name], digits)})"
 
     body = [(row["file"], *(cell(row, name, digits) for name, (_, digits) in _TIMING.items())) for row in rows]
     return Table(columns=("trace", *(head for head, _ in _TIMING.values())), rows=tuple(body))
@@ -211,5 +211,5 @@ def _per_trace(rows: Sequence[Mapping[str, Any]], part: str, columns: Mapping[st
 
 
 def _span(pair: Sequence[float], digits: int) -> str:
-    low, high = (as_number(value, f".{digits}f") for value in pair)
+    low, high = (as_number(value, f"z.{digits}f") for value in pair)
     return low if low == high else f"{low} to {high}"

@@ -14,8 +14,8 @@ from mgdd.results.labels import labelled_dataset
 if TYPE_CHECKING:
     import xarray as xr
 
-    from mgdd.identify.engine.best_timing import BestTiming
     from mgdd.identify.engine.family import Member
+    from mgdd.identify.engine.timing_records import BestTiming
 
 __all__ = ["law_row", "law_table", "summarize"]
 

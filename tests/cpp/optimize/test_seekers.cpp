@@ -184,7 +184,7 @@ bool all_finite(const StateColumns& columns) {
 }
 
 TEST(EverySeeker, StaysFiniteWhateverReadingsItTakes) {
-  // Alternating signs are the worst case of every difference: 1e308 - -1e308 is no number any more.
+  // Alternating signs are the worst case of every difference: 1e308 - -1e308 is not finite.
   for (const double size : {1e308, 1e200, 1e100, largest_reading, 1e25, 1e8}) {
     on_every_seeker([&](auto& seeker, const Scene& scene) {
       for (int k = 0; k < 600; ++k) {

@@ -27,7 +27,7 @@ constexpr double free_offset_low = -0.04, free_offset_high = 0.11;
 constexpr double motored_peak_low_cad = -1.5, motored_peak_high_cad = 0.1;
 constexpr double window_shift_cad = 5.0, window_tolerance_cad = 1.0;
 constexpr double ivc_coldest_k = 250.0, ivc_hottest_k = 400.0, ivc_least_k = 100.0, ivc_most_k = 1500.0;
-// A light load of a diesel stays near 950 K; colder than this is no burn, whatever the mass.
+// A light load of a diesel stays near 950 K; colder than this is not a burn, whatever the mass.
 constexpr double fired_coldest_k = 900.0, fired_hottest_k = 3200.0;
 constexpr double ivc_lowest_bar = 0.2, ivc_highest_bar = 8.0;
 constexpr const char* mass_causes =

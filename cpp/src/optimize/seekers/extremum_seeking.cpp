@@ -112,7 +112,7 @@ TellStatus ExtremumSeeking::tell(const Reading& reading) noexcept {
   return status;
 }
 
-// Fills gradient_ (smoothed) with this cycle's demodulated reading; false while there is no mean to take off yet.
+// Fills gradient_ (smoothed) with this cycle's demodulated reading; false until the mean of a period is known.
 bool ExtremumSeeking::remove_mean(const Reading& reading) noexcept {
   const auto period = static_cast<std::size_t>(dither_.period());
   const double shaped = filter_.shaping(reading.limits);

@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import math
 from collections.abc import Callable, Mapping, Sequence
-from dataclasses import dataclass, field
 from typing import TYPE_CHECKING, Any
 
 from mgdd import _core
@@ -15,164 +14,15 @@ from mgdd.errors import ConvergenceError
 from mgdd.identify.engine.family import Member, ModelFamily, fit_family
 from mgdd.identify.engine.records import Load
 from mgdd.identify.engine.request import Bounds, Request
+from mgdd.identify.engine.timing_records import RANGED, BestTiming, MemberTiming
 from mgdd.optimize import Optimum
-from mgdd.results.describe import described
 
 if TYPE_CHECKING:
-    from matplotlib.axes import Axes
-
     from mgdd.identify.engine.tdc import TdcEstimate
 
-__all__ = ["BestTiming", "MemberTiming", "best_timing", "doubts_of", "headline_of"]
+__all__ = ["best_timing", "doubts_of", "headline_of"]
 
-_RANGED = (
-    "soc_cad", "ca50_cad", "shift_cad", "gain_percent",
-    "free_soc_cad", "free_ca50_cad", "free_shift_cad", "free_gain_percent",
-)  # fmt: skip
 _MARGIN_CAD = 5.0  # the search reaches this far beyond the fitted timing
-
-
-@described
-@dataclass(frozen=True, kw_only=True)
-class MemberTiming:
-    """What one member of the family answers for one load.
-
-    Parameters
-    ----------
-    member : Member
-        The model; its fit has the burn of every load.
-    plausible : bool
-        Whether it counts for this load.
-    why_not : str
-        Why not; empty if it does.
-    rmse_percent, left_out_percent, imep_closed_error_percent : float
-        Pressure RMSE, the same with gamma and wall heat of the other loads [% of p_max]; error of closed IMEP [%].
-    fitted_soc_cad, fitted_ca50_cad, soc_minus_soi_cad : float
-        Fitted start and half of the burn [°CA aTDC]; the start after the injection [°CA], NaN where none is stated.
-    efficiency_gross : float
-        Gross efficiency at the measured timing [-].
-    soc_cad, ca50_cad, shift_cad, gain_percent : float
-        Best timing with the load's own p_max kept [°CA aTDC], how far that is from the measured one [°CA, positive =
-        later], and its gain over it [%].
-    free_soc_cad, free_ca50_cad, free_shift_cad, free_gain_percent : float
-        The same without that limit. All are NaN for a member that is not plausible and has no timing within the limits.
-    free_p_max_bar : float
-        Peak pressure there [bar].
-    p_max_model_error_bar : float
-        Peak pressure of the model minus the measured one, at the measured timing [bar].
-    p_max_limit_bar : float
-        The limit kept: the trace's own highest sample, or the model's at the measured timing where that is higher
-        [bar].
-    at_bound : bool
-        Whether a best timing lies at the end of the searched range.
-    """
-
-    member: Member = field(repr=False)
-    plausible: bool
-    why_not: str
-    rmse_percent: float
-    left_out_percent: float
-    imep_closed_error_percent: float
-    fitted_soc_cad: float
-    fitted_ca50_cad: float
-    soc_minus_soi_cad: float
-    efficiency_gross: float
-    soc_cad: float
-    ca50_cad: float
-    shift_cad: float
-    gain_percent: float
-    free_soc_cad: float
-    free_ca50_cad: float
-    free_shift_cad: float
-    free_gain_percent: float
-    free_p_max_bar: float
-    p_max_model_error_bar: float
-    p_max_limit_bar: float
-    at_bound: bool
-
-    def to_dict(self) -> dict[str, Any]:
-        """Give law, gamma and wall heat of the member and its answer as plain values.
-
-        Returns
-        -------
-        dict
-            Names to values.
-        """
-        model = {name: getattr(self.member, name) for name in ("law", "gamma_model", "gamma", "wall_heat_scale")}
-        own = {name: getattr(self, name) for name in self.__dataclass_fields__ if name != "member"}
-        return {"name": self.member.name, **model, "fitted": self.member.fitted, "score": self.member.score, **own}
-
-
-@described
-@dataclass(frozen=True, kw_only=True)
-class BestTiming:
-    """Best timing of one load, over a family of models.
-
-    Parameters
-    ----------
-    file : str
-        Name of the trace.
-    members : tuple of MemberTiming
-        Every member's answer, in the order of the family.
-    best : MemberTiming or None
-        The plausible one with the least score; None if no member is plausible for this load.
-    soc_cad, ca50_cad, shift_cad, gain_percent : tuple of float
-        Lowest and highest answer of the plausible members, as in `MemberTiming`; NaN without any.
-    free_soc_cad, free_ca50_cad, free_shift_cad, free_gain_percent : tuple of float
-        The same without the limit of the load's own p_max.
-
-    Examples
-    --------
-    >>> from mgdd import datasets, presets
-    >>> from mgdd.identify import best_timing
-    >>> rows = best_timing(datasets.load("hd_diesel_128x144"), presets.load("hd_diesel_128x144").cylinder)
-    >>> [round(angle) for angle in rows[1].free_ca50_cad], round(rows[1].best.free_ca50_cad)
-    ([5, 12], 8)
-    """
-
-    file: str
-    members: tuple[MemberTiming, ...] = field(repr=False)
-    best: MemberTiming | None
-    soc_cad: tuple[float, float]
-    ca50_cad: tuple[float, float]
-    shift_cad: tuple[float, float]
-    gain_percent: tuple[float, float]
-    free_soc_cad: tuple[float, float]
-    free_ca50_cad: tuple[float, float]
-    free_shift_cad: tuple[float, float]
-    free_gain_percent: tuple[float, float]
-
-    def to_dict(self) -> dict[str, Any]:
-        """Give file, ranges, best member and all members as plain values.
-
-        Returns
-        -------
-        dict
-            Names to values; ranges as lists.
-        """
-        return {
-            "file": self.file,
-            **{name: list(getattr(self, name)) for name in _RANGED},
-            "best": None if self.best is None else self.best.to_dict(),
-            "members": [member.to_dict() for member in self.members],
-        }
-
-    def plot(self, *, ax: Axes | None = None) -> Axes:
-        """Draw each member's best CA50 as a strip: filled where plausible, ringed the best.
-
-        Parameters
-        ----------
-        ax : matplotlib.axes.Axes, optional
-            Where to draw; None makes a figure.
-
-        Returns
-        -------
-        matplotlib.axes.Axes
-            One row per member; the shaded band is the range of the plausible ones.
-        """
-        from mgdd.plot.family import family_strip
-
-        return family_strip(self, ax=ax)
 
 
 def best_timing(
@@ -326,7 +176,7 @@ def _over_family(file: str, answers: tuple[MemberTiming, ...]) -> BestTiming:
         file=file,
         members=answers,
         best=min(kept, key=lambda answer: answer.member.score, default=None),
-        **{name: span(name) for name in _RANGED},
+        **{name: span(name) for name in RANGED},
     )
 
 

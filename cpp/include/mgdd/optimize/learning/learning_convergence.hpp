@@ -25,7 +25,7 @@ struct ConvergenceReport {
   double limit_error_gain = std::numeric_limits<double>::quiet_NaN();  ///< its largest singular value
   bool asymptotic = false;                                             ///< spectral_radius < 1: the trials converge
   bool monotone = false;  ///< sigma_max < 1: the distance to the limit error shrinks in every trial
-  std::string sentence;   ///< all of it for people
+  std::string sentence;   ///< human-readable summary
 };
 
 /// Throws ParameterError without an impulse response, ConvergenceError where the eigenvalues cannot be found.
