@@ -129,6 +129,7 @@ void bind_cylinder_fit(py::module_& m);
 void bind_throttle_fit(py::module_& m);
 void bind_online(py::module_& m);
 void bind_benchmark_models(py::module_& m);
+void bind_curve(py::module_& m);
 void bind_engine_bench(py::module_& m);
 void bind_loop(py::module_& m);
 void bind_virtual_throttle(py::module_& m);

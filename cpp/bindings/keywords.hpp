@@ -66,6 +66,14 @@ Plain<Place> plain(const char* name, Place place, const char* doc = "") {
   return {{name, place, doc}};
 }
 
+/// The same without a default.
+template <class Place>
+struct Needed : Plain<Place> {};
+template <class Place>
+Needed<Place> needed(const char* name, Place place, const char* doc = "") {
+  return {{{name, place, doc}}};
+}
+
 /// An enumerator that Python writes by its name.
 template <class Place>
 struct Choice : Row<Place> {
@@ -126,6 +134,11 @@ py::arg_v keyword(const Each& row, const Record& standard) {
 template <class Place>
 py::arg_v keyword(const OrDefault<Place>& row, const typename PlaceOf<Place>::Record&) {
   return py::arg_v(row.name, py::none());
+}
+
+template <class Place>
+py::arg keyword(const Needed<Place>& row, const typename PlaceOf<Place>::Record&) {
+  return py::arg(row.name);
 }
 
 /// All rows of a record as a dict.

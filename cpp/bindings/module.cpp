@@ -36,6 +36,7 @@ PYBIND11_MODULE(_core, m) {
        "Fits of the cylinder and the throttle, update while running.",
        {&bind_cylinder_fit, &bind_throttle_fit, &bind_online}},
       {"systems", "Models of measured benchmarks.", {&bind_benchmark_models}},
+      {"guide", "Models that guide a seeker.", {&bind_curve}},
       {"loop", "Virtual benches and the loops over them.", {&bind_engine_bench, &bind_loop, &bind_virtual_throttle}},
   };
   for (const Room& room : rooms) {

@@ -1,7 +1,7 @@
 """Model-guided data-driven optimization and control for internal combustion engine systems.
 
 The modules: `mgdd.engine` (cycle model and trace analysis), `mgdd.throttle` (electronic throttle), `mgdd.identify`
-(calibration, throttle logs), `mgdd.optimize` (least squares, seekers, iterative learning), `mgdd.loop` (virtual bench,
+(calibration, throttle logs), `mgdd.guide` (models that guide a seeker), `mgdd.optimize` (least squares, seekers, iterative learning), `mgdd.loop` (virtual bench,
 closed loops), `mgdd.rig` (test rigs), `mgdd.presets`, `mgdd.io`, `mgdd.datasets`, `mgdd.plot`, `mgdd.studies`,
 `mgdd.report`, `mgdd.results` and `mgdd.errors`. They are imported on use.
 
@@ -20,6 +20,7 @@ __all__ = [
     "datasets",
     "engine",
     "errors",
+    "guide",
     "identify",
     "io",
     "loop",

@@ -261,6 +261,8 @@ def _encode(value: Any) -> Any:
     if isinstance(value, _core.optimize.Limit):
         names = ("name", "upper", "margin", "method", "weight", "scale")
         return {"limit": {name: getattr(value, name) for name in names}}
+    if isinstance(value, _core.guide.Curve):
+        return {"curve": value._table}
     if isinstance(value, dict):
         return {name: _encode(item) for name, item in value.items()}
     if isinstance(value, list):
@@ -275,4 +277,6 @@ def _decode(item: dict[str, Any]) -> Any:
         return _core.optimize.ComponentLag(**item["component_lag"])
     if set(item) == {"limit"}:
         return _core.optimize.Limit(**item["limit"])
+    if set(item) == {"curve"}:
+        return _core.guide.Curve._of_table(item["curve"])
     return item

@@ -61,6 +61,13 @@ class RecordedSeeker {
     return status;
   }
   void restart() noexcept { seeker_.restart(); }
+  /// Of a seeker that a model guides: what the model says of a new operating point.
+  template <class Guide>
+  bool guide(const Guide& says) noexcept
+    requires requires(S s) { s.guide(says); }
+  {
+    return seeker_.guide(says);
+  }
   void restore(const StateColumns& state) { restore_state(seeker_, state); }
 
   const Inputs& estimate() const noexcept { return seeker_.estimate(); }

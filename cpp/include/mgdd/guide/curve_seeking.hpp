@@ -1,0 +1,135 @@
+// Curve-guided seeking of one input: the guide's whole curve gives the shape, the measurements give the place. A filter
+// over the place of the curve (`CurveFilter`) takes every reading; the next input lies one standard deviation of the
+// place to one side of its mean and then to the other, at least as far as keeping track costs least.
+// Kin: self-tuning extremum control (Wellstead and Zarrop 1991). Readings that the curve cannot explain raise a doubt:
+// what was known is dropped but for the last few readings. A guide that keeps failing hands over to plain extremum
+// seeking. Behind a slow sensor every reading is paired with the input that caused it. ask and tell are noexcept and
+// allocation-free.
+#pragma once
+
+#include <cstdint>
+#include <limits>
+#include <vector>
+
+#include "mgdd/guide/curve.hpp"
+#include "mgdd/guide/curve_filter.hpp"
+#include "mgdd/optimize/seekers/dither.hpp"
+#include "mgdd/optimize/seekers/extremum_seeking.hpp"
+#include "mgdd/optimize/seekers/seeker.hpp"
+
+namespace mgdd::guide {
+
+struct CurveSeekingSettings {
+  optimize::SearchSpace space;  ///< one input, finite bounds
+  Curve curve;                  ///< the guide's J, to be maximised; it must bend down at its best input
+  /// How far the plant's best input may lie from the guide's: one standard deviation, input unit; 0 = a quarter of the
+  /// bounds.
+  double prior_sd = 0.0;
+  double scale_sd = 0.3;              ///< of the plant's curvature over the guide's, about 1
+  double discrepancy = 0.15;          ///< error of the curve per unit of its drop
+  double noise_sd = 0.0;              ///< of one reading of J; 0 = learnt
+  double memory_cycles = 143.0;       ///< readings fade with this time constant
+  double amplitude_max = 0.0;         ///< largest distance from the estimate that is applied; 0 = 0.4 prior_sd
+  double rate = optimize::unlimited;  ///< largest change of the applied input per cycle
+  optimize::ComponentLag sensor{};    ///< between the plant and J; the delay is rounded to whole cycles
+  bool hand_over = true;              ///< to plain extremum seeking where the guide keeps failing
+  bool maximize = true;
+  std::vector<optimize::Limit> limits{};
+};
+
+class CurveSeeking {
+ public:
+  /// Throws ParameterError or ShapeError naming the field.
+  explicit CurveSeeking(CurveSeekingSettings settings);
+
+  const optimize::Inputs& ask() noexcept;
+  optimize::TellStatus tell(const optimize::Reading& reading) noexcept;
+
+  /// The operating point has changed and the guide's curve with it: the distance between the plant's best input and
+  /// the guide's is kept, with a doubt of a fifth of `prior_sd`. False where the curve does not bend down at its best
+  /// input or that lies out of bounds: then the old one stays, as `restart` does.
+  bool guide(const Curve& curve) noexcept;
+  /// The operating point has changed and the guide says nothing of it.
+  void restart() noexcept;
+
+  const optimize::Inputs& estimate() const noexcept { return estimate_; }
+  double estimate_sd() const noexcept;  ///< of the estimate as stated; NaN after a hand-over
+  double noise_sd() const noexcept { return filter_.noise_sd(); }
+  double scale() const noexcept { return filter_.scale(); }
+  /// 1: what the curve leaves unexplained is noise; towards 0: it is not; 0 after a hand-over.
+  double trust() const noexcept;
+  std::int64_t doubts() const noexcept { return doubts_; }
+  bool handed_over() const noexcept { return plain_at_work_; }
+  const CurveSeekingSettings& settings() const noexcept { return settings_; }
+  const optimize::Inputs& applied() const noexcept { return applied_; }
+  const optimize::Protocol& protocol() const noexcept { return protocol_; }
+  std::size_t component_count() const noexcept { return 1; }
+  std::size_t limit_count() const noexcept { return settings_.limits.size(); }
+
+  /// ParameterError for a restored state that these settings do not allow.
+  void require_usable() const {
+    optimize::require_within_space("estimate", estimate_, settings_.space);
+    optimize::require_within_space("applied", applied_, settings_.space);
+  }
+
+  template <class Self, class V>
+  static void visit(Self& self, V& v) {
+    optimize::Protocol::visit(self.protocol_, v);
+    v("estimate", self.estimate_);
+    v("applied", self.applied_);
+    v("upwards", self.upwards_);
+    v("sent", self.sent_);
+    v("sent_count", self.sent_count_);
+    v("surprise", self.surprise_);
+    v("doubts", self.doubts_);
+    v("since_doubt", self.since_doubt_);
+    v("doubt_rate", self.doubt_rate_);
+    v("repeat_input", self.repeat_input_);
+    v("repeat_j", self.repeat_j_);
+    v("repeat_known", self.repeat_known_);
+    v("repeat_variance", self.repeat_variance_);
+    v("repeats", self.repeats_);
+    v("plain_at_work", self.plain_at_work_);
+    v("taken_over_at", self.taken_over_at_);
+    CurveFilter::visit(self.filter_, v);
+    Prefixed<V> plain{v};
+    optimize::ExtremumSeeking::visit(self.plain_, plain);
+  }
+
+ private:
+  /// The columns of the seeker within, apart from ours.
+  template <class V>
+  struct Prefixed {
+    V& inner;
+    template <class... Rest>
+    void operator()(std::string_view name, Rest&&... rest) {
+      inner("plain_" + std::string(name), std::forward<Rest>(rest)...);
+    }
+  };
+  double amplitude() const noexcept;
+  void learn(double applied, double j) noexcept;
+  void watch_repeats(double applied, double j) noexcept;
+  void judge_surprise(double input, double j) noexcept;
+  void take_over() noexcept;
+
+  CurveSeekingSettings settings_;
+  CurveFilter filter_;
+  optimize::ExtremumSeeking plain_;  // about `taken_over_at_`, once it is at work
+  optimize::Protocol protocol_;
+  optimize::Inputs estimate_, applied_;
+  std::int64_t delay_;
+  bool upwards_ = true;       // side of the next input
+  std::vector<double> sent_;  // inputs on their way through the delay, a ring
+  std::int64_t sent_count_ = 0;
+  double surprise_ = 1.0;  // running mean of the squared normalised innovation
+  std::int64_t doubts_ = 0, since_doubt_ = 0;
+  double doubt_rate_ = 0.0;                            // of late
+  std::array<double, 2> repeat_input_{}, repeat_j_{};  // last reading on either side, to tell noise from misfit
+  std::array<double, 2> repeat_known_{};
+  double repeat_variance_ = 0.0;
+  std::int64_t repeats_ = 0;
+  bool plain_at_work_ = false;
+  double taken_over_at_ = 0.0;
+};
+
+}  // namespace mgdd::guide

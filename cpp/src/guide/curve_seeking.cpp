@@ -1,0 +1,257 @@
+#include "mgdd/guide/curve_seeking.hpp"
+
+#include <algorithm>
+#include <cmath>
+#include <string>
+#include <utility>
+
+#include "mgdd/common/bounds.hpp"
+#include "mgdd/common/text.hpp"
+
+namespace mgdd::guide {
+namespace {
+
+using optimize::Inputs;
+using optimize::Reading;
+using optimize::scalar_input;
+using optimize::TellStatus;
+
+constexpr double prior_share = 0.25;       // of the bounds
+constexpr double amplitude_share = 0.4;    // of prior_sd: the farthest a reading is taken from the estimate
+constexpr double coarsest_share = 0.1;     // of prior_sd between two places of the filter
+constexpr double point_doubt_share = 0.2;  // of prior_sd: how the guide's error may differ from point to point
+constexpr double lost_share = 0.5;         // the same where the guide says nothing of the new point
+
+// A doubt: two readings in a row about three standard deviations off, or several somewhat less.
+constexpr double surprise_memory = 0.8, surprise_cap = 9.0, surprise_limit = 3.2, kept_in_doubt = 0.01;
+constexpr std::int64_t calm_cycles = 10;
+// A hand-over: four doubts within about 80 cycles, or readings that scatter far less than the curve fits.
+constexpr double doubt_memory_cycles = 80.0, doubt_rate_limit = 3.0;
+constexpr double worst_ratio = 0.12, good_ratio = 0.6;  // of the noise seen to what the curve leaves unexplained
+constexpr double repeat_memory = 0.98;
+constexpr std::int64_t fewest_repeats = 60;
+
+constexpr int plain_period = 10;
+constexpr double plain_time_constant = 40.0;
+constexpr double plain_amplitude_share = 0.1;  // of prior_sd
+constexpr double curvature_share = 0.3;        // of prior_sd
+
+CurveSeekingSettings checked(CurveSeekingSettings s) {
+  if (s.space.size() != 1) {
+    throw about("start",
+                ShapeError("start has " + std::to_string(s.space.size()) + " entries: a curve guides one input"));
+  }
+  for (const auto& [name, bound] : {std::pair{"lower", &s.space.lower}, std::pair{"upper", &s.space.upper}}) {
+    if (bound->size() == 1 && !std::isfinite((*bound)[0])) {
+      throw ParameterError(name, (*bound)[0], "must be finite: the guide's curve is placed between the bounds");
+    }
+  }
+  validate(s.space, scalar_input(0.0));
+  const double width = s.space.upper[0] - s.space.lower[0];
+  if (s.prior_sd == 0.0) s.prior_sd = prior_share * width;
+  require_in(above(0.0, 1e12), "prior_sd", s.prior_sd);
+  if (width / (CurveFilter::places - 1) > coarsest_share * s.prior_sd) {
+    throw ParameterError("prior_sd", s.prior_sd,
+                         "must be at least " + text(width / (CurveFilter::places - 1) / coarsest_share) +
+                             " between these bounds; narrow the bounds or raise it");
+  }
+  if (s.amplitude_max == 0.0) s.amplitude_max = amplitude_share * s.prior_sd;
+  require_in(above(0.0, 1e12), "amplitude_max", s.amplitude_max);
+  if (!(s.rate > 0.0)) throw ParameterError("rate", s.rate, "must be > 0");
+  optimize::validate(std::vector{s.sensor});
+  if (s.sensor.delay_cycles > 10000.0) throw ParameterError("delay_cycles", s.sensor.delay_cycles, "must be <= 10000");
+  if (!(s.curve.curvature(curvature_share * s.prior_sd) < 0.0)) {
+    throw about("curve", ParameterError("curve does not bend down at its best input, " + text(s.curve.best()) +
+                                        ": give a guide whose J has a maximum, or a parabola"));
+  }
+  if (!(s.curve.best() >= s.space.lower[0] && s.curve.best() <= s.space.upper[0])) {
+    throw about("curve", ParameterError("curve has its best input at " + text(s.curve.best()) + ": must be in [" +
+                                        text(s.space.lower[0]) + ", " + text(s.space.upper[0]) +
+                                        "], the bounds; widen them or move the curve"));
+  }
+  return s;
+}
+
+CurveFilterSettings filter_settings(const CurveSeekingSettings& s) {
+  const CurveFilterSettings out{s.space.lower[0], s.space.upper[0], s.prior_sd,      s.scale_sd,
+                                s.discrepancy,    s.noise_sd,       s.memory_cycles, s.sensor.lag_cycles};
+  validate(out);
+  return out;
+}
+
+// About an origin that is set when it takes over; amplitude and gain follow from the guide's curvature.
+optimize::ExtremumSeekingSettings plain_settings(const CurveSeekingSettings& s) {
+  const double width = s.space.upper[0] - s.space.lower[0];
+  const double amplitude = std::min(plain_amplitude_share * s.prior_sd, 0.05 * width);
+  optimize::ExtremumSeekingSettings out;
+  const double late = s.sensor.delay_cycles + s.sensor.lag_cycles;
+  const int period = std::max(plain_period, static_cast<int>(std::ceil(2.4 * s.sensor.lag_cycles)));
+  const double tau = std::max({plain_time_constant, 4.0 * period * (late > 0.0 ? 1.0 : 0.0), 3.0 * late});
+  out.space = {scalar_input(0.0), scalar_input(-2.0 * width), scalar_input(2.0 * width)};
+  out.dither.amplitude = scalar_input(amplitude);
+  out.dither.period = period;
+  out.gain = scalar_input(2.0 / (amplitude * std::abs(s.curve.curvature(curvature_share * s.prior_sd)) * tau));
+  out.components = {s.sensor};
+  out.maximize = s.maximize;
+  return out;
+}
+
+}  // namespace
+
+CurveSeeking::CurveSeeking(CurveSeekingSettings settings)
+    : settings_(checked(std::move(settings))),
+      filter_(filter_settings(settings_), settings_.curve),
+      plain_(plain_settings(settings_)),
+      estimate_(settings_.space.start),
+      applied_(estimate_),
+      delay_(std::lround(settings_.sensor.delay_cycles)),
+      sent_(static_cast<std::size_t>(delay_) + 1, 0.0) {}
+
+// As far as the place is uncertain; once it is known, as far as learning its moves costs least: the dither costs
+// |J''| A^2/4 a cycle, the error that it leaves |J''| s^2/2 with s = sigma/(A |J''| sqrt(N)).
+double CurveSeeking::amplitude() const noexcept {
+  const double faded = std::exp(-1.0 / settings_.memory_cycles);
+  const double readings = (1.0 + faded) / (1.0 - faded);
+  const double bend = filter_.curvature();
+  const double cheapest = std::sqrt(filter_.noise_sd() / (std::abs(bend) * std::sqrt(readings)));
+  return std::min(std::max(filter_.search_sd(), cheapest), settings_.amplitude_max);
+}
+
+const Inputs& CurveSeeking::ask() noexcept {
+  if (protocol_.asked) return applied_;
+  const double last = applied_[0];
+  if (plain_at_work_) {
+    applied_[0] = taken_over_at_ + plain_.ask()[0];
+  } else if (sent_count_ == 0) {
+    applied_[0] = estimate_[0];
+  } else {
+    applied_[0] = estimate_[0] + (upwards_ ? amplitude() : -amplitude());
+  }
+  if (protocol_.cycle > 0) applied_[0] = std::clamp(applied_[0], last - settings_.rate, last + settings_.rate);
+  applied_[0] = std::clamp(applied_[0], settings_.space.lower[0], settings_.space.upper[0]);
+  protocol_.asked = true;
+  return applied_;
+}
+
+TellStatus CurveSeeking::tell(const Reading& reading) noexcept {
+  const TellStatus status = protocol_.check(reading, component_count(), limit_count(), 1);
+  protocol_.count(status);
+  if (status != TellStatus::accepted && status != TellStatus::misfire) return status;
+  const double applied = applied_input(reading, applied_)[0];
+  upwards_ = !upwards_;
+  sent_[static_cast<std::size_t>(sent_count_ % (delay_ + 1))] = applied;
+  ++sent_count_;
+  if (plain_at_work_) {
+    const double moved = applied - taken_over_at_;
+    Reading own = reading;
+    own.limits = {};
+    own.applied = {&moved, 1};
+    plain_.tell(own);
+    estimate_[0] = std::clamp(taken_over_at_ + plain_.estimate()[0], settings_.space.lower[0], settings_.space.upper[0]);
+    return status;
+  }
+  if (sent_count_ <= delay_) return status;  // what is read now was caused before the first cycle
+  const double cause = sent_[static_cast<std::size_t>(sent_count_ % (delay_ + 1))];
+  if (status == TellStatus::misfire) {
+    filter_.pass(cause);
+  } else {
+    learn(cause, objective_of(reading, settings_.maximize));
+  }
+  return status;
+}
+
+void CurveSeeking::learn(double cause, double j) noexcept {
+  judge_surprise(cause, j);
+  watch_repeats(cause, j);
+  filter_.learn(cause, j);
+  ++since_doubt_;
+  doubt_rate_ *= std::exp(-1.0 / doubt_memory_cycles);
+  if (surprise_ > surprise_limit && since_doubt_ > calm_cycles) {
+    filter_.forget(kept_in_doubt);
+    surprise_ = 1.0;
+    since_doubt_ = 0;
+    doubt_rate_ += 1.0;
+    ++doubts_;
+  }
+  estimate_[0] = filter_.mean();
+  const bool misfit = repeats_ >= fewest_repeats && !(trust() > 0.0);
+  if (settings_.hand_over && (doubt_rate_ > doubt_rate_limit || misfit)) take_over();
+}
+
+void CurveSeeking::judge_surprise(double input, double j) noexcept {
+  if (!(filter_.readings() > 0.0)) return;
+  const CurveFilter::Prediction expected = filter_.predict(input);
+  const double off = j - expected.mean;
+  surprise_ =
+      surprise_memory * surprise_ + (1.0 - surprise_memory) * std::min(off * off / expected.variance, surprise_cap);
+}
+
+// Two readings of one side, two cycles apart and close together, differ by noise alone: half their squared difference.
+void CurveSeeking::watch_repeats(double input, double j) noexcept {
+  const auto side = static_cast<std::size_t>(sent_count_ % 2);
+  if (repeat_known_[side] > 0.0 && std::abs(input - repeat_input_[side]) < 0.25 * amplitude()) {
+    const double half = 0.5 * (j - repeat_j_[side]) * (j - repeat_j_[side]);
+    ++repeats_;
+    const double share = std::max(1.0 - repeat_memory, 1.0 / static_cast<double>(repeats_));
+    repeat_variance_ += share * (half - repeat_variance_);
+  }
+  repeat_input_[side] = input;
+  repeat_j_[side] = j;
+  repeat_known_[side] = 1.0;
+}
+
+void CurveSeeking::take_over() noexcept {
+  plain_at_work_ = true;
+  taken_over_at_ = estimate_[0];
+  plain_.restart();
+}
+
+bool CurveSeeking::guide(const Curve& curve) noexcept {
+  const bool bends = curve.curvature(curvature_share * settings_.prior_sd) < 0.0;
+  const bool inside = curve.best() >= settings_.space.lower[0] && curve.best() <= settings_.space.upper[0];
+  if (!bends || !inside) {
+    restart();
+    return false;
+  }
+  const double error = estimate_[0] - settings_.curve.best();
+  const double known = filter_.readings() > 0.0 || plain_at_work_ ? filter_.spread() : settings_.prior_sd;
+  const double sd = std::min(std::hypot(known, point_doubt_share * settings_.prior_sd), settings_.prior_sd);
+  const bool learnt = filter_.readings() > 0.0 || plain_at_work_;
+  settings_.curve = curve;
+  const double mean = curve.best() + (learnt ? error : 0.0);
+  estimate_[0] = std::clamp(mean, settings_.space.lower[0], settings_.space.upper[0]);
+  filter_.restart(curve, mean, sd);
+  sent_count_ = 0;
+  surprise_ = 1.0;
+  since_doubt_ = 0;
+  doubt_rate_ = 0.0;
+  repeats_ = 0;
+  repeat_known_.fill(0.0);
+  plain_at_work_ = false;
+  return true;
+}
+
+void CurveSeeking::restart() noexcept {
+  const double sd = std::hypot(filter_.spread(), lost_share * settings_.prior_sd);
+  filter_.restart(settings_.curve, estimate_[0], std::min(sd, settings_.prior_sd));
+  sent_count_ = 0;
+  surprise_ = 1.0;
+  since_doubt_ = 0;
+  doubt_rate_ = 0.0;
+  repeats_ = 0;
+  repeat_known_.fill(0.0);
+  plain_at_work_ = false;
+}
+
+double CurveSeeking::trust() const noexcept {
+  if (plain_at_work_) return 0.0;
+  if (repeats_ < fewest_repeats / 2) return 1.0;
+  const double unexplained = filter_.noise_sd() * filter_.noise_sd();
+  return std::clamp((repeat_variance_ / unexplained - worst_ratio) / (good_ratio - worst_ratio), 0.0, 1.0);
+}
+
+double CurveSeeking::estimate_sd() const noexcept {
+  return plain_at_work_ ? std::numeric_limits<double>::quiet_NaN() : filter_.stated_sd();
+}
+
+}  // namespace mgdd::guide

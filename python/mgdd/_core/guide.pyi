@@ -1,0 +1,200 @@
+"""
+Models that guide a seeker.
+"""
+from __future__ import annotations
+import collections.abc
+import mgdd._core.optimize
+import numpy
+import numpy.typing
+import typing
+__all__: list[str] = ['Curve', 'CurveSeeking']
+class Curve:
+    """
+    What a model says of one quantity over one input: a smooth curve through given points.
+    
+    Between the points runs a cubic, beyond them a straight line.
+    
+    Parameters
+    ----------
+    inputs : array_like, shape (n,)
+        Increasing inputs, three or more, in their unit.
+    values : array_like, shape (n,)
+        What the model says there, in its unit.
+    
+    Raises
+    ------
+    mgdd.errors.ShapeError
+        Fewer than three points, or not one value per input.
+    mgdd.errors.ParameterError
+        A number that is not finite, or inputs that do not increase.
+    
+    Examples
+    --------
+    >>> from mgdd.guide import Curve
+    >>> curve = Curve([-20.0, -10.0, 0.0, 10.0], [-5.0, 0.0, -4.0, -16.0])
+    >>> curve(-10.0), round(curve.best, 1)
+    (0.0, -9.4)
+    >>> round(Curve.parabola(curvature=-0.05, best=-6.0, reach=40.0)(-4.0), 3)
+    -0.1
+    """
+    __hash__: typing.ClassVar[None] = None
+    @staticmethod
+    def _of_table(table: collections.abc.Mapping[str, collections.abc.Sequence[typing.SupportsFloat | typing.SupportsIndex]]) -> Curve:
+        """
+        The curve of such a table.
+        """
+    @staticmethod
+    def parabola(*, curvature: typing.SupportsFloat | typing.SupportsIndex, best: typing.SupportsFloat | typing.SupportsIndex, reach: typing.SupportsFloat | typing.SupportsIndex) -> Curve:
+        """
+        curvature/2 (x - best)^2 on [best - reach, best + reach]; ParameterError unless curvature < 0.
+        """
+    def __call__(self, inputs: typing.Annotated[numpy.typing.ArrayLike, numpy.float64]) -> typing.Any:
+        """
+        Value at one input or at many.
+        """
+    def __eq__(self, arg0: typing.Any) -> bool:
+        ...
+    def __getstate__(self) -> tuple[int, dict[str, list[float]]]:
+        ...
+    def __init__(self, inputs: typing.Annotated[numpy.typing.ArrayLike, numpy.float64], values: typing.Annotated[numpy.typing.ArrayLike, numpy.float64]) -> None:
+        ...
+    def __setstate__(self, arg0: tuple) -> None:
+        ...
+    def curvature(self, reach: typing.SupportsFloat | typing.SupportsIndex) -> float:
+        """
+        Second difference over +-reach about the best input.
+        """
+    @property
+    def _table(self) -> dict[str, list[float]]:
+        """
+        What a file keeps of it.
+        """
+    @property
+    def best(self) -> float:
+        """
+        Input of the largest value.
+        """
+    @property
+    def lower(self) -> float:
+        """
+        First input given.
+        """
+    @property
+    def top(self) -> float:
+        """
+        The largest value.
+        """
+    @property
+    def upper(self) -> float:
+        """
+        Last input given.
+        """
+class CurveSeeking:
+    """
+    Seeking guided by a curve; see mgdd.guide.CurveSeeking.
+    """
+    def __init__(self, *, start: typing.Any, lower: typing.Any, upper: typing.Any, curve: Curve, prior_sd: typing.SupportsFloat | typing.SupportsIndex | None = None, scale_sd: typing.SupportsFloat | typing.SupportsIndex = 0.3, discrepancy: typing.SupportsFloat | typing.SupportsIndex = 0.15, noise_sd: typing.SupportsFloat | typing.SupportsIndex | None = None, memory_cycles: typing.SupportsFloat | typing.SupportsIndex = 143.0, amplitude_max: typing.SupportsFloat | typing.SupportsIndex | None = None, rate: typing.SupportsFloat | typing.SupportsIndex | None = None, delay_cycles: typing.SupportsFloat | typing.SupportsIndex = 0.0, lag_cycles: typing.SupportsFloat | typing.SupportsIndex = 0.0, hand_over: bool = True, maximize: bool = True, limits: collections.abc.Sequence[mgdd._core.optimize.Limit] = []) -> None:
+        ...
+    def _clear_history(self) -> None:
+        """
+        Forget the history, keep the state.
+        """
+    def _history_columns(self) -> dict:
+        """
+        Columns behind .history.
+        """
+    def _set_history_columns(self, columns: collections.abc.Mapping[str, typing.Annotated[numpy.typing.ArrayLike, numpy.float64]]) -> None:
+        """
+        Columns behind .history, as _history_columns gave them.
+        """
+    def ask(self) -> numpy.typing.NDArray[numpy.float64]:
+        """
+        The input to apply in this cycle, shape (inputs,). Asking again before tell gives the same.
+        """
+    def guide(self, curve: Curve) -> bool:
+        """
+        The operating point has changed, and the guide's curve with it.
+        """
+    def restart(self) -> None:
+        """
+        The operating point has changed: forget the window, keep the estimate.
+        """
+    def tell(self, J: typing.Any = None, limits: typing.Any = None, *, misfire: bool = False, applied: typing.Any = None) -> None:
+        """
+        Accept what was measured at the input of the last ask.
+        
+        J: float, or one number per component; limits: one value per limit, in order or by name;
+        misfire: the cycle is counted and its J and limits are not read;
+        applied: what the plant really applied, one number per input; None where it is what was asked for.
+        Raises ParameterError (tell without ask), ShapeError (wrong count), DataError (not finite, or beyond
+        1e30 in magnitude); the state is unchanged then.
+        """
+    @property
+    def component_count(self) -> int:
+        """
+        Components of J that tell takes.
+        """
+    @property
+    def cycle(self) -> int:
+        """
+        Cycles told so far, misfires included.
+        """
+    @property
+    def doubts(self) -> int:
+        """
+        How often the readings were doubted.
+        """
+    @property
+    def estimate(self) -> numpy.typing.NDArray[numpy.float64]:
+        """
+        Present estimate of the optimum, shape (inputs,).
+        """
+    @property
+    def estimate_sd(self) -> float:
+        """
+        Standard deviation of the estimate as stated, in the unit of the input; NaN after a hand-over.
+        """
+    @property
+    def handed_over(self) -> bool:
+        """
+        Whether plain extremum seeking is at work, because the guide kept failing.
+        """
+    @property
+    def limit_names(self) -> list[str]:
+        """
+        Names of the limits, in the order of tell.
+        """
+    @property
+    def misfires(self) -> int:
+        """
+        Misfired cycles told so far.
+        """
+    @property
+    def noise_sd(self) -> float:
+        """
+        Standard deviation of one reading of J, as learnt.
+        """
+    @property
+    def scale(self) -> float:
+        """
+        Curvature of the plant's J over that of the guide, as learnt.
+        """
+    @property
+    def settings(self) -> dict:
+        """
+        Arguments that make this seeker again.
+        """
+    @property
+    def state(self) -> dict[str, list[float]]:
+        """
+        What the run needs to go on bit for bit: named lists of numbers, JSON-able. Setting it restores the run;
+        a state of another kind or size raises ParameterError and changes nothing.
+        """
+    @state.setter
+    def state(self, arg1: collections.abc.Mapping[str, collections.abc.Sequence[typing.SupportsFloat | typing.SupportsIndex]]) -> None:
+        ...
+    @property
+    def trust(self) -> float:
+        """
+        Between 0 and 1: how much of what the curve leaves unexplained is noise; 0 after a hand-over.
+        """

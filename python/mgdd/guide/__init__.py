@@ -1,0 +1,27 @@
+"""Models that guide a seeker: the model leads, the measurements decide.
+
+`CurveSeeking` takes the whole curve of a model, which may stand in the wrong place, and finds from a few measurements
+where it stands; `Curve` holds such a curve.
+
+Examples
+--------
+>>> from mgdd.engine import Cylinder, OperatingPoint, timing_sweep
+>>> from mgdd.guide import Curve, CurveSeeking
+>>> from mgdd.loop import EngineBench
+>>> # twice the wall heat of the bench
+>>> rough = timing_sweep(Cylinder(wall_heat_scale=1.0), OperatingPoint(), soc_cad=range(-45, 21))
+>>> curve = Curve(rough["soc_cad"], 100.0 * rough["efficiency_gross"])
+>>> seeker = CurveSeeking(start=curve.best, lower=-30.0, upper=10.0, curve=curve)
+>>> bench = EngineBench(seed=3)
+>>> for _ in range(40):
+...     seeker.tell(bench.step(seeker.ask()[0])["j"])
+>>> round(curve.best, 1), abs(seeker.estimate[0] - bench.find_optimum()["soc_cad"]) < 1.5
+(-1.5, np.True_)
+"""
+
+from __future__ import annotations
+
+from mgdd._core.guide import Curve
+from mgdd.guide.curve_seeking import CurveSeeking
+
+__all__ = ["Curve", "CurveSeeking"]

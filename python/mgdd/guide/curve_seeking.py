@@ -1,0 +1,80 @@
+"""A model's whole curve as a guide: the curve gives the shape, the measurements give the place."""
+
+from __future__ import annotations
+
+from typing import ClassVar
+
+from mgdd import _core
+from mgdd.optimize.seeker import Seeker
+
+__all__ = ["CurveSeeking"]
+
+
+class CurveSeeking(Seeker, _core.guide.CurveSeeking):
+    """Seeking guided by a curve: a rough model gives the shape of J, the measurements give its place.
+
+    The guide's curve may stand in the wrong place and have the wrong height; every reading of J says where it stands.
+    After a few readings the estimate is near the plant's own best input, wherever the guide's lies. Curvature, noise
+    and level of J are learnt. Readings that the curve cannot explain are doubted and the search begins anew; a guide
+    that keeps failing is given up for plain extremum seeking. With ``Curve.parabola`` no model is needed at all.
+
+    Parameters
+    ----------
+    start : float
+        First input, in its unit; the guide's best input, ``curve.best``, where nothing speaks for another.
+    lower, upper : float
+        Bounds of the applied input, finite.
+    curve : Curve
+        J of the guide over the input, to be maximised; it bends down at its best input, which lies in the bounds.
+    prior_sd : float, optional
+        How far the plant's best input may lie from the guide's, one standard deviation; a quarter of the bounds.
+    scale_sd : float
+        Standard deviation of the plant's curvature over the guide's, about 1 [-].
+    discrepancy : float
+        Error of the curve per unit of its drop: readings far from the best input count less [-].
+    noise_sd : float, optional
+        Standard deviation of one reading [unit of J]; learnt without.
+    memory_cycles : float
+        Readings fade with this time constant; shorter follows a drift faster and costs more dither.
+    amplitude_max : float, optional
+        Largest distance from the estimate that is applied; 0.4 `prior_sd`.
+    rate : float, optional
+        Largest change of the applied input per cycle; none without.
+    delay_cycles, lag_cycles : float
+        Transport delay and time constant between the plant and J [cycles].
+    hand_over : bool
+        Whether a guide that keeps failing is given up for plain extremum seeking.
+    maximize : bool
+        False to minimise J; the curve is that of -J then.
+    limits : sequence of Limit
+        Measured quantities to keep.
+
+    Raises
+    ------
+    mgdd.errors.ParameterError
+        A value outside its domain, infinite bounds, a curve without a maximum between the bounds.
+    mgdd.errors.ShapeError
+        More than one input.
+
+    See Also
+    --------
+    Curve : holds what the model says.
+
+    References
+    ----------
+    Wellstead and Zarrop (1991), Self-tuning systems: control and signal processing.
+    Bucy and Senne (1971), Digital synthesis of non-linear filters.
+
+    Examples
+    --------
+    >>> from mgdd.guide import Curve, CurveSeeking
+    >>> rough = Curve.parabola(curvature=-0.05, best=4.0, reach=40.0)  # 10 too late
+    >>> seeker = CurveSeeking(start=rough.best, lower=-30.0, upper=10.0, curve=rough)
+    >>> for _ in range(8):
+    ...     soi = seeker.ask()[0]
+    ...     seeker.tell(56.0 - 0.0255 * (soi + 6.0) ** 2)
+    >>> abs(seeker.estimate[0] + 6.0) < 0.5
+    np.True_
+    """
+
+    kind: ClassVar[str] = "CurveSeeking"

@@ -1,0 +1,268 @@
+// Curve-guided seeking: arrival wherever the guide's curve stands, delay and lag, jumps, hand-over, protocol, real
+// time.
+#include "mgdd/guide/curve_seeking.hpp"
+
+#include <algorithm>
+#include <cmath>
+#include <functional>
+#include <vector>
+
+#include "support/seeker_case.hpp"
+
+namespace mgdd::guide {
+namespace {
+
+using optimize::Inputs;
+using optimize::scalar_input;
+using optimize::TellStatus;
+
+/// Of the engine: J'' -0.05, a little flatter above.
+double engine_like(double x) {
+  return 56.0 - 0.05 * (std::exp(-0.02 * x) - 1.0 + 0.02 * x) / 0.0004;
+}
+
+CurveSeekingSettings guided(double best, double start) {
+  CurveSeekingSettings s;
+  s.space = {scalar_input(start), scalar_input(-30.0), scalar_input(10.0)};
+  s.curve = Curve::parabola(-0.05, best, 60.0);
+  return s;
+}
+
+/// Estimates before each cycle, on a plant with its best input at `at(cycle)`.
+std::vector<double> seek(CurveSeeking& seeker, int cycles, const std::function<double(int)>& at, double noise_sd,
+                         std::uint64_t seed = 1) {
+  std::vector<double> path{seeker.estimate()[0]};
+  for (int k = 0; k < cycles; ++k) {
+    const double noise = noise_sd * random::normal(seed, 3, static_cast<std::uint64_t>(k));
+    const double j[] = {engine_like(seeker.ask()[0] - at(k)) + noise};
+    EXPECT_EQ(seeker.tell({j, {}, false}), TellStatus::accepted);
+    path.push_back(seeker.estimate()[0]);
+  }
+  return path;
+}
+
+TEST(CurveSeeking, ArrivesWithinFiveCyclesWhereverTheGuideStands) {
+  for (const double best : {-20.0, -12.0, -5.0, 3.0, 8.0}) {
+    for (const double start : {best, -20.0, 5.0}) {
+      CurveSeeking seeker(guided(best, start));
+      const std::vector<double> path = seek(seeker, 200, [](int) { return -6.0; }, 0.0);
+      for (std::size_t k = 6; k < path.size(); ++k)
+        ASSERT_NEAR(path[k], -6.0, 0.6) << "guide " << best << " start " << start << " cycle " << k;
+      EXPECT_NEAR(path.back(), -6.0, 0.1) << "guide " << best << " start " << start;
+    }
+  }
+}
+
+TEST(CurveSeeking, StaysUnderNoiseThatNobodyTold) {
+  double late = 0.0, inside = 0.0;
+  const int seeds = 60, cycles = 300;
+  int lost = 0;
+  for (std::uint64_t seed = 0; seed < seeds; ++seed) {
+    CurveSeeking seeker(guided(3.0, 3.0));
+    std::vector<double> path = seek(seeker, cycles, [](int) { return -6.0; }, 0.25, seed);
+    lost += std::abs(path[40] + 6.0) > 2.5;
+    for (double& x : path)
+      x += 6.0;
+    late += optimize::rms_of(path, cycles / 2, cycles) / seeds;
+    inside += std::abs(path.back()) <= 1.96 * seeker.estimate_sd() ? 1.0 / seeds : 0.0;
+    EXPECT_NEAR(seeker.noise_sd(), 0.25, 0.08);
+    EXPECT_GT(seeker.trust(), 0.5);
+  }
+  EXPECT_LE(late, 0.55);
+  EXPECT_LE(lost, 2);
+  EXPECT_GE(inside, 0.88);
+}
+
+TEST(CurveSeeking, ComesBackAfterAJump) {
+  std::vector<double> back;
+  for (std::uint64_t seed = 0; seed < 40; ++seed) {
+    CurveSeeking seeker(guided(-4.0, -4.0));
+    const std::vector<double> path = seek(seeker, 260, [](int k) { return k < 200 ? -9.0 : -3.0; }, 0.25, seed);
+    double cycles = 60.0;
+    for (int k = 60; k > 0; --k) {
+      if (std::abs(path[static_cast<std::size_t>(200 + k)] + 3.0) > 2.0) break;
+      cycles = k;
+    }
+    back.push_back(cycles);
+  }
+  std::nth_element(back.begin(), back.begin() + 20, back.end());
+  EXPECT_LE(back[20], 8.0);
+}
+
+TEST(CurveSeeking, OneCycleAfterTheFirstReadingBehindASlowSensor) {
+  for (const double believed : {34.0, 38.0, 42.0}) {
+    CurveSeekingSettings settings = guided(-4.0, -20.0);
+    settings.sensor = {believed, 25.0};
+    CurveSeeking seeker(settings);
+    const double share = -std::expm1(-1.0 / 25.0);
+    std::vector<double> sent;
+    double level = engine_like(-20.0 + 6.0);
+    std::size_t first = 0;
+    for (std::size_t k = 0; k < 400; ++k) {
+      sent.push_back(engine_like(seeker.ask()[0] + 6.0));
+      level += share * (sent[k < 38 ? 0 : k - 38] - level);
+      const double j[] = {level + 0.25 * random::normal(9, 1, k)};
+      ASSERT_EQ(seeker.tell({j, {}, false}), TellStatus::accepted);
+      if (first == 0 && std::abs(seeker.estimate()[0] + 6.0) < 3.0) first = k + 1;
+    }
+    EXPECT_LE(first, static_cast<std::size_t>(believed) + 2);
+    EXPECT_NEAR(seeker.estimate()[0], -6.0, 2.5) << believed;
+  }
+}
+
+TEST(CurveSeeking, AGuideOfAnotherPointKeepsTheErrorOfTheFirst) {
+  CurveSeeking seeker(guided(-4.0, -4.0));
+  seek(seeker, 120, [](int) { return -9.0; }, 0.0);
+  EXPECT_NEAR(seeker.estimate()[0], -9.0, 0.2);
+  ASSERT_TRUE(seeker.guide(Curve::parabola(-0.045, 2.0, 60.0)));
+  EXPECT_NEAR(seeker.estimate()[0], -3.0, 0.2) << "five earlier than the guide, as before";
+  const std::vector<double> path = seek(seeker, 60, [](int) { return -4.0; }, 0.1);
+  EXPECT_NEAR(path.back(), -4.0, 0.5);
+}
+
+TEST(CurveSeeking, ACurveThatIsNoneIsRefusedAndThePointCountsAsNew) {
+  CurveSeeking seeker(guided(-4.0, -4.0));
+  seek(seeker, 50, [](int) { return -9.0; }, 0.0);
+  const double before = seeker.estimate()[0], sd = seeker.estimate_sd();
+  const std::vector<double> x{-45.0, -20.0, 20.0}, valley{5.0, 0.0, 9.0};
+  EXPECT_FALSE(seeker.guide(Curve(x, valley)));
+  EXPECT_FALSE(seeker.guide(Curve::parabola(-0.05, 40.0, 60.0)));
+  EXPECT_EQ(seeker.estimate()[0], before);
+  EXPECT_GT(seeker.estimate_sd(), sd);
+  seek(seeker, 60, [](int) { return -12.0; }, 0.0);
+  EXPECT_NEAR(seeker.estimate()[0], -12.0, 0.5);
+}
+
+TEST(CurveSeeking, HandsOverWhereTheGuideIsNothingLikeThePlant) {
+  CurveSeeking seeker(guided(0.0, 0.0));
+  double reach = 0.0;
+  for (int k = 0; k < 900; ++k) {
+    const double x = seeker.ask()[0] + 6.0;
+    const double j[] = {-0.5 * x * x + 0.05 * random::normal(4, 1, static_cast<std::uint64_t>(k))};
+    ASSERT_EQ(seeker.tell({j, {}, false}), TellStatus::accepted);
+    if (k > 700) reach = std::max(reach, std::abs(seeker.estimate()[0] + 6.0));
+  }
+  EXPECT_TRUE(seeker.handed_over());
+  EXPECT_EQ(seeker.trust(), 0.0);
+  EXPECT_LT(reach, 1.5);
+  CurveSeekingSettings settings = guided(0.0, 0.0);
+  settings.hand_over = false;
+  CurveSeeking stubborn(settings);
+  for (int k = 0; k < 900; ++k)
+    optimize::cycle_of(stubborn, [](const Inputs& x) { return -0.5 * (x[0] + 6.0) * (x[0] + 6.0); });
+  EXPECT_FALSE(stubborn.handed_over());
+}
+
+TEST(CurveSeeking, MinimisesWhatItIsTold) {
+  CurveSeekingSettings settings = guided(3.0, 3.0);
+  CurveSeeking up(settings);
+  settings.maximize = false;
+  CurveSeeking down(settings);
+  for (int k = 0; k < 80; ++k) {
+    const auto j = [&](const Inputs& x) { return engine_like(x[0] + 6.0) + 0.1 * (k % 3); };
+    optimize::cycle_of(up, j);
+    optimize::cycle_of(down, [&](const Inputs& x) { return -j(x); });
+    ASSERT_EQ(up.estimate()[0], down.estimate()[0]);
+  }
+}
+
+TEST(CurveSeeking, LearnsFromWhatWasReallyApplied) {
+  CurveSeeking seeker(guided(3.0, 3.0));
+  for (int k = 0; k < 150; ++k) {
+    const double applied[] = {std::max(seeker.ask()[0], -2.5)};
+    const double j[] = {engine_like(applied[0] + 6.0)};
+    ASSERT_EQ(seeker.tell({j, {}, false, applied}), TellStatus::accepted);
+  }
+  EXPECT_LE(seeker.estimate()[0], -2.0);
+  EXPECT_GE(seeker.estimate()[0], -30.0);
+}
+
+TEST(CurveSeeking, StaysInsideBoundsAndRate) {
+  CurveSeekingSettings settings = guided(9.0, 9.0);
+  settings.rate = 1.5;
+  CurveSeeking seeker(settings);
+  double last = seeker.ask()[0];
+  for (int k = 0; k < 200; ++k) {
+    const double x = seeker.ask()[0];
+    ASSERT_LE(std::abs(x - last), 1.5 + 1e-12);
+    ASSERT_GE(x, -30.0);
+    ASSERT_LE(x, 10.0);
+    last = x;
+    optimize::cycle_of(seeker, [](const Inputs& in) { return engine_like(in[0] - 14.0); });  // beyond the bounds
+  }
+  EXPECT_GT(seeker.estimate()[0], 8.0);
+}
+
+TEST(CurveSeeking, ARefusedReadingChangesNothing) {
+  CurveSeeking seeker(guided(3.0, 3.0));
+  seek(seeker, 7, [](int) { return -6.0; }, 0.2);
+  const double one[] = {1.0}, two[] = {1.0, 2.0}, bad[] = {std::nan("")};
+  EXPECT_EQ(seeker.tell({one, {}, false}), TellStatus::not_asked);
+  seeker.ask();
+  const StateColumns before = save_state(seeker);
+  EXPECT_EQ(seeker.tell({two, {}, false}), TellStatus::wrong_component_count);
+  EXPECT_EQ(seeker.tell({one, one, false}), TellStatus::wrong_limit_count);
+  EXPECT_EQ(seeker.tell({bad, {}, false}), TellStatus::not_a_reading);
+  EXPECT_EQ(seeker.tell({one, {}, false, two}), TellStatus::wrong_applied);
+  EXPECT_EQ(save_state(seeker), before);
+  EXPECT_EQ(seeker.tell({bad, {}, true}), TellStatus::misfire);
+}
+
+TEST(CurveSeeking, GoesOnBitForBitFromItsState) {
+  CurveSeekingSettings settings = guided(3.0, -20.0);
+  settings.sensor = {3.0, 2.0};
+  CurveSeeking seeker(settings);
+  for (int cut = 0; cut < 60; ++cut) {
+    seek(seeker, 1, [](int) { return -6.0; }, 0.3, static_cast<std::uint64_t>(cut));
+    CurveSeeking again(settings);
+    restore_state(again, save_state(seeker));
+    CurveSeeking original = seeker;
+    const auto here = [](int) { return -6.0; };
+    ASSERT_EQ(seek(original, 15, here, 0.3, 99), seek(again, 15, here, 0.3, 99)) << cut;
+    ASSERT_EQ(save_state(original), save_state(again));
+  }
+}
+
+TEST(CurveSeeking, TakesNoMemoryAndNeverThrows) {
+  for (const double delay : {0.0, 5.0}) {
+    CurveSeekingSettings settings = guided(3.0, 3.0);
+    settings.sensor = {delay, delay};
+    CurveSeeking seeker(settings);
+    static_assert(noexcept(seeker.ask()) && noexcept(seeker.tell({})) && noexcept(seeker.restart()));
+    static_assert(noexcept(seeker.guide(settings.curve)));
+    const test_support::AllocationCounter counter;
+    for (int k = 0; k < 300; ++k) {
+      const double x = seeker.ask()[0];
+      const double j[] = {(k < 150 ? engine_like(x + 6.0) : engine_like(x - 2.0)) +
+                          0.2 * random::normal(2, 1, static_cast<std::uint64_t>(k))};
+      seeker.tell({j, {}, k % 31 == 5});
+      if (k == 100) seeker.guide(settings.curve);
+      if (k == 200) seeker.restart();
+    }
+    EXPECT_EQ(counter.count(), 0U);
+  }
+}
+
+TEST(CurveSeeking, RefusesGuidesAndBoundsThatItCannotUse) {
+  const auto refused = [](const std::function<void(CurveSeekingSettings&)>& spoil) {
+    CurveSeekingSettings settings = guided(-4.0, -4.0);
+    spoil(settings);
+    try {
+      CurveSeeking{settings};
+    } catch (const Error& error) {
+      return error.field;
+    }
+    return std::string("nothing");
+  };
+  EXPECT_EQ(refused([](auto&) {}), "nothing");
+  EXPECT_EQ(refused([](auto& s) { s.space.upper = scalar_input(optimize::unlimited); }), "upper");
+  EXPECT_EQ(refused([](auto& s) { s.curve = Curve(); }), "curve");
+  EXPECT_EQ(refused([](auto& s) { s.curve = Curve::parabola(-1.0, 11.0, 40.0); }), "curve");
+  EXPECT_EQ(refused([](auto& s) { s.prior_sd = 1.0; }), "prior_sd");
+  EXPECT_EQ(refused([](auto& s) { s.memory_cycles = std::nan(""); }), "memory_cycles");
+  EXPECT_EQ(refused([](auto& s) { s.rate = 0.0; }), "rate");
+  EXPECT_EQ(refused([](auto& s) { s.space.start = optimize::inputs({1.0, 2.0}); }), "start");
+}
+
+}  // namespace
+}  // namespace mgdd::guide
