@@ -42,11 +42,13 @@ BoundedSeeking::BoundedSeeking(BoundedSeekingSettings settings)
       applied_(settings_.space.start),
       estimate_(applied_),
       omega_(applied_),
+      metric_(InputMatrix::Identity(applied_.size(), applied_.size())),
       window_(static_cast<std::size_t>(settings_.dither.period * applied_.size()), 0.0) {
   for (Eigen::Index i = 0; i < omega_.size(); ++i) {
     omega_[i] =
         2.0 * std::numbers::pi * settings_.dither.harmonics[static_cast<std::size_t>(i)] / settings_.dither.period;
   }
+  metric_.diagonal() = settings_.dither.amplitude.cwiseAbs2().cwiseProduct(omega_);  // of the mean drift
 }
 
 const Inputs& BoundedSeeking::ask() noexcept {
@@ -82,7 +84,7 @@ TellStatus BoundedSeeking::tell(const Reading& reading) noexcept {
   for (Eigen::Index i = 0; i < n; ++i)
     step[i] = largest[i] * std::cos(omega_[i] * static_cast<double>(phase) - settings_.kappa * j);
   const Inputs none = Inputs::Zero(n);
-  step = filter_.project(applied_, step, none, largest);
+  step = filter_.project(applied_, step, {settings_.space, none, none, largest, largest, metric_});
   move_within(applied_, step, settings_.space, none, clamp_, largest);
   return status;
 }

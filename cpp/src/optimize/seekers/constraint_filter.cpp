@@ -20,7 +20,17 @@ constexpr std::array<std::pair<LimitMethod, std::string_view>, 3> method_names{{
 constexpr double significance = 2.0;    // standard errors
 constexpr double patience_share = 0.6;  // of the memory, before a limit without a slope is no longer waited for
 constexpr double alarm_cycles = 3.0;    // in a row over the limit
+constexpr double rounding = 1e-9;       // scales: less is not over a limit
 constexpr double barrier_edge = 0.01;   // scaled distance where the logarithm goes on as its tangent
+
+/// The largest share of a step, at most 1, with which every entry stays within `most`.
+double share_within(const Inputs& step, const Inputs& most) noexcept {
+  double share = 1.0;
+  for (Eigen::Index i = 0; i < step.size(); ++i) {
+    if (std::abs(step[i]) > most[i]) share = std::min(share, most[i] / std::abs(step[i]));
+  }
+  return share;
+}
 
 }  // namespace
 
@@ -56,6 +66,9 @@ ConstraintFilter::ConstraintFilter(std::vector<Limit> limits, Eigen::Index input
       patience_(patience_share * memory),
       models_(limits_.size(), LocalModel(inputs, memory)),
       in_a_row_(limits_.size(), 0.0),
+      slopes_(limits_.size(), Inputs::Zero(inputs)),
+      over_(limits_.size(), 0.0),
+      nearest_(limits_.size()),
       good_(Inputs::Zero(inputs)) {
   validate(limits_);
   for (Limit& limit : limits_) {
@@ -89,60 +102,69 @@ double ConstraintFilter::excess(std::size_t i, const Inputs& at, const Inputs& r
   return models_[i].predict(at) + models_[i].slope().cwiseAbs().dot(reach) + limits_[i].margin - limits_[i].upper;
 }
 
-Inputs ConstraintFilter::project(const Inputs& estimate, const Inputs& step, const Inputs& reach,
-                                 const Inputs& rate) noexcept {
+Inputs ConstraintFilter::project(const Inputs& estimate, const Inputs& step, const StepFrame& frame) noexcept {
+  Inputs wish = step;
+  if (active_) {  // along a limit the step keeps its direction
+    wish *= share_within(step, frame.rate);
+  } else {
+    clip_each(wish, frame.rate);
+  }
   active_ = false;
-  if (limits_.empty() || !(models_.front().cycles() > 0.0)) return step;
+  if (limits_.empty() || !(models_.front().cycles() > 0.0)) return wish;
   std::size_t worst = 0;
   double worst_excess = -unlimited;
   for (std::size_t i = 0; i < limits_.size(); ++i) {
-    const double scaled = excess(i, estimate, reach) / limits_[i].scale;
-    if (scaled > worst_excess) {
-      worst_excess = scaled;
+    slopes_[i] = models_[i].slope();
+    over_[i] = excess(i, estimate, frame.reach);
+    if (over_[i] / limits_[i].scale > worst_excess) {
+      worst_excess = over_[i] / limits_[i].scale;
       worst = i;
     }
   }
-  Inputs out = step;
   if (worst_excess > 0.0) {
     active_ = true;
-    if (models_[worst].slope_known(significance)) {
-      const Inputs s = models_[worst].slope();
-      const double over = worst_excess * limits_[worst].scale;
-      out = step - s * ((s.dot(step) + over) / s.squaredNorm());
-    } else if (has_good_ && good_ != estimate) {
-      out = good_ - estimate;
-    } else if (!reach.isZero(0.0) && models_[worst].cycles() < patience_) {
-      out.setZero();
+    if (models_[worst].slope_known(significance)) return turn(estimate, step, frame, worst_excess);
+    if (has_good_ && good_ != estimate) {
+      wish = good_ - estimate;
+      clip_each(wish, frame.rate.cwiseMax(frame.recovery));
+    } else if (!frame.reach.isZero(0.0) && models_[worst].cycles() < patience_) {
+      wish.setZero();
     }  // else the steps go on: they may be the only dither, or no slope may ever show
-    clip_each(out, rate);
-  } else {
-    good_ = estimate;
-    has_good_ = true;
+    return admits(wish) ? wish : turn(estimate, wish, frame, worst_excess);
   }
-  for (int pass = 0; pass < 4; ++pass) {
-    bool changed = false;
-    for (std::size_t i = 0; i < limits_.size(); ++i) {
-      const double allowed = std::max(0.0, excess(i, estimate, reach));
-      const double over = excess(i, estimate + out, reach) - allowed;
-      const Inputs s = models_[i].slope();
-      if (silent(i, allowed)) continue;
-      if (!(over > 1e-12 * limits_[i].scale) || !(s.squaredNorm() > 0.0)) continue;
-      out -= s * (over / s.squaredNorm());
-      changed = active_ = true;
-    }
-    if (!changed) break;
-  }
-  // What projections in turns leave over: a shorter step in the same direction keeps every rate and every limit.
-  const Inputs cap = rate.cwiseMax(step.cwiseAbs());
-  double share = 1.0;
-  for (Eigen::Index i = 0; i < out.size(); ++i) {
-    if (std::abs(out[i]) > cap[i]) share = std::min(share, cap[i] / std::abs(out[i]));
-  }
+  good_ = estimate;
+  has_good_ = true;
+  if (admits(wish)) return wish;
+  active_ = true;
+  return turn(estimate, step, frame, worst_excess);
+}
+
+// True where the step makes no broken limit worse and breaks no other; one that says nothing is not asked.
+bool ConstraintFilter::admits(const Inputs& step) const noexcept {
   for (std::size_t i = 0; i < limits_.size(); ++i) {
-    const double rise = models_[i].slope().dot(out);
-    const double room = std::max(0.0, -excess(i, estimate, reach));
-    if (silent(i, excess(i, estimate, reach))) continue;
-    if (rise > room + 1e-12 * limits_[i].scale) share = std::min(share, room / rise);
+    const double room = std::max(0.0, -over_[i]);
+    if (slopes_[i].dot(step) > room + rounding * limits_[i].scale && !silent(i, over_[i])) return false;
+  }
+  return true;
+}
+
+// Wish and answer are made shorter, not cut entry by entry: what is cut does not point along the limits any more.
+Inputs ConstraintFilter::turn(const Inputs& estimate, const Inputs& step, const StepFrame& frame,
+                              double worst_excess) noexcept {
+  const SearchSpace& space = frame.space;
+  nearest_.begin(step * share_within(step, frame.rate), frame.metric, space.lower + frame.margin - estimate,
+                 space.upper - frame.margin - estimate);
+  for (std::size_t i = 0; i < limits_.size(); ++i) {
+    if (silent(i, over_[i])) continue;
+    const bool back = over_[i] > 0.0 && models_[i].slope_known(significance);
+    nearest_.add(slopes_[i], back ? -over_[i] : std::max(0.0, -over_[i]), limits_[i].scale);
+  }
+  nearest_.solve(worst_excess);
+  const Inputs& out = nearest_.step();
+  double share = share_within(out, frame.rate.cwiseMax(frame.recovery));
+  for (std::size_t i = 0; i < limits_.size(); ++i) {
+    const double rise = slopes_[i].dot(out), room = -over_[i];
+    if (room > 0.0 && rise > room + rounding * limits_[i].scale) share = std::min(share, room / rise);
   }
   return out * share;
 }

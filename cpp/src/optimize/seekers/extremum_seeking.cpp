@@ -88,10 +88,12 @@ ExtremumSeeking::ExtremumSeeking(ExtremumSeekingSettings settings)
       estimate_(settings_.space.start),
       applied_(estimate_),
       gradient_(Inputs::Zero(estimate_.size())),
+      metric_(settings_.gain.cwiseProduct(settings_.dither.amplitude).asDiagonal()),
       held_(settings_.hold_cycles),
       mean_(component_count(), 0.0),
       sum_(gradient_),
       smooth_(gradient_),
+      slow_(gradient_),
       response_(Inputs::Ones(estimate_.size())),
       origin_(component_count(), 0.0) {
   if (settings_.form == MeanRemoval::moving_average) {
@@ -140,13 +142,13 @@ bool ExtremumSeeking::remove_mean(const Reading& reading) noexcept {
   }
   if (settings_.form == MeanRemoval::moving_average && seen_ + 1 < dither_.period()) return false;
   smooth_ += settings_.low_pass * (product - smooth_);
+  slow_ += (smooth_ - slow_) / static_cast<double>(period);
   return true;
 }
 
 void ExtremumSeeking::move(Inputs step, const Inputs& rate) noexcept {
-  clip_each(step, rate);
-  const Inputs reach = settings_.dither.amplitude * share_;
-  step = filter_.project(estimate_, step, reach, rate.cwiseMax(settings_.recovery_rate));
+  const Inputs& a = settings_.dither.amplitude;
+  step = filter_.project(estimate_, step, {settings_.space, a, a * share_, rate, settings_.recovery_rate, metric_});
   if (filter_.active()) ++limited_cycles_;
   move_within(estimate_, step, settings_.space, settings_.dither.amplitude, clamp_, Inputs::Zero(step.size()));
 }
@@ -176,7 +178,8 @@ void ExtremumSeeking::learn(const Reading& reading) noexcept {
   } else if (remove_mean(reading)) {
     gradient_ = (smooth_.cwiseQuotient(a) * (2.0 / share_)).cwiseProduct(response_);
     if (!holding) {
-      move(settings_.gain.cwiseProduct(smooth_) * share_, settings_.rate);
+      // A limit passes what points inwards and turns the rest: of a ripple that would leave a bias.
+      move(settings_.gain.cwiseProduct(filter_.active() ? slow_ : smooth_) * share_, settings_.rate);
       moved_by_alarm = true;
     }
   }
@@ -225,6 +228,7 @@ void ExtremumSeeking::restart() noexcept {
   held_ = settings_.hold_cycles;
   share_ = 1.0;
   smooth_.setZero();
+  slow_.setZero();
   sum_.setZero();
   response_.setOnes();
   limited_cycles_ = 0;

@@ -202,7 +202,8 @@ void GoldenSection::refine() noexcept {
   const Parabola fit = parabola();
   Inputs step = scalar_input(fit.vertex - estimate_[0]);
   clip_each(step, scalar_input(0.25 * reach));
-  step = filter_.project(estimate_, step, scalar_input(reach), scalar_input(reach));
+  const Inputs none = scalar_input(0.0), side = scalar_input(reach);
+  step = filter_.project(estimate_, step, {settings_.space, none, side, side, side, InputMatrix::Ones(1, 1)});
   move_within(estimate_, step, settings_.space, scalar_input(0.0), clamp_, Inputs::Zero(step.size()));
   const double most = widest_share * (settings_.space.upper[0] - settings_.space.lower[0]);
   const double wide = fit.bend < 0.0 ? std::sqrt(8.0 * settings_.noise_sd / -fit.bend) : most;

@@ -40,7 +40,8 @@ GradientDescent::GradientDescent(GradientDescentSettings settings)
       clamp_(settings_.space.size()),
       estimate_(settings_.space.start),
       applied_(estimate_),
-      gradient_(Inputs::Zero(estimate_.size())) {}
+      gradient_(Inputs::Zero(estimate_.size())),
+      metric_(InputMatrix::Identity(estimate_.size(), estimate_.size())) {}
 
 const Inputs& GradientDescent::ask() noexcept {
   applied_ = estimate_;
@@ -71,9 +72,8 @@ TellStatus GradientDescent::tell(const Reading& reading) noexcept {
   stage_ = 0;
   clamp_.close_window();
   Inputs step = settings_.step_size * gradient_;
-  clip_each(step, settings_.rate);
   const Inputs reach = Inputs::Constant(step.size(), settings_.difference);
-  step = filter_.project(estimate_, step, reach, settings_.rate);
+  step = filter_.project(estimate_, step, {settings_.space, reach, reach, settings_.rate, settings_.rate, metric_});
   move_within(estimate_, step, settings_.space, reach, clamp_, Inputs::Zero(step.size()));
   ++iteration_;
   if (converged_at_ < 0 && iteration_ <= settings_.iterations && step.cwiseAbs().maxCoeff() < settings_.tolerance) {

@@ -61,6 +61,7 @@ NewtonSeeking::NewtonSeeking(NewtonSeekingSettings settings)
       estimate_(settings_.space.start),
       applied_(estimate_),
       gradient_(Inputs::Zero(estimate_.size())),
+      slow_(gradient_),
       hessian_(settings_.initial_hessian.asDiagonal()),
       inverse_(settings_.initial_inverse.asDiagonal()),
       held_(settings_.hold_cycles),
@@ -125,15 +126,17 @@ void NewtonSeeking::learn(const Reading& reading) noexcept {
   Inputs step = Inputs::Zero(n);
   if (full) {
     gradient_ = gradient;
+    slow_ += (gradient - slow_) / static_cast<double>(period);
     if (!clamp_.clamped()) {  // a dither that is cut off bends whatever it measures
       hessian_ += settings_.hessian_rate * (sample - hessian_);
       update_inverse();
     }
-    if (!holding) step = inverse_ * gradient * (-1.0 / settings_.time_constant_cycles);
+    // A limit passes what points inwards and turns the rest: of a ripple that would leave a bias.
+    if (!holding) step = inverse_ * (filter_.active() ? slow_ : gradient) * (-1.0 / settings_.time_constant_cycles);
   }
   if ((full && !holding) || filter_.alarmed()) {
-    clip_each(step, settings_.rate);
-    step = filter_.project(estimate_, step, a, settings_.rate);
+    const Inputs& margin = settings_.dither.amplitude;
+    step = filter_.project(estimate_, step, {settings_.space, margin, a, settings_.rate, settings_.rate, -inverse_});
     if (filter_.active()) ++limited_cycles_;
     move_within(estimate_, step, settings_.space, settings_.dither.amplitude, clamp_, Inputs::Zero(step.size()));
   }
@@ -152,6 +155,7 @@ void NewtonSeeking::restart() noexcept {
   held_ = dither_.period();
   share_ = 1.0;
   limited_cycles_ = 0;
+  slow_.setZero();
   filter_.forget();
   clamp_.forget();
 }

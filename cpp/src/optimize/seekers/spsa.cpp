@@ -108,6 +108,7 @@ Spsa::Spsa(SpsaSettings settings)
       sum_(gradient_),
       hessian_(InputMatrix::Identity(estimate_.size(), estimate_.size()) * settings_.initial_hessian),
       hessian_sum_(InputMatrix::Zero(estimate_.size(), estimate_.size())),
+      metric_(InputMatrix::Identity(estimate_.size(), estimate_.size())),
       missed_(InputMatrix::Zero(estimate_.size(), 4)),
       measured_(4, 0.0) {}
 
@@ -238,8 +239,8 @@ void Spsa::finish_gradient(double j, const Inputs& applied) noexcept {
   ++draw_;
 }
 
-// -H^-1 g with H shifted until it bends down in every direction, at least a fifth as much as at the start.
-Inputs Spsa::newton_step() noexcept {
+// -H with H shifted until it bends down in every direction, at least a fifth as much as at the start.
+InputMatrix Spsa::bent_down() noexcept {
   const double q = settings_.averaging;
   const double seen = static_cast<double>(iteration_) + settings_.hessian_prior;
   hessian_ += (hessian_sum_ / q - hessian_) / (seen + 1.0);
@@ -251,7 +252,7 @@ Inputs Spsa::newton_step() noexcept {
   for (double shift = least; Eigen::LLT<InputMatrix>(bent - floor).info() != Eigen::Success && shift < 1e300;
        shift *= 2.0)
     bent.diagonal().array() += shift;
-  return bent.llt().solve(gradient_);
+  return bent;
 }
 
 void Spsa::finish_iteration() noexcept {
@@ -259,15 +260,19 @@ void Spsa::finish_iteration() noexcept {
   sum_.setZero();
   const bool second = settings_.form == SpsaForm::second_order;
   // The noise of a gradient grows with 1/c: the gain follows c squared, so that the estimate does not get rougher.
-  Inputs step = gain_now() * share_ * share_ * (second ? newton_step() : gradient_);
+  Inputs direction = gradient_;
+  if (second) {
+    const Eigen::LLT<InputMatrix> bent(bent_down());
+    direction = bent.solve(gradient_);
+    if (!settings_.limits.empty()) metric_ = bent.solve(InputMatrix::Identity(direction.size(), direction.size()));
+  }
+  Inputs step = gain_now() * share_ * share_ * direction;
   const Inputs most = Inputs::Constant(step.size(), settings_.step_max);
-  clip_each(step, most);
   const Inputs reach = Inputs::Constant(step.size(), perturbation_now() * (second ? 2.0 : 1.0));
-  step = filter_.project(estimate_, step, reach, most);
+  const Inputs widest = Inputs::Constant(step.size(), settings_.perturbation * (second ? 2.0 : 1.0));
+  step = filter_.project(estimate_, step, {settings_.space, widest, reach, most, most, metric_});
   candidate_ = estimate_;
-  const double widest = settings_.perturbation * (second ? 2.0 : 1.0);
-  move_within(candidate_, step, settings_.space, Inputs::Constant(step.size(), widest), clamp_,
-              Inputs::Zero(step.size()));
+  move_within(candidate_, step, settings_.space, widest, clamp_, Inputs::Zero(step.size()));
   share_ += share_rate * ((filter_.active() ? settings_.limit_amplitude : 1.0) - share_);
 }
 

@@ -70,6 +70,7 @@ class BoundedSeeking {
   ClampWatch clamp_;
   Protocol protocol_;
   Inputs applied_, estimate_, omega_;
+  InputMatrix metric_;
   std::int64_t seen_ = 0;
   std::vector<double> window_;  // last M applied inputs
 };

@@ -10,6 +10,7 @@
 #include <vector>
 
 #include "mgdd/optimize/seekers/local_model.hpp"
+#include "mgdd/optimize/seekers/nearest_step.hpp"
 #include "mgdd/optimize/seekers/seeker.hpp"
 
 namespace mgdd::optimize {
@@ -31,6 +32,16 @@ struct Limit {
 };
 void validate(const std::vector<Limit>& limits);
 
+/// How a seeker steps, for the length of one call.
+struct StepFrame {
+  const SearchSpace& space;
+  const Inputs& margin;       ///< room that the estimate keeps to the bounds
+  const Inputs& reach;        ///< of the dither to both sides, now
+  const Inputs& rate;         ///< largest entry of a step
+  const Inputs& recovery;     ///< the same on the way back below a limit; counts where it is larger
+  const InputMatrix& metric;  ///< what turns the slope of J into the step: symmetric, positive definite
+};
+
 class ConstraintFilter {
  public:
   /// `memory` is the number of cycles that the learnt slopes look back.
@@ -51,11 +62,13 @@ class ConstraintFilter {
   /// What has been learnt of limit i.
   const LocalModel& model(std::size_t i) const noexcept { return models_[i]; }
 
-  /// The nearest step to `step` that no limit forbids; where the estimate itself is over a limit, the way back:
-  /// along the learnt slope, or to the last good point while the slope is not known (with no such point the estimate
-  /// stays, unless `reach` is zero and nothing but steps explores, or the limit has been broken for long without
-  /// showing a slope: it cannot say where to go and is not waited for). Each entry stays within `rate`.
-  Inputs project(const Inputs& estimate, const Inputs& step, const Inputs& reach, const Inputs& rate) noexcept;
+  /// The step within its rate, or where a limit forbids that, the nearest one in the metric of the seeker that no limit
+  /// forbids, and that stays within the bounds. Where the estimate itself is over a limit: the way back along the
+  /// learnt slopes, or to the last good point while the slope is not known (with no such point the estimate stays,
+  /// unless the reach is zero and nothing but steps explores, or the limit has been broken for long without showing a
+  /// slope: it cannot say where to go and is not waited for). Limits that cannot be met together are broken by as
+  /// little as possible, counted in their scales.
+  Inputs project(const Inputs& estimate, const Inputs& step, const StepFrame& frame) noexcept;
 
   /// True when the last `project` changed its step.
   bool active() const noexcept { return active_; }
@@ -77,11 +90,16 @@ class ConstraintFilter {
 
  private:
   bool silent(std::size_t i, double excess) const noexcept;
+  bool admits(const Inputs& step) const noexcept;
+  Inputs turn(const Inputs& estimate, const Inputs& step, const StepFrame& frame, double worst_excess) noexcept;
 
   std::vector<Limit> limits_;
   double patience_;                 // cycles that a broken limit is given to show its slope
   std::vector<LocalModel> models_;  // one per limit
   std::vector<double> in_a_row_;
+  std::vector<Inputs> slopes_;  // of the step at work
+  std::vector<double> over_;    // excess at its estimate, in the unit of the limit
+  NearestStep nearest_;
   Inputs good_;
   bool has_good_ = false;
   bool active_ = false;

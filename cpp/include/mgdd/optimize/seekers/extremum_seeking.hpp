@@ -88,6 +88,7 @@ class ExtremumSeeking {
     v("mean", self.mean_);
     v("sum", self.sum_);
     v("smooth", self.smooth_);
+    v("slow", self.slow_);
     v("response", self.response_);
     v("origin", self.origin_);
     v("limited_cycles", self.limited_cycles_);
@@ -108,6 +109,7 @@ class ExtremumSeeking {
   ClampWatch clamp_;
   Protocol protocol_;
   Inputs estimate_, applied_, gradient_;
+  InputMatrix metric_;          // what turns the slope into a step: gain times amplitude, but for a factor
   std::int64_t phase_ = 0;      // of the window
   std::int64_t seen_ = 0;       // cycles since the last restart
   std::int64_t held_ = 0;       // cycles that the estimate is still held
@@ -116,6 +118,7 @@ class ExtremumSeeking {
   std::vector<double> mean_;    // window sum or washout state, per component
   Inputs sum_;                  // demodulated sum of the window
   Inputs smooth_;
+  Inputs slow_;                 // mean of smooth_ over about a window: what steps along a limit
   Inputs response_;             // what the slope is multiplied with where only a part of the dither is applied
   std::vector<double> origin_;  // first reading of the window, taken off before summing
   std::int64_t limited_cycles_ = 0;

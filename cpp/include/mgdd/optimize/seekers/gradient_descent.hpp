@@ -71,6 +71,7 @@ class GradientDescent {
   ClampWatch clamp_;
   Protocol protocol_;
   Inputs estimate_, applied_, gradient_;
+  InputMatrix metric_;
   double above_ = 0.0;         // J at theta + c of the input at work
   double above_missed_ = 0.0;  // how far the plant fell short of theta + c
   std::int64_t stage_ = 0;     // measurement within the step

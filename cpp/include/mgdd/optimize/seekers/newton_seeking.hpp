@@ -66,6 +66,7 @@ class NewtonSeeking {
     v("estimate", self.estimate_);
     v("applied", self.applied_);
     v("gradient", self.gradient_);
+    v("slow", self.slow_);
     v("hessian", self.hessian_);
     v("inverse", self.inverse_);
     v("phase", self.phase_, self.settings_.dither.period);
@@ -88,6 +89,7 @@ class NewtonSeeking {
   ClampWatch clamp_;
   Protocol protocol_;
   Inputs estimate_, applied_, gradient_;
+  Inputs slow_;  // mean of the slope over about a window: what steps along a limit
   InputMatrix hessian_, inverse_;
   std::int64_t phase_ = 0, seen_ = 0, held_ = 0;
   double share_ = 1.0;

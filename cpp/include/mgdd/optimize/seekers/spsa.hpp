@@ -117,7 +117,7 @@ class Spsa {
   void add_slope(double rise, double c, const Inputs& missed) noexcept;
   void finish_gradient(double j, const Inputs& applied) noexcept;
   void finish_iteration() noexcept;
-  Inputs newton_step() noexcept;
+  InputMatrix bent_down() noexcept;
 
   SpsaSettings settings_;
   ConstraintFilter filter_;
@@ -126,6 +126,7 @@ class Spsa {
   Protocol protocol_;
   Inputs estimate_, candidate_, applied_, gradient_, sum_;
   InputMatrix hessian_, hessian_sum_;
+  InputMatrix metric_;            // inverse of the bend, or one
   InputMatrix missed_;            // applied less asked, per input and measurement of the gradient at work
   std::vector<double> measured_;  // of the gradient at work
   std::int64_t iteration_ = 0;    // of the gains
