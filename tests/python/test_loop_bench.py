@@ -46,6 +46,29 @@ def test_without_chance_it_is_the_cycle_model() -> None:
     )
 
 
+def test_pressure_of_the_last_cycle_as_the_sensor_reads_it() -> None:
+    truth = simulate(Cylinder(), OperatingPoint(), soc_cad=-6.0)
+    with pytest.raises(RigError, match="before the first cycle"):
+        EngineBench().pressure()
+    exact = EngineBench(**QUIET)
+    exact.step(-6.0)
+    angle, pressure = exact.pressure()
+    np.testing.assert_array_equal(angle, truth["crank_angle_cad"])
+    np.testing.assert_array_equal(pressure, truth["pressure_bar"])
+    errors = {"pressure_gain_error": 0.01, "pressure_offset_bar": -0.2, "tdc_error_cad": 2.0}
+    wrong = EngineBench(**QUIET, **errors)
+    wrong.step(-6.0)
+    np.testing.assert_allclose(wrong.pressure()[1][3:], 1.01 * pressure[1:-2] - 0.2, rtol=1e-3)
+    noisy = EngineBench(**RICH, **errors, pressure_noise_bar=0.3)
+    silent = EngineBench(**RICH)
+    assert noisy.run(requests(30)).identical(silent.run(requests(30)))
+    again = pickle.loads(pickle.dumps(noisy))
+    assert again.settings["pressure_noise_bar"] == 0.3
+    np.testing.assert_array_equal(again.pressure()[1], noisy.pressure()[1])
+    with pytest.raises(ParameterError, match="tdc_error_cad = 7"):
+        EngineBench(tdc_error_cad=7.0)
+
+
 def test_run_is_labelled_and_complete() -> None:
     out = EngineBench(**RICH).run(requests(80))
     check_labels(out)

@@ -68,6 +68,29 @@ def test_a_minimum_is_refused_as_a_maximum_and_taken_as_a_minimum() -> None:
 
 
 # --- the tuner ----------------------------------------------------------------------------------------------
+@pytest.mark.parametrize("error", [-2, 2])
+@pytest.mark.parametrize("delay", [5, 20])
+def test_a_delay_that_is_wrong_by_two_cycles_is_survived(delay: int, error: int) -> None:
+    tuning = tune(SIGMA, BEND, delay_cycles=delay)
+    assert "may be wrong by" in tuning.summary()
+    bold = tune(SIGMA, BEND, delay_cycles=delay, delay_uncertainty=0.0)
+    assert (bold.period, bold.delay_uncertainty) == (6, 0.0)
+    assert "may be wrong by" not in bold.summary()
+    late = {}
+    for name, made in (("safe", tuning), ("bold", bold)):
+        rng = np.random.default_rng(delay)
+        values = [0.5 * BEND * 12.0**2] * (delay + error)
+
+        def j(x: Any, values: list[float] = values, rng: np.random.Generator = rng) -> float:
+            values.append(0.5 * BEND * x[0] ** 2)
+            return values.pop(0) + rng.normal(0.0, SIGMA)
+
+        path = made.seeker(start=12.0).run(j, int(5 * made.cycles))["estimate"].values[:, 0]
+        late[name] = np.abs(path[-len(path) // 4 :]).max()
+    assert late["safe"] < 6.0
+    assert late["bold"] > 15.0  # 120 deg: the wrong way
+
+
 @pytest.mark.parametrize("method", METHODS)
 def test_the_tuned_seeker_arrives_as_predicted(method: str) -> None:
     tuning = tune(SIGMA, BEND, method=method, distance=12.0, arrival=1.0, cycles=100.0)
@@ -141,6 +164,7 @@ def test_tuning_is_a_value() -> None:
         ({"arrival": 30.0, "distance": 20.0}, "arrival = 30: must be below distance = 20"),
         ({"method": "spsa", "lag_cycles": 3.0}, "without delay and lag"),
         ({"delay_cycles": -1.0}, "delay_cycles = -1"),
+        ({"delay_uncertainty": -1.0}, "delay_uncertainty = -1: must be >= 0 and finite; 0 for"),
     ],
 )
 def test_wishes_are_refused_by_name(arguments: dict[str, Any], message: str) -> None:

@@ -38,6 +38,10 @@ py::dict to_dict(const BenchSettings& s) {
   out["misfire_probability"] = s.misfire_probability;
   out["soc_drift_cad_per_kcycle"] = s.soc_drift_cad_per_kcycle;
   out["wall_heat_drift_per_kcycle"] = s.wall_heat_drift_per_kcycle;
+  out["pressure_noise_bar"] = s.pressure_noise_bar;
+  out["tdc_error_cad"] = s.tdc_error_cad;
+  out["pressure_gain_error"] = s.pressure_gain_error;
+  out["pressure_offset_bar"] = s.pressure_offset_bar;
   out["true_nox"] = s.true_nox;
   out["soft_sensor"] = s.soft_sensor;
   out["analyser"] = s.analyser;
@@ -144,6 +148,7 @@ BoundBench make(const engine::Cylinder& cylinder, const Schedule& schedule,
                 const std::optional<engine::Performance>& performance, const std::string& nox_sensor,
                 const std::vector<std::string>& limits, double soc_scatter_cad, double efficiency_noise_percent,
                 double misfire_probability, double soc_drift_cad_per_kcycle, double wall_heat_drift_per_kcycle,
+                double pressure_noise_bar, double tdc_error_cad, double pressure_gain_error, double pressure_offset_bar,
                 const std::optional<engine::NoxModel>& true_nox, const std::optional<engine::SoftSensor>& soft_sensor,
                 const std::optional<SensorDynamics>& analyser, const std::optional<SensorDynamics>& fast_sensor,
                 bool delay_whole_objective, double step_cad, const std::string& integrator, std::uint64_t seed) {
@@ -160,6 +165,10 @@ BoundBench make(const engine::Cylinder& cylinder, const Schedule& schedule,
   s.misfire_probability = misfire_probability;
   s.soc_drift_cad_per_kcycle = soc_drift_cad_per_kcycle;
   s.wall_heat_drift_per_kcycle = wall_heat_drift_per_kcycle;
+  s.pressure_noise_bar = pressure_noise_bar;
+  s.tdc_error_cad = tdc_error_cad;
+  s.pressure_gain_error = pressure_gain_error;
+  s.pressure_offset_bar = pressure_offset_bar;
   s.true_nox = true_nox.value_or(s.true_nox);
   s.soft_sensor = soft_sensor.value_or(s.soft_sensor);
   s.analyser = analyser.value_or(s.analyser);
@@ -237,10 +246,12 @@ void bind_engine_bench(py::module_& m) {
            arg("soc_scatter_cad") = d.soc_scatter_cad, arg("efficiency_noise_percent") = d.efficiency_noise_percent,
            arg("misfire_probability") = d.misfire_probability,
            arg("soc_drift_cad_per_kcycle") = d.soc_drift_cad_per_kcycle,
-           arg("wall_heat_drift_per_kcycle") = d.wall_heat_drift_per_kcycle, arg("true_nox") = py::none(),
-           arg("soft_sensor") = py::none(), arg("analyser") = py::none(), arg("fast_sensor") = py::none(),
-           arg("delay_whole_objective") = d.delay_whole_objective, arg("step_cad") = d.step_cad,
-           arg("integrator") = std::string(to_string(d.integrator)), arg("seed") = d.seed)
+           arg("wall_heat_drift_per_kcycle") = d.wall_heat_drift_per_kcycle,
+           arg("pressure_noise_bar") = d.pressure_noise_bar, arg("tdc_error_cad") = d.tdc_error_cad,
+           arg("pressure_gain_error") = d.pressure_gain_error, arg("pressure_offset_bar") = d.pressure_offset_bar,
+           arg("true_nox") = py::none(), arg("soft_sensor") = py::none(), arg("analyser") = py::none(),
+           arg("fast_sensor") = py::none(), arg("delay_whole_objective") = d.delay_whole_objective,
+           arg("step_cad") = d.step_cad, arg("integrator") = std::string(to_string(d.integrator)), arg("seed") = d.seed)
       .def(
           "step",
           [](B& b, double soc_cad) {
@@ -260,6 +271,15 @@ void bind_engine_bench(py::module_& m) {
             bench->reset(seed.value_or(bench->seed()));
           },
           arg("seed") = py::none(), "Back to cycle 0, with another seed if given.")
+      .def(
+          "pressure_columns",
+          [](B& b) {
+            const auto bench = b.use();
+            const loop::PressureTrace trace = bench->pressure();
+            return std::pair(to_array({trace.angle_cad.begin(), trace.angle_cad.end()}),
+                             to_array({trace.pressure_bar.begin(), trace.pressure_bar.end()}));
+          },
+          "Angles and pressure of the last cycle as the sensor reads them; both empty before the first.")
       .def_property(
           "state", [](const B& b) { return save_state(*b.use()); },
           [](B& b, const StateColumns& state) { restore_state(*b.use(), state); },

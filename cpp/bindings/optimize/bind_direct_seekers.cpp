@@ -105,14 +105,16 @@ void bind_tuner(py::module_& m) {
   m.def(
       "tune",
       [](double noise_sd, double curvature, const std::string& method, double delay_cycles, double lag_cycles,
-         bool compensated, std::optional<double> rms, std::optional<double> cycles, std::optional<double> distance,
-         std::optional<double> arrival, std::optional<double> amplitude_max) {
+         bool compensated, std::optional<double> delay_uncertainty, std::optional<double> rms,
+         std::optional<double> cycles, std::optional<double> distance, std::optional<double> arrival,
+         std::optional<double> amplitude_max) {
         TuningSpec w;
         w.method = parse_tuned_method(method);
         w.noise_sd = noise_sd;
         w.curvature = curvature;
         w.lag = {delay_cycles, lag_cycles};
         w.compensated = compensated;
+        w.delay_uncertainty = delay_uncertainty.value_or(nan);
         w.rms = rms.value_or(nan);
         w.cycles = cycles.value_or(nan);
         w.distance = distance.value_or(nan);
@@ -132,13 +134,14 @@ void bind_tuner(py::module_& m) {
         out["jitter_cost"] = t.jitter_cost;
         out["sensor_gain"] = t.sensor_gain;
         out["sensor_phase_deg"] = t.sensor_phase_rad * 180.0 / std::numbers::pi;
+        out["delay_uncertainty"] = t.delay_uncertainty;
         out["met"] = t.met;
         out["reasons"] = t.reasons;
         return out;
       },
       py::kw_only(), py::arg("noise_sd"), py::arg("curvature"), py::arg("method"), py::arg("delay_cycles"),
-      py::arg("lag_cycles"), py::arg("compensated"), py::arg("rms"), py::arg("cycles"), py::arg("distance"),
-      py::arg("arrival"), py::arg("amplitude_max"), "Behind mgdd.optimize.tune.");
+      py::arg("lag_cycles"), py::arg("compensated"), py::arg("delay_uncertainty"), py::arg("rms"), py::arg("cycles"),
+      py::arg("distance"), py::arg("arrival"), py::arg("amplitude_max"), "Behind mgdd.optimize.tune.");
 }
 
 }  // namespace

@@ -87,6 +87,8 @@ EngineBench::EngineBench(const BenchSettings& settings)
     : settings_(checked(settings)),
       model_(settings_.cylinder, engine::crank_grid(settings_.cylinder, settings_.step_cad), settings_.integrator),
       work_(model_.make_workspace()),
+      pressure_sensor_(model_, {settings_.pressure_noise_bar, settings_.tdc_error_cad, settings_.pressure_gain_error,
+                                settings_.pressure_offset_bar}),
       limit_members_(members_of(settings_.limits)),
       closed_(closed_part(settings_.cylinder)),
       window_(timing_window(settings_.cylinder)),
@@ -139,8 +141,8 @@ double EngineBench::analyser_gain() const noexcept {
   return prepared_[index_at(cycle_)].analyser_gain;
 }
 
-double EngineBench::noise(BenchStream stream) const noexcept {
-  return random::normal(seed_, static_cast<std::uint64_t>(stream), static_cast<std::uint64_t>(cycle_));
+double EngineBench::noise_at(BenchStream stream, std::int64_t cycle) const noexcept {
+  return random::normal(seed_, static_cast<std::uint64_t>(stream), static_cast<std::uint64_t>(cycle));
 }
 
 void EngineBench::drift_to(std::int64_t cycle) noexcept {
@@ -153,6 +155,29 @@ void EngineBench::drift_to(std::int64_t cycle) noexcept {
 
 double EngineBench::drifted_soc_cad(double soc_cad, std::int64_t cycle) const noexcept {
   return soc_cad + settings_.soc_drift_cad_per_kcycle * kcycles(cycle);
+}
+
+// Drift must not carry the burn out of the cycle.
+double EngineBench::burning_soc_cad(double soc_cad, std::int64_t cycle) const noexcept {
+  double burning = drifted_soc_cad(soc_cad, cycle);
+  if (settings_.soc_scatter_cad > 0.0) burning += settings_.soc_scatter_cad * noise_at(BenchStream::soc, cycle);
+  return std::clamp(burning, closed_[0], closed_[1]);
+}
+
+bool EngineBench::misfires_at(std::int64_t cycle) const noexcept {
+  return random::bernoulli(settings_.misfire_probability, seed_, static_cast<std::uint64_t>(BenchStream::misfire),
+                           static_cast<std::uint64_t>(cycle));
+}
+
+// The noise of a cycle is a function of its number, so the state needs no trace.
+PressureTrace EngineBench::pressure() noexcept {
+  if (cycle_ == 0) return {};
+  const std::int64_t last = cycle_ - 1;
+  drift_to(last);
+  engine::Charge<double> charge = prepared_[index_at(last)].charge;
+  if (misfires_at(last)) charge.fuel_heat_j = 0.0;
+  model_.run(charge, burning_soc_cad(last_soc_cad_, last), work_);
+  return pressure_sensor_.read(model_, work_, seed_, static_cast<std::uint64_t>(BenchStream::pressure), last);
 }
 
 std::array<double, max_limits> EngineBench::noise_free_limits(std::int64_t cycle, double soc_cad) noexcept {
@@ -210,11 +235,8 @@ BenchCycle EngineBench::step(double soc_cad) noexcept {
   drift_to(cycle_);
   if (cycle_ == 0) start(at, applied);
 
-  c.soc_cad = drifted_soc_cad(applied, cycle_);
-  if (settings_.soc_scatter_cad > 0.0) c.soc_cad += settings_.soc_scatter_cad * noise(BenchStream::soc);
-  c.soc_cad = std::clamp(c.soc_cad, closed_[0], closed_[1]);  // drift must not carry the burn out of the cycle
-  c.misfire = random::bernoulli(settings_.misfire_probability, seed_, static_cast<std::uint64_t>(BenchStream::misfire),
-                                static_cast<std::uint64_t>(cycle_));
+  c.soc_cad = burning_soc_cad(applied, cycle_);
+  c.misfire = misfires_at(cycle_);
   c.indicators = burn(at, c.soc_cad, c.misfire, c.unphysical);
   if (settings_.efficiency_noise_percent > 0.0 && !c.misfire && !c.unphysical) {
     const double points = settings_.efficiency_noise_percent * noise(BenchStream::efficiency);

@@ -32,6 +32,11 @@ constexpr std::array setting_fields{
         {"soc_drift_cad_per_kcycle", "°CA", closed(-100.0, 100.0), "offset of SOC per 1000 cycles"}),
     field<&S::wall_heat_drift_per_kcycle>(
         {"wall_heat_drift_per_kcycle", "-", closed(-100.0, 100.0), "change of wall_heat_scale per 1000 cycles"}),
+    field<&S::pressure_noise_bar>({"pressure_noise_bar", "bar", closed(0.0, 20.0), "standard deviation of a sample"}),
+    field<&S::tdc_error_cad>({"tdc_error_cad", "°CA", closed(-5.0, 5.0), "angles of the trace read that much high"}),
+    field<&S::pressure_gain_error>(
+        {"pressure_gain_error", "-", closed(-0.5, 0.5), "share by which pressure reads high"}),
+    field<&S::pressure_offset_bar>({"pressure_offset_bar", "bar", closed(-5.0, 5.0), "error of pegging"}),
 };
 
 // The refusal of another room, with the field of the bench in front.

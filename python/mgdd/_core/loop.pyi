@@ -93,7 +93,7 @@ class EngineBench:
     """
     def __getstate__(self) -> tuple[int, dict, dict[str, list[float]]]:
         ...
-    def __init__(self, *, cylinder: mgdd._core.engine.Cylinder, schedule: collections.abc.Sequence[tuple[typing.SupportsInt | typing.SupportsIndex, mgdd._core.engine.OperatingPoint]], performance: mgdd._core.engine.Performance | None = None, nox_sensor: str = 'soft', limits: collections.abc.Sequence[str] = [], soc_scatter_cad: typing.SupportsFloat | typing.SupportsIndex = 0.3, efficiency_noise_percent: typing.SupportsFloat | typing.SupportsIndex = 0.25, misfire_probability: typing.SupportsFloat | typing.SupportsIndex = 0.0, soc_drift_cad_per_kcycle: typing.SupportsFloat | typing.SupportsIndex = 0.0, wall_heat_drift_per_kcycle: typing.SupportsFloat | typing.SupportsIndex = 0.0, true_nox: mgdd._core.engine.NoxModel | None = None, soft_sensor: mgdd._core.engine.SoftSensor | None = None, analyser: SensorDynamics | None = None, fast_sensor: SensorDynamics | None = None, delay_whole_objective: bool = False, step_cad: typing.SupportsFloat | typing.SupportsIndex = 1.0, integrator: str = 'trapezoid', seed: typing.SupportsInt | typing.SupportsIndex = 0) -> None:
+    def __init__(self, *, cylinder: mgdd._core.engine.Cylinder, schedule: collections.abc.Sequence[tuple[typing.SupportsInt | typing.SupportsIndex, mgdd._core.engine.OperatingPoint]], performance: mgdd._core.engine.Performance | None = None, nox_sensor: str = 'soft', limits: collections.abc.Sequence[str] = [], soc_scatter_cad: typing.SupportsFloat | typing.SupportsIndex = 0.3, efficiency_noise_percent: typing.SupportsFloat | typing.SupportsIndex = 0.25, misfire_probability: typing.SupportsFloat | typing.SupportsIndex = 0.0, soc_drift_cad_per_kcycle: typing.SupportsFloat | typing.SupportsIndex = 0.0, wall_heat_drift_per_kcycle: typing.SupportsFloat | typing.SupportsIndex = 0.0, pressure_noise_bar: typing.SupportsFloat | typing.SupportsIndex = 0.0, tdc_error_cad: typing.SupportsFloat | typing.SupportsIndex = 0.0, pressure_gain_error: typing.SupportsFloat | typing.SupportsIndex = 0.0, pressure_offset_bar: typing.SupportsFloat | typing.SupportsIndex = 0.0, true_nox: mgdd._core.engine.NoxModel | None = None, soft_sensor: mgdd._core.engine.SoftSensor | None = None, analyser: SensorDynamics | None = None, fast_sensor: SensorDynamics | None = None, delay_whole_objective: bool = False, step_cad: typing.SupportsFloat | typing.SupportsIndex = 1.0, integrator: str = 'trapezoid', seed: typing.SupportsInt | typing.SupportsIndex = 0) -> None:
         ...
     def __repr__(self) -> str:
         ...
@@ -107,6 +107,10 @@ class EngineBench:
     def point_at(self, cycle: typing.SupportsInt | typing.SupportsIndex) -> mgdd._core.engine.OperatingPoint:
         """
         Operating point of a cycle.
+        """
+    def pressure_columns(self) -> tuple[numpy.typing.NDArray[numpy.float64], numpy.typing.NDArray[numpy.float64]]:
+        """
+        Angles and pressure of the last cycle as the sensor reads them; both empty before the first.
         """
     def reset(self, seed: typing.SupportsInt | typing.SupportsIndex | None = None) -> None:
         """

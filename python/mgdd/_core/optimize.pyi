@@ -936,7 +936,7 @@ def least_squares(fun: collections.abc.Callable, x0: typing.Annotated[numpy.typi
     """
     Minimise sum(residual^2) / 2 for `fun(x) -> (residual, jacobian)`; None refuses a point.
     """
-def tune(*, noise_sd: typing.SupportsFloat | typing.SupportsIndex, curvature: typing.SupportsFloat | typing.SupportsIndex, method: str, delay_cycles: typing.SupportsFloat | typing.SupportsIndex, lag_cycles: typing.SupportsFloat | typing.SupportsIndex, compensated: bool, rms: typing.SupportsFloat | typing.SupportsIndex | None, cycles: typing.SupportsFloat | typing.SupportsIndex | None, distance: typing.SupportsFloat | typing.SupportsIndex | None, arrival: typing.SupportsFloat | typing.SupportsIndex | None, amplitude_max: typing.SupportsFloat | typing.SupportsIndex | None) -> dict:
+def tune(*, noise_sd: typing.SupportsFloat | typing.SupportsIndex, curvature: typing.SupportsFloat | typing.SupportsIndex, method: str, delay_cycles: typing.SupportsFloat | typing.SupportsIndex, lag_cycles: typing.SupportsFloat | typing.SupportsIndex, compensated: bool, delay_uncertainty: typing.SupportsFloat | typing.SupportsIndex | None, rms: typing.SupportsFloat | typing.SupportsIndex | None, cycles: typing.SupportsFloat | typing.SupportsIndex | None, distance: typing.SupportsFloat | typing.SupportsIndex | None, arrival: typing.SupportsFloat | typing.SupportsIndex | None, amplitude_max: typing.SupportsFloat | typing.SupportsIndex | None) -> dict:
     """
     Behind mgdd.optimize.tune.
     """

@@ -17,8 +17,9 @@ from mgdd.presets import Preset
 from mgdd.results.describe import as_html, rows_of
 
 if TYPE_CHECKING:
+    import numpy as np
     import xarray as xr
-    from numpy.typing import ArrayLike
+    from numpy.typing import ArrayLike, NDArray
 
 __all__ = ["EngineBench"]
 
@@ -53,6 +54,9 @@ class EngineBench(_core.loop.EngineBench):
         Of each cycle [-].
     soc_drift_cad_per_kcycle, wall_heat_drift_per_kcycle : float
         Offset of SOC [°CA] and of the wall-heat scale [-] per 1000 cycles.
+    pressure_noise_bar, tdc_error_cad, pressure_gain_error, pressure_offset_bar : float
+        Of the pressure sensor: standard deviation of each sample [bar], by how much its angles [°CA] and its pressure
+        [-] read high, and its offset [bar]. Only `pressure` shows them: indicators are those of the true pressure.
     true_nox : NoxModel, optional
         NOx of the plant from its own maximum gas temperature; an Arrhenius map if left out.
     soft_sensor : SoftSensor, optional
@@ -97,6 +101,10 @@ class EngineBench(_core.loop.EngineBench):
         misfire_probability: float = 0.0,
         soc_drift_cad_per_kcycle: float = 0.0,
         wall_heat_drift_per_kcycle: float = 0.0,
+        pressure_noise_bar: float = 0.0,
+        tdc_error_cad: float = 0.0,
+        pressure_gain_error: float = 0.0,
+        pressure_offset_bar: float = 0.0,
         true_nox: NoxModel | None = None,
         soft_sensor: SoftSensor | None = None,
         analyser: SensorDynamics | None = None,
@@ -129,6 +137,10 @@ class EngineBench(_core.loop.EngineBench):
             misfire_probability=misfire_probability,
             soc_drift_cad_per_kcycle=soc_drift_cad_per_kcycle,
             wall_heat_drift_per_kcycle=wall_heat_drift_per_kcycle,
+            pressure_noise_bar=pressure_noise_bar,
+            tdc_error_cad=tdc_error_cad,
+            pressure_gain_error=pressure_gain_error,
+            pressure_offset_bar=pressure_offset_bar,
             true_nox=true_nox,
             soft_sensor=soft_sensor,
             analyser=analyser,
@@ -193,6 +205,34 @@ class EngineBench(_core.loop.EngineBench):
             noise_free_limits=dict(zip(self.limit_names, map(float, noise_free), strict=True)),
             applied={"soc_cad": float(cycle["soc_applied_cad"])},
         )
+
+    def pressure(self) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
+        """Return the pressure trace of the last cycle as the sensor reads it.
+
+        Returns
+        -------
+        angle_cad, pressure_bar : ndarray
+            Angles as the encoder labels them, IVC to EVO [°CA aTDC], and pressure [bar]; NaN where no such cycle
+            exists. Reading it again gives the same, also after `state` was restored.
+
+        Raises
+        ------
+        mgdd.errors.RigError
+            No cycle has run yet.
+
+        Examples
+        --------
+        >>> from mgdd.loop import EngineBench
+        >>> bench = EngineBench(soc_scatter_cad=0.0, pressure_gain_error=0.01)
+        >>> cycle = bench.step(-6.0)
+        >>> angle_cad, pressure_bar = bench.pressure()
+        >>> float(pressure_bar.max().round(1))
+        108.2
+        """
+        angle, pressure = self.pressure_columns()
+        if not len(angle):
+            raise RigError("pressure() before the first cycle: step the bench first")
+        return angle, pressure
 
     def run(self, soc_cad: ArrayLike) -> xr.Dataset:
         """Run one cycle per requested start of combustion, without the GIL.

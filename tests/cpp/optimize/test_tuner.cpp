@@ -114,6 +114,74 @@ TEST(Tuner, AnUnknownLagAsksForADitherSlowEnoughToKeepTheSign) {
   EXPECT_GT(t.cycles, 3.0 * compensated.cycles);
 }
 
+/// Largest distance from the optimum over the last quarter of a run whose sensor is later than the seeker believes.
+double lost_by(const Tuning& t, const ComponentLag& believed, int delay, double lag, std::uint64_t seed) {
+  const double start = seed % 2 == 0 ? 12.0 : -12.0;
+  Seeker any = seeker_of(t, start, seed, believed);
+  test_support::LaggedSensor sensor(delay, lag, quadratic(start));
+  const auto late = [&](double x) { return sensor.show(quadratic(x)); };
+  const int cycles = static_cast<int>(6.0 * t.cycles);
+  const std::vector<double> path = std::visit([&](auto& s) { return search(s, late, cycles, sigma, seed); }, any);
+  double farthest = 0.0;
+  for (std::size_t k = path.size() - path.size() / 4; k < path.size(); ++k)
+    farthest = std::max(farthest, std::abs(path[k]));
+  return farthest;
+}
+
+TEST(Tuner, ADelayKnownToTwoCyclesLosesNoRun) {
+  for (const TunedMethod method : {TunedMethod::batch, TunedMethod::moving_average}) {
+    for (const int delay : {5, 10, 20}) {
+      TuningSpec w = default_wish(method);
+      w.lag = {static_cast<double>(delay), 0.0};
+      const Tuning t = tune(w);
+      for (const int error : {-2, 0, 2}) {
+        for (std::uint64_t seed = 0; seed < 20; ++seed)
+          EXPECT_LT(lost_by(t, w.lag, delay + error, 0.0, seed), 6.0)
+              << to_string(method) << " delay " << delay << " error " << error << " seed " << seed;
+      }
+    }
+  }
+}
+
+TEST(Tuner, ALagKnownToAFifthLosesNoRun) {
+  for (const TunedMethod method : {TunedMethod::batch, TunedMethod::moving_average}) {
+    for (const ComponentLag believed : {ComponentLag{0.0, 4.0}, {5.0, 10.0}, {38.0, 25.0}}) {
+      TuningSpec w = default_wish(method);
+      w.lag = believed;
+      const Tuning t = tune(w);
+      const double off = t.delay_uncertainty;
+      EXPECT_NEAR(off, std::max(2.0, 0.2 * (believed.delay_cycles + believed.lag_cycles)), 1e-12);
+      for (const double share : {-1.0, 1.0}) {  // all of the error in the lag, then as much as can be in the delay
+        const double lag = std::max(0.0, believed.lag_cycles + share * off);
+        const SensorResponse thought = sensor_response(believed, 1, t.period);
+        const SensorResponse real = sensor_response({believed.delay_cycles, lag}, 1, t.period);
+        EXPECT_LT(std::abs(real.phase_rad - thought.phase_rad), pi / 3.0);
+        const int delay = static_cast<int>(std::max(0.0, std::trunc(believed.delay_cycles + share * off)));
+        for (std::uint64_t seed = 0; seed < 10; ++seed) {
+          EXPECT_LT(lost_by(t, believed, static_cast<int>(believed.delay_cycles), lag, seed), 6.0);
+          EXPECT_LT(lost_by(t, believed, delay, believed.lag_cycles, seed), 6.0);
+        }
+      }
+    }
+  }
+}
+
+TEST(Tuner, AnExactDelayKeepsItsShortPeriod) {
+  TuningSpec w = default_wish();
+  w.lag = {10.0, 0.0};
+  w.delay_uncertainty = 0.0;
+  EXPECT_EQ(tune(w).period, 6);
+  w.delay_uncertainty = 3.0;
+  EXPECT_EQ(tune(w).period, 18);
+  w.compensated = false;
+  EXPECT_EQ(tune(w).period, 6 * (10 + 3));
+  w = default_wish();  // nobody said delay: none is provided for, unless asked
+  EXPECT_EQ(tune(w).period, 6);
+  EXPECT_EQ(tune(w).delay_uncertainty, 0.0);
+  w.delay_uncertainty = 2.0;
+  EXPECT_EQ(tune(w).period, 12);
+}
+
 TEST(Tuner, SaysPlainlyWhatCannotBeMet) {
   TuningSpec w = default_wish();
   w.cycles = 10.0;
@@ -148,6 +216,9 @@ TEST(Tuner, RefusesByName) {
   EXPECT_NE(message([](auto& w) { w.cycles = 0.0; }).find("cycles = 0"), std::string::npos);
   EXPECT_NE(message([](auto& w) { w.arrival = 12.0; }).find("must be below distance = 12"), std::string::npos);
   EXPECT_NE(message([](auto& w) { w.lag.delay_cycles = -1.0; }).find("delay_cycles = -1"), std::string::npos);
+  EXPECT_NE(message([](auto& w) { w.delay_uncertainty = -0.5; }).find("delay_uncertainty = -0.5"), std::string::npos);
+  EXPECT_NE(message([](auto& w) { w.delay_uncertainty = unlimited; }).find("delay_uncertainty = inf"),
+            std::string::npos);
   EXPECT_NE(message([](auto& w) {
               w.method = TunedMethod::spsa;
               w.lag.lag_cycles = 5.0;

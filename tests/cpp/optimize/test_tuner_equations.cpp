@@ -72,6 +72,7 @@ TEST(TunerEquations, ADitherWithoutLag) {
 TEST(TunerEquations, ADitherBehindALag) {
   TuningSpec w = full_wish(TunedMethod::batch);
   w.cycles = 900.0;
+  w.delay_uncertainty = 0.0;
   w.lag = {7.0, 11.0};
   const SensorResponse known = sensor_response(w.lag, 1, 27);  // 2.4 x 11 cycles, rounded up
   expect_dithered(w, {27, 108.0, known.gain, known.phase_rad});
@@ -95,6 +96,34 @@ TEST(TunerEquations, ADitherBehindALag) {
   w.compensated = false;
   w.lag = {};
   expect_dithered(w, {10, 20.0, 1.0, 0.0});
+}
+
+TEST(TunerEquations, ADoubtOfTheDelayLengthensThePeriod) {
+  TuningSpec w = full_wish(TunedMethod::batch);
+  w.cycles = 900.0;
+  const auto period_is = [&w](const ComponentLag& lag, int period) {
+    w.lag = lag;
+    const SensorResponse r = sensor_response(lag, 1, period);
+    const double whole = lag.delay_cycles + lag.lag_cycles;
+    const double tau_least = std::max((w.compensated ? 4.0 : 2.0) * period, 3.0 * (whole + tune(w).delay_uncertainty));
+    expect_dithered(w, {period, tau_least, r.gain, r.phase_rad});
+  };
+  period_is({5.0, 0.0}, 12);    // two cycles at least
+  period_is({38.0, 25.0}, 76);  // a fifth of 63
+  period_is({1.0, 40.0}, 96);   // 2.4 x 40 is longer than six fifths of 41
+  w.delay_uncertainty = 0.7;
+  period_is({70.0, 0.0}, 6);
+  w.delay_uncertainty = 4.3;
+  period_is({70.0, 0.0}, 26);
+  w.method = TunedMethod::moving_average;
+  w.delay_uncertainty = 1.5;
+  period_is({5.0, 0.0}, 10);
+  w.method = TunedMethod::batch;
+  w.compensated = false;
+  period_is({5.0, 3.0}, 57);
+  w = full_wish(TunedMethod::spsa);
+  w.delay_uncertainty = 1.0;
+  EXPECT_THROW(tune(w), ParameterError);
 }
 
 TEST(TunerEquations, SpsaWithAConstantGain) {
@@ -146,6 +175,7 @@ TEST(TunerEquations, WhatIsLeftOpenScalesWithTheLengthOfTheNoise) {
   open.noise_sd = 0.4;
   open.curvature = 0.1;
   open.lag = {7.0, 11.0};
+  open.delay_uncertainty = 0.0;
   const Tuning t = tune(open);
   EXPECT_NEAR(t.time_constant_cycles, 108.0, 1e-9);
 }

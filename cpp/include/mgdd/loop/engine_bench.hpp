@@ -1,6 +1,6 @@
 // A virtual engine test bench: SOC in, what a real bench would measure of that cycle out. The plant is the cycle model
-// with scatter, misfire, drift and a schedule of operating points; its sensors are a NOx analyser, a fast NOx sensor
-// and a soft sensor. Angles in °CA aTDC, NOx in ppm. `step` is noexcept and allocation-free.
+// with scatter, misfire, drift and a schedule of operating points; its sensors are a NOx analyser, a fast NOx sensor,
+// a soft sensor and a pressure sensor. Angles in °CA aTDC, NOx in ppm. `step` is noexcept and allocation-free.
 // All randomness is a function of (seed, stream, cycle): the same seed gives the same run however it is cut.
 #pragma once
 
@@ -16,6 +16,7 @@
 #include "mgdd/engine/cycle.hpp"
 #include "mgdd/engine/emissions.hpp"
 #include "mgdd/engine/performance.hpp"
+#include "mgdd/loop/pressure_sensor.hpp"
 #include "mgdd/loop/transport_lag.hpp"
 
 namespace mgdd::loop {
@@ -26,7 +27,7 @@ std::string_view to_string(NoxSensor sensor) noexcept;
 NoxSensor parse_nox_sensor(std::string_view name);
 
 /// Streams of the random numbers that the bench draws; others are free for seekers and studies.
-enum class BenchStream : std::uint64_t { soc = 0, efficiency = 1, misfire = 2, analyser = 3, fast = 4 };
+enum class BenchStream : std::uint64_t { soc = 0, efficiency = 1, misfire = 2, analyser = 3, fast = 4, pressure = 5 };
 inline constexpr std::uint64_t first_free_stream = 16;
 
 /// From cycle `cycle` on the engine runs at `point`.
@@ -53,6 +54,11 @@ struct BenchSettings {
   double misfire_probability = 0.0;         ///< [-] per cycle
   double soc_drift_cad_per_kcycle = 0.0;    ///< offset of SOC, per 1000 cycles, in [-100, 100]
   double wall_heat_drift_per_kcycle = 0.0;  ///< [-] change of wall_heat_scale per 1000 cycles, in [-100, 100]
+
+  double pressure_noise_bar = 0.0;   ///< standard deviation of each sample of the pressure trace, in [0, 20]
+  double tdc_error_cad = 0.0;        ///< angles of the trace read that much high, in [-5, 5]
+  double pressure_gain_error = 0.0;  ///< [-] pressure reads that share high, in [-0.5, 0.5]
+  double pressure_offset_bar = 0.0;  ///< error of pegging, in [-5, 5]
 
   engine::NoxModel true_nox{.map = engine::NoxMap::arrhenius};
   engine::SoftSensor soft_sensor{};
@@ -115,6 +121,10 @@ class EngineBench {
   /// BenchSettings::limits, NaN for the COV of IMEP, for NaN requests and where no such cycle exists. Nothing moves.
   std::array<double, max_limits> noise_free_limits(std::int64_t cycle, double soc_cad) noexcept;
 
+  /// What the pressure sensor read of the last cycle, by the crank grid of the cylinder; empty before the first one.
+  /// The trace stands until the next call. Indicators of a cycle are those of the true pressure.
+  PressureTrace pressure() noexcept;
+
   /// Back to cycle 0, with another seed.
   void reset(std::uint64_t seed) noexcept;
   void reset() noexcept { reset(seed_); }
@@ -167,11 +177,15 @@ class EngineBench {
   double cov_imep_percent() const noexcept;
   void drift_to(std::int64_t cycle) noexcept;
   double drifted_soc_cad(double soc_cad, std::int64_t cycle) const noexcept;
-  double noise(BenchStream stream) const noexcept;
+  double burning_soc_cad(double soc_cad, std::int64_t cycle) const noexcept;
+  bool misfires_at(std::int64_t cycle) const noexcept;
+  double noise(BenchStream stream) const noexcept { return noise_at(stream, cycle_); }
+  double noise_at(BenchStream stream, std::int64_t cycle) const noexcept;
 
   BenchSettings settings_;
   engine::CycleModel<double> model_;
   engine::CycleWorkspace<double> work_;
+  PressureSensor pressure_sensor_;
   std::vector<Prepared> prepared_;
   std::vector<double engine::Indicators<double>::*> limit_members_;  // null for the COV of IMEP
   std::array<double, 2> closed_, window_;

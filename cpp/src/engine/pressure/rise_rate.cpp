@@ -5,6 +5,7 @@
 #include <cstddef>
 #include <limits>
 
+#include "mgdd/math/cubic_weights.hpp"
 #include "mgdd/math/line_fit.hpp"
 
 namespace mgdd::engine {
@@ -13,20 +14,6 @@ namespace {
 using Column = std::vector<double>;
 
 constexpr double coarsest_cad = 0.25;
-
-// Cubic through the four samples around [k, k + 1] (Lagrange); a parabola in the first and last interval.
-double interpolate(const Column& x, const Column& y, std::size_t k, double at) {
-  const std::size_t low = k > 0 ? k - 1 : 0, high = std::min(k + 2, x.size() - 1);
-  double sum = 0.0;
-  for (std::size_t i = low; i <= high; ++i) {
-    double term = y[i];
-    for (std::size_t j = low; j <= high; ++j) {
-      if (j != i) term *= (at - x[j]) / (x[i] - x[j]);
-    }
-    sum += term;
-  }
-  return sum;
-}
 
 }  // namespace
 
@@ -37,7 +24,7 @@ double steepest_rise_bar_per_cad(const Column& angle, const Column& pressure) {
     const int parts = std::max(1, static_cast<int>(std::ceil(step / coarsest_cad - 1e-6)));
     for (int i = 0; i < parts; ++i) {
       x.push_back(angle[k] + step * i / parts);
-      y.push_back(i == 0 ? pressure[k] : interpolate(angle, pressure, k, x.back()));
+      y.push_back(i == 0 ? pressure[k] : cubic_weights(angle, k, x.back()).value_of(pressure));
     }
   }
   x.push_back(angle.back()), y.push_back(pressure.back());

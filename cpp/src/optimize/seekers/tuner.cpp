@@ -22,7 +22,8 @@ constexpr double default_cycles = 50.0;
 constexpr double reserve = 0.85;  // noise makes arrival later than the mean path: plan for this share of the wish
 constexpr int batch_period = 6, continuous_period = 10;
 constexpr double periods_of_lag = 2.4;  // a compensated period of 2.4 tau still passes 0.36 of the echo
-constexpr double slow_periods = 6.0;    // uncompensated: omega (D + tau) <= 60 degrees
+constexpr double slow_periods = 6.0;    // per cycle by which the echo comes late unknown: omega u <= 60 degrees
+constexpr double delay_doubt = 0.2, delay_doubt_least = 2.0;  // share of D + tau, and cycles
 constexpr double delays_per_tau = 3.0;  // an integrator with delay D is well damped for tau >= 3 D
 
 TuningSpec filled(TuningSpec w) {
@@ -45,6 +46,14 @@ TuningSpec filled(TuningSpec w) {
   fill("arrival", w.arrival, default_arrival * length);
   fill("amplitude_max", w.amplitude_max, default_amplitude_max * length);
   if (!std::isnan(w.cycles)) positive("cycles", w.cycles, "");
+  const double whole_lag = w.lag.delay_cycles + w.lag.lag_cycles;
+  if (std::isnan(w.delay_uncertainty)) {
+    w.delay_uncertainty = whole_lag > 0.0 ? std::max(delay_doubt * whole_lag, delay_doubt_least) : 0.0;
+  }
+  if (!(w.delay_uncertainty >= 0.0 && std::isfinite(w.delay_uncertainty))) {
+    throw ParameterError("delay_uncertainty", w.delay_uncertainty,
+                         "must be >= 0 and finite; 0 for a delay known exactly");
+  }
   if (!(w.arrival < w.distance)) {
     throw ParameterError("arrival", w.arrival, "must be below distance = " + text(w.distance));
   }
@@ -55,7 +64,7 @@ Tuning tune_spsa(const TuningSpec& w) {
   Tuning t;
   t.method = TunedMethod::spsa;
   t.period = 2;
-  if (w.lag.delay_cycles > 0.0 || w.lag.lag_cycles > 0.0) {
+  if (w.lag.delay_cycles > 0.0 || w.lag.lag_cycles > 0.0 || w.delay_uncertainty > 0.0) {
     throw about(
         "method",
         ParameterError("method = 'spsa': takes a measurement without delay and lag; hold each set-point until the "
@@ -89,22 +98,26 @@ Tuning tune_dither(const TuningSpec& w) {
                     "method = 'moving_average': behind a lag that is not compensated its window slows the approach by "
                     "more than these forms say; use 'batch', or compensate"));
   }
-  const bool lagged = w.lag.delay_cycles > 0.0 || w.lag.lag_cycles > 0.0;
   const double whole_lag = w.lag.delay_cycles + w.lag.lag_cycles;
+  const bool lagged = whole_lag > 0.0 || w.delay_uncertainty > 0.0;
   Tuning t;
   t.method = w.method;
   t.period = batch ? batch_period : continuous_period;
   if (lagged) {
-    const double needed = w.compensated ? periods_of_lag * w.lag.lag_cycles : slow_periods * whole_lag;
+    // An error of the lag turns the echo by less than the same error of the delay: d psi/d tau < omega.
+    const double unknown = w.delay_uncertainty + (w.compensated ? 0.0 : whole_lag);
+    const double needed = std::max(slow_periods * unknown, w.compensated ? periods_of_lag * w.lag.lag_cycles : 0.0);
     t.period = std::max(t.period, static_cast<int>(std::ceil(needed)));
   }
   const SensorResponse sensor = sensor_response(w.lag, 1, t.period);
   t.sensor_gain = sensor.gain;
   t.sensor_phase_rad = sensor.phase_rad;
+  t.delay_uncertainty = w.delay_uncertainty;
   const double echo = w.compensated ? sensor.gain : sensor.gain * std::cos(sensor.phase_rad);
   const double noise = w.noise_sd / echo;
   const double period = t.period;
-  const double tau_least = std::max((lagged && w.compensated ? 4.0 : 2.0) * period, delays_per_tau * whole_lag);
+  const double tau_least =
+      std::max((lagged && w.compensated ? 4.0 : 2.0) * period, delays_per_tau * (whole_lag + w.delay_uncertainty));
   const double decades = std::log(w.distance / w.arrival);
   const double wished =
       std::isnan(w.cycles) ? std::max(default_cycles, (period + tau_least * decades) / reserve) : w.cycles;

@@ -29,11 +29,12 @@ struct TuningSpec {
   ComponentLag lag{};                                           ///< between plant and J
   bool compensated = true;  ///< the seeker knows the lag and turns its demodulation back
   // NaN: left open.
-  double rms = std::numeric_limits<double>::quiet_NaN();            ///< of the estimate at the end; 0.2 L
-  double cycles = std::numeric_limits<double>::quiet_NaN();         ///< to arrive; 50, more where a lag asks for it
-  double distance = std::numeric_limits<double>::quiet_NaN();       ///< e0, at the start; 5 L
-  double arrival = std::numeric_limits<double>::quiet_NaN();        ///< eps, what counts as arrived; 0.45 L
-  double amplitude_max = std::numeric_limits<double>::quiet_NaN();  ///< 1.8 L
+  double delay_uncertainty = std::numeric_limits<double>::quiet_NaN();  ///< cycles, u; a fifth of D + tau, 2 at least
+  double rms = std::numeric_limits<double>::quiet_NaN();                ///< of the estimate at the end; 0.2 L
+  double cycles = std::numeric_limits<double>::quiet_NaN();             ///< to arrive; 50, more where a lag asks for it
+  double distance = std::numeric_limits<double>::quiet_NaN();           ///< e0, at the start; 5 L
+  double arrival = std::numeric_limits<double>::quiet_NaN();            ///< eps, what counts as arrived; 0.45 L
+  double amplitude_max = std::numeric_limits<double>::quiet_NaN();      ///< 1.8 L
 };
 
 struct Tuning {
@@ -49,6 +50,7 @@ struct Tuning {
   double jitter_cost = 0.0;  ///< ... and by the rms error
   double sensor_gain = 1.0;  ///< of the lag at the dither's frequency
   double sensor_phase_rad = 0.0;
+  double delay_uncertainty = 0.0;  ///< cycles by which the delay may be wrong
   bool met = true;
   std::vector<std::string> reasons;  ///< why not, with the figures that would do
 };
