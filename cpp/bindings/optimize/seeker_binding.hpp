@@ -233,10 +233,10 @@ inline py::dict history_columns(const StateColumns& history, Eigen::Index inputs
   return out;
 }
 
-/// ask, tell, restart, estimate, state and history of one seeker class.
-template <class S>
-void bind_seeking(py::class_<BoundSeeker<S>>& cls) {
-  using B = BoundSeeker<S>;
+/// ask, tell, restart and what a loop asks of a recorded seeker, or of what stands around one.
+template <class T>
+void bind_asking(py::class_<Guarded<T>>& cls) {
+  using B = Guarded<T>;
   cls.def(
          "ask", [](B& b) { return input_array(b.use()->ask()); },
          "The input to apply in this cycle, shape (inputs,). Asking again before tell gives the same.")
@@ -244,11 +244,9 @@ void bind_seeking(py::class_<BoundSeeker<S>>& cls) {
           "tell",
           [](B& b, const py::object& j, const py::object& limits, bool misfire) {
             ReadingBuffer buffer;
-            const optimize::Reading reading = reading_from(b.constant().seeker(), j, limits, misfire, buffer);
+            const optimize::Reading reading = reading_from(b.constant(), j, limits, misfire, buffer);
             const auto r = b.use();
-            const S& seeker = r->seeker();
-            optimize::require(r->tell(reading), seeker.protocol(), reading, seeker.component_count(),
-                              seeker.limit_count());
+            optimize::require(r->tell(reading), r->protocol(), reading, r->component_count(), r->limit_count());
           },
           py::arg("J") = py::none(), py::arg("limits") = py::none(), py::kw_only(), py::arg("misfire") = false,
           "Accept what was measured at the input of the last ask.\n\n"
@@ -263,10 +261,9 @@ void bind_seeking(py::class_<BoundSeeker<S>>& cls) {
           "estimate", [](const B& b) { return input_array(b.use()->estimate()); },
           "Present estimate of the optimum, shape (inputs,).")
       .def_property_readonly(
-          "cycle", [](const B& b) { return b.use()->seeker().protocol().cycle; },
-          "Cycles told so far, misfires included.")
+          "cycle", [](const B& b) { return b.use()->protocol().cycle; }, "Cycles told so far, misfires included.")
       .def_property_readonly(
-          "misfires", [](const B& b) { return b.use()->seeker().protocol().misfires; }, "Misfired cycles told so far.")
+          "misfires", [](const B& b) { return b.use()->protocol().misfires; }, "Misfired cycles told so far.")
       .def_property_readonly(
           "component_count", [](const B& b) { return b.constant().component_count(); },
           "Components of J that tell takes.")
@@ -274,16 +271,23 @@ void bind_seeking(py::class_<BoundSeeker<S>>& cls) {
           "limit_names",
           [](const B& b) {
             std::vector<std::string> names;
-            for (const optimize::Limit& limit : b.constant().seeker().settings().limits)
+            for (const optimize::Limit& limit : b.constant().settings().limits)
               names.push_back(limit.name);
             return names;
           },
-          "Names of the limits, in the order of tell.")
-      .def_property(
-          "state", [](const B& b) { return save_state(b.use()->seeker()); },
-          [](B& b, const StateColumns& columns) { b.use()->restore(columns); },
-          "What the run needs to go on bit for bit: named lists of numbers, JSON-able. Setting it restores the run;\n"
-          "a state of another kind or size raises ParameterError and changes nothing.")
+          "Names of the limits, in the order of tell.");
+}
+
+/// The same with state and history, of one seeker class.
+template <class S>
+void bind_seeking(py::class_<BoundSeeker<S>>& cls) {
+  using B = BoundSeeker<S>;
+  bind_asking(cls);
+  cls.def_property(
+         "state", [](const B& b) { return save_state(b.use()->seeker()); },
+         [](B& b, const StateColumns& columns) { b.use()->restore(columns); },
+         "What the run needs to go on bit for bit: named lists of numbers, JSON-able. Setting it restores the run;\n"
+         "a state of another kind or size raises ParameterError and changes nothing.")
       .def(
           "_history_columns",
           [](const B& b) {
@@ -302,6 +306,9 @@ void bind_seeking(py::class_<BoundSeeker<S>>& cls) {
           py::arg("columns"), "Columns behind .history, as _history_columns gave them.")
       .def("_clear_history", [](B& b) { b.use()->history().clear(); }, "Forget the history, keep the state.");
 }
+
+/// A copy of the seeker that Python holds; ParameterError naming the argument for anything else.
+optimize::Seeker seeker_of(const py::handle& object, const char* argument);
 
 /// The slope that the seeker estimates.
 template <class S>
