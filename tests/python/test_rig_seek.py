@@ -260,3 +260,72 @@ def test_summary_of_half_a_run() -> None:
     assert part["final_cad"] == pytest.approx(estimate[150:].mean())
     assert part["rms_cad"] == pytest.approx(np.sqrt(np.mean((estimate[125:] + 5.63) ** 2)))
     assert np.isnan(part["exceeded_fraction"])
+
+
+class ClampingRig(ScriptedRig):
+    """Takes timings of -4 °CA aTDC and later only, where the best would be -5.6, and says so."""
+
+    def measure(self) -> Measurement:
+        applied = max(self.applied[-1], -4.0)
+        return Measurement(components=hill(0, applied).components, applied={"soc_cad": applied})
+
+
+@pytest.mark.parametrize("name", [name for name in SEEKERS if name not in ("component-wise", "late newton")])
+def test_a_rig_that_clamps_inside_the_bounds_holds_the_estimate_there(name: str) -> None:
+    free = SEEKERS[name]()
+    chosen = type(free)(**{**free.settings, "limits": [], "start": [6.0]})
+    run = run_seeker(ClampingRig(hill), chosen, 1500)
+    check_labels(run.dataset)
+    estimate = run.dataset["estimate_cad"].to_numpy()
+    assert estimate[300:].min() > -4.0 - 0.2
+    assert abs(estimate[-500:].mean() + 4.0) < 1.2
+    asked, applied = (run.dataset[key].to_numpy() for key in ("soc_requested_cad", "soc_applied_cad"))
+    np.testing.assert_array_equal(applied, np.maximum(asked, -4.0))
+    np.testing.assert_array_equal(chosen.history["applied"].to_numpy()[:, 0], applied)
+    assert run.summary["mean_applied_cad"] == pytest.approx(applied[750:].mean(), abs=1e-12)
+
+
+def test_the_bench_says_what_it_applied_and_the_core_tells_it_as_well() -> None:
+    """Bounds wider than the window of the bench: the loop of the core and the one from Python stay one."""
+    wide = {"start": -20.0, "lower": -80.0, "upper": 60.0}
+    ends = []
+    for make in (lambda: ExtremumSeeking(**wide, gain=3.0, maximize=False), lambda: Spsa(**wide, maximize=False)):
+        in_core, on_rig = make(), make()
+        core = run_seeker(EngineBench(seed=2), in_core, 900)
+        with SimulatedRig(EngineBench(seed=2)) as rig:
+            run = run_seeker(rig, on_rig, 900)
+        low, high = EngineBench().window_cad
+        assert core.dataset["clamped"].to_numpy().any()
+        for key in ("soc_applied_cad", "soc_requested_cad", "estimate_cad"):
+            np.testing.assert_array_equal(core.dataset[key].to_numpy(), run.dataset[key].to_numpy(), err_msg=key)
+        np.testing.assert_array_equal(in_core.history["applied"], on_rig.history["applied"])
+        assert in_core.state == on_rig.state
+        applied = in_core.history["applied"].to_numpy()
+        assert applied.min() >= low
+        assert applied.max() <= high
+        ends.append(float(core.dataset["estimate_cad"][-1]))
+    assert all(low - 0.2 <= end <= high + 0.2 for end in ends)  # the worst efficiency lies at an end of the window
+
+
+def test_an_applied_input_that_the_plant_does_not_have_is_named() -> None:
+    rig = ScriptedRig(lambda *_: Measurement(components=(1.0,), applied={"rail_bar": 900.0}))
+    with pytest.raises(ParameterError, match=r"applied = rail_bar: must be among the inputs soc_cad"):
+        run_seeker(rig, seeker(), 3)
+
+
+def test_tell_takes_what_was_applied_and_refuses_what_cannot_be() -> None:
+    from mgdd.errors import ShapeError
+
+    one = Spsa(start=[1.0, 2.0])
+    one.ask()
+    before = one.state
+    for wrong, error, text in [
+        ([1.0], ShapeError, "applied has 1 entries: must have 2"),
+        ([], ShapeError, "applied is empty"),
+        ([1.0, np.nan], DataError, r"applied\[1\] = nan: must be finite"),
+    ]:
+        with pytest.raises(error, match=text):
+            one.tell(1.0, applied=wrong)
+        assert one.state == before
+    one.tell(1.0, applied=[0.25, 0.5])
+    assert one.history["applied"].to_numpy().tolist() == [[0.25, 0.5]]

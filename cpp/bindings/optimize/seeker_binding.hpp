@@ -90,13 +90,14 @@ inline void warn_each(const std::vector<std::string>& advice) {
 
 /// Numbers of a reading, kept alive as long as the spans into them.
 struct ReadingBuffer {
-  std::vector<double> components, limits;
+  std::vector<double> components, limits, applied;
 };
 
-/// J as a number or one number per component; limits as a sequence in the order of the settings, or by name.
+/// J as a number or one number per component; limits as a sequence in the order of the settings, or by name; what was
+/// applied as a number or one number per input.
 template <class S>
 optimize::Reading reading_from(const S& seeker, const py::object& j, const py::object& limits, bool misfire,
-                               ReadingBuffer& buffer) {
+                               const py::object& applied, ReadingBuffer& buffer) {
   if (j.is_none() && !misfire) throw about("J", ShapeError("J is missing: tell what was measured, or misfire=True"));
   if (!j.is_none()) {
     if (py::isinstance<py::float_>(j) || py::isinstance<py::int_>(j)) {
@@ -121,7 +122,13 @@ optimize::Reading reading_from(const S& seeker, const py::object& j, const py::o
   } else if (!limits.is_none()) {
     buffer.limits = numbers_from(limits, "limits");
   }
-  return {buffer.components, buffer.limits, misfire};
+  if (!applied.is_none()) {
+    buffer.applied = numbers_from(applied, "applied");
+    if (buffer.applied.empty()) {
+      throw about("applied", ShapeError("applied is empty: give one number per input, or leave it out"));
+    }
+  }
+  return {buffer.components, buffer.limits, misfire, buffer.applied};
 }
 
 /// One number for all inputs, or one per input; the space of the settings stands already.
@@ -242,16 +249,19 @@ void bind_asking(py::class_<Guarded<T>>& cls) {
          "The input to apply in this cycle, shape (inputs,). Asking again before tell gives the same.")
       .def(
           "tell",
-          [](B& b, const py::object& j, const py::object& limits, bool misfire) {
+          [](B& b, const py::object& j, const py::object& limits, bool misfire, const py::object& applied) {
             ReadingBuffer buffer;
-            const optimize::Reading reading = reading_from(b.constant(), j, limits, misfire, buffer);
+            const optimize::Reading reading = reading_from(b.constant(), j, limits, misfire, applied, buffer);
             const auto r = b.use();
-            optimize::require(r->tell(reading), r->protocol(), reading, r->component_count(), r->limit_count());
+            optimize::require(r->tell(reading), r->protocol(), reading, r->component_count(), r->limit_count(),
+                              r->settings().space.size());
           },
           py::arg("J") = py::none(), py::arg("limits") = py::none(), py::kw_only(), py::arg("misfire") = false,
+          py::arg("applied") = py::none(),
           "Accept what was measured at the input of the last ask.\n\n"
           "J: float, or one number per component; limits: one value per limit, in order or by name;\n"
-          "misfire: the cycle is counted and its numbers are not read.\n"
+          "misfire: the cycle is counted and its J and limits are not read;\n"
+          "applied: what the plant really applied, one number per input; None where it is what was asked for.\n"
           "Raises ParameterError (tell without ask), ShapeError (wrong count), DataError (not finite, or beyond\n"
           "1e30 in magnitude); the state is unchanged then.")
       .def(

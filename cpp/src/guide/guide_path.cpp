@@ -136,16 +136,17 @@ Inputs GuidePath::test_input(const Inputs& estimate) const noexcept {
   return at_trial() ? Inputs(estimate + tried_ * move_) : estimate;
 }
 
-Inputs GuidePath::tested(double j, double excess) noexcept {
-  const std::int64_t place = at_trial() ? 1 : 0;
-  if (stage_ - place * side() > settings_.trust.probe_settling) {
-    sums_[static_cast<std::size_t>(place)] += j;
-    sums_[static_cast<std::size_t>(2 + place)] += excess;
+Inputs GuidePath::tested(double j, double excess, const Inputs& away) noexcept {
+  const std::size_t place = at_trial() ? 1 : 0;
+  if (stage_ - static_cast<std::int64_t>(place) * side() > settings_.trust.probe_settling) {
+    sums_[place] += j;
+    sums_[2 + place] += excess;
+    sums_[4 + place] += away.dot(move_) / move_.squaredNorm();
   }
   if (++stage_ <= 2 * side()) return {};
-  const bool breaks = sums_[3] > 0.0 && sums_[3] > sums_[2];
-  const double rise = (sums_[1] - sums_[0]) / settings_.trust.probe_cycles;
-  return trusted(breaks ? trust_.condemn() : trust_.judge(rise, tried_, bend_));
+  if (sums_[3] > 0.0 && sums_[3] > sums_[2]) return trusted(trust_.condemn());
+  const double n = settings_.trust.probe_cycles;
+  return trusted(trust_.judge((sums_[1] - sums_[0]) / n, sums_[4] / n, sums_[5] / n, bend_));
 }
 
 void GuidePath::advance() noexcept {

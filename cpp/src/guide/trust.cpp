@@ -23,6 +23,7 @@ constexpr double fewest_cycles = 10.0;     // before what is left about it is ca
 constexpr double informative_share = 2.0;  // errors of a reading that a trial must be able to change
 constexpr double smallest_trial = 0.05;    // of the move
 constexpr double exact_share = 1e-6;       // error of a share where there is no noise
+constexpr double least_distance = 0.01;    // of the move, between the two places that were measured
 constexpr double refusal_share = 0.9;      // of the trust left after a value that cannot be used
 constexpr double unmeasured_share = 0.5;   // ... of the doubt, or of the trust, left after a verdict without curvature
 
@@ -68,17 +69,19 @@ double Trust::trial_share(double bend) const noexcept {
   return bend > error ? std::min(1.0, std::max({value_, informative_share * error / bend, smallest_trial})) : 0.0;
 }
 
-double Trust::judge(double rise, double tried, double bend) noexcept {
+double Trust::judge(double rise, double old, double tried, double bend) noexcept {
+  if (!(tried - old > least_distance)) return value_;  // the plant did not go there
   const double error = rise_error();
   const bool wrong = rise<-settings_.significance * error, confirmed = rise> settings_.significance * error;
   verdict_ = static_cast<std::int64_t>(wrong ? Verdict::wrong : confirmed ? Verdict::confirmed : Verdict::undecided);
   if (bend > 0.0) {
-    const double slope = rise / (bend * tried);
-    const double by_noise = std::max(error / (bend * tried), exact_share);
+    const double slope = rise / (bend * (tried - old));
+    const double by_noise = std::max(error / (bend * (tried - old)), exact_share);
     const double by_curvature = settings_.curvature_spread * slope;
     const double evidence = 1.0 / (by_noise * by_noise + by_curvature * by_curvature);
     const double prior = 1.0 / (settings_.prior_sd * settings_.prior_sd);
-    value_ = std::clamp((prior * value_ + evidence * (slope + 0.5 * tried)) / (prior + evidence), 0.0, 1.0);
+    const double measured = slope + 0.5 * (old + tried);
+    value_ = std::clamp((prior * value_ + evidence * measured) / (prior + evidence), 0.0, 1.0);
     return value_;
   }
   if (wrong) return condemn();

@@ -190,6 +190,7 @@ BenchCycle EngineBench::step(double soc_cad) noexcept {
   c.operating_point_changed = point_changes_at(cycle_);
   double applied = std::clamp(soc_cad, window_[0], window_[1]);
   if (std::isnan(soc_cad)) applied = cycle_ > 0 ? last_soc_cad_ : window_[1];
+  c.soc_applied_cad = applied;
   c.clamped = applied != soc_cad;
   last_soc_cad_ = applied;
 

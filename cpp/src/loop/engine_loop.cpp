@@ -96,7 +96,7 @@ void LoopStatistics::add(const LoopCycle& cycle) noexcept {
   if (k >= planned_ / 2) {
     half_.add(estimate);
     square_.add((estimate - criteria_.optimum_cad) * (estimate - criteria_.optimum_cad));
-    applied_.add(b.soc_requested_cad);
+    applied_.add(b.soc_applied_cad);
     if (!b.misfire && !b.unphysical) {
       j_.add(b.j);
       efficiency_.add(100.0 * b.indicators.efficiency_gross);

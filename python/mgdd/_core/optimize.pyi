@@ -368,12 +368,13 @@ class ExtremumSeeking:
         """
         The operating point has changed: forget the window, keep the estimate.
         """
-    def tell(self, J: typing.Any = None, limits: typing.Any = None, *, misfire: bool = False) -> None:
+    def tell(self, J: typing.Any = None, limits: typing.Any = None, *, misfire: bool = False, applied: typing.Any = None) -> None:
         """
         Accept what was measured at the input of the last ask.
         
         J: float, or one number per component; limits: one value per limit, in order or by name;
-        misfire: the cycle is counted and its numbers are not read.
+        misfire: the cycle is counted and its J and limits are not read;
+        applied: what the plant really applied, one number per input; None where it is what was asked for.
         Raises ParameterError (tell without ask), ShapeError (wrong count), DataError (not finite, or beyond
         1e30 in magnitude); the state is unchanged then.
         """
@@ -452,12 +453,13 @@ class NewtonSeeking:
         """
         The operating point has changed: forget the window, keep the estimate.
         """
-    def tell(self, J: typing.Any = None, limits: typing.Any = None, *, misfire: bool = False) -> None:
+    def tell(self, J: typing.Any = None, limits: typing.Any = None, *, misfire: bool = False, applied: typing.Any = None) -> None:
         """
         Accept what was measured at the input of the last ask.
         
         J: float, or one number per component; limits: one value per limit, in order or by name;
-        misfire: the cycle is counted and its numbers are not read.
+        misfire: the cycle is counted and its J and limits are not read;
+        applied: what the plant really applied, one number per input; None where it is what was asked for.
         Raises ParameterError (tell without ask), ShapeError (wrong count), DataError (not finite, or beyond
         1e30 in magnitude); the state is unchanged then.
         """
@@ -541,12 +543,13 @@ class BoundedSeeking:
         """
         The operating point has changed: forget the window, keep the estimate.
         """
-    def tell(self, J: typing.Any = None, limits: typing.Any = None, *, misfire: bool = False) -> None:
+    def tell(self, J: typing.Any = None, limits: typing.Any = None, *, misfire: bool = False, applied: typing.Any = None) -> None:
         """
         Accept what was measured at the input of the last ask.
         
         J: float, or one number per component; limits: one value per limit, in order or by name;
-        misfire: the cycle is counted and its numbers are not read.
+        misfire: the cycle is counted and its J and limits are not read;
+        applied: what the plant really applied, one number per input; None where it is what was asked for.
         Raises ParameterError (tell without ask), ShapeError (wrong count), DataError (not finite, or beyond
         1e30 in magnitude); the state is unchanged then.
         """
@@ -615,12 +618,13 @@ class Spsa:
         """
         The operating point has changed: forget the window, keep the estimate.
         """
-    def tell(self, J: typing.Any = None, limits: typing.Any = None, *, misfire: bool = False) -> None:
+    def tell(self, J: typing.Any = None, limits: typing.Any = None, *, misfire: bool = False, applied: typing.Any = None) -> None:
         """
         Accept what was measured at the input of the last ask.
         
         J: float, or one number per component; limits: one value per limit, in order or by name;
-        misfire: the cycle is counted and its numbers are not read.
+        misfire: the cycle is counted and its J and limits are not read;
+        applied: what the plant really applied, one number per input; None where it is what was asked for.
         Raises ParameterError (tell without ask), ShapeError (wrong count), DataError (not finite, or beyond
         1e30 in magnitude); the state is unchanged then.
         """
@@ -714,12 +718,13 @@ class GradientDescent:
         """
         The operating point has changed: forget the window, keep the estimate.
         """
-    def tell(self, J: typing.Any = None, limits: typing.Any = None, *, misfire: bool = False) -> None:
+    def tell(self, J: typing.Any = None, limits: typing.Any = None, *, misfire: bool = False, applied: typing.Any = None) -> None:
         """
         Accept what was measured at the input of the last ask.
         
         J: float, or one number per component; limits: one value per limit, in order or by name;
-        misfire: the cycle is counted and its numbers are not read.
+        misfire: the cycle is counted and its J and limits are not read;
+        applied: what the plant really applied, one number per input; None where it is what was asked for.
         Raises ParameterError (tell without ask), ShapeError (wrong count), DataError (not finite, or beyond
         1e30 in magnitude); the state is unchanged then.
         """
@@ -803,12 +808,13 @@ class GoldenSection:
         """
         The operating point has changed: forget the window, keep the estimate.
         """
-    def tell(self, J: typing.Any = None, limits: typing.Any = None, *, misfire: bool = False) -> None:
+    def tell(self, J: typing.Any = None, limits: typing.Any = None, *, misfire: bool = False, applied: typing.Any = None) -> None:
         """
         Accept what was measured at the input of the last ask.
         
         J: float, or one number per component; limits: one value per limit, in order or by name;
-        misfire: the cycle is counted and its numbers are not read.
+        misfire: the cycle is counted and its J and limits are not read;
+        applied: what the plant really applied, one number per input; None where it is what was asked for.
         Raises ParameterError (tell without ask), ShapeError (wrong count), DataError (not finite, or beyond
         1e30 in magnitude); the state is unchanged then.
         """

@@ -171,7 +171,8 @@ class EngineBench(_core.loop.EngineBench):
         -------
         Measurement
             ``values`` holds the indicators, actual SOC, NOx of every sensor and the flags as 0 or 1;
-            ``noise_free_limits`` are the limits at this timing without scatter, noise and misfire, COV of IMEP as NaN.
+            ``applied`` is the timing within the window of the bench; ``noise_free_limits`` are the
+            limits at this timing without scatter, noise and misfire, COV of IMEP as NaN.
 
         Raises
         ------
@@ -190,6 +191,7 @@ class EngineBench(_core.loop.EngineBench):
             misfire=cycle["misfire"],
             values={name: float(value) for name, value in cycle.items()},
             noise_free_limits=dict(zip(self.limit_names, map(float, noise_free), strict=True)),
+            applied={"soc_cad": float(cycle["soc_applied_cad"])},
         )
 
     def run(self, soc_cad: ArrayLike) -> xr.Dataset:

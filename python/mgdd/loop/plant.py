@@ -30,6 +30,8 @@ class Measurement:
         Everything else that was measured, by name.
     noise_free_limits : mapping of str to float
         Limited quantities at these inputs without scatter and noise; empty where the plant does not know them.
+    applied : mapping of str to float
+        Inputs that were really applied, by name, for a plant that clamps them; what is missing was applied as asked.
 
     Examples
     --------
@@ -43,6 +45,7 @@ class Measurement:
     misfire: bool = False
     values: Mapping[str, float] = field(default_factory=dict)
     noise_free_limits: Mapping[str, float] = field(default_factory=dict)
+    applied: Mapping[str, float] = field(default_factory=dict)
 
     @property
     def performance(self) -> float:

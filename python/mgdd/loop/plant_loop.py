@@ -28,13 +28,14 @@ __all__ = ["LoopRun", "steer"]
 
 _CHANGED = "operating_point_changed"
 _UNKNOWN = "not given by the plant"
-_OWN = ("estimate_cad", "soc_requested_cad", "j", "misfire")  # columns that the loop itself knows
+_OWN = ("estimate_cad", "soc_requested_cad", "soc_applied_cad", "j", "misfire")  # columns that the loop itself knows
 
 
 class _Row(NamedTuple):
     """One measured cycle."""
 
     estimate: NDArray[np.float64]
+    asked: NDArray[np.float64]
     applied: NDArray[np.float64]
     void: bool
     measured: Measurement
@@ -49,7 +50,7 @@ class LoopRun:
     ----------
     dataset : xarray.Dataset
         Over ``cycle``: ``estimate_cad`` before the cycle and everything that the plant measured of it. A plant whose
-        one input is not ``soc_cad`` has ``estimate`` and ``applied`` over ``cycle`` and ``input`` instead.
+        one input is not ``soc_cad`` has ``estimate``, ``asked`` and ``applied`` over ``cycle`` and ``input`` instead.
     summary : mapping of str to float
         ``final_cad`` (mean estimate of the last 100 cycles), ``mean_cad`` and ``rms_cad`` (second half), ``cycles_to``
         and ``cycles_stays`` (NaN: never), means of J, efficiency and true NOx over the second half, extremes of the
@@ -126,10 +127,20 @@ def _one_cycle(plant: Plant, announcing: AnnouncingPlant | None, seeker: Seeker,
     summed = seeker.component_count == 1
     told = measured.performance if summed else np.array(measured.components)
     limits = [measured.limits[name] for name in seeker.limit_names]
-    log.append(_Row(estimate, asked, void, measured))
-    seeker.tell(told, limits if limits else None, misfire=void)
+    applied = _applied(plant.input_names, asked, measured)
+    log.append(_Row(estimate, asked, applied, void, measured))
+    seeker.tell(told, limits if limits else None, misfire=void, applied=applied if measured.applied else None)
     if late:
         seeker.restart()
+
+
+def _applied(names: tuple[str, ...], asked: NDArray[np.float64], measured: Measurement) -> NDArray[np.float64]:
+    """Give the inputs that the plant says it applied; those it does not name were applied as asked."""
+    if unknown := set(measured.applied) - set(names):
+        raise ParameterError(f"applied = {', '.join(sorted(unknown))}: must be among the inputs {', '.join(names)}")
+    return np.array(
+        [measured.applied.get(name, own) for name, own in zip(names, asked.tolist(), strict=True)], np.float64
+    )
 
 
 def _require_match(seeker: Seeker, measured: Measurement) -> None:
@@ -147,14 +158,20 @@ def _require_match(seeker: Seeker, measured: Measurement) -> None:
 def _steered(log: list[_Row], inputs: tuple[str, ...]) -> dict[str, tuple[Any, ...]]:
     """Label what the seeker thought and asked for."""
     estimate = np.array([row.estimate for row in log], np.float64).reshape(-1, len(inputs))
+    asked = np.array([row.asked for row in log], np.float64).reshape(-1, len(inputs))
     applied = np.array([row.applied for row in log], np.float64).reshape(-1, len(inputs))
     if inputs == ("soc_cad",):
-        return {"estimate_cad": ("cycle", estimate[:, 0]), "soc_requested_cad": ("cycle", applied[:, 0])}
+        return {
+            "estimate_cad": ("cycle", estimate[:, 0]),
+            "soc_requested_cad": ("cycle", asked[:, 0]),
+            "soc_applied_cad": ("cycle", applied[:, 0]),
+        }
     over, unit = ("cycle", "input"), "unit of the input"
     return {
         "input": ("input", list(inputs), "-", "input of the plant"),
         "estimate": (over, estimate, unit, "estimate of the best input"),
-        "applied": (over, applied, unit, "input that was asked for"),
+        "asked": (over, asked, unit, "input that was asked for"),
+        "applied": (over, applied, unit, "input that the plant applied"),
     }
 
 

@@ -25,7 +25,8 @@ def summarize_cycles(cycles: xr.Dataset, criteria: LoopCriteria | None = None) -
     ----------
     cycles : xarray.Dataset
         Over ``cycle``: ``misfire`` and ``j``, and ``estimate_cad`` and ``soc_requested_cad`` or, over ``input`` as
-        well, ``estimate`` and ``applied``; where measured also ``unphysical``, ``efficiency_gross``, ``nox_true_ppm``
+        well, ``estimate`` and ``applied``; where known also
+        ``soc_applied_cad``, ``unphysical``, ``efficiency_gross``, ``nox_true_ppm``,
         ``limits`` and ``noise_free_limits`` over ``limit``.
     criteria : LoopCriteria, optional
         As in `run_seeker`; cycles are counted from the first row. No seeker is at hand, so ``limits`` must be named for
@@ -109,9 +110,10 @@ def _of_limits(cycles: xr.Dataset, uppers: Sequence[float], judged_from: int) ->
 
 
 def _one_angle(cycles: xr.Dataset) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
-    """Give estimate and request [°CA aTDC]; NaN where the plant has several inputs or one that is not an angle."""
+    """Give estimate and applied timing [°CA aTDC]; NaN for several inputs or one that is not an angle."""
     if "estimate_cad" in cycles:
-        return cycles["estimate_cad"].to_numpy(), cycles["soc_requested_cad"].to_numpy()
+        applied = cycles["soc_applied_cad" if "soc_applied_cad" in cycles else "soc_requested_cad"]
+        return cycles["estimate_cad"].to_numpy(), applied.to_numpy()
     if cycles.sizes["input"] == 1 and str(cycles["input"].to_numpy()[0]).endswith("_cad"):
         return cycles["estimate"].to_numpy()[:, 0], cycles["applied"].to_numpy()[:, 0]
     nothing = np.full(cycles.sizes["cycle"], math.nan)

@@ -49,7 +49,14 @@ if TYPE_CHECKING:
         @property
         def limit_names(self) -> list[str]: ...
         def ask(self) -> NDArray[np.float64]: ...
-        def tell(self, J: Any = None, limits: Any = None, *, misfire: bool = False) -> None: ...  # noqa: N803
+        def tell(
+            self,
+            J: Any = None,  # noqa: N803
+            limits: Any = None,
+            *,
+            misfire: bool = False,
+            applied: Any = None,
+        ) -> None: ...
         def restart(self) -> None: ...
         def _history_columns(self) -> dict[str, Any]: ...
         def _clear_history(self) -> None: ...
@@ -129,8 +136,9 @@ class Seeker(_CoreSeeker):
     def history(self) -> xr.Dataset:
         """What was applied and told, cycle by cycle.
 
-        Dimensions `cycle` and `input`; variables `applied` and `estimate` (before the cycle was told), both
-        (cycle, input) in the unit of the input, `objective` (J as told, components summed; NaN where the cycle
+        Dimensions `cycle` and `input`; variables `applied` (as asked, where ``tell`` was not told ``applied``) and
+        `estimate` (before the cycle was told), both (cycle, input) in the unit of the input,
+        `objective` (J as told, components summed; NaN where the cycle
         misfired) and `misfire` (0 or 1). Built anew on every access.
         """
         columns = self._history_columns()
@@ -138,7 +146,7 @@ class Seeker(_CoreSeeker):
             {
                 "cycle": ("cycle", columns["cycle"].astype(np.int64)),
                 "input": ("input", np.arange(columns["applied"].shape[1]), "-", "index of the input"),
-                "applied": (("cycle", "input"), columns["applied"], _INPUT_UNIT, "applied input"),
+                "applied": (("cycle", "input"), columns["applied"], _INPUT_UNIT, "input that the plant applied"),
                 "estimate": (("cycle", "input"), columns["estimate"], _INPUT_UNIT, "estimate of the optimum"),
                 "objective": ("cycle", columns["objective"], _J_UNIT, "objective J"),
                 "misfire": ("cycle", columns["misfire"].astype(np.int8), "-", "misfired cycle"),

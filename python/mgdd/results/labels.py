@@ -100,6 +100,7 @@ VARIABLES: Mapping[str, Label] = MappingProxyType(
         "nox_arrhenius_ppm": Label("ppm", "NOx proxy, Arrhenius map"),
         "cycle": Label("-", "engine cycle"),
         "soc_requested_cad": Label(_CAD, "requested start of combustion"),
+        "soc_applied_cad": Label(_CAD, "start of combustion that was set, clamped to the timing window"),
         "nox_true_ppm": Label("ppm", "NOx, true value"),
         "nox_analyser_ppm": Label("ppm", "NOx, analyser"),
         "nox_fast_ppm": Label("ppm", "NOx, fast sensor"),

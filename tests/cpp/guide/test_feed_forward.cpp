@@ -234,6 +234,22 @@ TEST(FeedForward, AMisfiredCycleOfATestIsMeasuredAgain) {
   EXPECT_NEAR(seeker.estimate()[0], -10.7, 0.1);
 }
 
+// A plant that goes no further than -7: the share of the move is that of the place it went to, and no wind-up follows.
+TEST(FeedForward, LearnsFromWhatThePlantApplied) {
+  FeedForward<ExtremumSeeking> seeker = guided(-20.0, {.noise_sd = 0.05});
+  seeker.offer(at(-4.2), GuideCause::new_point);
+  seeker.offer(at(-10.7), GuideCause::new_point);
+  for (int k = 0; k < 400; ++k) {
+    const double x[] = {std::max(seeker.ask()[0], -7.0)};
+    const double j[] = {quadratic(x[0] + 8.8)};
+    ASSERT_EQ(seeker.tell({j, {}, false, x}), TellStatus::accepted);
+    if (k == 1) {
+      EXPECT_NEAR(seeker.path().trust().value(), 4.6 / 6.5, 0.02);
+    }
+  }
+  EXPECT_GE(seeker.estimate()[0], -8.01);
+}
+
 TEST(FeedForward, MovesSeveralInputsAtOnce) {
   ExtremumSeekingSettings s;
   s.space = space_at(inputs({8.0, -6.0}), 40.0);

@@ -28,10 +28,22 @@ TEST(Trust, IsTheShareOfTheMoveWhereTheOptimumLies) {
   for (const double optimum : {-1.0, -0.2, 0.0, 0.3, 0.65, 1.0, 1.4}) {
     for (const double tried : {0.4, 1.0}) {
       Trust trust({.curvature_spread = 0.0, .noise_sd = 1e-7}, 1);
-      EXPECT_NEAR(trust.judge(rise_of(bend, optimum, tried), tried, bend), std::clamp(optimum, 0.0, 1.0), 1e-5)
+      EXPECT_NEAR(trust.judge(rise_of(bend, optimum, tried), 0.0, tried, bend), std::clamp(optimum, 0.0, 1.0), 1e-5)
           << optimum << " at " << tried;
     }
   }
+}
+
+TEST(Trust, ReadsTheSameShareFromWhateverTwoPlacesThePlantApplied) {
+  const double bend = 2.0, optimum = 0.4;
+  for (const auto& [old, tried] : {std::pair{0.0, 1.0}, {0.1, 0.7}, {-0.2, 0.5}}) {
+    Trust trust({.curvature_spread = 0.0, .noise_sd = 1e-7}, 1);
+    const double rise = rise_of(bend, optimum, tried) - rise_of(bend, optimum, old);
+    EXPECT_NEAR(trust.judge(rise, old, tried, bend), optimum, 1e-5) << old << " " << tried;
+  }
+  Trust stuck = known_noise(0.1, 0.7);
+  EXPECT_EQ(stuck.judge(-5.0, 0.3, 0.3, bend), 0.7);
+  EXPECT_EQ(stuck.verdict(), Verdict::untested);
 }
 
 TEST(Trust, WeighsTheMeasurementByItsErrorAgainstWhatWasBelieved) {
@@ -39,15 +51,15 @@ TEST(Trust, WeighsTheMeasurementByItsErrorAgainstWhatWasBelieved) {
   double before = 0.0;
   for (const double noise : {1e-6, 0.1, 0.3, 1.0, 3.0, 1e3}) {
     Trust trust = known_noise(noise);
-    const double share = trust.judge(rise_of(bend, optimum, tried), tried, bend);
+    const double share = trust.judge(rise_of(bend, optimum, tried), 0.0, tried, bend);
     EXPECT_GT(share, before) << noise;  // from what was measured to what was believed
     EXPECT_EQ(share, trust.value());
     before = share;
   }
   EXPECT_NEAR(before, 1.0, 1e-3);
   Trust once = known_noise(0.8), often = known_noise(0.8, 1.0, 16);
-  EXPECT_GT(once.judge(rise_of(bend, optimum, tried), tried, bend),
-            often.judge(rise_of(bend, optimum, tried), tried, bend));
+  EXPECT_GT(once.judge(rise_of(bend, optimum, tried), 0.0, tried, bend),
+            often.judge(rise_of(bend, optimum, tried), 0.0, tried, bend));
 }
 
 TEST(Trust, SaysWrongOnlyWhereJFellByMoreThanTheNoise) {
@@ -56,7 +68,7 @@ TEST(Trust, SaysWrongOnlyWhereJFellByMoreThanTheNoise) {
     const auto verdict = [&](double rise) {
       Trust trust = known_noise(0.25);
       EXPECT_EQ(trust.verdict(), Verdict::untested);
-      trust.judge(rise, 1.0, bend);
+      trust.judge(rise, 0.0, 1.0, bend);
       return trust.verdict();
     };
     EXPECT_EQ(verdict(-3.01 * error), Verdict::wrong);
@@ -68,10 +80,10 @@ TEST(Trust, SaysWrongOnlyWhereJFellByMoreThanTheNoise) {
 
 TEST(Trust, WithoutACurvatureGoesByTheVerdictAlone) {
   Trust trust = known_noise(0.1, 0.6);
-  EXPECT_EQ(trust.judge(-5.0, 1.0, 0.0), 0.0);  // the move is not taken
+  EXPECT_EQ(trust.judge(-5.0, 0.0, 1.0, 0.0), 0.0);  // the move is not taken
   EXPECT_NEAR(trust.value(), 0.3, 1e-12);
-  EXPECT_NEAR(trust.judge(5.0, 1.0, 0.0), 0.65, 1e-12);
-  EXPECT_NEAR(trust.judge(0.0, 1.0, 0.0), 0.65, 1e-12);
+  EXPECT_NEAR(trust.judge(5.0, 0.0, 1.0, 0.0), 0.65, 1e-12);
+  EXPECT_NEAR(trust.judge(0.0, 0.0, 1.0, 0.0), 0.65, 1e-12);
   trust.refuse();
   EXPECT_LT(trust.value(), 0.65);
 }

@@ -148,7 +148,7 @@ TEST(EverySeeker, ARefusedReadingChangesNothing) {
       const Reading reading{j, limits, false};
       EXPECT_EQ(seeker.tell(reading), TellStatus::not_a_reading);
       try {
-        require(TellStatus::not_a_reading, seeker.protocol(), reading, 1, limits.size());
+        require(TellStatus::not_a_reading, seeker.protocol(), reading, 1, limits.size(), scene.space.size());
         FAIL();
       } catch (const DataError& e) {
         EXPECT_NE(std::string(e.what()).find("cycle 41: J = "), std::string::npos) << e.what();

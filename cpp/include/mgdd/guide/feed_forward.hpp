@@ -44,18 +44,20 @@ class FeedForward {
 
   optimize::TellStatus tell(const optimize::Reading& reading) noexcept(noexcept(seeker_.tell(reading))) {
     const auto& settings = seeker_.settings();
-    const optimize::TellStatus status = protocol_.check(reading, component_count(), limit_count());
+    const optimize::TellStatus status = protocol_.check(reading, component_count(), limit_count(), applied_.size());
     if (status != optimize::TellStatus::accepted && status != optimize::TellStatus::misfire) return status;
     const bool fired = status == optimize::TellStatus::accepted;
+    const optimize::Inputs applied = optimize::applied_input(reading, applied_);
     const double j = fired ? optimize::objective_of(reading, settings.maximize) : 0.0;
     if (path_.testing()) {
       if (fired) {
-        const optimize::Inputs move = path_.tested(j, worst_excess(settings.limits, reading.limits));
+        const optimize::Inputs move =
+            path_.tested(j, worst_excess(settings.limits, reading.limits), applied - seeker_.estimate());
         if (move.size() > 0) seeker_.shift_estimate(move);
       }
     } else {
       seeker_.tell(reading);
-      if (fired) path_.searched(applied_, j);
+      if (fired) path_.searched(applied, j);
     }
     path_.advance();
     protocol_.count(status);

@@ -58,8 +58,8 @@ class GuidePath {
   bool at_trial() const noexcept { return stage_ > side(); }  ///< of a test: at the new place, not at the old one
   optimize::Inputs test_input(const optimize::Inputs& estimate) const noexcept;
 
-  /// One reading of a test; the move of the estimate after the last one, else empty.
-  optimize::Inputs tested(double j, double excess) noexcept;
+  /// One reading of a test, `away` from the estimate; the move of the estimate after the last one, else empty.
+  optimize::Inputs tested(double j, double excess, const optimize::Inputs& away) noexcept;
   /// One reading of the search.
   void searched(const optimize::Inputs& applied, double j) noexcept { trust_.record(applied, j); }
   /// One more cycle: a calibration goes on.
@@ -97,7 +97,7 @@ class GuidePath {
   optimize::Inputs move_;     // of the guide, under test
   double bend_ = 0.0, tried_ = 0.0;
   std::int64_t stage_ = 0;        // cycle of the test from 1 on; 0 = none
-  std::array<double, 4> sums_{};  // J and excess at the old place and at the trial
+  std::array<double, 6> sums_{};  // J, excess and share of the move, at the old place and at the trial
   bool known_ = false;
   bool open_ = false;  // a new operating point for which no valid value has come yet
 };

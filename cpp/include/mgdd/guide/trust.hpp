@@ -49,8 +49,9 @@ class Trust {
   /// Share of the move at which the guide should be tested: its trust, or more where that would show nothing. 0: the
   /// noise hides what the move may change, or is not known. `bend` is K, 0 where the guide does not say its curvature.
   double trial_share(double bend) const noexcept;
-  /// Learns from a test at `tried` of the move, where J was higher by `rise`; the share of the move to take.
-  double judge(double rise, double tried, double bend) noexcept;
+  /// Learns from a test: J was higher by `rise` at the share `tried` of the move than at the share `old`, which is 0
+  /// unless the plant applied something else. The share of the move to take.
+  double judge(double rise, double old, double tried, double bend) noexcept;
   /// The tried place broke a limit that the old one kept: the move is not taken.
   double condemn() noexcept;
   /// The guide gave what cannot be used.

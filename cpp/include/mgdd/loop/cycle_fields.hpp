@@ -16,8 +16,9 @@ struct NamedNumber {
 };
 
 /// Scalars of one cycle that are no indicator.
-inline constexpr std::array<NamedNumber<BenchCycle>, 8> bench_cycle_numbers{{
+inline constexpr std::array<NamedNumber<BenchCycle>, 9> bench_cycle_numbers{{
     {"soc_requested_cad", [](const BenchCycle& c) noexcept { return c.soc_requested_cad; }},
+    {"soc_applied_cad", [](const BenchCycle& c) noexcept { return c.soc_applied_cad; }},
     {"soc_cad", [](const BenchCycle& c) noexcept { return c.soc_cad; }},
     {"nox_true_ppm", [](const BenchCycle& c) noexcept { return c.nox_true_ppm; }},
     {"nox_analyser_ppm", [](const BenchCycle& c) noexcept { return c.nox_analyser_ppm; }},

@@ -79,6 +79,7 @@ std::array<double, 2> timing_window(const engine::Cylinder& cylinder) noexcept;
 struct BenchCycle {
   std::int64_t cycle = 0;
   double soc_requested_cad = 0.0;
+  double soc_applied_cad = 0.0;             ///< request as far as the timing window takes it
   double soc_cad = 0.0;                     ///< of the burn: request, clamped, with drift and scatter
   engine::Indicators<double> indicators{};  ///< efficiency, work and IMEP with their noise
   bool misfire = false;                     ///< nothing burned: indicators of the motored cycle, efficiency of the

@@ -41,8 +41,10 @@ LoopCycle loop_step(EngineBench& bench, S& seeker) noexcept(noexcept(seeker.tell
   out.bench = bench.step(seeker.ask()[0]);
   const BenchCycle& c = out.bench;
   const bool summed = seeker.component_count() == 1;
-  seeker.tell(
-      {summed ? std::span<const double>(&c.j, 1) : c.component_values(), c.limits(), c.misfire || c.unphysical});
+  seeker.tell({summed ? std::span<const double>(&c.j, 1) : c.component_values(),
+               c.limits(),
+               c.misfire || c.unphysical,
+               {&c.soc_applied_cad, 1}});
   return out;
 }
 

@@ -38,6 +38,7 @@ std::vector<std::string> BoundedSeekingSettings::advice() const {
 BoundedSeeking::BoundedSeeking(BoundedSeekingSettings settings)
     : settings_(checked(std::move(settings))),
       filter_(settings_.limits, settings_.space.size(), 2.0 * settings_.dither.period),
+      clamp_(settings_.space.size()),
       applied_(settings_.space.start),
       estimate_(applied_),
       omega_(applied_),
@@ -54,16 +55,19 @@ const Inputs& BoundedSeeking::ask() noexcept {
 }
 
 TellStatus BoundedSeeking::tell(const Reading& reading) noexcept {
-  const TellStatus status = protocol_.check(reading, component_count(), limit_count());
+  const TellStatus status = protocol_.check(reading, component_count(), limit_count(), applied_.size());
   protocol_.count(status);
   if (status != TellStatus::accepted) return status;
-  filter_.record(applied_, reading.limits);
+  const Inputs applied = applied_input(reading, applied_);
+  filter_.record(applied, reading.limits);
+  clamp_.record(applied_, applied, applied_);
   const Eigen::Index n = applied_.size();
   const std::int64_t period = settings_.dither.period;
   const std::int64_t phase = seen_ % period;
   for (Eigen::Index i = 0; i < n; ++i)
-    window_[static_cast<std::size_t>(phase * n + i)] = applied_[i];
+    window_[static_cast<std::size_t>(phase * n + i)] = applied[i];
   ++seen_;
+  if (phase + 1 == period) clamp_.close_window();
   if (seen_ >= period) {
     estimate_.setZero();
     for (std::int64_t k = 0; k < period; ++k) {
@@ -79,7 +83,7 @@ TellStatus BoundedSeeking::tell(const Reading& reading) noexcept {
     step[i] = largest[i] * std::cos(omega_[i] * static_cast<double>(phase) - settings_.kappa * j);
   const Inputs none = Inputs::Zero(n);
   step = filter_.project(applied_, step, none, largest);
-  move_within(applied_, step, settings_.space, none);
+  move_within(applied_, step, settings_.space, none, clamp_, largest);
   return status;
 }
 

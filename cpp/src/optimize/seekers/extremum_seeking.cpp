@@ -18,7 +18,8 @@ constexpr std::array<std::pair<MeanRemoval, std::string_view>, 3> form_names{{
 }};
 
 constexpr double limit_memory_windows = 2.0;
-constexpr double share_rate = 0.25;  // how fast the amplitude follows its target, per window
+constexpr double least_response = 0.05;  // share of the dither that must arrive before a slope is told
+constexpr double share_rate = 0.25;      // how fast the amplitude follows its target, per window
 
 ExtremumSeekingSettings checked(ExtremumSeekingSettings s) {
   const Eigen::Index n = s.space.size();
@@ -83,6 +84,7 @@ ExtremumSeeking::ExtremumSeeking(ExtremumSeekingSettings settings)
     : settings_(checked(std::move(settings))),
       dither_(settings_.dither, settings_.components, false),
       filter_(settings_.limits, settings_.space.size(), limit_memory_windows * settings_.dither.period),
+      clamp_(settings_.space.size()),
       estimate_(settings_.space.start),
       applied_(estimate_),
       gradient_(Inputs::Zero(estimate_.size())),
@@ -90,6 +92,7 @@ ExtremumSeeking::ExtremumSeeking(ExtremumSeekingSettings settings)
       mean_(component_count(), 0.0),
       sum_(gradient_),
       smooth_(gradient_),
+      response_(Inputs::Ones(estimate_.size())),
       origin_(component_count(), 0.0) {
   if (settings_.form == MeanRemoval::moving_average) {
     window_.assign(component_count() * static_cast<std::size_t>(settings_.dither.period), 0.0);
@@ -106,7 +109,7 @@ const Inputs& ExtremumSeeking::ask() noexcept {
 }
 
 TellStatus ExtremumSeeking::tell(const Reading& reading) noexcept {
-  const TellStatus status = protocol_.check(reading, component_count(), limit_count());
+  const TellStatus status = protocol_.check(reading, component_count(), limit_count(), applied_.size());
   protocol_.count(status);
   if (status == TellStatus::accepted) learn(reading);
   return status;
@@ -145,11 +148,13 @@ void ExtremumSeeking::move(Inputs step, const Inputs& rate) noexcept {
   const Inputs reach = settings_.dither.amplitude * share_;
   step = filter_.project(estimate_, step, reach, rate.cwiseMax(settings_.recovery_rate));
   if (filter_.active()) ++limited_cycles_;
-  move_within(estimate_, step, settings_.space, settings_.dither.amplitude);
+  move_within(estimate_, step, settings_.space, settings_.dither.amplitude, clamp_, Inputs::Zero(step.size()));
 }
 
 void ExtremumSeeking::learn(const Reading& reading) noexcept {
-  filter_.record(applied_, reading.limits);
+  const Inputs applied = applied_input(reading, applied_);
+  filter_.record(applied, reading.limits);
+  clamp_.record(applied_, applied, estimate_);
   const Inputs& a = settings_.dither.amplitude;
   const double period = dither_.period();
   const Inputs no_step = Inputs::Zero(estimate_.size());
@@ -169,7 +174,7 @@ void ExtremumSeeking::learn(const Reading& reading) noexcept {
         sum_[i] += j * dither_.demodulation(static_cast<int>(phase_), c, i);
     }
   } else if (remove_mean(reading)) {
-    gradient_ = smooth_.cwiseQuotient(a) * (2.0 / share_);
+    gradient_ = (smooth_.cwiseQuotient(a) * (2.0 / share_)).cwiseProduct(response_);
     if (!holding) {
       move(settings_.gain.cwiseProduct(smooth_) * share_, settings_.rate);
       moved_by_alarm = true;
@@ -187,12 +192,18 @@ void ExtremumSeeking::learn(const Reading& reading) noexcept {
   ++seen_;
   if (++phase_ < dither_.period()) return;
   phase_ = 0;
+  // The steps take the slope against what is asked, which fades where the plant does not follow; `gradient` tells it
+  // against what is applied: the regression on the part of the dither that arrives.
+  const Inputs arriving = clamp_.response(a.cwiseAbs2() * (0.5 * period * share_ * share_));
+  response_ = (arriving.array() > least_response).select(arriving.cwiseInverse(), Inputs::Zero(a.size()));
+  clamp_.close_window();
   if (settings_.form == MeanRemoval::batch) {
     gradient_ = (sum_ * (2.0 / (period * share_))).cwiseQuotient(a);
     if (!holding) {  // the mean rate of the continuous form: M g_r A/2 times the slope, smaller with a smaller dither
       move((settings_.gain.cwiseProduct(a)).cwiseProduct(gradient_) * (0.5 * period * share_ * share_),
            settings_.rate * period);
     }
+    gradient_ = gradient_.cwiseProduct(response_);
   }
   end_of_window();
 }
@@ -215,8 +226,10 @@ void ExtremumSeeking::restart() noexcept {
   share_ = 1.0;
   smooth_.setZero();
   sum_.setZero();
+  response_.setOnes();
   limited_cycles_ = 0;
   filter_.forget();
+  clamp_.forget();
 }
 
 }  // namespace mgdd::optimize

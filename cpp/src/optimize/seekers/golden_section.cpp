@@ -20,6 +20,7 @@ constexpr double limit_samples = 4.0;           // ... before a limit decides: i
 constexpr double widest_share = 0.2;            // of the first bracket: the refinement looks no wider
 constexpr double width_rate = 0.05;             // how fast the width follows what the parabola says, per triple
 constexpr double narrow_share = 0.25;           // of its width, while a limit holds the refinement back
+constexpr double least_distance = 0.1;          // of the asked one: two points nearer to each other are one
 constexpr std::int64_t last_draws = 2;          // in a row: the bracket is as small as the noise allows
 
 GoldenSectionSettings checked(GoldenSectionSettings s) {
@@ -47,6 +48,7 @@ GoldenSectionSettings checked(GoldenSectionSettings s) {
 GoldenSection::GoldenSection(GoldenSectionSettings settings)
     : settings_(checked(std::move(settings))),
       filter_(settings_.limits, 1, 20.0),
+      clamp_(1),
       estimate_(settings_.space.start),
       applied_(estimate_),
       lower_(settings_.space.lower[0]),
@@ -73,22 +75,26 @@ const Inputs& GoldenSection::ask() noexcept {
 }
 
 TellStatus GoldenSection::tell(const Reading& reading) noexcept {
-  const TellStatus status = protocol_.check(reading, component_count(), limit_count());
+  const TellStatus status = protocol_.check(reading, component_count(), limit_count(), applied_.size());
   protocol_.count(status);
   if (status != TellStatus::accepted) return status;
   const double j = objective_of(reading, settings_.maximize) + filter_.shaping(reading.limits);
-  filter_.record(applied_, reading.limits);
+  const Inputs applied = applied_input(reading, applied_);
+  filter_.record(applied, reading.limits);
   const auto slot = static_cast<std::size_t>(samples_++) % ring;
-  sample_input_[slot] = applied_[0];
+  sample_input_[slot] = applied[0];
   sample_j_[slot] = j;
   if (refining_) {
+    clamp_.record(applied_, applied, estimate_);
     turn_ = (turn_ + 1) % 3;
+    if (turn_ == 0) clamp_.close_window();
     if (turn_ == 0 && settings_.noise_sd > 0.0) refine();
     return status;
   }
   Point& point = points_[static_cast<std::size_t>(turn_)];
   point.count += 1.0;
   point.sum += j;
+  point.missed += applied[0] - applied_[0];
   double worst = 0.0;
   for (std::size_t i = 0; i < limit_count(); ++i) {
     const Limit& limit = filter_.limits()[i];
@@ -101,12 +107,20 @@ TellStatus GoldenSection::tell(const Reading& reading) noexcept {
   return status;
 }
 
-// A limit broken at either point decides first, by the lesser excess; then J, if it differs by more than chance.
+// What decides, in this order: that the plant applies both points as one; a limit broken at either point, by the lesser
+// excess; J, if it differs by more than chance.
 void GoldenSection::decide() noexcept {
   const bool exact = settings_.noise_sd == 0.0;
   const double n = std::min(points_[0].count, points_[1].count);
-  if (n < (exact ? 1.0 : first_samples)) return;
   const auto mean = [](double sum, const Point& p) { return sum / p.count; };
+  if (n < 1.0) return;
+  const double asked = inner(1) - inner(0);
+  const double missed = mean(points_[1].missed, points_[1]) - mean(points_[0].missed, points_[0]);
+  if (asked + missed < least_distance * asked) {  // both are applied as one: the plant does not go there
+    draws_ = 0;
+    return points_[0].missed + points_[1].missed > 0.0 ? cut(inner(0), upper_) : cut(lower_, inner(1));
+  }
+  if (n < (exact ? 1.0 : first_samples)) return;
   const double over0 = mean(points_[0].excess, points_[0]);
   const double over1 = mean(points_[1].excess, points_[1]);
   if (limit_count() > 0 && std::max(over0, over1) > 0.0) {
@@ -189,7 +203,7 @@ void GoldenSection::refine() noexcept {
   Inputs step = scalar_input(fit.vertex - estimate_[0]);
   clip_each(step, scalar_input(0.25 * reach));
   step = filter_.project(estimate_, step, scalar_input(reach), scalar_input(reach));
-  move_within(estimate_, step, settings_.space, scalar_input(0.0));
+  move_within(estimate_, step, settings_.space, scalar_input(0.0), clamp_, Inputs::Zero(step.size()));
   const double most = widest_share * (settings_.space.upper[0] - settings_.space.lower[0]);
   const double wide = fit.bend < 0.0 ? std::sqrt(8.0 * settings_.noise_sd / -fit.bend) : most;
   width_ += width_rate * (std::clamp(wide, settings_.tolerance, most) - width_);
@@ -212,6 +226,7 @@ void GoldenSection::restart() noexcept {
   samples_ = 0;
   refining_ = false;
   filter_.forget();
+  clamp_.forget();
 }
 
 // A bracket that still covers the range stays: what the range holds does not move.

@@ -9,6 +9,8 @@
 namespace mgdd::optimize {
 namespace {
 
+constexpr double least_distance = 0.5;  // of the difference: inputs applied nearer to each other show no slope
+
 GradientDescentSettings checked(GradientDescentSettings s) {
   const Eigen::Index n = s.space.size();
   require_positive("step_size", s.step_size);
@@ -35,6 +37,7 @@ std::vector<std::string> GradientDescentSettings::advice() const {
 GradientDescent::GradientDescent(GradientDescentSettings settings)
     : settings_(checked(std::move(settings))),
       filter_(settings_.limits, settings_.space.size(), 8.0 * static_cast<double>(settings_.space.size())),
+      clamp_(settings_.space.size()),
       estimate_(settings_.space.start),
       applied_(estimate_),
       gradient_(Inputs::Zero(estimate_.size())) {}
@@ -47,23 +50,31 @@ const Inputs& GradientDescent::ask() noexcept {
 }
 
 TellStatus GradientDescent::tell(const Reading& reading) noexcept {
-  const TellStatus status = protocol_.check(reading, component_count(), limit_count());
+  const TellStatus status = protocol_.check(reading, component_count(), limit_count(), applied_.size());
   protocol_.count(status);
   if (status != TellStatus::accepted) return status;
-  filter_.record(applied_, reading.limits);
+  const Inputs applied = applied_input(reading, applied_);
+  filter_.record(applied, reading.limits);
+  clamp_.record(applied_, applied, estimate_);
   const double j = objective_of(reading, settings_.maximize) + filter_.shaping(reading.limits);
+  const Eigen::Index input = stage_ / 2;
+  const double missed = applied[input] - applied_[input];
   if (stage_ % 2 == 0) {
     above_ = j;
+    above_missed_ = missed;
   } else {
-    gradient_[stage_ / 2] = (above_ - j) / (2.0 * settings_.difference);
+    const double distance = 2.0 * settings_.difference + (above_missed_ - missed);  // between the applied inputs
+    const bool moved = distance > least_distance * settings_.difference;
+    gradient_[input] = moved ? (above_ - j) / distance : 0.0;
   }
   if (++stage_ < 2 * estimate_.size()) return status;
   stage_ = 0;
+  clamp_.close_window();
   Inputs step = settings_.step_size * gradient_;
   clip_each(step, settings_.rate);
   const Inputs reach = Inputs::Constant(step.size(), settings_.difference);
   step = filter_.project(estimate_, step, reach, settings_.rate);
-  move_within(estimate_, step, settings_.space, reach);
+  move_within(estimate_, step, settings_.space, reach, clamp_, Inputs::Zero(step.size()));
   ++iteration_;
   if (converged_at_ < 0 && iteration_ <= settings_.iterations && step.cwiseAbs().maxCoeff() < settings_.tolerance) {
     converged_at_ = iteration_;
@@ -76,6 +87,7 @@ void GradientDescent::restart() noexcept {
   iteration_ = 0;
   converged_at_ = -1;
   filter_.forget();
+  clamp_.forget();
 }
 
 }  // namespace mgdd::optimize

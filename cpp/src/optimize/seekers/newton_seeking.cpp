@@ -57,6 +57,7 @@ NewtonSeeking::NewtonSeeking(NewtonSeekingSettings settings)
     : settings_(checked(std::move(settings))),
       dither_(settings_.dither, settings_.components, true),
       filter_(settings_.limits, settings_.space.size(), 2.0 * settings_.dither.period),
+      clamp_(settings_.space.size()),
       estimate_(settings_.space.start),
       applied_(estimate_),
       gradient_(Inputs::Zero(estimate_.size())),
@@ -75,7 +76,7 @@ const Inputs& NewtonSeeking::ask() noexcept {
 }
 
 TellStatus NewtonSeeking::tell(const Reading& reading) noexcept {
-  const TellStatus status = protocol_.check(reading, component_count(), limit_count());
+  const TellStatus status = protocol_.check(reading, component_count(), limit_count(), applied_.size());
   protocol_.count(status);
   if (status == TellStatus::accepted) learn(reading);
   return status;
@@ -95,7 +96,9 @@ void NewtonSeeking::update_inverse() noexcept {
 }
 
 void NewtonSeeking::learn(const Reading& reading) noexcept {
-  filter_.record(applied_, reading.limits);
+  const Inputs applied = applied_input(reading, applied_);
+  filter_.record(applied, reading.limits);
+  clamp_.record(applied_, applied, estimate_);
   const auto period = static_cast<std::size_t>(dither_.period());
   const Eigen::Index n = estimate_.size();
   const Inputs a = settings_.dither.amplitude * share_;
@@ -122,19 +125,22 @@ void NewtonSeeking::learn(const Reading& reading) noexcept {
   Inputs step = Inputs::Zero(n);
   if (full) {
     gradient_ = gradient;
-    hessian_ += settings_.hessian_rate * (sample - hessian_);
-    update_inverse();
+    if (!clamp_.clamped()) {  // a dither that is cut off bends whatever it measures
+      hessian_ += settings_.hessian_rate * (sample - hessian_);
+      update_inverse();
+    }
     if (!holding) step = inverse_ * gradient * (-1.0 / settings_.time_constant_cycles);
   }
   if ((full && !holding) || filter_.alarmed()) {
     clip_each(step, settings_.rate);
     step = filter_.project(estimate_, step, a, settings_.rate);
     if (filter_.active()) ++limited_cycles_;
-    move_within(estimate_, step, settings_.space, settings_.dither.amplitude);
+    move_within(estimate_, step, settings_.space, settings_.dither.amplitude, clamp_, Inputs::Zero(step.size()));
   }
   ++seen_;
   if (++phase_ < dither_.period()) return;
   phase_ = 0;
+  clamp_.close_window();
   const double target = limited_cycles_ >= dither_.period() / 2 ? settings_.limit_amplitude : 1.0;
   share_ += 0.25 * (target - share_);
   limited_cycles_ = 0;
@@ -147,6 +153,7 @@ void NewtonSeeking::restart() noexcept {
   share_ = 1.0;
   limited_cycles_ = 0;
   filter_.forget();
+  clamp_.forget();
 }
 
 }  // namespace mgdd::optimize

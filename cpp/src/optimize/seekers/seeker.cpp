@@ -75,8 +75,13 @@ void require_within_space(std::string_view column, const Inputs& values, const S
   }
 }
 
-TellStatus Protocol::check(const Reading& reading, std::size_t components, std::size_t limits) const noexcept {
+TellStatus Protocol::check(const Reading& reading, std::size_t components, std::size_t limits,
+                           Eigen::Index inputs) const noexcept {
   if (!asked) return TellStatus::not_asked;
+  if (!reading.applied.empty() && (reading.applied.size() != static_cast<std::size_t>(inputs) ||
+                                   !std::all_of(reading.applied.begin(), reading.applied.end(), is_reading))) {
+    return TellStatus::wrong_applied;
+  }
   if (reading.misfire) return TellStatus::misfire;
   if (reading.components.size() != components) return TellStatus::wrong_component_count;
   if (reading.limits.size() != limits) return TellStatus::wrong_limit_count;
@@ -93,7 +98,7 @@ void Protocol::count(TellStatus status) noexcept {
 }
 
 void require(TellStatus status, const Protocol& protocol, const Reading& reading, std::size_t components,
-             std::size_t limits) {
+             std::size_t limits, Eigen::Index inputs) {
   const std::string at = "cycle " + std::to_string(protocol.cycle) + ": ";
   switch (status) {
     case TellStatus::accepted:
@@ -109,6 +114,20 @@ void require(TellStatus status, const Protocol& protocol, const Reading& reading
       throw in_context(
           at, about("limits", ShapeError("limits has " + std::to_string(reading.limits.size()) + " values: must have " +
                                          std::to_string(limits) + ", one per limit of the settings")));
+    case TellStatus::wrong_applied:
+      if (reading.applied.size() != static_cast<std::size_t>(inputs)) {
+        throw in_context(
+            at, about("applied", ShapeError("applied has " + std::to_string(reading.applied.size()) +
+                                            " entries: must have " + std::to_string(inputs) +
+                                            ", one per input, or be left out where everything was applied as asked")));
+      }
+      for (std::size_t i = 0; i < reading.applied.size(); ++i) {
+        if (is_reading(reading.applied[i])) continue;
+        throw in_context(at, DataError(entry("applied", static_cast<Eigen::Index>(i), inputs), reading.applied[i],
+                                       "must be finite and at most " + text(largest_reading) +
+                                           " in magnitude; leave it out if what was applied is not known"));
+      }
+      return;
     case TellStatus::not_a_reading:
       for (const double value : reading.components) {
         if (!is_reading(value)) refuse_reading(at, "J", value);

@@ -27,7 +27,9 @@ constexpr std::array<std::pair<GainSchedule, std::string_view>, 2> schedule_name
 constexpr double memory = 10.0;              // measurements behind the trend and the limits
 constexpr double one_measurement_start = 6;  // measurements before the trend is trusted
 constexpr double blocking_errors = 2.0;
-constexpr double share_rate = 0.25;  // how fast the perturbation follows its target, per iteration
+constexpr int clamp_window = 6;          // measurements, at least, before a clamp is judged
+constexpr double least_distance = 0.25;  // of the perturbation: with less applied there is no slope
+constexpr double share_rate = 0.25;      // how fast the perturbation follows its target, per iteration
 
 SpsaSettings checked(SpsaSettings s) {
   const bool second = s.form == SpsaForm::second_order;
@@ -97,6 +99,7 @@ std::vector<std::string> SpsaSettings::advice() const {
 Spsa::Spsa(SpsaSettings settings)
     : settings_(checked(std::move(settings))),
       filter_(settings_.limits, settings_.space.size(), 2.0 * memory),
+      clamp_(settings_.space.size()),
       trend_(settings_.space.size(), memory),
       estimate_(settings_.space.start),
       candidate_(estimate_),
@@ -105,6 +108,7 @@ Spsa::Spsa(SpsaSettings settings)
       sum_(gradient_),
       hessian_(InputMatrix::Identity(estimate_.size(), estimate_.size()) * settings_.initial_hessian),
       hessian_sum_(InputMatrix::Zero(estimate_.size(), estimate_.size())),
+      missed_(InputMatrix::Zero(estimate_.size(), 4)),
       measured_(4, 0.0) {}
 
 int Spsa::per_gradient() const noexcept {
@@ -158,15 +162,17 @@ const Inputs& Spsa::ask() noexcept {
 }
 
 TellStatus Spsa::tell(const Reading& reading) noexcept {
-  const TellStatus status = protocol_.check(reading, component_count(), limit_count());
+  const TellStatus status = protocol_.check(reading, component_count(), limit_count(), applied_.size());
   protocol_.count(status);
   if (status != TellStatus::accepted) return status;
   const double j = objective_of(reading, settings_.maximize) + filter_.shaping(reading.limits);
-  filter_.record(applied_, reading.limits);
+  const Inputs applied = applied_input(reading, applied_);
+  filter_.record(applied, reading.limits);
   const int gradients_end = per_gradient() * settings_.averaging;
   if (stage_ < gradients_end) {
     around_j_ += j;
-    finish_gradient(j);
+    watch(applied);
+    finish_gradient(j, applied);
     if (++stage_ < gradients_end) return status;
     finish_iteration();
     if (settings_.blocking) return status;
@@ -185,26 +191,43 @@ TellStatus Spsa::tell(const Reading& reading) noexcept {
   return status;
 }
 
+// A window of the watch: whole iterations, as many as have measured to both sides.
+void Spsa::watch(const Inputs& applied) noexcept {
+  clamp_.record(applied_, applied, estimate_);
+  if (++watched_ < std::max(std::int64_t{clamp_window}, std::int64_t{per_gradient()} * settings_.averaging)) return;
+  watched_ = 0;
+  clamp_.close_window();
+}
+
+// Adds a rise of J over the perturbation `c` times the direction, less what the plant did not apply of it.
+void Spsa::add_slope(double rise, double c, const Inputs& missed) noexcept {
+  for (Eigen::Index i = 0; i < sum_.size(); ++i) {
+    const double distance = c * direction(0, i) + missed[i];
+    if (std::abs(distance) > least_distance * c) sum_[i] += rise / distance;
+  }
+}
+
 // Takes one measurement in; at the last one of a gradient, adds that gradient to the sum of the iteration.
-void Spsa::finish_gradient(double j) noexcept {
+void Spsa::finish_gradient(double j, const Inputs& applied) noexcept {
   const int per = per_gradient();
   const auto within = static_cast<std::size_t>(stage_) % static_cast<std::size_t>(per);
   const double c = perturbation_now();
   measured_[within] = j;
+  missed_.col(static_cast<Eigen::Index>(within)) = applied - applied_;
   if (settings_.form == SpsaForm::one_measurement) {
     const bool ready = trend_.cycles() >= one_measurement_start;
     const double surprise = j - trend_.predict(estimate_);
-    trend_.record(applied_, j);
-    for (Eigen::Index i = 0; ready && i < sum_.size(); ++i)
-      sum_[i] += surprise / (c * direction(0, i));
+    trend_.record(applied, j);
+    if (ready) add_slope(surprise, c, missed_.col(0));
     ++draw_;
     return;
   }
   if (within + 1 < static_cast<std::size_t>(per)) return;
-  const double rise = (measured_[0] - measured_[1]) / (2.0 * c);
-  for (Eigen::Index i = 0; i < sum_.size(); ++i)
-    sum_[i] += rise / direction(0, i);
-  if (settings_.form == SpsaForm::second_order) {
+  add_slope(measured_[0] - measured_[1], 2.0 * c, missed_.col(0) - missed_.col(1));
+  const InputMatrix uneven = missed_.colwise() - missed_.col(0);  // an offset common to all four does not matter
+  if (settings_.form == SpsaForm::second_order && uneven.cwiseAbs().maxCoeff() > least_distance * c) {
+    hessian_sum_ += hessian_;  // perturbations that are cut off bend whatever they measure
+  } else if (settings_.form == SpsaForm::second_order) {
     const double bend = ((measured_[2] - measured_[0]) - (measured_[3] - measured_[1])) / (2.0 * c * c);
     for (Eigen::Index i = 0; i < sum_.size(); ++i) {
       for (Eigen::Index k = 0; k < sum_.size(); ++k) {
@@ -243,7 +266,8 @@ void Spsa::finish_iteration() noexcept {
   step = filter_.project(estimate_, step, reach, most);
   candidate_ = estimate_;
   const double widest = settings_.perturbation * (second ? 2.0 : 1.0);
-  move_within(candidate_, step, settings_.space, Inputs::Constant(step.size(), widest));
+  move_within(candidate_, step, settings_.space, Inputs::Constant(step.size(), widest), clamp_,
+              Inputs::Zero(step.size()));
   share_ += share_rate * ((filter_.active() ? settings_.limit_amplitude : 1.0) - share_);
 }
 
@@ -255,8 +279,10 @@ void Spsa::restart() noexcept {
   hessian_sum_.setZero();
   around_j_ = 0.0;
   share_ = 1.0;
+  watched_ = 0;
   trend_.forget();
   filter_.forget();
+  clamp_.forget();
 }
 
 void Spsa::shift_estimate(const Inputs& by) noexcept {

@@ -8,6 +8,7 @@
 #include <string>
 #include <vector>
 
+#include "mgdd/optimize/seekers/clamp_watch.hpp"
 #include "mgdd/optimize/seekers/constraint_filter.hpp"
 #include "mgdd/optimize/seekers/dither.hpp"
 #include "mgdd/optimize/seekers/seeker.hpp"
@@ -32,12 +33,15 @@ class BoundedSeeking {
   const Inputs& ask() noexcept;
   TellStatus tell(const Reading& reading) noexcept;
   /// New operating point: forget the limits; the estimate goes on.
-  void restart() noexcept { filter_.forget(); }
+  void restart() noexcept {
+    filter_.forget();
+    clamp_.forget();
+  }
 
   /// Mean of the applied input over the last window; the start before there is one.
   const Inputs& estimate() const noexcept { return estimate_; }
   const BoundedSeekingSettings& settings() const noexcept { return settings_; }
-  /// The input of the last ask.
+  /// The input of the last ask; what the plant made of it stands in the reading.
   const Inputs& applied() const noexcept { return applied_; }
   const Protocol& protocol() const noexcept { return protocol_; }
   std::size_t component_count() const noexcept { return 1; }
@@ -60,11 +64,13 @@ class BoundedSeeking {
     v("seen", self.seen_);
     v("window", self.window_);
     ConstraintFilter::visit(self.filter_, v);
+    ClampWatch::visit(self.clamp_, v);
   }
 
  private:
   BoundedSeekingSettings settings_;
   ConstraintFilter filter_;
+  ClampWatch clamp_;
   Protocol protocol_;
   Inputs applied_, estimate_, omega_;
   std::int64_t seen_ = 0;

@@ -10,6 +10,7 @@
 #include <string_view>
 #include <vector>
 
+#include "mgdd/optimize/seekers/clamp_watch.hpp"
 #include "mgdd/optimize/seekers/constraint_filter.hpp"
 #include "mgdd/optimize/seekers/dither.hpp"
 #include "mgdd/optimize/seekers/seeker.hpp"
@@ -61,7 +62,7 @@ class ExtremumSeeking {
   const Inputs& gradient() const noexcept { return gradient_; }
   double amplitude_share() const noexcept { return share_; }
   const ExtremumSeekingSettings& settings() const noexcept { return settings_; }
-  /// The input of the last ask.
+  /// The input of the last ask; what the plant made of it stands in the reading.
   const Inputs& applied() const noexcept { return applied_; }
   const Protocol& protocol() const noexcept { return protocol_; }
   std::size_t component_count() const noexcept { return settings_.components.size(); }
@@ -92,9 +93,11 @@ class ExtremumSeeking {
     v("mean", self.mean_);
     v("sum", self.sum_);
     v("smooth", self.smooth_);
+    v("response", self.response_);
     v("origin", self.origin_);
     v("limited_cycles", self.limited_cycles_);
     ConstraintFilter::visit(self.filter_, v);
+    ClampWatch::visit(self.clamp_, v);
   }
 
  private:
@@ -107,6 +110,7 @@ class ExtremumSeeking {
   ExtremumSeekingSettings settings_;
   Dither dither_;
   ConstraintFilter filter_;
+  ClampWatch clamp_;
   Protocol protocol_;
   Inputs estimate_, applied_, gradient_;
   std::int64_t phase_ = 0;      // of the window
@@ -117,6 +121,7 @@ class ExtremumSeeking {
   std::vector<double> mean_;    // window sum or washout state, per component
   Inputs sum_;                  // demodulated sum of the window
   Inputs smooth_;
+  Inputs response_;             // what the slope is multiplied with where only a part of the dither is applied
   std::vector<double> origin_;  // first reading of the window, taken off before summing
   std::int64_t limited_cycles_ = 0;
 };

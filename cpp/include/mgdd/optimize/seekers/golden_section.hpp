@@ -7,6 +7,7 @@
 #include <array>
 #include <vector>
 
+#include "mgdd/optimize/seekers/clamp_watch.hpp"
 #include "mgdd/optimize/seekers/constraint_filter.hpp"
 #include "mgdd/optimize/seekers/seeker.hpp"
 
@@ -36,7 +37,7 @@ class GoldenSection {
   double upper() const noexcept { return upper_; }
   bool converged() const noexcept { return refining_; }
   const GoldenSectionSettings& settings() const noexcept { return settings_; }
-  /// The input of the last ask.
+  /// The input of the last ask; what the plant made of it stands in the reading.
   const Inputs& applied() const noexcept { return applied_; }
   const Protocol& protocol() const noexcept { return protocol_; }
   std::size_t component_count() const noexcept { return 1; }
@@ -67,13 +68,16 @@ class GoldenSection {
       v(name + "_count", self.points_[p].count);
       v(name + "_sum", self.points_[p].sum);
       v(name + "_excess", self.points_[p].excess);
+      v(name + "_missed", self.points_[p].missed);
     }
     ConstraintFilter::visit(self.filter_, v);
+    ClampWatch::visit(self.clamp_, v);
   }
 
  private:
   struct Point {
-    double count = 0.0, sum = 0.0, excess = 0.0;  // excess: sum of the worst scaled excess over the limits
+    // Sums: of J, of the worst scaled excess over the limits, of the applied input less the asked one.
+    double count = 0.0, sum = 0.0, excess = 0.0, missed = 0.0;
   };
   struct Parabola {
     double vertex, bend;
@@ -87,6 +91,7 @@ class GoldenSection {
 
   GoldenSectionSettings settings_;
   ConstraintFilter filter_;
+  ClampWatch clamp_;
   Protocol protocol_;
   Inputs estimate_, applied_;
   double lower_, upper_;

@@ -7,6 +7,7 @@
 #include <string>
 #include <vector>
 
+#include "mgdd/optimize/seekers/clamp_watch.hpp"
 #include "mgdd/optimize/seekers/constraint_filter.hpp"
 #include "mgdd/optimize/seekers/seeker.hpp"
 
@@ -40,7 +41,7 @@ class GradientDescent {
   /// The step at which the tolerance was met first, counting that step; -1 before, and after `iterations` without.
   std::int64_t converged_at() const noexcept { return converged_at_; }
   const GradientDescentSettings& settings() const noexcept { return settings_; }
-  /// The input of the last ask.
+  /// The input of the last ask; what the plant made of it stands in the reading.
   const Inputs& applied() const noexcept { return applied_; }
   const Protocol& protocol() const noexcept { return protocol_; }
   std::size_t component_count() const noexcept { return 1; }
@@ -61,19 +62,23 @@ class GradientDescent {
     v("applied", self.applied_);
     v("gradient", self.gradient_);
     v("above", self.above_);
+    v("above_missed", self.above_missed_);
     v("stage", self.stage_, 2 * self.estimate_.size());
     v("iteration", self.iteration_);
     v("converged_at", self.converged_at_);
     ConstraintFilter::visit(self.filter_, v);
+    ClampWatch::visit(self.clamp_, v);
   }
 
  private:
   GradientDescentSettings settings_;
   ConstraintFilter filter_;
+  ClampWatch clamp_;
   Protocol protocol_;
   Inputs estimate_, applied_, gradient_;
-  double above_ = 0.0;      // J at theta + c of the input at work
-  std::int64_t stage_ = 0;  // measurement within the step
+  double above_ = 0.0;         // J at theta + c of the input at work
+  double above_missed_ = 0.0;  // how far the plant fell short of theta + c
+  std::int64_t stage_ = 0;     // measurement within the step
   std::int64_t iteration_ = 0;
   std::int64_t converged_at_ = -1;
 };

@@ -8,6 +8,7 @@
 #include <string>
 #include <vector>
 
+#include "mgdd/optimize/seekers/clamp_watch.hpp"
 #include "mgdd/optimize/seekers/constraint_filter.hpp"
 #include "mgdd/optimize/seekers/dither.hpp"
 #include "mgdd/optimize/seekers/seeker.hpp"
@@ -47,7 +48,7 @@ class NewtonSeeking {
   const InputMatrix& hessian() const noexcept { return hessian_; }
   const InputMatrix& inverse_hessian() const noexcept { return inverse_; }
   const NewtonSeekingSettings& settings() const noexcept { return settings_; }
-  /// The input of the last ask.
+  /// The input of the last ask; what the plant made of it stands in the reading.
   const Inputs& applied() const noexcept { return applied_; }
   const Protocol& protocol() const noexcept { return protocol_; }
   std::size_t component_count() const noexcept { return settings_.components.size(); }
@@ -79,6 +80,7 @@ class NewtonSeeking {
     v("limited_cycles", self.limited_cycles_);
     v("window", self.window_);
     ConstraintFilter::visit(self.filter_, v);
+    ClampWatch::visit(self.clamp_, v);
   }
 
  private:
@@ -88,6 +90,7 @@ class NewtonSeeking {
   NewtonSeekingSettings settings_;
   Dither dither_;
   ConstraintFilter filter_;
+  ClampWatch clamp_;
   Protocol protocol_;
   Inputs estimate_, applied_, gradient_;
   InputMatrix hessian_, inverse_;

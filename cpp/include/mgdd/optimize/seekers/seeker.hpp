@@ -50,9 +50,18 @@ struct Reading {
   std::span<const double> components;
   std::span<const double> limits;  ///< measured values of the limited quantities, in the order of the settings
   bool misfire = false;
+  std::span<const double> applied{};  ///< what the plant really applied, in the order of the inputs; empty: as asked
 };
 
-enum class TellStatus { accepted, misfire, not_asked, wrong_component_count, wrong_limit_count, not_a_reading };
+enum class TellStatus {
+  accepted,
+  misfire,
+  not_asked,
+  wrong_component_count,
+  wrong_limit_count,
+  not_a_reading,
+  wrong_applied  ///< not one number per input, or one that is not a reading; of a misfired cycle too
+};
 
 /// The bookkeeping of ask and tell.
 struct Protocol {
@@ -61,7 +70,8 @@ struct Protocol {
   bool asked = false;
 
   /// What would become of this reading; changes nothing.
-  TellStatus check(const Reading& reading, std::size_t components, std::size_t limits) const noexcept;
+  TellStatus check(const Reading& reading, std::size_t components, std::size_t limits,
+                   Eigen::Index inputs) const noexcept;
 
   /// Counts an accepted or misfired reading; a refused one changes nothing.
   void count(TellStatus status) noexcept;
@@ -76,10 +86,16 @@ struct Protocol {
 
 /// Throws what a refused reading deserves, naming the cycle; returns for accepted and misfired ones.
 void require(TellStatus status, const Protocol& protocol, const Reading& reading, std::size_t components,
-             std::size_t limits);
+             std::size_t limits, Eigen::Index inputs);
 
 /// ParameterError unless every entry of a restored column lies within the bounds of these settings.
 void require_within_space(std::string_view column, const Inputs& values, const SearchSpace& space);
+
+/// What a seeker learns from: the input that the plant applied, or `asked` where the reading does not say.
+inline Inputs applied_input(const Reading& reading, const Inputs& asked) noexcept {
+  if (reading.applied.empty()) return asked;
+  return Eigen::Map<const Inputs>(reading.applied.data(), asked.size());
+}
 
 /// Sum of the components of J, negated where the user minimises.
 inline double objective_of(const Reading& reading, bool maximize) noexcept {

@@ -20,7 +20,7 @@ class SeekerHistory {
   /// Makes the next `cycles` calls of `add` free of allocation.
   void make_room(std::size_t cycles);
 
-  /// One told cycle: what was applied, the estimate before it was told, J as told, NaN where the cycle misfired.
+  /// One told cycle: what the plant applied, the estimate before it was told, J as told, NaN where the cycle misfired.
   void add(std::int64_t cycle, const Inputs& applied, const Inputs& estimate, double objective, bool misfire);
   void clear() noexcept { rows_.clear(); }
 
@@ -50,12 +50,13 @@ class RecordedSeeker {
   TellStatus tell(const Reading& reading) {
     history_.make_room(1);  // before the seeker learns: without memory nothing has happened
     const std::int64_t cycle = seeker_.protocol().cycle;
-    const Inputs applied = seeker_.applied();  // a seeker may move both while it learns
+    const Inputs asked = seeker_.applied();  // a seeker may move both while it learns
     const Inputs estimate = seeker_.estimate();
     const TellStatus status = seeker_.tell(reading);
     if (status == TellStatus::accepted || status == TellStatus::misfire) {
       const bool misfire = status == TellStatus::misfire;
-      history_.add(cycle, applied, estimate, misfire ? std::nan("") : objective_of(reading, true), misfire);
+      history_.add(cycle, applied_input(reading, asked), estimate, misfire ? std::nan("") : objective_of(reading, true),
+                   misfire);
     }
     return status;
   }

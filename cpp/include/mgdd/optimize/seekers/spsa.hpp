@@ -10,6 +10,7 @@
 #include <string_view>
 #include <vector>
 
+#include "mgdd/optimize/seekers/clamp_watch.hpp"
 #include "mgdd/optimize/seekers/constraint_filter.hpp"
 #include "mgdd/optimize/seekers/local_model.hpp"
 #include "mgdd/optimize/seekers/seeker.hpp"
@@ -70,7 +71,7 @@ class Spsa {
   std::int64_t blocked() const noexcept { return blocked_; }
   int measurements_per_iteration() const noexcept;
   const SpsaSettings& settings() const noexcept { return settings_; }
-  /// The input of the last ask.
+  /// The input of the last ask; what the plant made of it stands in the reading.
   const Inputs& applied() const noexcept { return applied_; }
   const Protocol& protocol() const noexcept { return protocol_; }
   std::size_t component_count() const noexcept { return 1; }
@@ -96,15 +97,18 @@ class Spsa {
     v("sum", self.sum_);
     v("hessian", self.hessian_);
     v("hessian_sum", self.hessian_sum_);
+    v("missed", self.missed_);
     v("measured", self.measured_);
     v("iteration", self.iteration_);
     v("draw", self.draw_);
     v("stage", self.stage_, self.measurements_per_iteration());
     v("blocked", self.blocked_);
+    v("watched", self.watched_);
     v("share", self.share_);
     v("around_j", self.around_j_);
     LocalModel::visit(self.trend_, v, "trend");
     ConstraintFilter::visit(self.filter_, v);
+    ClampWatch::visit(self.clamp_, v);
   }
 
  private:
@@ -112,23 +116,28 @@ class Spsa {
   double perturbation_now() const noexcept;
   int per_gradient() const noexcept;
   double direction(int kind, Eigen::Index input) const noexcept;
-  void finish_gradient(double j) noexcept;
+  void watch(const Inputs& applied) noexcept;
+  void add_slope(double rise, double c, const Inputs& missed) noexcept;
+  void finish_gradient(double j, const Inputs& applied) noexcept;
   void finish_iteration() noexcept;
   Inputs newton_step() noexcept;
 
   SpsaSettings settings_;
   ConstraintFilter filter_;
+  ClampWatch clamp_;
   LocalModel trend_;
   Protocol protocol_;
   Inputs estimate_, candidate_, applied_, gradient_, sum_;
   InputMatrix hessian_, hessian_sum_;
+  InputMatrix missed_;            // applied less asked, per input and measurement of the gradient at work
   std::vector<double> measured_;  // of the gradient at work
   std::int64_t iteration_ = 0;    // of the gains
   std::int64_t draw_ = 0;         // gradients begun since construction: index of the random numbers
   std::int64_t stage_ = 0;        // measurement within the iteration
   std::int64_t blocked_ = 0;
-  double share_ = 1.0;     // perturbation now over that of the schedule
-  double around_j_ = 0.0;  // sum of J measured around the estimate in this iteration
+  std::int64_t watched_ = 0;  // measurements in the window of the clamp watch
+  double share_ = 1.0;        // perturbation now over that of the schedule
+  double around_j_ = 0.0;     // sum of J measured around the estimate in this iteration
 };
 
 }  // namespace mgdd::optimize
