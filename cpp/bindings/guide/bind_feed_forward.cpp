@@ -56,6 +56,8 @@ void bind_feed_forward(py::module_& m) {
            return status == guide::GuideStatus::followed;
          },
          arg("optimum"), arg("curvature"), arg("cause"), "What the guide says; False where it cannot be used.")
+      .def(
+          "_hold", [](Bound& b) { b.use()->hold(); }, "A new operating point of which the guide says nothing.")
       .def_property_readonly(
           "applied", [](const Bound& b) { return input_array(b.use()->applied()); },
           "The input of the last ask, shape (inputs,).")
@@ -108,7 +110,13 @@ void bind_feed_forward(py::module_& m) {
             const auto core = b.use();
             return history_columns(core->seeker().history().save(), core->estimate().size());
           },
-          "History of the seeker, as its _history_columns.");
+          "History of the seeker, as its _history_columns.")
+      .def(
+          "_set_seeker_history",
+          [](Bound& b, const std::map<std::string, InputArray>& given) {
+            b.use()->seeker().history().restore(columns_from(given));
+          },
+          arg("columns"), "History of the seeker, as its _history_columns gave it.");
 }
 
 }  // namespace mgdd::bindings

@@ -240,6 +240,14 @@ inline py::dict history_columns(const StateColumns& history, Eigen::Index inputs
   return out;
 }
 
+/// Columns of a history as Python hands them back.
+inline StateColumns columns_from(const std::map<std::string, InputArray>& given) {
+  StateColumns columns;
+  for (const auto& [name, values] : given)
+    columns[name].assign(values.data(), values.data() + values.size());
+  return columns;
+}
+
 /// ask, tell, restart and what a loop asks of a recorded seeker, or of what stands around one.
 template <class T>
 void bind_asking(py::class_<Guarded<T>>& cls) {
@@ -307,12 +315,7 @@ void bind_seeking(py::class_<BoundSeeker<S>>& cls) {
           "Columns behind .history.")
       .def(
           "_set_history_columns",
-          [](B& b, const std::map<std::string, InputArray>& given) {
-            StateColumns columns;
-            for (const auto& [name, values] : given)
-              columns[name].assign(values.data(), values.data() + values.size());
-            b.use()->history().restore(columns);
-          },
+          [](B& b, const std::map<std::string, InputArray>& given) { b.use()->history().restore(columns_from(given)); },
           py::arg("columns"), "Columns behind .history, as _history_columns gave them.")
       .def("_clear_history", [](B& b) { b.use()->history().clear(); }, "Forget the history, keep the state.");
 }

@@ -94,8 +94,7 @@ GuidePath::Order GuidePath::take(const GuideValue& value, GuideCause cause, cons
   const bool opens = cause == GuideCause::new_point;
   if (!usable(value, space)) {
     trust_.refuse();
-    if (opens && known_) open_ = true;
-    if (opens) trust_.forget();
+    if (opens) open();
     return {GuideStatus::refused, opens};
   }
   const bool news = opens || open_;

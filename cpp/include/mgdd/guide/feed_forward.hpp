@@ -64,7 +64,13 @@ class FeedForward {
     return status;
   }
 
-  /// A new operating point of which the guide says nothing: the feed-forward stands, the seeker begins anew.
+  /// A new operating point of which the guide says nothing: the feed-forward stands, the seeker begins anew, and the
+  /// next value of the guide counts as one for a new point.
+  void hold() noexcept {
+    seeker_.restart();
+    path_.open();
+  }
+  /// The seeker begins anew; what the guide said stands.
   void restart() noexcept { seeker_.restart(); }
   void shift_estimate(const optimize::Inputs& by) noexcept { seeker_.shift_estimate(by); }
 
@@ -76,6 +82,7 @@ class FeedForward {
   std::size_t limit_count() const noexcept { return seeker_.limit_count(); }
   const auto& settings() const noexcept { return seeker_.settings(); }
   const S& seeker() const noexcept { return seeker_; }
+  S& seeker() noexcept { return seeker_; }  ///< for its history
   const GuidePath& path() const noexcept { return path_; }
   /// What the seeker has learnt beside the guide; the whole estimate while there is none.
   optimize::Inputs trim() const noexcept { return seeker_.estimate() - path_.feed_forward(); }

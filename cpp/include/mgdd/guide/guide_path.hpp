@@ -53,6 +53,12 @@ class GuidePath {
   Order take(const GuideValue& value, GuideCause cause, const optimize::Inputs& estimate,
              const optimize::SearchSpace& space) noexcept;
 
+  /// A new operating point without a value.
+  void open() noexcept {
+    open_ = known_;
+    trust_.forget();
+  }
+
   bool known() const noexcept { return known_; }  ///< has a valid value been taken?
   bool testing() const noexcept { return stage_ > 0; }
   bool at_trial() const noexcept { return stage_ > side(); }  ///< of a test: at the new place, not at the old one
