@@ -18,6 +18,7 @@ constexpr std::array<std::pair<Verdict, std::string_view>, 4> verdict_names{{
     {Verdict::wrong, "wrong"},
 }};
 
+constexpr double anything_sd = 1.0;        // of the share, of a guide that is not as good as it was
 constexpr double noise_memory = 40.0;      // cycles behind the plane
 constexpr double fewest_cycles = 10.0;     // before what is left about it is called noise
 constexpr double informative_share = 2.0;  // errors of a reading that a trial must be able to change
@@ -38,6 +39,7 @@ void validate(const TrustSettings& s) {
   if (s.probe_cycles < 0) throw ParameterError("probe_cycles", s.probe_cycles, "must be >= 0");
   if (s.probe_settling < 0) throw ParameterError("probe_settling", s.probe_settling, "must be >= 0");
   require_positive("prior_sd", s.prior_sd);
+  if (!(s.doubt >= 0.0 && s.doubt < 1.0)) throw ParameterError("doubt", s.doubt, "must be in [0, 1)");
   require_in(closed(0.0, unbounded), "curvature_spread", s.curvature_spread);
   require_positive("significance", s.significance);
   if (s.noise_sd) require_positive("noise_sd", *s.noise_sd);
@@ -69,6 +71,25 @@ double Trust::trial_share(double bend) const noexcept {
   return bend > error ? std::min(1.0, std::max({value_, informative_share * error / bend, smallest_trial})) : 0.0;
 }
 
+// Mean of the share after a measurement of it: of the two explanations, weighted by how likely they make it.
+double Trust::expected_share(double measured, double variance) const noexcept {
+  struct Explanation {
+    double sd, probability;
+  };
+  const double off = measured - value_;
+  const auto far = [&](const Explanation& e) { return 0.5 * off * off / (e.sd * e.sd + variance); };
+  const Explanation good{settings_.prior_sd, 1.0 - settings_.doubt}, other{anything_sd, settings_.doubt};
+  const double least = std::min(far(good), far(other));
+  double gain = 0.0, weight = 0.0;
+  for (const Explanation& e : {good, other}) {
+    const double total = e.sd * e.sd + variance;
+    const double likely = e.probability / std::sqrt(total) * std::exp(least - far(e));
+    gain += likely * e.sd * e.sd / total;
+    weight += likely;
+  }
+  return value_ + gain / weight * off;
+}
+
 double Trust::judge(double rise, double old, double tried, double bend) noexcept {
   if (!(tried - old > least_distance)) return value_;  // the plant did not go there
   const double error = rise_error();
@@ -78,10 +99,8 @@ double Trust::judge(double rise, double old, double tried, double bend) noexcept
     const double slope = rise / (bend * (tried - old));
     const double by_noise = std::max(error / (bend * (tried - old)), exact_share);
     const double by_curvature = settings_.curvature_spread * slope;
-    const double evidence = 1.0 / (by_noise * by_noise + by_curvature * by_curvature);
-    const double prior = 1.0 / (settings_.prior_sd * settings_.prior_sd);
-    const double measured = slope + 0.5 * (old + tried);
-    value_ = std::clamp((prior * value_ + evidence * measured) / (prior + evidence), 0.0, 1.0);
+    const double variance = by_noise * by_noise + by_curvature * by_curvature;
+    value_ = std::clamp(expected_share(slope + 0.5 * (old + tried), variance), 0.0, 1.0);
     return value_;
   }
   if (wrong) return condemn();

@@ -61,7 +61,9 @@ class FeedForward(_core.guide.FeedForward):
     noise_sd : float, optional
         Standard deviation of one reading of J; learnt from the readings if left out.
     trust_sd : float
-        Standard deviation of the right share of a move about the trust before [-]; smaller is slower.
+        Standard deviation of the right share of a move about the trust before, of a guide as good as it was [-].
+    doubt : float
+        Probability that the guide is not as good as it was, in [0, 1).
     curvature_spread : float
         Relative standard deviation of the guide's curvature [-].
     significance : float
@@ -102,7 +104,8 @@ class FeedForward(_core.guide.FeedForward):
         probe_cycles: int = 1,
         probe_settling: int = 0,
         noise_sd: float | None = None,
-        trust_sd: float = 0.5,
+        trust_sd: float = 0.15,
+        doubt: float = 0.1,
         curvature_spread: float = 0.2,
         significance: float = 3.0,
     ) -> None:
@@ -115,6 +118,7 @@ class FeedForward(_core.guide.FeedForward):
             "probe_settling": probe_settling,
             "noise_sd": noise_sd,
             "trust_sd": trust_sd,
+            "doubt": doubt,
             "curvature_spread": curvature_spread,
             "significance": significance,
         }

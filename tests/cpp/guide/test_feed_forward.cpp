@@ -236,7 +236,7 @@ TEST(FeedForward, AMisfiredCycleOfATestIsMeasuredAgain) {
 
 // A plant that goes no further than -7: the share of the move is that of the place it went to, and no wind-up follows.
 TEST(FeedForward, LearnsFromWhatThePlantApplied) {
-  FeedForward<ExtremumSeeking> seeker = guided(-20.0, {.noise_sd = 0.05});
+  FeedForward<ExtremumSeeking> seeker = guided(-20.0, {.curvature_spread = 0.0, .noise_sd = 0.01});
   seeker.offer(at(-4.2), GuideCause::new_point);
   seeker.offer(at(-10.7), GuideCause::new_point);
   for (int k = 0; k < 400; ++k) {

@@ -130,6 +130,7 @@ TEST(Trust, RefusesSettingsThatMakeNoSense) {
   EXPECT_EQ(field_of({.probe_cycles = -1}), "probe_cycles");
   EXPECT_EQ(field_of({.probe_settling = -1}), "probe_settling");
   EXPECT_EQ(field_of({.prior_sd = 0.0}), "prior_sd");
+  EXPECT_EQ(field_of({.doubt = 1.0}), "doubt");
   EXPECT_EQ(field_of({.curvature_spread = std::nan("")}), "curvature_spread");
   EXPECT_EQ(field_of({.significance = -3.0}), "significance");
   EXPECT_EQ(field_of({.noise_sd = 0.0}), "noise_sd");

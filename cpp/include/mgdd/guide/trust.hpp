@@ -1,8 +1,8 @@
 // How far a guide is believed, between 0 and 1: the share of the move that it predicts which measurements confirm.
 // At a new operating point J is measured at both ends of the move D, the old place first. Where J is a parabola along
 // D with its optimum at the share a,  J(b D) - J(0) = K (a b - b^2/2),  K = -J'' D^2,  so that two readings give a and
-// its error; trust is the mean of that a and of the trust before, weighted by their errors, between 0 and 1. Ours; the
-// curvature is the guide's, since the shape of a model is right more often than the place of its optimum.
+// its error. Before, a lies near the trust so far, or, with the probability `doubt`, anywhere; trust is its mean after,
+// between 0 and 1. Ours; the curvature is the guide's: the shape of a model is right more often than its optimum.
 // J in the unit of the objective, maximised. noexcept and allocation-free after construction.
 #pragma once
 
@@ -23,7 +23,8 @@ struct TrustSettings {
   double initial = 1.0;              ///< before the first test, in [0, 1]
   int probe_cycles = 1;              ///< readings at each end of the move; 0 = never tested
   int probe_settling = 0;            ///< cycles before them that do not count: of a sensor with delay and lag
-  double prior_sd = 0.5;             ///< [-] of the share, about the trust before, > 0
+  double prior_sd = 0.15;            ///< [-] of the share about the trust before, of a guide as good as it was, > 0
+  double doubt = 0.1;                ///< [-] probability that it is not, in [0, 1)
   double curvature_spread = 0.2;     ///< [-] relative standard deviation of the guide's curvature
   double significance = 3.0;         ///< standard errors between undecided and a verdict, > 0
   std::optional<double> noise_sd{};  ///< of one reading of J, > 0; none: learnt from the readings
@@ -70,6 +71,7 @@ class Trust {
 
  private:
   double rise_error() const noexcept;
+  double expected_share(double measured, double variance) const noexcept;
 
   TrustSettings settings_;
   optimize::LocalModel plane_;
