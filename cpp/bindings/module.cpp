@@ -35,8 +35,10 @@ PYBIND11_MODULE(_core, m) {
       {"identify",
        "Fits of the cylinder and the throttle, update while running.",
        {&bind_cylinder_fit, &bind_throttle_fit, &bind_online}},
+      {"guide",
+       "Models that guide a seeker: feed-forward, curves, trust, maps.",
+       {&bind_feed_forward, &bind_model_optimum, &bind_timing_map, &bind_curve}},
       {"systems", "Models of measured benchmarks.", {&bind_benchmark_models}},
-      {"guide", "Models that guide a seeker.", {&bind_curve}},
       {"loop", "Virtual benches and the loops over them.", {&bind_engine_bench, &bind_loop, &bind_virtual_throttle}},
   };
   for (const Room& room : rooms) {

@@ -68,21 +68,6 @@ void bind_run(py::module_& m) {
         "Run a seeker on the bench without the GIL; behind mgdd.loop.run_seeker.");
 }
 
-template <class S>
-bool take(const py::handle& object, std::vector<optimize::Seeker>& into) {
-  if (!py::isinstance<BoundSeeker<S>>(object)) return false;
-  into.push_back(object.cast<const BoundSeeker<S>&>().use()->seeker());
-  return true;
-}
-
-template <class... S>
-optimize::Seeker seeker_of(const py::handle& object, const std::variant<S...>*) {
-  std::vector<optimize::Seeker> found;
-  if ((take<S>(object, found) || ...)) return found.front();
-  throw about("seekers",
-              ParameterError("seekers: " + std::string(py::repr(object)) + " is not a seeker of mgdd.optimize"));
-}
-
 py::dict to_dict(const MonteCarloResult& result, const std::vector<std::string>& limit_names) {
   py::dict out;
   std::vector<double> column(result.loops.size());
@@ -118,7 +103,7 @@ py::dict run_many(const std::vector<BoundBench*>& benches, const py::list& seeke
     plan.criteria.push_back({optimum_cad[i], arrival_cad, tail_cycles, exceed_from, exceed_above[i], limits[i]});
   }
   for (const py::handle& object : seekers)
-    plan.seekers.push_back(seeker_of(object, static_cast<const optimize::Seeker*>(nullptr)));
+    plan.seekers.push_back(seeker_of<Seeker>(object, "seekers"));
   plan.seeds = seeds;
   plan.cycles = cycles;
   plan.threads = threads;
@@ -137,7 +122,7 @@ void bind_runs(py::module_& m, const std::variant<S...>*) {
 }  // namespace
 
 void bind_loop(py::module_& m) {
-  bind_runs(m, static_cast<const optimize::Seeker*>(nullptr));
+  bind_runs(m, static_cast<const Seeker*>(nullptr));
   m.def("monte_carlo", &run_many, py::arg("benches"), py::arg("seekers"), py::arg("seeds"), py::kw_only(),
         py::arg("cycles"), py::arg("optimum_cad"), py::arg("arrival_cad"), py::arg("tail_cycles"),
         py::arg("exceed_from"), py::arg("exceed_above"), py::arg("limits"), py::arg("threads"),

@@ -9,6 +9,7 @@
 #include <string>
 #include <tuple>
 #include <utility>
+#include <variant>
 #include <vector>
 
 #include "binding.hpp"
@@ -240,10 +241,18 @@ inline py::dict history_columns(const StateColumns& history, Eigen::Index inputs
   return out;
 }
 
-/// ask, tell, restart, estimate, state and history of one seeker class.
-template <class S>
-void bind_seeking(py::class_<BoundSeeker<S>>& cls) {
-  using B = BoundSeeker<S>;
+/// Columns of a history as Python hands them back.
+inline StateColumns columns_from(const std::map<std::string, InputArray>& given) {
+  StateColumns columns;
+  for (const auto& [name, values] : given)
+    columns[name].assign(values.data(), values.data() + values.size());
+  return columns;
+}
+
+/// ask, tell, restart and what a loop asks of a recorded seeker, or of what stands around one.
+template <class T>
+void bind_asking(py::class_<Guarded<T>>& cls) {
+  using B = Guarded<T>;
   cls.def(
          "ask", [](B& b) { return input_array(b.use()->ask()); },
          "The input to apply in this cycle, shape (inputs,). Asking again before tell gives the same.")
@@ -251,11 +260,10 @@ void bind_seeking(py::class_<BoundSeeker<S>>& cls) {
           "tell",
           [](B& b, const py::object& j, const py::object& limits, bool misfire, const py::object& applied) {
             ReadingBuffer buffer;
-            const optimize::Reading reading = reading_from(b.constant().seeker(), j, limits, misfire, applied, buffer);
+            const optimize::Reading reading = reading_from(b.constant(), j, limits, misfire, applied, buffer);
             const auto r = b.use();
-            const S& seeker = r->seeker();
-            optimize::require(r->tell(reading), seeker.protocol(), reading, seeker.component_count(),
-                              seeker.limit_count(), seeker.settings().space.size());
+            optimize::require(r->tell(reading), r->protocol(), reading, r->component_count(), r->limit_count(),
+                              r->settings().space.size());
           },
           py::arg("J") = py::none(), py::arg("limits") = py::none(), py::kw_only(), py::arg("misfire") = false,
           py::arg("applied") = py::none(),
@@ -272,10 +280,9 @@ void bind_seeking(py::class_<BoundSeeker<S>>& cls) {
           "estimate", [](const B& b) { return input_array(b.use()->estimate()); },
           "Present estimate of the optimum, shape (inputs,).")
       .def_property_readonly(
-          "cycle", [](const B& b) { return b.use()->seeker().protocol().cycle; },
-          "Cycles told so far, misfires included.")
+          "cycle", [](const B& b) { return b.use()->protocol().cycle; }, "Cycles told so far, misfires included.")
       .def_property_readonly(
-          "misfires", [](const B& b) { return b.use()->seeker().protocol().misfires; }, "Misfired cycles told so far.")
+          "misfires", [](const B& b) { return b.use()->protocol().misfires; }, "Misfired cycles told so far.")
       .def_property_readonly(
           "component_count", [](const B& b) { return b.constant().component_count(); },
           "Components of J that tell takes.")
@@ -283,16 +290,23 @@ void bind_seeking(py::class_<BoundSeeker<S>>& cls) {
           "limit_names",
           [](const B& b) {
             std::vector<std::string> names;
-            for (const optimize::Limit& limit : b.constant().seeker().settings().limits)
+            for (const optimize::Limit& limit : b.constant().settings().limits)
               names.push_back(limit.name);
             return names;
           },
-          "Names of the limits, in the order of tell.")
-      .def_property(
-          "state", [](const B& b) { return save_state(b.use()->seeker()); },
-          [](B& b, const StateColumns& columns) { b.use()->restore(columns); },
-          "What the run needs to go on bit for bit: named lists of numbers, JSON-able. Setting it restores the run;\n"
-          "a state of another kind or size raises ParameterError and changes nothing.")
+          "Names of the limits, in the order of tell.");
+}
+
+/// The same with state and history, of one seeker class.
+template <class S>
+void bind_seeking(py::class_<BoundSeeker<S>>& cls) {
+  using B = BoundSeeker<S>;
+  bind_asking(cls);
+  cls.def_property(
+         "state", [](const B& b) { return save_state(b.use()->seeker()); },
+         [](B& b, const StateColumns& columns) { b.use()->restore(columns); },
+         "What the run needs to go on bit for bit: named lists of numbers, JSON-able. Setting it restores the run;\n"
+         "a state of another kind or size raises ParameterError and changes nothing.")
       .def(
           "_history_columns",
           [](const B& b) {
@@ -302,14 +316,30 @@ void bind_seeking(py::class_<BoundSeeker<S>>& cls) {
           "Columns behind .history.")
       .def(
           "_set_history_columns",
-          [](B& b, const std::map<std::string, InputArray>& given) {
-            StateColumns columns;
-            for (const auto& [name, values] : given)
-              columns[name].assign(values.data(), values.data() + values.size());
-            b.use()->history().restore(columns);
-          },
+          [](B& b, const std::map<std::string, InputArray>& given) { b.use()->history().restore(columns_from(given)); },
           py::arg("columns"), "Columns behind .history, as _history_columns gave them.")
       .def("_clear_history", [](B& b) { b.use()->history().clear(); }, "Forget the history, keep the state.");
+}
+
+template <class S, class Any>
+bool take_seeker(const py::handle& object, std::optional<Any>& into) {
+  if (!py::isinstance<BoundSeeker<S>>(object)) return false;
+  into.emplace(object.cast<const BoundSeeker<S>&>().use()->seeker());
+  return true;
+}
+template <class Any, class... S>
+bool take_any_seeker(const py::handle& object, std::optional<Any>& into, const std::variant<S...>*) {
+  return (take_seeker<S>(object, into) || ...);
+}
+
+/// A copy of the seeker that Python holds, of one of the kinds of the variant; ParameterError naming the argument for
+/// anything else.
+template <class Any = optimize::Seeker>
+Any seeker_of(const py::handle& object, const char* argument) {
+  std::optional<Any> found;
+  if (take_any_seeker(object, found, static_cast<const Any*>(nullptr))) return *std::move(found);
+  throw about(argument, ParameterError(std::string(argument) + ": " + std::string(py::repr(object)) +
+                                       " is not a seeker that runs here"));
 }
 
 /// The slope that the seeker estimates.

@@ -57,6 +57,18 @@ std::string_view unit_of(PerformanceSignal signal) noexcept {
   return name_of<PerformanceSignal>(signal_units, signal);
 }
 
+PerformanceSignals signals_of(const Indicators<double>& cycle, double nox) noexcept {
+  PerformanceSignals s;
+  s[efficiency_percent] = 100.0 * cycle.efficiency_gross;
+  s[imep_gross_bar] = cycle.imep_gross_bar;
+  s[imep_closed_bar] = cycle.imep_closed_bar;
+  s[nox_ppm] = nox;
+  s[p_max_bar] = cycle.p_max_bar;
+  s[dp_max_bar_per_cad] = cycle.dp_max_bar_per_cad;
+  s[t_max_k] = cycle.t_max_k;
+  return s;
+}
+
 double PerformanceTerm::value(double x) const noexcept {
   if (!above) return weight * x / reference;
   const double excess = std::max(0.0, (x - *above) / *above);

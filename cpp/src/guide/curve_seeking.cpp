@@ -147,7 +147,8 @@ TellStatus CurveSeeking::tell(const Reading& reading) noexcept {
     own.limits = {};
     own.applied = {&moved, 1};
     plain_.tell(own);
-    estimate_[0] = std::clamp(taken_over_at_ + plain_.estimate()[0], settings_.space.lower[0], settings_.space.upper[0]);
+    estimate_[0] =
+        std::clamp(taken_over_at_ + plain_.estimate()[0], settings_.space.lower[0], settings_.space.upper[0]);
     return status;
   }
   if (sent_count_ <= delay_) return status;  // what is read now was caused before the first cycle
@@ -206,21 +207,10 @@ void CurveSeeking::take_over() noexcept {
   plain_.restart();
 }
 
-bool CurveSeeking::guide(const Curve& curve) noexcept {
-  const bool bends = curve.curvature(curvature_share * settings_.prior_sd) < 0.0;
-  const bool inside = curve.best() >= settings_.space.lower[0] && curve.best() <= settings_.space.upper[0];
-  if (!bends || !inside) {
-    restart();
-    return false;
-  }
-  const double error = estimate_[0] - settings_.curve.best();
-  const double known = filter_.readings() > 0.0 || plain_at_work_ ? filter_.spread() : settings_.prior_sd;
-  const double sd = std::min(std::hypot(known, point_doubt_share * settings_.prior_sd), settings_.prior_sd);
-  const bool learnt = filter_.readings() > 0.0 || plain_at_work_;
-  settings_.curve = curve;
-  const double mean = curve.best() + (learnt ? error : 0.0);
+// The filter begins anew with T about `mean`, and so does all that watches it.
+void CurveSeeking::begin_at(double mean, double sd) noexcept {
   estimate_[0] = std::clamp(mean, settings_.space.lower[0], settings_.space.upper[0]);
-  filter_.restart(curve, mean, sd);
+  filter_.restart(settings_.curve, mean, std::min(sd, settings_.prior_sd));
   sent_count_ = 0;
   surprise_ = 1.0;
   since_doubt_ = 0;
@@ -228,19 +218,28 @@ bool CurveSeeking::guide(const Curve& curve) noexcept {
   repeats_ = 0;
   repeat_known_.fill(0.0);
   plain_at_work_ = false;
+}
+
+bool CurveSeeking::guide(const Curve& curve) noexcept {
+  const bool bends = curve.curvature(curvature_share * settings_.prior_sd) < 0.0;
+  if (!bends || !(curve.best() >= settings_.space.lower[0] && curve.best() <= settings_.space.upper[0])) {
+    restart();
+    return false;
+  }
+  const bool learnt = filter_.readings() > 0.0 || plain_at_work_;
+  const double error = learnt ? estimate_[0] - settings_.curve.best() : 0.0;
+  const double sd = learnt ? filter_.spread() : settings_.prior_sd;
+  settings_.curve = curve;
+  begin_at(curve.best() + error, std::hypot(sd, point_doubt_share * settings_.prior_sd));
   return true;
 }
 
 void CurveSeeking::restart() noexcept {
-  const double sd = std::hypot(filter_.spread(), lost_share * settings_.prior_sd);
-  filter_.restart(settings_.curve, estimate_[0], std::min(sd, settings_.prior_sd));
-  sent_count_ = 0;
-  surprise_ = 1.0;
-  since_doubt_ = 0;
-  doubt_rate_ = 0.0;
-  repeats_ = 0;
-  repeat_known_.fill(0.0);
-  plain_at_work_ = false;
+  begin_at(estimate_[0], std::hypot(filter_.spread(), lost_share * settings_.prior_sd));
+}
+
+void CurveSeeking::shift_estimate(const Inputs& by) noexcept {
+  begin_at(estimate_[0] + by[0], std::hypot(filter_.spread(), point_doubt_share * settings_.prior_sd));
 }
 
 double CurveSeeking::trust() const noexcept {

@@ -50,19 +50,6 @@ bool differs(double now, double before) noexcept {
   return std::abs(now - before) > changed_fraction * std::abs(before);
 }
 
-engine::PerformanceSignals signals_of(const Indicators<double>& of, double nox) noexcept {
-  using enum engine::PerformanceSignal;
-  engine::PerformanceSignals s;
-  s[efficiency_percent] = percent * of.efficiency_gross;
-  s[imep_gross_bar] = of.imep_gross_bar;
-  s[imep_closed_bar] = of.imep_closed_bar;
-  s[nox_ppm] = nox;
-  s[p_max_bar] = of.p_max_bar;
-  s[dp_max_bar_per_cad] = of.dp_max_bar_per_cad;
-  s[t_max_k] = of.t_max_k;
-  return s;
-}
-
 double routed_ppm(NoxSensor sensor, const BenchCycle& c) noexcept {
   switch (sensor) {
     case NoxSensor::analyser:

@@ -26,7 +26,7 @@ void check(const MonteCarloPlan& plan) {
   for (const LoopCriteria& criteria : plan.criteria)
     validate(criteria, plan.cycles);
   for (const EngineBench& bench : plan.benches) {
-    for (const optimize::Seeker& seeker : plan.seekers)
+    for (const Seeker& seeker : plan.seekers)
       std::visit([&](const auto& s) { require_match(bench, s); }, seeker);
   }
 }
@@ -44,7 +44,7 @@ MonteCarloResult monte_carlo(const MonteCarloPlan& plan, const std::function<boo
   const auto run = [&](std::size_t job, std::size_t worker, StopRequest& stopped) {
     EngineBench& bench = benches[worker][job / per_bench];
     const std::uint64_t seed = plan.seeds[job % seeds];
-    optimize::Seeker seeker = plan.seekers[job % per_bench / seeds];
+    Seeker seeker = plan.seekers[job % per_bench / seeds];
     bench.reset(seed);
     std::visit(
         [&](auto& s) {

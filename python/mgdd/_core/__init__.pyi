@@ -6,8 +6,8 @@ from . import optimize
 from . import engine
 from . import throttle
 from . import identify
-from . import systems
 from . import guide
+from . import systems
 from . import loop
 __all__: list[str] = ['compiled_simd_level', 'compiler', 'engine', 'guide', 'identify', 'loop', 'optimize', 'processor_simd_levels', 'systems', 'throttle']
 def compiled_simd_level() -> str:

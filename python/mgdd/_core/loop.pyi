@@ -4,6 +4,7 @@ Virtual benches and the loops over them.
 from __future__ import annotations
 import collections.abc
 import mgdd._core.engine
+import mgdd._core.guide
 import mgdd._core.optimize
 import mgdd._core.throttle
 import numpy
@@ -227,6 +228,11 @@ def run_loop(bench: EngineBench, seeker: mgdd._core.optimize.GradientDescent, cy
     """
 @typing.overload
 def run_loop(bench: EngineBench, seeker: mgdd._core.optimize.GoldenSection, cycles: typing.SupportsInt | typing.SupportsIndex, *, optimum_cad: typing.SupportsFloat | typing.SupportsIndex, arrival_cad: typing.SupportsFloat | typing.SupportsIndex, tail_cycles: typing.SupportsInt | typing.SupportsIndex, exceed_from: typing.SupportsInt | typing.SupportsIndex | None, exceed_above: collections.abc.Sequence[typing.SupportsFloat | typing.SupportsIndex], limits: collections.abc.Sequence[typing.SupportsFloat | typing.SupportsIndex]) -> dict:
+    """
+    Run a seeker on the bench without the GIL; behind mgdd.loop.run_seeker.
+    """
+@typing.overload
+def run_loop(bench: EngineBench, seeker: mgdd._core.guide.CurveSeeking, cycles: typing.SupportsInt | typing.SupportsIndex, *, optimum_cad: typing.SupportsFloat | typing.SupportsIndex, arrival_cad: typing.SupportsFloat | typing.SupportsIndex, tail_cycles: typing.SupportsInt | typing.SupportsIndex, exceed_from: typing.SupportsInt | typing.SupportsIndex | None, exceed_above: collections.abc.Sequence[typing.SupportsFloat | typing.SupportsIndex], limits: collections.abc.Sequence[typing.SupportsFloat | typing.SupportsIndex]) -> dict:
     """
     Run a seeker on the bench without the GIL; behind mgdd.loop.run_seeker.
     """

@@ -1,7 +1,10 @@
 """Models that guide a seeker: the model leads, the measurements decide.
 
-`CurveSeeking` takes the whole curve of a model, which may stand in the wrong place, and finds from a few measurements
-where it stands; `Curve` holds such a curve.
+A guide is any function of the operating point that says where the optimum should be: `ModelOptimum` asks the cycle
+model, `TimingMap` a table, and a function of your own will do. `FeedForward` puts it in front of a seeker of
+`mgdd.optimize`, which learns only what is left; ``guide=None`` is the plain seeker. `CurveSeeking` takes the whole
+curve of a model, held by a `Curve`, which may stand in the wrong place, and finds from a few measurements where it
+stands.
 
 Examples
 --------
@@ -23,5 +26,8 @@ from __future__ import annotations
 
 from mgdd._core.guide import Curve
 from mgdd.guide.curve_seeking import CurveSeeking
+from mgdd.guide.feed_forward import FeedForward
+from mgdd.guide.model_optimum import ModelOptimum
+from mgdd.guide.timing_map import TimingMap
 
-__all__ = ["Curve", "CurveSeeking"]
+__all__ = ["Curve", "CurveSeeking", "FeedForward", "ModelOptimum", "TimingMap"]

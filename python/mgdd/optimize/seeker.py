@@ -209,14 +209,14 @@ class Seeker(_CoreSeeker):
         if kind not in known:
             raise DataError(f"{Path(path)}: holds a {kind}, not a {' or '.join(known)}")
         try:
-            seeker: Self = _rebuild(known[kind], settings, state, None)
+            seeker: Self = rebuilt(known[kind], settings, state, None)
         except (Error, TypeError, KeyError) as error:
             raise DataError(f"{Path(path)}: settings and state do not make a {kind}: {error}") from error
         return seeker
 
     def __reduce__(self) -> tuple[Any, ...]:
         columns = {name: np.asarray(column) for name, column in self._history_columns().items()}
-        return _rebuild, (type(self), self.settings, self.state, columns), self.__dict__ or None
+        return rebuilt, (type(self), self.settings, self.state, columns), self.__dict__ or None
 
     def __repr__(self) -> str:
         return f"<{type(self).__name__} cycle {self.cycle}, estimate {np.array2string(self.estimate, precision=6)}>"
@@ -242,7 +242,8 @@ def _read(path: str | os.PathLike[str]) -> tuple[str, dict[str, Any], dict[str, 
     return kind, settings, state
 
 
-def _rebuild(cls: type[Any], settings: dict[str, Any], state: dict[str, Any], history: dict[str, Any] | None) -> Any:
+def rebuilt(cls: type[Any], settings: dict[str, Any], state: dict[str, Any], history: dict[str, Any] | None) -> Any:
+    """Make a seeker of its settings, state and, if given, columns of history."""
     with warnings.catch_warnings():  # advice on these settings was given when they were chosen
         warnings.simplefilter("ignore", UserWarning)
         seeker = cls(**settings)

@@ -146,6 +146,18 @@ class StateReader {
   std::size_t used_ = 0;
 };
 
+/// Visits an object within another one: the same columns with a prefix, so that two of a kind do not meet.
+template <class V>
+struct Prefixed {
+  V& visitor;
+  std::string_view prefix;
+
+  template <class... Values>
+  void operator()(std::string_view name, Values&&... values) {
+    visitor(std::string(prefix) + std::string(name), std::forward<Values>(values)...);
+  }
+};
+
 /// Columns of an object whose class has `template <class Self, class V> static void visit(Self&, V&)`.
 template <class T>
 StateColumns save_state(const T& object) {

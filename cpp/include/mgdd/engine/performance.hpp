@@ -12,6 +12,8 @@
 #include <span>
 #include <string_view>
 
+#include "mgdd/engine/indicators.hpp"
+
 namespace mgdd::engine {
 
 enum class PerformanceSignal {
@@ -38,6 +40,9 @@ struct PerformanceSignals {
   double& operator[](PerformanceSignal s) noexcept { return values[static_cast<std::size_t>(s)]; }
   double operator[](PerformanceSignal s) const noexcept { return values[static_cast<std::size_t>(s)]; }
 };
+
+/// The signals of a simulated cycle, with the NOx that a sensor or a model gives [ppm].
+PerformanceSignals signals_of(const Indicators<double>& cycle, double nox_ppm) noexcept;
 
 struct PerformanceTerm {
   PerformanceSignal signal = PerformanceSignal::efficiency_percent;

@@ -11,6 +11,7 @@
 #include <limits>
 #include <vector>
 
+#include "mgdd/common/state.hpp"
 #include "mgdd/guide/curve.hpp"
 #include "mgdd/guide/curve_filter.hpp"
 #include "mgdd/optimize/seekers/dither.hpp"
@@ -52,6 +53,9 @@ class CurveSeeking {
   /// The operating point has changed and the guide says nothing of it.
   void restart() noexcept;
 
+  /// Moves the estimate, as a feed-forward does; what the readings said of the place is void.
+  void shift_estimate(const optimize::Inputs& by) noexcept;
+
   const optimize::Inputs& estimate() const noexcept { return estimate_; }
   double estimate_sd() const noexcept;  ///< of the estimate as stated; NaN after a hand-over
   double noise_sd() const noexcept { return filter_.noise_sd(); }
@@ -92,25 +96,17 @@ class CurveSeeking {
     v("plain_at_work", self.plain_at_work_);
     v("taken_over_at", self.taken_over_at_);
     CurveFilter::visit(self.filter_, v);
-    Prefixed<V> plain{v};
+    Prefixed<V> plain{v, "plain_"};
     optimize::ExtremumSeeking::visit(self.plain_, plain);
   }
 
  private:
-  /// The columns of the seeker within, apart from ours.
-  template <class V>
-  struct Prefixed {
-    V& inner;
-    template <class... Rest>
-    void operator()(std::string_view name, Rest&&... rest) {
-      inner("plain_" + std::string(name), std::forward<Rest>(rest)...);
-    }
-  };
   double amplitude() const noexcept;
   void learn(double applied, double j) noexcept;
   void watch_repeats(double applied, double j) noexcept;
   void judge_surprise(double input, double j) noexcept;
   void take_over() noexcept;
+  void begin_at(double mean, double sd) noexcept;
 
   CurveSeekingSettings settings_;
   CurveFilter filter_;

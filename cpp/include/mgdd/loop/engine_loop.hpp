@@ -9,12 +9,18 @@
 #include <limits>
 #include <optional>
 #include <string>
+#include <variant>
 #include <vector>
 
+#include "mgdd/guide/curve_seeking.hpp"
 #include "mgdd/loop/engine_bench.hpp"
 #include "mgdd/optimize/seekers/seekers.hpp"
 
 namespace mgdd::loop {
+
+/// Every seeker that a loop of the core steers.
+using Seeker = std::variant<optimize::ExtremumSeeking, optimize::NewtonSeeking, optimize::BoundedSeeking,
+                            optimize::Spsa, optimize::GradientDescent, optimize::GoldenSection, guide::CurveSeeking>;
 
 /// One cycle of a run: what the bench gave, and the estimate that stood before it.
 struct LoopCycle {

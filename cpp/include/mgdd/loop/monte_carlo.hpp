@@ -13,7 +13,7 @@ namespace mgdd::loop {
 struct MonteCarloPlan {
   std::vector<EngineBench> benches;
   std::vector<LoopCriteria> criteria;  ///< one per bench
-  std::vector<optimize::Seeker> seekers;
+  std::vector<Seeker> seekers;
   std::vector<std::uint64_t> seeds;  ///< of the bench and of a seeker that draws; each loop starts at cycle 0
   std::int64_t cycles = 1000;
   int threads = 0;  ///< 0 = all cores

@@ -89,4 +89,13 @@ TellStatus BoundedSeeking::tell(const Reading& reading) noexcept {
   return status;
 }
 
+// The oscillation and the window behind the mean move along.
+void BoundedSeeking::shift_estimate(const Inputs& by) noexcept {
+  const Inputs none = Inputs::Zero(by.size());
+  move_within(estimate_, by, settings_.space, none);
+  move_within(applied_, by, settings_.space, none);
+  Eigen::Map<Eigen::MatrixXd> window(window_.data(), by.size(), settings_.dither.period);
+  window.colwise() += Eigen::VectorXd::Map(by.data(), by.size());
+}
+
 }  // namespace mgdd::optimize

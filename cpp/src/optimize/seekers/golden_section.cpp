@@ -230,4 +230,14 @@ void GoldenSection::restart() noexcept {
   clamp_.forget();
 }
 
+// A bracket that still covers the range stays: what the range holds does not move.
+void GoldenSection::shift_estimate(const Inputs& by) noexcept {
+  const double before = estimate_[0];
+  move_within(estimate_, by, settings_.space, scalar_input(0.0));
+  if (!refining_) return;
+  centre_bracket(upper_ - lower_);
+  for (double& x : sample_input_)
+    x += estimate_[0] - before;
+}
+
 }  // namespace mgdd::optimize

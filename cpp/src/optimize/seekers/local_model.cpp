@@ -49,10 +49,14 @@ double LocalModel::predict(const Inputs& at) const noexcept {
   return mean_ + slope().dot(at - mean_input_);
 }
 
+double LocalModel::residual_variance() const noexcept {
+  return std::max(0.0, variance_ - slope().dot(cross_));
+}
+
 bool LocalModel::slope_known(double errors) const noexcept {
   if (weight_ < fewest_cycles) return false;
   const Inputs s = slope();
-  const double residual = std::max(0.0, variance_ - s.dot(cross_));
+  const double residual = residual_variance();
   for (Eigen::Index j = 0; j < s.size(); ++j) {
     const double squared_error = residual / (weight_ * std::max(spread_(j, j), 1e-300));
     if (s[j] != 0.0 && s[j] * s[j] > errors * errors * squared_error) return true;

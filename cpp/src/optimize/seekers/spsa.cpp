@@ -290,4 +290,11 @@ void Spsa::restart() noexcept {
   clamp_.forget();
 }
 
+void Spsa::shift_estimate(const Inputs& by) noexcept {
+  const double widest = settings_.perturbation * (settings_.form == SpsaForm::second_order ? 2.0 : 1.0);
+  const Inputs reach = Inputs::Constant(by.size(), widest);
+  move_within(estimate_, by, settings_.space, reach);
+  move_within(candidate_, by, settings_.space, reach);
+}
+
 }  // namespace mgdd::optimize

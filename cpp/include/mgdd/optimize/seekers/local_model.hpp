@@ -19,6 +19,7 @@ class LocalModel {
   double cycles() const noexcept { return weight_; }  ///< effective number of cycles behind the plane
   Inputs slope() const noexcept;                      ///< zero while the input has not moved
   double predict(const Inputs& at) const noexcept;
+  double residual_variance() const noexcept;  ///< mean square of what was recorded about the plane
 
   /// True where some entry of the slope exceeds `errors` of its standard errors.
   bool slope_known(double errors) const noexcept;

@@ -54,6 +54,11 @@ class NewtonSeeking {
   std::size_t component_count() const noexcept { return settings_.components.size(); }
   std::size_t limit_count() const noexcept { return settings_.limits.size(); }
 
+  /// Moves the estimate, within the bounds; `by` is finite. A search that goes on elsewhere is restarted first.
+  void shift_estimate(const Inputs& by) noexcept {
+    move_within(estimate_, by, settings_.space, settings_.dither.amplitude);
+  }
+
   /// ParameterError for a restored state that these settings do not allow.
   void require_usable() const {
     require_within_space("estimate", estimate_, settings_.space);

@@ -68,13 +68,24 @@ class RecordedSeeker {
   {
     return seeker_.guide(says);
   }
+  void shift_estimate(const Inputs& by) noexcept { seeker_.shift_estimate(by); }
   void restore(const StateColumns& state) { restore_state(seeker_, state); }
 
   const Inputs& estimate() const noexcept { return seeker_.estimate(); }
+  const Inputs& applied() const noexcept { return seeker_.applied(); }
+  const Protocol& protocol() const noexcept { return seeker_.protocol(); }
   std::size_t component_count() const noexcept { return seeker_.component_count(); }
+  std::size_t limit_count() const noexcept { return seeker_.limit_count(); }
+  decltype(auto) settings() const noexcept { return seeker_.settings(); }
   const S& seeker() const noexcept { return seeker_; }
   SeekerHistory& history() noexcept { return history_; }
   const SeekerHistory& history() const noexcept { return history_; }
+
+  void require_usable() const { seeker_.require_usable(); }
+  template <class Self, class V>
+  static void visit(Self& self, V& v) {
+    S::visit(self.seeker_, v);
+  }
 
  private:
   S seeker_;

@@ -15,10 +15,11 @@ namespace mgdd::optimize {
 
 /// What a loop needs of a seeker.
 template <class S>
-concept AnySeeker = requires(S seeker, const S constant, const Reading& reading) {
+concept AnySeeker = requires(S seeker, const S constant, const Reading& reading, const Inputs& by) {
   { seeker.ask() } noexcept -> std::same_as<const Inputs&>;
   { seeker.tell(reading) } noexcept -> std::same_as<TellStatus>;
   { seeker.restart() } noexcept;
+  { seeker.shift_estimate(by) } noexcept;
   { constant.applied() } noexcept -> std::same_as<const Inputs&>;
   { constant.estimate() } noexcept -> std::same_as<const Inputs&>;
   { constant.protocol() } noexcept -> std::same_as<const Protocol&>;

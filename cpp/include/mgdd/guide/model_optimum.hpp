@@ -1,0 +1,76 @@
+// The best timing of the cycle model at an operating point, for use while the engine runs: a bounded amount of work.
+// Gradient ascent  theta <- theta + lambda_c [J(theta + c) - J(theta - c)]/(2 c)  (Tan 2018 names lambda_c and c) from
+// the best of a coarse scan; golden section (Kiefer 1953) between the neighbours of that angle where the ascent does
+// not converge there, or from the outset. SOC in °CA aTDC, J in the unit of the performance.
+// `find` is noexcept and allocation-free: at most 9 + 2 iterations + 20 + 2 cycles on the default bounds.
+#pragma once
+
+#include <cstdint>
+#include <string_view>
+
+#include "mgdd/engine/cycle.hpp"
+#include "mgdd/engine/emissions.hpp"
+#include "mgdd/engine/performance.hpp"
+#include "mgdd/guide/guide_path.hpp"
+#include "mgdd/optimize/seekers/gradient_descent.hpp"
+
+namespace mgdd::guide {
+
+enum class OptimumMethod { gradient, golden_section };
+std::string_view to_string(OptimumMethod v) noexcept;
+OptimumMethod parse_optimum_method(std::string_view name);
+
+struct ModelOptimumSettings {
+  engine::Cylinder cylinder{};
+  engine::Performance performance{};  ///< to be maximised
+  engine::NoxModel nox{};             ///< NOx of the model, where the performance uses it
+  OptimumMethod method = OptimumMethod::gradient;
+  double lower_cad = -30.0, upper_cad = 10.0;
+  double step_size = 15.0;       ///< lambda_c [CAD^2 per unit of J], > 0; converges below 2/|J''|
+  double difference_cad = 1.0;   ///< c, > 0; at least 1 where J has kinks
+  double tolerance_cad = 0.02;   ///< of a step, > 0
+  std::int64_t iterations = 60;  ///< of the ascent, >= 1
+  double step_cad = engine::default_step_cad;
+  engine::Integrator integrator = engine::Integrator::trapezoid;
+};
+void validate(const ModelOptimumSettings& settings);
+
+struct ModelOptimumResult {
+  bool found = false;  ///< false: no fuel, a point outside the domain of its fields, or no physical cycle
+  double soc_cad = 0.0;
+  double j = 0.0;
+  double curvature = 0.0;  ///< J'' over +-3 CAD; 0 where a neighbour leaves the timing window
+  bool at_bound = false;
+  OptimumMethod method = OptimumMethod::gradient;  ///< that found it
+  std::int64_t iterations = 0;                     ///< of the ascent, the stopping one included
+};
+
+class ModelOptimum {
+ public:
+  /// ParameterError naming the field.
+  explicit ModelOptimum(ModelOptimumSettings settings);
+
+  ModelOptimumResult find(const engine::OperatingPoint& point) noexcept;
+
+  /// The same model with other parameters, as a calibration finds them; geometry and grid stay. ParameterError for a
+  /// cylinder that is none, and nothing has changed then.
+  void set_cylinder(const engine::Cylinder& cylinder);
+
+  const ModelOptimumSettings& settings() const noexcept { return settings_; }
+
+ private:
+  double performance_at(double soc_cad) noexcept;  // -infinity where there is no such cycle
+  bool climb(double start_cad, double room_cad, ModelOptimumResult& out) noexcept;
+  void divide(double lower_cad, double upper_cad, ModelOptimumResult& out) noexcept;
+
+  ModelOptimumSettings settings_;
+  engine::CycleModel<double> model_;
+  engine::CycleWorkspace<double> work_;
+  optimize::GradientDescent ascent_;
+  engine::Charge<double> charge_{};
+};
+
+/// What a feed-forward takes: the timing as the one input, with its curvature where that is known.
+GuideValue guide_value(const ModelOptimumResult& found) noexcept;
+
+}  // namespace mgdd::guide

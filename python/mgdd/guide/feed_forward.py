@@ -1,0 +1,326 @@
+"""A seeker with the optimum of a guide as feed-forward, of which it learns only the trim."""
+
+from __future__ import annotations
+
+import logging
+import math
+from collections.abc import Callable, Mapping, Sequence
+from typing import TYPE_CHECKING, Any, Literal
+
+import numpy as np
+
+from mgdd import _core
+from mgdd.errors import ParameterError
+from mgdd.guide.conditions import change_between, numbers_of
+from mgdd.optimize import Optimum, Seeker
+from mgdd.optimize.seeker import rebuilt
+from mgdd.results.describe import as_html, rows_of
+from mgdd.results.labels import labelled_dataset
+
+if TYPE_CHECKING:
+    import xarray as xr
+
+__all__ = ["FeedForward", "Guide"]
+
+Guide = Callable[[Any], "float | Sequence[float] | Optimum | None"]
+Answer = Literal["same", "followed", "held", "refused"]
+
+_LOG = logging.getLogger(__name__)
+_INPUT_UNIT, _J_UNIT = "unit of the input", "unit of J"
+_CAUSES = ("", "calibration", "following", "new_point")  # of a value, the weightier the later
+_POINT = "point."  # of the columns of the state that hold the operating point
+_TABLES = ("guide_optimum", "feed_forward", "trim", "estimate", "applied")
+
+
+class FeedForward(_core.guide.FeedForward):
+    """A seeker whose estimate moves with the optimum of a guide; it learns what is left, the trim.
+
+    ``at(point)`` says at which operating point the next cycle runs, ``ask()`` and ``tell(J)`` are those of a seeker. At
+    a new operating point the estimate moves as far as the guide's optimum does, times the trust in the guide, and the
+    trim stays. Trust is measured: after such a move J is read at the old place and at the new one, and the two tell
+    which share of the move was right. A calibration of the guide at the same point never moves what is applied: the
+    trim takes the opposite step.
+
+    Parameters
+    ----------
+    seeker : Seeker
+        Any seeker of `mgdd.optimize`; it is copied with its state and history. Its bounds hold for what is applied.
+        Golden section searches its whole bracket at every new point and gains nothing from a guide.
+    guide : callable, optional
+        ``guide(point)`` gives the optimum of the model there: a number, one number per input, or an
+        `mgdd.optimize.Optimum`, whose ``curvature`` then must be in the unit of J; None where the point lies outside
+        of what the guide knows. Without a guide every call is that of the seeker, bit for bit.
+    trust : float
+        Trust in the guide before its first test, in [0, 1].
+    calibration_rate : float or array_like
+        Largest move of the feed-forward per cycle after a calibration [unit of the input].
+    probe_cycles : int
+        Readings of J at each of the two places; 0 for a trust that is never tested.
+    probe_settling : int
+        Cycles before them that do not count, at each place: behind a sensor its delay and three times its lag.
+    noise_sd : float, optional
+        Standard deviation of one reading of J; learnt from the readings if left out.
+    trust_sd : float
+        Standard deviation of the right share of a move about the trust before, of a guide as good as it was [-].
+    doubt : float
+        Probability that the guide is not as good as it was, in [0, 1).
+    curvature_spread : float
+        Relative standard deviation of the guide's curvature [-].
+    significance : float
+        Standard errors of the difference in J that make a verdict.
+
+    Raises
+    ------
+    mgdd.errors.ParameterError
+        No seeker, a guide that cannot be called, or a number outside its domain.
+
+    References
+    ----------
+    Tan 2018, section 5.2 (structure). Trust and its test are ours.
+
+    Examples
+    --------
+    >>> from mgdd.guide import FeedForward
+    >>> from mgdd.optimize import ExtremumSeeking
+    >>> def late_by_one(fuel_mg):  # a rough model of the best timing
+    ...     return -0.35 * fuel_mg + 1.0
+    >>> seeker = ExtremumSeeking(start=-20.0, lower=-30.0, upper=10.0)
+    >>> guided = FeedForward(seeker, late_by_one, noise_sd=0.1)
+    >>> for cycle in range(400):
+    ...     fuel_mg = 12.0 if cycle < 300 else 30.0
+    ...     answer = guided.at(fuel_mg)
+    ...     guided.tell(-0.0255 * (guided.ask()[0] + 0.35 * fuel_mg) ** 2)
+    >>> bool(abs(guided.estimate[0] + 0.35 * 30.0) < 0.2), bool(abs(guided.trim[0] + 1.0) < 0.2), guided.verdict
+    (True, True, 'confirmed')
+    """
+
+    def __init__(
+        self,
+        seeker: Seeker,
+        guide: Guide | None = None,
+        *,
+        trust: float = 1.0,
+        calibration_rate: Any = 1.0,
+        probe_cycles: int = 1,
+        probe_settling: int = 0,
+        noise_sd: float | None = None,
+        trust_sd: float = 0.15,
+        doubt: float = 0.1,
+        curvature_spread: float = 0.2,
+        significance: float = 3.0,
+    ) -> None:
+        if guide is not None and not callable(guide):
+            raise ParameterError.of("guide", guide, "None or a function of the operating point")
+        self._options: dict[str, Any] = {
+            "trust": trust,
+            "calibration_rate": calibration_rate,
+            "probe_cycles": probe_cycles,
+            "probe_settling": probe_settling,
+            "noise_sd": noise_sd,
+            "trust_sd": trust_sd,
+            "doubt": doubt,
+            "curvature_spread": curvature_spread,
+            "significance": significance,
+        }
+        super().__init__(seeker, **self._options)
+        self._set_seeker_history(seeker._history_columns())
+        self._made_of = (type(seeker), seeker.settings)
+        self._guide = guide
+        self._point: dict[str, float] | None = None
+        self._points = 0
+        self._owed = ""  # cause of a value that the guide still has to give
+        self._rows: list[tuple[Any, ...]] = []
+
+    @property
+    def guide(self) -> Guide | None:
+        """The guide; another one counts as a calibration at the next `at`."""
+        return self._guide
+
+    @guide.setter
+    def guide(self, guide: Guide | None) -> None:
+        if guide is not None and not callable(guide):
+            raise ParameterError.of("guide", guide, "None or a function of the operating point")
+        self._guide = guide
+        self.recalibrated()
+
+    def recalibrated(self) -> None:
+        """Say that the guide has changed in itself: the next `at` asks it again and moves nothing that is applied."""
+        self._owed = self._owed or "calibration"
+
+    def at(self, point: Any) -> Answer:
+        """Say at which operating point the next cycle runs; call it before `ask`, in every cycle.
+
+        Parameters
+        ----------
+        point : OperatingPoint, mapping of str to float, sequence of float, or float
+            As the guide takes it. A change of any number by more than 5 % makes a new operating point; smaller ones are
+            followed without a test and without a restart of the seeker.
+
+        Returns
+        -------
+        {"same", "followed", "held", "refused"}
+            ``held``: no guide, or the point lies outside of what it knows; ``refused``: it raised an error, or gave
+            what is not finite, out of bounds or of the wrong size. In both the last valid feed-forward stands, a
+            refusal also lowers the trust, and the guide is asked again in the next cycle.
+
+        Raises
+        ------
+        mgdd.errors.ParameterError
+            Not an operating point, or a call between `ask` and `tell`.
+        """
+        now = numbers_of(point)
+        if not all(map(math.isfinite, now.values())):
+            _LOG.warning("operating point %s is not finite: the last one stands", now)
+            return "held"
+        change = change_between(now, self._point)
+        cause = max(self._owed, "" if change == "same" else change, key=_CAUSES.index)
+        if not cause:
+            return "same"
+        opens = change == "new_point"
+        answer = self._ask_guide(point, cause, opens)
+        self._point, self._owed = now, "" if answer == "followed" else cause
+        self._points += opens
+        return answer
+
+    def _ask_guide(self, point: Any, cause: str, opens: bool) -> Answer:
+        retry = self._owed == cause and not opens
+        optimum, curvature, why = [math.nan], list[float](), ""
+        try:
+            said = None if self._guide is None else self._guide(point)
+            if said is None:
+                if opens and self._point is not None:
+                    self._hold()
+                return "held"
+            optimum, curvature = _numbers_said(said)
+            why = f"it gave {optimum}"
+        except Exception as error:  # noqa: BLE001 - a guide must not stop the engine: logged, and trust falls
+            why = f"it raised {type(error).__name__}: {error}"
+        # A new point whose value comes late was opened before: to open it again would restart the seeker once more.
+        if self._offer(optimum, curvature, "following" if cause == "new_point" and not opens else cause):
+            return "followed"
+        _LOG.log(
+            logging.DEBUG if retry else logging.WARNING,
+            "guide refused at %s: %s; the last valid feed-forward stands, trust is now %.2f",
+            point, why, self.trust,
+        )  # fmt: skip
+        return "refused"
+
+    def tell(
+        self, J: Any = None, limits: Any = None, *, misfire: bool = False, applied: Any = None  # noqa: N803
+    ) -> None:
+        """Accept what was measured at the input of the last ask.
+
+        Parameters
+        ----------
+        J : float or array_like
+            Performance, or one number per component.
+        limits : sequence or mapping of str to float, optional
+            One value per limit of the seeker.
+        misfire : bool
+            The cycle is counted and its J and limits are not read.
+        applied : array_like, optional
+            What the plant really applied, if not what was asked for.
+
+        Raises
+        ------
+        mgdd.errors.ParameterError, mgdd.errors.ShapeError, mgdd.errors.DataError
+            As by the seeker; nothing has changed then.
+        """
+        before = (self.cycle, self._points, self.trust, self.testing, *(getattr(self, name) for name in _TABLES[:-1]))
+        super().tell(J, limits, misfire=misfire, applied=applied)
+        done = self.applied if applied is None else np.atleast_1d(np.array(applied, np.float64))
+        objective = math.nan if misfire else float(np.sum(np.asarray(J, np.float64)))
+        self._rows.append((*before, done, objective, misfire))
+
+    @property
+    def history(self) -> xr.Dataset:
+        """What came from the guide and what from the trim, cycle by cycle.
+
+        Dimensions `cycle` and `input`; variables before the cycle was told: ``guide_optimum``, ``feed_forward``,
+        ``trim`` and ``estimate``, ``applied`` in the cycle (cycle, input), ``trust`` (0 to 1), ``testing`` (1: the old
+        place, 2: the new one), ``point`` (operating points so far), ``objective`` (NaN where the cycle misfired) and
+        ``misfire``. What is not known yet is NaN. Built anew on every access.
+        """
+        names = ("cycle", "point", "trust", "testing", *_TABLES, "objective", "misfire")
+        columns = dict(zip(names, zip(*self._rows, strict=True), strict=True)) if self._rows else dict.fromkeys(names, ())
+        inputs, over = self.estimate.size, ("cycle", "input")
+        said = ("optimum by the guide", "feed-forward in force", "trim, estimate less feed-forward")
+        labels = dict(zip(_TABLES, (*said, "estimate of the optimum", "applied input"), strict=True))
+        tables = {
+            name: (over, np.array(columns[name], np.float64).reshape(-1, inputs), _INPUT_UNIT, label)
+            for name, label in labels.items()
+        }
+        return labelled_dataset(
+            {
+                "cycle": ("cycle", np.array(columns["cycle"], np.int64)),
+                "input": ("input", np.arange(inputs), "-", "index of the input"),
+                **tables,
+                "trust": ("cycle", np.array(columns["trust"], np.float64), "-", "trust in the guide"),
+                "testing": ("cycle", np.array(columns["testing"], np.int8), "-", "test of the guide"),
+                "point": ("cycle", np.array(columns["point"], np.int64), "-", "operating points so far"),
+                "objective": ("cycle", np.array(columns["objective"], np.float64), _J_UNIT, "objective J"),
+                "misfire": ("cycle", np.array(columns["misfire"], np.int8), "-", "misfired cycle"),
+            },
+            attrs={"seeker": self._made_of[0].kind},
+        )
+
+    @property
+    def seeker(self) -> Seeker:
+        """The seeker as it stands now, with its history: a copy."""
+        kind, settings = self._made_of
+        made: Seeker = rebuilt(kind, settings, self._seeker_state, self._seeker_history)
+        return made
+
+    @property
+    def state(self) -> dict[str, list[float]]:
+        """What the run needs to go on bit for bit, the history excepted: named lists of numbers, JSON-able.
+
+        Setting it restores the run; one of another kind or size raises `mgdd.errors.ParameterError` and changes
+        nothing.
+        """
+        own = {f"{_POINT}{name}": [value] for name, value in (self._point or {}).items()}
+        own["points"] = [float(self._points), float(_CAUSES.index(self._owed))]
+        return {**self._core_state, **own}
+
+    @state.setter
+    def state(self, saved: Mapping[str, Sequence[float]]) -> None:
+        counted = list(saved.get("points", ()))
+        if len(counted) != 2 or counted[1] not in range(len(_CAUSES)):
+            raise ParameterError("state column 'points' is missing or wrong: it belongs to another kind of object")
+        own = {name for name in saved if name == "points" or name.startswith(_POINT)}
+        self._core_state = {name: list(column) for name, column in saved.items() if name not in own}
+        point = {name.removeprefix(_POINT): float(saved[name][0]) for name in own - {"points"}}
+        self._point, self._points, self._owed = point or None, int(counted[0]), _CAUSES[int(counted[1])]
+
+    def __reduce__(self) -> tuple[Any, ...]:
+        return _rebuild, (type(self), self.seeker, self._guide, self._options, self.state, list(self._rows))
+
+    def __repr__(self) -> str:
+        at = np.array2string(self.estimate, precision=6)
+        return f"<FeedForward of {self._made_of[0].__name__}, cycle {self.cycle}, estimate {at}, trust {self.trust:.2f}>"
+
+    def _repr_html_(self) -> str:
+        now = {"cycle": self.cycle, "estimate": self.estimate, "feed_forward": self.feed_forward, "trim": self.trim}
+        return as_html("FeedForward", rows_of({**now, "verdict": self.verdict, **self._options, "trust": self.trust}))
+
+
+def _numbers_said(said: Any) -> tuple[list[float], list[float]]:
+    """Give the optimum and, where it is known, the curvature of what a guide said."""
+    if isinstance(said, Optimum):
+        bend = [said.curvature] if len(said.inputs) == 1 and said.curvature < 0.0 else []
+        return [float(value) for value in said.inputs.values()], bend
+    return np.atleast_1d(np.asarray(math.nan if said is None else said, np.float64)).ravel().tolist(), []
+
+
+def _rebuild(
+    cls: type[FeedForward],
+    seeker: Seeker,
+    guide: Guide | None,
+    options: dict[str, Any],
+    state: dict[str, list[float]],
+    rows: list[tuple[Any, ...]],
+) -> FeedForward:
+    made = cls(seeker, guide, **options)
+    made.state = state
+    made._rows = rows
+    return made

@@ -1,0 +1,168 @@
+"""The best timing of the cycle model at an operating point, as a guide."""
+
+from __future__ import annotations
+
+import math
+from typing import Any
+
+from mgdd import _core
+from mgdd._core.engine import Cylinder, NoxModel, OperatingPoint, Performance
+from mgdd.errors import ParameterError
+from mgdd.optimize import Optimum
+from mgdd.results.describe import as_html, core_rows
+
+__all__ = ["ModelOptimum"]
+
+_MOST_POINTS = 4096  # of the cache
+
+
+class ModelOptimum(_core.guide.ModelOptimum):
+    """Says where the cycle model has its best start of combustion; a guide of `FeedForward`.
+
+    A coarse scan every 5 CAD brackets the optimum; gradient ascent, theta <- theta + step_size (J(theta + c) -
+    J(theta - c))/(2 c), finds it, and golden section where that does not converge, or from the outset. The work is
+    bounded (below 151 cycles of the model, about 25 as a rule), and each operating point is searched once.
+    `mgdd.engine.find_optimum` is the offline search, with limits.
+
+    Parameters
+    ----------
+    cylinder : Cylinder
+        The model.
+    performance : Performance, optional
+        What is maximised, as the plant measures it; gross efficiency in percent if left out.
+    nox : NoxModel, optional
+        NOx of the model, where the performance uses it.
+    method : {"gradient", "golden_section"}
+        Of the search.
+    bounds_cad : tuple of float
+        Searched range of SOC [°CA aTDC].
+    step_size : float
+        lambda_c of the ascent [°CA**2 per unit of J]; it converges below 2/abs(J'').
+    difference_cad : float
+        c, half the distance of its differences [°CA]; at least 1 where J has kinks.
+    tolerance_cad : float
+        Step below which the ascent has converged [°CA].
+    iterations : int
+        Most steps of the ascent.
+    step_cad, integrator
+        As in `mgdd.engine.simulate`.
+
+    Raises
+    ------
+    mgdd.errors.ParameterError
+        A setting outside its domain.
+
+    References
+    ----------
+    Tan 2018, section 5.2 (lambda_c and c; their meaning is our reading).
+
+    Examples
+    --------
+    >>> from mgdd.engine import Cylinder, OperatingPoint
+    >>> from mgdd.guide import ModelOptimum
+    >>> guide = ModelOptimum(Cylinder())
+    >>> best = guide(OperatingPoint())
+    >>> round(best["soc_cad"], 1), best.value > 55.0, best.curvature < 0.0
+    (-5.6, True, True)
+    """
+
+    def __init__(
+        self,
+        cylinder: Cylinder,
+        *,
+        performance: Performance | None = None,
+        nox: NoxModel | None = None,
+        method: str = "gradient",
+        bounds_cad: tuple[float, float] = (-30.0, 10.0),
+        step_size: float = 15.0,
+        difference_cad: float = 1.0,
+        tolerance_cad: float = 0.02,
+        iterations: int = 60,
+        step_cad: float = 1.0,
+        integrator: str = "trapezoid",
+    ) -> None:
+        super().__init__(
+            cylinder,
+            performance=performance or Performance(),
+            nox=nox or NoxModel(),
+            method=method,
+            bounds_cad=bounds_cad,
+            step_size=step_size,
+            difference_cad=difference_cad,
+            tolerance_cad=tolerance_cad,
+            iterations=iterations,
+            step_cad=step_cad,
+            integrator=integrator,
+        )
+        self._known: dict[OperatingPoint, Optimum] = {}
+
+    def __call__(self, point: OperatingPoint) -> Optimum | None:
+        """Find the best start of combustion.
+
+        Parameters
+        ----------
+        point : OperatingPoint
+            Where.
+
+        Returns
+        -------
+        mgdd.optimize.Optimum or None
+            Input ``soc_cad``, value and curvature in the unit of the performance, in ``values`` the ``iterations`` of
+            the ascent; None where the model has no optimum, as of a motored point.
+
+        Raises
+        ------
+        mgdd.errors.ParameterError
+            Not an operating point.
+        """
+        if not isinstance(point, OperatingPoint):
+            raise ParameterError.of("point", point, "an OperatingPoint")
+        if point in self._known:
+            return self._known[point]
+        found = self._find(point)
+        if not found["found"]:
+            return None
+        best = Optimum(
+            inputs={"soc_cad": found["soc_cad"]},
+            objective="performance",
+            value=found["j"],
+            values={"iterations": float(found["iterations"])},
+            at_bound=found["at_bound"],
+            bounds={"soc_cad": tuple(self.settings["bounds_cad"])},
+            curvature=found["curvature"] or math.nan,
+        )
+        if len(self._known) >= _MOST_POINTS:
+            self._known.pop(next(iter(self._known)))
+        self._known[point] = best
+        return best
+
+    def calibrate(self, cylinder: Cylinder) -> None:
+        """Go on with other parameters of the same cylinder, as a calibration finds them.
+
+        Say so to a `FeedForward` that uses this guide: its ``recalibrated()``.
+
+        Parameters
+        ----------
+        cylinder : Cylinder
+            Of the same geometry.
+
+        Raises
+        ------
+        mgdd.errors.ParameterError
+            Another geometry; nothing has changed then.
+        """
+        self._set_cylinder(cylinder)
+        self._known.clear()
+
+    def __reduce__(self) -> tuple[Any, ...]:
+        return _rebuild, (type(self), self.cylinder, self.settings)
+
+    def __repr__(self) -> str:
+        return f"<ModelOptimum by {self.settings['method']}, {len(self._known)} points searched>"
+
+    def _repr_html_(self) -> str:
+        return as_html("ModelOptimum", core_rows(self.cylinder))
+
+
+def _rebuild(cls: type[ModelOptimum], cylinder: Cylinder, settings: dict[str, Any]) -> ModelOptimum:
+    return cls(cylinder, **settings)

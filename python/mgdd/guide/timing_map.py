@@ -1,0 +1,400 @@
+"""A look-up table of the best timing that serves as a guide and learns from confirmed optima."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import dataclass
+from typing import TYPE_CHECKING, Any, Self
+
+import numpy as np
+
+from mgdd import _core
+from mgdd.errors import DataError, ParameterError, ShapeError
+from mgdd.guide.conditions import numbers_of
+from mgdd.io.parameters import Entry, ParameterFile, Parameters, Wanted, wanted
+from mgdd.optimize import Optimum
+from mgdd.results.describe import as_html, rows_of
+from mgdd.results.labels import label_of, labelled_dataset
+from mgdd.results.units import unit_of
+
+if TYPE_CHECKING:
+    import xarray as xr
+    from numpy.typing import ArrayLike, NDArray
+
+__all__ = ["MapValue", "TimingMap"]
+
+_CAD, _SQUARED = "°CA aTDC", "degree**2"
+_CELLS = {"timing_cad": _CAD, "variance_cad2": _SQUARED, "support": "-"}
+_SETTINGS = {"prior_sd_cad": "°CA", "forgetting": "-"}
+_CORE = dict(zip(_CELLS, ("values_cad", "variance", "support"), strict=True))
+
+
+@dataclass(frozen=True, kw_only=True)
+class MapValue:
+    """What a map says of one operating point.
+
+    Parameters
+    ----------
+    timing_cad : float
+        Best timing [°CA aTDC].
+    sd_cad : float
+        Its standard deviation [°CA].
+    support : float
+        Confirmed optima behind it, forgotten ones taken off.
+    held_outside : bool
+        The point lies outside of the axes: the value is that of the edge.
+    """
+
+    timing_cad: float
+    sd_cad: float
+    support: float
+    held_outside: bool
+
+
+class TimingMap(_core.guide.TimingMap, Parameters):
+    """A table of the best timing over one or two axes: bilinear between its cells, held at its edges.
+
+    As a guide of `FeedForward` it answers inside of its axes only. A confirmed optimum is shared by the cells around it
+    with their bilinear weights, against what they knew, as a Kalman filter with a diagonal covariance does; each cell
+    has its standard deviation and its support.
+
+    Parameters
+    ----------
+    axes : mapping of str to array_like
+        One or two, each strictly increasing with two entries at least: ``speed_rpm`` and ``fuel_mg``, or other numbers
+        of the operating point.
+    timing_cad : array_like
+        Start values [°CA aTDC], one axis of the array per axis; a number for all cells.
+    prior_sd_cad : float
+        Standard deviation of a value that was never learnt [°CA].
+    forgetting : float
+        What a cell keeps of its knowledge per confirmed optimum, in (0, 1]; 1 for a plant that never changes.
+
+    Raises
+    ------
+    mgdd.errors.ParameterError, mgdd.errors.ShapeError
+        Axes or values that make no map.
+
+    Examples
+    --------
+    >>> from mgdd.guide import TimingMap
+    >>> timing = TimingMap({"speed_rpm": [900, 1500, 3000], "fuel_mg": [6, 20, 40]}, -5.0)
+    >>> point = {"speed_rpm": 1500, "fuel_mg": 20}
+    >>> timing.learn(point, -6.4, sd_cad=0.3)
+    >>> round(timing(point), 2), timing.lookup({"speed_rpm": 4000, "fuel_mg": 20}).held_outside
+    (-6.39, True)
+    """
+
+    def __init__(
+        self,
+        axes: Mapping[str, ArrayLike],
+        timing_cad: ArrayLike,
+        *,
+        prior_sd_cad: float = 3.0,
+        forgetting: float = 0.95,
+    ) -> None:
+        if not isinstance(axes, Mapping) or not axes:
+            raise ParameterError.of("axes", axes, "names with their entries, for example {'fuel_mg': [6, 20, 40]}")
+        own = {str(name): np.array(entries, np.float64, ndmin=1).ravel() for name, entries in axes.items()}
+        shape = tuple(entries.size for entries in own.values())
+        given = np.array(timing_cad, np.float64)
+        values = np.full(shape, given) if given.ndim == 0 else given
+        if values.shape != shape:
+            raise ShapeError(f"timing_cad has shape {values.shape}: the axes {', '.join(own)} make {shape}")
+        super().__init__(
+            axes=[entries.tolist() for entries in own.values()],
+            values_cad=values.ravel().tolist(),
+            prior_sd_cad=prior_sd_cad,
+            forgetting=forgetting,
+        )
+        for entries in own.values():
+            entries.setflags(write=False)
+        self._axes, self._settings = own, {"prior_sd_cad": float(prior_sd_cad), "forgetting": float(forgetting)}
+
+    @classmethod
+    def of_guide(
+        cls, guide: Callable[[Any], Any], points: Mapping[str, ArrayLike], *, make: Callable[..., Any], **settings: float
+    ) -> Self:
+        """Fill a map with what another guide says.
+
+        Parameters
+        ----------
+        guide : callable
+            For example a `ModelOptimum`.
+        points : mapping of str to array_like
+            The axes.
+        make : callable
+            ``make(**numbers)`` gives the operating point of a cell, for example `mgdd.engine.OperatingPoint`.
+        **settings : float
+            ``prior_sd_cad`` and ``forgetting``.
+
+        Returns
+        -------
+        TimingMap
+            With the guide's optima as start values.
+
+        Raises
+        ------
+        mgdd.errors.DataError
+            The guide has no answer at a cell.
+
+        Examples
+        --------
+        >>> from mgdd.engine import Cylinder, OperatingPoint
+        >>> from mgdd.guide import ModelOptimum, TimingMap
+        >>> axes = {"speed_rpm": [1200, 2000], "fuel_mg": [10, 20, 30]}
+        >>> timing = TimingMap.of_guide(ModelOptimum(Cylinder()), axes, make=OperatingPoint)
+        >>> round(timing(OperatingPoint(speed_rpm=1200, fuel_mg=20)), 1)
+        -4.9
+        """
+        own = {str(name): np.array(entries, np.float64, ndmin=1).ravel() for name, entries in points.items()}
+        cells = np.stack(np.meshgrid(*own.values(), indexing="ij"), axis=-1).reshape(-1, len(own))
+        values = []
+        for cell in cells.tolist():
+            numbers = dict(zip(own, cell, strict=True))
+            said = guide(make(**numbers))
+            if said is None:
+                raise DataError(f"guide: no answer at {numbers}: narrow the axes")
+            values.append(next(iter(said.inputs.values())) if isinstance(said, Optimum) else float(said))
+        return cls(own, np.reshape(values, [entries.size for entries in own.values()]), **settings)
+
+    @property
+    def axes(self) -> Mapping[str, NDArray[np.float64]]:
+        """Entries of each axis, by name."""
+        return dict(self._axes)
+
+    @property
+    def timing_cad(self) -> NDArray[np.float64]:
+        """Value of every cell [°CA aTDC], one axis of the array per axis of the map."""
+        return self._table("values_cad")
+
+    @property
+    def sd_cad(self) -> NDArray[np.float64]:
+        """Standard deviation of every cell [°CA]."""
+        return np.sqrt(self._table("variance"))
+
+    @property
+    def support(self) -> NDArray[np.float64]:
+        """Confirmed optima behind every cell, forgotten ones taken off."""
+        return self._table("support")
+
+    def __call__(self, point: Any) -> float | None:
+        """Give the best timing as a guide does.
+
+        Parameters
+        ----------
+        point : OperatingPoint, mapping of str to float, or sequence of float
+            It names the axes, or has one number for each.
+
+        Returns
+        -------
+        float or None
+            [°CA aTDC]; None outside of the axes.
+
+        Raises
+        ------
+        mgdd.errors.ParameterError
+            The point lacks an axis.
+        """
+        found = self.lookup(point)
+        return None if found.held_outside else found.timing_cad
+
+    def lookup(self, point: Any) -> MapValue:
+        """Read the map, outside of its axes too.
+
+        Parameters
+        ----------
+        point : OperatingPoint, mapping of str to float, or sequence of float
+            As of a call.
+
+        Returns
+        -------
+        MapValue
+            Timing, standard deviation, support, and whether it is held at the edge.
+
+        Raises
+        ------
+        mgdd.errors.ParameterError
+            The point lacks an axis.
+        """
+        timing, sd, support, outside = self._lookup(self._coordinates(point))
+        return MapValue(timing_cad=timing, sd_cad=sd, support=support, held_outside=outside)
+
+    def learn(self, point: Any, timing_cad: float, *, sd_cad: float) -> None:
+        """Write a confirmed optimum back.
+
+        Parameters
+        ----------
+        point : OperatingPoint, mapping of str to float, or sequence of float
+            Where it was found.
+        timing_cad : float
+            The optimum [°CA aTDC].
+        sd_cad : float
+            Its standard deviation [°CA], > 0.
+
+        Raises
+        ------
+        mgdd.errors.ParameterError
+            A point outside of the axes, or numbers that are no optimum; nothing has changed then.
+        """
+        if not self._learn(self._coordinates(point), timing_cad, sd_cad):
+            raise ParameterError(
+                f"learn: timing_cad = {timing_cad:g} with sd_cad = {sd_cad:g} at {numbers_of(point)}: must be finite, "
+                "sd_cad > 0, and the point inside of the axes"
+            )
+
+    def learn_from(self, seeker: Any, point: Any, *, cycles: int = 100, spread_cad: float = 1.0) -> bool:
+        """Write the estimate of a finished or running seeker back if it has settled.
+
+        Parameters
+        ----------
+        seeker : Seeker, FeedForward
+            With one input and a history.
+        point : OperatingPoint, mapping of str to float, or sequence of float
+            The operating point of its last cycles.
+        cycles : int
+            How many of the last cycles must agree, >= 2; all at one operating point, as a `FeedForward` knows.
+        spread_cad : float
+            Their mean absolute deviation from their mean, and the distance between the means of their halves, must lie
+            below this [°CA].
+
+        Returns
+        -------
+        bool
+            Whether the estimate counted as confirmed and was learnt. Its standard deviation is taken from the scatter
+            of the estimates and the distance of the halves.
+
+        Raises
+        ------
+        mgdd.errors.ParameterError
+            As by `learn`, or fewer than two cycles.
+        """
+        if cycles < 2:
+            raise ParameterError.of("cycles", cycles, ">= 2")
+        history = seeker.history
+        estimate = history["estimate"].to_numpy()[-cycles:]
+        if estimate.shape[0] < cycles or ("point" in history and np.ptp(history["point"].to_numpy()[-cycles:]) > 0):
+            return False
+        if "testing" in history and bool(history["testing"].to_numpy()[-cycles:].any()):
+            return False
+        column = estimate[:, 0]
+        half = cycles // 2
+        drift = abs(float(np.mean(column[half:]) - np.mean(column[:half])))
+        scatter = float(np.mean(np.abs(column - np.mean(column))))
+        if not (scatter < spread_cad and drift < spread_cad):
+            return False
+        self.learn(point, float(np.mean(column)), sd_cad=max(math.hypot(scatter, drift), 1e-3 * spread_cad))
+        return True
+
+    def to_dataset(self) -> xr.Dataset:
+        """Give the map as data.
+
+        Returns
+        -------
+        xarray.Dataset
+            ``timing_cad``, ``sd_cad`` and ``support`` over the axes.
+        """
+        dims = tuple(self._axes)
+        return labelled_dataset(
+            {
+                **{name: (name, entries, unit_of(name), name) for name, entries in self._axes.items()},
+                "timing_cad": (dims, self.timing_cad, _CAD, "best timing"),
+                "sd_cad": (dims, self.sd_cad, "°CA", "standard deviation of the best timing"),
+                "support": (dims, self.support, "-", "confirmed optima"),
+            },
+            attrs=self._settings,
+        )
+
+    @classmethod
+    def from_dataset(cls, dataset: xr.Dataset) -> Self:
+        """Make a map of what `to_dataset` gave.
+
+        Parameters
+        ----------
+        dataset : xarray.Dataset
+            With ``timing_cad``, ``sd_cad`` and ``support``.
+
+        Returns
+        -------
+        TimingMap
+            The same map, its standard deviations to the last digit but one.
+
+        Raises
+        ------
+        mgdd.errors.DataError
+            A variable is missing, or has another unit.
+        """
+        for name in ("timing_cad", "sd_cad", "support"):
+            if name not in dataset:
+                raise DataError(f"{name} is missing: a map has timing_cad, sd_cad and support")
+        unit = label_of(dataset["timing_cad"]).units
+        if unit != _CAD:
+            raise DataError(f"timing_cad has units {unit!r}: must be {_CAD!r}")
+        dims = dataset["timing_cad"].dims
+        axes = {str(name): dataset[name].to_numpy() for name in dims}
+        own = {name: float(dataset.attrs[name]) for name in _SETTINGS if name in dataset.attrs}
+        made = cls(axes, dataset["timing_cad"].to_numpy(), **own)
+        made._columns = {
+            **made._columns,
+            "variance": (dataset["sd_cad"].transpose(*dims).to_numpy().ravel() ** 2).tolist(),
+            "support": dataset["support"].transpose(*dims).to_numpy().ravel().tolist(),
+        }
+        return made
+
+    def to_parameters(self) -> ParameterFile:
+        """Give axes, cells and settings, as `to_toml` writes them."""
+        cells = {name: Entry(value=self._table(_CORE[name]).tolist(), unit=unit) for name, unit in _CELLS.items()}
+        axes = {name: Entry(value=entries.tolist(), unit=unit_of(name)) for name, entries in self._axes.items()}
+        settings = {name: Entry(value=self._settings[name], unit=unit) for name, unit in _SETTINGS.items()}
+        return ParameterFile(kind="timing_map", tables={"axes": axes, "cells": cells, "settings": settings})
+
+    @classmethod
+    def from_parameters(cls, file: ParameterFile) -> Self:
+        """Make the map of a file that `to_toml` wrote."""
+        file.expect(kinds=("timing_map",), tables=("axes", "cells", "settings"))
+        axes = file.values("axes", {name: Wanted(unit_of(name), "numbers") for name in file.tables["axes"]})
+        cells = file.values("cells", wanted(_CELLS, _CELLS, "numbers"))
+        made = cls(axes, cells["timing_cad"], **file.values("settings", wanted(_SETTINGS, _SETTINGS)))
+        made._columns = {_CORE[name]: np.array(values, np.float64).ravel().tolist() for name, values in cells.items()}
+        return made
+
+    def _table(self, column: str) -> NDArray[np.float64]:
+        return np.array(self._columns[column]).reshape([entries.size for entries in self._axes.values()])
+
+    def _coordinates(self, point: Any) -> list[float]:
+        numbers = numbers_of(point)
+        named = set(self._axes) <= set(numbers)
+        if not named and (isinstance(point, Mapping) or len(numbers) != len(self._axes)):
+            raise ParameterError.of("point", point, f"an operating point with {' and '.join(self._axes)}")
+        return [numbers[name] for name in self._axes] if named else list(numbers.values())
+
+    def __eq__(self, other: object) -> bool:
+        return isinstance(other, TimingMap) and self._parts() == other._parts()
+
+    __hash__ = None  # type: ignore[assignment]
+
+    def _parts(self) -> tuple[Any, ...]:
+        return {name: entries.tolist() for name, entries in self._axes.items()}, self._settings, self._columns
+
+    def __reduce__(self) -> tuple[Any, ...]:
+        return _rebuild, (type(self), dict(self._axes), self._settings, self._columns)
+
+    def __repr__(self) -> str:
+        size = " x ".join(f"{entries.size} {name}" for name, entries in self._axes.items())
+        return f"<TimingMap {size}, {np.count_nonzero(self.support > 0.0)} cells with support>"
+
+    def _repr_html_(self) -> str:
+        return as_html("TimingMap", rows_of({**self._axes, "timing_cad": self.timing_cad, **self._settings}))
+
+
+def _rebuild(
+    cls: type[TimingMap],
+    axes: Mapping[str, NDArray[np.float64]],
+    settings: Mapping[str, float],
+    columns: Mapping[str, Sequence[float]],
+) -> TimingMap:
+    shape = [entries.size for entries in axes.values()]
+    made = cls(axes, np.reshape(columns["values_cad"], shape), **settings)
+    made._columns = {name: list(column) for name, column in columns.items()}
+    return made

@@ -1,0 +1,311 @@
+// Feed-forward with a learnt trim: nothing without a guide, whole moves at a new point, no bump at a calibration,
+// guides that cannot be used, guides that are wrong, and a run that is cut in two.
+#include "mgdd/guide/feed_forward.hpp"
+
+#include <gtest/gtest.h>
+
+#include <bit>
+#include <cmath>
+#include <limits>
+#include <vector>
+
+#include "mgdd/optimize/seekers/seeker_history.hpp"
+#include "mgdd/optimize/seekers/variant_seeker.hpp"
+#include "support/seeker_case.hpp"
+
+namespace mgdd::guide {
+namespace {
+
+using namespace optimize;
+
+constexpr double nan = std::numeric_limits<double>::quiet_NaN();
+
+GuideValue at(double optimum, double curvature = bend) {
+  return {scalar_input(optimum), scalar_input(curvature)};
+}
+
+FeedForward<ExtremumSeeking> guided(double start = -20.0, TrustSettings trust = {.noise_sd = 0.25}) {
+  ExtremumSeekingSettings s = plain_seeking(start);
+  s.space.lower = scalar_input(-30.0);
+  s.space.upper = scalar_input(10.0);
+  return FeedForward<ExtremumSeeking>(ExtremumSeeking(s), {.trust = trust});
+}
+
+/// Columns as bits: a misfired cycle has no J.
+std::vector<std::uint64_t> bits_of(const StateColumns& columns) {
+  std::vector<std::uint64_t> bits;
+  for (const auto& [name, values] : columns) {
+    for (const double x : values)
+      bits.push_back(std::bit_cast<std::uint64_t>(x));
+  }
+  return bits;
+}
+
+/// `cycles` cycles on a parabola with its top at `optimum`; what was applied.
+template <class S>
+std::vector<double> run(S& seeker, double optimum, int cycles, double noise_sd = 0.0, std::uint64_t seed = 1) {
+  std::vector<double> applied;
+  for (int k = 0; k < cycles; ++k) {
+    const double x = seeker.ask()[0];
+    const auto index = static_cast<std::uint64_t>(seeker.protocol().cycle);
+    const double j[] = {quadratic(x - optimum) + noise_sd * random::normal(seed, 7, index)};
+    EXPECT_EQ(seeker.tell({j, {}, false}), TellStatus::accepted);
+    applied.push_back(x);
+  }
+  return applied;
+}
+
+TEST(FeedForward, WithoutAGuideIsTheSeekerBitForBit) {
+  const std::vector<Limit> limits{{"p_max_bar", 150.0, 1.0}, {"rise", 4.0, 0.0, LimitMethod::penalty}};
+  for (const SearchSpace& space : {space_at(scalar_input(8.0), 40.0), space_at(inputs({8.0, -6.0, 4.0}), 40.0)}) {
+    for (auto& [name, any] : every_seeker(space, 0.25, 3, limits)) {
+      SCOPED_TRACE(name + ", inputs " + std::to_string(space.size()));
+      RecordedSeeker<VariantSeeker> plain{VariantSeeker(any)};
+      FeedForward<RecordedSeeker<VariantSeeker>> guided(RecordedSeeker<VariantSeeker>{VariantSeeker(any)});
+      const StateColumns start = save_state(plain);
+      for (int k = 0; k < 700; ++k) {
+        const Inputs x = plain.ask();
+        ASSERT_EQ(guided.ask(), x);
+        const double j[] = {0.5 * bend * x.squaredNorm() + 0.25 * random::normal(5, 1, static_cast<std::uint64_t>(k))};
+        const double values[] = {148.0 + 0.3 * x[0], 2.0 - 0.1 * x[0]};
+        const double unread[] = {nan};
+        ASSERT_EQ(guided.tell({unread, values, false}), TellStatus::not_a_reading);
+        const Reading reading{j, values, k % 50 == 7};
+        ASSERT_EQ(guided.tell(reading), plain.tell(reading));
+        if (k == 400) plain.restart();
+        if (k == 400) guided.restart();
+      }
+      EXPECT_NE(save_state(plain), start);
+      EXPECT_EQ(save_state(guided.seeker()), save_state(plain));
+      EXPECT_EQ(bits_of(guided.seeker().history().save()), bits_of(plain.history().save()));
+      EXPECT_EQ(guided.protocol().cycle, plain.protocol().cycle);
+      EXPECT_EQ(guided.estimate(), plain.estimate());
+      EXPECT_FALSE(guided.path().known());
+    }
+  }
+}
+
+TEST(FeedForward, StartsAtTheOptimumOfTheGuide) {
+  FeedForward<ExtremumSeeking> seeker = guided();
+  EXPECT_EQ(seeker.offer(at(-4.2), GuideCause::new_point), GuideStatus::followed);
+  EXPECT_NEAR(seeker.estimate()[0], -4.2, 1e-12);
+  EXPECT_NEAR(seeker.path().feed_forward()[0], -4.2, 1e-12);
+  EXPECT_NEAR(seeker.trim()[0], 0.0, 1e-12);
+}
+
+// The guide is 1.5 CAD late everywhere: the trim takes that, and a step moves the estimate as far as the optimum goes.
+TEST(FeedForward, ANewPointMovesTheEstimateAndKeepsTheTrim) {
+  FeedForward<ExtremumSeeking> seeker = guided();
+  seeker.offer(at(-2.7), GuideCause::new_point);
+  run(seeker, -4.2, 600);
+  const double trim = seeker.trim()[0];
+  EXPECT_NEAR(trim, -1.5, 0.02);
+  seeker.offer(at(-9.2), GuideCause::new_point);
+  const std::vector<double> applied = run(seeker, -10.7, 2);
+  EXPECT_NEAR(applied[0], -4.2, 0.02);   // the test of the guide: the old place, without dither ...
+  EXPECT_NEAR(applied[1], -10.7, 0.02);  // ... and the new one
+  EXPECT_EQ(seeker.path().trust().verdict(), Verdict::confirmed);
+  EXPECT_NEAR(seeker.estimate()[0], -10.7, 0.05);
+  EXPECT_NEAR(seeker.trim()[0], trim, 1e-12);
+}
+
+TEST(FeedForward, ACalibrationMovesNothingThatIsApplied) {
+  FeedForward<ExtremumSeeking> plain = guided(), calibrated = guided();
+  for (FeedForward<ExtremumSeeking>* one : {&plain, &calibrated})
+    one->offer(at(-1.0), GuideCause::new_point);
+  EXPECT_EQ(run(calibrated, -5.6, 50, 0.25), run(plain, -5.6, 50, 0.25));
+  EXPECT_EQ(calibrated.offer(at(-4.75), GuideCause::calibration), GuideStatus::followed);
+  double before = calibrated.path().feed_forward()[0];
+  for (const double expected : {-2.0, -3.0, -4.0, -4.75, -4.75}) {
+    EXPECT_EQ(run(calibrated, -5.6, 1, 0.25), run(plain, -5.6, 1, 0.25));
+    EXPECT_NEAR(calibrated.path().feed_forward()[0], expected, 1e-12);
+    EXPECT_LE(std::abs(calibrated.path().feed_forward()[0] - before), 1.0 + 1e-12);
+    EXPECT_NEAR(calibrated.trim()[0] - plain.trim()[0], plain.path().feed_forward()[0] - expected, 1e-12);
+    before = calibrated.path().feed_forward()[0];
+  }
+  EXPECT_EQ(save_state(calibrated.seeker()), save_state(plain.seeker()));
+}
+
+TEST(FeedForward, WhatIsLeftOfACalibrationBelongsToTheOldPoint) {
+  FeedForward<ExtremumSeeking> seeker = guided();
+  seeker.offer(at(-1.0), GuideCause::new_point);
+  run(seeker, -1.0, 300);
+  seeker.offer(at(-4.0), GuideCause::calibration);
+  seeker.offer(at(-7.0), GuideCause::new_point);  // by the new model the optimum moves by 3 CAD, not by 6
+  run(seeker, -4.0, 2);
+  EXPECT_NEAR(seeker.estimate()[0], -4.0, 0.1);
+  EXPECT_NEAR(seeker.path().feed_forward()[0], -7.0, 0.1);
+}
+
+TEST(FeedForward, FollowsAPointThatDriftsWithoutATestOrARestart) {
+  FeedForward<ExtremumSeeking> seeker = guided();
+  seeker.offer(at(-4.0), GuideCause::new_point);
+  run(seeker, -4.0, 45);
+  const StateColumns before = save_state(seeker.seeker());
+  seeker.offer(at(-4.3), GuideCause::following);
+  EXPECT_NEAR(seeker.estimate()[0] - before.at("estimate")[0], -0.3, 1e-12);
+  EXPECT_EQ(save_state(seeker.seeker()).at("seen"), before.at("seen"));
+  EXPECT_FALSE(seeker.path().testing());
+}
+
+TEST(FeedForward, HoldsTheLastValidValueOfAGuideThatCannotBeUsed) {
+  for (const GuideValue& bad :
+       {at(nan), at(-30.5), at(10.5), at(std::numeric_limits<double>::infinity()), GuideValue{inputs({-4.0, 2.0})},
+        GuideValue{scalar_input(-4.0), inputs({-0.1, -0.2})}}) {
+    FeedForward<ExtremumSeeking> seeker = guided();
+    seeker.offer(at(-4.0), GuideCause::new_point);
+    run(seeker, -4.0, 45);
+    const double estimate = seeker.estimate()[0], trust = seeker.path().trust().value();
+    EXPECT_EQ(seeker.offer(bad, GuideCause::new_point), GuideStatus::refused);
+    EXPECT_EQ(seeker.estimate()[0], estimate);
+    EXPECT_EQ(seeker.path().feed_forward()[0], -4.0);
+    EXPECT_LT(seeker.path().trust().value(), trust);
+    EXPECT_FALSE(seeker.path().testing());
+    EXPECT_EQ(seeker.offer(at(-10.0), GuideCause::following), GuideStatus::followed);  // late, but the whole move
+    EXPECT_TRUE(seeker.path().testing());
+    run(seeker, -10.0, 2);
+    EXPECT_NEAR(seeker.estimate()[0], -10.0, 0.5);
+  }
+}
+
+TEST(FeedForward, TakesNoAdviceBetweenAskAndTell) {
+  FeedForward<ExtremumSeeking> seeker = guided();
+  seeker.offer(at(-4.0), GuideCause::new_point);
+  seeker.ask();
+  const StateColumns before = save_state(seeker);
+  EXPECT_EQ(seeker.offer(at(-9.0), GuideCause::new_point), GuideStatus::busy);
+  EXPECT_EQ(save_state(seeker), before);
+}
+
+TEST(FeedForward, TurnsDownAGuideThatGoesTheWrongWay) {
+  FeedForward<ExtremumSeeking> seeker = guided();
+  seeker.offer(at(-4.2), GuideCause::new_point);
+  run(seeker, -4.2, 300, 0.25);
+  const double before = seeker.estimate()[0];
+  seeker.offer(at(2.3), GuideCause::new_point);
+  run(seeker, -10.7, 2, 0.25);
+  EXPECT_EQ(seeker.path().trust().verdict(), Verdict::wrong);
+  EXPECT_LT(seeker.path().trust().value(), 0.1);
+  EXPECT_NEAR(seeker.estimate()[0], before, 0.6);
+  seeker.offer(at(-4.2), GuideCause::new_point);  // back at the first point the guide has to earn its trust anew
+  const std::vector<double> applied = run(seeker, -4.2, 2, 0.25);
+  EXPECT_LT(std::abs(applied[1] - applied[0]), 0.6 * 6.5);
+}
+
+TEST(FeedForward, AMoveThatBreaksALimitIsNotTaken) {
+  ExtremumSeekingSettings s = plain_seeking(-4.0);
+  s.limits = {{"p_max_bar", 150.0}};
+  FeedForward<ExtremumSeeking> seeker(ExtremumSeeking(s), {.trust = {.noise_sd = 0.25}});
+  seeker.offer(at(-4.0), GuideCause::new_point);
+  seeker.offer(at(-12.0), GuideCause::new_point);
+  for (int k = 0; k < 2; ++k) {
+    const double x = seeker.ask()[0];
+    const double j[] = {quadratic(x + 12.0)}, pressure[] = {140.0 - 2.0 * (x + 4.0)};
+    seeker.tell({j, pressure, false});
+  }
+  EXPECT_EQ(seeker.path().trust().verdict(), Verdict::wrong);
+  EXPECT_EQ(seeker.estimate()[0], -4.0);
+}
+
+TEST(FeedForward, TestsWithinTheBoundsAndAfterTheSensorHasSettled) {
+  FeedForward<ExtremumSeeking> seeker = guided(-20.0, {.probe_cycles = 2, .probe_settling = 3, .noise_sd = 0.25});
+  seeker.offer(at(4.0), GuideCause::new_point);
+  seeker.shift_estimate(scalar_input(2.0));
+  seeker.offer(at(9.9), GuideCause::new_point);
+  const std::vector<double> applied = run(seeker, 9.0, 10);
+  for (int k = 0; k < 10; ++k)
+    EXPECT_NEAR(applied[static_cast<std::size_t>(k)], k < 5 ? 6.0 : 10.0, 1e-12) << k;
+  EXPECT_FALSE(seeker.path().testing());
+}
+
+TEST(FeedForward, AMisfiredCycleOfATestIsMeasuredAgain) {
+  FeedForward<ExtremumSeeking> seeker = guided();
+  seeker.offer(at(-4.2), GuideCause::new_point);
+  seeker.offer(at(-10.7), GuideCause::new_point);
+  for (const bool misfire : {true, false, true, true}) {
+    EXPECT_TRUE(seeker.path().testing());
+    const double x = seeker.ask()[0];
+    const double j[] = {quadratic(x + 10.7)};
+    seeker.tell({j, {}, misfire});
+  }
+  EXPECT_TRUE(seeker.path().at_trial());
+  run(seeker, -10.7, 1);
+  EXPECT_FALSE(seeker.path().testing());
+  EXPECT_NEAR(seeker.estimate()[0], -10.7, 0.1);
+}
+
+// A plant that goes no further than -7: the share of the move is that of the place it went to, and no wind-up follows.
+TEST(FeedForward, LearnsFromWhatThePlantApplied) {
+  FeedForward<ExtremumSeeking> seeker = guided(-20.0, {.curvature_spread = 0.0, .noise_sd = 0.01});
+  seeker.offer(at(-4.2), GuideCause::new_point);
+  seeker.offer(at(-10.7), GuideCause::new_point);
+  for (int k = 0; k < 400; ++k) {
+    const double x[] = {std::max(seeker.ask()[0], -7.0)};
+    const double j[] = {quadratic(x[0] + 8.8)};
+    ASSERT_EQ(seeker.tell({j, {}, false, x}), TellStatus::accepted);
+    if (k == 1) {
+      EXPECT_NEAR(seeker.path().trust().value(), 4.6 / 6.5, 0.02);
+    }
+  }
+  EXPECT_GE(seeker.estimate()[0], -8.01);
+}
+
+TEST(FeedForward, MovesSeveralInputsAtOnce) {
+  ExtremumSeekingSettings s;
+  s.space = space_at(inputs({8.0, -6.0}), 40.0);
+  s.dither = {.amplitude = inputs({1.0, 0.5}), .period = 20, .harmonics = {2, 3}};
+  s.gain = inputs({0.4, 0.4});
+  FeedForward<ExtremumSeeking> seeker(ExtremumSeeking(s), {.trust = {.noise_sd = 0.1}});
+  const Inputs curvature = inputs({-0.05, -0.2});
+  seeker.offer({inputs({2.0, 1.0}), curvature}, GuideCause::new_point);
+  EXPECT_LT((seeker.estimate() - inputs({2.0, 1.0})).norm(), 1e-12);
+  seeker.offer({inputs({-4.0, 3.5}), curvature}, GuideCause::new_point);
+  for (int k = 0; k < 2; ++k) {
+    const Inputs away = seeker.ask() - inputs({-4.0, 3.5});
+    const double j[] = {0.5 * (curvature.array() * away.array().square()).sum()};
+    seeker.tell({j, {}, false});
+  }
+  EXPECT_LT((seeker.estimate() - inputs({-4.0, 3.5})).norm(), 0.2);
+}
+
+TEST(FeedForward, GoesOnBitForBitFromItsState) {
+  for (const int cut : {1, 2, 40, 301, 302, 350}) {  // within both tests, between them, in the middle of a window
+    const auto play = [](auto& seeker, int from, int to) {
+      for (int k = from; k < to; ++k) {
+        if (k == 0) seeker.offer(at(-12.0), GuideCause::new_point);
+        if (k == 100) seeker.offer(at(-9.5), GuideCause::calibration);
+        if (k == 300) seeker.offer(at(-19.0), GuideCause::new_point);
+        run(seeker, k < 300 ? -4.2 : -10.7, 1, 0.25);
+      }
+    };
+    FeedForward<ExtremumSeeking> whole = guided(-20.0, {}), first = whole, second = whole;
+    play(whole, 0, 500);
+    play(first, 0, cut);
+    restore_state(second, save_state(first));
+    play(second, cut, 500);
+    EXPECT_EQ(save_state(second), save_state(whole)) << cut;
+  }
+}
+
+TEST(FeedForward, AskTellAndOfferAreNoexceptAndDoNotAllocate) {
+  for (auto& [name, any] : every_seeker(space_at(scalar_input(8.0), 40.0), 0.25, 3)) {
+    SCOPED_TRACE(name);
+    FeedForward<VariantSeeker> seeker{VariantSeeker(any)};
+    const GuideValue one = at(2.0), other = at(-6.0), bad = at(nan);
+    static_assert(noexcept(seeker.ask()) && noexcept(seeker.restart()) &&
+                  noexcept(seeker.tell(std::declval<const Reading&>())) &&
+                  noexcept(seeker.offer(one, GuideCause::new_point)));
+    static_assert(AnySeeker<FeedForward<VariantSeeker>>);
+    const test_support::AllocationCounter counter;
+    for (int k = 0; k < 600; ++k) {
+      if (k % 60 == 0) seeker.offer(k % 120 == 0 ? one : other, GuideCause::new_point);
+      if (k % 60 == 30) seeker.offer(k % 120 == 30 ? bad : other, GuideCause::calibration);
+      const double j[] = {quadratic(seeker.ask()[0]) + 0.1 * std::sin(k)};
+      seeker.tell({j, {}, k % 50 == 7});
+    }
+    EXPECT_EQ(counter.count(), 0u);
+  }
+}
+
+}  // namespace
+}  // namespace mgdd::guide

@@ -1,0 +1,167 @@
+// The best timing of the cycle model within a bounded amount of work: against another search, the bound of gradient
+// ascent, its fallback, edges, points that have no optimum, real time.
+#include "mgdd/guide/model_optimum.hpp"
+
+#include <gtest/gtest.h>
+
+#include <cmath>
+#include <limits>
+
+#include "support/engine_case.hpp"
+#include "support/no_alloc.hpp"
+
+namespace mgdd::guide {
+namespace {
+
+using test_support::EngineCase;
+
+ModelOptimumSettings settings_of(const EngineCase& c) {
+  ModelOptimumSettings s;
+  s.cylinder = c.cylinder;
+  return s;
+}
+
+TEST(ModelOptimum, AgreesWithAnotherSearchOverLoadSpeedAndModel) {
+  for (const char* words : {"", "fuel_mg=12", "fuel_mg=30", "speed_rpm=3000 fuel_mg=38", "speed_rpm=900 fuel_mg=6",
+                            "wall_heat_scale=0", "wall_heat_scale=1.3 fuel_mg=30", "burn_shape=wiebe fuel_mg=26"}) {
+    const EngineCase c(words);
+    const double expected = test_support::best_soc_cad(c, "efficiency_gross");
+    for (const OptimumMethod method : {OptimumMethod::gradient, OptimumMethod::golden_section}) {
+      ModelOptimumSettings s = settings_of(c);
+      s.method = method;
+      const ModelOptimumResult found = ModelOptimum(s).find(c.point);
+      ASSERT_TRUE(found.found) << words;
+      EXPECT_EQ(found.method, method) << words;
+      EXPECT_NEAR(found.soc_cad, expected, 0.06) << words << to_string(method);
+      EXPECT_FALSE(found.at_bound);
+      EXPECT_GT(found.curvature, -0.08) << words;
+      EXPECT_LT(found.curvature, -0.02) << words;
+    }
+  }
+}
+
+// 2/|J''| = 39 CAD^2 per point: below it the ascent converges, above it it does not, and golden section takes over.
+TEST(ModelOptimum, ConvergesBelowTheBoundOfTheStepAndFallsBackAboveIt) {
+  const EngineCase c;
+  const double expected = test_support::best_soc_cad(c, "efficiency_gross");
+  for (const double step_size : {5.0, 10.0, 15.0, 18.0, 30.0, 45.0}) {
+    ModelOptimumSettings s = settings_of(c);
+    s.step_size = step_size;
+    const ModelOptimumResult found = ModelOptimum(s).find(c.point);
+    EXPECT_EQ(found.method, step_size < 39.0 ? OptimumMethod::gradient : OptimumMethod::golden_section) << step_size;
+    EXPECT_NEAR(found.soc_cad, expected, 0.06) << step_size;
+    if (step_size == 18.0) {
+      EXPECT_LE(found.iterations, 4);
+    }
+    if (step_size == 45.0) {
+      EXPECT_EQ(found.iterations, 60);
+    }
+  }
+}
+
+TEST(ModelOptimum, TheAscentAloneTakesFourIterationsFromMinusTwenty) {
+  const EngineCase c;
+  for (const double step_size : {18.0, 45.0}) {
+    optimize::GradientDescentSettings g;
+    g.space.start = optimize::scalar_input(-20.0);
+    g.step_size = step_size;
+    optimize::GradientDescent ascent(g);
+    double widest = 0.0;
+    while (ascent.converged_at() < 0 && ascent.iteration() < 60) {
+      EngineCase at = c;
+      at.soc_cad = ascent.ask()[0];
+      widest = std::max(widest, std::abs(at.soc_cad));
+      const double j[] = {100.0 * test_support::run(at).indicators.efficiency_gross};
+      ascent.tell({j, {}, false});
+    }
+    EXPECT_EQ(ascent.converged_at(), step_size < 39.0 ? 4 : -1);
+    EXPECT_LT(widest, 22.0);  // bounded, even where it does not converge
+  }
+}
+
+TEST(ModelOptimum, EndsAtAnEdgeThatHoldsItBack) {
+  const EngineCase c;
+  ModelOptimumSettings s = settings_of(c);
+  s.lower_cad = -30.0;
+  s.upper_cad = -9.0;
+  const ModelOptimumResult late = ModelOptimum(s).find(c.point);
+  EXPECT_TRUE(late.at_bound);
+  EXPECT_EQ(late.soc_cad, -9.0);
+  s.lower_cad = 0.0;
+  s.upper_cad = 10.0;
+  const ModelOptimumResult early = ModelOptimum(s).find(c.point);
+  EXPECT_TRUE(early.at_bound);
+  EXPECT_EQ(early.soc_cad, 0.0);
+}
+
+TEST(ModelOptimum, WeighsNoxAsThePerformanceSays) {
+  const EngineCase c;
+  ModelOptimumSettings s = settings_of(c);
+  const double without = ModelOptimum(s).find(c.point).soc_cad;
+  s.performance = engine::efficiency_and_nox();
+  s.nox.map = engine::NoxMap::arrhenius;
+  const double with = ModelOptimum(s).find(c.point).soc_cad;
+  EXPECT_GT(with, without + 1.0);  // cooler, so later
+}
+
+TEST(ModelOptimum, SaysWhereThereIsNoOptimum) {
+  ModelOptimum optimum(settings_of(EngineCase()));
+  engine::OperatingPoint point;
+  for (auto& [field, value] : std::initializer_list<std::pair<double engine::OperatingPoint::*, double>>{
+           {&engine::OperatingPoint::fuel_mg, 0.0},
+           {&engine::OperatingPoint::fuel_mg, std::nan("")},
+           {&engine::OperatingPoint::speed_rpm, -1.0},
+           {&engine::OperatingPoint::intake_pressure_kpa, std::numeric_limits<double>::infinity()}}) {
+    engine::OperatingPoint bad = point;
+    bad.*field = value;
+    EXPECT_FALSE(optimum.find(bad).found);
+    EXPECT_EQ(guide_value(optimum.find(bad)).optimum.size(), 0);
+  }
+  EXPECT_TRUE(optimum.find(point).found);
+  EXPECT_EQ(guide_value(optimum.find(point)).optimum[0], optimum.find(point).soc_cad);
+}
+
+TEST(ModelOptimum, FollowsACalibrationOfTheSameCylinder) {
+  const EngineCase calibrated("wall_heat_scale=1.1");
+  ModelOptimum optimum(settings_of(EngineCase()));
+  optimum.set_cylinder(calibrated.cylinder);
+  EXPECT_EQ(optimum.find(calibrated.point).soc_cad,
+            ModelOptimum(settings_of(calibrated)).find(calibrated.point).soc_cad);
+  EXPECT_THROW(optimum.set_cylinder(EngineCase("bore_mm=90").cylinder), ParameterError);
+  EXPECT_EQ(optimum.settings().cylinder, calibrated.cylinder);
+}
+
+TEST(ModelOptimum, FindsWithoutAllocating) {
+  ModelOptimum optimum(settings_of(EngineCase()));
+  static_assert(noexcept(optimum.find(engine::OperatingPoint{})));
+  engine::OperatingPoint point;
+  const test_support::AllocationCounter counter;
+  for (const double fuel : {6.0, 12.0, 20.0, 30.0, 40.0}) {
+    point.fuel_mg = fuel;
+    optimum.find(point);
+  }
+  EXPECT_EQ(counter.count(), 0u);
+}
+
+TEST(ModelOptimum, RefusesSettingsThatMakeNoSense) {
+  const auto field_of = [](auto change) {
+    ModelOptimumSettings s;
+    change(s);
+    try {
+      ModelOptimum optimum(s);
+    } catch (const ParameterError& e) {
+      return std::string(e.field);
+    }
+    return std::string();
+  };
+  EXPECT_EQ(field_of([](auto& s) { s.step_size = 0.0; }), "step_size");
+  EXPECT_EQ(field_of([](auto& s) { s.difference_cad = -1.0; }), "difference_cad");
+  EXPECT_EQ(field_of([](auto& s) { s.tolerance_cad = 0.0; }), "tolerance_cad");
+  EXPECT_EQ(field_of([](auto& s) { s.iterations = 0; }), "iterations");
+  EXPECT_EQ(field_of([](auto& s) { s.lower_cad = -61.0; }), "lower_cad");
+  EXPECT_EQ(field_of([](auto& s) { s.upper_cad = -29.0; }), "upper_cad");
+  EXPECT_EQ(field_of([](auto& s) { s.cylinder.geometry.bore_mm = -1.0; }), "bore_mm");
+}
+
+}  // namespace
+}  // namespace mgdd::guide

@@ -1,0 +1,190 @@
+// The map of the best timing: bilinear values, what one optimum teaches its cells, forgetting, edges, real time.
+#include "mgdd/guide/timing_map.hpp"
+
+#include <gtest/gtest.h>
+
+#include <array>
+#include <cmath>
+#include <limits>
+
+#include "mgdd/common/random.hpp"
+#include "mgdd/common/state.hpp"
+#include "support/no_alloc.hpp"
+
+namespace mgdd::guide {
+namespace {
+
+constexpr double nan = std::numeric_limits<double>::quiet_NaN();
+
+double plane(double speed, double fuel) {
+  return -2.0 - 0.003 * speed + 0.2 * fuel + 1e-4 * speed * fuel;  // bilinear, so that the map can hold it exactly
+}
+
+/// Uneven axes of three speeds and four fuels; zero everywhere where `start` is null.
+TimingMapSettings uneven(bool filled, double forgetting = 1.0) {
+  TimingMapSettings s;
+  s.axes = {{900.0, 1500.0, 3000.0}, {6.0, 12.0, 20.0, 40.0}};
+  for (const double speed : s.axes[0]) {
+    for (const double fuel : s.axes[1])
+      s.values_cad.push_back(filled ? plane(speed, fuel) : 0.0);
+  }
+  s.forgetting = forgetting;
+  return s;
+}
+
+TEST(TimingMap, IsBilinearBetweenItsCells) {
+  const TimingMap map(uneven(true));
+  for (const auto& [speed, fuel] :
+       {std::pair{900.0, 6.0}, {3000.0, 40.0}, {1500.0, 20.0}, {1310.0, 33.0}, {2999.0, 6.5}}) {
+    const TimingLookup at = map.lookup(std::array{speed, fuel});
+    EXPECT_NEAR(at.value_cad, plane(speed, fuel), 1e-12);
+    EXPECT_FALSE(at.held_outside);
+  }
+}
+
+TEST(TimingMap, HoldsTheEdgeOutsideAndSaysSo) {
+  const TimingMap map(uneven(true));
+  const TimingLookup fast = map.lookup(std::array{4000.0, 33.0});
+  EXPECT_TRUE(fast.held_outside);
+  EXPECT_NEAR(fast.value_cad, plane(3000.0, 33.0), 1e-12);
+  const TimingLookup corner = map.lookup(std::array{100.0, 1.0});
+  EXPECT_TRUE(corner.held_outside);
+  EXPECT_NEAR(corner.value_cad, plane(900.0, 6.0), 1e-12);
+  EXPECT_TRUE(std::isnan(map.lookup(std::array{nan, 12.0}).value_cad));
+  EXPECT_TRUE(std::isnan(map.lookup(std::array{1500.0}).value_cad));
+}
+
+// At a cell alone, the weighted mean of prior and observations: s^2/n after many.
+TEST(TimingMap, ACellLearnsTheMeanOfItsOptima) {
+  TimingMap map(uneven(false));
+  const std::array at{1500.0, 20.0};
+  double sum = 0.0;
+  for (int k = 1; k <= 50; ++k) {
+    const double y = -6.0 + 0.5 * random::normal(3, 1, static_cast<std::uint64_t>(k));
+    sum += y;
+    ASSERT_TRUE(map.learn(at, y, 0.5));
+    const double information = 1.0 / 9.0 + k / 0.25;
+    EXPECT_NEAR(map.lookup(at).value_cad, sum / 0.25 / information, 1e-9);
+    EXPECT_NEAR(map.lookup(at).sd_cad, 1.0 / std::sqrt(information), 1e-12);
+    EXPECT_NEAR(map.lookup(at).support, k, 1e-12);
+  }
+  for (const double other : {6.0, 12.0, 40.0}) {
+    EXPECT_EQ(map.lookup(std::array{1500.0, other}).value_cad, 0.0);
+    EXPECT_EQ(map.lookup(std::array{1500.0, other}).support, 0.0);
+  }
+}
+
+TEST(TimingMap, AnOptimumBetweenCellsTeachesTheNearOnesMost) {
+  TimingMap map(uneven(false));
+  map.learn(std::array{1400.0, 18.0}, -5.0, 0.1);
+  const std::vector<double>& v = map.values_cad();  // rows of four
+  EXPECT_LT(v[1 * 4 + 2], v[1 * 4 + 1]);
+  EXPECT_LT(v[1 * 4 + 1], v[0 * 4 + 1]);
+  EXPECT_LT(v[0 * 4 + 1], 0.0);
+  EXPECT_EQ(v[2 * 4 + 2], 0.0);
+  double support = 0.0;
+  for (const double s : map.support())
+    support += s;
+  EXPECT_NEAR(support, 1.0, 1e-12);
+}
+
+TEST(TimingMap, LearnsASurfaceFromOptimaAllOverIt) {
+  TimingMap map(uneven(false));
+  for (int k = 0; k < 4000; ++k) {
+    const auto at = static_cast<std::uint64_t>(k);
+    const std::array point{900.0 + 2100.0 * random::uniform(1, 2, at), 6.0 + 34.0 * random::uniform(1, 3, at)};
+    ASSERT_TRUE(map.learn(point, plane(point[0], point[1]) + 0.3 * random::normal(1, 4, at), 0.3));
+  }
+  for (std::size_t i = 0; i < 3; ++i) {
+    for (std::size_t j = 0; j < 4; ++j) {
+      const double speed = map.settings().axes[0][i], fuel = map.settings().axes[1][j];
+      EXPECT_NEAR(map.lookup(std::array{speed, fuel}).value_cad, plane(speed, fuel), 0.4) << speed << " " << fuel;
+    }
+  }
+}
+
+TEST(TimingMap, ForgetsAsItIsTold) {
+  const std::array at{1500.0, 20.0};
+  TimingMap forgets(uneven(false, 0.8)), keeps(uneven(false, 1.0));
+  for (const double y : {-6.0, -2.0}) {
+    for (int k = 0; k < 60; ++k) {
+      for (TimingMap* map : {&forgets, &keeps})
+        map->learn(at, y, 0.5);
+    }
+  }
+  EXPECT_NEAR(forgets.lookup(at).value_cad, -2.0, 0.01);
+  EXPECT_NEAR(keeps.lookup(at).value_cad, -4.0, 0.05);
+  EXPECT_NEAR(forgets.lookup(at).support, 5.0, 0.01);  // 1/(1 - 0.8)
+  EXPECT_GT(forgets.lookup(at).sd_cad, keeps.lookup(at).sd_cad);
+}
+
+TEST(TimingMap, RefusesWhatIsNoConfirmedOptimumAndChangesNothing) {
+  TimingMap map(uneven(true));
+  const StateColumns before = save_state(map);
+  for (const auto& [speed, fuel, y, sd] : {std::array{3001.0, 20.0, -5.0, 0.5},
+                                           {1500.0, 5.9, -5.0, 0.5},
+                                           {nan, 20.0, -5.0, 0.5},
+                                           {1500.0, 20.0, nan, 0.5},
+                                           {1500.0, 20.0, -5.0, 0.0},
+                                           {1500.0, 20.0, -5.0, nan}}) {
+    EXPECT_FALSE(map.learn(std::array{speed, fuel}, y, sd));
+  }
+  EXPECT_EQ(save_state(map), before);
+}
+
+TEST(TimingMap, HasOneAxisToo) {
+  TimingMapSettings s;
+  s.axes = {{6.0, 12.0, 40.0}};
+  s.values_cad = {-3.0, -4.5, -12.0};
+  TimingMap map(s);
+  EXPECT_NEAR(map.lookup(std::array{26.0}).value_cad, -8.25, 1e-12);
+  ASSERT_TRUE(map.learn(std::array{12.0}, -6.0, 1e-3));
+  EXPECT_NEAR(map.lookup(std::array{12.0}).value_cad, -6.0, 1e-3);
+  EXPECT_NEAR(map.lookup(std::array{6.0}).value_cad, -3.0, 1e-12);
+}
+
+TEST(TimingMap, GoesOnFromItsStateAndRefusesOneThatCannotBe) {
+  TimingMap map(uneven(true, 0.9)), other(uneven(false, 0.9));
+  map.learn(std::array{1400.0, 18.0}, -5.0, 0.1);
+  restore_state(other, save_state(map));
+  EXPECT_EQ(save_state(other), save_state(map));
+  StateColumns bad = save_state(map);
+  bad["variance"][3] = 0.0;
+  EXPECT_THROW(restore_state(other, bad), ParameterError);
+  EXPECT_EQ(save_state(other), save_state(map));
+}
+
+TEST(TimingMap, RefusesSettingsThatMakeNoSense) {
+  const auto field_of = [](auto change) {
+    TimingMapSettings s = uneven(true);
+    change(s);
+    try {
+      TimingMap map(s);
+    } catch (const Error& e) {
+      return std::string(e.field);
+    }
+    return std::string();
+  };
+  EXPECT_EQ(field_of([](auto& s) { s.axes.clear(); }), "axes");
+  EXPECT_EQ(field_of([](auto& s) { s.axes[1] = {3.0}; }), "axes[1]");
+  EXPECT_EQ(field_of([](auto& s) { s.axes[0][1] = 900.0; }), "axes[0][1]");
+  EXPECT_EQ(field_of([](auto& s) { s.values_cad.pop_back(); }), "values_cad");
+  EXPECT_EQ(field_of([](auto& s) { s.values_cad[2] = nan; }), "values_cad[2]");
+  EXPECT_EQ(field_of([](auto& s) { s.prior_sd_cad = 0.0; }), "prior_sd_cad");
+  EXPECT_EQ(field_of([](auto& s) { s.forgetting = 1.01; }), "forgetting");
+}
+
+TEST(TimingMap, LooksUpAndLearnsWithoutAllocating) {
+  TimingMap map(uneven(true));
+  const std::array at{1400.0, 18.0};
+  static_assert(noexcept(map.lookup(at)) && noexcept(map.learn(at, 0.0, 1.0)));
+  const test_support::AllocationCounter counter;
+  for (int k = 0; k < 100; ++k) {
+    map.learn(at, -0.01 * k, 0.3);
+    map.lookup(at);
+  }
+  EXPECT_EQ(counter.count(), 0u);
+}
+
+}  // namespace
+}  // namespace mgdd::guide
