@@ -13,6 +13,7 @@ import pytest
 
 from mgdd import _core, datasets, presets
 from mgdd.engine import Cylinder, NoxModel, OperatingPoint, Performance, SoftSensor, find_optimum
+from mgdd.guide import FeedForward, ModelOptimum, TimingMap
 from mgdd.identify import (
     FirstPrincipleModel,
     OdeModel,
@@ -61,6 +62,9 @@ def objects() -> dict[str, Callable[[], Any]]:
         "limit": lambda: Limit(name="p_max_bar", upper=95.0),
         "bench": EngineBench,
         "seeker": lambda: ExtremumSeeking(**seeking),
+        "feed-forward": lambda: FeedForward(ExtremumSeeking(**seeking), lambda _: -5.0),
+        "model optimum": lambda: ModelOptimum(Cylinder()),
+        "timing map": lambda: TimingMap({"speed_rpm": [900.0, 3000.0], "fuel_mg": [6.0, 20.0, 40.0]}, -5.0),
         "golden": lambda: GoldenSection(**seeking, noise_sd=0.2),
         "run": lambda: run_seeker(EngineBench(), ExtremumSeeking(**seeking), 300),
         "steady": lambda: EngineBench(limits=["p_max_bar"]).find_optimum({"p_max_bar": 95.0}),

@@ -17,6 +17,7 @@ import xarray as xr
 import mgdd
 from mgdd import datasets, identify, optimize, presets, signals, surrogate
 from mgdd.engine import Cylinder, OperatingPoint, analyze, convergence, sensitivities, simulate, timing_sweep
+from mgdd.guide import FeedForward, TimingMap
 from mgdd.identify.throttle.validation import ThrottleValidation
 from mgdd.io import pressure_trace, read_pressure, read_throttle_log, throttle_log, write_throttle_log
 from mgdd.loop import EngineBench, monte_carlo, run_seeker
@@ -69,6 +70,14 @@ def learned() -> xr.Dataset:
     return learner.history
 
 
+def guided() -> FeedForward:
+    ff = FeedForward(optimize.ExtremumSeeking(start=-20.0, lower=-30.0, upper=10.0), lambda fuel: -0.35 * fuel)
+    for fuel in (12.0, 12.0, 30.0):
+        ff.at(fuel)
+        ff.tell(-float((ff.ask()[0] + 0.35 * fuel) ** 2))
+    return ff
+
+
 def validation() -> ThrottleValidation:
     model = identify.FirstPrincipleModel()
     return identify.validate_throttle(model, log())
@@ -117,6 +126,8 @@ MADE: dict[str, Callable[[Path], Any]] = {
     "results.FitReport.to_dataset": lambda _: report().to_dataset(),
     "results.Fit.run": lambda _: identify.fit_first_principle(log(), options=optimize.FitOptions(n_starts=1)).run,
     "throttle.PseudoWiener.predict": lambda _: PseudoWiener("pw_r").predict(log(), 5),
+    "guide.FeedForward.history": lambda _: guided().history,
+    "guide.TimingMap.to_dataset": lambda _: TimingMap({"fuel_mg": [6.0, 20.0]}, -5.0).to_dataset(),
     "identify.design_excitation": lambda _: identify.design_excitation("chirp", Throttle())[0],
     "surrogate.random_step_records": lambda _: surrogate.random_step_records(50),
     "io.pressure_trace": lambda _: pressure_trace(np.arange(-40.0, 41.0), 60.0 - 0.01 * np.arange(-40.0, 41.0) ** 2),

@@ -54,5 +54,7 @@ def change_between(now: Mapping[str, float], before: Mapping[str, float] | None)
         return "new_point"
     if dict(now) == dict(before):
         return "same"
-    far = any(not math.isclose(now[name], before[name], rel_tol=0.0, abs_tol=NEW_POINT * abs(before[name])) for name in now)
+    far = any(
+        not math.isclose(now[name], before[name], rel_tol=0.0, abs_tol=NEW_POINT * abs(before[name])) for name in now
+    )
     return "new_point" if far else "following"

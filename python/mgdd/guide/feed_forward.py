@@ -206,7 +206,12 @@ class FeedForward(_core.guide.FeedForward):
         return "refused"
 
     def tell(
-        self, J: Any = None, limits: Any = None, *, misfire: bool = False, applied: Any = None  # noqa: N803
+        self,
+        J: Any = None,  # noqa: N803
+        limits: Any = None,
+        *,
+        misfire: bool = False,
+        applied: Any = None,
     ) -> None:
         """Accept what was measured at the input of the last ask.
 
@@ -242,7 +247,9 @@ class FeedForward(_core.guide.FeedForward):
         ``misfire``. What is not known yet is NaN. Built anew on every access.
         """
         names = ("cycle", "point", "trust", "testing", *_TABLES, "objective", "misfire")
-        columns = dict(zip(names, zip(*self._rows, strict=True), strict=True)) if self._rows else dict.fromkeys(names, ())
+        columns = (
+            dict(zip(names, zip(*self._rows, strict=True), strict=True)) if self._rows else dict.fromkeys(names, ())
+        )
         inputs, over = self.estimate.size, ("cycle", "input")
         said = ("optimum by the guide", "feed-forward in force", "trim, estimate less feed-forward")
         labels = dict(zip(_TABLES, (*said, "estimate of the optimum", "applied input"), strict=True))
@@ -297,7 +304,9 @@ class FeedForward(_core.guide.FeedForward):
 
     def __repr__(self) -> str:
         at = np.array2string(self.estimate, precision=6)
-        return f"<FeedForward of {self._made_of[0].__name__}, cycle {self.cycle}, estimate {at}, trust {self.trust:.2f}>"
+        return (
+            f"<FeedForward of {self._made_of[0].__name__}, cycle {self.cycle}, estimate {at}, trust {self.trust:.2f}>"
+        )
 
     def _repr_html_(self) -> str:
         now = {"cycle": self.cycle, "estimate": self.estimate, "feed_forward": self.feed_forward, "trim": self.trim}

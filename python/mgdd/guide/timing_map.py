@@ -114,7 +114,12 @@ class TimingMap(_core.guide.TimingMap, Parameters):
 
     @classmethod
     def of_guide(
-        cls, guide: Callable[[Any], Any], points: Mapping[str, ArrayLike], *, make: Callable[..., Any], **settings: float
+        cls,
+        guide: Callable[[Any], Any],
+        points: Mapping[str, ArrayLike],
+        *,
+        make: Callable[..., Any],
+        **settings: float,
     ) -> Self:
         """Fill a map with what another guide says.
 

@@ -192,6 +192,72 @@ TEST(FeedForward, TurnsDownAGuideThatGoesTheWrongWay) {
   EXPECT_LT(std::abs(applied[1] - applied[0]), 0.6 * 6.5);
 }
 
+TEST(FeedForward, AGuideThatWasTurnedDownEarnsItsTrustBack) {
+  FeedForward<ExtremumSeeking> seeker = guided();
+  seeker.offer(at(-4.2), GuideCause::new_point);
+  run(seeker, -4.2, 300, 0.25);
+  seeker.offer(at(2.3), GuideCause::new_point);
+  run(seeker, -10.7, 300, 0.25);
+  const double turned_down = seeker.path().trust().value();
+  ASSERT_LT(turned_down, 0.1);
+  for (int k = 0; k < 12; ++k) {  // from now on it is right about every move
+    const double optimum = k % 2 == 0 ? -4.2 : -10.7;
+    seeker.offer(at(k % 2 == 0 ? 8.8 : 2.3), GuideCause::new_point);
+    run(seeker, optimum, 150, 0.25);
+    EXPECT_NEAR(seeker.estimate()[0], optimum, 3.0);
+  }
+  EXPECT_GT(seeker.path().trust().value(), 0.7);
+}
+
+// Back at the first point before the guide was judged: nothing has been moved, so nothing is left over.
+TEST(FeedForward, ANewPointDuringATestLeavesNothingBehind) {
+  for (const int cycles : {0, 1}) {
+    FeedForward<ExtremumSeeking> seeker = guided();
+    seeker.offer(at(-4.2), GuideCause::new_point);
+    run(seeker, -4.2, 100, 0.25);
+    const double estimate = seeker.estimate()[0];
+    seeker.offer(at(-10.7), GuideCause::new_point);
+    run(seeker, -10.7, cycles, 0.25);
+    EXPECT_TRUE(seeker.path().testing());
+    seeker.offer(at(-4.2), GuideCause::new_point);
+    EXPECT_FALSE(seeker.path().testing());
+    EXPECT_NEAR(seeker.estimate()[0], estimate, 1e-12);
+    EXPECT_NEAR(seeker.path().feed_forward()[0], -4.2, 1e-12);
+    seeker.offer(at(-10.7), GuideCause::new_point);
+    seeker.offer(at(-13.0), GuideCause::new_point);  // on to a third point: the whole way from the first one
+    run(seeker, -13.0, 2);
+    EXPECT_NEAR(seeker.estimate()[0], estimate - 8.8, 0.6);
+  }
+}
+
+TEST(FeedForward, OneWildReadingDoesNotOverthrowAGuide) {
+  for (const double wild : {-50.0, 50.0}) {
+    FeedForward<ExtremumSeeking> seeker = guided();
+    seeker.offer(at(-4.2), GuideCause::new_point);
+    seeker.offer(at(-10.7), GuideCause::new_point);
+    run(seeker, -10.7, 1);
+    const double j[] = {quadratic(seeker.ask()[0] + 10.7) + wild};
+    seeker.tell({j, {}, false});
+    EXPECT_GT(seeker.path().trust().value(), 0.7) << wild;
+  }
+}
+
+TEST(FeedForward, HoldsAtAPointThatTheGuideDoesNotKnow) {
+  FeedForward<ExtremumSeeking> seeker = guided();
+  seeker.offer(at(-4.2), GuideCause::new_point);
+  run(seeker, -4.2, 47);
+  const double estimate = seeker.estimate()[0];
+  seeker.hold();
+  EXPECT_EQ(seeker.estimate()[0], estimate);
+  EXPECT_EQ(seeker.path().trust().value(), 1.0);
+  EXPECT_EQ(save_state(seeker.seeker()).at("seen")[0], 0.0);
+  run(seeker, -7.0, 30);
+  const double learnt = seeker.estimate()[0];
+  seeker.offer(at(-10.7), GuideCause::calibration);  // known again: a step from the last point that it knew
+  EXPECT_TRUE(seeker.path().testing());
+  EXPECT_NEAR(seeker.estimate()[0], learnt, 1e-12);
+}
+
 TEST(FeedForward, AMoveThatBreaksALimitIsNotTaken) {
   ExtremumSeekingSettings s = plain_seeking(-4.0);
   s.limits = {{"p_max_bar", 150.0}};
