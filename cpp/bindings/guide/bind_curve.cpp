@@ -15,7 +15,8 @@ using namespace guide;
 constexpr double inf = std::numeric_limits<double>::infinity();
 
 void bind_one_curve(py::module_& m) {
-  py::class_<Curve>(m, "Curve", R"(What a model says of one quantity over one input: a smooth curve through given points.
+  py::class_<Curve>(m, "Curve",
+                    R"(What a model says of one quantity over one input: a smooth curve through given points.
 
 Between the points runs a cubic, beyond them a straight line.
 
@@ -60,7 +61,8 @@ Examples
            [](const Curve& c, const py::object& other) {
              return py::isinstance<Curve>(other) && c == other.cast<const Curve&>();
            })
-      .def_property_readonly("_table", [](const Curve& c) { return save_state(c); }, "What a file keeps of it.")
+      .def_property_readonly(
+          "_table", [](const Curve& c) { return save_state(c); }, "What a file keeps of it.")
       .def_static(
           "_of_table",
           [](const StateColumns& table) {

@@ -1,4 +1,5 @@
 // Binds guide/model_optimum.hpp: the best timing of the cycle model in bounded time.
+#include <optional>
 #include <string>
 #include <utility>
 
@@ -67,6 +68,13 @@ void bind_model_optimum(py::module_& m) {
         return out;
       },
       arg("point"), "The search at one operating point.");
+  cls.def(
+      "_curve",
+      [](Bound& b, const engine::OperatingPoint& point) {
+        guide::Curve out;
+        return b.use()->tabulate(point, out) ? std::optional(out) : std::nullopt;
+      },
+      arg("point"), "J over SOC at one operating point; None where there is no such cycle.");
   cls.def(
       "_set_cylinder", [](Bound& b, const engine::Cylinder& cylinder) { b.use()->set_cylinder(cylinder); },
       arg("cylinder"), "Other parameters of the same geometry.");

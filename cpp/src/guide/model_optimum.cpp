@@ -16,11 +16,12 @@ constexpr std::array<std::pair<OptimumMethod, std::string_view>, 2> method_names
     {OptimumMethod::golden_section, "golden_section"},
 }};
 
-constexpr double scan_cad = 5.0;                // guards against flat regions and edges
-constexpr int golden_evaluations = 20;          // from 10 CAD to 0.002
-constexpr double golden = 0.38196601125010515;  // (3 - sqrt 5)/2
-constexpr double secant_cad = 3.0;              // of the curvature
-constexpr double worth = 1e-9;                  // of J: an ascent may end that much below the scan
+constexpr double scan_cad = 5.0;                        // guards against flat regions and edges
+constexpr int golden_evaluations = 20;                  // from 10 CAD to 0.002
+constexpr double golden = 0.38196601125010515;          // (3 - sqrt 5)/2
+constexpr double secant_cad = 3.0;                      // of the curvature
+constexpr double before_cad = 15.0, behind_cad = 10.0;  // of the bounds: how far a curve goes on
+constexpr double worth = 1e-9;                          // of J: an ascent may end that much below the scan
 
 ModelOptimumSettings checked(ModelOptimumSettings s) {
   validate(s);
@@ -36,6 +37,18 @@ optimize::GradientDescent ascent_of(const ModelOptimumSettings& s) {
   g.tolerance = s.tolerance_cad;
   g.iterations = s.iterations;
   return optimize::GradientDescent(std::move(g));
+}
+
+// Of a curve: a degree apart, from before the bounds to behind them as far as the valves are closed.
+std::vector<double> timings_of(const ModelOptimumSettings& s) {
+  const auto& geometry = s.cylinder.geometry;
+  const double first = std::max({s.lower_cad - before_cad, engine::timing_lower_cad, geometry.ivc_cad});
+  const double last = std::min({s.upper_cad + behind_cad, engine::timing_upper_cad, geometry.evo_cad - 1.0});
+  const auto steps = static_cast<std::size_t>(std::ceil(last - first));
+  std::vector<double> out;
+  for (std::size_t k = 0; k <= steps; ++k)
+    out.push_back(first + (last - first) * static_cast<double>(k) / static_cast<double>(steps));
+  return out;
 }
 
 bool inside_domains(const engine::OperatingPoint& point) noexcept {
@@ -77,7 +90,11 @@ ModelOptimum::ModelOptimum(ModelOptimumSettings settings)
     : settings_(checked(std::move(settings))),
       model_(settings_.cylinder, engine::crank_grid(settings_.cylinder, settings_.step_cad), settings_.integrator),
       work_(model_.make_workspace()),
-      ascent_(ascent_of(settings_)) {}
+      ascent_(ascent_of(settings_)),
+      timings_(timings_of(settings_)),
+      values_(timings_.size(), 0.0) {
+  indicator_values_.fill(values_);
+}
 
 void ModelOptimum::set_cylinder(const engine::Cylinder& cylinder) {
   engine::validate(cylinder);
@@ -89,9 +106,14 @@ void ModelOptimum::set_cylinder(const engine::Cylinder& cylinder) {
 }
 
 double ModelOptimum::performance_at(double soc_cad) noexcept {
+  engine::Indicators<double> cycle;
+  return performance_at(soc_cad, cycle);
+}
+
+double ModelOptimum::performance_at(double soc_cad, engine::Indicators<double>& cycle) noexcept {
   model_.run(charge_, soc_cad, work_);
   if (model_.first_unphysical(work_) < model_.angles_cad().size()) return -optimize::unlimited;
-  const engine::Indicators<double> cycle = model_.indicators(charge_, soc_cad, work_);
+  cycle = model_.indicators(charge_, soc_cad, work_);
   const double j = settings_.performance.value(engine::signals_of(cycle, settings_.nox.ppm(cycle.t_max_k)));
   return std::isfinite(j) ? j : -optimize::unlimited;
 }
@@ -176,6 +198,29 @@ void ModelOptimum::divide(double lower_cad, double upper_cad, ModelOptimumResult
     out.j = j;
   }
   out.method = OptimumMethod::golden_section;
+}
+
+bool ModelOptimum::tabulate(const engine::OperatingPoint& point, Curve& j,
+                            std::span<double engine::Indicators<double>::* const> indicators,
+                            std::span<Curve> curves) noexcept {
+  if (!inside_domains(point) || indicators.size() > max_curves || curves.size() != indicators.size()) return false;
+  charge_ = model_.charge(point);
+  for (std::size_t k = 0; k < timings_.size(); ++k) {
+    engine::Indicators<double> cycle;
+    values_[k] = performance_at(timings_[k], cycle);
+    if (!std::isfinite(values_[k])) return false;
+    for (std::size_t i = 0; i < indicators.size(); ++i)
+      indicator_values_[i][k] = cycle.*indicators[i];
+  }
+  Curve drawn;
+  std::array<Curve, max_curves> own;
+  bool usable = drawn.put(timings_, values_);
+  for (std::size_t i = 0; i < indicators.size(); ++i)
+    usable = usable && own[i].put(timings_, indicator_values_[i]);
+  if (!usable) return false;
+  j = drawn;
+  std::copy(own.begin(), own.begin() + static_cast<std::ptrdiff_t>(curves.size()), curves.begin());
+  return true;
 }
 
 GuideValue guide_value(const ModelOptimumResult& found) noexcept {

@@ -9,171 +9,6 @@ import numpy
 import numpy.typing
 import typing
 __all__: list[str] = ['Curve', 'CurveSeeking', 'FeedForward', 'ModelOptimum', 'TimingMap']
-class FeedForward:
-    """
-    A seeker with feed-forward; see mgdd.guide.FeedForward.
-    """
-    def __init__(self, seeker: typing.Any, *, calibration_rate: typing.Any, trust: typing.SupportsFloat | typing.SupportsIndex, probe_cycles: typing.SupportsInt | typing.SupportsIndex, probe_settling: typing.SupportsInt | typing.SupportsIndex, trust_sd: typing.SupportsFloat | typing.SupportsIndex, doubt: typing.SupportsFloat | typing.SupportsIndex, curvature_spread: typing.SupportsFloat | typing.SupportsIndex, significance: typing.SupportsFloat | typing.SupportsIndex, noise_sd: typing.SupportsFloat | typing.SupportsIndex | None) -> None:
-        ...
-    def _hold(self) -> None:
-        """
-        A new operating point of which the guide says nothing.
-        """
-    def _offer(self, optimum: collections.abc.Sequence[typing.SupportsFloat | typing.SupportsIndex], curvature: collections.abc.Sequence[typing.SupportsFloat | typing.SupportsIndex], cause: str) -> bool:
-        """
-        What the guide says; False where it cannot be used.
-        """
-    def _set_seeker_history(self, columns: collections.abc.Mapping[str, typing.Annotated[numpy.typing.ArrayLike, numpy.float64]]) -> None:
-        """
-        History of the seeker, as its _history_columns gave it.
-        """
-    def ask(self) -> numpy.typing.NDArray[numpy.float64]:
-        """
-        The input to apply in this cycle, shape (inputs,). Asking again before tell gives the same.
-        """
-    def restart(self) -> None:
-        """
-        The operating point has changed: forget the window, keep the estimate.
-        """
-    def tell(self, J: typing.Any = None, limits: typing.Any = None, *, misfire: bool = False, applied: typing.Any = None) -> None:
-        """
-        Accept what was measured at the input of the last ask.
-        
-        J: float, or one number per component; limits: one value per limit, in order or by name;
-        misfire: the cycle is counted and its J and limits are not read;
-        applied: what the plant really applied, one number per input; None where it is what was asked for.
-        Raises ParameterError (tell without ask), ShapeError (wrong count), DataError (not finite, or beyond
-        1e30 in magnitude); the state is unchanged then.
-        """
-    @property
-    def _core_state(self) -> dict[str, list[float]]:
-        """
-        State of the feed-forward and of its seeker.
-        """
-    @_core_state.setter
-    def _core_state(self, arg1: collections.abc.Mapping[str, collections.abc.Sequence[typing.SupportsFloat | typing.SupportsIndex]]) -> None:
-        ...
-    @property
-    def _seeker_history(self) -> dict:
-        """
-        History of the seeker, as its _history_columns.
-        """
-    @property
-    def _seeker_state(self) -> dict[str, list[float]]:
-        """
-        State of the seeker.
-        """
-    @property
-    def applied(self) -> numpy.typing.NDArray[numpy.float64]:
-        """
-        The input of the last ask, shape (inputs,).
-        """
-    @property
-    def component_count(self) -> int:
-        """
-        Components of J that tell takes.
-        """
-    @property
-    def cycle(self) -> int:
-        """
-        Cycles told so far, misfires included.
-        """
-    @property
-    def estimate(self) -> numpy.typing.NDArray[numpy.float64]:
-        """
-        Present estimate of the optimum, shape (inputs,).
-        """
-    @property
-    def feed_forward(self) -> numpy.typing.NDArray[numpy.float64]:
-        """
-        Feed-forward in force, shape (inputs,); NaN before there is one.
-        """
-    @property
-    def guide_optimum(self) -> numpy.typing.NDArray[numpy.float64]:
-        """
-        Last valid optimum of the guide, shape (inputs,); NaN before there is one.
-        """
-    @property
-    def limit_names(self) -> list[str]:
-        """
-        Names of the limits, in the order of tell.
-        """
-    @property
-    def misfires(self) -> int:
-        """
-        Misfired cycles told so far.
-        """
-    @property
-    def noise_sd(self) -> float:
-        """
-        Standard deviation of one reading of J, as given or learnt; NaN while it is not known.
-        """
-    @property
-    def testing(self) -> int:
-        """
-        1: the next cycle measures the old place, 2: the new one, 0: no test of the guide is under way.
-        """
-    @property
-    def trim(self) -> numpy.typing.NDArray[numpy.float64]:
-        """
-        Estimate less feed-forward, what the seeker has learnt itself, shape (inputs,); NaN without a guide.
-        """
-    @property
-    def trust(self) -> float:
-        """
-        Trust in the guide, 0 to 1: share of its next move that is made.
-        """
-    @property
-    def verdict(self) -> str:
-        """
-        What the last test of the guide said: ``untested``, ``undecided``, ``confirmed`` or ``wrong``.
-        """
-class ModelOptimum:
-    """
-    Best timing of the cycle model; see mgdd.guide.ModelOptimum.
-    """
-    def __init__(self, cylinder: mgdd._core.engine.Cylinder, *, performance: mgdd._core.engine.Performance, nox: mgdd._core.engine.NoxModel, method: str, bounds_cad: tuple[typing.SupportsFloat | typing.SupportsIndex, typing.SupportsFloat | typing.SupportsIndex], step_size: typing.SupportsFloat | typing.SupportsIndex, difference_cad: typing.SupportsFloat | typing.SupportsIndex, tolerance_cad: typing.SupportsFloat | typing.SupportsIndex, iterations: typing.SupportsInt | typing.SupportsIndex, step_cad: typing.SupportsFloat | typing.SupportsIndex, integrator: str) -> None:
-        ...
-    def _find(self, point: mgdd._core.engine.OperatingPoint) -> dict:
-        """
-        The search at one operating point.
-        """
-    def _set_cylinder(self, cylinder: mgdd._core.engine.Cylinder) -> None:
-        """
-        Other parameters of the same geometry.
-        """
-    @property
-    def cylinder(self) -> mgdd._core.engine.Cylinder:
-        """
-        The model at present.
-        """
-    @property
-    def settings(self) -> dict:
-        """
-        Keyword arguments that, with `cylinder`, make this guide again.
-        """
-class TimingMap:
-    """
-    A map of the best timing; see mgdd.guide.TimingMap.
-    """
-    def __init__(self, *, axes: collections.abc.Sequence[collections.abc.Sequence[typing.SupportsFloat | typing.SupportsIndex]], values_cad: collections.abc.Sequence[typing.SupportsFloat | typing.SupportsIndex], prior_sd_cad: typing.SupportsFloat | typing.SupportsIndex, forgetting: typing.SupportsFloat | typing.SupportsIndex) -> None:
-        ...
-    def _learn(self, point: collections.abc.Sequence[typing.SupportsFloat | typing.SupportsIndex], value_cad: typing.SupportsFloat | typing.SupportsIndex, sd_cad: typing.SupportsFloat | typing.SupportsIndex) -> bool:
-        """
-        One confirmed optimum; False where it was not taken.
-        """
-    def _lookup(self, point: collections.abc.Sequence[typing.SupportsFloat | typing.SupportsIndex]) -> tuple[float, float, float, bool]:
-        """
-        Value, its standard deviation, support, and whether it is held outside of the axes.
-        """
-    @property
-    def _columns(self) -> dict[str, list[float]]:
-        """
-        Values, variances and support of all cells.
-        """
-    @_columns.setter
-    def _columns(self, arg1: collections.abc.Mapping[str, collections.abc.Sequence[typing.SupportsFloat | typing.SupportsIndex]]) -> None:
-        ...
 class Curve:
     """
     What a model says of one quantity over one input: a smooth curve through given points.
@@ -364,3 +199,172 @@ class CurveSeeking:
         """
         Between 0 and 1: how much of what the curve leaves unexplained is noise; 0 after a hand-over.
         """
+class FeedForward:
+    """
+    A seeker with feed-forward; see mgdd.guide.FeedForward.
+    """
+    def __init__(self, seeker: typing.Any, *, calibration_rate: typing.Any, trust: typing.SupportsFloat | typing.SupportsIndex, probe_cycles: typing.SupportsInt | typing.SupportsIndex, probe_settling: typing.SupportsInt | typing.SupportsIndex, trust_sd: typing.SupportsFloat | typing.SupportsIndex, doubt: typing.SupportsFloat | typing.SupportsIndex, curvature_spread: typing.SupportsFloat | typing.SupportsIndex, significance: typing.SupportsFloat | typing.SupportsIndex, noise_sd: typing.SupportsFloat | typing.SupportsIndex | None) -> None:
+        ...
+    def _hold(self) -> None:
+        """
+        A new operating point of which the guide says nothing.
+        """
+    def _offer(self, optimum: collections.abc.Sequence[typing.SupportsFloat | typing.SupportsIndex], curvature: collections.abc.Sequence[typing.SupportsFloat | typing.SupportsIndex], cause: str) -> bool:
+        """
+        What the guide says; False where it cannot be used.
+        """
+    def _set_seeker_history(self, columns: collections.abc.Mapping[str, typing.Annotated[numpy.typing.ArrayLike, numpy.float64]]) -> None:
+        """
+        History of the seeker, as its _history_columns gave it.
+        """
+    def ask(self) -> numpy.typing.NDArray[numpy.float64]:
+        """
+        The input to apply in this cycle, shape (inputs,). Asking again before tell gives the same.
+        """
+    def restart(self) -> None:
+        """
+        The operating point has changed: forget the window, keep the estimate.
+        """
+    def tell(self, J: typing.Any = None, limits: typing.Any = None, *, misfire: bool = False, applied: typing.Any = None) -> None:
+        """
+        Accept what was measured at the input of the last ask.
+        
+        J: float, or one number per component; limits: one value per limit, in order or by name;
+        misfire: the cycle is counted and its J and limits are not read;
+        applied: what the plant really applied, one number per input; None where it is what was asked for.
+        Raises ParameterError (tell without ask), ShapeError (wrong count), DataError (not finite, or beyond
+        1e30 in magnitude); the state is unchanged then.
+        """
+    @property
+    def _core_state(self) -> dict[str, list[float]]:
+        """
+        State of the feed-forward and of its seeker.
+        """
+    @_core_state.setter
+    def _core_state(self, arg1: collections.abc.Mapping[str, collections.abc.Sequence[typing.SupportsFloat | typing.SupportsIndex]]) -> None:
+        ...
+    @property
+    def _seeker_history(self) -> dict:
+        """
+        History of the seeker, as its _history_columns.
+        """
+    @property
+    def _seeker_state(self) -> dict[str, list[float]]:
+        """
+        State of the seeker.
+        """
+    @property
+    def applied(self) -> numpy.typing.NDArray[numpy.float64]:
+        """
+        The input of the last ask, shape (inputs,).
+        """
+    @property
+    def component_count(self) -> int:
+        """
+        Components of J that tell takes.
+        """
+    @property
+    def cycle(self) -> int:
+        """
+        Cycles told so far, misfires included.
+        """
+    @property
+    def estimate(self) -> numpy.typing.NDArray[numpy.float64]:
+        """
+        Present estimate of the optimum, shape (inputs,).
+        """
+    @property
+    def feed_forward(self) -> numpy.typing.NDArray[numpy.float64]:
+        """
+        Feed-forward in force, shape (inputs,); NaN before there is one.
+        """
+    @property
+    def guide_optimum(self) -> numpy.typing.NDArray[numpy.float64]:
+        """
+        Last valid optimum of the guide, shape (inputs,); NaN before there is one.
+        """
+    @property
+    def limit_names(self) -> list[str]:
+        """
+        Names of the limits, in the order of tell.
+        """
+    @property
+    def misfires(self) -> int:
+        """
+        Misfired cycles told so far.
+        """
+    @property
+    def noise_sd(self) -> float:
+        """
+        Standard deviation of one reading of J, as given or learnt; NaN while it is not known.
+        """
+    @property
+    def testing(self) -> int:
+        """
+        1: the next cycle measures the old place, 2: the new one, 0: no test of the guide is under way.
+        """
+    @property
+    def trim(self) -> numpy.typing.NDArray[numpy.float64]:
+        """
+        Estimate less feed-forward, what the seeker has learnt itself, shape (inputs,); NaN without a guide.
+        """
+    @property
+    def trust(self) -> float:
+        """
+        Trust in the guide, 0 to 1: share of its next move that is made.
+        """
+    @property
+    def verdict(self) -> str:
+        """
+        What the last test of the guide said: ``untested``, ``undecided``, ``confirmed`` or ``wrong``.
+        """
+class ModelOptimum:
+    """
+    Best timing of the cycle model; see mgdd.guide.ModelOptimum.
+    """
+    def __init__(self, cylinder: mgdd._core.engine.Cylinder, *, performance: mgdd._core.engine.Performance, nox: mgdd._core.engine.NoxModel, method: str, bounds_cad: tuple[typing.SupportsFloat | typing.SupportsIndex, typing.SupportsFloat | typing.SupportsIndex], step_size: typing.SupportsFloat | typing.SupportsIndex, difference_cad: typing.SupportsFloat | typing.SupportsIndex, tolerance_cad: typing.SupportsFloat | typing.SupportsIndex, iterations: typing.SupportsInt | typing.SupportsIndex, step_cad: typing.SupportsFloat | typing.SupportsIndex, integrator: str) -> None:
+        ...
+    def _curve(self, point: mgdd._core.engine.OperatingPoint) -> Curve | None:
+        """
+        J over SOC at one operating point; None where there is no such cycle.
+        """
+    def _find(self, point: mgdd._core.engine.OperatingPoint) -> dict:
+        """
+        The search at one operating point.
+        """
+    def _set_cylinder(self, cylinder: mgdd._core.engine.Cylinder) -> None:
+        """
+        Other parameters of the same geometry.
+        """
+    @property
+    def cylinder(self) -> mgdd._core.engine.Cylinder:
+        """
+        The model at present.
+        """
+    @property
+    def settings(self) -> dict:
+        """
+        Keyword arguments that, with `cylinder`, make this guide again.
+        """
+class TimingMap:
+    """
+    A map of the best timing; see mgdd.guide.TimingMap.
+    """
+    def __init__(self, *, axes: collections.abc.Sequence[collections.abc.Sequence[typing.SupportsFloat | typing.SupportsIndex]], values_cad: collections.abc.Sequence[typing.SupportsFloat | typing.SupportsIndex], prior_sd_cad: typing.SupportsFloat | typing.SupportsIndex, forgetting: typing.SupportsFloat | typing.SupportsIndex) -> None:
+        ...
+    def _learn(self, point: collections.abc.Sequence[typing.SupportsFloat | typing.SupportsIndex], value_cad: typing.SupportsFloat | typing.SupportsIndex, sd_cad: typing.SupportsFloat | typing.SupportsIndex) -> bool:
+        """
+        One confirmed optimum; False where it was not taken.
+        """
+    def _lookup(self, point: collections.abc.Sequence[typing.SupportsFloat | typing.SupportsIndex]) -> tuple[float, float, float, bool]:
+        """
+        Value, its standard deviation, support, and whether it is held outside of the axes.
+        """
+    @property
+    def _columns(self) -> dict[str, list[float]]:
+        """
+        Values, variances and support of all cells.
+        """
+    @_columns.setter
+    def _columns(self, arg1: collections.abc.Mapping[str, collections.abc.Sequence[typing.SupportsFloat | typing.SupportsIndex]]) -> None:
+        ...

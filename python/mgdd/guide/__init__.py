@@ -8,12 +8,11 @@ stands.
 
 Examples
 --------
->>> from mgdd.engine import Cylinder, OperatingPoint, timing_sweep
->>> from mgdd.guide import Curve, CurveSeeking
+>>> from mgdd.engine import Cylinder, OperatingPoint
+>>> from mgdd.guide import CurveSeeking, ModelOptimum
 >>> from mgdd.loop import EngineBench
->>> # twice the wall heat of the bench
->>> rough = timing_sweep(Cylinder(wall_heat_scale=1.0), OperatingPoint(), soc_cad=range(-45, 21))
->>> curve = Curve(rough["soc_cad"], 100.0 * rough["efficiency_gross"])
+>>> rough = ModelOptimum(Cylinder(wall_heat_scale=1.0))  # twice the wall heat of the bench
+>>> curve = rough.curve(OperatingPoint())
 >>> seeker = CurveSeeking(start=curve.best, lower=-30.0, upper=10.0, curve=curve)
 >>> bench = EngineBench(seed=3)
 >>> for _ in range(40):

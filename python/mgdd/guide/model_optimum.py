@@ -7,6 +7,7 @@ from typing import Any
 
 from mgdd import _core
 from mgdd._core.engine import Cylinder, NoxModel, OperatingPoint, Performance
+from mgdd._core.guide import Curve
 from mgdd.errors import ParameterError
 from mgdd.optimize import Optimum
 from mgdd.results.describe import as_html, core_rows
@@ -135,6 +136,38 @@ class ModelOptimum(_core.guide.ModelOptimum):
             self._known.pop(next(iter(self._known)))
         self._known[point] = best
         return best
+
+    def curve(self, point: OperatingPoint) -> Curve | None:
+        """Draw J over the start of combustion, for `CurveSeeking`.
+
+        Parameters
+        ----------
+        point : OperatingPoint
+            Where.
+
+        Returns
+        -------
+        Curve or None
+            J over SOC [°CA aTDC], from 15 °CA before the bounds to 10 °CA behind them as far as the bench goes; None
+            where the model has no such cycle, as of a motored point.
+
+        Raises
+        ------
+        mgdd.errors.ParameterError
+            Not an operating point.
+
+        Examples
+        --------
+        >>> from mgdd.engine import Cylinder, OperatingPoint
+        >>> from mgdd.guide import ModelOptimum
+        >>> curve = ModelOptimum(Cylinder()).curve(OperatingPoint())
+        >>> round(curve.best, 1), round(curve.top - curve(-20.0), 1)
+        (-5.6, 5.7)
+        """
+        if not isinstance(point, OperatingPoint):
+            raise ParameterError.of("point", point, "an OperatingPoint")
+        drawn: Curve | None = self._curve(point)
+        return drawn
 
     def calibrate(self, cylinder: Cylinder) -> None:
         """Go on with other parameters of the same cylinder, as a calibration finds them.

@@ -5,12 +5,17 @@
 // `find` is noexcept and allocation-free: at most 9 + 2 iterations + 20 + 2 cycles on the default bounds.
 #pragma once
 
+#include <array>
+#include <cstddef>
 #include <cstdint>
+#include <span>
 #include <string_view>
+#include <vector>
 
 #include "mgdd/engine/cycle.hpp"
 #include "mgdd/engine/emissions.hpp"
 #include "mgdd/engine/performance.hpp"
+#include "mgdd/guide/curve.hpp"
 #include "mgdd/guide/guide_path.hpp"
 #include "mgdd/optimize/seekers/gradient_descent.hpp"
 
@@ -47,10 +52,18 @@ struct ModelOptimumResult {
 
 class ModelOptimum {
  public:
+  static constexpr std::size_t max_curves = 8;
+
   /// ParameterError naming the field.
   explicit ModelOptimum(ModelOptimumSettings settings);
 
   ModelOptimumResult find(const engine::OperatingPoint& point) noexcept;
+
+  /// J of the model over SOC at an operating point, from 15 CAD before the bounds to 10 after them, and the named
+  /// indicators where asked for. False, and nothing written, where `find` would find nothing. About 66 cycles.
+  bool tabulate(const engine::OperatingPoint& point, Curve& j) noexcept { return tabulate(point, j, {}, {}); }
+  bool tabulate(const engine::OperatingPoint& point, Curve& j,
+                std::span<double engine::Indicators<double>::* const> indicators, std::span<Curve> curves) noexcept;
 
   /// The same model with other parameters, as a calibration finds them; geometry and grid stay. ParameterError for a
   /// cylinder that is none, and nothing has changed then.
@@ -60,6 +73,7 @@ class ModelOptimum {
 
  private:
   double performance_at(double soc_cad) noexcept;  // -infinity where there is no such cycle
+  double performance_at(double soc_cad, engine::Indicators<double>& cycle) noexcept;
   bool climb(double start_cad, double room_cad, ModelOptimumResult& out) noexcept;
   void divide(double lower_cad, double upper_cad, ModelOptimumResult& out) noexcept;
 
@@ -68,6 +82,8 @@ class ModelOptimum {
   engine::CycleWorkspace<double> work_;
   optimize::GradientDescent ascent_;
   engine::Charge<double> charge_{};
+  std::vector<double> timings_, values_;  // of a curve
+  std::array<std::vector<double>, max_curves> indicator_values_;
 };
 
 /// What a feed-forward takes: the timing as the one input, with its curvature where that is known.
