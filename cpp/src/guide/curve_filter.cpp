@@ -62,6 +62,14 @@ void CurveFilter::restart(const Curve& curve, double mean, double sd) noexcept {
   judge();
 }
 
+void CurveFilter::believe(const Curve& curve, double sd) noexcept {
+  curve_ = curve;
+  bend_ = curve.curvature(curvature_reach * settings_.prior_sd);
+  prior_mean_ = curve.best();
+  prior_sd_ = sd;
+  judge();
+}
+
 double CurveFilter::guessed_variance() const noexcept {
   const double told = settings_.noise_sd;
   const double drop = 0.5 * bend_ * std::pow(curvature_reach * settings_.prior_sd, 2);

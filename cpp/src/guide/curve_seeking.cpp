@@ -220,9 +220,21 @@ void CurveSeeking::begin_at(double mean, double sd) noexcept {
   plain_at_work_ = false;
 }
 
+bool CurveSeeking::usable(const Curve& curve) const noexcept {
+  return curve.curvature(curvature_share * settings_.prior_sd) < 0.0 && curve.best() >= settings_.space.lower[0] &&
+         curve.best() <= settings_.space.upper[0];
+}
+
+bool CurveSeeking::believe(const Curve& curve, double sd) noexcept {
+  if (!usable(curve) || !(sd > 0.0)) return false;
+  settings_.curve = curve;
+  filter_.believe(curve, std::min(sd, settings_.prior_sd));
+  if (!plain_at_work_ && (filter_.readings() > 0.0 || protocol_.cycle == 0)) estimate_[0] = filter_.mean();
+  return true;
+}
+
 bool CurveSeeking::guide(const Curve& curve) noexcept {
-  const bool bends = curve.curvature(curvature_share * settings_.prior_sd) < 0.0;
-  if (!bends || !(curve.best() >= settings_.space.lower[0] && curve.best() <= settings_.space.upper[0])) {
+  if (!usable(curve)) {
     restart();
     return false;
   }

@@ -52,6 +52,8 @@ class CurveFilter {
 
   /// Keeps this share of what the readings said, and the last few in full; the sensor's lag and the prior stay.
   void forget(double kept) noexcept;
+  /// Another curve at the same operating point, T known to `sd` about its best input: the readings stand.
+  void believe(const Curve& curve, double sd) noexcept;
   /// Another curve or operating point: nothing of J's level is known, T is expected about `mean`.
   void restart(const Curve& curve, double mean, double sd) noexcept;
 

@@ -50,6 +50,10 @@ class CurveSeeking {
   /// the guide's is kept, with a doubt of a fifth of `prior_sd`. False where the curve does not bend down at its best
   /// input or that lies out of bounds: then the old one stays, as `restart` does.
   bool guide(const Curve& curve) noexcept;
+  /// Another curve at the same operating point, as a calibration of the guide draws it, whose best input is known to
+  /// `sd` (at most `prior_sd` counts): what the readings said stays, and they decide beside it. False as for `guide`;
+  /// nothing has changed then.
+  bool believe(const Curve& curve, double sd) noexcept;
   /// The operating point has changed and the guide says nothing of it.
   void restart() noexcept;
 
@@ -107,6 +111,7 @@ class CurveSeeking {
   void judge_surprise(double input, double j) noexcept;
   void take_over() noexcept;
   void begin_at(double mean, double sd) noexcept;
+  bool usable(const Curve& curve) const noexcept;
 
   CurveSeekingSettings settings_;
   CurveFilter filter_;
