@@ -128,6 +128,7 @@ void bind_pseudo_wiener(py::module_& m);
 void bind_cylinder_fit(py::module_& m);
 void bind_throttle_fit(py::module_& m);
 void bind_online(py::module_& m);
+void bind_online_calibration(py::module_& m);
 void bind_benchmark_models(py::module_& m);
 void bind_engine_bench(py::module_& m);
 void bind_loop(py::module_& m);

@@ -35,6 +35,7 @@ PYBIND11_MODULE(_core, m) {
       {"identify",
        "Fits of the cylinder and the throttle, update while running.",
        {&bind_cylinder_fit, &bind_throttle_fit, &bind_online}},
+      {"guide", "What a model tells a seeker, and how it learns while an engine runs.", {&bind_online_calibration}},
       {"systems", "Models of measured benchmarks.", {&bind_benchmark_models}},
       {"loop", "Virtual benches and the loops over them.", {&bind_engine_bench, &bind_loop, &bind_virtual_throttle}},
   };

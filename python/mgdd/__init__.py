@@ -1,9 +1,9 @@
 """Model-guided data-driven optimization and control for internal combustion engine systems.
 
 The modules: `mgdd.engine` (cycle model and trace analysis), `mgdd.throttle` (electronic throttle), `mgdd.identify`
-(calibration, throttle logs), `mgdd.optimize` (least squares, seekers, iterative learning), `mgdd.loop` (virtual bench,
-closed loops), `mgdd.rig` (test rigs), `mgdd.presets`, `mgdd.io`, `mgdd.datasets`, `mgdd.plot`, `mgdd.studies`,
-`mgdd.report`, `mgdd.results` and `mgdd.errors`. They are imported on use.
+(calibration, throttle logs), `mgdd.optimize` (least squares, seekers, iterative learning), `mgdd.guide` (calibration
+while an engine runs), `mgdd.loop` (virtual bench, closed loops), `mgdd.rig` (test rigs), `mgdd.presets`, `mgdd.io`,
+`mgdd.datasets`, `mgdd.plot`, `mgdd.studies`, `mgdd.report`, `mgdd.results` and `mgdd.errors`. They are imported on use.
 
 Crank angles are degrees everywhere, firing TDC = 0, compression negative (°CA aTDC).
 """
@@ -20,6 +20,7 @@ __all__ = [
     "datasets",
     "engine",
     "errors",
+    "guide",
     "identify",
     "io",
     "loop",

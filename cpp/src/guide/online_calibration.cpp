@@ -149,10 +149,12 @@ bool OnlineCalibration::take_mean() noexcept {
   if (has_mean_ && fresh < (recursive ? settings_.window.window_cycles : 1)) return true;
   taken_ = window_.accepted();
   mean_ = window_.mean(mean_bar_);
+  mean_.soc_sd_cad = std::hypot(mean_.soc_sd_cad, settings_.soc_scatter_cad);
   has_mean_ = true;
   if (recursive && has_block_) {
     earlier_.information = settings_.forgetting * (earlier_.information + block_.information);
     earlier_.pull = settings_.forgetting * (earlier_.pull + block_.pull);
+    let_timing_wander();
     const double usual = std::max(rms_bar_, unremarkable * highest_bar());
     if (settled_updates_ >= settled_after &&
         residual_power(x_, mean_, mean_bar_) > std::pow(settings_.jump_factor * usual, 2)) {
@@ -162,6 +164,18 @@ bool OnlineCalibration::take_mean() noexcept {
     }
   }
   return true;
+}
+
+// Two means of M cycles differ by sqrt(2/M) of the scatter: as much variance for the offset of the timing (matrix
+// inversion lemma), while the mean of the earlier data stays.
+void OnlineCalibration::let_timing_wander() noexcept {
+  constexpr int soc = Calibrated::soc_offset;
+  const double variance = 2.0 * std::pow(settings_.soc_scatter_cad, 2) / settings_.window.window_cycles;
+  if (!beforehand_.unknown[place(soc)] || !(variance > 0.0)) return;
+  const CalibrationVector column = earlier_.information.col(soc);
+  const double divisor = 1.0 / variance + column[soc];
+  earlier_.pull -= column * (earlier_.pull[soc] / divisor);
+  earlier_.information -= column * column.transpose() / divisor;
 }
 
 // What belongs to the old point is integrated out of the earlier data (Schur complement), with what was known of it.

@@ -29,19 +29,20 @@ std::string_view to_string(CalibrationMethod method) noexcept {
 CalibrationMethod parse_calibration_method(std::string_view name) {
   return parse_name<CalibrationMethod>(method_names, "method", name);
 }
-int parse_calibrated(std::string_view name) {
+int parse_calibrated(std::string_view field, std::string_view name) {
   std::string valid;
   for (int i = 0; i < n_calibrated; ++i) {
     if (info_of(i).field.name == name) return i;
     valid.append(valid.empty() ? "" : ", ").append(info_of(i).field.name);
   }
-  throw ParameterError("parameters", name, "must be one of " + valid);
+  throw ParameterError(field, name, "must be one of " + valid);
 }
 
 void validate(const OnlineCalibrationSettings& s) {
   engine::validate(s.cylinder);
   require_within("gamma", s.cylinder.gas.gamma, gamma_lower, gamma_upper);
   require_within("forgetting", s.forgetting, 0.0, 1.0);
+  require_within("soc_scatter_cad", s.soc_scatter_cad, 0.0, 5.0, "°CA");
   require_within("jump_factor", s.jump_factor, 1.5, 100.0);
   require_within("trials_per_update", s.trials_per_update, 1.0, 100.0);
   if (std::none_of(s.wanted.begin(), s.wanted.end(), [](bool w) { return w; })) {

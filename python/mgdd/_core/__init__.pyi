@@ -6,9 +6,10 @@ from . import optimize
 from . import engine
 from . import throttle
 from . import identify
+from . import guide
 from . import systems
 from . import loop
-__all__: list[str] = ['compiled_simd_level', 'compiler', 'engine', 'identify', 'loop', 'optimize', 'processor_simd_levels', 'systems', 'throttle']
+__all__: list[str] = ['compiled_simd_level', 'compiler', 'engine', 'guide', 'identify', 'loop', 'optimize', 'processor_simd_levels', 'systems', 'throttle']
 def compiled_simd_level() -> str:
     """
     Instruction set of this build.

@@ -140,9 +140,9 @@ TEST(OnlineCalibration, AModelOfAnotherShapeIsNotBelieved) {
 struct Coverage {
   double within_95 = 0.0, spread = 0.0;
 };
-// Errors over stated standard errors, 120 seeds; the sensor's own errors are drawn from what is known of them.
+// Errors over stated standard errors, 100 seeds; the sensor's own errors are drawn from what is known of them.
 Coverage coverage_of(CalibrationMethod method, double noise_bar, double correlation, int cycles) {
-  constexpr int seeds = 120;
+  constexpr int seeds = 100;
   Coverage out;
   for (std::uint64_t seed = 0; seed < seeds; ++seed) {
     const auto drawn = [&](std::uint64_t of) { return random::normal(seed, 77, of); };
@@ -184,7 +184,7 @@ TEST(OnlineCalibration, StandardErrorsHoldForWhiteNoise) {
   for (const CalibrationMethod method : {CalibrationMethod::gauss_newton, CalibrationMethod::recursive}) {
     for (const double noise : {0.1, 0.5}) {
       const Coverage c = coverage_of(method, noise, 0.0, 40);
-      EXPECT_GT(c.within_95, 0.89) << to_string(method) << " " << noise;  // 0.95 less three of 0.02
+      EXPECT_GT(c.within_95, 0.88) << to_string(method) << " " << noise;  // 0.95 less three of 0.022
       EXPECT_LT(c.spread, 1.2) << to_string(method) << " " << noise;
       EXPECT_GT(c.spread, 0.7) << to_string(method) << " " << noise;
     }
@@ -197,6 +197,34 @@ TEST(OnlineCalibration, StandardErrorsHoldForCorrelatedNoise) {
       const Coverage c = coverage_of(method, 0.3, correlation, 40);
       EXPECT_GT(c.within_95, 0.88) << to_string(method) << " " << correlation;
       EXPECT_LT(c.spread, 1.25) << to_string(method) << " " << correlation;
+    }
+  }
+}
+
+// The commanded timing is told, the true one scatters about it: no window's mean error is that of the next.
+TEST(OnlineCalibration, StandardErrorsHoldWhereTheTimingScatters) {
+  for (const CalibrationMethod method : {CalibrationMethod::gauss_newton, CalibrationMethod::recursive}) {
+    for (const double noise : {0.02, 0.2}) {
+      constexpr int seeds = 100;
+      double within = 0.0, spread = 0.0;
+      for (std::uint64_t seed = 0; seed < seeds; ++seed) {
+        loop::BenchSettings s = steady_bench(noise, seed);
+        s.soc_scatter_cad = 0.3;
+        loop::EngineBench bench(s);
+        OnlineCalibrationSettings g = wrong_guide(method, 0.7);
+        g.soc_scatter_cad = 0.3;
+        OnlineCalibration calibration(g);
+        for (int k = 0; k < 65; ++k) {
+          bench.step(-8.0);
+          calibration.offer(bench.pressure().pressure_bar, {}, -8.0);
+          calibration.update();
+        }
+        const double z = (calibration.parameters()[wall] - 0.5) / calibration.standard_errors()[wall];
+        within += std::abs(z) < 1.96 ? 1.0 / seeds : 0.0;
+        spread += z * z / seeds;
+      }
+      EXPECT_GT(within, 0.88) << to_string(method) << " " << noise;
+      EXPECT_LT(std::sqrt(spread), 1.2) << to_string(method) << " " << noise;
     }
   }
 }

@@ -24,11 +24,12 @@ inline loop::BenchSettings steady_bench(double noise_bar = 0.0, std::uint64_t se
   return s;
 }
 
-/// A guide with another wall heat.
+/// A guide with another wall heat, which takes the timing as told.
 inline guide::OnlineCalibrationSettings wrong_guide(guide::CalibrationMethod method, double wall_heat_scale = 1.0) {
   guide::OnlineCalibrationSettings s;
   s.cylinder.wall_heat.wall_heat_scale = wall_heat_scale;
   s.method = method;
+  s.soc_scatter_cad = 0.0;
   return s;
 }
 

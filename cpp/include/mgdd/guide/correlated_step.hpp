@@ -1,7 +1,7 @@
 // One Gauss-Newton step of a calibration, with what is known beforehand and with a residual whose samples are
 // correlated: n samples with autocorrelation time tau count as n / tau. The noise comes from the residual that the step
-// leaves. Minimises |r - A d|^2 / (tau sigma^2) + |x + d - start|^2 / known^2 + earlier data (Bard 1974,
-// normal prior). noexcept, allocation-free.
+// leaves. Minimises |r - A d|^2 / (tau sigma^2) + |x + d - start|^2 / known^2 + earlier data (normal prior: Bard 1974).
+// noexcept, allocation-free.
 #pragma once
 
 #include <array>

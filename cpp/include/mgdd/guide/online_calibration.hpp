@@ -120,6 +120,7 @@ class OnlineCalibration {
   bool newest_is_suspect() noexcept;
   bool take_mean() noexcept;  // false: the new mean contradicts what was learnt
   void forget_point() noexcept;
+  void let_timing_wander() noexcept;
   CalibrationStatus step() noexcept;
   CalibrationStatus seek() noexcept;
   /// Mean square of measured less predicted over the rows in use; negative where the model has no such cycle.

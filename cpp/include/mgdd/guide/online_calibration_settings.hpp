@@ -17,8 +17,8 @@ enum class CalibrationMethod { extremum_seeking, gauss_newton, recursive };
 std::string_view to_string(CalibrationMethod method) noexcept;
 CalibrationMethod parse_calibration_method(std::string_view name);
 
-/// Place of a parameter in a CalibrationVector; ParameterError that lists the names.
-int parse_calibrated(std::string_view name);
+/// Place of a parameter in a CalibrationVector; ParameterError of `field` that lists the names.
+int parse_calibrated(std::string_view field, std::string_view name);
 
 struct OnlineCalibrationSettings {
   engine::Cylinder cylinder{};
@@ -28,7 +28,10 @@ struct OnlineCalibrationSettings {
   /// Standard deviation of what is known of the others, >= 0; 0: exactly as the model has it.
   std::array<double, n_calibrated> uncertainty = default_uncertainty();
   CycleWindowSettings window{};
-  double forgetting = 0.9;    ///< recursive: weight of a window in the next one, in [0, 1]
+  double forgetting = 0.9;  ///< recursive: weight of a window in the next one, in [0, 1]
+  /// Scatter of the true start of combustion about the told one from cycle to cycle, in [0, 5]; 0 where it is measured.
+  /// It blurs the mean pressure, and what is left of it in one window does not belong to the next.
+  double soc_scatter_cad = 0.3;
   double jump_factor = 3.0;   ///< a cycle whose residual is so many times the usual one is not believed, in [1.5, 100]
   int trials_per_update = 5;  ///< extremum seeking, in [1, 100]
   double step_cad = engine::default_step_cad;
