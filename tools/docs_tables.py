@@ -14,11 +14,13 @@ import numpy as np
 
 from mgdd import datasets, engine, presets
 from mgdd.engine import Cylinder, OperatingPoint, analyze, simulate
+from mgdd.guide import OnlineCalibration
 from mgdd.identify import best_timing, wall_heat_profile
 from mgdd.identify.engine.burn_laws import compare_laws
 from mgdd.identify.engine.records import CylinderFit
 from mgdd.identify.engine.timing_records import BestTiming
 from mgdd.io import pressure_trace
+from mgdd.loop import EngineBench
 from mgdd.results.labels import ANGLE, VARIABLES
 from mgdd.studies import run_study
 
@@ -35,6 +37,7 @@ __all__ = [
     "integrators",
     "learning",
     "members",
+    "online_calibration",
     "optimum",
     "pegging",
     "profile",
@@ -296,6 +299,31 @@ def traces() -> Rows:
 
 def variables() -> Rows:
     return {f"`{name}` {label.units} {label.long_name}": [] for name, label in VARIABLES.items()}
+
+
+# --- calibration while the engine runs ----------------------------------------------------------------------
+def online_calibration() -> Rows:
+    alone = dict.fromkeys(OnlineCalibration("puma_single").parameters, 0.0)
+    rows = {}
+    for label, sensor, told_late_cad in (
+        ("nothing", {}, 0.0),
+        ("timing told 0.5 °CA late", {}, 0.5),
+        ("TDC read 0.5 °CA late", {"tdc_error_cad": 0.5}, 0.0),
+        ("pressure 1 % high", {"pressure_gain_error": 0.01}, 0.0),
+        ("pegging 0.1 bar high", {"pressure_offset_bar": 0.1}, 0.0),
+    ):
+        row: list[float] = []
+        for method, uncertainty in (("gauss_newton", alone), ("gauss_newton", None), ("recursive", None)):
+            bench = EngineBench(pressure_noise_bar=0.1, soc_scatter_cad=0.0, seed=2, **sensor)
+            settings = {"method": method, "uncertainty": uncertainty, "soc_scatter_cad": 0.0}
+            guide = OnlineCalibration(Cylinder(wall_heat_scale=1.0), **settings)
+            for _ in range(100):
+                bench.step(-6.0)
+                guide.offer(bench.pressure()[1], bench.point, -6.0 + told_late_cad)
+                guide.update()
+            row += [guide.parameters["wall_heat_scale"], guide.standard_errors["wall_heat_scale"]]
+        rows[label] = row
+    return rows
 
 
 # --- studies ------------------------------------------------------------------------------------------------

@@ -37,7 +37,8 @@ PYBIND11_MODULE(_core, m) {
        {&bind_cylinder_fit, &bind_throttle_fit, &bind_online}},
       {"guide",
        "Models that guide a seeker: feed-forward, curves, trust, maps.",
-       {&bind_curve, &bind_feed_forward, &bind_model_optimum, &bind_timing_map}},
+       {&bind_curve, &bind_feed_forward, &bind_model_optimum, &bind_timing_map, &bind_online_calibration,
+        &bind_guided_engine}},
       {"systems", "Models of measured benchmarks.", {&bind_benchmark_models}},
       {"loop", "Virtual benches and the loops over them.", {&bind_engine_bench, &bind_loop, &bind_virtual_throttle}},
   };

@@ -305,5 +305,6 @@ Indicators<T> CycleModel<T>::indicators(const Charge<T>& charge, const T& soc_ca
 
 template class CycleModel<double>;
 template class CycleModel<Dual<4>>;
+template class CycleModel<Dual<5>>;
 
 }  // namespace mgdd::engine

@@ -208,9 +208,9 @@ void CurveSeeking::take_over() noexcept {
 }
 
 // The filter begins anew with T about `mean`, and so does all that watches it.
-void CurveSeeking::begin_at(double mean, double sd) noexcept {
+void CurveSeeking::begin_at(const Curve& curve, double mean, double sd) noexcept {
   estimate_[0] = std::clamp(mean, settings_.space.lower[0], settings_.space.upper[0]);
-  filter_.restart(settings_.curve, mean, std::min(sd, settings_.prior_sd));
+  filter_.restart(curve, mean, std::min(sd, settings_.prior_sd));
   sent_count_ = 0;
   surprise_ = 1.0;
   since_doubt_ = 0;
@@ -227,7 +227,6 @@ bool CurveSeeking::usable(const Curve& curve) const noexcept {
 
 bool CurveSeeking::believe(const Curve& curve, double sd) noexcept {
   if (!usable(curve) || !(sd > 0.0)) return false;
-  settings_.curve = curve;
   filter_.believe(curve, std::min(sd, settings_.prior_sd));
   if (!plain_at_work_ && (filter_.readings() > 0.0 || protocol_.cycle == 0)) estimate_[0] = filter_.mean();
   return true;
@@ -239,19 +238,18 @@ bool CurveSeeking::guide(const Curve& curve) noexcept {
     return false;
   }
   const bool learnt = filter_.readings() > 0.0 || plain_at_work_;
-  const double error = learnt ? estimate_[0] - settings_.curve.best() : 0.0;
+  const double error = learnt ? estimate_[0] - filter_.curve().best() : 0.0;
   const double sd = learnt ? filter_.spread() : settings_.prior_sd;
-  settings_.curve = curve;
-  begin_at(curve.best() + error, std::hypot(sd, point_doubt_share * settings_.prior_sd));
+  begin_at(curve, curve.best() + error, std::hypot(sd, point_doubt_share * settings_.prior_sd));
   return true;
 }
 
 void CurveSeeking::restart() noexcept {
-  begin_at(estimate_[0], std::hypot(filter_.spread(), lost_share * settings_.prior_sd));
+  begin_at(filter_.curve(), estimate_[0], std::hypot(filter_.spread(), lost_share * settings_.prior_sd));
 }
 
 void CurveSeeking::shift_estimate(const Inputs& by) noexcept {
-  begin_at(estimate_[0] + by[0], std::hypot(filter_.spread(), point_doubt_share * settings_.prior_sd));
+  begin_at(filter_.curve(), estimate_[0] + by[0], std::hypot(filter_.spread(), point_doubt_share * settings_.prior_sd));
 }
 
 double CurveSeeking::trust() const noexcept {

@@ -101,6 +101,10 @@ void ModelOptimum::set_cylinder(const engine::Cylinder& cylinder) {
   if (!(cylinder.geometry == settings_.cylinder.geometry)) {
     throw ParameterError("geometry of the cylinder differs: make a ModelOptimum of it");
   }
+  put_cylinder(cylinder);
+}
+
+void ModelOptimum::put_cylinder(const engine::Cylinder& cylinder) noexcept {
   settings_.cylinder = cylinder;
   model_.set_cylinder(cylinder);
 }

@@ -4,7 +4,7 @@ A guide is any function of the operating point that says where the optimum shoul
 model, `TimingMap` a table, and a function of your own will do. `FeedForward` puts it in front of a seeker of
 `mgdd.optimize`, which learns only what is left; ``guide=None`` is the plain seeker. `CurveSeeking` takes the whole
 curve of a model, held by a `Curve`, which may stand in the wrong place, and finds from a few measurements where it
-stands.
+stands. `OnlineCalibration` adapts the model itself to the measured pressure.
 
 Examples
 --------
@@ -27,6 +27,7 @@ from mgdd._core.guide import Curve
 from mgdd.guide.curve_seeking import CurveSeeking
 from mgdd.guide.feed_forward import FeedForward
 from mgdd.guide.model_optimum import ModelOptimum
+from mgdd.guide.online_calibration import OnlineCalibration
 from mgdd.guide.timing_map import TimingMap
 
-__all__ = ["Curve", "CurveSeeking", "FeedForward", "ModelOptimum", "TimingMap"]
+__all__ = ["Curve", "CurveSeeking", "FeedForward", "ModelOptimum", "OnlineCalibration", "TimingMap"]

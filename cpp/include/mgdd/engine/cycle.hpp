@@ -116,5 +116,6 @@ class CycleModel {
 
 extern template class CycleModel<double>;
 extern template class CycleModel<Dual<4>>;
+extern template class CycleModel<Dual<5>>;
 
 }  // namespace mgdd::engine

@@ -12,6 +12,7 @@
 #include <cstdint>
 #include <string>
 
+#include "mgdd/common/state.hpp"
 #include "mgdd/guide/curve.hpp"
 
 namespace mgdd::guide {
@@ -66,10 +67,14 @@ class CurveFilter {
   double curvature() const noexcept;  ///< J'' of the curve as scaled, < 0
   double scale() const noexcept { return scale_; }
   double readings() const noexcept { return count_; }  ///< that count now
+  const Curve& curve() const noexcept { return curve_; }
   const CurveFilterSettings& settings() const noexcept { return settings_; }
 
   template <class Self, class V>
   static void visit(Self& self, V& v) {
+    Prefixed<V> curve{v, "curve."};
+    Curve::visit(self.curve_, curve);
+    v("filter_bend", self.bend_);
     v("filter_count", self.count_);
     v("filter_count_squared", self.count_squared_);
     v("filter_prior_mean", self.prior_mean_);

@@ -22,7 +22,7 @@ namespace mgdd::guide {
 
 struct CurveSeekingSettings {
   optimize::SearchSpace space;  ///< one input, finite bounds
-  Curve curve;                  ///< the guide's J, to be maximised; it must bend down at its best input
+  Curve curve;                  ///< the guide's J to begin with, to be maximised; it must bend down at its best input
   /// How far the plant's best input may lie from the guide's: one standard deviation, input unit; 0 = a quarter of the
   /// bounds.
   double prior_sd = 0.0;
@@ -68,6 +68,7 @@ class CurveSeeking {
   double trust() const noexcept;
   std::int64_t doubts() const noexcept { return doubts_; }
   bool handed_over() const noexcept { return plain_at_work_; }
+  const Curve& curve() const noexcept { return filter_.curve(); }  ///< of the guide, now
   const CurveSeekingSettings& settings() const noexcept { return settings_; }
   const optimize::Inputs& applied() const noexcept { return applied_; }
   const optimize::Protocol& protocol() const noexcept { return protocol_; }
@@ -110,7 +111,7 @@ class CurveSeeking {
   void watch_repeats(double applied, double j) noexcept;
   void judge_surprise(double input, double j) noexcept;
   void take_over() noexcept;
-  void begin_at(double mean, double sd) noexcept;
+  void begin_at(const Curve& curve, double mean, double sd) noexcept;
   bool usable(const Curve& curve) const noexcept;
 
   CurveSeekingSettings settings_;

@@ -23,9 +23,9 @@
 namespace mgdd::guide {
 
 struct GuidedEngineSettings {
-  double changed_share = 0.05;      ///< change of speed, fuel or intake that makes a new operating point, in (0, 1)
-  double calibrated_sd_cad = 2.0;   ///< of a calibrated model's best timing about the plant's, > 0
-  double recalibrated_cad = 0.1;    ///< move of the model's best timing below which a calibration is not passed on, >= 0
+  double changed_share = 0.05;     ///< change of speed, fuel or intake that makes a new operating point, in (0, 1)
+  double calibrated_sd_cad = 2.0;  ///< of a calibrated model's best timing about the plant's, > 0
+  double recalibrated_cad = 0.1;   ///< move of the model's best timing below which a calibration is not passed on, >= 0
 };
 void validate(const GuidedEngineSettings& settings);
 
@@ -84,8 +84,8 @@ class GuidedEngine {
       Prefixed<V> own{v, "calibration."};
       OnlineCalibration::visit(*self.calibration_, own);
     }
-    for (const auto& field : engine::operating_point_fields<double>())
-      v("point." + std::string(field.info.name), field.in(self.point_));
+    visit_point(v, "point.", self.point_);
+    visit_point(v, "advised.", self.advised_);
     v("guide_cad", self.guide_cad_);
     v("refusals", self.refusals_);
     v("recalibrations", self.recalibrations_);
@@ -93,13 +93,22 @@ class GuidedEngine {
   }
 
  private:
-  GuideStatus advise(GuideCause cause) noexcept;
+  template <class V, class Point>
+  static void visit_point(V& v, std::string_view prefix, Point& point) {
+    Prefixed<V> own{v, prefix};
+    for (const auto& field : engine::operating_point_fields<double>())
+      own(field.info.name, field.in(point));
+    own("burn_duration_cad", point.burn_duration_cad);
+    own("trapped_mass_g", point.trapped_mass_g);
+    own("ivc_temperature_k", point.ivc_temperature_k);
+  }
+  GuideStatus advise(GuideCause cause, bool opened = false) noexcept;
   void recalibrate() noexcept;
 
   Seeking seeking_;
   ModelOptimum model_;
   std::optional<OnlineCalibration> calibration_;
-  engine::OperatingPoint point_;
+  engine::OperatingPoint point_, advised_;  // now, and where the model was asked last
   GuidedEngineSettings guidance_;
   optimize::VariantSeeker::Settings settings_;
   double guide_cad_ = 0.0;

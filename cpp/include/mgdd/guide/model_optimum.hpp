@@ -68,6 +68,8 @@ class ModelOptimum {
   /// The same model with other parameters, as a calibration finds them; geometry and grid stay. ParameterError for a
   /// cylinder that is none, and nothing has changed then.
   void set_cylinder(const engine::Cylinder& cylinder);
+  /// The same for a cylinder that is known to be valid and of that geometry.
+  void put_cylinder(const engine::Cylinder& cylinder) noexcept;
 
   const ModelOptimumSettings& settings() const noexcept { return settings_; }
 

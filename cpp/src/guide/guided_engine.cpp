@@ -1,0 +1,183 @@
+#include "mgdd/guide/guided_engine.hpp"
+
+#include <cmath>
+#include <limits>
+#include <utility>
+
+#include "mgdd/common/bounds.hpp"
+
+namespace mgdd::guide {
+namespace {
+
+using optimize::Inputs;
+using optimize::Reading;
+using optimize::TellStatus;
+
+optimize::VariantSeeker::Settings shared_settings(const GuidedEngine::Seeking& seeking) {
+  return std::visit(
+      [](const auto& s) {
+        return optimize::VariantSeeker::Settings{s.settings().space, s.settings().maximize, s.settings().limits};
+      },
+      seeking);
+}
+
+bool differs(double now, double before, double share) noexcept {
+  return std::abs(now - before) > share * std::abs(before);
+}
+
+}  // namespace
+
+void validate(const GuidedEngineSettings& settings) {
+  require_in(above(0.0, 1.0), "changed_share", settings.changed_share);
+  require_in(above(0.0, 1e3), "calibrated_sd_cad", settings.calibrated_sd_cad);
+  require_in(closed(0.0, 1e3), "recalibrated_cad", settings.recalibrated_cad);
+}
+
+GuidedEngine::GuidedEngine(Seeking seeking, ModelOptimum model, std::optional<OnlineCalibration> calibration,
+                           const engine::OperatingPoint& point, const GuidedEngineSettings& settings)
+    : seeking_(std::move(seeking)),
+      model_(std::move(model)),
+      calibration_(std::move(calibration)),
+      point_(point),
+      advised_(point),
+      guidance_(settings),
+      settings_(shared_settings(seeking_)) {
+  validate(settings);
+  if (settings_.space.size() != 1) {
+    throw about("seeker", ShapeError("seeker has " + std::to_string(settings_.space.size()) +
+                                     " inputs: the timing of an engine is one"));
+  }
+  if (!settings_.maximize) {
+    throw about("maximize", ParameterError("maximize = False: a guided engine maximises its performance"));
+  }
+  if (calibration_ && !(calibration_->settings().cylinder.geometry == model_.settings().cylinder.geometry)) {
+    throw about("calibration", ParameterError("calibration is of a cylinder of another geometry than the model: make "
+                                              "both of the same cylinder"));
+  }
+  if (advise(GuideCause::new_point) != GuideStatus::followed) {
+    throw about("model", ParameterError("model has no best timing that can guide at this operating point: widen the "
+                                        "bounds, or give another model"));
+  }
+  refusals_ = 0;
+}
+
+GuideStatus GuidedEngine::advise(GuideCause cause, bool opened) noexcept {
+  if (calibration_ && calibration_->updates() > 0) model_.put_cylinder(calibration_->cylinder());
+  GuideStatus status = GuideStatus::refused;
+  if (auto* const curve_seeking = std::get_if<CurveSeeking>(&seeking_)) {
+    Curve curve;
+    if (model_.tabulate(point_, curve)) {
+      const bool taken = cause == GuideCause::calibration ? curve_seeking->believe(curve, guidance_.calibrated_sd_cad)
+                                                          : curve_seeking->guide(curve);
+      if (taken) {
+        status = GuideStatus::followed;
+        guide_cad_ = curve.best();
+      }
+    } else if (opened) {
+      curve_seeking->restart();
+    }
+  } else {
+    auto& trimmed = std::get<FeedForward<optimize::VariantSeeker>>(seeking_);
+    const ModelOptimumResult found = model_.find(point_);
+    status = trimmed.offer(guide_value(found), cause);
+    if (status == GuideStatus::followed) guide_cad_ = found.soc_cad;
+    if (status == GuideStatus::refused && opened) trimmed.hold();
+  }
+  if (status == GuideStatus::refused) ++refusals_;
+  return status;
+}
+
+GuideStatus GuidedEngine::at(const engine::OperatingPoint& point) noexcept {
+  if (protocol().asked) return GuideStatus::busy;
+  bool finite = true, moved = false, opened = false;
+  for (const auto& f : engine::operating_point_fields<double>()) {
+    finite = finite && std::isfinite(f.in(point));
+    moved = moved || f.in(point) != f.in(point_);
+    opened = opened || differs(f.in(point), f.in(advised_), guidance_.changed_share);
+  }
+  if (!finite) {
+    ++refusals_;
+    return GuideStatus::refused;
+  }
+  point_ = point;
+  if (opened || owed_) {
+    if (opened) advised_ = point;
+    const GuideStatus status = advise(GuideCause::new_point, opened);
+    owed_ = status == GuideStatus::refused;
+    return status;
+  }
+  // A curve hardly changes within a small step; a feed-forward follows it.
+  if (!moved || std::holds_alternative<CurveSeeking>(seeking_)) return GuideStatus::followed;
+  advised_ = point;
+  return advise(GuideCause::following);
+}
+
+const Inputs& GuidedEngine::ask() noexcept {
+  return std::visit([](auto& s) -> const Inputs& { return s.ask(); }, seeking_);
+}
+
+TellStatus GuidedEngine::tell(const Reading& reading, std::span<const double> pressure_bar) noexcept {
+  const Inputs asked = applied();
+  const TellStatus status = std::visit([&](auto& s) { return s.tell(reading); }, seeking_);
+  if (!calibration_ || pressure_bar.empty()) return status;
+  if (status != TellStatus::accepted && status != TellStatus::misfire) return status;
+  const double soc_cad = applied_input(reading, asked)[0];
+  if (calibration_->offer(pressure_bar, point_, soc_cad, status == TellStatus::misfire) ==
+          CalibrationStatus::accepted &&
+      calibration_->update() == CalibrationStatus::updated) {
+    recalibrate();
+  }
+  return status;
+}
+
+// The model takes over what was calibrated as soon as that moves its best timing.
+void GuidedEngine::recalibrate() noexcept {
+  model_.put_cylinder(calibration_->cylinder());
+  const ModelOptimumResult found = model_.find(point_);
+  if (!found.found || std::abs(found.soc_cad - guide_cad_) < guidance_.recalibrated_cad) return;
+  if (advise(GuideCause::calibration) == GuideStatus::followed) ++recalibrations_;
+}
+
+void GuidedEngine::restart() noexcept {
+  std::visit([](auto& s) { s.restart(); }, seeking_);
+}
+void GuidedEngine::shift_estimate(const Inputs& by) noexcept {
+  std::visit([&](auto& s) { s.shift_estimate(by); }, seeking_);
+}
+
+const Inputs& GuidedEngine::estimate() const noexcept {
+  return std::visit([](const auto& s) -> const Inputs& { return s.estimate(); }, seeking_);
+}
+const Inputs& GuidedEngine::applied() const noexcept {
+  return std::visit([](const auto& s) -> const Inputs& { return s.applied(); }, seeking_);
+}
+const optimize::Protocol& GuidedEngine::protocol() const noexcept {
+  return std::visit([](const auto& s) -> const optimize::Protocol& { return s.protocol(); }, seeking_);
+}
+std::size_t GuidedEngine::component_count() const noexcept {
+  return std::visit([](const auto& s) { return s.component_count(); }, seeking_);
+}
+
+GuidedCycle GuidedEngine::now() const noexcept {
+  GuidedCycle out;
+  out.guide_cad = out.feed_forward_cad = guide_cad_;
+  out.estimate_cad = estimate()[0];
+  out.estimate_sd_cad = std::numeric_limits<double>::quiet_NaN();
+  if (const auto* const curve_seeking = std::get_if<CurveSeeking>(&seeking_)) {
+    out.estimate_sd_cad = curve_seeking->estimate_sd();
+    out.trust = curve_seeking->trust();
+  } else {
+    const auto& trimmed = std::get<FeedForward<optimize::VariantSeeker>>(seeking_);
+    out.feed_forward_cad = trimmed.path().feed_forward()[0];
+    out.trust = trimmed.path().trust().value();
+  }
+  out.trim_cad = out.estimate_cad - out.feed_forward_cad;
+  return out;
+}
+
+void GuidedEngine::require_usable() const {
+  std::visit([](const auto& s) { s.require_usable(); }, seeking_);
+  if (calibration_) calibration_->require_usable();
+}
+
+}  // namespace mgdd::guide

@@ -1,0 +1,340 @@
+"""Calibration of the cycle model to the measured pressure while an engine runs."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+
+from mgdd import _core, presets
+from mgdd._core.engine import Cylinder, OperatingPoint
+from mgdd.errors import ParameterError, ShapeError
+from mgdd.presets import Preset
+from mgdd.results.describe import as_html, described, rows_of
+from mgdd.results.labels import labelled_dataset
+
+if TYPE_CHECKING:
+    import xarray as xr
+    from numpy.typing import ArrayLike, NDArray
+
+__all__ = ["OnlineCalibration"]
+
+_FIGURES = {
+    "residual_rms_bar": ("bar", "root mean square residual of the mean trace"),
+    "noise_bar": ("bar", "standard deviation of a sample of the mean trace"),
+    "effective_samples": ("-", "independent samples that the residual is worth"),
+}
+
+
+@described
+@dataclass(frozen=True, kw_only=True)
+class ParameterVerdict:
+    """How much one parameter of an online calibration deserves belief.
+
+    Attributes
+    ----------
+    name : str
+        Of the parameter.
+    value, standard_error : float
+        Estimate, and its standard error with everything that is not known exactly counted.
+    knowledge : str
+        ``"determined"``, ``"uncertain"``, ``"held"`` (the data know less than was known beforehand), ``"at bound"``,
+        ``"contradicted"`` (the model does not fit this pressure) or ``"no data"``.
+    sentence : str
+        All of it in words, with the reason.
+
+    Examples
+    --------
+    >>> from mgdd.guide import OnlineCalibration
+    >>> OnlineCalibration("puma_single").verdicts["wall_heat_scale"].knowledge
+    'no data'
+    """
+
+    name: str
+    value: float
+    standard_error: float
+    knowledge: str
+    sentence: str
+
+
+class OnlineCalibration:
+    """Keeps parameters of the cycle model true to the mean pressure of the last cycles, and says which it cannot know.
+
+    Offer every cycle, then update once: a refused cycle is left out and says why. What stands between model and
+    measurement and is not adapted counts as known to its `uncertainty` only, so that an error of TDC, gain, pegging,
+    gamma, fuel or timing widens the standard error instead of passing for wall heat.
+
+    Parameters
+    ----------
+    engine : str, Preset or Cylinder
+        The guide: a preset, its name, or a cylinder of your own. It is not changed.
+    method : {"gauss_newton", "recursive", "extremum_seeking"}
+        One exact Gauss-Newton step per update on the last window; the same with earlier windows remembered;
+        extremum seeking on the pressure error, which moves the wall heat alone.
+    parameters : sequence of str
+        What is adapted: ``"wall_heat_scale"``, ``"soc_offset_cad"``, ``"burn_duration_scale"``, ``"gamma_offset"``,
+        ``"fuel_heat_scale"``, ``"tdc_offset_cad"``, ``"pressure_gain"``, ``"pressure_offset_bar"``.
+    uncertainty : mapping of str to float, optional
+        Standard deviation of what is known of the others, in their units; 0: exactly as the model has it. Left out:
+        0.3 °CA of SOC, 5 % of burn duration, 0.01 of gamma, 2 % of fuel heat, 0.3 °CA of TDC, 0.5 % of pressure
+        gain, 0.1 bar of pegging. Where the fuel is measured, give ``{"fuel_heat_scale": 0.0}``.
+    window_cycles : int
+        Cycles whose mean is compared, in [2, 500].
+    steady_cycles : int
+        Cycles left out after speed, fuel or intake changed by more than 5 %.
+    cov_limit_percent : float
+        COV of IMEP in the window from which on nothing is adapted [%].
+    forgetting : float
+        Weight that a window keeps in the next one, in [0, 1]; ``recursive`` only.
+    soc_scatter_cad : float
+        Scatter of the true start of combustion about the told one from cycle to cycle [°CA]: it blurs the mean
+        pressure, and differs from window to window. 0 where the start of combustion is measured.
+    jump_factor : float
+        A cycle whose residual is so many times the usual one is left out; three in a row start anew.
+    trials_per_update : int
+        Cycles of the model per update; ``extremum_seeking`` only.
+    step_cad, integrator
+        As in `mgdd.engine.simulate`.
+
+    Raises
+    ------
+    ParameterError
+        A setting outside its domain, an unknown parameter, or a second one for ``extremum_seeking``.
+
+    References
+    ----------
+    Tan (2018), chapter 6; Tan et al. (2016): wall heat by extremum seeking on the pressure error. The rest is ours.
+
+    Examples
+    --------
+    >>> from mgdd.engine import Cylinder
+    >>> from mgdd.guide import OnlineCalibration
+    >>> from mgdd.loop import EngineBench
+    >>> bench = EngineBench(pressure_noise_bar=0.05)  # its wall heat is 0.5
+    >>> calibration = OnlineCalibration(Cylinder(wall_heat_scale=1.0))
+    >>> for _ in range(40):
+    ...     soc_cad = bench.step(-6.0)["soc_cad"]
+    ...     status = calibration.offer(bench.pressure()[1], bench.point, soc_cad)
+    ...     status = calibration.update()
+    >>> round(calibration.cylinder.wall_heat_scale, 2), calibration.determined
+    (0.5, True)
+    """
+
+    def __init__(
+        self,
+        engine: str | Preset | Cylinder,
+        *,
+        method: str = "gauss_newton",
+        parameters: Sequence[str] = ("wall_heat_scale",),
+        uncertainty: Mapping[str, float] | None = None,
+        window_cycles: int = 10,
+        steady_cycles: int = 20,
+        cov_limit_percent: float = 3.0,
+        forgetting: float = 0.9,
+        soc_scatter_cad: float = 0.3,
+        jump_factor: float = 3.0,
+        trials_per_update: int = 5,
+        step_cad: float = 1.0,
+        integrator: str = "trapezoid",
+    ) -> None:
+        if isinstance(parameters, str):
+            raise ParameterError.of("parameters", parameters, "a sequence of names")
+        if isinstance(engine, str):
+            engine = presets.load(engine, kind="engine")
+        self._core = _core.guide.OnlineCalibration(
+            cylinder=engine.cylinder if isinstance(engine, Preset) else engine,
+            method=method,
+            parameters=list(parameters),
+            uncertainty=dict(uncertainty or {}),
+            window_cycles=window_cycles,
+            steady_cycles=steady_cycles,
+            cov_limit_percent=cov_limit_percent,
+            forgetting=forgetting,
+            soc_scatter_cad=soc_scatter_cad,
+            jump_factor=jump_factor,
+            trials_per_update=trials_per_update,
+            step_cad=step_cad,
+            integrator=integrator,
+        )
+        self._size = len(self._core.angles_cad)
+        self._history: list[tuple[str, list[float]]] = []
+
+    def offer(self, pressure_bar: ArrayLike, point: OperatingPoint, soc_cad: float, *, misfire: bool = False) -> str:
+        """Give the pressure of one cycle.
+
+        Parameters
+        ----------
+        pressure_bar : array_like
+            One pressure per angle of `angles_cad` [bar], pegged as well as can be. Missing samples as NaN.
+        point : OperatingPoint
+            Speed, fuel and intake of this cycle, as measured or commanded.
+        soc_cad : float
+            Start of combustion, measured or commanded [°CA aTDC].
+        misfire : bool
+            Whether the cycle is known to have misfired.
+
+        Returns
+        -------
+        str
+            ``"accepted"``, or why not: ``"misfire"``, ``"unsteady"``, ``"saturated"``, ``"unusable numbers"``. A
+            refused cycle teaches nothing; one at another operating point empties the window.
+
+        Raises
+        ------
+        ShapeError
+            Not one pressure per angle.
+        """
+        pressure = np.asarray(pressure_bar, float)
+        if pressure.shape != (self._size,):
+            raise ShapeError(
+                f"pressure_bar has shape {pressure.shape}: must be ({self._size},), one per angle of angles_cad"
+            )
+        return self._core.offer(pressure, point, float(soc_cad), misfire=misfire)
+
+    def update(self) -> str:
+        """Do the work of one cycle: at most one step, or `trials_per_update` trials.
+
+        Returns
+        -------
+        str
+            ``"updated"``; ``"collecting"`` while the window fills; ``"poor excitation"`` where every parameter is
+            held; ``"COV"``, ``"jump"``, ``"no such cycle"``, or why the last cycle was refused.
+        """
+        status = self._core.update()
+        values, errors, figures = self._core.values, self._core.errors, self._core.figures
+        row = [*values.values(), *errors.values(), *(figures[name] for name in _FIGURES)]
+        self._history.append((status, row))
+        return status
+
+    def restart(self) -> None:
+        """Forget all cycles and keep the parameters."""
+        self._core.restart()
+
+    @property
+    def cylinder(self) -> Cylinder:
+        """The guide with the parameters of it that are adapted."""
+        return self._core.cylinder
+
+    @property
+    def parameters(self) -> dict[str, float]:
+        """Value of every parameter by name, adapted or only estimated beside them."""
+        return self._core.values
+
+    @property
+    def standard_errors(self) -> dict[str, float]:
+        """Standard error of every parameter by name; 0 for what is known exactly, and before the first step."""
+        return self._core.errors
+
+    @property
+    def verdicts(self) -> dict[str, ParameterVerdict]:
+        """What to believe of each adapted parameter."""
+        values, errors = self._core.values, self._core.errors
+        return {
+            name: ParameterVerdict(
+                name=name, value=values[name], standard_error=errors[name], knowledge=knowledge, sentence=sentence
+            )
+            for name, (knowledge, sentence) in self._core.verdicts.items()
+        }
+
+    @property
+    def determined(self) -> bool:
+        """Whether the data determine every adapted parameter."""
+        return self._core.determined
+
+    @property
+    def status(self) -> str:
+        """What became of the last call."""
+        return self._core.status
+
+    @property
+    def angles_cad(self) -> NDArray[np.float64]:
+        """Angles that a pressure trace is offered on, IVC to EVO [°CA aTDC]."""
+        return self._core.angles_cad
+
+    @property
+    def settings(self) -> dict[str, Any]:
+        """Keywords that make this calibration again."""
+        settings = dict(self._core.settings)
+        settings["engine"] = settings.pop("cylinder")
+        return settings
+
+    @property
+    def state(self) -> dict[str, list[float]]:
+        """Cycles, parameters and all else that the next update depends on; setting it goes on bit for bit."""
+        return self._core.state
+
+    @state.setter
+    def state(self, saved: Mapping[str, Sequence[float]]) -> None:
+        self._core.state = {name: list(column) for name, column in saved.items()}
+
+    def summary(self) -> str:
+        """Say status and verdicts as text.
+
+        Returns
+        -------
+        str
+            A few lines: how far it is, then one sentence per adapted parameter.
+
+        Examples
+        --------
+        >>> from mgdd.guide import OnlineCalibration
+        >>> print(OnlineCalibration("puma_single").summary())
+        gauss_newton: 0 cycles taken, 0 updates, now collecting
+        wall_heat_scale = 0.5: no data, nothing was adapted yet
+        """
+        figures = self._core.figures
+        taken, updates = figures["accepted"], figures["updates"]
+        jumps = f", {figures['jumps']} jumps" if figures["jumps"] else ""
+        lines = [f"{self._core.settings['method']}: {taken} cycles taken, {updates} updates{jumps}, now {self.status}"]
+        if updates:
+            residual = f"residual {figures['residual_rms_bar']:.3g} bar rms"
+            worth = f"worth {figures['effective_samples']:.0f} independent samples"
+            lines.append(f"{residual}, {worth}; COV of IMEP {figures['cov_percent']:.2g} %")
+        return "\n".join([*lines, *(verdict.sentence for verdict in self.verdicts.values())])
+
+    @property
+    def history(self) -> xr.Dataset:
+        """Parameters after every update, over ``update``: value and ``NAME_error`` of each, figures of the residual.
+
+        ``moved`` is 1 where the update took place, ``status`` says why not. Built anew on every access.
+        """
+        names = _core.guide.calibrated_parameters()
+        width = 2 * len(names) + len(_FIGURES)
+        rows = np.array([row for _, row in self._history], float).reshape(len(self._history), width)
+        variables: dict[str, tuple[Any, ...]] = {
+            "update": ("update", np.arange(len(self._history)), "-", "update of the calibration"),
+            "status": ("update", np.array([status for status, _ in self._history], str), "-", "status of the update"),
+            "moved": (
+                "update",
+                np.array([status == "updated" for status, _ in self._history], np.int8),
+                "-",
+                "whether parameters were adapted",
+            ),
+        }
+        for i, (name, (unit, meaning)) in enumerate(names.items()):
+            variables[name] = ("update", rows[:, i], unit, meaning)
+            variables[f"{name}_error"] = ("update", rows[:, len(names) + i], unit, f"standard error: {meaning}")
+        for i, (name, (unit, meaning)) in enumerate(_FIGURES.items()):
+            variables[name] = ("update", rows[:, 2 * len(names) + i], unit, meaning)
+        return labelled_dataset(variables, attrs={"method": self._core.settings["method"]})
+
+    def __reduce__(self) -> tuple[Any, ...]:
+        return _rebuild, (self.settings, self.state, self._history)
+
+    def __repr__(self) -> str:
+        names = ", ".join(f"{name} {self.parameters[name]:.4g}" for name in self._core.settings["parameters"])
+        return f"<OnlineCalibration {self._core.settings['method']}: {names}, {self.status}>"
+
+    def _repr_html_(self) -> str:
+        return as_html("OnlineCalibration", rows_of({"status": self.status, **self.parameters, **self.settings}))
+
+
+def _rebuild(
+    settings: dict[str, Any], state: dict[str, list[float]], history: list[tuple[str, list[float]]]
+) -> OnlineCalibration:
+    made = OnlineCalibration(settings.pop("engine"), **settings)
+    made.state = state
+    made._history = list(history)
+    return made

@@ -1,0 +1,286 @@
+// Safeguards of the online calibration, and what a loop relies on: bounded work without allocation, a state that goes
+// on bit for bit, refusals that change nothing.
+#include <cmath>
+#include <functional>
+#include <limits>
+#include <map>
+#include <string>
+#include <vector>
+
+#include <gtest/gtest.h>
+
+#include "mgdd/common/state.hpp"
+#include "mgdd/guide/online_calibration.hpp"
+#include "mgdd/optimize/seekers/extremum_seeking.hpp"
+#include "support/calibration_case.hpp"
+#include "support/no_alloc.hpp"
+
+namespace mgdd::guide {
+namespace {
+
+using test_support::cycle_of;
+using test_support::run;
+using test_support::steady_bench;
+using test_support::sure_of_the_rest;
+using test_support::wall;
+using test_support::wrong_guide;
+
+static_assert(noexcept(std::declval<OnlineCalibration&>().update()));
+static_assert(noexcept(std::declval<OnlineCalibration&>().offer({}, engine::OperatingPoint{}, 0.0)));
+
+constexpr CalibrationMethod every_method[] = {CalibrationMethod::extremum_seeking, CalibrationMethod::gauss_newton,
+                                              CalibrationMethod::recursive};
+
+std::vector<double> trace_of(loop::EngineBench& bench, double soc_cad = -6.0) {
+  bench.step(soc_cad);
+  const auto shown = bench.pressure().pressure_bar;
+  return {shown.begin(), shown.end()};
+}
+
+// Twice the wall heat of the engine, while extremum seeking moves the timing of every cycle.
+TEST(OnlineCalibrationLoop, FollowsAnEngineThatSeeks) {
+  for (const CalibrationMethod method : {CalibrationMethod::gauss_newton, CalibrationMethod::recursive}) {
+    for (const double scatter : {0.0, 0.3}) {
+      loop::BenchSettings s = steady_bench(0.0, 3);
+      s.soc_scatter_cad = scatter;
+      loop::EngineBench bench(s);
+      OnlineCalibrationSettings g = wrong_guide(method);
+      g.soc_scatter_cad = scatter;
+      OnlineCalibration calibration(g);
+      optimize::ExtremumSeekingSettings seeking;
+      seeking.space = {optimize::scalar_input(-15.0), optimize::scalar_input(-30.0), optimize::scalar_input(10.0)};
+      optimize::ExtremumSeeking seeker(seeking);
+      int late = 0;
+      for (int k = 0; k < 300; ++k) {
+        const double soc = seeker.ask()[0];
+        const loop::BenchCycle c = bench.step(soc);
+        seeker.tell({.components = c.component_values().first(1), .limits = {}, .misfire = false});
+        calibration.offer(bench.pressure().pressure_bar, {}, soc);  // the commanded timing
+        calibration.update();
+        late += k >= 40 && std::abs(calibration.parameters()[wall] - 0.5) > 0.015 ? 1 : 0;
+      }
+      EXPECT_GT(std::abs(seeker.estimate()[0] + 15.0), 3.0);  // it did move
+      EXPECT_NEAR(calibration.parameters()[wall], 0.5, 0.015) << to_string(method) << " " << scatter;
+      EXPECT_EQ(late, 0) << to_string(method) << " " << scatter;
+    }
+  }
+}
+
+TEST(OnlineCalibrationLoop, BadCyclesNeverReachIt) {
+  using enum CalibrationStatus;
+  loop::EngineBench bench(steady_bench(0.05));
+  OnlineCalibration calibration(wrong_guide(CalibrationMethod::gauss_newton));
+  run(bench, calibration, 40);
+  const std::vector<double> good = trace_of(bench);
+  const auto offered = [&](const std::function<void(std::vector<double>&)>& spoil, bool misfire = false,
+                           double soc = -6.0) {
+    std::vector<double> bad = good;
+    spoil(bad);
+    StateColumns before = save_state(calibration);
+    const CalibrationStatus status = calibration.offer(bad, {}, soc, misfire);
+    EXPECT_EQ(calibration.update(), status);
+    StateColumns after = save_state(calibration);
+    for (StateColumns* each : {&before, &after}) {
+      each->erase("last_offer");
+      each->erase("last_status");
+    }
+    EXPECT_EQ(after, before) << to_string(status);
+    return status;
+  };
+  EXPECT_EQ(offered([](auto& p) { p.pop_back(); }), wrong_size);
+  EXPECT_EQ(offered([](auto& p) { p[100] = std::nan(""); }), unusable);
+  EXPECT_EQ(offered([](auto& p) { p[0] = HUGE_VAL; }), unusable);
+  EXPECT_EQ(offered([](auto&) {}, false, std::nan("")), unusable);
+  EXPECT_EQ(offered([](auto& p) {
+              for (double& each : p)
+                each = std::min(each, 100.0);
+            }),
+            saturated);
+  EXPECT_EQ(offered([](auto&) {}, true), misfire);
+  loop::BenchSettings motored = steady_bench();
+  motored.misfire_probability = 1.0;
+  loop::EngineBench unlit(motored);
+  const std::vector<double> unburned = trace_of(unlit);
+  EXPECT_EQ(offered([&](auto& p) { p = unburned; }), misfire);  // seen, not said
+  EXPECT_EQ(calibration.offer(good, {}, -6.0), accepted);
+  EXPECT_EQ(calibration.update(), updated);
+}
+
+TEST(OnlineCalibrationLoop, WaitsAfterAChangeOfOperatingPoint) {
+  using enum CalibrationStatus;
+  loop::BenchSettings s = steady_bench();
+  engine::OperatingPoint load;
+  load.fuel_mg = 26.0;
+  s.schedule = {{0, {}}, {30, load}, {100, {}}};
+  for (const CalibrationMethod method : every_method) {
+    loop::EngineBench bench(s);
+    OnlineCalibration calibration(sure_of_the_rest(wrong_guide(method)));
+    for (int k = 0; k < 140; ++k) {
+      const CalibrationVector before = calibration.parameters();
+      const CalibrationStatus status = cycle_of(bench, calibration);
+      const bool waits = (k >= 30 && k < 50) || (k >= 100 && k < 120);
+      EXPECT_EQ(status == unsteady, waits) << k << " " << to_string(status);
+      if (k < 9 || (k >= 50 && k < 59)) {
+        EXPECT_EQ(status, collecting) << k;
+      }
+      if (status != updated) {
+        EXPECT_EQ(calibration.parameters()[wall], before[wall]) << k;
+      }
+    }
+    EXPECT_NEAR(calibration.parameters()[wall], 0.5, 0.02) << to_string(method);
+  }
+}
+
+TEST(OnlineCalibrationLoop, FreezesWhereCyclesScatter) {
+  loop::BenchSettings s = steady_bench();
+  s.soc_scatter_cad = 4.0;
+  loop::EngineBench bench(s);
+  OnlineCalibration calibration(wrong_guide(CalibrationMethod::gauss_newton));
+  int frozen = 0;
+  for (int k = 0; k < 60; ++k) {
+    const CalibrationStatus status = cycle_of(bench, calibration, 8.0);
+    frozen += status == CalibrationStatus::cov ? 1 : 0;
+    if (status == CalibrationStatus::updated) {
+      EXPECT_LT(calibration.cov_percent(), 3.0);
+    }
+  }
+  EXPECT_GT(frozen, 30);
+}
+
+TEST(OnlineCalibrationLoop, AJumpIsNotAveragedButLearntAnew) {
+  for (const CalibrationMethod method : every_method) {
+    loop::EngineBench bench(steady_bench(0.05));
+    OnlineCalibration calibration(sure_of_the_rest(wrong_guide(method, 0.6)));
+    run(bench, calibration, 80);
+    EXPECT_NEAR(calibration.parameters()[wall], 0.5, 0.02);
+    EXPECT_EQ(calibration.jumps(), 0);
+    loop::BenchSettings changed = steady_bench(0.05);
+    changed.cylinder.wall_heat.wall_heat_scale = 1.2;
+    loop::EngineBench other(changed);
+    EXPECT_EQ(to_string(cycle_of(other, calibration)), "jump") << to_string(method);
+    EXPECT_NEAR(calibration.parameters()[wall], 0.5, 0.02);  // one cycle is not believed
+    run(other, calibration, 60);
+    EXPECT_EQ(calibration.jumps(), 1) << to_string(method);
+    EXPECT_NEAR(calibration.parameters()[wall], 1.2, 0.04) << to_string(method);
+    loop::EngineBench again(steady_bench(0.05, 8));
+    cycle_of(again, calibration);  // a single odd cycle
+    run(other, calibration, 30);
+    EXPECT_EQ(calibration.jumps(), 1);
+    EXPECT_NEAR(calibration.parameters()[wall], 1.2, 0.03);
+  }
+}
+
+TEST(OnlineCalibrationLoop, StaysInsideItsBounds) {
+  for (const CalibrationMethod method : every_method) {
+    for (const double truth : {0.0, 4.0}) {
+      loop::BenchSettings s = steady_bench(0.02);
+      s.cylinder.wall_heat.wall_heat_scale = truth;
+      loop::EngineBench bench(s);
+      OnlineCalibration calibration(sure_of_the_rest(wrong_guide(method)));
+      for (int k = 0; k < 100; ++k) {
+        cycle_of(bench, calibration);
+        EXPECT_GE(calibration.parameters()[wall], 0.2);
+        EXPECT_LE(calibration.parameters()[wall], 2.5);
+      }
+      EXPECT_FALSE(calibration.determined()) << to_string(method) << " " << calibration.explain(wall);
+    }
+  }
+}
+
+TEST(OnlineCalibrationLoop, NothingIsAllocatedAndTheStateGoesOnBitForBit) {
+  loop::BenchSettings s = steady_bench(0.2, 4);
+  s.soc_scatter_cad = 0.3;
+  s.misfire_probability = 0.03;
+  engine::OperatingPoint load;
+  load.fuel_mg = 26.0;
+  s.schedule = {{0, {}}, {70, load}};
+  for (const CalibrationMethod method : every_method) {
+    for (const int cut : {0, 3, 25, 75, 101}) {
+      loop::EngineBench bench(s);
+      OnlineCalibration whole(wrong_guide(method)), later(wrong_guide(method));
+      run(bench, later, 13, -4.0);
+      bench.reset();
+      for (int k = 0; k < 140; ++k) {
+        if (k == cut) {
+          const StateColumns state = save_state(whole);
+          restore_state(later, state);
+          EXPECT_EQ(save_state(later), state);
+        }
+        const engine::OperatingPoint point = bench.point();
+        const loop::BenchCycle c = bench.step(test_support::wandering_soc_cad(k));
+        const auto shown = bench.pressure().pressure_bar;
+        const test_support::AllocationCounter counter;
+        const CalibrationStatus offered = whole.offer(shown, point, c.soc_requested_cad, c.misfire);
+        const CalibrationStatus updated = whole.update();
+        EXPECT_EQ(counter.count(), 0u);
+        if (k >= cut) {
+          EXPECT_EQ(later.offer(shown, point, c.soc_requested_cad, c.misfire), offered);
+          EXPECT_EQ(later.update(), updated) << k;
+          EXPECT_EQ(later.parameters(), whole.parameters()) << to_string(method) << cut << " " << k;
+          EXPECT_EQ(later.standard_errors(), whole.standard_errors());
+        }
+      }
+      EXPECT_GT(whole.updates(), 30);
+      EXPECT_EQ(save_state(later), save_state(whole));
+    }
+  }
+}
+
+TEST(OnlineCalibrationLoop, ARefusedStateChangesNothing) {
+  loop::EngineBench bench(steady_bench(0.1));
+  OnlineCalibration calibration(wrong_guide(CalibrationMethod::recursive));
+  run(bench, calibration, 35);
+  const StateColumns good = save_state(calibration);
+  for (const auto& [name, values] : good) {
+    if (values.empty()) continue;
+    StateColumns bad = good;
+    bad[name][values.size() / 2] = std::nan("");
+    EXPECT_THROW(restore_state(calibration, bad), ParameterError) << name;
+    bad = good;
+    bad.erase(name);
+    EXPECT_THROW(restore_state(calibration, bad), ParameterError) << name;
+  }
+  StateColumns bad = good;
+  bad["parameters"][0] = 9.0;
+  EXPECT_THROW(restore_state(calibration, bad), ParameterError);
+  bad = good;
+  bad["covariance"][9] = -1.0;
+  EXPECT_THROW(restore_state(calibration, bad), ParameterError);
+  EXPECT_EQ(save_state(calibration), good);
+}
+
+TEST(OnlineCalibrationLoop, RefusesByName) {
+  const auto message = [](auto change) -> std::string {
+    OnlineCalibrationSettings s;
+    change(s);
+    try {
+      OnlineCalibration calibration(s);
+    } catch (const ParameterError& e) {
+      return e.what();
+    }
+    return "";
+  };
+  const auto holds = [&](auto change, const std::string& part) {
+    EXPECT_NE(message(change).find(part), std::string::npos) << message(change);
+  };
+  holds([](auto& s) { s.wanted.fill(false); }, "parameters is empty");
+  holds([](auto& s) { s.uncertainty[Calibrated::tdc] = -1.0; }, "uncertainty of tdc_offset_cad = -1");
+  holds([](auto& s) { s.window.window_cycles = 1; }, "window_cycles = 1");
+  holds([](auto& s) { s.window.cov_limit_percent = 0.0; }, "cov_limit_percent = 0");
+  holds([](auto& s) { s.forgetting = 1.1; }, "forgetting = 1.1");
+  holds([](auto& s) { s.soc_scatter_cad = -0.1; }, "soc_scatter_cad = -0.1");
+  holds([](auto& s) { s.jump_factor = 1.0; }, "jump_factor = 1");
+  holds([](auto& s) { s.trials_per_update = 0; }, "trials_per_update = 0");
+  holds([](auto& s) { s.cylinder.geometry.bore_mm = -1.0; }, "bore_mm = -1");
+  holds(
+      [](auto& s) {
+        s.method = CalibrationMethod::extremum_seeking;
+        s.wanted[Calibrated::gamma] = true;
+      },
+      "extremum seeking adapts wall_heat_scale alone, not gamma_offset");
+  EXPECT_THROW(parse_calibrated("parameters", "c1"), ParameterError);
+  EXPECT_EQ(parse_calibrated("parameters", "tdc_offset_cad"), Calibrated::tdc);
+}
+
+}  // namespace
+}  // namespace mgdd::guide

@@ -1,0 +1,167 @@
+"""Online calibration from Python: what it finds beside a running engine, its record, state, pickle and refusals."""
+
+from __future__ import annotations
+
+import copy
+import json
+import pickle
+from typing import Any
+
+import numpy as np
+import pytest
+
+from mgdd import presets
+from mgdd.engine import Cylinder, OperatingPoint, simulate
+from mgdd.errors import ParameterError, ShapeError
+from mgdd.guide import OnlineCalibration
+from mgdd.loop import EngineBench
+from mgdd.optimize import ExtremumSeeking
+from mgdd.results.labels import check_labels
+
+WRONG = Cylinder(wall_heat_scale=1.0)  # twice that of the engine
+SURE = dict.fromkeys(
+    [
+        "soc_offset_cad",
+        "burn_duration_scale",
+        "gamma_offset",
+        "fuel_heat_scale",
+        "tdc_offset_cad",
+        "pressure_gain",
+        "pressure_offset_bar",
+    ],
+    0.0,
+)
+
+
+def drive(bench: EngineBench, calibration: OnlineCalibration, cycles: int, soc_cad: float = -6.0) -> list[str]:
+    statuses = []
+    for _ in range(cycles):
+        point = bench.point
+        cycle = bench.step(soc_cad)
+        calibration.offer(bench.pressure()[1], point, cycle["soc_cad"], misfire=cycle["misfire"])
+        statuses.append(calibration.update())
+    return statuses
+
+
+@pytest.mark.parametrize("method", ["gauss_newton", "recursive", "extremum_seeking"])
+def test_it_follows_an_engine_that_seeks_its_best_timing(method: str) -> None:
+    bench = EngineBench(seed=3)
+    alone = method == "extremum_seeking"  # then the timing must be measured: nothing else is fitted
+    calibration = OnlineCalibration(WRONG, method=method, uncertainty=SURE if alone else None)
+    seeker = ExtremumSeeking(start=-12.0, lower=-30.0, upper=10.0)
+    for _ in range(120):
+        (soc_cad,) = seeker.ask()
+        cycle = bench.step(soc_cad)
+        seeker.tell(cycle["j"])
+        calibration.offer(bench.pressure()[1], bench.point, cycle["soc_cad"] if alone else soc_cad)
+        calibration.update()
+    assert calibration.cylinder.wall_heat_scale == pytest.approx(0.5, rel=0.03)
+    assert calibration.cylinder.gamma == WRONG.gamma
+    assert calibration.determined
+
+
+# The guide of which the timing is asked: 4.1 CAD of bias before, below 0.2 CAD after.
+def test_the_best_timing_of_the_guide_comes_right() -> None:
+    def best(cylinder: Cylinder) -> float:
+        timings = np.arange(-12.0, 6.0, 0.1)
+        gains = [float(simulate(cylinder, OperatingPoint(), soc_cad=soc)["efficiency_gross"]) for soc in timings]
+        return float(timings[int(np.argmax(gains))])
+
+    bench = EngineBench(pressure_noise_bar=0.1, seed=2)
+    calibration = OnlineCalibration(WRONG, method="recursive")
+    drive(bench, calibration, 60)
+    assert best(WRONG) - best(Cylinder()) == pytest.approx(4.1, abs=0.3)
+    assert best(calibration.cylinder) == pytest.approx(best(Cylinder()), abs=0.2)
+
+
+def test_history_and_summary_say_what_happened() -> None:
+    bench = EngineBench(pressure_noise_bar=0.1, misfire_probability=0.1, seed=1)
+    calibration = OnlineCalibration("puma_single")
+    empty = calibration.history
+    check_labels(empty)
+    assert empty.sizes["update"] == 0
+    statuses = drive(bench, calibration, 50)
+    history = calibration.history
+    check_labels(history)
+    assert list(history["status"].values) == statuses
+    assert {"updated", "collecting", "misfire"} <= set(statuses)
+    np.testing.assert_array_equal(history["moved"], [status == "updated" for status in statuses])
+    assert float(history["wall_heat_scale"][-1]) == calibration.parameters["wall_heat_scale"]
+    assert float(history["gamma_offset_error"][-1]) == calibration.standard_errors["gamma_offset"]
+    frozen = np.flatnonzero(history["status"].values == "misfire")
+    moved = np.diff(history["wall_heat_scale"].values)
+    assert np.all(moved[frozen[frozen > 0] - 1] == 0.0)
+    verdict = calibration.verdicts["wall_heat_scale"]
+    assert verdict.knowledge == "determined"
+    assert abs(verdict.value - 0.5) < 3.0 * verdict.standard_error
+    assert verdict.sentence in calibration.summary()
+    assert "bar rms" in calibration.summary()
+    assert "wall_heat_scale" in repr(calibration)
+
+
+@pytest.mark.parametrize("method", ["gauss_newton", "recursive", "extremum_seeking"])
+def test_state_and_pickle_go_on_bit_for_bit(method: str) -> None:
+    bench = EngineBench(pressure_noise_bar=0.2, seed=5)
+    calibration = OnlineCalibration(WRONG, method=method, window_cycles=7, uncertainty={"gamma_offset": 0.003})
+    drive(bench, calibration, 25)
+    twin = pickle.loads(pickle.dumps(calibration))
+    other = OnlineCalibration(**calibration.settings)
+    other.state = json.loads(json.dumps(calibration.state))
+    assert twin.settings == calibration.settings == other.settings
+    for each in (twin, other):
+        assert drive(copy.deepcopy(bench), each, 20) == drive(copy.deepcopy(bench), copy.deepcopy(calibration), 20)
+    drive(bench, calibration, 20)
+    assert twin.parameters == calibration.parameters == other.parameters
+    assert twin.history.identical(calibration.history)
+    with pytest.raises(ParameterError, match="state column"):
+        other.state = {**calibration.state, "parameters": [float("nan")] * 8}
+    assert other.state == calibration.state
+
+
+def test_several_parameters_and_a_measured_fuel() -> None:
+    bench = EngineBench(pressure_noise_bar=0.1, tdc_error_cad=0.8, soc_scatter_cad=0.0, seed=4)
+    names = ("wall_heat_scale", "tdc_offset_cad", "soc_offset_cad")
+    told = OnlineCalibration(WRONG, method="recursive", parameters=names, uncertainty={"fuel_heat_scale": 0.0})
+    free = OnlineCalibration(WRONG, method="recursive", parameters=names)
+    for calibration in (told, free):
+        drive(copy.deepcopy(bench), calibration, 100)
+    assert list(told.verdicts) == ["wall_heat_scale", "soc_offset_cad", "tdc_offset_cad"]
+    assert told.parameters["tdc_offset_cad"] == pytest.approx(0.8, abs=0.1)
+    assert told.parameters["fuel_heat_scale"] == 1.0
+    assert told.standard_errors["tdc_offset_cad"] < 0.8 * free.standard_errors["tdc_offset_cad"]
+
+
+def test_a_refused_cycle_says_why() -> None:
+    bench = EngineBench()
+    calibration = OnlineCalibration(presets.load("puma_single"))
+    drive(bench, calibration, 12)
+    trace = bench.pressure()[1]
+    before = calibration.cylinder
+    assert calibration.offer(np.where(np.arange(271) == 9, np.nan, trace), bench.point, -6.0) == "unusable numbers"
+    assert calibration.update() == "unusable numbers"
+    assert calibration.offer(np.minimum(trace, 90.0), bench.point, -6.0) == "saturated"
+    assert calibration.offer(trace, bench.point, -6.0, misfire=True) == "misfire"
+    assert calibration.offer(trace, OperatingPoint(fuel_mg=30.0), -6.0) == "unsteady"
+    assert calibration.update() == calibration.status == "unsteady"
+    assert calibration.cylinder == before
+    with pytest.raises(ShapeError, match=r"shape \(270,\): must be \(271,\), one per angle of angles_cad"):
+        calibration.offer(trace[1:], bench.point, -6.0)
+
+
+@pytest.mark.parametrize(
+    ("arguments", "message"),
+    [
+        ({"method": "kalman"}, "method = 'kalman'"),
+        ({"parameters": ()}, "parameters is empty"),
+        ({"parameters": "wall_heat_scale"}, "a sequence of names"),
+        ({"parameters": ("c1",)}, "parameters = 'c1': must be one of wall_heat_scale, soc_offset_cad"),
+        ({"uncertainty": {"tdc": 0.1}}, "uncertainty = 'tdc': must be one of"),
+        ({"uncertainty": {"pressure_gain": -0.1}}, "uncertainty of pressure_gain = -0.1"),
+        ({"window_cycles": 1}, "window_cycles = 1 cycles"),
+        ({"method": "extremum_seeking", "parameters": ("tdc_offset_cad",)}, "wall_heat_scale alone"),
+        ({"forgetting": 2.0}, "forgetting = 2"),
+    ],
+)
+def test_settings_are_refused_by_name(arguments: dict[str, Any], message: str) -> None:
+    with pytest.raises(ParameterError, match=message):
+        OnlineCalibration("puma_single", **arguments)
