@@ -11,12 +11,25 @@ from contextlib import contextmanager
 from dataclasses import replace
 from typing import TYPE_CHECKING, Any
 
+import numpy as np
+
+from mgdd.cli.guidance import (
+    CURVES,
+    GuidedTask,
+    add_guidance,
+    check_guidance,
+    guided_seeker,
+    late_loss,
+    task_with_guide,
+    with_start,
+)
 from mgdd.cli.options import add_command, add_engine, engine_of, number_pairs
 from mgdd.cli.output import Stopped, check_figure, check_output, emit, lines, save_figure
 from mgdd.cli.seek_limits import COV, COV_CYCLES, choose_start, doubts_of, limit_report, limit_text
 from mgdd.cli.seekers import Task, default_cycles, make_seeker
 from mgdd.engine import Performance
 from mgdd.errors import ConvergenceError, Interrupted, ParameterError
+from mgdd.guide import GuidedEngine
 from mgdd.loop import EngineBench, LoopCriteria, run_seeker
 from mgdd.loop.plant_loop import LoopRun
 from mgdd.optimize import Optimum
@@ -37,6 +50,7 @@ _COV_TRIAL = 1000
 _START_CAD = -20.0
 _MOST_CYCLES = 2_000_000
 _ARRIVAL_CAD = 1.0
+_STAYS_CAD = 1.5
 # Fields of the library and the options that set them.
 _OPTIONS = {"efficiency_noise_percent": "--noise", "misfire_probability": "--misfire", "start": "--start-cad",
             "limits": "--limit", "soc_scatter_cad": "--soc-scatter-cad", "seed": "--seed"}  # fmt: skip
@@ -50,11 +64,12 @@ def add_seek(verbs: Any) -> None:
         example="mgdd engine seek --method extremum_seeking --limit p_max_bar=95 --json",
         endings=".json or .csv, the cycles",
     )  # fmt: skip
-    parser.add_argument("--method", choices=_METHODS, default="extremum_seeking", help="default: extremum_seeking")
+    parser.add_argument("--method", choices=_METHODS, help="default: extremum_seeking")
     parser.add_argument("--form", choices=_FORMS, help="of extremum_seeking (default: batch)")
     parser.add_argument(
         "--start-cad", type=float, metavar="X",
-        help="first SOC (default: -20; with --limit a start whose noise-free values stay below the limits)",
+        help="first SOC (default: -20; with --guide the guide's best timing; with --limit a start whose noise-free values "
+        "stay below the limits)",
     )  # fmt: skip
     parser.add_argument("--lower-cad", type=float, default=-30.0, metavar="X", help="earliest SOC (default: -30)")
     parser.add_argument("--upper-cad", type=float, default=10.0, metavar="X", help="latest SOC (default: 10)")
@@ -85,12 +100,17 @@ def add_seek(verbs: Any) -> None:
         help="standard deviation of the measured efficiency, in points (default: 0.25)",
     )  # fmt: skip
     group.add_argument("--misfire", type=float, default=0.0, metavar="P", help="probability per cycle (default: 0)")
+    add_guidance(parser)
     add_engine(parser)
 
 
 def _seek(args: argparse.Namespace) -> None:
     check_output(args, ".json", ".csv")
     check_figure(args.figure)
+    check_guidance(args)
+    guided_curve = args.guide in CURVES
+    if args.method is None and not guided_curve:
+        args.method = "extremum_seeking"
     _check(args)
     limits = number_pairs(args.limit, "--limit")
     for name, value in limits.items():
@@ -99,8 +119,9 @@ def _seek(args: argparse.Namespace) -> None:
     bench, preset = _bench(args, limits)
     _check_bounds(args, bench)
     best = _optimum(args, bench, limits)
+    guided = None if args.guide == "none" else task_with_guide(args, bench)
     task = Task(
-        method=args.method,
+        method=args.guide if guided_curve else args.method,
         form=args.form or "batch",
         start_cad=_START_CAD if args.start_cad is None else args.start_cad,
         bounds_cad=(args.lower_cad, args.upper_cad),
@@ -113,11 +134,13 @@ def _seek(args: argparse.Namespace) -> None:
         best=best,
     )
     reason = "default" if args.start_cad is None else "as given"
+    if args.start_cad is None and guided is not None:
+        task, reason = with_start(task, guided), "best timing of the guide"
     if args.start_cad is None and limits:
         start, reason = choose_start(task)
         task = replace(task, start_cad=start)
     with _option_names():
-        seeker = make_seeker(task)
+        seeker = make_seeker(task) if guided is None else guided_seeker(task, guided)
     cycles = default_cycles(task) if args.cycles is None else args.cycles
     goal = LoopCriteria(optimum=best["soc_cad"], arrival=_ARRIVAL_CAD)
     try:
@@ -132,6 +155,7 @@ def _seek(args: argparse.Namespace) -> None:
     for doubt in doubts:
         _LOG.warning("%s", doubt)
     payload = _payload(args, preset, run, best, limits)
+    payload |= _guidance_figures(args, guided, seeker, bench, run, best)
     payload |= {"start_cad": task.start_cad, "start_reason": reason, "warnings": doubts}
     report = payload["limit_report"]
     text = [lines(to_jsonable(payload)), *limit_text(report, int(run.summary["judged_from"]))]
@@ -245,6 +269,29 @@ def _payload(
         out["form"] = args.form or "batch"
     if limits:
         out["limit_method"] = args.limit_method or "switching"
+    return out
+
+
+def _guidance_figures(
+    args: argparse.Namespace, guided: GuidedTask | None, seeker: Any, bench: EngineBench, run: LoopRun, best: Optimum
+) -> dict[str, Any]:
+    """Say what the guide did, and what every run is compared by."""
+    away = np.abs(run.dataset["estimate_cad"].to_numpy() - best["soc_cad"])
+    outside = np.flatnonzero(away > _STAYS_CAD)
+    stays = 0 if outside.size == 0 else int(outside[-1]) + 1
+    sd, trust = getattr(seeker, "estimate_sd", math.nan), getattr(seeker, "trust", math.nan)
+    out: dict[str, Any] = {
+        "guide": args.guide,
+        "guide_cad": None if guided is None else guided.guide_cad,
+        "cycles_stays_1_5_cad": stays if stays < away.size else None,
+        "late_loss_percent": late_loss(bench, run.dataset, best),
+        "estimate_sd_cad": sd if math.isfinite(sd) else None,
+        "trust": trust if math.isfinite(trust) else None,
+    }
+    if guided is not None and guided.kind in CURVES:
+        out["guide_shape"] = args.guide_shape or "model"
+    if isinstance(seeker, GuidedEngine) and guided is not None and guided.kind == "calibrated":
+        out |= {"guide_wall_heat_scale": seeker.cylinder.wall_heat_scale, "recalibrations": seeker.recalibrations}
     return out
 
 

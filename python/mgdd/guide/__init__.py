@@ -4,7 +4,8 @@ A guide is any function of the operating point that says where the optimum shoul
 model, `TimingMap` a table, and a function of your own will do. `FeedForward` puts it in front of a seeker of
 `mgdd.optimize`, which learns only what is left; ``guide=None`` is the plain seeker. `CurveSeeking` takes the whole
 curve of a model, held by a `Curve`, which may stand in the wrong place, and finds from a few measurements where it
-stands. `OnlineCalibration` adapts the model itself to the measured pressure.
+stands. `OnlineCalibration` adapts the model itself to the measured pressure, and `GuidedEngine` is
+the whole loop of seeker, model and calibration.
 
 Examples
 --------
@@ -26,8 +27,9 @@ from __future__ import annotations
 from mgdd._core.guide import Curve
 from mgdd.guide.curve_seeking import CurveSeeking
 from mgdd.guide.feed_forward import FeedForward
+from mgdd.guide.guided_engine import GuidedEngine
 from mgdd.guide.model_optimum import ModelOptimum
 from mgdd.guide.online_calibration import OnlineCalibration
 from mgdd.guide.timing_map import TimingMap
 
-__all__ = ["Curve", "CurveSeeking", "FeedForward", "ModelOptimum", "OnlineCalibration", "TimingMap"]
+__all__ = ["Curve", "CurveSeeking", "FeedForward", "GuidedEngine", "ModelOptimum", "OnlineCalibration", "TimingMap"]

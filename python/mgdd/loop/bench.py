@@ -204,6 +204,7 @@ class EngineBench(_core.loop.EngineBench):
             values={name: float(value) for name, value in cycle.items()},
             noise_free_limits=dict(zip(self.limit_names, map(float, noise_free), strict=True)),
             applied={"soc_cad": float(cycle["soc_applied_cad"])},
+            pressure_bar=self.pressure()[1],
         )
 
     def pressure(self) -> tuple[NDArray[np.float64], NDArray[np.float64]]:

@@ -5,10 +5,14 @@ from __future__ import annotations
 import math
 from collections.abc import Mapping
 from dataclasses import dataclass, field
-from typing import Protocol, runtime_checkable
+from typing import TYPE_CHECKING, Protocol, runtime_checkable
 
 from mgdd.errors import ParameterError
 from mgdd.results.describe import described
+
+if TYPE_CHECKING:
+    import numpy as np
+    from numpy.typing import NDArray
 
 __all__ = ["AnnouncingPlant", "Measurement", "Plant", "checked_inputs"]
 
@@ -32,6 +36,8 @@ class Measurement:
         Limited quantities at these inputs without scatter and noise; empty where the plant does not know them.
     applied : mapping of str to float
         Inputs that were really applied, by name, for a plant that clamps them; what is missing was applied as asked.
+    pressure_bar : ndarray, optional
+        Cylinder pressure of the cycle [bar], for a guide that learns from it (`mgdd.guide.GuidedEngine`).
 
     Examples
     --------
@@ -46,6 +52,7 @@ class Measurement:
     values: Mapping[str, float] = field(default_factory=dict)
     noise_free_limits: Mapping[str, float] = field(default_factory=dict)
     applied: Mapping[str, float] = field(default_factory=dict)
+    pressure_bar: NDArray[np.float64] | None = field(default=None, compare=False)
 
     @property
     def performance(self) -> float:

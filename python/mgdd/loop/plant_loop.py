@@ -10,6 +10,7 @@ from typing import TYPE_CHECKING, Any, NamedTuple
 import numpy as np
 
 from mgdd.errors import Interrupted, ParameterError
+from mgdd.guide import FeedForward, GuidedEngine
 from mgdd.loop.bench_record import FLAGS
 from mgdd.loop.criteria import LoopCriteria
 from mgdd.loop.limit_figures import noise_free_variable
@@ -77,7 +78,7 @@ class LoopRun:
     interrupted: bool = False
 
 
-def steer(plant: Plant, seeker: Seeker, cycles: int, criteria: LoopCriteria) -> LoopRun:
+def steer(plant: Plant, seeker: Seeker | FeedForward | GuidedEngine, cycles: int, criteria: LoopCriteria) -> LoopRun:
     """Run the loop of `mgdd.loop.run_seeker` from Python."""
     if cycles < 1:
         raise ParameterError.of("cycles", cycles, ">= 1")
@@ -106,7 +107,7 @@ def steer(plant: Plant, seeker: Seeker, cycles: int, criteria: LoopCriteria) -> 
     except KeyboardInterrupt:
         interrupted = True
         del log[seeker.cycle - first :]  # a cycle that was measured and not told: it is asked again
-    dataset = _dataset(log, first, plant.input_names)
+    dataset = _dataset(log, first, plant.input_names, _guided(seeker, len(log)))
     dataset.attrs["interrupted"] = int(interrupted)
     run = LoopRun(dataset=dataset, summary=summarize_cycles(dataset, criteria), interrupted=interrupted)
     if interrupted:
@@ -114,8 +115,12 @@ def steer(plant: Plant, seeker: Seeker, cycles: int, criteria: LoopCriteria) -> 
     return run
 
 
-def _one_cycle(plant: Plant, announcing: AnnouncingPlant | None, seeker: Seeker, log: list[_Row]) -> None:
-    if announcing is not None and announcing.operating_point_changes:
+def _one_cycle(
+    plant: Plant, announcing: AnnouncingPlant | None, seeker: Seeker | FeedForward | GuidedEngine, log: list[_Row]
+) -> None:
+    if isinstance(seeker, FeedForward | GuidedEngine) and hasattr(plant, "point"):
+        seeker.at(plant.point)
+    elif announcing is not None and announcing.operating_point_changes:
         seeker.restart()
     estimate = np.array(seeker.estimate, np.float64)
     asked = np.array(seeker.ask(), np.float64)
@@ -129,7 +134,10 @@ def _one_cycle(plant: Plant, announcing: AnnouncingPlant | None, seeker: Seeker,
     limits = [measured.limits[name] for name in seeker.limit_names]
     applied = _applied(plant.input_names, asked, measured)
     log.append(_Row(estimate, asked, applied, void, measured))
-    seeker.tell(told, limits if limits else None, misfire=void, applied=applied if measured.applied else None)
+    reading: dict[str, Any] = {"misfire": void, "applied": applied if measured.applied else None}
+    if isinstance(seeker, GuidedEngine):
+        reading["pressure_bar"] = measured.pressure_bar
+    seeker.tell(told, limits if limits else None, **reading)
     if late:
         seeker.restart()
 
@@ -143,7 +151,7 @@ def _applied(names: tuple[str, ...], asked: NDArray[np.float64], measured: Measu
     )
 
 
-def _require_match(seeker: Seeker, measured: Measurement) -> None:
+def _require_match(seeker: Seeker | FeedForward | GuidedEngine, measured: Measurement) -> None:
     if seeker.component_count not in (1, len(measured.components)):
         raise ParameterError(
             f"components has {seeker.component_count} entries: the plant measures {len(measured.components)}; give as "
@@ -175,7 +183,17 @@ def _steered(log: list[_Row], inputs: tuple[str, ...]) -> dict[str, tuple[Any, .
     }
 
 
-def _dataset(log: list[_Row], first: int, inputs: tuple[str, ...]) -> xr.Dataset:
+def _guided(seeker: Seeker | FeedForward | GuidedEngine, cycles: int) -> dict[str, tuple[Any, ...]]:
+    """Give what came from the guide, what from the trim, and the trust, of the last cycles of a guided engine."""
+    if not isinstance(seeker, GuidedEngine) or not cycles:
+        return {}
+    last = seeker.history.isel(cycle=slice(-cycles, None))
+    names = ("guide_cad", "feed_forward_cad", "trim_cad", "estimate_sd_cad", "trust", "wall_heat_scale")
+    labels = {name: (last[name].attrs["units"], last[name].attrs["long_name"]) for name in names}
+    return {name: ("cycle", last[name].to_numpy(), *labels[name]) for name in names}
+
+
+def _dataset(log: list[_Row], first: int, inputs: tuple[str, ...], guided: dict[str, tuple[Any, ...]]) -> xr.Dataset:
     """Label what was measured; a value that is missing in some cycles is NaN there."""
     rows = [row.measured for row in log]
     names = dict.fromkeys(name for row in rows for name in row.values)
@@ -188,6 +206,7 @@ def _dataset(log: list[_Row], first: int, inputs: tuple[str, ...]) -> xr.Dataset
         "j": ("cycle", np.array([row.performance for row in rows], np.float64)),
         "misfire": ("cycle", np.array([row.misfire for row in rows], np.bool_), "-", FLAGS["misfire"]),
         "void": ("cycle", np.array([row.void for row in log], np.bool_), "-", "cycle that the seeker did not use"),
+        **guided,
     }
     for name, values in columns.items():
         if name in FLAGS and name not in _OWN:

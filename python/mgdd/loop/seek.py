@@ -11,6 +11,7 @@ import numpy as np
 
 from mgdd import _core
 from mgdd.errors import ParameterError, ShapeError, hand_over, or_partial
+from mgdd.guide import FeedForward, GuidedEngine
 from mgdd.loop.bench import EngineBench
 from mgdd.loop.bench_record import cycles_to_dataset
 from mgdd.loop.criteria import LoopCriteria
@@ -47,7 +48,7 @@ _SUMMARY = {
 
 def run_seeker(
     plant: Plant,
-    seeker: Seeker,
+    seeker: Seeker | FeedForward | GuidedEngine,
     cycles: int,
     *,
     criteria: LoopCriteria | None = None,
@@ -65,7 +66,7 @@ def run_seeker(
     plant : Plant
         It advances by ``cycles``; a rig is open and stays open.
     seeker
-        Any seeker of `mgdd.optimize` with one input for every name of ``plant.input_names``, one component or as many
+        Any seeker of `mgdd.optimize` or `mgdd.guide` with one input for every name of ``plant.input_names``, one component or as many
         as the plant measures, and limits that the plant measures.
     cycles : int
         How many, >= 1.
@@ -100,7 +101,7 @@ def run_seeker(
     True
     """
     criteria = criteria or LoopCriteria()
-    if not isinstance(plant, EngineBench):
+    if not isinstance(plant, EngineBench) or isinstance(seeker, FeedForward | GuidedEngine):
         return steer(plant, seeker, cycles, criteria)
     goal = _core_criteria(plant, criteria)
     run: Any = _core.loop.run_loop  # one overload for each class of seeker

@@ -1,0 +1,200 @@
+"""Guides of `mgdd engine seek`: a rough cycle model, a parabola or a map in front of the seeker."""
+
+from __future__ import annotations
+
+import argparse
+import math
+from dataclasses import dataclass, replace
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from mgdd import presets
+from mgdd._core.engine import Cylinder, OperatingPoint
+from mgdd.cli.options import assignments, refuse_idle
+from mgdd.cli.seekers import Task, make_seeker
+from mgdd.errors import ParameterError
+from mgdd.guide import Curve, CurveSeeking, FeedForward, GuidedEngine, ModelOptimum, OnlineCalibration, TimingMap
+from mgdd.optimize import Optimum
+
+if TYPE_CHECKING:
+    import xarray as xr
+
+    from mgdd.loop import EngineBench
+    from mgdd.optimize import Seeker
+
+__all__ = [
+    "CURVES",
+    "GUIDES",
+    "GuidedTask",
+    "add_guidance",
+    "check_guidance",
+    "guided_seeker",
+    "late_loss",
+    "task_with_guide",
+    "with_start",
+]
+
+GUIDES = ("none", "feed_forward", "curve", "calibrated", "map")
+CURVES = ("curve", "calibrated")
+_SHAPES = ("model", "parabola")
+_POINT = frozenset(OperatingPoint.fields())
+_PARABOLA_BEND = -0.05  # of ten cycle models, wall heat 0 to 1 and 25 to 60 °CA of burn: -0.037 to -0.054
+_CALIBRATED = ("wall_heat_scale", "burn_duration_scale")
+_REACH_CAD = 60.0
+_STEADY_GRID_CAD = 0.1
+
+
+@dataclass(frozen=True, kw_only=True)
+class GuidedTask:
+    """What guides a run, and where it says the best timing is."""
+
+    kind: str
+    cylinder: Cylinder
+    guide_cad: float
+    model: ModelOptimum | None = None
+    curve: Curve | None = None
+    table: TimingMap | None = None
+
+
+def add_guidance(parser: argparse.ArgumentParser) -> None:
+    """Add the options of the guide."""
+    group = parser.add_argument_group("guide", "a rough model that leads while the measurements decide")
+    group.add_argument(
+        "--guide", choices=GUIDES, default="none",
+        help="feed_forward: the model's best timing, the seeker learns the rest; curve: the model's whole curve, placed by "
+        "the measurements; calibrated: the same while the model learns from the measured pressure; map: a table of "
+        "timings as feed-forward (default: none)",
+    )  # fmt: skip
+    group.add_argument(
+        "--guide-preset", metavar="NAME_OR_FILE.toml", help="cylinder of the model (default: that of the bench)"
+    )
+    group.add_argument(
+        "--guide-set", action="append", default=[], metavar="FIELD=VALUE",
+        help="any field of the model's cylinder, repeatable, for example wall_heat_scale=1.0",
+    )  # fmt: skip
+    group.add_argument(
+        "--guide-shape", choices=_SHAPES,
+        help="of the curve: the model's, or a plain parabola about the model's best timing (default: model)",
+    )  # fmt: skip
+    group.add_argument("--guide-map", metavar="FILE.toml", help="the table of --guide map")
+
+
+def check_guidance(args: argparse.Namespace) -> None:
+    """Refuse options of a guide that is not there, and a guide that does not fit the method."""
+    if args.guide == "none":
+        refuse_idle(args, "guide_preset", "guide_set", "guide_shape", "guide_map", why="--guide none has no model")
+        return
+    if args.guide == "map":
+        refuse_idle(args, "guide_preset", "guide_set", "guide_shape", why="--guide map has a table, not a model")
+        if args.guide_map is None:
+            raise ParameterError("--guide map needs --guide-map FILE.toml, a table that TimingMap.to_toml wrote")
+    else:
+        refuse_idle(args, "guide_map", why=f"--guide {args.guide} has a model, not a table")
+    if args.guide in CURVES:
+        if args.method is not None or args.form is not None:
+            option = "--method" if args.method is not None else "--form"
+            raise ParameterError(
+                f"{option} acts with --guide none, feed_forward or map: --guide {args.guide} is a seeker itself"
+            )
+        if args.sensor == "analyser":
+            raise ParameterError(
+                f"--guide {args.guide} takes J of the same cycle, and the NOx of the analyser is late: use --sensor soft, "
+                "or --guide feed_forward"
+            )
+    else:
+        refuse_idle(args, "guide_shape", why=f"--guide {args.guide} takes one timing, not a curve")
+    if args.method == "golden":
+        raise ParameterError("--method golden searches its whole bracket, whatever the guide says: use another method")
+
+
+def task_with_guide(args: argparse.Namespace, bench: EngineBench) -> GuidedTask:
+    """Make the guide and ask it for the best timing at the point of the bench."""
+    if args.guide == "map":
+        table = TimingMap.from_toml(args.guide_map)
+        said = table(bench.point)
+        if said is None:
+            raise ParameterError(
+                f"--guide-map {args.guide_map}: has nothing to say at {bench.point}; its axes end before"
+            )
+        return GuidedTask(kind="map", cylinder=bench.settings["cylinder"], guide_cad=float(said), table=table)
+    cylinder = _cylinder_of(args, bench)
+    settings = bench.settings
+    model = ModelOptimum(
+        cylinder,
+        performance=settings["performance"],
+        nox=settings["true_nox"],
+        bounds_cad=(args.lower_cad, args.upper_cad),
+    )
+    best = model(bench.point)
+    if best is None or not best.curvature < 0.0:
+        raise ParameterError(
+            f"--guide {args.guide}: the model has no best timing between --lower-cad {args.lower_cad:g} and --upper-cad "
+            f"{args.upper_cad:g}: move the bounds or change --guide-set"
+        )
+    curve = None
+    if args.guide in CURVES:
+        curve = model.curve(bench.point)
+        if args.guide_shape == "parabola":
+            curve = Curve.parabola(curvature=_PARABOLA_BEND, best=best["soc_cad"], reach=_REACH_CAD)
+    return GuidedTask(
+        kind=args.guide,
+        cylinder=cylinder,
+        guide_cad=best["soc_cad"] if curve is None else curve.best,
+        model=model,
+        curve=curve,
+    )
+
+
+def _cylinder_of(args: argparse.Namespace, bench: EngineBench) -> Cylinder:
+    base: Cylinder = bench.settings["cylinder"]
+    if args.guide_preset is not None:
+        base = presets.load(args.guide_preset, kind="engine").cylinder
+    if known := sorted(_POINT & {item.partition("=")[0] for item in args.guide_set}):
+        raise ParameterError(f"--guide-set {known[0]}: belongs to the operating point, which guide and bench share")
+    given = assignments(args.guide_set, Cylinder.fields())
+    return base.replace(**given)
+
+
+def guided_seeker(task: Task, guided: GuidedTask) -> Seeker | FeedForward | GuidedEngine:
+    """Make what the loop steers."""
+    if guided.curve is not None:
+        seeker = CurveSeeking(
+            start=task.start_cad, lower=task.bounds_cad[0], upper=task.bounds_cad[1], curve=guided.curve
+        )
+        if guided.kind == "curve":
+            return seeker
+        if guided.model is None:
+            raise ParameterError("--guide calibrated: has no model")
+        calibration = OnlineCalibration(
+            guided.cylinder, parameters=_CALIBRATED, steady_cycles=0, window_cycles=5,
+            soc_scatter_cad=float(task.bench.settings["soc_scatter_cad"]),
+        )  # fmt: skip
+        return GuidedEngine(seeker, guided.model, task.bench.point, calibration=calibration)
+    plain = make_seeker(task)
+    if guided.table is not None:
+        return FeedForward(plain, guided.table)
+    if guided.model is None:
+        raise ParameterError(f"--guide {guided.kind}: has no model")
+    return GuidedEngine(plain, guided.model, task.bench.point)
+
+
+def late_loss(bench: EngineBench, cycles: xr.Dataset, best: Optimum) -> float:
+    """Give the J that is lost per cycle over the second half, by what was applied, against the steady optimum."""
+    applied = cycles["soc_applied_cad" if "soc_applied_cad" in cycles else "soc_requested_cad"].to_numpy()
+    late = applied[applied.size // 2 :]
+    if late.size == 0:
+        return math.nan
+    low, high = float(late.min()), float(late.max())
+    grid = (
+        np.linspace(low, high, max(2, math.ceil((high - low) / _STEADY_GRID_CAD) + 1))
+        if high > low
+        else np.array([low])
+    )
+    steady = bench.steady_map(grid, cycle=max(bench.cycle - 1, 0))["j"].to_numpy()
+    return float(best.value - np.mean(np.interp(late, grid, steady)))
+
+
+def with_start(task: Task, guided: GuidedTask) -> Task:
+    """Start at the guide's best timing."""
+    return replace(task, start_cad=guided.guide_cad)

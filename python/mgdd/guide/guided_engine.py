@@ -1,0 +1,227 @@
+"""The whole guided loop of an engine: seek, calibrate, re-optimise, blend."""
+
+from __future__ import annotations
+
+import copy
+import math
+from typing import TYPE_CHECKING, Any, Literal
+
+import numpy as np
+
+from mgdd import _core
+from mgdd._core.engine import OperatingPoint
+from mgdd.errors import ParameterError
+from mgdd.guide.model_optimum import ModelOptimum
+from mgdd.guide.online_calibration import OnlineCalibration
+from mgdd.results.describe import as_html, rows_of
+from mgdd.results.labels import labelled_dataset
+
+if TYPE_CHECKING:
+    import xarray as xr
+    from numpy.typing import ArrayLike
+
+    from mgdd.optimize import Seeker
+
+__all__ = ["GuidedEngine"]
+
+_CAD = "°CA aTDC"
+_COLUMNS = {
+    "guide_cad": (_CAD, "best timing by the guide"),
+    "feed_forward_cad": (_CAD, "feed-forward in force"),
+    "trim_cad": ("°CA", "trim, estimate less feed-forward"),
+    "estimate_cad": (_CAD, "estimate of the best timing"),
+    "estimate_sd_cad": ("°CA", "standard deviation of the estimate as stated"),
+    "trust": ("-", "trust in the guide"),
+    "wall_heat_scale": ("-", "wall-heat scale of the guide"),
+    "applied_cad": (_CAD, "applied timing"),
+    "objective": ("unit of J", "objective J"),
+    "misfire": ("-", "misfired cycle"),
+}
+
+
+class GuidedEngine(_core.guide.GuidedEngine):
+    """Seek, calibrate, re-optimise and blend, one engine cycle at a time.
+
+    ``at(point)`` says at which operating point the next cycle runs, ``ask()`` gives its timing, ``tell(J,
+    pressure_bar=...)`` takes what was measured. A seeker of `mgdd.optimize` gets the model's optimum as feed-forward
+    (`FeedForward`); `CurveSeeking` gets the model's curve. With a calibration the model follows the measured pressure,
+    and what it says anew reaches the seeker without moving the applied timing by itself. `mgdd.loop.run_seeker` runs
+    it on any plant; the work per cycle is bounded.
+
+    Parameters
+    ----------
+    seeker : Seeker
+        Of one input, the start of combustion [°CA aTDC], maximising; copied as it stands.
+    model : ModelOptimum
+        The guide; copied.
+    point : OperatingPoint
+        Of the first cycle; the model must have a best timing there.
+    calibration : OnlineCalibration, optional
+        What keeps the model true to the pressure; copied, of a cylinder of the same geometry.
+    changed_share : float
+        Change of speed, fuel or intake that makes a new operating point [-].
+    calibrated_sd_cad : float
+        How far the best timing of a calibrated model may lie from the plant's, one standard deviation [°CA].
+    recalibrated_cad : float
+        Move of the model's best timing below which a calibration is not passed on [°CA].
+    calibration_rate_cad : float
+        Largest move of a feed-forward per cycle after a calibration [°CA].
+    noise_sd : float, optional
+        Standard deviation of one reading, for the trust in a feed-forward [unit of J]; learnt without.
+
+    Raises
+    ------
+    mgdd.errors.ParameterError
+        A model without a best timing, another geometry, a setting outside its domain.
+
+    References
+    ----------
+    Tan (2018), figure 6-1 and chapter 6 (structure). Curve, trust and bumpless rules are ours.
+
+    Examples
+    --------
+    >>> from mgdd.engine import Cylinder
+    >>> from mgdd.guide import CurveSeeking, GuidedEngine, ModelOptimum, OnlineCalibration
+    >>> from mgdd.loop import EngineBench, run_seeker
+    >>> bench = EngineBench(seed=2)  # its wall heat is 0.5
+    >>> rough = Cylinder(wall_heat_scale=1.0)
+    >>> model = ModelOptimum(rough)
+    >>> curve = model.curve(bench.point)
+    >>> seeker = CurveSeeking(start=curve.best, lower=-30.0, upper=10.0, curve=curve)
+    >>> guided = GuidedEngine(seeker, model, bench.point, calibration=OnlineCalibration(rough))
+    >>> run = run_seeker(bench, guided, 80)
+    >>> round(guided.cylinder.wall_heat_scale, 1), abs(run.summary["final_cad"] + 5.63) < 1.0
+    (0.5, True)
+    """
+
+    def __init__(
+        self,
+        seeker: Seeker,
+        model: ModelOptimum,
+        point: OperatingPoint,
+        *,
+        calibration: OnlineCalibration | None = None,
+        changed_share: float = 0.05,
+        calibrated_sd_cad: float = 2.0,
+        recalibrated_cad: float = 0.1,
+        calibration_rate_cad: float = 1.0,
+        noise_sd: float | None = None,
+    ) -> None:
+        if not isinstance(model, ModelOptimum):
+            raise ParameterError.of("model", model, "a ModelOptimum")
+        if calibration is not None and not isinstance(calibration, OnlineCalibration):
+            raise ParameterError.of("calibration", calibration, "an OnlineCalibration, or None")
+        self._options: dict[str, Any] = {
+            "changed_share": changed_share,
+            "calibrated_sd_cad": calibrated_sd_cad,
+            "recalibrated_cad": recalibrated_cad,
+            "calibration_rate_cad": calibration_rate_cad,
+            "noise_sd": noise_sd,
+        }
+        core = None if calibration is None else calibration._core
+        super().__init__(seeker, model, core, point, **self._options)
+        self._made_of = (copy.deepcopy(seeker), copy.deepcopy(model), copy.deepcopy(calibration), point)
+        self._rows: list[tuple[float, ...]] = []
+
+    @property
+    def settings(self) -> dict[str, Any]:
+        """What it was made of: those of the seeker, and its own."""
+        return {**self._made_of[0].settings, **self._options}
+
+    def at(self, point: OperatingPoint) -> Literal["followed", "refused"]:
+        """Say at which operating point the next cycle runs; call it before `ask`, in every cycle.
+
+        Parameters
+        ----------
+        point : OperatingPoint
+            Speed, fuel and intake.
+
+        Returns
+        -------
+        {"followed", "refused"}
+            ``refused``: the model has no answer there; what it said last stands, and it is asked again in the next
+            cycle.
+
+        Raises
+        ------
+        mgdd.errors.ParameterError
+            A call between `ask` and `tell`.
+        """
+        answer: Literal["followed", "refused"] = self._at(point)
+        return answer
+
+    def tell(
+        self,
+        J: Any = None,  # noqa: N803
+        limits: Any = None,
+        *,
+        misfire: bool = False,
+        applied: Any = None,
+        pressure_bar: ArrayLike | None = None,
+    ) -> None:
+        """Accept what was measured at the timing of the last ask.
+
+        Parameters
+        ----------
+        J : float or array_like
+            Performance, or one number per component.
+        limits : sequence or mapping of str to float, optional
+            One value per limit of the seeker.
+        misfire : bool
+            The cycle is counted and its J and limits are not read.
+        applied : array_like, optional
+            What the plant really applied, if not what was asked for [°CA aTDC].
+        pressure_bar : array_like, optional
+            Pressure of the cycle on the angles of the calibration [bar]; not used without one.
+
+        Raises
+        ------
+        mgdd.errors.ParameterError, mgdd.errors.ShapeError, mgdd.errors.DataError
+            As by the seeker; nothing has changed then.
+        """
+        before = self._now()
+        self._tell(J, limits, misfire, applied, pressure_bar)
+        done = float(self.applied[0]) if applied is None else float(np.ravel(applied)[0])
+        objective = math.nan if misfire else float(np.sum(np.asarray(J, np.float64)))
+        self._rows.append((*before.values(), done, objective, float(misfire)))
+
+    @property
+    def history(self) -> xr.Dataset:
+        """What came from the guide, what from the trim, and the trust, cycle by cycle.
+
+        Over ``cycle``, before each was told: ``guide_cad``, ``feed_forward_cad``, ``trim_cad``, ``estimate_cad``,
+        ``estimate_sd_cad`` (NaN where the seeker states none), ``trust``, ``wall_heat_scale`` of the guide; in the
+        cycle ``applied_cad``, ``objective`` (NaN where it misfired) and ``misfire`` (0 or 1). Built anew on every access.
+        """
+        table = np.array(self._rows, np.float64).reshape(-1, len(_COLUMNS))
+        first = self.cycle - table.shape[0]
+        variables: dict[str, tuple[Any, ...]] = {"cycle": ("cycle", np.arange(first, self.cycle, dtype=np.int64))}
+        for at, (name, label) in enumerate(_COLUMNS.items()):
+            variables[name] = ("cycle", table[:, at], *label)
+        return labelled_dataset(variables, attrs={"seeker": self._made_of[0].kind})
+
+    def __reduce__(self) -> tuple[Any, ...]:
+        return _rebuild, (type(self), self._made_of, self._options, self.state, list(self._rows))
+
+    def __repr__(self) -> str:
+        name = type(self._made_of[0]).__name__
+        return (
+            f"<GuidedEngine with {name}, cycle {self.cycle}, estimate {self.estimate[0]:.6g}, trust {self.trust:.2f}>"
+        )
+
+    def _repr_html_(self) -> str:
+        return as_html("GuidedEngine", rows_of({**self._now(), **self._options}))
+
+
+def _rebuild(
+    cls: type[GuidedEngine],
+    made_of: tuple[Any, ...],
+    options: dict[str, Any],
+    state: dict[str, list[float]],
+    rows: list[tuple[float, ...]],
+) -> GuidedEngine:
+    seeker, model, calibration, point = made_of
+    made = cls(seeker, model, point, calibration=calibration, **options)
+    made.state = state
+    made._rows = rows
+    return made
