@@ -20,6 +20,9 @@ class LocalModel {
   Inputs slope() const noexcept;                      ///< zero while the input has not moved
   double predict(const Inputs& at) const noexcept;
 
+  /// Standard deviation of the readings about the plane; 0 before there are enough to tell.
+  double scatter() const noexcept;
+
   /// True where some entry of the slope exceeds `errors` of its standard errors.
   bool slope_known(double errors) const noexcept;
 
