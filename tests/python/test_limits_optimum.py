@@ -156,7 +156,7 @@ def test_j_never_falls_after_the_first_arrival(name: str) -> None:
     history = seeker.run(lambda x: (mixed(x), PLANES @ x), 12000)
     estimate = history["estimate"].to_numpy()
     rooms = UPPER - estimate @ PLANES.T
-    arrival = int(np.argmax((rooms < 0.6).any(axis=1)))
+    arrival = int(np.argmax((rooms < 0.7).any(axis=1)))
     assert 0 < arrival < 6000
     j = np.array([mixed(x) for x in estimate[arrival:]])
     # Newton seeking moves in every cycle, on what the dither makes of the slope within a window.

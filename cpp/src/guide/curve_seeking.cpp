@@ -101,6 +101,8 @@ optimize::ExtremumSeekingSettings plain_settings(const CurveSeekingSettings& s) 
 CurveSeeking::CurveSeeking(CurveSeekingSettings settings)
     : settings_(checked(std::move(settings))),
       filter_(filter_settings(settings_), settings_.curve),
+      limits_(settings_.limits, settings_.limit_curves, settings_.space.lower[0], settings_.space.upper[0],
+              amplitude_share * settings_.prior_sd, settings_.memory_cycles),
       plain_(plain_settings(settings_)),
       estimate_(settings_.space.start),
       applied_(estimate_),
@@ -127,18 +129,31 @@ const Inputs& CurveSeeking::ask() noexcept {
   } else {
     applied_[0] = estimate_[0] + (upwards_ ? amplitude() : -amplitude());
   }
+  if (sent_count_ > 0) applied_[0] = within_limits(applied_[0]);
   if (protocol_.cycle > 0) applied_[0] = std::clamp(applied_[0], last - settings_.rate, last + settings_.rate);
   applied_[0] = std::clamp(applied_[0], settings_.space.lower[0], settings_.space.upper[0]);
   protocol_.asked = true;
   return applied_;
 }
 
+// An input that a limit forbids is taken back: to the other side of the estimate, or to the edge and inside of it.
+double CurveSeeking::within_limits(double wanted) noexcept {
+  if (limits_.size() == 0) return wanted;
+  const double allowed = limits_.nearest(wanted);
+  if (allowed == wanted || plain_at_work_) return allowed;
+  const double reach = std::min(std::abs(wanted - estimate_[0]), 0.5 * amplitude());
+  const double inside = allowed + std::copysign(reach, allowed - wanted);
+  return upwards_ == (allowed > wanted) && limits_.excess(inside) <= 0.0 ? inside : allowed;
+}
+
 TellStatus CurveSeeking::tell(const Reading& reading) noexcept {
   const TellStatus status = protocol_.check(reading, component_count(), limit_count(), 1);
   protocol_.count(status);
   if (status != TellStatus::accepted && status != TellStatus::misfire) return status;
-  const double applied = applied_input(reading, applied_)[0];
+  Inputs told;
+  const double applied = applied_input(reading, applied_, told)[0];
   upwards_ = !upwards_;
+  if (status == TellStatus::accepted) limits_.record(applied, reading.limits);
   sent_[static_cast<std::size_t>(sent_count_ % (delay_ + 1))] = applied;
   ++sent_count_;
   if (plain_at_work_) {
@@ -174,7 +189,7 @@ void CurveSeeking::learn(double cause, double j) noexcept {
     doubt_rate_ += 1.0;
     ++doubts_;
   }
-  estimate_[0] = filter_.mean();
+  estimate_[0] = limits_.size() > 0 ? limits_.nearest(filter_.mean()) : filter_.mean();
   const bool misfit = repeats_ >= fewest_repeats && !(trust() > 0.0);
   if (settings_.hand_over && (doubt_rate_ > doubt_rate_limit || misfit)) take_over();
 }
@@ -232,7 +247,7 @@ bool CurveSeeking::believe(const Curve& curve, double sd) noexcept {
   return true;
 }
 
-bool CurveSeeking::guide(const Curve& curve) noexcept {
+bool CurveSeeking::guide(const Curve& curve, std::span<const Curve> limit_curves) noexcept {
   if (!usable(curve)) {
     restart();
     return false;
@@ -240,11 +255,13 @@ bool CurveSeeking::guide(const Curve& curve) noexcept {
   const bool learnt = filter_.readings() > 0.0 || plain_at_work_;
   const double error = learnt ? estimate_[0] - filter_.curve().best() : 0.0;
   const double sd = learnt ? filter_.spread() : settings_.prior_sd;
+  limits_.restart(limit_curves);
   begin_at(curve, curve.best() + error, std::hypot(sd, point_doubt_share * settings_.prior_sd));
   return true;
 }
 
 void CurveSeeking::restart() noexcept {
+  limits_.restart({});
   begin_at(filter_.curve(), estimate_[0], std::hypot(filter_.spread(), lost_share * settings_.prior_sd));
 }
 

@@ -1,5 +1,6 @@
 #include "mgdd/guide/guided_engine.hpp"
 
+#include <array>
 #include <cmath>
 #include <limits>
 #include <utility>
@@ -19,6 +20,17 @@ optimize::VariantSeeker::Settings shared_settings(const GuidedEngine::Seeking& s
         return optimize::VariantSeeker::Settings{s.settings().space, s.settings().maximize, s.settings().limits};
       },
       seeking);
+}
+
+// Of the model's cycle, by the names of the limits; none where one of them is no indicator.
+std::vector<double engine::Indicators<double>::*> indicators_of(const std::vector<optimize::Limit>& limits) {
+  std::vector<double engine::Indicators<double>::*> out;
+  for (const optimize::Limit& limit : limits) {
+    for (const auto& field : engine::indicator_fields<double>()) {
+      if (field.name == limit.name) out.push_back(field.member);
+    }
+  }
+  return out.size() == limits.size() ? out : std::vector<double engine::Indicators<double>::*>{};
 }
 
 bool differs(double now, double before, double share) noexcept {
@@ -41,7 +53,8 @@ GuidedEngine::GuidedEngine(Seeking seeking, ModelOptimum model, std::optional<On
       point_(point),
       advised_(point),
       guidance_(settings),
-      settings_(shared_settings(seeking_)) {
+      settings_(shared_settings(seeking_)),
+      limited_(indicators_of(settings_.limits)) {
   validate(settings);
   if (settings_.space.size() != 1) {
     throw about("seeker", ShapeError("seeker has " + std::to_string(settings_.space.size()) +
@@ -66,9 +79,11 @@ GuideStatus GuidedEngine::advise(GuideCause cause, bool opened) noexcept {
   GuideStatus status = GuideStatus::refused;
   if (auto* const curve_seeking = std::get_if<CurveSeeking>(&seeking_)) {
     Curve curve;
-    if (model_.tabulate(point_, curve)) {
+    std::array<Curve, ModelOptimum::max_curves> own;
+    const std::span<Curve> limit_curves(own.data(), limited_.size());
+    if (model_.tabulate(point_, curve, limited_, limit_curves)) {
       const bool taken = cause == GuideCause::calibration ? curve_seeking->believe(curve, guidance_.calibrated_sd_cad)
-                                                          : curve_seeking->guide(curve);
+                                                          : curve_seeking->guide(curve, limit_curves);
       if (taken) {
         status = GuideStatus::followed;
         guide_cad_ = curve.best();
@@ -121,7 +136,8 @@ TellStatus GuidedEngine::tell(const Reading& reading, std::span<const double> pr
   const TellStatus status = std::visit([&](auto& s) { return s.tell(reading); }, seeking_);
   if (!calibration_ || pressure_bar.empty()) return status;
   if (status != TellStatus::accepted && status != TellStatus::misfire) return status;
-  const double soc_cad = applied_input(reading, asked)[0];
+  Inputs told;
+  const double soc_cad = applied_input(reading, asked, told)[0];
   if (calibration_->offer(pressure_bar, point_, soc_cad, status == TellStatus::misfire) ==
           CalibrationStatus::accepted &&
       calibration_->update() == CalibrationStatus::updated) {
@@ -156,6 +172,10 @@ const optimize::Protocol& GuidedEngine::protocol() const noexcept {
 }
 std::size_t GuidedEngine::component_count() const noexcept {
   return std::visit([](const auto& s) { return s.component_count(); }, seeking_);
+}
+
+optimize::LimitState GuidedEngine::limit_state(std::size_t i) const noexcept {
+  return std::visit([&](const auto& s) { return optimize::limit_state_of(s, i); }, seeking_);
 }
 
 GuidedCycle GuidedEngine::now() const noexcept {

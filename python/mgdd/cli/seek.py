@@ -154,7 +154,7 @@ def _seek(args: argparse.Namespace) -> None:
     doubts = doubts_of(run, limits, remedy)
     for doubt in doubts:
         _LOG.warning("%s", doubt)
-    payload = _payload(args, preset, run, best, limits)
+    payload = _payload(args, preset, run, best, limits, seeker.limit_states)
     payload |= _guidance_figures(args, guided, seeker, bench, run, best)
     payload |= {"start_cad": task.start_cad, "start_reason": reason, "warnings": doubts}
     report = payload["limit_report"]
@@ -240,7 +240,12 @@ def _optimum(args: argparse.Namespace, bench: EngineBench, limits: Mapping[str, 
 
 
 def _payload(
-    args: argparse.Namespace, preset: str, run: LoopRun, best: Optimum, limits: Mapping[str, float]
+    args: argparse.Namespace,
+    preset: str,
+    run: LoopRun,
+    best: Optimum,
+    limits: Mapping[str, float],
+    states: Mapping[str, str],
 ) -> dict[str, Any]:
     summary = run.summary
     out: dict[str, Any] = {
@@ -262,7 +267,7 @@ def _payload(
         "misfires": int(summary["misfires"]),
         "limits": dict(limits),
         "judged_from": int(summary["judged_from"]),
-        "limit_report": limit_report(run, best, limits),
+        "limit_report": limit_report(run, best, limits, states),
         "interrupted": run.interrupted,
     }
     if args.method == "extremum_seeking":

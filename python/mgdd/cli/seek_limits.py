@@ -67,8 +67,10 @@ def _excess(task: Task, timings: np.ndarray[Any, np.dtype[np.float64]]) -> np.nd
     return out
 
 
-def limit_report(run: LoopRun, best: Optimum, limits: Mapping[str, float]) -> dict[str, dict[str, Any]]:
-    """Give the figures of the run per limit, and the share above the limit and three standard deviations."""
+def limit_report(
+    run: LoopRun, best: Optimum, limits: Mapping[str, float], states: Mapping[str, str]
+) -> dict[str, dict[str, Any]]:
+    """Give per limit the figures of the run, its state at the end, and the share above three standard deviations."""
     summary, out = run.summary, dict[str, dict[str, Any]]()
     own = 1.0 / math.sqrt(2.0 * (COV_CYCLES - 1))  # a COV of n cycles scatters by 1/sqrt(2n - 2) of its value
     for name, upper in limits.items():
@@ -77,6 +79,7 @@ def limit_report(run: LoopRun, best: Optimum, limits: Mapping[str, float]) -> di
         free = {figure: summary.get(f"{NOISE_FREE}{figure}_{name}") for figure in FIGURES}
         out[name] = {figure: summary[f"{figure}_{name}"] for figure in FIGURES if f"{figure}_{name}" in summary}
         out[name] |= {
+            "state": states[name],
             "noise_free": {figure: value for figure, value in free.items() if value is not None} or None,
             "scatter_margin": margin,
             "threshold_with_margin": upper + margin,
@@ -89,9 +92,10 @@ def limit_text(report: Mapping[str, Mapping[str, Any]], judged_from: int) -> lis
     """Say in two lines per limit how it was kept."""
     out = []
     for name, own in report.items():
+        infeasible = "; infeasible with the other limits and the bounds" if own["state"] == "infeasible" else ""
         out.append(
             f"{name} as measured: {_kept(own, judged_from)}, {_percent(own['judged_above_threshold_fraction'])} above "
-            f"{own['threshold_with_margin']:.6g} (plus {_SCATTER:g} standard deviations of the scatter)"
+            f"{own['threshold_with_margin']:.6g} (plus {_SCATTER:g} standard deviations of the scatter){infeasible}"
         )
         if own["noise_free"] is not None:
             free = {"limit": own["limit"], **own["noise_free"]}

@@ -47,7 +47,10 @@ class CurveSeeking(Seeker, _core.guide.CurveSeeking):
     maximize : bool
         False to minimise J; the curve is that of -J then.
     limits : sequence of Limit
-        Measured quantities to keep.
+        Measured quantities to keep; ``tell(J, limits)`` then takes their values.
+    limit_curves : sequence of Curve, optional
+        The guide's curve of every limited quantity, which gives its shape; level and slope are learnt. Without, their
+        slopes are learnt by trying, in small steps.
 
     Raises
     ------

@@ -181,7 +181,8 @@ class BoundedSeeking(Seeker, _core.optimize.BoundedSeeking):
     maximize : bool
         False to minimise J.
     limits : sequence of Limit
-        Measured quantities to keep.
+        Measured quantities to keep. The oscillation is the search itself: single steps are held back, and while nothing
+        is known of a late limit yet, the search goes on where other seekers wait.
     curvature : float, optional
         J'' if known: a kappa above the bound of averaging gives a UserWarning with that bound.
 

@@ -48,6 +48,8 @@ if TYPE_CHECKING:
         def component_count(self) -> int: ...
         @property
         def limit_names(self) -> list[str]: ...
+        @property
+        def limit_states(self) -> dict[str, str]: ...
         def ask(self) -> NDArray[np.float64]: ...
         def tell(
             self,
@@ -137,11 +139,18 @@ class Seeker(_CoreSeeker):
         """What was applied and told, cycle by cycle.
 
         Dimensions `cycle` and `input`; variables `applied` (as asked, where ``tell`` was not told ``applied``) and
-        `estimate` (before the cycle was told), both (cycle, input) in the unit of the input,
-        `objective` (J as told, components summed; NaN where the cycle
-        misfired) and `misfire` (0 or 1). Built anew on every access.
+        `estimate` (before the cycle was told), both (cycle, input) in the unit of the input, `objective` (J as told,
+        components summed; NaN where the cycle misfired) and `misfire` (0 or 1). With limits also dimension `limit`, and
+        over (cycle, limit) `limits` as told and `limit_states` after the cycle (0 free, 1 active, 2 infeasible). Built
+        anew on every access.
         """
         columns = self._history_columns()
+        names, over, unit = self.limit_names, ("cycle", "limit"), "unit of the limit"
+        limited: dict[str, tuple[Any, ...]] = {
+            "limit": ("limit", names, "-", "limited quantity"),
+            "limits": (over, columns["limits"], unit, "measured value of a limited quantity"),
+            "limit_states": (over, columns["limit_states"].astype(np.int8), "-", "0 free, 1 active, 2 infeasible"),
+        }
         return labelled_dataset(
             {
                 "cycle": ("cycle", columns["cycle"].astype(np.int64)),
@@ -150,6 +159,7 @@ class Seeker(_CoreSeeker):
                 "estimate": (("cycle", "input"), columns["estimate"], _INPUT_UNIT, "estimate of the optimum"),
                 "objective": ("cycle", columns["objective"], _J_UNIT, "objective J"),
                 "misfire": ("cycle", columns["misfire"].astype(np.int8), "-", "misfired cycle"),
+                **(limited if names else {}),
             },
             attrs={"seeker": self.kind},
         )
@@ -260,7 +270,7 @@ def _encode(value: Any) -> Any:
     if isinstance(value, _core.optimize.ComponentLag):
         return {"component_lag": {"delay_cycles": value.delay_cycles, "lag_cycles": value.lag_cycles}}
     if isinstance(value, _core.optimize.Limit):
-        names = ("name", "upper", "margin", "method", "weight", "scale")
+        names = ("name", "upper", "margin", "method", "weight", "scale", "delay_cycles", "lag_cycles", "margin_sd")
         return {"limit": {name: getattr(value, name) for name in names}}
     if isinstance(value, _core.guide.Curve):
         return {"curve": value._table}

@@ -46,8 +46,10 @@ TEST(LocalModel, DoesNotClaimASlopeThatNoiseExplains) {
 // --- what it lets pass --------------------------------------------------------------------------------------
 
 /// A filter that knows planes value = level + slope x, from exact measurements around `at`.
-ConstraintFilter taught(const std::vector<Limit>& limits, const std::vector<Inputs>& slopes,
-                        const std::vector<double>& levels, const Inputs& at) {
+ConstraintFilter taught(std::vector<Limit> limits, const std::vector<Inputs>& slopes, const std::vector<double>& levels,
+                        const Inputs& at) {
+  for (Limit& limit : limits)
+    limit.margin_sd = 0.0;
   ConstraintFilter filter(limits, at.size(), 30.0);
   std::vector<double> values(limits.size());
   for (std::uint64_t k = 0; k < 40; ++k) {
@@ -163,7 +165,7 @@ TEST(ConstraintFilter, AlarmsAfterThreeCyclesInARowOverTheSameLimit) {
 double shaping(Limit limit, double value) {
   const ConstraintFilter filter({std::move(limit)}, 1, 10.0);
   const double values[] = {value};
-  return filter.shaping(values);
+  return filter.shaping(scalar_input(0.0), values);
 }
 
 TEST(ConstraintFilter, PenaltyIsTheSquareOfTheScaledExcess) {

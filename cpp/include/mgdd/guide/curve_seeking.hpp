@@ -14,6 +14,7 @@
 #include "mgdd/common/state.hpp"
 #include "mgdd/guide/curve.hpp"
 #include "mgdd/guide/curve_filter.hpp"
+#include "mgdd/guide/limit_curves.hpp"
 #include "mgdd/optimize/seekers/dither.hpp"
 #include "mgdd/optimize/seekers/extremum_seeking.hpp"
 #include "mgdd/optimize/seekers/seeker.hpp"
@@ -36,6 +37,7 @@ struct CurveSeekingSettings {
   bool hand_over = true;              ///< to plain extremum seeking where the guide keeps failing
   bool maximize = true;
   std::vector<optimize::Limit> limits{};
+  std::vector<Curve> limit_curves{};  ///< of the guide, one per limit, or none: then their slopes are learnt by trying
 };
 
 class CurveSeeking {
@@ -49,7 +51,9 @@ class CurveSeeking {
   /// The operating point has changed and the guide's curve with it: the distance between the plant's best input and
   /// the guide's is kept, with a doubt of a fifth of `prior_sd`. False where the curve does not bend down at its best
   /// input or that lies out of bounds: then the old one stays, as `restart` does.
-  bool guide(const Curve& curve) noexcept;
+  bool guide(const Curve& curve) noexcept { return guide(curve, {}); }
+  /// The same with the curves of the limits; empty: the old ones.
+  bool guide(const Curve& curve, std::span<const Curve> limit_curves) noexcept;
   /// Another curve at the same operating point, as a calibration of the guide draws it, whose best input is known to
   /// `sd` (at most `prior_sd` counts): what the readings said stays, and they decide beside it. False as for `guide`;
   /// nothing has changed then.
@@ -74,6 +78,7 @@ class CurveSeeking {
   const optimize::Protocol& protocol() const noexcept { return protocol_; }
   std::size_t component_count() const noexcept { return 1; }
   std::size_t limit_count() const noexcept { return settings_.limits.size(); }
+  optimize::LimitState limit_state(std::size_t i) const noexcept { return limits_.state(i); }
 
   /// ParameterError for a restored state that these settings do not allow.
   void require_usable() const {
@@ -100,6 +105,7 @@ class CurveSeeking {
     v("repeats", self.repeats_);
     v("plain_at_work", self.plain_at_work_);
     v("taken_over_at", self.taken_over_at_);
+    LimitCurves::visit(self.limits_, v);
     CurveFilter::visit(self.filter_, v);
     Prefixed<V> plain{v, "plain_"};
     optimize::ExtremumSeeking::visit(self.plain_, plain);
@@ -107,6 +113,7 @@ class CurveSeeking {
 
  private:
   double amplitude() const noexcept;
+  double within_limits(double wanted) noexcept;
   void learn(double applied, double j) noexcept;
   void watch_repeats(double applied, double j) noexcept;
   void judge_surprise(double input, double j) noexcept;
@@ -116,6 +123,7 @@ class CurveSeeking {
 
   CurveSeekingSettings settings_;
   CurveFilter filter_;
+  LimitCurves limits_;
   optimize::ExtremumSeeking plain_;  // about `taken_over_at_`, once it is at work
   optimize::Protocol protocol_;
   optimize::Inputs estimate_, applied_;

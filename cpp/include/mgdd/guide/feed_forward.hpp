@@ -47,7 +47,8 @@ class FeedForward {
     const optimize::TellStatus status = protocol_.check(reading, component_count(), limit_count(), applied_.size());
     if (status != optimize::TellStatus::accepted && status != optimize::TellStatus::misfire) return status;
     const bool fired = status == optimize::TellStatus::accepted;
-    const optimize::Inputs applied = optimize::applied_input(reading, applied_);
+    optimize::Inputs told;
+    const optimize::Inputs applied = optimize::applied_input(reading, applied_, told);
     const double j = fired ? optimize::objective_of(reading, settings.maximize) : 0.0;
     if (path_.testing()) {
       if (fired) {
@@ -80,6 +81,7 @@ class FeedForward {
   const optimize::Protocol& protocol() const noexcept { return protocol_; }
   std::size_t component_count() const noexcept { return seeker_.component_count(); }
   std::size_t limit_count() const noexcept { return seeker_.limit_count(); }
+  optimize::LimitState limit_state(std::size_t i) const noexcept { return limit_state_of(seeker_, i); }
   const auto& settings() const noexcept { return seeker_.settings(); }
   const S& seeker() const noexcept { return seeker_; }
   S& seeker() noexcept { return seeker_; }  ///< for its history

@@ -12,6 +12,7 @@
 #include <optional>
 #include <span>
 #include <variant>
+#include <vector>
 
 #include "mgdd/common/state.hpp"
 #include "mgdd/guide/curve_seeking.hpp"
@@ -65,6 +66,7 @@ class GuidedEngine {
   std::size_t limit_count() const noexcept { return settings_.limits.size(); }
   /// What the settings of all seekers share.
   const optimize::VariantSeeker::Settings& settings() const noexcept { return settings_; }
+  optimize::LimitState limit_state(std::size_t i) const noexcept;
   const GuidedEngineSettings& guidance() const noexcept { return guidance_; }
 
   GuidedCycle now() const noexcept;
@@ -111,6 +113,7 @@ class GuidedEngine {
   engine::OperatingPoint point_, advised_;  // now, and where the model was asked last
   GuidedEngineSettings guidance_;
   optimize::VariantSeeker::Settings settings_;
+  std::vector<double engine::Indicators<double>::*> limited_;  // of the limits; empty where one is no indicator
   double guide_cad_ = 0.0;
   std::int64_t refusals_ = 0, recalibrations_ = 0;
   bool owed_ = false;  // the model has no answer for this operating point yet

@@ -60,7 +60,8 @@ TellStatus BoundedSeeking::tell(const Reading& reading) noexcept {
   const TellStatus status = protocol_.check(reading, component_count(), limit_count(), applied_.size());
   protocol_.count(status);
   if (status != TellStatus::accepted) return status;
-  const Inputs applied = applied_input(reading, applied_);
+  Inputs told;
+  const Inputs& applied = applied_input(reading, applied_, told);
   filter_.record(applied, reading.limits);
   clamp_.record(applied_, applied, applied_);
   const Eigen::Index n = applied_.size();
@@ -78,7 +79,7 @@ TellStatus BoundedSeeking::tell(const Reading& reading) noexcept {
     }
     estimate_ /= static_cast<double>(period);
   }
-  const double j = objective_of(reading, settings_.maximize) + filter_.shaping(reading.limits);
+  const double j = objective_of(reading, settings_.maximize) + filter_.shaping(applied, reading.limits);
   const Inputs largest = settings_.dither.amplitude.cwiseProduct(omega_);
   Inputs step(n);
   for (Eigen::Index i = 0; i < n; ++i)

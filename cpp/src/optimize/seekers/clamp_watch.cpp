@@ -19,11 +19,9 @@ void ClampWatch::begin_window() noexcept {
   differs_ = false;
 }
 
-void ClampWatch::record(const Inputs& asked, const Inputs& applied, const Inputs& centre) noexcept {
-  const bool differs = applied != asked;
-  if (!watching_ && !differs) return;
+void ClampWatch::watch(const Inputs& asked, const Inputs& applied, const Inputs& centre) noexcept {
   watching_ = true;
-  differs_ = differs_ || differs;
+  differs_ = differs_ || applied != asked;
   asked_low_ = asked_low_.cwiseMin(asked);
   asked_high_ = asked_high_.cwiseMax(asked);
   applied_low_ = applied_low_.cwiseMin(applied);

@@ -17,11 +17,29 @@ constexpr std::array<std::pair<LimitMethod, std::string_view>, 3> method_names{{
     {LimitMethod::barrier, "barrier"},
 }};
 
-constexpr double significance = 2.0;    // standard errors
-constexpr double patience_share = 0.6;  // of the memory, before a limit without a slope is no longer waited for
-constexpr double alarm_cycles = 3.0;    // in a row over the limit
-constexpr double rounding = 1e-9;       // scales: less is not over a limit
-constexpr double barrier_edge = 0.01;   // scaled distance where the logarithm goes on as its tangent
+constexpr std::array<std::pair<LimitState, std::string_view>, 3> state_names{{
+    {LimitState::free, "free"},
+    {LimitState::active, "active"},
+    {LimitState::infeasible, "infeasible"},
+}};
+
+constexpr double significance = 2.0;        // standard errors
+constexpr double patience_share = 0.6;      // of the memory, before a limit without a slope is no longer waited for
+constexpr double alarm_cycles = 3.0;        // in a row over the limit
+constexpr double contradicted_steps = 3.0;  // in a row: infeasible
+constexpr double lag_memory = 4.0;          // time constants: behind a lag a slope takes longer to show
+constexpr double binding_room = 1e-6;       // scales: no room
+constexpr double rounding = 1e-9;           // scales: less is not over a limit
+constexpr double barrier_edge = 0.01;       // scaled distance where the logarithm goes on as its tangent
+
+/// Refuses a limit's own mistakes before its lag sizes anything.
+std::vector<ComponentLag> lags_of(const std::vector<Limit>& limits) {
+  validate(limits);
+  std::vector<ComponentLag> out;
+  for (const Limit& limit : limits)
+    out.push_back(limit.lag);
+  return out;
+}
 
 /// The largest share of a step, at most 1, with which every entry stays within `most`.
 double share_within(const Inputs& step, const Inputs& most) noexcept {
@@ -34,6 +52,9 @@ double share_within(const Inputs& step, const Inputs& most) noexcept {
 
 }  // namespace
 
+std::string_view to_string(LimitState v) noexcept {
+  return name_of<LimitState>(state_names, v);
+}
 std::string_view to_string(LimitMethod v) noexcept {
   return name_of<LimitMethod>(method_names, v);
 }
@@ -55,6 +76,10 @@ void validate(const std::vector<Limit>& limits) {
     if (!(limit.weight > 0.0 && std::isfinite(limit.weight))) {
       throw in_context(at, ParameterError("weight", limit.weight, "must be > 0 and finite"));
     }
+    if (!(limit.margin_sd >= 0.0 && limit.margin_sd <= 100.0)) {
+      throw in_context(at, ParameterError("margin_sd", limit.margin_sd, "must lie in [0, 100]"));
+    }
+    validate(limit.lag, at);
     if (!(limit.scale >= 0.0 && std::isfinite(limit.scale))) {
       throw in_context(at, ParameterError("scale", limit.scale, "must be >= 0 (0: the limit itself) and finite"));
     }
@@ -63,31 +88,40 @@ void validate(const std::vector<Limit>& limits) {
 
 ConstraintFilter::ConstraintFilter(std::vector<Limit> limits, Eigen::Index inputs, double memory)
     : limits_(std::move(limits)),
+      causes_(lags_of(limits_), inputs),
       patience_(patience_share * memory),
-      models_(limits_.size(), LocalModel(inputs, memory)),
       in_a_row_(limits_.size(), 0.0),
+      binding_(in_a_row_),
+      contradicted_(in_a_row_),
       slopes_(limits_.size(), Inputs::Zero(inputs)),
       over_(limits_.size(), 0.0),
       nearest_(limits_.size()),
       good_(Inputs::Zero(inputs)) {
-  validate(limits_);
   for (Limit& limit : limits_) {
+    models_.emplace_back(inputs, memory + lag_memory * limit.lag.lag_cycles);
     if (limit.scale == 0.0) limit.scale = limit.upper != 0.0 ? std::abs(limit.upper) : 1.0;
   }
 }
 
 void ConstraintFilter::record(const Inputs& applied, std::span<const double> values) noexcept {
+  if (limits_.empty()) return;
+  causes_.record(applied);
   for (std::size_t i = 0; i < limits_.size(); ++i) {
-    models_[i].record(applied, values[i]);
+    if (!causes_.known(i)) continue;
+    models_[i].record(causes_.of(i, applied), values[i]);
     in_a_row_[i] = values[i] > limits_[i].upper - limits_[i].margin ? in_a_row_[i] + 1.0 : 0.0;
   }
 }
 
-double ConstraintFilter::shaping(std::span<const double> values) const noexcept {
+double ConstraintFilter::shaping(const Inputs& applied, std::span<const double> values) const noexcept {
   double sum = 0.0;
   for (std::size_t i = 0; i < limits_.size(); ++i) {
     const Limit& limit = limits_[i];
-    const double over = (values[i] + limit.margin - limit.upper) / limit.scale;
+    if (limit.method == LimitMethod::switching) continue;
+    const bool late = !causes_.direct(i);
+    if (late && !(models_[i].cycles() > 0.0)) continue;
+    const double value = late ? models_[i].predict(applied) : values[i];
+    const double over = (value + margin(i) - limit.upper) / limit.scale;
     if (limit.method == LimitMethod::penalty && over > 0.0) sum -= limit.weight * over * over;
     if (limit.method == LimitMethod::barrier) {
       const double room = std::max(-over, barrier_edge);
@@ -99,7 +133,17 @@ double ConstraintFilter::shaping(std::span<const double> values) const noexcept 
 
 double ConstraintFilter::excess(std::size_t i, const Inputs& at, const Inputs& reach) const noexcept {
   if (!(models_[i].cycles() > 0.0)) return -unlimited;
-  return models_[i].predict(at) + models_[i].slope().cwiseAbs().dot(reach) + limits_[i].margin - limits_[i].upper;
+  return models_[i].predict(at) + models_[i].slope().cwiseAbs().dot(reach) + margin(i) - limits_[i].upper;
+}
+
+double ConstraintFilter::margin(std::size_t i) const noexcept {
+  const double scatter = limits_[i].margin_sd > 0.0 ? limits_[i].margin_sd * models_[i].scatter() : 0.0;
+  return limits_[i].margin + scatter;
+}
+
+LimitState ConstraintFilter::state(std::size_t i) const noexcept {
+  if (contradicted_[i] >= contradicted_steps) return LimitState::infeasible;
+  return binding_[i] > 0.0 ? LimitState::active : LimitState::free;
 }
 
 Inputs ConstraintFilter::project(const Inputs& estimate, const Inputs& step, const StepFrame& frame) noexcept {
@@ -110,12 +154,18 @@ Inputs ConstraintFilter::project(const Inputs& estimate, const Inputs& step, con
     clip_each(wish, frame.rate);
   }
   active_ = false;
-  if (limits_.empty() || !(models_.front().cycles() > 0.0)) return wish;
+  if (limits_.empty()) return wish;
+  for (std::size_t i = 0; i < limits_.size(); ++i) {
+    if (models_[i].cycles() > 0.0) continue;
+    if (causes_.direct(i)) return wish;
+    if (!frame.reach.isZero(0.0)) return Inputs::Zero(step.size());
+  }
   std::size_t worst = 0;
   double worst_excess = -unlimited;
   for (std::size_t i = 0; i < limits_.size(); ++i) {
     slopes_[i] = models_[i].slope();
     over_[i] = excess(i, estimate, frame.reach);
+    binding_[i] = over_[i] > -binding_room * limits_[i].scale ? 1.0 : 0.0;
     if (over_[i] / limits_[i].scale > worst_excess) {
       worst_excess = over_[i] / limits_[i].scale;
       worst = i;
@@ -134,6 +184,7 @@ Inputs ConstraintFilter::project(const Inputs& estimate, const Inputs& step, con
   }
   good_ = estimate;
   has_good_ = true;
+  std::fill(contradicted_.begin(), contradicted_.end(), 0.0);
   if (admits(wish)) return wish;
   active_ = true;
   return turn(estimate, step, frame, worst_excess);
@@ -159,12 +210,19 @@ Inputs ConstraintFilter::turn(const Inputs& estimate, const Inputs& step, const 
     const bool back = over_[i] > 0.0 && models_[i].slope_known(significance);
     nearest_.add(slopes_[i], back ? -over_[i] : std::max(0.0, -over_[i]), limits_[i].scale);
   }
-  nearest_.solve(worst_excess);
+  const double relaxation = nearest_.solve(worst_excess);
   const Inputs& out = nearest_.step();
+  for (std::size_t i = 0; i < limits_.size(); ++i) {
+    const double left = -over_[i] - slopes_[i].dot(out), least = binding_room * limits_[i].scale;
+    if (slopes_[i].squaredNorm() > 0.0 && left < least) binding_[i] = 1.0;
+    const double reached = slopes_[i].cwiseAbs().dot(frame.reach);  // by the dither, which may shrink
+    contradicted_[i] = relaxation > 0.0 && left + reached < -least ? contradicted_[i] + 1.0 : 0.0;
+  }
   double share = share_within(out, frame.rate.cwiseMax(frame.recovery));
   for (std::size_t i = 0; i < limits_.size(); ++i) {
     const double rise = slopes_[i].dot(out), room = -over_[i];
-    if (room > 0.0 && rise > room + rounding * limits_[i].scale) share = std::min(share, room / rise);
+    const double allowed = room + relaxation * limits_[i].scale;
+    if (room > 0.0 && rise > allowed + rounding * limits_[i].scale) share = std::min(share, allowed / rise);
   }
   return out * share;
 }
@@ -181,7 +239,9 @@ bool ConstraintFilter::alarmed() const noexcept {
 void ConstraintFilter::forget() noexcept {
   for (LocalModel& model : models_)
     model.forget();
-  std::fill(in_a_row_.begin(), in_a_row_.end(), 0.0);
+  causes_.forget();
+  for (std::vector<double>* const column : {&in_a_row_, &binding_, &contradicted_})
+    std::fill(column->begin(), column->end(), 0.0);
   has_good_ = false;
   active_ = false;
 }

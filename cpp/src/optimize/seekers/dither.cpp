@@ -80,13 +80,14 @@ void validate(const DitherSettings& settings, Eigen::Index inputs, bool hessian)
 
 void validate(const std::vector<ComponentLag>& components) {
   if (components.empty()) throw about("components", ShapeError("components is empty: J has at least one component"));
-  for (std::size_t c = 0; c < components.size(); ++c) {
-    for (const auto& [name, value] :
-         {std::pair{"delay_cycles", components[c].delay_cycles}, std::pair{"lag_cycles", components[c].lag_cycles}}) {
-      if (!(value >= 0.0 && value <= 1e6)) {
-        throw ParameterError("components[" + std::to_string(c) + "]." + name, value, "must lie in [0, 1e6]");
-      }
-    }
+  for (std::size_t c = 0; c < components.size(); ++c)
+    validate(components[c], "components[" + std::to_string(c) + "].");
+}
+
+void validate(const ComponentLag& lag, const std::string& at) {
+  for (const auto& [name, value] :
+       {std::pair{"delay_cycles", lag.delay_cycles}, std::pair{"lag_cycles", lag.lag_cycles}}) {
+    if (!(value >= 0.0 && value <= 1e6)) throw in_context(at, ParameterError(name, value, "must lie in [0, 1e6]"));
   }
 }
 

@@ -118,9 +118,9 @@ TellStatus ExtremumSeeking::tell(const Reading& reading) noexcept {
 }
 
 // Fills gradient_ (smoothed) with this cycle's demodulated reading; false until the mean of a period is known.
-bool ExtremumSeeking::remove_mean(const Reading& reading) noexcept {
+bool ExtremumSeeking::remove_mean(const Reading& reading, const Inputs& applied) noexcept {
   const auto period = static_cast<std::size_t>(dither_.period());
-  const double shaped = filter_.shaping(reading.limits);
+  const double shaped = filter_.shaping(applied, reading.limits);
   Inputs product = Inputs::Zero(estimate_.size());
   for (std::size_t c = 0; c < component_count(); ++c) {
     const double j = sign() * reading.components[c] + (c == 0 ? shaped : 0.0);
@@ -154,7 +154,8 @@ void ExtremumSeeking::move(Inputs step, const Inputs& rate) noexcept {
 }
 
 void ExtremumSeeking::learn(const Reading& reading) noexcept {
-  const Inputs applied = applied_input(reading, applied_);
+  Inputs told;
+  const Inputs& applied = applied_input(reading, applied_, told);
   filter_.record(applied, reading.limits);
   clamp_.record(applied_, applied, estimate_);
   const Inputs& a = settings_.dither.amplitude;
@@ -169,13 +170,13 @@ void ExtremumSeeking::learn(const Reading& reading) noexcept {
       sum_.setZero();
       std::copy(reading.components.begin(), reading.components.end(), origin_.begin());
     }
-    const double shaped = filter_.shaping(reading.limits);
+    const double shaped = filter_.shaping(applied, reading.limits);
     for (std::size_t c = 0; c < component_count(); ++c) {
       const double j = sign() * (reading.components[c] - origin_[c]) + (c == 0 ? shaped : 0.0);
       for (Eigen::Index i = 0; i < sum_.size(); ++i)
         sum_[i] += j * dither_.demodulation(static_cast<int>(phase_), c, i);
     }
-  } else if (remove_mean(reading)) {
+  } else if (remove_mean(reading, applied)) {
     gradient_ = (smooth_.cwiseQuotient(a) * (2.0 / share_)).cwiseProduct(response_);
     if (!holding) {
       // A limit passes what points inwards and turns the rest: of a ripple that would leave a bias.

@@ -78,8 +78,9 @@ TellStatus GoldenSection::tell(const Reading& reading) noexcept {
   const TellStatus status = protocol_.check(reading, component_count(), limit_count(), applied_.size());
   protocol_.count(status);
   if (status != TellStatus::accepted) return status;
-  const double j = objective_of(reading, settings_.maximize) + filter_.shaping(reading.limits);
-  const Inputs applied = applied_input(reading, applied_);
+  Inputs told;
+  const Inputs& applied = applied_input(reading, applied_, told);
+  const double j = objective_of(reading, settings_.maximize) + filter_.shaping(applied, reading.limits);
   filter_.record(applied, reading.limits);
   const auto slot = static_cast<std::size_t>(samples_++) % ring;
   sample_input_[slot] = applied[0];
@@ -95,16 +96,37 @@ TellStatus GoldenSection::tell(const Reading& reading) noexcept {
   point.count += 1.0;
   point.sum += j;
   point.missed += applied[0] - applied_[0];
-  double worst = 0.0;
-  for (std::size_t i = 0; i < limit_count(); ++i) {
-    const Limit& limit = filter_.limits()[i];
-    const double over = (reading.limits[i] + limit.margin - limit.upper) / limit.scale;
-    worst = i == 0 ? over : std::max(worst, over);
-  }
-  point.excess += worst;
-  turn_ = points_[0].count <= points_[1].count ? 0 : 1;
+  judge(point, reading);
+  next_turn();
   decide();
   return status;
+}
+
+// Limits that come late say something of a point only after it was measured for as long as they take.
+void GoldenSection::judge(Point& point, const Reading& reading) noexcept {
+  stayed_ = applied_[0] == last_asked_ ? stayed_ + 1 : 0;
+  last_asked_ = applied_[0];
+  if (limit_count() == 0 || stayed_ < filter_.settling()) return;
+  double worst = -unlimited;
+  for (std::size_t i = 0; i < limit_count(); ++i) {
+    const Limit& limit = filter_.limits()[i];
+    worst = std::max(worst, (reading.limits[i] + filter_.margin(i) - limit.upper) / limit.scale);
+  }
+  point.excess += worst;
+  point.judged += 1.0;
+}
+
+// In turns; but where limits come late, one point until they have judged it.
+void GoldenSection::next_turn() noexcept {
+  turn_ = points_[0].count <= points_[1].count ? 0 : 1;
+  if (filter_.settling() == 0) return;
+  const double enough = settings_.noise_sd == 0.0 ? 1.0 : limit_samples;
+  const bool now_at_second = last_asked_ == inner(1);
+  for (const std::int64_t p : {std::int64_t{now_at_second ? 1 : 0}, std::int64_t{now_at_second ? 0 : 1}}) {
+    if (points_[static_cast<std::size_t>(p)].judged >= enough) continue;
+    turn_ = p;
+    return;
+  }
 }
 
 // What decides, in this order: that the plant applies both points as one; a limit broken at either point, by the lesser
@@ -121,10 +143,13 @@ void GoldenSection::decide() noexcept {
     return points_[0].missed + points_[1].missed > 0.0 ? cut(inner(0), upper_) : cut(lower_, inner(1));
   }
   if (n < (exact ? 1.0 : first_samples)) return;
-  const double over0 = mean(points_[0].excess, points_[0]);
-  const double over1 = mean(points_[1].excess, points_[1]);
-  if (limit_count() > 0 && std::max(over0, over1) > 0.0) {
-    if (!exact && n < limit_samples) return;
+  const double judged = std::min(points_[0].judged, points_[1].judged);
+  const double enough = filter_.settling() > 0 && !exact ? limit_samples : 1.0;
+  if (limit_count() > 0 && judged < enough) return;
+  const double over0 = limit_count() > 0 ? points_[0].excess / points_[0].judged : 0.0;
+  const double over1 = limit_count() > 0 ? points_[1].excess / points_[1].judged : 0.0;
+  if (std::max(over0, over1) > 0.0) {
+    if (!exact && judged < limit_samples) return;
     draws_ = 0;
     return over0 > over1 ? cut(inner(0), upper_) : cut(lower_, inner(1));
   }
@@ -150,14 +175,22 @@ void GoldenSection::cut(double lower, double upper) noexcept {
   if (keeps_left) points_[1] = old[0];
   lower_ = lower;
   upper_ = upper;
-  turn_ = points_[0].count <= points_[1].count ? 0 : 1;
+  next_turn();
   const Parabola fit = parabola();
   estimate_[0] = std::clamp(fit.vertex, lower_, upper_);
   const bool exact = settings_.noise_sd == 0.0;
   refining_ = upper_ - lower_ <= settings_.tolerance || (!exact && draws_ >= last_draws);
   if (!refining_) return;
   turn_ = 0;
-  if (exact) return;
+  if (exact) {  // to the side that no limit forbids, as often as it takes to know that there is none
+    const Inputs none = scalar_input(0.0), width = scalar_input(upper_ - lower_);
+    for (int k = 0; k < 3; ++k) {
+      const Inputs back =
+          filter_.project(estimate_, none, {settings_.space, none, none, width, width, InputMatrix::Ones(1, 1)});
+      move_within(estimate_, back, settings_.space, none);
+    }
+    return;
+  }
   // Ends that lie less than the noise below the top tell nothing: wide enough that they lie one noise_sd below.
   const double wide = fit.bend < 0.0 ? std::sqrt(8.0 * settings_.noise_sd / -fit.bend) : 0.0;
   const double most = widest_share * (settings_.space.upper[0] - settings_.space.lower[0]);

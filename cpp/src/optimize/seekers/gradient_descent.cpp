@@ -54,10 +54,11 @@ TellStatus GradientDescent::tell(const Reading& reading) noexcept {
   const TellStatus status = protocol_.check(reading, component_count(), limit_count(), applied_.size());
   protocol_.count(status);
   if (status != TellStatus::accepted) return status;
-  const Inputs applied = applied_input(reading, applied_);
+  Inputs told;
+  const Inputs& applied = applied_input(reading, applied_, told);
   filter_.record(applied, reading.limits);
   clamp_.record(applied_, applied, estimate_);
-  const double j = objective_of(reading, settings_.maximize) + filter_.shaping(reading.limits);
+  const double j = objective_of(reading, settings_.maximize) + filter_.shaping(applied, reading.limits);
   const Eigen::Index input = stage_ / 2;
   const double missed = applied[input] - applied_[input];
   if (stage_ % 2 == 0) {

@@ -2,6 +2,7 @@
 
 #include <Eigen/Cholesky>
 #include <algorithm>
+#include <cmath>
 
 namespace mgdd::optimize {
 namespace {
@@ -51,6 +52,12 @@ double LocalModel::predict(const Inputs& at) const noexcept {
 
 double LocalModel::residual_variance() const noexcept {
   return std::max(0.0, variance_ - slope().dot(cross_));
+}
+
+double LocalModel::scatter() const noexcept {
+  const double freedom = weight_ - 1.0 - static_cast<double>(cross_.size());
+  if (weight_ < fewest_cycles || !(freedom > 0.0)) return 0.0;
+  return std::sqrt(residual_variance() * weight_ / freedom);
 }
 
 bool LocalModel::slope_known(double errors) const noexcept {

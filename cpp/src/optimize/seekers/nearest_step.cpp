@@ -65,16 +65,28 @@ bool NearestStep::ascend(double relaxation, int most_passes) noexcept {
     largest = std::max(largest, moved);
     if (moved <= rest * largest) break;
   }
-  step_ = step_.cwiseMax(lowest_).cwiseMin(highest_);
+  return worst_excess(relaxation) <= broken;
+}
+
+// Of the step cut to the box, in scales.
+double NearestStep::worst_excess(double relaxation) const noexcept {
+  const Inputs step = step_.cwiseMax(lowest_).cwiseMin(highest_);
+  double worst = 0.0;
   for (std::size_t p = 0; p < count_; ++p) {
     const Plane& plane = planes_[p];
-    if (plane.slope.dot(step_) > plane.room + (relaxation + broken) * plane.scale) return false;
+    worst = std::max(worst, (plane.slope.dot(step) - plane.room) / plane.scale - relaxation);
   }
-  return true;
+  return worst;
 }
 
 double NearestStep::solve(double most) noexcept {
-  if (ascend(0.0, passes) || !(most > 0.0)) return 0.0;
+  double relaxation = 0.0;
+  if (!ascend(0.0, passes) && most > 0.0) relaxation = least_relaxation(most);
+  step_ = step_.cwiseMax(lowest_).cwiseMin(highest_);
+  return relaxation;
+}
+
+double NearestStep::least_relaxation(double most) noexcept {
   double below = 0.0, above = most;
   for (int k = 0; k < halvings; ++k) {
     const double middle = 0.5 * (below + above);

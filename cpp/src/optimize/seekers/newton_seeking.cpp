@@ -97,13 +97,14 @@ void NewtonSeeking::update_inverse() noexcept {
 }
 
 void NewtonSeeking::learn(const Reading& reading) noexcept {
-  const Inputs applied = applied_input(reading, applied_);
+  Inputs told;
+  const Inputs& applied = applied_input(reading, applied_, told);
   filter_.record(applied, reading.limits);
   clamp_.record(applied_, applied, estimate_);
   const auto period = static_cast<std::size_t>(dither_.period());
   const Eigen::Index n = estimate_.size();
   const Inputs a = settings_.dither.amplitude * share_;
-  const double shaped = filter_.shaping(reading.limits);
+  const double shaped = filter_.shaping(applied, reading.limits);
   Inputs gradient = Inputs::Zero(n);
   InputMatrix sample = InputMatrix::Zero(n, n);
   for (std::size_t c = 0; c < component_count(); ++c) {

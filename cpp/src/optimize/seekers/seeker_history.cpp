@@ -35,11 +35,18 @@ void SeekerHistory::make_room(std::size_t cycles) {
 }
 
 void SeekerHistory::add(std::int64_t cycle, const Inputs& applied, const Inputs& estimate, double objective,
-                        bool misfire) {
+                        bool misfire, std::span<const double> limits, std::span<const double> states) {
   make_room(1);
   rows_.insert(rows_.end(), {static_cast<double>(cycle), objective, misfire ? 1.0 : 0.0});
   rows_.insert(rows_.end(), applied.begin(), applied.end());
   rows_.insert(rows_.end(), estimate.begin(), estimate.end());
+  const std::span<const double> told = limits.size() == limits_ ? limits : std::span<const double>(nothing_);
+  rows_.insert(rows_.end(), told.begin(), told.end());
+  if (states.size() == limits_) {
+    rows_.insert(rows_.end(), states.begin(), states.end());
+  } else {
+    rows_.insert(rows_.end(), limits_, 0.0);
+  }
 }
 
 StateColumns SeekerHistory::save() const {
@@ -58,6 +65,8 @@ StateColumns SeekerHistory::save() const {
   take("misfire", 2, 1);
   take("applied", 3, inputs_);
   take("estimate", 3 + inputs_, inputs_);
+  take("limits", 3 + 2 * inputs_, limits_);
+  take("limit_states", 3 + 2 * inputs_ + limits_, limits_);
   return out;
 }
 
@@ -69,18 +78,26 @@ void SeekerHistory::restore(const StateColumns& columns) {
   const std::vector<double>& misfire = column(columns, "misfire", n);
   const std::vector<double>& applied = column(columns, "applied", n * inputs_);
   const std::vector<double>& estimate = column(columns, "estimate", n * inputs_);
-  SeekerHistory next(static_cast<Eigen::Index>(inputs_));
+  const std::vector<double>& limits = column(columns, "limits", n * limits_);
+  const std::vector<double>& states = column(columns, "limit_states", n * limits_);
+  SeekerHistory next(static_cast<Eigen::Index>(inputs_), limits_);
   next.make_room(n);
   for (std::size_t row = 0; row < n; ++row) {
     if (!(cycle[row] >= 0.0 && cycle[row] <= 0x1p53 && cycle[row] == std::floor(cycle[row]))) {
       refuse("cycle", row, cycle[row], "a whole number >= 0");
+    }
+    const auto of_row = [&](const std::vector<double>& values) {
+      return std::span<const double>(values).subspan(row * limits_, limits_);
+    };
+    for (const double state : of_row(states)) {
+      if (state != 0.0 && state != 1.0 && state != 2.0) refuse("limit_states", row, state, "0, 1 or 2");
     }
     if (misfire[row] != 0.0 && misfire[row] != 1.0) refuse("misfire", row, misfire[row], "0 or 1");
     const auto inputs_of = [&](const std::vector<double>& values) -> Inputs {
       return Eigen::Map<const Inputs>(values.data() + row * inputs_, static_cast<Eigen::Index>(inputs_));
     };
     next.add(static_cast<std::int64_t>(cycle[row]), inputs_of(applied), inputs_of(estimate), objective[row],
-             misfire[row] != 0.0);
+             misfire[row] != 0.0, of_row(limits), of_row(states));
   }
   *this = std::move(next);
 }

@@ -166,8 +166,9 @@ TellStatus Spsa::tell(const Reading& reading) noexcept {
   const TellStatus status = protocol_.check(reading, component_count(), limit_count(), applied_.size());
   protocol_.count(status);
   if (status != TellStatus::accepted) return status;
-  const double j = objective_of(reading, settings_.maximize) + filter_.shaping(reading.limits);
-  const Inputs applied = applied_input(reading, applied_);
+  Inputs told;
+  const Inputs& applied = applied_input(reading, applied_, told);
+  const double j = objective_of(reading, settings_.maximize) + filter_.shaping(applied, reading.limits);
   filter_.record(applied, reading.limits);
   const int gradients_end = per_gradient() * settings_.averaging;
   if (stage_ < gradients_end) {

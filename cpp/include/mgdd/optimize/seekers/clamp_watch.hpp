@@ -15,7 +15,9 @@ class ClampWatch {
   explicit ClampWatch(Eigen::Index inputs) noexcept;
 
   /// One cycle around `centre`. Costs next to nothing as long as every input is applied as asked.
-  void record(const Inputs& asked, const Inputs& applied, const Inputs& centre) noexcept;
+  void record(const Inputs& asked, const Inputs& applied, const Inputs& centre) noexcept {
+    if (watching_ || (&asked != &applied && asked != applied)) watch(asked, applied, centre);
+  }
 
   /// The end of a window in which every input was moved to both sides: an input whose applied spread is less than 0.7
   /// of the asked one is clamped on the side where more is missing, until it is applied further out again.
@@ -48,6 +50,7 @@ class ClampWatch {
   }
 
  private:
+  void watch(const Inputs& asked, const Inputs& applied, const Inputs& centre) noexcept;
   void begin_window() noexcept;
 
   bool watching_ = false;  // since an input was applied otherwise than asked, until it is as if that had never been

@@ -9,6 +9,7 @@
 #include <string_view>
 #include <vector>
 
+#include "mgdd/optimize/seekers/causing_inputs.hpp"
 #include "mgdd/optimize/seekers/local_model.hpp"
 #include "mgdd/optimize/seekers/nearest_step.hpp"
 #include "mgdd/optimize/seekers/seeker.hpp"
@@ -19,14 +20,21 @@ enum class LimitMethod { switching, penalty, barrier };
 std::string_view to_string(LimitMethod v) noexcept;
 LimitMethod parse_limit_method(std::string_view name);
 
+/// free: holds nothing back; active: turned the last step, or is broken; infeasible: cannot be met together with the
+/// others and the bounds, as far as the learnt slopes tell.
+enum class LimitState { free, active, infeasible };
+std::string_view to_string(LimitState v) noexcept;
+
 /// value <= upper - margin, measured once per cycle. Excess is counted in units of `scale`.
 struct Limit {
   std::string name;
   double upper = 0.0;
   double margin = 0.0;  ///< kept free below `upper`, same unit, >= 0
   LimitMethod method = LimitMethod::switching;
-  double weight = 1.0;  ///< penalty: J units per squared scaled excess; barrier: J units times the logarithm
-  double scale = 0.0;   ///< > 0; 0 = abs(upper), or 1
+  double weight = 1.0;     ///< penalty: J units per squared scaled excess; barrier: J units times the logarithm
+  double scale = 0.0;      ///< > 0; 0 = abs(upper), or 1
+  ComponentLag lag{};      ///< between the input and the reading: a reading is judged on the input that caused it
+  double margin_sd = 1.0;  ///< added to `margin`: standard deviations of the reading about its local model, >= 0
 
   bool operator==(const Limit&) const = default;
 };
@@ -49,12 +57,16 @@ class ConstraintFilter {
 
   std::size_t size() const noexcept { return limits_.size(); }
   const std::vector<Limit>& limits() const noexcept { return limits_; }
+  LimitState state(std::size_t i) const noexcept;
+  /// Cycles until every limit is read at an input that has stayed; 0 where none is delayed or lagged.
+  std::int64_t settling() const noexcept { return causes_.settling(); }
 
   /// Learns from one cycle: the input that was applied and the values that it gave.
   void record(const Inputs& applied, std::span<const double> values) noexcept;
 
-  /// What penalty and barrier add to J (to be maximised) for these values; <= 0 for penalties.
-  double shaping(std::span<const double> values) const noexcept;
+  /// What penalty and barrier add to J (to be maximised) for these values, <= 0 for penalties; of a limit that comes
+  /// late, for what is predicted at the applied input.
+  double shaping(const Inputs& applied, std::span<const double> values) const noexcept;
 
   /// Predicted excess of the worst point within `reach` of `at` over limit i, in the unit of the limit.
   double excess(std::size_t i, const Inputs& at, const Inputs& reach) const noexcept;
@@ -62,12 +74,16 @@ class ConstraintFilter {
   /// What has been learnt of limit i.
   const LocalModel& model(std::size_t i) const noexcept { return models_[i]; }
 
+  /// What limit i keeps free, scatter included, in its unit.
+  double margin(std::size_t i) const noexcept;
+
   /// The step within its rate, or where a limit forbids that, the nearest one in the metric of the seeker that no limit
   /// forbids, and that stays within the bounds. Where the estimate itself is over a limit: the way back along the
   /// learnt slopes, or to the last good point while the slope is not known (with no such point the estimate stays,
   /// unless the reach is zero and nothing but steps explores, or the limit has been broken for long without showing a
   /// slope: it cannot say where to go and is not waited for). Limits that cannot be met together are broken by as
-  /// little as possible, counted in their scales.
+  /// little as possible, counted in their scales. While a late limit has not been read yet, a seeker that dithers does
+  /// not step.
   Inputs project(const Inputs& estimate, const Inputs& step, const StepFrame& frame) noexcept;
 
   /// True when the last `project` changed its step.
@@ -86,6 +102,9 @@ class ConstraintFilter {
     v("limit_good", self.good_);
     v("limit_has_good", self.has_good_);
     v("limit_active", self.active_);
+    v("limit_binding", self.binding_);
+    v("limit_contradicted", self.contradicted_);
+    CausingInputs::visit(self.causes_, v, "limit_cause");
   }
 
  private:
@@ -94,15 +113,28 @@ class ConstraintFilter {
   Inputs turn(const Inputs& estimate, const Inputs& step, const StepFrame& frame, double worst_excess) noexcept;
 
   std::vector<Limit> limits_;
+  CausingInputs causes_;
   double patience_;                 // cycles that a broken limit is given to show its slope
   std::vector<LocalModel> models_;  // one per limit
   std::vector<double> in_a_row_;
-  std::vector<Inputs> slopes_;  // of the step at work
-  std::vector<double> over_;    // excess at its estimate, in the unit of the limit
+  std::vector<double> binding_;       // 1 where the limit turned the last step or is broken
+  std::vector<double> contradicted_;  // steps in a row without any that would meet it
+  std::vector<Inputs> slopes_;        // of the step at work
+  std::vector<double> over_;          // excess at its estimate, in the unit of the limit
   NearestStep nearest_;
   Inputs good_;
   bool has_good_ = false;
   bool active_ = false;
 };
+
+/// State of limit i of any seeker, or of what stands around one.
+template <class S>
+LimitState limit_state_of(const S& seeker, std::size_t i) noexcept {
+  if constexpr (requires { seeker.limit_state(i); }) {
+    return seeker.limit_state(i);
+  } else {
+    return seeker.filter().state(i);
+  }
+}
 
 }  // namespace mgdd::optimize

@@ -4,6 +4,7 @@
 #pragma once
 
 #include <cstdint>
+#include <string>
 #include <vector>
 
 #include "mgdd/optimize/seekers/seeker.hpp"
@@ -28,6 +29,8 @@ struct DitherSettings {
 /// `hessian` also needs sums and differences of two harmonics to be distinct.
 void validate(const DitherSettings& settings, Eigen::Index inputs, bool hessian);
 void validate(const std::vector<ComponentLag>& components);
+/// ParameterError whose message has `at` in front.
+void validate(const ComponentLag& lag, const std::string& at);
 
 /// Amplitude and phase of delay and discrete lag at n cycles per window of M.
 struct SensorResponse {

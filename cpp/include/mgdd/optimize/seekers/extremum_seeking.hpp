@@ -66,6 +66,8 @@ class ExtremumSeeking {
   const Inputs& applied() const noexcept { return applied_; }
   const Protocol& protocol() const noexcept { return protocol_; }
   std::size_t component_count() const noexcept { return settings_.components.size(); }
+  /// What has been learnt of the limits.
+  const ConstraintFilter& filter() const noexcept { return filter_; }
   std::size_t limit_count() const noexcept { return settings_.limits.size(); }
 
   /// Moves the estimate, within the bounds; `by` is finite. A search that goes on elsewhere is restarted first.
@@ -103,7 +105,7 @@ class ExtremumSeeking {
 
  private:
   void learn(const Reading& reading) noexcept;
-  bool remove_mean(const Reading& reading) noexcept;
+  bool remove_mean(const Reading& reading, const Inputs& applied) noexcept;
   void move(Inputs step, const Inputs& rate) noexcept;
   void end_of_window() noexcept;
   double sign() const noexcept { return settings_.maximize ? 1.0 : -1.0; }

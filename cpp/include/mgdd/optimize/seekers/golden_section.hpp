@@ -41,6 +41,8 @@ class GoldenSection {
   const Inputs& applied() const noexcept { return applied_; }
   const Protocol& protocol() const noexcept { return protocol_; }
   std::size_t component_count() const noexcept { return 1; }
+  /// What has been learnt of the limits.
+  const ConstraintFilter& filter() const noexcept { return filter_; }
   std::size_t limit_count() const noexcept { return settings_.limits.size(); }
 
   /// Moves the estimate, within the bounds; `by` is finite. A search that goes on elsewhere is restarted first.
@@ -58,6 +60,8 @@ class GoldenSection {
     v("upper", self.upper_);
     v("width", self.width_);
     v("draws", self.draws_);
+    v("stayed", self.stayed_);
+    v("last_asked", self.last_asked_);
     v("refining", self.refining_);
     v("turn", self.turn_, self.refining_ ? 3 : 2);
     v("sample_input", self.sample_input_);
@@ -68,6 +72,7 @@ class GoldenSection {
       v(name + "_count", self.points_[p].count);
       v(name + "_sum", self.points_[p].sum);
       v(name + "_excess", self.points_[p].excess);
+      v(name + "_judged", self.points_[p].judged);
       v(name + "_missed", self.points_[p].missed);
     }
     ConstraintFilter::visit(self.filter_, v);
@@ -76,13 +81,16 @@ class GoldenSection {
 
  private:
   struct Point {
-    // Sums: of J, of the worst scaled excess over the limits, of the applied input less the asked one.
-    double count = 0.0, sum = 0.0, excess = 0.0, missed = 0.0;
+    // Sums: of J, of the worst scaled excess over the limits in `judged` cycles, of the applied input less the asked
+    // one.
+    double count = 0.0, sum = 0.0, excess = 0.0, judged = 0.0, missed = 0.0;
   };
   struct Parabola {
     double vertex, bend;
   };
   double inner(std::size_t p) const noexcept;
+  void judge(Point& point, const Reading& reading) noexcept;
+  void next_turn() noexcept;
   void decide() noexcept;
   void cut(double lower, double upper) noexcept;
   Parabola parabola() const noexcept;
@@ -98,6 +106,8 @@ class GoldenSection {
   double width_;           // of the bracket when the refinement began
   std::int64_t turn_ = 0;  // which inner point, or which of a triple, is measured now
   std::int64_t draws_ = 0;
+  std::int64_t stayed_ = 0;  // cycles in a row at the same point
+  double last_asked_ = 0.0;
   bool refining_ = false;
   std::array<Point, 2> points_;
   std::vector<double> sample_input_, sample_j_;  // the last samples, a ring

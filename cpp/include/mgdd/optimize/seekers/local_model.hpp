@@ -21,6 +21,9 @@ class LocalModel {
   double predict(const Inputs& at) const noexcept;
   double residual_variance() const noexcept;  ///< mean square of what was recorded about the plane
 
+  /// Standard deviation of the readings about the plane; 0 before there are enough to tell.
+  double scatter() const noexcept;
+
   /// True where some entry of the slope exceeds `errors` of its standard errors.
   bool slope_known(double errors) const noexcept;
 

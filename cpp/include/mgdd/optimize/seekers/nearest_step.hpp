@@ -30,6 +30,8 @@ class NearestStep {
     double size = 0.0;     // slope . turned
     double room = 0.0, scale = 1.0, multiplier = 0.0;
   };
+  double worst_excess(double relaxation) const noexcept;
+  double least_relaxation(double most) noexcept;
   bool ascend(double relaxation, int most_passes) noexcept;
 
   std::vector<Plane> planes_;

@@ -91,10 +91,12 @@ void require(TellStatus status, const Protocol& protocol, const Reading& reading
 /// ParameterError unless every entry of a restored column lies within the bounds of these settings.
 void require_within_space(std::string_view column, const Inputs& values, const SearchSpace& space);
 
-/// What a seeker learns from: the input that the plant applied, or `asked` where the reading does not say.
-inline Inputs applied_input(const Reading& reading, const Inputs& asked) noexcept {
+/// What a seeker learns from: the input that the plant applied, kept in `told`, or `asked` itself where the reading
+/// does not say.
+inline const Inputs& applied_input(const Reading& reading, const Inputs& asked, Inputs& told) noexcept {
   if (reading.applied.empty()) return asked;
-  return Eigen::Map<const Inputs>(reading.applied.data(), asked.size());
+  told = Eigen::Map<const Inputs>(reading.applied.data(), asked.size());
+  return told;
 }
 
 /// Sum of the components of J, negated where the user minimises.

@@ -23,6 +23,7 @@ concept AnySeeker = requires(S seeker, const S constant, const Reading& reading,
   { constant.applied() } noexcept -> std::same_as<const Inputs&>;
   { constant.estimate() } noexcept -> std::same_as<const Inputs&>;
   { constant.protocol() } noexcept -> std::same_as<const Protocol&>;
+  { limit_state_of(constant, std::size_t{}) } noexcept -> std::same_as<LimitState>;
   { constant.component_count() } noexcept -> std::same_as<std::size_t>;
   { constant.limit_count() } noexcept -> std::same_as<std::size_t>;
 };

@@ -75,6 +75,8 @@ class Spsa {
   const Inputs& applied() const noexcept { return applied_; }
   const Protocol& protocol() const noexcept { return protocol_; }
   std::size_t component_count() const noexcept { return 1; }
+  /// What has been learnt of the limits.
+  const ConstraintFilter& filter() const noexcept { return filter_; }
   std::size_t limit_count() const noexcept { return settings_.limits.size(); }
 
   /// Moves the estimate, within the bounds; `by` is finite. A search that goes on elsewhere is restarted first.

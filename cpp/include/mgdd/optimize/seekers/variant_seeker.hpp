@@ -56,6 +56,9 @@ class VariantSeeker {
     return on([](auto& s) { return s.component_count(); });
   }
   std::size_t limit_count() const noexcept { return settings_.limits.size(); }
+  LimitState limit_state(std::size_t i) const noexcept {
+    return on([&](const auto& s) { return limit_state_of(s, i); });
+  }
   const Settings& settings() const noexcept { return settings_; }
   const Seeker& variant() const noexcept { return seeker_; }
 

@@ -1,0 +1,137 @@
+"""Limits that come late: on the engine bench, in files, pickles and histories."""
+
+from __future__ import annotations
+
+import copy
+import math
+import pickle
+from collections import deque
+from collections.abc import Callable, Mapping
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pytest
+
+from mgdd.errors import ParameterError
+from mgdd.loop import EngineBench, Measurement, run_seeker
+from mgdd.optimize import (
+    BoundedSeeking,
+    ExtremumSeeking,
+    GoldenSection,
+    GradientDescent,
+    Limit,
+    NewtonSeeking,
+    Seeker,
+    Spsa,
+)
+from mgdd.results.labels import check_labels
+
+DELAY, UPPER = 10, 95.0
+SPACE: dict[str, Any] = {"lower": -30.0, "upper": 10.0}
+
+
+class LatePressure:
+    """An engine bench whose reading of the peak pressure takes ten cycles."""
+
+    input_names = ("soc_cad",)
+    limit_names = ("p_max_bar",)
+
+    def __init__(self, seed: int) -> None:
+        self.bench, self.past = EngineBench(seed=seed, limits=["p_max_bar"]), deque[float]()
+
+    def apply(self, inputs: Mapping[str, float]) -> None:
+        self.bench.apply(inputs)
+
+    def measure(self) -> Measurement:
+        now = self.bench.measure()
+        self.past.append(now.limits["p_max_bar"])
+        late = self.past.popleft() if len(self.past) > DELAY else self.past[0]
+        return Measurement(
+            components=now.components,
+            limits={"p_max_bar": late},
+            values={"imep_gross_bar": now.values["imep_gross_bar"]},
+            noise_free_limits=now.noise_free_limits,
+            applied=now.applied,
+        )
+
+
+def seekers(limit: Limit, seed: int) -> dict[str, Callable[[], Any]]:
+    common = {**SPACE, "start": -5.0, "limits": [limit]}
+    return {
+        "batch": lambda: ExtremumSeeking(**common),
+        "moving_average": lambda: ExtremumSeeking(**common, form="moving_average"),
+        "washout": lambda: ExtremumSeeking(**common, form="washout"),
+        "newton": lambda: NewtonSeeking(**common),
+        "bounded": lambda: BoundedSeeking(**common),
+        "spsa": lambda: Spsa(**common, seed=seed),
+        "spsa_second_order": lambda: Spsa(**common, form="second_order", seed=seed),
+        "golden": lambda: GoldenSection(**common, noise_sd=0.25),
+        "gradient": lambda: GradientDescent(**common, rate=1.0),
+    }
+
+
+@pytest.mark.parametrize("name", list(seekers(Limit("p_max_bar", UPPER), 0)))
+def test_a_peak_pressure_ten_cycles_late_is_truly_kept(name: str) -> None:
+    limit = Limit("p_max_bar", UPPER, delay_cycles=DELAY)
+    best = EngineBench(limits=["p_max_bar"]).find_optimum({"p_max_bar": UPPER})["soc_cad"]
+    above, applied = [], []
+    for seed in range(4):
+        run = run_seeker(LatePressure(seed), seekers(limit, seed)[name](), 2000)
+        above.append(run.summary["noise_free_judged_above_fraction_p_max_bar"])
+        applied.append(run.summary["mean_applied_cad"])
+    assert np.mean(above) <= 0.01, above
+    assert 0.0 < np.mean(applied) - best < 2.0, applied
+
+
+def test_without_its_delay_the_same_limit_is_broken_most_of_the_time() -> None:
+    limit = Limit("p_max_bar", UPPER, margin_sd=0.0)
+    for name in ("spsa", "gradient"):
+        run = run_seeker(LatePressure(1), seekers(limit, 1)[name](), 2000)
+        assert run.summary["noise_free_judged_above_fraction_p_max_bar"] > 0.3, name
+
+
+def test_a_limit_is_the_same_after_every_journey(tmp_path: Path) -> None:
+    limit = Limit("p_max_bar", 95.0, margin=1.5, scale=7.0, delay_cycles=10.5, lag_cycles=2.0, margin_sd=0.25)
+    assert (limit.delay_cycles, limit.lag_cycles, limit.margin_sd) == (10.5, 2.0, 0.25)
+    assert limit != Limit("p_max_bar", 95.0, margin=1.5, scale=7.0, delay_cycles=10.5, lag_cycles=2.0, margin_sd=0.5)
+    assert eval(repr(limit)) == limit
+    assert pickle.loads(pickle.dumps(limit)) == copy.copy(limit) == limit
+    seeker = seekers(limit, 1)["batch"]()
+    seeker.run(lambda x: (-((x[0] - 3.0) ** 2), [100.0 - x[0]]), 123)
+    seeker.save(tmp_path / "seeker.json")
+    loaded, twin = Seeker.load(tmp_path / "seeker.json"), pickle.loads(pickle.dumps(seeker))
+    assert loaded.settings["limits"] == [limit]
+    for one in (loaded, twin, seeker):
+        one.run(lambda x: (-((x[0] - 3.0) ** 2), [100.0 - x[0]]), 100)
+    assert loaded.state == twin.state == seeker.state
+    np.testing.assert_array_equal(twin.history["limit_states"], seeker.history["limit_states"])
+
+
+@pytest.mark.parametrize(
+    ("wrong", "text"),
+    [
+        ({"delay_cycles": -1.0}, r"limit p: delay_cycles = -1: must lie in \[0, 1e6\]"),
+        ({"lag_cycles": math.nan}, r"limit p: lag_cycles = nan: must lie in \[0, 1e6\]"),
+        ({"margin_sd": -0.5}, r"limit p: margin_sd = -0.5: must lie in \[0, 100\]"),
+    ],
+)
+def test_what_cannot_be_is_named(wrong: dict[str, float], text: str) -> None:
+    with pytest.raises(ParameterError, match=text):
+        Limit("p", 1.0, **wrong)
+
+
+def test_history_and_states_tell_of_the_limits() -> None:
+    both = [Limit("low", -1.0, scale=1.0), Limit("high", -5.0, scale=3.0), Limit("far", 90.0)]
+    seeker = ExtremumSeeking(start=-8.0, lower=-30.0, upper=30.0, limits=both)
+    assert seeker.limit_states == {"low": "free", "high": "free", "far": "free"}
+    history = seeker.run(lambda x: (-0.0255 * (x[0] - 8.0) ** 2, [x[0], -x[0], x[0]]), 1500)
+    check_labels(history)
+    # x <= -1 and x >= 5 cannot both be: the largest excess, in scales of 1 and 3, is smallest at 0.5, and at 0.25
+    # where half the dither is kept free of both.
+    assert seeker.limit_states == {"low": "infeasible", "high": "infeasible", "far": "free"}
+    assert float(seeker.estimate[0]) == pytest.approx(0.25, abs=0.02)
+    assert history["limit"].to_numpy().tolist() == ["low", "high", "far"]
+    np.testing.assert_array_equal(history["limits"].sel(limit="low"), history["applied"][:, 0])
+    assert history["limit_states"][-1].to_numpy().tolist() == [2, 2, 0]
+    assert "limits" not in ExtremumSeeking(start=0.0).history
