@@ -1,7 +1,9 @@
 // Binds guide/model_optimum.hpp: the best timing of the cycle model in bounded time.
 #include <optional>
+#include <span>
 #include <string>
 #include <utility>
+#include <vector>
 
 #include "binding.hpp"
 #include "guarded.hpp"
@@ -69,12 +71,22 @@ void bind_model_optimum(py::module_& m) {
       },
       arg("point"), "The search at one operating point.");
   cls.def(
-      "_curve",
-      [](Bound& b, const engine::OperatingPoint& point) {
-        guide::Curve out;
-        return b.use()->tabulate(point, out) ? std::optional(out) : std::nullopt;
+      "_curves",
+      [](Bound& b, const engine::OperatingPoint& point,
+         const std::vector<std::string>& names) -> std::optional<std::vector<guide::Curve>> {
+        std::vector<double engine::Indicators<double>::*> members;
+        for (const std::string& name : names) {
+          for (const auto& field : engine::indicator_fields<double>()) {
+            if (field.name == name) members.push_back(field.member);
+          }
+        }
+        if (members.size() != names.size()) return std::nullopt;
+        std::vector<guide::Curve> out(names.size() + 1);
+        if (!b.use()->tabulate(point, out.front(), members, std::span(out).subspan(1))) return std::nullopt;
+        return out;
       },
-      arg("point"), "J over SOC at one operating point; None where there is no such cycle.");
+      arg("point"), arg("names"),
+      "J and indicators over SOC at one operating point; None where there is no such cycle.");
   cls.def(
       "_set_cylinder", [](Bound& b, const engine::Cylinder& cylinder) { b.use()->set_cylinder(cylinder); },
       arg("cylinder"), "Other parameters of the same geometry.");

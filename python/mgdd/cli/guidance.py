@@ -15,7 +15,7 @@ from mgdd.cli.options import assignments, refuse_idle
 from mgdd.cli.seekers import Task, make_seeker
 from mgdd.errors import ParameterError
 from mgdd.guide import Curve, CurveSeeking, FeedForward, GuidedEngine, ModelOptimum, OnlineCalibration, TimingMap
-from mgdd.optimize import Optimum
+from mgdd.optimize import Limit, Optimum
 
 if TYPE_CHECKING:
     import xarray as xr
@@ -62,8 +62,8 @@ def add_guidance(parser: argparse.ArgumentParser) -> None:
     group = parser.add_argument_group("guide", "a rough model that leads while the measurements decide")
     group.add_argument(
         "--guide", choices=GUIDES, default="none",
-        help="feed_forward: the model's best timing, the seeker learns the rest; curve: the model's whole curve, placed by "
-        "the measurements; calibrated: the same while the model learns from the measured pressure; map: a table of "
+        help="feed_forward: the model's best timing, the seeker learns the rest; curve: the model's whole curve, placed "
+        "by the measurements; calibrated: the same while the model learns from the measured pressure; map: a table of "
         "timings as feed-forward (default: none)",
     )  # fmt: skip
     group.add_argument(
@@ -99,8 +99,8 @@ def check_guidance(args: argparse.Namespace) -> None:
             )
         if args.sensor == "analyser":
             raise ParameterError(
-                f"--guide {args.guide} takes J of the same cycle, and the NOx of the analyser is late: use --sensor soft, "
-                "or --guide feed_forward"
+                f"--guide {args.guide} takes J of the same cycle, and the NOx of the analyser is late: use --sensor "
+                "soft, or --guide feed_forward"
             )
     else:
         refuse_idle(args, "guide_shape", why=f"--guide {args.guide} takes one timing, not a curve")
@@ -129,8 +129,8 @@ def task_with_guide(args: argparse.Namespace, bench: EngineBench) -> GuidedTask:
     best = model(bench.point)
     if best is None or not best.curvature < 0.0:
         raise ParameterError(
-            f"--guide {args.guide}: the model has no best timing between --lower-cad {args.lower_cad:g} and --upper-cad "
-            f"{args.upper_cad:g}: move the bounds or change --guide-set"
+            f"--guide {args.guide}: the model has no best timing between --lower-cad {args.lower_cad:g} and "
+            f"--upper-cad {args.upper_cad:g}: move the bounds or change --guide-set"
         )
     curve = None
     if args.guide in CURVES:
@@ -159,9 +159,12 @@ def _cylinder_of(args: argparse.Namespace, bench: EngineBench) -> Cylinder:
 def guided_seeker(task: Task, guided: GuidedTask) -> Seeker | FeedForward | GuidedEngine:
     """Make what the loop steers."""
     if guided.curve is not None:
+        limits = [Limit(name, upper) for name, upper in task.limits.items()]
+        drawn = guided.model.limit_curves(task.bench.point, list(task.limits)) if guided.model and limits else None
         seeker = CurveSeeking(
-            start=task.start_cad, lower=task.bounds_cad[0], upper=task.bounds_cad[1], curve=guided.curve
-        )
+            start=task.start_cad, lower=task.bounds_cad[0], upper=task.bounds_cad[1], curve=guided.curve, limits=limits,
+            limit_curves=drawn,
+        )  # fmt: skip
         if guided.kind == "curve":
             return seeker
         if guided.model is None:

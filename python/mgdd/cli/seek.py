@@ -68,8 +68,8 @@ def add_seek(verbs: Any) -> None:
     parser.add_argument("--form", choices=_FORMS, help="of extremum_seeking (default: batch)")
     parser.add_argument(
         "--start-cad", type=float, metavar="X",
-        help="first SOC (default: -20; with --guide the guide's best timing; with --limit a start whose noise-free values "
-        "stay below the limits)",
+        help="first SOC (default: -20; with --guide the guide's best timing; with --limit a start whose noise-free "
+        "values stay below the limits)",
     )  # fmt: skip
     parser.add_argument("--lower-cad", type=float, default=-30.0, metavar="X", help="earliest SOC (default: -30)")
     parser.add_argument("--upper-cad", type=float, default=10.0, metavar="X", help="latest SOC (default: 10)")

@@ -191,7 +191,8 @@ class GuidedEngine(_core.guide.GuidedEngine):
 
         Over ``cycle``, before each was told: ``guide_cad``, ``feed_forward_cad``, ``trim_cad``, ``estimate_cad``,
         ``estimate_sd_cad`` (NaN where the seeker states none), ``trust``, ``wall_heat_scale`` of the guide; in the
-        cycle ``applied_cad``, ``objective`` (NaN where it misfired) and ``misfire`` (0 or 1). Built anew on every access.
+        cycle ``applied_cad``, ``objective`` (NaN where it misfired) and ``misfire`` (0 or 1). Built anew on every
+        access.
         """
         table = np.array(self._rows, np.float64).reshape(-1, len(_COLUMNS))
         first = self.cycle - table.shape[0]

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+from collections.abc import Sequence
 from typing import Any
 
 from mgdd import _core
@@ -166,8 +167,34 @@ class ModelOptimum(_core.guide.ModelOptimum):
         """
         if not isinstance(point, OperatingPoint):
             raise ParameterError.of("point", point, "an OperatingPoint")
-        drawn: Curve | None = self._curve(point)
-        return drawn
+        drawn: list[Curve] | None = self._curves(point, [])
+        return None if drawn is None else drawn[0]
+
+    def limit_curves(self, point: OperatingPoint, names: Sequence[str]) -> list[Curve] | None:
+        """Draw limited indicators over the start of combustion, for the limits of `CurveSeeking`.
+
+        Parameters
+        ----------
+        point : OperatingPoint
+            Where.
+        names : sequence of str
+            Indicators, for example ``["p_max_bar"]``; at most eight.
+
+        Returns
+        -------
+        list of Curve or None
+            One per name, each in its unit over SOC [°CA aTDC]; None where the model has no such cycle, or no such
+            indicator.
+
+        Raises
+        ------
+        mgdd.errors.ParameterError
+            Not an operating point.
+        """
+        if not isinstance(point, OperatingPoint):
+            raise ParameterError.of("point", point, "an OperatingPoint")
+        drawn: list[Curve] | None = self._curves(point, list(names))
+        return None if drawn is None else drawn[1:]
 
     def calibrate(self, cylinder: Cylinder) -> None:
         """Go on with other parameters of the same cylinder, as a calibration finds them.

@@ -66,8 +66,8 @@ def run_seeker(
     plant : Plant
         It advances by ``cycles``; a rig is open and stays open.
     seeker
-        Any seeker of `mgdd.optimize` or `mgdd.guide` with one input for every name of ``plant.input_names``, one component or as many
-        as the plant measures, and limits that the plant measures.
+        Any seeker of `mgdd.optimize` or `mgdd.guide` with one input for every name of ``plant.input_names``, one
+        component or as many as the plant measures, and limits that the plant measures.
     cycles : int
         How many, >= 1.
     criteria : LoopCriteria, optional
