@@ -164,8 +164,8 @@ class GoldenSection(Seeker, _core.optimize.GoldenSection):
     maximize : bool
         False to minimise J.
     limits : sequence of Limit
-        Measured quantities to keep. Points on both sides of a limit are tried until the bracket is small, so it is broken
-        during the search; behind a delay each point is measured for as long as the limits take to show it.
+        Measured quantities to keep. Points on both sides of a limit are tried until the bracket is small, so it is
+        broken during the search; behind a delay each point is measured for as long as the limits take to show it.
 
     Raises
     ------
