@@ -13,6 +13,23 @@ namespace {
 
 using namespace optimize;
 
+/// Name and limit, and what is not as by default.
+py::str limit_text(const Limit& l) {
+  const Limit standard;
+  py::str out = py::str("Limit({!r}, {!r}").format(l.name, l.upper);
+  const auto add = [&](const char* name, const auto& value, const auto& usual) {
+    if (value != usual) out = py::str("{}, {}={!r}").format(out, name, value);
+  };
+  add("margin", l.margin, standard.margin);
+  add("method", std::string(to_string(l.method)), std::string(to_string(standard.method)));
+  add("weight", l.weight, standard.weight);
+  add("scale", l.scale, standard.scale);
+  add("delay_cycles", l.lag.delay_cycles, standard.lag.delay_cycles);
+  add("lag_cycles", l.lag.lag_cycles, standard.lag.lag_cycles);
+  add("margin_sd", l.margin_sd, standard.margin_sd);
+  return py::str("{})").format(out);
+}
+
 void bind_limit(py::module_& m) {
   py::class_<Limit>(m, "Limit", R"(An upper limit on a measured quantity, kept by a seeker.
 
@@ -49,7 +66,7 @@ Examples
 --------
 >>> from mgdd.optimize import Limit
 >>> Limit("p_max_bar", 95.0, margin=1.0)
-Limit('p_max_bar', 95.0, margin=1.0, method='switching', weight=1.0, scale=0.0, delay_cycles=0.0, lag_cycles=0.0, margin_sd=1.0)
+Limit('p_max_bar', 95.0, margin=1.0)
 )")
       .def(py::init([](std::string name, double upper, double margin, const std::string& method, double weight,
                        double scale, double delay_cycles, double lag_cycles, double margin_sd) {
@@ -75,14 +92,7 @@ Limit('p_max_bar', 95.0, margin=1.0, method='switching', weight=1.0, scale=0.0, 
       .def_readonly("margin_sd", &Limit::margin_sd, "Margin in standard deviations of the reading.")
       .def(
           "__eq__", [](const Limit& a, const Limit& b) { return a == b; }, py::is_operator())
-      .def("__repr__",
-           [](const Limit& l) {
-             return py::str(
-                        "Limit({!r}, {!r}, margin={!r}, method={!r}, weight={!r}, scale={!r}, delay_cycles={!r}, "
-                        "lag_cycles={!r}, margin_sd={!r})")
-                 .format(l.name, l.upper, l.margin, std::string(to_string(l.method)), l.weight, l.scale,
-                         l.lag.delay_cycles, l.lag.lag_cycles, l.margin_sd);
-           })
+      .def("__repr__", &limit_text)
       .def(py::pickle(
           [](const Limit& l) {
             return py::make_tuple(l.name, l.upper, l.margin, std::string(to_string(l.method)), l.weight, l.scale,

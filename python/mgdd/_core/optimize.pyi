@@ -259,7 +259,7 @@ class Limit:
     --------
     >>> from mgdd.optimize import Limit
     >>> Limit("p_max_bar", 95.0, margin=1.0)
-    Limit('p_max_bar', 95.0, margin=1.0, method='switching', weight=1.0, scale=0.0, delay_cycles=0.0, lag_cycles=0.0, margin_sd=1.0)
+    Limit('p_max_bar', 95.0, margin=1.0)
     """
     __hash__: typing.ClassVar[None] = None
     def __eq__(self, arg0: Limit) -> bool:
