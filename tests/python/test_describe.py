@@ -13,6 +13,7 @@ import pytest
 
 from mgdd import _core, datasets, presets
 from mgdd.engine import Cylinder, NoxModel, OperatingPoint, Performance, SoftSensor, find_optimum
+from mgdd.guide import OnlineCalibration
 from mgdd.identify import (
     FirstPrincipleModel,
     OdeModel,
@@ -60,6 +61,8 @@ def objects() -> dict[str, Callable[[], Any]]:
         "analyser": SensorDynamics,
         "limit": lambda: Limit(name="p_max_bar", upper=95.0),
         "bench": EngineBench,
+        "online calibration": lambda: OnlineCalibration("puma_single"),
+        "verdict": lambda: OnlineCalibration("puma_single").verdicts["wall_heat_scale"],
         "seeker": lambda: ExtremumSeeking(**seeking),
         "golden": lambda: GoldenSection(**seeking, noise_sd=0.2),
         "run": lambda: run_seeker(EngineBench(), ExtremumSeeking(**seeking), 300),

@@ -2,7 +2,8 @@
 
 from __future__ import annotations
 
-from mgdd.guide.online_calibration import OnlineCalibration, ParameterVerdict
+from mgdd.guide.online_calibration import OnlineCalibration
+from mgdd.guide.parameter_verdict import ParameterVerdict
 
 __all__ = [
     "OnlineCalibration",
