@@ -13,7 +13,7 @@ import pytest
 
 from mgdd import _core, datasets, presets
 from mgdd.engine import Cylinder, NoxModel, OperatingPoint, Performance, SoftSensor, find_optimum
-from mgdd.guide import FeedForward, ModelOptimum, TimingMap
+from mgdd.guide import FeedForward, ModelOptimum, OnlineCalibration, TimingMap
 from mgdd.identify import (
     FirstPrincipleModel,
     OdeModel,
@@ -61,6 +61,8 @@ def objects() -> dict[str, Callable[[], Any]]:
         "analyser": SensorDynamics,
         "limit": lambda: Limit(name="p_max_bar", upper=95.0),
         "bench": EngineBench,
+        "online calibration": lambda: OnlineCalibration("puma_single"),
+        "verdict": lambda: OnlineCalibration("puma_single").verdicts["wall_heat_scale"],
         "seeker": lambda: ExtremumSeeking(**seeking),
         "feed-forward": lambda: FeedForward(ExtremumSeeking(**seeking), lambda _: -5.0),
         "model optimum": lambda: ModelOptimum(Cylinder()),

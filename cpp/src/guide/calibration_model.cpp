@@ -12,10 +12,11 @@ namespace {
 // The number itself, or the variable in its direction.
 template <class T>
 T variable(const CalibrationVector& x, int parameter) noexcept {
-  if constexpr (is_dual_v<T>)
+  if constexpr (is_dual_v<T>) {
     return T::seeded(x[parameter], parameter);
-  else
+  } else {
     return x[parameter];
+  }
 }
 
 template <class T>

@@ -96,7 +96,7 @@ CalibrationStatus OnlineCalibration::advance() noexcept {
     if (!take_mean()) return CalibrationStatus::jump;
   }
   if (!has_mean_) return CalibrationStatus::collecting;
-  return seeker_ ? seek() : step();
+  return seeker_ ? seek(*seeker_) : step();
 }
 
 void OnlineCalibration::restart() noexcept {
@@ -197,10 +197,11 @@ void OnlineCalibration::forget_point() noexcept {
       if (!info_of(i).at_point) continue;
       pull[i] = all.pull[i] + beforehand_.information[i] * beforehand_.start[i];
       for (int j = 0; j < n_calibrated; ++j) {
-        if (info_of(j).at_point)
+        if (info_of(j).at_point) {
           own(i, j) = all.information(i, j) + (i == j ? beforehand_.information[i] : 0.0);
-        else
+        } else {
           mixed(j, i) = all.information(j, i);
+        }
       }
       if (!beforehand_.unknown[place(i)]) own(i, i) = 1.0;
     }
@@ -263,7 +264,7 @@ CalibrationStatus OnlineCalibration::step() noexcept {
   return all ? CalibrationStatus::poor_excitation : CalibrationStatus::updated;
 }
 
-CalibrationStatus OnlineCalibration::seek() noexcept {
+CalibrationStatus OnlineCalibration::seek(optimize::ExtremumSeeking& seeker) noexcept {
   constexpr int wall = Calibrated::wall_heat_scale;
   if (residual_power(x_, mean_, mean_bar_) < 0.0 || !model_.differentiate(x_, mean_, columns_)) {
     return CalibrationStatus::unphysical;
@@ -292,12 +293,12 @@ CalibrationStatus OnlineCalibration::seek() noexcept {
   const double before = x_[wall];
   for (int trial = 0; trial < settings_.trials_per_update; ++trial) {
     CalibrationVector tried = x_;
-    tried[wall] = seeker_->ask()[0];
+    tried[wall] = seeker.ask()[0];
     const double power = residual_power(tried, mean_, mean_bar_);
     const double value[] = {-power / bend};
-    seeker_->tell({.components = value, .limits = {}, .misfire = power < 0.0});
+    seeker.tell({.components = value, .limits = {}, .misfire = power < 0.0});
   }
-  x_[wall] = seeker_->estimate()[0];
+  x_[wall] = seeker.estimate()[0];
   settled_updates_ = std::abs(x_[wall] - before) <= calibration_amplitude / seeking_period ? settled_updates_ + 1 : 0;
   return CalibrationStatus::updated;
 }

@@ -35,8 +35,8 @@ PressureTrace PressureSensor::read(const engine::CycleModel<double>& model, cons
   };
   const auto first = static_cast<std::uint64_t>(cycle) * label_cad_.size();
   for (std::size_t k = 0; k < label_cad_.size(); ++k) {
-    const double pa =
-        weights_[k] ? weights_[k]->value_of(work.pressure_pa) : open_pa(label_cad_[k] - settings_.tdc_error_cad);
+    const std::optional<CubicWeights>& weights = weights_[k];
+    const double pa = weights ? weights->value_of(work.pressure_pa) : open_pa(label_cad_[k] - settings_.tdc_error_cad);
     pressure_bar_[k] = pa / units::pa_per_bar * (1.0 + settings_.gain_error) + settings_.offset_bar;
     if (settings_.noise_bar > 0.0) pressure_bar_[k] += settings_.noise_bar * random::normal(seed, stream, first + k);
   }

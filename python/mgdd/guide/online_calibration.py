@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
@@ -11,8 +10,9 @@ import numpy as np
 from mgdd import _core, presets
 from mgdd._core.engine import Cylinder, OperatingPoint
 from mgdd.errors import ParameterError, ShapeError
+from mgdd.guide.parameter_verdict import ParameterVerdict
 from mgdd.presets import Preset
-from mgdd.results.describe import as_html, described, rows_of
+from mgdd.results.describe import as_html, rows_of
 from mgdd.results.labels import labelled_dataset
 
 if TYPE_CHECKING:
@@ -26,37 +26,6 @@ _FIGURES = {
     "noise_bar": ("bar", "standard deviation of a sample of the mean trace"),
     "effective_samples": ("-", "independent samples that the residual is worth"),
 }
-
-
-@described
-@dataclass(frozen=True, kw_only=True)
-class ParameterVerdict:
-    """How much one parameter of an online calibration deserves belief.
-
-    Attributes
-    ----------
-    name : str
-        Of the parameter.
-    value, standard_error : float
-        Estimate, and its standard error with everything that is not known exactly counted.
-    knowledge : str
-        ``"determined"``, ``"uncertain"``, ``"held"`` (the data know less than was known beforehand), ``"at bound"``,
-        ``"contradicted"`` (the model does not fit this pressure) or ``"no data"``.
-    sentence : str
-        All of it in words, with the reason.
-
-    Examples
-    --------
-    >>> from mgdd.guide import OnlineCalibration
-    >>> OnlineCalibration("puma_single").verdicts["wall_heat_scale"].knowledge
-    'no data'
-    """
-
-    name: str
-    value: float
-    standard_error: float
-    knowledge: str
-    sentence: str
 
 
 class OnlineCalibration:

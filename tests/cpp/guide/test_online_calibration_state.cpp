@@ -254,7 +254,7 @@ TEST(OnlineCalibrationLoop, RefusesByName) {
     OnlineCalibrationSettings s;
     change(s);
     try {
-      OnlineCalibration calibration(s);
+      const OnlineCalibration calibration(s);
     } catch (const ParameterError& e) {
       return e.what();
     }

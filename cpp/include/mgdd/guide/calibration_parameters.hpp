@@ -22,11 +22,13 @@ struct Calibrated {
 };
 
 struct CalibratedInfo {
-  FieldInfo field;  ///< name, unit and bounds
-  double start;     ///< value beforehand; the wall heat starts from that of the cylinder
-  double known_sd;  ///< how well it is known beforehand, as a standard deviation; data that know less teach nothing
-  double determined_sd;  ///< standard error below which it counts as determined; of the wall heat a share of its value
-  bool at_point;         ///< belongs to the operating point and is not carried to the next one
+  FieldInfo field;     ///< name, unit and bounds
+  double start = 0.0;  ///< value beforehand; the wall heat starts from that of the cylinder
+  /// How well it is known beforehand, as a standard deviation; data that know less teach nothing.
+  double known_sd = 0.0;
+  /// Standard error below which it counts as determined; of the wall heat a share of its value.
+  double determined_sd = 0.0;
+  bool at_point = false;  ///< belongs to the operating point and is not carried to the next one
 };
 
 /// Ours. Two standard deviations of what is known beforehand move a determined wall heat by at most 5 %.

@@ -122,7 +122,7 @@ class OnlineCalibration {
   void forget_point() noexcept;
   void let_timing_wander() noexcept;
   CalibrationStatus step() noexcept;
-  CalibrationStatus seek() noexcept;
+  CalibrationStatus seek(optimize::ExtremumSeeking& seeker) noexcept;
   /// Mean square of measured less predicted over the rows in use; negative where the model has no such cycle.
   double residual_power(const CalibrationVector& x, const CalibrationConditions& at,
                         std::span<const double> measured_bar) noexcept;
