@@ -22,7 +22,7 @@ constexpr double golden = 0.38196601125010515;  // (3 - sqrt 5)/2
 constexpr double secant_cad = 3.0;              // of the curvature
 constexpr double worth = 1e-9;                  // of J: an ascent may end that much below the scan
 
-ModelOptimumSettings checked(ModelOptimumSettings s) {
+ModelOptimumSettings checked(const ModelOptimumSettings& s) {
   validate(s);
   return s;
 }
@@ -73,8 +73,8 @@ void validate(const ModelOptimumSettings& s) {
   }
 }
 
-ModelOptimum::ModelOptimum(ModelOptimumSettings settings)
-    : settings_(checked(std::move(settings))),
+ModelOptimum::ModelOptimum(const ModelOptimumSettings& settings)
+    : settings_(checked(settings)),
       model_(settings_.cylinder, engine::crank_grid(settings_.cylinder, settings_.step_cad), settings_.integrator),
       work_(model_.make_workspace()),
       ascent_(ascent_of(settings_)) {}

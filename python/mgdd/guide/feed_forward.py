@@ -12,10 +12,10 @@ import numpy as np
 from mgdd import _core
 from mgdd.errors import ParameterError
 from mgdd.guide.conditions import change_between, numbers_of
+from mgdd.guide.guided_history import TABLES, history_dataset
 from mgdd.optimize import Optimum, Seeker
 from mgdd.optimize.seeker import rebuilt
 from mgdd.results.describe import as_html, rows_of
-from mgdd.results.labels import labelled_dataset
 
 if TYPE_CHECKING:
     import xarray as xr
@@ -26,10 +26,8 @@ Guide = Callable[[Any], "float | Sequence[float] | Optimum | None"]
 Answer = Literal["same", "followed", "held", "refused"]
 
 _LOG = logging.getLogger(__name__)
-_INPUT_UNIT, _J_UNIT = "unit of the input", "unit of J"
 _CAUSES = ("", "calibration", "following", "new_point")  # of a value, the weightier the later
 _POINT = "point."  # of the columns of the state that hold the operating point
-_TABLES = ("guide_optimum", "feed_forward", "trim", "estimate", "applied")
 
 
 class FeedForward(_core.guide.FeedForward):
@@ -231,7 +229,7 @@ class FeedForward(_core.guide.FeedForward):
         mgdd.errors.ParameterError, mgdd.errors.ShapeError, mgdd.errors.DataError
             As by the seeker; nothing has changed then.
         """
-        before = (self.cycle, self._points, self.trust, self.testing, *(getattr(self, name) for name in _TABLES[:-1]))
+        before = (self.cycle, self._points, self.trust, self.testing, *(getattr(self, name) for name in TABLES[:-1]))
         super().tell(J, limits, misfire=misfire, applied=applied)
         done = self.applied if applied is None else np.atleast_1d(np.array(applied, np.float64))
         objective = math.nan if misfire else float(np.sum(np.asarray(J, np.float64)))
@@ -246,30 +244,7 @@ class FeedForward(_core.guide.FeedForward):
         place, 2: the new one), ``point`` (operating points so far), ``objective`` (NaN where the cycle misfired) and
         ``misfire``. What is not known yet is NaN. Built anew on every access.
         """
-        names = ("cycle", "point", "trust", "testing", *_TABLES, "objective", "misfire")
-        columns = (
-            dict(zip(names, zip(*self._rows, strict=True), strict=True)) if self._rows else dict.fromkeys(names, ())
-        )
-        inputs, over = self.estimate.size, ("cycle", "input")
-        said = ("optimum by the guide", "feed-forward in force", "trim, estimate less feed-forward")
-        labels = dict(zip(_TABLES, (*said, "estimate of the optimum", "applied input"), strict=True))
-        tables = {
-            name: (over, np.array(columns[name], np.float64).reshape(-1, inputs), _INPUT_UNIT, label)
-            for name, label in labels.items()
-        }
-        return labelled_dataset(
-            {
-                "cycle": ("cycle", np.array(columns["cycle"], np.int64)),
-                "input": ("input", np.arange(inputs), "-", "index of the input"),
-                **tables,
-                "trust": ("cycle", np.array(columns["trust"], np.float64), "-", "trust in the guide"),
-                "testing": ("cycle", np.array(columns["testing"], np.int8), "-", "test of the guide"),
-                "point": ("cycle", np.array(columns["point"], np.int64), "-", "operating points so far"),
-                "objective": ("cycle", np.array(columns["objective"], np.float64), _J_UNIT, "objective J"),
-                "misfire": ("cycle", np.array(columns["misfire"], np.int8), "-", "misfired cycle"),
-            },
-            attrs={"seeker": self._made_of[0].kind},
-        )
+        return history_dataset(self._rows, self.estimate.size, self._made_of[0].kind)
 
     @property
     def seeker(self) -> Seeker:

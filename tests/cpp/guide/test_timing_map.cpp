@@ -159,7 +159,7 @@ TEST(TimingMap, RefusesSettingsThatMakeNoSense) {
     TimingMapSettings s = uneven(true);
     change(s);
     try {
-      TimingMap map(s);
+      const TimingMap map(s);
     } catch (const Error& e) {
       return std::string(e.field);
     }

@@ -12,7 +12,6 @@ namespace mgdd::guide {
 namespace {
 
 using optimize::Inputs;
-using optimize::scalar_input;
 
 Trust known_noise(double noise_sd, double initial = 1.0, int probe_cycles = 1) {
   return {{.initial = initial, .probe_cycles = probe_cycles, .noise_sd = noise_sd}, 1};

@@ -48,7 +48,7 @@ struct ModelOptimumResult {
 class ModelOptimum {
  public:
   /// ParameterError naming the field.
-  explicit ModelOptimum(ModelOptimumSettings settings);
+  explicit ModelOptimum(const ModelOptimumSettings& settings);
 
   ModelOptimumResult find(const engine::OperatingPoint& point) noexcept;
 
