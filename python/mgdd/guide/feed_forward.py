@@ -27,6 +27,7 @@ Answer = Literal["same", "followed", "held", "refused"]
 
 _LOG = logging.getLogger(__name__)
 _CAUSES = ("", "calibration", "following", "new_point")  # of a value, the weightier the later
+_LONGEST_SETTLING, _LAGS = 5, 3.0  # cycles before a reading of a test; lags until a sensor has settled
 _POINT = "point."  # of the columns of the state that hold the operating point
 
 
@@ -52,10 +53,12 @@ class FeedForward(_core.guide.FeedForward):
         Trust in the guide before its first test, in [0, 1].
     calibration_rate : float or array_like
         Largest move of the feed-forward per cycle after a calibration [unit of the input].
-    probe_cycles : int
-        Readings of J at each of the two places; 0 for a trust that is never tested.
-    probe_settling : int
-        Cycles before them that do not count, at each place: behind a sensor its delay and three times its lag.
+    probe_cycles : int, optional
+        Readings of J at each of the two places; 0 for a trust that is never tested. If left out 1, or 0 where
+        `probe_settling` is above 5: so long a stay at the old place would cost more than a wrong guide.
+    probe_settling : int, optional
+        Cycles before them that do not count, at each place; if left out the delay and three times the lag of the
+        slowest of the seeker's ``components``.
     noise_sd : float, optional
         Standard deviation of one reading of J; learnt from the readings if left out.
     trust_sd : float
@@ -99,8 +102,8 @@ class FeedForward(_core.guide.FeedForward):
         *,
         trust: float = 1.0,
         calibration_rate: Any = 1.0,
-        probe_cycles: int = 1,
-        probe_settling: int = 0,
+        probe_cycles: int | None = None,
+        probe_settling: int | None = None,
         noise_sd: float | None = None,
         trust_sd: float = 0.15,
         doubt: float = 0.1,
@@ -109,11 +112,12 @@ class FeedForward(_core.guide.FeedForward):
     ) -> None:
         if guide is not None and not callable(guide):
             raise ParameterError.of("guide", guide, "None or a function of the operating point")
+        settling = _settling_of(seeker) if probe_settling is None else probe_settling
         self._options: dict[str, Any] = {
             "trust": trust,
             "calibration_rate": calibration_rate,
-            "probe_cycles": probe_cycles,
-            "probe_settling": probe_settling,
+            "probe_cycles": int(settling <= _LONGEST_SETTLING) if probe_cycles is None else probe_cycles,
+            "probe_settling": settling,
             "noise_sd": noise_sd,
             "trust_sd": trust_sd,
             "doubt": doubt,
@@ -286,6 +290,12 @@ class FeedForward(_core.guide.FeedForward):
     def _repr_html_(self) -> str:
         now = {"cycle": self.cycle, "estimate": self.estimate, "feed_forward": self.feed_forward, "trim": self.trim}
         return as_html("FeedForward", rows_of({**now, "verdict": self.verdict, **self._options, "trust": self.trust}))
+
+
+def _settling_of(seeker: Any) -> int:
+    """Cycles until the slowest component of J shows a step of the input."""
+    components = getattr(seeker, "settings", {}).get("components", ())
+    return max((math.ceil(lag.delay_cycles + _LAGS * lag.lag_cycles) for lag in components), default=0)
 
 
 def _numbers_said(said: Any) -> tuple[list[float], list[float]]:
