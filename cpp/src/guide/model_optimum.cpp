@@ -116,7 +116,7 @@ ModelOptimumResult ModelOptimum::find(const engine::OperatingPoint& point) noexc
   out.j = best;
   const double lower = std::max(start - width, settings_.lower_cad);
   const double upper = std::min(start + width, settings_.upper_cad);
-  if (settings_.method == OptimumMethod::golden_section || !climb(start, width, out)) divide(lower, upper, out);
+  if (settings_.method == OptimumMethod::golden_section || !climb(start, out)) divide(lower, upper, out);
   out.at_bound = out.soc_cad <= settings_.lower_cad || out.soc_cad >= settings_.upper_cad;
   if (out.soc_cad - secant_cad >= std::max(engine::timing_lower_cad, settings_.cylinder.geometry.ivc_cad) &&
       out.soc_cad + secant_cad <= std::min(engine::timing_upper_cad, settings_.cylinder.geometry.evo_cad - 1e-9)) {
@@ -128,8 +128,8 @@ ModelOptimumResult ModelOptimum::find(const engine::OperatingPoint& point) noexc
   return out;
 }
 
-// The ascent from the best angle of the scan; false where it does not converge near it, or to less.
-bool ModelOptimum::climb(double start_cad, double room_cad, ModelOptimumResult& out) noexcept {
+// The ascent from the best angle of the scan; false where it does not converge, or to less.
+bool ModelOptimum::climb(double start_cad, ModelOptimumResult& out) noexcept {
   ascent_.restart();
   ascent_.shift_estimate(optimize::scalar_input(start_cad - ascent_.estimate()[0]));
   while (ascent_.converged_at() < 0 && ascent_.iteration() < settings_.iterations) {
@@ -138,7 +138,7 @@ bool ModelOptimum::climb(double start_cad, double room_cad, ModelOptimumResult& 
   }
   out.iterations = ascent_.iteration();
   const double found = ascent_.estimate()[0];
-  if (ascent_.converged_at() < 0 || std::abs(found - start_cad) > room_cad) return false;
+  if (ascent_.converged_at() < 0) return false;
   const double j = performance_at(found);
   if (!(j >= out.j - worth * std::abs(out.j))) return false;
   out.soc_cad = found;

@@ -75,6 +75,23 @@ TEST(FeedForward, OneWildReadingDoesNotOverthrowAGuide) {
   }
 }
 
+// The optimum moves by 0.6 of what the guide says, there and back: the move is made so far, and so is the next one.
+TEST(FeedForward, MakesTheShareOfTheMoveThatTheMeasurementsConfirm) {
+  FeedForward<ExtremumSeeking> seeker = guided(-20.0, {.curvature_spread = 0.0, .noise_sd = 0.01});
+  seeker.offer(at(-4.0), GuideCause::new_point);
+  run(seeker, -4.0, 103);
+  double before = seeker.estimate()[0];
+  for (const bool there : {true, false, true}) {
+    seeker.offer(at(there ? -14.0 : -4.0), GuideCause::new_point);
+    EXPECT_EQ(save_state(seeker.seeker()).at("seen")[0], 0.0);
+    run(seeker, there ? -10.0 : -4.0, 2);
+    EXPECT_NEAR(seeker.path().trust().value(), 0.6, 0.02);
+    EXPECT_NEAR(seeker.estimate()[0] - before, there ? -6.0 : 6.0, 0.3);
+    before = seeker.estimate()[0];
+  }
+  EXPECT_NEAR(seeker.path().feed_forward()[0] + seeker.trim()[0], before, 1e-12);
+}
+
 TEST(FeedForward, AMoveThatBreaksALimitIsNotTaken) {
   ExtremumSeekingSettings s = plain_seeking(-4.0);
   s.limits = {{"p_max_bar", 150.0}};
@@ -88,6 +105,29 @@ TEST(FeedForward, AMoveThatBreaksALimitIsNotTaken) {
   }
   EXPECT_EQ(seeker.path().trust().verdict(), Verdict::wrong);
   EXPECT_EQ(seeker.estimate()[0], -4.0);
+}
+
+TEST(FeedForward, AMoveThatLessensABrokenLimitIsTaken) {
+  ExtremumSeekingSettings s = plain_seeking(-12.0);
+  s.limits = {{"p_max_bar", 150.0}};
+  FeedForward<ExtremumSeeking> seeker(ExtremumSeeking(s), {.trust = {.noise_sd = 0.25}});
+  seeker.offer(at(-12.0), GuideCause::new_point);
+  seeker.offer(at(-4.0), GuideCause::new_point);
+  for (int k = 0; k < 2; ++k) {
+    const double x = seeker.ask()[0];
+    const double j[] = {quadratic(x + 4.0)}, pressure[] = {155.0 - 0.5 * (x + 4.0)};
+    seeker.tell({j, pressure, false});
+  }
+  EXPECT_EQ(seeker.path().trust().verdict(), Verdict::confirmed);
+  EXPECT_NEAR(seeker.estimate()[0], -4.0, 0.5);
+}
+
+TEST(FeedForward, TestsNoFurtherThanTheLowerBound) {
+  FeedForward<ExtremumSeeking> seeker = guided();
+  seeker.offer(at(-20.0), GuideCause::new_point);
+  seeker.shift_estimate(scalar_input(-5.0));
+  seeker.offer(at(-29.0), GuideCause::new_point);
+  EXPECT_NEAR(run(seeker, -29.0, 2)[1], -30.0, 1e-12);
 }
 
 TEST(FeedForward, TestsWithinTheBoundsAndAfterTheSensorHasSettled) {
@@ -122,14 +162,14 @@ TEST(FeedForward, LearnsFromWhatThePlantApplied) {
   seeker.offer(at(-4.2), GuideCause::new_point);
   seeker.offer(at(-10.7), GuideCause::new_point);
   for (int k = 0; k < 400; ++k) {
-    const double x[] = {std::max(seeker.ask()[0], -7.0)};
-    const double j[] = {quadratic(x[0] + 8.8)};
+    const double x[] = {std::max(seeker.ask()[0], -6.0)};
+    const double j[] = {quadratic(x[0] + 9.5)};
     ASSERT_EQ(seeker.tell({j, {}, false, x}), TellStatus::accepted);
     if (k == 1) {
-      EXPECT_NEAR(seeker.path().trust().value(), 4.6 / 6.5, 0.02);
+      EXPECT_NEAR(seeker.path().trust().value(), 5.3 / 6.5, 0.02);
     }
   }
-  EXPECT_GE(seeker.estimate()[0], -8.01);
+  EXPECT_GE(seeker.estimate()[0], -7.01);
 }
 
 }  // namespace
