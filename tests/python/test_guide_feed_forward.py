@@ -18,6 +18,7 @@ from mgdd.errors import Error, ParameterError
 from mgdd.guide import FeedForward
 from mgdd.optimize import (
     BoundedSeeking,
+    ComponentLag,
     ExtremumSeeking,
     GoldenSection,
     GradientDescent,
@@ -282,6 +283,25 @@ def test_refused_arguments_are_named(change: dict[str, Any], field: str) -> None
     arguments: dict[str, Any] = {"seeker": ExtremumSeeking(**SPACE), "guide": moved, **change}
     with pytest.raises(Error, match=field):
         FeedForward(arguments.pop("seeker"), arguments.pop("guide"), **arguments)
+
+
+@pytest.mark.parametrize(
+    ("lags", "stages"),
+    [
+        ([(0.0, 0.0)], [1, 2, 0]),
+        ([(0.0, 0.0), (1.0, 0.5)], [1, 1, 1, 1, 2, 2, 2, 2, 0]),  # three cycles until the slower one has settled
+        ([(38.0, 25.0)], [0]),
+    ],
+)
+def test_the_test_of_a_guide_waits_for_the_sensors(lags: list[tuple[float, float]], stages: list[int]) -> None:
+    components = [ComponentLag(delay_cycles=delay, lag_cycles=lag) for delay, lag in lags]
+    ff = FeedForward(ExtremumSeeking(components=components, **SPACE), moved, noise_sd=0.1)
+    ff.at(12.0)
+    for stage in stages:
+        ff.at(30.0)
+        assert ff.testing == stage
+        ff.ask()
+        ff.tell(np.full(len(lags), 50.0))
 
 
 def test_several_inputs_move_together() -> None:

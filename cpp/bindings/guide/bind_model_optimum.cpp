@@ -29,7 +29,7 @@ Bound make(const engine::Cylinder& cylinder, const engine::Performance& performa
   s.iterations = iterations;
   s.step_cad = step_cad;
   s.integrator = engine::parse_integrator(integrator);
-  return {"ModelOptimum", guide::ModelOptimum(std::move(s))};
+  return {"ModelOptimum", guide::ModelOptimum(s)};
 }
 
 py::dict to_dict(const guide::ModelOptimumSettings& s) {

@@ -23,7 +23,7 @@ constexpr double secant_cad = 3.0;                      // of the curvature
 constexpr double before_cad = 15.0, behind_cad = 10.0;  // of the bounds: how far a curve goes on
 constexpr double worth = 1e-9;                          // of J: an ascent may end that much below the scan
 
-ModelOptimumSettings checked(ModelOptimumSettings s) {
+ModelOptimumSettings checked(const ModelOptimumSettings& s) {
   validate(s);
   return s;
 }
@@ -86,8 +86,8 @@ void validate(const ModelOptimumSettings& s) {
   }
 }
 
-ModelOptimum::ModelOptimum(ModelOptimumSettings settings)
-    : settings_(checked(std::move(settings))),
+ModelOptimum::ModelOptimum(const ModelOptimumSettings& settings)
+    : settings_(checked(settings)),
       model_(settings_.cylinder, engine::crank_grid(settings_.cylinder, settings_.step_cad), settings_.integrator),
       work_(model_.make_workspace()),
       ascent_(ascent_of(settings_)),
@@ -142,7 +142,7 @@ ModelOptimumResult ModelOptimum::find(const engine::OperatingPoint& point) noexc
   out.j = best;
   const double lower = std::max(start - width, settings_.lower_cad);
   const double upper = std::min(start + width, settings_.upper_cad);
-  if (settings_.method == OptimumMethod::golden_section || !climb(start, width, out)) divide(lower, upper, out);
+  if (settings_.method == OptimumMethod::golden_section || !climb(start, out)) divide(lower, upper, out);
   out.at_bound = out.soc_cad <= settings_.lower_cad || out.soc_cad >= settings_.upper_cad;
   if (out.soc_cad - secant_cad >= std::max(engine::timing_lower_cad, settings_.cylinder.geometry.ivc_cad) &&
       out.soc_cad + secant_cad <= std::min(engine::timing_upper_cad, settings_.cylinder.geometry.evo_cad - 1e-9)) {
@@ -154,8 +154,8 @@ ModelOptimumResult ModelOptimum::find(const engine::OperatingPoint& point) noexc
   return out;
 }
 
-// The ascent from the best angle of the scan; false where it does not converge near it, or to less.
-bool ModelOptimum::climb(double start_cad, double room_cad, ModelOptimumResult& out) noexcept {
+// The ascent from the best angle of the scan; false where it does not converge, or to less.
+bool ModelOptimum::climb(double start_cad, ModelOptimumResult& out) noexcept {
   ascent_.restart();
   ascent_.shift_estimate(optimize::scalar_input(start_cad - ascent_.estimate()[0]));
   while (ascent_.converged_at() < 0 && ascent_.iteration() < settings_.iterations) {
@@ -164,7 +164,7 @@ bool ModelOptimum::climb(double start_cad, double room_cad, ModelOptimumResult& 
   }
   out.iterations = ascent_.iteration();
   const double found = ascent_.estimate()[0];
-  if (ascent_.converged_at() < 0 || std::abs(found - start_cad) > room_cad) return false;
+  if (ascent_.converged_at() < 0) return false;
   const double j = performance_at(found);
   if (!(j >= out.j - worth * std::abs(out.j))) return false;
   out.soc_cad = found;

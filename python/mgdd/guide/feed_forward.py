@@ -12,10 +12,10 @@ import numpy as np
 from mgdd import _core
 from mgdd.errors import ParameterError
 from mgdd.guide.conditions import change_between, numbers_of
+from mgdd.guide.guided_history import TABLES, history_dataset
 from mgdd.optimize import Optimum, Seeker
 from mgdd.optimize.seeker import rebuilt
 from mgdd.results.describe import as_html, rows_of
-from mgdd.results.labels import labelled_dataset
 
 if TYPE_CHECKING:
     import xarray as xr
@@ -26,10 +26,9 @@ Guide = Callable[[Any], "float | Sequence[float] | Optimum | None"]
 Answer = Literal["same", "followed", "held", "refused"]
 
 _LOG = logging.getLogger(__name__)
-_INPUT_UNIT, _J_UNIT = "unit of the input", "unit of J"
 _CAUSES = ("", "calibration", "following", "new_point")  # of a value, the weightier the later
+_LONGEST_SETTLING, _LAGS = 5, 3.0  # cycles before a reading of a test; lags until a sensor has settled
 _POINT = "point."  # of the columns of the state that hold the operating point
-_TABLES = ("guide_optimum", "feed_forward", "trim", "estimate", "applied")
 
 
 class FeedForward(_core.guide.FeedForward):
@@ -54,10 +53,12 @@ class FeedForward(_core.guide.FeedForward):
         Trust in the guide before its first test, in [0, 1].
     calibration_rate : float or array_like
         Largest move of the feed-forward per cycle after a calibration [unit of the input].
-    probe_cycles : int
-        Readings of J at each of the two places; 0 for a trust that is never tested.
-    probe_settling : int
-        Cycles before them that do not count, at each place: behind a sensor its delay and three times its lag.
+    probe_cycles : int, optional
+        Readings of J at each of the two places; 0 for a trust that is never tested. If left out 1, or 0 where
+        `probe_settling` is above 5: so long a stay at the old place would cost more than a wrong guide.
+    probe_settling : int, optional
+        Cycles before them that do not count, at each place; if left out the delay and three times the lag of the
+        slowest of the seeker's ``components``.
     noise_sd : float, optional
         Standard deviation of one reading of J; learnt from the readings if left out.
     trust_sd : float
@@ -101,8 +102,8 @@ class FeedForward(_core.guide.FeedForward):
         *,
         trust: float = 1.0,
         calibration_rate: Any = 1.0,
-        probe_cycles: int = 1,
-        probe_settling: int = 0,
+        probe_cycles: int | None = None,
+        probe_settling: int | None = None,
         noise_sd: float | None = None,
         trust_sd: float = 0.15,
         doubt: float = 0.1,
@@ -111,11 +112,12 @@ class FeedForward(_core.guide.FeedForward):
     ) -> None:
         if guide is not None and not callable(guide):
             raise ParameterError.of("guide", guide, "None or a function of the operating point")
+        settling = _settling_of(seeker) if probe_settling is None else probe_settling
         self._options: dict[str, Any] = {
             "trust": trust,
             "calibration_rate": calibration_rate,
-            "probe_cycles": probe_cycles,
-            "probe_settling": probe_settling,
+            "probe_cycles": int(settling <= _LONGEST_SETTLING) if probe_cycles is None else probe_cycles,
+            "probe_settling": settling,
             "noise_sd": noise_sd,
             "trust_sd": trust_sd,
             "doubt": doubt,
@@ -231,7 +233,7 @@ class FeedForward(_core.guide.FeedForward):
         mgdd.errors.ParameterError, mgdd.errors.ShapeError, mgdd.errors.DataError
             As by the seeker; nothing has changed then.
         """
-        before = (self.cycle, self._points, self.trust, self.testing, *(getattr(self, name) for name in _TABLES[:-1]))
+        before = (self.cycle, self._points, self.trust, self.testing, *(getattr(self, name) for name in TABLES[:-1]))
         super().tell(J, limits, misfire=misfire, applied=applied)
         done = self.applied if applied is None else np.atleast_1d(np.array(applied, np.float64))
         objective = math.nan if misfire else float(np.sum(np.asarray(J, np.float64)))
@@ -246,30 +248,7 @@ class FeedForward(_core.guide.FeedForward):
         place, 2: the new one), ``point`` (operating points so far), ``objective`` (NaN where the cycle misfired) and
         ``misfire``. What is not known yet is NaN. Built anew on every access.
         """
-        names = ("cycle", "point", "trust", "testing", *_TABLES, "objective", "misfire")
-        columns = (
-            dict(zip(names, zip(*self._rows, strict=True), strict=True)) if self._rows else dict.fromkeys(names, ())
-        )
-        inputs, over = self.estimate.size, ("cycle", "input")
-        said = ("optimum by the guide", "feed-forward in force", "trim, estimate less feed-forward")
-        labels = dict(zip(_TABLES, (*said, "estimate of the optimum", "applied input"), strict=True))
-        tables = {
-            name: (over, np.array(columns[name], np.float64).reshape(-1, inputs), _INPUT_UNIT, label)
-            for name, label in labels.items()
-        }
-        return labelled_dataset(
-            {
-                "cycle": ("cycle", np.array(columns["cycle"], np.int64)),
-                "input": ("input", np.arange(inputs), "-", "index of the input"),
-                **tables,
-                "trust": ("cycle", np.array(columns["trust"], np.float64), "-", "trust in the guide"),
-                "testing": ("cycle", np.array(columns["testing"], np.int8), "-", "test of the guide"),
-                "point": ("cycle", np.array(columns["point"], np.int64), "-", "operating points so far"),
-                "objective": ("cycle", np.array(columns["objective"], np.float64), _J_UNIT, "objective J"),
-                "misfire": ("cycle", np.array(columns["misfire"], np.int8), "-", "misfired cycle"),
-            },
-            attrs={"seeker": self._made_of[0].kind},
-        )
+        return history_dataset(self._rows, self.estimate.size, self._made_of[0].kind)
 
     @property
     def seeker(self) -> Seeker:
@@ -311,6 +290,12 @@ class FeedForward(_core.guide.FeedForward):
     def _repr_html_(self) -> str:
         now = {"cycle": self.cycle, "estimate": self.estimate, "feed_forward": self.feed_forward, "trim": self.trim}
         return as_html("FeedForward", rows_of({**now, "verdict": self.verdict, **self._options, "trust": self.trust}))
+
+
+def _settling_of(seeker: Any) -> int:
+    """Cycles until the slowest component of J shows a step of the input."""
+    components = getattr(seeker, "settings", {}).get("components", ())
+    return max((math.ceil(lag.delay_cycles + _LAGS * lag.lag_cycles) for lag in components), default=0)
 
 
 def _numbers_said(said: Any) -> tuple[list[float], list[float]]:

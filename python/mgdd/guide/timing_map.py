@@ -2,8 +2,7 @@
 
 from __future__ import annotations
 
-import math
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Callable, Mapping
 from dataclasses import dataclass
 from typing import TYPE_CHECKING, Any, Self
 
@@ -12,22 +11,15 @@ import numpy as np
 from mgdd import _core
 from mgdd.errors import DataError, ParameterError, ShapeError
 from mgdd.guide.conditions import numbers_of
-from mgdd.io.parameters import Entry, ParameterFile, Parameters, Wanted, wanted
+from mgdd.guide.map_forms import MapForms
+from mgdd.guide.settled import settled_estimate
 from mgdd.optimize import Optimum
 from mgdd.results.describe import as_html, rows_of
-from mgdd.results.labels import label_of, labelled_dataset
-from mgdd.results.units import unit_of
 
 if TYPE_CHECKING:
-    import xarray as xr
-    from numpy.typing import ArrayLike, NDArray
+    from numpy.typing import ArrayLike
 
 __all__ = ["MapValue", "TimingMap"]
-
-_CAD, _SQUARED = "°CA aTDC", "degree**2"
-_CELLS = {"timing_cad": _CAD, "variance_cad2": _SQUARED, "support": "-"}
-_SETTINGS = {"prior_sd_cad": "°CA", "forgetting": "-"}
-_CORE = dict(zip(_CELLS, ("values_cad", "variance", "support"), strict=True))
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -52,7 +44,7 @@ class MapValue:
     held_outside: bool
 
 
-class TimingMap(_core.guide.TimingMap, Parameters):
+class TimingMap(_core.guide.TimingMap, MapForms):
     """A table of the best timing over one or two axes: bilinear between its cells, held at its edges.
 
     As a guide of `FeedForward` it answers inside of its axes only. A confirmed optimum is shared by the cells around it
@@ -164,26 +156,6 @@ class TimingMap(_core.guide.TimingMap, Parameters):
             values.append(next(iter(said.inputs.values())) if isinstance(said, Optimum) else float(said))
         return cls(own, np.reshape(values, [entries.size for entries in own.values()]), **settings)
 
-    @property
-    def axes(self) -> Mapping[str, NDArray[np.float64]]:
-        """Entries of each axis, by name."""
-        return dict(self._axes)
-
-    @property
-    def timing_cad(self) -> NDArray[np.float64]:
-        """Value of every cell [°CA aTDC], one axis of the array per axis of the map."""
-        return self._table("values_cad")
-
-    @property
-    def sd_cad(self) -> NDArray[np.float64]:
-        """Standard deviation of every cell [°CA]."""
-        return np.sqrt(self._table("variance"))
-
-    @property
-    def support(self) -> NDArray[np.float64]:
-        """Confirmed optima behind every cell, forgotten ones taken off."""
-        return self._table("support")
-
     def __call__(self, point: Any) -> float | None:
         """Give the best timing as a guide does.
 
@@ -275,97 +247,11 @@ class TimingMap(_core.guide.TimingMap, Parameters):
         mgdd.errors.ParameterError
             As by `learn`, or fewer than two cycles.
         """
-        if cycles < 2:
-            raise ParameterError.of("cycles", cycles, ">= 2")
-        history = seeker.history
-        estimate = history["estimate"].to_numpy()[-cycles:]
-        if estimate.shape[0] < cycles or ("point" in history and np.ptp(history["point"].to_numpy()[-cycles:]) > 0):
+        settled = settled_estimate(seeker.history, cycles, spread_cad)
+        if settled is None:
             return False
-        if "testing" in history and bool(history["testing"].to_numpy()[-cycles:].any()):
-            return False
-        column = estimate[:, 0]
-        half = cycles // 2
-        drift = abs(float(np.mean(column[half:]) - np.mean(column[:half])))
-        scatter = float(np.mean(np.abs(column - np.mean(column))))
-        if not (scatter < spread_cad and drift < spread_cad):
-            return False
-        self.learn(point, float(np.mean(column)), sd_cad=max(math.hypot(scatter, drift), 1e-3 * spread_cad))
+        self.learn(point, settled[0], sd_cad=settled[1])
         return True
-
-    def to_dataset(self) -> xr.Dataset:
-        """Give the map as data.
-
-        Returns
-        -------
-        xarray.Dataset
-            ``timing_cad``, ``sd_cad`` and ``support`` over the axes.
-        """
-        dims = tuple(self._axes)
-        return labelled_dataset(
-            {
-                **{name: (name, entries, unit_of(name), name) for name, entries in self._axes.items()},
-                "timing_cad": (dims, self.timing_cad, _CAD, "best timing"),
-                "sd_cad": (dims, self.sd_cad, "°CA", "standard deviation of the best timing"),
-                "support": (dims, self.support, "-", "confirmed optima"),
-            },
-            attrs=self._settings,
-        )
-
-    @classmethod
-    def from_dataset(cls, dataset: xr.Dataset) -> Self:
-        """Make a map of what `to_dataset` gave.
-
-        Parameters
-        ----------
-        dataset : xarray.Dataset
-            With ``timing_cad``, ``sd_cad`` and ``support``.
-
-        Returns
-        -------
-        TimingMap
-            The same map, its standard deviations to the last digit but one.
-
-        Raises
-        ------
-        mgdd.errors.DataError
-            A variable is missing, or has another unit.
-        """
-        for name in ("timing_cad", "sd_cad", "support"):
-            if name not in dataset:
-                raise DataError(f"{name} is missing: a map has timing_cad, sd_cad and support")
-        unit = label_of(dataset["timing_cad"]).units
-        if unit != _CAD:
-            raise DataError(f"timing_cad has units {unit!r}: must be {_CAD!r}")
-        dims = dataset["timing_cad"].dims
-        axes = {str(name): dataset[name].to_numpy() for name in dims}
-        own = {name: float(dataset.attrs[name]) for name in _SETTINGS if name in dataset.attrs}
-        made = cls(axes, dataset["timing_cad"].to_numpy(), **own)
-        made._columns = {
-            **made._columns,
-            "variance": (dataset["sd_cad"].transpose(*dims).to_numpy().ravel() ** 2).tolist(),
-            "support": dataset["support"].transpose(*dims).to_numpy().ravel().tolist(),
-        }
-        return made
-
-    def to_parameters(self) -> ParameterFile:
-        """Give axes, cells and settings, as `to_toml` writes them."""
-        cells = {name: Entry(value=self._table(_CORE[name]).tolist(), unit=unit) for name, unit in _CELLS.items()}
-        axes = {name: Entry(value=entries.tolist(), unit=unit_of(name)) for name, entries in self._axes.items()}
-        settings = {name: Entry(value=self._settings[name], unit=unit) for name, unit in _SETTINGS.items()}
-        return ParameterFile(kind="timing_map", tables={"axes": axes, "cells": cells, "settings": settings})
-
-    @classmethod
-    def from_parameters(cls, file: ParameterFile) -> Self:
-        """Make the map of a file that `to_toml` wrote."""
-        file.expect(kinds=("timing_map",), tables=("axes", "cells", "settings"))
-        axes = file.values("axes", {name: Wanted(unit_of(name), "numbers") for name in file.tables["axes"]})
-        cells = file.values("cells", wanted(_CELLS, _CELLS, "numbers"))
-        made = cls(axes, cells["timing_cad"], **file.values("settings", wanted(_SETTINGS, _SETTINGS)))
-        made._columns = {_CORE[name]: np.array(values, np.float64).ravel().tolist() for name, values in cells.items()}
-        return made
-
-    def _table(self, column: str) -> NDArray[np.float64]:
-        return np.array(self._columns[column]).reshape([entries.size for entries in self._axes.values()])
 
     def _coordinates(self, point: Any) -> list[float]:
         numbers = numbers_of(point)
@@ -374,32 +260,9 @@ class TimingMap(_core.guide.TimingMap, Parameters):
             raise ParameterError.of("point", point, f"an operating point with {' and '.join(self._axes)}")
         return [numbers[name] for name in self._axes] if named else list(numbers.values())
 
-    def __eq__(self, other: object) -> bool:
-        return isinstance(other, TimingMap) and self._parts() == other._parts()
-
-    __hash__ = None  # type: ignore[assignment]
-
-    def _parts(self) -> tuple[Any, ...]:
-        return {name: entries.tolist() for name, entries in self._axes.items()}, self._settings, self._columns
-
-    def __reduce__(self) -> tuple[Any, ...]:
-        return _rebuild, (type(self), dict(self._axes), self._settings, self._columns)
-
     def __repr__(self) -> str:
         size = " x ".join(f"{entries.size} {name}" for name, entries in self._axes.items())
         return f"<TimingMap {size}, {np.count_nonzero(self.support > 0.0)} cells with support>"
 
     def _repr_html_(self) -> str:
         return as_html("TimingMap", rows_of({**self._axes, "timing_cad": self.timing_cad, **self._settings}))
-
-
-def _rebuild(
-    cls: type[TimingMap],
-    axes: Mapping[str, NDArray[np.float64]],
-    settings: Mapping[str, float],
-    columns: Mapping[str, Sequence[float]],
-) -> TimingMap:
-    shape = [entries.size for entries in axes.values()]
-    made = cls(axes, np.reshape(columns["values_cad"], shape), **settings)
-    made._columns = {name: list(column) for name, column in columns.items()}
-    return made

@@ -1,5 +1,5 @@
 // Feed-forward with a learnt trim: nothing without a guide, whole moves at a new point, no bump at a calibration,
-// guides that cannot be used, guides that are wrong, and a run that is cut in two.
+// guides that cannot be used, and a run that is cut in two.
 #include "mgdd/guide/feed_forward.hpp"
 
 #include <gtest/gtest.h>
@@ -11,25 +11,12 @@
 
 #include "mgdd/optimize/seekers/seeker_history.hpp"
 #include "mgdd/optimize/seekers/variant_seeker.hpp"
-#include "support/seeker_case.hpp"
+#include "support/guided_case.hpp"
 
 namespace mgdd::guide {
 namespace {
 
-using namespace optimize;
-
 constexpr double nan = std::numeric_limits<double>::quiet_NaN();
-
-GuideValue at(double optimum, double curvature = bend) {
-  return {scalar_input(optimum), scalar_input(curvature)};
-}
-
-FeedForward<ExtremumSeeking> guided(double start = -20.0, TrustSettings trust = {.noise_sd = 0.25}) {
-  ExtremumSeekingSettings s = plain_seeking(start);
-  s.space.lower = scalar_input(-30.0);
-  s.space.upper = scalar_input(10.0);
-  return FeedForward<ExtremumSeeking>(ExtremumSeeking(s), {.trust = trust});
-}
 
 /// Columns as bits: a misfired cycle has no J.
 std::vector<std::uint64_t> bits_of(const StateColumns& columns) {
@@ -39,20 +26,6 @@ std::vector<std::uint64_t> bits_of(const StateColumns& columns) {
       bits.push_back(std::bit_cast<std::uint64_t>(x));
   }
   return bits;
-}
-
-/// `cycles` cycles on a parabola with its top at `optimum`; what was applied.
-template <class S>
-std::vector<double> run(S& seeker, double optimum, int cycles, double noise_sd = 0.0, std::uint64_t seed = 1) {
-  std::vector<double> applied;
-  for (int k = 0; k < cycles; ++k) {
-    const double x = seeker.ask()[0];
-    const auto index = static_cast<std::uint64_t>(seeker.protocol().cycle);
-    const double j[] = {quadratic(x - optimum) + noise_sd * random::normal(seed, 7, index)};
-    EXPECT_EQ(seeker.tell({j, {}, false}), TellStatus::accepted);
-    applied.push_back(x);
-  }
-  return applied;
 }
 
 TEST(FeedForward, WithoutAGuideIsTheSeekerBitForBit) {
@@ -177,71 +150,7 @@ TEST(FeedForward, TakesNoAdviceBetweenAskAndTell) {
   EXPECT_EQ(save_state(seeker), before);
 }
 
-TEST(FeedForward, TurnsDownAGuideThatGoesTheWrongWay) {
-  FeedForward<ExtremumSeeking> seeker = guided();
-  seeker.offer(at(-4.2), GuideCause::new_point);
-  run(seeker, -4.2, 300, 0.25);
-  const double before = seeker.estimate()[0];
-  seeker.offer(at(2.3), GuideCause::new_point);
-  run(seeker, -10.7, 2, 0.25);
-  EXPECT_EQ(seeker.path().trust().verdict(), Verdict::wrong);
-  EXPECT_LT(seeker.path().trust().value(), 0.1);
-  EXPECT_NEAR(seeker.estimate()[0], before, 0.6);
-  seeker.offer(at(-4.2), GuideCause::new_point);  // back at the first point the guide has to earn its trust anew
-  const std::vector<double> applied = run(seeker, -4.2, 2, 0.25);
-  EXPECT_LT(std::abs(applied[1] - applied[0]), 0.6 * 6.5);
-}
-
-TEST(FeedForward, AGuideThatWasTurnedDownEarnsItsTrustBack) {
-  FeedForward<ExtremumSeeking> seeker = guided();
-  seeker.offer(at(-4.2), GuideCause::new_point);
-  run(seeker, -4.2, 300, 0.25);
-  seeker.offer(at(2.3), GuideCause::new_point);
-  run(seeker, -10.7, 300, 0.25);
-  const double turned_down = seeker.path().trust().value();
-  ASSERT_LT(turned_down, 0.1);
-  for (int k = 0; k < 12; ++k) {  // from now on it is right about every move
-    const double optimum = k % 2 == 0 ? -4.2 : -10.7;
-    seeker.offer(at(k % 2 == 0 ? 8.8 : 2.3), GuideCause::new_point);
-    run(seeker, optimum, 150, 0.25);
-    EXPECT_NEAR(seeker.estimate()[0], optimum, 3.0);
-  }
-  EXPECT_GT(seeker.path().trust().value(), 0.7);
-}
-
 // Back at the first point before the guide was judged: nothing has been moved, so nothing is left over.
-TEST(FeedForward, ANewPointDuringATestLeavesNothingBehind) {
-  for (const int cycles : {0, 1}) {
-    FeedForward<ExtremumSeeking> seeker = guided();
-    seeker.offer(at(-4.2), GuideCause::new_point);
-    run(seeker, -4.2, 100, 0.25);
-    const double estimate = seeker.estimate()[0];
-    seeker.offer(at(-10.7), GuideCause::new_point);
-    run(seeker, -10.7, cycles, 0.25);
-    EXPECT_TRUE(seeker.path().testing());
-    seeker.offer(at(-4.2), GuideCause::new_point);
-    EXPECT_FALSE(seeker.path().testing());
-    EXPECT_NEAR(seeker.estimate()[0], estimate, 1e-12);
-    EXPECT_NEAR(seeker.path().feed_forward()[0], -4.2, 1e-12);
-    seeker.offer(at(-10.7), GuideCause::new_point);
-    seeker.offer(at(-13.0), GuideCause::new_point);  // on to a third point: the whole way from the first one
-    run(seeker, -13.0, 2);
-    EXPECT_NEAR(seeker.estimate()[0], estimate - 8.8, 0.6);
-  }
-}
-
-TEST(FeedForward, OneWildReadingDoesNotOverthrowAGuide) {
-  for (const double wild : {-50.0, 50.0}) {
-    FeedForward<ExtremumSeeking> seeker = guided();
-    seeker.offer(at(-4.2), GuideCause::new_point);
-    seeker.offer(at(-10.7), GuideCause::new_point);
-    run(seeker, -10.7, 1);
-    const double j[] = {quadratic(seeker.ask()[0] + 10.7) + wild};
-    seeker.tell({j, {}, false});
-    EXPECT_GT(seeker.path().trust().value(), 0.7) << wild;
-  }
-}
-
 TEST(FeedForward, HoldsAtAPointThatTheGuideDoesNotKnow) {
   FeedForward<ExtremumSeeking> seeker = guided();
   seeker.offer(at(-4.2), GuideCause::new_point);
@@ -258,64 +167,7 @@ TEST(FeedForward, HoldsAtAPointThatTheGuideDoesNotKnow) {
   EXPECT_NEAR(seeker.estimate()[0], learnt, 1e-12);
 }
 
-TEST(FeedForward, AMoveThatBreaksALimitIsNotTaken) {
-  ExtremumSeekingSettings s = plain_seeking(-4.0);
-  s.limits = {{"p_max_bar", 150.0}};
-  FeedForward<ExtremumSeeking> seeker(ExtremumSeeking(s), {.trust = {.noise_sd = 0.25}});
-  seeker.offer(at(-4.0), GuideCause::new_point);
-  seeker.offer(at(-12.0), GuideCause::new_point);
-  for (int k = 0; k < 2; ++k) {
-    const double x = seeker.ask()[0];
-    const double j[] = {quadratic(x + 12.0)}, pressure[] = {140.0 - 2.0 * (x + 4.0)};
-    seeker.tell({j, pressure, false});
-  }
-  EXPECT_EQ(seeker.path().trust().verdict(), Verdict::wrong);
-  EXPECT_EQ(seeker.estimate()[0], -4.0);
-}
-
-TEST(FeedForward, TestsWithinTheBoundsAndAfterTheSensorHasSettled) {
-  FeedForward<ExtremumSeeking> seeker = guided(-20.0, {.probe_cycles = 2, .probe_settling = 3, .noise_sd = 0.25});
-  seeker.offer(at(4.0), GuideCause::new_point);
-  seeker.shift_estimate(scalar_input(2.0));
-  seeker.offer(at(9.9), GuideCause::new_point);
-  const std::vector<double> applied = run(seeker, 9.0, 10);
-  for (int k = 0; k < 10; ++k)
-    EXPECT_NEAR(applied[static_cast<std::size_t>(k)], k < 5 ? 6.0 : 10.0, 1e-12) << k;
-  EXPECT_FALSE(seeker.path().testing());
-}
-
-TEST(FeedForward, AMisfiredCycleOfATestIsMeasuredAgain) {
-  FeedForward<ExtremumSeeking> seeker = guided();
-  seeker.offer(at(-4.2), GuideCause::new_point);
-  seeker.offer(at(-10.7), GuideCause::new_point);
-  for (const bool misfire : {true, false, true, true}) {
-    EXPECT_TRUE(seeker.path().testing());
-    const double x = seeker.ask()[0];
-    const double j[] = {quadratic(x + 10.7)};
-    seeker.tell({j, {}, misfire});
-  }
-  EXPECT_TRUE(seeker.path().at_trial());
-  run(seeker, -10.7, 1);
-  EXPECT_FALSE(seeker.path().testing());
-  EXPECT_NEAR(seeker.estimate()[0], -10.7, 0.1);
-}
-
 // A plant that goes no further than -7: the share of the move is that of the place it went to, and no wind-up follows.
-TEST(FeedForward, LearnsFromWhatThePlantApplied) {
-  FeedForward<ExtremumSeeking> seeker = guided(-20.0, {.curvature_spread = 0.0, .noise_sd = 0.01});
-  seeker.offer(at(-4.2), GuideCause::new_point);
-  seeker.offer(at(-10.7), GuideCause::new_point);
-  for (int k = 0; k < 400; ++k) {
-    const double x[] = {std::max(seeker.ask()[0], -7.0)};
-    const double j[] = {quadratic(x[0] + 8.8)};
-    ASSERT_EQ(seeker.tell({j, {}, false, x}), TellStatus::accepted);
-    if (k == 1) {
-      EXPECT_NEAR(seeker.path().trust().value(), 4.6 / 6.5, 0.02);
-    }
-  }
-  EXPECT_GE(seeker.estimate()[0], -8.01);
-}
-
 TEST(FeedForward, MovesSeveralInputsAtOnce) {
   ExtremumSeekingSettings s;
   s.space = space_at(inputs({8.0, -6.0}), 40.0);

@@ -106,7 +106,7 @@ TEST(ModelOptimum, WeighsNoxAsThePerformanceSays) {
 
 TEST(ModelOptimum, SaysWhereThereIsNoOptimum) {
   ModelOptimum optimum(settings_of(EngineCase()));
-  engine::OperatingPoint point;
+  const engine::OperatingPoint point;
   for (auto& [field, value] : std::initializer_list<std::pair<double engine::OperatingPoint::*, double>>{
            {&engine::OperatingPoint::fuel_mg, 0.0},
            {&engine::OperatingPoint::fuel_mg, std::nan("")},
@@ -148,7 +148,7 @@ TEST(ModelOptimum, RefusesSettingsThatMakeNoSense) {
     ModelOptimumSettings s;
     change(s);
     try {
-      ModelOptimum optimum(s);
+      const ModelOptimum optimum(s);
     } catch (const ParameterError& e) {
       return std::string(e.field);
     }

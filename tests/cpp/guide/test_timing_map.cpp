@@ -118,6 +118,14 @@ TEST(TimingMap, ForgetsAsItIsTold) {
   EXPECT_GT(forgets.lookup(at).sd_cad, keeps.lookup(at).sd_cad);
 }
 
+TEST(TimingMap, NeverKnowsLessThanAtTheStart) {
+  TimingMap map(uneven(false, 0.5));
+  const std::array at{1500.0, 20.0};
+  for (int k = 0; k < 20; ++k)
+    map.learn(at, -6.0, 50.0);
+  EXPECT_LE(map.lookup(at).sd_cad, 3.0);
+}
+
 TEST(TimingMap, RefusesWhatIsNoConfirmedOptimumAndChangesNothing) {
   TimingMap map(uneven(true));
   const StateColumns before = save_state(map);
@@ -159,7 +167,7 @@ TEST(TimingMap, RefusesSettingsThatMakeNoSense) {
     TimingMapSettings s = uneven(true);
     change(s);
     try {
-      TimingMap map(s);
+      const TimingMap map(s);
     } catch (const Error& e) {
       return std::string(e.field);
     }

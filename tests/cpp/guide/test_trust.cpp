@@ -12,7 +12,6 @@ namespace mgdd::guide {
 namespace {
 
 using optimize::Inputs;
-using optimize::scalar_input;
 
 Trust known_noise(double noise_sd, double initial = 1.0, int probe_cycles = 1) {
   return {{.initial = initial, .probe_cycles = probe_cycles, .noise_sd = noise_sd}, 1};
@@ -115,6 +114,19 @@ TEST(Trust, LearnsTheNoiseBesideTheSearch) {
     mean += trust.noise_sd() / 40.0;
   }
   EXPECT_NEAR(mean, 0.25, 0.02);
+}
+
+TEST(Trust, LearnsTheNoiseFromFewReadingsWithoutABias) {
+  double variance = 0.0;
+  for (std::uint64_t seed = 0; seed < 2000; ++seed) {
+    Trust trust({}, 2);
+    for (int k = 0; k < 12; ++k) {
+      trust.record(optimize::inputs({std::sin(0.6 * k), std::cos(1.3 * k)}),
+                   0.25 * random::normal(seed, 2, static_cast<std::uint64_t>(k)));
+    }
+    variance += trust.noise_sd() * trust.noise_sd() / 2000.0;
+  }
+  EXPECT_NEAR(std::sqrt(variance), 0.25, 0.01);
 }
 
 TEST(Trust, RefusesSettingsThatMakeNoSense) {

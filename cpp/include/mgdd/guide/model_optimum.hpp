@@ -1,7 +1,7 @@
 // The best timing of the cycle model at an operating point, for use while the engine runs: a bounded amount of work.
 // Gradient ascent  theta <- theta + lambda_c [J(theta + c) - J(theta - c)]/(2 c)  (Tan 2018 names lambda_c and c) from
 // the best of a coarse scan; golden section (Kiefer 1953) between the neighbours of that angle where the ascent does
-// not converge there, or from the outset. SOC in °CA aTDC, J in the unit of the performance.
+// not converge, ends below the scan, or from the outset. SOC in °CA aTDC, J in the unit of the performance.
 // `find` is noexcept and allocation-free: at most 9 + 2 iterations + 20 + 2 cycles on the default bounds.
 #pragma once
 
@@ -55,7 +55,7 @@ class ModelOptimum {
   static constexpr std::size_t max_curves = 8;
 
   /// ParameterError naming the field.
-  explicit ModelOptimum(ModelOptimumSettings settings);
+  explicit ModelOptimum(const ModelOptimumSettings& settings);
 
   ModelOptimumResult find(const engine::OperatingPoint& point) noexcept;
 
@@ -76,7 +76,7 @@ class ModelOptimum {
  private:
   double performance_at(double soc_cad) noexcept;  // -infinity where there is no such cycle
   double performance_at(double soc_cad, engine::Indicators<double>& cycle) noexcept;
-  bool climb(double start_cad, double room_cad, ModelOptimumResult& out) noexcept;
+  bool climb(double start_cad, ModelOptimumResult& out) noexcept;
   void divide(double lower_cad, double upper_cad, ModelOptimumResult& out) noexcept;
 
   ModelOptimumSettings settings_;

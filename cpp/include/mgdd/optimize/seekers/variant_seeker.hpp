@@ -11,13 +11,10 @@
 namespace mgdd::optimize {
 
 class VariantSeeker {
-  template <class F>
-  decltype(auto) on(F&& call) noexcept {
-    return std::visit(std::forward<F>(call), seeker_);
-  }
-  template <class F>
-  decltype(auto) on(F&& call) const noexcept {
-    return std::visit(std::forward<F>(call), seeker_);
+  template <class V, class F>
+  // NOLINTNEXTLINE(bugprone-exception-escape): a variant of seekers always holds one of them
+  static decltype(auto) on(V& seeker, const F& call) noexcept {
+    return std::visit(call, seeker);
   }
 
  public:
@@ -31,33 +28,33 @@ class VariantSeeker {
   explicit VariantSeeker(Seeker seeker) : seeker_(std::move(seeker)), settings_(shared_settings(seeker_)) {}
 
   const Inputs& ask() noexcept {
-    return on([](auto& s) -> const Inputs& { return s.ask(); });
+    return on(seeker_, [](auto& s) -> const Inputs& { return s.ask(); });
   }
   TellStatus tell(const Reading& reading) noexcept {
-    return on([&](auto& s) { return s.tell(reading); });
+    return on(seeker_, [&](auto& s) { return s.tell(reading); });
   }
   void restart() noexcept {
-    on([](auto& s) { s.restart(); });
+    on(seeker_, [](auto& s) { s.restart(); });
   }
   void shift_estimate(const Inputs& by) noexcept {
-    on([&](auto& s) { s.shift_estimate(by); });
+    on(seeker_, [&](auto& s) { s.shift_estimate(by); });
   }
 
   const Inputs& estimate() const noexcept {
-    return on([](auto& s) -> const Inputs& { return s.estimate(); });
+    return on(seeker_, [](auto& s) -> const Inputs& { return s.estimate(); });
   }
   const Inputs& applied() const noexcept {
-    return on([](auto& s) -> const Inputs& { return s.applied(); });
+    return on(seeker_, [](auto& s) -> const Inputs& { return s.applied(); });
   }
   const Protocol& protocol() const noexcept {
-    return on([](auto& s) -> const Protocol& { return s.protocol(); });
+    return on(seeker_, [](auto& s) -> const Protocol& { return s.protocol(); });
   }
   std::size_t component_count() const noexcept {
-    return on([](auto& s) { return s.component_count(); });
+    return on(seeker_, [](auto& s) { return s.component_count(); });
   }
   std::size_t limit_count() const noexcept { return settings_.limits.size(); }
   LimitState limit_state(std::size_t i) const noexcept {
-    return on([&](const auto& s) { return limit_state_of(s, i); });
+    return on(seeker_, [&](const auto& s) { return limit_state_of(s, i); });
   }
   const Settings& settings() const noexcept { return settings_; }
   const Seeker& variant() const noexcept { return seeker_; }
