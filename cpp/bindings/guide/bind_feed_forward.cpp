@@ -109,7 +109,7 @@ void bind_feed_forward(py::module_& m) {
           "_seeker_history",
           [](const Bound& b) {
             const auto core = b.use();
-            return history_columns(core->seeker().history().save(), core->estimate().size());
+            return history_columns(core->seeker().history());
           },
           "History of the seeker, as its _history_columns.")
       .def(
