@@ -187,6 +187,14 @@ def test_small_changes_are_followed_and_calibrations_move_nothing() -> None:
     run(ff, 20.0, -7.0, 25)
     before = float(ff.estimate[0])
     assert ff.at(20.4) == "followed"
+    for moved_by in (-0.2 * 0.14, -0.36 * 0.14):
+        ff.ask()
+        assert ff.estimate[0] - before == pytest.approx(moved_by)
+        ff.tell(misfire=True)
+        assert ff.at(20.4) == "same"
+    for _ in range(100):
+        ff.ask()
+        ff.tell(misfire=True)
     assert ff.estimate[0] - before == pytest.approx(-0.14)
     ff.guide = lambda fuel: -0.35 * fuel + 1.5
     asked = ff.ask()
@@ -203,6 +211,19 @@ def test_small_changes_are_followed_and_calibrations_move_nothing() -> None:
         ff.tell(misfire=True)
         assert ff.feed_forward[0] == pytest.approx(-0.35 * 20.4 + expected)
     assert ff.estimate[0] == pytest.approx(before)
+
+
+def test_noise_of_the_operating_point_is_filtered() -> None:
+    spread = []
+    for share in (1.0, 0.2):
+        rng = np.random.default_rng(5)
+        ff = FeedForward(ExtremumSeeking(**SPACE), lambda fuel: -0.35 * fuel, following_share=share)
+        for _ in range(2000):
+            ff.at(20.0 + 0.2 * float(np.clip(rng.standard_normal(), -2.0, 2.0)))
+            ff.tell(plant(float(ff.ask()[0]), -7.0))
+        spread.append(float(np.std(ff.history["feed_forward"].to_numpy()[100:])))
+        assert (ff.history["point"] == 1).all()
+    assert spread[1] / spread[0] == pytest.approx(math.sqrt(0.2 / 1.8), rel=0.1)
 
 
 def test_history_says_what_came_from_the_guide_and_what_from_the_trim() -> None:
@@ -274,6 +295,7 @@ def test_a_state_that_does_not_fit_changes_nothing() -> None:
         ({"doubt": 1.0}, "doubt"),
         ({"noise_sd": 0.0}, "noise_sd"),
         ({"calibration_rate": 0.0}, "calibration_rate"),
+        ({"following_share": 0.0}, "following_share"),
         ({"calibration_rate": [1.0, 2.0]}, "calibration_rate"),
         ({"guide": 3.0}, "guide"),
         ({"seeker": "esc"}, "seeker"),

@@ -16,12 +16,13 @@ using Core = guide::FeedForward<Recorded>;
 using Bound = Guarded<Core>;
 
 // Seeker, state and history are copied: the one that Python holds goes its own way.
-Bound make(const py::object& seeker, const py::object& calibration_rate, double trust, int probe_cycles,
-           int probe_settling, double trust_sd, double doubt, double curvature_spread, double significance,
-           std::optional<double> noise_sd) {
+Bound make(const py::object& seeker, const py::object& calibration_rate, double following_share, double trust,
+           int probe_cycles, int probe_settling, double trust_sd, double doubt, double curvature_spread,
+           double significance, std::optional<double> noise_sd) {
   Recorded recorded(optimize::VariantSeeker(seeker_of(seeker, "seeker")));
   guide::FeedForwardSettings settings;
   settings.calibration_rate = inputs_from(calibration_rate, "calibration_rate", recorded.estimate().size());
+  settings.following_share = following_share;
   settings.trust = {trust, probe_cycles, probe_settling, trust_sd, doubt, curvature_spread, significance, noise_sd};
   return {"FeedForward", Core(std::move(recorded), std::move(settings))};
 }
@@ -36,9 +37,9 @@ std::vector<double> known_or_nan(const Core& core, const optimize::Inputs& value
 void bind_feed_forward(py::module_& m) {
   using py::arg;
   py::class_<Bound> cls(m, "FeedForward", "A seeker with feed-forward; see mgdd.guide.FeedForward.");
-  cls.def(py::init(&make), arg("seeker"), py::kw_only(), arg("calibration_rate"), arg("trust"), arg("probe_cycles"),
-          arg("probe_settling"), arg("trust_sd"), arg("doubt"), arg("curvature_spread"), arg("significance"),
-          arg("noise_sd"));
+  cls.def(py::init(&make), arg("seeker"), py::kw_only(), arg("calibration_rate"), arg("following_share"), arg("trust"),
+          arg("probe_cycles"), arg("probe_settling"), arg("trust_sd"), arg("doubt"), arg("curvature_spread"),
+          arg("significance"), arg("noise_sd"));
   bind_asking(cls);
   cls.def(
          "_offer",

@@ -5,6 +5,7 @@
 #include <cmath>
 #include <utility>
 
+#include "mgdd/common/bounds.hpp"
 #include "mgdd/common/enum_names.hpp"
 
 namespace mgdd::guide {
@@ -20,9 +21,12 @@ constexpr std::array<std::pair<GuideCause, std::string_view>, 3> cause_names{{
 
 constexpr double least_room = 0.01;  // share of a move: with less room inside the bounds it is not tested
 
+constexpr double least_following = 1e-9;  // unit of the input: the rest is made at once
+
 FeedForwardSettings checked(FeedForwardSettings s, Eigen::Index inputs) {
   if (s.calibration_rate.size() == 0) s.calibration_rate = Inputs::Ones(inputs);
   optimize::validate_entries("calibration_rate", s.calibration_rate, inputs, 0.0);
+  require_in(above(0.0, 1.0), "following_share", s.following_share);
   return s;
 }
 
@@ -73,6 +77,7 @@ GuidePath::GuidePath(FeedForwardSettings settings, Eigen::Index inputs)
       trust_(settings_.trust, inputs),
       guide_(Inputs::Zero(inputs)),
       feed_forward_(guide_),
+      target_(guide_),
       pending_(guide_),
       move_(guide_) {}
 
@@ -101,24 +106,23 @@ GuidePath::Order GuidePath::take(const GuideValue& value, GuideCause cause, cons
   open_ = false;
   if (!known_) {
     known_ = true;
-    guide_ = value.optimum;
+    guide_ = target_ = value.optimum;
     move_ = value.optimum - estimate;
     feed_forward_ = estimate;
     trust_.forget();
     return {GuideStatus::followed, true, trusted(trust_.value())};
   }
-  const Inputs change = value.optimum - guide_;
-  guide_ = value.optimum;
   if (!news && cause == GuideCause::calibration) {
+    const Inputs change = value.optimum - target_;
     pending_ += change;
+    guide_ += change;
+    target_ = value.optimum;
     return {GuideStatus::followed};
   }
-  if (!news && !testing()) {
-    move_ = change;
-    return {GuideStatus::followed, false, trusted(trust_.value())};
-  }
-  move_ += change;
+  target_ = value.optimum;
   if (!news) return {GuideStatus::followed};
+  move_ += target_ - guide_;
+  guide_ = target_;
   feed_forward_ += pending_;  // what is left of a calibration belongs to the old point
   pending_.setZero();
   trust_.forget();
@@ -146,6 +150,16 @@ Inputs GuidePath::tested(double j, double excess, const Inputs& away) noexcept {
   if (sums_[3] > 0.0 && sums_[3] > sums_[2]) return trusted(trust_.condemn());
   const double n = settings_.trust.probe_cycles;
   return trusted(trust_.judge((sums_[1] - sums_[0]) / n, sums_[4] / n, sums_[5] / n, bend_));
+}
+
+Inputs GuidePath::follow() noexcept {
+  if (testing() || guide_ == target_) return {};
+  const Inputs ahead = target_ - guide_;
+  move_ = settings_.following_share * ahead;
+  const bool arrived = move_.cwiseAbs().maxCoeff() <= least_following;
+  if (arrived) move_ = ahead;
+  guide_ = arrived ? target_ : Inputs(guide_ + move_);
+  return trusted(trust_.value());
 }
 
 void GuidePath::advance() noexcept {

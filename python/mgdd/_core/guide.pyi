@@ -203,7 +203,7 @@ class FeedForward:
     """
     A seeker with feed-forward; see mgdd.guide.FeedForward.
     """
-    def __init__(self, seeker: typing.Any, *, calibration_rate: typing.Any, trust: typing.SupportsFloat | typing.SupportsIndex, probe_cycles: typing.SupportsInt | typing.SupportsIndex, probe_settling: typing.SupportsInt | typing.SupportsIndex, trust_sd: typing.SupportsFloat | typing.SupportsIndex, doubt: typing.SupportsFloat | typing.SupportsIndex, curvature_spread: typing.SupportsFloat | typing.SupportsIndex, significance: typing.SupportsFloat | typing.SupportsIndex, noise_sd: typing.SupportsFloat | typing.SupportsIndex | None) -> None:
+    def __init__(self, seeker: typing.Any, *, calibration_rate: typing.Any, following_share: typing.SupportsFloat | typing.SupportsIndex, trust: typing.SupportsFloat | typing.SupportsIndex, probe_cycles: typing.SupportsInt | typing.SupportsIndex, probe_settling: typing.SupportsInt | typing.SupportsIndex, trust_sd: typing.SupportsFloat | typing.SupportsIndex, doubt: typing.SupportsFloat | typing.SupportsIndex, curvature_spread: typing.SupportsFloat | typing.SupportsIndex, significance: typing.SupportsFloat | typing.SupportsIndex, noise_sd: typing.SupportsFloat | typing.SupportsIndex | None) -> None:
         ...
     def _hold(self) -> None:
         """

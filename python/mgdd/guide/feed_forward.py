@@ -53,6 +53,9 @@ class FeedForward(_core.guide.FeedForward):
         Trust in the guide before its first test, in [0, 1].
     calibration_rate : float or array_like
         Largest move of the feed-forward per cycle after a calibration [unit of the input].
+    following_share : float
+        Share of what the guide is ahead that the estimate moves per cycle while the operating point drifts, in
+        (0, 1]: a first-order filter against a noisy measurement of the point.
     probe_cycles : int, optional
         Readings of J at each of the two places; 0 for a trust that is never tested. If left out 1, or 0 where
         `probe_settling` is above 5: so long a stay at the old place would cost more than a wrong guide.
@@ -102,6 +105,7 @@ class FeedForward(_core.guide.FeedForward):
         *,
         trust: float = 1.0,
         calibration_rate: Any = 1.0,
+        following_share: float = 0.2,
         probe_cycles: int | None = None,
         probe_settling: int | None = None,
         noise_sd: float | None = None,
@@ -116,6 +120,7 @@ class FeedForward(_core.guide.FeedForward):
         self._options: dict[str, Any] = {
             "trust": trust,
             "calibration_rate": calibration_rate,
+            "following_share": following_share,
             "probe_cycles": int(settling <= _LONGEST_SETTLING) if probe_cycles is None else probe_cycles,
             "probe_settling": settling,
             "noise_sd": noise_sd,

@@ -2,7 +2,7 @@
 // guide's optimum does, and the seeker learns only what is left, the trim = estimate - feed-forward.
 // Structure: Tan 2018, section 5.2 (reconstruction); rules and trust are ours:
 //  - new point: the seeker is restarted, the guide tested (`trust.hpp`), and its whole trusted move is made at once;
-//  - following (the point drifts): the trusted move is made, the seeker goes on;
+//  - following (the point drifts): the trusted move is made through a first-order filter, the seeker goes on;
 //  - calibration (another model at the same point): the feed-forward moves by at most `calibration_rate` per cycle and
 //    the trim takes the opposite step, so that the applied input does not move by itself.
 // Without a guide every call is that of the seeker, bit for bit. Inputs in their own unit.
@@ -37,6 +37,10 @@ class FeedForward {
   }
 
   const optimize::Inputs& ask() noexcept {
+    if (!protocol_.asked) {
+      const optimize::Inputs move = path_.follow();
+      if (move.size() > 0) seeker_.shift_estimate(move);
+    }
     applied_ = path_.testing() ? path_.test_input(seeker_.estimate()) : seeker_.ask();
     protocol_.asked = true;
     return applied_;

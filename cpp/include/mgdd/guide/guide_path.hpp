@@ -30,6 +30,7 @@ struct GuideValue {
 
 struct FeedForwardSettings {
   optimize::Inputs calibration_rate{};  ///< per cycle and input, > 0; empty: 1
+  double following_share = 0.2;         ///< of what the guide is ahead while the point drifts, per cycle, in (0, 1]
   TrustSettings trust{};
 };
 
@@ -68,17 +69,21 @@ class GuidePath {
   optimize::Inputs tested(double j, double excess, const optimize::Inputs& away) noexcept;
   /// One reading of the search.
   void searched(const optimize::Inputs& applied, double j) noexcept { trust_.record(applied, j); }
+  /// Of what the guide is ahead since the point has drifted, the part that the estimate moves in this cycle; empty:
+  /// none.
+  optimize::Inputs follow() noexcept;
   /// One more cycle: a calibration goes on.
   void advance() noexcept;
 
   const optimize::Inputs& feed_forward() const noexcept { return feed_forward_; }
-  const optimize::Inputs& guide() const noexcept { return guide_; }
+  const optimize::Inputs& guide() const noexcept { return target_; }  ///< its last valid optimum
   const Trust& trust() const noexcept { return trust_; }
   const FeedForwardSettings& settings() const noexcept { return settings_; }
 
   template <class Self, class V>
   static void visit(Self& self, V& v) {
     v("guide", self.guide_);
+    v("target", self.target_);
     v("feed_forward", self.feed_forward_);
     v("pending", self.pending_);
     v("move", self.move_);
@@ -98,9 +103,10 @@ class GuidePath {
 
   FeedForwardSettings settings_;
   Trust trust_;
-  optimize::Inputs guide_, feed_forward_;
-  optimize::Inputs pending_;  // of a calibration, still to be taken over by the trim
-  optimize::Inputs move_;     // of the guide, under test
+  optimize::Inputs guide_, feed_forward_;  // guide_: as far as it has been followed
+  optimize::Inputs target_;                // what the guide said last
+  optimize::Inputs pending_;               // of a calibration, still to be taken over by the trim
+  optimize::Inputs move_;                  // of the guide, under test
   double bend_ = 0.0, tried_ = 0.0;
   std::int64_t stage_ = 0;        // cycle of the test from 1 on; 0 = none
   std::array<double, 6> sums_{};  // J, excess and share of the move, at the old place and at the trial
