@@ -147,23 +147,24 @@ bool OnlineCalibration::take_mean() noexcept {
   const std::int64_t fresh = window_.accepted() - taken_;
   const bool recursive = settings_.method == CalibrationMethod::recursive;
   if (has_mean_ && fresh < (recursive ? settings_.window.window_cycles : 1)) return true;
+  const bool known = recursive && has_block_;
+  const double before = known ? residual_power(x_, mean_, mean_bar_) : 0.0;
   taken_ = window_.accepted();
   mean_ = window_.mean(mean_bar_);
   mean_.soc_sd_cad = std::hypot(mean_.soc_sd_cad, settings_.soc_scatter_cad);
   has_mean_ = true;
-  if (recursive && has_block_) {
-    earlier_.information = settings_.forgetting * (earlier_.information + block_.information);
-    earlier_.pull = settings_.forgetting * (earlier_.pull + block_.pull);
-    let_timing_wander();
-    const double usual = std::max(rms_bar_, unremarkable * highest_bar());
-    if (settled_updates_ >= settled_after &&
-        residual_power(x_, mean_, mean_bar_) > std::pow(settings_.jump_factor * usual, 2)) {
-      restart();
-      ++jumps_;
-      return false;
-    }
+  if (!known) return true;
+  earlier_.information = settings_.forgetting * (earlier_.information + block_.information);
+  earlier_.pull = settings_.forgetting * (earlier_.pull + block_.pull);
+  let_timing_wander();
+  const double usual = std::max(before, std::pow(unremarkable * highest_bar(), 2));
+  if (settled_updates_ < settled_after ||
+      residual_power(x_, mean_, mean_bar_) <= std::pow(settings_.jump_factor, 2) * usual) {
+    return true;
   }
-  return true;
+  restart();
+  ++jumps_;
+  return false;
 }
 
 // Two means of M cycles differ by sqrt(2/M) of the scatter: as much variance for the offset of the timing (matrix
