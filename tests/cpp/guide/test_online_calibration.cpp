@@ -294,6 +294,27 @@ TEST(OnlineCalibration, WhatBelongsToAPointIsForgottenWithIt) {
   EXPECT_NEAR(calibration.parameters()[Calibrated::tdc], 0.4, 0.06);
 }
 
+TEST(OnlineCalibration, AtABoundTheOthersStandAsIfItWereKnown) {
+  loop::BenchSettings s = steady_bench();
+  s.cylinder.wall_heat.wall_heat_scale = 0.12;
+  loop::EngineBench bench(s);
+  OnlineCalibrationSettings free = wrong_guide(CalibrationMethod::gauss_newton, 0.2), fixed = free;
+  free.wanted[Calibrated::tdc] = fixed.wanted[Calibrated::tdc] = true;
+  fixed.wanted[wall] = false;
+  fixed.uncertainty[wall] = 0.0;
+  OnlineCalibration at_bound(free), known(fixed);
+  for (int k = 0; k < 80; ++k) {
+    bench.step(-6.0);
+    for (OnlineCalibration* each : {&at_bound, &known}) {
+      each->offer(bench.pressure().pressure_bar, {}, -6.0);
+      each->update();
+    }
+  }
+  EXPECT_EQ(at_bound.verdict(wall).knowledge, Knowledge::at_bound);
+  for (int i = 0; i < n_calibrated; ++i)
+    EXPECT_NEAR(at_bound.parameters()[i], known.parameters()[i], 0.02 * info_of(i).known_sd) << info_of(i).field.name;
+}
+
 TEST(OnlineCalibration, AMotoredCycleHoldsWhatItDoesNotShow) {
   loop::BenchSettings s = steady_bench(0.1);
   s.misfire_probability = 1.0;  // the motored cycle
