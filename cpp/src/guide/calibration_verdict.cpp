@@ -24,9 +24,6 @@ constexpr std::array<std::pair<Knowledge, std::string_view>, 6> knowledge_names{
     {Knowledge::contradicted, "contradicted"},
 }};
 
-std::size_t place(int parameter) noexcept {
-  return static_cast<std::size_t>(parameter);
-}
 std::string name_of_parameter(int parameter) {
   return std::string(info_of(parameter).field.name);
 }

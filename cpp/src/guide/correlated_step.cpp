@@ -99,12 +99,4 @@ CorrelatedStep correlated_step(const CalibrationColumns& columns, std::span<cons
   return out;
 }
 
-CalibrationVector step_with_held(const CorrelatedStep& step, const CalibrationVector& x, const Beforehand& beforehand,
-                                 const EarlierData& earlier, const std::array<bool, n_calibrated>& held) noexcept {
-  std::array<bool, n_calibrated> moves = beforehand.unknown;
-  for (std::size_t i = 0; i < held.size(); ++i)
-    moves[i] = moves[i] && !held[i];
-  return solve(with_knowledge(step.information, step.slope, x, beforehand, earlier), moves).change;
-}
-
 }  // namespace mgdd::guide

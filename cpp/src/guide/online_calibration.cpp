@@ -4,8 +4,6 @@
 #include <cmath>
 #include <utility>
 
-#include <Eigen/Cholesky>
-
 #include "mgdd/common/bounds.hpp"
 #include "mgdd/common/enum_names.hpp"
 
@@ -15,16 +13,9 @@ namespace {
 constexpr int seeking_period = 10;  // trials
 constexpr double seeking_time_constant = 30.0;
 
-constexpr double resolution = 1e-4;      // of the highest pressure: no sensor is better
-constexpr double unremarkable = 1e-3;    // of the highest pressure: a residual that is never a jump
-constexpr std::int64_t jump_cycles = 3;  // suspects in a row
-constexpr std::int64_t settled_after = 3;
+constexpr double resolution = 1e-4;    // of the highest pressure: no sensor is better
 constexpr double settled_share = 2.0;  // of a standard error: steps below it are settled
 constexpr double longest_step = 2.0;   // in what is known beforehand
-
-std::size_t place(int parameter) noexcept {
-  return static_cast<std::size_t>(parameter);
-}
 
 OnlineCalibrationSettings checked(OnlineCalibrationSettings settings) {
   validate(settings);
@@ -99,15 +90,6 @@ CalibrationStatus OnlineCalibration::advance() noexcept {
   return seeker_ ? seek(*seeker_) : step();
 }
 
-void OnlineCalibration::restart() noexcept {
-  window_.clear();
-  block_ = earlier_ = EarlierData{};
-  has_mean_ = has_block_ = false;
-  usual_power_ = 0.0;
-  settled_updates_ = suspects_ = 0;
-  taken_ = checked_ = window_.accepted();
-}
-
 double OnlineCalibration::highest_bar() const noexcept {
   return *std::max_element(mean_bar_.begin(), mean_bar_.end());
 }
@@ -123,117 +105,42 @@ double OnlineCalibration::residual_power(const CalibrationVector& x, const Calib
   return power / static_cast<double>(last_row_ - first_row_);
 }
 
-// A cycle unlike those before it does not reach the calibration; three in a row are the new truth.
-bool OnlineCalibration::newest_is_suspect() noexcept {
-  if (settled_updates_ < settled_after) return false;
-  const CalibrationConditions at = window_.newest(newest_bar_);
-  const double power = residual_power(x_, at, newest_bar_);
-  const double floor = std::pow(unremarkable * highest_bar(), 2);
-  if (usual_power_ > 0.0 && power > std::pow(settings_.jump_factor, 2) * std::max(usual_power_, floor)) {
-    window_.drop_newest();
-    if (++suspects_ >= jump_cycles) {
-      restart();
-      ++jumps_;
-    }
-    return true;
-  }
-  suspects_ = 0;
-  const double share = usual_power_ > 0.0 ? 1.0 / settings_.window.window_cycles : 1.0;
-  if (power >= 0.0) usual_power_ += share * (power - usual_power_);
-  return false;
-}
-
-bool OnlineCalibration::take_mean() noexcept {
-  const std::int64_t fresh = window_.accepted() - taken_;
-  const bool recursive = settings_.method == CalibrationMethod::recursive;
-  if (has_mean_ && fresh < (recursive ? settings_.window.window_cycles : 1)) return true;
-  taken_ = window_.accepted();
-  mean_ = window_.mean(mean_bar_);
-  mean_.soc_sd_cad = std::hypot(mean_.soc_sd_cad, settings_.soc_scatter_cad);
-  has_mean_ = true;
-  if (recursive && has_block_) {
-    earlier_.information = settings_.forgetting * (earlier_.information + block_.information);
-    earlier_.pull = settings_.forgetting * (earlier_.pull + block_.pull);
-    let_timing_wander();
-    const double usual = std::max(rms_bar_, unremarkable * highest_bar());
-    if (settled_updates_ >= settled_after &&
-        residual_power(x_, mean_, mean_bar_) > std::pow(settings_.jump_factor * usual, 2)) {
-      restart();
-      ++jumps_;
-      return false;
-    }
-  }
-  return true;
-}
-
-// Two means of M cycles differ by sqrt(2/M) of the scatter: as much variance for the offset of the timing (matrix
-// inversion lemma), while the mean of the earlier data stays.
-void OnlineCalibration::let_timing_wander() noexcept {
-  constexpr int soc = Calibrated::soc_offset;
-  const double variance = 2.0 * std::pow(settings_.soc_scatter_cad, 2) / settings_.window.window_cycles;
-  if (!beforehand_.unknown[place(soc)] || !(variance > 0.0)) return;
-  const CalibrationVector column = earlier_.information.col(soc);
-  const double divisor = 1.0 / variance + column[soc];
-  earlier_.pull -= column * (earlier_.pull[soc] / divisor);
-  earlier_.information -= column * column.transpose() / divisor;
-}
-
-// What belongs to the old point is integrated out of the earlier data (Schur complement), with what was known of it.
-void OnlineCalibration::forget_point() noexcept {
-  points_seen_ = window_.points_seen();
-  if (has_block_) {
-    EarlierData all{earlier_.information + block_.information, earlier_.pull + block_.pull};
-    for (int i = 0; i < n_calibrated; ++i) {  // what is known exactly is put in
-      if (beforehand_.unknown[place(i)]) continue;
-      all.pull -= all.information.col(i) * x_[i];
-      all.information.row(i).setZero();
-      all.information.col(i).setZero();
-      all.pull[i] = 0.0;
-    }
-    CalibrationMatrix own = CalibrationMatrix::Identity();
-    CalibrationVector pull = CalibrationVector::Zero();
-    CalibrationMatrix mixed = CalibrationMatrix::Zero();  // row: kept, column: of the point
-    for (int i = 0; i < n_calibrated; ++i) {
-      if (!info_of(i).at_point) continue;
-      pull[i] = all.pull[i] + beforehand_.information[i] * beforehand_.start[i];
-      for (int j = 0; j < n_calibrated; ++j) {
-        if (info_of(j).at_point) {
-          own(i, j) = all.information(i, j) + (i == j ? beforehand_.information[i] : 0.0);
-        } else {
-          mixed(j, i) = all.information(j, i);
-        }
-      }
-      if (!beforehand_.unknown[place(i)]) own(i, i) = 1.0;
-    }
-    const Eigen::LDLT<CalibrationMatrix> factors(own);
-    all.information -= mixed * factors.solve(mixed.transpose());
-    all.pull -= mixed * factors.solve(pull);
-    for (int i = 0; i < n_calibrated; ++i) {
-      if (!info_of(i).at_point) continue;
-      all.information.row(i).setZero();
-      all.information.col(i).setZero();
-      all.pull[i] = 0.0;
-    }
-    earlier_.information = settings_.forgetting * all.information;
-    earlier_.pull = settings_.forgetting * all.pull;
-  }
-  for (int i = 0; i < n_calibrated; ++i) {
-    if (info_of(i).at_point && !settings_.wanted[place(i)]) x_[i] = beforehand_.start[i];
-  }
-  block_ = EarlierData{};
-  has_mean_ = has_block_ = false;
-  settled_updates_ = suspects_ = 0;
-  taken_ = checked_ = window_.accepted();
-}
-
 CalibrationStatus OnlineCalibration::step() noexcept {
   if (residual_power(x_, mean_, mean_bar_) < 0.0 || !model_.differentiate(x_, mean_, columns_)) {
     x_ = beforehand_.start;
     return CalibrationStatus::unphysical;
   }
-  const CorrelatedStep s = correlated_step(columns_, residual_bar_, first_row_, last_row_, x_, beforehand_, earlier_,
-                                           resolution * highest_bar(), scratch_);
+  const auto stepped = [&](const Beforehand& moving) {
+    return correlated_step(columns_, residual_bar_, first_row_, last_row_, x_, moving, earlier_,
+                           resolution * highest_bar(), scratch_);
+  };
+  // What the data want beyond its bound stays, then what they do not show; the rest moves as if that were known.
+  Beforehand moving = beforehand_;
+  CorrelatedStep s = stepped(moving);
   covariance_ = s.covariance;
+  for (int i = 0; i < n_calibrated; ++i) {
+    const Domain& domain = info_of(i).field.domain;
+    const bool outward = (x_[i] <= domain.lower && s.change[i] < 0.0) || (x_[i] >= domain.upper && s.change[i] > 0.0);
+    if (outward) moving.unknown[place(i)] = false;
+  }
+  if (moving.unknown != beforehand_.unknown) {
+    s = stepped(moving);
+    const CalibrationVector alone = covariance_.diagonal();
+    covariance_ = s.covariance;
+    for (int i = 0; i < n_calibrated; ++i) {
+      if (!moving.unknown[place(i)]) covariance_(i, i) = alone[i];
+    }
+  }
+  bool all = true, any = false;
+  for (int i = 0; i < n_calibrated; ++i) {
+    if (!settings_.wanted[place(i)]) continue;
+    const bool held = is_held(i);
+    if (held) moving.unknown[place(i)] = false;
+    all = all && held;
+    any = any || held;
+  }
+  if (any) s = stepped(moving);
+  const CalibrationVector& change = s.change;
   rms_bar_ = s.rms_bar;
   sigma_bar_ = s.sigma_bar;
   samples_ = s.samples;
@@ -241,15 +148,6 @@ CalibrationStatus OnlineCalibration::step() noexcept {
     block_ = {s.information, s.slope + s.information * x_};
     has_block_ = true;
   }
-  std::array<bool, n_calibrated> held{};
-  bool any = false, all = true;
-  for (int i = 0; i < n_calibrated; ++i) {
-    if (!settings_.wanted[place(i)]) continue;
-    held[place(i)] = is_held(i);
-    any = any || held[place(i)];
-    all = all && held[place(i)];
-  }
-  CalibrationVector change = any ? step_with_held(s, x_, beforehand_, earlier_, held) : s.change;
   double farthest = 1.0, unsettled = 0.0;
   for (int i = 0; i < n_calibrated; ++i)
     farthest = std::max(farthest, std::abs(change[i]) / (longest_step * info_of(i).known_sd));

@@ -17,9 +17,6 @@ constexpr std::array<std::pair<CalibrationMethod, std::string_view>, 3> method_n
     {CalibrationMethod::gauss_newton, "gauss_newton"},
     {CalibrationMethod::recursive, "recursive"},
 }};
-std::size_t place(int parameter) noexcept {
-  return static_cast<std::size_t>(parameter);
-}
 
 }  // namespace
 

@@ -51,8 +51,12 @@ inline constexpr std::array<CalibratedInfo, n_calibrated> calibrated_parameters{
     {{"pressure_offset_bar", "bar", closed(-2.0, 2.0), "measured less true pressure: pegging"}, 0.0, 0.1, 0.025, false},
 }};
 
+/// The place of a parameter as an index of an array.
+constexpr std::size_t place(int parameter) noexcept {
+  return static_cast<std::size_t>(parameter);
+}
 constexpr const CalibratedInfo& info_of(int parameter) noexcept {
-  return calibrated_parameters[static_cast<std::size_t>(parameter)];
+  return calibrated_parameters[place(parameter)];
 }
 
 }  // namespace mgdd::guide

@@ -42,8 +42,4 @@ CorrelatedStep correlated_step(const CalibrationColumns& columns, std::span<cons
                                const Beforehand& beforehand, const EarlierData& earlier, double least_sigma_bar,
                                std::span<double> scratch) noexcept;
 
-/// The step with the parameters of `held` kept where they are.
-CalibrationVector step_with_held(const CorrelatedStep& step, const CalibrationVector& x, const Beforehand& beforehand,
-                                 const EarlierData& earlier, const std::array<bool, n_calibrated>& held) noexcept;
-
 }  // namespace mgdd::guide

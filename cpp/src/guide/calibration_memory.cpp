@@ -1,0 +1,131 @@
+// What an online calibration remembers of earlier cycles, and when it forgets them.
+#include <algorithm>
+#include <cmath>
+
+#include <Eigen/Cholesky>
+
+#include "mgdd/guide/online_calibration.hpp"
+
+namespace mgdd::guide {
+namespace {
+
+constexpr double unremarkable = 1e-3;    // of the highest pressure: a residual that is never a jump
+constexpr std::int64_t jump_cycles = 3;  // suspects in a row
+constexpr std::int64_t settled_after = 3;
+
+}  // namespace
+
+void OnlineCalibration::restart() noexcept {
+  window_.clear();
+  block_ = earlier_ = EarlierData{};
+  has_mean_ = has_block_ = false;
+  usual_power_ = 0.0;
+  settled_updates_ = suspects_ = 0;
+  taken_ = checked_ = window_.accepted();
+}
+
+// A cycle unlike those before it does not reach the calibration; three in a row are the new truth.
+bool OnlineCalibration::newest_is_suspect() noexcept {
+  if (settled_updates_ < settled_after) return false;
+  const CalibrationConditions at = window_.newest(newest_bar_);
+  const double power = residual_power(x_, at, newest_bar_);
+  const double floor = std::pow(unremarkable * highest_bar(), 2);
+  if (usual_power_ > 0.0 && power > std::pow(settings_.jump_factor, 2) * std::max(usual_power_, floor)) {
+    window_.drop_newest();
+    if (++suspects_ >= jump_cycles) {
+      restart();
+      ++jumps_;
+    }
+    return true;
+  }
+  suspects_ = 0;
+  const double share = usual_power_ > 0.0 ? 1.0 / settings_.window.window_cycles : 1.0;
+  if (power >= 0.0) usual_power_ += share * (power - usual_power_);
+  return false;
+}
+
+bool OnlineCalibration::take_mean() noexcept {
+  const std::int64_t fresh = window_.accepted() - taken_;
+  const bool recursive = settings_.method == CalibrationMethod::recursive;
+  if (has_mean_ && fresh < (recursive ? settings_.window.window_cycles : 1)) return true;
+  const bool known = recursive && has_block_;
+  const double before = known ? residual_power(x_, mean_, mean_bar_) : 0.0;
+  taken_ = window_.accepted();
+  mean_ = window_.mean(mean_bar_);
+  mean_.soc_sd_cad = std::hypot(mean_.soc_sd_cad, settings_.soc_scatter_cad);
+  has_mean_ = true;
+  if (!known) return true;
+  earlier_.information = settings_.forgetting * (earlier_.information + block_.information);
+  earlier_.pull = settings_.forgetting * (earlier_.pull + block_.pull);
+  let_timing_wander();
+  const double usual = std::max(before, std::pow(unremarkable * highest_bar(), 2));
+  if (settled_updates_ < settled_after ||
+      residual_power(x_, mean_, mean_bar_) <= std::pow(settings_.jump_factor, 2) * usual) {
+    return true;
+  }
+  restart();
+  ++jumps_;
+  return false;
+}
+
+// Two means of M cycles differ by sqrt(2/M) of the scatter: as much variance for the offset of the timing (matrix
+// inversion lemma), while the mean of the earlier data stays.
+void OnlineCalibration::let_timing_wander() noexcept {
+  constexpr int soc = Calibrated::soc_offset;
+  const double variance = 2.0 * std::pow(settings_.soc_scatter_cad, 2) / settings_.window.window_cycles;
+  if (!beforehand_.unknown[place(soc)] || !(variance > 0.0)) return;
+  const CalibrationVector column = earlier_.information.col(soc);
+  const double divisor = 1.0 / variance + column[soc];
+  earlier_.pull -= column * (earlier_.pull[soc] / divisor);
+  earlier_.information -= column * column.transpose() / divisor;
+}
+
+// What belongs to the old point is integrated out of the earlier data (Schur complement), with what was known of it.
+void OnlineCalibration::forget_point() noexcept {
+  points_seen_ = window_.points_seen();
+  if (has_block_) {
+    EarlierData all{earlier_.information + block_.information, earlier_.pull + block_.pull};
+    for (int i = 0; i < n_calibrated; ++i) {  // what is known exactly is put in
+      if (beforehand_.unknown[place(i)]) continue;
+      all.pull -= all.information.col(i) * x_[i];
+      all.information.row(i).setZero();
+      all.information.col(i).setZero();
+      all.pull[i] = 0.0;
+    }
+    CalibrationMatrix own = CalibrationMatrix::Identity();
+    CalibrationVector pull = CalibrationVector::Zero();
+    CalibrationMatrix mixed = CalibrationMatrix::Zero();  // row: kept, column: of the point
+    for (int i = 0; i < n_calibrated; ++i) {
+      if (!info_of(i).at_point) continue;
+      pull[i] = all.pull[i] + beforehand_.information[i] * beforehand_.start[i];
+      for (int j = 0; j < n_calibrated; ++j) {
+        if (info_of(j).at_point) {
+          own(i, j) = all.information(i, j) + (i == j ? beforehand_.information[i] : 0.0);
+        } else {
+          mixed(j, i) = all.information(j, i);
+        }
+      }
+      if (!beforehand_.unknown[place(i)]) own(i, i) = 1.0;
+    }
+    const Eigen::LDLT<CalibrationMatrix> factors(own);
+    all.information -= mixed * factors.solve(mixed.transpose());
+    all.pull -= mixed * factors.solve(pull);
+    for (int i = 0; i < n_calibrated; ++i) {
+      if (!info_of(i).at_point) continue;
+      all.information.row(i).setZero();
+      all.information.col(i).setZero();
+      all.pull[i] = 0.0;
+    }
+    earlier_.information = settings_.forgetting * all.information;
+    earlier_.pull = settings_.forgetting * all.pull;
+  }
+  for (int i = 0; i < n_calibrated; ++i) {
+    if (info_of(i).at_point && !settings_.wanted[place(i)]) x_[i] = beforehand_.start[i];
+  }
+  block_ = EarlierData{};
+  has_mean_ = has_block_ = false;
+  settled_updates_ = suspects_ = 0;
+  taken_ = checked_ = window_.accepted();
+}
+
+}  // namespace mgdd::guide
