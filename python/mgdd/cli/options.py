@@ -269,7 +269,7 @@ def _rows_of(
 def refuse_idle(args: argparse.Namespace, *names: str, why: str) -> None:
     """Refuse options that were given and would act on nothing."""
     for name in names:
-        if getattr(args, name, None) is not None:
+        if getattr(args, name, None) not in (None, []):  # a repeatable option that is not given is an empty list
             raise ParameterError(f"{as_option(name)} does not act here; {why}")
 
 
