@@ -286,12 +286,12 @@ def number_pairs(items: Sequence[str], option: str) -> dict[str, float]:
     return out
 
 
-def assignments(items: Sequence[str], fields: Mapping[str, Mapping[str, Any]]) -> dict[str, Any]:
-    """Read repeated --set FIELD=VALUE; the caller judges a name that is not a field."""
+def assignments(items: Sequence[str], fields: Mapping[str, Mapping[str, Any]], option: str = "--set") -> dict[str, Any]:
+    """Read repeated FIELD=VALUE of an option; the caller judges a name that is not a field."""
     out: dict[str, Any] = {}
     for item in items:
-        name, value = _pair(item, "--set", "FIELD=VALUE")
-        _once(name, "--set", out)
+        name, value = _pair(item, option, "FIELD=VALUE")
+        _once(name, option, out)
         out[name] = _value(name, value, fields)
     return out
 

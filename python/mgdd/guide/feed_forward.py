@@ -257,7 +257,7 @@ class FeedForward(_core.guide.FeedForward):
 
     @property
     def settings(self) -> dict[str, Any]:
-        """What it was made of: the settings of the seeker, and its own."""
+        """What it was made of: those of the seeker, and its own."""
         return {**self._made_of[1], **self._options}
 
     @property
