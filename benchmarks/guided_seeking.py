@@ -1,4 +1,4 @@
-"""One question: what does seeking with a rough curve lose, beside plain seekers and Bayesian optimisation?
+"""One question: how much J do guided seeking, plain seekers and Bayesian optimisation lose.
 
     python benchmarks/guided_seeking.py [--seeds 200] [--bayes-seeds 20] [--only REGEX] [--json FILE]
 
@@ -25,16 +25,16 @@ import re
 import statistics
 import sys
 from collections.abc import Callable
-from dataclasses import dataclass
+from dataclasses import asdict, dataclass
 from pathlib import Path
 
 from peers import peer_bayes
-from peers.peer_seekers import Contender, Plant, run_to_end
+from peers.peer_seekers import Contender, Plant, installed, run_to_end
 from support import machine
 from support.seeking_maps import CYCLES, CountedPlant, SeekingMap, all_maps
 
 from mgdd import guide, optimize
-from mgdd.studies.statistics import with_interval
+from mgdd.studies.statistics import mean_interval
 
 Make = Callable[[SeekingMap, float, int], optimize.Seeker]  # map, start, seed
 
@@ -91,32 +91,31 @@ def golden(field: SeekingMap, start: float, seed: int) -> optimize.Seeker:  # no
 
 def curve(name: str) -> Callable[[SeekingMap], Contender]:
     def make(field: SeekingMap, start: float, seed: int) -> optimize.Seeker:  # noqa: ARG001 - no chance in it
-        told = {} if field.prior_sd is None else {"prior_sd": field.prior_sd}
         return guide.CurveSeeking(
-            start=start, lower=field.lower, upper=field.upper, curve=field.guides[name], **told
+            start=start, lower=field.lower, upper=field.upper, curve=field.guides[name], prior_sd=field.prior_sd
         )
 
     return driven(make)
 
 
 def rows_for(field: SeekingMap) -> list[Row]:
-    versions = peer_bayes.installed()
-    bayes = []
-    if versions["bayesian-optimization"] is not None:
-        bayes += [
-            Row("bayesian-optimization, defaults, 40", lambda m: peer_bayes.bayes_opt(m.lower, m.upper), is_bayes=True),
-            *(
-                Row(
-                    f"bayesian-optimization by hand, {words}",
-                    lambda m, on=on: peer_bayes.bayes_opt_by_hand(m.lower, m.upper, m.noise_sd, goes_on=on),
-                    is_bayes=True,
-                    must_arrive=True,
-                )
-                for words, on in (("40", False), ("goes on", True))
-            ),
-        ]
-    if versions["scikit-optimize"] is not None:
-        bayes.append(Row("scikit-optimize, defaults, 40", lambda m: peer_bayes.skopt(m.lower, m.upper), is_bayes=True))
+    versions = installed(peer_bayes.PACKAGES)
+    bayes: list[tuple[str, str, Callable[[SeekingMap], Contender], bool]] = [
+        ("bayes_opt", "defaults, 40", lambda m: peer_bayes.bayes_opt(m.lower, m.upper), False),
+        ("bayes_opt", "by hand, 40", lambda m: peer_bayes.bayes_opt_by_hand(m.lower, m.upper, m.noise_sd), True),
+        (
+            "bayes_opt",
+            "by hand, goes on",
+            lambda m: peer_bayes.bayes_opt_by_hand(m.lower, m.upper, m.noise_sd, goes_on=True),
+            True,
+        ),
+        ("skopt", "defaults, 40", lambda m: peer_bayes.skopt(m.lower, m.upper), False),
+    ]
+    found = [
+        Row(f"{peer_bayes.PACKAGES[module]}, {words}", contender, is_bayes=True, must_arrive=arrives)
+        for module, words, contender, arrives in bayes
+        if versions[peer_bayes.PACKAGES[module]] is not None
+    ]
     return [
         *(Row(f"curve: {name}", curve(name), is_curve=True, must_arrive=True) for name in field.guides),
         *(
@@ -132,7 +131,7 @@ def rows_for(field: SeekingMap) -> list[Row]:
             for method in ("batch", "moving_average", "spsa")
         ),
         Row("golden section, noise told", driven(golden), must_arrive=True),
-        *bayes,
+        *found,
     ]
 
 
@@ -150,17 +149,30 @@ def check_agreement(rows: list[Row], field: SeekingMap) -> None:
             sys.exit(f"{row.name} does not find the optimum of {field.name} without noise: nothing counted")
 
 
-def judged(row: Row, field: SeekingMap, seeds: int) -> dict[str, float | int | None]:
+@dataclass(frozen=True)
+class Figures:
+    """What came out of one contender on one map."""
+
+    seeds: int
+    lost: float
+    lost_low: float
+    lost_high: float
+    median_arrival: float | None
+    never: float
+    away_at_end: float
+
+
+def judged(row: Row, field: SeekingMap, seeds: int) -> Figures:
     plants = [run_once(row, field, seed) for seed in range(seeds)]
     arrivals = [plant.arrived for plant in plants]
     median = statistics.median(arrivals)
-    return {
-        "seeds": seeds,
-        **with_interval("lost", [plant.lost / CYCLES for plant in plants]),
-        "median_arrival": None if median == math.inf else median,
-        "never": sum(arrival == math.inf for arrival in arrivals) / seeds,
-        "away_at_end": sum(not plant.near() for plant in plants) / seeds,
-    }
+    return Figures(
+        seeds,
+        *mean_interval([plant.lost / CYCLES for plant in plants]),
+        None if median == math.inf else median,
+        sum(arrival == math.inf for arrival in arrivals) / seeds,
+        sum(not plant.near() for plant in plants) / seeds,
+    )
 
 
 def arguments() -> argparse.Namespace:
@@ -176,31 +188,25 @@ def arguments() -> argparse.Namespace:
     return options
 
 
-def print_row(name: str, found: dict[str, float | int | None]) -> None:
-    half = (found["lost_high"] - found["lost_low"]) / 2
-    arrival = "never" if found["median_arrival"] is None else f"{found['median_arrival']:.0f}"
+def print_row(name: str, found: Figures) -> None:
+    half = (found.lost_high - found.lost_low) / 2
+    arrival = "never" if found.median_arrival is None else f"{found.median_arrival:.0f}"
     print(
-        f"{name:40s} {found['lost']:8.3f} +-{half:6.3f} {arrival:>8s} {found['never']:7.0%} "
-        f"{found['away_at_end']:8.0%} {found['seeds']:6d}",
+        f"{name:40s} {found.lost:8.3f} +-{half:6.3f} {arrival:>8s} {found.never:7.0%} "
+        f"{found.away_at_end:8.0%} {found.seeds:6d}",
         flush=True,
     )
 
 
-def ratios(table: dict[str, dict[str, float | int | None]], rows: list[Row]) -> dict[str, float | str]:
-    """Loss of every curve over that of the best of the others."""
-    others = {row.name: table[row.name]["lost"] for row in rows if not row.is_curve}
-    curves = [row.name for row in rows if row.is_curve]
-    if not others or not curves:
-        return {}
-    best = min(others, key=others.__getitem__)
-    return {"best of the others": best, **{name: table[name]["lost"] / others[best] for name in curves}}
+def best_other(table: dict[str, Figures], rows: list[Row]) -> str | None:
+    """Name of the one without a curve that loses least."""
+    return min((row.name for row in rows if not row.is_curve), key=lambda name: table[name].lost, default=None)
 
 
 def main() -> None:
     options = arguments()
-    machine.pin()
     context = machine.versions()
-    for package, version in peer_bayes.installed().items():
+    for package, version in installed(peer_bayes.PACKAGES).items():
         context[package] = version or "missing: its rows are left out (pip install --group bench)"
     fields = [field for field in all_maps() if options.maps.search(field.name)]
     chosen = {field.name: [row for row in rows_for(field) if options.only.search(row.name)] for field in fields}
@@ -215,14 +221,19 @@ def main() -> None:
         print(f"\n{field.name}: noise {field.noise_sd:g}, {CYCLES} cycles")
         print(f"{'':40s} {'J lost':>8s} {'95 %':>8s} {'cycles':>8s} {'never':>7s} {'away':>8s} {'':>6s}")
         print(f"{'':40s} {'a cycle':>8s} {'':>8s} {'to 1':>8s} {'':>7s} {'at end':>8s} {'seeds':>6s}")
-        table = {}
+        table: dict[str, Figures] = {}
         for row in rows:
             table[row.name] = judged(row, field, options.bayes_seeds if row.is_bayes else options.seeds)
             print_row(row.name, table[row.name])
-        compared = ratios(table, rows)
-        for name, value in compared.items():
-            print(f"{name if isinstance(value, str) else name + ', over it':40s} {value if isinstance(value, str) else f'{value:8.2f}'}")
-        report[field.name] = {"contenders": table, "ratios": compared}
+        best = best_other(table, rows)
+        ratios = {row.name: table[row.name].lost / table[best].lost for row in rows if row.is_curve} if best else {}
+        for name, ratio in ratios.items():
+            print(f"{name} loses {ratio:.2f} times what {best} loses")
+        report[field.name] = {
+            "contenders": {name: asdict(found) for name, found in table.items()},
+            "best_of_the_others": best,
+            "ratios": ratios,
+        }
         if options.json:
             whole = {"context": context, "cycles": CYCLES, "maps": report}
             options.json.write_text(json.dumps(whole, indent=2) + "\n", encoding="utf-8")

@@ -65,11 +65,12 @@ class CountedPlant:
         return self._setting.read(x)
 
     def near(self) -> bool:
+        """Whether the estimate is within 1 of the best input."""
         return abs(self.estimate - self._setting.best) <= NEAR
 
 
 def drawn(name: str, drop: Callable[[float], float], *, noise_sd: float = NOISE) -> SeekingMap:
-    """A map by its formula. Sides alternate; where between 4 and 5 the optimum lies is drawn: grids must not hit it."""
+    """Make a map of its formula; where between 4 and 5 the optimum lies is drawn, so that no grid hits it."""
 
     def setting(seed: int, noisy: bool) -> Setting:
         rng = np.random.default_rng(seed)
@@ -79,23 +80,25 @@ def drawn(name: str, drop: Callable[[float], float], *, noise_sd: float = NOISE)
         return Setting(start, best, lambda x: drop(x - best) + noise.pop(), lambda x: -drop(x - best))
 
     parabola = Curve.parabola(curvature=-0.05, best=0.0, reach=1.5 * WIDTH)
-    return SeekingMap(
-        name, -WIDTH / 2, WIDTH / 2, noise_sd, CURVATURE, setting, {"parabola": parabola}, prior_sd=12.0
-    )
+    return SeekingMap(name, -WIDTH / 2, WIDTH / 2, noise_sd, CURVATURE, setting, {"parabola": parabola}, prior_sd=12.0)
 
 
 def engine() -> SeekingMap:
-    """The virtual bench at its default point, over the start of combustion."""
+    """Make the map of the virtual bench at its default point, over the start of combustion."""
     lower, upper = ENGINE_BOUNDS
     point = OperatingPoint()
-    exact = ModelOptimum(Cylinder())(point)
     quiet = EngineBench(soc_scatter_cad=0.0, efficiency_noise_percent=0.0)
     timings = np.linspace(lower, upper, 4001)
     true = np.array(quiet.run_columns(timings)["j"])
     best = float(timings[true.argmax()])
+    bend = Curve(timings, true).curvature(3.0)
 
     def setting(seed: int, noisy: bool) -> Setting:
-        bench = EngineBench(seed=seed) if noisy else EngineBench(soc_scatter_cad=0.0, efficiency_noise_percent=0.0)
+        bench = EngineBench(
+            soc_scatter_cad=ENGINE_SCATTER if noisy else 0.0,
+            efficiency_noise_percent=ENGINE_NOISE if noisy else 0.0,
+            seed=seed,
+        )
         return Setting(
             ENGINE_STARTS[seed % 2],
             best,
@@ -104,9 +107,10 @@ def engine() -> SeekingMap:
         )
 
     heats = {"wall heat +30 %": 0.65, "adiabatic": 0.0, "twice the wall heat": 1.0}
-    guides = {name: ModelOptimum(Cylinder(wall_heat_scale=heat)).curve(point) for name, heat in heats.items()}
+    drawn_curves = {name: ModelOptimum(Cylinder(wall_heat_scale=heat)).curve(point) for name, heat in heats.items()}
+    guides = {name: curve for name, curve in drawn_curves.items() if curve is not None}
     guides["parabola"] = Curve.parabola(curvature=-0.05, best=(lower + upper) / 2, reach=1.5 * WIDTH)
-    return SeekingMap("engine", lower, upper, ENGINE_NOISE, exact.curvature, setting, guides)
+    return SeekingMap("engine", lower, upper, ENGINE_NOISE, bend, setting, guides)
 
 
 def all_maps() -> list[SeekingMap]:
