@@ -17,7 +17,7 @@ using optimize::scalar_input;
 using optimize::TellStatus;
 
 constexpr double prior_share = 0.25;       // of the bounds
-constexpr double amplitude_share = 0.4;    // of prior_sd: the farthest a reading is taken from the estimate
+constexpr double amplitude_share = 0.2;    // of prior_sd: the farthest a reading is taken from the estimate
 constexpr double coarsest_share = 0.1;     // of prior_sd between two places of the filter
 constexpr double point_doubt_share = 0.2;  // of prior_sd: how the guide's error may differ from point to point
 constexpr double lost_share = 0.5;         // the same where the guide says nothing of the new point
