@@ -11,7 +11,7 @@ import numpy as np
 
 from mgdd import presets
 from mgdd.engine import Cylinder, OperatingPoint
-from mgdd.guide import Curve, CurveSeeking, FeedForward, ModelOptimum
+from mgdd.guide import Curve, CurveSeeking, FeedForward, GuidedEngine, ModelOptimum
 from mgdd.loop import EngineBench
 from mgdd.optimize import ExtremumSeeking, Optimum
 
@@ -68,7 +68,8 @@ class Guide:
     backwards: bool = False
 
     @cached_property
-    def _model(self) -> ModelOptimum:
+    def model(self) -> ModelOptimum:
+        """The model that is asked, by the duration law where a point has no burn duration of its own."""
         burn = self.burn_duration * self.cylinder.burn_duration_ref_cad
         return ModelOptimum(self.cylinder.replace(burn_duration_ref_cad=burn), bounds_cad=BOUNDS_CAD)
 
@@ -83,7 +84,7 @@ class Guide:
         return 2.0 * (self._best(LOW)["soc_cad"] - self._best(point)["soc_cad"])
 
     def _best(self, point: OperatingPoint) -> Optimum:
-        best = self._model(self._told(point))
+        best = self.model(self._told(point))
         if best is None:
             raise ArithmeticError(f"guide {self.name!r} has no optimum at {point}")
         return best
@@ -98,7 +99,7 @@ class Guide:
 
     def curve(self, point: OperatingPoint) -> Curve:
         """Give J of the model over SOC, as a `CurveSeeking` takes it."""
-        curve = self._model.curve(self._told(point))
+        curve = self.model.curve(self._told(point))
         if curve is None:
             raise ArithmeticError(f"guide {self.name!r} has no curve at {point}")
         shift = self._shift(point)
@@ -181,7 +182,7 @@ class Run:
 
 def drive(
     bench: EngineBench,
-    seeker: FeedForward | CurveSeeking,
+    seeker: FeedForward | CurveSeeking | GuidedEngine,
     cycles: int,
     *,
     guide: Guide | None = None,
@@ -194,8 +195,8 @@ def drive(
     ----------
     bench : EngineBench
         It advances.
-    seeker : FeedForward or CurveSeeking
-        It advances; a feed-forward is told every operating point.
+    seeker : FeedForward, CurveSeeking or GuidedEngine
+        It advances; all but a bare curve are told every operating point.
     cycles : int
         How many.
     guide : Guide, optional
@@ -214,7 +215,7 @@ def drive(
     point = bench.point
     for k in range(cycles):
         now = bench.point
-        if isinstance(seeker, FeedForward):
+        if isinstance(seeker, FeedForward | GuidedEngine):
             seeker.at(now)
         elif guide is not None and now != point:
             seeker.guide(guide.curve(now))
