@@ -66,9 +66,9 @@ def add_guidance(parser: argparse.ArgumentParser) -> None:
     group = parser.add_argument_group("guide", "a rough model that leads while the measurements decide")
     group.add_argument(
         "--guide", choices=GUIDES, default="none",
-        help="feed_forward: the model's best timing, the seeker learns the rest; curve: the model's whole curve, "
-        "placed by the measurements; calibrated: the same while the model learns from the measured pressure; map: a table "
-        "of timings as feed-forward (default: none)",
+        help="feed_forward: the model's best timing, the seeker learns the rest; curve: its whole curve, placed "
+        "by the measurements; calibrated: the same while the model learns from the measured pressure; map: a table of "
+        "timings as feed-forward (default: none)",
     )  # fmt: skip
     group.add_argument(
         "--guide-preset", metavar="NAME_OR_FILE.toml", help="cylinder of the model (default: that of the bench)"

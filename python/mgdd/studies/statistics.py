@@ -18,7 +18,16 @@ if TYPE_CHECKING:
     import xarray as xr
     from numpy.typing import ArrayLike, NDArray
 
-__all__ = ["bands", "loops", "mean_interval", "rms", "run_with_slope", "with_interval"]
+__all__ = [
+    "bands",
+    "loops",
+    "mean_interval",
+    "median_interval",
+    "rms",
+    "run_with_slope",
+    "with_interval",
+    "with_median_interval",
+]
 
 _CONFIDENCE = 0.95
 
@@ -48,6 +57,43 @@ def mean_interval(values: ArrayLike) -> tuple[float, float, float]:
     freedom = known.size - 1
     half = float(stdtrit(freedom, 0.5 + 0.5 * _CONFIDENCE) * known.std(ddof=1) / math.sqrt(known.size))
     return mean, mean - half, mean + half
+
+
+def median_interval(values: ArrayLike) -> tuple[float, float, float]:
+    """Give the median of independent values and the ends of its 95 % interval, by order statistics.
+
+    The interval holds for any distribution: its ends are the narrowest symmetric pair of ordered values between which
+    the median lies with at least 95 %.
+
+    Parameters
+    ----------
+    values : array_like
+        One value per seed; infinite for a loop that never arrived, which counts. NaN is left out.
+
+    Returns
+    -------
+    tuple of float
+        Median, low and high end; the ends are NaN for fewer than six values, which have no such pair.
+    """
+    from scipy.stats import binom
+
+    known = np.sort(np.asarray(values, float).ravel())
+    known = known[~np.isnan(known)]
+    if known.size == 0:
+        return math.nan, math.nan, math.nan
+    below = known[(known.size - 1) // 2]
+    above = known[known.size // 2]
+    middle = float(above if not math.isfinite(above) else 0.5 * (below + above))
+    cut = int(binom.ppf(0.5 * (1.0 - _CONFIDENCE), known.size, 0.5))
+    if cut < 1:
+        return middle, math.nan, math.nan
+    return middle, float(known[cut - 1]), float(known[known.size - cut])
+
+
+def with_median_interval(name: str, values: ArrayLike) -> dict[str, float | None]:
+    """Name a median and the ends of its interval as a row does; None for what is not finite."""
+    said = zip((name, f"{name}_low", f"{name}_high"), median_interval(values), strict=True)
+    return {key: value if math.isfinite(value) else None for key, value in said}
 
 
 def with_interval(name: str, values: ArrayLike) -> dict[str, float]:
