@@ -8,7 +8,7 @@ from collections.abc import Mapping, Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
-from mgdd.cli.options import add_command
+from mgdd.cli.options import add_command, refuse_idle
 from mgdd.cli.output import Stopped, check_output, emit
 from mgdd.errors import Interrupted, ParameterError
 from mgdd.report import write_report
@@ -21,6 +21,7 @@ if TYPE_CHECKING:
 __all__ = ["add"]
 
 _LOW = "_low"
+_OPTIONS = {"real": ("guided",)}  # of single studies
 
 
 def add(commands: Any) -> None:
@@ -38,6 +39,10 @@ def add(commands: Any) -> None:
         "--seeds", type=int, metavar="N", help="seeds behind every statistic (default: the study's own)"
     )
     parser.add_argument("--quick", action="store_true", help="a shorter study with wider intervals")
+    parser.add_argument(
+        "--real", action="store_true", default=None,
+        help="of guided: on the surrogate of the measured hydrogen-diesel engine instead of the virtual bench",
+    )  # fmt: skip
     parser.add_argument("--figures", metavar="DIR", help="write its figures into DIR")
     parser.add_argument("--report", metavar="DIR", help="write a page with tables and figures into DIR")
     parser.add_argument("--format", choices=("png", "svg"), default="png", help="of the figures (default: png)")
@@ -48,6 +53,7 @@ def run(args: argparse.Namespace) -> None:
     check_output(args)
     titles = available_studies()
     if args.list:
+        refuse_idle(args, *_OPTIONS, why="--list runs no study")
         width = max(map(len, titles))
         text = "\n".join(f"{name:{width}} {title}" for name, title in titles.items())
         emit(args, {"studies": [{"name": name, "title": title} for name, title in titles.items()]}, text=text)
@@ -55,13 +61,19 @@ def run(args: argparse.Namespace) -> None:
     if args.name not in titles:
         given = "no study named" if args.name is None else f"no study {args.name!r}"
         raise ParameterError(f"{given}: must be one of {', '.join(titles)}")
+    options: dict[str, Any] = {}
+    for option, studies in _OPTIONS.items():
+        if args.name not in studies:
+            refuse_idle(args, option, why=f"it is an option of the study {', '.join(studies)}, not of {args.name}")
+        elif getattr(args, option) is not None:
+            options[option] = getattr(args, option)
     folder = None if args.figures is None else Path(args.figures)
     if folder is not None:
         folder.mkdir(parents=True, exist_ok=True)
     drawn = folder is not None or args.report is not None
     step = args.progress.expect(10)
     try:
-        result = run_study(args.name, seeds=args.seeds, quick=args.quick, figures=drawn, progress=step)
+        result = run_study(args.name, seeds=args.seeds, quick=args.quick, figures=drawn, progress=step, **options)
     except Interrupted as stop:
         if not isinstance(stop.partial, StudyResult):
             raise
@@ -93,7 +105,7 @@ def _text(title: str, summary: Mapping[str, Any]) -> list[str | Table]:
     chance = f" ({seeds} seed{'s' if seeds != 1 else ''})" if seeds else ""
     out: list[str | Table] = [f"{summary['study']}: {title}{chance}\n", rows_table(summary["rows"])]
     if any(name.endswith(_LOW) for row in summary["rows"] for name in row):
-        out.append("\nBrackets: 95 % interval of the mean over seeds.")
+        out.append("\nBrackets: 95 % interval over seeds, of the mean or, for cycles, of the median.")
     if summary.get("figures"):
         out += ["", *summary["figures"]]
     if summary.get("report"):

@@ -9,6 +9,8 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
+from mgdd import datasets
+from mgdd.errors import DataError
 from mgdd.loop import SurrogatePlant
 from mgdd.optimize import (
     BoundedSeeking,
@@ -27,6 +29,7 @@ from mgdd.optimize.tuning import Tuning
 from mgdd.surrogate import EngineSurrogate
 
 if TYPE_CHECKING:
+    import xarray as xr
     from numpy.typing import NDArray
 
 __all__ = [
@@ -39,6 +42,7 @@ __all__ = [
     "Objective",
     "held_objective",
     "lag_of",
+    "measured_records",
     "noise_at",
     "seeker_of",
     "tuned_case",
@@ -87,6 +91,17 @@ class Case:
     tuning: Tuning
     noise_sd: float
     lags: tuple[ComponentLag, ...]
+
+
+def measured_records(study: str) -> xr.Dataset:
+    """Load the records of the hydrogen-diesel engine; DataError where they are not at hand."""
+    try:
+        return datasets.load("h2df_502")
+    except FileNotFoundError as error:
+        raise DataError(
+            f"the study {study} needs the records of the hydrogen-diesel engine: {error.strerror}; the page "
+            "'A measured engine' says where they come from"
+        ) from error
 
 
 def lag_of(surrogate: EngineSurrogate, name: str) -> ComponentLag:

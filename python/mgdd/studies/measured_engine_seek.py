@@ -10,8 +10,6 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from mgdd import datasets
-from mgdd.errors import DataError
 from mgdd.loop import SurrogatePlant, run_seeker
 from mgdd.results.labels import labelled_dataset
 from mgdd.studies.base import Progress, StudyResult, check_seeds, finish, run_parts
@@ -24,6 +22,7 @@ from mgdd.studies.measured_engine_cases import (
     Case,
     held_objective,
     lag_of,
+    measured_records,
     seeker_of,
     tuned_case,
 )
@@ -132,14 +131,7 @@ def run_measured_engine_seek(
 
 
 def _surrogate() -> EngineSurrogate:
-    try:
-        records = datasets.load("h2df_502")
-    except FileNotFoundError as error:
-        raise DataError(
-            f"the study {_NAME} needs the records of the hydrogen-diesel engine: {error.strerror}; the page "
-            "'A measured engine' says where they come from"
-        ) from error
-    return fit_surrogate(records)
+    return fit_surrogate(measured_records(_NAME))
 
 
 def _run(surrogate: EngineSurrogate, case: Case, seeds: int, cycles: int) -> _Runs:

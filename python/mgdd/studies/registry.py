@@ -42,6 +42,7 @@ _STUDIES = {
     "identification-benchmarks": _Study(
         "measured drive, tanks and circuit: fits beside published ones (needs the data sets)"
     ),
+    "guided": _Study("a start guided by a rough model beside an unguided one, on the bench or a measured engine", 5),
     "measured-engine-seek": _Study("seekers on a surrogate of a measured hydrogen-diesel engine (needs the data set)"),
 }
 
@@ -89,7 +90,8 @@ def run_study(
     **options
         What one study takes beside these. ``measured-traces``: measured ``traces``, their ``cylinder``, the ``point``
         of what a trace does not carry, and ``step_cad`` and ``integrator`` as in `mgdd.identify.fit_cylinder`; the four
-        heavy-duty diesel traces and the preset ``hd_diesel_128x144`` if left out.
+        heavy-duty diesel traces and the preset ``hd_diesel_128x144`` if left out. ``guided``: ``real``, whether on the
+        surrogate of the measured engine.
 
     Returns
     -------

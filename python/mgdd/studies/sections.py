@@ -16,7 +16,7 @@ if TYPE_CHECKING:
 __all__ = ["Section", "Table", "as_number", "cells", "column_names", "standard_sections", "table_of"]
 
 _ENDS = ("_low", "_high")
-_INTERVAL = "Brackets: 95 % interval of the mean over seeds."
+_INTERVAL = "Brackets: 95 % interval over seeds, of the mean or, for cycles, of the median."
 _SAID = ("study", "seeds", "rows", "interrupted", "mgdd")
 
 

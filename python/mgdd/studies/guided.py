@@ -1,0 +1,292 @@
+"""Guided against unguided on one engine: the virtual bench, or the surrogate of a measured engine."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Callable
+from dataclasses import dataclass
+from functools import partial
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+
+from mgdd.engine import Cylinder, OperatingPoint
+from mgdd.errors import ConvergenceError
+from mgdd.guide import Curve, CurveSeeking, ModelOptimum
+from mgdd.loop import EngineBench, SurrogatePlant, run_seeker
+from mgdd.optimize import ExtremumSeeking
+from mgdd.optimize.by_curvature import approach_gain
+from mgdd.results.labels import labelled_dataset
+from mgdd.studies import measured_engine_cases as measured
+from mgdd.studies.base import Progress, StudyResult, check_seeds, finish, run_parts
+from mgdd.studies.guided_figures import draw
+from mgdd.studies.statistics import with_interval, with_median_interval
+from mgdd.surrogate import EngineSurrogate, fit_surrogate
+
+if TYPE_CHECKING:
+    import xarray as xr
+    from numpy.typing import NDArray
+
+__all__ = ["run_guided"]
+
+_NAME = "guided"
+_CYCLES, _EARLY_CYCLES, _QUICK_SEEDS = 400, 100, 20
+_GRID_CAD, _REACH_CAD = 0.1, 60.0
+_BEND = -0.05  # of a parabola, points of efficiency per (°CA)**2: what cycle models have, -0.037 to -0.054
+_WRONG_WALL_HEAT = 1.0  # of the guide of the bench, which has 0.5
+_AMPLITUDE_CAD, _PERIOD, _TIME_CONSTANT = 1.0, 10, 40.0  # of the seeker on the bench, as `mgdd engine seek` has them
+# 4.5 L of four cylinders; bore and stroke are those of engines of this size, the compression ratio is a usual one.
+_MEASURED_CYLINDER = Cylinder(bore_mm=107.0, stroke_mm=124.0, connecting_rod_mm=192.0, compression_ratio=17.3)
+_TEN_TO_NINETY = 1.0 - math.sqrt(0.2)  # of the duration of a symmetric triangle
+
+
+@dataclass(frozen=True, kw_only=True)
+class _Engine:
+    """A plant, its optimum, its J over timing without noise, and its guide."""
+
+    unit: str
+    start_cad: float
+    bounds_cad: tuple[float, float]
+    best_cad: float
+    best_j: float
+    grid_cad: NDArray[np.float64]
+    steady_j: NDArray[np.float64]
+    curve: Curve
+    bend: float  # of the parabola
+    plant: Callable[[int, float], Any]
+    plain: Callable[[float], ExtremumSeeking]
+
+    def seeker(self, case: str) -> Any:
+        """Make the seeker of a case."""
+        led_cad = min(max(self.curve.best, self.bounds_cad[0]), self.bounds_cad[1])
+        if case in ("unguided", "feed_forward"):
+            return self.plain(self.start_cad if case == "unguided" else led_cad)
+        shape = self.curve
+        if case == "parabola":
+            shape = Curve.parabola(curvature=self.bend, best=led_cad, reach=_REACH_CAD)
+        return CurveSeeking(start=led_cad, lower=self.bounds_cad[0], upper=self.bounds_cad[1], curve=shape)
+
+
+@dataclass(frozen=True, kw_only=True)
+class _Runs:
+    """Of one case, one row per seed."""
+
+    case: str
+    start_cad: float
+    estimate: NDArray[np.float64]
+    lost: NDArray[np.float64]
+
+
+_CASES = ("unguided", "feed_forward", "curve", "parabola")
+
+
+def run_guided(
+    *, seeds: int = 200, quick: bool = False, figures: bool = True, real: bool = False, progress: Progress | None = None
+) -> StudyResult:
+    """Start an engine with a rough model and without one, and count cycles and the J that is lost.
+
+    Cases: extremum seeking from a start far away; the same from the guide's best timing, which is what a feed-forward
+    does at one operating point; `CurveSeeking` with the guide's curve, and with a parabola about its best timing.
+    The guide of the virtual bench has twice its wall heat. The guide of the measured engine is the cycle model of a
+    diesel with a triangular burn: size, energy, burn angles and speed are those of the records; bore, stroke,
+    compression ratio, intake and wall heat are usual ones, and hydrogen, pilot and residuals are left out.
+
+    Parameters
+    ----------
+    seeds : int
+        Runs per case.
+    quick : bool
+        At most twenty seeds.
+    figures : bool
+        Whether to draw.
+    real : bool
+        Whether the plant is the surrogate of the measured hydrogen-diesel engine, J its IMEP, input its injection.
+    progress : callable, optional
+        Called with a few words before each case.
+
+    Returns
+    -------
+    StudyResult
+        ``summary["rows"]``: per case the median of the first cycle within 1 °CA of the optimum and of the cycle from
+        which on the estimate stays within 1.5 °CA (None: never in most runs), J lost in the first 100 cycles
+        (J x cycles), J lost per cycle in the second half, and the final timing, with 95 % intervals.
+
+    Raises
+    ------
+    mgdd.errors.DataError
+        The records are not at hand.
+    mgdd.errors.ParameterError
+        Fewer than one seed.
+
+    Examples
+    --------
+    >>> from mgdd.studies.guided import run_guided
+    >>> rows = run_guided(seeds=8, figures=False).summary["rows"]
+    >>> [row["case"] for row in rows], 5 * rows[2]["cycles_to_1_cad"] < rows[0]["cycles_to_1_cad"]
+    (['unguided', 'feed_forward', 'curve', 'parabola'], True)
+    """
+    seeds = min(check_seeds(seeds), _QUICK_SEEDS if quick else seeds)
+    if progress is not None:
+        progress("drawing the guide")
+    engine = _measured_engine() if real else _bench_engine()
+    parts = [(case, partial(_run, engine, case, seeds)) for case in _CASES]
+    runs, interrupted = run_parts(parts, progress)
+    summary: dict[str, Any] = {
+        "study": _NAME,
+        "plant": "surrogate of the measured engine" if real else "virtual bench",
+        "seeds": seeds,
+        "cycles": _CYCLES,
+        "unit_of_j": engine.unit,
+        "optimum_cad": engine.best_cad,
+        "guide_cad": engine.curve.best,
+        "interrupted": interrupted,
+        "rows": [_row(engine, run) for run in runs],
+    }
+    return finish(_dataset(engine, runs), summary, draw if figures else None)
+
+
+def _bench_engine() -> _Engine:
+    bench, bounds = EngineBench(), (-30.0, 10.0)
+    best = bench.find_optimum(bounds_cad=bounds)
+    grid = np.arange(bounds[0], bounds[1] + 0.5 * _GRID_CAD, _GRID_CAD)
+    model = ModelOptimum(bench.settings["cylinder"].replace(wall_heat_scale=_WRONG_WALL_HEAT), bounds_cad=bounds)
+
+    def plain(start: float) -> ExtremumSeeking:
+        gain = approach_gain(abs(best.curvature), _TIME_CONSTANT, amplitude=_AMPLITUDE_CAD)
+        return ExtremumSeeking(
+            start=start, lower=bounds[0], upper=bounds[1], amplitude=_AMPLITUDE_CAD, period=_PERIOD, gain=gain
+        )
+
+    return _Engine(
+        unit="%",
+        start_cad=-20.0,
+        bounds_cad=bounds,
+        best_cad=best["soc_cad"],
+        best_j=best.value,
+        grid_cad=grid,
+        steady_j=bench.steady_map(grid)["j"].to_numpy(),
+        curve=_drawn(model, bench.point),
+        bend=_BEND,
+        plant=lambda seed, _: EngineBench(seed=seed),
+        plain=plain,
+    )
+
+
+def _measured_engine() -> _Engine:
+    records = measured.measured_records(_NAME)
+    surrogate = fit_surrogate(records)
+    objective = measured.Objective(name="IMEP", weights={"imep_bar": 1.0})
+    case = measured.tuned_case(surrogate, objective, "batch", measured.held_objective(surrogate, objective))
+    bounds = (measured.LOWER_CAD, measured.UPPER_CAD)
+    grid = np.arange(bounds[0], bounds[1] + 0.5 * _GRID_CAD, _GRID_CAD)
+    curve, bar_per_point = _measured_guide(records)
+
+    def plain(start: float) -> ExtremumSeeking:
+        settings = {**measured.seeker_of(case, 0).settings, "start": start}
+        return ExtremumSeeking(**settings)
+
+    return _Engine(
+        unit="bar",
+        start_cad=measured.START_CAD,
+        bounds_cad=bounds,
+        best_cad=case.best["soi_cad"],
+        best_j=case.best.value,
+        grid_cad=grid,
+        steady_j=surrogate.predict(grid)["imep_bar"].to_numpy(),
+        curve=curve,
+        bend=_BEND * bar_per_point,
+        plant=lambda seed, start: _measured_plant(surrogate, seed, start),
+        plain=plain,
+    )
+
+
+def _measured_plant(surrogate: EngineSurrogate, seed: int, start_cad: float) -> SurrogatePlant:
+    return SurrogatePlant(surrogate, "imep_bar", start_soi_cad=start_cad, seed=seed)
+
+
+def _measured_guide(records: xr.Dataset) -> tuple[Curve, float]:
+    """Draw IMEP over injection by the cycle model, and give the bar of IMEP per point of efficiency."""
+    middle = {
+        name: float(records[name].median())
+        for name in ("speed_rpm", "soi_cad", "mfb10_cad", "mfb50_cad", "mfb90_cad", "diesel_energy_kj", "h2_energy_kj")
+    }
+    cylinder = _MEASURED_CYLINDER
+    energy_kj = middle["diesel_energy_kj"] + middle["h2_energy_kj"]
+    duration = (middle["mfb90_cad"] - middle["mfb10_cad"]) / _TEN_TO_NINETY
+    point = OperatingPoint(
+        speed_rpm=middle["speed_rpm"],
+        fuel_mg=energy_kj * 1e3 / cylinder.lower_heating_value_mj_per_kg,
+        burn_duration_cad=duration,
+    )
+    from_soc_to_soi = middle["soi_cad"] - (middle["mfb50_cad"] - 0.5 * duration)
+    drawn = _drawn(ModelOptimum(cylinder, bounds_cad=(-30.0, 15.0)), point)
+    displacement_m3 = 0.25 * math.pi * cylinder.bore_mm**2 * cylinder.stroke_mm * 1e-9
+    bar_per_point = 0.01 * energy_kj * 1e3 / displacement_m3 * 1e-5
+    soc = np.linspace(drawn.lower, drawn.upper, 121)
+    return Curve(soc + from_soc_to_soi, bar_per_point * np.asarray(drawn(soc))), bar_per_point
+
+
+def _drawn(model: ModelOptimum, point: OperatingPoint) -> Curve:
+    curve = model.curve(point)
+    if curve is None:
+        raise ConvergenceError(f"study {_NAME!r}: the guide has no cycle at {point}")
+    return curve
+
+
+def _run(engine: _Engine, case: str, seeds: int) -> _Runs:
+    estimate, lost = np.empty((seeds, _CYCLES)), np.empty((seeds, _CYCLES))
+    start = float(engine.seeker(case).estimate[0])
+    for seed in range(seeds):
+        cycles = run_seeker(engine.plant(seed, start), engine.seeker(case), _CYCLES).dataset
+        if "estimate_cad" in cycles:
+            estimate[seed], applied = cycles["estimate_cad"], cycles["soc_applied_cad"].to_numpy()
+        else:
+            estimate[seed], applied = cycles["estimate"][:, 0], cycles["applied"][:, 0].to_numpy()
+        lost[seed] = engine.best_j - np.interp(applied, engine.grid_cad, engine.steady_j)
+    return _Runs(case=case, start_cad=start, estimate=estimate, lost=lost)
+
+
+def _arrivals(engine: _Engine, run: _Runs) -> NDArray[np.float64]:
+    near = np.abs(run.estimate - engine.best_cad) <= 1.0
+    return np.where(near.any(axis=1), near.argmax(axis=1), math.inf)
+
+
+def _stays(engine: _Engine, run: _Runs) -> NDArray[np.float64]:
+    outside = np.abs(run.estimate - engine.best_cad) > 1.5
+    after = _CYCLES - np.argmax(outside[:, ::-1], axis=1)
+    stays = np.where(outside.any(axis=1), after, 0).astype(np.float64)
+    return np.where(outside[:, -1], math.inf, stays)
+
+
+def _row(engine: _Engine, run: _Runs) -> dict[str, Any]:
+    final = run.estimate[:, -_EARLY_CYCLES:].mean(axis=1)
+    return {
+        "case": run.case,
+        "start_cad": run.start_cad,
+        **with_median_interval("cycles_to_1_cad", _arrivals(engine, run)),
+        **with_median_interval("cycles_stays_1_5_cad", _stays(engine, run)),
+        **with_interval("lost_j_cycles", run.lost[:, :_EARLY_CYCLES].sum(axis=1)),
+        **with_interval("late_loss", run.lost[:, _CYCLES // 2 :].mean(axis=1)),
+        **with_interval("final_cad", final),
+        "final_sd_cad": float(final.std(ddof=1)) if final.size > 1 else math.nan,
+    }
+
+
+def _dataset(engine: _Engine, runs: list[_Runs]) -> xr.Dataset:
+    cad, unit = "°CA aTDC", engine.unit
+    low, median, high = np.quantile(np.stack([run.estimate for run in runs]), [0.1, 0.5, 0.9], axis=1)
+    lost = np.stack([np.cumsum(run.lost, axis=1).mean(axis=0) for run in runs])
+    over = ("case", "cycle")
+    variables: dict[str, tuple[Any, ...]] = {
+        "case": ("case", [run.case for run in runs], "-", "what guides"),
+        "cycle": ("cycle", np.arange(_CYCLES)),
+        "timing_cad": ("timing_cad", engine.grid_cad, cad, "timing"),
+        "steady_j": ("timing_cad", engine.steady_j, unit, "J without noise"),
+        "guide_j": ("timing_cad", np.asarray(engine.curve(engine.grid_cad)), unit, "J by the guide"),
+        "optimum_cad": ((), engine.best_cad, cad, "best timing"),
+        "estimate_low_cad": (over, low, cad, "estimate, 10 % of the seeds below"),
+        "estimate_median_cad": (over, median, cad, "estimate, median of the seeds"),
+        "estimate_high_cad": (over, high, cad, "estimate, 10 % of the seeds above"),
+        "lost_j_cycles": (over, lost, unit, "J lost so far, summed over cycles, mean of the seeds"),
+    }
+    return labelled_dataset(variables)
