@@ -29,6 +29,7 @@ constexpr std::int64_t calm_cycles = 10;
 // A hand-over: four doubts within about 80 cycles, or readings that scatter far less than the curve fits.
 constexpr double doubt_memory_cycles = 80.0, doubt_rate_limit = 3.0;
 constexpr double worst_ratio = 0.12, good_ratio = 0.6;  // of the noise seen to what the curve leaves unexplained
+constexpr double little_share = 0.1;                    // of the drop at 0.3 prior_sd, squared
 constexpr double repeat_memory = 0.98;
 constexpr std::int64_t fewest_repeats = 60;
 
@@ -273,8 +274,9 @@ void CurveSeeking::shift_estimate(const Inputs& by) noexcept {
 double CurveSeeking::trust() const noexcept {
   if (plain_at_work_) return 0.0;
   if (repeats_ < fewest_repeats / 2) return 1.0;
-  const double unexplained = filter_.noise_sd() * filter_.noise_sd();
-  return std::clamp((repeat_variance_ / unexplained - worst_ratio) / (good_ratio - worst_ratio), 0.0, 1.0);
+  const double little = little_share * filter_.small_variance();  // what is left of a plant without noise is no misfit
+  const double ratio = (repeat_variance_ + little) / (filter_.unexplained_variance() + little);
+  return std::clamp((ratio - worst_ratio) / (good_ratio - worst_ratio), 0.0, 1.0);
 }
 
 double CurveSeeking::estimate_sd() const noexcept {
