@@ -16,6 +16,7 @@ import pytest
 from mgdd.engine import OperatingPoint
 from mgdd.errors import Error, ParameterError
 from mgdd.guide import FeedForward
+from mgdd.loop import EngineBench, run_seeker
 from mgdd.optimize import (
     BoundedSeeking,
     ComponentLag,
@@ -338,3 +339,13 @@ def test_several_inputs_move_together() -> None:
             ff.at(fuel)
             ff.tell(-0.05 * float(np.sum((ff.ask() - optimum) ** 2)))
     assert ff.feed_forward == pytest.approx([4.0, -8.0])
+
+
+def test_the_loop_judges_the_limits_of_its_seeker() -> None:
+    bench = EngineBench(limits=["p_max_bar"], seed=1)
+    seeker = ExtremumSeeking(start=0.4, lower=-30.0, upper=10.0, limits=[Limit("p_max_bar", 95.0)])
+    guided = FeedForward(seeker, lambda _: 0.0, trust=0.7)
+    assert guided.settings["limits"][0].upper == 95.0
+    assert (guided.settings["amplitude"], guided.settings["trust"]) == (seeker.settings["amplitude"], 0.7)
+    run = run_seeker(bench, guided, 100)
+    assert run.summary["limit_p_max_bar"] == 95.0

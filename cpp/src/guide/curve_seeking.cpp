@@ -17,7 +17,8 @@ using optimize::scalar_input;
 using optimize::TellStatus;
 
 constexpr double prior_share = 0.25;       // of the bounds
-constexpr double amplitude_share = 0.4;    // of prior_sd: the farthest a reading is taken from the estimate
+constexpr double amplitude_share = 0.25;   // of prior_sd: the farthest a reading is taken from the estimate
+constexpr double limit_reach_share = 0.4;  // of prior_sd: where a limit without a curve may have been reached
 constexpr double coarsest_share = 0.1;     // of prior_sd between two places of the filter
 constexpr double point_doubt_share = 0.2;  // of prior_sd: how the guide's error may differ from point to point
 constexpr double lost_share = 0.5;         // the same where the guide says nothing of the new point
@@ -102,7 +103,7 @@ CurveSeeking::CurveSeeking(CurveSeekingSettings settings)
     : settings_(checked(std::move(settings))),
       filter_(filter_settings(settings_), settings_.curve),
       limits_(settings_.limits, settings_.limit_curves, settings_.space.lower[0], settings_.space.upper[0],
-              amplitude_share * settings_.prior_sd, settings_.memory_cycles),
+              limit_reach_share * settings_.prior_sd, settings_.memory_cycles),
       plain_(plain_settings(settings_)),
       estimate_(settings_.space.start),
       applied_(estimate_),

@@ -4,17 +4,20 @@ from __future__ import annotations
 
 import argparse
 import math
+from collections.abc import Iterator
+from contextlib import contextmanager
 from dataclasses import dataclass, replace
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, TypeVar
 
 import numpy as np
 
 from mgdd import presets
 from mgdd._core.engine import Cylinder, OperatingPoint
 from mgdd.cli.options import assignments, refuse_idle
-from mgdd.cli.seekers import Task, make_seeker
+from mgdd.cli.seekers import Task, amplitude_of, make_seeker
 from mgdd.errors import ParameterError
 from mgdd.guide import Curve, CurveSeeking, FeedForward, GuidedEngine, ModelOptimum, OnlineCalibration, TimingMap
+from mgdd.io.parameters import ParameterFile
 from mgdd.optimize import Limit, Optimum
 
 if TYPE_CHECKING:
@@ -40,9 +43,10 @@ CURVES = ("curve", "calibrated")
 _SHAPES = ("model", "parabola")
 _POINT = frozenset(OperatingPoint.fields())
 _PARABOLA_BEND = -0.05  # of ten cycle models, wall heat 0 to 1 and 25 to 60 °CA of burn: -0.037 to -0.054
-_CALIBRATED = ("wall_heat_scale", "burn_duration_scale")
+_CALIBRATED = ("wall_heat_scale",)
 _REACH_CAD = 60.0
 _STEADY_GRID_CAD = 0.1
+_ESTIMATE = {FeedForward: "estimate", GuidedEngine: "seeking.estimate"}  # in their states
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -62,9 +66,9 @@ def add_guidance(parser: argparse.ArgumentParser) -> None:
     group = parser.add_argument_group("guide", "a rough model that leads while the measurements decide")
     group.add_argument(
         "--guide", choices=GUIDES, default="none",
-        help="feed_forward: the model's best timing, the seeker learns the rest; curve: the model's whole curve, placed "
-        "by the measurements; calibrated: the same while the model learns from the measured pressure; map: a table of "
-        "timings as feed-forward (default: none)",
+        help="feed_forward: the model's best timing, the seeker learns the rest; curve: the model's whole curve, "
+        "placed by the measurements; calibrated: the same while the model learns from the measured pressure; map: a "
+        "table of timings as feed-forward (default: none)",
     )  # fmt: skip
     group.add_argument(
         "--guide-preset", metavar="NAME_OR_FILE.toml", help="cylinder of the model (default: that of the bench)"
@@ -88,7 +92,7 @@ def check_guidance(args: argparse.Namespace) -> None:
     if args.guide == "map":
         refuse_idle(args, "guide_preset", "guide_set", "guide_shape", why="--guide map has a table, not a model")
         if args.guide_map is None:
-            raise ParameterError("--guide map needs --guide-map FILE.toml, a table that TimingMap.to_toml wrote")
+            raise ParameterError("--guide map needs --guide-map FILE.toml, a table as TimingMap.to_toml writes it")
     else:
         refuse_idle(args, "guide_map", why=f"--guide {args.guide} has a model, not a table")
     if args.guide in CURVES:
@@ -102,6 +106,7 @@ def check_guidance(args: argparse.Namespace) -> None:
                 f"--guide {args.guide} takes J of the same cycle, and the NOx of the analyser is late: use --sensor "
                 "soft, or --guide feed_forward"
             )
+        refuse_idle(args, "limit_method", why=f"--guide {args.guide} keeps limits in its own way")
     else:
         refuse_idle(args, "guide_shape", why=f"--guide {args.guide} takes one timing, not a curve")
     if args.method == "golden":
@@ -111,7 +116,7 @@ def check_guidance(args: argparse.Namespace) -> None:
 def task_with_guide(args: argparse.Namespace, bench: EngineBench) -> GuidedTask:
     """Make the guide and ask it for the best timing at the point of the bench."""
     if args.guide == "map":
-        table = TimingMap.from_toml(args.guide_map)
+        table = TimingMap.of_file(ParameterFile.read(args.guide_map))
         said = table(bench.point)
         if said is None:
             raise ParameterError(
@@ -137,6 +142,12 @@ def task_with_guide(args: argparse.Namespace, bench: EngineBench) -> GuidedTask:
         curve = model.curve(bench.point)
         if args.guide_shape == "parabola":
             curve = Curve.parabola(curvature=_PARABOLA_BEND, best=best["soc_cad"], reach=_REACH_CAD)
+        if curve is not None and not args.lower_cad <= curve.best <= args.upper_cad:
+            raise ParameterError(
+                f"--guide {args.guide}: the best timing of the model, {curve.best:.3g} °CA aTDC, lies outside of "
+                f"--lower-cad {args.lower_cad:g} to --upper-cad {args.upper_cad:g}: move the bounds, change "
+                "--guide-set, or use --guide feed_forward"
+            )
     return GuidedTask(
         kind=args.guide,
         cylinder=cylinder,
@@ -149,15 +160,33 @@ def task_with_guide(args: argparse.Namespace, bench: EngineBench) -> GuidedTask:
 def _cylinder_of(args: argparse.Namespace, bench: EngineBench) -> Cylinder:
     base: Cylinder = bench.settings["cylinder"]
     if args.guide_preset is not None:
-        base = presets.load(args.guide_preset, kind="engine").cylinder
-    if known := sorted(_POINT & {item.partition("=")[0] for item in args.guide_set}):
-        raise ParameterError(f"--guide-set {known[0]}: belongs to the operating point, which guide and bench share")
-    given = assignments(args.guide_set, Cylinder.fields())
-    return base.replace(**given)
+        with _named("--guide-preset", f"{args.guide_preset}: "):
+            base = presets.load(args.guide_preset, kind="engine").cylinder
+    fields = {**Cylinder.fields(), **OperatingPoint.fields()}
+    with _named("--guide-set"):
+        given = assignments(args.guide_set, fields, "--guide-set")
+        if known := sorted(_POINT & given.keys()):
+            raise ParameterError(f"--guide-set {known[0]}: belongs to the operating point, which guide and bench share")
+        if strange := [name for name in given if name not in fields]:
+            raise ParameterError(
+                f"--guide-set {strange[0]}: is not a field of the cylinder; mgdd.engine.Cylinder has "
+                f"{', '.join(Cylinder.fields())}"
+            )
+        return base.replace(**given)
+
+
+@contextmanager
+def _named(option: str, given: str = "") -> Iterator[None]:
+    """Let errors of the library name the option."""
+    try:
+        yield
+    except ParameterError as error:
+        said = str(error)
+        raise error.reworded(said if said.startswith(option) else f"{option} {given}{said}") from error
 
 
 def guided_seeker(task: Task, guided: GuidedTask) -> Seeker | FeedForward | GuidedEngine:
-    """Make what the loop steers."""
+    """Make what the loop steers; its first cycle runs at the start of the task."""
     if guided.curve is not None:
         limits = [Limit(name, upper) for name, upper in task.limits.items()]
         drawn = guided.model.limit_curves(task.bench.point, list(task.limits)) if guided.model and limits else None
@@ -173,13 +202,26 @@ def guided_seeker(task: Task, guided: GuidedTask) -> Seeker | FeedForward | Guid
             guided.cylinder, parameters=_CALIBRATED, steady_cycles=0, window_cycles=5,
             soc_scatter_cad=float(task.bench.settings["soc_scatter_cad"]),
         )  # fmt: skip
-        return GuidedEngine(seeker, guided.model, task.bench.point, calibration=calibration)
+        return _begun(GuidedEngine(seeker, guided.model, task.bench.point, calibration=calibration), task.start_cad)
     plain = make_seeker(task)
     if guided.table is not None:
-        return FeedForward(plain, guided.table)
+        led = FeedForward(plain, guided.table)
+        led.at(task.bench.point)
+        return _begun(led, task.start_cad)
     if guided.model is None:
         raise ParameterError(f"--guide {guided.kind}: has no model")
-    return GuidedEngine(plain, guided.model, task.bench.point)
+    return _begun(GuidedEngine(plain, guided.model, task.bench.point), task.start_cad)
+
+
+Led = TypeVar("Led", FeedForward, GuidedEngine)
+
+
+def _begun(led: Led, start_cad: float) -> Led:
+    """Begin at that timing: by itself a guide begins at its own best one, which may lie above a limit."""
+    state = led.state
+    state[_ESTIMATE[type(led)]] = [start_cad]
+    led.state = state
+    return led
 
 
 def late_loss(bench: EngineBench, cycles: xr.Dataset, best: Optimum) -> float:
@@ -198,6 +240,10 @@ def late_loss(bench: EngineBench, cycles: xr.Dataset, best: Optimum) -> float:
     return float(best.value - np.mean(np.interp(late, grid, steady)))
 
 
-def with_start(task: Task, guided: GuidedTask) -> Task:
-    """Start at the guide's best timing."""
-    return replace(task, start_cad=guided.guide_cad)
+def with_start(task: Task, guided: GuidedTask) -> tuple[Task, str]:
+    """Start at the guide's best timing, or where the bounds leave room for the dither, and say which."""
+    room = 0.0 if guided.kind in CURVES else amplitude_of(task)
+    low, high = task.bounds_cad
+    start = min(max(guided.guide_cad, low + room), high - room)
+    reason = "best timing of the guide" + ("" if start == guided.guide_cad else ", moved inside of the bounds")
+    return replace(task, start_cad=start), reason

@@ -269,7 +269,7 @@ def _rows_of(
 def refuse_idle(args: argparse.Namespace, *names: str, why: str) -> None:
     """Refuse options that were given and would act on nothing."""
     for name in names:
-        if getattr(args, name, None) is not None:
+        if getattr(args, name, None) not in (None, []):  # a repeatable option that is not given is an empty list
             raise ParameterError(f"{as_option(name)} does not act here; {why}")
 
 
@@ -286,12 +286,12 @@ def number_pairs(items: Sequence[str], option: str) -> dict[str, float]:
     return out
 
 
-def assignments(items: Sequence[str], fields: Mapping[str, Mapping[str, Any]]) -> dict[str, Any]:
-    """Read repeated --set FIELD=VALUE; the caller judges a name that is not a field."""
+def assignments(items: Sequence[str], fields: Mapping[str, Mapping[str, Any]], option: str = "--set") -> dict[str, Any]:
+    """Read repeated FIELD=VALUE of an option; the caller judges a name that is not a field."""
     out: dict[str, Any] = {}
     for item in items:
-        name, value = _pair(item, "--set", "FIELD=VALUE")
-        _once(name, "--set", out)
+        name, value = _pair(item, option, "FIELD=VALUE")
+        _once(name, option, out)
         out[name] = _value(name, value, fields)
     return out
 

@@ -135,9 +135,9 @@ def _seek(args: argparse.Namespace) -> None:
     )
     reason = "default" if args.start_cad is None else "as given"
     if args.start_cad is None and guided is not None:
-        task, reason = with_start(task, guided), "best timing of the guide"
+        task, reason = with_start(task, guided)
     if args.start_cad is None and limits:
-        start, reason = choose_start(task)
+        start, reason = choose_start(task, wanted=reason)
         task = replace(task, start_cad=start)
     with _option_names():
         seeker = make_seeker(task) if guided is None else guided_seeker(task, guided)
@@ -272,7 +272,7 @@ def _payload(
     }
     if args.method == "extremum_seeking":
         out["form"] = args.form or "batch"
-    if limits:
+    if limits and args.guide not in CURVES:
         out["limit_method"] = args.limit_method or "switching"
     return out
 

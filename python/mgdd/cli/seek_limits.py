@@ -21,17 +21,20 @@ _START_MARGIN = 0.1  # of a limit
 _SCAN_CAD = 0.1
 
 
-def choose_start(task: Task) -> tuple[float, str]:
-    """Choose a start whose noise-free values, dither included, stay below the limits by a margin, and say why."""
+def choose_start(task: Task, *, wanted: str = "default") -> tuple[float, str]:
+    """Choose a start whose noise-free values, dither included, stay below the limits by a margin, and say why.
+
+    The start of the task is taken where it does; `wanted` says what it is.
+    """
     if task.method == "golden":
-        return task.start_cad, "default; golden section tries the whole range, wherever it starts"
+        return task.start_cad, f"{wanted}; golden section tries the whole range, wherever it starts"
     low, high = task.bounds_cad
     amplitude = amplitude_of(task)
     timings = np.linspace(low, high, max(2, round((high - low) / _SCAN_CAD) + 1))
     excess = _excess(task, timings)
     starts = timings[(timings >= low + amplitude - 1e-9) & (timings <= high - amplitude + 1e-9)]
     if excess is None or starts.size == 0:
-        return task.start_cad, "default; no limit has a noise-free value to choose by"
+        return task.start_cad, f"{wanted}; no limit has a noise-free value to choose by"
 
     def worst(start: float) -> float:
         return float(np.max(excess[np.abs(timings - start) <= amplitude + 1e-9]))
@@ -40,7 +43,7 @@ def choose_start(task: Task) -> tuple[float, str]:
         f" over ±{amplitude:g} °CA" if amplitude else ""
     )
     if starts[0] <= task.start_cad <= starts[-1] and worst(task.start_cad) <= 0.0:
-        return task.start_cad, f"default; the {below}"
+        return task.start_cad, f"{wanted}; the {below}"
     found = np.array([worst(start) for start in starts])
     kept = found <= 0.0
     if kept[-1]:

@@ -256,6 +256,11 @@ class FeedForward(_core.guide.FeedForward):
         return history_dataset(self._rows, self.estimate.size, self._made_of[0].kind)
 
     @property
+    def settings(self) -> dict[str, Any]:
+        """What it was made of: those of the seeker, and its own."""
+        return {**self._made_of[1], **self._options}
+
+    @property
     def seeker(self) -> Seeker:
         """The seeker as it stands now, with its history: a copy."""
         kind, settings = self._made_of

@@ -52,7 +52,7 @@ std::optional<OnlineCalibration> calibration() {
 loop::EngineBench bench_at(std::vector<loop::ScheduledPoint> schedule, std::uint64_t seed) {
   loop::BenchSettings s;
   s.schedule = std::move(schedule);
-  s.pressure_noise_bar = 0.2;
+  s.pressure_noise_bar = 0.05;
   s.seed = seed;
   return loop::EngineBench(s);
 }

@@ -1,0 +1,173 @@
+"""`mgdd engine seek --guide`: where a guided run starts, what it reports, and what is wrong with an option."""
+
+from __future__ import annotations
+
+import csv
+import json
+from pathlib import Path
+
+import pytest
+
+from mgdd.cli import main
+from mgdd.guide import TimingMap
+from mgdd.loop import EngineBench
+
+KINDS = ("feed_forward", "curve", "calibrated", "map")
+ROUGH = ("--guide-set", "wall_heat_scale=0.8", "--guide-set", "burn_duration_ref_cad=45")
+FIELDS = {"guide", "guide_cad", "cycles_stays_1_5_cad", "late_loss_percent", "estimate_sd_cad", "trust"}
+OPTIMUM_CAD, LIMITED_CAD = -5.63, -3.08
+
+
+@pytest.fixture
+def table(tmp_path: Path) -> Path:
+    file = tmp_path / "timing.toml"
+    made = TimingMap({"speed_rpm": [900, 1500, 3000], "fuel_mg": [6, 20, 40]}, -9.0)
+    file.write_text(made.to_toml(), encoding="utf-8")
+    return file
+
+
+def seek(capsys: pytest.CaptureFixture[str], *argv: str) -> dict[str, object]:
+    code = main(["engine", "seek", *argv, "--json"])
+    captured = capsys.readouterr()
+    assert code == 0, captured.err
+    return json.loads(captured.out)
+
+
+def refused(capsys: pytest.CaptureFixture[str], *argv: str, code: int = 2) -> str:
+    assert main(["engine", "seek", *argv]) == code
+    captured = capsys.readouterr()
+    assert captured.out == ""
+    return captured.err
+
+
+def options(kind: str, table: Path) -> tuple[str, ...]:
+    return ("--guide", "map", "--guide-map", str(table)) if kind == "map" else ("--guide", kind, *ROUGH)
+
+
+def first_timing(file: Path) -> float:
+    with file.open(encoding="utf-8") as stream:
+        return float(next(csv.DictReader(line for line in stream if not line.startswith("#")))["soc_requested_cad"])
+
+
+def test_without_a_guide_nothing_is_guided(capsys: pytest.CaptureFixture[str]) -> None:
+    out = seek(capsys, "--cycles", "600")
+    assert out.keys() >= FIELDS
+    assert (out["guide"], out["guide_cad"], out["estimate_sd_cad"], out["trust"]) == ("none", None, None, None)
+    assert "guide_shape" not in out
+    assert out == seek(capsys, "--cycles", "600", "--guide", "none")
+
+
+@pytest.mark.parametrize("kind", KINDS)
+def test_every_kind_reports_what_the_guide_did(kind: str, capsys: pytest.CaptureFixture[str], table: Path) -> None:
+    out = seek(capsys, *options(kind, table), "--cycles", "600", "--seed", "3")
+    assert out.keys() >= FIELDS
+    assert (out["guide"], out["start_reason"]) == (kind, "best timing of the guide")
+    assert out["start_cad"] == out["guide_cad"]
+    assert out["guide_cad"] == pytest.approx(-9.0 if kind == "map" else -9.87, abs=0.1)
+    assert abs(out["guide_cad"] - OPTIMUM_CAD) > 2.0  # a rough guide, on which the measurements improve
+    assert out["final_cad"] == pytest.approx(OPTIMUM_CAD, abs=1.2)
+    assert 0.0 < out["late_loss_percent"] < 0.1
+    assert 0.0 <= out["trust"] <= 1.0
+    if kind in ("curve", "calibrated"):
+        assert out["guide_shape"] == "model"
+        assert out["cycles_to_1_cad"] <= 15
+        assert out["cycles_stays_1_5_cad"] is not None
+        assert 0.2 < out["estimate_sd_cad"] < 1.0
+        assert out["method"] is None
+    else:
+        assert out["estimate_sd_cad"] is None
+        assert out["method"] == "extremum_seeking"
+    if kind == "calibrated":
+        assert out["guide_wall_heat_scale"] == pytest.approx(0.5, rel=0.05)  # the bench has 0.5
+
+
+def test_a_plain_parabola_guides_as_well(capsys: pytest.CaptureFixture[str]) -> None:
+    out = seek(capsys, "--guide", "curve", *ROUGH, "--guide-shape", "parabola", "--cycles", "600")
+    assert out["guide_shape"] == "parabola"
+    assert out["final_cad"] == pytest.approx(OPTIMUM_CAD, abs=1.0)
+
+
+def test_another_engine_can_be_the_guide(capsys: pytest.CaptureFixture[str]) -> None:
+    out = seek(capsys, "--guide", "curve", "--guide-preset", "hd_diesel_128x144", "--cycles", "600")
+    assert out["preset"] == "puma_single"
+    assert abs(out["guide_cad"] - OPTIMUM_CAD) > 0.2
+    assert out["final_cad"] == pytest.approx(OPTIMUM_CAD, abs=1.0)
+
+
+@pytest.mark.parametrize("kind", KINDS)
+def test_a_guided_run_starts_below_the_limit(
+    kind: str, capsys: pytest.CaptureFixture[str], table: Path, tmp_path: Path
+) -> None:
+    file = tmp_path / "run.csv"
+    limited = ("--guide", kind) if kind != "map" else options(kind, table)  # an exact model: over the limit at its best
+    out = seek(capsys, *limited, "--limit", "p_max_bar=95", "-o", str(file))
+    assert out.keys() >= FIELDS
+    assert out["warnings"] == []
+    assert first_timing(file) == pytest.approx(out["start_cad"], abs=1.0 + 1e-9)  # the dither
+    own = out["limit_report"]["p_max_bar"]
+    assert own["noise_free"]["worst"] < 97.0  # at the guide's own best timing 105.6
+    assert own["judged_above_threshold_fraction"] < 0.01
+    assert out["optimum_cad"] == pytest.approx(LIMITED_CAD, abs=0.01)
+    assert -0.1 < out["final_cad"] - LIMITED_CAD < 1.25
+
+
+@pytest.mark.parametrize("kind", KINDS)
+def test_the_start_is_that_of_the_user(
+    kind: str, capsys: pytest.CaptureFixture[str], table: Path, tmp_path: Path
+) -> None:
+    file = tmp_path / "run.csv"
+    out = seek(capsys, *options(kind, table), "--start-cad", "-18", "--cycles", "50", "-o", str(file))
+    assert (out["start_cad"], out["start_reason"]) == (-18.0, "as given")
+    assert first_timing(file) == pytest.approx(-18.0, abs=1.0 + 1e-9)
+
+
+@pytest.mark.parametrize(
+    ("argv", "said"),
+    [
+        ("--guide-preset puma_single", "--guide-preset does not act here; --guide none has no model"),
+        ("--guide-set wall_heat_scale=1", "--guide-set does not act here; --guide none has no model"),
+        ("--guide-shape parabola", "--guide-shape does not act here; --guide none has no model"),
+        ("--guide-map x.toml", "--guide-map does not act here; --guide none has no model"),
+        ("--guide map", "--guide map needs --guide-map FILE.toml"),
+        ("--guide map --guide-map none.toml", "none.toml"),
+        ("--guide map --guide-map x.toml --guide-set wall_heat_scale=1", "--guide-set does not act here; --guide map"),
+        ("--guide curve --guide-map x.toml", "--guide-map does not act here; --guide curve has a model"),
+        ("--guide feed_forward --guide-shape model", "--guide-shape does not act here; --guide feed_forward takes one"),
+        ("--guide curve --method spsa", "--method acts with --guide none, feed_forward or map"),
+        ("--guide calibrated --form batch", "--form acts with --guide none, feed_forward or map"),
+        ("--guide curve --sensor analyser", "use --sensor soft, or --guide feed_forward"),
+        ("--guide feed_forward --method golden", "--method golden searches its whole bracket"),
+        ("--guide curve --guide-set foo=1", "--guide-set foo: is not a field of the cylinder"),
+        ("--guide curve --guide-set wall_heat_scale", "--guide-set wall_heat_scale: write FIELD=VALUE"),
+        ("--guide curve --guide-set bore_mm=90 --guide-set bore_mm=91", "--guide-set bore_mm is given twice"),
+        ("--guide curve --guide-set wall_heat_scale=-1", "--guide-set wall_heat_scale = -1: must be in [0, 100]"),
+        ("--guide curve --guide-set wall_heat_scale=much", "--guide-set wall_heat_scale = 'much': must be a number"),
+        ("--guide curve --guide-set speed_rpm=3000", "--guide-set speed_rpm: belongs to the operating point"),
+        ("--guide curve --guide-set speed-rpm=3000", "--guide-set speed_rpm: belongs to the operating point"),
+        ("--guide curve --guide-preset nowhere", "--guide-preset nowhere: no preset 'nowhere'"),
+        ("--guide curve --lower-cad 5", "--guide curve: the best timing of the model, -5.6"),
+        (
+            "--guide curve --limit p_max_bar=95 --limit-method penalty",
+            "--limit-method does not act here; --guide curve",
+        ),
+    ],
+)
+def test_what_cannot_guide_is_refused_with_the_remedy(argv: str, said: str, capsys: pytest.CaptureFixture[str]) -> None:
+    assert said in refused(capsys, *argv.split())
+
+
+def test_a_table_that_ends_before_the_point_is_refused(capsys: pytest.CaptureFixture[str], table: Path) -> None:
+    said = refused(capsys, "--guide", "map", "--guide-map", str(table), "--speed-rpm", "3500")
+    assert "its axes end before" in said
+
+
+def test_the_guide_of_a_limited_run_is_the_best_without_the_limit(capsys: pytest.CaptureFixture[str]) -> None:
+    best = EngineBench().find_optimum()
+    for kind in ("feed_forward", "curve"):
+        out = seek(capsys, "--guide", kind, "--limit", "p_max_bar=95", "--cycles", "50")
+        assert out["guide_cad"] == pytest.approx(best["soc_cad"], abs=0.05)
+
+
+def test_a_feed_forward_beyond_the_bounds_starts_inside(capsys: pytest.CaptureFixture[str]) -> None:
+    out = seek(capsys, "--guide", "feed_forward", "--lower-cad", "-4", "--cycles", "50")
+    assert (out["start_cad"], out["start_reason"]) == (-3.0, "best timing of the guide, moved inside of the bounds")
