@@ -25,7 +25,10 @@ def test_cells_are_compared_one_by_one() -> None:
     none = Plane(name="none", cycles=np.array([[50.0, 0.0]]), lost=np.array([[20.0, 2.0]]))
     own = Plane(name="own", cycles=np.array([[10.0, 2.0]]), lost=np.array([[5.0, 2.5]]))
     row = plane_row(own, none)
-    assert (row["cells"], row["cells_slower"], row["worst_cost_over_unguided"]) == (2, 1, 1.25)
+    assert (row["cells"], row["cells_slower"], row["cells_costlier"]) == (2, 1, 1)
+    assert row["worst_cost_over_unguided"] == 1.25
+    near = Plane(name="near", cycles=np.array([[60.0, 0.0]]), lost=np.array([[20.1, 2.01]]))  # half a percent more
+    assert (plane_row(near, none)["cells_slower"], plane_row(near, none)["cells_costlier"]) == (1, 0)
     assert (row["mean_cycles"], row["mean_cycles_saved"]) == (6.0, 19.0)
     assert row["lost_over_unguided"] == pytest.approx(7.5 / 22.0)
 
@@ -60,8 +63,10 @@ def test_plane_few_cells(result: StudyResult) -> None:
     rows = {row["guide"]: row for row in result.summary["plane"]}
     assert rows["none"]["mean_cycles_saved"] == 0.0
     assert rows["wall heat +30 %"]["mean_cycles_saved"] > 30.0
+    good = [rows[name] for name in ("wall heat -30 %", "wall heat +30 %", "duration -15 %")]
     assert [bar["met"] for bar in result.summary["bars"]] == [
-        all(rows[name]["cells_slower"] == 0 for name in ("wall heat -30 %", "wall heat +30 %", "duration -15 %")),
+        all(row["cells_slower"] == 0 for row in good),
+        all(row["cells_costlier"] == 0 for row in good),
         rows["adiabatic"]["worst_cost_over_unguided"] <= 1.2,
     ]
 

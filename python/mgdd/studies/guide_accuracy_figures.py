@@ -47,6 +47,8 @@ def draw(dataset: xr.Dataset) -> dict[str, Figure]:
             ax.grid(alpha=0.3)
         for ax in axes.flat[len(cases) :]:
             ax.remove()
+        for ax in axes.flat[len(cases) - 2 : len(cases)]:
+            ax.tick_params(labelbottom=True)
         figure.supylabel("error of the estimate [°CA]", fontsize="medium")
         figure.supxlabel("engine cycle [-]", fontsize="medium")
         out["Unannounced trouble, curve-guided: median error of the estimate and the band of 80 % of the seeds"] = (

@@ -57,16 +57,16 @@ def _plane(dataset: xr.Dataset) -> Figure:
     from matplotlib.figure import Figure
 
     names = [str(name) for name in dataset["plane_guide"].to_numpy()][1:]
-    figure = Figure(figsize=(11.0, 3.4), layout="constrained")
+    figure = Figure(figsize=(12.5, 3.8), layout="constrained")
     lost = dataset["plane_lost"].to_numpy()
     speeds, fuels = dataset["plane_speed_rpm"].to_numpy(), dataset["plane_fuel_mg"].to_numpy()
     axes = figure.subplots(1, max(len(names), 1), sharey=True, squeeze=False)[0]
     for ax, name, own in zip(axes, names, lost[1:], strict=False):
         shares = own / lost[0]
-        mesh = ax.pcolormesh(speeds, fuels, shares.T, cmap="cividis_r", vmin=0.0, vmax=1.2, shading="nearest")
+        mesh = ax.pcolormesh(speeds, fuels, shares.T, cmap="cividis_r", vmin=0.0, vmax=1.4, shading="nearest")
         for i, j in np.ndindex(*shares.shape):
             color = "white" if shares[i, j] > 0.6 else "black"
-            ax.text(speeds[i], fuels[j], f"{shares[i, j]:.2f}", ha="center", va="center", fontsize=5.5, color=color)
+            ax.text(speeds[i], fuels[j], f"{shares[i, j]:.2f}", ha="center", va="center", fontsize=6.0, color=color)
         ax.set_title(name, loc="left", fontsize="small")
         ax.set_xlabel("speed [rpm]")
     axes[0].set_ylabel("fuel [mg]")
