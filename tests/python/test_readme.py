@@ -41,25 +41,6 @@ def test_table_of_the_demo() -> None:
     assert written == computed
 
 
-def test_tables_of_the_guided_start() -> None:
-    manual = (ROOT / "docs" / "studies.md").read_text(encoding="utf-8")
-    found = run_study("guided", figures=False).summary["rows"]
-    for page, names in (
-        (README, {"cycles_to_1_cad": "g", "lost_j_cycles": ".1f", "late_loss": ".3f"}),
-        (manual, {"cycles_to_1_cad": "g", "cycles_stays_1_5_cad": "g", "lost_j_cycles": ".1f", "late_loss": ".3f"}),
-    ):
-        table = page.split("<!-- numbers: guided -->")[1].split("<!-- end numbers -->")[0].replace("−", "-")
-        written = [line for line in table.splitlines() if line.startswith("| ")][1 if page is README else 2 :]
-        cells = []
-        for row in found:
-            own = [f"{row[name]:{form}}" for name, form in names.items()]
-            if page is manual:
-                ends = [f" [{row[f'{n}_low']:{form}}, {row[f'{n}_high']:{form}}]" for n, form in names.items()]
-                own = [f"{row['start_cad']:.1f}", *(one + end for one, end in zip(own, ends, strict=True))]
-            cells.append(f"| {' | '.join([row['case'], *own])} |")
-        assert written == cells
-
-
 def test_pictures_and_links_exist() -> None:
     targets = re.findall(r"\]\((?!https?:)([^)#]+)\)", README)
     assert targets
