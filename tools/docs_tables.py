@@ -35,7 +35,9 @@ __all__ = [
     "esc_tests",
     "gamma",
     "golden",
+    "guided",
     "guided_plane",
+    "guided_start",
     "ignition",
     "integrators",
     "learning",
@@ -344,6 +346,16 @@ def _with_ends(row: Mapping[str, Any], *names: str) -> list[float]:
 def seekers() -> Rows:
     names = ("cycles_to_1_cad", "rms_cad", "final_cad", "j_lost")
     return {f"{row['seeker']} {row['settings']}": _with_ends(row, *names) for row in study("seeker-comparison")["rows"]}
+
+
+def guided() -> Rows:
+    names = ("cycles_to_1_cad", "cycles_stays_1_5_cad", "lost_j_cycles", "late_loss")
+    return {row["case"]: [row["start_cad"], *_with_ends(row, *names)] for row in study("guided")["rows"]}
+
+
+def guided_start() -> Rows:
+    names = ("cycles_to_1_cad", "lost_j_cycles", "late_loss")
+    return {row["case"]: [float(row[name]) for name in names] for row in study("guided")["rows"]}
 
 
 def learning() -> Rows:

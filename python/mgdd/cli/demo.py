@@ -1,4 +1,4 @@
-"""`mgdd demo`: the main job on the measured traces of the package."""
+"""`mgdd demo`: the main job on the measured traces of the package, and a guided start beside an unguided one."""
 
 from __future__ import annotations
 
@@ -14,6 +14,13 @@ from mgdd.studies.sections import Table
 
 __all__ = ["add"]
 
+_GUIDED = {
+    "unguided": "extremum seeking, unguided",
+    "feed_forward": "extremum seeking from the model's timing",
+    "curve": "guided by the model's curve",
+    "parabola": "guided by a parabola",
+}
+
 
 def add(commands: Any) -> None:
     """Add the command."""
@@ -21,7 +28,7 @@ def add(commands: Any) -> None:
         commands,
         "demo",
         run,
-        help_text="read, analyse and calibrate four measured traces, find their best timing, write a report",
+        help_text="calibrate four measured traces, find their best timing, write a report; run a guided seeker",
         example="mgdd demo",
     )
     parser.add_argument("--folder", default="mgdd-report", help="folder of the report (default: mgdd-report)")
@@ -34,7 +41,9 @@ def run(args: argparse.Namespace) -> None:
     result = run_study("measured-traces", progress=step)
     step("write the report")
     page = write_report(result, Path(args.folder))
-    emit(args, result.summary, text=_text(result.summary, page))
+    guided = run_study("guided", quick=True, figures=False, progress=step).summary
+    text = [*_text(result.summary, page), *_guided_text(guided)]
+    emit(args, {**result.summary, "guided": guided}, text=text)
 
 
 def _text(summary: Any, page: Path) -> list[str | Table]:
@@ -66,6 +75,26 @@ def _text(summary: Any, page: Path) -> list[str | Table]:
             "Positive moves are later."
         ),
         f"Every model's answer, and what to distrust: {page}",
+    ]
+
+
+def _guided_text(summary: Any) -> list[str | Table]:
+    columns = ("seeker", "start [CAD]", "cycles to 1 CAD", "lost in 100 cycles [% x cycles]", "late loss [%]")
+    rows = [
+        (
+            _GUIDED[row["case"]], f"{row['start_cad']:.1f}", f"{row['cycles_to_1_cad']:g}",
+            f"{row['lost_j_cycles']:.1f}", f"{row['late_loss']:.3f}",
+        )
+        for row in summary["rows"]
+    ]  # fmt: skip
+    return [
+        (
+            "\nThe other half needs no trace: a seeker looks for the best timing on the virtual bench, "
+            f"{summary['optimum_cad']:.1f} °CA aTDC.\nA model with twice the wall heat says "
+            f"{summary['guide_cad']:.1f}; medians and means of {summary['seeds']} seeds:\n"
+        ),
+        Table(columns=columns, rows=tuple(rows)),
+        "\nMore seeds: mgdd study guided. One run: mgdd engine seek --guide curve --guide-set wall_heat_scale=1.0",
     ]
 
 
