@@ -22,7 +22,7 @@ from mgdd.identify.engine.timing_records import BestTiming
 from mgdd.io import pressure_trace
 from mgdd.loop import EngineBench
 from mgdd.results.labels import ANGLE, VARIABLES
-from mgdd.studies import guided_plane as guided
+from mgdd.studies import guided_plane as plane_study
 from mgdd.studies import run_study
 from mgdd.studies.guide_cases import SteadyMap
 
@@ -364,14 +364,14 @@ def learning() -> Rows:
 
 
 def guided_plane() -> Rows:
-    speeds, fuels = guided.SPEEDS_RPM, guided.FUELS_MG
+    speeds, fuels = plane_study.SPEEDS_RPM, plane_study.FUELS_MG
     maps = [
         [SteadyMap.of(EngineBench(point=OperatingPoint(speed_rpm=float(n), fuel_mg=float(m)))) for m in fuels]
         for n in speeds
     ]
-    planes = [guided.run_plane(name, maps) for name in ("none", *guided.PLANE_GUIDES)]
+    planes = [plane_study.run_plane(name, maps) for name in ("none", *plane_study.PLANE_GUIDES)]
     names = ("cells_slower", "cells_costlier", "worst_cost_over_unguided", "mean_cycles", "mean_cycles_saved")
-    rows = [guided.plane_row(plane, planes[0]) for plane in planes]
+    rows = [plane_study.plane_row(plane, planes[0]) for plane in planes]
     return {row["guide"]: [float(row[name]) for name in (*names, "lost_over_unguided")] for row in rows}
 
 
