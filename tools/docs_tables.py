@@ -22,7 +22,9 @@ from mgdd.identify.engine.timing_records import BestTiming
 from mgdd.io import pressure_trace
 from mgdd.loop import EngineBench
 from mgdd.results.labels import ANGLE, VARIABLES
+from mgdd.studies import guided_plane as guided
 from mgdd.studies import run_study
+from mgdd.studies.guide_cases import SteadyMap
 
 __all__ = [
     "burn_laws",
@@ -33,7 +35,8 @@ __all__ = [
     "esc_tests",
     "gamma",
     "golden",
-    "guided",
+    "guided_bench",
+    "guided_plane",
     "guided_start",
     "ignition",
     "integrators",
@@ -345,7 +348,7 @@ def seekers() -> Rows:
     return {f"{row['seeker']} {row['settings']}": _with_ends(row, *names) for row in study("seeker-comparison")["rows"]}
 
 
-def guided() -> Rows:
+def guided_bench() -> Rows:
     names = ("cycles_to_1_cad", "cycles_stays_1_5_cad", "lost_j_cycles", "late_loss")
     return {row["case"]: [row["start_cad"], *_with_ends(row, *names)] for row in study("guided")["rows"]}
 
@@ -358,6 +361,18 @@ def guided_start() -> Rows:
 def learning() -> Rows:
     names = ("sigma_max", "first_rms_cad", "third_rms_cad", "last_rms_cad")
     return {f"`{row['law']}`": _with_ends(row, *names) for row in study("seeker-comparison")["iterative_learning"]}
+
+
+def guided_plane() -> Rows:
+    speeds, fuels = guided.SPEEDS_RPM, guided.FUELS_MG
+    maps = [
+        [SteadyMap.of(EngineBench(point=OperatingPoint(speed_rpm=float(n), fuel_mg=float(m)))) for m in fuels]
+        for n in speeds
+    ]
+    planes = [guided.run_plane(name, maps) for name in ("none", *guided.PLANE_GUIDES)]
+    names = ("cells_slower", "cells_costlier", "worst_cost_over_unguided", "mean_cycles", "mean_cycles_saved")
+    rows = [guided.plane_row(plane, planes[0]) for plane in planes]
+    return {row["guide"]: [float(row[name]) for name in (*names, "lost_over_unguided")] for row in rows}
 
 
 def sensors() -> Rows:

@@ -1,6 +1,7 @@
 """Draw the figures of docs/studies.md: one or two of each study.
 
-Run `python tools/study_figures.py [FOLDER]` with the package installed; FOLDER defaults to docs/_static.
+Run `python tools/study_figures.py [FOLDER [STUDY ...]]` with the package installed; FOLDER defaults to docs/_static,
+the studies to all of them.
 """
 
 from __future__ import annotations
@@ -20,6 +21,10 @@ FIGURES = {
     "study_delay.png": ("sensor-delay", 0, 90),
     "study_cures.png": ("sensor-delay", 1, 90),
     "study_tests.png": ("timing-tests", 3, 80),
+    "study_guide_curve.png": ("guided-start-up", 1, 72),
+    "study_guide_step.png": ("guide-accuracy", 0, 72),
+    "study_guide_drive.png": ("guided-transients", 0, 80),
+    "study_guide_plane.png": ("guided-transients", 1, 72),
 }
 
 
@@ -28,8 +33,9 @@ def main() -> None:
     mpl.use("Agg")
     out = Path(sys.argv[1]) if len(sys.argv) > 1 else OUT
     mpl.rcParams["font.size"] = 9.5
-    results = {name: run_study(name) for name, _, _ in FIGURES.values()}
-    for file, (name, number, dpi) in FIGURES.items():
+    wanted = {file: figure for file, figure in FIGURES.items() if figure[0] in sys.argv[2:] or len(sys.argv) < 3}
+    results = {name: run_study(name) for name in {name for name, _, _ in wanted.values()}}
+    for file, (name, number, dpi) in wanted.items():
         figure = list(results[name].figures.values())[number]
         figure.savefig(out / file, dpi=dpi, metadata={"Software": None})
         print(file, (out / file).stat().st_size // 1024, "kB")

@@ -14,7 +14,7 @@ import importlib.metadata
 import math
 import time
 from collections import deque
-from collections.abc import Callable
+from collections.abc import Callable, Mapping
 from typing import Protocol
 
 import numpy as np
@@ -65,10 +65,10 @@ def null_time_us(contender: Contender, start: float, evaluations: int) -> float:
     return (time.process_time() - begin) / evaluations * 1e6
 
 
-def installed() -> dict[str, str | None]:
+def installed(packages: Mapping[str, str] = PACKAGES) -> dict[str, str | None]:
     """Package to its version; None where it is missing."""
     found: dict[str, str | None] = {}
-    for package in PACKAGES.values():
+    for package in packages.values():
         try:
             found[package] = importlib.metadata.version(package)
         except importlib.metadata.PackageNotFoundError:

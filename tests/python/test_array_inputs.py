@@ -13,7 +13,7 @@ import pytest
 import xarray as xr
 
 import mgdd
-from mgdd import identify, io, optimize, signals, surrogate, throttle
+from mgdd import guide, identify, io, optimize, signals, surrogate, throttle
 from mgdd.engine import Cylinder, OperatingPoint, fit_nox_proxy, timing_sweep
 from mgdd.io.checks import check_trace
 from mgdd.loop import EngineBench
@@ -112,6 +112,39 @@ def many(duty: Any, time: Any, start: Any, supply: Any, air: Any) -> Any:
     )["angle_deg"].to_numpy()
 
 
+def pressure() -> Array:
+    bench = EngineBench(soc_scatter_cad=0.0)
+    bench.step(-6.0)
+    return bench.pressure()[1]
+
+
+def calibrated(trace: Any) -> Any:
+    calibration = guide.OnlineCalibration(Cylinder(wall_heat_scale=1.0), window_cycles=2, steady_cycles=0)
+    statuses = [calibration.offer(trace, OperatingPoint(), -6.0) for _ in range(3)]
+    calibration.update()
+    return [calibration.cylinder.wall_heat_scale, statuses.count("accepted")]
+
+
+def guided(trace: Any) -> Any:
+    rough, point = Cylinder(wall_heat_scale=1.0), OperatingPoint()
+    calibration = guide.OnlineCalibration(rough, window_cycles=2, steady_cycles=0)
+    seeker = optimize.ExtremumSeeking(start=-6.0, lower=-30.0, upper=10.0)
+    engine = guide.GuidedEngine(seeker, guide.ModelOptimum(rough), point, calibration=calibration)
+    for _ in range(3):
+        engine.ask()
+        engine.tell(56.0, pressure_bar=trace)
+    return [engine.cylinder.wall_heat_scale, *engine.estimate]
+
+
+def mapped(fuel: Any, timing: Any) -> Any:
+    return guide.TimingMap({"fuel_mg": fuel}, timing).lookup({"fuel_mg": 21.0}).timing_cad
+
+
+def mapped_by_guide(fuel: Any) -> Any:
+    table = guide.TimingMap.of_guide(lambda point: -0.3 * point.fuel_mg, {"fuel_mg": fuel}, make=OperatingPoint)
+    return table.lookup({"fuel_mg": 21.0}).timing_cad
+
+
 def log() -> xr.Dataset:
     return io.throttle_log(TIME, DUTY, ANGLE)
 
@@ -121,6 +154,10 @@ CALLS: dict[str, tuple[Call, tuple[Array, ...]]] = {
     "engine.timing_sweep": (
         lambda soc: timing_sweep(Cylinder(), OperatingPoint(), soc_cad=soc)["imep_gross_bar"].to_numpy(), (SOC,),
     ),
+    "guide.GuidedEngine.tell": (guided, (pressure(),)),
+    "guide.OnlineCalibration.offer": (calibrated, (pressure(),)),
+    "guide.TimingMap.__init__": (mapped, (np.array([6.0, 20.0, 40.0]), np.array([-2.0, -6.0, -11.0]))),
+    "guide.TimingMap.of_guide": (mapped_by_guide, (np.array([6.0, 20.0, 40.0]),)),
     "identify.OnlineUpdate.update": (updated, (DUTY, ANGLE)),
     "identify.fit_ode": (fitted, (TIME, DUTY, ANGLE, np.array([8.0]))),
     "identify.SmoothThrottle.fit": (smooth, (DUTY, ANGLE, 1.05 * TEN, 0.1 * TEN, 10.0 * TEN)),

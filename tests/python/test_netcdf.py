@@ -17,7 +17,7 @@ import xarray as xr
 import mgdd
 from mgdd import datasets, identify, optimize, presets, signals, surrogate
 from mgdd.engine import Cylinder, OperatingPoint, analyze, convergence, sensitivities, simulate, timing_sweep
-from mgdd.guide import FeedForward, TimingMap
+from mgdd.guide import FeedForward, GuidedEngine, ModelOptimum, OnlineCalibration, TimingMap
 from mgdd.identify.throttle.validation import ThrottleValidation
 from mgdd.io import pressure_trace, read_pressure, read_throttle_log, throttle_log, write_throttle_log
 from mgdd.loop import EngineBench, monte_carlo, run_seeker
@@ -78,6 +78,22 @@ def guided() -> FeedForward:
     return ff
 
 
+def guided_engine() -> GuidedEngine:
+    bench, model = EngineBench(), ModelOptimum(Cylinder())
+    engine = GuidedEngine(optimize.ExtremumSeeking(start=-6.0, lower=-30.0, upper=10.0), model, bench.point)
+    run_seeker(bench, engine, 3)
+    return engine
+
+
+def taught() -> OnlineCalibration:
+    bench, calibration = EngineBench(), OnlineCalibration(Cylinder(), window_cycles=2, steady_cycles=0)
+    for _ in range(3):
+        soc_cad = bench.step(-6.0)["soc_cad"]
+        calibration.offer(bench.pressure()[1], bench.point, soc_cad)
+        calibration.update()
+    return calibration
+
+
 def validation() -> ThrottleValidation:
     model = identify.FirstPrincipleModel()
     return identify.validate_throttle(model, log())
@@ -127,6 +143,8 @@ MADE: dict[str, Callable[[Path], Any]] = {
     "results.Fit.run": lambda _: identify.fit_first_principle(log(), options=optimize.FitOptions(n_starts=1)).run,
     "throttle.PseudoWiener.predict": lambda _: PseudoWiener("pw_r").predict(log(), 5),
     "guide.FeedForward.history": lambda _: guided().history,
+    "guide.GuidedEngine.history": lambda _: guided_engine().history,
+    "guide.OnlineCalibration.history": lambda _: taught().history,
     "guide.TimingMap.to_dataset": lambda _: TimingMap({"fuel_mg": [6.0, 20.0]}, -5.0).to_dataset(),
     "identify.design_excitation": lambda _: identify.design_excitation("chirp", Throttle())[0],
     "surrogate.random_step_records": lambda _: surrogate.random_step_records(50),

@@ -173,7 +173,9 @@ void CurveFilter::judge() noexcept {
   mean_ = settings_.lower + mean;
   spread_ = std::sqrt(std::max(0.0, square - mean * mean));
   scale_ = (sums_[share] * sums_[own_scale]).sum();
-  variance_ = (sums_[share] * residual).sum() / counts;
+  const double left = (sums_[share] * residual).sum();
+  variance_ = left / counts;
+  unexplained_ = count_ > 1.0 ? std::max(0.0, left - guess_counts * guess) / count_ : 0.0;
 }
 
 CurveFilter::Prediction CurveFilter::predict(double input) const noexcept {

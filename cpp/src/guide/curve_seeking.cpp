@@ -17,7 +17,8 @@ using optimize::scalar_input;
 using optimize::TellStatus;
 
 constexpr double prior_share = 0.25;       // of the bounds
-constexpr double amplitude_share = 0.4;    // of prior_sd: the farthest a reading is taken from the estimate
+constexpr double amplitude_share = 0.25;   // of prior_sd: the farthest a reading is taken from the estimate
+constexpr double limit_reach_share = 0.4;  // of prior_sd: where a limit without a curve may have been reached
 constexpr double coarsest_share = 0.1;     // of prior_sd between two places of the filter
 constexpr double point_doubt_share = 0.2;  // of prior_sd: how the guide's error may differ from point to point
 constexpr double lost_share = 0.5;         // the same where the guide says nothing of the new point
@@ -28,6 +29,7 @@ constexpr std::int64_t calm_cycles = 10;
 // A hand-over: four doubts within about 80 cycles, or readings that scatter far less than the curve fits.
 constexpr double doubt_memory_cycles = 80.0, doubt_rate_limit = 3.0;
 constexpr double worst_ratio = 0.12, good_ratio = 0.6;  // of the noise seen to what the curve leaves unexplained
+constexpr double little_share = 0.1;                    // of the drop at 0.3 prior_sd, squared
 constexpr double repeat_memory = 0.98;
 constexpr std::int64_t fewest_repeats = 60;
 
@@ -102,7 +104,7 @@ CurveSeeking::CurveSeeking(CurveSeekingSettings settings)
     : settings_(checked(std::move(settings))),
       filter_(filter_settings(settings_), settings_.curve),
       limits_(settings_.limits, settings_.limit_curves, settings_.space.lower[0], settings_.space.upper[0],
-              amplitude_share * settings_.prior_sd, settings_.memory_cycles),
+              limit_reach_share * settings_.prior_sd, settings_.memory_cycles),
       plain_(plain_settings(settings_)),
       estimate_(settings_.space.start),
       applied_(estimate_),
@@ -272,8 +274,9 @@ void CurveSeeking::shift_estimate(const Inputs& by) noexcept {
 double CurveSeeking::trust() const noexcept {
   if (plain_at_work_) return 0.0;
   if (repeats_ < fewest_repeats / 2) return 1.0;
-  const double unexplained = filter_.noise_sd() * filter_.noise_sd();
-  return std::clamp((repeat_variance_ / unexplained - worst_ratio) / (good_ratio - worst_ratio), 0.0, 1.0);
+  const double little = little_share * filter_.small_variance();  // what is left of a plant without noise is no misfit
+  const double ratio = (repeat_variance_ + little) / (filter_.unexplained_variance() + little);
+  return std::clamp((ratio - worst_ratio) / (good_ratio - worst_ratio), 0.0, 1.0);
 }
 
 double CurveSeeking::estimate_sd() const noexcept {

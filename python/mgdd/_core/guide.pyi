@@ -8,7 +8,7 @@ import mgdd._core.optimize
 import numpy
 import numpy.typing
 import typing
-__all__: list[str] = ['Curve', 'CurveSeeking', 'FeedForward', 'ModelOptimum', 'TimingMap']
+__all__: list[str] = ['Curve', 'CurveSeeking', 'FeedForward', 'GuidedEngine', 'ModelOptimum', 'OnlineCalibration', 'TimingMap', 'calibrated_parameters']
 class Curve:
     """
     What a model says of one quantity over one input: a smooth curve through given points.
@@ -94,7 +94,7 @@ class CurveSeeking:
     """
     Seeking guided by a curve; see mgdd.guide.CurveSeeking.
     """
-    def __init__(self, *, start: typing.Any, lower: typing.Any, upper: typing.Any, curve: Curve, prior_sd: typing.SupportsFloat | typing.SupportsIndex | None = None, scale_sd: typing.SupportsFloat | typing.SupportsIndex = 0.3, discrepancy: typing.SupportsFloat | typing.SupportsIndex = 0.15, noise_sd: typing.SupportsFloat | typing.SupportsIndex | None = None, memory_cycles: typing.SupportsFloat | typing.SupportsIndex = 143.0, amplitude_max: typing.SupportsFloat | typing.SupportsIndex | None = None, rate: typing.SupportsFloat | typing.SupportsIndex | None = None, delay_cycles: typing.SupportsFloat | typing.SupportsIndex = 0.0, lag_cycles: typing.SupportsFloat | typing.SupportsIndex = 0.0, hand_over: bool = True, maximize: bool = True, limits: collections.abc.Sequence[mgdd._core.optimize.Limit] = []) -> None:
+    def __init__(self, *, start: typing.Any, lower: typing.Any, upper: typing.Any, curve: Curve, prior_sd: typing.SupportsFloat | typing.SupportsIndex | None = None, scale_sd: typing.SupportsFloat | typing.SupportsIndex = 0.3, discrepancy: typing.SupportsFloat | typing.SupportsIndex = 0.15, noise_sd: typing.SupportsFloat | typing.SupportsIndex | None = None, memory_cycles: typing.SupportsFloat | typing.SupportsIndex = 143.0, amplitude_max: typing.SupportsFloat | typing.SupportsIndex | None = None, rate: typing.SupportsFloat | typing.SupportsIndex | None = None, delay_cycles: typing.SupportsFloat | typing.SupportsIndex = 0.0, lag_cycles: typing.SupportsFloat | typing.SupportsIndex = 0.0, hand_over: bool = True, maximize: bool = True, limits: collections.abc.Sequence[mgdd._core.optimize.Limit] = [], limit_curves: collections.abc.Sequence[Curve] | None = None) -> None:
         ...
     def _clear_history(self) -> None:
         """
@@ -164,6 +164,13 @@ class CurveSeeking:
     def limit_names(self) -> list[str]:
         """
         Names of the limits, in the order of tell.
+        """
+    @property
+    def limit_states(self) -> dict:
+        """
+        State of every limit by name: 'free' holds nothing back, 'active' turned the last step or is broken,
+        'infeasible' cannot be met together with the other limits and the bounds, as far as the learnt slopes tell;
+        the estimate goes to where the largest excess, counted in scales, is smallest.
         """
     @property
     def misfires(self) -> int:
@@ -289,6 +296,13 @@ class FeedForward:
         Names of the limits, in the order of tell.
         """
     @property
+    def limit_states(self) -> dict:
+        """
+        State of every limit by name: 'free' holds nothing back, 'active' turned the last step or is broken,
+        'infeasible' cannot be met together with the other limits and the bounds, as far as the learnt slopes tell;
+        the estimate goes to where the largest excess, counted in scales, is smallest.
+        """
+    @property
     def misfires(self) -> int:
         """
         Misfired cycles told so far.
@@ -324,9 +338,9 @@ class ModelOptimum:
     """
     def __init__(self, cylinder: mgdd._core.engine.Cylinder, *, performance: mgdd._core.engine.Performance, nox: mgdd._core.engine.NoxModel, method: str, bounds_cad: tuple[typing.SupportsFloat | typing.SupportsIndex, typing.SupportsFloat | typing.SupportsIndex], step_size: typing.SupportsFloat | typing.SupportsIndex, difference_cad: typing.SupportsFloat | typing.SupportsIndex, tolerance_cad: typing.SupportsFloat | typing.SupportsIndex, iterations: typing.SupportsInt | typing.SupportsIndex, step_cad: typing.SupportsFloat | typing.SupportsIndex, integrator: str) -> None:
         ...
-    def _curve(self, point: mgdd._core.engine.OperatingPoint) -> Curve | None:
+    def _curves(self, point: mgdd._core.engine.OperatingPoint, names: collections.abc.Sequence[str]) -> list[Curve] | None:
         """
-        J over SOC at one operating point; None where there is no such cycle.
+        J and indicators over SOC at one operating point; None where there is no such cycle.
         """
     def _find(self, point: mgdd._core.engine.OperatingPoint) -> dict:
         """
@@ -368,3 +382,182 @@ class TimingMap:
     @_columns.setter
     def _columns(self, arg1: collections.abc.Mapping[str, collections.abc.Sequence[typing.SupportsFloat | typing.SupportsIndex]]) -> None:
         ...
+class OnlineCalibration:
+    """
+    Calibration while an engine runs; use mgdd.guide.OnlineCalibration.
+    """
+    def __init__(self, *, cylinder: mgdd._core.engine.Cylinder, method: str, parameters: collections.abc.Sequence[str], uncertainty: collections.abc.Mapping[str, typing.SupportsFloat | typing.SupportsIndex], window_cycles: typing.SupportsInt | typing.SupportsIndex, steady_cycles: typing.SupportsInt | typing.SupportsIndex, cov_limit_percent: typing.SupportsFloat | typing.SupportsIndex, forgetting: typing.SupportsFloat | typing.SupportsIndex, soc_scatter_cad: typing.SupportsFloat | typing.SupportsIndex, jump_factor: typing.SupportsFloat | typing.SupportsIndex, trials_per_update: typing.SupportsInt | typing.SupportsIndex, step_cad: typing.SupportsFloat | typing.SupportsIndex, integrator: str) -> None:
+        ...
+    def offer(self, pressure_bar: typing.Annotated[numpy.typing.ArrayLike, numpy.float64], point: mgdd._core.engine.OperatingPoint, soc_cad: typing.SupportsFloat | typing.SupportsIndex, *, misfire: bool = False) -> str:
+        """
+        Takes one cycle; the status says what became of it.
+        """
+    def restart(self) -> None:
+        """
+        Forget all cycles, keep the parameters.
+        """
+    def update(self) -> str:
+        """
+        One step of the calibration; the status says what became of it.
+        """
+    @property
+    def angles_cad(self) -> numpy.typing.NDArray[numpy.float64]:
+        """
+        Angles that a pressure trace is taken on [°CA aTDC].
+        """
+    @property
+    def cylinder(self) -> mgdd._core.engine.Cylinder:
+        """
+        The guide's cylinder with the adapted parameters.
+        """
+    @property
+    def determined(self) -> bool:
+        """
+        Whether the data determine every parameter that is adapted.
+        """
+    @property
+    def errors(self) -> dict:
+        ...
+    @property
+    def figures(self) -> dict:
+        ...
+    @property
+    def settings(self) -> dict:
+        """
+        Constructor keywords as a new dict.
+        """
+    @property
+    def state(self) -> dict[str, list[float]]:
+        """
+        State between two cycles: named lists of numbers, JSON-able. Setting it continues that run bit for
+        bit; a state of other settings raises ParameterError and changes nothing.
+        """
+    @state.setter
+    def state(self, arg1: collections.abc.Mapping[str, collections.abc.Sequence[typing.SupportsFloat | typing.SupportsIndex]]) -> None:
+        ...
+    @property
+    def status(self) -> str:
+        """
+        Of the last call.
+        """
+    @property
+    def values(self) -> dict:
+        ...
+    @property
+    def verdicts(self) -> dict:
+        ...
+class GuidedEngine:
+    """
+    The guided loop of an engine; see mgdd.guide.GuidedEngine.
+    """
+    def __init__(self, seeker: typing.Any, model: ModelOptimum, calibration: OnlineCalibration, point: mgdd._core.engine.OperatingPoint, *, changed_share: typing.SupportsFloat | typing.SupportsIndex, calibrated_sd_cad: typing.SupportsFloat | typing.SupportsIndex, recalibrated_cad: typing.SupportsFloat | typing.SupportsIndex, calibration_rate_cad: typing.SupportsFloat | typing.SupportsIndex, noise_sd: typing.SupportsFloat | typing.SupportsIndex | None) -> None:
+        ...
+    def _at(self, point: mgdd._core.engine.OperatingPoint) -> str:
+        """
+        The operating point of the next cycle.
+        """
+    def _now(self) -> dict:
+        """
+        What the next cycle is made of.
+        """
+    def _tell(self, J: typing.Any, limits: typing.Any, misfire: bool, applied: typing.Any, pressure_bar: typing.Annotated[numpy.typing.ArrayLike, numpy.float64] | None) -> None:
+        """
+        tell, with the pressure.
+        """
+    def ask(self) -> numpy.typing.NDArray[numpy.float64]:
+        """
+        The input to apply in this cycle, shape (inputs,). Asking again before tell gives the same.
+        """
+    def restart(self) -> None:
+        """
+        The operating point has changed: forget the window, keep the estimate.
+        """
+    def tell(self, J: typing.Any = None, limits: typing.Any = None, *, misfire: bool = False, applied: typing.Any = None) -> None:
+        """
+        Accept what was measured at the input of the last ask.
+        
+        J: float, or one number per component; limits: one value per limit, in order or by name;
+        misfire: the cycle is counted and its J and limits are not read;
+        applied: what the plant really applied, one number per input; None where it is what was asked for.
+        Raises ParameterError (tell without ask), ShapeError (wrong count), DataError (not finite, or beyond
+        1e30 in magnitude); the state is unchanged then.
+        """
+    @property
+    def applied(self) -> numpy.typing.NDArray[numpy.float64]:
+        """
+        The input of the last ask, shape (1,).
+        """
+    @property
+    def calibration_status(self) -> str:
+        """
+        What became of the last cycle in the calibration; ``none`` without one.
+        """
+    @property
+    def component_count(self) -> int:
+        """
+        Components of J that tell takes.
+        """
+    @property
+    def cycle(self) -> int:
+        """
+        Cycles told so far, misfires included.
+        """
+    @property
+    def cylinder(self) -> mgdd._core.engine.Cylinder:
+        """
+        The guide's cylinder as calibrated.
+        """
+    @property
+    def estimate(self) -> numpy.typing.NDArray[numpy.float64]:
+        """
+        Present estimate of the optimum, shape (inputs,).
+        """
+    @property
+    def estimate_sd(self) -> float:
+        """
+        Standard deviation of the estimate as stated [°CA]; NaN where the seeker states none.
+        """
+    @property
+    def limit_names(self) -> list[str]:
+        """
+        Names of the limits, in the order of tell.
+        """
+    @property
+    def limit_states(self) -> dict:
+        """
+        State of every limit by name: 'free' holds nothing back, 'active' turned the last step or is broken,
+        'infeasible' cannot be met together with the other limits and the bounds, as far as the learnt slopes tell;
+        the estimate goes to where the largest excess, counted in scales, is smallest.
+        """
+    @property
+    def misfires(self) -> int:
+        """
+        Misfired cycles told so far.
+        """
+    @property
+    def recalibrations(self) -> int:
+        """
+        How often a calibration moved what the guide says.
+        """
+    @property
+    def refusals(self) -> int:
+        """
+        Answers of the model, and operating points, that could not be used.
+        """
+    @property
+    def state(self) -> dict[str, list[float]]:
+        """
+        What the run needs to go on bit for bit, the history excepted: named lists of numbers, JSON-able.
+        """
+    @state.setter
+    def state(self, arg1: collections.abc.Mapping[str, collections.abc.Sequence[typing.SupportsFloat | typing.SupportsIndex]]) -> None:
+        ...
+    @property
+    def trust(self) -> float:
+        """
+        Trust in the guide, 0 to 1.
+        """
+def calibrated_parameters() -> dict:
+    """
+    Unit and meaning of every parameter of an online calibration, by name.
+    """

@@ -43,7 +43,7 @@ CURVES = ("curve", "calibrated")
 _SHAPES = ("model", "parabola")
 _POINT = frozenset(OperatingPoint.fields())
 _PARABOLA_BEND = -0.05  # of ten cycle models, wall heat 0 to 1 and 25 to 60 °CA of burn: -0.037 to -0.054
-_CALIBRATED = ("wall_heat_scale", "burn_duration_scale")
+_CALIBRATED = ("wall_heat_scale",)
 _REACH_CAD = 60.0
 _STEADY_GRID_CAD = 0.1
 _ESTIMATE = {FeedForward: "estimate", GuidedEngine: "seeking.estimate"}  # in their states
@@ -66,9 +66,9 @@ def add_guidance(parser: argparse.ArgumentParser) -> None:
     group = parser.add_argument_group("guide", "a rough model that leads while the measurements decide")
     group.add_argument(
         "--guide", choices=GUIDES, default="none",
-        help="feed_forward: the model's best timing, the seeker learns the rest; curve: its whole curve, placed "
-        "by the measurements; calibrated: the same while the model learns from the measured pressure; map: a table of "
-        "timings as feed-forward (default: none)",
+        help="feed_forward: the model's best timing, the seeker learns the rest; curve: the model's whole curve, "
+        "placed by the measurements; calibrated: the same while the model learns from the measured pressure; map: a "
+        "table of timings as feed-forward (default: none)",
     )  # fmt: skip
     group.add_argument(
         "--guide-preset", metavar="NAME_OR_FILE.toml", help="cylinder of the model (default: that of the bench)"

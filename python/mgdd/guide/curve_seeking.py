@@ -37,7 +37,7 @@ class CurveSeeking(Seeker, _core.guide.CurveSeeking):
     memory_cycles : float
         Readings fade with this time constant; shorter follows a drift faster and costs more dither.
     amplitude_max : float, optional
-        Largest distance from the estimate that is applied; 0.4 `prior_sd`.
+        Largest distance from the estimate that is applied; 0.25 `prior_sd`.
     rate : float, optional
         Largest change of the applied input per cycle; none without.
     delay_cycles, lag_cycles : float

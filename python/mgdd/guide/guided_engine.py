@@ -118,7 +118,7 @@ class GuidedEngine(_core.guide.GuidedEngine):
             "calibration_rate_cad": calibration_rate_cad,
             "noise_sd": noise_sd,
         }
-        core = None if calibration is None else calibration._core
+        core: Any = None if calibration is None else calibration._core
         super().__init__(seeker, model, core, point, **self._options)
         self._made_of = (copy.deepcopy(seeker), copy.deepcopy(model), copy.deepcopy(calibration), point)
         self._rows: list[tuple[float, ...]] = []
@@ -147,8 +147,7 @@ class GuidedEngine(_core.guide.GuidedEngine):
         mgdd.errors.ParameterError
             A call between `ask` and `tell`.
         """
-        answer: Literal["followed", "refused"] = self._at(point)
-        return answer
+        return "followed" if self._at(point) == "followed" else "refused"
 
     def tell(
         self,

@@ -143,7 +143,7 @@ class TimingMap(_core.guide.TimingMap, MapForms):
         >>> axes = {"speed_rpm": [1200, 2000], "fuel_mg": [10, 20, 30]}
         >>> timing = TimingMap.of_guide(ModelOptimum(Cylinder()), axes, make=OperatingPoint)
         >>> round(timing(OperatingPoint(speed_rpm=1200, fuel_mg=20)), 1)
-        -4.9
+        -3.5
         """
         own = {str(name): np.array(entries, np.float64, ndmin=1).ravel() for name, entries in points.items()}
         cells = np.stack(np.meshgrid(*own.values(), indexing="ij"), axis=-1).reshape(-1, len(own))

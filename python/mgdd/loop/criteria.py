@@ -10,6 +10,7 @@ from typing import TYPE_CHECKING
 from mgdd.errors import ParameterError
 
 if TYPE_CHECKING:
+    from mgdd.guide import FeedForward, GuidedEngine
     from mgdd.optimize import Seeker
 
 __all__ = ["LoopCriteria"]
@@ -133,7 +134,9 @@ class LoopCriteria:
         """
         return _in_order("exceed_above", self.exceed_above, names) if self.exceed_above else []
 
-    def limits_of(self, names: tuple[str, ...], seeker: Seeker | None = None) -> list[float]:
+    def limits_of(
+        self, names: tuple[str, ...], seeker: Seeker | FeedForward | GuidedEngine | None = None
+    ) -> list[float]:
         """Give ``limits`` or those of the seeker in the order of the names, infinite where there is none.
 
         Parameters
@@ -141,7 +144,7 @@ class LoopCriteria:
         names : tuple of str
             Limited quantities that are measured.
         seeker : optional
-            Any seeker of `mgdd.optimize`.
+            Any seeker of `mgdd.optimize` or `mgdd.guide`.
 
         Returns
         -------

@@ -153,6 +153,16 @@ TEST(CurveSeeking, HandsOverWhereTheGuideIsNothingLikeThePlant) {
   EXPECT_FALSE(stubborn.handed_over());
 }
 
+TEST(CurveSeeking, APlantWithoutNoiseIsNoReasonToGiveTheGuideUp) {
+  for (const double best : {-15.0, -4.0, 8.0}) {
+    CurveSeeking seeker(guided(best, best));
+    const std::vector<double> path = seek(seeker, 600, [](int) { return -6.0; }, 0.0);
+    EXPECT_FALSE(seeker.handed_over());
+    EXPECT_GT(seeker.trust(), 0.9);
+    EXPECT_NEAR(path.back(), -6.0, 0.1);
+  }
+}
+
 TEST(CurveSeeking, MinimisesWhatItIsTold) {
   CurveSeekingSettings settings = guided(3.0, 3.0);
   CurveSeeking up(settings);

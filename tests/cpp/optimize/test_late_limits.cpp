@@ -132,9 +132,13 @@ TEST(LateLimits, TheEstimateWaitsForTheFirstReading) {
               const double x = seeker.ask()[0];
               const double j[] = {quadratic(x - 8.0)}, values[] = {90.0 + x};
               seeker.tell({j, values});
-              if (k < 30) EXPECT_EQ(seeker.estimate()[0], start) << who;
+              if (k < 30) {
+                EXPECT_EQ(seeker.estimate()[0], start) << who;
+              }
             }
-            if (begin == 0) EXPECT_NE(seeker.estimate()[0], start) << who;
+            if (begin == 0) {
+              EXPECT_NE(seeker.estimate()[0], start) << who;
+            }
             seeker.restart();
           }
         },

@@ -63,7 +63,10 @@ class CurveFilter {
   /// Standard deviation of the estimate that the fading of the readings leaves, and the same as it covers in practice.
   double search_sd() const noexcept { return faded_sd(1.0); }
   double stated_sd() const noexcept;
-  double noise_sd() const noexcept;   ///< of a reading, as learnt
+  double noise_sd() const noexcept;  ///< of a reading, as learnt
+  /// Mean square of what the curve leaves of the readings, and the square of the drop that counts as small.
+  double unexplained_variance() const noexcept { return unexplained_; }
+  double small_variance() const noexcept { return guessed_variance(); }
   double curvature() const noexcept;  ///< J'' of the curve as scaled, < 0
   double scale() const noexcept { return scale_; }
   double readings() const noexcept { return count_; }  ///< that count now
@@ -83,6 +86,7 @@ class CurveFilter {
     v("filter_spread", self.spread_);
     v("filter_variance", self.variance_);
     v("filter_scale", self.scale_);
+    v("filter_unexplained", self.unexplained_);
     v("filter_origin", self.origin_);
     const char* names[] = {"weight", "c", "cc", "y", "cy", "yy", "log_weight", "lagged", "share", "own_scale"};
     for (std::size_t i = 0; i < self.sums_.size(); ++i)
@@ -111,6 +115,7 @@ class CurveFilter {
   double prior_mean_, prior_sd_;
   double count_ = 0.0, count_squared_ = 0.0;  // readings, and sum of their squared weights
   double mean_ = 0.0, spread_ = 0.0, variance_ = 0.0, scale_ = 1.0;
+  double unexplained_ = 0.0;
   double origin_ = 0.0;   // first reading, taken off before summing
   bool started_ = false;  // the lag has an input
   std::array<Column, sums> sums_;

@@ -31,7 +31,7 @@ struct CurveSeekingSettings {
   double discrepancy = 0.15;          ///< error of the curve per unit of its drop
   double noise_sd = 0.0;              ///< of one reading of J; 0 = learnt
   double memory_cycles = 143.0;       ///< readings fade with this time constant
-  double amplitude_max = 0.0;         ///< largest distance from the estimate that is applied; 0 = 0.4 prior_sd
+  double amplitude_max = 0.0;         ///< largest distance from the estimate that is applied; 0 = 0.25 prior_sd
   double rate = optimize::unlimited;  ///< largest change of the applied input per cycle
   optimize::ComponentLag sensor{};    ///< between the plant and J; the delay is rounded to whole cycles
   bool hand_over = true;              ///< to plain extremum seeking where the guide keeps failing

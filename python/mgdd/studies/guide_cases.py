@@ -1,0 +1,258 @@
+"""Guides that are wrong in a stated way, the engine they guide, and what one guided run came to."""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass
+from functools import cached_property
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+
+from mgdd import presets
+from mgdd.engine import Cylinder, OperatingPoint
+from mgdd.guide import Curve, CurveSeeking, FeedForward, GuidedEngine, ModelOptimum
+from mgdd.loop import EngineBench
+from mgdd.optimize import ExtremumSeeking, Optimum
+
+if TYPE_CHECKING:
+    from collections.abc import Callable, Sequence
+
+    from numpy.typing import NDArray
+
+__all__ = [
+    "BOUNDS_CAD",
+    "GUIDES",
+    "HIGH",
+    "LOW",
+    "PLANT",
+    "Guide",
+    "Run",
+    "SteadyMap",
+    "curve_seeker",
+    "drive",
+    "first_within",
+    "stays_within",
+    "trimmed",
+    "verdict_on",
+]
+
+BOUNDS_CAD = (-30.0, 10.0)
+PLANT: Cylinder = presets.load("puma_single", kind="engine").cylinder
+LOW = OperatingPoint(speed_rpm=1500.0, fuel_mg=12.0, burn_duration_cad=24.0)
+HIGH = OperatingPoint(speed_rpm=1500.0, fuel_mg=30.0, burn_duration_cad=44.0)
+_UNGUIDED_START_CAD, _WIDE_CAD = -20.0, (-50.0, 18.0)
+_GAIN = 2.0 / (0.051 * 40.0)  # amplitude 1, time constant 40 cycles at a curvature of -0.051 points per CAD**2
+_GRID_STEP_CAD = 0.05
+
+
+@dataclass(frozen=True)
+class Guide:
+    """A cycle model that is wrong in what it is told of the engine.
+
+    Parameters
+    ----------
+    name : str
+        What is wrong with it.
+    cylinder : Cylinder
+        The model.
+    burn_duration : float
+        Scale of the burn duration it is told [-].
+    backwards : bool
+        From the point `LOW` on its optimum moves as far as the model's, the other way.
+    """
+
+    name: str
+    cylinder: Cylinder
+    burn_duration: float = 1.0
+    backwards: bool = False
+
+    @cached_property
+    def model(self) -> ModelOptimum:
+        """The model that is asked, by the duration law where a point has no burn duration of its own."""
+        burn = self.burn_duration * self.cylinder.burn_duration_ref_cad
+        return ModelOptimum(self.cylinder.replace(burn_duration_ref_cad=burn), bounds_cad=BOUNDS_CAD)
+
+    def _told(self, point: OperatingPoint) -> OperatingPoint:
+        if point.burn_duration_cad is None:
+            return point
+        return point.replace(burn_duration_cad=self.burn_duration * point.burn_duration_cad)
+
+    def _shift(self, point: OperatingPoint) -> float:
+        if not self.backwards:
+            return 0.0
+        return 2.0 * (self._best(LOW)["soc_cad"] - self._best(point)["soc_cad"])
+
+    def _best(self, point: OperatingPoint) -> Optimum:
+        best = self.model(self._told(point))
+        if best is None:
+            raise ArithmeticError(f"guide {self.name!r} has no optimum at {point}")
+        return best
+
+    def __call__(self, point: OperatingPoint) -> Optimum:
+        """Give the optimum of the model, as a `FeedForward` asks for it."""
+        best, shift = self._best(point), self._shift(point)
+        if not shift:
+            return best
+        moved = {"soc_cad": best["soc_cad"] + shift}
+        return Optimum(inputs=moved, objective="performance", value=best.value, curvature=best.curvature)
+
+    def curve(self, point: OperatingPoint) -> Curve:
+        """Give J of the model over SOC, as a `CurveSeeking` takes it."""
+        curve = self.model.curve(self._told(point))
+        if curve is None:
+            raise ArithmeticError(f"guide {self.name!r} has no curve at {point}")
+        shift = self._shift(point)
+        if not shift:
+            return curve
+        grid = np.linspace(curve.lower, curve.upper, 200)
+        return Curve(grid + shift, curve(grid))
+
+
+def _heat(scale: float) -> Cylinder:
+    return PLANT.replace(wall_heat_scale=scale)
+
+
+def _squeezed(change: float) -> Cylinder:
+    return PLANT.replace(compression_ratio=PLANT.compression_ratio + change)
+
+
+GUIDES: tuple[Guide, ...] = (
+    Guide("exact", PLANT),
+    Guide("wall heat -30 %", _heat(0.35)),
+    Guide("wall heat +30 %", _heat(0.65)),
+    Guide("duration -15 %", PLANT, burn_duration=0.85),
+    Guide("duration +15 %", PLANT, burn_duration=1.15),
+    Guide("compression ratio -1", _squeezed(-1.0)),
+    Guide("compression ratio +1", _squeezed(1.0)),
+    Guide("adiabatic", _heat(0.0)),
+    Guide("wrong sign", PLANT, backwards=True),
+)
+
+
+def trimmed(guide: Guide | None) -> FeedForward:
+    """Make extremum seeking with a moving average, no clip, start at -20 CAD, and the guide as feed-forward."""
+    seeker = ExtremumSeeking(
+        start=_UNGUIDED_START_CAD, lower=_WIDE_CAD[0], upper=_WIDE_CAD[1], form="moving_average", gain=_GAIN,
+        rate=math.inf,
+    )  # fmt: skip
+    return FeedForward(seeker, guide)
+
+
+def curve_seeker(curve: Curve, *, start: float | None = None, delay: float = 0.0, lag: float = 0.0) -> CurveSeeking:
+    """Make a seeker by the curve with default settings; it starts at the curve's best input if nothing is said."""
+    return CurveSeeking(
+        start=curve.best if start is None else start, lower=BOUNDS_CAD[0], upper=BOUNDS_CAD[1], curve=curve,
+        delay_cycles=delay, lag_cycles=lag,
+    )  # fmt: skip
+
+
+@dataclass(frozen=True)
+class SteadyMap:
+    """J of a plant at one point over SOC, without noise and scatter [°CA aTDC; points]."""
+
+    soc_cad: NDArray[np.float64]
+    j: NDArray[np.float64]
+
+    @classmethod
+    def of(cls, bench: EngineBench, *, cycle: int = 0) -> SteadyMap:
+        """Tabulate the map of a bench at the operating point of a cycle."""
+        low, high = _WIDE_CAD
+        grid = np.linspace(low, high, round((high - low) / _GRID_STEP_CAD) + 1)
+        return cls(grid, bench.steady_map(grid, cycle=cycle)["j"].to_numpy().astype(np.float64))
+
+    @property
+    def best_cad(self) -> float:
+        """Input of the largest J."""
+        return float(self.soc_cad[np.argmax(self.j)])
+
+    def lost(self, applied_cad: NDArray[np.float64]) -> NDArray[np.float64]:
+        """Give what J loses against its best."""
+        return np.asarray(self.j.max() - np.interp(applied_cad, self.soc_cad, self.j))
+
+
+@dataclass(frozen=True)
+class Run:
+    """One run, cycle by cycle: estimate and its stated standard deviation before the cycle, applied timing [°CA]."""
+
+    estimate: NDArray[np.float64]
+    estimate_sd: NDArray[np.float64]
+    applied: NDArray[np.float64]
+
+
+def drive(
+    bench: EngineBench,
+    seeker: FeedForward | CurveSeeking | GuidedEngine,
+    cycles: int,
+    *,
+    guide: Guide | None = None,
+    late_by_cad: Callable[[int], float] | None = None,
+    beyond: Callable[[float], float] | None = None,
+) -> Run:
+    """Let a guided seeker steer a bench.
+
+    Parameters
+    ----------
+    bench : EngineBench
+        It advances.
+    seeker : FeedForward, CurveSeeking or GuidedEngine
+        It advances; all but a bare curve are told every operating point.
+    cycles : int
+        How many.
+    guide : Guide, optional
+        Draws the curve of a new operating point.
+    late_by_cad : callable, optional
+        By how much combustion starts later than asked for, by cycle [°CA]; nobody tells the seeker.
+    beyond : callable, optional
+        What J gains at an input beside what the bench measures [points].
+
+    Returns
+    -------
+    Run
+        Of these cycles.
+    """
+    estimate, sd, applied = np.empty(cycles), np.full(cycles, np.nan), np.empty(cycles)
+    point = bench.point
+    for k in range(cycles):
+        now = bench.point
+        if isinstance(seeker, FeedForward | GuidedEngine):
+            seeker.at(now)
+        elif guide is not None and now != point:
+            seeker.guide(guide.curve(now))
+        point = now
+        asked = float(seeker.ask()[0])
+        estimate[k] = seeker.estimate[0]
+        if isinstance(seeker, CurveSeeking):
+            sd[k] = seeker.estimate_sd
+        applied[k] = asked + (late_by_cad(k) if late_by_cad else 0.0)
+        j = bench.step(applied[k])["j"]
+        seeker.tell(j + (beyond(applied[k]) if beyond else 0.0))
+    return Run(estimate, sd, applied)
+
+
+def first_within(estimate: NDArray[np.float64], best: float, distance: float) -> float:
+    """Give the first cycle whose estimate lies within the distance; infinite where none does."""
+    near = np.abs(estimate - best) <= distance
+    return float(np.argmax(near)) if near.any() else math.inf
+
+
+def stays_within(estimate: NDArray[np.float64], best: float, distance: float) -> float:
+    """Give the cycle from which no estimate lies beyond the distance; infinite where the last one does."""
+    beyond = np.flatnonzero(np.abs(estimate - best) > distance)
+    last = int(beyond[-1]) + 1 if beyond.size else 0
+    return float(last) if last < estimate.size else math.inf
+
+
+def verdict_on(bar: str, values: Sequence[float], limit: str, *, low: float = -math.inf, high: float = math.inf) -> Any:
+    """Say of one bar what the worst case came to, and whether all of them are within it; a missing one is not."""
+    known = [value if math.isfinite(value) else math.inf for value in values]
+    outside = [max(low - value, value - high) for value in known]
+    worst = known[int(np.argmax(outside))]
+    return {
+        "bar": bar,
+        "limit": limit,
+        "worst": worst if math.isfinite(worst) else None,
+        "cases": len(known),
+        "cases_met": sum(excess <= 0.0 for excess in outside),
+        "met": all(excess <= 0.0 for excess in outside),
+    }
