@@ -35,7 +35,7 @@ __all__ = [
     "esc_tests",
     "gamma",
     "golden",
-    "guided",
+    "guided_bench",
     "guided_plane",
     "guided_start",
     "ignition",
@@ -348,7 +348,7 @@ def seekers() -> Rows:
     return {f"{row['seeker']} {row['settings']}": _with_ends(row, *names) for row in study("seeker-comparison")["rows"]}
 
 
-def guided() -> Rows:
+def guided_bench() -> Rows:
     names = ("cycles_to_1_cad", "cycles_stays_1_5_cad", "lost_j_cycles", "late_loss")
     return {row["case"]: [row["start_cad"], *_with_ends(row, *names)] for row in study("guided")["rows"]}
 
