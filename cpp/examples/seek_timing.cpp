@@ -27,7 +27,7 @@ int main() {
       const double efficiency_percent[] = {40.0 - 0.025 * (soc_cad + 6.0) * (soc_cad + 6.0) + noise};
       const double p_max_bar[] = {100.0 - 4.0 * (soc_cad + 3.0)};
       const Reading reading{efficiency_percent, p_max_bar};
-      require(seeker.tell(reading), seeker.protocol(), reading, 1, 1);  // throws for a reading that is refused
+      require(seeker.tell(reading), seeker.protocol(), reading, 1, 1, 1);  // throws for a reading that is refused
       if (cycle % 50 == 49) std::printf("%5d  %12.2f  %9.1f\n", cycle + 1, seeker.estimate()[0], p_max_bar[0]);
     }
   } catch (const std::exception& error) {
