@@ -126,6 +126,7 @@ def test_the_start_is_that_of_the_user(
     [
         ("--guide-preset puma_single", "--guide-preset does not act here; --guide none has no model"),
         ("--guide-set wall_heat_scale=1", "--guide-set does not act here; --guide none has no model"),
+        ("--guide calibrated --guide-shape parabola", "--guide-shape parabola: a parabola cannot be calibrated"),
         ("--guide-shape parabola", "--guide-shape does not act here; --guide none has no model"),
         ("--guide-map x.toml", "--guide-map does not act here; --guide none has no model"),
         ("--guide map", "--guide map needs --guide-map FILE.toml"),

@@ -13,7 +13,7 @@ import pytest
 from mgdd.engine import Cylinder, OperatingPoint
 from mgdd.errors import DataError, ParameterError, ShapeError
 from mgdd.guide import Curve, CurveSeeking, FeedForward, GuidedEngine, ModelOptimum, OnlineCalibration
-from mgdd.loop import EngineBench, LoopCriteria, monte_carlo, run_seeker
+from mgdd.loop import EngineBench, LoopCriteria, Measurement, monte_carlo, run_seeker
 from mgdd.optimize import ExtremumSeeking, Limit, Seeker
 from mgdd.rig import SimulatedRig
 
@@ -198,8 +198,10 @@ def test_a_rig_and_the_bench_go_the_same_way(plain: bool) -> None:
     assert other.history["estimate_cad"].equals(one.history["estimate_cad"])
     guide = run.dataset["guide_cad"].to_numpy()
     assert guide[41] < guide[39] - 2.0
-    with SimulatedRig(EngineBench(seed=4)) as rig:
-        assert run_seeker(rig, guided(bench, plain=plain), 10).dataset.sizes["cycle"] == 10
+    with SimulatedRig(EngineBench(schedule=schedule, seed=4)) as rig:
+        third = guided(EngineBench(schedule=schedule), plain=plain)
+        run_seeker(rig, third, 90)
+    assert third.history["estimate_cad"].equals(one.history["estimate_cad"])
 
 
 def test_a_guided_engine_is_pickled_and_goes_on() -> None:
@@ -225,6 +227,27 @@ def test_a_point_without_a_best_timing_is_refused_and_the_run_goes_on() -> None:
     engine.ask()
     with pytest.raises(ParameterError, match="between ask"):
         engine.at(OperatingPoint(fuel_mg=30.0))
+
+
+class WithoutPoint:
+    """A plant that does not say its operating point."""
+
+    input_names, limit_names = ("soc_cad",), ()
+
+    def apply(self, inputs: Any) -> None:
+        self.soc_cad = inputs["soc_cad"]
+
+    def measure(self) -> Measurement:
+        return Measurement(components=(-((self.soc_cad + 6.0) ** 2),))
+
+
+def test_a_guide_that_would_never_be_asked_is_refused() -> None:
+    front = FeedForward(ExtremumSeeking(start=-20.0, lower=-30.0, upper=10.0), lambda fuel_mg: -0.3 * fuel_mg)
+    with pytest.raises(ParameterError, match="would never be asked"):
+        run_seeker(WithoutPoint(), front, 5)
+    assert front.cycle == 0
+    front.at(20.0)
+    assert run_seeker(WithoutPoint(), front, 5).dataset["estimate_cad"][0] == -6.0
 
 
 def test_what_makes_no_guided_engine_is_refused() -> None:

@@ -274,7 +274,7 @@ void CurveSeeking::shift_estimate(const Inputs& by) noexcept {
 double CurveSeeking::trust() const noexcept {
   if (plain_at_work_) return 0.0;
   if (repeats_ < fewest_repeats / 2) return 1.0;
-  const double little = little_share * filter_.small_variance();  // what is left of a plant without noise is no misfit
+  const double little = little_share * filter_.small_variance();  // what a noise-free plant leaves is not a misfit
   const double ratio = (repeat_variance_ + little) / (filter_.unexplained_variance() + little);
   return std::clamp((ratio - worst_ratio) / (good_ratio - worst_ratio), 0.0, 1.0);
 }

@@ -22,7 +22,7 @@ optimize::VariantSeeker::Settings shared_settings(const GuidedEngine::Seeking& s
       seeking);
 }
 
-// Of the model's cycle, by the names of the limits; none where one of them is no indicator.
+// Of the model's cycle, by the names of the limits; empty where one is not an indicator.
 std::vector<double engine::Indicators<double>::*> indicators_of(const std::vector<optimize::Limit>& limits) {
   std::vector<double engine::Indicators<double>::*> out;
   for (const optimize::Limit& limit : limits) {

@@ -106,6 +106,8 @@ def check_guidance(args: argparse.Namespace) -> None:
                 f"--guide {args.guide} takes J of the same cycle, and the NOx of the analyser is late: use --sensor "
                 "soft, or --guide feed_forward"
             )
+        if args.guide == "calibrated" and args.guide_shape == "parabola":
+            raise ParameterError("--guide-shape parabola: a parabola cannot be calibrated; use --guide curve, or model")
         refuse_idle(args, "limit_method", why=f"--guide {args.guide} keeps limits in its own way")
     else:
         refuse_idle(args, "guide_shape", why=f"--guide {args.guide} takes one timing, not a curve")

@@ -150,6 +150,11 @@ class FeedForward(_core.guide.FeedForward):
         self._guide = guide
         self.recalibrated()
 
+    @property
+    def point(self) -> dict[str, float] | None:
+        """Numbers of the operating point that `at` was told last; None before the first."""
+        return None if self._point is None else dict(self._point)
+
     def recalibrated(self) -> None:
         """Say that the guide has changed in itself: the next `at` asks it again and moves nothing that is applied."""
         self._owed = self._owed or "calibration"

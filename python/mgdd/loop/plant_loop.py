@@ -89,6 +89,12 @@ def steer(plant: Plant, seeker: Seeker | FeedForward | GuidedEngine, cycles: int
             f"start has {seeker.estimate.size} entries: the plant takes {len(plant.input_names)}, "
             f"{', '.join(plant.input_names)}"
         )
+    unasked = isinstance(seeker, FeedForward) and seeker.guide is not None and seeker.point is None
+    if unasked and not hasattr(plant, "point"):
+        raise ParameterError(
+            "plant has no point: the guide of a FeedForward would never be asked; give the plant a property `point`, "
+            "or call at(point) of the FeedForward before the run"
+        )
     names = tuple(seeker.limit_names)
     if not set(names) <= set(plant.limit_names):
         raise ParameterError(

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 from types import TracebackType
-from typing import Self
+from typing import Any, Self
 
 from mgdd.errors import RigError
 from mgdd.loop import Measurement, Plant
@@ -50,6 +50,11 @@ class SimulatedRig:
     def operating_point_changes(self) -> bool:
         """Whether the next cycle brings a new operating point; False for a plant that announces none."""
         return bool(getattr(self.plant, "operating_point_changes", False))
+
+    @property
+    def point(self) -> Any:
+        """Operating point of the next cycle, for a guide; as absent as the plant's own."""
+        return getattr(self.plant, "point")  # noqa: B009 - the protocol of a plant does not have it
 
     def apply(self, inputs: Mapping[str, float]) -> None:
         """Set the inputs of the next cycle or sample.
