@@ -121,6 +121,16 @@ def test_the_start_is_that_of_the_user(
     assert first_timing(file) == pytest.approx(-18.0, abs=1.0 + 1e-9)
 
 
+@pytest.mark.parametrize("method", ["newton", "bounded", "spsa"])
+def test_a_seeker_of_any_kind_begins_there(
+    method: str, capsys: pytest.CaptureFixture[str], table: Path, tmp_path: Path
+) -> None:
+    for kind in ("feed_forward", "map"):
+        file = tmp_path / f"{kind}.csv"
+        seek(capsys, *options(kind, table), "--method", method, "--start-cad", "-18", "--cycles", "50", "-o", str(file))
+        assert first_timing(file) == pytest.approx(-18.0, abs=2.0)
+
+
 @pytest.mark.parametrize(
     ("argv", "said"),
     [

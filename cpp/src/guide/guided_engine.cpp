@@ -10,6 +10,7 @@
 namespace mgdd::guide {
 namespace {
 
+using IndicatorMember = double engine::Indicators<double>::*;
 using optimize::Inputs;
 using optimize::Reading;
 using optimize::TellStatus;
@@ -23,14 +24,14 @@ optimize::VariantSeeker::Settings shared_settings(const GuidedEngine::Seeking& s
 }
 
 // Of the model's cycle, by the names of the limits; empty where one is not an indicator.
-std::vector<double engine::Indicators<double>::*> indicators_of(const std::vector<optimize::Limit>& limits) {
-  std::vector<double engine::Indicators<double>::*> out;
+std::vector<IndicatorMember> indicators_of(const std::vector<optimize::Limit>& limits) {
+  std::vector<IndicatorMember> out;
   for (const optimize::Limit& limit : limits) {
     for (const auto& field : engine::indicator_fields<double>()) {
       if (field.name == limit.name) out.push_back(field.member);
     }
   }
-  return out.size() == limits.size() ? out : std::vector<double engine::Indicators<double>::*>{};
+  return out.size() == limits.size() ? out : std::vector<IndicatorMember>{};
 }
 
 bool differs(double now, double before, double share) noexcept {
@@ -67,11 +68,27 @@ GuidedEngine::GuidedEngine(Seeking seeking, ModelOptimum model, std::optional<On
     throw about("calibration", ParameterError("calibration is of a cylinder of another geometry than the model: make "
                                               "both of the same cylinder"));
   }
-  if (advise(GuideCause::new_point) != GuideStatus::followed) {
+  if (begin() != GuideStatus::followed) {
     throw about("model", ParameterError("model has no best timing that can guide at this operating point: widen the "
                                         "bounds, or give another model"));
   }
   refusals_ = 0;
+}
+
+// The model's first answer. A curve-guided seeker that keeps its start and has not run yet is made anew with the
+// model's curves, since `guide` moves it to their best.
+GuideStatus GuidedEngine::begin() {
+  auto* const by_curve = std::get_if<CurveSeeking>(&seeking_);
+  const bool moves_nothing = guidance_.keep_start && by_curve == nullptr;
+  const GuideStatus status = advise(moves_nothing ? GuideCause::calibration : GuideCause::new_point);
+  if (status != GuideStatus::followed || !guidance_.keep_start || by_curve == nullptr) return status;
+  if (by_curve->protocol().cycle > 0) return status;  // the error of the guide that it has learnt stays
+  CurveSeekingSettings own = by_curve->settings();
+  const bool draws_limits = own.limit_curves.size() == limited_.size();
+  model_.tabulate(point_, own.curve, draws_limits ? std::span(limited_) : std::span<IndicatorMember>(),
+                  draws_limits ? std::span(own.limit_curves) : std::span<Curve>());
+  *by_curve = CurveSeeking(std::move(own));
+  return status;
 }
 
 GuideStatus GuidedEngine::advise(GuideCause cause, bool opened) noexcept {

@@ -72,6 +72,9 @@ class FeedForward(_core.guide.FeedForward):
         Relative standard deviation of the guide's curvature [-].
     significance : float
         Standard errors of the difference in J that make a verdict.
+    keep_start : bool
+        The guide's first value leaves the estimate at the seeker's own start, or where it stands if it has run, and
+        the trim takes the distance; by itself the estimate begins at the guide's optimum.
 
     Raises
     ------
@@ -113,9 +116,12 @@ class FeedForward(_core.guide.FeedForward):
         doubt: float = 0.1,
         curvature_spread: float = 0.2,
         significance: float = 3.0,
+        keep_start: bool = False,
     ) -> None:
         if guide is not None and not callable(guide):
             raise ParameterError.of("guide", guide, "None or a function of the operating point")
+        if not isinstance(keep_start, bool | np.bool_):
+            raise ParameterError.of("keep_start", keep_start, "True or False")
         settling = _settling_of(seeker) if probe_settling is None else probe_settling
         self._options: dict[str, Any] = {
             "trust": trust,
@@ -130,6 +136,7 @@ class FeedForward(_core.guide.FeedForward):
             "significance": significance,
         }
         super().__init__(seeker, **self._options)
+        self._options["keep_start"] = bool(keep_start)
         self._set_seeker_history(seeker._history_columns())
         self._made_of = (type(seeker), seeker.settings)
         self._guide = guide
@@ -208,7 +215,10 @@ class FeedForward(_core.guide.FeedForward):
         except Exception as error:  # noqa: BLE001 - a guide must not stop the engine: logged, and trust falls
             why = f"it raised {type(error).__name__}: {error}"
         # A new point whose value comes late was opened before: to open it again would restart the seeker once more.
-        if self._offer(optimum, curvature, "following" if cause == "new_point" and not opens else cause):
+        offered = "following" if cause == "new_point" and not opens else cause
+        if self._options["keep_start"] and np.isnan(self.guide_optimum).any():
+            offered = "calibration"  # the first value of all: the estimate stays
+        if self._offer(optimum, curvature, offered):
             return "followed"
         _LOG.log(
             logging.DEBUG if retry else logging.WARNING,

@@ -68,6 +68,9 @@ class GuidedEngine(_core.guide.GuidedEngine):
         Largest move of a feed-forward per cycle after a calibration [°CA].
     noise_sd : float, optional
         Standard deviation of one reading, for the trust in a feed-forward [unit of J]; learnt without.
+    keep_start : bool
+        Begin at the seeker's own start, or where it stands if it has run; by itself a run begins at the model's best
+        timing. The trim takes the distance; a `CurveSeeking` believes the model from the second cycle on.
 
     Raises
     ------
@@ -106,6 +109,7 @@ class GuidedEngine(_core.guide.GuidedEngine):
         recalibrated_cad: float = 0.1,
         calibration_rate_cad: float = 1.0,
         noise_sd: float | None = None,
+        keep_start: bool = False,
     ) -> None:
         if not isinstance(model, ModelOptimum):
             raise ParameterError.of("model", model, "a ModelOptimum")
@@ -117,6 +121,7 @@ class GuidedEngine(_core.guide.GuidedEngine):
             "recalibrated_cad": recalibrated_cad,
             "calibration_rate_cad": calibration_rate_cad,
             "noise_sd": noise_sd,
+            "keep_start": keep_start,
         }
         core: Any = None if calibration is None else calibration._core
         super().__init__(seeker, model, core, point, **self._options)
