@@ -11,7 +11,7 @@ import numpy as np
 import pytest
 
 from mgdd.engine import Cylinder, OperatingPoint
-from mgdd.errors import ParameterError
+from mgdd.errors import DataError, ParameterError
 from mgdd.guide import CurveSeeking, FeedForward, GuidedEngine, ModelOptimum
 from mgdd.loop import EngineBench, run_seeker
 from mgdd.optimize import ExtremumSeeking, NewtonSeeking, Optimum, Seeker, Spsa
@@ -128,6 +128,27 @@ def test_a_kept_start_survives_state_pickle_and_copy(kind: str, cut: int) -> Non
         assert run_seeker(own, other, 60).dataset["estimate_cad"].equals(expected)
         assert other.state == whole.state
     assert cut > 0 or float(expected[0]) == START_CAD
+
+
+@pytest.mark.parametrize("kind", ["curve", "dither", "feed-forward"])
+def test_the_history_numbers_cycles_as_the_state_does_and_keeps_no_refused_one(kind: str) -> None:
+    bench = EngineBench(seed=5)
+    one = engine_at(kind, bench)
+    run_seeker(bench, one, 10)
+    other = engine_at(kind, bench)
+    other.state = one.state
+    other.ask()
+    with pytest.raises(DataError):
+        other.tell(float("nan"))
+    other.tell(misfire=True)
+    other.ask()
+    other.tell(50.0, applied=[-17.25])
+    history = other.history
+    assert history["cycle"].to_numpy().tolist() == [10, 11]
+    assert history["misfire"].to_numpy().tolist() == [1, 0]
+    assert np.array_equal(history["objective"], [np.nan, 50.0], equal_nan=True)
+    applied = history["applied" if kind == "feed-forward" else "applied_cad"].to_numpy().ravel()
+    assert (applied[0] != -17.25, applied[1]) == (True, -17.25)
 
 
 def test_what_does_not_say_whether_to_keep_it_is_refused() -> None:
