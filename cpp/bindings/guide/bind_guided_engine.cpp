@@ -8,6 +8,7 @@
 
 #include "mgdd/guide/guided_engine.hpp"
 #include "optimize/seeker_binding.hpp"
+#include "optimize/seeker_inputs.hpp"
 
 namespace mgdd::bindings {
 namespace {
