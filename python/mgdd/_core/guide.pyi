@@ -340,7 +340,7 @@ class ModelOptimum:
         ...
     def _curves(self, point: mgdd._core.engine.OperatingPoint, names: collections.abc.Sequence[str]) -> list[Curve] | None:
         """
-        J and indicators over SOC at one operating point; None where there is no such cycle.
+        J and indicators over SOC at one operating point; None where the model has no physical cycle.
         """
     def _find(self, point: mgdd._core.engine.OperatingPoint) -> dict:
         """

@@ -117,7 +117,7 @@ class GuidedEngine {
   engine::OperatingPoint point_, advised_;  // now, and where the model was asked last
   GuidedEngineSettings guidance_;
   optimize::VariantSeeker::Settings settings_;
-  std::vector<double engine::Indicators<double>::*> limited_;  // of the limits; empty where one is no indicator
+  std::vector<double engine::Indicators<double>::*> limited_;  // of the limits; empty where one is not an indicator
   double guide_cad_ = 0.0;
   std::int64_t refusals_ = 0, recalibrations_ = 0;
   bool owed_ = false;  // the model has no answer for this operating point yet
