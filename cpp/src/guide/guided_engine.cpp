@@ -98,7 +98,10 @@ GuideStatus GuidedEngine::advise(GuideCause cause, bool opened) noexcept {
     Curve curve;
     std::array<Curve, ModelOptimum::max_curves> own;
     const std::span<Curve> limit_curves(own.data(), limited_.size());
-    if (model_.tabulate(point_, curve, limited_, limit_curves)) {
+    // A curve that is best out of the bounds is not handed on: `guide` would begin anew with every cycle that asks
+    // again.
+    const bool drawn = model_.tabulate(point_, curve, limited_, limit_curves);
+    if (drawn && curve.best() >= settings_.space.lower[0] && curve.best() <= settings_.space.upper[0]) {
       const bool taken = cause == GuideCause::calibration ? curve_seeking->believe(curve, guidance_.calibrated_sd_cad)
                                                           : curve_seeking->guide(curve, limit_curves);
       if (taken) {
@@ -134,7 +137,9 @@ GuideStatus GuidedEngine::at(const engine::OperatingPoint& point) noexcept {
   point_ = point;
   if (opened || owed_) {
     if (opened) advised_ = point;
-    const GuideStatus status = advise(GuideCause::new_point, opened);
+    // Asked again at a point that is open already: as a new point once more, the seeker would begin anew in every
+    // cycle.
+    const GuideStatus status = advise(opened ? GuideCause::new_point : GuideCause::following, opened);
     owed_ = status == GuideStatus::refused;
     return status;
   }
