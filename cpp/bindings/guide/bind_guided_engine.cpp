@@ -19,15 +19,16 @@ using AnySeeker = std::variant<optimize::ExtremumSeeking, optimize::NewtonSeekin
                                optimize::Spsa, optimize::GradientDescent, optimize::GoldenSection, CurveSeeking>;
 
 GuidedEngine::Seeking seeking_of(const py::object& seeker, const FeedForwardSettings& settings) {
+  AnySeeker any = seeker_of<AnySeeker>(seeker, "seeker");
   return std::visit(
-      [&](auto&& found) -> GuidedEngine::Seeking {
+      [&](auto& found) -> GuidedEngine::Seeking {
         if constexpr (std::is_same_v<std::decay_t<decltype(found)>, CurveSeeking>) {
           return std::move(found);
         } else {
           return FeedForward(optimize::VariantSeeker(std::move(found)), settings);
         }
       },
-      seeker_of<AnySeeker>(seeker, "seeker"));
+      any);
 }
 
 // Everything is copied: what Python holds goes its own way.

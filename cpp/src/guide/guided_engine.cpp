@@ -6,6 +6,7 @@
 #include <utility>
 
 #include "mgdd/common/bounds.hpp"
+#include "mgdd/common/variant.hpp"
 
 namespace mgdd::guide {
 namespace {
@@ -112,7 +113,7 @@ GuideStatus GuidedEngine::advise(GuideCause cause, bool opened) noexcept {
       curve_seeking->restart();
     }
   } else {
-    auto& trimmed = std::get<FeedForward<optimize::VariantSeeker>>(seeking_);
+    auto& trimmed = *std::get_if<FeedForward<optimize::VariantSeeker>>(&seeking_);
     const ModelOptimumResult found = model_.find(point_);
     status = trimmed.offer(guide_value(found), cause);
     if (status == GuideStatus::followed) guide_cad_ = found.soc_cad;
@@ -150,12 +151,12 @@ GuideStatus GuidedEngine::at(const engine::OperatingPoint& point) noexcept {
 }
 
 const Inputs& GuidedEngine::ask() noexcept {
-  return std::visit([](auto& s) -> const Inputs& { return s.ask(); }, seeking_);
+  return on(seeking_, [](auto& s) -> const Inputs& { return s.ask(); });
 }
 
 TellStatus GuidedEngine::tell(const Reading& reading, std::span<const double> pressure_bar) noexcept {
   const Inputs asked = applied();
-  const TellStatus status = std::visit([&](auto& s) { return s.tell(reading); }, seeking_);
+  const TellStatus status = on(seeking_, [&](auto& s) { return s.tell(reading); });
   if (!calibration_ || pressure_bar.empty()) return status;
   if (status != TellStatus::accepted && status != TellStatus::misfire) return status;
   Inputs told;
@@ -163,41 +164,41 @@ TellStatus GuidedEngine::tell(const Reading& reading, std::span<const double> pr
   if (calibration_->offer(pressure_bar, point_, soc_cad, status == TellStatus::misfire) ==
           CalibrationStatus::accepted &&
       calibration_->update() == CalibrationStatus::updated) {
-    recalibrate();
+    recalibrate(calibration_->cylinder());
   }
   return status;
 }
 
 // The model takes over what was calibrated as soon as that moves its best timing.
-void GuidedEngine::recalibrate() noexcept {
-  model_.put_cylinder(calibration_->cylinder());
+void GuidedEngine::recalibrate(const engine::Cylinder& calibrated) noexcept {
+  model_.put_cylinder(calibrated);
   const ModelOptimumResult found = model_.find(point_);
   if (!found.found || std::abs(found.soc_cad - guide_cad_) < guidance_.recalibrated_cad) return;
   if (advise(GuideCause::calibration) == GuideStatus::followed) ++recalibrations_;
 }
 
 void GuidedEngine::restart() noexcept {
-  std::visit([](auto& s) { s.restart(); }, seeking_);
+  on(seeking_, [](auto& s) { s.restart(); });
 }
 void GuidedEngine::shift_estimate(const Inputs& by) noexcept {
-  std::visit([&](auto& s) { s.shift_estimate(by); }, seeking_);
+  on(seeking_, [&](auto& s) { s.shift_estimate(by); });
 }
 
 const Inputs& GuidedEngine::estimate() const noexcept {
-  return std::visit([](const auto& s) -> const Inputs& { return s.estimate(); }, seeking_);
+  return on(seeking_, [](const auto& s) -> const Inputs& { return s.estimate(); });
 }
 const Inputs& GuidedEngine::applied() const noexcept {
-  return std::visit([](const auto& s) -> const Inputs& { return s.applied(); }, seeking_);
+  return on(seeking_, [](const auto& s) -> const Inputs& { return s.applied(); });
 }
 const optimize::Protocol& GuidedEngine::protocol() const noexcept {
-  return std::visit([](const auto& s) -> const optimize::Protocol& { return s.protocol(); }, seeking_);
+  return on(seeking_, [](const auto& s) -> const optimize::Protocol& { return s.protocol(); });
 }
 std::size_t GuidedEngine::component_count() const noexcept {
-  return std::visit([](const auto& s) { return s.component_count(); }, seeking_);
+  return on(seeking_, [](const auto& s) { return s.component_count(); });
 }
 
 optimize::LimitState GuidedEngine::limit_state(std::size_t i) const noexcept {
-  return std::visit([&](const auto& s) { return optimize::limit_state_of(s, i); }, seeking_);
+  return on(seeking_, [&](const auto& s) { return optimize::limit_state_of(s, i); });
 }
 
 GuidedCycle GuidedEngine::now() const noexcept {
@@ -209,7 +210,7 @@ GuidedCycle GuidedEngine::now() const noexcept {
     out.estimate_sd_cad = curve_seeking->estimate_sd();
     out.trust = curve_seeking->trust();
   } else {
-    const auto& trimmed = std::get<FeedForward<optimize::VariantSeeker>>(seeking_);
+    const auto& trimmed = *std::get_if<FeedForward<optimize::VariantSeeker>>(&seeking_);
     out.feed_forward_cad = trimmed.path().feed_forward()[0];
     out.trust = trimmed.path().trust().value();
   }

@@ -109,7 +109,7 @@ class GuidedEngine {
   }
   GuideStatus begin();
   GuideStatus advise(GuideCause cause, bool opened = false) noexcept;
-  void recalibrate() noexcept;
+  void recalibrate(const engine::Cylinder& calibrated) noexcept;
 
   Seeking seeking_;
   ModelOptimum model_;
