@@ -340,7 +340,7 @@ class ModelOptimum:
         ...
     def _curves(self, point: mgdd._core.engine.OperatingPoint, names: collections.abc.Sequence[str]) -> list[Curve] | None:
         """
-        J and indicators over SOC at one operating point; None where there is no such cycle.
+        J and indicators over SOC at one operating point; None where the model has no physical cycle.
         """
     def _find(self, point: mgdd._core.engine.OperatingPoint) -> dict:
         """
@@ -450,7 +450,7 @@ class GuidedEngine:
     """
     The guided loop of an engine; see mgdd.guide.GuidedEngine.
     """
-    def __init__(self, seeker: typing.Any, model: ModelOptimum, calibration: OnlineCalibration, point: mgdd._core.engine.OperatingPoint, *, changed_share: typing.SupportsFloat | typing.SupportsIndex, calibrated_sd_cad: typing.SupportsFloat | typing.SupportsIndex, recalibrated_cad: typing.SupportsFloat | typing.SupportsIndex, calibration_rate_cad: typing.SupportsFloat | typing.SupportsIndex, noise_sd: typing.SupportsFloat | typing.SupportsIndex | None) -> None:
+    def __init__(self, seeker: typing.Any, model: ModelOptimum, calibration: OnlineCalibration | None, point: mgdd._core.engine.OperatingPoint, *, changed_share: typing.SupportsFloat | typing.SupportsIndex, calibrated_sd_cad: typing.SupportsFloat | typing.SupportsIndex, recalibrated_cad: typing.SupportsFloat | typing.SupportsIndex, calibration_rate_cad: typing.SupportsFloat | typing.SupportsIndex, noise_sd: typing.SupportsFloat | typing.SupportsIndex | None, keep_start: bool) -> None:
         ...
     def _at(self, point: mgdd._core.engine.OperatingPoint) -> str:
         """
