@@ -16,7 +16,9 @@ TEST(GuidedEngine, TheModelLearnsWhileTheEngineSeeks) {
     GuidedEngine guided(curve_seeking(rough_model(), point), rough_model(), calibration(), point);
     EXPECT_NEAR(guided.now().guide_cad, -1.5, 0.2);
     const std::vector<double> path = path_of(bench, guided, 60);
-    EXPECT_NEAR(guided.calibration().value().cylinder().wall_heat.wall_heat_scale, 0.5, 0.025);
+    const auto& calibrated = guided.calibration();
+    ASSERT_TRUE(calibrated.has_value());
+    EXPECT_NEAR(calibrated->cylinder().wall_heat.wall_heat_scale, 0.5, 0.025);
     EXPECT_NEAR(guided.now().guide_cad, plant_best_cad, 0.4) << "the calibrated model says where the plant's best is";
     EXPECT_GT(guided.recalibrations(), 0);
     EXPECT_NEAR(path.back(), plant_best_cad, 1.2);

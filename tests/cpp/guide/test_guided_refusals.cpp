@@ -98,7 +98,9 @@ TEST(GuidedEngine, BadPressureNeverReachesTheCalibration) {
     const double j[] = {c.j};
     EXPECT_EQ(guided.tell({j, {}, false}, spoilt), TellStatus::accepted);
   }
-  EXPECT_EQ(guided.calibration().value().accepted(), 0);
+  const auto& calibrated = guided.calibration();
+  ASSERT_TRUE(calibrated.has_value());
+  EXPECT_EQ(calibrated->accepted(), 0);
   EXPECT_EQ(guided.recalibrations(), 0);
   EXPECT_NEAR(guided.estimate()[0], plant_best_cad, 1.5) << "the seeker goes on";
 }
