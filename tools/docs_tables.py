@@ -69,7 +69,7 @@ __all__ = [
     "woschni_units",
 ]
 
-LABEL_COLUMNS = {"woschni_units": 2, "burn_laws": 2, "variables": 3, "esc_cases": 2, "seekers": 2}
+LABEL_COLUMNS = {"woschni_units": 2, "burn_laws": 2, "variables": 3, "esc_cases": 2, "seekers": 2, "guided_plane": 2}
 
 
 # --- calibration while the engine runs ----------------------------------------------------------------------
@@ -135,10 +135,12 @@ def guided_plane() -> Rows:
         [SteadyMap.of(EngineBench(point=OperatingPoint(speed_rpm=float(n), fuel_mg=float(m)))) for m in fuels]
         for n in speeds
     ]
-    planes = [plane_study.run_plane(name, maps) for name in ("none", *plane_study.PLANE_GUIDES)]
+    planes = [plane_study.run_plane(form, name, maps) for form, name in plane_study.PLANE_RUNS]
     names = ("cells_slower", "cells_costlier", "worst_cost_over_unguided", "mean_cycles", "mean_cycles_saved")
     rows = [plane_study.plane_row(plane, planes[0]) for plane in planes]
-    return {row["guide"]: [float(row[name]) for name in (*names, "lost_over_unguided")] for row in rows}
+    return {
+        f"{row['form']} {row['guide']}": [float(row[name]) for name in (*names, "lost_over_unguided")] for row in rows
+    }
 
 
 def sensors() -> Rows:

@@ -22,12 +22,13 @@ def result(quick_study: Callable[..., StudyResult]) -> StudyResult:
 
 
 def test_cells_are_compared_one_by_one() -> None:
-    none = Plane(name="none", cycles=np.array([[50.0, 0.0]]), lost=np.array([[20.0, 2.0]]))
-    own = Plane(name="own", cycles=np.array([[10.0, 2.0]]), lost=np.array([[5.0, 2.5]]))
+    none = Plane(form="none", name="none", cycles=np.array([[50.0, 0.0]]), lost=np.array([[20.0, 2.0]]))
+    own = Plane(form="curve", name="own", cycles=np.array([[10.0, 2.0]]), lost=np.array([[5.0, 2.5]]))
     row = plane_row(own, none)
     assert (row["cells"], row["cells_slower"], row["cells_costlier"]) == (2, 1, 1)
     assert row["worst_cost_over_unguided"] == 1.25
-    near = Plane(name="near", cycles=np.array([[60.0, 0.0]]), lost=np.array([[20.1, 2.01]]))  # half a percent more
+    lost = np.array([[20.1, 2.01]])  # half a percent more
+    near = Plane(form="curve", name="near", cycles=np.array([[60.0, 0.0]]), lost=lost)
     assert (plane_row(near, none)["cells_slower"], plane_row(near, none)["cells_costlier"]) == (1, 0)
     assert (row["mean_cycles"], row["mean_cycles_saved"]) == (6.0, 19.0)
     assert row["lost_over_unguided"] == pytest.approx(7.5 / 22.0)
@@ -36,10 +37,16 @@ def test_cells_are_compared_one_by_one() -> None:
 def test_a_guide_reaches_a_far_cell_at_once_and_the_plain_seeker_does_not() -> None:
     cell = OperatingPoint(speed_rpm=2700.0, fuel_mg=34.0)
     maps = [[SteadyMap.of(EngineBench(point=cell))]]
-    none, heat = (run_plane(name, maps, speeds=[2700.0], fuels=[34.0]) for name in ("none", "wall heat -30 %"))
+    name = "wall heat -30 %"
+    none, heat, curve = (
+        run_plane(form, name, maps, speeds=[2700.0], fuels=[34.0])
+        for form, name in (("none", "none"), ("feed-forward", name), ("curve", name))
+    )
     assert none.cycles[0, 0] > 60.0
     assert heat.cycles[0, 0] <= 3.0  # two cycles of the test of the guide
     assert heat.lost[0, 0] < 0.2 * none.lost[0, 0]
+    assert curve.cycles[0, 0] <= 1.0  # the curve needs no test
+    assert curve.lost[0, 0] < 0.5 * heat.lost[0, 0]
 
 
 def test_sequence_few_seeds(result: StudyResult) -> None:
@@ -60,15 +67,18 @@ def test_loss_of_the_table_is_that_of_the_dataset(result: StudyResult) -> None:
 
 
 def test_plane_few_cells(result: StudyResult) -> None:
-    rows = {row["guide"]: row for row in result.summary["plane"]}
-    assert rows["none"]["mean_cycles_saved"] == 0.0
-    assert rows["wall heat +30 %"]["mean_cycles_saved"] > 30.0
-    good = [rows[name] for name in ("wall heat -30 %", "wall heat +30 %", "duration -15 %")]
-    assert [bar["met"] for bar in result.summary["bars"]] == [
-        all(row["cells_slower"] == 0 for row in good),
-        all(row["cells_costlier"] == 0 for row in good),
-        rows["adiabatic"]["worst_cost_over_unguided"] <= 1.2,
-    ]
+    rows = {(row["form"], row["guide"]): row for row in result.summary["plane"]}
+    assert rows["none", "none"]["mean_cycles_saved"] == 0.0
+    met = []
+    for form in ("feed-forward", "curve"):
+        assert rows[form, "wall heat +30 %"]["mean_cycles_saved"] > 30.0
+        good = [rows[form, name] for name in ("wall heat -30 %", "wall heat +30 %", "duration -15 %")]
+        met += [
+            all(row["cells_slower"] == 0 for row in good),
+            all(row["cells_costlier"] == 0 for row in good),
+            rows[form, "adiabatic"]["worst_cost_over_unguided"] <= 1.2,
+        ]
+    assert [bar["met"] for bar in result.summary["bars"]] == met
 
 
 def test_dataset_and_figures(result: StudyResult) -> None:

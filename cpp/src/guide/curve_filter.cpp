@@ -21,7 +21,7 @@ constexpr double guess_counts = 4.0;     // readings that the first guess of the
 constexpr double least_scale = 0.1;      // a curve flatter than this, or upside down, is hardly believed
 constexpr double scale_penalty = 1500.0;
 // Of the variance that fading leaves: closed loops read more than their dither does. Makes the stated 95 % hold.
-constexpr double calibrated = 0.6;
+constexpr double calibrated = 0.5;
 
 }  // namespace
 

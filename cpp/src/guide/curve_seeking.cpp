@@ -24,8 +24,10 @@ constexpr double point_doubt_share = 0.2;  // of prior_sd: how the guide's error
 constexpr double lost_share = 0.5;         // the same where the guide says nothing of the new point
 
 // A doubt: two readings in a row about three standard deviations off, or several somewhat less.
-constexpr double surprise_memory = 0.8, surprise_cap = 9.0, surprise_limit = 3.2, kept_in_doubt = 0.01;
+constexpr double surprise_share = 0.2, surprise_cap = 9.0, surprise_limit = 3.2, kept_in_doubt = 0.01;
+constexpr double patience = 0.2;  // of a lag: behind it no change is sudden, and more readings are heard before a doubt
 constexpr std::int64_t calm_cycles = 10;
+constexpr double trying_share = 0.04;  // of prior_sd: steps where every input breaks a limit of unknown slope
 // A hand-over: four doubts within about 80 cycles, or readings that scatter far less than the curve fits.
 constexpr double doubt_memory_cycles = 80.0, doubt_rate_limit = 3.0;
 constexpr double worst_ratio = 0.12, good_ratio = 0.6;  // of the noise seen to what the curve leaves unexplained
@@ -77,6 +79,10 @@ CurveSeekingSettings checked(CurveSeekingSettings s) {
   return s;
 }
 
+double surprise_share_of(const optimize::ComponentLag& sensor) noexcept {
+  return surprise_share / (1.0 + patience * sensor.lag_cycles);
+}
+
 CurveFilterSettings filter_settings(const CurveSeekingSettings& s) {
   const CurveFilterSettings out{s.space.lower[0], s.space.upper[0], s.prior_sd,      s.scale_sd,
                                 s.discrepancy,    s.noise_sd,       s.memory_cycles, s.sensor.lag_cycles};
@@ -121,8 +127,12 @@ double CurveSeeking::amplitude() const noexcept {
   const double faded = std::exp(-1.0 / settings_.memory_cycles);
   const double readings = (1.0 + faded) / (1.0 - faded);
   const double bend = filter_.curvature();
+  // Beyond a limit that holds the estimate back nothing is gained by knowing the place.
+  const double held_back =
+      limits_.size() > 0 && filter_.readings() > 0.0 ? std::abs(filter_.mean() - estimate_[0]) : 0.0;
   const double cheapest = std::sqrt(filter_.noise_sd() / (std::abs(bend) * std::sqrt(readings)));
-  return std::min(std::max(filter_.search_sd() - modest_share * cheapest, cheapest), settings_.amplitude_max);
+  return std::min(std::max(filter_.search_sd() - held_back - modest_share * cheapest, cheapest),
+                  settings_.amplitude_max);
 }
 
 const Inputs& CurveSeeking::ask() noexcept {
@@ -146,6 +156,9 @@ const Inputs& CurveSeeking::ask() noexcept {
 double CurveSeeking::within_limits(double wanted) noexcept {
   if (limits_.size() == 0) return wanted;
   const double allowed = limits_.nearest(wanted);
+  if (settings_.limit_curves.empty() && limits_.excess(allowed) > 0.0) {
+    return allowed + (upwards_ ? trying_share : -trying_share) * settings_.prior_sd;
+  }
   if (allowed == wanted || plain_at_work_) return allowed;
   const double reach = std::min(std::abs(wanted - estimate_[0]), 0.5 * amplitude());
   const double inside = allowed + std::copysign(reach, allowed - wanted);
@@ -190,7 +203,8 @@ void CurveSeeking::learn(double cause, double j) noexcept {
   filter_.learn(cause, j);
   ++since_doubt_;
   doubt_rate_ *= std::exp(-1.0 / doubt_memory_cycles);
-  if (surprise_ > surprise_limit && since_doubt_ > calm_cycles) {
+  const double usual = std::sqrt(surprise_share_of(settings_.sensor) / surprise_share);  // scatter of a longer mean
+  if (surprise_ > 1.0 + (surprise_limit - 1.0) * usual && since_doubt_ > calm_cycles) {
     filter_.forget(kept_in_doubt);
     surprise_ = 1.0;
     since_doubt_ = 0;
@@ -198,17 +212,21 @@ void CurveSeeking::learn(double cause, double j) noexcept {
     repeats_ = 0;  // what the curve leaves is counted anew, and so is the noise it is held against
     ++doubts_;
   }
-  estimate_[0] = limits_.size() > 0 ? limits_.nearest(filter_.mean()) : filter_.mean();
+  estimate_[0] = allowed_mean();
   const bool misfit = repeats_ >= fewest_repeats && !(trust() > 0.0);
   if (settings_.hand_over && (doubt_rate_ > doubt_rate_limit || misfit)) take_over();
+}
+
+double CurveSeeking::allowed_mean() noexcept {
+  return limits_.size() > 0 ? limits_.nearest(filter_.mean()) : filter_.mean();
 }
 
 void CurveSeeking::judge_surprise(double input, double j) noexcept {
   if (!(filter_.readings() > 0.0)) return;
   const CurveFilter::Prediction expected = filter_.predict(input);
   const double off = j - expected.mean;
-  surprise_ =
-      surprise_memory * surprise_ + (1.0 - surprise_memory) * std::min(off * off / expected.variance, surprise_cap);
+  surprise_ +=
+      surprise_share_of(settings_.sensor) * (std::min(off * off / expected.variance, surprise_cap) - surprise_);
 }
 
 // Two readings of one side, two cycles apart and close together, differ by noise alone: half their squared difference.
@@ -253,7 +271,7 @@ bool CurveSeeking::usable(const Curve& curve) const noexcept {
 bool CurveSeeking::believe(const Curve& curve, double sd) noexcept {
   if (!usable(curve) || !(sd > 0.0)) return false;
   filter_.believe(curve, std::min(sd, settings_.prior_sd));
-  if (!plain_at_work_ && (filter_.readings() > 0.0 || protocol_.cycle == 0)) estimate_[0] = filter_.mean();
+  if (!plain_at_work_ && (filter_.readings() > 0.0 || protocol_.cycle == 0)) estimate_[0] = allowed_mean();
   return true;
 }
 

@@ -32,6 +32,7 @@ __all__ = [
     "curve_seeker",
     "drive",
     "first_within",
+    "guided_by",
     "stays_within",
     "trimmed",
     "verdict_on",
@@ -145,6 +146,15 @@ def curve_seeker(curve: Curve, *, start: float | None = None, delay: float = 0.0
         start=curve.best if start is None else start, lower=BOUNDS_CAD[0], upper=BOUNDS_CAD[1], curve=curve,
         delay_cycles=delay, lag_cycles=lag,
     )  # fmt: skip
+
+
+def guided_by(form: str, guide: Guide | None, point: OperatingPoint) -> FeedForward | GuidedEngine:
+    """Make what a guide does in a changing engine: the trim of `trimmed`, or for ``curve`` a curve that follows it."""
+    if form != "curve":
+        return trimmed(guide)
+    if guide is None:
+        raise ValueError("a curve needs a guide")
+    return GuidedEngine(curve_seeker(guide.curve(point)), guide.model, point)
 
 
 @dataclass(frozen=True)

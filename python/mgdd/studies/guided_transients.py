@@ -9,12 +9,11 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from mgdd.engine import OperatingPoint
-from mgdd.guide import GuidedEngine
 from mgdd.loop import EngineBench
 from mgdd.results.labels import labelled_dataset, to_jsonable
 from mgdd.studies.base import Progress, StudyResult, check_seeds, finish, run_parts
-from mgdd.studies.guide_cases import GUIDES, Guide, SteadyMap, curve_seeker, drive, trimmed, verdict_on
-from mgdd.studies.guided_plane import FUELS_MG, PLANE_GUIDES, SPEEDS_RPM, Plane, plane_row, run_plane
+from mgdd.studies.guide_cases import GUIDES, Guide, SteadyMap, drive, guided_by, verdict_on
+from mgdd.studies.guided_plane import FUELS_MG, PLANE_GUIDES, PLANE_RUNS, SPEEDS_RPM, Plane, plane_row, run_plane
 from mgdd.studies.guided_transients_figures import draw
 from mgdd.studies.statistics import mean_interval, with_interval
 
@@ -104,8 +103,8 @@ def run_guided_transients(
             for n in speeds
         ]
         each = [
-            (f"plane, {name}", partial(run_plane, name, cells, speeds=speeds, fuels=fuels))
-            for name in ("none", *PLANE_GUIDES)
+            (f"plane, {form}, {name}", partial(run_plane, form, name, cells, speeds=speeds, fuels=fuels))
+            for form, name in PLANE_RUNS
         ]
         planes, interrupted = run_parts(each, progress)
     table = [plane_row(plane, planes[0]) for plane in planes]
@@ -127,13 +126,7 @@ def _sequence(form: str, name: str, points: list[OperatingPoint], maps: list[Ste
     lost, estimates = [], []
     for seed in range(seeds):
         bench = EngineBench(schedule=schedule, seed=seed)
-        if form == "curve":
-            guide = guides[name]
-            run = drive(
-                bench, GuidedEngine(curve_seeker(guide.curve(points[0])), guide.model, points[0]), _DWELL * len(points)
-            )
-        else:
-            run = drive(bench, trimmed(guides.get(name)), _DWELL * len(points))
+        run = drive(bench, guided_by(form, guides.get(name), points[0]), _DWELL * len(points))
         parts = run.applied.reshape(len(points), _DWELL)
         lost.append(np.concatenate([own.lost(part) for own, part in zip(maps, parts, strict=True)]))
         estimates.append(run.estimate)
@@ -155,16 +148,18 @@ def _row(own: _Drive, none: _Drive) -> dict[str, Any]:
 
 
 def _bars(table: list[dict[str, Any]]) -> list[dict[str, Any]]:
-    known = {row["guide"]: row for row in table}
-    good = [known[name] for name in PLANE_GUIDES[:-1] if name in known]
     bars = []
-    for key, text in (("cells_slower", "more cycles to 1 CAD"), ("cells_costlier", "over 1 % more loss")):
-        if good:
-            said = f"plane, wall heat ±30 % and duration -15 %: cells with {text} than unguided"
-            bars.append(verdict_on(said, [float(row[key]) for row in good], "none", high=0.0))
-    if "adiabatic" in known:
-        worst = [known["adiabatic"]["worst_cost_over_unguided"]]
-        bars.append(verdict_on("plane, adiabatic: worst cost over unguided [-]", worst, "at most 1.2", high=1.2))
+    for form in ("feed-forward", "curve"):
+        known = {row["guide"]: row for row in table if row["form"] == form}
+        good = [known[name] for name in PLANE_GUIDES[:-1] if name in known]
+        for key, text in (("cells_slower", "more cycles to 1 CAD"), ("cells_costlier", "over 1 % more loss")):
+            if good:
+                said = f"plane, {form}, wall heat ±30 % and duration -15 %: cells with {text} than unguided"
+                bars.append(verdict_on(said, [float(row[key]) for row in good], "none", high=0.0))
+        if "adiabatic" in known:
+            worst = [known["adiabatic"]["worst_cost_over_unguided"]]
+            said = f"plane, {form}, adiabatic: worst cost over unguided [-]"
+            bars.append(verdict_on(said, worst, "at most 1.2", high=1.2))
     return bars
 
 
@@ -192,9 +187,10 @@ def _dataset(done: list[_Drive], planes: list[Plane], maps: list[SteadyMap], spe
         "fuel_mg": ("cycle", np.repeat([fuel for _, fuel in SEQUENCE], _DWELL), "mg", "fuel per cycle"),
     }
     if planes:
-        dims = ("plane_guide", "plane_speed_rpm", "plane_fuel_mg")
+        dims = ("plane_run", "plane_speed_rpm", "plane_fuel_mg")
+        named = ["unguided" if plane.form == "none" else f"{plane.form}, {plane.name}" for plane in planes]
         variables |= {
-            "plane_guide": ("plane_guide", [plane.name for plane in planes], "-", "guide"),
+            "plane_run": ("plane_run", named, "-", "form and guide"),
             "plane_speed_rpm": ("plane_speed_rpm", speeds, "rpm", "engine speed"),
             "plane_fuel_mg": ("plane_fuel_mg", fuels, "mg", "fuel per cycle"),
             "plane_cycles": (dims, [plane.cycles for plane in planes], "-", "cycles to 1 °CA after the step"),

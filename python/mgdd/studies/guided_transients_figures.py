@@ -46,7 +46,7 @@ def draw(dataset: xr.Dataset) -> dict[str, Figure]:
     for ax in (timing, loss, point):
         ax.grid(alpha=0.3)
     out = {"A sequence of twelve operating points: medians of the estimate, loss with its 95 % interval": figure}
-    if "plane_guide" in dataset:
+    if "plane_run" in dataset:
         out["Loss in the 200 cycles after a step from 1500 rpm and 20 mg, over that of the unguided seeker"] = _plane(
             dataset
         )
@@ -56,20 +56,24 @@ def draw(dataset: xr.Dataset) -> dict[str, Figure]:
 def _plane(dataset: xr.Dataset) -> Figure:
     from matplotlib.figure import Figure
 
-    names = [str(name) for name in dataset["plane_guide"].to_numpy()][1:]
-    figure = Figure(figsize=(12.5, 3.8), layout="constrained")
+    names = [str(name) for name in dataset["plane_run"].to_numpy()][1:]
     lost = dataset["plane_lost"].to_numpy()
     speeds, fuels = dataset["plane_speed_rpm"].to_numpy(), dataset["plane_fuel_mg"].to_numpy()
-    axes = figure.subplots(1, max(len(names), 1), sharey=True, squeeze=False)[0]
-    for ax, name, own in zip(axes, names, lost[1:], strict=False):
+    rows = 2 if len(names) > 1 else 1
+    columns = max(-(-len(names) // rows), 1)
+    figure = Figure(figsize=(3.1 * columns, 3.4 * rows), layout="constrained")
+    grid = figure.subplots(rows, columns, sharex=True, sharey=True, squeeze=False)
+    for ax, name, own in zip(grid.flat, names, lost[1:], strict=False):
         shares = own / lost[0]
         mesh = ax.pcolormesh(speeds, fuels, shares.T, cmap="cividis_r", vmin=0.0, vmax=1.4, shading="nearest")
         for i, j in np.ndindex(*shares.shape):
             color = "white" if shares[i, j] > 0.6 else "black"
             ax.text(speeds[i], fuels[j], f"{shares[i, j]:.2f}", ha="center", va="center", fontsize=6.0, color=color)
         ax.set_title(name, loc="left", fontsize="small")
+    for ax in grid[-1]:
         ax.set_xlabel("speed [rpm]")
-    axes[0].set_ylabel("fuel [mg]")
+    for ax in grid[:, 0]:
+        ax.set_ylabel("fuel [mg]")
     if names:
-        figure.colorbar(mesh, ax=list(axes), label="loss over unguided [-]")
+        figure.colorbar(mesh, ax=list(grid.flat), label="loss over unguided [-]")
     return figure

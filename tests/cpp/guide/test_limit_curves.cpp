@@ -146,6 +146,58 @@ TEST_P(LimitedSeeking, KeepsTheLimitAndEndsAtIt) {
   EXPECT_NEAR(end, 94.0, 1.5);
 }
 
+// The place beyond the limit stays unknown for ever; looking for it costs J.
+TEST_P(LimitedSeeking, DithersAtTheLimitNoMoreThanItMust) {
+  const auto [drawn, delay] = GetParam();
+  CurveSeeking seeker(limited(drawn, {delay, 0.0}));
+  std::vector<double> read;
+  double reach = 0.0;
+  for (int k = 0; k < 400; ++k) {
+    const auto at = static_cast<std::uint64_t>(k);
+    const double x = seeker.ask()[0];
+    read.push_back(peak_bar(x));
+    const auto late = static_cast<std::size_t>(std::max(0.0, k - delay));
+    const double j[] = {-0.025 * (x + 8.0) * (x + 8.0) + 0.25 * random::normal(21, 2, at)};
+    const double limit[] = {read[late] + 0.3 * random::normal(21, 1, at)};
+    ASSERT_EQ(seeker.tell({j, limit, false}), optimize::TellStatus::accepted);
+    if (k >= 200) reach = std::max(reach, std::abs(x - seeker.estimate()[0]));
+  }
+  EXPECT_LT(reach, 1.5);
+}
+
+TEST_P(LimitedSeeking, LeavesAStartAboveTheLimit) {
+  const auto [drawn, delay] = GetParam();
+  CurveSeekingSettings settings = limited(drawn, {delay, 0.0});
+  for (const double start : {-22.0, -9.0}) {
+    settings.space.start = scalar_input(start);
+    CurveSeeking seeker(settings);
+    std::vector<double> read;
+    double above = 0.0;
+    for (int k = 0; k < 200; ++k) {
+      const auto at = static_cast<std::uint64_t>(k);
+      const double x = seeker.ask()[0];
+      read.push_back(peak_bar(x));
+      const auto late = static_cast<std::size_t>(std::max(0.0, k - delay));
+      const double j[] = {-0.025 * (x + 8.0) * (x + 8.0) + 0.25 * random::normal(22, 2, at)};
+      const double limit[] = {read[late] + 0.5 * random::normal(22, 1, at)};
+      ASSERT_EQ(seeker.tell({j, limit, false}), optimize::TellStatus::accepted);
+      if (k >= 60) above += peak_bar(x) > 95.0;
+    }
+    EXPECT_LE(above, 3.0) << "start " << start;
+    EXPECT_NEAR(peak_bar(seeker.estimate()[0]), 93.5, 2.0) << "start " << start;
+  }
+}
+
+TEST(LimitCurves, ABetterGuideMovesNothingOverTheLimit) {
+  CurveSeeking seeker(limited(true));
+  for (int k = 0; k < 100; ++k) {
+    const double x = seeker.ask()[0], j[] = {-0.025 * (x + 8.0) * (x + 8.0)}, limit[] = {peak_bar(x)};
+    seeker.tell({j, limit, false});
+  }
+  ASSERT_TRUE(seeker.believe(Curve::parabola(-0.05, -9.0, 60.0), 1.0));
+  EXPECT_LE(peak_bar(seeker.estimate()[0]), 95.0);
+}
+
 INSTANTIATE_TEST_SUITE_P(DrawnOrNot, LimitedSeeking, testing::Combine(testing::Bool(), testing::Values(0.0, 10.0)));
 
 TEST(LimitCurves, GoOnBitForBitFromTheStateOfTheSeeker) {

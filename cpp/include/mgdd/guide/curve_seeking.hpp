@@ -116,6 +116,7 @@ class CurveSeeking {
  private:
   double amplitude() const noexcept;
   double within_limits(double wanted) noexcept;
+  double allowed_mean() noexcept;
   void learn(double applied, double j) noexcept;
   void watch_repeats(double applied, double j) noexcept;
   void judge_surprise(double input, double j) noexcept;
