@@ -2,9 +2,11 @@
 
 from __future__ import annotations
 
+import importlib.util
 import json
 import math
 from collections.abc import Callable
+from pathlib import Path
 
 import numpy as np
 import pytest
@@ -250,6 +252,23 @@ def test_a_guide_that_learns_with_few_seeds(calibrated: StudyResult) -> None:
         assert steps[engine, "feed-forward", BURN.name]["lost_less"] > 1.0
     assert len(calibrated.summary["settings"]) == 2 * len(VARIANTS)
     assert len(calibrated.summary["refits"]) == 4
+
+
+def test_the_page_has_the_rows_of_the_study(root: Path, online: StudyResult, calibrated: StudyResult) -> None:
+    """Labels alone: the numbers there are of 200 seeds, and `tools/study_tables.py` prints them."""
+    spec = importlib.util.spec_from_file_location("study_tables", root / "tools" / "study_tables.py")
+    assert spec is not None
+    assert spec.loader is not None
+    tool = importlib.util.module_from_spec(spec)
+    spec.loader.exec_module(tool)
+    page = (root / "docs" / "studies.md").read_text(encoding="utf-8").splitlines()
+    for result in (online, calibrated):
+        for lines in tool.tables(result.name, result.summary).values():
+            at = page.index(lines[0])
+            words = [[cell for cell in line.split(" | ") if not any(map(str.isdigit, cell))] for line in lines[2:]]
+            for own, printed in zip(words, page[at + 2 :], strict=False):
+                assert all(cell in printed for cell in own if cell not in ("– |", "–", "never", "never |"))
+            assert not page[at + len(lines)].startswith("|")
 
 
 def test_datasets_figures_and_bars(online: StudyResult, calibrated: StudyResult) -> None:
