@@ -1,7 +1,7 @@
-"""Print the tables of docs/studies.md that take a full run of a study, as they stand there.
+"""Print the tables of docs/studies.md that take a full run of a study, or put them there.
 
-Run `python tools/study_tables.py online-calibration calibrated-guide` with the package installed; it takes half
-an hour. With `--json FILE ...` it prints them of what `mgdd study NAME --json` has said, in a second.
+Run `python tools/study_tables.py [--page docs/studies.md] online-calibration calibrated-guide` with the package
+installed; it takes a quarter of an hour. With `--json FILE ...` it takes what `mgdd study NAME --json` has printed.
 """
 
 from __future__ import annotations
@@ -14,7 +14,7 @@ from typing import Any
 
 from mgdd.studies import run_study
 
-__all__ = ["TABLES", "tables"]
+__all__ = ["TABLES", "put_into", "tables"]
 
 Row = Mapping[str, Any]
 Column = tuple[str, Callable[[Row], str]]
@@ -168,11 +168,24 @@ def _settings(rows: Sequence[Row]) -> list[str]:
     )
 
 
+def put_into(page: str, name: str, summary: Mapping[str, Any]) -> str:
+    """Put the tables into a page in place of those with the same head."""
+    lines = page.split("\n")
+    for new in tables(name, summary).values():
+        if new[0] not in lines:
+            raise SystemExit(f"the page has no table with the head {new[0]}")
+        first = lines.index(new[0])
+        last = first + next(k for k, line in enumerate(lines[first:]) if not line.startswith("|"))
+        lines[first:last] = new
+    return "\n".join(lines)
+
+
 def main() -> None:
     """Run the studies that are named, or read what they said, and print their tables."""
     parser = argparse.ArgumentParser(description=(__doc__ or "").splitlines()[0])
     parser.add_argument("study", nargs="*", choices=[[], *TABLES], help="which; all of them if none is named")
     parser.add_argument("--json", nargs="+", type=Path, default=[], help="what `mgdd study NAME --json` has printed")
+    parser.add_argument("--page", type=Path, metavar="FILE", help="also put them into this page")
     options = parser.parse_args()
     found = [json.loads(file.read_text(encoding="utf-8")) for file in options.json]
     if not found:
@@ -181,6 +194,9 @@ def main() -> None:
         for part, lines in tables(summary["study"], summary).items():
             print(f"\n{summary['study']}, {part}\n")
             print("\n".join(lines))
+        if options.page:
+            page = options.page.read_text(encoding="utf-8")
+            options.page.write_text(put_into(page, summary["study"], summary), encoding="utf-8")
         for bar in summary["bars"]:
             print(f"{'met' if bar['met'] else 'MISSED':6} {bar['bar']}: {bar['worst']} ({bar['limit']})")
 

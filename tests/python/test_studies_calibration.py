@@ -19,6 +19,7 @@ from mgdd.studies.calibrated_guide_cases import (
     BURN,
     HEAT,
     NONE,
+    STEADY,
     VARIANTS,
     WIEBE_45,
     WIEBE_60,
@@ -28,7 +29,7 @@ from mgdd.studies.calibrated_guide_cases import (
     refits_of,
     step_run,
 )
-from mgdd.studies.calibrated_guide_rows import Case, Runs, Steps, bars, refit_row, row, step_row
+from mgdd.studies.calibrated_guide_rows import Case, Runs, Steps, bars, findings, refit_row, row, step_row
 from mgdd.studies.calibration_facts import TRUE_SCALE, WRONG, calibration_facts, fact_bars
 from mgdd.studies.guide_cases import SteadyMap
 from mgdd.studies.online_calibration import CYCLES, ERRORS, NOISES, WAYS, Sensor, Taught, row_of, teach
@@ -222,6 +223,21 @@ def test_bars_name_what_is_missed() -> None:
     assert [(bar["worst"], bar["met"]) for bar in found] == [(None, False), (0.6, False), (-0.1, False), (25.0, False)]
 
 
+def test_findings_say_what_is_beyond_the_interval() -> None:
+    def said(name: str, gain: float, half: float) -> dict[str, float]:
+        return {name: gain, f"{name}_low": gain - half, f"{name}_high": gain + half}
+
+    own = {"calibrated": HEAT.name, "tdc_error_cad": 0.0}
+    rows = [own | said("late_error_less_cad", gain, 0.02) for gain in (-0.05, 0.01, 0.03)]
+    late = own | {"tdc_error_cad": 0.3} | said("late_error_less_cad", 9.0, 0.1)
+    steps = [{"form": "curve", "calibrated": BURN.name} | said("lost_less", 2.1, 0.4)]
+    point, step = findings([*rows, late], steps)
+    assert "wall heat: the mean error after 60 cycles is -0.05 to 0.03 °CA less than without calibration" in point
+    assert point.endswith("better in 1 of 3 cases, worse in 1.")
+    assert "curve, wall heat and burn: the loss is 2.1 to 2.1 points x cycles less" in step
+    assert step.endswith("better in 1 of 1 cases, worse in 0.")
+
+
 def test_a_load_step_asks_the_guide_for_the_new_point() -> None:
     cycles, best = 8, [ModelOptimum(WRONG)(OperatingPoint(fuel_mg=mg)) for mg in (12.0, 30.0)]
     for form in ("curve", "feed-forward"):
@@ -247,7 +263,11 @@ def test_a_guide_that_learns_with_few_seeds(calibrated: StudyResult) -> None:
         if recipe == "wall heat and burn":
             assert abs(own["guide_error_end_cad"]) < 4.0
     steps = {(own["engine"], own["form"], own["calibrated"]): own for own in calibrated.summary["load_step"]}
-    assert len(steps) == 12
+    assert len(steps) == 16
+    steady = steps[WIEBE_45.name, "curve", STEADY.name]
+    assert steady["guide_error_cad"] == pytest.approx(
+        steps[WIEBE_45.name, "curve", HEAT.name]["guide_error_cad"], abs=0.2
+    )
     for engine in (WIEBE_45.name, WIEBE_60.name):
         assert steps[engine, "feed-forward", BURN.name]["lost_less"] > 1.0
     assert len(calibrated.summary["settings"]) == 2 * len(VARIANTS)
@@ -261,7 +281,8 @@ def test_the_page_has_the_rows_of_the_study(root: Path, online: StudyResult, cal
     assert spec.loader is not None
     tool = importlib.util.module_from_spec(spec)
     spec.loader.exec_module(tool)
-    page = (root / "docs" / "studies.md").read_text(encoding="utf-8").splitlines()
+    text = (root / "docs" / "studies.md").read_text(encoding="utf-8")
+    page = text.splitlines()
     for result in (online, calibrated):
         for lines in tool.tables(result.name, result.summary).values():
             at = page.index(lines[0])
@@ -269,6 +290,10 @@ def test_the_page_has_the_rows_of_the_study(root: Path, online: StudyResult, cal
             for own, printed in zip(words, page[at + 2 :], strict=False):
                 assert all(cell in printed for cell in own if cell not in ("– |", "–", "never", "never |"))
             assert not page[at + len(lines)].startswith("|")
+        other = tool.put_into(text, result.name, result.summary)
+        assert other != text
+        assert len(other.splitlines()) == len(page)
+        assert tool.put_into(other, result.name, result.summary) == other
 
 
 def test_datasets_figures_and_bars(online: StudyResult, calibrated: StudyResult) -> None:

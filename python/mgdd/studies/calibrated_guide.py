@@ -13,6 +13,7 @@ from mgdd.studies.calibrated_guide_cases import (
     BURN,
     HEAT,
     RECIPES,
+    STEADY,
     VARIANTS,
     WIEBE_45,
     WIEBE_60,
@@ -32,6 +33,7 @@ from mgdd.studies.calibrated_guide_rows import (
     Runs,
     Steps,
     bars,
+    findings,
     refit_row,
     row,
     setting_row,
@@ -85,8 +87,9 @@ def run_calibrated_guide(
         absolute error after 60 cycles, how much less it is than without calibration on the same noise, J lost per cycle
         there; how far the guide's best timing is off before, and after 10, 60 and all cycles (median).
         ``summary["refits"]``: what a calibration did to the estimate, against the same cycle without it.
-        ``summary["settings"]``: other parameters, windows and trusts, 100 cycles each. ``summary["load_step"]``: J lost
-        after a load step. ``summary["bars"]``: what was demanded.
+        ``summary["settings"]``: other parameters, windows and trusts, 100 cycles each. ``summary["load_step"]``: J
+        lost after a load step. ``summary["findings"]``: what calibration gains, in words. ``summary["bars"]``: what was
+        demanded.
 
     Raises
     ------
@@ -124,19 +127,24 @@ def run_calibrated_guide(
         settings, interrupted = run_parts([(c.name, partial(seek, c, maps, seeds)) for c in cases], progress)
     if not interrupted:
         each = [
-            (engine, form, recipe) for engine in _ENGINES for form in ("curve", "feed-forward") for recipe in RECIPES
+            (engine, form, recipe)
+            for engine in _ENGINES
+            for form in ("curve", "feed-forward")
+            for recipe in (*RECIPES, STEADY)
         ]
         texts = [f"load step, {form}, {engine.name}, calibrated: {recipe.name}" for engine, form, recipe in each]
         works = [partial(_step, engine, form, recipe, seeds) for engine, form, recipe in each]
         steps, interrupted = run_parts(list(zip(texts, works, strict=True)), progress)
     rows = [row(own, uncalibrated(own, runs)) for own in runs]
+    step_rows = [step_row(own, steps) for own in steps]
     summary = {
         "study": "calibrated-guide",
         "seeds": seeds,
         "rows": rows,
         "refits": refits,
         "settings": [setting_row(own, uncalibrated(own, settings)) for own in settings],
-        "load_step": [step_row(own, steps) for own in steps],
+        "load_step": step_rows,
+        "findings": findings(rows, step_rows),
         "bars": bars(rows, refits),
         "guide_cad": curve_of().best,
         "interrupted": interrupted,

@@ -25,6 +25,7 @@ __all__ = [
     "NOISE_BAR",
     "NONE",
     "RECIPES",
+    "STEADY",
     "VARIANTS",
     "WIEBE_45",
     "WIEBE_60",
@@ -103,6 +104,7 @@ BURN = Recipe(
     uncertainty={"soc_offset_cad": 3.0}, window_cycles=8, sd_cad=5.0,
 )  # fmt: skip
 RECIPES = (NONE, HEAT, BURN)
+STEADY = replace(HEAT, name="wall heat after 20 steady cycles", steady_cycles=20)
 _HALF = {"burn_duration_scale": 0.5}
 VARIANTS = (
     *RECIPES,

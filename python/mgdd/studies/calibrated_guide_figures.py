@@ -69,7 +69,7 @@ def _steps(dataset: xr.Dataset) -> Figure:
     cycle = dataset["after_step"].to_numpy()[:_SHOWN_AFTER]
     for ax, case in zip(axes, cases, strict=True):
         for at, (engine, form, name) in enumerate(parts):
-            if (engine, form) == case:
+            if (engine, form) == case and name in _LOOKS:
                 _band(ax, cycle, dataset.isel(step=at, after_step=slice(_SHOWN_AFTER)), "step_error", name)
         ax.axhspan(-1.5, 1.5, color=GREY, alpha=0.15, linewidth=0.0)
         ax.set_title(f"{case[0]},\n{case[1]}", loc="left", fontsize="small")

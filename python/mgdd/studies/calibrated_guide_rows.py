@@ -15,7 +15,7 @@ from mgdd.studies.statistics import with_interval, with_median_interval
 if TYPE_CHECKING:
     from numpy.typing import NDArray
 
-__all__ = ["Case", "Runs", "Steps", "bars", "refit_row", "row", "setting_row", "step_row", "uncalibrated"]
+__all__ = ["Case", "Runs", "Steps", "bars", "findings", "refit_row", "row", "setting_row", "step_row", "uncalibrated"]
 
 CYCLES, LATE = 200, 60
 TDC_CAD = 0.3
@@ -157,6 +157,32 @@ def step_row(own: Steps, steps: list[Steps]) -> dict[str, Any]:
 
 def _number(value: float | None) -> float:
     return math.inf if value is None else value
+
+
+def findings(rows: list[dict[str, Any]], steps: list[dict[str, Any]]) -> list[str]:
+    """Say in words what calibration gains over the same guide without it."""
+    said = []
+    for name in (HEAT.name, BURN.name):
+        own = [row for row in rows if row["calibrated"] == name and row["tdc_error_cad"] == 0.0]
+        if own:
+            text = f"One operating point, {name}: the mean error after {LATE} cycles is"
+            said.append(f"{text} {_gain(own, 'late_error_less_cad', 2, '°CA')}")
+    for form in ("curve", "feed-forward"):
+        for name in (HEAT.name, BURN.name):
+            own = [row for row in steps if (row["form"], row["calibrated"]) == (form, name)]
+            if own:
+                text = f"After a load step, {form}, {name}: the loss is"
+                said.append(f"{text} {_gain(own, 'lost_less', 1, 'points x cycles')}")
+    return said
+
+
+def _gain(rows: list[dict[str, Any]], name: str, digits: int, unit: str) -> str:
+    gains = [row[name] for row in rows]
+    better = sum(row[f"{name}_low"] > 0.0 for row in rows)
+    worse = sum(row[f"{name}_high"] < 0.0 for row in rows)
+    span = f"{min(gains):.{digits}f} to {max(gains):.{digits}f} {unit}"
+    beyond = f"beyond the 95 % interval better in {better} of {len(rows)} cases, worse in {worse}"
+    return f"{span} less than without calibration, {beyond}."
 
 
 def bars(rows: list[dict[str, Any]], refits: list[dict[str, Any]]) -> list[dict[str, Any]]:
