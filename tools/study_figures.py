@@ -24,6 +24,9 @@ FIGURES = {
     "study_guide_curve.png": ("guided-start-up", 1, 72),
     "study_guide_step.png": ("guide-accuracy", 0, 72),
     "study_guide_drive.png": ("guided-transients", 0, 80),
+    "study_calibration_errors.png": ("online-calibration", 1, 72),
+    "study_guide_learns.png": ("calibrated-guide", 0, 72),
+    "study_guide_learns_step.png": ("calibrated-guide", 1, 72),
     "study_guide_plane.png": ("guided-transients", 1, 72),
 }
 

@@ -33,6 +33,7 @@ __all__ = [
     "drive",
     "first_within",
     "guided_by",
+    "seeker_without_clip",
     "stays_within",
     "trimmed",
     "verdict_on",
@@ -131,13 +132,17 @@ GUIDES: tuple[Guide, ...] = (
 )
 
 
-def trimmed(guide: Guide | None) -> FeedForward:
-    """Make extremum seeking with a moving average, no clip, start at -20 CAD, and the guide as feed-forward."""
-    seeker = ExtremumSeeking(
+def seeker_without_clip() -> ExtremumSeeking:
+    """Make extremum seeking with a moving average, no clip, start at -20 CAD: what a feed-forward leads."""
+    return ExtremumSeeking(
         start=_UNGUIDED_START_CAD, lower=_WIDE_CAD[0], upper=_WIDE_CAD[1], form="moving_average", gain=_GAIN,
         rate=math.inf,
     )  # fmt: skip
-    return FeedForward(seeker, guide)
+
+
+def trimmed(guide: Guide | None) -> FeedForward:
+    """Make extremum seeking with the guide as feed-forward."""
+    return FeedForward(seeker_without_clip(), guide)
 
 
 def curve_seeker(curve: Curve, *, start: float | None = None, delay: float = 0.0, lag: float = 0.0) -> CurveSeeking:

@@ -1,0 +1,205 @@
+"""Print the tables of docs/studies.md that take a full run of a study, or put them there.
+
+Run `python tools/study_tables.py [--page docs/studies.md] online-calibration calibrated-guide` with the package
+installed; it takes a quarter of an hour. With `--json FILE ...` it takes what `mgdd study NAME --json` has printed.
+"""
+
+from __future__ import annotations
+
+import argparse
+import json
+from collections.abc import Callable, Mapping, Sequence
+from pathlib import Path
+from typing import Any
+
+from mgdd.studies import run_study
+
+__all__ = ["TABLES", "put_into", "tables"]
+
+Row = Mapping[str, Any]
+Column = tuple[str, Callable[[Row], str]]
+
+
+def _words(name: str) -> Callable[[Row], str]:
+    return lambda row: str(row[name]).replace("CAD", "°CA")
+
+
+def _printed(value: float, digits: int) -> str:
+    text = f"{value:.{digits}f}"
+    return text.lstrip("-") if float(text) == 0.0 else text
+
+
+def _number(name: str, digits: int) -> Callable[[Row], str]:
+    return lambda row: "–" if row[name] is None else _printed(row[name], digits)
+
+
+def _between(name: str, digits: int) -> Callable[[Row], str]:
+    def said(row: Row) -> str:
+        ends = [row[name + end] for end in ("_low", "_high")]
+        if row[name] is None:
+            return "never"
+        middle = _printed(row[name], digits)
+        if ends == [None, None]:
+            return middle  # of too few seeds
+        return f"{middle} ({' to '.join('never' if end is None else _printed(end, digits) for end in ends)})"
+
+    return said
+
+
+_ENGINE: tuple[Column, ...] = (("engine", _words("engine")), ("start [°CA aTDC]", _number("start_cad", 0)))
+_PATH: tuple[Column, ...] = (
+    ("stays within 1.5 °CA from cycle, median", _between("median_stays", 0)),
+    ("90 % of the runs", _number("stays_90_percent", 0)),
+    ("mean error after 60 cycles [°CA]", _between("late_error_cad", 2)),
+    ("less than without calibration [°CA]", _between("late_error_less_cad", 2)),
+    ("loss there [points]", _between("late_lost_percent", 4)),
+)
+
+
+def _error_and_verdict(row: Row) -> str:
+    error = f"{_printed(row['error_percent'], 1)} ± {_printed(row['error_sd_percent'], 1)}"
+    return f"{error}, {_printed(row['determined_percent'], 0)} %"
+
+
+def _is_of_noise(row: Row) -> bool:
+    return bool(row["sensor"] == "clean" or row["sensor"].endswith("of noise"))
+
+
+# The rows of a table where it has not all of them.
+_ROWS: Mapping[str, Callable[[Row], bool]] = {
+    "online-calibration": _is_of_noise,
+    "calibrated-guide": lambda row: row["tdc_error_cad"] == 0.0,
+}
+# By study: name of the list in its summary, and the columns.
+TABLES: Mapping[str, Mapping[str, tuple[Column, ...]]] = {
+    "online-calibration": {
+        "rows": (
+            ("sensor", _words("sensor")),
+            ("way", _words("way")),
+            ("first within 3 %, cycles", _between("median_first", 0)),
+            ("of later cycles [%]", _number("late_within_3_percent", 0)),
+            ("error at the end [%]", _between("error_percent", 1)),
+            ("spread [%]", _number("error_sd_percent", 1)),
+            ("stated [%]", _number("stated_percent", 1)),
+            ("holds [%]", _number("covered_percent", 0)),
+            ("determined [%]", _number("determined_percent", 0)),
+        ),
+        "facts": (
+            ("fact", _words("fact")),
+            ("found", lambda row: f"{row['value']:.3g}"),
+            ("expected", lambda row: f"{row['expected']:g} ± {row['margin']:g}"),
+        ),
+    },
+    "calibrated-guide": {
+        "rows": (
+            *_ENGINE,
+            ("calibrated", _words("calibrated")),
+            *_PATH,
+            ("guide after 10, 60, 200 cycles off by [°CA]", lambda row: ", ".join(
+                f"{row[name]:.1f}" for name in ("guide_error_10_cad", "guide_error_60_cad", "guide_error_end_cad")
+            )),
+        ),
+        "refits": (
+            ("engine", _words("engine")),
+            ("calibrated", _words("calibrated")),
+            ("per run", _number("refits_per_run", 1)),
+            ("error changed by those before cycle 10 [°CA]", _number("early_change_cad", 2)),
+            ("by later ones [°CA]", _between("late_change_cad", 3)),
+            ("worst of those [°CA]", _number("late_worst_cad", 2)),
+            ("threw back", lambda row: f"{row['thrown_back']} of {row['late_refits']}"),
+        ),
+        "load_step": (
+            ("engine", _words("engine")),
+            ("form", _words("form")),
+            ("calibrated", _words("calibrated")),
+            ("guide off at the new point [°CA]", _number("guide_error_cad", 1)),
+            ("back within 1 °CA, median [cycles]", _between("median_back", 0)),
+            ("loss [points × cycles]", _between("lost", 1)),
+            ("less than without calibration", _between("lost_less", 1)),
+        ),
+    },
+}  # fmt: skip
+
+
+def tables(name: str, summary: Mapping[str, Any]) -> dict[str, list[str]]:
+    """Give the lines of each table of a study by the name of its list."""
+    out = {}
+    for part, columns in TABLES[name].items():
+        lines = [[head for head, _ in columns], ["---"] * len(columns)]
+        rows = [row for row in summary[part] if part != "rows" or _ROWS[name](row)]
+        lines += [[cell(row) for _, cell in columns] for row in rows]
+        out[part] = [f"| {' | '.join(line)} |" for line in lines]
+    if name == "online-calibration":
+        out["errors"] = _errors(summary["rows"])
+    else:
+        out["settings"] = _settings(summary["settings"])
+    return out
+
+
+def _side_by_side(
+    rows: Sequence[Row], head: str, below: str, beside: Callable[[Row], str], cell: Callable[[Row], str]
+) -> list[str]:
+    """Give a line to each value of ``below`` and a column to each of ``beside``."""
+    columns = list(dict.fromkeys(map(beside, rows)))
+    cells = {(row[below], beside(row)): cell(row) for row in rows}
+    lines = [[head, *columns], ["---"] * (1 + len(columns))]
+    lines += [
+        [label.replace("CAD", "°CA"), *(cells[label, column] for column in columns)]
+        for label in dict.fromkeys(row[below] for row in rows)
+    ]
+    return [f"| {' | '.join(line)} |" for line in lines]
+
+
+def _errors(rows: Sequence[Row]) -> list[str]:
+    """Error at the end ± spread over seeds, share of runs that call it determined."""
+    faulty = [row for row in rows if not _is_of_noise(row)]
+    return _side_by_side(faulty, "error of the sensor", "sensor", _words("way"), _error_and_verdict)
+
+
+def _settings(rows: Sequence[Row]) -> list[str]:
+    """Cycle from which it stays (90 % of the runs), mean error after 60 cycles, error of the guide."""
+
+    def cell(row: Row) -> str:
+        stays = f"{_number('median_stays', 0)(row)} ({_number('stays_90_percent', 0)(row)})"
+        return f"{stays}; {_between('late_error_cad', 2)(row)}; {_number('guide_error_end_cad', 1)(row)}"
+
+    return _side_by_side(
+        rows, "calibrated", "calibrated", lambda row: f"{row['engine']}, from {row['start_cad']:g}", cell
+    )
+
+
+def put_into(page: str, name: str, summary: Mapping[str, Any]) -> str:
+    """Put the tables into a page in place of those with the same head."""
+    lines = page.split("\n")
+    for new in tables(name, summary).values():
+        if new[0] not in lines:
+            raise SystemExit(f"the page has no table with the head {new[0]}")
+        first = lines.index(new[0])
+        last = first + next(k for k, line in enumerate(lines[first:]) if not line.startswith("|"))
+        lines[first:last] = new
+    return "\n".join(lines)
+
+
+def main() -> None:
+    """Run the studies that are named, or read what they said, and print their tables."""
+    parser = argparse.ArgumentParser(description=(__doc__ or "").splitlines()[0])
+    parser.add_argument("study", nargs="*", choices=[[], *TABLES], help="which; all of them if none is named")
+    parser.add_argument("--json", nargs="+", type=Path, default=[], help="what `mgdd study NAME --json` has printed")
+    parser.add_argument("--page", type=Path, metavar="FILE", help="also put them into this page")
+    options = parser.parse_args()
+    found = [json.loads(file.read_text(encoding="utf-8")) for file in options.json]
+    if not found:
+        found = [run_study(name, figures=False).summary for name in options.study or TABLES]
+    for summary in found:
+        for part, lines in tables(summary["study"], summary).items():
+            print(f"\n{summary['study']}, {part}\n")
+            print("\n".join(lines))
+        if options.page:
+            page = options.page.read_text(encoding="utf-8")
+            options.page.write_text(put_into(page, summary["study"], summary), encoding="utf-8")
+        for bar in summary["bars"]:
+            print(f"{'met' if bar['met'] else 'MISSED':6} {bar['bar']}: {bar['worst']} ({bar['limit']})")
+
+
+if __name__ == "__main__":
+    main()
