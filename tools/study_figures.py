@@ -23,6 +23,8 @@ FIGURES = {
     "study_tests.png": ("timing-tests", 3, 80),
     "study_guide_curve.png": ("guided-start-up", 1, 72),
     "study_guide_step.png": ("guide-accuracy", 0, 72),
+    "study_ignition_delay.png": ("ignition-delay", 0, 80),
+    "study_ignition_runs.png": ("ignition-delay", 2, 72),
     "study_guide_drive.png": ("guided-transients", 0, 80),
     "study_guide_plane.png": ("guided-transients", 1, 72),
 }
