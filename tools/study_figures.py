@@ -25,6 +25,7 @@ FIGURES = {
     "study_guide_step.png": ("guide-accuracy", 0, 72),
     "study_ignition_delay.png": ("ignition-delay", 0, 80),
     "study_ignition_runs.png": ("ignition-delay", 2, 72),
+    "study_validation.png": ("model-validation", 1, 80),
     "study_guide_drive.png": ("guided-transients", 0, 80),
     "study_guide_plane.png": ("guided-transients", 1, 72),
 }

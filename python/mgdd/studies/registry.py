@@ -34,6 +34,7 @@ _STUDIES = {
     "guide-accuracy": _Study("how wrong a guide may be and still help after a load step and in trouble", 5),
     "guided-transients": _Study("what a guide saves while the operating point keeps changing", 5),
     "ignition-delay": _Study("start of injection for a start of combustion, and what a wrong delay costs a guide", 5),
+    "model-validation": _Study("cycle models beside measured traces, before and after calibration", 5),
     "throttle-first-principle": _Study(
         "groups of a throttle from noisy logs, also where the plant does more than the model", 7
     ),
