@@ -4,13 +4,16 @@ from __future__ import annotations
 
 import csv
 import json
+from argparse import Namespace
 from pathlib import Path
 
 import pytest
 
 from mgdd.cli import main
-from mgdd.guide import TimingMap
-from mgdd.loop import EngineBench
+from mgdd.cli.guide_map import learn_map
+from mgdd.guide import FeedForward, TimingMap
+from mgdd.loop import EngineBench, run_seeker
+from mgdd.optimize import ExtremumSeeking
 
 KINDS = ("feed_forward", "curve", "calibrated", "map")
 ROUGH = ("--guide-set", "wall_heat_scale=0.8", "--guide-set", "burn_duration_ref_cad=45")
@@ -218,6 +221,21 @@ def test_a_run_that_has_not_settled_writes_nothing(
     assert f"--guide-map-out {out_file}: not written, the estimate has not settled" in said
     assert said.endswith("raise --cycles")
     assert said in caplog.text
+
+
+def test_an_interrupted_run_teaches_nothing(table: Path, tmp_path: Path) -> None:
+    bench, timing = EngineBench(seed=2), TimingMap.from_toml(table.read_text(encoding="utf-8"))
+    seeker = FeedForward(ExtremumSeeking(start=-9.0, lower=-30.0, upper=10.0), timing)
+    seeker.at(bench.point)
+    run_seeker(bench, seeker, 900)
+    args = Namespace(guide_map=str(table), guide_map_out=str(tmp_path / "out.csv"), seed=2)
+    for interrupted in (True, False):
+        before = timing.to_toml()
+        figures, doubts = learn_map(args, timing, seeker, bench.point, interrupted=interrupted)
+        assert figures["guide_map_learnt"] is not interrupted
+        assert (tmp_path / "out.csv").exists() is not interrupted
+        assert (timing.to_toml() == before) is interrupted
+        assert any("interrupted" in doubt for doubt in doubts) is interrupted
 
 
 def test_an_axis_that_no_point_has_is_named(capsys: pytest.CaptureFixture[str], tmp_path: Path) -> None:

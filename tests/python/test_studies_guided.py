@@ -12,7 +12,7 @@ from mgdd.cli import main
 from mgdd.errors import DataError, ParameterError
 from mgdd.results.labels import check_labels, to_jsonable
 from mgdd.studies import StudyResult, run_study
-from mgdd.studies.guided_limited import LimitedRuns, limited_row
+from mgdd.studies.guided_limited import LimitedRuns, limited_parts, limited_row
 from mgdd.studies.guided_measured import measured_guide
 from mgdd.surrogate import fit_surrogate
 
@@ -105,6 +105,15 @@ def test_the_guide_knows_where_the_pressure_rises_not_how_much() -> None:
     assert (np.diff(said) < 0.0).all()
     assert abs(said[1] - measured[1]) > 0.3
     assert guide.curve.best == pytest.approx(-1.2, abs=0.05)
+
+
+@needs_records
+def test_what_is_above_the_limit_is_no_gain() -> None:
+    parts = dict(limited_parts(datasets.load("h2df_502"), 2, 150))
+    run = parts["limited: curve, slope of the limit learnt, margin 0 sd"]()
+    assert run.above.any()
+    assert run.lost[run.above].max() < 1e-3
+    assert run.lost.min() == 0.0
 
 
 def test_a_row_under_a_limit_by_hand() -> None:

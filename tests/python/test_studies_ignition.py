@@ -37,6 +37,14 @@ def test_a_guide_that_is_told_the_truth_asks_for_the_best_combustion() -> None:
         assert guide.curve(LATE).best == pytest.approx(guide(LATE)["soi_cad"], abs=0.15), law.name
 
 
+def test_the_curvature_over_the_injection_is_that_of_its_curve() -> None:
+    guide = InjectionGuide(WATSON)
+    best, curve = guide(LATE), guide.curve(LATE)
+    around = curve(best["soi_cad"] + np.array([-1.5, 0.0, 1.5]))
+    assert best.curvature == pytest.approx((around[0] - 2.0 * around[1] + around[2]) / 1.5**2, rel=0.1)
+    assert best.curvature > 0.8 * guide.best_soc(LATE).curvature  # flatter than over the combustion
+
+
 def test_the_measured_delays_make_the_polynomial_and_the_constant() -> None:
     for truth in TRUTHS:
         polynomial = told(truth, "polynomial of 1500 rpm").cylinder
@@ -85,6 +93,7 @@ def test_an_injection_that_does_not_ignite_counts_apart() -> None:
     assert InjectionGuide(WOLFER).timing(fast).clipped  # so early that Hardenberg and Hase have no value there
     plane = plane_of(HARDENBERG, WOLFER, [[fast]], [[SteadyMap.of(EngineBench(point=fast))]])
     assert np.isinf(plane.lost).all()
+    assert plane_of(WOLFER, WOLFER, [[fast]], [[SteadyMap.of(EngineBench(point=fast))]]).lost[0, 0] == 0.0
 
 
 def test_few_cells(result: StudyResult) -> None:

@@ -152,6 +152,11 @@ def test_what_a_quick_run_shows(result: StudyResult) -> None:
     assert all(
         row["redrawn_sd_cad_low"] < row["redrawn_sd_cad"] < row["redrawn_sd_cad_high"] for row in spread.values()
     )
+    calibrated = result.dataset.sel(stage="calibrated")
+    away = result.dataset["redrawn_ca50_cad"] - calibrated["best_ca50_cad"]
+    lost = (-0.5 * calibrated["curvature_percent"] * away**2).quantile(0.95, dim="draw")
+    for (law, file), row in spread.items():
+        assert row["lost_p95_percent"] == pytest.approx(float(lost.sel(law=law, file=file)), rel=1e-9)
     for row in result.summary["coverage"]:
         assert row["block_parameters_share"] < row["white_parameters_share"]
 
