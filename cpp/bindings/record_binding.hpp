@@ -92,7 +92,7 @@ Open<Place> open_number(const FieldInfo& info, Place place) {
 template <std::size_t>
 using Number = double;
 
-/// A parameter record from its table of numbers and the rows that are none: __init__, properties, `fields`, `to_dict`,
+/// A parameter record from its table of numbers and its other rows: __init__, properties, `fields`, `to_dict`,
 /// `replace`, comparison, hash, short text and pickle. Checked by `validate`.
 template <class Record, class Fields, class... Rows, std::size_t... I>
 void bind_record(py::class_<Record>& cls, const char* name, const Fields& fields, const std::tuple<Rows...>& rows,

@@ -124,6 +124,23 @@ def test_the_start_is_that_of_the_user(
     assert first_timing(file) == pytest.approx(-18.0, abs=1.0 + 1e-9)
 
 
+def test_a_method_without_dither_starts_below_the_limit_too(capsys: pytest.CaptureFixture[str]) -> None:
+    argv = ("--guide", "feed_forward", *ROUGH, "--method", "bounded", "--limit", "p_max_bar=95")
+    out = seek(capsys, *argv, "--cycles", "300")  # the guide's best timing lies between two timings of the scan
+    assert out["start_cad"] > LIMITED_CAD
+    assert out["limit_report"]["p_max_bar"]["noise_free"]["worst"] < 97.0
+
+
+@pytest.mark.parametrize("method", ["newton", "bounded", "spsa"])
+def test_a_seeker_of_any_kind_begins_there(
+    method: str, capsys: pytest.CaptureFixture[str], table: Path, tmp_path: Path
+) -> None:
+    for kind in ("feed_forward", "map"):
+        file = tmp_path / f"{kind}.csv"
+        seek(capsys, *options(kind, table), "--method", method, "--start-cad", "-18", "--cycles", "50", "-o", str(file))
+        assert first_timing(file) == pytest.approx(-18.0, abs=2.0)
+
+
 @pytest.mark.parametrize(
     ("argv", "said"),
     [

@@ -8,11 +8,11 @@ In the same way ``<!-- number: NAME -->`` goes before a single number.
 from __future__ import annotations
 
 import importlib
-import importlib.util
 import inspect
 import pkgutil
 import re
 import shlex
+import sys
 from pathlib import Path
 
 import pytest
@@ -21,11 +21,8 @@ import mgdd
 from mgdd.results.labels import VARIABLES
 
 ROOT = Path(__file__).resolve().parents[2]
-_SPEC = importlib.util.spec_from_file_location("docs_tables", ROOT / "tools" / "docs_tables.py")
-assert _SPEC is not None
-assert _SPEC.loader is not None
-docs_tables = importlib.util.module_from_spec(_SPEC)
-_SPEC.loader.exec_module(docs_tables)
+sys.path.append(str(ROOT / "tools"))
+docs_tables = importlib.import_module("docs_tables")
 DOCS = ROOT / "docs"
 PAGES = [*sorted(DOCS.glob("*.md")), *ROOT.glob("README.md")]
 TABLE = re.compile(r"<!-- (?:checked|numbers): (\w+) -->\n+((?:\|.*\n)+)")
@@ -34,7 +31,7 @@ MARKED = re.compile(r"<!-- number: (\w+) -->\s*\W*?(" + NUMBER.pattern + ")")
 CITATION = re.compile(
     r"\b([A-Z][\w-]+)(?: et al\.|(?:, [A-Z][\w-]+)*,? and (?:[A-Z][\w-]+ )*[A-Z][\w-]+)?,? \(?((?:18|19|20)\d\d)\b"
 )
-# Names before a year that are no authors.
+# Names before a year that are not authors.
 NO_AUTHORS = {"CODATA", "Atmosphere", "Paper"}
 
 

@@ -33,7 +33,7 @@ INTEGRATORS = ("trapezoid", "split", "seed", "euler")
 
 @functools.cache
 def parse(text):
-    """Split settings into cylinder, point and the words that are no field; the C++ suite does the same."""
+    """Split settings into cylinder, point and the words that are not fields; the C++ suite does the same."""
     cylinder, point, words = {}, {}, {}
     for word in text.split():
         name, value = word.split("=")

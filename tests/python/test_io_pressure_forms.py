@@ -274,7 +274,7 @@ def test_a_long_record_over_time(write: Write) -> None:
 # In 2060 samples both cycles have 1029 samples, the second 0.3 degrees later; in 3200 samples the third has 1028.
 @pytest.mark.parametrize(("samples", "cycles"), [(2060, 2), (3200, 3)])
 def test_a_step_that_divides_no_cycle_is_interpolated_and_told(write: Write, samples: int, cycles: int) -> None:
-    step = 0.7  # 720 / 0.7 is no integer
+    step = 0.7  # 720 / 0.7 is not an integer
     angle = step * np.arange(samples)
     signal = 60.0 + 50.0 * np.cos(np.deg2rad(angle - 360.0) / 2.0)  # every cycle is the same, and smooth
     trace = read_pressure(write([angle, signal]), firing_tdc_deg=360.0)

@@ -7,6 +7,7 @@
 
 #include "mgdd/guide/curve_seeking.hpp"
 #include "optimize/seeker_binding.hpp"
+#include "optimize/seeker_settings.hpp"
 
 namespace mgdd::bindings {
 namespace {

@@ -1,4 +1,6 @@
 // Binds guide/feed_forward.hpp: a seeker of any kind with the optimum of a guide as feed-forward.
+#include <limits>
+#include <map>
 #include <optional>
 #include <string>
 #include <utility>
@@ -7,6 +9,7 @@
 #include "mgdd/guide/feed_forward.hpp"
 #include "mgdd/optimize/seekers/variant_seeker.hpp"
 #include "optimize/seeker_binding.hpp"
+#include "optimize/seeker_inputs.hpp"
 
 namespace mgdd::bindings {
 namespace {

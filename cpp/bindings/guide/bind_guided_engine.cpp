@@ -8,6 +8,7 @@
 
 #include "mgdd/guide/guided_engine.hpp"
 #include "optimize/seeker_binding.hpp"
+#include "optimize/seeker_inputs.hpp"
 
 namespace mgdd::bindings {
 namespace {
@@ -18,28 +19,30 @@ using AnySeeker = std::variant<optimize::ExtremumSeeking, optimize::NewtonSeekin
                                optimize::Spsa, optimize::GradientDescent, optimize::GoldenSection, CurveSeeking>;
 
 GuidedEngine::Seeking seeking_of(const py::object& seeker, const FeedForwardSettings& settings) {
+  AnySeeker any = seeker_of<AnySeeker>(seeker, "seeker");
   return std::visit(
-      [&](auto&& found) -> GuidedEngine::Seeking {
+      [&](auto& found) -> GuidedEngine::Seeking {
         if constexpr (std::is_same_v<std::decay_t<decltype(found)>, CurveSeeking>) {
           return std::move(found);
         } else {
           return FeedForward(optimize::VariantSeeker(std::move(found)), settings);
         }
       },
-      seeker_of<AnySeeker>(seeker, "seeker"));
+      any);
 }
 
 // Everything is copied: what Python holds goes its own way.
-Bound make(const py::object& seeker, const Guarded<ModelOptimum>& model, const Guarded<OnlineCalibration>* calibration,
-           const engine::OperatingPoint& point, double changed_share, double calibrated_sd_cad, double recalibrated_cad,
-           double calibration_rate_cad, std::optional<double> noise_sd) {
+Bound make(const py::object& seeker, const Guarded<ModelOptimum>& model,
+           std::optional<const Guarded<OnlineCalibration>*> calibration, const engine::OperatingPoint& point,
+           double changed_share, double calibrated_sd_cad, double recalibrated_cad, double calibration_rate_cad,
+           std::optional<double> noise_sd, bool keep_start) {
   FeedForwardSettings trimmed;
   trimmed.calibration_rate = optimize::scalar_input(calibration_rate_cad);
   trimmed.trust.noise_sd = noise_sd;
   std::optional<OnlineCalibration> own;
-  if (calibration != nullptr) own.emplace(*calibration->use());
+  if (calibration) own.emplace(*(*calibration)->use());
   return {"GuidedEngine", GuidedEngine(seeking_of(seeker, trimmed), ModelOptimum(*model.use()), std::move(own), point,
-                                       {changed_share, calibrated_sd_cad, recalibrated_cad})};
+                                       {changed_share, calibrated_sd_cad, recalibrated_cad, keep_start})};
 }
 
 py::dict to_dict(const GuidedEngine& engine) {
@@ -62,9 +65,9 @@ py::dict to_dict(const GuidedEngine& engine) {
 void bind_guided_engine(py::module_& m) {
   using py::arg;
   py::class_<Bound> cls(m, "GuidedEngine", "The guided loop of an engine; see mgdd.guide.GuidedEngine.");
-  cls.def(py::init(&make), arg("seeker"), arg("model"), arg("calibration").none(true), arg("point"), py::kw_only(),
+  cls.def(py::init(&make), arg("seeker"), arg("model"), arg("calibration"), arg("point"), py::kw_only(),
           arg("changed_share"), arg("calibrated_sd_cad"), arg("recalibrated_cad"), arg("calibration_rate_cad"),
-          arg("noise_sd"));
+          arg("noise_sd"), arg("keep_start"));
   bind_asking(cls);
   cls.def(
          "_tell",

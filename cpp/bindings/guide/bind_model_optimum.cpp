@@ -86,7 +86,7 @@ void bind_model_optimum(py::module_& m) {
         return out;
       },
       arg("point"), arg("names"),
-      "J and indicators over SOC at one operating point; None where there is no such cycle.");
+      "J and indicators over SOC at one operating point; None where the model has no physical cycle.");
   cls.def(
       "_set_cylinder", [](Bound& b, const engine::Cylinder& cylinder) { b.use()->set_cylinder(cylinder); },
       arg("cylinder"), "Other parameters of the same geometry.");

@@ -8,6 +8,7 @@
 
 #include "mgdd/optimize/seekers/tuner.hpp"
 #include "optimize/seeker_binding.hpp"
+#include "optimize/seeker_settings.hpp"
 
 namespace mgdd::bindings {
 namespace {

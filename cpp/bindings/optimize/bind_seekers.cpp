@@ -3,6 +3,7 @@
 #include <tuple>
 
 #include "optimize/seeker_binding.hpp"
+#include "optimize/seeker_settings.hpp"
 
 namespace mgdd::bindings {
 namespace {

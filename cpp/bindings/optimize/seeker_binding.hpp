@@ -1,25 +1,20 @@
-// What the bindings of all seekers share: inputs from Python, ask and tell, state and history.
+// What the bindings of all seekers share: ask and tell, state and history, and a seeker taken from Python.
 #pragma once
 
-#include <cmath>
-#include <cstdint>
-#include <limits>
 #include <map>
 #include <optional>
 #include <string>
-#include <tuple>
 #include <utility>
 #include <variant>
 #include <vector>
 
 #include "binding.hpp"
 #include "guarded.hpp"
-#include "keywords.hpp"
 #include "mgdd/common/error.hpp"
 #include "mgdd/common/state.hpp"
 #include "mgdd/optimize/seekers/seeker_history.hpp"
 #include "mgdd/optimize/seekers/seekers.hpp"
-#include "record_binding.hpp"
+#include "optimize/seeker_inputs.hpp"
 
 namespace mgdd::bindings {
 
@@ -30,203 +25,6 @@ using BoundSeeker = Guarded<optimize::RecordedSeeker<S>>;
 template <class S>
 BoundSeeker<S> bound(const char* name, S seeker) {
   return {name, optimize::RecordedSeeker<S>(std::move(seeker))};
-}
-
-/// A number (of any kind that NumPy takes) as a column of one, or a column.
-inline std::vector<double> numbers_from(const py::object& value, std::string_view name) {
-  const InputArray array = InputArray::ensure(value);
-  if (!array) {
-    PyErr_Clear();
-    refuse(std::string(name), value, "one number or a sequence of numbers");
-  }
-  if (array.ndim() == 0) return {*array.data()};
-  return to_column(array, name);
-}
-
-/// A number for every input, or one number per input.
-inline optimize::Inputs inputs_from(const py::object& value, std::string_view name, Eigen::Index inputs) {
-  if (py::isinstance<py::float_>(value) || py::isinstance<py::int_>(value)) {
-    return optimize::Inputs::Constant(inputs, as_number(py::str(name.data(), name.size()), value));
-  }
-  const std::vector<double> column = numbers_from(value, name);
-  if (column.size() > optimize::max_inputs) {
-    throw about(name, ShapeError(std::string(name) + " has " + std::to_string(column.size()) + " entries: at most " +
-                                 std::to_string(optimize::max_inputs) + " inputs are possible"));
-  }
-  if (column.size() == 1 && inputs > 1) return optimize::Inputs::Constant(inputs, column[0]);
-  return Eigen::Map<const Eigen::VectorXd>(column.data(), static_cast<Eigen::Index>(column.size()));
-}
-
-inline optimize::SearchSpace space_from(const py::object& start, const py::object& lower, const py::object& upper) {
-  optimize::SearchSpace space;
-  space.start = inputs_from(start, "start", 1);
-  space.lower = inputs_from(lower, "lower", space.size());
-  space.upper = inputs_from(upper, "upper", space.size());
-  return space;
-}
-
-inline py::array_t<double> input_array(const optimize::Inputs& values) {
-  return py::array_t<double>(static_cast<py::ssize_t>(values.size()), values.data());
-}
-
-inline std::vector<double> list_of(const optimize::Inputs& values) {
-  return {values.begin(), values.end()};
-}
-
-/// The arguments `start`, `lower` and `upper` again.
-inline py::dict space_dict(const optimize::SearchSpace& space) {
-  py::dict out;
-  out["start"] = list_of(space.start);
-  out["lower"] = list_of(space.lower);
-  out["upper"] = list_of(space.upper);
-  return out;
-}
-
-/// Each sentence of advice becomes a UserWarning of the caller.
-inline void warn_each(const std::vector<std::string>& advice) {
-  for (const std::string& sentence : advice) {
-    if (PyErr_WarnEx(PyExc_UserWarning, sentence.c_str(), 1) != 0) throw py::error_already_set();
-  }
-}
-
-/// Numbers of a reading, kept alive as long as the spans into them.
-struct ReadingBuffer {
-  std::vector<double> components, limits, applied;
-};
-
-/// J as a number or one number per component; limits as a sequence in the order of the settings, or by name; what was
-/// applied as a number or one number per input.
-template <class S>
-optimize::Reading reading_from(const S& seeker, const py::object& j, const py::object& limits, bool misfire,
-                               const py::object& applied, ReadingBuffer& buffer) {
-  if (j.is_none() && !misfire) throw about("J", ShapeError("J is missing: tell what was measured, or misfire=True"));
-  if (!j.is_none()) {
-    if (py::isinstance<py::float_>(j) || py::isinstance<py::int_>(j)) {
-      buffer.components.assign(1, as_number(py::str("J"), j));
-    } else {
-      buffer.components = numbers_from(j, "J");
-    }
-  }
-  if (py::isinstance<py::dict>(limits)) {
-    const auto by_name = py::reinterpret_borrow<py::dict>(limits);
-    if (by_name.size() > seeker.settings().limits.size()) {
-      throw about("limits", ShapeError("limits has " + std::to_string(by_name.size()) + " names: the settings have " +
-                                       std::to_string(seeker.settings().limits.size())));
-    }
-    for (const optimize::Limit& limit : seeker.settings().limits) {
-      if (!by_name.contains(limit.name)) {
-        throw about("limits", ShapeError("limits: '" + limit.name +
-                                         "' is missing: tell one value for every limit of the settings"));
-      }
-      buffer.limits.push_back(as_number(py::str(limit.name), by_name[limit.name.c_str()]));
-    }
-  } else if (!limits.is_none()) {
-    buffer.limits = numbers_from(limits, "limits");
-  }
-  if (!applied.is_none()) {
-    buffer.applied = numbers_from(applied, "applied");
-    if (buffer.applied.empty()) {
-      throw about("applied", ShapeError("applied is empty: give one number per input, or leave it out"));
-    }
-  }
-  return {buffer.components, buffer.limits, misfire, buffer.applied};
-}
-
-/// One number for all inputs, or one per input; the space of the settings stands already.
-template <class Place>
-struct PerInput : Row<Place> {
-  using typename Row<Place>::Record;
-  using Argument = py::object;
-
-  void put(Record& settings, const py::object& given) const {
-    this->at(settings) = inputs_from(given, this->name, settings.space.size());
-  }
-  std::vector<double> get(const Record& settings) const { return list_of(this->at(settings)); }
-};
-template <class Place>
-PerInput<Place> per_input(const char* name, Place place) {
-  return {{name, place}};
-}
-template <class Place>
-py::arg_v keyword(const PerInput<Place>& row, const typename PlaceOf<Place>::Record& standard) {
-  return py::arg_v(row.name, row.at(standard)[0]);
-}
-
-/// The same, empty where Python writes None.
-template <class Place>
-struct PerInputOrNone : PerInput<Place> {
-  using typename Row<Place>::Record;
-
-  void put(Record& settings, const py::object& given) const {
-    if (!given.is_none()) PerInput<Place>::put(settings, given);
-  }
-};
-template <class Place>
-PerInputOrNone<Place> per_input_or_none(const char* name, Place place) {
-  return {{{name, place}}};
-}
-template <class Place>
-py::arg_v keyword(const PerInputOrNone<Place>& row, const typename PlaceOf<Place>::Record&) {
-  return py::arg_v(row.name, py::none());
-}
-
-/// A number > 0; None leaves the choice to the seeker.
-template <class Place>
-struct PositiveOrOwn : Row<Place> {
-  using typename Row<Place>::Record;
-  using Argument = std::optional<double>;
-
-  void put(Record& settings, Argument given) const {
-    if (given && !(*given > 0.0)) throw ParameterError(this->name, *given, "must be > 0");
-    if (given) this->at(settings) = *given;
-  }
-  double get(const Record& settings) const { return this->at(settings); }
-};
-template <class Place>
-PositiveOrOwn<Place> positive_or_own(const char* name, Place place) {
-  return {{name, place}};
-}
-template <class Place>
-py::arg_v keyword(const PositiveOrOwn<Place>& row, const typename PlaceOf<Place>::Record&) {
-  return py::arg_v(row.name, py::none());
-}
-
-/// Amplitude, period and harmonics of a dithering seeker.
-template <class Settings>
-auto dither_rows() {
-  using Dither = optimize::DitherSettings;
-  const auto place = [](auto member) { return Path{&Settings::dither, member}; };
-  return std::tuple{per_input("amplitude", place(&Dither::amplitude)), plain("period", place(&Dither::period)),
-                    or_default("harmonics", place(&Dither::harmonics))};
-}
-
-/// __init__ of start, bounds and the rows, all keyword-only, and `settings`, which makes the seeker again.
-template <class S, class Settings, class... Rows, class Lower, class Upper>
-void bind_settings(py::class_<BoundSeeker<S>>& cls, const char* name, const Settings& standard,
-                   const std::tuple<Rows...>& rows, const Lower& lower, const Upper& upper) {
-  const auto make = [name, rows](const py::object& start, const py::object& low, const py::object& high,
-                                 typename Rows::Argument... values) {
-    Settings settings;
-    settings.space = space_from(start, low, high);
-    std::apply([&](const Rows&... row) { (row.put(settings, std::move(values)), ...); }, rows);
-    S made(std::move(settings));
-    if constexpr (requires { made.settings().advice(); }) warn_each(made.settings().advice());
-    return bound(name, std::move(made));
-  };
-  std::apply(
-      [&](const Rows&... row) {
-        cls.def(py::init(make), py::kw_only(), py::arg("start"), lower, upper, keyword(row, standard)...);
-      },
-      rows);
-  cls.def_property_readonly(
-      "settings",
-      [rows](const BoundSeeker<S>& b) {
-        const auto& settings = b.constant().seeker().settings();
-        py::dict out = space_dict(settings.space);
-        std::apply([&](const Rows&... row) { ((out[row.name] = row.get(settings)), ...); }, rows);
-        return out;
-      },
-      "Arguments that make this seeker again.");
 }
 
 /// The columns of a history; `applied` and `estimate` have one column per input, those of limits one per limit.

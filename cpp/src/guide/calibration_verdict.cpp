@@ -56,7 +56,7 @@ CalibrationVector OnlineCalibration::standard_errors() const noexcept {
 
 bool OnlineCalibration::is_held(int parameter) const noexcept {
   double variance = covariance_(parameter, parameter);
-  // Extremum seeking fits nothing else, so that what others add is no lack of excitation.
+  // Extremum seeking fits one parameter: the variance that the others add to it does not mean poor excitation.
   for (int i = 0; seeker_ && i < n_calibrated; ++i) {
     if (i != parameter && covariance_(i, i) > 0.0)
       variance -= std::pow(covariance_(parameter, i), 2) / covariance_(i, i);

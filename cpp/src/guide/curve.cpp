@@ -59,7 +59,7 @@ Curve Curve::parabola(double curvature, double best, double reach) {
   require_in(above(-optimize::largest_reading, optimize::largest_reading), "best", best);
   require_positive("reach", reach);
   if (!(curvature < 0.0 && optimize::is_reading(curvature))) {
-    throw ParameterError("curvature", curvature, "must be < 0, the bend of a maximum, and finite");
+    throw ParameterError("curvature", curvature, "must be < 0, as at a maximum, and finite");
   }
   Curve out;
   out.first_ = best - reach;

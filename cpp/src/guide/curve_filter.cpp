@@ -19,9 +19,9 @@ constexpr std::array<Shape, CurveFilter::shapes> shape_table{{{1.0, 1.0, 0.0}, {
 constexpr double curvature_reach = 0.3;  // of the prior's sd: second differences and the guess of the noise
 constexpr double guess_counts = 4.0;     // readings that the first guess of the noise is worth
 constexpr double least_scale = 0.1;      // a curve flatter than this, or upside down, is hardly believed
-constexpr double scale_penalty = 50.0;
+constexpr double scale_penalty = 1500.0;
 // Of the variance that fading leaves: closed loops read more than their dither does. Makes the stated 95 % hold.
-constexpr double calibrated = 0.65;
+constexpr double calibrated = 0.6;
 
 }  // namespace
 
@@ -48,25 +48,30 @@ CurveFilter::CurveFilter(const CurveFilterSettings& settings, const Curve& curve
   restart(curve, curve.best(), settings.prior_sd);
 }
 
-void CurveFilter::restart(const Curve& curve, double mean, double sd) noexcept {
+void CurveFilter::expect(const Curve& curve, double mean, double sd) noexcept {
   curve_ = curve;
   bend_ = curve.curvature(curvature_reach * settings_.prior_sd);
   prior_mean_ = mean;
-  prior_sd_ = sd;
-  count_ = count_squared_ = 0.0;
+  prior_extra_ = std::max(0.0, 1.0 / (sd * sd) - 1.0 / (settings_.prior_sd * settings_.prior_sd));
+}
+
+double CurveFilter::prior_precision() const noexcept {
+  return 1.0 / (settings_.prior_sd * settings_.prior_sd) + prior_extra_;
+}
+
+void CurveFilter::restart(const Curve& curve, double mean, double sd) noexcept {
+  expect(curve, mean, sd);
+  count_ = count_squared_ = weight_ = y_ = yy_ = 0.0;
   recent_count_ = 0;
   started_ = false;
-  for (const Sum sum : {weight, c, cc, y, cy, yy, log_weight})
+  for (const Sum sum : {c, cc, cy})
     sums_[sum].setZero();
   if (!(variance_ > 0.0)) variance_ = guessed_variance();  // what was learnt of the noise stays
   judge();
 }
 
 void CurveFilter::believe(const Curve& curve, double sd) noexcept {
-  curve_ = curve;
-  bend_ = curve.curvature(curvature_reach * settings_.prior_sd);
-  prior_mean_ = curve.best();
-  prior_sd_ = sd;
+  expect(curve, curve.best(), sd);
   judge();
 }
 
@@ -99,6 +104,7 @@ void CurveFilter::pass(double input) noexcept {
 void CurveFilter::learn(double input, double j) noexcept {
   pass(input);
   if (!(count_ > 0.0)) origin_ = j;
+  prior_extra_ *= fading_ * fading_;  // sooner than the readings, or a guide that is wrong would draw the end to itself
   add(sums_[lagged], j);
   const auto at = static_cast<std::size_t>(recent_count_++) % recent;
   recent_drops_[at] = sums_[lagged];
@@ -108,24 +114,23 @@ void CurveFilter::learn(double input, double j) noexcept {
 
 void CurveFilter::add(const Column& drops, double j) noexcept {
   const double value = j - origin_;
+  const double error = settings_.discrepancy * (sums_[share] * drops).sum();
+  const double own = variance_ / (variance_ + error * error);
   count_ = fading_ * count_ + 1.0;
   count_squared_ = fading_ * fading_ * count_squared_ + 1.0;
-  const double relative = settings_.discrepancy * settings_.discrepancy / variance_;
-  const Column loss = 1.0 + relative * drops.square();
-  const Column own = loss.inverse();
-  sums_[log_weight] = fading_ * sums_[log_weight] - 0.5 * loss.log();
-  sums_[weight] = fading_ * sums_[weight] + own;
+  weight_ = fading_ * weight_ + own;
+  y_ = fading_ * y_ + own * value;
+  yy_ = fading_ * yy_ + own * (value * value);
   sums_[c] = fading_ * sums_[c] + own * drops;
   sums_[cc] = fading_ * sums_[cc] + own * drops.square();
-  sums_[y] = fading_ * sums_[y] + own * value;
-  sums_[cy] = fading_ * sums_[cy] + own * drops * value;
-  sums_[yy] = fading_ * sums_[yy] + own * (value * value);
+  sums_[cy] = fading_ * sums_[cy] + (own * value) * drops;
 }
 
 void CurveFilter::forget(double kept) noexcept {
-  count_ *= kept;
+  for (double* sum : {&count_, &weight_, &y_, &yy_})
+    *sum *= kept;
   count_squared_ *= kept * kept;
-  for (const Sum sum : {weight, c, cc, y, cy, yy, log_weight})
+  for (const Sum sum : {c, cc, cy})
     sums_[sum] *= kept;
   const auto known = std::min<std::int64_t>(recent_count_, recent);
   for (std::int64_t i = recent_count_ - known; i < recent_count_; ++i) {
@@ -138,28 +143,29 @@ void CurveFilter::forget(double kept) noexcept {
 // Posterior of every hypothesis from its sums: S is normal about 1, o flat, the noise an inverse gamma.
 void CurveFilter::judge() noexcept {
   const double guess = guessed_variance();
-  const double counts = guess_counts + std::max(0.0, count_ - 1.0);
+  const double counts = guess_counts + std::max(0.0, weight_ - 1.0);
   const double per_scale = variance_ / (settings_.scale_sd * settings_.scale_sd);
   const double step = (settings_.upper - settings_.lower) / (places - 1);
   Column residual = Column::Constant(guess_counts * guess), log_of = Column::Zero();
   sums_[own_scale].setOnes();
   if (count_ > 0.0) {
-    const Column per = sums_[weight].inverse();
-    const Column bend = (sums_[cc] - sums_[c].square() * per).max(0.0);
-    const Column cross = sums_[cy] - sums_[c] * sums_[y] * per;
-    const Column rest = sums_[yy] - sums_[y].square() * per;
+    const double per = 1.0 / weight_;
+    const Column bend = (sums_[cc] - per * sums_[c].square()).max(0.0);
+    const Column cross = sums_[cy] - (per * y_) * sums_[c];
+    const double rest = yy_ - per * y_ * y_;
     const Column precision = per_scale + bend;
     sums_[own_scale] += (cross - bend) / precision;
     residual += (rest - 2.0 * cross + bend - (cross - bend).square() / precision).max(0.0);
-    log_of = sums_[log_weight] - 0.5 * (precision * sums_[weight] * (1.0 / per_scale)).log();
+    log_of = -0.5 * (precision * (1.0 / per_scale)).log();
   }
   log_of -= 0.5 * counts * residual.log();
   const Column flat = (least_scale - sums_[own_scale]).max(0.0);
   log_of -= scale_penalty * flat.square();
   for (std::size_t s = 0; s < shape_table.size(); ++s) {
     for (int i = 0; i < places; ++i) {
-      const double away = (settings_.lower + step * i - prior_mean_) / prior_sd_;
-      log_of[static_cast<Eigen::Index>(s) * places + i] += shape_table[s].log_prior - 0.5 * away * away;
+      const double away = settings_.lower + step * i - prior_mean_;
+      log_of[static_cast<Eigen::Index>(s) * places + i] +=
+          shape_table[s].log_prior - 0.5 * away * away * prior_precision();
     }
   }
   sums_[share] = (log_of - log_of.maxCoeff()).exp();
@@ -175,7 +181,7 @@ void CurveFilter::judge() noexcept {
   scale_ = (sums_[share] * sums_[own_scale]).sum();
   const double left = (sums_[share] * residual).sum();
   variance_ = left / counts;
-  unexplained_ = count_ > 1.0 ? std::max(0.0, left - guess_counts * guess) / count_ : 0.0;
+  unexplained_ = count_ > 1.0 ? std::max(0.0, left - guess_counts * guess) / weight_ : 0.0;
 }
 
 CurveFilter::Prediction CurveFilter::predict(double input) const noexcept {
@@ -183,11 +189,11 @@ CurveFilter::Prediction CurveFilter::predict(double input) const noexcept {
   fill_drops(input, drops);
   if (per_lag_ < 1.0) drops = (sums_[lagged] + per_lag_ * (drops - sums_[lagged])).eval();
   if (!(count_ > 0.0)) return {0.0, std::numeric_limits<double>::infinity()};
-  const Column per = sums_[weight].inverse();
-  const Column away = drops - sums_[c] * per;
-  const Column means = sums_[y] * per + sums_[own_scale] * away;
+  const double per = 1.0 / weight_;
+  const Column away = drops - per * sums_[c];
+  const Column means = per * y_ + sums_[own_scale] * away;
   const double per_scale = variance_ / (settings_.scale_sd * settings_.scale_sd);
-  const Column bend = (sums_[cc] - sums_[c].square() * per).max(0.0);
+  const Column bend = (sums_[cc] - per * sums_[c].square()).max(0.0);
   const Column variances =
       variance_ * (1.0 + per + away.square() / (per_scale + bend)) + (settings_.discrepancy * drops).square();
   const double mean = (sums_[share] * means).sum();
@@ -196,7 +202,7 @@ CurveFilter::Prediction CurveFilter::predict(double input) const noexcept {
 }
 
 double CurveFilter::faded_sd(double factor) const noexcept {
-  const double of_prior = std::min(1.0, spread_ * spread_ / (prior_sd_ * prior_sd_));
+  const double of_prior = std::min(1.0, spread_ * spread_ * prior_precision());
   const double left = count_ > 1.0 ? count_squared_ / count_ : 1.0;  // sum of w^2 over sum of w: Liang and Zeger 1986
   return spread_ * std::sqrt(of_prior + (1.0 - of_prior) * left * factor);
 }

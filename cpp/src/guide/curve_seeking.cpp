@@ -33,6 +33,9 @@ constexpr double little_share = 0.1;                    // of the drop at 0.3 pr
 constexpr double repeat_memory = 0.98;
 constexpr std::int64_t fewest_repeats = 60;
 
+constexpr double hold_share = 1.5;     // of the sensor's lag: cycles on one side of the estimate
+constexpr double modest_share = 0.25;  // of the cheapest amplitude, less than the place is uncertain by
+
 constexpr int plain_period = 10;
 constexpr double plain_time_constant = 40.0;
 constexpr double plain_amplitude_share = 0.1;  // of prior_sd
@@ -109,6 +112,7 @@ CurveSeeking::CurveSeeking(CurveSeekingSettings settings)
       estimate_(settings_.space.start),
       applied_(estimate_),
       delay_(std::lround(settings_.sensor.delay_cycles)),
+      hold_(std::max(1L, std::lround(hold_share * settings_.sensor.lag_cycles))),
       sent_(static_cast<std::size_t>(delay_) + 1, 0.0) {}
 
 // As far as the place is uncertain; once it is known, as far as learning its moves costs least: the dither costs
@@ -118,7 +122,7 @@ double CurveSeeking::amplitude() const noexcept {
   const double readings = (1.0 + faded) / (1.0 - faded);
   const double bend = filter_.curvature();
   const double cheapest = std::sqrt(filter_.noise_sd() / (std::abs(bend) * std::sqrt(readings)));
-  return std::min(std::max(filter_.search_sd(), cheapest), settings_.amplitude_max);
+  return std::min(std::max(filter_.search_sd() - modest_share * cheapest, cheapest), settings_.amplitude_max);
 }
 
 const Inputs& CurveSeeking::ask() noexcept {
@@ -154,7 +158,7 @@ TellStatus CurveSeeking::tell(const Reading& reading) noexcept {
   if (status != TellStatus::accepted && status != TellStatus::misfire) return status;
   Inputs told;
   const double applied = applied_input(reading, applied_, told)[0];
-  upwards_ = !upwards_;
+  if ((sent_count_ + 1) % hold_ == 0) upwards_ = !upwards_;
   if (status == TellStatus::accepted) limits_.record(applied, reading.limits);
   sent_[static_cast<std::size_t>(sent_count_ % (delay_ + 1))] = applied;
   ++sent_count_;
@@ -163,6 +167,8 @@ TellStatus CurveSeeking::tell(const Reading& reading) noexcept {
     Reading own = reading;
     own.limits = {};
     own.applied = {&moved, 1};
+    const double as_guided = reading.components.empty() ? 0.0 : reading.components[0] / taken_over_scale_;
+    if (!reading.components.empty()) own.components = {&as_guided, 1};
     plain_.tell(own);
     estimate_[0] =
         std::clamp(taken_over_at_ + plain_.estimate()[0], settings_.space.lower[0], settings_.space.upper[0]);
@@ -189,6 +195,7 @@ void CurveSeeking::learn(double cause, double j) noexcept {
     surprise_ = 1.0;
     since_doubt_ = 0;
     doubt_rate_ += 1.0;
+    repeats_ = 0;  // what the curve leaves is counted anew, and so is the noise it is held against
     ++doubts_;
   }
   estimate_[0] = limits_.size() > 0 ? limits_.nearest(filter_.mean()) : filter_.mean();
@@ -206,7 +213,7 @@ void CurveSeeking::judge_surprise(double input, double j) noexcept {
 
 // Two readings of one side, two cycles apart and close together, differ by noise alone: half their squared difference.
 void CurveSeeking::watch_repeats(double input, double j) noexcept {
-  const auto side = static_cast<std::size_t>(sent_count_ % 2);
+  const auto side = static_cast<std::size_t>(upwards_);
   if (repeat_known_[side] > 0.0 && std::abs(input - repeat_input_[side]) < 0.25 * amplitude()) {
     const double half = 0.5 * (j - repeat_j_[side]) * (j - repeat_j_[side]);
     ++repeats_;
@@ -221,6 +228,7 @@ void CurveSeeking::watch_repeats(double input, double j) noexcept {
 void CurveSeeking::take_over() noexcept {
   plain_at_work_ = true;
   taken_over_at_ = estimate_[0];
+  taken_over_scale_ = filter_.curvature() / filter_.curve().curvature(curvature_share * settings_.prior_sd);
   plain_.restart();
 }
 

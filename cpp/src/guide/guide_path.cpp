@@ -110,7 +110,8 @@ GuidePath::Order GuidePath::take(const GuideValue& value, GuideCause cause, cons
     move_ = value.optimum - estimate;
     feed_forward_ = estimate;
     trust_.forget();
-    return {GuideStatus::followed, true, trusted(trust_.value())};
+    const Inputs made = trusted(trust_.value());
+    return {GuideStatus::followed, true, cause == GuideCause::calibration ? Inputs{} : made};
   }
   if (!news && cause == GuideCause::calibration) {
     const Inputs change = value.optimum - target_;

@@ -6,10 +6,12 @@
 #include <utility>
 
 #include "mgdd/common/bounds.hpp"
+#include "mgdd/common/variant.hpp"
 
 namespace mgdd::guide {
 namespace {
 
+using IndicatorMember = double engine::Indicators<double>::*;
 using optimize::Inputs;
 using optimize::Reading;
 using optimize::TellStatus;
@@ -23,14 +25,14 @@ optimize::VariantSeeker::Settings shared_settings(const GuidedEngine::Seeking& s
 }
 
 // Of the model's cycle, by the names of the limits; empty where one is not an indicator.
-std::vector<double engine::Indicators<double>::*> indicators_of(const std::vector<optimize::Limit>& limits) {
-  std::vector<double engine::Indicators<double>::*> out;
+std::vector<IndicatorMember> indicators_of(const std::vector<optimize::Limit>& limits) {
+  std::vector<IndicatorMember> out;
   for (const optimize::Limit& limit : limits) {
     for (const auto& field : engine::indicator_fields<double>()) {
       if (field.name == limit.name) out.push_back(field.member);
     }
   }
-  return out.size() == limits.size() ? out : std::vector<double engine::Indicators<double>::*>{};
+  return out.size() == limits.size() ? out : std::vector<IndicatorMember>{};
 }
 
 bool differs(double now, double before, double share) noexcept {
@@ -67,11 +69,27 @@ GuidedEngine::GuidedEngine(Seeking seeking, ModelOptimum model, std::optional<On
     throw about("calibration", ParameterError("calibration is of a cylinder of another geometry than the model: make "
                                               "both of the same cylinder"));
   }
-  if (advise(GuideCause::new_point) != GuideStatus::followed) {
+  if (begin() != GuideStatus::followed) {
     throw about("model", ParameterError("model has no best timing that can guide at this operating point: widen the "
                                         "bounds, or give another model"));
   }
   refusals_ = 0;
+}
+
+// The model's first answer. A curve-guided seeker that keeps its start and has not run yet is made anew with the
+// model's curves, since `guide` moves it to their best.
+GuideStatus GuidedEngine::begin() {
+  auto* const by_curve = std::get_if<CurveSeeking>(&seeking_);
+  const bool moves_nothing = guidance_.keep_start && by_curve == nullptr;
+  const GuideStatus status = advise(moves_nothing ? GuideCause::calibration : GuideCause::new_point);
+  if (status != GuideStatus::followed || !guidance_.keep_start || by_curve == nullptr) return status;
+  if (by_curve->protocol().cycle > 0) return status;  // the error of the guide that it has learnt stays
+  CurveSeekingSettings own = by_curve->settings();
+  const bool draws_limits = own.limit_curves.size() == limited_.size();
+  model_.tabulate(point_, own.curve, draws_limits ? std::span(limited_) : std::span<IndicatorMember>(),
+                  draws_limits ? std::span(own.limit_curves) : std::span<Curve>());
+  *by_curve = CurveSeeking(std::move(own));
+  return status;
 }
 
 GuideStatus GuidedEngine::advise(GuideCause cause, bool opened) noexcept {
@@ -81,7 +99,10 @@ GuideStatus GuidedEngine::advise(GuideCause cause, bool opened) noexcept {
     Curve curve;
     std::array<Curve, ModelOptimum::max_curves> own;
     const std::span<Curve> limit_curves(own.data(), limited_.size());
-    if (model_.tabulate(point_, curve, limited_, limit_curves)) {
+    // A curve that is best out of the bounds is not handed on: `guide` would begin anew with every cycle that asks
+    // again.
+    const bool drawn = model_.tabulate(point_, curve, limited_, limit_curves);
+    if (drawn && curve.best() >= settings_.space.lower[0] && curve.best() <= settings_.space.upper[0]) {
       const bool taken = cause == GuideCause::calibration ? curve_seeking->believe(curve, guidance_.calibrated_sd_cad)
                                                           : curve_seeking->guide(curve, limit_curves);
       if (taken) {
@@ -92,7 +113,7 @@ GuideStatus GuidedEngine::advise(GuideCause cause, bool opened) noexcept {
       curve_seeking->restart();
     }
   } else {
-    auto& trimmed = std::get<FeedForward<optimize::VariantSeeker>>(seeking_);
+    auto& trimmed = *std::get_if<FeedForward<optimize::VariantSeeker>>(&seeking_);
     const ModelOptimumResult found = model_.find(point_);
     status = trimmed.offer(guide_value(found), cause);
     if (status == GuideStatus::followed) guide_cad_ = found.soc_cad;
@@ -117,7 +138,9 @@ GuideStatus GuidedEngine::at(const engine::OperatingPoint& point) noexcept {
   point_ = point;
   if (opened || owed_) {
     if (opened) advised_ = point;
-    const GuideStatus status = advise(GuideCause::new_point, opened);
+    // Asked again at a point that is open already: as a new point once more, the seeker would begin anew in every
+    // cycle.
+    const GuideStatus status = advise(opened ? GuideCause::new_point : GuideCause::following, opened);
     owed_ = status == GuideStatus::refused;
     return status;
   }
@@ -128,12 +151,12 @@ GuideStatus GuidedEngine::at(const engine::OperatingPoint& point) noexcept {
 }
 
 const Inputs& GuidedEngine::ask() noexcept {
-  return std::visit([](auto& s) -> const Inputs& { return s.ask(); }, seeking_);
+  return on(seeking_, [](auto& s) -> const Inputs& { return s.ask(); });
 }
 
 TellStatus GuidedEngine::tell(const Reading& reading, std::span<const double> pressure_bar) noexcept {
   const Inputs asked = applied();
-  const TellStatus status = std::visit([&](auto& s) { return s.tell(reading); }, seeking_);
+  const TellStatus status = on(seeking_, [&](auto& s) { return s.tell(reading); });
   if (!calibration_ || pressure_bar.empty()) return status;
   if (status != TellStatus::accepted && status != TellStatus::misfire) return status;
   Inputs told;
@@ -141,41 +164,41 @@ TellStatus GuidedEngine::tell(const Reading& reading, std::span<const double> pr
   if (calibration_->offer(pressure_bar, point_, soc_cad, status == TellStatus::misfire) ==
           CalibrationStatus::accepted &&
       calibration_->update() == CalibrationStatus::updated) {
-    recalibrate();
+    recalibrate(calibration_->cylinder());
   }
   return status;
 }
 
 // The model takes over what was calibrated as soon as that moves its best timing.
-void GuidedEngine::recalibrate() noexcept {
-  model_.put_cylinder(calibration_->cylinder());
+void GuidedEngine::recalibrate(const engine::Cylinder& calibrated) noexcept {
+  model_.put_cylinder(calibrated);
   const ModelOptimumResult found = model_.find(point_);
   if (!found.found || std::abs(found.soc_cad - guide_cad_) < guidance_.recalibrated_cad) return;
   if (advise(GuideCause::calibration) == GuideStatus::followed) ++recalibrations_;
 }
 
 void GuidedEngine::restart() noexcept {
-  std::visit([](auto& s) { s.restart(); }, seeking_);
+  on(seeking_, [](auto& s) { s.restart(); });
 }
 void GuidedEngine::shift_estimate(const Inputs& by) noexcept {
-  std::visit([&](auto& s) { s.shift_estimate(by); }, seeking_);
+  on(seeking_, [&](auto& s) { s.shift_estimate(by); });
 }
 
 const Inputs& GuidedEngine::estimate() const noexcept {
-  return std::visit([](const auto& s) -> const Inputs& { return s.estimate(); }, seeking_);
+  return on(seeking_, [](const auto& s) -> const Inputs& { return s.estimate(); });
 }
 const Inputs& GuidedEngine::applied() const noexcept {
-  return std::visit([](const auto& s) -> const Inputs& { return s.applied(); }, seeking_);
+  return on(seeking_, [](const auto& s) -> const Inputs& { return s.applied(); });
 }
 const optimize::Protocol& GuidedEngine::protocol() const noexcept {
-  return std::visit([](const auto& s) -> const optimize::Protocol& { return s.protocol(); }, seeking_);
+  return on(seeking_, [](const auto& s) -> const optimize::Protocol& { return s.protocol(); });
 }
 std::size_t GuidedEngine::component_count() const noexcept {
-  return std::visit([](const auto& s) { return s.component_count(); }, seeking_);
+  return on(seeking_, [](const auto& s) { return s.component_count(); });
 }
 
 optimize::LimitState GuidedEngine::limit_state(std::size_t i) const noexcept {
-  return std::visit([&](const auto& s) { return optimize::limit_state_of(s, i); }, seeking_);
+  return on(seeking_, [&](const auto& s) { return optimize::limit_state_of(s, i); });
 }
 
 GuidedCycle GuidedEngine::now() const noexcept {
@@ -187,7 +210,7 @@ GuidedCycle GuidedEngine::now() const noexcept {
     out.estimate_sd_cad = curve_seeking->estimate_sd();
     out.trust = curve_seeking->trust();
   } else {
-    const auto& trimmed = std::get<FeedForward<optimize::VariantSeeker>>(seeking_);
+    const auto& trimmed = *std::get_if<FeedForward<optimize::VariantSeeker>>(&seeking_);
     out.feed_forward_cad = trimmed.path().feed_forward()[0];
     out.trust = trimmed.path().trust().value();
   }

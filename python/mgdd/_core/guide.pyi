@@ -94,7 +94,7 @@ class CurveSeeking:
     """
     Seeking guided by a curve; see mgdd.guide.CurveSeeking.
     """
-    def __init__(self, *, start: typing.Any, lower: typing.Any, upper: typing.Any, curve: Curve, prior_sd: typing.SupportsFloat | typing.SupportsIndex | None = None, scale_sd: typing.SupportsFloat | typing.SupportsIndex = 0.3, discrepancy: typing.SupportsFloat | typing.SupportsIndex = 0.15, noise_sd: typing.SupportsFloat | typing.SupportsIndex | None = None, memory_cycles: typing.SupportsFloat | typing.SupportsIndex = 143.0, amplitude_max: typing.SupportsFloat | typing.SupportsIndex | None = None, rate: typing.SupportsFloat | typing.SupportsIndex | None = None, delay_cycles: typing.SupportsFloat | typing.SupportsIndex = 0.0, lag_cycles: typing.SupportsFloat | typing.SupportsIndex = 0.0, hand_over: bool = True, maximize: bool = True, limits: collections.abc.Sequence[mgdd._core.optimize.Limit] = [], limit_curves: collections.abc.Sequence[Curve] | None = None) -> None:
+    def __init__(self, *, start: typing.Any, lower: typing.Any, upper: typing.Any, curve: Curve, prior_sd: typing.SupportsFloat | typing.SupportsIndex | None = None, scale_sd: typing.SupportsFloat | typing.SupportsIndex = 0.3, discrepancy: typing.SupportsFloat | typing.SupportsIndex = 0.25, noise_sd: typing.SupportsFloat | typing.SupportsIndex | None = None, memory_cycles: typing.SupportsFloat | typing.SupportsIndex = 143.0, amplitude_max: typing.SupportsFloat | typing.SupportsIndex | None = None, rate: typing.SupportsFloat | typing.SupportsIndex | None = None, delay_cycles: typing.SupportsFloat | typing.SupportsIndex = 0.0, lag_cycles: typing.SupportsFloat | typing.SupportsIndex = 0.0, hand_over: bool = True, maximize: bool = True, limits: collections.abc.Sequence[mgdd._core.optimize.Limit] = [], limit_curves: collections.abc.Sequence[Curve] | None = None) -> None:
         ...
     def _clear_history(self) -> None:
         """
@@ -340,7 +340,7 @@ class ModelOptimum:
         ...
     def _curves(self, point: mgdd._core.engine.OperatingPoint, names: collections.abc.Sequence[str]) -> list[Curve] | None:
         """
-        J and indicators over SOC at one operating point; None where there is no such cycle.
+        J and indicators over SOC at one operating point; None where the model has no physical cycle.
         """
     def _find(self, point: mgdd._core.engine.OperatingPoint) -> dict:
         """
@@ -450,7 +450,7 @@ class GuidedEngine:
     """
     The guided loop of an engine; see mgdd.guide.GuidedEngine.
     """
-    def __init__(self, seeker: typing.Any, model: ModelOptimum, calibration: OnlineCalibration, point: mgdd._core.engine.OperatingPoint, *, changed_share: typing.SupportsFloat | typing.SupportsIndex, calibrated_sd_cad: typing.SupportsFloat | typing.SupportsIndex, recalibrated_cad: typing.SupportsFloat | typing.SupportsIndex, calibration_rate_cad: typing.SupportsFloat | typing.SupportsIndex, noise_sd: typing.SupportsFloat | typing.SupportsIndex | None) -> None:
+    def __init__(self, seeker: typing.Any, model: ModelOptimum, calibration: OnlineCalibration | None, point: mgdd._core.engine.OperatingPoint, *, changed_share: typing.SupportsFloat | typing.SupportsIndex, calibrated_sd_cad: typing.SupportsFloat | typing.SupportsIndex, recalibrated_cad: typing.SupportsFloat | typing.SupportsIndex, calibration_rate_cad: typing.SupportsFloat | typing.SupportsIndex, noise_sd: typing.SupportsFloat | typing.SupportsIndex | None, keep_start: bool) -> None:
         ...
     def _at(self, point: mgdd._core.engine.OperatingPoint) -> str:
         """

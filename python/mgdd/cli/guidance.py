@@ -7,7 +7,7 @@ import math
 from collections.abc import Iterator
 from contextlib import contextmanager
 from dataclasses import dataclass, replace
-from typing import TYPE_CHECKING, TypeVar
+from typing import TYPE_CHECKING
 
 import numpy as np
 
@@ -46,7 +46,6 @@ _PARABOLA_BEND = -0.05  # of ten cycle models, wall heat 0 to 1 and 25 to 60 °C
 _CALIBRATED = ("wall_heat_scale",)
 _REACH_CAD = 60.0
 _STEADY_GRID_CAD = 0.1
-_ESTIMATE = {FeedForward: "estimate", GuidedEngine: "seeking.estimate"}  # in their states
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -202,26 +201,13 @@ def guided_seeker(task: Task, guided: GuidedTask) -> Seeker | FeedForward | Guid
             guided.cylinder, parameters=_CALIBRATED, steady_cycles=0, window_cycles=5,
             soc_scatter_cad=float(task.bench.settings["soc_scatter_cad"]),
         )  # fmt: skip
-        return _begun(GuidedEngine(seeker, guided.model, task.bench.point, calibration=calibration), task.start_cad)
+        return GuidedEngine(seeker, guided.model, task.bench.point, calibration=calibration, keep_start=True)
     plain = make_seeker(task)
     if guided.table is not None:
-        led = FeedForward(plain, guided.table)
-        led.at(task.bench.point)
-        return _begun(led, task.start_cad)
+        return FeedForward(plain, guided.table, keep_start=True)
     if guided.model is None:
         raise ParameterError(f"--guide {guided.kind}: has no model")
-    return _begun(GuidedEngine(plain, guided.model, task.bench.point), task.start_cad)
-
-
-Led = TypeVar("Led", FeedForward, GuidedEngine)
-
-
-def _begun(led: Led, start_cad: float) -> Led:
-    """Begin at that timing: by itself a guide begins at its own best one, which may lie above a limit."""
-    state = led.state
-    state[_ESTIMATE[type(led)]] = [start_cad]
-    led.state = state
-    return led
+    return GuidedEngine(plain, guided.model, task.bench.point, keep_start=True)
 
 
 def late_loss(bench: EngineBench, cycles: xr.Dataset, best: Optimum) -> float:

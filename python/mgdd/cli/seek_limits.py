@@ -37,7 +37,8 @@ def choose_start(task: Task, *, wanted: str = "default") -> tuple[float, str]:
         return task.start_cad, f"{wanted}; no limit has a noise-free value to choose by"
 
     def worst(start: float) -> float:
-        return float(np.max(excess[np.abs(timings - start) <= amplitude + 1e-9]))
+        reach = max(amplitude, 0.5 * (timings[1] - timings[0]))  # without dither the nearest timing of the scan
+        return float(np.max(excess[np.abs(timings - start) <= reach + 1e-9]))
 
     below = f"noise-free values stay {100 * _START_MARGIN:g} % below the limits" + (
         f" over ±{amplitude:g} °CA" if amplitude else ""

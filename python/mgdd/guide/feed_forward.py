@@ -5,6 +5,7 @@ from __future__ import annotations
 import logging
 import math
 from collections.abc import Callable, Mapping, Sequence
+from types import MappingProxyType
 from typing import TYPE_CHECKING, Any, Literal
 
 import numpy as np
@@ -12,10 +13,9 @@ import numpy as np
 from mgdd import _core
 from mgdd.errors import ParameterError
 from mgdd.guide.conditions import change_between, numbers_of
-from mgdd.guide.guided_history import TABLES, history_dataset
+from mgdd.guide.guided import TOLD, Column, Guided
 from mgdd.optimize import Optimum, Seeker
 from mgdd.optimize.seeker import rebuilt
-from mgdd.results.describe import as_html, rows_of
 
 if TYPE_CHECKING:
     import xarray as xr
@@ -28,10 +28,11 @@ Answer = Literal["same", "followed", "held", "refused"]
 _LOG = logging.getLogger(__name__)
 _CAUSES = ("", "calibration", "following", "new_point")  # of a value, the weightier the later
 _LONGEST_SETTLING, _LAGS = 5, 3.0  # cycles before a reading of a test; lags until a sensor has settled
+_UNIT = "unit of the input"
 _POINT = "point."  # of the columns of the state that hold the operating point
 
 
-class FeedForward(_core.guide.FeedForward):
+class FeedForward(Guided, _core.guide.FeedForward):
     """A seeker whose estimate moves with the optimum of a guide; it learns what is left, the trim.
 
     ``at(point)`` says at which operating point the next cycle runs, ``ask()`` and ``tell(J)`` are those of a seeker. At
@@ -72,6 +73,9 @@ class FeedForward(_core.guide.FeedForward):
         Relative standard deviation of the guide's curvature [-].
     significance : float
         Standard errors of the difference in J that make a verdict.
+    keep_start : bool
+        The guide's first value leaves the estimate at the seeker's own start, or where it stands if it has run, and
+        the trim takes the distance; by itself the estimate begins at the guide's optimum.
 
     Raises
     ------
@@ -98,6 +102,19 @@ class FeedForward(_core.guide.FeedForward):
     (True, True, 'confirmed')
     """
 
+    _columns = MappingProxyType({
+        "guide_optimum": Column(_UNIT, "optimum by the guide", per_input=True),
+        "feed_forward": Column(_UNIT, "feed-forward in force", per_input=True),
+        "trim": Column(_UNIT, "trim, estimate less feed-forward", per_input=True),
+        "estimate": Column(_UNIT, "estimate of the optimum", per_input=True),
+        "trust": Column("-", "trust in the guide"),
+        "testing": Column("-", "test of the guide", np.int8),
+        "point": Column("-", "operating points so far", np.int64),
+        "applied": Column(_UNIT, "applied input", per_input=True),
+        **TOLD,
+    })  # fmt: skip
+    _shown = ("verdict",)
+
     def __init__(
         self,
         seeker: Seeker,
@@ -113,9 +130,12 @@ class FeedForward(_core.guide.FeedForward):
         doubt: float = 0.1,
         curvature_spread: float = 0.2,
         significance: float = 3.0,
+        keep_start: bool = False,
     ) -> None:
         if guide is not None and not callable(guide):
             raise ParameterError.of("guide", guide, "None or a function of the operating point")
+        if not isinstance(keep_start, bool | np.bool_):
+            raise ParameterError.of("keep_start", keep_start, "True or False")
         settling = _settling_of(seeker) if probe_settling is None else probe_settling
         self._options: dict[str, Any] = {
             "trust": trust,
@@ -130,8 +150,9 @@ class FeedForward(_core.guide.FeedForward):
             "significance": significance,
         }
         super().__init__(seeker, **self._options)
+        self._options["keep_start"] = bool(keep_start)
         self._set_seeker_history(seeker._history_columns())
-        self._made_of = (type(seeker), seeker.settings)
+        self._seeker_class, self._seeker_kind, self._seeker_settings = type(seeker), seeker.kind, seeker.settings
         self._guide = guide
         self._point: dict[str, float] | None = None
         self._points = 0
@@ -208,7 +229,10 @@ class FeedForward(_core.guide.FeedForward):
         except Exception as error:  # noqa: BLE001 - a guide must not stop the engine: logged, and trust falls
             why = f"it raised {type(error).__name__}: {error}"
         # A new point whose value comes late was opened before: to open it again would restart the seeker once more.
-        if self._offer(optimum, curvature, "following" if cause == "new_point" and not opens else cause):
+        offered = "following" if cause == "new_point" and not opens else cause
+        if self._options["keep_start"] and np.isnan(self.guide_optimum).any():
+            offered = "calibration"  # the first value of all: the estimate stays
+        if self._offer(optimum, curvature, offered):
             return "followed"
         _LOG.log(
             logging.DEBUG if retry else logging.WARNING,
@@ -217,37 +241,12 @@ class FeedForward(_core.guide.FeedForward):
         )  # fmt: skip
         return "refused"
 
-    def tell(
-        self,
-        J: Any = None,  # noqa: N803
-        limits: Any = None,
-        *,
-        misfire: bool = False,
-        applied: Any = None,
-    ) -> None:
-        """Accept what was measured at the input of the last ask.
+    def _standing(self) -> dict[str, Any]:
+        tables = {name: getattr(self, name) for name in ("guide_optimum", "feed_forward", "trim", "estimate")}
+        return {**tables, "trust": self.trust, "testing": self.testing, "point": self._points}
 
-        Parameters
-        ----------
-        J : float or array_like
-            Performance, or one number per component.
-        limits : sequence or mapping of str to float, optional
-            One value per limit of the seeker.
-        misfire : bool
-            The cycle is counted and its J and limits are not read.
-        applied : array_like, optional
-            What the plant really applied, if not what was asked for.
-
-        Raises
-        ------
-        mgdd.errors.ParameterError, mgdd.errors.ShapeError, mgdd.errors.DataError
-            As by the seeker; nothing has changed then.
-        """
-        before = (self.cycle, self._points, self.trust, self.testing, *(getattr(self, name) for name in TABLES[:-1]))
-        super().tell(J, limits, misfire=misfire, applied=applied)
-        done = self.applied if applied is None else np.atleast_1d(np.array(applied, np.float64))
-        objective = math.nan if misfire else float(np.sum(np.asarray(J, np.float64)))
-        self._rows.append((*before, done, objective, misfire))
+    def _arguments(self) -> tuple[tuple[Any, ...], dict[str, Any]]:
+        return (self.seeker, self._guide), {}
 
     @property
     def history(self) -> xr.Dataset:
@@ -258,18 +257,12 @@ class FeedForward(_core.guide.FeedForward):
         place, 2: the new one), ``point`` (operating points so far), ``objective`` (NaN where the cycle misfired) and
         ``misfire``. What is not known yet is NaN. Built anew on every access.
         """
-        return history_dataset(self._rows, self.estimate.size, self._made_of[0].kind)
-
-    @property
-    def settings(self) -> dict[str, Any]:
-        """What it was made of: those of the seeker, and its own."""
-        return {**self._made_of[1], **self._options}
+        return self._told()
 
     @property
     def seeker(self) -> Seeker:
         """The seeker as it stands now, with its history: a copy."""
-        kind, settings = self._made_of
-        made: Seeker = rebuilt(kind, settings, self._seeker_state, self._seeker_history)
+        made: Seeker = rebuilt(self._seeker_class, self._seeker_settings, self._seeker_state, self._seeker_history)
         return made
 
     @property
@@ -293,19 +286,6 @@ class FeedForward(_core.guide.FeedForward):
         point = {name.removeprefix(_POINT): float(saved[name][0]) for name in own - {"points"}}
         self._point, self._points, self._owed = point or None, int(counted[0]), _CAUSES[int(counted[1])]
 
-    def __reduce__(self) -> tuple[Any, ...]:
-        return _rebuild, (type(self), self.seeker, self._guide, self._options, self.state, list(self._rows))
-
-    def __repr__(self) -> str:
-        at = np.array2string(self.estimate, precision=6)
-        return (
-            f"<FeedForward of {self._made_of[0].__name__}, cycle {self.cycle}, estimate {at}, trust {self.trust:.2f}>"
-        )
-
-    def _repr_html_(self) -> str:
-        now = {"cycle": self.cycle, "estimate": self.estimate, "feed_forward": self.feed_forward, "trim": self.trim}
-        return as_html("FeedForward", rows_of({**now, "verdict": self.verdict, **self._options, "trust": self.trust}))
-
 
 def _settling_of(seeker: Any) -> int:
     """Cycles until the slowest component of J shows a step of the input."""
@@ -319,17 +299,3 @@ def _numbers_said(said: Any) -> tuple[list[float], list[float]]:
         bend = [said.curvature] if len(said.inputs) == 1 and said.curvature < 0.0 else []
         return [float(value) for value in said.inputs.values()], bend
     return np.atleast_1d(np.asarray(math.nan if said is None else said, np.float64)).ravel().tolist(), []
-
-
-def _rebuild(
-    cls: type[FeedForward],
-    seeker: Seeker,
-    guide: Guide | None,
-    options: dict[str, Any],
-    state: dict[str, list[float]],
-    rows: list[tuple[Any, ...]],
-) -> FeedForward:
-    made = cls(seeker, guide, **options)
-    made.state = state
-    made._rows = rows
-    return made

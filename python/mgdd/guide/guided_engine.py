@@ -3,18 +3,15 @@
 from __future__ import annotations
 
 import copy
-import math
+from types import MappingProxyType
 from typing import TYPE_CHECKING, Any, Literal
-
-import numpy as np
 
 from mgdd import _core
 from mgdd._core.engine import OperatingPoint
 from mgdd.errors import ParameterError
+from mgdd.guide.guided import TOLD, Column, Guided
 from mgdd.guide.model_optimum import ModelOptimum
 from mgdd.guide.online_calibration import OnlineCalibration
-from mgdd.results.describe import as_html, rows_of
-from mgdd.results.labels import labelled_dataset
 
 if TYPE_CHECKING:
     import xarray as xr
@@ -25,21 +22,9 @@ if TYPE_CHECKING:
 __all__ = ["GuidedEngine"]
 
 _CAD = "°CA aTDC"
-_COLUMNS = {
-    "guide_cad": (_CAD, "best timing by the guide"),
-    "feed_forward_cad": (_CAD, "feed-forward in force"),
-    "trim_cad": ("°CA", "trim, estimate less feed-forward"),
-    "estimate_cad": (_CAD, "estimate of the best timing"),
-    "estimate_sd_cad": ("°CA", "standard deviation of the estimate as stated"),
-    "trust": ("-", "trust in the guide"),
-    "wall_heat_scale": ("-", "wall-heat scale of the guide"),
-    "applied_cad": (_CAD, "applied timing"),
-    "objective": ("unit of J", "objective J"),
-    "misfire": ("-", "misfired cycle"),
-}
 
 
-class GuidedEngine(_core.guide.GuidedEngine):
+class GuidedEngine(Guided, _core.guide.GuidedEngine):
     """Seek, calibrate, re-optimise and blend, one engine cycle at a time.
 
     ``at(point)`` says at which operating point the next cycle runs, ``ask()`` gives its timing, ``tell(J,
@@ -68,6 +53,9 @@ class GuidedEngine(_core.guide.GuidedEngine):
         Largest move of a feed-forward per cycle after a calibration [°CA].
     noise_sd : float, optional
         Standard deviation of one reading, for the trust in a feed-forward [unit of J]; learnt without.
+    keep_start : bool
+        Begin at the seeker's own start, or where it stands if it has run; by itself a run begins at the model's best
+        timing. The trim takes the distance; a `CurveSeeking` believes the model from the second cycle on.
 
     Raises
     ------
@@ -94,6 +82,19 @@ class GuidedEngine(_core.guide.GuidedEngine):
     (0.5, True)
     """
 
+    _columns = MappingProxyType({
+        "guide_cad": Column(_CAD, "best timing by the guide"),
+        "feed_forward_cad": Column(_CAD, "feed-forward in force"),
+        "trim_cad": Column("°CA", "trim, estimate less feed-forward"),
+        "estimate_cad": Column(_CAD, "estimate of the best timing"),
+        "estimate_sd_cad": Column("°CA", "standard deviation of the estimate as stated"),
+        "trust": Column("-", "trust in the guide"),
+        "wall_heat_scale": Column("-", "wall-heat scale of the guide"),
+        "applied_cad": Column(_CAD, "applied timing"),
+        **TOLD,
+    })  # fmt: skip
+    _shown = ("recalibrations", "refusals", "calibration_status")
+
     def __init__(
         self,
         seeker: Seeker,
@@ -106,6 +107,7 @@ class GuidedEngine(_core.guide.GuidedEngine):
         recalibrated_cad: float = 0.1,
         calibration_rate_cad: float = 1.0,
         noise_sd: float | None = None,
+        keep_start: bool = False,
     ) -> None:
         if not isinstance(model, ModelOptimum):
             raise ParameterError.of("model", model, "a ModelOptimum")
@@ -117,16 +119,22 @@ class GuidedEngine(_core.guide.GuidedEngine):
             "recalibrated_cad": recalibrated_cad,
             "calibration_rate_cad": calibration_rate_cad,
             "noise_sd": noise_sd,
+            "keep_start": keep_start,
         }
         core: Any = None if calibration is None else calibration._core
         super().__init__(seeker, model, core, point, **self._options)
-        self._made_of = (copy.deepcopy(seeker), copy.deepcopy(model), copy.deepcopy(calibration), point)
-        self._rows: list[tuple[float, ...]] = []
+        self._seeker_kind, self._seeker_settings = seeker.kind, seeker.settings
+        self._made_of = (
+            (copy.deepcopy(seeker), copy.deepcopy(model), point),
+            {"calibration": copy.deepcopy(calibration)},
+        )
+        self._rows = []
 
-    @property
-    def settings(self) -> dict[str, Any]:
-        """What it was made of: those of the seeker, and its own."""
-        return {**self._made_of[0].settings, **self._options}
+    def _standing(self) -> dict[str, Any]:
+        return dict(self._now())
+
+    def _arguments(self) -> tuple[tuple[Any, ...], dict[str, Any]]:
+        return self._made_of
 
     def at(self, point: OperatingPoint) -> Literal["followed", "refused"]:
         """Say at which operating point the next cycle runs; call it before `ask`, in every cycle.
@@ -178,11 +186,8 @@ class GuidedEngine(_core.guide.GuidedEngine):
         mgdd.errors.ParameterError, mgdd.errors.ShapeError, mgdd.errors.DataError
             As by the seeker; nothing has changed then.
         """
-        before = self._now()
-        self._tell(J, limits, misfire, applied, pressure_bar)
-        done = float(self.applied[0]) if applied is None else float(np.ravel(applied)[0])
-        objective = math.nan if misfire else float(np.sum(np.asarray(J, np.float64)))
-        self._rows.append((*before.values(), done, objective, float(misfire)))
+        with self._recorded(J, misfire, applied):
+            self._tell(J, limits, misfire, applied, pressure_bar)
 
     @property
     def history(self) -> xr.Dataset:
@@ -193,35 +198,4 @@ class GuidedEngine(_core.guide.GuidedEngine):
         cycle ``applied_cad``, ``objective`` (NaN where it misfired) and ``misfire`` (0 or 1). Built anew on every
         access.
         """
-        table = np.array(self._rows, np.float64).reshape(-1, len(_COLUMNS))
-        first = self.cycle - table.shape[0]
-        variables: dict[str, tuple[Any, ...]] = {"cycle": ("cycle", np.arange(first, self.cycle, dtype=np.int64))}
-        for at, (name, label) in enumerate(_COLUMNS.items()):
-            variables[name] = ("cycle", table[:, at], *label)
-        return labelled_dataset(variables, attrs={"seeker": self._made_of[0].kind})
-
-    def __reduce__(self) -> tuple[Any, ...]:
-        return _rebuild, (type(self), self._made_of, self._options, self.state, list(self._rows))
-
-    def __repr__(self) -> str:
-        name = type(self._made_of[0]).__name__
-        return (
-            f"<GuidedEngine with {name}, cycle {self.cycle}, estimate {self.estimate[0]:.6g}, trust {self.trust:.2f}>"
-        )
-
-    def _repr_html_(self) -> str:
-        return as_html("GuidedEngine", rows_of({**self._now(), **self._options}))
-
-
-def _rebuild(
-    cls: type[GuidedEngine],
-    made_of: tuple[Any, ...],
-    options: dict[str, Any],
-    state: dict[str, list[float]],
-    rows: list[tuple[float, ...]],
-) -> GuidedEngine:
-    seeker, model, calibration, point = made_of
-    made = cls(seeker, model, point, calibration=calibration, **options)
-    made.state = state
-    made._rows = rows
-    return made
+        return self._told()

@@ -214,7 +214,7 @@ class TimingMap(_core.guide.TimingMap, MapForms):
         Raises
         ------
         mgdd.errors.ParameterError
-            A point outside of the axes, or numbers that are no optimum; nothing has changed then.
+            A point outside of the axes, or numbers that are not an optimum; nothing has changed then.
         """
         if not self._learn(self._coordinates(point), timing_cad, sd_cad):
             raise ParameterError(

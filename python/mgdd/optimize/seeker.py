@@ -210,7 +210,7 @@ class Seeker(_CoreSeeker):
         Raises
         ------
         DataError
-            No file of a seeker, one of another kind, or one whose settings and state do not fit.
+            Not a file of a seeker, one of another kind, or one whose settings and state do not fit.
         OSError
             The file cannot be read.
         """
@@ -237,7 +237,7 @@ class Seeker(_CoreSeeker):
 
 
 def _read(path: str | os.PathLike[str]) -> tuple[str, dict[str, Any], dict[str, Any]]:
-    """Read kind, settings and state of a file that `Seeker.save` wrote; DataError if it is none."""
+    """Read kind, settings and state of a file that `Seeker.save` wrote; DataError for any other file."""
     file = existing_file(path)
     try:
         content = json.loads(file.read_text(encoding="utf-8"), object_hook=_decode)

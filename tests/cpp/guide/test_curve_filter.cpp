@@ -35,7 +35,7 @@ TEST(CurveFilter, FindsPlaceAndScaleOfAMovedCurve) {
   for (const double place : {-14.0, -3.2, 6.0}) {
     CurveFilter filter(settings_on(-30.0, 10.0), skewed_curve(-2.0));
     for (int k = 0; k < 40; ++k) {
-      const double x = place + (k % 2 == 0 ? 5.0 : -3.0);
+      const double x = place + (k % 3 == 0 ? 5.0 : k % 3 == 1 ? -3.0 : 0.5);
       filter.learn(x, 17.0 + 1.25 * skewed(x - place));
     }
     EXPECT_NEAR(filter.mean(), place, 0.15);
@@ -135,7 +135,7 @@ TEST(CurveFilter, ALagIsPartOfTheHypotheses) {
   const double share = -std::expm1(-1.0 / 7.0);
   double level = skewed(-18.0 + 9.0);  // settled at the first input
   for (int k = 0; k < 60; ++k) {
-    const double x = k < 5 ? -18.0 : (k % 2 == 0 ? -5.0 : -12.0);
+    const double x = k < 5 ? -18.0 : (k / 10 % 2 == 0 ? -5.0 : -12.0);
     level += share * (skewed(x + 9.0) - level);
     if (k % 7 == 3) {
       filter.pass(x);  // a misfire
@@ -144,6 +144,34 @@ TEST(CurveFilter, ALagIsPartOfTheHypotheses) {
     }
   }
   EXPECT_NEAR(filter.mean(), -9.0, 0.3);
+}
+
+// A level is not known, so that readings of one input alone say nothing of the place, however far below the top they
+// lie.
+TEST(CurveFilter, OneInputAloneSaysNothingOfThePlace) {
+  CurveFilter filter(settings_on(-40.0, 36.0), skewed_curve(-2.0));
+  for (int k = 0; k < 80; ++k)
+    filter.learn(-16.0, 3.0 + 0.3 * random::normal(5, 1, static_cast<std::uint64_t>(k)));
+  EXPECT_NEAR(filter.mean(), -2.0, 0.05);
+  EXPECT_NEAR(filter.spread(), 10.0, 0.2);
+  EXPECT_NEAR(filter.noise_sd(), 0.3, 0.06) << "what is read far from the top is noise as well";
+}
+
+TEST(CurveFilter, APriorThatIsWrongFades) {
+  CurveFilter filter(settings_on(-30.0, 10.0), skewed_curve(-2.0));
+  const double place = -14.0;
+  filter.restart(skewed_curve(-2.0), -9.0, 1.5);
+  const auto read = [&](int from, int to) {
+    for (int k = from; k < to; ++k) {
+      const double x = place + (k % 2 == 0 ? 1.0 : -1.0);
+      filter.learn(x, skewed(x - place) + 0.02 * random::normal(6, 1, static_cast<std::uint64_t>(k)));
+    }
+  };
+  read(0, 20);
+  const double early = filter.mean();
+  read(20, 700);
+  EXPECT_GT(early, place + 0.5) << "the prior is believed at first";
+  EXPECT_NEAR(filter.mean(), place, 0.1);
 }
 
 TEST(CurveFilter, OldReadingsFade) {

@@ -66,6 +66,42 @@ TEST(FeedForward, StartsAtTheOptimumOfTheGuide) {
   EXPECT_NEAR(seeker.trim()[0], 0.0, 1e-12);
 }
 
+// Where the start is to be kept, what is applied stays that of the seeker, which begins anew as with any first value.
+TEST(FeedForward, AFirstValueThatIsACalibrationKeepsTheStart) {
+  for (auto& [name, any] : every_seeker(space_at(scalar_input(8.0), 40.0), 0.25, 3)) {
+    SCOPED_TRACE(name);
+    VariantSeeker plain(any);
+    FeedForward<VariantSeeker> kept{VariantSeeker(any)};
+    EXPECT_EQ(kept.offer(at(-4.2), GuideCause::calibration), GuideStatus::followed);
+    EXPECT_EQ(kept.estimate(), plain.estimate());
+    plain.restart();
+    EXPECT_EQ(kept.path().guide()[0], -4.2);
+    EXPECT_NEAR(kept.path().feed_forward()[0], -4.2, 1e-12);
+    EXPECT_NEAR(kept.trim()[0], plain.estimate()[0] + 4.2, 1e-12);
+    EXPECT_EQ(run(kept, -5.6, 90, 0.25), run(plain, -5.6, 90, 0.25));
+    EXPECT_EQ(save_state(kept.seeker()), save_state(plain));
+  }
+}
+
+TEST(FeedForward, AKeptStartLeavesTheGuidesMovesAsTheyAre) {
+  FeedForward<ExtremumSeeking> seeker = guided(-12.0);
+  seeker.offer(at(-2.7), GuideCause::calibration);
+  EXPECT_NEAR(seeker.trim()[0], -9.3, 1e-12);
+  run(seeker, -4.2, 600);
+  EXPECT_NEAR(seeker.trim()[0], -1.5, 0.02);
+  seeker.offer(at(-9.2), GuideCause::new_point);
+  run(seeker, -10.7, 2);
+  EXPECT_EQ(seeker.path().trust().verdict(), Verdict::confirmed);
+  EXPECT_NEAR(seeker.estimate()[0], -10.7, 0.05);
+}
+
+TEST(FeedForward, ALittleTrustedGuideIsInForceInPart) {
+  FeedForward<ExtremumSeeking> seeker = guided(-20.0, {.initial = 0.25, .noise_sd = 0.25});
+  seeker.offer(at(-4.0), GuideCause::calibration);
+  EXPECT_EQ(seeker.estimate()[0], -20.0);
+  EXPECT_NEAR(seeker.path().feed_forward()[0], -16.0, 1e-12);
+}
+
 // The guide is 1.5 CAD late everywhere: the trim takes that, and a step moves the estimate as far as the optimum goes.
 TEST(FeedForward, ANewPointMovesTheEstimateAndKeepsTheTrim) {
   FeedForward<ExtremumSeeking> seeker = guided();

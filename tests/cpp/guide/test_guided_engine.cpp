@@ -1,79 +1,13 @@
-// The whole guided loop on the virtual bench: arrival, new points, calibration without a jump, refusals, real time.
+// The whole guided loop on the virtual bench: arrival, new points, calibration without a jump, state, real time.
 #include "mgdd/guide/guided_engine.hpp"
 
 #include <cmath>
 #include <vector>
 
-#include "mgdd/loop/engine_bench.hpp"
-#include "support/seeker_case.hpp"
+#include "support/guided_engine_case.hpp"
 
 namespace mgdd::guide {
 namespace {
-
-using engine::OperatingPoint;
-using optimize::scalar_input;
-using optimize::TellStatus;
-
-constexpr double plant_best_cad = -5.63;  // of the default cylinder, wall heat 0.5
-
-engine::Cylinder rough_cylinder() {
-  engine::Cylinder c;
-  c.wall_heat.wall_heat_scale = 1.0;
-  return c;
-}
-
-ModelOptimum rough_model() {
-  ModelOptimumSettings s;
-  s.cylinder = rough_cylinder();
-  return ModelOptimum(s);
-}
-
-CurveSeeking curve_seeking(ModelOptimum model, const OperatingPoint& point) {
-  CurveSeekingSettings s;
-  EXPECT_TRUE(model.tabulate(point, s.curve));
-  s.space = {scalar_input(s.curve.best()), scalar_input(-30.0), scalar_input(10.0)};
-  return CurveSeeking(s);
-}
-
-FeedForward<optimize::VariantSeeker> trimmed() {
-  optimize::ExtremumSeekingSettings s;
-  s.space = {scalar_input(-15.0), scalar_input(-30.0), scalar_input(10.0)};
-  return FeedForward(optimize::VariantSeeker(optimize::ExtremumSeeking(s)));
-}
-
-std::optional<OnlineCalibration> calibration() {
-  OnlineCalibrationSettings s;
-  s.cylinder = rough_cylinder();
-  s.window.steady_cycles = 0;
-  s.window.window_cycles = 10;
-  return std::optional<OnlineCalibration>(std::in_place, s);
-}
-
-loop::EngineBench bench_at(std::vector<loop::ScheduledPoint> schedule, std::uint64_t seed) {
-  loop::BenchSettings s;
-  s.schedule = std::move(schedule);
-  s.pressure_noise_bar = 0.05;
-  s.seed = seed;
-  return loop::EngineBench(s);
-}
-
-/// One cycle as 7.2 of the loop has it.
-double cycle(loop::EngineBench& bench, GuidedEngine& guided) {
-  guided.at(bench.point());
-  const loop::BenchCycle c = bench.step(guided.ask()[0]);
-  const double j[] = {c.j};
-  const auto trace = bench.pressure();
-  EXPECT_EQ(guided.tell({j, {}, c.misfire}, trace.pressure_bar),
-            c.misfire ? TellStatus::misfire : TellStatus::accepted);
-  return guided.estimate()[0];
-}
-
-std::vector<double> path_of(loop::EngineBench& bench, GuidedEngine& guided, int cycles) {
-  std::vector<double> path;
-  for (int k = 0; k < cycles; ++k)
-    path.push_back(cycle(bench, guided));
-  return path;
-}
 
 TEST(GuidedEngine, TheModelLearnsWhileTheEngineSeeks) {
   const OperatingPoint point;
@@ -82,7 +16,7 @@ TEST(GuidedEngine, TheModelLearnsWhileTheEngineSeeks) {
     GuidedEngine guided(curve_seeking(rough_model(), point), rough_model(), calibration(), point);
     EXPECT_NEAR(guided.now().guide_cad, -1.5, 0.2);
     const std::vector<double> path = path_of(bench, guided, 60);
-    EXPECT_NEAR(guided.calibration()->cylinder().wall_heat.wall_heat_scale, 0.5, 0.025);
+    EXPECT_NEAR(guided.calibration().value().cylinder().wall_heat.wall_heat_scale, 0.5, 0.025);
     EXPECT_NEAR(guided.now().guide_cad, plant_best_cad, 0.4) << "the calibrated model says where the plant's best is";
     EXPECT_GT(guided.recalibrations(), 0);
     EXPECT_NEAR(path.back(), plant_best_cad, 1.2);
@@ -134,53 +68,6 @@ TEST(GuidedEngine, SmallStepsOfThePointAreNoNewPoint) {
   EXPECT_NE(save_state(guided), before) << "from where the model was asked last, not from the cycle before";
 }
 
-TEST(GuidedEngine, APointOfWhichTheModelSaysNothingIsWaitedFor) {
-  const OperatingPoint point;
-  for (const bool by_curve : {true, false}) {
-    auto bench = bench_at({{0, point}}, 1);
-    GuidedEngine guided(
-        by_curve ? GuidedEngine::Seeking(curve_seeking(rough_model(), point)) : GuidedEngine::Seeking(trimmed()),
-        rough_model(), std::nullopt, point);
-    path_of(bench, guided, 60);
-    const double held = guided.estimate()[0];
-    OperatingPoint motored = point, broken = point;
-    motored.fuel_mg = 0.0;
-    broken.speed_rpm = std::nan("");
-    EXPECT_EQ(guided.at(broken), GuideStatus::refused);
-    EXPECT_EQ(guided.estimate()[0], held);
-    EXPECT_EQ(guided.at(motored), GuideStatus::refused);
-    EXPECT_EQ(guided.at(motored), GuideStatus::refused);
-    EXPECT_EQ(guided.estimate()[0], held) << "what it said last stands";
-    EXPECT_EQ(guided.refusals(), 3);
-    EXPECT_EQ(guided.at(point), GuideStatus::followed);
-    path_of(bench, guided, 20);
-    guided.ask();
-    EXPECT_EQ(guided.at(motored), GuideStatus::busy);
-  }
-}
-
-TEST(GuidedEngine, BadPressureNeverReachesTheCalibration) {
-  const OperatingPoint point;
-  auto bench = bench_at({{0, point}}, 2);
-  GuidedEngine guided(curve_seeking(rough_model(), point), rough_model(), calibration(), point);
-  for (int k = 0; k < 40; ++k) {
-    const loop::BenchCycle c = bench.step(guided.ask()[0]);
-    const auto trace = bench.pressure().pressure_bar;
-    std::vector<double> spoilt(trace.begin(), trace.end());
-    if (k % 3 == 0) spoilt[40] = std::nan("");
-    if (k % 3 == 1) spoilt.pop_back();
-    if (k % 3 == 2) {
-      for (double& p : spoilt)
-        p = std::min(p, 60.0);
-    }
-    const double j[] = {c.j};
-    EXPECT_EQ(guided.tell({j, {}, false}, spoilt), TellStatus::accepted);
-  }
-  EXPECT_EQ(guided.calibration()->accepted(), 0);
-  EXPECT_EQ(guided.recalibrations(), 0);
-  EXPECT_NEAR(guided.estimate()[0], plant_best_cad, 1.5) << "the seeker goes on";
-}
-
 TEST(GuidedEngine, GoesOnBitForBitFromItsState) {
   OperatingPoint point, other;
   other.fuel_mg = 26.0;
@@ -188,16 +75,18 @@ TEST(GuidedEngine, GoesOnBitForBitFromItsState) {
     const auto make = [&] {
       return GuidedEngine(
           by_curve ? GuidedEngine::Seeking(curve_seeking(rough_model(), point)) : GuidedEngine::Seeking(trimmed()),
-          rough_model(), calibration(), point);
+          rough_model(), calibration(), point, {.keep_start = true});
     };
-    auto bench = bench_at({{0, point}, {33, other}}, 1);
-    GuidedEngine guided = make();
-    path_of(bench, guided, 45);
-    GuidedEngine again = make();
-    restore_state(again, save_state(guided));
-    auto same = bench;
-    EXPECT_EQ(path_of(bench, guided, 40), path_of(same, again, 40));
-    EXPECT_EQ(save_state(guided), save_state(again));
+    for (const int cut : {0, 1, 45}) {
+      auto bench = bench_at({{0, point}, {33, other}}, 1);
+      GuidedEngine guided = make();
+      path_of(bench, guided, cut);
+      GuidedEngine again = make();
+      restore_state(again, save_state(guided));
+      auto same = bench;
+      EXPECT_EQ(path_of(bench, guided, 40), path_of(same, again, 40));
+      EXPECT_EQ(save_state(guided), save_state(again));
+    }
   }
 }
 
@@ -220,19 +109,6 @@ TEST(GuidedEngine, TakesNoMemoryAndNeverThrows) {
     }
     EXPECT_EQ(counter.count(), 0U);
   }
-}
-
-TEST(GuidedEngine, RefusesAGuideThatCannotGuide) {
-  OperatingPoint point, motored;
-  motored.fuel_mg = 0.0;
-  EXPECT_THROW(GuidedEngine(curve_seeking(rough_model(), point), rough_model(), std::nullopt, motored), ParameterError);
-  engine::Cylinder wide = rough_cylinder();
-  wide.geometry.bore_mm = 90.0;
-  ModelOptimumSettings s;
-  s.cylinder = wide;
-  EXPECT_THROW(GuidedEngine(curve_seeking(rough_model(), point), ModelOptimum(s), calibration(), point),
-               ParameterError);
-  EXPECT_THROW(GuidedEngine(trimmed(), rough_model(), std::nullopt, point, {.changed_share = 0.0}), ParameterError);
 }
 
 }  // namespace

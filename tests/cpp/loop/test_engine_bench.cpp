@@ -238,7 +238,7 @@ TEST(EngineBench, TheScheduleChangesThePointAndSaysSo) {
     EXPECT_EQ(bench.analyser_delay_cycles(), k < 5 ? 38u : 75u);
     const BenchCycle c = bench.step(-6.0);
     EXPECT_EQ(c.indicators.imep_gross_bar, cycle_of({}, expected, -6.0).imep_gross_bar);
-    EXPECT_EQ(c.operating_point_changed, k == 5) << k;  // 4 % more fuel is no change
+    EXPECT_EQ(c.operating_point_changed, k == 5) << k;  // 4 % more fuel is not a change
   }
 }
 

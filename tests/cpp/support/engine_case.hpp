@@ -22,7 +22,7 @@ struct EngineCase {
   double soc_cad = -6.0;
   double soi_cad = std::numeric_limits<double>::quiet_NaN();
   double step_cad = engine::default_step_cad;
-  std::map<std::string, std::string> words;  ///< settings that are no field: objective, traces, free
+  std::map<std::string, std::string> words;  ///< settings that are not fields: objective, traces, free
 
   EngineCase() = default;
   explicit EngineCase(std::string_view settings);

@@ -1,7 +1,9 @@
 // Where a known curve stands: a point-mass filter (Bucy and Senne 1971) over the place T of its maximum and over its
 // shape, from noisy readings of J at any inputs. Hypothesis (T, shape): J = o + S [c(b + (x - T)/w) - c(b)], with c the
 // guide's curve, b its best input and w the width on that side of T. Offset o and scale S are integrated out as in a
-// linear regression, the noise as in Student's t (Rao-Blackwellised; Doucet et al. 2000); old readings fade.
+// linear regression, the noise as in Student's t (Rao-Blackwellised; Doucet et al. 2000); old readings fade, and with
+// them all that the prior says beyond its widest. A reading counts alike in every hypothesis, the less the lower on the
+// curve it lies: weights that differed would favour the hypotheses to which every reading is a near one.
 // Shapes: as the guide says, and steep on one side, which is what a knock limit or a cliff looks like.
 // A first-order lag of the sensor is part of every hypothesis. noexcept and allocation-free after construction.
 #pragma once
@@ -21,7 +23,7 @@ struct CurveFilterSettings {
   double lower = 0.0, upper = 1.0;  ///< of T, finite
   double prior_sd = 0.25;           ///< of T about the guide's best input, > 0, input unit
   double scale_sd = 0.3;            ///< of S about 1, > 0
-  double discrepancy = 0.15;        ///< error of the curve per unit of its drop: far readings count less, >= 0
+  double discrepancy = 0.25;        ///< error of the curve per unit of its drop: far readings count less, >= 0
   double noise_sd = 0.0;            ///< of one reading of J; 0 = not known: learnt from a guess that the curve suggests
   double memory_cycles = 143.0;     ///< readings fade by exp(-1/memory), > 1
   double lag_cycles = 0.0;          ///< time constant between the plant and J, >= 0
@@ -80,15 +82,18 @@ class CurveFilter {
     v("filter_bend", self.bend_);
     v("filter_count", self.count_);
     v("filter_count_squared", self.count_squared_);
+    v("filter_weight", self.weight_);
+    v("filter_y", self.y_);
+    v("filter_yy", self.yy_);
     v("filter_prior_mean", self.prior_mean_);
-    v("filter_prior_sd", self.prior_sd_);
+    v("filter_prior_extra", self.prior_extra_);
     v("filter_mean", self.mean_);
     v("filter_spread", self.spread_);
     v("filter_variance", self.variance_);
     v("filter_scale", self.scale_);
     v("filter_unexplained", self.unexplained_);
     v("filter_origin", self.origin_);
-    const char* names[] = {"weight", "c", "cc", "y", "cy", "yy", "log_weight", "lagged", "share", "own_scale"};
+    const char* names[] = {"c", "cc", "cy", "lagged", "share", "own_scale"};
     for (std::size_t i = 0; i < self.sums_.size(); ++i)
       v(std::string("filter_") + names[i], self.sums_[i]);
     v("filter_started", self.started_);
@@ -99,21 +104,24 @@ class CurveFilter {
   }
 
  private:
-  enum Sum : std::size_t { weight, c, cc, y, cy, yy, log_weight, lagged, share, own_scale, sums };
+  enum Sum : std::size_t { c, cc, cy, lagged, share, own_scale, sums };
   static constexpr std::size_t recent = 3;  // readings that survive a doubt
   void fill_drops(double input, Column& drops) const noexcept;
   void add(const Column& drops, double j) noexcept;
   void judge() noexcept;
   double faded_sd(double factor) const noexcept;
+  double prior_precision() const noexcept;
+  void expect(const Curve& curve, double mean, double sd) noexcept;
   double guessed_variance() const noexcept;
 
   CurveFilterSettings settings_;
   Curve curve_;
   double per_lag_;  // share of the way that the lag goes in one cycle
   double fading_;
-  double bend_;  // of the curve
-  double prior_mean_, prior_sd_;
-  double count_ = 0.0, count_squared_ = 0.0;  // readings, and sum of their squared weights
+  double bend_;                               // of the curve
+  double prior_mean_, prior_extra_ = 0.0;     // precision of the prior beyond that of `prior_sd`; it fades
+  double count_ = 0.0, count_squared_ = 0.0;  // readings that have not faded, and sum of their squares
+  double weight_ = 0.0, y_ = 0.0, yy_ = 0.0;  // weighted: the readings, J and J^2
   double mean_ = 0.0, spread_ = 0.0, variance_ = 0.0, scale_ = 1.0;
   double unexplained_ = 0.0;
   double origin_ = 0.0;   // first reading, taken off before summing

@@ -3,7 +3,8 @@
 // place to one side of its mean and then to the other, at least as far as keeping track costs least.
 // Kin: self-tuning extremum control (Wellstead and Zarrop 1991). Readings that the curve cannot explain raise a doubt:
 // what was known is dropped but for the last few readings. A guide that keeps failing hands over to plain extremum
-// seeking. Behind a slow sensor every reading is paired with the input that caused it. ask and tell are noexcept and
+// seeking. Behind a slow sensor every reading is paired with the input that caused it, and the side is held for one and
+// a half time constants of its lag, which would blot out a faster change. ask and tell are noexcept and
 // allocation-free.
 #pragma once
 
@@ -28,7 +29,7 @@ struct CurveSeekingSettings {
   /// bounds.
   double prior_sd = 0.0;
   double scale_sd = 0.3;              ///< of the plant's curvature over the guide's, about 1
-  double discrepancy = 0.15;          ///< error of the curve per unit of its drop
+  double discrepancy = 0.25;          ///< error of the curve per unit of its drop
   double noise_sd = 0.0;              ///< of one reading of J; 0 = learnt
   double memory_cycles = 143.0;       ///< readings fade with this time constant
   double amplitude_max = 0.0;         ///< largest distance from the estimate that is applied; 0 = 0.25 prior_sd
@@ -105,6 +106,7 @@ class CurveSeeking {
     v("repeats", self.repeats_);
     v("plain_at_work", self.plain_at_work_);
     v("taken_over_at", self.taken_over_at_);
+    v("taken_over_scale", self.taken_over_scale_);
     LimitCurves::visit(self.limits_, v);
     CurveFilter::visit(self.filter_, v);
     Prefixed<V> plain{v, "plain_"};
@@ -127,9 +129,9 @@ class CurveSeeking {
   optimize::ExtremumSeeking plain_;  // about `taken_over_at_`, once it is at work
   optimize::Protocol protocol_;
   optimize::Inputs estimate_, applied_;
-  std::int64_t delay_;
-  bool upwards_ = true;       // side of the next input
-  std::vector<double> sent_;  // inputs on their way through the delay, a ring
+  std::int64_t delay_, hold_;  // cycles: of the sensor, and on one side
+  bool upwards_ = true;        // side of the next input
+  std::vector<double> sent_;   // inputs on their way through the delay, a ring
   std::int64_t sent_count_ = 0;
   double surprise_ = 1.0;  // running mean of the squared normalised innovation
   std::int64_t doubts_ = 0, since_doubt_ = 0;
@@ -139,7 +141,7 @@ class CurveSeeking {
   double repeat_variance_ = 0.0;
   std::int64_t repeats_ = 0;
   bool plain_at_work_ = false;
-  double taken_over_at_ = 0.0;
+  double taken_over_at_ = 0.0, taken_over_scale_ = 1.0;  // estimate, and height of J over the guide's, as learnt
 };
 
 }  // namespace mgdd::guide

@@ -4,7 +4,8 @@
 //  - new point: the seeker is restarted, the guide tested (`trust.hpp`), and its whole trusted move is made at once;
 //  - following (the point drifts): the trusted move is made through a first-order filter, the seeker goes on;
 //  - calibration (another model at the same point): the feed-forward moves by at most `calibration_rate` per cycle and
-//    the trim takes the opposite step, so that the applied input does not move by itself.
+//    the trim takes the opposite step, so that the applied input does not move by itself. A first value given so is in
+//    force at once, and the estimate keeps the seeker's start.
 // Without a guide every call is that of the seeker, bit for bit. Inputs in their own unit.
 // `offer`, `ask` and `tell` are noexcept and allocation-free where those of the seeker are.
 #pragma once
@@ -27,7 +28,8 @@ class FeedForward {
         applied_(seeker_.applied()) {}
 
   /// What the guide says of the operating point of the next cycle. A refused value lowers the trust and moves nothing;
-  /// the first valid one after a new point is taken as one for a new point.
+  /// the first valid one after a new point is taken as one for a new point. The first of all restarts the seeker and
+  /// moves the estimate to the guide's optimum; as a calibration it leaves the estimate where it stands.
   GuideStatus offer(const GuideValue& value, GuideCause cause) noexcept {
     if (protocol_.asked) return GuideStatus::busy;
     const GuidePath::Order order = path_.take(value, cause, seeker_.estimate(), seeker_.settings().space);

@@ -27,6 +27,8 @@ struct GuidedEngineSettings {
   double changed_share = 0.05;     ///< change of speed, fuel or intake that makes a new operating point, in (0, 1)
   double calibrated_sd_cad = 2.0;  ///< of a calibrated model's best timing about the plant's, > 0
   double recalibrated_cad = 0.1;   ///< move of the model's best timing below which a calibration is not passed on, >= 0
+  bool keep_start = false;         ///< begin at the seeker's start, not at the model's best timing; the trim takes the
+                                   ///< distance, and a curve is believed as it is
 };
 void validate(const GuidedEngineSettings& settings);
 
@@ -44,7 +46,8 @@ class GuidedEngine {
  public:
   using Seeking = std::variant<CurveSeeking, FeedForward<optimize::VariantSeeker>>;
 
-  /// The model's first answer goes to the seeker; ParameterError where it has none, or a setting is out of its domain.
+  /// The model's first answer goes to the seeker, which keeps what it has learnt; ParameterError where it has none, or
+  /// a setting is out of its domain.
   GuidedEngine(Seeking seeking, ModelOptimum model, std::optional<OnlineCalibration> calibration,
                const engine::OperatingPoint& point, const GuidedEngineSettings& settings = {});
 
@@ -104,8 +107,9 @@ class GuidedEngine {
     own("trapped_mass_g", point.trapped_mass_g);
     own("ivc_temperature_k", point.ivc_temperature_k);
   }
+  GuideStatus begin();
   GuideStatus advise(GuideCause cause, bool opened = false) noexcept;
-  void recalibrate() noexcept;
+  void recalibrate(const engine::Cylinder& calibrated) noexcept;
 
   Seeking seeking_;
   ModelOptimum model_;
@@ -113,7 +117,7 @@ class GuidedEngine {
   engine::OperatingPoint point_, advised_;  // now, and where the model was asked last
   GuidedEngineSettings guidance_;
   optimize::VariantSeeker::Settings settings_;
-  std::vector<double engine::Indicators<double>::*> limited_;  // of the limits; empty where one is no indicator
+  std::vector<double engine::Indicators<double>::*> limited_;  // of the limits; empty where one is not an indicator
   double guide_cad_ = 0.0;
   std::int64_t refusals_ = 0, recalibrations_ = 0;
   bool owed_ = false;  // the model has no answer for this operating point yet

@@ -65,8 +65,8 @@ class ModelOptimum {
   bool tabulate(const engine::OperatingPoint& point, Curve& j,
                 std::span<double engine::Indicators<double>::* const> indicators, std::span<Curve> curves) noexcept;
 
-  /// The same model with other parameters, as a calibration finds them; geometry and grid stay. ParameterError for a
-  /// cylinder that is none, and nothing has changed then.
+  /// The same model with other parameters, as a calibration finds them; geometry and grid stay. ParameterError for an
+  /// invalid cylinder, and nothing has changed then.
   void set_cylinder(const engine::Cylinder& cylinder);
   /// The same for a cylinder that is known to be valid and of that geometry.
   void put_cylinder(const engine::Cylinder& cylinder) noexcept;
@@ -74,7 +74,7 @@ class ModelOptimum {
   const ModelOptimumSettings& settings() const noexcept { return settings_; }
 
  private:
-  double performance_at(double soc_cad) noexcept;  // -infinity where there is no such cycle
+  double performance_at(double soc_cad) noexcept;  // -infinity where that cycle is not physical
   double performance_at(double soc_cad, engine::Indicators<double>& cycle) noexcept;
   bool climb(double start_cad, ModelOptimumResult& out) noexcept;
   void divide(double lower_cad, double upper_cad, ModelOptimumResult& out) noexcept;

@@ -37,7 +37,7 @@ class TimingMap {
 
   /// One coordinate per axis; NaN coordinates give NaN, and so do too few.
   TimingLookup lookup(std::span<const double> point) const noexcept;
-  /// False, and nothing is learnt, for a point outside of the axes or numbers that are none.
+  /// False, and nothing is learnt, for a point outside of the axes or numbers out of their domain.
   bool learn(std::span<const double> point, double value_cad, double sd_cad) noexcept;
 
   const TimingMapSettings& settings() const noexcept { return settings_; }

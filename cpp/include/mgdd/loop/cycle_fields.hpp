@@ -15,7 +15,7 @@ struct NamedNumber {
   double (*of)(const Record&) noexcept;
 };
 
-/// Scalars of one cycle that are no indicator.
+/// Scalars of one cycle that are not indicators.
 inline constexpr std::array<NamedNumber<BenchCycle>, 9> bench_cycle_numbers{{
     {"soc_requested_cad", [](const BenchCycle& c) noexcept { return c.soc_requested_cad; }},
     {"soc_applied_cad", [](const BenchCycle& c) noexcept { return c.soc_applied_cad; }},

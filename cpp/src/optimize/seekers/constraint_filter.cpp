@@ -24,7 +24,7 @@ constexpr std::array<std::pair<LimitState, std::string_view>, 3> state_names{{
 }};
 
 constexpr double significance = 2.0;        // standard errors
-constexpr double patience_share = 0.6;      // of the memory, before a limit without a slope is no longer waited for
+constexpr double patience_share = 0.6;      // of the memory: how long the search waits for the slope of a limit
 constexpr double alarm_cycles = 3.0;        // in a row over the limit
 constexpr double contradicted_steps = 3.0;  // in a row: infeasible
 constexpr double lag_memory = 4.0;          // time constants: behind a lag a slope takes longer to show

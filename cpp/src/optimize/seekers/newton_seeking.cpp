@@ -34,7 +34,7 @@ NewtonSeekingSettings checked(NewtonSeekingSettings s) {
     }
     for (const double value : *values) {
       if (!(value < 0.0 && std::isfinite(value))) {
-        throw ParameterError(name, value, "must be < 0, the bend of a maximum");
+        throw ParameterError(name, value, "must be < 0, as at a maximum");
       }
     }
   }

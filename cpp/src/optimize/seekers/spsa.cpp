@@ -28,7 +28,7 @@ constexpr double memory = 10.0;              // measurements behind the trend an
 constexpr double one_measurement_start = 6;  // measurements before the trend is trusted
 constexpr double blocking_errors = 2.0;
 constexpr int clamp_window = 6;          // measurements, at least, before a clamp is judged
-constexpr double least_distance = 0.25;  // of the perturbation: with less applied there is no slope
+constexpr double least_distance = 0.25;  // of the perturbation: with less applied a slope is not computed
 constexpr double share_rate = 0.25;      // how fast the perturbation follows its target, per iteration
 
 SpsaSettings checked(SpsaSettings s) {
@@ -62,7 +62,7 @@ SpsaSettings checked(SpsaSettings s) {
     throw ParameterError("noise_sd", s.noise_sd, "must be >= 0 and finite");
   }
   if (!(s.initial_hessian < 0.0 && std::isfinite(s.initial_hessian))) {
-    throw ParameterError("initial_hessian", s.initial_hessian, "must be < 0, the bend of a maximum");
+    throw ParameterError("initial_hessian", s.initial_hessian, "must be < 0, as at a maximum");
   }
   require_positive("hessian_prior", s.hessian_prior);
   if (!(s.limit_amplitude > 0.0 && s.limit_amplitude <= 1.0)) {

@@ -170,7 +170,7 @@ def fit_family(
             progress(f"calibrated {members[-1].name}")
     least = min(m.fit.report.rmse for m in members)
     members = [replace(m, why_not=tuple(_judged(m, family, least))) for m in members]
-    # The choice is among the plausible ones, so a member that is none does not set the measure.
+    # The choice is among the plausible ones, so an implausible member does not set the measure.
     kept = [m.fit.report.rmse for m in members if "" in m.why_not]
     return tuple(replace(m, score=_score(m, family, min(kept, default=least))) for m in members)
 

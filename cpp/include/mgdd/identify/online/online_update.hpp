@@ -23,7 +23,7 @@ namespace mgdd::identify {
 inline constexpr std::array<std::string_view, 5> pw_r_groups{"tau_s", "gain_deg_per_s2_per_duty", "preload_duty",
                                                              "spring_duty_per_deg", "coulomb_duty"};
 
-/// ParameterError for a name that is none of them.
+/// ParameterError for any other name.
 inline std::array<bool, 5> free_groups(const std::vector<std::string>& names) {
   std::array<bool, 5> free{};
   for (const std::string& name : names) {

@@ -21,7 +21,7 @@ enum class UpdateGate {
   at_stop,     ///< at or next to an end stop
   limp_home,   ///< within the band around limp-home, where the side is not certain
   small,       ///< the error is inside the noise
-  not_finite,  ///< duty or angle is no number
+  not_finite,  ///< duty or angle is not a number
 };
 
 struct RecursivePwRSettings {

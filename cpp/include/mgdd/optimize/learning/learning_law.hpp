@@ -67,7 +67,7 @@ class LearningUpdate {
   /// u := Q (u + L e), both of length n.
   void apply(std::span<const double> error, std::span<double> input) noexcept;
 
-  /// column := Q column, nothing where Q = 1 and for norm_optimal, whose Q is no filter.
+  /// column := Q column, nothing where Q = 1 and for norm_optimal, whose Q is not a filter.
   void filter(std::span<double> column) noexcept;
 
   [[nodiscard]] std::size_t samples() const noexcept { return n_; }              ///< n

@@ -27,7 +27,7 @@ inline Inputs scalar_input(double value) {
   return Inputs::Constant(1, value);
 }
 
-/// Where to start and what may be applied, per input; an infinite bound is no bound.
+/// Where to start and what may be applied, per input; infinite: not bounded on that side.
 struct SearchSpace {
   Inputs start = scalar_input(0.0);
   Inputs lower = scalar_input(-unlimited);

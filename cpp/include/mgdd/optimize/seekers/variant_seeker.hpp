@@ -6,17 +6,12 @@
 #include <variant>
 #include <vector>
 
+#include "mgdd/common/variant.hpp"
 #include "mgdd/optimize/seekers/seekers.hpp"
 
 namespace mgdd::optimize {
 
 class VariantSeeker {
-  template <class V, class F>
-  // NOLINTNEXTLINE(bugprone-exception-escape): a variant of seekers always holds one of them
-  static decltype(auto) on(V& seeker, const F& call) noexcept {
-    return std::visit(call, seeker);
-  }
-
  public:
   /// What the settings of all seekers share.
   struct Settings {

@@ -1,0 +1,109 @@
+// Numbers between Python and a seeker: inputs, bounds, and what a cycle tells.
+#pragma once
+
+#include <string>
+#include <string_view>
+#include <vector>
+
+#include "binding.hpp"
+#include "mgdd/common/error.hpp"
+#include "mgdd/optimize/seekers/constraint_filter.hpp"
+#include "mgdd/optimize/seekers/seeker.hpp"
+#include "record_binding.hpp"
+
+namespace mgdd::bindings {
+
+/// A number (of any kind that NumPy takes) as a column of one, or a column.
+inline std::vector<double> numbers_from(const py::object& value, std::string_view name) {
+  const InputArray array = InputArray::ensure(value);
+  if (!array) {
+    PyErr_Clear();
+    refuse(std::string(name), value, "one number or a sequence of numbers");
+  }
+  if (array.ndim() == 0) return {*array.data()};
+  return to_column(array, name);
+}
+
+/// A number for every input, or one number per input.
+inline optimize::Inputs inputs_from(const py::object& value, std::string_view name, Eigen::Index inputs) {
+  if (py::isinstance<py::float_>(value) || py::isinstance<py::int_>(value)) {
+    return optimize::Inputs::Constant(inputs, as_number(py::str(name.data(), name.size()), value));
+  }
+  const std::vector<double> column = numbers_from(value, name);
+  if (column.size() > optimize::max_inputs) {
+    throw about(name, ShapeError(std::string(name) + " has " + std::to_string(column.size()) + " entries: at most " +
+                                 std::to_string(optimize::max_inputs) + " inputs are possible"));
+  }
+  if (column.size() == 1 && inputs > 1) return optimize::Inputs::Constant(inputs, column[0]);
+  return Eigen::Map<const Eigen::VectorXd>(column.data(), static_cast<Eigen::Index>(column.size()));
+}
+
+inline optimize::SearchSpace space_from(const py::object& start, const py::object& lower, const py::object& upper) {
+  optimize::SearchSpace space;
+  space.start = inputs_from(start, "start", 1);
+  space.lower = inputs_from(lower, "lower", space.size());
+  space.upper = inputs_from(upper, "upper", space.size());
+  return space;
+}
+
+inline py::array_t<double> input_array(const optimize::Inputs& values) {
+  return py::array_t<double>(static_cast<py::ssize_t>(values.size()), values.data());
+}
+
+inline std::vector<double> list_of(const optimize::Inputs& values) {
+  return {values.begin(), values.end()};
+}
+
+/// The arguments `start`, `lower` and `upper` again.
+inline py::dict space_dict(const optimize::SearchSpace& space) {
+  py::dict out;
+  out["start"] = list_of(space.start);
+  out["lower"] = list_of(space.lower);
+  out["upper"] = list_of(space.upper);
+  return out;
+}
+
+/// Numbers of a reading, kept alive as long as the spans into them.
+struct ReadingBuffer {
+  std::vector<double> components, limits, applied;
+};
+
+/// J as a number or one number per component; limits as a sequence in the order of the settings, or by name; what was
+/// applied as a number or one number per input.
+template <class S>
+optimize::Reading reading_from(const S& seeker, const py::object& j, const py::object& limits, bool misfire,
+                               const py::object& applied, ReadingBuffer& buffer) {
+  if (j.is_none() && !misfire) throw about("J", ShapeError("J is missing: tell what was measured, or misfire=True"));
+  if (!j.is_none()) {
+    if (py::isinstance<py::float_>(j) || py::isinstance<py::int_>(j)) {
+      buffer.components.assign(1, as_number(py::str("J"), j));
+    } else {
+      buffer.components = numbers_from(j, "J");
+    }
+  }
+  if (py::isinstance<py::dict>(limits)) {
+    const auto by_name = py::reinterpret_borrow<py::dict>(limits);
+    if (by_name.size() > seeker.settings().limits.size()) {
+      throw about("limits", ShapeError("limits has " + std::to_string(by_name.size()) + " names: the settings have " +
+                                       std::to_string(seeker.settings().limits.size())));
+    }
+    for (const optimize::Limit& limit : seeker.settings().limits) {
+      if (!by_name.contains(limit.name)) {
+        throw about("limits", ShapeError("limits: '" + limit.name +
+                                         "' is missing: tell one value for every limit of the settings"));
+      }
+      buffer.limits.push_back(as_number(py::str(limit.name), by_name[limit.name.c_str()]));
+    }
+  } else if (!limits.is_none()) {
+    buffer.limits = numbers_from(limits, "limits");
+  }
+  if (!applied.is_none()) {
+    buffer.applied = numbers_from(applied, "applied");
+    if (buffer.applied.empty()) {
+      throw about("applied", ShapeError("applied is empty: give one number per input, or leave it out"));
+    }
+  }
+  return {buffer.components, buffer.limits, misfire, buffer.applied};
+}
+
+}  // namespace mgdd::bindings

@@ -1,0 +1,15 @@
+// A call on whatever a variant holds, for variants that always hold one of their kinds. noexcept where the call is.
+#pragma once
+
+#include <utility>
+#include <variant>
+
+namespace mgdd {
+
+template <class Variant, class Call>
+// NOLINTNEXTLINE(bugprone-exception-escape): valueless is only a variant whose assignment threw
+decltype(auto) on(Variant& held, const Call& call) noexcept {
+  return std::visit(call, held);
+}
+
+}  // namespace mgdd

@@ -1,0 +1,162 @@
+"""What a feed-forward and a guided engine share in Python: told cycles as data, settings, text and pickles."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Iterator, Mapping
+from contextlib import contextmanager
+from typing import TYPE_CHECKING, Any, ClassVar, NamedTuple
+
+import numpy as np
+
+from mgdd.results.describe import as_html, rows_of
+from mgdd.results.labels import labelled_dataset
+
+if TYPE_CHECKING:
+    import xarray as xr
+    from numpy.typing import NDArray
+
+    class _CoreGuided:
+        """What both have of their class of the core."""
+
+        @property
+        def estimate(self) -> NDArray[np.float64]: ...
+        @property
+        def applied(self) -> NDArray[np.float64]: ...
+        @property
+        def cycle(self) -> int: ...
+        @property
+        def trust(self) -> float: ...
+        def tell(
+            self,
+            J: Any = None,  # noqa: N803
+            limits: Any = None,
+            *,
+            misfire: bool = False,
+            applied: Any = None,
+        ) -> None: ...
+else:
+    _CoreGuided = object
+
+__all__ = ["TOLD", "Column", "Guided"]
+
+
+class Column(NamedTuple):
+    """A variable of the history: units and long name as `labelled_dataset` takes them."""
+
+    units: str
+    long_name: str
+    dtype: type = np.float64
+    per_input: bool = False  # one number for every input of the seeker
+
+
+TOLD = {"objective": Column("unit of J", "objective J"), "misfire": Column("-", "misfired cycle", np.int8)}
+
+
+class Guided(_CoreGuided):
+    """A seeker with a guide that keeps every told cycle.
+
+    A subclass sets `_columns`: what `_standing` gives before a cycle is told, then what was applied, then `TOLD`. Its
+    ``__init__`` sets the attributes below.
+    """
+
+    _columns: ClassVar[Mapping[str, Column]]
+    _shown: ClassVar[tuple[str, ...]]  # further properties for the table of a notebook
+    _seeker_kind: str
+    _seeker_settings: dict[str, Any]
+    _options: dict[str, Any]
+    _rows: list[tuple[Any, ...]]
+    state: Any
+
+    def _standing(self) -> Mapping[str, Any]:
+        """Give what stands before the next cycle, by column."""
+        raise NotImplementedError
+
+    def _arguments(self) -> tuple[tuple[Any, ...], dict[str, Any]]:
+        """Give the arguments of ``__init__`` beside the options, by place and by name."""
+        raise NotImplementedError
+
+    def tell(
+        self,
+        J: Any = None,  # noqa: N803
+        limits: Any = None,
+        *,
+        misfire: bool = False,
+        applied: Any = None,
+    ) -> None:
+        """Accept what was measured at the input of the last ask.
+
+        Parameters
+        ----------
+        J : float or array_like
+            Performance, or one number per component.
+        limits : sequence or mapping of str to float, optional
+            One value per limit of the seeker.
+        misfire : bool
+            The cycle is counted and its J and limits are not read.
+        applied : array_like, optional
+            What the plant really applied, if not what was asked for.
+
+        Raises
+        ------
+        mgdd.errors.ParameterError, mgdd.errors.ShapeError, mgdd.errors.DataError
+            As by the seeker; nothing has changed then.
+        """
+        with self._recorded(J, misfire, applied):
+            super().tell(J, limits, misfire=misfire, applied=applied)
+
+    @contextmanager
+    def _recorded(self, objective: Any, misfire: bool, applied: Any) -> Iterator[None]:
+        """Keep the cycle that is told inside, unless it is refused."""
+        before = (self.cycle, *self._standing().values())
+        yield
+        done = self.applied if applied is None else np.array(applied, np.float64)
+        total = math.nan if misfire else float(np.sum(np.asarray(objective, np.float64)))
+        self._rows.append((*before, done, total, misfire))
+
+    def _told(self) -> xr.Dataset:
+        """Give the rows as data."""
+        named = zip(("cycle", *self._columns), zip(*self._rows, strict=True), strict=True)
+        values: dict[str, Any] = dict(named) if self._rows else dict.fromkeys(("cycle", *self._columns), ())
+        variables: dict[str, tuple[Any, ...]] = {"cycle": ("cycle", np.array(values["cycle"], np.int64))}
+        if any(column.per_input for column in self._columns.values()):
+            variables["input"] = ("input", np.arange(self.estimate.size), "-", "index of the input")
+        for name, column in self._columns.items():
+            shape = (-1, self.estimate.size) if column.per_input else (-1,)
+            dims = ("cycle", "input") if column.per_input else "cycle"
+            table: NDArray[Any] = np.array(values[name], column.dtype).reshape(shape)
+            variables[name] = (dims, table, column.units, column.long_name)
+        return labelled_dataset(variables, attrs={"seeker": self._seeker_kind})
+
+    @property
+    def settings(self) -> dict[str, Any]:
+        """What it was made of: those of the seeker, and its own."""
+        return {**self._seeker_settings, **self._options}
+
+    def __reduce__(self) -> tuple[Any, ...]:
+        return _rebuild, (type(self), *self._arguments(), self._options, self.state, list(self._rows))
+
+    def __repr__(self) -> str:
+        at = np.array2string(self.estimate, precision=6)
+        return (
+            f"<{type(self).__name__} with {self._seeker_kind}, cycle {self.cycle}, estimate {at}, "
+            f"trust {self.trust:.2f}>"
+        )
+
+    def _repr_html_(self) -> str:
+        shown = {name: getattr(self, name) for name in self._shown}
+        return as_html(type(self).__name__, rows_of({**self._standing(), **shown, **self._options}))
+
+
+def _rebuild(
+    cls: type[Any],
+    arguments: tuple[Any, ...],
+    named: dict[str, Any],
+    options: dict[str, Any],
+    state: Any,
+    rows: list[tuple[Any, ...]],
+) -> Any:
+    made = cls(*arguments, **named, **options)
+    made.state = state
+    made._rows = rows
+    return made
