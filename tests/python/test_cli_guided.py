@@ -209,7 +209,7 @@ def test_a_run_that_settles_writes_its_timing_back(
     ending: str, capsys: pytest.CaptureFixture[str], table: Path, tmp_path: Path
 ) -> None:
     before, out_file = tmp_path / "timing.csv", tmp_path / f"learnt.{ending}"
-    TimingMap.from_toml(table.read_text(encoding="utf-8")).write_csv(before)
+    TimingMap.from_toml(table.read_text(encoding="utf-8")).write_csv(before, source="by hand")
     run = ("--guide", "map", "--guide-map", str(before), "--guide-map-out", str(out_file), "--cycles", "1200")
     out = seek(capsys, *run, "--seed", "3", "--fuel-mg", "22")
     assert (out["guide_map_learnt"], out["guide_map_out"]) == (True, str(out_file))
@@ -219,7 +219,10 @@ def test_a_run_that_settles_writes_its_timing_back(
     assert abs(learnt(point) - out["final_cad"]) < 0.5 < abs(-9.0 - out["final_cad"])
     assert learnt.sd_cad.min() < 1.0
     assert learnt.support[1, 1] > learnt.support[1, 2] > learnt.support[0, 0] == 0.0
-    assert "speed_rpm=1500 fuel_mg=22 seed=3" in out_file.read_text(encoding="utf-8")
+    text = out_file.read_text(encoding="utf-8")
+    assert "mgdd engine seek at speed_rpm=1500 fuel_mg=22 seed=3" in text
+    if ending == "csv":
+        assert text.count("by hand") == 7  # the run has taught two cells of nine
     again = seek(capsys, "--guide", "map", "--guide-map", str(out_file), "--fuel-mg", "22", "--cycles", "50")
     assert again["guide_cad"] == pytest.approx(out["guide_map_cad"], abs=1e-9)
     assert "guide_map_learnt" not in again

@@ -10,8 +10,9 @@ import pandas as pd
 import pytest
 
 from mgdd.engine import OperatingPoint
-from mgdd.errors import DataError, Error, ParameterError
+from mgdd.errors import DataError, Error, ParameterError, ShapeError
 from mgdd.guide import TimingMap
+from mgdd.guide.map_table import read_map_table
 
 AXES = {"speed_rpm": [900.0, 1500.0, 3000.0], "fuel_mg": [6.0, 12.0, 20.0, 40.0]}
 VALUES = [[-2.0, -3.1, -4.3, -9.0], [-2.5, -4.0, -5.6, -11.0], [-4.0, -6.0, -8.0, -14.0]]
@@ -129,6 +130,19 @@ def test_what_is_wrong_is_named_with_its_place_and_the_remedy(text: str, said: s
 def test_a_missing_file_is_named() -> None:
     with pytest.raises(FileNotFoundError, match=re.escape("no such file")):
         TimingMap.read_csv("nowhere.csv")
+
+
+def test_each_cell_may_say_where_it_comes_from(tmp_path: Path) -> None:
+    texts = [[f"{speed:g} rpm {fuel:g} mg" for fuel in AXES["fuel_mg"]] for speed in AXES["speed_rpm"]]
+    learnt().write_csv(tmp_path / "map.csv", source=texts)
+    table = pd.read_csv(tmp_path / "map.csv").sample(frac=1.0, random_state=3)
+    for _, row in table.iterrows():
+        assert row["source"] == f"{row['speed_rpm']:g} rpm {row['fuel_mg']:g} mg"
+    table.to_csv(tmp_path / "mixed.csv", index=False)
+    same(TimingMap.read_csv(tmp_path / "mixed.csv"), learnt())
+    assert read_map_table(tmp_path / "mixed.csv", ".")[1].tolist() == texts
+    with pytest.raises(ShapeError, match="source has shape"):
+        learnt().write_csv(tmp_path / "map.csv", source=texts[0])
 
 
 def test_an_origin_that_would_break_the_table_is_refused(tmp_path: Path) -> None:

@@ -5,14 +5,20 @@ from __future__ import annotations
 import argparse
 from dataclasses import replace
 from pathlib import Path
-from typing import Any
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
 
 from mgdd.cli.options import refuse_idle
 from mgdd.cli.output import check_file, wrote
 from mgdd.engine import OperatingPoint
 from mgdd.errors import ParameterError, did_you_mean
 from mgdd.guide import FeedForward, TimingMap
+from mgdd.guide.map_table import read_map_table
 from mgdd.io.parameters import ParameterFile
+
+if TYPE_CHECKING:
+    from numpy.typing import NDArray
 
 __all__ = ["MAP_ENDINGS", "add_map_options", "check_map_options", "learn_map", "read_map"]
 
@@ -72,10 +78,11 @@ def learn_map(
     """
     if args.guide_map_out is None or table is None or not isinstance(seeker, FeedForward):
         return {}, []
+    before = table.support
     learnt = not interrupted and table.learn_from(seeker, point, cycles=_CYCLES, spread_cad=_SPREAD_CAD)
     doubts = []
     if learnt:
-        _write(table, args, point)
+        _write(table, args, point, before)
     else:
         why = f"the estimate has not settled within {_SPREAD_CAD:g} °CA over the last {_CYCLES} cycles: raise --cycles"
         if interrupted:
@@ -91,14 +98,17 @@ def learn_map(
     return figures, doubts
 
 
-def _write(table: TimingMap, args: argparse.Namespace, point: OperatingPoint) -> None:
+def _write(table: TimingMap, args: argparse.Namespace, point: OperatingPoint, before: NDArray[np.float64]) -> None:
+    """Write the table; the cells that have learnt say so, the others what they said before."""
     own = point.to_dict()
     where = " ".join(f"{name}={own[name]:g}" for name in table.axes if own.get(name) is not None)
-    source = _plain(f"{Path(args.guide_map).name} and mgdd engine seek at {where} seed={args.seed}")
-    out = Path(args.guide_map_out)
+    said = f"mgdd engine seek at {where} seed={args.seed}"
+    known, out = Path(args.guide_map), Path(args.guide_map_out)
     if out.suffix == ".csv":
-        table.write_csv(out, source=source)
+        old = read_map_table(known, ".")[1] if known.suffix == ".csv" else np.full(before.shape, _plain(known.name))
+        table.write_csv(out, source=np.where(table.support != before, _plain(said), old))
     else:
+        source = f"{known.name}; {said}"
         out.write_text(replace(table.to_parameters(), notes={"source": source}).to_toml(), encoding="utf-8")
     wrote(str(out))
 

@@ -17,7 +17,7 @@ if TYPE_CHECKING:
     import os
 
     import xarray as xr
-    from numpy.typing import NDArray
+    from numpy.typing import ArrayLike, NDArray
 
 __all__ = ["MapForms"]
 
@@ -110,20 +110,21 @@ class MapForms(Parameters):
         }
         return made
 
-    def write_csv(self, path: str | os.PathLike[str], *, source: str = "") -> None:
+    def write_csv(self, path: str | os.PathLike[str], *, source: ArrayLike = "") -> None:
         """Write a plain CSV, a row per cell, which spreadsheets and `read_csv` take without options.
 
         Parameters
         ----------
         path : path-like
             The file; an existing one is replaced.
-        source : str
-            Where the numbers come from, in a column of its own: text without comma, quote or line break.
+        source : str or array_like of str
+            Where the numbers come from, one text or one per cell, in a column of its own: without comma, quote or line
+            break.
 
         Raises
         ------
-        mgdd.errors.ParameterError
-            Such a text; nothing is written then.
+        mgdd.errors.ParameterError, mgdd.errors.ShapeError
+            Such a text, or another number of texts; nothing is written then.
 
         Examples
         --------
@@ -170,7 +171,7 @@ class MapForms(Parameters):
             A cell that is missing, repeated, no number or outside its domain, another unit, no axis or more than two;
             the message names file, line, column, value and remedy.
         """
-        return cls.from_dataset(read_map_table(path, decimal))
+        return cls.from_dataset(read_map_table(path, decimal)[0])
 
     def to_parameters(self) -> ParameterFile:
         """Give axes, cells and settings, as `to_toml` writes them."""

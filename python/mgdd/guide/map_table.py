@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from mgdd.errors import DataError, ParameterError, did_you_mean
+from mgdd.errors import DataError, ParameterError, ShapeError, did_you_mean
 from mgdd.io.plain_csv import write_columns
 from mgdd.io.table import TextTable, read_table
 from mgdd.results.labels import labelled_dataset
@@ -18,7 +18,7 @@ if TYPE_CHECKING:
     import os
 
     import xarray as xr
-    from numpy.typing import NDArray
+    from numpy.typing import ArrayLike, NDArray
 
 __all__ = ["SETTINGS", "read_map_table", "write_map_table"]
 
@@ -28,22 +28,26 @@ _KNOWN = (*_CELLS, *SETTINGS, "source")
 _ANGLES = frozenset({"°CA aTDC", "°CA", "deg", "degree", "cad", "°"})
 
 
-def write_map_table(dataset: xr.Dataset, path: str | os.PathLike[str], source: str) -> None:
+def write_map_table(dataset: xr.Dataset, path: str | os.PathLike[str], source: ArrayLike) -> None:
     """Write the Dataset of a map, a row per cell, the last axis fastest; see `TimingMap.write_csv`."""
-    if any(mark in source for mark in ',"\r\n'):
-        raise ParameterError.of("source", source, "text without comma, quote and line break: it stands in a cell")
     dims = [str(name) for name in dataset["timing_cad"].dims]
     grid = np.meshgrid(*(dataset[name].to_numpy() for name in dims), indexing="ij")
+    texts = np.asarray(source, dtype=np.str_)
+    if texts.ndim and texts.shape != grid[0].shape:
+        raise ShapeError(f"source has shape {texts.shape}: one text, or one per cell of the map, {grid[0].shape}")
+    for text in texts.ravel().tolist():
+        if any(mark in text for mark in ',"\r\n'):
+            raise ParameterError.of("source", text, "text without comma, quote and line break: it stands in a cell")
     columns: dict[str, Any] = {name: entries.ravel() for name, entries in zip(dims, grid, strict=True)}
     columns |= {name: dataset[name].to_numpy().ravel() for name in _CELLS}
     columns |= {name: np.full(grid[0].size, float(dataset.attrs[name])) for name in SETTINGS}
-    if source:
-        columns["source"] = np.full(grid[0].size, source)
+    if (texts != "").any():
+        columns["source"] = np.broadcast_to(texts, grid[0].shape).ravel()
     write_columns(columns, path)
 
 
-def read_map_table(path: str | os.PathLike[str], decimal: str) -> xr.Dataset:
-    """Read a table into the Dataset of a map; see `TimingMap.read_csv`."""
+def read_map_table(path: str | os.PathLike[str], decimal: str) -> tuple[xr.Dataset, NDArray[np.str_]]:
+    """Read a table into the Dataset of a map, and where each cell comes from; see `TimingMap.read_csv`."""
     table = read_table(path, decimal=decimal)
     names = _names(table)
     axes = [name for name in names if name not in _KNOWN]
@@ -51,21 +55,21 @@ def read_map_table(path: str | os.PathLike[str], decimal: str) -> xr.Dataset:
         said = f"{len(axes)} axes, {', '.join(map(repr, axes))}" if axes else "no axis"
         raise DataError(f"{table.source}: {said}: a map has one or two, for example speed_rpm and fuel_mg")
     found = {name: _numbers(table, name) for name in names if name != "source"}
-    settings = {name: _one(table, name, found[name]) for name in SETTINGS if name in found}
+    settings = SETTINGS | {name: _one(table, name, found[name]) for name in SETTINGS if name in found}
     entries = {name: _entries(table, name, found[name]) for name in axes}
     places = _places(table, {name: found[name] for name in axes}, entries)
     shape = tuple(own.size for own in entries.values())
-    settings = {**SETTINGS, **settings}
     if not settings["prior_sd_cad"] > 0.0 or not 0.0 < settings["forgetting"] <= 1.0:
         bad, bound = ("prior_sd_cad", "> 0") if not settings["prior_sd_cad"] > 0.0 else ("forgetting", "in (0, 1]")
         raise DataError(f"{table.source}: {bad} = {settings[bad]:g}: must be {bound}")
-    missing = {"sd_cad": settings["prior_sd_cad"], "support": 0.0}
-    cells = {}
-    for name in _CELLS:
-        cells[name] = np.full(shape, missing.get(name, math.nan))
-        if name in found:
-            cells[name].ravel()[places] = found[name]
-    return labelled_dataset(
+    cells = {"sd_cad": np.full(shape, settings["prior_sd_cad"]), "support": np.zeros(shape)}
+    for name in set(_CELLS) & set(found):
+        cells[name] = np.empty(shape)
+        cells[name].ravel()[places] = found[name]
+    sources = np.full(math.prod(shape), "", dtype=object)
+    if "source" in names:
+        sources[places] = [row[table.index("source")] for row in table.rows]
+    dataset = labelled_dataset(
         {
             **{name: (name, own, unit_of(name), name) for name, own in entries.items()},
             "timing_cad": (tuple(axes), cells["timing_cad"], "°CA aTDC", "best timing"),
@@ -74,6 +78,7 @@ def read_map_table(path: str | os.PathLike[str], decimal: str) -> xr.Dataset:
         },
         attrs=settings,
     )
+    return dataset, sources.astype(np.str_).reshape(shape)
 
 
 def _names(table: TextTable) -> tuple[str, ...]:
