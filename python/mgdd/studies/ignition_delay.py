@@ -23,7 +23,7 @@ if TYPE_CHECKING:
     import xarray as xr
     from numpy.typing import NDArray
 
-__all__ = ["run_ignition_delay"]
+__all__ = ["Plane", "plane_of", "plane_row", "run_ignition_delay", "slope_row"]
 
 AFTER = OperatingPoint(speed_rpm=2100.0, fuel_mg=16.0)  # of the step from `MEASURED_AT`
 _STEP_AT, _CYCLES, _START_CYCLES, _JUDGED = 300, 600, 100, 200
@@ -121,8 +121,8 @@ def run_ignition_delay(
     summary = {
         "study": "ignition-delay",
         "seeds": seeds,
-        "rows": [_plane_row(plane) for plane in planes],
-        "slopes": [_slope_row(plane) for plane in planes if plane.truth == plane.told],
+        "rows": [plane_row(plane) for plane in planes],
+        "slopes": [slope_row(plane) for plane in planes if plane.truth == plane.told],
         "intake": [_intake_row(law) for law in TRUTHS],
         "runs": [_run_row(run) for run in runs],
         "interrupted": interrupted,
@@ -157,7 +157,8 @@ def _lost(truth: DelayLaw, own: SteadyMap, point: OperatingPoint, soi_cad: float
     return float(lost - least) if np.isfinite(soc) else np.inf
 
 
-def _plane_row(plane: Plane) -> dict[str, Any]:
+def plane_row(plane: Plane) -> dict[str, Any]:
+    """Give size of the error and J lost, before and after the trim."""
     left = plane.soi_error_cad + plane.trim_cad
     fired, fired_trimmed = (np.isfinite(lost) for lost in (plane.lost, plane.lost_trimmed))
     return {
@@ -177,7 +178,8 @@ def _plane_row(plane: Plane) -> dict[str, Any]:
     }
 
 
-def _slope_row(plane: Plane) -> dict[str, Any]:
+def slope_row(plane: Plane) -> dict[str, Any]:
+    """Give delay and dSOC/dSOI at the right injection."""
     low, middle, high = np.quantile(plane.slope, [0.1, 0.5, 0.9]).tolist()
     return {
         "truth": plane.truth,

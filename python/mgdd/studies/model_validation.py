@@ -22,7 +22,7 @@ if TYPE_CHECKING:
     import xarray as xr
     from numpy.typing import NDArray
 
-__all__ = ["run_model_validation"]
+__all__ = ["Validated", "run_model_validation", "stage_rows", "validate_law"]
 
 BLOCK_CAD = 30.0  # the residuals of every law have lost their correlation over this angle
 SHOWN = "Wiebe, linear gamma"  # of the figure of pressures
@@ -31,7 +31,7 @@ _ENGINE: Final = "hd_diesel_128x144"
 
 
 @dataclass(frozen=True, kw_only=True)
-class _Validated:
+class Validated:
     """One law: its calibration, its models and how they meet the traces by stage, and draws by kind of error."""
 
     law: Law
@@ -101,7 +101,7 @@ def run_model_validation(
     """
     draws = min(check_seeds(seeds), _QUICK_DRAWS) if quick else check_seeds(seeds)
     traces, cylinder = datasets.load(_ENGINE), presets.load(_ENGINE).cylinder
-    parts = [(law.name, partial(_validate, law, traces, cylinder, draws)) for law in LAWS]
+    parts = [(law.name, partial(validate_law, law, traces, cylinder, draws)) for law in LAWS]
     done, interrupted = run_parts(parts, progress)
     family: list[tuple[float, float]] = []
     if not quick and not interrupted:
@@ -110,7 +110,7 @@ def run_model_validation(
     summary = {
         "study": "model-validation",
         "seeds": draws,
-        "rows": [row for own in done for row in _rows(own, done[0])],
+        "rows": [row for own in done for row in stage_rows(own, done[0])],
         "spread": [row for own in done for row in _spread(own, family)],
         "coverage": [_coverage(own) for own in done],
         "interrupted": interrupted,
@@ -118,7 +118,8 @@ def run_model_validation(
     return finish(_dataset(done, family), to_jsonable(summary), draw if figures else None)
 
 
-def _validate(law: Law, traces: list[xr.Dataset], cylinder: Any, draws: int) -> _Validated:
+def validate_law(law: Law, traces: list[xr.Dataset], cylinder: Any, draws: int) -> Validated:
+    """Calibrate a law, set its stages beside the traces, and redraw."""
     fit = law.fit(traces, cylinder)
     burns = burns_of(law, fit, traces, cylinder)
     slopes = best_slopes(fit)
@@ -126,7 +127,7 @@ def _validate(law: Law, traces: list[xr.Dataset], cylinder: Any, draws: int) -> 
         block: [redraw(fit, np.random.default_rng([at, seed]), block_cad=block, slopes=slopes) for seed in range(draws)]
         for at, block in enumerate((None, BLOCK_CAD))
     }
-    return _Validated(
+    return Validated(
         law=law,
         fit=fit,
         burns=burns,
@@ -138,7 +139,8 @@ def _validate(law: Law, traces: list[xr.Dataset], cylinder: Any, draws: int) -> 
     )
 
 
-def _rows(own: _Validated, reference: _Validated) -> list[dict[str, Any]]:
+def stage_rows(own: Validated, reference: Validated) -> list[dict[str, Any]]:
+    """Give a row per stage and trace; the reference says what a best timing loses."""
     out = []
     for stage in STAGES:
         for at, (burn, met) in enumerate(zip(own.burns[stage], own.met[stage], strict=True)):
@@ -162,7 +164,7 @@ def _rows(own: _Validated, reference: _Validated) -> list[dict[str, Any]]:
     return out
 
 
-def _spread(own: _Validated, family: list[tuple[float, float]]) -> list[dict[str, Any]]:
+def _spread(own: Validated, family: list[tuple[float, float]]) -> list[dict[str, Any]]:
     best = np.array([drawn.best_ca50_cad for drawn in own.block])
     bend = np.array([drawn.curvature_percent for drawn in own.block])
     slopes = best_slopes(own.fit)
@@ -203,7 +205,7 @@ def _sd_interval(name: str, values: NDArray[np.float64]) -> dict[str, float | No
     return {name: sd, f"{name}_low": low, f"{name}_high": high}
 
 
-def _coverage(own: _Validated) -> dict[str, Any]:
+def _coverage(own: Validated) -> dict[str, Any]:
     """Tell how often stated intervals hold the truth, over parameters that are not at a bound."""
     row: dict[str, Any] = {"law": own.law.name, "wall_heat_scale": own.fit.model.wall_heat_scale}
     truth, known = own.fit.report.values, np.isfinite(own.fit.report.stderr)
@@ -217,7 +219,7 @@ def _coverage(own: _Validated) -> dict[str, Any]:
     return row
 
 
-def _dataset(done: list[_Validated], family: list[tuple[float, float]]) -> xr.Dataset:
+def _dataset(done: list[Validated], family: list[tuple[float, float]]) -> xr.Dataset:
     loads = done[0].fit.loads
     over, drawn = ("law", "stage", "file"), ("law", "file", "draw")
     ends = np.array(family) if family else np.full((len(loads), 2), np.nan)
