@@ -11,6 +11,7 @@ from functools import cache
 from typing import Any
 
 import numpy as np
+from tables_of_guidance import ignition_plane, ignition_slopes, model_stages
 from tables_of_measured_traces import burn_laws, demo, fits, members, profile, timing, traces
 from tables_of_model import (
     Rows,
@@ -50,9 +51,12 @@ __all__ = [
     "guided_plane",
     "guided_start",
     "ignition",
+    "ignition_plane",
+    "ignition_slopes",
     "integrators",
     "learning",
     "members",
+    "model_stages",
     "online_calibration",
     "optimum",
     "pegging",
@@ -69,7 +73,10 @@ __all__ = [
     "woschni_units",
 ]
 
-LABEL_COLUMNS = {"woschni_units": 2, "burn_laws": 2, "variables": 3, "esc_cases": 2, "seekers": 2, "guided_plane": 2}
+LABEL_COLUMNS = {
+    "woschni_units": 2, "burn_laws": 2, "variables": 3, "esc_cases": 2, "seekers": 2, "ignition_plane": 2,
+    "model_stages": 2, "guided_plane": 2,
+}  # fmt: skip
 
 
 # --- calibration while the engine runs ----------------------------------------------------------------------

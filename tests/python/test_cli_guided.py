@@ -4,13 +4,16 @@ from __future__ import annotations
 
 import csv
 import json
+from argparse import Namespace
 from pathlib import Path
 
 import pytest
 
 from mgdd.cli import main
-from mgdd.guide import TimingMap
-from mgdd.loop import EngineBench
+from mgdd.cli.guide_map import learn_map
+from mgdd.guide import FeedForward, TimingMap
+from mgdd.loop import EngineBench, run_seeker
+from mgdd.optimize import ExtremumSeeking
 
 KINDS = ("feed_forward", "curve", "calibrated", "map")
 ROUGH = ("--guide-set", "wall_heat_scale=0.8", "--guide-set", "burn_duration_ref_cad=45")
@@ -146,7 +149,17 @@ def test_a_seeker_of_any_kind_begins_there(
         ("--guide calibrated --guide-shape parabola", "--guide-shape parabola: a parabola cannot be calibrated"),
         ("--guide-shape parabola", "--guide-shape does not act here; --guide none has no model"),
         ("--guide-map x.toml", "--guide-map does not act here; --guide none has no model"),
-        ("--guide map", "--guide map needs --guide-map FILE.toml"),
+        ("--guide map", "--guide map needs --guide-map FILE"),
+        ("--guide map --guide-map x.txt", "--guide-map x.txt: the ending must be one of .csv, .toml"),
+        ("--guide map --guide-map x.csv --guide-map-out y.txt", "--guide-map-out y.txt: the ending must be one of"),
+        ("--guide map --guide-map x.csv --guide-map-out no/y.csv", "--guide-map-out no/y.csv: there is no folder no"),
+        ("--guide map --guide-map none.csv", "none.csv"),
+        ("--guide-map-out y.csv", "--guide-map-out does not act here; --guide none has no model"),
+        ("--guide curve --guide-map-out y.csv", "--guide-map-out does not act here; --guide curve has a model"),
+        (
+            "--guide map --guide-map x.csv --guide-map-out y.csv --limit p_max_bar=95",
+            "--guide-map-out does not act here; with --limit a run ends at the best timing within the limit",
+        ),
         ("--guide map --guide-map none.toml", "none.toml"),
         ("--guide map --guide-map x.toml --guide-set wall_heat_scale=1", "--guide-set does not act here; --guide map"),
         ("--guide curve --guide-map x.toml", "--guide-map does not act here; --guide curve has a model"),
@@ -189,3 +202,64 @@ def test_the_guide_of_a_limited_run_is_the_best_without_the_limit(capsys: pytest
 def test_a_feed_forward_beyond_the_bounds_starts_inside(capsys: pytest.CaptureFixture[str]) -> None:
     out = seek(capsys, "--guide", "feed_forward", "--lower-cad", "-4", "--cycles", "50")
     assert (out["start_cad"], out["start_reason"]) == (-3.0, "best timing of the guide, moved inside of the bounds")
+
+
+@pytest.mark.parametrize("ending", ["csv", "toml"])
+def test_a_run_that_settles_writes_its_timing_back(
+    ending: str, capsys: pytest.CaptureFixture[str], table: Path, tmp_path: Path
+) -> None:
+    before, out_file = tmp_path / "timing.csv", tmp_path / f"learnt.{ending}"
+    TimingMap.from_toml(table.read_text(encoding="utf-8")).write_csv(before, source="by hand")
+    run = ("--guide", "map", "--guide-map", str(before), "--guide-map-out", str(out_file), "--cycles", "1200")
+    out = seek(capsys, *run, "--seed", "3", "--fuel-mg", "22")
+    assert (out["guide_map_learnt"], out["guide_map_out"]) == (True, str(out_file))
+    learnt = TimingMap.read_csv(out_file) if ending == "csv" else TimingMap.from_toml(out_file.read_text("utf-8"))
+    point = {"speed_rpm": 1500.0, "fuel_mg": 22.0}
+    assert learnt(point) == pytest.approx(out["guide_map_cad"], abs=1e-12)
+    assert abs(learnt(point) - out["final_cad"]) < 0.5 < abs(-9.0 - out["final_cad"])
+    assert learnt.sd_cad.min() < 1.0
+    assert learnt.support[1, 1] > learnt.support[1, 2] > learnt.support[0, 0] == 0.0
+    text = out_file.read_text(encoding="utf-8")
+    assert "mgdd engine seek at speed_rpm=1500 fuel_mg=22 seed=3" in text
+    if ending == "csv":
+        assert text.count("by hand") == 7  # the run has taught two cells of nine
+    again = seek(capsys, "--guide", "map", "--guide-map", str(out_file), "--fuel-mg", "22", "--cycles", "50")
+    assert again["guide_cad"] == pytest.approx(out["guide_map_cad"], abs=1e-9)
+    assert "guide_map_learnt" not in again
+
+
+def test_a_run_that_has_not_settled_writes_nothing(
+    capsys: pytest.CaptureFixture[str], caplog: pytest.LogCaptureFixture, table: Path, tmp_path: Path
+) -> None:
+    out_file = tmp_path / "learnt.csv"
+    run = ("--guide", "map", "--guide-map", str(table), "--guide-map-out", str(out_file), "--cycles", "60", "--json")
+    assert main(["engine", "seek", *run]) == 0
+    out = json.loads(capsys.readouterr().out)
+    assert (out["guide_map_learnt"], out["guide_map_out"], out["guide_map_cad"]) == (False, None, -9.0)
+    assert not out_file.exists()
+    (said,) = out["warnings"]
+    assert f"--guide-map-out {out_file}: not written, the estimate has not settled" in said
+    assert said.endswith("raise --cycles")
+    assert said in caplog.text
+
+
+def test_an_interrupted_run_teaches_nothing(table: Path, tmp_path: Path) -> None:
+    bench, timing = EngineBench(seed=2), TimingMap.from_toml(table.read_text(encoding="utf-8"))
+    seeker = FeedForward(ExtremumSeeking(start=-9.0, lower=-30.0, upper=10.0), timing)
+    seeker.at(bench.point)
+    run_seeker(bench, seeker, 900)
+    args = Namespace(guide_map=str(table), guide_map_out=str(tmp_path / "out.csv"), seed=2)
+    for interrupted in (True, False):
+        before = timing.to_toml()
+        figures, doubts = learn_map(args, timing, seeker, bench.point, interrupted=interrupted)
+        assert figures["guide_map_learnt"] is not interrupted
+        assert (tmp_path / "out.csv").exists() is not interrupted
+        assert (timing.to_toml() == before) is interrupted
+        assert any("interrupted" in doubt for doubt in doubts) is interrupted
+
+
+def test_an_axis_that_no_point_has_is_named(capsys: pytest.CaptureFixture[str], tmp_path: Path) -> None:
+    file = tmp_path / "timing.csv"
+    file.write_text("speed,timing_cad\n900,-2\n1500,-5\n", encoding="utf-8")
+    said = refused(capsys, "--guide", "map", "--guide-map", str(file))
+    assert "axis 'speed' is not a number of the operating point: did you mean 'speed_rpm'?" in said

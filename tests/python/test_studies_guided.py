@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import json
 
+import numpy as np
 import pytest
 
 from mgdd import datasets
@@ -11,6 +12,9 @@ from mgdd.cli import main
 from mgdd.errors import DataError, ParameterError
 from mgdd.results.labels import check_labels, to_jsonable
 from mgdd.studies import StudyResult, run_study
+from mgdd.studies.guided_limited import LimitedRuns, limited_parts, limited_row
+from mgdd.studies.guided_measured import measured_guide
+from mgdd.surrogate import fit_surrogate
 
 needs_records = pytest.mark.skipif(
     "h2df_502" not in datasets.available(), reason="MGDD_DATA_DIR holds no folder h2df_502"
@@ -56,15 +60,73 @@ def test_losses_are_those_of_the_applied_timings(bench: StudyResult) -> None:
     assert lost.sel(case="unguided")[99] == pytest.approx(rows(bench)["unguided"]["lost_j_cycles"])
 
 
+@pytest.fixture(scope="module")
+def real() -> StudyResult:
+    return run_study("guided", seeds=12, real=True)
+
+
 @needs_records
-def test_a_rough_model_of_another_engine_and_fuel_guides_the_measured_one() -> None:
-    result = run_study("guided", seeds=12, real=True)
+def test_a_rough_model_of_another_engine_and_fuel_guides_the_measured_one(real: StudyResult) -> None:
+    result = real
     check_labels(result.dataset)
     assert result.summary["plant"] == "surrogate of the measured engine"
     assert abs(result.summary["guide_cad"] - result.summary["optimum_cad"]) > 3.0
     own = rows(result)
     assert own["curve"]["cycles_to_1_cad"] < 0.1 * own["unguided"]["cycles_to_1_cad"]
     assert own["curve"]["lost_j_cycles_high"] < 0.2 * own["unguided"]["lost_j_cycles_low"]
+
+
+@needs_records
+def test_under_a_limit_the_curve_arrives_first_and_stays_below_as_often(real: StudyResult) -> None:
+    own = rows(real)
+    assert own["unguided"].get("above_share") is None
+    best = fit_surrogate(datasets.load("h2df_502")).find_optimum({"imep_bar": 1.0}, {"mprr": 5.0})
+    none, curve = own["unguided, margin 0 sd"], own["curve, margin 0 sd"]
+    for row in (none, curve):
+        assert row["limited_optimum_cad"] == pytest.approx(best["soi_cad"])
+        assert row["start_cad"] == own["unguided"]["start_cad"]
+        assert row["final_cad"] == pytest.approx(best["soi_cad"], abs=2.0)
+    assert curve["cycles_to_1_cad"] < 0.1 * none["cycles_to_1_cad"]
+    assert curve["lost_j_cycles_high"] < 0.3 * none["lost_j_cycles_low"]
+    assert curve["above_share"] < none["above_share_high"]
+    for form in ("unguided", "curve", "curve, slope of the limit learnt"):
+        safe, bold = own[f"{form}, margin 1 sd"], own[f"{form}, margin 0 sd"]
+        assert safe["above_share"] < 0.02
+        assert safe["late_loss"] > bold["late_loss"]  # what the margin costs
+    assert len(real.figures) == 3
+
+
+@needs_records
+def test_the_guide_knows_where_the_pressure_rises_not_how_much() -> None:
+    guide = measured_guide(datasets.load("h2df_502"))
+    surface = fit_surrogate(datasets.load("h2df_502")).predict([-6.0, -2.0, 2.0])
+    measured, said = surface["mprr"].to_numpy(), [float(guide.pressure_rise(soi)) for soi in (-6.0, -2.0, 2.0)]
+    assert (np.diff(measured) < 0.0).all()
+    assert (np.diff(said) < 0.0).all()
+    assert abs(said[1] - measured[1]) > 0.3
+    assert guide.curve.best == pytest.approx(-1.2, abs=0.05)
+
+
+@needs_records
+def test_what_is_above_the_limit_is_no_gain() -> None:
+    parts = dict(limited_parts(datasets.load("h2df_502"), 2, 150))
+    run = parts["limited: curve, slope of the limit learnt, margin 0 sd"]()
+    assert run.above.any()
+    assert run.lost[run.above].max() < 1e-3
+    assert run.lost.min() == 0.0
+
+
+def test_a_row_under_a_limit_by_hand() -> None:
+    estimate = np.array([[8.0, -1.0, -1.0, -2.0], [8.0, 4.0, -1.5, 6.0]])
+    rise = np.array([[2.0, 5.1, 5.0, 4.9], [2.0, 3.0, 5.2, 5.3]])
+    lost = np.array([[0.4, 0.0, 0.1, 0.0], [0.4, 0.2, 0.0, 0.3]])
+    run = LimitedRuns(case="own", margin_sd=0.0, best_cad=-2.0, limit=5.0, estimate=estimate, lost=lost, rise=rise)
+    row = limited_row(run, 2)
+    assert row["cycles_to_1_cad"] == 1.5  # cycles 1 and 2
+    assert row["cycles_stays_1_5_cad"] is None  # cycle 1, and never
+    assert (row["above_share"], row["late_above_share"]) == (3.0 / 8.0, 0.5)
+    assert (row["lost_j_cycles"], row["late_loss"]) == pytest.approx((0.5, 0.1))
+    assert (row["final_cad"], row["worst_pressure_rise"]) == pytest.approx((0.375, 5.3))
 
 
 def test_records_that_are_missing_are_named(monkeypatch: pytest.MonkeyPatch) -> None:

@@ -13,11 +13,11 @@ import numpy as np
 
 from mgdd import presets
 from mgdd._core.engine import Cylinder, OperatingPoint
+from mgdd.cli.guide_map import add_map_options, check_map_options, read_map
 from mgdd.cli.options import assignments, refuse_idle
 from mgdd.cli.seekers import Task, amplitude_of, make_seeker
 from mgdd.errors import ParameterError
 from mgdd.guide import Curve, CurveSeeking, FeedForward, GuidedEngine, ModelOptimum, OnlineCalibration, TimingMap
-from mgdd.io.parameters import ParameterFile
 from mgdd.optimize import Limit, Optimum
 
 if TYPE_CHECKING:
@@ -80,20 +80,18 @@ def add_guidance(parser: argparse.ArgumentParser) -> None:
         "--guide-shape", choices=_SHAPES,
         help="of the curve: the model's, or a plain parabola about the model's best timing (default: model)",
     )  # fmt: skip
-    group.add_argument("--guide-map", metavar="FILE.toml", help="the table of --guide map")
+    add_map_options(group)
 
 
 def check_guidance(args: argparse.Namespace) -> None:
     """Refuse options of a guide that is not there, and a guide that does not fit the method."""
     if args.guide == "none":
-        refuse_idle(args, "guide_preset", "guide_set", "guide_shape", "guide_map", why="--guide none has no model")
+        refuse_idle(args, "guide_preset", "guide_set", "guide_shape", why="--guide none has no model")
+        check_map_options(args)
         return
     if args.guide == "map":
         refuse_idle(args, "guide_preset", "guide_set", "guide_shape", why="--guide map has a table, not a model")
-        if args.guide_map is None:
-            raise ParameterError("--guide map needs --guide-map FILE.toml, a table as TimingMap.to_toml writes it")
-    else:
-        refuse_idle(args, "guide_map", why=f"--guide {args.guide} has a model, not a table")
+    check_map_options(args)
     if args.guide in CURVES:
         if args.method is not None or args.form is not None:
             option = "--method" if args.method is not None else "--form"
@@ -117,7 +115,7 @@ def check_guidance(args: argparse.Namespace) -> None:
 def task_with_guide(args: argparse.Namespace, bench: EngineBench) -> GuidedTask:
     """Make the guide and ask it for the best timing at the point of the bench."""
     if args.guide == "map":
-        table = TimingMap.of_file(ParameterFile.read(args.guide_map))
+        table = read_map(args.guide_map)
         said = table(bench.point)
         if said is None:
             raise ParameterError(

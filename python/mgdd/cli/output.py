@@ -21,6 +21,7 @@ if TYPE_CHECKING:
 __all__ = [
     "Stopped",
     "check_figure",
+    "check_file",
     "check_output",
     "emit",
     "error_of",
@@ -38,15 +39,16 @@ class Stopped(KeyboardInterrupt):
 
 def check_output(args: argparse.Namespace, *endings: str) -> None:
     """Refuse an output file of unknown kind before any work is done; JSON is known where nothing is said."""
-    _check_file("-o", args.output, endings or (".json",))
+    check_file("-o", args.output, endings or (".json",))
 
 
 def check_figure(file: str | None) -> None:
     """Refuse a figure of unknown kind before any work is done."""
-    _check_file("--figure", file, (".png", ".svg", ".pdf"))
+    check_file("--figure", file, (".png", ".svg", ".pdf"))
 
 
-def _check_file(option: str, file: str | None, endings: tuple[str, ...]) -> None:
+def check_file(option: str, file: str | None, endings: tuple[str, ...]) -> None:
+    """Refuse a file of unknown kind, or in a folder that is not there."""
     if file is None:
         return
     if Path(file).suffix not in endings:

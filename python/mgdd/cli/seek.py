@@ -23,6 +23,7 @@ from mgdd.cli.guidance import (
     task_with_guide,
     with_start,
 )
+from mgdd.cli.guide_map import learn_map
 from mgdd.cli.options import add_command, add_engine, engine_of, number_pairs
 from mgdd.cli.output import Stopped, check_figure, check_output, emit, lines, save_figure
 from mgdd.cli.seek_limits import COV, COV_CYCLES, choose_start, doubts_of, limit_report, limit_text
@@ -151,11 +152,14 @@ def _seek(args: argparse.Namespace) -> None:
         run = stop.partial
     bracketing = args.start_cad is None or args.method == "golden"
     remedy = "narrow --lower-cad to --upper-cad" if bracketing else "leave --start-cad out or move it"
-    doubts = doubts_of(run, limits, remedy)
+    table = None if guided is None else guided.table
+    learnt, unlearnt = learn_map(args, table, seeker, bench.point, interrupted=run.interrupted)
+    doubts = [*doubts_of(run, limits, remedy), *unlearnt]
     for doubt in doubts:
         _LOG.warning("%s", doubt)
     payload = _payload(args, preset, run, best, limits, seeker.limit_states)
     payload |= _guidance_figures(args, guided, seeker, bench, run, best)
+    payload |= learnt
     payload |= {"start_cad": task.start_cad, "start_reason": reason, "warnings": doubts}
     report = payload["limit_report"]
     text = [lines(to_jsonable(payload)), *limit_text(report, int(run.summary["judged_from"]))]

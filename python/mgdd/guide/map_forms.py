@@ -8,13 +8,16 @@ from typing import TYPE_CHECKING, Any, Self, TypeVar
 import numpy as np
 
 from mgdd.errors import DataError
+from mgdd.guide.map_table import read_map_table, write_map_table
 from mgdd.io.parameters import Entry, ParameterFile, Parameters, Wanted, wanted
 from mgdd.results.labels import label_of, labelled_dataset
 from mgdd.results.units import unit_of
 
 if TYPE_CHECKING:
+    import os
+
     import xarray as xr
-    from numpy.typing import NDArray
+    from numpy.typing import ArrayLike, NDArray
 
 __all__ = ["MapForms"]
 
@@ -106,6 +109,69 @@ class MapForms(Parameters):
             "support": dataset["support"].transpose(*dims).to_numpy().ravel().tolist(),
         }
         return made
+
+    def write_csv(self, path: str | os.PathLike[str], *, source: ArrayLike = "") -> None:
+        """Write a plain CSV, a row per cell, which spreadsheets and `read_csv` take without options.
+
+        Parameters
+        ----------
+        path : path-like
+            The file; an existing one is replaced.
+        source : str or array_like of str
+            Where the numbers come from, one text or one per cell, in a column of its own: without comma, quote or line
+            break.
+
+        Raises
+        ------
+        mgdd.errors.ParameterError, mgdd.errors.ShapeError
+            Such a text, or another number of texts; nothing is written then.
+
+        Examples
+        --------
+        >>> import pathlib, tempfile
+        >>> from mgdd.guide import TimingMap
+        >>> timing = TimingMap({"fuel_mg": [6, 20]}, [-2.0, -5.5])
+        >>> with tempfile.TemporaryDirectory() as folder:
+        ...     file = pathlib.Path(folder) / "timing.csv"
+        ...     timing.write_csv(file, source="bench run 7")
+        ...     print(file.read_text(), end="")
+        ...     TimingMap.read_csv(file) == timing
+        fuel_mg,timing_cad,sd_cad,support,prior_sd_cad,forgetting,source
+        6.0,-2.0,3.0,0.0,3.0,0.95,bench run 7
+        20.0,-5.5,3.0,0.0,3.0,0.95,bench run 7
+        True
+        """
+        write_map_table(self.to_dataset(), path, source)
+
+    @classmethod
+    def read_csv(cls, path: str | os.PathLike[str], *, decimal: str = ".") -> Self:
+        """Read a table of timings: what `write_csv` wrote, or the user's own.
+
+        Parameters
+        ----------
+        path : path-like
+            CSV (comma, semicolon, tab) with a header, a row per cell in any order. ``timing_cad`` [°CA aTDC] is
+            required; every column that is not ``sd_cad`` [°CA], ``support``, ``prior_sd_cad`` [°CA], ``forgetting`` or
+            ``source`` is an axis. A second row may hold units, which must be those of the names; lines that begin with
+            # are skipped.
+        decimal : str
+            Decimal mark.
+
+        Returns
+        -------
+        TimingMap
+            The same map as was written, its standard deviations to the last digit but one. What the table does not say
+            is as of a new map.
+
+        Raises
+        ------
+        FileNotFoundError
+            No such file.
+        mgdd.errors.DataError
+            A cell that is missing, repeated, no number or outside its domain, another unit, no axis or more than two;
+            the message names file, line, column, value and remedy.
+        """
+        return cls.from_dataset(read_map_table(path, decimal)[0])
 
     def to_parameters(self) -> ParameterFile:
         """Give axes, cells and settings, as `to_toml` writes them."""

@@ -12,6 +12,7 @@ from mgdd import _core
 from mgdd.errors import DataError, ParameterError, ShapeError
 from mgdd.guide.conditions import numbers_of
 from mgdd.guide.map_forms import MapForms
+from mgdd.guide.map_table import SETTINGS
 from mgdd.guide.settled import settled_estimate
 from mgdd.optimize import Optimum
 from mgdd.results.describe import as_html, rows_of
@@ -83,8 +84,8 @@ class TimingMap(_core.guide.TimingMap, MapForms):
         axes: Mapping[str, ArrayLike],
         timing_cad: ArrayLike,
         *,
-        prior_sd_cad: float = 3.0,
-        forgetting: float = 0.95,
+        prior_sd_cad: float = SETTINGS["prior_sd_cad"],
+        forgetting: float = SETTINGS["forgetting"],
     ) -> None:
         if not isinstance(axes, Mapping) or not axes:
             raise ParameterError.of("axes", axes, "names with their entries, for example {'fuel_mg': [6, 20, 40]}")

@@ -10,6 +10,7 @@ import numpy as np
 from mgdd.errors import DataError
 from mgdd.io.angles import pair
 from mgdd.io.checks import check_trace
+from mgdd.io.plain_csv import write_columns
 from mgdd.io.pressure_file import Reading, checked, cycles_of
 from mgdd.io.table import read_table
 from mgdd.results.labels import ANGLE, check_labels, labelled_dataset
@@ -218,9 +219,7 @@ def write_pressure(dataset: xr.Dataset, path: str | os.PathLike[str]) -> None:
     measured = dataset["pressure_bar"].transpose(..., ANGLE)
     angle, pressure = check_trace(measured[ANGLE].to_numpy(), measured.to_numpy(), source="dataset")
     names = ["pressure_bar"] if pressure.ndim == 1 else [f"pressure_bar_{k + 1}" for k in range(len(pressure))]
-    lines = [",".join([ANGLE, *names])]
-    lines += [",".join(map(repr, row)) for row in np.vstack([angle, np.atleast_2d(pressure)]).T.tolist()]
-    Path(path).write_text("\n".join(lines) + "\n", encoding="utf-8", newline="\n")
+    write_columns({ANGLE: angle, **dict(zip(names, np.atleast_2d(pressure), strict=True))}, path)
 
 
 def _dataset(angle: NDArray[np.float64], pressure: NDArray[np.float64], attrs: dict[str, str | float]) -> xr.Dataset:

@@ -11,6 +11,7 @@ import numpy as np
 from mgdd.errors import DataError, ParameterError, ShapeError
 from mgdd.io.checks import check_choice
 from mgdd.io.mat_file import read_mat
+from mgdd.io.plain_csv import write_columns
 from mgdd.io.table import read_table
 from mgdd.io.throttle_checks import (
     Place,
@@ -219,9 +220,7 @@ def write_throttle_log(log: xr.Dataset, path: str | os.PathLike[str]) -> None:
     """
     check_throttle_log(log)
     names = ["time_s", "duty", "angle_deg", *(name for name in _OPTIONAL if name in log)]
-    lines = [",".join(names)]
-    lines += [",".join(map(repr, row)) for row in np.column_stack([log[name].to_numpy() for name in names]).tolist()]
-    Path(path).write_text("\n".join(lines) + "\n", encoding="utf-8", newline="\n")
+    write_columns({name: log[name].to_numpy() for name in names}, path)
 
 
 def _columns(given: dict[str, ArrayLike], name: str) -> dict[str, NDArray[np.float64]]:

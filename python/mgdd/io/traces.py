@@ -3,12 +3,10 @@
 from __future__ import annotations
 
 import os
-from pathlib import Path
 from typing import TYPE_CHECKING
 
-import numpy as np
-
 from mgdd.errors import ShapeError
+from mgdd.io.plain_csv import write_columns
 from mgdd.results.labels import check_labels
 
 if TYPE_CHECKING:
@@ -53,7 +51,4 @@ def write_traces(dataset: xr.Dataset, path: str | os.PathLike[str]) -> None:
     if len(dims) != 1 or any(v.ndim > 1 for v in dataset.variables.values()):
         raise ShapeError(f"a CSV holds columns over one dimension; this result has {dict(dataset.sizes)}")
     names = [str(dims[0]), *(str(n) for n, v in dataset.data_vars.items() if v.dims == (dims[0],))]
-    lines = [",".join(names)]
-    columns = np.column_stack([dataset[name].to_numpy() for name in names])
-    lines += [",".join(map(repr, row)) for row in columns.tolist()]
-    Path(path).write_text("\n".join(lines) + "\n", encoding="utf-8", newline="\n")
+    write_columns({name: dataset[name].to_numpy() for name in names}, path)

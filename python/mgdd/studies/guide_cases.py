@@ -5,7 +5,7 @@ from __future__ import annotations
 import math
 from dataclasses import dataclass
 from functools import cached_property
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING, Any, Protocol
 
 import numpy as np
 
@@ -26,6 +26,7 @@ __all__ = [
     "HIGH",
     "LOW",
     "PLANT",
+    "DrawsCurve",
     "Guide",
     "Run",
     "SteadyMap",
@@ -140,7 +141,7 @@ def seeker_without_clip() -> ExtremumSeeking:
     )  # fmt: skip
 
 
-def trimmed(guide: Guide | None) -> FeedForward:
+def trimmed(guide: Callable[[OperatingPoint], Optimum] | None) -> FeedForward:
     """Make extremum seeking with the guide as feed-forward."""
     return FeedForward(seeker_without_clip(), guide)
 
@@ -186,9 +187,17 @@ class SteadyMap:
         return np.asarray(self.j.max() - np.interp(applied_cad, self.soc_cad, self.j))
 
 
+class DrawsCurve(Protocol):
+    """A guide that draws J over its input at an operating point."""
+
+    def curve(self, point: OperatingPoint) -> Curve:
+        """Draw it."""
+        ...
+
+
 @dataclass(frozen=True)
 class Run:
-    """One run, cycle by cycle: estimate and its stated standard deviation before the cycle, applied timing [°CA]."""
+    """One run, cycle by cycle: estimate and its stated sd before the cycle, start of combustion that was set [°CA]."""
 
     estimate: NDArray[np.float64]
     estimate_sd: NDArray[np.float64]
@@ -200,8 +209,9 @@ def drive(
     seeker: FeedForward | CurveSeeking | GuidedEngine,
     cycles: int,
     *,
-    guide: Guide | None = None,
+    guide: DrawsCurve | None = None,
     late_by_cad: Callable[[int], float] | None = None,
+    soc_of: Callable[[OperatingPoint, float], float] | None = None,
     beyond: Callable[[float], float] | None = None,
 ) -> Run:
     """Let a guided seeker steer a bench.
@@ -214,10 +224,12 @@ def drive(
         It advances; all but a bare curve are told every operating point.
     cycles : int
         How many.
-    guide : Guide, optional
+    guide : DrawsCurve, optional
         Draws the curve of a new operating point.
     late_by_cad : callable, optional
         By how much combustion starts later than asked for, by cycle [°CA]; nobody tells the seeker.
+    soc_of : callable, optional
+        Start of combustion of an injection at an operating point: the seeker then steers the injection.
     beyond : callable, optional
         What J gains at an input beside what the bench measures [points].
 
@@ -239,7 +251,8 @@ def drive(
         estimate[k] = seeker.estimate[0]
         if isinstance(seeker, CurveSeeking):
             sd[k] = seeker.estimate_sd
-        applied[k] = asked + (late_by_cad(k) if late_by_cad else 0.0)
+        burns = soc_of(now, asked) if soc_of else asked
+        applied[k] = burns + (late_by_cad(k) if late_by_cad else 0.0)
         j = bench.step(applied[k])["j"]
         seeker.tell(j + (beyond(applied[k]) if beyond else 0.0))
     return Run(estimate, sd, applied)

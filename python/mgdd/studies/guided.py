@@ -10,8 +10,6 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from mgdd.engine import Cylinder, OperatingPoint
-from mgdd.errors import ConvergenceError
 from mgdd.guide import Curve, CurveSeeking, ModelOptimum
 from mgdd.loop import EngineBench, SurrogatePlant, run_seeker
 from mgdd.optimize import ExtremumSeeking
@@ -20,6 +18,8 @@ from mgdd.results.labels import labelled_dataset
 from mgdd.studies import measured_engine_cases as measured
 from mgdd.studies.base import Progress, StudyResult, check_seeds, finish, run_parts
 from mgdd.studies.guided_figures import draw
+from mgdd.studies.guided_limited import LimitedRuns, limited_parts, limited_row, limited_variables
+from mgdd.studies.guided_measured import drawn_curve, measured_guide
 from mgdd.studies.statistics import with_interval, with_median_interval
 from mgdd.surrogate import EngineSurrogate, fit_surrogate
 
@@ -35,9 +35,6 @@ _GRID_CAD, _REACH_CAD = 0.1, 60.0
 _BEND = -0.05  # of a parabola, points of efficiency per (°CA)**2: what cycle models have, -0.037 to -0.054
 _WRONG_WALL_HEAT = 1.0  # of the guide of the bench, which has 0.5
 _AMPLITUDE_CAD, _PERIOD, _TIME_CONSTANT = 1.0, 10, 40.0  # of the seeker on the bench, as `mgdd engine seek` has them
-# 4.5 L of four cylinders; bore and stroke are those of engines of this size, the compression ratio is a usual one.
-_MEASURED_CYLINDER = Cylinder(bore_mm=107.0, stroke_mm=124.0, connecting_rod_mm=192.0, compression_ratio=17.3)
-_TEN_TO_NINETY = 1.0 - math.sqrt(0.2)  # of the duration of a symmetric triangle
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -89,7 +86,9 @@ def run_guided(
     does at one operating point; `CurveSeeking` with the guide's curve, and with a parabola about its best timing.
     The guide of the virtual bench has twice its wall heat. The guide of the measured engine is the cycle model of a
     diesel with a triangular burn: size, energy, burn angles and speed are those of the records; bore, stroke,
-    compression ratio, intake and wall heat are usual ones, and hydrogen, pilot and residuals are left out.
+    compression ratio, intake and wall heat are usual ones, and hydrogen, pilot and residuals are left out. On that
+    engine there are further cases with a limit of the pressure rise, all from the same late start: extremum seeking,
+    the curve with and without the guide's curve of the pressure rise, each without and with a margin for its scatter.
 
     Parameters
     ----------
@@ -109,7 +108,9 @@ def run_guided(
     StudyResult
         ``summary["rows"]``: per case the median of the first cycle within 1 °CA of the optimum and of the cycle from
         which on the estimate stays within 1.5 °CA (None: never in most runs), J lost in the first 100 cycles
-        (J x cycles), J lost per cycle in the second half, and the final timing, with 95 % intervals.
+        (J x cycles), J lost per cycle in the second half, and the final timing, with 95 % intervals. Cases with a limit
+        are judged by the best timing within it, J above that is not counted as a gain, and ``above_share`` is the share
+        of cycles whose pressure rise without noise is above the limit.
 
     Raises
     ------
@@ -131,6 +132,9 @@ def run_guided(
     engine = _measured_engine() if real else _bench_engine()
     parts = [(case, partial(_run, engine, case, seeds)) for case in _CASES]
     runs, interrupted = run_parts(parts, progress)
+    limited: list[LimitedRuns] = []
+    if real and not interrupted:
+        limited, interrupted = run_parts(limited_parts(measured.measured_records(_NAME), seeds, _CYCLES), progress)
     summary: dict[str, Any] = {
         "study": _NAME,
         "plant": "surrogate of the measured engine" if real else "virtual bench",
@@ -140,9 +144,9 @@ def run_guided(
         "optimum_cad": engine.best_cad,
         "guide_cad": engine.curve.best,
         "interrupted": interrupted,
-        "rows": [_row(engine, run) for run in runs],
+        "rows": [_row(engine, run) for run in runs] + [limited_row(run, _EARLY_CYCLES) for run in limited],
     }
-    return finish(_dataset(engine, runs), summary, draw if figures else None)
+    return finish(_dataset(engine, runs, limited), summary, draw if figures else None)
 
 
 def _bench_engine() -> _Engine:
@@ -165,7 +169,7 @@ def _bench_engine() -> _Engine:
         best_j=best.value,
         grid_cad=grid,
         steady_j=bench.steady_map(grid)["j"].to_numpy(),
-        curve=_drawn(model, bench.point),
+        curve=drawn_curve(model, bench.point),
         bend=_BEND,
         plant=lambda seed, _: EngineBench(seed=seed),
         plain=plain,
@@ -179,7 +183,7 @@ def _measured_engine() -> _Engine:
     case = measured.tuned_case(surrogate, objective, "batch", measured.held_objective(surrogate, objective))
     bounds = (measured.LOWER_CAD, measured.UPPER_CAD)
     grid = np.arange(bounds[0], bounds[1] + 0.5 * _GRID_CAD, _GRID_CAD)
-    curve, bar_per_point = _measured_guide(records)
+    guide = measured_guide(records)
 
     def plain(start: float) -> ExtremumSeeking:
         settings = {**measured.seeker_of(case, 0).settings, "start": start}
@@ -193,8 +197,8 @@ def _measured_engine() -> _Engine:
         best_j=case.best.value,
         grid_cad=grid,
         steady_j=surrogate.predict(grid)["imep_bar"].to_numpy(),
-        curve=curve,
-        bend=_BEND * bar_per_point,
+        curve=guide.curve,
+        bend=_BEND * guide.bar_per_point,
         plant=lambda seed, start: _measured_plant(surrogate, seed, start),
         plain=plain,
     )
@@ -202,35 +206,6 @@ def _measured_engine() -> _Engine:
 
 def _measured_plant(surrogate: EngineSurrogate, seed: int, start_cad: float) -> SurrogatePlant:
     return SurrogatePlant(surrogate, "imep_bar", start_soi_cad=start_cad, seed=seed)
-
-
-def _measured_guide(records: xr.Dataset) -> tuple[Curve, float]:
-    """Draw IMEP over injection by the cycle model, and give the bar of IMEP per point of efficiency."""
-    middle = {
-        name: float(records[name].median())
-        for name in ("speed_rpm", "soi_cad", "mfb10_cad", "mfb50_cad", "mfb90_cad", "diesel_energy_kj", "h2_energy_kj")
-    }
-    cylinder = _MEASURED_CYLINDER
-    energy_kj = middle["diesel_energy_kj"] + middle["h2_energy_kj"]
-    duration = (middle["mfb90_cad"] - middle["mfb10_cad"]) / _TEN_TO_NINETY
-    point = OperatingPoint(
-        speed_rpm=middle["speed_rpm"],
-        fuel_mg=energy_kj * 1e3 / cylinder.lower_heating_value_mj_per_kg,
-        burn_duration_cad=duration,
-    )
-    from_soc_to_soi = middle["soi_cad"] - (middle["mfb50_cad"] - 0.5 * duration)
-    drawn = _drawn(ModelOptimum(cylinder, bounds_cad=(-30.0, 15.0)), point)
-    displacement_m3 = 0.25 * math.pi * cylinder.bore_mm**2 * cylinder.stroke_mm * 1e-9
-    bar_per_point = 0.01 * energy_kj * 1e3 / displacement_m3 * 1e-5
-    soc = np.linspace(drawn.lower, drawn.upper, 121)
-    return Curve(soc + from_soc_to_soi, bar_per_point * np.asarray(drawn(soc))), bar_per_point
-
-
-def _drawn(model: ModelOptimum, point: OperatingPoint) -> Curve:
-    curve = model.curve(point)
-    if curve is None:
-        raise ConvergenceError(f"study {_NAME!r}: the guide has no cycle at {point}")
-    return curve
 
 
 def _run(engine: _Engine, case: str, seeds: int) -> _Runs:
@@ -272,7 +247,7 @@ def _row(engine: _Engine, run: _Runs) -> dict[str, Any]:
     }
 
 
-def _dataset(engine: _Engine, runs: list[_Runs]) -> xr.Dataset:
+def _dataset(engine: _Engine, runs: list[_Runs], limited: list[LimitedRuns]) -> xr.Dataset:
     cad, unit = "°CA aTDC", engine.unit
     low, median, high = np.quantile(np.stack([run.estimate for run in runs]), [0.1, 0.5, 0.9], axis=1)
     lost = np.stack([np.cumsum(run.lost, axis=1).mean(axis=0) for run in runs])
@@ -289,4 +264,4 @@ def _dataset(engine: _Engine, runs: list[_Runs]) -> xr.Dataset:
         "estimate_high_cad": (over, high, cad, "estimate, 10 % of the seeds above"),
         "lost_j_cycles": (over, lost, unit, "J lost so far, summed over cycles, mean of the seeds"),
     }
-    return labelled_dataset(variables)
+    return labelled_dataset(variables | limited_variables(limited))

@@ -33,6 +33,8 @@ _STUDIES = {
     "guided-start-up": _Study("cycles that a rough model saves at the start, as feed-forward and as a curve", 5),
     "guide-accuracy": _Study("how wrong a guide may be and still help after a load step and in trouble", 5),
     "guided-transients": _Study("what a guide saves while the operating point keeps changing", 5),
+    "ignition-delay": _Study("start of injection for a start of combustion, and what a wrong delay costs a guide", 5),
+    "model-validation": _Study("cycle models beside measured traces, before and after calibration", 5),
     "online-calibration": _Study("what the engine teaches its model while it runs, also with errors of the sensor", 6),
     "calibrated-guide": _Study("whether a guide that the measured pressure calibrates beats one that stays wrong", 6),
     "throttle-first-principle": _Study(

@@ -1,0 +1,280 @@
+"""What start of injection belongs to a start of combustion, and what a wrong ignition delay costs a guide."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from functools import partial
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+
+from mgdd.engine import OperatingPoint
+from mgdd.guide import CurveSeeking
+from mgdd.loop import EngineBench
+from mgdd.results.labels import labelled_dataset, to_jsonable
+from mgdd.studies.base import Progress, StudyResult, check_seeds, finish, run_parts
+from mgdd.studies.guide_cases import SteadyMap, drive, first_within, trimmed
+from mgdd.studies.guided_plane import FUELS_MG, SPEEDS_RPM
+from mgdd.studies.ignition_cases import MEASURED_AT, SOI_CAD, TRUTHS, DelayLaw, InjectionGuide, told_laws
+from mgdd.studies.ignition_delay_figures import draw
+from mgdd.studies.statistics import with_interval, with_median_interval
+
+if TYPE_CHECKING:
+    import xarray as xr
+    from numpy.typing import NDArray
+
+__all__ = ["Plane", "plane_of", "plane_row", "run_ignition_delay", "slope_row"]
+
+AFTER = OperatingPoint(speed_rpm=2100.0, fuel_mg=16.0)  # of the step from `MEASURED_AT`
+_STEP_AT, _CYCLES, _START_CYCLES, _JUDGED = 300, 600, 100, 200
+_BIN, _TAIL = 20, 100  # cycles of a mean in the figure, and of the final estimate
+_BOUNDS_SOI_CAD = (-45.0, 10.0)
+_QUICK_SEEDS = 4
+_INTAKE = {"warmer_20_k": ("intake_temperature_k", 20.0), "boost_less_15_kpa": ("intake_pressure_kpa", -15.0)}
+
+
+@dataclass(frozen=True, kw_only=True)
+class Plane:
+    """One truth and one told correlation over the speed-load plane, cell by cell.
+
+    ``soi_error_cad``: told less right injection; ``lost`` and ``lost_trimmed``: J lost [points], infinite where nothing
+    ignites; trimmed by the error that was learnt at `MEASURED_AT`.
+    """
+
+    truth: str
+    told: str
+    clipped: NDArray[np.bool_]
+    delay_cad: NDArray[np.float64]
+    slope: NDArray[np.float64]
+    soi_error_cad: NDArray[np.float64]
+    trim_cad: float
+    lost: NDArray[np.float64]
+    lost_trimmed: NDArray[np.float64]
+
+
+@dataclass(frozen=True, kw_only=True)
+class _Runs:
+    form: str
+    told: str
+    estimate: NDArray[np.float64]
+    lost: NDArray[np.float64]
+
+
+def run_ignition_delay(
+    *, seeds: int = 200, quick: bool = False, figures: bool = True, progress: Progress | None = None
+) -> StudyResult:
+    """Turn the best SOC of a right cycle model into SOI by a wrong correlation, and see what that costs.
+
+    Deterministic part, on 8 x 8 cells from 900 to 3000 rpm and 6 to 40 mg at constant intake: one of three correlations
+    is the truth, and the guide is told it, another one, a polynomial through delays measured at 1500 rpm, their
+    value at the best timing, or nothing. Then a run: the truth is Watson's, the guide starts at 1500 rpm and 20 mg, and
+    steps in cycle 300 to 2100 rpm and 16 mg; extremum seeking with feed-forward, and curve-guided seeking, both in SOI.
+
+    Parameters
+    ----------
+    seeds : int
+        Runs per form and correlation.
+    quick : bool
+        At most four seeds, and a plane of 3 x 3 cells.
+    figures : bool
+        Draw figures.
+    progress : callable, optional
+        Called with a short text before each part.
+
+    Returns
+    -------
+    StudyResult
+        Rows ``truth told ...``: errors of the told injection [°CA], of what the trim of one point leaves, and J lost
+        [points]. ``summary["slopes"]``: delay and dSOC/dSOI at the right injection. ``summary["intake"]``: the same
+        when the intake is not as told. ``summary["runs"]``: J lost [points x cycles] and cycles to 1 °CA.
+
+    Raises
+    ------
+    mgdd.errors.ParameterError
+        Fewer than one seed.
+
+    References
+    ----------
+    Tan (2018), figure 5-10 (question); the numbers are of this package's own bench.
+
+    Examples
+    --------
+    >>> from mgdd.studies.ignition_delay import run_ignition_delay
+    >>> rows = run_ignition_delay(seeds=1, quick=True, figures=False).summary["rows"]
+    >>> [row["lost_mean"] for row in rows if row["truth"] == row["told"]]
+    [0.0, 0.0, 0.0]
+    """
+    seeds = min(check_seeds(seeds), _QUICK_SEEDS) if quick else check_seeds(seeds)
+    speeds, fuels = (SPEEDS_RPM[::3], FUELS_MG[::3]) if quick else (SPEEDS_RPM, FUELS_MG)
+    if progress is not None:
+        progress("maps of the plane")
+    cells = [[OperatingPoint(speed_rpm=float(n), fuel_mg=float(m)) for m in fuels] for n in speeds]
+    maps = [[SteadyMap.of(EngineBench(point=point)) for point in row] for row in cells]
+    wanted = [(truth, told) for truth in TRUTHS for told in told_laws(truth)]
+    parts = [(f"{a.name}, told {b.name}", partial(plane_of, a, b, cells, maps)) for a, b in wanted]
+    planes, interrupted = run_parts(parts, progress)
+    runs: list[_Runs] = []
+    if not interrupted:
+        told_runs = [(form, told) for form in ("feed-forward", "curve") for told in told_laws(TRUTHS[0])]
+        each = [(f"{form}, told {told.name}", partial(_runs, form, told, seeds)) for form, told in told_runs]
+        runs, interrupted = run_parts(each, progress)
+    summary = {
+        "study": "ignition-delay",
+        "seeds": seeds,
+        "rows": [plane_row(plane) for plane in planes],
+        "slopes": [slope_row(plane) for plane in planes if plane.truth == plane.told],
+        "intake": [_intake_row(law) for law in TRUTHS],
+        "runs": [_run_row(run) for run in runs],
+        "interrupted": interrupted,
+    }
+    return finish(_dataset(planes, runs, speeds, fuels), to_jsonable(summary), draw if figures else None)
+
+
+def plane_of(truth: DelayLaw, told: DelayLaw, cells: Any, maps: Any) -> Plane:
+    """Compare told with right injection in every cell."""
+    right, guide = InjectionGuide(truth), InjectionGuide(told)
+    trim = right.timing(MEASURED_AT).soi_cad - guide.timing(MEASURED_AT).soi_cad
+    shape = (len(cells), len(cells[0]))
+    error, lost, trimmed_lost, delay, slope = (np.empty(shape) for _ in range(5))
+    clipped = np.empty(shape, bool)
+    for at in np.ndindex(*shape):
+        point, own = cells[at[0]][at[1]], maps[at[0]][at[1]]
+        best, said = right.timing(point), guide.timing(point)
+        error[at], clipped[at] = said.soi_cad - best.soi_cad, best.clipped
+        delay[at], slope[at] = best.delay_cad, truth.slope(point, best.soi_cad)
+        lost[at] = _lost(truth, own, point, said.soi_cad, best.soi_cad)
+        trimmed_lost[at] = _lost(truth, own, point, said.soi_cad + trim, best.soi_cad)
+    return Plane(
+        truth=truth.name, told=told.name, clipped=clipped, delay_cad=delay, slope=slope, soi_error_cad=error,
+        trim_cad=trim, lost=lost, lost_trimmed=trimmed_lost,
+    )  # fmt: skip
+
+
+def _lost(truth: DelayLaw, own: SteadyMap, point: OperatingPoint, soi_cad: float, best_soi_cad: float) -> float:
+    """Give J lost by an injection against the best that the truth can reach; infinite where nothing ignites."""
+    soc = truth.soc_of(point, min(max(soi_cad, SOI_CAD[0]), SOI_CAD[-1]))
+    lost, least = own.lost(np.array([soc, truth.soc_of(point, best_soi_cad)])).tolist()
+    return float(lost - least) if np.isfinite(soc) else np.inf
+
+
+def plane_row(plane: Plane) -> dict[str, Any]:
+    """Give size of the error and J lost, before and after the trim."""
+    left = plane.soi_error_cad + plane.trim_cad
+    fired, fired_trimmed = (np.isfinite(lost) for lost in (plane.lost, plane.lost_trimmed))
+    return {
+        "truth": plane.truth,
+        "told": plane.told,
+        "cells": plane.lost.size,
+        "soi_error_median_cad": float(np.median(np.abs(plane.soi_error_cad))),
+        "soi_error_largest_cad": float(np.abs(plane.soi_error_cad).max()),
+        "lost_mean": float(plane.lost[fired].mean()),
+        "lost_p95": float(np.quantile(plane.lost[fired], 0.95)),
+        "cells_without_ignition": int(np.sum(~fired)),
+        "trim_cad": plane.trim_cad,
+        "left_median_cad": float(np.median(np.abs(left))),
+        "lost_trimmed_mean": float(plane.lost_trimmed[fired_trimmed].mean()),
+        "lost_trimmed_p95": float(np.quantile(plane.lost_trimmed[fired_trimmed], 0.95)),
+        "cells_without_ignition_trimmed": int(np.sum(~fired_trimmed)),
+    }
+
+
+def slope_row(plane: Plane) -> dict[str, Any]:
+    """Give delay and dSOC/dSOI at the right injection."""
+    low, middle, high = np.quantile(plane.slope, [0.1, 0.5, 0.9]).tolist()
+    return {
+        "truth": plane.truth,
+        "delay_smallest_cad": float(plane.delay_cad.min()),
+        "delay_median_cad": float(np.median(plane.delay_cad)),
+        "delay_largest_cad": float(plane.delay_cad.max()),
+        "slope_p10": low,
+        "slope_median": middle,
+        "slope_p90": high,
+        "curvature_ratio_median": float(np.median(plane.slope**2)),
+        "cells_out_of_reach": int(plane.clipped.sum()),
+    }
+
+
+def _intake_row(law: DelayLaw) -> dict[str, Any]:
+    """Tell how the right injection at `MEASURED_AT` moves with the intake, and how much of it is the optimum's move."""
+    guide = InjectionGuide(law)
+    row: dict[str, Any] = {"truth": law.name}
+    told = guide.timing(MEASURED_AT)
+    for name, (field, by) in _INTAKE.items():
+        point = MEASURED_AT.replace(**{field: getattr(MEASURED_AT, field) + by})
+        row[f"soi_move_{name}_cad"] = guide.timing(point).soi_cad - told.soi_cad
+        row[f"soc_move_{name}_cad"] = guide.timing(point).soc_cad - told.soc_cad
+    return row
+
+
+def _runs(form: str, told: DelayLaw, seeds: int) -> _Runs:
+    truth, guide = TRUTHS[0], InjectionGuide(told)
+    points = (MEASURED_AT, AFTER)
+    maps = [SteadyMap.of(EngineBench(point=point)) for point in points]
+    estimates, lost = np.empty((seeds, _CYCLES)), np.empty((seeds, _CYCLES))
+    for seed in range(seeds):
+        bench = EngineBench(schedule=[(0, MEASURED_AT), (_STEP_AT, AFTER)], seed=seed)
+        if form == "curve":
+            curve, (low, high) = guide.curve(MEASURED_AT), _BOUNDS_SOI_CAD
+            seeker: Any = CurveSeeking(start=curve.best, lower=low, upper=high, curve=curve)
+        else:
+            seeker = trimmed(guide)
+        run = drive(bench, seeker, _CYCLES, guide=guide, soc_of=truth.soc_of)
+        estimates[seed] = run.estimate
+        lost[seed] = np.concatenate(
+            [own.lost(part) for own, part in zip(maps, np.split(run.applied, [_STEP_AT]), strict=True)]
+        )
+    return _Runs(form=form, told=told.name, estimate=estimates, lost=lost)
+
+
+def _best_soi(point: OperatingPoint) -> float:
+    return InjectionGuide(TRUTHS[0]).timing(point).soi_cad
+
+
+def _run_row(run: _Runs) -> dict[str, Any]:
+    before, after = _best_soi(MEASURED_AT), _best_soi(AFTER)
+    starts = [first_within(own[:_STEP_AT], before, 1.0) for own in run.estimate]
+    steps = [first_within(own[_STEP_AT:], after, 1.0) for own in run.estimate]
+    return {
+        "form": run.form,
+        "told": run.told,
+        **with_median_interval("start_cycles_to_1_cad", starts),
+        **with_interval("start_lost", run.lost[:, :_START_CYCLES].sum(axis=1)),
+        **with_median_interval("step_cycles_to_1_cad", steps),
+        **with_interval("step_lost", run.lost[:, _STEP_AT : _STEP_AT + _JUDGED].sum(axis=1)),
+        **with_interval("final_error_cad", run.estimate[:, -_TAIL:].mean(axis=1) - after),
+    }
+
+
+def _dataset(planes: list[Plane], runs: list[_Runs], speeds: Any, fuels: Any) -> xr.Dataset:
+    cad, dims = "°CA aTDC", ("pair", "speed_rpm", "fuel_mg")
+    laws = [law.soc(MEASURED_AT) - SOI_CAD for law in TRUTHS]
+    variables: dict[str, tuple[Any, ...]] = {
+        "pair": ("pair", [f"{plane.truth}, told {plane.told}" for plane in planes], "-", "truth and told correlation"),
+        "speed_rpm": ("speed_rpm", speeds, "rpm", "engine speed"),
+        "fuel_mg": ("fuel_mg", fuels, "mg", "fuel per cycle"),
+        "soi_error_cad": (dims, [plane.soi_error_cad for plane in planes], "°CA", "told less right start of injection"),
+        "left_error_cad": (
+            dims, [plane.soi_error_cad + plane.trim_cad for plane in planes], "°CA", "error that the trim leaves",
+        ),
+        "lost": (dims, [plane.lost for plane in planes], "%", "J lost by the told injection"),
+        "lost_trimmed": (dims, [plane.lost_trimmed for plane in planes], "%", "J lost with the trim of one point"),
+        "law": ("law", [law.name for law in TRUTHS], "-", "correlation"),
+        "soi_cad": ("soi_cad", SOI_CAD),
+        "delay_cad": (("law", "soi_cad"), laws, "°CA", "ignition delay"),
+        "cycle": ("cycle", np.arange(_CYCLES)),
+    }  # fmt: skip
+    if runs:
+        over = ("run", "cycle")
+        low, median, high = np.quantile(np.stack([run.estimate for run in runs]), [0.1, 0.5, 0.9], axis=1)
+        best = np.repeat([_best_soi(MEASURED_AT), _best_soi(AFTER)], [_STEP_AT, _CYCLES - _STEP_AT])
+        lost = [run.lost.mean(axis=0).reshape(-1, _BIN).mean(axis=1) for run in runs]
+        variables |= {
+            "run": ("run", [f"{run.form}, {run.told}" for run in runs], "-", "form and told correlation"),
+            "estimate_low_cad": (over, low, cad, "estimate, 10 % of the seeds below"),
+            "estimate_median_cad": (over, median, cad, "estimate, median of the seeds"),
+            "estimate_high_cad": (over, high, cad, "estimate, 10 % of the seeds above"),
+            "middle_cycle": ("middle_cycle", np.arange(_BIN / 2, _CYCLES, _BIN), "-", "engine cycle"),
+            "mean_lost": (("run", "middle_cycle"), lost, "%", "J lost per cycle, mean of the seeds and of 20 cycles"),
+            "optimum_cad": ("cycle", best, cad, "right start of injection"),
+        }
+    return labelled_dataset(variables)

@@ -1,0 +1,60 @@
+"""Tables of the documentation about what a guide rests on: ignition delay, and the model beside measured traces."""
+
+from __future__ import annotations
+
+from functools import cache
+from typing import TYPE_CHECKING
+
+import numpy as np
+from tables_of_measured_traces import measured
+
+from mgdd.engine import OperatingPoint
+from mgdd.loop import EngineBench
+from mgdd.studies.guide_cases import SteadyMap
+from mgdd.studies.guided_plane import FUELS_MG, SPEEDS_RPM
+from mgdd.studies.ignition_cases import TRUTHS, told_laws
+from mgdd.studies.ignition_delay import Plane, plane_of, plane_row, slope_row
+from mgdd.studies.model_validation import stage_rows, validate_law
+from mgdd.studies.validation_fits import LAWS, STAGES
+
+if TYPE_CHECKING:
+    from tables_of_model import Rows
+
+__all__ = ["ignition_plane", "ignition_slopes", "model_stages"]
+
+
+@cache
+def _planes() -> tuple[Plane, ...]:
+    cells = [[OperatingPoint(speed_rpm=float(n), fuel_mg=float(m)) for m in FUELS_MG] for n in SPEEDS_RPM]
+    maps = [[SteadyMap.of(EngineBench(point=point)) for point in row] for row in cells]
+    return tuple(plane_of(truth, told, cells, maps) for truth in TRUTHS for told in told_laws(truth))
+
+
+def ignition_plane() -> Rows:
+    names = ("soi_error_median_cad", "lost_mean", "lost_p95", "to_learn", "left_median_cad", "lost_trimmed_mean")
+    names += ("lost_trimmed_p95", "cells_without_ignition", "cells_without_ignition_trimmed")
+    rows = {}
+    for plane in _planes():
+        if plane.truth != plane.told:
+            row = {**plane_row(plane), "to_learn": -plane.trim_cad}
+            rows[f"{plane.truth} {plane.told}"] = [float(row[name]) for name in names]
+    return rows
+
+
+def ignition_slopes() -> Rows:
+    names = ("delay_smallest_cad", "delay_median_cad", "delay_largest_cad", "slope_p10", "slope_median", "slope_p90")
+    names += ("curvature_ratio_median", "cells_out_of_reach")
+    own = [plane for plane in _planes() if plane.truth == plane.told]
+    return {plane.truth: [float(slope_row(plane)[name]) for name in names] for plane in own}
+
+
+def model_stages() -> Rows:
+    done = [validate_law(law, *measured(), 0) for law in LAWS]
+    names = ("rmse_percent", "imep_closed_error_percent", "best_ca50_cad", "lost_percent", "curvature_ratio")
+    rows = {}
+    for own in done:
+        found = stage_rows(own, done[0])
+        for stage in STAGES:
+            loads = [row for row in found if row["stage"] == stage]
+            rows[f"{own.law.name} {stage}"] = np.ravel([[row[name] for row in loads] for name in names]).tolist()
+    return rows
