@@ -182,6 +182,7 @@ def test_a_refused_cycle_says_why() -> None:
         ({"parameters": "wall_heat_scale"}, "a sequence of names"),
         ({"parameters": ("c1",)}, "parameters = 'c1': must be one of wall_heat_scale, soc_offset_cad"),
         ({"uncertainty": {"tdc": 0.1}}, "uncertainty = 'tdc': must be one of"),
+        ({"uncertainty": {"wall_heat_scale": 0.1}}, "uncertainty of wall_heat_scale = 0.1: must be left out"),
         ({"uncertainty": {"pressure_gain": -0.1}}, "uncertainty of pressure_gain = -0.1"),
         ({"window_cycles": 1}, "window_cycles = 1 cycles"),
         ({"method": "extremum_seeking", "parameters": ("tdc_offset_cad",)}, "wall_heat_scale alone"),

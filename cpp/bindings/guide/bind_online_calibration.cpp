@@ -36,8 +36,9 @@ py::dict by_name(const CalibrationVector& values) {
 
 py::dict settings_of(const OnlineCalibrationSettings& s) {
   py::dict uncertainty;
-  for (std::size_t i = 0; i < s.uncertainty.size(); ++i)
-    uncertainty[as_str(calibrated_parameters[i].field.name)] = s.uncertainty[i];
+  for (std::size_t i = 0; i < s.uncertainty.size(); ++i) {
+    if (!s.wanted[i]) uncertainty[as_str(calibrated_parameters[i].field.name)] = s.uncertainty[i];
+  }
   py::dict out;
   out["cylinder"] = s.cylinder;
   out["method"] = as_str(to_string(s.method));
@@ -65,8 +66,14 @@ Bound make(const engine::Cylinder& cylinder, const std::string& method, const Na
   s.wanted.fill(false);
   for (const std::string& name : parameters)
     s.wanted[static_cast<std::size_t>(parse_calibrated("parameters", name))] = true;
-  for (const auto& [name, sd] : uncertainty)
-    s.uncertainty[static_cast<std::size_t>(parse_calibrated("uncertainty", name))] = sd;
+  for (const auto& [name, sd] : uncertainty) {
+    const auto at = static_cast<std::size_t>(parse_calibrated("uncertainty", name));
+    if (s.wanted[at]) {
+      throw about("uncertainty", ParameterError("uncertainty of " + name + " = " + text(sd) +
+                                                ": must be left out, nothing is held against an adapted parameter"));
+    }
+    s.uncertainty[at] = sd;
+  }
   s.window = {window_cycles, steady_cycles, cov_limit_percent};
   s.forgetting = forgetting;
   s.soc_scatter_cad = soc_scatter_cad;

@@ -49,11 +49,6 @@ void validate(const OnlineCalibrationSettings& s) {
     const FieldInfo& field = info_of(i).field;
     require_within("uncertainty of " + std::string(field.name), s.uncertainty[place(i)], 0.0,
                    field.domain.upper - field.domain.lower, field.unit);
-    if (s.wanted[place(i)] && s.uncertainty[place(i)] != info_of(i).known_sd) {
-      throw about("uncertainty",
-                  ParameterError("uncertainty of " + std::string(field.name) + " = " + text(s.uncertainty[place(i)]) +
-                                 ": nothing is held against an adapted parameter; leave it out of one"));
-    }
     if (i != Calibrated::wall_heat_scale && s.wanted[place(i)] && s.method == CalibrationMethod::extremum_seeking) {
       throw about("parameters", ParameterError("parameters: extremum seeking adapts wall_heat_scale alone, not " +
                                                std::string(field.name) + "; use 'gauss_newton' or 'recursive'"));

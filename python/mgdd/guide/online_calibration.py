@@ -46,7 +46,8 @@ class OnlineCalibration:
         What is adapted: ``"wall_heat_scale"``, ``"soc_offset_cad"``, ``"burn_duration_scale"``, ``"gamma_offset"``,
         ``"fuel_heat_scale"``, ``"tdc_offset_cad"``, ``"pressure_gain"``, ``"pressure_offset_bar"``.
     uncertainty : mapping of str to float, optional
-        Standard deviation of what is known of the others, in their units; 0: exactly as the model has it. Left out:
+        Standard deviation of what is known of the parameters that are not adapted, in their units; 0: exactly as the
+        model has it. Left out:
         0.3 °CA of SOC, 5 % of burn duration, 0.01 of gamma, 2 % of fuel heat, 0.3 °CA of TDC, 0.5 % of pressure
         gain, 0.1 bar of pegging. Where the fuel is measured, give ``{"fuel_heat_scale": 0.0}``.
     window_cycles : int
