@@ -35,7 +35,7 @@ constexpr double little_share = 0.1;                    // of the drop at 0.3 pr
 constexpr double repeat_memory = 0.98;
 constexpr std::int64_t fewest_repeats = 60;
 
-constexpr double hold_share = 1.5;     // of the sensor's lag: cycles on one side of the estimate
+constexpr double hold_share = 2.0;     // of the sensor's lag: cycles on one side of the estimate
 constexpr double modest_share = 0.25;  // of the cheapest amplitude, less than the place is uncertain by
 
 constexpr int plain_period = 10;
