@@ -81,7 +81,7 @@ LABEL_COLUMNS = {
 
 # --- calibration while the engine runs ----------------------------------------------------------------------
 def online_calibration() -> Rows:
-    alone = dict.fromkeys(OnlineCalibration("puma_single").parameters, 0.0)
+    alone = {name: 0.0 for name in OnlineCalibration("puma_single").parameters if name != "wall_heat_scale"}
     rows = {}
     for label, sensor, told_late_cad in (
         ("nothing", {}, 0.0),

@@ -14,7 +14,7 @@ import matplotlib as mpl
 from mgdd.studies import run_study
 
 OUT = Path(__file__).parents[1] / "docs" / "_static"
-# Study, number of the figure, resolution: each file stays below 100 kB.
+# Study, number of the figure, resolution: a file stays below 150 kB.
 FIGURES = {
     "study_seekers.png": ("seeker-comparison", 0, 72),
     "study_sensors.png": ("nox-sensors", 1, 72),
