@@ -21,9 +21,9 @@ class CausingInputs {
   }
   /// False until the reading of path i no longer stems from before the first record: delay and twice the lag.
   bool known(std::size_t i) const noexcept { return cycles_ > paths_[i].wait; }
-  /// The input behind the present reading of path i; `applied` is what was recorded last.
+  /// The input behind the present reading of path i; `applied` is what was recorded last, and outlives the answer.
   const Inputs& of(std::size_t i, const Inputs& applied) const noexcept {
-    return paths_[i].direct ? applied : paths_[i].input;
+    return paths_[i].direct ? applied : paths_[i].input;  // NOLINT(bugprone-return-const-ref-from-parameter)
   }
   /// True where path i is neither delayed nor lagged.
   bool direct(std::size_t i) const noexcept { return paths_[i].direct; }

@@ -92,9 +92,9 @@ void require(TellStatus status, const Protocol& protocol, const Reading& reading
 void require_within_space(std::string_view column, const Inputs& values, const SearchSpace& space);
 
 /// What a seeker learns from: the input that the plant applied, kept in `told`, or `asked` itself where the reading
-/// does not say.
+/// does not say; both outlive the answer.
 inline const Inputs& applied_input(const Reading& reading, const Inputs& asked, Inputs& told) noexcept {
-  if (reading.applied.empty()) return asked;
+  if (reading.applied.empty()) return asked;  // NOLINT(bugprone-return-const-ref-from-parameter)
   told = Eigen::Map<const Inputs>(reading.applied.data(), asked.size());
   return told;
 }
