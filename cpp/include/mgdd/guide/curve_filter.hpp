@@ -118,10 +118,10 @@ class CurveFilter {
   Curve curve_;
   double per_lag_;  // share of the way that the lag goes in one cycle
   double fading_;
-  double bend_;                               // of the curve
-  double prior_mean_, prior_extra_ = 0.0;     // precision of the prior beyond that of `prior_sd`; it fades
-  double count_ = 0.0, count_squared_ = 0.0;  // readings that have not faded, and sum of their squares
-  double weight_ = 0.0, y_ = 0.0, yy_ = 0.0;  // weighted: the readings, J and J^2
+  double bend_ = 0.0;                            // of the curve
+  double prior_mean_ = 0.0, prior_extra_ = 0.0;  // precision of the prior beyond that of `prior_sd`; it fades
+  double count_ = 0.0, count_squared_ = 0.0;     // readings that have not faded, and sum of their squares
+  double weight_ = 0.0, y_ = 0.0, yy_ = 0.0;     // weighted: the readings, J and J^2
   double mean_ = 0.0, spread_ = 0.0, variance_ = 0.0, scale_ = 1.0;
   double unexplained_ = 0.0;
   double origin_ = 0.0;   // first reading, taken off before summing
