@@ -149,7 +149,7 @@ TEST(EngineDoubts, LevelNamesTheUnitThatWouldFit) {
 TEST(EngineDoubts, AMassInAnotherUnitIsRefusedByName) {
   const EngineCase c("step_cad=0.5");
   const auto cycle = run(c);
-  const double right = with_mass(c).trapped_mass_g.value();
+  const double right = with_mass(c).trapped_mass_g.value_or(0.0);
   const auto with = [&](double mass) {
     OperatingPoint point = c.point;
     point.trapped_mass_g = mass;

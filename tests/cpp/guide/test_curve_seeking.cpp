@@ -80,7 +80,7 @@ TEST(CurveSeeking, ComesBackAfterAJump) {
     const std::vector<double> path = seek(seeker, 260, [](int k) { return k < 200 ? -9.0 : -3.0; }, 0.25, seed);
     double cycles = 60.0;
     for (int k = 60; k > 0; --k) {
-      if (std::abs(path[static_cast<std::size_t>(200 + k)] + 3.0) > 2.0) break;
+      if (std::abs(path[200 + static_cast<std::size_t>(k)] + 3.0) > 2.0) break;
       cycles = k;
     }
     back.push_back(cycles);

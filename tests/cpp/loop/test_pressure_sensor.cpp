@@ -184,7 +184,7 @@ TEST(PressureSensor, RefusesByName) {
     BenchSettings s;
     change(s);
     try {
-      EngineBench bench(s);
+      const EngineBench bench(s);
     } catch (const ParameterError& e) {
       return e.what();
     }

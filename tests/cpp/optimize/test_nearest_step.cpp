@@ -67,9 +67,10 @@ TEST(NearestStep, NoAllowedStepIsNearer) {
     const Inputs normal = problem.metric.llt().solve(problem.wish - x);
     for (std::uint64_t other = 0; other < 200; ++other) {
       Inputs y(n);
-      for (Eigen::Index i = 0; i < n; ++i)
+      for (Eigen::Index i = 0; i < n; ++i) {
         y[i] = uniform(900000 + trial * 2000 + other * 8 + static_cast<std::uint64_t>(i), problem.lowest[i],
                        problem.highest[i]);
+      }
       if (!problem.allows(y, 0.0)) continue;
       ASSERT_LE(normal.dot(y - x), 1e-5 * (1.0 + normal.norm())) << trial;
     }

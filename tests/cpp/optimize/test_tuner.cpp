@@ -135,9 +135,10 @@ TEST(Tuner, ADelayKnownToTwoCyclesLosesNoRun) {
       w.lag = {static_cast<double>(delay), 0.0};
       const Tuning t = tune(w);
       for (const int error : {-2, 0, 2}) {
-        for (std::uint64_t seed = 0; seed < 20; ++seed)
+        for (std::uint64_t seed = 0; seed < 20; ++seed) {
           EXPECT_LT(lost_by(t, w.lag, delay + error, 0.0, seed), 6.0)
               << to_string(method) << " delay " << delay << " error " << error << " seed " << seed;
+        }
       }
     }
   }
