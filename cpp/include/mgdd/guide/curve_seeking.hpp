@@ -3,9 +3,8 @@
 // place to one side of its mean and then to the other, at least as far as keeping track costs least.
 // Kin: self-tuning extremum control (Wellstead and Zarrop 1991). Readings that the curve cannot explain raise a doubt:
 // what was known is dropped but for the last few readings. A guide that keeps failing hands over to plain extremum
-// seeking. Behind a slow sensor every reading is paired with the input that caused it, and the side is held for two time
-// constants of its lag, which would blot out a faster change. ask and tell are noexcept and
-// allocation-free.
+// seeking. Behind a slow sensor every reading is paired with the input that caused it, and the side is held for two
+// time constants of its lag, which would blot out a faster change. ask and tell are noexcept and allocation-free.
 #pragma once
 
 #include <cstdint>
