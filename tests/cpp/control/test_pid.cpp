@@ -145,9 +145,22 @@ TEST(Pid, AntiWindupTheIntegralStopsWhileABoundHoldsTheDutyAndLeavesAtOnce) {
   EXPECT_LT(pid.step(60.0, 61.0), 0.4);  // no time to unwind
   // Driven below by a jammed plate, the other bound.
   pid.reset();
+  EXPECT_EQ(pid.duty(), 0.0);
   for (int k = 0; k < 3000; ++k)
     EXPECT_GE(pid.step(2.0, 60.0), -0.7);
   EXPECT_GT(pid.step(2.0, 1.0), -0.7);
+}
+
+TEST(Pid, AntiWindupHoldsForSmallErrorsToo) {
+  PidSettings s = bare({1.0, 0.5, 0.0});
+  s.upper = 0.4;
+  s.lower = -0.3;
+  for (const double error : {0.5, -0.5}) {
+    Pid pid(s);
+    for (int k = 0; k < 100; ++k)
+      (void)pid.step(20.0 + error, 20.0);
+    EXPECT_EQ(pid.integral(), 0.0);
+  }
 }
 
 TEST(Pid, TheIntegralKeepsToItsWindowAndItsLimit) {
@@ -224,9 +237,10 @@ void goes_on_bit_for_bit() {
   for (int k = 0; k < 333; ++k)
     (void)first.step(T(reference_of(k)), T(measurement_of(k)));
   restore_state(second, save_state(first));
-  for (int k = 333; k < 900; ++k)
+  for (int k = 333; k < 900; ++k) {
     EXPECT_EQ(first.step(T(reference_of(k)), T(measurement_of(k))),
               second.step(T(reference_of(k)), T(measurement_of(k))));
+  }
 }
 
 TEST(Pid, GoesOnBitForBitAfterARestore) {

@@ -101,6 +101,24 @@ TEST(SlidingMode, SuperTwistingReachesTheSurfaceInFiniteTimeAndStaysThereUnderAD
   EXPECT_GT(run(s, swell, 400, 2000).surface, 4.5 * one_sample);
 }
 
+TEST(SlidingMode, TheRootOfSuperTwistingIsTakenAtTheEndOfTheSample) {
+  SlidingModeSettings s = frictionless(ReachingLaw::super_twisting);
+  s.bandwidth_per_s = 1e-12;  // s is the speed
+  s.root_per_root_deg_per_s = 0.02;
+  s.twist_per_s = 0.0;
+  for (const double speed : {0.3, 2.0, -7.0}) {
+    SlidingMode controller(s);
+    (void)controller.step(0.0, 0.0);
+    const double duty = controller.step(0.0, 1e-3 * speed);
+    const double end = speed + 1e-3 * gain * duty;
+    EXPECT_GT(end * speed, 0.0);
+    EXPECT_NEAR(end + std::copysign(1e-3 * gain * 0.02 * std::sqrt(std::abs(end)), end), speed, 1e-9);
+    EXPECT_EQ(save_state(controller).at("twist")[0], 0.0);
+    controller.reset();
+    EXPECT_EQ(controller.duty(), 0.0);
+  }
+}
+
 TEST(SlidingMode, SuperTwistingLeavesNoErrorUnderAConstantDisturbanceAndABoundaryLayerDoes) {
   const auto constant = [](int) { return 0.1; };
   SlidingModeSettings s = frictionless(ReachingLaw::super_twisting);
@@ -142,7 +160,7 @@ TEST(SlidingMode, OnTheSurfaceTheErrorDecaysWithTheBandwidth) {
 }
 
 TEST(SlidingMode, TheModelHoldsThePlateAgainstItsSpring) {
-  SlidingModeSettings s = lively(ReachingLaw::implicit);
+  const SlidingModeSettings s = lively(ReachingLaw::implicit);
   SlidingMode controller(s);
   EXPECT_NEAR(controller.step(31.0, 31.0), 0.13 + 6e-4 * 20.0, 1e-15);
   controller.reset();

@@ -234,9 +234,10 @@ TEST(ThrottleControl, TheDefaultsAreTheTunedSetOfP1) {
     EXPECT_NEAR(field.in(PidSettings{}), field.in(tuned), 2e-3 * std::abs(field.in(tuned))) << field.info.name;
   const SlidingModeSettings sliding =
       sliding_mode_of(g, {0.793, 0.0604, 3.03, 136.0, 170.0, 0.82, 3.0}, ReachingLaw::implicit);
-  for (const auto& field : control::sliding_mode_fields())
+  for (const auto& field : control::sliding_mode_fields()) {
     EXPECT_NEAR(field.in(SlidingModeSettings{}), field.in(sliding), 2e-3 * std::abs(field.in(sliding)))
         << field.info.name;
+  }
 }
 
 }  // namespace
