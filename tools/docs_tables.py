@@ -11,6 +11,7 @@ from functools import cache
 from typing import Any
 
 import numpy as np
+from tables_of_control import throttle_baselines
 from tables_of_guidance import ignition_plane, ignition_slopes, model_stages
 from tables_of_measured_traces import burn_laws, demo, fits, members, profile, timing, traces
 from tables_of_model import (
@@ -65,6 +66,7 @@ __all__ = [
     "sensor_fits",
     "sensors",
     "tdc",
+    "throttle_baselines",
     "timing",
     "timing_table",
     "traces",

@@ -29,7 +29,7 @@ TABLE = re.compile(r"<!-- (?:checked|numbers): (\w+) -->\n+((?:\|.*\n)+)")
 NUMBER = re.compile(r"[-−]?\d+(?:\.\d+)?(?:e[-+]?\d+)?")
 MARKED = re.compile(r"<!-- number: (\w+) -->\s*\W*?(" + NUMBER.pattern + ")")
 CITATION = re.compile(
-    r"\b([A-Z][\w-]+)(?: et al\.|(?:, [A-Z][\w-]+)*,? and (?:[A-Z][\w-]+ )*[A-Z][\w-]+)?,? \(?((?:18|19|20)\d\d)\b"
+    r"\b([A-ZÅ][\w-]+)(?: et al\.|(?:, [A-Z][\w-]+)*,? and (?:[A-Z][\w-]+ )*[A-Z][\w-]+)?,? \(?((?:18|19|20)\d\d)\b"
 )
 # Names before a year that are not authors.
 NO_AUTHORS = {"CODATA", "Atmosphere", "Paper"}
@@ -145,7 +145,7 @@ def test_public_docstring_is_complete(room: str, name: str, item: object) -> Non
 def bibliography() -> dict[str, tuple[str, str]]:
     """Read references.bib: first author's family name and year, by key."""
     text = (ROOT / "references.bib").read_text(encoding="utf-8")
-    for tex, letter in (('{\\"u}', "ü"), ('{\\"o}', "ö"), ("{\\'e}", "é")):
+    for tex, letter in (('{\\"u}', "ü"), ('{\\"o}', "ö"), ("{\\'e}", "é"), ("{\\AA}", "Å")):
         text = text.replace(tex, letter)
     entries = {}
     for key, body in re.findall(r"^@\w+\{(\w+),(.*?)^\}", text, re.MULTILINE | re.DOTALL):

@@ -3,13 +3,14 @@ The C++ core of mgdd, a submodule per room. Use it through mgdd.engine, mgdd.thr
 """
 from __future__ import annotations
 from . import optimize
+from . import control
 from . import engine
 from . import throttle
 from . import identify
 from . import guide
 from . import systems
 from . import loop
-__all__: list[str] = ['compiled_simd_level', 'compiler', 'engine', 'guide', 'identify', 'loop', 'optimize', 'processor_simd_levels', 'systems', 'throttle']
+__all__: list[str] = ['compiled_simd_level', 'compiler', 'control', 'engine', 'guide', 'identify', 'loop', 'optimize', 'processor_simd_levels', 'systems', 'throttle']
 def compiled_simd_level() -> str:
     """
     Instruction set of this build.

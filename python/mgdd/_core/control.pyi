@@ -1,0 +1,241 @@
+"""
+Controllers of a throttle plate.
+"""
+from __future__ import annotations
+import collections.abc
+import typing
+__all__: list[str] = ['Pid', 'SlidingMode']
+class Pid:
+    """
+    PID controller of a throttle plate, one sample at a time.
+    
+    Gains per side of limp-home, filtered derivative of the measurement, conditional integration, spring and friction
+    feed-forward, a friction kick and a dead band. Keyword-only; the defaults fit the throttle ``P1``, tuned with its noise
+    of 0.03 deg and a delay of one sample. ``Pid.fields()`` lists bounds and defaults.
+    
+    Parameters
+    ----------
+    sample_s : float
+        Time between samples [s].
+    proportional_above_per_deg, proportional_below_per_deg : float
+        Duty per error above and below limp-home [1/deg]; all gains are blended over `ramp_deg` by the measured angle.
+    integral_above_per_deg_s, integral_below_per_deg_s : float
+        Integral gains [1/(deg s)].
+    derivative_above_s_per_deg, derivative_below_s_per_deg : float
+        Duty against the measured speed [s/deg].
+    derivative_lag_s : float
+        Lag of that speed [s].
+    limp_home_deg, ramp_deg : float
+        Rest angle of the springs, and half width over which preload and gains change sides [deg].
+    preload_above, preload_below : float
+        Duty against the preload, fed forward at the reference [-].
+    spring_above_per_deg, spring_below_per_deg : float
+        Duty against the springs [1/deg].
+    kick, kick_width_deg : float
+        Duty towards the reference against stiction [-], and the error at which it is full [deg].
+    dead_band_deg : float
+        Smaller errors count as zero [deg].
+    integral_window_deg, integral_limit : float
+        Only smaller errors are integrated [deg]; bound of the integral [-].
+    rate_s_per_deg : float
+        Duty fed forward per rate of the reference [s/deg].
+    friction, friction_rate_deg_per_s : float
+        Duty in the direction of that rate [-], and the rate at which it is full [deg/s].
+    reference_lag_s, reference_jump_deg_per_s : float
+        Lag of that rate [s]; a faster reference steps and has no rate [deg/s].
+    lower, upper : float
+        Bounds of the duty [-].
+    
+    Raises
+    ------
+    mgdd.errors.ParameterError
+        A setting outside its domain, naming field, value and bound.
+    
+    See Also
+    --------
+    SlidingMode : the other classic baseline.
+    mgdd.loop.VirtualThrottle : a plant to run it on.
+    
+    References
+    ----------
+    Åström and Hägglund (2006), Advanced PID Control.
+    Armstrong-Helouvry et al. (1994), A survey of models, analysis tools and compensation methods for the control of
+    machines with friction.
+    
+    Examples
+    --------
+    >>> from mgdd.control import Pid
+    >>> from mgdd.loop import VirtualThrottle
+    >>> plant, pid, measured_deg = VirtualThrottle(seed=1), Pid(), 8.0
+    >>> for _ in range(300):
+    ...     plant.apply({"duty": pid.step(40.0, measured_deg)})
+    ...     values = plant.measure().values
+    ...     measured_deg = values["sensed_angle_deg"]
+    >>> abs(values["angle_deg"] - 40.0) < 0.3
+    True
+    """
+    @staticmethod
+    def fields() -> dict:
+        """
+        Every setting by name: unit, bounds or choices, meaning, default.
+        """
+    def __getstate__(self) -> tuple[int, dict, dict[str, list[float]]]:
+        ...
+    def __init__(self, *, sample_s: typing.SupportsFloat | typing.SupportsIndex = 0.001, proportional_above_per_deg: typing.SupportsFloat | typing.SupportsIndex = 0.12778, integral_above_per_deg_s: typing.SupportsFloat | typing.SupportsIndex = 1.3, derivative_above_s_per_deg: typing.SupportsFloat | typing.SupportsIndex = 0.0014667, proportional_below_per_deg: typing.SupportsFloat | typing.SupportsIndex = 0.12778, integral_below_per_deg_s: typing.SupportsFloat | typing.SupportsIndex = 1.3, derivative_below_s_per_deg: typing.SupportsFloat | typing.SupportsIndex = 0.0014667, derivative_lag_s: typing.SupportsFloat | typing.SupportsIndex = 0.003, limp_home_deg: typing.SupportsFloat | typing.SupportsIndex = 8.0, ramp_deg: typing.SupportsFloat | typing.SupportsIndex = 0.5, preload_above: typing.SupportsFloat | typing.SupportsIndex = 0.1292, spring_above_per_deg: typing.SupportsFloat | typing.SupportsIndex = 0.000496, preload_below: typing.SupportsFloat | typing.SupportsIndex = 0.1292, spring_below_per_deg: typing.SupportsFloat | typing.SupportsIndex = 0.000496, kick: typing.SupportsFloat | typing.SupportsIndex = 0.1205, kick_width_deg: typing.SupportsFloat | typing.SupportsIndex = 0.019, dead_band_deg: typing.SupportsFloat | typing.SupportsIndex = 0.1, integral_window_deg: typing.SupportsFloat | typing.SupportsIndex = 2.0, integral_limit: typing.SupportsFloat | typing.SupportsIndex = 0.3, rate_s_per_deg: typing.SupportsFloat | typing.SupportsIndex = 0.000346, friction: typing.SupportsFloat | typing.SupportsIndex = 0.0603, friction_rate_deg_per_s: typing.SupportsFloat | typing.SupportsIndex = 17.2, reference_lag_s: typing.SupportsFloat | typing.SupportsIndex = 0.0045, reference_jump_deg_per_s: typing.SupportsFloat | typing.SupportsIndex = 400.0, lower: typing.SupportsFloat | typing.SupportsIndex = -1.0, upper: typing.SupportsFloat | typing.SupportsIndex = 1.0) -> None:
+        ...
+    def __repr__(self) -> str:
+        ...
+    def __setstate__(self, arg0: tuple) -> None:
+        ...
+    def reset(self) -> None:
+        """
+        As made: no integral, no rates.
+        """
+    def step(self, reference_deg: typing.SupportsFloat | typing.SupportsIndex, measurement_deg: typing.SupportsFloat | typing.SupportsIndex) -> float:
+        """
+        Duty [-] of this sample for a reference and a measured angle [deg].
+        
+        NaN repeats the last value; before the first ones the duty is 0.
+        """
+    def take_over(self, reference_deg: typing.SupportsFloat | typing.SupportsIndex, measurement_deg: typing.SupportsFloat | typing.SupportsIndex, duty: typing.SupportsFloat | typing.SupportsIndex) -> None:
+        """
+        Start at rest from a duty without a bump, as far as the limit of the integral allows.
+        
+        Ignored if a number is not finite.
+        """
+    @property
+    def duty(self) -> float:
+        """
+        Duty of the last sample [-].
+        """
+    @property
+    def integral(self) -> float:
+        """
+        Share of the integral in the duty [-].
+        """
+    @property
+    def settings(self) -> dict:
+        """
+        All settings as a new dict: keywords that make the controller again.
+        """
+    @property
+    def state(self) -> dict[str, list[float]]:
+        """
+        What a run needs to go on bit for bit; a state that the settings do not allow is refused and changes nothing.
+        """
+    @state.setter
+    def state(self, arg1: collections.abc.Mapping[str, collections.abc.Sequence[typing.SupportsFloat | typing.SupportsIndex]]) -> None:
+        ...
+class SlidingMode:
+    """
+    Sliding-mode controller of a throttle plate, one sample at a time.
+    
+    With the angle y, the filtered reference r and e = y - r, the surface is ``s = de/dt + bandwidth_per_s (e +
+    integral_per_s * integral of e)``. A model of the plate gives the duty that stays on it, `reaching` the duty that gets
+    there. Keyword-only; the defaults fit the throttle ``P1``. ``SlidingMode.fields()`` lists bounds and defaults.
+    
+    Parameters
+    ----------
+    sample_s : float
+        Time between samples [s].
+    gain_deg_per_s2, time_constant_s : float
+        Acceleration per duty [deg/s²] and time constant of the speed [s]; G and tau of `mgdd.throttle.PseudoWiener`.
+    limp_home_deg, ramp_deg : float
+        Rest angle of the springs, and half width over which the preload changes sides [deg].
+    preload_above, preload_below : float
+        Duty against the preload, at the measured angle [-].
+    spring_above_per_deg, spring_below_per_deg : float
+        Duty against the springs [1/deg].
+    friction, friction_rate_deg_per_s : float
+        Duty in the direction of the reference's rate [-], and the rate at which it is full [deg/s].
+    bandwidth_per_s : float
+        Decay of the error on the surface [1/s].
+    integral_per_s, integral_layers : float
+        Weight of the integral [1/s]; it grows only while ``|s|`` is below so many layers [-].
+    reference_pole_per_s : float
+        Double pole of the filter of the reference [1/s].
+    derivative_lag_s : float
+        Lag of the measured speed [s].
+    switching, layer_deg : float
+        Duty of the reaching law [-], and the error at which it is full [deg].
+    root_per_root_deg_per_s, twist_per_s : float
+        Super-twisting: duty per root of ``|s|`` [sqrt(s/deg)], and rate of its integral [1/s].
+    lower, upper : float
+        Bounds of the duty [-].
+    reaching : {"implicit", "boundary_layer", "super_twisting"}
+        ``boundary_layer``: ``-switching sat(s/layer)``. ``implicit``: its backward Euler step, which cannot chatter on
+        the model however thin the layer. ``super_twisting``: ``-root sqrt|s| sgn s`` and an integral of ``-twist sgn s``.
+    
+    Raises
+    ------
+    mgdd.errors.ParameterError
+        A setting outside its domain, naming field, value and bound.
+    
+    See Also
+    --------
+    Pid : the other classic baseline.
+    
+    References
+    ----------
+    Slotine and Li (1991), Applied Nonlinear Control, chapter 7.
+    Acary and Brogliato (2010), Implicit Euler numerical scheme and chattering-free implementation of sliding mode systems.
+    Levant (1993), Sliding order and sliding accuracy in sliding mode control.
+    
+    Examples
+    --------
+    >>> from mgdd.control import SlidingMode
+    >>> from mgdd.loop import VirtualThrottle
+    >>> plant, controller, measured_deg = VirtualThrottle(seed=1), SlidingMode(), 8.0
+    >>> for _ in range(300):
+    ...     plant.apply({"duty": controller.step(40.0, measured_deg)})
+    ...     values = plant.measure().values
+    ...     measured_deg = values["sensed_angle_deg"]
+    >>> abs(values["angle_deg"] - 40.0) < 0.3
+    True
+    """
+    @staticmethod
+    def fields() -> dict:
+        """
+        Every setting by name: unit, bounds or choices, meaning, default.
+        """
+    def __getstate__(self) -> tuple[int, dict, dict[str, list[float]]]:
+        ...
+    def __init__(self, *, sample_s: typing.SupportsFloat | typing.SupportsIndex = 0.001, gain_deg_per_s2: typing.SupportsFloat | typing.SupportsIndex = 83597.0, time_constant_s: typing.SupportsFloat | typing.SupportsIndex = 0.0197, limp_home_deg: typing.SupportsFloat | typing.SupportsIndex = 8.0, ramp_deg: typing.SupportsFloat | typing.SupportsIndex = 0.5, preload_above: typing.SupportsFloat | typing.SupportsIndex = 0.1292, spring_above_per_deg: typing.SupportsFloat | typing.SupportsIndex = 0.000496, preload_below: typing.SupportsFloat | typing.SupportsIndex = 0.1292, spring_below_per_deg: typing.SupportsFloat | typing.SupportsIndex = 0.000496, friction: typing.SupportsFloat | typing.SupportsIndex = 0.076, friction_rate_deg_per_s: typing.SupportsFloat | typing.SupportsIndex = 17.2, bandwidth_per_s: typing.SupportsFloat | typing.SupportsIndex = 136.0, integral_per_s: typing.SupportsFloat | typing.SupportsIndex = 3.03, integral_layers: typing.SupportsFloat | typing.SupportsIndex = 3.0, reference_pole_per_s: typing.SupportsFloat | typing.SupportsIndex = 170.0, derivative_lag_s: typing.SupportsFloat | typing.SupportsIndex = 0.003, switching: typing.SupportsFloat | typing.SupportsIndex = 0.793, layer_deg: typing.SupportsFloat | typing.SupportsIndex = 3.46, root_per_root_deg_per_s: typing.SupportsFloat | typing.SupportsIndex = 0.015, twist_per_s: typing.SupportsFloat | typing.SupportsIndex = 2.0, lower: typing.SupportsFloat | typing.SupportsIndex = -1.0, upper: typing.SupportsFloat | typing.SupportsIndex = 1.0, reaching: str = 'implicit') -> None:
+        ...
+    def __repr__(self) -> str:
+        ...
+    def __setstate__(self, arg0: tuple) -> None:
+        ...
+    def reset(self) -> None:
+        """
+        As made: no integral, no rates.
+        """
+    def step(self, reference_deg: typing.SupportsFloat | typing.SupportsIndex, measurement_deg: typing.SupportsFloat | typing.SupportsIndex) -> float:
+        """
+        Duty [-] of this sample for a reference and a measured angle [deg].
+        
+        NaN repeats the last value; before the first ones the duty is 0.
+        """
+    @property
+    def duty(self) -> float:
+        """
+        Duty of the last sample [-].
+        """
+    @property
+    def settings(self) -> dict:
+        """
+        All settings as a new dict: keywords that make the controller again.
+        """
+    @property
+    def state(self) -> dict[str, list[float]]:
+        """
+        What a run needs to go on bit for bit; a state that the settings do not allow is refused and changes nothing.
+        """
+    @state.setter
+    def state(self, arg1: collections.abc.Mapping[str, collections.abc.Sequence[typing.SupportsFloat | typing.SupportsIndex]]) -> None:
+        ...
+    @property
+    def surface_deg_per_s(self) -> float:
+        """
+        s of the last sample [deg/s].
+        """
