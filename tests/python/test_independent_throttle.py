@@ -6,12 +6,15 @@ import ast
 import math
 from dataclasses import replace
 from pathlib import Path
+from types import ModuleType
 
 import numpy as np
 import pytest
 
 import independent_throttle
-from independent_throttle import FAMILIES, Bench, Body, draw_body, forty_bodies, make_logs
+import throttle_bodies
+from independent_throttle import FAMILIES, Bench, Body
+from throttle_bodies import draw_body, forty_bodies, make_logs
 
 BODY = Body()
 KINDS = {
@@ -26,11 +29,12 @@ def run(bench: Bench, duty: list[float]) -> np.ndarray:
     return np.array([bench.sample(u) for u in duty])
 
 
-def test_it_shares_no_code_with_the_package() -> None:
-    tree = ast.parse(Path(independent_throttle.__file__).read_text(encoding="utf-8"))
-    modules = {alias.name for node in ast.walk(tree) if isinstance(node, ast.Import) for alias in node.names}
-    modules |= {str(node.module) for node in ast.walk(tree) if isinstance(node, ast.ImportFrom)}
-    assert modules == {"__future__", "dataclasses", "math", "numpy"}
+@pytest.mark.parametrize("module", [independent_throttle, throttle_bodies])
+def test_it_shares_no_code_with_the_package(module: ModuleType) -> None:
+    tree = ast.parse(Path(str(module.__file__)).read_text(encoding="utf-8"))
+    names = {alias.name for node in ast.walk(tree) if isinstance(node, ast.Import) for alias in node.names}
+    names |= {str(node.module) for node in ast.walk(tree) if isinstance(node, ast.ImportFrom)}
+    assert names <= {"__future__", "dataclasses", "independent_throttle", "math", "numpy"}
 
 
 @pytest.mark.parametrize("family", FAMILIES)
