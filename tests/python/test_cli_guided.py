@@ -152,7 +152,10 @@ def test_a_seeker_of_any_kind_begins_there(
         ("--guide map", "--guide map needs --guide-map FILE"),
         ("--guide map --guide-map x.txt", "--guide-map x.txt: the ending must be one of .csv, .toml"),
         ("--guide map --guide-map x.csv --guide-map-out y.txt", "--guide-map-out y.txt: the ending must be one of"),
-        ("--guide map --guide-map x.csv --guide-map-out no/y.csv", "--guide-map-out no/y.csv: there is no folder no"),
+        (
+            "--guide map --guide-map x.csv --guide-map-out no/y.csv",
+            "no/y.csv: the folder no does not exist; make it",
+        ),
         ("--guide map --guide-map none.csv", "none.csv"),
         ("--guide-map-out y.csv", "--guide-map-out does not act here; --guide none has no model"),
         ("--guide curve --guide-map-out y.csv", "--guide-map-out does not act here; --guide curve has a model"),

@@ -222,7 +222,7 @@ def test_figure(capsys: pytest.CaptureFixture[str], tmp_path: Path) -> None:
     seek(capsys, "--figure", str(file), "--limit", "p_max_bar=95", "--misfire", "0.01", "--cycles", "300")
     assert file.read_bytes().startswith(b"\x89PNG")
     assert "--figure run.bmp" in refused(capsys, "--figure", "run.bmp")
-    assert "no folder" in refused(capsys, "--figure", "nowhere/run.png")
+    assert "does not exist; make it" in refused(capsys, "--figure", "nowhere/run.png")
 
 
 @pytest.mark.parametrize(

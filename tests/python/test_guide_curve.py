@@ -97,6 +97,14 @@ def test_it_arrives_goes_on_from_a_file_and_from_a_pickle(tmp_path: Path) -> Non
         ExtremumSeeking.load(tmp_path / "seeker.json")
 
 
+def test_a_state_that_would_scale_j_by_nothing_is_refused() -> None:
+    seeker = seeking()
+    before = seeker.state
+    with pytest.raises(ParameterError, match="taken_over_scale"):
+        seeker.state = {**before, "taken_over_scale": [0.0]}
+    assert seeker.state == before
+
+
 def test_a_new_curve_keeps_the_error_of_the_old_one() -> None:
     seeker = seeking()
     seek(seeker, 150)

@@ -54,7 +54,9 @@ def test_a_written_map_comes_back_and_learns_alike(tmp_path: Path) -> None:
 def test_a_map_of_one_axis_comes_back(tmp_path: Path) -> None:
     timing = TimingMap({"fuel_mg": [6.0, 20.0, 40.0]}, [-1.0, -5.0, -9.5], prior_sd_cad=1.25)
     timing.write_csv(tmp_path / "map.csv")
-    same(TimingMap.read_csv(tmp_path / "map.csv"), timing)
+    back = TimingMap.read_csv(tmp_path / "map.csv")
+    same(back, timing)
+    assert back((13.0,)) == -3.0  # half way between two breakpoints
 
 
 def test_the_file_is_plain_and_says_units_and_origin(tmp_path: Path) -> None:

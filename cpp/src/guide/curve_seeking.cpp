@@ -229,7 +229,7 @@ void CurveSeeking::judge_surprise(double input, double j) noexcept {
       surprise_share_of(settings_.sensor) * (std::min(off * off / expected.variance, surprise_cap) - surprise_);
 }
 
-// Two readings of one side, two cycles apart and close together, differ by noise alone: half their squared difference.
+// Two readings of one side in a row that lie close together differ by noise alone: half their squared difference.
 void CurveSeeking::watch_repeats(double input, double j) noexcept {
   const auto side = static_cast<std::size_t>(upwards_);
   if (repeat_known_[side] > 0.0 && std::abs(input - repeat_input_[side]) < 0.25 * amplitude()) {

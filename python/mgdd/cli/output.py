@@ -53,8 +53,9 @@ def check_file(option: str, file: str | None, endings: tuple[str, ...]) -> None:
         return
     if Path(file).suffix not in endings:
         raise ParameterError(f"{option} {file}: the ending must be one of {', '.join(endings)}")
-    if not Path(file).resolve().parent.is_dir():
-        raise ParameterError(f"{option} {file}: there is no folder {Path(file).parent}")
+    folder = Path(file).parent
+    if not folder.resolve().is_dir():
+        raise ParameterError(f"{option} {file}: the folder {folder} does not exist; make it, or name another file")
 
 
 def save_figure(figure: Figure, file: str) -> None:

@@ -205,7 +205,7 @@ def _check_bounds(args: argparse.Namespace, bench: EngineBench) -> None:
 def _bench(args: argparse.Namespace, limits: Mapping[str, float]) -> tuple[EngineBench, str]:
     cylinder, point, preset = engine_of(args)
     if not point.fuel_mg > 0.0:
-        raise ParameterError("fuel_mg = 0: nothing burns, so there is no timing to seek; leave --motored out")
+        raise ParameterError("fuel_mg = 0: nothing burns, so a best timing does not exist; leave --motored out")
     nox = args.sensor != "none"
     with _option_names():
         bench = EngineBench(

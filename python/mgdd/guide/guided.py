@@ -17,7 +17,7 @@ if TYPE_CHECKING:
     from numpy.typing import NDArray
 
     class _CoreGuided:
-        """What both have of their class of the core."""
+        """What both have of their class of the core, and what each brings itself."""
 
         @property
         def estimate(self) -> NDArray[np.float64]: ...
@@ -35,6 +35,9 @@ if TYPE_CHECKING:
             misfire: bool = False,
             applied: Any = None,
         ) -> None: ...
+        def _standing(self) -> Mapping[str, Any]: ...  # what stands before the next cycle, by column
+        def _arguments(self) -> tuple[tuple[Any, ...], dict[str, Any]]: ...  # of __init__, beside the options
+
 else:
     _CoreGuided = object
 
@@ -67,14 +70,6 @@ class Guided(_CoreGuided):
     _options: dict[str, Any]
     _rows: list[tuple[Any, ...]]
     state: Any
-
-    def _standing(self) -> Mapping[str, Any]:
-        """Give what stands before the next cycle, by column."""
-        raise NotImplementedError
-
-    def _arguments(self) -> tuple[tuple[Any, ...], dict[str, Any]]:
-        """Give the arguments of ``__init__`` beside the options, by place and by name."""
-        raise NotImplementedError
 
     def tell(
         self,

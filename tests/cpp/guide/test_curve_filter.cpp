@@ -158,20 +158,21 @@ TEST(CurveFilter, OneInputAloneSaysNothingOfThePlace) {
 }
 
 TEST(CurveFilter, APriorThatIsWrongFades) {
-  CurveFilter filter(settings_on(-30.0, 10.0), skewed_curve(-2.0));
-  const double place = -14.0;
-  filter.restart(skewed_curve(-2.0), -9.0, 1.5);
-  const auto read = [&](int from, int to) {
-    for (int k = from; k < to; ++k) {
+  const double place = -14.0, expected = -9.0;
+  const int seeds = 40;
+  double early = 0.0, late = 0.0;
+  for (std::uint64_t seed = 0; seed < seeds; ++seed) {
+    CurveFilter filter(settings_on(-30.0, 10.0), skewed_curve(-2.0));
+    filter.restart(skewed_curve(-2.0), expected, 1.5);
+    for (std::uint64_t k = 0; k < 700; ++k) {
       const double x = place + (k % 2 == 0 ? 1.0 : -1.0);
-      filter.learn(x, skewed(x - place) + 0.02 * random::normal(6, 1, static_cast<std::uint64_t>(k)));
+      filter.learn(x, skewed(x - place) + 0.25 * random::normal(seed, 6, k));
+      if (k == 19) early += (filter.mean() - place) / seeds;
     }
-  };
-  read(0, 20);
-  const double early = filter.mean();
-  read(20, 700);
-  EXPECT_GT(early, place + 0.5) << "the prior is believed at first";
-  EXPECT_NEAR(filter.mean(), place, 0.1);
+    late += (filter.mean() - place) / seeds;
+  }
+  EXPECT_GT(early, 3.0) << "the prior is believed at first";
+  EXPECT_NEAR(late, 0.0, 0.8) << "a prior that stays holds the end 2.9 away";
 }
 
 TEST(CurveFilter, OldReadingsFade) {

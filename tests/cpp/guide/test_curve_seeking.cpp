@@ -84,7 +84,7 @@ TEST(CurveSeeking, ComesBackAfterAJump) {
       cycles = k;
     }
     back.push_back(cycles);
-    EXPECT_FALSE(seeker.handed_over()) << "a jump is no fault of the guide, seed " << seed;
+    EXPECT_FALSE(seeker.handed_over()) << "the guide is not to blame for a jump, seed " << seed;
   }
   std::nth_element(back.begin(), back.begin() + 20, back.end());
   EXPECT_LE(back[20], 8.0);

@@ -11,6 +11,7 @@
 #include <limits>
 #include <vector>
 
+#include "mgdd/common/bounds.hpp"
 #include "mgdd/common/state.hpp"
 #include "mgdd/guide/curve.hpp"
 #include "mgdd/guide/curve_filter.hpp"
@@ -84,6 +85,7 @@ class CurveSeeking {
   void require_usable() const {
     optimize::require_within_space("estimate", estimate_, settings_.space);
     optimize::require_within_space("applied", applied_, settings_.space);
+    require_in(above(0.0, 1e12), "taken_over_scale", taken_over_scale_);
   }
 
   template <class Self, class V>
