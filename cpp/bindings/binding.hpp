@@ -117,6 +117,7 @@ void bind_seekers(py::module_& m);
 void bind_direct_seekers(py::module_& m);
 void bind_learning(py::module_& m);
 void bind_controllers(py::module_& m);
+void bind_guided_predictive(py::module_& m);
 void bind_cylinder(py::module_& m);
 void bind_emissions(py::module_& m);
 void bind_cycle(py::module_& m);
@@ -139,5 +140,6 @@ void bind_guided_engine(py::module_& m);
 void bind_engine_bench(py::module_& m);
 void bind_loop(py::module_& m);
 void bind_virtual_throttle(py::module_& m);
+void bind_throttle_loop(py::module_& m);
 
 }  // namespace mgdd::bindings

@@ -26,7 +26,7 @@ PYBIND11_MODULE(_core, m) {
       {"optimize",
        "Fits, seekers and learners.",
        {&bind_least_squares, &bind_limits, &bind_seekers, &bind_direct_seekers, &bind_learning}},
-      {"control", "Controllers of a throttle plate.", {&bind_controllers}},
+      {"control", "Controllers of a throttle plate.", {&bind_controllers, &bind_guided_predictive}},
       {"engine",
        "Cycle model of one cylinder, emissions, performance, measured pressure.",
        {&bind_cylinder, &bind_emissions, &bind_cycle, &bind_performance, &bind_pressure}},
@@ -41,7 +41,9 @@ PYBIND11_MODULE(_core, m) {
        {&bind_curve, &bind_feed_forward, &bind_model_optimum, &bind_timing_map, &bind_online_calibration,
         &bind_guided_engine}},
       {"systems", "Models of measured benchmarks.", {&bind_benchmark_models}},
-      {"loop", "Virtual benches and the loops over them.", {&bind_engine_bench, &bind_loop, &bind_virtual_throttle}},
+      {"loop",
+       "Virtual benches and the loops over them.",
+       {&bind_engine_bench, &bind_loop, &bind_virtual_throttle, &bind_throttle_loop}},
   };
   for (const Room& room : rooms) {
     auto submodule = m.def_submodule(room.name, room.doc);

@@ -12,6 +12,21 @@
 
 namespace mgdd::bindings {
 
+/// A whole number, a list of them or a switch among the settings of a controller.
+template <class Place>
+struct Explained : Plain<Place> {
+  py::dict described(const typename Row<Place>::Record& standard) const {
+    py::dict record;
+    record["meaning"] = this->doc;
+    record["default"] = this->get(standard);
+    return record;
+  }
+};
+template <class Place>
+Explained<Place> explained(const char* name, Place place, const char* meaning) {
+  return {{{name, place, meaning}}};
+}
+
 template <class Controller, class Settings, class Fields, class... Rows, std::size_t... I>
 void bind_controller(py::class_<Controller>& cls, const char* name, const Settings& standard, const Fields& fields,
                      const std::tuple<Rows...>& rows, std::index_sequence<I...>) {
@@ -48,7 +63,8 @@ void bind_controller(py::class_<Controller>& cls, const char* name, const Settin
       "settings", [to_dict](const Controller& self) { return to_dict(self.settings()); },
       "All settings as a new dict: keywords that make the controller again.");
   cls.def(
-      "step", &Controller::step, py::arg("reference_deg"), py::arg("measurement_deg"),
+      "step", [](Controller& self, double reference, double measured) { return self.step(reference, measured); },
+      py::arg("reference_deg"), py::arg("measurement_deg"),
       "Duty [-] of this sample for a reference and a measured angle [deg].\n\nNaN repeats the last value; before the "
       "first ones the duty is 0.");
   cls.def_property_readonly("duty", &Controller::duty, "Duty of the last sample [-].");

@@ -25,11 +25,6 @@ py::dict parameters_of(const PseudoWiener& model) {
 
 namespace {
 
-struct BoundModel {
-  PseudoWiener parameters;
-  bool operator==(const BoundModel&) const = default;
-};
-
 std::vector<double> run_free(const BoundModel& self, const std::vector<double>& duty, double start_deg) {
   std::vector<double> angle(duty.size());
   std::visit(

@@ -8,4 +8,10 @@ namespace mgdd::bindings {
 
 py::dict parameters_of(const throttle::PseudoWiener& model);
 
+/// What `mgdd._core.throttle.PseudoWienerModel` holds.
+struct BoundModel {
+  throttle::PseudoWiener parameters;
+  bool operator==(const BoundModel&) const = default;
+};
+
 }  // namespace mgdd::bindings

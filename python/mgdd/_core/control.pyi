@@ -3,8 +3,10 @@ Controllers of a throttle plate.
 """
 from __future__ import annotations
 import collections.abc
+import numpy
+import numpy.typing
 import typing
-__all__: list[str] = ['Pid', 'SlidingMode']
+__all__: list[str] = ['GuidedPredictive', 'Pid', 'SlidingMode']
 class Pid:
     """
     PID controller of a throttle plate, one sample at a time.
@@ -239,3 +241,174 @@ class SlidingMode:
         """
         s of the last sample [deg/s].
         """
+class GuidedPredictive:
+    """
+    Model-guided predictive controller of a throttle plate, one sample at a time.
+    
+    A rough model predicts a short horizon; one Gauss-Newton step per sample moves the last duties along its exact slopes;
+    what is measured corrects the model while it runs. The default learns dry friction as two levels per side of limp-home
+    gain and damping, asks the model for the duty at which the plate breaks away, and holds still inside the friction band.
+    ``friction_learning=False`` is the plain form, ``prediction="linear"`` the usual linear MPC, more `gauss_newton_steps`
+    the converged nonlinear one. Keyword-only; the defaults fit the throttle ``P1``. `mgdd.control.tuned` makes one for
+    another throttle; ``GuidedPredictive.fields()`` lists bounds and defaults.
+    
+    Parameters
+    ----------
+    sample_s : float
+        Time between samples [s].
+    gain_deg_per_s2, time_constant_s : float
+        Acceleration per duty [deg/s²] and time constant of the speed [s].
+    electrical_s : float
+        Lag of the motor's torque, L/R [s]; 0 for none.
+    limp_home_deg, ramp_deg : float
+        Rest angle of the springs, and half width over which the preload changes sides [deg].
+    preload_above, preload_below : float
+        Duty against the preload [-].
+    spring_above_per_deg, spring_below_per_deg : float
+        Duty against the springs [1/deg].
+    friction : float
+        Duty against dry friction [-], from which learning starts.
+    closed_deg, open_deg : float
+        Ends of the travel [deg].
+    prediction_step_s : float
+        Step of the horizon [s].
+    error_weight, speed_weight, duty_change_weight : float
+        Of the squared error [1/deg²] and speed [s²/deg²] at each step, and of the squared change of each move [-].
+    lower, upper, duty_rate_per_s : float
+        Bounds of the duty [-] and of its change [1/s], both hard.
+    lowest_deg, highest_deg, angle_limit_weight : float
+        Bounds of the predicted angle [deg], and the price of a squared degree beyond them [1/deg²].
+    observer_angle_per_s, observer_speed_per_s2 : float
+        How fast a measurement moves the angle [1/s] and the speed [1/s²] of the model.
+    noise_deg : float
+        Standard deviation of the measured angle [deg]: what counts as motion.
+    learning_rate_per_s, gain_weight, damping_weight : float
+        Learning: share of what explains an innovation, per time [1/s], and how much of it goes to gain and damping beside a
+        friction level [-].
+    least_gain_factor, largest_gain_factor : float
+        Bounds of the learnt gain over the given one [-].
+    bias_rate_per_deg_s, trim_rate_per_deg_s : float
+        Without learning: rates of the one bias and of the trim, which the model does not see [1/(deg s)].
+    reference_lag_s, reference_jump_deg_per_s : float
+        Lag of the reference's rate [s]; a faster reference steps and has no rate [deg/s].
+    prediction : {"nonlinear", "linear"}
+        ``linear``: the spring of the measured side without end, friction only fed forward.
+    switching : {"predicted", "measured"}
+        How the prediction knows its side of limp-home.
+    delay_samples : int
+        From a duty to its effect, beside the electrical lag: 0 to 5.
+    move_steps : sequence of three int
+        Prediction steps for which each duty of the horizon is held; together at most 64.
+    gauss_newton_steps : int
+        At most so many per sample; it ends when the duties stand still.
+    friction_learning : bool
+        Learn friction levels and gain, and use breakaway and hold rules.
+    
+    Raises
+    ------
+    mgdd.errors.ParameterError
+        A setting outside its domain, naming field, value and bound.
+    
+    See Also
+    --------
+    Mgdd1 : the plainest form, guided by the outputs of any model.
+    tuned : controllers for a throttle, all tuned alike.
+    
+    References
+    ----------
+    Tan (2018), Model-Guided Data-Driven Optimization and Control for Internal Combustion Engine Systems, section 7.3.
+    Diehl, Bock and Schlöder (2005), A real-time iteration scheme for nonlinear optimization in optimal feedback control.
+    
+    Examples
+    --------
+    >>> from mgdd.control import GuidedPredictive
+    >>> from mgdd.loop import VirtualThrottle
+    >>> plant, controller, measured_deg = VirtualThrottle(seed=1), GuidedPredictive(), 8.0
+    >>> for _ in range(120):
+    ...     plant.apply({"duty": controller.step(40.0, measured_deg)})
+    ...     values = plant.measure().values
+    ...     measured_deg = values["sensed_angle_deg"]
+    >>> abs(values["angle_deg"] - 40.0) < 0.2
+    True
+    >>> sorted(controller.learnt)
+    ['bias_above', 'bias_below', 'damping_factor', 'friction_above', 'friction_below', 'gain_factor']
+    """
+    @staticmethod
+    def fields() -> dict:
+        """
+        Every setting by name: unit, bounds or choices, meaning, default.
+        """
+    def __getstate__(self) -> tuple[int, dict, dict[str, list[float]]]:
+        ...
+    def __init__(self, *, sample_s: typing.SupportsFloat | typing.SupportsIndex = 0.001, gain_deg_per_s2: typing.SupportsFloat | typing.SupportsIndex = 83597.0, time_constant_s: typing.SupportsFloat | typing.SupportsIndex = 0.0197, electrical_s: typing.SupportsFloat | typing.SupportsIndex = 0.001, limp_home_deg: typing.SupportsFloat | typing.SupportsIndex = 8.0, ramp_deg: typing.SupportsFloat | typing.SupportsIndex = 0.5, preload_above: typing.SupportsFloat | typing.SupportsIndex = 0.1292, spring_above_per_deg: typing.SupportsFloat | typing.SupportsIndex = 0.000496, preload_below: typing.SupportsFloat | typing.SupportsIndex = 0.1292, spring_below_per_deg: typing.SupportsFloat | typing.SupportsIndex = 0.000496, friction: typing.SupportsFloat | typing.SupportsIndex = 0.0927, closed_deg: typing.SupportsFloat | typing.SupportsIndex = 0.0, open_deg: typing.SupportsFloat | typing.SupportsIndex = 90.0, prediction_step_s: typing.SupportsFloat | typing.SupportsIndex = 0.002, error_weight: typing.SupportsFloat | typing.SupportsIndex = 1.0, speed_weight: typing.SupportsFloat | typing.SupportsIndex = 0.0, duty_change_weight: typing.SupportsFloat | typing.SupportsIndex = 4.0, lower: typing.SupportsFloat | typing.SupportsIndex = -1.0, upper: typing.SupportsFloat | typing.SupportsIndex = 1.0, duty_rate_per_s: typing.SupportsFloat | typing.SupportsIndex = 10000.0, lowest_deg: typing.SupportsFloat | typing.SupportsIndex = -1000.0, highest_deg: typing.SupportsFloat | typing.SupportsIndex = 1000.0, angle_limit_weight: typing.SupportsFloat | typing.SupportsIndex = 20.0, observer_angle_per_s: typing.SupportsFloat | typing.SupportsIndex = 430.0, observer_speed_per_s2: typing.SupportsFloat | typing.SupportsIndex = 28000.0, noise_deg: typing.SupportsFloat | typing.SupportsIndex = 0.03, learning_rate_per_s: typing.SupportsFloat | typing.SupportsIndex = 150.0, gain_weight: typing.SupportsFloat | typing.SupportsIndex = 36.0, damping_weight: typing.SupportsFloat | typing.SupportsIndex = 36.0, least_gain_factor: typing.SupportsFloat | typing.SupportsIndex = 0.625, largest_gain_factor: typing.SupportsFloat | typing.SupportsIndex = 1.6, bias_rate_per_deg_s: typing.SupportsFloat | typing.SupportsIndex = 4.0, trim_rate_per_deg_s: typing.SupportsFloat | typing.SupportsIndex = 0.3, reference_lag_s: typing.SupportsFloat | typing.SupportsIndex = 0.0045, reference_jump_deg_per_s: typing.SupportsFloat | typing.SupportsIndex = 400.0, prediction: str = 'nonlinear', switching: str = 'predicted', delay_samples: typing.SupportsInt | typing.SupportsIndex = 1, move_steps: typing.Annotated[collections.abc.Sequence[typing.SupportsInt | typing.SupportsIndex], "FixedSize(3)"] = [3, 5, 12], gauss_newton_steps: typing.SupportsInt | typing.SupportsIndex = 1, friction_learning: bool = True) -> None:
+        ...
+    def __repr__(self) -> str:
+        ...
+    def __setstate__(self, arg0: tuple) -> None:
+        ...
+    def prepare(self) -> None:
+        """
+        The part of the next sample that needs no measurement; `step` then does the rest.
+        """
+    def refine(self) -> float:
+        """
+        One more Gauss-Newton step on the last sample, and its duty [-]; feasible after every one.
+        """
+    def reset(self) -> None:
+        """
+        As made, with what was learnt forgotten.
+        """
+    @typing.overload
+    def step(self, reference_deg: typing.SupportsFloat | typing.SupportsIndex, measurement_deg: typing.SupportsFloat | typing.SupportsIndex) -> float:
+        """
+        Duty [-] of this sample for a reference and a measured angle [deg].
+        
+        NaN repeats the last value; before the first ones the duty is 0.
+        """
+    @typing.overload
+    def step(self, reference_deg: typing.SupportsFloat | typing.SupportsIndex, measurement_deg: typing.SupportsFloat | typing.SupportsIndex, *, preview_deg: typing.Annotated[numpy.typing.ArrayLike, numpy.float64]) -> float:
+        """
+        The same with the references of the next samples [deg]; a short preview goes on at its last value.
+        """
+    def take_over(self, measurement_deg: typing.SupportsFloat | typing.SupportsIndex, duty: typing.SupportsFloat | typing.SupportsIndex) -> None:
+        """
+        Start at rest from a duty, what was learnt kept.
+        
+        Ignored if a number is not finite.
+        """
+    @property
+    def duty(self) -> float:
+        """
+        Duty of the last sample [-].
+        """
+    @property
+    def holds(self) -> bool:
+        """
+        Whether the plate is held where it is stuck.
+        """
+    @property
+    def innovation_deg(self) -> float:
+        """
+        Measured less predicted angle of the last sample [deg].
+        """
+    @property
+    def learnt(self) -> dict[str, float]:
+        """
+        Friction levels [-], factors of gain and damping [-] as learnt; setting some or all of them starts from them.
+        """
+    @learnt.setter
+    def learnt(self, arg1: collections.abc.Mapping[str, typing.SupportsFloat | typing.SupportsIndex]) -> None:
+        ...
+    @property
+    def settings(self) -> dict:
+        """
+        All settings as a new dict: keywords that make the controller again.
+        """
+    @property
+    def state(self) -> dict[str, list[float]]:
+        """
+        What a run needs to go on bit for bit; a state that the settings do not allow is refused and changes nothing.
+        """
+    @state.setter
+    def state(self, arg1: collections.abc.Mapping[str, collections.abc.Sequence[typing.SupportsFloat | typing.SupportsIndex]]) -> None:
+        ...

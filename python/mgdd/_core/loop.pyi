@@ -10,7 +10,7 @@ import mgdd._core.throttle
 import numpy
 import numpy.typing
 import typing
-__all__: list[str] = ['EngineBench', 'SensorDynamics', 'VirtualThrottle', 'monte_carlo', 'run_loop']
+__all__: list[str] = ['EngineBench', 'Mgdd1', 'SensorDynamics', 'VirtualThrottle', 'monte_carlo', 'run_loop', 'step_times_us', 'track_throttle', 'track_throttles', 'tracking_figures']
 class SensorDynamics:
     """
     Transport delay, first-order lag and noise of a gas sensor.
@@ -197,6 +197,28 @@ class VirtualThrottle:
     @state.setter
     def state(self, arg1: collections.abc.Mapping[str, collections.abc.Sequence[typing.SupportsFloat | typing.SupportsIndex]]) -> None:
         ...
+class Mgdd1:
+    """
+    The plainest model-guided controller; use mgdd.control.Mgdd1.
+    """
+    @staticmethod
+    def fields() -> dict:
+        ...
+    def __init__(self, guide: mgdd._core.throttle.PseudoWienerModel, *, horizon_samples: typing.SupportsInt | typing.SupportsIndex, delay_samples: typing.SupportsInt | typing.SupportsIndex, numbers: collections.abc.Mapping[str, typing.SupportsFloat | typing.SupportsIndex]) -> None:
+        ...
+    def reset(self) -> None:
+        ...
+    def step(self, reference_deg: typing.SupportsFloat | typing.SupportsIndex, measurement_deg: typing.SupportsFloat | typing.SupportsIndex) -> float:
+        ...
+    @property
+    def duty(self) -> float:
+        ...
+    @property
+    def state(self) -> dict[str, list[float]]:
+        ...
+    @state.setter
+    def state(self, arg1: collections.abc.Mapping[str, collections.abc.Sequence[typing.SupportsFloat | typing.SupportsIndex]]) -> None:
+        ...
 def monte_carlo(benches: collections.abc.Sequence[EngineBench], seekers: list, seeds: collections.abc.Sequence[typing.SupportsInt | typing.SupportsIndex], *, cycles: typing.SupportsInt | typing.SupportsIndex, optimum_cad: collections.abc.Sequence[typing.SupportsFloat | typing.SupportsIndex], arrival_cad: typing.SupportsFloat | typing.SupportsIndex, tail_cycles: typing.SupportsInt | typing.SupportsIndex, exceed_from: typing.SupportsInt | typing.SupportsIndex | None, exceed_above: collections.abc.Sequence[collections.abc.Sequence[typing.SupportsFloat | typing.SupportsIndex]], limits: collections.abc.Sequence[collections.abc.Sequence[typing.SupportsFloat | typing.SupportsIndex]], threads: typing.SupportsInt | typing.SupportsIndex) -> dict:
     """
     Whole loops on all cores; behind mgdd.loop.monte_carlo.
@@ -235,4 +257,20 @@ def run_loop(bench: EngineBench, seeker: mgdd._core.optimize.GoldenSection, cycl
 def run_loop(bench: EngineBench, seeker: mgdd._core.guide.CurveSeeking, cycles: typing.SupportsInt | typing.SupportsIndex, *, optimum_cad: typing.SupportsFloat | typing.SupportsIndex, arrival_cad: typing.SupportsFloat | typing.SupportsIndex, tail_cycles: typing.SupportsInt | typing.SupportsIndex, exceed_from: typing.SupportsInt | typing.SupportsIndex | None, exceed_above: collections.abc.Sequence[typing.SupportsFloat | typing.SupportsIndex], limits: collections.abc.Sequence[typing.SupportsFloat | typing.SupportsIndex]) -> dict:
     """
     Run a seeker on the bench without the GIL; behind mgdd.loop.run_seeker.
+    """
+def step_times_us(controller: typing.Any, reference_deg: typing.Annotated[numpy.typing.ArrayLike, numpy.float64], measured_deg: typing.Annotated[numpy.typing.ArrayLike, numpy.float64]) -> numpy.typing.NDArray[numpy.float64]:
+    """
+    Time of every step of a copy of the controller [us].
+    """
+def track_throttle(controller: typing.Any, plant: VirtualThrottle, *, delay_samples: typing.SupportsInt | typing.SupportsIndex, reference_deg: typing.Annotated[numpy.typing.ArrayLike, numpy.float64], airflow_torque_nm: typing.Annotated[numpy.typing.ArrayLike, numpy.float64], supply_v: typing.Annotated[numpy.typing.ArrayLike, numpy.float64], from_sample: typing.SupportsInt | typing.SupportsIndex, band_deg: typing.SupportsFloat | typing.SupportsIndex) -> dict:
+    """
+    Run a controller on a virtual throttle without the GIL; behind mgdd.loop.track.
+    """
+def track_throttles(plants: collections.abc.Sequence[VirtualThrottle], controllers: list, scenarios: collections.abc.Sequence[tuple[typing.Annotated[numpy.typing.ArrayLike, numpy.float64], typing.Annotated[numpy.typing.ArrayLike, numpy.float64], typing.Annotated[numpy.typing.ArrayLike, numpy.float64], typing.SupportsInt | typing.SupportsIndex]], *, delay_samples: typing.SupportsInt | typing.SupportsIndex, band_deg: collections.abc.Sequence[typing.SupportsFloat | typing.SupportsIndex], threads: typing.SupportsInt | typing.SupportsIndex) -> tuple:
+    """
+    Whole loops on all cores; behind mgdd.loop.track_many.
+    """
+def tracking_figures(*, reference_deg: typing.Annotated[numpy.typing.ArrayLike, numpy.float64], angle_deg: typing.Annotated[numpy.typing.ArrayLike, numpy.float64], duty: typing.Annotated[numpy.typing.ArrayLike, numpy.float64], sample_s: typing.SupportsFloat | typing.SupportsIndex, from_sample: typing.SupportsInt | typing.SupportsIndex, band_deg: typing.SupportsFloat | typing.SupportsIndex) -> dict:
+    """
+    How well a reference was followed.
     """

@@ -2,7 +2,8 @@
 
 `EngineBench`, `SurrogatePlant` and `VirtualThrottle` are plants: ``apply`` inputs by name, ``measure``. `run_seeker`
 closes the loop on any of them and on a test rig, `monte_carlo` does so for seeds, gains and operating points of the
-bench on all cores, `EngineBench.find_optimum` says where a seeker should end.
+bench on all cores, `EngineBench.find_optimum` says where a seeker should end. `track` and `track_many` run controllers
+of the throttle along a `Reference`.
 """
 
 from __future__ import annotations
@@ -11,8 +12,11 @@ from mgdd._core.loop import SensorDynamics
 from mgdd.loop.bench import EngineBench
 from mgdd.loop.criteria import LoopCriteria
 from mgdd.loop.plant import Measurement, Plant
+from mgdd.loop.reference import Reference
 from mgdd.loop.seek import monte_carlo, run_seeker
 from mgdd.loop.surrogate_plant import SurrogatePlant
+from mgdd.loop.track import track, track_many
+from mgdd.loop.tune import tune_controller, tuned_controller
 from mgdd.loop.virtual_throttle import VirtualThrottle
 
 __all__ = [
@@ -20,9 +24,14 @@ __all__ = [
     "LoopCriteria",
     "Measurement",
     "Plant",
+    "Reference",
     "SensorDynamics",
     "SurrogatePlant",
     "VirtualThrottle",
     "monte_carlo",
     "run_seeker",
+    "track",
+    "track_many",
+    "tune_controller",
+    "tuned_controller",
 ]

@@ -75,6 +75,7 @@ class VirtualThrottle:
         self.sample_s = sample_s
         self._inputs = tuple(inputs)
         self._still = {"duty": 0.0, "supply_v": self.throttle.supply_v, "airflow_torque_nm": 0.0}
+        self.start_deg = self.throttle.limp_home_deg if start_deg is None else float(start_deg)
         self._applied: dict[str, float] | None = None
         self._core = _core.loop.VirtualThrottle(
             throttle=self.throttle,
@@ -82,7 +83,7 @@ class VirtualThrottle:
             faults=fault_pair(faults),
             sample_s=sample_s,
             step_s=step_s,
-            start_deg=self.throttle.limp_home_deg if start_deg is None else float(start_deg),
+            start_deg=self.start_deg,
             bridge=bridge,
             seed=seed,
         )

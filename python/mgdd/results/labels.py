@@ -132,6 +132,15 @@ VARIABLES: Mapping[str, Label] = MappingProxyType(
         "t10_s": Label("s", "time to 10 % of the way"),
         "t90_s": Label("s", "time to 90 % of the way"),
         "speed_deg_per_s": Label("deg/s", "plate speed"),
+        "sensed_angle_deg": Label("deg", "measured plate angle"),
+        "reference_deg": Label("deg", "wanted plate angle"),
+        "settling_ms": Label("ms", "settling time"),
+        "mse_deg2": Label("deg²", "mean square error"),
+        "static_error_deg": Label("deg", "static error"),
+        "overshoot_deg": Label("deg", "overshoot"),
+        "total_variation": Label("-", "total variation of the duty"),
+        "limit_cycle_deg": Label("deg", "peak to peak at rest"),
+        "largest_error_deg": Label("deg", "largest error"),
     }
 )
 

@@ -16,6 +16,7 @@
 #include "mgdd/control/pid.hpp"
 #include "mgdd/control/sliding_mode.hpp"
 #include "mgdd/loop/virtual_throttle.hpp"
+#include "support/throttle_presets.hpp"
 
 namespace mgdd::loop {
 namespace {
@@ -25,31 +26,8 @@ using control::PidSettings;
 using control::ReachingLaw;
 using control::SlidingMode;
 using control::SlidingModeSettings;
+using test_support::preset;
 using throttle::Throttle;
-
-Throttle preset(int number) {
-  Throttle t;  // P1
-  t.friction = throttle::Friction::stribeck;
-  t.stiction_nm = 0.3;  // as in the study
-  if (number == 2) {
-    t.coulomb_nm = 0.1;
-    t.stiction_nm = 0.11;
-    t.spring_above_nm_per_rad = t.spring_below_nm_per_rad = 0.819;
-    t.preload_above_nm = t.preload_below_nm = 0.2;
-  } else if (number == 3) {
-    t.friction = throttle::Friction::coulomb;
-    t.coulomb_nm = t.stiction_nm = 0.089;
-    t.inertia_kgm2 = 0.0035;
-    t.viscous_nms_per_rad = 0.1503;
-    t.torque_constant_nm_per_a = 0.24;
-    t.back_emf_vs_per_rad = t.inductance_mh = 0.0;
-    t.resistance_ohm = 1.0;
-    t.limp_home_deg = 12.0;
-    t.spring_above_nm_per_rad = t.spring_below_nm_per_rad = 0.0914;
-    t.preload_above_nm = t.preload_below_nm = 0.3193;
-  }
-  return t;
-}
 
 /// What a controller knows of its plant.
 struct Groups {

@@ -1,0 +1,157 @@
+// The plainest model-guided step: one duty over the horizon, moved along the slope of what any model *says*, found by
+// asking it twice more. No parameter of the model is read, so a black box guides as well as a physical one. With the
+// adaptation gain 1 it is a Gauss-Newton step; below 1 a gradient scheme. Angles in deg, duty -1..1, time in s.
+// `step` is noexcept and allocation-free where the model's is. Source: our reading of the adaptation by model outputs
+// in Tan 2018, section 7.3; finite differences as in Nocedal and Wright 2006, section 8.1.
+#pragma once
+
+#include <algorithm>
+#include <array>
+#include <cmath>
+#include <cstddef>
+#include <cstdint>
+#include <span>
+#include <type_traits>
+
+#include "mgdd/common/bounds.hpp"
+#include "mgdd/common/field.hpp"
+#include "mgdd/common/state.hpp"
+#include "mgdd/control/duty_range.hpp"
+#include "mgdd/control/filtered_rate.hpp"
+#include "mgdd/dynamics/discrete_model.hpp"
+#include "mgdd/dynamics/observer.hpp"
+
+namespace mgdd::control {
+
+struct Mgdd1Settings {
+  int horizon_samples = 16;  ///< of the model
+  int delay_samples = 1;     ///< from a duty to its effect: 0 to 5
+  double adaptation_gain = 1.0;
+  double difference = 0.02;          ///< [-] of the duty, for the slope
+  double error_weight = 1.0;         ///< per deg²
+  double duty_change_weight = 20.0;  ///< per duty²
+  double trim_rate_per_deg_s = 0.3;  ///< slow integral that the model does not see
+  double reference_lag_s = 4.5e-3;
+  double reference_jump_deg_per_s = 400.0;  ///< a faster reference steps: it has no rate
+  double lower = -1.0;
+  double upper = 1.0;
+
+  bool operator==(const Mgdd1Settings&) const = default;
+};
+
+inline constexpr int longest_mgdd1_delay = 5;
+inline constexpr std::size_t n_mgdd1_fields = 9;
+std::span<const Field<Mgdd1Settings>, n_mgdd1_fields> mgdd1_fields() noexcept;
+
+/// ParameterError naming field, value and bound.
+void validate(const Mgdd1Settings& settings);
+
+/// A model that an observer of fixed gains can pull toward a measured angle.
+template <class M, class Gains>
+concept Guide = dynamics::StartsAtRest<M> && std::floating_point<typename M::Scalar> &&
+                requires(const M& model, typename M::State& state, typename M::Scalar y, const Gains& gains) {
+                  { model.correct(state, y, gains) } noexcept;
+                };
+
+template <class M, class Gains>
+  requires Guide<M, Gains>
+class Mgdd1 {
+ public:
+  using T = typename M::Scalar;
+
+  Mgdd1(const M& model, const Mgdd1Settings& settings, const Gains& gains = {})
+      : settings_((validate(settings), settings)),
+        observer_(model, gains),
+        reference_(settings.reference_lag_s, model.sample_s(), settings.reference_jump_deg_per_s) {}
+
+  /// Duty of this sample. Inputs that are not finite repeat the last reference or correct nothing; before the first
+  /// finite ones the duty is 0.
+  T step(T reference_deg, T measurement_deg) noexcept {
+    reference_.step(reference_deg);
+    if (!started_) {
+      if (!std::isfinite(measurement_deg) || !reference_.started()) return duty_;
+      observer_.start(observer_.model().at_rest(measurement_deg));
+      started_ = true;
+    } else {
+      observer_.update(sent_[static_cast<std::size_t>(settings_.delay_samples)], measurement_deg);
+    }
+    auto ahead = observer_.state();
+    const M& model = observer_.model();
+    for (int i = settings_.delay_samples - 1; i >= 0; --i)
+      model.step(ahead, dynamics::input_of(model, sent_[static_cast<std::size_t>(i)]));
+    adapt(ahead);
+    for (std::size_t i = sent_.size() - 1; i > 0; --i)
+      sent_[i] = sent_[i - 1];
+    sent_[0] = move_;
+    const T missed = reference_.value() - measurement_deg;
+    if (std::abs(missed) > T(0.08) && std::abs(missed) < T(3.0)) {
+      trim_ = std::clamp(trim_ + T(settings_.trim_rate_per_deg_s * model.sample_s()) * missed, T(-0.25), T(0.25));
+    }
+    duty_ = std::clamp(move_ + trim_, T(settings_.lower), T(settings_.upper));
+    return duty_;
+  }
+
+  void reset() noexcept {
+    started_ = false;
+    reference_.forget();
+    observer_.start({});
+    sent_.fill(T(0.0));
+    move_ = trim_ = duty_ = T(0.0);
+  }
+
+  const Mgdd1Settings& settings() const noexcept { return settings_; }
+  const M& model() const noexcept { return observer_.model(); }
+  T duty() const noexcept { return duty_; }
+
+  /// ParameterError for a restored state that these settings do not allow.
+  void require_usable() const { require_usable_duty(duty_, settings_.lower, settings_.upper); }
+
+  template <class Self, class V>
+  static void visit(Self& self, V& v) {
+    v("started", self.started_);
+    Prefixed<V> model{v, "model_"};
+    decltype(self.observer_)::visit(self.observer_, model);
+    FilteredRate<T>::visit(self.reference_, Prefixed<V>{v, "reference_"});
+    for (std::size_t i = 0; i < self.sent_.size(); ++i)
+      visit_number(v, names_of_sent[i], self.sent_[i]);
+    visit_number(v, "move", self.move_);
+    visit_number(v, "trim", self.trim_);
+    visit_number(v, "duty", self.duty_);
+  }
+
+ private:
+  static constexpr std::array<const char*, longest_mgdd1_delay + 1> names_of_sent{"sent_0", "sent_1", "sent_2",
+                                                                                  "sent_3", "sent_4", "sent_5"};
+  using Observer = dynamics::FixedGainObserver<M, Gains>;
+
+  // u moves by -gain (sum w_e (y - r) s + w_u (u - u_last)) / (sum w_e s² + w_u), s the slope of the model's output.
+  void adapt(const typename M::State& ahead) noexcept {
+    const M& model = observer_.model();
+    const T half = T(settings_.difference);
+    auto middle = ahead, above = ahead, below = ahead;
+    const auto u = dynamics::input_of(model, move_);
+    const auto more = dynamics::input_of(model, T(move_ + half)), less = dynamics::input_of(model, T(move_ - half));
+    const T weight = T(settings_.duty_change_weight);
+    T gradient = weight * (move_ - sent_[0]), curvature = weight;
+    for (int k = 1; k <= settings_.horizon_samples; ++k) {
+      model.step(middle, u);
+      model.step(above, more);
+      model.step(below, less);
+      const T slope = (model.output(above) - model.output(below)) / (T(2.0) * half);
+      const T target = reference_.value() + reference_.rate() * T(model.sample_s()) * T(k);
+      gradient += T(settings_.error_weight) * (model.output(middle) - target) * slope;
+      curvature += T(settings_.error_weight) * slope * slope;
+    }
+    const T step = T(settings_.adaptation_gain) * gradient / (curvature + T(1e-9));
+    move_ = std::clamp(move_ - step, T(settings_.lower), T(settings_.upper));
+  }
+
+  Mgdd1Settings settings_;
+  Observer observer_;
+  FilteredRate<T> reference_;
+  bool started_ = false;
+  std::array<T, longest_mgdd1_delay + 1> sent_{};  // the last one first
+  T move_{0.0}, trim_{0.0}, duty_{0.0};
+};
+
+}  // namespace mgdd::control

@@ -1,0 +1,87 @@
+// A controller on the virtual throttle over a recorded reference: measured angle in, duty out, the duty behind a whole
+// number of samples. What it did is a track; figures say how well. Angles in deg, duty -1..1, time in s.
+// The samples themselves allocate nothing; runs are offline code.
+#pragma once
+
+#include <concepts>
+#include <cstddef>
+#include <span>
+#include <string>
+#include <utility>
+#include <vector>
+
+#include "mgdd/common/error.hpp"
+#include "mgdd/loop/virtual_throttle.hpp"
+
+namespace mgdd::loop {
+
+/// A controller of the plate's angle.
+template <class C>
+concept AngleController = std::copyable<C> && requires(C& controller, double deg) {
+  { controller.step(deg, deg) } noexcept -> std::same_as<double>;
+};
+
+/// What a loop follows and what disturbs it, sample by sample.
+struct ThrottleScenario {
+  std::vector<double> reference_deg;
+  std::vector<double> airflow_torque_nm;  ///< as many, or none for still air
+  std::vector<double> supply_v;           ///< as many, or none for that of the throttle
+  std::size_t from = 0;                   ///< sample at which figures begin; the step of a step reference
+};
+/// ParameterError or ShapeError naming the column.
+void validate(const ThrottleScenario& scenario);
+
+inline constexpr int longest_loop_delay = 16;
+
+/// Columns of a run, one entry per sample: the angles are those at its end, the duty is that computed at its start.
+struct ThrottleTrack {
+  std::vector<double> angle_deg, sensed_angle_deg, speed_deg_per_s, current_a, duty;
+};
+
+/// How well a reference was followed, from sample `from` on. Errors are reference less true angle, the angle at the end
+/// of the sample whose start the reference names.
+struct TrackingFigures {
+  double settling_s = 0.0;        ///< until the error stays within the band; NaN: never
+  double mse_deg2 = 0.0;          ///< over all samples
+  double static_error_deg = 0.0;  ///< mean size over the last 0.1 s
+  double overshoot_deg = 0.0;     ///< beyond the last reference, in the direction of the step; 0 without one
+  double total_variation = 0.0;   ///< of the duty
+  double limit_cycle_deg = 0.0;   ///< peak to peak over the last 0.3 s if the reference stands still there, else 0
+  double largest_error_deg = 0.0;
+};
+/// `band_deg` of the settling.
+TrackingFigures tracking_figures(const ThrottleScenario& scenario, const ThrottleTrack& track, double sample_s,
+                                 double band_deg);
+
+/// The run of a controller from rest at the start angle of the plant. ParameterError for a bad delay or scenario.
+template <AngleController C>
+ThrottleTrack run_throttle_loop(C& controller, const VirtualThrottleSettings& plant, int delay_samples,
+                                const ThrottleScenario& scenario) {
+  validate(scenario);
+  if (delay_samples < 0 || delay_samples > longest_loop_delay) {
+    throw ParameterError("delay_samples", delay_samples, "must be in [0, " + std::to_string(longest_loop_delay) + "]");
+  }
+  VirtualThrottle throttle(plant);
+  const std::size_t n = scenario.reference_deg.size();
+  ThrottleTrack track;
+  for (auto* column :
+       {&track.angle_deg, &track.sensed_angle_deg, &track.speed_deg_per_s, &track.current_a, &track.duty})
+    column->resize(n);
+  const auto delay = static_cast<std::size_t>(delay_samples);
+  double measured = plant.start_deg;
+  for (std::size_t k = 0; k < n; ++k) {
+    track.duty[k] = controller.step(scenario.reference_deg[k], measured);
+    const VirtualThrottleSample now =
+        throttle.step({k < delay ? 0.0 : track.duty[k - delay],
+                       scenario.supply_v.empty() ? plant.throttle.supply_v : scenario.supply_v[k],
+                       scenario.airflow_torque_nm.empty() ? 0.0 : scenario.airflow_torque_nm[k]});
+    measured = now.sensed.angle_deg;
+    track.angle_deg[k] = now.angle_deg;
+    track.sensed_angle_deg[k] = measured;
+    track.speed_deg_per_s[k] = now.speed_deg_per_s;
+    track.current_a[k] = now.current_a;
+  }
+  return track;
+}
+
+}  // namespace mgdd::loop

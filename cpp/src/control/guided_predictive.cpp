@@ -1,0 +1,363 @@
+#include "mgdd/control/guided_predictive.hpp"
+
+#include <algorithm>
+#include <cmath>
+#include <utility>
+
+#include "mgdd/control/move_qp.hpp"
+#include "mgdd/dynamics/lag.hpp"
+#include "mgdd/dynamics/predict.hpp"
+
+namespace mgdd::control {
+namespace {
+
+constexpr double dead_band_deg = 0.3;        // of the measured side of limp-home
+constexpr double end_deg = 0.5;              // a stop holds the plate there: nothing is learnt
+constexpr double slow_deg_per_s = 6.0;       // below it the plate may stick
+constexpr double hold_rate_deg_per_s = 2.0;  // a faster reference is followed, not waited for
+constexpr double breakaway_margin = 0.015;   // duty beyond the friction level
+constexpr double hold_share = 0.3;           // of the friction band that a held duty may use
+constexpr double hold_duty_per_s = 2.0;      // how fast it goes there
+constexpr double lead_s = 0.01;              // of the reference in the wanted direction
+constexpr double feed_forward_deg = 0.25;    // error at which a linear prediction feeds all friction forward
+constexpr double trim_from_deg = 0.08, trim_to_deg = 3.0, largest_trim = 0.25, largest_bias = 0.4;
+
+PlateFriction friction_form(const GuidedPredictiveSettings& s) noexcept {
+  if (s.prediction == Prediction::linear) return PlateFriction::none;
+  return s.friction_learning ? PlateFriction::set_valued : PlateFriction::creeping;
+}
+
+const GuidedPredictiveSettings& checked(const GuidedPredictiveSettings& settings) {
+  validate(settings);
+  return settings;  // NOLINT(bugprone-return-const-ref-from-parameter): the caller holds it
+}
+
+template <class T>
+PlateBelief<double> widened(const PlateBelief<T>& b) noexcept {
+  const auto band = [](const FrictionBand<T>& from) {
+    return FrictionBand<double>{static_cast<double>(from.bias), static_cast<double>(from.friction)};
+  };
+  return {band(b.above), band(b.below), static_cast<double>(b.gain_factor), static_cast<double>(b.damping_factor)};
+}
+
+}  // namespace
+
+template <class T>
+BasicGuidedPredictive<T>::BasicGuidedPredictive(const GuidedPredictiveSettings& s)
+    : settings_(checked(s)),
+      observed_(s.plate, s.sample_s, PlateFriction::set_valued),
+      predicted_(s.plate, s.prediction_step_s, friction_form(s)),
+      angle_share_(static_cast<T>(1.0 - std::exp(-s.observer_angle_per_s * s.sample_s))),
+      speed_gain_(static_cast<T>(s.observer_speed_per_s2 * s.sample_s)),
+      learner_(s.learner, s.plate, s.sample_s, s.noise_deg, angle_share_, speed_gain_),
+      belief_(observed_.belief()),
+      reference_(s.reference_lag_s, s.sample_s, s.reference_jump_deg_per_s) {}
+
+template <class T>
+void BasicGuidedPredictive<T>::start(T angle_deg, T duty) noexcept {
+  started_ = true;
+  prepared_ = true;  // nothing acted before this sample
+  holds_ = false;
+  still_ = 0;
+  above_ = !(angle_deg < T(settings_.plate.spring.limp_home_deg));
+  state_ = observed_.at_rest(angle_deg, duty);
+  mean_torque_ = duty_ = duty;
+  sent_.fill(duty);
+  moves_.fill(duty);
+  innovation_ = mean_error_ = trim_ = T(0.0);
+  learner_.forget();
+}
+
+template <class T>
+FrictionBand<T>& BasicGuidedPredictive<T>::band_at(T angle_deg) noexcept {
+  return angle_deg < T(settings_.plate.spring.limp_home_deg) ? belief_.below : belief_.above;
+}
+
+template <class T>
+void BasicGuidedPredictive<T>::prepare() noexcept {
+  if (!started_ || prepared_) return;
+  const T acting = sent_[static_cast<std::size_t>(settings_.delay_samples)];
+  observed_.believe(belief_);
+  mean_torque_ = observed_.mean_torque(state_, acting);
+  observed_.step(state_, acting);
+  prepared_ = true;
+}
+
+template <class T>
+void BasicGuidedPredictive<T>::correct(T measurement_deg) noexcept {
+  const GuidedPredictiveSettings& s = settings_;
+  const T predicted = state_.angle_deg, speed = state_.speed_deg_per_s, last = innovation_;
+  innovation_ = measurement_deg - predicted;
+  state_.angle_deg = std::clamp(predicted + angle_share_ * innovation_, T(s.plate.closed_deg), T(s.plate.open_deg));
+  state_.speed_deg_per_s += speed_gain_ * innovation_;
+  if (!s.friction_learning) {
+    const T step = T(s.bias_rate_per_deg_s * s.sample_s) * innovation_;
+    for (FrictionBand<T>* band : {&belief_.above, &belief_.below})
+      band->bias = std::clamp(band->bias - step, T(-largest_bias), T(largest_bias));
+    return;
+  }
+  if (predicted < T(s.plate.closed_deg + end_deg) || predicted > T(s.plate.open_deg - end_deg)) {
+    learner_.forget();
+    return;
+  }
+  const T push = mean_torque_ - observed_.holding(predicted);
+  if (speed != T(0.0)) {
+    learner_.slide(belief_, band_at(predicted), innovation_, {push, speed, observed_.damped()});
+    return;
+  }
+  const T moves = learner_.stick(band_at(predicted), innovation_, last, push);
+  const T now = state_.speed_deg_per_s;
+  state_.speed_deg_per_s = moves > T(0.0) ? std::max(now, moves) : std::min(now, moves);
+}
+
+template <class T>
+void BasicGuidedPredictive<T>::look_ahead(T measurement_deg, std::span<const T> preview_deg) noexcept {
+  const GuidedPredictiveSettings& s = settings_;
+  observed_.believe(belief_);
+  horizon_.ahead = state_;
+  for (int i = s.delay_samples - 1; i >= 0; --i)
+    observed_.step(horizon_.ahead, sent_[static_cast<std::size_t>(i)]);
+  const T room = T(s.duty_rate_per_s * s.sample_s);
+  horizon_.before = sent_[0];
+  horizon_.acting = duty_;
+  horizon_.lowest = std::max(T(s.lower), sent_[0] - room);
+  horizon_.highest = std::min(T(s.upper), sent_[0] + room);
+  const T per_step = T(s.prediction_step_s / s.sample_s);
+  T last = reference_.value();
+  std::size_t read = 0;
+  for (int k = 0; k < n_steps(); ++k) {
+    T target = reference_.value() + reference_.rate() * T(s.prediction_step_s) * T(k + 1);
+    if (!preview_deg.empty()) {
+      const auto wanted = static_cast<std::size_t>(T(s.delay_samples) + per_step * T(k + 1));
+      for (; read < std::min(wanted, preview_deg.size()) && std::isfinite(preview_deg[read]); ++read)
+        last = preview_deg[read];
+      target = last;
+    }
+    horizon_.target[static_cast<std::size_t>(k)] = target;
+  }
+  // Where the plate should be soon: it leaves rest for that, and breaks away towards it.
+  const auto soon = static_cast<std::size_t>(std::min(n_steps(), static_cast<int>(lead_s / s.prediction_step_s)));
+  horizon_.aim = preview_deg.empty() || soon == 0 ? reference_.value() : horizon_.target[soon - 1];
+  horizon_.wanted = horizon_.aim - horizon_.ahead.angle_deg;
+  if (preview_deg.empty()) horizon_.wanted += T(lead_s) * reference_.rate();
+  if (!std::isfinite(measurement_deg)) return;
+  const T away = measurement_deg - T(s.plate.spring.limp_home_deg);
+  if (std::abs(away) > T(dead_band_deg)) above_ = away > T(0.0);
+}
+
+// Whether the plate is stuck near enough to the reference to be left there; moves the duty inside the friction band.
+template <class T>
+bool BasicGuidedPredictive<T>::hold_still() noexcept {
+  const GuidedPredictiveSettings& s = settings_;
+  const T error = horizon_.aim - horizon_.ahead.angle_deg, rate = reference_.rate();
+  const bool slow = std::abs(horizon_.ahead.speed_deg_per_s) < T(slow_deg_per_s);
+  still_ = slow ? still_ + 1 : 0;
+  const bool rests = still_ >= 3;
+  mean_error_ = still_ <= 1 ? error : mean_error_ + (error - mean_error_) / T(std::min<std::int64_t>(still_, 8));
+  if (std::abs(rate) >= T(hold_rate_deg_per_s)) {
+    holds_ = false;
+  } else if (holds_) {
+    holds_ = rests && std::abs(mean_error_) <= T(4.3 * s.noise_deg);
+  } else {
+    holds_ = rests && std::abs(error) < T(2.0 * s.noise_deg);
+  }
+  if (!holds_) return false;
+  const T angle = horizon_.ahead.angle_deg;
+  const FrictionBand<T>& band = band_at(angle);
+  const T middle = observed_.holding(angle) + band.bias, half = T(hold_share) * band.friction;
+  const T most = T(hold_duty_per_s * s.sample_s);
+  const T wanted = std::clamp(sent_[0], middle - half, middle + half);
+  moves_.fill(std::clamp(std::clamp(wanted, sent_[0] - most, sent_[0] + most), horizon_.lowest, horizon_.highest));
+  return true;
+}
+
+// A stuck plate has no slope: the first duty is at least the one that frees it.
+template <class T>
+void BasicGuidedPredictive<T>::break_away() noexcept {
+  if (!settings_.friction_learning || !(std::abs(horizon_.ahead.speed_deg_per_s) < T(slow_deg_per_s))) return;
+  const auto duty = observed_.breakaway(horizon_.ahead);
+  if (horizon_.wanted > T(0.0)) moves_[0] = std::max(moves_[0], duty.up + T(breakaway_margin));
+  if (horizon_.wanted < T(0.0)) moves_[0] = std::min(moves_[0], duty.down - T(breakaway_margin));
+  moves_[0] = std::clamp(moves_[0], horizon_.lowest, horizon_.highest);
+}
+
+template <class T>
+T BasicGuidedPredictive<T>::performance(std::span<const T> output) const noexcept {
+  const GuidedPredictiveSettings& s = settings_;
+  const T over_step = T(1.0 / s.prediction_step_s);
+  T sum = T(0.0), last_output = horizon_.ahead.angle_deg, last_move = horizon_.before;
+  for (std::size_t k = 0; k < output.size(); ++k) {
+    const T error = output[k] - horizon_.target[k], speed = (output[k] - last_output) * over_step;
+    const T beyond = output[k] - std::clamp(output[k], T(s.lowest_deg), T(s.highest_deg));
+    sum += T(s.error_weight) * error * error + T(s.speed_weight) * speed * speed +
+           T(s.angle_limit_weight) * beyond * beyond;
+    last_output = output[k];
+  }
+  for (const T move : moves_) {
+    sum += T(s.duty_change_weight) * (move - last_move) * (move - last_move);
+    last_move = move;
+  }
+  return sum;
+}
+
+// Gives whether the moves changed.
+template <class T>
+bool BasicGuidedPredictive<T>::gauss_newton() noexcept {
+  const GuidedPredictiveSettings& s = settings_;
+  const auto steps = static_cast<std::size_t>(n_steps());
+  std::array<T, longest_guided_horizon> outputs;
+  std::array<Moves, longest_guided_horizon> slopes;
+  const std::span<T> output(outputs.data(), steps);
+  dynamics::predict<n_guided_moves>(predicted_, horizon_.ahead, moves_, s.move_steps, output,
+                                    std::span<Moves>(slopes.data(), steps));
+  MoveQp<T, n_guided_moves> qp;
+  const T speed_weight = T(s.speed_weight / (s.prediction_step_s * s.prediction_step_s));
+  for (std::size_t k = 0; k < steps; ++k) {
+    qp.add(T(s.error_weight), output[k] - horizon_.target[k], slopes[k]);
+    if (speed_weight > T(0.0)) {
+      Moves change = slopes[k];
+      for (std::size_t i = 0; i < n && k > 0; ++i)
+        change[i] -= slopes[k - 1][i];
+      qp.add(speed_weight, output[k] - (k == 0 ? horizon_.ahead.angle_deg : output[k - 1]), change);
+    }
+    const T beyond = output[k] - std::clamp(output[k], T(s.lowest_deg), T(s.highest_deg));
+    if (beyond != T(0.0)) qp.add(T(s.angle_limit_weight), beyond, slopes[k]);
+  }
+  qp.add_changes(T(s.duty_change_weight), moves_, horizon_.before);
+  Moves low, high;
+  T room = T(s.duty_rate_per_s * s.sample_s);
+  for (std::size_t i = 0; i < n; ++i) {
+    low[i] = std::max(T(s.lower), horizon_.before - room) - moves_[i];
+    high[i] = std::min(T(s.upper), horizon_.before + room) - moves_[i];
+    room += T(s.duty_rate_per_s * s.prediction_step_s) * T(s.move_steps[i]);
+  }
+  const Moves before = moves_;
+  const auto moved = [&](T scale) {
+    const Moves change = qp.solve(low, high, T(1.0) + T(1e-3) * scale, T(1e-6) * scale);
+    T most = T(0.0);
+    for (std::size_t i = 0; i < n; ++i) {
+      moves_[i] = before[i] + change[i];
+      most = std::max(most, std::abs(change[i]));
+    }
+    return most > T(1e-5);
+  };
+  const bool changed = moved(T(1.0));
+  if (s.friction_learning || s.prediction == Prediction::linear || !changed) return changed;
+  // Not lower after the step: ten times the damping, once.
+  const Moves after = std::exchange(moves_, before);
+  const T performance_before = performance(output);
+  moves_ = after;
+  auto state = horizon_.ahead;
+  for (std::size_t i = 0, k = 0; i < n; ++i) {
+    for (int j = 0; j < s.move_steps[i]; ++j, ++k) {
+      predicted_.step(state, moves_[i]);
+      output[k] = state.angle_deg;
+    }
+  }
+  if (performance(output) < performance_before) return true;
+  return moved(T(10.0));
+}
+
+template <class T>
+T BasicGuidedPredictive<T>::step(T reference_deg, T measurement_deg, std::span<const T> preview_deg) noexcept {
+  prepare();
+  return feedback(reference_deg, measurement_deg, preview_deg);
+}
+
+template <class T>
+T BasicGuidedPredictive<T>::feedback(T reference_deg, T measurement_deg, std::span<const T> preview_deg) noexcept {
+  const GuidedPredictiveSettings& s = settings_;
+  reference_.step(reference_deg);
+  if (!started_) {
+    if (!std::isfinite(measurement_deg) || !reference_.started()) return duty_;
+    const T room = T(s.duty_rate_per_s * s.sample_s);
+    start(measurement_deg,
+          std::clamp(observed_.holding(measurement_deg), std::max(T(s.lower), -room), std::min(T(s.upper), room)));
+    prepared_ = false;
+    return duty_;
+  }
+  prepare();
+  prepared_ = false;
+  if (std::isfinite(measurement_deg)) correct(measurement_deg);
+  look_ahead(measurement_deg, preview_deg);
+  if (!(s.friction_learning && hold_still())) {
+    PlateBelief<T> belief = belief_;
+    if (s.prediction == Prediction::linear) {
+      const T share = limited_share(horizon_.wanted, T(feed_forward_deg));
+      belief.above.bias += share * belief.above.friction;
+      belief.below.bias += share * belief.below.friction;
+    }
+    if (s.prediction == Prediction::linear || s.switching == SideSwitching::measured) predicted_.freeze_side(above_);
+    predicted_.believe(belief);
+    break_away();
+    for (int i = 0; i < s.gauss_newton_steps; ++i) {
+      if (!gauss_newton()) break;
+    }
+    break_away();
+  }
+  for (std::size_t i = sent_.size() - 1; i > 0; --i)
+    sent_[i] = sent_[i - 1];
+  const T missed = reference_.value() - measurement_deg;
+  if (!s.friction_learning && std::abs(missed) > T(trim_from_deg) && std::abs(missed) < T(trim_to_deg)) {
+    trim_ = std::clamp(trim_ + T(s.trim_rate_per_deg_s * s.sample_s) * missed, T(-largest_trim), T(largest_trim));
+  }
+  return send();
+}
+
+template <class T>
+T BasicGuidedPredictive<T>::refine() noexcept {
+  if (!started_ || holds_) return duty_;
+  gauss_newton();
+  break_away();
+  return send();
+}
+
+// The trim is not told to the model: it would take it for a disturbance and work against it.
+template <class T>
+T BasicGuidedPredictive<T>::send() noexcept {
+  sent_[0] = moves_[0];
+  const T room = T(settings_.duty_rate_per_s * settings_.sample_s);
+  duty_ = std::clamp(std::clamp(moves_[0] + trim_, T(settings_.lower), T(settings_.upper)), horizon_.acting - room,
+                     horizon_.acting + room);
+  return duty_;
+}
+
+template <class T>
+void BasicGuidedPredictive<T>::reset() noexcept {
+  started_ = prepared_ = holds_ = false;
+  above_ = true;
+  still_ = 0;
+  state_ = {};
+  belief_.above = belief_.below = {T(0.0), T(settings_.plate.friction)};
+  belief_.gain_factor = belief_.damping_factor = T(1.0);
+  learner_.forget();
+  reference_.forget();
+  sent_.fill(T(0.0));
+  moves_.fill(T(0.0));
+  mean_torque_ = innovation_ = mean_error_ = trim_ = duty_ = T(0.0);
+  horizon_ = {};
+}
+
+template <class T>
+void BasicGuidedPredictive<T>::take_over(T measurement_deg, T duty) noexcept {
+  if (!std::isfinite(measurement_deg) || !std::isfinite(duty)) return;
+  reference_.start(measurement_deg);
+  start(measurement_deg, std::clamp(duty, T(settings_.lower), T(settings_.upper)));
+}
+
+template <class T>
+void BasicGuidedPredictive<T>::set_belief(const PlateBelief<T>& belief) {
+  require_usable_belief(widened(belief), settings_);
+  belief_ = belief;
+}
+
+template <class T>
+void BasicGuidedPredictive<T>::require_usable() const {
+  require_usable_duty(duty_, settings_.lower, settings_.upper);
+  require_usable_belief(widened(belief_), settings_);
+}
+
+template class BasicGuidedPredictive<double>;
+template class BasicGuidedPredictive<float>;
+
+}  // namespace mgdd::control

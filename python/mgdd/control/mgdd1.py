@@ -1,0 +1,182 @@
+"""MGDD-1: one duty, moved along the slope of what a model says, whatever the model is."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from typing import Any, Protocol
+
+from mgdd import _core
+
+__all__ = ["Mgdd1"]
+
+
+class Guide(Protocol):
+    """A model that the core can ask: `mgdd.throttle.PseudoWiener` of any kind."""
+
+    @property
+    def kind(self) -> str:
+        """Its name."""
+        ...
+
+    @property
+    def parameters(self) -> Mapping[str, float]:
+        """Its numbers."""
+        ...
+
+
+class Mgdd1:
+    """The plainest model-guided controller of a throttle plate: one duty over the horizon, moved by model outputs only.
+
+    Each sample it asks the guide for the angles at the present duty and at two others, and takes the slope between
+    them; no parameter of the guide is read. With `adaptation_gain` 1 the step is one of Gauss and Newton, below 1 a
+    gradient scheme. ``Mgdd1.fields()`` lists bounds and defaults.
+
+    Parameters
+    ----------
+    guide : PseudoWiener, optional
+        A model of any kind and quality, with the sample time of the controller; PW-R of the throttle ``P1`` if left
+        out.
+    horizon_samples : int
+        Length of the prediction [-], 1 to 1000.
+    delay_samples : int
+        From a duty to its effect, 0 to 5.
+    adaptation_gain : float
+        Share of the Gauss-Newton step [-].
+    difference : float
+        Duty by which the model is asked for its slope [-].
+    error_weight, duty_change_weight : float
+        Of the squared error at each sample [1/deg²] and of the squared change of the duty [-].
+    trim_rate_per_deg_s : float
+        Rate of the slow trim, which the model does not see [1/(deg s)].
+    reference_lag_s, reference_jump_deg_per_s : float
+        Lag of the reference's rate [s]; a faster reference steps and has no rate [deg/s].
+    lower, upper : float
+        Bounds of the duty [-].
+
+    Raises
+    ------
+    mgdd.errors.ParameterError
+        A setting outside its domain, naming field, value and bound.
+
+    See Also
+    --------
+    GuidedPredictive : three moves, exact slopes, learning.
+
+    References
+    ----------
+    Tan (2018), Model-Guided Data-Driven Optimization and Control for Internal Combustion Engine Systems, section 7.3;
+    the form is our reading.
+
+    Examples
+    --------
+    >>> from mgdd.control import Mgdd1
+    >>> from mgdd.loop import track
+    >>> bool(track(Mgdd1(), "step:20:60", seed=1)["static_error_deg"] < 0.5)
+    True
+    """
+
+    def __init__(
+        self,
+        guide: Guide | None = None,
+        *,
+        horizon_samples: int = 16,
+        delay_samples: int = 1,
+        adaptation_gain: float = 1.0,
+        difference: float = 0.02,
+        error_weight: float = 1.0,
+        duty_change_weight: float = 20.0,
+        trim_rate_per_deg_s: float = 0.3,
+        reference_lag_s: float = 4.5e-3,
+        reference_jump_deg_per_s: float = 400.0,
+        lower: float = -1.0,
+        upper: float = 1.0,
+    ) -> None:
+        numbers = {
+            "adaptation_gain": adaptation_gain,
+            "difference": difference,
+            "error_weight": error_weight,
+            "duty_change_weight": duty_change_weight,
+            "trim_rate_per_deg_s": trim_rate_per_deg_s,
+            "reference_lag_s": reference_lag_s,
+            "reference_jump_deg_per_s": reference_jump_deg_per_s,
+            "lower": lower,
+            "upper": upper,
+        }
+        self._settings: dict[str, Any] = {"horizon_samples": horizon_samples, "delay_samples": delay_samples, **numbers}
+        self.guide = guide
+        self._core = _core.loop.Mgdd1(
+            _asked(guide), horizon_samples=horizon_samples, delay_samples=delay_samples, numbers=numbers
+        )
+
+    @staticmethod
+    def fields() -> dict[str, dict[str, Any]]:
+        """Give every number by name: unit, bounds, meaning, default.
+
+        Returns
+        -------
+        dict
+            As of the other controllers.
+        """
+        described: dict[str, dict[str, Any]] = _core.loop.Mgdd1.fields()
+        return described
+
+    @property
+    def settings(self) -> dict[str, Any]:
+        """All settings but the guide as a new dict: keywords that make the controller again."""
+        return dict(self._settings)
+
+    @property
+    def duty(self) -> float:
+        """Duty of the last sample [-]."""
+        return float(self._core.duty)
+
+    @property
+    def state(self) -> dict[str, list[float]]:
+        """What a run needs to go on bit for bit; a refused state changes nothing."""
+        columns: dict[str, list[float]] = self._core.state
+        return columns
+
+    @state.setter
+    def state(self, saved: Mapping[str, Sequence[float]]) -> None:
+        self._core.state = {name: list(values) for name, values in saved.items()}
+
+    def step(self, reference_deg: float, measurement_deg: float) -> float:
+        """Give the duty of this sample.
+
+        Parameters
+        ----------
+        reference_deg, measurement_deg : float
+            Wanted and measured angle [deg]; NaN repeats the last reference or corrects nothing.
+
+        Returns
+        -------
+        float
+            Duty [-]; 0 before the first finite inputs.
+        """
+        return float(self._core.step(reference_deg, measurement_deg))
+
+    def reset(self) -> None:
+        """Forget everything that was measured."""
+        self._core.reset()
+
+    def __reduce__(self) -> tuple[Any, ...]:
+        """Pickle settings, guide and state."""
+        return _restored, (self.guide, self.settings, self.state)
+
+
+def _restored(guide: Guide | None, settings: dict[str, Any], state: dict[str, list[float]]) -> Mgdd1:
+    made = Mgdd1(guide, **settings)
+    made.state = state
+    return made
+
+
+def _asked(guide: Guide | None) -> Any:
+    if guide is None:
+        control = {"ramp_deg": 0.5, "tanh_deg_per_s": 40.0, "substeps": 1.0}
+        return _core.throttle.PseudoWienerModel("pw_r", control, friction="tanh")
+    inner = getattr(guide, "_core", None)
+    if not isinstance(inner, _core.throttle.PseudoWienerModel):
+        from mgdd.errors import ParameterError
+
+        raise ParameterError.of("guide", guide, "a PseudoWiener model")
+    return inner

@@ -1,0 +1,295 @@
+"""How each kind of controller follows from the groups of a throttle and a few numbers without a unit to tune."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Callable, Mapping
+from dataclasses import dataclass
+from typing import TYPE_CHECKING, Any
+
+from mgdd.control import GuidedPredictive, Mgdd1, Pid, SlidingMode
+from mgdd.errors import ParameterError
+
+if TYPE_CHECKING:
+    from mgdd.throttle.pseudo_wiener import PseudoWiener
+
+__all__ = ["FAMILIES", "Family", "Groups", "groups_of"]
+
+Controller = GuidedPredictive | Mgdd1 | Pid | SlidingMode
+_SIDES = ("above", "below")
+
+
+@dataclass(frozen=True, kw_only=True)
+class Groups:
+    """What duty and angle say about a throttle: all that a controller knows. Units deg, s, duty."""
+
+    gain_deg_per_s2: float
+    time_constant_s: float
+    electrical_s: float
+    friction: float
+    limp_home_deg: float
+    preload_above: float
+    preload_below: float
+    spring_above_per_deg: float
+    spring_below_per_deg: float
+    closed_deg: float = 0.0
+    open_deg: float = 90.0
+    delay_samples: float | None = None
+
+    @property
+    def spring(self) -> dict[str, Any]:
+        """Keywords of the springs that all controllers share."""
+        names = ["limp_home_deg"]
+        names += [f"preload_{side}" for side in _SIDES] + [f"spring_{side}_per_deg" for side in _SIDES]
+        return {name: getattr(self, name) for name in names} | {"ramp_deg": 0.5}
+
+
+def groups_of(model: Any) -> Groups:
+    """Give the groups of a throttle, of PW-R, or of fitted first-principle groups; ParameterError for anything else."""
+    if hasattr(model, "stall_torque_nm"):
+        return _of_throttle(model)
+    numbers = getattr(model, "parameters", None)
+    if isinstance(numbers, Mapping):
+        if "beta_above_duty" in numbers:
+            return _of_groups(model, numbers)
+        if getattr(model, "kind", None) == "pw_r":
+            return _of_pw_r(numbers)
+    raise ParameterError.of(
+        "model", model, "a Throttle, PW-R or fitted first-principle groups: other models have no groups to design with"
+    )
+
+
+def _of_throttle(throttle: Any) -> Groups:
+    stall = throttle.stall_torque_nm
+    sides = {f"preload_{side}": getattr(throttle, f"preload_{side}_nm") / stall for side in _SIDES}
+    sides |= {
+        f"spring_{side}_per_deg": math.radians(getattr(throttle, f"spring_{side}_nm_per_rad")) / stall
+        for side in _SIDES
+    }
+    return Groups(
+        gain_deg_per_s2=math.degrees(stall / throttle.inertia_kgm2),
+        time_constant_s=throttle.inertia_kgm2 / throttle.damping_nms_per_rad,
+        electrical_s=1e-3 * throttle.inductance_mh / throttle.resistance_ohm,
+        friction=throttle.coulomb_nm / stall,
+        limp_home_deg=throttle.limp_home_deg,
+        closed_deg=throttle.closed_deg,
+        open_deg=throttle.open_deg,
+        **sides,
+    )
+
+
+def _of_groups(model: Any, numbers: Mapping[str, float]) -> Groups:
+    return Groups(
+        gain_deg_per_s2=numbers["gain_deg_per_s2_per_duty"],
+        time_constant_s=numbers["tau_s"],
+        electrical_s=numbers["electrical_s"],
+        friction=numbers["delta_duty"],
+        limp_home_deg=numbers["limp_home_deg"],
+        preload_above=numbers["beta_above_duty"],
+        preload_below=numbers["beta_below_duty"],
+        spring_above_per_deg=numbers["kappa_above_duty_per_deg"],
+        spring_below_per_deg=numbers["kappa_below_duty_per_deg"],
+        closed_deg=float(getattr(model, "closed_deg", 0.0)),
+        open_deg=float(getattr(model, "open_deg", 90.0)),
+        delay_samples=numbers.get("delay_samples"),
+    )
+
+
+def _of_pw_r(numbers: Mapping[str, float]) -> Groups:
+    def mean(name: str) -> float:
+        return math.sqrt(numbers[f"above_{name}"] * numbers[f"below_{name}"])
+
+    return Groups(
+        gain_deg_per_s2=mean("gain_deg_per_s2_per_duty"),
+        time_constant_s=mean("tau_s"),
+        electrical_s=0.0,
+        friction=mean("coulomb_duty"),
+        limp_home_deg=numbers["limp_home_deg"],
+        preload_above=numbers["above_preload_duty"],
+        preload_below=numbers["below_preload_duty"],
+        spring_above_per_deg=numbers["above_spring_duty_per_deg"],
+        spring_below_per_deg=numbers["below_spring_duty_per_deg"],
+        closed_deg=numbers["closed_deg"],
+        open_deg=numbers["open_deg"],
+        delay_samples=numbers.get("delay_samples"),
+    )
+
+
+def pw_r_of(groups: Groups, sample_s: float) -> PseudoWiener:
+    """PW-R of the groups as a guide: friction by tanh, the ramp of 0.5 deg that control uses, no delay of its own."""
+    from mgdd.throttle.pseudo_wiener import PseudoWiener
+
+    numbers = {"limp_home_deg": groups.limp_home_deg, "closed_deg": groups.closed_deg, "open_deg": groups.open_deg}
+    for side in _SIDES:
+        numbers[f"{side}_tau_s"] = groups.time_constant_s
+        numbers[f"{side}_gain_deg_per_s2_per_duty"] = groups.gain_deg_per_s2
+        numbers[f"{side}_preload_duty"] = getattr(groups, f"preload_{side}")
+        numbers[f"{side}_spring_duty_per_deg"] = getattr(groups, f"spring_{side}_per_deg")
+        numbers[f"{side}_coulomb_duty"] = groups.friction
+    numbers |= {"sample_s": sample_s, "substeps": 1, "ramp_deg": 0.5, "tanh_deg_per_s": 40.0}
+    return PseudoWiener("pw_r", numbers, friction="tanh")
+
+
+@dataclass(frozen=True)
+class Setup:
+    """What is not tuned: sampling, delay, noise."""
+
+    sample_s: float = 1e-3
+    delay_samples: int = 1
+    noise_deg: float = 0.03
+
+
+@dataclass(frozen=True)
+class Family:
+    """A kind of controller: what of it is tuned, and how it is built."""
+
+    label: str
+    space: Mapping[str, tuple[float, float, bool]]  # lower, upper, as a logarithm
+    build: Callable[[Groups, Mapping[str, float], Setup], Controller]
+
+
+def _guided(groups: Groups, x: Mapping[str, float], setup: Setup, **fixed: Any) -> GuidedPredictive:
+    first, second = round(x["first_move"]), round(x["second_move"])
+    settings: dict[str, Any] = {
+        "move_steps": (first, second, 20 - first - second),
+        "duty_change_weight": x["duty_change_weight"],
+        "speed_weight": x["speed_weight"],
+        "observer_angle_per_s": x["observer_angle_per_s"],
+        "observer_speed_per_s2": x["observer_speed_per_s2"],
+    }
+    for name in ("learning_rate_per_s", "gain_weight", "damping_weight", "bias_rate_per_deg_s", "trim_rate_per_deg_s"):
+        if name in x:
+            settings[name] = x[name]
+    return GuidedPredictive(
+        sample_s=setup.sample_s,
+        delay_samples=setup.delay_samples,
+        noise_deg=setup.noise_deg,
+        gain_deg_per_s2=groups.gain_deg_per_s2,
+        time_constant_s=groups.time_constant_s,
+        electrical_s=groups.electrical_s,
+        friction=groups.friction,
+        closed_deg=groups.closed_deg,
+        open_deg=groups.open_deg,
+        **groups.spring,
+        **settings,
+        **fixed,
+    )
+
+
+def _mgdd1(groups: Groups, x: Mapping[str, float], setup: Setup) -> Mgdd1:
+    return Mgdd1(
+        pw_r_of(groups, setup.sample_s),
+        delay_samples=setup.delay_samples,
+        horizon_samples=round(x["horizon_samples"]),
+        adaptation_gain=x["adaptation_gain"],
+        duty_change_weight=x["duty_change_weight"],
+        trim_rate_per_deg_s=x["trim_rate_per_deg_s"],
+    )
+
+
+def _pid(groups: Groups, x: Mapping[str, float], setup: Setup) -> Pid:
+    gains = {}
+    for side in _SIDES:
+        gains[f"proportional_{side}_per_deg"] = x["proportional"] / 90.0
+        gains[f"integral_{side}_per_deg_s"] = x["integral_per_s"] / 90.0
+        gains[f"derivative_{side}_s_per_deg"] = x["derivative_s"] / 90.0
+    return Pid(
+        sample_s=setup.sample_s,
+        kick=min(x["kick"] * groups.friction, 1.0),
+        kick_width_deg=x["kick_width_deg"],
+        integral_window_deg=x["integral_window_deg"],
+        dead_band_deg=x["dead_band_deg"],
+        rate_s_per_deg=x["rate"] / (groups.time_constant_s * groups.gain_deg_per_s2),
+        friction=min(x["friction"] * groups.friction, 1.0),
+        **groups.spring,
+        **gains,
+    )
+
+
+def _sliding_mode(groups: Groups, x: Mapping[str, float], setup: Setup) -> SlidingMode:
+    return SlidingMode(
+        sample_s=setup.sample_s,
+        gain_deg_per_s2=groups.gain_deg_per_s2,
+        time_constant_s=groups.time_constant_s,
+        switching=x["switching"],
+        layer_deg=x["layer_deg"],
+        integral_per_s=x["integral_per_s"],
+        bandwidth_per_s=x["bandwidth_per_s"],
+        reference_pole_per_s=x["reference_pole_per_s"],
+        friction=min(x["friction"] * groups.friction, 1.0),
+        integral_layers=x["integral_layers"],
+        reaching="implicit",
+        **groups.spring,
+    )
+
+
+_PREDICTIVE: dict[str, tuple[float, float, bool]] = {
+    "first_move": (1.0, 6.0, False),
+    "second_move": (3.0, 10.0, False),
+    "duty_change_weight": (0.3, 100.0, True),
+    "speed_weight": (1e-7, 1e-4, True),
+    "observer_angle_per_s": (200.0, 900.0, True),
+    "observer_speed_per_s2": (8e3, 7e4, True),
+}
+_PLAIN = _PREDICTIVE | {"bias_rate_per_deg_s": (0.3, 40.0, True), "trim_rate_per_deg_s": (0.05, 5.0, True)}
+
+FAMILIES: Mapping[str, Family] = {
+    "guided": Family(
+        "model-guided predictive",
+        _PREDICTIVE
+        | {
+            "learning_rate_per_s": (30.0, 600.0, True),
+            "gain_weight": (3.0, 300.0, True),
+            "damping_weight": (3.0, 300.0, True),
+        },
+        _guided,
+    ),
+    "mgdd1": Family(
+        "MGDD-1",
+        {
+            "horizon_samples": (4.0, 30.0, False),
+            "adaptation_gain": (0.1, 1.0, False),
+            "duty_change_weight": (1.0, 200.0, True),
+            "trim_rate_per_deg_s": (0.05, 5.0, True),
+        },
+        _mgdd1,
+    ),
+    "pid": Family(
+        "PID",
+        {
+            "proportional": (2.0, 30.0, True),
+            "integral_per_s": (1.0, 300.0, True),
+            "derivative_s": (0.02, 0.4, True),
+            "kick": (0.0, 1.5, False),
+            "kick_width_deg": (0.01, 1.0, True),
+            "integral_window_deg": (0.3, 20.0, True),
+            "dead_band_deg": (0.0, 0.15, False),
+            "rate": (0.0, 1.5, False),
+            "friction": (0.0, 1.5, False),
+        },
+        _pid,
+    ),
+    "sliding_mode": Family(
+        "sliding mode",
+        {
+            "switching": (0.1, 1.0, True),
+            "layer_deg": (0.3, 6.0, True),
+            "integral_per_s": (0.5, 40.0, True),
+            "bandwidth_per_s": (30.0, 200.0, True),
+            "reference_pole_per_s": (60.0, 300.0, True),
+            "friction": (0.0, 1.5, False),
+            "integral_layers": (0.3, 5.0, True),
+        },
+        _sliding_mode,
+    ),
+    "linear_mpc": Family(
+        "linear MPC",
+        _PLAIN,
+        lambda groups, x, setup: _guided(groups, x, setup, friction_learning=False, prediction="linear"),
+    ),
+    "nmpc": Family(
+        "nonlinear MPC",
+        _PLAIN,
+        lambda groups, x, setup: _guided(groups, x, setup, friction_learning=False, gauss_newton_steps=10),
+    ),
+}

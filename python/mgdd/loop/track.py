@@ -1,0 +1,317 @@
+"""Controllers on the virtual throttle: one run with its signals, or many throttles and references on all cores."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from typing import TYPE_CHECKING, Any, Protocol
+
+import numpy as np
+
+from mgdd import _core
+from mgdd.errors import ParameterError
+from mgdd.loop.reference import Reference
+from mgdd.loop.virtual_throttle import VirtualThrottle
+from mgdd.results.labels import labelled_dataset
+from mgdd.throttle import SensorPair, Throttle
+
+if TYPE_CHECKING:
+    import xarray as xr
+    from numpy.typing import ArrayLike, NDArray
+
+__all__ = ["AngleController", "track", "track_many"]
+
+FIGURES = (
+    "settling_ms",
+    "mse_deg2",
+    "static_error_deg",
+    "overshoot_deg",
+    "total_variation",
+    "limit_cycle_deg",
+    "largest_error_deg",
+)
+_CORE = (_core.control.GuidedPredictive, _core.control.Pid, _core.control.SlidingMode, _core.loop.Mgdd1)
+
+
+class AngleController(Protocol):
+    """A controller of the plate: any object with this method."""
+
+    def step(self, reference_deg: float, measurement_deg: float) -> float:
+        """Give the duty of this sample."""
+        ...
+
+
+def sensors_of(noise_deg: float) -> SensorPair:
+    """Give position sensors with that noise and no filter."""
+    if not 0.0 <= noise_deg <= 10.0:
+        raise ParameterError.of("noise_deg", noise_deg, "in [0, 10] deg")
+    ideal = SensorPair()
+    return SensorPair(noise_v=noise_deg * ideal.span_v / ideal.travel_deg, lag_s=0.0)
+
+
+def core_of(controller: Any) -> Any:
+    """Give the controller of the core behind a controller of mgdd, or None for one of the user."""
+    inner = getattr(controller, "_core", controller)
+    return inner if isinstance(inner, _CORE) else None
+
+
+def track(
+    controller: AngleController,
+    reference: Reference | str | ArrayLike,
+    *,
+    throttle: Throttle | None = None,
+    delay_samples: int = 1,
+    airflow_torque_nm: ArrayLike | None = None,
+    supply_v: ArrayLike | None = None,
+    start_deg: float | None = None,
+    noise_deg: float = 0.03,
+    sensors: SensorPair | None = None,
+    seed: int = 0,
+) -> xr.Dataset:
+    """Run a controller on the virtual throttle along a reference, and say how well it followed.
+
+    Parameters
+    ----------
+    controller : object
+        A controller of `mgdd.control`, or any object with ``step(reference_deg, measurement_deg) -> duty``. It goes on
+        from its present state and is left in the state after the run.
+    reference : Reference, str or array_like, shape (n,)
+        What to follow: a `Reference`, what `Reference.parse` reads, or angles [deg] 1 ms apart.
+    throttle : Throttle, optional
+        The plant; the preset ``P1`` if left out.
+    delay_samples : int
+        Whole samples between the computed duty and its effect, 0 to 16.
+    airflow_torque_nm, supply_v : array_like, shape (n,), optional
+        Torque on the plate [N m], positive when it opens, and supply of the bridge [V]; one number acts all the time.
+    start_deg : float, optional
+        Angle at rest at the start [deg]; the first angle of the reference, inside the travel, if left out.
+    noise_deg : float
+        Standard deviation of the measured angle [deg]; not used where `sensors` are given.
+    sensors : SensorPair, optional
+        The position sensors.
+    seed : int
+        Of the noise.
+
+    Returns
+    -------
+    xarray.Dataset
+        Over ``time_s``: ``reference_deg``, ``angle_deg`` (true, at the end of the sample), ``sensed_angle_deg``,
+        ``speed_deg_per_s``, ``current_a`` and ``duty`` [-]. Scalars, judged from ``reference.from_s`` on:
+        ``settling_ms`` (until the error stays in the band; NaN: never), ``mse_deg2``, ``static_error_deg`` (mean size
+        over the last 0.1 s), ``overshoot_deg``, ``total_variation`` of the duty [-], ``limit_cycle_deg`` (peak to peak
+        over the last 0.3 s of a reference that stands still) and ``largest_error_deg``.
+
+    Raises
+    ------
+    mgdd.errors.ParameterError
+        A bad setting, or an object that is no controller.
+    mgdd.errors.ShapeError
+        Columns of different length.
+
+    Examples
+    --------
+    >>> from mgdd.control import GuidedPredictive
+    >>> from mgdd.loop import track
+    >>> run = track(GuidedPredictive(), "step:40:42", seed=1)
+    >>> float(run["settling_ms"]) < 30.0, run["settling_ms"].units
+    (True, 'millisecond')
+    """
+    wanted = _reference_of(reference)
+    plant = _plant(throttle, wanted, start_deg, sensors or sensors_of(noise_deg), seed)
+    n = len(wanted.angle_deg)
+    airflow, supply = _column("airflow_torque_nm", airflow_torque_nm, n), _column("supply_v", supply_v, n)
+    inner = core_of(controller)
+    if inner is not None:
+        run = _core.loop.track_throttle(
+            inner,
+            plant._core,
+            delay_samples=delay_samples,
+            reference_deg=wanted.angle_deg,
+            airflow_torque_nm=airflow,
+            supply_v=supply,
+            from_sample=wanted.from_sample,
+            band_deg=wanted.band_deg,
+        )
+        figures = {name: float(column[0]) for name, column in run.pop("figures").items()}
+    elif callable(getattr(controller, "step", None)):
+        run = _run_in_python(controller, plant, wanted.angle_deg, delay_samples, airflow, supply)
+        figures = _core.loop.tracking_figures(
+            reference_deg=wanted.angle_deg,
+            angle_deg=run["angle_deg"],
+            duty=run["duty"],
+            sample_s=wanted.sample_s,
+            from_sample=wanted.from_sample,
+            band_deg=wanted.band_deg,
+        )
+    else:
+        raise ParameterError.of("controller", controller, "an object with step(reference_deg, measurement_deg)")
+    variables: dict[str, tuple[Any, ...]] = {"time_s": ("time_s", np.arange(n) * wanted.sample_s)}
+    variables["reference_deg"] = ("time_s", wanted.angle_deg)
+    for name, column in run.items():
+        variables[name] = ("time_s", column)
+    for name in FIGURES:
+        variables[name] = ((), float(figures[name]))
+    for name, column in (("airflow_torque_nm", airflow), ("supply_v", supply)):
+        if len(column):
+            variables[name] = ("time_s", column)
+    attributes = {"reference": wanted.name, "band_deg": wanted.band_deg, "delay_samples": delay_samples, "seed": seed}
+    return labelled_dataset(variables, attrs=attributes)
+
+
+def track_many(
+    controllers: Mapping[str, AngleController],
+    references: Sequence[Reference | str],
+    throttles: Sequence[Throttle],
+    *,
+    delay_samples: int = 1,
+    airflow_torque_nm: Mapping[str, ArrayLike] | None = None,
+    noise_deg: float = 0.03,
+    first_seed: int = 0,
+    threads: int = 0,
+) -> xr.Dataset:
+    """Run every controller along every reference on every throttle, on all cores.
+
+    Parameters
+    ----------
+    controllers : mapping of str to controller
+        Controllers of `mgdd.control` by name; each run starts from a copy.
+    references : sequence of Reference or str
+        As for `track`, all with the same sample time.
+    throttles : sequence of Throttle
+        The plants; the noise of number i has the seed ``first_seed + i`` in every run.
+    delay_samples, noise_deg : int, float
+        As for `track`.
+    airflow_torque_nm : mapping of str to array_like, optional
+        Torque on the plate [N m] by the name of the reference, one number or one per sample.
+    first_seed : int
+        Of the noise of the first throttle.
+    threads : int
+        0 for all cores.
+
+    Returns
+    -------
+    xarray.Dataset
+        The scalars of `track` over ``throttle``, ``controller`` and ``reference``.
+
+    Raises
+    ------
+    mgdd.errors.ParameterError
+        Nothing to run, a controller that is not one of mgdd, references of different sample time.
+    mgdd.errors.Interrupted
+        Ctrl-C: nothing is kept.
+
+    Examples
+    --------
+    >>> from mgdd.control import GuidedPredictive, Pid
+    >>> from mgdd.loop import track_many
+    >>> from mgdd.throttle import Throttle
+    >>> plants = [Throttle().replace(coulomb_nm=0.25 + 0.01 * i) for i in range(5)]
+    >>> runs = track_many({"guided": GuidedPredictive(), "PID": Pid()}, ["step:40:42"], plants)
+    >>> mse = runs["mse_deg2"].mean("throttle").squeeze()
+    >>> bool(mse.sel(controller="guided") < mse.sel(controller="PID"))
+    True
+    """
+    wanted = [_reference_of(reference) for reference in references]
+    if not wanted or not controllers or not throttles:
+        raise ParameterError("controllers, references and throttles: give at least one each")
+    if len({reference.sample_s for reference in wanted}) > 1:
+        raise ParameterError("references: must all have the same sample_s")
+    inner = [core_of(controller) for controller in controllers.values()]
+    for name, core in zip(controllers, inner, strict=True):
+        if core is None:
+            raise ParameterError.of(
+                f"controllers[{name!r}]", controllers[name], "a controller of mgdd; run others with track"
+            )
+    sensors = sensors_of(noise_deg)
+    plants = [
+        _plant(throttle, wanted[0], None, sensors, first_seed + number)._core
+        for number, throttle in enumerate(throttles)
+    ]
+    flows = dict(airflow_torque_nm or {})
+    unknown = set(flows) - {reference.name for reference in wanted}
+    if unknown:
+        raise ParameterError.of("airflow_torque_nm", sorted(unknown), "names of references")
+    scenarios = [
+        (r.angle_deg, _column("airflow_torque_nm", flows.get(r.name), len(r.angle_deg)), np.empty(0), r.from_sample)
+        for r in wanted
+    ]
+    figures, _ = _core.loop.track_throttles(
+        plants,
+        inner,
+        scenarios,
+        delay_samples=delay_samples,
+        band_deg=[r.band_deg for r in wanted],
+        threads=threads,
+    )
+    shape = (len(throttles), len(inner), len(wanted))
+    dims = ("throttle", "controller", "reference")
+    variables: dict[str, tuple[Any, ...]] = {
+        "throttle": ("throttle", np.arange(len(throttles)), "-", "number of the throttle"),
+        "controller": ("controller", list(controllers), "-", "controller"),
+        "reference": ("reference", [r.name for r in wanted], "-", "reference"),
+    }
+    for name in FIGURES:
+        variables[name] = (dims, np.asarray(figures[name]).reshape(shape))
+    return labelled_dataset(
+        variables, attrs={"delay_samples": delay_samples, "noise_deg": noise_deg, "seed": first_seed}
+    )
+
+
+def step_times_us(controller: AngleController, run: xr.Dataset) -> tuple[float, float]:
+    """Replay a run through a controller of mgdd, and give median and 99.9th percentile of its step [us]."""
+    inner = core_of(controller)
+    if inner is None:
+        raise ParameterError.of("controller", controller, "a controller of mgdd")
+    times = _core.loop.step_times_us(inner, run["reference_deg"].to_numpy(), run["sensed_angle_deg"].to_numpy())
+    return float(np.median(times)), float(np.quantile(times, 0.999))
+
+
+def _reference_of(given: Reference | str | ArrayLike) -> Reference:
+    if isinstance(given, Reference):
+        return given
+    if isinstance(given, str):
+        return Reference.parse(given)
+    return Reference(angle_deg=np.asarray(given, float))
+
+
+def _plant(
+    throttle: Throttle | None, reference: Reference, start_deg: float | None, sensors: SensorPair, seed: int
+) -> VirtualThrottle:
+    body = Throttle() if throttle is None else throttle
+    start = float(np.clip(reference.angle_deg[0], body.closed_deg, body.open_deg)) if start_deg is None else start_deg
+    return VirtualThrottle(body, sensors=sensors, start_deg=start, sample_s=reference.sample_s, seed=seed)
+
+
+def _column(name: str, given: ArrayLike | None, n: int) -> NDArray[np.float64]:
+    if given is None:
+        return np.empty(0)
+    column = np.asarray(given, float)
+    if column.ndim > 1:
+        raise ParameterError.of(name, f"an array of shape {column.shape}", "one number or one per sample")
+    return np.full(n, float(column)) if column.ndim == 0 else column
+
+
+def _run_in_python(
+    controller: AngleController,
+    plant: VirtualThrottle,
+    reference_deg: NDArray[np.float64],
+    delay_samples: int,
+    airflow: NDArray[np.float64],
+    supply: NDArray[np.float64],
+) -> dict[str, NDArray[np.float64]]:
+    if not 0 <= delay_samples <= 16:
+        raise ParameterError.of("delay_samples", delay_samples, "in [0, 16]")
+    names = ("angle_deg", "sensed_angle_deg", "speed_deg_per_s", "current_a", "duty")
+    out = {name: np.empty(len(reference_deg)) for name in names}
+    still = plant._still
+    measured = plant.start_deg
+    for k, wanted in enumerate(reference_deg):
+        out["duty"][k] = controller.step(float(wanted), measured)
+        values = plant._core.step(
+            duty=out["duty"][k - delay_samples] if k >= delay_samples else 0.0,
+            supply_v=supply[k] if len(supply) else still["supply_v"],
+            airflow_torque_nm=airflow[k] if len(airflow) else 0.0,
+        )
+        measured = values["sensed_angle_deg"]
+        for name in names[:-1]:
+            out[name][k] = values[name]
+    return out

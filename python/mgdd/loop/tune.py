@@ -1,0 +1,342 @@
+"""Controllers tuned alike: one cost, one set of throttles and references, one budget for every kind."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import dataclass, field
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+
+from mgdd.errors import ParameterError
+from mgdd.loop.controller_families import FAMILIES, Family, Groups, Setup, groups_of
+from mgdd.loop.reference import Reference
+from mgdd.loop.track import track_many
+from mgdd.loop.tuned_sets import TUNED_SETS
+
+if TYPE_CHECKING:
+    import xarray as xr
+
+    from mgdd.control import GuidedPredictive, Mgdd1, Pid, SlidingMode
+    from mgdd.throttle import Throttle
+
+    Controller = GuidedPredictive | Mgdd1 | Pid | SlidingMode
+
+__all__ = ["Tuning", "draw_throttles", "tracking_cost", "tune_controller", "tuned_controller"]
+
+_SPREAD_FIELDS = (
+    ("inertia_kgm2",),
+    ("viscous_nms_per_rad",),
+    ("torque_constant_nm_per_a", "back_emf_vs_per_rad"),
+    ("resistance_ohm",),
+    ("spring_above_nm_per_rad", "spring_below_nm_per_rad"),
+    ("preload_above_nm", "preload_below_nm"),
+    ("coulomb_nm", "stiction_nm"),
+)
+_MOST = 5.0  # a run that never settles costs as much as one that takes five times as long as wanted
+
+
+def draw_throttles(throttle: Throttle, n: int, *, spread: float = 0.2, seed: int = 0) -> list[Throttle]:
+    """Draw throttles around one: inertia, viscous friction, motor, resistance, springs, preloads and dry friction.
+
+    Parameters
+    ----------
+    throttle : Throttle
+        The centre.
+    n : int
+        How many.
+    spread : float
+        Each of the seven numbers is multiplied by one from ``1 - spread`` to ``1 + spread``, evenly.
+    seed : int
+        Of the draw.
+
+    Returns
+    -------
+    list of Throttle
+        Equal seeds draw equal throttles.
+
+    Raises
+    ------
+    mgdd.errors.ParameterError
+        A spread outside [0, 0.9] or a negative number of throttles.
+
+    Examples
+    --------
+    >>> from mgdd.loop.tune import draw_throttles
+    >>> from mgdd.throttle import Throttle
+    >>> first, second = draw_throttles(Throttle(), 2, seed=1)
+    >>> 0.8 <= first.coulomb_nm / Throttle().coulomb_nm <= 1.2, first == second
+    (True, False)
+    """
+    if not 0.0 <= spread <= 0.9:
+        raise ParameterError.of("spread", spread, "in [0, 0.9]")
+    if n < 0:
+        raise ParameterError.of("n", n, ">= 0")
+    factors = 1.0 + spread * (2.0 * np.random.default_rng(seed).random((n, len(_SPREAD_FIELDS))) - 1.0)
+    return [
+        throttle.replace(
+            **{
+                name: getattr(throttle, name) * float(factor)
+                for names, factor in zip(_SPREAD_FIELDS, row, strict=True)
+                for name in names
+            }
+        )
+        for row in factors
+    ]
+
+
+def tuning_references() -> dict[str, tuple[Reference, float]]:
+    """Give the references of the tuner with their wanted settling time [ms], of the sine its mean square error."""
+    wanted = {(20, 60): 70.0, (60, 25): 70.0, (40, 42): 25.0, (42, 41): 20.0, (4, 20): 50.0, (20, 4): 50.0}
+    steps = [
+        (Reference.step(a, b, hold_s=0.4, after_s=0.6, band_deg=max(0.2, 0.02 * abs(b - a))), ms)
+        for (a, b), ms in wanted.items()
+    ]
+    sine = Reference.sine(40.0, 10.0, 1.0, duration_s=2.0, skip_s=0.5)
+    return {reference.name: (reference, goal) for reference, goal in [*steps, (sine, 0.05)]}
+
+
+def tracking_cost(runs: xr.Dataset) -> float:
+    """Cost of runs along `tuning_references`: mean over the throttles plus half their 95th percentile.
+
+    Of each throttle: settling times over the wanted ones, the sine's error over the wanted one, each at most 5, mean
+    static error over 0.1 deg, half the mean overshoot in deg, mean total variation over 20, and 5 per limit cycle
+    above 0.5 deg.
+    """
+    goals = tuning_references()
+    total = np.zeros(runs.sizes["throttle"])
+    for name, (_, goal) in goals.items():
+        run = runs.sel(reference=name)
+        if name.startswith("sine"):
+            total += np.minimum(run["mse_deg2"].to_numpy() / goal, _MOST)
+            continue
+        settling = np.nan_to_num(run["settling_ms"].to_numpy(), nan=1e9)
+        total += np.minimum(settling / goal, _MOST)
+        total += 5.0 * (run["limit_cycle_deg"].to_numpy() > 0.5)
+        total += np.minimum(run["static_error_deg"].to_numpy() / 0.1, _MOST) / 6.0
+        total += 0.5 * np.minimum(run["overshoot_deg"].to_numpy(), 10.0) / 6.0
+    total += np.minimum(runs["total_variation"].mean("reference").to_numpy() / 20.0, _MOST)
+    return float(total.mean() + 0.5 * np.quantile(total, 0.95))
+
+
+@dataclass(frozen=True, kw_only=True)
+class Tuning:
+    """What tuning found: numbers that `tuned_controller` takes, and how the search went."""
+
+    kind: str
+    numbers: Mapping[str, float]
+    cost: float
+    start_cost: float
+    evaluations: int
+    settings: Mapping[str, Any] = field(default_factory=dict)
+
+
+def tune_controller(
+    kind: str,
+    throttle: Throttle,
+    *,
+    n_throttles: int = 20,
+    spread: float = 0.2,
+    budget: int = 200,
+    seed: int = 0,
+    delay_samples: int = 1,
+    noise_deg: float = 0.03,
+    threads: int = 0,
+    progress: Callable[[int, float], None] | None = None,
+) -> Tuning:
+    """Tune a kind of controller for throttles around one; it knows that one only.
+
+    Every kind has the same references, throttles, noise, cost and budget: the shipped set, a Latin hypercube over its
+    numbers (a third of the budget), then the simplex of Nelder and Mead (1965) from its best corners.
+
+    Parameters
+    ----------
+    kind : str
+        ``guided``, ``mgdd1``, ``pid``, ``sliding_mode``, ``linear_mpc`` or ``nmpc``.
+    throttle : Throttle
+        The centre of the throttles, and what the controller knows.
+    n_throttles, spread : int, float
+        How many throttles, and the share by which seven of their numbers vary.
+    budget : int
+        Runs of the whole set, at least 30.
+    seed : int
+        Of throttles, noise and search.
+    delay_samples, noise_deg, threads : int, float, int
+        As for `track_many`.
+    progress : callable, optional
+        Called with the number of runs and the least cost so far.
+
+    Returns
+    -------
+    Tuning
+        Its ``numbers`` make the controller: ``tuned_controller(kind, throttle, numbers=tuning.numbers)``.
+
+    Raises
+    ------
+    mgdd.errors.ParameterError
+        An unknown kind or a budget below 30.
+
+    Examples
+    --------
+    >>> from mgdd.loop import tune_controller
+    >>> from mgdd.throttle import Throttle
+    >>> tuning = tune_controller("mgdd1", Throttle(), n_throttles=2, budget=30)
+    >>> tuning.cost <= tuning.start_cost, tuning.evaluations
+    (True, 30)
+    """
+    from scipy.optimize import minimize
+    from scipy.stats import qmc
+
+    family = _family(kind)
+    if budget < 30:
+        raise ParameterError.of("budget", budget, ">= 30")
+    groups = groups_of(throttle)
+    setup = Setup(delay_samples=delay_samples, noise_deg=noise_deg)
+    throttles = draw_throttles(throttle, n_throttles, spread=spread, seed=seed)
+    references = [reference for reference, _ in tuning_references().values()]
+    names = list(family.space)
+    seen: list[tuple[float, tuple[float, ...]]] = []
+
+    def cost_of(shares: Sequence[float]) -> float:
+        if len(seen) >= budget:
+            raise StopIteration
+        inside = np.clip(np.asarray(shares, float), 0.0, 1.0)
+        controller = family.build(groups, _numbers(family.space, inside), setup)
+        runs = track_many(
+            {kind: controller},
+            references,
+            throttles,
+            delay_samples=delay_samples,
+            noise_deg=noise_deg,
+            first_seed=seed,
+            threads=threads,
+        )
+        outside = float(np.abs(np.asarray(shares, float) - inside).sum())
+        cost = tracking_cost(runs.isel(controller=0)) + 10.0 * outside
+        seen.append((cost, tuple(map(float, inside))))
+        if progress is not None:
+            progress(len(seen), min(seen)[0])
+        return cost
+
+    start_cost = cost_of(_shares(family.space, _shipped(kind, groups)))
+    for point in qmc.LatinHypercube(len(names), seed=seed).random(budget // 3):
+        cost_of(point)
+    while len(seen) < budget:
+        corners = np.array([point for _, point in sorted(seen)[: len(names) + 1]])
+        before = len(seen)
+        try:
+            minimize(
+                cost_of,
+                corners[0],
+                method="Nelder-Mead",
+                options={"initial_simplex": corners, "adaptive": True, "xatol": 1e-3, "fatol": 1e-3},
+            )
+        except StopIteration:
+            break
+        if len(seen) < before + 2 * len(names):  # it stands: look elsewhere near the best
+            rng = np.random.default_rng([seed, len(seen)])
+            try:
+                for _ in range(2 * len(names)):
+                    cost_of(np.clip(corners[0] + 0.1 * rng.normal(size=len(names)), 0.0, 1.0))
+            except StopIteration:
+                break
+    best, point = min(seen)
+    return Tuning(
+        kind=kind,
+        numbers=_numbers(family.space, point),
+        cost=best,
+        start_cost=start_cost,
+        evaluations=len(seen),
+        settings={"n_throttles": n_throttles, "spread": spread, "seed": seed, "noise_deg": noise_deg},
+    )
+
+
+def tuned_controller(
+    kind: str,
+    model: Any = None,
+    *,
+    numbers: Mapping[str, float] | None = None,
+    sample_s: float = 1e-3,
+    delay_samples: int | None = None,
+    noise_deg: float = 0.03,
+) -> Controller:
+    """Give a controller for a throttle, with the numbers that one tuner found for every kind.
+
+    Parameters
+    ----------
+    kind : str
+        ``guided`` (model-guided predictive), ``mgdd1``, ``pid``, ``sliding_mode``, ``linear_mpc`` or ``nmpc``.
+    model : optional
+        What the controller knows: a `Throttle`, PW-R, or fitted first-principle groups; the preset ``P1`` if left out.
+    numbers : mapping of str to float, optional
+        Of `tune_controller`; those of the preset whose groups are nearest to the model's if left out.
+    sample_s, noise_deg : float
+        Time between samples [s], and standard deviation of the measured angle [deg].
+    delay_samples : int, optional
+        From a duty to its effect; that of the model, or 1, if left out.
+
+    Returns
+    -------
+    GuidedPredictive, Mgdd1, Pid or SlidingMode
+        Ready to run.
+
+    Raises
+    ------
+    mgdd.errors.ParameterError
+        An unknown kind, a model without groups, unknown numbers.
+
+    Examples
+    --------
+    >>> from mgdd.loop import track, tuned_controller
+    >>> {kind: type(tuned_controller(kind)).__name__ for kind in ("guided", "pid", "nmpc")}
+    {'guided': 'GuidedPredictive', 'pid': 'Pid', 'nmpc': 'GuidedPredictive'}
+    """
+    family = _family(kind)
+    if model is None:
+        from mgdd.throttle import Throttle
+
+        model = Throttle()
+    groups = groups_of(model)
+    chosen = _shipped(kind, groups) if numbers is None else dict(numbers)
+    if set(chosen) != set(family.space):
+        raise ParameterError.of("numbers", sorted(chosen), f"exactly {', '.join(family.space)}")
+    if delay_samples is None:
+        delay_samples = 1 if groups.delay_samples is None else round(groups.delay_samples)
+    return family.build(groups, chosen, Setup(sample_s, delay_samples, noise_deg))
+
+
+def _family(kind: str) -> Family:
+    if kind not in FAMILIES:
+        raise ParameterError.of("kind", kind, f"one of {', '.join(FAMILIES)}")
+    return FAMILIES[kind]
+
+
+def _distance(a: Groups, b: Groups) -> float:
+    names = ("gain_deg_per_s2", "time_constant_s", "friction", "preload_above", "spring_above_per_deg")
+    pairs = [(getattr(a, name), getattr(b, name)) for name in names]
+    return sum(math.log(max(x, 1e-9) / max(y, 1e-9)) ** 2 for x, y in pairs)
+
+
+def _shipped(kind: str, groups: Groups) -> dict[str, float]:
+    from mgdd import presets
+
+    sets = TUNED_SETS[kind]
+    near = min(sets, key=lambda name: _distance(groups, groups_of(presets.load(name, kind="throttle").throttle)))
+    return dict(sets[near])
+
+
+def _numbers(space: Mapping[str, tuple[float, float, bool]], shares: Sequence[float]) -> dict[str, float]:
+    out = {}
+    for (name, (low, high, logarithmic)), share in zip(space.items(), shares, strict=True):
+        value = low * (high / low) ** share if logarithmic else low + (high - low) * share
+        out[name] = float(f"{value:.4g}")
+    return out
+
+
+def _shares(space: Mapping[str, tuple[float, float, bool]], numbers: Mapping[str, float]) -> list[float]:
+    out = []
+    for name, (low, high, logarithmic) in space.items():
+        value = min(max(numbers[name], low), high)
+        out.append(math.log(value / low) / math.log(high / low) if logarithmic else (value - low) / (high - low))
+    return out

@@ -1,0 +1,204 @@
+"""Controllers along a reference: figures, own controllers, warm starts, tuning, the command line, refusals."""
+
+from __future__ import annotations
+
+import json
+import math
+import pickle
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pytest
+
+from mgdd.cli import main
+from mgdd.control import GuidedPredictive, Mgdd1, Pid, SlidingMode
+from mgdd.errors import DataError, ParameterError, ShapeError
+from mgdd.loop import Reference, VirtualThrottle, track, track_many, tune_controller, tuned_controller
+from mgdd.loop.controller_families import FAMILIES, groups_of
+from mgdd.loop.track import FIGURES, sensors_of
+from mgdd.loop.tune import draw_throttles
+from mgdd.throttle import PseudoWiener, Throttle
+
+
+class Proportional:
+    """A controller of a user."""
+
+    def step(self, reference_deg: float, measurement_deg: float) -> float:
+        return max(-1.0, min(1.0, 0.14 + 0.05 * (reference_deg - measurement_deg)))
+
+
+def test_the_loop_in_the_core_is_the_loop_that_a_user_writes() -> None:
+    reference = Reference.step(40.0, 45.0, hold_s=0.1, after_s=0.2)
+    run = track(Pid(), reference, seed=3)
+    plant, pid, measured, sent = VirtualThrottle(start_deg=40.0, sensors=sensors_of(0.03), seed=3), Pid(), 40.0, 0.0
+    for k, wanted in enumerate(reference.angle_deg):
+        computed = pid.step(float(wanted), measured)
+        plant.apply({"duty": sent})
+        values = plant.measure().values
+        sent, measured = computed, values["sensed_angle_deg"]
+        assert run["duty"][k] == computed
+        assert run["angle_deg"][k] == values["angle_deg"]
+
+
+def test_a_controller_of_the_user_runs_too_and_is_judged_alike() -> None:
+    run = track(Proportional(), "step:40:42", seed=1)
+    error = run["reference_deg"].to_numpy() - run["angle_deg"].to_numpy()
+    assert float(run["mse_deg2"]) == pytest.approx(float(np.mean(error[500:] ** 2)))
+    assert math.isnan(float(run["settling_ms"]))  # it stays off the reference
+    assert set(FIGURES) <= set(run)
+
+
+def test_a_run_leaves_its_controller_behind_and_what_it_learnt_starts_another() -> None:
+    heavy = Throttle().replace(coulomb_nm=0.40, stiction_nm=0.40)
+    controller = GuidedPredictive()
+    track(controller, Reference.sine(40.0, 12.0, 1.0, duration_s=2.0, skip_s=0.0), throttle=heavy, seed=1)
+    learnt = controller.learnt
+    assert learnt["friction_above"] == pytest.approx(0.40 / 3.064, rel=0.1)
+    warm = GuidedPredictive()
+    warm.learnt = learnt
+    cold = track(GuidedPredictive(), "step:40:42", throttle=heavy, seed=2)
+    assert float(track(warm, "step:40:42", throttle=heavy, seed=2)["mse_deg2"]) < float(cold["mse_deg2"])
+    before = warm.learnt
+    with pytest.raises(ParameterError, match="gain_factor"):
+        warm.learnt = {"bias_above": 0.1, "gain_factor": 9.0}
+    assert warm.learnt == before
+
+
+def test_air_and_supply_act() -> None:
+    still = track(GuidedPredictive(), "step:40:42", seed=1)
+    blown = track(GuidedPredictive(), "step:40:42", airflow_torque_nm=-0.3, seed=1)
+    assert float(blown["duty"][1000]) > float(still["duty"][1000]) + 0.03
+    n = still.sizes["time_s"]
+    weak = track(GuidedPredictive(), "step:20:60", supply_v=np.full(n, 8.0), seed=1)
+    assert float(weak["settling_ms"]) > float(track(GuidedPredictive(), "step:20:60", seed=1)["settling_ms"])
+    assert {"airflow_torque_nm"} <= set(blown) - set(still)
+
+
+def test_many_runs_are_the_single_ones() -> None:
+    throttles = draw_throttles(Throttle(), 3, seed=5)
+    references = [Reference.parse("step:40:42"), Reference.parse("sine:30:5:2")]
+    controllers = {"guided": GuidedPredictive(), "mgdd1": Mgdd1(), "sliding": SlidingMode()}
+    runs = track_many(controllers, references, throttles, first_seed=10, threads=2)
+    assert runs["mse_deg2"].dims == ("throttle", "controller", "reference")
+    one = track(Mgdd1(), references[1], throttle=throttles[2], seed=12)
+    picked = runs.isel(throttle=2).sel(controller="mgdd1", reference="sine:30:5:2")
+    for name in FIGURES:
+        assert float(picked[name]) == float(one[name])
+
+
+@pytest.mark.parametrize("kind", FAMILIES)
+def test_every_kind_is_tuned_for_every_preset_and_follows(kind: str) -> None:
+    controller = tuned_controller(kind, Throttle())
+    run = track(controller, "step:20:60", seed=4)
+    assert float(run["static_error_deg"]) < 0.5
+    assert float(run["limit_cycle_deg"]) < 0.5
+    again = pickle.loads(pickle.dumps(controller))
+    assert [controller.step(50.0, 45.0 + 0.1 * k) for k in range(20)] == [
+        again.step(50.0, 45.0 + 0.1 * k) for k in range(20)
+    ]
+
+
+def test_a_controller_is_made_from_a_throttle_or_from_pw_r_alike() -> None:
+    throttle = Throttle().replace(limp_home_deg=11.0, preload_below_nm=0.5)
+    first, second = groups_of(throttle), groups_of(PseudoWiener.of_throttle(throttle))
+    assert second.preload_below == pytest.approx(first.preload_below)
+    assert second.friction == pytest.approx(first.friction)
+    assert second.gain_deg_per_s2 == pytest.approx(first.gain_deg_per_s2)
+    with pytest.raises(ParameterError, match="model"):
+        groups_of(PseudoWiener("pw_w"))
+
+
+def test_tuning_improves_and_repeats() -> None:
+    first = tune_controller("mgdd1", Throttle(), n_throttles=2, budget=36, seed=1)
+    again = tune_controller("mgdd1", Throttle(), n_throttles=2, budget=36, seed=1)
+    assert first == again
+    assert first.cost <= first.start_cost
+    assert first.evaluations == 36
+    tuned_controller("mgdd1", Throttle(), numbers=first.numbers)
+
+
+def test_draws_stay_inside_their_spread_and_keep_pairs_together() -> None:
+    centre = Throttle()
+    for throttle in draw_throttles(centre, 50, spread=0.3, seed=2):
+        assert 0.7 <= throttle.inertia_kgm2 / centre.inertia_kgm2 <= 1.3
+        assert throttle.stiction_nm / throttle.coulomb_nm == pytest.approx(centre.stiction_nm / centre.coulomb_nm)
+        assert throttle.supply_v == centre.supply_v
+
+
+def test_references_are_read_from_text_and_files(tmp_path: Path) -> None:
+    step = Reference.parse("step:42:-1")
+    assert (step.angle_deg[0], step.angle_deg[-1], step.from_sample) == (42.0, -1.0, 500)
+    file = tmp_path / "wanted.csv"
+    file.write_text("time_s,reference_deg\n0,10\n0.002,11\n0.004,12\n", encoding="utf-8")
+    read = Reference.parse(str(file))
+    assert (read.sample_s, list(read.angle_deg), read.name) == (pytest.approx(0.002), [10.0, 11.0, 12.0], "wanted")
+    file.write_text("time_s,angle\n0,10\n1,11\n", encoding="utf-8")
+    with pytest.raises(DataError, match="reference_deg"):
+        Reference.parse(str(file))
+
+
+@pytest.mark.parametrize(
+    ("call", "kind", "word"),
+    [
+        (lambda: Reference.parse("stp:1:2"), ParameterError, "step:FROM:TO"),
+        (lambda: Reference.parse("step:1:nan"), ParameterError, "step:FROM:TO"),
+        (lambda: Reference.parse("sine:1:2"), ParameterError, "sine:MEAN"),
+        (lambda: Reference.sine(40.0, 5.0, 600.0), ParameterError, "frequency_hz"),
+        (lambda: Reference(angle_deg=np.array([])), ShapeError, "at least one"),
+        (lambda: Reference(angle_deg=np.array([1.0, math.nan])), DataError, r"\[1\]"),
+        (lambda: Reference(angle_deg=np.ones(5), from_s=1.0), ParameterError, "from_s"),
+        (lambda: track(3, "step:1:2"), ParameterError, "controller"),  # type: ignore[arg-type]
+        (lambda: track(Pid(), "step:40:42", noise_deg=-1.0), ParameterError, "noise_deg"),
+        (lambda: track(Proportional(), "step:40:42", delay_samples=17), ParameterError, "delay_samples"),
+        (lambda: track(Pid(), "step:40:42", airflow_torque_nm=[1.0, 2.0]), ShapeError, "airflow_torque_nm"),
+        (lambda: track_many({}, ["step:1:2"], [Throttle()]), ParameterError, "at least one"),
+        (lambda: track_many({"own": Proportional()}, ["step:1:2"], [Throttle()]), ParameterError, "track"),
+        (lambda: tuned_controller("pi"), ParameterError, "guided"),
+        (lambda: tuned_controller("pid", numbers={"kick": 1.0}), ParameterError, "proportional"),
+        (lambda: tune_controller("pid", Throttle(), budget=5), ParameterError, "budget"),
+        (lambda: Mgdd1(Throttle()), ParameterError, "guide"),  # type: ignore[arg-type]
+        (lambda: GuidedPredictive(move_steps=(40, 20, 20)), ParameterError, "move_steps"),
+    ],
+)
+def test_refusals_name_field_and_remedy(call: Any, kind: type[Exception], word: str) -> None:
+    with pytest.raises(kind, match=word):
+        call()
+
+
+def run_json(capsys: pytest.CaptureFixture[str], *argv: str) -> dict[str, Any]:
+    assert main([*argv, "--json"]) == 0
+    out: dict[str, Any] = json.loads(capsys.readouterr().out)
+    return out
+
+
+def test_the_command_line_tracks(capsys: pytest.CaptureFixture[str], tmp_path: Path) -> None:
+    table, figure = tmp_path / "run.csv", tmp_path / "run.png"
+    out = run_json(
+        capsys, "throttle", "track", "--controller", "guided", "--reference", "step:40:42", "--plant", "P2",
+        "--plant-scale", "coulomb_nm=1.3", "--seed", "4", "-o", str(table), "--figure", str(figure),
+    )  # fmt: skip
+    assert out["settling_ms"] < 60.0
+    assert out["plant_scale"] == {"coulomb_nm": 1.3, "stiction_nm": 1.3}
+    assert 0.0 < out["step_us_p50"] <= out["step_us_p999"]
+    assert set(FIGURES) <= set(out)
+    header = table.read_text(encoding="utf-8").splitlines()
+    assert "reference_deg" in header[0] + header[1]
+    assert figure.stat().st_size > 10_000
+    never = run_json(
+        capsys, "throttle", "track", "--controller", "pid", "--reference", "step:40:200", "--airflow", "-0.2"
+    )
+    assert never["settling_ms"] is None
+    for argv in (
+        ["throttle", "track", "--plant-scale", "colomb_nm=1.2"],
+        ["throttle", "track", "--reference", "step:40"],
+        ["throttle", "track", "--plant", "puma_single"],
+    ):
+        assert main(argv) == 2
+    assert "coulomb_nm" in capsys.readouterr().err
+
+
+def test_the_command_line_tunes(capsys: pytest.CaptureFixture[str]) -> None:
+    out = run_json(capsys, "throttle", "tune", "--controller", "mgdd1", "--throttles", "2", "--budget", "30")
+    assert out["cost"] <= out["start_cost"]
+    assert set(out["numbers"]) == set(FAMILIES["mgdd1"].space)

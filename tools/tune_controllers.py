@@ -1,0 +1,73 @@
+"""Tune every kind of controller for every preset, all alike, and write python/mgdd/loop/tuned_sets.py.
+
+    python tools/tune_controllers.py [KIND ...]
+
+Only the named kinds are tuned anew. A search starts from the shipped set, so a second run goes on.
+"""
+
+from __future__ import annotations
+
+import sys
+from pathlib import Path
+
+from mgdd import presets
+from mgdd.loop import tune_controller
+from mgdd.loop.controller_families import FAMILIES
+from mgdd.loop.tuned_sets import TUNED_SETS
+from mgdd.throttle import Throttle
+
+N_THROTTLES, SPREAD, BUDGET, SEED = 20, 0.2, 400, 7
+TARGET = Path(__file__).resolve().parents[1] / "python/mgdd/loop/tuned_sets.py"
+
+HEAD = f'''"""Numbers that `mgdd.loop.tune_controller` found for each kind of controller and each preset.
+
+Protocol: {N_THROTTLES} throttles within {SPREAD:.0%} of the preset (P1 with stiction of 0.3 N m), a budget of
+{BUDGET} runs of the whole set for every kind, seed {SEED}, noise of 0.03 deg, a delay of one sample; the
+controller knows the preset only.
+Written by ``tools/tune_controllers.py``.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+
+__all__ = ["TUNED_SETS"]
+
+TUNED_SETS: Mapping[str, Mapping[str, Mapping[str, float]]] = '''
+
+
+def plant_of(preset: str) -> Throttle:
+    """Throttle of a preset as the study of controllers takes it."""
+    throttle = presets.load(preset, kind="throttle").throttle
+    return throttle.replace(friction="stribeck", stiction_nm=0.3) if preset == "P1" else throttle
+
+
+def written(sets: dict[str, dict[str, dict[str, float]]]) -> str:
+    """Text of the module."""
+    lines = [HEAD + "{"]
+    for kind, by_preset in sets.items():
+        lines.append(f'    "{kind}": {{')
+        for preset, numbers in by_preset.items():
+            lines.append(f'        "{preset}": {{')
+            lines += [f'            "{name}": {float(value)!r},' for name, value in numbers.items()]
+            lines.append("        },")
+        lines.append("    },")
+    return "\n".join([*lines, "}", ""])
+
+
+def main() -> None:
+    """Tune and write after every one."""
+    kinds = sys.argv[1:] or list(FAMILIES)
+    sets = {kind: {preset: dict(row) for preset, row in rows.items()} for kind, rows in TUNED_SETS.items()}
+    for kind in kinds:
+        for preset in ("P1", "P2", "P3"):
+            found = tune_controller(
+                kind, plant_of(preset), n_throttles=N_THROTTLES, spread=SPREAD, budget=BUDGET, seed=SEED
+            )
+            print(f"{kind} {preset}: {found.start_cost:.3f} -> {found.cost:.3f}  {dict(found.numbers)}", flush=True)
+            sets[kind][preset] = dict(found.numbers)
+    TARGET.write_text(written(sets), encoding="utf-8")
+
+
+if __name__ == "__main__":
+    main()
