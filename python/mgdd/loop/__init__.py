@@ -2,7 +2,8 @@
 
 `EngineBench`, `SurrogatePlant` and `VirtualThrottle` are plants: ``apply`` inputs by name, ``measure``. `run_seeker`
 closes the loop on any of them and on a test rig, `monte_carlo` does so for seeds, gains and operating points of the
-bench on all cores, `EngineBench.find_optimum` says where a seeker should end.
+bench on all cores, `EngineBench.find_optimum` says where a seeker should end. `simulate_drive` runs a throttle between the
+pedal and the engine's torque.
 """
 
 from __future__ import annotations
@@ -10,6 +11,7 @@ from __future__ import annotations
 from mgdd._core.loop import SensorDynamics
 from mgdd.loop.bench import EngineBench
 from mgdd.loop.criteria import LoopCriteria
+from mgdd.loop.drive import simulate_drive
 from mgdd.loop.plant import Measurement, Plant
 from mgdd.loop.seek import monte_carlo, run_seeker
 from mgdd.loop.surrogate_plant import SurrogatePlant
@@ -25,4 +27,5 @@ __all__ = [
     "VirtualThrottle",
     "monte_carlo",
     "run_seeker",
+    "simulate_drive",
 ]
