@@ -2,8 +2,8 @@
 
 `EngineBench`, `SurrogatePlant` and `VirtualThrottle` are plants: ``apply`` inputs by name, ``measure``. `run_seeker`
 closes the loop on any of them and on a test rig, `monte_carlo` does so for seeds, gains and operating points of the
-bench on all cores, `EngineBench.find_optimum` says where a seeker should end. `simulate_drive` runs a throttle between the
-pedal and the engine's torque.
+bench on all cores, `EngineBench.find_optimum` says where a seeker should end. `simulate_drive` runs a throttle between
+the pedal and the engine's torque.
 """
 
 from __future__ import annotations

@@ -76,7 +76,7 @@ def simulate_drive(
     engine : DemandChain, optional
         The engine as it is: throttle flow, manifold and torque; as the controller believes if left out.
     measured_pressure : bool
-        Whether the chain gets the manifold pressure; without it computes the opening from the wanted one.
+        Whether the chain gets the manifold pressure; without it the opening follows from the wanted one.
     air_torque : bool
         Whether the pressure drop over the plate loads it, ``-D³ (p_0 - p) C_T(angle)``, in place of the constant
         ``pressure_drop_kpa`` of the throttle.
@@ -103,7 +103,7 @@ def simulate_drive(
 
     Notes
     -----
-    The speed is given: there is no vehicle. Torque follows the air without delay. The shape C_T of the air's torque is a
+    The speed is given: there is no vehicle. Torque follows the air without delay. C_T of the air's torque is a
     placeholder of plausible shape.
 
     Examples
@@ -163,9 +163,7 @@ def _traces(pedal_percent: ArrayLike, speed_rpm: ArrayLike) -> tuple[NDArray[np.
     return pedal, speed
 
 
-def _steady(
-    chain: DemandChain, truth: DemandChain, pedal: float, speed: float, body: Throttle
-) -> tuple[float, float]:
+def _steady(chain: DemandChain, truth: DemandChain, pedal: float, speed: float, body: Throttle) -> tuple[float, float]:
     """Give manifold pressure and opening at the first demand, as the chain reaches it on this engine."""
     opening = float(chain.steady(pedal, speed)["opening_deg"].item())
     angle = min(max(opening, body.closed_deg), body.open_deg)

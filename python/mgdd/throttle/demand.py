@@ -107,9 +107,7 @@ class DemandChain(Parameters, _core.throttle.DemandChain):
         numbers = self.to_dict()
         rows: dict[str, Any] = dict(numbers.pop("pedal_map").to_dict())
         rows["wanted_nm"] = [list(row) for row in rows["wanted_nm"]]
-        return ParameterFile(
-            kind="demand_chain", tables={"parameters": entries(numbers), "pedal_map": entries(rows)}
-        )
+        return ParameterFile(kind="demand_chain", tables={"parameters": entries(numbers), "pedal_map": entries(rows)})
 
     @classmethod
     def from_parameters(cls, file: ParameterFile) -> DemandChain:
