@@ -42,13 +42,11 @@ def drive(run: xr.Dataset, *, ax: Axes | None = None) -> Axes:
 
     Examples
     --------
-    >>> import numpy as np
+    >>> from mgdd.loop import simulate_drive
     >>> from mgdd.plot.drive import drive
-    >>> from mgdd.results.labels import labelled_dataset
-    >>> names = ("wanted_torque_nm", "torque_nm", "reference_deg", "angle_deg", "wanted_pressure_kpa", "pressure_kpa")
-    >>> lines = {name: ("time_s", np.arange(9.0), "-", name) for name in ("pedal_percent", *names)}
-    >>> drive(labelled_dataset({"time_s": ("time_s", np.arange(9.0)), **lines})).get_ylabel()
-    'pedal_percent [-]'
+    >>> from mgdd.throttle import DemandChain
+    >>> drive(simulate_drive(DemandChain(), [10.0] * 20 + [40.0] * 80, 2000.0)).get_ylabel()
+    'pedal [%]'
     """
     names = tuple(name for _, lines in _PANELS for name, _ in lines)
     require(run, ("time_s", "pedal_percent", *names), "mgdd.loop.simulate_drive")

@@ -119,13 +119,18 @@ double DemandModel::opening_deg(double air_kg_per_s, double pressure_pa, double 
   return std::min(angle / units::rad_per_deg, shape.widest_deg);
 }
 
-Demand DemandModel::steady(double pedal_percent, double speed_rpm) const noexcept {
+Demand DemandModel::wanted(double pedal_percent, double speed_rpm) const noexcept {
   Demand out;
   out.torque_nm = chain_.pedal_map.torque_nm(pedal_percent, speed_rpm);
   // A standing engine breathes nothing: what it wants is read at the first speed of the table.
   const double speed = std::max(speed_rpm, chain_.pedal_map.speed_rpm.front());
   out.air_kg_per_s = chain_.torque.air_kg_per_s(out.torque_nm, speed);
   out.pressure_pa = out.air_kg_per_s / chain_.air.pumping_kg_per_s_pa(speed);
+  return out;
+}
+
+Demand DemandModel::steady(double pedal_percent, double speed_rpm) const noexcept {
+  Demand out = wanted(pedal_percent, speed_rpm);
   out.opening_deg = opening_deg(out.air_kg_per_s, out.pressure_pa, out.pressure_pa);
   return out;
 }
@@ -149,7 +154,7 @@ TrackedDemand DemandTracker::step(double pedal_percent, double speed_rpm, double
   }
   const DemandChain& chain = model_.chain();
   const double speed = std::max(*speed_rpm_, chain.pedal_map.speed_rpm.front());
-  const Demand steady = model_.steady(*pedal_percent_, speed);
+  const Demand steady = model_.wanted(*pedal_percent_, speed);
   const double before = wanted_pa_.value_or(steady.pressure_pa);
   const double wanted = before + pressure_share_ * (steady.pressure_pa - before);
   wanted_pa_ = wanted;

@@ -191,7 +191,6 @@ TEST(Tracker, FillingIsFedForwardSoThatThePressureFollowsItsLag) {
   DemandChain chain = odd_chain();
   chain.reference.reference_rate_deg_per_s = 1e6;
   chain.reference.reference_bandwidth_per_s = 1e5;
-  DemandTracker tracker(chain, sample);
   const Manifold manifold(chain.air, chain.bore, sample);
   const auto worst_of = [&](double share) {
     chain.reference.filling_share = share;

@@ -74,6 +74,8 @@ class DemandModel {
 
   /// Below the first speed of the pedal map, as at that speed.
   Demand steady(double pedal_percent, double speed_rpm) const noexcept;
+  /// The same without the opening.
+  Demand wanted(double pedal_percent, double speed_rpm) const noexcept;
   /// Opening that lets an air flow through against a manifold pressure: what lies above `highest_ratio` of the ambient
   /// pressure is taken from `wanted_pa`, and just below it a share of both.
   double opening_deg(double air_kg_per_s, double pressure_pa, double wanted_pa) const noexcept;
