@@ -38,7 +38,7 @@ PlateOpening::PlateOpening(const ThrottleBore& bore) noexcept
 
 double PlateOpening::area_m2(double angle_rad) const noexcept {
   const double angle = cut(angle_rad);
-  const double shadow = angle > 0.0 ? std::cos(angle + closed_rad_) / cos_closed_ : 1.0;
+  const double shadow = std::cos(angle + closed_rad_) / cos_closed_;
   // From where the shaft hides the plate's edge on, the shaft alone is in the way.
   const double open = shadow > shaft_ratio_
                           ? 1.0 - shadow + 2.0 / std::numbers::pi * (half_shadow(shaft_ratio_, shadow) - shaft_term_)

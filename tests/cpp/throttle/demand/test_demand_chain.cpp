@@ -130,6 +130,39 @@ TEST(Demand, WhatTheEngineCannotMakeOpensMonotonouslyAndGetsTheAirThereIs) {
   }
 }
 
+TEST(Demand, AMeasuredPressureCountsUpToTheHighestRatioAndTheWantedOneBeyond) {
+  const DemandModel model(odd_chain());
+  const Manifold manifold(odd_chain().air, odd_chain().bore, sample);
+  const double ambient = 96.4e3, air = 0.02, wanted = 0.7 * ambient;
+  for (const double ratio : {0.3, 0.6, 0.85, 0.899}) {
+    const double angle = model.opening_deg(air, ratio * ambient, wanted);
+    EXPECT_NEAR(manifold.throttle_kg_per_s(angle, ratio * ambient) / air, 1.0, 1e-9) << ratio;
+  }
+  for (const double ratio : {0.951, 1.0, 1.3}) {
+    const double angle = model.opening_deg(air, ratio * ambient, wanted);
+    EXPECT_NEAR(manifold.throttle_kg_per_s(angle, wanted) / air, 1.0, 1e-9) << ratio;
+  }
+}
+
+TEST(Demand, AStandingEngineWantsWhatItWouldAtTheFirstSpeed) {
+  const DemandModel model(odd_chain());
+  const Demand still = model.steady(30.0, 0.0), first = model.steady(30.0, 800.0);
+  EXPECT_EQ(still.opening_deg, first.opening_deg);
+  EXPECT_EQ(still.air_kg_per_s, first.air_kg_per_s);
+  EXPECT_GT(first.opening_deg, 1.0);
+}
+
+TEST(Demand, TheWidestReferenceIsNeverPassed) {
+  DemandChain chain = odd_chain();
+  chain.reference.widest_deg = 22.0;
+  EXPECT_EQ(DemandModel(chain).steady(100.0, 6000.0).opening_deg, 22.0);
+  DemandTracker tracker(chain, sample);
+  tracker.take_over(60.0);
+  EXPECT_EQ(tracker.step(nan, nan, nan).reference_deg, 22.0);
+  for (int k = 0; k < 300; ++k)
+    EXPECT_LE(tracker.step(100.0, 6000.0, nan).reference_deg, 22.0);
+}
+
 TEST(Demand, NothingThatAMeasuredPressureCanBeGivesAJump) {
   const DemandModel model{DemandChain{}};
   const double air = 0.03, wanted = 0.93 * 101325.0;
@@ -160,6 +193,15 @@ TEST(Tracker, WithoutAMeasuredPressureItTakesTheWantedOne) {
     const TrackedDemand blind = without.step(pedal, 2600.0, nan);
     const TrackedDemand told = with.step(pedal, 2600.0, blind.pressure_pa);
     EXPECT_EQ(told.reference_deg, blind.reference_deg) << k;
+  }
+}
+
+TEST(Tracker, OpensForTheMeasuredPressure) {
+  DemandTracker tracker(odd_chain(), sample);
+  const Manifold manifold(odd_chain().air, odd_chain().bore, sample);
+  for (const double pressure : {30e3, 62e3, 75e3}) {
+    const TrackedDemand out = tracker.step(40.0, 2500.0, pressure);
+    EXPECT_NEAR(manifold.throttle_kg_per_s(out.opening_deg, pressure) / out.air_kg_per_s, 1.0, 1e-9) << pressure;
   }
 }
 

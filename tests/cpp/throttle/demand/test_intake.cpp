@@ -182,6 +182,20 @@ TEST(Manifold, FlowsOfASampleAreTheMeanOfItsFlows) {
   EXPECT_NEAR(mean.cylinder_kg_per_s / out, 1.0, 2e-3);
 }
 
+TEST(Manifold, FlowsOfAnEmptyingSampleAreExact) {
+  const IntakeAir air = odd_air();
+  ThrottleBore shut = odd_bore(0.0);
+  shut.leak_mm2 = 0.0;
+  const double tau = air.filling_time_s(1900.0);
+  for (const double sample : {4e-6, 1e-3, 5e-2}) {
+    Manifold::State state{60e3};
+    const ManifoldFlows flows = Manifold(air, shut, sample).flows(state, {0.0, 1900.0});
+    const double mean_pa = 60e3 * tau / sample * -std::expm1(-sample / tau);
+    EXPECT_NEAR(flows.cylinder_kg_per_s / (air.pumping_kg_per_s_pa(1900.0) * mean_pa), 1.0, 1e-11) << sample;
+    EXPECT_NEAR(flows.throttle_kg_per_s, 0.0, 1e-9);
+  }
+}
+
 TEST(Manifold, AWideOpenThrottleNeitherOscillatesNorOvershoots) {
   ThrottleBore large = odd_bore(0.1);
   large.bore_mm = 90.0;
