@@ -108,6 +108,7 @@ struct Inner : Row<Place> {
   Value get(const Record& record) const { return this->at(record); }
   py::dict described(const Record& standard) const {
     py::dict record;
+    record["unit"] = "-";
     record["meaning"] = this->doc;
     record["default"] = get(standard);
     return record;

@@ -1,6 +1,5 @@
 // Binds throttle/demand: the map of the pedal, the parameters of the chain with its equations over arrays, the chain
 // and the manifold sample by sample.
-#include <algorithm>
 #include <cstddef>
 #include <limits>
 #include <string>
@@ -121,10 +120,6 @@ Examples
       "pedal_percent", [](const PedalMap& map) { return as_tuple(map.pedal_percent); }, "Pedal [%].");
   cls.def_property_readonly("speed_rpm", [](const PedalMap& map) { return as_tuple(map.speed_rpm); }, "Speed [rpm].");
   cls.def_property_readonly("wanted_nm", &rows_of, "Torque [N m], a row per pedal.");
-  cls.def("__repr__", [](const PedalMap& map) {
-    return "PedalMap(" + std::to_string(map.pedal_percent.size()) + " pedals, " + std::to_string(map.speed_rpm.size()) +
-           " speeds, up to " + text(*std::max_element(map.wanted_nm.begin(), map.wanted_nm.end())) + " N m)";
-  });
   bind_value(cls, "PedalMap", [](const PedalMap& map) {
     py::dict out;
     out["pedal_percent"] = as_tuple(map.pedal_percent);
