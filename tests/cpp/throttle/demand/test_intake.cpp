@@ -9,6 +9,7 @@
 
 #include "mgdd/dynamics/discrete_model.hpp"
 #include "mgdd/dynamics/rk4.hpp"
+#include "support/demand_case.hpp"
 #include "support/no_alloc.hpp"
 
 namespace mgdd::throttle {
@@ -17,24 +18,8 @@ namespace {
 static_assert(dynamics::DiscreteModel<Manifold>);
 static_assert(noexcept(std::declval<const Manifold&>().flows(std::declval<Manifold::State&>(), Manifold::Input{})));
 
-/// No number has its default, no two are equal.
-IntakeAir odd_air() {
-  return {.displacement_l = 1.62,
-          .volumetric_efficiency = 0.91,
-          .manifold_l = 2.3,
-          .manifold_temperature_k = 323.0,
-          .ambient_kpa = 96.4,
-          .ambient_temperature_k = 287.0};
-}
-ThrottleBore odd_bore(double pressure_loss) {
-  ThrottleBore bore;
-  bore.bore_mm = 52.0;
-  bore.shaft_mm = 9.0;
-  bore.plate_closed_deg = 11.0;
-  bore.leak_mm2 = 4.0;
-  bore.discharge_pressure_loss = pressure_loss;
-  return bore;
-}
+using test_support::odd_air;
+using test_support::odd_bore;
 
 TEST(Intake, TheEnginePointOfAnIndependentProgram) {
   const IntakeAir air;
