@@ -14,6 +14,13 @@
 
 namespace mgdd {
 
+/// The interval of `at`: the last k with x[k] <= at, at most the last interval; the first one where `at` is before
+/// x[0].
+inline std::size_t interval_of(std::span<const double> x, double at) noexcept {
+  const auto after = std::upper_bound(x.begin(), x.end(), at) - x.begin();
+  return std::min(static_cast<std::size_t>(std::max<std::ptrdiff_t>(after, 1)) - 1, x.size() - 2);
+}
+
 /// The interval of an axis that holds a number, and the share of it that lies below.
 struct AxisPlace {
   std::size_t low = 0;
@@ -23,8 +30,7 @@ struct AxisPlace {
 
 /// NaN has a share of NaN: who may meet it asks before.
 inline AxisPlace place_on(std::span<const double> axis, double at) noexcept {
-  const auto above = std::upper_bound(axis.begin() + 1, axis.end() - 1, at);
-  const std::size_t low = static_cast<std::size_t>(above - axis.begin()) - 1;
+  const std::size_t low = interval_of(axis, at);
   return {low, std::clamp((at - axis[low]) / (axis[low + 1] - axis[low]), 0.0, 1.0),
           at < axis.front() || at > axis.back()};
 }
