@@ -44,8 +44,10 @@ double Manifold::throttle_kg_per_s(double angle_deg, double pressure_pa) const n
 }
 
 ManifoldFlows Manifold::flows(State& state, const Input& input) const noexcept {
-  const double effective = plate_.effective_m2(input.angle_deg * units::rad_per_deg);
-  const double pumping = air_.pumping_kg_per_s_pa(input.speed_rpm);
+  if (std::isfinite(input.angle_deg)) state.angle_deg = input.angle_deg;
+  if (std::isfinite(input.speed_rpm)) state.speed_rpm = std::max(input.speed_rpm, 0.0);
+  const double effective = plate_.effective_m2(state.angle_deg * units::rad_per_deg);
+  const double pumping = air_.pumping_kg_per_s_pa(state.speed_rpm);
   const double stiffness = air_.stiffness_pa_per_kg();
   const GasState ambient = air_.ambient();
   const auto through = [&](double pressure) noexcept {

@@ -3,6 +3,7 @@
 #include "mgdd/throttle/demand/intake.hpp"
 
 #include <cmath>
+#include <limits>
 #include <utility>
 
 #include <gtest/gtest.h>
@@ -195,6 +196,24 @@ TEST(Manifold, AWideOpenThrottleNeitherOscillatesNorOvershoots) {
     EXPECT_LE(state.pressure_pa, 96.4e3 * 1.0005);
     last = state.pressure_pa;
   }
+}
+
+TEST(Manifold, InputsThatAreNotFiniteRepeatTheLastOnes) {
+  constexpr double nan = std::numeric_limits<double>::quiet_NaN(), infinity = std::numeric_limits<double>::infinity();
+  const Manifold manifold(odd_air(), odd_bore(0.1), 1e-3);
+  Manifold::State gap{40e3}, held{40e3};
+  for (int k = 0; k < 200; ++k) {
+    manifold.step(gap, {k % 3 == 0 && k > 0 ? nan : 21.0, k % 4 == 0 && k > 0 ? infinity : 2300.0});
+    manifold.step(held, {21.0, 2300.0});
+    EXPECT_EQ(gap.pressure_pa, held.pressure_pa) << k;
+  }
+  Manifold::State never{40e3};  // closed, at standstill
+  manifold.step(never, {nan, nan});
+  Manifold::State backwards{40e3};
+  manifold.step(backwards, {0.0, -900.0});
+  EXPECT_EQ(backwards.pressure_pa, never.pressure_pa);
+  EXPECT_GT(never.pressure_pa, 40e3);
+  EXPECT_LT(never.pressure_pa, 41e3);
 }
 
 TEST(Manifold, NoAllocation) {

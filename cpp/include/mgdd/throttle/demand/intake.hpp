@@ -74,6 +74,8 @@ class Manifold {
  public:
   struct State {
     double pressure_pa = 0.0;
+    double angle_deg = 0.0;  ///< last finite inputs
+    double speed_rpm = 0.0;
   };
   struct Input {
     double angle_deg = 0.0;
@@ -85,7 +87,8 @@ class Manifold {
   Manifold(const IntakeAir& air, const ThrottleBore& bore, double sample_s) noexcept;
 
   void step(State& state, const Input& input) const noexcept { (void)flows(state, input); }
-  /// One sample, and the flows of it.
+  /// One sample, and the flows of it. Inputs that are not finite repeat the last ones, a negative speed is
+  /// standstill.
   ManifoldFlows flows(State& state, const Input& input) const noexcept;
   /// Manifold pressure [Pa].
   double output(const State& state) const noexcept { return state.pressure_pa; }
@@ -98,7 +101,7 @@ class Manifold {
 
   template <class S>
   static auto numbers(S& state) noexcept {
-    return std::array{&state.pressure_pa};
+    return std::array{&state.pressure_pa, &state.angle_deg, &state.speed_rpm};
   }
 
  private:
