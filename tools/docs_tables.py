@@ -69,6 +69,7 @@ __all__ = [
     "throttle_baselines",
     "timing",
     "timing_table",
+    "torque_demand",
     "traces",
     "triangle",
     "variables",
@@ -110,6 +111,11 @@ def online_calibration() -> Rows:
 @cache
 def study(name: str) -> Mapping[str, Any]:
     return run_study(name, figures=False).summary
+
+
+def torque_demand() -> Rows:
+    rows = study("torque-demand")["rows"]
+    return {row["case"]: [value for name, value in row.items() if name != "case"] for row in rows}
 
 
 def _with_ends(row: Mapping[str, Any], *names: str) -> list[float]:

@@ -127,6 +127,7 @@ void bind_throttle(py::module_& m);
 void bind_sensors(py::module_& m);
 void bind_stepper(py::module_& m);
 void bind_pseudo_wiener(py::module_& m);
+void bind_demand(py::module_& m);
 void bind_cylinder_fit(py::module_& m);
 void bind_throttle_fit(py::module_& m);
 void bind_online(py::module_& m);

@@ -89,6 +89,40 @@ Open<Place> open_number(const FieldInfo& info, Place place) {
   return {{info.name.data(), place, info.meaning.data()}, &info};
 }
 
+/// A record within a parameter record, with a class of its own; None is its default.
+template <class Place>
+struct Inner : Row<Place> {
+  using typename Row<Place>::Record;
+  using Value = typename Row<Place>::Value;
+  using Argument = std::optional<Value>;
+
+  void put(Record& record, Argument given) const {
+    if (given) this->at(record) = std::move(*given);
+  }
+  void read(Record& record, const py::handle& key, const py::handle& value) const {
+    if (!py::isinstance<Value>(value)) {
+      refuse(py::str(key), value, "a " + py::cast<std::string>(py::type::of<Value>().attr("__name__")));
+    }
+    put(record, value.cast<Value>());
+  }
+  Value get(const Record& record) const { return this->at(record); }
+  py::dict described(const Record& standard) const {
+    py::dict record;
+    record["unit"] = "-";
+    record["meaning"] = this->doc;
+    record["default"] = get(standard);
+    return record;
+  }
+};
+template <class Place>
+Inner<Place> inner(const char* name, Place place, const char* meaning) {
+  return {{name, place, meaning}};
+}
+template <class Place>
+py::arg_v keyword(const Inner<Place>& row, const typename PlaceOf<Place>::Record&) {
+  return py::arg_v(row.name, py::none());
+}
+
 template <std::size_t>
 using Number = double;
 

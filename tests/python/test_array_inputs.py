@@ -16,7 +16,7 @@ import mgdd
 from mgdd import guide, identify, io, optimize, signals, surrogate, throttle
 from mgdd.engine import Cylinder, OperatingPoint, fit_nox_proxy, timing_sweep
 from mgdd.io.checks import check_trace
-from mgdd.loop import EngineBench
+from mgdd.loop import EngineBench, simulate_drive
 from mgdd.signals.even_grid import even_step
 from mgdd.signals.metrics import mse
 from mgdd.throttle.characteristics import airflow_torque_nm, mass_flow_kg_per_s
@@ -38,6 +38,7 @@ SOC = np.array([-8.0, -6.0, -4.0])
 RECORDS = surrogate.fit_surrogate(surrogate.random_step_records(1500))
 SWEEP = np.linspace(-3.0, 3.0, 40)
 OPEN = np.array([10.0, 30.0, 60.0])
+CHAIN = throttle.DemandChain()
 
 
 def lag(_: float, x: Any, u: Any, p: Any) -> Any:
@@ -149,6 +150,11 @@ def log() -> xr.Dataset:
     return io.throttle_log(TIME, DUTY, ANGLE)
 
 
+def pedals(pedal: Any, speed: Any, wanted: Any) -> Any:
+    rows = [wanted, wanted]
+    return throttle.PedalMap(pedal_percent=pedal, speed_rpm=speed, wanted_nm=rows).torque_nm(25.0, 2500.0)
+
+
 CALLS: dict[str, tuple[Call, tuple[Array, ...]]] = {
     "engine.fit_nox_proxy": (lambda t, ppm: list(fit_nox_proxy(t, ppm).proxy.to_dict().values()), (KELVIN, PPM)),
     "engine.timing_sweep": (
@@ -165,6 +171,9 @@ CALLS: dict[str, tuple[Call, tuple[Array, ...]]] = {
     "io.throttle_log": (logged, (TIME, DUTY, ANGLE, 0.1 * DUTY, 12.0 + DUTY)),
     "loop.EngineBench.run": (lambda soc: EngineBench(seed=1).run(soc)["j"].to_numpy(), (SOC,)),
     "loop.EngineBench.steady_map": (lambda soc: EngineBench().steady_map(soc)["j"].to_numpy(), (SOC,)),
+    "loop.simulate_drive": (
+        lambda pedal, speed: simulate_drive(CHAIN, pedal, speed)["torque_nm"].to_numpy(), (OPEN, 2000.0 + OPEN),
+    ),
     "optimize.IterativeLearning.__init__": (taps, (np.zeros(5), np.array([0.1, 0.5, 0.1]))),
     "optimize.IterativeLearning.tell": (learned, (np.zeros(5), np.array([0.5, 0.3]), np.arange(5.0))),
     "optimize.least_squares": (searched, (np.array([1.0]), np.array([0.0]), np.array([9.0]), OPEN)),
@@ -177,6 +186,9 @@ CALLS: dict[str, tuple[Call, tuple[Array, ...]]] = {
     "signals.vaf_percent": (signals.vaf_percent, (ANGLE, ANGLE + NOISE)),
     "surrogate.EngineSurrogate.predict": (
         lambda soi: RECORDS.predict(soi)["imep_bar"].to_numpy(), (np.array([-4.0, 0.0]),),
+    ),
+    "throttle.DemandChain.steady": (
+        lambda pedal, speed: CHAIN.steady(pedal, speed)["opening_deg"].to_numpy(), (OPEN, 2000.0 + OPEN),
     ),
     "throttle.PseudoWiener.slopes": (lambda u: MODEL.slopes(u, initial_state={"angle_deg": 8.0})[1], (DUTY[:20],)),
     "throttle.holding_duty": (
@@ -192,6 +204,16 @@ CALLS: dict[str, tuple[Call, tuple[Array, ...]]] = {
 MORE: dict[str, tuple[Call, tuple[Array, ...]]] = {
     "throttle.simulate, many cases": (many, (DUTY, TIME, OPEN, 12.0 + DUTY, 0.01 * DUTY)),
     "signals.even_grid.even_step": (even_step, (TIME,)),
+    **{f"throttle.DemandChain.{name}": (getattr(CHAIN, name), (OPEN,)) for name in ("area_mm2", "angle_of_area_deg")},
+    **{
+        f"throttle.DemandChain.{name}": (getattr(CHAIN, name), (OPEN, 20.0 + OPEN))
+        for name in (
+            "air_g_per_s", "torque_nm", "pressure_kpa", "cylinder_g_per_s", "throttle_g_per_s", "opening_deg",
+            "steady_kpa",
+        )
+    },
+    "throttle.PedalMap": (pedals, (np.array([0.0, 100.0]), np.array([1e3, 3e3, 6e3]), OPEN)),
+    "throttle.PedalMap.torque_nm": (CHAIN.pedal_map.torque_nm, (OPEN, 2000.0 + OPEN)),
     "throttle.airflow_torque_nm": (lambda a: airflow_torque_nm(throttle.Throttle(), a), (OPEN,)),
     "identify.FirstPrincipleModel.simulate": (run(GROUPS), (TIME, DUTY)),
     "identify.FirstPrincipleModel.predict": (ahead(GROUPS), (TIME, DUTY, ANGLE)),

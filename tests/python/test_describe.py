@@ -34,7 +34,7 @@ from mgdd.studies import StudyResult
 from mgdd.studies.benchmarks.drive_axis import DriveModel
 from mgdd.studies.benchmarks.wiener_hammerstein import LinearApproximation
 from mgdd.surrogate import fit_surrogate, random_step_records
-from mgdd.throttle import PseudoWiener, SensorPair, Throttle, simulate
+from mgdd.throttle import DemandChain, PedalMap, PseudoWiener, SensorPair, Throttle, simulate
 
 
 def objects() -> dict[str, Callable[[], Any]]:
@@ -55,6 +55,8 @@ def objects() -> dict[str, Callable[[], Any]]:
         "point": lambda: OperatingPoint(trapped_mass_g=0.7),
         "throttle": lambda: Throttle(friction="stribeck", stiction_nm=0.3),
         "sensors": lambda: SensorPair(closed_v=0.4),
+        "demand chain": lambda: DemandChain(bore_mm=52.0, leak_mm2=1.5),
+        "pedal map": lambda: DemandChain().pedal_map,
         "NOx": NoxModel,
         "soft sensor": SoftSensor,
         "performance": Performance.efficiency_and_nox,
@@ -143,8 +145,11 @@ def test_a_record_of_the_core_still_evaluates_to_itself() -> None:
         "NoxModel": _core.engine.NoxModel,
         "NoxProxy": _core.engine.NoxProxy,
         "SoftSensor": SoftSensor,
+        "DemandChain": DemandChain,
+        "PedalMap": PedalMap,
     }
-    for record in (SensorPair(closed_v=0.4), NoxModel(), SoftSensor()):
+    chain = DemandChain(bore_mm=52.0, pedal_map=PedalMap.of_full_load([900.0, 5000.0], [150.0, 130.0]))
+    for record in (SensorPair(closed_v=0.4), NoxModel(), SoftSensor(), chain, chain.pedal_map):
         assert eval(repr(record), names) == record
 
 

@@ -20,12 +20,12 @@ from mgdd.engine import Cylinder, OperatingPoint, analyze, convergence, sensitiv
 from mgdd.guide import FeedForward, GuidedEngine, ModelOptimum, OnlineCalibration, TimingMap
 from mgdd.identify.throttle.validation import ThrottleValidation
 from mgdd.io import pressure_trace, read_pressure, read_throttle_log, throttle_log, write_throttle_log
-from mgdd.loop import EngineBench, monte_carlo, run_seeker
+from mgdd.loop import EngineBench, monte_carlo, run_seeker, simulate_drive
 from mgdd.results import FitReport
 from mgdd.results.labels import check_labels
 from mgdd.rig import SimulatedRig
 from mgdd.studies import run_study
-from mgdd.throttle import PseudoWiener, SensorFault, SensorPair, Throttle, characteristics, holding_duty
+from mgdd.throttle import DemandChain, PseudoWiener, SensorFault, SensorPair, Throttle, characteristics, holding_duty
 from mgdd.throttle import simulate as simulate_throttle
 
 POINT = OperatingPoint()
@@ -155,11 +155,13 @@ MADE: dict[str, Callable[[Path], Any]] = {
     "loop.EngineBench.run": lambda _: bench_run(),
     "loop.LoopRun.dataset": lambda _: [run_seeker(EngineBench(seed=1), seeker(), 20).dataset, rig_run()],
     "loop.monte_carlo": lambda _: monte_carlo(EngineBench(), seeker(), [1, 2], cycles=20),
+    "loop.simulate_drive": lambda _: simulate_drive(DemandChain(), [10.0, 60.0], 2000.0),
     "loop.EngineBench.steady_map": lambda _: EngineBench().steady_map([-10.0, -6.0]),
     "optimize.IterativeLearning.history": lambda _: learned(),
     "optimize.Seeker.history": lambda _: optimize.Spsa(start=1.0).history,
     "optimize.Seeker.run": lambda _: optimize.GradientDescent(start=1.0).run(lambda x: -float((x[0] - 2.0) ** 2), 20),
     "studies.StudyResult.dataset": lambda _: run_study("measured-traces", quick=True, figures=False).dataset,
+    "throttle.DemandChain.steady": lambda _: DemandChain().steady([10.0, 60.0], 2000.0),
     "throttle.characteristics": lambda _: characteristics(Throttle()),
     "throttle.holding_duty": lambda _: holding_duty(Throttle()),
     "throttle.SensorPair.sense": lambda _: SensorPair().sense(

@@ -6,6 +6,7 @@ import pytest
 
 from mgdd.identify.throttle.free_run import quality_of
 from mgdd.results.labels import check_labels
+from mgdd.studies import run_study
 
 
 @pytest.fixture(scope="module")
@@ -77,3 +78,24 @@ def test_a_fit_in_percent_is_that_of_every_throttle_fit(quick_study, study, opti
         stated = {f"{row['plant']} {row['model']}": row["fit_steps_percent"] for row in rows}
     for case, percent in stated.items():
         assert percent == quality_of([result.dataset.sel(case=case)]).nrmse_fit_percent, case
+
+
+def test_the_torque_demand_study_says_what_each_part_is_worth():
+    """All cases: they take two seconds."""
+    result = run_study("torque-demand")
+    check_labels(result.dataset)
+    assert len(result.figures) == 1
+    assert result.summary["seeds"] == 0
+    rows = {row["case"]: row for row in result.summary["rows"]}
+    believed = rows["as believed"]
+    assert abs(believed["hold_error_nm"]) < 1.0
+    assert abs(believed["end_error_nm"]) < 1.0
+    assert believed["tip_in_t90_s"] < 0.6 * rows["no filling fed forward"]["tip_in_t90_s"]
+    # Near the ambient pressure an engine that breathes less shows only in the measured pressure.
+    weak, blind = rows["breathes 10 % less"], rows["breathes 10 % less, no measured pressure"]
+    assert abs(weak["end_error_nm"]) < 1.0
+    assert blind["end_error_nm"] < -4.0
+    # Air is metered at the throttle: 10 % more of it is 10 % more indicated torque.
+    free = rows["throttle flows 10 % more"]
+    wanted = result.dataset["wanted_torque_nm"].sel(case="as believed").to_numpy()[2999]
+    assert free["hold_error_nm"] == pytest.approx(0.1 * (wanted + 21.0), abs=1.2)

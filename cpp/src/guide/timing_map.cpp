@@ -29,19 +29,8 @@ void validate(const TimingMapSettings& s) {
   if (s.axes.empty() || s.axes.size() > 2) {
     throw about("axes", ShapeError("axes has " + std::to_string(s.axes.size()) + " entries: must have one or two"));
   }
-  for (std::size_t a = 0; a < s.axes.size(); ++a) {
-    const std::string name = "axes[" + std::to_string(a) + "]";
-    if (s.axes[a].size() < 2) {
-      throw about(name,
-                  ShapeError(name + " has " + std::to_string(s.axes[a].size()) + " entries: must have at least two"));
-    }
-    for (std::size_t i = 0; i < s.axes[a].size(); ++i) {
-      const double value = s.axes[a][i];
-      const std::string entry = name + "[" + std::to_string(i) + "]";
-      if (!std::isfinite(value)) throw ParameterError(entry, value, "must be finite");
-      if (i > 0 && !(value > s.axes[a][i - 1])) throw ParameterError(entry, value, "must be above the entry before it");
-    }
-  }
+  for (std::size_t a = 0; a < s.axes.size(); ++a)
+    require_axis("axes[" + std::to_string(a) + "]", s.axes[a]);
   if (s.values_cad.size() != cells_of(s)) {
     throw about("values_cad", ShapeError("values_cad has " + std::to_string(s.values_cad.size()) +
                                          " entries: the axes have " + std::to_string(cells_of(s)) + " cells"));
@@ -63,23 +52,18 @@ TimingMap::TimingMap(TimingMapSettings settings)
 
 TimingMap::Place TimingMap::place_of(std::span<const double> point) const noexcept {
   Place at;
-  if (point.size() != settings_.axes.size()) return at;
-  std::array<std::size_t, 2> low{};
-  std::array<double, 2> share{};
-  for (std::size_t a = 0; a < point.size(); ++a) {
-    const std::vector<double>& axis = settings_.axes[a];
-    if (!std::isfinite(point[a])) return at;
-    at.outside = at.outside || point[a] < axis.front() || point[a] > axis.back();
-    const auto above = std::upper_bound(axis.begin() + 1, axis.end() - 1, point[a]);
-    low[a] = static_cast<std::size_t>(above - axis.begin()) - 1;
-    share[a] = std::clamp((point[a] - axis[low[a]]) / (axis[low[a] + 1] - axis[low[a]]), 0.0, 1.0);
+  const std::vector<std::vector<double>>& axes = settings_.axes;
+  if (point.size() != axes.size()) return at;
+  for (const double coordinate : point) {
+    if (!std::isfinite(coordinate)) return at;
   }
-  const bool plane = point.size() == 2;
-  const std::size_t columns = plane ? settings_.axes[1].size() : 1;
-  for (std::size_t c = 0; c < (plane ? corners : corners / 2); ++c) {
-    const std::size_t up = plane ? c / 2 : c, right = plane ? c % 2 : 0;
-    at.cell[c] = (low[0] + up) * columns + low[1] + right;
-    at.weight[c] = (up == 1 ? share[0] : 1.0 - share[0]) * (!plane ? 1.0 : right == 1 ? share[1] : 1.0 - share[1]);
+  if (point.size() == 2) {
+    static_cast<TablePlace<corners>&>(at) = place_in(axes[0], axes[1], point[0], point[1]);
+  } else {
+    const TablePlace<2> on_line = place_in(axes[0], point[0]);
+    std::copy(on_line.cell.begin(), on_line.cell.end(), at.cell.begin());
+    std::copy(on_line.weight.begin(), on_line.weight.end(), at.weight.begin());
+    at.outside = on_line.outside;
   }
   at.known = true;
   return at;

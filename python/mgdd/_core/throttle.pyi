@@ -1,12 +1,12 @@
 """
-Throttle body, its sensors, pseudo-Wiener models.
+Throttle body, its sensors, pseudo-Wiener models, demand chain.
 """
 from __future__ import annotations
 import collections.abc
 import numpy
 import numpy.typing
 import typing
-__all__: list[str] = ['PseudoWienerModel', 'PseudoWienerStepper', 'SensorPair', 'Stepper', 'Throttle', 'airflow_torque', 'pseudo_wiener_of', 'pseudo_wiener_units', 'sense', 'sensor_fault_kinds', 'simulate', 'simulate_many']
+__all__: list[str] = ['DemandChain', 'DemandTracker', 'PedalMap', 'PseudoWienerModel', 'PseudoWienerStepper', 'SensorPair', 'Stepper', 'Throttle', 'airflow_torque', 'fill_manifold', 'pseudo_wiener_of', 'pseudo_wiener_units', 'sense', 'sensor_fault_kinds', 'simulate', 'simulate_many']
 class Throttle:
     """
     Parameters of an electronic throttle body, seen from the plate shaft.
@@ -424,9 +424,337 @@ class PseudoWienerModel:
     @property
     def parameters(self) -> dict:
         ...
+class PedalMap:
+    """
+    What the driver wants: engine torque over pedal and speed, a table read bilinearly.
+    
+    Immutable. Outside of the axes the edge holds. `of_full_load` makes a progressive one of a full-load curve.
+    
+    Parameters
+    ----------
+    pedal_percent : array_like, shape (n,)
+        Pedal [%], two or more increasing entries in 0 to 100.
+    speed_rpm : array_like, shape (m,)
+        Engine speed [rpm], two or more increasing entries > 0.
+    wanted_nm : array_like, shape (n, m)
+        Torque at the crankshaft [N m], which does not fall with the pedal; negative where the released pedal brakes.
+    
+    Raises
+    ------
+    mgdd.errors.ParameterError, mgdd.errors.ShapeError
+        An axis or entry that cannot be, by name.
+    
+    Examples
+    --------
+    >>> from mgdd.throttle import PedalMap
+    >>> sport = PedalMap(pedal_percent=[0, 50, 100], speed_rpm=[1000, 5000], wanted_nm=[[-5, -9], [80, 70], [120, 105]])
+    >>> float(sport.torque_nm(75.0, 1000.0))
+    100.0
+    >>> PedalMap.of_full_load([1000.0, 6000.0], [120.0, 105.0]).torque_nm([0.0, 100.0], 6000.0).tolist()
+    [-10.5, 105.0]
+    """
+    @staticmethod
+    def of_full_load(speed_rpm: typing.Annotated[numpy.typing.ArrayLike, numpy.float64], full_load_nm: typing.Annotated[numpy.typing.ArrayLike, numpy.float64], *, pedal_percent: typing.Annotated[numpy.typing.ArrayLike, numpy.float64] | None = None) -> PedalMap:
+        """
+        A progressive map: with M the full-load torque and p the pedal 0 to 1, ``M (0.6 p + 0.4 p²) - 0.1 M (1 - p) N/N_last``.
+        
+        The pedal's axis is that of the default map if left out.
+        """
+    def __eq__(self, arg0: typing.Any) -> bool:
+        ...
+    def __getstate__(self) -> tuple[int, dict]:
+        ...
+    def __hash__(self) -> int:
+        ...
+    def __init__(self, *, pedal_percent: typing.Annotated[numpy.typing.ArrayLike, numpy.float64], speed_rpm: typing.Annotated[numpy.typing.ArrayLike, numpy.float64], wanted_nm: typing.Annotated[numpy.typing.ArrayLike, numpy.float64]) -> None:
+        ...
+    def __repr__(self) -> str:
+        ...
+    def __setstate__(self, arg0: tuple) -> None:
+        ...
+    def to_dict(self) -> dict:
+        """
+        Constructor keywords as a new dict.
+        """
+    def torque_nm(self, pedal_percent: typing.Annotated[numpy.typing.ArrayLike, numpy.float64], speed_rpm: typing.Annotated[numpy.typing.ArrayLike, numpy.float64]) -> typing.Any:
+        """
+        Wanted torque [N m]; arrays are broadcast together.
+        """
+    @property
+    def pedal_percent(self) -> tuple:
+        """
+        Pedal [%].
+        """
+    @property
+    def speed_rpm(self) -> tuple:
+        """
+        Speed [rpm].
+        """
+    @property
+    def wanted_nm(self) -> tuple:
+        """
+        Torque [N m], a row per pedal.
+        """
+class DemandChain:
+    """
+    Parameters of the chain; see mgdd.throttle.DemandChain.
+    """
+    @staticmethod
+    def fields() -> dict:
+        """
+        Every field by name: unit, bounds or choices, meaning, default.
+        """
+    def __eq__(self, arg0: typing.Any) -> bool:
+        ...
+    def __getstate__(self) -> tuple[int, dict]:
+        ...
+    def __hash__(self) -> int:
+        ...
+    def __init__(self, *, indicated_efficiency: typing.SupportsFloat | typing.SupportsIndex = 0.33, heating_value_mj_per_kg: typing.SupportsFloat | typing.SupportsIndex = 42.5, stoichiometric_air_fuel: typing.SupportsFloat | typing.SupportsIndex = 14.7, air_fuel_ratio: typing.SupportsFloat | typing.SupportsIndex = 1.0, friction_nm: typing.SupportsFloat | typing.SupportsIndex = 15.0, friction_nm_per_rpm: typing.SupportsFloat | typing.SupportsIndex = 0.003, displacement_l: typing.SupportsFloat | typing.SupportsIndex = 2.0, volumetric_efficiency: typing.SupportsFloat | typing.SupportsIndex = 0.85, manifold_l: typing.SupportsFloat | typing.SupportsIndex = 3.0, manifold_temperature_k: typing.SupportsFloat | typing.SupportsIndex = 310.0, ambient_kpa: typing.SupportsFloat | typing.SupportsIndex = 101.325, ambient_temperature_k: typing.SupportsFloat | typing.SupportsIndex = 298.15, bore_mm: typing.SupportsFloat | typing.SupportsIndex = 60.0, shaft_mm: typing.SupportsFloat | typing.SupportsIndex = 8.0, plate_closed_deg: typing.SupportsFloat | typing.SupportsIndex = 6.0, leak_mm2: typing.SupportsFloat | typing.SupportsIndex = 3.0, discharge_5: typing.SupportsFloat | typing.SupportsIndex = 0.65, discharge_20: typing.SupportsFloat | typing.SupportsIndex = 0.75, discharge_45: typing.SupportsFloat | typing.SupportsIndex = 0.85, discharge_90: typing.SupportsFloat | typing.SupportsIndex = 0.9, discharge_pressure_loss: typing.SupportsFloat | typing.SupportsIndex = 0.1, pressure_lag_s: typing.SupportsFloat | typing.SupportsIndex = 0.05, filling_share: typing.SupportsFloat | typing.SupportsIndex = 1.0, lowest_flow_function: typing.SupportsFloat | typing.SupportsIndex = 0.1, highest_ratio: typing.SupportsFloat | typing.SupportsIndex = 0.95, reference_rate_deg_per_s: typing.SupportsFloat | typing.SupportsIndex = 800.0, reference_bandwidth_per_s: typing.SupportsFloat | typing.SupportsIndex = 80.0, widest_deg: typing.SupportsFloat | typing.SupportsIndex = 90.0, pedal_map: PedalMap | None = None) -> None:
+        ...
+    def __repr__(self) -> str:
+        ...
+    def __setstate__(self, arg0: tuple) -> None:
+        ...
+    def _steady(self, pedal_percent: typing.Annotated[numpy.typing.ArrayLike, numpy.float64], speed_rpm: typing.Annotated[numpy.typing.ArrayLike, numpy.float64]) -> tuple[numpy.typing.NDArray[numpy.float64], numpy.typing.NDArray[numpy.float64], numpy.typing.NDArray[numpy.float64], numpy.typing.NDArray[numpy.float64]]:
+        """
+        Torque, air, pressure and opening of steady demands.
+        """
+    def air_g_per_s(self, torque_nm: typing.Annotated[numpy.typing.ArrayLike, numpy.float64], speed_rpm: typing.Annotated[numpy.typing.ArrayLike, numpy.float64]) -> typing.Any:
+        """
+        Air that makes a torque [g/s]; 0 where friction alone brakes more.
+        """
+    def angle_of_area_deg(self, area_mm2: typing.Annotated[numpy.typing.ArrayLike, numpy.float64]) -> typing.Any:
+        """
+        Smallest opening of at least that area [deg]; 0 or 90 beyond its range.
+        """
+    def area_mm2(self, angle_deg: typing.Annotated[numpy.typing.ArrayLike, numpy.float64]) -> typing.Any:
+        """
+        Open area of the throttle with its leak [mm²].
+        """
+    def cylinder_g_per_s(self, pressure_kpa: typing.Annotated[numpy.typing.ArrayLike, numpy.float64], speed_rpm: typing.Annotated[numpy.typing.ArrayLike, numpy.float64]) -> typing.Any:
+        """
+        Air that the cylinders take at a manifold pressure [g/s], by speed density.
+        """
+    def filling_time_s(self, speed_rpm: typing.Annotated[numpy.typing.ArrayLike, numpy.float64]) -> typing.Any:
+        """
+        Time constant of the manifold where the throttle is choked [s].
+        """
+    def opening_deg(self, air_g_per_s: typing.Annotated[numpy.typing.ArrayLike, numpy.float64], pressure_kpa: typing.Annotated[numpy.typing.ArrayLike, numpy.float64]) -> typing.Any:
+        """
+        Opening that lets an air flow through against a manifold pressure [deg].
+        """
+    def pressure_kpa(self, air_g_per_s: typing.Annotated[numpy.typing.ArrayLike, numpy.float64], speed_rpm: typing.Annotated[numpy.typing.ArrayLike, numpy.float64]) -> typing.Any:
+        """
+        Manifold pressure at which the cylinders take an air flow [kPa], by speed density.
+        """
+    def replace(self, **kwargs) -> DemandChain:
+        """
+        A validated copy with some fields changed; an unknown name is a ParameterError.
+        """
+    def steady_kpa(self, angle_deg: typing.Annotated[numpy.typing.ArrayLike, numpy.float64], speed_rpm: typing.Annotated[numpy.typing.ArrayLike, numpy.float64]) -> typing.Any:
+        """
+        Manifold pressure at which a held opening ends [kPa].
+        """
+    def throttle_g_per_s(self, angle_deg: typing.Annotated[numpy.typing.ArrayLike, numpy.float64], pressure_kpa: typing.Annotated[numpy.typing.ArrayLike, numpy.float64]) -> typing.Any:
+        """
+        Air through the throttle against a manifold pressure [g/s]; negative above the ambient one.
+        """
+    def to_dict(self) -> dict:
+        """
+        All fields as a new dict.
+        """
+    def torque_nm(self, air_g_per_s: typing.Annotated[numpy.typing.ArrayLike, numpy.float64], speed_rpm: typing.Annotated[numpy.typing.ArrayLike, numpy.float64]) -> typing.Any:
+        """
+        Torque that an air flow makes [N m].
+        """
+    @property
+    def air_fuel_ratio(self) -> float:
+        """
+        lambda [-]
+        """
+    @property
+    def ambient_kpa(self) -> float:
+        """
+        pressure before the throttle [kPa]
+        """
+    @property
+    def ambient_temperature_k(self) -> float:
+        """
+        temperature before the throttle [K]
+        """
+    @property
+    def bore_mm(self) -> float:
+        """
+        bore of the throttle [mm]
+        """
+    @property
+    def discharge_20(self) -> float:
+        """
+        discharge coefficient at 20 deg [-]
+        """
+    @property
+    def discharge_45(self) -> float:
+        """
+        discharge coefficient at 45 deg [-]
+        """
+    @property
+    def discharge_5(self) -> float:
+        """
+        discharge coefficient up to 5 deg of opening [-]
+        """
+    @property
+    def discharge_90(self) -> float:
+        """
+        discharge coefficient at 90 deg [-]
+        """
+    @property
+    def discharge_pressure_loss(self) -> float:
+        """
+        share that it loses at equal pressures [-]
+        """
+    @property
+    def displacement_l(self) -> float:
+        """
+        displacement of the engine [L]
+        """
+    @property
+    def filling_share(self) -> float:
+        """
+        share fed forward of the air that fills the manifold [-]
+        """
+    @property
+    def friction_nm(self) -> float:
+        """
+        friction torque at standstill [N m]
+        """
+    @property
+    def friction_nm_per_rpm(self) -> float:
+        """
+        rise of the friction torque with the speed [N m/rpm]
+        """
+    @property
+    def heating_value_mj_per_kg(self) -> float:
+        """
+        lower heating value of the fuel [MJ/kg]
+        """
+    @property
+    def highest_ratio(self) -> float:
+        """
+        pressure ratio up to which a measured pressure counts [-]
+        """
+    @property
+    def indicated_efficiency(self) -> float:
+        """
+        indicated work over the heat of the fuel [-]
+        """
+    @property
+    def leak_mm2(self) -> float:
+        """
+        area that is open at any angle [mm²]
+        """
+    @property
+    def lowest_flow_function(self) -> float:
+        """
+        the flow function is taken no lower [-]
+        """
+    @property
+    def manifold_l(self) -> float:
+        """
+        volume of the manifold [L]
+        """
+    @property
+    def manifold_temperature_k(self) -> float:
+        """
+        temperature in the manifold [K]
+        """
+    @property
+    def pedal_map(self) -> PedalMap:
+        """
+        torque that the pedal wants over the speed
+        """
+    @property
+    def plate_closed_deg(self) -> float:
+        """
+        plate against the cross-section where the opening is zero [deg]
+        """
+    @property
+    def pressure_lag_s(self) -> float:
+        """
+        lag of the wanted manifold pressure [s]
+        """
+    @property
+    def reference_bandwidth_per_s(self) -> float:
+        """
+        bandwidth of the filter of the reference [1/s]
+        """
+    @property
+    def reference_rate_deg_per_s(self) -> float:
+        """
+        fastest change of the reference [deg/s]
+        """
+    @property
+    def shaft_mm(self) -> float:
+        """
+        shaft of the plate [mm]
+        """
+    @property
+    def stoichiometric_air_fuel(self) -> float:
+        """
+        stoichiometric air over fuel by mass [-]
+        """
+    @property
+    def volumetric_efficiency(self) -> float:
+        """
+        charge over what the displacement holds of manifold gas [-]
+        """
+    @property
+    def widest_deg(self) -> float:
+        """
+        largest reference [deg]
+        """
+class DemandTracker:
+    """
+    The chain sample by sample; see mgdd.throttle.DemandChain.tracker.
+    """
+    def __init__(self, chain: DemandChain, *, sample_s: typing.SupportsFloat | typing.SupportsIndex) -> None:
+        ...
+    def reset(self) -> None:
+        """
+        As made: no demand yet.
+        """
+    def step(self, pedal_percent: typing.SupportsFloat | typing.SupportsIndex, speed_rpm: typing.SupportsFloat | typing.SupportsIndex, pressure_kpa: typing.SupportsFloat | typing.SupportsIndex = ...) -> dict:
+        """
+        Demand and reference of this sample, by name.
+        
+        NaN repeats the last value; without any measured pressure yet it is the wanted one. The first demand is taken as steady.
+        """
+    def take_over(self, reference_deg: typing.SupportsFloat | typing.SupportsIndex) -> None:
+        """
+        The next reference goes on from this angle, at the allowed rate.
+        
+        Ignored if it is not finite.
+        """
+    @property
+    def sample_s(self) -> float:
+        """
+        Time between samples [s].
+        """
+    @property
+    def state(self) -> dict[str, list[float]]:
+        """
+        What a run needs to go on bit for bit.
+        """
+    @state.setter
+    def state(self, arg1: collections.abc.Mapping[str, collections.abc.Sequence[typing.SupportsFloat | typing.SupportsIndex]]) -> None:
+        ...
 def airflow_torque(throttle: Throttle, angle_deg: typing.Annotated[numpy.typing.ArrayLike, numpy.float64]) -> numpy.typing.NDArray[numpy.float64]:
     """
     Torque of the modelled air flow [N m]; behind mgdd.throttle.airflow_torque_nm.
+    """
+def fill_manifold(chain: DemandChain, pressure_kpa: typing.SupportsFloat | typing.SupportsIndex, angle_deg: typing.SupportsFloat | typing.SupportsIndex, speed_rpm: typing.SupportsFloat | typing.SupportsIndex, *, sample_s: typing.SupportsFloat | typing.SupportsIndex) -> tuple[float, float, float]:
+    """
+    Pressure [kPa] after a sample, and the mean flows through throttle and cylinders [g/s].
     """
 def pseudo_wiener_of(throttle: Throttle) -> PseudoWienerModel:
     """

@@ -3,13 +3,15 @@
 from __future__ import annotations
 
 import argparse
+from collections.abc import Mapping
+from typing import Any
 
 from mgdd import presets
 from mgdd.cli.options import assignments
 from mgdd.errors import ParameterError, did_you_mean
 from mgdd.throttle import Throttle
 
-__all__ = ["add_throttle", "throttle_of"]
+__all__ = ["add_throttle", "changes_of", "throttle_of"]
 
 _DEFAULT_PRESET = "P1"
 
@@ -30,7 +32,11 @@ def throttle_of(args: argparse.Namespace) -> tuple[Throttle, str]:
     throttle = getattr(preset, "throttle", None)
     if throttle is None:
         raise ParameterError(f"--preset {args.preset}: is not a throttle; P1, P2 and P3 are")
-    fields = Throttle.fields()
+    return throttle.replace(**changes_of(args, Throttle.fields())), str(preset.name)
+
+
+def changes_of(args: argparse.Namespace, fields: Mapping[str, Mapping[str, Any]]) -> dict[str, Any]:
+    """Read ``--set FIELD=VALUE`` over the fields of a record; an unknown name is refused with the closest one."""
     values = assignments(args.set, fields)
     for name in values:
         if name not in fields:
@@ -38,4 +44,4 @@ def throttle_of(args: argparse.Namespace) -> tuple[Throttle, str]:
             raise ParameterError(
                 f"--set {name}: no field {name!r}; {guess + '; ' if guess else ''}the fields are {', '.join(fields)}"
             )
-    return throttle.replace(**values), str(preset.name)
+    return values

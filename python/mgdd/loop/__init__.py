@@ -3,7 +3,7 @@
 `EngineBench`, `SurrogatePlant` and `VirtualThrottle` are plants: ``apply`` inputs by name, ``measure``. `run_seeker`
 closes the loop on any of them and on a test rig, `monte_carlo` does so for seeds, gains and operating points of the
 bench on all cores, `EngineBench.find_optimum` says where a seeker should end. `track` and `track_many` run controllers
-of the throttle along a `Reference`.
+of the throttle along a `Reference`, `simulate_drive` runs a throttle between the pedal and the engine's torque.
 """
 
 from __future__ import annotations
@@ -11,6 +11,7 @@ from __future__ import annotations
 from mgdd._core.loop import SensorDynamics
 from mgdd.loop.bench import EngineBench
 from mgdd.loop.criteria import LoopCriteria
+from mgdd.loop.drive import simulate_drive
 from mgdd.loop.plant import Measurement, Plant
 from mgdd.loop.reference import Reference
 from mgdd.loop.seek import monte_carlo, run_seeker
@@ -30,6 +31,7 @@ __all__ = [
     "VirtualThrottle",
     "monte_carlo",
     "run_seeker",
+    "simulate_drive",
     "track",
     "track_many",
     "tune_controller",

@@ -37,6 +37,7 @@ _STUDIES = {
     "model-validation": _Study("cycle models beside measured traces, before and after calibration", 5),
     "online-calibration": _Study("what the engine teaches its model while it runs, also with errors of the sensor", 6),
     "calibrated-guide": _Study("whether a guide that the measured pressure calibrates beats one that stays wrong", 6),
+    "torque-demand": _Study("how far the torque follows the pedal through the throttle, and what loses it", 2),
     "throttle-first-principle": _Study(
         "groups of a throttle from noisy logs, also where the plant does more than the model", 7
     ),

@@ -1,4 +1,4 @@
-"""The electronic throttle: parameters, simulation, and what follows from the parameters in closed form.
+"""The electronic throttle: parameters, simulation, closed forms, and the demand chain from the pedal to the plate.
 
 Angles are degrees from the mechanically closed position, opening positive; a positive duty opens. The model is a
 reconstruction from public sources, not the code behind the dissertation: see the theory page.
@@ -6,14 +6,17 @@ reconstruction from public sources, not the code behind the dissertation: see th
 
 from __future__ import annotations
 
-from mgdd._core.throttle import Throttle
+from mgdd._core.throttle import PedalMap, Throttle
 from mgdd.throttle.characteristics import characteristics, holding_duty
+from mgdd.throttle.demand import DemandChain
 from mgdd.throttle.interop import to_iosystem
 from mgdd.throttle.pseudo_wiener import PseudoWiener
 from mgdd.throttle.sensors import SensorFault, SensorPair
 from mgdd.throttle.simulation import simulate
 
 __all__ = [
+    "DemandChain",
+    "PedalMap",
     "PseudoWiener",
     "SensorFault",
     "SensorPair",

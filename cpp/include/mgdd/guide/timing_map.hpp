@@ -6,12 +6,12 @@
 // Timings in °CA aTDC, axes in their own units. `lookup` and `learn` are noexcept and allocation-free.
 #pragma once
 
-#include <array>
 #include <cstddef>
 #include <span>
 #include <vector>
 
 #include "mgdd/common/error.hpp"
+#include "mgdd/math/tables.hpp"
 
 namespace mgdd::guide {
 
@@ -57,11 +57,9 @@ class TimingMap {
 
  private:
   static constexpr std::size_t corners = 4;
-  /// Cells around a point and their weights, which add up to one.
-  struct Place {
-    std::array<std::size_t, corners> cell{};
-    std::array<double, corners> weight{};
-    bool known = false, outside = false;
+  /// On one axis the last two weights are zero.
+  struct Place : TablePlace<corners> {
+    bool known = false;
   };
   Place place_of(std::span<const double> point) const noexcept;
 

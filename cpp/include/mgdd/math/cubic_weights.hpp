@@ -7,6 +7,8 @@
 #include <cstddef>
 #include <span>
 
+#include "mgdd/math/tables.hpp"
+
 namespace mgdd {
 
 struct CubicWeights {
@@ -54,13 +56,6 @@ inline CubicWeights cubic_weights(std::span<const double> x, std::size_t k, doub
     }
   }
   return w;
-}
-
-/// The interval of `at`: the last k with x[k] <= at, at most the last interval; the first one where `at` is before
-/// x[0].
-inline std::size_t interval_of(std::span<const double> x, double at) noexcept {
-  const auto after = std::upper_bound(x.begin(), x.end(), at) - x.begin();
-  return std::min(static_cast<std::size_t>(std::max<std::ptrdiff_t>(after, 1)) - 1, x.size() - 2);
 }
 
 }  // namespace mgdd

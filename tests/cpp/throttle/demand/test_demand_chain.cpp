@@ -1,0 +1,206 @@
+// From the pedal to the reference of the plate: the table of the pedal, round trips, laws of the reference (rate,
+// filter, bumpless start, takeover, repeated inputs, restart), refusals, no allocation.
+#include "mgdd/throttle/demand/demand_chain.hpp"
+
+#include <cmath>
+#include <functional>
+#include <limits>
+#include <string>
+#include <utility>
+#include <vector>
+
+#include <gtest/gtest.h>
+
+#include "mgdd/common/error.hpp"
+#include "support/demand_case.hpp"
+
+namespace mgdd::throttle {
+namespace {
+
+constexpr double nan = std::numeric_limits<double>::quiet_NaN();
+constexpr double sample = 1e-3;
+
+using test_support::odd_chain;
+
+TEST(PedalMap, TheDefaultIsTheProgressiveFormula) {
+  const PedalMap map;
+  EXPECT_EQ(map.wanted_nm.size(), 64u);
+  // 45 % at 3500 rpm of 113 N m full load, last speed 6000 rpm.
+  const double share = 0.6 * 0.45 + 0.4 * 0.45 * 0.45 - 0.1 * 0.55 * 3500.0 / 6000.0;
+  EXPECT_NEAR(map.torque_nm(45.0, 3500.0), 113.0 * share, 1e-12);
+  EXPECT_NEAR(map.torque_nm(100.0, 2000.0), 117.0, 1e-12);
+  EXPECT_NEAR(map.torque_nm(0.0, 6000.0), -10.4, 1e-12);
+  EXPECT_EQ(map.torque_nm(130.0, 9000.0), map.torque_nm(100.0, 6000.0));
+  EXPECT_TRUE(std::isnan(map.torque_nm(nan, 2000.0)));
+  EXPECT_TRUE(std::isnan(map.torque_nm(20.0, nan)));
+}
+
+TEST(PedalMap, MoreTorqueWithMorePedal) {
+  const PedalMap map;
+  for (double speed = 500.0; speed < 7000.0; speed += 211.0) {
+    double last = -1e9;
+    for (double pedal = 0.0; pedal <= 100.0; pedal += 0.5) {
+      EXPECT_GT(map.torque_nm(pedal, speed), last);
+      last = map.torque_nm(pedal, speed);
+    }
+  }
+}
+
+TEST(Demand, FullPedalOfTheDefaultIsWhatTheEngineCanBreathe) {
+  const DemandModel model{DemandChain{}};
+  for (double speed = 800.0; speed <= 6000.0; speed += 100.0) {
+    const Demand demand = model.steady(100.0, speed);
+    EXPECT_LT(demand.pressure_pa / 101325.0, 0.95) << speed;
+    EXPECT_LT(demand.opening_deg, 90.0) << speed;
+  }
+}
+
+TEST(Demand, TorqueComesBackThroughOpeningAndAir) {
+  for (const DemandChain& chain : {DemandChain{}, odd_chain()}) {
+    const DemandModel model(chain);
+    const Manifold manifold(chain.air, chain.bore, sample);
+    int seen = 0;
+    for (double speed = 800.0; speed <= 6000.0; speed += 400.0) {
+      for (double pedal = 0.0; pedal <= 100.0; pedal += 2.5) {
+        const Demand demand = model.steady(pedal, speed);
+        if (demand.pressure_pa > 0.95e3 * chain.air.ambient_kpa || demand.opening_deg <= 0.0) continue;
+        const double pressure = manifold.steady_pa({demand.opening_deg, speed});
+        const double air = chain.air.pumping_kg_per_s_pa(speed) * pressure;
+        EXPECT_NEAR(air / demand.air_kg_per_s, 1.0, 1e-9);
+        EXPECT_NEAR(chain.torque.torque_nm(air, speed), demand.torque_nm, 1e-4 * std::fabs(demand.torque_nm) + 1e-7);
+        ++seen;
+      }
+    }
+    EXPECT_GT(seen, 400);
+  }
+}
+
+TEST(Demand, OpeningComesBackFromItsAir) {
+  for (const DemandChain& chain : {DemandChain{}, odd_chain()}) {
+    const DemandModel model(chain);
+    const Manifold manifold(chain.air, chain.bore, sample);
+    for (const double ratio : {0.1, 0.4, 0.53, 0.7, 0.9}) {
+      const double pressure = ratio * chain.air.ambient_kpa * 1e3;
+      for (double angle = 0.5; angle <= 89.5; angle += 0.5) {
+        const double air = manifold.throttle_kg_per_s(angle, pressure);
+        EXPECT_NEAR(model.opening_deg(air, pressure, pressure), angle, 1e-6) << ratio;
+      }
+    }
+    // Up to the last ratio, where a share comes from the wanted pressure.
+    const double last = 0.95e3 * chain.air.ambient_kpa;
+    EXPECT_NEAR(model.opening_deg(manifold.throttle_kg_per_s(37.0, last), last, last), 37.0, 1e-6);
+  }
+}
+
+TEST(Demand, WhatTheEngineCannotMakeOpensMonotonouslyAndGetsTheAirThereIs) {
+  DemandChain strong;
+  for (double& torque : strong.pedal_map.wanted_nm)
+    torque *= 1.7;
+  const DemandModel model(strong);
+  const Manifold manifold(strong.air, strong.bore, sample);
+  for (const double speed : {800.0, 2500.0, 6500.0}) {
+    double last = -1.0;
+    for (double pedal = 0.0; pedal <= 100.0; pedal += 1.0) {
+      const Demand demand = model.steady(pedal, speed);
+      EXPECT_GE(demand.opening_deg, last);
+      EXPECT_LE(demand.opening_deg, 90.0);
+      last = demand.opening_deg;
+    }
+    EXPECT_GT(model.steady(100.0, speed).pressure_pa, 101325.0);
+    EXPECT_GT(manifold.steady_pa({last, speed}), 0.985 * manifold.steady_pa({90.0, speed}));
+  }
+}
+
+TEST(Demand, AMeasuredPressureCountsUpToTheHighestRatioAndTheWantedOneBeyond) {
+  const DemandModel model(odd_chain());
+  const Manifold manifold(odd_chain().air, odd_chain().bore, sample);
+  const double ambient = 96.4e3, air = 0.02, wanted = 0.7 * ambient;
+  for (const double ratio : {0.3, 0.6, 0.85, 0.899}) {
+    const double angle = model.opening_deg(air, ratio * ambient, wanted);
+    EXPECT_NEAR(manifold.throttle_kg_per_s(angle, ratio * ambient) / air, 1.0, 1e-9) << ratio;
+  }
+  for (const double ratio : {0.951, 1.0, 1.3}) {
+    const double angle = model.opening_deg(air, ratio * ambient, wanted);
+    EXPECT_NEAR(manifold.throttle_kg_per_s(angle, wanted) / air, 1.0, 1e-9) << ratio;
+  }
+}
+
+TEST(Demand, AStandingEngineWantsWhatItWouldAtTheFirstSpeed) {
+  const DemandModel model(odd_chain());
+  const Demand still = model.steady(30.0, 0.0), first = model.steady(30.0, 800.0);
+  EXPECT_EQ(still.opening_deg, first.opening_deg);
+  EXPECT_EQ(still.air_kg_per_s, first.air_kg_per_s);
+  EXPECT_GT(first.opening_deg, 1.0);
+}
+
+TEST(Demand, TheWidestReferenceIsNeverPassed) {
+  DemandChain chain = odd_chain();
+  chain.reference.widest_deg = 22.0;
+  EXPECT_EQ(DemandModel(chain).steady(100.0, 6000.0).opening_deg, 22.0);
+  DemandTracker tracker(chain, sample);
+  tracker.take_over(60.0);
+  EXPECT_EQ(tracker.step(nan, nan, nan).reference_deg, 22.0);
+  for (int k = 0; k < 300; ++k)
+    EXPECT_LE(tracker.step(100.0, 6000.0, nan).reference_deg, 22.0);
+}
+
+TEST(Demand, NothingThatAMeasuredPressureCanBeGivesAJump) {
+  const DemandModel model{DemandChain{}};
+  const double air = 0.03, wanted = 0.93 * 101325.0;
+  double last = model.opening_deg(air, 80e3, wanted);
+  for (double pressure = 80e3; pressure < 130e3; pressure += 5.0) {
+    const double opening = model.opening_deg(air, pressure, wanted);
+    EXPECT_LT(std::fabs(opening - last), 0.05) << pressure;
+    last = opening;
+  }
+}
+
+TEST(DemandChain, ARefusedParameterNamesItself) {
+  const auto refused = [](const std::string& field, const std::function<void(DemandChain&)>& change) {
+    DemandChain chain = odd_chain();
+    change(chain);
+    try {
+      (void)DemandTracker(chain, sample);
+      ADD_FAILURE() << field << " was taken";
+    } catch (const Error& error) {
+      EXPECT_EQ(error.field, field);
+    }
+  };
+  refused("displacement_l", [](DemandChain& c) { c.air.displacement_l = 0.0; });
+  refused("manifold_temperature_k", [](DemandChain& c) { c.air.manifold_temperature_k = 20.0; });
+  refused("indicated_efficiency", [](DemandChain& c) { c.torque.indicated_efficiency = nan; });
+  refused("shaft_mm", [](DemandChain& c) { c.bore.shaft_mm = 52.0; });
+  refused("plate_closed_deg", [](DemandChain& c) { c.bore.plate_closed_deg = 80.0; });
+  refused("discharge_45", [](DemandChain& c) { c.bore.discharge_45 = 0.7; });
+  refused("filling_share", [](DemandChain& c) { c.reference.filling_share = -0.1; });
+  refused("reference_rate_deg_per_s", [](DemandChain& c) { c.reference.reference_rate_deg_per_s = 0.0; });
+  refused("pedal_percent", [](DemandChain& c) { c.pedal_map.pedal_percent = {0.0}; });
+  refused("pedal_percent[7]", [](DemandChain& c) { c.pedal_map.pedal_percent[7] = 101.0; });
+  refused("speed_rpm[0]", [](DemandChain& c) { c.pedal_map.speed_rpm[0] = 0.0; });
+  refused("wanted_nm", [](DemandChain& c) { c.pedal_map.wanted_nm.pop_back(); });
+  refused("wanted_nm[3][2]", [](DemandChain& c) { c.pedal_map.wanted_nm[3 * 8 + 2] = nan; });
+  refused("wanted_nm[3][2]", [](DemandChain& c) { c.pedal_map.wanted_nm[3 * 8 + 2] = -20.0; });
+  for (const double bad : {0.0, 1.5, nan}) {
+    try {
+      (void)DemandTracker(odd_chain(), bad);
+      ADD_FAILURE();
+    } catch (const ParameterError& error) {
+      EXPECT_EQ(error.field, "sample_s");
+    }
+  }
+}
+
+TEST(DemandChain, EveryNumberHasOneField) {
+  DemandChain chain;
+  double at = 0.5;
+  for (const auto& field : demand_fields())
+    field.in(chain) = at += 1.0;
+  EXPECT_EQ(sizeof(EngineTorque) + sizeof(IntakeAir) + sizeof(ThrottleBore) + sizeof(ReferenceShape),
+            n_demand_fields * sizeof(double));
+  at = 0.5;
+  for (const auto& field : demand_fields())
+    EXPECT_EQ(field.in(chain), at += 1.0);
+}
+
+}  // namespace
+}  // namespace mgdd::throttle

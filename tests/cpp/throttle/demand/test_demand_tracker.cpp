@@ -1,0 +1,190 @@
+// The reference of the plate sample by sample: bumpless start, rate and filter, filling fed forward, takeover, repeated
+// inputs, restart bit for bit, no allocation.
+#include <cmath>
+#include <limits>
+#include <utility>
+
+#include <gtest/gtest.h>
+
+#include "mgdd/common/error.hpp"
+#include "mgdd/throttle/demand/demand_chain.hpp"
+#include "support/demand_case.hpp"
+#include "support/no_alloc.hpp"
+
+namespace mgdd::throttle {
+namespace {
+
+using test_support::odd_chain;
+
+static_assert(noexcept(std::declval<DemandTracker&>().step(0.0, 0.0, 0.0)));
+
+constexpr double nan = std::numeric_limits<double>::quiet_NaN();
+constexpr double sample = 1e-3;
+
+TEST(Tracker, StartsAtItsSteadyDemandAndStaysThere) {
+  const DemandModel model(odd_chain());
+  DemandTracker tracker(odd_chain(), sample);
+  const Demand steady = model.steady(33.0, 2100.0);
+  for (int k = 0; k < 500; ++k) {
+    const TrackedDemand out = tracker.step(33.0, 2100.0, steady.pressure_pa);
+    EXPECT_NEAR(out.reference_deg, steady.opening_deg, 1e-9);
+    EXPECT_NEAR(out.torque_nm, steady.torque_nm, 1e-12);
+    EXPECT_NEAR(out.air_kg_per_s, steady.air_kg_per_s, 1e-15);
+  }
+}
+
+TEST(Tracker, WithoutAMeasuredPressureItTakesTheWantedOne) {
+  DemandTracker with(odd_chain(), sample), without(odd_chain(), sample);
+  for (int k = 0; k < 400; ++k) {
+    const double pedal = k < 50 ? 12.0 : 70.0;
+    const TrackedDemand blind = without.step(pedal, 2600.0, nan);
+    const TrackedDemand told = with.step(pedal, 2600.0, blind.pressure_pa);
+    EXPECT_EQ(told.reference_deg, blind.reference_deg) << k;
+  }
+}
+
+TEST(Tracker, OpensForTheMeasuredPressure) {
+  DemandTracker tracker(odd_chain(), sample);
+  const Manifold manifold(odd_chain().air, odd_chain().bore, sample);
+  for (const double pressure : {30e3, 62e3, 75e3}) {
+    const TrackedDemand out = tracker.step(40.0, 2500.0, pressure);
+    EXPECT_NEAR(manifold.throttle_kg_per_s(out.opening_deg, pressure) / out.air_kg_per_s, 1.0, 1e-9) << pressure;
+  }
+}
+
+TEST(Tracker, TheReferenceKeepsItsRateAndSettlesWithItsFilter) {
+  DemandChain chain = odd_chain();
+  chain.reference.pressure_lag_s = 0.0;
+  chain.reference.filling_share = 0.0;
+  chain.reference.reference_rate_deg_per_s = 300.0;
+  DemandTracker tracker(chain, sample);
+  const DemandModel model(chain);
+  double last = tracker.step(5.0, 1500.0, nan).reference_deg;
+  const double target = model.steady(90.0, 1500.0).opening_deg;
+  ASSERT_GT(target - last, 15.0);
+  const double way = target - last;
+  double limited = last;
+  for (int k = 0; k < 600; ++k) {
+    const TrackedDemand out = tracker.step(90.0, 1500.0, nan);
+    EXPECT_LE(std::fabs(out.reference_deg - last), 0.3 + 1e-12);
+    limited += std::fmin(0.3, target - limited);
+    const double wanted = last + (1.0 - std::exp(-0.08)) * (limited - last);
+    EXPECT_NEAR(out.reference_deg, wanted, 1e-9);
+    last = out.reference_deg;
+  }
+  EXPECT_NEAR(last, target, 1e-6 * way);
+}
+
+TEST(Tracker, FillingIsFedForwardSoThatThePressureFollowsItsLag) {
+  // Without rate limit and filter, on the same manifold, the pressure is the wanted one.
+  DemandChain chain = odd_chain();
+  chain.reference.reference_rate_deg_per_s = 1e6;
+  chain.reference.reference_bandwidth_per_s = 1e5;
+  const Manifold manifold(chain.air, chain.bore, sample);
+  const auto worst_of = [&](double share) {
+    chain.reference.filling_share = share;
+    DemandTracker own(chain, sample);
+    Manifold::State state{DemandModel(chain).steady(15.0, 2000.0).pressure_pa};
+    double worst = 0.0;
+    for (int k = 0; k < 1500; ++k) {
+      const TrackedDemand out = own.step(k < 100 ? 15.0 : k < 800 ? 55.0 : 25.0, 2000.0, state.pressure_pa);
+      manifold.step(state, {out.reference_deg, 2000.0});
+      worst = std::fmax(worst, std::fabs(state.pressure_pa - out.pressure_pa));
+    }
+    return worst;
+  };
+  EXPECT_LT(worst_of(1.0), 1000.0);
+  EXPECT_GT(worst_of(0.0), 5000.0);
+}
+
+TEST(Tracker, TakesOverFromAnAngleWithoutABump) {
+  DemandTracker tracker(odd_chain(), sample);
+  tracker.take_over(41.0);
+  EXPECT_EQ(tracker.step(nan, nan, nan).reference_deg, 41.0);
+  double last = 41.0;
+  for (int k = 0; k < 1000; ++k) {
+    const double now = tracker.step(10.0, 1500.0, nan).reference_deg;
+    EXPECT_LE(std::fabs(now - last), 0.8 + 1e-12);
+    last = now;
+  }
+  EXPECT_NEAR(last, DemandModel(odd_chain()).steady(10.0, 1500.0).opening_deg, 1e-6);
+  tracker.take_over(nan);
+  EXPECT_NEAR(tracker.step(10.0, 1500.0, nan).reference_deg, last, 1e-9);
+}
+
+TEST(Tracker, InputsThatAreNotFiniteRepeatTheLastOnes) {
+  DemandTracker tracker(odd_chain(), sample), other(odd_chain(), sample);
+  EXPECT_EQ(tracker.step(nan, 1500.0, 40e3).reference_deg, 0.0);
+  EXPECT_EQ(tracker.step(20.0, nan, nan).reference_deg, other.step(20.0, 1500.0, 40e3).reference_deg);
+  for (int k = 0; k < 100; ++k) {
+    const double infinity = std::numeric_limits<double>::infinity();
+    const TrackedDemand gap = tracker.step(k % 3 == 0 ? nan : 60.0, k % 5 == 0 ? infinity : 2500.0, nan);
+    const TrackedDemand held = other.step(k == 0 ? 20.0 : 60.0, k == 0 ? 1500.0 : 2500.0, 40e3);
+    EXPECT_EQ(gap.reference_deg, held.reference_deg) << k;
+  }
+}
+
+TEST(Tracker, HoldsAtStandstillAndBeyondTheTable) {
+  DemandTracker tracker(odd_chain(), sample);
+  for (const double speed : {0.0, -100.0, 1e9}) {
+    for (const double pedal : {-20.0, 0.0, 300.0}) {
+      for (int k = 0; k < 50; ++k) {
+        const TrackedDemand out = tracker.step(pedal, speed, k % 2 == 0 ? 0.0 : 500e3);
+        EXPECT_TRUE(std::isfinite(out.reference_deg) && std::isfinite(out.air_kg_per_s));
+        EXPECT_GE(out.reference_deg, 0.0);
+        EXPECT_LE(out.reference_deg, 90.0);
+      }
+    }
+  }
+}
+
+TEST(Tracker, GoesOnBitForBitAfterARestore) {
+  DemandTracker first(odd_chain(), sample), second(odd_chain(), sample);
+  const auto step = [](DemandTracker& tracker, int k) {
+    return tracker.step(50.0 + 50.0 * std::sin(0.01 * k), 1500.0 + k, 50e3 + 20e3 * std::cos(0.02 * k)).reference_deg;
+  };
+  for (int k = 0; k < 333; ++k)
+    (void)step(first, k);
+  restore_state(second, save_state(first));
+  for (int k = 333; k < 900; ++k)
+    EXPECT_EQ(step(first, k), step(second, k));
+  restore_state(second, save_state(DemandTracker(odd_chain(), sample)));  // one that has seen nothing
+  EXPECT_EQ(second.step(nan, nan, nan).reference_deg, 0.0);
+}
+
+TEST(Tracker, AStateThatCannotBeIsRefusedAndChangesNothing) {
+  DemandTracker tracker(odd_chain(), sample);
+  (void)tracker.step(40.0, 1800.0, 50e3);
+  const StateColumns before = save_state(tracker);
+  StateColumns bad = before;
+  bad["reference_deg"] = {90.5};
+  EXPECT_THROW(restore_state(tracker, bad), ParameterError);
+  bad = before;
+  bad["limited_deg"] = {};
+  EXPECT_THROW(restore_state(tracker, bad), ParameterError);
+  bad = before;
+  bad["wanted_pa"] = {-1.0};
+  EXPECT_THROW(restore_state(tracker, bad), ParameterError);
+  EXPECT_EQ(save_state(tracker), before);
+}
+
+TEST(Tracker, ResetForgetsEverything) {
+  DemandTracker tracker(odd_chain(), sample);
+  const StateColumns fresh = save_state(tracker);
+  (void)tracker.step(40.0, 1800.0, 50e3);
+  tracker.reset();
+  EXPECT_EQ(save_state(tracker), fresh);
+}
+
+TEST(Tracker, NoAllocation) {
+  DemandTracker tracker(odd_chain(), sample);
+  const test_support::AllocationCounter counter;
+  for (int k = 0; k < 1000; ++k)
+    (void)tracker.step(k % 101, 800.0 + k, 30e3 + 70.0 * k);
+  tracker.take_over(3.0);
+  tracker.reset();
+  EXPECT_EQ(counter.count(), 0u);
+}
+
+}  // namespace
+}  // namespace mgdd::throttle
