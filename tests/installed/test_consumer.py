@@ -90,12 +90,14 @@ def test_examples_build_and_run(build: Callable[..., Path], tmp_path: Path, incl
     efficiency = {float(row[0]): float(row[1]) for row in timing[1:]}
     assert max(efficiency, key=efficiency.__getitem__) == -5.0
 
-    step = [line.split(",") for line in run(programs / "throttle_step", "0.3").splitlines()]
+    step = [line.split(",") for line in run(programs / "throttle_plate", "0.3").splitlines()]
     assert step[0] == ["time_ms", "duty", "angle_deg", "pw_r_angle_deg"]
     angle, model = ([float(row[column]) for row in step[1:]] for column in (2, 3))
     assert angle[0] == 8.0
     assert max(angle) > 25.0 > angle[-1]
     assert all(abs(a - b) < 0.2 for a, b in zip(angle, model, strict=True))
+
+    assert ", 0 allocations, " in run(programs / "throttle_step")  # fails by its exit code if the plate does not follow
 
     seek = [line.split() for line in run(programs / "seek_timing").splitlines()]
     assert -3.0 < float(seek[-1][1]) < -2.0, "as early as the limit allows"

@@ -44,6 +44,7 @@ _STUDIES = {
     "throttle-pseudo-wiener": _Study(
         "three pseudo-Wiener models of a throttle, in free run and corrected by measurements", 7
     ),
+    "throttle-tracking": _Study("six controllers, tuned alike, on throttles that they do not know", 7),
     "identification-benchmarks": _Study(
         "measured drive, tanks and circuit: fits beside published ones (needs the data sets)"
     ),

@@ -17,6 +17,8 @@ namespace mgdd::control {
 
 inline constexpr double least_damping_factor = 0.4;
 inline constexpr double largest_damping_factor = 2.5;
+/// Duty beyond the friction level, or taken by the speed, from which gain and damping are learnt.
+inline constexpr double least_excitation = 0.15;
 
 struct FrictionLearnerSettings {
   double rate_per_s = 150.0;     ///< share of what explains an innovation that is learnt, per time
@@ -72,10 +74,16 @@ class FrictionLearner {
     }
     const T error = rate_ * std::clamp(innovation, -largest_error_, largest_error_) / size;
     const T level = error * angle_slope_[0];
-    belief.gain_factor =
-        std::clamp(belief.gain_factor + error * weights_[1] * angle_slope_[1], least_gain_, largest_gain_);
-    belief.damping_factor = std::clamp(belief.damping_factor + error * weights_[2] * angle_slope_[2],
-                                       T(least_damping_factor), T(largest_damping_factor));
+    // Gain and damping only where they show: a slow plate says nothing about them, and they would drift.
+    const T shown = T(least_excitation) * std::abs(angle_slope_[0]);
+    if (std::abs(angle_slope_[1]) > shown) {
+      belief.gain_factor =
+          std::clamp(belief.gain_factor + error * weights_[1] * angle_slope_[1], least_gain_, largest_gain_);
+    }
+    if (std::abs(angle_slope_[2]) > shown) {
+      belief.damping_factor = std::clamp(belief.damping_factor + error * weights_[2] * angle_slope_[2],
+                                         T(least_damping_factor), T(largest_damping_factor));
+    }
     // The level of this direction moves by the step, that of the other one by a quarter of it.
     band.bias += T(0.625) * level;
     band.friction += T(0.375) * sign * level;
