@@ -106,8 +106,7 @@ SensorReading SensorSampler::step(double angle_deg) noexcept {
   }
   out.sum_error_v = out.volts[0] + out.volts[1] - pair_.supply_v;
   out.sum_fault = std::abs(out.sum_error_v) >= pair_.sum_tolerance_v;
-  const double used_v = out.range_fault[0] && !out.range_fault[1] ? pair_.supply_v - out.volts[1] : out.volts[0];
-  out.angle_deg = (used_v - pair_.closed_v) / pair_.span_v * pair_.travel_deg;
+  out.angle_deg = pair_.angles_deg(out.volts)[out.range_fault[0] && !out.range_fault[1] ? 1 : 0];
   state_.failing = out.range_fault[0] || out.range_fault[1] || out.sum_fault ? state_.failing + 1 : 0;
   state_.fault = state_.fault || state_.failing >= debounce_;
   out.fault = state_.fault;
