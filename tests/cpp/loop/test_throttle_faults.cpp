@@ -27,13 +27,13 @@ VirtualThrottleSettings with(std::vector<ThrottleFault> faults, double start_deg
 }
 
 double lively_duty(int k) {
-  return 0.3 * std::sin(0.02 * k) + 0.15;
+  return 0.4 * std::sin(0.02 * k) + 0.1;
 }
 
 TEST(ThrottleFaults, OneThatBeginsLaterChangesNoBitBefore) {
   for (const Kind kind : {Kind::jammed, Kind::jammed_at, Kind::spring_above, Kind::supply_sag, Kind::missing_sample,
                           Kind::nan_sample, Kind::stale_sample}) {
-    const double size = kind == Kind::jammed_at ? 15.0 : kind == Kind::spring_above ? 1.0 : 0.0;
+    const double size = kind == Kind::jammed_at ? 40.0 : kind == Kind::spring_above ? 1.0 : 0.0;
     VirtualThrottle healthy(with({})), other(with({{kind, 0.2, size, 0.55}}));
     int differing = 0;
     for (int k = 0; k < 600; ++k) {
