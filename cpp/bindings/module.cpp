@@ -26,7 +26,7 @@ PYBIND11_MODULE(_core, m) {
       {"optimize",
        "Fits, seekers and learners.",
        {&bind_least_squares, &bind_limits, &bind_seekers, &bind_direct_seekers, &bind_learning}},
-      {"control", "Controllers of a throttle plate.", {&bind_controllers}},
+      {"control", "Controllers of a throttle plate.", {&bind_controllers, &bind_supervisor}},
       {"engine",
        "Cycle model of one cylinder, emissions, performance, measured pressure.",
        {&bind_cylinder, &bind_emissions, &bind_cycle, &bind_performance, &bind_pressure}},

@@ -12,7 +12,9 @@ namespace {
 using Mode = SupervisorMode;
 using Reason = SupervisorReason;
 
-constexpr double rounding = 1e-6;  // of times against whole samples
+constexpr double rounding = 1e-6;   // of times against whole samples
+constexpr double fast_moves = 8.0;  // so many times the speed of a jam: the plate moves, without waiting for the way
+constexpr double quick_lag = 1.0 / 3.0;  // of the balance's
 
 const SupervisorSettings& checked(const SupervisorSettings& settings) {
   validate(settings);
@@ -30,6 +32,7 @@ ThrottleSupervisor::State::State(const SupervisorSettings& s) noexcept
 ThrottleSupervisor::ThrottleSupervisor(const SupervisorSettings& settings)
     : settings_(checked(settings)),
       lag_(settings.balance_lag_s, settings.balance_lag_s, settings.sample_s),
+      quick_share_(dynamics::lag_share(quick_lag * settings.balance_lag_s, settings.sample_s)),
       state_(settings) {}
 
 // The first reason of an open bridge stays; of limits the later one in the list, of held samples the last one.
@@ -114,20 +117,52 @@ void ThrottleSupervisor::look_at_supply(double supply_v) noexcept {
 
 // Equivalent disturbance, both lags on every term: excess - rate/(tau G) - acceleration/G.
 void ThrottleSupervisor::follow_balance(double excess) noexcept {
+  const SupervisorSettings& set = settings_;
   State& s = state_;
   auto& f = s.filtered;
   if (!s.filtering) {
     s.filtering = true;
-    s.anchor_deg = s.angle_deg;
-    f[angle_once] = f[angle_twice] = s.angle_deg;
-    f[excess_once] = f[excess_twice] = f[rate] = 0.0;
+    s.anchor_deg = s.last_deg = f[angle_once] = f[angle_twice] = s.angle_deg;
+    f[excess_once] = f[excess_twice] = f[rate] = f[quick_rate] = 0.0;
   }
   const double before_deg = f[angle_twice], before = f[rate];
   lag_.step(f[angle_once], f[angle_twice], s.angle_deg);
   lag_.step(f[excess_once], f[excess_twice], excess);
-  f[rate] = (f[angle_twice] - before_deg) / settings_.sample_s;
-  s.imbalance = f[excess_twice] - f[rate] / (settings_.time_constant_s * settings_.gain_deg_per_s2) -
-                (f[rate] - before) / (settings_.sample_s * settings_.gain_deg_per_s2);
+  f[rate] = (f[angle_twice] - before_deg) / set.sample_s;
+  f[quick_rate] += quick_share_ * ((s.angle_deg - s.last_deg) / set.sample_s - f[quick_rate]);
+  s.last_deg = s.angle_deg;
+  const double inertia = (f[rate] - before) / (set.sample_s * set.gain_deg_per_s2);
+  const double braking = f[rate] / (set.time_constant_s * set.gain_deg_per_s2);
+  s.imbalance = f[excess_twice] - braking - inertia;
+  s.motion = std::abs(braking) + std::abs(inertia);
+}
+
+// Whether the plate is pushed: neither with its spring nor without it would a free one stand still.
+bool ThrottleSupervisor::look_for_jam(double duty, double excess, double friction, double known) noexcept {
+  const SupervisorSettings& set = settings_;
+  State& s = state_;
+  const double error = usable_reference_deg() - s.angle_deg, way = std::copysign(1.0, error);
+  const bool pushed =
+      std::abs(error) > set.jam_error_deg && way * excess > known + set.load && way * duty > friction + set.load;
+  const bool fast = std::abs(s.filtered[quick_rate]) * set.jam_s > fast_moves * set.jam_move_deg;
+  if (!pushed || fast || std::abs(s.angle_deg - s.anchor_deg) > set.jam_move_deg) {
+    s.anchor_deg = s.angle_deg;
+    s.counts[jam] = 0.0;
+  }
+  (void)raise_after(jam, pushed, set.jam_s, Mode::limp_home, Reason::jammed);
+  return pushed;
+}
+
+// A plate driven towards limp-home harder than its friction needs: nothing pulls it there. Inertia and back-EMF count
+// as unknown, so that fast moves cannot show it.
+void ThrottleSupervisor::look_for_spring(double known) noexcept {
+  const SupervisorSettings& set = settings_;
+  State& s = state_;
+  const double distance = s.angle_deg - set.spring.limp_home_deg;
+  const double beyond = -std::copysign(1.0, distance) * s.imbalance - known - s.motion;
+  const bool near = std::abs(distance) <= set.spring_band_deg;
+  s.evidence_s = near ? 0.0 : std::max(0.0, s.evidence_s + set.sample_s * beyond);
+  if (s.evidence_s >= set.spring_evidence_s) raise(Mode::limp_home, Reason::spring_lost);
 }
 
 void ThrottleSupervisor::look_at_motion() noexcept {
@@ -135,40 +170,22 @@ void ThrottleSupervisor::look_at_motion() noexcept {
   State& s = state_;
   if (!s.trusted || s.order.bridge_open) {
     s.filtering = false;
-    for (const Count which : {jam, spring, too_far_closed, too_far_open, overload})
+    for (const Count which : {jam, too_far_closed, too_far_open, overload})
       s.counts[which] = 0.0;
-    s.imbalance = 0.0;
+    s.imbalance = s.evidence_s = 0.0;
     return;
   }
   const double duty = s.order.duty * s.supply_v / set.nominal_supply_v;
   const double held = set.spring.at(s.angle_deg), excess = duty - held;
-  const double rate_before = s.filtered[rate];
-  follow_balance(excess);
   const double friction = set.friction * (1.0 + set.uncertainty);
   const double known = friction + set.uncertainty * std::abs(held);
-  const double error = usable_reference_deg() - s.angle_deg;
-
-  // Neither with its spring nor without it would a free plate stand still.
-  const double way = std::copysign(1.0, error);
-  const bool pushed =
-      std::abs(error) > set.jam_error_deg && way * excess > known + set.load && way * duty > friction + set.load;
-  if (!pushed || std::abs(s.angle_deg - s.anchor_deg) > set.jam_move_deg) {
-    s.anchor_deg = s.angle_deg;
-    s.counts[jam] = 0.0;
+  follow_balance(excess);
+  if (look_for_jam(duty, excess, friction, known)) {
+    s.evidence_s = 0.0;  // a plate that is pushed and stands has its spring
+  } else {
+    look_for_spring(known);
   }
-  (void)raise_after(jam, pushed, set.jam_s, Mode::limp_home, Reason::jammed);
-
-  // A plate driven towards limp-home harder than its friction needs: nothing pulls it there. Inertia and back-EMF count
-  // as unknown, so that fast moves cannot show it.
-  const double distance = s.angle_deg - set.spring.limp_home_deg;
-  const double rate_now = s.filtered[rate];
-  const double motion = std::abs(rate_now) / (set.time_constant_s * set.gain_deg_per_s2) +
-                        std::abs(rate_now - rate_before) / (set.sample_s * set.gain_deg_per_s2);
-  const bool stands = s.counts[jam] * set.sample_s > 0.5 * set.spring_s;
-  const bool unsprung =
-      std::abs(distance) > set.spring_band_deg && -std::copysign(1.0, distance) * s.imbalance > known + motion;
-  (void)raise_after(spring, unsprung && !stands, set.spring_s, Mode::limp_home, Reason::spring_lost);
-
+  const double error = usable_reference_deg() - s.angle_deg;
   for (const auto& [side, beyond] : {std::pair{too_far_closed, error}, std::pair{too_far_open, -error}})
     (void)raise_after(side, beyond > set.tracking_error_deg, set.tracking_s, Mode::limp_home, Reason::tracking);
   const bool away = s.angle_deg > set.closed_deg + set.jam_error_deg && s.angle_deg < set.open_deg - set.jam_error_deg;

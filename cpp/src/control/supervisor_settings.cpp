@@ -52,7 +52,8 @@ constexpr std::array<Field<S>, n_supervisor_fields> table{{
     field<&S::jam_s>({"jam_s", "s", time, "time without that move: open"}),
     field<&S::balance_lag_s>({"balance_lag_s", "s", above(0.0, 1.0), "each of two lags of the balance"}),
     field<&S::spring_band_deg>({"spring_band_deg", "deg", width, "no check of the springs nearer to limp-home"}),
-    field<&S::spring_s>({"spring_s", "s", time, "time that a spring must be missing: open"}),
+    field<&S::spring_evidence_s>(
+        {"spring_evidence_s", "s", above(0.0, 60.0), "sum of the duty beyond what a whole spring allows: open"}),
     field<&S::tracking_error_deg>({"tracking_error_deg", "deg", width, "error that must not last"}),
     field<&S::tracking_s>({"tracking_s", "s", time, "time that it lasts: open"}),
     field<&S::overload_duty>({"overload_duty", "-", above(0.0, 1.0), "duty that must not last away from the stops"}),

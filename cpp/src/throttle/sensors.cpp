@@ -52,6 +52,9 @@ void validate(const SensorPair& p) {
 
 void validate(const SensorFault& fault) {
   require_within("from_s", fault.from_s, 0.0, 1e9, "s");
+  if (fault.until_s && !(*fault.until_s > fault.from_s && *fault.until_s <= 1e9)) {
+    throw ParameterError("until_s", *fault.until_s, "must be > from_s = " + text(fault.from_s) + " and <= 1e9", "s");
+  }
   if (fault.kind == SensorFaultKind::offset) require_within("size", fault.size, -100.0, 100.0, "V");
   if (fault.kind == SensorFaultKind::gain) require_within("size", fault.size, -1.0, 10.0);
 }
@@ -71,7 +74,7 @@ SensorSampler::SensorSampler(const SensorPair& pair, double sample_s, std::uint6
 
 double SensorSampler::faulty(std::size_t which, double volts, double time_s) noexcept {
   const SensorFault& fault = faults_[which];
-  if (time_s < fault.from_s) return volts;
+  if (time_s < fault.from_s || (fault.until_s && time_s >= *fault.until_s)) return volts;
   switch (fault.kind) {
     case SensorFaultKind::none:
       return volts;

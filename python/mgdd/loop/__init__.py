@@ -13,6 +13,7 @@ from mgdd.loop.criteria import LoopCriteria
 from mgdd.loop.plant import Measurement, Plant
 from mgdd.loop.seek import monte_carlo, run_seeker
 from mgdd.loop.surrogate_plant import SurrogatePlant
+from mgdd.loop.throttle_faults import ThrottleFault
 from mgdd.loop.virtual_throttle import VirtualThrottle
 
 __all__ = [
@@ -22,6 +23,7 @@ __all__ = [
     "Plant",
     "SensorDynamics",
     "SurrogatePlant",
+    "ThrottleFault",
     "VirtualThrottle",
     "monte_carlo",
     "run_seeker",

@@ -43,6 +43,7 @@ _STUDIES = {
     "throttle-pseudo-wiener": _Study(
         "three pseudo-Wiener models of a throttle, in free run and corrected by measurements", 7
     ),
+    "throttle-faults": _Study("faults of a throttle under a supervisor: time to the safe state, reason, recovery"),
     "identification-benchmarks": _Study(
         "measured drive, tanks and circuit: fits beside published ones (needs the data sets)"
     ),

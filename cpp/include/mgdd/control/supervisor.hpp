@@ -3,7 +3,8 @@
 // so until `acknowledge` finds the cause gone. Angles in deg, duty -1..1, volts, seconds; `observe` and `decide` are
 // noexcept and allocation-free. A monitor of a simulation or a test rig, not a certified safety function.
 // Thresholds: sum of sensors 0.2 V of 5 V and range 0.2..4.8 V (Bosch Motorsport, MS 6 manual), 40 deg in limp-home
-// mode (ETC benchmark, Berkeley). Balance of the plate: a disturbance observer (Ohnishi et al. 1996) in units of duty.
+// mode (ETC benchmark, Berkeley). Balance of the plate: a disturbance observer (Ohnishi et al. 1996) in units of duty;
+// its excess is summed (Page 1954).
 #pragma once
 
 #include <array>
@@ -79,15 +80,15 @@ struct SupervisorSettings {
   double gain_deg_per_s2 = 83597.0;
   double time_constant_s = 0.0197;
   double uncertainty = 0.3;  ///< [-] share by which spring and friction may differ from these
-  double load = 0.04;         ///< [-] of the air
+  double load = 0.04;        ///< [-] of the air
 
   double jam_error_deg = 2.0;
   double jam_move_deg = 0.5;  ///< who moves farther in `jam_s` is not jammed
   double jam_s = 0.04;
 
-  double balance_lag_s = 0.006;  ///< of the balance, twice
-  double spring_band_deg = 3.0;  ///< no check of the springs nearer to limp-home
-  double spring_s = 0.02;
+  double balance_lag_s = 0.006;     ///< of the balance, twice
+  double spring_band_deg = 3.0;     ///< no check of the springs nearer to limp-home
+  double spring_evidence_s = 4e-4;  ///< duty beyond what a whole spring allows, summed over time: 0.02 for 20 ms
 
   double tracking_error_deg = 8.0;
   double tracking_s = 0.5;
@@ -178,6 +179,8 @@ class ThrottleSupervisor {
     v("filtering", s.filtering);
     v("filtered", s.filtered);
     v("imbalance", s.imbalance);
+    v("evidence_s", s.evidence_s);
+    v("last_deg", s.last_deg);
   }
 
  private:
@@ -188,13 +191,12 @@ class ThrottleSupervisor {
     low,
     lost,
     jam,
-    spring,
     too_far_closed,
     too_far_open,
     overload,
     n_counts
   };
-  enum Filter : std::uint8_t { angle_once, angle_twice, excess_once, excess_twice, rate, n_filtered };
+  enum Filter : std::uint8_t { angle_once, angle_twice, excess_once, excess_twice, rate, quick_rate, n_filtered };
 
   /// Everything that changes from sample to sample.
   struct State {
@@ -213,7 +215,9 @@ class ThrottleSupervisor {
     double anchor_deg = 0.0;  // from where a pushed plate has to move
     bool filtering = false;
     std::array<double, n_filtered> filtered{};
-    double imbalance = 0.0;
+    double last_deg = 0.0;
+    double imbalance = 0.0, motion = 0.0;  // what is not explained, and what inertia and back-EMF explain
+    double evidence_s = 0.0;
   };
 
   static constexpr std::int64_t n_modes = 4, n_reasons = 14, n_tests = 4;
@@ -233,10 +237,13 @@ class ThrottleSupervisor {
   void look_at_supply(double supply_v) noexcept;
   void look_at_motion() noexcept;
   void follow_balance(double excess) noexcept;
+  bool look_for_jam(double duty, double excess, double friction, double known) noexcept;
+  void look_for_spring(double known) noexcept;
   void test_return() noexcept;
 
   SupervisorSettings settings_;
   dynamics::LagPair<double> lag_;
+  double quick_share_;
   State state_;
 };
 

@@ -51,6 +51,7 @@ struct SensorFault {
   SensorFaultKind kind = SensorFaultKind::none;
   double from_s = 0.0;
   double size = 0.0;
+  std::optional<double> until_s{};  ///< none: it stays
 };
 Names<SensorFaultKind> sensor_fault_names() noexcept;
 
