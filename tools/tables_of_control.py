@@ -9,10 +9,11 @@ from functools import cache
 import numpy as np
 
 from mgdd.loop import VirtualThrottle
+from mgdd.studies import run_study
 from mgdd.studies.throttle_baselines import Baseline, Controller, baselines, controller_of, settings_of, throttle_of
 from mgdd.throttle import SensorPair, Throttle
 
-__all__ = ["Baseline", "baselines", "settings_of", "sine_mse_deg2", "stepped", "throttle_baselines"]
+__all__ = ["Baseline", "baselines", "settings_of", "sine_mse_deg2", "stepped", "throttle_baselines", "throttle_faults"]
 
 Rows = dict[str, list[float]]
 
@@ -65,4 +66,18 @@ def throttle_baselines() -> Rows:
         (large_ms, _), (small_ms, small_mse) = stepped(b, 20.0, 60.0), stepped(b, 40.0, 42.0)
         sine = sine_mse_deg2(b)
         rows[label] = [large_ms, b.large_ms, small_ms, b.small_ms, small_mse, b.small_mse_deg2, sine, b.sine_mse_deg2]
+    return rows
+
+
+@cache
+def throttle_faults() -> Rows:
+    """Time to the safe state per preset and controller [ms], excursion [deg], return per preset [ms] where there is one."""
+    found: dict[str, list[dict[str, float | None]]] = {}
+    for row in run_study("throttle-faults", figures=False).summary["rows"]:
+        found.setdefault(row["fault"], []).append(row)
+    rows = {}
+    for fault, each in found.items():
+        safe = [row["safe_ms"] for row in each]
+        returns = [max(row["return_ms"] or 0.0 for row in each if row["preset"] == name) for name in ("P1", "P2", "P3")]
+        rows[fault] = [*safe, max(row["beyond_deg"] for row in each), *(value for value in returns if value > 0.0)]
     return rows

@@ -24,7 +24,7 @@ SHOWN = ("sensors disagree", "jammed in flight")
 
 
 def run_throttle_faults(
-    *, seeds: int = 5, quick: bool = False, figures: bool = True, progress: Progress | None = None
+    *, seeds: int = 3, quick: bool = False, figures: bool = True, progress: Progress | None = None
 ) -> StudyResult:
     """Run every labelled fault against PID and sliding mode on every preset, watched by a supervisor.
 
