@@ -71,7 +71,7 @@ def throttle_baselines() -> Rows:
 
 @cache
 def throttle_faults() -> Rows:
-    """Time to the safe state per preset and controller [ms], excursion [deg], return per preset [ms] where there is one."""
+    """Time to the safe state per controller and preset [ms], excursion [deg], return per preset [ms] where it comes."""
     found: dict[str, list[dict[str, float | None]]] = {}
     for row in run_study("throttle-faults", figures=False).summary["rows"]:
         found.setdefault(row["fault"], []).append(row)

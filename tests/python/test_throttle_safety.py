@@ -33,7 +33,9 @@ def run_of(baseline):
     def run(name):
         if name not in done:
             supervisor = supervisor_of(baseline.preset)
-            done[name] = run_case(CASES[name], throttle_of(baseline.preset), controller_of(baseline), supervisor, seed=3)
+            done[name] = run_case(
+                CASES[name], throttle_of(baseline.preset), controller_of(baseline), supervisor, seed=3
+            )
         return done[name]
 
     return run
@@ -50,7 +52,7 @@ LIMITING = [name for name, case in CASES.items() if case.mode == "limited"]
 @pytest.mark.parametrize("name", OPENING)
 def test_the_bridge_is_open_within_50_ms_of_what_can_be_seen_and_stays_so_until_told(run_of, name):
     case, run = CASES[name], run_of(name)
-    visible = case.visible_s(run)
+    visible = case.seen_s(run)
     assert 1.0 <= visible < 1.5
     opened = int(np.argmax(run.bridge_open))
     assert opened >= 1000

@@ -132,8 +132,8 @@ class VirtualThrottle:
         -------
         Measurement
             ``values``: ``time_s``, ``sensed_angle_deg``, both sensors as ``first_v``, ``second_v``, ``first_angle_deg``
-            and ``second_angle_deg``, ``fault`` of their check as 0 or 1, ``age_s`` of what arrived last, ``supply_v`` of
-            the bridge, and the truth ``angle_deg``, ``speed_deg_per_s`` and ``current_a``. What did not arrive is NaN.
+            and ``second_angle_deg``, ``fault`` of their check as 0 or 1, ``age_s`` of what arrived last, ``supply_v``
+            of the bridge, and the truth ``angle_deg``, ``speed_deg_per_s`` and ``current_a``. What is missing is NaN.
 
         Raises
         ------
@@ -142,5 +142,11 @@ class VirtualThrottle:
         """
         if self._applied is None:
             raise RigError("measure() before apply(): apply a duty first")
-        reading = self._core.step(**self._applied)
+        applied = self._applied
+        reading = self._core.step(
+            duty=applied["duty"],
+            supply_v=applied["supply_v"],
+            airflow_torque_nm=applied["airflow_torque_nm"],
+            bridge_open=applied["bridge_open"] != 0.0,
+        )
         return Measurement(values={name: float(value) for name, value in reading.items()})

@@ -1,4 +1,4 @@
-"""Faults of a throttle in the loop, each with what is asked for meanwhile, when it can be seen, and what must follow."""
+"""Faults of a throttle in the loop, each with its reference, when it can be seen, and what must follow."""
 
 from __future__ import annotations
 
@@ -56,8 +56,8 @@ class FaultCase:
         Of the plant.
     reference_deg : callable
         Of the time [s].
-    visible_s : callable
-        Of the run: from when on the supervisor can see the fault.
+    visible_s : float or callable
+        From when on the supervisor can see the fault [s], or that of a run.
     repair_s : float
         When the fault ends [s].
     returns : bool
@@ -68,9 +68,13 @@ class FaultCase:
     reason: str
     faults: tuple[SensorFault | ThrottleFault, ...] = ()
     reference_deg: Callable[[float], float] = field(repr=False)
-    visible_s: Callable[[FaultRun], float] = field(default=lambda run: ONSET_S, repr=False)
+    visible_s: float | Callable[[FaultRun], float] = field(default=ONSET_S, repr=False)
     repair_s: float = REPAIR_S
     returns: bool = True
+
+    def seen_s(self, run: FaultRun) -> float:
+        """From when on the fault could be seen in this run [s]."""
+        return self.visible_s(run) if callable(self.visible_s) else self.visible_s
 
 
 def run_case(
@@ -101,7 +105,7 @@ def run_case(
     array = {name: np.array(values) for name, values in columns.items()}
     return FaultRun(
         throttle=throttle,
-        time_s=np.arange(n) * SAMPLE_S,
+        time_s=np.array([k * SAMPLE_S for k in range(n)]),
         reference_deg=array["reference"],
         angle_deg=array["angle"],
         speed_deg_per_s=array["speed"],
@@ -135,19 +139,19 @@ def _first(run: FaultRun, seen: NDArray[np.bool_]) -> float:
 
 
 def _first_lasting(run: FaultRun, seen: NDArray[np.bool_]) -> float:
-    """The same of what is seen for 20 ms on end, or until the bridge opens [s]."""
+    """Give the same of what is seen for 20 ms on end, or until the bridge opens [s]."""
     seen = seen | run.bridge_open
     return _first(run, np.array([seen[k : k + LASTS].all() for k in range(seen.size)]))
 
 
 def _differ(run: FaultRun) -> float:
-    """The plate has left the angle at which a sensor is stuck by the tolerance of 0.2 V."""
+    """Say when the plate has left the angle at which a sensor is stuck by the tolerance of 0.2 V [s]."""
     stuck_deg = run.angle_deg[round(ONSET_S / SAMPLE_S)]
     return _first(run, np.abs(run.angle_deg - stuck_deg) >= 4.5)
 
 
 def _stands(run: FaultRun) -> float:
-    """The plate stands more than 2 deg from the reference under a duty that would move a whole one towards it, for 20 ms."""
+    """Say when it stands 2 deg from the reference under a duty that would move a whole one there, for 20 ms [s]."""
     inside = np.clip(run.angle_deg, run.throttle.closed_deg, run.throttle.open_deg)
     band = holding_duty(run.throttle, inside)
     up = (run.reference_deg - run.angle_deg > 2.0) & (run.duty > band["duty_breakaway_up"].to_numpy())
@@ -156,7 +160,7 @@ def _stands(run: FaultRun) -> float:
 
 
 def _unsprung(run: FaultRun) -> float:
-    """Above limp-home, slow, and driven towards limp-home where a spring would have done so, for 20 ms."""
+    """Say when it is driven closed slowly above limp-home, where a spring would have done so, for 20 ms [s]."""
     return _first_lasting(run, (run.duty < 0.0) & (np.abs(run.speed_deg_per_s) < SLOW_DEG_PER_S))
 
 
@@ -177,28 +181,28 @@ CASES: dict[str, FaultCase] = {
         reason="missing_sample",
         faults=_throttle("nan_sample", _MOVING),
         reference_deg=_opens,
-        visible_s=lambda run: _MOVING,
+        visible_s=_MOVING,
     ),
     "no measurement": FaultCase(
         mode="limp_home",
         reason="missing_sample",
         faults=_throttle("missing_sample", _MOVING),
         reference_deg=_opens,
-        visible_s=lambda run: _MOVING,
+        visible_s=_MOVING,
     ),
     "three samples missing": FaultCase(
         mode="holding",
         reason="missing_sample",
         faults=_throttle("missing_sample", _MOVING, until_s=_MOVING + 0.003),
         reference_deg=_opens,
-        visible_s=lambda run: _MOVING,
+        visible_s=_MOVING,
     ),
     "stale measurement": FaultCase(
         mode="limp_home",
         reason="stale_sample",
         faults=_throttle("stale_sample", _MOVING),
         reference_deg=_opens,
-        visible_s=lambda run: _MOVING,
+        visible_s=_MOVING,
     ),
     "sensors disagree": FaultCase(
         mode="limp_home",

@@ -12,7 +12,16 @@ from mgdd.control import Pid
 from mgdd.results.labels import labelled_dataset, to_jsonable
 from mgdd.studies.base import Progress, StudyResult, check_seeds, finish, run_parts
 from mgdd.studies.throttle_baselines import Baseline, baselines, controller_of, supervisor_of, throttle_of
-from mgdd.studies.throttle_fault_cases import CASES, MODES, ONSET_S, SAMPLE_S, ACKNOWLEDGE_S, FaultCase, FaultRun, run_case
+from mgdd.studies.throttle_fault_cases import (
+    ACKNOWLEDGE_S,
+    CASES,
+    MODES,
+    ONSET_S,
+    SAMPLE_S,
+    FaultCase,
+    FaultRun,
+    run_case,
+)
 
 if TYPE_CHECKING:
     import xarray as xr
@@ -28,8 +37,8 @@ def run_throttle_faults(
 ) -> StudyResult:
     """Run every labelled fault against PID and sliding mode on every preset, watched by a supervisor.
 
-    The plate is at rest at 40 deg; at 1 s the reference steps to 60 deg (or closes slowly, or leaves the travel) and the
-    fault sets in; an acknowledgement is tried while it lasts, and again well after its end.
+    The plate is at rest at 40 deg; at 1 s the reference steps to 60 deg (or closes slowly, or leaves the travel) and
+    the fault sets in; an acknowledgement is tried while it lasts, and again well after its end.
 
     Parameters
     ----------
@@ -47,8 +56,8 @@ def run_throttle_faults(
     StudyResult
         Rows ``fault preset controller mode reason visible_ms safe_ms beyond_deg return_ms kept recovered``: time from
         the onset until the fault can be seen and from there until the reference is limited or the bridge open [ms], the
-        largest angle above reference and start [deg], time from the open bridge to the limp-home band [ms] (None where it
-        never comes), whether the early acknowledgement was refused and the late one led back to normal.
+        largest angle above reference and start [deg], time from the open bridge to the limp-home band [ms] (None
+        where it never comes), whether the early acknowledgement was refused and the late one led back to normal.
 
     Raises
     ------
@@ -128,10 +137,13 @@ def figures_of_run(case: FaultCase, run: FaultRun) -> dict[str, Any]:
         Entries of a row by name.
     """
     wanted = MODES.index(case.mode)
-    visible = case.visible_s(run)
+    visible = case.seen_s(run)
     during = (run.time_s >= ONSET_S) & (run.time_s < case.repair_s)
     first = int(np.argmax(during & (run.mode >= wanted)))
-    asked = np.fmax(np.clip(run.reference_deg, run.throttle.closed_deg, run.throttle.open_deg), run.angle_deg[round(ONSET_S / SAMPLE_S)])
+    asked = np.fmax(
+        np.clip(run.reference_deg, run.throttle.closed_deg, run.throttle.open_deg),
+        run.angle_deg[round(ONSET_S / SAMPLE_S)],
+    )
     returned = None
     if case.mode == "limp_home":
         there = run.bridge_open & (np.abs(run.angle_deg - run.throttle.limp_home_deg) <= 1.0)
