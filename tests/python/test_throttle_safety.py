@@ -14,7 +14,7 @@ from mgdd.errors import ParameterError
 from mgdd.loop import ThrottleFault, VirtualThrottle
 from mgdd.results.labels import check_labels
 from mgdd.studies.throttle_baselines import baselines, controller_of, supervisor_of, throttle_of
-from mgdd.studies.throttle_fault_cases import CASES, run_case
+from mgdd.studies.throttle_fault_cases import CASES, SENSORS, run_case
 from mgdd.throttle import SensorFault, SensorPair, Throttle, simulate
 
 NORMAL, HOLDING, LIMITED, LIMP_HOME = range(4)
@@ -111,6 +111,31 @@ def test_a_short_gap_is_held_and_ends_by_itself(run_of):
     assert run.reason[1500] == "missing_sample"
     assert not run.bridge_open.any()
     assert run.angle_deg[1600] == pytest.approx(60.0, abs=0.5)
+
+
+def test_a_spring_lost_below_limp_home_is_seen_while_the_plate_opens_slowly(baseline):
+    """Mirrored: below limp-home a whole spring opens by itself, so that a slow opening needs no duty."""
+    lost = ThrottleFault(kind="spring_below", from_s=0.2)
+    plant = VirtualThrottle(
+        throttle_of(baseline.preset),
+        inputs=("duty", "bridge_open"),
+        sensors=SENSORS,
+        faults=[lost],
+        start_deg=1.0,
+        seed=1,
+    )
+    loop = SupervisedController(controller_of(baseline), supervisor_of(baseline.preset))
+    values, order, opened = {"first_angle_deg": 1.0, "second_angle_deg": 1.0}, {"duty": 0.0, "bridge_open": 0.0}, None
+    for k in range(600):
+        acting, order = order, loop.step(1.0 + min(max(0.01 * (k - 300), 0.0), 3.0), values)
+        plant.apply(acting)
+        values = plant.measure().values
+        if opened is None and order["bridge_open"]:
+            opened = k
+    assert opened is not None
+    assert 200 <= opened <= 400
+    assert loop.supervisor.reason == "spring_lost"
+    assert values["angle_deg"] < 6.0  # nothing opens it
 
 
 def test_every_fault_of_the_list_is_a_case():

@@ -115,11 +115,12 @@ VirtualThrottleSample VirtualThrottle::step(const VirtualThrottleInputs& inputs)
       in.supply_v = std::min(in.supply_v, fault.size);
     }
   }
+  const bool whole = settings_.plant_faults.empty();
   for (std::size_t i = 0; i < steps_; ++i) {
-    use(acting());
-    const double before = plant_.output(state_);
+    const double before_deg = plant_.output(state_);
+    if (!whole) use(acting());
     plant_.step(state_, in);
-    catch_plate(before, plant_.output(state_));
+    if (!whole) catch_plate(before_deg, plant_.output(state_));
   }
   VirtualThrottleSample out;
   out.sample = samples_ + 1;
@@ -128,7 +129,7 @@ VirtualThrottleSample VirtualThrottle::step(const VirtualThrottleInputs& inputs)
   out.current_a = state_.current_a;
   out.supply_v = in.supply_v;
   out.sensed = sensors_.step(out.angle_deg);
-  if (!settings_.plant_faults.empty()) transmit(out);
+  if (!whole) transmit(out);
   ++samples_;
   return out;
 }

@@ -1,9 +1,8 @@
 // Supervisor of a throttle controller on made-up samples: transparent while all is well, one law per fault, times of
-// debouncing, what stays until acknowledged, the balance of a plate, a restart bit for bit, no allocation.
+// debouncing, what stays until acknowledged, a restart bit for bit, no allocation.
 #include "mgdd/control/supervisor.hpp"
 
 #include <cmath>
-#include <limits>
 #include <string>
 #include <utility>
 
@@ -11,6 +10,7 @@
 
 #include "mgdd/common/error.hpp"
 #include "support/no_alloc.hpp"
+#include "support/supervisor_samples.hpp"
 
 namespace mgdd::control {
 namespace {
@@ -18,53 +18,6 @@ namespace {
 static_assert(noexcept(std::declval<ThrottleSupervisor&>().observe({})));
 static_assert(noexcept(std::declval<ThrottleSupervisor&>().decide(0.0)));
 static_assert(noexcept(std::declval<ThrottleSupervisor&>().acknowledge()));
-
-using Mode = SupervisorMode;
-using Reason = SupervisorReason;
-constexpr double nan = std::numeric_limits<double>::quiet_NaN();
-
-/// Both sides of limp-home different, odd thresholds.
-SupervisorSettings lively() {
-  SupervisorSettings s;
-  s.closed_deg = 1.0;
-  s.open_deg = 84.0;
-  s.limited_open_deg = 35.0;
-  s.spring.limp_home_deg = 11.0;
-  s.spring.above = {.preload = 0.13, .per_deg = 6e-4};
-  s.spring.below = {.preload = 0.17, .per_deg = 9e-4};
-  return s;
-}
-
-SupervisorInputs at(double angle_deg, double reference_deg) {
-  return {.reference_deg = reference_deg, .angle_deg = {angle_deg, angle_deg}, .supply_v = 12.0};
-}
-SupervisorInputs at(double angle_deg) {
-  return at(angle_deg, angle_deg);
-}
-
-/// One sample of a plate that is held where it is.
-SupervisorOrder hold(ThrottleSupervisor& s, const SupervisorInputs& in) {
-  const SupervisorView view = s.observe(in);
-  return s.decide(s.settings().spring.at(view.angle_deg));
-}
-void settle(ThrottleSupervisor& s, double angle_deg, int samples = 100) {
-  for (int k = 0; k < samples; ++k)
-    ASSERT_EQ(hold(s, at(angle_deg)).mode, Mode::normal) << k;
-}
-
-/// Samples of these inputs until the bridge opens; -1 if it does not within 3 s.
-int opens_after(ThrottleSupervisor& s, const SupervisorInputs& in, Reason reason) {
-  for (int k = 1; k <= 3000; ++k) {
-    const SupervisorOrder order = hold(s, in);
-    if (order.bridge_open) {
-      EXPECT_EQ(order.mode, Mode::limp_home);
-      EXPECT_EQ(order.duty, 0.0);
-      EXPECT_EQ(order.reason, reason);
-      return k;
-    }
-  }
-  return -1;
-}
 
 TEST(Supervisor, IsTransparentWhileAllIsWell) {
   ThrottleSupervisor s(lively());
@@ -265,133 +218,6 @@ TEST(Supervisor, OfTwoLimitsTheSupplyIsReportedAndTheFirstReasonOfAnOpenBridgeSt
   EXPECT_EQ(opens_after(s, in, Reason::sensor_range), 20);
   for (int k = 0; k < 50; ++k)
     EXPECT_EQ(hold(s, in).reason, Reason::sensor_range);
-}
-
-/// A plate that stands although it is pushed.
-int jam(double angle_deg, double reference_deg, double duty, double creep_deg_per_s = 0.0) {
-  ThrottleSupervisor s(lively());
-  for (int k = 0; k < 100; ++k)
-    (void)hold(s, at(angle_deg));
-  for (int k = 1; k <= 300; ++k) {
-    (void)s.observe(at(angle_deg + 1e-3 * creep_deg_per_s * k, reference_deg));
-    if (s.decide(duty).bridge_open) {
-      EXPECT_EQ(s.order().reason, Reason::jammed);
-      return k;
-    }
-  }
-  return -1;
-}
-
-TEST(Supervisor, APlateThatStandsUnderAPushIsJammedOnEitherSideAndEitherWay) {
-  EXPECT_EQ(jam(40.0, 60.0, 0.7), 41);  // a push acts one sample before it is judged
-  EXPECT_EQ(jam(40.0, 20.0, -0.5), 41);
-  EXPECT_EQ(jam(5.0, 9.0, 0.3), 41);
-  EXPECT_EQ(jam(9.0, 2.0, -0.6), 41);
-}
-
-TEST(Supervisor, NoJamWithoutAnErrorWithoutAPushAgainstTheErrorOrWhileThePlateMoves) {
-  EXPECT_EQ(jam(40.0, 41.5, 0.7), -1);
-  EXPECT_EQ(jam(40.0, 60.0, 0.3), -1);  // 0.15 above the spring: friction may hold it
-  EXPECT_EQ(jam(40.0, 20.0, 0.1), -1);
-  EXPECT_EQ(jam(40.0, 60.0, 0.7, 15.0), -1);
-  EXPECT_EQ(jam(40.0, 60.0, 0.7, 10.0), 41);
-  EXPECT_EQ(jam(84.0, 90.0, 0.8), -1);  // at the stop: the reference is limited to it
-}
-
-TEST(Supervisor, NoDutyAboveLimpHomeWithoutComingBackMeansThatTheSpringIsLost) {
-  const auto run = [](double angle_deg, double duty) {
-    ThrottleSupervisor s(lively());
-    for (int k = 0; k < 200; ++k) {
-      (void)s.observe(at(angle_deg));
-      if (s.decide(k < 100 ? s.settings().spring.at(angle_deg) : duty).bridge_open) {
-        EXPECT_EQ(s.order().reason, Reason::spring_lost);
-        return k - 100;
-      }
-    }
-    return -1;
-  };
-  const int above = run(60.0, -0.05), below = run(2.0, 0.03);
-  EXPECT_GE(above, 20);
-  EXPECT_LE(above, 50);
-  EXPECT_GE(below, 20);
-  EXPECT_LE(below, 50);
-  EXPECT_EQ(run(60.0, 0.05), -1);  // friction may hold that
-  EXPECT_EQ(run(60.0, 0.4), -1);   // away from limp-home: no matter of the spring
-  EXPECT_EQ(run(13.0, -0.2), -1);  // too near to limp-home to tell
-}
-
-TEST(Supervisor, TheImbalanceIsTheDutyThatModelAndMotionDoNotExplain) {
-  SupervisorSettings settings = lively();
-  settings.uncertainty = 10.0;  // never alarms
-  ThrottleSupervisor s(settings);
-  const double h = 1e-3, disturbance = 0.06;
-  double angle = 30.0, speed = 0.0, duty = 0.0;
-  for (int k = 0; k < 600; ++k) {
-    (void)s.observe(at(angle));
-    if (k > 100) {
-      ASSERT_NEAR(s.imbalance(), disturbance, 0.004) << k;
-    }
-    duty = settings.spring.at(angle) + 0.12 * std::sin(0.02 * k) + disturbance;
-    (void)s.decide(duty);
-    const double net = duty - settings.spring.at(angle) - disturbance;
-    speed += h * (settings.gain_deg_per_s2 * net - speed / settings.time_constant_s);
-    angle += h * speed;
-  }
-}
-
-TEST(Supervisor, ALastingErrorAndALastingLargeDutyOpen) {
-  ThrottleSupervisor s(lively());
-  settle(s, 30.0);
-  EXPECT_EQ(opens_after(s, at(30.0, 39.0), Reason::tracking), 500);
-  ThrottleSupervisor sweeping(lively());
-  for (int k = 0; k < 3000; ++k)  // late, but on changing sides
-    ASSERT_FALSE(hold(sweeping, at(30.0, k / 400 % 2 == 0 ? 39.0 : 21.0)).bridge_open);
-  const auto load = [](double angle_deg) {
-    ThrottleSupervisor t(lively());
-    for (int k = 1; k <= 2000; ++k) {
-      (void)t.observe(at(angle_deg));
-      if (t.decide(0.95).bridge_open) return k;
-    }
-    return -1;
-  };
-  EXPECT_EQ(load(40.0), 1001);
-  EXPECT_EQ(load(83.0), -1);
-}
-
-TEST(Supervisor, AnOpenBridgeIsAcknowledgedAtLimpHomeOnly) {
-  ThrottleSupervisor s(lively());
-  settle(s, 40.0);
-  EXPECT_EQ(s.return_test(), ReturnTest::none);
-  ASSERT_GT(opens_after(s, at(nan, 40.0), Reason::missing_sample), 0);
-  for (int k = 1; k < 500; ++k) {
-    EXPECT_EQ(hold(s, at(40.0)).duty, 0.0);
-    EXPECT_EQ(s.return_test(), k < 400 ? ReturnTest::pending : ReturnTest::failed) << k;
-    EXPECT_EQ(s.acknowledge(), Reason::missing_sample);
-  }
-  (void)hold(s, at(11.9));
-  EXPECT_EQ(s.return_test(), ReturnTest::passed);
-  EXPECT_EQ(s.acknowledge(), Reason::none);
-  const SupervisorOrder order = hold(s, at(11.9));
-  EXPECT_EQ(order.mode, Mode::normal);
-  EXPECT_EQ(order.reason, Reason::none);
-  EXPECT_FALSE(order.bridge_open);
-  EXPECT_EQ(s.return_test(), ReturnTest::none);
-  settle(s, 11.9, 500);
-}
-
-TEST(Supervisor, AnOpenBridgeStaysOpenWhileASensorIsWrongAndNothingButAWordEndsIt) {
-  ThrottleSupervisor s(lively());
-  SupervisorInputs in = at(11.0, 30.0);
-  in.angle_deg[1] = 60.0;
-  ASSERT_EQ(opens_after(s, in, Reason::sensor_disagreement), 20);
-  for (int k = 0; k < 200; ++k)
-    (void)hold(s, in);
-  EXPECT_EQ(s.acknowledge(), Reason::sensor_disagreement);
-  for (int k = 0; k < 5000; ++k)
-    ASSERT_TRUE(hold(s, at(11.0, 30.0)).bridge_open);
-  EXPECT_EQ(s.acknowledge(), Reason::none);
-  s.reset();
-  EXPECT_EQ(s.order().mode, Mode::normal);
 }
 
 TEST(Supervisor, TimesAreSecondsAtAnySampleTime) {
