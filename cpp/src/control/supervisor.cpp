@@ -238,8 +238,6 @@ SupervisorReason ThrottleSupervisor::acknowledge() noexcept {
   s.order.reason = Reason::none;
   s.order.bridge_open = s.restricted = false;
   s.test = ReturnTest::none;
-  s.counts.fill(0.0);
-  s.open = 0.0;
   return Reason::none;
 }
 

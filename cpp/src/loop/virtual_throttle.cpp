@@ -90,7 +90,7 @@ void VirtualThrottle::transmit(VirtualThrottleSample& out) noexcept {
   const bool missing = hit_by(ThrottleFaultKind::missing_sample), stale = hit_by(ThrottleFaultKind::stale_sample);
   const bool invalid = hit_by(ThrottleFaultKind::nan_sample);
   const bool arrives = !missing && !stale;
-  if (stale && received_sample_ > 0) out.sensed = received_;
+  if (stale) out.sensed = received_;
   if (arrives && !invalid) {
     received_sample_ = samples_ + 1;
     received_ = out.sensed;

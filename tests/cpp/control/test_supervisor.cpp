@@ -205,6 +205,26 @@ TEST(Supervisor, ALowSupplyLimitsTheReferenceUntilAcknowledgedAndALostOneOpens) 
   EXPECT_EQ(opens_after(blind, at(30.0), Reason::none), -1);
 }
 
+TEST(Supervisor, ASupplyThatFlickersIsNotHealthy) {
+  ThrottleSupervisor s(lively());
+  SupervisorInputs low = at(30.0);
+  low.supply_v = 8.0;
+  for (int k = 0; k < 20; ++k)
+    (void)hold(s, low);
+  for (int k = 0; k < 300; ++k) {
+    (void)hold(s, k % 40 < 5 ? low : at(30.0));
+    EXPECT_EQ(s.acknowledge(), Reason::supply_low);
+  }
+}
+
+TEST(Supervisor, OfTwoBadInputsAtOnceTheMeasurementIsReported) {
+  ThrottleSupervisor s(lively());
+  settle(s, 30.0);
+  SupervisorInputs in = at(30.0, nan);
+  in.angle_deg[1] = nan;
+  EXPECT_EQ(hold(s, in).reason, Reason::sensor_range);
+}
+
 TEST(Supervisor, OfTwoLimitsTheSupplyIsReportedAndTheFirstReasonOfAnOpenBridgeStays) {
   ThrottleSupervisor s(lively());
   SupervisorInputs in = at(30.0, 95.0);

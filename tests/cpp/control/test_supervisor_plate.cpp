@@ -38,6 +38,58 @@ TEST(SupervisorOfThePlate, NoJamWithoutAnErrorWithoutAPushAgainstTheErrorOrWhile
   EXPECT_EQ(jam(84.0, 90.0, 0.8), -1);  // at the stop: the reference is limited to it
 }
 
+TEST(SupervisorOfThePlate, AJamInFlightIsTimedFromTheStopWhereverTheLastMoveWasCounted) {
+  for (const int flight : {10, 11}) {
+    ThrottleSupervisor s(lively());
+    settle(s, 20.0);
+    double angle = 20.0;
+    int opened = -1;
+    for (int k = 0; k < 150 && opened < 0; ++k) {
+      if (k < flight) angle += 0.49;  // below `jam_move_deg` in one sample
+      (void)s.observe(at(angle + (k == 40 ? 0.04 : -0.04), 60.0));
+      if (s.decide(0.9).bridge_open) opened = k;
+    }
+    EXPECT_EQ(s.order().reason, Reason::jammed);
+    EXPECT_LE(opened - flight, 46) << flight;
+  }
+}
+
+TEST(SupervisorOfThePlate, ADutyThatFrictionHoldsAloneIsNoJamButALostSpring) {
+  ThrottleSupervisor s(lively());
+  settle(s, 60.0);
+  SupervisorOrder order;
+  for (int k = 0; k < 100 && !order.bridge_open; ++k) {
+    (void)s.observe(at(60.0, 57.0));
+    order = s.decide(-0.09);
+  }
+  EXPECT_EQ(order.reason, Reason::spring_lost);
+}
+
+TEST(SupervisorOfThePlate, AGapDoesNotLookLikeAMove) {
+  ThrottleSupervisor s(lively());
+  settle(s, 30.0);
+  for (int k = 0; k < 10; ++k)
+    (void)hold(s, at(nan, 30.0));
+  for (int k = 0; k < 60; ++k) {
+    (void)hold(s, at(33.0));
+    EXPECT_NEAR(s.imbalance(), 0.0, 0.01);
+  }
+}
+
+TEST(SupervisorOfThePlate, ADutyCountsWithItsSupply) {
+  for (const auto& [supply_v, jammed] : {std::pair{12.0, true}, std::pair{9.1, false}}) {
+    ThrottleSupervisor s(lively());
+    SupervisorInputs in = at(40.0, 47.0);
+    in.supply_v = supply_v;
+    bool opened = false;
+    for (int k = 0; k < 100; ++k) {
+      (void)s.observe(in);
+      opened = opened || s.decide(0.4).bridge_open;
+    }
+    EXPECT_EQ(opened, jammed) << supply_v;
+  }
+}
+
 TEST(SupervisorOfThePlate, NoDutyAboveLimpHomeWithoutComingBackMeansThatTheSpringIsLost) {
   const auto run = [](double angle_deg, double duty) {
     ThrottleSupervisor s(lively());
@@ -124,11 +176,15 @@ TEST(SupervisorOfThePlate, AnOpenBridgeStaysOpenWhileASensorIsWrongAndNothingBut
   SupervisorInputs in = at(11.0, 30.0);
   in.angle_deg[1] = 60.0;
   ASSERT_EQ(opens_after(s, in, Reason::sensor_disagreement), 20);
-  for (int k = 0; k < 200; ++k)
+  for (int k = 0; k < 500; ++k) {
     (void)hold(s, in);
+    EXPECT_EQ(s.return_test(), ReturnTest::pending);  // neither sensor can tell
+  }
   EXPECT_EQ(s.acknowledge(), Reason::sensor_disagreement);
-  for (int k = 0; k < 5000; ++k)
-    ASSERT_TRUE(hold(s, at(11.0, 30.0)).bridge_open);
+  for (int k = 0; k < 5000; ++k) {
+    (void)s.observe(at(11.0, 30.0));
+    ASSERT_TRUE(s.decide(nan).bridge_open);  // nobody asks the controller meanwhile
+  }
   EXPECT_EQ(s.acknowledge(), Reason::none);
   s.reset();
   EXPECT_EQ(s.order().mode, Mode::normal);

@@ -148,6 +148,19 @@ TEST(ThrottleFaults, AStaleSampleBeforeAnyGoodOneIsAMissingOne) {
   EXPECT_NEAR(first.age_s, 1e-3, 1e-12);
 }
 
+TEST(ThrottleFaults, AStaleSampleRepeatsTheLastGoodOneNotAnInvalidOne) {
+  VirtualThrottle bench(with({{Kind::nan_sample, 0.05, 0.0, 0.06}, {Kind::stale_sample, 0.06, 0.0, 0.07}}));
+  throttle::SensorReading last;
+  for (int k = 0; k < 70; ++k) {
+    const auto now = bench.step({lively_duty(k), 12.0, 0.0});
+    if (k < 50) last = now.sensed;
+    if (k >= 60) {
+      EXPECT_EQ(now.sensed.volts, last.volts);
+      EXPECT_NEAR(now.age_s, (k - 49) * 1e-3, 1e-12);
+    }
+  }
+}
+
 TEST(ThrottleFaults, AnOpenBridgePassesNoCurrentWhateverTheDuty) {
   VirtualThrottle bench(with({}, 70.0));
   VirtualThrottleSample now;
