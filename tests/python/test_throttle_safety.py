@@ -138,6 +138,24 @@ def test_a_spring_lost_below_limp_home_is_seen_while_the_plate_opens_slowly(base
     assert values["angle_deg"] < 6.0  # nothing opens it
 
 
+@pytest.mark.parametrize(("preset", "limit_s"), [("P1", 0.4), ("P2", 0.4), ("P3", 0.8)])
+@pytest.mark.parametrize("start_deg", [0.0, 90.0])
+def test_from_either_stop_the_open_bridge_brings_the_plate_to_limp_home_in_time_and_a_brake_does_not(
+    preset, limit_s, start_deg
+):
+    throttle = throttle_of(preset)
+    ends = []
+    for bridge_open in (1.0, 0.0):
+        plant = VirtualThrottle(throttle, inputs=("duty", "bridge_open"), start_deg=start_deg)
+        for _ in range(sample_of(limit_s)):
+            plant.apply({"duty": 0.0, "bridge_open": bridge_open})
+            values = plant.measure().values
+        ends.append(abs(values["angle_deg"] - throttle.limp_home_deg))
+    assert ends[0] <= 1.0
+    if preset == "P1" and start_deg == 90.0:
+        assert ends[1] > 20.0
+
+
 def test_every_fault_of_the_list_is_a_case():
     """NaN or stale, sensors that disagree, jam, spring, supply, missing sample, reference outside the travel."""
     reasons = {case.reason for case in CASES.values()}
