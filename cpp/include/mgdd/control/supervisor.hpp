@@ -12,6 +12,8 @@
 #include <cstdint>
 #include <limits>
 #include <span>
+#include <string_view>
+#include <type_traits>
 
 #include "mgdd/common/enum_names.hpp"
 #include "mgdd/common/field.hpp"
