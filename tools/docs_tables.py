@@ -11,7 +11,7 @@ from functools import cache
 from typing import Any
 
 import numpy as np
-from tables_of_control import throttle_baselines
+from tables_of_control import throttle_baselines, throttle_faults
 from tables_of_guidance import ignition_plane, ignition_slopes, model_stages
 from tables_of_measured_traces import burn_laws, demo, fits, members, profile, timing, traces
 from tables_of_model import (
@@ -67,6 +67,7 @@ __all__ = [
     "sensors",
     "tdc",
     "throttle_baselines",
+    "throttle_faults",
     "timing",
     "timing_table",
     "torque_demand",

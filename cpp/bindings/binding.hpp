@@ -118,6 +118,7 @@ void bind_direct_seekers(py::module_& m);
 void bind_learning(py::module_& m);
 void bind_controllers(py::module_& m);
 void bind_guided_predictive(py::module_& m);
+void bind_supervisor(py::module_& m);
 void bind_cylinder(py::module_& m);
 void bind_emissions(py::module_& m);
 void bind_cycle(py::module_& m);

@@ -216,7 +216,7 @@ def air_torque() -> Call:
 
 @batch
 def sensors() -> Call:
-    angle, faults = np.full(SOME, 10.0), [("none", 0.0, 0.0)] * 2
+    angle, faults = np.full(SOME, 10.0), [("none", 0.0, 0.0, None)] * 2
     return partial(_core.throttle.sense, _core.throttle.SensorPair(), angle, sample_s=1e-3, seed=1, faults=faults)
 
 

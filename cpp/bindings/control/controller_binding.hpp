@@ -1,5 +1,5 @@
-// A controller with settings from a table of fields: keyword-only __init__, `fields`, `settings`, `step`, `reset`,
-// saved state, and copies that go on bit for bit.
+// What is stepped with settings from a table of fields: keyword-only __init__, `fields`, `settings`, saved state, and
+// copies that go on bit for bit; of a controller `step` and its duty too.
 #pragma once
 
 #include <cstddef>
@@ -28,8 +28,8 @@ Explained<Place> explained(const char* name, Place place, const char* meaning) {
 }
 
 template <class Controller, class Settings, class Fields, class... Rows, std::size_t... I>
-void bind_controller(py::class_<Controller>& cls, const char* name, const Settings& standard, const Fields& fields,
-                     const std::tuple<Rows...>& rows, std::index_sequence<I...>) {
+void bind_stepped(py::class_<Controller>& cls, const char* name, const Settings& standard, const Fields& fields,
+                  const std::tuple<Rows...>& rows, std::index_sequence<I...>) {
   std::apply(
       [&](const Rows&... row) {
         cls.def(py::init([fields, rows](Number<I>... values, typename Rows::Argument... given) {
@@ -62,12 +62,6 @@ void bind_controller(py::class_<Controller>& cls, const char* name, const Settin
   cls.def_property_readonly(
       "settings", [to_dict](const Controller& self) { return to_dict(self.settings()); },
       "All settings as a new dict: keywords that make the controller again.");
-  cls.def(
-      "step", [](Controller& self, double reference, double measured) { return self.step(reference, measured); },
-      py::arg("reference_deg"), py::arg("measurement_deg"),
-      "Duty [-] of this sample for a reference and a measured angle [deg].\n\nNaN repeats the last value; before the "
-      "first ones the duty is 0.");
-  cls.def_property_readonly("duty", &Controller::duty, "Duty of the last sample [-].");
   cls.def_property(
       "state", [](const Controller& self) { return save_state(self); },
       [](Controller& self, const StateColumns& columns) { restore_state(self, columns); },
@@ -83,6 +77,18 @@ void bind_controller(py::class_<Controller>& cls, const char* name, const Settin
         restore_state(made, saved[2].cast<StateColumns>());
         return made;
       }));
+}
+
+template <class Controller, class Settings, class Fields, class... Rows, std::size_t... I>
+void bind_controller(py::class_<Controller>& cls, const char* name, const Settings& standard, const Fields& fields,
+                     const std::tuple<Rows...>& rows, std::index_sequence<I...> numbers) {
+  bind_stepped(cls, name, standard, fields, rows, numbers);
+  cls.def(
+      "step", [](Controller& self, double reference, double measured) { return self.step(reference, measured); },
+      py::arg("reference_deg"), py::arg("measurement_deg"),
+      "Duty [-] of this sample for a reference and a measured angle [deg].\n\nNaN repeats the last value; before the "
+      "first ones the duty is 0.");
+  cls.def_property_readonly("duty", &Controller::duty, "Duty of the last sample [-].");
 }
 
 }  // namespace mgdd::bindings

@@ -9,6 +9,7 @@
 #include "binding.hpp"
 #include "keywords.hpp"
 #include "mgdd/throttle/sensors.hpp"
+#include "throttle/sensor_fault_binding.hpp"
 
 namespace mgdd::bindings {
 namespace {
@@ -34,14 +35,9 @@ py::array_t<bool> flags(const std::vector<SensorReading>& rows, Of of) {
 }
 
 py::dict sense(const SensorPair& pair, const InputArray& angle_deg, double sample_s, std::uint64_t seed,
-               const std::array<std::tuple<std::string, double, double>, 2>& faults) {
-  std::array<SensorFault, 2> parsed;
-  for (std::size_t i = 0; i < 2; ++i) {
-    const auto& [kind, from_s, size] = faults[i];
-    parsed[i] = {parse_name(sensor_fault_names(), "fault", kind), from_s, size};
-  }
+               const std::array<SensorFaultArgument, 2>& faults) {
   const std::vector<double> angle = to_column(angle_deg, "angle_deg");
-  SensorSampler sampler(pair, sample_s, seed, parsed);
+  SensorSampler sampler(pair, sample_s, seed, sensor_faults_from(faults));
   std::vector<SensorReading> rows;
   rows.reserve(angle.size());
   {

@@ -52,6 +52,9 @@ void validate(const SensorPair& p) {
 
 void validate(const SensorFault& fault) {
   require_within("from_s", fault.from_s, 0.0, 1e9, "s");
+  if (fault.until_s && !(*fault.until_s > fault.from_s && *fault.until_s <= 1e9)) {
+    throw ParameterError("until_s", *fault.until_s, "must be > from_s = " + text(fault.from_s) + " and <= 1e9", "s");
+  }
   if (fault.kind == SensorFaultKind::offset) require_within("size", fault.size, -100.0, 100.0, "V");
   if (fault.kind == SensorFaultKind::gain) require_within("size", fault.size, -1.0, 10.0);
 }
@@ -71,7 +74,7 @@ SensorSampler::SensorSampler(const SensorPair& pair, double sample_s, std::uint6
 
 double SensorSampler::faulty(std::size_t which, double volts, double time_s) noexcept {
   const SensorFault& fault = faults_[which];
-  if (time_s < fault.from_s) return volts;
+  if (time_s < fault.from_s || (fault.until_s && time_s >= *fault.until_s)) return volts;
   switch (fault.kind) {
     case SensorFaultKind::none:
       return volts;
@@ -106,8 +109,7 @@ SensorReading SensorSampler::step(double angle_deg) noexcept {
   }
   out.sum_error_v = out.volts[0] + out.volts[1] - pair_.supply_v;
   out.sum_fault = std::abs(out.sum_error_v) >= pair_.sum_tolerance_v;
-  const double used_v = out.range_fault[0] && !out.range_fault[1] ? pair_.supply_v - out.volts[1] : out.volts[0];
-  out.angle_deg = (used_v - pair_.closed_v) / pair_.span_v * pair_.travel_deg;
+  out.angle_deg = pair_.angles_deg(out.volts)[out.range_fault[0] && !out.range_fault[1] ? 1 : 0];
   state_.failing = out.range_fault[0] || out.range_fault[1] || out.sum_fault ? state_.failing + 1 : 0;
   state_.fault = state_.fault || state_.failing >= debounce_;
   out.fault = state_.fault;

@@ -178,9 +178,9 @@ class VirtualThrottle:
     """
     A throttle with its sensors, sample by sample; behind mgdd.loop.VirtualThrottle.
     """
-    def __init__(self, *, throttle: mgdd._core.throttle.Throttle, sensors: mgdd._core.throttle.SensorPair, faults: typing.Annotated[collections.abc.Sequence[tuple[str, typing.SupportsFloat | typing.SupportsIndex, typing.SupportsFloat | typing.SupportsIndex]], "FixedSize(2)"], sample_s: typing.SupportsFloat | typing.SupportsIndex, step_s: typing.SupportsFloat | typing.SupportsIndex, start_deg: typing.SupportsFloat | typing.SupportsIndex, bridge: str, seed: typing.SupportsInt | typing.SupportsIndex) -> None:
+    def __init__(self, *, throttle: mgdd._core.throttle.Throttle, sensors: mgdd._core.throttle.SensorPair, faults: typing.Annotated[collections.abc.Sequence[tuple[str, typing.SupportsFloat | typing.SupportsIndex, typing.SupportsFloat | typing.SupportsIndex, typing.SupportsFloat | typing.SupportsIndex | None]], "FixedSize(2)"], plant_faults: collections.abc.Sequence[tuple[str, typing.SupportsFloat | typing.SupportsIndex, typing.SupportsFloat | typing.SupportsIndex, typing.SupportsFloat | typing.SupportsIndex | None]], sample_s: typing.SupportsFloat | typing.SupportsIndex, step_s: typing.SupportsFloat | typing.SupportsIndex, start_deg: typing.SupportsFloat | typing.SupportsIndex, bridge: str, seed: typing.SupportsInt | typing.SupportsIndex) -> None:
         ...
-    def step(self, duty: typing.SupportsFloat | typing.SupportsIndex, supply_v: typing.SupportsFloat | typing.SupportsIndex, airflow_torque_nm: typing.SupportsFloat | typing.SupportsIndex) -> dict:
+    def step(self, *, duty: typing.SupportsFloat | typing.SupportsIndex, supply_v: typing.SupportsFloat | typing.SupportsIndex, airflow_torque_nm: typing.SupportsFloat | typing.SupportsIndex, bridge_open: bool) -> dict:
         """
         Run one sample.
         """

@@ -16,6 +16,7 @@ from mgdd.loop.plant import Measurement, Plant
 from mgdd.loop.reference import Reference
 from mgdd.loop.seek import monte_carlo, run_seeker
 from mgdd.loop.surrogate_plant import SurrogatePlant
+from mgdd.loop.throttle_faults import ThrottleFault
 from mgdd.loop.track import track, track_many
 from mgdd.loop.tune import tune_controller, tuned_controller
 from mgdd.loop.virtual_throttle import VirtualThrottle
@@ -28,6 +29,7 @@ __all__ = [
     "Reference",
     "SensorDynamics",
     "SurrogatePlant",
+    "ThrottleFault",
     "VirtualThrottle",
     "monte_carlo",
     "run_seeker",

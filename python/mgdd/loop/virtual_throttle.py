@@ -7,28 +7,29 @@ from collections.abc import Mapping, Sequence
 from mgdd import _core
 from mgdd.errors import ParameterError, RigError
 from mgdd.loop.plant import Measurement, checked_inputs
+from mgdd.loop.throttle_faults import ThrottleFault
 from mgdd.throttle import SensorFault, SensorPair, Throttle
 from mgdd.throttle.sensors import fault_pair
 
 __all__ = ["VirtualThrottle"]
 
-_INPUTS = ("duty", "supply_v", "airflow_torque_nm")
+_INPUTS = ("duty", "supply_v", "airflow_torque_nm", "bridge_open")
 
 
 class VirtualThrottle:
-    """An electronic throttle sample by sample, with both position sensors, their noise and their faults.
+    """An electronic throttle sample by sample, with both position sensors, their noise, and faults of every part.
 
     Parameters
     ----------
     throttle : Throttle, optional
         Its parameters; the preset ``P1`` if left out.
     inputs : sequence of str
-        Which of ``duty`` [-], ``supply_v`` [V] and ``airflow_torque_nm`` [N m] are applied; the others stay at 0 and
-        at the supply of the throttle.
+        Which of ``duty`` [-], ``supply_v`` [V], ``airflow_torque_nm`` [N m] and ``bridge_open`` are applied; the others
+        stay at 0 and at the supply of the throttle. While ``bridge_open`` is not 0 no current flows, whatever the duty.
     sensors : SensorPair, optional
         As in `mgdd.throttle.SensorPair.sense`.
-    faults : sequence of SensorFault
-        At most one per sensor.
+    faults : sequence of SensorFault and ThrottleFault
+        At most one per sensor, and 32 of plate, springs, supply and measurement.
     start_deg : float, optional
         Angle at the start, at rest [deg]; limp-home if left out.
     sample_s, step_s : float
@@ -60,7 +61,7 @@ class VirtualThrottle:
         *,
         inputs: Sequence[str] = ("duty",),
         sensors: SensorPair | None = None,
-        faults: Sequence[SensorFault] = (),
+        faults: Sequence[SensorFault | ThrottleFault] = (),
         start_deg: float | None = None,
         sample_s: float = 1e-3,
         step_s: float = 1e-4,
@@ -74,13 +75,14 @@ class VirtualThrottle:
         self.throttle = Throttle() if throttle is None else throttle
         self.sample_s = sample_s
         self._inputs = tuple(inputs)
-        self._still = {"duty": 0.0, "supply_v": self.throttle.supply_v, "airflow_torque_nm": 0.0}
+        self._still = {"duty": 0.0, "supply_v": self.throttle.supply_v, "airflow_torque_nm": 0.0, "bridge_open": 0.0}
         self.start_deg = self.throttle.limp_home_deg if start_deg is None else float(start_deg)
         self._applied: dict[str, float] | None = None
         self._core = _core.loop.VirtualThrottle(
             throttle=self.throttle,
             sensors=sensors or SensorPair(),
-            faults=fault_pair(faults),
+            faults=fault_pair([fault for fault in faults if not isinstance(fault, ThrottleFault)]),
+            plant_faults=[fault.to_core() for fault in faults if isinstance(fault, ThrottleFault)],
             sample_s=sample_s,
             step_s=step_s,
             start_deg=self.start_deg,
@@ -130,8 +132,9 @@ class VirtualThrottle:
         Returns
         -------
         Measurement
-            ``values``: ``time_s``, ``sensed_angle_deg``, ``first_v``, ``second_v``, ``fault`` as 0 or 1, and the truth
-            ``angle_deg``, ``speed_deg_per_s`` and ``current_a``.
+            ``values``: ``time_s``, ``sensed_angle_deg``, both sensors as ``first_v``, ``second_v``, ``first_angle_deg``
+            and ``second_angle_deg``, ``fault`` of their check as 0 or 1, ``age_s`` of what arrived last, ``supply_v``
+            of the bridge, and the truth ``angle_deg``, ``speed_deg_per_s`` and ``current_a``. What is missing is NaN.
 
         Raises
         ------
@@ -140,5 +143,11 @@ class VirtualThrottle:
         """
         if self._applied is None:
             raise RigError("measure() before apply(): apply a duty first")
-        reading = self._core.step(**self._applied)
+        applied = self._applied
+        reading = self._core.step(
+            duty=applied["duty"],
+            supply_v=applied["supply_v"],
+            airflow_torque_nm=applied["airflow_torque_nm"],
+            bridge_open=applied["bridge_open"] != 0.0,
+        )
         return Measurement(values={name: float(value) for name, value in reading.items()})

@@ -45,6 +45,7 @@ _STUDIES = {
         "three pseudo-Wiener models of a throttle, in free run and corrected by measurements", 7
     ),
     "throttle-tracking": _Study("six controllers, tuned alike, on throttles that they do not know", 7),
+    "throttle-faults": _Study("faults of a throttle under a supervisor: time to the safe state, reason, recovery"),
     "identification-benchmarks": _Study(
         "measured drive, tanks and circuit: fits beside published ones (needs the data sets)"
     ),

@@ -46,6 +46,8 @@ class SensorFault:
         Which sensor.
     from_s : float
         Onset after the first sample [s], >= 0.
+    until_s : float, optional
+        End [s]; it stays if left out.
     size : float
         Added voltage of ``offset`` [V], share by which ``gain`` grows [-].
 
@@ -64,6 +66,7 @@ class SensorFault:
     kind: str
     sensor: int = 1
     from_s: float = 0.0
+    until_s: float | None = None
     size: float = 0.0
 
     def __post_init__(self) -> None:
@@ -159,11 +162,11 @@ class SensorPair(Parameters, _core.throttle.SensorPair):  # noqa: D101 the core'
         )
 
 
-def fault_pair(faults: Sequence[SensorFault]) -> list[tuple[str, float, float]]:
-    """Give kind, onset [s] and size of the fault of each sensor; ParameterError for two of one sensor."""
-    per_sensor = [("none", 0.0, 0.0), ("none", 0.0, 0.0)]
+def fault_pair(faults: Sequence[SensorFault]) -> list[tuple[str, float, float, float | None]]:
+    """Give kind, onset [s], size and end [s] of the fault of each sensor; ParameterError for two of one sensor."""
+    per_sensor: list[tuple[str, float, float, float | None]] = [("none", 0.0, 0.0, None), ("none", 0.0, 0.0, None)]
     for fault in faults:
         if per_sensor[fault.sensor - 1][0] != "none":
             raise ParameterError(f"faults: sensor {fault.sensor} has two: give at most one per sensor")
-        per_sensor[fault.sensor - 1] = (fault.kind, fault.from_s, fault.size)
+        per_sensor[fault.sensor - 1] = (fault.kind, fault.from_s, fault.size, fault.until_s)
     return per_sensor

@@ -152,6 +152,26 @@ TEST(Sensors, StuckSensorShowsOnceThePlateMoves) {
   EXPECT_NEAR(r.volts[0], 0.5 + 30.0 * 4.0 / 90.0, 0.01);
 }
 
+TEST(Sensors, AFaultThatEndsLeavesAWholeSensor) {
+  for (const SensorFaultKind kind : {SensorFaultKind::stuck, SensorFaultKind::short_to_supply}) {
+    std::array<SensorFault, 2> faults = first(kind, 0.0, 0.1);
+    faults[0].until_s = 0.25;
+    SensorSampler faulty(SensorPair{}, sample_s, 1, faults), whole(SensorPair{}, sample_s, 1, healthy);
+    for (int k = 0; k < 400; ++k) {
+      const double angle = 30.0 + 0.05 * k;
+      const SensorReading a = faulty.step(angle), b = whole.step(angle);
+      if (k < 100 || k >= 270) {
+        EXPECT_EQ(a.volts, b.volts) << k;
+      } else if (k > 110 && k < 250) {
+        EXPECT_NE(a.volts, b.volts) << k;
+      }
+      EXPECT_FALSE(a.fault);  // shorter than the debounce time
+    }
+  }
+  SensorFault backwards{SensorFaultKind::stuck, 0.1, 0.0, 0.1};
+  EXPECT_THROW(validate(backwards), mgdd::ParameterError);
+}
+
 TEST(Sensors, SecondSensorServesWhereTheFirstIsOutOfRange) {
   SensorSampler sampler(SensorPair{}, sample_s, 1, first(SensorFaultKind::short_to_supply));
   EXPECT_NEAR(sampler.step(30.0).angle_deg, 30.0, 0.3);

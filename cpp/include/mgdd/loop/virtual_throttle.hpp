@@ -6,8 +6,10 @@
 #include <array>
 #include <cstdint>
 #include <string>
+#include <vector>
 
 #include "mgdd/common/state.hpp"
+#include "mgdd/loop/throttle_faults.hpp"
 #include "mgdd/throttle/plant.hpp"
 #include "mgdd/throttle/sensors.hpp"
 
@@ -16,7 +18,8 @@ namespace mgdd::loop {
 struct VirtualThrottleSettings {
   throttle::Throttle throttle{};
   throttle::SensorPair sensors{};
-  std::array<throttle::SensorFault, 2> faults{};
+  std::array<throttle::SensorFault, 2> faults{};  ///< of the sensors
+  std::vector<ThrottleFault> plant_faults{};      ///< of all else, 32 at most
   double sample_s = 1e-3;
   double step_s = throttle::default_step_s;
   double start_deg = 0.0;  ///< at rest, without current
@@ -31,12 +34,15 @@ struct VirtualThrottleInputs {
   double duty = 0.0;               ///< clipped to -1..1
   double supply_v = 12.0;          ///< of the bridge
   double airflow_torque_nm = 0.0;  ///< positive when it opens
+  bool bridge_open = false;        ///< no current whatever the duty: the safe state; else the bridge of the settings
 };
 
 /// The end of one sample: what is measured, and the truth behind it.
 struct VirtualThrottleSample {
-  std::int64_t sample = 0;  ///< samples run so far, this one included
-  throttle::SensorReading sensed{};
+  std::int64_t sample = 0;           ///< samples run so far, this one included
+  throttle::SensorReading sensed{};  ///< as it arrived: numbers are NaN where none did
+  double age_s = 0.0;                ///< of what arrived last
+  double supply_v = 0.0;             ///< of the bridge
   double angle_deg = 0.0;
   double speed_deg_per_s = 0.0;
   double current_a = 0.0;
@@ -66,9 +72,25 @@ class VirtualThrottle {
     v("supply_v", self.last_.supply_v);
     v("airflow_torque_nm", self.last_.airflow_torque_nm);
     throttle::SensorSampler::visit(self.sensors_, v);
+    if (self.settings_.plant_faults.empty()) return;
+    auto& r = self.received_;
+    v("caught", self.caught_);
+    v("received_sample", self.received_sample_);
+    v("received_v", r.volts);
+    v("received_angle_deg", r.angle_deg);
+    v("received_sum_error_v", r.sum_error_v);
+    v("received_first_range_fault", r.range_fault[0]);
+    v("received_second_range_fault", r.range_fault[1]);
+    v("received_sum_fault", r.sum_fault);
+    v("received_fault", r.fault);
   }
 
  private:
+  std::int64_t acting() const noexcept;                       // on the plant, one bit per fault
+  void use(std::int64_t faults) noexcept;                     // the plant under these
+  void catch_plate(double from_deg, double to_deg) noexcept;  // by a jam that waits between these angles
+  void transmit(VirtualThrottleSample& sample) noexcept;
+
   VirtualThrottleSettings settings_;
   throttle::ThrottlePlant plant_;
   throttle::SensorSampler sensors_;
@@ -76,6 +98,10 @@ class VirtualThrottle {
   throttle::ThrottleState state_;
   VirtualThrottleInputs last_{};
   std::int64_t samples_ = 0;
+  std::int64_t acting_ = 0;           // faults in `plant_`
+  std::int64_t caught_ = 0;           // jams that hold the plate
+  std::int64_t received_sample_ = 0;  // 0: none yet
+  throttle::SensorReading received_{};
 };
 
 }  // namespace mgdd::loop

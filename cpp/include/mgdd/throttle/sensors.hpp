@@ -31,6 +31,11 @@ struct SensorPair {
   bool operator==(const SensorPair&) const = default;
 
   [[nodiscard]] double lsb_v() const noexcept { return supply_v / static_cast<double>(1LL << adc_bits); }
+  /// What each sensor alone says of the angle.
+  [[nodiscard]] std::array<double, 2> angles_deg(const std::array<double, 2>& volts) const noexcept {
+    const auto scaled = [this](double first_v) { return (first_v - closed_v) / span_v * travel_deg; };
+    return {scaled(volts[0]), scaled(supply_v - volts[1])};
+  }
 };
 
 enum class SensorFaultKind {
@@ -46,6 +51,7 @@ struct SensorFault {
   SensorFaultKind kind = SensorFaultKind::none;
   double from_s = 0.0;
   double size = 0.0;
+  std::optional<double> until_s{};  ///< none: it stays
 };
 Names<SensorFaultKind> sensor_fault_names() noexcept;
 

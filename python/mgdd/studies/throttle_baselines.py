@@ -1,0 +1,125 @@
+"""Tuned sets of PID and sliding mode for the throttle presets, from a design study, and what their supervisor knows."""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass
+
+from mgdd import presets
+from mgdd.control import Pid, SlidingMode, ThrottleSupervisor
+from mgdd.throttle import Throttle
+
+__all__ = ["Baseline", "baselines", "controller_of", "settings_of", "supervisor_of", "throttle_of"]
+
+Controller = Pid | SlidingMode
+
+RETURN_S = {"P1": 0.4, "P2": 0.4, "P3": 0.8}  # from anywhere to limp-home with the bridge open
+
+
+@dataclass(frozen=True)
+class Baseline:
+    """A tuned set of the study and the medians that it found there."""
+
+    preset: str
+    kind: type[Controller]
+    tuned: tuple[float, ...]
+    large_ms: float
+    small_ms: float
+    small_mse_deg2: float
+    sine_mse_deg2: float
+
+
+# PID: Kp, Ki, Kd in duty % per travel %, kick per Coulomb friction, its width, integral window, dead band, feed-forward
+# of rate and friction per their values in the model. Sliding mode: switching duty, layer in rad, integral, bandwidth,
+# pole of the reference, friction feed-forward, integral layers.
+_BASELINES = (
+    Baseline("P1", Pid, (11.5, 117.0, 0.132, 1.3, 0.019, 2.0, 0.1, 0.57, 0.65), 74.0, 24.0, 0.064, 0.028),
+    Baseline("P2", Pid, (11.0, 49.4, 0.117, 1.3, 0.216, 2.0, 0.0, 0.55, 0.99), 69.0, 23.0, 0.065, 0.052),
+    Baseline("P3", Pid, (15.8, 15.0, 0.147, 1.3, 0.097, 1.0, 0.0, 1.3, 1.3), 75.0, 25.0, 0.068, 0.006),
+    Baseline("P1", SlidingMode, (0.793, 0.0604, 3.03, 136.0, 170.0, 0.82, 3.0), 100.0, 25.0, 0.055, 0.253),
+    Baseline("P2", SlidingMode, (0.238, 0.0248, 4.46, 85.0, 147.0, 1.2, 1.0), 193.0, 18.0, 0.048, 0.25),
+    Baseline("P3", SlidingMode, (0.855, 0.0564, 21.2, 119.0, 185.0, 1.2, 0.5), 135.0, 18.0, 0.044, 0.155),
+)
+
+
+def baselines() -> dict[str, Baseline]:
+    """Give all tuned sets by preset and kind."""
+    return {f"{b.preset}, {'PID' if b.kind is Pid else 'sliding mode'}": b for b in _BASELINES}
+
+
+def throttle_of(preset: str) -> Throttle:
+    """Give the throttle of the study: P1 has more stiction there."""
+    throttle: Throttle = presets.load(preset, kind="throttle").throttle
+    return throttle.replace(friction="stribeck", stiction_nm=0.3) if preset == "P1" else throttle
+
+
+def settings_of(baseline: Baseline) -> dict[str, float]:
+    """Give the keywords of the controller: the tuned set in the units of `mgdd.control`, for its plant as it is."""
+    throttle, row = throttle_of(baseline.preset), baseline.tuned
+    coulomb = throttle.coulomb_nm / throttle.stall_torque_nm
+    known = _springs(throttle)
+    if baseline.kind is Pid:
+        for side in ("above", "below"):
+            known[f"proportional_{side}_per_deg"] = row[0] / 90.0
+            known[f"integral_{side}_per_deg_s"] = row[1] / 90.0
+            known[f"derivative_{side}_s_per_deg"] = row[2] / 90.0
+        motion = _motion(throttle)
+        return known | {
+            "kick": row[3] * coulomb,
+            "kick_width_deg": row[4],
+            "integral_window_deg": row[5],
+            "dead_band_deg": row[6],
+            "rate_s_per_deg": row[7] / (motion["time_constant_s"] * motion["gain_deg_per_s2"]),
+            "friction": row[8] * coulomb,
+        }
+    return (
+        known
+        | _motion(throttle)
+        | {
+            "switching": row[0],
+            "layer_deg": math.degrees(row[1]),
+            "integral_per_s": row[2],
+            "bandwidth_per_s": row[3],
+            "reference_pole_per_s": row[4],
+            "friction": row[5] * coulomb,
+            "integral_layers": row[6],
+        }
+    )
+
+
+def controller_of(baseline: Baseline, reaching: str = "boundary_layer") -> Controller:
+    """Make the controller."""
+    if baseline.kind is Pid:
+        return Pid(**settings_of(baseline))
+    return SlidingMode(reaching=reaching, **settings_of(baseline))
+
+
+def supervisor_of(preset: str) -> ThrottleSupervisor:
+    """Make a supervisor that knows the groups of a preset and the time in which its springs return the plate."""
+    throttle = throttle_of(preset)
+    stall_nm = throttle.stall_torque_nm
+    return ThrottleSupervisor(
+        closed_deg=throttle.closed_deg,
+        open_deg=throttle.open_deg,
+        nominal_supply_v=throttle.supply_v,
+        friction=throttle.stiction_nm / stall_nm,
+        return_s=RETURN_S[preset],
+        **_springs(throttle),
+        **_motion(throttle),
+    )
+
+
+def _springs(throttle: Throttle) -> dict[str, float]:
+    known = {"limp_home_deg": throttle.limp_home_deg}
+    for side in ("above", "below"):
+        known[f"preload_{side}"] = getattr(throttle, f"preload_{side}_nm") / throttle.stall_torque_nm
+        stiffness = math.radians(getattr(throttle, f"spring_{side}_nm_per_rad"))
+        known[f"spring_{side}_per_deg"] = stiffness / throttle.stall_torque_nm
+    return known
+
+
+def _motion(throttle: Throttle) -> dict[str, float]:
+    return {
+        "gain_deg_per_s2": math.degrees(throttle.stall_torque_nm / throttle.inertia_kgm2),
+        "time_constant_s": throttle.inertia_kgm2 / throttle.damping_nms_per_rad,
+    }
