@@ -48,8 +48,8 @@ A rough model predicts a short horizon; one Gauss-Newton step per sample moves t
 what is measured corrects the model while it runs. The default learns dry friction as two levels per side of limp-home
 gain and damping, asks the model for the duty at which the plate breaks away, and holds still inside the friction band.
 ``friction_learning=False`` is the plain form, ``prediction="linear"`` the usual linear MPC, more `gauss_newton_steps`
-the converged nonlinear one. Keyword-only; the defaults fit the throttle ``P1``. `mgdd.control.tuned` makes one for
-another throttle; ``GuidedPredictive.fields()`` lists bounds and defaults.
+the converged nonlinear one. Keyword-only; the defaults fit the throttle ``P1``. `mgdd.loop.tuned_controller` makes one
+for another throttle; ``GuidedPredictive.fields()`` lists bounds and defaults.
 
 Parameters
 ----------
@@ -111,7 +111,7 @@ mgdd.errors.ParameterError
 See Also
 --------
 Mgdd1 : the plainest form, guided by the outputs of any model.
-tuned : controllers for a throttle, all tuned alike.
+mgdd.loop.tuned_controller : controllers for a throttle, all tuned alike.
 
 References
 ----------
