@@ -58,8 +58,8 @@ def check_agreement(bodies: list[tuple[Body, Any, Any]]) -> None:
         if body.family != "coulomb" or body.delay_samples != 0:
             continue
         model = FirstPrincipleModel(
-            parameters=body.groups(), closed_deg=body.closed_deg, open_deg=body.open_deg,
-            ramp_deg=body.ramp_deg, substeps=20,
+            parameters=body.groups() | {"ramp_deg": body.ramp_deg}, closed_deg=body.closed_deg,
+            open_deg=body.open_deg, substeps=20,
         )  # fmt: skip
         percent = quality_of([free_run(model, test)]).nrmse_fit_percent
         if percent is None or percent < LOWEST_PERCENT:

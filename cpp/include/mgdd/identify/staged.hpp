@@ -26,7 +26,7 @@ struct FitStage {
 
 /// Stages one after the other, each from where the last one ended. `parameters` describes every model parameter;
 /// `values` comes in as the start and goes out as the estimate. Returns the report of the last stage.
-template <dynamics::ModelFamily Model>
+template <dynamics::DescribedFamily Model>
 optimize::FitReport fit_in_stages(const Model& model, const std::vector<optimize::Parameter>& parameters,
                                   const std::vector<SimulationRecord>& records, const std::vector<FitStage>& stages,
                                   Values<double, Model::n_parameters>& values) {
@@ -50,10 +50,7 @@ optimize::FitReport fit_in_stages(const Model& model, const std::vector<optimize
     std::vector<optimize::Parameter> unknowns;
     for (const std::size_t i : stage.free)
       unknowns.push_back(parameters.at(i));
-    for (std::size_t r = 0; r < chosen.size(); ++r) {
-      for (const std::size_t s : chosen[r].free_start)
-        unknowns.push_back({.name = "start_" + std::to_string(s) + "[" + std::to_string(r) + "]"});
-    }
+    append_start_numbers<Model>(unknowns, chosen);
     OutputError<Model> residual(model, values, stage.free, std::move(chosen));
     optimize::LeastSquares search(unknowns, residual.n_residuals(), stage.search);
     report = search.solve(residual, residual.start());

@@ -92,11 +92,11 @@ def regression_start(
 def group_starts(
     values: Mapping[str, float],
     free: list[str],
-    bounds: Mapping[str, _core.optimize.Parameter],
     n_starts: int,
     seed: int,
 ) -> list[list[float]]:
     """Spread the free groups that are searched as logarithms from half to twice their first value."""
+    bounds = {parameter.name: parameter for parameter in _core.identify.throttle_group_bounds()}
     box = [
         _core.optimize.Parameter(
             name=name,

@@ -43,9 +43,9 @@ def fit_kind(
         fixed = None if limp_home_deg is None else {"limp_home_deg": limp_home_deg}
         fits = [
             fit_first_principle(
-                log, fixed=fixed, electrical=electrical, options=options, closed_deg=closed, open_deg=opened,
+                log, fixed=fixed, free=free, options=options, closed_deg=closed, open_deg=opened,
             )
-            for electrical in (False, True)
+            for free in ((), ("electrical_s",))
         ]  # fmt: skip
         # A lag of the current that only follows the noise is left out: one number less to carry over.
         return fits[1] if fits[1].report.rmse < _WORTH * fits[0].report.rmse else fits[0]
