@@ -5,7 +5,7 @@
 Forty random bodies, ten each of Coulomb, Stribeck and LuGre friction and with a gap in the gear; delays of 0 to 3
 samples, lags of 0.3 to 2 ms, angle noise 0.02 to 0.05 deg and a 12-bit converter (tests/python/support). Each gives an
 excitation log (8.3 s across limp-home: levels, then a chirp) and a fresh log of other levels (6.3 s). Both stops are
-told. Every fit is a call of `identify_throttle` with its own defaults; the second row also asks for a set per side and
+told. Every fit is a call of `identify_throttle` with its own defaults; one row of PW-R also asks for a set per side and
 for delays of 0 to 5 samples.
 
 Told of each: free-run fit on the fresh log, the delay found, how often the 95 % interval (1.96 standard errors) of
@@ -37,6 +37,7 @@ from independent_throttle import FAMILIES, Body
 from throttle_bodies import draw_body, make_logs
 
 CALLS: dict[str, dict[str, Any]] = {
+    "auto": {},
     "pw_r": {"model": "pw_r"},
     "pw_r, two_sided, delays 0 to 5": {"model": "pw_r", "two_sided": True, "delay_samples": range(6)},
     "first_principle": {"model": "first_principle"},
@@ -83,8 +84,11 @@ def identify(body: Body, train: Any, test: Any, call: dict[str, Any]) -> dict[st
     assert fit.test is not None  # noqa: S101
     return {
         "percent": fit.test.nrmse_fit_percent,
+        "kind": fit.kind,
         # What was not searched was not found.
-        "delay": fit.parameters["delay_samples"] if "delay_samples" in call else None,
+        "delay": None
+        if call.get("model") in ("pw_r", "pw_w", "pw_p") and "delay_samples" not in call
+        else fit.parameters["delay_samples"],
         "delay_truth": body.delay_samples,
         "estimates": estimates,
         "seconds": seconds,
@@ -172,8 +176,8 @@ def main() -> None:
             rows[body.family].append(identify(body, train, test, call))
         report(name, rows)
         results[name] = rows
-    for theirs in ("pw_r", "pw_r, two_sided, delays 0 to 5"):
-        compare(results, "first_principle", theirs)
+    for theirs in ("pw_r", "pw_r, two_sided, delays 0 to 5", "first_principle"):
+        compare(results, "auto", theirs)
     if options.json:
         options.json.write_text(json.dumps({"machine": head, "results": results}, indent=2) + "\n", encoding="utf-8")
 

@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING, NamedTuple
 import numpy as np
 
 from mgdd import _core
-from mgdd.errors import DataError, ParameterError, argument
+from mgdd.errors import DataError, ParameterError, argument, hand_over, or_partial
 from mgdd.identify.throttle.first_principle_model import GROUP_NAMES, REFINEMENTS, TYPICAL
 from mgdd.identify.throttle.first_principle_start import SIDE_DEG, regression_start, rest_angle
 from mgdd.identify.throttle.free_run import LOG_COLUMNS
@@ -21,11 +21,11 @@ if TYPE_CHECKING:
     import xarray as xr
     from numpy.typing import NDArray
 
-__all__ = ["GroupsProblem", "Search", "groups_problem", "log_columns"]
+__all__ = ["GroupsProblem", "Search", "groups_problem", "log_columns", "shows_limp_home"]
 
 ABOVE = ("beta_above_duty", "kappa_above_duty_per_deg")
 BELOW = ("beta_below_duty", "kappa_below_duty_per_deg")
-SIDE_S = 0.3  # shorter visits cannot settle a side's two parameters
+SIDE_S = 0.1  # shorter visits cannot settle a side's two parameters
 # Where a group begins that is searched and was not there before.
 _FIRST = {
     "electrical_s": 1e-3,
@@ -88,22 +88,24 @@ class GroupsProblem:
         max_iterations: int,
         share: float = 1.0,
     ) -> Search:
-        """Search the groups `free` from `values`, all others kept."""
+        """Search the groups `free` from `values`, all others kept; Interrupted carries what it had."""
         start = within_bounds({**values, **{name: values[name] or _FIRST.get(name, 0.0) for name in free}}, free)
         stage: tuple[list[int], list[int], float, float, int] = (
             [GROUP_NAMES.index(name) for name in free], [], 1.0, tolerance, max_iterations,
         )  # fmt: skip
-        found = _core.identify.fit_throttle_groups(
-            [self.record(share)],
-            stages=[stage],
-            starts=[[start[name] for name in GROUP_NAMES]],
-            closed_deg=self.stops_deg[0],
-            open_deg=self.stops_deg[1],
-            substeps=substeps,
-            n_threads=1,
+        found, stop = or_partial(
+            lambda: _core.identify.fit_throttle_groups(
+                [self.record(share)],
+                stages=[stage],
+                starts=[[start[name] for name in GROUP_NAMES]],
+                closed_deg=self.stops_deg[0],
+                open_deg=self.stops_deg[1],
+                substeps=substeps,
+                n_threads=1,
+            )
         )
         report = found["reports"][0]
-        return Search(report.rmse, dict(zip(GROUP_NAMES, found["values"], strict=True)), report)
+        return hand_over(Search(report.rmse, dict(zip(GROUP_NAMES, found["values"], strict=True)), report), stop)
 
 
 def groups_problem(
@@ -164,6 +166,15 @@ def groups_problem(
         unvisited=tuple(unvisited),
         findings=tuple(findings),
     )
+
+
+def shows_limp_home(log: xr.Dataset) -> bool:
+    """Whether a log has been on both sides of where it seems to rest, long enough to settle both."""
+    time, duty, angle = log_columns(log)
+    step_s = even_step(time)
+    home = rest_angle(step_s, duty, angle, TYPICAL["limp_home_deg"])
+    sides = (angle > home + SIDE_DEG, angle < home - SIDE_DEG)
+    return all(np.count_nonzero(side) * step_s >= SIDE_S for side in sides)
 
 
 def within_bounds(values: Mapping[str, float], free: Sequence[str]) -> dict[str, float]:
