@@ -8,8 +8,8 @@ excitation log (8.3 s across limp-home: levels, then a chirp) and a fresh log of
 told. Every fit is a call of `identify_throttle` with its own defaults; one row of PW-R also asks for a set per side and
 for delays of 0 to 5 samples.
 
-Told of each: free-run fit on the fresh log, the delay found, how often the 95 % interval (1.96 standard errors) of
-lag, preloads and springs holds the true value, processor seconds. First the package's groups at the true values must
+Told of each: free-run fit on the fresh log, the delay found, how often the 95 % interval of delay, lag, preloads and
+springs holds the true value, processor seconds. First the package's groups at the true values must
 follow the fresh logs of the undelayed Coulomb bodies: otherwise truths and estimates do not mean the same.
 """
 
@@ -45,6 +45,7 @@ CALLS: dict[str, dict[str, Any]] = {
     "pw_p": {"model": "pw_p"},
 }
 TRUTHS = {  # shown name: truth's name, then the names that fits use
+    "delay": ("delay_samples", "delay_samples"),
     "lag": ("electrical_s", "electrical_s"),
     "preload above": ("beta_above_duty", "beta_above_duty", "above_preload_duty"),
     "preload below": ("beta_below_duty", "beta_below_duty", "below_preload_duty"),
@@ -74,12 +75,14 @@ def identify(body: Body, train: Any, test: Any, call: dict[str, Any]) -> dict[st
     except Error as error:
         return {"refused": str(error), "seconds": time.process_time() - begin}
     seconds = time.process_time() - begin
-    estimates: dict[str, dict[str, float]] = {}
+    estimates: dict[str, dict[str, Any]] = {}
+    intervals, truths = fit.report.interval(0.95), body.groups() | {"delay_samples": float(body.delay_samples)}
     for shown, (truth, *names) in TRUTHS.items():
         name = next((own for own in names if own in fit.stderr), None)
         if name is not None and math.isfinite(fit.stderr[name]):
             estimates[shown] = {
-                "value": fit.parameters[name], "stderr": fit.stderr[name], "truth": body.groups()[truth],
+                "value": fit.parameters[name], "stderr": fit.stderr[name], "truth": truths[truth],
+                "interval": intervals[name],
             }  # fmt: skip
     assert fit.test is not None  # noqa: S101
     return {
@@ -104,8 +107,8 @@ def covered(rows: list[dict[str, Any]], shown: str) -> str:
     own = [row["estimates"][shown] for row in rows if shown in row.get("estimates", {})]
     if not own:
         return "-"
-    inside = sum(abs(one["value"] - one["truth"]) <= 1.96 * one["stderr"] for one in own)
-    error = statistics.median(abs(one["value"] / one["truth"] - 1.0) for one in own)
+    inside = sum(one["interval"][0] <= one["truth"] <= one["interval"][1] for one in own)
+    error = statistics.median(abs(one["value"] / one["truth"] - 1.0) if one["truth"] else 0.0 for one in own)
     apart = statistics.median(abs(one["value"] - one["truth"]) / one["stderr"] for one in own)
     return f"{inside} of {len(own)} ({100 * error:.2g} %, {apart:.2g} standard errors)"
 

@@ -11,9 +11,9 @@ import pytest
 
 from mgdd.errors import ParameterError
 from mgdd.identify import FirstPrincipleModel, identify_throttle, load_throttle_model
-from mgdd.identify.throttle.automatic import correlation_samples
+from mgdd.identify.throttle.delay_report import with_delay
 from mgdd.io import throttle_log
-from mgdd.optimize import FitOptions
+from mgdd.optimize import FitOptions, least_squares
 from mgdd.signals import amplitude_random_steps, chirp
 from mgdd.throttle import PseudoWiener
 
@@ -97,13 +97,17 @@ def test_the_same_log_gives_the_same_bits_and_a_refused_call_changes_nothing() -
     assert again.findings == once.findings
 
 
-def test_correlated_residuals_count_less() -> None:
-    rng = np.random.default_rng(0)
-    white = rng.standard_normal(20_000)
-    assert correlation_samples(white) == pytest.approx(1.0, abs=0.1)
-    slow = np.empty(white.size)
-    slow[0] = 0.0
-    for k in range(1, white.size):
-        slow[k] = 0.9 * slow[k - 1] + white[k]
-    assert correlation_samples(slow) == pytest.approx(19.0, rel=0.2)  # (1 + a)/(1 - a)
-    assert correlation_samples(np.zeros(100)) == 1.0
+def test_a_delay_among_several_has_the_error_of_the_costs_beside_it() -> None:
+    report = least_squares(lambda x: ([x[0] - 1.0, x[1], x[0] + x[1]], [[1, 0], [0, 1], [1, 1]]), [0.0, 0.0])
+    n, rmse = 400.0, {1.0: 0.05, 2.0: 0.04, 3.0: 0.044}
+    known = with_delay(report, 2.0, rmse, n)
+    # A parabola c (1 + (d - 2)^2 / (n s^2)) about the minimum, through the flatter neighbour.
+    assert known.stderr[-1] == pytest.approx((2.0 * n * np.log(0.044 / 0.04)) ** -0.5)
+    assert known.names == (*report.names, "delay_samples")
+    assert known.values[-1] == 2.0
+    assert known.values.flags.writeable is False
+    np.testing.assert_array_equal(known.stderr[:-1], report.stderr)
+    low, high = known.interval()["delay_samples"]
+    assert low < 2.0 < high
+    assert with_delay(report, 2.0, {2.0: 0.04, 3.0: 0.04}, n).stderr[-1] == 1.0
+    assert known.to_dataset().sizes["parameter"] == 3

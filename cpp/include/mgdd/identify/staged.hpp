@@ -10,6 +10,7 @@
 
 #include "mgdd/common/error.hpp"
 #include "mgdd/identify/output_error.hpp"
+#include "mgdd/optimize/least_squares/block_sandwich.hpp"
 #include "mgdd/optimize/least_squares/fit_report.hpp"
 #include "mgdd/optimize/least_squares/least_squares.hpp"
 #include "mgdd/optimize/least_squares/parameter.hpp"
@@ -24,8 +25,21 @@ struct FitStage {
   optimize::LeastSquaresOptions search{};
 };
 
+/// The rows that each record has in a residual.
+inline std::vector<optimize::ResidualRecord> residual_records(const std::vector<SimulationRecord>& records) {
+  std::vector<optimize::ResidualRecord> out;
+  Eigen::Index first = 0;
+  for (const SimulationRecord& record : records) {
+    const auto rows = static_cast<Eigen::Index>(record.output.size() - record.skip);
+    out.push_back({first, rows, record.dt_s});
+    first += rows;
+  }
+  return out;
+}
+
 /// Stages one after the other, each from where the last one ended. `parameters` describes every model parameter;
-/// `values` comes in as the start and goes out as the estimate. Returns the report of the last stage.
+/// `values` comes in as the start and goes out as the estimate. Returns the report of the last stage; its
+/// standard errors count the correlation of the residual.
 template <dynamics::DescribedFamily Model>
 optimize::FitReport fit_in_stages(const Model& model, const std::vector<optimize::Parameter>& parameters,
                                   const std::vector<SimulationRecord>& records, const std::vector<FitStage>& stages,
@@ -55,7 +69,11 @@ optimize::FitReport fit_in_stages(const Model& model, const std::vector<optimize
     optimize::LeastSquares search(unknowns, residual.n_residuals(), stage.search);
     report = search.solve(residual, residual.start());
     values = residual.parameters(report.values);
-    if (report.status == optimize::FitStatus::interrupted) break;
+    const bool interrupted = report.status == optimize::FitStatus::interrupted;
+    if ((interrupted || &stage == &stages.back()) && std::isfinite(report.cost)) {
+      optimize::block_sandwich(report, search.jacobian(), residual_records(residual.records()));
+    }
+    if (interrupted) break;
   }
   return report;
 }

@@ -12,6 +12,7 @@ import numpy as np
 from mgdd import _core
 from mgdd.errors import Interrupted, hand_over
 from mgdd.identify.starts import spread_starts
+from mgdd.identify.throttle.delay_report import with_delay
 from mgdd.identify.throttle.first_principle_model import REFINEMENTS, FirstPrincipleModel
 from mgdd.identify.throttle.first_principle_problem import GroupsProblem, Search, groups_problem
 from mgdd.identify.throttle.free_run import draw_free_run, free_run, quality_of, source_of
@@ -120,6 +121,7 @@ def fit_groups(
     hunt = _Hunt(problem=problem, max_iterations=chosen.max_iterations, tolerance=chosen.tolerance)
     interrupted: Interrupted | None = None
     findings: list[Finding] = []
+    by_delay: dict[float, Search] = {}
     try:
         rough, terms = _structure(hunt, fixed or {}, sorted(delays), chosen.n_starts, chosen.seed)
         found, by_delay = _whole_delay(hunt, rough, sorted(delays))
@@ -130,6 +132,9 @@ def fit_groups(
             raise
         found, interrupted = hunt.best, stop
     report = FitReport.from_core(found.report, problem.angle)
+    if len(by_delay) > 1:
+        by_rmse = {delay: max(one.rmse, _FLOOR_DEG) for delay, one in by_delay.items()}
+        report = with_delay(report, found.values["delay_samples"], by_rmse, independent_samples(found))
     model = FirstPrincipleModel(
         parameters=found.values, closed_deg=stops_deg[0], open_deg=stops_deg[1], substeps=_FINE, sample_s=problem.step_s
     )
@@ -241,26 +246,13 @@ def _without(hunt: _Hunt, found: Search, terms: list[tuple[str, ...]]) -> tuple[
 def independent_samples(found: Search) -> float:
     """Return how many independent samples the residual is worth: samples over its integrated correlation time."""
     residual = np.asarray(found.report.residual)
-    return residual.size / correlation_samples(residual)
+    return residual.size / _core.optimize.autocorrelation_time(residual)
 
 
 def noise_of(angle: NDArray[np.float64]) -> float:
     """Return the standard deviation of white noise on an angle: its second differences, which motion hardly has."""
     second = np.diff(angle, 2)
     return float(1.4826 * np.median(np.abs(second)) / math.sqrt(6.0))
-
-
-def correlation_samples(residual: NDArray[np.float64]) -> float:
-    """Integrate the autocorrelation until it has first fallen below a twentieth."""
-    r = residual - residual.mean()
-    power = np.abs(np.fft.rfft(r, 2 * r.size)) ** 2
-    correlation = np.fft.irfft(power)[: r.size]
-    if correlation[0] <= 0.0:
-        return 1.0
-    correlation = correlation / correlation[0]
-    low = correlation < 0.05
-    end = int(np.argmax(low)) if low.any() else r.size
-    return max(1.0, float(1.0 + 2.0 * correlation[1:end].sum()))
 
 
 def _missed(smaller: Search, larger: Search, size: int, n: float) -> bool:
