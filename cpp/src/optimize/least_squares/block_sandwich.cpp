@@ -30,18 +30,24 @@ void check(const FitReport& report, const Eigen::MatrixXd& jacobian, const std::
   }
 }
 
-// Sum over all windows of `length` rows, those that reach over an end included, of (window sum)(window sum)', over the
-// length: the Bartlett-weighted sum of all products of rows.
-Eigen::MatrixXd of_windows(const Eigen::MatrixXd& score, const ResidualRecord& record, Eigen::Index length) {
-  const Eigen::Index n = score.cols();
-  Eigen::MatrixXd total = Eigen::MatrixXd::Zero(n, n);
-  Eigen::VectorXd window = Eigen::VectorXd::Zero(n);
-  for (Eigen::Index last = 0; last < record.rows + length - 1; ++last) {
-    if (last < record.rows) window += score.row(record.first + last).transpose();
-    if (last >= length) window -= score.row(record.first + last - length).transpose();
-    total.selfadjointView<Eigen::Lower>().rankUpdate(window);
+// Spread of the estimates that lack one block each, to first order: (J'J - J_b'J_b)^-1 J_b'r_b. A block without which
+// nothing is known of a parameter leaves it a spread to match. Mean of two partitions, the second half a block on.
+Eigen::MatrixXd without_one_block(const Eigen::MatrixXd& columns, const Eigen::VectorXd& residual,
+                                  const Eigen::MatrixXd& whole, const ResidualRecord& record, Eigen::Index length) {
+  const Eigen::Index n = columns.cols();
+  Eigen::MatrixXd spread = Eigen::MatrixXd::Zero(n, n);
+  for (const Eigen::Index shift : {Eigen::Index{0}, length / 2}) {
+    for (Eigen::Index first = -shift; first < record.rows; first += length) {
+      const Eigen::Index begin = std::max<Eigen::Index>(first, 0);
+      const Eigen::Index rows = std::min(first + length, record.rows) - begin;
+      if (rows < 1) continue;
+      const auto own = columns.middleRows(record.first + begin, rows);
+      const Eigen::VectorXd score = own.transpose() * residual.segment(record.first + begin, rows);
+      const Eigen::VectorXd change = (whole - own.transpose() * own).ldlt().solve(score);
+      if (change.allFinite()) spread += 0.5 * change * change.transpose();
+    }
   }
-  return Eigen::MatrixXd(total.selfadjointView<Eigen::Lower>()) / static_cast<double>(length);
+  return spread;
 }
 
 }  // namespace
@@ -69,21 +75,20 @@ void block_sandwich(FitReport& report, const Eigen::MatrixXd& jacobian, const st
     scale[k] = columns.col(k).norm();
     columns.col(k) /= scale[k];
   }
-  const Eigen::MatrixXd bread = (columns.transpose() * columns).ldlt().solve(Eigen::MatrixXd::Identity(n, n));
+  const Eigen::MatrixXd whole = columns.transpose() * columns;
+  const Eigen::MatrixXd bread = whole.ldlt().solve(Eigen::MatrixXd::Identity(n, n));
   const Eigen::MatrixXd score = columns.array().colwise() * report.residual.array();
-  Eigen::MatrixXd meat = Eigen::MatrixXd::Zero(n, n), between = meat;
+  Eigen::MatrixXd within = Eigen::MatrixXd::Zero(n, n), between = within;
   double blocks = 0.0;
   for (const ResidualRecord& record : records) {
     const Eigen::Index length = block_rows(report.residual, record);
-    meat += of_windows(score, record, length);
+    within += without_one_block(columns, report.residual, whole, record, length);
     blocks += static_cast<double>(record.rows) / static_cast<double>(length);
     const Eigen::VectorXd sum = score.middleRows(record.first, record.rows).colwise().sum().transpose();
     between += sum * sum.transpose();
   }
-  const double rows = static_cast<double>(report.residual.size());
-  const double freedom = rows / std::max(rows - static_cast<double>(n), 1.0);
   const double count = static_cast<double>(records.size());
-  const Eigen::MatrixXd within = freedom * blocks / std::max(blocks - 1.0, 1.0) * (bread * meat * bread);
+  within *= (blocks - 1.0) / blocks;
   const Eigen::MatrixXd apart =
       count > 1.0 ? Eigen::MatrixXd(count / (count - 1.0) * (bread * between * bread)) : Eigen::MatrixXd::Zero(n, n);
   for (Eigen::Index a = 0; a < n; ++a) {

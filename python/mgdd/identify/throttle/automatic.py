@@ -35,6 +35,7 @@ _SHOWN = {LAG: "lag", DROP: "Stribeck drop", PRESLIDING: "presliding", GAP: "gap
 _COARSE, _BRISTLES, _FINE = 2, 4, 8
 _WORTH = 0.99  # what explains less than a hundredth of the error is left out, however certain it is
 _FLOOR_DEG = 1e-3  # no sensor shows less: a residual below it is as good as any
+_SEEDS = 3  # rough solutions that are looked at from every delay
 _MOTOR_LAG_S = 1e-3  # L/R of throttle motors, which decides between delays that the log does not separate
 _AT_NOISE = 1.05  # a residual that small leaves nothing to explain
 _DROPS, _SPEEDS, _PRESLIDINGS, _HALF_GAPS = (0.08, 0.6), (8.0, 40.0), (0.06, 0.2), (0.1, 0.3)
@@ -157,8 +158,8 @@ def fit_groups(
 
 def _structure(
     hunt: _Hunt, fixed: Mapping[str, float], delays: Sequence[float], n_starts: int, seed: int
-) -> tuple[Search, list[tuple[str, ...]]]:
-    """Find the structure and its rough values, with the delay free between the first and the last."""
+) -> tuple[list[Search], list[tuple[str, ...]]]:
+    """Find the structure and its rough values, the best first, with the delay free between the first and the last."""
     problem = hunt.problem
     latency = [*LAG, *(DELAY if len(delays) > 1 else ())]
     further = [*latency, *(RAMP if problem.both_sides else ())]
@@ -176,7 +177,7 @@ def _structure(
     terms: list[tuple[str, ...]] = [LAG] if "electrical_s" in base else []
     enough = max(_AT_NOISE * noise_of(problem.angle), _FLOOR_DEG)
     if plain.rmse < enough:
-        return plain, terms
+        return [plain], terms
     box = [
         _core.optimize.Parameter(name=name, lower=low, upper=high, log_scaled=True)
         for name, (low, high) in zip(DROP, (_DROPS, _SPEEDS), strict=True)
@@ -186,7 +187,7 @@ def _structure(
     dropping = hunt.search(_best(tries).values, of([DROP]), _COARSE, 40)
     found[(DROP,)] = dropping
     if dropping.rmse < enough:
-        return dropping, [*terms, DROP]
+        return [dropping], [*terms, DROP]
     tries = [
         hunt.search(
             {**one.values, "presliding_deg": width, "stribeck_drop": max(one.values["stribeck_drop"], 0.05)},
@@ -209,15 +210,19 @@ def _structure(
     own = {name: found[best].values[name] for term in best for name in term}
     others = [one for structure, one in found.items() if structure != best]
     again = [hunt.search({**one.values, **_ABSENT, **own}, of(best), _BRISTLES, 25) for one in others]
-    return _best([found[best], *again]), [*terms, *best]
+    return sorted([found[best], *again], key=lambda one: one.rmse)[:_SEEDS], [*terms, *best]
 
 
-def _whole_delay(hunt: _Hunt, rough: Search, delays: Sequence[float]) -> tuple[Search, dict[float, Search]]:
+def _whole_delay(hunt: _Hunt, rough: Sequence[Search], delays: Sequence[float]) -> tuple[Search, dict[float, Search]]:
     """Fit with fine steps at the delays about the rough one; of equals take the one whose lag a motor would have."""
-    at = rough.values["delay_samples"]
-    free = [name for name in _names(rough) if name not in DELAY]
+    at = rough[0].values["delay_samples"]
+    free = [name for name in _names(rough[0]) if name not in DELAY]
     near = [d for d in delays if math.floor(at) - 1 <= d <= math.ceil(at)] or [min(delays, key=lambda d: abs(d - at))]
-    found = {delay: hunt.fine(_at_delay(rough, delay, hunt.problem.step_s, free), free) for delay in near}
+    found = {}
+    for delay in near:
+        starts = [_at_delay(one, delay, hunt.problem.step_s, free) for one in rough]
+        looks = [hunt.search(start, free, _BRISTLES, 15) for start in starts]
+        found[delay] = hunt.fine(_best(looks).values, free)
     for k, delay in enumerate(near):  # each also from where its neighbours ended
         for other in near[max(k - 1, 0) : k] + near[k + 1 : k + 2]:
             again = hunt.fine(_at_delay(found[other], delay, hunt.problem.step_s, free), free)

@@ -1,6 +1,6 @@
-// Standard errors of a least-squares fit whose residual is correlated in time: the sandwich A^-1 S A^-1 with A = J'J
-// and S the long-run covariance of the score J'r, from overlapping blocks (Newey and West 1987; Liang and Zeger 1986
-// over records). Units of the parameters. Not real-time safe: allocates.
+// Standard errors of a least-squares fit whose residual is correlated in time: the jackknife over blocks of the record
+// (Kuensch 1989), to first order, and over records the sandwich (Liang and Zeger 1986). Units of the parameters. Not
+// real-time safe: allocates.
 #pragma once
 
 #include <vector>
