@@ -5,11 +5,11 @@
 Forty random bodies, ten each of Coulomb, Stribeck and LuGre friction and with a gap in the gear; delays of 0 to 3
 samples, lags of 0.3 to 2 ms, angle noise 0.02 to 0.05 deg and a 12-bit converter (tests/python/support). Each gives an
 excitation log (8.3 s across limp-home: levels, then a chirp) and a fresh log of other levels (6.3 s). Both stops are
-told. Every fit is a call of `identify_throttle` with its own defaults; the second row also asks for a set per side and
+told. Every fit is a call of `identify_throttle` with its own defaults; one row of PW-R also asks for a set per side and
 for delays of 0 to 5 samples.
 
-Told of each: free-run fit on the fresh log, the delay found, how often the 95 % interval (1.96 standard errors) of
-lag, preloads and springs holds the true value, processor seconds. First the package's groups at the true values must
+Told of each: free-run fit on the fresh log, the delay found, how often the 95 % interval of delay, lag, preloads and
+springs holds the true value, processor seconds. First the package's groups at the true values must
 follow the fresh logs of the undelayed Coulomb bodies: otherwise truths and estimates do not mean the same.
 """
 
@@ -37,6 +37,7 @@ from independent_throttle import FAMILIES, Body
 from throttle_bodies import draw_body, make_logs
 
 CALLS: dict[str, dict[str, Any]] = {
+    "auto": {},
     "pw_r": {"model": "pw_r"},
     "pw_r, two_sided, delays 0 to 5": {"model": "pw_r", "two_sided": True, "delay_samples": range(6)},
     "first_principle": {"model": "first_principle"},
@@ -44,6 +45,7 @@ CALLS: dict[str, dict[str, Any]] = {
     "pw_p": {"model": "pw_p"},
 }
 TRUTHS = {  # shown name: truth's name, then the names that fits use
+    "delay": ("delay_samples", "delay_samples"),
     "lag": ("electrical_s", "electrical_s"),
     "preload above": ("beta_above_duty", "beta_above_duty", "above_preload_duty"),
     "preload below": ("beta_below_duty", "beta_below_duty", "below_preload_duty"),
@@ -58,8 +60,8 @@ def check_agreement(bodies: list[tuple[Body, Any, Any]]) -> None:
         if body.family != "coulomb" or body.delay_samples != 0:
             continue
         model = FirstPrincipleModel(
-            parameters=body.groups(), closed_deg=body.closed_deg, open_deg=body.open_deg,
-            ramp_deg=body.ramp_deg, substeps=20,
+            parameters=body.groups() | {"ramp_deg": body.ramp_deg}, closed_deg=body.closed_deg,
+            open_deg=body.open_deg, substeps=20,
         )  # fmt: skip
         percent = quality_of([free_run(model, test)]).nrmse_fit_percent
         if percent is None or percent < LOWEST_PERCENT:
@@ -73,18 +75,23 @@ def identify(body: Body, train: Any, test: Any, call: dict[str, Any]) -> dict[st
     except Error as error:
         return {"refused": str(error), "seconds": time.process_time() - begin}
     seconds = time.process_time() - begin
-    estimates: dict[str, dict[str, float]] = {}
+    estimates: dict[str, dict[str, Any]] = {}
+    intervals, truths = fit.report.interval(0.95), body.groups() | {"delay_samples": float(body.delay_samples)}
     for shown, (truth, *names) in TRUTHS.items():
         name = next((own for own in names if own in fit.stderr), None)
         if name is not None and math.isfinite(fit.stderr[name]):
             estimates[shown] = {
-                "value": fit.parameters[name], "stderr": fit.stderr[name], "truth": body.groups()[truth],
+                "value": fit.parameters[name], "stderr": fit.stderr[name], "truth": truths[truth],
+                "interval": intervals[name],
             }  # fmt: skip
     assert fit.test is not None  # noqa: S101
     return {
         "percent": fit.test.nrmse_fit_percent,
+        "kind": fit.kind,
         # What was not searched was not found.
-        "delay": fit.parameters["delay_samples"] if "delay_samples" in call else None,
+        "delay": None
+        if call.get("model") in ("pw_r", "pw_w", "pw_p") and "delay_samples" not in call
+        else fit.parameters["delay_samples"],
         "delay_truth": body.delay_samples,
         "estimates": estimates,
         "seconds": seconds,
@@ -100,8 +107,8 @@ def covered(rows: list[dict[str, Any]], shown: str) -> str:
     own = [row["estimates"][shown] for row in rows if shown in row.get("estimates", {})]
     if not own:
         return "-"
-    inside = sum(abs(one["value"] - one["truth"]) <= 1.96 * one["stderr"] for one in own)
-    error = statistics.median(abs(one["value"] / one["truth"] - 1.0) for one in own)
+    inside = sum(one["interval"][0] <= one["truth"] <= one["interval"][1] for one in own)
+    error = statistics.median(abs(one["value"] / one["truth"] - 1.0) if one["truth"] else 0.0 for one in own)
     apart = statistics.median(abs(one["value"] - one["truth"]) / one["stderr"] for one in own)
     return f"{inside} of {len(own)} ({100 * error:.2g} %, {apart:.2g} standard errors)"
 
@@ -172,8 +179,8 @@ def main() -> None:
             rows[body.family].append(identify(body, train, test, call))
         report(name, rows)
         results[name] = rows
-    for theirs in ("pw_r", "pw_r, two_sided, delays 0 to 5"):
-        compare(results, "first_principle", theirs)
+    for theirs in ("pw_r", "pw_r, two_sided, delays 0 to 5", "first_principle"):
+        compare(results, "auto", theirs)
     if options.json:
         options.json.write_text(json.dumps({"machine": head, "results": results}, indent=2) + "\n", encoding="utf-8")
 

@@ -32,7 +32,7 @@ auto groups() {
   FirstPrinciple family;
   family.substeps = 1;
   const auto values = first_principle_of(Throttle{});
-  std::array<S, 9> p{};
+  FirstPrinciple::Groups<S> p{};
   for (std::size_t i = 0; i < p.size(); ++i)
     p[i] = static_cast<S>(values[i]);
   return family.prepare(p, 2e-3);

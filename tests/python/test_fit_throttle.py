@@ -33,7 +33,9 @@ TRUTH = {
 
 def simulate(time, duty, start_deg):
     inputs = {"time_s": time, "duty": duty}
-    return FirstPrincipleModel(parameters=TRUTH).simulate(inputs, initial_state={"angle_deg": start_deg})["angle_deg"]
+    return FirstPrincipleModel(parameters=TRUTH, substeps=4).simulate(inputs, initial_state={"angle_deg": start_deg})[
+        "angle_deg"
+    ]
 
 
 def make_log(span_s=8.0, offset=0.15, amplitude=0.2, start_deg=40.0, noise_deg=0.0, seed=1, f_end=6.0):
@@ -63,7 +65,7 @@ def test_noise_free_log_gives_the_visited_side_back():
 def test_the_start_leaves_out_windows_that_hold_a_reversal_or_a_rest(amplitude):
     time = 1e-3 * np.arange(6000)
     duty = 0.15 + amplitude * np.sin(2 * np.pi * 4.0 * time) + 0.1 * np.sin(2 * np.pi * 0.4 * time)
-    run = FirstPrincipleModel(parameters=TRUTH).simulate(
+    run = FirstPrincipleModel(parameters=TRUTH, substeps=4).simulate(
         {"time_s": time, "duty": duty}, initial_state={"angle_deg": 40.0}
     )
     angle = run["angle_deg"].to_numpy()
@@ -71,7 +73,7 @@ def test_the_start_leaves_out_windows_that_hold_a_reversal_or_a_rest(amplitude):
     free = [name for name in TRUTH if name not in ("limp_home_deg", "electrical_s")]
     found = regression_start(1e-3, duty, angle, known, free, 0.0, 90.0)
     for name in ("tau_s", "gain_deg_per_s2_per_duty", "beta_above_duty", "delta_duty"):
-        assert found[name] == pytest.approx(TRUTH[name], rel=0.025), name
+        assert found[name] == pytest.approx(TRUTH[name], rel=0.03), name
 
 
 def test_a_one_sided_log_names_the_other_side_and_an_excitation():
@@ -97,7 +99,7 @@ def test_a_two_sided_log_with_noise_gives_both_sides_and_predicts_another_log():
 
 
 def test_physical_numbers_come_back_from_either_known_number():
-    model = FirstPrincipleModel(parameters=TRUTH)
+    model = FirstPrincipleModel(parameters=TRUTH, substeps=4)
     one = model.physical_parameters(resistance_ohm=1.5, supply_v=12.0, inertia_kgm2=0.0021)
     # A passenger-car throttle with 0.383 N m/A, 0.0088 N m s/rad, 0.087 N m/rad, 0.396 and 0.284 N m.
     assert one["torque_constant_nm_per_a"] == pytest.approx(0.383, rel=2e-3)
@@ -126,7 +128,7 @@ def test_wrong_calls_name_the_remedy_and_a_right_one_follows():
     with pytest.raises(DataError, match="drive the plate"):
         fit_first_principle(log.assign(angle_deg=log.angle_deg * 0.0 + 40.0))
     with pytest.raises(ParameterError, match="horizon"):
-        FirstPrincipleModel(parameters=TRUTH).predict(log, 0)
+        FirstPrincipleModel(parameters=TRUTH, substeps=4).predict(log, 0)
     assert (
         fit_first_principle(log, fixed={"limp_home_deg": 8.0}, options=FitOptions(n_starts=1)).train.nrmse_fit_percent
         > 99.0
@@ -135,7 +137,7 @@ def test_wrong_calls_name_the_remedy_and_a_right_one_follows():
 
 def test_prediction_is_corrected_by_the_measurement():
     log = make_log(span_s=2.0)
-    model = FirstPrincipleModel(parameters=TRUTH)
+    model = FirstPrincipleModel(parameters=TRUTH, substeps=4)
     ahead = model.predict(log, 20)["angle_deg"]
     np.testing.assert_allclose(ahead, log.angle_deg.values[20:], atol=1e-9)
 

@@ -13,6 +13,7 @@ from mgdd import presets
 from mgdd.cli import main
 from mgdd.errors import ParameterError
 from mgdd.identify import FirstPrincipleModel, design_excitation, identify_throttle, validate_throttle
+from mgdd.identify.throttle.limp_home import doubts
 from mgdd.io import throttle_log, write_throttle_log
 from mgdd.optimize import FitOptions
 from mgdd.signals import amplitude_random_steps, chirp
@@ -72,10 +73,27 @@ def test_limp_home_is_read_off_a_record_that_starts_there() -> None:
 
 def test_a_rest_elsewhere_is_doubted(p1: Throttle) -> None:
     duty = np.concatenate([np.full(200, 0.145), swing(offset=0.12)])
-    fit = identify_throttle(measured(p1, duty, start_deg=40.0), "pw_r")
-    found = next(finding for finding in fit.findings if finding.code == "limp_home_read_off")
-    assert "first samples: 40" in found.text
-    assert found.remedy == "give limp_home_deg"
+    log = measured(p1, duty, start_deg=40.0)
+    fit = identify_throttle(log, "pw_r")
+    found = {finding.code: finding for finding in fit.findings}
+    assert "first samples: 40" in found["limp_home_read_off"].text
+    assert "at 40 deg under a duty of 0.145" in found["limp_home_stuck"].text
+    assert found["limp_home_stuck"].remedy.startswith("give limp_home_deg")
+    # The groups estimate it, and say that the record began elsewhere.
+    groups = identify_throttle(log, "first_principle", options=FitOptions(n_starts=1))
+    assert groups.parameters["limp_home_deg"] == pytest.approx(8.0, abs=0.2)
+    told = next(finding for finding in groups.findings if finding.code == "limp_home_stuck")
+    assert "begins at rest at 40 deg, and limp-home is 8" in told.text
+
+
+def test_friction_above_the_preload_makes_every_rest_a_doubt(p1: Throttle) -> None:
+    log = measured(p1, np.concatenate([np.zeros(100), swing(1.0)]), start_deg=8.0)
+    groups = FirstPrincipleModel().parameters
+    for static, codes in ((0.09, ["limp_home_read_off"]), (0.11, ["limp_home_read_off", "limp_home_stuck"])):
+        drop = {"delta_duty": 0.08, "stribeck_drop": static / 0.08 - 1.0}  # the preloads are 0.1
+        found = doubts(log, FirstPrincipleModel(parameters=groups | drop), 8.0)
+        assert [finding.code for finding in found] == codes
+    assert found[1].text.startswith("friction is 1.1 times the preload, so the plate may rest anywhere")
 
 
 def test_inductance_is_taken_in_where_it_shows(p1: Throttle) -> None:
@@ -88,18 +106,23 @@ def test_inductance_is_taken_in_where_it_shows(p1: Throttle) -> None:
 
 def test_a_delay_is_found_from_a_list(p1: Throttle) -> None:
     log = measured(p1, swing(), delay=3)
-    late = identify_throttle(log, delay_samples=[0, 2, 3, 4], options=FitOptions(n_starts=3))
+    late = identify_throttle(log, "pw_r", delay_samples=[0, 2, 3, 4], options=FitOptions(n_starts=3))
     assert late.parameters["delay_samples"] in (3.0, 4.0)  # the inductance is worth about one sample
-    prompt = identify_throttle(log, options=FitOptions(n_starts=3))
+    prompt = identify_throttle(log, "pw_r", options=FitOptions(n_starts=3))
     assert late.train.nrmse_fit_percent > 99.0 > prompt.train.nrmse_fit_percent
+    for asked, found in ((None, 3.0), ([2, 3], 3.0), (2, 2.0)):
+        fit = identify_throttle(log, "first_principle", delay_samples=asked, options=FitOptions(n_starts=1))
+        assert fit.parameters["delay_samples"] == found
 
 
 def test_what_a_kind_lacks_is_refused_first(p1: Throttle) -> None:
     log = measured(p1, swing(2.0))
     with pytest.raises(ParameterError, match="pw_w has one set of parameters"):
         identify_throttle(log, "pw_w", two_sided=True)
-    with pytest.raises(ParameterError, match="the first-principle groups have none"):
-        identify_throttle(log, "first_principle", delay_samples=2)
+    with pytest.raises(ParameterError, match=r"delay_samples = 6: must be within \[0, 5\]"):
+        identify_throttle(log, "first_principle", delay_samples=[2, 6])
+    with pytest.raises(ParameterError, match="must be at least one delay"):
+        identify_throttle(log, delay_samples=[])
     with pytest.raises(ParameterError, match=r"seed = -1: must be >= 0"):
         identify_throttle(log, options=FitOptions(seed=-1))
     with pytest.raises(ParameterError, match=r"open_deg = -5: must be above closed_deg"):

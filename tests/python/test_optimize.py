@@ -385,3 +385,20 @@ def test_options_are_keyword_only():
         _core.optimize.LeastSquaresOptions(7)
     with pytest.raises(TypeError):
         _core.optimize.Parameter("a")
+
+
+def test_intervals_hold_as_often_as_they_say_even_of_few_residuals() -> None:
+    x = np.array([0.0, 1.0, 2.0, 4.0, 7.0])
+    jacobian = np.column_stack([np.ones(x.size), x])
+    rng = np.random.default_rng(11)
+    held = {0.5: 0, 0.95: 0}
+    for _ in range(1000):
+        y = 2.0 - 3.0 * x + 0.4 * rng.standard_normal(x.size)
+        report = least_squares(lambda p, y=y: (jacobian @ p - y, jacobian), [0.0, 0.0], names=["offset", "slope"])
+        for level in held:
+            low, high = report.interval(level)["slope"]
+            held[level] += low <= -3.0 <= high
+    assert held[0.5] == pytest.approx(500, abs=50)
+    assert held[0.95] == pytest.approx(950, abs=21)  # 1.96 standard errors hold 855 times
+    with pytest.raises(ParameterError, match=r"level = 1: must be between 0 and 1"):
+        report.interval(1.0)

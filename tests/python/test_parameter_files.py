@@ -42,12 +42,14 @@ def span(low: float, high: float) -> st.SearchStrategy[float]:
 def first_principle(draw: st.DrawFn) -> FirstPrincipleModel:
     bounds = {parameter.name: parameter for parameter in _core.identify.throttle_group_bounds()}
     values = {name: draw(span(bound.lower, bound.upper)) for name, bound in bounds.items()}
+    values["delay_samples"] = draw(span(0.0, 3.0))
+    values["presliding_deg"] = draw(st.one_of(st.just(0.0), span(0.01, 0.5)))
     return FirstPrincipleModel(
         parameters=values,
         closed_deg=draw(span(-5.0, 5.0)),
         open_deg=draw(span(30.0, 100.0)),
-        ramp_deg=draw(span(0.05, 2.0)),
         substeps=draw(st.integers(1, 8)),
+        sample_s=draw(st.sampled_from([1e-3, 1.5e-3])),
     )
 
 
@@ -109,8 +111,35 @@ def test_a_throttle_model_simulates_bit_for_bit_after_a_file(model: Any, start_d
 
 
 def test_stops_ramp_and_substeps_of_a_first_principle_model_come_back() -> None:
-    model = FirstPrincipleModel(parameters=GROUPS, closed_deg=2.0, open_deg=60.0, ramp_deg=1.0, substeps=5)
+    model = FirstPrincipleModel(
+        parameters=GROUPS | {"ramp_deg": 1.0, "delay_samples": 1.5}, closed_deg=2.0, open_deg=60.0, substeps=5
+    )
     assert FirstPrincipleModel.from_toml(model.to_toml()) == model
+
+
+def test_a_first_principle_file_without_the_later_groups_is_read_as_it_was_meant() -> None:
+    later = ("stribeck_drop", "stribeck_deg_per_s", "ramp_deg", "delay_samples", "presliding_deg")
+    model = FirstPrincipleModel(parameters=GROUPS | {"ramp_deg": 0.4}, closed_deg=2.0, substeps=5)
+    lines = [line for line in model.to_toml().splitlines() if not line.startswith((*later, "sample_s"))]
+    at = lines.index("[settings]") + 1
+    old = "\n".join([*lines[:at], 'ramp_deg = { value = 0.4, unit = "deg" }', *lines[at:]])
+    read = FirstPrincipleModel.from_toml(old)
+    assert read == model
+    assert [read.parameters[name] for name in ("stribeck_drop", "delay_samples", "presliding_deg")] == [0.0, 0.0, 0.0]
+    with pytest.raises(DataError, match="tau_s"):
+        FirstPrincipleModel.from_toml("\n".join(line for line in lines if not line.startswith("tau_s")))
+
+
+def test_the_delay_of_a_first_principle_model_keeps_its_seconds() -> None:
+    model = FirstPrincipleModel(parameters=GROUPS | {"delay_samples": 2.0}, substeps=8)
+    fine, coarse = 5e-4 * np.arange(800), 1e-3 * np.arange(400)
+    duty = np.where(np.arange(400) < 50, 0.0, 0.3)
+    on_fine = model.simulate({"time_s": fine, "duty": np.repeat(duty, 2)})["angle_deg"].to_numpy()[::2]
+    on_coarse = model.simulate({"time_s": coarse, "duty": duty})["angle_deg"].to_numpy()
+    assert np.ptp(on_coarse) > 10.0
+    np.testing.assert_allclose(on_fine, on_coarse, atol=0.02)
+    with pytest.raises(ParameterError, match=r"delay_samples = 2 of 0\.001 s: at most 5 samples"):
+        model.simulate({"time_s": 2e-4 * np.arange(100), "duty": np.zeros(100)})
 
 
 def test_a_value_outside_its_domain_names_the_file(tmp_path: Path) -> None:
@@ -125,7 +154,7 @@ def test_a_value_outside_its_domain_names_the_file(tmp_path: Path) -> None:
 
 def test_a_file_of_a_model_is_loaded_whatever_its_kind(tmp_path: Path) -> None:
     for model in (
-        FirstPrincipleModel(parameters=GROUPS, closed_deg=2.0, open_deg=60.0, ramp_deg=1.0, substeps=5),
+        FirstPrincipleModel(parameters=GROUPS, closed_deg=2.0, open_deg=60.0, substeps=5),
         PseudoWiener("pw_r", {"delay_samples": 2.0}, switching="measured", friction="tanh"),
         PseudoWiener("pw_w"),
         PseudoWiener("pw_p", {"plays": 3.0}),

@@ -20,7 +20,7 @@ using namespace identify;  // NOLINT(google-build-using-namespace): this file bi
 using throttle::FirstPrinciple;
 using throttle::SmoothPlant;
 using Set = std::array<double, 10>;
-using Groups = std::array<double, 9>;
+using Groups = FirstPrincipleGroups;
 
 template <std::size_t n>
 std::vector<std::string> names_of(const std::array<std::string_view, n>& names) {
@@ -70,31 +70,31 @@ py::dict fit_smooth(const InputArray& duty, const InputArray& angle_deg, const s
                    });
 }
 
-FirstPrinciple groups_model(double closed_deg, double open_deg, double ramp_deg, int substeps) {
+FirstPrinciple groups_model(double closed_deg, double open_deg, int substeps) {
   FirstPrinciple model;
   model.closed_deg = closed_deg;
   model.open_deg = open_deg;
-  model.ramp_deg = ramp_deg;
   model.substeps = substeps;
   return model;
 }
 
-// (dt_s, duty, angle_deg, start, skip, estimate_start) per record.
-using RecordTuple = std::tuple<double, InputArray, InputArray, std::vector<double>, std::size_t, bool>;
+// (dt_s, duty, angle_deg, start, skip, free_start) per record.
+using RecordTuple =
+    std::tuple<double, InputArray, InputArray, std::vector<double>, std::size_t, std::vector<std::size_t>>;
 using StageTuple = std::tuple<std::vector<std::size_t>, std::vector<std::size_t>, double, double, int>;
 
 py::dict fit_groups(const std::vector<RecordTuple>& records, const std::vector<StageTuple>& stages,
-                    const std::vector<Groups>& starts, double closed_deg, double open_deg, double ramp_deg,
-                    int substeps, std::size_t n_threads) {
+                    const std::vector<Groups>& starts, double closed_deg, double open_deg, int substeps,
+                    std::size_t n_threads) {
   std::vector<SimulationRecord> data;
-  for (const auto& [dt_s, duty, angle, start, skip, estimate_start] : records) {
+  for (const auto& [dt_s, duty, angle, start, skip, free_start] : records) {
     SimulationRecord record;
     record.dt_s = dt_s;
     record.input = to_column(duty, "duty");
     record.output = to_column(angle, "angle_deg");
     record.start = start;
     record.skip = skip;
-    if (estimate_start) record.free_start = {0};
+    record.free_start = free_start;
     data.push_back(std::move(record));
   }
   std::vector<FitStage> plan;
@@ -104,7 +104,7 @@ py::dict fit_groups(const std::vector<RecordTuple>& records, const std::vector<S
     stage.search.max_iterations = max_iterations;
     plan.push_back(std::move(stage));
   }
-  const FirstPrinciple model = groups_model(closed_deg, open_deg, ramp_deg, substeps);
+  const FirstPrinciple model = groups_model(closed_deg, open_deg, substeps);
   return hand_over(interruptible([&](const std::stop_token& stop) {
                      for (FitStage& stage : plan)
                        stage.search.stop = stop;
@@ -122,9 +122,9 @@ py::dict fit_groups(const std::vector<RecordTuple>& records, const std::vector<S
 
 std::vector<double> simulate_groups(const Groups& values, const InputArray& duty, double step_s,
                                     const std::array<double, 3>& start, double closed_deg, double open_deg,
-                                    double ramp_deg, int substeps) {
+                                    int substeps) {
   const std::vector<double> u = to_column(duty, "duty");
-  const FirstPrinciple family = groups_model(closed_deg, open_deg, ramp_deg, substeps);
+  const FirstPrinciple family = groups_model(closed_deg, open_deg, substeps);
   family.validate();
   const py::gil_scoped_release release;
   return free_run(family, {values.begin(), values.end()}, {start.begin(), start.end()}, u, step_s);
@@ -154,15 +154,15 @@ void bind_throttle_fit(py::module_& m) {
         arg("supply_v"), arg("cost_tolerance"), arg("lanes"),
         "Staged fit of the ten parameters from every start; releases the GIL.");
   m.def("fit_throttle_groups", &fit_groups, arg("records"), py::kw_only(), arg("stages"), arg("starts"),
-        arg("closed_deg"), arg("open_deg"), arg("ramp_deg"), arg("substeps"), arg("n_threads"),
+        arg("closed_deg"), arg("open_deg"), arg("substeps"), arg("n_threads"),
         "Staged multi-start fit of the throttle groups; releases the GIL.");
   m.def(
       "simulate_throttle_groups",
       [](const Groups& values, const InputArray& duty, double step_s, const std::array<double, 3>& start, double closed,
-         double open, double ramp,
-         int substeps) { return to_array(simulate_groups(values, duty, step_s, start, closed, open, ramp, substeps)); },
+         double open,
+         int substeps) { return to_array(simulate_groups(values, duty, step_s, start, closed, open, substeps)); },
       arg("values"), arg("duty"), py::kw_only(), arg("step_s"), arg("start"), arg("closed_deg"), arg("open_deg"),
-      arg("ramp_deg"), arg("substeps"), "Angle [deg] on every sample; releases the GIL.");
+      arg("substeps"), "Angle [deg] on every sample; releases the GIL.");
   m.def(
       "throttle_group_bounds",
       [] {
@@ -171,7 +171,7 @@ void bind_throttle_fit(py::module_& m) {
           rows.append(p);
         return rows;
       },
-      "The nine groups with their bounds.");
+      "The groups with their bounds.");
 }
 
 }  // namespace mgdd::bindings

@@ -1,9 +1,11 @@
 // Binds include/mgdd/optimize: least squares for Python callables, its parameters, options and report.
+#include <optional>
 #include <string>
 
 #include "binding.hpp"
 #include "keywords.hpp"
 #include "mgdd/common/error.hpp"
+#include "mgdd/math/autocorrelation.hpp"
 #include "mgdd/optimize/least_squares/least_squares.hpp"
 #include "mgdd/optimize/least_squares/multi_start.hpp"
 
@@ -152,6 +154,12 @@ void bind_options(py::module_& m) {
 }
 
 void bind_report(py::module_& m) {
+  m.def(
+      "autocorrelation_time",
+      [](const Eigen::VectorXd& residual) {
+        return autocorrelation_time({residual.data(), static_cast<std::size_t>(residual.size())});
+      },
+      py::arg("residual"), "Integrated autocorrelation time of a residual about zero, in samples (Geyer 1992).");
   py::class_<FitReport>(m, "FitReport", "Result of a fit as the core gives it; `mgdd.optimize.FitReport` wraps it.")
       .def(py::init<>(), "A fit that has not been run.")
       .def_property_readonly("names", by_value(&FitReport::names), "Parameter names.")
@@ -166,6 +174,12 @@ void bind_report(py::module_& m) {
       .def_property_readonly("findings", by_value(&FitReport::findings), "Reasons behind `unidentifiable`.")
       .def_property_readonly("null_directions", by_value(&FitReport::null_directions),
                              "Columns: parameter changes that leave the residual as it is.")
+      .def_property_readonly(
+          "residual_blocks",
+          [](const FitReport& r) {
+            return std::isfinite(r.residual_blocks) ? std::optional(r.residual_blocks) : std::nullopt;
+          },
+          "Blocks that the standard errors count as independent; None where they count every residual.")
       .def_property_readonly("residual", by_value(&FitReport::residual), "Residual at the estimates.")
       .def_property_readonly("rmse", by_value(&FitReport::rmse), "Root mean square residual.")
       .def_property_readonly("cost", by_value(&FitReport::cost), "Half the sum of squares.")

@@ -6,7 +6,7 @@ import collections.abc
 import numpy
 import numpy.typing
 import typing
-__all__: list[str] = ['BoundedSeeking', 'ComponentLag', 'ExtremumSeeking', 'FitReport', 'GoldenSection', 'GradientDescent', 'IterativeLearning', 'LeastSquaresOptions', 'Limit', 'NewtonSeeking', 'Parameter', 'Spsa', 'latin_hypercube', 'least_squares', 'tune']
+__all__: list[str] = ['BoundedSeeking', 'ComponentLag', 'ExtremumSeeking', 'FitReport', 'GoldenSection', 'GradientDescent', 'IterativeLearning', 'LeastSquaresOptions', 'Limit', 'NewtonSeeking', 'Parameter', 'Spsa', 'autocorrelation_time', 'latin_hypercube', 'least_squares', 'tune']
 class Parameter:
     """
     One unknown of a fit: name, bounds, and whether it is searched as its log.
@@ -186,6 +186,11 @@ class FitReport:
     def residual(self) -> typing.Annotated[numpy.typing.NDArray[numpy.float64], "[m, 1]"]:
         """
         Residual at the estimates.
+        """
+    @property
+    def residual_blocks(self) -> float | None:
+        """
+        Blocks that the standard errors count as independent; None where they count every residual.
         """
     @property
     def rmse(self) -> float:
@@ -993,6 +998,10 @@ class IterativeLearning:
         """
         Number of the trial to come.
         """
+def autocorrelation_time(residual: typing.Annotated[numpy.typing.ArrayLike, numpy.float64, "[m, 1]"]) -> float:
+    """
+    Integrated autocorrelation time of a residual about zero, in samples (Geyer 1992).
+    """
 def latin_hypercube(parameters: collections.abc.Sequence[Parameter], n: typing.SupportsInt | typing.SupportsIndex, seed: typing.SupportsInt | typing.SupportsIndex) -> list[typing.Annotated[numpy.typing.NDArray[numpy.float64], "[m, 1]"]]:
     """
     Points between the bounds, one per cell of every axis.

@@ -12,7 +12,7 @@ from mgdd.cli.options import add_command
 from mgdd.cli.output import check_figure, check_output, emit, save_figure, wrote
 from mgdd.cli.throttle_files import add_log_options, log_of
 from mgdd.errors import ConvergenceError
-from mgdd.identify.throttle.fits import KINDS
+from mgdd.identify.throttle.fits import CHOICES
 from mgdd.optimize import FitOptions
 from mgdd.results.fit import figures_of
 
@@ -39,7 +39,9 @@ def add(verbs: Any) -> None:
         endings=".toml, the parameters, or .json",
     )  # fmt: skip
     fit.add_argument("file", metavar="FILE", help="log to fit: CSV, plain columns or .mat")
-    fit.add_argument("--model", choices=KINDS, default="pw_r", help="default: pw_r")
+    fit.add_argument(
+        "--model", choices=CHOICES, default="auto", help="default: auto, which says in its findings what it took"
+    )
     fit.add_argument("--test", metavar="FILE", help="log to test on, with the same columns")
     fit.add_argument(
         "--limp-home-deg", type=float, metavar="X", help="limp-home angle [deg] (default: from the log, or the model's)"
@@ -50,9 +52,8 @@ def add(verbs: Any) -> None:
     fit.add_argument(
         "--delay-samples",
         type=_counts,
-        default=0,
         metavar="N[,N...]",
-        help="samples until the duty acts; of several the best",
+        help="samples until the duty acts; of several the best (default: searched for the groups, 0 for pw_*)",
     )
     fit.add_argument("--seed", type=int, default=0, metavar="N", help="of the starts (default: 0)")
     fit.add_argument("--figure", metavar="FILE", help="draw the validation (.png, .svg or .pdf)")

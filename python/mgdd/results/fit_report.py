@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from mgdd import _core
-from mgdd.errors import ShapeError
+from mgdd.errors import ParameterError, ShapeError
 from mgdd.results.finding import Finding, findings_html
 from mgdd.results.labels import labelled_dataset, to_jsonable
 
@@ -37,8 +37,8 @@ class FitReport:
     values, lower, upper : ndarray, shape (n,)
         Estimates and bounds in the units of the parameters.
     stderr : ndarray, shape (n,)
-        Standard errors, same units. Infinite for a parameter in a null direction; NaN at a bound (it was
-        held, not estimated) and without degrees of freedom.
+        Standard errors, same units; `interval` turns them into confidence intervals. Infinite for a parameter in a null
+        direction; NaN at a bound (it was held, not estimated) and without degrees of freedom.
     bounds_active : ndarray of int, shape (n,)
         -1 at the lower bound, +1 at the upper, 0 free.
     covariance, correlation : ndarray, shape (n, n)
@@ -68,6 +68,8 @@ class FitReport:
         The status as a sentence.
     success : bool
         Whether a tolerance was met.
+    residual_blocks : float or None
+        Blocks of the record that `stderr` and `covariance` count as independent; None where they count every residual.
 
     See Also
     --------
@@ -106,6 +108,7 @@ class FitReport:
     status: str
     message: str
     success: bool
+    residual_blocks: float | None = None
 
     @classmethod
     def from_core(cls, core_report: _core.optimize.FitReport, data: ArrayLike | None = None) -> FitReport:
@@ -158,6 +161,7 @@ class FitReport:
             status=core_report.status,
             message=core_report.message,
             success=core_report.success,
+            residual_blocks=core_report.residual_blocks,
         )
 
     @property
@@ -169,6 +173,49 @@ class FitReport:
     def fun(self) -> NDArray[np.float64]:
         """Residual under SciPy's name; the same array as `residual`."""
         return self.residual
+
+    def interval(self, level: float = 0.95) -> dict[str, tuple[float, float]]:
+        """Turn the standard errors into confidence intervals.
+
+        Student's t with the degrees of freedom that the errors have: independent blocks less one where
+        `residual_blocks` counts them, otherwise residuals less parameters.
+
+        Parameters
+        ----------
+        level : float
+            Probability that an interval holds the true value, between 0 and 1 [-].
+
+        Returns
+        -------
+        dict of str to tuple of float
+            Lower and upper end by name, in the units of the parameters; NaN for a parameter at a bound.
+
+        Raises
+        ------
+        ParameterError
+            A level outside 0 to 1.
+
+        Examples
+        --------
+        >>> from mgdd.optimize import least_squares
+        >>> report = least_squares(lambda x: ([x[0] - 1.0, x[0] - 3.0, x[0] - 2.0], [[1], [1], [1]]), [0.0])
+        >>> low, high = report.interval()["x0"]
+        >>> round(low, 3), round(high, 3)
+        (-0.484, 4.484)
+        """
+        from scipy.stats import t
+
+        if not 0.0 < level < 1.0:
+            raise ParameterError.of("level", level, "between 0 and 1")
+        if self.residual_blocks is None:
+            freedom = float(self.residual.size - np.count_nonzero(self.bounds_active == 0))
+        else:
+            freedom = self.residual_blocks - 1.0
+        wide = float(t.ppf(0.5 + 0.5 * level, max(freedom, 1.0)))
+        return {
+            name: (float(value - wide * error), float(value + wide * error))
+            for name, value, error in zip(self.names, self.values, self.stderr, strict=True)
+        }
 
     def __repr__(self) -> str:
         text = f"<FitReport {self.status}, {len(self.names)} parameters, rmse={self.rmse:.6g}"

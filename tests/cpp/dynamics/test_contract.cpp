@@ -94,11 +94,17 @@ TEST(ModelContract, ThrottleModelsOnEveryScalar) {
   for (const double delay : {0.0, 2.0, 1.75}) {
     for (const auto friction : {Friction::coulomb, Friction::tanh}) {
       FirstPrinciple groups;
-      groups.delay_samples = delay;
       groups.friction = friction;
       Throttle t;
       t.preload_below_nm = 0.5;
-      expect_one_law(from_family(groups, first_principle_of(t), std::array{20.0, 0.0, 0.0}, 1e-3), u, 2e-2);
+      auto numbers = first_principle_of(t);
+      numbers[12] = delay;
+      for (const bool bends : {false, true}) {
+        numbers[9] = bends ? 0.3 : 0.0;  // drop, presliding and gap
+        numbers[13] = bends ? 0.15 : 0.0;
+        numbers[15] = bends ? 0.25 : 0.0;
+        expect_one_law(from_family(groups, numbers, std::array{20.0, 0.0, 0.0}, 1e-3), u, 2e-2);
+      }
       PwR r = pw_r_of(t);
       r.frame.delay_samples = delay;
       r.friction = friction;

@@ -78,6 +78,10 @@ TEST(Breakaway, JustBelowHoldsAndJustAboveMovesOnEveryModelAndSide) {
     }
     const auto groups = first_principle_of(uneven());
     expect_breakaway(FirstPrinciple{}.prepare<double>(groups, 1e-3), angle, 40);
+    Throttle dropping = uneven();
+    dropping.friction = Friction::stribeck;
+    dropping.stiction_nm = 0.33;
+    expect_breakaway(FirstPrinciple{}.prepare<double>(first_principle_of(dropping), 1e-3), angle, 40);
     PwR p = pw_r_of(uneven());
     expect_breakaway(PwRModel(p), angle, 40);
     p.frame.delay_samples = 2.5;

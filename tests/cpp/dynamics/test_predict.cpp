@@ -88,10 +88,9 @@ TEST(Predict, SlopesToMovesStateAndBiasAreExact) {
     p.frame.delay_samples = delay;
     const throttle::PwRModel pw_r(p);
     expect_exact<3>(pw_r, moving(pw_r));  // position, speed, bias
-    FirstPrinciple family;
-    family.delay_samples = delay;
-    const auto groups = throttle::first_principle_of(throttle::Throttle{});
-    const auto model = family.prepare<double>(groups, 2e-3);
+    auto groups = throttle::first_principle_of(throttle::Throttle{});
+    groups[12] = delay;
+    const auto model = FirstPrinciple{}.prepare<double>(groups, 2e-3);
     expect_exact<4>(model, moving(model));  // angle, speed, torque, bias
   }
   const Repeated<throttle::ThrottlePlant> plant{throttle::ThrottlePlant{throttle::Throttle{}}, 20};
@@ -180,8 +179,8 @@ TEST(Predict, FloatFollowsDouble) {
   p.frame.sample_s = 2e-3;
   expect_float_follows(throttle::PwRModel(p), throttle::BasicPwRModel<float>(throttle::lift<float>(p)));
   const auto values = throttle::first_principle_of(throttle::Throttle{});
-  std::array<float, 9> narrow{};
-  for (std::size_t i = 0; i < 9; ++i)
+  FirstPrinciple::Groups<float> narrow{};
+  for (std::size_t i = 0; i < narrow.size(); ++i)
     narrow[i] = static_cast<float>(values[i]);
   expect_float_follows(FirstPrinciple{}.prepare(values, 2e-3), FirstPrinciple{}.prepare(narrow, 2e-3));
 }

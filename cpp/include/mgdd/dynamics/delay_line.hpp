@@ -40,12 +40,13 @@ struct DelayLine {
     return acting;
   }
 
-  /// What acts at a delay that is itself a parameter: piecewise linear in it, so that it has a derivative.
+  /// What acts at a delay that is itself a parameter: piecewise linear in it, so that it has a derivative (at whole
+  /// samples that towards a longer delay). The same number as `pass` gives.
   MGDD_INLINE T at(const T& newest, const T& delay) const noexcept {
     T acting = newest + delay * (before[0] - newest);
     for (std::size_t i = 1; i < before.size(); ++i) {
       const T samples = T(static_cast<double>(i));
-      acting = select(delay <= samples, acting, before[i - 1] + (delay - samples) * (before[i] - before[i - 1]));
+      acting = select(delay < samples, acting, before[i - 1] + (delay - samples) * (before[i] - before[i - 1]));
     }
     return acting;
   }

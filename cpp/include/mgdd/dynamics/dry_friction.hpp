@@ -52,6 +52,26 @@ MGDD_INLINE T creep(const T& speed, const T& momentum, const C& level, const C& 
   return (momentum - level * t + slope * speed) / (divisor + slope);
 }
 
+/// Stiffness and damping of bristles: level per deflection, and per its rate.
+template <class C>
+struct Bristles {
+  C stiffness, damping;
+};
+
+/// The LuGre step, implicit in the deflection: `level` is the sliding friction at the speed before the step.
+template <class T, class L, class C, class D>
+MGDD_INLINE T bend_or_slide(const T& speed, const T& momentum, const L& level, const Bristles<C>& bristles,
+                            double step_s, const D& divisor, T& bristle) noexcept {
+  const T h = T(step_s);
+  const C per_h = bristles.damping / C(step_s);
+  const T size = larger(speed, -speed);
+  const T keep = T(1.0) / (T(1.0) + h * bristles.stiffness * size / level);
+  const T grip = (bristles.stiffness + per_h) * keep;
+  const T moved = (momentum - (grip - per_h) * bristle) / (divisor + grip * h);
+  bristle = keep * (bristle + h * moved);
+  return moved;
+}
+
 template <class C>
 struct FrictionLevels {
   C coulomb, stiction;
@@ -106,15 +126,9 @@ MGDD_INLINE T next_speed(Friction form, const FrictionLevels<C>& f, const Fricti
     }
     case Friction::tanh:
       return creep(speed, momentum, f.coulomb, shape.inverse_tanh, divisor);
-    case Friction::lugre: {
-      const T h = T(step_s);
-      const C per_h = shape.bristle_damping / C(step_s);
-      const T keep = T(1.0) / (T(1.0) + h * shape.bristle * size / stribeck_level(f, shape, speed));
-      const T grip = (shape.bristle + per_h) * keep;
-      const T moved = (momentum - (grip - per_h) * bristle) / (divisor + grip * h);
-      bristle = keep * (bristle + h * moved);
-      return moved;
-    }
+    case Friction::lugre:
+      return bend_or_slide(speed, momentum, stribeck_level(f, shape, speed),
+                           Bristles<C>{shape.bristle, shape.bristle_damping}, step_s, divisor, bristle);
   }
   return zero;
 }

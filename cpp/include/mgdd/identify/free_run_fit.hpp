@@ -59,14 +59,7 @@ FreeRunFit fit_free_run(const Model& model, const std::vector<double>& base, con
     indices.push_back(i);
     unknowns.push_back(optimize::parameter_of(Model::parameters[i], name));
   }
-  for (std::size_t r = 0; r < records.size(); ++r) {
-    for (const std::size_t s : records[r].free_start) {
-      if (s >= Model::start_numbers.size()) throw about("free_start", ShapeError("free_start: no such state"));
-      const FieldInfo& state = Model::start_numbers[s];
-      const std::string suffix = records.size() > 1 ? "_" + std::to_string(r) : "";
-      unknowns.push_back(optimize::parameter_of(state, "start_" + std::string(state.name) + suffix));
-    }
-  }
+  append_start_numbers<Model>(unknowns, records);
   OutputError<Model> residual(model, parameters, std::move(indices), std::move(records));
   optimize::LeastSquares search(std::move(unknowns), residual.n_residuals(), options);
   FreeRunFit fit;

@@ -15,6 +15,7 @@
 #include "mgdd/common/bounds.hpp"
 #include "mgdd/common/error.hpp"
 #include "mgdd/dynamics/sensitivity.hpp"
+#include "mgdd/optimize/least_squares/parameter.hpp"
 
 namespace mgdd::identify {
 
@@ -257,5 +258,19 @@ class OutputError {
   Eigen::Index n_unknowns_ = 0;
   Eigen::Index n_residuals_ = 0;
 };
+
+/// The free start numbers of the records as unknowns of a search, after the parameters: `start_angle_deg`, with the
+/// number of the record where there are several. ShapeError for a number that the family does not have.
+template <dynamics::DescribedFamily Family>
+void append_start_numbers(std::vector<optimize::Parameter>& unknowns, const std::vector<SimulationRecord>& records) {
+  for (std::size_t r = 0; r < records.size(); ++r) {
+    const std::string suffix = records.size() > 1 ? "_" + std::to_string(r) : "";
+    for (const std::size_t s : records[r].free_start) {
+      if (s >= Family::start_numbers.size()) throw about("free_start", ShapeError("free_start: no such state"));
+      const FieldInfo& state = Family::start_numbers[s];
+      unknowns.push_back(optimize::parameter_of(state, "start_" + std::string(state.name) + suffix));
+    }
+  }
+}
 
 }  // namespace mgdd::identify

@@ -10,6 +10,7 @@
 
 #include "mgdd/common/error.hpp"
 #include "mgdd/identify/output_error.hpp"
+#include "mgdd/optimize/least_squares/block_sandwich.hpp"
 #include "mgdd/optimize/least_squares/fit_report.hpp"
 #include "mgdd/optimize/least_squares/least_squares.hpp"
 #include "mgdd/optimize/least_squares/parameter.hpp"
@@ -24,9 +25,22 @@ struct FitStage {
   optimize::LeastSquaresOptions search{};
 };
 
+/// The rows that each record has in a residual.
+inline std::vector<optimize::ResidualRecord> residual_records(const std::vector<SimulationRecord>& records) {
+  std::vector<optimize::ResidualRecord> out;
+  Eigen::Index first = 0;
+  for (const SimulationRecord& record : records) {
+    const auto rows = static_cast<Eigen::Index>(record.output.size() - record.skip);
+    out.push_back({first, rows, record.dt_s});
+    first += rows;
+  }
+  return out;
+}
+
 /// Stages one after the other, each from where the last one ended. `parameters` describes every model parameter;
-/// `values` comes in as the start and goes out as the estimate. Returns the report of the last stage.
-template <dynamics::ModelFamily Model>
+/// `values` comes in as the start and goes out as the estimate. Returns the report of the last stage; its
+/// standard errors count the correlation of the residual.
+template <dynamics::DescribedFamily Model>
 optimize::FitReport fit_in_stages(const Model& model, const std::vector<optimize::Parameter>& parameters,
                                   const std::vector<SimulationRecord>& records, const std::vector<FitStage>& stages,
                                   Values<double, Model::n_parameters>& values) {
@@ -50,15 +64,16 @@ optimize::FitReport fit_in_stages(const Model& model, const std::vector<optimize
     std::vector<optimize::Parameter> unknowns;
     for (const std::size_t i : stage.free)
       unknowns.push_back(parameters.at(i));
-    for (std::size_t r = 0; r < chosen.size(); ++r) {
-      for (const std::size_t s : chosen[r].free_start)
-        unknowns.push_back({.name = "start_" + std::to_string(s) + "[" + std::to_string(r) + "]"});
-    }
+    append_start_numbers<Model>(unknowns, chosen);
     OutputError<Model> residual(model, values, stage.free, std::move(chosen));
     optimize::LeastSquares search(unknowns, residual.n_residuals(), stage.search);
     report = search.solve(residual, residual.start());
     values = residual.parameters(report.values);
-    if (report.status == optimize::FitStatus::interrupted) break;
+    const bool interrupted = report.status == optimize::FitStatus::interrupted;
+    if ((interrupted || &stage == &stages.back()) && std::isfinite(report.cost)) {
+      optimize::block_sandwich(report, search.jacobian(), residual_records(residual.records()));
+    }
+    if (interrupted) break;
   }
   return report;
 }

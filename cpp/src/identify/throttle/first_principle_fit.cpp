@@ -12,20 +12,24 @@ std::vector<optimize::Parameter> first_principle_parameters() {
   std::vector<optimize::Parameter> out;
   for (const FieldInfo& field : FirstPrinciple::parameters)
     out.push_back(optimize::parameter_of(field, std::string(field.name)));
+  // Without presliding friction is another law: a search does not cross over.
+  optimize::Parameter& presliding = out[13];
+  presliding.lower = 0.01;
+  presliding.log_scaled = true;
   return out;
 }
 
 FirstPrincipleFit fit_first_principle(const FirstPrinciple& model, const std::vector<SimulationRecord>& records,
-                                      const std::vector<FitStage>& stages, const std::vector<Values<double, 9>>& starts,
-                                      std::size_t n_threads) {
+                                      const std::vector<FitStage>& stages,
+                                      const std::vector<FirstPrincipleGroups>& starts, std::size_t n_threads) {
   model.validate();
   const std::vector<optimize::Parameter> parameters = first_principle_parameters();
-  for (const Values<double, 9>& start : starts) {
+  for (const FirstPrincipleGroups& start : starts) {
     for (std::size_t i = 0; i < start.size(); ++i)
       require_in(FirstPrinciple::parameters[i], start[i]);
   }
   std::vector<Eigen::VectorXd> indices;  // which start: each thread then owns its entry of `ends`
-  std::vector<Values<double, 9>> ends = starts;
+  std::vector<FirstPrincipleGroups> ends = starts;
   for (std::size_t i = 0; i < starts.size(); ++i)
     indices.push_back(Eigen::VectorXd::Constant(1, static_cast<double>(i)));
   FirstPrincipleFit fit;

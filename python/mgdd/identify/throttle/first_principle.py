@@ -2,35 +2,25 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from typing import TYPE_CHECKING
 
-import numpy as np
-
 from mgdd import _core
-from mgdd.errors import DataError, ParameterError, argument, hand_over, or_partial
-from mgdd.identify.throttle.first_principle_model import GROUP_NAMES, TYPICAL, FirstPrincipleModel
-from mgdd.identify.throttle.first_principle_start import (
-    SIDE_DEG,
-    group_starts,
-    regression_start,
-    rest_angle,
-)
-from mgdd.identify.throttle.free_run import LOG_COLUMNS, draw_free_run, free_run, quality_of, source_of
+from mgdd.errors import ParameterError, hand_over, or_partial
+from mgdd.identify.throttle.first_principle_model import GROUP_NAMES, FirstPrincipleModel
+from mgdd.identify.throttle.first_principle_problem import groups_problem, log_columns
+from mgdd.identify.throttle.first_principle_start import group_starts
+from mgdd.identify.throttle.free_run import draw_free_run, free_run, quality_of, source_of
 from mgdd.optimize.fit_options import FitOptions, fit_options
 from mgdd.results import Finding, Fit, FitReport
-from mgdd.signals.even_grid import even_step
-from mgdd.signals.model import columns_of
 
 if TYPE_CHECKING:
     import xarray as xr
-    from numpy.typing import NDArray
 
 __all__ = ["fit_first_principle"]
 
-ABOVE = ("beta_above_duty", "kappa_above_duty_per_deg")
-BELOW = ("beta_below_duty", "kappa_below_duty_per_deg")
-SIDE_S = 0.3  # shorter visits cannot settle a side's two parameters
+STATIC = (*GROUP_NAMES[2:7], "limp_home_deg")
+SUBSTEPS = 4  # 0.25 ms at 1 kHz: the lag is then met within 5 %
 
 
 def fit_first_principle(
@@ -39,7 +29,7 @@ def fit_first_principle(
     test: xr.Dataset | None = None,
     start_values: Mapping[str, float] | None = None,
     fixed: Mapping[str, float] | None = None,
-    electrical: bool = False,
+    free: Sequence[str] = (),
     closed_deg: float = 0.0,
     open_deg: float = 90.0,
     options: FitOptions | None = None,
@@ -69,8 +59,9 @@ def fit_first_principle(
         Start values of some groups; taken as they are instead of the regression.
     fixed : mapping of str to float, optional
         Groups that are known and not estimated.
-    electrical : bool
-        Also estimate ``electrical_s`` (L/R).
+    free : sequence of str, optional
+        Further groups to estimate: ``electrical_s ramp_deg stribeck_drop stribeck_deg_per_s presliding_deg
+        presliding_damping half_gap_deg delay_samples``. Otherwise they keep their start values.
     closed_deg, open_deg : float
         Mechanical stops [deg].
     options : FitOptions, optional
@@ -110,58 +101,15 @@ def fit_first_principle(
     True
     """
     chosen = fit_options(options, n_starts=4, seed=0, max_iterations=60, tolerance=1e-10)
-    n_starts = chosen.n_starts
-    time, duty, angle = _columns(log)
+    problem = groups_problem(log, free=free, start_values=start_values, fixed=fixed, stops_deg=(closed_deg, open_deg))
     if test is not None:
-        _columns(test)
-    step_s = even_step(time, remedy=f"read_throttle_log(..., {argument('step_s', '{step:g}')}) resamples")
-    for name in [*(start_values or {}), *(fixed or {})]:
-        if name not in GROUP_NAMES:
-            raise ParameterError(f"{name!r}: no throttle group; they are {', '.join(GROUP_NAMES)}")
+        log_columns(test)
     if threads < 1:
         raise ParameterError.of("threads", threads, ">= 1")
-    if np.ptp(angle) < 1.0:
-        raise DataError(f"angle_deg moves by {np.ptp(angle):.3g} deg: drive the plate, mgdd.identify.design_excitation")
-    values = dict(TYPICAL)
-    values["limp_home_deg"] = rest_angle(step_s, duty, angle, values["limp_home_deg"])
-    values |= {name: float(value) for name, value in {**(start_values or {}), **(fixed or {})}.items()}
-    findings: list[Finding] = []
-    unvisited: list[str] = []
-    free = [name for name in GROUP_NAMES if name not in (fixed or {})]
-    if not electrical and "electrical_s" in free:
-        free.remove("electrical_s")
-    sides = {
-        "above": (angle > values["limp_home_deg"] + SIDE_DEG, ABOVE),
-        "below": (angle < values["limp_home_deg"] - SIDE_DEG, BELOW),
-    }
-    for side, (visited, names) in sides.items():
-        if np.count_nonzero(visited) * step_s < SIDE_S:
-            gone = [name for name in (*names, "limp_home_deg") if name in free]
-            free = [name for name in free if name not in gone]
-            unvisited += gone
-            findings.append(
-                Finding(
-                    "start_value_kept",
-                    tuple(gone),
-                    f"the plate spends less than {SIDE_S:g} s {side} limp-home ({values['limp_home_deg']:.3g} deg): "
-                    f"{', '.join(gone) or 'that side'} kept at the start value",
-                    "use an excitation across limp-home",
-                )
-            )
-    if start_values is None:
-        values |= regression_start(step_s, duty, angle, values, free, closed_deg, open_deg)
-    bounds = {parameter.name: parameter for parameter in _core.identify.throttle_group_bounds()}
-    for name, value in values.items():
-        low, high = bounds[name].lower, bounds[name].upper
-        if (name in (start_values or {}) or name in (fixed or {})) and not low <= value <= high:
-            raise ParameterError.of(name, value, f"within [{low:g}, {high:g}]")
-        values[name] = min(max(value, low), high)
     index = {name: i for i, name in enumerate(GROUP_NAMES)}
-    static = [index[name] for name in free if name not in ("tau_s", "gain_deg_per_s2_per_duty", "electrical_s")]
-    dynamics = [index[name] for name in free if name in ("tau_s", "gain_deg_per_s2_per_duty")]
-    everything = [index[name] for name in free]
-    if not everything:
-        raise ParameterError("fixed: nothing is left to estimate")
+    static = [index[name] for name in problem.free if name in STATIC]
+    dynamics = [index[name] for name in problem.free if name in ("tau_s", "gain_deg_per_s2_per_duty")]
+    everything = [index[name] for name in problem.free]
     stages: list[tuple[list[int], list[int], float, float, int]] = [
         (part, [], fraction, tolerance, chosen.max_iterations)
         for part, fraction, tolerance in (
@@ -170,24 +118,28 @@ def fit_first_principle(
             (everything, 0.25, 1e-4),
             (everything, 1.0, chosen.tolerance),
         )
-        if part and (fraction == 1.0 or fraction * time.size >= 200)
+        if part and (fraction == 1.0 or fraction * problem.angle.size >= 200)
     ]
     found, stop = or_partial(
         lambda: _core.identify.fit_throttle_groups(
-            [(step_s, np.clip(duty, -1.0, 1.0), angle, [float(angle[0]), 0.0, 0.0], 0, False)],
+            [problem.record()],
             stages=stages,
-            starts=group_starts(values, free, bounds, n_starts, chosen.seed),
+            starts=group_starts(problem.values, list(problem.free), chosen.n_starts, chosen.seed),
             closed_deg=closed_deg,
             open_deg=open_deg,
-            ramp_deg=0.25,
-            substeps=2,
+            substeps=SUBSTEPS,
             n_threads=threads,
         )
     )
-    report = FitReport.from_core(found["reports"][found["best"]], angle)
+    report = FitReport.from_core(found["reports"][found["best"]], problem.angle)
     model = FirstPrincipleModel(
-        parameters=dict(zip(GROUP_NAMES, found["values"], strict=True)), closed_deg=closed_deg, open_deg=open_deg
+        parameters=dict(zip(GROUP_NAMES, found["values"], strict=True)),
+        closed_deg=closed_deg,
+        open_deg=open_deg,
+        substeps=SUBSTEPS,
+        sample_s=problem.step_s,
     )
+    findings = [*problem.findings]
     findings += report.findings
     if supply_v is None or resistance_ohm is None or (inertia_kgm2 is None) == (torque_constant_nm_per_a is None):
         findings.append(
@@ -214,7 +166,7 @@ def fit_first_principle(
         kind=model.kind,
         train=quality_of([run]),
         test=None if test is None else quality_of([free_run(model, test)]),
-        unidentifiable=(*unvisited, *report.unidentifiable),
+        unidentifiable=(*problem.unvisited, *report.unidentifiable),
         findings=tuple(findings),
         source=source_of(log),
         start_rmse=tuple(sorted(float(one.rmse) for one in found["reports"])),
@@ -223,10 +175,3 @@ def fit_first_principle(
         draw=draw_free_run,
     )
     return hand_over(fit, stop)
-
-
-def _columns(log: xr.Dataset) -> list[NDArray[np.float64]]:
-    columns = columns_of(log, LOG_COLUMNS)
-    if columns[0].size < 100:
-        raise DataError(f"log has {columns[0].size} samples: at least 100 are needed")
-    return columns

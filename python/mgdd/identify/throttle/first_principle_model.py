@@ -13,7 +13,7 @@ import numpy as np
 from mgdd import _core
 from mgdd.errors import ParameterError
 from mgdd.io.model_parameters import ModelParameters
-from mgdd.io.parameters import Wanted, wanted
+from mgdd.io.parameters import FIT_NOTES, ParameterFile, Wanted, wanted
 from mgdd.results.describe import described
 from mgdd.signals.model import RunInputs, SampledModel
 
@@ -24,27 +24,49 @@ if TYPE_CHECKING:
 __all__ = ["FirstPrincipleModel"]
 
 GROUP_NAMES = tuple(_core.identify.group_names)
+# What a throttle need not have: without a word its friction does not drop or bend, its gear has no gap and
+# its duty acts at once.
+REFINEMENTS = MappingProxyType(
+    {
+        "stribeck_drop": 0.0,
+        "stribeck_deg_per_s": 15.0,
+        "ramp_deg": 0.25,
+        "delay_samples": 0.0,
+        "presliding_deg": 0.0,
+        "presliding_damping": 0.5,
+        "half_gap_deg": 0.0,
+    }
+)
+_NEEDED = tuple(name for name in GROUP_NAMES if name not in REFINEMENTS)
 # Groups of a typical passenger-car throttle, the start of a fit.
-TYPICAL = MappingProxyType(dict(zip(GROUP_NAMES, (0.03, 5e4, 0.1, 1e-3, 0.05, 0.1, 1e-3, 8.0, 0.0), strict=True)))
+TYPICAL = MappingProxyType(
+    dict(zip(_NEEDED, (0.03, 5e4, 0.1, 1e-3, 0.05, 0.1, 1e-3, 8.0, 0.0), strict=True)) | REFINEMENTS
+)
+_POSITIVE = ("tau_s", "gain_deg_per_s2_per_duty", "stribeck_deg_per_s", "ramp_deg")
+_LONGEST_DELAY = 5.0
 
 
 @described
 @dataclass(frozen=True, kw_only=True)
 class FirstPrincipleModel(SampledModel, ModelParameters):
-    """Throttle in groups: set-valued friction, springs with preload on both sides, motor as a torque source.
+    """Throttle in groups: dry friction, springs with preload on both sides, motor as a torque source with a lag.
 
     Parameters
     ----------
     parameters : mapping of str to float, optional
         ``tau_s``, ``gain_deg_per_s2_per_duty``, preload ``beta_above_duty`` / ``beta_below_duty``, stiffness
         ``kappa_above_duty_per_deg`` / ``kappa_below_duty_per_deg``, friction ``delta_duty``, ``limp_home_deg`` and
-        ``electrical_s`` (L/R, 0 for none); those of a typical passenger-car throttle without.
+        ``electrical_s`` (L/R, 0 for none); those of a typical passenger-car throttle without. Further, if they are
+        given: ``stribeck_drop`` (static over sliding friction, less one; 0) and ``stribeck_deg_per_s`` (speed over
+        which it drops), ``ramp_deg`` (half width of the preload's ramp at limp-home; 0.25), ``delay_samples`` of the
+        duty (0 to 5; 0), ``presliding_deg`` (LuGre deflection at which friction is full; 0 for none) and
+        ``presliding_damping`` (ratio; 0.5), ``half_gap_deg`` (of the gap between motor and plate; 0).
     closed_deg, open_deg : float
         Mechanical stops [deg].
-    ramp_deg : float
-        Half width of the preload's ramp at limp-home [deg].
     substeps : int
         Steps per sample.
+    sample_s : float
+        Sample time that the delay counts [s].
 
     Examples
     --------
@@ -56,7 +78,10 @@ class FirstPrincipleModel(SampledModel, ModelParameters):
 
     kind = "first_principle"
     parameter_names = GROUP_NAMES
-    settings = MappingProxyType(wanted(("closed_deg", "open_deg", "ramp_deg")) | {"substeps": Wanted(form="integer")})
+    settings = MappingProxyType(
+        wanted(("closed_deg", "open_deg"))
+        | {"substeps": Wanted(form="integer"), "sample_s": Wanted("s", required=False)}
+    )
     input_names = ("duty",)
     output_name = observed_state = "angle_deg"
     state_names = ("angle_deg", "speed_deg_per_s", "lagged_duty")
@@ -64,20 +89,25 @@ class FirstPrincipleModel(SampledModel, ModelParameters):
     parameters: Mapping[str, float] = field(default_factory=lambda: dict(TYPICAL))
     closed_deg: float = 0.0
     open_deg: float = 90.0
-    ramp_deg: float = 0.25
     substeps: int = 2
+    sample_s: float = 1e-3
 
     def __post_init__(self) -> None:
-        missing = set(GROUP_NAMES) - set(self.parameters)
+        missing = set(_NEEDED) - set(self.parameters)
         if missing:
             raise ParameterError(f"parameters: {', '.join(sorted(missing))} missing")
-        ordered = {name: float(self.parameters[name]) for name in GROUP_NAMES}
+        given = {**REFINEMENTS, **self.parameters}
+        ordered = {name: float(given[name]) for name in GROUP_NAMES}
         for name, value in ordered.items():
             if not math.isfinite(value):
                 raise ParameterError.of(name, value, "finite")
-            positive = name in ("tau_s", "gain_deg_per_s2_per_duty")
+            positive = name in _POSITIVE
             if name != "limp_home_deg" and not (value > 0.0 if positive else value >= 0.0):
                 raise ParameterError.of(name, value, f"{('>' if positive else '>=')} 0")
+        if ordered["delay_samples"] > _LONGEST_DELAY:
+            raise ParameterError.of("delay_samples", ordered["delay_samples"], f"<= {_LONGEST_DELAY:g}")
+        if not (math.isfinite(self.sample_s) and self.sample_s > 0.0):
+            raise ParameterError.of("sample_s", self.sample_s, "> 0")
         if not self.closed_deg < self.open_deg:
             raise ParameterError.of("open_deg", self.open_deg, f"above closed_deg = {self.closed_deg:.12g}")
         object.__setattr__(self, "parameters", MappingProxyType(ordered))
@@ -86,13 +116,47 @@ class FirstPrincipleModel(SampledModel, ModelParameters):
         return [self.parameters["limp_home_deg"], 0.0, 0.0]
 
     def _run(self, run: RunInputs) -> NDArray[np.float64]:
+        values = dict(self.parameters)
+        if not math.isclose(run.step_s, self.sample_s, rel_tol=1e-6):  # the delay keeps its seconds
+            values["delay_samples"] *= self.sample_s / run.step_s
+            if values["delay_samples"] > _LONGEST_DELAY:
+                raise ParameterError(
+                    f"delay_samples = {self.parameters['delay_samples']:g} of {self.sample_s:g} s: at most "
+                    f"{_LONGEST_DELAY:g} samples of this run, {run.step_s:g} s"
+                )
         return _core.identify.simulate_throttle_groups(
-            list(self.parameters.values()),
+            list(values.values()),
             np.clip(run.columns[0], -1.0, 1.0),
             step_s=run.step_s,
             start=run.state,
-            **{name: getattr(self, name) for name in self.settings},
+            closed_deg=self.closed_deg,
+            open_deg=self.open_deg,
+            substeps=self.substeps,
         )
+
+    @classmethod
+    def from_parameters(cls, file: ParameterFile) -> FirstPrincipleModel:
+        """Make the model of a file that `to_toml` or a fit wrote; older ones have fewer groups, the ramp as a setting.
+
+        Parameters
+        ----------
+        file : ParameterFile
+            The file.
+
+        Returns
+        -------
+        FirstPrincipleModel
+            What older files do not name is not there: no drop, no presliding, no delay.
+        """
+        file.expect(kinds=(cls.kind,), tables=("parameters", "settings", "fit?"), notes=FIT_NOTES)
+        names = wanted(cls.parameter_names)
+        may_lack = {name: want._replace(required=False) for name, want in names.items() if name in REFINEMENTS}
+        values = file.values("parameters", names | may_lack)
+        settings = file.values("settings", {**cls.settings, "ramp_deg": names["ramp_deg"]._replace(required=False)})
+        ramp = settings.pop("ramp_deg", None)
+        if ramp is not None:
+            values.setdefault("ramp_deg", ramp)
+        return cls(parameters=values, **settings)
 
     def physical_parameters(
         self,

@@ -14,18 +14,20 @@ from mgdd.identify.throttle.first_principle_model import GROUP_NAMES
 if TYPE_CHECKING:
     from numpy.typing import NDArray
 
+IDLE_DUTY = 0.03  # less than any plate needs to move
 SIDE_DEG = 1.0  # beyond it a sample belongs to one side of limp-home
 
 
 def rest_angle(step_s: float, duty: NDArray[np.float64], angle: NDArray[np.float64], otherwise: float) -> float:
     """Angle at the end of the longest rest without duty, if it lasts half a second.
 
-    Failing that, the first angle of a record that starts at rest and stays on one side of it; failing that,
-    `otherwise`.
+    Failing that, the first angle of a record that starts at rest and either without duty or never to cross it; failing
+    that, `otherwise`.
     """
-    first = angle[: max(2, round(0.01 / step_s))]
-    home = float(np.median(first))
-    if np.ptp(first) < 0.5 and (angle.min() > home - SIDE_DEG or angle.max() < home + SIDE_DEG):
+    first = slice(0, max(2, round(0.01 / step_s)))
+    home = float(np.median(angle[first]))
+    idle = bool((np.abs(duty[first]) < IDLE_DUTY).all())
+    if np.ptp(angle[first]) < 0.5 and (idle or angle.min() > home - SIDE_DEG or angle.max() < home + SIDE_DEG):
         otherwise = home
     edges = np.flatnonzero(np.diff(np.concatenate([[0], (np.abs(duty) < 0.01).astype(int), [0]])))
     begins, ends = edges[::2], edges[1::2]
@@ -92,11 +94,11 @@ def regression_start(
 def group_starts(
     values: Mapping[str, float],
     free: list[str],
-    bounds: Mapping[str, _core.optimize.Parameter],
     n_starts: int,
     seed: int,
 ) -> list[list[float]]:
     """Spread the free groups that are searched as logarithms from half to twice their first value."""
+    bounds = {parameter.name: parameter for parameter in _core.identify.throttle_group_bounds()}
     box = [
         _core.optimize.Parameter(
             name=name,

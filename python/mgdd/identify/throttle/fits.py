@@ -6,7 +6,8 @@ from dataclasses import replace
 from typing import TYPE_CHECKING
 
 from mgdd.errors import ParameterError
-from mgdd.identify.throttle.first_principle import fit_first_principle
+from mgdd.identify.throttle.automatic import fit_groups
+from mgdd.identify.throttle.choice import fit_auto
 from mgdd.identify.throttle.first_principle_model import FirstPrincipleModel
 from mgdd.identify.throttle.pseudo_wiener_fit import fit_pseudo_wiener
 from mgdd.io.parameters import ParameterFile
@@ -21,10 +22,12 @@ if TYPE_CHECKING:
 
     from mgdd.results import Fit, Model
 
-__all__ = ["KINDS", "check_kind", "fit_kind", "load_throttle_model"]
+__all__ = ["CHOICES", "KINDS", "PSEUDO_WIENER", "check_kind", "fit_kind", "load_throttle_model"]
 
-KINDS = ("first_principle", "pw_r", "pw_w", "pw_p")
-_WORTH = 0.97
+PSEUDO_WIENER = ("pw_r", "pw_w", "pw_p")
+KINDS = ("first_principle", *PSEUDO_WIENER)
+CHOICES = ("auto", *KINDS)
+_DELAYS = (0.0, 1.0, 2.0, 3.0, 4.0, 5.0)
 
 
 def fit_kind(
@@ -33,37 +36,39 @@ def fit_kind(
     *,
     limp_home_deg: float | None,
     two_sided: bool,
-    delay_samples: float | Sequence[float],
+    delay_samples: float | Sequence[float] | None,
     stops_deg: tuple[float, float],
     options: FitOptions | None,
 ) -> Fit:
     """Fit a kind with what the front knows; what is None keeps the fit's own default."""
-    closed, opened = stops_deg
-    if kind == "first_principle":
+    if kind not in PSEUDO_WIENER:
         fixed = None if limp_home_deg is None else {"limp_home_deg": limp_home_deg}
-        fits = [
-            fit_first_principle(
-                log, fixed=fixed, electrical=electrical, options=options, closed_deg=closed, open_deg=opened,
-            )
-            for electrical in (False, True)
-        ]  # fmt: skip
-        # A lag of the current that only follows the noise is left out: one number less to carry over.
-        return fits[1] if fits[1].report.rmse < _WORTH * fits[0].report.rmse else fits[0]
+        fit = fit_auto if kind == "auto" else fit_groups
+        delays = _DELAYS if delay_samples is None else delays_of(delay_samples)
+        return fit(log, fixed=fixed, delays=delays, stops_deg=stops_deg, options=options)
+    closed, opened = stops_deg
     sides = "both" if two_sided else "shared"
     return fit_pseudo_wiener(
-        log, kind, limp_home_deg=limp_home_deg, sides=sides, delay_samples=delay_samples, options=_seeded(options),
-        settings={"closed_deg": closed, "open_deg": opened},
+        log, kind, limp_home_deg=limp_home_deg, sides=sides, delay_samples=delay_samples or 0,
+        options=_seeded(options), settings={"closed_deg": closed, "open_deg": opened},
     )  # fmt: skip
 
 
-def check_kind(kind: str, *, two_sided: bool, delay_samples: float | Sequence[float]) -> None:
+def check_kind(kind: str, *, two_sided: bool, delay_samples: float | Sequence[float] | None) -> None:
     """Refuse what the kind does not have, before the log is looked at."""
     if two_sided and kind in ("pw_w", "pw_p"):
         raise ParameterError(f"two_sided = True: {kind} has one set of parameters; only pw_r has one per side")
-    if kind == "first_principle" and delay_samples not in (0, (0,), [0]):
-        raise ParameterError(
-            f"delay_samples = {delay_samples!r}: the first-principle groups have none; pw_r, pw_w and pw_p do"
-        )
+    for delay in () if delay_samples is None else delays_of(delay_samples):
+        if not _DELAYS[0] <= delay <= _DELAYS[-1]:
+            raise ParameterError.of("delay_samples", delay, f"within [{_DELAYS[0]:g}, {_DELAYS[-1]:g}]")
+
+
+def delays_of(delay_samples: float | Sequence[float]) -> tuple[float, ...]:
+    """Return the delays that were asked for, at least one."""
+    delays = (delay_samples,) if isinstance(delay_samples, int | float) else tuple(delay_samples)
+    if not delays:
+        raise ParameterError("delay_samples = (): must be at least one delay")
+    return tuple(float(delay) for delay in delays)
 
 
 def load_throttle_model(path: str | os.PathLike[str]) -> Model:

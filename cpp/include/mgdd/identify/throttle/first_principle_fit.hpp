@@ -11,16 +11,18 @@
 
 namespace mgdd::identify {
 
-/// Bounds of the nine groups; all are searched as logarithms but the limp-home angle and the electrical time.
+using FirstPrincipleGroups = throttle::FirstPrinciple::Groups<double>;
+
+/// Bounds of the groups in a search: their domains, and for the presliding what still bends.
 std::vector<optimize::Parameter> first_principle_parameters();
 
 /// Staged fit from every start; values of the best start and all reports (last stage).
 struct FirstPrincipleFit {
-  Values<double, 9> values{};
+  FirstPrincipleGroups values{};
   optimize::MultiStartFit starts;
 };
 FirstPrincipleFit fit_first_principle(const throttle::FirstPrinciple& model,
                                       const std::vector<SimulationRecord>& records, const std::vector<FitStage>& stages,
-                                      const std::vector<Values<double, 9>>& starts, std::size_t n_threads);
+                                      const std::vector<FirstPrincipleGroups>& starts, std::size_t n_threads);
 
 }  // namespace mgdd::identify

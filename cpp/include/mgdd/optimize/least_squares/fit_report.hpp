@@ -48,12 +48,15 @@ struct FitReport {
   Eigen::VectorXd lower;
   Eigen::VectorXd upper;
   Eigen::VectorXi bounds_active;  ///< -1 at the lower bound, +1 at the upper, 0 free
-  Eigen::MatrixXd covariance;     ///< s^2 (J^T J)^-1 over the free parameters, s^2 = 2 cost / (n_residuals - rank)
+  Eigen::MatrixXd covariance;     ///< s^2 (J^T J)^-1 over the free parameters, s^2 = 2 cost / (n_residuals - rank);
+                                  ///< of a correlated residual by `block_sandwich`
   Eigen::MatrixXd correlation;    ///< for a null direction its limit: +-1 between parameters that trade exactly
   std::vector<std::string> unidentifiable;  ///< names that the data do not determine, in the order of `names`
   std::vector<std::string> findings;        ///< one sentence per reason behind `unidentifiable`
   Eigen::MatrixXd null_directions;          ///< columns: parameter changes, largest 1, that leave the residual as it is
   Eigen::VectorXd residual;                 ///< at `values`
+  /// Blocks that the standard errors count as independent; NaN where they count every residual.
+  double residual_blocks = std::numeric_limits<double>::quiet_NaN();
   double rmse = std::numeric_limits<double>::quiet_NaN();  ///< sqrt(mean r^2)
   double cost = std::numeric_limits<double>::quiet_NaN();  ///< sum r^2 / 2
   int nfev = 0;                                            ///< residual evaluations

@@ -85,6 +85,8 @@ class LeastSquares {
   /// caller.
   [[nodiscard]] FitReport report() const;
 
+  /// d residual / d parameter at the point of the report, in the caller's units.
+  [[nodiscard]] const Eigen::MatrixXd& jacobian() const noexcept { return jacobian_; }
   [[nodiscard]] const std::vector<Parameter>& parameters() const noexcept { return parameters_; }
   [[nodiscard]] const LeastSquaresOptions& options() const noexcept { return options_; }
   [[nodiscard]] Eigen::Index n_residuals() const noexcept { return n_residuals_; }

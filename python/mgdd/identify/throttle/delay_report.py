@@ -1,0 +1,71 @@
+"""A delay that was chosen among several, as an estimate of the report beside those of the search."""
+
+from __future__ import annotations
+
+import dataclasses
+import math
+from collections.abc import Mapping
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+
+from mgdd.results import FitReport
+
+if TYPE_CHECKING:
+    from numpy.typing import NDArray
+
+__all__ = ["with_delay"]
+
+_NAME = "delay_samples"
+
+
+def with_delay(report: FitReport, delay: float, rmse: Mapping[float, float], n: float) -> FitReport:
+    """Add the chosen delay, with the error of the flattest parabola through the costs of the others.
+
+    Parameters
+    ----------
+    report : FitReport
+        Of the fit at the chosen delay.
+    delay : float
+        The chosen delay [samples].
+    rmse : mapping of float to float
+        Error by delay, the chosen one included; at least two.
+    n : float
+        Independent samples of the residual.
+
+    Returns
+    -------
+    FitReport
+        With `delay_samples` last; a delay that fits as well as the chosen one leaves a whole sample open.
+    """
+    curvature = min(
+        2.0 * n * math.log(other / rmse[delay]) / (at - delay) ** 2 for at, other in rmse.items() if at != delay
+    )
+    error = 1.0 / math.sqrt(max(curvature, 1.0))
+    null = np.vstack([report.null_directions, np.zeros((1, report.null_directions.shape[1]))])
+    null.flags.writeable = False
+    return dataclasses.replace(
+        report,
+        names=(*report.names, _NAME),
+        values=_longer(report.values, delay),
+        stderr=_longer(report.stderr, error),
+        lower=_longer(report.lower, min(rmse)),
+        upper=_longer(report.upper, max(rmse)),
+        bounds_active=_longer(report.bounds_active, 0),
+        covariance=_wider(report.covariance, error**2),
+        correlation=_wider(report.correlation, 1.0),
+        null_directions=null,
+    )
+
+
+def _longer(array: NDArray[Any], value: float) -> NDArray[Any]:
+    out = np.append(array, array.dtype.type(value))
+    out.flags.writeable = False
+    return out
+
+
+def _wider(matrix: NDArray[np.float64], corner: float) -> NDArray[np.float64]:
+    out = np.full((matrix.shape[0] + 1, matrix.shape[1] + 1), np.nan)
+    out[:-1, :-1], out[-1, -1] = matrix, corner
+    out.flags.writeable = False
+    return out

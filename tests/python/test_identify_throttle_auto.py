@@ -1,0 +1,113 @@
+"""The model that identification chooses: throttles from a program of its own, each friction and a gap."""
+
+from __future__ import annotations
+
+import sys
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pytest
+
+from mgdd.errors import ParameterError
+from mgdd.identify import FirstPrincipleModel, identify_throttle, load_throttle_model
+from mgdd.identify.throttle.delay_report import with_delay
+from mgdd.io import throttle_log
+from mgdd.optimize import FitOptions, least_squares
+from mgdd.signals import amplitude_random_steps, chirp
+from mgdd.throttle import PseudoWiener
+
+sys.path.append(str(Path(__file__).parent / "support"))
+from throttle_bodies import draw_body, make_logs
+
+HAS = {
+    "coulomb": "Coulomb friction with lag (",
+    "stribeck": "Coulomb friction with lag, Stribeck drop (",
+    "lugre": "Coulomb friction with lag, Stribeck drop, presliding (",
+    "backlash": "gap (",
+}
+
+
+def said(fit: Any, code: str) -> str:
+    return next(finding.text for finding in fit.findings if finding.code == code)
+
+
+@pytest.mark.parametrize(("family", "seed"), [("coulomb", 2), ("stribeck", 2), ("lugre", 4), ("backlash", 9)])
+def test_an_independent_throttle_is_followed_on_a_fresh_log(family: str, seed: int, tmp_path: Path) -> None:
+    body = draw_body(family, seed)
+    train, test = (throttle_log(*log) for log in make_logs(body, seed))
+    fit = identify_throttle(train, test=test, closed_deg=body.closed_deg, open_deg=body.open_deg)
+    assert fit.kind == "first_principle"
+    assert fit.test is not None
+    assert fit.test.nrmse_fit_percent is not None
+    assert fit.test.nrmse_fit_percent > 98.5
+    assert fit.parameters["delay_samples"] == body.delay_samples
+    assert HAS[family] in said(fit, "structure_chosen")
+    assert "the groups were taken" in said(fit, "model_chosen")
+    assert fit.parameters["limp_home_deg"] == pytest.approx(body.limp_home_deg, abs=0.15)
+    truth = body.groups()
+    names = ["beta_above_duty", "delta_duty", "gain_deg_per_s2_per_duty", "tau_s"]
+    for name in names[:2] if family == "backlash" else names:
+        assert fit.parameters[name] == pytest.approx(truth[name], rel=0.03), name
+    if family != "backlash":
+        assert fit.parameters["electrical_s"] == pytest.approx(truth["electrical_s"], rel=0.05, abs=1e-4)
+    if family == "stribeck":
+        assert fit.parameters["stribeck_drop"] == pytest.approx(body.static_nm / body.coulomb_nm - 1.0, rel=0.05)
+        assert fit.parameters["stribeck_deg_per_s"] == pytest.approx(np.degrees(body.stribeck_rad_per_s), rel=0.05)
+    if family == "lugre":
+        bent = np.degrees(body.coulomb_nm / body.bristle_nm_per_rad)
+        assert fit.parameters["presliding_deg"] == pytest.approx(bent, rel=0.1)
+    file = tmp_path / "fit.toml"
+    file.write_text(fit.to_toml(), encoding="utf-8")
+    assert load_throttle_model(file) == fit.model
+
+
+def two_kinds_of_sides() -> PseudoWiener:
+    """A plate whose friction and damping differ between the sides: no groups have that, PW-R has."""
+    below = {"below_tau_s": 0.05, "below_coulomb_duty": 0.03, "below_gain_deg_per_s2_per_duty": 4e4}
+    return PseudoWiener("pw_r", {**below, "limp_home_deg": 20.0})
+
+
+def log_of(model: Any, duty: np.ndarray, seed: int, start_deg: float) -> Any:
+    time = 1e-3 * np.arange(duty.size)
+    run = model.simulate({"time_s": time, "duty": duty}, initial_state={"angle_deg": start_deg})
+    noise = 0.03 * np.random.default_rng(seed).standard_normal(duty.size)
+    return throttle_log(time, duty, run["angle_deg"].to_numpy() + noise)
+
+
+def test_pw_r_is_taken_where_it_runs_better_on_what_neither_has_seen() -> None:
+    plant = two_kinds_of_sides()
+    duty = amplitude_random_steps(6.0, offset=0.0, amplitude=0.4, seed=3)["duty"].to_numpy()
+    log = log_of(plant, np.concatenate([np.zeros(300), duty]), 1, 20.0)
+    fit = identify_throttle(log, options=FitOptions(n_starts=1))
+    assert fit.kind == "pw_r"
+    assert "PW-R was taken" in said(fit, "model_chosen")
+    assert fit.parameters["below_coulomb_duty"] < 0.6 * fit.parameters["above_coulomb_duty"]
+    assert fit.parameters["delay_samples"] == 0.0
+
+
+def test_the_same_log_gives_the_same_bits_and_a_refused_call_changes_nothing() -> None:
+    duty = np.concatenate([np.zeros(200), chirp(2.5, offset=0.02, amplitude=0.3)["duty"].to_numpy()])
+    log = log_of(FirstPrincipleModel(substeps=8), duty, 2, 8.0)
+    once = identify_throttle(log, options=FitOptions(n_starts=2))
+    with pytest.raises(ParameterError, match="model = 'automatic': must be one of 'auto', 'first_principle'"):
+        identify_throttle(log, "automatic")
+    again = identify_throttle(log, options=FitOptions(n_starts=2))
+    assert dict(again.parameters) == dict(once.parameters)
+    assert again.findings == once.findings
+
+
+def test_a_delay_among_several_has_the_error_of_the_costs_beside_it() -> None:
+    report = least_squares(lambda x: ([x[0] - 1.0, x[1], x[0] + x[1]], [[1, 0], [0, 1], [1, 1]]), [0.0, 0.0])
+    n, rmse = 400.0, {1.0: 0.05, 2.0: 0.04, 3.0: 0.044}
+    known = with_delay(report, 2.0, rmse, n)
+    # A parabola c (1 + (d - 2)^2 / (n s^2)) about the minimum, through the flatter neighbour.
+    assert known.stderr[-1] == pytest.approx((2.0 * n * np.log(0.044 / 0.04)) ** -0.5)
+    assert known.names == (*report.names, "delay_samples")
+    assert known.values[-1] == 2.0
+    assert known.values.flags.writeable is False
+    np.testing.assert_array_equal(known.stderr[:-1], report.stderr)
+    low, high = known.interval()["delay_samples"]
+    assert low < 2.0 < high
+    assert with_delay(report, 2.0, {2.0: 0.04, 3.0: 0.04}, n).stderr[-1] == 1.0
+    assert known.to_dataset().sizes["parameter"] == 3
