@@ -1,9 +1,8 @@
 // Quadratic program of a linear horizon of one input with bounds and a limit of its change per sample, solved exactly
 // by Riccati sweeps over an active set: O(N n^3) per sweep. With V_k the cost to go as a function of the deviation of
 // the state and of the input before, a stage is free, fixed or tied to the input before it; the multipliers are the
-// slopes of the stage costs (recursion: Bertsekas 2017, section 3.1; active sets: Nocedal and Wright 2006,
-// section 16.5). Every iterate is feasible and none costs more than the one before. noexcept, heap-free; double or
-// float.
+// slopes of the stage costs (recursion: Bertsekas 2017; active sets: Nocedal and Wright 2006, section 16.5). Every
+// iterate is feasible and none costs more than the one before. noexcept, heap-free; double or float.
 #pragma once
 
 #include <Eigen/Core>
