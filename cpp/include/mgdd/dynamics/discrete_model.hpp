@@ -50,14 +50,19 @@ concept Liftable = DiscreteModel<M> && requires(const M& model) {
 template <class M>
 inline constexpr std::size_t n_numbers = std::tuple_size_v<decltype(M::numbers(std::declval<typename M::State&>()))>;
 
-/// The input of a model of one input from a number: a scalar, an array of one, or what `model.input` makes of it.
+/// The input of a model of one input from a number: a scalar, an array of one, or what `model.input` makes of it. A
+/// number that an array of the model cannot hold (a dual) goes in an array of its own, where the model steps by that.
 template <class M, class U>
-MGDD_INLINE constexpr typename M::Input input_of(const M& model, const U& value) noexcept {
+MGDD_INLINE constexpr auto input_of(const M& model, const U& value) noexcept {
   using Input = typename M::Input;
   if constexpr (requires { model.input(typename M::Scalar(value)); }) {
     return model.input(typename M::Scalar(value));
   } else if constexpr (requires { typename Input::value_type; }) {
-    return Input{static_cast<typename Input::value_type>(value)};
+    if constexpr (is_dual_v<U> && !is_dual_v<typename Input::value_type>) {
+      return std::array<U, 1>{value};
+    } else {
+      return Input{static_cast<typename Input::value_type>(value)};
+    }
   } else {
     return static_cast<Input>(value);
   }

@@ -1,0 +1,432 @@
+// Receding-horizon control: exact on a linear model, its cost falls from iteration to iteration on others, preview
+// helps, limits hold in every sample, bad numbers repeat the last input, a restart goes on bit for bit, no allocation.
+#include "mgdd/control/receding_horizon.hpp"
+
+#include <cmath>
+#include <functional>
+#include <limits>
+#include <string>
+#include <utility>
+#include <vector>
+
+#include <gtest/gtest.h>
+
+#include "mgdd/common/error.hpp"
+#include "mgdd/throttle/models/first_principle.hpp"
+#include "support/horizon_case.hpp"
+#include "support/no_alloc.hpp"
+
+namespace mgdd::control {
+namespace {
+
+using test_support::LaggedOscillator;
+using test_support::Pendulum;
+
+constexpr double nan = std::numeric_limits<double>::quiet_NaN();
+constexpr int length = 16;
+
+template <class T>
+auto oscillator() {
+  return dynamics::Rk4<LaggedOscillator>{}.prepare(std::array{T(5.0)}, 0.05);
+}
+template <class T>
+auto pendulum() {
+  return dynamics::Rk4<Pendulum>{}.prepare(std::array{T(0.8)}, 0.05);
+}
+/// The plate with a lag of its current and a duty that acts 1.4 samples late.
+auto plate(double delay_samples) {
+  throttle::FirstPrinciple family;
+  family.friction = throttle::Friction::tanh;
+  family.delay_samples = delay_samples;
+  family.substeps = 1;
+  return family.prepare(throttle::first_principle_of(throttle::Throttle{}), 2e-3);
+}
+template <class T>
+using Oscillator = decltype(oscillator<T>());
+template <class T>
+using Swinging = decltype(pendulum<T>());
+using Plate = decltype(plate(0.0));
+
+HorizonSettings narrow_settings() {
+  HorizonSettings s;
+  s.output_weight = 3.0;
+  s.terminal_weight = 11.0;
+  s.input_weight = 2e-3;
+  s.change_weight = 1e-2;
+  s.lower = -0.45;
+  s.upper = 0.8;
+  s.largest_change = 0.17;
+  return s;
+}
+
+double reference_of(int k) {
+  return (k / 40) % 2 == 0 ? 0.5 : -0.2 + 0.1 * std::sin(0.11 * k);
+}
+
+template <class M>
+std::vector<typename M::Scalar> outputs(const M& model, typename M::State s, const Eigen::VectorXd& u) {
+  std::vector<typename M::Scalar> y;
+  for (Eigen::Index k = 0; k < u.size(); ++k) {
+    model.step(s, dynamics::input_of(model, u(k)));
+    y.push_back(model.output(s));
+  }
+  return y;
+}
+
+/// Quadratic model of the cost of a run about inputs, from differences of outputs.
+template <class M>
+test_support::DenseHorizon by_differences(const M& model, const typename M::State& state, const HorizonSettings& s,
+                                          const Eigen::VectorXd& about, double before, double reference, double h) {
+  const Eigen::Index n = about.size();
+  Eigen::MatrixXd rows = Eigen::MatrixXd::Zero(3 * n, n);
+  Eigen::VectorXd rest = Eigen::VectorXd::Zero(3 * n);
+  const auto at = outputs(model, state, about);
+  const auto weight = [&](Eigen::Index k) { return std::sqrt(k + 1 < n ? s.output_weight : s.terminal_weight); };
+  for (Eigen::Index i = 0; i < n; ++i) {
+    Eigen::VectorXd up = about, down = about;
+    up(i) += h;
+    down(i) -= h;
+    const auto above = outputs(model, state, up), below = outputs(model, state, down);
+    for (Eigen::Index k = 0; k < n; ++k)
+      rows(k, i) = weight(k) * (above[static_cast<std::size_t>(k)] - below[static_cast<std::size_t>(k)]) / (2.0 * h);
+    rows(n + i, i) = std::sqrt(s.input_weight);
+    rows(2 * n + i, i) = std::sqrt(s.change_weight);
+    if (i > 0) rows(2 * n + i, i - 1) = -std::sqrt(s.change_weight);
+  }
+  for (Eigen::Index k = 0; k < n; ++k)
+    rest(k) = weight(k) * (at[static_cast<std::size_t>(k)] - reference);
+  rest.head(n) -= rows.topRows(n) * about;
+  rest(2 * n) = -std::sqrt(s.change_weight) * before;
+  return {2.0 * rows.transpose() * rows, 2.0 * rows.transpose() * rest, rest.squaredNorm()};
+}
+
+template <class Controller>
+Eigen::VectorXd plan(const Controller& c) {
+  return Eigen::Map<const Eigen::VectorXd>(c.inputs().data(), static_cast<Eigen::Index>(c.inputs().size()));
+}
+
+TEST(RecedingHorizon, OneIterationIsExactOnALinearModelInEverySampleOfALoop) {
+  const auto model = oscillator<double>();
+  const auto s = narrow_settings();
+  RecedingHorizon<Oscillator<double>, length> controller(model, s);
+  auto plant = dynamics::Rk4<LaggedOscillator>{}.prepare(std::array{5.6}, 0.05);  // so that states are not foreseen
+  std::array<double, 3> x{0.4, -1.0, 0.3};
+  controller.start(x, 0.3);
+  double before = 0.3;
+  for (int k = 0; k < 250; ++k) {
+    const double u = controller.step(x, reference_of(k));
+    ASSERT_EQ(controller.status(), HorizonStatus::converged);
+    const auto dense =
+        by_differences(model, x, s, Eigen::VectorXd::Zero(length), before, reference_of(k), 1.0);  // exact: linear
+    ASSERT_LT(test_support::broken_optimality(dense, plan(controller), {s.lower, s.upper, s.largest_change, before}),
+              1e-9)
+        << k;
+    ASSERT_EQ(u, controller.inputs()[0]);
+    plant.step(x, std::array{u});
+    before = u;
+  }
+}
+
+TEST(RecedingHorizon, TheCostNeverRisesOverTheIterationsAndEndsWhereNothingIsBetter) {
+  const auto model = pendulum<double>();
+  for (const double angle : {-2.4, -0.7, 0.3, 1.9}) {
+    for (const double reference : {1.2, -0.6}) {
+      const std::array<double, 2> x{angle, 1.5};
+      auto s = narrow_settings();
+      s.input_weight = 0.05;
+      s.lower = -1.0;
+      double last = std::numeric_limits<double>::infinity();
+      for (int most = 2; most <= 60; ++most) {
+        s.max_iterations = most;
+        s.tolerance = 1e-9;
+        RecedingHorizon<Swinging<double>, length> controller(model, s);
+        controller.start(x, 0.1);
+        (void)controller.step(x, reference);
+        const double before = 0.1;
+        double cost = 0.0, previous = before;
+        const auto y = outputs(model, x, plan(controller));
+        for (std::size_t k = 0; k < length; ++k) {
+          const double u = controller.inputs()[k];
+          cost += (k + 1 < length ? s.output_weight : s.terminal_weight) * std::pow(y[k] - reference, 2) +
+                  s.input_weight * u * u + s.change_weight * (u - previous) * (u - previous);
+          previous = u;
+        }
+        ASSERT_LE(cost, last * (1.0 + 1e-14)) << angle << " " << most;
+        last = cost;
+        if (controller.status() == HorizonStatus::converged) {
+          const auto dense = by_differences(model, x, s, plan(controller), before, reference, 1e-5);
+          EXPECT_LT(
+              test_support::broken_optimality(dense, plan(controller), {s.lower, s.upper, s.largest_change, before}),
+              1e-6);
+          break;
+        }
+        ASSERT_LT(most, 60) << "not converged from " << angle << " to " << reference;
+      }
+    }
+  }
+}
+
+TEST(RecedingHorizon, ADelayedInputIsPlannedThroughTheNumbersOfItsLine) {
+  const auto model = plate(1.4);
+  HorizonSettings s;
+  s.change_weight = 5.0;
+  s.max_iterations = 50;
+  s.tolerance = 1e-10;
+  RecedingHorizon<Plate, length> controller(model, s);
+  auto x = model.at_rest(20.0, 0.2);
+  controller.start(x, 0.2);
+  (void)controller.step(x, 31.0);
+  ASSERT_EQ(controller.status(), HorizonStatus::converged);
+  const auto dense = by_differences(model, x, s, plan(controller), 0.2, 31.0, 1e-5);
+  EXPECT_LT(test_support::broken_optimality(dense, plan(controller), {s.lower, s.upper, 1e30, 0.2}), 1e-6);
+}
+
+/// Root mean square error of a loop on the pendulum.
+double loop_error(bool preview, const HorizonSettings& s) {
+  const auto model = pendulum<double>();
+  RecedingHorizon<Swinging<double>, length> controller(model, s);
+  std::array<double, 2> x{0.0, 0.0};
+  controller.start(x, 0.0);
+  double sum = 0.0;
+  std::array<double, length> ahead{};
+  for (int k = 0; k < 400; ++k) {
+    for (int j = 0; j < length; ++j)
+      ahead[static_cast<std::size_t>(j)] = reference_of(k + 1 + j);
+    const double u = preview ? controller.step(x, ahead) : controller.step(x, reference_of(k + 1));
+    model.step(x, std::array{u});
+    sum += std::pow(model.output(x) - reference_of(k + 1), 2);
+  }
+  return std::sqrt(sum / 400.0);
+}
+
+TEST(RecedingHorizon, PreviewOfTheReferenceBeatsAHeldOne) {
+  auto s = narrow_settings();
+  s.lower = -1.0;
+  s.upper = 1.0;
+  s.largest_change = 0.4;
+  EXPECT_LT(loop_error(true, s), 0.75 * loop_error(false, s));
+}
+
+TEST(RecedingHorizon, LimitsHoldInEverySampleAndBind) {
+  const auto model = pendulum<double>();
+  auto s = narrow_settings();
+  s.largest_change = 0.07;
+  for (const int sweeps : {1, 2, 60}) {
+    s.max_sweeps = sweeps;
+    RecedingHorizon<Swinging<double>, length> controller(model, s);
+    std::array<double, 2> x{0.0, 0.0};
+    double before = 0.0;
+    int at_bound = 0, at_change = 0;
+    controller.start(x, before);
+    for (int k = 0; k < 500; ++k) {
+      const double u = controller.step(x, 3.0 * reference_of(k));
+      ASSERT_GE(u, s.lower);
+      ASSERT_LE(u, s.upper);
+      ASSERT_LE(u, before + s.largest_change);
+      ASSERT_GE(u, before - s.largest_change);
+      at_bound += u == s.lower || u == s.upper;
+      at_change += std::abs(std::abs(u - before) - s.largest_change) < 1e-12;
+      model.step(x, std::array{u});
+      before = u;
+    }
+    EXPECT_GT(at_bound, 20);
+    EXPECT_GT(at_change, 10);
+  }
+}
+
+TEST(RecedingHorizon, ChangesCountFromWhatReallyActed) {
+  RecedingHorizon<Swinging<double>, length> controller(pendulum<double>(), narrow_settings());
+  const std::array<double, 2> x{0.1, 0.0};
+  controller.start(x, 0.0);
+  (void)controller.step(x, 2.0);
+  controller.applied(-0.4);
+  controller.applied(nan);
+  EXPECT_LE(controller.step(x, 2.0), -0.4 + 0.17);
+  controller.prepare();
+  controller.applied(0.6);
+  EXPECT_GE(controller.feedback(x, -2.0), 0.6 - 0.17);
+}
+
+TEST(RecedingHorizon, WhatIsNotFiniteRepeatsTheLastInputAndTheNextSampleGoesOn) {
+  const auto model = pendulum<double>();
+  RecedingHorizon<Swinging<double>, length> controller(model, narrow_settings());
+  std::array<double, 2> x{0.1, 0.0};
+  controller.start(x, 0.2);
+  const double u = controller.step(x, 0.4);
+  const std::array<double, 3> torn{0.1, nan, 0.3};
+  const auto repeats = [&](auto&& call) {
+    EXPECT_EQ(call(), u);
+    EXPECT_EQ(controller.status(), HorizonStatus::not_finite);
+  };
+  repeats([&] { return controller.step({nan, 0.0}, 0.4); });
+  repeats([&] { return controller.step({0.1, std::numeric_limits<double>::infinity()}, 0.4); });
+  repeats([&] { return controller.step(x, nan); });
+  repeats([&] { return controller.step(x, torn); });
+  repeats([&] { return controller.step(x, std::span<const double>()); });
+  const double after = controller.step(x, 0.4);
+  EXPECT_EQ(controller.status(), HorizonStatus::converged);
+  EXPECT_TRUE(std::isfinite(after));
+  // A state that the model carries out of the numbers.
+  for (const int iterations : {1, 5}) {
+    auto s = narrow_settings();
+    s.max_iterations = iterations;
+    RecedingHorizon<Swinging<double>, length> other(model, s);
+    other.start(x, 0.2);
+    (void)other.step(x, 0.4);
+    const double held = other.inputs()[0];
+    EXPECT_EQ(other.step({1e308, 1e308}, 0.4), held);
+    EXPECT_EQ(other.status(), HorizonStatus::not_finite);
+    (void)other.step(x, 0.4);  // the plan is along numbers that are not finite: seen and started anew
+    EXPECT_TRUE(std::isfinite(other.step(x, 0.4)));
+    EXPECT_NE(other.status(), HorizonStatus::not_finite);
+  }
+}
+
+TEST(RecedingHorizon, PreparedOrNotTheAnswerIsTheSame) {
+  const auto model = pendulum<double>();
+  RecedingHorizon<Swinging<double>, length> one(model, narrow_settings()), other = one, third = one;
+  std::array<double, 2> x{0.0, 0.0};
+  for (auto* c : {&one, &other, &third})
+    c->start(x, 0.0);
+  for (int k = 0; k < 200; ++k) {
+    const double u = one.step(x, reference_of(k));
+    if (k % 3 != 0) other.prepare();
+    if (k % 5 == 0) other.prepare();
+    ASSERT_EQ(other.feedback(x, reference_of(k)), u);
+    ASSERT_EQ(third.feedback(x, reference_of(k)), u);
+    model.step(x, std::array{u});
+    x[1] += 0.01 * std::cos(0.7 * k);
+  }
+}
+
+TEST(RecedingHorizon, AWantedOutputThatStaysTakesOneSweepPerSample) {
+  const auto model = pendulum<double>();
+  RecedingHorizon<Swinging<double>, length> controller(model, narrow_settings());
+  std::array<double, 2> x{0.0, 0.0};
+  controller.start(x, 0.0);
+  int sweeps = 0;
+  for (int k = 0; k < 400; ++k) {
+    model.step(x, std::array{controller.step(x, 0.25)});
+    sweeps += controller.sweeps();
+    if (k > 100) {
+      ASSERT_EQ(controller.sweeps(), 1) << k;
+    }
+  }
+  EXPECT_LT(sweeps, 520);
+}
+
+TEST(RecedingHorizon, FloatAgreesWithDouble) {
+  const auto model = pendulum<double>();
+  const auto small = pendulum<float>();
+  RecedingHorizon<Swinging<double>, length> wide(model, narrow_settings());
+  RecedingHorizon<Swinging<float>, length> narrow(small, narrow_settings());
+  std::array<double, 2> x{0.0, 0.0};
+  for (int k = 0; k < 300; ++k) {
+    const double u = wide.step(x, reference_of(k));
+    const std::array<float, 2> seen{static_cast<float>(x[0]), static_cast<float>(x[1])};
+    ASSERT_NEAR(narrow.step(seen, static_cast<float>(reference_of(k))), u, 2e-3) << k;
+    ASSERT_EQ(narrow.status(), HorizonStatus::converged) << k;
+    model.step(x, std::array{u});
+  }
+}
+
+template <class T>
+void goes_on_bit_for_bit() {
+  const auto model = pendulum<T>();
+  auto s = narrow_settings();
+  s.max_iterations = 2;
+  RecedingHorizon<Swinging<T>, length> first(model, s), second(model, s);
+  std::array<T, 2> x{T(0.3), T(0.0)};
+  first.start(x, T(0.1));
+  for (int k = 0; k < 300; ++k) {
+    if (k % 3 == 0) restore_state(second, save_state(first));
+    first.prepare();
+    if (k % 4 == 1) restore_state(second, save_state(first));
+    const T r = static_cast<T>(reference_of(k)), u = first.feedback(x, r);
+    ASSERT_EQ(second.feedback(x, r), u) << k;
+    model.step(x, std::array{static_cast<double>(u)});
+  }
+}
+
+TEST(RecedingHorizon, GoesOnBitForBitAfterARestore) {
+  goes_on_bit_for_bit<double>();
+  goes_on_bit_for_bit<float>();
+}
+
+TEST(RecedingHorizon, AStateThatTheSettingsDoNotAllowIsRefusedAndChangesNothing) {
+  RecedingHorizon<Swinging<double>, length> controller(pendulum<double>(), narrow_settings());
+  controller.start({0.0, 0.0}, 0.0);
+  (void)controller.step({0.0, 0.0}, 1.0);
+  const StateColumns before = save_state(controller);
+  const auto refused = [&](const std::string& name, double value) {
+    StateColumns bad = before;
+    bad.at(name) = {value};
+    EXPECT_THROW(restore_state(controller, bad), ParameterError) << name;
+  };
+  refused("applied", 0.9);
+  refused("input_3", -0.46);
+  refused("input_5", before.at("input_4")[0] + 0.2);
+  refused("tie_2", 2.0);
+  refused("bound_7", -0.5);
+  refused("shifted", 3.0);
+  refused("state_1", nan);
+  EXPECT_EQ(save_state(controller), before);
+}
+
+TEST(RecedingHorizon, NoAllocation) {
+  using Wide = RecedingHorizon<Swinging<double>, length>;
+  using Narrow = RecedingHorizon<Swinging<float>, length>;
+  static_assert(noexcept(std::declval<Wide&>().step(std::array{0.0, 0.0}, 0.0)));
+  static_assert(noexcept(std::declval<Narrow&>().step(std::array{0.0F, 0.0F}, 0.0F)));
+  static_assert(noexcept(std::declval<Wide&>().prepare()) && noexcept(std::declval<Wide&>().start({}, 0.0)));
+  const auto model = pendulum<double>();
+  auto s = narrow_settings();
+  s.max_iterations = 3;
+  Wide wide(model, s);
+  Narrow narrow(pendulum<float>(), s);
+  std::array<double, 2> x{0.3, 0.0};
+  const test_support::AllocationCounter counter;
+  wide.start(x, 0.0);
+  for (int k = 0; k < 200; ++k) {
+    model.step(x, std::array{wide.step(x, reference_of(k))});
+    (void)narrow.step({static_cast<float>(x[0]), static_cast<float>(x[1])}, static_cast<float>(reference_of(k)));
+  }
+  (void)wide.step({nan, 0.0}, 0.0);
+  wide.applied(0.3);
+  EXPECT_EQ(counter.count(), 0U);
+}
+
+TEST(RecedingHorizon, ARefusedSettingNamesItself) {
+  const auto refused = [](const std::string& field, const std::function<void(HorizonSettings&)>& change) {
+    HorizonSettings s = narrow_settings();
+    change(s);
+    try {
+      validate(s);
+      ADD_FAILURE() << field << " was taken";
+    } catch (const ParameterError& error) {
+      EXPECT_EQ(error.field, field);
+    }
+  };
+  refused("output_weight", [](HorizonSettings& s) { s.output_weight = -1.0; });
+  refused("terminal_weight", [](HorizonSettings& s) { s.terminal_weight = nan; });
+  refused("change_weight", [](HorizonSettings& s) { s.input_weight = s.change_weight = 0.0; });
+  refused("upper", [](HorizonSettings& s) { s.upper = s.lower; });
+  refused("largest_change", [](HorizonSettings& s) { s.largest_change = 0.0; });
+  refused("tolerance", [](HorizonSettings& s) { s.tolerance = 0.0; });
+  refused("max_iterations", [](HorizonSettings& s) { s.max_iterations = 0; });
+  refused("max_sweeps", [](HorizonSettings& s) { s.max_sweeps = 0; });
+}
+
+TEST(RecedingHorizon, EveryNumberOfTheSettingsHasOneField) {
+  HorizonSettings s;
+  double at = 0.5;
+  for (const auto& field : horizon_fields())
+    field.in(s) = at += 1.0;
+  EXPECT_EQ(sizeof(HorizonSettings), n_horizon_fields * sizeof(double) + 2 * sizeof(int));
+  at = 0.5;
+  for (const auto& field : horizon_fields())
+    EXPECT_EQ(field.in(s), at += 1.0);
+}
+
+}  // namespace
+}  // namespace mgdd::control
