@@ -30,6 +30,7 @@ FIGURES = {
     "study_calibration_errors.png": ("online-calibration", 1, 72),
     "study_guide_learns.png": ("calibrated-guide", 0, 72),
     "study_guide_learns_step.png": ("calibrated-guide", 1, 72),
+    "study_tracking.png": ("throttle-tracking", 0, 80),
     "study_guide_plane.png": ("guided-transients", 1, 72),
 }
 

@@ -46,6 +46,14 @@ def _between(name: str, digits: int) -> Callable[[Row], str]:
     return said
 
 
+def _median_and_p95(name: str, digits: int, unit: str = "") -> Callable[[Row], str]:
+    def said(row: Row) -> str:
+        ends = (row[f"{name}{unit}"], row[f"{name}_p95{unit}"])
+        return " / ".join("never" if end is None else _printed(end, digits) for end in ends)
+
+    return said
+
+
 _ENGINE: tuple[Column, ...] = (("engine", _words("engine")), ("start [°CA aTDC]", _number("start_cad", 0)))
 _PATH: tuple[Column, ...] = (
     ("stays within 1.5 °CA from cycle, median", _between("median_stays", 0)),
@@ -118,6 +126,30 @@ TABLES: Mapping[str, Mapping[str, tuple[Column, ...]]] = {
             ("less than without calibration", _between("lost_less", 1)),
         ),
     },
+    "throttle-tracking": {
+        "rows": (
+            ("throttles", _words("case")),
+            ("preset", _words("preset")),
+            ("controller", _words("controller")),
+            ("20→60 [ms]", _median_and_p95("large", 0, "_ms")),
+            ("40→42 [ms]", _median_and_p95("small", 0, "_ms")),
+            ("4→20 [ms]", _median_and_p95("up", 0, "_ms")),
+            ("20→4 [ms]", _median_and_p95("down", 0, "_ms")),
+            ("MSE 40→42 [deg²]", _median_and_p95("small_mse", 3, "_deg2")),
+            ("MSE sine [deg²]", _median_and_p95("sine_mse", 4, "_deg2")),
+            ("static error, p95 [deg]", _number("static_p95_deg", 2)),
+            ("overshoot, p95 [deg]", _number("overshoot_p95_deg", 1)),
+            ("variation in 2 s of rest", _number("variation_rest", 1)),
+            ("limit cycles", _number("limit_cycles", 0)),
+        ),
+        "warm": (
+            ("preset", _words("preset")),
+            ("wrong", _words("wrong")),
+            ("model-guided", _words("controller")),
+            ("MSE sine 40 ± 10 deg [deg²]", _number("sine_mse_deg2", 5)),
+            ("MSE sine 10 ± 8 deg [deg²]", _number("crossing_mse_deg2", 5)),
+        ),
+    },
 }  # fmt: skip
 
 
@@ -126,12 +158,12 @@ def tables(name: str, summary: Mapping[str, Any]) -> dict[str, list[str]]:
     out = {}
     for part, columns in TABLES[name].items():
         lines = [[head for head, _ in columns], ["---"] * len(columns)]
-        rows = [row for row in summary[part] if part != "rows" or _ROWS[name](row)]
+        rows = [row for row in summary[part] if part != "rows" or name not in _ROWS or _ROWS[name](row)]
         lines += [[cell(row) for _, cell in columns] for row in rows]
         out[part] = [f"| {' | '.join(line)} |" for line in lines]
     if name == "online-calibration":
         out["errors"] = _errors(summary["rows"])
-    else:
+    elif name == "calibrated-guide":
         out["settings"] = _settings(summary["settings"])
     return out
 
@@ -197,7 +229,7 @@ def main() -> None:
         if options.page:
             page = options.page.read_text(encoding="utf-8")
             options.page.write_text(put_into(page, summary["study"], summary), encoding="utf-8")
-        for bar in summary["bars"]:
+        for bar in summary.get("bars", ()):
             print(f"{'met' if bar['met'] else 'MISSED':6} {bar['bar']}: {bar['worst']} ({bar['limit']})")
 
 
