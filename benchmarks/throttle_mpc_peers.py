@@ -159,7 +159,7 @@ def main() -> None:
     try:
         import casadi as ca
     except ImportError:
-print("CasADi is the plant here, too: pip install casadi do-mpc tinympc, in an environment of their own")
+        print("CasADi is the plant here, too: pip install casadi do-mpc tinympc, in an environment of their own")
         return
     context = machine.versions()
     for package in ("casadi", "do-mpc", "tinympc"):
