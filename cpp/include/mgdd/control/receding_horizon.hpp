@@ -6,10 +6,14 @@
 #pragma once
 
 #include <algorithm>
+#include <array>
 #include <cmath>
 #include <concepts>
+#include <cstdint>
 #include <span>
 #include <string>
+#include <type_traits>
+#include <utility>
 
 #include "mgdd/common/state.hpp"
 #include "mgdd/control/filtered_rate.hpp"
