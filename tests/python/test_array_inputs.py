@@ -16,7 +16,8 @@ import mgdd
 from mgdd import guide, identify, io, optimize, signals, surrogate, throttle
 from mgdd.engine import Cylinder, OperatingPoint, fit_nox_proxy, timing_sweep
 from mgdd.io.checks import check_trace
-from mgdd.loop import EngineBench, simulate_drive
+from mgdd.control import Pid
+from mgdd.loop import EngineBench, Reference, simulate_drive, track, track_many
 from mgdd.signals.even_grid import even_step
 from mgdd.signals.metrics import mse
 from mgdd.throttle.characteristics import airflow_torque_nm, mass_flow_kg_per_s
@@ -171,6 +172,16 @@ CALLS: dict[str, tuple[Call, tuple[Array, ...]]] = {
     "io.throttle_log": (logged, (TIME, DUTY, ANGLE, 0.1 * DUTY, 12.0 + DUTY)),
     "loop.EngineBench.run": (lambda soc: EngineBench(seed=1).run(soc)["j"].to_numpy(), (SOC,)),
     "loop.EngineBench.steady_map": (lambda soc: EngineBench().steady_map(soc)["j"].to_numpy(), (SOC,)),
+    "loop.track": (
+        lambda wanted, air: track(Pid(), wanted, airflow_torque_nm=air)["angle_deg"].to_numpy(), (OPEN, 1e-3 * OPEN),
+    ),
+    "loop.track_many": (
+        lambda air: track_many(
+            {"pid": Pid()}, [Reference(angle_deg=np.linspace(20.0, 30.0, len(air)), name="ramp")], [throttle.Throttle()],
+            airflow_torque_nm={"ramp": air},
+        )["mse_deg2"].to_numpy(),
+        (1e-3 * OPEN,),
+    ),
     "loop.simulate_drive": (
         lambda pedal, speed: simulate_drive(CHAIN, pedal, speed)["torque_nm"].to_numpy(), (OPEN, 2000.0 + OPEN),
     ),

@@ -20,7 +20,8 @@ from mgdd.engine import Cylinder, OperatingPoint, analyze, convergence, sensitiv
 from mgdd.guide import FeedForward, GuidedEngine, ModelOptimum, OnlineCalibration, TimingMap
 from mgdd.identify.throttle.validation import ThrottleValidation
 from mgdd.io import pressure_trace, read_pressure, read_throttle_log, throttle_log, write_throttle_log
-from mgdd.loop import EngineBench, monte_carlo, run_seeker, simulate_drive
+from mgdd.control import Pid
+from mgdd.loop import EngineBench, monte_carlo, run_seeker, simulate_drive, track, track_many
 from mgdd.results import FitReport
 from mgdd.results.labels import check_labels
 from mgdd.rig import SimulatedRig
@@ -155,6 +156,8 @@ MADE: dict[str, Callable[[Path], Any]] = {
     "loop.EngineBench.run": lambda _: bench_run(),
     "loop.LoopRun.dataset": lambda _: [run_seeker(EngineBench(seed=1), seeker(), 20).dataset, rig_run()],
     "loop.monte_carlo": lambda _: monte_carlo(EngineBench(), seeker(), [1, 2], cycles=20),
+    "loop.track": lambda _: track(Pid(), "step:40:42", airflow_torque_nm=0.1),
+    "loop.track_many": lambda _: track_many({"pid": Pid()}, ["step:40:42"], [Throttle()]),
     "loop.simulate_drive": lambda _: simulate_drive(DemandChain(), [10.0, 60.0], 2000.0),
     "loop.EngineBench.steady_map": lambda _: EngineBench().steady_map([-10.0, -6.0]),
     "optimize.IterativeLearning.history": lambda _: learned(),

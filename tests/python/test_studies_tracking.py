@@ -1,0 +1,57 @@
+"""The study of the controllers: its rows, its cases, and what it claims, on few throttles."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+
+from mgdd.studies import run_study
+from mgdd.studies.throttle_tracking_cases import CASES, controllers_of, plant_of, row_of, run_case, throttles_of, warm_rows
+
+
+@pytest.fixture(scope="module")
+def few() -> dict[str, dict[str, float]]:
+    runs = run_case("unknown", "P1", 12)
+    return {str(kind): row_of("unknown", "P1", str(kind), runs) for kind in runs["controller"].to_numpy()}
+
+
+def test_the_guided_controller_is_not_beaten_where_it_says_so(few: dict[str, dict[str, float]]) -> None:
+    guided = few.pop("guided")
+    assert guided["limit_cycles"] == 0
+    assert guided["variation_rest"] < 0.01 < min(row["variation_rest"] for row in few.values())
+    for name in ("large_p95_ms", "small_p95_ms", "up_p95_ms", "down_p95_ms", "sine_mse_deg2"):
+        assert guided[name] <= 1.2 * min(row[name] for row in few.values()), name
+
+
+def test_far_throttles_unsettle_the_baselines_only() -> None:
+    runs = run_case("far", "P1", 16)
+    rows = {kind: row_of("far", "P1", kind, runs) for kind in ("guided", "linear_mpc", "pid")}
+    assert rows["guided"]["limit_cycles"] == 0
+    assert rows["guided"]["small_p95_ms"] < min(rows["linear_mpc"]["small_p95_ms"], rows["pid"]["small_p95_ms"])
+
+
+@pytest.mark.parametrize("name", CASES)
+def test_a_case_does_what_it_says(name: str) -> None:
+    case = CASES[name]
+    throttles = throttles_of(case, "P1", 3)
+    assert throttles == throttles_of(case, "P1", 3)
+    assert len({throttle.coulomb_nm for throttle in throttles}) == 3
+    assert all((throttle.friction == "lugre") == case.bristles for throttle in throttles)
+    known = controllers_of(case, plant_of("P1"))
+    assert list(known) == list(case.controllers)
+
+
+def test_what_was_learnt_is_worth_knowing_it() -> None:
+    rows = {(row["wrong"], row["controller"]): row for row in warm_rows("P1", 5)}
+    for wrong in ("friction 40 % higher", "preload 40 % higher"):
+        for column in ("sine_mse_deg2", "crossing_mse_deg2"):
+            assert rows[wrong, "after 2 s"][column] <= 1.25 * rows[wrong, "known"][column]
+
+
+def test_the_study_runs_and_draws() -> None:
+    result = run_study("throttle-tracking", seeds=2, quick=True)
+    assert [row["controller"] for row in result.summary["rows"]] == list(CASES["unknown"].controllers)
+    assert set(result.dataset["settling_ms"].dims) == {"preset", "throttle", "controller", "reference"}
+    assert np.isfinite(result.dataset["mse_deg2"].to_numpy()).all()
+    (figure,) = result.figures.values()
+    assert len(figure.axes) == 4
