@@ -28,7 +28,8 @@ class Planned:
     def __init__(self, plan: np.ndarray, before: float, after: float, step: int) -> None:
         self.plan, self.before, self.after, self.first, self.k = plan, before, after, step, -1
 
-    def step(self, reference_deg: float, measurement_deg: float) -> float:
+    def step(self, _reference_deg: float, _measurement_deg: float) -> float:
+        """Give the next duty of the plan, whatever is measured."""
         self.k += 1
         at = self.k - self.first
         if at < 0:

@@ -14,9 +14,9 @@ import xarray as xr
 
 import mgdd
 from mgdd import guide, identify, io, optimize, signals, surrogate, throttle
+from mgdd.control import Pid
 from mgdd.engine import Cylinder, OperatingPoint, fit_nox_proxy, timing_sweep
 from mgdd.io.checks import check_trace
-from mgdd.control import Pid
 from mgdd.loop import EngineBench, Reference, simulate_drive, track, track_many
 from mgdd.signals.even_grid import even_step
 from mgdd.signals.metrics import mse
@@ -177,7 +177,9 @@ CALLS: dict[str, tuple[Call, tuple[Array, ...]]] = {
     ),
     "loop.track_many": (
         lambda air: track_many(
-            {"pid": Pid()}, [Reference(angle_deg=np.linspace(20.0, 30.0, len(air)), name="ramp")], [throttle.Throttle()],
+            {"pid": Pid()},
+            [Reference(angle_deg=np.linspace(20.0, 30.0, len(air)), name="ramp")],
+            [throttle.Throttle()],
             airflow_torque_nm={"ramp": air},
         )["mse_deg2"].to_numpy(),
         (1e-3 * OPEN,),

@@ -16,11 +16,11 @@ import xarray as xr
 
 import mgdd
 from mgdd import datasets, identify, optimize, presets, signals, surrogate
+from mgdd.control import Pid
 from mgdd.engine import Cylinder, OperatingPoint, analyze, convergence, sensitivities, simulate, timing_sweep
 from mgdd.guide import FeedForward, GuidedEngine, ModelOptimum, OnlineCalibration, TimingMap
 from mgdd.identify.throttle.validation import ThrottleValidation
 from mgdd.io import pressure_trace, read_pressure, read_throttle_log, throttle_log, write_throttle_log
-from mgdd.control import Pid
 from mgdd.loop import EngineBench, monte_carlo, run_seeker, simulate_drive, track, track_many
 from mgdd.results import FitReport
 from mgdd.results.labels import check_labels

@@ -6,7 +6,15 @@ import numpy as np
 import pytest
 
 from mgdd.studies import run_study
-from mgdd.studies.throttle_tracking_cases import CASES, controllers_of, plant_of, row_of, run_case, throttles_of, warm_rows
+from mgdd.studies.throttle_tracking_cases import (
+    CASES,
+    controllers_of,
+    plant_of,
+    row_of,
+    run_case,
+    throttles_of,
+    warm_rows,
+)
 
 
 @pytest.fixture(scope="module")

@@ -6,7 +6,7 @@ import collections.abc
 import numpy
 import numpy.typing
 import typing
-__all__: list[str] = ['GuidedPredictive', 'Pid', 'SlidingMode']
+__all__: list[str] = ['GuidedPredictive', 'Pid', 'SlidingMode', 'ThrottleSupervisor']
 class Pid:
     """
     PID controller of a throttle plate, one sample at a time.
@@ -249,8 +249,8 @@ class GuidedPredictive:
     what is measured corrects the model while it runs. The default learns dry friction as two levels per side of limp-home
     gain and damping, asks the model for the duty at which the plate breaks away, and holds still inside the friction band.
     ``friction_learning=False`` is the plain form, ``prediction="linear"`` the usual linear MPC, more `gauss_newton_steps`
-    the converged nonlinear one. Keyword-only; the defaults fit the throttle ``P1``. `mgdd.control.tuned` makes one for
-    another throttle; ``GuidedPredictive.fields()`` lists bounds and defaults.
+    the converged nonlinear one. Keyword-only; the defaults fit the throttle ``P1``. `mgdd.loop.tuned_controller` makes one
+    for another throttle; ``GuidedPredictive.fields()`` lists bounds and defaults.
     
     Parameters
     ----------
@@ -312,7 +312,7 @@ class GuidedPredictive:
     See Also
     --------
     Mgdd1 : the plainest form, guided by the outputs of any model.
-    tuned : controllers for a throttle, all tuned alike.
+    mgdd.loop.tuned_controller : controllers for a throttle, all tuned alike.
     
     References
     ----------
@@ -399,6 +399,175 @@ class GuidedPredictive:
     @learnt.setter
     def learnt(self, arg1: collections.abc.Mapping[str, typing.SupportsFloat | typing.SupportsIndex]) -> None:
         ...
+    @property
+    def settings(self) -> dict:
+        """
+        All settings as a new dict: keywords that make the controller again.
+        """
+    @property
+    def state(self) -> dict[str, list[float]]:
+        """
+        What a run needs to go on bit for bit; a state that the settings do not allow is refused and changes nothing.
+        """
+    @state.setter
+    def state(self, arg1: collections.abc.Mapping[str, collections.abc.Sequence[typing.SupportsFloat | typing.SupportsIndex]]) -> None:
+        ...
+class ThrottleSupervisor:
+    """
+    Supervisor of a throttle controller: bad input, faults, and the safe state.
+    
+    Sees every sample before and after the controller. It bridges short gaps (mode ``holding``), limits the reference
+    (``limited``), and opens the bridge so that the springs bring the plate to limp-home (``limp_home``), within 50 ms of what
+    it can see. The last two stay until `acknowledge` finds the cause gone. Keyword-only; the defaults fit the throttle
+    ``P1``. ``ThrottleSupervisor.fields()`` lists bounds and defaults. Not a certified safety function.
+    
+    Parameters
+    ----------
+    sample_s : float
+        Time between samples [s].
+    closed_deg, open_deg : float
+        Travel; the reference is limited to it [deg].
+    limited_open_deg : float
+        Largest reference while the supply is low [deg].
+    late_s, silence_s : float
+        Age beyond which an angle is not used, and time without a usable reference, angle or duty that opens [s].
+    range_margin_deg, disagreement_deg, sensor_s : float
+        What a sensor may say beyond the travel, by what both may differ [deg], and the time of either that opens [s].
+    nominal_supply_v, supply_low_v, supply_lost_v, supply_s : float
+        Supply to which duties belong, below which the reference is limited, below which the bridge opens [V], and for how
+        long [s].
+    limp_home_deg, ramp_deg, preload_above, spring_above_per_deg, preload_below, spring_below_per_deg : float
+        The springs in duty, as in `Pid`.
+    friction : float
+        Duty against dry friction at breakaway [-].
+    gain_deg_per_s2, time_constant_s : float
+        Acceleration per duty [deg/s²] and time constant of the speed [s], as in `SlidingMode`.
+    uncertainty, load : float
+        Share by which springs and friction may differ from these, and duty that the air may add [-].
+    jam_error_deg, jam_move_deg, jam_s : float
+        Error that demands a move, and the move [deg] that a pushed plate must make within that time [s].
+    balance_lag_s, spring_band_deg, spring_evidence_s : float
+        Two lags of the balance [s], distance from limp-home without a check of the springs [deg], and the duty beyond what a
+        whole spring allows, summed over time, that opens [s].
+    tracking_error_deg, tracking_s : float
+        Error [deg] that must not last [s].
+    overload_duty, overload_s : float
+        Duty [-] that must not last away from the stops [s].
+    limp_home_band_deg, return_s : float
+        The plate is at limp-home so near to it [deg], and must be after that time with the bridge open [s].
+    healthy_s : float
+        Time without any reason before an acknowledgement counts [s].
+    
+    Raises
+    ------
+    mgdd.errors.ParameterError
+        A setting outside its domain, naming field, value and bound.
+    
+    See Also
+    --------
+    SupervisedController : a controller and its supervisor as one object.
+    mgdd.loop.ThrottleFault : faults to try it on.
+    
+    Notes
+    -----
+    Reasons: ``missing_reference``, ``reference_range``, ``missing_sample``, ``stale_sample``, ``sensor_range``,
+    ``sensor_disagreement``, ``invalid_duty``, ``supply_low``, ``supply_lost``, ``jammed``, ``spring_lost``, ``tracking``
+    and ``overload``; ``none`` while nothing was wrong since the last acknowledgement.
+    
+    References
+    ----------
+    Bosch Motorsport, manual of the MS 6 engine control (sum and range of the sensors).
+    Ohnishi et al. (1996), Motion control for advanced mechatronics (disturbance observer).
+    Page (1954), Continuous inspection schemes.
+    
+    Examples
+    --------
+    >>> from mgdd.control import ThrottleSupervisor
+    >>> supervisor = ThrottleSupervisor()
+    >>> supervisor.observe(95.0, (60.0, 60.1), supply_v=12.0)
+    (90.0, 60.0)
+    >>> supervisor.decide(0.3), supervisor.mode, supervisor.reason
+    ((0.3, False), 'limited', 'reference_range')
+    """
+    @staticmethod
+    def fields() -> dict:
+        """
+        Every setting by name: unit, bounds or choices, meaning, default.
+        """
+    def __getstate__(self) -> tuple[int, dict, dict[str, list[float]]]:
+        ...
+    def __init__(self, *, sample_s: typing.SupportsFloat | typing.SupportsIndex = 0.001, closed_deg: typing.SupportsFloat | typing.SupportsIndex = 0.0, open_deg: typing.SupportsFloat | typing.SupportsIndex = 90.0, limited_open_deg: typing.SupportsFloat | typing.SupportsIndex = 40.0, late_s: typing.SupportsFloat | typing.SupportsIndex = 0.003, silence_s: typing.SupportsFloat | typing.SupportsIndex = 0.02, range_margin_deg: typing.SupportsFloat | typing.SupportsIndex = 6.75, disagreement_deg: typing.SupportsFloat | typing.SupportsIndex = 4.5, sensor_s: typing.SupportsFloat | typing.SupportsIndex = 0.02, nominal_supply_v: typing.SupportsFloat | typing.SupportsIndex = 12.0, supply_low_v: typing.SupportsFloat | typing.SupportsIndex = 9.0, supply_lost_v: typing.SupportsFloat | typing.SupportsIndex = 6.0, supply_s: typing.SupportsFloat | typing.SupportsIndex = 0.02, limp_home_deg: typing.SupportsFloat | typing.SupportsIndex = 8.0, ramp_deg: typing.SupportsFloat | typing.SupportsIndex = 0.5, preload_above: typing.SupportsFloat | typing.SupportsIndex = 0.1292, spring_above_per_deg: typing.SupportsFloat | typing.SupportsIndex = 0.000496, preload_below: typing.SupportsFloat | typing.SupportsIndex = 0.1292, spring_below_per_deg: typing.SupportsFloat | typing.SupportsIndex = 0.000496, friction: typing.SupportsFloat | typing.SupportsIndex = 0.098, gain_deg_per_s2: typing.SupportsFloat | typing.SupportsIndex = 83597.0, time_constant_s: typing.SupportsFloat | typing.SupportsIndex = 0.0197, uncertainty: typing.SupportsFloat | typing.SupportsIndex = 0.3, load: typing.SupportsFloat | typing.SupportsIndex = 0.04, jam_error_deg: typing.SupportsFloat | typing.SupportsIndex = 2.0, jam_move_deg: typing.SupportsFloat | typing.SupportsIndex = 0.5, jam_s: typing.SupportsFloat | typing.SupportsIndex = 0.04, balance_lag_s: typing.SupportsFloat | typing.SupportsIndex = 0.006, spring_band_deg: typing.SupportsFloat | typing.SupportsIndex = 3.0, spring_evidence_s: typing.SupportsFloat | typing.SupportsIndex = 0.0004, tracking_error_deg: typing.SupportsFloat | typing.SupportsIndex = 8.0, tracking_s: typing.SupportsFloat | typing.SupportsIndex = 0.5, overload_duty: typing.SupportsFloat | typing.SupportsIndex = 0.9, overload_s: typing.SupportsFloat | typing.SupportsIndex = 1.0, limp_home_band_deg: typing.SupportsFloat | typing.SupportsIndex = 1.0, return_s: typing.SupportsFloat | typing.SupportsIndex = 0.4, healthy_s: typing.SupportsFloat | typing.SupportsIndex = 0.05) -> None:
+        ...
+    def __repr__(self) -> str:
+        ...
+    def __setstate__(self, arg0: tuple) -> None:
+        ...
+    def acknowledge(self) -> str:
+        """
+        Back to normal where the cause is gone: nothing wrong for `healthy_s`, and an open bridge has brought the plate to limp-home.
+        
+        Returns the reason that stands, ``'none'`` where it was accepted.
+        """
+    def decide(self, duty: typing.SupportsFloat | typing.SupportsIndex) -> tuple[float, bool]:
+        """
+        Second half of a sample: duty [-] for the bridge and whether it is open, for the duty that the controller asks for.
+        """
+    def observe(self, reference_deg: typing.SupportsFloat | typing.SupportsIndex, angles_deg: typing.Annotated[collections.abc.Sequence[typing.SupportsFloat | typing.SupportsIndex], "FixedSize(2)"], *, age_s: typing.SupportsFloat | typing.SupportsIndex = 0.0, supply_v: typing.SupportsFloat | typing.SupportsIndex | None = None, sensor_fault: bool = False) -> tuple[float, float]:
+        """
+        First half of a sample, before the controller.
+        
+        Parameters
+        ----------
+        reference_deg : float
+            What is asked for [deg]; NaN where nothing arrived.
+        angles_deg : pair of float
+            What each sensor alone says [deg]; NaN where nothing arrived.
+        age_s : float
+            Age of these angles [s].
+        supply_v : float, optional
+            Supply of the bridge [V]; unknown if left out.
+        sensor_fault : bool
+            From a check of the sensors elsewhere.
+        
+        Returns
+        -------
+        tuple of float
+            Reference and angle that the controller shall use [deg].
+        """
+    def reset(self) -> None:
+        """
+        As made.
+        """
+    @property
+    def bridge_open(self) -> bool:
+        """
+        Whether the bridge is open.
+        """
+    @property
+    def duty(self) -> float:
+        """
+        Duty of the last sample [-].
+        """
+    @property
+    def imbalance(self) -> float:
+        """
+        Duty that springs, inertia and back-EMF do not explain [-].
+        """
+    @property
+    def mode(self) -> str:
+        """
+        Mode of the last sample: ``normal``, ``holding``, ``limited`` or ``limp_home``.
+        """
+    @property
+    def reason(self) -> str:
+        """
+        Reason of the mode, or the last one since it was acknowledged.
+        """
+    @property
+    def return_test(self) -> str:
+        """
+        Whether the open bridge has brought the plate to limp-home: ``none`` (not open), ``pending``, ``passed`` or ``failed``.
+        """
     @property
     def settings(self) -> dict:
         """

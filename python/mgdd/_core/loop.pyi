@@ -10,7 +10,7 @@ import mgdd._core.throttle
 import numpy
 import numpy.typing
 import typing
-__all__: list[str] = ['EngineBench', 'Mgdd1', 'SensorDynamics', 'VirtualThrottle', 'monte_carlo', 'run_loop', 'step_times_us', 'track_throttle', 'track_throttles', 'tracking_figures']
+__all__: list[str] = ['EngineBench', 'Mgdd1', 'SensorDynamics', 'VirtualThrottle', 'monte_carlo', 'run_loop', 'step_times_us', 'throttle_fault_kinds', 'track_throttle', 'track_throttles', 'tracking_figures']
 class SensorDynamics:
     """
     Transport delay, first-order lag and noise of a gas sensor.
@@ -274,3 +274,4 @@ def tracking_figures(*, reference_deg: typing.Annotated[numpy.typing.ArrayLike, 
     """
     How well a reference was followed.
     """
+throttle_fault_kinds: tuple = ('jammed', 'jammed_at', 'spring_above', 'spring_below', 'supply_sag', 'missing_sample', 'nan_sample', 'stale_sample')

@@ -310,6 +310,7 @@ def _run_in_python(
             duty=out["duty"][k - delay_samples] if k >= delay_samples else 0.0,
             supply_v=supply[k] if len(supply) else still["supply_v"],
             airflow_torque_nm=airflow[k] if len(airflow) else 0.0,
+            bridge_open=False,
         )
         measured = values["sensed_angle_deg"]
         for name in names[:-1]:

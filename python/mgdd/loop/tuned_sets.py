@@ -1,8 +1,8 @@
 """Numbers that `mgdd.loop.tune_controller` found for each kind of controller and each preset.
 
 Protocol: 20 throttles within 20% of the preset (P1 with stiction of 0.3 N m), a budget of
-400 runs of the whole set for every kind, seed 7, noise of 0.03 deg, a delay of one sample; the controller knows
-the preset only.
+400 runs of the whole set for every kind, seed 7, noise of 0.03 deg, a delay of one sample; the
+controller knows the preset only.
 Written by ``tools/tune_controllers.py``.
 """
 
@@ -15,37 +15,37 @@ __all__ = ["TUNED_SETS"]
 TUNED_SETS: Mapping[str, Mapping[str, Mapping[str, float]]] = {
     "guided": {
         "P1": {
-            "first_move": 2.278,
-            "second_move": 7.544,
-            "duty_change_weight": 0.3255,
-            "speed_weight": 9.095e-06,
-            "observer_angle_per_s": 455.8,
-            "observer_speed_per_s2": 52810.0,
-            "learning_rate_per_s": 238.0,
-            "gain_weight": 11.94,
-            "damping_weight": 60.74,
+            "first_move": 2.182,
+            "second_move": 7.709,
+            "duty_change_weight": 0.361,
+            "speed_weight": 8.415e-06,
+            "observer_angle_per_s": 424.6,
+            "observer_speed_per_s2": 49370.0,
+            "learning_rate_per_s": 148.4,
+            "gain_weight": 13.54,
+            "damping_weight": 55.97,
         },
         "P2": {
-            "first_move": 1.502,
-            "second_move": 8.01,
-            "duty_change_weight": 0.3952,
-            "speed_weight": 5.764e-06,
-            "observer_angle_per_s": 470.4,
-            "observer_speed_per_s2": 35900.0,
-            "learning_rate_per_s": 240.5,
-            "gain_weight": 19.44,
-            "damping_weight": 91.97,
+            "first_move": 2.421,
+            "second_move": 7.841,
+            "duty_change_weight": 0.5695,
+            "speed_weight": 3.901e-06,
+            "observer_angle_per_s": 470.9,
+            "observer_speed_per_s2": 44460.0,
+            "learning_rate_per_s": 138.3,
+            "gain_weight": 38.79,
+            "damping_weight": 139.5,
         },
         "P3": {
-            "first_move": 2.314,
-            "second_move": 5.244,
-            "duty_change_weight": 0.5537,
-            "speed_weight": 2.692e-06,
-            "observer_angle_per_s": 346.4,
-            "observer_speed_per_s2": 26480.0,
-            "learning_rate_per_s": 188.2,
-            "gain_weight": 4.458,
-            "damping_weight": 49.74,
+            "first_move": 2.371,
+            "second_move": 6.477,
+            "duty_change_weight": 0.4477,
+            "speed_weight": 7.698e-06,
+            "observer_angle_per_s": 367.9,
+            "observer_speed_per_s2": 34090.0,
+            "learning_rate_per_s": 126.6,
+            "gain_weight": 6.816,
+            "damping_weight": 59.22,
         },
     },
     "mgdd1": {
@@ -186,14 +186,14 @@ TUNED_SETS: Mapping[str, Mapping[str, Mapping[str, float]]] = {
             "trim_rate_per_deg_s": 0.09889,
         },
         "P3": {
-            "first_move": 4.0,
-            "second_move": 6.0,
-            "duty_change_weight": 20.0,
-            "speed_weight": 1e-07,
-            "observer_angle_per_s": 430.0,
-            "observer_speed_per_s2": 35000.0,
-            "bias_rate_per_deg_s": 4.0,
-            "trim_rate_per_deg_s": 0.3,
+            "first_move": 1.189,
+            "second_move": 3.497,
+            "duty_change_weight": 0.3472,
+            "speed_weight": 1.54e-05,
+            "observer_angle_per_s": 245.3,
+            "observer_speed_per_s2": 63270.0,
+            "bias_rate_per_deg_s": 4.15,
+            "trim_rate_per_deg_s": 0.1914,
         },
     },
 }

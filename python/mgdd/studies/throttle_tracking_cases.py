@@ -5,7 +5,7 @@ from __future__ import annotations
 import math
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING, Any, cast
 
 import numpy as np
 
@@ -30,13 +30,13 @@ _REST_S = 2.0
 
 
 def plant_of(preset: str) -> Throttle:
-    """Throttle of a preset as the study takes it: P1 with stiction of 0.3 N m."""
+    """Give the throttle of a preset as the study takes it: P1 with stiction of 0.3 N m."""
     throttle = presets.load(preset, kind="throttle").throttle
     return throttle.replace(friction="stribeck", stiction_nm=0.3) if preset == "P1" else throttle
 
 
 def references() -> dict[str, Reference]:
-    """References by the name of their columns: steps into 2 % or 0.2 deg, a sine, and a rest after a step."""
+    """Give references by the name of their columns: steps into 2 % or 0.2 deg, a sine, and a rest after a step."""
     steps = {"large": (20.0, 60.0), "small": (40.0, 42.0), "up": (4.0, 20.0), "down": (20.0, 4.0)}
     out = {
         name: Reference.step(a, b, after_s=0.6, band_deg=max(0.2, 0.02 * abs(b - a))) for name, (a, b) in steps.items()
@@ -90,13 +90,16 @@ CASES: Mapping[str, Case] = {
 }
 
 
+def _guided(known: Throttle) -> GuidedPredictive:
+    return cast("GuidedPredictive", tuned_controller("guided", known))
+
+
 def controllers_of(case: Case, known: Throttle) -> dict[str, Any]:
-    """Controllers of a case by name; they know the throttle of the preset only."""
+    """Give the controllers of a case by name; they know the throttle of the preset only."""
     out: dict[str, Any] = {}
     for name in case.controllers:
         if name in case.settings:
-            base = tuned_controller("guided", known)
-            assert isinstance(base, GuidedPredictive)
+            base = _guided(known)
             out[name] = GuidedPredictive(**{**base.settings, "speed_weight": 0.0, **case.settings[name]})
         else:
             out[name] = tuned_controller(name, known)
@@ -198,12 +201,10 @@ def warm_rows(preset: str, n: int) -> list[dict[str, Any]]:
         plant = known.replace(**{name: 1.4 * getattr(known, name) for name in names})
         mse: dict[str, list[list[float]]] = {"cold": [], "after 2 s": [], "known": []}
         for seed in range(n):
-            cold = tuned_controller("guided", known)
-            warm, exact = tuned_controller("guided", known), tuned_controller("guided", plant)
+            cold = _guided(known)
+            warm, exact = _guided(known), _guided(plant)
             track(warm, driving, throttle=plant, delay_samples=DELAY_SAMPLES, seed=1000 + seed)
-            assert isinstance(warm, GuidedPredictive)
-            start = tuned_controller("guided", known)
-            assert isinstance(start, GuidedPredictive)
+            start = _guided(known)
             start.learnt = warm.learnt
             for label, controller in (("cold", cold), ("after 2 s", start), ("known", exact)):
                 state = controller.state

@@ -2,8 +2,10 @@
 // helps, limits hold in every sample, a wanted output that stays takes one sweep.
 #include "mgdd/control/receding_horizon.hpp"
 
+#include <algorithm>
 #include <cmath>
 #include <limits>
+#include <string_view>
 #include <vector>
 
 #include <gtest/gtest.h>
@@ -17,13 +19,21 @@ namespace {
 using namespace test_support;
 
 constexpr double nan = std::numeric_limits<double>::quiet_NaN();
+template <class Table>
+std::size_t index_of(const Table& table, std::string_view name) {
+  const auto at = std::ranges::find(table, name, &FieldInfo::name);
+  return static_cast<std::size_t>(at - table.begin());
+}
+
 /// The plate with a lag of its current and a duty that acts 1.4 samples late.
 auto plate(double delay_samples) {
   throttle::FirstPrinciple family;
   family.friction = throttle::Friction::tanh;
-  family.delay_samples = delay_samples;
   family.substeps = 1;
-  return family.prepare(throttle::first_principle_of(throttle::Throttle{}), 2e-3);
+  auto groups = throttle::first_principle_of(throttle::Throttle{});
+  const auto delay = index_of(throttle::FirstPrinciple::parameters, "delay_samples");
+  groups[delay] = delay_samples;
+  return family.prepare(groups, 2e-3);
 }
 using Plate = decltype(plate(0.0));
 

@@ -18,7 +18,7 @@ namespace mgdd::control {
 inline constexpr double least_damping_factor = 0.4;
 inline constexpr double largest_damping_factor = 2.5;
 /// Duty beyond the friction level, or taken by the speed, from which gain and damping are learnt.
-inline constexpr double least_excitation = 0.15;
+inline constexpr double least_excitation = 0.08;
 
 struct FrictionLearnerSettings {
   double rate_per_s = 150.0;     ///< share of what explains an innovation that is learnt, per time
