@@ -232,7 +232,7 @@ def smooth_throttle() -> Call:
 @batch
 def throttle_groups() -> Call:
     values = [0.5 * (bound.lower + bound.upper) for bound in _core.identify.throttle_group_bounds()]
-    frame = {"closed_deg": 0.0, "open_deg": 90.0, "ramp_deg": 0.25, "substeps": 2}
+    frame = {"closed_deg": 0.0, "open_deg": 90.0, "substeps": 2}
     return partial(_core.identify.simulate_throttle_groups, values, DUTY, step_s=1e-3, start=[10.0, 0.0, 0.0], **frame)
 
 

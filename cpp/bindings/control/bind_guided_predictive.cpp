@@ -153,7 +153,7 @@ void bind_guided_predictive(py::module_& m) {
         const auto ahead = to_column(preview, "preview_deg");
         return self.step(reference, measured, ahead);
       },
-      py::arg("reference_deg"), py::arg("measurement_deg"), py::kw_only(), py::arg("preview_deg"),
+      py::arg("reference_deg"), py::arg("measurement_deg"), py::arg("preview_deg"),
       "The same with the references of the next samples [deg]; a short preview goes on at its last value.");
   cls.def("prepare", &GuidedPredictive::prepare,
           "The part of the next sample that needs no measurement; `step` then does the rest.");

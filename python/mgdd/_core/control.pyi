@@ -366,7 +366,7 @@ class GuidedPredictive:
         NaN repeats the last value; before the first ones the duty is 0.
         """
     @typing.overload
-    def step(self, reference_deg: typing.SupportsFloat | typing.SupportsIndex, measurement_deg: typing.SupportsFloat | typing.SupportsIndex, *, preview_deg: typing.Annotated[numpy.typing.ArrayLike, numpy.float64]) -> float:
+    def step(self, reference_deg: typing.SupportsFloat | typing.SupportsIndex, measurement_deg: typing.SupportsFloat | typing.SupportsIndex, preview_deg: typing.Annotated[numpy.typing.ArrayLike, numpy.float64]) -> float:
         """
         The same with the references of the next samples [deg]; a short preview goes on at its last value.
         """

@@ -49,9 +49,9 @@ class Reference:
     --------
     >>> from mgdd.loop import Reference
     >>> step = Reference.parse("step:20:60")
-    >>> step.angle_deg[499], step.angle_deg[500], step.from_s
-    (20.0, 60.0, 0.5)
-    >>> Reference.parse("sine:40:10:1").angle_deg.max().round(6)
+    >>> step.angle_deg[498:502].tolist(), step.from_s
+    ([20.0, 20.0, 60.0, 60.0], 0.5)
+    >>> round(float(Reference.parse("sine:40:10:1").angle_deg.max()), 6)
     50.0
     """
 

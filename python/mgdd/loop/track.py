@@ -113,7 +113,7 @@ def track(
     >>> from mgdd.loop import track
     >>> run = track(GuidedPredictive(), "step:40:42", seed=1)
     >>> float(run["settling_ms"]) < 30.0, run["settling_ms"].units
-    (True, 'millisecond')
+    (True, 'ms')
     """
     wanted = _reference_of(reference)
     plant = _plant(throttle, wanted, start_deg, sensors or sensors_of(noise_deg), seed)
