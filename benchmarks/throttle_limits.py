@@ -13,9 +13,10 @@ import argparse
 
 import numpy as np
 
-from mgdd import presets
 from mgdd.loop import Reference, track, tuned_controller
 from mgdd.loop.controller_families import FAMILIES
+from mgdd.studies.throttle_baselines import throttle_of
+from mgdd.studies.throttle_tracking_cases import driving
 from mgdd.throttle import Throttle
 
 SEEDS = 11
@@ -35,11 +36,6 @@ class Planned:
         if at < 0:
             return self.before
         return float(self.plan[at]) if at < len(self.plan) else self.after
-
-
-def plant_of(preset: str) -> Throttle:
-    throttle = presets.load(preset, kind="throttle").throttle
-    return throttle.replace(friction="stribeck", stiction_nm=0.3) if preset == "P1" else throttle
 
 
 def holding(throttle: Throttle, angle_deg: float) -> float:
@@ -80,12 +76,6 @@ def limit_ms(throttle: Throttle, start: float, end: float) -> float:
     return float(best)
 
 
-def driving() -> Reference:
-    time_s = np.arange(2000) * 1e-3
-    waves = 32.0 + 20.0 * np.sin(4.2 * time_s) + 9.0 * np.sin(14.6 * time_s + 1.0) - 40.0 * (time_s % 0.7 > 0.55)
-    return Reference(angle_deg=np.clip(waves, 2.0, 85.0), name="driving")
-
-
 def median_ms(kind: str, throttle: Throttle, start: float, end: float, *, warm: bool) -> float:
     reference = Reference.step(start, end, after_s=0.6, band_deg=max(0.2, 0.02 * abs(end - start)))
     found = []
@@ -104,7 +94,7 @@ def main() -> None:
     parser.add_argument("--quick", action="store_true", help="P1 and the small step only")
     quick = parser.parse_args().quick
     for preset in ("P1",) if quick else ("P1", "P2", "P3"):
-        throttle = plant_of(preset)
+        throttle = throttle_of(preset)
         for start, end in CASES[: 1 if quick else None]:
             limit = limit_ms(throttle, start, end)
             print(f"{preset} {start:g} -> {end:g} deg: limit {limit:.0f} ms")

@@ -10,11 +10,10 @@ from __future__ import annotations
 import sys
 from pathlib import Path
 
-from mgdd import presets
 from mgdd.loop import tune_controller
 from mgdd.loop.controller_families import FAMILIES
 from mgdd.loop.tuned_sets import TUNED_SETS
-from mgdd.throttle import Throttle
+from mgdd.studies.throttle_baselines import throttle_of
 
 N_THROTTLES, SPREAD, BUDGET, SEED = 20, 0.2, 400, 7
 TARGET = Path(__file__).resolve().parents[1] / "python/mgdd/loop/tuned_sets.py"
@@ -34,12 +33,6 @@ from collections.abc import Mapping
 __all__ = ["TUNED_SETS"]
 
 TUNED_SETS: Mapping[str, Mapping[str, Mapping[str, float]]] = '''
-
-
-def plant_of(preset: str) -> Throttle:
-    """Throttle of a preset as the study of controllers takes it."""
-    throttle = presets.load(preset, kind="throttle").throttle
-    return throttle.replace(friction="stribeck", stiction_nm=0.3) if preset == "P1" else throttle
 
 
 def written(sets: dict[str, dict[str, dict[str, float]]]) -> str:
@@ -62,7 +55,7 @@ def main() -> None:
     for kind in kinds:
         for preset in ("P1", "P2", "P3"):
             found = tune_controller(
-                kind, plant_of(preset), n_throttles=N_THROTTLES, spread=SPREAD, budget=BUDGET, seed=SEED
+                kind, throttle_of(preset), n_throttles=N_THROTTLES, spread=SPREAD, budget=BUDGET, seed=SEED
             )
             print(f"{kind} {preset}: {found.start_cost:.3f} -> {found.cost:.3f}  {dict(found.numbers)}", flush=True)
             sets[kind][preset] = dict(found.numbers)

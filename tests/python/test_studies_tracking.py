@@ -6,10 +6,10 @@ import numpy as np
 import pytest
 
 from mgdd.studies import run_study
+from mgdd.studies.throttle_baselines import throttle_of
 from mgdd.studies.throttle_tracking_cases import (
     CASES,
     controllers_of,
-    plant_of,
     row_of,
     run_case,
     throttles_of,
@@ -45,7 +45,7 @@ def test_a_case_does_what_it_says(name: str) -> None:
     assert throttles == throttles_of(case, "P1", 3)
     assert len({throttle.coulomb_nm for throttle in throttles}) == 3
     assert all((throttle.friction == "lugre") == case.bristles for throttle in throttles)
-    known = controllers_of(case, plant_of("P1"))
+    known = controllers_of(case, throttle_of("P1"))
     assert list(known) == list(case.controllers)
 
 

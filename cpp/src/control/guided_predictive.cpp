@@ -2,11 +2,9 @@
 
 #include <algorithm>
 #include <cmath>
-#include <utility>
 
-#include "mgdd/control/move_qp.hpp"
+#include "mgdd/control/slow_trim.hpp"
 #include "mgdd/dynamics/lag.hpp"
-#include "mgdd/dynamics/predict.hpp"
 
 namespace mgdd::control {
 namespace {
@@ -20,7 +18,7 @@ constexpr double hold_share = 0.3;           // of the friction band that a held
 constexpr double hold_duty_per_s = 2.0;      // how fast it goes there
 constexpr double lead_s = 0.01;              // of the reference in the wanted direction
 constexpr double feed_forward_deg = 0.25;    // error at which a linear prediction feeds all friction forward
-constexpr double trim_from_deg = 0.08, trim_to_deg = 3.0, largest_trim = 0.25, largest_bias = 0.4;
+constexpr double largest_bias = 0.4;         // of the form without learning
 
 PlateFriction friction_form(const GuidedPredictiveSettings& s) noexcept {
   if (s.prediction == Prediction::linear) return PlateFriction::none;
@@ -76,7 +74,7 @@ FrictionBand<T>& BasicGuidedPredictive<T>::band_at(T angle_deg) noexcept {
 template <class T>
 void BasicGuidedPredictive<T>::prepare() noexcept {
   if (!started_ || prepared_) return;
-  const T acting = sent_[static_cast<std::size_t>(settings_.delay_samples)];
+  const T acting = sent_.before[static_cast<std::size_t>(settings_.delay_samples)];
   observed_.believe(belief_);
   mean_torque_ = observed_.mean_torque(state_, acting);
   observed_.step(state_, acting);
@@ -116,16 +114,16 @@ void BasicGuidedPredictive<T>::look_ahead(T measurement_deg, std::span<const T> 
   observed_.believe(belief_);
   horizon_.ahead = state_;
   for (int i = s.delay_samples - 1; i >= 0; --i)
-    observed_.step(horizon_.ahead, sent_[static_cast<std::size_t>(i)]);
+    observed_.step(horizon_.ahead, sent_.before[static_cast<std::size_t>(i)]);
   const T room = T(s.duty_rate_per_s * s.sample_s);
-  horizon_.before = sent_[0];
+  horizon_.before = sent_.before[0];
   horizon_.acting = duty_;
-  horizon_.lowest = std::max(T(s.lower), sent_[0] - room);
-  horizon_.highest = std::min(T(s.upper), sent_[0] + room);
+  horizon_.lowest = std::max(T(s.lower), sent_.before[0] - room);
+  horizon_.highest = std::min(T(s.upper), sent_.before[0] + room);
   const T per_step = T(s.prediction_step_s / s.sample_s);
   T last = reference_.value();
   std::size_t read = 0;
-  for (int k = 0; k < n_steps(); ++k) {
+  for (int k = 0; k < settings_.n_steps(); ++k) {
     T target = reference_.value() + reference_.rate() * T(s.prediction_step_s) * T(k + 1);
     if (!preview_deg.empty()) {
       const auto wanted = static_cast<std::size_t>(T(s.delay_samples) + per_step * T(k + 1));
@@ -136,7 +134,8 @@ void BasicGuidedPredictive<T>::look_ahead(T measurement_deg, std::span<const T> 
     horizon_.target[static_cast<std::size_t>(k)] = target;
   }
   // Where the plate should be soon: it leaves rest for that, and breaks away towards it.
-  const auto soon = static_cast<std::size_t>(std::min(n_steps(), static_cast<int>(lead_s / s.prediction_step_s)));
+  const auto soon =
+      static_cast<std::size_t>(std::min(settings_.n_steps(), static_cast<int>(lead_s / s.prediction_step_s)));
   horizon_.aim = preview_deg.empty() || soon == 0 ? reference_.value() : horizon_.target[soon - 1];
   horizon_.wanted = horizon_.aim - horizon_.ahead.angle_deg;
   if (preview_deg.empty()) horizon_.wanted += T(lead_s) * reference_.rate();
@@ -166,8 +165,9 @@ bool BasicGuidedPredictive<T>::hold_still() noexcept {
   const FrictionBand<T>& band = band_at(angle);
   const T middle = observed_.holding(angle) + band.bias, half = T(hold_share) * band.friction;
   const T most = T(hold_duty_per_s * s.sample_s);
-  const T wanted = std::clamp(sent_[0], middle - half, middle + half);
-  moves_.fill(std::clamp(std::clamp(wanted, sent_[0] - most, sent_[0] + most), horizon_.lowest, horizon_.highest));
+  const T wanted = std::clamp(sent_.before[0], middle - half, middle + half);
+  moves_.fill(std::clamp(std::clamp(wanted, sent_.before[0] - most, sent_.before[0] + most), horizon_.lowest,
+                         horizon_.highest));
   return true;
 }
 
@@ -179,83 +179,6 @@ void BasicGuidedPredictive<T>::break_away() noexcept {
   if (horizon_.wanted > T(0.0)) moves_[0] = std::max(moves_[0], duty.up + T(breakaway_margin));
   if (horizon_.wanted < T(0.0)) moves_[0] = std::min(moves_[0], duty.down - T(breakaway_margin));
   moves_[0] = std::clamp(moves_[0], horizon_.lowest, horizon_.highest);
-}
-
-template <class T>
-T BasicGuidedPredictive<T>::performance(std::span<const T> output) const noexcept {
-  const GuidedPredictiveSettings& s = settings_;
-  const T over_step = T(1.0 / s.prediction_step_s);
-  T sum = T(0.0), last_output = horizon_.ahead.angle_deg, last_move = horizon_.before;
-  for (std::size_t k = 0; k < output.size(); ++k) {
-    const T error = output[k] - horizon_.target[k], speed = (output[k] - last_output) * over_step;
-    const T beyond = output[k] - std::clamp(output[k], T(s.lowest_deg), T(s.highest_deg));
-    sum += T(s.error_weight) * error * error + T(s.speed_weight) * speed * speed +
-           T(s.angle_limit_weight) * beyond * beyond;
-    last_output = output[k];
-  }
-  for (const T move : moves_) {
-    sum += T(s.duty_change_weight) * (move - last_move) * (move - last_move);
-    last_move = move;
-  }
-  return sum;
-}
-
-// Gives whether the moves changed.
-template <class T>
-bool BasicGuidedPredictive<T>::gauss_newton() noexcept {
-  const GuidedPredictiveSettings& s = settings_;
-  const auto steps = static_cast<std::size_t>(n_steps());
-  std::array<T, longest_guided_horizon> outputs;
-  std::array<Moves, longest_guided_horizon> slopes;
-  const std::span<T> output(outputs.data(), steps);
-  dynamics::predict<n_guided_moves>(predicted_, horizon_.ahead, moves_, s.move_steps, output,
-                                    std::span<Moves>(slopes.data(), steps));
-  MoveQp<T, n_guided_moves> qp;
-  const T speed_weight = T(s.speed_weight / (s.prediction_step_s * s.prediction_step_s));
-  for (std::size_t k = 0; k < steps; ++k) {
-    qp.add(T(s.error_weight), output[k] - horizon_.target[k], slopes[k]);
-    if (speed_weight > T(0.0)) {
-      Moves change = slopes[k];
-      for (std::size_t i = 0; i < n && k > 0; ++i)
-        change[i] -= slopes[k - 1][i];
-      qp.add(speed_weight, output[k] - (k == 0 ? horizon_.ahead.angle_deg : output[k - 1]), change);
-    }
-    const T beyond = output[k] - std::clamp(output[k], T(s.lowest_deg), T(s.highest_deg));
-    if (beyond != T(0.0)) qp.add(T(s.angle_limit_weight), beyond, slopes[k]);
-  }
-  qp.add_changes(T(s.duty_change_weight), moves_, horizon_.before);
-  Moves low, high;
-  T room = T(s.duty_rate_per_s * s.sample_s);
-  for (std::size_t i = 0; i < n; ++i) {
-    low[i] = std::max(T(s.lower), horizon_.before - room) - moves_[i];
-    high[i] = std::min(T(s.upper), horizon_.before + room) - moves_[i];
-    room += T(s.duty_rate_per_s * s.prediction_step_s) * T(s.move_steps[i]);
-  }
-  const Moves before = moves_;
-  const auto moved = [&](T scale) {
-    const Moves change = qp.solve(low, high, T(1.0) + T(1e-3) * scale, T(1e-6) * scale);
-    T most = T(0.0);
-    for (std::size_t i = 0; i < n; ++i) {
-      moves_[i] = before[i] + change[i];
-      most = std::max(most, std::abs(change[i]));
-    }
-    return most > T(1e-5);
-  };
-  const bool changed = moved(T(1.0));
-  if (s.friction_learning || s.prediction == Prediction::linear || !changed) return changed;
-  // Not lower after the step: ten times the damping, once.
-  const Moves after = std::exchange(moves_, before);
-  const T performance_before = performance(output);
-  moves_ = after;
-  auto state = horizon_.ahead;
-  for (std::size_t i = 0, k = 0; i < n; ++i) {
-    for (int j = 0; j < s.move_steps[i]; ++j, ++k) {
-      predicted_.step(state, moves_[i]);
-      output[k] = state.angle_deg;
-    }
-  }
-  if (performance(output) < performance_before) return true;
-  return moved(T(10.0));
 }
 
 template <class T>
@@ -295,11 +218,9 @@ T BasicGuidedPredictive<T>::feedback(T reference_deg, T measurement_deg, std::sp
     }
     break_away();
   }
-  for (std::size_t i = sent_.size() - 1; i > 0; --i)
-    sent_[i] = sent_[i - 1];
-  const T missed = reference_.value() - measurement_deg;
-  if (!s.friction_learning && std::abs(missed) > T(trim_from_deg) && std::abs(missed) < T(trim_to_deg)) {
-    trim_ = std::clamp(trim_ + T(s.trim_rate_per_deg_s * s.sample_s) * missed, T(-largest_trim), T(largest_trim));
+  sent_.push(sent_.before[0]);  // the place of this sample's duty
+  if (!s.friction_learning) {
+    trim_ = trimmed(trim_, reference_.value() - measurement_deg, s.trim_rate_per_deg_s, s.sample_s);
   }
   return send();
 }
@@ -315,7 +236,7 @@ T BasicGuidedPredictive<T>::refine() noexcept {
 // The trim is not told to the model: it would take it for a disturbance and work against it.
 template <class T>
 T BasicGuidedPredictive<T>::send() noexcept {
-  sent_[0] = moves_[0];
+  sent_.before[0] = moves_[0];
   const T room = T(settings_.duty_rate_per_s * settings_.sample_s);
   duty_ = std::clamp(std::clamp(moves_[0] + trim_, T(settings_.lower), T(settings_.upper)), horizon_.acting - room,
                      horizon_.acting + room);

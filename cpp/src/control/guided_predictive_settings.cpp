@@ -1,8 +1,9 @@
+#include "mgdd/control/guided_predictive_settings.hpp"
+
 #include <array>
 #include <string>
 
 #include "mgdd/common/error.hpp"
-#include "mgdd/control/guided_predictive.hpp"
 
 namespace mgdd::control {
 namespace {

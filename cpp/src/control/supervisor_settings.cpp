@@ -47,7 +47,7 @@ constexpr std::array<Field<S>, n_supervisor_fields> table{{
     field<&S::time_constant_s>({"time_constant_s", "s", above(0.0, 1e3), "of the speed"}),
     field<&S::uncertainty>({"uncertainty", "-", closed(0.0, 10.0), "share by which springs and friction may differ"}),
     field<&S::load>({"load", "-", share, "duty that the air may add"}),
-    field<&S::jam_error_deg>({"jam_error_deg", "deg", width, "a smaller error is no demand to move"}),
+    field<&S::jam_error_deg>({"jam_error_deg", "deg", width, "a smaller error does not ask for a move"}),
     field<&S::jam_move_deg>({"jam_move_deg", "deg", width, "a plate that moves farther is not jammed"}),
     field<&S::jam_s>({"jam_s", "s", time, "time without that move: open"}),
     field<&S::balance_lag_s>({"balance_lag_s", "s", above(0.0, 1.0), "each of two lags of the balance"}),

@@ -43,6 +43,11 @@ class Groups:
         names += [f"preload_{side}" for side in _SIDES] + [f"spring_{side}_per_deg" for side in _SIDES]
         return {name: getattr(self, name) for name in names} | {"ramp_deg": 0.5}
 
+    @property
+    def motion(self) -> dict[str, Any]:
+        """Keywords of gain and time constant."""
+        return {"gain_deg_per_s2": self.gain_deg_per_s2, "time_constant_s": self.time_constant_s}
+
 
 def groups_of(model: Any) -> Groups:
     """Give the groups of a throttle, of PW-R, or of fitted first-principle groups; ParameterError for anything else."""
@@ -164,13 +169,12 @@ def _guided(groups: Groups, x: Mapping[str, float], setup: Setup, **fixed: Any) 
         sample_s=setup.sample_s,
         delay_samples=setup.delay_samples,
         noise_deg=setup.noise_deg,
-        gain_deg_per_s2=groups.gain_deg_per_s2,
-        time_constant_s=groups.time_constant_s,
         electrical_s=groups.electrical_s,
         friction=groups.friction,
         closed_deg=groups.closed_deg,
         open_deg=groups.open_deg,
         **groups.spring,
+        **groups.motion,
         **settings,
         **fixed,
     )
@@ -209,8 +213,6 @@ def _pid(groups: Groups, x: Mapping[str, float], setup: Setup) -> Pid:
 def _sliding_mode(groups: Groups, x: Mapping[str, float], setup: Setup) -> SlidingMode:
     return SlidingMode(
         sample_s=setup.sample_s,
-        gain_deg_per_s2=groups.gain_deg_per_s2,
-        time_constant_s=groups.time_constant_s,
         switching=x["switching"],
         layer_deg=x["layer_deg"],
         integral_per_s=x["integral_per_s"],
@@ -220,6 +222,7 @@ def _sliding_mode(groups: Groups, x: Mapping[str, float], setup: Setup) -> Slidi
         integral_layers=x["integral_layers"],
         reaching="implicit",
         **groups.spring,
+        **groups.motion,
     )
 
 

@@ -103,8 +103,8 @@ def simulate_drive(
 
     Notes
     -----
-    The speed is given: there is no vehicle. Torque follows the air without delay. C_T of the air's torque is a
-    placeholder of plausible shape.
+    The engine speed is an input; no vehicle is modelled. Torque follows the air without delay. C_T of the air torque
+    is a placeholder of plausible shape.
 
     Examples
     --------

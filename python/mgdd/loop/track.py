@@ -103,7 +103,7 @@ def track(
     Raises
     ------
     mgdd.errors.ParameterError
-        A bad setting, or an object that is no controller.
+        A bad setting, or a controller without ``step``.
     mgdd.errors.ShapeError
         Columns of different length.
 

@@ -4,9 +4,11 @@ from __future__ import annotations
 
 import math
 from dataclasses import dataclass
+from typing import Any
 
 from mgdd import presets
 from mgdd.control import Pid, SlidingMode, ThrottleSupervisor
+from mgdd.loop.controller_families import FAMILIES, Setup, groups_of
 from mgdd.throttle import Throttle
 
 __all__ = ["Baseline", "baselines", "controller_of", "settings_of", "supervisor_of", "throttle_of"]
@@ -53,73 +55,32 @@ def throttle_of(preset: str) -> Throttle:
     return throttle.replace(friction="stribeck", stiction_nm=0.3) if preset == "P1" else throttle
 
 
-def settings_of(baseline: Baseline) -> dict[str, float]:
+def settings_of(baseline: Baseline) -> dict[str, Any]:
     """Give the keywords of the controller: the tuned set in the units of `mgdd.control`, for its plant as it is."""
-    throttle, row = throttle_of(baseline.preset), baseline.tuned
-    coulomb = throttle.coulomb_nm / throttle.stall_torque_nm
-    known = _springs(throttle)
-    if baseline.kind is Pid:
-        for side in ("above", "below"):
-            known[f"proportional_{side}_per_deg"] = row[0] / 90.0
-            known[f"integral_{side}_per_deg_s"] = row[1] / 90.0
-            known[f"derivative_{side}_s_per_deg"] = row[2] / 90.0
-        motion = _motion(throttle)
-        return known | {
-            "kick": row[3] * coulomb,
-            "kick_width_deg": row[4],
-            "integral_window_deg": row[5],
-            "dead_band_deg": row[6],
-            "rate_s_per_deg": row[7] / (motion["time_constant_s"] * motion["gain_deg_per_s2"]),
-            "friction": row[8] * coulomb,
-        }
-    return (
-        known
-        | _motion(throttle)
-        | {
-            "switching": row[0],
-            "layer_deg": math.degrees(row[1]),
-            "integral_per_s": row[2],
-            "bandwidth_per_s": row[3],
-            "reference_pole_per_s": row[4],
-            "friction": row[5] * coulomb,
-            "integral_layers": row[6],
-        }
-    )
+    family = FAMILIES["pid" if baseline.kind is Pid else "sliding_mode"]
+    row = list(baseline.tuned)
+    if baseline.kind is SlidingMode:
+        row[1] = math.degrees(row[1])  # the layer stands in rad there
+    groups = groups_of(throttle_of(baseline.preset))
+    return family.build(groups, dict(zip(family.space, row, strict=True)), Setup()).settings
 
 
 def controller_of(baseline: Baseline, reaching: str = "boundary_layer") -> Controller:
     """Make the controller."""
-    if baseline.kind is Pid:
-        return Pid(**settings_of(baseline))
-    return SlidingMode(reaching=reaching, **settings_of(baseline))
+    settings = settings_of(baseline)
+    return Pid(**settings) if baseline.kind is Pid else SlidingMode(**{**settings, "reaching": reaching})
 
 
 def supervisor_of(preset: str) -> ThrottleSupervisor:
     """Make a supervisor that knows the groups of a preset and the time in which its springs return the plate."""
     throttle = throttle_of(preset)
-    stall_nm = throttle.stall_torque_nm
+    groups = groups_of(throttle)
     return ThrottleSupervisor(
         closed_deg=throttle.closed_deg,
         open_deg=throttle.open_deg,
         nominal_supply_v=throttle.supply_v,
-        friction=throttle.stiction_nm / stall_nm,
+        friction=throttle.stiction_nm / throttle.stall_torque_nm,
         return_s=RETURN_S[preset],
-        **_springs(throttle),
-        **_motion(throttle),
+        **groups.spring,
+        **groups.motion,
     )
-
-
-def _springs(throttle: Throttle) -> dict[str, float]:
-    known = {"limp_home_deg": throttle.limp_home_deg}
-    for side in ("above", "below"):
-        known[f"preload_{side}"] = getattr(throttle, f"preload_{side}_nm") / throttle.stall_torque_nm
-        stiffness = math.radians(getattr(throttle, f"spring_{side}_nm_per_rad"))
-        known[f"spring_{side}_per_deg"] = stiffness / throttle.stall_torque_nm
-    return known
-
-
-def _motion(throttle: Throttle) -> dict[str, float]:
-    return {
-        "gain_deg_per_s2": math.degrees(throttle.stall_torque_nm / throttle.inertia_kgm2),
-        "time_constant_s": throttle.inertia_kgm2 / throttle.damping_nms_per_rad,
-    }

@@ -11,10 +11,10 @@ from mgdd.loop import track, tuned_controller
 from mgdd.loop.controller_families import FAMILIES
 from mgdd.results.labels import labelled_dataset, to_jsonable
 from mgdd.studies.base import Progress, StudyResult, check_seeds, finish, run_parts
+from mgdd.studies.throttle_baselines import throttle_of
 from mgdd.studies.throttle_tracking_cases import (
     CASES,
     DELAY_SAMPLES,
-    plant_of,
     references,
     row_of,
     run_case,
@@ -135,7 +135,7 @@ def _draw(dataset: xr.Dataset) -> dict[str, Figure]:
     for (left, right), name, window_ms in zip(axes, ("small", "large"), (120.0, 200.0), strict=True):
         reference = wanted[name]
         for kind in FAMILIES:
-            run = track(tuned_controller(kind, plant_of("P1")), reference, throttle=plant, seed=1)
+            run = track(tuned_controller(kind, throttle_of("P1")), reference, throttle=plant, seed=1)
             time_ms = 1e3 * (run["time_s"].to_numpy() - reference.from_s)
             shown = (time_ms >= -10.0) & (time_ms <= window_ms)
             left.plot(

@@ -9,30 +9,24 @@ from typing import TYPE_CHECKING, Any, cast
 
 import numpy as np
 
-from mgdd import presets
 from mgdd.control import GuidedPredictive
 from mgdd.loop import Reference, track, track_many, tuned_controller
 from mgdd.loop.controller_families import FAMILIES
 from mgdd.loop.tune import draw_throttles
 from mgdd.studies.statistics import mean_interval
+from mgdd.studies.throttle_baselines import throttle_of
 from mgdd.throttle import Throttle
 
 if TYPE_CHECKING:
     import xarray as xr
     from numpy.typing import NDArray
 
-__all__ = ["CASES", "DELAY_SAMPLES", "Case", "controllers_of", "plant_of", "references", "row_of", "run_case"]
+__all__ = ["CASES", "DELAY_SAMPLES", "Case", "controllers_of", "driving", "references", "row_of", "run_case"]
 
 DELAY_SAMPLES = 1
 SEED = 2026  # not that of the tuner
 _FEW = ("guided", "linear_mpc", "pid")
 _REST_S = 2.0
-
-
-def plant_of(preset: str) -> Throttle:
-    """Give the throttle of a preset as the study takes it: P1 with stiction of 0.3 N m."""
-    throttle = presets.load(preset, kind="throttle").throttle
-    return throttle.replace(friction="stribeck", stiction_nm=0.3) if preset == "P1" else throttle
 
 
 def references() -> dict[str, Reference]:
@@ -108,7 +102,7 @@ def controllers_of(case: Case, known: Throttle) -> dict[str, Any]:
 
 def throttles_of(case: Case, preset: str, n: int) -> list[Throttle]:
     """Draw the throttles of a case."""
-    drawn = draw_throttles(plant_of(preset), n, spread=case.spread, seed=SEED)
+    drawn = draw_throttles(throttle_of(preset), n, spread=case.spread, seed=SEED)
     if not case.bristles:
         return drawn
     width_rad = 0.0035  # 0.2 deg
@@ -130,7 +124,7 @@ def run_case(name: str, preset: str, n: int) -> xr.Dataset:
     if case.air_nm or case.gusts_nm:
         flows = {r.name: _air(case, len(r.angle_deg)) for r in wanted.values()}
     return track_many(
-        controllers_of(case, plant_of(preset)),
+        controllers_of(case, throttle_of(preset)),
         list(wanted.values()),
         throttles_of(case, preset, n),
         delay_samples=DELAY_SAMPLES + case.late_samples,
@@ -177,22 +171,20 @@ def _pair(values: NDArray[np.float64]) -> tuple[float, float]:
     return float(ordered[len(ordered) // 2]), float(ordered[min(len(ordered) - 1, int(0.95 * len(ordered)))])
 
 
+def driving() -> Reference:
+    """Give 2 s of ordinary driving: slow and fast waves, and two visits below limp-home."""
+    time_s = np.arange(2000) * 1e-3
+    waves = 32.0 + 20.0 * np.sin(4.2 * time_s) + 9.0 * np.sin(14.6 * time_s + 1.0) - 40.0 * (time_s % 0.7 > 0.55)
+    return Reference(angle_deg=np.clip(waves, 2.0, 85.0), name="driving")
+
+
 def warm_rows(preset: str, n: int) -> list[dict[str, Any]]:
     """Give what a wrong friction or preload costs a cold controller, one warmed up for 2 s, and one that knows it."""
-    time_s = np.arange(2000) * 1e-3
-    driving = Reference(
-        angle_deg=np.clip(
-            32.0 + 20.0 * np.sin(4.2 * time_s) + 9.0 * np.sin(14.6 * time_s + 1.0) - 40.0 * (time_s % 0.7 > 0.55),
-            2.0,
-            85.0,
-        ),
-        name="driving",
-    )
     judged = {
         "sine": Reference.sine(40.0, 10.0, 1.0, duration_s=3.0, skip_s=0.5),
         "crossing": Reference.sine(10.0, 8.0, 1.0, duration_s=3.0, skip_s=0.5),
     }
-    known = plant_of(preset)
+    known = throttle_of(preset)
     rows = []
     for fault, names in (
         ("friction 40 % higher", ("coulomb_nm", "stiction_nm")),
@@ -203,7 +195,7 @@ def warm_rows(preset: str, n: int) -> list[dict[str, Any]]:
         for seed in range(n):
             cold = _guided(known)
             warm, exact = _guided(known), _guided(plant)
-            track(warm, driving, throttle=plant, delay_samples=DELAY_SAMPLES, seed=1000 + seed)
+            track(warm, driving(), throttle=plant, delay_samples=DELAY_SAMPLES, seed=1000 + seed)
             start = _guided(known)
             start.learnt = warm.learnt
             for label, controller in (("cold", cold), ("after 2 s", start), ("known", exact)):

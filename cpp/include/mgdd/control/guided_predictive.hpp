@@ -13,84 +13,13 @@
 #include <cstdint>
 #include <span>
 
-#include "mgdd/common/enum_names.hpp"
-#include "mgdd/common/field.hpp"
 #include "mgdd/common/state.hpp"
-#include "mgdd/control/duty_range.hpp"
 #include "mgdd/control/filtered_rate.hpp"
-#include "mgdd/control/friction_learner.hpp"
-#include "mgdd/control/plate.hpp"
+#include "mgdd/control/guided_horizon.hpp"
+#include "mgdd/control/guided_predictive_settings.hpp"
+#include "mgdd/dynamics/delay_line.hpp"
 
 namespace mgdd::control {
-
-inline constexpr int n_guided_moves = 3;
-inline constexpr int longest_guided_horizon = 64;  ///< prediction steps
-inline constexpr int longest_guided_delay = 5;     ///< samples
-
-/// What the horizon is predicted with.
-enum class Prediction {
-  nonlinear,  ///< springs and friction as they are
-  linear,     ///< the spring of the measured side without end, friction only fed forward: a linear-quadratic step
-};
-Names<Prediction> prediction_names() noexcept;
-
-/// How a prediction knows its side of limp-home.
-enum class SideSwitching {
-  predicted,  ///< by the predicted angle
-  measured,   ///< that of the last measurement, with a dead band of 0.3 deg
-};
-Names<SideSwitching> side_switching_names() noexcept;
-
-struct GuidedPredictiveSettings {
-  double sample_s = 1e-3;
-  PlateSettings plate{};  ///< the guide
-  int delay_samples = 1;  ///< from a duty to its effect, beside the electrical lag: 0 to 5
-
-  // The horizon.
-  Prediction prediction = Prediction::nonlinear;
-  SideSwitching switching = SideSwitching::predicted;
-  double prediction_step_s = 2e-3;
-  std::array<int, n_guided_moves> move_steps{3, 5, 12};  ///< prediction steps for which each duty is held
-  int gauss_newton_steps = 1;                            ///< at most, per sample
-
-  // The performance function: per prediction step, and per change from move to move.
-  double error_weight = 1.0;        ///< per deg²
-  double speed_weight = 0.0;        ///< per (deg/s)²
-  double duty_change_weight = 4.0;  ///< per duty²
-
-  // Constraints: hard for the duty and its rate; predicted angles beyond theirs cost `angle_limit_weight` per deg².
-  double lower = -1.0;
-  double upper = 1.0;
-  double duty_rate_per_s = 1e4;
-  double lowest_deg = -1e3;
-  double highest_deg = 1e3;
-  double angle_limit_weight = 20.0;
-
-  // The observer, and what it learns.
-  double observer_angle_per_s = 430.0;
-  double observer_speed_per_s2 = 28000.0;
-  double noise_deg = 0.03;  ///< of the measured angle: what counts as motion
-  bool friction_learning = true;
-  FrictionLearnerSettings learner{};
-  double bias_rate_per_deg_s = 4.0;  ///< without learning
-  double trim_rate_per_deg_s = 0.3;  ///< without learning: invisible to the prediction
-
-  // The reference.
-  double reference_lag_s = 4.5e-3;
-  double reference_jump_deg_per_s = 400.0;  ///< a faster reference steps: it has no rate
-
-  bool operator==(const GuidedPredictiveSettings&) const = default;
-};
-
-/// All numbers of the settings, in the order in which Python shows them.
-inline constexpr std::size_t n_guided_predictive_fields = 35;
-std::span<const Field<GuidedPredictiveSettings>, n_guided_predictive_fields> guided_predictive_fields() noexcept;
-
-/// ParameterError naming field, value and bound.
-void validate(const GuidedPredictiveSettings& settings);
-
-/// ParameterError for levels that learning with these settings could not have reached.
-void require_usable_belief(const PlateBelief<double>& belief, const GuidedPredictiveSettings& settings);
 
 template <class T>
 class BasicGuidedPredictive {
@@ -147,8 +76,8 @@ class BasicGuidedPredictive {
     visit_number(v, "damping_factor", self.belief_.damping_factor);
     FrictionLearner<T>::visit(self.learner_, Prefixed<V>{v, "slope_"});
     FilteredRate<T>::visit(self.reference_, Prefixed<V>{v, "reference_"});
-    for (std::size_t i = 0; i < self.sent_.size(); ++i)
-      visit_number(v, names_of_sent[i], self.sent_[i]);
+    for (std::size_t i = 0; i < self.sent_.before.size(); ++i)
+      visit_number(v, names_of_sent[i], self.sent_.before[i]);
     for (std::size_t i = 0; i < self.moves_.size(); ++i)
       visit_number(v, names_of_moves[i], self.moves_[i]);
     visit_number(v, "innovation_deg", self.innovation_);
@@ -162,28 +91,13 @@ class BasicGuidedPredictive {
   static constexpr std::array<const char*, longest_guided_delay + 1> names_of_sent{"sent_0", "sent_1", "sent_2",
                                                                                    "sent_3", "sent_4", "sent_5"};
   static constexpr std::array<const char*, n> names_of_moves{"move_0", "move_1", "move_2"};
-  using Moves = std::array<T, n>;
-
-  /// One problem of the horizon: what is predicted from, to where, and where the first duty may lie.
-  struct Horizon {
-    PlateState<T> ahead{};  // when the first duty acts
-    std::array<T, longest_guided_horizon> target{};
-    T before{0.0};  // the duty before it, without trim
-    T acting{0.0};  // and with it
-    T lowest{0.0}, highest{0.0};
-    T aim{0.0};     // where it shall be soon
-    T wanted{0.0};  // way that it shall go
-  };
-
-  int n_steps() const noexcept { return settings_.move_steps[0] + settings_.move_steps[1] + settings_.move_steps[2]; }
   void start(T angle_deg, T duty) noexcept;
   void correct(T measurement_deg) noexcept;
   void look_ahead(T measurement_deg, std::span<const T> preview_deg) noexcept;
   bool hold_still() noexcept;
   void break_away() noexcept;
   T send() noexcept;
-  T performance(std::span<const T> output) const noexcept;
-  bool gauss_newton() noexcept;
+  bool gauss_newton() noexcept { return gauss_newton_step(predicted_, settings_, horizon_, moves_); }
   FrictionBand<T>& band_at(T angle_deg) noexcept;
 
   GuidedPredictiveSettings settings_;
@@ -198,10 +112,10 @@ class BasicGuidedPredictive {
   T mean_torque_{0.0};
   PlateBelief<T> belief_{};
   FilteredRate<T> reference_;
-  std::array<T, longest_guided_delay + 1> sent_{};  // the last one first
-  Moves moves_{};
+  dynamics::DelayLine<T, longest_guided_delay + 1> sent_{};  // duties without trim
+  GuidedMoves<T> moves_{};
   T innovation_{0.0}, mean_error_{0.0}, trim_{0.0}, duty_{0.0};
-  Horizon horizon_{};  // of the last sample, for `refine`
+  GuidedHorizon<T> horizon_{};  // of the last sample, for `refine`
 };
 
 using GuidedPredictive = BasicGuidedPredictive<double>;

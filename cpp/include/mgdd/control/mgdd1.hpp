@@ -18,6 +18,8 @@
 #include "mgdd/common/state.hpp"
 #include "mgdd/control/duty_range.hpp"
 #include "mgdd/control/filtered_rate.hpp"
+#include "mgdd/control/slow_trim.hpp"
+#include "mgdd/dynamics/delay_line.hpp"
 #include "mgdd/dynamics/discrete_model.hpp"
 #include "mgdd/dynamics/observer.hpp"
 
@@ -73,20 +75,15 @@ class Mgdd1 {
       observer_.start(observer_.model().at_rest(measurement_deg));
       started_ = true;
     } else {
-      observer_.update(sent_[static_cast<std::size_t>(settings_.delay_samples)], measurement_deg);
+      observer_.update(sent_.before[static_cast<std::size_t>(settings_.delay_samples)], measurement_deg);
     }
     auto ahead = observer_.state();
     const M& model = observer_.model();
     for (int i = settings_.delay_samples - 1; i >= 0; --i)
-      model.step(ahead, dynamics::input_of(model, sent_[static_cast<std::size_t>(i)]));
+      model.step(ahead, dynamics::input_of(model, sent_.before[static_cast<std::size_t>(i)]));
     adapt(ahead);
-    for (std::size_t i = sent_.size() - 1; i > 0; --i)
-      sent_[i] = sent_[i - 1];
-    sent_[0] = move_;
-    const T missed = reference_.value() - measurement_deg;
-    if (std::abs(missed) > T(0.08) && std::abs(missed) < T(3.0)) {
-      trim_ = std::clamp(trim_ + T(settings_.trim_rate_per_deg_s * model.sample_s()) * missed, T(-0.25), T(0.25));
-    }
+    sent_.push(move_);
+    trim_ = trimmed(trim_, reference_.value() - measurement_deg, settings_.trim_rate_per_deg_s, model.sample_s());
     duty_ = std::clamp(move_ + trim_, T(settings_.lower), T(settings_.upper));
     return duty_;
   }
@@ -112,8 +109,8 @@ class Mgdd1 {
     Prefixed<V> model{v, "model_"};
     decltype(self.observer_)::visit(self.observer_, model);
     FilteredRate<T>::visit(self.reference_, Prefixed<V>{v, "reference_"});
-    for (std::size_t i = 0; i < self.sent_.size(); ++i)
-      visit_number(v, names_of_sent[i], self.sent_[i]);
+    for (std::size_t i = 0; i < self.sent_.before.size(); ++i)
+      visit_number(v, names_of_sent[i], self.sent_.before[i]);
     visit_number(v, "move", self.move_);
     visit_number(v, "trim", self.trim_);
     visit_number(v, "duty", self.duty_);
@@ -132,7 +129,7 @@ class Mgdd1 {
     const auto u = dynamics::input_of(model, move_);
     const auto more = dynamics::input_of(model, T(move_ + half)), less = dynamics::input_of(model, T(move_ - half));
     const T weight = T(settings_.duty_change_weight);
-    T gradient = weight * (move_ - sent_[0]), curvature = weight;
+    T gradient = weight * (move_ - sent_.before[0]), curvature = weight;
     for (int k = 1; k <= settings_.horizon_samples; ++k) {
       model.step(middle, u);
       model.step(above, more);
@@ -150,7 +147,7 @@ class Mgdd1 {
   Observer observer_;
   FilteredRate<T> reference_;
   bool started_ = false;
-  std::array<T, longest_mgdd1_delay + 1> sent_{};  // the last one first
+  dynamics::DelayLine<T, longest_mgdd1_delay + 1> sent_{};  // duties without trim
   T move_{0.0}, trim_{0.0}, duty_{0.0};
 };
 

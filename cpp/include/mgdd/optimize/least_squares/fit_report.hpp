@@ -27,7 +27,7 @@ enum class FitStatus {
 
 [[nodiscard]] std::string_view to_string(FitStatus status) noexcept;
 
-/// One sentence for people.
+/// What the status means, in one sentence.
 [[nodiscard]] std::string_view explain(FitStatus status) noexcept;
 
 [[nodiscard]] bool is_converged(FitStatus status) noexcept;

@@ -25,7 +25,7 @@ namespace mgdd::throttle {
 
 template <class T>
 struct FirstPrincipleState {
-  T angle_deg{0.0};  ///< of the motor, at the plate shaft: the plate's where there is no gap
+  T angle_deg{0.0};  ///< of the motor, seen at the plate shaft; without a gap that of the plate
   T speed_deg_per_s{0.0};
   T torque{0.0};     ///< motor torque over stall torque, as a duty
   T bias_duty{0.0};  ///< what an observer subtracts from the duty
