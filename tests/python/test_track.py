@@ -198,7 +198,16 @@ def test_the_command_line_tracks(capsys: pytest.CaptureFixture[str], tmp_path: P
     assert "coulomb_nm" in capsys.readouterr().err
 
 
+def test_a_sensor_without_noise_is_told_its_converter() -> None:
+    run = track(tuned_controller("guided", noise_deg=0.0), "step:40:42", noise_deg=0.0)
+    assert float(run["settling_ms"]) < 30.0
+    with pytest.raises(ParameterError, match="noise_deg"):
+        track(tuned_controller("guided", noise_deg=-1.0), "step:40:42", noise_deg=-1.0)
+
+
 def test_the_command_line_tunes(capsys: pytest.CaptureFixture[str]) -> None:
+    assert main(["throttle", "tune", "--controller", "mgdd1", "--throttles", "2", "--budget", "30"]) == 0
+    assert "adaptation_gain" in capsys.readouterr().out
     out = run_json(capsys, "throttle", "tune", "--controller", "mgdd1", "--throttles", "2", "--budget", "30")
     assert out["cost"] <= out["start_cost"]
     assert set(out["numbers"]) == set(FAMILIES["mgdd1"].space)

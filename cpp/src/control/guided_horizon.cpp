@@ -4,35 +4,11 @@
 #include <cmath>
 #include <cstddef>
 #include <span>
-#include <utility>
 
 #include "mgdd/control/move_qp.hpp"
 #include "mgdd/dynamics/predict.hpp"
 
 namespace mgdd::control {
-namespace {
-
-template <class T>
-T performance(const GuidedPredictiveSettings& s, const GuidedHorizon<T>& horizon, const GuidedMoves<T>& moves,
-              std::span<const T> output) noexcept {
-  const T over_step = T(1.0 / s.prediction_step_s);
-  T sum = T(0.0), last_output = horizon.ahead.angle_deg, last_move = horizon.before;
-  for (std::size_t k = 0; k < output.size(); ++k) {
-    const T error = output[k] - horizon.target[k], speed = (output[k] - last_output) * over_step;
-    const T beyond = output[k] - std::clamp(output[k], T(s.lowest_deg), T(s.highest_deg));
-    sum += T(s.error_weight) * error * error + T(s.speed_weight) * speed * speed +
-           T(s.angle_limit_weight) * beyond * beyond;
-    last_output = output[k];
-  }
-  for (const T move : moves) {
-    sum += T(s.duty_change_weight) * (move - last_move) * (move - last_move);
-    last_move = move;
-  }
-  return sum;
-}
-
-}  // namespace
-
 template <class T>
 bool gauss_newton_step(const PlateModel<T>& model, const GuidedPredictiveSettings& s, const GuidedHorizon<T>& horizon,
                        GuidedMoves<T>& moves) noexcept {
@@ -65,31 +41,13 @@ bool gauss_newton_step(const PlateModel<T>& model, const GuidedPredictiveSetting
     high[i] = std::min(T(s.upper), horizon.before + room) - moves[i];
     room += T(s.duty_rate_per_s * s.prediction_step_s) * T(s.move_steps[i]);
   }
-  const Moves before = moves;
-  const auto moved = [&](T scale) {
-    const Moves change = qp.solve(low, high, T(1.0) + T(1e-3) * scale, T(1e-6) * scale);
-    T most = T(0.0);
-    for (std::size_t i = 0; i < n; ++i) {
-      moves[i] = before[i] + change[i];
-      most = std::max(most, std::abs(change[i]));
-    }
-    return most > T(1e-5);
-  };
-  const bool changed = moved(T(1.0));
-  if (s.friction_learning || s.prediction == Prediction::linear || !changed) return changed;
-  // Not lower after the step: ten times the damping, once.
-  const Moves after = std::exchange(moves, before);
-  const T performance_before = performance<T>(s, horizon, moves, output);
-  moves = after;
-  auto state = horizon.ahead;
-  for (std::size_t i = 0, k = 0; i < n; ++i) {
-    for (int j = 0; j < s.move_steps[i]; ++j, ++k) {
-      model.step(state, moves[i]);
-      output[k] = state.angle_deg;
-    }
+  const Moves change = qp.solve(low, high, T(1.001), T(1e-6));
+  T most = T(0.0);
+  for (std::size_t i = 0; i < n; ++i) {
+    moves[i] += change[i];
+    most = std::max(most, std::abs(change[i]));
   }
-  if (performance<T>(s, horizon, moves, output) < performance_before) return true;
-  return moved(T(10.0));
+  return most > T(1e-5);
 }
 
 template bool gauss_newton_step(const PlateModel<double>&, const GuidedPredictiveSettings&,

@@ -233,7 +233,7 @@ T BasicGuidedPredictive<T>::refine() noexcept {
   return send();
 }
 
-// The trim is not told to the model: it would take it for a disturbance and work against it.
+// The trim stays out of the model: told, the model takes it for a disturbance, and sines are followed 5 to 20 % worse.
 template <class T>
 T BasicGuidedPredictive<T>::send() noexcept {
   sent_.before[0] = moves_[0];

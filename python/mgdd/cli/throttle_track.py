@@ -14,6 +14,7 @@ from mgdd.loop import Reference, track, tune_controller, tuned_controller
 from mgdd.loop.controller_families import FAMILIES
 from mgdd.loop.track import FIGURES, step_times_us
 from mgdd.plot.style import drawn
+from mgdd.studies.sections import Table
 from mgdd.throttle import Throttle
 
 __all__ = ["add"]
@@ -158,7 +159,16 @@ def _tune(args: argparse.Namespace) -> None:
         "numbers": dict(found.numbers),
         **found.settings,
     }
-    emit(args, payload)
+    said = (
+        f"{FAMILIES[found.kind].label} for throttles around {preset}: cost {found.start_cost:.3f} -> {found.cost:.3f} "
+        f"in {found.evaluations} runs of {args.throttles} throttles\n"
+    )
+    text: list[str | Table] = [
+        said,
+        Table(columns=("number", "tuned"), rows=tuple((name, f"{value:g}") for name, value in found.numbers.items())),
+        f"\nIn Python: mgdd.loop.tuned_controller({found.kind!r}, throttle, numbers={{...}})",
+    ]
+    emit(args, payload, text=text)
 
 
 def _scales(given: list[str]) -> dict[str, float]:

@@ -17,6 +17,7 @@ __all__ = ["FAMILIES", "Family", "Groups", "groups_of"]
 
 Controller = GuidedPredictive | Mgdd1 | Pid | SlidingMode
 _SIDES = ("above", "below")
+_CONVERTER_DEG = 0.01  # what 12 bits leave of a sensor without noise
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -168,7 +169,7 @@ def _guided(groups: Groups, x: Mapping[str, float], setup: Setup, **fixed: Any) 
     return GuidedPredictive(
         sample_s=setup.sample_s,
         delay_samples=setup.delay_samples,
-        noise_deg=setup.noise_deg,
+        noise_deg=max(setup.noise_deg, _CONVERTER_DEG),
         electrical_s=groups.electrical_s,
         friction=groups.friction,
         closed_deg=groups.closed_deg,

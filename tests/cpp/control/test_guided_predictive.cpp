@@ -193,5 +193,77 @@ TEST(GuidedPredictive, AStuckPlateIsFreedAndAHeldOneIsLeftAlone) {
   EXPECT_LT(settle(40.4, 1000), 1e-9);
 }
 
+TEST(GuidedPredictive, ASlowPlateSaysNothingAboutGainAndDamping) {
+  GuidedPredictiveSettings s = asymmetric();
+  Plant plant(s.plate, 40.0);
+  plant.believe({{0.01, 0.09}, {0.0, 0.08}, 1.0, 1.0});
+  GuidedPredictive controller(s);
+  std::mt19937_64 random(8);
+  std::normal_distribution<double> noise(0.0, 0.03);
+  for (int k = 0; k < 30000; ++k)
+    plant.step(controller.step(40.0 + 12.0 * std::sin(6e-3 * k), plant.angle_deg() + noise(random)));
+  EXPECT_NEAR(controller.belief().gain_factor, 1.0, 0.06);
+  EXPECT_NEAR(controller.belief().damping_factor, 1.0, 0.06);
+  EXPECT_NEAR(controller.belief().above.friction, 0.09, 0.02);
+}
+
+TEST(GuidedPredictive, NothingIsLearntAtAStop) {
+  for (const auto& [end, out, duty] : {std::array{90.0, 1.0, 0.19}, std::array{0.0, -1.0, -0.17}}) {
+    GuidedPredictive controller(asymmetric());
+    controller.take_over(end, duty);
+    for (int k = 0; k < 400; ++k)  // the stop gives way and creeps back, which no friction explains
+      controller.step(end, end + out * (0.3 - 1e-4 * k));
+    for (const auto* band : {&controller.belief().above, &controller.belief().below}) {
+      EXPECT_EQ(band->friction, 0.08);
+      EXPECT_EQ(band->bias, 0.0);
+    }
+    EXPECT_EQ(controller.belief().gain_factor, 1.0);
+  }
+}
+
+TEST(GuidedPredictive, TheModelIsToldTheDutyThatTheRateAllowed) {
+  GuidedPredictiveSettings s = asymmetric();
+  s.duty_rate_per_s = 3.0;
+  Plant plant(s.plate, 20.0);
+  GuidedPredictive controller(s);
+  double worst = 0.0;
+  for (int k = 0; k < 4000; ++k) {  // small steps: the duty that frees the plate is far away
+    plant.step(controller.step(k / 200 % 2 == 0 ? 20.0 : 21.0, plant.angle_deg()));
+    worst = std::max(worst, std::abs(controller.innovation_deg()));
+  }
+  EXPECT_LT(worst, 0.03);
+}
+
+TEST(GuidedPredictive, APreviewIsReadAtItsOwnTime) {
+  GuidedPredictiveSettings s = asymmetric();
+  Plant plant(s.plate, 40.0);
+  GuidedPredictive controller(s);
+  const auto reference = [](int k) { return 40.0 + 10.0 * std::sin(0.0126 * k); };
+  double sum = 0.0;
+  for (int k = 0; k < 2000; ++k) {
+    std::vector<double> ahead;
+    for (int i = 1; i <= 50; ++i)
+      ahead.push_back(reference(k + i));
+    plant.step(controller.step(reference(k), plant.angle_deg(), ahead));
+    if (k >= 500) sum += std::pow(reference(k + 1) - plant.angle_deg(), 2);
+  }
+  EXPECT_LT(std::sqrt(sum / 1500.0), 0.12);  // 1 ms is 0.09 deg rms
+}
+
+TEST(FrictionLearner, APlateThatMovesAgainstItsLevelLowersItToWhatPushed) {
+  const GuidedPredictiveSettings s = asymmetric();
+  FrictionLearner<double> learner(s.learner, s.plate, 1e-3, 0.03, 0.35, 28.0);
+  FrictionBand<double> band{0.0, 0.08};
+  EXPECT_EQ(learner.stick(band, 0.2, 0.05, 0.05), 0.0);  // once may be noise
+  EXPECT_EQ(band.friction, 0.08);
+  EXPECT_NEAR(learner.stick(band, 0.2, 0.15, 0.05), 40.0, 1e-12);
+  EXPECT_NEAR(band.bias + band.friction, 0.045, 1e-12);
+  EXPECT_NEAR(band.bias - band.friction, -0.08, 1e-12);  // of closing, untouched
+  FrictionBand<double> other{0.0, 0.08};
+  EXPECT_NEAR(learner.stick(other, -0.2, -0.15, -0.05), -40.0, 1e-12);
+  EXPECT_NEAR(other.bias - other.friction, -0.045, 1e-12);
+  EXPECT_NEAR(other.bias + other.friction, 0.08, 1e-12);
+}
+
 }  // namespace
 }  // namespace mgdd::control

@@ -26,8 +26,7 @@ struct GuidedHorizon {
   T wanted{0.0};  // way that it shall go
 };
 
-/// Moves the duties by one step, inside the limits; gives whether they changed. A nonlinear prediction without learning
-/// repeats a step that raised the performance function with ten times the damping.
+/// Moves the duties by one step, inside the limits; gives whether they changed.
 template <class T>
 bool gauss_newton_step(const PlateModel<T>& model, const GuidedPredictiveSettings& settings,
                        const GuidedHorizon<T>& horizon, GuidedMoves<T>& moves) noexcept;
