@@ -13,6 +13,7 @@ using P = PlateSettings;
 using H = HoldingDuty;
 using Side = SpringSideDuty;
 using L = FrictionLearnerSettings;
+using R = BeliefReviewSettings;
 
 constexpr Domain share = closed(0.0, 1.0);
 constexpr Domain weight = closed(0.0, 1e9);
@@ -55,12 +56,22 @@ constexpr std::array<Field<S>, n_guided_predictive_fields> table{{
     field<&S::noise_deg>({"noise_deg", "deg", above(0.0, 1e2), "standard deviation of the measured angle"}),
     field<&S::learner, &L::rate_per_s>(
         {"learning_rate_per_s", "1/second", rate, "share of what explains an innovation that is learnt"}),
-    field<&S::learner, &L::gain_weight>({"gain_weight", "-", weight, "of the gain in that, beside a friction level"}),
-    field<&S::learner, &L::damping_weight>({"damping_weight", "-", weight, "of the damping in that"}),
+    field<&S::learner, &L::gain_weight>(
+        {"gain_weight", "-", weight, "first variance of the gain factor over that of a friction level"}),
+    field<&S::learner, &L::damping_weight>({"damping_weight", "-", weight, "of the damping factor"}),
+    field<&S::learner, &L::level_memory_s>(
+        {"level_memory_s", "s", above(0.0, 1e6), "sliding after which a level is as uncertain as at first"}),
+    field<&S::learner, &L::memory_s>({"memory_s", "s", above(0.0, 1e6), "the same for gain and damping"}),
     field<&S::learner, &L::least_gain_factor>(
         {"least_gain_factor", "-", above(0.0, 1.0), "least learnt gain over the given one"}),
     field<&S::learner, &L::largest_gain_factor>(
         {"largest_gain_factor", "-", closed(1.0, 10.0), "largest learnt gain over the given one"}),
+    field<&S::review, &R::worse>(
+        {"rollback_ratio", "-", closed(1.0, 1e9), "of squared innovations, from which a belief predicts worse"}),
+    field<&S::review, &R::roll_back_s>(
+        {"rollback_s", "s", above(0.0, 1e6), "sliding over which a worse belief is given up"}),
+    field<&S::review, &R::certify_s>(
+        {"certify_s", "s", above(0.0, 1e6), "sliding over which a better belief is certified"}),
     field<&S::bias_rate_per_deg_s>(
         {"bias_rate_per_deg_s", "1/(degree*second)", rate, "without learning: rate of the one bias"}),
     field<&S::trim_rate_per_deg_s>(
@@ -110,9 +121,9 @@ void validate(const S& s) {
   }
 }
 
-void require_usable_belief(const PlateBelief<double>& belief, const S& settings) {
-  const auto check = [](const char* name, double value, double lowest, double highest) {
-    require_within("state column '" + std::string(name) + "'", value, lowest, highest);
+void require_usable_belief(const PlateBelief<double>& belief, const S& settings, const char* prefix) {
+  const auto check = [prefix](const char* name, double value, double lowest, double highest) {
+    require_within("state column '" + std::string(prefix) + name + "'", value, lowest, highest);
   };
   constexpr double room = 1e-6;  // of float
   check("gain_factor", belief.gain_factor, settings.learner.least_gain_factor - room,
