@@ -76,18 +76,18 @@ template <class Figures>
 py::dict to_dict(const Figures& all) {
   using F = TrackingFigures;
   py::dict out;
-  const auto put = [&](const char* name, double F::* member, double scale) {
+  const auto put = [&](const char* name, double F::* member) {
     std::vector<double> column(all.size());
-    std::ranges::transform(all, column.begin(), [&](const F& f) { return scale * (f.*member); });
+    std::ranges::transform(all, column.begin(), [&](const F& f) { return f.*member; });
     out[name] = to_array(column);
   };
-  put("settling_ms", &F::settling_s, 1e3);
-  put("mse_deg2", &F::mse_deg2, 1.0);
-  put("static_error_deg", &F::static_error_deg, 1.0);
-  put("overshoot_deg", &F::overshoot_deg, 1.0);
-  put("total_variation", &F::total_variation, 1.0);
-  put("limit_cycle_deg", &F::limit_cycle_deg, 1.0);
-  put("largest_error_deg", &F::largest_error_deg, 1.0);
+  put("settling_ms", &F::settling_ms);
+  put("mse_deg2", &F::mse_deg2);
+  put("static_error_deg", &F::static_error_deg);
+  put("overshoot_deg", &F::overshoot_deg);
+  put("total_variation", &F::total_variation);
+  put("limit_cycle_deg", &F::limit_cycle_deg);
+  put("largest_error_deg", &F::largest_error_deg);
   return out;
 }
 
