@@ -1,30 +1,29 @@
 // Receding-horizon control of a discrete model of one input: every sample the N inputs ahead are improved by
-// Gauss-Newton steps on sum q (y - r)^2 + terminal + input + change weights, under bounds of the input and of its
-// change, and the first is applied. One step per sample from the shifted inputs is the real-time iteration (Diehl, Bock
-// and Schlöder 2005): `prepare` linearises while the sample passes, `feedback` answers to the state. Units are the
-// model's own, one input per sample. All steps are noexcept and heap-free; double or float.
+// Gauss-Newton steps on sum q (y - r)^2 + terminal + input + change weights + squared excess over soft bounds of the
+// output, under bounds of the input and of its change, and the first is applied. One step per sample from the shifted
+// inputs is the real-time iteration (Diehl, Bock and Schlöder 2005): `prepare` linearises while the sample passes,
+// `feedback` answers to the state. Units are the model's own, one input per sample. All steps are noexcept; double or
+// float; heap-free where N and n are known to the compiler (Eigen::Dynamic: told at run time).
 #pragma once
 
 #include <algorithm>
-#include <array>
 #include <cmath>
 #include <concepts>
 #include <cstdint>
 #include <span>
 #include <string>
-#include <type_traits>
-#include <utility>
 
 #include "mgdd/common/state.hpp"
 #include "mgdd/control/filtered_rate.hpp"
 #include "mgdd/control/horizon_qp.hpp"
 #include "mgdd/control/horizon_settings.hpp"
+#include "mgdd/control/horizon_slopes.hpp"
 #include "mgdd/dynamics/discrete_model.hpp"
 
 namespace mgdd::control {
 
 /// Slopes go through the first `n` numbers of the state: all of them, or those that the inputs and the others reach
-/// (without a delay line that is not in use, the observed ones).
+/// (without a delay line that is not in use, the observed ones). `length` is told where N is Eigen::Dynamic.
 template <dynamics::DiscreteModel M, int N, int n = static_cast<int>(dynamics::n_numbers<M>)>
   requires std::floating_point<typename M::Scalar>
 class RecedingHorizon {
@@ -35,15 +34,20 @@ class RecedingHorizon {
   using Inputs = typename Qp::Inputs;
 
   /// ParameterError for settings out of range. `start` follows.
-  RecedingHorizon(const M& model, const HorizonSettings& settings)
-      : model_(model), dual_model_(model.template over<D>()), settings_(settings) {
-    validate(settings);
+  RecedingHorizon(const M& model, const HorizonSettings& settings, int length = N)
+      : model_(model), slopes_(model), settings_((validate(settings), settings)) {
+    require_within("horizon_samples", length, 1.0, 1000.0);
+    if constexpr (N == Eigen::Dynamic || n == Eigen::Dynamic) {
+      qp_.resize(static_cast<std::size_t>(length), static_cast<Eigen::Index>(slopes_.order()));
+    }
+    for (Inputs* line : {&inputs_, &outputs_})
+      stretch(*line, qp_.size());
+    stretch(sides_, qp_.size());
     qp_.set.limit(narrow(settings.lower), narrow(settings.upper), narrow(settings.largest_change));
     qp_.input_weight = narrow(settings.input_weight);
     qp_.change_weight = narrow(settings.change_weight);
-    for (auto& stage : qp_.stages)
-      stage.weight = narrow(settings.output_weight);
-    qp_.stages[size - 1].weight = narrow(settings.terminal_weight);
+    for (std::size_t k = 0; k < size(); ++k)
+      qp_.stages[k].weight = weight(k);
     start({}, Scalar(0));
   }
 
@@ -51,7 +55,7 @@ class RecedingHorizon {
   void start(const State& state, Scalar applied) noexcept {
     state_ = state;
     applied_ = std::clamp(applied, narrow(settings_.lower), narrow(settings_.upper));
-    inputs_.fill(applied_);
+    std::ranges::fill(inputs_, applied_);
     qp_.set.clear();
     shifted_ = true;  // nothing to shift
     linearised_ = false;
@@ -85,10 +89,10 @@ class RecedingHorizon {
       return applied_;
     }
     if (!shifted_ || !linearised_) prepare();
-    typename Qp::Column deviation;
+    typename Qp::Column deviation = Qp::Column::Zero(static_cast<Eigen::Index>(slopes_.order()));
     const auto now = M::numbers(state);
     const auto predicted = M::numbers(state_);
-    for (std::size_t i = 0; i < slopes; ++i)
+    for (std::size_t i = 0; i < slopes_.order(); ++i)
       deviation(static_cast<Eigen::Index>(i)) = *now[i] - *predicted[i];
     search(state, deviation, reference);
     if (status_ == HorizonStatus::not_finite) {
@@ -119,12 +123,14 @@ class RecedingHorizon {
   int sweeps() const noexcept { return sweeps_; }
   /// The plan: after `feedback` the inputs from this sample on, after `prepare` those from the next.
   const Inputs& inputs() const noexcept { return inputs_; }
+  /// The state that the plan starts from: after `feedback` the one given, after `prepare` the predicted one.
+  const State& state() const noexcept { return state_; }
   const HorizonSettings& settings() const noexcept { return settings_; }
   const M& model() const noexcept { return model_; }
   /// Other numbers, the same plan.
   void set_model(const M& model) noexcept {
     model_ = model;
-    dual_model_ = model.template over<D>();
+    slopes_ = HorizonSlopes<M, n>(model);
     linearised_ = false;
   }
 
@@ -132,11 +138,14 @@ class RecedingHorizon {
   Scalar cost(const State& state, const Inputs& inputs, std::span<const Scalar> reference) const noexcept {
     State s = state;
     Scalar sum(0), before = applied_;
-    for (std::size_t k = 0; k < size; ++k) {
+    for (std::size_t k = 0; k < size(); ++k) {
       model_.step(s, dynamics::input_of(model_, inputs[k]));
-      const Scalar error = model_.output(s) - wanted(reference, k), change = inputs[k] - before;
-      sum += qp_.stages[k].weight * error * error + qp_.input_weight * inputs[k] * inputs[k] +
-             qp_.change_weight * change * change;
+      const Scalar y = model_.output(s), error = y - wanted(reference, k), change = inputs[k] - before;
+      sum += weight(k) * error * error + qp_.input_weight * inputs[k] * inputs[k] + qp_.change_weight * change * change;
+      if (bounds_outputs()) {
+        const Scalar excess = y - std::clamp(y, narrow(settings_.least_output), narrow(settings_.largest_output));
+        sum += narrow(settings_.output_limit_weight) * excess * excess;
+      }
       before = inputs[k];
     }
     return sum;
@@ -146,7 +155,7 @@ class RecedingHorizon {
   void require_usable() const {
     Scalar before = applied_;
     require_within("state column 'applied'", applied_, narrow(settings_.lower), narrow(settings_.upper));
-    for (std::size_t k = 0; k < size; ++k) {
+    for (std::size_t k = 0; k < size(); ++k) {
       if (k > 0 || shifted_) {
         require_within("state column 'input_" + std::to_string(k) + "'", inputs_[k], qp_.set.lowest(before),
                        qp_.set.highest(before));
@@ -160,10 +169,10 @@ class RecedingHorizon {
   template <class Self, class V>
   static void visit(Self& self, V& v) {
     const auto numbers = M::numbers(self.state_);
-    for (std::size_t i = 0; i < numbers.size(); ++i)
+    for (std::size_t i = 0; i < self.slopes_.n_saved(); ++i)
       visit_number(v, "state_" + std::to_string(i), *numbers[i]);
     visit_number(v, "applied", self.applied_);
-    for (std::size_t k = 0; k < size; ++k) {
+    for (std::size_t k = 0; k < self.size(); ++k) {
       visit_number(v, "input_" + std::to_string(k), self.inputs_[k]);
       visit_sign(v, "tie_" + std::to_string(k), self.qp_.set.ties()[k]);
       visit_sign(v, "bound_" + std::to_string(k), self.qp_.set.bounds()[k]);
@@ -173,12 +182,9 @@ class RecedingHorizon {
   }
 
  private:
-  static constexpr std::size_t size = static_cast<std::size_t>(N);
-  static constexpr std::size_t slopes = static_cast<std::size_t>(n);
   static constexpr int halvings = 12;
-  using D = Dual<n + 1, Scalar>;
-  using Lifted = std::remove_const_t<decltype(std::declval<const M&>().template over<D>())>;
 
+  std::size_t size() const noexcept { return qp_.size(); }
   static Scalar narrow(double value) noexcept { return static_cast<Scalar>(std::clamp(value, -1e30, 1e30)); }
   template <class V, class Sign>
   static void visit_sign(V& v, const std::string& name, Sign& sign) {
@@ -197,28 +203,10 @@ class RecedingHorizon {
 
   /// Along the inputs from `state_`.
   void linearise() noexcept {
-    auto s = dynamics::lifted<Lifted>(state_);
-    const auto places = Lifted::numbers(s);
-    const auto seed = [&] {
-      for (std::size_t i = 0; i < slopes; ++i) {
-        places[i]->grad = {};
-        places[i]->grad[i] = Scalar(1);
-      }
-    };
-    seed();
-    for (std::size_t k = 0; k < size; ++k) {
-      dual_model_.step(s, dynamics::input_of(dual_model_, D::seeded(inputs_[k], n)));
-      auto& stage = qp_.stages[k];
-      for (std::size_t i = 0; i < slopes; ++i) {
-        for (std::size_t j = 0; j < slopes; ++j)
-          stage.a(static_cast<Eigen::Index>(i), static_cast<Eigen::Index>(j)) = places[i]->grad[j];
-        stage.b(static_cast<Eigen::Index>(i)) = places[i]->grad[slopes];
-      }
-      seed();
-      const D y = dual_model_.output(s);
-      outputs_[k] = y.value;
-      for (std::size_t i = 0; i < slopes; ++i)
-        stage.c(static_cast<Eigen::Index>(i)) = y.grad[i];
+    slopes_.along(state_, inputs_, outputs_, qp_.stages);
+    if (bounds_outputs()) {
+      for (std::size_t k = 0; k < size(); ++k)
+        stand(k, side(outputs_[k]));
     }
     qp_.nominal = inputs_;
     qp_.invalidate();
@@ -226,12 +214,53 @@ class RecedingHorizon {
     linearised_ = true;
   }
 
+  Scalar weight(std::size_t k) const noexcept {
+    return narrow(k + 1 < size() ? settings_.output_weight : settings_.terminal_weight);
+  }
+  bool bounds_outputs() const noexcept { return settings_.output_limit_weight > 0.0; }
+  /// Beyond which soft bound an output lies.
+  int side(Scalar y) const noexcept {
+    return y > narrow(settings_.largest_output) ? 1 : y < narrow(settings_.least_output) ? -1 : 0;
+  }
+  /// Beyond a soft bound its price joins the weight of the output.
+  void stand(std::size_t k, int beyond) noexcept {
+    sides_[k] = static_cast<std::int8_t>(beyond);
+    qp_.stages[k].weight = weight(k) + (beyond == 0 ? Scalar(0) : narrow(settings_.output_limit_weight));
+  }
+  /// Error of an output, that beyond a soft bound meant with it: q (y - r)^2 + p (y - bound)^2 has one square in y.
+  Scalar error(std::size_t k, Scalar reference) const noexcept {
+    if (sides_[k] == 0) return outputs_[k] - reference;
+    const Scalar bound = narrow(sides_[k] > 0 ? settings_.largest_output : settings_.least_output);
+    const Scalar share = weight(k) / qp_.stages[k].weight;
+    return outputs_[k] - bound + share * (bound - reference);
+  }
+  /// Puts the outputs at the solution on their sides of the soft bounds; whether one was on another.
+  bool change_sides(const typename Qp::Column& deviation) noexcept {
+    typename Qp::Column x = deviation;
+    bool changed = false;
+    for (std::size_t k = 0; k < size(); ++k) {
+      const auto& stage = qp_.stages[k];
+      x = (stage.a * x + stage.b * (qp_.input()[k] - qp_.nominal[k])).eval();
+      const int beyond = side(outputs_[k] + stage.c.dot(x));
+      if (beyond == sides_[k]) continue;
+      stand(k, beyond);
+      changed = true;
+    }
+    return changed;
+  }
+
   QpResult solve(const typename Qp::Column& deviation, std::span<const Scalar> reference) noexcept {
-    for (std::size_t k = 0; k < size; ++k)
-      qp_.stages[k].error = outputs_[k] - wanted(reference, k);
-    const QpResult result = qp_.solve(deviation, applied_, settings_.max_sweeps);
-    sweeps_ += qp_.sweeps();
-    return result;
+    for (int spent = 0;;) {
+      for (std::size_t k = 0; k < size(); ++k)
+        qp_.stages[k].error = error(k, wanted(reference, k));
+      const QpResult result = qp_.solve(deviation, applied_, settings_.max_sweeps - spent);
+      spent += qp_.sweeps();
+      sweeps_ += qp_.sweeps();
+      if (result != QpResult::solved || !bounds_outputs() || !change_sides(deviation)) return result;
+      if (spent >= settings_.max_sweeps) return QpResult::sweep_limit;
+      qp_.set.clear();
+      qp_.invalidate();
+    }
   }
 
   void search(const State& state, const typename Qp::Column& deviation, std::span<const Scalar> reference) noexcept {
@@ -261,7 +290,7 @@ class RecedingHorizon {
       }
       if (iterations_ == settings_.max_iterations) return;
       linearise();
-      result = solve(Qp::Column::Zero(), reference);
+      result = solve(Qp::Column::Zero(static_cast<Eigen::Index>(slopes_.order())), reference);
     }
   }
 
@@ -271,7 +300,7 @@ class RecedingHorizon {
     Scalar share(1);
     for (int i = 0; i < halvings; ++i, share /= Scalar(2)) {
       if (i > 0) {
-        for (std::size_t k = 0; k < size; ++k)
+        for (std::size_t k = 0; k < size(); ++k)
           trial[k] = inputs_[k] + share * (qp_.input()[k] - inputs_[k]);
         qp_.set.clamp(trial, applied_);
       }
@@ -279,7 +308,7 @@ class RecedingHorizon {
       if (!(tried < best)) continue;
       best = tried;
       Scalar moved(0);
-      for (std::size_t k = 0; k < size; ++k)
+      for (std::size_t k = 0; k < size(); ++k)
         moved = std::max(moved, std::abs(trial[k] - inputs_[k]));
       if (i > 0) qp_.set.clear();  // what acts at the end of the step need not act before it
       inputs_ = trial;
@@ -290,11 +319,12 @@ class RecedingHorizon {
   }
 
   M model_;
-  Lifted dual_model_;
+  HorizonSlopes<M, n> slopes_;
   HorizonSettings settings_;
   Qp qp_{};
   State state_{};  // after `prepare` the predicted one, after `feedback` the measured one
   Inputs inputs_{}, outputs_{};
+  Along<std::int8_t, N> sides_{};  // of the soft bounds on which the outputs are
   Scalar applied_{0};
   bool shifted_ = true, linearised_ = false;
   HorizonStatus status_ = HorizonStatus::iteration_limit;
