@@ -15,6 +15,7 @@
 
 #include "mgdd/common/state.hpp"
 #include "mgdd/control/filtered_rate.hpp"
+#include "mgdd/control/horizon_outputs.hpp"
 #include "mgdd/control/horizon_qp.hpp"
 #include "mgdd/control/horizon_settings.hpp"
 #include "mgdd/control/horizon_slopes.hpp"
@@ -40,14 +41,12 @@ class RecedingHorizon {
     if constexpr (N == Eigen::Dynamic || n == Eigen::Dynamic) {
       qp_.resize(static_cast<std::size_t>(length), static_cast<Eigen::Index>(slopes_.order()));
     }
-    for (Inputs* line : {&inputs_, &outputs_})
-      stretch(*line, qp_.size());
-    stretch(sides_, qp_.size());
+    stretch(inputs_, qp_.size());
+    outputs_.set(settings, qp_.size());
     qp_.set.limit(narrow(settings.lower), narrow(settings.upper), narrow(settings.largest_change));
     qp_.input_weight = narrow(settings.input_weight);
     qp_.change_weight = narrow(settings.change_weight);
-    for (std::size_t k = 0; k < size(); ++k)
-      qp_.stages[k].weight = weight(k);
+    outputs_.settle(qp_.stages);
     start({}, Scalar(0));
   }
 
@@ -125,6 +124,7 @@ class RecedingHorizon {
   const Inputs& inputs() const noexcept { return inputs_; }
   /// The state that the plan starts from: after `feedback` the one given, after `prepare` the predicted one.
   const State& state() const noexcept { return state_; }
+  Scalar last_input() const noexcept { return applied_; }
   const HorizonSettings& settings() const noexcept { return settings_; }
   const M& model() const noexcept { return model_; }
   /// Other numbers, the same plan.
@@ -140,12 +140,9 @@ class RecedingHorizon {
     Scalar sum(0), before = applied_;
     for (std::size_t k = 0; k < size(); ++k) {
       model_.step(s, dynamics::input_of(model_, inputs[k]));
-      const Scalar y = model_.output(s), error = y - wanted(reference, k), change = inputs[k] - before;
-      sum += weight(k) * error * error + qp_.input_weight * inputs[k] * inputs[k] + qp_.change_weight * change * change;
-      if (bounds_outputs()) {
-        const Scalar excess = y - std::clamp(y, narrow(settings_.least_output), narrow(settings_.largest_output));
-        sum += narrow(settings_.output_limit_weight) * excess * excess;
-      }
+      const Scalar change = inputs[k] - before;
+      sum += outputs_.cost(k, model_.output(s), wanted(reference, k)) + qp_.input_weight * inputs[k] * inputs[k] +
+             qp_.change_weight * change * change;
       before = inputs[k];
     }
     return sum;
@@ -183,9 +180,10 @@ class RecedingHorizon {
 
  private:
   static constexpr int halvings = 12;
+  static constexpr int rounds = 8;  // sides change by many at once; then by the first (Murty 1974), against cycles
 
   std::size_t size() const noexcept { return qp_.size(); }
-  static Scalar narrow(double value) noexcept { return static_cast<Scalar>(std::clamp(value, -1e30, 1e30)); }
+  static Scalar narrow(double value) noexcept { return narrowed<Scalar>(value); }
   template <class V, class Sign>
   static void visit_sign(V& v, const std::string& name, Sign& sign) {
     std::int64_t wide = sign;  // NOLINT(misc-const-correctness): a reader writes it
@@ -203,60 +201,24 @@ class RecedingHorizon {
 
   /// Along the inputs from `state_`.
   void linearise() noexcept {
-    slopes_.along(state_, inputs_, outputs_, qp_.stages);
-    if (bounds_outputs()) {
-      for (std::size_t k = 0; k < size(); ++k)
-        stand(k, side(outputs_[k]));
-    }
+    slopes_.along(state_, inputs_, outputs_.values, qp_.stages);
+    outputs_.settle(qp_.stages);
     qp_.nominal = inputs_;
     qp_.invalidate();
     qp_.factor(applied_);
     linearised_ = true;
   }
 
-  Scalar weight(std::size_t k) const noexcept {
-    return narrow(k + 1 < size() ? settings_.output_weight : settings_.terminal_weight);
-  }
-  bool bounds_outputs() const noexcept { return settings_.output_limit_weight > 0.0; }
-  /// Beyond which soft bound an output lies.
-  int side(Scalar y) const noexcept {
-    return y > narrow(settings_.largest_output) ? 1 : y < narrow(settings_.least_output) ? -1 : 0;
-  }
-  /// Beyond a soft bound its price joins the weight of the output.
-  void stand(std::size_t k, int beyond) noexcept {
-    sides_[k] = static_cast<std::int8_t>(beyond);
-    qp_.stages[k].weight = weight(k) + (beyond == 0 ? Scalar(0) : narrow(settings_.output_limit_weight));
-  }
-  /// Error of an output, that beyond a soft bound meant with it: q (y - r)^2 + p (y - bound)^2 has one square in y.
-  Scalar error(std::size_t k, Scalar reference) const noexcept {
-    if (sides_[k] == 0) return outputs_[k] - reference;
-    const Scalar bound = narrow(sides_[k] > 0 ? settings_.largest_output : settings_.least_output);
-    const Scalar share = weight(k) / qp_.stages[k].weight;
-    return outputs_[k] - bound + share * (bound - reference);
-  }
-  /// Puts the outputs at the solution on their sides of the soft bounds; whether one was on another.
-  bool change_sides(const typename Qp::Column& deviation) noexcept {
-    typename Qp::Column x = deviation;
-    bool changed = false;
-    for (std::size_t k = 0; k < size(); ++k) {
-      const auto& stage = qp_.stages[k];
-      x = (stage.a * x + stage.b * (qp_.input()[k] - qp_.nominal[k])).eval();
-      const int beyond = side(outputs_[k] + stage.c.dot(x));
-      if (beyond == sides_[k]) continue;
-      stand(k, beyond);
-      changed = true;
-    }
-    return changed;
-  }
-
   QpResult solve(const typename Qp::Column& deviation, std::span<const Scalar> reference) noexcept {
-    for (int spent = 0;;) {
+    int spent = 0;
+    for (int round = 0;; ++round) {
       for (std::size_t k = 0; k < size(); ++k)
-        qp_.stages[k].error = error(k, wanted(reference, k));
+        qp_.stages[k].error = outputs_.error(k, wanted(reference, k));
       const QpResult result = qp_.solve(deviation, applied_, settings_.max_sweeps - spent);
       spent += qp_.sweeps();
       sweeps_ += qp_.sweeps();
-      if (result != QpResult::solved || !bounds_outputs() || !change_sides(deviation)) return result;
+      if (result != QpResult::solved || !outputs_.bounded() || !outputs_.change_sides(qp_, deviation, round < rounds))
+        return result;
       if (spent >= settings_.max_sweeps) return QpResult::sweep_limit;
       qp_.set.clear();
       qp_.invalidate();
@@ -323,8 +285,8 @@ class RecedingHorizon {
   HorizonSettings settings_;
   Qp qp_{};
   State state_{};  // after `prepare` the predicted one, after `feedback` the measured one
-  Inputs inputs_{}, outputs_{};
-  Along<std::int8_t, N> sides_{};  // of the soft bounds on which the outputs are
+  Inputs inputs_{};
+  HorizonOutputs<Scalar, N> outputs_{};
   Scalar applied_{0};
   bool shifted_ = true, linearised_ = false;
   HorizonStatus status_ = HorizonStatus::iteration_limit;

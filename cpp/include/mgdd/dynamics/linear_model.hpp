@@ -30,6 +30,11 @@ inline auto places_of(const RunTimeState& x) noexcept {
   return out;
 }
 
+inline void pull_toward(RunTimeState& x, double innovation, const RunTimeState& gain) noexcept {
+  for (std::size_t i = 0; i < most_states; ++i)
+    x[i] += gain[i] * innovation;
+}
+
 class LinearModel {
  public:
   using Scalar = double;
@@ -68,6 +73,10 @@ class LinearModel {
   void linearise(const State&, double, Eigen::MatrixXd& a, Eigen::VectorXd& b) const noexcept {
     a = a_;
     b = b_;
+  }
+  /// Pulls the state toward a measured output: x += gain (y - c'x).
+  void correct(State& state, double measured, const RunTimeState& gain) const noexcept {
+    pull_toward(state, measured - output(state), gain);
   }
   void output_slope(const State&, Eigen::VectorXd& c) const noexcept { c = c_; }
   template <class S>
