@@ -14,7 +14,6 @@ struct Room {
 
 }  // namespace
 
-namespace mgdd::bindings { void bind_receding_horizon(pybind11::module_& m); }
 PYBIND11_MODULE(_core, m) {
   using namespace mgdd::bindings;
   m.doc() = "The C++ core of mgdd, a submodule per room. Use it through mgdd.engine, mgdd.throttle and so on.";
@@ -44,7 +43,8 @@ PYBIND11_MODULE(_core, m) {
       {"systems", "Models of measured benchmarks.", {&bind_benchmark_models}},
       {"loop",
        "Virtual benches and the loops over them.",
-       {&bind_engine_bench, &bind_loop, &bind_virtual_throttle, &bind_throttle_loop, &bind_receding_horizon}},
+       {&bind_engine_bench, &bind_loop, &bind_virtual_throttle, &bind_throttle_loop, &bind_mgdd1,
+        &bind_receding_horizon}},
   };
   for (const Room& room : rooms) {
     auto submodule = m.def_submodule(room.name, room.doc);

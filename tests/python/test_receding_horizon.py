@@ -100,7 +100,7 @@ def test_a_long_horizon_without_limits_is_the_linear_quadratic_regulator() -> No
 def test_its_plan_is_that_of_sequential_quadratic_programming(x: list[float], soft: dict[str, float]) -> None:
     settings = LIMITS | soft
     for r in (0.9, -0.4):
-        controller = RecedingHorizon(LINEAR, horizon_samples=12, **settings)  # type: ignore[arg-type]
+        controller = RecedingHorizon(LINEAR, horizon_samples=12, max_sweeps=300, **settings)  # type: ignore[arg-type]
         controller.start(x, applied=0.3)
         u = controller.step(r, x)
         other = best_plan(LINEAR, np.array(x), r, settings, 12, 0.3)

@@ -115,7 +115,6 @@ py::tuple run_many(const std::vector<VirtualThrottle*>& plants, const py::list& 
 }  // namespace
 
 void bind_throttle_loop(py::module_& m) {
-  bind_mgdd1(m);
   m.def("track_throttle", &run_one, py::arg("controller"), py::arg("plant"), py::kw_only(), py::arg("delay_samples"),
         py::arg("reference_deg"), py::arg("airflow_torque_nm"), py::arg("supply_v"), py::arg("from_sample"),
         py::arg("band_deg"), "Run a controller on a virtual throttle without the GIL; behind mgdd.loop.track.");

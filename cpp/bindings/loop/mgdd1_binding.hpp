@@ -15,6 +15,4 @@ struct BoundMgdd1 {
   AnyMgdd1 controller;
 };
 
-void bind_mgdd1(py::module_& m);
-
 }  // namespace mgdd::bindings

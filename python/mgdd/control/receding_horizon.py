@@ -46,7 +46,8 @@ class RecedingHorizon:
     max_iterations : int
         Linearisations per sample.
     max_sweeps : int
-        Of the quadratic program, per iteration; the plan is feasible after every one.
+        Of the quadratic program, per iteration; the plan is feasible after every one. Soft bounds need more, up to
+        about 100 where many outputs are beyond them.
     observer_gain : array_like, shape (n,), optional
         Of a `DiscreteModel` whose output is measured: ``x += gain (y - h(x))`` every sample. Without it `step` takes
         the state. A constant disturbance is met without offset where the model has a state for it.
