@@ -2,6 +2,7 @@
 
 #include "binding.hpp"
 #include "mgdd/common/platform.hpp"
+#include "nouns.hpp"
 
 namespace {
 
