@@ -31,7 +31,8 @@ constexpr std::array fields{
     field<&E::stall_duty>({"stall_duty", "-", above(0.0, 1.0), "duty that must move the plate"}),
     field<&E::stall_move_deg>({"stall_move_deg", "deg", above(0.0, 360.0), "motion that it must make"}),
     field<&E::stall_s>({"stall_s", "s", above(0.0, 60.0), "time without that motion: LIMP"}),
-    field<&E::largest_age_cycles>({"largest_age_cycles", "cycles", count, "age beyond which a measurement is not used"}),
+    field<&E::largest_age_cycles>(
+        {"largest_age_cycles", "cycles", count, "age beyond which a measurement is not used"}),
     field<&E::held_cycles>(
         {"held_cycles", "cycles", closed(0.0, 1e6), "cycles for which the last duty bridges it, then LIMP"}),
     field<&E::bad_frames>({"bad_frames", "-", count, "bad frames in a row: LIMP"}),

@@ -24,25 +24,25 @@ Names<SafetyState> safety_state_names() noexcept;
 /// Why a state was entered, or what stands against a request.
 enum class SafetyReason {
   none,
-  requested,        ///< the operator asked for it
-  wrong_state,      ///< a request that this state does not have
-  too_few_frames,   ///< nothing is wrong, but not for long enough
+  requested,       ///< the operator asked for it
+  wrong_state,     ///< a request that this state does not have
+  too_few_frames,  ///< nothing is wrong, but not for long enough
   // To LIMP.
-  aborted,          ///< an exception, a signal or a contact asked for the safe state
-  stale,            ///< no good frame for too long
-  bad_frames,       ///< wrong checksum, length or counter
+  aborted,     ///< an exception, a signal or a contact asked for the safe state
+  stale,       ///< no good frame for too long
+  bad_frames,  ///< wrong checksum, length or counter
   bus_fault,
-  not_sent,         ///< commands do not leave
-  deadlines,        ///< missed in a row
-  not_observed,     ///< a duty without facts before it
+  not_sent,      ///< commands do not leave
+  deadlines,     ///< missed in a row
+  not_observed,  ///< a duty without facts before it
   heat,
   stall,
   // To FAULT.
   sensor_range,
   sensor_disagreement,
   sensor_slope,
-  travel,           ///< the plate is where it cannot be
-  invalid_duty,     ///< not finite
+  travel,        ///< the plate is where it cannot be
+  invalid_duty,  ///< not finite
 };
 Names<SafetyReason> safety_reason_names() noexcept;
 inline constexpr std::size_t n_safety_states = 5, n_safety_reasons = 18;

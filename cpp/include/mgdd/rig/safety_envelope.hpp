@@ -1,6 +1,7 @@
-// Safety envelope: the numbers of a safety gate (rig/safety_gate.hpp), all that may leave the machine towards an actuator
-// and all that must be true of its measurements. Duty -1..1, angles in deg, volts, seconds; a cycle is `cycle_s`.
-// Sum of sensors 0.2 V of 5 V and range 0.2 to 4.8 V: Bosch Motorsport, manual of the MS 6; all else is ours. Offline code.
+// Safety envelope: the numbers of a safety gate (rig/safety_gate.hpp), all that may leave the machine towards an
+// actuator and all that must be true of its measurements. Duty -1..1, angles in deg, volts, seconds; a cycle is
+// `cycle_s`. Sum of sensors 0.2 V of 5 V and range 0.2 to 4.8 V: Bosch Motorsport, manual of the MS 6; all else is
+// ours. Offline code.
 #pragma once
 
 #include <cstddef>
@@ -21,7 +22,7 @@ struct SafetyEnvelope {
   // The duty.
   double duty_limit = 0.8;
   double slew_per_s = 200.0;
-  double ramp_s = 0.2;         ///< after the start the duty grows in, without a jerk
+  double ramp_s = 0.2;          ///< after the start the duty grows in, without a jerk
   double invalid_duties = 1.0;  ///< that are not finite, in a row; the last good one is held before
 
   // Heat: duty² through a lag.
@@ -36,8 +37,8 @@ struct SafetyEnvelope {
 
   // Frames and cycles.
   double largest_age_cycles = 3.0;
-  double held_cycles = 1.0;  ///< that an older measurement is bridged with the last duty
-  double bad_frames = 3.0;   ///< in a row
+  double held_cycles = 1.0;   ///< that an older measurement is bridged with the last duty
+  double bad_frames = 3.0;    ///< in a row
   double good_frames = 20.0;  ///< before arming and before a reset, with nothing wrong meanwhile
   double missed_deadlines = 3.0;
   double unsent_cycles = 3.0;
