@@ -134,12 +134,13 @@ class Experiment:
         task = table.take("task", "text")
         if task not in TASKS:
             raise table.error("task", task, f"one of {', '.join(TASKS)}")
+        table.only((*_HEAD, task))
         mode, seed = table.take("mode", "text", "simulate"), table.take("seed", "integer", 0)
         if mode not in MODES:
             raise table.error("mode", mode, f"one of {', '.join(MODES)}")
         if not 0 <= seed < 2**64:
             raise table.error("seed", seed, "in [0, 2**64)")
-        made = cls(
+        return cls(
             task=task,
             mode=mode,
             seed=seed,
@@ -150,8 +151,6 @@ class Experiment:
             replay=ReplaySettings.read(table.table("replay")),
             origin=origin,
         )
-        table.done((*_HEAD, task))
-        return made
 
     def to_toml(self) -> str:
         """Write what `from_toml` reads back equal, every key that is set."""
@@ -191,6 +190,12 @@ class Experiment:
     def folder(self) -> Path:
         """Where relative paths of the file start from."""
         return Path(self.origin).parent if Path(self.origin).is_file() else Path()
+
+    @property
+    def limit_names(self) -> tuple[str, ...]:
+        """Limited quantities that seeker and guard ask for."""
+        own = self.settings.limits if isinstance(self.settings, SeekTask) else {}
+        return tuple(dict.fromkeys((*own, *self.safety.limits)))
 
     @property
     def map_name(self) -> str:

@@ -16,13 +16,14 @@ from mgdd.loop.controller_families import FAMILIES
 from mgdd.rig.can.toml_table import TomlTable
 
 __all__ = [
-    "MODES", "PACES", "TASKS", "BusSettings", "EnginePlant", "IdentifyTask", "ReplaySettings", "SafetySettings",
-    "SeekTask", "Settings", "ThrottlePlant", "TrackTask",
+    "MODES", "PACES", "SAMPLE_S", "TASKS", "BusSettings", "EnginePlant", "IdentifyTask", "ReplaySettings", "SafetySettings",
+    "SeekTask", "Settings", "ThrottlePlant", "TrackTask", "scaled",
 ]  # fmt: skip
 
 MODES = ("simulate", "hil", "dry_run", "replay", "bench")
 PACES = ("step", "real_time")
 TASKS = ("identify", "track", "seek")
+SAMPLE_S = 1e-3  # between samples of a throttle that is simulated
 GUIDES = ("none", "feed_forward", "curve")
 _T = TypeVar("_T")
 
@@ -44,6 +45,7 @@ class Settings:
     @classmethod
     def read(cls, table: TomlTable) -> Self:
         """Take all keys of a table; an unknown key, a wrong form or range is a ParameterError that names the file."""
+        table.only([own.name for own in dataclasses.fields(cls)])  # type: ignore[arg-type]
         values = {}
         for own in dataclasses.fields(cls):  # type: ignore[arg-type]
             facts = own.metadata
@@ -54,7 +56,6 @@ class Settings:
             if value is not None:
                 _require(table, own.name, value, facts)
             values[own.name] = value
-        table.done([own.name for own in dataclasses.fields(cls)])  # type: ignore[arg-type]
         return cls(**values)
 
     def to_dict(self) -> dict[str, Any]:

@@ -37,8 +37,7 @@ _SETTLE_S = 1.0  # before an excitation: the plate comes to rest at limp-home
 def throttle_named(name: str, folder: Path) -> Throttle:
     """Load the throttle of a preset or of a TOML file."""
     beside = folder / name
-    preset = presets.load(beside if beside.is_file() else name, kind="throttle")
-    return preset.throttle
+    return presets.load(beside if beside.is_file() else name, kind="throttle").throttle
 
 
 class TrackPlan:
