@@ -10,6 +10,7 @@ import asyncio
 import contextlib
 import time
 from collections.abc import Callable, Sequence
+from typing import cast
 
 from mgdd.errors import ParameterError, RigError
 from mgdd.rig.can.hub_faults import BusFault, Delivery, FaultInjector
@@ -25,10 +26,25 @@ _STUFFING = 1.2
 
 
 class _Client:
-    """One connection in raw mode."""
+    """One connection in raw mode; its first frames wait until it has read the greeting."""
 
     def __init__(self, number: int, writer: asyncio.StreamWriter) -> None:
-        self.number, self.writer = number, writer
+        self.number, self._writer = number, writer
+        self._waiting: list[bytes] | None = []
+        asyncio.get_running_loop().call_later(_JOIN_S, self._begin)
+
+    def write(self, text: bytes) -> None:
+        """Give it a frame; one that does not read is put out."""
+        if self._waiting is not None:
+            self._waiting.append(text)
+        elif self._writer.transport.get_write_buffer_size() > _MOST_WAITING:
+            self._writer.transport.abort()
+        else:
+            self._writer.write(text)
+
+    def _begin(self) -> None:
+        waiting, self._waiting = self._waiting or [], None
+        self._writer.write(b"".join(waiting))
 
 
 class Hub:
@@ -71,6 +87,7 @@ class Hub:
         self._rate = bit_rate
         self._injector = FaultInjector(faults, seed)
         self._clients: list[_Client] = []
+        self._serving: set[asyncio.Task[None]] = set()
         self._joined = 0
         self._free_s = 0.0
         self._start_s = 0.0
@@ -99,8 +116,10 @@ class Hub:
         async with server:
             on_ready(self)
             await stop.wait()
-            for client in list(self._clients):
-                client.writer.close()
+        serving = list(self._serving)
+        for task in serving:
+            task.cancel()
+        await asyncio.gather(*serving, return_exceptions=True)
 
     @property
     def counts(self) -> dict[str, int]:
@@ -109,6 +128,8 @@ class Hub:
 
     async def _serve(self, reader: asyncio.StreamReader, writer: asyncio.StreamWriter) -> None:
         client: _Client | None = None
+        task = cast("asyncio.Task[None]", asyncio.current_task())
+        self._serving.add(task)
         writer.write(b"< hi >")
         buffer = b""
         try:
@@ -122,7 +143,6 @@ class Hub:
                     elif words[:1] == [b"rawmode"] and client is None:
                         writer.write(b"< ok >")
                         await writer.drain()
-                        await asyncio.sleep(_JOIN_S)
                         self._joined += 1
                         client = _Client(self._joined, writer)
                         self._clients.append(client)
@@ -131,10 +151,12 @@ class Hub:
         except (ConnectionError, asyncio.CancelledError):  # a killed client is a normal event on a test bus
             pass
         finally:
+            self._serving.discard(task)
             if client is not None:
                 self._clients.remove(client)
-            with contextlib.suppress(ConnectionError):
-                writer.close()
+            writer.close()
+            with contextlib.suppress(ConnectionError, asyncio.CancelledError):
+                await writer.wait_closed()
 
     def _pass_on(self, sender: _Client, words: list[bytes]) -> None:
         try:
@@ -171,11 +193,7 @@ class Hub:
         for client in list(self._clients):
             if client is sender or self._injector.frozen(client.number, now):
                 continue
-            transport = client.writer.transport
-            if transport.get_write_buffer_size() > _MOST_WAITING:
-                transport.abort()
-            else:
-                client.writer.write(text)
+            client.write(text)
 
 
 def _text(identifier: int, width: int, delivery: Delivery) -> bytes:
