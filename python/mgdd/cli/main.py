@@ -10,7 +10,7 @@ import sys
 from collections.abc import Sequence
 
 from mgdd import _core
-from mgdd.cli import demo, doctor, engine, study, throttle
+from mgdd.cli import demo, doctor, engine, rig, study, throttle
 from mgdd.cli.options import Parser, UsageError, as_option
 from mgdd.cli.output import Stopped, fail
 from mgdd.cli.progress import Progress
@@ -101,6 +101,7 @@ def _parser() -> argparse.ArgumentParser:
     demo.add(commands)
     engine.add(commands)
     throttle.add(commands)
+    rig.add(commands)
     study.add(commands)
     doctor.add(commands)
     return parser

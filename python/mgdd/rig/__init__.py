@@ -1,4 +1,4 @@
-"""Test rigs: one protocol for the simulated plant and the real one.
+"""Test rigs: one protocol for the simulated plant and the real one, in this process, over a CAN bus, or recorded.
 
 `mgdd.loop.run_seeker` steers a rig as it steers any plant.
 """
@@ -7,6 +7,22 @@ from __future__ import annotations
 
 from mgdd._core.rig import E2eCheck, E2eSettings, protect
 from mgdd.rig.base import Rig
+from mgdd.rig.can.can_rig import CanRig
+from mgdd.rig.can.modes import RigMode
+from mgdd.rig.can.processes import VirtualNode
+from mgdd.rig.can.signal_map import SignalMap
+from mgdd.rig.can.transport import CanTransport
 from mgdd.rig.simulated import SimulatedRig
 
-__all__ = ["E2eCheck", "E2eSettings", "Rig", "SimulatedRig", "protect"]
+__all__ = [
+    "CanRig",
+    "CanTransport",
+    "E2eCheck",
+    "E2eSettings",
+    "Rig",
+    "RigMode",
+    "SignalMap",
+    "SimulatedRig",
+    "VirtualNode",
+    "protect",
+]
