@@ -2,6 +2,7 @@
 
 #include "binding.hpp"
 #include "mgdd/common/platform.hpp"
+#include "rig/rig_binding.hpp"
 
 namespace {
 
@@ -44,6 +45,9 @@ PYBIND11_MODULE(_core, m) {
       {"loop",
        "Virtual benches and the loops over them.",
        {&bind_engine_bench, &bind_loop, &bind_virtual_throttle, &bind_throttle_loop}},
+      {"rig",
+       "What a bus and a record of a run hold: protection of a payload, signals in its bits.",
+       {&bind_e2e, &bind_signal_codec}},
   };
   for (const Room& room : rooms) {
     auto submodule = m.def_submodule(room.name, room.doc);

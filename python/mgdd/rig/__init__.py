@@ -5,7 +5,8 @@
 
 from __future__ import annotations
 
+from mgdd._core.rig import E2eCheck, E2eSettings, protect
 from mgdd.rig.base import Rig
 from mgdd.rig.simulated import SimulatedRig
 
-__all__ = ["Rig", "SimulatedRig"]
+__all__ = ["E2eCheck", "E2eSettings", "Rig", "SimulatedRig", "protect"]
