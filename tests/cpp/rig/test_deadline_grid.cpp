@@ -35,8 +35,11 @@ TEST(DeadlineGrid, AStallSkipsToTheNextGridPointBehindIt) {
   EXPECT_EQ(grid.skip(7'100), 0);
   EXPECT_EQ(grid.begin(7'100).number, 2);
   EXPECT_EQ(grid.begin(7'100).missed_in_row, 2);
+  EXPECT_EQ(grid.begin(7'100).missed, 2);
+  EXPECT_EQ(grid.begin(7'100).skipped, 2);
   EXPECT_TRUE(grid.finish(7'200));
   EXPECT_EQ(grid.begin(8'000).missed_in_row, 0);
+  EXPECT_EQ(grid.begin(8'000).missed, 0);
   EXPECT_EQ(grid.missed(), 2);
   EXPECT_EQ(grid.longest_row(), 2);
   EXPECT_EQ(grid.skip(8'000 + 49'999), 50);
@@ -49,10 +52,14 @@ TEST(DeadlineGrid, TurnsThatTakeTooLongCountInARowWithSkippedOnes) {
   EXPECT_FALSE(grid.finish(first + 1'001));
   EXPECT_EQ(grid.skip(first + 1'001), 0);
   EXPECT_EQ(grid.begin(first + 1'001).missed_in_row, 1);
+  EXPECT_EQ(grid.begin(first + 1'001).missed, 1);
+  EXPECT_EQ(grid.begin(first + 1'001).skipped, 0);
   EXPECT_FALSE(grid.finish(first + 4'300));  // the turn of 6000 ends at 9300
   EXPECT_EQ(grid.skip(first + 4'300), 3);    // 7000, 8000 and 9000 are over
   EXPECT_EQ(grid.next_ns(), 10'000);
   EXPECT_EQ(grid.begin(10'000).missed_in_row, 5);
+  EXPECT_EQ(grid.begin(10'000).missed, 4);
+  EXPECT_EQ(grid.begin(10'000).skipped, 3);
   EXPECT_TRUE(grid.finish(10'500));
   EXPECT_EQ(grid.missed(), 5);
   EXPECT_EQ(grid.longest_row(), 5);
@@ -64,7 +71,7 @@ TEST(DeadlineGrid, EveryGridPointIsATurnOrMissed) {
   std::mt19937_64 random(3);
   std::uniform_int_distribution<std::int64_t> delay(0, 400), rare(0, 30);
   DeadlineGrid grid(first, period);
-  std::int64_t now = 0, in_time = 0, last = -1;
+  std::int64_t now = 0, in_time = 0, last = -1, told = 0;
   for (int k = 0; k < 5'000; ++k) {
     now = std::max(now, grid.next_ns()) + delay(random) * (rare(random) == 0 ? 20 : 1);
     if (grid.skip(now) > 0) continue;
@@ -74,10 +81,12 @@ TEST(DeadlineGrid, EveryGridPointIsATurnOrMissed) {
     ASSERT_GE(now, turn.deadline_ns);
     ASSERT_LT(now, turn.deadline_ns + period);
     last = turn.number;
+    told += turn.missed;
     now += delay(random) * (rare(random) == 0 ? 9 : 1);
     in_time += grid.finish(now) ? 1 : 0;
   }
   EXPECT_EQ(in_time + grid.missed(), (grid.next_ns() - first) / period);
+  EXPECT_EQ(told + grid.begin(now).missed, grid.missed());  // every miss is told to one turn
   EXPECT_GT(grid.missed(), 100);
 }
 

@@ -12,7 +12,9 @@ struct Turn {
   std::int64_t number = 0;         ///< of its grid point; the numbers of skipped ones are left out
   std::int64_t deadline_ns = 0;    ///< time of its grid point
   std::int64_t woken_ns = 0;       ///< when it really began
-  std::int64_t missed_in_row = 0;  ///< deadlines directly before it that were missed
+  std::int64_t missed = 0;         ///< deadlines since the turn before: skipped grid points, and its own if it was late
+  std::int64_t skipped = 0;        ///< those of them without a turn
+  std::int64_t missed_in_row = 0;  ///< deadlines directly before this turn that were missed
   bool stopping = false;           ///< somebody asked for an end
 };
 
@@ -31,19 +33,27 @@ class DeadlineGrid {
     advance(missed);
     missed_ += missed;
     in_row_ += missed;
+    skipped_ += missed;
     longest_row_ = std::max(longest_row_, in_row_);
     return missed;
   }
 
   [[nodiscard]] Turn begin(std::int64_t now_ns) const noexcept {
-    return {.number = number_, .deadline_ns = next_ns_, .woken_ns = now_ns, .missed_in_row = in_row_};
+    return {.number = number_,
+            .deadline_ns = next_ns_,
+            .woken_ns = now_ns,
+            .missed = skipped_ + (late_ ? 1 : 0),
+            .skipped = skipped_,
+            .missed_in_row = in_row_};
   }
 
   /// After the turn: whether it was over in time.
   bool finish(std::int64_t now_ns) noexcept {
     const bool in_time = now_ns - next_ns_ <= period_ns_;
     advance(1);
-    missed_ += in_time ? 0 : 1;
+    skipped_ = 0;
+    late_ = !in_time;
+    missed_ += late_ ? 1 : 0;
     in_row_ = in_time ? 0 : in_row_ + 1;
     longest_row_ = std::max(longest_row_, in_row_);
     return in_time;
@@ -60,6 +70,8 @@ class DeadlineGrid {
 
   std::int64_t next_ns_, period_ns_;
   std::int64_t number_ = 0, missed_ = 0, in_row_ = 0, longest_row_ = 0;
+  std::int64_t skipped_ = 0;  // since the last turn
+  bool late_ = false;         // was the last turn
 };
 
 }  // namespace mgdd::rig

@@ -22,6 +22,7 @@ class RingTransport {
   [[nodiscard]] BusState bus_state() const noexcept;
   [[nodiscard]] const TransportCounts& counts() const noexcept { return counts_; }
   [[nodiscard]] const BusMonitor& monitor() const noexcept { return monitor_; }
+  Claim& claim() noexcept { return claim_; }
 
   // The bus's side: one thread feeds, one takes.
   /// A frame from the bus, with its stamps; false, and counted as lost, where the loop left no room.
@@ -34,6 +35,7 @@ class RingTransport {
 
  private:
   SpscRing<Frame> from_bus_, to_bus_;
+  Claim claim_;
   TransportCounts counts_;
   BusMonitor monitor_;
   std::atomic<bool> failed_{false};

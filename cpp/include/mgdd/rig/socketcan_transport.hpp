@@ -48,6 +48,7 @@ class SocketCanTransport {
   [[nodiscard]] BusState bus_state() const noexcept;
   [[nodiscard]] const TransportCounts& counts() const noexcept { return counts_; }
   [[nodiscard]] const BusMonitor& monitor() const noexcept { return monitor_; }
+  Claim& claim() noexcept { return claim_; }
 
   /// Bytes that the kernel granted; it counts its own book-keeping too.
   [[nodiscard]] int receive_buffer_bytes() const noexcept { return receive_buffer_bytes_; }
@@ -58,6 +59,7 @@ class SocketCanTransport {
   void note_failure(int error) noexcept;
 
   SocketCanSettings settings_;
+  Claim claim_;
   int descriptor_ = -1;
   int receive_buffer_bytes_ = 0;
   std::uint32_t dropped_by_kernel_ = 0;
