@@ -5,6 +5,7 @@
 #include <atomic>
 #include <concepts>
 
+#include "mgdd/common/enum_names.hpp"
 #include "mgdd/rig/bus_monitor.hpp"
 #include "mgdd/rig/frame.hpp"
 #include "mgdd/rig/shared_count.hpp"
@@ -16,6 +17,7 @@ enum class SendResult {
   full,    ///< no room within the time that the transport allows; nothing was sent
   failed,  ///< the frame cannot be sent, or the interface is gone
 };
+Names<SendResult> send_result_names() noexcept;
 
 /// One thread writes, any thread reads.
 struct TransportCounts {
