@@ -44,6 +44,7 @@ PYBIND11_MODULE(_core, m) {
       {"loop",
        "Virtual benches and the loops over them.",
        {&bind_engine_bench, &bind_loop, &bind_virtual_throttle, &bind_throttle_loop}},
+      {"rig", "Between a controller and a real actuator.", {&bind_safety}},
   };
   for (const Room& room : rooms) {
     auto submodule = m.def_submodule(room.name, room.doc);
