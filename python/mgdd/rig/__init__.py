@@ -1,12 +1,29 @@
-"""Test rigs: one protocol for the simulated plant and the real one.
+"""Test rigs: one protocol for the simulated plant and the real one, and what keeps the actuators safe.
 
-`mgdd.loop.run_seeker` steers a rig as it steers any plant.
+`mgdd.loop.run_seeker` steers a rig as it steers any plant. Below every optimiser stands an `ActuatorGuard`, below every
+throttle controller a `SafetyGate`.
 """
 
 from __future__ import annotations
 
 from mgdd._core.rig import E2eCheck, E2eSettings, protect
+from mgdd.rig.actuator_guard import ActuatorGuard, GuardedAsk
 from mgdd.rig.base import Rig
+from mgdd.rig.gated import GatedThrottle
+from mgdd.rig.safety import Drive, SafetyChange, SafetyEnvelope, SafetyGate
 from mgdd.rig.simulated import SimulatedRig
 
-__all__ = ["E2eCheck", "E2eSettings", "Rig", "SimulatedRig", "protect"]
+__all__ = [
+    "ActuatorGuard",
+    "Drive",
+    "E2eCheck",
+    "E2eSettings",
+    "GatedThrottle",
+    "GuardedAsk",
+    "Rig",
+    "SafetyChange",
+    "SafetyEnvelope",
+    "SafetyGate",
+    "SimulatedRig",
+    "protect",
+]
