@@ -143,5 +143,6 @@ void bind_engine_bench(py::module_& m);
 void bind_loop(py::module_& m);
 void bind_virtual_throttle(py::module_& m);
 void bind_throttle_loop(py::module_& m);
+void bind_safety(py::module_& m);
 
 }  // namespace mgdd::bindings

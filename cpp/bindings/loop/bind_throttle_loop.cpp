@@ -12,21 +12,16 @@
 
 #include "binding.hpp"
 #include "interruptible.hpp"
+#include "loop/throttle_controller_binding.hpp"
 #include "mgdd/common/error.hpp"
-#include "mgdd/loop/throttle_controllers.hpp"
 #include "record_binding.hpp"
 #include "throttle/pseudo_wiener_binding.hpp"
 
 namespace mgdd::bindings {
-namespace {
 
 using namespace loop;
 
-using AnyMgdd1 = std::variant<Mgdd1On<throttle::PwRModel>, Mgdd1On<throttle::PwWModel>, Mgdd1On<throttle::PwPModel>>;
-
-struct BoundMgdd1 {
-  AnyMgdd1 controller;
-};
+namespace {
 
 BoundMgdd1 made_mgdd1(const BoundModel& guide, int horizon_samples, int delay_samples,
                       const std::map<std::string, double>& numbers) {
@@ -40,30 +35,6 @@ BoundMgdd1 made_mgdd1(const BoundModel& guide, int horizon_samples, int delay_sa
   }
   return std::visit([&](const auto& model) -> BoundMgdd1 { return {Mgdd1On<std::decay_t<decltype(model)>>(model, s)}; },
                     throttle::prepare(guide.parameters));
-}
-
-ThrottleController controller_of(const py::handle& object) {
-  if (py::isinstance<control::GuidedPredictive>(object)) return object.cast<const control::GuidedPredictive&>();
-  if (py::isinstance<control::Pid>(object)) return object.cast<const control::Pid&>();
-  if (py::isinstance<control::SlidingMode>(object)) return object.cast<const control::SlidingMode&>();
-  if (py::isinstance<BoundMgdd1>(object)) {
-    return std::visit([](const auto& c) -> ThrottleController { return c; },
-                      object.cast<const BoundMgdd1&>().controller);
-  }
-  refuse("controller", object, "a controller of mgdd.control");
-}
-
-// Puts what a run left behind back into the caller's object.
-void give_back(const py::handle& object, const ThrottleController& controller) {
-  std::visit(
-      [&]<class C>(const C& c) {
-        if constexpr (std::is_constructible_v<AnyMgdd1, C>) {
-          object.cast<BoundMgdd1&>().controller = c;
-        } else {
-          object.cast<C&>() = c;
-        }
-      },
-      controller);
 }
 
 ThrottleScenario scenario_of(const InputArray& reference, const InputArray& airflow, const InputArray& supply,
@@ -136,6 +107,29 @@ py::tuple run_many(const std::vector<VirtualThrottle*>& plants, const py::list& 
 }
 
 }  // namespace
+
+ThrottleController controller_of(const py::handle& object) {
+  if (py::isinstance<control::GuidedPredictive>(object)) return object.cast<const control::GuidedPredictive&>();
+  if (py::isinstance<control::Pid>(object)) return object.cast<const control::Pid&>();
+  if (py::isinstance<control::SlidingMode>(object)) return object.cast<const control::SlidingMode&>();
+  if (py::isinstance<BoundMgdd1>(object)) {
+    return std::visit([](const auto& c) -> ThrottleController { return c; },
+                      object.cast<const BoundMgdd1&>().controller);
+  }
+  refuse("controller", object, "a controller of mgdd.control");
+}
+
+void give_back(const py::handle& object, const ThrottleController& controller) {
+  std::visit(
+      [&]<class C>(const C& c) {
+        if constexpr (std::is_constructible_v<AnyMgdd1, C>) {
+          object.cast<BoundMgdd1&>().controller = c;
+        } else {
+          object.cast<C&>() = c;
+        }
+      },
+      controller);
+}
 
 void bind_throttle_loop(py::module_& m) {
   py::class_<BoundMgdd1>(m, "Mgdd1", "The plainest model-guided controller; use mgdd.control.Mgdd1.")

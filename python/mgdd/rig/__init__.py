@@ -1,28 +1,55 @@
 """Test rigs: one protocol for the simulated plant and the real one, in this process, over a CAN bus, or recorded.
 
-`mgdd.loop.run_seeker` steers a rig as it steers any plant.
+`mgdd.loop.run_seeker` steers a rig as it steers any plant. Below every optimiser stands an `ActuatorGuard`, below every
+throttle controller a `SafetyGate`. An `Experiment` from a file runs on all of them.
 """
 
 from __future__ import annotations
 
 from mgdd._core.rig import E2eCheck, E2eSettings, protect
+from mgdd.rig.actuator_guard import ActuatorGuard, GuardedAsk
 from mgdd.rig.base import Rig
 from mgdd.rig.can.can_rig import CanRig
 from mgdd.rig.can.modes import RigMode
 from mgdd.rig.can.processes import VirtualNode
 from mgdd.rig.can.signal_map import SignalMap
 from mgdd.rig.can.transport import CanTransport
+from mgdd.rig.experiment import (
+    CheckedExperiment,
+    Experiment,
+    ExperimentResult,
+    SelfTest,
+    check_experiment,
+    run_experiment,
+    run_self_test,
+)
+from mgdd.rig.gated import GatedThrottle
+from mgdd.rig.safety import Drive, SafetyChange, SafetyEnvelope, SafetyGate
 from mgdd.rig.simulated import SimulatedRig
 
 __all__ = [
+    "ActuatorGuard",
     "CanRig",
     "CanTransport",
+    "CheckedExperiment",
+    "Drive",
     "E2eCheck",
     "E2eSettings",
+    "Experiment",
+    "ExperimentResult",
+    "GatedThrottle",
+    "GuardedAsk",
     "Rig",
     "RigMode",
+    "SafetyChange",
+    "SafetyEnvelope",
+    "SafetyGate",
+    "SelfTest",
     "SignalMap",
     "SimulatedRig",
     "VirtualNode",
+    "check_experiment",
     "protect",
+    "run_experiment",
+    "run_self_test",
 ]

@@ -92,6 +92,9 @@ TEST(SafetyGate, AfterTheStartTheDutyGrowsInWithoutAJerk) {
     roughest = std::max(roughest, std::abs(duty[k] - 2.0 * duty[k - 1] + duty[k - 2]));
   EXPECT_LE(roughest, 0.5 * 5.8 / (256.0 * 256.0));  // 10 / sqrt(3) is the largest curvature of the ramp
   EXPECT_LT(duty[1], 1e-4);
+  (void)gate.request(Request::stop);
+  (void)gate.request(Request::run);
+  EXPECT_LT(cycle(gate, healthy(), 0.5).duty, 1e-5);  // every start anew
 }
 
 TEST(SafetyGate, ADutyThatIsNotFiniteIsAFaultUntilAFiniteOneComes) {
@@ -243,6 +246,40 @@ TEST(SafetyGate, ADutyWithoutFactsLimps) {
   SafetyGate gate = running();
   EXPECT_EQ(gate.command(0.125), Drive{});
   expect_off(gate, SafetyState::limp, Reason::not_observed);
+  EXPECT_EQ(gate.request(Request::reset), Reason::not_observed);
+  pass(gate, 6);
+  EXPECT_EQ(gate.request(Request::reset), Reason::too_few_frames);
+  pass(gate, 1);
+  EXPECT_EQ(gate.request(Request::reset), Reason::none);
+}
+
+TEST(SafetyGate, GoodFramesCountNotCycles) {
+  SafetyGate gate(narrow());
+  SafetyFacts none = healthy();
+  none.good_frames = 0;
+  for (int k = 0; k < 20; ++k)
+    (void)cycle(gate, none);
+  EXPECT_EQ(gate.request(Request::arm), Reason::too_few_frames);
+  SafetyFacts many = healthy();
+  many.good_frames = 3;
+  (void)cycle(gate, many);
+  (void)cycle(gate, many);
+  EXPECT_EQ(gate.request(Request::arm), Reason::too_few_frames);
+  (void)cycle(gate, healthy());
+  EXPECT_EQ(gate.request(Request::arm), Reason::none);
+}
+
+TEST(SafetyGate, OnlyMeasurementsCountAgainstASensor) {
+  SafetyGate gate = running();
+  SafetyFacts wrong = healthy(), silent;
+  wrong.sensor_v = {1.5, 3.8};
+  (void)cycle(gate, wrong);
+  (void)cycle(gate, wrong);
+  for (int k = 0; k < 5; ++k)
+    (void)cycle(gate, silent);
+  EXPECT_EQ(gate.state(), SafetyState::run);
+  (void)cycle(gate, wrong);
+  expect_off(gate, SafetyState::fault, Reason::sensor_disagreement);
 }
 
 TEST(SafetyGate, HeatIsTheMeanSquareOfTheDutyAndMustCoolBeforeTheNextStart) {
@@ -354,6 +391,7 @@ TEST(SafetyGate, AbortLimpsAndIsNeverRefused) {
   facts.request = Request::abort;
   EXPECT_EQ(cycle(gate, facts), Drive{});
   expect_off(gate, SafetyState::limp, Reason::aborted);
+  EXPECT_EQ(gate.request(Request::reset), Reason::too_few_frames);
   EXPECT_EQ(gate.request(Request::abort), Reason::none);
   pass(gate, 200);
   expect_off(gate, SafetyState::limp, Reason::aborted);
@@ -386,6 +424,12 @@ TEST(SafetyGate, AFaultOutranksALimpAndTheFirstReasonStays) {
   (void)cycle(gate, both);
   (void)cycle(gate, both);
   expect_off(gate, SafetyState::fault, Reason::sensor_disagreement);
+  SafetyGate noisy = running();
+  both.bus = BusState::active;
+  both.bad_frames = 5;
+  for (int k = 0; k < 3; ++k)
+    (void)cycle(noisy, both);
+  expect_off(noisy, SafetyState::fault, Reason::sensor_disagreement);  // in a cycle whose frames were bad too
   SafetyFacts other = healthy();
   other.bus = BusState::off;
   other.sensor_v = {0.0, 0.0};

@@ -31,12 +31,14 @@ enum class SafetyRequest {
 };
 Names<SafetyRequest> safety_request_names() noexcept;
 
+inline constexpr double unknown = std::numeric_limits<double>::quiet_NaN();
+
 /// What is known of a cycle; the defaults are of one in which nothing arrived and all else is well.
 struct SafetyFacts {
-  std::int64_t good_frames = 0, bad_frames = 0;             ///< that arrived since the last cycle, in whatever order
-  double age_s = std::numeric_limits<double>::quiet_NaN();  ///< of the last good one; NaN: it grows by the cycle
-  std::array<double, 2> sensor_v{};  ///< of both position sensors; looked at where a good frame arrived
-  double angle_deg = 0.0;            ///< of the plate; the same
+  std::int64_t good_frames = 0, bad_frames = 0;      ///< that arrived since the last cycle, in whatever order
+  double age_s = unknown;                            ///< of the last good one; NaN: it grows by the cycle
+  std::array<double, 2> sensor_v{unknown, unknown};  ///< of both position sensors; looked at where a good frame arrived
+  double angle_deg = unknown;                        ///< of the plate; the same
   BusState bus = BusState::active;
   bool sent = true;                   ///< the last command left
   std::int64_t missed_deadlines = 0;  ///< since the last cycle
