@@ -20,7 +20,7 @@ __all__ = ["main"]
 
 EXIT_OK, EXIT_BAD_INPUT, EXIT_NO_CONVERGENCE, EXIT_INTERRUPTED, EXIT_PIPE = 0, 2, 3, 130, 141
 
-_EPILOG = """exit codes: 0 done, 2 bad input or usage, 3 no convergence or no feasible answer, 130 interrupted.
+_EPILOG = """exit codes: 0 done, 1 a self-test that failed, 2 bad input or usage, 3 no convergence or no feasible answer, 130 interrupted.
 
 examples:
   mgdd demo
@@ -42,7 +42,8 @@ def main(argv: Sequence[str] | None = None) -> int:
     Returns
     -------
     int
-        Exit code: 0 done, 2 bad input or usage, 3 no convergence or no feasible answer, 130 interrupted.
+        Exit code: 0 done, 1 a self-test that failed, 2 bad input or usage, 3 no convergence or no feasible answer, 130
+        interrupted.
 
     Examples
     --------
@@ -85,7 +86,7 @@ def main(argv: Sequence[str] | None = None) -> int:
         print(f"mgdd: {kept}", file=sys.stderr)
         fail(args, error, kept)
         return EXIT_INTERRUPTED
-    return EXIT_OK
+    return int(getattr(args, "exit_code", EXIT_OK))
 
 
 def _parser() -> argparse.ArgumentParser:

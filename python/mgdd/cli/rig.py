@@ -10,13 +10,14 @@ import time
 from collections.abc import Callable
 from typing import Any
 
-from mgdd.cli.options import add_command, add_group
+from mgdd.cli import rig_run, rig_selftest
+from mgdd.cli.options import add_command, add_group, refuse_idle
 from mgdd.cli.output import check_file, check_output, emit
 from mgdd.rig import CanTransport, SignalMap
 from mgdd.rig.can.hub import Hub
 from mgdd.rig.can.hub_faults import BusFault
 from mgdd.rig.can.node import TruthLog, node_of, parent_watch, run_node
-from mgdd.rig.can.node_core import NodeCore
+from mgdd.rig.can.node_core import NodeCore, NodePlant, node_plant
 from mgdd.rig.can.signal_map import SHIPPED
 
 __all__ = ["add"]
@@ -28,9 +29,11 @@ def add(commands: Any) -> None:
     """Add the group and its commands."""
     verbs = add_group(
         commands, "rig",
-        help_text="experiments over a CAN bus: hub, node",
-        example="mgdd rig hub --port 29536",
+        help_text="experiments in process, over a CAN bus and on a bench",
+        example="mgdd rig run track.toml --mode hil",
     )  # fmt: skip
+    rig_run.add(verbs)
+    rig_selftest.add(verbs)
     _add_hub(verbs)
     _add_node(verbs)
 
@@ -78,6 +81,7 @@ def _add_node(verbs: Any) -> None:
         "offset:sensor=2,size=0.3,from_s=1",
     )  # fmt: skip
     parser.add_argument("--seed", type=int, default=0, metavar="N", help="of the plant (default: 0)")
+    parser.add_argument("--experiment", metavar="FILE.toml", help="serve the plant of this experiment, with its seed")
     parser.add_argument("--truth", metavar="FILE.csv", help="write a line per sample: what really happened")
     parser.add_argument("--duration-s", type=float, metavar="X", help="end after this time (default: never)")
 
@@ -117,7 +121,7 @@ def _node(args: argparse.Namespace) -> None:
     signal_map = SignalMap.load(args.map)
     period_s = None if args.period_ms is None else args.period_ms * 1e-3
     sample_s = period_s if args.sample_ms is None else args.sample_ms * 1e-3
-    core = NodeCore(node_of(signal_map, faults=args.fault, seed=args.seed, sample_s=sample_s), signal_map)
+    core = NodeCore(_plant_of(args, signal_map, sample_s), signal_map)
     stopped: list[int] = []
     for number in (signal.SIGINT, signal.SIGTERM):
         signal.signal(number, lambda got, _: stopped.append(got))
@@ -133,6 +137,18 @@ def _node(args: argparse.Namespace) -> None:
         if log is not None:
             log.close()
     emit(args, counts)
+
+
+def _plant_of(args: argparse.Namespace, signal_map: SignalMap, sample_s: float | None) -> NodePlant:
+    if args.experiment is None:
+        return node_of(signal_map, faults=args.fault, seed=args.seed, sample_s=sample_s)
+    from mgdd.rig.experiment import Experiment
+    from mgdd.rig.experiment.stand import simulated_plant
+
+    refuse_idle(args, "fault", why="--experiment says what the plant is")
+    inputs = (*signal_map.input_names, "bridge_open")
+    sample_s = signal_map.cycle_s if sample_s is None else sample_s
+    return node_plant(simulated_plant(Experiment.load(args.experiment), sample_s=sample_s, inputs=inputs))
 
 
 def _until(duration_s: float | None, stopped: list[int]) -> Callable[[], bool]:

@@ -41,6 +41,8 @@ class VirtualNode:
         Of the hub, as ``mgdd rig hub --fault`` takes them.
     sample_ms : float, optional
         Time in a throttle between two samples [ms]; the cycle of the map if left out.
+    experiment : path-like, optional
+        Experiment file whose plant and seed it has; a preset throttle or engine if left out.
 
     Examples
     --------
@@ -63,6 +65,7 @@ class VirtualNode:
         faults: Sequence[str] = (),
         bus_faults: Sequence[str] = (),
         sample_ms: float | None = None,
+        experiment: str | os.PathLike[str] | None = None,
     ) -> None:
         self._hub_options = [word for fault in bus_faults for word in ("--fault", fault)]
         self._node_options = ["--map", str(signal_map), "--seed", str(seed)]
@@ -70,6 +73,7 @@ class VirtualNode:
         self._node_options += ["--truth", str(truth)] if truth is not None else []
         self._node_options += [word for fault in faults for word in ("--fault", fault)]
         self._node_options += ["--sample-ms", str(sample_ms)] if sample_ms is not None else []
+        self._node_options += ["--experiment", str(experiment)] if experiment is not None else []
         self._started: list[tuple[subprocess.Popen[str], IO[str]]] = []
         self._bus = ""
 
@@ -135,6 +139,7 @@ class VirtualNode:
             stdout=subprocess.PIPE,
             stderr=said,
             text=True,
+            start_new_session=True,  # a Ctrl-C in the terminal is for the run, which then ends them
         )
         self._started.append((process, said))
         assert process.stdout is not None  # noqa: S101 - PIPE
