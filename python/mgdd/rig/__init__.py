@@ -12,6 +12,8 @@ from mgdd.rig.can.modes import RigMode
 from mgdd.rig.can.processes import VirtualNode
 from mgdd.rig.can.signal_map import SignalMap
 from mgdd.rig.can.transport import CanTransport
+from mgdd.rig.exchange import RecordingRig, RigRecord
+from mgdd.rig.replay import ReplayRig
 from mgdd.rig.simulated import SimulatedRig
 
 __all__ = [
@@ -19,8 +21,11 @@ __all__ = [
     "CanTransport",
     "E2eCheck",
     "E2eSettings",
+    "RecordingRig",
+    "ReplayRig",
     "Rig",
     "RigMode",
+    "RigRecord",
     "SignalMap",
     "SimulatedRig",
     "VirtualNode",
