@@ -14,6 +14,7 @@ from mgdd.rig.can.modes import RigMode
 from mgdd.rig.can.processes import VirtualNode
 from mgdd.rig.can.signal_map import SignalMap
 from mgdd.rig.can.transport import CanTransport
+from mgdd.rig.exchange import RecordingRig, RigRecord
 from mgdd.rig.experiment import (
     CheckedExperiment,
     Experiment,
@@ -24,6 +25,7 @@ from mgdd.rig.experiment import (
     run_self_test,
 )
 from mgdd.rig.gated import GatedThrottle
+from mgdd.rig.replay import ReplayRig
 from mgdd.rig.safety import Drive, SafetyChange, SafetyEnvelope, SafetyGate
 from mgdd.rig.simulated import SimulatedRig
 
@@ -39,8 +41,11 @@ __all__ = [
     "ExperimentResult",
     "GatedThrottle",
     "GuardedAsk",
+    "RecordingRig",
+    "ReplayRig",
     "Rig",
     "RigMode",
+    "RigRecord",
     "SafetyChange",
     "SafetyEnvelope",
     "SafetyGate",
