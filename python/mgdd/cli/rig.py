@@ -10,7 +10,7 @@ import time
 from collections.abc import Callable
 from typing import Any
 
-from mgdd.cli import rig_run, rig_selftest
+from mgdd.cli import rig_records, rig_run, rig_selftest
 from mgdd.cli.options import add_command, add_group, refuse_idle
 from mgdd.cli.output import check_file, check_output, emit
 from mgdd.rig import CanTransport, SignalMap
@@ -33,6 +33,7 @@ def add(commands: Any) -> None:
         example="mgdd rig run track.toml --mode hil",
     )  # fmt: skip
     rig_run.add(verbs)
+    rig_records.add(verbs)
     rig_selftest.add(verbs)
     _add_hub(verbs)
     _add_node(verbs)

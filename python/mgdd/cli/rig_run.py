@@ -48,6 +48,8 @@ def add(verbs: Any) -> None:
 def _add_experiment(parser: argparse.ArgumentParser) -> None:
     parser.add_argument("file", metavar="EXPERIMENT.toml", help="what to do; the page Experiments lists its keys")
     parser.add_argument("--mode", choices=_MODES, help="instead of the mode of the file")
+    parser.add_argument("--connection", metavar="INTERFACE:CHANNEL", help="the bus, for example socketcan:can0")
+    parser.add_argument("--pace", choices=("step", "real_time"), help="of the bus; step needs a simulated node")
     parser.add_argument("--record", metavar="FILE", help="of the mode replay: run.rec of a run")
 
 
@@ -55,9 +57,10 @@ def _checked(args: argparse.Namespace) -> CheckedExperiment:
     from mgdd.rig.experiment import Experiment, check_experiment
 
     experiment = Experiment.load(args.file)
-    if args.mode is not None or args.record is not None:
-        experiment = experiment.with_mode(args.mode or experiment.mode, record=args.record)
-    return check_experiment(experiment)
+    mode = args.mode or experiment.mode
+    return check_experiment(
+        experiment.with_mode(mode, record=args.record, connection=args.connection, pace=args.pace)
+    )
 
 
 def _run(args: argparse.Namespace) -> None:

@@ -172,6 +172,8 @@ class RecordingRig:
         The rig, or a plain plant.
     sink : callable, optional
         Called with each row of named numbers as soon as it is measured, to write it to a file.
+    keep : bool
+        Whether `record` remembers them too; a run of days has a sink instead.
 
     Examples
     --------
@@ -185,8 +187,10 @@ class RecordingRig:
     (0.6, 1)
     """
 
-    def __init__(self, rig: Rig | Plant, sink: Callable[[Mapping[str, float]], None] | None = None) -> None:
-        self.rig = rig
+    def __init__(
+        self, rig: Rig | Plant, sink: Callable[[Mapping[str, float]], None] | None = None, *, keep: bool = True
+    ) -> None:
+        self.rig, self._keep = rig, keep
         self.record = RigRecord(rig.input_names, rig.limit_names)
         self._sink = sink
         self._inputs: dict[str, float] = {}
@@ -232,7 +236,8 @@ class RecordingRig:
         """
         measured = self.rig.measure()
         exchange = Exchange(dict(self._inputs), measured)
-        self.record.append(exchange)
+        if self._keep:
+            self.record.append(exchange)
         if self._sink is not None:
             self._sink(flat(exchange))
         return measured

@@ -99,11 +99,12 @@ class SeekPlan:
         )
         return plain if task.guide == "none" else GuidedEngine(plain, self.model, self.point, keep_start=True)
 
-    def run(self, plant: Plant) -> Outcome:
-        """Run it on a plant."""
+    def run(self, plant: Plant, most: int | None = None) -> Outcome:
+        """Run it on a plant, for at most so many cycles."""
+        cycles = self.task.cycles if most is None else min(self.task.cycles, most)
         criteria = LoopCriteria(arrival=_ARRIVAL_CAD, limits=dict(self.task.limits) or None)
         try:
-            run = run_seeker(plant, self.seeker(), self.task.cycles, criteria=criteria)
+            run = run_seeker(plant, self.seeker(), cycles, criteria=criteria)
         except Interrupted as stop:
             if not isinstance(stop.partial, LoopRun):
                 raise

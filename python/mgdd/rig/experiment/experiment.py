@@ -15,6 +15,7 @@ from mgdd.results.describe import described
 from mgdd.rig.can.toml_table import TomlTable
 from mgdd.rig.experiment.settings import (
     MODES,
+    PACES,
     TASKS,
     BusSettings,
     EnginePlant,
@@ -161,7 +162,14 @@ class Experiment:
         head = {"kind": _KIND, "format": _FORMAT, "task": self.task, "mode": self.mode, "seed": self.seed}
         return tomli_w.dumps(head | {name: own for name, table in every.items() if (own := table.to_dict())})
 
-    def with_mode(self, mode: str, *, record: str | os.PathLike[str] | None = None) -> Self:
+    def with_mode(
+        self,
+        mode: str,
+        *,
+        record: str | os.PathLike[str] | None = None,
+        connection: str | None = None,
+        pace: str | None = None,
+    ) -> Self:
         """Give the same experiment in another mode.
 
         Parameters
@@ -169,7 +177,11 @@ class Experiment:
         mode : {"simulate", "hil", "dry_run", "replay", "bench"}
             The mode.
         record : path-like, optional
-            The record to replay.
+            The record to replay; as it is if left out.
+        connection : str, optional
+            The bus, as ``socketcan:can0``; as it is if left out.
+        pace : {"step", "real_time"}, optional
+            Of the bus; as it is if left out.
 
         Returns
         -------
@@ -179,12 +191,21 @@ class Experiment:
         Raises
         ------
         mgdd.errors.ParameterError
-            No such mode.
+            No such mode or pace.
+
+        Examples
+        --------
+        >>> from mgdd.rig import Experiment
+        >>> text = 'kind = "experiment"\nformat = 1\ntask = "seek"'
+        >>> Experiment.from_toml(text).with_mode("hil").mode
+        'hil'
         """
-        if mode not in MODES:
-            raise ParameterError.of("mode", mode, f"one of {', '.join(MODES)}")
-        own = self.replay if record is None else ReplaySettings(record=os.fspath(record))
-        return replace(self, mode=mode, replay=own)
+        for name, value, among in (("mode", mode, MODES), ("pace", pace or self.bus.pace, PACES)):
+            if value not in among:
+                raise ParameterError.of(name, value, f"one of {', '.join(among)}")
+        bus = replace(self.bus, connection=connection or self.bus.connection, pace=pace or self.bus.pace)
+        replay = self.replay if record is None else ReplaySettings(record=os.fspath(record))
+        return replace(self, mode=mode, replay=replay, bus=bus)
 
     @property
     def folder(self) -> Path:

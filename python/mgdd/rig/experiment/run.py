@@ -11,7 +11,7 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from mgdd.errors import Interrupted
+from mgdd.errors import DataError
 from mgdd.results.describe import described
 from mgdd.rig.experiment.checked import CheckedExperiment, check_experiment
 from mgdd.rig.experiment.engine_task import SeekPlan
@@ -169,11 +169,10 @@ def _steered(
     watch: Callable[[Cycle], None] | None,
 ) -> tuple[Outcome, dict[str, Any], dict[str, Any]]:
     times: list[tuple[float, float]] = []
-    with opened(checked, arm=arm, key_file=key_file) as stand:
+    with opened(checked, record, arm=arm, key_file=key_file) as stand:
 
         def listen(cycle: Cycle) -> None:
             times.append((cycle.thinking_s, cycle.waiting_s))
-            record.cycle(cycle)
             record.say(stand.events())
             if watch is not None:
                 watch(cycle)
@@ -189,10 +188,12 @@ def _steered(
 
 def _run(checked: CheckedExperiment, stand: Stand, listen: Callable[[Cycle], None]) -> Outcome:
     first = stand.start()
-    plant = Watched(stand.plant, listen)
+    plant, most = Watched(stand.plant, listen), stand.left()
+    if most is not None and most < 1:
+        raise DataError(f"{checked.record}: ends before the first cycle of the task")
     if isinstance(checked.plan, SeekPlan):
-        return checked.plan.run(plant)
-    return checked.plan.run(plant, first)
+        return checked.plan.run(plant, most)
+    return checked.plan.run(plant, first, most)
 
 
 def _timing(times: list[tuple[float, float]], elapsed_s: float) -> dict[str, Any]:

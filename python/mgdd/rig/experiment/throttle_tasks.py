@@ -10,7 +10,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from mgdd import _core, identify, presets
-from mgdd.errors import DataError, ParameterError
+from mgdd.errors import ParameterError
 from mgdd.io import throttle_log
 from mgdd.loop import Plant, Reference, tuned_controller
 from mgdd.loop.track import FIGURES
@@ -75,18 +75,18 @@ class TrackPlan:
             self.task.controller, self.model, sample_s=self.sample_s, delay_samples=self.task.delay_samples or 0
         )
 
-    def run(self, plant: Plant, first_angle_deg: float) -> Outcome:
-        """Run it on a plant whose last measured angle is given."""
+    def run(self, plant: Plant, first_angle_deg: float, most: int | None = None) -> Outcome:
+        """Run it on a plant whose last measured angle is given, for at most so many samples."""
         controller = self.controller()
         wanted = self.reference.angle_deg
 
         def duty_at(sample: int, measured_deg: float) -> float:
             return float(controller.step(float(wanted[sample]), measured_deg))
 
-        columns, interrupted = _drive(plant, self.samples, duty_at, first_angle_deg)
+        columns, interrupted = _drive(plant, _fewer(self.samples, most), duty_at, first_angle_deg)
         n = len(columns["asked_duty"])
         if n == 0:
-            raise DataError("track: interrupted before the first sample")
+            return Outcome(figures={}, dataset=_dataset(columns, self.sample_s, {}, {}), interrupted=True)
         from_sample = min(self.reference.from_sample, n - 1)
         figures = _core.loop.tracking_figures(
             reference_deg=wanted[:n], angle_deg=columns["sensed_angle_deg"], duty=columns["duty"],
@@ -132,13 +132,14 @@ class IdentifyPlan:
         """How many samples it takes."""
         return len(self.duty)
 
-    def run(self, plant: Plant, first_angle_deg: float) -> Outcome:
-        """Run it on a plant, and fit."""
-        columns, interrupted = _drive(plant, self.samples, lambda sample, _: float(self.duty[sample]), first_angle_deg)
+    def run(self, plant: Plant, first_angle_deg: float, most: int | None = None) -> Outcome:
+        """Run it on a plant, for at most so many samples, and fit."""
+        samples = _fewer(self.samples, most)
+        columns, interrupted = _drive(plant, samples, lambda sample, _: float(self.duty[sample]), first_angle_deg)
         dataset = _dataset(columns, self.sample_s, {}, {})
         said: dict[str, Any] = {"excitation": self.task.excitation, "samples": len(columns["duty"])}
-        if interrupted:
-            return Outcome(figures=said, dataset=dataset, interrupted=True)
+        if interrupted or samples < self.samples:
+            return Outcome(figures=said, dataset=dataset, interrupted=interrupted)
         time_s = np.arange(len(columns["duty"])) * self.sample_s
         angle_deg = np.r_[first_angle_deg, columns["sensed_angle_deg"][:-1]]  # a log holds the angle before its duty
         log = throttle_log(time_s, columns["duty"], angle_deg, name="recorded")
@@ -156,6 +157,10 @@ class IdentifyPlan:
             files={"fit.toml": fit.to_toml()},
             drawings={"identify": partial(_draw_fit, validation)},
         )
+
+
+def _fewer(samples: int, most: int | None) -> int:
+    return samples if most is None else min(samples, most)
 
 
 def _model_named(name: str, folder: Path) -> Any:
