@@ -7,6 +7,19 @@ from __future__ import annotations
 
 from mgdd._core.rig import E2eCheck, E2eSettings, protect
 from mgdd.rig.base import Rig
+from mgdd.rig.export import export_record
+from mgdd.rig.recorded import read_record, repair_record
+from mgdd.rig.recorder import Recorder
 from mgdd.rig.simulated import SimulatedRig
 
-__all__ = ["E2eCheck", "E2eSettings", "Rig", "SimulatedRig", "protect"]
+__all__ = [
+    "E2eCheck",
+    "E2eSettings",
+    "Recorder",
+    "Rig",
+    "SimulatedRig",
+    "export_record",
+    "protect",
+    "read_record",
+    "repair_record",
+]
