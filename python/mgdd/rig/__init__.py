@@ -24,7 +24,10 @@ from mgdd.rig.experiment import (
     run_experiment,
     run_self_test,
 )
+from mgdd.rig.export import export_record
 from mgdd.rig.gated import GatedThrottle
+from mgdd.rig.recorded import read_record, repair_record
+from mgdd.rig.recorder import Recorder
 from mgdd.rig.replay import ReplayRig
 from mgdd.rig.safety import Drive, SafetyChange, SafetyEnvelope, SafetyGate
 from mgdd.rig.simulated import SimulatedRig
@@ -41,6 +44,7 @@ __all__ = [
     "ExperimentResult",
     "GatedThrottle",
     "GuardedAsk",
+    "Recorder",
     "RecordingRig",
     "ReplayRig",
     "Rig",
@@ -54,7 +58,10 @@ __all__ = [
     "SimulatedRig",
     "VirtualNode",
     "check_experiment",
+    "export_record",
     "protect",
+    "read_record",
+    "repair_record",
     "run_experiment",
     "run_self_test",
 ]
