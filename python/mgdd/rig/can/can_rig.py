@@ -27,7 +27,7 @@ __all__ = ["CanRig"]
 
 _SAFE_FRAMES = 5
 _SAFE_PAUSE_S = 0.002
-_LISTEN_CYCLES = 3
+_LISTEN_CYCLES = 10
 _ARMING_ROUNDS = 3
 _PEER_CYCLES = 20
 _PEER_S = 1.0  # at least so long for the first valid frame
@@ -273,15 +273,17 @@ class CanRig:
             raise RigError("the rig is not open: use it in a with block")
 
     def _listen(self) -> None:
-        """Before the first frame of ours: another sender of our identifiers shows itself within some cycles."""
+        """Before the first frame of ours: two senders of one identifier show themselves within some cycles."""
         if not self.bus.shared or not self._sends:
             return
         cycles = [m.message.cycle_s for m in self.map.commands.values() if m.message.cycle_s is not None]
-        until = time.monotonic() + _LISTEN_CYCLES * max(cycles, default=self.map.cycle_s)
+        until = time.monotonic() + _LISTEN_CYCLES * max([*cycles, self.map.cycle_s])
         while (left := until - time.monotonic()) > 0.0:
             frame = self.bus.receive(left)
             if frame is not None:
                 self._inbox.take(frame)
+        if jumping := self._inbox.jumping():
+            raise RigError(f"{self.bus.name}: {jumping}: two nodes send it, or most frames are lost")
 
     def _send(self, message: MappedMessage, values: Mapping[str, float]) -> None:
         payloads = message.payloads(values, message.driven)
