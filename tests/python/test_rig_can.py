@@ -197,15 +197,14 @@ def test_signals_leave_by_the_exit(number: signal.Signals, raised: type[BaseExce
 
 
 def test_a_dead_bus_does_not_hide_why_it_was_left(monkeypatch: pytest.MonkeyPatch) -> None:
-    with node("dead"):
-        with pytest.raises(ZeroDivisionError), rig_on("dead") as rig:
-            rig.apply({"duty": 0.7})
+    with node("dead"), pytest.raises(ZeroDivisionError), rig_on("dead") as rig:
+        rig.apply({"duty": 0.7})
 
-            def refuse(*_: object, **__: object) -> None:
-                raise RigError("gone")
+        def refuse(*_: object, **__: object) -> None:
+            raise RigError("gone")
 
-            monkeypatch.setattr(rig.bus, "send", refuse)
-            raise ZeroDivisionError
+        monkeypatch.setattr(rig.bus, "send", refuse)
+        raise ZeroDivisionError
 
 
 # --- who is there -------------------------------------------------------------------------------------------
@@ -231,7 +230,9 @@ def test_a_node_of_another_dbc_is_told_by_what_it_sends() -> None:
 def test_a_node_with_another_data_identifier_has_no_valid_frame(tmp_path: Path) -> None:
     (tmp_path / "etb.dbc").write_bytes(ETB.dbc.file.read_bytes())
     file = tmp_path / "etb.toml"
-    file.write_text(ETB.file.read_text(encoding="utf-8").replace("data_id = 0x121", "data_id = 0x999"), encoding="utf-8")
+    file.write_text(
+        ETB.file.read_text(encoding="utf-8").replace("data_id = 0x121", "data_id = 0x999"), encoding="utf-8"
+    )
     with node("crc", step=False, signal_map=SignalMap.load(file)):
         rig = CanRig(ETB, "virtual:crc", mode="hil", timeout_s=0.05)
         with pytest.raises(RigError, match=r"frames ETB_Status \(0x121\) came, too few of them valid .*wrong_crc"):
@@ -277,7 +278,9 @@ def test_another_host_is_found_before_anything_is_sent() -> None:
         busy.start()
         rig = rig_on("hosts")
         try:
-            with pytest.raises(RigError, match="frame 0x120 arrived, which this host sends: two nodes have one identifier"):
+            with pytest.raises(
+                RigError, match="frame 0x120 arrived, which this host sends: two nodes have one identifier"
+            ):
                 rig.open()
         finally:
             stop.set()
