@@ -16,10 +16,10 @@ import pytest
 
 from mgdd.errors import ParameterError, RigError
 from mgdd.loop import EngineBench, VirtualThrottle
-from mgdd.rig import CanRig, CanTransport, RigMode, SignalMap
+from mgdd.rig import CanRig, CanTransport, SignalMap
 from mgdd.rig.can.frame import Frame
 from mgdd.rig.can.link import Sender
-from mgdd.rig.can.modes import key_line
+from mgdd.rig.can.modes import RigMode, key_line
 from mgdd.rig.can.node import node_of, run_node
 from mgdd.rig.can.node_core import NodeCore, node_plant
 

@@ -8,7 +8,6 @@ from __future__ import annotations
 from mgdd._core.rig import E2eCheck, E2eSettings, protect
 from mgdd.rig.base import Rig
 from mgdd.rig.can.can_rig import CanRig
-from mgdd.rig.can.modes import RigMode
 from mgdd.rig.can.processes import VirtualNode
 from mgdd.rig.can.signal_map import SignalMap
 from mgdd.rig.can.transport import CanTransport
@@ -24,7 +23,6 @@ __all__ = [
     "RecordingRig",
     "ReplayRig",
     "Rig",
-    "RigMode",
     "RigRecord",
     "SignalMap",
     "SimulatedRig",

@@ -50,7 +50,7 @@ class CanRig:
     plant : mgdd.loop.Plant, optional
         Of the mode ``simulate``: what the node in this process drives.
     mode : str
-        ``simulate``, ``hil``, ``dry_run``, ``replay`` or ``bench``, as in `RigMode`.
+        ``simulate``, ``hil``, ``dry_run``, ``replay`` or ``bench``, as the page *Experiments over CAN* says.
     limits, objective : optional
         Instead of those of the map, as in `SignalMap.with_goals`.
     timeout_s : float, optional
