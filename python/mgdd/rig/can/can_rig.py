@@ -6,14 +6,14 @@ import contextlib
 import math
 import os
 import time
-from collections.abc import Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from types import TracebackType
 from typing import Any, Self
 
 from mgdd.errors import ParameterError, RigError
 from mgdd.loop import Measurement, Plant
 from mgdd.loop.plant import checked_inputs
-from mgdd.rig.can.frame import Bus
+from mgdd.rig.can.frame import Bus, Frame
 from mgdd.rig.can.inbox import Inbox
 from mgdd.rig.can.link import Sender
 from mgdd.rig.can.local_bus import LocalBus
@@ -55,6 +55,8 @@ class CanRig:
         Instead of those of the map, as in `SignalMap.with_goals`.
     timeout_s : float, optional
         Longest time to wait for a measurement [s]; that of the trigger message in the map if left out.
+    on_frame : callable, optional
+        Called with every frame, sent or received, in this thread: to record it. What it raises leaves the rig.
     arm : bool
         Must be True for ``bench``.
     key_file : path-like, optional
@@ -87,6 +89,7 @@ class CanRig:
         limits: Sequence[str] | None = None,
         objective: Mapping[str, float] | None = None,
         timeout_s: float | None = None,
+        on_frame: Callable[[Frame], None] | None = None,
         arm: bool = False,
         key_file: str | os.PathLike[str] | None = None,
     ) -> None:
@@ -99,6 +102,7 @@ class CanRig:
         if not 0.0 < self.timeout_s < math.inf:
             raise ParameterError.of("timeout_s", timeout_s, "> 0 s")
         self._arm, self._key_file = arm, key_file
+        self._on_frame = on_frame
         self._signals = SignalsAsExceptions()
         self._inputs: tuple[float, ...] | None = None
         self._is_open = self._has_sent = False
@@ -157,6 +161,9 @@ class CanRig:
         self._inputs = tuple(clamped.values())
         for message in self.map.commands.values():
             self._send(message, {name: clamped[name] for name in message.signals})
+        if self.mode is RigMode.REPLAY:  # what came before the recorded command is older than this one
+            self._take_all()
+            self._inbox.skip()
 
     def measure(self) -> Measurement:
         """Wait for the next complete measurement after the inputs applied last.
@@ -279,42 +286,54 @@ class CanRig:
         cycles = [m.message.cycle_s for m in self.map.commands.values() if m.message.cycle_s is not None]
         until = time.monotonic() + _LISTEN_CYCLES * max([*cycles, self.map.cycle_s])
         while (left := until - time.monotonic()) > 0.0:
-            frame = self.bus.receive(left)
-            if frame is not None:
-                self._inbox.take(frame)
+            self._receive(left)
         if jumping := self._inbox.jumping():
             raise RigError(f"{self.bus.name}: {jumping}: two nodes send it, or most frames are lost")
 
     def _send(self, message: MappedMessage, values: Mapping[str, float]) -> None:
         payloads = message.payloads(values, message.driven)
-        if self._sends:
-            self._has_sent = True
-            for frame in self._sender.frames(message, payloads):
-                self.bus.send(frame)
-            self._commands += 1
+        if self.mode is RigMode.DRY_RUN:
+            return
+        self._has_sent = self._sends
+        for frame in self._sender.frames(message, payloads):
+            self._hand_over(frame)
+        self._commands += 1
+
+    def _hand_over(self, frame: Frame, *, final: bool = False) -> None:
+        self.bus.send(frame, final=final)
+        if self._on_frame is not None:
+            self._on_frame(frame._replace(monotonic_ns=time.monotonic_ns()))
+
+    def _receive(self, timeout_s: float) -> bool:
+        """Take the next frame; False where none came."""
+        frame = self.bus.receive(timeout_s)
+        if frame is None:
+            return False
+        if self._on_frame is not None:
+            self._on_frame(frame)
+        self._inbox.take(frame)
+        return True
 
     def _send_safe(self, *, final: bool = False) -> None:
         self._has_sent = True
         for message in self.map.commands.values():
             if message.safe:
                 for frame in self._sender.frames(message, message.payloads({}, message.safe)):
-                    self.bus.send(frame, final=final)
+                    self._hand_over(frame, final=final)
 
     def _heard(self, timeout_s: float) -> bool:
         """Wait for a whole cycle, then take all that came: the newest one counts."""
         until = time.monotonic() + timeout_s
         while not self._inbox.ready:
-            frame = self.bus.receive(max(0.0, until - time.monotonic()))
-            if frame is None:
+            if not self._receive(max(0.0, until - time.monotonic())):
                 return False
-            self._inbox.take(frame)
         self._take_all()
         self._inbox.read()
         return True
 
     def _take_all(self) -> None:
-        while (frame := self.bus.receive(0.0)) is not None:
-            self._inbox.take(frame)
+        while self._receive(0.0):
+            pass
 
 
 def _bus_of(mode: RigMode, signal_map: SignalMap, bus: Bus | str | None, plant: Plant | None) -> Bus:

@@ -111,7 +111,9 @@ class Inbox:
         for name, checks in self.counts.items():
             jumps = checks.get("repeated", 0) + checks.get("lost", 0)
             if jumps >= _JUMPS and 2 * jumps > checks.get("ok", 0):
-                return f"alive counter of {name} ({self.map.measurements[name].message.frame_id:#x}) jumps ({jumps} times)"
+                return (
+                    f"alive counter of {name} ({self.map.measurements[name].message.frame_id:#x}) jumps ({jumps} times)"
+                )
         return ""
 
     def no_answer(self) -> str:
