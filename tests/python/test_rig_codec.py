@@ -9,8 +9,8 @@ import numpy as np
 import pytest
 from hypothesis import assume, given, settings
 from hypothesis import strategies as st
-from mgdd._core.rig import SignalLayout, check_message
 
+from mgdd._core.rig import SignalLayout, check_message
 from mgdd.errors import ParameterError, ShapeError
 
 KNOWN = [  # by hand from the bit charts of the DBC convention; tests/cpp/rig/test_signal_codec.cpp holds the same list

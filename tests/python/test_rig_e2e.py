@@ -8,8 +8,8 @@ import pickle
 import pytest
 from hypothesis import given
 from hypothesis import strategies as st
-from mgdd._core.rig import crc8
 
+from mgdd._core.rig import crc8
 from mgdd.errors import ParameterError, ShapeError
 from mgdd.rig import E2eCheck, E2eSettings, protect
 

@@ -10,8 +10,8 @@ from collections.abc import Iterator
 from typing import Any
 
 import pytest
-from hub_thread import bus_of, running_hub
 
+from hub_thread import bus_of, running_hub
 from mgdd.errors import ParameterError, RigError
 from mgdd.rig import CanTransport
 from mgdd.rig.can.frame import Frame, error_classes

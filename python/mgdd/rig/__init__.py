@@ -10,7 +10,6 @@ from mgdd._core.rig import E2eCheck, E2eSettings, protect
 from mgdd.rig.actuator_guard import ActuatorGuard, GuardedAsk
 from mgdd.rig.base import Rig
 from mgdd.rig.can.can_rig import CanRig
-from mgdd.rig.can.modes import RigMode
 from mgdd.rig.can.processes import VirtualNode
 from mgdd.rig.can.signal_map import SignalMap
 from mgdd.rig.can.transport import CanTransport
@@ -48,7 +47,6 @@ __all__ = [
     "RecordingRig",
     "ReplayRig",
     "Rig",
-    "RigMode",
     "RigRecord",
     "SafetyChange",
     "SafetyEnvelope",

@@ -6,14 +6,14 @@ import contextlib
 import math
 import os
 import time
-from collections.abc import Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from types import TracebackType
 from typing import Any, Self
 
 from mgdd.errors import ParameterError, RigError
 from mgdd.loop import Measurement, Plant
 from mgdd.loop.plant import checked_inputs
-from mgdd.rig.can.frame import Bus
+from mgdd.rig.can.frame import Bus, Frame
 from mgdd.rig.can.inbox import Inbox
 from mgdd.rig.can.link import Sender
 from mgdd.rig.can.local_bus import LocalBus
@@ -27,7 +27,7 @@ __all__ = ["CanRig"]
 
 _SAFE_FRAMES = 5
 _SAFE_PAUSE_S = 0.002
-_LISTEN_CYCLES = 3
+_LISTEN_CYCLES = 10
 _ARMING_ROUNDS = 3
 _PEER_CYCLES = 20
 _PEER_S = 1.0  # at least so long for the first valid frame
@@ -50,11 +50,13 @@ class CanRig:
     plant : mgdd.loop.Plant, optional
         Of the mode ``simulate``: what the node in this process drives.
     mode : str
-        ``simulate``, ``hil``, ``dry_run``, ``replay`` or ``bench``, as in `RigMode`.
+        ``simulate``, ``hil``, ``dry_run``, ``replay`` or ``bench``, as the page *Experiments over CAN* says.
     limits, objective : optional
         Instead of those of the map, as in `SignalMap.with_goals`.
     timeout_s : float, optional
         Longest time to wait for a measurement [s]; that of the trigger message in the map if left out.
+    on_frame : callable, optional
+        Called with every frame, sent or received, in this thread: to record it. What it raises leaves the rig.
     arm : bool
         Must be True for ``bench``.
     key_file : path-like, optional
@@ -87,6 +89,7 @@ class CanRig:
         limits: Sequence[str] | None = None,
         objective: Mapping[str, float] | None = None,
         timeout_s: float | None = None,
+        on_frame: Callable[[Frame], None] | None = None,
         arm: bool = False,
         key_file: str | os.PathLike[str] | None = None,
     ) -> None:
@@ -99,6 +102,7 @@ class CanRig:
         if not 0.0 < self.timeout_s < math.inf:
             raise ParameterError.of("timeout_s", timeout_s, "> 0 s")
         self._arm, self._key_file = arm, key_file
+        self._on_frame = on_frame
         self._signals = SignalsAsExceptions()
         self._inputs: tuple[float, ...] | None = None
         self._is_open = self._has_sent = False
@@ -157,6 +161,9 @@ class CanRig:
         self._inputs = tuple(clamped.values())
         for message in self.map.commands.values():
             self._send(message, {name: clamped[name] for name in message.signals})
+        if self.mode is RigMode.REPLAY:  # what came before the recorded command is older than this one
+            self._take_all()
+            self._inbox.skip()
 
     def measure(self) -> Measurement:
         """Wait for the next complete measurement after the inputs applied last.
@@ -273,46 +280,60 @@ class CanRig:
             raise RigError("the rig is not open: use it in a with block")
 
     def _listen(self) -> None:
-        """Before the first frame of ours: another sender of our identifiers shows itself within some cycles."""
+        """Before the first frame of ours: two senders of one identifier show themselves within some cycles."""
         if not self.bus.shared or not self._sends:
             return
         cycles = [m.message.cycle_s for m in self.map.commands.values() if m.message.cycle_s is not None]
-        until = time.monotonic() + _LISTEN_CYCLES * max(cycles, default=self.map.cycle_s)
+        until = time.monotonic() + _LISTEN_CYCLES * max([*cycles, self.map.cycle_s])
         while (left := until - time.monotonic()) > 0.0:
-            frame = self.bus.receive(left)
-            if frame is not None:
-                self._inbox.take(frame)
+            self._receive(left)
+        if jumping := self._inbox.jumping():
+            raise RigError(f"{self.bus.name}: {jumping}: two nodes send it, or most frames are lost")
 
     def _send(self, message: MappedMessage, values: Mapping[str, float]) -> None:
         payloads = message.payloads(values, message.driven)
-        if self._sends:
-            self._has_sent = True
-            for frame in self._sender.frames(message, payloads):
-                self.bus.send(frame)
-            self._commands += 1
+        if self.mode is RigMode.DRY_RUN:
+            return
+        self._has_sent = self._sends
+        for frame in self._sender.frames(message, payloads):
+            self._hand_over(frame)
+        self._commands += 1
+
+    def _hand_over(self, frame: Frame, *, final: bool = False) -> None:
+        self.bus.send(frame, final=final)
+        if self._on_frame is not None:
+            self._on_frame(frame._replace(monotonic_ns=time.monotonic_ns()))
+
+    def _receive(self, timeout_s: float) -> bool:
+        """Take the next frame; False where none came."""
+        frame = self.bus.receive(timeout_s)
+        if frame is None:
+            return False
+        if self._on_frame is not None:
+            self._on_frame(frame)
+        self._inbox.take(frame)
+        return True
 
     def _send_safe(self, *, final: bool = False) -> None:
         self._has_sent = True
         for message in self.map.commands.values():
             if message.safe:
                 for frame in self._sender.frames(message, message.payloads({}, message.safe)):
-                    self.bus.send(frame, final=final)
+                    self._hand_over(frame, final=final)
 
     def _heard(self, timeout_s: float) -> bool:
         """Wait for a whole cycle, then take all that came: the newest one counts."""
         until = time.monotonic() + timeout_s
         while not self._inbox.ready:
-            frame = self.bus.receive(max(0.0, until - time.monotonic()))
-            if frame is None:
+            if not self._receive(max(0.0, until - time.monotonic())):
                 return False
-            self._inbox.take(frame)
         self._take_all()
         self._inbox.read()
         return True
 
     def _take_all(self) -> None:
-        while (frame := self.bus.receive(0.0)) is not None:
-            self._inbox.take(frame)
+        while self._receive(0.0):
+            pass
 
 
 def _bus_of(mode: RigMode, signal_map: SignalMap, bus: Bus | str | None, plant: Plant | None) -> Bus:

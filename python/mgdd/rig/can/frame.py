@@ -38,6 +38,8 @@ class Frame(NamedTuple):
         Stamp of the driver in its own epoch [ns]; 0 where it gave none.
     error : bool
         A report of the controller instead of a frame of a sender.
+    received : bool
+        From the bus; otherwise sent by us.
     """
 
     id: int
@@ -46,6 +48,7 @@ class Frame(NamedTuple):
     monotonic_ns: int = 0
     bus_ns: int = 0
     error: bool = False
+    received: bool = True
 
 
 class Bus(Protocol):

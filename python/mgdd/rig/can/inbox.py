@@ -12,6 +12,8 @@ from mgdd.rig.can.signal_map import SignalMap
 
 __all__ = ["Inbox"]
 
+_JUMPS = 3  # so many show another sender
+
 
 class Inbox:
     """Checked frames, gathered until the trigger message ends their cycle.
@@ -103,6 +105,16 @@ class Inbox:
             values=values,
             applied={name: value for name, value in self._applied.items() if math.isfinite(value)},
         )
+
+    def jumping(self) -> str:
+        """Name a message whose alive counter does not count; empty where all do."""
+        for name, checks in self.counts.items():
+            jumps = checks.get("repeated", 0) + checks.get("lost", 0)
+            if jumps >= _JUMPS and 2 * jumps > checks.get("ok", 0):
+                return (
+                    f"alive counter of {name} ({self.map.measurements[name].message.frame_id:#x}) jumps ({jumps} times)"
+                )
+        return ""
 
     def no_answer(self) -> str:
         """Say what came instead of a valid trigger message."""

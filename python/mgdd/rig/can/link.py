@@ -63,7 +63,9 @@ class Sender:
                 counter = self._counters.get(message.name, 0)
                 whole = protect(message.e2e, counter, payload)
                 self._counters[message.name] = message.e2e.next_counter(counter)
-            out.append(Frame(id=message.message.frame_id, data=whole, extended=message.message.extended))
+            out.append(
+                Frame(id=message.message.frame_id, data=whole, extended=message.message.extended, received=False)
+            )
         return out
 
 

@@ -57,9 +57,11 @@ class LocalBus:
     def send(self, frame: Frame, *, final: bool = False) -> None:  # noqa: ARG002 - there are no faults to pass
         """Give a frame to the node."""
         self._require_open()
-        if self.core.take(frame._replace(monotonic_ns=self._now_ns)):
+        if self.core.take(frame._replace(monotonic_ns=self._now_ns, received=True)):
             self._now_ns += round(self.core.map.cycle_s * 1e9)
-            self._answers += [answer._replace(monotonic_ns=self._now_ns) for answer in self.core.answer()]
+            self._answers += [
+                answer._replace(monotonic_ns=self._now_ns, received=True) for answer in self.core.answer()
+            ]
 
     def receive(self, timeout_s: float) -> Frame | None:  # noqa: ARG002 - time stands still
         """Give the next frame of the node; None where it has none."""

@@ -22,7 +22,7 @@ class RigMode(StrEnum):
 
     Examples
     --------
-    >>> from mgdd.rig import RigMode
+    >>> from mgdd.rig.can.modes import RigMode
     >>> RigMode("hil"), [mode.value for mode in RigMode]
     (<RigMode.HIL: 'hil'>, ['simulate', 'hil', 'dry_run', 'replay', 'bench'])
     """
