@@ -13,10 +13,9 @@ from mgdd.control import Pid
 from mgdd.errors import DataError, ParameterError, RigError
 from mgdd.io.parameters import ParameterFile
 from mgdd.loop import Plant, VirtualThrottle
-from mgdd.rig import Drive, GatedThrottle, SafetyChange, SafetyEnvelope, SafetyGate
+from mgdd.rig import GatedThrottle, SafetyEnvelope, SafetyGate
+from mgdd.rig.safety import SafetyChange
 from rig_hazards import HAZARDS, LIMP_HOME_DEG, ONSET, OVER, Hazard, Loop, at
-
-OPEN = Drive  # the type, for equality below
 
 
 @pytest.mark.parametrize("name", HAZARDS)
@@ -31,7 +30,7 @@ def test_a_hazard_opens_the_bridge_in_time_and_only_the_operator_brings_it_back(
     assert opened - ONSET <= hazard.within
     assert (loop.gate.mode, loop.gate.reason) == (hazard.mode, hazard.reason)
     first = loop.gate.drain()[0]
-    assert (first.before, first.after, first.reason, first.count) == ("run", hazard.mode, hazard.reason, 1)
+    assert (first.before, first.after, first.reason, first.times) == ("run", hazard.mode, hazard.reason, 1)
 
     loop.until(opened + 400)
     if hazard.returns:

@@ -6,19 +6,16 @@ throttle controller a `SafetyGate`.
 
 from __future__ import annotations
 
-from mgdd.rig.actuator_guard import ActuatorGuard, GuardedAsk
+from mgdd.rig.actuator_guard import ActuatorGuard
 from mgdd.rig.base import Rig
 from mgdd.rig.gated import GatedThrottle
-from mgdd.rig.safety import Drive, SafetyChange, SafetyEnvelope, SafetyGate
+from mgdd.rig.safety import SafetyEnvelope, SafetyGate
 from mgdd.rig.simulated import SimulatedRig
 
 __all__ = [
     "ActuatorGuard",
-    "Drive",
     "GatedThrottle",
-    "GuardedAsk",
     "Rig",
-    "SafetyChange",
     "SafetyEnvelope",
     "SafetyGate",
     "SimulatedRig",
