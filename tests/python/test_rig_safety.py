@@ -12,11 +12,10 @@ import pytest
 from mgdd.control import Pid
 from mgdd.errors import DataError, ParameterError, RigError
 from mgdd.io.parameters import ParameterFile
-from mgdd.loop import Plant, VirtualThrottle
-from mgdd.rig import Drive, GatedThrottle, SafetyChange, SafetyEnvelope, SafetyGate
+from mgdd.loop import Plant, VirtualThrottle, tuned_controller
+from mgdd.rig import GatedThrottle, SafetyEnvelope, SafetyGate
+from mgdd.rig.safety import SafetyChange
 from rig_hazards import HAZARDS, LIMP_HOME_DEG, ONSET, OVER, Hazard, Loop, at
-
-OPEN = Drive  # the type, for equality below
 
 
 @pytest.mark.parametrize("name", HAZARDS)
@@ -31,7 +30,7 @@ def test_a_hazard_opens_the_bridge_in_time_and_only_the_operator_brings_it_back(
     assert opened - ONSET <= hazard.within
     assert (loop.gate.mode, loop.gate.reason) == (hazard.mode, hazard.reason)
     first = loop.gate.drain()[0]
-    assert (first.before, first.after, first.reason, first.count) == ("run", hazard.mode, hazard.reason, 1)
+    assert (first.before, first.after, first.reason, first.times) == ("run", hazard.mode, hazard.reason, 1)
 
     loop.until(opened + 400)
     if hazard.returns:
@@ -130,6 +129,31 @@ def test_both_shipped_envelopes_open_within_what_the_design_allows():
     assert (host.sensor_sum_tolerance_v, host.sensor_low_v, host.sensor_high_v) == (0.2, 0.2, 4.8)
     assert host.stall_s == 0.2
     assert (host.largest_age_cycles, host.held_cycles, host.bad_frames, host.missed_deadlines) == (3.0, 1.0, 3.0, 3.0)
+
+
+def lively_reference(k: int) -> float:
+    """Large and small steps, sines of 1 and 3 Hz, both stops."""
+    time_s = 1e-3 * k
+    if k < 3000:
+        return (8.0, 70.0, 20.0, 90.0, 0.0, 45.0, 44.0, 46.0, 90.0, 8.0)[k // 300]
+    if k < 6000:
+        return 45.0 + 40.0 * math.sin(2.0 * math.pi * (1.0 if k < 4500 else 3.0) * time_s)
+    return 90.0 if k < 7500 else 0.0
+
+
+@pytest.mark.parametrize("kind", ["pid", "sliding_mode", "guided"])
+def test_a_healthy_rig_is_never_stopped(kind):
+    plant = GatedThrottle(VirtualThrottle(inputs=("duty", "bridge_open"), seed=4))
+    plant.start()
+    controller, measured, hottest = tuned_controller(kind), plant.measure(), 0.0
+    for k in range(9000):
+        duty = controller.step(lively_reference(k), measured.values["sensed_angle_deg"])
+        plant.apply({"duty": duty})
+        measured = plant.measure()
+        hottest = max(hottest, plant.gate.rms_duty)
+        assert plant.gate.mode == "run", (k, plant.gate.reason)
+    assert measured.values["angle_deg"] == pytest.approx(0.0, abs=0.5)
+    assert hottest < 0.3  # of 0.5
 
 
 def test_zero_duty_with_a_closed_bridge_is_not_the_safe_state():

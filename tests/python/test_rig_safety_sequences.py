@@ -17,10 +17,10 @@ ENVELOPE = SafetyEnvelope(
     slew_per_s=150.0,
     ramp_s=0.004,
     good_frames=3.0,
-    heat_time_constant_s=0.02,
+    heat_time_constant_s=0.006,
     rms_duty_limit=0.45,
     rms_duty_to_arm=0.3,
-    stall_s=0.006,
+    stall_s=0.01,
     stall_duty=0.4,
     sensor_cycles=2.0,
 )
@@ -33,7 +33,7 @@ def well(**changed: Any) -> dict[str, Any]:
 
 # One letter is one cycle: facts and the duty asked for. Healthy ones and requests are many, so that runs come about.
 LETTERS: list[tuple[dict[str, Any], float]] = [
-    *[(WELL, duty) for duty in (0.0, 0.1, 0.3, -0.2, 0.65, -0.65)],
+    *[(WELL, duty) for duty in (0.0, 0.1, 0.42, -0.2, 0.65, -0.65)],
     *[(well(good_frames=2, angle_deg=angle), 0.5) for angle in (20.0, 25.0, 30.0)],
     *[(well(request=name), 0.2) for name in ("arm", "run", "arm", "run", "reset", "reset", "stop", "disarm", "abort")],
     (well(request="run"), 5.0),

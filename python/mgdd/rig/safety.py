@@ -13,7 +13,7 @@ from mgdd._core.rig import Drive
 from mgdd.errors import DataError, RigError, did_you_mean
 from mgdd.io.parameters import ParameterFile, Parameters, Wanted, entries
 
-__all__ = ["Drive", "SafetyChange", "SafetyEnvelope", "SafetyGate"]
+__all__ = ["SafetyChange", "SafetyEnvelope", "SafetyGate"]
 
 _KIND = "safety_envelope"
 _CHOICE = "bus_fault_from"
@@ -97,8 +97,8 @@ class SafetyChange(NamedTuple):
         Its modes.
     reason : str
         Why.
-    count : int
-        Changes for this reason so far, this one included.
+    times : int
+        How often this reason has led to one so far, this one included.
 
     Examples
     --------
@@ -109,14 +109,14 @@ class SafetyChange(NamedTuple):
     ...     drive = gate.command(0.0)
     >>> gate.arm()
     >>> gate.drain()
-    [SafetyChange(cycle=20, before='init', after='armed', reason='requested', count=1)]
+    [SafetyChange(cycle=20, before='init', after='armed', reason='requested', times=1)]
     """
 
     cycle: int
     before: str
     after: str
     reason: str
-    count: int
+    times: int
 
 
 class SafetyGate:
@@ -349,5 +349,5 @@ class SafetyGate:
 
 def _restored(envelope: SafetyEnvelope, state: Mapping[str, Sequence[float]]) -> SafetyGate:
     gate = SafetyGate(envelope)
-    gate.state = dict(state)  # type: ignore[assignment]
+    gate.state = dict(state)
     return gate

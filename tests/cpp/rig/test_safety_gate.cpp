@@ -269,6 +269,25 @@ TEST(SafetyGate, GoodFramesCountNotCycles) {
   EXPECT_EQ(gate.request(Request::arm), Reason::none);
 }
 
+TEST(SafetyGate, WhateverIsOddStartsTheCountOfGoodFramesAnew) {
+  std::array<SafetyFacts, 5> odd;
+  odd.fill(healthy());
+  odd[0].bad_frames = 1;
+  odd[1].age_s = 0.01;
+  odd[2].sent = false;
+  odd[3].missed_deadlines = 1;
+  odd[4].sensor_v = {1.5, 3.8};
+  for (const SafetyFacts& facts : odd) {
+    SafetyGate gate(narrow());
+    pass(gate, 6);
+    (void)cycle(gate, facts);
+    pass(gate, 6);
+    EXPECT_EQ(gate.request(Request::arm), Reason::too_few_frames);
+    pass(gate, 1);
+    EXPECT_EQ(gate.request(Request::arm), Reason::none);
+  }
+}
+
 TEST(SafetyGate, OnlyMeasurementsCountAgainstASensor) {
   SafetyGate gate = running();
   SafetyFacts wrong = healthy(), silent;
