@@ -82,7 +82,11 @@ def test_a_missing_key_or_file_is_named(tmp_path: Path) -> None:
         (TRACK + 'model = "away.toml"\n', FileNotFoundError, r"away\.toml"),
         (TRACK + '[safety]\nenvelope = "ebt"\n', DataError, "ebt"),
         (SEEK + '[plant]\npreset = "P1"\n', DataError, "P1"),
-        (SEEK.replace("cycles = 60", "lower_cad = 5.0\nupper_cad = 1.0"), ParameterError, r"lower_cad = 5: must be < upper"),
+        (
+            SEEK.replace("cycles = 60", "lower_cad = 5.0\nupper_cad = 1.0"),
+            ParameterError,
+            r"lower_cad = 5: must be < upper",
+        ),
         (SEEK.replace("cycles = 60", "start_cad = 40.0"), ParameterError, r"start_cad = 40: must be in \[-30, 10\]"),
     ],
 )
@@ -98,7 +102,7 @@ def test_modes_that_drive_or_listen_need_what_they_need() -> None:
     with pytest.raises(ParameterError, match=r"mode = 'bench': needs \[bus\] connection"):
         check_experiment(known.with_mode("bench"))
     wired = experiment(TRACK + '[bus]\nconnection = "virtual:none"\n')
-    with pytest.raises(ParameterError, match="bus.pace = 'step': must be 'real_time' with mode = 'bench'"):
+    with pytest.raises(ParameterError, match=r"bus\.pace = 'step': must be 'real_time' with mode = 'bench'"):
         check_experiment(wired.with_mode("bench"))
     with pytest.raises(ParameterError, match=r"mode = 'replay': needs \[replay\] record"):
         check_experiment(known.with_mode("replay"))
@@ -157,7 +161,9 @@ def test_identification_finds_the_throttle_and_keeps_the_model(tmp_path: Path) -
 
 @pytest.mark.parametrize("guide", ["curve", "feed_forward", "none"])
 def test_seeking_stays_inside_its_bounds_and_says_what_guided_it(guide: str) -> None:
-    result = run_experiment(experiment(SEEK.replace("cycles = 60", f'cycles = 60\nguide = "{guide}"\nlower_cad = -12.0')))
+    result = run_experiment(
+        experiment(SEEK.replace("cycles = 60", f'cycles = 60\nguide = "{guide}"\nlower_cad = -12.0'))
+    )
     check_labels(result.dataset)
     applied = result.dataset["soc_applied_cad"].to_numpy()
     assert applied.min() >= -12.0
@@ -194,7 +200,9 @@ def test_the_folder_of_a_run_holds_what_belongs_to_it(tmp_path: Path) -> None:
 
 def test_a_gate_that_takes_the_drive_away_ends_the_run_and_keeps_what_was_recorded(tmp_path: Path) -> None:
     """A plate held against its stop by full duty: the heat model or the stall monitor acts."""
-    text = TRACK.replace("step:20:35", "step:20:89.9").replace('"pid"', '"pid"\n[plant.scale]\nspring_above_nm_per_rad = 60.0')
+    text = TRACK.replace("step:20:35", "step:20:89.9").replace(
+        '"pid"', '"pid"\n[plant.scale]\nspring_above_nm_per_rad = 60.0'
+    )
     with pytest.raises(RigError, match=r"the safety gate went to 'limp': (stall|heat)"):
         run_experiment(experiment(text), tmp_path / "run")
     left = {entry.name for entry in (tmp_path / "run").iterdir()}

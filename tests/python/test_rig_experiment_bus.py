@@ -16,15 +16,24 @@ import pytest
 
 from mgdd.cli import main
 from mgdd.errors import RigError
-from mgdd.rig import CanRig, Experiment, ExperimentResult, VirtualNode, read_record, run_experiment
+from mgdd.rig import CanRig, Experiment, VirtualNode, read_record, run_experiment
+from mgdd.rig.experiment import ExperimentResult
 from mgdd.rig.experiment.self_test import LIMIT_S, WAYS_TO_DIE, SelfTest
 
 pytest.importorskip("can", reason="python-can is not installed: pip install 'mgdd[can]'")
 pytest.importorskip("cantools", reason="cantools is not installed: pip install 'mgdd[can]'")
 
 HEAD = 'kind = "experiment"\nformat = 1\nseed = {seed}\n'
-TRACK = HEAD + 'task = "track"\n[track]\nreference = "step:20:35"\ncontroller = "guided"\n[plant]\nscale = {{ coulomb_nm = 1.2 }}\n'
-SEEK = HEAD + 'task = "seek"\n[plant]\nscale = {{ wall_heat_scale = 1.4 }}\n[seek]\ncycles = 80\n[seek.limits]\np_max_bar = 110.0\n'
+TRACK = (
+    HEAD
+    + 'task = "track"\n[track]\nreference = "step:20:35"\ncontroller = "guided"\n'
+    + "[plant]\nscale = {{ coulomb_nm = 1.2 }}\n"
+)
+SEEK = (
+    HEAD
+    + 'task = "seek"\n[plant]\nscale = {{ wall_heat_scale = 1.4 }}\n'
+    + "[seek]\ncycles = 80\n[seek.limits]\np_max_bar = 110.0\n"
+)
 FEED = HEAD + 'task = "seek"\n[seek]\nguide = "feed_forward"\ncycles = 80\nscale = {{ wall_heat_scale = 1.4 }}\n'
 IDENTIFY = HEAD + 'task = "identify"\n[identify]\nmodel = "pw_r"\nduration_s = 4.0\n'
 SEED = 5

@@ -1,5 +1,4 @@
 """
-<<<<<<< HEAD
 Frames of a bus, their protection, signals in their bits, records of a run.
 """
 from __future__ import annotations
@@ -40,7 +39,6 @@ class E2eSettings:
         Largest step between two frames that counts as good: one less may be lost.
     bad_until_invalid, good_until_valid : int
         Frames in a row until `E2eCheck.valid` changes.
-=======
 Between a controller and a real actuator.
 """
 from __future__ import annotations
@@ -82,12 +80,10 @@ class SafetyEnvelope:
         Travel, and by which an angle may leave it [deg].
     bus_fault_from : {"warning", "passive", "off"}
         State of the CAN controller from which on it is ``limp``.
->>>>>>> 622c298b99ad4335fd3163198e4a8ce0d67ace3e
     
     Raises
     ------
     mgdd.errors.ParameterError
-<<<<<<< HEAD
         A field outside its domain, naming field, value and bound.
     
     Examples
@@ -100,7 +96,6 @@ class SafetyEnvelope:
     >>> check.push(protect(E2eSettings(data_id=0x121), 7, bytes(8)))
     'wrong_crc'
     """
-=======
         A value outside its domain, naming field, value and bound.
     
     See Also
@@ -124,24 +119,19 @@ class SafetyEnvelope:
         """
         Every field by name: unit, bounds or choices, meaning, default.
         """
->>>>>>> 622c298b99ad4335fd3163198e4a8ce0d67ace3e
     def __eq__(self, arg0: typing.Any) -> bool:
         ...
     def __getstate__(self) -> tuple[int, dict]:
         ...
     def __hash__(self) -> int:
         ...
-<<<<<<< HEAD
     def __init__(self, *, crc: str | tuple[typing.SupportsInt | typing.SupportsIndex, typing.SupportsInt | typing.SupportsIndex, typing.SupportsInt | typing.SupportsIndex] = 'sae_j1850', data_id: typing.SupportsInt | typing.SupportsIndex = 0, data_id_mode: str = 'both', data_id_list: collections.abc.Sequence[typing.SupportsInt | typing.SupportsIndex] | None = None, size: typing.SupportsInt | typing.SupportsIndex = 8, crc_byte: typing.SupportsInt | typing.SupportsIndex = 0, counter_byte: typing.SupportsInt | typing.SupportsIndex = 1, counter_place: str = 'low_nibble', counter_modulus: typing.SupportsInt | typing.SupportsIndex = 16, max_step: typing.SupportsInt | typing.SupportsIndex = 3, bad_until_invalid: typing.SupportsInt | typing.SupportsIndex = 3, good_until_valid: typing.SupportsInt | typing.SupportsIndex = 2) -> None:
-=======
     def __init__(self, *, cycle_s: typing.SupportsFloat | typing.SupportsIndex = 0.001, duty_limit: typing.SupportsFloat | typing.SupportsIndex = 0.8, slew_per_s: typing.SupportsFloat | typing.SupportsIndex = 200.0, ramp_s: typing.SupportsFloat | typing.SupportsIndex = 0.2, invalid_duties: typing.SupportsFloat | typing.SupportsIndex = 1.0, rms_duty_limit: typing.SupportsFloat | typing.SupportsIndex = 0.5, rms_duty_to_arm: typing.SupportsFloat | typing.SupportsIndex = 0.4, heat_time_constant_s: typing.SupportsFloat | typing.SupportsIndex = 10.0, stall_duty: typing.SupportsFloat | typing.SupportsIndex = 0.6, stall_move_deg: typing.SupportsFloat | typing.SupportsIndex = 0.5, stall_s: typing.SupportsFloat | typing.SupportsIndex = 0.2, largest_age_cycles: typing.SupportsFloat | typing.SupportsIndex = 3.0, held_cycles: typing.SupportsFloat | typing.SupportsIndex = 1.0, bad_frames: typing.SupportsFloat | typing.SupportsIndex = 3.0, good_frames: typing.SupportsFloat | typing.SupportsIndex = 20.0, missed_deadlines: typing.SupportsFloat | typing.SupportsIndex = 3.0, unsent_cycles: typing.SupportsFloat | typing.SupportsIndex = 3.0, sensor_sum_v: typing.SupportsFloat | typing.SupportsIndex = 5.0, sensor_sum_tolerance_v: typing.SupportsFloat | typing.SupportsIndex = 0.2, sensor_low_v: typing.SupportsFloat | typing.SupportsIndex = 0.2, sensor_high_v: typing.SupportsFloat | typing.SupportsIndex = 4.8, sensor_slope_v_per_s: typing.SupportsFloat | typing.SupportsIndex = 400.0, sensor_cycles: typing.SupportsFloat | typing.SupportsIndex = 4.0, closed_deg: typing.SupportsFloat | typing.SupportsIndex = 0.0, open_deg: typing.SupportsFloat | typing.SupportsIndex = 90.0, travel_margin_deg: typing.SupportsFloat | typing.SupportsIndex = 6.75, bus_fault_from: str = 'passive') -> None:
->>>>>>> 622c298b99ad4335fd3163198e4a8ce0d67ace3e
         ...
     def __repr__(self) -> str:
         ...
     def __setstate__(self, arg0: tuple) -> None:
         ...
-<<<<<<< HEAD
     def next_counter(self, counter: typing.SupportsInt | typing.SupportsIndex) -> int:
         """
         The counter that follows.
@@ -577,7 +567,6 @@ def repair_record(path: str, target: str) -> dict:
     """
     Behind mgdd.rig.repair_record.
     """
-=======
     def replace(self, **kwargs) -> SafetyEnvelope:
         """
         A validated copy with some fields changed; an unknown name is a ParameterError.
@@ -874,4 +863,3 @@ bus_states: tuple = ('active', 'warning', 'passive', 'off')
 safety_reasons: tuple = ('none', 'requested', 'wrong_state', 'too_few_frames', 'aborted', 'stale', 'bad_frames', 'bus_fault', 'not_sent', 'deadlines', 'not_observed', 'heat', 'stall', 'sensor_range', 'sensor_disagreement', 'sensor_slope', 'travel', 'invalid_duty')
 safety_requests: tuple = ('none', 'arm', 'run', 'stop', 'disarm', 'reset', 'abort')
 safety_states: tuple = ('init', 'armed', 'run', 'limp', 'fault')
->>>>>>> 622c298b99ad4335fd3163198e4a8ce0d67ace3e

@@ -20,7 +20,8 @@ __all__ = ["main"]
 
 EXIT_OK, EXIT_BAD_INPUT, EXIT_NO_CONVERGENCE, EXIT_INTERRUPTED, EXIT_PIPE = 0, 2, 3, 130, 141
 
-_EPILOG = """exit codes: 0 done, 1 a self-test that failed, 2 bad input or usage, 3 no convergence or no feasible answer, 130 interrupted.
+_EPILOG = """exit codes: 0 done, 1 a self-test or replay that failed, 2 bad input or usage, 3 no convergence or no
+feasible answer, 130 interrupted.
 
 examples:
   mgdd demo
@@ -42,8 +43,8 @@ def main(argv: Sequence[str] | None = None) -> int:
     Returns
     -------
     int
-        Exit code: 0 done, 1 a self-test that failed, 2 bad input or usage, 3 no convergence or no feasible answer, 130
-        interrupted.
+        Exit code: 0 done, 1 a self-test or replay that failed, 2 bad input or usage, 3 no convergence or no feasible
+        answer, 130 interrupted.
 
     Examples
     --------

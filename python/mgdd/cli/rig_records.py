@@ -28,13 +28,16 @@ def add(verbs: Any) -> None:
     )  # fmt: skip
     record.add_argument("file", metavar="FILE.rec", help="new record")
     record.add_argument(
-        "--bus", required=True, metavar="INTERFACE:CHANNEL", help="any interface of python-can, ?OPTION=VALUE&... behind"
+        "--bus",
+        required=True,
+        metavar="INTERFACE:CHANNEL",
+        help="any interface of python-can, ?OPTION=VALUE&... behind",
     )
     record.add_argument("--duration-s", type=float, metavar="X", help="end after this time (default: never)")
     replay = add_command(
         verbs, "replay", _replay,
-        help_text="give the measurements of a recorded run to its controller again, and compare every output bit for bit; "
-        "exit code 1 where one differs",
+        help_text="give the measurements of a recorded run to its controller again, and compare every output bit for "
+        "bit; exit code 1 where one differs",
         example="mgdd rig replay mgdd-runs/first --json",
     )  # fmt: skip
     replay.add_argument("run", metavar="DIR", help="folder of a run, with experiment.toml and run.rec")
@@ -87,10 +90,11 @@ def _replay(args: argparse.Namespace) -> None:
     result = run_experiment(check_experiment(experiment), args.folder)
     compared = result.counters["replay"]
     same = compared["different"] == 0 and compared["samples"] > 0
+    verdict = "every output is the recorded one, bit for bit" if same else "the outputs differ"
     emit(
         args,
         {"same": same, "replay": compared, "result": result.figures},
-        text=f"{lines(compared)}\n\n{'every output is the recorded one, bit for bit' if same else 'the outputs differ'}",
+        text=f"{lines(compared)}\n\n{verdict}",
     )
     if not same:
         args.exit_code = _DIFFERENT

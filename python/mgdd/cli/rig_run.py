@@ -58,9 +58,7 @@ def _checked(args: argparse.Namespace) -> CheckedExperiment:
 
     experiment = Experiment.load(args.file)
     mode = args.mode or experiment.mode
-    return check_experiment(
-        experiment.with_mode(mode, record=args.record, connection=args.connection, pace=args.pace)
-    )
+    return check_experiment(experiment.with_mode(mode, record=args.record, connection=args.connection, pace=args.pace))
 
 
 def _run(args: argparse.Namespace) -> None:

@@ -18,8 +18,8 @@ def add(verbs: Any) -> None:
     """Add the command."""
     add_command(
         verbs, "selftest", _selftest,
-        help_text="let a process that drives a simulated throttle over a bus die in six ways, and time the plate's way to "
-        "limp-home; exit code 1 above 0.4 s",
+        help_text="let a process that drives a simulated throttle over a bus die in six ways, and time the plate's way "
+        "to limp-home; exit code 1 above 0.4 s",
         example="mgdd rig selftest --json",
     )  # fmt: skip
 

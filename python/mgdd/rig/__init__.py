@@ -14,15 +14,7 @@ from mgdd.rig.can.processes import VirtualNode
 from mgdd.rig.can.signal_map import SignalMap
 from mgdd.rig.can.transport import CanTransport
 from mgdd.rig.exchange import RecordingRig, RigRecord
-from mgdd.rig.experiment import (
-    CheckedExperiment,
-    Experiment,
-    ExperimentResult,
-    SelfTest,
-    check_experiment,
-    run_experiment,
-    run_self_test,
-)
+from mgdd.rig.experiment import Experiment, check_experiment, run_experiment
 from mgdd.rig.export import export_record
 from mgdd.rig.gated import GatedThrottle
 from mgdd.rig.recorded import read_record, repair_record
@@ -35,12 +27,10 @@ __all__ = [
     "ActuatorGuard",
     "CanRig",
     "CanTransport",
-    "CheckedExperiment",
     "Drive",
     "E2eCheck",
     "E2eSettings",
     "Experiment",
-    "ExperimentResult",
     "GatedThrottle",
     "GuardedAsk",
     "Recorder",
@@ -51,7 +41,6 @@ __all__ = [
     "SafetyChange",
     "SafetyEnvelope",
     "SafetyGate",
-    "SelfTest",
     "SignalMap",
     "SimulatedRig",
     "VirtualNode",
@@ -61,5 +50,4 @@ __all__ = [
     "read_record",
     "repair_record",
     "run_experiment",
-    "run_self_test",
 ]

@@ -67,7 +67,7 @@ class CheckedExperiment:
             out |= {
                 "map": str(known.file), "dbc": str(known.dbc.file), "dbc_sha256": known.dbc.sha256,
                 "inputs": list(known.input_names), "values": list(known.value_names),
-                "timeouts_ms": {name: entry.timeout_s * 1e3 for name, entry in known.commands.items() if entry.timeout_s},
+                "timeouts_ms": {name: own.timeout_s * 1e3 for name, own in known.commands.items() if own.timeout_s},
             }  # fmt: skip
         if self.envelope is not None:
             out["envelope"] = self.envelope.to_dict()
@@ -103,7 +103,13 @@ def check_experiment(experiment: Experiment) -> CheckedExperiment:
     Examples
     --------
     >>> from mgdd.rig import Experiment, check_experiment
-    >>> text = 'kind = "experiment"\\nformat = 1\\ntask = "track"\\n[track]\\nreference = "step:20:60"'
+    >>> text = '''
+    ... kind = "experiment"
+    ... format = 1
+    ... task = "track"
+    ... [track]
+    ... reference = "step:20:60"
+    ... '''
     >>> checked = check_experiment(Experiment.from_toml(text))
     >>> checked.plan.samples, checked.to_dict()["transmits"]
     (1500, False)
@@ -149,7 +155,8 @@ def _require_bus(experiment: Experiment) -> None:
         )  # fmt: skip
     if mode in ("dry_run", "bench") and bus.pace == "step":
         raise ParameterError(
-            f"{experiment.origin}: bus.pace = 'step': must be 'real_time' with mode = {mode!r}; only a simulated node steps",
+            f"{experiment.origin}: bus.pace = 'step': must be 'real_time' with mode = {mode!r}; only a simulated node "
+            "steps",
             field="bus.pace", value="step", bound="'real_time'",
         )  # fmt: skip
 

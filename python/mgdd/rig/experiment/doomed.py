@@ -1,7 +1,7 @@
-"""A process of the self-test: it opens a throttle over a bus, and dies in the way it is told: doomed.py WAY BUS.
+"""A process of the self-test: it opens a throttle over a bus and dies in the way it is told, doomed.py WAY BUS.
 
-It says ``ready`` when everything is imported, waits for a line, says ``open`` when the plate is open, and ``dying`` with
-the monotonic time [ns] where it dies by itself.
+It says ``ready`` when everything is imported, waits for a line, says ``open`` when the plate is open, and ``dying``
+with the monotonic time [ns] where it dies by itself.
 """
 
 from __future__ import annotations

@@ -109,7 +109,7 @@ class SeekPlan:
             if not isinstance(stop.partial, LoopRun):
                 raise
             run = stop.partial
-        summary = {name: value for name, value in run.summary.items() if value == value}  # noqa: PLR0124 NaN: unknown
+        summary = {name: value for name, value in run.summary.items() if value == value}
         said = {"guide": self.task.guide, "guide_cad": self.guide_cad, "start_cad": self.start_cad}
         return Outcome(
             figures=to_jsonable({**said, "cycles": run.dataset.sizes["cycle"], **summary}),

@@ -196,8 +196,12 @@ class Experiment:
         Examples
         --------
         >>> from mgdd.rig import Experiment
-        >>> text = 'kind = "experiment"\nformat = 1\ntask = "seek"'
-        >>> Experiment.from_toml(text).with_mode("hil").mode
+        >>> experiment = Experiment.from_toml('''
+        ... kind = "experiment"
+        ... format = 1
+        ... task = "seek"
+        ... ''')
+        >>> experiment.with_mode("hil").mode
         'hil'
         """
         for name, value, among in (("mode", mode, MODES), ("pace", pace or self.bus.pace, PACES)):

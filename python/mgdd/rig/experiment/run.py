@@ -200,7 +200,9 @@ def _timing(times: list[tuple[float, float]], elapsed_s: float) -> dict[str, Any
     out: dict[str, Any] = {"cycles": len(times), "elapsed_s": elapsed_s}
     if times:
         for name, column in zip(("thinking_us", "waiting_us"), np.array(times).T * 1e6, strict=True):
-            out[name] = {f"p{q:g}": float(np.percentile(column, q)) for q in (50, 99, 99.9)} | {"max": float(column.max())}
+            out[name] = {f"p{q:g}": float(np.percentile(column, q)) for q in (50, 99, 99.9)} | {
+                "max": float(column.max())
+            }
     return out
 
 

@@ -79,7 +79,9 @@ class RunFolder:
             half.replace(self.path / name)
         except OSError as error:
             half.unlink(missing_ok=True)
-            raise RigError(f"{self.path / name}: {error.strerror or error}; what was finished before is kept") from error
+            raise RigError(
+                f"{self.path / name}: {error.strerror or error}; what was finished before is kept"
+            ) from error
 
 
 def versions() -> dict[str, Any]:

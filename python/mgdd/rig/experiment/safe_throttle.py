@@ -1,4 +1,4 @@
-"""A throttle behind a safety gate for a run: what the gate forbids ends the run, and leaving the rig opens the bridge."""
+"""A throttle behind a safety gate for a run: what the gate forbids ends it, and leaving the rig opens the bridge."""
 
 from __future__ import annotations
 
@@ -73,7 +73,8 @@ class SafeThrottle:
         drive = self.gate.command(inputs["duty"])
         if drive.bridge_open and not self.shadow:
             raise RigError(
-                f"the safety gate went to {self.gate.mode!r}: {self.gate.reason}; look for the cause before the next run"
+                f"the safety gate went to {self.gate.mode!r}: {self.gate.reason}; look for the cause before the next "
+                "run"
             )
         self._send(drive.duty)
 

@@ -16,8 +16,8 @@ from mgdd.loop.controller_families import FAMILIES
 from mgdd.rig.can.toml_table import TomlTable
 
 __all__ = [
-    "MODES", "PACES", "SAMPLE_S", "TASKS", "BusSettings", "EnginePlant", "IdentifyTask", "ReplaySettings", "SafetySettings",
-    "SeekTask", "Settings", "ThrottlePlant", "TrackTask", "scaled",
+    "MODES", "PACES", "SAMPLE_S", "TASKS", "BusSettings", "EnginePlant", "IdentifyTask", "ReplaySettings",
+    "SafetySettings", "SeekTask", "Settings", "ThrottlePlant", "TrackTask", "scaled",
 ]  # fmt: skip
 
 MODES = ("simulate", "hil", "dry_run", "replay", "bench")
@@ -104,7 +104,7 @@ class EnginePlant(Settings):
 
 @dataclass(frozen=True, kw_only=True)
 class BusSettings(Settings):
-    """The bus of ``hil``, ``dry_run`` and ``bench``; without `connection`, ``hil`` starts a hub and a node of its own."""
+    """The bus of ``hil``, ``dry_run`` and ``bench``; without `connection`, ``hil`` starts a hub and a node itself."""
 
     map: str | None = _key("text")
     connection: str | None = _key("text")

@@ -19,10 +19,10 @@ from mgdd.rig.can.transport import CanTransport
 from mgdd.rig.exchange import RecordingRig
 from mgdd.rig.experiment.checked import CheckedExperiment
 from mgdd.rig.experiment.engine_task import SeekPlan, engine_named
+from mgdd.rig.experiment.experiment import Experiment
 from mgdd.rig.experiment.own_node import own_node
 from mgdd.rig.experiment.run_record import RunRecord, read_exchanges
 from mgdd.rig.experiment.safe_throttle import SafeThrottle
-from mgdd.rig.experiment.experiment import Experiment
 from mgdd.rig.experiment.settings import SAMPLE_S, EnginePlant, scaled
 from mgdd.rig.experiment.throttle_tasks import throttle_named
 from mgdd.rig.recorder import Recorder
@@ -115,9 +115,7 @@ def _rig_of(
     bus: Bus = CanTransport.parse(connection)
     if recorder is not None:
         bus = RecordedBus(bus, recorder)
-    return CanRig(
-        checked.signal_map, bus, mode=mode, limits=experiment.limit_names or None, arm=arm, key_file=key_file
-    )
+    return CanRig(checked.signal_map, bus, mode=mode, limits=experiment.limit_names or None, arm=arm, key_file=key_file)
 
 
 def _guarded(checked: CheckedExperiment, rig: Any, recorded: Plant) -> Stand:
@@ -156,7 +154,10 @@ def _guarded(checked: CheckedExperiment, rig: Any, recorded: Plant) -> Stand:
         nonlocal told
         log, told_before = guard.log, told
         told = len(log)
-        return [f"guard: cycle {e.cycle}: {e.reason} {e.name}: {dict(e.asked)} -> {dict(e.applied)}" for e in log[told_before:]]
+        return [
+            f"guard: cycle {e.cycle}: {e.reason} {e.name}: {dict(e.asked)} -> {dict(e.applied)}"
+            for e in log[told_before:]
+        ]
 
     return Stand(
         plant=guard,
