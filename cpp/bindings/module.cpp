@@ -46,9 +46,9 @@ PYBIND11_MODULE(_core, m) {
        "Virtual benches and the loops over them.",
        {&bind_engine_bench, &bind_loop, &bind_virtual_throttle, &bind_throttle_loop}},
       {"rig",
-       "Between a controller and a real actuator: protection and signals of a payload, the safety gate, buses, the "
-       "loop.",
-       {&bind_frame, &bind_e2e, &bind_signal_codec, &bind_safety, &bind_transports, &bind_realtime_loop}},
+       "Between a controller and a real actuator: frames of a bus, their protection and signals, records, the safety "
+       "gate, buses, the loop.",
+       {&bind_e2e, &bind_signal_codec, &bind_frame, &bind_record, &bind_safety, &bind_transports, &bind_realtime_loop}},
   };
   for (const Room& room : rooms) {
     auto submodule = m.def_submodule(room.name, room.doc);

@@ -6,8 +6,9 @@
 namespace mgdd::bindings {
 
 void bind_e2e(py::module_& m);
-void bind_signal_codec(py::module_& m);
 void bind_frame(py::module_& m);
+void bind_record(py::module_& m);
+void bind_signal_codec(py::module_& m);
 void bind_transports(py::module_& m);
 void bind_realtime_loop(py::module_& m);
 

@@ -10,9 +10,12 @@ from mgdd._core.rig import E2eCheck, E2eSettings, Frame, RingTransport, SignalLa
 from mgdd.rig.actuator_guard import ActuatorGuard, GuardedAsk
 from mgdd.rig.base import Rig
 from mgdd.rig.can.bus_bridge import BusBridge
+from mgdd.rig.export import export_record
 from mgdd.rig.gated import GatedThrottle
 from mgdd.rig.loop_message import LoopMessage
 from mgdd.rig.realtime import RealtimeLoop
+from mgdd.rig.recorded import read_record, repair_record
+from mgdd.rig.recorder import Recorder
 from mgdd.rig.safety import Drive, SafetyChange, SafetyEnvelope, SafetyGate
 from mgdd.rig.simulated import SimulatedRig
 
@@ -27,6 +30,7 @@ __all__ = [
     "GuardedAsk",
     "LoopMessage",
     "RealtimeLoop",
+    "Recorder",
     "Rig",
     "RingTransport",
     "SafetyChange",
@@ -35,5 +39,8 @@ __all__ = [
     "SignalLayout",
     "SimulatedRig",
     "SocketCanTransport",
+    "export_record",
     "protect",
+    "read_record",
+    "repair_record",
 ]

@@ -32,8 +32,8 @@ class RealtimeLoop:
     Every period the loop takes the frames that arrived, judges them, steps the controller, passes its duty through a
     safety gate and sends the command. Python sets references and reads samples; no cycle waits for it. A deadline that
     was missed is counted and skipped to the next grid point, never made up for; what was sent last holds meanwhile, and
-    several in a row open the bridge. Used as a context manager it starts, and stops with an open bridge; so it does when
-    the object or the interpreter goes.
+    several in a row open the bridge. Used as a context manager it starts, and stops with an open bridge; so it does
+    when the object or the interpreter goes.
 
     Parameters
     ----------
@@ -47,8 +47,8 @@ class RealtimeLoop:
     measurements : sequence of LoopMessage
         What it receives.
     envelope : SafetyEnvelope, optional
-        Of its safety gate, ``etb`` if left out. ``cycle_s`` is the period of the loop, and must be the sample time of the
-        controller.
+        Of its safety gate, ``etb`` if left out. ``cycle_s`` is the period of the loop, and must be the sample time of
+        the controller.
     reference_deg : float
         First reference [deg].
     reference_timeout_s : float, optional
