@@ -1,5 +1,4 @@
-// Binds rig/ring_transport.hpp and rig/socketcan_transport.hpp. A frame is a tuple (id, data, extended, error, fd,
-// bit_rate_switch, remote, monotonic_ns, bus_ns).
+// Binds rig/ring_transport.hpp and rig/socketcan_transport.hpp.
 #include <algorithm>
 #include <cstdint>
 #include <memory>
@@ -15,7 +14,6 @@
 #include "mgdd/rig/monotonic_clock.hpp"
 #include "mgdd/rig/ring_transport.hpp"
 #include "mgdd/rig/socketcan_transport.hpp"
-#include "rig/payload.hpp"
 #include "rig/rig_binding.hpp"
 #include "rig/transport_binding.hpp"
 
@@ -25,30 +23,6 @@ namespace {
 using namespace rig;
 
 constexpr std::int64_t between_looks_ns = 200'000, between_signals_ns = 50'000'000;
-
-py::tuple as_tuple(const Frame& f) {
-  return py::make_tuple(f.id, as_bytes(f.payload()), f.extended, f.error, f.fd, f.bit_rate_switch, f.remote,
-                        f.monotonic_ns, f.bus_ns);
-}
-
-Frame frame_of(std::uint32_t id, const py::buffer& data, bool extended, bool error, bool fd, bool bit_rate_switch,
-               bool remote, std::int64_t monotonic_ns, std::int64_t bus_ns) {
-  const std::vector<std::uint8_t> bytes = to_payload(data);
-  const std::uint32_t largest = extended || error ? 0x1FFF'FFFFu : 0x7FFu;
-  if (id > largest) throw ParameterError("can_id", id, "must have 11 bits, or 29 if extended");
-  if (bytes.size() > 8 && !fd) {
-    throw about("data",
-                ShapeError("data has " + std::to_string(bytes.size()) + " bytes: must be at most 8, or fd=True"));
-  }
-  Frame f{.id = id, .extended = extended, .error = error, .size = static_cast<std::uint8_t>(bytes.size())};
-  std::ranges::copy(bytes, f.data.begin());
-  f.fd = fd;
-  f.bit_rate_switch = bit_rate_switch;
-  f.remote = remote;
-  f.monotonic_ns = monotonic_ns;
-  f.bus_ns = bus_ns;
-  return f;
-}
 
 // Looks again and again, without the GIL, until a frame is there or the time is over; None then.
 template <class Look>
@@ -71,14 +45,7 @@ py::object next_frame(double timeout_s, Look look) {
     if (auto raised = raised_by_a_signal()) throw py::error_already_set(*raised);
     if (found) break;
   }
-  return as_tuple(frame);
-}
-
-template <class Cls>
-void bind_frame_keywords(Cls& cls, const char* name, auto call, const char* doc) {
-  cls.def(name, call, py::arg("can_id"), py::arg("data"), py::kw_only(), py::arg("extended") = false,
-          py::arg("error") = false, py::arg("fd") = false, py::arg("bit_rate_switch") = false,
-          py::arg("remote") = false, py::arg("monotonic_ns") = 0, py::arg("bus_ns") = 0, doc);
+  return py::cast(frame);
 }
 
 template <class T>
@@ -98,21 +65,72 @@ void require_free(Claim& claim) {
 
 void bind_ring(py::module_& m) {
   using T = RingTransport;
-  py::class_<T, std::shared_ptr<T>> cls(m, "RingTransport", "A bus behind two rings; behind mgdd.rig.RingTransport.");
+  py::class_<T, std::shared_ptr<T>> cls(m, "RingTransport",
+                                        R"(A bus behind two rings, fed and drained by a thread of Python.
+
+A `RealtimeLoop` takes and gives frames without waiting for Python. `BusBridge` connects it with any interface of
+python-can; a simulated plant may serve it as well.
+
+Parameters
+----------
+receive_capacity : int
+    Frames from the bus that may wait for the loop, a power of two; what does not fit is lost and counted.
+send_capacity : int
+    Frames towards the bus that may wait, a power of two. Short, so that no command leaves late: a command that finds no
+    room is not sent, and the loop knows.
+
+Raises
+------
+mgdd.errors.ParameterError
+    A capacity that is no power of two from 2 to 16777216.
+
+See Also
+--------
+BusBridge : a python-can bus on the other side.
+SocketCanTransport : a CAN interface of Linux, without Python in between.
+
+Examples
+--------
+>>> from mgdd.rig import Frame, RingTransport
+>>> bus = RingTransport()
+>>> bus.feed(Frame(id=0x121, data=bytes(8)))
+True
+>>> bus.counts["lost"], bus.take() is None, bus.bus_state
+(0, True, 'active')
+)");
   cls.def(py::init<std::size_t, std::size_t>(), py::kw_only(), py::arg("receive_capacity") = 1024,
           py::arg("send_capacity") = 16);
-  bind_frame_keywords(
-      cls, "feed",
-      [](T& t, std::uint32_t id, const py::buffer& data, bool extended, bool error, bool fd, bool brs, bool remote,
-         std::int64_t monotonic,
-         std::int64_t bus) { return t.feed(frame_of(id, data, extended, error, fd, brs, remote, monotonic, bus)); },
-      "Hand a frame from the bus to the loop; False, and counted as lost, where it finds no room.");
+  cls.def(
+      "feed", [](T& t, const Frame& frame) { return t.feed(frame); }, py::arg("frame"),
+      R"(Hand a frame from the bus to the loop.
+
+Parameters
+----------
+frame : Frame
+    Without a stamp ``monotonic_ns`` it gets that of now.
+
+Returns
+-------
+bool
+    False, and counted as lost, where it finds no room.
+)");
   cls.def(
       "take", [](T& t, double timeout_s) { return next_frame(timeout_s, [&t](Frame& f) { return t.take(f); }); },
-      py::arg("timeout_s") = 0.0,
-      "The next frame that the loop sends, waiting without the GIL; None where there is none.");
-  cls.def("fail", &T::fail, "Say that the bus is gone, for good: the loop sees it as off.");
-  cls.def_property_readonly("waiting_to_send", &T::waiting_to_send, "Frames that nobody has taken yet.");
+      py::arg("timeout_s") = 0.0, R"(Take the next frame that the loop sends; other threads run while it waits.
+
+Parameters
+----------
+timeout_s : float
+    How long to wait for one, 0 to 3600 [s].
+
+Returns
+-------
+Frame or None
+    None where none came.
+)");
+  cls.def("fail", &T::fail, "Say that the bus is gone, for good: the loop sees it as off and opens the bridge.");
+  cls.def_property_readonly("waiting_to_send", &T::waiting_to_send, "Frames of the loop that nobody has taken yet.");
+  cls.def_property_readonly("waiting_for_loop", &T::waiting_for_loop, "Frames that the loop has not taken yet.");
   bind_state(cls);
 }
 
@@ -120,8 +138,48 @@ using FilterArgument = std::tuple<std::uint32_t, std::uint32_t, bool>;
 
 void bind_socketcan(py::module_& m) {
   using T = SocketCanTransport;
-  py::class_<T, std::shared_ptr<T>> cls(m, "SocketCanTransport",
-                                        "A CAN interface of Linux; behind mgdd.rig.SocketCanTransport.");
+  py::class_<T, std::shared_ptr<T>> cls(
+      m, "SocketCanTransport",
+      R"(A CAN interface of Linux as a raw socket that never blocks, for a `RealtimeLoop`.
+
+Several sockets on one interface see each other's frames: a logger of python-can beside it records all, our own commands
+too. Set the queue of the interface short (``ip link set can0 txqueuelen 10``), or old commands leave late.
+
+Parameters
+----------
+interface : str
+    Its name, for example ``"can0"``.
+fd : bool
+    CAN FD frames too.
+filters : sequence of tuple
+    ``(id, mask, extended)``: a frame passes whose identifier agrees with one of them in the bits of its mask; all frames
+    if empty. They hold before the first frame can arrive.
+receive_buffer_bytes : int
+    Asked of the kernel; `receive_buffer_bytes` says what it granted.
+send_patience_s : float
+    How long to try again where the queue of the interface is full, 0 to 0.1 [s].
+
+Raises
+------
+mgdd.errors.ParameterError
+    A setting outside its domain.
+mgdd.errors.RigError
+    The kernel has no CAN; or the interface does not exist, is down, is no CAN interface or does no CAN FD.
+
+See Also
+--------
+RingTransport : any other adapter, through python-can.
+
+Examples
+--------
+>>> from mgdd.errors import RigError
+>>> from mgdd.rig import SocketCanTransport
+>>> try:
+...     bus = SocketCanTransport("no_such_can")
+... except RigError:
+...     print("no bus")
+no bus
+)");
   const SocketCanSettings standard;
   cls.def(py::init([](const std::string& interface, bool fd, const std::vector<FilterArgument>& filters,
                       int receive_buffer_bytes, double send_patience_s) {
@@ -144,16 +202,46 @@ void bind_socketcan(py::module_& m) {
         require_free(t.claim());
         return next_frame(timeout_s, [&t](Frame& f) { return t.receive(f); });
       },
-      py::arg("timeout_s") = 0.0, "The next frame from the bus, waiting without the GIL; None where there is none.");
-  bind_frame_keywords(
-      cls, "send",
-      [](T& t, std::uint32_t id, const py::buffer& data, bool extended, bool error, bool fd, bool brs, bool remote,
-         std::int64_t monotonic, std::int64_t bus) {
+      py::arg("timeout_s") = 0.0, R"(Take the next frame from the bus; other threads run while it waits.
+
+Parameters
+----------
+timeout_s : float
+    How long to wait for one, 0 to 3600 [s].
+
+Returns
+-------
+Frame or None
+    None where none came.
+
+Raises
+------
+mgdd.errors.RigError
+    A loop takes the frames.
+)");
+  cls.def(
+      "send",
+      [](T& t, const Frame& frame) {
         require_free(t.claim());
-        const Frame frame = frame_of(id, data, extended, error, fd, brs, remote, monotonic, bus);
         return as_str(mgdd::name_of(send_result_names(), without_gil([&] { return t.send(frame); })));
       },
-      "Send a frame now: ``\"sent\"``, ``\"full\"`` or ``\"failed\"``.");
+      py::arg("frame"), R"(Send a frame now.
+
+Parameters
+----------
+frame : Frame
+    Its stamps are not used.
+
+Returns
+-------
+str
+    ``"sent"``, ``"full"`` where the queue had no room in time, ``"failed"`` where the frame or the interface is unfit.
+
+Raises
+------
+mgdd.errors.RigError
+    A loop sends here.
+)");
   cls.def_property_readonly("receive_buffer_bytes", &T::receive_buffer_bytes, "Bytes that the kernel granted.");
   bind_state(cls);
 }

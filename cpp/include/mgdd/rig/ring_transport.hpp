@@ -32,6 +32,7 @@ class RingTransport {
   /// The bus is gone, for good: the loop sees it as bus-off and sends nothing more.
   void fail() noexcept { failed_.store(true, std::memory_order_relaxed); }
   [[nodiscard]] std::size_t waiting_to_send() const noexcept { return to_bus_.size(); }
+  [[nodiscard]] std::size_t waiting_for_loop() const noexcept { return from_bus_.size(); }
 
  private:
   SpscRing<Frame> from_bus_, to_bus_;
