@@ -46,8 +46,8 @@ PYBIND11_MODULE(_core, m) {
        "Virtual benches and the loops over them.",
        {&bind_engine_bench, &bind_loop, &bind_virtual_throttle, &bind_throttle_loop}},
       {"rig",
-       "What a bus and a record of a run hold: protection of a payload, signals in its bits.",
-       {&bind_e2e, &bind_signal_codec}},
+       "Frames of a bus, their protection, signals in their bits, records of a run.",
+       {&bind_e2e, &bind_signal_codec, &bind_frame, &bind_record}},
   };
   for (const Room& room : rooms) {
     auto submodule = m.def_submodule(room.name, room.doc);

@@ -6,6 +6,8 @@
 namespace mgdd::bindings {
 
 void bind_e2e(py::module_& m);
+void bind_frame(py::module_& m);
+void bind_record(py::module_& m);
 void bind_signal_codec(py::module_& m);
 
 }  // namespace mgdd::bindings

@@ -1,5 +1,5 @@
 """
-What a bus and a record of a run hold: protection of a payload, signals in its bits.
+Frames of a bus, their protection, signals in their bits, records of a run.
 """
 from __future__ import annotations
 import collections.abc
@@ -7,7 +7,7 @@ import numpy
 import numpy.typing
 import typing
 import typing_extensions
-__all__: list[str] = ['E2eCheck', 'E2eSettings', 'SignalLayout', 'check_message', 'crc8', 'protect']
+__all__: list[str] = ['E2eCheck', 'E2eSettings', 'Frame', 'RecordReader', 'RecordWriter', 'SignalLayout', 'check_message', 'crc8', 'protect', 'read_record', 'repair_record']
 class E2eSettings:
     """
     End-to-end protection of a CAN payload: an alive counter and a CRC-8.
@@ -285,6 +285,176 @@ class SignalLayout:
         """
         First bit, as a DBC counts.
         """
+class Frame:
+    """
+    One CAN or CAN FD frame. Keyword-only and immutable.
+    
+    Parameters
+    ----------
+    id : int
+        Identifier: 11 bits, 29 of an extended frame; of an error frame its class bits.
+    data : bytes
+        Payload, up to 64 bytes.
+    extended, error, received, fd, bit_rate_switch, remote : bool
+        29-bit identifier; news of a bus error; from the bus rather than sent by us; CAN FD; its data at the higher rate;
+        request of a frame.
+    channel : int
+        Which bus, where one record holds several.
+    monotonic_ns, bus_ns : int
+        When it was received or handed to the bus, and the driver's own stamp [ns].
+    
+    Examples
+    --------
+    >>> from mgdd._core.rig import Frame
+    >>> Frame(id=0x121, data=bytes(3), received=True).data
+    b'\\x00\\x00\\x00'
+    """
+    def __eq__(self, arg0: typing.Any) -> bool:
+        ...
+    def __getstate__(self) -> tuple[int, dict]:
+        ...
+    def __hash__(self) -> int:
+        ...
+    def __init__(self, *, id: typing.SupportsInt | typing.SupportsIndex, data: bytes = b'', extended: bool = False, error: bool = False, received: bool = False, fd: bool = False, bit_rate_switch: bool = False, remote: bool = False, channel: typing.SupportsInt | typing.SupportsIndex = 0, monotonic_ns: typing.SupportsInt | typing.SupportsIndex = 0, bus_ns: typing.SupportsInt | typing.SupportsIndex = 0) -> None:
+        ...
+    def __repr__(self) -> str:
+        ...
+    def __setstate__(self, arg0: tuple) -> None:
+        ...
+    def to_dict(self) -> dict:
+        """
+        Constructor keywords as a new dict.
+        """
+    @property
+    def bit_rate_switch(self) -> bool:
+        """
+        Fast data.
+        """
+    @property
+    def bus_ns(self) -> int:
+        """
+        Stamp of the driver [ns]; 0: none.
+        """
+    @property
+    def channel(self) -> int:
+        """
+        Which bus.
+        """
+    @property
+    def data(self) -> bytes:
+        """
+        Payload, up to 64 bytes.
+        """
+    @property
+    def error(self) -> bool:
+        """
+        News of a bus error.
+        """
+    @property
+    def extended(self) -> bool:
+        """
+        29-bit identifier.
+        """
+    @property
+    def fd(self) -> bool:
+        """
+        CAN FD.
+        """
+    @property
+    def id(self) -> int:
+        """
+        Identifier.
+        """
+    @property
+    def monotonic_ns(self) -> int:
+        """
+        When received or handed to the bus [ns].
+        """
+    @property
+    def received(self) -> bool:
+        """
+        From the bus rather than sent by us.
+        """
+    @property
+    def remote(self) -> bool:
+        """
+        Request of a frame.
+        """
+class RecordWriter:
+    """
+    Appends to a record file; behind mgdd.rig.Recorder.
+    """
+    def __init__(self, path: str, *, run_id: bytes, wall_ns: typing.SupportsInt | typing.SupportsIndex, monotonic_ns: typing.SupportsInt | typing.SupportsIndex, json: str) -> None:
+        ...
+    def add_table(self, name: str, columns: collections.abc.Sequence[str], monotonic_ns: typing.SupportsInt | typing.SupportsIndex) -> int:
+        """
+        Number of a new table of samples.
+        """
+    def close(self) -> None:
+        """
+        Close the file; what is written later is a RigError.
+        """
+    def sync(self) -> None:
+        """
+        Wait until the disk has everything.
+        """
+    def write(self, frame: Frame) -> None:
+        """
+        Append a frame.
+        """
+    def write_event(self, monotonic_ns: typing.SupportsInt | typing.SupportsIndex, category: str, text: str) -> None:
+        """
+        Append an event.
+        """
+    def write_sample(self, table: typing.SupportsInt | typing.SupportsIndex, monotonic_ns: typing.SupportsInt | typing.SupportsIndex, values: typing.Annotated[numpy.typing.ArrayLike, numpy.float64]) -> None:
+        """
+        Append a number per column of a table.
+        """
+    @property
+    def path(self) -> str:
+        """
+        As given.
+        """
+    @property
+    def refused(self) -> int:
+        """
+        Records that could not be written.
+        """
+    @property
+    def size(self) -> int:
+        """
+        Bytes.
+        """
+    @property
+    def written(self) -> int:
+        """
+        Records.
+        """
+class RecordReader:
+    """
+    Iterates over a record: frames, and tuples ('sample', ns, table, values), ('event', ns, category, text) and ('damage', bytes).
+    """
+    def __init__(self, path: str) -> None:
+        ...
+    def __iter__(self) -> RecordReader:
+        ...
+    def __next__(self) -> typing.Any:
+        ...
+    @property
+    def header(self) -> dict:
+        """
+        As written.
+        """
+    @property
+    def ignored_bytes(self) -> int:
+        """
+        Bytes behind the last readable record; known at the end.
+        """
+    @property
+    def incomplete(self) -> bool:
+        """
+        Whether they may be the start of a record that is still being written.
+        """
 def check_message(signals: collections.abc.Mapping[str, SignalLayout], size: typing.SupportsInt | typing.SupportsIndex, branches: collections.abc.Mapping[str, collections.abc.Sequence[typing.SupportsInt | typing.SupportsIndex]] | None = None) -> None:
     """
     ParameterError naming signals that reach beyond a message of `size` bytes or share bits; `branches` gives the values of the multiplexer that select a signal.
@@ -323,4 +493,12 @@ def protect(settings: E2eSettings, counter: typing.SupportsInt | typing.Supports
     >>> from mgdd.rig import E2eSettings, protect
     >>> protect(E2eSettings(data_id=0x120), 5, bytes.fromhex("0000112233445566")).hex()
     '3a05112233445566'
+    """
+def read_record(path: str) -> dict:
+    """
+    All of a record as columns; behind mgdd.rig.read_record.
+    """
+def repair_record(path: str, target: str) -> dict:
+    """
+    Behind mgdd.rig.repair_record.
     """

@@ -12,6 +12,9 @@ from mgdd.rig.can.processes import VirtualNode
 from mgdd.rig.can.signal_map import SignalMap
 from mgdd.rig.can.transport import CanTransport
 from mgdd.rig.exchange import RecordingRig, RigRecord
+from mgdd.rig.export import export_record
+from mgdd.rig.recorded import read_record, repair_record
+from mgdd.rig.recorder import Recorder
 from mgdd.rig.replay import ReplayRig
 from mgdd.rig.simulated import SimulatedRig
 
@@ -20,6 +23,7 @@ __all__ = [
     "CanTransport",
     "E2eCheck",
     "E2eSettings",
+    "Recorder",
     "RecordingRig",
     "ReplayRig",
     "Rig",
@@ -27,5 +31,8 @@ __all__ = [
     "SignalMap",
     "SimulatedRig",
     "VirtualNode",
+    "export_record",
     "protect",
+    "read_record",
+    "repair_record",
 ]

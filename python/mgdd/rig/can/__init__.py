@@ -1,1 +1,3 @@
-"""Rigs over a CAN bus: DBC and signal map, transport, rig, and the node and hub of the other side."""
+"""CAN through python-can and cantools: nothing else in mgdd imports them, and this only inside its functions."""
+
+from __future__ import annotations

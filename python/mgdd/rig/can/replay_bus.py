@@ -5,8 +5,8 @@ from __future__ import annotations
 from collections import deque
 from collections.abc import Iterable
 
+from mgdd._core.rig import Frame
 from mgdd.errors import RigError
-from mgdd.rig.can.frame import Frame
 from mgdd.rig.can.mapped import MappedMessage
 from mgdd.rig.can.signal_map import SignalMap
 
