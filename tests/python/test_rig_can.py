@@ -12,12 +12,13 @@ from collections.abc import Iterator
 from contextlib import contextmanager
 from pathlib import Path
 
+import numpy as np
 import pytest
 
 from mgdd._core.rig import Frame
-from mgdd.errors import ParameterError, RigError
+from mgdd.errors import DataError, ParameterError, RigError
 from mgdd.loop import EngineBench, Measurement, VirtualThrottle
-from mgdd.rig import CanRig, CanTransport, SignalMap
+from mgdd.rig import CanRig, CanTransport, Recorder, RecordingRig, ReplayRig, Rig, RigRecord, SignalMap
 from mgdd.rig.can.frame import changed
 from mgdd.rig.can.link import Sender
 from mgdd.rig.can.modes import RigMode, key_line
@@ -506,15 +507,28 @@ def test_a_replay_of_frames_says_where_a_command_differs() -> None:
         replayed(frames, [*DUTIES, 0.0])
 
 
-def test_a_run_in_real_time_is_replayed_too() -> None:
-    frames: list[Frame] = []
-    measured = []
-    with node("record", step=False), rig_on("record", on_frame=frames.append) as rig:
-        for duty in DUTIES:
-            try:
+def test_a_run_in_real_time_is_replayed_from_its_file(tmp_path: Path) -> None:
+    """Frames through the checks, and measurements as they were: both from one record."""
+    patient = tmp_path / "patient.toml"  # a node that does not let go when this machine stops for a moment
+    (tmp_path / "etb.dbc").write_bytes(ETB.dbc.file.read_bytes())
+    text = ETB.file.read_text(encoding="utf-8").replace("timeout_ms = 20", "timeout_ms = 20000")
+    patient.write_text(text, encoding="utf-8")
+    file = tmp_path / "run.rec"
+    with Recorder(file) as recorder, node("record", step=False, signal_map=SignalMap.load(patient)):
+        live = rig_on("record", on_frame=recorder.frame)
+        with RecordingRig(live, lambda row: recorder.sample("rig", row)) as rig:
+            for duty in DUTIES:
                 rig.apply({"duty": duty})
-                measured.append(rig.measure())
-            except RigError:  # a machine that stopped
-                pytest.skip("the node let go: this machine stopped for more than 20 ms")
-    again, _ = replayed(frames, DUTIES)
-    assert [m.values["sensed_angle_deg"] for m in again] == [m.values["sensed_angle_deg"] for m in measured]
+                rig.measure()
+    measured = [exchange.measurement.values for exchange in map(rig.record.__getitem__, range(len(DUTIES)))]
+    with CanRig(ETB, ReplayBus.read(file, ETB), mode="replay") as again:
+        np.testing.assert_equal([answer(again, duty) for duty in DUTIES], measured)
+    with ReplayRig(RigRecord.read(file)) as again:
+        np.testing.assert_equal([answer(again, duty) for duty in DUTIES], measured)
+    with pytest.raises(DataError, match="has no table 'bench': it has rig"):
+        RigRecord.read(file, table="bench")
+
+
+def answer(rig: Rig, duty: float) -> dict[str, float]:
+    rig.apply({"duty": duty})
+    return dict(rig.measure().values)
