@@ -12,12 +12,14 @@ from collections.abc import Iterator
 from contextlib import contextmanager
 from pathlib import Path
 
+import numpy as np
 import pytest
 
-from mgdd.errors import ParameterError, RigError
+from mgdd._core.rig import Frame
+from mgdd.errors import DataError, ParameterError, RigError
 from mgdd.loop import EngineBench, Measurement, VirtualThrottle
-from mgdd.rig import CanRig, CanTransport, SignalMap
-from mgdd.rig.can.frame import Frame
+from mgdd.rig import CanRig, CanTransport, Recorder, RecordingRig, ReplayRig, Rig, RigRecord, SignalMap
+from mgdd.rig.can.frame import changed
 from mgdd.rig.can.link import Sender
 from mgdd.rig.can.modes import RigMode, key_line
 from mgdd.rig.can.node import node_of, run_node
@@ -308,7 +310,7 @@ class Host:
             else self.command.payloads({"duty": duty}, self.command.driven)
         )
         (frame,) = self.sender.frames(self.command, payloads)
-        return frame._replace(monotonic_ns=self.now_ns)
+        return changed(frame, monotonic_ns=self.now_ns)
 
     def send(self, duty: float | None, times: int = 1) -> None:
         for _ in range(times):
@@ -360,13 +362,13 @@ def test_broken_commands_are_ignored_and_three_of_them_open_the_bridge(host: Hos
     running(host)
     for _ in range(2):
         bad = host.frame(0.9)
-        host.core.take(bad._replace(data=bad.data[:-1] + bytes([bad.data[-1] ^ 0x10])))
+        host.core.take(changed(bad, data=bad.data[:-1] + bytes([bad.data[-1] ^ 0x10])))
         assert host.core.state == "run"
     assert host.core._inputs == {"duty": 0.5}
     host.send(0.4)  # one good frame between
     for k in range(3):
         bad = host.frame(0.9)
-        host.core.take(bad._replace(data=bytes([bad.data[0] ^ 1]) + bad.data[1:]))
+        host.core.take(changed(bad, data=bytes([bad.data[0] ^ 1]) + bad.data[1:]))
         assert host.core.state == ("limp" if k == 2 else "run")
     assert host.core.reasons == {"wrong_crc": 1}
 
@@ -377,16 +379,16 @@ def test_a_frozen_sender_is_not_one_that_lives(host: Host) -> None:
     host.core.take(frozen)
     for _ in range(3):
         host.wait(0.004)
-        host.core.take(frozen._replace(monotonic_ns=host.now_ns))
+        host.core.take(changed(frozen, monotonic_ns=host.now_ns))
     assert (host.core.state, host.core.reasons) == ("limp", {"wrong_counter": 1})
 
 
 def test_foreign_and_short_frames_change_nothing(host: Host) -> None:
     running(host)
     good = host.frame(0.5)
-    assert not host.core.take(good._replace(id=0x121))
-    assert not host.core.take(good._replace(extended=True))
-    assert not host.core.take(good._replace(data=good.data[:7]))
+    assert not host.core.take(changed(good, id=0x121))
+    assert not host.core.take(changed(good, extended=True))
+    assert not host.core.take(changed(good, data=good.data[:7]))
     assert host.core.state == "run"
 
 
@@ -487,7 +489,7 @@ def test_recorded_frames_pass_the_same_checks_and_give_the_same_measurements() -
     again, _ = replayed(frames, DUTIES)
     assert [m.values for m in again] == [m.values for m in measured]
     assert [m.applied for m in again] == [m.applied for m in measured]
-    frames[-20] = frames[-20]._replace(data=bytes(8))
+    frames[-20] = changed(frames[-20], data=bytes(8))
     with pytest.raises(RigError):  # a changed frame of the record is seen as on the bus
         replayed(frames, DUTIES)
 
@@ -505,15 +507,28 @@ def test_a_replay_of_frames_says_where_a_command_differs() -> None:
         replayed(frames, [*DUTIES, 0.0])
 
 
-def test_a_run_in_real_time_is_replayed_too() -> None:
-    frames: list[Frame] = []
-    measured = []
-    with node("record", step=False), rig_on("record", on_frame=frames.append) as rig:
-        for duty in DUTIES:
-            try:
+def test_a_run_in_real_time_is_replayed_from_its_file(tmp_path: Path) -> None:
+    """Frames through the checks, and measurements as they were: both from one record."""
+    patient = tmp_path / "patient.toml"  # a node that does not let go when this machine stops for a moment
+    (tmp_path / "etb.dbc").write_bytes(ETB.dbc.file.read_bytes())
+    text = ETB.file.read_text(encoding="utf-8").replace("timeout_ms = 20", "timeout_ms = 20000")
+    patient.write_text(text, encoding="utf-8")
+    file = tmp_path / "run.rec"
+    with Recorder(file) as recorder, node("record", step=False, signal_map=SignalMap.load(patient)):
+        live = rig_on("record", on_frame=recorder.frame)
+        with RecordingRig(live, lambda row: recorder.sample("rig", row)) as rig:
+            for duty in DUTIES:
                 rig.apply({"duty": duty})
-                measured.append(rig.measure())
-            except RigError:  # a machine that stopped
-                pytest.skip("the node let go: this machine stopped for more than 20 ms")
-    again, _ = replayed(frames, DUTIES)
-    assert [m.values["sensed_angle_deg"] for m in again] == [m.values["sensed_angle_deg"] for m in measured]
+                rig.measure()
+    measured = [exchange.measurement.values for exchange in map(rig.record.__getitem__, range(len(DUTIES)))]
+    with CanRig(ETB, ReplayBus.read(file, ETB), mode="replay") as again:
+        np.testing.assert_equal([answer(again, duty) for duty in DUTIES], measured)
+    with ReplayRig(RigRecord.read(file)) as again:
+        np.testing.assert_equal([answer(again, duty) for duty in DUTIES], measured)
+    with pytest.raises(DataError, match="has no table 'bench': it has rig"):
+        RigRecord.read(file, table="bench")
+
+
+def answer(rig: Rig, duty: float) -> dict[str, float]:
+    rig.apply({"duty": duty})
+    return dict(rig.measure().values)

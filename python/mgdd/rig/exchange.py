@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+import os
 from collections.abc import Callable, Mapping, Sequence
 from types import TracebackType
 from typing import TYPE_CHECKING, Any, NamedTuple, Self
@@ -12,6 +13,7 @@ import numpy as np
 from mgdd.errors import DataError
 from mgdd.loop import Measurement, Plant
 from mgdd.rig.base import Rig
+from mgdd.rig.recorded import read_record
 
 if TYPE_CHECKING:
     from numpy.typing import ArrayLike, NDArray
@@ -147,6 +149,33 @@ class RigRecord:
             )
         return record
 
+    @classmethod
+    def read(cls, path: str | os.PathLike[str], *, table: str = "rig") -> Self:
+        """Read the exchanges of a record file.
+
+        Parameters
+        ----------
+        path : path-like
+            File of a `Recorder` that was the sink of a `RecordingRig`.
+        table : str
+            Name of their table.
+
+        Returns
+        -------
+        RigRecord
+            As far as the file can be read.
+
+        Raises
+        ------
+        mgdd.errors.DataError
+            Not a record, or one without that table.
+        """
+        samples = read_record(path).samples
+        if table not in samples:
+            raise DataError(f"{path}: has no table {table!r}: it has {', '.join(samples) or 'none'}")
+        columns = samples[table].data_vars
+        return cls.from_columns([str(name) for name in columns], np.column_stack([*columns.values()]))
+
 
 def flat(exchange: Exchange) -> dict[str, float]:
     """Give an exchange as one row of named numbers."""
@@ -171,9 +200,14 @@ class RecordingRig:
     rig : Rig
         The rig, or a plain plant.
     sink : callable, optional
+<<<<<<< HEAD
         Called with each row of named numbers as soon as it is measured, to write it to a file.
     keep : bool
         Whether `record` remembers them too; a run of days has a sink instead.
+=======
+        Called with each row of named numbers as soon as it is measured, to write it to a file: all have the names of the
+        first one, NaN where there is none.
+>>>>>>> f69a0e3e0e18647b44bb8c8c5fe058a4ed76bab1
 
     Examples
     --------
@@ -194,6 +228,7 @@ class RecordingRig:
         self.record = RigRecord(rig.input_names, rig.limit_names)
         self._sink = sink
         self._inputs: dict[str, float] = {}
+        self._names: tuple[str, ...] = ()
 
     @property
     def input_names(self) -> tuple[str, ...]:
@@ -239,7 +274,9 @@ class RecordingRig:
         if self._keep:
             self.record.append(exchange)
         if self._sink is not None:
-            self._sink(flat(exchange))
+            row = flat(exchange)
+            self._names = self._names or tuple(row)
+            self._sink({**dict.fromkeys(self._names, math.nan), **row})
         return measured
 
     def __enter__(self) -> Self:

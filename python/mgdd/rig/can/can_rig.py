@@ -10,10 +10,11 @@ from collections.abc import Callable, Mapping, Sequence
 from types import TracebackType
 from typing import Any, Self
 
+from mgdd._core.rig import Frame
 from mgdd.errors import ParameterError, RigError
 from mgdd.loop import Measurement, Plant
 from mgdd.loop.plant import checked_inputs
-from mgdd.rig.can.frame import Bus, Frame
+from mgdd.rig.can.frame import Bus, changed
 from mgdd.rig.can.inbox import Inbox
 from mgdd.rig.can.link import Sender
 from mgdd.rig.can.local_bus import LocalBus
@@ -302,7 +303,7 @@ class CanRig:
     def _hand_over(self, frame: Frame, *, final: bool = False) -> None:
         self.bus.send(frame, final=final)
         if self._on_frame is not None:
-            self._on_frame(frame._replace(monotonic_ns=time.monotonic_ns()))
+            self._on_frame(changed(frame, monotonic_ns=time.monotonic_ns()))
 
     def _receive(self, timeout_s: float) -> bool:
         """Take the next frame; False where none came."""
@@ -322,12 +323,12 @@ class CanRig:
                     self._hand_over(frame, final=final)
 
     def _heard(self, timeout_s: float) -> bool:
-        """Wait for a whole cycle, then take all that came: the newest one counts."""
+        """Wait for the next whole cycle."""
         until = time.monotonic() + timeout_s
         while not self._inbox.ready:
-            if not self._receive(max(0.0, until - time.monotonic())):
+            left_s = until - time.monotonic() if self.bus.shared else timeout_s
+            if not self._receive(max(0.0, left_s)):
                 return False
-        self._take_all()
         self._inbox.read()
         return True
 

@@ -11,7 +11,7 @@ from typing import Any
 from mgdd._core.rig import SignalLayout
 from mgdd.errors import DataError, did_you_mean
 from mgdd.io.existing_file import existing_file
-from mgdd.rig.can.packages import cantools_package
+from mgdd.rig.extras import import_extra
 
 __all__ = ["DbcFile", "DbcMessage", "DbcSignal"]
 
@@ -130,7 +130,7 @@ class DbcFile:
         mgdd.errors.DataError
             Not a DBC, overlapping signals, or signals beyond their message.
         """
-        cantools = cantools_package()
+        cantools = import_extra("cantools", "can", "a DBC file")
         file = existing_file(path)
         content = file.read_bytes()
         try:

@@ -1,10 +1,12 @@
-"""One CAN frame, and what a rig or node needs of a bus."""
+"""What a rig or node needs of a bus, and what is done with its frames."""
 
 from __future__ import annotations
 
-from typing import NamedTuple, Protocol
+from typing import Any, Protocol
 
-__all__ = ["Bus", "Frame", "error_classes"]
+from mgdd._core.rig import Frame
+
+__all__ = ["Bus", "changed", "error_classes"]
 
 # Class bits of an error frame, as Linux defines them (linux/can/error.h).
 _CLASSES = {
@@ -19,36 +21,6 @@ _CLASSES = {
     0x100: "restarted",
 }
 _PASSIVE = 0x30  # of byte 1 of a controller error: receiver or transmitter is error-passive
-
-
-class Frame(NamedTuple):
-    """One frame, as it came or goes.
-
-    Parameters
-    ----------
-    id : int
-        Identifier; of an error frame its class bits.
-    data : bytes
-        Payload.
-    extended : bool
-        Whether the identifier has 29 bits.
-    monotonic_ns : int
-        Our own stamp [ns]; 0 before it was sent.
-    bus_ns : int
-        Stamp of the driver in its own epoch [ns]; 0 where it gave none.
-    error : bool
-        A report of the controller instead of a frame of a sender.
-    received : bool
-        From the bus; otherwise sent by us.
-    """
-
-    id: int
-    data: bytes
-    extended: bool = False
-    monotonic_ns: int = 0
-    bus_ns: int = 0
-    error: bool = False
-    received: bool = True
 
 
 class Bus(Protocol):
@@ -91,3 +63,8 @@ def error_classes(frame: Frame) -> list[str]:
     if frame.id & 0x004 and len(frame.data) > 1 and frame.data[1] & _PASSIVE:
         out.append("error_passive")
     return out or ["unknown"]
+
+
+def changed(frame: Frame, **fields: Any) -> Frame:
+    """Return the frame with other fields: its stamp, its direction, its data."""
+    return Frame(**{**frame.to_dict(), **fields})

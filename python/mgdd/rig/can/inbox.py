@@ -5,8 +5,8 @@ from __future__ import annotations
 import math
 from typing import Any
 
+from mgdd._core.rig import Frame
 from mgdd.loop import Measurement
-from mgdd.rig.can.frame import Frame
 from mgdd.rig.can.link import Receiver
 from mgdd.rig.can.signal_map import SignalMap
 
@@ -28,7 +28,7 @@ class Inbox:
     ready : int
         Whole cycles that nobody has read.
     skipped : int
-        Whole cycles that were not read before a newer one came.
+        Whole cycles that nobody read before the next command.
     state : str
         State that the node reported last; empty where it reports none.
     """
@@ -76,7 +76,6 @@ class Inbox:
 
     def read(self) -> None:
         """Note that the newest cycle is read."""
-        self.skipped += max(0, self.ready - 1)
         self.ready = 0
 
     def skip(self) -> None:

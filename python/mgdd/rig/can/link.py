@@ -5,8 +5,7 @@ from __future__ import annotations
 from collections.abc import Iterable, Mapping
 from typing import Any, NamedTuple
 
-from mgdd._core.rig import E2eCheck, protect
-from mgdd.rig.can.frame import Frame
+from mgdd._core.rig import E2eCheck, Frame, protect
 from mgdd.rig.can.mapped import MappedMessage
 
 __all__ = ["Receiver", "Sender", "Taken"]
@@ -63,9 +62,8 @@ class Sender:
                 counter = self._counters.get(message.name, 0)
                 whole = protect(message.e2e, counter, payload)
                 self._counters[message.name] = message.e2e.next_counter(counter)
-            out.append(
-                Frame(id=message.message.frame_id, data=whole, extended=message.message.extended, received=False)
-            )
+            where = message.message
+            out.append(Frame(id=where.frame_id, data=whole, extended=where.extended, fd=len(whole) > 8))
         return out
 
 

@@ -4,9 +4,10 @@ from __future__ import annotations
 
 from collections import deque
 
+from mgdd._core.rig import Frame
 from mgdd.errors import RigError
 from mgdd.loop import Plant
-from mgdd.rig.can.frame import Frame
+from mgdd.rig.can.frame import changed
 from mgdd.rig.can.node_core import NodeCore, node_plant
 from mgdd.rig.can.signal_map import SignalMap
 
@@ -57,10 +58,10 @@ class LocalBus:
     def send(self, frame: Frame, *, final: bool = False) -> None:  # noqa: ARG002 - there are no faults to pass
         """Give a frame to the node."""
         self._require_open()
-        if self.core.take(frame._replace(monotonic_ns=self._now_ns, received=True)):
+        if self.core.take(changed(frame, monotonic_ns=self._now_ns, received=True)):
             self._now_ns += round(self.core.map.cycle_s * 1e9)
             self._answers += [
-                answer._replace(monotonic_ns=self._now_ns, received=True) for answer in self.core.answer()
+                changed(answer, monotonic_ns=self._now_ns, received=True) for answer in self.core.answer()
             ]
 
     def receive(self, timeout_s: float) -> Frame | None:  # noqa: ARG002 - time stands still

@@ -10,9 +10,9 @@ import math
 from collections.abc import Mapping
 from typing import Any, NamedTuple, Protocol
 
+from mgdd._core.rig import Frame
 from mgdd.errors import ParameterError
 from mgdd.loop import Plant, VirtualThrottle
-from mgdd.rig.can.frame import Frame
 from mgdd.rig.can.link import Receiver, Sender
 from mgdd.rig.can.mapped import MappedMessage, MappedSignal
 from mgdd.rig.can.signal_map import SignalMap

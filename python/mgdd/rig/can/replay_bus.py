@@ -2,13 +2,17 @@
 
 from __future__ import annotations
 
+import os
 from collections import deque
 from collections.abc import Iterable
+from typing import Self
 
+from mgdd._core.rig import Frame
 from mgdd.errors import RigError
-from mgdd.rig.can.frame import Frame
+from mgdd.io.existing_file import existing_file
 from mgdd.rig.can.mapped import MappedMessage
 from mgdd.rig.can.signal_map import SignalMap
+from mgdd.rig.recorded import stamped_frames
 
 __all__ = ["ReplayBus"]
 
@@ -40,6 +44,27 @@ class ReplayBus:
         self._by_key = {message.key: message for message in signal_map.commands.values()}
         self.differences: list[tuple[int, dict[str, float], dict[str, float]]] = []
         self._rewind()
+
+    @classmethod
+    def read(cls, path: str | os.PathLike[str], signal_map: SignalMap, *, strict: bool = True) -> Self:
+        """Read the frames of a record file.
+
+        Parameters
+        ----------
+        path : path-like
+            File of a `mgdd.rig.Recorder` that was given every frame.
+        signal_map : SignalMap
+            Messages.
+        strict : bool
+            Whether another command is an error.
+
+        Returns
+        -------
+        ReplayBus
+            For a `mgdd.rig.CanRig` in the mode ``replay``.
+        """
+        frames = [frame for _, frame in stamped_frames(existing_file(path))]
+        return cls(frames, signal_map, strict=strict)
 
     @property
     def name(self) -> str:

@@ -14,9 +14,11 @@ from types import MappingProxyType
 from typing import Any, Self
 from urllib.parse import parse_qsl
 
+from mgdd._core.rig import Frame
 from mgdd.errors import ParameterError, RigError, did_you_mean
-from mgdd.rig.can.frame import Frame, error_classes
-from mgdd.rig.can.packages import can_package
+from mgdd.rig.can.frame import error_classes
+from mgdd.rig.can.messages import frame_of, message_of
+from mgdd.rig.extras import import_extra
 
 __all__ = ["CanTransport"]
 
@@ -51,6 +53,7 @@ class CanTransport:
 
     Examples
     --------
+    >>> from mgdd._core.rig import Frame
     >>> from mgdd.rig import CanTransport
     >>> with CanTransport("virtual", "doc") as one, CanTransport("virtual", "doc") as other:
     ...     one.send(Frame(id=0x120, data=bytes(8)))
@@ -196,14 +199,12 @@ class CanTransport:
             The driver does not take it, or the bus has a fault.
         """
         bus = self._open_bus(final=final)
-        message = can_package().Message(
-            arbitration_id=frame.id, data=frame.data, is_extended_id=frame.extended, is_fd=len(frame.data) > 8
-        )
+        can, message = _library(), message_of(frame)
         until, pause = time.monotonic() + self.send_timeout_s, 1e-4
         while True:
             try:
                 bus.send(message)
-            except (can_package().CanError, OSError) as error:
+            except (can.CanError, OSError) as error:
                 if not _is_full(error) or time.monotonic() + pause > until:
                     raise RigError(f"{self.name}: frame {frame.id:#x} was not sent: {error}") from error
                 self._count("retries")
@@ -246,7 +247,7 @@ class CanTransport:
         return self._bus
 
     def _connected(self) -> Any:
-        can = can_package()
+        can = _library()
         options = dict(self.options)
         if self.interface == "socketcand":
             options.setdefault("tcp_tune", True)
@@ -285,14 +286,7 @@ class CanTransport:
             self._trip(RigError(f"{self.name}: receiving ended: {error}"))
 
     def _store(self, message: Any, now_ns: int) -> None:
-        frame = Frame(
-            id=message.arbitration_id,
-            data=bytes(message.data),
-            extended=message.is_extended_id,
-            monotonic_ns=now_ns,
-            bus_ns=int(message.timestamp * 1e9),
-            error=message.is_error_frame,
-        )
+        frame = frame_of(message, monotonic_ns=now_ns, received=True)
         if frame.error:
             classes = error_classes(frame)
             for name in classes:
@@ -302,7 +296,7 @@ class CanTransport:
                     f"{self.name}: error frame {frame.id:#x}: {', '.join(sorted(fatal))}; the bus is not usable"
                 )
             return
-        if message.is_remote_frame:
+        if frame.remote:
             self._count("remote")
             return
         if (frame.id, frame.extended) in self._claimed:
@@ -335,6 +329,10 @@ class CanTransport:
     def _count(self, name: str) -> None:
         with self._arrived:
             self._counts[name] += 1
+
+
+def _library() -> Any:
+    return import_extra("can", "can", "a CAN bus")
 
 
 def _plain(text: str) -> Any:
