@@ -200,14 +200,10 @@ class RecordingRig:
     rig : Rig
         The rig, or a plain plant.
     sink : callable, optional
-<<<<<<< HEAD
-        Called with each row of named numbers as soon as it is measured, to write it to a file.
+        Called with each row of named numbers as soon as it is measured, to write it to a file: all have the names of
+        the first one, NaN where there is none.
     keep : bool
         Whether `record` remembers them too; a run of days has a sink instead.
-=======
-        Called with each row of named numbers as soon as it is measured, to write it to a file: all have the names of the
-        first one, NaN where there is none.
->>>>>>> f69a0e3e0e18647b44bb8c8c5fe058a4ed76bab1
 
     Examples
     --------

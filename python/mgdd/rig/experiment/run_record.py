@@ -8,15 +8,12 @@ from pathlib import Path
 from types import TracebackType
 from typing import Self
 
-from mgdd.errors import DataError
-from mgdd.rig.exchange import RigRecord
 from mgdd.rig.experiment.checked import CheckedExperiment
-from mgdd.rig.recorded import read_record
 from mgdd.rig.recorder import Recorder
 
-__all__ = ["TABLE", "RunRecord", "read_exchanges"]
+__all__ = ["RunRecord"]
 
-TABLE = "rig"  # of the record: a row per exchange
+_TABLE = "rig"  # where `RigRecord.read` looks for exchanges
 
 
 class RunRecord:
@@ -42,6 +39,7 @@ class RunRecord:
         header = {"experiment": checked.experiment.to_toml(), **checked.to_dict()}
         self.recorder = None if file is None else Recorder(file, config=header)
         self._names: tuple[str, ...] = ()
+        self._missed: set[str] = set()
 
     def row(self, row: Mapping[str, float]) -> None:
         """Append an exchange; the first one says the names, what a later one lacks is NaN."""
@@ -51,10 +49,11 @@ class RunRecord:
             # What a rig applied may be missing at first: it has its place from the start.
             late = [name.replace("input.", "applied.", 1) for name in row if name.startswith("input.")]
             self._names = tuple(dict.fromkeys((*row, *late)))
-        new = [name for name in row if name not in self._names]
+        new = sorted(set(row).difference(self._names, self._missed))
         if new:
-            self.say([f"record: {', '.join(new)} came too late for the table"])
-        self.recorder.sample(TABLE, {name: row.get(name, math.nan) for name in self._names})
+            self._missed.update(new)
+            self.say([f"record: {', '.join(new)} came after the first cycle and has no column"])
+        self.recorder.sample(_TABLE, {name: row.get(name, math.nan) for name in self._names})
 
     def say(self, events: Iterable[str]) -> None:
         """Append events."""
@@ -73,20 +72,3 @@ class RunRecord:
         if self.recorder is not None:
             self.recorder.__exit__(kind, error, trace)
 
-
-def read_exchanges(file: Path) -> RigRecord:
-    """Read the exchanges of a recorded run.
-
-    Raises
-    ------
-    mgdd.errors.DataError
-        Not a record, or none of a run.
-    """
-    import numpy as np
-
-    samples = read_record(file).samples
-    if TABLE not in samples:
-        raise DataError(f"{file}: holds no exchanges of a rig: give run.rec of `mgdd rig run`")
-    table = samples[TABLE]
-    names = [str(name) for name in table.data_vars]
-    return RigRecord.from_columns(names, np.column_stack([table[name].to_numpy() for name in names]))

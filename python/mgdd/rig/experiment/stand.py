@@ -16,12 +16,12 @@ from mgdd.rig.can.can_rig import CanRig
 from mgdd.rig.can.frame import Bus
 from mgdd.rig.can.recorded_bus import RecordedBus
 from mgdd.rig.can.transport import CanTransport
-from mgdd.rig.exchange import RecordingRig
+from mgdd.rig.exchange import RecordingRig, RigRecord
 from mgdd.rig.experiment.checked import CheckedExperiment
 from mgdd.rig.experiment.engine_task import SeekPlan, engine_named
 from mgdd.rig.experiment.experiment import Experiment
 from mgdd.rig.experiment.own_node import own_node
-from mgdd.rig.experiment.run_record import RunRecord, read_exchanges
+from mgdd.rig.experiment.run_record import RunRecord
 from mgdd.rig.experiment.safe_throttle import SafeThrottle
 from mgdd.rig.experiment.settings import SAMPLE_S, EnginePlant, scaled
 from mgdd.rig.experiment.throttle_tasks import throttle_named
@@ -108,7 +108,7 @@ def _rig_of(
     if mode == "simulate":
         return SimulatedRig(simulated_plant(experiment, sample_s=checked.sample_s, inputs=("duty",)))
     if checked.record is not None:
-        return ReplayRig(read_exchanges(checked.record), strict=False)
+        return ReplayRig(RigRecord.read(checked.record), strict=False)
     connection = experiment.bus.connection
     if connection is None:
         connection = stack.enter_context(own_node(checked))
