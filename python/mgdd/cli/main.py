@@ -78,7 +78,7 @@ def main(argv: Sequence[str] | None = None) -> int:
     except BrokenPipeError:
         os.dup2(os.open(os.devnull, os.O_WRONLY), sys.stdout.fileno())  # the reader has left; nothing more to say
         return EXIT_PIPE
-    except (Error, OSError) as error:
+    except (Error, OSError, ImportError) as error:  # an extra that is not installed is named
         print(f"mgdd: error: {error}", file=sys.stderr)
         fail(args, error, str(error))
         return EXIT_BAD_INPUT
