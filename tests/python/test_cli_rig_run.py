@@ -121,7 +121,8 @@ def test_bad_input_is_named(
 
 
 def test_without_the_extra_a_simulation_runs_and_a_bus_names_it(file: Path, tmp_path: Path) -> None:
-    blocked = "import sys; sys.modules.update(can=None, cantools=None); from mgdd.cli import main; sys.exit(main(sys.argv[1:]))"
+    blocked = "import sys; sys.modules.update(can=None, cantools=None)"
+    blocked += "\nfrom mgdd.cli import main; sys.exit(main(sys.argv[1:]))"
     command = [sys.executable, "-c", blocked, "rig", "run", str(file), "--folder", str(tmp_path / "run"), "--json"]
     done = subprocess.run(command, capture_output=True, text=True)
     assert done.returncode == 0, done.stderr
