@@ -9,7 +9,8 @@ from __future__ import annotations
 from mgdd.rig.actuator_guard import ActuatorGuard
 from mgdd.rig.base import Rig
 from mgdd.rig.gated import GatedThrottle
-from mgdd.rig.safety import SafetyEnvelope, SafetyGate
+from mgdd.rig.safety import SafetyGate
+from mgdd.rig.safety_envelope import SafetyEnvelope
 from mgdd.rig.simulated import SimulatedRig
 
 __all__ = [
