@@ -7,7 +7,7 @@ throttle controller a `SafetyGate`. An `Experiment` from a file runs on all of t
 from __future__ import annotations
 
 from mgdd._core.rig import E2eCheck, E2eSettings, Frame, RingTransport, SignalLayout, SocketCanTransport, protect
-from mgdd.rig.actuator_guard import ActuatorGuard, GuardedAsk
+from mgdd.rig.actuator_guard import ActuatorGuard
 from mgdd.rig.base import Rig
 from mgdd.rig.can.bus_bridge import BusBridge
 from mgdd.rig.can.can_rig import CanRig
@@ -23,7 +23,8 @@ from mgdd.rig.realtime import RealtimeLoop
 from mgdd.rig.recorded import read_record, repair_record
 from mgdd.rig.recorder import Recorder
 from mgdd.rig.replay import ReplayRig
-from mgdd.rig.safety import Drive, SafetyChange, SafetyEnvelope, SafetyGate
+from mgdd.rig.safety import SafetyGate
+from mgdd.rig.safety_envelope import SafetyEnvelope
 from mgdd.rig.simulated import SimulatedRig
 
 __all__ = [
@@ -31,13 +32,11 @@ __all__ = [
     "BusBridge",
     "CanRig",
     "CanTransport",
-    "Drive",
     "E2eCheck",
     "E2eSettings",
     "Experiment",
     "Frame",
     "GatedThrottle",
-    "GuardedAsk",
     "LoopMessage",
     "RealtimeLoop",
     "Recorder",
@@ -46,7 +45,6 @@ __all__ = [
     "Rig",
     "RigRecord",
     "RingTransport",
-    "SafetyChange",
     "SafetyEnvelope",
     "SafetyGate",
     "SignalLayout",
