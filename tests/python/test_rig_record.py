@@ -20,10 +20,10 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from mgdd._core.rig import Frame, RecordReader
-from mgdd.errors import DataError, ParameterError, RigError
+from mgdd._core.rig import RecordReader
+from mgdd.errors import DataError, ParameterError, RigError, ShapeError
 from mgdd.results.labels import check_labels
-from mgdd.rig import Recorder, read_record, repair_record
+from mgdd.rig import Frame, Recorder, read_record, repair_record
 
 
 def independent(path: Path) -> Iterator[tuple[Any, ...]]:
@@ -175,6 +175,8 @@ def test_refused_calls_change_nothing(tmp_path: Path) -> None:
             record.sample("plate", {"angle_deg": 1.0})
         with pytest.raises(ParameterError, match="its own time_s"):
             record.sample("other", {"time_s": 1.0})
+        with pytest.raises(ParameterError, match="angle_deg = 'wide': must be one number"):
+            record.sample("plate", {"angle_deg": "wide", "duty": 0.0})  # type: ignore[dict-item]
         with pytest.raises(ParameterError, match="columns"):
             record.sample("other", {})
         with pytest.raises(ParameterError, match="category"):
@@ -222,8 +224,7 @@ def test_many_threads_write_whole_records(tmp_path: Path) -> None:
 
 WRITER = """
 import sys
-from mgdd._core.rig import Frame
-from mgdd.rig import Recorder
+from mgdd.rig import Frame, Recorder
 record = Recorder(sys.argv[1])
 i = 0
 while True:
@@ -261,7 +262,6 @@ def test_a_killed_process_loses_at_most_the_record_it_was_writing(tmp_path: Path
 
 FULL = """
 import resource, sys
-from mgdd._core.rig import Frame
 from mgdd.errors import RigError
 from mgdd.rig import Recorder, read_record
 record = Recorder(sys.argv[1])
@@ -370,3 +370,14 @@ def test_a_record_can_be_read_while_it_is_written(tmp_path: Path) -> None:
         for i in range(3):
             record.event("note", str(i))
             assert read_record(tmp_path / "run.rec").events["text"].values.tolist() == [str(n) for n in range(i + 1)]
+
+
+def test_refused_frames() -> None:
+    with pytest.raises(ParameterError, match=r"id = 2048: must be in \[0, 2047\]"):
+        Frame(id=0x800)
+    with pytest.raises(ParameterError, match="id = 536870912"):
+        Frame(id=0x20000000, extended=True)
+    with pytest.raises(ShapeError, match="payload has 65 bytes: must be at most 64"):
+        Frame(id=1, data=bytes(65))
+    assert Frame(id=1, data=memoryview(bytes(range(8)))[::2]).data == bytes([0, 2, 4, 6])
+    assert Frame(**FRAMES[2].to_dict()) == FRAMES[2]

@@ -60,7 +60,7 @@ monotonic_ns, bus_ns : int
 
 Examples
 --------
->>> from mgdd._core.rig import Frame
+>>> from mgdd.rig import Frame
 >>> Frame(id=0x121, data=bytes(3), received=True).data
 b'\x00\x00\x00'
 )");

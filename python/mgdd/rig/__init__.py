@@ -6,7 +6,7 @@ throttle controller a `SafetyGate`. An `Experiment` from a file runs on all of t
 
 from __future__ import annotations
 
-from mgdd._core.rig import E2eCheck, E2eSettings, Frame, RingTransport, SignalLayout, SocketCanTransport, protect
+from mgdd._core.rig import E2eCheck, E2eSettings, Frame, RingTransport, SignalLayout, SocketCanTransport
 from mgdd.rig.actuator_guard import ActuatorGuard
 from mgdd.rig.base import Rig
 from mgdd.rig.can.bus_bridge import BusBridge
@@ -19,6 +19,7 @@ from mgdd.rig.experiment import Experiment, check_experiment, run_experiment
 from mgdd.rig.export import export_record
 from mgdd.rig.gated import GatedThrottle
 from mgdd.rig.loop_message import LoopMessage
+from mgdd.rig.protection import protect
 from mgdd.rig.realtime import RealtimeLoop
 from mgdd.rig.recorded import read_record, repair_record
 from mgdd.rig.recorder import Recorder
