@@ -196,6 +196,9 @@ def test_the_folder_of_a_run_holds_what_belongs_to_it(tmp_path: Path) -> None:
         np.testing.assert_array_equal(stored["duty"], result.dataset["duty"])
     with pytest.raises(RigError, match=r"holds experiment.toml already; name a new folder"):
         run_experiment(known, folder)
+    (tmp_path / "a_file").write_text("")
+    with pytest.raises(RigError, match=r"a_file.*name another one"):
+        run_experiment(known, tmp_path / "a_file")
 
 
 def test_a_folder_keeps_the_files_that_a_run_read(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
