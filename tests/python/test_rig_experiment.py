@@ -17,7 +17,7 @@ import xarray as xr
 
 from mgdd.errors import DataError, ParameterError, RigError
 from mgdd.results.labels import check_labels
-from mgdd.rig import Experiment, check_experiment, run_experiment
+from mgdd.rig import Experiment, SafetyEnvelope, check_experiment, run_experiment
 from mgdd.rig.experiment.watched import Cycle
 
 HEAD = 'kind = "experiment"\nformat = 1\nseed = 5\n'
@@ -196,6 +196,28 @@ def test_the_folder_of_a_run_holds_what_belongs_to_it(tmp_path: Path) -> None:
         np.testing.assert_array_equal(stored["duty"], result.dataset["duty"])
     with pytest.raises(RigError, match=r"holds experiment.toml already; name a new folder"):
         run_experiment(known, folder)
+    (tmp_path / "a_file").write_text("")
+    with pytest.raises(RigError, match=r"a_file.*name another one"):
+        run_experiment(known, tmp_path / "a_file")
+
+
+def test_a_folder_keeps_the_files_that_a_run_read(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    """A run moved elsewhere can be replayed: reference, envelope and plant are with it."""
+    home, run = tmp_path / "home", tmp_path / "elsewhere" / "run"
+    home.mkdir()
+    time_s = np.arange(600) * 1e-3
+    rows = np.c_[time_s, 20.0 + 10.0 * (time_s > 0.3)]
+    np.savetxt(home / "steps.csv", rows, delimiter=",", header="time_s,reference_deg", comments="")
+    (home / "mine.toml").write_text(SafetyEnvelope.load("etb").replace(duty_limit=0.5).to_toml())
+    text = TRACK.replace("step:20:35", "steps.csv") + '[safety]\nenvelope = "mine.toml"\n'
+    (home / "track.toml").write_text(text)
+    result = run_experiment(Experiment.load(home / "track.toml"), run)
+    assert np.abs(result.dataset["duty"]).max() <= 0.5
+    (home / "steps.csv").unlink()
+    (home / "mine.toml").unlink()
+    monkeypatch.chdir(tmp_path)
+    again = Experiment.load(run / "experiment.toml").with_mode("replay", record=run / "run.rec")
+    assert run_experiment(again).counters["replay"]["different"] == 0
 
 
 def test_a_gate_that_takes_the_drive_away_ends_the_run_and_keeps_what_was_recorded(tmp_path: Path) -> None:

@@ -144,7 +144,7 @@ def test_a_wrong_map_is_refused_before_anything_is_opened(tmp_path: Path, capsys
     assert not (tmp_path / "run").exists()
 
 
-def test_ctrl_c_ends_a_run_over_the_bus_with_what_it_has(tmp_path: Path) -> None:
+def test_ctrl_c_ends_a_run_over_the_bus_with_what_it_has(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
     file, folder = tmp_path / "track.toml", tmp_path / "run"
     file.write_text(TRACK.format(seed=1).replace("step:20:35", "sine:30:5:1"))
     command = [sys.executable, "-m", "mgdd", "rig", "run", str(file), "--mode", "hil", "--pace", "real_time"]
@@ -160,6 +160,9 @@ def test_ctrl_c_ends_a_run_over_the_bus_with_what_it_has(tmp_path: Path) -> None
     assert said["interrupted"] is True
     assert 0 < said["timing"]["cycles"] < 1200
     assert json.loads((folder / "result.json").read_text())["interrupted"] is True
+    assert main(["rig", "replay", str(folder), "--quiet", "--json"]) == 0
+    compared = json.loads(capsys.readouterr().out)["replay"]
+    assert compared["samples"] == compared["recorded"]
 
 
 def test_record_listens_and_export_writes(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:

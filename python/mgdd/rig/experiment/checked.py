@@ -14,6 +14,7 @@ from mgdd.rig.experiment.engine_task import SeekPlan
 from mgdd.rig.experiment.experiment import Experiment
 from mgdd.rig.experiment.settings import SAMPLE_S, EnginePlant, IdentifyTask, SeekTask, TrackTask
 from mgdd.rig.experiment.throttle_tasks import IdentifyPlan, TrackPlan
+from mgdd.rig.recorded import read_record
 from mgdd.rig.safety import SafetyEnvelope
 
 __all__ = ["CheckedExperiment", "check_experiment"]
@@ -117,24 +118,34 @@ def check_experiment(experiment: Experiment) -> CheckedExperiment:
     mode, settings = experiment.mode, experiment.settings
     signal_map = _map_of(experiment) if mode in _BUS_MODES else None
     _require_bus(experiment)
+    record = _record_of(experiment)
     plan: IdentifyPlan | TrackPlan | SeekPlan
     if isinstance(settings, SeekTask):
         plan, sample_s, envelope = SeekPlan(settings, folder=experiment.folder), None, None
     else:
-        sample_s = _sample_s(experiment, signal_map)
+        sample_s = _sample_s(experiment, signal_map) if record is None else _recorded_sample_s(experiment, record)
         envelope = _envelope(experiment, sample_s)
         plan = _throttle_plan(settings, sample_s, experiment)
-    record = None
-    if mode == "replay":
-        if experiment.replay.record is None:
-            raise ParameterError(f"{experiment.origin}: mode = 'replay': needs [replay] record, the file of a run")
-        record = existing_file(_beside(experiment, experiment.replay.record))
     checked = CheckedExperiment(
         experiment=experiment, plan=plan, sample_s=sample_s, envelope=envelope, signal_map=signal_map, record=record
     )
     if signal_map is not None:
         _require_names(checked, signal_map)
     return checked
+
+
+def _record_of(experiment: Experiment) -> Path | None:
+    if experiment.mode != "replay":
+        return None
+    if experiment.replay.record is None:
+        raise ParameterError(f"{experiment.origin}: mode = 'replay': needs [replay] record, the file of a run")
+    return existing_file(_beside(experiment, experiment.replay.record))
+
+
+def _recorded_sample_s(experiment: Experiment, record: Path) -> float:
+    """Give the time between samples that the recorded run had: over a bus its DBC said it."""
+    recorded = read_record(record).config.get("sample_s")
+    return _sample_s(experiment, None) if recorded is None else float(recorded)
 
 
 def _beside(experiment: Experiment, name: str) -> str:

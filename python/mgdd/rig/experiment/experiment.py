@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import os
 import tomllib
-from collections.abc import Mapping
+from collections.abc import Callable, Mapping
 from dataclasses import dataclass, field, replace
 from pathlib import Path
 from typing import Any, Self
@@ -33,6 +33,11 @@ __all__ = ["Experiment"]
 _KIND, _FORMAT = "experiment", 1
 _TASK_OF: Mapping[str, type[IdentifyTask | TrackTask | SeekTask]] = {
     "identify": IdentifyTask, "track": TrackTask, "seek": SeekTask,
+}  # fmt: skip
+# Keys that may name a file, in the records of an experiment.
+_FILES = {
+    "settings": ("reference", "model", "prior"), "plant": ("preset",), "safety": ("envelope",), "bus": ("map",),
+    "replay": ("record",),
 }  # fmt: skip
 _HEAD = ("kind", "format", "task", "mode", "seed", "plant", "bus", "safety", "replay")
 
@@ -210,6 +215,28 @@ class Experiment:
         bus = replace(self.bus, connection=connection or self.bus.connection, pace=pace or self.bus.pace)
         replay = self.replay if record is None else ReplaySettings(record=os.fspath(record))
         return replace(self, mode=mode, replay=replay, bus=bus)
+
+    def with_files(self, put: Callable[[Path], str]) -> Self:
+        """Give the same experiment with other names for the files that it finds beside it.
+
+        Parameters
+        ----------
+        put : callable
+            Takes the path of a file, gives what the experiment shall call it.
+
+        Returns
+        -------
+        Experiment
+            A new one; names of presets and of what is shipped stay.
+        """
+        changed: dict[str, Any] = {}
+        for part, keys in _FILES.items():
+            record = getattr(self, part)
+            named = {key: getattr(record, key, None) for key in keys}
+            found = {key: self.folder / name for key, name in named.items() if name and (self.folder / name).is_file()}
+            if found:
+                changed[part] = replace(record, **{key: put(path) for key, path in found.items()})
+        return replace(self, **changed)
 
     @property
     def folder(self) -> Path:

@@ -5,14 +5,12 @@ from __future__ import annotations
 import os
 from collections.abc import Iterator
 from contextlib import contextmanager
-from dataclasses import replace
 from pathlib import Path
 from tempfile import TemporaryDirectory
 
 from mgdd.errors import RigError
 from mgdd.rig.can.processes import VirtualNode
 from mgdd.rig.experiment.checked import CheckedExperiment
-from mgdd.rig.experiment.experiment import Experiment
 
 __all__ = ["own_node"]
 
@@ -42,7 +40,7 @@ def own_node(checked: CheckedExperiment, *, truth: str | os.PathLike[str] | None
         raise RigError("a node needs the map of a bus")
     with TemporaryDirectory(prefix="mgdd-node-") as folder:
         file = Path(folder) / "experiment.toml"
-        file.write_text(_anywhere(checked.experiment).to_toml(), encoding="utf-8")
+        file.write_text(checked.experiment.with_files(lambda path: str(path.resolve())).to_toml(), encoding="utf-8")
         with VirtualNode(
             checked.signal_map.file.resolve(),
             step=checked.experiment.bus.pace == "step",
@@ -51,11 +49,3 @@ def own_node(checked: CheckedExperiment, *, truth: str | os.PathLike[str] | None
             experiment=file,
         ) as node:
             yield node.bus
-
-
-def _anywhere(experiment: Experiment) -> Experiment:
-    """Give the experiment with the full path of its plant: the file that the node reads stands elsewhere."""
-    beside = experiment.folder / experiment.plant.preset
-    if not beside.is_file():
-        return experiment
-    return replace(experiment, plant=replace(experiment.plant, preset=str(beside.resolve())))

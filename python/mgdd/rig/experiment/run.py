@@ -141,7 +141,7 @@ def run_experiment(
     checked = experiment if isinstance(experiment, CheckedExperiment) else check_experiment(experiment)
     run = None if folder is None else RunFolder(folder)
     if run is not None:
-        run.text("experiment.toml", checked.experiment.to_toml())
+        run.text("experiment.toml", checked.experiment.with_files(run.keep).to_toml())
         run.json("run.json", {**versions(), **checked.to_dict()})
     with RunRecord(None if run is None else run.file("run.rec"), checked) as record:
         outcome, stand_said, timing = _steered(checked, record, arm=arm, key_file=key_file, watch=watch)

@@ -22,6 +22,7 @@ if TYPE_CHECKING:
 
 __all__ = ["RunFolder", "versions"]
 
+_INPUTS = "inputs"
 _PACKAGES = ("numpy", "scipy", "xarray", "python-can", "cantools")
 
 
@@ -53,6 +54,23 @@ class RunFolder:
         """Give the path of a file of the run."""
         return self.path / name
 
+    def keep(self, path: Path) -> str:
+        """Copy a file that a run reads, and give its name in the folder; bulk and maps stay where they are.
+
+        A map reads its DBC beside it, a record may be large: both are named by their full path.
+        """
+        if path.suffix == ".rec" or _is_map(path):
+            return str(path.resolve())
+        inputs = self.path / _INPUTS
+        inputs.mkdir(exist_ok=True)
+        name = path.name
+        for number in range(2, 1000):
+            if not (inputs / name).exists():
+                break
+            name = f"{path.stem}_{number}{path.suffix}"
+        self._whole(f"{_INPUTS}/{name}", lambda half: half.write_bytes(path.read_bytes()))
+        return f"{_INPUTS}/{name}"
+
     def text(self, name: str, text: str) -> None:
         """Write a text."""
         self._whole(name, lambda path: path.write_text(text, encoding="utf-8", newline="\n"))
@@ -71,17 +89,22 @@ class RunFolder:
 
     def _whole(self, name: str, write: Any) -> None:
         """Write under another name, and give it its own when it is on the disk."""
-        half = self.path / f".{name}.part"
+        whole = self.path / name
+        half = whole.with_name(f".{whole.name}.part")
         try:
             write(half)
             with half.open("rb") as written:
                 os.fsync(written.fileno())
-            half.replace(self.path / name)
+            half.replace(whole)
         except OSError as error:
             half.unlink(missing_ok=True)
             raise RigError(
                 f"{self.path / name}: {error.strerror or error}; what was finished before is kept"
             ) from error
+
+
+def _is_map(path: Path) -> bool:
+    return path.suffix == ".toml" and 'kind = "signal_map"' in path.read_text(encoding="utf-8", errors="replace")
 
 
 def versions() -> dict[str, Any]:

@@ -71,4 +71,3 @@ class RunRecord:
     ) -> None:
         if self.recorder is not None:
             self.recorder.__exit__(kind, error, trace)
-

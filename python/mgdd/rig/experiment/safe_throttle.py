@@ -24,7 +24,8 @@ class SafeThrottle:
     gate : SafetyGate
         Its cycle time is that of the plant.
     shadow : bool
-        The plant does not follow, as in ``dry_run``: what the gate forbids is noted, and the run goes on at zero duty.
+        The plant does not follow, as in ``dry_run`` and ``replay``: what the gate forbids is noted, and the run goes on
+        at zero duty.
     """
 
     def __init__(self, plant: Plant, gate: SafetyGate, *, shadow: bool = False) -> None:

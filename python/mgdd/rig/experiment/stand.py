@@ -130,7 +130,7 @@ def _guarded(checked: CheckedExperiment, rig: Any, recorded: Plant) -> Stand:
 
     if checked.envelope is not None:
         gate = SafetyGate(checked.envelope)
-        safe = SafeThrottle(recorded, gate, shadow=checked.experiment.mode == "dry_run")
+        safe = SafeThrottle(recorded, gate, shadow=checked.experiment.mode in ("dry_run", "replay"))
         return Stand(
             plant=safe,
             counters=lambda: {**counters(), "gate": gate.counts},
