@@ -1,7 +1,6 @@
 """
 The C++ core of mgdd, a submodule per room. Use it through mgdd.engine, mgdd.throttle and so on.
 """
-
 from __future__ import annotations
 from . import optimize
 from . import control
@@ -12,35 +11,17 @@ from . import guide
 from . import systems
 from . import loop
 from . import rig
-
-__all__: list[str] = [
-    "compiled_simd_level",
-    "compiler",
-    "control",
-    "engine",
-    "guide",
-    "identify",
-    "loop",
-    "optimize",
-    "processor_simd_levels",
-    "rig",
-    "systems",
-    "throttle",
-]
-
+__all__: list[str] = ['compiled_simd_level', 'compiler', 'control', 'engine', 'guide', 'identify', 'loop', 'optimize', 'processor_simd_levels', 'rig', 'systems', 'throttle']
 def compiled_simd_level() -> str:
     """
     Instruction set of this build.
     """
-
 def compiler() -> str:
     """
     Compiler of this build.
     """
-
 def processor_simd_levels() -> list[str]:
     """
     Vector instruction sets of this processor.
     """
-
-__version__: str = "0.1.0"
+__version__: str = '0.1.0'

@@ -1,23 +1,20 @@
 """
 Controllers of a throttle plate.
 """
-
 from __future__ import annotations
 import collections.abc
 import numpy
 import numpy.typing
 import typing
-
-__all__: list[str] = ["GuidedPredictive", "Pid", "SlidingMode", "ThrottleSupervisor"]
-
+__all__: list[str] = ['GuidedPredictive', 'Pid', 'SlidingMode', 'ThrottleSupervisor']
 class Pid:
     """
     PID controller of a throttle plate, one sample at a time.
-
+    
     Gains per side of limp-home, filtered derivative of the measurement, conditional integration, spring and friction
     feed-forward, a friction kick and a dead band. Keyword-only; the defaults fit the throttle ``P1``, tuned with its noise
     of 0.03 deg and a delay of one sample. ``Pid.fields()`` lists bounds and defaults.
-
+    
     Parameters
     ----------
     sample_s : float
@@ -50,23 +47,23 @@ class Pid:
         Lag of that rate [s]; a faster reference steps and has no rate [deg/s].
     lower, upper : float
         Bounds of the duty [-].
-
+    
     Raises
     ------
     mgdd.errors.ParameterError
         A setting outside its domain, naming field, value and bound.
-
+    
     See Also
     --------
     SlidingMode : the other classic baseline.
     mgdd.loop.VirtualThrottle : a plant to run it on.
-
+    
     References
     ----------
     Åström and Hägglund (2006), Advanced PID Control.
     Armstrong-Helouvry et al. (1994), A survey of models, analysis tools and compensation methods for the control of
     machines with friction.
-
+    
     Examples
     --------
     >>> from mgdd.control import Pid
@@ -84,62 +81,28 @@ class Pid:
         """
         Every setting by name: unit, bounds or choices, meaning, default.
         """
-    def __getstate__(self) -> tuple[int, dict, dict[str, list[float]]]: ...
-    def __init__(
-        self,
-        *,
-        sample_s: typing.SupportsFloat | typing.SupportsIndex = 0.001,
-        proportional_above_per_deg: typing.SupportsFloat | typing.SupportsIndex = 0.12778,
-        integral_above_per_deg_s: typing.SupportsFloat | typing.SupportsIndex = 1.3,
-        derivative_above_s_per_deg: typing.SupportsFloat | typing.SupportsIndex = 0.0014667,
-        proportional_below_per_deg: typing.SupportsFloat | typing.SupportsIndex = 0.12778,
-        integral_below_per_deg_s: typing.SupportsFloat | typing.SupportsIndex = 1.3,
-        derivative_below_s_per_deg: typing.SupportsFloat | typing.SupportsIndex = 0.0014667,
-        derivative_lag_s: typing.SupportsFloat | typing.SupportsIndex = 0.003,
-        limp_home_deg: typing.SupportsFloat | typing.SupportsIndex = 8.0,
-        ramp_deg: typing.SupportsFloat | typing.SupportsIndex = 0.5,
-        preload_above: typing.SupportsFloat | typing.SupportsIndex = 0.1292,
-        spring_above_per_deg: typing.SupportsFloat | typing.SupportsIndex = 0.000496,
-        preload_below: typing.SupportsFloat | typing.SupportsIndex = 0.1292,
-        spring_below_per_deg: typing.SupportsFloat | typing.SupportsIndex = 0.000496,
-        kick: typing.SupportsFloat | typing.SupportsIndex = 0.1205,
-        kick_width_deg: typing.SupportsFloat | typing.SupportsIndex = 0.019,
-        dead_band_deg: typing.SupportsFloat | typing.SupportsIndex = 0.1,
-        integral_window_deg: typing.SupportsFloat | typing.SupportsIndex = 2.0,
-        integral_limit: typing.SupportsFloat | typing.SupportsIndex = 0.3,
-        rate_s_per_deg: typing.SupportsFloat | typing.SupportsIndex = 0.000346,
-        friction: typing.SupportsFloat | typing.SupportsIndex = 0.0603,
-        friction_rate_deg_per_s: typing.SupportsFloat | typing.SupportsIndex = 17.2,
-        reference_lag_s: typing.SupportsFloat | typing.SupportsIndex = 0.0045,
-        reference_jump_deg_per_s: typing.SupportsFloat | typing.SupportsIndex = 400.0,
-        lower: typing.SupportsFloat | typing.SupportsIndex = -1.0,
-        upper: typing.SupportsFloat | typing.SupportsIndex = 1.0,
-    ) -> None: ...
-    def __repr__(self) -> str: ...
-    def __setstate__(self, arg0: tuple) -> None: ...
+    def __getstate__(self) -> tuple[int, dict, dict[str, list[float]]]:
+        ...
+    def __init__(self, *, sample_s: typing.SupportsFloat | typing.SupportsIndex = 0.001, proportional_above_per_deg: typing.SupportsFloat | typing.SupportsIndex = 0.12778, integral_above_per_deg_s: typing.SupportsFloat | typing.SupportsIndex = 1.3, derivative_above_s_per_deg: typing.SupportsFloat | typing.SupportsIndex = 0.0014667, proportional_below_per_deg: typing.SupportsFloat | typing.SupportsIndex = 0.12778, integral_below_per_deg_s: typing.SupportsFloat | typing.SupportsIndex = 1.3, derivative_below_s_per_deg: typing.SupportsFloat | typing.SupportsIndex = 0.0014667, derivative_lag_s: typing.SupportsFloat | typing.SupportsIndex = 0.003, limp_home_deg: typing.SupportsFloat | typing.SupportsIndex = 8.0, ramp_deg: typing.SupportsFloat | typing.SupportsIndex = 0.5, preload_above: typing.SupportsFloat | typing.SupportsIndex = 0.1292, spring_above_per_deg: typing.SupportsFloat | typing.SupportsIndex = 0.000496, preload_below: typing.SupportsFloat | typing.SupportsIndex = 0.1292, spring_below_per_deg: typing.SupportsFloat | typing.SupportsIndex = 0.000496, kick: typing.SupportsFloat | typing.SupportsIndex = 0.1205, kick_width_deg: typing.SupportsFloat | typing.SupportsIndex = 0.019, dead_band_deg: typing.SupportsFloat | typing.SupportsIndex = 0.1, integral_window_deg: typing.SupportsFloat | typing.SupportsIndex = 2.0, integral_limit: typing.SupportsFloat | typing.SupportsIndex = 0.3, rate_s_per_deg: typing.SupportsFloat | typing.SupportsIndex = 0.000346, friction: typing.SupportsFloat | typing.SupportsIndex = 0.0603, friction_rate_deg_per_s: typing.SupportsFloat | typing.SupportsIndex = 17.2, reference_lag_s: typing.SupportsFloat | typing.SupportsIndex = 0.0045, reference_jump_deg_per_s: typing.SupportsFloat | typing.SupportsIndex = 400.0, lower: typing.SupportsFloat | typing.SupportsIndex = -1.0, upper: typing.SupportsFloat | typing.SupportsIndex = 1.0) -> None:
+        ...
+    def __repr__(self) -> str:
+        ...
+    def __setstate__(self, arg0: tuple) -> None:
+        ...
     def reset(self) -> None:
         """
         As made: no integral, no rates.
         """
-    def step(
-        self,
-        reference_deg: typing.SupportsFloat | typing.SupportsIndex,
-        measurement_deg: typing.SupportsFloat | typing.SupportsIndex,
-    ) -> float:
+    def step(self, reference_deg: typing.SupportsFloat | typing.SupportsIndex, measurement_deg: typing.SupportsFloat | typing.SupportsIndex) -> float:
         """
         Duty [-] of this sample for a reference and a measured angle [deg].
-
+        
         NaN repeats the last value; before the first ones the duty is 0.
         """
-    def take_over(
-        self,
-        reference_deg: typing.SupportsFloat | typing.SupportsIndex,
-        measurement_deg: typing.SupportsFloat | typing.SupportsIndex,
-        duty: typing.SupportsFloat | typing.SupportsIndex,
-    ) -> None:
+    def take_over(self, reference_deg: typing.SupportsFloat | typing.SupportsIndex, measurement_deg: typing.SupportsFloat | typing.SupportsIndex, duty: typing.SupportsFloat | typing.SupportsIndex) -> None:
         """
         Start at rest from a duty without a bump, as far as the limit of the integral allows.
-
+        
         Ignored if a number is not finite.
         """
     @property
@@ -163,18 +126,16 @@ class Pid:
         What a run needs to go on bit for bit; a state that the settings do not allow is refused and changes nothing.
         """
     @state.setter
-    def state(
-        self, arg1: collections.abc.Mapping[str, collections.abc.Sequence[typing.SupportsFloat | typing.SupportsIndex]]
-    ) -> None: ...
-
+    def state(self, arg1: collections.abc.Mapping[str, collections.abc.Sequence[typing.SupportsFloat | typing.SupportsIndex]]) -> None:
+        ...
 class SlidingMode:
     """
     Sliding-mode controller of a throttle plate, one sample at a time.
-
+    
     With the angle y, the filtered reference r and e = y - r, the surface is ``s = de/dt + bandwidth_per_s (e +
     integral_per_s * integral of e)``. A model of the plate gives the duty that stays on it, `reaching` the duty that gets
     there. Keyword-only; the defaults fit the throttle ``P1``. ``SlidingMode.fields()`` lists bounds and defaults.
-
+    
     Parameters
     ----------
     sample_s : float
@@ -206,22 +167,22 @@ class SlidingMode:
     reaching : {"implicit", "boundary_layer", "super_twisting"}
         ``boundary_layer``: ``-switching sat(s/layer)``. ``implicit``: its backward Euler step, which cannot chatter on
         the model however thin the layer. ``super_twisting``: ``-root sqrt|s| sgn s`` and an integral of ``-twist sgn s``.
-
+    
     Raises
     ------
     mgdd.errors.ParameterError
         A setting outside its domain, naming field, value and bound.
-
+    
     See Also
     --------
     Pid : the other classic baseline.
-
+    
     References
     ----------
     Slotine and Li (1991), Applied Nonlinear Control, chapter 7.
     Acary and Brogliato (2010), Implicit Euler numerical scheme and chattering-free implementation of sliding mode systems.
     Levant (1993), Sliding order and sliding accuracy in sliding mode control.
-
+    
     Examples
     --------
     >>> from mgdd.control import SlidingMode
@@ -239,48 +200,22 @@ class SlidingMode:
         """
         Every setting by name: unit, bounds or choices, meaning, default.
         """
-    def __getstate__(self) -> tuple[int, dict, dict[str, list[float]]]: ...
-    def __init__(
-        self,
-        *,
-        sample_s: typing.SupportsFloat | typing.SupportsIndex = 0.001,
-        gain_deg_per_s2: typing.SupportsFloat | typing.SupportsIndex = 83597.0,
-        time_constant_s: typing.SupportsFloat | typing.SupportsIndex = 0.0197,
-        limp_home_deg: typing.SupportsFloat | typing.SupportsIndex = 8.0,
-        ramp_deg: typing.SupportsFloat | typing.SupportsIndex = 0.5,
-        preload_above: typing.SupportsFloat | typing.SupportsIndex = 0.1292,
-        spring_above_per_deg: typing.SupportsFloat | typing.SupportsIndex = 0.000496,
-        preload_below: typing.SupportsFloat | typing.SupportsIndex = 0.1292,
-        spring_below_per_deg: typing.SupportsFloat | typing.SupportsIndex = 0.000496,
-        friction: typing.SupportsFloat | typing.SupportsIndex = 0.076,
-        friction_rate_deg_per_s: typing.SupportsFloat | typing.SupportsIndex = 17.2,
-        bandwidth_per_s: typing.SupportsFloat | typing.SupportsIndex = 136.0,
-        integral_per_s: typing.SupportsFloat | typing.SupportsIndex = 3.03,
-        integral_layers: typing.SupportsFloat | typing.SupportsIndex = 3.0,
-        reference_pole_per_s: typing.SupportsFloat | typing.SupportsIndex = 170.0,
-        derivative_lag_s: typing.SupportsFloat | typing.SupportsIndex = 0.003,
-        switching: typing.SupportsFloat | typing.SupportsIndex = 0.793,
-        layer_deg: typing.SupportsFloat | typing.SupportsIndex = 3.46,
-        root_per_root_deg_per_s: typing.SupportsFloat | typing.SupportsIndex = 0.015,
-        twist_per_s: typing.SupportsFloat | typing.SupportsIndex = 2.0,
-        lower: typing.SupportsFloat | typing.SupportsIndex = -1.0,
-        upper: typing.SupportsFloat | typing.SupportsIndex = 1.0,
-        reaching: str = "implicit",
-    ) -> None: ...
-    def __repr__(self) -> str: ...
-    def __setstate__(self, arg0: tuple) -> None: ...
+    def __getstate__(self) -> tuple[int, dict, dict[str, list[float]]]:
+        ...
+    def __init__(self, *, sample_s: typing.SupportsFloat | typing.SupportsIndex = 0.001, gain_deg_per_s2: typing.SupportsFloat | typing.SupportsIndex = 83597.0, time_constant_s: typing.SupportsFloat | typing.SupportsIndex = 0.0197, limp_home_deg: typing.SupportsFloat | typing.SupportsIndex = 8.0, ramp_deg: typing.SupportsFloat | typing.SupportsIndex = 0.5, preload_above: typing.SupportsFloat | typing.SupportsIndex = 0.1292, spring_above_per_deg: typing.SupportsFloat | typing.SupportsIndex = 0.000496, preload_below: typing.SupportsFloat | typing.SupportsIndex = 0.1292, spring_below_per_deg: typing.SupportsFloat | typing.SupportsIndex = 0.000496, friction: typing.SupportsFloat | typing.SupportsIndex = 0.076, friction_rate_deg_per_s: typing.SupportsFloat | typing.SupportsIndex = 17.2, bandwidth_per_s: typing.SupportsFloat | typing.SupportsIndex = 136.0, integral_per_s: typing.SupportsFloat | typing.SupportsIndex = 3.03, integral_layers: typing.SupportsFloat | typing.SupportsIndex = 3.0, reference_pole_per_s: typing.SupportsFloat | typing.SupportsIndex = 170.0, derivative_lag_s: typing.SupportsFloat | typing.SupportsIndex = 0.003, switching: typing.SupportsFloat | typing.SupportsIndex = 0.793, layer_deg: typing.SupportsFloat | typing.SupportsIndex = 3.46, root_per_root_deg_per_s: typing.SupportsFloat | typing.SupportsIndex = 0.015, twist_per_s: typing.SupportsFloat | typing.SupportsIndex = 2.0, lower: typing.SupportsFloat | typing.SupportsIndex = -1.0, upper: typing.SupportsFloat | typing.SupportsIndex = 1.0, reaching: str = 'implicit') -> None:
+        ...
+    def __repr__(self) -> str:
+        ...
+    def __setstate__(self, arg0: tuple) -> None:
+        ...
     def reset(self) -> None:
         """
         As made: no integral, no rates.
         """
-    def step(
-        self,
-        reference_deg: typing.SupportsFloat | typing.SupportsIndex,
-        measurement_deg: typing.SupportsFloat | typing.SupportsIndex,
-    ) -> float:
+    def step(self, reference_deg: typing.SupportsFloat | typing.SupportsIndex, measurement_deg: typing.SupportsFloat | typing.SupportsIndex) -> float:
         """
         Duty [-] of this sample for a reference and a measured angle [deg].
-
+        
         NaN repeats the last value; before the first ones the duty is 0.
         """
     @property
@@ -299,26 +234,24 @@ class SlidingMode:
         What a run needs to go on bit for bit; a state that the settings do not allow is refused and changes nothing.
         """
     @state.setter
-    def state(
-        self, arg1: collections.abc.Mapping[str, collections.abc.Sequence[typing.SupportsFloat | typing.SupportsIndex]]
-    ) -> None: ...
+    def state(self, arg1: collections.abc.Mapping[str, collections.abc.Sequence[typing.SupportsFloat | typing.SupportsIndex]]) -> None:
+        ...
     @property
     def surface_deg_per_s(self) -> float:
         """
         s of the last sample [deg/s].
         """
-
 class GuidedPredictive:
     """
     Model-guided predictive controller of a throttle plate, one sample at a time.
-
+    
     A rough model predicts a short horizon; one Gauss-Newton step per sample moves the last duties along its exact slopes;
     what is measured corrects the model while it runs. The default learns dry friction as two levels per side of limp-home
     gain and damping, asks the model for the duty at which the plate breaks away, and holds still inside the friction band.
     ``friction_learning=False`` is the plain form, ``prediction="linear"`` the usual linear MPC, more `gauss_newton_steps`
     the converged nonlinear one. Keyword-only; the defaults fit the throttle ``P1``. `mgdd.loop.tuned_controller` makes one
     for another throttle; ``GuidedPredictive.fields()`` lists bounds and defaults.
-
+    
     Parameters
     ----------
     sample_s : float
@@ -370,22 +303,22 @@ class GuidedPredictive:
         At most so many per sample; it ends when the duties stand still.
     friction_learning : bool
         Learn friction levels and gain, and use breakaway and hold rules.
-
+    
     Raises
     ------
     mgdd.errors.ParameterError
         A setting outside its domain, naming field, value and bound.
-
+    
     See Also
     --------
     Mgdd1 : the plainest form, guided by the outputs of any model.
     mgdd.loop.tuned_controller : controllers for a throttle, all tuned alike.
-
+    
     References
     ----------
     Tan (2018), Model-Guided Data-Driven Optimization and Control for Internal Combustion Engine Systems, section 7.3.
     Diehl, Bock and Schlöder (2005), A real-time iteration scheme for nonlinear optimization in optimal feedback control.
-
+    
     Examples
     --------
     >>> from mgdd.control import GuidedPredictive
@@ -405,56 +338,14 @@ class GuidedPredictive:
         """
         Every setting by name: unit, bounds or choices, meaning, default.
         """
-    def __getstate__(self) -> tuple[int, dict, dict[str, list[float]]]: ...
-    def __init__(
-        self,
-        *,
-        sample_s: typing.SupportsFloat | typing.SupportsIndex = 0.001,
-        gain_deg_per_s2: typing.SupportsFloat | typing.SupportsIndex = 83597.0,
-        time_constant_s: typing.SupportsFloat | typing.SupportsIndex = 0.0197,
-        electrical_s: typing.SupportsFloat | typing.SupportsIndex = 0.001,
-        limp_home_deg: typing.SupportsFloat | typing.SupportsIndex = 8.0,
-        ramp_deg: typing.SupportsFloat | typing.SupportsIndex = 0.5,
-        preload_above: typing.SupportsFloat | typing.SupportsIndex = 0.1292,
-        spring_above_per_deg: typing.SupportsFloat | typing.SupportsIndex = 0.000496,
-        preload_below: typing.SupportsFloat | typing.SupportsIndex = 0.1292,
-        spring_below_per_deg: typing.SupportsFloat | typing.SupportsIndex = 0.000496,
-        friction: typing.SupportsFloat | typing.SupportsIndex = 0.0927,
-        closed_deg: typing.SupportsFloat | typing.SupportsIndex = 0.0,
-        open_deg: typing.SupportsFloat | typing.SupportsIndex = 90.0,
-        prediction_step_s: typing.SupportsFloat | typing.SupportsIndex = 0.002,
-        error_weight: typing.SupportsFloat | typing.SupportsIndex = 1.0,
-        speed_weight: typing.SupportsFloat | typing.SupportsIndex = 0.0,
-        duty_change_weight: typing.SupportsFloat | typing.SupportsIndex = 4.0,
-        lower: typing.SupportsFloat | typing.SupportsIndex = -1.0,
-        upper: typing.SupportsFloat | typing.SupportsIndex = 1.0,
-        duty_rate_per_s: typing.SupportsFloat | typing.SupportsIndex = 10000.0,
-        lowest_deg: typing.SupportsFloat | typing.SupportsIndex = -1000.0,
-        highest_deg: typing.SupportsFloat | typing.SupportsIndex = 1000.0,
-        angle_limit_weight: typing.SupportsFloat | typing.SupportsIndex = 20.0,
-        observer_angle_per_s: typing.SupportsFloat | typing.SupportsIndex = 430.0,
-        observer_speed_per_s2: typing.SupportsFloat | typing.SupportsIndex = 28000.0,
-        noise_deg: typing.SupportsFloat | typing.SupportsIndex = 0.03,
-        learning_rate_per_s: typing.SupportsFloat | typing.SupportsIndex = 150.0,
-        gain_weight: typing.SupportsFloat | typing.SupportsIndex = 36.0,
-        damping_weight: typing.SupportsFloat | typing.SupportsIndex = 36.0,
-        least_gain_factor: typing.SupportsFloat | typing.SupportsIndex = 0.625,
-        largest_gain_factor: typing.SupportsFloat | typing.SupportsIndex = 1.6,
-        bias_rate_per_deg_s: typing.SupportsFloat | typing.SupportsIndex = 4.0,
-        trim_rate_per_deg_s: typing.SupportsFloat | typing.SupportsIndex = 0.3,
-        reference_lag_s: typing.SupportsFloat | typing.SupportsIndex = 0.0045,
-        reference_jump_deg_per_s: typing.SupportsFloat | typing.SupportsIndex = 400.0,
-        prediction: str = "nonlinear",
-        switching: str = "predicted",
-        delay_samples: typing.SupportsInt | typing.SupportsIndex = 1,
-        move_steps: typing.Annotated[
-            collections.abc.Sequence[typing.SupportsInt | typing.SupportsIndex], "FixedSize(3)"
-        ] = [3, 5, 12],
-        gauss_newton_steps: typing.SupportsInt | typing.SupportsIndex = 1,
-        friction_learning: bool = True,
-    ) -> None: ...
-    def __repr__(self) -> str: ...
-    def __setstate__(self, arg0: tuple) -> None: ...
+    def __getstate__(self) -> tuple[int, dict, dict[str, list[float]]]:
+        ...
+    def __init__(self, *, sample_s: typing.SupportsFloat | typing.SupportsIndex = 0.001, gain_deg_per_s2: typing.SupportsFloat | typing.SupportsIndex = 83597.0, time_constant_s: typing.SupportsFloat | typing.SupportsIndex = 0.0197, electrical_s: typing.SupportsFloat | typing.SupportsIndex = 0.001, limp_home_deg: typing.SupportsFloat | typing.SupportsIndex = 8.0, ramp_deg: typing.SupportsFloat | typing.SupportsIndex = 0.5, preload_above: typing.SupportsFloat | typing.SupportsIndex = 0.1292, spring_above_per_deg: typing.SupportsFloat | typing.SupportsIndex = 0.000496, preload_below: typing.SupportsFloat | typing.SupportsIndex = 0.1292, spring_below_per_deg: typing.SupportsFloat | typing.SupportsIndex = 0.000496, friction: typing.SupportsFloat | typing.SupportsIndex = 0.0927, closed_deg: typing.SupportsFloat | typing.SupportsIndex = 0.0, open_deg: typing.SupportsFloat | typing.SupportsIndex = 90.0, prediction_step_s: typing.SupportsFloat | typing.SupportsIndex = 0.002, error_weight: typing.SupportsFloat | typing.SupportsIndex = 1.0, speed_weight: typing.SupportsFloat | typing.SupportsIndex = 0.0, duty_change_weight: typing.SupportsFloat | typing.SupportsIndex = 4.0, lower: typing.SupportsFloat | typing.SupportsIndex = -1.0, upper: typing.SupportsFloat | typing.SupportsIndex = 1.0, duty_rate_per_s: typing.SupportsFloat | typing.SupportsIndex = 10000.0, lowest_deg: typing.SupportsFloat | typing.SupportsIndex = -1000.0, highest_deg: typing.SupportsFloat | typing.SupportsIndex = 1000.0, angle_limit_weight: typing.SupportsFloat | typing.SupportsIndex = 20.0, observer_angle_per_s: typing.SupportsFloat | typing.SupportsIndex = 430.0, observer_speed_per_s2: typing.SupportsFloat | typing.SupportsIndex = 28000.0, noise_deg: typing.SupportsFloat | typing.SupportsIndex = 0.03, learning_rate_per_s: typing.SupportsFloat | typing.SupportsIndex = 150.0, gain_weight: typing.SupportsFloat | typing.SupportsIndex = 36.0, damping_weight: typing.SupportsFloat | typing.SupportsIndex = 36.0, least_gain_factor: typing.SupportsFloat | typing.SupportsIndex = 0.625, largest_gain_factor: typing.SupportsFloat | typing.SupportsIndex = 1.6, bias_rate_per_deg_s: typing.SupportsFloat | typing.SupportsIndex = 4.0, trim_rate_per_deg_s: typing.SupportsFloat | typing.SupportsIndex = 0.3, reference_lag_s: typing.SupportsFloat | typing.SupportsIndex = 0.0045, reference_jump_deg_per_s: typing.SupportsFloat | typing.SupportsIndex = 400.0, prediction: str = 'nonlinear', switching: str = 'predicted', delay_samples: typing.SupportsInt | typing.SupportsIndex = 1, move_steps: typing.Annotated[collections.abc.Sequence[typing.SupportsInt | typing.SupportsIndex], "FixedSize(3)"] = [3, 5, 12], gauss_newton_steps: typing.SupportsInt | typing.SupportsIndex = 1, friction_learning: bool = True) -> None:
+        ...
+    def __repr__(self) -> str:
+        ...
+    def __setstate__(self, arg0: tuple) -> None:
+        ...
     def prepare(self) -> None:
         """
         The part of the next sample that needs no measurement; `step` then does the rest.
@@ -468,34 +359,21 @@ class GuidedPredictive:
         As made, with what was learnt forgotten.
         """
     @typing.overload
-    def step(
-        self,
-        reference_deg: typing.SupportsFloat | typing.SupportsIndex,
-        measurement_deg: typing.SupportsFloat | typing.SupportsIndex,
-    ) -> float:
+    def step(self, reference_deg: typing.SupportsFloat | typing.SupportsIndex, measurement_deg: typing.SupportsFloat | typing.SupportsIndex) -> float:
         """
         Duty [-] of this sample for a reference and a measured angle [deg].
-
+        
         NaN repeats the last value; before the first ones the duty is 0.
         """
     @typing.overload
-    def step(
-        self,
-        reference_deg: typing.SupportsFloat | typing.SupportsIndex,
-        measurement_deg: typing.SupportsFloat | typing.SupportsIndex,
-        preview_deg: typing.Annotated[numpy.typing.ArrayLike, numpy.float64],
-    ) -> float:
+    def step(self, reference_deg: typing.SupportsFloat | typing.SupportsIndex, measurement_deg: typing.SupportsFloat | typing.SupportsIndex, preview_deg: typing.Annotated[numpy.typing.ArrayLike, numpy.float64]) -> float:
         """
         The same with the references of the next samples [deg]; a short preview goes on at its last value.
         """
-    def take_over(
-        self,
-        measurement_deg: typing.SupportsFloat | typing.SupportsIndex,
-        duty: typing.SupportsFloat | typing.SupportsIndex,
-    ) -> None:
+    def take_over(self, measurement_deg: typing.SupportsFloat | typing.SupportsIndex, duty: typing.SupportsFloat | typing.SupportsIndex) -> None:
         """
         Start at rest from a duty, what was learnt kept.
-
+        
         Ignored if a number is not finite.
         """
     @property
@@ -519,7 +397,8 @@ class GuidedPredictive:
         Friction levels [-], factors of gain and damping [-] as learnt; setting some or all of them starts from them.
         """
     @learnt.setter
-    def learnt(self, arg1: collections.abc.Mapping[str, typing.SupportsFloat | typing.SupportsIndex]) -> None: ...
+    def learnt(self, arg1: collections.abc.Mapping[str, typing.SupportsFloat | typing.SupportsIndex]) -> None:
+        ...
     @property
     def settings(self) -> dict:
         """
@@ -531,19 +410,17 @@ class GuidedPredictive:
         What a run needs to go on bit for bit; a state that the settings do not allow is refused and changes nothing.
         """
     @state.setter
-    def state(
-        self, arg1: collections.abc.Mapping[str, collections.abc.Sequence[typing.SupportsFloat | typing.SupportsIndex]]
-    ) -> None: ...
-
+    def state(self, arg1: collections.abc.Mapping[str, collections.abc.Sequence[typing.SupportsFloat | typing.SupportsIndex]]) -> None:
+        ...
 class ThrottleSupervisor:
     """
     Supervisor of a throttle controller: bad input, faults, and the safe state.
-
+    
     Sees every sample before and after the controller. It bridges short gaps (mode ``holding``), limits the reference
     (``limited``), and opens the bridge so that the springs bring the plate to limp-home (``limp_home``), within 50 ms of what
     it can see. The last two stay until `acknowledge` finds the cause gone. Keyword-only; the defaults fit the throttle
     ``P1``. ``ThrottleSupervisor.fields()`` lists bounds and defaults. Not a certified safety function.
-
+    
     Parameters
     ----------
     sample_s : float
@@ -580,29 +457,29 @@ class ThrottleSupervisor:
         The plate is at limp-home so near to it [deg], and must be after that time with the bridge open [s].
     healthy_s : float
         Time without any reason before an acknowledgement counts [s].
-
+    
     Raises
     ------
     mgdd.errors.ParameterError
         A setting outside its domain, naming field, value and bound.
-
+    
     See Also
     --------
     SupervisedController : a controller and its supervisor as one object.
     mgdd.loop.ThrottleFault : faults to try it on.
-
+    
     Notes
     -----
     Reasons: ``missing_reference``, ``reference_range``, ``missing_sample``, ``stale_sample``, ``sensor_range``,
     ``sensor_disagreement``, ``invalid_duty``, ``supply_low``, ``supply_lost``, ``jammed``, ``spring_lost``, ``tracking``
     and ``overload``; ``none`` while nothing was wrong since the last acknowledgement.
-
+    
     References
     ----------
     Bosch Motorsport, manual of the MS 6 engine control (sum and range of the sensors).
     Ohnishi et al. (1996), Motion control for advanced mechatronics (disturbance observer).
     Page (1954), Continuous inspection schemes.
-
+    
     Examples
     --------
     >>> from mgdd.control import ThrottleSupervisor
@@ -617,74 +494,28 @@ class ThrottleSupervisor:
         """
         Every setting by name: unit, bounds or choices, meaning, default.
         """
-    def __getstate__(self) -> tuple[int, dict, dict[str, list[float]]]: ...
-    def __init__(
-        self,
-        *,
-        sample_s: typing.SupportsFloat | typing.SupportsIndex = 0.001,
-        closed_deg: typing.SupportsFloat | typing.SupportsIndex = 0.0,
-        open_deg: typing.SupportsFloat | typing.SupportsIndex = 90.0,
-        limited_open_deg: typing.SupportsFloat | typing.SupportsIndex = 40.0,
-        late_s: typing.SupportsFloat | typing.SupportsIndex = 0.003,
-        silence_s: typing.SupportsFloat | typing.SupportsIndex = 0.02,
-        range_margin_deg: typing.SupportsFloat | typing.SupportsIndex = 6.75,
-        disagreement_deg: typing.SupportsFloat | typing.SupportsIndex = 4.5,
-        sensor_s: typing.SupportsFloat | typing.SupportsIndex = 0.02,
-        nominal_supply_v: typing.SupportsFloat | typing.SupportsIndex = 12.0,
-        supply_low_v: typing.SupportsFloat | typing.SupportsIndex = 9.0,
-        supply_lost_v: typing.SupportsFloat | typing.SupportsIndex = 6.0,
-        supply_s: typing.SupportsFloat | typing.SupportsIndex = 0.02,
-        limp_home_deg: typing.SupportsFloat | typing.SupportsIndex = 8.0,
-        ramp_deg: typing.SupportsFloat | typing.SupportsIndex = 0.5,
-        preload_above: typing.SupportsFloat | typing.SupportsIndex = 0.1292,
-        spring_above_per_deg: typing.SupportsFloat | typing.SupportsIndex = 0.000496,
-        preload_below: typing.SupportsFloat | typing.SupportsIndex = 0.1292,
-        spring_below_per_deg: typing.SupportsFloat | typing.SupportsIndex = 0.000496,
-        friction: typing.SupportsFloat | typing.SupportsIndex = 0.098,
-        gain_deg_per_s2: typing.SupportsFloat | typing.SupportsIndex = 83597.0,
-        time_constant_s: typing.SupportsFloat | typing.SupportsIndex = 0.0197,
-        uncertainty: typing.SupportsFloat | typing.SupportsIndex = 0.3,
-        load: typing.SupportsFloat | typing.SupportsIndex = 0.04,
-        jam_error_deg: typing.SupportsFloat | typing.SupportsIndex = 2.0,
-        jam_move_deg: typing.SupportsFloat | typing.SupportsIndex = 0.5,
-        jam_s: typing.SupportsFloat | typing.SupportsIndex = 0.04,
-        balance_lag_s: typing.SupportsFloat | typing.SupportsIndex = 0.006,
-        spring_band_deg: typing.SupportsFloat | typing.SupportsIndex = 3.0,
-        spring_evidence_s: typing.SupportsFloat | typing.SupportsIndex = 0.0004,
-        tracking_error_deg: typing.SupportsFloat | typing.SupportsIndex = 8.0,
-        tracking_s: typing.SupportsFloat | typing.SupportsIndex = 0.5,
-        overload_duty: typing.SupportsFloat | typing.SupportsIndex = 0.9,
-        overload_s: typing.SupportsFloat | typing.SupportsIndex = 1.0,
-        limp_home_band_deg: typing.SupportsFloat | typing.SupportsIndex = 1.0,
-        return_s: typing.SupportsFloat | typing.SupportsIndex = 0.4,
-        healthy_s: typing.SupportsFloat | typing.SupportsIndex = 0.05,
-    ) -> None: ...
-    def __repr__(self) -> str: ...
-    def __setstate__(self, arg0: tuple) -> None: ...
+    def __getstate__(self) -> tuple[int, dict, dict[str, list[float]]]:
+        ...
+    def __init__(self, *, sample_s: typing.SupportsFloat | typing.SupportsIndex = 0.001, closed_deg: typing.SupportsFloat | typing.SupportsIndex = 0.0, open_deg: typing.SupportsFloat | typing.SupportsIndex = 90.0, limited_open_deg: typing.SupportsFloat | typing.SupportsIndex = 40.0, late_s: typing.SupportsFloat | typing.SupportsIndex = 0.003, silence_s: typing.SupportsFloat | typing.SupportsIndex = 0.02, range_margin_deg: typing.SupportsFloat | typing.SupportsIndex = 6.75, disagreement_deg: typing.SupportsFloat | typing.SupportsIndex = 4.5, sensor_s: typing.SupportsFloat | typing.SupportsIndex = 0.02, nominal_supply_v: typing.SupportsFloat | typing.SupportsIndex = 12.0, supply_low_v: typing.SupportsFloat | typing.SupportsIndex = 9.0, supply_lost_v: typing.SupportsFloat | typing.SupportsIndex = 6.0, supply_s: typing.SupportsFloat | typing.SupportsIndex = 0.02, limp_home_deg: typing.SupportsFloat | typing.SupportsIndex = 8.0, ramp_deg: typing.SupportsFloat | typing.SupportsIndex = 0.5, preload_above: typing.SupportsFloat | typing.SupportsIndex = 0.1292, spring_above_per_deg: typing.SupportsFloat | typing.SupportsIndex = 0.000496, preload_below: typing.SupportsFloat | typing.SupportsIndex = 0.1292, spring_below_per_deg: typing.SupportsFloat | typing.SupportsIndex = 0.000496, friction: typing.SupportsFloat | typing.SupportsIndex = 0.098, gain_deg_per_s2: typing.SupportsFloat | typing.SupportsIndex = 83597.0, time_constant_s: typing.SupportsFloat | typing.SupportsIndex = 0.0197, uncertainty: typing.SupportsFloat | typing.SupportsIndex = 0.3, load: typing.SupportsFloat | typing.SupportsIndex = 0.04, jam_error_deg: typing.SupportsFloat | typing.SupportsIndex = 2.0, jam_move_deg: typing.SupportsFloat | typing.SupportsIndex = 0.5, jam_s: typing.SupportsFloat | typing.SupportsIndex = 0.04, balance_lag_s: typing.SupportsFloat | typing.SupportsIndex = 0.006, spring_band_deg: typing.SupportsFloat | typing.SupportsIndex = 3.0, spring_evidence_s: typing.SupportsFloat | typing.SupportsIndex = 0.0004, tracking_error_deg: typing.SupportsFloat | typing.SupportsIndex = 8.0, tracking_s: typing.SupportsFloat | typing.SupportsIndex = 0.5, overload_duty: typing.SupportsFloat | typing.SupportsIndex = 0.9, overload_s: typing.SupportsFloat | typing.SupportsIndex = 1.0, limp_home_band_deg: typing.SupportsFloat | typing.SupportsIndex = 1.0, return_s: typing.SupportsFloat | typing.SupportsIndex = 0.4, healthy_s: typing.SupportsFloat | typing.SupportsIndex = 0.05) -> None:
+        ...
+    def __repr__(self) -> str:
+        ...
+    def __setstate__(self, arg0: tuple) -> None:
+        ...
     def acknowledge(self) -> str:
         """
         Back to normal where the cause is gone: nothing wrong for `healthy_s`, and an open bridge has brought the plate to limp-home.
-
+        
         Returns the reason that stands, ``'none'`` where it was accepted.
         """
     def decide(self, duty: typing.SupportsFloat | typing.SupportsIndex) -> tuple[float, bool]:
         """
         Second half of a sample: duty [-] for the bridge and whether it is open, for the duty that the controller asks for.
         """
-    def observe(
-        self,
-        reference_deg: typing.SupportsFloat | typing.SupportsIndex,
-        angles_deg: typing.Annotated[
-            collections.abc.Sequence[typing.SupportsFloat | typing.SupportsIndex], "FixedSize(2)"
-        ],
-        *,
-        age_s: typing.SupportsFloat | typing.SupportsIndex = 0.0,
-        supply_v: typing.SupportsFloat | typing.SupportsIndex | None = None,
-        sensor_fault: bool = False,
-    ) -> tuple[float, float]:
+    def observe(self, reference_deg: typing.SupportsFloat | typing.SupportsIndex, angles_deg: typing.Annotated[collections.abc.Sequence[typing.SupportsFloat | typing.SupportsIndex], "FixedSize(2)"], *, age_s: typing.SupportsFloat | typing.SupportsIndex = 0.0, supply_v: typing.SupportsFloat | typing.SupportsIndex | None = None, sensor_fault: bool = False) -> tuple[float, float]:
         """
         First half of a sample, before the controller.
-
+        
         Parameters
         ----------
         reference_deg : float
@@ -697,7 +528,7 @@ class ThrottleSupervisor:
             Supply of the bridge [V]; unknown if left out.
         sensor_fault : bool
             From a check of the sensors elsewhere.
-
+        
         Returns
         -------
         tuple of float
@@ -748,6 +579,5 @@ class ThrottleSupervisor:
         What a run needs to go on bit for bit; a state that the settings do not allow is refused and changes nothing.
         """
     @state.setter
-    def state(
-        self, arg1: collections.abc.Mapping[str, collections.abc.Sequence[typing.SupportsFloat | typing.SupportsIndex]]
-    ) -> None: ...
+    def state(self, arg1: collections.abc.Mapping[str, collections.abc.Sequence[typing.SupportsFloat | typing.SupportsIndex]]) -> None:
+        ...

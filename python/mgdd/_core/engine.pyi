@@ -1,61 +1,24 @@
 """
 Cycle model of one cylinder, emissions, performance, measured pressure.
 """
-
 from __future__ import annotations
 import collections.abc
 import numpy
 import numpy.typing
 import typing
-
-__all__: list[str] = [
-    "Cylinder",
-    "NoxFit",
-    "NoxModel",
-    "NoxProxy",
-    "OperatingPoint",
-    "Performance",
-    "PerformanceTerm",
-    "SoftSensor",
-    "TraceOptions",
-    "analyze",
-    "analyze_cycles",
-    "burn_duration_cad",
-    "burned_fraction",
-    "check_trace",
-    "convergence",
-    "differentiable_inputs",
-    "fit_nox_proxy",
-    "hardenberg_hase_delay_cad",
-    "hohenberg_coefficient",
-    "indicator_units",
-    "input_unit",
-    "scan",
-    "sensitivities",
-    "simulate",
-    "start_of_combustion",
-    "start_of_injection",
-    "timing_window_cad",
-    "volume_l",
-    "wall_area_m2",
-    "watson_delay_ms",
-    "wolfer_delay_ms",
-    "woschni_c1_bar_m",
-    "woschni_coefficient",
-]
-
+__all__: list[str] = ['Cylinder', 'NoxFit', 'NoxModel', 'NoxProxy', 'OperatingPoint', 'Performance', 'PerformanceTerm', 'SoftSensor', 'TraceOptions', 'analyze', 'analyze_cycles', 'burn_duration_cad', 'burned_fraction', 'check_trace', 'convergence', 'differentiable_inputs', 'fit_nox_proxy', 'hardenberg_hase_delay_cad', 'hohenberg_coefficient', 'indicator_units', 'input_unit', 'scan', 'sensitivities', 'simulate', 'start_of_combustion', 'start_of_injection', 'timing_window_cad', 'volume_l', 'wall_area_m2', 'watson_delay_ms', 'wolfer_delay_ms', 'woschni_c1_bar_m', 'woschni_coefficient']
 class Cylinder:
     """
     Parameters of one cylinder: geometry, charge, gas, wall heat, burn law, ignition delay.
-
+    
     Keyword-only and immutable; units stand in the names. Defaults are the preset `puma_single`.
     `Cylinder.fields()` lists every field with unit, bounds, meaning and default.
-
+    
     Raises
     ------
     mgdd.errors.ParameterError
         A field outside its domain, naming field, value and bound.
-
+    
     Examples
     --------
     >>> from mgdd.engine import Cylinder
@@ -70,54 +33,18 @@ class Cylinder:
         """
         Every field by name: unit, bounds or choices, meaning, default.
         """
-    def __eq__(self, arg0: typing.Any) -> bool: ...
-    def __getstate__(self) -> tuple[int, dict]: ...
-    def __hash__(self) -> int: ...
-    def __init__(
-        self,
-        *,
-        bore_mm: typing.SupportsFloat | typing.SupportsIndex = 86.0,
-        stroke_mm: typing.SupportsFloat | typing.SupportsIndex = 86.0,
-        connecting_rod_mm: typing.SupportsFloat | typing.SupportsIndex = 155.0,
-        compression_ratio: typing.SupportsFloat | typing.SupportsIndex = 18.2,
-        ivc_cad: typing.SupportsFloat | typing.SupportsIndex = -140.0,
-        evo_cad: typing.SupportsFloat | typing.SupportsIndex = 130.0,
-        bowl_area_factor: typing.SupportsFloat | typing.SupportsIndex = 1.0,
-        ivc_pressure_rise_kpa: typing.SupportsFloat | typing.SupportsIndex = 0.0,
-        volumetric_efficiency: typing.SupportsFloat | typing.SupportsIndex = 0.9,
-        lower_heating_value_mj_per_kg: typing.SupportsFloat | typing.SupportsIndex = 42.8,
-        gamma: typing.SupportsFloat | typing.SupportsIndex = 1.37,
-        gamma_linear_300k: typing.SupportsFloat | typing.SupportsIndex = 1.38,
-        gamma_linear_slope_per_k: typing.SupportsFloat | typing.SupportsIndex = -8e-05,
-        gamma_polynomial_c0: typing.SupportsFloat | typing.SupportsIndex = 1.338,
-        gamma_polynomial_c1_per_k: typing.SupportsFloat | typing.SupportsIndex = -6e-05,
-        gamma_polynomial_c2_per_k2: typing.SupportsFloat | typing.SupportsIndex = 1e-08,
-        wall_heat_scale: typing.SupportsFloat | typing.SupportsIndex = 0.5,
-        woschni_c2: typing.SupportsFloat | typing.SupportsIndex = 2.28,
-        woschni_cp_m_per_sk: typing.SupportsFloat | typing.SupportsIndex = 0.00324,
-        wall_temperature_k: typing.SupportsFloat | typing.SupportsIndex = 450.0,
-        burn_duration_ref_cad: typing.SupportsFloat | typing.SupportsIndex = 30.0,
-        burn_fuel_ref_mg: typing.SupportsFloat | typing.SupportsIndex = 20.0,
-        burn_speed_ref_rpm: typing.SupportsFloat | typing.SupportsIndex = 1500.0,
-        burn_fuel_exponent: typing.SupportsFloat | typing.SupportsIndex = 0.6,
-        burn_speed_exponent: typing.SupportsFloat | typing.SupportsIndex = 0.3,
-        wiebe_a: typing.SupportsFloat | typing.SupportsIndex = 6.908,
-        wiebe_m: typing.SupportsFloat | typing.SupportsIndex = 1.5,
-        second_fraction: typing.SupportsFloat | typing.SupportsIndex = 0.6,
-        second_delay_cad: typing.SupportsFloat | typing.SupportsIndex = 3.0,
-        second_duration_cad: typing.SupportsFloat | typing.SupportsIndex = 50.0,
-        second_wiebe_m: typing.SupportsFloat | typing.SupportsIndex = 0.8,
-        cetane_number: typing.SupportsFloat | typing.SupportsIndex = 45.0,
-        ignition_c0_cad: typing.SupportsFloat | typing.SupportsIndex = 4.0,
-        ignition_c1: typing.SupportsFloat | typing.SupportsIndex = 0.0,
-        ignition_c2_per_cad: typing.SupportsFloat | typing.SupportsIndex = 0.0,
-        burn_shape: str = "triangle",
-        gamma_model: str = "constant",
-        wall_heat_model: str = "woschni",
-        ignition_model: str = "watson",
-    ) -> None: ...
-    def __repr__(self) -> str: ...
-    def __setstate__(self, arg0: tuple) -> None: ...
+    def __eq__(self, arg0: typing.Any) -> bool:
+        ...
+    def __getstate__(self) -> tuple[int, dict]:
+        ...
+    def __hash__(self) -> int:
+        ...
+    def __init__(self, *, bore_mm: typing.SupportsFloat | typing.SupportsIndex = 86.0, stroke_mm: typing.SupportsFloat | typing.SupportsIndex = 86.0, connecting_rod_mm: typing.SupportsFloat | typing.SupportsIndex = 155.0, compression_ratio: typing.SupportsFloat | typing.SupportsIndex = 18.2, ivc_cad: typing.SupportsFloat | typing.SupportsIndex = -140.0, evo_cad: typing.SupportsFloat | typing.SupportsIndex = 130.0, bowl_area_factor: typing.SupportsFloat | typing.SupportsIndex = 1.0, ivc_pressure_rise_kpa: typing.SupportsFloat | typing.SupportsIndex = 0.0, volumetric_efficiency: typing.SupportsFloat | typing.SupportsIndex = 0.9, lower_heating_value_mj_per_kg: typing.SupportsFloat | typing.SupportsIndex = 42.8, gamma: typing.SupportsFloat | typing.SupportsIndex = 1.37, gamma_linear_300k: typing.SupportsFloat | typing.SupportsIndex = 1.38, gamma_linear_slope_per_k: typing.SupportsFloat | typing.SupportsIndex = -8e-05, gamma_polynomial_c0: typing.SupportsFloat | typing.SupportsIndex = 1.338, gamma_polynomial_c1_per_k: typing.SupportsFloat | typing.SupportsIndex = -6e-05, gamma_polynomial_c2_per_k2: typing.SupportsFloat | typing.SupportsIndex = 1e-08, wall_heat_scale: typing.SupportsFloat | typing.SupportsIndex = 0.5, woschni_c2: typing.SupportsFloat | typing.SupportsIndex = 2.28, woschni_cp_m_per_sk: typing.SupportsFloat | typing.SupportsIndex = 0.00324, wall_temperature_k: typing.SupportsFloat | typing.SupportsIndex = 450.0, burn_duration_ref_cad: typing.SupportsFloat | typing.SupportsIndex = 30.0, burn_fuel_ref_mg: typing.SupportsFloat | typing.SupportsIndex = 20.0, burn_speed_ref_rpm: typing.SupportsFloat | typing.SupportsIndex = 1500.0, burn_fuel_exponent: typing.SupportsFloat | typing.SupportsIndex = 0.6, burn_speed_exponent: typing.SupportsFloat | typing.SupportsIndex = 0.3, wiebe_a: typing.SupportsFloat | typing.SupportsIndex = 6.908, wiebe_m: typing.SupportsFloat | typing.SupportsIndex = 1.5, second_fraction: typing.SupportsFloat | typing.SupportsIndex = 0.6, second_delay_cad: typing.SupportsFloat | typing.SupportsIndex = 3.0, second_duration_cad: typing.SupportsFloat | typing.SupportsIndex = 50.0, second_wiebe_m: typing.SupportsFloat | typing.SupportsIndex = 0.8, cetane_number: typing.SupportsFloat | typing.SupportsIndex = 45.0, ignition_c0_cad: typing.SupportsFloat | typing.SupportsIndex = 4.0, ignition_c1: typing.SupportsFloat | typing.SupportsIndex = 0.0, ignition_c2_per_cad: typing.SupportsFloat | typing.SupportsIndex = 0.0, burn_shape: str = 'triangle', gamma_model: str = 'constant', wall_heat_model: str = 'woschni', ignition_model: str = 'watson') -> None:
+        ...
+    def __repr__(self) -> str:
+        ...
+    def __setstate__(self, arg0: tuple) -> None:
+        ...
     def replace(self, **kwargs) -> Cylinder:
         """
         A validated copy with some fields changed; an unknown name is a ParameterError.
@@ -331,20 +258,19 @@ class Cylinder:
         """
         combustion term of the gas velocity [m/(s K)]
         """
-
 class OperatingPoint:
     """
     What changes from cycle to cycle: speed, fuel, intake state.
-
+    
     Keyword-only and immutable. `burn_duration_cad=None` is the cylinder's duration law. Without `trapped_mass_g` the mass
     is p V/(R T) at IVC where `ivc_temperature_k` is given, else a simulation takes the volumetric efficiency, and a
     measured trace p V/(R T) with the intake temperature + 40 K.
-
+    
     Raises
     ------
     mgdd.errors.ParameterError
         A field outside its domain, naming field, value and bound.
-
+    
     Examples
     --------
     >>> from mgdd.engine import OperatingPoint
@@ -356,22 +282,18 @@ class OperatingPoint:
         """
         Every field by name: unit, bounds or choices, meaning, default.
         """
-    def __eq__(self, arg0: typing.Any) -> bool: ...
-    def __getstate__(self) -> tuple[int, dict]: ...
-    def __hash__(self) -> int: ...
-    def __init__(
-        self,
-        *,
-        speed_rpm: typing.SupportsFloat | typing.SupportsIndex = 1500.0,
-        fuel_mg: typing.SupportsFloat | typing.SupportsIndex = 20.0,
-        intake_pressure_kpa: typing.SupportsFloat | typing.SupportsIndex = 150.0,
-        intake_temperature_k: typing.SupportsFloat | typing.SupportsIndex = 313.0,
-        burn_duration_cad: typing.SupportsFloat | typing.SupportsIndex | None = None,
-        trapped_mass_g: typing.SupportsFloat | typing.SupportsIndex | None = None,
-        ivc_temperature_k: typing.SupportsFloat | typing.SupportsIndex | None = None,
-    ) -> None: ...
-    def __repr__(self) -> str: ...
-    def __setstate__(self, arg0: tuple) -> None: ...
+    def __eq__(self, arg0: typing.Any) -> bool:
+        ...
+    def __getstate__(self) -> tuple[int, dict]:
+        ...
+    def __hash__(self) -> int:
+        ...
+    def __init__(self, *, speed_rpm: typing.SupportsFloat | typing.SupportsIndex = 1500.0, fuel_mg: typing.SupportsFloat | typing.SupportsIndex = 20.0, intake_pressure_kpa: typing.SupportsFloat | typing.SupportsIndex = 150.0, intake_temperature_k: typing.SupportsFloat | typing.SupportsIndex = 313.0, burn_duration_cad: typing.SupportsFloat | typing.SupportsIndex | None = None, trapped_mass_g: typing.SupportsFloat | typing.SupportsIndex | None = None, ivc_temperature_k: typing.SupportsFloat | typing.SupportsIndex | None = None) -> None:
+        ...
+    def __repr__(self) -> str:
+        ...
+    def __setstate__(self, arg0: tuple) -> None:
+        ...
     def replace(self, **kwargs) -> OperatingPoint:
         """
         A validated copy with some fields changed; an unknown name is a ParameterError.
@@ -415,14 +337,13 @@ class OperatingPoint:
         """
         trapped charge; none = from ivc_temperature_k or volumetric efficiency
         """
-
 class NoxProxy:
     """
     NOx proxy from the maximum bulk gas temperature: a correlation to be fitted.
-
+    
     Two maps with equal slope at the reference: affine-log, NOx0 exp(b/T0^2 (T - T0)), and Arrhenius,
     NOx0 exp(-b (1/T - 1/T0)). Valid at fixed intake oxygen only; the defaults are plausible, not of any engine.
-
+    
     Parameters
     ----------
     reference_temperature_k : float
@@ -431,30 +352,30 @@ class NoxProxy:
         NOx0, at T0 [ppm].
     activation_temperature_k : float
         b [K].
-
+    
     Raises
     ------
     mgdd.errors.ParameterError
         A constant that is not > 0.
-
+    
     Examples
     --------
     >>> from mgdd.engine import NoxProxy
     >>> float(NoxProxy().arrhenius_ppm(1900.0))
     1200.0
     """
-    def __eq__(self, arg0: typing.Any) -> bool: ...
-    def __getstate__(self) -> tuple[int, dict]: ...
-    def __hash__(self) -> int: ...
-    def __init__(
-        self,
-        *,
-        reference_temperature_k: typing.SupportsFloat | typing.SupportsIndex = 1900.0,
-        reference_nox_ppm: typing.SupportsFloat | typing.SupportsIndex = 1200.0,
-        activation_temperature_k: typing.SupportsFloat | typing.SupportsIndex = 16000.0,
-    ) -> None: ...
-    def __repr__(self) -> str: ...
-    def __setstate__(self, arg0: tuple) -> None: ...
+    def __eq__(self, arg0: typing.Any) -> bool:
+        ...
+    def __getstate__(self) -> tuple[int, dict]:
+        ...
+    def __hash__(self) -> int:
+        ...
+    def __init__(self, *, reference_temperature_k: typing.SupportsFloat | typing.SupportsIndex = 1900.0, reference_nox_ppm: typing.SupportsFloat | typing.SupportsIndex = 1200.0, activation_temperature_k: typing.SupportsFloat | typing.SupportsIndex = 16000.0) -> None:
+        ...
+    def __repr__(self) -> str:
+        ...
+    def __setstate__(self, arg0: tuple) -> None:
+        ...
     def affine_log_ppm(self, t_max_k: typing.Annotated[numpy.typing.ArrayLike, numpy.float64]) -> typing.Any:
         """
         NOx [ppm] by the affine-log map.
@@ -482,13 +403,12 @@ class NoxProxy:
         """
         T0 [K].
         """
-
 class NoxModel:
     """
     NOx of one cycle from its maximum bulk gas temperature and the intake oxygen.
-
+    
     NOx = map(T_max) (x_O2 / 0.209)^n: a `NoxProxy` with the map that is used.
-
+    
     Parameters
     ----------
     proxy : NoxProxy
@@ -499,31 +419,30 @@ class NoxModel:
         Oxygen in the intake by volume [-]; 0.209 is air without exhaust gas recirculation.
     o2_exponent : float
         n [-], 2 to 4, to be fitted.
-
+    
     Raises
     ------
     mgdd.errors.ParameterError
         An unknown map, or a value outside its domain.
-
+    
     Examples
     --------
     >>> from mgdd.engine import NoxModel
     >>> float(NoxModel(intake_o2_fraction=0.1045).ppm(1900.0))
     150.0
     """
-    def __eq__(self, arg0: typing.Any) -> bool: ...
-    def __getstate__(self) -> tuple[int, dict]: ...
-    def __hash__(self) -> int: ...
-    def __init__(
-        self,
-        *,
-        proxy: NoxProxy | None = None,
-        map: str = "affine_log",
-        intake_o2_fraction: typing.SupportsFloat | typing.SupportsIndex = 0.209,
-        o2_exponent: typing.SupportsFloat | typing.SupportsIndex = 3.0,
-    ) -> None: ...
-    def __repr__(self) -> str: ...
-    def __setstate__(self, arg0: tuple) -> None: ...
+    def __eq__(self, arg0: typing.Any) -> bool:
+        ...
+    def __getstate__(self) -> tuple[int, dict]:
+        ...
+    def __hash__(self) -> int:
+        ...
+    def __init__(self, *, proxy: NoxProxy | None = None, map: str = 'affine_log', intake_o2_fraction: typing.SupportsFloat | typing.SupportsIndex = 0.209, o2_exponent: typing.SupportsFloat | typing.SupportsIndex = 3.0) -> None:
+        ...
+    def __repr__(self) -> str:
+        ...
+    def __setstate__(self, arg0: tuple) -> None:
+        ...
     def ppm(self, t_max_k: typing.Annotated[numpy.typing.ArrayLike, numpy.float64]) -> typing.Any:
         """
         NOx [ppm].
@@ -552,26 +471,25 @@ class NoxModel:
         """
         Constants of the map.
         """
-
 class SoftSensor:
     """
     Soft NOx sensor: the value of each cycle at once, its level held to a slow analyser.
-
+    
     ``b += c (ln(analyser / delayed) - b)`` once per cycle, where ``delayed`` is the uncorrected soft value after the
     analyser's own delay and lag: b approaches the log-ratio of the two at the rate c, however late the analyser is.
-
+    
     Parameters
     ----------
     model : NoxModel
         NOx from the maximum bulk gas temperature.
     correction_gain : float
         c per cycle [-], in [0, 1]; 0 never corrects.
-
+    
     Raises
     ------
     mgdd.errors.ParameterError
         A value outside its domain.
-
+    
     Examples
     --------
     >>> from mgdd.engine import SoftSensor
@@ -580,30 +498,23 @@ class SoftSensor:
     >>> round(float(sensor.ppm(1900.0, ln_bias=bias)), 1)
     1258.6
     """
-    def __eq__(self, arg0: typing.Any) -> bool: ...
-    def __getstate__(self) -> tuple[int, dict]: ...
-    def __hash__(self) -> int: ...
-    def __init__(
-        self, *, model: NoxModel | None = None, correction_gain: typing.SupportsFloat | typing.SupportsIndex = 0.01
-    ) -> None: ...
-    def __repr__(self) -> str: ...
-    def __setstate__(self, arg0: tuple) -> None: ...
-    def next_bias(
-        self,
-        ln_bias: typing.SupportsFloat | typing.SupportsIndex,
-        *,
-        analyser_ppm: typing.SupportsFloat | typing.SupportsIndex,
-        delayed_soft_ppm: typing.SupportsFloat | typing.SupportsIndex,
-    ) -> float:
+    def __eq__(self, arg0: typing.Any) -> bool:
+        ...
+    def __getstate__(self) -> tuple[int, dict]:
+        ...
+    def __hash__(self) -> int:
+        ...
+    def __init__(self, *, model: NoxModel | None = None, correction_gain: typing.SupportsFloat | typing.SupportsIndex = 0.01) -> None:
+        ...
+    def __repr__(self) -> str:
+        ...
+    def __setstate__(self, arg0: tuple) -> None:
+        ...
+    def next_bias(self, ln_bias: typing.SupportsFloat | typing.SupportsIndex, *, analyser_ppm: typing.SupportsFloat | typing.SupportsIndex, delayed_soft_ppm: typing.SupportsFloat | typing.SupportsIndex) -> float:
         """
         The log-bias after one reading; values that are not positive leave it alone.
         """
-    def ppm(
-        self,
-        t_max_k: typing.Annotated[numpy.typing.ArrayLike, numpy.float64],
-        *,
-        ln_bias: typing.SupportsFloat | typing.SupportsIndex = 0.0,
-    ) -> typing.Any:
+    def ppm(self, t_max_k: typing.Annotated[numpy.typing.ArrayLike, numpy.float64], *, ln_bias: typing.SupportsFloat | typing.SupportsIndex = 0.0) -> typing.Any:
         """
         NOx [ppm] at the log-bias b.
         """
@@ -621,11 +532,10 @@ class SoftSensor:
         """
         NOx from T_max.
         """
-
 class NoxFit:
     """
     A NOx proxy fitted to a sweep, with its spread: what `fit_nox_proxy` returns.
-
+    
     Attributes
     ----------
     proxy : NoxProxy
@@ -640,7 +550,7 @@ class NoxFit:
         Standard error of NOx0 [ppm], delta method.
     activation_temperature_stderr_k : float
         Standard error of b [K].
-
+    
     Examples
     --------
     >>> from mgdd.engine import NoxProxy, fit_nox_proxy
@@ -648,7 +558,8 @@ class NoxFit:
     >>> fit_nox_proxy(t, NoxProxy().affine_log_ppm(t)).points
     5
     """
-    def __repr__(self) -> str: ...
+    def __repr__(self) -> str:
+        ...
     @property
     def activation_temperature_stderr_k(self) -> float:
         """
@@ -679,14 +590,13 @@ class NoxFit:
         """
         Standard deviation of ln NOx about the fit [-].
         """
-
 class PerformanceTerm:
     """
     One term of the performance J of a cycle.
-
+    
     Its value is ``weight * x / reference``; with a limit, ``weight * max(0, (x - above) / above) ** 2``. J is maximised,
     so a penalty has a negative weight.
-
+    
     Parameters
     ----------
     signal : str
@@ -698,31 +608,30 @@ class PerformanceTerm:
         > 0, in the unit of the signal; not used by a hinge.
     above : float, optional
         Limit > 0 of a hinge, in the unit of the signal.
-
+    
     Raises
     ------
     mgdd.errors.ParameterError
         An unknown signal or a value outside its domain.
-
+    
     Examples
     --------
     >>> from mgdd.engine import PerformanceTerm
     >>> PerformanceTerm("dp_max_bar_per_cad", -2.0, above=10.0).value(15.0)
     -0.5
     """
-    def __eq__(self, arg0: typing.Any) -> bool: ...
-    def __getstate__(self) -> tuple[int, dict]: ...
-    def __hash__(self) -> int: ...
-    def __init__(
-        self,
-        signal: str,
-        weight: typing.SupportsFloat | typing.SupportsIndex = 1.0,
-        *,
-        reference: typing.SupportsFloat | typing.SupportsIndex = 1.0,
-        above: typing.SupportsFloat | typing.SupportsIndex | None = None,
-    ) -> None: ...
-    def __repr__(self) -> str: ...
-    def __setstate__(self, arg0: tuple) -> None: ...
+    def __eq__(self, arg0: typing.Any) -> bool:
+        ...
+    def __getstate__(self) -> tuple[int, dict]:
+        ...
+    def __hash__(self) -> int:
+        ...
+    def __init__(self, signal: str, weight: typing.SupportsFloat | typing.SupportsIndex = 1.0, *, reference: typing.SupportsFloat | typing.SupportsIndex = 1.0, above: typing.SupportsFloat | typing.SupportsIndex | None = None) -> None:
+        ...
+    def __repr__(self) -> str:
+        ...
+    def __setstate__(self, arg0: tuple) -> None:
+        ...
     def to_dict(self) -> dict:
         """
         Constructor keywords as a new dict.
@@ -751,25 +660,24 @@ class PerformanceTerm:
         """
         Unit of J per unit of x / reference.
         """
-
 class Performance:
     """
     The performance J of a cycle, to be maximised: a sum of one to eight terms.
-
+    
     Parameters
     ----------
     terms : sequence of PerformanceTerm, optional
         Efficiency in percent if left out.
-
+    
     Raises
     ------
     mgdd.errors.ParameterError
         No term, or more than eight.
-
+    
     References
     ----------
     Tan (2018), section 5.3.
-
+    
     Examples
     --------
     >>> from mgdd.engine import Performance
@@ -780,9 +688,7 @@ class Performance:
     50.0
     """
     @staticmethod
-    def efficiency_and_nox(
-        nox_weight_percent_per_ppm: typing.SupportsFloat | typing.SupportsIndex = 0.004,
-    ) -> Performance:
+    def efficiency_and_nox(nox_weight_percent_per_ppm: typing.SupportsFloat | typing.SupportsIndex = 0.004) -> Performance:
         """
         J = efficiency in percent - weight * NOx; the weight in %/ppm.
         """
@@ -791,13 +697,20 @@ class Performance:
         """
         J = gross indicated efficiency in percent.
         """
-    def __eq__(self, arg0: typing.Any) -> bool: ...
-    def __getstate__(self) -> tuple[int, dict]: ...
-    def __hash__(self) -> int: ...
-    def __init__(self, terms: collections.abc.Sequence[PerformanceTerm] | None = None) -> None: ...
-    def __len__(self) -> int: ...
-    def __repr__(self) -> str: ...
-    def __setstate__(self, arg0: tuple) -> None: ...
+    def __eq__(self, arg0: typing.Any) -> bool:
+        ...
+    def __getstate__(self) -> tuple[int, dict]:
+        ...
+    def __hash__(self) -> int:
+        ...
+    def __init__(self, terms: collections.abc.Sequence[PerformanceTerm] | None = None) -> None:
+        ...
+    def __len__(self) -> int:
+        ...
+    def __repr__(self) -> str:
+        ...
+    def __setstate__(self, arg0: tuple) -> None:
+        ...
     def components(self, signals: dict) -> numpy.typing.NDArray[numpy.float64]:
         """
         Value of each term, from a dict of signals by name.
@@ -815,261 +728,153 @@ class Performance:
         """
         The terms, in order.
         """
-
 class TraceOptions:
-    def __init__(
-        self,
-        *,
-        pegging: str = "none",
-        pegging_exponent: typing.SupportsFloat | typing.SupportsIndex = 1.35,
-        inlet_pressure_kpa: typing.SupportsFloat | typing.SupportsIndex = 0.0,
-        gamma_source: str = "constant",
-        gamma: typing.SupportsFloat | typing.SupportsIndex = 1.33,
-        gamma_compression: typing.SupportsFloat | typing.SupportsIndex = 1.37,
-        gamma_combustion: typing.SupportsFloat | typing.SupportsIndex = 1.3,
-        heat_from_cad: typing.SupportsFloat | typing.SupportsIndex | None = None,
-        heat_to_cad: typing.SupportsFloat | typing.SupportsIndex | None = None,
-        earliest_burn_cad: typing.SupportsFloat | typing.SupportsIndex | None = None,
-        burn_from_cad: typing.SupportsFloat | typing.SupportsIndex | None = None,
-        total_at_end: bool = False,
-        fractions_of_gross: bool = False,
-        smoothing: str = "automatic",
-        smoothing_width_cad: typing.SupportsFloat | typing.SupportsIndex = 4.0,
-        smoothing_cutoff_hz: typing.SupportsFloat | typing.SupportsIndex = 3000.0,
-        intake_pressure_kpa: typing.SupportsFloat | typing.SupportsIndex | None = None,
-        intake_factor: typing.SupportsFloat | typing.SupportsIndex = 1.5,
-        bmep_bar: typing.SupportsFloat | typing.SupportsIndex | None = None,
-    ) -> None: ...
+    def __init__(self, *, pegging: str = 'none', pegging_exponent: typing.SupportsFloat | typing.SupportsIndex = 1.35, inlet_pressure_kpa: typing.SupportsFloat | typing.SupportsIndex = 0.0, gamma_source: str = 'constant', gamma: typing.SupportsFloat | typing.SupportsIndex = 1.33, gamma_compression: typing.SupportsFloat | typing.SupportsIndex = 1.37, gamma_combustion: typing.SupportsFloat | typing.SupportsIndex = 1.3, heat_from_cad: typing.SupportsFloat | typing.SupportsIndex | None = None, heat_to_cad: typing.SupportsFloat | typing.SupportsIndex | None = None, earliest_burn_cad: typing.SupportsFloat | typing.SupportsIndex | None = None, burn_from_cad: typing.SupportsFloat | typing.SupportsIndex | None = None, total_at_end: bool = False, fractions_of_gross: bool = False, smoothing: str = 'automatic', smoothing_width_cad: typing.SupportsFloat | typing.SupportsIndex = 4.0, smoothing_cutoff_hz: typing.SupportsFloat | typing.SupportsIndex = 3000.0, intake_pressure_kpa: typing.SupportsFloat | typing.SupportsIndex | None = None, intake_factor: typing.SupportsFloat | typing.SupportsIndex = 1.5, bmep_bar: typing.SupportsFloat | typing.SupportsIndex | None = None) -> None:
+        ...
     @property
-    def bmep_bar(self) -> float | None: ...
+    def bmep_bar(self) -> float | None:
+        ...
     @property
-    def burn_from_cad(self) -> float | None: ...
+    def burn_from_cad(self) -> float | None:
+        ...
     @property
-    def earliest_burn_cad(self) -> float | None: ...
+    def earliest_burn_cad(self) -> float | None:
+        ...
     @property
-    def fractions_of_gross(self) -> bool: ...
+    def fractions_of_gross(self) -> bool:
+        ...
     @property
-    def gamma(self) -> float: ...
+    def gamma(self) -> float:
+        ...
     @property
-    def gamma_combustion(self) -> float: ...
+    def gamma_combustion(self) -> float:
+        ...
     @property
-    def gamma_compression(self) -> float: ...
+    def gamma_compression(self) -> float:
+        ...
     @property
-    def gamma_source(self) -> str: ...
+    def gamma_source(self) -> str:
+        ...
     @property
-    def heat_from_cad(self) -> float | None: ...
+    def heat_from_cad(self) -> float | None:
+        ...
     @property
-    def heat_to_cad(self) -> float | None: ...
+    def heat_to_cad(self) -> float | None:
+        ...
     @property
-    def inlet_pressure_kpa(self) -> float: ...
+    def inlet_pressure_kpa(self) -> float:
+        ...
     @property
-    def intake_factor(self) -> float: ...
+    def intake_factor(self) -> float:
+        ...
     @property
-    def intake_pressure_kpa(self) -> float | None: ...
+    def intake_pressure_kpa(self) -> float | None:
+        ...
     @property
-    def pegging(self) -> str: ...
+    def pegging(self) -> str:
+        ...
     @property
-    def pegging_exponent(self) -> float: ...
+    def pegging_exponent(self) -> float:
+        ...
     @property
-    def smoothing(self) -> str: ...
+    def smoothing(self) -> str:
+        ...
     @property
-    def smoothing_cutoff_hz(self) -> float: ...
+    def smoothing_cutoff_hz(self) -> float:
+        ...
     @property
-    def smoothing_width_cad(self) -> float: ...
+    def smoothing_width_cad(self) -> float:
+        ...
     @property
-    def total_at_end(self) -> bool: ...
-
-def analyze(
-    crank_angle_cad: typing.Annotated[numpy.typing.ArrayLike, numpy.float64],
-    pressure_bar: typing.Annotated[numpy.typing.ArrayLike, numpy.float64],
-    cylinder: Cylinder,
-    point: OperatingPoint,
-    options: TraceOptions,
-) -> dict:
+    def total_at_end(self) -> bool:
+        ...
+def analyze(crank_angle_cad: typing.Annotated[numpy.typing.ArrayLike, numpy.float64], pressure_bar: typing.Annotated[numpy.typing.ArrayLike, numpy.float64], cylinder: Cylinder, point: OperatingPoint, options: TraceOptions) -> dict:
     """
     Pegging, heat release, burn angles, work.
     """
-
-def analyze_cycles(
-    crank_angle_cad: typing.Annotated[numpy.typing.ArrayLike, numpy.float64],
-    pressure_bar: typing.Annotated[numpy.typing.ArrayLike, numpy.float64],
-    cylinder: Cylinder,
-    point: OperatingPoint,
-    options: TraceOptions,
-    threads: typing.SupportsInt | typing.SupportsIndex = 0,
-) -> dict:
+def analyze_cycles(crank_angle_cad: typing.Annotated[numpy.typing.ArrayLike, numpy.float64], pressure_bar: typing.Annotated[numpy.typing.ArrayLike, numpy.float64], cylinder: Cylinder, point: OperatingPoint, options: TraceOptions, threads: typing.SupportsInt | typing.SupportsIndex = 0) -> dict:
     """
     The same of every row; warnings counted together.
     """
-
 def burn_duration_cad(cylinder: Cylinder, point: OperatingPoint) -> float:
     """
     Burn duration in force [°CA].
     """
-
-def burned_fraction(
-    cylinder: Cylinder,
-    crank_angle_cad: typing.Annotated[numpy.typing.ArrayLike, numpy.float64],
-    soc_cad: typing.SupportsFloat | typing.SupportsIndex,
-    burn_duration_cad: typing.SupportsFloat | typing.SupportsIndex,
-) -> typing.Any:
+def burned_fraction(cylinder: Cylinder, crank_angle_cad: typing.Annotated[numpy.typing.ArrayLike, numpy.float64], soc_cad: typing.SupportsFloat | typing.SupportsIndex, burn_duration_cad: typing.SupportsFloat | typing.SupportsIndex) -> typing.Any:
     """
     Burned fraction [-].
     """
-
-def check_trace(
-    crank_angle_cad: typing.Annotated[numpy.typing.ArrayLike, numpy.float64],
-    pressure_bar: typing.Annotated[numpy.typing.ArrayLike, numpy.float64],
-) -> None:
+def check_trace(crank_angle_cad: typing.Annotated[numpy.typing.ArrayLike, numpy.float64], pressure_bar: typing.Annotated[numpy.typing.ArrayLike, numpy.float64]) -> None:
     """
     DataError unless the trace can be analysed.
     """
-
-def convergence(
-    cylinder: Cylinder,
-    point: OperatingPoint,
-    soc_cad: typing.SupportsFloat | typing.SupportsIndex,
-    step_cad: typing.SupportsFloat | typing.SupportsIndex,
-    integrator: str,
-) -> dict:
+def convergence(cylinder: Cylinder, point: OperatingPoint, soc_cad: typing.SupportsFloat | typing.SupportsIndex, step_cad: typing.SupportsFloat | typing.SupportsIndex, integrator: str) -> dict:
     """
     Step-size error per indicator: (value, extrapolated, error, order, unit).
     """
-
 def differentiable_inputs() -> list[str]:
     """
     Names that `sensitivities` takes.
     """
-
-def fit_nox_proxy(
-    t_max_k: typing.Annotated[numpy.typing.ArrayLike, numpy.float64],
-    nox_ppm: typing.Annotated[numpy.typing.ArrayLike, numpy.float64],
-    map: str,
-    reference_temperature_k: typing.SupportsFloat | typing.SupportsIndex,
-) -> NoxFit:
+def fit_nox_proxy(t_max_k: typing.Annotated[numpy.typing.ArrayLike, numpy.float64], nox_ppm: typing.Annotated[numpy.typing.ArrayLike, numpy.float64], map: str, reference_temperature_k: typing.SupportsFloat | typing.SupportsIndex) -> NoxFit:
     """
     Least squares on ln NOx; use mgdd.engine.fit_nox_proxy.
     """
-
-def hardenberg_hase_delay_cad(
-    pressure_bar: typing.Annotated[numpy.typing.ArrayLike, numpy.float64],
-    temperature_k: typing.Annotated[numpy.typing.ArrayLike, numpy.float64],
-    cetane_number: typing.Annotated[numpy.typing.ArrayLike, numpy.float64],
-    piston_speed_m_per_s: typing.Annotated[numpy.typing.ArrayLike, numpy.float64],
-) -> typing.Any:
+def hardenberg_hase_delay_cad(pressure_bar: typing.Annotated[numpy.typing.ArrayLike, numpy.float64], temperature_k: typing.Annotated[numpy.typing.ArrayLike, numpy.float64], cetane_number: typing.Annotated[numpy.typing.ArrayLike, numpy.float64], piston_speed_m_per_s: typing.Annotated[numpy.typing.ArrayLike, numpy.float64]) -> typing.Any:
     """
     Ignition delay [°CA].
     """
-
-def hohenberg_coefficient(
-    c1_bar_m3: typing.Annotated[numpy.typing.ArrayLike, numpy.float64],
-    volume_m3: typing.Annotated[numpy.typing.ArrayLike, numpy.float64],
-    pressure_bar: typing.Annotated[numpy.typing.ArrayLike, numpy.float64],
-    temperature_k: typing.Annotated[numpy.typing.ArrayLike, numpy.float64],
-    piston_speed_m_per_s: typing.Annotated[numpy.typing.ArrayLike, numpy.float64],
-) -> typing.Any:
+def hohenberg_coefficient(c1_bar_m3: typing.Annotated[numpy.typing.ArrayLike, numpy.float64], volume_m3: typing.Annotated[numpy.typing.ArrayLike, numpy.float64], pressure_bar: typing.Annotated[numpy.typing.ArrayLike, numpy.float64], temperature_k: typing.Annotated[numpy.typing.ArrayLike, numpy.float64], piston_speed_m_per_s: typing.Annotated[numpy.typing.ArrayLike, numpy.float64]) -> typing.Any:
     """
     Film coefficient [W/(m2 K)].
     """
-
 def indicator_units() -> dict:
     """
     Unit of every indicator.
     """
-
 def input_unit(name: str) -> str:
     """
     Unit of a differentiable input.
     """
-
-def scan(
-    cylinder: Cylinder,
-    point: OperatingPoint,
-    soc_cad: typing.Annotated[numpy.typing.ArrayLike, numpy.float64],
-    step_cad: typing.SupportsFloat | typing.SupportsIndex,
-    integrator: str,
-) -> dict:
+def scan(cylinder: Cylinder, point: OperatingPoint, soc_cad: typing.Annotated[numpy.typing.ArrayLike, numpy.float64], step_cad: typing.SupportsFloat | typing.SupportsIndex, integrator: str) -> dict:
     """
     Indicators over a column of timings; releases the GIL.
     """
-
-def sensitivities(
-    cylinder: Cylinder,
-    point: OperatingPoint,
-    soc_cad: typing.SupportsFloat | typing.SupportsIndex,
-    names: collections.abc.Sequence[str],
-    step_cad: typing.SupportsFloat | typing.SupportsIndex,
-    integrator: str,
-) -> dict:
+def sensitivities(cylinder: Cylinder, point: OperatingPoint, soc_cad: typing.SupportsFloat | typing.SupportsIndex, names: collections.abc.Sequence[str], step_cad: typing.SupportsFloat | typing.SupportsIndex, integrator: str) -> dict:
     """
     Exact derivatives of indicators and pressure.
     """
-
-def simulate(
-    cylinder: Cylinder,
-    point: OperatingPoint,
-    soc_cad: typing.SupportsFloat | typing.SupportsIndex,
-    step_cad: typing.SupportsFloat | typing.SupportsIndex,
-    integrator: str,
-) -> dict:
+def simulate(cylinder: Cylinder, point: OperatingPoint, soc_cad: typing.SupportsFloat | typing.SupportsIndex, step_cad: typing.SupportsFloat | typing.SupportsIndex, integrator: str) -> dict:
     """
     One cycle: traces and indicators.
     """
-
-def start_of_combustion(
-    cylinder: Cylinder, point: OperatingPoint, soi_cad: typing.SupportsFloat | typing.SupportsIndex
-) -> dict:
+def start_of_combustion(cylinder: Cylinder, point: OperatingPoint, soi_cad: typing.SupportsFloat | typing.SupportsIndex) -> dict:
     """
     SOI to SOC.
     """
-
-def start_of_injection(
-    cylinder: Cylinder, point: OperatingPoint, soc_cad: typing.SupportsFloat | typing.SupportsIndex
-) -> dict:
+def start_of_injection(cylinder: Cylinder, point: OperatingPoint, soc_cad: typing.SupportsFloat | typing.SupportsIndex) -> dict:
     """
     SOC to SOI.
     """
-
-def volume_l(
-    cylinder: Cylinder, crank_angle_cad: typing.Annotated[numpy.typing.ArrayLike, numpy.float64]
-) -> typing.Any:
+def volume_l(cylinder: Cylinder, crank_angle_cad: typing.Annotated[numpy.typing.ArrayLike, numpy.float64]) -> typing.Any:
     """
     Cylinder volume [L].
     """
-
-def wall_area_m2(
-    cylinder: Cylinder, crank_angle_cad: typing.Annotated[numpy.typing.ArrayLike, numpy.float64]
-) -> typing.Any:
+def wall_area_m2(cylinder: Cylinder, crank_angle_cad: typing.Annotated[numpy.typing.ArrayLike, numpy.float64]) -> typing.Any:
     """
     Wall area [m2].
     """
-
-def watson_delay_ms(
-    pressure_bar: typing.Annotated[numpy.typing.ArrayLike, numpy.float64],
-    temperature_k: typing.Annotated[numpy.typing.ArrayLike, numpy.float64],
-) -> typing.Any:
+def watson_delay_ms(pressure_bar: typing.Annotated[numpy.typing.ArrayLike, numpy.float64], temperature_k: typing.Annotated[numpy.typing.ArrayLike, numpy.float64]) -> typing.Any:
     """
     Ignition delay [ms].
     """
-
-def wolfer_delay_ms(
-    pressure_bar: typing.Annotated[numpy.typing.ArrayLike, numpy.float64],
-    temperature_k: typing.Annotated[numpy.typing.ArrayLike, numpy.float64],
-) -> typing.Any:
+def wolfer_delay_ms(pressure_bar: typing.Annotated[numpy.typing.ArrayLike, numpy.float64], temperature_k: typing.Annotated[numpy.typing.ArrayLike, numpy.float64]) -> typing.Any:
     """
     Ignition delay [ms].
     """
-
-def woschni_coefficient(
-    c1_bar_m: typing.Annotated[numpy.typing.ArrayLike, numpy.float64],
-    bore_m: typing.Annotated[numpy.typing.ArrayLike, numpy.float64],
-    pressure_bar: typing.Annotated[numpy.typing.ArrayLike, numpy.float64],
-    temperature_k: typing.Annotated[numpy.typing.ArrayLike, numpy.float64],
-    gas_velocity_m_per_s: typing.Annotated[numpy.typing.ArrayLike, numpy.float64],
-) -> typing.Any:
+def woschni_coefficient(c1_bar_m: typing.Annotated[numpy.typing.ArrayLike, numpy.float64], bore_m: typing.Annotated[numpy.typing.ArrayLike, numpy.float64], pressure_bar: typing.Annotated[numpy.typing.ArrayLike, numpy.float64], temperature_k: typing.Annotated[numpy.typing.ArrayLike, numpy.float64], gas_velocity_m_per_s: typing.Annotated[numpy.typing.ArrayLike, numpy.float64]) -> typing.Any:
     """
     Film coefficient [W/(m2 K)].
     """
-
 timing_window_cad: tuple = (-60.0, 20.0)
 woschni_c1_bar_m: float = 129.8

@@ -1,7 +1,6 @@
 """
 Models that guide a seeker: feed-forward, curves, trust, maps.
 """
-
 from __future__ import annotations
 import collections.abc
 import mgdd._core.engine
@@ -9,38 +8,27 @@ import mgdd._core.optimize
 import numpy
 import numpy.typing
 import typing
-
-__all__: list[str] = [
-    "Curve",
-    "CurveSeeking",
-    "FeedForward",
-    "GuidedEngine",
-    "ModelOptimum",
-    "OnlineCalibration",
-    "TimingMap",
-    "calibrated_parameters",
-]
-
+__all__: list[str] = ['Curve', 'CurveSeeking', 'FeedForward', 'GuidedEngine', 'ModelOptimum', 'OnlineCalibration', 'TimingMap', 'calibrated_parameters']
 class Curve:
     """
     What a model says of one quantity over one input: a smooth curve through given points.
-
+    
     Between the points runs a cubic, beyond them a straight line.
-
+    
     Parameters
     ----------
     inputs : array_like, shape (n,)
         Increasing inputs, three or more, in their unit.
     values : array_like, shape (n,)
         What the model says there, in its unit.
-
+    
     Raises
     ------
     mgdd.errors.ShapeError
         Fewer than three points, or not one value per input.
     mgdd.errors.ParameterError
         A number that is not finite, or inputs that do not increase.
-
+    
     Examples
     --------
     >>> from mgdd.guide import Curve
@@ -50,22 +38,14 @@ class Curve:
     >>> round(Curve.parabola(curvature=-0.05, best=-6.0, reach=40.0)(-4.0), 3)
     -0.1
     """
-
     __hash__: typing.ClassVar[None] = None
     @staticmethod
-    def _of_table(
-        table: collections.abc.Mapping[str, collections.abc.Sequence[typing.SupportsFloat | typing.SupportsIndex]],
-    ) -> Curve:
+    def _of_table(table: collections.abc.Mapping[str, collections.abc.Sequence[typing.SupportsFloat | typing.SupportsIndex]]) -> Curve:
         """
         The curve of such a table.
         """
     @staticmethod
-    def parabola(
-        *,
-        curvature: typing.SupportsFloat | typing.SupportsIndex,
-        best: typing.SupportsFloat | typing.SupportsIndex,
-        reach: typing.SupportsFloat | typing.SupportsIndex,
-    ) -> Curve:
+    def parabola(*, curvature: typing.SupportsFloat | typing.SupportsIndex, best: typing.SupportsFloat | typing.SupportsIndex, reach: typing.SupportsFloat | typing.SupportsIndex) -> Curve:
         """
         curvature/2 (x - best)^2 on [best - reach, best + reach]; ParameterError unless curvature < 0.
         """
@@ -73,14 +53,14 @@ class Curve:
         """
         Value at one input or at many.
         """
-    def __eq__(self, arg0: typing.Any) -> bool: ...
-    def __getstate__(self) -> tuple[int, dict[str, list[float]]]: ...
-    def __init__(
-        self,
-        inputs: typing.Annotated[numpy.typing.ArrayLike, numpy.float64],
-        values: typing.Annotated[numpy.typing.ArrayLike, numpy.float64],
-    ) -> None: ...
-    def __setstate__(self, arg0: tuple) -> None: ...
+    def __eq__(self, arg0: typing.Any) -> bool:
+        ...
+    def __getstate__(self) -> tuple[int, dict[str, list[float]]]:
+        ...
+    def __init__(self, inputs: typing.Annotated[numpy.typing.ArrayLike, numpy.float64], values: typing.Annotated[numpy.typing.ArrayLike, numpy.float64]) -> None:
+        ...
+    def __setstate__(self, arg0: tuple) -> None:
+        ...
     def curvature(self, reach: typing.SupportsFloat | typing.SupportsIndex) -> float:
         """
         Second difference over +-reach about the best input.
@@ -110,32 +90,12 @@ class Curve:
         """
         Last input given.
         """
-
 class CurveSeeking:
     """
     Seeking guided by a curve; see mgdd.guide.CurveSeeking.
     """
-    def __init__(
-        self,
-        *,
-        start: typing.Any,
-        lower: typing.Any,
-        upper: typing.Any,
-        curve: Curve,
-        prior_sd: typing.SupportsFloat | typing.SupportsIndex | None = None,
-        scale_sd: typing.SupportsFloat | typing.SupportsIndex = 0.3,
-        discrepancy: typing.SupportsFloat | typing.SupportsIndex = 0.25,
-        noise_sd: typing.SupportsFloat | typing.SupportsIndex | None = None,
-        memory_cycles: typing.SupportsFloat | typing.SupportsIndex = 143.0,
-        amplitude_max: typing.SupportsFloat | typing.SupportsIndex | None = None,
-        rate: typing.SupportsFloat | typing.SupportsIndex | None = None,
-        delay_cycles: typing.SupportsFloat | typing.SupportsIndex = 0.0,
-        lag_cycles: typing.SupportsFloat | typing.SupportsIndex = 0.0,
-        hand_over: bool = True,
-        maximize: bool = True,
-        limits: collections.abc.Sequence[mgdd._core.optimize.Limit] = [],
-        limit_curves: collections.abc.Sequence[Curve] | None = None,
-    ) -> None: ...
+    def __init__(self, *, start: typing.Any, lower: typing.Any, upper: typing.Any, curve: Curve, prior_sd: typing.SupportsFloat | typing.SupportsIndex | None = None, scale_sd: typing.SupportsFloat | typing.SupportsIndex = 0.3, discrepancy: typing.SupportsFloat | typing.SupportsIndex = 0.25, noise_sd: typing.SupportsFloat | typing.SupportsIndex | None = None, memory_cycles: typing.SupportsFloat | typing.SupportsIndex = 143.0, amplitude_max: typing.SupportsFloat | typing.SupportsIndex | None = None, rate: typing.SupportsFloat | typing.SupportsIndex | None = None, delay_cycles: typing.SupportsFloat | typing.SupportsIndex = 0.0, lag_cycles: typing.SupportsFloat | typing.SupportsIndex = 0.0, hand_over: bool = True, maximize: bool = True, limits: collections.abc.Sequence[mgdd._core.optimize.Limit] = [], limit_curves: collections.abc.Sequence[Curve] | None = None) -> None:
+        ...
     def _clear_history(self) -> None:
         """
         Forget the history, keep the state.
@@ -144,9 +104,7 @@ class CurveSeeking:
         """
         Columns behind .history.
         """
-    def _set_history_columns(
-        self, columns: collections.abc.Mapping[str, typing.Annotated[numpy.typing.ArrayLike, numpy.float64]]
-    ) -> None:
+    def _set_history_columns(self, columns: collections.abc.Mapping[str, typing.Annotated[numpy.typing.ArrayLike, numpy.float64]]) -> None:
         """
         Columns behind .history, as _history_columns gave them.
         """
@@ -162,12 +120,10 @@ class CurveSeeking:
         """
         The operating point has changed: forget the window, keep the estimate.
         """
-    def tell(
-        self, J: typing.Any = None, limits: typing.Any = None, *, misfire: bool = False, applied: typing.Any = None
-    ) -> None:
+    def tell(self, J: typing.Any = None, limits: typing.Any = None, *, misfire: bool = False, applied: typing.Any = None) -> None:
         """
         Accept what was measured at the input of the last ask.
-
+        
         J: float, or one number per component; limits: one value per limit, in order or by name;
         misfire: the cycle is counted and its J and limits are not read;
         applied: what the plant really applied, one number per input; None where it is what was asked for.
@@ -243,50 +199,28 @@ class CurveSeeking:
         a state of another kind or size raises ParameterError and changes nothing.
         """
     @state.setter
-    def state(
-        self, arg1: collections.abc.Mapping[str, collections.abc.Sequence[typing.SupportsFloat | typing.SupportsIndex]]
-    ) -> None: ...
+    def state(self, arg1: collections.abc.Mapping[str, collections.abc.Sequence[typing.SupportsFloat | typing.SupportsIndex]]) -> None:
+        ...
     @property
     def trust(self) -> float:
         """
         Between 0 and 1: how much of what the curve leaves unexplained is noise; 0 after a hand-over.
         """
-
 class FeedForward:
     """
     A seeker with feed-forward; see mgdd.guide.FeedForward.
     """
-    def __init__(
-        self,
-        seeker: typing.Any,
-        *,
-        calibration_rate: typing.Any,
-        following_share: typing.SupportsFloat | typing.SupportsIndex,
-        trust: typing.SupportsFloat | typing.SupportsIndex,
-        probe_cycles: typing.SupportsInt | typing.SupportsIndex,
-        probe_settling: typing.SupportsInt | typing.SupportsIndex,
-        trust_sd: typing.SupportsFloat | typing.SupportsIndex,
-        doubt: typing.SupportsFloat | typing.SupportsIndex,
-        curvature_spread: typing.SupportsFloat | typing.SupportsIndex,
-        significance: typing.SupportsFloat | typing.SupportsIndex,
-        noise_sd: typing.SupportsFloat | typing.SupportsIndex | None,
-    ) -> None: ...
+    def __init__(self, seeker: typing.Any, *, calibration_rate: typing.Any, following_share: typing.SupportsFloat | typing.SupportsIndex, trust: typing.SupportsFloat | typing.SupportsIndex, probe_cycles: typing.SupportsInt | typing.SupportsIndex, probe_settling: typing.SupportsInt | typing.SupportsIndex, trust_sd: typing.SupportsFloat | typing.SupportsIndex, doubt: typing.SupportsFloat | typing.SupportsIndex, curvature_spread: typing.SupportsFloat | typing.SupportsIndex, significance: typing.SupportsFloat | typing.SupportsIndex, noise_sd: typing.SupportsFloat | typing.SupportsIndex | None) -> None:
+        ...
     def _hold(self) -> None:
         """
         A new operating point of which the guide says nothing.
         """
-    def _offer(
-        self,
-        optimum: collections.abc.Sequence[typing.SupportsFloat | typing.SupportsIndex],
-        curvature: collections.abc.Sequence[typing.SupportsFloat | typing.SupportsIndex],
-        cause: str,
-    ) -> bool:
+    def _offer(self, optimum: collections.abc.Sequence[typing.SupportsFloat | typing.SupportsIndex], curvature: collections.abc.Sequence[typing.SupportsFloat | typing.SupportsIndex], cause: str) -> bool:
         """
         What the guide says; False where it cannot be used.
         """
-    def _set_seeker_history(
-        self, columns: collections.abc.Mapping[str, typing.Annotated[numpy.typing.ArrayLike, numpy.float64]]
-    ) -> None:
+    def _set_seeker_history(self, columns: collections.abc.Mapping[str, typing.Annotated[numpy.typing.ArrayLike, numpy.float64]]) -> None:
         """
         History of the seeker, as its _history_columns gave it.
         """
@@ -298,12 +232,10 @@ class FeedForward:
         """
         The operating point has changed: forget the window, keep the estimate.
         """
-    def tell(
-        self, J: typing.Any = None, limits: typing.Any = None, *, misfire: bool = False, applied: typing.Any = None
-    ) -> None:
+    def tell(self, J: typing.Any = None, limits: typing.Any = None, *, misfire: bool = False, applied: typing.Any = None) -> None:
         """
         Accept what was measured at the input of the last ask.
-
+        
         J: float, or one number per component; limits: one value per limit, in order or by name;
         misfire: the cycle is counted and its J and limits are not read;
         applied: what the plant really applied, one number per input; None where it is what was asked for.
@@ -316,9 +248,8 @@ class FeedForward:
         State of the feed-forward and of its seeker.
         """
     @_core_state.setter
-    def _core_state(
-        self, arg1: collections.abc.Mapping[str, collections.abc.Sequence[typing.SupportsFloat | typing.SupportsIndex]]
-    ) -> None: ...
+    def _core_state(self, arg1: collections.abc.Mapping[str, collections.abc.Sequence[typing.SupportsFloat | typing.SupportsIndex]]) -> None:
+        ...
     @property
     def _seeker_history(self) -> dict:
         """
@@ -401,29 +332,13 @@ class FeedForward:
         """
         What the last test of the guide said: ``untested``, ``undecided``, ``confirmed`` or ``wrong``.
         """
-
 class ModelOptimum:
     """
     Best timing of the cycle model; see mgdd.guide.ModelOptimum.
     """
-    def __init__(
-        self,
-        cylinder: mgdd._core.engine.Cylinder,
-        *,
-        performance: mgdd._core.engine.Performance,
-        nox: mgdd._core.engine.NoxModel,
-        method: str,
-        bounds_cad: tuple[typing.SupportsFloat | typing.SupportsIndex, typing.SupportsFloat | typing.SupportsIndex],
-        step_size: typing.SupportsFloat | typing.SupportsIndex,
-        difference_cad: typing.SupportsFloat | typing.SupportsIndex,
-        tolerance_cad: typing.SupportsFloat | typing.SupportsIndex,
-        iterations: typing.SupportsInt | typing.SupportsIndex,
-        step_cad: typing.SupportsFloat | typing.SupportsIndex,
-        integrator: str,
-    ) -> None: ...
-    def _curves(
-        self, point: mgdd._core.engine.OperatingPoint, names: collections.abc.Sequence[str]
-    ) -> list[Curve] | None:
+    def __init__(self, cylinder: mgdd._core.engine.Cylinder, *, performance: mgdd._core.engine.Performance, nox: mgdd._core.engine.NoxModel, method: str, bounds_cad: tuple[typing.SupportsFloat | typing.SupportsIndex, typing.SupportsFloat | typing.SupportsIndex], step_size: typing.SupportsFloat | typing.SupportsIndex, difference_cad: typing.SupportsFloat | typing.SupportsIndex, tolerance_cad: typing.SupportsFloat | typing.SupportsIndex, iterations: typing.SupportsInt | typing.SupportsIndex, step_cad: typing.SupportsFloat | typing.SupportsIndex, integrator: str) -> None:
+        ...
+    def _curves(self, point: mgdd._core.engine.OperatingPoint, names: collections.abc.Sequence[str]) -> list[Curve] | None:
         """
         J and indicators over SOC at one operating point; None where the model has no physical cycle.
         """
@@ -445,31 +360,17 @@ class ModelOptimum:
         """
         Keyword arguments that, with `cylinder`, make this guide again.
         """
-
 class TimingMap:
     """
     A map of the best timing; see mgdd.guide.TimingMap.
     """
-    def __init__(
-        self,
-        *,
-        axes: collections.abc.Sequence[collections.abc.Sequence[typing.SupportsFloat | typing.SupportsIndex]],
-        values_cad: collections.abc.Sequence[typing.SupportsFloat | typing.SupportsIndex],
-        prior_sd_cad: typing.SupportsFloat | typing.SupportsIndex,
-        forgetting: typing.SupportsFloat | typing.SupportsIndex,
-    ) -> None: ...
-    def _learn(
-        self,
-        point: collections.abc.Sequence[typing.SupportsFloat | typing.SupportsIndex],
-        value_cad: typing.SupportsFloat | typing.SupportsIndex,
-        sd_cad: typing.SupportsFloat | typing.SupportsIndex,
-    ) -> bool:
+    def __init__(self, *, axes: collections.abc.Sequence[collections.abc.Sequence[typing.SupportsFloat | typing.SupportsIndex]], values_cad: collections.abc.Sequence[typing.SupportsFloat | typing.SupportsIndex], prior_sd_cad: typing.SupportsFloat | typing.SupportsIndex, forgetting: typing.SupportsFloat | typing.SupportsIndex) -> None:
+        ...
+    def _learn(self, point: collections.abc.Sequence[typing.SupportsFloat | typing.SupportsIndex], value_cad: typing.SupportsFloat | typing.SupportsIndex, sd_cad: typing.SupportsFloat | typing.SupportsIndex) -> bool:
         """
         One confirmed optimum; False where it was not taken.
         """
-    def _lookup(
-        self, point: collections.abc.Sequence[typing.SupportsFloat | typing.SupportsIndex]
-    ) -> tuple[float, float, float, bool]:
+    def _lookup(self, point: collections.abc.Sequence[typing.SupportsFloat | typing.SupportsIndex]) -> tuple[float, float, float, bool]:
         """
         Value, its standard deviation, support, and whether it is held outside of the axes.
         """
@@ -479,39 +380,15 @@ class TimingMap:
         Values, variances and support of all cells.
         """
     @_columns.setter
-    def _columns(
-        self, arg1: collections.abc.Mapping[str, collections.abc.Sequence[typing.SupportsFloat | typing.SupportsIndex]]
-    ) -> None: ...
-
+    def _columns(self, arg1: collections.abc.Mapping[str, collections.abc.Sequence[typing.SupportsFloat | typing.SupportsIndex]]) -> None:
+        ...
 class OnlineCalibration:
     """
     Calibration while an engine runs; use mgdd.guide.OnlineCalibration.
     """
-    def __init__(
-        self,
-        *,
-        cylinder: mgdd._core.engine.Cylinder,
-        method: str,
-        parameters: collections.abc.Sequence[str],
-        uncertainty: collections.abc.Mapping[str, typing.SupportsFloat | typing.SupportsIndex],
-        window_cycles: typing.SupportsInt | typing.SupportsIndex,
-        steady_cycles: typing.SupportsInt | typing.SupportsIndex,
-        cov_limit_percent: typing.SupportsFloat | typing.SupportsIndex,
-        forgetting: typing.SupportsFloat | typing.SupportsIndex,
-        soc_scatter_cad: typing.SupportsFloat | typing.SupportsIndex,
-        jump_factor: typing.SupportsFloat | typing.SupportsIndex,
-        trials_per_update: typing.SupportsInt | typing.SupportsIndex,
-        step_cad: typing.SupportsFloat | typing.SupportsIndex,
-        integrator: str,
-    ) -> None: ...
-    def offer(
-        self,
-        pressure_bar: typing.Annotated[numpy.typing.ArrayLike, numpy.float64],
-        point: mgdd._core.engine.OperatingPoint,
-        soc_cad: typing.SupportsFloat | typing.SupportsIndex,
-        *,
-        misfire: bool = False,
-    ) -> str:
+    def __init__(self, *, cylinder: mgdd._core.engine.Cylinder, method: str, parameters: collections.abc.Sequence[str], uncertainty: collections.abc.Mapping[str, typing.SupportsFloat | typing.SupportsIndex], window_cycles: typing.SupportsInt | typing.SupportsIndex, steady_cycles: typing.SupportsInt | typing.SupportsIndex, cov_limit_percent: typing.SupportsFloat | typing.SupportsIndex, forgetting: typing.SupportsFloat | typing.SupportsIndex, soc_scatter_cad: typing.SupportsFloat | typing.SupportsIndex, jump_factor: typing.SupportsFloat | typing.SupportsIndex, trials_per_update: typing.SupportsInt | typing.SupportsIndex, step_cad: typing.SupportsFloat | typing.SupportsIndex, integrator: str) -> None:
+        ...
+    def offer(self, pressure_bar: typing.Annotated[numpy.typing.ArrayLike, numpy.float64], point: mgdd._core.engine.OperatingPoint, soc_cad: typing.SupportsFloat | typing.SupportsIndex, *, misfire: bool = False) -> str:
         """
         Takes one cycle; the status says what became of it.
         """
@@ -539,9 +416,11 @@ class OnlineCalibration:
         Whether the data determine every parameter that is adapted.
         """
     @property
-    def errors(self) -> dict: ...
+    def errors(self) -> dict:
+        ...
     @property
-    def figures(self) -> dict: ...
+    def figures(self) -> dict:
+        ...
     @property
     def settings(self) -> dict:
         """
@@ -554,37 +433,25 @@ class OnlineCalibration:
         bit; a state of other settings raises ParameterError and changes nothing.
         """
     @state.setter
-    def state(
-        self, arg1: collections.abc.Mapping[str, collections.abc.Sequence[typing.SupportsFloat | typing.SupportsIndex]]
-    ) -> None: ...
+    def state(self, arg1: collections.abc.Mapping[str, collections.abc.Sequence[typing.SupportsFloat | typing.SupportsIndex]]) -> None:
+        ...
     @property
     def status(self) -> str:
         """
         Of the last call.
         """
     @property
-    def values(self) -> dict: ...
+    def values(self) -> dict:
+        ...
     @property
-    def verdicts(self) -> dict: ...
-
+    def verdicts(self) -> dict:
+        ...
 class GuidedEngine:
     """
     The guided loop of an engine; see mgdd.guide.GuidedEngine.
     """
-    def __init__(
-        self,
-        seeker: typing.Any,
-        model: ModelOptimum,
-        calibration: OnlineCalibration | None,
-        point: mgdd._core.engine.OperatingPoint,
-        *,
-        changed_share: typing.SupportsFloat | typing.SupportsIndex,
-        calibrated_sd_cad: typing.SupportsFloat | typing.SupportsIndex,
-        recalibrated_cad: typing.SupportsFloat | typing.SupportsIndex,
-        calibration_rate_cad: typing.SupportsFloat | typing.SupportsIndex,
-        noise_sd: typing.SupportsFloat | typing.SupportsIndex | None,
-        keep_start: bool,
-    ) -> None: ...
+    def __init__(self, seeker: typing.Any, model: ModelOptimum, calibration: OnlineCalibration | None, point: mgdd._core.engine.OperatingPoint, *, changed_share: typing.SupportsFloat | typing.SupportsIndex, calibrated_sd_cad: typing.SupportsFloat | typing.SupportsIndex, recalibrated_cad: typing.SupportsFloat | typing.SupportsIndex, calibration_rate_cad: typing.SupportsFloat | typing.SupportsIndex, noise_sd: typing.SupportsFloat | typing.SupportsIndex | None, keep_start: bool) -> None:
+        ...
     def _at(self, point: mgdd._core.engine.OperatingPoint) -> str:
         """
         The operating point of the next cycle.
@@ -593,14 +460,7 @@ class GuidedEngine:
         """
         What the next cycle is made of.
         """
-    def _tell(
-        self,
-        J: typing.Any,
-        limits: typing.Any,
-        misfire: bool,
-        applied: typing.Any,
-        pressure_bar: typing.Annotated[numpy.typing.ArrayLike, numpy.float64] | None,
-    ) -> None:
+    def _tell(self, J: typing.Any, limits: typing.Any, misfire: bool, applied: typing.Any, pressure_bar: typing.Annotated[numpy.typing.ArrayLike, numpy.float64] | None) -> None:
         """
         tell, with the pressure.
         """
@@ -612,12 +472,10 @@ class GuidedEngine:
         """
         The operating point has changed: forget the window, keep the estimate.
         """
-    def tell(
-        self, J: typing.Any = None, limits: typing.Any = None, *, misfire: bool = False, applied: typing.Any = None
-    ) -> None:
+    def tell(self, J: typing.Any = None, limits: typing.Any = None, *, misfire: bool = False, applied: typing.Any = None) -> None:
         """
         Accept what was measured at the input of the last ask.
-
+        
         J: float, or one number per component; limits: one value per limit, in order or by name;
         misfire: the cycle is counted and its J and limits are not read;
         applied: what the plant really applied, one number per input; None where it is what was asked for.
@@ -692,15 +550,13 @@ class GuidedEngine:
         What the run needs to go on bit for bit, the history excepted: named lists of numbers, JSON-able.
         """
     @state.setter
-    def state(
-        self, arg1: collections.abc.Mapping[str, collections.abc.Sequence[typing.SupportsFloat | typing.SupportsIndex]]
-    ) -> None: ...
+    def state(self, arg1: collections.abc.Mapping[str, collections.abc.Sequence[typing.SupportsFloat | typing.SupportsIndex]]) -> None:
+        ...
     @property
     def trust(self) -> float:
         """
         Trust in the guide, 0 to 1.
         """
-
 def calibrated_parameters() -> dict:
     """
     Unit and meaning of every parameter of an online calibration, by name.

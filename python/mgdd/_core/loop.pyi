@@ -1,7 +1,6 @@
 """
 Virtual benches and the loops over them.
 """
-
 from __future__ import annotations
 import collections.abc
 import mgdd._core.engine
@@ -11,25 +10,11 @@ import mgdd._core.throttle
 import numpy
 import numpy.typing
 import typing
-
-__all__: list[str] = [
-    "EngineBench",
-    "Mgdd1",
-    "SensorDynamics",
-    "VirtualThrottle",
-    "monte_carlo",
-    "run_loop",
-    "step_times_us",
-    "throttle_fault_kinds",
-    "track_throttle",
-    "track_throttles",
-    "tracking_figures",
-]
-
+__all__: list[str] = ['EngineBench', 'Mgdd1', 'SensorDynamics', 'VirtualThrottle', 'monte_carlo', 'run_loop', 'step_times_us', 'throttle_fault_kinds', 'track_throttle', 'track_throttles', 'tracking_figures']
 class SensorDynamics:
     """
     Transport delay, first-order lag and noise of a gas sensor.
-
+    
     Parameters
     ----------
     delay_s : float
@@ -42,32 +27,30 @@ class SensorDynamics:
         Delay in engine cycles instead; it does not follow the speed.
     lag_cycles : float, optional
         Time constant in engine cycles instead.
-
+    
     Raises
     ------
     mgdd.errors.ParameterError
         A value outside its domain.
-
+    
     Examples
     --------
     >>> from mgdd.loop import SensorDynamics
     >>> SensorDynamics(delay_s=3.0, lag_s=2.0).delay_at(1500.0)
     38
     """
-    def __eq__(self, arg0: typing.Any) -> bool: ...
-    def __getstate__(self) -> tuple[int, dict]: ...
-    def __hash__(self) -> int: ...
-    def __init__(
-        self,
-        *,
-        delay_s: typing.SupportsFloat | typing.SupportsIndex = 0.0,
-        lag_s: typing.SupportsFloat | typing.SupportsIndex = 0.0,
-        noise_fraction: typing.SupportsFloat | typing.SupportsIndex = 0.0,
-        delay_cycles: typing.SupportsInt | typing.SupportsIndex | None = None,
-        lag_cycles: typing.SupportsFloat | typing.SupportsIndex | None = None,
-    ) -> None: ...
-    def __repr__(self) -> str: ...
-    def __setstate__(self, arg0: tuple) -> None: ...
+    def __eq__(self, arg0: typing.Any) -> bool:
+        ...
+    def __getstate__(self) -> tuple[int, dict]:
+        ...
+    def __hash__(self) -> int:
+        ...
+    def __init__(self, *, delay_s: typing.SupportsFloat | typing.SupportsIndex = 0.0, lag_s: typing.SupportsFloat | typing.SupportsIndex = 0.0, noise_fraction: typing.SupportsFloat | typing.SupportsIndex = 0.0, delay_cycles: typing.SupportsInt | typing.SupportsIndex | None = None, lag_cycles: typing.SupportsFloat | typing.SupportsIndex | None = None) -> None:
+        ...
+    def __repr__(self) -> str:
+        ...
+    def __setstate__(self, arg0: tuple) -> None:
+        ...
     def delay_at(self, speed_rpm: typing.SupportsFloat | typing.SupportsIndex) -> int:
         """
         Delay in whole cycles at a speed.
@@ -105,47 +88,19 @@ class SensorDynamics:
         """
         Relative noise [-].
         """
-
 class EngineBench:
     """
     The virtual engine bench; use mgdd.loop.EngineBench.
     """
-    def __getstate__(self) -> tuple[int, dict, dict[str, list[float]]]: ...
-    def __init__(
-        self,
-        *,
-        cylinder: mgdd._core.engine.Cylinder,
-        schedule: collections.abc.Sequence[
-            tuple[typing.SupportsInt | typing.SupportsIndex, mgdd._core.engine.OperatingPoint]
-        ],
-        performance: mgdd._core.engine.Performance | None = None,
-        nox_sensor: str = "soft",
-        limits: collections.abc.Sequence[str] = [],
-        soc_scatter_cad: typing.SupportsFloat | typing.SupportsIndex = 0.3,
-        efficiency_noise_percent: typing.SupportsFloat | typing.SupportsIndex = 0.25,
-        misfire_probability: typing.SupportsFloat | typing.SupportsIndex = 0.0,
-        soc_drift_cad_per_kcycle: typing.SupportsFloat | typing.SupportsIndex = 0.0,
-        wall_heat_drift_per_kcycle: typing.SupportsFloat | typing.SupportsIndex = 0.0,
-        pressure_noise_bar: typing.SupportsFloat | typing.SupportsIndex = 0.0,
-        tdc_error_cad: typing.SupportsFloat | typing.SupportsIndex = 0.0,
-        pressure_gain_error: typing.SupportsFloat | typing.SupportsIndex = 0.0,
-        pressure_offset_bar: typing.SupportsFloat | typing.SupportsIndex = 0.0,
-        true_nox: mgdd._core.engine.NoxModel | None = None,
-        soft_sensor: mgdd._core.engine.SoftSensor | None = None,
-        analyser: SensorDynamics | None = None,
-        fast_sensor: SensorDynamics | None = None,
-        delay_whole_objective: bool = False,
-        step_cad: typing.SupportsFloat | typing.SupportsIndex = 1.0,
-        integrator: str = "trapezoid",
-        seed: typing.SupportsInt | typing.SupportsIndex = 0,
-    ) -> None: ...
-    def __repr__(self) -> str: ...
-    def __setstate__(self, arg0: tuple) -> None: ...
-    def noise_free_limits(
-        self,
-        soc_cad: typing.Annotated[numpy.typing.ArrayLike, numpy.float64],
-        cycle: collections.abc.Sequence[typing.SupportsInt | typing.SupportsIndex],
-    ) -> numpy.typing.NDArray[numpy.float64]:
+    def __getstate__(self) -> tuple[int, dict, dict[str, list[float]]]:
+        ...
+    def __init__(self, *, cylinder: mgdd._core.engine.Cylinder, schedule: collections.abc.Sequence[tuple[typing.SupportsInt | typing.SupportsIndex, mgdd._core.engine.OperatingPoint]], performance: mgdd._core.engine.Performance | None = None, nox_sensor: str = 'soft', limits: collections.abc.Sequence[str] = [], soc_scatter_cad: typing.SupportsFloat | typing.SupportsIndex = 0.3, efficiency_noise_percent: typing.SupportsFloat | typing.SupportsIndex = 0.25, misfire_probability: typing.SupportsFloat | typing.SupportsIndex = 0.0, soc_drift_cad_per_kcycle: typing.SupportsFloat | typing.SupportsIndex = 0.0, wall_heat_drift_per_kcycle: typing.SupportsFloat | typing.SupportsIndex = 0.0, pressure_noise_bar: typing.SupportsFloat | typing.SupportsIndex = 0.0, tdc_error_cad: typing.SupportsFloat | typing.SupportsIndex = 0.0, pressure_gain_error: typing.SupportsFloat | typing.SupportsIndex = 0.0, pressure_offset_bar: typing.SupportsFloat | typing.SupportsIndex = 0.0, true_nox: mgdd._core.engine.NoxModel | None = None, soft_sensor: mgdd._core.engine.SoftSensor | None = None, analyser: SensorDynamics | None = None, fast_sensor: SensorDynamics | None = None, delay_whole_objective: bool = False, step_cad: typing.SupportsFloat | typing.SupportsIndex = 1.0, integrator: str = 'trapezoid', seed: typing.SupportsInt | typing.SupportsIndex = 0) -> None:
+        ...
+    def __repr__(self) -> str:
+        ...
+    def __setstate__(self, arg0: tuple) -> None:
+        ...
+    def noise_free_limits(self, soc_cad: typing.Annotated[numpy.typing.ArrayLike, numpy.float64], cycle: collections.abc.Sequence[typing.SupportsInt | typing.SupportsIndex]) -> numpy.typing.NDArray[numpy.float64]:
         """
         Limited quantities without scatter, noise and misfire, drift included: one row per request and its cycle, in
         the order of limit_names. NaN for the COV of IMEP, which has no such value. The bench itself does not run.
@@ -212,57 +167,20 @@ class EngineBench:
         run bit for bit; a state of another bench raises ParameterError and changes nothing.
         """
     @state.setter
-    def state(
-        self, arg1: collections.abc.Mapping[str, collections.abc.Sequence[typing.SupportsFloat | typing.SupportsIndex]]
-    ) -> None: ...
+    def state(self, arg1: collections.abc.Mapping[str, collections.abc.Sequence[typing.SupportsFloat | typing.SupportsIndex]]) -> None:
+        ...
     @property
     def window_cad(self) -> typing.Annotated[list[float], "FixedSize(2)"]:
         """
         Earliest and latest SOC that is not clamped.
         """
-
 class VirtualThrottle:
     """
     A throttle with its sensors, sample by sample; behind mgdd.loop.VirtualThrottle.
     """
-    def __init__(
-        self,
-        *,
-        throttle: mgdd._core.throttle.Throttle,
-        sensors: mgdd._core.throttle.SensorPair,
-        faults: typing.Annotated[
-            collections.abc.Sequence[
-                tuple[
-                    str,
-                    typing.SupportsFloat | typing.SupportsIndex,
-                    typing.SupportsFloat | typing.SupportsIndex,
-                    typing.SupportsFloat | typing.SupportsIndex | None,
-                ]
-            ],
-            "FixedSize(2)",
-        ],
-        plant_faults: collections.abc.Sequence[
-            tuple[
-                str,
-                typing.SupportsFloat | typing.SupportsIndex,
-                typing.SupportsFloat | typing.SupportsIndex,
-                typing.SupportsFloat | typing.SupportsIndex | None,
-            ]
-        ],
-        sample_s: typing.SupportsFloat | typing.SupportsIndex,
-        step_s: typing.SupportsFloat | typing.SupportsIndex,
-        start_deg: typing.SupportsFloat | typing.SupportsIndex,
-        bridge: str,
-        seed: typing.SupportsInt | typing.SupportsIndex,
-    ) -> None: ...
-    def step(
-        self,
-        *,
-        duty: typing.SupportsFloat | typing.SupportsIndex,
-        supply_v: typing.SupportsFloat | typing.SupportsIndex,
-        airflow_torque_nm: typing.SupportsFloat | typing.SupportsIndex,
-        bridge_open: bool,
-    ) -> dict:
+    def __init__(self, *, throttle: mgdd._core.throttle.Throttle, sensors: mgdd._core.throttle.SensorPair, faults: typing.Annotated[collections.abc.Sequence[tuple[str, typing.SupportsFloat | typing.SupportsIndex, typing.SupportsFloat | typing.SupportsIndex, typing.SupportsFloat | typing.SupportsIndex | None]], "FixedSize(2)"], plant_faults: collections.abc.Sequence[tuple[str, typing.SupportsFloat | typing.SupportsIndex, typing.SupportsFloat | typing.SupportsIndex, typing.SupportsFloat | typing.SupportsIndex | None]], sample_s: typing.SupportsFloat | typing.SupportsIndex, step_s: typing.SupportsFloat | typing.SupportsIndex, start_deg: typing.SupportsFloat | typing.SupportsIndex, bridge: str, seed: typing.SupportsInt | typing.SupportsIndex) -> None:
+        ...
+    def step(self, *, duty: typing.SupportsFloat | typing.SupportsIndex, supply_v: typing.SupportsFloat | typing.SupportsIndex, airflow_torque_nm: typing.SupportsFloat | typing.SupportsIndex, bridge_open: bool) -> dict:
         """
         Run one sample.
         """
@@ -277,240 +195,83 @@ class VirtualThrottle:
         What a run needs to go on bit for bit.
         """
     @state.setter
-    def state(
-        self, arg1: collections.abc.Mapping[str, collections.abc.Sequence[typing.SupportsFloat | typing.SupportsIndex]]
-    ) -> None: ...
-
+    def state(self, arg1: collections.abc.Mapping[str, collections.abc.Sequence[typing.SupportsFloat | typing.SupportsIndex]]) -> None:
+        ...
 class Mgdd1:
     """
     The plainest model-guided controller; use mgdd.control.Mgdd1.
     """
     @staticmethod
-    def fields() -> dict: ...
-    def __init__(
-        self,
-        guide: mgdd._core.throttle.PseudoWienerModel,
-        *,
-        horizon_samples: typing.SupportsInt | typing.SupportsIndex,
-        delay_samples: typing.SupportsInt | typing.SupportsIndex,
-        numbers: collections.abc.Mapping[str, typing.SupportsFloat | typing.SupportsIndex],
-    ) -> None: ...
-    def reset(self) -> None: ...
-    def step(
-        self,
-        reference_deg: typing.SupportsFloat | typing.SupportsIndex,
-        measurement_deg: typing.SupportsFloat | typing.SupportsIndex,
-    ) -> float: ...
+    def fields() -> dict:
+        ...
+    def __init__(self, guide: mgdd._core.throttle.PseudoWienerModel, *, horizon_samples: typing.SupportsInt | typing.SupportsIndex, delay_samples: typing.SupportsInt | typing.SupportsIndex, numbers: collections.abc.Mapping[str, typing.SupportsFloat | typing.SupportsIndex]) -> None:
+        ...
+    def reset(self) -> None:
+        ...
+    def step(self, reference_deg: typing.SupportsFloat | typing.SupportsIndex, measurement_deg: typing.SupportsFloat | typing.SupportsIndex) -> float:
+        ...
     @property
-    def duty(self) -> float: ...
+    def duty(self) -> float:
+        ...
     @property
-    def state(self) -> dict[str, list[float]]: ...
+    def state(self) -> dict[str, list[float]]:
+        ...
     @state.setter
-    def state(
-        self, arg1: collections.abc.Mapping[str, collections.abc.Sequence[typing.SupportsFloat | typing.SupportsIndex]]
-    ) -> None: ...
-
-def monte_carlo(
-    benches: collections.abc.Sequence[EngineBench],
-    seekers: list,
-    seeds: collections.abc.Sequence[typing.SupportsInt | typing.SupportsIndex],
-    *,
-    cycles: typing.SupportsInt | typing.SupportsIndex,
-    optimum_cad: collections.abc.Sequence[typing.SupportsFloat | typing.SupportsIndex],
-    arrival_cad: typing.SupportsFloat | typing.SupportsIndex,
-    tail_cycles: typing.SupportsInt | typing.SupportsIndex,
-    exceed_from: typing.SupportsInt | typing.SupportsIndex | None,
-    exceed_above: collections.abc.Sequence[collections.abc.Sequence[typing.SupportsFloat | typing.SupportsIndex]],
-    limits: collections.abc.Sequence[collections.abc.Sequence[typing.SupportsFloat | typing.SupportsIndex]],
-    threads: typing.SupportsInt | typing.SupportsIndex,
-) -> dict:
+    def state(self, arg1: collections.abc.Mapping[str, collections.abc.Sequence[typing.SupportsFloat | typing.SupportsIndex]]) -> None:
+        ...
+def monte_carlo(benches: collections.abc.Sequence[EngineBench], seekers: list, seeds: collections.abc.Sequence[typing.SupportsInt | typing.SupportsIndex], *, cycles: typing.SupportsInt | typing.SupportsIndex, optimum_cad: collections.abc.Sequence[typing.SupportsFloat | typing.SupportsIndex], arrival_cad: typing.SupportsFloat | typing.SupportsIndex, tail_cycles: typing.SupportsInt | typing.SupportsIndex, exceed_from: typing.SupportsInt | typing.SupportsIndex | None, exceed_above: collections.abc.Sequence[collections.abc.Sequence[typing.SupportsFloat | typing.SupportsIndex]], limits: collections.abc.Sequence[collections.abc.Sequence[typing.SupportsFloat | typing.SupportsIndex]], threads: typing.SupportsInt | typing.SupportsIndex) -> dict:
     """
     Whole loops on all cores; behind mgdd.loop.monte_carlo.
     """
-
 @typing.overload
-def run_loop(
-    bench: EngineBench,
-    seeker: mgdd._core.optimize.ExtremumSeeking,
-    cycles: typing.SupportsInt | typing.SupportsIndex,
-    *,
-    optimum_cad: typing.SupportsFloat | typing.SupportsIndex,
-    arrival_cad: typing.SupportsFloat | typing.SupportsIndex,
-    tail_cycles: typing.SupportsInt | typing.SupportsIndex,
-    exceed_from: typing.SupportsInt | typing.SupportsIndex | None,
-    exceed_above: collections.abc.Sequence[typing.SupportsFloat | typing.SupportsIndex],
-    limits: collections.abc.Sequence[typing.SupportsFloat | typing.SupportsIndex],
-) -> dict:
+def run_loop(bench: EngineBench, seeker: mgdd._core.optimize.ExtremumSeeking, cycles: typing.SupportsInt | typing.SupportsIndex, *, optimum_cad: typing.SupportsFloat | typing.SupportsIndex, arrival_cad: typing.SupportsFloat | typing.SupportsIndex, tail_cycles: typing.SupportsInt | typing.SupportsIndex, exceed_from: typing.SupportsInt | typing.SupportsIndex | None, exceed_above: collections.abc.Sequence[typing.SupportsFloat | typing.SupportsIndex], limits: collections.abc.Sequence[typing.SupportsFloat | typing.SupportsIndex]) -> dict:
     """
     Run a seeker on the bench without the GIL; behind mgdd.loop.run_seeker.
     """
-
 @typing.overload
-def run_loop(
-    bench: EngineBench,
-    seeker: mgdd._core.optimize.NewtonSeeking,
-    cycles: typing.SupportsInt | typing.SupportsIndex,
-    *,
-    optimum_cad: typing.SupportsFloat | typing.SupportsIndex,
-    arrival_cad: typing.SupportsFloat | typing.SupportsIndex,
-    tail_cycles: typing.SupportsInt | typing.SupportsIndex,
-    exceed_from: typing.SupportsInt | typing.SupportsIndex | None,
-    exceed_above: collections.abc.Sequence[typing.SupportsFloat | typing.SupportsIndex],
-    limits: collections.abc.Sequence[typing.SupportsFloat | typing.SupportsIndex],
-) -> dict:
+def run_loop(bench: EngineBench, seeker: mgdd._core.optimize.NewtonSeeking, cycles: typing.SupportsInt | typing.SupportsIndex, *, optimum_cad: typing.SupportsFloat | typing.SupportsIndex, arrival_cad: typing.SupportsFloat | typing.SupportsIndex, tail_cycles: typing.SupportsInt | typing.SupportsIndex, exceed_from: typing.SupportsInt | typing.SupportsIndex | None, exceed_above: collections.abc.Sequence[typing.SupportsFloat | typing.SupportsIndex], limits: collections.abc.Sequence[typing.SupportsFloat | typing.SupportsIndex]) -> dict:
     """
     Run a seeker on the bench without the GIL; behind mgdd.loop.run_seeker.
     """
-
 @typing.overload
-def run_loop(
-    bench: EngineBench,
-    seeker: mgdd._core.optimize.BoundedSeeking,
-    cycles: typing.SupportsInt | typing.SupportsIndex,
-    *,
-    optimum_cad: typing.SupportsFloat | typing.SupportsIndex,
-    arrival_cad: typing.SupportsFloat | typing.SupportsIndex,
-    tail_cycles: typing.SupportsInt | typing.SupportsIndex,
-    exceed_from: typing.SupportsInt | typing.SupportsIndex | None,
-    exceed_above: collections.abc.Sequence[typing.SupportsFloat | typing.SupportsIndex],
-    limits: collections.abc.Sequence[typing.SupportsFloat | typing.SupportsIndex],
-) -> dict:
+def run_loop(bench: EngineBench, seeker: mgdd._core.optimize.BoundedSeeking, cycles: typing.SupportsInt | typing.SupportsIndex, *, optimum_cad: typing.SupportsFloat | typing.SupportsIndex, arrival_cad: typing.SupportsFloat | typing.SupportsIndex, tail_cycles: typing.SupportsInt | typing.SupportsIndex, exceed_from: typing.SupportsInt | typing.SupportsIndex | None, exceed_above: collections.abc.Sequence[typing.SupportsFloat | typing.SupportsIndex], limits: collections.abc.Sequence[typing.SupportsFloat | typing.SupportsIndex]) -> dict:
     """
     Run a seeker on the bench without the GIL; behind mgdd.loop.run_seeker.
     """
-
 @typing.overload
-def run_loop(
-    bench: EngineBench,
-    seeker: mgdd._core.optimize.Spsa,
-    cycles: typing.SupportsInt | typing.SupportsIndex,
-    *,
-    optimum_cad: typing.SupportsFloat | typing.SupportsIndex,
-    arrival_cad: typing.SupportsFloat | typing.SupportsIndex,
-    tail_cycles: typing.SupportsInt | typing.SupportsIndex,
-    exceed_from: typing.SupportsInt | typing.SupportsIndex | None,
-    exceed_above: collections.abc.Sequence[typing.SupportsFloat | typing.SupportsIndex],
-    limits: collections.abc.Sequence[typing.SupportsFloat | typing.SupportsIndex],
-) -> dict:
+def run_loop(bench: EngineBench, seeker: mgdd._core.optimize.Spsa, cycles: typing.SupportsInt | typing.SupportsIndex, *, optimum_cad: typing.SupportsFloat | typing.SupportsIndex, arrival_cad: typing.SupportsFloat | typing.SupportsIndex, tail_cycles: typing.SupportsInt | typing.SupportsIndex, exceed_from: typing.SupportsInt | typing.SupportsIndex | None, exceed_above: collections.abc.Sequence[typing.SupportsFloat | typing.SupportsIndex], limits: collections.abc.Sequence[typing.SupportsFloat | typing.SupportsIndex]) -> dict:
     """
     Run a seeker on the bench without the GIL; behind mgdd.loop.run_seeker.
     """
-
 @typing.overload
-def run_loop(
-    bench: EngineBench,
-    seeker: mgdd._core.optimize.GradientDescent,
-    cycles: typing.SupportsInt | typing.SupportsIndex,
-    *,
-    optimum_cad: typing.SupportsFloat | typing.SupportsIndex,
-    arrival_cad: typing.SupportsFloat | typing.SupportsIndex,
-    tail_cycles: typing.SupportsInt | typing.SupportsIndex,
-    exceed_from: typing.SupportsInt | typing.SupportsIndex | None,
-    exceed_above: collections.abc.Sequence[typing.SupportsFloat | typing.SupportsIndex],
-    limits: collections.abc.Sequence[typing.SupportsFloat | typing.SupportsIndex],
-) -> dict:
+def run_loop(bench: EngineBench, seeker: mgdd._core.optimize.GradientDescent, cycles: typing.SupportsInt | typing.SupportsIndex, *, optimum_cad: typing.SupportsFloat | typing.SupportsIndex, arrival_cad: typing.SupportsFloat | typing.SupportsIndex, tail_cycles: typing.SupportsInt | typing.SupportsIndex, exceed_from: typing.SupportsInt | typing.SupportsIndex | None, exceed_above: collections.abc.Sequence[typing.SupportsFloat | typing.SupportsIndex], limits: collections.abc.Sequence[typing.SupportsFloat | typing.SupportsIndex]) -> dict:
     """
     Run a seeker on the bench without the GIL; behind mgdd.loop.run_seeker.
     """
-
 @typing.overload
-def run_loop(
-    bench: EngineBench,
-    seeker: mgdd._core.optimize.GoldenSection,
-    cycles: typing.SupportsInt | typing.SupportsIndex,
-    *,
-    optimum_cad: typing.SupportsFloat | typing.SupportsIndex,
-    arrival_cad: typing.SupportsFloat | typing.SupportsIndex,
-    tail_cycles: typing.SupportsInt | typing.SupportsIndex,
-    exceed_from: typing.SupportsInt | typing.SupportsIndex | None,
-    exceed_above: collections.abc.Sequence[typing.SupportsFloat | typing.SupportsIndex],
-    limits: collections.abc.Sequence[typing.SupportsFloat | typing.SupportsIndex],
-) -> dict:
+def run_loop(bench: EngineBench, seeker: mgdd._core.optimize.GoldenSection, cycles: typing.SupportsInt | typing.SupportsIndex, *, optimum_cad: typing.SupportsFloat | typing.SupportsIndex, arrival_cad: typing.SupportsFloat | typing.SupportsIndex, tail_cycles: typing.SupportsInt | typing.SupportsIndex, exceed_from: typing.SupportsInt | typing.SupportsIndex | None, exceed_above: collections.abc.Sequence[typing.SupportsFloat | typing.SupportsIndex], limits: collections.abc.Sequence[typing.SupportsFloat | typing.SupportsIndex]) -> dict:
     """
     Run a seeker on the bench without the GIL; behind mgdd.loop.run_seeker.
     """
-
 @typing.overload
-def run_loop(
-    bench: EngineBench,
-    seeker: mgdd._core.guide.CurveSeeking,
-    cycles: typing.SupportsInt | typing.SupportsIndex,
-    *,
-    optimum_cad: typing.SupportsFloat | typing.SupportsIndex,
-    arrival_cad: typing.SupportsFloat | typing.SupportsIndex,
-    tail_cycles: typing.SupportsInt | typing.SupportsIndex,
-    exceed_from: typing.SupportsInt | typing.SupportsIndex | None,
-    exceed_above: collections.abc.Sequence[typing.SupportsFloat | typing.SupportsIndex],
-    limits: collections.abc.Sequence[typing.SupportsFloat | typing.SupportsIndex],
-) -> dict:
+def run_loop(bench: EngineBench, seeker: mgdd._core.guide.CurveSeeking, cycles: typing.SupportsInt | typing.SupportsIndex, *, optimum_cad: typing.SupportsFloat | typing.SupportsIndex, arrival_cad: typing.SupportsFloat | typing.SupportsIndex, tail_cycles: typing.SupportsInt | typing.SupportsIndex, exceed_from: typing.SupportsInt | typing.SupportsIndex | None, exceed_above: collections.abc.Sequence[typing.SupportsFloat | typing.SupportsIndex], limits: collections.abc.Sequence[typing.SupportsFloat | typing.SupportsIndex]) -> dict:
     """
     Run a seeker on the bench without the GIL; behind mgdd.loop.run_seeker.
     """
-
-def step_times_us(
-    controller: typing.Any,
-    reference_deg: typing.Annotated[numpy.typing.ArrayLike, numpy.float64],
-    measured_deg: typing.Annotated[numpy.typing.ArrayLike, numpy.float64],
-) -> numpy.typing.NDArray[numpy.float64]:
+def step_times_us(controller: typing.Any, reference_deg: typing.Annotated[numpy.typing.ArrayLike, numpy.float64], measured_deg: typing.Annotated[numpy.typing.ArrayLike, numpy.float64]) -> numpy.typing.NDArray[numpy.float64]:
     """
     Time of every step of a copy of the controller [us].
     """
-
-def track_throttle(
-    controller: typing.Any,
-    plant: VirtualThrottle,
-    *,
-    delay_samples: typing.SupportsInt | typing.SupportsIndex,
-    reference_deg: typing.Annotated[numpy.typing.ArrayLike, numpy.float64],
-    airflow_torque_nm: typing.Annotated[numpy.typing.ArrayLike, numpy.float64],
-    supply_v: typing.Annotated[numpy.typing.ArrayLike, numpy.float64],
-    from_sample: typing.SupportsInt | typing.SupportsIndex,
-    band_deg: typing.SupportsFloat | typing.SupportsIndex,
-) -> dict:
+def track_throttle(controller: typing.Any, plant: VirtualThrottle, *, delay_samples: typing.SupportsInt | typing.SupportsIndex, reference_deg: typing.Annotated[numpy.typing.ArrayLike, numpy.float64], airflow_torque_nm: typing.Annotated[numpy.typing.ArrayLike, numpy.float64], supply_v: typing.Annotated[numpy.typing.ArrayLike, numpy.float64], from_sample: typing.SupportsInt | typing.SupportsIndex, band_deg: typing.SupportsFloat | typing.SupportsIndex) -> dict:
     """
     Run a controller on a virtual throttle without the GIL; behind mgdd.loop.track.
     """
-
-def track_throttles(
-    plants: collections.abc.Sequence[VirtualThrottle],
-    controllers: list,
-    scenarios: collections.abc.Sequence[
-        tuple[
-            typing.Annotated[numpy.typing.ArrayLike, numpy.float64],
-            typing.Annotated[numpy.typing.ArrayLike, numpy.float64],
-            typing.Annotated[numpy.typing.ArrayLike, numpy.float64],
-            typing.SupportsInt | typing.SupportsIndex,
-        ]
-    ],
-    *,
-    delay_samples: typing.SupportsInt | typing.SupportsIndex,
-    band_deg: collections.abc.Sequence[typing.SupportsFloat | typing.SupportsIndex],
-    threads: typing.SupportsInt | typing.SupportsIndex,
-) -> tuple:
+def track_throttles(plants: collections.abc.Sequence[VirtualThrottle], controllers: list, scenarios: collections.abc.Sequence[tuple[typing.Annotated[numpy.typing.ArrayLike, numpy.float64], typing.Annotated[numpy.typing.ArrayLike, numpy.float64], typing.Annotated[numpy.typing.ArrayLike, numpy.float64], typing.SupportsInt | typing.SupportsIndex]], *, delay_samples: typing.SupportsInt | typing.SupportsIndex, band_deg: collections.abc.Sequence[typing.SupportsFloat | typing.SupportsIndex], threads: typing.SupportsInt | typing.SupportsIndex) -> tuple:
     """
     Whole loops on all cores; behind mgdd.loop.track_many.
     """
-
-def tracking_figures(
-    *,
-    reference_deg: typing.Annotated[numpy.typing.ArrayLike, numpy.float64],
-    angle_deg: typing.Annotated[numpy.typing.ArrayLike, numpy.float64],
-    duty: typing.Annotated[numpy.typing.ArrayLike, numpy.float64],
-    sample_s: typing.SupportsFloat | typing.SupportsIndex,
-    from_sample: typing.SupportsInt | typing.SupportsIndex,
-    band_deg: typing.SupportsFloat | typing.SupportsIndex,
-) -> dict:
+def tracking_figures(*, reference_deg: typing.Annotated[numpy.typing.ArrayLike, numpy.float64], angle_deg: typing.Annotated[numpy.typing.ArrayLike, numpy.float64], duty: typing.Annotated[numpy.typing.ArrayLike, numpy.float64], sample_s: typing.SupportsFloat | typing.SupportsIndex, from_sample: typing.SupportsInt | typing.SupportsIndex, band_deg: typing.SupportsFloat | typing.SupportsIndex) -> dict:
     """
     How well a reference was followed.
     """
-
-throttle_fault_kinds: tuple = (
-    "jammed",
-    "jammed_at",
-    "spring_above",
-    "spring_below",
-    "supply_sag",
-    "missing_sample",
-    "nan_sample",
-    "stale_sample",
-)
+throttle_fault_kinds: tuple = ('jammed', 'jammed_at', 'spring_above', 'spring_below', 'supply_sag', 'missing_sample', 'nan_sample', 'stale_sample')

@@ -1,50 +1,27 @@
 """
 Fits, seekers and learners.
 """
-
 from __future__ import annotations
 import collections.abc
 import numpy
 import numpy.typing
 import typing
-
-__all__: list[str] = [
-    "BoundedSeeking",
-    "ComponentLag",
-    "ExtremumSeeking",
-    "FitReport",
-    "GoldenSection",
-    "GradientDescent",
-    "IterativeLearning",
-    "LeastSquaresOptions",
-    "Limit",
-    "NewtonSeeking",
-    "Parameter",
-    "Spsa",
-    "autocorrelation_time",
-    "latin_hypercube",
-    "least_squares",
-    "tune",
-]
-
+__all__: list[str] = ['BoundedSeeking', 'ComponentLag', 'ExtremumSeeking', 'FitReport', 'GoldenSection', 'GradientDescent', 'IterativeLearning', 'LeastSquaresOptions', 'Limit', 'NewtonSeeking', 'Parameter', 'Spsa', 'autocorrelation_time', 'latin_hypercube', 'least_squares', 'tune']
 class Parameter:
     """
     One unknown of a fit: name, bounds, and whether it is searched as its log.
     """
-
     __hash__: typing.ClassVar[None] = None
-    def __eq__(self, arg0: Parameter) -> bool: ...
-    def __getstate__(self) -> tuple: ...
-    def __init__(
-        self,
-        *,
-        name: str,
-        lower: typing.SupportsFloat | typing.SupportsIndex = ...,
-        upper: typing.SupportsFloat | typing.SupportsIndex = ...,
-        log_scaled: bool = False,
-    ) -> None: ...
-    def __repr__(self) -> str: ...
-    def __setstate__(self, arg0: tuple) -> None: ...
+    def __eq__(self, arg0: Parameter) -> bool:
+        ...
+    def __getstate__(self) -> tuple:
+        ...
+    def __init__(self, *, name: str, lower: typing.SupportsFloat | typing.SupportsIndex = ..., upper: typing.SupportsFloat | typing.SupportsIndex = ..., log_scaled: bool = False) -> None:
+        ...
+    def __repr__(self) -> str:
+        ...
+    def __setstate__(self, arg0: tuple) -> None:
+        ...
     @property
     def log_scaled(self) -> bool:
         """
@@ -65,28 +42,22 @@ class Parameter:
         """
         Upper bound, inf for none.
         """
-
 class LeastSquaresOptions:
     """
     When a least-squares search ends and what it reports.
     """
-    def __eq__(self, arg0: typing.Any) -> bool: ...
-    def __getstate__(self) -> tuple[int, dict]: ...
-    def __hash__(self) -> int: ...
-    def __init__(
-        self,
-        *,
-        max_iterations: typing.SupportsInt | typing.SupportsIndex = 200,
-        cost_tolerance: typing.SupportsFloat | typing.SupportsIndex = 1e-12,
-        step_tolerance: typing.SupportsFloat | typing.SupportsIndex = 1e-10,
-        gradient_tolerance: typing.SupportsFloat | typing.SupportsIndex = 1e-12,
-        initial_damping: typing.SupportsFloat | typing.SupportsIndex = 0.001,
-        correlation_limit: typing.SupportsFloat | typing.SupportsIndex = 0.98,
-        rank_tolerance: typing.SupportsFloat | typing.SupportsIndex = 1e-10,
-        evaluate_together: bool = True,
-    ) -> None: ...
-    def __repr__(self) -> str: ...
-    def __setstate__(self, arg0: tuple) -> None: ...
+    def __eq__(self, arg0: typing.Any) -> bool:
+        ...
+    def __getstate__(self) -> tuple[int, dict]:
+        ...
+    def __hash__(self) -> int:
+        ...
+    def __init__(self, *, max_iterations: typing.SupportsInt | typing.SupportsIndex = 200, cost_tolerance: typing.SupportsFloat | typing.SupportsIndex = 1e-12, step_tolerance: typing.SupportsFloat | typing.SupportsIndex = 1e-10, gradient_tolerance: typing.SupportsFloat | typing.SupportsIndex = 1e-12, initial_damping: typing.SupportsFloat | typing.SupportsIndex = 0.001, correlation_limit: typing.SupportsFloat | typing.SupportsIndex = 0.98, rank_tolerance: typing.SupportsFloat | typing.SupportsIndex = 1e-10, evaluate_together: bool = True) -> None:
+        ...
+    def __repr__(self) -> str:
+        ...
+    def __setstate__(self, arg0: tuple) -> None:
+        ...
     def to_dict(self) -> dict:
         """
         Constructor keywords as a new dict.
@@ -131,7 +102,6 @@ class LeastSquaresOptions:
         """
         Step over parameters, scaled [-].
         """
-
 class FitReport:
     """
     Result of a fit as the core gives it; `mgdd.optimize.FitReport` wraps it.
@@ -140,7 +110,8 @@ class FitReport:
         """
         A fit that has not been run.
         """
-    def __repr__(self) -> str: ...
+    def __repr__(self) -> str:
+        ...
     @property
     def bounds_active(self) -> typing.Annotated[numpy.typing.NDArray[numpy.int32], "[m, 1]"]:
         """
@@ -256,11 +227,10 @@ class FitReport:
         """
         Estimates.
         """
-
 class Limit:
     """
     An upper limit on a measured quantity, kept by a seeker.
-
+    
     Parameters
     ----------
     name : str
@@ -284,37 +254,29 @@ class Limit:
     margin_sd : float
         Added to `margin`: this many standard deviations of the reading about the local model that the seeker learns of it.
         Without any, an estimate at the limit is above it in 5 to 25 % of the cycles; with one in less than 1 %.
-
+    
     Raises
     ------
     mgdd.errors.ParameterError
         Limit not finite, negative margin, delay or lag, weight not > 0, ``margin_sd`` outside [0, 100].
-
+    
     Examples
     --------
     >>> from mgdd.optimize import Limit
     >>> Limit("p_max_bar", 95.0, margin=1.0)
     Limit('p_max_bar', 95.0, margin=1.0)
     """
-
     __hash__: typing.ClassVar[None] = None
-    def __eq__(self, arg0: Limit) -> bool: ...
-    def __getstate__(self) -> tuple[str, float, float, str, float, float, float, float, float]: ...
-    def __init__(
-        self,
-        name: str,
-        upper: typing.SupportsFloat | typing.SupportsIndex,
-        *,
-        margin: typing.SupportsFloat | typing.SupportsIndex = 0.0,
-        method: str = "switching",
-        weight: typing.SupportsFloat | typing.SupportsIndex = 1.0,
-        scale: typing.SupportsFloat | typing.SupportsIndex = 0.0,
-        delay_cycles: typing.SupportsFloat | typing.SupportsIndex = 0.0,
-        lag_cycles: typing.SupportsFloat | typing.SupportsIndex = 0.0,
-        margin_sd: typing.SupportsFloat | typing.SupportsIndex = 1.0,
-    ) -> None: ...
-    def __repr__(self) -> str: ...
-    def __setstate__(self, arg0: tuple) -> None: ...
+    def __eq__(self, arg0: Limit) -> bool:
+        ...
+    def __getstate__(self) -> tuple[str, float, float, str, float, float, float, float, float]:
+        ...
+    def __init__(self, name: str, upper: typing.SupportsFloat | typing.SupportsIndex, *, margin: typing.SupportsFloat | typing.SupportsIndex = 0.0, method: str = 'switching', weight: typing.SupportsFloat | typing.SupportsIndex = 1.0, scale: typing.SupportsFloat | typing.SupportsIndex = 0.0, delay_cycles: typing.SupportsFloat | typing.SupportsIndex = 0.0, lag_cycles: typing.SupportsFloat | typing.SupportsIndex = 0.0, margin_sd: typing.SupportsFloat | typing.SupportsIndex = 1.0) -> None:
+        ...
+    def __repr__(self) -> str:
+        ...
+    def __setstate__(self, arg0: tuple) -> None:
+        ...
     @property
     def delay_cycles(self) -> float:
         """
@@ -360,23 +322,22 @@ class Limit:
         """
         Of penalty or barrier.
         """
-
 class ComponentLag:
     """
     What stands between the plant and one measured component of J.
-
+    
     Parameters
     ----------
     delay_cycles : float
         Transport delay [cycles].
     lag_cycles : float
         Time constant of the first-order lag y += (1 - exp(-1/tau)) (x - y) [cycles]; 0 for none.
-
+    
     Raises
     ------
     mgdd.errors.ParameterError
         A negative delay or lag.
-
+    
     Examples
     --------
     >>> from mgdd.optimize import ComponentLag
@@ -384,24 +345,18 @@ class ComponentLag:
     >>> round(gain, 4), round(phase_deg % 360.0, 1)
     (0.0646, 140.5)
     """
-
     __hash__: typing.ClassVar[None] = None
-    def __eq__(self, arg0: ComponentLag) -> bool: ...
-    def __getstate__(self) -> tuple[float, float]: ...
-    def __init__(
-        self,
-        *,
-        delay_cycles: typing.SupportsFloat | typing.SupportsIndex = 0.0,
-        lag_cycles: typing.SupportsFloat | typing.SupportsIndex = 0.0,
-    ) -> None: ...
-    def __repr__(self) -> str: ...
-    def __setstate__(self, arg0: tuple) -> None: ...
-    def response(
-        self,
-        *,
-        period: typing.SupportsInt | typing.SupportsIndex,
-        harmonic: typing.SupportsInt | typing.SupportsIndex = 1,
-    ) -> tuple[float, float]:
+    def __eq__(self, arg0: ComponentLag) -> bool:
+        ...
+    def __getstate__(self) -> tuple[float, float]:
+        ...
+    def __init__(self, *, delay_cycles: typing.SupportsFloat | typing.SupportsIndex = 0.0, lag_cycles: typing.SupportsFloat | typing.SupportsIndex = 0.0) -> None:
+        ...
+    def __repr__(self) -> str:
+        ...
+    def __setstate__(self, arg0: tuple) -> None:
+        ...
+    def response(self, *, period: typing.SupportsInt | typing.SupportsIndex, harmonic: typing.SupportsInt | typing.SupportsIndex = 1) -> tuple[float, float]:
         """
         Gain [-] and phase lag [deg] at `harmonic` oscillations per `period` cycles.
         """
@@ -415,35 +370,12 @@ class ComponentLag:
         """
         Time constant of the lag [cycles].
         """
-
 class ExtremumSeeking:
     """
     Extremum seeking; see mgdd.optimize.ExtremumSeeking.
     """
-    def __init__(
-        self,
-        *,
-        start: typing.Any,
-        lower: typing.Any = ...,
-        upper: typing.Any = ...,
-        form: str = "batch",
-        amplitude: typing.Any = 1.0,
-        period: typing.SupportsInt | typing.SupportsIndex = 10,
-        harmonics: collections.abc.Sequence[typing.SupportsInt | typing.SupportsIndex] | None = None,
-        gain: typing.Any = 0.98,
-        rate: typing.Any = None,
-        recovery_rate: typing.Any = None,
-        washout_pole: typing.SupportsFloat | typing.SupportsIndex = 0.9,
-        low_pass: typing.SupportsFloat | typing.SupportsIndex = 1.0,
-        components: collections.abc.Sequence[ComponentLag] | None = None,
-        hold_cycles: typing.SupportsInt | typing.SupportsIndex | None = None,
-        amplitude_floor: typing.SupportsFloat | typing.SupportsIndex = 1.0,
-        full_gradient: typing.SupportsFloat | typing.SupportsIndex = 0.0,
-        limit_amplitude: typing.SupportsFloat | typing.SupportsIndex = 0.5,
-        maximize: bool = True,
-        limits: collections.abc.Sequence[Limit] = [],
-        curvature: typing.SupportsFloat | typing.SupportsIndex | None = None,
-    ) -> None: ...
+    def __init__(self, *, start: typing.Any, lower: typing.Any = ..., upper: typing.Any = ..., form: str = 'batch', amplitude: typing.Any = 1.0, period: typing.SupportsInt | typing.SupportsIndex = 10, harmonics: collections.abc.Sequence[typing.SupportsInt | typing.SupportsIndex] | None = None, gain: typing.Any = 0.98, rate: typing.Any = None, recovery_rate: typing.Any = None, washout_pole: typing.SupportsFloat | typing.SupportsIndex = 0.9, low_pass: typing.SupportsFloat | typing.SupportsIndex = 1.0, components: collections.abc.Sequence[ComponentLag] | None = None, hold_cycles: typing.SupportsInt | typing.SupportsIndex | None = None, amplitude_floor: typing.SupportsFloat | typing.SupportsIndex = 1.0, full_gradient: typing.SupportsFloat | typing.SupportsIndex = 0.0, limit_amplitude: typing.SupportsFloat | typing.SupportsIndex = 0.5, maximize: bool = True, limits: collections.abc.Sequence[Limit] = [], curvature: typing.SupportsFloat | typing.SupportsIndex | None = None) -> None:
+        ...
     def _clear_history(self) -> None:
         """
         Forget the history, keep the state.
@@ -452,9 +384,7 @@ class ExtremumSeeking:
         """
         Columns behind .history.
         """
-    def _set_history_columns(
-        self, columns: collections.abc.Mapping[str, typing.Annotated[numpy.typing.ArrayLike, numpy.float64]]
-    ) -> None:
+    def _set_history_columns(self, columns: collections.abc.Mapping[str, typing.Annotated[numpy.typing.ArrayLike, numpy.float64]]) -> None:
         """
         Columns behind .history, as _history_columns gave them.
         """
@@ -466,12 +396,10 @@ class ExtremumSeeking:
         """
         The operating point has changed: forget the window, keep the estimate.
         """
-    def tell(
-        self, J: typing.Any = None, limits: typing.Any = None, *, misfire: bool = False, applied: typing.Any = None
-    ) -> None:
+    def tell(self, J: typing.Any = None, limits: typing.Any = None, *, misfire: bool = False, applied: typing.Any = None) -> None:
         """
         Accept what was measured at the input of the last ask.
-
+        
         J: float, or one number per component; limits: one value per limit, in order or by name;
         misfire: the cycle is counted and its J and limits are not read;
         applied: what the plant really applied, one number per input; None where it is what was asked for.
@@ -532,36 +460,14 @@ class ExtremumSeeking:
         a state of another kind or size raises ParameterError and changes nothing.
         """
     @state.setter
-    def state(
-        self, arg1: collections.abc.Mapping[str, collections.abc.Sequence[typing.SupportsFloat | typing.SupportsIndex]]
-    ) -> None: ...
-
+    def state(self, arg1: collections.abc.Mapping[str, collections.abc.Sequence[typing.SupportsFloat | typing.SupportsIndex]]) -> None:
+        ...
 class NewtonSeeking:
     """
     Newton extremum seeking; see mgdd.optimize.NewtonSeeking.
     """
-    def __init__(
-        self,
-        *,
-        start: typing.Any,
-        lower: typing.Any = ...,
-        upper: typing.Any = ...,
-        amplitude: typing.Any = 2.0,
-        period: typing.SupportsInt | typing.SupportsIndex = 10,
-        harmonics: collections.abc.Sequence[typing.SupportsInt | typing.SupportsIndex] | None = None,
-        time_constant_cycles: typing.SupportsFloat | typing.SupportsIndex = 40.0,
-        hessian_rate: typing.SupportsFloat | typing.SupportsIndex = 0.03,
-        riccati_rate: typing.SupportsFloat | typing.SupportsIndex = 0.02,
-        initial_hessian: typing.Any = -0.051,
-        initial_inverse: typing.Any = -20.0,
-        largest_inverse: typing.SupportsFloat | typing.SupportsIndex = 100.0,
-        hold_cycles: typing.SupportsInt | typing.SupportsIndex = 300,
-        rate: typing.Any = None,
-        components: collections.abc.Sequence[ComponentLag] | None = None,
-        limit_amplitude: typing.SupportsFloat | typing.SupportsIndex = 0.5,
-        maximize: bool = True,
-        limits: collections.abc.Sequence[Limit] = [],
-    ) -> None: ...
+    def __init__(self, *, start: typing.Any, lower: typing.Any = ..., upper: typing.Any = ..., amplitude: typing.Any = 2.0, period: typing.SupportsInt | typing.SupportsIndex = 10, harmonics: collections.abc.Sequence[typing.SupportsInt | typing.SupportsIndex] | None = None, time_constant_cycles: typing.SupportsFloat | typing.SupportsIndex = 40.0, hessian_rate: typing.SupportsFloat | typing.SupportsIndex = 0.03, riccati_rate: typing.SupportsFloat | typing.SupportsIndex = 0.02, initial_hessian: typing.Any = -0.051, initial_inverse: typing.Any = -20.0, largest_inverse: typing.SupportsFloat | typing.SupportsIndex = 100.0, hold_cycles: typing.SupportsInt | typing.SupportsIndex = 300, rate: typing.Any = None, components: collections.abc.Sequence[ComponentLag] | None = None, limit_amplitude: typing.SupportsFloat | typing.SupportsIndex = 0.5, maximize: bool = True, limits: collections.abc.Sequence[Limit] = []) -> None:
+        ...
     def _clear_history(self) -> None:
         """
         Forget the history, keep the state.
@@ -570,9 +476,7 @@ class NewtonSeeking:
         """
         Columns behind .history.
         """
-    def _set_history_columns(
-        self, columns: collections.abc.Mapping[str, typing.Annotated[numpy.typing.ArrayLike, numpy.float64]]
-    ) -> None:
+    def _set_history_columns(self, columns: collections.abc.Mapping[str, typing.Annotated[numpy.typing.ArrayLike, numpy.float64]]) -> None:
         """
         Columns behind .history, as _history_columns gave them.
         """
@@ -584,12 +488,10 @@ class NewtonSeeking:
         """
         The operating point has changed: forget the window, keep the estimate.
         """
-    def tell(
-        self, J: typing.Any = None, limits: typing.Any = None, *, misfire: bool = False, applied: typing.Any = None
-    ) -> None:
+    def tell(self, J: typing.Any = None, limits: typing.Any = None, *, misfire: bool = False, applied: typing.Any = None) -> None:
         """
         Accept what was measured at the input of the last ask.
-
+        
         J: float, or one number per component; limits: one value per limit, in order or by name;
         misfire: the cycle is counted and its J and limits are not read;
         applied: what the plant really applied, one number per input; None where it is what was asked for.
@@ -655,28 +557,14 @@ class NewtonSeeking:
         a state of another kind or size raises ParameterError and changes nothing.
         """
     @state.setter
-    def state(
-        self, arg1: collections.abc.Mapping[str, collections.abc.Sequence[typing.SupportsFloat | typing.SupportsIndex]]
-    ) -> None: ...
-
+    def state(self, arg1: collections.abc.Mapping[str, collections.abc.Sequence[typing.SupportsFloat | typing.SupportsIndex]]) -> None:
+        ...
 class BoundedSeeking:
     """
     Bounded extremum seeking; see mgdd.optimize.BoundedSeeking.
     """
-    def __init__(
-        self,
-        *,
-        start: typing.Any,
-        lower: typing.Any = ...,
-        upper: typing.Any = ...,
-        amplitude: typing.Any = 1.0,
-        period: typing.SupportsInt | typing.SupportsIndex = 10,
-        harmonics: collections.abc.Sequence[typing.SupportsInt | typing.SupportsIndex] | None = None,
-        kappa: typing.SupportsFloat | typing.SupportsIndex = 1.0,
-        maximize: bool = True,
-        limits: collections.abc.Sequence[Limit] = [],
-        curvature: typing.SupportsFloat | typing.SupportsIndex | None = None,
-    ) -> None: ...
+    def __init__(self, *, start: typing.Any, lower: typing.Any = ..., upper: typing.Any = ..., amplitude: typing.Any = 1.0, period: typing.SupportsInt | typing.SupportsIndex = 10, harmonics: collections.abc.Sequence[typing.SupportsInt | typing.SupportsIndex] | None = None, kappa: typing.SupportsFloat | typing.SupportsIndex = 1.0, maximize: bool = True, limits: collections.abc.Sequence[Limit] = [], curvature: typing.SupportsFloat | typing.SupportsIndex | None = None) -> None:
+        ...
     def _clear_history(self) -> None:
         """
         Forget the history, keep the state.
@@ -685,9 +573,7 @@ class BoundedSeeking:
         """
         Columns behind .history.
         """
-    def _set_history_columns(
-        self, columns: collections.abc.Mapping[str, typing.Annotated[numpy.typing.ArrayLike, numpy.float64]]
-    ) -> None:
+    def _set_history_columns(self, columns: collections.abc.Mapping[str, typing.Annotated[numpy.typing.ArrayLike, numpy.float64]]) -> None:
         """
         Columns behind .history, as _history_columns gave them.
         """
@@ -699,12 +585,10 @@ class BoundedSeeking:
         """
         The operating point has changed: forget the window, keep the estimate.
         """
-    def tell(
-        self, J: typing.Any = None, limits: typing.Any = None, *, misfire: bool = False, applied: typing.Any = None
-    ) -> None:
+    def tell(self, J: typing.Any = None, limits: typing.Any = None, *, misfire: bool = False, applied: typing.Any = None) -> None:
         """
         Accept what was measured at the input of the last ask.
-
+        
         J: float, or one number per component; limits: one value per limit, in order or by name;
         misfire: the cycle is counted and its J and limits are not read;
         applied: what the plant really applied, one number per input; None where it is what was asked for.
@@ -755,39 +639,14 @@ class BoundedSeeking:
         a state of another kind or size raises ParameterError and changes nothing.
         """
     @state.setter
-    def state(
-        self, arg1: collections.abc.Mapping[str, collections.abc.Sequence[typing.SupportsFloat | typing.SupportsIndex]]
-    ) -> None: ...
-
+    def state(self, arg1: collections.abc.Mapping[str, collections.abc.Sequence[typing.SupportsFloat | typing.SupportsIndex]]) -> None:
+        ...
 class Spsa:
     """
     Simultaneous perturbation; see mgdd.optimize.Spsa.
     """
-    def __init__(
-        self,
-        *,
-        start: typing.Any,
-        lower: typing.Any = ...,
-        upper: typing.Any = ...,
-        form: str = "first_order",
-        schedule: str = "decreasing",
-        gain: typing.SupportsFloat | typing.SupportsIndex | None = None,
-        stability: typing.SupportsFloat | typing.SupportsIndex = 50.0,
-        gain_exponent: typing.SupportsFloat | typing.SupportsIndex = 0.602,
-        perturbation: typing.SupportsFloat | typing.SupportsIndex = 1.5,
-        perturbation_exponent: typing.SupportsFloat | typing.SupportsIndex = 0.101,
-        step_max: typing.SupportsFloat | typing.SupportsIndex | None = None,
-        averaging: typing.SupportsInt | typing.SupportsIndex = 1,
-        blocking: bool = False,
-        noise_sd: typing.SupportsFloat | typing.SupportsIndex = 0.0,
-        initial_hessian: typing.SupportsFloat | typing.SupportsIndex = -0.051,
-        hessian_prior: typing.SupportsFloat | typing.SupportsIndex = 20.0,
-        limit_amplitude: typing.SupportsFloat | typing.SupportsIndex = 0.5,
-        seed: typing.SupportsInt | typing.SupportsIndex = 0,
-        maximize: bool = True,
-        limits: collections.abc.Sequence[Limit] = [],
-        curvature: typing.SupportsFloat | typing.SupportsIndex | None = None,
-    ) -> None: ...
+    def __init__(self, *, start: typing.Any, lower: typing.Any = ..., upper: typing.Any = ..., form: str = 'first_order', schedule: str = 'decreasing', gain: typing.SupportsFloat | typing.SupportsIndex | None = None, stability: typing.SupportsFloat | typing.SupportsIndex = 50.0, gain_exponent: typing.SupportsFloat | typing.SupportsIndex = 0.602, perturbation: typing.SupportsFloat | typing.SupportsIndex = 1.5, perturbation_exponent: typing.SupportsFloat | typing.SupportsIndex = 0.101, step_max: typing.SupportsFloat | typing.SupportsIndex | None = None, averaging: typing.SupportsInt | typing.SupportsIndex = 1, blocking: bool = False, noise_sd: typing.SupportsFloat | typing.SupportsIndex = 0.0, initial_hessian: typing.SupportsFloat | typing.SupportsIndex = -0.051, hessian_prior: typing.SupportsFloat | typing.SupportsIndex = 20.0, limit_amplitude: typing.SupportsFloat | typing.SupportsIndex = 0.5, seed: typing.SupportsInt | typing.SupportsIndex = 0, maximize: bool = True, limits: collections.abc.Sequence[Limit] = [], curvature: typing.SupportsFloat | typing.SupportsIndex | None = None) -> None:
+        ...
     def _clear_history(self) -> None:
         """
         Forget the history, keep the state.
@@ -796,9 +655,7 @@ class Spsa:
         """
         Columns behind .history.
         """
-    def _set_history_columns(
-        self, columns: collections.abc.Mapping[str, typing.Annotated[numpy.typing.ArrayLike, numpy.float64]]
-    ) -> None:
+    def _set_history_columns(self, columns: collections.abc.Mapping[str, typing.Annotated[numpy.typing.ArrayLike, numpy.float64]]) -> None:
         """
         Columns behind .history, as _history_columns gave them.
         """
@@ -810,12 +667,10 @@ class Spsa:
         """
         The operating point has changed: forget the window, keep the estimate.
         """
-    def tell(
-        self, J: typing.Any = None, limits: typing.Any = None, *, misfire: bool = False, applied: typing.Any = None
-    ) -> None:
+    def tell(self, J: typing.Any = None, limits: typing.Any = None, *, misfire: bool = False, applied: typing.Any = None) -> None:
         """
         Accept what was measured at the input of the last ask.
-
+        
         J: float, or one number per component; limits: one value per limit, in order or by name;
         misfire: the cycle is counted and its J and limits are not read;
         applied: what the plant really applied, one number per input; None where it is what was asked for.
@@ -891,29 +746,14 @@ class Spsa:
         a state of another kind or size raises ParameterError and changes nothing.
         """
     @state.setter
-    def state(
-        self, arg1: collections.abc.Mapping[str, collections.abc.Sequence[typing.SupportsFloat | typing.SupportsIndex]]
-    ) -> None: ...
-
+    def state(self, arg1: collections.abc.Mapping[str, collections.abc.Sequence[typing.SupportsFloat | typing.SupportsIndex]]) -> None:
+        ...
 class GradientDescent:
     """
     Two-sided differences; see mgdd.optimize.GradientDescent.
     """
-    def __init__(
-        self,
-        *,
-        start: typing.Any,
-        lower: typing.Any = ...,
-        upper: typing.Any = ...,
-        step_size: typing.SupportsFloat | typing.SupportsIndex = 15.0,
-        difference: typing.SupportsFloat | typing.SupportsIndex = 1.0,
-        rate: typing.Any = None,
-        tolerance: typing.SupportsFloat | typing.SupportsIndex = 0.02,
-        iterations: typing.SupportsInt | typing.SupportsIndex = 60,
-        maximize: bool = True,
-        limits: collections.abc.Sequence[Limit] = [],
-        curvature: typing.SupportsFloat | typing.SupportsIndex | None = None,
-    ) -> None: ...
+    def __init__(self, *, start: typing.Any, lower: typing.Any = ..., upper: typing.Any = ..., step_size: typing.SupportsFloat | typing.SupportsIndex = 15.0, difference: typing.SupportsFloat | typing.SupportsIndex = 1.0, rate: typing.Any = None, tolerance: typing.SupportsFloat | typing.SupportsIndex = 0.02, iterations: typing.SupportsInt | typing.SupportsIndex = 60, maximize: bool = True, limits: collections.abc.Sequence[Limit] = [], curvature: typing.SupportsFloat | typing.SupportsIndex | None = None) -> None:
+        ...
     def _clear_history(self) -> None:
         """
         Forget the history, keep the state.
@@ -922,9 +762,7 @@ class GradientDescent:
         """
         Columns behind .history.
         """
-    def _set_history_columns(
-        self, columns: collections.abc.Mapping[str, typing.Annotated[numpy.typing.ArrayLike, numpy.float64]]
-    ) -> None:
+    def _set_history_columns(self, columns: collections.abc.Mapping[str, typing.Annotated[numpy.typing.ArrayLike, numpy.float64]]) -> None:
         """
         Columns behind .history, as _history_columns gave them.
         """
@@ -936,12 +774,10 @@ class GradientDescent:
         """
         The operating point has changed: forget the window, keep the estimate.
         """
-    def tell(
-        self, J: typing.Any = None, limits: typing.Any = None, *, misfire: bool = False, applied: typing.Any = None
-    ) -> None:
+    def tell(self, J: typing.Any = None, limits: typing.Any = None, *, misfire: bool = False, applied: typing.Any = None) -> None:
         """
         Accept what was measured at the input of the last ask.
-
+        
         J: float, or one number per component; limits: one value per limit, in order or by name;
         misfire: the cycle is counted and its J and limits are not read;
         applied: what the plant really applied, one number per input; None where it is what was asked for.
@@ -1007,27 +843,14 @@ class GradientDescent:
         a state of another kind or size raises ParameterError and changes nothing.
         """
     @state.setter
-    def state(
-        self, arg1: collections.abc.Mapping[str, collections.abc.Sequence[typing.SupportsFloat | typing.SupportsIndex]]
-    ) -> None: ...
-
+    def state(self, arg1: collections.abc.Mapping[str, collections.abc.Sequence[typing.SupportsFloat | typing.SupportsIndex]]) -> None:
+        ...
 class GoldenSection:
     """
     Golden-section search; see mgdd.optimize.GoldenSection.
     """
-    def __init__(
-        self,
-        *,
-        start: typing.Any,
-        lower: typing.Any,
-        upper: typing.Any,
-        noise_sd: typing.SupportsFloat | typing.SupportsIndex = 0.0,
-        significance: typing.SupportsFloat | typing.SupportsIndex = 2.0,
-        samples_max: typing.SupportsInt | typing.SupportsIndex = 8,
-        tolerance: typing.SupportsFloat | typing.SupportsIndex = 0.02,
-        maximize: bool = True,
-        limits: collections.abc.Sequence[Limit] = [],
-    ) -> None: ...
+    def __init__(self, *, start: typing.Any, lower: typing.Any, upper: typing.Any, noise_sd: typing.SupportsFloat | typing.SupportsIndex = 0.0, significance: typing.SupportsFloat | typing.SupportsIndex = 2.0, samples_max: typing.SupportsInt | typing.SupportsIndex = 8, tolerance: typing.SupportsFloat | typing.SupportsIndex = 0.02, maximize: bool = True, limits: collections.abc.Sequence[Limit] = []) -> None:
+        ...
     def _clear_history(self) -> None:
         """
         Forget the history, keep the state.
@@ -1036,9 +859,7 @@ class GoldenSection:
         """
         Columns behind .history.
         """
-    def _set_history_columns(
-        self, columns: collections.abc.Mapping[str, typing.Annotated[numpy.typing.ArrayLike, numpy.float64]]
-    ) -> None:
+    def _set_history_columns(self, columns: collections.abc.Mapping[str, typing.Annotated[numpy.typing.ArrayLike, numpy.float64]]) -> None:
         """
         Columns behind .history, as _history_columns gave them.
         """
@@ -1050,12 +871,10 @@ class GoldenSection:
         """
         The operating point has changed: forget the window, keep the estimate.
         """
-    def tell(
-        self, J: typing.Any = None, limits: typing.Any = None, *, misfire: bool = False, applied: typing.Any = None
-    ) -> None:
+    def tell(self, J: typing.Any = None, limits: typing.Any = None, *, misfire: bool = False, applied: typing.Any = None) -> None:
         """
         Accept what was measured at the input of the last ask.
-
+        
         J: float, or one number per component; limits: one value per limit, in order or by name;
         misfire: the cycle is counted and its J and limits are not read;
         applied: what the plant really applied, one number per input; None where it is what was asked for.
@@ -1116,34 +935,14 @@ class GoldenSection:
         a state of another kind or size raises ParameterError and changes nothing.
         """
     @state.setter
-    def state(
-        self, arg1: collections.abc.Mapping[str, collections.abc.Sequence[typing.SupportsFloat | typing.SupportsIndex]]
-    ) -> None: ...
-
+    def state(self, arg1: collections.abc.Mapping[str, collections.abc.Sequence[typing.SupportsFloat | typing.SupportsIndex]]) -> None:
+        ...
 class IterativeLearning:
     """
     Iterative learning control, ask and tell.
     """
-    def __init__(
-        self,
-        initial: typing.Annotated[numpy.typing.ArrayLike, numpy.float64],
-        *,
-        law: str,
-        impulse_response: typing.Annotated[numpy.typing.ArrayLike, numpy.float64],
-        relative_degree: typing.SupportsInt | typing.SupportsIndex | None = None,
-        k_p: typing.SupportsFloat | typing.SupportsIndex | None = None,
-        k_d: typing.SupportsFloat | typing.SupportsIndex | None = None,
-        learning_function: typing.Annotated[numpy.typing.ArrayLike, numpy.float64],
-        lead: typing.SupportsInt | typing.SupportsIndex | None = None,
-        cutoff: typing.SupportsFloat | typing.SupportsIndex | None = None,
-        error_weight: typing.SupportsFloat | typing.SupportsIndex | None = None,
-        input_weight: typing.SupportsFloat | typing.SupportsIndex | None = None,
-        change_weight: typing.SupportsFloat | typing.SupportsIndex | None = None,
-        lower: typing.SupportsFloat | typing.SupportsIndex = ...,
-        upper: typing.SupportsFloat | typing.SupportsIndex = ...,
-        rate: typing.SupportsFloat | typing.SupportsIndex = ...,
-        guard: bool = True,
-    ) -> None: ...
+    def __init__(self, initial: typing.Annotated[numpy.typing.ArrayLike, numpy.float64], *, law: str, impulse_response: typing.Annotated[numpy.typing.ArrayLike, numpy.float64], relative_degree: typing.SupportsInt | typing.SupportsIndex | None = None, k_p: typing.SupportsFloat | typing.SupportsIndex | None = None, k_d: typing.SupportsFloat | typing.SupportsIndex | None = None, learning_function: typing.Annotated[numpy.typing.ArrayLike, numpy.float64], lead: typing.SupportsInt | typing.SupportsIndex | None = None, cutoff: typing.SupportsFloat | typing.SupportsIndex | None = None, error_weight: typing.SupportsFloat | typing.SupportsIndex | None = None, input_weight: typing.SupportsFloat | typing.SupportsIndex | None = None, change_weight: typing.SupportsFloat | typing.SupportsIndex | None = None, lower: typing.SupportsFloat | typing.SupportsIndex = ..., upper: typing.SupportsFloat | typing.SupportsIndex = ..., rate: typing.SupportsFloat | typing.SupportsIndex = ..., guard: bool = True) -> None:
+        ...
     def ask(self) -> numpy.typing.NDArray[numpy.float64]:
         """
         Input of this trial.
@@ -1152,9 +951,7 @@ class IterativeLearning:
         """
         Findings of the linear theory, by name. Releases the GIL.
         """
-    def restore(
-        self, state: collections.abc.Mapping[str, collections.abc.Sequence[typing.SupportsFloat | typing.SupportsIndex]]
-    ) -> None:
+    def restore(self, state: collections.abc.Mapping[str, collections.abc.Sequence[typing.SupportsFloat | typing.SupportsIndex]]) -> None:
         """
         Go on from the columns of `state`.
         """
@@ -1201,47 +998,19 @@ class IterativeLearning:
         """
         Number of the trial to come.
         """
-
 def autocorrelation_time(residual: typing.Annotated[numpy.typing.ArrayLike, numpy.float64, "[m, 1]"]) -> float:
     """
     Integrated autocorrelation time of a residual about zero, in samples (Geyer 1992).
     """
-
-def latin_hypercube(
-    parameters: collections.abc.Sequence[Parameter],
-    n: typing.SupportsInt | typing.SupportsIndex,
-    seed: typing.SupportsInt | typing.SupportsIndex,
-) -> list[typing.Annotated[numpy.typing.NDArray[numpy.float64], "[m, 1]"]]:
+def latin_hypercube(parameters: collections.abc.Sequence[Parameter], n: typing.SupportsInt | typing.SupportsIndex, seed: typing.SupportsInt | typing.SupportsIndex) -> list[typing.Annotated[numpy.typing.NDArray[numpy.float64], "[m, 1]"]]:
     """
     Points between the bounds, one per cell of every axis.
     """
-
-def least_squares(
-    fun: collections.abc.Callable,
-    x0: typing.Annotated[numpy.typing.ArrayLike, numpy.float64, "[m, 1]"],
-    *,
-    parameters: collections.abc.Sequence[Parameter],
-    options: LeastSquaresOptions,
-) -> FitReport:
+def least_squares(fun: collections.abc.Callable, x0: typing.Annotated[numpy.typing.ArrayLike, numpy.float64, "[m, 1]"], *, parameters: collections.abc.Sequence[Parameter], options: LeastSquaresOptions) -> FitReport:
     """
     Minimise sum(residual^2) / 2 for `fun(x) -> (residual, jacobian)`; None refuses a point.
     """
-
-def tune(
-    *,
-    noise_sd: typing.SupportsFloat | typing.SupportsIndex,
-    curvature: typing.SupportsFloat | typing.SupportsIndex,
-    method: str,
-    delay_cycles: typing.SupportsFloat | typing.SupportsIndex,
-    lag_cycles: typing.SupportsFloat | typing.SupportsIndex,
-    compensated: bool,
-    delay_uncertainty: typing.SupportsFloat | typing.SupportsIndex | None,
-    rms: typing.SupportsFloat | typing.SupportsIndex | None,
-    cycles: typing.SupportsFloat | typing.SupportsIndex | None,
-    distance: typing.SupportsFloat | typing.SupportsIndex | None,
-    arrival: typing.SupportsFloat | typing.SupportsIndex | None,
-    amplitude_max: typing.SupportsFloat | typing.SupportsIndex | None,
-) -> dict:
+def tune(*, noise_sd: typing.SupportsFloat | typing.SupportsIndex, curvature: typing.SupportsFloat | typing.SupportsIndex, method: str, delay_cycles: typing.SupportsFloat | typing.SupportsIndex, lag_cycles: typing.SupportsFloat | typing.SupportsIndex, compensated: bool, delay_uncertainty: typing.SupportsFloat | typing.SupportsIndex | None, rms: typing.SupportsFloat | typing.SupportsIndex | None, cycles: typing.SupportsFloat | typing.SupportsIndex | None, distance: typing.SupportsFloat | typing.SupportsIndex | None, arrival: typing.SupportsFloat | typing.SupportsIndex | None, amplitude_max: typing.SupportsFloat | typing.SupportsIndex | None) -> dict:
     """
     Behind mgdd.optimize.tune.
     """

@@ -1,48 +1,20 @@
 """
 Between a controller and a real actuator: frames of a bus, their protection and signals, records, the safety gate, buses, the loop.
 """
-
 from __future__ import annotations
 import collections.abc
 import numpy
 import numpy.typing
 import typing
 import typing_extensions
-
-__all__: list[str] = [
-    "Drive",
-    "E2eCheck",
-    "E2eSettings",
-    "Frame",
-    "RealtimeLoop",
-    "RecordReader",
-    "RecordWriter",
-    "RingTransport",
-    "SafetyEnvelope",
-    "SafetyGate",
-    "SignalLayout",
-    "SocketCanTransport",
-    "bus_states",
-    "check_message",
-    "commanded_names",
-    "crc8",
-    "measured_names",
-    "protect",
-    "read_record",
-    "repair_record",
-    "safety_reasons",
-    "safety_requests",
-    "safety_states",
-    "send_results",
-]
-
+__all__: list[str] = ['Drive', 'E2eCheck', 'E2eSettings', 'Frame', 'RealtimeLoop', 'RecordReader', 'RecordWriter', 'RingTransport', 'SafetyEnvelope', 'SafetyGate', 'SignalLayout', 'SocketCanTransport', 'bus_states', 'check_message', 'commanded_names', 'crc8', 'measured_names', 'protect', 'read_record', 'repair_record', 'safety_reasons', 'safety_requests', 'safety_states', 'send_results']
 class E2eSettings:
     """
     End-to-end protection of a CAN payload: an alive counter and a CRC-8.
-
+    
     Keyword-only and immutable. The defaults are those of a frame of 8 bytes with the CRC in its first byte and the counter
     in the low half of the second. Much like AUTOSAR profiles 1 and 2; not a conformant implementation of either.
-
+    
     Parameters
     ----------
     crc : str or tuple of int
@@ -67,12 +39,12 @@ class E2eSettings:
         Largest step between two frames that counts as good: one less may be lost.
     bad_until_invalid, good_until_valid : int
         Frames in a row until `E2eCheck.valid` changes.
-
+    
     Raises
     ------
     mgdd.errors.ParameterError
         A field outside its domain, naming field, value and bound.
-
+    
     Examples
     --------
     >>> from mgdd.rig import E2eCheck, E2eSettings, protect
@@ -83,32 +55,18 @@ class E2eSettings:
     >>> check.push(protect(E2eSettings(data_id=0x121), 7, bytes(8)))
     'wrong_crc'
     """
-    def __eq__(self, arg0: typing.Any) -> bool: ...
-    def __getstate__(self) -> tuple[int, dict]: ...
-    def __hash__(self) -> int: ...
-    def __init__(
-        self,
-        *,
-        crc: str
-        | tuple[
-            typing.SupportsInt | typing.SupportsIndex,
-            typing.SupportsInt | typing.SupportsIndex,
-            typing.SupportsInt | typing.SupportsIndex,
-        ] = "sae_j1850",
-        data_id: typing.SupportsInt | typing.SupportsIndex = 0,
-        data_id_mode: str = "both",
-        data_id_list: collections.abc.Sequence[typing.SupportsInt | typing.SupportsIndex] | None = None,
-        size: typing.SupportsInt | typing.SupportsIndex = 8,
-        crc_byte: typing.SupportsInt | typing.SupportsIndex = 0,
-        counter_byte: typing.SupportsInt | typing.SupportsIndex = 1,
-        counter_place: str = "low_nibble",
-        counter_modulus: typing.SupportsInt | typing.SupportsIndex = 16,
-        max_step: typing.SupportsInt | typing.SupportsIndex = 3,
-        bad_until_invalid: typing.SupportsInt | typing.SupportsIndex = 3,
-        good_until_valid: typing.SupportsInt | typing.SupportsIndex = 2,
-    ) -> None: ...
-    def __repr__(self) -> str: ...
-    def __setstate__(self, arg0: tuple) -> None: ...
+    def __eq__(self, arg0: typing.Any) -> bool:
+        ...
+    def __getstate__(self) -> tuple[int, dict]:
+        ...
+    def __hash__(self) -> int:
+        ...
+    def __init__(self, *, crc: str | tuple[typing.SupportsInt | typing.SupportsIndex, typing.SupportsInt | typing.SupportsIndex, typing.SupportsInt | typing.SupportsIndex] = 'sae_j1850', data_id: typing.SupportsInt | typing.SupportsIndex = 0, data_id_mode: str = 'both', data_id_list: collections.abc.Sequence[typing.SupportsInt | typing.SupportsIndex] | None = None, size: typing.SupportsInt | typing.SupportsIndex = 8, crc_byte: typing.SupportsInt | typing.SupportsIndex = 0, counter_byte: typing.SupportsInt | typing.SupportsIndex = 1, counter_place: str = 'low_nibble', counter_modulus: typing.SupportsInt | typing.SupportsIndex = 16, max_step: typing.SupportsInt | typing.SupportsIndex = 3, bad_until_invalid: typing.SupportsInt | typing.SupportsIndex = 3, good_until_valid: typing.SupportsInt | typing.SupportsIndex = 2) -> None:
+        ...
+    def __repr__(self) -> str:
+        ...
+    def __setstate__(self, arg0: tuple) -> None:
+        ...
     def next_counter(self, counter: typing.SupportsInt | typing.SupportsIndex) -> int:
         """
         The counter that follows.
@@ -177,19 +135,18 @@ class E2eSettings:
         """
         Bytes of the payload.
         """
-
 class E2eCheck:
     """
     The receiver's check of protected payloads.
-
+    
     Valid after ``good_until_valid`` good frames in a row, no longer after ``bad_until_invalid`` bad ones in a row. It sees
     frames and not time: a frame that never comes needs a time limit beside it.
-
+    
     Parameters
     ----------
     settings : E2eSettings
         As the sender has them.
-
+    
     Examples
     --------
     >>> from mgdd.rig import E2eCheck, E2eSettings, protect
@@ -200,7 +157,8 @@ class E2eCheck:
     >>> check.counts["missing"]
     5
     """
-    def __init__(self, settings: E2eSettings) -> None: ...
+    def __init__(self, settings: E2eSettings) -> None:
+        ...
     def push(self, payload: typing_extensions.Buffer) -> str:
         """
         Judge the next payload: 'ok', 'initial', 'repeated', 'lost', 'wrong_crc', 'wrong_length' or 'wrong_counter'.
@@ -224,13 +182,12 @@ class E2eCheck:
         """
         Whether enough good frames came, and not too many bad ones.
         """
-
 class SignalLayout:
     """
     Where a number stands in the bits of a CAN payload, as a DBC says it.
-
+    
     Keyword-only and immutable. The physical value is ``raw * scale + offset``. A value never wraps, and NaN is never sent.
-
+    
     Parameters
     ----------
     start, length : int
@@ -243,7 +200,7 @@ class SignalLayout:
         Of the physical value.
     minimum, maximum : float, optional
         Bounds of the physical value.
-
+    
     Examples
     --------
     >>> from mgdd._core.rig import SignalLayout
@@ -252,29 +209,19 @@ class SignalLayout:
     >>> payload.hex(), duty.unpack(payload)
     ('0000300800000000', -1.0)
     """
-    def __eq__(self, arg0: typing.Any) -> bool: ...
-    def __getstate__(self) -> tuple[int, dict]: ...
-    def __hash__(self) -> int: ...
-    def __init__(
-        self,
-        *,
-        start: typing.SupportsInt | typing.SupportsIndex,
-        length: typing.SupportsInt | typing.SupportsIndex,
-        byte_order: str = "little_endian",
-        raw_type: str = "unsigned",
-        scale: typing.SupportsFloat | typing.SupportsIndex = 1.0,
-        offset: typing.SupportsFloat | typing.SupportsIndex = 0.0,
-        minimum: typing.SupportsFloat | typing.SupportsIndex | None = None,
-        maximum: typing.SupportsFloat | typing.SupportsIndex | None = None,
-    ) -> None: ...
-    def __repr__(self) -> str: ...
-    def __setstate__(self, arg0: tuple) -> None: ...
-    def pack(
-        self,
-        payload: typing_extensions.Buffer,
-        value: typing.SupportsFloat | typing.SupportsIndex,
-        out_of_range: str = "clamp",
-    ) -> bytes:
+    def __eq__(self, arg0: typing.Any) -> bool:
+        ...
+    def __getstate__(self) -> tuple[int, dict]:
+        ...
+    def __hash__(self) -> int:
+        ...
+    def __init__(self, *, start: typing.SupportsInt | typing.SupportsIndex, length: typing.SupportsInt | typing.SupportsIndex, byte_order: str = 'little_endian', raw_type: str = 'unsigned', scale: typing.SupportsFloat | typing.SupportsIndex = 1.0, offset: typing.SupportsFloat | typing.SupportsIndex = 0.0, minimum: typing.SupportsFloat | typing.SupportsIndex | None = None, maximum: typing.SupportsFloat | typing.SupportsIndex | None = None) -> None:
+        ...
+    def __repr__(self) -> str:
+        ...
+    def __setstate__(self, arg0: tuple) -> None:
+        ...
+    def pack(self, payload: typing_extensions.Buffer, value: typing.SupportsFloat | typing.SupportsIndex, out_of_range: str = 'clamp') -> bytes:
         """
         The payload with this physical value; beyond its range it is clamped, or with 'refuse' a ParameterError.
         """
@@ -338,11 +285,10 @@ class SignalLayout:
         """
         First bit, as a DBC counts.
         """
-
 class Frame:
     """
     One CAN or CAN FD frame. Keyword-only and immutable.
-
+    
     Parameters
     ----------
     id : int
@@ -356,33 +302,25 @@ class Frame:
         Which bus, where one record holds several.
     monotonic_ns, bus_ns : int
         When it was received or handed to the bus, and the driver's own stamp [ns].
-
+    
     Examples
     --------
     >>> from mgdd._core.rig import Frame
     >>> Frame(id=0x121, data=bytes(3), received=True).data
     b'\\x00\\x00\\x00'
     """
-    def __eq__(self, arg0: typing.Any) -> bool: ...
-    def __getstate__(self) -> tuple[int, dict]: ...
-    def __hash__(self) -> int: ...
-    def __init__(
-        self,
-        *,
-        id: typing.SupportsInt | typing.SupportsIndex,
-        data: bytes = b"",
-        extended: bool = False,
-        error: bool = False,
-        received: bool = False,
-        fd: bool = False,
-        bit_rate_switch: bool = False,
-        remote: bool = False,
-        channel: typing.SupportsInt | typing.SupportsIndex = 0,
-        monotonic_ns: typing.SupportsInt | typing.SupportsIndex = 0,
-        bus_ns: typing.SupportsInt | typing.SupportsIndex = 0,
-    ) -> None: ...
-    def __repr__(self) -> str: ...
-    def __setstate__(self, arg0: tuple) -> None: ...
+    def __eq__(self, arg0: typing.Any) -> bool:
+        ...
+    def __getstate__(self) -> tuple[int, dict]:
+        ...
+    def __hash__(self) -> int:
+        ...
+    def __init__(self, *, id: typing.SupportsInt | typing.SupportsIndex, data: bytes = b'', extended: bool = False, error: bool = False, received: bool = False, fd: bool = False, bit_rate_switch: bool = False, remote: bool = False, channel: typing.SupportsInt | typing.SupportsIndex = 0, monotonic_ns: typing.SupportsInt | typing.SupportsIndex = 0, bus_ns: typing.SupportsInt | typing.SupportsIndex = 0) -> None:
+        ...
+    def __repr__(self) -> str:
+        ...
+    def __setstate__(self, arg0: tuple) -> None:
+        ...
     def to_dict(self) -> dict:
         """
         Constructor keywords as a new dict.
@@ -442,23 +380,13 @@ class Frame:
         """
         Request of a frame.
         """
-
 class RecordWriter:
     """
     Appends to a record file; behind mgdd.rig.Recorder.
     """
-    def __init__(
-        self,
-        path: str,
-        *,
-        run_id: bytes,
-        wall_ns: typing.SupportsInt | typing.SupportsIndex,
-        monotonic_ns: typing.SupportsInt | typing.SupportsIndex,
-        json: str,
-    ) -> None: ...
-    def add_table(
-        self, name: str, columns: collections.abc.Sequence[str], monotonic_ns: typing.SupportsInt | typing.SupportsIndex
-    ) -> int:
+    def __init__(self, path: str, *, run_id: bytes, wall_ns: typing.SupportsInt | typing.SupportsIndex, monotonic_ns: typing.SupportsInt | typing.SupportsIndex, json: str) -> None:
+        ...
+    def add_table(self, name: str, columns: collections.abc.Sequence[str], monotonic_ns: typing.SupportsInt | typing.SupportsIndex) -> int:
         """
         Number of a new table of samples.
         """
@@ -478,12 +406,7 @@ class RecordWriter:
         """
         Append an event.
         """
-    def write_sample(
-        self,
-        table: typing.SupportsInt | typing.SupportsIndex,
-        monotonic_ns: typing.SupportsInt | typing.SupportsIndex,
-        values: typing.Annotated[numpy.typing.ArrayLike, numpy.float64],
-    ) -> None:
+    def write_sample(self, table: typing.SupportsInt | typing.SupportsIndex, monotonic_ns: typing.SupportsInt | typing.SupportsIndex, values: typing.Annotated[numpy.typing.ArrayLike, numpy.float64]) -> None:
         """
         Append a number per column of a table.
         """
@@ -507,14 +430,16 @@ class RecordWriter:
         """
         Records.
         """
-
 class RecordReader:
     """
     Iterates over a record: frames, and tuples ('sample', ns, table, values), ('event', ns, category, text) and ('damage', bytes).
     """
-    def __init__(self, path: str) -> None: ...
-    def __iter__(self) -> RecordReader: ...
-    def __next__(self) -> typing.Any: ...
+    def __init__(self, path: str) -> None:
+        ...
+    def __iter__(self) -> RecordReader:
+        ...
+    def __next__(self) -> typing.Any:
+        ...
     @property
     def header(self) -> dict:
         """
@@ -530,14 +455,13 @@ class RecordReader:
         """
         Whether they may be the start of a record that is still being written.
         """
-
 class SafetyEnvelope:
     """
     What a safety gate lets pass, and what must be true of the measurements meanwhile.
-
+    
     Keyword-only and immutable; the defaults are the shipped envelope ``etb``. ``SafetyEnvelope.fields()`` lists bounds, units
     and defaults.
-
+    
     Parameters
     ----------
     cycle_s : float
@@ -566,20 +490,20 @@ class SafetyEnvelope:
         Travel, and by which an angle may leave it [deg].
     bus_fault_from : {"warning", "passive", "off"}
         State of the CAN controller from which on it is ``limp``.
-
+    
     Raises
     ------
     mgdd.errors.ParameterError
         A value outside its domain, naming field, value and bound.
-
+    
     See Also
     --------
     SafetyGate : what keeps it.
-
+    
     References
     ----------
     Bosch Motorsport, manual of the MS 6 engine control (sum and range of the sensors).
-
+    
     Examples
     --------
     >>> from mgdd.rig import SafetyEnvelope
@@ -593,42 +517,18 @@ class SafetyEnvelope:
         """
         Every field by name: unit, bounds or choices, meaning, default.
         """
-    def __eq__(self, arg0: typing.Any) -> bool: ...
-    def __getstate__(self) -> tuple[int, dict]: ...
-    def __hash__(self) -> int: ...
-    def __init__(
-        self,
-        *,
-        cycle_s: typing.SupportsFloat | typing.SupportsIndex = 0.001,
-        duty_limit: typing.SupportsFloat | typing.SupportsIndex = 0.8,
-        slew_per_s: typing.SupportsFloat | typing.SupportsIndex = 200.0,
-        ramp_s: typing.SupportsFloat | typing.SupportsIndex = 0.2,
-        invalid_duties: typing.SupportsFloat | typing.SupportsIndex = 1.0,
-        rms_duty_limit: typing.SupportsFloat | typing.SupportsIndex = 0.5,
-        rms_duty_to_arm: typing.SupportsFloat | typing.SupportsIndex = 0.4,
-        heat_time_constant_s: typing.SupportsFloat | typing.SupportsIndex = 10.0,
-        stall_duty: typing.SupportsFloat | typing.SupportsIndex = 0.6,
-        stall_move_deg: typing.SupportsFloat | typing.SupportsIndex = 0.5,
-        stall_s: typing.SupportsFloat | typing.SupportsIndex = 0.2,
-        largest_age_cycles: typing.SupportsFloat | typing.SupportsIndex = 3.0,
-        held_cycles: typing.SupportsFloat | typing.SupportsIndex = 1.0,
-        bad_frames: typing.SupportsFloat | typing.SupportsIndex = 3.0,
-        good_frames: typing.SupportsFloat | typing.SupportsIndex = 20.0,
-        missed_deadlines: typing.SupportsFloat | typing.SupportsIndex = 3.0,
-        unsent_cycles: typing.SupportsFloat | typing.SupportsIndex = 3.0,
-        sensor_sum_v: typing.SupportsFloat | typing.SupportsIndex = 5.0,
-        sensor_sum_tolerance_v: typing.SupportsFloat | typing.SupportsIndex = 0.2,
-        sensor_low_v: typing.SupportsFloat | typing.SupportsIndex = 0.2,
-        sensor_high_v: typing.SupportsFloat | typing.SupportsIndex = 4.8,
-        sensor_slope_v_per_s: typing.SupportsFloat | typing.SupportsIndex = 400.0,
-        sensor_cycles: typing.SupportsFloat | typing.SupportsIndex = 4.0,
-        closed_deg: typing.SupportsFloat | typing.SupportsIndex = 0.0,
-        open_deg: typing.SupportsFloat | typing.SupportsIndex = 90.0,
-        travel_margin_deg: typing.SupportsFloat | typing.SupportsIndex = 6.75,
-        bus_fault_from: str = "passive",
-    ) -> None: ...
-    def __repr__(self) -> str: ...
-    def __setstate__(self, arg0: tuple) -> None: ...
+    def __eq__(self, arg0: typing.Any) -> bool:
+        ...
+    def __getstate__(self) -> tuple[int, dict]:
+        ...
+    def __hash__(self) -> int:
+        ...
+    def __init__(self, *, cycle_s: typing.SupportsFloat | typing.SupportsIndex = 0.001, duty_limit: typing.SupportsFloat | typing.SupportsIndex = 0.8, slew_per_s: typing.SupportsFloat | typing.SupportsIndex = 200.0, ramp_s: typing.SupportsFloat | typing.SupportsIndex = 0.2, invalid_duties: typing.SupportsFloat | typing.SupportsIndex = 1.0, rms_duty_limit: typing.SupportsFloat | typing.SupportsIndex = 0.5, rms_duty_to_arm: typing.SupportsFloat | typing.SupportsIndex = 0.4, heat_time_constant_s: typing.SupportsFloat | typing.SupportsIndex = 10.0, stall_duty: typing.SupportsFloat | typing.SupportsIndex = 0.6, stall_move_deg: typing.SupportsFloat | typing.SupportsIndex = 0.5, stall_s: typing.SupportsFloat | typing.SupportsIndex = 0.2, largest_age_cycles: typing.SupportsFloat | typing.SupportsIndex = 3.0, held_cycles: typing.SupportsFloat | typing.SupportsIndex = 1.0, bad_frames: typing.SupportsFloat | typing.SupportsIndex = 3.0, good_frames: typing.SupportsFloat | typing.SupportsIndex = 20.0, missed_deadlines: typing.SupportsFloat | typing.SupportsIndex = 3.0, unsent_cycles: typing.SupportsFloat | typing.SupportsIndex = 3.0, sensor_sum_v: typing.SupportsFloat | typing.SupportsIndex = 5.0, sensor_sum_tolerance_v: typing.SupportsFloat | typing.SupportsIndex = 0.2, sensor_low_v: typing.SupportsFloat | typing.SupportsIndex = 0.2, sensor_high_v: typing.SupportsFloat | typing.SupportsIndex = 4.8, sensor_slope_v_per_s: typing.SupportsFloat | typing.SupportsIndex = 400.0, sensor_cycles: typing.SupportsFloat | typing.SupportsIndex = 4.0, closed_deg: typing.SupportsFloat | typing.SupportsIndex = 0.0, open_deg: typing.SupportsFloat | typing.SupportsIndex = 90.0, travel_margin_deg: typing.SupportsFloat | typing.SupportsIndex = 6.75, bus_fault_from: str = 'passive') -> None:
+        ...
+    def __repr__(self) -> str:
+        ...
+    def __setstate__(self, arg0: tuple) -> None:
+        ...
     def replace(self, **kwargs) -> SafetyEnvelope:
         """
         A validated copy with some fields changed; an unknown name is a ParameterError.
@@ -772,13 +672,12 @@ class SafetyEnvelope:
         """
         commands in a row that did not leave: LIMP [cycles]
         """
-
 class Drive:
     """
     What may leave the machine in this cycle.
-
+    
     A gate gives it; ``duty, bridge_open, send`` unpacks it.
-
+    
     Examples
     --------
     >>> from mgdd.rig import SafetyGate
@@ -787,10 +686,14 @@ class Drive:
     >>> gate.command(0.3)
     Drive(duty=0.0, bridge_open=True, send=True)
     """
-    def __eq__(self, arg0: typing.Any) -> bool: ...
-    def __hash__(self) -> int: ...
-    def __iter__(self) -> collections.abc.Iterator: ...
-    def __repr__(self) -> str: ...
+    def __eq__(self, arg0: typing.Any) -> bool:
+        ...
+    def __hash__(self) -> int:
+        ...
+    def __iter__(self) -> collections.abc.Iterator:
+        ...
+    def __repr__(self) -> str:
+        ...
     @property
     def bridge_open(self) -> bool:
         """
@@ -806,16 +709,16 @@ class Drive:
         """
         Whether to send anything; not while the bus is off.
         """
-
 class SafetyGate:
     """
     The gate of the core; behind mgdd.rig.SafetyGate.
     """
-    def __init__(self, envelope: SafetyEnvelope) -> None: ...
+    def __init__(self, envelope: SafetyEnvelope) -> None:
+        ...
     def command(self, duty: typing.SupportsFloat | typing.SupportsIndex) -> Drive:
         """
         Second half of a cycle: the drive that may leave, for the duty [-] that the controller asks for.
-
+        
         NaN is a fault of the controller.
         """
     def count(self, reason: str) -> int:
@@ -826,25 +729,10 @@ class SafetyGate:
         """
         Take the waiting changes of state out of the audit list, oldest first: cycle, from, to, reason, count.
         """
-    def observe(
-        self,
-        *,
-        good_frames: typing.SupportsInt | typing.SupportsIndex = 0,
-        bad_frames: typing.SupportsInt | typing.SupportsIndex = 0,
-        age_s: typing.SupportsFloat | typing.SupportsIndex | None = None,
-        sensor_v: typing.Annotated[
-            collections.abc.Sequence[typing.SupportsFloat | typing.SupportsIndex], "FixedSize(2)"
-        ]
-        | None = None,
-        angle_deg: typing.SupportsFloat | typing.SupportsIndex | None = None,
-        bus: str = "active",
-        sent: bool = True,
-        missed_deadlines: typing.SupportsInt | typing.SupportsIndex = 0,
-        request: str = "none",
-    ) -> None:
+    def observe(self, *, good_frames: typing.SupportsInt | typing.SupportsIndex = 0, bad_frames: typing.SupportsInt | typing.SupportsIndex = 0, age_s: typing.SupportsFloat | typing.SupportsIndex | None = None, sensor_v: typing.Annotated[collections.abc.Sequence[typing.SupportsFloat | typing.SupportsIndex], "FixedSize(2)"] | None = None, angle_deg: typing.SupportsFloat | typing.SupportsIndex | None = None, bus: str = 'active', sent: bool = True, missed_deadlines: typing.SupportsInt | typing.SupportsIndex = 0, request: str = 'none') -> None:
         """
         First half of a cycle, before the controller: what is known of it.
-
+        
         Parameters
         ----------
         good_frames, bad_frames : int
@@ -863,7 +751,7 @@ class SafetyGate:
             Since the last cycle, >= 0.
         request : {"none", "arm", "run", "stop", "disarm", "reset", "abort"}
             What the operator asks for, after all checks of the cycle.
-
+        
         Raises
         ------
         mgdd.errors.ParameterError
@@ -872,7 +760,7 @@ class SafetyGate:
     def request(self, request: str) -> str:
         """
         Ask for another state between two cycles.
-
+        
         Returns what stands against it, ``'none'`` where it was accepted.
         """
     @property
@@ -931,17 +819,15 @@ class SafetyGate:
         What a run needs to go on bit for bit; a state that the envelope does not allow is refused and changes nothing.
         """
     @state.setter
-    def state(
-        self, arg1: collections.abc.Mapping[str, collections.abc.Sequence[typing.SupportsFloat | typing.SupportsIndex]]
-    ) -> None: ...
-
+    def state(self, arg1: collections.abc.Mapping[str, collections.abc.Sequence[typing.SupportsFloat | typing.SupportsIndex]]) -> None:
+        ...
 class RingTransport:
     """
     A bus behind two rings, fed and drained by a thread of Python.
-
+    
     A `RealtimeLoop` takes and gives frames without waiting for Python. `BusBridge` connects it with any interface of
     python-can; a simulated plant may serve it as well.
-
+    
     Parameters
     ----------
     receive_capacity : int
@@ -949,17 +835,17 @@ class RingTransport:
     send_capacity : int
         Frames towards the bus that may wait, a power of two. Short, so that no command leaves late: a command that finds no
         room is not sent, and the loop knows.
-
+    
     Raises
     ------
     mgdd.errors.ParameterError
         A capacity that is no power of two from 2 to 16777216.
-
+    
     See Also
     --------
     BusBridge : a python-can bus on the other side.
     SocketCanTransport : a CAN interface of Linux, without Python in between.
-
+    
     Examples
     --------
     >>> from mgdd.rig import Frame, RingTransport
@@ -969,12 +855,8 @@ class RingTransport:
     >>> bus.counts["lost"], bus.take() is None, bus.bus_state
     (0, True, 'active')
     """
-    def __init__(
-        self,
-        *,
-        receive_capacity: typing.SupportsInt | typing.SupportsIndex = 1024,
-        send_capacity: typing.SupportsInt | typing.SupportsIndex = 16,
-    ) -> None: ...
+    def __init__(self, *, receive_capacity: typing.SupportsInt | typing.SupportsIndex = 1024, send_capacity: typing.SupportsInt | typing.SupportsIndex = 16) -> None:
+        ...
     def fail(self) -> None:
         """
         Say that the bus is gone, for good: the loop sees it as off and opens the bridge.
@@ -982,12 +864,12 @@ class RingTransport:
     def feed(self, frame: Frame) -> bool:
         """
         Hand a frame from the bus to the loop.
-
+        
         Parameters
         ----------
         frame : Frame
             Without a stamp ``monotonic_ns`` it gets that of now.
-
+        
         Returns
         -------
         bool
@@ -996,12 +878,12 @@ class RingTransport:
     def take(self, timeout_s: typing.SupportsFloat | typing.SupportsIndex = 0.0) -> typing.Any:
         """
         Take the next frame that the loop sends; other threads run while it waits.
-
+        
         Parameters
         ----------
         timeout_s : float
             How long to wait for one, 0 to 3600 [s].
-
+        
         Returns
         -------
         Frame or None
@@ -1032,14 +914,13 @@ class RingTransport:
         """
         Frames of the loop that nobody has taken yet.
         """
-
 class SocketCanTransport:
     """
     A CAN interface of Linux as a raw socket that never blocks, for a `RealtimeLoop`.
-
+    
     Several sockets on one interface see each other's frames: a logger of python-can beside it records all, our own commands
     too. Set the queue of the interface short (``ip link set can0 txqueuelen 10``), or old commands leave late.
-
+    
     Parameters
     ----------
     interface : str
@@ -1053,18 +934,18 @@ class SocketCanTransport:
         Asked of the kernel; `receive_buffer_bytes` says what it granted.
     send_patience_s : float
         How long to try again where the queue of the interface is full, 0 to 0.1 [s].
-
+    
     Raises
     ------
     mgdd.errors.ParameterError
         A setting outside its domain.
     mgdd.errors.RigError
         The kernel has no CAN; or the interface does not exist, is down, is no CAN interface or does no CAN FD.
-
+    
     See Also
     --------
     RingTransport : any other adapter, through python-can.
-
+    
     Examples
     --------
     >>> from mgdd.errors import RigError
@@ -1075,31 +956,22 @@ class SocketCanTransport:
     ...     print("no bus")
     no bus
     """
-    def __init__(
-        self,
-        interface: str,
-        *,
-        fd: bool = False,
-        filters: collections.abc.Sequence[
-            tuple[typing.SupportsInt | typing.SupportsIndex, typing.SupportsInt | typing.SupportsIndex, bool]
-        ] = [],
-        receive_buffer_bytes: typing.SupportsInt | typing.SupportsIndex = 4194304,
-        send_patience_s: typing.SupportsFloat | typing.SupportsIndex = 0.0002,
-    ) -> None: ...
+    def __init__(self, interface: str, *, fd: bool = False, filters: collections.abc.Sequence[tuple[typing.SupportsInt | typing.SupportsIndex, typing.SupportsInt | typing.SupportsIndex, bool]] = [], receive_buffer_bytes: typing.SupportsInt | typing.SupportsIndex = 4194304, send_patience_s: typing.SupportsFloat | typing.SupportsIndex = 0.0002) -> None:
+        ...
     def receive(self, timeout_s: typing.SupportsFloat | typing.SupportsIndex = 0.0) -> typing.Any:
         """
         Take the next frame from the bus; other threads run while it waits.
-
+        
         Parameters
         ----------
         timeout_s : float
             How long to wait for one, 0 to 3600 [s].
-
+        
         Returns
         -------
         Frame or None
             None where none came.
-
+        
         Raises
         ------
         mgdd.errors.RigError
@@ -1108,17 +980,17 @@ class SocketCanTransport:
     def send(self, frame: Frame) -> str:
         """
         Send a frame now.
-
+        
         Parameters
         ----------
         frame : Frame
             Its stamps are not used.
-
+        
         Returns
         -------
         str
             ``"sent"``, ``"full"`` where the queue had no room in time, ``"failed"`` where the frame or the interface is unfit.
-
+        
         Raises
         ------
         mgdd.errors.RigError
@@ -1144,60 +1016,32 @@ class SocketCanTransport:
         """
         Bytes that the kernel granted.
         """
-
 class RealtimeLoop:
     """
     A controller in a thread of its own; behind mgdd.rig.RealtimeLoop.
     """
-    def __init__(
-        self,
-        *,
-        controller: typing.Any,
-        transport: RingTransport | SocketCanTransport,
-        envelope: SafetyEnvelope,
-        command: tuple[
-            typing.SupportsInt | typing.SupportsIndex,
-            bool,
-            typing.SupportsInt | typing.SupportsIndex,
-            E2eSettings | None,
-            collections.abc.Sequence[tuple[str, SignalLayout, typing.SupportsFloat | typing.SupportsIndex]],
-        ],
-        received: collections.abc.Sequence[
-            tuple[
-                typing.SupportsInt | typing.SupportsIndex,
-                bool,
-                typing.SupportsInt | typing.SupportsIndex,
-                E2eSettings | None,
-                collections.abc.Sequence[tuple[str, SignalLayout, typing.SupportsFloat | typing.SupportsIndex]],
-            ]
-        ],
-        period_s: typing.SupportsFloat | typing.SupportsIndex = 0.001,
-        initial_reference_deg: typing.SupportsFloat | typing.SupportsIndex = 0.0,
-        reference_timeout_s: typing.SupportsFloat | typing.SupportsIndex | None = None,
-        transmit: bool = True,
-        stop_frames: typing.SupportsInt | typing.SupportsIndex = 5,
-        realtime: bool = True,
-        priority: typing.SupportsInt | typing.SupportsIndex = 50,
-        lock_memory: bool = True,
-        sample_capacity: typing.SupportsInt | typing.SupportsIndex = 16384,
-        queue_capacity: typing.SupportsInt | typing.SupportsIndex = 65536,
-    ) -> None: ...
+    def __init__(self, *, controller: typing.Any, transport: RingTransport | SocketCanTransport, envelope: SafetyEnvelope, command: tuple[typing.SupportsInt | typing.SupportsIndex, bool, typing.SupportsInt | typing.SupportsIndex, E2eSettings | None, collections.abc.Sequence[tuple[str, SignalLayout, typing.SupportsFloat | typing.SupportsIndex]]], received: collections.abc.Sequence[tuple[typing.SupportsInt | typing.SupportsIndex, bool, typing.SupportsInt | typing.SupportsIndex, E2eSettings | None, collections.abc.Sequence[tuple[str, SignalLayout, typing.SupportsFloat | typing.SupportsIndex]]]], period_s: typing.SupportsFloat | typing.SupportsIndex = 0.001, initial_reference_deg: typing.SupportsFloat | typing.SupportsIndex = 0.0, reference_timeout_s: typing.SupportsFloat | typing.SupportsIndex | None = None, transmit: bool = True, stop_frames: typing.SupportsInt | typing.SupportsIndex = 5, realtime: bool = True, priority: typing.SupportsInt | typing.SupportsIndex = 50, lock_memory: bool = True, sample_capacity: typing.SupportsInt | typing.SupportsIndex = 16384, queue_capacity: typing.SupportsInt | typing.SupportsIndex = 65536) -> None:
+        ...
     def events(self) -> list:
         """
         Changes of state since the last call: cycle, from, to, reason, count.
         """
-    def give_back(self, controller: typing.Any) -> None: ...
-    def queue_references(self, reference_deg: typing.Annotated[numpy.typing.ArrayLike, numpy.float64]) -> None: ...
+    def give_back(self, controller: typing.Any) -> None:
+        ...
+    def queue_references(self, reference_deg: typing.Annotated[numpy.typing.ArrayLike, numpy.float64]) -> None:
+        ...
     def report(self) -> dict:
         """
         Account of the loop so far.
         """
-    def request(self, request: str) -> bool: ...
+    def request(self, request: str) -> bool:
+        ...
     def samples(self) -> dict:
         """
         Samples since the last call, as a dict of columns.
         """
-    def set_reference(self, reference_deg: typing.SupportsFloat | typing.SupportsIndex) -> None: ...
+    def set_reference(self, reference_deg: typing.SupportsFloat | typing.SupportsIndex) -> None:
+        ...
     def start(self) -> None:
         """
         Start; returns at once.
@@ -1211,49 +1055,38 @@ class RealtimeLoop:
         Wait for the end without the GIL; whether it came.
         """
     @property
-    def bus_state(self) -> str: ...
+    def bus_state(self) -> str:
+        ...
     @property
-    def cause(self) -> str: ...
+    def cause(self) -> str:
+        ...
     @property
-    def patience_s(self) -> float: ...
+    def patience_s(self) -> float:
+        ...
     @property
-    def queued_references(self) -> int: ...
+    def queued_references(self) -> int:
+        ...
     @property
-    def reason(self) -> str: ...
+    def reason(self) -> str:
+        ...
     @property
-    def running(self) -> bool: ...
+    def running(self) -> bool:
+        ...
     @property
-    def state(self) -> str: ...
-
-def check_message(
-    signals: collections.abc.Mapping[str, SignalLayout],
-    size: typing.SupportsInt | typing.SupportsIndex,
-    branches: collections.abc.Mapping[str, collections.abc.Sequence[typing.SupportsInt | typing.SupportsIndex]]
-    | None = None,
-) -> None:
+    def state(self) -> str:
+        ...
+def check_message(signals: collections.abc.Mapping[str, SignalLayout], size: typing.SupportsInt | typing.SupportsIndex, branches: collections.abc.Mapping[str, collections.abc.Sequence[typing.SupportsInt | typing.SupportsIndex]] | None = None) -> None:
     """
     ParameterError naming signals that reach beyond a message of `size` bytes or share bits; `branches` gives the values of the multiplexer that select a signal.
     """
-
-def crc8(
-    data: bytes,
-    crc: str
-    | tuple[
-        typing.SupportsInt | typing.SupportsIndex,
-        typing.SupportsInt | typing.SupportsIndex,
-        typing.SupportsInt | typing.SupportsIndex,
-    ] = "sae_j1850",
-) -> int:
+def crc8(data: bytes, crc: str | tuple[typing.SupportsInt | typing.SupportsIndex, typing.SupportsInt | typing.SupportsIndex, typing.SupportsInt | typing.SupportsIndex] = 'sae_j1850') -> int:
     """
     CRC-8 by name, or of (polynomial, start, final xor).
     """
-
-def protect(
-    settings: E2eSettings, counter: typing.SupportsInt | typing.SupportsIndex, payload: typing_extensions.Buffer
-) -> bytes:
+def protect(settings: E2eSettings, counter: typing.SupportsInt | typing.SupportsIndex, payload: typing_extensions.Buffer) -> bytes:
     """
     Write alive counter and CRC into a payload.
-
+    
     Parameters
     ----------
     settings : E2eSettings
@@ -1262,59 +1095,37 @@ def protect(
         Alive counter of this frame, 0 to ``counter_modulus - 1``.
     payload : bytes
         ``settings.size`` bytes; what stands in the places of CRC and counter is replaced.
-
+    
     Returns
     -------
     bytes
         The protected payload.
-
+    
     Raises
     ------
     mgdd.errors.ParameterError
         A counter outside of the modulus.
     mgdd.errors.ShapeError
         A payload of another length.
-
+    
     Examples
     --------
     >>> from mgdd.rig import E2eSettings, protect
     >>> protect(E2eSettings(data_id=0x120), 5, bytes.fromhex("0000112233445566")).hex()
     '3a05112233445566'
     """
-
 def read_record(path: str) -> dict:
     """
     All of a record as columns; behind mgdd.rig.read_record.
     """
-
 def repair_record(path: str, target: str) -> dict:
     """
     Behind mgdd.rig.repair_record.
     """
-
-bus_states: tuple = ("active", "warning", "passive", "off")
-commanded_names: tuple = ("duty", "enable", "reference_deg", "fixed")
-measured_names: tuple = ("angle_deg", "first_v", "second_v", "supply_v", "current_a", "speed_deg_per_s", "applied_duty")
-safety_reasons: tuple = (
-    "none",
-    "requested",
-    "wrong_state",
-    "too_few_frames",
-    "aborted",
-    "stale",
-    "bad_frames",
-    "bus_fault",
-    "not_sent",
-    "deadlines",
-    "not_observed",
-    "heat",
-    "stall",
-    "sensor_range",
-    "sensor_disagreement",
-    "sensor_slope",
-    "travel",
-    "invalid_duty",
-)
-safety_requests: tuple = ("none", "arm", "run", "stop", "disarm", "reset", "abort")
-safety_states: tuple = ("init", "armed", "run", "limp", "fault")
-send_results: tuple = ("sent", "full", "failed")
+bus_states: tuple = ('active', 'warning', 'passive', 'off')
+commanded_names: tuple = ('duty', 'enable', 'reference_deg', 'fixed')
+measured_names: tuple = ('angle_deg', 'first_v', 'second_v', 'supply_v', 'current_a', 'speed_deg_per_s', 'applied_duty')
+safety_reasons: tuple = ('none', 'requested', 'wrong_state', 'too_few_frames', 'aborted', 'stale', 'bad_frames', 'bus_fault', 'not_sent', 'deadlines', 'not_observed', 'heat', 'stall', 'sensor_range', 'sensor_disagreement', 'sensor_slope', 'travel', 'invalid_duty')
+safety_requests: tuple = ('none', 'arm', 'run', 'stop', 'disarm', 'reset', 'abort')
+safety_states: tuple = ('init', 'armed', 'run', 'limp', 'fault')
+send_results: tuple = ('sent', 'full', 'failed')

@@ -1,44 +1,24 @@
 """
 Throttle body, its sensors, pseudo-Wiener models, demand chain.
 """
-
 from __future__ import annotations
 import collections.abc
 import numpy
 import numpy.typing
 import typing
-
-__all__: list[str] = [
-    "DemandChain",
-    "DemandTracker",
-    "PedalMap",
-    "PseudoWienerModel",
-    "PseudoWienerStepper",
-    "SensorPair",
-    "Stepper",
-    "Throttle",
-    "airflow_torque",
-    "fill_manifold",
-    "pseudo_wiener_of",
-    "pseudo_wiener_units",
-    "sense",
-    "sensor_fault_kinds",
-    "simulate",
-    "simulate_many",
-]
-
+__all__: list[str] = ['DemandChain', 'DemandTracker', 'PedalMap', 'PseudoWienerModel', 'PseudoWienerStepper', 'SensorPair', 'Stepper', 'Throttle', 'airflow_torque', 'fill_manifold', 'pseudo_wiener_of', 'pseudo_wiener_units', 'sense', 'sensor_fault_kinds', 'simulate', 'simulate_many']
 class Throttle:
     """
     Parameters of an electronic throttle body, seen from the plate shaft.
-
+    
     Keyword-only and immutable; units stand in the names. Angles are degrees from mechanically closed, opening positive.
     Defaults are the preset `P1`. `Throttle.fields()` lists every field with unit, bounds, meaning and default.
-
+    
     Raises
     ------
     mgdd.errors.ParameterError
         A field outside its domain, naming field, value and bound.
-
+    
     Examples
     --------
     >>> from mgdd.throttle import Throttle
@@ -53,51 +33,18 @@ class Throttle:
         """
         Every field by name: unit, bounds or choices, meaning, default.
         """
-    def __eq__(self, arg0: typing.Any) -> bool: ...
-    def __getstate__(self) -> tuple[int, dict]: ...
-    def __hash__(self) -> int: ...
-    def __init__(
-        self,
-        *,
-        inertia_kgm2: typing.SupportsFloat | typing.SupportsIndex = 0.0021,
-        viscous_nms_per_rad: typing.SupportsFloat | typing.SupportsIndex = 0.0088,
-        torque_constant_nm_per_a: typing.SupportsFloat | typing.SupportsIndex = 0.383,
-        back_emf_vs_per_rad: typing.SupportsFloat | typing.SupportsIndex = 0.383,
-        resistance_ohm: typing.SupportsFloat | typing.SupportsIndex = 1.5,
-        inductance_mh: typing.SupportsFloat | typing.SupportsIndex = 1.5,
-        supply_v: typing.SupportsFloat | typing.SupportsIndex = 12.0,
-        driver_drop_v: typing.SupportsFloat | typing.SupportsIndex = 0.0,
-        driver_resistance_ohm: typing.SupportsFloat | typing.SupportsIndex = 0.0,
-        dead_band: typing.SupportsFloat | typing.SupportsIndex = 0.0,
-        coulomb_nm: typing.SupportsFloat | typing.SupportsIndex = 0.284,
-        stiction_nm: typing.SupportsFloat | typing.SupportsIndex = 0.284,
-        stribeck_rad_per_s: typing.SupportsFloat | typing.SupportsIndex = 0.3,
-        karnopp_rad_per_s: typing.SupportsFloat | typing.SupportsIndex = 0.05,
-        tanh_rad_per_s: typing.SupportsFloat | typing.SupportsIndex = 0.05,
-        bristle_nm_per_rad: typing.SupportsFloat | typing.SupportsIndex = 81.0,
-        bristle_damping_nms_per_rad: typing.SupportsFloat | typing.SupportsIndex = 0.41,
-        limp_home_deg: typing.SupportsFloat | typing.SupportsIndex = 8.0,
-        spring_above_nm_per_rad: typing.SupportsFloat | typing.SupportsIndex = 0.087,
-        spring_below_nm_per_rad: typing.SupportsFloat | typing.SupportsIndex = 0.087,
-        preload_above_nm: typing.SupportsFloat | typing.SupportsIndex = 0.396,
-        preload_below_nm: typing.SupportsFloat | typing.SupportsIndex = 0.396,
-        preload_ramp_deg: typing.SupportsFloat | typing.SupportsIndex = 0.25,
-        closed_deg: typing.SupportsFloat | typing.SupportsIndex = 0.0,
-        open_deg: typing.SupportsFloat | typing.SupportsIndex = 90.0,
-        stop_stiffness_nm_per_rad: typing.SupportsFloat | typing.SupportsIndex = 5000.0,
-        stop_damping_nms_per_rad: typing.SupportsFloat | typing.SupportsIndex = 4.5,
-        backlash_half_deg: typing.SupportsFloat | typing.SupportsIndex = 0.2,
-        gear_stiffness_nm_per_rad: typing.SupportsFloat | typing.SupportsIndex = 200.0,
-        gear_damping_nms_per_rad: typing.SupportsFloat | typing.SupportsIndex = 0.2,
-        plate_inertia_kgm2: typing.SupportsFloat | typing.SupportsIndex = 0.0003,
-        plate_friction_share: typing.SupportsFloat | typing.SupportsIndex = 0.3,
-        bore_mm: typing.SupportsFloat | typing.SupportsIndex = 60.0,
-        pressure_drop_kpa: typing.SupportsFloat | typing.SupportsIndex = 0.0,
-        friction: str = "coulomb",
-        backlash: str = "none",
-    ) -> None: ...
-    def __repr__(self) -> str: ...
-    def __setstate__(self, arg0: tuple) -> None: ...
+    def __eq__(self, arg0: typing.Any) -> bool:
+        ...
+    def __getstate__(self) -> tuple[int, dict]:
+        ...
+    def __hash__(self) -> int:
+        ...
+    def __init__(self, *, inertia_kgm2: typing.SupportsFloat | typing.SupportsIndex = 0.0021, viscous_nms_per_rad: typing.SupportsFloat | typing.SupportsIndex = 0.0088, torque_constant_nm_per_a: typing.SupportsFloat | typing.SupportsIndex = 0.383, back_emf_vs_per_rad: typing.SupportsFloat | typing.SupportsIndex = 0.383, resistance_ohm: typing.SupportsFloat | typing.SupportsIndex = 1.5, inductance_mh: typing.SupportsFloat | typing.SupportsIndex = 1.5, supply_v: typing.SupportsFloat | typing.SupportsIndex = 12.0, driver_drop_v: typing.SupportsFloat | typing.SupportsIndex = 0.0, driver_resistance_ohm: typing.SupportsFloat | typing.SupportsIndex = 0.0, dead_band: typing.SupportsFloat | typing.SupportsIndex = 0.0, coulomb_nm: typing.SupportsFloat | typing.SupportsIndex = 0.284, stiction_nm: typing.SupportsFloat | typing.SupportsIndex = 0.284, stribeck_rad_per_s: typing.SupportsFloat | typing.SupportsIndex = 0.3, karnopp_rad_per_s: typing.SupportsFloat | typing.SupportsIndex = 0.05, tanh_rad_per_s: typing.SupportsFloat | typing.SupportsIndex = 0.05, bristle_nm_per_rad: typing.SupportsFloat | typing.SupportsIndex = 81.0, bristle_damping_nms_per_rad: typing.SupportsFloat | typing.SupportsIndex = 0.41, limp_home_deg: typing.SupportsFloat | typing.SupportsIndex = 8.0, spring_above_nm_per_rad: typing.SupportsFloat | typing.SupportsIndex = 0.087, spring_below_nm_per_rad: typing.SupportsFloat | typing.SupportsIndex = 0.087, preload_above_nm: typing.SupportsFloat | typing.SupportsIndex = 0.396, preload_below_nm: typing.SupportsFloat | typing.SupportsIndex = 0.396, preload_ramp_deg: typing.SupportsFloat | typing.SupportsIndex = 0.25, closed_deg: typing.SupportsFloat | typing.SupportsIndex = 0.0, open_deg: typing.SupportsFloat | typing.SupportsIndex = 90.0, stop_stiffness_nm_per_rad: typing.SupportsFloat | typing.SupportsIndex = 5000.0, stop_damping_nms_per_rad: typing.SupportsFloat | typing.SupportsIndex = 4.5, backlash_half_deg: typing.SupportsFloat | typing.SupportsIndex = 0.2, gear_stiffness_nm_per_rad: typing.SupportsFloat | typing.SupportsIndex = 200.0, gear_damping_nms_per_rad: typing.SupportsFloat | typing.SupportsIndex = 0.2, plate_inertia_kgm2: typing.SupportsFloat | typing.SupportsIndex = 0.0003, plate_friction_share: typing.SupportsFloat | typing.SupportsIndex = 0.3, bore_mm: typing.SupportsFloat | typing.SupportsIndex = 60.0, pressure_drop_kpa: typing.SupportsFloat | typing.SupportsIndex = 0.0, friction: str = 'coulomb', backlash: str = 'none') -> None:
+        ...
+    def __repr__(self) -> str:
+        ...
+    def __setstate__(self, arg0: tuple) -> None:
+        ...
     def replace(self, **kwargs) -> Throttle:
         """
         A validated copy with some fields changed; an unknown name is a ParameterError.
@@ -296,13 +243,12 @@ class Throttle:
         """
         viscous friction [N m s/rad]
         """
-
 class SensorPair:
     """
     Two redundant position sensors of a throttle with opposite slopes, and their check.
-
+    
     Keyword-only and immutable. The first gives ``closed_v + span_v angle/travel_deg``, the second ``supply_v`` minus that.
-
+    
     Parameters
     ----------
     closed_v, span_v : float
@@ -323,38 +269,30 @@ class SensorPair:
         Range of a healthy sensor [V].
     debounce_s : float
         A check must fail without a break for so long before the fault counts [s].
-
+    
     Raises
     ------
     mgdd.errors.ParameterError
         A field outside its domain, naming field, value and bound.
-
+    
     Examples
     --------
     >>> from mgdd.throttle import SensorPair
     >>> SensorPair().adc_bits
     12
     """
-    def __eq__(self, arg0: typing.Any) -> bool: ...
-    def __getstate__(self) -> tuple[int, dict]: ...
-    def __hash__(self) -> int: ...
-    def __init__(
-        self,
-        *,
-        closed_v: typing.SupportsFloat | typing.SupportsIndex = 0.5,
-        span_v: typing.SupportsFloat | typing.SupportsIndex = 4.0,
-        travel_deg: typing.SupportsFloat | typing.SupportsIndex = 90.0,
-        supply_v: typing.SupportsFloat | typing.SupportsIndex = 5.0,
-        noise_v: typing.SupportsFloat | typing.SupportsIndex = 0.002,
-        lag_s: typing.SupportsFloat | typing.SupportsIndex = 0.0003,
-        adc_bits: typing.SupportsInt | typing.SupportsIndex = 12,
-        sum_tolerance_v: typing.SupportsFloat | typing.SupportsIndex = 0.2,
-        low_v: typing.SupportsFloat | typing.SupportsIndex = 0.2,
-        high_v: typing.SupportsFloat | typing.SupportsIndex = 4.8,
-        debounce_s: typing.SupportsFloat | typing.SupportsIndex = 0.2,
-    ) -> None: ...
-    def __repr__(self) -> str: ...
-    def __setstate__(self, arg0: tuple) -> None: ...
+    def __eq__(self, arg0: typing.Any) -> bool:
+        ...
+    def __getstate__(self) -> tuple[int, dict]:
+        ...
+    def __hash__(self) -> int:
+        ...
+    def __init__(self, *, closed_v: typing.SupportsFloat | typing.SupportsIndex = 0.5, span_v: typing.SupportsFloat | typing.SupportsIndex = 4.0, travel_deg: typing.SupportsFloat | typing.SupportsIndex = 90.0, supply_v: typing.SupportsFloat | typing.SupportsIndex = 5.0, noise_v: typing.SupportsFloat | typing.SupportsIndex = 0.002, lag_s: typing.SupportsFloat | typing.SupportsIndex = 0.0003, adc_bits: typing.SupportsInt | typing.SupportsIndex = 12, sum_tolerance_v: typing.SupportsFloat | typing.SupportsIndex = 0.2, low_v: typing.SupportsFloat | typing.SupportsIndex = 0.2, high_v: typing.SupportsFloat | typing.SupportsIndex = 4.8, debounce_s: typing.SupportsFloat | typing.SupportsIndex = 0.2) -> None:
+        ...
+    def __repr__(self) -> str:
+        ...
+    def __setstate__(self, arg0: tuple) -> None:
+        ...
     def to_dict(self) -> dict:
         """
         Constructor keywords as a new dict.
@@ -419,54 +357,31 @@ class SensorPair:
         """
         Angle of the full span [deg].
         """
-
 class Stepper:
     """
     One sample of a throttle from a given state; behind mgdd.throttle.to_iosystem.
-
+    
     The state is angle [deg], speed [deg/s], current [A] and bristle [deg] of motor and gear, then angle, speed and bristle
     of the plate.
     """
     @staticmethod
-    def at_rest(
-        angle_deg: typing.SupportsFloat | typing.SupportsIndex,
-    ) -> typing.Annotated[list[float], "FixedSize(7)"]:
+    def at_rest(angle_deg: typing.SupportsFloat | typing.SupportsIndex) -> typing.Annotated[list[float], "FixedSize(7)"]:
         """
         State at rest at an angle [deg], without current.
         """
-    def __init__(
-        self,
-        throttle: Throttle,
-        *,
-        sample_s: typing.SupportsFloat | typing.SupportsIndex,
-        step_s: typing.SupportsFloat | typing.SupportsIndex,
-    ) -> None: ...
-    def advance(
-        self,
-        state: typing.Annotated[collections.abc.Sequence[typing.SupportsFloat | typing.SupportsIndex], "FixedSize(7)"],
-        duty: typing.SupportsFloat | typing.SupportsIndex,
-    ) -> typing.Annotated[list[float], "FixedSize(7)"]:
+    def __init__(self, throttle: Throttle, *, sample_s: typing.SupportsFloat | typing.SupportsIndex, step_s: typing.SupportsFloat | typing.SupportsIndex) -> None:
+        ...
+    def advance(self, state: typing.Annotated[collections.abc.Sequence[typing.SupportsFloat | typing.SupportsIndex], "FixedSize(7)"], duty: typing.SupportsFloat | typing.SupportsIndex) -> typing.Annotated[list[float], "FixedSize(7)"]:
         """
         State after one sample under a duty [-], which is clipped to -1..1.
         """
-
 class PseudoWienerStepper:
     """
     One sample of a pseudo-Wiener model from a given state; behind mgdd.throttle.to_iosystem.
     """
-    def __init__(
-        self,
-        kind: str,
-        parameters: collections.abc.Mapping[str, typing.SupportsFloat | typing.SupportsIndex],
-        *,
-        switching: str = "predicted",
-        friction: str = "set_valued",
-    ) -> None: ...
-    def advance(
-        self,
-        state: collections.abc.Sequence[typing.SupportsFloat | typing.SupportsIndex],
-        duty: typing.SupportsFloat | typing.SupportsIndex,
-    ) -> list[float]:
+    def __init__(self, kind: str, parameters: collections.abc.Mapping[str, typing.SupportsFloat | typing.SupportsIndex], *, switching: str = 'predicted', friction: str = 'set_valued') -> None:
+        ...
+    def advance(self, state: collections.abc.Sequence[typing.SupportsFloat | typing.SupportsIndex], duty: typing.SupportsFloat | typing.SupportsIndex) -> list[float]:
         """
         State after one sample under a duty [-].
         """
@@ -478,74 +393,43 @@ class PseudoWienerStepper:
         """
         Angle [deg] of a state.
         """
-
 class PseudoWienerModel:
     """
     A pseudo-Wiener model; use mgdd.throttle.PseudoWiener.
     """
-
     __hash__: typing.ClassVar[None] = None
-    def __eq__(self, arg0: typing.Any) -> bool: ...
-    def __init__(
-        self,
-        kind: str,
-        parameters: collections.abc.Mapping[str, typing.SupportsFloat | typing.SupportsIndex],
-        *,
-        switching: str = "predicted",
-        friction: str = "set_valued",
-    ) -> None: ...
-    def at_sample(
-        self,
-        sample_s: typing.SupportsFloat | typing.SupportsIndex,
-        *,
-        substeps: typing.SupportsInt | typing.SupportsIndex | None = None,
-    ) -> dict:
+    def __eq__(self, arg0: typing.Any) -> bool:
+        ...
+    def __init__(self, kind: str, parameters: collections.abc.Mapping[str, typing.SupportsFloat | typing.SupportsIndex], *, switching: str = 'predicted', friction: str = 'set_valued') -> None:
+        ...
+    def at_sample(self, sample_s: typing.SupportsFloat | typing.SupportsIndex, *, substeps: typing.SupportsInt | typing.SupportsIndex | None = None) -> dict:
         """
         Parameters for another sample time, the delay in seconds kept.
         """
-    def predict(
-        self,
-        duty: typing.Annotated[numpy.typing.ArrayLike, numpy.float64],
-        angle_deg: typing.Annotated[numpy.typing.ArrayLike, numpy.float64],
-        horizon: typing.SupportsInt | typing.SupportsIndex,
-        *,
-        angle_gain: typing.SupportsFloat | typing.SupportsIndex = 0.35,
-        speed_gain_per_s: typing.SupportsFloat | typing.SupportsIndex = 35.0,
-        bias_gain_duty_per_deg: typing.SupportsFloat | typing.SupportsIndex = 0.004,
-        offset_gain: typing.SupportsFloat | typing.SupportsIndex = 1.0,
-    ) -> list[float]:
+    def predict(self, duty: typing.Annotated[numpy.typing.ArrayLike, numpy.float64], angle_deg: typing.Annotated[numpy.typing.ArrayLike, numpy.float64], horizon: typing.SupportsInt | typing.SupportsIndex, *, angle_gain: typing.SupportsFloat | typing.SupportsIndex = 0.35, speed_gain_per_s: typing.SupportsFloat | typing.SupportsIndex = 35.0, bias_gain_duty_per_deg: typing.SupportsFloat | typing.SupportsIndex = 0.004, offset_gain: typing.SupportsFloat | typing.SupportsIndex = 1.0) -> list[float]:
         """
         Prediction, corrected at every sample, `horizon` samples ahead [deg].
         """
-    def simulate(
-        self,
-        duty: typing.Annotated[numpy.typing.ArrayLike, numpy.float64],
-        start_deg: typing.SupportsFloat | typing.SupportsIndex,
-    ) -> numpy.typing.NDArray[numpy.float64]:
+    def simulate(self, duty: typing.Annotated[numpy.typing.ArrayLike, numpy.float64], start_deg: typing.SupportsFloat | typing.SupportsIndex) -> numpy.typing.NDArray[numpy.float64]:
         """
         Free run: angle [deg] per sample.
         """
-    def slopes(
-        self,
-        duty: typing.Annotated[numpy.typing.ArrayLike, numpy.float64],
-        *,
-        start_deg: typing.SupportsFloat | typing.SupportsIndex,
-        speed_deg_per_s: typing.SupportsFloat | typing.SupportsIndex = 0.0,
-    ) -> tuple[numpy.typing.NDArray[numpy.float64], typing.Annotated[numpy.typing.NDArray[numpy.float64], "[m, n]"]]:
+    def slopes(self, duty: typing.Annotated[numpy.typing.ArrayLike, numpy.float64], *, start_deg: typing.SupportsFloat | typing.SupportsIndex, speed_deg_per_s: typing.SupportsFloat | typing.SupportsIndex = 0.0) -> tuple[numpy.typing.NDArray[numpy.float64], typing.Annotated[numpy.typing.NDArray[numpy.float64], "[m, n]"]]:
         """
         Angle after each sample of a horizon [deg] and d angle / d duty [deg].
         """
     @property
-    def kind(self) -> str: ...
+    def kind(self) -> str:
+        ...
     @property
-    def parameters(self) -> dict: ...
-
+    def parameters(self) -> dict:
+        ...
 class PedalMap:
     """
     What the driver wants: engine torque over pedal and speed, a table read bilinearly.
-
+    
     Immutable. Outside of the axes the edge holds. `of_full_load` makes a progressive one of a full-load curve.
-
+    
     Parameters
     ----------
     pedal_percent : array_like, shape (n,)
@@ -554,12 +438,12 @@ class PedalMap:
         Engine speed [rpm], two or more increasing entries > 0.
     wanted_nm : array_like, shape (n, m)
         Torque at the crankshaft [N m], which does not fall with the pedal; negative where the released pedal brakes.
-
+    
     Raises
     ------
     mgdd.errors.ParameterError, mgdd.errors.ShapeError
         An axis or entry that cannot be, by name.
-
+    
     Examples
     --------
     >>> from mgdd.throttle import PedalMap
@@ -570,38 +454,29 @@ class PedalMap:
     [-10.5, 105.0]
     """
     @staticmethod
-    def of_full_load(
-        speed_rpm: typing.Annotated[numpy.typing.ArrayLike, numpy.float64],
-        full_load_nm: typing.Annotated[numpy.typing.ArrayLike, numpy.float64],
-        *,
-        pedal_percent: typing.Annotated[numpy.typing.ArrayLike, numpy.float64] | None = None,
-    ) -> PedalMap:
+    def of_full_load(speed_rpm: typing.Annotated[numpy.typing.ArrayLike, numpy.float64], full_load_nm: typing.Annotated[numpy.typing.ArrayLike, numpy.float64], *, pedal_percent: typing.Annotated[numpy.typing.ArrayLike, numpy.float64] | None = None) -> PedalMap:
         """
         A progressive map: with M the full-load torque and p the pedal 0 to 1, ``M (0.6 p + 0.4 p²) - 0.1 M (1 - p) N/N_last``.
-
+        
         The pedal's axis is that of the default map if left out.
         """
-    def __eq__(self, arg0: typing.Any) -> bool: ...
-    def __getstate__(self) -> tuple[int, dict]: ...
-    def __hash__(self) -> int: ...
-    def __init__(
-        self,
-        *,
-        pedal_percent: typing.Annotated[numpy.typing.ArrayLike, numpy.float64],
-        speed_rpm: typing.Annotated[numpy.typing.ArrayLike, numpy.float64],
-        wanted_nm: typing.Annotated[numpy.typing.ArrayLike, numpy.float64],
-    ) -> None: ...
-    def __repr__(self) -> str: ...
-    def __setstate__(self, arg0: tuple) -> None: ...
+    def __eq__(self, arg0: typing.Any) -> bool:
+        ...
+    def __getstate__(self) -> tuple[int, dict]:
+        ...
+    def __hash__(self) -> int:
+        ...
+    def __init__(self, *, pedal_percent: typing.Annotated[numpy.typing.ArrayLike, numpy.float64], speed_rpm: typing.Annotated[numpy.typing.ArrayLike, numpy.float64], wanted_nm: typing.Annotated[numpy.typing.ArrayLike, numpy.float64]) -> None:
+        ...
+    def __repr__(self) -> str:
+        ...
+    def __setstate__(self, arg0: tuple) -> None:
+        ...
     def to_dict(self) -> dict:
         """
         Constructor keywords as a new dict.
         """
-    def torque_nm(
-        self,
-        pedal_percent: typing.Annotated[numpy.typing.ArrayLike, numpy.float64],
-        speed_rpm: typing.Annotated[numpy.typing.ArrayLike, numpy.float64],
-    ) -> typing.Any:
+    def torque_nm(self, pedal_percent: typing.Annotated[numpy.typing.ArrayLike, numpy.float64], speed_rpm: typing.Annotated[numpy.typing.ArrayLike, numpy.float64]) -> typing.Any:
         """
         Wanted torque [N m]; arrays are broadcast together.
         """
@@ -620,7 +495,6 @@ class PedalMap:
         """
         Torque [N m], a row per pedal.
         """
-
 class DemandChain:
     """
     Parameters of the chain; see mgdd.throttle.DemandChain.
@@ -630,62 +504,23 @@ class DemandChain:
         """
         Every field by name: unit, bounds or choices, meaning, default.
         """
-    def __eq__(self, arg0: typing.Any) -> bool: ...
-    def __getstate__(self) -> tuple[int, dict]: ...
-    def __hash__(self) -> int: ...
-    def __init__(
-        self,
-        *,
-        indicated_efficiency: typing.SupportsFloat | typing.SupportsIndex = 0.33,
-        heating_value_mj_per_kg: typing.SupportsFloat | typing.SupportsIndex = 42.5,
-        stoichiometric_air_fuel: typing.SupportsFloat | typing.SupportsIndex = 14.7,
-        air_fuel_ratio: typing.SupportsFloat | typing.SupportsIndex = 1.0,
-        friction_nm: typing.SupportsFloat | typing.SupportsIndex = 15.0,
-        friction_nm_per_rpm: typing.SupportsFloat | typing.SupportsIndex = 0.003,
-        displacement_l: typing.SupportsFloat | typing.SupportsIndex = 2.0,
-        volumetric_efficiency: typing.SupportsFloat | typing.SupportsIndex = 0.85,
-        manifold_l: typing.SupportsFloat | typing.SupportsIndex = 3.0,
-        manifold_temperature_k: typing.SupportsFloat | typing.SupportsIndex = 310.0,
-        ambient_kpa: typing.SupportsFloat | typing.SupportsIndex = 101.325,
-        ambient_temperature_k: typing.SupportsFloat | typing.SupportsIndex = 298.15,
-        bore_mm: typing.SupportsFloat | typing.SupportsIndex = 60.0,
-        shaft_mm: typing.SupportsFloat | typing.SupportsIndex = 8.0,
-        plate_closed_deg: typing.SupportsFloat | typing.SupportsIndex = 6.0,
-        leak_mm2: typing.SupportsFloat | typing.SupportsIndex = 3.0,
-        discharge_5: typing.SupportsFloat | typing.SupportsIndex = 0.65,
-        discharge_20: typing.SupportsFloat | typing.SupportsIndex = 0.75,
-        discharge_45: typing.SupportsFloat | typing.SupportsIndex = 0.85,
-        discharge_90: typing.SupportsFloat | typing.SupportsIndex = 0.9,
-        discharge_pressure_loss: typing.SupportsFloat | typing.SupportsIndex = 0.1,
-        pressure_lag_s: typing.SupportsFloat | typing.SupportsIndex = 0.05,
-        filling_share: typing.SupportsFloat | typing.SupportsIndex = 1.0,
-        lowest_flow_function: typing.SupportsFloat | typing.SupportsIndex = 0.1,
-        highest_ratio: typing.SupportsFloat | typing.SupportsIndex = 0.95,
-        reference_rate_deg_per_s: typing.SupportsFloat | typing.SupportsIndex = 800.0,
-        reference_bandwidth_per_s: typing.SupportsFloat | typing.SupportsIndex = 80.0,
-        widest_deg: typing.SupportsFloat | typing.SupportsIndex = 90.0,
-        pedal_map: PedalMap | None = None,
-    ) -> None: ...
-    def __repr__(self) -> str: ...
-    def __setstate__(self, arg0: tuple) -> None: ...
-    def _steady(
-        self,
-        pedal_percent: typing.Annotated[numpy.typing.ArrayLike, numpy.float64],
-        speed_rpm: typing.Annotated[numpy.typing.ArrayLike, numpy.float64],
-    ) -> tuple[
-        numpy.typing.NDArray[numpy.float64],
-        numpy.typing.NDArray[numpy.float64],
-        numpy.typing.NDArray[numpy.float64],
-        numpy.typing.NDArray[numpy.float64],
-    ]:
+    def __eq__(self, arg0: typing.Any) -> bool:
+        ...
+    def __getstate__(self) -> tuple[int, dict]:
+        ...
+    def __hash__(self) -> int:
+        ...
+    def __init__(self, *, indicated_efficiency: typing.SupportsFloat | typing.SupportsIndex = 0.33, heating_value_mj_per_kg: typing.SupportsFloat | typing.SupportsIndex = 42.5, stoichiometric_air_fuel: typing.SupportsFloat | typing.SupportsIndex = 14.7, air_fuel_ratio: typing.SupportsFloat | typing.SupportsIndex = 1.0, friction_nm: typing.SupportsFloat | typing.SupportsIndex = 15.0, friction_nm_per_rpm: typing.SupportsFloat | typing.SupportsIndex = 0.003, displacement_l: typing.SupportsFloat | typing.SupportsIndex = 2.0, volumetric_efficiency: typing.SupportsFloat | typing.SupportsIndex = 0.85, manifold_l: typing.SupportsFloat | typing.SupportsIndex = 3.0, manifold_temperature_k: typing.SupportsFloat | typing.SupportsIndex = 310.0, ambient_kpa: typing.SupportsFloat | typing.SupportsIndex = 101.325, ambient_temperature_k: typing.SupportsFloat | typing.SupportsIndex = 298.15, bore_mm: typing.SupportsFloat | typing.SupportsIndex = 60.0, shaft_mm: typing.SupportsFloat | typing.SupportsIndex = 8.0, plate_closed_deg: typing.SupportsFloat | typing.SupportsIndex = 6.0, leak_mm2: typing.SupportsFloat | typing.SupportsIndex = 3.0, discharge_5: typing.SupportsFloat | typing.SupportsIndex = 0.65, discharge_20: typing.SupportsFloat | typing.SupportsIndex = 0.75, discharge_45: typing.SupportsFloat | typing.SupportsIndex = 0.85, discharge_90: typing.SupportsFloat | typing.SupportsIndex = 0.9, discharge_pressure_loss: typing.SupportsFloat | typing.SupportsIndex = 0.1, pressure_lag_s: typing.SupportsFloat | typing.SupportsIndex = 0.05, filling_share: typing.SupportsFloat | typing.SupportsIndex = 1.0, lowest_flow_function: typing.SupportsFloat | typing.SupportsIndex = 0.1, highest_ratio: typing.SupportsFloat | typing.SupportsIndex = 0.95, reference_rate_deg_per_s: typing.SupportsFloat | typing.SupportsIndex = 800.0, reference_bandwidth_per_s: typing.SupportsFloat | typing.SupportsIndex = 80.0, widest_deg: typing.SupportsFloat | typing.SupportsIndex = 90.0, pedal_map: PedalMap | None = None) -> None:
+        ...
+    def __repr__(self) -> str:
+        ...
+    def __setstate__(self, arg0: tuple) -> None:
+        ...
+    def _steady(self, pedal_percent: typing.Annotated[numpy.typing.ArrayLike, numpy.float64], speed_rpm: typing.Annotated[numpy.typing.ArrayLike, numpy.float64]) -> tuple[numpy.typing.NDArray[numpy.float64], numpy.typing.NDArray[numpy.float64], numpy.typing.NDArray[numpy.float64], numpy.typing.NDArray[numpy.float64]]:
         """
         Torque, air, pressure and opening of steady demands.
         """
-    def air_g_per_s(
-        self,
-        torque_nm: typing.Annotated[numpy.typing.ArrayLike, numpy.float64],
-        speed_rpm: typing.Annotated[numpy.typing.ArrayLike, numpy.float64],
-    ) -> typing.Any:
+    def air_g_per_s(self, torque_nm: typing.Annotated[numpy.typing.ArrayLike, numpy.float64], speed_rpm: typing.Annotated[numpy.typing.ArrayLike, numpy.float64]) -> typing.Any:
         """
         Air that makes a torque [g/s]; 0 where friction alone brakes more.
         """
@@ -697,11 +532,7 @@ class DemandChain:
         """
         Open area of the throttle with its leak [mm²].
         """
-    def cylinder_g_per_s(
-        self,
-        pressure_kpa: typing.Annotated[numpy.typing.ArrayLike, numpy.float64],
-        speed_rpm: typing.Annotated[numpy.typing.ArrayLike, numpy.float64],
-    ) -> typing.Any:
+    def cylinder_g_per_s(self, pressure_kpa: typing.Annotated[numpy.typing.ArrayLike, numpy.float64], speed_rpm: typing.Annotated[numpy.typing.ArrayLike, numpy.float64]) -> typing.Any:
         """
         Air that the cylinders take at a manifold pressure [g/s], by speed density.
         """
@@ -709,19 +540,11 @@ class DemandChain:
         """
         Time constant of the manifold where the throttle is choked [s].
         """
-    def opening_deg(
-        self,
-        air_g_per_s: typing.Annotated[numpy.typing.ArrayLike, numpy.float64],
-        pressure_kpa: typing.Annotated[numpy.typing.ArrayLike, numpy.float64],
-    ) -> typing.Any:
+    def opening_deg(self, air_g_per_s: typing.Annotated[numpy.typing.ArrayLike, numpy.float64], pressure_kpa: typing.Annotated[numpy.typing.ArrayLike, numpy.float64]) -> typing.Any:
         """
         Opening that lets an air flow through against a manifold pressure [deg].
         """
-    def pressure_kpa(
-        self,
-        air_g_per_s: typing.Annotated[numpy.typing.ArrayLike, numpy.float64],
-        speed_rpm: typing.Annotated[numpy.typing.ArrayLike, numpy.float64],
-    ) -> typing.Any:
+    def pressure_kpa(self, air_g_per_s: typing.Annotated[numpy.typing.ArrayLike, numpy.float64], speed_rpm: typing.Annotated[numpy.typing.ArrayLike, numpy.float64]) -> typing.Any:
         """
         Manifold pressure at which the cylinders take an air flow [kPa], by speed density.
         """
@@ -729,19 +552,11 @@ class DemandChain:
         """
         A validated copy with some fields changed; an unknown name is a ParameterError.
         """
-    def steady_kpa(
-        self,
-        angle_deg: typing.Annotated[numpy.typing.ArrayLike, numpy.float64],
-        speed_rpm: typing.Annotated[numpy.typing.ArrayLike, numpy.float64],
-    ) -> typing.Any:
+    def steady_kpa(self, angle_deg: typing.Annotated[numpy.typing.ArrayLike, numpy.float64], speed_rpm: typing.Annotated[numpy.typing.ArrayLike, numpy.float64]) -> typing.Any:
         """
         Manifold pressure at which a held opening ends [kPa].
         """
-    def throttle_g_per_s(
-        self,
-        angle_deg: typing.Annotated[numpy.typing.ArrayLike, numpy.float64],
-        pressure_kpa: typing.Annotated[numpy.typing.ArrayLike, numpy.float64],
-    ) -> typing.Any:
+    def throttle_g_per_s(self, angle_deg: typing.Annotated[numpy.typing.ArrayLike, numpy.float64], pressure_kpa: typing.Annotated[numpy.typing.ArrayLike, numpy.float64]) -> typing.Any:
         """
         Air through the throttle against a manifold pressure [g/s]; negative above the ambient one.
         """
@@ -749,11 +564,7 @@ class DemandChain:
         """
         All fields as a new dict.
         """
-    def torque_nm(
-        self,
-        air_g_per_s: typing.Annotated[numpy.typing.ArrayLike, numpy.float64],
-        speed_rpm: typing.Annotated[numpy.typing.ArrayLike, numpy.float64],
-    ) -> typing.Any:
+    def torque_nm(self, air_g_per_s: typing.Annotated[numpy.typing.ArrayLike, numpy.float64], speed_rpm: typing.Annotated[numpy.typing.ArrayLike, numpy.float64]) -> typing.Any:
         """
         Torque that an air flow makes [N m].
         """
@@ -902,31 +713,26 @@ class DemandChain:
         """
         largest reference [deg]
         """
-
 class DemandTracker:
     """
     The chain sample by sample; see mgdd.throttle.DemandChain.tracker.
     """
-    def __init__(self, chain: DemandChain, *, sample_s: typing.SupportsFloat | typing.SupportsIndex) -> None: ...
+    def __init__(self, chain: DemandChain, *, sample_s: typing.SupportsFloat | typing.SupportsIndex) -> None:
+        ...
     def reset(self) -> None:
         """
         As made: no demand yet.
         """
-    def step(
-        self,
-        pedal_percent: typing.SupportsFloat | typing.SupportsIndex,
-        speed_rpm: typing.SupportsFloat | typing.SupportsIndex,
-        pressure_kpa: typing.SupportsFloat | typing.SupportsIndex = ...,
-    ) -> dict:
+    def step(self, pedal_percent: typing.SupportsFloat | typing.SupportsIndex, speed_rpm: typing.SupportsFloat | typing.SupportsIndex, pressure_kpa: typing.SupportsFloat | typing.SupportsIndex = ...) -> dict:
         """
         Demand and reference of this sample, by name.
-
+        
         NaN repeats the last value; without any measured pressure yet it is the wanted one. The first demand is taken as steady.
         """
     def take_over(self, reference_deg: typing.SupportsFloat | typing.SupportsIndex) -> None:
         """
         The next reference goes on from this angle, at the allowed rate.
-
+        
         Ignored if it is not finite.
         """
     @property
@@ -940,89 +746,34 @@ class DemandTracker:
         What a run needs to go on bit for bit.
         """
     @state.setter
-    def state(
-        self, arg1: collections.abc.Mapping[str, collections.abc.Sequence[typing.SupportsFloat | typing.SupportsIndex]]
-    ) -> None: ...
-
-def airflow_torque(
-    throttle: Throttle, angle_deg: typing.Annotated[numpy.typing.ArrayLike, numpy.float64]
-) -> numpy.typing.NDArray[numpy.float64]:
+    def state(self, arg1: collections.abc.Mapping[str, collections.abc.Sequence[typing.SupportsFloat | typing.SupportsIndex]]) -> None:
+        ...
+def airflow_torque(throttle: Throttle, angle_deg: typing.Annotated[numpy.typing.ArrayLike, numpy.float64]) -> numpy.typing.NDArray[numpy.float64]:
     """
     Torque of the modelled air flow [N m]; behind mgdd.throttle.airflow_torque_nm.
     """
-
-def fill_manifold(
-    chain: DemandChain,
-    pressure_kpa: typing.SupportsFloat | typing.SupportsIndex,
-    angle_deg: typing.SupportsFloat | typing.SupportsIndex,
-    speed_rpm: typing.SupportsFloat | typing.SupportsIndex,
-    *,
-    sample_s: typing.SupportsFloat | typing.SupportsIndex,
-) -> tuple[float, float, float]:
+def fill_manifold(chain: DemandChain, pressure_kpa: typing.SupportsFloat | typing.SupportsIndex, angle_deg: typing.SupportsFloat | typing.SupportsIndex, speed_rpm: typing.SupportsFloat | typing.SupportsIndex, *, sample_s: typing.SupportsFloat | typing.SupportsIndex) -> tuple[float, float, float]:
     """
     Pressure [kPa] after a sample, and the mean flows through throttle and cylinders [g/s].
     """
-
 def pseudo_wiener_of(throttle: Throttle) -> PseudoWienerModel:
     """
     PW-R with the groups of a first-principle throttle.
     """
-
 def pseudo_wiener_units(kind: str) -> dict:
     """
     Unit of every parameter.
     """
-
-def sense(
-    pair: SensorPair,
-    angle_deg: typing.Annotated[numpy.typing.ArrayLike, numpy.float64],
-    *,
-    sample_s: typing.SupportsFloat | typing.SupportsIndex,
-    seed: typing.SupportsInt | typing.SupportsIndex,
-    faults: typing.Annotated[
-        collections.abc.Sequence[
-            tuple[
-                str,
-                typing.SupportsFloat | typing.SupportsIndex,
-                typing.SupportsFloat | typing.SupportsIndex,
-                typing.SupportsFloat | typing.SupportsIndex | None,
-            ]
-        ],
-        "FixedSize(2)",
-    ],
-) -> dict:
+def sense(pair: SensorPair, angle_deg: typing.Annotated[numpy.typing.ArrayLike, numpy.float64], *, sample_s: typing.SupportsFloat | typing.SupportsIndex, seed: typing.SupportsInt | typing.SupportsIndex, faults: typing.Annotated[collections.abc.Sequence[tuple[str, typing.SupportsFloat | typing.SupportsIndex, typing.SupportsFloat | typing.SupportsIndex, typing.SupportsFloat | typing.SupportsIndex | None]], "FixedSize(2)"]) -> dict:
     """
     Samples of both sensors; behind mgdd.throttle.SensorPair.sense.
     """
-
-def simulate(
-    throttle: Throttle,
-    duty: typing.Annotated[numpy.typing.ArrayLike, numpy.float64],
-    *,
-    sample_s: typing.SupportsFloat | typing.SupportsIndex,
-    start_deg: typing.SupportsFloat | typing.SupportsIndex,
-    bridge: str,
-    supply_v: typing.Annotated[numpy.typing.ArrayLike, numpy.float64],
-    airflow_torque_nm: typing.Annotated[numpy.typing.ArrayLike, numpy.float64],
-    step_s: typing.SupportsFloat | typing.SupportsIndex,
-) -> dict:
+def simulate(throttle: Throttle, duty: typing.Annotated[numpy.typing.ArrayLike, numpy.float64], *, sample_s: typing.SupportsFloat | typing.SupportsIndex, start_deg: typing.SupportsFloat | typing.SupportsIndex, bridge: str, supply_v: typing.Annotated[numpy.typing.ArrayLike, numpy.float64], airflow_torque_nm: typing.Annotated[numpy.typing.ArrayLike, numpy.float64], step_s: typing.SupportsFloat | typing.SupportsIndex) -> dict:
     """
     One throttle over columns, from rest; behind mgdd.throttle.simulate.
     """
-
-def simulate_many(
-    throttles: collections.abc.Sequence[Throttle],
-    duty: typing.Annotated[numpy.typing.ArrayLike, numpy.float64],
-    *,
-    sample_s: typing.SupportsFloat | typing.SupportsIndex,
-    start_deg: typing.Annotated[numpy.typing.ArrayLike, numpy.float64],
-    bridge: str,
-    supply_v: typing.Annotated[numpy.typing.ArrayLike, numpy.float64],
-    airflow_torque_nm: typing.Annotated[numpy.typing.ArrayLike, numpy.float64],
-    step_s: typing.SupportsFloat | typing.SupportsIndex,
-) -> numpy.typing.NDArray[numpy.float64]:
+def simulate_many(throttles: collections.abc.Sequence[Throttle], duty: typing.Annotated[numpy.typing.ArrayLike, numpy.float64], *, sample_s: typing.SupportsFloat | typing.SupportsIndex, start_deg: typing.Annotated[numpy.typing.ArrayLike, numpy.float64], bridge: str, supply_v: typing.Annotated[numpy.typing.ArrayLike, numpy.float64], airflow_torque_nm: typing.Annotated[numpy.typing.ArrayLike, numpy.float64], step_s: typing.SupportsFloat | typing.SupportsIndex) -> numpy.typing.NDArray[numpy.float64]:
     """
     Many throttles under one input, in lanes; behind mgdd.throttle.simulate.
     """
-
-sensor_fault_kinds: tuple = ("none", "open_wire", "short_to_ground", "short_to_supply", "offset", "gain", "stuck")
+sensor_fault_kinds: tuple = ('none', 'open_wire', 'short_to_ground', 'short_to_supply', 'offset', 'gain', 'stuck')
