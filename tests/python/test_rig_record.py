@@ -263,7 +263,7 @@ def test_a_killed_process_loses_at_most_the_record_it_was_writing(tmp_path: Path
 FULL = """
 import resource, sys
 from mgdd.errors import RigError
-from mgdd.rig import Recorder, read_record
+from mgdd.rig import Frame, Recorder, read_record
 record = Recorder(sys.argv[1])
 resource.setrlimit(resource.RLIMIT_FSIZE, (3000, resource.RLIM_INFINITY))
 written = 0
