@@ -202,8 +202,10 @@ void fuzz_codec(Random& random) {
   for (std::uint8_t& byte : payload)
     byte = static_cast<std::uint8_t>(random.word());
   const Bytes before = payload;
-  const double value =
-      random.one_in(2) ? std::bit_cast<double>(random.word()) : static_cast<double>(random.below(100000)) / 7.0 - 500.0;
+  static constexpr std::array<double, 5> edges{HUGE_VAL, -HUGE_VAL, -0.0, 0x1p63, 0x1p64};
+  const double value = random.one_in(8)   ? edges[random.below(edges.size())]
+                       : random.one_in(2) ? std::bit_cast<double>(random.word())
+                                          : static_cast<double>(random.below(100000)) / 7.0 - 500.0;
   const auto beyond = static_cast<OutOfRange>(random.below(2));
   const PackStatus status = pack(layout, value, beyond, payload);
   const bool written = status == PackStatus::ok || status == PackStatus::clamped;

@@ -21,7 +21,7 @@ using rig::Frame;
 struct Data {
   const char* name = "data";
   const char* doc = "Payload, up to 64 bytes.";
-  using Argument = py::bytes;
+  using Argument = py::buffer;  // a message of python-can holds a bytearray
 
   void put(Frame& frame, const py::buffer& given) const {
     const std::vector<std::uint8_t> bytes = to_payload(given);

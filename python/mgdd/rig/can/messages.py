@@ -80,7 +80,7 @@ def frame_of(message: can.Message, *, monotonic_ns: int, channel: int = 0, recei
     """
     return Frame(
         id=message.arbitration_id,
-        data=bytes(message.dlc) if message.is_remote_frame else bytes(message.data),
+        data=bytes(message.dlc) if message.is_remote_frame else message.data,
         extended=message.is_extended_id,
         error=message.is_error_frame,
         received=message.is_rx if received is None else received,
