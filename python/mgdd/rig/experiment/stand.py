@@ -7,7 +7,6 @@ from contextlib import ExitStack, contextmanager
 from dataclasses import dataclass
 from typing import TYPE_CHECKING, Any
 
-from mgdd.errors import ParameterError
 from mgdd.loop import EngineBench, Plant, VirtualThrottle
 from mgdd.loop.track import sensors_of
 from mgdd.optimize import Limit
@@ -103,8 +102,6 @@ def _rig_of(
     key_file: str | os.PathLike[str] | None,
 ) -> Any:
     experiment, mode = checked.experiment, checked.experiment.mode
-    if arm and mode != "bench":
-        raise ParameterError.of("arm", arm, f"left out with mode = {mode!r}: only 'bench' drives hardware")
     if mode == "simulate":
         return SimulatedRig(simulated_plant(experiment, sample_s=checked.sample_s, inputs=("duty",)))
     if checked.record is not None:
