@@ -34,6 +34,8 @@ if TYPE_CHECKING:
 
 __all__ = ["Stand", "opened", "simulated_plant"]
 
+_STEP_TIMEOUT_S = 10.0  # a node that steps has no clock: only its end is waited for
+
 
 @dataclass(frozen=True, kw_only=True)
 class Stand:
@@ -112,6 +114,8 @@ def _rig_of(
     bus: Bus = CanTransport.parse(connection)
     if recorder is not None:
         bus = RecordedBus(bus, recorder)
+    given_ms = experiment.bus.timeout_ms
+    timeout_s = given_ms * 1e-3 if given_ms else _STEP_TIMEOUT_S if experiment.bus.pace == "step" else None
     return CanRig(checked.signal_map, bus, mode=mode, limits=experiment.limit_names or None, arm=arm, key_file=key_file)
 
 
