@@ -117,11 +117,18 @@ def test_error_frames_are_classified(peer: can.BusABC, kind: int, detail: int, f
             assert sum(transport.counters.get(name, 0) for name in ("controller", "restarted")) == 1
 
 
+def complaint_about(interface: str) -> str:
+    try:
+        CanTransport.parse(f"socketcan:{interface}").open()
+    except RigError as error:
+        return str(error)
+    return ""
+
+
 def test_an_interface_that_is_not_there_is_named() -> None:
     with warnings.catch_warnings():
         warnings.simplefilter("ignore", ResourceWarning)  # python-can forgets the socket of a bus that did not open
-        with pytest.raises(RigError, match="vcan7"):
-            CanTransport.parse("socketcan:vcan7").open()
+        assert "vcan7" in complaint_about("vcan7")
         gc.collect()
 
 
