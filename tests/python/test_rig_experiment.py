@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+import math
 import os
 import signal
 import subprocess
@@ -17,7 +18,7 @@ import xarray as xr
 
 from mgdd.errors import DataError, ParameterError, RigError
 from mgdd.results.labels import check_labels
-from mgdd.rig import Experiment, SafetyEnvelope, check_experiment, run_experiment
+from mgdd.rig import Experiment, SafetyEnvelope, check_experiment, read_record, run_experiment
 from mgdd.rig.experiment.watched import Cycle
 
 HEAD = 'kind = "experiment"\nformat = 1\nseed = 5\n'
@@ -78,10 +79,10 @@ def test_a_missing_key_or_file_is_named(tmp_path: Path) -> None:
     ("text", "error", "said"),
     [
         (TRACK.replace("step:20:35", "steps:20"), ParameterError, "reference = 'steps:20'"),
-        (TRACK + 'model = "P9"\n', DataError, "P9"),
+        (TRACK + 'model = "P9"\n', ParameterError, "P9"),
         (TRACK + 'model = "away.toml"\n', FileNotFoundError, r"away\.toml"),
         (TRACK + '[safety]\nenvelope = "ebt"\n', DataError, "ebt"),
-        (SEEK + '[plant]\npreset = "P1"\n', DataError, "P1"),
+        (SEEK + '[plant]\npreset = "P1"\n', ParameterError, "P1"),
         (
             SEEK.replace("cycles = 60", "lower_cad = 5.0\nupper_cad = 1.0"),
             ParameterError,
@@ -144,8 +145,8 @@ def test_a_plant_that_differs_from_the_model_is_scaled_with_its_stiction() -> No
     weak = run_experiment(experiment(TRACK))
     sticky = run_experiment(experiment(TRACK + "[plant.scale]\ncoulomb_nm = 1.5\n"))
     assert sticky.figures["mse_deg2"] != weak.figures["mse_deg2"]
-    with pytest.raises(ParameterError, match="bore_mm"):
-        run_experiment(experiment(TRACK + "[plant.scale]\nbore_mm = 1.5\n"))
+    with pytest.raises(ParameterError, match="stroke_mm"):
+        run_experiment(experiment(TRACK + "[plant.scale]\nstroke_mm = 1.5\n"))
 
 
 def test_identification_finds_the_throttle_and_keeps_the_model(tmp_path: Path) -> None:
@@ -244,8 +245,6 @@ def test_ctrl_c_keeps_the_cycles_so_far(tmp_path: Path) -> None:
 
 
 def test_a_killed_run_keeps_its_record(tmp_path: Path) -> None:
-    from mgdd.rig.record import read_record
-
     file, folder = tmp_path / "slow.toml", tmp_path / "run"
     file.write_text(TRACK)
     code = (
@@ -261,6 +260,10 @@ def test_a_killed_run_keeps_its_record(tmp_path: Path) -> None:
     process.communicate()
     time.sleep(0.05)
     assert Experiment.load(folder / "experiment.toml") == experiment(TRACK)
+    envelope = check_experiment(experiment(TRACK)).envelope
+    assert envelope is not None
+    before = 2 * math.ceil(envelope.good_frames)  # until the gate runs
     record = read_record(folder / "run.rec")
-    assert len(record.samples["cycle"]["asked_duty"]) == 401
+    assert record.samples["rig"].sizes["time_s"] == before + 401
+    assert record.ignored_bytes == 0
     assert not (folder / "result.json").exists()

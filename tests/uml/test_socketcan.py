@@ -2,8 +2,10 @@
 
 from __future__ import annotations
 
+import gc
 import threading
 import time
+import warnings
 from collections.abc import Iterator
 from pathlib import Path
 
@@ -115,9 +117,19 @@ def test_error_frames_are_classified(peer: can.BusABC, kind: int, detail: int, f
             assert sum(transport.counters.get(name, 0) for name in ("controller", "restarted")) == 1
 
 
+def complaint_about(interface: str) -> str:
+    try:
+        CanTransport.parse(f"socketcan:{interface}").open()
+    except RigError as error:
+        return str(error)
+    return ""
+
+
 def test_an_interface_that_is_not_there_is_named() -> None:
-    with pytest.raises(RigError, match="vcan7"):
-        CanTransport.parse("socketcan:vcan7").open()
+    with warnings.catch_warnings():
+        warnings.simplefilter("ignore", ResourceWarning)  # python-can forgets the socket of a bus that did not open
+        assert "vcan7" in complaint_about("vcan7")
+        gc.collect()
 
 
 # --- a rig and its node on one bus --------------------------------------------------------------------------
@@ -213,7 +225,7 @@ def test_the_socket_of_the_core_speaks_with_python_can(peer: can.BusABC) -> None
     heard = peer.recv(1.0)
     assert heard is not None
     assert (heard.arbitration_id, bytes(heard.data)) == (0x120, b"\x05\x06")
-    assert socket.counts["dropped"] == 0
+    assert socket.counts["lost"] == 0
 
 
 def test_the_socket_of_the_core_follows_the_state_of_the_bus(peer: can.BusABC) -> None:

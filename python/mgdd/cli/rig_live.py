@@ -54,22 +54,21 @@ class LiveView:
             self._live.update(self._table(cycle, now - self._begun), refresh=True)
 
     def _table(self, cycle: Cycle, elapsed_s: float) -> Any:
+        from rich.console import Group
         from rich.table import Table
         from rich.text import Text
 
-        done = (cycle.number + 1) / max(self._cycles, 1)
-        bar = "█" * round(done * _BAR)
-        table = Table(title=Text(f"{self._title}  {elapsed_s:.1f} s"), caption=Text(
-            f"{bar:░<{_BAR}} {cycle.number + 1} of {self._cycles}"
-        ), box=None, pad_edge=False)  # fmt: skip
-        for head in ("", "now", ""):
-            table.add_column(head, justify="left" if not head else "right")
+        bar = "█" * round((cycle.number + 1) / max(self._cycles, 1) * _BAR)
+        table = Table(box=None, pad_edge=False, show_header=False)
+        for justify in ("left", "right", "left"):
+            table.add_column(justify=justify)  # type: ignore[arg-type]
         for kind, values in (
             ("asked", cycle.asked), ("applied", cycle.measured.applied), ("limit", cycle.measured.limits),
             ("measured", cycle.measured.values),
         ):  # fmt: skip
             _add(table, kind, values)
-        return table
+        head = Text(f"{self._title}  {elapsed_s:.1f} s", style="bold")
+        return Group(head, table, Text(f"{bar:░<{_BAR}} {cycle.number + 1} of {self._cycles}"))
 
 
 def _add(table: Any, kind: str, values: Mapping[str, float]) -> None:

@@ -40,7 +40,7 @@ def add(verbs: Any) -> None:
         "bit; exit code 1 where one differs",
         example="mgdd rig replay mgdd-runs/first --json",
     )  # fmt: skip
-    replay.add_argument("run", metavar="DIR", help="folder of a run, with experiment.toml and run.rec")
+    replay.add_argument("source", metavar="DIR", help="folder of a run, with experiment.toml and run.rec")
     replay.add_argument("--folder", metavar="NEW_DIR", help="keep the replayed run there (default: only compare)")
     export = add_command(
         verbs, "export", _export,
@@ -82,7 +82,7 @@ def _replay(args: argparse.Namespace) -> None:
     from mgdd.rig import Experiment, check_experiment, run_experiment
 
     check_output(args)
-    folder = Path(args.run)
+    folder = Path(args.source)
     for name in ("experiment.toml", "run.rec"):
         if not (folder / name).is_file():
             raise DataError(f"{folder}: holds no {name}: give the folder of a run of `mgdd rig run`")

@@ -11,7 +11,7 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from mgdd.errors import DataError
+from mgdd.errors import DataError, ParameterError
 from mgdd.results.describe import described
 from mgdd.rig.experiment.checked import CheckedExperiment, check_experiment
 from mgdd.rig.experiment.engine_task import SeekPlan
@@ -139,6 +139,9 @@ def run_experiment(
     (True, 0)
     """
     checked = experiment if isinstance(experiment, CheckedExperiment) else check_experiment(experiment)
+    mode = checked.experiment.mode
+    if arm and mode != "bench":
+        raise ParameterError.of("arm", arm, f"left out with mode = {mode!r}: only 'bench' drives hardware")
     run = None if folder is None else RunFolder(folder)
     if run is not None:
         run.text("experiment.toml", checked.experiment.with_files(run.keep).to_toml())

@@ -109,6 +109,7 @@ class BusSettings(Settings):
     map: str | None = _key("text")
     connection: str | None = _key("text")
     pace: str = _key("text", "step", among=PACES)
+    timeout_ms: float | None = _key("number", low=1.0, high=60_000.0)
 
 
 @dataclass(frozen=True, kw_only=True)

@@ -7,7 +7,6 @@ from contextlib import ExitStack, contextmanager
 from dataclasses import dataclass
 from typing import TYPE_CHECKING, Any
 
-from mgdd.errors import ParameterError
 from mgdd.loop import EngineBench, Plant, VirtualThrottle
 from mgdd.loop.track import sensors_of
 from mgdd.optimize import Limit
@@ -34,6 +33,8 @@ if TYPE_CHECKING:
     import os
 
 __all__ = ["Stand", "opened", "simulated_plant"]
+
+_STEP_TIMEOUT_S = 10.0  # a node that steps has no clock: only its end is waited for
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -103,8 +104,6 @@ def _rig_of(
     key_file: str | os.PathLike[str] | None,
 ) -> Any:
     experiment, mode = checked.experiment, checked.experiment.mode
-    if arm and mode != "bench":
-        raise ParameterError.of("arm", arm, f"left out with mode = {mode!r}: only 'bench' drives hardware")
     if mode == "simulate":
         return SimulatedRig(simulated_plant(experiment, sample_s=checked.sample_s, inputs=("duty",)))
     if checked.record is not None:
@@ -115,7 +114,12 @@ def _rig_of(
     bus: Bus = CanTransport.parse(connection)
     if recorder is not None:
         bus = RecordedBus(bus, recorder)
-    return CanRig(checked.signal_map, bus, mode=mode, limits=experiment.limit_names or None, arm=arm, key_file=key_file)
+    given_ms = experiment.bus.timeout_ms
+    timeout_s = given_ms * 1e-3 if given_ms else _STEP_TIMEOUT_S if experiment.bus.pace == "step" else None
+    return CanRig(
+        checked.signal_map, bus, mode=mode, timeout_s=timeout_s, arm=arm, key_file=key_file,
+        limits=experiment.limit_names or None,
+    )  # fmt: skip
 
 
 def _guarded(checked: CheckedExperiment, rig: Any, recorded: Plant) -> Stand:
