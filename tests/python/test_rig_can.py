@@ -184,15 +184,20 @@ def test_leaving_sends_five_safe_frames_and_then_nothing(way: str) -> None:
         assert core.state == "armed"
 
 
+def drive_until_killed(number: signal.Signals) -> None:
+    with rig_on("signal") as rig:
+        rig.apply({"duty": 0.7})
+        os.kill(os.getpid(), number)
+        time.sleep(LONG_S)
+
+
 @pytest.mark.parametrize(("number", "raised"), [(signal.SIGINT, KeyboardInterrupt), (signal.SIGTERM, SystemExit)])
 def test_signals_leave_by_the_exit(number: signal.Signals, raised: type[BaseException]) -> None:
     before = signal.signal(number, signal.SIG_IGN)  # as a shell leaves SIGINT to its background jobs
     try:
         with CanTransport("virtual", "signal") as spy, node("signal"):
-            with pytest.raises(raised), rig_on("signal") as rig:
-                rig.apply({"duty": 0.7})
-                os.kill(os.getpid(), number)
-                time.sleep(LONG_S)
+            with pytest.raises(raised):
+                drive_until_killed(number)
             assert all(map(is_safe, commands(spy)[-5:]))
         assert signal.getsignal(number) is signal.SIG_IGN
     finally:
@@ -200,14 +205,17 @@ def test_signals_leave_by_the_exit(number: signal.Signals, raised: type[BaseExce
 
 
 def test_a_dead_bus_does_not_hide_why_it_was_left(monkeypatch: pytest.MonkeyPatch) -> None:
-    with node("dead"), pytest.raises(ZeroDivisionError), rig_on("dead") as rig:
-        rig.apply({"duty": 0.7})
+    def refuse(*_: object, **__: object) -> None:
+        raise RigError("gone")
 
-        def refuse(*_: object, **__: object) -> None:
-            raise RigError("gone")
+    def lose_the_bus() -> None:
+        with rig_on("dead") as rig:
+            rig.apply({"duty": 0.7})
+            monkeypatch.setattr(rig.bus, "send", refuse)
+            raise ZeroDivisionError
 
-        monkeypatch.setattr(rig.bus, "send", refuse)
-        raise ZeroDivisionError
+    with node("dead"), pytest.raises(ZeroDivisionError):
+        lose_the_bus()
 
 
 # --- who is there -------------------------------------------------------------------------------------------
@@ -416,6 +424,11 @@ def test_without_drive_the_plate_is_at_limp_home_and_an_engine_stands(host: Host
     assert engine.sample(None) == ({}, {})
 
 
+def measure_all(rig: CanRig, times: int) -> None:
+    for _ in range(times):
+        rig.measure()
+
+
 def test_a_late_command_is_seen_over_the_bus_and_arming_mends_it() -> None:
     with node("late", step=False), rig_on("late") as rig:
         tried = 0
@@ -425,8 +438,7 @@ def test_a_late_command_is_seen_over_the_bus_and_arming_mends_it() -> None:
             time.sleep(0.1)
             rig.bus.receive(0.0)
             with pytest.raises(RigError, match="node is in state 'limp' and does not drive; look for the cause"):
-                for _ in range(3):
-                    rig.measure()
+                measure_all(rig, 3)
             rig.arm()
             rig.apply({"duty": 0.5})
             try:
@@ -442,7 +454,7 @@ def test_a_node_needs_the_inputs_of_its_map_and_a_bridge_that_opens() -> None:
         NodeCore(node_of(ETB), SignalMap.load("engine"))
     with pytest.raises(ParameterError, match="with 'bridge_open': power off means an open bridge"):
         node_plant(VirtualThrottle())
-    with pytest.raises(ParameterError, match="soi_cad.*those of a virtual throttle"):
+    with pytest.raises(ParameterError, match=r"soi_cad.*those of a virtual throttle"):
         node_of(SignalMap.load("surrogate"))
     with pytest.raises(ParameterError, match="fault = 'offset:sensor=1': must be left out"):
         node_of(SignalMap.load("engine"), faults=["offset:sensor=1"])
@@ -460,7 +472,7 @@ def test_faults_of_the_plant_reach_the_host() -> None:
 # --- replay of frames ---------------------------------------------------------------------------------------
 
 
-def recorded_run(duties: list[float], **settings: object) -> tuple[list[Frame], list[Measurement]]:
+def recorded_run(duties: list[float]) -> tuple[list[Frame], list[Measurement]]:
     frames: list[Frame] = []
     with CanRig(ETB, plant=VirtualThrottle(inputs=["duty", "bridge_open"], seed=2), on_frame=frames.append) as rig:
         measured = []

@@ -217,7 +217,7 @@ def test_seeking_on_the_engine_bench_over_the_bus() -> None:
 
 
 def test_a_node_that_cannot_start_says_why() -> None:
-    with pytest.raises(RigError, match="mgdd rig node did not start: .*did you mean 'from_s'"):
+    with pytest.raises(RigError, match=r"mgdd rig node did not start: .*did you mean 'from_s'"):
         VirtualNode("etb", faults=["jammed:form_s=1"]).start()
 
 

@@ -200,8 +200,8 @@ class RecordingRig:
     rig : Rig
         The rig, or a plain plant.
     sink : callable, optional
-        Called with each row of named numbers as soon as it is measured, to write it to a file: all have the names of the
-        first one, NaN where there is none.
+        Called with each row of named numbers as soon as it is measured, to write it to a file: all have the names of
+        the first one, NaN where there is none.
 
     Examples
     --------

@@ -191,7 +191,7 @@ class CanRig:
                 f"{self.bus.name}: the node is in state {self.state!r} and does not drive; look for the cause, then "
                 "call arm() or enter the rig again"
             )
-        return self._inbox.measurement()
+        return self._inbox.read()
 
     def arm(self) -> None:
         """Send safe frames until the node is ready to be driven.
@@ -211,6 +211,7 @@ class CanRig:
                 self._send_safe()
             rounds += 1
             heard = self._heard(self.map.cycle_s if self.bus.shared else 0.0)
+            self._inbox.skip()
             refuses = self._sends and (self._inbox.failed or self.state == "init")
             if heard and not refuses and (rounds >= _ARMING_ROUNDS or not self._sends):
                 return
@@ -242,6 +243,7 @@ class CanRig:
         try:
             self._listen()
             self.arm()
+            self._inbox.skipped = 0  # those of the arming
         except BaseException:
             self.close()
             raise
@@ -323,13 +325,13 @@ class CanRig:
                     self._hand_over(frame, final=final)
 
     def _heard(self, timeout_s: float) -> bool:
-        """Wait for the next whole cycle."""
+        """Wait for a whole cycle, then take all that came: the newest state counts, the oldest cycle is next."""
         until = time.monotonic() + timeout_s
         while not self._inbox.ready:
             left_s = until - time.monotonic() if self.bus.shared else timeout_s
             if not self._receive(max(0.0, left_s)):
                 return False
-        self._inbox.read()
+        self._take_all()
         return True
 
     def _take_all(self) -> None:
