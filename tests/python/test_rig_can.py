@@ -20,6 +20,7 @@ from mgdd.errors import DataError, ParameterError, RigError
 from mgdd.loop import EngineBench, Measurement, VirtualThrottle
 from mgdd.rig import CanRig, CanTransport, Recorder, RecordingRig, ReplayRig, Rig, RigRecord, SignalMap
 from mgdd.rig.can.frame import changed
+from mgdd.rig.can.inbox import Inbox
 from mgdd.rig.can.link import Sender
 from mgdd.rig.can.modes import RigMode, key_line
 from mgdd.rig.can.node import node_of, run_node
@@ -389,6 +390,38 @@ def test_a_frozen_sender_is_not_one_that_lives(host: Host) -> None:
         host.wait(0.004)
         host.core.take(changed(frozen, monotonic_ns=host.now_ns))
     assert (host.core.state, host.core.reasons) == ("limp", {"wrong_counter": 1})
+
+
+def test_a_mode_that_the_node_does_not_have_is_not_driven_and_does_not_arm(host: Host) -> None:
+    def in_mode(name: str) -> Frame:
+        mode = host.command.message.signals["Mode"]
+        raws = {**host.command.driven, "Mode": mode.choices[name]}
+        (frame,) = host.sender.frames(host.command, host.command.payloads({"duty": 0.5}, raws))
+        return changed(frame, monotonic_ns=host.now_ns)
+
+    for _ in range(10):
+        host.core.take(in_mode("position"))
+    assert host.core.state == "init"
+    running(host)
+    host.core.take(in_mode("calib"))
+    assert not host.core.driven
+    host.send(0.5)
+    assert host.core.driven
+
+
+def test_what_came_too_long_ago_is_missing() -> None:
+    core = NodeCore(node_of(ETB, seed=1), ETB)
+    inbox = Inbox(ETB)
+    seen = []
+    for cycle in range(12):
+        for frame in core.sample():
+            if frame.id != 0x122 or cycle < 5:  # the sensors fall silent
+                inbox.take(frame)
+        if inbox.ready:
+            seen.append(inbox.read().values)
+    limit = 3  # cycles, as the map says nothing else
+    assert [math.isnan(values["first_v"]) for values in seen] == [False] * (3 + limit) + [True] * (7 - limit)
+    assert not any(math.isnan(values["sensed_angle_deg"]) for values in seen[1:])
 
 
 def test_foreign_and_short_frames_change_nothing(host: Host) -> None:

@@ -112,8 +112,11 @@ def test_interface_and_channel_are_always_given(text: str) -> None:
 def test_no_configuration_file_chooses_the_bus(monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setenv("CAN_INTERFACE", "socketcan")
     monkeypatch.setenv("CAN_CHANNEL", "vcan9")
+    monkeypatch.setenv("CAN_CONFIG", '{"receive_own_messages": true}')
     with CanTransport("virtual", "own") as bus:
         assert bus._bus.channel_info == "Virtual bus channel own"
+        bus.send(frame())
+        assert bus.receive(0.1) is None
 
 
 def test_use_before_and_after_it_is_open() -> None:
