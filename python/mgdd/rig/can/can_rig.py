@@ -206,6 +206,8 @@ class CanRig:
             return
         wait_s = max(_PEER_S, _PEER_CYCLES * self.map.cycle_s, self.timeout_s)
         until, rounds = time.monotonic() + wait_s, 0
+        checks = [message.e2e.good_until_valid for message in self.map.commands.values() if message.e2e is not None]
+        enough = _ARMING_ROUNDS + max(checks, default=0)  # for a node that does not say its state
         while True:
             if self._sends:
                 self._send_safe()
@@ -213,7 +215,7 @@ class CanRig:
             heard = self._heard(self.map.cycle_s if self.bus.shared else 0.0)
             self._inbox.skip()
             refuses = self._sends and (self._inbox.failed or self.state == "init")
-            if heard and not refuses and (rounds >= _ARMING_ROUNDS or not self._sends):
+            if heard and not refuses and (rounds >= enough or not self._sends):
                 return
             if time.monotonic() > until if self.bus.shared else rounds > _PEER_CYCLES:
                 if heard:
