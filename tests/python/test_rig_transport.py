@@ -296,6 +296,13 @@ def test_the_hub_delays_and_has_a_bit_rate() -> None:
             assert time.monotonic() - begin >= least
 
 
+def test_a_bus_that_is_too_slow_loses_frames_and_says_so() -> None:
+    got, hub = exchange([], bit_rate=20e3, count=300)  # 133 bits each: 150 in a second
+    assert got == sorted(got)
+    assert len(got) + hub.counts["overload"] == 300
+    assert 100 < len(got) < 260
+
+
 def test_the_hub_reports_bus_errors_and_freezes_a_client() -> None:
     with running_hub(["error:class=0x40,id=0x7ff"]) as hub, two_on(hub) as (one, other):
         one.send(frame(1, 0x7FF))

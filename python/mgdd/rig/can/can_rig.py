@@ -255,17 +255,21 @@ class CanRig:
         if not self._is_open:
             return
         self._is_open = False
-        with undisturbed():
-            try:
-                if self._has_sent:
-                    for _ in range(_SAFE_FRAMES):
-                        with contextlib.suppress(RigError):  # a dead bus must not hide why we leave
-                            self._send_safe(final=True)
-                        if self.bus.shared:
-                            time.sleep(_SAFE_PAUSE_S)
-            finally:
-                self.bus.close()
-        self._signals.restore()
+        try:
+            with undisturbed():
+                self._leave()
+        finally:
+            self._signals.restore()
+
+    def _leave(self) -> None:
+        try:
+            for _ in range(_SAFE_FRAMES if self._has_sent else 0):
+                with contextlib.suppress(RigError):  # a dead bus must not hide why we leave
+                    self._send_safe(final=True)
+                if self.bus.shared:
+                    time.sleep(_SAFE_PAUSE_S)
+        finally:
+            self.bus.close()
 
     def __enter__(self) -> Self:
         self.open()
