@@ -17,12 +17,10 @@ from mgdd.loop.plant import checked_inputs
 from mgdd.rig.can.frame import Bus, changed
 from mgdd.rig.can.inbox import Inbox
 from mgdd.rig.can.link import Sender
-from mgdd.rig.can.local_bus import LocalBus
 from mgdd.rig.can.mapped import MappedMessage
-from mgdd.rig.can.modes import RigMode, require_key
+from mgdd.rig.can.modes import RigMode, bus_of, require_key
 from mgdd.rig.can.signal_map import SignalMap
 from mgdd.rig.can.signals import SignalsAsExceptions, undisturbed
-from mgdd.rig.can.transport import CanTransport
 
 __all__ = ["CanRig"]
 
@@ -97,7 +95,7 @@ class CanRig:
         self.mode = RigMode.of(mode)
         loaded = signal_map if isinstance(signal_map, SignalMap) else SignalMap.load(signal_map)
         self.map = loaded.with_goals(limits=limits, objective=objective)
-        self.bus = _bus_of(self.mode, self.map, bus, plant)
+        self.bus = bus_of(self.mode, self.map, bus, plant)
         trigger = self.map.measurements[self.map.trigger]
         self.timeout_s = trigger.timeout_s or 0.0 if timeout_s is None else float(timeout_s)
         if not 0.0 < self.timeout_s < math.inf:
@@ -343,19 +341,3 @@ class CanRig:
     def _take_all(self) -> None:
         while self._receive(0.0):
             pass
-
-
-def _bus_of(mode: RigMode, signal_map: SignalMap, bus: Bus | str | None, plant: Plant | None) -> Bus:
-    if mode is RigMode.SIMULATE:
-        if bus is not None:
-            raise ParameterError.of(
-                "mode",
-                mode.value,
-                "said for a bus: 'hil', 'dry_run', 'replay' or 'bench'; 'simulate' takes a plant instead",
-            )
-        if plant is None:
-            raise ParameterError("plant = None: must be given for mode='simulate', or give a bus and another mode")
-        return LocalBus(plant, signal_map)
-    if plant is not None or bus is None:
-        raise ParameterError(f"mode = {mode.value!r}: must have a bus, and no plant: that is in the node")
-    return CanTransport.parse(bus) if isinstance(bus, str) else bus
