@@ -5,7 +5,7 @@
 
 from __future__ import annotations
 
-from mgdd._core.rig import E2eCheck, E2eSettings, protect
+from mgdd._core.rig import E2eCheck, E2eSettings, Frame
 from mgdd.rig.base import Rig
 from mgdd.rig.can.can_rig import CanRig
 from mgdd.rig.can.processes import VirtualNode
@@ -13,6 +13,7 @@ from mgdd.rig.can.signal_map import SignalMap
 from mgdd.rig.can.transport import CanTransport
 from mgdd.rig.exchange import RecordingRig, RigRecord
 from mgdd.rig.export import export_record
+from mgdd.rig.protection import protect
 from mgdd.rig.recorded import read_record, repair_record
 from mgdd.rig.recorder import Recorder
 from mgdd.rig.replay import ReplayRig
@@ -23,6 +24,7 @@ __all__ = [
     "CanTransport",
     "E2eCheck",
     "E2eSettings",
+    "Frame",
     "Recorder",
     "RecordingRig",
     "ReplayRig",
