@@ -6,7 +6,8 @@ import time
 from typing import Any
 
 from mgdd._core import rig as core
-from mgdd.rig.can.frame import Bus, Frame
+from mgdd._core.rig import Frame
+from mgdd.rig.can.frame import Bus
 from mgdd.rig.recorder import Recorder
 
 __all__ = ["RecordedBus"]

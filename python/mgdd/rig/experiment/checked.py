@@ -15,7 +15,7 @@ from mgdd.rig.experiment.experiment import Experiment
 from mgdd.rig.experiment.settings import SAMPLE_S, EnginePlant, IdentifyTask, SeekTask, TrackTask
 from mgdd.rig.experiment.throttle_tasks import IdentifyPlan, TrackPlan
 from mgdd.rig.recorded import read_record
-from mgdd.rig.safety import SafetyEnvelope
+from mgdd.rig.safety_envelope import SafetyEnvelope
 
 __all__ = ["CheckedExperiment", "check_experiment"]
 
@@ -48,6 +48,13 @@ class CheckedExperiment:
     envelope: SafetyEnvelope | None
     signal_map: SignalMap | None
     record: Path | None
+
+    @property
+    def bus_map(self) -> SignalMap:
+        """Map of an experiment over a bus; RigError for one without."""
+        if self.signal_map is None:
+            raise RigError(f"mode = {self.experiment.mode!r}: no bus; must be one of {', '.join(_BUS_MODES)}")
+        return self.signal_map
 
     def to_dict(self) -> dict[str, Any]:
         """Say what would run.

@@ -117,7 +117,7 @@ def _rig_of(
     given_ms = experiment.bus.timeout_ms
     timeout_s = given_ms * 1e-3 if given_ms else _STEP_TIMEOUT_S if experiment.bus.pace == "step" else None
     return CanRig(
-        checked.signal_map, bus, mode=mode, timeout_s=timeout_s, arm=arm, key_file=key_file,
+        checked.bus_map, bus, mode=mode, timeout_s=timeout_s, arm=arm, key_file=key_file,
         limits=experiment.limit_names or None,
     )  # fmt: skip
 
