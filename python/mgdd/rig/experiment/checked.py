@@ -6,7 +6,7 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
-from mgdd.errors import ParameterError
+from mgdd.errors import ParameterError, RigError
 from mgdd.io.existing_file import existing_file
 from mgdd.results.describe import described
 from mgdd.rig.can.signal_map import SignalMap
