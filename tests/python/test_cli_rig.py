@@ -47,7 +47,7 @@ def test_a_hub_says_its_bus_and_at_the_end_its_counts() -> None:
 @pytest.mark.parametrize(
     ("arguments", "text"),
     [
-        (["hub", "--fault", "dorp:p=1"], "fault = 'dorp': must be one of drop"),
+        (["hub", "--fault", "dropp:p=1"], "fault = 'dropp': must be one of drop"),
         (["hub", "--port", "70000"], "port = 70000: must be in [0, 65535]"),
         (["hub", "--bit-rate", "1"], "bit_rate = 1: must be in [1e3, 1e8] bit/s"),
         (["node", "--bus", BUS], "nobody answers there"),

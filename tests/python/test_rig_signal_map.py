@@ -142,7 +142,7 @@ def test_a_layout_of_somebody_else(foreign: Path) -> None:
 
 WRONG = [
     ('trigger = "Done"', 'trigger = "Don"', ParameterError, r"trigger = 'Don': must be one of the measurements"),
-    ("[commands.Cmd.inputs]", "[commands.Cmd.imputs]", ParameterError, r"commands.Cmd.imputs = .*inputs"),
+    ("[commands.Cmd.inputs]", "[commands.Cmd.inputz]", ParameterError, r"commands.Cmd.inputz = .*inputs"),
     ("[commands.Cmd", "[commands.Kmd", DataError, r"\[commands.Kmd\]: foreign.dbc has no .*'Cmd'"),
     ('signal = "Drive"', 'signal = "Driev"', ParameterError, r"duty.signal = 'Driev': .*did you mean 'Drive'"),
     ('"Angle", unit = "rad"', '"Current", unit = "A"', ParameterError, "mapped once: .*sensed_angle_deg has it too"),
@@ -202,7 +202,7 @@ def test_a_wrong_dbc_is_refused_by_name(foreign: Path, right: str, wrong: str, t
 
 def test_files_that_are_not_there(foreign: Path) -> None:
     with pytest.raises(FileNotFoundError, match=r"did you mean 'foreign.toml'"):
-        SignalMap.load(foreign.with_name("foreing.toml"))
+        SignalMap.load(foreign.with_name("foreignn.toml"))
     (foreign.parent / "foreign.dbc").unlink()
     with pytest.raises(FileNotFoundError, match="no such file"):
         SignalMap.load(foreign)

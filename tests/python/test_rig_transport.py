@@ -318,7 +318,7 @@ def test_the_hub_reports_bus_errors_and_freezes_a_client() -> None:
 @pytest.mark.parametrize(
     ("text", "message"),
     [
-        ("dorp:p=1", "fault = 'dorp': must be one of drop"),
+        ("dropp:p=1", "fault = 'dropp': must be one of drop"),
         ("drop:q=1", "must be KIND:KEY=VALUE"),
         ("drop:p=much", "fault drop: p = 'much': must be a number"),
         ("drop:p=2", r"p = 2: must be in \[0, 1\]"),

@@ -27,6 +27,7 @@ __all__ = ["CanRig"]
 _SAFE_FRAMES = 5
 _SAFE_PAUSE_S = 0.002
 _LISTEN_CYCLES = 10
+_LISTEN_S = 0.1  # at least
 _ARMING_ROUNDS = 3
 _PEER_CYCLES = 20
 _PEER_S = 1.0  # at least so long for the first valid frame
@@ -291,7 +292,7 @@ class CanRig:
         if not self.bus.shared or not self._sends:
             return
         cycles = [m.message.cycle_s for m in self.map.commands.values() if m.message.cycle_s is not None]
-        until = time.monotonic() + _LISTEN_CYCLES * max([*cycles, self.map.cycle_s])
+        until = time.monotonic() + max(_LISTEN_S, _LISTEN_CYCLES * max([*cycles, self.map.cycle_s]))
         while (left := until - time.monotonic()) > 0.0:
             self._receive(left)
         if jumping := self._inbox.jumping():
