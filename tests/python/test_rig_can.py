@@ -15,11 +15,13 @@ from pathlib import Path
 import numpy as np
 import pytest
 
+from foreign_bus import write_foreign
 from mgdd._core.rig import Frame
 from mgdd.errors import DataError, ParameterError, RigError
 from mgdd.loop import EngineBench, Measurement, VirtualThrottle
 from mgdd.rig import CanRig, CanTransport, Recorder, RecordingRig, ReplayRig, Rig, RigRecord, SignalMap
 from mgdd.rig.can.frame import changed
+from mgdd.rig.can.inbox import Inbox
 from mgdd.rig.can.link import Sender
 from mgdd.rig.can.modes import RigMode, key_line
 from mgdd.rig.can.node import node_of, run_node
@@ -184,15 +186,20 @@ def test_leaving_sends_five_safe_frames_and_then_nothing(way: str) -> None:
         assert core.state == "armed"
 
 
+def drive_until_killed(number: signal.Signals) -> None:
+    with rig_on("signal") as rig:
+        rig.apply({"duty": 0.7})
+        os.kill(os.getpid(), number)
+        time.sleep(LONG_S)
+
+
 @pytest.mark.parametrize(("number", "raised"), [(signal.SIGINT, KeyboardInterrupt), (signal.SIGTERM, SystemExit)])
 def test_signals_leave_by_the_exit(number: signal.Signals, raised: type[BaseException]) -> None:
     before = signal.signal(number, signal.SIG_IGN)  # as a shell leaves SIGINT to its background jobs
     try:
         with CanTransport("virtual", "signal") as spy, node("signal"):
-            with pytest.raises(raised), rig_on("signal") as rig:
-                rig.apply({"duty": 0.7})
-                os.kill(os.getpid(), number)
-                time.sleep(LONG_S)
+            with pytest.raises(raised):
+                drive_until_killed(number)
             assert all(map(is_safe, commands(spy)[-5:]))
         assert signal.getsignal(number) is signal.SIG_IGN
     finally:
@@ -200,14 +207,17 @@ def test_signals_leave_by_the_exit(number: signal.Signals, raised: type[BaseExce
 
 
 def test_a_dead_bus_does_not_hide_why_it_was_left(monkeypatch: pytest.MonkeyPatch) -> None:
-    with node("dead"), pytest.raises(ZeroDivisionError), rig_on("dead") as rig:
-        rig.apply({"duty": 0.7})
+    def refuse(*_: object, **__: object) -> None:
+        raise RigError("gone")
 
-        def refuse(*_: object, **__: object) -> None:
-            raise RigError("gone")
+    def lose_the_bus() -> None:
+        with rig_on("dead") as rig:
+            rig.apply({"duty": 0.7})
+            monkeypatch.setattr(rig.bus, "send", refuse)
+            raise ZeroDivisionError
 
-        monkeypatch.setattr(rig.bus, "send", refuse)
-        raise ZeroDivisionError
+    with node("dead"), pytest.raises(ZeroDivisionError):
+        lose_the_bus()
 
 
 # --- who is there -------------------------------------------------------------------------------------------
@@ -383,6 +393,38 @@ def test_a_frozen_sender_is_not_one_that_lives(host: Host) -> None:
     assert (host.core.state, host.core.reasons) == ("limp", {"wrong_counter": 1})
 
 
+def test_a_mode_that_the_node_does_not_have_is_not_driven_and_does_not_arm(host: Host) -> None:
+    def in_mode(name: str) -> Frame:
+        mode = host.command.message.signals["Mode"]
+        raws = {**host.command.driven, "Mode": mode.choices[name]}
+        (frame,) = host.sender.frames(host.command, host.command.payloads({"duty": 0.5}, raws))
+        return changed(frame, monotonic_ns=host.now_ns)
+
+    for _ in range(10):
+        host.core.take(in_mode("position"))
+    assert host.core.state == "init"
+    running(host)
+    host.core.take(in_mode("calib"))
+    assert not host.core.driven
+    host.send(0.5)
+    assert host.core.driven
+
+
+def test_what_came_too_long_ago_is_missing() -> None:
+    core = NodeCore(node_of(ETB, seed=1), ETB)
+    inbox = Inbox(ETB)
+    seen = []
+    for cycle in range(12):
+        for frame in core.sample():
+            if frame.id != 0x122 or cycle < 5:  # the sensors fall silent
+                inbox.take(frame)
+        if inbox.ready:
+            seen.append(inbox.read().values)
+    limit = 3  # cycles, as the map says nothing else
+    assert [math.isnan(values["first_v"]) for values in seen] == [False] * (3 + limit) + [True] * (7 - limit)
+    assert not any(math.isnan(values["sensed_angle_deg"]) for values in seen[1:])
+
+
 def test_foreign_and_short_frames_change_nothing(host: Host) -> None:
     running(host)
     good = host.frame(0.5)
@@ -416,6 +458,11 @@ def test_without_drive_the_plate_is_at_limp_home_and_an_engine_stands(host: Host
     assert engine.sample(None) == ({}, {})
 
 
+def measure_all(rig: CanRig, times: int) -> None:
+    for _ in range(times):
+        rig.measure()
+
+
 def test_a_late_command_is_seen_over_the_bus_and_arming_mends_it() -> None:
     with node("late", step=False), rig_on("late") as rig:
         tried = 0
@@ -425,8 +472,7 @@ def test_a_late_command_is_seen_over_the_bus_and_arming_mends_it() -> None:
             time.sleep(0.1)
             rig.bus.receive(0.0)
             with pytest.raises(RigError, match="node is in state 'limp' and does not drive; look for the cause"):
-                for _ in range(3):
-                    rig.measure()
+                measure_all(rig, 3)
             rig.arm()
             rig.apply({"duty": 0.5})
             try:
@@ -442,7 +488,7 @@ def test_a_node_needs_the_inputs_of_its_map_and_a_bridge_that_opens() -> None:
         NodeCore(node_of(ETB), SignalMap.load("engine"))
     with pytest.raises(ParameterError, match="with 'bridge_open': power off means an open bridge"):
         node_plant(VirtualThrottle())
-    with pytest.raises(ParameterError, match="soi_cad.*those of a virtual throttle"):
+    with pytest.raises(ParameterError, match=r"soi_cad.*those of a virtual throttle"):
         node_of(SignalMap.load("surrogate"))
     with pytest.raises(ParameterError, match="fault = 'offset:sensor=1': must be left out"):
         node_of(SignalMap.load("engine"), faults=["offset:sensor=1"])
@@ -457,10 +503,62 @@ def test_faults_of_the_plant_reach_the_host() -> None:
     assert values["angle_deg"] == pytest.approx(20.0, abs=0.5)
 
 
+# --- maps of somebody else ------------------------------------------------------------------------------------
+
+
+def test_a_throttle_behind_a_bus_of_somebody_else(tmp_path: Path) -> None:
+    """No state to be asked, multiplexed answers, a trigger without protection: the node is driven all the same."""
+    straight = VirtualThrottle(inputs=["duty", "bridge_open"], sample_s=0.01, seed=4)
+    plant = VirtualThrottle(inputs=["duty", "bridge_open"], sample_s=0.01, seed=4)
+    with CanRig(write_foreign(tmp_path), plant=plant) as rig:
+        for k in range(30):
+            duty = 0.00025 * round(4000 * 0.3 * math.sin(0.4 * k))
+            rig.apply({"duty": duty})
+            measured = rig.measure()
+            straight.apply({"duty": duty, "bridge_open": 0.0})
+            wanted = straight.measure().values
+            assert measured.values["sensed_angle_deg"] == pytest.approx(wanted["sensed_angle_deg"], abs=3e-3)
+            assert measured.values["current_a"] == pytest.approx(wanted["current_a"], abs=5.1e-4)
+            assert measured.applied == {"duty": pytest.approx(duty, abs=1e-9)}
+
+
+def test_a_multiplexed_command_carries_one_input_per_frame(tmp_path: Path) -> None:
+    """Supply and torque of the air by ETB_Config, which is sent on events and has no safe frame."""
+    (tmp_path / "etb.dbc").write_bytes(ETB.dbc.file.read_bytes())
+    file = tmp_path / "config.toml"
+    more = """
+[commands.ETB_Config.inputs]
+supply_v = { signal = "SupplyVoltage", unit = "V", lower = 6.0, upper = 16.0 }
+airflow_torque_nm = { signal = "AirflowTorque", unit = "N m", lower = -5.0, upper = 5.0 }
+
+[commands.ETB_Cmd]
+"""
+    text = ETB.file.read_text(encoding="utf-8")
+    file.write_text(text.replace("\n[commands.ETB_Cmd]\n", more), encoding="utf-8")
+    names = ["supply_v", "airflow_torque_nm", "duty"]
+    frames: list[Frame] = []
+    plant = VirtualThrottle(inputs=[*names, "bridge_open"], sample_s=5e-3, seed=4)
+    straight = VirtualThrottle(inputs=[*names, "bridge_open"], sample_s=5e-3, seed=4)
+    with CanRig(file, plant=plant, on_frame=frames.append) as rig:
+        assert rig.input_names == ("supply_v", "airflow_torque_nm", "duty")
+        for supply in (8.0, 13.5):
+            for _ in range(10):
+                given = {"supply_v": supply, "airflow_torque_nm": -0.125, "duty": 0.5}
+                rig.apply(given)
+                measured = rig.measure()
+                straight.apply({**given, "bridge_open": 0.0})
+                wanted = straight.measure().values
+            assert measured.values["supply_v"] == pytest.approx(supply)
+            assert measured.values["sensed_angle_deg"] == pytest.approx(wanted["sensed_angle_deg"], abs=5.1e-3)
+    config = [frame.data for frame in frames if frame.id == 0x125]
+    assert len(config) == 2 * 20
+    assert {data[0] for data in config} == {0, 1}
+
+
 # --- replay of frames ---------------------------------------------------------------------------------------
 
 
-def recorded_run(duties: list[float], **settings: object) -> tuple[list[Frame], list[Measurement]]:
+def recorded_run(duties: list[float]) -> tuple[list[Frame], list[Measurement]]:
     frames: list[Frame] = []
     with CanRig(ETB, plant=VirtualThrottle(inputs=["duty", "bridge_open"], seed=2), on_frame=frames.append) as rig:
         measured = []

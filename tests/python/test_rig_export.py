@@ -10,10 +10,9 @@ import numpy as np
 import pytest
 import xarray as xr
 
-from mgdd._core.rig import Frame
 from mgdd.errors import ParameterError, RigError
 from mgdd.results.labels import check_labels
-from mgdd.rig import Recorder, export_record, read_record
+from mgdd.rig import Frame, Recorder, export_record, read_record
 from mgdd.rig.can.messages import frame_of, message_of
 
 CLASSIC = [

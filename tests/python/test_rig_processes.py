@@ -94,6 +94,8 @@ def test_whatever_the_host_dies_of_the_plate_goes_home(bench: Bench, way: str) -
         dying_ns = int(host.stdout.readline().split()[1])
     if way != "hang":
         host.wait(30.0)
+    if later:
+        bench.start(later[0])  # it imports while the plate falls
     deadline_ns = dying_ns + round(LIMIT_S * 1e9)
     time.sleep(max(0.0, (deadline_ns - time.monotonic_ns()) * 1e-9) + 0.1)
     truth = bench.truth()
@@ -104,8 +106,6 @@ def test_whatever_the_host_dies_of_the_plate_goes_home(bench: Bench, way: str) -
         truth = bench.truth()
     host.kill()  # the one that hangs
     host.communicate()
-    if later:
-        bench.start(later[0])
 
     time_ns, angle = truth["monotonic_ns"], truth["angle_deg"]
     before = (time_ns > dying_ns - 0.3e9) & (time_ns <= dying_ns)
@@ -217,7 +217,7 @@ def test_seeking_on_the_engine_bench_over_the_bus() -> None:
 
 
 def test_a_node_that_cannot_start_says_why() -> None:
-    with pytest.raises(RigError, match="mgdd rig node did not start: .*did you mean 'from_s'"):
+    with pytest.raises(RigError, match=r"mgdd rig node did not start: .*did you mean 'from_s'"):
         VirtualNode("etb", faults=["jammed:form_s=1"]).start()
 
 

@@ -8,6 +8,7 @@ from pathlib import Path
 
 import pytest
 
+from foreign_bus import FOREIGN, FOREIGN_MAP, write_foreign
 from mgdd.errors import DataError, Error, ParameterError
 from mgdd.rig import SignalMap
 from mgdd.rig.can.dbc import DbcFile
@@ -109,63 +110,9 @@ def test_a_missing_value_lies_outside_of_the_range(name: str) -> None:
                 assert not low <= signal.layout.unpack(raw) <= high, (message.name, signal.name)
 
 
-FOREIGN = """VERSION ""
-NS_ :
-BS_:
-BU_: PC BOX
-
-BO_ 2566848766 Cmd: 8 PC
- SG_ Check : 7|8@0+ (1,0) [0|255] "" BOX
- SG_ Count : 11|4@0+ (1,0) [0|15] "" BOX
- SG_ Go : 15|1@0+ (1,0) [0|1] "" BOX
- SG_ Drive : 20|13@0- (0.025,0) [-100|100] "%" BOX
-
-BO_ 2566849022 Answer: 8 BOX
- SG_ Select M : 7|4@0+ (1,0) [0|15] "" PC
- SG_ Angle m3 : 15|24@0- (0.0001,0) [-10|10] "rad" PC
- SG_ Current m5 : 15|16@0- (0.001,0) [-30|30] "A" PC
- SG_ Used m5 : 31|13@0- (0.025,0) [-100|100] "%" PC
- SG_ Alarm : 3|1@0+ (1,0) [0|1] "" PC
-
-BO_ 2566849278 Done: 1 BOX
- SG_ Beat : 7|8@0+ (1,0) [0|255] "" PC
-
-BA_DEF_ BO_ "GenMsgCycleTime" INT 0 65535;
-BA_DEF_DEF_ "GenMsgCycleTime" 0;
-BA_ "GenMsgCycleTime" BO_ 2566848766 10;
-BA_ "GenMsgCycleTime" BO_ 2566849022 10;
-BA_ "GenMsgCycleTime" BO_ 2566849278 10;
-"""
-
-FOREIGN_MAP = """kind = "signal_map"
-format = 1
-dbc = "foreign.dbc"
-trigger = "Done"
-
-[commands.Cmd]
-e2e = { profile = "h2f", data_id = 7, crc = "Check", counter = "Count", max_step = 2 }
-driven = { Go = 1 }
-safe = { Go = 0, Drive = 0.0 }
-
-[commands.Cmd.inputs]
-duty = { signal = "Drive", unit = "%", scale = 0.01, lower = -0.9, upper = 0.9 }
-
-[measurements.Answer.values]
-sensed_angle_deg = { signal = "Angle", unit = "rad", scale = 57.29577951308232 }
-current_a = { signal = "Current", unit = "A" }
-
-[measurements.Answer.applied]
-duty = { signal = "Used", unit = "%", scale = 0.01 }
-
-[measurements.Done]
-"""
-
-
 @pytest.fixture
 def foreign(tmp_path: Path) -> Path:
-    (tmp_path / "foreign.dbc").write_text(FOREIGN, encoding="utf-8")
-    (tmp_path / "foreign.toml").write_text(FOREIGN_MAP, encoding="utf-8")
-    return tmp_path / "foreign.toml"
+    return write_foreign(tmp_path)
 
 
 def test_a_layout_of_somebody_else(foreign: Path) -> None:
@@ -195,7 +142,7 @@ def test_a_layout_of_somebody_else(foreign: Path) -> None:
 
 WRONG = [
     ('trigger = "Done"', 'trigger = "Don"', ParameterError, r"trigger = 'Don': must be one of the measurements"),
-    ("[commands.Cmd.inputs]", "[commands.Cmd.imputs]", ParameterError, r"commands.Cmd.imputs = .*inputs"),
+    ("[commands.Cmd.inputs]", "[commands.Cmd.inputz]", ParameterError, r"commands.Cmd.inputz = .*inputs"),
     ("[commands.Cmd", "[commands.Kmd", DataError, r"\[commands.Kmd\]: foreign.dbc has no .*'Cmd'"),
     ('signal = "Drive"', 'signal = "Driev"', ParameterError, r"duty.signal = 'Driev': .*did you mean 'Drive'"),
     ('"Angle", unit = "rad"', '"Current", unit = "A"', ParameterError, "mapped once: .*sensed_angle_deg has it too"),
@@ -255,7 +202,7 @@ def test_a_wrong_dbc_is_refused_by_name(foreign: Path, right: str, wrong: str, t
 
 def test_files_that_are_not_there(foreign: Path) -> None:
     with pytest.raises(FileNotFoundError, match=r"did you mean 'foreign.toml'"):
-        SignalMap.load(foreign.with_name("foreing.toml"))
+        SignalMap.load(foreign.with_name("foreignn.toml"))
     (foreign.parent / "foreign.dbc").unlink()
     with pytest.raises(FileNotFoundError, match="no such file"):
         SignalMap.load(foreign)

@@ -7,6 +7,7 @@ import socket
 import threading
 import time
 from collections.abc import Iterator
+from contextlib import contextmanager
 from typing import Any
 
 import pytest
@@ -111,8 +112,11 @@ def test_interface_and_channel_are_always_given(text: str) -> None:
 def test_no_configuration_file_chooses_the_bus(monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setenv("CAN_INTERFACE", "socketcan")
     monkeypatch.setenv("CAN_CHANNEL", "vcan9")
+    monkeypatch.setenv("CAN_CONFIG", '{"receive_own_messages": true}')
     with CanTransport("virtual", "own") as bus:
         assert bus._bus.channel_info == "Virtual bus channel own"
+        bus.send(frame())
+        assert bus.receive(0.1) is None
 
 
 def test_use_before_and_after_it_is_open() -> None:
@@ -181,8 +185,7 @@ def test_what_ends_the_receive_thread_is_raised_by_the_next_call(monkeypatch: py
     fake = FakeBus([good, OSError(errno.ENETDOWN, "Network is down"), good])
     with behind(monkeypatch, fake) as bus:
         with pytest.raises(RigError, match=r"virtual:fake: receiving ended: .*Network is down"):
-            for _ in range(2):
-                bus.receive(2.0)
+            [bus.receive(2.0) for _ in range(2)]
         with pytest.raises(RigError, match="Network is down"):
             bus.send(frame())
         bus.send(frame(3), final=True)  # the safe frames are tried whatever happened
@@ -219,7 +222,9 @@ def test_another_sender_of_our_identifier_is_a_fault() -> None:
         other.send(frame(1, 0x120, extended=True))  # another identifier: it has 29 bits
         assert bus.receive(1.0) is not None
         other.send(frame())
-        with pytest.raises(RigError, match="frame 0x120 arrived, which this host sends: two nodes have one identifier"):
+        with pytest.raises(
+            RigError, match=r"frame 0x120 arrived, which this host sends: two nodes have one identifier"
+        ):
             bus.receive(1.0)
 
 
@@ -239,15 +244,21 @@ def test_a_hub_that_goes_away() -> None:
         bus = CanTransport.parse(bus_of(hub))
         bus.open()
     try:
-        with pytest.raises(RigError, match="the hub has closed the connection|receiving ended"):
+        with pytest.raises(RigError, match=r"the hub has closed the connection|receiving ended"):
             bus.receive(5.0)
     finally:
         bus.close()
 
 
+@contextmanager
+def two_on(hub: Any) -> Iterator[tuple[CanTransport, CanTransport]]:
+    with CanTransport.parse(bus_of(hub)) as one, CanTransport.parse(bus_of(hub)) as other:
+        yield one, other
+
+
 def exchange(faults: list[str], count: int = 200, **settings: Any) -> tuple[list[int], Any]:
     with running_hub(faults, **settings) as hub:
-        with CanTransport.parse(bus_of(hub)) as one, CanTransport.parse(bus_of(hub)) as other:
+        with two_on(hub) as (one, other):
             for number in range(count):
                 one.send(frame(number))
             got = numbers(other, 3 * count)
@@ -277,33 +288,37 @@ def test_the_hub_drops_duplicates_reorders_and_corrupts_as_told() -> None:
 
 def test_the_hub_delays_and_has_a_bit_rate() -> None:
     for faults, settings, least in [(["delay:ms=120"], {}, 0.12), ([], {"bit_rate": 10e3}, 10 * 111 / 10e3)]:
-        with running_hub(faults, **settings) as hub, CanTransport.parse(bus_of(hub)) as one:
-            with CanTransport.parse(bus_of(hub)) as other:
-                begin = time.monotonic()
-                for number in range(10):
-                    one.send(frame(number))
-                assert numbers(other, 10, 2.0) == list(range(10))
-                assert time.monotonic() - begin >= least
+        with running_hub(faults, **settings) as hub, two_on(hub) as (one, other):
+            begin = time.monotonic()
+            for number in range(10):
+                one.send(frame(number))
+            assert numbers(other, 10, 2.0) == list(range(10))
+            assert time.monotonic() - begin >= least
+
+
+def test_a_bus_that_is_too_slow_loses_frames_and_says_so() -> None:
+    got, hub = exchange([], bit_rate=20e3, count=300)  # 133 bits each: 150 in a second
+    assert got == sorted(got)
+    assert len(got) + hub.counts["overload"] == 300
+    assert 100 < len(got) < 260
 
 
 def test_the_hub_reports_bus_errors_and_freezes_a_client() -> None:
-    with running_hub(["error:class=0x40,id=0x7ff"]) as hub, CanTransport.parse(bus_of(hub)) as one:
-        with CanTransport.parse(bus_of(hub)) as other:
-            one.send(frame(1, 0x7FF))
-            with pytest.raises(RigError, match="0x40: bus_off"):
-                other.receive(2.0)
-    with running_hub(["freeze:client=1"]) as hub, CanTransport.parse(bus_of(hub)) as one:
-        with CanTransport.parse(bus_of(hub)) as two, CanTransport.parse(bus_of(hub)) as three:
-            one.send(frame(1))
-            two.send(frame(2))
-            assert numbers(three, 2, 1.0) == [2]
-            assert numbers(one, 1, 0.1) == []
+    with running_hub(["error:class=0x40,id=0x7ff"]) as hub, two_on(hub) as (one, other):
+        one.send(frame(1, 0x7FF))
+        with pytest.raises(RigError, match="0x40: bus_off"):
+            other.receive(2.0)
+    with running_hub(["freeze:client=1"]) as hub, two_on(hub) as (one, two), CanTransport.parse(bus_of(hub)) as three:
+        one.send(frame(1))
+        two.send(frame(2))
+        assert numbers(three, 2, 1.0) == [2]
+        assert numbers(one, 1, 0.1) == []
 
 
 @pytest.mark.parametrize(
     ("text", "message"),
     [
-        ("dorp:p=1", "fault = 'dorp': must be one of drop"),
+        ("dropp:p=1", "fault = 'dropp': must be one of drop"),
         ("drop:q=1", "must be KIND:KEY=VALUE"),
         ("drop:p=much", "fault drop: p = 'much': must be a number"),
         ("drop:p=2", r"p = 2: must be in \[0, 1\]"),

@@ -166,36 +166,6 @@ Examples
 5
 )";
 
-constexpr const char* protect_doc = R"(Write alive counter and CRC into a payload.
-
-Parameters
-----------
-settings : E2eSettings
-    Places, CRC and data identifier.
-counter : int
-    Alive counter of this frame, 0 to ``counter_modulus - 1``.
-payload : bytes
-    ``settings.size`` bytes; what stands in the places of CRC and counter is replaced.
-
-Returns
--------
-bytes
-    The protected payload.
-
-Raises
-------
-mgdd.errors.ParameterError
-    A counter outside of the modulus.
-mgdd.errors.ShapeError
-    A payload of another length.
-
-Examples
---------
->>> from mgdd.rig import E2eSettings, protect
->>> protect(E2eSettings(data_id=0x120), 5, bytes.fromhex("0000112233445566")).hex()
-'3a05112233445566'
-)";
-
 }  // namespace
 
 void bind_e2e(py::module_& m) {
@@ -233,7 +203,8 @@ void bind_e2e(py::module_& m) {
       .def_property_readonly("settings", &E2eCheck::settings, "As given.")
       .def("reset", &E2eCheck::reset, "Forget the last frame and the validity; the counts stay.");
 
-  m.def("protect", &protected_payload, py::arg("settings"), py::arg("counter"), py::arg("payload"), protect_doc);
+  m.def("protect", &protected_payload, py::arg("settings"), py::arg("counter"), py::arg("payload"),
+        "Behind mgdd.rig.protect.");
   m.def(
       "crc8",
       [](const py::bytes& data, const CrcArgument& crc) {

@@ -21,7 +21,7 @@ using rig::Frame;
 struct Data {
   const char* name = "data";
   const char* doc = "Payload, up to 64 bytes.";
-  using Argument = py::bytes;
+  using Argument = py::buffer;  // a message of python-can holds a bytearray
 
   void put(Frame& frame, const py::buffer& given) const {
     const std::vector<std::uint8_t> bytes = to_payload(given);
@@ -60,7 +60,7 @@ monotonic_ns, bus_ns : int
 
 Examples
 --------
->>> from mgdd._core.rig import Frame
+>>> from mgdd.rig import Frame
 >>> Frame(id=0x121, data=bytes(3), received=True).data
 b'\x00\x00\x00'
 )");

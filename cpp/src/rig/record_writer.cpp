@@ -178,7 +178,11 @@ bool RecordWriter::write(const Frame& frame) noexcept {
 
 bool RecordWriter::write_sample(std::uint16_t table, std::int64_t monotonic_ns,
                                 std::span<const double> values) noexcept {
-  if (table >= tables_.size() || values.size() != tables_[table]) return false;
+  misfit_ = table >= tables_.size() || values.size() != tables_[table];
+  if (misfit_) {
+    ++refused_;
+    return false;
+  }
   encode_sample(table, monotonic_ns, values, room_);
   return put(ByteSpan(room_).first(sample_record_size(values.size())));
 }
@@ -190,7 +194,13 @@ bool RecordWriter::write_event(std::int64_t monotonic_ns, std::string_view categ
   return put(encoded_event(monotonic_ns, category, text));
 }
 
+RigError RecordWriter::failure() const {
+  if (!misfit_) return file_.failure();
+  return about("values", RigError(path() + ": a sample needs a number per column of a table that was added before"));
+}
+
 bool RecordWriter::put(ByteSpan record) noexcept {
+  misfit_ = false;
   const bool done = file_.append(record);
   ++(done ? written_ : refused_);
   return done;

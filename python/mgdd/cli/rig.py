@@ -3,22 +3,24 @@
 from __future__ import annotations
 
 import argparse
-import asyncio
 import signal
 import sys
 import time
 from collections.abc import Callable
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 from mgdd.cli import rig_records, rig_run, rig_selftest
 from mgdd.cli.options import add_command, add_group, refuse_idle
 from mgdd.cli.output import check_file, check_output, emit
 from mgdd.rig import CanTransport, SignalMap
-from mgdd.rig.can.hub import Hub
 from mgdd.rig.can.hub_faults import BusFault
 from mgdd.rig.can.node import TruthLog, node_of, parent_watch, run_node
 from mgdd.rig.can.node_core import NodeCore, NodePlant, node_plant
 from mgdd.rig.can.signal_map import SHIPPED
+from mgdd.rig.can.signals import noted_signals
+
+if TYPE_CHECKING:
+    from mgdd.rig.can.hub import Hub
 
 __all__ = ["add"]
 
@@ -88,6 +90,10 @@ def _add_node(verbs: Any) -> None:
 
 
 def _hub(args: argparse.Namespace) -> None:
+    import asyncio
+
+    from mgdd.rig.can.hub import Hub
+
     check_output(args)
     hub = Hub(
         args.host,
@@ -102,6 +108,8 @@ def _hub(args: argparse.Namespace) -> None:
 
 
 async def _serve(args: argparse.Namespace, hub: Hub) -> None:
+    import asyncio
+
     stop, alive = asyncio.Event(), parent_watch()
     for number in (signal.SIGINT, signal.SIGTERM):
         asyncio.get_running_loop().add_signal_handler(number, stop.set)
@@ -122,13 +130,17 @@ def _node(args: argparse.Namespace) -> None:
     signal_map = SignalMap.load(args.map)
     period_s = None if args.period_ms is None else args.period_ms * 1e-3
     sample_s = period_s if args.sample_ms is None else args.sample_ms * 1e-3
+<<<<<<< HEAD
     core = NodeCore(_plant_of(args, signal_map, sample_s), signal_map)
     stopped: list[int] = []
     for number in (signal.SIGINT, signal.SIGTERM):
         signal.signal(number, lambda got, _: stopped.append(got))
+=======
+    core = NodeCore(node_of(signal_map, faults=args.fault, seed=args.seed, sample_s=sample_s), signal_map)
+>>>>>>> d291144f6438966b2759a650dbb32ef73a4c8a22
     log = None if args.truth is None else TruthLog(args.truth)
     try:
-        with CanTransport.parse(args.bus) as bus:
+        with noted_signals() as stopped, CanTransport.parse(args.bus) as bus:
             bus.claim({message.key for message in signal_map.measurements.values()})
             args.progress.close()
             _say(args, f"{signal_map.file.stem} on {bus.name}: ready")

@@ -19,6 +19,7 @@ from mgdd.rig.experiment import Experiment, check_experiment, run_experiment
 from mgdd.rig.export import export_record
 from mgdd.rig.gated import GatedThrottle
 from mgdd.rig.loop_message import LoopMessage
+from mgdd.rig.protection import protect
 from mgdd.rig.realtime import RealtimeLoop
 from mgdd.rig.recorded import read_record, repair_record
 from mgdd.rig.recorder import Recorder

@@ -8,9 +8,10 @@ import threading
 import time
 import uuid
 from collections.abc import Mapping, Sequence
+from numbers import Real
 from pathlib import Path
 from types import TracebackType
-from typing import Any, Self
+from typing import TYPE_CHECKING, Any, Self
 
 import numpy as np
 
@@ -18,6 +19,9 @@ from mgdd import _core
 from mgdd._core.rig import Frame, RecordWriter
 from mgdd.errors import ParameterError, did_you_mean
 from mgdd.results.labels import to_jsonable
+
+if TYPE_CHECKING:
+    from numpy.typing import NDArray
 
 __all__ = ["Recorder"]
 
@@ -95,7 +99,7 @@ class Recorder:
 
         Parameters
         ----------
-        frame : mgdd._core.rig.Frame
+        frame : mgdd.rig.Frame
             With its stamps.
         """
         with self._lock:
@@ -117,14 +121,14 @@ class Recorder:
         Raises
         ------
         mgdd.errors.ParameterError
-            Other names than those of the first row; ``time_s``, which a reader adds.
+            Other names than those of the first row; ``time_s``, which a reader adds; a value that is not a number.
         """
         now = time.monotonic_ns() if monotonic_ns is None else monotonic_ns
         with self._lock:
             number, names = self._tables.get(table) or self._new_table(table, tuple(values), now)
             if values.keys() != set(names):
                 raise _other_names(table, names, values)
-            self._writer.write_sample(number, now, np.array([values[name] for name in names], float))
+            self._writer.write_sample(number, now, _numbers(names, values))
 
     def event(self, category: str, text: str, *, monotonic_ns: int | None = None) -> None:
         """Append an event.
@@ -169,6 +173,14 @@ class Recorder:
             raise ParameterError.of("values", _OWN, "another name: the record has its own time_s")
         self._tables[table] = (self._writer.add_table(table, list(names), now), tuple(names))
         return self._tables[table]
+
+
+def _numbers(names: Sequence[str], values: Mapping[str, float]) -> NDArray[np.float64]:
+    try:
+        return np.array([float(values[name]) for name in names])
+    except (TypeError, ValueError):
+        name = next(name for name in names if not isinstance(values[name], Real))
+        raise ParameterError.of(name, values[name], "one number") from None
 
 
 def _other_names(table: str, names: Sequence[str], values: Mapping[str, float]) -> ParameterError:

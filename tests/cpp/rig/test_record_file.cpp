@@ -252,6 +252,8 @@ TEST_F(RecordFile, RefusedCallsChangeNothing) {
   for (const auto& columns : {twice, none, empty})
     EXPECT_THROW(writer.add_table("t", columns, 0), ParameterError);
   EXPECT_FALSE(writer.write_sample(0, 0, std::array{1.0})) << "no such table";
+  EXPECT_NE(std::string(writer.failure().what()).find("a number per column"), std::string::npos);
+  EXPECT_EQ(writer.refused(), 1u);
   EXPECT_THROW(static_cast<void>(writer.write_event(0, "", "text")), ParameterError);
   EXPECT_THROW(static_cast<void>(writer.write_event(0, "note", std::string(largest_body, ' '))), ParameterError);
   EXPECT_EQ(writer.size(), size);

@@ -16,6 +16,11 @@ from mgdd.rig import CanRig, CanTransport
 OPEN_DEG, SAMPLES = 40.0, 8
 
 
+def say(text: str) -> None:
+    sys.stdout.write(text + "\n")
+    sys.stdout.flush()
+
+
 def drive(rig: CanRig, samples: int) -> None:
     """Hold the plate open for so many samples in a row; a machine that stalls is armed again."""
     held = 0
@@ -32,14 +37,14 @@ def drive(rig: CanRig, samples: int) -> None:
 
 def main(way: str, bus: str) -> None:
     transport = CanTransport.parse(bus)
-    print("ready", flush=True)
+    say("ready")
     sys.stdin.readline()
     with CanRig("etb", transport, mode="hil", timeout_s=2.0) as rig:
         drive(rig, SAMPLES)
-        print("open", flush=True)
+        say("open")
         if way in ("sigint", "sigterm", "sigkill"):
             drive(rig, 1_000_000)
-        print(f"dying {time.monotonic_ns()}", flush=True)
+        say(f"dying {time.monotonic_ns()}")
         if way == "exception":
             raise ZeroDivisionError
         if way == "nan":

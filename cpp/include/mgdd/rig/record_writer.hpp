@@ -66,7 +66,7 @@ class RecordWriter {
 
   [[nodiscard]] bool sync() noexcept { return file_.sync(); }
   bool close() noexcept { return file_.close(); }
-  [[nodiscard]] RigError failure() const { return file_.failure(); }
+  [[nodiscard]] RigError failure() const;
 
   [[nodiscard]] bool is_open() const noexcept { return file_.is_open(); }
   [[nodiscard]] const std::string& path() const noexcept { return file_.path(); }
@@ -82,6 +82,7 @@ class RecordWriter {
   std::vector<std::size_t> tables_;
   std::vector<std::uint8_t> room_;  ///< for the longest sample
   std::uint64_t written_ = 0, refused_ = 0;
+  bool misfit_ = false;  ///< the last sample fitted no table
 };
 
 }  // namespace mgdd::rig

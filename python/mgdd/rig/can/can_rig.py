@@ -17,18 +17,17 @@ from mgdd.loop.plant import checked_inputs
 from mgdd.rig.can.frame import Bus, changed
 from mgdd.rig.can.inbox import Inbox
 from mgdd.rig.can.link import Sender
-from mgdd.rig.can.local_bus import LocalBus
 from mgdd.rig.can.mapped import MappedMessage
-from mgdd.rig.can.modes import RigMode, require_key
+from mgdd.rig.can.modes import RigMode, bus_of, require_key
 from mgdd.rig.can.signal_map import SignalMap
 from mgdd.rig.can.signals import SignalsAsExceptions, undisturbed
-from mgdd.rig.can.transport import CanTransport
 
 __all__ = ["CanRig"]
 
 _SAFE_FRAMES = 5
 _SAFE_PAUSE_S = 0.002
 _LISTEN_CYCLES = 10
+_LISTEN_S = 0.1  # at least
 _ARMING_ROUNDS = 3
 _PEER_CYCLES = 20
 _PEER_S = 1.0  # at least so long for the first valid frame
@@ -97,7 +96,7 @@ class CanRig:
         self.mode = RigMode.of(mode)
         loaded = signal_map if isinstance(signal_map, SignalMap) else SignalMap.load(signal_map)
         self.map = loaded.with_goals(limits=limits, objective=objective)
-        self.bus = _bus_of(self.mode, self.map, bus, plant)
+        self.bus = bus_of(self.mode, self.map, bus, plant)
         trigger = self.map.measurements[self.map.trigger]
         self.timeout_s = trigger.timeout_s or 0.0 if timeout_s is None else float(timeout_s)
         if not 0.0 < self.timeout_s < math.inf:
@@ -191,7 +190,7 @@ class CanRig:
                 f"{self.bus.name}: the node is in state {self.state!r} and does not drive; look for the cause, then "
                 "call arm() or enter the rig again"
             )
-        return self._inbox.measurement()
+        return self._inbox.read()
 
     def arm(self) -> None:
         """Send safe frames until the node is ready to be driven.
@@ -206,13 +205,16 @@ class CanRig:
             return
         wait_s = max(_PEER_S, _PEER_CYCLES * self.map.cycle_s, self.timeout_s)
         until, rounds = time.monotonic() + wait_s, 0
+        checks = [message.e2e.good_until_valid for message in self.map.commands.values() if message.e2e is not None]
+        enough = _ARMING_ROUNDS + max(checks, default=0)  # for a node that does not say its state
         while True:
             if self._sends:
                 self._send_safe()
             rounds += 1
             heard = self._heard(self.map.cycle_s if self.bus.shared else 0.0)
+            self._inbox.skip()
             refuses = self._sends and (self._inbox.failed or self.state == "init")
-            if heard and not refuses and (rounds >= _ARMING_ROUNDS or not self._sends):
+            if heard and not refuses and (rounds >= enough or not self._sends):
                 return
             if time.monotonic() > until if self.bus.shared else rounds > _PEER_CYCLES:
                 if heard:
@@ -242,6 +244,7 @@ class CanRig:
         try:
             self._listen()
             self.arm()
+            self._inbox.skipped = 0  # those of the arming
         except BaseException:
             self.close()
             raise
@@ -251,17 +254,21 @@ class CanRig:
         if not self._is_open:
             return
         self._is_open = False
-        with undisturbed():
-            try:
-                if self._has_sent:
-                    for _ in range(_SAFE_FRAMES):
-                        with contextlib.suppress(RigError):  # a dead bus must not hide why we leave
-                            self._send_safe(final=True)
-                        if self.bus.shared:
-                            time.sleep(_SAFE_PAUSE_S)
-            finally:
-                self.bus.close()
-        self._signals.restore()
+        try:
+            with undisturbed():
+                self._leave()
+        finally:
+            self._signals.restore()
+
+    def _leave(self) -> None:
+        try:
+            for _ in range(_SAFE_FRAMES if self._has_sent else 0):
+                with contextlib.suppress(RigError):  # a dead bus must not hide why we leave
+                    self._send_safe(final=True)
+                if self.bus.shared:
+                    time.sleep(_SAFE_PAUSE_S)
+        finally:
+            self.bus.close()
 
     def __enter__(self) -> Self:
         self.open()
@@ -285,7 +292,7 @@ class CanRig:
         if not self.bus.shared or not self._sends:
             return
         cycles = [m.message.cycle_s for m in self.map.commands.values() if m.message.cycle_s is not None]
-        until = time.monotonic() + _LISTEN_CYCLES * max([*cycles, self.map.cycle_s])
+        until = time.monotonic() + max(_LISTEN_S, _LISTEN_CYCLES * max([*cycles, self.map.cycle_s]))
         while (left := until - time.monotonic()) > 0.0:
             self._receive(left)
         if jumping := self._inbox.jumping():
@@ -323,31 +330,15 @@ class CanRig:
                     self._hand_over(frame, final=final)
 
     def _heard(self, timeout_s: float) -> bool:
-        """Wait for the next whole cycle."""
+        """Wait for a whole cycle, then take all that came: the newest state counts, the oldest cycle is next."""
         until = time.monotonic() + timeout_s
         while not self._inbox.ready:
             left_s = until - time.monotonic() if self.bus.shared else timeout_s
             if not self._receive(max(0.0, left_s)):
                 return False
-        self._inbox.read()
+        self._take_all()
         return True
 
     def _take_all(self) -> None:
         while self._receive(0.0):
             pass
-
-
-def _bus_of(mode: RigMode, signal_map: SignalMap, bus: Bus | str | None, plant: Plant | None) -> Bus:
-    if mode is RigMode.SIMULATE:
-        if bus is not None:
-            raise ParameterError.of(
-                "mode",
-                mode.value,
-                "said for a bus: 'hil', 'dry_run', 'replay' or 'bench'; 'simulate' takes a plant instead",
-            )
-        if plant is None:
-            raise ParameterError("plant = None: must be given for mode='simulate', or give a bus and another mode")
-        return LocalBus(plant, signal_map)
-    if plant is not None or bus is None:
-        raise ParameterError(f"mode = {mode.value!r}: must have a bus, and no plant: that is in the node")
-    return CanTransport.parse(bus) if isinstance(bus, str) else bus

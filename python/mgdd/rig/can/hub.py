@@ -19,6 +19,7 @@ __all__ = ["Hub"]
 
 _READ = 4096
 _JOIN_S = 0.02  # python-can does not expect a frame in one packet with the last "ok"
+_MOST_WAITING_S = 1.0  # of a frame before a bus with a bit rate: then it is lost
 _MOST_WAITING = 1 << 20  # bytes that a client has not read: then it is put out
 _OVERHEAD_BITS = 47  # of a standard frame; stuff bits come on top
 _EXTENDED_BITS = 67
@@ -83,7 +84,7 @@ class Hub:
         if bit_rate is not None and not 1e3 <= bit_rate <= 1e8:
             raise ParameterError.of("bit_rate", bit_rate, "in [1e3, 1e8] bit/s")
         self.host, self.port = host, port
-        self.frames = 0
+        self.frames = self._overload = 0
         self._rate = bit_rate
         self._injector = FaultInjector(faults, seed)
         self._clients: list[_Client] = []
@@ -123,8 +124,8 @@ class Hub:
 
     @property
     def counts(self) -> dict[str, int]:
-        """Frames taken, and how often each fault struck."""
-        return {"frames": self.frames, **self._injector.counts}
+        """Frames taken, lost because the bus was too slow for them, and how often each fault struck."""
+        return {"frames": self.frames, "overload": self._overload, **self._injector.counts}
 
     async def _serve(self, reader: asyncio.StreamReader, writer: asyncio.StreamWriter) -> None:
         client: _Client | None = None
@@ -173,7 +174,11 @@ class Hub:
             return
         width = len(words[1])  # 3 digits say 11 bits, 8 say 29
         for other, delivery in self._injector.deliver(identifier, data, now):
-            late = delivery.late_s + self._queueing_s(len(delivery.data), width, now)
+            waiting_s = self._queueing_s(len(delivery.data), width, now)
+            if waiting_s > _MOST_WAITING_S:
+                self._overload += 1
+                continue
+            late = delivery.late_s + waiting_s
             text = _text(other, width, delivery)
             if late > 0.0:
                 asyncio.get_running_loop().call_later(late, self._write, sender, text)
@@ -185,8 +190,10 @@ class Hub:
         if self._rate is None:
             return 0.0
         bits = ((_OVERHEAD_BITS if width <= 3 else _EXTENDED_BITS) + 8 * size) * _STUFFING
-        self._free_s = max(self._free_s, now) + bits / self._rate
-        return self._free_s - now
+        free_s = max(self._free_s, now) + bits / self._rate
+        if free_s - now <= _MOST_WAITING_S:
+            self._free_s = free_s
+        return free_s - now
 
     def _write(self, sender: _Client, text: bytes) -> None:
         now = time.monotonic() - self._start_s

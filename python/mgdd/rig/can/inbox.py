@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+from collections import deque
 from typing import Any
 
 from mgdd._core.rig import Frame
@@ -25,8 +26,6 @@ class Inbox:
 
     Attributes
     ----------
-    ready : int
-        Whole cycles that nobody has read.
     skipped : int
         Whole cycles that nobody read before the next command.
     state : str
@@ -35,10 +34,11 @@ class Inbox:
 
     def __init__(self, signal_map: SignalMap) -> None:
         self.map = signal_map
-        self.ready = self.skipped = 0
+        self.skipped = 0
         self.state = ""
         self._receiver = Receiver(signal_map.measurements)
         self._cycles = 0
+        self._whole: deque[Measurement] = deque()
         self._values: dict[str, dict[str, float]] = {}
         self._applied: dict[str, float] = {}
         self._cycle_of: dict[str, int] = {}
@@ -74,36 +74,25 @@ class Inbox:
         if name == self.map.trigger:  # a cycle is whole: frames of the next one do not mix into it
             self._end_cycle()
 
-    def read(self) -> None:
-        """Note that the newest cycle is read."""
-        self.ready = 0
+    @property
+    def ready(self) -> bool:
+        """Whether there is a whole cycle that nobody has read."""
+        return bool(self._whole)
 
-    def skip(self) -> None:
-        """Note that nobody will read what came until now."""
-        self.skipped += self.ready
-        self.ready = 0
-
-    def measurement(self) -> Measurement:
-        """Give the newest whole cycle.
+    def read(self) -> Measurement:
+        """Give the oldest whole cycle that nobody has read.
 
         Returns
         -------
         mgdd.loop.Measurement
             NaN for what never came, or longer ago than the time limit of its message.
         """
-        values: dict[str, float] = {}
-        for name, message in self.map.measurements.items():
-            known = self._values.get(name, {})
-            age = self._cycles - 1 - self._cycle_of.get(name, -1)
-            fresh = message.timeout_s is None or age <= math.ceil(message.timeout_s / self.map.cycle_s)
-            values |= {key: known.get(key, math.nan) if fresh else math.nan for key in message.signals}
-        return Measurement(
-            components=tuple(weight * values[name] for name, weight in self.map.objective.items()),
-            limits={name: values[name] for name in self.map.limits},
-            misfire=values.get("misfire") == 1.0,
-            values=values,
-            applied={name: value for name, value in self._applied.items() if math.isfinite(value)},
-        )
+        return self._whole.popleft()
+
+    def skip(self) -> None:
+        """Note that nobody will read what came until now."""
+        self.skipped += len(self._whole)
+        self._whole.clear()
 
     def jumping(self) -> str:
         """Name a message whose alive counter does not count; empty where all do."""
@@ -136,4 +125,19 @@ class Inbox:
         self._applied.update(self._pending_applied)
         self._pending, self._pending_applied = {}, {}
         self._cycles += 1
-        self.ready += 1
+        self._whole.append(self._measurement())
+
+    def _measurement(self) -> Measurement:
+        values: dict[str, float] = {}
+        for name, message in self.map.measurements.items():
+            known = self._values.get(name, {})
+            age = self._cycles - 1 - self._cycle_of.get(name, -1)
+            fresh = message.timeout_s is None or age <= math.ceil(message.timeout_s / self.map.cycle_s)
+            values |= {key: known.get(key, math.nan) if fresh else math.nan for key in message.signals}
+        return Measurement(
+            components=tuple(weight * values[name] for name, weight in self.map.objective.items()),
+            limits={name: values[name] for name in self.map.limits},
+            misfire=values.get("misfire") == 1.0,
+            values=values,
+            applied={name: value for name, value in self._applied.items() if math.isfinite(value)},
+        )

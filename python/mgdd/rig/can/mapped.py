@@ -129,10 +129,17 @@ class MappedMessage:
 
     def drives(self, payload: bytes) -> bool:
         """Whether a command drives: every further signal stands as it does while driven."""
+        return self._stands(payload, self.driven)
+
+    def rests(self, payload: bytes) -> bool:
+        """Whether a command is a safe one: every signal stands as in a safe frame."""
+        return bool(self.safe) and self._stands(payload, self.safe)
+
+    def _stands(self, payload: bytes, raws: Mapping[str, Raw]) -> bool:
         branch = self._branch_of(payload)
         return all(
             signal.layout.unpack_raw(payload) == raw
-            for name, raw in self.driven.items()
+            for name, raw in raws.items()
             if _is_in(signal := self.message.signals[name], branch)
         )
 

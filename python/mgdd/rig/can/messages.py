@@ -18,7 +18,7 @@ def message_of(frame: Frame, *, timestamp_s: float = 0.0) -> can.Message:
 
     Parameters
     ----------
-    frame : mgdd._core.rig.Frame
+    frame : mgdd.rig.Frame
         Any frame.
     timestamp_s : float
         Stamp of the message [s]; in files since 1970.
@@ -30,7 +30,7 @@ def message_of(frame: Frame, *, timestamp_s: float = 0.0) -> can.Message:
 
     Examples
     --------
-    >>> from mgdd._core.rig import Frame
+    >>> from mgdd.rig import Frame
     >>> from mgdd.rig.can.messages import message_of
     >>> message_of(Frame(id=0x120, data=bytes(2), received=True)).dlc
     2
@@ -68,7 +68,7 @@ def frame_of(message: can.Message, *, monotonic_ns: int, channel: int = 0, recei
 
     Returns
     -------
-    mgdd._core.rig.Frame
+    mgdd.rig.Frame
         With the stamp of the message as ``bus_ns``.
 
     Examples
@@ -80,7 +80,7 @@ def frame_of(message: can.Message, *, monotonic_ns: int, channel: int = 0, recei
     """
     return Frame(
         id=message.arbitration_id,
-        data=bytes(message.dlc) if message.is_remote_frame else bytes(message.data),
+        data=bytes(message.dlc) if message.is_remote_frame else message.data,
         extended=message.is_extended_id,
         error=message.is_error_frame,
         received=message.is_rx if received is None else received,

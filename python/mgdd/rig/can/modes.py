@@ -8,9 +8,13 @@ from enum import StrEnum
 from pathlib import Path
 
 from mgdd.errors import ParameterError, RigError
+from mgdd.loop import Plant
+from mgdd.rig.can.frame import Bus
+from mgdd.rig.can.local_bus import LocalBus
 from mgdd.rig.can.signal_map import SignalMap
+from mgdd.rig.can.transport import CanTransport
 
-__all__ = ["RigMode", "key_line", "require_key"]
+__all__ = ["RigMode", "bus_of", "key_line", "require_key"]
 
 
 class RigMode(StrEnum):
@@ -71,3 +75,26 @@ def require_key(signal_map: SignalMap, bus: str, *, arm: bool, key_file: str | o
     sys.stderr.flush()
     if sys.stdin.readline().strip() != "ARM":
         raise RigError("not confirmed: nothing was sent")
+
+
+def bus_of(mode: RigMode, signal_map: SignalMap, bus: Bus | str | None, plant: Plant | None) -> Bus:
+    """Return the bus of a mode.
+
+    Raises
+    ------
+    mgdd.errors.ParameterError
+        A bus or plant that does not go with the mode.
+    """
+    if mode is RigMode.SIMULATE:
+        if bus is not None:
+            raise ParameterError.of(
+                "mode",
+                mode.value,
+                "said for a bus: 'hil', 'dry_run', 'replay' or 'bench'; 'simulate' takes a plant instead",
+            )
+        if plant is None:
+            raise ParameterError("plant = None: must be given for mode='simulate', or give a bus and another mode")
+        return LocalBus(plant, signal_map)
+    if plant is not None or bus is None:
+        raise ParameterError(f"mode = {mode.value!r}: must have a bus, and no plant: that is in the node")
+    return CanTransport.parse(bus) if isinstance(bus, str) else bus

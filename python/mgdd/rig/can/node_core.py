@@ -130,7 +130,7 @@ class NodeCore:
         self._receiver = Receiver(signal_map.commands)
         self._sender = Sender()
         self._inputs: dict[str, float] = {}
-        self._driving: dict[str, bool] = {}
+        self._said: dict[str, str] = {}  # by message: rest, drive or other
         self._fresh: set[str] = set()
         self._safe_frames = 0
         self._cyclic = {name: m for name, m in signal_map.commands.items() if m.timeout_s is not None}
@@ -199,18 +199,21 @@ class NodeCore:
         self._inputs.update(message.read(payload))
         if message.name not in self._cyclic:
             return
-        self._driving[message.name] = message.drives(payload)
-        driving = len(self._driving) == len(self._cyclic) and all(self._driving.values())
-        if not any(self._driving.values()):
+        rests, drives = message.rests(payload), message.drives(payload)
+        self._said[message.name] = "rest" if rests else "drive" if drives else "other"
+        said = [self._said.get(name) for name in self._cyclic]
+        if all(word == "rest" for word in said):
             self._safe_frames += 1
-            if (
-                self.state in ("init", "limp") and self._safe_frames >= _ARMING_FRAMES * len(self._cyclic)
-            ) or self.state == "run":
+            armed = self._safe_frames >= _ARMING_FRAMES * len(self._cyclic)
+            if self.state == "run" or (self.state in ("init", "limp") and armed):
                 self.state = "armed"
-        else:
-            self._safe_frames = 0
-            if driving and self.state == "armed" and set(self._inputs) >= set(self.map.input_names):
-                self.state = "run"
+            return
+        self._safe_frames = 0
+        if self.state == "run" and "other" in said:  # a mode that this node does not have
+            self.state = "armed"
+        complete = set(self._inputs) >= set(self.map.input_names)
+        if self.state == "armed" and complete and all(word == "drive" for word in said):
+            self.state = "run"
 
     def _limp(self, reason: str) -> None:
         self.state = "limp"

@@ -9,7 +9,7 @@ from contextlib import contextmanager
 from types import FrameType
 from typing import Any
 
-__all__ = ["SignalsAsExceptions", "undisturbed"]
+__all__ = ["SignalsAsExceptions", "noted_signals", "undisturbed"]
 
 _CAUGHT = (signal.SIGINT, signal.SIGTERM)
 
@@ -48,6 +48,18 @@ def undisturbed() -> Iterator[None]:
         yield
     finally:
         signal.pthread_sigmask(signal.SIG_UNBLOCK, _CAUGHT)
+
+
+@contextmanager
+def noted_signals() -> Iterator[list[int]]:
+    """Note both signals in a list, for a loop that looks whether it goes on."""
+    noted: list[int] = []
+    before = {number: signal.signal(number, lambda got, _: noted.append(got)) for number in _CAUGHT}
+    try:
+        yield noted
+    finally:
+        for number, handler in before.items():
+            signal.signal(number, handler)
 
 
 def _leave(number: int, _: FrameType | None) -> None:

@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import contextlib
 import errno
-import logging
 import socket
 import threading
 import time
@@ -15,7 +14,8 @@ from typing import Any, Self
 from urllib.parse import parse_qsl
 
 from mgdd._core.rig import Frame
-from mgdd.errors import ParameterError, RigError, did_you_mean
+from mgdd.errors import ParameterError, RigError
+from mgdd.rig.can.connect import connected, error_code
 from mgdd.rig.can.frame import error_classes
 from mgdd.rig.can.messages import frame_of, message_of
 from mgdd.rig.extras import import_extra
@@ -24,8 +24,6 @@ __all__ = ["CanTransport"]
 
 _POLL_S = 0.05  # longest sleep of the receive thread: how long closing waits
 _QUEUE = 4096  # frames that nobody has read
-_GREETING_S = 2.0
-_GREETINGS = 5
 _FATAL = frozenset({"bus_off", "error_passive"})
 
 
@@ -148,7 +146,7 @@ class CanTransport:
         """
         if self._bus is not None:
             raise RigError(f"{self.name} is open already: close it first")
-        self._bus = self._connected()
+        self._bus = connected(self.interface, self.channel, self.options, self.name)
         self._stop.clear()
         self._queue.clear()
         self._fault = None
@@ -199,7 +197,7 @@ class CanTransport:
             The driver does not take it, or the bus has a fault.
         """
         bus = self._open_bus(final=final)
-        can, message = _library(), message_of(frame)
+        can, message = import_extra("can", "can", "a CAN bus"), message_of(frame)
         until, pause = time.monotonic() + self.send_timeout_s, 1e-4
         while True:
             try:
@@ -245,32 +243,6 @@ class CanTransport:
         if self._bus is None:
             raise RigError(f"{self.name} is not open: use it in a with block, or call open()")
         return self._bus
-
-    def _connected(self) -> Any:
-        can = _library()
-        options = dict(self.options)
-        if self.interface == "socketcand":
-            options.setdefault("tcp_tune", True)
-            logging.getLogger("can.interfaces.socketcand.socketcand").setLevel(logging.CRITICAL)  # one per TCP segment
-            _require_hub(self.name, options)
-        if self.interface not in can.VALID_INTERFACES:
-            guess = did_you_mean(self.interface, can.VALID_INTERFACES)
-            known = f"must be one of {', '.join(sorted(can.VALID_INTERFACES))}"
-            raise RigError(f"interface {self.interface!r}: python-can has no such interface: {guess or known}")
-        try:
-            for _ in range(_GREETINGS):
-                try:
-                    return can.Bus(interface=self.interface, channel=self.channel, ignore_config=True, **options)
-                except can.CanError as error:
-                    if self.interface != "socketcand" or "Expected" not in str(error):
-                        raise  # the one that is tried again: a frame in one packet with the greeting
-            raise can.CanError("the greeting of the hub was never read alone")
-        except (can.CanError, OSError, ImportError, ValueError, TypeError) as error:
-            hint = _hint(error)
-            raise RigError(
-                f"{self.name}: channel {self.channel!r} of interface {self.interface} cannot be opened: {error}"
-                + (f"; {hint}" if hint else "")
-            ) from error
 
     def _receive_all(self) -> None:
         try:
@@ -331,10 +303,6 @@ class CanTransport:
             self._counts[name] += 1
 
 
-def _library() -> Any:
-    return import_extra("can", "can", "a CAN bus")
-
-
 def _plain(text: str) -> Any:
     if text.lower() in ("true", "false"):
         return text.lower() == "true"
@@ -345,30 +313,4 @@ def _plain(text: str) -> Any:
 
 
 def _is_full(error: Exception) -> bool:
-    code = getattr(error, "error_code", None) or getattr(error, "errno", None)
-    return code in (errno.ENOBUFS, errno.EAGAIN) or "buffer" in str(error).lower()
-
-
-def _require_hub(name: str, options: Mapping[str, Any]) -> None:
-    """Refuse a place where no socketcand answers: python-can would try for ten seconds, or wait for ever."""
-    missing = [key for key in ("host", "port") if key not in options]
-    if missing:
-        raise RigError(
-            f"{name}: socketcand needs {' and '.join(missing)}, for example socketcand:can0?host=H&port=29536"
-        )
-    try:
-        with socket.create_connection((options["host"], options["port"]), timeout=_GREETING_S) as stream:
-            greeting = stream.recv(16)
-    except OSError as error:
-        raise RigError(f"{name}: nobody answers there: {error}; start the hub first: mgdd rig hub") from error
-    if not greeting.startswith(b"< hi"):
-        raise RigError(f"{name}: what answers there is not socketcand: it said {greeting!r}")
-
-
-def _hint(error: Exception) -> str:
-    code = getattr(error, "error_code", None) or getattr(error, "errno", None)
-    return {
-        errno.EAFNOSUPPORT: "this kernel has no CAN: use socketcand and a hub (mgdd rig hub), or another machine",
-        errno.ENODEV: "`ip -brief link` lists the CAN interfaces",
-        errno.ENETDOWN: "`ip link set CHANNEL up type can bitrate 500000` starts it",
-    }.get(code if isinstance(code, int) else 0, "")
+    return error_code(error) in (errno.ENOBUFS, errno.EAGAIN) or "buffer" in str(error).lower()
