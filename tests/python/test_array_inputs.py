@@ -18,6 +18,7 @@ from mgdd.control import DiscreteModel, Pid, RecedingHorizon
 from mgdd.engine import Cylinder, OperatingPoint, fit_nox_proxy, timing_sweep
 from mgdd.io.checks import check_trace
 from mgdd.loop import EngineBench, Reference, simulate_drive, track, track_many
+from mgdd.rig import LoopMessage, RealtimeLoop, RigRecord, RingTransport, SafetyEnvelope, SignalLayout
 from mgdd.signals.even_grid import even_step
 from mgdd.signals.metrics import mse
 from mgdd.throttle.characteristics import airflow_torque_nm, mass_flow_kg_per_s
@@ -181,6 +182,25 @@ def observing(gain: Any) -> Any:
     return [controller.step(1.0, 0.2), controller.step(1.0, 0.4)]
 
 
+def exchanged(row: Any) -> Any:
+    return RigRecord.from_columns(["misfire", "input.duty", "value.angle_deg"], [row, row]).to_columns()[1]
+
+
+def queued(references: Any) -> Any:
+    measured = {
+        name: SignalLayout(start=16 * i, length=12) for i, name in enumerate(("angle_deg", "first_v", "second_v"))
+    }
+    loop = RealtimeLoop(
+        Pid(sample_s=0.002),
+        RingTransport(),
+        command=LoopMessage(can_id=0x120, signals={"duty": SignalLayout(start=0, length=16, raw_type="signed")}),
+        measurements=[LoopMessage(can_id=0x121, signals=measured)],
+        envelope=SafetyEnvelope(cycle_s=0.002),
+    )
+    loop.queue_references(references)
+    return loop.queued_references
+
+
 CALLS: dict[str, tuple[Call, tuple[Array, ...]]] = {
     "control.DiscreteModel.__init__": (lambda c: swings(c).output(X), (C,)),
     "control.DiscreteModel.linear": (lambda a, b, c: linear(list(a), b, c).step(X, 0.5), (A, B, C)),
@@ -259,6 +279,8 @@ MORE: dict[str, tuple[Call, tuple[Array, ...]]] = {
             "steady_kpa",
         )
     },
+    "rig.RealtimeLoop.queue_references": (queued, (OPEN,)),
+    "rig.RigRecord.from_columns": (exchanged, (np.array([0.0, 0.3, 41.5]),)),
     "throttle.PedalMap": (pedals, (np.array([0.0, 100.0]), np.array([1e3, 3e3, 6e3]), OPEN)),
     "throttle.PedalMap.torque_nm": (CHAIN.pedal_map.torque_nm, (OPEN, 2000.0 + OPEN)),
     "throttle.airflow_torque_nm": (lambda a: airflow_torque_nm(throttle.Throttle(), a), (OPEN,)),
