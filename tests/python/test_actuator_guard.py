@@ -138,6 +138,18 @@ def test_a_late_reading_blames_the_input_that_caused_it():
         assert cycle(guard, -9.3)["soc_cad"] == -8.0  # until what was applied meanwhile has been read
 
 
+def test_of_two_proven_points_the_one_that_caused_a_late_excess_is_dropped():
+    engine = Engine(delay=2)
+    guard = guard_of(engine, limits=[Limit("p_max_bar", 130.0, delay_cycles=2.0)])
+    for soc in (-3.0, -3.0, -3.0, -6.0, -6.0, -6.0, -3.0, -3.0, -3.0):
+        cycle(guard, soc)
+    engine.offset = 15.0  # now -6 has 133 bar, -3 has 124
+    for soc in (-6.0, -3.0, -3.0):
+        cycle(guard, soc)
+    assert cycle(guard, 5.0)["soc_cad"] == guard.good["soc_cad"] == -3.0
+    assert [entry.name for entry in guard.log] == ["p_max_bar"]
+
+
 @pytest.mark.parametrize("limits", [{}, {"p_max_bar": math.nan}])
 def test_a_reading_that_is_missing_or_not_a_number_counts_as_exceeded(limits):
     class Mute(Engine):

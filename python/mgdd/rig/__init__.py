@@ -25,6 +25,7 @@ from mgdd.rig.recorded import read_record, repair_record
 from mgdd.rig.recorder import Recorder
 from mgdd.rig.replay import ReplayRig
 from mgdd.rig.safety import Drive, SafetyChange, SafetyEnvelope, SafetyGate
+from mgdd.rig.safety_envelope import SafetyEnvelope
 from mgdd.rig.simulated import SimulatedRig
 
 __all__ = [
