@@ -231,6 +231,7 @@ void bind_realtime_loop(py::module_& m) {
             give_back(controller, l.cycle().controller());
           },
           py::arg("controller"))
+      .def_property_readonly("patience_s", &RealtimeLoop::patience_s)
       .def_property_readonly("running", [](const RealtimeLoop& l) { return l.thread().running(); })
       .def_property_readonly("queued_references", [](const RealtimeLoop& l) { return l.cycle().queued_references(); })
       .def_property_readonly(

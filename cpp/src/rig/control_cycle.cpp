@@ -14,6 +14,7 @@
 namespace mgdd::rig {
 namespace {
 
+constexpr int most_frames = 4096;  // of a cycle: a sender without end must not hold the loop
 constexpr double nothing = std::numeric_limits<double>::quiet_NaN();
 
 void require_finite(std::string_view name, double value) {
@@ -62,7 +63,7 @@ ControlCycle::~ControlCycle() {
 
 void ControlCycle::take_frames(SafetyFacts& facts) noexcept {
   Frame frame;
-  while (on(transport_, [&](auto& t) noexcept { return t->receive(frame); })) {
+  for (int i = 0; i < most_frames && on(transport_, [&](auto& t) noexcept { return t->receive(frame); }); ++i) {
     const FrameVerdict verdict = codec_.read(frame, measurements_);
     if (verdict == FrameVerdict::bad) {
       ++facts.bad_frames;

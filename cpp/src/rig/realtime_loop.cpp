@@ -36,6 +36,7 @@ RealtimeLoop::RealtimeLoop(const ScheduleSettings& schedule, const CycleSettings
         require_same("cycle_s", gate.envelope().cycle_s, schedule.period_s);
         return std::make_shared<ControlCycle>(settings, transport, controller, codec, gate);
       }()),
-      thread_(schedule, [cycle = cycle_](const Turn& turn) { return cycle->turn(turn); }) {}
+      patience_s_(2.0 + (settings.stop_frames + 2) * schedule.period_s),
+      thread_(schedule, [cycle = cycle_](const Turn& turn) { return cycle->turn(turn); }, patience_s_) {}
 
 }  // namespace mgdd::rig

@@ -31,7 +31,6 @@ namespace mgdd::rig {
 namespace {
 
 constexpr double shortest_period_s = 5e-5, longest_period_s = 1.0;
-constexpr double destructor_patience_s = 2.0;
 
 #ifdef __linux__
 
@@ -136,8 +135,8 @@ struct RealtimeThread::Shared {
   }
 };
 
-RealtimeThread::RealtimeThread(const ScheduleSettings& settings, TurnFunction turn)
-    : shared_(std::make_shared<Shared>()) {
+RealtimeThread::RealtimeThread(const ScheduleSettings& settings, TurnFunction turn, double patience_s)
+    : shared_(std::make_shared<Shared>()), patience_s_(patience_s) {
   validate(settings);
   shared_->settings = settings;
   shared_->turn = std::move(turn);
@@ -146,7 +145,7 @@ RealtimeThread::RealtimeThread(const ScheduleSettings& settings, TurnFunction tu
 RealtimeThread::~RealtimeThread() {
   request_stop();
   if (!shared_->thread.joinable()) return;
-  if (wait(destructor_patience_s)) {
+  if (wait(patience_s_)) {
     shared_->thread.join();
   } else {
     shared_->thread.detach();

@@ -1,5 +1,5 @@
 """
-Frames of a bus, their protection, signals in their bits, records of a run.
+Between a controller and a real actuator: frames of a bus, their protection and signals, records, the safety gate, buses, the loop.
 """
 from __future__ import annotations
 import collections.abc
@@ -7,7 +7,7 @@ import numpy
 import numpy.typing
 import typing
 import typing_extensions
-__all__: list[str] = ['E2eCheck', 'E2eSettings', 'Frame', 'RecordReader', 'RecordWriter', 'SignalLayout', 'check_message', 'crc8', 'protect', 'read_record', 'repair_record']
+__all__: list[str] = ['Drive', 'E2eCheck', 'E2eSettings', 'Frame', 'RealtimeLoop', 'RecordReader', 'RecordWriter', 'RingTransport', 'SafetyEnvelope', 'SafetyGate', 'SignalLayout', 'SocketCanTransport', 'bus_states', 'check_message', 'commanded_names', 'crc8', 'measured_names', 'protect', 'read_record', 'repair_record', 'safety_reasons', 'safety_requests', 'safety_states', 'send_results']
 class E2eSettings:
     """
     End-to-end protection of a CAN payload: an alive counter and a CRC-8.
@@ -39,47 +39,6 @@ class E2eSettings:
         Largest step between two frames that counts as good: one less may be lost.
     bad_until_invalid, good_until_valid : int
         Frames in a row until `E2eCheck.valid` changes.
-Between a controller and a real actuator.
-"""
-from __future__ import annotations
-import collections.abc
-import typing
-__all__: list[str] = ['Drive', 'SafetyEnvelope', 'SafetyGate', 'bus_states', 'safety_reasons', 'safety_requests', 'safety_states']
-class SafetyEnvelope:
-    """
-    What a safety gate lets pass, and what must be true of the measurements meanwhile.
-    
-    Keyword-only and immutable; the defaults are the shipped envelope ``etb``. ``SafetyEnvelope.fields()`` lists bounds, units
-    and defaults.
-    
-    Parameters
-    ----------
-    cycle_s : float
-        Time between two cycles of the gate [s].
-    duty_limit, slew_per_s, ramp_s : float
-        Largest duty [-], its largest change [1/s], and the time in which it grows in after the start [s].
-    invalid_duties : float
-        Duties in a row that are not finite and lead to ``fault`` [cycles]; the last good one is held before.
-    rms_duty_limit, rms_duty_to_arm, heat_time_constant_s : float
-        Largest RMS duty of the heat model [-], what it must cool to before the next start [-], and its time constant [s].
-    stall_duty, stall_move_deg, stall_s : float
-        Duty that must move the plate [-], by how much [deg], and within which time [s].
-    largest_age_cycles, held_cycles : float
-        Age beyond which a measurement is not used, and for how long the last duty bridges it [cycles].
-    bad_frames, good_frames : float
-        Bad frames in a row that lead to ``limp``; good ones, with nothing wrong meanwhile, before arming and a reset [-].
-    missed_deadlines, unsent_cycles : float
-        Deadlines missed in a row [-], and commands in a row that did not leave [cycles], that lead to ``limp``.
-    sensor_sum_v, sensor_sum_tolerance_v, sensor_low_v, sensor_high_v : float
-        Sum of both sensors, by which it may be off, and the range of each [V].
-    sensor_slope_v_per_s : float
-        Fastest change of a healthy sensor [V/s].
-    sensor_cycles : float
-        Measurements in a row that fail a check of the sensors or of the travel and lead to ``fault`` [cycles].
-    closed_deg, open_deg, travel_margin_deg : float
-        Travel, and by which an angle may leave it [deg].
-    bus_fault_from : {"warning", "passive", "off"}
-        State of the CAN controller from which on it is ``limp``.
     
     Raises
     ------
@@ -96,29 +55,6 @@ class SafetyEnvelope:
     >>> check.push(protect(E2eSettings(data_id=0x121), 7, bytes(8)))
     'wrong_crc'
     """
-        A value outside its domain, naming field, value and bound.
-    
-    See Also
-    --------
-    SafetyGate : what keeps it.
-    
-    References
-    ----------
-    Bosch Motorsport, manual of the MS 6 engine control (sum and range of the sensors).
-    
-    Examples
-    --------
-    >>> from mgdd.rig import SafetyEnvelope
-    >>> SafetyEnvelope(duty_limit=0.5).slew_per_s
-    200.0
-    >>> SafetyEnvelope.from_toml(SafetyEnvelope(duty_limit=0.5).to_toml()) == SafetyEnvelope(duty_limit=0.5)
-    True
-    """
-    @staticmethod
-    def fields() -> dict:
-        """
-        Every field by name: unit, bounds or choices, meaning, default.
-        """
     def __eq__(self, arg0: typing.Any) -> bool:
         ...
     def __getstate__(self) -> tuple[int, dict]:
@@ -126,7 +62,6 @@ class SafetyEnvelope:
     def __hash__(self) -> int:
         ...
     def __init__(self, *, crc: str | tuple[typing.SupportsInt | typing.SupportsIndex, typing.SupportsInt | typing.SupportsIndex, typing.SupportsInt | typing.SupportsIndex] = 'sae_j1850', data_id: typing.SupportsInt | typing.SupportsIndex = 0, data_id_mode: str = 'both', data_id_list: collections.abc.Sequence[typing.SupportsInt | typing.SupportsIndex] | None = None, size: typing.SupportsInt | typing.SupportsIndex = 8, crc_byte: typing.SupportsInt | typing.SupportsIndex = 0, counter_byte: typing.SupportsInt | typing.SupportsIndex = 1, counter_place: str = 'low_nibble', counter_modulus: typing.SupportsInt | typing.SupportsIndex = 16, max_step: typing.SupportsInt | typing.SupportsIndex = 3, bad_until_invalid: typing.SupportsInt | typing.SupportsIndex = 3, good_until_valid: typing.SupportsInt | typing.SupportsIndex = 2) -> None:
-    def __init__(self, *, cycle_s: typing.SupportsFloat | typing.SupportsIndex = 0.001, duty_limit: typing.SupportsFloat | typing.SupportsIndex = 0.8, slew_per_s: typing.SupportsFloat | typing.SupportsIndex = 200.0, ramp_s: typing.SupportsFloat | typing.SupportsIndex = 0.2, invalid_duties: typing.SupportsFloat | typing.SupportsIndex = 1.0, rms_duty_limit: typing.SupportsFloat | typing.SupportsIndex = 0.5, rms_duty_to_arm: typing.SupportsFloat | typing.SupportsIndex = 0.4, heat_time_constant_s: typing.SupportsFloat | typing.SupportsIndex = 10.0, stall_duty: typing.SupportsFloat | typing.SupportsIndex = 0.6, stall_move_deg: typing.SupportsFloat | typing.SupportsIndex = 0.5, stall_s: typing.SupportsFloat | typing.SupportsIndex = 0.2, largest_age_cycles: typing.SupportsFloat | typing.SupportsIndex = 3.0, held_cycles: typing.SupportsFloat | typing.SupportsIndex = 1.0, bad_frames: typing.SupportsFloat | typing.SupportsIndex = 3.0, good_frames: typing.SupportsFloat | typing.SupportsIndex = 20.0, missed_deadlines: typing.SupportsFloat | typing.SupportsIndex = 3.0, unsent_cycles: typing.SupportsFloat | typing.SupportsIndex = 3.0, sensor_sum_v: typing.SupportsFloat | typing.SupportsIndex = 5.0, sensor_sum_tolerance_v: typing.SupportsFloat | typing.SupportsIndex = 0.2, sensor_low_v: typing.SupportsFloat | typing.SupportsIndex = 0.2, sensor_high_v: typing.SupportsFloat | typing.SupportsIndex = 4.8, sensor_slope_v_per_s: typing.SupportsFloat | typing.SupportsIndex = 400.0, sensor_cycles: typing.SupportsFloat | typing.SupportsIndex = 4.0, closed_deg: typing.SupportsFloat | typing.SupportsIndex = 0.0, open_deg: typing.SupportsFloat | typing.SupportsIndex = 90.0, travel_margin_deg: typing.SupportsFloat | typing.SupportsIndex = 6.75, bus_fault_from: str = 'passive') -> None:
         ...
     def __repr__(self) -> str:
         ...
@@ -370,7 +305,7 @@ class Frame:
     
     Examples
     --------
-    >>> from mgdd.rig import Frame
+    >>> from mgdd._core.rig import Frame
     >>> Frame(id=0x121, data=bytes(3), received=True).data
     b'\\x00\\x00\\x00'
     """
@@ -380,7 +315,7 @@ class Frame:
         ...
     def __hash__(self) -> int:
         ...
-    def __init__(self, *, id: typing.SupportsInt | typing.SupportsIndex, data: typing_extensions.Buffer = b'', extended: bool = False, error: bool = False, received: bool = False, fd: bool = False, bit_rate_switch: bool = False, remote: bool = False, channel: typing.SupportsInt | typing.SupportsIndex = 0, monotonic_ns: typing.SupportsInt | typing.SupportsIndex = 0, bus_ns: typing.SupportsInt | typing.SupportsIndex = 0) -> None:
+    def __init__(self, *, id: typing.SupportsInt | typing.SupportsIndex, data: bytes = b'', extended: bool = False, error: bool = False, received: bool = False, fd: bool = False, bit_rate_switch: bool = False, remote: bool = False, channel: typing.SupportsInt | typing.SupportsIndex = 0, monotonic_ns: typing.SupportsInt | typing.SupportsIndex = 0, bus_ns: typing.SupportsInt | typing.SupportsIndex = 0) -> None:
         ...
     def __repr__(self) -> str:
         ...
@@ -520,26 +455,80 @@ class RecordReader:
         """
         Whether they may be the start of a record that is still being written.
         """
-def check_message(signals: collections.abc.Mapping[str, SignalLayout], size: typing.SupportsInt | typing.SupportsIndex, branches: collections.abc.Mapping[str, collections.abc.Sequence[typing.SupportsInt | typing.SupportsIndex]] | None = None) -> None:
+class SafetyEnvelope:
     """
-    ParameterError naming signals that reach beyond a message of `size` bytes or share bits; `branches` gives the values of the multiplexer that select a signal.
+    What a safety gate lets pass, and what must be true of the measurements meanwhile.
+    
+    Keyword-only and immutable; the defaults are the shipped envelope ``etb``. ``SafetyEnvelope.fields()`` lists bounds, units
+    and defaults.
+    
+    Parameters
+    ----------
+    cycle_s : float
+        Time between two cycles of the gate [s].
+    duty_limit, slew_per_s, ramp_s : float
+        Largest duty [-], its largest change [1/s], and the time in which it grows in after the start [s].
+    invalid_duties : float
+        Duties in a row that are not finite and lead to ``fault`` [cycles]; the last good one is held before.
+    rms_duty_limit, rms_duty_to_arm, heat_time_constant_s : float
+        Largest RMS duty of the heat model [-], what it must cool to before the next start [-], and its time constant [s].
+    stall_duty, stall_move_deg, stall_s : float
+        Duty that must move the plate [-], by how much [deg], and within which time [s].
+    largest_age_cycles, held_cycles : float
+        Age beyond which a measurement is not used, and for how long the last duty bridges it [cycles].
+    bad_frames, good_frames : float
+        Bad frames in a row that lead to ``limp``; good ones, with nothing wrong meanwhile, before arming and a reset [-].
+    missed_deadlines, unsent_cycles : float
+        Deadlines missed in a row [-], and commands in a row that did not leave [cycles], that lead to ``limp``.
+    sensor_sum_v, sensor_sum_tolerance_v, sensor_low_v, sensor_high_v : float
+        Sum of both sensors, by which it may be off, and the range of each [V].
+    sensor_slope_v_per_s : float
+        Fastest change of a healthy sensor [V/s].
+    sensor_cycles : float
+        Measurements in a row that fail a check of the sensors or of the travel and lead to ``fault`` [cycles].
+    closed_deg, open_deg, travel_margin_deg : float
+        Travel, and by which an angle may leave it [deg].
+    bus_fault_from : {"warning", "passive", "off"}
+        State of the CAN controller from which on it is ``limp``.
+    
+    Raises
+    ------
+    mgdd.errors.ParameterError
+        A value outside its domain, naming field, value and bound.
+    
+    See Also
+    --------
+    SafetyGate : what keeps it.
+    
+    References
+    ----------
+    Bosch Motorsport, manual of the MS 6 engine control (sum and range of the sensors).
+    
+    Examples
+    --------
+    >>> from mgdd.rig import SafetyEnvelope
+    >>> SafetyEnvelope(duty_limit=0.5).slew_per_s
+    200.0
+    >>> SafetyEnvelope.from_toml(SafetyEnvelope(duty_limit=0.5).to_toml()) == SafetyEnvelope(duty_limit=0.5)
+    True
     """
-def crc8(data: bytes, crc: str | tuple[typing.SupportsInt | typing.SupportsIndex, typing.SupportsInt | typing.SupportsIndex, typing.SupportsInt | typing.SupportsIndex] = 'sae_j1850') -> int:
-    """
-    CRC-8 by name, or of (polynomial, start, final xor).
-    """
-def protect(settings: E2eSettings, counter: typing.SupportsInt | typing.SupportsIndex, payload: typing_extensions.Buffer) -> bytes:
-    """
-    Behind mgdd.rig.protect.
-    """
-def read_record(path: str) -> dict:
-    """
-    All of a record as columns; behind mgdd.rig.read_record.
-    """
-def repair_record(path: str, target: str) -> dict:
-    """
-    Behind mgdd.rig.repair_record.
-    """
+    @staticmethod
+    def fields() -> dict:
+        """
+        Every field by name: unit, bounds or choices, meaning, default.
+        """
+    def __eq__(self, arg0: typing.Any) -> bool:
+        ...
+    def __getstate__(self) -> tuple[int, dict]:
+        ...
+    def __hash__(self) -> int:
+        ...
+    def __init__(self, *, cycle_s: typing.SupportsFloat | typing.SupportsIndex = 0.001, duty_limit: typing.SupportsFloat | typing.SupportsIndex = 0.8, slew_per_s: typing.SupportsFloat | typing.SupportsIndex = 200.0, ramp_s: typing.SupportsFloat | typing.SupportsIndex = 0.2, invalid_duties: typing.SupportsFloat | typing.SupportsIndex = 1.0, rms_duty_limit: typing.SupportsFloat | typing.SupportsIndex = 0.5, rms_duty_to_arm: typing.SupportsFloat | typing.SupportsIndex = 0.4, heat_time_constant_s: typing.SupportsFloat | typing.SupportsIndex = 10.0, stall_duty: typing.SupportsFloat | typing.SupportsIndex = 0.6, stall_move_deg: typing.SupportsFloat | typing.SupportsIndex = 0.5, stall_s: typing.SupportsFloat | typing.SupportsIndex = 0.2, largest_age_cycles: typing.SupportsFloat | typing.SupportsIndex = 3.0, held_cycles: typing.SupportsFloat | typing.SupportsIndex = 1.0, bad_frames: typing.SupportsFloat | typing.SupportsIndex = 3.0, good_frames: typing.SupportsFloat | typing.SupportsIndex = 20.0, missed_deadlines: typing.SupportsFloat | typing.SupportsIndex = 3.0, unsent_cycles: typing.SupportsFloat | typing.SupportsIndex = 3.0, sensor_sum_v: typing.SupportsFloat | typing.SupportsIndex = 5.0, sensor_sum_tolerance_v: typing.SupportsFloat | typing.SupportsIndex = 0.2, sensor_low_v: typing.SupportsFloat | typing.SupportsIndex = 0.2, sensor_high_v: typing.SupportsFloat | typing.SupportsIndex = 4.8, sensor_slope_v_per_s: typing.SupportsFloat | typing.SupportsIndex = 400.0, sensor_cycles: typing.SupportsFloat | typing.SupportsIndex = 4.0, closed_deg: typing.SupportsFloat | typing.SupportsIndex = 0.0, open_deg: typing.SupportsFloat | typing.SupportsIndex = 90.0, travel_margin_deg: typing.SupportsFloat | typing.SupportsIndex = 6.75, bus_fault_from: str = 'passive') -> None:
+        ...
+    def __repr__(self) -> str:
+        ...
+    def __setstate__(self, arg0: tuple) -> None:
+        ...
     def replace(self, **kwargs) -> SafetyEnvelope:
         """
         A validated copy with some fields changed; an unknown name is a ParameterError.
@@ -832,7 +821,311 @@ class SafetyGate:
     @state.setter
     def state(self, arg1: collections.abc.Mapping[str, collections.abc.Sequence[typing.SupportsFloat | typing.SupportsIndex]]) -> None:
         ...
+class RingTransport:
+    """
+    A bus behind two rings, fed and drained by a thread of Python.
+    
+    A `RealtimeLoop` takes and gives frames without waiting for Python. `BusBridge` connects it with any interface of
+    python-can; a simulated plant may serve it as well.
+    
+    Parameters
+    ----------
+    receive_capacity : int
+        Frames from the bus that may wait for the loop, a power of two; what does not fit is lost and counted.
+    send_capacity : int
+        Frames towards the bus that may wait, a power of two. Short, so that no command leaves late: a command that finds no
+        room is not sent, and the loop knows.
+    
+    Raises
+    ------
+    mgdd.errors.ParameterError
+        A capacity that is no power of two from 2 to 16777216.
+    
+    See Also
+    --------
+    BusBridge : a python-can bus on the other side.
+    SocketCanTransport : a CAN interface of Linux, without Python in between.
+    
+    Examples
+    --------
+    >>> from mgdd.rig import Frame, RingTransport
+    >>> bus = RingTransport()
+    >>> bus.feed(Frame(id=0x121, data=bytes(8)))
+    True
+    >>> bus.counts["lost"], bus.take() is None, bus.bus_state
+    (0, True, 'active')
+    """
+    def __init__(self, *, receive_capacity: typing.SupportsInt | typing.SupportsIndex = 1024, send_capacity: typing.SupportsInt | typing.SupportsIndex = 16) -> None:
+        ...
+    def fail(self) -> None:
+        """
+        Say that the bus is gone, for good: the loop sees it as off and opens the bridge.
+        """
+    def feed(self, frame: Frame) -> bool:
+        """
+        Hand a frame from the bus to the loop.
+        
+        Parameters
+        ----------
+        frame : Frame
+            Without a stamp ``monotonic_ns`` it gets that of now.
+        
+        Returns
+        -------
+        bool
+            False, and counted as lost, where it finds no room.
+        """
+    def take(self, timeout_s: typing.SupportsFloat | typing.SupportsIndex = 0.0) -> typing.Any:
+        """
+        Take the next frame that the loop sends; other threads run while it waits.
+        
+        Parameters
+        ----------
+        timeout_s : float
+            How long to wait for one, 0 to 3600 [s].
+        
+        Returns
+        -------
+        Frame or None
+            None where none came.
+        """
+    @property
+    def bus_state(self) -> str:
+        """
+        ``"active"``, ``"warning"``, ``"passive"`` or ``"off"``.
+        """
+    @property
+    def counts(self) -> dict:
+        """
+        Frames by what became of them, and error frames by kind, as a new dict.
+        """
+    @property
+    def in_use(self) -> bool:
+        """
+        Whether a loop takes its frames.
+        """
+    @property
+    def waiting_for_loop(self) -> int:
+        """
+        Frames that the loop has not taken yet.
+        """
+    @property
+    def waiting_to_send(self) -> int:
+        """
+        Frames of the loop that nobody has taken yet.
+        """
+class SocketCanTransport:
+    """
+    A CAN interface of Linux as a raw socket that never blocks, for a `RealtimeLoop`.
+    
+    Several sockets on one interface see each other's frames: a logger of python-can beside it records all, our own commands
+    too. Set the queue of the interface short (``ip link set can0 txqueuelen 10``), or old commands leave late.
+    
+    Parameters
+    ----------
+    interface : str
+        Its name, for example ``"can0"``.
+    fd : bool
+        CAN FD frames too.
+    filters : sequence of tuple
+        ``(id, mask, extended)``: a frame passes whose identifier agrees with one of them in the bits of its mask; all frames
+        if empty. They hold before the first frame can arrive.
+    receive_buffer_bytes : int
+        Asked of the kernel; `receive_buffer_bytes` says what it granted.
+    send_patience_s : float
+        How long to try again where the queue of the interface is full, 0 to 0.1 [s].
+    
+    Raises
+    ------
+    mgdd.errors.ParameterError
+        A setting outside its domain.
+    mgdd.errors.RigError
+        The kernel has no CAN; or the interface does not exist, is down, is no CAN interface or does no CAN FD.
+    
+    See Also
+    --------
+    RingTransport : any other adapter, through python-can.
+    
+    Examples
+    --------
+    >>> from mgdd.errors import RigError
+    >>> from mgdd.rig import SocketCanTransport
+    >>> try:
+    ...     bus = SocketCanTransport("no_such_can")
+    ... except RigError:
+    ...     print("no bus")
+    no bus
+    """
+    def __init__(self, interface: str, *, fd: bool = False, filters: collections.abc.Sequence[tuple[typing.SupportsInt | typing.SupportsIndex, typing.SupportsInt | typing.SupportsIndex, bool]] = [], receive_buffer_bytes: typing.SupportsInt | typing.SupportsIndex = 4194304, send_patience_s: typing.SupportsFloat | typing.SupportsIndex = 0.0002) -> None:
+        ...
+    def receive(self, timeout_s: typing.SupportsFloat | typing.SupportsIndex = 0.0) -> typing.Any:
+        """
+        Take the next frame from the bus; other threads run while it waits.
+        
+        Parameters
+        ----------
+        timeout_s : float
+            How long to wait for one, 0 to 3600 [s].
+        
+        Returns
+        -------
+        Frame or None
+            None where none came.
+        
+        Raises
+        ------
+        mgdd.errors.RigError
+            A loop takes the frames.
+        """
+    def send(self, frame: Frame) -> str:
+        """
+        Send a frame now.
+        
+        Parameters
+        ----------
+        frame : Frame
+            Its stamps are not used.
+        
+        Returns
+        -------
+        str
+            ``"sent"``, ``"full"`` where the queue had no room in time, ``"failed"`` where the frame or the interface is unfit.
+        
+        Raises
+        ------
+        mgdd.errors.RigError
+            A loop sends here.
+        """
+    @property
+    def bus_state(self) -> str:
+        """
+        ``"active"``, ``"warning"``, ``"passive"`` or ``"off"``.
+        """
+    @property
+    def counts(self) -> dict:
+        """
+        Frames by what became of them, and error frames by kind, as a new dict.
+        """
+    @property
+    def in_use(self) -> bool:
+        """
+        Whether a loop takes its frames.
+        """
+    @property
+    def receive_buffer_bytes(self) -> int:
+        """
+        Bytes that the kernel granted.
+        """
+class RealtimeLoop:
+    """
+    A controller in a thread of its own; behind mgdd.rig.RealtimeLoop.
+    """
+    def __init__(self, *, controller: typing.Any, transport: RingTransport | SocketCanTransport, envelope: SafetyEnvelope, command: tuple[typing.SupportsInt | typing.SupportsIndex, bool, typing.SupportsInt | typing.SupportsIndex, E2eSettings | None, collections.abc.Sequence[tuple[str, SignalLayout, typing.SupportsFloat | typing.SupportsIndex]]], received: collections.abc.Sequence[tuple[typing.SupportsInt | typing.SupportsIndex, bool, typing.SupportsInt | typing.SupportsIndex, E2eSettings | None, collections.abc.Sequence[tuple[str, SignalLayout, typing.SupportsFloat | typing.SupportsIndex]]]], period_s: typing.SupportsFloat | typing.SupportsIndex = 0.001, initial_reference_deg: typing.SupportsFloat | typing.SupportsIndex = 0.0, reference_timeout_s: typing.SupportsFloat | typing.SupportsIndex | None = None, transmit: bool = True, stop_frames: typing.SupportsInt | typing.SupportsIndex = 5, realtime: bool = True, priority: typing.SupportsInt | typing.SupportsIndex = 50, lock_memory: bool = True, sample_capacity: typing.SupportsInt | typing.SupportsIndex = 16384, queue_capacity: typing.SupportsInt | typing.SupportsIndex = 65536) -> None:
+        ...
+    def events(self) -> list:
+        """
+        Changes of state since the last call: cycle, from, to, reason, count.
+        """
+    def give_back(self, controller: typing.Any) -> None:
+        ...
+    def queue_references(self, reference_deg: typing.Annotated[numpy.typing.ArrayLike, numpy.float64]) -> None:
+        ...
+    def report(self) -> dict:
+        """
+        Account of the loop so far.
+        """
+    def request(self, request: str) -> bool:
+        ...
+    def samples(self) -> dict:
+        """
+        Samples since the last call, as a dict of columns.
+        """
+    def set_reference(self, reference_deg: typing.SupportsFloat | typing.SupportsIndex) -> None:
+        ...
+    def start(self) -> None:
+        """
+        Start; returns at once.
+        """
+    def stop(self, timeout_s: typing.SupportsFloat | typing.SupportsIndex) -> bool:
+        """
+        Ask for the end; whether it came in time.
+        """
+    def wait(self, timeout_s: typing.SupportsFloat | typing.SupportsIndex | None) -> bool:
+        """
+        Wait for the end without the GIL; whether it came.
+        """
+    @property
+    def bus_state(self) -> str:
+        ...
+    @property
+    def cause(self) -> str:
+        ...
+    @property
+    def patience_s(self) -> float:
+        ...
+    @property
+    def queued_references(self) -> int:
+        ...
+    @property
+    def reason(self) -> str:
+        ...
+    @property
+    def running(self) -> bool:
+        ...
+    @property
+    def state(self) -> str:
+        ...
+def check_message(signals: collections.abc.Mapping[str, SignalLayout], size: typing.SupportsInt | typing.SupportsIndex, branches: collections.abc.Mapping[str, collections.abc.Sequence[typing.SupportsInt | typing.SupportsIndex]] | None = None) -> None:
+    """
+    ParameterError naming signals that reach beyond a message of `size` bytes or share bits; `branches` gives the values of the multiplexer that select a signal.
+    """
+def crc8(data: bytes, crc: str | tuple[typing.SupportsInt | typing.SupportsIndex, typing.SupportsInt | typing.SupportsIndex, typing.SupportsInt | typing.SupportsIndex] = 'sae_j1850') -> int:
+    """
+    CRC-8 by name, or of (polynomial, start, final xor).
+    """
+def protect(settings: E2eSettings, counter: typing.SupportsInt | typing.SupportsIndex, payload: typing_extensions.Buffer) -> bytes:
+    """
+    Write alive counter and CRC into a payload.
+    
+    Parameters
+    ----------
+    settings : E2eSettings
+        Places, CRC and data identifier.
+    counter : int
+        Alive counter of this frame, 0 to ``counter_modulus - 1``.
+    payload : bytes
+        ``settings.size`` bytes; what stands in the places of CRC and counter is replaced.
+    
+    Returns
+    -------
+    bytes
+        The protected payload.
+    
+    Raises
+    ------
+    mgdd.errors.ParameterError
+        A counter outside of the modulus.
+    mgdd.errors.ShapeError
+        A payload of another length.
+    
+    Examples
+    --------
+    >>> from mgdd.rig import E2eSettings, protect
+    >>> protect(E2eSettings(data_id=0x120), 5, bytes.fromhex("0000112233445566")).hex()
+    '3a05112233445566'
+    """
+def read_record(path: str) -> dict:
+    """
+    All of a record as columns; behind mgdd.rig.read_record.
+    """
+def repair_record(path: str, target: str) -> dict:
+    """
+    Behind mgdd.rig.repair_record.
+    """
 bus_states: tuple = ('active', 'warning', 'passive', 'off')
+commanded_names: tuple = ('duty', 'enable', 'reference_deg', 'fixed')
+measured_names: tuple = ('angle_deg', 'first_v', 'second_v', 'supply_v', 'current_a', 'speed_deg_per_s', 'applied_duty')
 safety_reasons: tuple = ('none', 'requested', 'wrong_state', 'too_few_frames', 'aborted', 'stale', 'bad_frames', 'bus_fault', 'not_sent', 'deadlines', 'not_observed', 'heat', 'stall', 'sensor_range', 'sensor_disagreement', 'sensor_slope', 'travel', 'invalid_duty')
 safety_requests: tuple = ('none', 'arm', 'run', 'stop', 'disarm', 'reset', 'abort')
 safety_states: tuple = ('init', 'armed', 'run', 'limp', 'fault')
+send_results: tuple = ('sent', 'full', 'failed')

@@ -151,7 +151,7 @@ class RealtimeLoop:
         )
         self._origin_ns: int | None = None
         # Also at the end of the interpreter: a thread of the core must not outlive it.
-        self._end = weakref.finalize(self, self._core.stop, 2.0)
+        self._end = weakref.finalize(self, self._core.stop, self._core.patience_s)
 
     # --- life -------------------------------------------------------------------------------------------------
 
@@ -167,21 +167,22 @@ class RealtimeLoop:
 
         self._core.start()
 
-    def stop(self, timeout_s: float = 2.0) -> None:
+    def stop(self, timeout_s: float | None = None) -> None:
         """Send the last commands with an open bridge and end the thread; does nothing where it has ended.
 
         Parameters
         ----------
-        timeout_s : float
-            How long to wait for the end [s].
+        timeout_s : float, optional
+            How long to wait for the end [s]; ``stop_frames`` periods and 2 s if left out.
 
         Raises
         ------
         mgdd.errors.RigError
             It did not end in time: cut the supply of the motor.
         """
-        if not self._core.stop(timeout_s):
-            raise RigError(f"the loop did not end within {timeout_s:g} s: cut the supply of the motor")
+        limit_s = self._core.patience_s if timeout_s is None else timeout_s
+        if not self._core.stop(limit_s):
+            raise RigError(f"the loop did not end within {limit_s:g} s: cut the supply of the motor")
         self._core.give_back(getattr(self.controller, "_core", self.controller))
 
     def wait(self, timeout_s: float | None = None) -> bool:

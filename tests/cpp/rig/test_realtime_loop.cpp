@@ -105,6 +105,16 @@ TEST(RealtimeLoop, TheDestructorSendsTheLastFrames) {
   EXPECT_FALSE(throttle.bus->claim().taken());
 }
 
+TEST(RealtimeLoop, AStopMayTakeItsFrames) {
+  ThrottleOnBus throttle;
+  control::PidSettings pid;
+  SafetyEnvelope envelope;
+  pid.sample_s = envelope.cycle_s = 0.5;
+  const RealtimeLoop loop({.period_s = 0.5}, {.stop_frames = 40}, throttle.bus, control::Pid(pid),
+                          FrameCodec(bus_messages()), SafetyGate(envelope));
+  EXPECT_GT(loop.patience_s(), 20.5);
+}
+
 TEST(RealtimeLoop, PeriodControllerAndGateMustAgree) {
   ThrottleOnBus throttle;
   const auto refused = [&](double period_s, double sample_s, double cycle_s, const std::string& words) {

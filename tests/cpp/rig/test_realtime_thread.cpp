@@ -130,11 +130,14 @@ TEST(RealtimeThread, ATurnThatHangsIsLeftAloneWithWhatItUses) {
   auto hang = std::make_shared<std::atomic<bool>>(true);
   const std::weak_ptr<std::atomic<bool>> used = hang;
   {
-    RealtimeThread thread(ordinary(), [hang](const Turn&) {
-      while (*hang)
-        std::this_thread::sleep_for(1ms);
-      return false;
-    });
+    RealtimeThread thread(
+        ordinary(),
+        [hang](const Turn&) {
+          while (*hang)
+            std::this_thread::sleep_for(1ms);
+          return false;
+        },
+        0.05);
     thread.start();
     EXPECT_FALSE(thread.wait(0.01));
   }

@@ -1,6 +1,7 @@
 // A throttle controller on a real bus: rig/control_cycle.hpp on the thread of rig/realtime_thread.hpp, at one period
-// that loop, controller and safety gate share. Made, started once, stopped; it reads no clock but that of its deadlines.
-// What runs while it is driven is real-time safe; all calls here are offline code, from any thread but one at a time.
+// that loop, controller and safety gate share. Made, started once, stopped; it reads no clock but that of its
+// deadlines. What runs while it is driven is real-time safe; all calls here are offline code, from any thread but one
+// at a time.
 #pragma once
 
 #include <memory>
@@ -19,6 +20,8 @@ class RealtimeLoop {
 
   /// Returns at once. RigError where it was started before.
   void start() { thread_.start(); }
+  /// How long a stop takes: its frames, one per period, and 2 s for a busy machine.
+  [[nodiscard]] double patience_s() const noexcept { return patience_s_; }
   /// Asks for the safe frames and the end; true where the loop ended within so long.
   bool stop(double timeout_s) {
     thread_.request_stop();
@@ -33,6 +36,7 @@ class RealtimeLoop {
 
  private:
   std::shared_ptr<ControlCycle> cycle_;  // the thread holds it too
+  double patience_s_;
   RealtimeThread thread_;
 };
 

@@ -45,11 +45,11 @@ class RealtimeThread {
   /// One turn; false ends the loop. Must not throw: an exception ends the program.
   using TurnFunction = std::function<bool(const Turn&)>;
 
-  /// ParameterError for bad settings.
-  RealtimeThread(const ScheduleSettings& settings, TurnFunction turn);
+  /// ParameterError for bad settings. `patience_s`: how long the destructor waits for the end.
+  RealtimeThread(const ScheduleSettings& settings, TurnFunction turn, double patience_s = 2.0);
   RealtimeThread(const RealtimeThread&) = delete;
   RealtimeThread& operator=(const RealtimeThread&) = delete;
-  /// Asks for the end and waits for it, 2 s at most; a turn that hangs longer keeps what it uses and is left alone.
+  /// Asks for the end and waits for it; a turn that hangs longer keeps what it uses and is left alone.
   ~RealtimeThread();
 
   /// Returns once the thread runs; what the system refuses is in `grant`. RigError where it was started before or where
@@ -68,6 +68,7 @@ class RealtimeThread {
  private:
   struct Shared;
   std::shared_ptr<Shared> shared_;
+  double patience_s_;
 };
 
 }  // namespace mgdd::rig
