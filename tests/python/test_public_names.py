@@ -9,16 +9,9 @@ from pathlib import Path
 
 import mgdd
 
-<<<<<<< HEAD
 # Beyond this nobody finds anything: unexport a helper or a result before a name is added. 172: controllers of the
 # throttle, their loop, tuner and supervisor, faults, the demand chain, protection, rigs, record, loop and experiments.
 FEWEST, MOST = 105, 172
-=======
-# Beyond this nobody finds anything: unexport a helper or a result before a name is added. 165: controllers of the
-# throttle, their loop, tuner and supervisor, faults, the demand chain, protection and record of a bus, the safety of a
-# rig, the real-time loop.
-FEWEST, MOST = 105, 165
->>>>>>> 8398e2080a8c9d165582d8d31351ea59f9ca12c9
 
 
 def public() -> dict[str, list[str]]:

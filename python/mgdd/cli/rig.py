@@ -130,14 +130,7 @@ def _node(args: argparse.Namespace) -> None:
     signal_map = SignalMap.load(args.map)
     period_s = None if args.period_ms is None else args.period_ms * 1e-3
     sample_s = period_s if args.sample_ms is None else args.sample_ms * 1e-3
-<<<<<<< HEAD
     core = NodeCore(_plant_of(args, signal_map, sample_s), signal_map)
-    stopped: list[int] = []
-    for number in (signal.SIGINT, signal.SIGTERM):
-        signal.signal(number, lambda got, _: stopped.append(got))
-=======
-    core = NodeCore(node_of(signal_map, faults=args.fault, seed=args.seed, sample_s=sample_s), signal_map)
->>>>>>> d291144f6438966b2759a650dbb32ef73a4c8a22
     log = None if args.truth is None else TruthLog(args.truth)
     try:
         with noted_signals() as stopped, CanTransport.parse(args.bus) as bus:

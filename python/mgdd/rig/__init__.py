@@ -6,7 +6,7 @@ throttle controller a `SafetyGate`. An `Experiment` from a file runs on all of t
 
 from __future__ import annotations
 
-from mgdd._core.rig import E2eCheck, E2eSettings, Frame, RingTransport, SignalLayout, SocketCanTransport, protect
+from mgdd._core.rig import E2eCheck, E2eSettings, Frame, RingTransport, SignalLayout, SocketCanTransport
 from mgdd.rig.actuator_guard import ActuatorGuard, GuardedAsk
 from mgdd.rig.base import Rig
 from mgdd.rig.can.bus_bridge import BusBridge
@@ -24,7 +24,7 @@ from mgdd.rig.realtime import RealtimeLoop
 from mgdd.rig.recorded import read_record, repair_record
 from mgdd.rig.recorder import Recorder
 from mgdd.rig.replay import ReplayRig
-from mgdd.rig.safety import Drive, SafetyChange, SafetyEnvelope, SafetyGate
+from mgdd.rig.safety import Drive, SafetyChange, SafetyGate
 from mgdd.rig.safety_envelope import SafetyEnvelope
 from mgdd.rig.simulated import SimulatedRig
 

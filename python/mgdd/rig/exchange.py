@@ -202,11 +202,8 @@ class RecordingRig:
     sink : callable, optional
         Called with each row of named numbers as soon as it is measured, to write it to a file: all have the names of
         the first one, NaN where there is none.
-<<<<<<< HEAD
     keep : bool
         Whether `record` remembers them too; a run of days has a sink instead.
-=======
->>>>>>> d291144f6438966b2759a650dbb32ef73a4c8a22
 
     Examples
     --------
