@@ -224,6 +224,8 @@ CALLS: dict[str, tuple[Call, tuple[Array, ...]]] = {
     "identify.SmoothThrottle.fit": (smooth, (DUTY, ANGLE, 1.05 * TEN, 0.1 * TEN, 10.0 * TEN)),
     "io.pressure_trace": (lambda a, p: io.pressure_trace(a, p)["pressure_bar"].to_numpy(), (CRANK, BAR)),
     "io.throttle_log": (logged, (TIME, DUTY, ANGLE, 0.1 * DUTY, 12.0 + DUTY)),
+    "rig.RealtimeLoop.queue_references": (queued, (OPEN,)),
+    "rig.RigRecord.from_columns": (exchanged, (np.array([0.0, 0.3, 41.5]),)),
     "loop.EngineBench.run": (lambda soc: EngineBench(seed=1).run(soc)["j"].to_numpy(), (SOC,)),
     "loop.EngineBench.steady_map": (lambda soc: EngineBench().steady_map(soc)["j"].to_numpy(), (SOC,)),
     "loop.track": (
@@ -279,8 +281,6 @@ MORE: dict[str, tuple[Call, tuple[Array, ...]]] = {
             "steady_kpa",
         )
     },
-    "rig.RealtimeLoop.queue_references": (queued, (OPEN,)),
-    "rig.RigRecord.from_columns": (exchanged, (np.array([0.0, 0.3, 41.5]),)),
     "throttle.PedalMap": (pedals, (np.array([0.0, 100.0]), np.array([1e3, 3e3, 6e3]), OPEN)),
     "throttle.PedalMap.torque_nm": (CHAIN.pedal_map.torque_nm, (OPEN, 2000.0 + OPEN)),
     "throttle.airflow_torque_nm": (lambda a: airflow_torque_nm(throttle.Throttle(), a), (OPEN,)),

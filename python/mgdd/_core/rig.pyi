@@ -305,7 +305,7 @@ class Frame:
     
     Examples
     --------
-    >>> from mgdd._core.rig import Frame
+    >>> from mgdd.rig import Frame
     >>> Frame(id=0x121, data=bytes(3), received=True).data
     b'\\x00\\x00\\x00'
     """
@@ -315,7 +315,7 @@ class Frame:
         ...
     def __hash__(self) -> int:
         ...
-    def __init__(self, *, id: typing.SupportsInt | typing.SupportsIndex, data: bytes = b'', extended: bool = False, error: bool = False, received: bool = False, fd: bool = False, bit_rate_switch: bool = False, remote: bool = False, channel: typing.SupportsInt | typing.SupportsIndex = 0, monotonic_ns: typing.SupportsInt | typing.SupportsIndex = 0, bus_ns: typing.SupportsInt | typing.SupportsIndex = 0) -> None:
+    def __init__(self, *, id: typing.SupportsInt | typing.SupportsIndex, data: typing_extensions.Buffer = b'', extended: bool = False, error: bool = False, received: bool = False, fd: bool = False, bit_rate_switch: bool = False, remote: bool = False, channel: typing.SupportsInt | typing.SupportsIndex = 0, monotonic_ns: typing.SupportsInt | typing.SupportsIndex = 0, bus_ns: typing.SupportsInt | typing.SupportsIndex = 0) -> None:
         ...
     def __repr__(self) -> str:
         ...
@@ -1085,34 +1085,7 @@ def crc8(data: bytes, crc: str | tuple[typing.SupportsInt | typing.SupportsIndex
     """
 def protect(settings: E2eSettings, counter: typing.SupportsInt | typing.SupportsIndex, payload: typing_extensions.Buffer) -> bytes:
     """
-    Write alive counter and CRC into a payload.
-    
-    Parameters
-    ----------
-    settings : E2eSettings
-        Places, CRC and data identifier.
-    counter : int
-        Alive counter of this frame, 0 to ``counter_modulus - 1``.
-    payload : bytes
-        ``settings.size`` bytes; what stands in the places of CRC and counter is replaced.
-    
-    Returns
-    -------
-    bytes
-        The protected payload.
-    
-    Raises
-    ------
-    mgdd.errors.ParameterError
-        A counter outside of the modulus.
-    mgdd.errors.ShapeError
-        A payload of another length.
-    
-    Examples
-    --------
-    >>> from mgdd.rig import E2eSettings, protect
-    >>> protect(E2eSettings(data_id=0x120), 5, bytes.fromhex("0000112233445566")).hex()
-    '3a05112233445566'
+    Behind mgdd.rig.protect.
     """
 def read_record(path: str) -> dict:
     """
