@@ -1,5 +1,5 @@
 """
-Between a controller and a real actuator: frames of a bus, their protection and signals, records, the safety gate, buses, the loop.
+Between a controller and a real actuator: protection and signals of a payload, the safety gate, buses, the loop.
 """
 from __future__ import annotations
 import collections.abc
@@ -284,176 +284,6 @@ class SignalLayout:
     def start(self) -> int:
         """
         First bit, as a DBC counts.
-        """
-class Frame:
-    """
-    One CAN or CAN FD frame. Keyword-only and immutable.
-    
-    Parameters
-    ----------
-    id : int
-        Identifier: 11 bits, 29 of an extended frame; of an error frame its class bits.
-    data : bytes
-        Payload, up to 64 bytes.
-    extended, error, received, fd, bit_rate_switch, remote : bool
-        29-bit identifier; news of a bus error; from the bus rather than sent by us; CAN FD; its data at the higher rate;
-        request of a frame.
-    channel : int
-        Which bus, where one record holds several.
-    monotonic_ns, bus_ns : int
-        When it was received or handed to the bus, and the driver's own stamp [ns].
-    
-    Examples
-    --------
-    >>> from mgdd._core.rig import Frame
-    >>> Frame(id=0x121, data=bytes(3), received=True).data
-    b'\\x00\\x00\\x00'
-    """
-    def __eq__(self, arg0: typing.Any) -> bool:
-        ...
-    def __getstate__(self) -> tuple[int, dict]:
-        ...
-    def __hash__(self) -> int:
-        ...
-    def __init__(self, *, id: typing.SupportsInt | typing.SupportsIndex, data: bytes = b'', extended: bool = False, error: bool = False, received: bool = False, fd: bool = False, bit_rate_switch: bool = False, remote: bool = False, channel: typing.SupportsInt | typing.SupportsIndex = 0, monotonic_ns: typing.SupportsInt | typing.SupportsIndex = 0, bus_ns: typing.SupportsInt | typing.SupportsIndex = 0) -> None:
-        ...
-    def __repr__(self) -> str:
-        ...
-    def __setstate__(self, arg0: tuple) -> None:
-        ...
-    def to_dict(self) -> dict:
-        """
-        Constructor keywords as a new dict.
-        """
-    @property
-    def bit_rate_switch(self) -> bool:
-        """
-        Fast data.
-        """
-    @property
-    def bus_ns(self) -> int:
-        """
-        Stamp of the driver [ns]; 0: none.
-        """
-    @property
-    def channel(self) -> int:
-        """
-        Which bus.
-        """
-    @property
-    def data(self) -> bytes:
-        """
-        Payload, up to 64 bytes.
-        """
-    @property
-    def error(self) -> bool:
-        """
-        News of a bus error.
-        """
-    @property
-    def extended(self) -> bool:
-        """
-        29-bit identifier.
-        """
-    @property
-    def fd(self) -> bool:
-        """
-        CAN FD.
-        """
-    @property
-    def id(self) -> int:
-        """
-        Identifier.
-        """
-    @property
-    def monotonic_ns(self) -> int:
-        """
-        When received or handed to the bus [ns].
-        """
-    @property
-    def received(self) -> bool:
-        """
-        From the bus rather than sent by us.
-        """
-    @property
-    def remote(self) -> bool:
-        """
-        Request of a frame.
-        """
-class RecordWriter:
-    """
-    Appends to a record file; behind mgdd.rig.Recorder.
-    """
-    def __init__(self, path: str, *, run_id: bytes, wall_ns: typing.SupportsInt | typing.SupportsIndex, monotonic_ns: typing.SupportsInt | typing.SupportsIndex, json: str) -> None:
-        ...
-    def add_table(self, name: str, columns: collections.abc.Sequence[str], monotonic_ns: typing.SupportsInt | typing.SupportsIndex) -> int:
-        """
-        Number of a new table of samples.
-        """
-    def close(self) -> None:
-        """
-        Close the file; what is written later is a RigError.
-        """
-    def sync(self) -> None:
-        """
-        Wait until the disk has everything.
-        """
-    def write(self, frame: Frame) -> None:
-        """
-        Append a frame.
-        """
-    def write_event(self, monotonic_ns: typing.SupportsInt | typing.SupportsIndex, category: str, text: str) -> None:
-        """
-        Append an event.
-        """
-    def write_sample(self, table: typing.SupportsInt | typing.SupportsIndex, monotonic_ns: typing.SupportsInt | typing.SupportsIndex, values: typing.Annotated[numpy.typing.ArrayLike, numpy.float64]) -> None:
-        """
-        Append a number per column of a table.
-        """
-    @property
-    def path(self) -> str:
-        """
-        As given.
-        """
-    @property
-    def refused(self) -> int:
-        """
-        Records that could not be written.
-        """
-    @property
-    def size(self) -> int:
-        """
-        Bytes.
-        """
-    @property
-    def written(self) -> int:
-        """
-        Records.
-        """
-class RecordReader:
-    """
-    Iterates over a record: frames, and tuples ('sample', ns, table, values), ('event', ns, category, text) and ('damage', bytes).
-    """
-    def __init__(self, path: str) -> None:
-        ...
-    def __iter__(self) -> RecordReader:
-        ...
-    def __next__(self) -> typing.Any:
-        ...
-    @property
-    def header(self) -> dict:
-        """
-        As written.
-        """
-    @property
-    def ignored_bytes(self) -> int:
-        """
-        Bytes behind the last readable record; known at the end.
-        """
-    @property
-    def incomplete(self) -> bool:
-        """
-        Whether they may be the start of a record that is still being written.
         """
 class SafetyEnvelope:
     """
@@ -861,7 +691,7 @@ class RingTransport:
         """
         Say that the bus is gone, for good: the loop sees it as off and opens the bridge.
         """
-    def feed(self, frame: Frame) -> bool:
+    def feed(self, frame: ...) -> bool:
         """
         Hand a frame from the bus to the loop.
         
@@ -977,7 +807,7 @@ class SocketCanTransport:
         mgdd.errors.RigError
             A loop takes the frames.
         """
-    def send(self, frame: Frame) -> str:
+    def send(self, frame: ...) -> str:
         """
         Send a frame now.
         
@@ -1075,6 +905,176 @@ class RealtimeLoop:
     @property
     def state(self) -> str:
         ...
+class Frame:
+    """
+    One CAN or CAN FD frame. Keyword-only and immutable.
+    
+    Parameters
+    ----------
+    id : int
+        Identifier: 11 bits, 29 of an extended frame; of an error frame its class bits.
+    data : bytes
+        Payload, up to 64 bytes.
+    extended, error, received, fd, bit_rate_switch, remote : bool
+        29-bit identifier; news of a bus error; from the bus rather than sent by us; CAN FD; its data at the higher rate;
+        request of a frame.
+    channel : int
+        Which bus, where one record holds several.
+    monotonic_ns, bus_ns : int
+        When it was received or handed to the bus, and the driver's own stamp [ns].
+    
+    Examples
+    --------
+    >>> from mgdd.rig import Frame
+    >>> Frame(id=0x121, data=bytes(3), received=True).data
+    b'\\x00\\x00\\x00'
+    """
+    def __eq__(self, arg0: typing.Any) -> bool:
+        ...
+    def __getstate__(self) -> tuple[int, dict]:
+        ...
+    def __hash__(self) -> int:
+        ...
+    def __init__(self, *, id: typing.SupportsInt | typing.SupportsIndex, data: typing_extensions.Buffer = b'', extended: bool = False, error: bool = False, received: bool = False, fd: bool = False, bit_rate_switch: bool = False, remote: bool = False, channel: typing.SupportsInt | typing.SupportsIndex = 0, monotonic_ns: typing.SupportsInt | typing.SupportsIndex = 0, bus_ns: typing.SupportsInt | typing.SupportsIndex = 0) -> None:
+        ...
+    def __repr__(self) -> str:
+        ...
+    def __setstate__(self, arg0: tuple) -> None:
+        ...
+    def to_dict(self) -> dict:
+        """
+        Constructor keywords as a new dict.
+        """
+    @property
+    def bit_rate_switch(self) -> bool:
+        """
+        Fast data.
+        """
+    @property
+    def bus_ns(self) -> int:
+        """
+        Stamp of the driver [ns]; 0: none.
+        """
+    @property
+    def channel(self) -> int:
+        """
+        Which bus.
+        """
+    @property
+    def data(self) -> bytes:
+        """
+        Payload, up to 64 bytes.
+        """
+    @property
+    def error(self) -> bool:
+        """
+        News of a bus error.
+        """
+    @property
+    def extended(self) -> bool:
+        """
+        29-bit identifier.
+        """
+    @property
+    def fd(self) -> bool:
+        """
+        CAN FD.
+        """
+    @property
+    def id(self) -> int:
+        """
+        Identifier.
+        """
+    @property
+    def monotonic_ns(self) -> int:
+        """
+        When received or handed to the bus [ns].
+        """
+    @property
+    def received(self) -> bool:
+        """
+        From the bus rather than sent by us.
+        """
+    @property
+    def remote(self) -> bool:
+        """
+        Request of a frame.
+        """
+class RecordWriter:
+    """
+    Appends to a record file; behind mgdd.rig.Recorder.
+    """
+    def __init__(self, path: str, *, run_id: bytes, wall_ns: typing.SupportsInt | typing.SupportsIndex, monotonic_ns: typing.SupportsInt | typing.SupportsIndex, json: str) -> None:
+        ...
+    def add_table(self, name: str, columns: collections.abc.Sequence[str], monotonic_ns: typing.SupportsInt | typing.SupportsIndex) -> int:
+        """
+        Number of a new table of samples.
+        """
+    def close(self) -> None:
+        """
+        Close the file; what is written later is a RigError.
+        """
+    def sync(self) -> None:
+        """
+        Wait until the disk has everything.
+        """
+    def write(self, frame: Frame) -> None:
+        """
+        Append a frame.
+        """
+    def write_event(self, monotonic_ns: typing.SupportsInt | typing.SupportsIndex, category: str, text: str) -> None:
+        """
+        Append an event.
+        """
+    def write_sample(self, table: typing.SupportsInt | typing.SupportsIndex, monotonic_ns: typing.SupportsInt | typing.SupportsIndex, values: typing.Annotated[numpy.typing.ArrayLike, numpy.float64]) -> None:
+        """
+        Append a number per column of a table.
+        """
+    @property
+    def path(self) -> str:
+        """
+        As given.
+        """
+    @property
+    def refused(self) -> int:
+        """
+        Records that could not be written.
+        """
+    @property
+    def size(self) -> int:
+        """
+        Bytes.
+        """
+    @property
+    def written(self) -> int:
+        """
+        Records.
+        """
+class RecordReader:
+    """
+    Iterates over a record: frames, and tuples ('sample', ns, table, values), ('event', ns, category, text) and ('damage', bytes).
+    """
+    def __init__(self, path: str) -> None:
+        ...
+    def __iter__(self) -> RecordReader:
+        ...
+    def __next__(self) -> typing.Any:
+        ...
+    @property
+    def header(self) -> dict:
+        """
+        As written.
+        """
+    @property
+    def ignored_bytes(self) -> int:
+        """
+        Bytes behind the last readable record; known at the end.
+        """
+    @property
+    def incomplete(self) -> bool:
+        """
+        Whether they may be the start of a record that is still being written.
+        """
 def check_message(signals: collections.abc.Mapping[str, SignalLayout], size: typing.SupportsInt | typing.SupportsIndex, branches: collections.abc.Mapping[str, collections.abc.Sequence[typing.SupportsInt | typing.SupportsIndex]] | None = None) -> None:
     """
     ParameterError naming signals that reach beyond a message of `size` bytes or share bits; `branches` gives the values of the multiplexer that select a signal.
@@ -1085,34 +1085,7 @@ def crc8(data: bytes, crc: str | tuple[typing.SupportsInt | typing.SupportsIndex
     """
 def protect(settings: E2eSettings, counter: typing.SupportsInt | typing.SupportsIndex, payload: typing_extensions.Buffer) -> bytes:
     """
-    Write alive counter and CRC into a payload.
-    
-    Parameters
-    ----------
-    settings : E2eSettings
-        Places, CRC and data identifier.
-    counter : int
-        Alive counter of this frame, 0 to ``counter_modulus - 1``.
-    payload : bytes
-        ``settings.size`` bytes; what stands in the places of CRC and counter is replaced.
-    
-    Returns
-    -------
-    bytes
-        The protected payload.
-    
-    Raises
-    ------
-    mgdd.errors.ParameterError
-        A counter outside of the modulus.
-    mgdd.errors.ShapeError
-        A payload of another length.
-    
-    Examples
-    --------
-    >>> from mgdd.rig import E2eSettings, protect
-    >>> protect(E2eSettings(data_id=0x120), 5, bytes.fromhex("0000112233445566")).hex()
-    '3a05112233445566'
+    Behind mgdd.rig.protect.
     """
 def read_record(path: str) -> dict:
     """

@@ -61,7 +61,7 @@ class LiveView:
         bar = "█" * round((cycle.number + 1) / max(self._cycles, 1) * _BAR)
         table = Table(box=None, pad_edge=False, show_header=False)
         for justify in ("left", "right", "left"):
-            table.add_column(justify=justify)  # type: ignore[arg-type]
+            table.add_column(justify=justify)
         for kind, values in (
             ("asked", cycle.asked), ("applied", cycle.measured.applied), ("limit", cycle.measured.limits),
             ("measured", cycle.measured.values),

@@ -111,5 +111,7 @@ def _listen(checked: CheckedExperiment) -> dict[str, Any]:
     """Listen on the bus without sending; RigError where nobody is there, or another one sends our commands."""
     from mgdd.rig.can.can_rig import CanRig
 
+    if checked.signal_map is None:
+        return {}
     with CanRig(checked.signal_map, checked.experiment.bus.connection, mode="dry_run") as rig:
         return {"connection": checked.experiment.bus.connection, "state": rig.state, **rig.counters}

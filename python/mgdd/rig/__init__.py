@@ -24,7 +24,7 @@ from mgdd.rig.realtime import RealtimeLoop
 from mgdd.rig.recorded import read_record, repair_record
 from mgdd.rig.recorder import Recorder
 from mgdd.rig.replay import ReplayRig
-from mgdd.rig.safety import Drive, SafetyChange, SafetyGate
+from mgdd.rig.safety import SafetyChange, SafetyGate
 from mgdd.rig.safety_envelope import SafetyEnvelope
 from mgdd.rig.simulated import SimulatedRig
 
@@ -33,7 +33,6 @@ __all__ = [
     "BusBridge",
     "CanRig",
     "CanTransport",
-    "Drive",
     "E2eCheck",
     "E2eSettings",
     "Experiment",

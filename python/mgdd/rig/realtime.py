@@ -15,7 +15,8 @@ from mgdd._core.rig import RingTransport, SocketCanTransport
 from mgdd.errors import ParameterError, RigError
 from mgdd.rig.loop_message import LoopMessage
 from mgdd.rig.loop_samples import samples_dataset, summary
-from mgdd.rig.safety import SafetyChange, SafetyEnvelope
+from mgdd.rig.safety import SafetyChange
+from mgdd.rig.safety_envelope import SafetyEnvelope
 
 if TYPE_CHECKING:
     import xarray as xr

@@ -15,7 +15,7 @@ from mgdd.rig.experiment.experiment import Experiment
 from mgdd.rig.experiment.settings import SAMPLE_S, EnginePlant, IdentifyTask, SeekTask, TrackTask
 from mgdd.rig.experiment.throttle_tasks import IdentifyPlan, TrackPlan
 from mgdd.rig.recorded import read_record
-from mgdd.rig.safety import SafetyEnvelope
+from mgdd.rig.safety_envelope import SafetyEnvelope
 
 __all__ = ["CheckedExperiment", "check_experiment"]
 

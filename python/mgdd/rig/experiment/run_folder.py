@@ -109,7 +109,7 @@ def _is_map(path: Path) -> bool:
 
 def versions() -> dict[str, Any]:
     """Give time, versions and machine of a run."""
-    found = {}
+    found: dict[str, str | None] = {}
     for name in _PACKAGES:
         try:
             found[name] = metadata.version(name)

@@ -7,6 +7,7 @@ from contextlib import ExitStack, contextmanager
 from dataclasses import dataclass
 from typing import TYPE_CHECKING, Any
 
+from mgdd.errors import ParameterError
 from mgdd.loop import EngineBench, Plant, VirtualThrottle
 from mgdd.loop.track import sensors_of
 from mgdd.optimize import Limit
@@ -108,6 +109,8 @@ def _rig_of(
         return SimulatedRig(simulated_plant(experiment, sample_s=checked.sample_s, inputs=("duty",)))
     if checked.record is not None:
         return ReplayRig(RigRecord.read(checked.record), strict=False)
+    if checked.signal_map is None:
+        raise ParameterError.of("mode", mode, "one of a bus, with a map")
     connection = experiment.bus.connection
     if connection is None:
         connection = stack.enter_context(own_node(checked))
