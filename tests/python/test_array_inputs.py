@@ -13,12 +13,13 @@ import pytest
 import xarray as xr
 
 import mgdd
+from idle_loop import idle_loop
 from mgdd import guide, identify, io, optimize, signals, surrogate, throttle
 from mgdd.control import DiscreteModel, Pid, RecedingHorizon
 from mgdd.engine import Cylinder, OperatingPoint, fit_nox_proxy, timing_sweep
 from mgdd.io.checks import check_trace
 from mgdd.loop import EngineBench, Reference, simulate_drive, track, track_many
-from mgdd.rig import LoopMessage, RealtimeLoop, RigRecord, RingTransport, SafetyEnvelope, SignalLayout
+from mgdd.rig import RigRecord
 from mgdd.signals.even_grid import even_step
 from mgdd.signals.metrics import mse
 from mgdd.throttle.characteristics import airflow_torque_nm, mass_flow_kg_per_s
@@ -187,16 +188,7 @@ def exchanged(row: Any) -> Any:
 
 
 def queued(references: Any) -> Any:
-    measured = {
-        name: SignalLayout(start=16 * i, length=12) for i, name in enumerate(("angle_deg", "first_v", "second_v"))
-    }
-    loop = RealtimeLoop(
-        Pid(sample_s=0.002),
-        RingTransport(),
-        command=LoopMessage(can_id=0x120, signals={"duty": SignalLayout(start=0, length=16, raw_type="signed")}),
-        measurements=[LoopMessage(can_id=0x121, signals=measured)],
-        envelope=SafetyEnvelope(cycle_s=0.002),
-    )
+    loop = idle_loop()
     loop.queue_references(references)
     return loop.queued_references
 

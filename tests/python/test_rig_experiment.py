@@ -47,7 +47,7 @@ def test_a_file_comes_back_equal(text: str) -> None:
         (TRACK.replace("format = 1", "format = 2"), r"format = 2: must be 1"),
         (TRACK.replace('task = "track"', 'task = "drive"'), r"task = 'drive': must be one of identify, track, seek"),
         (TRACK + "speed = 3\n", r"track.speed = 3: must be one of the keys reference"),
-        (TRACK + "controler = 'pid'\n", r"track.controler = 'pid': .*did you mean 'controller'"),
+        (TRACK + "controllr = 'pid'\n", r"track.controllr = 'pid': .*did you mean 'controller'"),
         (TRACK.replace('"pid"', '"bang"'), r"track.controller = 'bang': must be one of guided"),
         (TRACK.replace('"pid"', "3"), r"track.controller = 3: must be text in quotes"),
         (TRACK + "[seek]\ncycles = 3\n", r"file: seek = .*: must be one of the keys"),

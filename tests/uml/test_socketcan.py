@@ -15,7 +15,6 @@ import pytest
 from mgdd.errors import RigError
 from mgdd.loop import VirtualThrottle
 from mgdd.rig import CanRig, CanTransport, Frame, SignalMap, SocketCanTransport
-from mgdd.rig.can.frame import Frame as BusFrame
 from mgdd.rig.can.node import run_node
 from mgdd.rig.can.node_core import NodeCore, node_plant
 
@@ -79,7 +78,7 @@ def test_the_kernel_itself_sends_on_time(peer: can.BusABC) -> None:
 
 def test_our_transport_sends_and_receives(peer: can.BusABC) -> None:
     with CanTransport.parse(f"socketcan:{CHANNEL}") as transport:
-        transport.send(BusFrame(id=0x120, data=b"\x01\x02"))
+        transport.send(Frame(id=0x120, data=b"\x01\x02"))
         heard = peer.recv(1.0)
         assert heard is not None
         assert (heard.arbitration_id, bytes(heard.data)) == (0x120, b"\x01\x02")
@@ -108,7 +107,7 @@ def test_error_frames_are_classified(peer: can.BusABC, kind: int, detail: int, f
             with pytest.raises(RigError, match=fatal):
                 transport.receive(1.0)
             with pytest.raises(RigError, match=fatal):
-                transport.send(BusFrame(id=0x120, data=bytes(8)))
+                transport.send(Frame(id=0x120, data=bytes(8)))
         else:
             peer.send(can.Message(arbitration_id=0x121, data=b"\x01", is_extended_id=False))
             frame = transport.receive(1.0)

@@ -5,9 +5,8 @@ from __future__ import annotations
 import time
 from typing import Any
 
-from mgdd._core import rig as core
 from mgdd._core.rig import Frame
-from mgdd.rig.can.frame import Bus
+from mgdd.rig.can.frame import Bus, changed
 from mgdd.rig.recorder import Recorder
 
 __all__ = ["RecordedBus"]
@@ -67,14 +66,5 @@ class RecordedBus:
         return frame
 
     def _append(self, frame: Frame, *, received: bool) -> None:
-        self.recorder.frame(
-            core.Frame(
-                id=frame.id,
-                data=frame.data,
-                extended=frame.extended,
-                error=frame.error,
-                received=received,
-                monotonic_ns=frame.monotonic_ns or time.monotonic_ns(),
-                bus_ns=frame.bus_ns,
-            )
-        )
+        stamp_ns = frame.monotonic_ns or time.monotonic_ns()
+        self.recorder.frame(changed(frame, monotonic_ns=stamp_ns, received=received))

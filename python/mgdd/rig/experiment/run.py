@@ -135,8 +135,8 @@ def run_experiment(
     ... reference = "step:20:60"
     ... '''
     >>> result = run_experiment(Experiment.from_toml(text))
-    >>> result.figures["settling_ms"] < 70.0, result.counters["gate"]["clamped"]
-    (True, 0)
+    >>> result.figures["settling_ms"] < 150.0, result.events[-1]
+    (True, 'safety gate: armed -> run: requested')
     """
     checked = experiment if isinstance(experiment, CheckedExperiment) else check_experiment(experiment)
     mode = checked.experiment.mode
