@@ -3,6 +3,7 @@
 export PATH=/usr/sbin:/usr/bin:/sbin:/bin PYTHONDONTWRITEBYTECODE=1 TMPDIR=/run
 mount -t proc proc /proc; mount -t sysfs sys /sys; mount -t tmpfs tmpfs /run
 exec >/dev/console 2>&1
+echo UML-UP
 modules=/usr/lib/uml/modules/$(uname -r)/kernel
 # In the order of their dependencies: vcan fails with "Unknown symbol" where can-dev is missing.
 for module in net/can/can net/can/can-raw net/can/can-bcm drivers/net/can/dev/can-dev drivers/net/can/vcan; do
