@@ -187,8 +187,24 @@ def test_a_gated_throttle_is_a_plant_that_says_what_was_applied():
     plant.apply({"duty": math.nan})
     assert plant.measure().applied == {"duty": 0.0, "bridge_open": 1.0}
     assert plant.gate.reason == "invalid_duty"
-    with pytest.raises(ParameterError, match="must take duty, bridge_open"):
-        GatedThrottle(VirtualThrottle())
+    with pytest.raises(ParameterError, match="must take duty, or duty and bridge_open"):
+        GatedThrottle(VirtualThrottle(inputs=("duty", "supply_v")))
+
+
+@pytest.mark.parametrize("shadow", [False, True])
+def test_where_the_bridge_cannot_be_opened_the_run_ends(shadow):
+    plant = GatedThrottle(VirtualThrottle(seed=2), shadow=shadow)
+    assert plant.start() == pytest.approx(LIMP_HOME_DEG, abs=1.0)
+    plant.apply({"duty": 0.3})
+    assert plant.measure().applied == {"duty": 0.3}
+    plant.gate.abort()
+    if shadow:
+        plant.apply({"duty": 0.3})
+        assert plant.measure().applied == {"duty": 0.0}
+        return
+    with pytest.raises(RigError, match="the safety gate went to 'limp': requested"):
+        plant.apply({"duty": 0.3})
+    assert plant.measure().applied == {"duty": 0.3}, "a refused duty is not sent"
 
 
 def well() -> dict[str, object]:

@@ -7,7 +7,7 @@
 
 namespace mgdd::bindings {
 
-/// A copy; ParameterError for what is no controller of mgdd.control.
+/// A copy; ParameterError for anything but a controller of mgdd.control.
 loop::ThrottleController controller_of(const py::handle& object);
 
 /// Puts what a run left behind back into the caller's object.

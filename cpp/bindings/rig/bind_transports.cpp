@@ -82,7 +82,7 @@ send_capacity : int
 Raises
 ------
 mgdd.errors.ParameterError
-    A capacity that is no power of two from 2 to 16777216.
+    A capacity that is not a power of two from 2 to 16777216.
 
 See Also
 --------
@@ -164,7 +164,7 @@ Raises
 mgdd.errors.ParameterError
     A setting outside its domain.
 mgdd.errors.RigError
-    The kernel has no CAN; or the interface does not exist, is down, is no CAN interface or does no CAN FD.
+    The kernel is built without CAN; or the interface does not exist, is down, is of another type or cannot do CAN FD.
 
 See Also
 --------

@@ -1,4 +1,5 @@
-// One function per noun of the rig. Apart from binding.hpp, so that a new noun here compiles no other room anew.
+// One function per noun of the rig. Apart from binding.hpp, so that a new one here does not recompile the other
+// modules.
 #pragma once
 
 #include "binding.hpp"

@@ -103,7 +103,7 @@ void bind_to(int descriptor, const SocketCanSettings& s) {
   if (s.fd) {
     require(ioctl(descriptor, SIOCGIFMTU, &request) == 0, "frame size of " + s.interface);
     if (request.ifr_mtu < static_cast<int>(CANFD_MTU)) {
-      throw RigError("the interface " + s.interface + " does no CAN FD: set fd to false, or its MTU to 72");
+      throw RigError("the interface " + s.interface + " cannot do CAN FD: set fd to false, or its MTU to 72");
     }
     require(set_option(descriptor, SOL_CAN_RAW, CAN_RAW_FD_FRAMES, 1), "CAN FD frames");
   }

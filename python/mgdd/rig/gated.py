@@ -7,6 +7,7 @@ from collections.abc import Mapping
 from dataclasses import replace
 from typing import Any
 
+from mgdd._core.rig import Drive
 from mgdd.errors import ParameterError, RigError
 from mgdd.loop import Measurement, Plant
 from mgdd.rig.safety import SafetyGate
@@ -20,10 +21,14 @@ class GatedThrottle:
     Parameters
     ----------
     plant : mgdd.loop.Plant
-        Takes ``duty`` and ``bridge_open``, gives ``first_v``, ``second_v``, ``sensed_angle_deg`` and, where known,
-        ``age_s``: `mgdd.loop.VirtualThrottle`, or a rig.
+        Takes ``duty`` and, where it can, ``bridge_open``; gives ``first_v``, ``second_v``, ``sensed_angle_deg`` and,
+        where known, ``age_s``: `mgdd.loop.VirtualThrottle`, or a rig. The bridge of a plant without ``bridge_open``
+        opens when its rig is left: there `apply` raises once the gate takes the drive away.
     gate : SafetyGate, optional
-        With the envelope ``etb`` if left out; `arm` and `run` it when measurements have come.
+        With the envelope ``etb`` if left out.
+    shadow : bool
+        The plant does not follow, as in ``dry_run`` and ``replay``: nothing is raised, and the run goes on at zero
+        duty.
 
     Raises
     ------
@@ -35,7 +40,7 @@ class GatedThrottle:
     >>> from mgdd.loop import VirtualThrottle
     >>> from mgdd.rig import GatedThrottle
     >>> plant = GatedThrottle(VirtualThrottle(inputs=("duty", "bridge_open"), seed=1))
-    >>> plant.start()
+    >>> start_deg = plant.start()
     >>> for _ in range(400):
     ...     plant.apply({"duty": 0.3})
     ...     measured = plant.measure()
@@ -49,11 +54,13 @@ class GatedThrottle:
     ({'duty': 0.0, 'bridge_open': 1.0}, True)
     """
 
-    def __init__(self, plant: Plant, gate: SafetyGate | None = None) -> None:
-        if set(plant.input_names) != {"duty", "bridge_open"}:
-            raise ParameterError(f"plant takes {', '.join(plant.input_names)}: must take duty, bridge_open")
+    def __init__(self, plant: Plant, gate: SafetyGate | None = None, *, shadow: bool = False) -> None:
+        if set(plant.input_names) not in ({"duty"}, {"duty", "bridge_open"}):
+            raise ParameterError(f"plant takes {', '.join(plant.input_names)}: must take duty, or duty and bridge_open")
         self.plant = plant
         self.gate = SafetyGate() if gate is None else gate
+        self.shadow = shadow
+        self._opens = "bridge_open" in plant.input_names
         self._values: Mapping[str, float] | None = None
         self._applied: dict[str, float] | None = None
 
@@ -67,20 +74,27 @@ class GatedThrottle:
         """Names of the limited quantities of the plant."""
         return self.plant.limit_names
 
-    def start(self) -> None:
-        """Measure with an open bridge until the gate can be armed, then arm and run it.
+    def start(self) -> float:
+        """Measure without drive until the gate can be armed, then arm and run it.
+
+        Returns
+        -------
+        float
+            Angle measured last [deg].
 
         Raises
         ------
         mgdd.errors.RigError
             Something still stands against it after twice the good frames that it needs.
         """
-        for _ in range(2 * math.ceil(self.gate.envelope.good_frames)):
-            self.apply({"duty": 0.0})
-            self.measure()
+        angle_deg = math.nan
+        for _ in range(2 * max(math.ceil(self.gate.envelope.good_frames), 1)):
+            self._send(self._passed(0.0))
+            angle_deg = float(self.measure().values["sensed_angle_deg"])
         if self.gate.mode == "init":
             self.gate.arm()
         self.gate.run()
+        return angle_deg
 
     def apply(self, inputs: Mapping[str, float]) -> None:
         """Pass the duty of the next cycle through the gate, with what was measured last.
@@ -94,13 +108,18 @@ class GatedThrottle:
         ------
         mgdd.errors.ParameterError
             A missing or unknown input.
+        mgdd.errors.RigError
+            The gate takes the drive away from a plant that cannot open its bridge; the message has the reason.
         """
         if set(inputs) != {"duty"}:
             raise ParameterError(f"inputs = {', '.join(map(str, inputs)) or 'none'}: must be duty")
-        self.gate.observe(**facts_of(self._values, self.gate.envelope.cycle_s))
-        drive = self.gate.command(inputs["duty"])
-        self._applied = {"duty": drive.duty, "bridge_open": float(drive.bridge_open)}
-        self.plant.apply(self._applied)
+        drive = self._passed(inputs["duty"])
+        if drive.bridge_open and not (self._opens or self.shadow):
+            raise RigError(
+                f"the safety gate went to {self.gate.mode!r}: {self.gate.reason}; look for the cause before the next "
+                "run"
+            )
+        self._send(drive)
 
     def measure(self) -> Measurement:
         """Run one cycle.
@@ -108,7 +127,7 @@ class GatedThrottle:
         Returns
         -------
         mgdd.loop.Measurement
-            As the plant gives it; ``applied`` has the ``duty`` that left and ``bridge_open``.
+            As the plant gives it; ``applied`` has the ``duty`` that left, and ``bridge_open`` where the plant takes it.
 
         Raises
         ------
@@ -119,7 +138,17 @@ class GatedThrottle:
             raise RigError("measure() before apply(): apply a duty first")
         measured = self.plant.measure()
         self._values = measured.values
-        return replace(measured, applied=self._applied)
+        return replace(measured, applied={**self._applied, **measured.applied})
+
+    def _passed(self, duty: float) -> Drive:
+        self.gate.observe(**facts_of(self._values, self.gate.envelope.cycle_s))
+        return self.gate.command(duty)
+
+    def _send(self, drive: Drive) -> None:
+        self._applied = {"duty": drive.duty}
+        if self._opens:
+            self._applied["bridge_open"] = float(drive.bridge_open)
+        self.plant.apply(self._applied)
 
 
 def facts_of(values: Mapping[str, float] | None, cycle_s: float) -> dict[str, Any]:

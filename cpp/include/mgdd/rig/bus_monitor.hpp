@@ -25,7 +25,7 @@ inline constexpr std::uint8_t receive_overflow = 0x01, transmit_overflow = 0x02,
 
 class BusMonitor {
  public:
-  /// Ignores what is no error frame.
+  /// Ignores all but error frames.
   void push(const Frame& frame) noexcept;
 
   /// From bus-off a controller comes back when it says that it was restarted, or is active again.

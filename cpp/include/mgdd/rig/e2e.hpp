@@ -89,7 +89,7 @@ void validate(const E2eSettings& settings);
 
 enum class E2eStatus {
   ok,             ///< a step of 1 to `max_step`
-  initial,        ///< first frame with a correct CRC: there is no step yet; neither good nor bad
+  initial,        ///< first frame with a correct CRC: its step is not known yet; neither good nor bad
   repeated,       ///< the counter stood still
   lost,           ///< a step beyond `max_step`
   wrong_crc,      ///< the payload is not to be used, nor is its counter

@@ -45,7 +45,7 @@ enum class PackStatus {
   clamped,       ///< the nearest value within the bounds of the layout and of its bits was written
   out_of_range,  ///< nothing was written
   not_finite,    ///< NaN or infinite: nothing was written
-  does_not_fit,  ///< the signal reaches beyond the payload, or is no signal: nothing was written
+  does_not_fit,  ///< the signal reaches beyond the payload, or its layout is invalid: nothing was written
 };
 
 /// Writes a physical value and leaves the other bits alone; rounds to the nearest raw value, halves to even.

@@ -32,7 +32,7 @@ void validate(const SocketCanSettings& settings);
 class SocketCanTransport {
  public:
   /// ParameterError for bad settings; RigError where the kernel has no CAN, or the interface does not exist, is down,
-  /// is no CAN interface or does no CAN FD.
+  /// is of another type or cannot do CAN FD.
   explicit SocketCanTransport(const SocketCanSettings& settings);
   /// Takes over an open socket that carries `struct can_frame`, and closes it in the end.
   SocketCanTransport(int descriptor, const SocketCanSettings& settings);

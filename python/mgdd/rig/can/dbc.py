@@ -33,7 +33,7 @@ class DbcSignal:
     choices : mapping of str to int
         Raw value by its name in the value table.
     missing_raw : int, optional
-        Raw value that says that there is no value.
+        Raw value that means that the value is missing.
     branches : tuple of int
         Values of the multiplexer that select it; empty: always there.
     multiplexer : bool

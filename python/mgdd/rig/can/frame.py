@@ -24,7 +24,7 @@ _PASSIVE = 0x30  # of byte 1 of a controller error: receiver or transmitter is e
 
 
 class Bus(Protocol):
-    """A bus behind one face: a `CanTransport`, or a node in the same process."""
+    """What every bus offers: a `CanTransport`, or a node in the same process."""
 
     @property
     def name(self) -> str:

@@ -1,4 +1,4 @@
-"""A node in the same process, behind the face of a bus: no threads and no clock, a command brings its answer."""
+"""A node in the same process, as a bus: no threads and no clock, a command brings its answer."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""Recorded frames behind the face of a bus: the same checks see them again, in the order in which they came."""
+"""Recorded frames as a bus: the same checks see them again, in the order in which they came."""
 
 from __future__ import annotations
 

@@ -21,9 +21,9 @@ from mgdd.rig.experiment.engine_task import SeekPlan, engine_named
 from mgdd.rig.experiment.experiment import Experiment
 from mgdd.rig.experiment.own_node import own_node
 from mgdd.rig.experiment.run_record import RunRecord
-from mgdd.rig.experiment.safe_throttle import SafeThrottle
 from mgdd.rig.experiment.settings import SAMPLE_S, EnginePlant, scaled
 from mgdd.rig.experiment.throttle_tasks import throttle_named
+from mgdd.rig.gated import GatedThrottle
 from mgdd.rig.recorder import Recorder
 from mgdd.rig.replay import ReplayRig
 from mgdd.rig.safety import SafetyGate
@@ -134,7 +134,7 @@ def _guarded(checked: CheckedExperiment, rig: Any, recorded: Plant) -> Stand:
 
     if checked.envelope is not None:
         gate = SafetyGate(checked.envelope)
-        safe = SafeThrottle(recorded, gate, shadow=checked.experiment.mode in ("dry_run", "replay"))
+        safe = GatedThrottle(recorded, gate, shadow=checked.experiment.mode in ("dry_run", "replay"))
         return Stand(
             plant=safe,
             counters=lambda: {**counters(), "gate": gate.counts},
