@@ -182,6 +182,10 @@ def test_a_node_needs_the_inputs_of_its_map_and_a_bridge_that_opens() -> None:
         node_of(SignalMap.load("engine"), faults=["offset:sensor=1"])
     with pytest.raises(ParameterError, match="did you mean 'from_s'"):
         node_of(ETB, faults=["jammed:form_s=1"])
+    with pytest.raises(ParameterError, match=r"with keys from_s, until_s, size, sensor$"):
+        node_of(ETB, faults=["jammed:x=1"])
+    with pytest.raises(ParameterError, match=r"fault offset: sensor = 'left': must be a number"):
+        node_of(ETB, faults=["offset:sensor=left"])
 
 
 def test_faults_of_the_plant_reach_the_host() -> None:
