@@ -209,6 +209,9 @@ def test_files_that_are_not_there(foreign: Path) -> None:
     foreign.write_text("kind = [", encoding="utf-8")
     with pytest.raises(DataError, match="not valid TOML"):
         SignalMap.load(foreign)
+    foreign.write_bytes('kind = "Träger"'.encode("latin-1"))
+    with pytest.raises(DataError, match="not a UTF-8 text file"):
+        SignalMap.load(foreign)
 
 
 def test_goals_are_values_that_are_measured() -> None:

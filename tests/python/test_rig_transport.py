@@ -13,10 +13,9 @@ from typing import Any
 import pytest
 
 from hub_thread import bus_of, running_hub
-from mgdd._core.rig import Frame
+from mgdd._core.rig import Frame, error_classes
 from mgdd.errors import ParameterError, RigError
 from mgdd.rig import CanTransport
-from mgdd.rig.can.frame import error_classes
 from mgdd.rig.can.hub_faults import BusFault, FaultInjector
 
 can = pytest.importorskip("can", reason="the extra `can` is not installed")

@@ -2,12 +2,14 @@
 #include <algorithm>
 #include <cstdint>
 #include <string>
+#include <string_view>
 #include <tuple>
 #include <vector>
 
 #include "binding.hpp"
 #include "keywords.hpp"
 #include "mgdd/common/bounds.hpp"
+#include "mgdd/rig/bus_monitor.hpp"
 #include "mgdd/rig/frame.hpp"
 #include "rig/payload.hpp"
 #include "rig/rig_binding.hpp"
@@ -74,6 +76,26 @@ b'\x00\x00\x00'
                  plain("monotonic_ns", &F::monotonic_ns, "When received or handed to the bus [ns]."),
                  plain("bus_ns", &F::bus_ns, "Stamp of the driver [ns]; 0: none.")},
       &check);
+  m.def(
+      "error_classes",
+      [](const Frame& frame) {
+        const std::vector<std::string_view> names = error_classes(frame);
+        return std::vector<std::string>(names.begin(), names.end());
+      },
+      py::arg("frame"), R"(Name what an error frame reports, as Linux defines its bits.
+
+Parameters
+----------
+frame : Frame
+    An error frame.
+
+Returns
+-------
+list of str
+    ``"transmit_timeout"``, ``"lost_arbitration"``, ``"controller"``, ``"protocol"``, ``"transceiver"``,
+    ``"no_acknowledgement"``, ``"bus_off"``, ``"bus_error"``, ``"restarted"``; ``"error_passive"`` last where the data of a
+    controller error say so; ``"unknown"`` where no bit is known.
+)");
 }
 
 }  // namespace mgdd::bindings

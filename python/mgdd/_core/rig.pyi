@@ -7,7 +7,7 @@ import numpy
 import numpy.typing
 import typing
 import typing_extensions
-__all__: list[str] = ['Drive', 'E2eCheck', 'E2eSettings', 'Frame', 'RealtimeLoop', 'RecordReader', 'RecordWriter', 'RingTransport', 'SafetyEnvelope', 'SafetyGate', 'SignalLayout', 'SocketCanTransport', 'bus_states', 'check_message', 'commanded_names', 'crc8', 'measured_names', 'protect', 'read_record', 'repair_record', 'safety_reasons', 'safety_requests', 'safety_states', 'send_results']
+__all__: list[str] = ['Drive', 'E2eCheck', 'E2eSettings', 'Frame', 'RealtimeLoop', 'RecordReader', 'RecordWriter', 'RingTransport', 'SafetyEnvelope', 'SafetyGate', 'SignalLayout', 'SocketCanTransport', 'bus_states', 'check_message', 'commanded_names', 'crc8', 'error_classes', 'measured_names', 'protect', 'read_record', 'repair_record', 'safety_reasons', 'safety_requests', 'safety_states', 'send_results']
 class E2eSettings:
     """
     End-to-end protection of a CAN payload: an alive counter and a CRC-8.
@@ -1082,6 +1082,22 @@ def check_message(signals: collections.abc.Mapping[str, SignalLayout], size: typ
 def crc8(data: bytes, crc: str | tuple[typing.SupportsInt | typing.SupportsIndex, typing.SupportsInt | typing.SupportsIndex, typing.SupportsInt | typing.SupportsIndex] = 'sae_j1850') -> int:
     """
     CRC-8 by name, or of (polynomial, start, final xor).
+    """
+def error_classes(frame: Frame) -> list[str]:
+    """
+    Name what an error frame reports, as Linux defines its bits.
+    
+    Parameters
+    ----------
+    frame : Frame
+        An error frame.
+    
+    Returns
+    -------
+    list of str
+        ``"transmit_timeout"``, ``"lost_arbitration"``, ``"controller"``, ``"protocol"``, ``"transceiver"``,
+        ``"no_acknowledgement"``, ``"bus_off"``, ``"bus_error"``, ``"restarted"``; ``"error_passive"`` last where the data of a
+        controller error say so; ``"unknown"`` where no bit is known.
     """
 def protect(settings: E2eSettings, counter: typing.SupportsInt | typing.SupportsIndex, payload: typing_extensions.Buffer) -> bytes:
     """

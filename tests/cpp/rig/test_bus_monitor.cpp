@@ -4,6 +4,8 @@
 #include <gtest/gtest.h>
 
 #include <cstdint>
+#include <string_view>
+#include <vector>
 
 namespace mgdd::rig {
 namespace {
@@ -54,6 +56,30 @@ TEST(BusMonitor, CountsTheRestAndLeavesTheStateAlone) {
   EXPECT_EQ(monitor.state(), BusState::active);
   EXPECT_EQ(monitor.counts().other.get(), 6u);
   EXPECT_EQ(monitor.counts().overflow.get(), 2u);
+}
+
+TEST(ErrorClasses, NameEveryBitOfTheFrame) {
+  using Names = std::vector<std::string_view>;
+  EXPECT_EQ(error_classes(error(0x001)), Names{"transmit_timeout"});
+  EXPECT_EQ(error_classes(error(0x010)), Names{"transceiver"});
+  EXPECT_EQ(error_classes(error(0x1A2)), (Names{"lost_arbitration", "no_acknowledgement", "bus_error", "restarted"}));
+  EXPECT_EQ(error_classes(error(0x04C)), (Names{"controller", "protocol", "bus_off"}));
+  EXPECT_EQ(error_classes(error(0x200)), Names{"unknown"});
+}
+
+// Whether a controller is passive stands in its data, and there alone.
+TEST(ErrorClasses, AgreeWithTheMonitorOnAPassiveController) {
+  for (unsigned flags = 0; flags < 256; ++flags) {
+    BusMonitor monitor;
+    monitor.push(error(0x004, static_cast<std::uint8_t>(flags)));
+    const auto names = error_classes(error(0x004, static_cast<std::uint8_t>(flags)));
+    EXPECT_EQ(names.front(), "controller");
+    EXPECT_EQ(names.back() == "error_passive", monitor.state() == BusState::passive) << flags;
+  }
+  Frame empty = error(0x004, 0x10);
+  empty.size = 1;
+  EXPECT_EQ(error_classes(empty), std::vector<std::string_view>{"controller"});
+  EXPECT_EQ(error_classes(error(0x008, 0x10)), std::vector<std::string_view>{"protocol"});
 }
 
 TEST(BusMonitor, IgnoresFramesOfSendersAndBrokenOnes) {

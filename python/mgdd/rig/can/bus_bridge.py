@@ -9,8 +9,9 @@ import weakref
 from types import TracebackType
 from typing import TYPE_CHECKING, Any, Self
 
-from mgdd._core.rig import Frame, RingTransport
+from mgdd._core.rig import RingTransport
 from mgdd.errors import RigError
+from mgdd.rig.can.messages import frame_of, message_of
 
 if TYPE_CHECKING:
     import can
@@ -62,12 +63,11 @@ class BusBridge:
 
     def __init__(self, bus: can.BusABC, transport: RingTransport) -> None:
         try:
-            import can
+            import can  # noqa: F401
         except ImportError:
             raise RigError('python-can is not installed: pip install "mgdd[can]"') from None
         self._bus = bus
         self._transport = transport
-        self._message = can.Message
         self._stop = threading.Event()
         self.error: BaseException | None = None
         self.send_errors = 0
@@ -105,21 +105,7 @@ class BusBridge:
             message = self._bus.recv(_LOOK_S)
             if message is None:
                 continue
-            stamp = time.monotonic_ns()
-            self._transport.feed(
-                Frame(
-                    id=message.arbitration_id,
-                    data=bytes(message.data),
-                    extended=message.is_extended_id and not message.is_error_frame,
-                    error=message.is_error_frame,
-                    received=True,
-                    fd=message.is_fd,
-                    bit_rate_switch=message.bitrate_switch,
-                    remote=message.is_remote_frame,
-                    monotonic_ns=stamp,
-                    bus_ns=round(message.timestamp * 1e9),
-                )
-            )
+            self._transport.feed(frame_of(message, monotonic_ns=time.monotonic_ns(), received=True))
 
     def _send(self) -> None:
         in_a_row = 0
@@ -127,17 +113,8 @@ class BusBridge:
             frame = self._transport.take(_LOOK_S)
             if frame is None:
                 continue
-            message = self._message(
-                arbitration_id=frame.id,
-                data=frame.data,
-                is_extended_id=frame.extended,
-                is_remote_frame=frame.remote,
-                is_fd=frame.fd,
-                bitrate_switch=frame.bit_rate_switch,
-                check=True,
-            )
             try:
-                self._bus.send(message)
+                self._bus.send(message_of(frame))
                 in_a_row = 0
             except Exception:
                 self.send_errors += 1

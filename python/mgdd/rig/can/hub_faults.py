@@ -6,9 +6,10 @@ import math
 import random
 from collections.abc import Sequence
 from dataclasses import dataclass
-from typing import Any, NamedTuple, Self
+from typing import NamedTuple, Self
 
-from mgdd.errors import ParameterError, did_you_mean
+from mgdd.errors import ParameterError
+from mgdd.rig.can.fault_text import fault_of
 
 __all__ = ["BusFault", "Delivery", "FaultInjector"]
 
@@ -89,17 +90,7 @@ class BusFault:
         >>> BusFault.parse("delay:ms=5,id=0x121").id
         289
         """
-        kind, _, rest = text.partition(":")
-        given: dict[str, Any] = {}
-        for part in filter(None, rest.split(",")):
-            key, _, value = part.partition("=")
-            if key not in _KEYS:
-                guess = did_you_mean(key, _KEYS)
-                raise ParameterError.of("fault", text, f"KIND:KEY=VALUE,... with keys {', '.join(_KEYS)}; {guess}")
-            try:
-                given[key] = int(value, 0) if _KEYS[key] is int else float(value)
-            except ValueError:
-                raise ParameterError.of(f"fault {kind}: {key}", value, "a number") from None
+        kind, given = fault_of(text, _KEYS)
         needed = _NEEDS.get(kind)
         if needed is not None and needed not in given:
             raise ParameterError.of("fault", text, f"given {needed}, for example {kind}:{needed}=1")

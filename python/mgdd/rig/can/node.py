@@ -10,8 +10,9 @@ from pathlib import Path
 from types import TracebackType
 from typing import IO, Any, Self
 
-from mgdd.errors import ParameterError, did_you_mean
+from mgdd.errors import ParameterError
 from mgdd.loop import EngineBench, ThrottleFault, VirtualThrottle
+from mgdd.rig.can.fault_text import fault_of
 from mgdd.rig.can.frame import Bus
 from mgdd.rig.can.node_core import NodeCore, NodePlant, node_plant
 from mgdd.rig.can.signal_map import SignalMap
@@ -21,7 +22,7 @@ __all__ = ["TruthLog", "node_of", "parent_watch", "run_node"]
 
 _STEP_POLL_S = 0.1  # how often a waiting node looks for its parent
 _MOST_BEHIND_S = 1.0
-_FAULT_KEYS = ("from_s", "until_s", "size", "sensor")
+_FAULT_KEYS = {"from_s": float, "until_s": float, "size": float, "sensor": int}
 
 
 class TruthLog:
@@ -108,7 +109,7 @@ def node_of(
     """
     names = signal_map.input_names
     if "duty" in names:
-        known = [_fault_of(text) for text in faults]
+        known = [_plant_fault(text) for text in faults]
         plant = VirtualThrottle(
             inputs=(*names, "bridge_open"),
             faults=known,
@@ -203,16 +204,6 @@ def parent_watch() -> Callable[[], bool]:
     return lambda: os.getppid() == parent
 
 
-def _fault_of(text: str) -> ThrottleFault | SensorFault:
-    kind, _, rest = text.partition(":")
-    given: dict[str, Any] = {}
-    for part in filter(None, rest.split(",")):
-        key, _, value = part.partition("=")
-        if key not in _FAULT_KEYS:
-            guess = did_you_mean(key, _FAULT_KEYS)
-            raise ParameterError.of("fault", text, f"KIND:KEY=VALUE,... with keys {', '.join(_FAULT_KEYS)}; {guess}")
-        try:
-            given[key] = int(value) if key == "sensor" else float(value)
-        except ValueError:
-            raise ParameterError.of(f"fault {kind}: {key}", value, "a number") from None
+def _plant_fault(text: str) -> ThrottleFault | SensorFault:
+    kind, given = fault_of(text, _FAULT_KEYS)
     return SensorFault(kind=kind, **given) if "sensor" in given else ThrottleFault(kind=kind, **given)

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import signal
 import threading
-from collections.abc import Iterator
+from collections.abc import Iterator, Mapping
 from contextlib import contextmanager
 from types import FrameType
 from typing import Any
@@ -27,17 +27,12 @@ class SignalsAsExceptions:
         """Raise KeyboardInterrupt at SIGINT and SystemExit at SIGTERM."""
         if threading.current_thread() is not threading.main_thread() or self._before:
             return
-        for number in _CAUGHT:
-            self._before[number] = signal.getsignal(number)
-        signal.signal(signal.SIGINT, signal.default_int_handler)
-        signal.signal(signal.SIGTERM, _leave)
+        self._before = _install({signal.SIGINT: signal.default_int_handler, signal.SIGTERM: _leave})
 
     def restore(self) -> None:
         """Put back what was there."""
         before, self._before = self._before, {}
-        for number, handler in before.items():
-            if handler is not None:  # one that was not installed from Python cannot be put back
-                signal.signal(number, handler)
+        _restore(before)
 
 
 @contextmanager
@@ -54,11 +49,24 @@ def undisturbed() -> Iterator[None]:
 def noted_signals() -> Iterator[list[int]]:
     """Note both signals in a list, for a loop that looks whether it goes on."""
     noted: list[int] = []
-    before = {number: signal.signal(number, lambda got, _: noted.append(got)) for number in _CAUGHT}
+    before = _install(dict.fromkeys(_CAUGHT, lambda got, _: noted.append(got)))
     try:
         yield noted
     finally:
-        for number, handler in before.items():
+        _restore(before)
+
+
+def _install(handlers: Mapping[signal.Signals, Any]) -> dict[int, Any]:
+    """Install handlers and give those that were there."""
+    before = {int(number): signal.getsignal(number) for number in handlers}
+    for number, handler in handlers.items():
+        signal.signal(number, handler)
+    return before
+
+
+def _restore(before: Mapping[int, Any]) -> None:
+    for number, handler in before.items():
+        if handler is not None:  # one that was not installed from Python cannot be put back
             signal.signal(number, handler)
 
 

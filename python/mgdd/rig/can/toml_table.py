@@ -2,14 +2,13 @@
 
 from __future__ import annotations
 
-import tomllib
 from collections.abc import Collection, Mapping
 from pathlib import Path
 from typing import Any
 
 from mgdd.errors import DataError, ParameterError, did_you_mean
-from mgdd.io.existing_file import existing_file
 from mgdd.io.parameter_entries import FORMS, Form, fits
+from mgdd.io.toml_text import text_of, toml_of
 
 __all__ = ["TomlTable"]
 
@@ -34,11 +33,8 @@ class TomlTable:
     @classmethod
     def read(cls, file: Path) -> TomlTable:
         """Read a file; DataError where it is not TOML."""
-        try:
-            values = tomllib.loads(existing_file(file).read_text(encoding="utf-8"))
-        except (tomllib.TOMLDecodeError, UnicodeDecodeError) as error:
-            raise DataError(f"{file}: not valid TOML: {error}") from error
-        return cls(values, origin=str(file))
+        text, origin = text_of(file)
+        return cls(toml_of(text, origin), origin=origin)
 
     def key(self, name: str) -> str:
         """Give a key with its table in front."""

@@ -13,10 +13,9 @@ from types import MappingProxyType
 from typing import Any, Self
 from urllib.parse import parse_qsl
 
-from mgdd._core.rig import Frame
+from mgdd._core.rig import Frame, error_classes
 from mgdd.errors import ParameterError, RigError
 from mgdd.rig.can.connect import connected, error_code
-from mgdd.rig.can.frame import error_classes
 from mgdd.rig.can.messages import frame_of, message_of
 from mgdd.rig.extras import import_extra
 

@@ -3,14 +3,13 @@
 from __future__ import annotations
 
 import os
-import tomllib
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass, field, replace
 from pathlib import Path
 from typing import Any, Self
 
-from mgdd.errors import DataError, ParameterError
-from mgdd.io.existing_file import existing_file
+from mgdd.errors import ParameterError
+from mgdd.io.toml_text import text_of, toml_of
 from mgdd.results.describe import described
 from mgdd.rig.can.toml_table import TomlTable
 from mgdd.rig.experiment.settings import (
@@ -118,20 +117,13 @@ class Experiment:
         mgdd.errors.ParameterError
             An unknown key, a value of another form or outside its range.
         """
-        file = existing_file(path)
-        try:
-            text = file.read_text(encoding="utf-8")
-        except UnicodeDecodeError as error:
-            raise DataError(f"{file}: not a UTF-8 text file: {error}") from error
-        return cls.from_toml(text, origin=str(file))
+        text, origin = text_of(path)
+        return cls.from_toml(text, origin=origin)
 
     @classmethod
     def from_toml(cls, text: str, *, origin: str = "experiment") -> Self:
         """Read the text of an experiment file; errors as those of `load`."""
-        try:
-            table = TomlTable(tomllib.loads(text), origin=origin)
-        except tomllib.TOMLDecodeError as error:
-            raise DataError(f"{origin}: not valid TOML: {error}") from error
+        table = TomlTable(toml_of(text, origin), origin=origin)
         kind, version = table.take("kind", "text"), table.take("format", "integer")
         if kind != _KIND:
             raise table.error("kind", kind, repr(_KIND))
