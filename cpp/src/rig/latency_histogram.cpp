@@ -1,7 +1,6 @@
 #include "mgdd/rig/latency_histogram.hpp"
 
 #include <algorithm>
-#include <cmath>
 #include <limits>
 
 namespace mgdd::rig {
@@ -41,13 +40,6 @@ void LatencyHistogram::add(std::int64_t time_ns) noexcept {
   max_.set(std::max(max_.get(), static_cast<std::uint64_t>(time_ns)));
 }
 
-void LatencyHistogram::merge(const LatencyHistogram& other) noexcept {
-  for (std::size_t i = 0; i < n_bins; ++i)
-    bins_[i].add(other.bins_[i].get());
-  sum_.add(other.sum_.get());
-  max_.set(std::max(max_.get(), other.max_.get()));
-}
-
 std::array<std::uint64_t, LatencyHistogram::n_bins> LatencyHistogram::counts() const noexcept {
   std::array<std::uint64_t, n_bins> out{};
   std::transform(bins_.begin(), bins_.end(), out.begin(), [](const SharedCount& bin) { return bin.get(); });
@@ -72,7 +64,7 @@ std::int64_t LatencyHistogram::quantile_ns(double q) const noexcept {
   for (const std::uint64_t bin : now)
     n += bin;
   if (n == 0) return 0;
-  const double wanted = std::ceil(std::clamp(q, 0.0, 1.0) * static_cast<double>(n));
+  const double wanted = std::clamp(q, 0.0, 1.0) * static_cast<double>(n);
   std::uint64_t below = 0;
   std::size_t bin = 0;
   for (; bin + 1 < n_bins; ++bin) {

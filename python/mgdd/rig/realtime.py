@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import time
 import weakref
 from collections.abc import Sequence
 from types import TracebackType
@@ -13,6 +12,7 @@ import numpy as np
 from mgdd import _core
 from mgdd._core.rig import RingTransport, SocketCanTransport
 from mgdd.errors import ParameterError, RigError
+from mgdd.rig.gate_requests import GateRequests
 from mgdd.rig.loop_message import LoopMessage
 from mgdd.rig.loop_samples import samples_dataset, summary
 from mgdd.rig.safety import SafetyChange
@@ -24,10 +24,8 @@ if TYPE_CHECKING:
 
 __all__ = ["RealtimeLoop"]
 
-_PAUSE_S = 0.002
 
-
-class RealtimeLoop:
+class RealtimeLoop(GateRequests):
     """A throttle controller over a bus, in a thread of the core with absolute deadlines.
 
     Every period the loop takes the frames that arrived, judges them, steps the controller, passes its duty through a
@@ -150,6 +148,7 @@ class RealtimeLoop:
             sample_capacity=sample_capacity,
             queue_capacity=queue_capacity,
         )
+        super().__init__(self._core, self.envelope.cycle_s)
         self._origin_ns: int | None = None
         # Also at the end of the interpreter: a thread of the core must not outlive it.
         self._end = weakref.finalize(self, self._core.stop, self._core.patience_s)
@@ -215,7 +214,7 @@ class RealtimeLoop:
     ) -> None:
         self.stop()
 
-    # --- references and requests ------------------------------------------------------------------------------
+    # --- references -------------------------------------------------------------------------------------------
 
     def set_reference(self, reference_deg: float) -> None:
         """Set the reference from the next cycle on; the latest one wins.
@@ -254,113 +253,7 @@ class RealtimeLoop:
         """References that wait for their cycle."""
         return int(self._core.queued_references)
 
-    def arm(self, timeout_s: float = 2.0) -> None:
-        """Ask the gate for the mode ``armed``, until enough good frames have come.
-
-        Parameters
-        ----------
-        timeout_s : float
-            How long to ask [s].
-
-        Raises
-        ------
-        mgdd.errors.RigError
-            The gate refuses, with what is wrong; or the loop does not run.
-        """
-        self._ask("arm", "armed", timeout_s)
-
-    def drive(self, timeout_s: float = 2.0) -> None:
-        """Ask the gate for the mode ``run``: the actuator is driven from now on.
-
-        Parameters
-        ----------
-        timeout_s : float
-            How long to ask [s].
-
-        Raises
-        ------
-        mgdd.errors.RigError
-            The gate refuses, with what is wrong; or the loop does not run.
-        """
-        self._ask("run", "run", timeout_s)
-
-    def release(self, timeout_s: float = 2.0) -> None:
-        """Open the bridge, back to the mode ``armed``.
-
-        Parameters
-        ----------
-        timeout_s : float
-            How long to ask [s].
-
-        Raises
-        ------
-        mgdd.errors.RigError
-            The loop does not run, or was not driving.
-        """
-        self._ask("stop", "armed", timeout_s)
-
-    def reset(self, timeout_s: float = 2.0) -> None:
-        """Leave ``limp`` for ``armed``, or ``fault`` for ``init``, once nothing is wrong any more.
-
-        Parameters
-        ----------
-        timeout_s : float
-            How long to ask [s].
-
-        Raises
-        ------
-        mgdd.errors.RigError
-            The gate refuses, with what is wrong; or the loop does not run.
-        """
-        self._ask("reset", "init" if self.mode == "fault" else "armed", timeout_s)
-
-    def abort(self) -> None:
-        """Open the bridge at the next cycle, whatever the mode; a reset leads out of it.
-
-        Raises
-        ------
-        mgdd.errors.RigError
-            The loop does not run.
-        """
-        self._require_running()
-        while not self._core.request("abort"):
-            time.sleep(_PAUSE_S)
-
-    def _ask(self, request: str, wanted: str, timeout_s: float) -> None:
-        until = time.monotonic() + timeout_s
-        while self.mode != wanted:
-            self._require_running()
-            if time.monotonic() > until:
-                why = self.cause if self.cause != "none" else f"too few good frames, or the wrong mode, {self.mode}"
-                raise RigError(f"no {request!r} within {timeout_s:g} s: {why}")
-            self._core.request(request)
-            time.sleep(max(_PAUSE_S, 2.0 * self.envelope.cycle_s))
-
-    def _require_running(self) -> None:
-        if not self._core.running:
-            raise RigError("the loop does not run: start() it; one that was stopped is made anew")
-
     # --- what it does -----------------------------------------------------------------------------------------
-
-    @property
-    def running(self) -> bool:
-        """Whether the thread runs."""
-        return bool(self._core.running)
-
-    @property
-    def mode(self) -> str:
-        """Mode of the safety gate: ``init``, ``armed``, ``run``, ``limp`` or ``fault``."""
-        return str(self._core.state)
-
-    @property
-    def reason(self) -> str:
-        """Why that mode was entered."""
-        return str(self._core.reason)
-
-    @property
-    def cause(self) -> str:
-        """What is wrong now; ``none`` where nothing is."""
-        return str(self._core.cause)
 
     @property
     def bus_state(self) -> str:

@@ -6,10 +6,12 @@
 
 #include <cmath>
 #include <cstdint>
+#include <memory>
 #include <string>
 #include <vector>
 
 #include "mgdd/common/error.hpp"
+#include "mgdd/rig/monotonic_clock.hpp"
 #include "support/no_alloc.hpp"
 #include "support/throttle_on_bus.hpp"
 
@@ -27,16 +29,17 @@ struct Rig {
                const SafetyEnvelope& envelope = bus_envelope())
       : cycle(settings, node.bus, controller, FrameCodec(bus_messages()), SafetyGate(envelope)) {}
 
-  /// One turn, which ends as told; the node answers 0.2 ms later unless it is silent.
-  bool turn(std::int64_t skipped = 0, bool stopping = false) {
+  /// One turn; grid points before it were skipped, and the turn before took too long by so many. The node answers
+  /// 0.2 ms later unless it is silent.
+  bool turn(std::int64_t skipped = 0, bool stopping = false, std::int64_t late = 0) {
     number += 1 + skipped;
     const std::int64_t deadline = start + number * period;
     const bool more = cycle.turn({.number = number,
                                   .deadline_ns = deadline,
                                   .woken_ns = deadline + 30'000,
-                                  .missed = skipped,
+                                  .missed = skipped + late,
                                   .skipped = skipped,
-                                  .missed_in_row = skipped,
+                                  .missed_in_row = skipped + late,
                                   .stopping = stopping});
     commanded = node.take_commands();
     node.run_plant();
@@ -151,6 +154,7 @@ TEST(ControlCycle, SilenceOfTheNodeOpensTheBridge) {
   rig.turns(8);
   EXPECT_EQ(rig.cycle.state(), SafetyState::limp);
   EXPECT_EQ(rig.cycle.reason(), SafetyReason::stale);
+  EXPECT_EQ(rig.cycle.cause(), SafetyReason::stale);
   EXPECT_TRUE(rig.commanded && rig.open());
   rig.turns(600);
   EXPECT_NEAR(rig.node.last.angle_deg, rig.node.throttle.settings().start_deg, 1.0);
@@ -168,7 +172,8 @@ TEST(ControlCycle, ThreeMissedDeadlinesInARowOpenTheBridgeAndTwoDoNot) {
   EXPECT_EQ(rig.sample.missed, 2);
   rig.turns(5);
   EXPECT_EQ(rig.cycle.state(), SafetyState::run);
-  rig.turn(3);
+  rig.turn(2, false, 1);  // the third one took too long
+  EXPECT_EQ(rig.sample.missed, 3);
   EXPECT_EQ(rig.cycle.state(), SafetyState::limp);
   EXPECT_TRUE(rig.open());
 }
@@ -219,8 +224,72 @@ TEST(ControlCycle, AReferenceThatIsNotRenewedAborts) {
   EXPECT_EQ(rig.cycle.counts().reference_timeouts.get(), 1u);
 }
 
+// Turns of a second before now, so that what is set now lies ahead of all of them.
+TEST(ControlCycle, AReferenceThatIsRenewedKeepsItDriven) {
+  Rig rig({.initial_reference_deg = 40.0, .reference_timeout_s = 0.05});
+  rig.number = (monotonic_ns() - start) / period - 1000;
+  rig.drive();
+  rig.turns(45);
+  rig.cycle.set_reference(41.0);
+  rig.turns(200);
+  EXPECT_EQ(rig.cycle.state(), SafetyState::run);
+  EXPECT_EQ(rig.cycle.counts().reference_timeouts.get(), 0u);
+}
+
+TEST(ControlCycle, QueuedReferencesCountAsRenewed) {
+  Rig rig({.initial_reference_deg = 40.0, .reference_timeout_s = 0.05});
+  rig.cycle.queue_references(std::vector<double>(100, 41.0));
+  rig.drive();
+  rig.turns(145);
+  EXPECT_EQ(rig.cycle.state(), SafetyState::run);
+  rig.turns(10);
+  EXPECT_EQ(rig.cycle.reason(), SafetyReason::aborted);
+}
+
+TEST(ControlCycle, OnlyAFrameWithTheAngleIsFresh) {
+  Rig rig({.initial_reference_deg = 40.0});
+  rig.drive();
+  rig.answers = false;
+  rig.turn();
+  const std::uint64_t fresh = rig.cycle.counts().fresh.get(), good = rig.cycle.counts().good_frames.get();
+  rig.node.bus->feed(rig.node.sensors(start + rig.number * period));
+  rig.turn();
+  EXPECT_FALSE(rig.sample.fresh);
+  EXPECT_EQ(rig.cycle.counts().fresh.get(), fresh);
+  EXPECT_EQ(rig.cycle.counts().good_frames.get(), good + 1);
+}
+
+TEST(ControlCycle, AFrameThatCameAfterWakingIsOfAgeZero) {
+  Rig rig;
+  rig.turns(12);
+  rig.answers = false;
+  rig.turn();
+  rig.node.answer(start + (rig.number + 1) * period + 40'000);
+  rig.turn();
+  EXPECT_TRUE(rig.sample.fresh);
+  EXPECT_EQ(rig.sample.age_ns, 0);
+}
+
+TEST(ControlCycle, ASenderWithoutEndDoesNotHoldTheLoop) {
+  const auto bus = std::make_shared<RingTransport>(8192, 16);
+  ControlCycle cycle({}, bus, control::Pid({}), FrameCodec(bus_messages()), SafetyGate(bus_envelope()));
+  for (int i = 0; i < 8192; ++i)
+    bus->feed({.id = 0x7FF, .size = 1});
+  std::size_t before = 8192;
+  for (int i = 0; before > 0; ++i) {
+    ASSERT_LT(i, 100);
+    cycle.turn({.number = i, .deadline_ns = start + i * period, .woken_ns = start + i * period});
+    ASSERT_LT(bus->waiting_for_loop(), before);
+    EXPECT_TRUE(i > 0 || bus->waiting_for_loop() > 0);
+    before = bus->waiting_for_loop();
+  }
+  EXPECT_EQ(cycle.counts().foreign_frames.get(), 8192u);
+}
+
 TEST(ControlCycle, QueuedReferencesAreTakenOnePerGridPoint) {
-  Rig rig({.initial_reference_deg = 12.0, .queue_capacity = 8});
+  SafetyEnvelope envelope = bus_envelope();
+  envelope.missed_deadlines = 100.0;
+  Rig rig({.initial_reference_deg = 12.0, .queue_capacity = 8}, control::Pid({}), envelope);
   EXPECT_THROW(rig.cycle.queue_references(std::vector<double>(9, 1.0)), RigError);
   EXPECT_THROW(rig.cycle.queue_references(std::vector<double>{1.0, NAN}), ParameterError);
   EXPECT_EQ(rig.cycle.queued_references(), 0u);
@@ -230,7 +299,7 @@ TEST(ControlCycle, QueuedReferencesAreTakenOnePerGridPoint) {
   rig.drive();
   std::vector<double> seen{rig.sample.reference_deg};
   for (const std::int64_t skipped : {0, 0, 2, 0, 0, 0}) {
-    rig.turn(skipped);
+    rig.turn(skipped, false, 1);  // one that only took too long has had its reference
     seen.push_back(rig.sample.reference_deg);
   }
   EXPECT_EQ(seen, (std::vector{12.0, 13.0, 14.0, 17.0, 18.0, 18.0, 18.0}));

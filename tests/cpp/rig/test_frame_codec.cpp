@@ -58,6 +58,9 @@ TEST(FrameCodec, BadFramesChangeNothing) {
   Frame shorter = node.sensors(now + 1);
   shorter.size = 5;
   EXPECT_EQ(codec.read(shorter, m), FrameVerdict::bad);
+  Frame longer = node.sensors(now + 1);
+  longer.size = 8;
+  EXPECT_EQ(codec.read(longer, m), FrameVerdict::bad);
   const Frame again = node.status(now + 1);
   EXPECT_EQ(codec.read(again, m), FrameVerdict::good);
   m = before;
@@ -85,8 +88,12 @@ TEST(FrameCodec, ANumberThatIsNoneMakesItsFrameBad) {
   EXPECT_EQ(codec.read(frame, m), FrameVerdict::good);
   frame.data[7] = 0x7F;
   frame.data[6] = 0xC0;  // NaN
+  frame.data[3] = 0x40;  // 2
+  frame.monotonic_ns = now + 9;
   EXPECT_EQ(codec.read(frame, m), FrameVerdict::bad);
+  EXPECT_EQ(m.of(Measured::first_v), 0.0);
   EXPECT_EQ(m.of(Measured::second_v), 0.0);
+  EXPECT_EQ(m.stamp_ns[static_cast<std::size_t>(Measured::first_v)], now);
 }
 
 TEST(FrameCodec, WritesProtectedCommands) {
@@ -142,6 +149,35 @@ TEST(FrameCodec, ACommandMayHaveSeveralFixedNumbers) {
   Frame frame;
   ASSERT_TRUE(codec.write({}, 0.0, frame));
   EXPECT_EQ(frame.data[7], 200);
+}
+
+TEST(FrameCodec, ACommandMayBeLongAndExtended) {
+  FrameCodecSettings s = bus_messages();
+  s.command = {.id = 0x120, .extended = true, .size = 12, .signals = {{Commanded::duty, intel(80, 16, 0.00005, true)}}};
+  FrameCodec codec(s);
+  Frame frame;
+  ASSERT_TRUE(codec.write({.duty = -0.25}, 0.0, frame));
+  EXPECT_EQ(frame.id, 0x120u);
+  EXPECT_TRUE(frame.extended);
+  EXPECT_TRUE(frame.fd);
+  EXPECT_EQ(frame.size, 12);
+  EXPECT_EQ(frame.data[10] | frame.data[11] << 8, 0x10000 - 5000);
+  s.command.size = 8;
+  s.command.signals[0].layout.start = 48;
+  ASSERT_TRUE(FrameCodec(s).write({}, 0.0, frame));
+  EXPECT_FALSE(frame.fd);
+}
+
+TEST(FrameCodec, OneNumberMayNameAShortAndALongIdentifier) {
+  FrameCodecSettings s = bus_messages();
+  s.received[1].id = 0x121;
+  FrameCodec codec(s);
+  ThrottleOnBus node;
+  Measurements m;
+  Frame sensors = node.sensors(now);
+  sensors.id = 0x121;
+  EXPECT_EQ(codec.read(sensors, m), FrameVerdict::good);
+  EXPECT_EQ(codec.read(node.status(now), m), FrameVerdict::waiting);
 }
 
 TEST(FrameCodec, AllocatesNothing) {

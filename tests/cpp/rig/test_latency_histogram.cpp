@@ -1,4 +1,4 @@
-// The histogram of times: quantiles that never understate, an exact largest time, merging, and reading while adding.
+// The histogram of times: quantiles that never understate, an exact largest time, and reading while adding.
 #include "mgdd/rig/latency_histogram.hpp"
 
 #include <gtest/gtest.h>
@@ -76,18 +76,6 @@ TEST(LatencyHistogram, AQuantileOfOneTimeIsThatTime) {
   LatencyHistogram other;
   other.add(9'000'000'000);
   EXPECT_EQ(other.quantile_ns(0.0), 9'000'000'000);
-}
-
-TEST(LatencyHistogram, MergingIsAddingEverything) {
-  LatencyHistogram all, first, second;
-  for (std::int64_t t = 50; t < 20'000'000; t = t * 3 / 2) {
-    all.add(t);
-    (t % 2 == 0 ? first : second).add(t);
-  }
-  first.merge(second);
-  EXPECT_EQ(first.counts(), all.counts());
-  EXPECT_EQ(first.max_ns(), all.max_ns());
-  EXPECT_EQ(first.mean_ns(), all.mean_ns());
 }
 
 TEST(LatencyHistogram, CanBeCopiedWhileAnotherThreadAdds) {

@@ -40,7 +40,9 @@ TEST(RingTransport, FramesPassBothWaysWithTheirStamps) {
   EXPECT_LE(got.monotonic_ns, before);
   EXPECT_FALSE(bus.receive(got));
 
-  EXPECT_EQ(bus.send(numbered(0x120, 1)), SendResult::sent);
+  Frame command = numbered(0x120, 1);
+  command.received = true;
+  EXPECT_EQ(bus.send(command), SendResult::sent);
   EXPECT_EQ(bus.waiting_to_send(), 1u);
   ASSERT_TRUE(bus.take(got));
   EXPECT_EQ(got.id, 0x120u);
@@ -81,10 +83,13 @@ TEST(RingTransport, ErrorFramesAndADeadBusShowInItsState) {
   ASSERT_TRUE(bus.receive(got));
   EXPECT_EQ(bus.bus_state(), BusState::active);
   EXPECT_EQ(bus.send(off), SendResult::failed);
+  Frame endless = numbered(1, 1);
+  endless.size = 65;
+  EXPECT_EQ(bus.send(endless), SendResult::failed);
   bus.fail();
   EXPECT_EQ(bus.bus_state(), BusState::off);
   EXPECT_EQ(bus.send(numbered(1, 1)), SendResult::failed);
-  EXPECT_EQ(bus.counts().failed.get(), 2u);
+  EXPECT_EQ(bus.counts().failed.get(), 3u);
 }
 
 TEST(RingTransport, TwoThreadsEchoEveryFrame) {

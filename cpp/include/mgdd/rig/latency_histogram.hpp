@@ -16,8 +16,6 @@ class LatencyHistogram {
 
   /// A negative time counts as none.
   void add(std::int64_t time_ns) noexcept;
-  /// As if everything that was added there had been added here.
-  void merge(const LatencyHistogram& other) noexcept;
 
   [[nodiscard]] std::uint64_t count() const noexcept;
   /// Exact; 0 of none.
