@@ -204,7 +204,7 @@ def test_where_the_bridge_cannot_be_opened_the_run_ends(shadow):
         plant.apply({"duty": 0.3})
         assert plant.measure().applied == {"duty": 0.0}
         return
-    with pytest.raises(RigError, match="the safety gate went to 'limp': requested"):
+    with pytest.raises(RigError, match="the safety gate went to 'limp': aborted"):
         plant.apply({"duty": 0.3})
     assert plant.measure().applied == {"duty": 0.3}, "a refused duty is not sent"
 
