@@ -12,10 +12,11 @@ import pytest
 from mgdd.errors import ParameterError
 from mgdd.identify import FirstPrincipleModel, identify_throttle, load_throttle_model
 from mgdd.identify.throttle.delay_report import with_delay
+from mgdd.identify.throttle.local_weights import Blocks, certainly_less
 from mgdd.io import throttle_log
 from mgdd.optimize import FitOptions, least_squares
 from mgdd.signals import amplitude_random_steps, chirp
-from mgdd.throttle import PseudoWiener
+from mgdd.throttle import PseudoWiener, Throttle, simulate
 
 sys.path.append(str(Path(__file__).parent / "support"))
 from throttle_bodies import draw_body, make_logs
@@ -60,6 +61,52 @@ def test_an_independent_throttle_is_followed_on_a_fresh_log(family: str, seed: i
     file = tmp_path / "fit.toml"
     file.write_text(fit.to_toml(), encoding="utf-8")
     assert load_throttle_model(file) == fit.model
+
+
+@pytest.mark.parametrize("seed", [4, 8])
+def test_intervals_hold_the_lag_and_what_few_samples_below_limp_home_show(seed: int) -> None:
+    body = draw_body("coulomb", seed)
+    train, _ = (throttle_log(*log) for log in make_logs(body, seed))
+    fit = identify_throttle(train, "first_principle", closed_deg=body.closed_deg, open_deg=body.open_deg)
+    intervals, truth = fit.report.interval(), body.groups()
+    for name in ("tau_s", "electrical_s", "gain_deg_per_s2_per_duty", "beta_below_duty", "kappa_below_duty_per_deg"):
+        assert intervals[name][0] <= truth[name] <= intervals[name][1], name
+    assert intervals["electrical_s"][1] < 1.15 * truth["electrical_s"]
+    # Told the share of the damping that is not back-EMF, the fit need not leave room for it.
+    emf = body.motor_nm_per_a**2 / body.resistance_ohm
+    assert fit.parameters["viscous_share"] == 0.25
+    assert fit.stderr["tau_s"] > 0.25 * abs(fit.parameters["tau_s"] - body.inertia_kgm2 / (body.viscous + emf))
+
+
+@pytest.mark.parametrize("seed", [1, 7])
+def test_where_the_model_misses_the_gap_the_delay_is_that_of_the_rest_of_the_log(seed: int) -> None:
+    body = draw_body("backlash", seed)
+    train, _ = (throttle_log(*log) for log in make_logs(body, seed))
+    fit = identify_throttle(train, closed_deg=body.closed_deg, open_deg=body.open_deg)
+    assert fit.kind == "first_principle"
+    assert fit.parameters["delay_samples"] == body.delay_samples
+    report, run = fit.report, fit.run
+    assert report.rmse == pytest.approx(float(np.sqrt(np.mean(report.residual**2))))
+    np.testing.assert_allclose(report.residual, run["residual_deg"], atol=0.05)
+
+
+def test_a_block_counts_by_its_error_and_has_no_vote_beyond_what_is_usual() -> None:
+    angle = np.repeat(np.arange(8.0), 50) + np.tile(np.linspace(0.0, 3.0, 50), 8)
+    residual = np.where(np.arange(400) % 2, 0.1, -0.1) * np.repeat([1.0, 1.0, 1.0, 4.0, 1.0, 1.0, 1.0, 1.1], 50)
+    blocks = Blocks(angle, 2e-3)
+    np.testing.assert_allclose(blocks.errors(residual), [0.1, 0.1, 0.1, 0.4, 0.1, 0.1, 0.1, 0.11])
+    weight = blocks.weights(residual, 0.01)
+    assert weight is not None
+    np.testing.assert_allclose(weight, np.repeat([1.0, 1.0, 1.0, 0.3125, 1.0, 1.0, 1.0, 1.0], 50))
+    assert blocks.weights(residual, 0.4) is None
+    assert blocks.losses(residual, 0.2)[3] == pytest.approx(0.04)
+    other = residual * np.repeat([1.5, 1.4, 1.5, 1.0, 1.6, 1.5, 1.5, 1.4], 50)
+    ours, theirs = blocks.losses(residual, 0.2), blocks.losses(other, 0.2)
+    assert certainly_less(ours, theirs)
+    assert not certainly_less(theirs, ours)
+    assert not certainly_less(ours, ours)
+    lucky = ours + np.array([0.0, 0.0, 0.05, 0.0, -0.01, 0.0, 0.0, 0.0])
+    assert not certainly_less(ours, lucky)
 
 
 def two_kinds_of_sides() -> PseudoWiener:
@@ -111,3 +158,11 @@ def test_a_delay_among_several_has_the_error_of_the_costs_beside_it() -> None:
     assert low < 2.0 < high
     assert with_delay(report, 2.0, {2.0: 0.04, 3.0: 0.04}, n).stderr[-1] == 1.0
     assert known.to_dataset().sizes["parameter"] == 3
+
+
+def test_a_short_noise_free_log_keeps_the_lag_of_the_motor_and_no_delay() -> None:
+    signal = chirp(2.0, offset=0.02, amplitude=0.3)
+    run = simulate(Throttle(), signal["duty"], time_s=signal["time_s"])
+    fit = identify_throttle(throttle_log(run["time_s"], run["duty"], run["angle_deg"]), options=FitOptions(n_starts=1))
+    assert fit.parameters["delay_samples"] == 0.0
+    assert fit.parameters["electrical_s"] == pytest.approx(1e-3, rel=0.1)

@@ -12,14 +12,18 @@ from mgdd.errors import Interrupted
 from mgdd.identify.throttle.automatic import fit_groups
 from mgdd.identify.throttle.first_principle_model import FirstPrincipleModel
 from mgdd.identify.throttle.first_principle_problem import groups_problem
+from mgdd.identify.throttle.hunt import FLOOR_DEG, noise_of
+from mgdd.identify.throttle.local_weights import Blocks
 from mgdd.identify.throttle.pseudo_wiener_fit import fit_pseudo_wiener
 from mgdd.optimize import FitOptions
 from mgdd.results import Finding, Fit
+from mgdd.signals.even_grid import even_step
 from mgdd.signals.metrics import nrmse_fit_percent
 from mgdd.throttle import PseudoWiener
 
 if TYPE_CHECKING:
     import xarray as xr
+    from numpy.typing import NDArray
 
     from mgdd.results import Model
 
@@ -41,7 +45,8 @@ def fit_auto(
     """Fit the groups with the structure that the log supports, and PW-R from their result; keep the better.
 
     Both are fitted to the first three quarters of the log and run on to its end; PW-R is taken where its free run
-    meets the last quarter better by more than 0.3 points, and then fitted to the whole log.
+    meets the last quarter better by more than 0.3 points, and if, fitted to the whole log, it meets that better, too:
+    a plate that stuck elsewhere once before the last quarter stays there through it.
 
     Parameters
     ----------
@@ -67,6 +72,8 @@ def fit_auto(
         percent = [_percent_after(model, log, first) for model in (ours, other.model)]
         better = percent[1] > percent[0] + _BETTER_PERCENT
         kept = _pw_r(other.model, log, iterations) if better else groups
+        if better and _rmse(kept) > _rmse(groups):  # one event of the last quarter, not the model
+            better, kept = False, groups
     except Interrupted as stop:
         raise Interrupted(str(stop), groups) from stop
     text = (
@@ -90,9 +97,17 @@ def _groups_again(
         substeps=model.substeps,
         tolerance=1e-6,
         max_iterations=30,
+        weight=_weights(groups, early),
     )
     again: FirstPrincipleModel = dataclasses.replace(model, parameters=found.values)
     return again
+
+
+def _weights(groups: Fit, early: xr.Dataset) -> NDArray[np.float64] | None:
+    """Weigh a part of the log as the fit of the whole log does."""
+    angle = early["angle_deg"].to_numpy()
+    floor = max(noise_of(angle), FLOOR_DEG)
+    return Blocks(angle, even_step(early["time_s"])).weights(groups.report.residual[: angle.size], floor)
 
 
 def _pw_r(start: PseudoWiener, log: xr.Dataset, options: FitOptions) -> Fit:
@@ -126,9 +141,19 @@ def pseudo_wiener_of(model: FirstPrincipleModel) -> PseudoWiener:
 def _percent_after(model: Model, log: xr.Dataset, first: int) -> float:
     """Run free over the whole log and compare from sample `first` on."""
     angle = log["angle_deg"].to_numpy()
-    run = model.simulate(log, initial_state={"angle_deg": float(angle[0])})["angle_deg"].to_numpy()
+    run = _run(model, log)
     percent = nrmse_fit_percent(angle[first:], run[first:])
     return -np.inf if percent is None or not np.isfinite(percent) else float(percent)
+
+
+def _run(model: Model, log: xr.Dataset) -> NDArray[np.float64]:
+    """Run free over a whole log."""
+    start = {"angle_deg": float(log["angle_deg"][0])}
+    return np.asarray(model.simulate(log, initial_state=start)["angle_deg"].to_numpy())
+
+
+def _rmse(fit: Fit) -> float:
+    return np.inf if fit.train is None else fit.train.rmse
 
 
 def _with(fit: Fit, finding: Finding) -> Fit:

@@ -33,9 +33,15 @@ _FIRST = {
     "delay_samples": 1.0,
     "presliding_deg": 0.1,
     "half_gap_deg": 0.15,
+    "viscous_share": 0.3,
+    "stop_duty_per_deg": 30.0,
 }
 _REST_S, _REST_DEG = 0.01, 0.5
 _FIRST_SAMPLES = 5
+
+
+# Step [s], duty, angle, start, samples left out, free start numbers, weight per sample (empty for 1).
+Record = tuple[float, "NDArray[np.float64]", "NDArray[np.float64]", list[float], int, list[int], list[float]]
 
 
 class Search(NamedTuple):
@@ -64,9 +70,7 @@ class GroupsProblem:
         """Whether the log settles the groups of both sides of limp-home."""
         return not self.unvisited
 
-    def record(
-        self, share: float = 1.0
-    ) -> tuple[float, NDArray[np.float64], NDArray[np.float64], list[float], int, list[int]]:
+    def record(self, share: float = 1.0, weight: NDArray[np.float64] | None = None) -> Record:
         """Return the first share of the log for the core; where it does not begin at rest its speed is free, too."""
         n = round(share * self.angle.size)
         first = self.angle[: max(2, round(_REST_S / self.step_s))]
@@ -76,7 +80,9 @@ class GroupsProblem:
         # A moving plate has left the mean of its first samples behind.
         begin = float(self.angle[0]) if moving else start
         state = [begin, speed, float(np.clip(self.duty[0], -1.0, 1.0))]
-        return self.step_s, np.clip(self.duty[:n], -1.0, 1.0), self.angle[:n], state, 0, [0, 1] if moving else [0]
+        free_start = [0, 1] if moving else [0]
+        weights = [] if weight is None else weight[:n].tolist()
+        return self.step_s, np.clip(self.duty[:n], -1.0, 1.0), self.angle[:n], state, 0, free_start, weights
 
     def search(
         self,
@@ -87,15 +93,19 @@ class GroupsProblem:
         tolerance: float,
         max_iterations: int,
         share: float = 1.0,
+        weight: NDArray[np.float64] | None = None,
     ) -> Search:
-        """Search the groups `free` from `values`, all others kept; Interrupted carries what it had."""
+        """Search the groups `free` from `values`, all others kept; Interrupted carries what it had.
+
+        With a weight per sample the residual is a weighted one, and the error its root mean square.
+        """
         start = within_bounds({**values, **{name: values[name] or _FIRST.get(name, 0.0) for name in free}}, free)
         stage: tuple[list[int], list[int], float, float, int] = (
             [GROUP_NAMES.index(name) for name in free], [], 1.0, tolerance, max_iterations,
         )  # fmt: skip
         found, stop = or_partial(
             lambda: _core.identify.fit_throttle_groups(
-                [self.record(share)],
+                [self.record(share, weight)],
                 stages=[stage],
                 starts=[[start[name] for name in GROUP_NAMES]],
                 closed_deg=self.stops_deg[0],

@@ -1,0 +1,123 @@
+"""Searches of one throttle log under one set of weights: what they compared, and the best of them."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Iterable, Mapping, Sequence
+from dataclasses import dataclass, field
+from functools import cached_property
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from mgdd import _core
+from mgdd.errors import Interrupted
+from mgdd.identify.throttle.first_principle_problem import GroupsProblem, Search
+from mgdd.identify.throttle.local_weights import Blocks
+
+if TYPE_CHECKING:
+    from numpy.typing import NDArray
+
+__all__ = [
+    "BRISTLES",
+    "FINE",
+    "FLOOR_DEG",
+    "WORTH",
+    "Hunt",
+    "best_of",
+    "independent_samples",
+    "missed",
+    "names_of",
+    "noise_of",
+]
+
+# Steps per sample of the look at bristles, and of what is handed over.
+BRISTLES, FINE = 4, 8
+WORTH = 0.99  # what explains less than a hundredth of the error is left out, however certain it is
+FLOOR_DEG = 5e-3  # a 14-bit converter steps by as much: a residual below it is as good as any
+
+
+@dataclass(kw_only=True)
+class Hunt:
+    """Searches of one log, what they compared, and the best of them so far."""
+
+    problem: GroupsProblem
+    max_iterations: int
+    tolerance: float
+    weight: NDArray[np.float64] | None = None
+    best: Search | None = None
+    done: list[Search] = field(default_factory=list)
+
+    def search(
+        self, values: Mapping[str, float], free: Sequence[str], substeps: int, iterations: int, tolerance: float = 1e-4
+    ) -> Search:
+        """Search once; an interrupt hands over what it has."""
+        try:
+            found = self.problem.search(
+                values, free, substeps=substeps, tolerance=tolerance,
+                max_iterations=min(iterations, self.max_iterations), weight=self.weight,
+            )  # fmt: skip
+        except Interrupted as stop:
+            if isinstance(stop.partial, Search):
+                self.keep(stop.partial)
+            raise
+        return self.keep(found)
+
+    def keep(self, found: Search) -> Search:
+        """Count a search in."""
+        self.done.append(found)
+        if self.best is None or found.rmse < self.best.rmse:
+            self.best = found
+        return found
+
+    def fine(self, values: Mapping[str, float], free: Sequence[str]) -> Search:
+        """Search with the steps and the tolerance of what is handed over."""
+        return self.search(values, free, FINE, self.max_iterations, self.tolerance)
+
+    @property
+    def floor(self) -> float:
+        """Error that no model undercuts and no block is blamed for [deg]."""
+        return max(noise_of(self.problem.angle), FLOOR_DEG)
+
+    @cached_property
+    def blocks(self) -> Blocks:
+        """Its log in blocks."""
+        return Blocks(self.problem.angle, self.problem.step_s)
+
+    def raw(self, found: Search) -> NDArray[np.float64]:
+        """Return the residual of a search under the present weights without them [deg]."""
+        residual = np.asarray(found.report.residual)
+        return residual if self.weight is None else residual / self.weight
+
+    def weigh(self, weight: NDArray[np.float64] | None) -> None:
+        """Take other weights; errors under the earlier ones do not compare."""
+        self.weight, self.best = weight, None
+        self.done.clear()
+
+
+def independent_samples(found: Search) -> float:
+    """Return how many independent samples the residual is worth: samples over its integrated correlation time."""
+    residual = np.asarray(found.report.residual)
+    return residual.size / _core.optimize.autocorrelation_time(residual)
+
+
+def noise_of(angle: NDArray[np.float64]) -> float:
+    """Return the standard deviation of white noise on an angle: its second differences, which motion hardly has."""
+    second = np.diff(angle, 2)
+    return float(1.4826 * np.median(np.abs(second)) / math.sqrt(6.0))
+
+
+def missed(smaller: Search, larger: Search, size: int, n: float) -> bool:
+    """Whether the log needs the `size` numbers that the larger model has beyond the smaller."""
+    low, high = max(larger.rmse, FLOOR_DEG), max(smaller.rmse, FLOOR_DEG)
+    return low < WORTH * high and 2.0 * n * math.log(high / low) > size * math.log(n)
+
+
+def names_of(found: Search) -> list[str]:
+    """Return the groups that a search estimated."""
+    return [name for name in found.report.names if name in found.values]
+
+
+def best_of(searches: Iterable[Search]) -> Search:
+    """Return the search with the lowest error."""
+    return min(searches, key=lambda one: one.rmse)
