@@ -45,7 +45,8 @@ GAP = ("half_gap_deg",)
 STOPS = ("stop_duty_per_deg", "stop_damping")
 _ABSENT = {name: REFINEMENTS[name] for term in (DROP, PRESLIDING, GAP) for name in term}
 _SHOWN = {LAG: "lag", DROP: "Stribeck drop", PRESLIDING: "presliding", GAP: "gap"}
-_STIFF, _STIFFEST = (40.0, 200.0), 400.0  # stops that were touched yield unless the log says that they do not
+_STOP = {"stop_duty_per_deg": 40.0, "stop_damping": 0.7}
+_AS_GOOD, _STIFFEST = 1.002, 400.0  # stops that were touched yield unless the log says that they do not
 _TOUCHED_DEG = 0.5  # as near as that the plate has been at a stop
 _COARSE = 2  # steps per sample of the first look
 _SEEDS = 3  # rough solutions that are looked at from every delay
@@ -209,10 +210,8 @@ def _described(
     touched = problem.angle.min() < low + _TOUCHED_DEG or problem.angle.max() > high - _TOUCHED_DEG
     if touched and not set(STOPS) & set(fixed):
         last = hunt.search(last.values, names_of(last), BRISTLES, 15)
-        free = [*names_of(last), *STOPS]
-        starts = [{**last.values, "stop_duty_per_deg": stiff, "stop_damping": 0.7} for stiff in _STIFF]
-        soft = best_of([hunt.search(start, free, BRISTLES, 20) for start in starts])
-        if soft.rmse <= last.rmse and soft.values["stop_duty_per_deg"] < _STIFFEST:
+        soft = hunt.search({**last.values, **_STOP}, [*names_of(last), *STOPS], BRISTLES, 20)
+        if soft.rmse < _AS_GOOD * last.rmse and soft.values["stop_duty_per_deg"] < _STIFFEST:
             last, terms = soft, [*terms, STOPS]
             values = {name: soft.values[name] for name in STOPS}
     for _ in range(2):
