@@ -91,8 +91,9 @@ def test_a_block_counts_by_its_error_and_has_no_vote_beyond_what_is_usual() -> N
     residual = np.where(np.arange(400) % 2, 0.1, -0.1) * np.repeat([1.0, 1.0, 1.0, 4.0, 1.0, 1.0, 1.0, 1.1], 50)
     blocks = Blocks(angle, 2e-3)
     np.testing.assert_allclose(blocks.errors(residual), [0.1, 0.1, 0.1, 0.4, 0.1, 0.1, 0.1, 0.11])
-    weight = blocks.weights(residual, 0.01)
+    weight = blocks.weights(residual, 0.06)
     assert weight is not None
+    assert blocks.weights(residual, 0.01) is None
     np.testing.assert_allclose(weight, np.repeat([1.0, 1.0, 1.0, 0.3125, 1.0, 1.0, 1.0, 1.0], 50))
     assert blocks.weights(residual, 0.4) is None
     assert blocks.losses(residual, 0.2)[3] == pytest.approx(0.04)

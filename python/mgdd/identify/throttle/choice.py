@@ -72,9 +72,7 @@ def fit_auto(
         other = _pw_r(pseudo_wiener_of(ours), early, iterations)
         percent = [_percent_after(model, log, first) for model in (ours, other.model)]
         better = percent[1] > percent[0] + _BETTER_PERCENT
-        # Where the groups miss much, they may have taken a lag that PW-R does not have for a delay.
-        earlier = (0.0, 1.0) if better and other.model.parameters["delay_samples"] >= 0.5 else (0.0,)
-        kept = min((_pw_r(other.model, log, iterations, by) for by in earlier), key=_rmse) if better else groups
+        kept = _pw_r(other.model, log, iterations) if better else groups
         if better and _rmse(kept) > _rmse(groups):  # one event of the last quarter, not the model
             better, kept = False, groups
     except Interrupted as stop:
@@ -113,15 +111,15 @@ def _weights(groups: Fit, early: xr.Dataset) -> NDArray[np.float64] | None:
     return Blocks(angle, even_step(early["time_s"])).weights(groups.report.residual[: angle.size], floor)
 
 
-def _pw_r(start: PseudoWiener, log: xr.Dataset, options: FitOptions, earlier: float = 0.0) -> Fit:
-    """Search PW-R once, from a delay that is some samples less."""
+def _pw_r(start: PseudoWiener, log: xr.Dataset, options: FitOptions) -> Fit:
+    """Search PW-R once."""
     values = start.parameters
     limp_home, angle = values["limp_home_deg"], log["angle_deg"].to_numpy()
     visited = [bool(angle.max() > limp_home + 1.0), bool(angle.min() < limp_home - 1.0)]
     sides = "both" if all(visited) else "above" if visited[0] else "below"
     return fit_pseudo_wiener(
         log, "pw_r", limp_home_deg=limp_home, sides=sides,
-        delay_samples=max(values["delay_samples"] - earlier, 0.0), start_values=start,
+        delay_samples=values["delay_samples"], start_values=start,
         options=options,
     )  # fmt: skip
 

@@ -14,6 +14,7 @@ __all__ = ["SPREAD", "Blocks", "certainly_less"]
 _BLOCK_S, _FEWEST = 0.1, 10
 _MOVED_DEG = 1.0
 _CERTAIN = 2.0  # standard errors
+_AT_NOISE = 2.0
 SPREAD = 1.25  # of the errors of blocks that differ by noise alone
 
 
@@ -47,10 +48,14 @@ class Blocks:
         return max(float(np.median(errors[self._moving])) if self._moving.any() else 0.0, floor)
 
     def weights(self, residual: NDArray[np.float64], floor: float) -> NDArray[np.float64] | None:
-        """Return a weight per sample, 1 where its block is as good as the usual one; None where all are."""
+        """Return a weight per sample, 1 where its block is as good as the usual one.
+
+        None where all are, and where the usual block is far from `floor`: then the model misses the whole log.
+        """
         errors = self.errors(residual)
-        most = SPREAD * self.usual(errors, floor)
-        if errors.size < 4 or not (errors > most).any():
+        usual = self.usual(errors, floor)
+        most = SPREAD * usual
+        if errors.size < 4 or usual > _AT_NOISE * floor or not (errors > most).any():
             return None
         return np.asarray(np.minimum(1.0, most / np.maximum(errors, floor))[self.of_sample])
 

@@ -65,8 +65,9 @@ def whole_delay(hunt: Hunt, rough: Sequence[Search], delays: Sequence[float], he
             found[delay] = hunt.fine(found[delay].values, free)
             residual[delay] = hunt.raw(found[delay])
     usual = min(hunt.blocks.usual(hunt.blocks.errors(one), hunt.floor) for one in residual.values())
-    loss = {delay: hunt.blocks.losses(one, SPREAD * usual) for delay, one in residual.items()}
-    ties = _equals(loss)
+    most = SPREAD * usual if hunt.weight is not None else math.inf
+    loss = {delay: hunt.blocks.losses(one, most) for delay, one in residual.items()}
+    ties = _equals(loss, by_block=math.isfinite(most))
     lag = {delay: found[delay].values["electrical_s"] for delay in ties}
     kept = min(ties, key=lambda delay: abs(math.log(max(lag[delay], 1e-5) / _MOTOR_LAG_S)))
     hunt.weigh(weight[kept])
@@ -75,15 +76,15 @@ def whole_delay(hunt: Hunt, rough: Sequence[Search], delays: Sequence[float], he
     return Delays(found=found[kept], rmse=rmse | dict.fromkeys(ties, min(rmse.values())), ties=tuple(ties))
 
 
-def _equals(loss: Mapping[float, NDArray[np.float64]]) -> list[float]:
-    """Return the delays whose losses are not certainly worse than the best ones."""
+def _equals(loss: Mapping[float, NDArray[np.float64]], *, by_block: bool) -> list[float]:
+    """Return the delays within a hundredth of the best error or, by block, not certainly worse."""
     best = min(loss, key=lambda delay: float(loss[delay].mean()))
     floor = FLOOR_DEG**2
     least = max(float(loss[best].mean()), floor)
     return [
         delay
         for delay, own in sorted(loss.items())
-        if max(float(own.mean()), floor) * WORTH**2 <= least or not certainly_less(loss[best], own)
+        if max(float(own.mean()), floor) * WORTH**2 <= least or (by_block and not certainly_less(loss[best], own))
     ]
 
 
