@@ -72,7 +72,8 @@ def fit_auto(
         other = _pw_r(pseudo_wiener_of(ours), early, iterations)
         percent = [_percent_after(model, log, first) for model in (ours, other.model)]
         better = percent[1] > percent[0] + _BETTER_PERCENT
-        kept = _pw_r(other.model, log, iterations) if better else groups
+        # The groups may start PW-R in a valley of their own: it is also searched from no delay.
+        kept = min((_pw_r(one, log, iterations) for one in _starts(other.model)), key=_rmse) if better else groups
         if better and _rmse(kept) > _rmse(groups):  # one event of the last quarter, not the model
             better, kept = False, groups
     except Interrupted as stop:
@@ -122,6 +123,11 @@ def _pw_r(start: PseudoWiener, log: xr.Dataset, options: FitOptions) -> Fit:
         delay_samples=values["delay_samples"], start_values=start,
         options=options,
     )  # fmt: skip
+
+
+def _starts(model: PseudoWiener) -> list[PseudoWiener]:
+    """Give a model and the same without its delay."""
+    return [model, PseudoWiener("pw_r", {**model.parameters, "delay_samples": 0.0})]
 
 
 def pseudo_wiener_of(model: FirstPrincipleModel) -> PseudoWiener:
