@@ -1,7 +1,8 @@
-"""Print the tables of docs/studies.md that take a full run of a study, or put them there.
+"""Print the tables of the docs that take a full run of a study, or put them there.
 
 Run `python tools/study_tables.py [--page docs/studies.md] online-calibration calibrated-guide` with the package
-installed; it takes a quarter of an hour. With `--json FILE ...` it takes what `mgdd study NAME --json` has printed.
+installed; it takes a quarter of an hour. `--page docs/throttle_tracking.md throttle-tracking` takes a minute. With
+`--json FILE ...` it takes what `mgdd study NAME --json` has printed.
 """
 
 from __future__ import annotations
@@ -128,7 +129,6 @@ TABLES: Mapping[str, Mapping[str, tuple[Column, ...]]] = {
     },
     "throttle-tracking": {
         "rows": (
-            ("throttles", _words("case")),
             ("preset", _words("preset")),
             ("controller", _words("controller")),
             ("20→60 [ms]", _median_and_p95("large", 0, "_ms")),
@@ -157,15 +157,31 @@ def tables(name: str, summary: Mapping[str, Any]) -> dict[str, list[str]]:
     """Give the lines of each table of a study by the name of its list."""
     out = {}
     for part, columns in TABLES[name].items():
-        lines = [[head for head, _ in columns], ["---"] * len(columns)]
         rows = [row for row in summary[part] if part != "rows" or name not in _ROWS or _ROWS[name](row)]
-        lines += [[cell(row) for _, cell in columns] for row in rows]
-        out[part] = [f"| {' | '.join(line)} |" for line in lines]
+        if "case" in (rows[0] if rows else {}):
+            out |= _by_case(columns, rows)
+        else:
+            out[part] = _table(columns, rows)
     if name == "online-calibration":
         out["errors"] = _errors(summary["rows"])
     elif name == "calibrated-guide":
         out["settings"] = _settings(summary["settings"])
     return out
+
+
+def _table(columns: Sequence[Column], rows: Sequence[Row]) -> list[str]:
+    lines = [[head for head, _ in columns], ["---"] * len(columns)]
+    lines += [[cell(row) for _, cell in columns] for row in rows]
+    return [f"| {' | '.join(line)} |" for line in lines]
+
+
+def _by_case(columns: Sequence[Column], rows: Sequence[Row]) -> dict[str, list[str]]:
+    """Give a table to each case, which heads its first column."""
+    (_, first), *others = columns
+    return {
+        case: _table(((case, first), *others), [row for row in rows if row["case"] == case])
+        for case in dict.fromkeys(row["case"] for row in rows)
+    }
 
 
 def _side_by_side(

@@ -2,7 +2,8 @@
 
     python tools/tune_controllers.py [KIND ...]
 
-Only the named kinds are tuned anew. A search starts from the shipped set, so a second run goes on.
+Only the named kinds are tuned anew. A search starts from the shipped set, so a second run goes on: to stay fair, tune
+all kinds in every round and count it in `ROUNDS`.
 """
 
 from __future__ import annotations
@@ -15,14 +16,14 @@ from mgdd.loop.controller_families import FAMILIES
 from mgdd.loop.tuned_sets import TUNED_SETS
 from mgdd.studies.throttle_baselines import throttle_of
 
-N_THROTTLES, SPREAD, BUDGET, SEED = 20, 0.2, 400, 7
+N_THROTTLES, SPREAD, BUDGET, SEED, ROUNDS = 20, 0.2, 400, 7, 2
 TARGET = Path(__file__).resolve().parents[1] / "python/mgdd/loop/tuned_sets.py"
 
 HEAD = f'''"""Numbers that `mgdd.loop.tune_controller` found for each kind of controller and each preset.
 
-Protocol: {N_THROTTLES} throttles within {SPREAD:.0%} of the preset (P1 with stiction of 0.3 N m), a budget of
-{BUDGET} runs of the whole set for every kind, seed {SEED}, noise of 0.03 deg, a delay of one sample; the
-controller knows the preset only.
+Protocol: {N_THROTTLES} throttles within {SPREAD:.0%} of the preset (P1 with stiction of 0.3 N m), {ROUNDS} rounds of
+{BUDGET} runs of the whole set for every kind, each from the best of the one before, seed {SEED}, noise of
+0.03 deg, a delay of one sample; the controller knows the preset only.
 Written by ``tools/tune_controllers.py``.
 """
 

@@ -4,7 +4,6 @@
 // is the same every time, so that quantiles are over the smallest time of each sample, which leaves out what the
 // operating system does, and p50 and p99 beside them over all times. Options: `--json`, one record per line;
 // `--loop SAMPLES [float]`, a loop alone with N = 20 for an instruction counter.
-#include <Eigen/Cholesky>
 #include <algorithm>
 #include <array>
 #include <chrono>
@@ -15,6 +14,7 @@
 #include <string_view>
 #include <vector>
 
+#include "condensed_horizon.hpp"
 #include "mgdd/control/receding_horizon.hpp"
 #include "mgdd/dynamics/rk4.hpp"
 #include "mgdd/throttle/models/smooth.hpp"
@@ -190,50 +190,11 @@ void report(const char* scalar, const control::HorizonSettings& s, bool linear =
   std::fflush(stdout);
 }
 
-/// The same quadratic program by condensing: responses of the outputs, normal matrix, Cholesky factor, solution.
-template <int N, int n>
-struct Condensed {
-  Eigen::Matrix<double, N, N> response = Eigen::Matrix<double, N, N>::Zero(), normal;
-  Eigen::Matrix<double, N, 1> slope, input;
-  Eigen::LLT<Eigen::Matrix<double, N, N>> factor;
-
-  void solve(const control::HorizonQp<double, N, n>& qp, const Eigen::Matrix<double, n, 1>& deviation) {
-    Eigen::Matrix<double, N, 1> error;
-    Eigen::Matrix<double, n, 1> x = deviation;
-    for (int k = 0; k < N; ++k) {
-      const auto& stage = qp.stages[static_cast<std::size_t>(k)];
-      x = (stage.a * x).eval();
-      error(k) = stage.error + stage.c.dot(x);
-      Eigen::Matrix<double, n, 1> d = stage.b;
-      response(k, k) = stage.c.dot(d);
-      for (int j = k + 1; j < N; ++j) {
-        const auto& next = qp.stages[static_cast<std::size_t>(j)];
-        d = (next.a * d).eval();
-        response(j, k) = next.c.dot(d);
-      }
-    }
-    Eigen::Matrix<double, N, 1> weight;
-    for (int k = 0; k < N; ++k)
-      weight(k) = qp.stages[static_cast<std::size_t>(k)].weight;
-    normal.setZero();
-    for (int i = 0; i < N; ++i) {
-      for (int j = 0; j <= i; ++j)
-        normal(i, j) = response.col(i).tail(N - i).cwiseProduct(weight.tail(N - i)).dot(response.col(j).tail(N - i));
-    }
-    normal.diagonal().array() += qp.input_weight;
-    slope.noalias() = response.transpose() * weight.cwiseProduct(error);
-    for (int k = 0; k < N; ++k)
-      slope(k) += qp.input_weight * qp.nominal[static_cast<std::size_t>(k)];
-    factor.compute(normal);
-    input = -factor.solve(slope);
-  }
-};
-
 /// Microseconds of one unlimited solve along the model, by sweep and by condensing.
 template <int N>
 void crossover() {
   static control::HorizonQp<double, N, 3> qp;
-  static Condensed<N, 3> dense;
+  static bench::Condensed<N, 3> dense;
   const auto model = smooth_model<double>(1e-3, 1);
   using D = Dual<4>;
   const auto dual = model.over<D>();

@@ -143,5 +143,7 @@ void bind_engine_bench(py::module_& m);
 void bind_loop(py::module_& m);
 void bind_virtual_throttle(py::module_& m);
 void bind_throttle_loop(py::module_& m);
+void bind_mgdd1(py::module_& m);
+void bind_receding_horizon(py::module_& m);
 
 }  // namespace mgdd::bindings

@@ -43,7 +43,8 @@ PYBIND11_MODULE(_core, m) {
       {"systems", "Models of measured benchmarks.", {&bind_benchmark_models}},
       {"loop",
        "Virtual benches and the loops over them.",
-       {&bind_engine_bench, &bind_loop, &bind_virtual_throttle, &bind_throttle_loop}},
+       {&bind_engine_bench, &bind_loop, &bind_virtual_throttle, &bind_throttle_loop, &bind_mgdd1,
+        &bind_receding_horizon}},
   };
   for (const Room& room : rooms) {
     auto submodule = m.def_submodule(room.name, room.doc);

@@ -2,10 +2,13 @@
 
 from __future__ import annotations
 
+import importlib.util
+from pathlib import Path
+
 import numpy as np
 import pytest
 
-from mgdd.studies import run_study
+from mgdd.studies import StudyResult, run_study
 from mgdd.studies.throttle_baselines import throttle_of
 from mgdd.studies.throttle_tracking_cases import (
     CASES,
@@ -56,10 +59,42 @@ def test_what_was_learnt_is_worth_knowing_it() -> None:
             assert rows[wrong, "after 2 s"][column] <= 1.25 * rows[wrong, "known"][column]
 
 
-def test_the_study_runs_and_draws() -> None:
-    result = run_study("throttle-tracking", seeds=2, quick=True)
+@pytest.fixture(scope="module")
+def quick() -> StudyResult:
+    return run_study("throttle-tracking", seeds=2, quick=True)
+
+
+def test_the_study_runs_and_draws(quick: StudyResult) -> None:
+    result = quick
     assert [row["controller"] for row in result.summary["rows"]] == list(CASES["unknown"].controllers)
     assert set(result.dataset["settling_ms"].dims) == {"preset", "throttle", "controller", "reference"}
     assert np.isfinite(result.dataset["mse_deg2"].to_numpy()).all()
     (figure,) = result.figures.values()
     assert len(figure.axes) == 4
+
+
+def test_the_page_has_a_table_of_every_case(root: Path, quick: StudyResult) -> None:
+    """Cases, presets and controllers alone: the numbers there are of 100 throttles, by `tools/study_tables.py`."""
+    spec = importlib.util.spec_from_file_location("study_tables", root / "tools" / "study_tables.py")
+    assert spec is not None
+    assert spec.loader is not None
+    tool = importlib.util.module_from_spec(spec)
+    spec.loader.exec_module(tool)
+    text = (root / "docs" / "throttle_tracking.md").read_text(encoding="utf-8")
+    page = text.splitlines()
+    some = quick.summary["rows"][0]
+    rows = [
+        some | {"case": case.text, "preset": preset, "controller": controller}
+        for case in CASES.values()
+        for preset in case.presets
+        for controller in case.controllers
+    ]
+    tables = tool.tables("throttle-tracking", quick.summary | {"rows": rows})
+    assert list(tables) == [*(case.text for case in CASES.values()), "warm"]
+    for lines in tables.values():
+        at = page.index(lines[0])
+        for made, printed in zip(lines[2:], page[at + 2 :], strict=False):
+            assert made.split(" | ")[:2] == printed.split(" | ")[:2]
+    made = tool.put_into(text, "throttle-tracking", quick.summary)
+    assert made != text
+    assert tool.put_into(made, "throttle-tracking", quick.summary) == made

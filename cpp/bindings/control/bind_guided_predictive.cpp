@@ -17,8 +17,7 @@ using namespace control;
 
 using Levels = std::map<std::string, double>;
 
-Levels levels_of(const GuidedPredictive& self) {
-  const PlateBelief<double>& b = self.belief();
+Levels levels_of(const PlateBelief<double>& b) {
   return {{"bias_above", b.above.bias},   {"friction_above", b.above.friction},
           {"bias_below", b.below.bias},   {"friction_below", b.below.friction},
           {"gain_factor", b.gain_factor}, {"damping_factor", b.damping_factor}};
@@ -34,7 +33,7 @@ void start_from(GuidedPredictive& self, const Levels& given) {
     if (place == places.end()) {
       throw ParameterError("learnt", name,
                            "must be some of bias_above, friction_above, bias_below, friction_below, "
-                           "gain_factor");
+                           "gain_factor, damping_factor");
     }
     *place->second = value;
   }
@@ -45,8 +44,8 @@ constexpr const char* doc =
     R"(Model-guided predictive controller of a throttle plate, one sample at a time.
 
 A rough model predicts a short horizon; one Gauss-Newton step per sample moves the last duties along its exact slopes;
-what is measured corrects the model while it runs. The default learns dry friction as two levels per side of limp-home
-gain and damping, asks the model for the duty at which the plate breaks away, and holds still inside the friction band.
+what is measured corrects the model while it runs. The default learns dry friction as two levels per side of limp-home,
+gain and damping, goes back to the last belief that proved itself where the learnt one predicts worse, asks the model for the duty at which the plate breaks away, and holds still inside the friction band.
 ``friction_learning=False`` is the plain form, ``prediction="linear"`` the usual linear MPC, more `gauss_newton_steps`
 the converged nonlinear one. Keyword-only; the defaults fit the throttle ``P1``. `mgdd.loop.tuned_controller` makes one
 for another throttle; ``GuidedPredictive.fields()`` lists bounds and defaults.
@@ -82,10 +81,15 @@ observer_angle_per_s, observer_speed_per_s2 : float
 noise_deg : float
     Standard deviation of the measured angle [deg]: what counts as motion.
 learning_rate_per_s, gain_weight, damping_weight : float
-    Learning: share of what explains an innovation, per time [1/s], and how much of it goes to gain and damping beside a
-    friction level [-].
+    Learning: share of what explains an innovation, per time [1/s], and the first variances of the factors of gain and
+    damping over that of a friction level [-].
+level_memory_s, memory_s : float
+    Time of sliding after which a friction level, and gain and damping, are as uncertain as at first [s].
 least_gain_factor, largest_gain_factor : float
     Bounds of the learnt gain over the given one [-].
+rollback_ratio, rollback_s, certify_s : float
+    A belief whose squared innovations are larger than those of the certified one by this ratio [-] over the first time
+    of sliding [s] is given up for it; one whose are smaller by it over the second time [s] is certified.
 bias_rate_per_deg_s, trim_rate_per_deg_s : float
     Without learning: rates of the one bias and of the trim, which the model does not see [1/(deg s)].
 reference_lag_s, reference_jump_deg_per_s : float
@@ -163,8 +167,13 @@ void bind_guided_predictive(py::module_& m) {
   cls.def("take_over", &GuidedPredictive::take_over, py::arg("measurement_deg"), py::arg("duty"),
           "Start at rest from a duty, what was learnt kept.\n\nIgnored if a number is not finite.");
   cls.def_property(
-      "learnt", &levels_of, &start_from,
+      "learnt", [](const GuidedPredictive& self) { return levels_of(self.belief()); }, &start_from,
       "Friction levels [-], factors of gain and damping [-] as learnt; setting some or all of them starts from them.");
+  cls.def_property_readonly(
+      "certified", [](const GuidedPredictive& self) { return levels_of(self.certified()); },
+      "The last belief that predicted well for `certify_s`, like `learnt`: a worse one is rolled back to it.");
+  cls.def_property_readonly("rollbacks", &GuidedPredictive::rollbacks,
+                            "How often a learnt belief was given up for the certified one.");
   cls.def_property_readonly("innovation_deg", &GuidedPredictive::innovation_deg,
                             "Measured less predicted angle of the last sample [deg].");
   cls.def_property_readonly("holds", &GuidedPredictive::holds, "Whether the plate is held where it is stuck.");

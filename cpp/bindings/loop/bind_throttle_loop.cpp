@@ -1,10 +1,8 @@
 // Binds include/mgdd/loop/throttle_controllers.hpp: a controller on the virtual throttle without the GIL, many of them
-// on all cores, and Mgdd1, which needs the models that guide it.
+// on all cores.
 #include <algorithm>
 #include <array>
 #include <chrono>
-#include <map>
-#include <string>
 #include <tuple>
 #include <utility>
 #include <variant>
@@ -12,35 +10,14 @@
 
 #include "binding.hpp"
 #include "interruptible.hpp"
+#include "loop/mgdd1_binding.hpp"
 #include "mgdd/common/error.hpp"
 #include "mgdd/loop/throttle_controllers.hpp"
-#include "record_binding.hpp"
-#include "throttle/pseudo_wiener_binding.hpp"
 
 namespace mgdd::bindings {
 namespace {
 
 using namespace loop;
-
-using AnyMgdd1 = std::variant<Mgdd1On<throttle::PwRModel>, Mgdd1On<throttle::PwWModel>, Mgdd1On<throttle::PwPModel>>;
-
-struct BoundMgdd1 {
-  AnyMgdd1 controller;
-};
-
-BoundMgdd1 made_mgdd1(const BoundModel& guide, int horizon_samples, int delay_samples,
-                      const std::map<std::string, double>& numbers) {
-  control::Mgdd1Settings s;
-  s.horizon_samples = horizon_samples;
-  s.delay_samples = delay_samples;
-  for (const auto& [name, value] : numbers) {
-    const auto field = find_field(control::mgdd1_fields(), name);
-    if (field == control::mgdd1_fields().end()) throw ParameterError("setting", name, "must be one of Mgdd1.fields()");
-    field->in(s) = value;
-  }
-  return std::visit([&](const auto& model) -> BoundMgdd1 { return {Mgdd1On<std::decay_t<decltype(model)>>(model, s)}; },
-                    throttle::prepare(guide.parameters));
-}
 
 ThrottleController controller_of(const py::handle& object) {
   if (py::isinstance<control::GuidedPredictive>(object)) return object.cast<const control::GuidedPredictive&>();
@@ -76,18 +53,18 @@ template <class Figures>
 py::dict to_dict(const Figures& all) {
   using F = TrackingFigures;
   py::dict out;
-  const auto put = [&](const char* name, double F::* member, double scale) {
+  const auto put = [&](const char* name, double F::* member) {
     std::vector<double> column(all.size());
-    std::ranges::transform(all, column.begin(), [&](const F& f) { return scale * (f.*member); });
+    std::ranges::transform(all, column.begin(), [&](const F& f) { return f.*member; });
     out[name] = to_array(column);
   };
-  put("settling_ms", &F::settling_s, 1e3);
-  put("mse_deg2", &F::mse_deg2, 1.0);
-  put("static_error_deg", &F::static_error_deg, 1.0);
-  put("overshoot_deg", &F::overshoot_deg, 1.0);
-  put("total_variation", &F::total_variation, 1.0);
-  put("limit_cycle_deg", &F::limit_cycle_deg, 1.0);
-  put("largest_error_deg", &F::largest_error_deg, 1.0);
+  put("settling_ms", &F::settling_ms);
+  put("mse_deg2", &F::mse_deg2);
+  put("static_error_deg", &F::static_error_deg);
+  put("overshoot_deg", &F::overshoot_deg);
+  put("total_variation", &F::total_variation);
+  put("limit_cycle_deg", &F::limit_cycle_deg);
+  put("largest_error_deg", &F::largest_error_deg);
   return out;
 }
 
@@ -138,35 +115,6 @@ py::tuple run_many(const std::vector<VirtualThrottle*>& plants, const py::list& 
 }  // namespace
 
 void bind_throttle_loop(py::module_& m) {
-  py::class_<BoundMgdd1>(m, "Mgdd1", "The plainest model-guided controller; use mgdd.control.Mgdd1.")
-      .def(py::init(&made_mgdd1), py::arg("guide"), py::kw_only(), py::arg("horizon_samples"), py::arg("delay_samples"),
-           py::arg("numbers"))
-      .def_static("fields",
-                  [] {
-                    py::dict out;
-                    for (const auto& field : control::mgdd1_fields())
-                      out[as_str(field.info.name)] =
-                          describe(field.info, py::float_(field.in(control::Mgdd1Settings{})));
-                    return out;
-                  })
-      .def(
-          "step",
-          [](BoundMgdd1& self, double reference, double measured) {
-            return std::visit([&](auto& c) { return c.step(reference, measured); }, self.controller);
-          },
-          py::arg("reference_deg"), py::arg("measurement_deg"))
-      .def("reset", [](BoundMgdd1& self) { std::visit([](auto& c) { c.reset(); }, self.controller); })
-      .def_property_readonly(
-          "duty",
-          [](const BoundMgdd1& self) { return std::visit([](const auto& c) { return c.duty(); }, self.controller); })
-      .def_property(
-          "state",
-          [](const BoundMgdd1& self) {
-            return std::visit([](const auto& c) { return save_state(c); }, self.controller);
-          },
-          [](BoundMgdd1& self, const StateColumns& columns) {
-            std::visit([&](auto& c) { restore_state(c, columns); }, self.controller);
-          });
   m.def("track_throttle", &run_one, py::arg("controller"), py::arg("plant"), py::kw_only(), py::arg("delay_samples"),
         py::arg("reference_deg"), py::arg("airflow_torque_nm"), py::arg("supply_v"), py::arg("from_sample"),
         py::arg("band_deg"), "Run a controller on a virtual throttle without the GIL; behind mgdd.loop.track.");

@@ -45,9 +45,11 @@ BasicGuidedPredictive<T>::BasicGuidedPredictive(const GuidedPredictiveSettings& 
     : settings_(checked(s)),
       observed_(s.plate, s.sample_s, PlateFriction::set_valued),
       predicted_(s.plate, s.prediction_step_s, friction_form(s)),
+      proven_(observed_),
       angle_share_(static_cast<T>(1.0 - std::exp(-s.observer_angle_per_s * s.sample_s))),
       speed_gain_(static_cast<T>(s.observer_speed_per_s2 * s.sample_s)),
       learner_(s.learner, s.plate, s.sample_s, s.noise_deg, angle_share_, speed_gain_),
+      review_(s.review, s.sample_s, s.noise_deg),
       belief_(observed_.belief()),
       reference_(s.reference_lag_s, s.sample_s, s.reference_jump_deg_per_s) {}
 
@@ -58,12 +60,13 @@ void BasicGuidedPredictive<T>::start(T angle_deg, T duty) noexcept {
   holds_ = false;
   still_ = 0;
   above_ = !(angle_deg < T(settings_.plate.spring.limp_home_deg));
-  state_ = observed_.at_rest(angle_deg, duty);
+  state_ = proven_state_ = observed_.at_rest(angle_deg, duty);
   mean_torque_ = duty_ = duty;
   sent_.fill(duty);
   moves_.fill(duty);
   innovation_ = mean_error_ = trim_ = T(0.0);
   learner_.forget();
+  review_.restart();
 }
 
 template <class T>
@@ -78,26 +81,58 @@ void BasicGuidedPredictive<T>::prepare() noexcept {
   observed_.believe(belief_);
   mean_torque_ = observed_.mean_torque(state_, acting);
   observed_.step(state_, acting);
+  if (settings_.friction_learning) proven_.step(proven_state_, acting);
   prepared_ = true;
+}
+
+// Moves a predicted state to a measurement; gives the innovation.
+template <class T>
+T BasicGuidedPredictive<T>::corrected(PlateState<T>& state, T measurement_deg) noexcept {
+  const T innovation = measurement_deg - state.angle_deg;
+  state.angle_deg = std::clamp(state.angle_deg + angle_share_ * innovation, T(settings_.plate.closed_deg),
+                               T(settings_.plate.open_deg));
+  state.speed_deg_per_s += speed_gain_ * innovation;
+  return innovation;
+}
+
+// Whether what was learnt was given up for the certified belief, whose innovation this is.
+template <class T>
+bool BasicGuidedPredictive<T>::review(T innovation, bool slides) noexcept {
+  if (!slides) return false;
+  const Verdict verdict = review_.judge(innovation_, innovation);
+  if (verdict == Verdict::keep) return false;
+  review_.restart();
+  if (verdict == Verdict::certify) {
+    proven_.believe(belief_);
+    proven_state_ = state_;
+    return false;
+  }
+  belief_ = proven_.belief();
+  state_ = proven_state_;
+  innovation_ = innovation;
+  learner_.reset();
+  ++rollbacks_;
+  return true;
 }
 
 template <class T>
 void BasicGuidedPredictive<T>::correct(T measurement_deg) noexcept {
   const GuidedPredictiveSettings& s = settings_;
   const T predicted = state_.angle_deg, speed = state_.speed_deg_per_s, last = innovation_;
-  innovation_ = measurement_deg - predicted;
-  state_.angle_deg = std::clamp(predicted + angle_share_ * innovation_, T(s.plate.closed_deg), T(s.plate.open_deg));
-  state_.speed_deg_per_s += speed_gain_ * innovation_;
+  innovation_ = corrected(state_, measurement_deg);
   if (!s.friction_learning) {
     const T step = T(s.bias_rate_per_deg_s * s.sample_s) * innovation_;
     for (FrictionBand<T>* band : {&belief_.above, &belief_.below})
       band->bias = std::clamp(band->bias - step, T(-largest_bias), T(largest_bias));
     return;
   }
+  const bool slides = speed != T(0.0) || proven_state_.speed_deg_per_s != T(0.0);
+  const T proven_innovation = corrected(proven_state_, measurement_deg);
   if (predicted < T(s.plate.closed_deg + end_deg) || predicted > T(s.plate.open_deg - end_deg)) {
     learner_.forget();
     return;
   }
+  if (review(proven_innovation, slides)) return;
   const T push = mean_torque_ - observed_.holding(predicted);
   if (speed != T(0.0)) {
     learner_.slide(belief_, band_at(predicted), innovation_, {push, speed, observed_.damped()});
@@ -251,7 +286,11 @@ void BasicGuidedPredictive<T>::reset() noexcept {
   state_ = {};
   belief_.above = belief_.below = {T(0.0), T(settings_.plate.friction)};
   belief_.gain_factor = belief_.damping_factor = T(1.0);
-  learner_.forget();
+  proven_.believe(belief_);
+  proven_state_ = {};
+  rollbacks_ = 0;
+  learner_.reset();
+  review_.restart();
   reference_.forget();
   sent_.fill(T(0.0));
   moves_.fill(T(0.0));
@@ -270,12 +309,20 @@ template <class T>
 void BasicGuidedPredictive<T>::set_belief(const PlateBelief<T>& belief) {
   require_usable_belief(widened(belief), settings_);
   belief_ = belief;
+  proven_.believe(belief);
+  learner_.reset();
+  review_.restart();
 }
 
 template <class T>
 void BasicGuidedPredictive<T>::require_usable() const {
   require_usable_duty(duty_, settings_.lower, settings_.upper);
   require_usable_belief(widened(belief_), settings_);
+  require_usable_belief(widened(proven_.belief()), settings_, "certified_");
+  if (!learner_.is_usable()) {
+    throw ParameterError("state column 'slope_level_variance'", "a covariance outside what these settings can reach",
+                         "must be the saved state of a controller with the same settings");
+  }
 }
 
 template class BasicGuidedPredictive<double>;

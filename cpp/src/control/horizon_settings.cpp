@@ -12,6 +12,7 @@ using S = HorizonSettings;
 
 constexpr Domain weight = closed(0.0, 1e12);
 constexpr Domain bound = closed(-1e12, 1e12);
+constexpr Domain anywhere = closed(-unbounded, unbounded);
 
 constexpr std::array<Field<S>, n_horizon_fields> table{{
     field<&S::output_weight>({"output_weight", "-", weight, "weight of each squared output error but the last"}),
@@ -21,6 +22,9 @@ constexpr std::array<Field<S>, n_horizon_fields> table{{
     field<&S::lower>({"lower", "-", bound, "least input"}),
     field<&S::upper>({"upper", "-", bound, "largest input"}),
     field<&S::largest_change>({"largest_change", "-", above(0.0), "largest change of the input from sample to sample"}),
+    field<&S::least_output>({"least_output", "-", anywhere, "soft bound of the output"}),
+    field<&S::largest_output>({"largest_output", "-", anywhere, "soft bound of the output"}),
+    field<&S::output_limit_weight>({"output_limit_weight", "-", weight, "price of the squared excess over them"}),
     field<&S::tolerance>({"tolerance", "-", above(0.0, 1e12), "converged where no input changes by more"}),
 }};
 
@@ -43,6 +47,9 @@ Names<HorizonStatus> horizon_status_names() noexcept {
 void validate(const HorizonSettings& s) {
   require_fields(table, s);
   if (!(s.lower < s.upper)) throw ParameterError("upper", s.upper, "must be > lower = " + text(s.lower));
+  if (!(s.least_output < s.largest_output)) {
+    throw ParameterError("largest_output", s.largest_output, "must be > least_output = " + text(s.least_output));
+  }
   if (!(s.input_weight + s.change_weight > 0.0)) {
     throw ParameterError("change_weight", s.change_weight,
                          "must be > 0 where input_weight is 0: else no input is best");

@@ -5,58 +5,51 @@
 #include <cmath>
 
 #include "mgdd/common/error.hpp"
+#include "mgdd/control/spring_fields.hpp"
 
 namespace mgdd::control {
 namespace {
 
 using S = PidSettings;
-using H = HoldingDuty;
-using Side = SpringSideDuty;
 
 constexpr Domain gain = closed(0.0, 1e3);
 constexpr Domain share = closed(0.0, 1.0);
 constexpr Domain angle = above(0.0, 1e3);
 
-constexpr std::array<Field<S>, n_pid_fields> table{{
-    field<&S::sample_s>({"sample_s", "s", above(0.0, 1.0), "time between samples"}),
-    field<&S::above, &PidGains::proportional_per_deg>(
-        {"proportional_above_per_deg", "1/degree", gain, "duty per error above limp-home"}),
-    field<&S::above, &PidGains::integral_per_deg_s>(
-        {"integral_above_per_deg_s", "1/(degree*second)", gain, "integral gain above limp-home"}),
-    field<&S::above, &PidGains::derivative_s_per_deg>(
-        {"derivative_above_s_per_deg", "second/degree", gain, "duty against speed above limp-home"}),
-    field<&S::below, &PidGains::proportional_per_deg>(
-        {"proportional_below_per_deg", "1/degree", gain, "duty per error below limp-home"}),
-    field<&S::below, &PidGains::integral_per_deg_s>(
-        {"integral_below_per_deg_s", "1/(degree*second)", gain, "integral gain below limp-home"}),
-    field<&S::below, &PidGains::derivative_s_per_deg>(
-        {"derivative_below_s_per_deg", "second/degree", gain, "duty against speed below limp-home"}),
-    field<&S::derivative_lag_s>({"derivative_lag_s", "s", closed(0.0, 10.0), "lag of the measured speed"}),
-    field<&S::spring, &H::limp_home_deg>({"limp_home_deg", "deg", closed(-360.0, 360.0), "rest angle of the springs"}),
-    field<&S::spring, &H::ramp_deg>({"ramp_deg", "deg", angle, "half width over which preload and gains change sides"}),
-    field<&S::spring, &H::above, &Side::preload>(
-        {"preload_above", "-", share, "duty against the preload above limp-home"}),
-    field<&S::spring, &H::above, &Side::per_deg>(
-        {"spring_above_per_deg", "1/degree", share, "duty against the spring above limp-home"}),
-    field<&S::spring, &H::below, &Side::preload>(
-        {"preload_below", "-", share, "duty against the preload below limp-home"}),
-    field<&S::spring, &H::below, &Side::per_deg>(
-        {"spring_below_per_deg", "1/degree", share, "duty against the spring below limp-home"}),
-    field<&S::kick>({"kick", "-", share, "duty towards the reference against stiction"}),
-    field<&S::kick_width_deg>({"kick_width_deg", "deg", angle, "error at which the kick is full"}),
-    field<&S::dead_band_deg>({"dead_band_deg", "deg", closed(0.0, 1e3), "smaller errors count as zero"}),
-    field<&S::integral_window_deg>({"integral_window_deg", "deg", angle, "only smaller errors are integrated"}),
-    field<&S::integral_limit>({"integral_limit", "-", share, "bound of the integral"}),
-    field<&S::rate_s_per_deg>({"rate_s_per_deg", "second/degree", gain, "duty per rate of the reference"}),
-    field<&S::friction>({"friction", "-", share, "duty in the direction of that rate against dry friction"}),
-    field<&S::friction_rate_deg_per_s>(
-        {"friction_rate_deg_per_s", "degree/second", above(0.0, 1e6), "rate at which it is full"}),
-    field<&S::reference_lag_s>({"reference_lag_s", "s", closed(0.0, 10.0), "lag of the rate of the reference"}),
-    field<&S::reference_jump_deg_per_s>(
-        {"reference_jump_deg_per_s", "degree/second", above(0.0, 1e9), "a faster reference steps and has no rate"}),
-    field<&S::lower>({"lower", "-", lower_duty, "least duty"}),
-    field<&S::upper>({"upper", "-", upper_duty, "largest duty"}),
-}};
+constexpr std::array<Field<S>, n_pid_fields> table = joined(
+    std::array{
+        field<&S::sample_s>({"sample_s", "s", above(0.0, 1.0), "time between samples"}),
+        field<&S::above, &PidGains::proportional_per_deg>(
+            {"proportional_above_per_deg", "1/degree", gain, "duty per error above limp-home"}),
+        field<&S::above, &PidGains::integral_per_deg_s>(
+            {"integral_above_per_deg_s", "1/(degree*second)", gain, "integral gain above limp-home"}),
+        field<&S::above, &PidGains::derivative_s_per_deg>(
+            {"derivative_above_s_per_deg", "second/degree", gain, "duty against speed above limp-home"}),
+        field<&S::below, &PidGains::proportional_per_deg>(
+            {"proportional_below_per_deg", "1/degree", gain, "duty per error below limp-home"}),
+        field<&S::below, &PidGains::integral_per_deg_s>(
+            {"integral_below_per_deg_s", "1/(degree*second)", gain, "integral gain below limp-home"}),
+        field<&S::below, &PidGains::derivative_s_per_deg>(
+            {"derivative_below_s_per_deg", "second/degree", gain, "duty against speed below limp-home"}),
+        field<&S::derivative_lag_s>({"derivative_lag_s", "s", closed(0.0, 10.0), "lag of the measured speed"}),
+    },
+    spring_fields<&S::spring>("half width over which preload and gains change sides"),
+    std::array{
+        field<&S::kick>({"kick", "-", share, "duty towards the reference against stiction"}),
+        field<&S::kick_width_deg>({"kick_width_deg", "deg", angle, "error at which the kick is full"}),
+        field<&S::dead_band_deg>({"dead_band_deg", "deg", closed(0.0, 1e3), "smaller errors count as zero"}),
+        field<&S::integral_window_deg>({"integral_window_deg", "deg", angle, "only smaller errors are integrated"}),
+        field<&S::integral_limit>({"integral_limit", "-", share, "bound of the integral"}),
+        field<&S::rate_s_per_deg>({"rate_s_per_deg", "second/degree", gain, "duty per rate of the reference"}),
+        field<&S::friction>({"friction", "-", share, "duty in the direction of that rate against dry friction"}),
+        field<&S::friction_rate_deg_per_s>(
+            {"friction_rate_deg_per_s", "degree/second", above(0.0, 1e6), "rate at which it is full"}),
+        field<&S::reference_lag_s>({"reference_lag_s", "s", closed(0.0, 10.0), "lag of the rate of the reference"}),
+        field<&S::reference_jump_deg_per_s>(
+            {"reference_jump_deg_per_s", "degree/second", above(0.0, 1e9), "a faster reference steps and has no rate"}),
+        field<&S::lower>({"lower", "-", lower_duty, "least duty"}),
+        field<&S::upper>({"upper", "-", upper_duty, "largest duty"}),
+    });
 
 const PidSettings& checked(const PidSettings& settings) {
   validate(settings);

@@ -7,13 +7,12 @@
 #include <utility>
 
 #include "mgdd/common/error.hpp"
+#include "mgdd/control/spring_fields.hpp"
 
 namespace mgdd::control {
 namespace {
 
 using S = SlidingModeSettings;
-using H = HoldingDuty;
-using Side = SpringSideDuty;
 
 constexpr std::array<std::pair<ReachingLaw, std::string_view>, 3> law_names{{
     {ReachingLaw::boundary_layer, "boundary_layer"},
@@ -23,40 +22,34 @@ constexpr std::array<std::pair<ReachingLaw, std::string_view>, 3> law_names{{
 
 constexpr Domain share = closed(0.0, 1.0);
 
-constexpr std::array<Field<S>, n_sliding_mode_fields> table{{
-    field<&S::sample_s>({"sample_s", "s", above(0.0, 1.0), "time between samples"}),
-    field<&S::gain_deg_per_s2>({"gain_deg_per_s2", "degree/second**2", above(0.0, 1e9), "acceleration per duty"}),
-    field<&S::time_constant_s>({"time_constant_s", "s", above(0.0, 1e9), "time constant of the speed"}),
-    field<&S::spring, &H::limp_home_deg>({"limp_home_deg", "deg", closed(-360.0, 360.0), "rest angle of the springs"}),
-    field<&S::spring, &H::ramp_deg>(
-        {"ramp_deg", "deg", above(0.0, 1e3), "half width over which the preload changes sides"}),
-    field<&S::spring, &H::above, &Side::preload>(
-        {"preload_above", "-", share, "duty against the preload above limp-home"}),
-    field<&S::spring, &H::above, &Side::per_deg>(
-        {"spring_above_per_deg", "1/degree", share, "duty against the spring above limp-home"}),
-    field<&S::spring, &H::below, &Side::preload>(
-        {"preload_below", "-", share, "duty against the preload below limp-home"}),
-    field<&S::spring, &H::below, &Side::per_deg>(
-        {"spring_below_per_deg", "1/degree", share, "duty against the spring below limp-home"}),
-    field<&S::friction>({"friction", "-", share, "duty in the direction of the reference's rate"}),
-    field<&S::friction_rate_deg_per_s>(
-        {"friction_rate_deg_per_s", "degree/second", above(0.0, 1e6), "rate at which it is full"}),
-    field<&S::bandwidth_per_s>({"bandwidth_per_s", "1/second", above(0.0, 1e6), "decay of the error on the surface"}),
-    field<&S::integral_per_s>(
-        {"integral_per_s", "1/second", closed(0.0, 1e6), "weight of the integral in the surface"}),
-    field<&S::integral_layers>(
-        {"integral_layers", "-", closed(0.0, 1e6), "integrates only while |s| is below so many layers"}),
-    field<&S::reference_pole_per_s>(
-        {"reference_pole_per_s", "1/second", above(0.0, 1e6), "double pole of the reference's filter"}),
-    field<&S::derivative_lag_s>({"derivative_lag_s", "s", closed(0.0, 10.0), "lag of the measured speed"}),
-    field<&S::switching>({"switching", "-", share, "duty of the reaching law"}),
-    field<&S::layer_deg>({"layer_deg", "deg", closed(0.0, 1e3), "error at which that duty is full"}),
-    field<&S::root_per_root_deg_per_s>(
-        {"root_per_root_deg_per_s", "(second/degree)**0.5", closed(0.0, 1e3), "super-twisting: duty per root of |s|"}),
-    field<&S::twist_per_s>({"twist_per_s", "1/second", closed(0.0, 1e6), "super-twisting: rate of its integral"}),
-    field<&S::lower>({"lower", "-", lower_duty, "least duty"}),
-    field<&S::upper>({"upper", "-", upper_duty, "largest duty"}),
-}};
+constexpr std::array<Field<S>, n_sliding_mode_fields> table = joined(
+    std::array{
+        field<&S::sample_s>({"sample_s", "s", above(0.0, 1.0), "time between samples"}),
+        field<&S::gain_deg_per_s2>({"gain_deg_per_s2", "degree/second**2", above(0.0, 1e9), "acceleration per duty"}),
+        field<&S::time_constant_s>({"time_constant_s", "s", above(0.0, 1e9), "time constant of the speed"}),
+    },
+    spring_fields<&S::spring>(),
+    std::array{
+        field<&S::friction>({"friction", "-", share, "duty in the direction of the reference's rate"}),
+        field<&S::friction_rate_deg_per_s>(
+            {"friction_rate_deg_per_s", "degree/second", above(0.0, 1e6), "rate at which it is full"}),
+        field<&S::bandwidth_per_s>(
+            {"bandwidth_per_s", "1/second", above(0.0, 1e6), "decay of the error on the surface"}),
+        field<&S::integral_per_s>(
+            {"integral_per_s", "1/second", closed(0.0, 1e6), "weight of the integral in the surface"}),
+        field<&S::integral_layers>(
+            {"integral_layers", "-", closed(0.0, 1e6), "integrates only while |s| is below so many layers"}),
+        field<&S::reference_pole_per_s>(
+            {"reference_pole_per_s", "1/second", above(0.0, 1e6), "double pole of the reference's filter"}),
+        field<&S::derivative_lag_s>({"derivative_lag_s", "s", closed(0.0, 10.0), "lag of the measured speed"}),
+        field<&S::switching>({"switching", "-", share, "duty of the reaching law"}),
+        field<&S::layer_deg>({"layer_deg", "deg", closed(0.0, 1e3), "error at which that duty is full"}),
+        field<&S::root_per_root_deg_per_s>({"root_per_root_deg_per_s", "(second/degree)**0.5", closed(0.0, 1e3),
+                                            "super-twisting: duty per root of |s|"}),
+        field<&S::twist_per_s>({"twist_per_s", "1/second", closed(0.0, 1e6), "super-twisting: rate of its integral"}),
+        field<&S::lower>({"lower", "-", lower_duty, "least duty"}),
+        field<&S::upper>({"upper", "-", upper_duty, "largest duty"}),
+    });
 
 const SlidingModeSettings& checked(const SlidingModeSettings& settings) {
   validate(settings);

@@ -56,8 +56,9 @@ TrackingFigures tracking_figures(const ThrottleScenario& s, const ThrottleTrack&
     }
     if (k > 0) out.total_variation += std::abs(track.duty[k] - track.duty[k - 1]);
   }
-  out.settling_s = last_outside == n ? std::numeric_limits<double>::quiet_NaN()
-                                     : static_cast<double>(last_outside - s.from) * sample_s;
+  const double sample_ms = 1e3 * sample_s;  // first, so that 1 kHz gives whole numbers
+  out.settling_ms = last_outside == n ? std::numeric_limits<double>::quiet_NaN()
+                                      : static_cast<double>(last_outside - s.from) * sample_ms;
   const std::size_t end = samples_of(static_s, sample_s, counted);
   for (std::size_t k = n - end; k < n; ++k)
     out.static_error_deg += std::abs(error(k)) / static_cast<double>(end);

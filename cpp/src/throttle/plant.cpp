@@ -14,6 +14,13 @@ double checked_step(const Throttle& throttle, double step_s) {
   return step_s;
 }
 
+// Bristles side by side: their deflection at full friction is the same on both sides of the gap.
+FrictionCoefficients<double> share_of_friction(const Throttle& t, double share) noexcept {
+  return {share * t.viscous_nms_per_rad,
+          {share * t.coulomb_nm, share * t.stiction_nm},
+          {share * t.bristle_nm_per_rad, share * t.bristle_damping_nms_per_rad}};
+}
+
 // Every option on every scalar of the contract.
 static_assert(dynamics::StartsAtRest<ThrottlePlant> && dynamics::StartsAtRest<BasicThrottlePlant<float>> &&
               dynamics::StartsAtRest<BasicThrottlePlant<Dual<3>>> &&
@@ -28,9 +35,9 @@ PlantCoefficients<double> plant_coefficients(const Throttle& t, double h) noexce
   const double plate = t.plate_friction_share;
   const double bore_m = t.bore_mm * units::m_per_mm;
   PlantCoefficients<double> c{};
-  c.whole = {t.viscous_nms_per_rad, {t.coulomb_nm, t.stiction_nm}};
-  c.motor_side = {(1.0 - plate) * t.viscous_nms_per_rad, {(1.0 - plate) * t.coulomb_nm, (1.0 - plate) * t.stiction_nm}};
-  c.plate_side = {plate * t.viscous_nms_per_rad, {plate * t.coulomb_nm, plate * t.stiction_nm}};
+  c.whole = share_of_friction(t, 1.0);
+  c.motor_side = share_of_friction(t, 1.0 - plate);
+  c.plate_side = share_of_friction(t, plate);
   c.inertia_over_h = t.inertia_kgm2 / h;
   c.motor_inertia_over_h = (t.inertia_kgm2 - t.plate_inertia_kgm2) / h;
   c.plate_inertia_over_h = t.plate_inertia_kgm2 / h;
@@ -41,8 +48,7 @@ PlantCoefficients<double> plant_coefficients(const Throttle& t, double h) noexce
   c.inverse_impedance = 1.0 / (inductance_over_h + resistance);
   c.drop = t.driver_drop_v;
   c.dead_band = t.dead_band;
-  c.shape = {1.0 / t.stribeck_rad_per_s, t.karnopp_rad_per_s, 1.0 / t.tanh_rad_per_s, t.bristle_nm_per_rad,
-             t.bristle_damping_nms_per_rad};
+  c.shape = {1.0 / t.stribeck_rad_per_s, t.karnopp_rad_per_s, 1.0 / t.tanh_rad_per_s};
   c.limp_home = t.limp_home_deg * rad_per_deg;
   c.above = {t.spring_above_nm_per_rad, t.preload_above_nm};
   c.below = {t.spring_below_nm_per_rad, t.preload_below_nm};

@@ -246,8 +246,8 @@ class GuidedPredictive:
     Model-guided predictive controller of a throttle plate, one sample at a time.
     
     A rough model predicts a short horizon; one Gauss-Newton step per sample moves the last duties along its exact slopes;
-    what is measured corrects the model while it runs. The default learns dry friction as two levels per side of limp-home
-    gain and damping, asks the model for the duty at which the plate breaks away, and holds still inside the friction band.
+    what is measured corrects the model while it runs. The default learns dry friction as two levels per side of limp-home,
+    gain and damping, goes back to the last belief that proved itself where the learnt one predicts worse, asks the model for the duty at which the plate breaks away, and holds still inside the friction band.
     ``friction_learning=False`` is the plain form, ``prediction="linear"`` the usual linear MPC, more `gauss_newton_steps`
     the converged nonlinear one. Keyword-only; the defaults fit the throttle ``P1``. `mgdd.loop.tuned_controller` makes one
     for another throttle; ``GuidedPredictive.fields()`` lists bounds and defaults.
@@ -283,10 +283,15 @@ class GuidedPredictive:
     noise_deg : float
         Standard deviation of the measured angle [deg]: what counts as motion.
     learning_rate_per_s, gain_weight, damping_weight : float
-        Learning: share of what explains an innovation, per time [1/s], and how much of it goes to gain and damping beside a
-        friction level [-].
+        Learning: share of what explains an innovation, per time [1/s], and the first variances of the factors of gain and
+        damping over that of a friction level [-].
+    level_memory_s, memory_s : float
+        Time of sliding after which a friction level, and gain and damping, are as uncertain as at first [s].
     least_gain_factor, largest_gain_factor : float
         Bounds of the learnt gain over the given one [-].
+    rollback_ratio, rollback_s, certify_s : float
+        A belief whose squared innovations are larger than those of the certified one by this ratio [-] over the first time
+        of sliding [s] is given up for it; one whose are smaller by it over the second time [s] is certified.
     bias_rate_per_deg_s, trim_rate_per_deg_s : float
         Without learning: rates of the one bias and of the trim, which the model does not see [1/(deg s)].
     reference_lag_s, reference_jump_deg_per_s : float
@@ -340,7 +345,7 @@ class GuidedPredictive:
         """
     def __getstate__(self) -> tuple[int, dict, dict[str, list[float]]]:
         ...
-    def __init__(self, *, sample_s: typing.SupportsFloat | typing.SupportsIndex = 0.001, gain_deg_per_s2: typing.SupportsFloat | typing.SupportsIndex = 83597.0, time_constant_s: typing.SupportsFloat | typing.SupportsIndex = 0.0197, electrical_s: typing.SupportsFloat | typing.SupportsIndex = 0.001, limp_home_deg: typing.SupportsFloat | typing.SupportsIndex = 8.0, ramp_deg: typing.SupportsFloat | typing.SupportsIndex = 0.5, preload_above: typing.SupportsFloat | typing.SupportsIndex = 0.1292, spring_above_per_deg: typing.SupportsFloat | typing.SupportsIndex = 0.000496, preload_below: typing.SupportsFloat | typing.SupportsIndex = 0.1292, spring_below_per_deg: typing.SupportsFloat | typing.SupportsIndex = 0.000496, friction: typing.SupportsFloat | typing.SupportsIndex = 0.0927, closed_deg: typing.SupportsFloat | typing.SupportsIndex = 0.0, open_deg: typing.SupportsFloat | typing.SupportsIndex = 90.0, prediction_step_s: typing.SupportsFloat | typing.SupportsIndex = 0.002, error_weight: typing.SupportsFloat | typing.SupportsIndex = 1.0, speed_weight: typing.SupportsFloat | typing.SupportsIndex = 0.0, duty_change_weight: typing.SupportsFloat | typing.SupportsIndex = 4.0, lower: typing.SupportsFloat | typing.SupportsIndex = -1.0, upper: typing.SupportsFloat | typing.SupportsIndex = 1.0, duty_rate_per_s: typing.SupportsFloat | typing.SupportsIndex = 10000.0, lowest_deg: typing.SupportsFloat | typing.SupportsIndex = -1000.0, highest_deg: typing.SupportsFloat | typing.SupportsIndex = 1000.0, angle_limit_weight: typing.SupportsFloat | typing.SupportsIndex = 20.0, observer_angle_per_s: typing.SupportsFloat | typing.SupportsIndex = 430.0, observer_speed_per_s2: typing.SupportsFloat | typing.SupportsIndex = 28000.0, noise_deg: typing.SupportsFloat | typing.SupportsIndex = 0.03, learning_rate_per_s: typing.SupportsFloat | typing.SupportsIndex = 150.0, gain_weight: typing.SupportsFloat | typing.SupportsIndex = 36.0, damping_weight: typing.SupportsFloat | typing.SupportsIndex = 36.0, least_gain_factor: typing.SupportsFloat | typing.SupportsIndex = 0.625, largest_gain_factor: typing.SupportsFloat | typing.SupportsIndex = 1.6, bias_rate_per_deg_s: typing.SupportsFloat | typing.SupportsIndex = 4.0, trim_rate_per_deg_s: typing.SupportsFloat | typing.SupportsIndex = 0.3, reference_lag_s: typing.SupportsFloat | typing.SupportsIndex = 0.0045, reference_jump_deg_per_s: typing.SupportsFloat | typing.SupportsIndex = 400.0, prediction: str = 'nonlinear', switching: str = 'predicted', delay_samples: typing.SupportsInt | typing.SupportsIndex = 1, move_steps: typing.Annotated[collections.abc.Sequence[typing.SupportsInt | typing.SupportsIndex], "FixedSize(3)"] = [3, 5, 12], gauss_newton_steps: typing.SupportsInt | typing.SupportsIndex = 1, friction_learning: bool = True) -> None:
+    def __init__(self, *, sample_s: typing.SupportsFloat | typing.SupportsIndex = 0.001, gain_deg_per_s2: typing.SupportsFloat | typing.SupportsIndex = 83597.0, time_constant_s: typing.SupportsFloat | typing.SupportsIndex = 0.0197, electrical_s: typing.SupportsFloat | typing.SupportsIndex = 0.001, limp_home_deg: typing.SupportsFloat | typing.SupportsIndex = 8.0, ramp_deg: typing.SupportsFloat | typing.SupportsIndex = 0.5, preload_above: typing.SupportsFloat | typing.SupportsIndex = 0.1292, spring_above_per_deg: typing.SupportsFloat | typing.SupportsIndex = 0.000496, preload_below: typing.SupportsFloat | typing.SupportsIndex = 0.1292, spring_below_per_deg: typing.SupportsFloat | typing.SupportsIndex = 0.000496, friction: typing.SupportsFloat | typing.SupportsIndex = 0.0927, closed_deg: typing.SupportsFloat | typing.SupportsIndex = 0.0, open_deg: typing.SupportsFloat | typing.SupportsIndex = 90.0, prediction_step_s: typing.SupportsFloat | typing.SupportsIndex = 0.002, error_weight: typing.SupportsFloat | typing.SupportsIndex = 1.0, speed_weight: typing.SupportsFloat | typing.SupportsIndex = 0.0, duty_change_weight: typing.SupportsFloat | typing.SupportsIndex = 4.0, lower: typing.SupportsFloat | typing.SupportsIndex = -1.0, upper: typing.SupportsFloat | typing.SupportsIndex = 1.0, duty_rate_per_s: typing.SupportsFloat | typing.SupportsIndex = 10000.0, lowest_deg: typing.SupportsFloat | typing.SupportsIndex = -1000.0, highest_deg: typing.SupportsFloat | typing.SupportsIndex = 1000.0, angle_limit_weight: typing.SupportsFloat | typing.SupportsIndex = 20.0, observer_angle_per_s: typing.SupportsFloat | typing.SupportsIndex = 430.0, observer_speed_per_s2: typing.SupportsFloat | typing.SupportsIndex = 28000.0, noise_deg: typing.SupportsFloat | typing.SupportsIndex = 0.03, learning_rate_per_s: typing.SupportsFloat | typing.SupportsIndex = 150.0, gain_weight: typing.SupportsFloat | typing.SupportsIndex = 36.0, damping_weight: typing.SupportsFloat | typing.SupportsIndex = 36.0, level_memory_s: typing.SupportsFloat | typing.SupportsIndex = 0.01, memory_s: typing.SupportsFloat | typing.SupportsIndex = 0.5, least_gain_factor: typing.SupportsFloat | typing.SupportsIndex = 0.625, largest_gain_factor: typing.SupportsFloat | typing.SupportsIndex = 1.6, rollback_ratio: typing.SupportsFloat | typing.SupportsIndex = 1.5, rollback_s: typing.SupportsFloat | typing.SupportsIndex = 0.05, certify_s: typing.SupportsFloat | typing.SupportsIndex = 1.0, bias_rate_per_deg_s: typing.SupportsFloat | typing.SupportsIndex = 4.0, trim_rate_per_deg_s: typing.SupportsFloat | typing.SupportsIndex = 0.3, reference_lag_s: typing.SupportsFloat | typing.SupportsIndex = 0.0045, reference_jump_deg_per_s: typing.SupportsFloat | typing.SupportsIndex = 400.0, prediction: str = 'nonlinear', switching: str = 'predicted', delay_samples: typing.SupportsInt | typing.SupportsIndex = 1, move_steps: typing.Annotated[collections.abc.Sequence[typing.SupportsInt | typing.SupportsIndex], "FixedSize(3)"] = [3, 5, 12], gauss_newton_steps: typing.SupportsInt | typing.SupportsIndex = 1, friction_learning: bool = True) -> None:
         ...
     def __repr__(self) -> str:
         ...
@@ -377,6 +382,11 @@ class GuidedPredictive:
         Ignored if a number is not finite.
         """
     @property
+    def certified(self) -> dict[str, float]:
+        """
+        The last belief that predicted well for `certify_s`, like `learnt`: a worse one is rolled back to it.
+        """
+    @property
     def duty(self) -> float:
         """
         Duty of the last sample [-].
@@ -399,6 +409,11 @@ class GuidedPredictive:
     @learnt.setter
     def learnt(self, arg1: collections.abc.Mapping[str, typing.SupportsFloat | typing.SupportsIndex]) -> None:
         ...
+    @property
+    def rollbacks(self) -> int:
+        """
+        How often a learnt belief was given up for the certified one.
+        """
     @property
     def settings(self) -> dict:
         """

@@ -2,25 +2,36 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Mapping, Sequence
-from typing import Any, Protocol
+from typing import TYPE_CHECKING, Any, Protocol
 
 from mgdd import _core
+from mgdd.control.discrete_model import MOST_STATES
+from mgdd.errors import ParameterError
+
+if TYPE_CHECKING:
+    from numpy.typing import ArrayLike
 
 __all__ = ["Mgdd1"]
 
 
 class Guide(Protocol):
-    """A model that the core can ask: `mgdd.throttle.PseudoWiener` of any kind."""
+    """A black box that guides; its states go in and out, so that it need not remember anything."""
 
-    @property
-    def kind(self) -> str:
-        """Its name."""
+    n_states: int
+    sample_s: float
+
+    def at_rest(self, angle_deg: float, /) -> ArrayLike:
+        """Give the state, shape (n_states,), at rest at an angle."""
         ...
 
-    @property
-    def parameters(self) -> Mapping[str, float]:
-        """Its numbers."""
+    def step(self, state: Any, duty: float, /) -> ArrayLike:
+        """Give the state after a sample with a duty."""
+        ...
+
+    def output(self, state: Any, /) -> float:
+        """Give the angle [deg] of a state."""
         ...
 
 
@@ -33,9 +44,12 @@ class Mgdd1:
 
     Parameters
     ----------
-    guide : PseudoWiener, optional
+    guide : PseudoWiener or object, optional
         A model of any kind and quality, with the sample time of the controller; PW-R of the throttle ``P1`` if left
-        out.
+        out. Or any object with the numbers ``n_states`` (1 to 32) and ``sample_s`` and the methods ``at_rest(angle_deg)
+        -> state``, ``step(state, duty) -> state``, ``output(state) -> angle_deg`` and, if it shall follow the
+        measurement, ``correct(state, angle_deg) -> state``; a state is an array of ``n_states`` numbers, which the
+        controller keeps.
     horizon_samples : int
         Length of the prediction [-], 1 to 1000.
     delay_samples : int
@@ -56,7 +70,14 @@ class Mgdd1:
     Raises
     ------
     mgdd.errors.ParameterError
-        A setting outside its domain, naming field, value and bound.
+        A setting outside its domain, naming field, value and bound; a guide that lacks what it needs.
+
+    Notes
+    -----
+    With a guide of the core a step cannot raise and takes microseconds. An object is called some ``6 horizon_samples``
+    times per sample, and sets the pace. Its exceptions come out of `step`, a state of the wrong length is a
+    `mgdd.errors.ShapeError`, a number that is not finite a `mgdd.errors.DataError` that names the method; each leaves
+    the controller as it was. `mgdd.loop.track` runs it, `mgdd.loop.track_many` does not.
 
     See Also
     --------
@@ -73,11 +94,26 @@ class Mgdd1:
     >>> from mgdd.loop import track
     >>> bool(track(Mgdd1(), "step:20:60", seed=1)["static_error_deg"] < 0.5)
     True
+
+    A guide that knows no more than that the plate follows the duty within some 50 ms:
+
+    >>> class Lag:
+    ...     n_states, sample_s = 1, 1e-3
+    ...     def at_rest(self, angle_deg):
+    ...         return [angle_deg]
+    ...     def step(self, state, duty):
+    ...         return [state[0] + 0.02 * (8.0 + 150.0 * duty - state[0])]
+    ...     def output(self, state):
+    ...         return state[0]
+    ...     def correct(self, state, angle_deg):
+    ...         return [angle_deg]
+    >>> -1.0 <= Mgdd1(Lag()).step(40.0, 20.0) <= 1.0
+    True
     """
 
     def __init__(
         self,
-        guide: Guide | None = None,
+        guide: Any | None = None,
         *,
         horizon_samples: int = 16,
         delay_samples: int = 1,
@@ -104,8 +140,8 @@ class Mgdd1:
         }
         self._settings: dict[str, Any] = {"horizon_samples": horizon_samples, "delay_samples": delay_samples, **numbers}
         self.guide = guide
-        self._core = _core.loop.Mgdd1(
-            _asked(guide), horizon_samples=horizon_samples, delay_samples=delay_samples, numbers=numbers
+        self._core: Any = _made(
+            guide, {"horizon_samples": horizon_samples, "delay_samples": delay_samples, "numbers": numbers}
         )
 
     @staticmethod
@@ -152,6 +188,11 @@ class Mgdd1:
         -------
         float
             Duty [-]; 0 before the first finite inputs.
+
+        Raises
+        ------
+        Exception
+            What an object that guides raised, or of mgdd where it answered wrongly; the controller is as before.
         """
         return float(self._core.step(reference_deg, measurement_deg))
 
@@ -164,19 +205,25 @@ class Mgdd1:
         return _restored, (self.guide, self.settings, self.state)
 
 
-def _restored(guide: Guide | None, settings: dict[str, Any], state: dict[str, list[float]]) -> Mgdd1:
+def _restored(guide: Any | None, settings: dict[str, Any], state: dict[str, list[float]]) -> Mgdd1:
     made = Mgdd1(guide, **settings)
     made.state = state
     return made
 
 
-def _asked(guide: Guide | None) -> Any:
+def _made(guide: Any | None, settings: dict[str, Any]) -> Any:
     if guide is None:
         control = {"ramp_deg": 0.5, "tanh_deg_per_s": 40.0, "substeps": 1.0}
-        return _core.throttle.PseudoWienerModel("pw_r", control, friction="tanh")
+        return _core.loop.Mgdd1(_core.throttle.PseudoWienerModel("pw_r", control, friction="tanh"), **settings)
     inner = getattr(guide, "_core", None)
-    if not isinstance(inner, _core.throttle.PseudoWienerModel):
-        from mgdd.errors import ParameterError
-
-        raise ParameterError.of("guide", guide, "a PseudoWiener model")
-    return inner
+    if isinstance(inner, _core.throttle.PseudoWienerModel):
+        return _core.loop.Mgdd1(inner, **settings)
+    missing = [name for name in ("at_rest", "step", "output") if not callable(getattr(guide, name, None))]
+    if missing:
+        raise ParameterError.of("guide", guide, f"a PseudoWiener model, or an object with {', '.join(missing)}")
+    n_states, sample_s = getattr(guide, "n_states", None), getattr(guide, "sample_s", None)
+    if isinstance(n_states, bool) or not isinstance(n_states, int) or not 1 <= n_states <= MOST_STATES:
+        raise ParameterError.of("guide.n_states", n_states, f"a whole number in [1, {MOST_STATES}]")
+    if not isinstance(sample_s, float) or not (math.isfinite(sample_s) and sample_s > 0.0):
+        raise ParameterError.of("guide.sample_s", sample_s, "a number > 0 s")
+    return _core.loop.ObjectGuidedMgdd1(guide, n_states=n_states, sample_s=sample_s, **settings)

@@ -66,7 +66,7 @@ CASES: Mapping[str, Case] = {
     "unknown": Case("100 throttles within 20 %", controllers=tuple(FAMILIES)),
     "far": Case("within 40 %", spread=0.4),
     "bristles": Case("presliding (LuGre)", bristles=True),
-    "air": Case("air torque -0.2 N m", air_nm=-0.2, controllers=tuple(FAMILIES), presets=("P1",)),
+    "air": Case("air torque -0.2 N m", air_nm=-0.2, controllers=tuple(FAMILIES)),
     "gusts": Case("gusty air, -0.1 N m with 0.03 N m rms up to 20 Hz", air_nm=-0.1, gusts_nm=0.03),
     "late": Case("duty one sample later than told", late_samples=1),
     "weights": Case(

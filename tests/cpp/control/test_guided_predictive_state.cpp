@@ -147,6 +147,11 @@ TEST(GuidedPredictive, RefusesByNameAndChangesNothing) {
   columns["friction_above"] = {0.9};
   EXPECT_THROW(restore_state(controller, columns), ParameterError);
   EXPECT_EQ(controller.belief().above.friction, 0.08);
+  for (const char* name : {"certified_gain_factor", "slope_damping_variance"}) {
+    columns = save_state(controller);
+    columns[name] = {1e3};
+    EXPECT_THROW(restore_state(controller, columns), ParameterError) << name;
+  }
 }
 
 }  // namespace

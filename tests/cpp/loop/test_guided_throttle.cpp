@@ -88,15 +88,15 @@ TEST(GuidedThrottle, ThePlainFormMeetsTheFactsOfP1) {
   const ThrottleTrack track = run(controller, preset(1), large);
   const TrackingFigures f = tracking_figures(large, track, 1e-3, 0.8);
   EXPECT_LE(rise_ms(track, large), 55.0);
-  EXPECT_LE(f.settling_s, 0.080);
+  EXPECT_LE(f.settling_ms, 80.0);
   EXPECT_LE(f.overshoot_deg, 1.5);
   for (const double duty : track.duty)
     EXPECT_LE(std::abs(duty), 1.0);
-  EXPECT_LE(judged(controller, preset(1), step_scenario(40.0, 42.0), 0.2).settling_s, 0.060);
-  EXPECT_LE(judged(controller, preset(1), step_scenario(4.0, 20.0), 0.32).settling_s, 0.080);
-  EXPECT_LE(judged(controller, preset(1), step_scenario(20.0, 4.0), 0.32).settling_s, 0.080);
+  EXPECT_LE(judged(controller, preset(1), step_scenario(40.0, 42.0), 0.2).settling_ms, 60.0);
+  EXPECT_LE(judged(controller, preset(1), step_scenario(4.0, 20.0), 0.32).settling_ms, 80.0);
+  EXPECT_LE(judged(controller, preset(1), step_scenario(20.0, 4.0), 0.32).settling_ms, 80.0);
   EXPECT_LE(rise_ms(run(controller, preset(1), largest), largest), 78.0);
-  EXPECT_LE(judged(controller, preset(1), largest, 1.44).settling_s, 0.095);
+  EXPECT_LE(judged(controller, preset(1), largest, 1.44).settling_ms, 95.0);
 }
 
 TEST(GuidedThrottle, TrimAndBiasRemoveTheErrorOfASteadyTorque) {
@@ -112,6 +112,57 @@ TEST(GuidedThrottle, TrimAndBiasRemoveTheErrorOfASteadyTorque) {
   EXPECT_LT(both, bias);
   EXPECT_LT(bias, neither);
   EXPECT_LE(error(learning(1)), 0.13);
+}
+
+// What a torque step does to a plate that is held at 40 deg, from half of its hold on.
+struct Held {
+  double moved_deg;
+  TrackingFigures figures;
+};
+Held torque_step(const GuidedPredictiveSettings& settings, double begin_deg, double torque_nm, std::uint64_t seed) {
+  ThrottleScenario s = step_scenario(begin_deg, 40.0, 3500);
+  s.from = 2000;
+  s.airflow_torque_nm.assign(s.from, 0.0);
+  s.airflow_torque_nm.resize(s.reference_deg.size(), torque_nm);
+  VirtualThrottleSettings plant = plant_of(preset(1), seed);
+  plant.start_deg = begin_deg;
+  GuidedPredictive controller(settings);
+  const ThrottleTrack track = run_throttle_loop(controller, plant, 1, s);
+  double moved = 0.0;
+  for (std::size_t k = s.from; k < track.angle_deg.size(); ++k)
+    moved = std::max(moved, std::abs(track.angle_deg[k] - track.angle_deg[s.from - 1]));
+  return {moved, tracking_figures(s, track, 1e-3, 0.2)};
+}
+
+// Held without having moved, the duty stands in the middle of the friction band, 0.28 N m to either side: a step of
+// 0.3 N m hardly leaves it.
+TEST(GuidedThrottle, ATorqueStepWhileHoldingStaysInTheFrictionBand) {
+  for (std::uint64_t seed = 0; seed < 5; ++seed) {
+    for (const double torque : {-0.3, 0.3}) {
+      EXPECT_LE(torque_step(plain(), 40.0, torque, seed).moved_deg, 0.1) << torque << ' ' << seed;
+      EXPECT_LE(torque_step(plain(0.0), 40.0, torque, seed).moved_deg, 0.1) << torque << ' ' << seed;
+    }
+  }
+}
+
+// Behind a step the duty rests anywhere in the inner part of the band: half of the friction moves nothing, and what
+// 0.3 N m move is brought back at once. The plain form stands at the edge of the band and is carried off slowly.
+TEST(GuidedThrottle, ATorqueStepBehindAMoveIsBroughtBackByTheLearningForm) {
+  double farthest_plain = 0.0;
+  for (const double begin : {20.0, 40.0, 60.0}) {
+    for (std::uint64_t seed = 0; seed < 5; ++seed) {
+      for (const double sign : {-1.0, 1.0}) {
+        EXPECT_EQ(torque_step(learning(1), begin, 0.15 * sign, seed).moved_deg, 0.0) << begin << ' ' << seed;
+        const Held large = torque_step(learning(1), begin, 0.3 * sign, seed);
+        EXPECT_LE(large.moved_deg, 0.65) << begin << ' ' << sign << ' ' << seed;
+        EXPECT_LE(large.figures.settling_ms, 150.0) << begin << ' ' << sign << ' ' << seed;
+        EXPECT_LE(large.figures.static_error_deg, 0.13) << begin << ' ' << sign << ' ' << seed;
+        farthest_plain = std::max(farthest_plain, torque_step(plain(), begin, 0.3 * sign, seed).moved_deg);
+      }
+    }
+  }
+  EXPECT_GT(farthest_plain, 0.7);
+  EXPECT_LE(farthest_plain, 1.2);
 }
 
 TEST(GuidedThrottle, FollowsASineFourTimesAsWellAsAnOrdinaryPid) {
@@ -141,7 +192,7 @@ TEST(GuidedThrottle, AnExtraDelayCostsWhatItMustAndIsForgottenOnceTold) {
     told.delay_samples = 1 + extra;
     const TrackingFigures right = judged(GuidedPredictive(told), preset(1), s, 0.8, 1 + extra);
     EXPECT_LT(right.overshoot_deg, 1.0);
-    EXPECT_LT(right.settling_s, 0.080 + 1e-3 * extra);
+    EXPECT_LT(right.settling_ms, 80.0 + extra);
   }
   EXPECT_GT(last, 3.0);
 }
@@ -184,11 +235,11 @@ TEST_P(UnknownThrottles, AreTrackedWithinTheBars) {
     EXPECT_LE(quantile(values, 0.95), p95);
   };
   using F = TrackingFigures;
-  expect(all(0, &F::settling_s), 1e-3 * bars.large_ms, 1e-3 * bars.large_p95_ms);
-  expect(all(1, &F::settling_s), 0.025, 0.045);
+  expect(all(0, &F::settling_ms), bars.large_ms, bars.large_p95_ms);
+  expect(all(1, &F::settling_ms), 25.0, 45.0);
   expect(all(1, &F::mse_deg2), 0.060, 0.080);
-  expect(all(2, &F::settling_s), 1e-3 * bars.crossing_ms, 1e-3 * bars.crossing_p95_ms);
-  expect(all(3, &F::settling_s), 1e-3 * bars.crossing_ms, 1e-3 * bars.crossing_p95_ms);
+  expect(all(2, &F::settling_ms), bars.crossing_ms, bars.crossing_p95_ms);
+  expect(all(3, &F::settling_ms), bars.crossing_ms, bars.crossing_p95_ms);
   expect(all(4, &F::mse_deg2), 0.01, 0.01);
   expect(all(5, &F::total_variation), 0.2, 0.2);
   for (std::size_t scenario = 0; scenario < 4; ++scenario) {

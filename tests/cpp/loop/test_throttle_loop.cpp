@@ -39,7 +39,7 @@ TEST(TrackingFigures, OfATrackMadeByHand) {
   track.duty[100] = -0.4;
   track.duty[101] = 0.1;
   const TrackingFigures f = tracking_figures(s, track, 1e-3, 0.2);
-  EXPECT_NEAR(f.settling_s, 0.050, 1e-12);
+  EXPECT_EQ(f.settling_ms, 50.0);
   EXPECT_NEAR(f.mse_deg2, (40.0 * 100.0 + 10.0 + 950.0 * 0.01) / 1000.0, 1e-9);
   EXPECT_NEAR(f.static_error_deg, 0.1, 1e-9);
   EXPECT_NEAR(f.overshoot_deg, 1.0, 1e-12);
@@ -48,8 +48,22 @@ TEST(TrackingFigures, OfATrackMadeByHand) {
   EXPECT_EQ(f.limit_cycle_deg, 0.0);
   track.angle_deg.back() = 21.0;
   const TrackingFigures late = tracking_figures(s, track, 1e-3, 0.2);
-  EXPECT_TRUE(std::isnan(late.settling_s));
+  EXPECT_TRUE(std::isnan(late.settling_ms));
   EXPECT_NEAR(late.limit_cycle_deg, 0.9, 1e-12);
+}
+
+// At 1 kHz a number of samples is the same number of milliseconds, to the last digit.
+TEST(TrackingFigures, SettlingIsAWholeNumberOfSamples) {
+  const ThrottleScenario s = step_scenario(30.0, 20.0, 10, 300);
+  ThrottleTrack track;
+  track.angle_deg.assign(310, 20.0);
+  track.duty.assign(310, 0.1);
+  for (std::size_t samples = 1; samples < 300; ++samples) {
+    track.angle_deg[9 + samples] = 30.0;  // the last one outside the band
+    const auto expected = static_cast<double>(samples);
+    ASSERT_EQ(tracking_figures(s, track, 1e-3, 0.2).settling_ms, expected);
+    ASSERT_EQ(tracking_figures(s, track, 2e-3, 0.2).settling_ms, 2.0 * expected);
+  }
 }
 
 TEST(TrackingFigures, AMovingReferenceHasNoLimitCycle) {
@@ -61,7 +75,7 @@ TEST(TrackingFigures, AMovingReferenceHasNoLimitCycle) {
   track.duty.assign(600, 0.2);
   const TrackingFigures f = tracking_figures(s, track, 1e-3, 0.2);
   EXPECT_EQ(f.limit_cycle_deg, 0.0);
-  EXPECT_EQ(f.settling_s, 0.0);
+  EXPECT_EQ(f.settling_ms, 0.0);
   EXPECT_EQ(f.overshoot_deg, 0.0);
 }
 

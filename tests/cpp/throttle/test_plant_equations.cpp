@@ -129,11 +129,11 @@ void expect_friction(const Throttle& p, const Shaft& s, double now, Left left, c
     }
     case Friction::lugre: {
       const double rate = (s.new_bristle - s.bristle) / s.h;
-      EXPECT_NEAR(rate, now - p.bristle_nm_per_rad * std::abs(s.speed) / level(p, s.share, s.speed) * s.new_bristle,
+      EXPECT_NEAR(rate, now - p.bristle_nm_per_rad * std::abs(s.speed) / level(p, 1.0, s.speed) * s.new_bristle,
                   1e-9 * (1.0 + std::abs(now)))
           << where;
-      EXPECT_NEAR(friction, p.bristle_nm_per_rad * s.new_bristle + p.bristle_damping_nms_per_rad * rate, tolerance_nm)
-          << where;
+      const double whole = p.bristle_nm_per_rad * s.new_bristle + p.bristle_damping_nms_per_rad * rate;
+      EXPECT_NEAR(friction, s.share * whole, tolerance_nm) << where;
       return;
     }
   }

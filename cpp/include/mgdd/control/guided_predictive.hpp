@@ -12,8 +12,10 @@
 #include <cstddef>
 #include <cstdint>
 #include <span>
+#include <type_traits>
 
 #include "mgdd/common/state.hpp"
+#include "mgdd/control/belief_review.hpp"
 #include "mgdd/control/filtered_rate.hpp"
 #include "mgdd/control/guided_horizon.hpp"
 #include "mgdd/control/guided_predictive_settings.hpp"
@@ -48,6 +50,9 @@ class BasicGuidedPredictive {
   /// What was learnt, and a start from it. ParameterError for levels that learning could not have reached.
   const PlateBelief<T>& belief() const noexcept { return belief_; }
   void set_belief(const PlateBelief<T>& belief);
+  /// The last belief that predicted well for long, to which a worse one is rolled back; how often that was.
+  const PlateBelief<T>& certified() const noexcept { return proven_.belief(); }
+  std::int64_t rollbacks() const noexcept { return rollbacks_; }
 
   const GuidedPredictiveSettings& settings() const noexcept { return settings_; }
   T duty() const noexcept { return duty_; }
@@ -68,12 +73,15 @@ class BasicGuidedPredictive {
     visit_number(v, "speed_deg_per_s", self.state_.speed_deg_per_s);
     visit_number(v, "torque", self.state_.torque);
     visit_number(v, "mean_torque", self.mean_torque_);
-    visit_number(v, "bias_above", self.belief_.above.bias);
-    visit_number(v, "friction_above", self.belief_.above.friction);
-    visit_number(v, "bias_below", self.belief_.below.bias);
-    visit_number(v, "friction_below", self.belief_.below.friction);
-    visit_number(v, "gain_factor", self.belief_.gain_factor);
-    visit_number(v, "damping_factor", self.belief_.damping_factor);
+    visit_belief(self.belief_, v);
+    auto certified = self.proven_.belief();
+    visit_belief(certified, Prefixed<V>{v, "certified_"});
+    if constexpr (!std::is_const_v<Self>) self.proven_.believe(certified);
+    visit_number(v, "certified_angle_deg", self.proven_state_.angle_deg);
+    visit_number(v, "certified_speed_deg_per_s", self.proven_state_.speed_deg_per_s);
+    visit_number(v, "certified_torque", self.proven_state_.torque);
+    BeliefReview<T>::visit(self.review_, Prefixed<V>{v, "review_"});
+    v("rollbacks", self.rollbacks_);
     FrictionLearner<T>::visit(self.learner_, Prefixed<V>{v, "slope_"});
     FilteredRate<T>::visit(self.reference_, Prefixed<V>{v, "reference_"});
     for (std::size_t i = 0; i < self.sent_.before.size(); ++i)
@@ -91,8 +99,19 @@ class BasicGuidedPredictive {
   static constexpr std::array<const char*, longest_guided_delay + 1> names_of_sent{"sent_0", "sent_1", "sent_2",
                                                                                    "sent_3", "sent_4", "sent_5"};
   static constexpr std::array<const char*, n> names_of_moves{"move_0", "move_1", "move_2"};
+  template <class B, class V>
+  static void visit_belief(B& belief, V&& v) {
+    visit_number(v, "bias_above", belief.above.bias);
+    visit_number(v, "friction_above", belief.above.friction);
+    visit_number(v, "bias_below", belief.below.bias);
+    visit_number(v, "friction_below", belief.below.friction);
+    visit_number(v, "gain_factor", belief.gain_factor);
+    visit_number(v, "damping_factor", belief.damping_factor);
+  }
   void start(T angle_deg, T duty) noexcept;
   void correct(T measurement_deg) noexcept;
+  T corrected(PlateState<T>& state, T measurement_deg) noexcept;
+  bool review(T innovation, bool slides) noexcept;
   void look_ahead(T measurement_deg, std::span<const T> preview_deg) noexcept;
   bool hold_still() noexcept;
   void break_away() noexcept;
@@ -103,17 +122,20 @@ class BasicGuidedPredictive {
   GuidedPredictiveSettings settings_;
   PlateModel<T> observed_;   // one sample at a time
   PlateModel<T> predicted_;  // one prediction step at a time
+  PlateModel<T> proven_;     // `observed_` with the certified belief
   T angle_share_, speed_gain_;
   FrictionLearner<T> learner_;
+  BeliefReview<T> review_;
 
   bool started_ = false, prepared_ = false, holds_ = false, above_ = true;
   std::int64_t still_ = 0;
-  PlateState<T> state_{};
+  PlateState<T> state_{}, proven_state_{};
   T mean_torque_{0.0};
   PlateBelief<T> belief_{};
   FilteredRate<T> reference_;
   dynamics::DelayLine<T, longest_guided_delay + 1> sent_{};  // duties without trim
   GuidedMoves<T> moves_{};
+  std::int64_t rollbacks_ = 0;
   T innovation_{0.0}, mean_error_{0.0}, trim_{0.0}, duty_{0.0};
   GuidedHorizon<T> horizon_{};  // of the last sample, for `refine`
 };

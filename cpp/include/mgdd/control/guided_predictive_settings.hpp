@@ -8,6 +8,7 @@
 
 #include "mgdd/common/enum_names.hpp"
 #include "mgdd/common/field.hpp"
+#include "mgdd/control/belief_review.hpp"
 #include "mgdd/control/duty_range.hpp"
 #include "mgdd/control/friction_learner.hpp"
 #include "mgdd/control/plate.hpp"
@@ -63,6 +64,7 @@ struct GuidedPredictiveSettings {
   double noise_deg = 0.03;  ///< of the measured angle: what counts as motion
   bool friction_learning = true;
   FrictionLearnerSettings learner{};
+  BeliefReviewSettings review{};
   double bias_rate_per_deg_s = 4.0;  ///< without learning
   double trim_rate_per_deg_s = 0.3;  ///< without learning: invisible to the prediction
 
@@ -76,13 +78,14 @@ struct GuidedPredictiveSettings {
 };
 
 /// All numbers of the settings, in the order in which Python shows them.
-inline constexpr std::size_t n_guided_predictive_fields = 35;
+inline constexpr std::size_t n_guided_predictive_fields = 40;
 std::span<const Field<GuidedPredictiveSettings>, n_guided_predictive_fields> guided_predictive_fields() noexcept;
 
 /// ParameterError naming field, value and bound.
 void validate(const GuidedPredictiveSettings& settings);
 
 /// ParameterError for levels that learning with these settings could not have reached.
-void require_usable_belief(const PlateBelief<double>& belief, const GuidedPredictiveSettings& settings);
+void require_usable_belief(const PlateBelief<double>& belief, const GuidedPredictiveSettings& settings,
+                           const char* prefix = "");
 
 }  // namespace mgdd::control

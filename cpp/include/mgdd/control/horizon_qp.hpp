@@ -2,12 +2,12 @@
 // by Riccati sweeps over an active set: O(N n^3) per sweep. With V_k the cost to go as a function of the deviation of
 // the state and of the input before, a stage is free, fixed or tied to the input before it; the multipliers are the
 // slopes of the stage costs (recursion: Bertsekas 2017; active sets: Nocedal and Wright 2006, section 16.5). Every
-// iterate is feasible and none costs more than the one before. noexcept, heap-free; double or float.
+// iterate is feasible and none costs more than the one before. noexcept; double or float; heap-free where N and n are
+// known to the compiler (Eigen::Dynamic: sized once by `resize`, then the heap is used in every sweep).
 #pragma once
 
 #include <Eigen/Core>
 #include <algorithm>
-#include <array>
 #include <cmath>
 #include <cstddef>
 #include <limits>
@@ -26,20 +26,38 @@ class HorizonQp {
  public:
   using Square = Eigen::Matrix<T, n, n>;
   using Column = Eigen::Matrix<T, n, 1>;
-  using Inputs = std::array<T, static_cast<std::size_t>(N)>;
+  using Inputs = Along<T, N>;
   struct Stage {
-    Square a = Square::Zero();
-    Column b = Column::Zero(), c = Column::Zero();
+    Square a = zero_or_empty<Square>();
+    Column b = zero_or_empty<Column>(), c = zero_or_empty<Column>();
     T error{0}, weight{0};
   };
 
-  std::array<Stage, static_cast<std::size_t>(N)> stages{};
+  Along<Stage, N> stages{};
   Inputs nominal{};  ///< must be feasible: the start of the search, too
   HorizonSet<T, N> set{};
   T input_weight{0}, change_weight{0};
 
+  /// Of a horizon whose length or order is told at run time.
+  void resize(std::size_t length, Eigen::Index order) {
+    stretch(stages, length);
+    for (Stage& stage : stages) {
+      stage.a.setZero(order, order);
+      stage.b.setZero(order);
+      stage.c.setZero(order);
+    }
+    for (Inputs* line : {&nominal, &input_, &target_, &trial_, &slope_})
+      stretch(*line, length);
+    stretch(to_go_, length);
+    stretch(law_, length);
+    set.resize(length);
+    trial_set_.resize(length);
+    start_.setZero(order);
+    invalidate();
+  }
+  std::size_t size() const noexcept { return stages.size(); }
   /// Refactors everything at the next solve: stages or weights are new.
-  void invalidate() noexcept { valid_from_ = N; }
+  void invalidate() noexcept { valid_from_ = static_cast<int>(size()); }
   /// What does not depend on errors and the state may be done ahead of `solve`.
   void factor(T before) noexcept {
     set.arrange(nominal, before, valid_from_);
@@ -87,7 +105,6 @@ class HorizonQp {
 
  private:
   static constexpr int jumps = 50, shares = 4;
-  static constexpr std::size_t size = static_cast<std::size_t>(N);
 
   // Half the cost to go: 1/2 x'Px + v a'x + 1/2 b v^2 and slopes, v the deviation of the input before.
   struct CostToGo {
@@ -103,13 +120,14 @@ class HorizonQp {
   };
 
   void factor() noexcept {
-    for (int i = std::min(valid_from_, N) - 1; i >= 0; --i) {
+    const int last = static_cast<int>(size()) - 1;
+    for (int i = std::min(valid_from_ - 1, last); i >= 0; --i) {
       const std::size_t k = static_cast<std::size_t>(i);
       const Stage& stage = stages[k];
       CostToGo ahead = to_go_[k];  // that of the outputs from here on is added below
-      if (i == N - 1) {
-        ahead.p.setZero();
-        ahead.a.setZero();
+      if (i == last) {
+        ahead.p.setZero(stage.b.size(), stage.b.size());
+        ahead.a.setZero(stage.b.size());
         ahead.b = T(0);
       }
       ahead.p.noalias() += (stage.weight * stage.c) * stage.c.transpose();
@@ -134,7 +152,7 @@ class HorizonQp {
           break;
         }
         case StageKind::fixed:
-          behind.a.setZero();
+          behind.a.setZero(stage.b.size());
           behind.b = change_weight;
           break;
         case StageKind::tied:
@@ -147,9 +165,9 @@ class HorizonQp {
   }
 
   void gradients() noexcept {
-    Column p = Column::Zero();
+    Column p = Column::Zero(start_.size());
     T g(0);
-    for (std::size_t k = size; k-- > 0;) {
+    for (std::size_t k = size(); k-- > 0;) {
       const Stage& stage = stages[k];
       p += (stage.weight * stage.error) * stage.c;
       const T moved = change_weight * (nominal[k] - (k == 0 ? before_ : nominal[k - 1]));
@@ -232,7 +250,7 @@ class HorizonQp {
   T roll(Choose&& choose) const noexcept {
     Column x = start_;
     T last(0), cost(0), u_last = before_;
-    for (std::size_t k = 0; k < size; ++k) {
+    for (std::size_t k = 0; k < size(); ++k) {
       const Stage& stage = stages[k];
       const T w = choose(k, law_[k].x.dot(x) + law_[k].slope - change_weight * last, last);
       const T u = nominal[k] + w, moved = u - u_last;
@@ -246,10 +264,10 @@ class HorizonQp {
     return cost;
   }
 
-  std::array<CostToGo, size> to_go_{};  // [k]: behind stage k, without the output after it
-  std::array<Law, size> law_{};
+  Along<CostToGo, N> to_go_{};  // [k]: behind stage k, without the output after it
+  Along<Law, N> law_{};
   int valid_from_ = N;  // laws of the stages from here on fit the set
-  Column start_ = Column::Zero();
+  Column start_ = zero_or_empty<Column>();
   Inputs input_{}, target_{}, trial_{}, slope_{};
   HorizonSet<T, N> trial_set_{};
   T before_{0}, cost_{0}, scale_{0};

@@ -1,14 +1,16 @@
 // Limits of the inputs of a horizon and the set of those that act: bounds of each input and of its change from the one
 // before. Acting limits of changes tie neighbours into runs; a run with a bound, or tied to the input that acted last,
-// is fixed, any other moves as one. noexcept, heap-free; double or float.
+// is fixed, any other moves as one. noexcept; double or float; heap-free where N is known to the compiler.
 #pragma once
 
 #include <algorithm>
-#include <array>
 #include <cmath>
 #include <cstddef>
 #include <cstdint>
 #include <limits>
+#include <utility>
+
+#include "mgdd/control/horizon_line.hpp"
 
 namespace mgdd::control {
 
@@ -18,8 +20,22 @@ enum class StageKind : std::uint8_t { free, fixed, tied };
 template <class T, int N>
 class HorizonSet {
  public:
-  static constexpr std::size_t size = static_cast<std::size_t>(N);
-  using Inputs = std::array<T, size>;
+  using Inputs = Along<T, N>;
+  using Signs = Along<std::int8_t, N>;
+
+  std::size_t size() const noexcept { return tie_.size(); }
+  /// Of a horizon whose length is told at run time: nothing acts.
+  void resize(std::size_t length) {
+    for (Signs* signs : {&tie_, &bound_})
+      stretch(*signs, length);
+    for (Flags* flags : {&wrong_tie_, &wrong_bound_, &ground_})
+      stretch(*flags, length);
+    stretch(first_, length);
+    stretch(kind_, length);
+    stretch(next_kind_, length);
+    stretch(value_, length);
+    clear();
+  }
 
   /// Bounds of an input and of its change; 1e30 and above for none.
   void limit(T lower, T upper, T largest_change) noexcept {
@@ -30,12 +46,15 @@ class HorizonSet {
     slack_ = T(64) * std::numeric_limits<T>::epsilon() * (size_of < T(1e29) ? size_of : T(1));
   }
 
-  void clear() noexcept { tie_ = bound_ = {}; }
+  void clear() noexcept {
+    std::ranges::fill(tie_, std::int8_t{0});
+    std::ranges::fill(bound_, std::int8_t{0});
+  }
   /// What acts one sample later.
   void shift() noexcept {
     std::copy(tie_.begin() + 1, tie_.end(), tie_.begin());
     std::copy(bound_.begin() + 1, bound_.end(), bound_.begin());
-    tie_[size - 1] = 0;
+    tie_.back() = 0;
   }
 
   T lowest(T before) const noexcept { return std::max(lower_, before - largest_change_); }
@@ -60,11 +79,12 @@ class HorizonSet {
   /// Kinds and values from what acts; of limits that follow from others of their run the first stays. Lowers
   /// `valid_from` to behind the last stage whose kind changed.
   void arrange(const Inputs& nominal, T before, int& valid_from) noexcept {
-    std::array<StageKind, size> kind{};
+    auto& kind = next_kind_;
+    std::ranges::fill(kind, StageKind::free);
     bool grounded = false;
     std::size_t first = 0;
     T above_first(0);
-    for (std::size_t k = 0; k < size; ++k) {
+    for (std::size_t k = 0; k < size(); ++k) {
       if (tie_[k] != 0) {
         kind[k] = StageKind::tied;
         const T change = T(tie_[k]) * largest_change_;
@@ -86,20 +106,21 @@ class HorizonSet {
         bound_[k] = 0;
       }
     }
-    for (std::size_t k = 0; k < size; ++k) {
+    for (std::size_t k = 0; k < size(); ++k) {
       if (kind[k] != kind_[k]) valid_from = std::max(valid_from, static_cast<int>(k) + 1);
     }
-    kind_ = kind;
+    std::swap(kind_, next_kind_);
   }
 
   /// Marks limits whose multiplier has the wrong sign, all of them or the worst, by the slopes of the stage costs.
   /// True if there is none.
   bool judge(const Inputs& slope, T tolerance, bool all) noexcept {
-    wrong_tie_ = wrong_bound_ = {};
-    std::array<bool, size>* worst_in = nullptr;
+    std::fill(wrong_tie_.begin(), wrong_tie_.end(), false);
+    std::fill(wrong_bound_.begin(), wrong_bound_.end(), false);
+    Flags* worst_in = nullptr;
     std::size_t worst_at = 0;
     T worst = tolerance;
-    const auto weigh = [&](std::array<bool, size>& marks, std::size_t k, T pull) {
+    const auto weigh = [&](Flags& marks, std::size_t k, T pull) {
       if (!(pull > tolerance)) return;
       if (all) marks[k] = true;
       if (pull > worst) {
@@ -109,7 +130,7 @@ class HorizonSet {
       }
     };
     T carried(0);  // slope that a bound later in the run takes up
-    for (std::size_t k = size; k-- > 0;) {
+    for (std::size_t k = size(); k-- > 0;) {
       const std::size_t first = static_cast<std::size_t>(first_[k]);
       if (ground_[k]) {
         carried = slope[first];
@@ -125,7 +146,7 @@ class HorizonSet {
     return worst_in == nullptr;
   }
   void drop_wrong() noexcept {
-    for (std::size_t k = 0; k < size; ++k) {
+    for (std::size_t k = 0; k < size(); ++k) {
       if (wrong_tie_[k]) tie_[k] = 0;
       if (wrong_bound_[k]) bound_[k] = 0;
     }
@@ -165,31 +186,33 @@ class HorizonSet {
         sign = step > T(0) ? 1 : -1;
       }
     };
-    for (std::size_t k = 0; k < size; ++k) {
+    for (std::size_t k = 0; k < size(); ++k) {
       const T step = target[k] - input[k];
       meet(step, input[k], lower_, upper_, bound_[k]);
       meet(step - last_step, input[k] - last, -largest_change_, largest_change_, tie_[k]);
       last_step = step;
       last = input[k];
     }
-    for (std::size_t k = 0; k < size; ++k)
+    for (std::size_t k = 0; k < size(); ++k)
       input[k] += share * (target[k] - input[k]);
     if (stop != nullptr) *stop = sign;
     clamp(input, before);
   }
 
-  std::array<std::int8_t, size>& ties() noexcept { return tie_; }
-  std::array<std::int8_t, size>& bounds() noexcept { return bound_; }
-  const std::array<std::int8_t, size>& ties() const noexcept { return tie_; }
-  const std::array<std::int8_t, size>& bounds() const noexcept { return bound_; }
+  Signs& ties() noexcept { return tie_; }
+  Signs& bounds() noexcept { return bound_; }
+  const Signs& ties() const noexcept { return tie_; }
+  const Signs& bounds() const noexcept { return bound_; }
 
  private:
+  using Flags = Along<bool, N>;
+
   T lower_{-1}, upper_{1}, largest_change_{T(1e30)};
-  T slack_{0};                                     // what rounding may do to an input
-  std::array<std::int8_t, size> tie_{}, bound_{};  // which limit acts: the upper (1), the lower (-1) or none
-  std::array<bool, size> wrong_tie_{}, wrong_bound_{}, ground_{};
-  std::array<std::int32_t, size> first_{};  // of the run
-  std::array<StageKind, size> kind_{};
+  T slack_{0};             // what rounding may do to an input
+  Signs tie_{}, bound_{};  // which limit acts: the upper (1), the lower (-1) or none
+  Flags wrong_tie_{}, wrong_bound_{}, ground_{};
+  Along<std::int32_t, N> first_{};  // of the run
+  Along<StageKind, N> kind_{}, next_kind_{};
   Inputs value_{};
 };
 

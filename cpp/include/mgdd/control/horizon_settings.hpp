@@ -1,5 +1,5 @@
-// What a receding horizon weighs and keeps to: weights, limits of the input and of its change, and how long it may
-// search. Units are those of the model: output, input, samples. Offline code.
+// What a receding horizon weighs and keeps to: weights, limits of the input, of its change and of the output, and how
+// long it may search. Units are those of the model: output, input, samples. Offline code.
 #pragma once
 
 #include <cstddef>
@@ -18,15 +18,18 @@ struct HorizonSettings {
   double lower = -1.0;           ///< of the input
   double upper = 1.0;
   double largest_change = unbounded;  ///< of the input from sample to sample, also from the last applied one
-  double tolerance = 1e-6;            ///< converged where the largest change of an input is below
-  int max_iterations = 1;             ///< linearisations per sample; 1 is the real-time iteration, without line search
-  int max_sweeps = 60;                ///< of the quadratic program, per iteration
+  double least_output = -unbounded;   ///< soft: beyond, each squared excess costs output_limit_weight
+  double largest_output = unbounded;
+  double output_limit_weight = 0.0;  ///< 0: no bounds
+  double tolerance = 1e-6;           ///< converged where the largest change of an input is below
+  int max_iterations = 1;            ///< linearisations per sample; 1 is the real-time iteration, without line search
+  int max_sweeps = 60;               ///< of the quadratic program, per iteration
 
   bool operator==(const HorizonSettings&) const = default;
 };
 
 /// The real numbers of the settings, in the order in which Python shows them.
-inline constexpr std::size_t n_horizon_fields = 8;
+inline constexpr std::size_t n_horizon_fields = 11;
 std::span<const Field<HorizonSettings>, n_horizon_fields> horizon_fields() noexcept;
 
 /// ParameterError naming field, value and bound.

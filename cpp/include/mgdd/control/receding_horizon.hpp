@@ -1,30 +1,30 @@
 // Receding-horizon control of a discrete model of one input: every sample the N inputs ahead are improved by
-// Gauss-Newton steps on sum q (y - r)^2 + terminal + input + change weights, under bounds of the input and of its
-// change, and the first is applied. One step per sample from the shifted inputs is the real-time iteration (Diehl, Bock
-// and Schlöder 2005): `prepare` linearises while the sample passes, `feedback` answers to the state. Units are the
-// model's own, one input per sample. All steps are noexcept and heap-free; double or float.
+// Gauss-Newton steps on sum q (y - r)^2 + terminal + input + change weights + squared excess over soft bounds of the
+// output, under bounds of the input and of its change, and the first is applied. One step per sample from the shifted
+// inputs is the real-time iteration (Diehl, Bock and Schlöder 2005): `prepare` linearises while the sample passes,
+// `feedback` answers to the state. Units are the model's own, one input per sample. All steps are noexcept; double or
+// float; heap-free where N and n are known to the compiler (Eigen::Dynamic: told at run time).
 #pragma once
 
 #include <algorithm>
-#include <array>
 #include <cmath>
 #include <concepts>
 #include <cstdint>
 #include <span>
 #include <string>
-#include <type_traits>
-#include <utility>
 
 #include "mgdd/common/state.hpp"
 #include "mgdd/control/filtered_rate.hpp"
+#include "mgdd/control/horizon_outputs.hpp"
 #include "mgdd/control/horizon_qp.hpp"
 #include "mgdd/control/horizon_settings.hpp"
+#include "mgdd/control/horizon_slopes.hpp"
 #include "mgdd/dynamics/discrete_model.hpp"
 
 namespace mgdd::control {
 
 /// Slopes go through the first `n` numbers of the state: all of them, or those that the inputs and the others reach
-/// (without a delay line that is not in use, the observed ones).
+/// (without a delay line that is not in use, the observed ones). `length` is told where N is Eigen::Dynamic.
 template <dynamics::DiscreteModel M, int N, int n = static_cast<int>(dynamics::n_numbers<M>)>
   requires std::floating_point<typename M::Scalar>
 class RecedingHorizon {
@@ -35,15 +35,18 @@ class RecedingHorizon {
   using Inputs = typename Qp::Inputs;
 
   /// ParameterError for settings out of range. `start` follows.
-  RecedingHorizon(const M& model, const HorizonSettings& settings)
-      : model_(model), dual_model_(model.template over<D>()), settings_(settings) {
-    validate(settings);
+  RecedingHorizon(const M& model, const HorizonSettings& settings, int length = N)
+      : model_(model), slopes_(model), settings_((validate(settings), settings)) {
+    require_within("horizon_samples", length, 1.0, 1000.0);
+    if constexpr (N == Eigen::Dynamic || n == Eigen::Dynamic) {
+      qp_.resize(static_cast<std::size_t>(length), static_cast<Eigen::Index>(slopes_.order()));
+    }
+    stretch(inputs_, qp_.size());
+    outputs_.set(settings, qp_.size());
     qp_.set.limit(narrow(settings.lower), narrow(settings.upper), narrow(settings.largest_change));
     qp_.input_weight = narrow(settings.input_weight);
     qp_.change_weight = narrow(settings.change_weight);
-    for (auto& stage : qp_.stages)
-      stage.weight = narrow(settings.output_weight);
-    qp_.stages[size - 1].weight = narrow(settings.terminal_weight);
+    outputs_.settle(qp_.stages);
     start({}, Scalar(0));
   }
 
@@ -51,7 +54,7 @@ class RecedingHorizon {
   void start(const State& state, Scalar applied) noexcept {
     state_ = state;
     applied_ = std::clamp(applied, narrow(settings_.lower), narrow(settings_.upper));
-    inputs_.fill(applied_);
+    std::ranges::fill(inputs_, applied_);
     qp_.set.clear();
     shifted_ = true;  // nothing to shift
     linearised_ = false;
@@ -85,10 +88,10 @@ class RecedingHorizon {
       return applied_;
     }
     if (!shifted_ || !linearised_) prepare();
-    typename Qp::Column deviation;
+    typename Qp::Column deviation = Qp::Column::Zero(static_cast<Eigen::Index>(slopes_.order()));
     const auto now = M::numbers(state);
     const auto predicted = M::numbers(state_);
-    for (std::size_t i = 0; i < slopes; ++i)
+    for (std::size_t i = 0; i < slopes_.order(); ++i)
       deviation(static_cast<Eigen::Index>(i)) = *now[i] - *predicted[i];
     search(state, deviation, reference);
     if (status_ == HorizonStatus::not_finite) {
@@ -119,12 +122,15 @@ class RecedingHorizon {
   int sweeps() const noexcept { return sweeps_; }
   /// The plan: after `feedback` the inputs from this sample on, after `prepare` those from the next.
   const Inputs& inputs() const noexcept { return inputs_; }
+  /// The state that the plan starts from: after `feedback` the one given, after `prepare` the predicted one.
+  const State& state() const noexcept { return state_; }
+  Scalar last_input() const noexcept { return applied_; }
   const HorizonSettings& settings() const noexcept { return settings_; }
   const M& model() const noexcept { return model_; }
   /// Other numbers, the same plan.
   void set_model(const M& model) noexcept {
     model_ = model;
-    dual_model_ = model.template over<D>();
+    slopes_ = HorizonSlopes<M, n>(model);
     linearised_ = false;
   }
 
@@ -132,10 +138,10 @@ class RecedingHorizon {
   Scalar cost(const State& state, const Inputs& inputs, std::span<const Scalar> reference) const noexcept {
     State s = state;
     Scalar sum(0), before = applied_;
-    for (std::size_t k = 0; k < size; ++k) {
+    for (std::size_t k = 0; k < size(); ++k) {
       model_.step(s, dynamics::input_of(model_, inputs[k]));
-      const Scalar error = model_.output(s) - wanted(reference, k), change = inputs[k] - before;
-      sum += qp_.stages[k].weight * error * error + qp_.input_weight * inputs[k] * inputs[k] +
+      const Scalar change = inputs[k] - before;
+      sum += outputs_.cost(k, model_.output(s), wanted(reference, k)) + qp_.input_weight * inputs[k] * inputs[k] +
              qp_.change_weight * change * change;
       before = inputs[k];
     }
@@ -146,7 +152,7 @@ class RecedingHorizon {
   void require_usable() const {
     Scalar before = applied_;
     require_within("state column 'applied'", applied_, narrow(settings_.lower), narrow(settings_.upper));
-    for (std::size_t k = 0; k < size; ++k) {
+    for (std::size_t k = 0; k < size(); ++k) {
       if (k > 0 || shifted_) {
         require_within("state column 'input_" + std::to_string(k) + "'", inputs_[k], qp_.set.lowest(before),
                        qp_.set.highest(before));
@@ -160,10 +166,10 @@ class RecedingHorizon {
   template <class Self, class V>
   static void visit(Self& self, V& v) {
     const auto numbers = M::numbers(self.state_);
-    for (std::size_t i = 0; i < numbers.size(); ++i)
+    for (std::size_t i = 0; i < self.slopes_.n_saved(); ++i)
       visit_number(v, "state_" + std::to_string(i), *numbers[i]);
     visit_number(v, "applied", self.applied_);
-    for (std::size_t k = 0; k < size; ++k) {
+    for (std::size_t k = 0; k < self.size(); ++k) {
       visit_number(v, "input_" + std::to_string(k), self.inputs_[k]);
       visit_sign(v, "tie_" + std::to_string(k), self.qp_.set.ties()[k]);
       visit_sign(v, "bound_" + std::to_string(k), self.qp_.set.bounds()[k]);
@@ -173,13 +179,11 @@ class RecedingHorizon {
   }
 
  private:
-  static constexpr std::size_t size = static_cast<std::size_t>(N);
-  static constexpr std::size_t slopes = static_cast<std::size_t>(n);
   static constexpr int halvings = 12;
-  using D = Dual<n + 1, Scalar>;
-  using Lifted = std::remove_const_t<decltype(std::declval<const M&>().template over<D>())>;
+  static constexpr int rounds = 8;  // sides change by many at once; then by the first (Murty 1974), against cycles
 
-  static Scalar narrow(double value) noexcept { return static_cast<Scalar>(std::clamp(value, -1e30, 1e30)); }
+  std::size_t size() const noexcept { return qp_.size(); }
+  static Scalar narrow(double value) noexcept { return narrowed<Scalar>(value); }
   template <class V, class Sign>
   static void visit_sign(V& v, const std::string& name, Sign& sign) {
     std::int64_t wide = sign;  // NOLINT(misc-const-correctness): a reader writes it
@@ -197,29 +201,8 @@ class RecedingHorizon {
 
   /// Along the inputs from `state_`.
   void linearise() noexcept {
-    auto s = dynamics::lifted<Lifted>(state_);
-    const auto places = Lifted::numbers(s);
-    const auto seed = [&] {
-      for (std::size_t i = 0; i < slopes; ++i) {
-        places[i]->grad = {};
-        places[i]->grad[i] = Scalar(1);
-      }
-    };
-    seed();
-    for (std::size_t k = 0; k < size; ++k) {
-      dual_model_.step(s, dynamics::input_of(dual_model_, D::seeded(inputs_[k], n)));
-      auto& stage = qp_.stages[k];
-      for (std::size_t i = 0; i < slopes; ++i) {
-        for (std::size_t j = 0; j < slopes; ++j)
-          stage.a(static_cast<Eigen::Index>(i), static_cast<Eigen::Index>(j)) = places[i]->grad[j];
-        stage.b(static_cast<Eigen::Index>(i)) = places[i]->grad[slopes];
-      }
-      seed();
-      const D y = dual_model_.output(s);
-      outputs_[k] = y.value;
-      for (std::size_t i = 0; i < slopes; ++i)
-        stage.c(static_cast<Eigen::Index>(i)) = y.grad[i];
-    }
+    slopes_.along(state_, inputs_, outputs_.values, qp_.stages);
+    outputs_.settle(qp_.stages);
     qp_.nominal = inputs_;
     qp_.invalidate();
     qp_.factor(applied_);
@@ -227,11 +210,19 @@ class RecedingHorizon {
   }
 
   QpResult solve(const typename Qp::Column& deviation, std::span<const Scalar> reference) noexcept {
-    for (std::size_t k = 0; k < size; ++k)
-      qp_.stages[k].error = outputs_[k] - wanted(reference, k);
-    const QpResult result = qp_.solve(deviation, applied_, settings_.max_sweeps);
-    sweeps_ += qp_.sweeps();
-    return result;
+    int spent = 0;
+    for (int round = 0;; ++round) {
+      for (std::size_t k = 0; k < size(); ++k)
+        qp_.stages[k].error = outputs_.error(k, wanted(reference, k));
+      const QpResult result = qp_.solve(deviation, applied_, settings_.max_sweeps - spent);
+      spent += qp_.sweeps();
+      sweeps_ += qp_.sweeps();
+      if (result != QpResult::solved || !outputs_.bounded() || !outputs_.change_sides(qp_, deviation, round < rounds))
+        return result;
+      if (spent >= settings_.max_sweeps) return QpResult::sweep_limit;
+      qp_.set.clear();
+      qp_.invalidate();
+    }
   }
 
   void search(const State& state, const typename Qp::Column& deviation, std::span<const Scalar> reference) noexcept {
@@ -261,7 +252,7 @@ class RecedingHorizon {
       }
       if (iterations_ == settings_.max_iterations) return;
       linearise();
-      result = solve(Qp::Column::Zero(), reference);
+      result = solve(Qp::Column::Zero(static_cast<Eigen::Index>(slopes_.order())), reference);
     }
   }
 
@@ -271,7 +262,7 @@ class RecedingHorizon {
     Scalar share(1);
     for (int i = 0; i < halvings; ++i, share /= Scalar(2)) {
       if (i > 0) {
-        for (std::size_t k = 0; k < size; ++k)
+        for (std::size_t k = 0; k < size(); ++k)
           trial[k] = inputs_[k] + share * (qp_.input()[k] - inputs_[k]);
         qp_.set.clamp(trial, applied_);
       }
@@ -279,7 +270,7 @@ class RecedingHorizon {
       if (!(tried < best)) continue;
       best = tried;
       Scalar moved(0);
-      for (std::size_t k = 0; k < size; ++k)
+      for (std::size_t k = 0; k < size(); ++k)
         moved = std::max(moved, std::abs(trial[k] - inputs_[k]));
       if (i > 0) qp_.set.clear();  // what acts at the end of the step need not act before it
       inputs_ = trial;
@@ -290,11 +281,12 @@ class RecedingHorizon {
   }
 
   M model_;
-  Lifted dual_model_;
+  HorizonSlopes<M, n> slopes_;
   HorizonSettings settings_;
   Qp qp_{};
   State state_{};  // after `prepare` the predicted one, after `feedback` the measured one
-  Inputs inputs_{}, outputs_{};
+  Inputs inputs_{};
+  HorizonOutputs<Scalar, N> outputs_{};
   Scalar applied_{0};
   bool shifted_ = true, linearised_ = false;
   HorizonStatus status_ = HorizonStatus::iteration_limit;

@@ -58,14 +58,15 @@ struct Bristles {
   C stiffness, damping;
 };
 
-/// The LuGre step, implicit in the deflection: `level` is the sliding friction at the speed before the step.
+/// The LuGre step, implicit in the deflection: `level` is the sliding friction at the speed before the step. Without
+/// friction the bristle stays unbent.
 template <class T, class L, class C, class D>
 MGDD_INLINE T bend_or_slide(const T& speed, const T& momentum, const L& level, const Bristles<C>& bristles,
                             double step_s, const D& divisor, T& bristle) noexcept {
   const T h = T(step_s);
   const C per_h = bristles.damping / C(step_s);
   const T size = larger(speed, -speed);
-  const T keep = T(1.0) / (T(1.0) + h * bristles.stiffness * size / level);
+  const T keep = select(level > L(0.0), T(1.0) / (T(1.0) + h * bristles.stiffness * size / level), T(0.0));
   const T grip = (bristles.stiffness + per_h) * keep;
   const T moved = (momentum - (grip - per_h) * bristle) / (divisor + grip * h);
   bristle = keep * (bristle + h * moved);
@@ -79,7 +80,7 @@ struct FrictionLevels {
 /// What the forms need beside the levels.
 template <class C>
 struct FrictionShape {
-  C inverse_stribeck, karnopp, inverse_tanh, bristle, bristle_damping;
+  C inverse_stribeck, karnopp, inverse_tanh;
 };
 
 /// Level at a speed that falls from stiction to Coulomb friction.
@@ -98,9 +99,9 @@ C breakaway_level(Friction form, const FrictionLevels<C>& f) noexcept {
 
 /// Speed after a step of `step_s` with `momentum` = inertia/h speed + all torques but dry friction, over `divisor`.
 template <class T, class C, class D>
-MGDD_INLINE T next_speed(Friction form, const FrictionLevels<C>& f, const FrictionShape<C>& shape, double step_s,
-                         const C& inertia_over_h, const T& speed, const T& momentum, const D& divisor,
-                         T& bristle) noexcept {
+MGDD_INLINE T next_speed(Friction form, const FrictionLevels<C>& f, const FrictionShape<C>& shape,
+                         const Bristles<C>& bristles, double step_s, const C& inertia_over_h, const T& speed,
+                         const T& momentum, const D& divisor, T& bristle) noexcept {
   const T zero(0.0);
   const T size = larger(speed, -speed);
   const T rest = T(rest_speed);
@@ -127,8 +128,7 @@ MGDD_INLINE T next_speed(Friction form, const FrictionLevels<C>& f, const Fricti
     case Friction::tanh:
       return creep(speed, momentum, f.coulomb, shape.inverse_tanh, divisor);
     case Friction::lugre:
-      return bend_or_slide(speed, momentum, stribeck_level(f, shape, speed),
-                           Bristles<C>{shape.bristle, shape.bristle_damping}, step_s, divisor, bristle);
+      return bend_or_slide(speed, momentum, stribeck_level(f, shape, speed), bristles, step_s, divisor, bristle);
   }
   return zero;
 }

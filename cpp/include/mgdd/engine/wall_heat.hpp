@@ -12,7 +12,7 @@
 
 namespace mgdd::engine {
 
-/// Woschni's constant with pressure in bar and bore in m: 3.26 (kPa, m; Heywood 1988, eq. 12.6x) times 100^0.8.
+/// Woschni's constant with pressure in bar and bore in m: 3.26 (kPa, m; Heywood 1988, chapter 12) times 100^0.8.
 inline constexpr double woschni_c1_bar_m = 129.8;
 /// Hohenberg's constant with pressure in bar and volume in m3 (Hohenberg 1979).
 inline constexpr double hohenberg_c1_bar_m3 = 130.0;

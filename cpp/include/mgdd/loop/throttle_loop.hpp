@@ -41,7 +41,7 @@ struct ThrottleTrack {
 /// How well a reference was followed, from sample `from` on. Errors are reference less true angle, the angle at the end
 /// of the sample whose start the reference names.
 struct TrackingFigures {
-  double settling_s = 0.0;        ///< until the error stays within the band; NaN: never
+  double settling_ms = 0.0;       ///< whole samples until the error stays within the band; NaN: never
   double mse_deg2 = 0.0;          ///< over all samples
   double static_error_deg = 0.0;  ///< mean size over the last 0.1 s
   double overshoot_deg = 0.0;     ///< beyond the last reference, in the direction of the step; 0 without one

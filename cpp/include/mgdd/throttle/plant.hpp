@@ -57,6 +57,7 @@ template <class C>
 struct FrictionCoefficients {
   C viscous;
   dynamics::FrictionLevels<C> levels;
+  dynamics::Bristles<C> bristles;
 };
 
 /// What one step needs of the parameters, in SI. Every member is a C, so that lanes are packed as columns.
@@ -188,8 +189,8 @@ class BasicThrottlePlant {
   MGDD_INLINE Load load(const T& angle, const Input& in) const noexcept;
   MGDD_INLINE T friction(const FrictionCoefficients<C>& f, const C& inertia_over_h, const T& speed, const T& momentum,
                          const C& divisor, T& bristle) const noexcept {
-    return dynamics::next_speed(friction_, f.levels, c_.shape, step_s_, inertia_over_h, speed, momentum, divisor,
-                                bristle);
+    return dynamics::next_speed(friction_, f.levels, c_.shape, f.bristles, step_s_, inertia_over_h, speed, momentum,
+                                divisor, bristle);
   }
   T duty_of(const T& torque, const Input& in) const noexcept {
     const T volts_per_duty = larger(in.supply_v - c_.drop, T(1e-9));

@@ -74,7 +74,7 @@ struct Throttle {
   double gear_stiffness_nm_per_rad = 200.0;
   double gear_damping_nms_per_rad = 0.2;
   double plate_inertia_kgm2 = 0.0003;  ///< share of `inertia_kgm2` on the plate's side of the gap
-  double plate_friction_share = 0.3;   ///< [-] of Coulomb, stiction and viscous friction
+  double plate_friction_share = 0.3;   ///< [-] of Coulomb, stiction and viscous friction, and of the bristles
 
   // Air flow: closing torque D^3 dp C_T(angle) (placeholder shape, to be fitted to a bench).
   double bore_mm = 60.0;

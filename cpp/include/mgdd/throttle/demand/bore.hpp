@@ -1,6 +1,6 @@
 // What a throttle plate leaves open: a round plate on a shaft in a round bore, area and discharge coefficient over the
 // angle, and both inverses. Parameters in field units; areas in m², angles in rad inside. noexcept, heap-free.
-// Area: Heywood 1988, eq. 7.19, with the signs of the exact geometry (the form printed in many places falls after
+// Area: Heywood 1988, chapter 7, with the signs of the exact geometry (the form printed in many places falls after
 // 74.85 deg). The discharge coefficient is a placeholder of plausible shape, to be fitted to a flow bench.
 #pragma once
 

@@ -1,7 +1,7 @@
 // Flow of air through an orifice [kg/s], isentropic to its throat: choked below the critical pressure ratio, straight
 // to zero near equal pressures, reversed beyond them. SI. noexcept, heap-free.
-// Equations: Heywood 1988, appendix C, eqs. C.8 and C.9, with gamma = 1.4. The straight part is ours: the slope stays
-// finite, so that the flow can be inverted and a manifold integrated.
+// Equations: Heywood 1988, appendix C, with gamma = 1.4. The straight part is ours: the slope stays finite, so that the
+// flow can be inverted and a manifold integrated.
 #pragma once
 
 namespace mgdd::throttle {

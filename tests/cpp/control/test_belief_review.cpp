@@ -1,0 +1,131 @@
+#include <gtest/gtest.h>
+
+#include <array>
+#include <cmath>
+#include <map>
+#include <random>
+#include <string>
+#include <string_view>
+
+#include "mgdd/common/state.hpp"
+#include "mgdd/control/belief_review.hpp"
+#include "mgdd/control/friction_learner.hpp"
+#include "support/guided_plate.hpp"
+
+namespace mgdd {
+namespace {
+
+using namespace control;
+using test_support::asymmetric;
+
+constexpr double noise_deg = 0.03;
+
+TEST(BeliefReview, GivesUpABeliefThatPredictsWorseForTheShortTime) {
+  BeliefReview<double> review({.worse = 1.5, .roll_back_s = 0.04, .certify_s = 10.0}, 2e-3, noise_deg);
+  for (int i = 0; i < 19; ++i)
+    EXPECT_EQ(review.judge(0.3, 0.1), Verdict::keep) << i;
+  EXPECT_EQ(review.judge(0.3, 0.1), Verdict::roll_back);
+  review.restart();
+  EXPECT_EQ(review.judge(0.3, 0.1), Verdict::keep) << "it needs the whole time again";
+}
+
+TEST(BeliefReview, DifferencesWithinTheNoiseDecideNothing) {
+  BeliefReview<double> review({.worse = 1.0, .roll_back_s = 0.02, .certify_s = 10.0}, 1e-3, noise_deg);
+  for (int i = 0; i < 500; ++i)
+    EXPECT_EQ(review.judge(0.9 * noise_deg, 0.0), Verdict::keep);
+}
+
+TEST(BeliefReview, CertifiesWhatPredictsBetterForTheLongTime) {
+  BeliefReview<double> review({.worse = 1.5, .roll_back_s = 0.05, .certify_s = 0.4}, 1e-3, noise_deg);
+  int samples = 1;
+  while (review.judge(0.1, 0.2) == Verdict::keep && samples < 1000)
+    ++samples;
+  EXPECT_EQ(samples, 400);
+  BeliefReview<double> even({.worse = 1.5, .roll_back_s = 0.05, .certify_s = 0.4}, 1e-3, noise_deg);
+  for (int i = 0; i < 1000; ++i)
+    EXPECT_EQ(even.judge(0.1, 0.12), Verdict::keep) << "a fifth better is not enough";
+}
+
+struct Named {
+  std::map<std::string, double> values;
+  void operator()(std::string_view name, double value) { values[std::string(name)] = value; }
+};
+
+// Sylvester's criterion on what is saved, along slides of random speed and push.
+TEST(FrictionLearner, ItsCovarianceStaysPositiveAndBelowTheFirstOne) {
+  const GuidedPredictiveSettings s = asymmetric();
+  FrictionLearner<float> learner(s.learner, s.plate, 1e-3, noise_deg, 0.35F, 28.0F);
+  PlateBelief<float> belief{{0.0F, 0.08F}, {0.0F, 0.08F}, 1.0F, 1.0F};
+  std::mt19937_64 generator(5);
+  std::uniform_real_distribution<float> speed(-900.0F, 900.0F), push(-0.9F, 0.9F), innovation(-0.5F, 0.5F);
+  float v = 0.0F, p = 0.0F;
+  double least_gain_variance = s.learner.gain_weight;
+  for (int k = 0; k < 20000; ++k) {
+    if (k % 37 == 0) v = speed(generator), p = push(generator);
+    if (k % 211 == 0) learner.forget();
+    learner.slide(belief, belief.above, innovation(generator), {p, v, 1.03F});
+    Named c;
+    FrictionLearner<float>::visit(std::as_const(learner), c);
+    const double a = c.values["level_variance"], b = c.values["level_gain"], d = c.values["level_damping"],
+                 e = c.values["gain_variance"], f = c.values["gain_damping"], g = c.values["damping_variance"];
+    ASSERT_GT(a, 0.0) << k;
+    ASSERT_GT(a * e - b * b, 0.0) << k;
+    ASSERT_GT(a * (e * g - f * f) - b * (b * g - f * d) + d * (b * f - e * d), 0.0) << k;
+    ASSERT_TRUE(learner.is_usable()) << k;
+    least_gain_variance = std::min(least_gain_variance, e);
+  }
+  EXPECT_LT(least_gain_variance, 0.3 * s.learner.gain_weight) << "nothing was narrowed";
+  learner.reset();
+  Named c;
+  FrictionLearner<float>::visit(std::as_const(learner), c);
+  EXPECT_EQ(c.values["gain_variance"], s.learner.gain_weight);
+}
+
+struct WrongBelief {
+  double squared_error;
+  std::int64_t rollbacks;
+  double gain_factor;
+};
+
+// Drives with a belief gone wrong beside a certified one that is right; so slow a learning keeps it.
+WrongBelief drive_with_wrong_belief(double rollback_ratio) {
+  GuidedPredictiveSettings s = asymmetric();
+  s.review.worse = rollback_ratio;
+  s.learner.rate_per_s = 0.5;
+  GuidedPredictive c(s);
+  test_support::Plant plant(s.plate, 30.0);
+  const auto driving = [](int k) { return 30.0 + 14.0 * std::sin(0.011 * k); };
+  test_support::squared_error(c, plant, 0, 500, driving);
+  StateColumns saved = save_state(c);
+  saved["gain_factor"] = {0.7};
+  saved["bias_above"] = {0.1};
+  restore_state(c, saved);
+  const double error = test_support::squared_error(c, plant, 500, 1500, driving);
+  return {error, c.rollbacks(), c.belief().gain_factor};
+}
+
+TEST(GuidedPredictive, ABeliefGoneWrongIsRolledBackToTheCertifiedOne) {
+  const WrongBelief with = drive_with_wrong_belief(1.5), without = drive_with_wrong_belief(1e9);
+  EXPECT_EQ(with.rollbacks, 1);
+  EXPECT_EQ(without.rollbacks, 0);
+  EXPECT_NEAR(with.gain_factor, 1.0, 0.05);
+  EXPECT_LT(without.gain_factor, 0.8) << "learning alone mended it: nothing to roll back";
+  EXPECT_LT(with.squared_error, 0.5 * without.squared_error);
+}
+
+TEST(GuidedPredictive, WhatProvesItselfIsCertified) {
+  GuidedPredictiveSettings s = asymmetric();
+  GuidedPredictive c(s);
+  s.plate.friction = 0.05;
+  test_support::Plant plant(s.plate, 30.0);
+  const auto given = c.certified().above.friction;
+  test_support::squared_error(c, plant, 0, 4000, [](int k) { return 40.0 + 15.0 * std::sin(0.012 * k); });
+  EXPECT_EQ(given, 0.08);
+  EXPECT_NEAR(c.certified().above.friction, 0.05, 0.006);
+  EXPECT_EQ(c.rollbacks(), 0);
+  c.reset();
+  EXPECT_EQ(c.certified().above.friction, 0.08);
+}
+
+}  // namespace
+}  // namespace mgdd
