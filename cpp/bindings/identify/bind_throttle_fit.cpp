@@ -78,16 +78,16 @@ FirstPrinciple groups_model(double closed_deg, double open_deg, int substeps) {
   return model;
 }
 
-// (dt_s, duty, angle_deg, start, skip, free_start, weight) per record; no weight for one of 1 everywhere.
-using RecordTuple = std::tuple<double, InputArray, InputArray, std::vector<double>, std::size_t,
-                               std::vector<std::size_t>, std::vector<double>>;
+// (dt_s, duty, angle_deg, start, skip, free_start) per record.
+using RecordTuple =
+    std::tuple<double, InputArray, InputArray, std::vector<double>, std::size_t, std::vector<std::size_t>>;
 using StageTuple = std::tuple<std::vector<std::size_t>, std::vector<std::size_t>, double, double, int>;
 
 py::dict fit_groups(const std::vector<RecordTuple>& records, const std::vector<StageTuple>& stages,
                     const std::vector<Groups>& starts, double closed_deg, double open_deg, int substeps,
                     std::size_t n_threads) {
   std::vector<SimulationRecord> data;
-  for (const auto& [dt_s, duty, angle, start, skip, free_start, weight] : records) {
+  for (const auto& [dt_s, duty, angle, start, skip, free_start] : records) {
     SimulationRecord record;
     record.dt_s = dt_s;
     record.input = to_column(duty, "duty");
@@ -95,7 +95,6 @@ py::dict fit_groups(const std::vector<RecordTuple>& records, const std::vector<S
     record.start = start;
     record.skip = skip;
     record.free_start = free_start;
-    record.weight = weight;
     data.push_back(std::move(record));
   }
   std::vector<FitStage> plan;

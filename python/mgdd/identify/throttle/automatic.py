@@ -2,12 +2,9 @@
 
 from __future__ import annotations
 
-import dataclasses
 import math
 from collections.abc import Mapping, Sequence
 from typing import TYPE_CHECKING
-
-import numpy as np
 
 from mgdd import _core
 from mgdd.errors import Interrupted, hand_over
@@ -31,7 +28,6 @@ from mgdd.identify.throttle.hunt import (
 from mgdd.identify.throttle.whole_delay import Delays, whole_delay
 from mgdd.optimize.fit_options import FitOptions, fit_options
 from mgdd.results import Finding, Fit, FitReport
-from mgdd.signals.metrics import nrmse_fit_percent, rmse
 
 if TYPE_CHECKING:
     import xarray as xr
@@ -49,8 +45,9 @@ _STOP = {"stop_duty_per_deg": 40.0, "stop_damping": 0.7}
 _AS_GOOD, _STIFFEST = 1.002, 400.0  # stops that were touched yield unless the log says that they do not
 _TOUCHED_DEG = 0.5  # as near as that the plate has been at a stop
 _COARSE = 2  # steps per sample of the first look
-_SEEDS = 3  # rough solutions that are looked at from every delay
+_SEEDS = 2  # rough solutions that are looked at from every delay
 _AT_NOISE = 1.05  # a residual that small leaves nothing to explain
+_RAMPS = (0.1, 0.4)
 _DROPS, _SPEEDS, _PRESLIDINGS, _HALF_GAPS = (0.08, 0.6), (8.0, 40.0), (0.06, 0.2), (0.1, 0.3)
 
 
@@ -105,13 +102,12 @@ def fit_groups(
     known = fixed or {}
     try:
         rough, terms = _structure(hunt, known, sorted(delays), chosen.n_starts, chosen.seed)
-        rough, terms = _described(hunt, known, rough, terms)
-        by_delay = whole_delay(hunt, rough, sorted(delays), held=STOPS)
+        by_delay = whole_delay(hunt, rough, sorted(delays))
         found, terms = _without(hunt, by_delay.found, terms)
         if STOPS in terms:
-            found = hunt.fine(found.values, [*names_of(found), *STOPS])
-        findings = _told(hunt, found, terms, by_delay)
-        report = _report(hunt, found)
+            found = hunt.fine(found.values, list(dict.fromkeys([*names_of(found), *STOPS])))
+        findings = _told(found, terms, by_delay)
+        report = FitReport.from_core(found.report, problem.angle)
         if LAG in terms and SHARE not in known:
             report = with_unknown_share(hunt, found, report)
     except Interrupted as stop:
@@ -119,10 +115,12 @@ def fit_groups(
             raise
         interrupted = stop
         if report is None:
-            found = hunt.best
-            report = _report(hunt, found)
+            found = hunt.best if by_delay is None else by_delay.found
+            report = FitReport.from_core(found.report, problem.angle)
     if by_delay is not None and len(by_delay.rmse) > 1:
-        report = with_delay(report, found.values["delay_samples"], by_delay.rmse, independent_samples(found))
+        kept = found.values["delay_samples"]
+        alike = dict.fromkeys(by_delay.ties, by_delay.rmse[kept])
+        report = with_delay(report, kept, {**by_delay.rmse, **alike}, independent_samples(found))
     model = FirstPrincipleModel(
         parameters=found.values, closed_deg=stops_deg[0], open_deg=stops_deg[1], substeps=FINE, sample_s=problem.step_s
     )
@@ -151,17 +149,28 @@ def _structure(
     latency = [*LAG, *(DELAY if len(delays) > 1 else ())]
     further = [*latency, *(RAMP if problem.both_sides else ())]
     base = [*problem.free, *(name for name in further if name not in fixed)]
-    values = {**problem.values, "delay_samples": float(min(max(1.0, delays[0]), delays[-1]))}
+    values = dict(problem.values)
     values |= {"electrical_s": 1e-3, SHARE: fixed.get(SHARE, TYPICAL_SHARE)} if "electrical_s" in base else {}
 
     def of(terms: Sequence[tuple[str, ...]]) -> list[str]:
         return [*base, *(name for term in terms for name in term if name not in fixed)]
 
-    moving = [name for name in ("tau_s", "gain_deg_per_s2_per_duty", *latency) if name in base]
-    first = hunt.search(values, moving, _COARSE, 15).values if moving else values
-    plain = best_of([hunt.search(start, base, _COARSE, 40) for start in (first, values)])
-    found: dict[tuple[tuple[str, ...], ...], Search] = {(): plain}
+    # A search in the valley of a wrong delay seldom leaves it: each begins with a search of its own.
+    ramps: list[dict[str, float]] = [{}, *({"ramp_deg": ramp} for ramp in _RAMPS if "ramp_deg" in base)]
+    moving = [name for name in ("tau_s", "gain_deg_per_s2_per_duty", *LAG) if name in base]
+    whole = [name for name in base if name not in DELAY]
+    tries = []
+    for delay in delays:
+        start = {**values, "delay_samples": float(delay)}
+        first = hunt.search(start, moving, _COARSE, 10).values if moving else start
+        tries.append(hunt.search(first, whole, _COARSE, 20))
+    nearest = sorted(tries, key=lambda one: one.rmse)[:2]
+    # Ramp and limp-home have valleys of their own, and so have both together.
+    tries = [hunt.search({**one.values, **ramp}, base, _COARSE, 20) for one in nearest for ramp in ramps]
+    plain = hunt.search(best_of(tries).values, base, BRISTLES, 20)
     terms: list[tuple[str, ...]] = [LAG] if "electrical_s" in base else []
+    plain, terms = _stopped(hunt, fixed, plain, terms)
+    found: dict[tuple[tuple[str, ...], ...], Search] = {(): plain}
     enough = max(_AT_NOISE * noise_of(problem.angle), FLOOR_DEG)
     if plain.rmse < enough:
         return [plain], terms
@@ -180,7 +189,7 @@ def _structure(
             {**one.values, "presliding_deg": width, "stribeck_drop": max(one.values["stribeck_drop"], 0.05)},
             of([DROP, PRESLIDING]), BRISTLES, 25,
         )
-        for one in (plain, dropping)
+        for one in sorted([plain, dropping], key=lambda one: one.rmse)[:1]
         for width in _PRESLIDINGS
     ]  # fmt: skip
     found[(DROP, PRESLIDING)] = hunt.search(best_of(tries).values, of([DROP, PRESLIDING]), BRISTLES, 30)
@@ -195,44 +204,25 @@ def _structure(
     best = min(found, key=lambda one: _criterion(found[one], len(of(one)), n))
     # Sticking makes the cost rough: what the other structures have found are further starts of the chosen one.
     own = {name: found[best].values[name] for term in best for name in term}
-    others = [one for structure, one in found.items() if structure != best]
-    again = [hunt.search({**one.values, **_ABSENT, **own}, of(best), BRISTLES, 25) for one in others]
+    others = [one.values for structure, one in found.items() if structure != best]
+    others += [{**found[best].values, **ramp} for ramp in ramps[1:]]
+    again = [hunt.search({**one, **_ABSENT, **own}, of(best), BRISTLES, 20) for one in others]
     return sorted([found[best], *again], key=lambda one: one.rmse)[:_SEEDS], [*terms, *best]
 
 
-def _described(
-    hunt: Hunt, fixed: Mapping[str, float], rough: Sequence[Search], terms: list[tuple[str, ...]]
-) -> tuple[list[Search], list[tuple[str, ...]]]:
-    """Let the stops yield where the log shows it, then weigh by local error, twice, what is still not described."""
-    problem, last = hunt.problem, rough[0]
-    values: dict[str, float] = {}
+def _stopped(
+    hunt: Hunt, fixed: Mapping[str, float], plain: Search, terms: list[tuple[str, ...]]
+) -> tuple[Search, list[tuple[str, ...]]]:
+    """Let the stops yield where the plate has touched one and the log does not say that they are rigid."""
+    problem = hunt.problem
     low, high = problem.stops_deg
     touched = problem.angle.min() < low + _TOUCHED_DEG or problem.angle.max() > high - _TOUCHED_DEG
-    if touched and not set(STOPS) & set(fixed):
-        last = hunt.search(last.values, names_of(last), BRISTLES, 15)
-        soft = hunt.search({**last.values, **_STOP}, [*names_of(last), *STOPS], BRISTLES, 20)
-        if soft.rmse < _AS_GOOD * last.rmse and soft.values["stop_duty_per_deg"] < _STIFFEST:
-            last, terms = soft, [*terms, STOPS]
-            values = {name: soft.values[name] for name in STOPS}
-    for _ in range(2):
-        weight = hunt.blocks.weights(hunt.raw(last), hunt.floor)
-        if weight is None and hunt.weight is None:
-            break
-        hunt.weigh(weight)
-        last = hunt.search(last.values, names_of(last), BRISTLES, 15)
-    others = [one._replace(values={**one.values, **values}) for one in rough]
-    return [last, *others], terms
-
-
-def _report(hunt: Hunt, found: Search) -> FitReport:
-    """Report a search with its residual as it is, whatever its weights."""
-    report = FitReport.from_core(found.report, hunt.problem.angle)
-    if hunt.weight is None:
-        return report
-    residual, angle = hunt.raw(found), hunt.problem.angle
-    residual.flags.writeable = False
-    percent = nrmse_fit_percent(angle, angle + residual)
-    return dataclasses.replace(report, residual=residual, rmse=rmse(angle, angle + residual), nrmse_fit_percent=percent)
+    if not touched or set(STOPS) & set(fixed):
+        return plain, terms
+    soft = hunt.search({**plain.values, **_STOP}, [*names_of(plain), *STOPS], BRISTLES, 25)
+    if soft.rmse > _AS_GOOD * plain.rmse or soft.values["stop_duty_per_deg"] > _STIFFEST:
+        return plain, terms
+    return soft, [*terms, STOPS]
 
 
 def _without(hunt: Hunt, found: Search, terms: list[tuple[str, ...]]) -> tuple[Search, list[tuple[str, ...]]]:
@@ -242,7 +232,7 @@ def _without(hunt: Hunt, found: Search, terms: list[tuple[str, ...]]) -> tuple[S
             continue
         free = [name for name in names_of(found) if name not in term]
         absent = {**_ABSENT, "electrical_s": 0.0}
-        smaller = hunt.fine({**found.values, **{name: absent[name] for name in term}}, free)
+        smaller = hunt.search({**found.values, **{name: absent[name] for name in term}}, free, FINE, 25, 1e-6)
         n = independent_samples(found)
         if not missed(smaller, found, len(term), n):
             found, terms = smaller, [one for one in terms if one != term]
@@ -253,9 +243,9 @@ def _criterion(found: Search, size: int, n: float) -> float:
     return 2.0 * n * math.log(max(found.rmse, FLOOR_DEG)) + size * math.log(n)
 
 
-def _told(hunt: Hunt, found: Search, terms: Sequence[tuple[str, ...]], delays: Delays) -> list[Finding]:
+def _told(found: Search, terms: Sequence[tuple[str, ...]], delays: Delays) -> list[Finding]:
     """Say what the model has and what it is worth, and how other delays fare."""
-    by_delay, rms = delays.rmse, float(np.sqrt(np.mean(hunt.raw(found) ** 2)))
+    by_delay, rms = delays.rmse, found.rmse
     has = ", ".join(_SHOWN[term] for term in terms if term in _SHOWN) or "none"
     stops = ", stops that yield" if STOPS in terms else ""
     left = ", ".join(_SHOWN[term] for term in _SHOWN if term not in terms) or "nothing"

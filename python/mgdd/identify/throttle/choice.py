@@ -12,18 +12,14 @@ from mgdd.errors import Interrupted
 from mgdd.identify.throttle.automatic import fit_groups
 from mgdd.identify.throttle.first_principle_model import FirstPrincipleModel
 from mgdd.identify.throttle.first_principle_problem import groups_problem
-from mgdd.identify.throttle.hunt import FLOOR_DEG, noise_of
-from mgdd.identify.throttle.local_weights import Blocks
 from mgdd.identify.throttle.pseudo_wiener_fit import fit_pseudo_wiener
 from mgdd.optimize import FitOptions
 from mgdd.results import Finding, Fit
-from mgdd.signals.even_grid import even_step
 from mgdd.signals.metrics import nrmse_fit_percent
 from mgdd.throttle import PseudoWiener
 
 if TYPE_CHECKING:
     import xarray as xr
-    from numpy.typing import NDArray
 
     from mgdd.results import Model
 
@@ -99,17 +95,9 @@ def _groups_again(
         substeps=model.substeps,
         tolerance=1e-6,
         max_iterations=30,
-        weight=_weights(groups, early),
     )
     again: FirstPrincipleModel = dataclasses.replace(model, parameters=found.values)
     return again
-
-
-def _weights(groups: Fit, early: xr.Dataset) -> NDArray[np.float64] | None:
-    """Weigh a part of the log as the fit of the whole log does."""
-    angle = early["angle_deg"].to_numpy()
-    floor = max(noise_of(angle), FLOOR_DEG)
-    return Blocks(angle, even_step(early["time_s"])).weights(groups.report.residual[: angle.size], floor)
 
 
 def _pw_r(start: PseudoWiener, log: xr.Dataset, options: FitOptions) -> Fit:
@@ -119,8 +107,7 @@ def _pw_r(start: PseudoWiener, log: xr.Dataset, options: FitOptions) -> Fit:
     visited = [bool(angle.max() > limp_home + 1.0), bool(angle.min() < limp_home - 1.0)]
     sides = "both" if all(visited) else "above" if visited[0] else "below"
     return fit_pseudo_wiener(
-        log, "pw_r", limp_home_deg=limp_home, sides=sides,
-        delay_samples=values["delay_samples"], start_values=start,
+        log, "pw_r", limp_home_deg=limp_home, sides=sides, delay_samples=values["delay_samples"], start_values=start,
         options=options,
     )  # fmt: skip
 
@@ -149,15 +136,9 @@ def pseudo_wiener_of(model: FirstPrincipleModel) -> PseudoWiener:
 def _percent_after(model: Model, log: xr.Dataset, first: int) -> float:
     """Run free over the whole log and compare from sample `first` on."""
     angle = log["angle_deg"].to_numpy()
-    run = _run(model, log)
+    run = model.simulate(log, initial_state={"angle_deg": float(angle[0])})["angle_deg"].to_numpy()
     percent = nrmse_fit_percent(angle[first:], run[first:])
     return -np.inf if percent is None or not np.isfinite(percent) else float(percent)
-
-
-def _run(model: Model, log: xr.Dataset) -> NDArray[np.float64]:
-    """Run free over a whole log."""
-    start = {"angle_deg": float(log["angle_deg"][0])}
-    return np.asarray(model.simulate(log, initial_state=start)["angle_deg"].to_numpy())
 
 
 def _rmse(fit: Fit) -> float:

@@ -40,10 +40,6 @@ _REST_S, _REST_DEG = 0.01, 0.5
 _FIRST_SAMPLES = 5
 
 
-# Step [s], duty, angle, start, samples left out, free start numbers, weight per sample (empty for 1).
-Record = tuple[float, "NDArray[np.float64]", "NDArray[np.float64]", list[float], int, list[int], list[float]]
-
-
 class Search(NamedTuple):
     """Where one search ended."""
 
@@ -70,7 +66,9 @@ class GroupsProblem:
         """Whether the log settles the groups of both sides of limp-home."""
         return not self.unvisited
 
-    def record(self, share: float = 1.0, weight: NDArray[np.float64] | None = None) -> Record:
+    def record(
+        self, share: float = 1.0
+    ) -> tuple[float, NDArray[np.float64], NDArray[np.float64], list[float], int, list[int]]:
         """Return the first share of the log for the core; where it does not begin at rest its speed is free, too."""
         n = round(share * self.angle.size)
         first = self.angle[: max(2, round(_REST_S / self.step_s))]
@@ -80,9 +78,7 @@ class GroupsProblem:
         # A moving plate has left the mean of its first samples behind.
         begin = float(self.angle[0]) if moving else start
         state = [begin, speed, float(np.clip(self.duty[0], -1.0, 1.0))]
-        free_start = [0, 1] if moving else [0]
-        weights = [] if weight is None else weight[:n].tolist()
-        return self.step_s, np.clip(self.duty[:n], -1.0, 1.0), self.angle[:n], state, 0, free_start, weights
+        return self.step_s, np.clip(self.duty[:n], -1.0, 1.0), self.angle[:n], state, 0, [0, 1] if moving else [0]
 
     def search(
         self,
@@ -93,19 +89,15 @@ class GroupsProblem:
         tolerance: float,
         max_iterations: int,
         share: float = 1.0,
-        weight: NDArray[np.float64] | None = None,
     ) -> Search:
-        """Search the groups `free` from `values`, all others kept; Interrupted carries what it had.
-
-        With a weight per sample the residual is a weighted one, and the error its root mean square.
-        """
+        """Search the groups `free` from `values`, all others kept; Interrupted carries what it had."""
         start = within_bounds({**values, **{name: values[name] or _FIRST.get(name, 0.0) for name in free}}, free)
         stage: tuple[list[int], list[int], float, float, int] = (
             [GROUP_NAMES.index(name) for name in free], [], 1.0, tolerance, max_iterations,
         )  # fmt: skip
         found, stop = or_partial(
             lambda: _core.identify.fit_throttle_groups(
-                [self.record(share, weight)],
+                [self.record(share)],
                 stages=[stage],
                 starts=[[start[name] for name in GROUP_NAMES]],
                 closed_deg=self.stops_deg[0],

@@ -1,11 +1,10 @@
-"""Searches of one throttle log under one set of weights: what they compared, and the best of them."""
+"""Searches of one throttle log: what they compared, and the best of them."""
 
 from __future__ import annotations
 
 import math
 from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass, field
-from functools import cached_property
 from typing import TYPE_CHECKING
 
 import numpy as np
@@ -13,7 +12,6 @@ import numpy as np
 from mgdd import _core
 from mgdd.errors import Interrupted
 from mgdd.identify.throttle.first_principle_problem import GroupsProblem, Search
-from mgdd.identify.throttle.local_weights import Blocks
 
 if TYPE_CHECKING:
     from numpy.typing import NDArray
@@ -44,7 +42,6 @@ class Hunt:
     problem: GroupsProblem
     max_iterations: int
     tolerance: float
-    weight: NDArray[np.float64] | None = None
     best: Search | None = None
     done: list[Search] = field(default_factory=list)
 
@@ -55,7 +52,7 @@ class Hunt:
         try:
             found = self.problem.search(
                 values, free, substeps=substeps, tolerance=tolerance,
-                max_iterations=min(iterations, self.max_iterations), weight=self.weight,
+                max_iterations=min(iterations, self.max_iterations),
             )  # fmt: skip
         except Interrupted as stop:
             if isinstance(stop.partial, Search):
@@ -73,26 +70,6 @@ class Hunt:
     def fine(self, values: Mapping[str, float], free: Sequence[str]) -> Search:
         """Search with the steps and the tolerance of what is handed over."""
         return self.search(values, free, FINE, self.max_iterations, self.tolerance)
-
-    @property
-    def floor(self) -> float:
-        """Error that no model undercuts and no block is blamed for [deg]."""
-        return max(noise_of(self.problem.angle), FLOOR_DEG)
-
-    @cached_property
-    def blocks(self) -> Blocks:
-        """Its log in blocks."""
-        return Blocks(self.problem.angle, self.problem.step_s)
-
-    def raw(self, found: Search) -> NDArray[np.float64]:
-        """Return the residual of a search under the present weights without them [deg]."""
-        residual = np.asarray(found.report.residual)
-        return residual if self.weight is None else residual / self.weight
-
-    def weigh(self, weight: NDArray[np.float64] | None) -> None:
-        """Take other weights; errors under the earlier ones do not compare."""
-        self.weight, self.best = weight, None
-        self.done.clear()
 
 
 def independent_samples(found: Search) -> float:

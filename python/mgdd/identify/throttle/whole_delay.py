@@ -9,8 +9,8 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from mgdd.identify.throttle.hunt import BRISTLES, FLOOR_DEG, WORTH, Hunt, best_of, names_of
-from mgdd.identify.throttle.local_weights import SPREAD, certainly_less
+from mgdd.identify.throttle.block_losses import block_losses, certainly_less
+from mgdd.identify.throttle.hunt import BRISTLES, FINE, FLOOR_DEG, WORTH, Hunt, best_of, names_of, noise_of
 
 if TYPE_CHECKING:
     from numpy.typing import NDArray
@@ -31,60 +31,48 @@ class Delays:
     ties: tuple[float, ...]
 
 
-def whole_delay(hunt: Hunt, rough: Sequence[Search], delays: Sequence[float], held: Sequence[str] = ()) -> Delays:
+def whole_delay(hunt: Hunt, rough: Sequence[Search], delays: Sequence[float]) -> Delays:
     """Fit with fine steps at the delays about the rough one; of equals take the one whose lag a motor would have.
 
     Equals are delays whose losses, block by block of the log, differ from those of the best by less than twice the
     standard error of their mean (Diebold and Mariano 1995). The loss of a block is its mean square, cut off where the
-    model at its best does not describe the plate: such blocks have no vote. Groups in `held` keep their rough
-    values.
+    model at its best does not describe the plate: such blocks do not decide.
     """
     at = rough[0].values["delay_samples"]
-    free = [name for name in names_of(rough[0]) if name not in ("delay_samples", *held)]
+    free = [name for name in names_of(rough[0]) if name != "delay_samples"]
     near = [d for d in delays if math.floor(at) - 1 <= d <= math.ceil(at)] or [min(delays, key=lambda d: abs(d - at))]
     found: dict[float, Search] = {}
+
     while missing := [delay for delay in near if delay not in found]:
         for delay in missing:
             starts = [_at_delay(one, delay, hunt.problem.step_s, free) for one in rough]
-            looks = [hunt.search(start, free, BRISTLES, 15) for start in starts]
-            found[delay] = hunt.fine(best_of(looks).values, free)
+            found[delay] = best_of([hunt.search(start, free, BRISTLES, 15) for start in starts])
         best = min(near, key=lambda delay: found[delay].rmse)
         at = list(delays).index(best)  # never the last of those looked at, while there are others
         near = [d for d in delays if d in found or d in delays[max(at - 1, 0) : at + 2]]
+    for delay in near:
+        found[delay] = hunt.search(found[delay].values, free, FINE, 25, 1e-6)
     for k, delay in enumerate(near):  # each also from where its neighbours ended
         for other in near[max(k - 1, 0) : k] + near[k + 1 : k + 2]:
-            again = hunt.fine(_at_delay(found[other], delay, hunt.problem.step_s, free), free)
-            if again.rmse < found[delay].rmse:
-                found[delay] = again
-    residual = {delay: hunt.raw(one) for delay, one in found.items()}
-    weight: dict[float, NDArray[np.float64] | None] = dict.fromkeys(near, hunt.weight)
-    if hunt.weight is not None:  # what a delay misses it may miss elsewhere than another
-        for delay in near:
-            weight[delay] = hunt.blocks.weights(residual[delay], hunt.floor)
-            hunt.weigh(weight[delay])
-            found[delay] = hunt.fine(found[delay].values, free)
-            residual[delay] = hunt.raw(found[delay])
-    usual = min(hunt.blocks.usual(hunt.blocks.errors(one), hunt.floor) for one in residual.values())
-    most = SPREAD * usual if hunt.weight is not None else math.inf
-    loss = {delay: hunt.blocks.losses(one, most) for delay, one in residual.items()}
-    ties = _equals(loss, by_block=math.isfinite(most))
-    lag = {delay: found[delay].values["electrical_s"] for delay in ties}
-    kept = min(ties, key=lambda delay: abs(math.log(max(lag[delay], 1e-5) / _MOTOR_LAG_S)))
-    hunt.weigh(weight[kept])
-    hunt.keep(found[kept])
-    rmse = {delay: max(float(np.sqrt(one.mean())), FLOOR_DEG) for delay, one in loss.items()}
-    return Delays(found=found[kept], rmse=rmse | dict.fromkeys(ties, min(rmse.values())), ties=tuple(ties))
+            start = _at_delay(found[other], delay, hunt.problem.step_s, free)
+            found[delay] = best_of([found[delay], hunt.search(start, free, FINE, 20, 1e-6)])
+    problem = hunt.problem
+    residual = {delay: np.asarray(one.report.residual) for delay, one in found.items()}
+    floor = max(noise_of(problem.angle), FLOOR_DEG)
+    ties = _equals(block_losses(residual, problem.angle, problem.step_s, floor))
+    kept = min(ties, key=lambda delay: abs(math.log(max(found[delay].values["electrical_s"], 1e-5) / _MOTOR_LAG_S)))
+    rmse = {delay: max(one.rmse, FLOOR_DEG) for delay, one in found.items()}
+    return Delays(found=found[kept], rmse=rmse, ties=tuple(ties))
 
 
-def _equals(loss: Mapping[float, NDArray[np.float64]], *, by_block: bool) -> list[float]:
-    """Return the delays within a hundredth of the best error or, by block, not certainly worse."""
+def _equals(loss: Mapping[float, NDArray[np.float64]]) -> list[float]:
+    """Return the delays within a hundredth of the best error, and those not certainly worse."""
     best = min(loss, key=lambda delay: float(loss[delay].mean()))
-    floor = FLOOR_DEG**2
-    least = max(float(loss[best].mean()), floor)
+    least = max(float(loss[best].mean()), FLOOR_DEG**2)
     return [
         delay
         for delay, own in sorted(loss.items())
-        if max(float(own.mean()), floor) * WORTH**2 <= least or (by_block and not certainly_less(loss[best], own))
+        if max(float(own.mean()), FLOOR_DEG**2) * WORTH**2 <= least or not certainly_less(loss[best], own)
     ]
 
 
