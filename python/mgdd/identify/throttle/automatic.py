@@ -45,7 +45,7 @@ _STOP = {"stop_duty_per_deg": 40.0, "stop_damping": 0.7}
 _AS_GOOD, _STIFFEST = 1.002, 400.0  # stops that were touched yield unless the log says that they do not
 _TOUCHED_DEG = 0.5  # as near as that the plate has been at a stop
 _COARSE = 2  # steps per sample of the first look
-_SEEDS = 2  # rough solutions that are looked at from every delay
+_SEEDS = 3  # rough solutions that are looked at from every delay
 _AT_NOISE = 1.05  # a residual that small leaves nothing to explain
 _RAMPS = (0.1, 0.4)
 _DROPS, _SPEEDS, _PRESLIDINGS, _HALF_GAPS = (0.08, 0.6), (8.0, 40.0), (0.06, 0.2), (0.1, 0.3)
@@ -257,7 +257,7 @@ def _told(found: Search, terms: Sequence[tuple[str, ...]], delays: Delays) -> li
     told = [Finding("structure_chosen", tuple(name for term in terms for name in term), text)]
     if len(delays.ties) > 1:
         ties = " and ".join(f"{delay:g}" for delay in delays.ties)
-        text = f"delays of {ties} samples fit alike; taken is the one with the lag of a motor"
+        text = f"delays of {ties} samples fit alike; taken is the shortest with the lag of a motor"
         told.append(
             Finding("delay_open", ("delay_samples", *LAG), text, "add steps of the duty, or give delay_samples")
         )

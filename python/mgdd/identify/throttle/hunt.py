@@ -32,6 +32,8 @@ __all__ = [
 # Steps per sample of the look at bristles, and of what is handed over.
 BRISTLES, FINE = 4, 8
 WORTH = 0.99  # what explains less than a hundredth of the error is left out, however certain it is
+# What a search has found absent begins here in the next, not where one begins that was never searched.
+_ABSENT = {"electrical_s": 1e-4, "stribeck_drop": 1e-3, "delay_samples": 1e-3, "half_gap_deg": 1e-3}
 FLOOR_DEG = 5e-3  # a 14-bit converter steps by as much: a residual below it is as good as any
 
 
@@ -49,9 +51,10 @@ class Hunt:
         self, values: Mapping[str, float], free: Sequence[str], substeps: int, iterations: int, tolerance: float = 1e-4
     ) -> Search:
         """Search once; an interrupt hands over what it has."""
+        start = {name: value or (_ABSENT.get(name, 0.0) if name in free else 0.0) for name, value in values.items()}
         try:
             found = self.problem.search(
-                values, free, substeps=substeps, tolerance=tolerance,
+                start, free, substeps=substeps, tolerance=tolerance,
                 max_iterations=min(iterations, self.max_iterations),
             )  # fmt: skip
         except Interrupted as stop:

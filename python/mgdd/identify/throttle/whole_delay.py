@@ -5,6 +5,7 @@ from __future__ import annotations
 import math
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
+from itertools import pairwise
 from typing import TYPE_CHECKING
 
 import numpy as np
@@ -19,7 +20,7 @@ if TYPE_CHECKING:
 
 __all__ = ["Delays", "whole_delay"]
 
-_MOTOR_LAG_S = 1e-3  # L/R of throttle motors, which decides between delays that the log does not separate
+_MOTOR_LAGS_S = (3e-4, 3e-3)  # L/R of throttle motors, which decides between delays that the log does not separate
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -32,7 +33,9 @@ class Delays:
 
 
 def whole_delay(hunt: Hunt, rough: Sequence[Search], delays: Sequence[float]) -> Delays:
-    """Fit with fine steps at the delays about the rough one; of equals take the one whose lag a motor would have.
+    """Fit with fine steps at the delays about the rough one; of equals take the shortest whose lag a motor would have.
+
+    The shortest, since what a model lacks (a gear that bends, a gap) makes the plate come later, never sooner.
 
     Equals are delays whose losses, block by block of the log, differ from those of the best by less than twice the
     standard error of their mean (Diebold and Mariano 1995). The loss of a block is its mean square, cut off where the
@@ -42,25 +45,25 @@ def whole_delay(hunt: Hunt, rough: Sequence[Search], delays: Sequence[float]) ->
     free = [name for name in names_of(rough[0]) if name != "delay_samples"]
     near = [d for d in delays if math.floor(at) - 1 <= d <= math.ceil(at)] or [min(delays, key=lambda d: abs(d - at))]
     found: dict[float, Search] = {}
-
+    tried: set[tuple[float, float]] = set()
     while missing := [delay for delay in near if delay not in found]:
         for delay in missing:
             starts = [_at_delay(one, delay, hunt.problem.step_s, free) for one in rough]
-            found[delay] = best_of([hunt.search(start, free, BRISTLES, 15) for start in starts])
+            look = best_of([hunt.search(start, free, BRISTLES, 15) for start in starts])
+            found[delay] = hunt.search(look.values, free, FINE, 25, 1e-6)
+        for delay, other in [*pairwise(near), *pairwise(near[::-1])]:  # each also from where its neighbours ended
+            if (delay, other) not in tried:
+                start = _at_delay(found[other], delay, hunt.problem.step_s, free)
+                found[delay] = best_of([found[delay], hunt.search(start, free, FINE, 20, 1e-6)])
+                tried.add((delay, other))
         best = min(near, key=lambda delay: found[delay].rmse)
         at = list(delays).index(best)  # never the last of those looked at, while there are others
         near = [d for d in delays if d in found or d in delays[max(at - 1, 0) : at + 2]]
-    for delay in near:
-        found[delay] = hunt.search(found[delay].values, free, FINE, 25, 1e-6)
-    for k, delay in enumerate(near):  # each also from where its neighbours ended
-        for other in near[max(k - 1, 0) : k] + near[k + 1 : k + 2]:
-            start = _at_delay(found[other], delay, hunt.problem.step_s, free)
-            found[delay] = best_of([found[delay], hunt.search(start, free, FINE, 20, 1e-6)])
     problem = hunt.problem
     residual = {delay: np.asarray(one.report.residual) for delay, one in found.items()}
     floor = max(noise_of(problem.angle), FLOOR_DEG)
     ties = _equals(block_losses(residual, problem.angle, problem.step_s, floor))
-    kept = min(ties, key=lambda delay: abs(math.log(max(found[delay].values["electrical_s"], 1e-5) / _MOTOR_LAG_S)))
+    kept = min(ties, key=lambda delay: (_unlike_a_motor(found[delay].values["electrical_s"]), delay))
     rmse = {delay: max(one.rmse, FLOOR_DEG) for delay, one in found.items()}
     return Delays(found=found[kept], rmse=rmse, ties=tuple(ties))
 
@@ -74,6 +77,13 @@ def _equals(loss: Mapping[float, NDArray[np.float64]]) -> list[float]:
         for delay, own in sorted(loss.items())
         if max(float(own.mean()), FLOOR_DEG**2) * WORTH**2 <= least or not certainly_less(loss[best], own)
     ]
+
+
+def _unlike_a_motor(lag_s: float) -> float:
+    """Return by which factor a lag is outside of those of motors, as a logarithm."""
+    low, high = _MOTOR_LAGS_S
+    lag = max(lag_s, 1e-5)
+    return math.log(max(low / lag, lag / high, 1.0))
 
 
 def _at_delay(found: Search, delay: float, step_s: float, free: Sequence[str]) -> dict[str, float]:
