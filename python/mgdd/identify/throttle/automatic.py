@@ -25,7 +25,7 @@ from mgdd.identify.throttle.hunt import (
     names_of,
     noise_of,
 )
-from mgdd.identify.throttle.whole_delay import Delays, whole_delay
+from mgdd.identify.throttle.whole_delay import RAMPS, Delays, whole_delay
 from mgdd.optimize.fit_options import FitOptions, fit_options
 from mgdd.results import Finding, Fit, FitReport
 
@@ -45,9 +45,8 @@ _STOP = {"stop_duty_per_deg": 40.0, "stop_damping": 0.7}
 _AS_GOOD, _STIFFEST = 1.002, 400.0  # stops that were touched yield unless the log says that they do not
 _TOUCHED_DEG = 0.5  # as near as that the plate has been at a stop
 _COARSE = 2  # steps per sample of the first look
-_SEEDS = 3  # rough solutions that are looked at from every delay
+_SEEDS = 2  # rough solutions that are looked at from every delay
 _AT_NOISE = 1.05  # a residual that small leaves nothing to explain
-_RAMPS = (0.1, 0.4)
 _DROPS, _SPEEDS, _PRESLIDINGS, _HALF_GAPS = (0.08, 0.6), (8.0, 40.0), (0.06, 0.2), (0.1, 0.3)
 
 
@@ -156,7 +155,7 @@ def _structure(
         return [*base, *(name for term in terms for name in term if name not in fixed)]
 
     # A search in the valley of a wrong delay seldom leaves it: each begins with a search of its own.
-    ramps: list[dict[str, float]] = [{}, *({"ramp_deg": ramp} for ramp in _RAMPS if "ramp_deg" in base)]
+    ramps: list[dict[str, float]] = [{}, *({"ramp_deg": ramp} for ramp in RAMPS if "ramp_deg" in base)]
     moving = [name for name in ("tau_s", "gain_deg_per_s2_per_duty", *LAG) if name in base]
     whole = [name for name in base if name not in DELAY]
     tries = []
@@ -184,12 +183,12 @@ def _structure(
     found[(DROP,)] = dropping
     if dropping.rmse < enough:
         return [dropping], [*terms, DROP]
+    least = min([plain, dropping], key=lambda one: one.rmse).values
     tries = [
         hunt.search(
-            {**one.values, "presliding_deg": width, "stribeck_drop": max(one.values["stribeck_drop"], 0.05)},
+            {**least, "presliding_deg": width, "stribeck_drop": max(least["stribeck_drop"], 0.05)},
             of([DROP, PRESLIDING]), BRISTLES, 25,
         )
-        for one in sorted([plain, dropping], key=lambda one: one.rmse)[:1]
         for width in _PRESLIDINGS
     ]  # fmt: skip
     found[(DROP, PRESLIDING)] = hunt.search(best_of(tries).values, of([DROP, PRESLIDING]), BRISTLES, 30)
@@ -204,7 +203,7 @@ def _structure(
     best = min(found, key=lambda one: _criterion(found[one], len(of(one)), n))
     # Sticking makes the cost rough: what the other structures have found are further starts of the chosen one.
     own = {name: found[best].values[name] for term in best for name in term}
-    others = [one.values for structure, one in found.items() if structure != best]
+    others = [one.values for one in sorted(found.values(), key=lambda one: one.rmse)[1:3]]
     others += [{**found[best].values, **ramp} for ramp in ramps[1:]]
     again = [hunt.search({**one, **_ABSENT, **own}, of(best), BRISTLES, 20) for one in others]
     return sorted([found[best], *again], key=lambda one: one.rmse)[:_SEEDS], [*terms, *best]

@@ -18,8 +18,10 @@ if TYPE_CHECKING:
 
     from mgdd.identify.throttle.first_principle_problem import Search
 
-__all__ = ["Delays", "whole_delay"]
+__all__ = ["RAMPS", "Delays", "whole_delay"]
 
+RAMPS = (0.1, 0.4)  # where searches begin [deg]: ramp and limp-home have valleys of their own
+_RIVAL = 1.5  # a delay whose coarse search ends that far above the best is no rival
 _MOTOR_LAGS_S = (3e-4, 3e-3)  # L/R of throttle motors, which decides between delays that the log does not separate
 
 
@@ -44,27 +46,32 @@ def whole_delay(hunt: Hunt, rough: Sequence[Search], delays: Sequence[float]) ->
     at = rough[0].values["delay_samples"]
     free = [name for name in names_of(rough[0]) if name != "delay_samples"]
     near = [d for d in delays if math.floor(at) - 1 <= d <= math.ceil(at)] or [min(delays, key=lambda d: abs(d - at))]
+    ramps = [{"ramp_deg": ramp} for ramp in RAMPS if "ramp_deg" in free]
+    begin = [*rough, *(rough[0]._replace(values={**rough[0].values, **ramp}) for ramp in ramps)]
+    looks: dict[float, Search] = {}
     found: dict[float, Search] = {}
-    tried: set[tuple[float, float]] = set()
-    while missing := [delay for delay in near if delay not in found]:
-        for delay in missing:
-            starts = [_at_delay(one, delay, hunt.problem.step_s, free) for one in rough]
-            look = best_of([hunt.search(start, free, BRISTLES, 15) for start in starts])
-            found[delay] = hunt.search(look.values, free, FINE, 25, 1e-6)
+
+    def look(start: Search, delay: float) -> Search:
+        return hunt.search(_at_delay(start, delay, hunt.problem.step_s, free), free, BRISTLES, 15)
+
+    while missing := [delay for delay in near if delay not in looks]:
+        looks |= {delay: best_of([look(start, delay) for start in begin]) for delay in missing}
         for delay, other in [*pairwise(near), *pairwise(near[::-1])]:  # each also from where its neighbours ended
-            if (delay, other) not in tried:
-                start = _at_delay(found[other], delay, hunt.problem.step_s, free)
-                found[delay] = best_of([found[delay], hunt.search(start, free, FINE, 20, 1e-6)])
-                tried.add((delay, other))
-        best = min(near, key=lambda delay: found[delay].rmse)
+            if delay in missing or other in missing:
+                looks[delay] = best_of([looks[delay], look(looks[other], delay)])
+        enough = _RIVAL * max(best_of(looks.values()).rmse, FLOOR_DEG)
+        for delay in near:
+            if looks[delay].rmse <= enough and delay not in found:
+                found[delay] = hunt.search(looks[delay].values, free, FINE, 25, 1e-6)
+        best = min(found, key=lambda delay: found[delay].rmse)
         at = list(delays).index(best)  # never the last of those looked at, while there are others
-        near = [d for d in delays if d in found or d in delays[max(at - 1, 0) : at + 2]]
+        near = [d for d in delays if d in looks or d in delays[max(at - 1, 0) : at + 2]]
     problem = hunt.problem
     residual = {delay: np.asarray(one.report.residual) for delay, one in found.items()}
     floor = max(noise_of(problem.angle), FLOOR_DEG)
     ties = _equals(block_losses(residual, problem.angle, problem.step_s, floor))
     kept = min(ties, key=lambda delay: (_unlike_a_motor(found[delay].values["electrical_s"]), delay))
-    rmse = {delay: max(one.rmse, FLOOR_DEG) for delay, one in found.items()}
+    rmse = {delay: max(one.rmse, FLOOR_DEG) for delay, one in {**looks, **found}.items()}
     return Delays(found=found[kept], rmse=rmse, ties=tuple(ties))
 
 
