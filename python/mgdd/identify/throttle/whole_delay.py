@@ -22,6 +22,7 @@ __all__ = ["RAMPS", "Delays", "whole_delay"]
 
 RAMPS = (0.1, 0.4)  # where searches begin [deg]: ramp and limp-home have valleys of their own
 _RIVAL = 1.5  # a delay whose coarse search ends that far above the best is no rival
+_ALIKE = 1.25  # delays whose errors are further apart than that are no equals, whatever their blocks say
 _MOTOR_LAGS_S = (3e-4, 3e-3)  # L/R of throttle motors, which decides between delays that the log does not separate
 
 
@@ -69,7 +70,9 @@ def whole_delay(hunt: Hunt, rough: Sequence[Search], delays: Sequence[float]) ->
     problem = hunt.problem
     residual = {delay: np.asarray(one.report.residual) for delay, one in found.items()}
     floor = max(noise_of(problem.angle), FLOOR_DEG)
-    ties = _equals(block_losses(residual, problem.angle, problem.step_s, floor))
+    alike = _ALIKE * max(best_of(found.values()).rmse, FLOOR_DEG)
+    equals = _equals(block_losses(residual, problem.angle, problem.step_s, floor))
+    ties = [delay for delay in equals if found[delay].rmse <= alike] or equals
     kept = min(ties, key=lambda delay: (_unlike_a_motor(found[delay].values["electrical_s"]), delay))
     rmse = {delay: max(one.rmse, FLOOR_DEG) for delay, one in {**looks, **found}.items()}
     return Delays(found=found[kept], rmse=rmse, ties=tuple(ties))
