@@ -164,6 +164,13 @@ bench: ready ## C++ benchmarks, then the Python ones against peers
 	for program in build/bench/bench/*; do $$program; done
 	for script in benchmarks/*.py; do [ ! -e $$script ] || $(DEV) $(PY) $$script; done
 
+.PHONY: fuzz
+RUNS ?= 10000000
+fuzz: $(VENV)/.stamp-build | system-test ## mutated records and random layouts under sanitizers: make fuzz RUNS=10000000
+	$(CONFIGURE) dev -DMGDD_BUILD_TESTS=ON
+	$(BUILD) dev --target mgdd_fuzz
+	build/dev/mgdd_fuzz $(RUNS) $(SEED)
+
 .PHONY: mutants
 MODULE ?= throttle
 mutants: ready ## changed lines that the tests notice: make mutants MODULE=throttle (Python: mgdd.throttle)

@@ -21,7 +21,15 @@ for group in "$@"; do
       runs "import sysconfig; open(sysconfig.get_path('include') + '/Python.h')" || missing+=(python3-dev)
       has ccache || useful+=(ccache)
       ;;
-    test) has_header gtest/gtest.h || missing+=(libgtest-dev) ;;
+    test)
+      has_header gtest/gtest.h || missing+=(libgtest-dev)
+      # A kernel with CAN for one test, which is skipped without; built for these two architectures only.
+      if [[ "$(uname -m)" =~ ^(x86_64|i.86)$ ]]; then
+        has linux.uml || useful+=(user-mode-linux)
+        [[ -x /sbin/insmod ]] || has insmod || useful+=(kmod)
+        [[ -x /sbin/ip ]] || has ip || useful+=(iproute2)
+      fi
+      ;;
     bench) has_header benchmark/benchmark.h || missing+=(libbenchmark-dev) ;;
     clang) has clang++ || missing+=(clang) ;;
     mingw) has x86_64-w64-mingw32-g++-posix || missing+=(g++-mingw-w64-x86-64-posix) ;;
@@ -29,17 +37,20 @@ for group in "$@"; do
   esac
 done
 
-if has apt-get; then
-  missing+=("${useful[@]}")
-elif ((${#useful[@]})); then
-  echo "would save time: ${useful[*]}"
+if ((${#useful[@]})) && ! has apt-get; then
+  echo "would help: ${useful[*]}"
+  useful=()
 fi
-((${#missing[@]})) || exit 0
+((${#missing[@]} + ${#useful[@]})) || exit 0
 has apt-get || { echo "please install what Debian calls: ${missing[*]}" >&2; exit 1; }
 
-echo "installing: ${missing[*]}"
 sudo=()
 [[ "$(id -u)" == 0 ]] || sudo=(sudo)
 "${sudo[@]}" env DEBIAN_FRONTEND=noninteractive tools/aloud.sh apt-get update -q
+for package in "${useful[@]}"; do # what this distribution does not have is done without
+  if apt-cache show "$package" >/dev/null 2>&1; then missing+=("$package"); fi
+done
+((${#missing[@]})) || exit 0
+echo "installing: ${missing[*]}"
 "${sudo[@]}" env DEBIAN_FRONTEND=noninteractive tools/aloud.sh \
   apt-get install -y -q -o Dpkg::Use-Pty=0 --no-install-recommends "${missing[@]}"

@@ -110,40 +110,4 @@ void make_refusals_readable(const py::module_& m);
 
 void bind_errors(py::module_& m);
 
-// One function per noun; module.cpp says in which submodule.
-void bind_least_squares(py::module_& m);
-void bind_limits(py::module_& m);
-void bind_seekers(py::module_& m);
-void bind_direct_seekers(py::module_& m);
-void bind_learning(py::module_& m);
-void bind_controllers(py::module_& m);
-void bind_guided_predictive(py::module_& m);
-void bind_supervisor(py::module_& m);
-void bind_cylinder(py::module_& m);
-void bind_emissions(py::module_& m);
-void bind_cycle(py::module_& m);
-void bind_performance(py::module_& m);
-void bind_pressure(py::module_& m);
-void bind_throttle(py::module_& m);
-void bind_sensors(py::module_& m);
-void bind_stepper(py::module_& m);
-void bind_pseudo_wiener(py::module_& m);
-void bind_demand(py::module_& m);
-void bind_cylinder_fit(py::module_& m);
-void bind_throttle_fit(py::module_& m);
-void bind_online(py::module_& m);
-void bind_feed_forward(py::module_& m);
-void bind_model_optimum(py::module_& m);
-void bind_timing_map(py::module_& m);
-void bind_online_calibration(py::module_& m);
-void bind_benchmark_models(py::module_& m);
-void bind_curve(py::module_& m);
-void bind_guided_engine(py::module_& m);
-void bind_engine_bench(py::module_& m);
-void bind_loop(py::module_& m);
-void bind_virtual_throttle(py::module_& m);
-void bind_throttle_loop(py::module_& m);
-void bind_mgdd1(py::module_& m);
-void bind_receding_horizon(py::module_& m);
-
 }  // namespace mgdd::bindings

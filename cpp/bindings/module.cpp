@@ -2,6 +2,8 @@
 
 #include "binding.hpp"
 #include "mgdd/common/platform.hpp"
+#include "nouns.hpp"
+#include "rig/rig_binding.hpp"
 
 namespace {
 
@@ -45,6 +47,10 @@ PYBIND11_MODULE(_core, m) {
        "Virtual benches and the loops over them.",
        {&bind_engine_bench, &bind_loop, &bind_virtual_throttle, &bind_throttle_loop, &bind_mgdd1,
         &bind_receding_horizon}},
+      {"rig",
+       "Between a controller and a real actuator: frames of a bus, their protection and signals, records, the safety "
+       "gate, buses, the loop.",
+       {&bind_e2e, &bind_signal_codec, &bind_frame, &bind_record, &bind_safety, &bind_transports, &bind_realtime_loop}},
   };
   for (const Room& room : rooms) {
     auto submodule = m.def_submodule(room.name, room.doc);

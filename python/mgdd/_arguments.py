@@ -27,6 +27,7 @@ _NAMED = {
     "list": "a list",
     "tuple": "a tuple",
     "Callable": "a function",
+    "Buffer": "bytes",
 }
 _MAKE = {
     "Cylinder": "mgdd.presets.load(name).cylinder is one",
@@ -192,6 +193,8 @@ def _fits_name(name: str, value: Any) -> bool:
         return value is None
     if name == "Callable":
         return callable(value)
+    if name == "Buffer":
+        return isinstance(value, bytes | bytearray | memoryview)
     if name == "bool":
         return type(value).__name__ in ("bool", "bool_")
     return any(base.__name__ == name for base in type(value).__mro__)

@@ -15,6 +15,7 @@ import pytest
 import xarray as xr
 
 import mgdd
+from idle_loop import idle_loop
 from mgdd import datasets, identify, optimize, presets, signals, surrogate
 from mgdd.control import Pid
 from mgdd.engine import Cylinder, OperatingPoint, analyze, convergence, sensitivities, simulate, timing_sweep
@@ -104,6 +105,12 @@ def of_records() -> surrogate.EngineSurrogate:
     return surrogate.fit_surrogate(surrogate.random_step_records(1500))
 
 
+def loop_samples() -> xr.Dataset:
+    with idle_loop() as loop:
+        loop.wait(0.05)
+    return loop.samples()
+
+
 def wall_heat() -> xr.Dataset:
     traces = datasets.load("hd_diesel_128x144")[:2]
     fit = identify.fit_cylinder(traces, presets.load("hd_diesel_128x144").cylinder)
@@ -153,6 +160,7 @@ MADE: dict[str, Callable[[Path], Any]] = {
     "io.read_pressure": pressures,
     "io.read_throttle_log": written_log,
     "io.throttle_log": lambda _: log(),
+    "rig.RealtimeLoop.samples": lambda _: loop_samples(),
     "loop.EngineBench.run": lambda _: bench_run(),
     "loop.LoopRun.dataset": lambda _: [run_seeker(EngineBench(seed=1), seeker(), 20).dataset, rig_run()],
     "loop.monte_carlo": lambda _: monte_carlo(EngineBench(), seeker(), [1, 2], cycles=20),

@@ -9,7 +9,7 @@ from pathlib import Path
 
 import pytest
 
-CPP = "common > math > dynamics > optimize > control > engine throttle > identify > guide > loop"
+CPP = "common > math > dynamics > optimize > control > engine throttle > identify > guide > loop > rig"
 PYTHON = (
     "errors > _arguments > _core > results > signals > io plot > presets > optimize > control > engine throttle"
     " > identify > surrogate > guide > loop sweep design datasets > maps > rig > studies > report > cli > __main__"

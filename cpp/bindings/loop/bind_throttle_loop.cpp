@@ -10,12 +10,10 @@
 
 #include "binding.hpp"
 #include "interruptible.hpp"
-#include "loop/mgdd1_binding.hpp"
+#include "loop/throttle_controller_binding.hpp"
 #include "mgdd/common/error.hpp"
-#include "mgdd/loop/throttle_controllers.hpp"
 
 namespace mgdd::bindings {
-namespace {
 
 using namespace loop;
 
@@ -30,7 +28,6 @@ ThrottleController controller_of(const py::handle& object) {
   refuse("controller", object, "a controller of mgdd.control");
 }
 
-// Puts what a run left behind back into the caller's object.
 void give_back(const py::handle& object, const ThrottleController& controller) {
   std::visit(
       [&]<class C>(const C& c) {
@@ -42,6 +39,8 @@ void give_back(const py::handle& object, const ThrottleController& controller) {
       },
       controller);
 }
+
+namespace {
 
 ThrottleScenario scenario_of(const InputArray& reference, const InputArray& airflow, const InputArray& supply,
                              std::size_t from) {

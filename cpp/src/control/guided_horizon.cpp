@@ -15,8 +15,8 @@ bool gauss_newton_step(const PlateModel<T>& model, const GuidedPredictiveSetting
   using Moves = GuidedMoves<T>;
   constexpr auto n = static_cast<std::size_t>(n_guided_moves);
   const auto steps = static_cast<std::size_t>(s.n_steps());
-  std::array<T, longest_guided_horizon> outputs;
-  std::array<Moves, longest_guided_horizon> slopes;
+  std::array<T, longest_guided_horizon> outputs;     // NOLINT(cppcoreguidelines-pro-type-member-init): filled below,
+  std::array<Moves, longest_guided_horizon> slopes;  // NOLINT(cppcoreguidelines-pro-type-member-init): as far as read
   const std::span<T> output(outputs.data(), steps);
   dynamics::predict<n_guided_moves>(model, horizon.ahead, moves, s.move_steps, output,
                                     std::span<Moves>(slopes.data(), steps));

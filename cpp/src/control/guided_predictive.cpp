@@ -16,6 +16,7 @@ constexpr double hold_rate_deg_per_s = 2.0;  // a faster reference is followed, 
 constexpr double breakaway_margin = 0.015;   // duty beyond the friction level
 constexpr double hold_share = 0.3;           // of the friction band that a held duty may use
 constexpr double hold_duty_per_s = 2.0;      // how fast it goes there
+constexpr double release_duty_per_s = 20.0;  // and at a stop, where it only heats the motor
 constexpr double lead_s = 0.01;              // of the reference in the wanted direction
 constexpr double feed_forward_deg = 0.25;    // error at which a linear prediction feeds all friction forward
 constexpr double largest_bias = 0.4;         // of the form without learning
@@ -199,7 +200,8 @@ bool BasicGuidedPredictive<T>::hold_still() noexcept {
   const T angle = horizon_.ahead.angle_deg;
   const FrictionBand<T>& band = band_at(angle);
   const T middle = observed_.holding(angle) + band.bias, half = T(hold_share) * band.friction;
-  const T most = T(hold_duty_per_s * s.sample_s);
+  const bool stopped = angle < T(s.plate.closed_deg + end_deg) || angle > T(s.plate.open_deg - end_deg);
+  const T most = T((stopped ? release_duty_per_s : hold_duty_per_s) * s.sample_s);
   const T wanted = std::clamp(sent_.before[0], middle - half, middle + half);
   moves_.fill(std::clamp(std::clamp(wanted, sent_.before[0] - most, sent_.before[0] + most), horizon_.lowest,
                          horizon_.highest));

@@ -5,6 +5,7 @@
 #include <utility>
 
 #include "mgdd/common/bounds.hpp"
+#include "mgdd/control/monitoring.hpp"
 
 namespace mgdd::control {
 namespace {
@@ -12,7 +13,6 @@ namespace {
 using Mode = SupervisorMode;
 using Reason = SupervisorReason;
 
-constexpr double rounding = 1e-6;   // of times against whole samples
 constexpr double fast_moves = 8.0;  // so many times the speed of a jam: the plate moves, without waiting for the way
 constexpr double quick_lag = 1.0 / 3.0;  // of the balance's
 
@@ -50,13 +50,9 @@ void ThrottleSupervisor::raise(Mode mode, Reason reason) noexcept {
 bool ThrottleSupervisor::raise_after(Count which, bool failing, double after_s, Mode mode, Reason reason) noexcept {
   double& count = state_.counts[which];
   count = failing ? count + 1.0 : 0.0;
-  const bool raised = failing && lasted(count, after_s);
+  const bool raised = failing && lasted(count, settings_.sample_s, after_s);
   if (raised) raise(mode, reason);
   return raised;
-}
-
-bool ThrottleSupervisor::lasted(double samples, double time_s) const noexcept {
-  return (samples + rounding) * settings_.sample_s >= time_s;
 }
 
 double ThrottleSupervisor::usable_reference_deg() const noexcept {
@@ -80,29 +76,25 @@ void ThrottleSupervisor::look_at_reference(double reference_deg) noexcept {
 void ThrottleSupervisor::look_at_angles(const SupervisorInputs& in) noexcept {
   const SupervisorSettings& set = settings_;
   State& s = state_;
-  const std::array<bool, 2> finite{std::isfinite(in.angle_deg[0]), std::isfinite(in.angle_deg[1])};
-  const bool arrived = (finite[0] || finite[1]) && in.age_s >= 0.0;
-  s.silence_s = arrived ? in.age_s : s.silence_s + set.sample_s;
+  const bool arrived = (std::isfinite(in.angle_deg[0]) || std::isfinite(in.angle_deg[1])) && in.age_s >= 0.0;
+  s.silence_s = aged(arrived, in.age_s, s.silence_s, set.sample_s);
   const Reason silent = arrived ? Reason::stale_sample : Reason::missing_sample;
-  const bool late = s.silence_s > set.late_s + rounding * set.sample_s;
+  const bool late = older(s.silence_s, set.late_s, set.sample_s);
   s.trusted = !late;
   if (!arrived || late) raise(Mode::holding, silent);
-  if (lasted(s.silence_s / set.sample_s, set.silence_s)) raise(Mode::limp_home, silent);
+  if (lasted(s.silence_s / set.sample_s, set.sample_s, set.silence_s)) raise(Mode::limp_home, silent);
   if (!arrived || late) return;
 
-  const auto in_range = [&](std::size_t i) {
-    return finite[i] && in.angle_deg[i] >= set.closed_deg - set.range_margin_deg &&
-           in.angle_deg[i] <= set.open_deg + set.range_margin_deg;
-  };
-  const bool first = in_range(0), second = in_range(1);
-  const bool disagree = first && second && !(std::abs(in.angle_deg[0] - in.angle_deg[1]) < set.disagreement_deg);
+  const Domain range = closed(set.closed_deg - set.range_margin_deg, set.open_deg + set.range_margin_deg);
+  const PairCheck check = check_pair(in.angle_deg, range, in.angle_deg[0] - in.angle_deg[1], set.disagreement_deg);
+  const bool disagree = check.all_in_range() && !check.agree;
   const Reason wrong = disagree ? Reason::sensor_disagreement : Reason::sensor_range;
-  const bool bad = disagree || !first || !second;
+  const bool bad = !check.healthy();
   if (bad) raise(Mode::holding, wrong);
   (void)raise_after(bad_sensor, bad, set.sensor_s, Mode::limp_home, wrong);
   if (in.sensor_fault) raise(Mode::limp_home, bad ? wrong : Reason::sensor_disagreement);
-  s.trusted = (first || second) && !disagree;
-  if (s.trusted) s.angle_deg = in.angle_deg[first ? 0 : 1];
+  s.trusted = check.in_range[check.usable()] && !disagree;
+  if (s.trusted) s.angle_deg = in.angle_deg[check.usable()];
 }
 
 void ThrottleSupervisor::look_at_supply(double supply_v) noexcept {
@@ -145,10 +137,7 @@ bool ThrottleSupervisor::look_for_jam(double duty, double excess, double frictio
   const bool pushed =
       std::abs(error) > set.jam_error_deg && way * excess > known + set.load && way * duty > friction + set.load;
   const bool fast = std::abs(s.filtered[quick_rate]) * set.jam_s > fast_moves * set.jam_move_deg;
-  if (!pushed || fast || std::abs(s.angle_deg - s.anchor_deg) > set.jam_move_deg) {
-    s.anchor_deg = s.angle_deg;
-    s.counts[jam] = 0.0;
-  }
+  follow_standstill(!pushed || fast, s.angle_deg, set.jam_move_deg, s.anchor_deg, s.counts[jam]);
   (void)raise_after(jam, pushed, set.jam_s, Mode::limp_home, Reason::jammed);
   return pushed;
 }
@@ -203,7 +192,7 @@ void ThrottleSupervisor::test_return() noexcept {
   s.open += 1.0;
   const bool there =
       s.trusted && std::abs(s.angle_deg - settings_.spring.limp_home_deg) <= settings_.limp_home_band_deg;
-  const bool due = lasted(s.open, settings_.return_s);
+  const bool due = lasted(s.open, settings_.sample_s, settings_.return_s);
   s.test = there ? ReturnTest::passed : due && s.trusted ? ReturnTest::failed : ReturnTest::pending;
 }
 
@@ -233,7 +222,7 @@ SupervisorOrder ThrottleSupervisor::decide(double duty) noexcept {
 SupervisorReason ThrottleSupervisor::acknowledge() noexcept {
   State& s = state_;
   const bool returned = s.latched != Mode::limp_home || s.test == ReturnTest::passed;
-  if (!returned || !lasted(s.quiet, settings_.healthy_s)) return s.order.reason;
+  if (!returned || !lasted(s.quiet, settings_.sample_s, settings_.healthy_s)) return s.order.reason;
   s.latched = s.order.mode = Mode::normal;
   s.order.reason = Reason::none;
   s.order.bridge_open = s.restricted = false;

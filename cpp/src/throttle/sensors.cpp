@@ -10,6 +10,7 @@
 #include "mgdd/common/field.hpp"
 #include "mgdd/common/random.hpp"
 #include "mgdd/common/text.hpp"
+#include "mgdd/control/monitoring.hpp"
 
 namespace mgdd::throttle {
 namespace {
@@ -105,12 +106,14 @@ SensorReading SensorSampler::step(double angle_deg) noexcept {
     held = state_.sample == 0 ? volts : held + filter_ * (volts - held);
     const double noise = pair_.noise_v * random::normal(seed_, i, static_cast<std::uint64_t>(state_.sample));
     out.volts[i] = std::clamp(std::round((held + noise) / lsb_v_) * lsb_v_, 0.0, highest_v_);
-    out.range_fault[i] = out.volts[i] < pair_.low_v || out.volts[i] > pair_.high_v;
   }
   out.sum_error_v = out.volts[0] + out.volts[1] - pair_.supply_v;
-  out.sum_fault = std::abs(out.sum_error_v) >= pair_.sum_tolerance_v;
-  out.angle_deg = pair_.angles_deg(out.volts)[out.range_fault[0] && !out.range_fault[1] ? 1 : 0];
-  state_.failing = out.range_fault[0] || out.range_fault[1] || out.sum_fault ? state_.failing + 1 : 0;
+  const control::PairCheck check =
+      control::check_pair(out.volts, closed(pair_.low_v, pair_.high_v), out.sum_error_v, pair_.sum_tolerance_v);
+  out.range_fault = {!check.in_range[0], !check.in_range[1]};
+  out.sum_fault = !check.agree;
+  out.angle_deg = pair_.angles_deg(out.volts)[check.usable()];
+  state_.failing = check.healthy() ? 0 : state_.failing + 1;
   state_.fault = state_.fault || state_.failing >= debounce_;
   out.fault = state_.fault;
   ++state_.sample;

@@ -10,7 +10,8 @@ from . import identify
 from . import guide
 from . import systems
 from . import loop
-__all__: list[str] = ['compiled_simd_level', 'compiler', 'control', 'engine', 'guide', 'identify', 'loop', 'optimize', 'processor_simd_levels', 'systems', 'throttle']
+from . import rig
+__all__: list[str] = ['compiled_simd_level', 'compiler', 'control', 'engine', 'guide', 'identify', 'loop', 'optimize', 'processor_simd_levels', 'rig', 'systems', 'throttle']
 def compiled_simd_level() -> str:
     """
     Instruction set of this build.

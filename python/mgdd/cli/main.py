@@ -10,7 +10,7 @@ import sys
 from collections.abc import Sequence
 
 from mgdd import _core
-from mgdd.cli import demo, doctor, engine, study, throttle
+from mgdd.cli import demo, doctor, engine, rig, study, throttle
 from mgdd.cli.options import Parser, UsageError, as_option
 from mgdd.cli.output import Stopped, fail
 from mgdd.cli.progress import Progress
@@ -20,7 +20,8 @@ __all__ = ["main"]
 
 EXIT_OK, EXIT_BAD_INPUT, EXIT_NO_CONVERGENCE, EXIT_INTERRUPTED, EXIT_PIPE = 0, 2, 3, 130, 141
 
-_EPILOG = """exit codes: 0 done, 2 bad input or usage, 3 no convergence or no feasible answer, 130 interrupted.
+_EPILOG = """exit codes: 0 done, 1 a self-test or replay that failed, 2 bad input or usage, 3 no convergence or no
+feasible answer, 130 interrupted.
 
 examples:
   mgdd demo
@@ -42,7 +43,8 @@ def main(argv: Sequence[str] | None = None) -> int:
     Returns
     -------
     int
-        Exit code: 0 done, 2 bad input or usage, 3 no convergence or no feasible answer, 130 interrupted.
+        Exit code: 0 done, 1 a self-test or replay that failed, 2 bad input or usage, 3 no convergence or no feasible
+        answer, 130 interrupted.
 
     Examples
     --------
@@ -76,7 +78,7 @@ def main(argv: Sequence[str] | None = None) -> int:
     except BrokenPipeError:
         os.dup2(os.open(os.devnull, os.O_WRONLY), sys.stdout.fileno())  # the reader has left; nothing more to say
         return EXIT_PIPE
-    except (Error, OSError) as error:
+    except (Error, OSError, ImportError) as error:  # an extra that is not installed is named
         print(f"mgdd: error: {error}", file=sys.stderr)
         fail(args, error, str(error))
         return EXIT_BAD_INPUT
@@ -85,7 +87,7 @@ def main(argv: Sequence[str] | None = None) -> int:
         print(f"mgdd: {kept}", file=sys.stderr)
         fail(args, error, kept)
         return EXIT_INTERRUPTED
-    return EXIT_OK
+    return int(getattr(args, "exit_code", EXIT_OK))
 
 
 def _parser() -> argparse.ArgumentParser:
@@ -101,6 +103,7 @@ def _parser() -> argparse.ArgumentParser:
     demo.add(commands)
     engine.add(commands)
     throttle.add(commands)
+    rig.add(commands)
     study.add(commands)
     doctor.add(commands)
     return parser

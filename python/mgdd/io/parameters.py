@@ -6,7 +6,6 @@ The one reader and writer of such files. It knows mappings only; presets, models
 
 from __future__ import annotations
 
-import tomllib
 from collections.abc import Collection, Iterable, Mapping
 from dataclasses import dataclass, field, replace
 from typing import TYPE_CHECKING, Any, Self
@@ -14,8 +13,8 @@ from typing import TYPE_CHECKING, Any, Self
 import numpy as np
 
 from mgdd.errors import DataError, ParameterError, did_you_mean
-from mgdd.io.existing_file import existing_file
 from mgdd.io.parameter_entries import FORMS, PARTS, Entry, Wanted, entries, entry_of, fits, key_line, quoted, wanted
+from mgdd.io.toml_text import text_of, toml_of
 
 if TYPE_CHECKING:
     import os
@@ -122,10 +121,7 @@ class ParameterFile:
         ParameterError
             A value that does not stand as ``{ value = ..., unit = "..." }``.
         """
-        try:
-            data = tomllib.loads(text)
-        except tomllib.TOMLDecodeError as error:
-            raise DataError(f"{origin}: not valid TOML: {error}") from error
+        data = toml_of(text, origin)
         kind, version = data.get("kind"), data.get("format")
         if not isinstance(kind, str):
             raise DataError(f'{origin}: kind = {kind!r}: say what the file holds, for example kind = "engine"')
@@ -145,12 +141,8 @@ class ParameterFile:
     @classmethod
     def read(cls, path: str | os.PathLike[str]) -> ParameterFile:
         """Read a file; FileNotFoundError or DataError name it."""
-        file = existing_file(path)
-        try:
-            text = file.read_text(encoding="utf-8")
-        except UnicodeDecodeError as error:
-            raise DataError(f"{file}: not a UTF-8 text file: {error}") from error
-        return cls.from_toml(text, origin=str(file))
+        text, origin = text_of(path)
+        return cls.from_toml(text, origin=origin)
 
     def expect(self, *, kinds: Collection[str], tables: Collection[str], notes: Collection[str] = ("source",)) -> None:
         """Refuse another kind, a missing table, and a table or note that the kind does not have.

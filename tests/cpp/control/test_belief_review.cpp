@@ -1,11 +1,13 @@
 #include <gtest/gtest.h>
 
+#include <algorithm>
 #include <array>
 #include <cmath>
 #include <map>
 #include <random>
 #include <string>
 #include <string_view>
+#include <utility>
 
 #include "mgdd/common/state.hpp"
 #include "mgdd/control/belief_review.hpp"
@@ -44,6 +46,11 @@ TEST(BeliefReview, CertifiesWhatPredictsBetterForTheLongTime) {
   BeliefReview<double> even({.worse = 1.5, .roll_back_s = 0.05, .certify_s = 0.4}, 1e-3, noise_deg);
   for (int i = 0; i < 1000; ++i)
     EXPECT_EQ(even.judge(0.1, 0.12), Verdict::keep) << "a fifth better is not enough";
+  even.restart();
+  samples = 1;
+  while (even.judge(0.1, 0.2) == Verdict::keep && samples < 1000)
+    ++samples;
+  EXPECT_EQ(samples, 400) << "it needs the whole time again";
 }
 
 struct Named {
@@ -60,6 +67,7 @@ TEST(FrictionLearner, ItsCovarianceStaysPositiveAndBelowTheFirstOne) {
   std::uniform_real_distribution<float> speed(-900.0F, 900.0F), push(-0.9F, 0.9F), innovation(-0.5F, 0.5F);
   float v = 0.0F, p = 0.0F;
   double least_gain_variance = s.learner.gain_weight;
+  float largest_level = 0.0F;
   for (int k = 0; k < 20000; ++k) {
     if (k % 37 == 0) v = speed(generator), p = push(generator);
     if (k % 211 == 0) learner.forget();
@@ -72,13 +80,67 @@ TEST(FrictionLearner, ItsCovarianceStaysPositiveAndBelowTheFirstOne) {
     ASSERT_GT(a * e - b * b, 0.0) << k;
     ASSERT_GT(a * (e * g - f * f) - b * (b * g - f * d) + d * (b * f - e * d), 0.0) << k;
     ASSERT_TRUE(learner.is_usable()) << k;
+    largest_level = std::max(largest_level, std::abs(belief.above.bias) + belief.above.friction);
     least_gain_variance = std::min(least_gain_variance, e);
   }
+  EXPECT_NEAR(largest_level, 0.5F, 1e-6F);  // reached, and never passed
   EXPECT_LT(least_gain_variance, 0.3 * s.learner.gain_weight) << "nothing was narrowed";
   learner.reset();
   Named c;
   FrictionLearner<float>::visit(std::as_const(learner), c);
   EXPECT_EQ(c.values["gain_variance"], s.learner.gain_weight);
+}
+
+FrictionLearner<double> learner_of(const GuidedPredictiveSettings& s) {
+  return {s.learner, s.plate, 1e-3, noise_deg, 0.35, 28.0};
+}
+
+TEST(FrictionLearner, WithoutExcitationWhatItsNumbersHadInCommonFades) {
+  const GuidedPredictiveSettings s = asymmetric();
+  auto learner = learner_of(s);
+  PlateBelief<double> belief{{0.0, 0.08}, {0.0, 0.08}, 1.0, 1.0};
+  for (int k = 0; k < 200; ++k)
+    learner.slide(belief, belief.above, 0.0, {0.5, 700.0, 1.03});
+  const auto common = [&] {
+    Named c;
+    FrictionLearner<double>::visit(std::as_const(learner), c);
+    return c.values["gain_damping"];
+  };
+  const double before = common();
+  EXPECT_GT(std::abs(before), 0.1);
+  for (int k = 0; k < 1000; ++k) {  // two memories of a plate whose push is its friction
+    learner.forget();
+    learner.slide(belief, belief.above, 0.0, {belief.above.bias + belief.above.friction, 1e-6, 1.03});
+  }
+  EXPECT_NEAR(common() / before, std::exp(-2.0), 0.02);
+}
+
+TEST(FrictionLearner, AnInnovationFarBeyondTheNoiseTeachesNoMoreThanTenTimesTheNoise) {
+  const GuidedPredictiveSettings s = asymmetric();
+  for (const double sign : {1.0, -1.0}) {
+    auto one = learner_of(s), other = learner_of(s);
+    PlateBelief<double> first{{0.01, 0.08}, {0.0, 0.08}, 1.0, 1.0}, second = first;
+    for (int k = 0; k < 20; ++k) {
+      one.slide(first, first.above, sign * 10.0 * noise_deg, {0.4, 300.0, 1.03});
+      other.slide(second, second.above, sign * 50.0, {0.4, 300.0, 1.03});
+    }
+    EXPECT_NE(first.above.bias, 0.01);
+    EXPECT_EQ(second.above.bias, first.above.bias);
+    EXPECT_EQ(second.above.friction, first.above.friction);
+    EXPECT_EQ(second.gain_factor, first.gain_factor);
+  }
+}
+
+// What moved it is not the push: its band lies too far on the side of the motion.
+TEST(FrictionLearner, AStuckPlateThatMovesAgainstItsPushShiftsItsBandAgainstTheMotion) {
+  auto learner = learner_of(asymmetric());
+  FrictionBand<double> up{0.03, 0.08}, down{-0.03, 0.08};
+  (void)learner.stick(up, 0.2, 0.15, 0.01);
+  (void)learner.stick(down, -0.2, -0.15, -0.01);
+  EXPECT_LT(up.bias, 0.03);
+  EXPECT_GT(down.bias, -0.03);
+  EXPECT_EQ(up.friction, 0.08);
+  EXPECT_EQ(up.bias, -down.bias);
 }
 
 struct WrongBelief {

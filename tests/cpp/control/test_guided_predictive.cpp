@@ -230,6 +230,24 @@ TEST(GuidedPredictive, NothingIsLearntAtAStop) {
   }
 }
 
+TEST(GuidedPredictive, APlateAtItsStopIsNotPressedOn) {
+  const GuidedPredictiveSettings s = asymmetric();
+  for (const double end : {s.plate.closed_deg, s.plate.open_deg}) {
+    Plant plant(s.plate, 45.0);
+    GuidedPredictive controller(s);
+    int arrived = -1, released = -1;
+    for (int k = 0; k < 400; ++k) {
+      const double duty = controller.step(k < 50 ? 45.0 : end, plant.angle_deg());
+      plant.step(duty);
+      if (arrived < 0 && std::abs(plant.angle_deg() - end) < 0.01) arrived = k;
+      if (std::abs(duty) > 0.4) released = k + 1;
+    }
+    ASSERT_GT(arrived, 50);
+    EXPECT_LT(released - arrived, 60) << end;
+    EXPECT_NEAR(plant.angle_deg(), end, 0.01);
+  }
+}
+
 TEST(GuidedPredictive, TheModelIsToldTheDutyThatTheRateAllowed) {
   GuidedPredictiveSettings s = asymmetric();
   s.duty_rate_per_s = 3.0;

@@ -54,10 +54,8 @@ struct MoveQp {
       bool changed = false;
       for (std::size_t i = 0; i < n; ++i) {
         if (bound[i] != 0) continue;
-        if (d[i] < low[i])
-          bound[i] = -1, changed = true;
-        else if (d[i] > high[i])
-          bound[i] = 1, changed = true;
+        bound[i] = d[i] < low[i] ? -1 : d[i] > high[i] ? 1 : 0;
+        changed = changed || bound[i] != 0;
       }
       if (changed) continue;
       for (std::size_t i = 0; i < n; ++i) {  // a bound that pulls is let go

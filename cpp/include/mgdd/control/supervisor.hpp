@@ -12,12 +12,11 @@
 #include <cstdint>
 #include <limits>
 #include <span>
-#include <string_view>
-#include <type_traits>
 
 #include "mgdd/common/enum_names.hpp"
 #include "mgdd/common/field.hpp"
 #include "mgdd/common/state.hpp"
+#include "mgdd/common/visit_enum.hpp"
 #include "mgdd/control/holding_duty.hpp"
 #include "mgdd/dynamics/lag.hpp"
 
@@ -223,16 +222,9 @@ class ThrottleSupervisor {
   };
 
   static constexpr std::int64_t n_modes = 4, n_reasons = 14, n_tests = 4;
-  template <class V, class Enum>
-  static void visit_enum(V& v, std::string_view name, Enum& value, std::int64_t end) {
-    auto number = static_cast<std::int64_t>(value);  // NOLINT(misc-const-correctness): a reader writes it
-    v(name, number, end);
-    if constexpr (!std::is_const_v<Enum>) value = static_cast<Enum>(number);
-  }
 
   void raise(SupervisorMode mode, SupervisorReason reason) noexcept;
   bool raise_after(Count which, bool failing, double after_s, SupervisorMode mode, SupervisorReason reason) noexcept;
-  bool lasted(double samples, double time_s) const noexcept;
   double usable_reference_deg() const noexcept;
   void look_at_reference(double reference_deg) noexcept;
   void look_at_angles(const SupervisorInputs& inputs) noexcept;

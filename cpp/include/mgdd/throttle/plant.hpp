@@ -6,7 +6,6 @@
 #pragma once
 
 #include <array>
-#include <bit>
 #include <cstddef>
 
 #include "mgdd/common/units.hpp"
@@ -15,6 +14,7 @@
 #include "mgdd/dynamics/play.hpp"
 #include "mgdd/math/select.hpp"
 #include "mgdd/throttle/limp_home_spring.hpp"
+#include "mgdd/throttle/plant_coefficients.hpp"
 #include "mgdd/throttle/throttle.hpp"
 
 namespace mgdd::throttle {
@@ -52,44 +52,6 @@ struct BasicThrottleTorques {
   T stop_nm{0.0};    ///< positive when it opens
   T air_nm{0.0};
 };
-
-template <class C>
-struct FrictionCoefficients {
-  C viscous;
-  dynamics::FrictionLevels<C> levels;
-  dynamics::Bristles<C> bristles;
-};
-
-/// What one step needs of the parameters, in SI. Every member is a C, so that lanes are packed as columns.
-template <class C>
-struct PlantCoefficients {
-  FrictionCoefficients<C> whole, motor_side, plate_side;
-  dynamics::FrictionShape<C> shape;
-  C inertia_over_h, motor_inertia_over_h, plate_inertia_over_h;
-  C torque_constant, back_emf, resistance, inverse_impedance, inductance_over_h;
-  C drop, dead_band;
-  C limp_home;
-  SpringSide<C> above, below;
-  C inverse_ramp;
-  C closed, open, stop, stop_implicit;
-  C half_gap, gear, gear_damping, gear_implicit;
-  C air_torque;  ///< -D^3 dp
-  C supply;
-};
-inline constexpr std::size_t n_plant_coefficients = sizeof(PlantCoefficients<double>) / sizeof(double);
-
-PlantCoefficients<double> plant_coefficients(const Throttle& throttle, double step_s) noexcept;
-
-/// The same coefficients on another scalar.
-template <class C>
-PlantCoefficients<C> coefficients_over(const PlantCoefficients<double>& coefficients) noexcept {
-  static_assert(sizeof(PlantCoefficients<C>) == n_plant_coefficients * sizeof(C));
-  const auto flat = std::bit_cast<std::array<double, n_plant_coefficients>>(coefficients);
-  std::array<C, n_plant_coefficients> columns{};
-  for (std::size_t i = 0; i < flat.size(); ++i)
-    columns[i] = C(flat[i]);
-  return std::bit_cast<PlantCoefficients<C>>(columns);
-}
 
 /// Coefficients C on states of T: the same, or plain numbers on duals.
 template <class T, class C = T>

@@ -1,0 +1,169 @@
+"""`mgdd rig hub | node`: the other side of a bus, for experiments without hardware."""
+
+from __future__ import annotations
+
+import argparse
+import signal
+import sys
+import time
+from collections.abc import Callable
+from typing import TYPE_CHECKING, Any
+
+from mgdd.cli import rig_records, rig_run, rig_selftest
+from mgdd.cli.options import add_command, add_group, refuse_idle
+from mgdd.cli.output import check_file, check_output, emit
+from mgdd.rig import CanTransport, SignalMap
+from mgdd.rig.can.hub_faults import BusFault
+from mgdd.rig.can.node import TruthLog, node_of, parent_watch, run_node
+from mgdd.rig.can.node_core import NodeCore, NodePlant, node_plant
+from mgdd.rig.can.signal_map import SHIPPED
+from mgdd.rig.can.signals import noted_signals
+
+if TYPE_CHECKING:
+    from mgdd.rig.can.hub import Hub
+
+__all__ = ["add"]
+
+_LOOK_S = 0.2  # how often the hub looks for the process that started it
+
+
+def add(commands: Any) -> None:
+    """Add the group and its commands."""
+    verbs = add_group(
+        commands, "rig",
+        help_text="experiments in process, over a CAN bus and on a bench",
+        example="mgdd rig run track.toml --mode hil",
+    )  # fmt: skip
+    rig_run.add(verbs)
+    rig_records.add(verbs)
+    rig_selftest.add(verbs)
+    _add_hub(verbs)
+    _add_node(verbs)
+
+
+def _add_hub(verbs: Any) -> None:
+    parser = add_command(
+        verbs, "hub", _hub,
+        help_text="join processes of this machine by a bus of the socketcand protocol, until Ctrl-C or its parent ends",
+        example="mgdd rig hub --port 29536 --fault drop:p=0.01 --bit-rate 500000",
+    )  # fmt: skip
+    parser.add_argument("--host", default="127.0.0.1", help="address to listen at (default: 127.0.0.1)")
+    parser.add_argument("--port", type=int, default=29536, metavar="N", help="0 takes a free one (default: 29536)")
+    parser.add_argument(
+        "--fault", action="append", default=[], metavar="KIND:KEY=VALUE,...",
+        help="drop, duplicate, delay, reorder, corrupt, error or freeze, with p, id, from_s, until_s, ms, class, "
+        "client; repeatable, for example delay:ms=5,id=0x121",
+    )  # fmt: skip
+    parser.add_argument("--bit-rate", type=float, metavar="X", help="of the simulated bus [bit/s] (default: no limit)")
+    parser.add_argument("--seed", type=int, default=0, metavar="N", help="of the faults (default: 0)")
+
+
+def _add_node(verbs: Any) -> None:
+    parser = add_command(
+        verbs, "node", _node,
+        help_text="serve a virtual throttle or engine bench behind a bus, until Ctrl-C or its parent ends",
+        example="mgdd rig node --map etb --bus 'socketcand:can0?host=127.0.0.1&port=29536' --truth truth.csv",
+    )  # fmt: skip
+    parser.add_argument(
+        "--map", default="etb", metavar="NAME_OR_FILE.toml", help=f"{', '.join(SHIPPED)} or a file (default: etb)"
+    )
+    parser.add_argument(
+        "--bus",
+        required=True,
+        metavar="INTERFACE:CHANNEL",
+        help="any interface of python-can, ?OPTION=VALUE&... behind",
+    )
+    parser.add_argument("--step", action="store_true", help="no clock: one sample per command, always the same bits")
+    parser.add_argument("--period-ms", type=float, metavar="X", help="between samples (default: that of the map)")
+    parser.add_argument(
+        "--sample-ms", type=float, metavar="X", help="time in the throttle per sample (default: the same)"
+    )
+    parser.add_argument(
+        "--fault", action="append", default=[], metavar="KIND:KEY=VALUE,...",
+        help="of the throttle and its sensors, with from_s, until_s, size, sensor; repeatable, for example "
+        "offset:sensor=2,size=0.3,from_s=1",
+    )  # fmt: skip
+    parser.add_argument("--seed", type=int, default=0, metavar="N", help="of the plant (default: 0)")
+    parser.add_argument("--experiment", metavar="FILE.toml", help="serve the plant of this experiment, with its seed")
+    parser.add_argument("--truth", metavar="FILE.csv", help="write a line per sample: what really happened")
+    parser.add_argument("--duration-s", type=float, metavar="X", help="end after this time (default: never)")
+
+
+def _hub(args: argparse.Namespace) -> None:
+    import asyncio
+
+    from mgdd.rig.can.hub import Hub
+
+    check_output(args)
+    hub = Hub(
+        args.host,
+        args.port,
+        faults=[BusFault.parse(text) for text in args.fault],
+        bit_rate=args.bit_rate,
+        seed=args.seed,
+    )
+    args.progress.close()
+    asyncio.run(_serve(args, hub))
+    emit(args, hub.counts)
+
+
+async def _serve(args: argparse.Namespace, hub: Hub) -> None:
+    import asyncio
+
+    stop, alive = asyncio.Event(), parent_watch()
+    for number in (signal.SIGINT, signal.SIGTERM):
+        asyncio.get_running_loop().add_signal_handler(number, stop.set)
+
+    async def watch() -> None:
+        while alive():
+            await asyncio.sleep(_LOOK_S)
+        stop.set()
+
+    watching = asyncio.create_task(watch())
+    await hub.run(lambda ready: _say(args, f"socketcand:can0?host={ready.host}&port={ready.port}"), stop)
+    watching.cancel()
+
+
+def _node(args: argparse.Namespace) -> None:
+    check_output(args)
+    check_file("--truth", args.truth, (".csv",))
+    signal_map = SignalMap.load(args.map)
+    period_s = None if args.period_ms is None else args.period_ms * 1e-3
+    sample_s = period_s if args.sample_ms is None else args.sample_ms * 1e-3
+    core = NodeCore(_plant_of(args, signal_map, sample_s), signal_map)
+    log = None if args.truth is None else TruthLog(args.truth)
+    try:
+        with noted_signals() as stopped, CanTransport.parse(args.bus) as bus:
+            bus.claim({message.key for message in signal_map.measurements.values()})
+            args.progress.close()
+            _say(args, f"{signal_map.file.stem} on {bus.name}: ready")
+            run_node(core, bus, step=args.step, period_s=period_s, log=log, keep_on=_until(args.duration_s, stopped))
+            counts = {"samples": core.samples, "state": core.state, **core.reasons, **bus.counters}
+    finally:
+        if log is not None:
+            log.close()
+    emit(args, counts)
+
+
+def _plant_of(args: argparse.Namespace, signal_map: SignalMap, sample_s: float | None) -> NodePlant:
+    if args.experiment is None:
+        return node_of(signal_map, faults=args.fault, seed=args.seed, sample_s=sample_s)
+    from mgdd.rig.experiment import Experiment
+    from mgdd.rig.experiment.stand import simulated_plant
+
+    refuse_idle(args, "fault", why="--experiment says what the plant is")
+    inputs = (*signal_map.input_names, "bridge_open")
+    sample_s = signal_map.cycle_s if sample_s is None else sample_s
+    return node_plant(simulated_plant(Experiment.load(args.experiment), sample_s=sample_s, inputs=inputs))
+
+
+def _until(duration_s: float | None, stopped: list[int]) -> Callable[[], bool]:
+    """Return the question whether to go on: no signal, a parent, time left."""
+    alive = parent_watch()
+    end = float("inf") if duration_s is None else time.monotonic() + duration_s
+    return lambda: not stopped and alive() and time.monotonic() < end
+
+
+def _say(args: argparse.Namespace, text: str) -> None:
+    """Say that the command is ready; beside a JSON object on stderr."""
+    print(text, file=sys.stderr if args.json else sys.stdout, flush=True)

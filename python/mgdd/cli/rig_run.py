@@ -1,0 +1,115 @@
+"""`mgdd rig run | check`: an experiment from a file, and what it would do."""
+
+from __future__ import annotations
+
+import argparse
+import contextlib
+import sys
+from collections.abc import Callable, Iterator
+from datetime import UTC, datetime
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+from mgdd.cli.options import add_command
+from mgdd.cli.output import Stopped, check_output, emit, is_terminal, lines, wrote
+
+if TYPE_CHECKING:
+    from mgdd.rig.experiment import CheckedExperiment, ExperimentResult
+    from mgdd.rig.experiment.watched import Cycle
+
+__all__ = ["add"]
+
+_MODES = ("simulate", "hil", "dry_run", "replay", "bench")
+
+
+def add(verbs: Any) -> None:
+    """Add both commands."""
+    run = add_command(
+        verbs, "run", _run,
+        help_text="run an experiment: identify or track on a throttle, seek on an engine; in process, over a bus, on a "
+        "record or on a bench",
+        example="mgdd rig run track.toml --mode hil --folder runs/first",
+    )  # fmt: skip
+    _add_experiment(run)
+    run.add_argument(
+        "--folder", metavar="DIR", help="new folder for record, signals, timing, result and figures (default: "
+        "mgdd-runs/TASK-MODE-TIME)",
+    )  # fmt: skip
+    run.add_argument("--arm", action="store_true", help="of the mode bench, which drives real hardware")
+    run.add_argument("--key-file", metavar="FILE", help="confirms the mode bench instead of a person at the terminal")
+    check = add_command(
+        verbs, "check", _check,
+        help_text="check an experiment, its map, DBC, envelope and bus, and say what would run; nothing is sent",
+        example="mgdd rig check track.toml --mode bench --json",
+    )  # fmt: skip
+    _add_experiment(check)
+
+
+def _add_experiment(parser: argparse.ArgumentParser) -> None:
+    parser.add_argument("file", metavar="EXPERIMENT.toml", help="what to do; the page Experiments lists its keys")
+    parser.add_argument("--mode", choices=_MODES, help="instead of the mode of the file")
+    parser.add_argument("--connection", metavar="INTERFACE:CHANNEL", help="the bus, for example socketcan:can0")
+    parser.add_argument("--pace", choices=("step", "real_time"), help="of the bus; step needs a simulated node")
+    parser.add_argument("--record", metavar="FILE", help="of the mode replay: run.rec of a run")
+
+
+def _checked(args: argparse.Namespace) -> CheckedExperiment:
+    from mgdd.rig.experiment import Experiment, check_experiment
+
+    experiment = Experiment.load(args.file)
+    mode = args.mode or experiment.mode
+    return check_experiment(experiment.with_mode(mode, record=args.record, connection=args.connection, pace=args.pace))
+
+
+def _run(args: argparse.Namespace) -> None:
+    from mgdd.rig.experiment import run_experiment
+
+    check_output(args)
+    checked = _checked(args)
+    experiment = checked.experiment
+    stamp = datetime.now(UTC).strftime("%Y%m%d-%H%M%S")
+    folder = args.folder or str(Path("mgdd-runs") / f"{experiment.task}-{experiment.mode}-{stamp}")
+    args.progress(f"{experiment.task}, {experiment.mode}")
+    with _watching(args, checked) as watch:
+        result = run_experiment(checked, folder, arm=args.arm, key_file=args.key_file, watch=watch)
+    emit(args, {**result.to_dict(), "folder": folder}, text=_text(result, folder))
+    wrote(folder)
+    if result.interrupted:
+        raise Stopped(f"{result.timing['cycles']} of {checked.plan.samples} cycles are kept in {folder}")
+
+
+@contextlib.contextmanager
+def _watching(args: argparse.Namespace, checked: CheckedExperiment) -> Iterator[Callable[[Cycle], None] | None]:
+    """Give the live view where a person looks, and nothing elsewhere."""
+    if args.quiet or args.json or not is_terminal():
+        yield None
+        return
+    from mgdd.cli.rig_live import LiveView
+
+    args.progress.close()
+    with LiveView(f"{checked.experiment.task}, {checked.experiment.mode}", checked.plan.samples) as view:
+        yield view
+
+
+def _text(result: ExperimentResult, folder: str) -> str:
+    said = lines({name: value for name, value in result.figures.items() if not isinstance(value, (dict, list))})
+    return f"{said}\n\nrecord, signals and figures: {folder}"
+
+
+def _check(args: argparse.Namespace) -> None:
+    check_output(args)
+    checked = _checked(args)
+    found = checked.to_dict()
+    if checked.experiment.bus.connection is not None and checked.signal_map is not None:
+        found["bus"] = _listen(checked)
+    plain = {name: value for name, value in found.items() if not isinstance(value, (dict, list))}
+    emit(args, {"ok": True, **found}, text=f"{lines(plain)}\n\nall checks passed; nothing was sent")
+    sys.stdout.flush()
+
+
+def _listen(checked: CheckedExperiment) -> dict[str, Any]:
+    """Listen on the bus without sending; RigError where nobody is there, or another one sends our commands."""
+    from mgdd.rig.can.can_rig import CanRig
+
+    with CanRig(checked.bus_map, checked.experiment.bus.connection, mode="dry_run") as rig:
+        return {"connection": checked.experiment.bus.connection, "state": rig.state, **rig.counters}

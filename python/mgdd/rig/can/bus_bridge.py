@@ -1,0 +1,132 @@
+"""A bus of python-can on the far side of the two rings of a real-time loop."""
+
+from __future__ import annotations
+
+import logging
+import threading
+import time
+import weakref
+from types import TracebackType
+from typing import TYPE_CHECKING, Any, Self
+
+from mgdd._core.rig import RingTransport
+from mgdd.errors import RigError
+from mgdd.rig.can.messages import frame_of, message_of
+
+if TYPE_CHECKING:
+    import can
+
+__all__ = ["BusBridge"]
+
+_log = logging.getLogger(__name__)
+_LOOK_S = 0.05  # how often a waiting thread looks whether it shall end
+_SEND_ERRORS = 3  # in a row, until the bus counts as gone
+
+
+class BusBridge:
+    """Two threads between a python-can bus and a `RingTransport`: one receives, one sends.
+
+    What goes wrong in either of them ends both and tells the loop that the bus is off, so that its gate opens the
+    bridge; `error` says what it was.
+
+    Parameters
+    ----------
+    bus : can.BusABC
+        Any interface of python-can, opened and closed by the caller; nobody else may receive from it meanwhile. Pass
+        ``interface``, ``channel`` and ``ignore_config=True`` when you open it: a configuration file must not choose.
+    transport : RingTransport
+        Of the loop.
+
+    Raises
+    ------
+    mgdd.errors.RigError
+        python-can is not installed.
+
+    Notes
+    -----
+    Python is in the way of every frame: while another thread computes, each frame may wait 5 ms and more for its turn.
+    On Linux a `SocketCanTransport` has no such detour.
+
+    Examples
+    --------
+    >>> import can
+    >>> from mgdd.rig import BusBridge, Frame, RingTransport
+    >>> transport = RingTransport()
+    >>> with can.Bus(interface="virtual", channel="demo", ignore_config=True) as node:
+    ...     with can.Bus(interface="virtual", channel="demo", ignore_config=True) as host, BusBridge(host, transport):
+    ...         node.send(can.Message(arbitration_id=0x121, data=[1, 2], is_extended_id=False))
+    ...         while transport.waiting_for_loop == 0:
+    ...             pass
+    >>> transport.counts["lost"]
+    0
+    """
+
+    def __init__(self, bus: can.BusABC, transport: RingTransport) -> None:
+        try:
+            import can  # noqa: F401
+        except ImportError:
+            raise RigError('python-can is not installed: pip install "mgdd[can]"') from None
+        self._bus = bus
+        self._transport = transport
+        self._stop = threading.Event()
+        self.error: BaseException | None = None
+        self.send_errors = 0
+        self._threads = [
+            threading.Thread(target=self._guarded, args=(work,), name=f"mgdd bus bridge, {name}", daemon=True)
+            for name, work in (("receive", self._receive), ("send", self._send))
+        ]
+        for thread in self._threads:
+            thread.start()
+        self._end = weakref.finalize(self, _end, transport, self._stop, self._threads)  # at the end of Python too
+
+    def close(self) -> None:
+        """Send what the loop has left, for 0.2 s at most, and end both threads; the bus stays open."""
+        self._end()
+
+    def __enter__(self) -> Self:
+        return self
+
+    def __exit__(
+        self, kind: type[BaseException] | None, error: BaseException | None, trace: TracebackType | None, /
+    ) -> None:
+        self.close()
+
+    def _guarded(self, work: Any) -> None:
+        try:
+            work()
+        except Exception as error:  # noqa: BLE001 - whatever it is, the loop must learn of it
+            self.error = error
+            self._transport.fail()
+            self._stop.set()
+            _log.exception("the bus bridge ends: the loop sees its bus as off")
+
+    def _receive(self) -> None:
+        while not self._stop.is_set():
+            message = self._bus.recv(_LOOK_S)
+            if message is None:
+                continue
+            self._transport.feed(frame_of(message, monotonic_ns=time.monotonic_ns(), received=True))
+
+    def _send(self) -> None:
+        in_a_row = 0
+        while not self._stop.is_set():
+            frame = self._transport.take(_LOOK_S)
+            if frame is None:
+                continue
+            try:
+                self._bus.send(message_of(frame))
+                in_a_row = 0
+            except Exception:
+                self.send_errors += 1
+                in_a_row += 1
+                if in_a_row == _SEND_ERRORS:
+                    raise
+
+
+def _end(transport: RingTransport, stop: threading.Event, threads: list[threading.Thread]) -> None:
+    until = time.monotonic() + 0.2
+    while transport.waiting_to_send and not stop.is_set() and time.monotonic() < until:
+        time.sleep(0.001)
+    stop.set()
+    for thread in threads:
+        thread.join()

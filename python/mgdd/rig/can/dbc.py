@@ -1,0 +1,196 @@
+"""A DBC file as the codec of the core reads it: cantools parses, `SignalLayout` packs and unpacks."""
+
+from __future__ import annotations
+
+import hashlib
+from collections.abc import Mapping
+from dataclasses import dataclass, field
+from pathlib import Path
+from typing import Any
+
+from mgdd._core.rig import SignalLayout
+from mgdd.errors import DataError, did_you_mean
+from mgdd.io.existing_file import existing_file
+from mgdd.rig.extras import import_extra
+
+__all__ = ["DbcFile", "DbcMessage", "DbcSignal"]
+
+_MISSING = ("invalid", "sna", "signal_not_available", "not_available")  # names of a raw value that says: no value
+
+
+@dataclass(frozen=True, kw_only=True)
+class DbcSignal:
+    """A signal: its bits, its unit, and the names of its raw values.
+
+    Parameters
+    ----------
+    name : str
+        As in the DBC.
+    layout : SignalLayout
+        Bits, scale and bounds.
+    unit : str
+        As in the DBC, ``"-"`` if empty.
+    choices : mapping of str to int
+        Raw value by its name in the value table.
+    missing_raw : int, optional
+        Raw value that means that the value is missing.
+    branches : tuple of int
+        Values of the multiplexer that select it; empty: always there.
+    multiplexer : bool
+        Whether it selects others.
+    """
+
+    name: str
+    layout: SignalLayout
+    unit: str
+    choices: Mapping[str, int] = field(default_factory=dict)
+    missing_raw: int | None = None
+    branches: tuple[int, ...] = ()
+    multiplexer: bool = False
+
+    @property
+    def bounds(self) -> tuple[float, float]:
+        """Lowest and highest physical value that can be sent."""
+        layout = self.layout
+        if layout.raw_type in ("float32", "float64"):
+            low, high = -float("inf"), float("inf")
+        else:
+            signed = layout.raw_type == "signed"
+            raw = (
+                (-(1 << (layout.length - 1)), (1 << (layout.length - 1)) - 1)
+                if signed
+                else (0, (1 << layout.length) - 1)
+            )
+            low, high = sorted(value * layout.scale + layout.offset for value in raw)
+        return (
+            low if layout.minimum is None else max(low, layout.minimum),
+            high if layout.maximum is None else min(high, layout.maximum),
+        )
+
+
+@dataclass(frozen=True, kw_only=True)
+class DbcMessage:
+    """A message: identifier, bytes, time between two frames, signals.
+
+    Parameters
+    ----------
+    name : str
+        As in the DBC.
+    frame_id : int
+        Identifier.
+    extended : bool
+        Of 29 bits.
+    size : int
+        Bytes.
+    cycle_s : float or None
+        Time between two frames [s]; None where it is sent on events.
+    signals : mapping of str to DbcSignal
+        By name.
+    """
+
+    name: str
+    frame_id: int
+    extended: bool
+    size: int
+    cycle_s: float | None
+    signals: Mapping[str, DbcSignal]
+
+    @property
+    def multiplexer(self) -> DbcSignal | None:
+        """The signal that selects others."""
+        return next((signal for signal in self.signals.values() if signal.multiplexer), None)
+
+
+@dataclass(frozen=True, kw_only=True)
+class DbcFile:
+    """A database of messages.
+
+    Parameters
+    ----------
+    file : pathlib.Path
+        Where it was read.
+    sha256 : str
+        Of its bytes.
+    messages : mapping of str to DbcMessage
+        By name.
+    """
+
+    file: Path
+    sha256: str
+    messages: Mapping[str, DbcMessage]
+
+    @classmethod
+    def read(cls, path: Path) -> DbcFile:
+        """Read a file strictly.
+
+        Raises
+        ------
+        FileNotFoundError
+            No such file.
+        mgdd.errors.DataError
+            Not a DBC, overlapping signals, or signals beyond their message.
+        """
+        cantools = import_extra("cantools", "can", "a DBC file")
+        file = existing_file(path)
+        content = file.read_bytes()
+        try:
+            database = cantools.database.load_file(file, database_format="dbc", strict=True, cache_dir=None)
+        except cantools.Error as error:
+            raise DataError(
+                f"{file}: {error}; correct the file, signals must fit their message and not overlap"
+            ) from error
+        except (UnicodeDecodeError, ValueError, KeyError) as error:
+            raise DataError(f"{file}: cannot be read as a DBC: {error}") from error
+        messages = {message.name: _message(file, message) for message in database.messages}
+        return cls(file=file, sha256=hashlib.sha256(content).hexdigest(), messages=messages)
+
+    def message(self, name: str) -> DbcMessage:
+        """Return a message; DataError guesses which one was meant."""
+        if name in self.messages:
+            return self.messages[name]
+        raise DataError(f"{self.file.name} has no message {name!r}: {near(name, self.messages)}")
+
+
+def near(name: str, known: Mapping[str, Any]) -> str:
+    """Ask for the nearest name, or list them."""
+    return did_you_mean(name, known) or f"it has {', '.join(known) or 'none'}"
+
+
+def _message(file: Path, message: Any) -> DbcMessage:
+    signals = {signal.name: _signal(signal) for signal in message.signals}
+    selecting = [signal.name for signal in signals.values() if signal.multiplexer]
+    if len(selecting) > 1:
+        raise DataError(
+            f"{file}: {message.name} has the multiplexers {', '.join(selecting)}: at most one per message is supported"
+        )
+    return DbcMessage(
+        name=message.name,
+        frame_id=message.frame_id,
+        extended=message.is_extended_frame,
+        size=message.length,
+        cycle_s=message.cycle_time * 1e-3 if message.cycle_time else None,
+        signals=signals,
+    )
+
+
+def _signal(signal: Any) -> DbcSignal:
+    kind = "signed" if signal.is_signed else "unsigned"
+    choices = {str(name): int(raw) for raw, name in (signal.choices or {}).items()}
+    return DbcSignal(
+        name=signal.name,
+        layout=SignalLayout(
+            start=signal.start,
+            length=signal.length,
+            byte_order=signal.byte_order,
+            raw_type=f"float{signal.length}" if signal.is_float else kind,
+            scale=float(signal.scale),
+            offset=float(signal.offset),
+            minimum=None if signal.minimum is None else float(signal.minimum),
+            maximum=None if signal.maximum is None else float(signal.maximum),
+        ),
+        unit=signal.unit or "-",
+        choices=choices,
+        missing_raw=next((raw for name, raw in choices.items() if name.lower() in _MISSING), None),
+        branches=tuple(signal.multiplexer_ids or ()),
+        multiplexer=signal.is_multiplexer,
+    )

@@ -1,0 +1,54 @@
+"""A fault to inject, as a user types it."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from typing import Any
+
+from mgdd.errors import ParameterError, did_you_mean
+
+__all__ = ["fault_of"]
+
+
+def fault_of(text: str, keys: Mapping[str, type]) -> tuple[str, dict[str, Any]]:
+    """Read ``KIND:KEY=VALUE,...``.
+
+    Parameters
+    ----------
+    text : str
+        For example ``drop:p=0.01,id=0x121``.
+    keys : mapping of str to type
+        Keys that may stand there: int or float.
+
+    Returns
+    -------
+    kind : str
+        As it stands; the caller knows the kinds.
+    given : dict
+        The values by key.
+
+    Raises
+    ------
+    mgdd.errors.ParameterError
+        An unknown key, or a value that is not a number.
+
+    Examples
+    --------
+    >>> from mgdd.rig.can.fault_text import fault_of
+    >>> fault_of("drop:p=0.01,id=0x121", {"p": float, "id": int})
+    ('drop', {'p': 0.01, 'id': 289})
+    """
+    kind, _, rest = text.partition(":")
+    given: dict[str, Any] = {}
+    for part in filter(None, rest.split(",")):
+        key, _, value = part.partition("=")
+        if key not in keys:
+            guess = did_you_mean(key, keys)
+            raise ParameterError.of(
+                "fault", text, f"KIND:KEY=VALUE,... with keys {', '.join(keys)}{'; ' + guess if guess else ''}"
+            )
+        try:
+            given[key] = int(value, 0) if keys[key] is int else float(value)
+        except ValueError:
+            raise ParameterError.of(f"fault {kind}: {key}", value, "a number") from None
+    return kind, given

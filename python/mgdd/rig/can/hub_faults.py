@@ -1,0 +1,186 @@
+"""What can go wrong between two clients of a hub: rules with a probability, an identifier and a time."""
+
+from __future__ import annotations
+
+import math
+import random
+from collections.abc import Sequence
+from dataclasses import dataclass
+from typing import NamedTuple, Self
+
+from mgdd.errors import ParameterError
+from mgdd.rig.can.fault_text import fault_of
+
+__all__ = ["BusFault", "Delivery", "FaultInjector"]
+
+KINDS = ("drop", "duplicate", "delay", "reorder", "corrupt", "error", "freeze")
+_KEYS = {"p": float, "id": int, "from_s": float, "until_s": float, "ms": float, "client": int, "class": int}
+_NEEDS = {"delay": "ms", "error": "class", "freeze": "client"}
+
+
+@dataclass(frozen=True, kw_only=True)
+class BusFault:
+    """A fault of the bus.
+
+    Parameters
+    ----------
+    kind : {"drop", "duplicate", "delay", "reorder", "corrupt", "error", "freeze"}
+        A frame is lost, comes twice, comes late, comes after the next one, comes with one byte changed; every client
+        gets an error frame instead of it; nothing goes to or comes from one client.
+    p : float
+        Probability for each frame it concerns, in [0, 1].
+    id : int, optional
+        Identifier that it concerns; all if left out.
+    from_s, until_s : float
+        When, after the start of the hub [s].
+    ms : float
+        Of ``delay``: how late [ms].
+    client : int
+        Of ``freeze``: number of the client, from 1 in the order in which they came.
+    error_class : int
+        Of ``error``: class bits of the error frame, for example 0x40 for bus-off.
+
+    Raises
+    ------
+    mgdd.errors.ParameterError
+        An unknown kind, or a value outside its domain.
+    """
+
+    kind: str
+    p: float = 1.0
+    id: int | None = None
+    from_s: float = 0.0
+    until_s: float = math.inf
+    ms: float = 0.0
+    client: int = 0
+    error_class: int = 0
+
+    def __post_init__(self) -> None:
+        """Refuse what cannot be."""
+        if self.kind not in KINDS:
+            raise ParameterError.of("fault", self.kind, f"one of {', '.join(KINDS)}")
+        if not 0.0 <= self.p <= 1.0:
+            raise ParameterError.of("p", self.p, "in [0, 1]")
+        if not 0.0 <= self.ms <= 60_000.0:
+            raise ParameterError.of("ms", self.ms, "in [0, 60000] ms")
+
+    @classmethod
+    def parse(cls, text: str) -> Self:
+        """Read ``KIND:KEY=VALUE,...``.
+
+        Parameters
+        ----------
+        text : str
+            For example ``drop:p=0.01``, ``delay:ms=5,id=0x121``, ``error:class=0x40,p=0.001`` or
+            ``freeze:client=1,from_s=2,until_s=3``.
+
+        Returns
+        -------
+        BusFault
+            The rule.
+
+        Raises
+        ------
+        mgdd.errors.ParameterError
+            An unknown kind or key, or a value that is not a number.
+
+        Examples
+        --------
+        >>> from mgdd.rig.can.hub_faults import BusFault
+        >>> BusFault.parse("delay:ms=5,id=0x121").id
+        289
+        """
+        kind, given = fault_of(text, _KEYS)
+        needed = _NEEDS.get(kind)
+        if needed is not None and needed not in given:
+            raise ParameterError.of("fault", text, f"given {needed}, for example {kind}:{needed}=1")
+        if "class" in given:
+            given["error_class"] = given.pop("class")
+        return cls(kind=kind, **given)
+
+
+class Delivery(NamedTuple):
+    """What leaves the hub for one frame: payload, how late [s], as error frame."""
+
+    data: bytes
+    late_s: float = 0.0
+    error_class: int = 0
+
+
+class FaultInjector:
+    """Applies rules, with noise of its own.
+
+    Parameters
+    ----------
+    faults : sequence of BusFault
+        In the order in which they act.
+    seed : int
+        Of their noise.
+    """
+
+    def __init__(self, faults: Sequence[BusFault], seed: int = 0) -> None:
+        self._faults = tuple(faults)
+        self._random = random.Random(seed)
+        self._held: list[tuple[int, Delivery]] = []
+        self.counts = dict.fromkeys(KINDS, 0)
+
+    def frozen(self, client: int, now_s: float) -> bool:
+        """Whether nothing goes to and comes from a client now."""
+        return any(
+            fault.kind == "freeze" and fault.client == client and fault.from_s <= now_s < fault.until_s
+            for fault in self._faults
+        )
+
+    def deliver(self, identifier: int, data: bytes, now_s: float) -> list[tuple[int, Delivery]]:
+        """Say what becomes of a frame.
+
+        Parameters
+        ----------
+        identifier : int
+            Of the frame.
+        data : bytes
+            Its payload.
+        now_s : float
+            Since the start of the hub [s].
+
+        Returns
+        -------
+        list of (int, Delivery)
+            Identifier and delivery of what leaves now: nothing where it was lost or is held back until the next one.
+        """
+        out = [Delivery(data)]
+        hold = False
+        for fault in self._faults:
+            if not self._strikes(fault, identifier, now_s):
+                continue
+            self.counts[fault.kind] += 1
+            if fault.kind == "drop":
+                out = []
+            elif fault.kind == "duplicate":
+                out = out * 2
+            elif fault.kind == "delay":
+                out = [one._replace(late_s=one.late_s + fault.ms * 1e-3) for one in out]
+            elif fault.kind == "corrupt":
+                out = [one._replace(data=self._changed(one.data)) for one in out]
+            elif fault.kind == "error":
+                out = [Delivery(data, error_class=fault.error_class)]
+            elif fault.kind == "reorder":
+                hold = True
+        leaving = [(identifier, one) for one in out]
+        if hold and not self._held:
+            self._held = leaving
+            return []
+        held, self._held = self._held, []
+        return leaving + held
+
+    def _strikes(self, fault: BusFault, identifier: int, now_s: float) -> bool:
+        if fault.kind == "freeze" or not fault.from_s <= now_s < fault.until_s:
+            return False
+        return fault.id in (None, identifier) and self._random.random() < fault.p
+
+    def _changed(self, data: bytes) -> bytes:
+        if not data:
+            return data
+        place = self._random.randrange(len(data))
+        flipped = data[place] ^ self._random.randrange(1, 256)
+        return data[:place] + bytes([flipped]) + data[place + 1 :]

@@ -1,0 +1,100 @@
+"""How near an experiment is to real hardware, and what it takes to come nearer."""
+
+from __future__ import annotations
+
+import os
+import sys
+from enum import StrEnum
+from pathlib import Path
+
+from mgdd.errors import ParameterError, RigError
+from mgdd.loop import Plant
+from mgdd.rig.can.frame import Bus
+from mgdd.rig.can.local_bus import LocalBus
+from mgdd.rig.can.signal_map import SignalMap
+from mgdd.rig.can.transport import CanTransport
+
+__all__ = ["RigMode", "bus_of", "key_line", "require_key"]
+
+
+class RigMode(StrEnum):
+    """Mode of an experiment over a bus.
+
+    ``simulate``: a node in this process and a virtual clock. ``hil``: a node in another process, real time.
+    ``dry_run``: a real bus, of which everything is received and to which nothing is sent. ``replay``: recorded frames
+    through the same checks. ``bench``: real hardware, which has to be armed.
+
+    Examples
+    --------
+    >>> from mgdd.rig.can.modes import RigMode
+    >>> RigMode("hil"), [mode.value for mode in RigMode]
+    (<RigMode.HIL: 'hil'>, ['simulate', 'hil', 'dry_run', 'replay', 'bench'])
+    """
+
+    SIMULATE = "simulate"
+    HIL = "hil"
+    DRY_RUN = "dry_run"
+    REPLAY = "replay"
+    BENCH = "bench"
+
+    @classmethod
+    def of(cls, name: str) -> RigMode:
+        """Return the mode of a name; ParameterError lists them."""
+        try:
+            return cls(name)
+        except ValueError:
+            raise ParameterError.of("mode", name, f"one of {', '.join(cls)}") from None
+
+
+def key_line(signal_map: SignalMap) -> str:
+    """Return the line that a key file must hold: it names this DBC."""
+    return f"arm {signal_map.dbc.file.name} {signal_map.dbc.sha256[:12]}"
+
+
+def require_key(signal_map: SignalMap, bus: str, *, arm: bool, key_file: str | os.PathLike[str] | None) -> None:
+    """Refuse the mode ``bench`` without a person who wants it.
+
+    Raises
+    ------
+    mgdd.errors.RigError
+        Not armed, no key, another key, or a person who did not confirm.
+    """
+    if arm is not True:
+        raise RigError("mode = 'bench' drives real hardware: give arm=True, and a key_file or a confirmation")
+    line = key_line(signal_map)
+    if key_file is not None:
+        file = Path(key_file)
+        if not file.is_file():
+            raise RigError(f"{file}: no such key file: write the line {line!r} into it when the bench is safe")
+        if line not in file.read_text(encoding="utf-8").splitlines():
+            raise RigError(f"{file}: holds no key of this DBC: it must have the line {line!r}")
+        return
+    if not sys.stdin.isatty():
+        raise RigError("mode = 'bench' without a terminal to confirm in: give a key_file")
+    sys.stderr.write(f"{bus} will be driven with {signal_map.file.name}. Emergency stop at hand? Type ARM: ")
+    sys.stderr.flush()
+    if sys.stdin.readline().strip() != "ARM":
+        raise RigError("not confirmed: nothing was sent")
+
+
+def bus_of(mode: RigMode, signal_map: SignalMap, bus: Bus | str | None, plant: Plant | None) -> Bus:
+    """Return the bus of a mode.
+
+    Raises
+    ------
+    mgdd.errors.ParameterError
+        A bus or plant that does not go with the mode.
+    """
+    if mode is RigMode.SIMULATE:
+        if bus is not None:
+            raise ParameterError.of(
+                "mode",
+                mode.value,
+                "said for a bus: 'hil', 'dry_run', 'replay' or 'bench'; 'simulate' takes a plant instead",
+            )
+        if plant is None:
+            raise ParameterError("plant = None: must be given for mode='simulate', or give a bus and another mode")
+        return LocalBus(plant, signal_map)
+    if plant is not None or bus is None:
+        raise ParameterError(f"mode = {mode.value!r}: must have a bus, and no plant: that is in the node")
+    return CanTransport.parse(bus) if isinstance(bus, str) else bus

@@ -1,0 +1,155 @@
+"""A virtual bench of two processes: a hub and a node, started and ended together."""
+
+from __future__ import annotations
+
+import os
+import selectors
+import subprocess
+import sys
+import tempfile
+import time
+from collections.abc import Sequence
+from types import TracebackType
+from typing import IO, Self
+
+from mgdd.errors import RigError
+
+__all__ = ["VirtualNode"]
+
+_START_S = 60.0
+_END_S = 5.0
+
+
+class VirtualNode:
+    """A virtual throttle or engine bench in a process of its own, behind a hub in another.
+
+    In a ``with`` block; both processes end with it, and with this process.
+
+    Parameters
+    ----------
+    signal_map : str or path-like
+        A mapping file or the name of a shipped one.
+    step : bool
+        No clock: one sample per command.
+    seed : int
+        Of the plant.
+    truth : path-like, optional
+        CSV file with a line per sample: what really happened.
+    faults : sequence of str
+        Of the plant, as ``mgdd rig node --fault`` takes them.
+    bus_faults : sequence of str
+        Of the hub, as ``mgdd rig hub --fault`` takes them.
+    sample_ms : float, optional
+        Time in a throttle between two samples [ms]; the cycle of the map if left out.
+    experiment : path-like, optional
+        Experiment file whose plant and seed it has; a preset throttle or engine if left out.
+
+    Examples
+    --------
+    >>> from mgdd.rig import CanRig, VirtualNode
+    >>> with VirtualNode("etb", step=True) as node, CanRig("etb", node.bus, mode="hil", timeout_s=5.0) as rig:
+    ...     for _ in range(40):
+    ...         rig.apply({"duty": 0.3})
+    ...         measured = rig.measure()
+    >>> measured.values["sensed_angle_deg"] > 30.0
+    True
+    """
+
+    def __init__(
+        self,
+        signal_map: str | os.PathLike[str],
+        *,
+        step: bool = False,
+        seed: int = 0,
+        truth: str | os.PathLike[str] | None = None,
+        faults: Sequence[str] = (),
+        bus_faults: Sequence[str] = (),
+        sample_ms: float | None = None,
+        experiment: str | os.PathLike[str] | None = None,
+    ) -> None:
+        self._hub_options = [word for fault in bus_faults for word in ("--fault", fault)]
+        self._node_options = ["--map", str(signal_map), "--seed", str(seed)]
+        self._node_options += ["--step"] if step else []
+        self._node_options += ["--truth", str(truth)] if truth is not None else []
+        self._node_options += [word for fault in faults for word in ("--fault", fault)]
+        self._node_options += ["--sample-ms", str(sample_ms)] if sample_ms is not None else []
+        self._node_options += ["--experiment", str(experiment)] if experiment is not None else []
+        self._started: list[tuple[subprocess.Popen[str], IO[str]]] = []
+        self._bus = ""
+
+    @property
+    def bus(self) -> str:
+        """Its bus, as `mgdd.rig.CanRig` takes it.
+
+        Raises
+        ------
+        mgdd.errors.RigError
+            It does not run.
+        """
+        if not self._bus:
+            raise RigError("the virtual node does not run: use it in a with block")
+        return self._bus
+
+    def start(self) -> None:
+        """Start both processes, and wait until they are ready.
+
+        Raises
+        ------
+        mgdd.errors.RigError
+            One of them ended; the message holds what it said.
+        """
+        try:
+            bus = self._start("hub", ["--port", "0", *self._hub_options])
+            self._start("node", ["--bus", bus, *self._node_options])
+        except BaseException:
+            self.stop()
+            raise
+        self._bus = bus
+
+    def stop(self) -> None:
+        """End both; twice does nothing."""
+        self._bus = ""
+        while self._started:
+            process, said = self._started.pop()
+            process.terminate()
+            try:
+                process.wait(_END_S)
+            except subprocess.TimeoutExpired:
+                process.kill()
+                process.wait()
+            if process.stdout is not None:
+                process.stdout.close()
+            said.close()
+
+    def __enter__(self) -> Self:
+        self.start()
+        return self
+
+    def __exit__(
+        self, kind: type[BaseException] | None, error: BaseException | None, trace: TracebackType | None, /
+    ) -> None:
+        self.stop()
+
+    def _start(self, command: str, options: Sequence[str]) -> str:
+        """Start a command and give the line that it says when it is ready."""
+        said = tempfile.TemporaryFile("w+", encoding="utf-8")  # noqa: SIM115 stop() closes it
+        process = subprocess.Popen(
+            [sys.executable, "-m", "mgdd", "rig", command, *options, "--quiet"],
+            stdin=subprocess.DEVNULL,
+            stdout=subprocess.PIPE,
+            stderr=said,
+            text=True,
+            start_new_session=True,  # a Ctrl-C in the terminal is for the run, which then ends them
+        )
+        self._started.append((process, said))
+        assert process.stdout is not None  # noqa: S101 - PIPE
+        until = time.monotonic() + _START_S
+        with selectors.DefaultSelector() as selector:
+            selector.register(process.stdout, selectors.EVENT_READ)
+            line = process.stdout.readline() if selector.select(until - time.monotonic()) else ""
+        if not line:
+            process.kill()
+            process.wait()
+            said.seek(0)
+            raise RigError(f"mgdd rig {command} did not start: {said.read().strip() or 'it said nothing'}")
+        return line.strip()

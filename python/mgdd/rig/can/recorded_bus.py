@@ -1,0 +1,70 @@
+"""A bus whose frames, sent and received, go into a record."""
+
+from __future__ import annotations
+
+import time
+from typing import Any
+
+from mgdd._core.rig import Frame
+from mgdd.rig.can.frame import Bus, changed
+from mgdd.rig.recorder import Recorder
+
+__all__ = ["RecordedBus"]
+
+
+class RecordedBus:
+    """Passes everything on to another bus, and appends every frame to a record.
+
+    Parameters
+    ----------
+    bus : Bus
+        The bus.
+    recorder : Recorder
+        The record; it stays open.
+    """
+
+    def __init__(self, bus: Bus, recorder: Recorder) -> None:
+        self.bus, self.recorder = bus, recorder
+
+    @property
+    def name(self) -> str:
+        """What messages call it."""
+        return self.bus.name
+
+    @property
+    def shared(self) -> bool:
+        """Whether others may be on it."""
+        return self.bus.shared
+
+    @property
+    def counters(self) -> dict[str, Any]:
+        """What the bus counts."""
+        return dict(getattr(self.bus, "counters", {}))
+
+    def open(self) -> None:
+        """Connect."""
+        self.bus.open()
+
+    def close(self) -> None:
+        """Disconnect."""
+        self.bus.close()
+
+    def claim(self, keys: set[tuple[int, bool]]) -> None:
+        """Say which identifiers only we send."""
+        self.bus.claim(keys)
+
+    def send(self, frame: Frame, *, final: bool = False) -> None:
+        """Send a frame; what the bus did not take is not recorded."""
+        self.bus.send(frame, final=final)
+        self._append(frame, received=False)
+
+    def receive(self, timeout_s: float) -> Frame | None:
+        """Give the next frame."""
+        frame = self.bus.receive(timeout_s)
+        if frame is not None:
+            self._append(frame, received=True)
+        return frame
+
+    def _append(self, frame: Frame, *, received: bool) -> None:
+        stamp_ns = frame.monotonic_ns or time.monotonic_ns()
+        self.recorder.frame(changed(frame, monotonic_ns=stamp_ns, received=received))

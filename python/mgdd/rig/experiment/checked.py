@@ -1,0 +1,221 @@
+"""What an experiment names, loaded and checked before anything is opened or armed."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
+
+from mgdd.errors import ParameterError, RigError
+from mgdd.io.existing_file import existing_file
+from mgdd.results.describe import described
+from mgdd.rig.can.signal_map import SignalMap
+from mgdd.rig.experiment.engine_task import SeekPlan
+from mgdd.rig.experiment.experiment import Experiment
+from mgdd.rig.experiment.settings import SAMPLE_S, EnginePlant, IdentifyTask, SeekTask, TrackTask
+from mgdd.rig.experiment.throttle_tasks import IdentifyPlan, TrackPlan
+from mgdd.rig.recorded import read_record
+from mgdd.rig.safety_envelope import SafetyEnvelope
+
+__all__ = ["CheckedExperiment", "check_experiment"]
+
+_BUS_MODES = ("hil", "dry_run", "bench")
+
+
+@dataclass(frozen=True, kw_only=True)
+class CheckedExperiment:
+    """An experiment with all that it names.
+
+    Parameters
+    ----------
+    experiment : Experiment
+        As it was checked.
+    plan : IdentifyPlan, TrackPlan or SeekPlan
+        What will be done, made with its models.
+    sample_s : float or None
+        Time between samples of a throttle [s].
+    envelope : SafetyEnvelope or None
+        Of a throttle.
+    signal_map : SignalMap or None
+        Of a mode with a bus.
+    record : pathlib.Path or None
+        Of ``replay``.
+    """
+
+    experiment: Experiment
+    plan: IdentifyPlan | TrackPlan | SeekPlan
+    sample_s: float | None
+    envelope: SafetyEnvelope | None
+    signal_map: SignalMap | None
+    record: Path | None
+
+    @property
+    def bus_map(self) -> SignalMap:
+        """Map of an experiment over a bus; RigError for one without."""
+        if self.signal_map is None:
+            raise RigError(f"mode = {self.experiment.mode!r}: no bus; must be one of {', '.join(_BUS_MODES)}")
+        return self.signal_map
+
+    def to_dict(self) -> dict[str, Any]:
+        """Say what would run.
+
+        Returns
+        -------
+        dict
+            As JSON holds it.
+        """
+        experiment, known = self.experiment, self.signal_map
+        out: dict[str, Any] = {"task": experiment.task, "mode": experiment.mode, "seed": experiment.seed}
+        out |= {"samples": self.plan.samples, "sample_s": self.sample_s}
+        out |= {"transmits": experiment.mode in ("hil", "bench")}
+        if experiment.mode in _BUS_MODES:
+            out["connection"] = experiment.bus.connection or "a hub and a node of its own"
+            out["pace"] = experiment.bus.pace
+        if known is not None:
+            out |= {
+                "map": str(known.file), "dbc": str(known.dbc.file), "dbc_sha256": known.dbc.sha256,
+                "inputs": list(known.input_names), "values": list(known.value_names),
+                "timeouts_ms": {name: own.timeout_s * 1e3 for name, own in known.commands.items() if own.timeout_s},
+            }  # fmt: skip
+        if self.envelope is not None:
+            out["envelope"] = self.envelope.to_dict()
+        else:
+            out["guard"] = experiment.safety.to_dict()
+        if self.record is not None:
+            out["record"] = str(self.record)
+        return out
+
+
+def check_experiment(experiment: Experiment) -> CheckedExperiment:
+    """Load and check all that an experiment names; nothing is opened.
+
+    Parameters
+    ----------
+    experiment : Experiment
+        To be run.
+
+    Returns
+    -------
+    CheckedExperiment
+        Ready for `run_experiment`.
+
+    Raises
+    ------
+    FileNotFoundError
+        A file that is not there.
+    ImportError
+        A mode with a bus, without the extra ``can``.
+    mgdd.errors.Error
+        A model, map, envelope or reference that cannot be what the experiment needs.
+
+    Examples
+    --------
+    >>> from mgdd.rig import Experiment, check_experiment
+    >>> text = '''
+    ... kind = "experiment"
+    ... format = 1
+    ... task = "track"
+    ... [track]
+    ... reference = "step:20:60"
+    ... '''
+    >>> checked = check_experiment(Experiment.from_toml(text))
+    >>> checked.plan.samples, checked.to_dict()["transmits"]
+    (1500, False)
+    """
+    mode, settings = experiment.mode, experiment.settings
+    signal_map = _map_of(experiment) if mode in _BUS_MODES else None
+    _require_bus(experiment)
+    record = _record_of(experiment)
+    plan: IdentifyPlan | TrackPlan | SeekPlan
+    if isinstance(settings, SeekTask):
+        plan, sample_s, envelope = SeekPlan(settings, folder=experiment.folder), None, None
+    else:
+        sample_s = _sample_s(experiment, signal_map) if record is None else _recorded_sample_s(experiment, record)
+        envelope = _envelope(experiment, sample_s)
+        plan = _throttle_plan(settings, sample_s, experiment)
+    checked = CheckedExperiment(
+        experiment=experiment, plan=plan, sample_s=sample_s, envelope=envelope, signal_map=signal_map, record=record
+    )
+    if signal_map is not None:
+        _require_names(checked, signal_map)
+    return checked
+
+
+def _record_of(experiment: Experiment) -> Path | None:
+    if experiment.mode != "replay":
+        return None
+    if experiment.replay.record is None:
+        raise ParameterError(f"{experiment.origin}: mode = 'replay': needs [replay] record, the file of a run")
+    return existing_file(_beside(experiment, experiment.replay.record))
+
+
+def _recorded_sample_s(experiment: Experiment, record: Path) -> float:
+    """Give the time between samples that the recorded run had: over a bus its DBC said it."""
+    recorded = read_record(record).config.get("sample_s")
+    return _sample_s(experiment, None) if recorded is None else float(recorded)
+
+
+def _beside(experiment: Experiment, name: str) -> str:
+    beside = experiment.folder / name
+    return str(beside) if beside.is_file() else name
+
+
+def _map_of(experiment: Experiment) -> SignalMap:
+    return SignalMap.load(_beside(experiment, experiment.map_name))
+
+
+def _require_bus(experiment: Experiment) -> None:
+    bus, mode = experiment.bus, experiment.mode
+    if mode in ("dry_run", "bench") and bus.connection is None:
+        raise ParameterError(
+            f"{experiment.origin}: mode = {mode!r}: needs [bus] connection, for example 'socketcan:can0'",
+            field="bus.connection", value=None, bound="given",
+        )  # fmt: skip
+    if mode in ("dry_run", "bench") and bus.pace == "step":
+        raise ParameterError(
+            f"{experiment.origin}: bus.pace = 'step': must be 'real_time' with mode = {mode!r}; only a simulated node "
+            "steps",
+            field="bus.pace", value="step", bound="'real_time'",
+        )  # fmt: skip
+
+
+def _sample_s(experiment: Experiment, signal_map: SignalMap | None) -> float:
+    plant, given = experiment.plant, getattr(experiment.plant, "sample_s", None)
+    if isinstance(plant, EnginePlant) or signal_map is None or experiment.bus.pace == "step":
+        return SAMPLE_S if given is None else float(given)
+    if given is not None and abs(given / signal_map.cycle_s - 1.0) > 1e-9:
+        raise ParameterError(
+            f"{experiment.origin}: plant.sample_s = {given:g}: must be {signal_map.cycle_s:g} s, the cycle time of "
+            f"{signal_map.trigger} in {signal_map.dbc.file.name}, or left out; bus.pace = 'step' takes any",
+            field="plant.sample_s", value=given, bound=f"{signal_map.cycle_s:g} s",
+        )  # fmt: skip
+    return signal_map.cycle_s
+
+
+def _envelope(experiment: Experiment, sample_s: float) -> SafetyEnvelope:
+    return SafetyEnvelope.load(_beside(experiment, experiment.safety.envelope)).replace(cycle_s=sample_s)
+
+
+def _throttle_plan(
+    settings: IdentifyTask | TrackTask, sample_s: float, experiment: Experiment
+) -> IdentifyPlan | TrackPlan:
+    if isinstance(settings, TrackTask):
+        return TrackPlan(settings, sample_s=sample_s, folder=experiment.folder)
+    return IdentifyPlan(settings, sample_s=sample_s, seed=experiment.seed, folder=experiment.folder)
+
+
+def _require_names(checked: CheckedExperiment, signal_map: SignalMap) -> None:
+    """Refuse a map without what the task applies and measures."""
+    seeks = checked.experiment.task == "seek"
+    inputs = ("soc_cad",) if seeks else ("duty",)
+    if signal_map.input_names != inputs:
+        raise ParameterError.of(f"{signal_map.file}: inputs", ", ".join(signal_map.input_names), ", ".join(inputs))
+    needed = checked.experiment.limit_names if seeks else ("first_v", "second_v", "sensed_angle_deg")
+    for name in needed:
+        if name not in signal_map.value_names:
+            raise ParameterError.of(
+                f"{signal_map.file}: measured values", ", ".join(signal_map.value_names), f"with {name}, map it"
+            )
+
+
+described(CheckedExperiment, rows=lambda checked: checked.to_dict())

@@ -1,0 +1,255 @@
+"""An experiment file: what is asked, of which plant, over which bus, and what stands between."""
+
+from __future__ import annotations
+
+import os
+from collections.abc import Callable, Mapping
+from dataclasses import dataclass, field, replace
+from pathlib import Path
+from typing import Any, Self
+
+from mgdd.errors import ParameterError
+from mgdd.io.toml_text import text_of, toml_of
+from mgdd.results.describe import described
+from mgdd.rig.can.toml_table import TomlTable
+from mgdd.rig.experiment.settings import (
+    MODES,
+    PACES,
+    TASKS,
+    BusSettings,
+    EnginePlant,
+    IdentifyTask,
+    ReplaySettings,
+    SafetySettings,
+    SeekTask,
+    Settings,
+    ThrottlePlant,
+    TrackTask,
+)
+
+__all__ = ["Experiment"]
+
+_KIND, _FORMAT = "experiment", 1
+_TASK_OF: Mapping[str, type[IdentifyTask | TrackTask | SeekTask]] = {
+    "identify": IdentifyTask, "track": TrackTask, "seek": SeekTask,
+}  # fmt: skip
+# Keys that may name a file, in the records of an experiment.
+_FILES = {
+    "settings": ("reference", "model", "prior"), "plant": ("preset",), "safety": ("envelope",), "bus": ("map",),
+    "replay": ("record",),
+}  # fmt: skip
+_HEAD = ("kind", "format", "task", "mode", "seed", "plant", "bus", "safety", "replay")
+
+
+@dataclass(frozen=True, kw_only=True)
+class Experiment:
+    """An experiment on a throttle or an engine; the same one runs in process, over a bus, on a record and on a bench.
+
+    Parameters
+    ----------
+    task : {"identify", "track", "seek"}
+        What is done.
+    mode : {"simulate", "hil", "dry_run", "replay", "bench"}
+        Where: in this process; in another process behind a bus; on a real bus, transmitting nothing; on a record; on a
+        real bench, which must be armed.
+    seed : int
+        Of the noise of a simulated plant, and of every search.
+    plant : ThrottlePlant or EnginePlant
+        What is simulated; the model of ``dry_run`` and ``bench`` stands in the task.
+    bus : BusSettings
+        Where the plant is.
+    safety : SafetySettings
+        What no controller and no seeker may exceed.
+    replay : ReplaySettings
+        The record to replay.
+    settings : IdentifyTask, TrackTask or SeekTask
+        Of the task.
+    origin : str
+        The file, for messages; not compared.
+
+    Examples
+    --------
+    >>> from mgdd.rig import Experiment
+    >>> experiment = Experiment.from_toml('''
+    ... kind = "experiment"
+    ... format = 1
+    ... task = "track"
+    ... [track]
+    ... reference = "step:20:60"
+    ... controller = "pid"
+    ... ''')
+    >>> experiment.mode, experiment.settings.reference
+    ('simulate', 'step:20:60')
+    >>> Experiment.from_toml(experiment.to_toml()) == experiment
+    True
+    """
+
+    task: str
+    settings: IdentifyTask | TrackTask | SeekTask
+    plant: ThrottlePlant | EnginePlant
+    mode: str = "simulate"
+    seed: int = 0
+    bus: BusSettings = field(default_factory=BusSettings)
+    safety: SafetySettings = field(default_factory=SafetySettings)
+    replay: ReplaySettings = field(default_factory=ReplaySettings)
+    origin: str = field(default="experiment", compare=False)
+
+    @classmethod
+    def load(cls, path: str | os.PathLike[str]) -> Self:
+        """Read an experiment file.
+
+        Parameters
+        ----------
+        path : path-like
+            TOML; the page Experiments lists the keys.
+
+        Returns
+        -------
+        Experiment
+            Checked as far as the file itself goes; `check_experiment` looks at what it names.
+
+        Raises
+        ------
+        FileNotFoundError
+            No such file.
+        mgdd.errors.DataError
+            Not TOML, a missing key.
+        mgdd.errors.ParameterError
+            An unknown key, a value of another form or outside its range.
+        """
+        text, origin = text_of(path)
+        return cls.from_toml(text, origin=origin)
+
+    @classmethod
+    def from_toml(cls, text: str, *, origin: str = "experiment") -> Self:
+        """Read the text of an experiment file; errors as those of `load`."""
+        table = TomlTable(toml_of(text, origin), origin=origin)
+        kind, version = table.take("kind", "text"), table.take("format", "integer")
+        if kind != _KIND:
+            raise table.error("kind", kind, repr(_KIND))
+        if version != _FORMAT:
+            raise table.error("format", version, f"{_FORMAT}: this version of mgdd reads no other")
+        task = table.take("task", "text")
+        if task not in TASKS:
+            raise table.error("task", task, f"one of {', '.join(TASKS)}")
+        table.only((*_HEAD, task))
+        mode, seed = table.take("mode", "text", "simulate"), table.take("seed", "integer", 0)
+        if mode not in MODES:
+            raise table.error("mode", mode, f"one of {', '.join(MODES)}")
+        if not 0 <= seed < 2**64:
+            raise table.error("seed", seed, "in [0, 2**64)")
+        return cls(
+            task=task,
+            mode=mode,
+            seed=seed,
+            settings=_TASK_OF[task].read(table.table(task)),
+            plant=(EnginePlant if task == "seek" else ThrottlePlant).read(table.table("plant")),
+            bus=BusSettings.read(table.table("bus")),
+            safety=SafetySettings.read(table.table("safety")),
+            replay=ReplaySettings.read(table.table("replay")),
+            origin=origin,
+        )
+
+    def to_toml(self) -> str:
+        """Write what `from_toml` reads back equal, every key that is set."""
+        import tomli_w
+
+        tables = {"plant": self.plant, "bus": self.bus, "safety": self.safety, "replay": self.replay}
+        every: Mapping[str, Settings] = {self.task: self.settings, **tables}
+        head = {"kind": _KIND, "format": _FORMAT, "task": self.task, "mode": self.mode, "seed": self.seed}
+        return tomli_w.dumps(head | {name: own for name, table in every.items() if (own := table.to_dict())})
+
+    def with_mode(
+        self,
+        mode: str,
+        *,
+        record: str | os.PathLike[str] | None = None,
+        connection: str | None = None,
+        pace: str | None = None,
+    ) -> Self:
+        """Give the same experiment in another mode.
+
+        Parameters
+        ----------
+        mode : {"simulate", "hil", "dry_run", "replay", "bench"}
+            The mode.
+        record : path-like, optional
+            The record to replay; as it is if left out.
+        connection : str, optional
+            The bus, as ``socketcan:can0``; as it is if left out.
+        pace : {"step", "real_time"}, optional
+            Of the bus; as it is if left out.
+
+        Returns
+        -------
+        Experiment
+            A new one.
+
+        Raises
+        ------
+        mgdd.errors.ParameterError
+            No such mode or pace.
+
+        Examples
+        --------
+        >>> from mgdd.rig import Experiment
+        >>> experiment = Experiment.from_toml('''
+        ... kind = "experiment"
+        ... format = 1
+        ... task = "seek"
+        ... ''')
+        >>> experiment.with_mode("hil").mode
+        'hil'
+        """
+        for name, value, among in (("mode", mode, MODES), ("pace", pace or self.bus.pace, PACES)):
+            if value not in among:
+                raise ParameterError.of(name, value, f"one of {', '.join(among)}")
+        bus = replace(self.bus, connection=connection or self.bus.connection, pace=pace or self.bus.pace)
+        replay = self.replay if record is None else ReplaySettings(record=os.fspath(record))
+        return replace(self, mode=mode, replay=replay, bus=bus)
+
+    def with_files(self, put: Callable[[Path], str]) -> Self:
+        """Give the same experiment with other names for the files that it finds beside it.
+
+        Parameters
+        ----------
+        put : callable
+            Takes the path of a file, gives what the experiment shall call it.
+
+        Returns
+        -------
+        Experiment
+            A new one; names of presets and of what is shipped stay.
+        """
+        changed: dict[str, Any] = {}
+        for part, keys in _FILES.items():
+            record = getattr(self, part)
+            named = {key: getattr(record, key, None) for key in keys}
+            found = {key: self.folder / name for key, name in named.items() if name and (self.folder / name).is_file()}
+            if found:
+                changed[part] = replace(record, **{key: put(path) for key, path in found.items()})
+        return replace(self, **changed)
+
+    @property
+    def folder(self) -> Path:
+        """Where relative paths of the file start from."""
+        return Path(self.origin).parent if Path(self.origin).is_file() else Path()
+
+    @property
+    def limit_names(self) -> tuple[str, ...]:
+        """Limited quantities that seeker and guard ask for."""
+        own = self.settings.limits if isinstance(self.settings, SeekTask) else {}
+        return tuple(dict.fromkeys((*own, *self.safety.limits)))
+
+    @property
+    def map_name(self) -> str:
+        """Mapping file of the bus: that of the file, else the shipped one of the plant."""
+        return self.bus.map or ("engine" if self.task == "seek" else "etb")
+
+
+def _rows(experiment: Experiment) -> Mapping[str, Any]:
+    own = {name: value for name, value in experiment.settings.to_dict().items() if not isinstance(value, Mapping)}
+    return {"task": experiment.task, "mode": experiment.mode, "seed": experiment.seed, **own}
+
+
+described(Experiment, rows=_rows)

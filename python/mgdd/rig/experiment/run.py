@@ -1,0 +1,219 @@
+"""Running an experiment: check, open, steer, record, report."""
+
+from __future__ import annotations
+
+import os
+import time
+from collections.abc import Callable
+from dataclasses import dataclass
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+
+from mgdd.errors import DataError, ParameterError
+from mgdd.results.describe import described
+from mgdd.rig.experiment.checked import CheckedExperiment, check_experiment
+from mgdd.rig.experiment.engine_task import SeekPlan
+from mgdd.rig.experiment.experiment import Experiment
+from mgdd.rig.experiment.outcome import Outcome
+from mgdd.rig.experiment.run_folder import RunFolder, versions
+from mgdd.rig.experiment.run_record import RunRecord
+from mgdd.rig.experiment.stand import Stand, opened
+from mgdd.rig.experiment.watched import Cycle, Watched
+
+if TYPE_CHECKING:
+    import xarray as xr
+
+__all__ = ["ExperimentResult", "run_experiment"]
+
+
+@dataclass(frozen=True, kw_only=True)
+class ExperimentResult:
+    """What an experiment came to.
+
+    Parameters
+    ----------
+    experiment : Experiment
+        As it was run.
+    figures : dict
+        Numbers and short texts of the task.
+    dataset : xarray.Dataset
+        Signals over time or cycle.
+    timing : dict
+        Cycles, and percentiles of the time for thinking and for waiting [us].
+    counters : dict
+        What rig and guard have counted.
+    events : tuple of str
+        What gate or guard had to say.
+    interrupted : bool
+        Whether Ctrl-C cut it.
+    folder : pathlib.Path or None
+        Where its files are.
+    """
+
+    experiment: Experiment
+    figures: dict[str, Any]
+    dataset: xr.Dataset
+    timing: dict[str, Any]
+    counters: dict[str, Any]
+    events: tuple[str, ...] = ()
+    interrupted: bool = False
+    folder: Path | None = None
+
+    def to_dict(self) -> dict[str, Any]:
+        """Give all but the signals.
+
+        Returns
+        -------
+        dict
+            As JSON holds it.
+        """
+        return {
+            "task": self.experiment.task,
+            "mode": self.experiment.mode,
+            "seed": self.experiment.seed,
+            "interrupted": self.interrupted,
+            "result": self.figures,
+            "timing": self.timing,
+            "counters": self.counters,
+            "events": list(self.events),
+        }
+
+
+described(ExperimentResult, rows=lambda result: {**result.to_dict()["result"], "folder": str(result.folder)})
+
+
+def run_experiment(
+    experiment: Experiment | CheckedExperiment,
+    folder: str | os.PathLike[str] | None = None,
+    *,
+    arm: bool = False,
+    key_file: str | os.PathLike[str] | None = None,
+    watch: Callable[[Cycle], None] | None = None,
+) -> ExperimentResult:
+    """Run an experiment and keep everything that belongs to it.
+
+    All files are checked first; then the folder is made, and takes ``experiment.toml``, ``run.json`` with versions, map
+    and envelope, and ``run.rec``, to which every cycle is appended. At the end come ``result.json``, ``signals.nc``,
+    files of the task and its figures. A killed process loses what was not done, and nothing else.
+
+    Parameters
+    ----------
+    experiment : Experiment or CheckedExperiment
+        What is to be run.
+    folder : path-like, optional
+        A new or empty folder; nothing is written if left out.
+    arm : bool
+        Must be True for the mode ``bench``, and only there.
+    key_file : path-like, optional
+        Confirms ``bench`` instead of a person at the terminal.
+    watch : callable, optional
+        Called with every `Cycle`; what it raises ends the run.
+
+    Returns
+    -------
+    ExperimentResult
+        Ctrl-C gives the cycles until then, ``interrupted``.
+
+    Raises
+    ------
+    mgdd.errors.RigError
+        No plant where it should be, a safety gate that took the drive away, a folder that holds another run. What was
+        recorded until then is in the folder.
+    mgdd.errors.Error
+        As `check_experiment`.
+
+    Examples
+    --------
+    >>> from mgdd.rig import Experiment, run_experiment
+    >>> text = '''
+    ... kind = "experiment"
+    ... format = 1
+    ... task = "track"
+    ... [track]
+    ... reference = "step:20:60"
+    ... '''
+    >>> result = run_experiment(Experiment.from_toml(text))
+    >>> result.figures["settling_ms"] < 150.0, result.events[-1]
+    (True, 'safety gate: armed -> run: requested')
+    """
+    checked = experiment if isinstance(experiment, CheckedExperiment) else check_experiment(experiment)
+    mode = checked.experiment.mode
+    if arm and mode != "bench":
+        raise ParameterError.of("arm", arm, f"left out with mode = {mode!r}: only 'bench' drives hardware")
+    run = None if folder is None else RunFolder(folder)
+    if run is not None:
+        run.text("experiment.toml", checked.experiment.with_files(run.keep).to_toml())
+        run.json("run.json", {**versions(), **checked.to_dict()})
+    with RunRecord(None if run is None else run.file("run.rec"), checked) as record:
+        outcome, stand_said, timing = _steered(checked, record, arm=arm, key_file=key_file, watch=watch)
+    result = ExperimentResult(
+        experiment=checked.experiment,
+        figures=dict(outcome.figures),
+        dataset=outcome.dataset,
+        timing=timing,
+        counters=stand_said,
+        events=tuple(record.events),
+        interrupted=outcome.interrupted,
+        folder=None if run is None else run.path,
+    )
+    if run is not None:
+        _keep(run, outcome, result)
+    return result
+
+
+def _steered(
+    checked: CheckedExperiment,
+    record: RunRecord,
+    *,
+    arm: bool,
+    key_file: str | os.PathLike[str] | None,
+    watch: Callable[[Cycle], None] | None,
+) -> tuple[Outcome, dict[str, Any], dict[str, Any]]:
+    times: list[tuple[float, float]] = []
+    with opened(checked, record, arm=arm, key_file=key_file) as stand:
+
+        def listen(cycle: Cycle) -> None:
+            times.append((cycle.thinking_s, cycle.waiting_s))
+            record.say(stand.events())
+            if watch is not None:
+                watch(cycle)
+
+        begun = time.monotonic()
+        try:
+            outcome = _run(checked, stand, listen)
+        finally:
+            record.say(stand.events())
+        elapsed_s = time.monotonic() - begun
+        return outcome, stand.counters(), _timing(times, elapsed_s)
+
+
+def _run(checked: CheckedExperiment, stand: Stand, listen: Callable[[Cycle], None]) -> Outcome:
+    first = stand.start()
+    plant, most = Watched(stand.plant, listen), stand.left()
+    if most is not None and most < 1:
+        raise DataError(f"{checked.record}: ends before the first cycle of the task")
+    if isinstance(checked.plan, SeekPlan):
+        return checked.plan.run(plant, most)
+    return checked.plan.run(plant, first, most)
+
+
+def _timing(times: list[tuple[float, float]], elapsed_s: float) -> dict[str, Any]:
+    out: dict[str, Any] = {"cycles": len(times), "elapsed_s": elapsed_s}
+    if times:
+        for name, column in zip(("thinking_us", "waiting_us"), np.array(times).T * 1e6, strict=True):
+            out[name] = {f"p{q:g}": float(np.percentile(column, q)) for q in (50, 99, 99.9)} | {
+                "max": float(column.max())
+            }
+    return out
+
+
+def _keep(run: RunFolder, outcome: Outcome, result: ExperimentResult) -> None:
+    run.json("timing.json", result.timing)
+    run.dataset("signals.nc", outcome.dataset)
+    for name, text in outcome.files.items():
+        run.text(name, text)
+    run.json("result.json", result.to_dict())
+    for name, draw in outcome.drawings.items():
+        run.figure(f"{name}.png", draw())

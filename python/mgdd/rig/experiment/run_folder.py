@@ -1,0 +1,125 @@
+"""The folder of a run: every file is whole as soon as it has its name, so that a kill loses only what was not done."""
+
+from __future__ import annotations
+
+import json
+import os
+import platform
+import sys
+from collections.abc import Mapping
+from datetime import UTC, datetime
+from importlib import metadata
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+from mgdd import _core
+from mgdd.errors import RigError
+from mgdd.results.labels import to_jsonable
+
+if TYPE_CHECKING:
+    import xarray as xr
+    from matplotlib.figure import Figure
+
+__all__ = ["RunFolder", "versions"]
+
+_INPUTS = "inputs"
+_PACKAGES = ("numpy", "scipy", "xarray", "python-can", "cantools")
+
+
+class RunFolder:
+    """A new or empty folder that takes the files of one run.
+
+    Parameters
+    ----------
+    path : path-like
+        It is made where it is not there.
+
+    Raises
+    ------
+    mgdd.errors.RigError
+        It holds something already, or cannot be written.
+    """
+
+    def __init__(self, path: str | os.PathLike[str]) -> None:
+        self.path = Path(path)
+        try:
+            self.path.mkdir(parents=True, exist_ok=True)
+            held = sorted(entry.name for entry in self.path.iterdir())
+        except OSError as error:
+            raise RigError(f"run folder {self.path}: {error.strerror or error}; name another one") from error
+        if held:
+            raise RigError(f"run folder {self.path}: holds {held[0]} already; name a new folder, no run is overwritten")
+
+    def file(self, name: str) -> Path:
+        """Give the path of a file of the run."""
+        return self.path / name
+
+    def keep(self, path: Path) -> str:
+        """Copy a file that a run reads, and give its name in the folder; bulk and maps stay where they are.
+
+        A map reads its DBC beside it, a record may be large: both are named by their full path.
+        """
+        if path.suffix == ".rec" or _is_map(path):
+            return str(path.resolve())
+        inputs = self.path / _INPUTS
+        inputs.mkdir(exist_ok=True)
+        name = path.name
+        for number in range(2, 1000):
+            if not (inputs / name).exists():
+                break
+            name = f"{path.stem}_{number}{path.suffix}"
+        self._whole(f"{_INPUTS}/{name}", lambda half: half.write_bytes(path.read_bytes()))
+        return f"{_INPUTS}/{name}"
+
+    def text(self, name: str, text: str) -> None:
+        """Write a text."""
+        self._whole(name, lambda path: path.write_text(text, encoding="utf-8", newline="\n"))
+
+    def json(self, name: str, content: Mapping[str, Any]) -> None:
+        """Write JSON; NaN and infinity as null."""
+        self.text(name, json.dumps(to_jsonable(content), indent=2, ensure_ascii=False, allow_nan=False) + "\n")
+
+    def dataset(self, name: str, dataset: xr.Dataset) -> None:
+        """Write netCDF."""
+        self._whole(name, lambda path: dataset.to_netcdf(path, engine="scipy"))
+
+    def figure(self, name: str, figure: Figure) -> None:
+        """Write a PNG."""
+        self._whole(name, lambda path: figure.savefig(path, dpi=150, format="png"))
+
+    def _whole(self, name: str, write: Any) -> None:
+        """Write under another name, and give it its own when it is on the disk."""
+        whole = self.path / name
+        half = whole.with_name(f".{whole.name}.part")
+        try:
+            write(half)
+            with half.open("rb") as written:
+                os.fsync(written.fileno())
+            half.replace(whole)
+        except OSError as error:
+            half.unlink(missing_ok=True)
+            raise RigError(
+                f"{self.path / name}: {error.strerror or error}; what was finished before is kept"
+            ) from error
+
+
+def _is_map(path: Path) -> bool:
+    return path.suffix == ".toml" and 'kind = "signal_map"' in path.read_text(encoding="utf-8", errors="replace")
+
+
+def versions() -> dict[str, Any]:
+    """Give time, versions and machine of a run."""
+    found: dict[str, str | None] = {}
+    for name in _PACKAGES:
+        try:
+            found[name] = metadata.version(name)
+        except metadata.PackageNotFoundError:
+            found[name] = None
+    return {
+        "begun": datetime.now(UTC).isoformat(timespec="seconds"),
+        "mgdd": _core.__version__,
+        "python": platform.python_version(),
+        "packages": found,
+        "system": platform.platform(),
+        "arguments": sys.argv[1:],
+    }

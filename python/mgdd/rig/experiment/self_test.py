@@ -1,0 +1,202 @@
+"""The ways to die, tried out on this machine: a process drives a throttle over a bus and ends badly, six times."""
+
+from __future__ import annotations
+
+import csv
+import signal
+import subprocess
+import sys
+import threading
+import time
+from collections.abc import Callable, Mapping
+from contextlib import ExitStack
+from dataclasses import dataclass
+from pathlib import Path
+from tempfile import TemporaryDirectory
+from typing import Any
+
+from mgdd.errors import RigError
+from mgdd.results.describe import described
+from mgdd.rig.experiment.checked import check_experiment
+from mgdd.rig.experiment.experiment import Experiment
+from mgdd.rig.experiment.own_node import own_node
+from mgdd.rig.experiment.throttle_tasks import throttle_named
+
+__all__ = ["WAYS_TO_DIE", "SelfTest", "run_self_test"]
+
+WAYS_TO_DIE = ("exception", "nan", "sigint", "sigterm", "sigkill", "hang")
+LIMIT_S = 0.4
+_AWAY_DEG = 5.0  # from limp-home before the end, or the test says nothing
+_BAND_DEG = 1.0
+_WATCHED_S = 0.3  # beyond the limit
+_READY_S = 60.0
+_EXPERIMENT = """
+kind = "experiment"
+format = 1
+task = "track"
+mode = "hil"
+[bus]
+pace = "real_time"
+"""
+_SIGNALS = {"sigint": signal.SIGINT, "sigterm": signal.SIGTERM, "sigkill": signal.SIGKILL}
+
+
+@dataclass(frozen=True, kw_only=True)
+class SelfTest:
+    """How long the plate took to limp-home after each way to die.
+
+    Parameters
+    ----------
+    ways_to_die : mapping of str to float or None
+        Seconds from the end of the process to limp-home, by way; None where the plate did not come home, or the way
+        could not be tried.
+    limit_s : float
+        What is allowed [s].
+    notes : mapping of str to str
+        Why a way has no time.
+    """
+
+    ways_to_die: Mapping[str, float | None]
+    limit_s: float
+    notes: Mapping[str, str]
+
+    @property
+    def passed(self) -> bool:
+        """Whether every way has a time, and none is above the limit."""
+        times = [self.ways_to_die.get(way) for way in WAYS_TO_DIE]
+        return all(time is not None and time <= self.limit_s for time in times)
+
+    def to_dict(self) -> dict[str, Any]:
+        """Give all of it.
+
+        Returns
+        -------
+        dict
+            As JSON holds it.
+        """
+        return {
+            "passed": self.passed,
+            "limit_s": self.limit_s,
+            "ways_to_die": dict(self.ways_to_die),
+            "notes": dict(self.notes),
+        }
+
+
+def run_self_test(*, progress: Callable[[str], None] | None = None) -> SelfTest:
+    """Let a process that drives a simulated throttle die in every way, and time the way home of the plate.
+
+    Three parts on this machine, as on a bench: a hub, a node with the throttle, and the process that dies. The times
+    are those of the truth in the node.
+
+    Parameters
+    ----------
+    progress : callable, optional
+        Called with the name of each way.
+
+    Returns
+    -------
+    SelfTest
+        With ``exception``, ``nan``, ``sigint``, ``sigterm``, ``sigkill`` and ``hang``.
+
+    Raises
+    ------
+    ImportError
+        The extra ``can`` is not installed.
+    mgdd.errors.RigError
+        Hub and node did not start.
+    """
+    experiment = Experiment.from_toml(_EXPERIMENT)
+    checked, home_deg = check_experiment(experiment), throttle_named(experiment.plant.preset, Path()).limp_home_deg
+    times: dict[str, float | None] = {}
+    notes: dict[str, str] = {}
+    with TemporaryDirectory(prefix="mgdd-selftest-") as folder:
+        truth = Path(folder) / "truth.csv"
+        with own_node(checked, truth=truth) as connection, ExitStack() as hosts:
+            coming: list[_Host] = []
+            for number, way in enumerate(WAYS_TO_DIE):
+                if progress is not None:
+                    progress(way)
+                for early in WAYS_TO_DIE[len(coming) : number + 2]:  # the next one starts while this one dies
+                    coming.append(_Host(early, connection))
+                    hosts.callback(coming[-1].end)
+                try:
+                    times[way] = _time_home(coming[number], truth, home_deg)
+                except RigError as error:
+                    times[way], notes[way] = None, str(error)
+                coming[number].end()
+    return SelfTest(ways_to_die=times, limit_s=LIMIT_S, notes=notes)
+
+
+def _time_home(host: _Host, truth: Path, home_deg: float) -> float:
+    """Let a host die, and give the time until the plate is home for good [s]."""
+    died_ns = host.die()
+    until_ns = died_ns + round((LIMIT_S + _WATCHED_S) * 1e9)
+    waited = time.monotonic() + _READY_S
+    rows = _rows(truth)
+    while not rows or rows[-1][0] < until_ns:  # a busy machine: the log comes, but later
+        if time.monotonic() > waited:
+            raise RigError("the node says nothing of that time")
+        time.sleep(0.05)
+        rows = _rows(truth)
+    before = [angle for at_ns, angle in rows if at_ns <= died_ns]
+    after = [(at_ns, angle) for at_ns, angle in rows if died_ns < at_ns <= until_ns]
+    if not before or abs(before[-1] - home_deg) < _AWAY_DEG:
+        raise RigError("the plate was at home already when the process ended")
+    outside = [at_ns for at_ns, angle in after if not abs(angle - home_deg) < _BAND_DEG]
+    if outside and outside[-1] == after[-1][0]:
+        raise RigError(f"the plate stands at {after[-1][1]:.1f} deg, {LIMIT_S + _WATCHED_S:g} s after the end")
+    return ((outside[-1] if outside else died_ns) - died_ns) * 1e-9
+
+
+def _rows(truth: Path) -> list[tuple[int, float]]:
+    with truth.open(encoding="utf-8", newline="") as lines:
+        rows = list(csv.DictReader(lines))
+    if rows and None in rows[-1].values():
+        del rows[-1]  # a line that is being written
+    return [(int(row["monotonic_ns"]), float(row["angle_deg"])) for row in rows]
+
+
+class _Host:
+    """The process that dies; it is started early, and drives when it is told to die."""
+
+    def __init__(self, way: str, connection: str) -> None:
+        self.way = way
+        self._process = subprocess.Popen(
+            [sys.executable, "-m", "mgdd.rig.experiment.doomed", way, connection],
+            stdin=subprocess.PIPE, stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True, start_new_session=True,
+        )  # fmt: skip
+
+    def die(self) -> int:
+        """Let it open the plate and die; give the time of its end [ns]."""
+        process = self._process
+        watchdog = threading.Timer(_READY_S, process.kill)
+        watchdog.start()
+        try:
+            self._expect("ready")
+            if process.stdin is not None:
+                process.stdin.write("go\n")
+                process.stdin.flush()
+            self._expect("open")
+            if self.way not in _SIGNALS:
+                return int(self._expect("dying").split()[1])
+            died_ns = time.monotonic_ns()
+            process.send_signal(_SIGNALS[self.way])
+            return died_ns
+        finally:
+            watchdog.cancel()
+
+    def end(self) -> None:
+        """End it, if it has not; the one that hangs has not."""
+        self._process.kill()
+        self._process.communicate()
+
+    def _expect(self, word: str) -> str:
+        line = self._process.stdout.readline() if self._process.stdout is not None else ""
+        if not line.startswith(word):
+            self._process.kill()
+            _, complaint = self._process.communicate()
+            raise RigError(f"the process did not come to {word!r}: {complaint.strip()[-300:] or 'it said nothing'}")
+        return line
+
+
+described(SelfTest, rows=lambda test: {**test.ways_to_die, "limit_s": test.limit_s, "passed": test.passed})

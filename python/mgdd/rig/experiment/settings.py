@@ -1,0 +1,176 @@
+"""What an experiment file may hold: one record per table, with the form, the default and the range of every key."""
+
+from __future__ import annotations
+
+import dataclasses
+import math
+from collections.abc import Mapping
+from dataclasses import dataclass, field
+from typing import Any, Self, TypeVar
+
+from mgdd.errors import ParameterError
+from mgdd.identify.throttle.excitation_design import EXCITATIONS
+from mgdd.identify.throttle.fits import CHOICES
+from mgdd.io.parameter_entries import fits
+from mgdd.loop.controller_families import FAMILIES
+from mgdd.rig.can.toml_table import TomlTable
+
+__all__ = [
+    "MODES", "PACES", "SAMPLE_S", "TASKS", "BusSettings", "EnginePlant", "IdentifyTask", "ReplaySettings",
+    "SafetySettings", "SeekTask", "Settings", "ThrottlePlant", "TrackTask", "scaled",
+]  # fmt: skip
+
+MODES = ("simulate", "hil", "dry_run", "replay", "bench")
+PACES = ("step", "real_time")
+TASKS = ("identify", "track", "seek")
+SAMPLE_S = 1e-3  # between samples of a throttle that is simulated
+GUIDES = ("none", "feed_forward", "curve")
+_T = TypeVar("_T")
+
+
+def _key(
+    form: str, default: Any = None, *, among: tuple[str, ...] | None = None, low: float | None = None,
+    high: float | None = None,
+) -> Any:  # fmt: skip
+    """Make a field that knows the form of its key; None: the key may be missing."""
+    facts = {"form": form, "among": among, "low": low, "high": high}
+    if isinstance(default, dict):
+        return field(default_factory=dict, metadata=facts)
+    return field(default=default, metadata=facts)
+
+
+class Settings:
+    """Base of the records: reading from a table, and back."""
+
+    @classmethod
+    def read(cls, table: TomlTable) -> Self:
+        """Take all keys of a table; an unknown key, a wrong form or range is a ParameterError that names the file."""
+        table.only([own.name for own in dataclasses.fields(cls)])  # type: ignore[arg-type]
+        values = {}
+        for own in dataclasses.fields(cls):  # type: ignore[arg-type]
+            facts = own.metadata
+            if facts["form"] == "scales":
+                values[own.name] = _numbers(table.table(own.name))
+                continue
+            value = table.take(own.name, facts["form"], own.default)
+            if value is not None:
+                _require(table, own.name, value, facts)
+            values[own.name] = value
+        return cls(**values)
+
+    def to_dict(self) -> dict[str, Any]:
+        """Give the keys that are set."""
+        every = {own.name: getattr(self, own.name) for own in dataclasses.fields(self)}  # type: ignore[arg-type]
+        return {name: value for name, value in every.items() if value is not None and value != {}}
+
+
+def _numbers(table: TomlTable) -> dict[str, float]:
+    found = table.items()
+    for name, value in found.items():
+        if not (fits(value, "number") and math.isfinite(value)):
+            raise table.error(name, value, "a finite number")
+    return {name: float(value) for name, value in found.items()}
+
+
+def _require(table: TomlTable, name: str, value: Any, facts: Mapping[str, Any]) -> None:
+    among, low, high = facts["among"], facts["low"], facts["high"]
+    if among is not None and value not in among:
+        raise table.error(name, value, f"one of {', '.join(among)}")
+    if facts["form"] in ("number", "integer"):
+        bounds = f"in [{-math.inf if low is None else low:g}, {math.inf if high is None else high:g}]"
+        if not math.isfinite(value) or (low is not None and value < low) or (high is not None and value > high):
+            raise table.error(name, value, "finite" if low is None and high is None else bounds)
+
+
+@dataclass(frozen=True, kw_only=True)
+class ThrottlePlant(Settings):
+    """The throttle of ``simulate``, and of the node that ``hil`` starts."""
+
+    preset: str = _key("text", "P1")
+    scale: Mapping[str, float] = _key("scales", {})
+    noise_deg: float = _key("number", 0.03, low=0.0, high=10.0)
+    sample_s: float | None = _key("number", low=1e-4, high=0.02)
+
+
+@dataclass(frozen=True, kw_only=True)
+class EnginePlant(Settings):
+    """The engine of ``simulate``, and of the node that ``hil`` starts."""
+
+    preset: str = _key("text", "puma_single")
+    scale: Mapping[str, float] = _key("scales", {})
+    soc_scatter_cad: float = _key("number", 0.3, low=0.0, high=10.0)
+    efficiency_noise_percent: float = _key("number", 0.25, low=0.0, high=10.0)
+
+
+@dataclass(frozen=True, kw_only=True)
+class BusSettings(Settings):
+    """The bus of ``hil``, ``dry_run`` and ``bench``; without `connection`, ``hil`` starts a hub and a node itself."""
+
+    map: str | None = _key("text")
+    connection: str | None = _key("text")
+    pace: str = _key("text", "step", among=PACES)
+    timeout_ms: float | None = _key("number", low=1.0, high=60_000.0)
+
+
+@dataclass(frozen=True, kw_only=True)
+class SafetySettings(Settings):
+    """What stands between controller or seeker and the plant."""
+
+    envelope: str = _key("text", "etb")
+    rate_cad: float = _key("number", 5.0, low=1e-3)
+    limits: Mapping[str, float] = _key("scales", {})
+
+
+@dataclass(frozen=True, kw_only=True)
+class ReplaySettings(Settings):
+    """What ``replay`` reads."""
+
+    record: str | None = _key("text")
+
+
+@dataclass(frozen=True, kw_only=True)
+class IdentifyTask(Settings):
+    """Excite a throttle, record it, fit a model."""
+
+    excitation: str = _key("text", "chirp", among=EXCITATIONS)
+    side: str = _key("text", "above", among=("above", "below", "both"))
+    duration_s: float | None = _key("number", low=0.5, high=600.0)
+    prior: str = _key("text", "P1")
+    model: str = _key("text", "auto", among=CHOICES)
+
+
+@dataclass(frozen=True, kw_only=True)
+class TrackTask(Settings):
+    """Run a controller along a reference."""
+
+    reference: str = _key("text", "step:40:42")
+    controller: str = _key("text", "guided", among=tuple(FAMILIES))
+    model: str = _key("text", "P1")
+    delay_samples: int | None = _key("integer", low=0, high=16)
+
+
+@dataclass(frozen=True, kw_only=True)
+class SeekTask(Settings):
+    """Let a seeker with a guide find the best start of combustion."""
+
+    guide: str = _key("text", "curve", among=GUIDES)
+    model: str = _key("text", "puma_single")
+    scale: Mapping[str, float] = _key("scales", {})
+    start_cad: float | None = _key("number", low=-60.0, high=60.0)
+    lower_cad: float = _key("number", -30.0, low=-60.0, high=60.0)
+    upper_cad: float = _key("number", 10.0, low=-60.0, high=60.0)
+    cycles: int = _key("integer", 300, low=1, high=2_000_000)
+    limits: Mapping[str, float] = _key("scales", {})
+
+
+def scaled(record: _T, scale: Mapping[str, float], what: str) -> _T:
+    """Multiply fields of a record; friction takes stiction along, as `mgdd throttle track --plant-scale` does."""
+    known = type(record).fields()  # type: ignore[attr-defined]
+    factors = dict(scale)
+    for name in factors:
+        if name not in known or not isinstance(getattr(record, name), float):
+            raise ParameterError.of(f"{what}.scale", name, f"a number of {type(record).__name__}: {', '.join(known)}")
+    if "coulomb_nm" in factors:
+        factors.setdefault("stiction_nm", factors["coulomb_nm"])
+    changed = {name: getattr(record, name) * factor for name, factor in factors.items()}
+    return record.replace(**changed)  # type: ignore[attr-defined,no-any-return]

@@ -1,0 +1,184 @@
+"""The plant of an experiment in its mode: in process, over a bus, or from a record, with its guard in front."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterator, Sequence
+from contextlib import ExitStack, contextmanager
+from dataclasses import dataclass
+from typing import TYPE_CHECKING, Any
+
+from mgdd.loop import EngineBench, Plant, VirtualThrottle
+from mgdd.loop.track import sensors_of
+from mgdd.optimize import Limit
+from mgdd.rig.actuator_guard import ActuatorGuard
+from mgdd.rig.can.can_rig import CanRig
+from mgdd.rig.can.frame import Bus
+from mgdd.rig.can.recorded_bus import RecordedBus
+from mgdd.rig.can.transport import CanTransport
+from mgdd.rig.exchange import RecordingRig, RigRecord
+from mgdd.rig.experiment.checked import CheckedExperiment
+from mgdd.rig.experiment.engine_task import SeekPlan, engine_named
+from mgdd.rig.experiment.experiment import Experiment
+from mgdd.rig.experiment.own_node import own_node
+from mgdd.rig.experiment.run_record import RunRecord
+from mgdd.rig.experiment.settings import SAMPLE_S, EnginePlant, scaled
+from mgdd.rig.experiment.throttle_tasks import throttle_named
+from mgdd.rig.gated import GatedThrottle
+from mgdd.rig.recorder import Recorder
+from mgdd.rig.replay import ReplayRig
+from mgdd.rig.safety import SafetyGate
+from mgdd.rig.simulated import SimulatedRig
+
+if TYPE_CHECKING:
+    import os
+
+__all__ = ["Stand", "opened", "simulated_plant"]
+
+_STEP_TIMEOUT_S = 10.0  # a node that steps has no clock: only its end is waited for
+
+
+@dataclass(frozen=True, kw_only=True)
+class Stand:
+    """A plant that is open and guarded.
+
+    Parameters
+    ----------
+    plant : mgdd.loop.Plant
+        What a task steers.
+    counters : callable
+        Gives what rig and guard have counted.
+    events : callable
+        Gives, once each, what guard or gate had to say.
+    start : callable
+        Brings the guard into service; gives the angle or timing there.
+    left : callable
+        Gives how many cycles there can be at most; None without an end.
+    """
+
+    plant: Plant
+    counters: Callable[[], dict[str, Any]]
+    events: Callable[[], list[str]]
+    start: Callable[[], float]
+    left: Callable[[], int | None]
+
+
+@contextmanager
+def opened(
+    checked: CheckedExperiment,
+    record: RunRecord,
+    *,
+    arm: bool = False,
+    key_file: str | os.PathLike[str] | None = None,
+) -> Iterator[Stand]:
+    """Open the plant of an experiment; it is left safe, in whatever way the block ends.
+
+    Every exchange with the rig itself, below the guard, and every frame of a bus go into the record.
+    """
+    with ExitStack() as stack:
+        rig = _rig_of(checked, stack, record.recorder, arm=arm, key_file=key_file)
+        yield _guarded(checked, rig, stack.enter_context(RecordingRig(rig, record.row, keep=False)))
+
+
+def simulated_plant(experiment: Experiment, *, sample_s: float | None, inputs: Sequence[str]) -> Plant:
+    """Make the plant of ``simulate``, or of a node of our own."""
+    plant, folder = experiment.plant, experiment.folder
+    if isinstance(plant, EnginePlant):
+        engine = engine_named(plant.preset, folder)
+        return EngineBench(
+            scaled(engine.cylinder, plant.scale, "plant"), engine.point, limits=experiment.limit_names,
+            soc_scatter_cad=plant.soc_scatter_cad, efficiency_noise_percent=plant.efficiency_noise_percent,
+            seed=experiment.seed,
+        )  # fmt: skip
+    return VirtualThrottle(
+        scaled(throttle_named(plant.preset, folder), plant.scale, "plant"), inputs=inputs,
+        sensors=sensors_of(plant.noise_deg), sample_s=sample_s or SAMPLE_S, seed=experiment.seed,
+    )  # fmt: skip
+
+
+def _rig_of(
+    checked: CheckedExperiment,
+    stack: ExitStack,
+    recorder: Recorder | None,
+    *,
+    arm: bool,
+    key_file: str | os.PathLike[str] | None,
+) -> Any:
+    experiment, mode = checked.experiment, checked.experiment.mode
+    if mode == "simulate":
+        return SimulatedRig(simulated_plant(experiment, sample_s=checked.sample_s, inputs=("duty",)))
+    if checked.record is not None:
+        return ReplayRig(RigRecord.read(checked.record), strict=False)
+    connection = experiment.bus.connection
+    if connection is None:
+        connection = stack.enter_context(own_node(checked))
+    bus: Bus = CanTransport.parse(connection)
+    if recorder is not None:
+        bus = RecordedBus(bus, recorder)
+    given_ms = experiment.bus.timeout_ms
+    timeout_s = given_ms * 1e-3 if given_ms else _STEP_TIMEOUT_S if experiment.bus.pace == "step" else None
+    return CanRig(
+        checked.bus_map, bus, mode=mode, timeout_s=timeout_s, arm=arm, key_file=key_file,
+        limits=experiment.limit_names or None,
+    )  # fmt: skip
+
+
+def _guarded(checked: CheckedExperiment, rig: Any, recorded: Plant) -> Stand:
+    def counters() -> dict[str, Any]:
+        told: dict[str, Any] = dict(getattr(rig, "counters", {}))
+        if isinstance(rig, ReplayRig):
+            told["replay"] = _compared(rig)
+        return told
+
+    def left() -> int | None:
+        return len(rig.record) - rig.sample if isinstance(rig, ReplayRig) else None
+
+    if checked.envelope is not None:
+        gate = SafetyGate(checked.envelope)
+        safe = GatedThrottle(recorded, gate, shadow=checked.experiment.mode in ("dry_run", "replay"))
+        return Stand(
+            plant=safe,
+            counters=lambda: {**counters(), "gate": gate.counts},
+            events=lambda: [f"safety gate: {c.before} -> {c.after}: {c.reason}" for c in gate.drain()],
+            start=safe.start,
+            left=left,
+        )
+    plan, safety = checked.plan, checked.experiment.safety
+    if not isinstance(plan, SeekPlan):
+        raise TypeError(f"{type(plan).__name__} without an envelope")
+    guard = ActuatorGuard(
+        recorded,
+        start={"soc_cad": plan.start_cad},
+        bounds={"soc_cad": (plan.task.lower_cad, plan.task.upper_cad)},
+        rates={"soc_cad": safety.rate_cad},
+        limits=[Limit(name, upper) for name, upper in safety.limits.items()],
+    )
+    told = 0
+
+    def new_events() -> list[str]:
+        nonlocal told
+        log, told_before = guard.log, told
+        told = len(log)
+        return [
+            f"guard: cycle {e.cycle}: {e.reason} {e.name}: {dict(e.asked)} -> {dict(e.applied)}"
+            for e in log[told_before:]
+        ]
+
+    return Stand(
+        plant=guard,
+        counters=lambda: {**counters(), "guard": guard.counts},
+        events=new_events,
+        start=lambda: plan.start_cad,
+        left=left,
+    )
+
+
+def _compared(rig: ReplayRig) -> dict[str, Any]:
+    """Say how the inputs that were asked for agree with the recorded ones, bit for bit."""
+    sizes = [abs(found.asked - found.recorded) for found in rig.differences]
+    return {
+        "samples": rig.sample,
+        "recorded": len(rig.record),
+        "different": len(sizes),
+        "first_different": rig.differences[0].sample if sizes else None,
+        "largest_difference": max(sizes, default=0.0),
+    }

@@ -1,0 +1,220 @@
+"""Identify and track on any plant that takes a duty and measures the angle: simulated, behind a bus, or recorded."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from functools import partial
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+
+from mgdd import _core, identify, presets
+from mgdd.errors import ParameterError
+from mgdd.io import throttle_log
+from mgdd.loop import Plant, Reference, tuned_controller
+from mgdd.loop.track import FIGURES
+from mgdd.optimize import FitOptions
+from mgdd.plot.style import drawn
+from mgdd.results.fit import figures_of
+from mgdd.results.labels import labelled_dataset
+from mgdd.rig.experiment.outcome import Outcome
+from mgdd.rig.experiment.settings import IdentifyTask, TrackTask
+
+if TYPE_CHECKING:
+    import xarray as xr
+    from matplotlib.figure import Figure
+    from numpy.typing import NDArray
+
+    from mgdd.loop.track import AngleController
+    from mgdd.throttle import Throttle
+
+__all__ = ["IdentifyPlan", "TrackPlan", "throttle_named"]
+
+_SETTLE_S = 1.0  # before an excitation: the plate comes to rest at limp-home
+
+
+def throttle_named(name: str, folder: Path) -> Throttle:
+    """Load the throttle of a preset or of a TOML file."""
+    beside = folder / name
+    return presets.load(beside if beside.is_file() else name, kind="throttle").throttle
+
+
+class TrackPlan:
+    """A controller along a reference, made and checked before anything moves.
+
+    Parameters
+    ----------
+    task : TrackTask
+        What is asked.
+    sample_s : float
+        Time between samples [s].
+    folder : pathlib.Path
+        Where files of the task are looked for.
+    """
+
+    def __init__(self, task: TrackTask, *, sample_s: float, folder: Path) -> None:
+        self.task, self.sample_s = task, sample_s
+        beside = folder / task.reference
+        self.reference = Reference.parse(str(beside) if beside.is_file() else task.reference, sample_s=sample_s)
+        if abs(self.reference.sample_s / sample_s - 1.0) > 1e-9:
+            raise ParameterError.of(
+                f"reference {task.reference}: time between samples", self.reference.sample_s,
+                f"{sample_s:g} s, as that of the plant",
+            )  # fmt: skip
+        self.model = _model_named(task.model, folder)
+
+    @property
+    def samples(self) -> int:
+        """How many samples it takes."""
+        return len(self.reference.angle_deg)
+
+    def controller(self) -> AngleController:
+        """Make the controller, at its beginning."""
+        return tuned_controller(
+            self.task.controller, self.model, sample_s=self.sample_s, delay_samples=self.task.delay_samples or 0
+        )
+
+    def run(self, plant: Plant, first_angle_deg: float, most: int | None = None) -> Outcome:
+        """Run it on a plant whose last measured angle is given, for at most so many samples."""
+        controller = self.controller()
+        wanted = self.reference.angle_deg
+
+        def duty_at(sample: int, measured_deg: float) -> float:
+            return float(controller.step(float(wanted[sample]), measured_deg))
+
+        columns, interrupted = _drive(plant, _fewer(self.samples, most), duty_at, first_angle_deg)
+        n = len(columns["asked_duty"])
+        if n == 0:
+            return Outcome(figures={}, dataset=_dataset(columns, self.sample_s, {}, {}), interrupted=True)
+        from_sample = min(self.reference.from_sample, n - 1)
+        figures = _core.loop.tracking_figures(
+            reference_deg=wanted[:n], angle_deg=columns["sensed_angle_deg"], duty=columns["duty"],
+            sample_s=self.sample_s, from_sample=from_sample, band_deg=self.reference.band_deg,
+        )  # fmt: skip
+        numbers = {name: float(figures[name]) for name in FIGURES}
+        dataset = _dataset(columns, self.sample_s, {"reference_deg": wanted[:n]}, numbers)
+        return Outcome(
+            figures={"reference": self.reference.name, "controller": self.task.controller, **numbers},
+            dataset=dataset,
+            interrupted=interrupted,
+            drawings={"track": partial(_draw_track, dataset)},
+        )
+
+
+class IdentifyPlan:
+    """An excitation that the prior model has been asked about, and the fit of what it shows.
+
+    Parameters
+    ----------
+    task : IdentifyTask
+        What is asked.
+    sample_s : float
+        Time between samples [s].
+    seed : int
+        Of the starts of the fit.
+    folder : pathlib.Path
+        Where files of the task are looked for.
+    """
+
+    def __init__(self, task: IdentifyTask, *, sample_s: float, seed: int, folder: Path) -> None:
+        self.task, self.sample_s, self.seed = task, sample_s, seed
+        self.prior = throttle_named(task.prior, folder)
+        signal, check = identify.design_excitation(
+            task.excitation, self.prior, side=task.side, duration_s=task.duration_s, step_s=sample_s
+        )
+        settle = round(_SETTLE_S / sample_s)
+        self.duty = np.r_[np.zeros(settle), signal["duty"].to_numpy()]
+        self.said = check.summary()
+
+    @property
+    def samples(self) -> int:
+        """How many samples it takes."""
+        return len(self.duty)
+
+    def run(self, plant: Plant, first_angle_deg: float, most: int | None = None) -> Outcome:
+        """Run it on a plant, for at most so many samples, and fit."""
+        samples = _fewer(self.samples, most)
+        columns, interrupted = _drive(plant, samples, lambda sample, _: float(self.duty[sample]), first_angle_deg)
+        dataset = _dataset(columns, self.sample_s, {}, {})
+        said: dict[str, Any] = {"excitation": self.task.excitation, "samples": len(columns["duty"])}
+        if interrupted or samples < self.samples:
+            return Outcome(figures=said, dataset=dataset, interrupted=interrupted)
+        time_s = np.arange(len(columns["duty"])) * self.sample_s
+        angle_deg = np.r_[first_angle_deg, columns["sensed_angle_deg"][:-1]]  # a log holds the angle before its duty
+        log = throttle_log(time_s, columns["duty"], angle_deg, name="recorded")
+        fit = identify.identify_throttle(
+            log, self.task.model, two_sided=self.task.side == "both", options=FitOptions(seed=self.seed)
+        )
+        said |= {
+            "model": fit.kind, **figures_of(fit), "parameters": dict(fit.to_dict()["parameters"]),
+            "findings": [str(finding) for finding in fit.findings], "success": bool(fit.report.success),
+        }  # fmt: skip
+        validation = identify.validate_throttle(fit, log)
+        return Outcome(
+            figures=said,
+            dataset=dataset,
+            files={"fit.toml": fit.to_toml()},
+            drawings={"identify": partial(_draw_fit, validation)},
+        )
+
+
+def _fewer(samples: int, most: int | None) -> int:
+    return samples if most is None else min(samples, most)
+
+
+def _model_named(name: str, folder: Path) -> Any:
+    beside = folder / name
+    if name.endswith(".toml"):
+        return identify.load_throttle_model(beside if beside.is_file() else name)
+    return throttle_named(name, folder)
+
+
+def _drive(
+    plant: Plant, samples: int, duty_at: Callable[[int, float], float], first_angle_deg: float
+) -> tuple[dict[str, NDArray[np.float64]], bool]:
+    """Step a plant; give columns of what was asked, applied and measured, and whether Ctrl-C cut them."""
+    asked, applied, angle = np.empty(samples), np.empty(samples), np.empty(samples)
+    measured_deg, done, interrupted = first_angle_deg, 0, False
+    try:
+        for sample in range(samples):
+            duty = duty_at(sample, measured_deg)
+            plant.apply({"duty": duty})
+            measured = plant.measure()
+            measured_deg = measured.values["sensed_angle_deg"]
+            asked[sample], applied[sample], angle[sample] = duty, measured.applied.get("duty", duty), measured_deg
+            done = sample + 1
+    except KeyboardInterrupt:
+        interrupted = True
+    return {"asked_duty": asked[:done], "duty": applied[:done], "sensed_angle_deg": angle[:done]}, interrupted
+
+
+def _dataset(
+    columns: dict[str, NDArray[np.float64]], sample_s: float, more: dict[str, Any], numbers: dict[str, float]
+) -> xr.Dataset:
+    n = len(columns["duty"])
+    variables: dict[str, tuple[Any, ...]] = {
+        "time_s": ("time_s", np.arange(n) * sample_s),
+        "duty": ("time_s", columns["duty"]),
+        "asked_duty": ("time_s", columns["asked_duty"], "-", "duty that the controller asked for"),
+        "sensed_angle_deg": ("time_s", columns["sensed_angle_deg"]),
+    }
+    variables |= {name: ("time_s", column) for name, column in more.items()}
+    variables |= {name: ((), value) for name, value in numbers.items()}
+    return labelled_dataset(variables)
+
+
+def _draw_track(dataset: xr.Dataset) -> Figure:
+    from mgdd.plot.throttle_track import throttle_track
+
+    seen = dataset.assign(angle_deg=dataset["sensed_angle_deg"])
+    return drawn(throttle_track, seen, size=(7.0, 5.4))
+
+
+def _draw_fit(validation: Any) -> Figure:
+    from matplotlib.figure import Figure
+
+    figure = Figure(figsize=(12.0, 4.6), layout="constrained")
+    for pane, what in zip(figure.subplots(1, 3), ("free_run", "n_step", "residuals"), strict=True):
+        validation.plot(what, ax=pane)
+    return figure

@@ -1,0 +1,87 @@
+"""A plant that tells a listener of every cycle."""
+
+from __future__ import annotations
+
+import time
+from collections.abc import Callable, Mapping
+from typing import Any, NamedTuple
+
+from mgdd.loop import Measurement, Plant
+
+__all__ = ["Cycle", "Watched"]
+
+
+class Cycle(NamedTuple):
+    """One cycle of a plant.
+
+    Parameters
+    ----------
+    number : int
+        From 0 on.
+    asked : mapping of str to float
+        Inputs by name.
+    measured : mgdd.loop.Measurement
+        What came back.
+    thinking_s, waiting_s : float
+        From the measurement before to these inputs, and from the inputs to this measurement [s].
+    """
+
+    number: int
+    asked: Mapping[str, float]
+    measured: Measurement
+    thinking_s: float
+    waiting_s: float
+
+
+class Watched:
+    """A plant whose cycles are told to a listener, with the time that they took.
+
+    Parameters
+    ----------
+    plant : mgdd.loop.Plant
+        Any.
+    listener : callable
+        Takes a `Cycle`; what it raises ends the run.
+    """
+
+    def __init__(self, plant: Plant, listener: Callable[[Cycle], None]) -> None:
+        self.plant, self.listener = plant, listener
+        self.cycles = 0
+        self._asked: Mapping[str, float] = {}
+        self._measured_s = self._applied_s = time.perf_counter()
+
+    @property
+    def input_names(self) -> tuple[str, ...]:
+        """Names of the inputs."""
+        return self.plant.input_names
+
+    @property
+    def limit_names(self) -> tuple[str, ...]:
+        """Names of the limited quantities."""
+        return self.plant.limit_names
+
+    @property
+    def operating_point_changes(self) -> bool:
+        """Whether the next cycle brings a new operating point; False for a plant that announces none."""
+        return bool(getattr(self.plant, "operating_point_changes", False))
+
+    @property
+    def point(self) -> Any:
+        """Operating point of the next cycle; as absent as the plant's own."""
+        return getattr(self.plant, "point")  # noqa: B009 - the protocol of a plant does not have it
+
+    def apply(self, inputs: Mapping[str, float]) -> None:
+        """Pass the inputs on."""
+        self._asked = dict(inputs)
+        self._applied_s = time.perf_counter()
+        self.plant.apply(inputs)
+
+    def measure(self) -> Measurement:
+        """Pass the measurement back, and tell the listener."""
+        measured = self.plant.measure()
+        now = time.perf_counter()
+        cycle = Cycle(self.cycles, self._asked, measured, self._applied_s - self._measured_s, now - self._applied_s)
+        self.cycles += 1
+        self.listener(cycle)
+        self._measured_s = time.perf_counter()
+        return measured

@@ -1,0 +1,232 @@
+"""A record in the formats of other tools."""
+
+from __future__ import annotations
+
+import csv
+import os
+import re
+import shutil
+import tempfile
+from collections.abc import Callable, Mapping
+from pathlib import Path
+from types import MappingProxyType
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+
+from mgdd.errors import ParameterError, RigError
+from mgdd.io.existing_file import existing_file
+from mgdd.results.labels import label_of
+from mgdd.rig.can.logs import LOG_WRITERS, write_log
+from mgdd.rig.extras import import_extra
+from mgdd.rig.recorded import RecordedRun, read_record, stamped_frames
+
+if TYPE_CHECKING:
+    import xarray as xr
+
+__all__ = ["export_record"]
+
+
+def export_record(
+    source: str | os.PathLike[str], target: str | os.PathLike[str], *, kind: str | None = None
+) -> list[Path]:
+    """Write a record in the format of another tool.
+
+    Parameters
+    ----------
+    source : path-like
+        File of a `Recorder`; what cannot be read of it is left out (`read_record` says how much).
+    target : path-like
+        The file; of the kinds that hold one table per file a new folder.
+    kind : str, optional
+        Default the ending of `target`. One file with everything: ``"mf4"`` (asammdf: tables, events and raw frames as
+        a bus log; ``pip install "mgdd[mdf]"``). One file with the frames: ``"blf"``, ``"asc"`` or ``"log"`` (candump;
+        ``pip install "mgdd[can]"``). A folder with ``frames``, ``events`` and each table of samples: ``"netcdf"``,
+        ``"csv"``, ``"parquet"`` (``pip install "mgdd[parquet]"``).
+
+    Returns
+    -------
+    list of pathlib.Path
+        What was written. It is written beside the target and renamed when complete: an existing file is replaced, an
+        existing folder is not.
+
+    Raises
+    ------
+    FileNotFoundError
+        No such record.
+    ImportError
+        A package is missing; the message says how to install it.
+    mgdd.errors.DataError
+        Not a record.
+    mgdd.errors.ParameterError
+        An unknown kind.
+    mgdd.errors.RigError
+        The folder exists already.
+
+    Examples
+    --------
+    >>> import pathlib, tempfile
+    >>> from mgdd.rig import Recorder, export_record
+    >>> with tempfile.TemporaryDirectory() as folder:
+    ...     path = pathlib.Path(folder) / "run.rec"
+    ...     with Recorder(path) as record:
+    ...         record.sample("plate", {"angle_deg": 9.0}, monotonic_ns=0)
+    ...     files = export_record(path, pathlib.Path(folder) / "run", kind="csv")
+    >>> [file.name for file in files]
+    ['events.csv', 'frames.csv', 'plate.csv']
+    """
+    record, whole = existing_file(source), Path(target)
+    chosen = whole.suffix.removeprefix(".").lower() if kind is None else kind
+    known = (*LOG_WRITERS, "mf4", *_TABLE_WRITERS)
+    if chosen not in known:
+        raise ParameterError.of("kind", chosen, f"one of {', '.join(known)}")
+    if chosen in _TABLE_WRITERS:
+        if whole.exists():
+            raise RigError(f"{whole} exists already: name a new folder")
+        return _write_beside(whole, lambda folder: _write_tables(chosen, folder, read_record(record)))
+    if chosen == "mf4":
+        return _write_beside(whole, lambda file: _write_mf4(file, read_record(record)))
+    return _write_beside(whole, lambda file: write_log(chosen, file, stamped_frames(record)))
+
+
+def _write_beside(target: Path, write: Callable[[Path], None]) -> list[Path]:
+    """Write under a name of its own and rename when complete: nobody finds half a file."""
+    beside = target.with_name(f"{target.stem}.writing{target.suffix}")
+    _remove(beside)
+    try:
+        write(beside)
+        beside.replace(target)
+    except BaseException:
+        _remove(beside)
+        raise
+    return sorted(target.iterdir()) if target.is_dir() else [target]
+
+
+def _remove(path: Path) -> None:
+    if path.is_dir():
+        shutil.rmtree(path)
+    else:
+        path.unlink(missing_ok=True)
+
+
+def _write_tables(kind: str, folder: Path, run: RecordedRun) -> None:
+    folder.mkdir()
+    suffix, write = _TABLE_WRITERS[kind]
+    taken: set[str] = set()
+    for name, data in {"frames": run.frames, "events": run.events, **run.samples}.items():
+        stem = re.sub(r"[^\w.-]", "_", name) or "table"
+        while stem in taken:
+            stem += "_"
+        taken.add(stem)
+        write(folder / f"{stem}{suffix}", data)
+
+
+def _columns(data: xr.Dataset) -> dict[str, tuple[Any, str, str]]:
+    """Return name: (values, unit, long name) of what stands along the rows; a payload becomes its bytes."""
+    rows = next(iter(data.sizes))
+    out: dict[str, tuple[Any, str, str]] = {}
+    for name in [*data.coords, *data.data_vars]:
+        variable = data[name]
+        values: Any = variable.values
+        if variable.dims == (rows, "byte"):
+            sizes = data["size"].values
+            values = [bytes(row[:size]) for row, size in zip(values, sizes, strict=True)]
+        elif variable.dims != (rows,):
+            continue
+        label = label_of(variable)
+        out[str(name)] = (values, label.units, label.long_name)
+    return out
+
+
+def _write_csv(path: Path, data: xr.Dataset) -> None:
+    columns = _columns(data)
+    lists = [v.tolist() if isinstance(v, np.ndarray) else [each.hex() for each in v] for v, _, _ in columns.values()]
+    with path.open("w", newline="", encoding="utf-8") as file:
+        rows = csv.writer(file)
+        rows.writerow(columns)
+        rows.writerows(zip(*lists, strict=True))
+
+
+def _write_netcdf(path: Path, data: xr.Dataset) -> None:
+    """NetCDF 3 knows no unsigned numbers."""
+    small = {name: v.astype(np.int16) for name, v in data.variables.items() if v.dtype == np.uint8}
+    data.assign({str(name): v for name, v in small.items()}).to_netcdf(path)
+
+
+def _write_parquet(path: Path, data: xr.Dataset) -> None:
+    arrow = import_extra("pyarrow", "parquet", "a Parquet file")
+    parquet = import_extra("pyarrow.parquet", "parquet", "a Parquet file")
+    columns = _columns(data)
+    arrays = [arrow.array(values) for values, _, _ in columns.values()]
+    fields = [
+        arrow.field(name, array.type, metadata={"units": units, "long_name": long_name})
+        for array, (name, (_, units, long_name)) in zip(arrays, columns.items(), strict=True)
+    ]
+    parquet.write_table(arrow.table(arrays, schema=arrow.schema(fields)), path)
+
+
+_TABLE_WRITERS: Mapping[str, tuple[str, Callable[[Path, Any], None]]] = MappingProxyType(
+    {
+        "netcdf": (".nc", _write_netcdf),
+        "csv": (".csv", _write_csv),
+        "parquet": (".parquet", _write_parquet),
+    }
+)
+
+# A bus log as ASAM's associated standard "Bus logging" names its parts.
+_BUS_GROUPS = {"CAN_DataFrame": (False, False), "CAN_ErrorFrame": (True, False), "CAN_RemoteFrame": (False, True)}
+
+
+def _bus_event(group: str, frames: xr.Dataset) -> np.ndarray[Any, Any]:
+    """Return frames as the structure that tools for bus logs look for."""
+    small = ("BusChannel", "IDE", "DLC", "DataLength", "Dir", "EDL", "BRS", "ESI")
+    kinds: list[Any] = [(f"{group}.ID", "<u4"), *((f"{group}.{name}", "u1") for name in small)]
+    if group != "CAN_RemoteFrame":
+        kinds += [(f"{group}.DataBytes", "u1", (64,))]
+    out = np.zeros(frames.sizes["frame"], np.dtype(kinds))
+    size = frames["size"].values
+    out[f"{group}.ID"] = frames["id"].values
+    out[f"{group}.BusChannel"] = frames["channel"].values
+    out[f"{group}.IDE"] = frames["extended"].values
+    out[f"{group}.DLC"] = np.where(size <= 8, size, 9 + np.searchsorted([12, 16, 20, 24, 32, 48], size))
+    out[f"{group}.Dir"] = ~frames["received"].values
+    out[f"{group}.EDL"] = frames["fd"].values
+    out[f"{group}.BRS"] = frames["bit_rate_switch"].values
+    if group != "CAN_RemoteFrame":
+        out[f"{group}.DataLength"] = size
+        out[f"{group}.DataBytes"][:, : frames.sizes["byte"]] = frames["data"].values
+    return out
+
+
+def _write_mf4(path: Path, run: RecordedRun) -> None:
+    asammdf = import_extra("asammdf", "mdf", "an MF4 file")
+    blocks = import_extra("asammdf.blocks.v4_blocks", "mdf", "an MF4 file")
+    constants = import_extra("asammdf.blocks.v4_constants", "mdf", "an MF4 file")
+    bus = blocks.SourceInformation(source_type=constants.SOURCE_BUS, bus_type=constants.BUS_TYPE_CAN)
+    with asammdf.MDF(version="4.10") as mdf:
+        mdf.header.start_time = run.started
+        for group, (error, remote) in _BUS_GROUPS.items():
+            own = (run.frames["error"].values == error) & (run.frames["remote"].values == remote)
+            frames = run.frames.isel(frame=own).sortby("time_s")
+            if frames.sizes["frame"]:
+                samples = _bus_event(group, frames)
+                mdf.append(asammdf.Signal(samples, frames["time_s"].values, name=group, source=bus), comment="frames")
+        for name, data in run.samples.items():
+            ordered = data.sortby("time_s")
+            signals = [
+                asammdf.Signal(
+                    ordered[key].values, ordered["time_s"].values, name=str(key), unit=label_of(data[key]).units
+                )
+                for key in data.data_vars
+            ]
+            mdf.append(signals, comment=name)
+        if run.events.sizes["event"]:
+            events = run.events.sortby("time_s")
+            pairs = zip(events["category"].values, events["text"].values, strict=True)
+            texts = np.array([f"{category}: {text}".encode() for category, text in pairs])
+            signal = asammdf.Signal(texts, events["time_s"].values, name="event", encoding="utf-8")
+            mdf.append(signal, comment="events")
+        with tempfile.TemporaryDirectory(dir=path.parent) as folder:  # it insists on its own ending
+            saved = Path(folder) / "run.mf4"
+            mdf.save(saved)
+            saved.replace(path)

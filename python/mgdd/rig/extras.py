@@ -1,0 +1,48 @@
+"""Optional packages, imported where they are used."""
+
+from __future__ import annotations
+
+import importlib
+from typing import Any
+
+__all__ = ["import_extra"]
+
+
+def import_extra(module: str, extra: str, purpose: str) -> Any:
+    """Import a package that only an extra of mgdd installs.
+
+    Parameters
+    ----------
+    module : str
+        What to import.
+    extra : str
+        Name of the extra.
+    purpose : str
+        What needs it, for the message.
+
+    Returns
+    -------
+    module
+        As imported.
+
+    Raises
+    ------
+    ImportError
+        It is not installed; the message says how to install it.
+
+    Examples
+    --------
+    >>> from mgdd.rig.extras import import_extra
+    >>> import_extra("no_such_package", "can", "a log of a CAN bus")
+    Traceback (most recent call last):
+    ...
+    ImportError: a log of a CAN bus needs no_such_package: pip install "mgdd[can]"
+    """
+    package = module.partition(".")[0]
+    try:
+        importlib.import_module(package)
+    except ModuleNotFoundError as error:
+        if error.name != package:
+            raise
+        raise ImportError(f'{purpose} needs {error.name}: pip install "mgdd[{extra}]"', name=error.name) from error
+    return importlib.import_module(module)

@@ -1,0 +1,281 @@
+"""The safety gate below every controller."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from types import TracebackType
+from typing import Any, NamedTuple, Self
+
+from mgdd import _core
+from mgdd._core.rig import Drive
+from mgdd.errors import RigError
+from mgdd.rig.safety_envelope import SafetyEnvelope
+
+__all__ = ["SafetyChange", "SafetyGate"]
+
+
+class SafetyChange(NamedTuple):
+    """A change of state of a safety gate.
+
+    Parameters
+    ----------
+    cycle : int
+        Cycle of the gate, missed ones counted.
+    before, after : str
+        Its modes.
+    reason : str
+        Why.
+    times : int
+        How often this reason has led to one so far, this one included.
+
+    Examples
+    --------
+    >>> from mgdd.rig import SafetyGate
+    >>> gate = SafetyGate()
+    >>> for _ in range(20):
+    ...     gate.observe(good_frames=1, age_s=0.0, sensor_v=(1.5, 3.5), angle_deg=22.5)
+    ...     drive = gate.command(0.0)
+    >>> gate.arm()
+    >>> gate.drain()
+    [SafetyChange(cycle=20, before='init', after='armed', reason='requested', times=1)]
+    """
+
+    cycle: int
+    before: str
+    after: str
+    reason: str
+    times: int
+
+
+class SafetyGate:
+    """What a duty passes last before it leaves the machine, whatever controller or optimiser asked for it.
+
+    In every cycle: `observe` what is known of it, then `command` the duty of the controller, and send the drive that
+    comes back. Modes: ``init``, ``armed``, ``run``, ``limp`` and ``fault``. Only in ``run`` is the actuator driven;
+    everywhere else the duty is 0 and the bridge open, so that the springs bring the plate to limp-home. What goes wrong
+    leads from ``armed`` and ``run`` to ``limp``; sensors that cannot be right and a duty that is not finite lead from
+    everywhere to ``fault``. Both are left by `reset` alone, after the cause is gone. As a context manager it aborts on
+    an exception and disarms at the end. Not a certified safety function: an emergency stop belongs into the supply of
+    the motor.
+
+    Parameters
+    ----------
+    envelope : SafetyEnvelope, optional
+        Its numbers; the shipped ``etb`` if left out.
+
+    See Also
+    --------
+    mgdd.rig.GatedThrottle : a throttle behind a gate, as a plant of the loop.
+    mgdd.rig.ActuatorGuard : the guard of an engine bench.
+    mgdd.control.ThrottleSupervisor : a monitor that knows the plate, beside its controller.
+
+    Notes
+    -----
+    Reasons of ``limp``: ``stale``, ``bad_frames``, ``bus_fault``, ``not_sent``, ``deadlines``, ``not_observed``,
+    ``heat``, ``stall`` and ``aborted``. Of ``fault``: ``sensor_range``, ``sensor_disagreement``, ``sensor_slope``,
+    ``travel`` and ``invalid_duty``. One thread at a time: a loop in another one passes requests on in
+    ``observe(request=...)``.
+
+    Examples
+    --------
+    >>> from mgdd.rig import SafetyGate
+    >>> gate = SafetyGate()
+    >>> well = {"good_frames": 1, "age_s": 0.0, "sensor_v": (1.5, 3.5), "angle_deg": 22.5}
+    >>> for _ in range(20):
+    ...     gate.observe(**well)
+    ...     drive = gate.command(0.1)
+    >>> gate.arm(), gate.run()
+    (None, None)
+    >>> for _ in range(300):
+    ...     gate.observe(**well)
+    ...     drive = gate.command(0.1)
+    >>> drive
+    Drive(duty=0.1, bridge_open=False, send=True)
+    >>> gate.observe(**well)
+    >>> gate.command(float("nan")), gate.mode, gate.reason
+    (Drive(duty=0.0, bridge_open=True, send=True), 'fault', 'invalid_duty')
+    >>> gate.reset()
+    Traceback (most recent call last):
+      ...
+    mgdd.errors.RigError: reset refused in mode 'fault': invalid_duty
+    """
+
+    def __init__(self, envelope: SafetyEnvelope | None = None) -> None:
+        self._envelope = SafetyEnvelope.load("etb") if envelope is None else envelope
+        self._core = _core.rig.SafetyGate(self._envelope)
+
+    def __reduce__(self) -> tuple[Any, ...]:
+        return _restored, (self._envelope, self.state)
+
+    @property
+    def envelope(self) -> SafetyEnvelope:
+        """The numbers that it keeps."""
+        return self._envelope
+
+    @property
+    def mode(self) -> str:
+        """``init``, ``armed``, ``run``, ``limp`` or ``fault``."""
+        return self._core.mode
+
+    @property
+    def reason(self) -> str:
+        """Why that mode was entered."""
+        return self._core.reason
+
+    @property
+    def cause(self) -> str:
+        """What is wrong now, ``none`` if nothing; arming, starting and a reset wait for its end."""
+        return self._core.cause
+
+    @property
+    def drive(self) -> Drive:
+        """The drive of the last cycle."""
+        return self._core.drive
+
+    @property
+    def rms_duty(self) -> float:
+        """RMS duty of the heat model [-]."""
+        return self._core.rms_duty
+
+    @property
+    def cycle(self) -> int:
+        """Cycles so far, missed ones included."""
+        return self._core.cycle
+
+    @property
+    def counts(self) -> dict[str, int]:
+        """Duties so far that were ``clamped`` or ``slewed``, ``dropped`` changes, and changes of mode by reason."""
+        core = self._core
+        own = {"clamped": core.clamped, "slewed": core.slewed, "dropped": core.dropped}
+        return own | {name: core.count(name) for name in _core.rig.safety_reasons if core.count(name)}
+
+    @property
+    def state(self) -> dict[str, list[float]]:
+        """What a run needs to go on bit for bit, the waiting changes included; setting it restores the run."""
+        return self._core.state
+
+    @state.setter
+    def state(self, saved: Mapping[str, Sequence[float]]) -> None:
+        self._core.state = {name: list(values) for name, values in saved.items()}
+
+    def observe(
+        self,
+        *,
+        good_frames: int = 0,
+        bad_frames: int = 0,
+        age_s: float | None = None,
+        sensor_v: tuple[float, float] | None = None,
+        angle_deg: float | None = None,
+        bus: str = "active",
+        sent: bool = True,
+        missed_deadlines: int = 0,
+        request: str = "none",
+    ) -> None:
+        """Take what is known of this cycle, before the controller runs.
+
+        Parameters
+        ----------
+        good_frames, bad_frames : int
+            Frames that arrived since the last cycle and passed or failed their checks, >= 0.
+        age_s : float, optional
+            Age of the last good one [s]; it grows by a cycle if left out.
+        sensor_v : pair of float, optional
+            Both position sensors [V]; looked at where a good frame arrived.
+        angle_deg : float, optional
+            Angle of the plate [deg]; the same.
+        bus : {"active", "warning", "passive", "off"}
+            Error state of the CAN controller.
+        sent : bool
+            Whether the last command left.
+        missed_deadlines : int
+            Since the last cycle, >= 0.
+        request : {"none", "arm", "run", "stop", "disarm", "reset", "abort"}
+            What the operator asks for, after all checks of the cycle; ignored where it is refused.
+
+        Raises
+        ------
+        mgdd.errors.ParameterError
+            A negative count, an unknown name.
+        """
+        self._core.observe(
+            good_frames=good_frames,
+            bad_frames=bad_frames,
+            age_s=age_s,
+            sensor_v=sensor_v,
+            angle_deg=angle_deg,
+            bus=bus,
+            sent=sent,
+            missed_deadlines=missed_deadlines,
+            request=request,
+        )
+
+    def command(self, duty: float) -> Drive:
+        """Give the drive that may leave in this cycle.
+
+        Parameters
+        ----------
+        duty : float
+            What the controller asks for [-]; NaN is a fault of the controller.
+
+        Returns
+        -------
+        Drive
+            Limited, or open. Without `observe` before it: open, and ``limp``.
+        """
+        return self._core.command(duty)
+
+    def arm(self) -> None:
+        """Go from ``init`` to ``armed``; RigError where something stands against it."""
+        self._request("arm")
+
+    def run(self) -> None:
+        """Go from ``armed`` to ``run``; RigError where something stands against it."""
+        self._request("run")
+
+    def stop(self) -> None:
+        """Go from ``run`` to ``armed``; RigError in another mode."""
+        self._request("stop")
+
+    def disarm(self) -> None:
+        """Go from ``armed`` or ``run`` to ``init``; RigError in another mode."""
+        self._request("disarm")
+
+    def reset(self) -> None:
+        """Go from ``limp`` to ``armed`` or from ``fault`` to ``init``; RigError while the cause stands."""
+        self._request("reset")
+
+    def abort(self) -> None:
+        """Go from ``armed`` or ``run`` to ``limp``; never refused."""
+        self._request("abort")
+
+    def _request(self, name: str) -> None:
+        against = self._core.request(name)
+        if against != "none":
+            raise RigError(f"{name} refused in mode {self.mode!r}: {against}")
+
+    def drain(self) -> list[SafetyChange]:
+        """Take the waiting changes of mode out of the audit list.
+
+        Returns
+        -------
+        list of SafetyChange
+            Oldest first. The list holds 64; ``counts["dropped"]`` found no room.
+        """
+        return [SafetyChange(*entry) for entry in self._core.drain()]
+
+    def __enter__(self) -> Self:
+        return self
+
+    def __exit__(
+        self, kind: type[BaseException] | None, error: BaseException | None, trace: TracebackType | None, /
+    ) -> None:
+        if error is not None:
+            self.abort()
+        elif self.mode in ("armed", "run"):
+            self.disarm()
+
+
+def _restored(envelope: SafetyEnvelope, state: Mapping[str, Sequence[float]]) -> SafetyGate:
+    gate = SafetyGate(envelope)
+    gate.state = dict(state)
+    return gate

@@ -1,0 +1,36 @@
+"""A real-time loop of a throttle that waits for a busy machine, and how a test waits for it."""
+
+from __future__ import annotations
+
+import time
+from collections.abc import Callable
+from typing import Any
+
+from mgdd.control import Pid
+from mgdd.rig import RealtimeLoop, RingTransport
+from throttle_node import COMMAND, MEASUREMENTS, PERIOD_S, patient_envelope
+
+
+def make_loop(transport: RingTransport, controller: Any = None, **changes: Any) -> RealtimeLoop:
+    settings: dict[str, Any] = {
+        "command": COMMAND,
+        "measurements": MEASUREMENTS,
+        "envelope": patient_envelope(),
+        "realtime": False,
+        "lock_memory": False,
+    }
+    return RealtimeLoop(controller or Pid(sample_s=PERIOD_S), transport, **{**settings, **changes})
+
+
+def becomes(condition: Callable[[], bool], within_s: float = 20.0) -> bool:
+    until = time.monotonic() + within_s
+    while not condition():
+        if time.monotonic() > until:
+            return False
+        time.sleep(0.005)
+    return True
+
+
+def go(loop: RealtimeLoop) -> None:
+    loop.arm(20.0)
+    loop.drive(20.0)

@@ -1,0 +1,142 @@
+"""A throttle at 1 kHz behind a safety gate, and the hazards of a rig with what must follow from each."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Callable, Mapping
+from dataclasses import dataclass, field
+from typing import Any
+
+from mgdd.control import Pid
+from mgdd.loop import ThrottleFault, VirtualThrottle
+from mgdd.rig import SafetyEnvelope, SafetyGate
+from mgdd.rig.gated import facts_of
+from mgdd.throttle import SensorFault
+
+ONSET, OVER = 600, 1500  # samples: the hazard sets in, and ends
+LIMP_HOME_DEG = 8.0
+GONE = {"good_frames": 0, "age_s": None, "sensor_v": None, "angle_deg": None}
+Facts = Mapping[str, Any]
+
+
+def at(value: Any, k: int) -> Any:
+    """Give what holds `k` samples after the onset."""
+    return value(k) if callable(value) else value
+
+
+@dataclass(frozen=True, kw_only=True)
+class Hazard:
+    """What goes wrong from ONSET to OVER, and the gate's answer."""
+
+    mode: str
+    reason: str
+    within: int  # samples from the onset to the open bridge; the gate sees a fault of the plate one later
+    faults: tuple[ThrottleFault | SensorFault, ...] = ()
+    facts: Facts | Callable[[int], Facts] = field(default_factory=dict)  # over those of the plant
+    duty: float | Callable[[int], float] | None = None  # in place of the controller's
+    reference_deg: float | Callable[[int], float] = 40.0
+    changes: Mapping[str, float] = field(default_factory=dict)  # of the envelope
+    returns: bool = True  # the plate to limp-home
+
+
+def lasting(kind: str, size: float | None = None) -> tuple[ThrottleFault]:
+    return (ThrottleFault(kind=kind, from_s=1e-3 * ONSET, until_s=1e-3 * OVER, size=size),)
+
+
+def of_sensor(kind: str, sensor: int, size: float = 0.0) -> tuple[SensorFault]:
+    return (SensorFault(kind=kind, sensor=sensor, from_s=1e-3 * ONSET, until_s=1e-3 * OVER, size=size),)
+
+
+HAZARDS = {
+    "lost measurement": Hazard(mode="limp", reason="stale", within=6, faults=lasting("missing_sample")),
+    "late measurement": Hazard(mode="limp", reason="stale", within=6, faults=lasting("stale_sample")),
+    "frozen sender": Hazard(mode="limp", reason="stale", within=5, facts=GONE),
+    "corrupted frames": Hazard(mode="limp", reason="bad_frames", within=3, facts={**GONE, "bad_frames": 1}),
+    "foreign frames between good ones": Hazard(mode="limp", reason="bad_frames", within=1, facts={"bad_frames": 3}),
+    "sensors disagree": Hazard(
+        mode="fault", reason="sensor_disagreement", within=6, faults=of_sensor("offset", 2, 0.3)
+    ),
+    "sensor wire open": Hazard(mode="fault", reason="sensor_range", within=6, faults=of_sensor("open_wire", 1)),
+    "sensor shorted to supply": Hazard(
+        mode="fault", reason="sensor_range", within=7, faults=of_sensor("short_to_supply", 2)
+    ),
+    "measurement not a number": Hazard(mode="fault", reason="sensor_range", within=5, faults=lasting("nan_sample")),
+    "sensors jump": Hazard(
+        mode="fault",
+        reason="sensor_slope",
+        within=4,
+        facts=lambda k: {"sensor_v": (4.5, 0.5) if k % 2 else (0.5, 4.5), "angle_deg": 40.0},
+    ),
+    "plate beyond its travel": Hazard(mode="fault", reason="travel", within=4, facts={"angle_deg": 97.0}),
+    "controller gives NaN": Hazard(mode="fault", reason="invalid_duty", within=1, duty=math.nan),
+    "controller gives infinity": Hazard(mode="fault", reason="invalid_duty", within=1, duty=-math.inf),
+    "actuator overload, plate jammed": Hazard(
+        mode="limp",
+        reason="stall",
+        within=700,
+        faults=lasting("jammed"),
+        reference_deg=lambda k: 40.0 if k < 0 else 85.0,
+        returns=False,
+    ),
+    "actuator overload, duty too high for too long": Hazard(
+        mode="limp",
+        reason="heat",
+        within=600,
+        duty=lambda k: 0.75 if k // 30 % 2 else -0.75,
+        changes={"heat_time_constant_s": 0.5, "slew_per_s": 1e4},
+    ),
+    "bus error passive": Hazard(mode="limp", reason="bus_fault", within=1, facts={"bus": "passive"}),
+    "bus off": Hazard(mode="limp", reason="bus_fault", within=1, facts={**GONE, "bus": "off", "sent": False}),
+    "commands do not leave": Hazard(mode="limp", reason="not_sent", within=3, facts={"sent": False}),
+    "deadlines missed": Hazard(mode="limp", reason="deadlines", within=3, facts={"missed_deadlines": 1}),
+    "host hung for a while": Hazard(mode="limp", reason="deadlines", within=1, facts={"missed_deadlines": 50}),
+    "exception or signal in the host": Hazard(mode="limp", reason="aborted", within=1, facts={"request": "abort"}),
+}
+
+
+class Loop:
+    """Controller, gate and throttle, sample by sample."""
+
+    def __init__(self, hazard: Hazard, *, node: bool = False) -> None:
+        self.hazard = hazard
+        name = "etb_node" if node else "etb"
+        self.gate = SafetyGate(SafetyEnvelope.load(name).replace(cycle_s=1e-3, **hazard.changes))
+        self.plant = VirtualThrottle(inputs=("duty", "bridge_open"), faults=hazard.faults, seed=5)
+        self.controller = Pid()
+        self.values: Mapping[str, float] | None = None
+        self.k = 0
+
+    def step(self) -> None:
+        """Run one sample; the hazard acts on what the gate is told and on the duty."""
+        after = self.k - ONSET
+        acts = ONSET <= self.k < OVER
+        facts = facts_of(self.values, 1e-3) | dict(at(self.hazard.facts, after) if acts else {})
+        self.gate.observe(**facts)
+        measured = math.nan if self.values is None else self.values["sensed_angle_deg"]
+        asked = self.controller.step(at(self.hazard.reference_deg, after), measured)
+        forced = acts and self.hazard.duty is not None
+        drive = self.gate.command(at(self.hazard.duty, after) if forced else asked)
+        assert drive.bridge_open == (self.gate.mode != "run")
+        assert drive.duty == 0.0 or not drive.bridge_open
+        self.plant.apply({"duty": drive.duty, "bridge_open": float(drive.bridge_open)})
+        self.values = self.plant.measure().values
+        self.k += 1
+
+    def until(self, k: int) -> None:
+        while self.k < k:
+            self.step()
+
+    def started(self) -> Loop:
+        """Give the loop with the plate at its reference, one sample before the onset."""
+        self.until(60)
+        self.gate.arm()
+        self.gate.run()
+        self.until(ONSET)
+        self.gate.drain()
+        return self
+
+    @property
+    def angle_deg(self) -> float:
+        """Where the plate really is."""
+        assert self.values is not None
+        return self.values["angle_deg"]

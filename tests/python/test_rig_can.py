@@ -1,0 +1,281 @@
+"""A rig over a bus: modes, who is there, arming and leaving."""
+
+from __future__ import annotations
+
+import io
+import math
+import os
+import signal
+import threading
+import time
+from collections.abc import Iterator
+from pathlib import Path
+
+import pytest
+
+from bus_node import ETB, LONG_S, commands, is_safe, node, rig_on
+from mgdd.errors import ParameterError, RigError
+from mgdd.loop import VirtualThrottle
+from mgdd.rig import CanRig, CanTransport, SignalMap
+from mgdd.rig.can.link import Sender
+from mgdd.rig.can.modes import RigMode, key_line
+
+
+@pytest.fixture(autouse=True)
+def no_thread_is_left() -> Iterator[None]:
+    before = set(threading.enumerate())
+    yield
+    assert set(threading.enumerate()) - before == set()
+
+
+# --- modes --------------------------------------------------------------------------------------------------
+
+
+def test_nothing_is_sent_because_an_argument_was_forgotten() -> None:
+    with CanTransport("virtual", "forgotten") as spy:
+        with pytest.raises(ParameterError, match="mode = 'simulate': must be said for a bus: 'hil'"):
+            CanRig("etb", "virtual:forgotten")
+        with pytest.raises(ParameterError, match="plant = None: must be given for mode='simulate'"):
+            CanRig("etb")
+        with pytest.raises(ParameterError, match="mode = 'hil': must have a bus, and no plant"):
+            CanRig("etb", plant=VirtualThrottle(), mode="hil")
+        with pytest.raises(ParameterError, match="mode = 'real': must be one of simulate, hil, dry_run, replay, bench"):
+            CanRig("etb", "virtual:forgotten", mode="real")
+        with pytest.raises(ParameterError, match="timeout_s = 0: must be > 0 s"):
+            CanRig("etb", "virtual:forgotten", mode="hil", timeout_s=0.0)
+        assert spy.receive(0.0) is None
+
+
+def test_the_bench_needs_a_person_or_a_key(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    key = tmp_path / "bench.key"
+    with CanTransport("virtual", "bench") as spy, node("bench"):
+        for arm, file, text in [
+            (False, key, "mode = 'bench' drives real hardware: give arm=True"),
+            (True, key, "no such key file: write the line 'arm etb.dbc "),
+            (True, None, "without a terminal to confirm in: give a key_file"),
+        ]:
+            monkeypatch.setattr("sys.stdin", io.StringIO())
+            with pytest.raises(RigError, match=text):
+                rig_on("bench", "bench", arm=arm, key_file=file).open()
+        key.write_text("arm etb.dbc 000000000000\n", encoding="utf-8")
+        with pytest.raises(RigError, match="holds no key of this DBC"):
+            rig_on("bench", "bench", arm=True, key_file=key).open()
+        assert commands(spy) == []
+        key.write_text(key_line(ETB) + "\n", encoding="utf-8")
+        with rig_on("bench", "bench", arm=True, key_file=key) as rig:
+            rig.apply({"duty": 0.2})
+            assert rig.measure().applied == {"duty": pytest.approx(0.2)}
+        assert rig.mode is RigMode.BENCH
+
+
+class Terminal:
+    """A person at a keyboard."""
+
+    def __init__(self, said: str) -> None:
+        self.said = said
+
+    def isatty(self) -> bool:
+        return True
+
+    def readline(self) -> str:
+        return self.said + "\n"
+
+
+def test_a_person_confirms_by_a_word(monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]) -> None:
+    with node("person"):
+        monkeypatch.setattr("sys.stdin", Terminal("yes"))
+        with pytest.raises(RigError, match="not confirmed: nothing was sent"):
+            rig_on("person", "bench", arm=True).open()
+        monkeypatch.setattr("sys.stdin", Terminal("ARM"))
+        with rig_on("person", "bench", arm=True) as rig:
+            assert rig.state == "armed"
+    assert "virtual:person will be driven with etb.toml" in capsys.readouterr().err
+
+
+def test_a_dry_run_receives_and_sends_nothing() -> None:
+    with CanTransport("virtual", "dry") as spy, node("dry", step=False) as core:
+        with rig_on("dry", "dry_run") as rig:
+            for _ in range(3):
+                rig.apply({"duty": 0.8})
+                measured = rig.measure()
+            assert 5.0 < measured.values["sensed_angle_deg"] < 12.0
+            assert measured.applied == {"duty": 0.0}
+        assert commands(spy) == []
+        assert core.state == "init"
+
+
+# --- leaving ------------------------------------------------------------------------------------------------
+
+
+@pytest.mark.parametrize("way", ["end", "error", "nan", "exit"])
+def test_leaving_sends_five_safe_frames_and_then_nothing(way: str) -> None:
+    with CanTransport("virtual", "leave") as spy, node("leave") as core:
+        raised: type[BaseException] = {"error": ZeroDivisionError, "nan": ParameterError, "exit": SystemExit}.get(
+            way, RuntimeError
+        )
+        try:
+            with rig_on("leave") as rig:
+                for _ in range(4):
+                    rig.apply({"duty": 0.7})
+                    rig.measure()
+                if way == "error":
+                    raise ZeroDivisionError
+                if way == "nan":
+                    rig.apply({"duty": math.nan})
+                if way == "exit":
+                    raise SystemExit
+        except raised:
+            assert way != "end"
+        sent = commands(spy)
+        assert not any(map(is_safe, sent[-9:-5]))
+        assert all(map(is_safe, sent[-5:]))
+        assert all(map(is_safe, sent[:-9]))  # those that armed it
+        assert len(sent) >= 3 + 4 + 5  # a slow answer is asked for again
+        until = time.monotonic() + LONG_S
+        while core.state != "armed" and time.monotonic() < until:
+            time.sleep(0.005)
+        assert core.state == "armed"
+
+
+def drive_until_killed(number: signal.Signals) -> None:
+    with rig_on("signal") as rig:
+        rig.apply({"duty": 0.7})
+        os.kill(os.getpid(), number)
+        time.sleep(LONG_S)
+
+
+@pytest.mark.parametrize(("number", "raised"), [(signal.SIGINT, KeyboardInterrupt), (signal.SIGTERM, SystemExit)])
+def test_signals_leave_by_the_exit(number: signal.Signals, raised: type[BaseException]) -> None:
+    before = signal.signal(number, signal.SIG_IGN)  # as a shell leaves SIGINT to its background jobs
+    try:
+        with CanTransport("virtual", "signal") as spy, node("signal"):
+            with pytest.raises(raised):
+                drive_until_killed(number)
+            assert all(map(is_safe, commands(spy)[-5:]))
+        assert signal.getsignal(number) is signal.SIG_IGN
+    finally:
+        signal.signal(number, before)
+
+
+def test_a_dead_bus_does_not_hide_why_it_was_left(monkeypatch: pytest.MonkeyPatch) -> None:
+    def refuse(*_: object, **__: object) -> None:
+        raise RigError("gone")
+
+    def lose_the_bus() -> None:
+        with rig_on("dead") as rig:
+            rig.apply({"duty": 0.7})
+            monkeypatch.setattr(rig.bus, "send", refuse)
+            raise ZeroDivisionError
+
+    with node("dead"), pytest.raises(ZeroDivisionError):
+        lose_the_bus()
+
+
+# --- who is there -------------------------------------------------------------------------------------------
+
+
+def test_a_bus_without_peers_is_named_and_left() -> None:
+    begin = time.monotonic()
+    rig = CanRig(ETB, "virtual:empty", mode="hil", timeout_s=0.05)
+    with pytest.raises(RigError, match=r"virtual:empty: within 1 s no frame ETB_Status \(0x121\) came; .*seen: none"):
+        rig.open()
+    assert time.monotonic() - begin < 30.0
+    with pytest.raises(RigError, match="not open"):
+        rig.apply({"duty": 0.0})
+
+
+def test_a_node_of_another_dbc_is_told_by_what_it_sends() -> None:
+    with node("other", step=False, signal_map=SignalMap.load("engine")):
+        rig = CanRig(ETB, "virtual:other", mode="hil", timeout_s=0.05)
+        with pytest.raises(RigError, match=r"no frame ETB_Status .*identifiers seen: 0x210, 0x211"):
+            rig.open()
+
+
+def test_a_node_with_another_data_identifier_has_no_valid_frame(tmp_path: Path) -> None:
+    (tmp_path / "etb.dbc").write_bytes(ETB.dbc.file.read_bytes())
+    file = tmp_path / "etb.toml"
+    file.write_text(
+        ETB.file.read_text(encoding="utf-8").replace("data_id = 0x121", "data_id = 0x999"), encoding="utf-8"
+    )
+    with node("crc", step=False, signal_map=SignalMap.load(file)):
+        rig = CanRig(ETB, "virtual:crc", mode="hil", timeout_s=0.05)
+        with pytest.raises(RigError, match=r"frames ETB_Status \(0x121\) came, too few of them valid .*wrong_crc"):
+            rig.open()
+
+
+def test_two_nodes_with_the_identifier_of_the_measurement() -> None:
+    stop = threading.Event()
+    status = ETB.measurements["ETB_Status"]
+
+    def report(bus: CanTransport) -> None:
+        one, other = Sender(), Sender()
+        other.frames(status, [bytes(8)] * 7)  # it was switched on earlier
+        while not stop.wait(0.004):
+            for sender in (one, other):
+                for frame in sender.frames(status, [bytes(8)]):
+                    bus.send(frame)
+
+    with CanTransport("virtual", "twins") as bus, CanTransport("virtual", "twins") as spy:
+        busy = threading.Thread(target=report, args=(bus,))
+        busy.start()
+        try:
+            with pytest.raises(RigError, match=r"alive counter of ETB_Status \(0x121\) jumps .*two nodes send it"):
+                rig_on("twins").open()
+        finally:
+            stop.set()
+            busy.join()
+        assert commands(spy) == []
+
+
+def test_another_host_is_found_before_anything_is_sent() -> None:
+    stop = threading.Event()
+    with CanTransport("virtual", "hosts") as other, CanTransport("virtual", "hosts") as spy, node("hosts"):
+        sender = Sender()
+        command = ETB.commands["ETB_Cmd"]
+
+        def drive() -> None:
+            while not stop.wait(0.004):
+                for frame in sender.frames(command, command.payloads({"duty": 0.1}, command.driven)):
+                    other.send(frame)
+
+        busy = threading.Thread(target=drive)
+        busy.start()
+        rig = rig_on("hosts")
+        try:
+            with pytest.raises(
+                RigError, match="frame 0x120 arrived, which this host sends: two nodes have one identifier"
+            ):
+                rig.open()
+        finally:
+            stop.set()
+            busy.join()
+        assert not any(map(is_safe, commands(spy)))
+        assert rig.counters["commands"] == 0
+
+
+# --- a node that let go --------------------------------------------------------------------------------------
+
+
+def measure_all(rig: CanRig, times: int) -> None:
+    for _ in range(times):
+        rig.measure()
+
+
+def test_a_late_command_is_seen_over_the_bus_and_arming_mends_it() -> None:
+    with node("late", step=False), rig_on("late") as rig:
+        tried = 0
+        while True:  # on a machine that stops for 20 ms the node lets go, and is armed again
+            tried += 1
+            rig.apply({"duty": 0.5})
+            time.sleep(0.1)
+            rig.bus.receive(0.0)
+            with pytest.raises(RigError, match="node is in state 'limp' and does not drive; look for the cause"):
+                measure_all(rig, 3)
+            rig.arm()
+            rig.apply({"duty": 0.5})
+            try:
+                assert "sensed_angle_deg" in rig.measure().values
+            except RigError:
+                assert tried < 10
+                continue
+            break

@@ -1,0 +1,195 @@
+"""A node behind a bus trusts nobody: frames and time by hand."""
+
+from __future__ import annotations
+
+import math
+
+import pytest
+
+from bus_node import ETB
+from mgdd._core.rig import Frame
+from mgdd.errors import ParameterError
+from mgdd.loop import EngineBench, VirtualThrottle
+from mgdd.rig import SignalMap
+from mgdd.rig.can.frame import changed
+from mgdd.rig.can.inbox import Inbox
+from mgdd.rig.can.link import Sender
+from mgdd.rig.can.node import node_of
+from mgdd.rig.can.node_core import NodeCore, node_plant
+
+
+class Host:
+    """The host of a core without a bus: frames and time by hand."""
+
+    def __init__(self, core: NodeCore) -> None:
+        self.core, self.sender, self.now_ns = core, Sender(), 10**9
+        self.command = ETB.commands["ETB_Cmd"]
+
+    def frame(self, duty: float | None) -> Frame:
+        """A command with this duty, or a safe one."""
+        payloads = (
+            self.command.payloads({}, self.command.safe)
+            if duty is None
+            else self.command.payloads({"duty": duty}, self.command.driven)
+        )
+        (frame,) = self.sender.frames(self.command, payloads)
+        return changed(frame, monotonic_ns=self.now_ns)
+
+    def send(self, duty: float | None, times: int = 1) -> None:
+        for _ in range(times):
+            self.core.take(self.frame(duty))
+            self.wait(0.005)
+
+    def wait(self, seconds: float) -> None:
+        self.now_ns += round(seconds * 1e9)
+        self.core.watch(self.now_ns)
+
+
+@pytest.fixture
+def host() -> Host:
+    return Host(NodeCore(node_of(ETB, seed=1), ETB))
+
+
+def test_a_node_has_to_be_armed_before_it_is_driven(host: Host) -> None:
+    host.send(0.5, 20)
+    assert host.core.state == "init"
+    host.send(None, 2)
+    assert host.core.state == "init"
+    host.send(0.5)
+    host.send(None, 3)
+    assert host.core.state == "armed"
+    host.send(0.5)
+    assert host.core.state == "run"
+    host.send(None)
+    assert host.core.state == "armed"
+
+
+def running(host: Host) -> None:
+    host.send(None, 5)
+    host.send(0.5, 3)
+    assert host.core.state == "run"
+
+
+def test_a_late_command_opens_the_bridge_and_only_arming_closes_it(host: Host) -> None:
+    running(host)
+    host.wait(0.014)
+    assert host.core.state == "run"
+    host.wait(0.007)  # 5 + 14 + 7 ms after the last one, with a limit of 20 ms
+    assert (host.core.state, host.core.reasons) == ("limp", {"command_timeout": 1})
+    host.send(0.5, 50)
+    assert host.core.state == "limp"
+    running(host)
+
+
+def test_broken_commands_are_ignored_and_three_of_them_open_the_bridge(host: Host) -> None:
+    running(host)
+    for _ in range(2):
+        bad = host.frame(0.9)
+        host.core.take(changed(bad, data=bad.data[:-1] + bytes([bad.data[-1] ^ 0x10])))
+        assert host.core.state == "run"
+    assert host.core._inputs == {"duty": 0.5}
+    host.send(0.4)  # one good frame between
+    for k in range(3):
+        bad = host.frame(0.9)
+        host.core.take(changed(bad, data=bytes([bad.data[0] ^ 1]) + bad.data[1:]))
+        assert host.core.state == ("limp" if k == 2 else "run")
+    assert host.core.reasons == {"wrong_crc": 1}
+
+
+def test_a_frozen_sender_is_not_one_that_lives(host: Host) -> None:
+    running(host)
+    frozen = host.frame(0.5)
+    host.core.take(frozen)
+    for _ in range(3):
+        host.wait(0.004)
+        host.core.take(changed(frozen, monotonic_ns=host.now_ns))
+    assert (host.core.state, host.core.reasons) == ("limp", {"wrong_counter": 1})
+
+
+def test_a_mode_that_the_node_does_not_have_is_not_driven_and_does_not_arm(host: Host) -> None:
+    def in_mode(name: str) -> Frame:
+        mode = host.command.message.signals["Mode"]
+        raws = {**host.command.driven, "Mode": mode.choices[name]}
+        (frame,) = host.sender.frames(host.command, host.command.payloads({"duty": 0.5}, raws))
+        return changed(frame, monotonic_ns=host.now_ns)
+
+    for _ in range(10):
+        host.core.take(in_mode("position"))
+    assert host.core.state == "init"
+    running(host)
+    host.core.take(in_mode("calib"))
+    assert not host.core.driven
+    host.send(0.5)
+    assert host.core.driven
+
+
+def test_what_came_too_long_ago_is_missing() -> None:
+    core = NodeCore(node_of(ETB, seed=1), ETB)
+    inbox = Inbox(ETB)
+    seen = []
+    for cycle in range(12):
+        for frame in core.sample():
+            if frame.id != 0x122 or cycle < 5:  # the sensors fall silent
+                inbox.take(frame)
+        if inbox.ready:
+            seen.append(inbox.read().values)
+    limit = 3  # cycles, as the map says nothing else
+    assert [math.isnan(values["first_v"]) for values in seen] == [False] * (3 + limit) + [True] * (7 - limit)
+    assert not any(math.isnan(values["sensed_angle_deg"]) for values in seen[1:])
+
+
+def test_foreign_and_short_frames_change_nothing(host: Host) -> None:
+    running(host)
+    good = host.frame(0.5)
+    assert not host.core.take(changed(good, id=0x121))
+    assert not host.core.take(changed(good, extended=True))
+    assert not host.core.take(changed(good, data=good.data[:7]))
+    assert host.core.state == "run"
+
+
+def test_in_steps_a_command_that_comes_twice_is_one_sample(host: Host) -> None:
+    running(host)
+    frame = host.frame(0.5)
+    assert host.core.take(frame)
+    host.core.answer()
+    assert not host.core.take(frame)
+
+
+def test_without_drive_the_plate_is_at_limp_home_and_an_engine_stands(host: Host) -> None:
+    running(host)
+    for _ in range(40):
+        host.send(0.5)
+        host.core.sample()
+    assert host.core.last is not None
+    assert host.core.last.values["angle_deg"] > 40.0
+    host.wait(0.1)
+    for _ in range(80):
+        host.core.sample()
+    assert host.core.last.values["angle_deg"] == pytest.approx(8.0, abs=1.0)
+    assert host.core.last.applied == {"duty": 0.0}
+    engine = node_plant(EngineBench())
+    assert engine.sample(None) == ({}, {})
+
+
+def test_a_node_needs_the_inputs_of_its_map_and_a_bridge_that_opens() -> None:
+    with pytest.raises(ParameterError, match="inputs of the map = 'soc_cad': must be those of the plant, duty"):
+        NodeCore(node_of(ETB), SignalMap.load("engine"))
+    with pytest.raises(ParameterError, match="with 'bridge_open': power off means an open bridge"):
+        node_plant(VirtualThrottle())
+    with pytest.raises(ParameterError, match=r"soi_cad.*those of a virtual throttle"):
+        node_of(SignalMap.load("surrogate"))
+    with pytest.raises(ParameterError, match="fault = 'offset:sensor=1': must be left out"):
+        node_of(SignalMap.load("engine"), faults=["offset:sensor=1"])
+    with pytest.raises(ParameterError, match="did you mean 'from_s'"):
+        node_of(ETB, faults=["jammed:form_s=1"])
+    with pytest.raises(ParameterError, match=r"with keys from_s, until_s, size, sensor$"):
+        node_of(ETB, faults=["jammed:x=1"])
+    with pytest.raises(ParameterError, match=r"fault offset: sensor = 'left': must be a number"):
+        node_of(ETB, faults=["offset:sensor=left"])
+
+
+def test_faults_of_the_plant_reach_the_host() -> None:
+    core = NodeCore(node_of(ETB, faults=["short_to_ground:sensor=2", "jammed_at:size=20"]), ETB)
+    values = [core.plant.sample({"duty": 0.6}).values for _ in range(40)][-1]
+    assert values["second_v"] == pytest.approx(0.0, abs=0.01)
+    assert values["angle_deg"] == pytest.approx(20.0, abs=0.5)

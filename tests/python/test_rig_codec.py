@@ -1,0 +1,177 @@
+"""Signals in the bits of a payload: the vectors of the C++ test, and cantools on random layouts."""
+
+from __future__ import annotations
+
+import math
+import struct
+
+import numpy as np
+import pytest
+from hypothesis import assume, given, settings
+from hypothesis import strategies as st
+
+from mgdd._core.rig import SignalLayout, check_message
+from mgdd.errors import ParameterError, ShapeError
+
+KNOWN = [  # by hand from the bit charts of the DBC convention; tests/cpp/rig/test_signal_codec.cpp holds the same list
+    ({"start": 0, "length": 16, "scale": 0.01}, 81.92, "0020"),
+    ({"start": 4, "length": 12}, 0xABC, "c0ab"),
+    ({"start": 3, "length": 12, "byte_order": "big_endian"}, 0xABC, "0abc"),
+    ({"start": 7, "length": 16, "byte_order": "big_endian", "raw_type": "signed"}, -2, "fffe"),
+    ({"start": 13, "length": 3, "byte_order": "big_endian"}, 5, "0028"),
+    ({"start": 6, "length": 12, "raw_type": "signed", "scale": 0.0005}, -1.0, "000c02"),
+    ({"start": 8, "length": 32, "raw_type": "float32"}, 1.5, "000000c03f"),
+    ({"start": 7, "length": 64, "byte_order": "big_endian", "raw_type": "float64"}, -2.0, "c0"),
+]
+
+
+@pytest.mark.parametrize(("layout", "value", "bytes_"), KNOWN)
+def test_known_bytes(layout: dict[str, object], value: float, bytes_: str) -> None:
+    signal = SignalLayout(**layout)
+    assert signal.pack(bytes(8), value, "refuse") == bytes.fromhex(bytes_).ljust(8, b"\0")
+    assert signal.unpack(bytes.fromhex(bytes_).ljust(8, b"\0")) == value
+
+
+@st.composite
+def layouts(draw: st.DrawFn) -> tuple[dict[str, object], int]:
+    """A signal that fits a message of 8 or 64 bytes, as keywords, and the size."""
+    size = draw(st.sampled_from([8, 64]))
+    raw_type = draw(st.sampled_from(["unsigned", "signed", "unsigned", "signed", "float32", "float64"]))
+    length = {"float32": 32, "float64": 64}.get(raw_type) or draw(st.integers(1, 64))
+    order = draw(st.sampled_from(["little_endian", "big_endian"]))
+    first = draw(st.integers(0, 8 * size - length))
+    start = first if order == "little_endian" else first // 8 * 8 + 7 - first % 8
+    scale = draw(st.sampled_from([1.0, 0.01, -0.25, 0.0005, 3.7]))
+    offset = draw(st.sampled_from([0.0, -40.0, 0.1]))
+    keywords = {"start": start, "length": length, "byte_order": order, "raw_type": raw_type}
+    return keywords | {"scale": scale, "offset": offset}, size
+
+
+def of_cantools(layout: dict[str, object], size: int):
+    database = pytest.importorskip("cantools.database")
+    conversion = pytest.importorskip("cantools.database.conversion").BaseConversion
+    signal = database.can.Signal(
+        "S",
+        layout["start"],
+        layout["length"],
+        byte_order=layout["byte_order"],
+        is_signed=layout["raw_type"] == "signed",
+        conversion=conversion.factory(layout["scale"], layout["offset"], is_float="float" in str(layout["raw_type"])),
+    )
+    return database.can.Message(1, "M", size, [signal], is_fd=size > 8, strict=True)
+
+
+def raw_bounds(layout: dict[str, object]) -> tuple[int, int]:
+    length = int(str(layout["length"]))
+    return (-(2 ** (length - 1)), 2 ** (length - 1) - 1) if layout["raw_type"] == "signed" else (0, 2**length - 1)
+
+
+def same(ours: float, theirs: float) -> bool:
+    """Equal; an integer of cantools beyond 2**53, which it scales without rounding, as near as a double can be."""
+    beyond = isinstance(theirs, int) and abs(theirs) >= 2**53
+    return math.isclose(ours, theirs, rel_tol=2**-52) if beyond else ours == theirs
+
+
+@settings(max_examples=600)
+@given(layouts(), st.data())
+def test_identical_to_cantools(drawn: tuple[dict[str, object], int], data: st.DataObject) -> None:
+    layout, size = drawn
+    ours, theirs = SignalLayout(**layout), of_cantools(layout, size)
+    noise = data.draw(st.binary(min_size=size, max_size=size))
+    if "float" in str(layout["raw_type"]):
+        raw = data.draw(st.floats(width=32 if layout["length"] == 32 else 64, allow_nan=False, allow_infinity=False))
+    else:
+        least, most = raw_bounds(layout)
+        raw = data.draw(st.sampled_from([least, most, 0]) | st.integers(least, most))
+    coded = theirs.encode({"S": raw}, scaling=False)
+    assert ours.pack_raw(bytes(size), raw) == coded
+    assert ours.unpack_raw(coded) == raw
+    assert same(ours.unpack(coded), theirs.decode(coded)["S"])
+    back, physical = ours.unpack_raw(noise), theirs.decode(noise)["S"]
+    if not math.isnan(physical):
+        assert back == theirs.decode(noise, scaling=False)["S"]
+        assert same(ours.unpack(noise), physical)
+        assert ours.unpack_column(np.frombuffer(noise + coded, np.uint8).reshape(2, size)).tolist() == [
+            ours.unpack(noise),
+            ours.unpack(coded),
+        ]
+    mask = ours.pack_raw(bytes(size), -1) if layout["raw_type"] == "signed" else None
+    if mask is not None:  # all ones: nothing beside the signal moves
+        kept = ours.pack_raw(noise, raw)
+        assert all((a ^ b) & ~m & 0xFF == 0 for a, b, m in zip(kept, noise, mask, strict=True))
+
+
+@settings(max_examples=600)
+@given(layouts(), st.data())
+def test_physical_values_are_coded_as_by_cantools(drawn: tuple[dict[str, object], int], data: st.DataObject) -> None:
+    layout, size = drawn
+    ours, theirs = SignalLayout(**layout), of_cantools(layout, size)
+    scale, offset = float(str(layout["scale"])), float(str(layout["offset"]))
+    if "float" in str(layout["raw_type"]):
+        value = data.draw(st.floats(-1e30, 1e30))
+    else:
+        least, most = (max(-(2**52), min(2**52, bound)) for bound in raw_bounds(layout))
+        value = data.draw(st.floats(least, most)) * scale + offset
+        assume(least <= round((value - offset) / scale) <= most)
+    assert ours.pack(bytes(size), value, "refuse") == theirs.encode({"S": value}, strict=False)
+
+
+@given(layouts(), st.floats(allow_nan=False, allow_infinity=False))
+def test_nothing_wraps(drawn: tuple[dict[str, object], int], value: float) -> None:
+    layout, size = drawn
+    assume("float" not in str(layout["raw_type"]))
+    ours = SignalLayout(**layout)
+    least, most = raw_bounds(layout)
+    exact = (value - ours.offset) / ours.scale
+    raw = ours.unpack_raw(ours.pack(bytes(size), value))
+    wanted = (most if exact > 0 else least) if math.isinf(exact) else min(max(round(exact), least), most)
+    assert raw == wanted
+
+
+def test_refused_values() -> None:
+    duty = SignalLayout(start=0, length=12, raw_type="signed", scale=0.0005, minimum=-1.0, maximum=1.0)
+    assert duty.unpack(duty.pack(bytes(8), 3.2)) == 1.0
+    with pytest.raises(ParameterError, match=r"value = 3.2: must be finite and >= -1 and <= 1 and fit the 12 bits"):
+        duty.pack(bytes(8), 3.2, "refuse")
+    for value in (math.nan, math.inf):
+        with pytest.raises(ParameterError, match="must be finite"):
+            duty.pack(bytes(8), value)
+    for raw in (2048, -2049, 2**64, -(2**63) - 1):
+        with pytest.raises(ParameterError, match="within the 12 bits"):
+            duty.pack_raw(bytes(8), raw)
+    with pytest.raises(ParameterError, match="a whole number"):
+        duty.pack_raw(bytes(8), 0.5)
+    with pytest.raises(ParameterError, match="out_of_range = 'wrap': must be one of clamp, refuse"):
+        duty.pack(bytes(8), 0.5, "wrap")
+    with pytest.raises(ShapeError, match="reaches beyond"):
+        duty.pack(bytes(1), 0.5)
+    with pytest.raises(ShapeError, match="reaches beyond"):
+        duty.unpack_column(np.zeros((2, 1), np.uint8))
+    with pytest.raises(ShapeError, match="1 dimensions"):
+        duty.unpack_column(np.zeros(8, np.uint8))
+
+
+def test_floats_of_64_bits_keep_every_bit() -> None:
+    value = struct.unpack("<d", bytes(range(1, 9)))[0]
+    layout = SignalLayout(start=0, length=64, raw_type="float64")
+    assert layout.pack(bytes(8), value) == bytes(range(1, 9))
+
+
+def test_a_message_is_checked() -> None:
+    theta, state = SignalLayout(start=0, length=16), SignalLayout(start=23, length=4, byte_order="big_endian")
+    check_message({"Theta": theta, "State": state}, 3)
+    with pytest.raises(ParameterError, match="signal State: its 4 bits from bit 23 reach beyond the 2 bytes") as error:
+        check_message({"Theta": theta, "State": state}, 2)
+    assert error.value.field == "State"
+    side = SignalLayout(start=15, length=1)
+    with pytest.raises(ParameterError, match="signal Theta: shares bits with signal Side"):
+        check_message({"Theta": theta, "Side": side}, 8)
+    check_message({"Theta": theta, "Side": side}, 8, {"Theta": [0], "Side": [1, 2]})
+
+
+def test_layouts_are_values() -> None:
+    layout = SignalLayout(start=3, length=9, byte_order="big_endian", raw_type="signed", scale=0.5, maximum=7.0)
+    assert SignalLayout(**layout.to_dict()) == layout
+    for wrong in ({"length": 65}, {"scale": 0.0}, {"offset": math.nan}, {"minimum": 8.0}, {"raw_type": "float32"}):
+        with pytest.raises(ParameterError):
+            SignalLayout(**{**layout.to_dict(), **wrong})

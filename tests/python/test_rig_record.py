@@ -1,0 +1,209 @@
+"""The record of a run: what comes back, what is refused, and a reader of its own."""
+
+from __future__ import annotations
+
+import json
+import struct
+import threading
+import time
+import zlib
+from collections.abc import Iterator
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
+
+from mgdd._core.rig import RecordReader
+from mgdd.errors import DataError, ParameterError, RigError, ShapeError
+from mgdd.results.labels import check_labels
+from mgdd.rig import Frame, Recorder, read_record, repair_record
+from recorded_rig import FRAMES, write
+
+
+def independent(path: Path) -> Iterator[tuple[Any, ...]]:
+    """Read a record with the standard library alone, as docs/rig_record.md says."""
+    data = path.read_bytes()
+    magic, version, length, run_id, wall_ns, monotonic_ns = struct.unpack_from("<8sII16sqq", data)
+    assert (magic, version) == (b"\x89MREC\r\n\x1a", 1)
+    at = 48 + length + 4
+    assert zlib.crc32(data[: at - 4]) == struct.unpack_from("<I", data, at - 4)[0]
+    yield "header", run_id, wall_ns, monotonic_ns, json.loads(data[48 : 48 + length])
+    while at + 8 <= len(data):
+        length, crc = struct.unpack_from("<II", data, at)
+        body = data[at + 8 : at + 8 + length]
+        if length < 16 or len(body) < length or zlib.crc32(body) != crc:
+            break
+        at += 8 + length
+        kind, flags, small, word, stamp = struct.unpack_from("<BBHIq", body)
+        if kind == 1:
+            yield "frame", flags, small & 255, small >> 8, word, stamp, struct.unpack_from("<q", body, 16)[0], body[24:]
+        elif kind == 2:
+            names, place = [], 16
+            for _ in range(word + 1):
+                size = struct.unpack_from("<H", body, place)[0]
+                names.append(body[place + 2 : place + 2 + size].decode())
+                place += 2 + size
+            yield "columns", small, stamp, names
+        elif kind == 3:
+            yield "sample", small, stamp, struct.unpack_from(f"<{word}d", body, 16)
+        elif kind == 4:
+            yield "event", stamp, body[16 : 16 + small].decode(), body[16 + small :].decode()
+    yield "ignored", len(data) - at
+
+
+def test_a_reader_of_its_own_finds_the_same(tmp_path: Path) -> None:
+    path = tmp_path / "run.rec"
+    record = write(path)
+    assert record.written == 11
+    header, *bodies = independent(path)
+    assert header[1].hex() == record.run_id
+    assert abs(header[2] - time.time_ns()) < 60e9
+    assert abs(header[3] - time.monotonic_ns()) < 60e9
+    assert header[4]["config"] == {"rig": "Prüfstand", "gain": 2.5}
+    assert bodies[0] == ("frame", 0, 0, 8, 0x120, 5_000_000_000, 1_700_000_000_000_000_123, bytes(range(8)))
+    assert bodies[1] == ("frame", 0b101, 3, 0, 0x1ABCDEF0, -7, 0, b"")
+    assert bodies[2][1:5] == (0b11100, 0, 48, 0x7FF)
+    assert bodies[3][1] == 0b110
+    assert bodies[4] == ("frame", 0b100000, 0, 4, 0x121, 0, 0, b"")
+    assert bodies[5][::3] == ("columns", ["controller", "angle_deg", "duty"])
+    assert bodies[6] == ("sample", 0, 1_000, (10.25, -0.5))
+    assert bodies[7][3][0] == 11.5
+    assert bodies[8][::3] == ("columns", ["engine", "speed_rpm"])
+    assert bodies[9:] == [("sample", 1, 1_500, (1200.0,)), ("event", 3_000, "state", "ARMED → RUN"), ("ignored", 0)]
+
+
+def test_frames_come_back_as_they_were(tmp_path: Path) -> None:
+    write(tmp_path / "run.rec")
+    reader = RecordReader(str(tmp_path / "run.rec"))
+    records = list(reader)
+    assert records[:5] == FRAMES
+    assert records[5] == ("sample", 1_000, "controller", {"angle_deg": 10.25, "duty": -0.5})
+    assert records[-1] == ("event", 3_000, "state", "ARMED → RUN")
+    assert (reader.ignored_bytes, reader.incomplete) == (0, False)
+
+
+def test_datasets(tmp_path: Path) -> None:
+    write(tmp_path / "run.rec")
+    run = read_record(tmp_path / "run.rec")
+    for data in (run.frames, run.events, *run.samples.values()):
+        check_labels(data)
+    assert run.config == {"rig": "Prüfstand", "gain": 2.5}
+    assert run.samples.keys() == {"controller", "engine"}
+    plate = run.samples["controller"]
+    assert plate["angle_deg"].values.tolist() == [10.25, 11.5]
+    assert plate["angle_deg"].attrs["units"] == "degree"
+    assert plate["duty"].values[0] == -0.5
+    assert np.isnan(plate["duty"].values[1])
+    start = run.header["monotonic_ns"]
+    assert plate["time_s"].values.tolist() == [(1_000 - start) * 1e-9, (2_000 - start) * 1e-9]
+    assert run.samples["engine"]["speed_rpm"].attrs["units"] == "rpm"
+    assert run.frames["id"].values.tolist() == [frame.id for frame in FRAMES]
+    assert run.frames["data"].shape == (5, 48)
+    assert run.frames["data"].dtype == np.uint8
+    assert run.frames["data"].values[2].tolist() == list(range(200, 248))
+    assert run.frames["received"].values.tolist() == [False, True, True, True, False]
+    assert run.frames["bus_time_s"].values[0] == 0.0
+    assert np.isnan(run.frames["bus_time_s"].values[1])
+    assert run.frames.attrs["bus_start_ns"] == "1700000000000000123"
+    assert run.events["text"].values.tolist() == ["ARMED → RUN"]
+    assert (run.records, run.unknown, run.damaged_bytes, run.ignored_bytes) == (11, 0, 0, 0)
+    assert run.summary().splitlines()[1:] == [
+        "5 frames, 1 events", "table controller: 2 samples of 2", "table engine: 1 samples of 1",
+    ]  # fmt: skip
+
+
+def test_an_empty_record(tmp_path: Path) -> None:
+    Recorder(tmp_path / "run.rec").close()
+    run = read_record(tmp_path / "run.rec")
+    assert (run.frames.sizes["frame"], run.events.sizes["event"], run.samples) == (0, 0, {})
+    assert run.started.tzinfo is not None
+
+
+@settings(max_examples=50)
+@given(st.dictionaries(st.text(min_size=1, max_size=20), st.floats(), min_size=1, max_size=5), st.text(max_size=50))
+def test_any_names_numbers_and_words(
+    tmp_path_factory: pytest.TempPathFactory, row: dict[str, float], text: str
+) -> None:
+    path = tmp_path_factory.mktemp("any") / "run.rec"
+    if "time_s" in row or any("\ud800" <= letter <= "\udfff" for letter in text + "".join(row)):
+        return
+    with Recorder(path) as record:
+        record.sample("t", row, monotonic_ns=3)
+        record.event("note", text, monotonic_ns=4)
+    sample, event = RecordReader(str(path))
+    assert np.array(list(sample[3].values())).tobytes() == np.array(list(row.values())).tobytes()
+    assert list(sample[3]) == list(row)
+    assert event == ("event", 4, "note", text)
+    assert read_record(path).ignored_bytes == 0
+
+
+def test_refused_calls_change_nothing(tmp_path: Path) -> None:
+    path = tmp_path / "run.rec"
+    with Recorder(path) as record:
+        record.sample("plate", {"angle_deg": 1.0, "duty": 0.0})
+        size = path.stat().st_size
+        with pytest.raises(ParameterError, match="did you mean 'angle_deg'"):
+            record.sample("plate", {"angel_deg": 1.0, "duty": 0.0})
+        with pytest.raises(ParameterError, match="values = 'duty': must be given in every row of table plate"):
+            record.sample("plate", {"angle_deg": 1.0})
+        with pytest.raises(ParameterError, match="its own time_s"):
+            record.sample("other", {"time_s": 1.0})
+        with pytest.raises(ParameterError, match="angle_deg = 'wide': must be one number"):
+            record.sample("plate", {"angle_deg": "wide", "duty": 0.0})  # type: ignore[dict-item]
+        with pytest.raises(ParameterError, match="columns"):
+            record.sample("other", {})
+        with pytest.raises(ParameterError, match="category"):
+            record.event("", "text")
+        assert path.stat().st_size == size
+    with pytest.raises(RigError, match="the record is closed"):
+        record.event("note", "late")
+    with pytest.raises(RigError, match="never overwritten"):
+        Recorder(path)
+    with pytest.raises(RigError, match="make the folder first"):
+        Recorder(tmp_path / "no" / "run.rec")
+    with pytest.raises(FileNotFoundError, match=r"run\.rec"):
+        read_record(tmp_path / "run.rce")
+    (tmp_path / "text.rec").write_text("no record")
+    for refused in (read_record, repair_record):
+        with pytest.raises(DataError, match="not a record of mgdd"):
+            refused(tmp_path / "text.rec")
+
+
+def test_an_exception_stands_in_the_record(tmp_path: Path) -> None:
+    with pytest.raises(ZeroDivisionError), Recorder(tmp_path / "run.rec"):
+        _ = 1 / 0
+    assert read_record(tmp_path / "run.rec").events["text"].values.tolist() == ["ZeroDivisionError: division by zero"]
+
+
+def test_many_threads_write_whole_records(tmp_path: Path) -> None:
+    with Recorder(tmp_path / "run.rec") as record:
+
+        def work(name: str) -> None:
+            for i in range(200):
+                record.sample(name, {"i": i})
+                record.frame(Frame(id=i))
+
+        threads = [threading.Thread(target=work, args=(f"t{n}",)) for n in range(4)]
+        for thread in threads:
+            thread.start()
+        for thread in threads:
+            thread.join()
+    run = read_record(tmp_path / "run.rec")
+    assert run.ignored_bytes == 0
+    assert run.frames.sizes["frame"] == 800
+    for n in range(4):
+        assert run.samples[f"t{n}"]["i"].values.tolist() == list(range(200))
+
+
+def test_refused_frames() -> None:
+    with pytest.raises(ParameterError, match=r"id = 2048: must be in \[0, 2047\]"):
+        Frame(id=0x800)
+    with pytest.raises(ParameterError, match="id = 536870912"):
+        Frame(id=0x20000000, extended=True)
+    with pytest.raises(ShapeError, match="payload has 65 bytes: must be at most 64"):
+        Frame(id=1, data=bytes(65))
+    assert Frame(id=1, data=memoryview(bytes(range(8)))[::2]).data == bytes([0, 2, 4, 6])
+    assert Frame(**FRAMES[2].to_dict()) == FRAMES[2]
