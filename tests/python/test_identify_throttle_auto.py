@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 import sys
 from pathlib import Path
 from typing import Any
@@ -13,6 +14,7 @@ from mgdd.errors import ParameterError
 from mgdd.identify import FirstPrincipleModel, identify_throttle, load_throttle_model
 from mgdd.identify.throttle.block_losses import block_losses, certainly_less
 from mgdd.identify.throttle.delay_report import with_delay
+from mgdd.identify.throttle.hunt import noise_of
 from mgdd.io import throttle_log
 from mgdd.optimize import FitOptions, least_squares
 from mgdd.signals import amplitude_random_steps, chirp
@@ -109,6 +111,16 @@ def test_less_is_certain_by_twice_the_standard_error_over_blocks() -> None:
     assert not certainly_less(ours, ours)
     lucky = ours + np.array([0.0, 0.0, 0.05, 0.0, -0.001, 0.0, 0.0, 0.0])
     assert not certainly_less(ours, lucky)
+
+
+@pytest.mark.parametrize(("noise_deg", "step_deg"), [(0.02, 0.0), (0.02, 0.022), (0.047, 0.022), (0.031, 0.04)])
+def test_noise_is_told_from_motion_whatever_the_step_of_the_converter(noise_deg: float, step_deg: float) -> None:
+    rng = np.random.default_rng(5)
+    time = 1e-3 * np.arange(8000)
+    angle = 30.0 + 20.0 * np.sin(2.0 * np.pi * 4.0 * time) + noise_deg * rng.standard_normal(time.size)
+    angle[4000:] += 15.0  # a step that no second difference of noise explains
+    measured = np.round(angle / step_deg) * step_deg if step_deg else angle
+    assert noise_of(measured) == pytest.approx(math.hypot(noise_deg, step_deg / math.sqrt(12.0)), rel=0.05)
 
 
 def two_kinds_of_sides() -> PseudoWiener:

@@ -15,9 +15,11 @@ from mgdd.identify.throttle.first_principle_model import REFINEMENTS, FirstPrinc
 from mgdd.identify.throttle.first_principle_problem import Search, groups_problem
 from mgdd.identify.throttle.free_run import draw_free_run, free_run, quality_of, source_of
 from mgdd.identify.throttle.hunt import (
+    AT_NOISE,
     BRISTLES,
     FINE,
     FLOOR_DEG,
+    MOVING,
     Hunt,
     best_of,
     independent_samples,
@@ -46,7 +48,6 @@ _AS_GOOD, _STIFFEST = 1.002, 400.0  # stops that were touched yield unless the l
 _TOUCHED_DEG = 0.5  # as near as that the plate has been at a stop
 _COARSE = 2  # steps per sample of the first look
 _SEEDS = 2  # rough solutions that are looked at from every delay
-_AT_NOISE = 1.05  # a residual that small leaves nothing to explain
 _DROPS, _SPEEDS, _PRESLIDINGS, _HALF_GAPS = (0.08, 0.6), (8.0, 40.0), (0.06, 0.2), (0.1, 0.3)
 
 
@@ -156,7 +157,7 @@ def _structure(
 
     # A search in the valley of a wrong delay seldom leaves it: each begins with a search of its own.
     ramps: list[dict[str, float]] = [{}, *({"ramp_deg": ramp} for ramp in RAMPS if "ramp_deg" in base)]
-    moving = [name for name in ("tau_s", "gain_deg_per_s2_per_duty", *LAG) if name in base]
+    moving = [name for name in MOVING if name in base]
     whole = [name for name in base if name not in DELAY]
     tries = []
     for delay in delays:
@@ -170,7 +171,7 @@ def _structure(
     terms: list[tuple[str, ...]] = [LAG] if "electrical_s" in base else []
     plain, terms = _stopped(hunt, fixed, plain, terms)
     found: dict[tuple[tuple[str, ...], ...], Search] = {(): plain}
-    enough = max(_AT_NOISE * noise_of(problem.angle), FLOOR_DEG)
+    enough = max(AT_NOISE * noise_of(problem.angle), FLOOR_DEG)
     if plain.rmse < enough:
         return [plain], terms
     box = [
@@ -192,6 +193,9 @@ def _structure(
         for width in _PRESLIDINGS
     ]  # fmt: skip
     found[(DROP, PRESLIDING)] = hunt.search(best_of(tries).values, of([DROP, PRESLIDING]), BRISTLES, 30)
+    # Both ways: friction without bristles also from where that with them has ended.
+    rigid = {**found[(DROP, PRESLIDING)].values, **{name: _ABSENT[name] for name in PRESLIDING}}
+    found[(DROP,)] = best_of([dropping, hunt.search(rigid, of([DROP]), BRISTLES, 25)])
     if problem.both_sides:
         tries = [
             hunt.search({**plain.values, "half_gap_deg": half, "ramp_deg": 0.25}, of([GAP]), _COARSE, 30)

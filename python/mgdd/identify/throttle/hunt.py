@@ -17,9 +17,11 @@ if TYPE_CHECKING:
     from numpy.typing import NDArray
 
 __all__ = [
+    "AT_NOISE",
     "BRISTLES",
     "FINE",
     "FLOOR_DEG",
+    "MOVING",
     "WORTH",
     "Hunt",
     "best_of",
@@ -31,9 +33,13 @@ __all__ = [
 
 # Steps per sample of the look at bristles, and of what is handed over.
 BRISTLES, FINE = 4, 8
+# What a wrong time constant spoils at once: searched first, as the rest would make up for it.
+MOVING = ("tau_s", "gain_deg_per_s2_per_duty", "electrical_s")
+AT_NOISE = 1.05  # a residual that small leaves nothing to explain
 WORTH = 0.99  # what explains less than a hundredth of the error is left out, however certain it is
 # What a search has found absent begins here in the next, not where one begins that was never searched.
 _ABSENT = {"electrical_s": 1e-4, "stribeck_drop": 1e-3, "delay_samples": 1e-3, "half_gap_deg": 1e-3}
+_LEAST_FOUR_FIFTHS = 0.4377  # mean square of the least four fifths of a normal variable, over its variance
 FLOOR_DEG = 5e-3  # a 14-bit converter steps by as much: a residual below it is as good as any
 
 
@@ -82,9 +88,14 @@ def independent_samples(found: Search) -> float:
 
 
 def noise_of(angle: NDArray[np.float64]) -> float:
-    """Return the standard deviation of white noise on an angle: its second differences, which motion hardly has."""
-    second = np.diff(angle, 2)
-    return float(1.4826 * np.median(np.abs(second)) / math.sqrt(6.0))
+    """Return the standard deviation of white noise on an angle, from its second differences, which motion hardly has.
+
+    The mean square of the smaller four fifths, over what it is of a normal distribution: a median would be a whole
+    number of steps of the converter.
+    """
+    second = np.sort(np.abs(np.diff(angle, 2)))
+    least = second[: max(4 * second.size // 5, 1)]
+    return float(np.sqrt(np.mean(least**2) / (_LEAST_FOUR_FIFTHS * 6.0)))
 
 
 def missed(smaller: Search, larger: Search, size: int, n: float) -> bool:

@@ -11,7 +11,18 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from mgdd.identify.throttle.block_losses import block_losses, certainly_less
-from mgdd.identify.throttle.hunt import BRISTLES, FINE, FLOOR_DEG, WORTH, Hunt, best_of, names_of, noise_of
+from mgdd.identify.throttle.hunt import (
+    AT_NOISE,
+    BRISTLES,
+    FINE,
+    FLOOR_DEG,
+    MOVING,
+    WORTH,
+    Hunt,
+    best_of,
+    names_of,
+    noise_of,
+)
 
 if TYPE_CHECKING:
     from numpy.typing import NDArray
@@ -38,7 +49,8 @@ class Delays:
 def whole_delay(hunt: Hunt, rough: Sequence[Search], delays: Sequence[float]) -> Delays:
     """Fit with fine steps at the delays about the rough one; of equals take the shortest whose lag a motor would have.
 
-    The shortest, since what a model lacks (a gear that bends, a gap) makes the plate come later, never sooner.
+    The shortest, since what a model lacks (a gear that bends, a gap) makes the plate come later, never sooner; where it
+    lacks nothing, down to the noise, the one with the least error.
 
     Equals are delays whose losses, block by block of the log, differ from those of the best by less than twice the
     standard error of their mean (Diebold and Mariano 1995). The loss of a block is its mean square, cut off where the
@@ -46,6 +58,7 @@ def whole_delay(hunt: Hunt, rough: Sequence[Search], delays: Sequence[float]) ->
     """
     at = rough[0].values["delay_samples"]
     free = [name for name in names_of(rough[0]) if name != "delay_samples"]
+    moving = [name for name in MOVING if name in free]
     near = [d for d in delays if math.floor(at) - 1 <= d <= math.ceil(at)] or [min(delays, key=lambda d: abs(d - at))]
     ramps = [{"ramp_deg": ramp} for ramp in RAMPS if "ramp_deg" in free]
     begin = [*rough, *(rough[0]._replace(values={**rough[0].values, **ramp}) for ramp in ramps)]
@@ -53,7 +66,9 @@ def whole_delay(hunt: Hunt, rough: Sequence[Search], delays: Sequence[float]) ->
     found: dict[float, Search] = {}
 
     def look(start: Search, delay: float) -> Search:
-        return hunt.search(_at_delay(start, delay, hunt.problem.step_s, free), free, BRISTLES, 15)
+        values = _at_delay(start, delay, hunt.problem.step_s, free)
+        first = hunt.search(values, moving, BRISTLES, 8).values if moving else values
+        return hunt.search(first, free, BRISTLES, 15)
 
     while missing := [delay for delay in near if delay not in looks]:
         looks |= {delay: best_of([look(start, delay) for start in begin]) for delay in missing}
@@ -73,7 +88,11 @@ def whole_delay(hunt: Hunt, rough: Sequence[Search], delays: Sequence[float]) ->
     alike = _ALIKE * max(best_of(found.values()).rmse, FLOOR_DEG)
     equals = _equals(block_losses(residual, problem.angle, problem.step_s, floor))
     ties = [delay for delay in equals if found[delay].rmse <= alike] or equals
-    kept = min(ties, key=lambda delay: (_unlike_a_motor(found[delay].values["electrical_s"]), delay))
+    complete = best_of(found.values()).rmse < AT_NOISE * floor  # nothing is missed that could make the plate come later
+    kept = min(
+        ties,
+        key=lambda delay: (_unlike_a_motor(found[delay].values["electrical_s"]), complete and found[delay].rmse, delay),
+    )
     rmse = {delay: max(one.rmse, FLOOR_DEG) for delay, one in {**looks, **found}.items()}
     return Delays(found=found[kept], rmse=rmse, ties=tuple(ties))
 
