@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 import sys
 from pathlib import Path
 from typing import Any
@@ -11,11 +12,13 @@ import pytest
 
 from mgdd.errors import ParameterError
 from mgdd.identify import FirstPrincipleModel, identify_throttle, load_throttle_model
+from mgdd.identify.throttle.block_losses import block_losses, certainly_less
 from mgdd.identify.throttle.delay_report import with_delay
+from mgdd.identify.throttle.hunt import noise_of
 from mgdd.io import throttle_log
 from mgdd.optimize import FitOptions, least_squares
 from mgdd.signals import amplitude_random_steps, chirp
-from mgdd.throttle import PseudoWiener
+from mgdd.throttle import PseudoWiener, Throttle, simulate
 
 sys.path.append(str(Path(__file__).parent / "support"))
 from throttle_bodies import draw_body, make_logs
@@ -60,6 +63,64 @@ def test_an_independent_throttle_is_followed_on_a_fresh_log(family: str, seed: i
     file = tmp_path / "fit.toml"
     file.write_text(fit.to_toml(), encoding="utf-8")
     assert load_throttle_model(file) == fit.model
+
+
+@pytest.mark.parametrize("seed", [4, 7, 8])
+def test_intervals_hold_the_lag_and_what_few_samples_below_limp_home_show(seed: int) -> None:
+    body = draw_body("coulomb", seed)
+    train, _ = (throttle_log(*log) for log in make_logs(body, seed))
+    fit = identify_throttle(train, "first_principle", closed_deg=body.closed_deg, open_deg=body.open_deg)
+    intervals, truth = fit.report.interval(), body.groups()
+    for name in ("tau_s", "electrical_s", "beta_below_duty", "kappa_below_duty_per_deg"):
+        assert intervals[name][0] <= truth[name] <= intervals[name][1], name
+    assert intervals["electrical_s"][1] < 1.05 * truth["electrical_s"]
+    assert fit.parameters["viscous_share"] == 0.25
+
+
+@pytest.mark.parametrize("seed", [2, 4])
+def test_where_the_model_misses_the_gap_the_delay_is_that_of_the_rest_of_the_log(seed: int) -> None:
+    body = draw_body("backlash", seed)
+    train, _ = (throttle_log(*log) for log in make_logs(body, seed))
+    fit = identify_throttle(train, "first_principle", closed_deg=body.closed_deg, open_deg=body.open_deg)
+    assert fit.parameters["delay_samples"] == body.delay_samples
+    assert fit.parameters["half_gap_deg"] > body.half_gap_deg
+    assert fit.parameters["tau_s"] == pytest.approx(body.groups()["tau_s"], rel=0.05)
+
+
+def test_a_block_counts_up_to_a_quarter_above_the_usual_error_and_one_at_rest_not_at_all() -> None:
+    angle = np.repeat(np.arange(8.0), 50) + np.tile(np.linspace(0.0, 3.0, 50), 8)
+    angle[300:350] = 6.0
+    sign = np.where(np.arange(400) % 2, 0.1, -0.1)
+    ours = sign * np.repeat([1.0, 1.05, 1.0, 4.0, 1.0, 0.95, 9.0, 1.0], 50)
+    theirs = sign * np.repeat([1.2, 1.2, 1.15, 1.0, 1.2, 1.1, 0.5, 1.2], 50)
+    loss = block_losses({0.0: ours, 1.0: theirs}, angle, 2e-3, 0.05)
+    most = (1.25 * 0.1) ** 2
+    np.testing.assert_allclose(loss[0.0], [0.01, 0.105**2, 0.01, most, 0.01, 0.095**2, 0.01])
+    np.testing.assert_allclose(loss[1.0][:3], [0.12**2, 0.12**2, 0.115**2])
+    assert np.mean(ours**2) > np.mean(theirs**2), "the block that it misses would decide"
+    assert loss[0.0].mean() < loss[1.0].mean()
+    noisy = block_losses({0.0: ours, 1.0: theirs}, angle, 2e-3, 0.2)
+    assert noisy[0.0].max() == pytest.approx((1.25 * 0.2) ** 2)
+
+
+def test_less_is_certain_by_twice_the_standard_error_over_blocks() -> None:
+    ours = np.full(8, 0.01)
+    theirs = ours + np.array([0.004, 0.005, 0.003, 0.004, -0.001, 0.005, 0.004, 0.004])
+    assert certainly_less(ours, theirs)
+    assert not certainly_less(theirs, ours)
+    assert not certainly_less(ours, ours)
+    lucky = ours + np.array([0.0, 0.0, 0.05, 0.0, -0.001, 0.0, 0.0, 0.0])
+    assert not certainly_less(ours, lucky)
+
+
+@pytest.mark.parametrize(("noise_deg", "step_deg"), [(0.02, 0.0), (0.02, 0.022), (0.047, 0.022), (0.031, 0.04)])
+def test_noise_is_told_from_motion_whatever_the_step_of_the_converter(noise_deg: float, step_deg: float) -> None:
+    rng = np.random.default_rng(5)
+    time = 1e-3 * np.arange(8000)
+    angle = 30.0 + 20.0 * np.sin(2.0 * np.pi * 4.0 * time) + noise_deg * rng.standard_normal(time.size)
+    angle[4000:] += 15.0  # a step that no second difference of noise explains
+    measured = np.round(angle / step_deg) * step_deg if step_deg else angle
+    assert noise_of(measured) == pytest.approx(math.hypot(noise_deg, step_deg / math.sqrt(12.0)), rel=0.05)
 
 
 def two_kinds_of_sides() -> PseudoWiener:
@@ -111,3 +172,11 @@ def test_a_delay_among_several_has_the_error_of_the_costs_beside_it() -> None:
     assert low < 2.0 < high
     assert with_delay(report, 2.0, {2.0: 0.04, 3.0: 0.04}, n).stderr[-1] == 1.0
     assert known.to_dataset().sizes["parameter"] == 3
+
+
+def test_a_short_noise_free_log_keeps_the_lag_of_the_motor_and_no_delay() -> None:
+    signal = chirp(2.0, offset=0.02, amplitude=0.3)
+    run = simulate(Throttle(), signal["duty"], time_s=signal["time_s"])
+    fit = identify_throttle(throttle_log(run["time_s"], run["duty"], run["angle_deg"]), options=FitOptions(n_starts=1))
+    assert fit.parameters["delay_samples"] == 0.0
+    assert fit.parameters["electrical_s"] == pytest.approx(1e-3, rel=0.1)

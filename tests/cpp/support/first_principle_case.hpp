@@ -24,7 +24,10 @@ enum GroupAt : std::size_t {
   delay,
   bend,
   bend_damping,
-  half_gap
+  half_gap,
+  viscous,
+  stop,
+  stop_damping
 };
 
 inline throttle::FirstPrinciple options_of(const throttle::Throttle& t) {

@@ -1,6 +1,8 @@
 #include "mgdd/identify/throttle/first_principle_fit.hpp"
 
+#include <cstddef>
 #include <string>
+#include <utility>
 
 #include "mgdd/common/field.hpp"
 
@@ -12,10 +14,12 @@ std::vector<optimize::Parameter> first_principle_parameters() {
   std::vector<optimize::Parameter> out;
   for (const FieldInfo& field : FirstPrinciple::parameters)
     out.push_back(optimize::parameter_of(field, std::string(field.name)));
-  // Without presliding friction is another law: a search does not cross over.
-  optimize::Parameter& presliding = out[13];
-  presliding.lower = 0.01;
-  presliding.log_scaled = true;
+  // Without presliding friction is another law, and so for stops: a search does not cross over.
+  for (const auto& [index, least] : {std::pair{13, 0.01}, {17, 2.0}}) {
+    optimize::Parameter& parameter = out[static_cast<std::size_t>(index)];
+    parameter.lower = least;
+    parameter.log_scaled = true;
+  }
   return out;
 }
 

@@ -45,7 +45,10 @@ FirstPrinciple::Groups<double> first_principle_of(const Throttle& t) noexcept {
           0.0,
           t.friction == Friction::lugre ? over_rad * t.coulomb_nm / t.bristle_nm_per_rad : 0.0,
           0.5 * t.bristle_damping_nms_per_rad / std::sqrt(t.bristle_nm_per_rad * t.inertia_kgm2),
-          t.backlash == Backlash::none ? 0.0 : t.backlash_half_deg};
+          t.backlash == Backlash::none ? 0.0 : t.backlash_half_deg,
+          t.viscous_nms_per_rad / t.damping_nms_per_rad(),
+          0.0,
+          0.5};
 }
 
 }  // namespace mgdd::throttle

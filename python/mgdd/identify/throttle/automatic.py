@@ -3,77 +3,52 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Iterable, Mapping, Sequence
-from dataclasses import dataclass, field
+from collections.abc import Mapping, Sequence
 from typing import TYPE_CHECKING
-
-import numpy as np
 
 from mgdd import _core
 from mgdd.errors import Interrupted, hand_over
 from mgdd.identify.starts import spread_starts
+from mgdd.identify.throttle.damping_share import SHARE, TYPICAL_SHARE, with_unknown_share
 from mgdd.identify.throttle.delay_report import with_delay
 from mgdd.identify.throttle.first_principle_model import REFINEMENTS, FirstPrincipleModel
-from mgdd.identify.throttle.first_principle_problem import GroupsProblem, Search, groups_problem
+from mgdd.identify.throttle.first_principle_problem import Search, groups_problem
 from mgdd.identify.throttle.free_run import draw_free_run, free_run, quality_of, source_of
+from mgdd.identify.throttle.hunt import (
+    AT_NOISE,
+    BRISTLES,
+    FINE,
+    FLOOR_DEG,
+    MOVING,
+    Hunt,
+    best_of,
+    independent_samples,
+    missed,
+    names_of,
+    noise_of,
+)
+from mgdd.identify.throttle.whole_delay import RAMPS, Delays, whole_delay
 from mgdd.optimize.fit_options import FitOptions, fit_options
 from mgdd.results import Finding, Fit, FitReport
 
 if TYPE_CHECKING:
     import xarray as xr
-    from numpy.typing import NDArray
 
-__all__ = ["fit_groups", "independent_samples"]
+__all__ = ["fit_groups"]
 
 LAG, RAMP, DELAY = ("electrical_s",), ("ramp_deg",), ("delay_samples",)
 DROP = ("stribeck_drop", "stribeck_deg_per_s")
 PRESLIDING = ("presliding_deg", "presliding_damping")
 GAP = ("half_gap_deg",)
+STOPS = ("stop_duty_per_deg", "stop_damping")
 _ABSENT = {name: REFINEMENTS[name] for term in (DROP, PRESLIDING, GAP) for name in term}
 _SHOWN = {LAG: "lag", DROP: "Stribeck drop", PRESLIDING: "presliding", GAP: "gap"}
-# Steps per sample of the first look, of the look at bristles, and of what is handed over.
-_COARSE, _BRISTLES, _FINE = 2, 4, 8
-_WORTH = 0.99  # what explains less than a hundredth of the error is left out, however certain it is
-_FLOOR_DEG = 1e-3  # no sensor shows less: a residual below it is as good as any
-_SEEDS = 3  # rough solutions that are looked at from every delay
-_MOTOR_LAG_S = 1e-3  # L/R of throttle motors, which decides between delays that the log does not separate
-_AT_NOISE = 1.05  # a residual that small leaves nothing to explain
+_STOP = {"stop_duty_per_deg": 40.0, "stop_damping": 0.7}
+_AS_GOOD, _STIFFEST = 1.002, 400.0  # stops that were touched yield unless the log says that they do not
+_TOUCHED_DEG = 0.5  # as near as that the plate has been at a stop
+_COARSE = 2  # steps per sample of the first look
+_SEEDS = 2  # rough solutions that are looked at from every delay
 _DROPS, _SPEEDS, _PRESLIDINGS, _HALF_GAPS = (0.08, 0.6), (8.0, 40.0), (0.06, 0.2), (0.1, 0.3)
-
-
-@dataclass(kw_only=True)
-class _Hunt:
-    """Searches of one log, what they compared, and the best of them so far."""
-
-    problem: GroupsProblem
-    max_iterations: int
-    tolerance: float
-    best: Search | None = None
-    done: list[Search] = field(default_factory=list)
-
-    def search(
-        self, values: Mapping[str, float], free: Sequence[str], substeps: int, iterations: int, tolerance: float = 1e-4
-    ) -> Search:
-        """Search once; an interrupt hands over what it has."""
-        try:
-            found = self.problem.search(
-                values, free, substeps=substeps, tolerance=tolerance,
-                max_iterations=min(iterations, self.max_iterations),
-            )  # fmt: skip
-        except Interrupted as stop:
-            if isinstance(stop.partial, Search):
-                self.keep(stop.partial)
-            raise
-        return self.keep(found)
-
-    def keep(self, found: Search) -> Search:
-        self.done.append(found)
-        if self.best is None or found.rmse < self.best.rmse:
-            self.best = found
-        return found
-
-    def fine(self, values: Mapping[str, float], free: Sequence[str]) -> Search:
-        return self.search(values, free, _FINE, self.max_iterations, self.tolerance)
 
 
 def fit_groups(
@@ -119,25 +94,35 @@ def fit_groups(
     """
     chosen = fit_options(options, n_starts=4, seed=0, max_iterations=40, tolerance=1e-7)
     problem = groups_problem(log, fixed=fixed, stops_deg=stops_deg)
-    hunt = _Hunt(problem=problem, max_iterations=chosen.max_iterations, tolerance=chosen.tolerance)
+    hunt = Hunt(problem=problem, max_iterations=chosen.max_iterations, tolerance=chosen.tolerance)
     interrupted: Interrupted | None = None
     findings: list[Finding] = []
-    by_delay: dict[float, Search] = {}
+    by_delay: Delays | None = None
+    report: FitReport | None = None
+    known = fixed or {}
     try:
-        rough, terms = _structure(hunt, fixed or {}, sorted(delays), chosen.n_starts, chosen.seed)
-        found, by_delay = _whole_delay(hunt, rough, sorted(delays))
-        found, terms = _without(hunt, found, terms)
+        rough, terms = _structure(hunt, known, sorted(delays), chosen.n_starts, chosen.seed)
+        by_delay = whole_delay(hunt, rough, sorted(delays))
+        found, terms = _without(hunt, by_delay.found, terms)
+        if STOPS in terms:
+            found = hunt.fine(found.values, list(dict.fromkeys([*names_of(found), *STOPS])))
         findings = _told(found, terms, by_delay)
+        report = FitReport.from_core(found.report, problem.angle)
+        if LAG in terms and SHARE not in known:
+            report = with_unknown_share(hunt, found, report)
     except Interrupted as stop:
         if hunt.best is None:
             raise
-        found, interrupted = hunt.best, stop
-    report = FitReport.from_core(found.report, problem.angle)
-    if len(by_delay) > 1:
-        by_rmse = {delay: max(one.rmse, _FLOOR_DEG) for delay, one in by_delay.items()}
-        report = with_delay(report, found.values["delay_samples"], by_rmse, independent_samples(found))
+        interrupted = stop
+        if report is None:
+            found = hunt.best if by_delay is None else by_delay.found
+            report = FitReport.from_core(found.report, problem.angle)
+    if by_delay is not None and len(by_delay.rmse) > 1:
+        kept = found.values["delay_samples"]
+        alike = dict.fromkeys(by_delay.ties, by_delay.rmse[kept])
+        report = with_delay(report, kept, {**by_delay.rmse, **alike}, independent_samples(found))
     model = FirstPrincipleModel(
-        parameters=found.values, closed_deg=stops_deg[0], open_deg=stops_deg[1], substeps=_FINE, sample_s=problem.step_s
+        parameters=found.values, closed_deg=stops_deg[0], open_deg=stops_deg[1], substeps=FINE, sample_s=problem.step_s
     )
     run = free_run(model, log)
     fit = Fit(
@@ -157,25 +142,36 @@ def fit_groups(
 
 
 def _structure(
-    hunt: _Hunt, fixed: Mapping[str, float], delays: Sequence[float], n_starts: int, seed: int
+    hunt: Hunt, fixed: Mapping[str, float], delays: Sequence[float], n_starts: int, seed: int
 ) -> tuple[list[Search], list[tuple[str, ...]]]:
     """Find the structure and its rough values, the best first, with the delay free between the first and the last."""
     problem = hunt.problem
     latency = [*LAG, *(DELAY if len(delays) > 1 else ())]
     further = [*latency, *(RAMP if problem.both_sides else ())]
     base = [*problem.free, *(name for name in further if name not in fixed)]
-    values = {**problem.values, "delay_samples": float(min(max(1.0, delays[0]), delays[-1]))}
-    values |= {"electrical_s": 1e-3} if "electrical_s" in base else {}
+    values = dict(problem.values)
+    values |= {"electrical_s": 1e-3, SHARE: fixed.get(SHARE, TYPICAL_SHARE)} if "electrical_s" in base else {}
 
     def of(terms: Sequence[tuple[str, ...]]) -> list[str]:
         return [*base, *(name for term in terms for name in term if name not in fixed)]
 
-    moving = [name for name in ("tau_s", "gain_deg_per_s2_per_duty", *latency) if name in base]
-    first = hunt.search(values, moving, _COARSE, 15).values if moving else values
-    plain = _best([hunt.search(start, base, _COARSE, 40) for start in (first, values)])
-    found: dict[tuple[tuple[str, ...], ...], Search] = {(): plain}
+    # A search in the valley of a wrong delay seldom leaves it: each begins with a search of its own.
+    ramps: list[dict[str, float]] = [{}, *({"ramp_deg": ramp} for ramp in RAMPS if "ramp_deg" in base)]
+    moving = [name for name in MOVING if name in base]
+    whole = [name for name in base if name not in DELAY]
+    tries = []
+    for delay in delays:
+        start = {**values, "delay_samples": float(delay)}
+        first = hunt.search(start, moving, _COARSE, 10).values if moving else start
+        tries.append(hunt.search(first, whole, _COARSE, 20))
+    nearest = sorted(tries, key=lambda one: one.rmse)[:2]
+    # Ramp and limp-home have valleys of their own, and so have both together.
+    tries = [hunt.search({**one.values, **ramp}, base, _COARSE, 20) for one in nearest for ramp in ramps]
+    plain = hunt.search(best_of(tries).values, base, BRISTLES, 20)
     terms: list[tuple[str, ...]] = [LAG] if "electrical_s" in base else []
-    enough = max(_AT_NOISE * noise_of(problem.angle), _FLOOR_DEG)
+    plain, terms = _stopped(hunt, fixed, plain, terms)
+    found: dict[tuple[tuple[str, ...], ...], Search] = {(): plain}
+    enough = max(AT_NOISE * noise_of(problem.angle), FLOOR_DEG)
     if plain.rmse < enough:
         return [plain], terms
     box = [
@@ -184,125 +180,87 @@ def _structure(
     ]
     start = {**plain.values, "stribeck_drop": 0.15, "stribeck_deg_per_s": 25.0}
     tries = [hunt.search(one, of([DROP]), _COARSE, 20) for one in spread_starts(start, box, n_starts, seed)]
-    dropping = hunt.search(_best(tries).values, of([DROP]), _COARSE, 40)
+    dropping = hunt.search(best_of(tries).values, of([DROP]), _COARSE, 40)
     found[(DROP,)] = dropping
     if dropping.rmse < enough:
         return [dropping], [*terms, DROP]
+    least = min([plain, dropping], key=lambda one: one.rmse).values
     tries = [
         hunt.search(
-            {**one.values, "presliding_deg": width, "stribeck_drop": max(one.values["stribeck_drop"], 0.05)},
-            of([DROP, PRESLIDING]), _BRISTLES, 25,
+            {**least, "presliding_deg": width, "stribeck_drop": max(least["stribeck_drop"], 0.05)},
+            of([DROP, PRESLIDING]), BRISTLES, 25,
         )
-        for one in (plain, dropping)
         for width in _PRESLIDINGS
     ]  # fmt: skip
-    found[(DROP, PRESLIDING)] = hunt.search(_best(tries).values, of([DROP, PRESLIDING]), _BRISTLES, 30)
+    found[(DROP, PRESLIDING)] = hunt.search(best_of(tries).values, of([DROP, PRESLIDING]), BRISTLES, 30)
+    # Both ways: friction without bristles also from where that with them has ended.
+    rigid = {**found[(DROP, PRESLIDING)].values, **{name: _ABSENT[name] for name in PRESLIDING}}
+    found[(DROP,)] = best_of([dropping, hunt.search(rigid, of([DROP]), BRISTLES, 25)])
     if problem.both_sides:
         tries = [
             hunt.search({**plain.values, "half_gap_deg": half, "ramp_deg": 0.25}, of([GAP]), _COARSE, 30)
             for half in _HALF_GAPS
         ]
-        found[(GAP,)] = _best(tries)
+        found[(GAP,)] = best_of(tries)
         found[(DROP, GAP)] = hunt.search({**found[(GAP,)].values, "stribeck_drop": 0.1}, of([DROP, GAP]), _COARSE, 30)
-    n = independent_samples(_best(found.values()))
+    n = independent_samples(best_of(found.values()))
     best = min(found, key=lambda one: _criterion(found[one], len(of(one)), n))
     # Sticking makes the cost rough: what the other structures have found are further starts of the chosen one.
     own = {name: found[best].values[name] for term in best for name in term}
-    others = [one for structure, one in found.items() if structure != best]
-    again = [hunt.search({**one.values, **_ABSENT, **own}, of(best), _BRISTLES, 25) for one in others]
+    others = [one.values for one in sorted(found.values(), key=lambda one: one.rmse)[1:3]]
+    others += [{**found[best].values, **ramp} for ramp in ramps[1:]]
+    again = [hunt.search({**one, **_ABSENT, **own}, of(best), BRISTLES, 20) for one in others]
     return sorted([found[best], *again], key=lambda one: one.rmse)[:_SEEDS], [*terms, *best]
 
 
-def _whole_delay(hunt: _Hunt, rough: Sequence[Search], delays: Sequence[float]) -> tuple[Search, dict[float, Search]]:
-    """Fit with fine steps at the delays about the rough one; of equals take the one whose lag a motor would have."""
-    at = rough[0].values["delay_samples"]
-    free = [name for name in _names(rough[0]) if name not in DELAY]
-    near = [d for d in delays if math.floor(at) - 1 <= d <= math.ceil(at)] or [min(delays, key=lambda d: abs(d - at))]
-    found = {}
-    for delay in near:
-        starts = [_at_delay(one, delay, hunt.problem.step_s, free) for one in rough]
-        looks = [hunt.search(start, free, _BRISTLES, 15) for start in starts]
-        found[delay] = hunt.fine(_best(looks).values, free)
-    for k, delay in enumerate(near):  # each also from where its neighbours ended
-        for other in near[max(k - 1, 0) : k] + near[k + 1 : k + 2]:
-            again = hunt.fine(_at_delay(found[other], delay, hunt.problem.step_s, free), free)
-            if again.rmse < found[delay].rmse:
-                found[delay] = again
-    enough = max(_best(found.values()).rmse, _FLOOR_DEG) / _WORTH
-    ties = [delay for delay in near if found[delay].rmse <= enough]
-    kept = min(ties, key=lambda delay: abs(math.log(max(found[delay].values["electrical_s"], 1e-5) / _MOTOR_LAG_S)))
-    return found[kept], found
+def _stopped(
+    hunt: Hunt, fixed: Mapping[str, float], plain: Search, terms: list[tuple[str, ...]]
+) -> tuple[Search, list[tuple[str, ...]]]:
+    """Let the stops yield where the plate has touched one and the log does not say that they are rigid."""
+    problem = hunt.problem
+    low, high = problem.stops_deg
+    touched = problem.angle.min() < low + _TOUCHED_DEG or problem.angle.max() > high - _TOUCHED_DEG
+    if not touched or set(STOPS) & set(fixed):
+        return plain, terms
+    soft = hunt.search({**plain.values, **_STOP}, [*names_of(plain), *STOPS], BRISTLES, 25)
+    if soft.rmse > _AS_GOOD * plain.rmse or soft.values["stop_duty_per_deg"] > _STIFFEST:
+        return plain, terms
+    return soft, [*terms, STOPS]
 
 
-def _without(hunt: _Hunt, found: Search, terms: list[tuple[str, ...]]) -> tuple[Search, list[tuple[str, ...]]]:
+def _without(hunt: Hunt, found: Search, terms: list[tuple[str, ...]]) -> tuple[Search, list[tuple[str, ...]]]:
     """Try every term without, the last first; what the log does not miss is left out."""
     for term in [PRESLIDING, GAP, DROP, LAG]:
         if term not in terms or (term == DROP and PRESLIDING in terms):
             continue
-        free = [name for name in _names(found) if name not in term]
+        free = [name for name in names_of(found) if name not in term]
         absent = {**_ABSENT, "electrical_s": 0.0}
-        smaller = hunt.fine({**found.values, **{name: absent[name] for name in term}}, free)
+        smaller = hunt.search({**found.values, **{name: absent[name] for name in term}}, free, FINE, 25, 1e-6)
         n = independent_samples(found)
-        if not _missed(smaller, found, len(term), n):
+        if not missed(smaller, found, len(term), n):
             found, terms = smaller, [one for one in terms if one != term]
     return found, terms
 
 
-def independent_samples(found: Search) -> float:
-    """Return how many independent samples the residual is worth: samples over its integrated correlation time."""
-    residual = np.asarray(found.report.residual)
-    return residual.size / _core.optimize.autocorrelation_time(residual)
-
-
-def noise_of(angle: NDArray[np.float64]) -> float:
-    """Return the standard deviation of white noise on an angle: its second differences, which motion hardly has."""
-    second = np.diff(angle, 2)
-    return float(1.4826 * np.median(np.abs(second)) / math.sqrt(6.0))
-
-
-def _missed(smaller: Search, larger: Search, size: int, n: float) -> bool:
-    """Whether the log needs the `size` numbers that the larger model has beyond the smaller."""
-    low, high = max(larger.rmse, _FLOOR_DEG), max(smaller.rmse, _FLOOR_DEG)
-    return low < _WORTH * high and 2.0 * n * math.log(high / low) > size * math.log(n)
-
-
 def _criterion(found: Search, size: int, n: float) -> float:
-    return 2.0 * n * math.log(max(found.rmse, _FLOOR_DEG)) + size * math.log(n)
+    return 2.0 * n * math.log(max(found.rmse, FLOOR_DEG)) + size * math.log(n)
 
 
-def _at_delay(found: Search, delay: float, step_s: float, free: Sequence[str]) -> dict[str, float]:
-    """Move a part of the latency between delay and lag."""
-    values = {**found.values, "delay_samples": float(delay)}
-    if "electrical_s" in free:
-        lag = found.values["electrical_s"] + step_s * (found.values["delay_samples"] - delay)
-        values["electrical_s"] = min(max(lag, 1e-4), 0.015)
-    return values
-
-
-def _names(found: Search) -> list[str]:
-    return [name for name in found.report.names if name in found.values]
-
-
-def _best(searches: Iterable[Search]) -> Search:
-    return min(searches, key=lambda one: one.rmse)
-
-
-def _told(found: Search, terms: Sequence[tuple[str, ...]], by_delay: Mapping[float, Search]) -> list[Finding]:
+def _told(found: Search, terms: Sequence[tuple[str, ...]], delays: Delays) -> list[Finding]:
     """Say what the model has and what it is worth, and how other delays fare."""
-    has = ", ".join(_SHOWN[term] for term in terms) or "none"
+    by_delay, rms = delays.rmse, found.rmse
+    has = ", ".join(_SHOWN[term] for term in terms if term in _SHOWN) or "none"
+    stops = ", stops that yield" if STOPS in terms else ""
     left = ", ".join(_SHOWN[term] for term in _SHOWN if term not in terms) or "nothing"
-    text = f"Coulomb friction with {has} ({found.rmse:.3g} deg RMS); left out, as the log does not support it: {left}"
+    text = f"Coulomb friction with {has} ({rms:.3g} deg RMS{stops}); left out, as the log does not support it: {left}"
     if len(by_delay) < 2:
         return [Finding("structure_chosen", tuple(name for term in terms for name in term), text)]
-    each = ", ".join(f"{delay:g}: {one.rmse:.3g}" for delay, one in sorted(by_delay.items()))
+    each = ", ".join(f"{delay:g}: {error:.3g}" for delay, error in sorted(by_delay.items()))
     text += f"; delay {found.values['delay_samples']:g} samples (deg RMS by delay: {each})"
     told = [Finding("structure_chosen", tuple(name for term in terms for name in term), text)]
-    enough = max(_best(by_delay.values()).rmse, _FLOOR_DEG) / _WORTH
-    ties = [f"{delay:g}" for delay, one in sorted(by_delay.items()) if one.rmse <= enough]
-    if len(ties) > 1:
-        text = (
-            f"delays of {' and '.join(ties)} samples fit within a hundredth; taken is the one with the lag of a motor"
-        )
+    if len(delays.ties) > 1:
+        ties = " and ".join(f"{delay:g}" for delay in delays.ties)
+        text = f"delays of {ties} samples fit alike; taken is the shortest with the lag of a motor"
         told.append(
             Finding("delay_open", ("delay_samples", *LAG), text, "add steps of the duty, or give delay_samples")
         )

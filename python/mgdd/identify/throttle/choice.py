@@ -27,6 +27,7 @@ __all__ = ["fit_auto"]
 
 _EARLY = 0.75  # of the log, for both models; they are compared on the rest
 _BETTER_PERCENT = 0.3  # PW-R must gain that much to replace the groups, which have physical meaning
+_STIFFEST_SPRING = 0.02  # that PW-R has [duty/deg]; the groups know stiffer ones below limp-home
 _LEAST_SAMPLES, _LEAST_DEG = 100, 1.0
 
 
@@ -41,7 +42,8 @@ def fit_auto(
     """Fit the groups with the structure that the log supports, and PW-R from their result; keep the better.
 
     Both are fitted to the first three quarters of the log and run on to its end; PW-R is taken where its free run
-    meets the last quarter better by more than 0.3 points, and then fitted to the whole log.
+    meets the last quarter better by more than 0.3 points, and if, fitted to the whole log, it meets that better, too:
+    a plate that stuck elsewhere once before the last quarter stays there through it.
 
     Parameters
     ----------
@@ -66,7 +68,10 @@ def fit_auto(
         other = _pw_r(pseudo_wiener_of(ours), early, iterations)
         percent = [_percent_after(model, log, first) for model in (ours, other.model)]
         better = percent[1] > percent[0] + _BETTER_PERCENT
-        kept = _pw_r(other.model, log, iterations) if better else groups
+        # The groups may start PW-R in a valley of their own: it is also searched from no delay.
+        kept = min((_pw_r(one, log, iterations) for one in _starts(other.model)), key=_rmse) if better else groups
+        if better and _rmse(kept) > _rmse(groups):  # one event of the last quarter, not the model
+            better, kept = False, groups
     except Interrupted as stop:
         raise Interrupted(str(stop), groups) from stop
     text = (
@@ -107,6 +112,11 @@ def _pw_r(start: PseudoWiener, log: xr.Dataset, options: FitOptions) -> Fit:
     )  # fmt: skip
 
 
+def _starts(model: PseudoWiener) -> list[PseudoWiener]:
+    """Give a model and the same without its delay."""
+    return [model, PseudoWiener("pw_r", {**model.parameters, "delay_samples": 0.0})]
+
+
 def pseudo_wiener_of(model: FirstPrincipleModel) -> PseudoWiener:
     """Give PW-R of the groups, without lag, drop, presliding and gap."""
     p = model.parameters
@@ -116,7 +126,7 @@ def pseudo_wiener_of(model: FirstPrincipleModel) -> PseudoWiener:
             f"{side}_tau_s": p["tau_s"],
             f"{side}_gain_deg_per_s2_per_duty": p["gain_deg_per_s2_per_duty"],
             f"{side}_preload_duty": p[f"beta_{side}_duty"],
-            f"{side}_spring_duty_per_deg": p[f"kappa_{side}_duty_per_deg"],
+            f"{side}_spring_duty_per_deg": min(p[f"kappa_{side}_duty_per_deg"], _STIFFEST_SPRING),
             f"{side}_coulomb_duty": p["delta_duty"],
         }
     settings = {"closed_deg": model.closed_deg, "open_deg": model.open_deg, "sample_s": model.sample_s}
@@ -129,6 +139,10 @@ def _percent_after(model: Model, log: xr.Dataset, first: int) -> float:
     run = model.simulate(log, initial_state={"angle_deg": float(angle[0])})["angle_deg"].to_numpy()
     percent = nrmse_fit_percent(angle[first:], run[first:])
     return -np.inf if percent is None or not np.isfinite(percent) else float(percent)
+
+
+def _rmse(fit: Fit) -> float:
+    return np.inf if fit.train is None else fit.train.rmse
 
 
 def _with(fit: Fit, finding: Finding) -> Fit:

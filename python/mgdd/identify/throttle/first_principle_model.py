@@ -24,8 +24,8 @@ if TYPE_CHECKING:
 __all__ = ["FirstPrincipleModel"]
 
 GROUP_NAMES = tuple(_core.identify.group_names)
-# What a throttle need not have: without a word its friction does not drop or bend, its gear has no gap and
-# its duty acts at once.
+# What a throttle need not have: without a word its friction does not drop or bend, its gear has no gap, its
+# stops are rigid, its damping is back-EMF and its duty acts at once.
 REFINEMENTS = MappingProxyType(
     {
         "stribeck_drop": 0.0,
@@ -35,6 +35,9 @@ REFINEMENTS = MappingProxyType(
         "presliding_deg": 0.0,
         "presliding_damping": 0.5,
         "half_gap_deg": 0.0,
+        "viscous_share": 0.0,
+        "stop_duty_per_deg": 0.0,
+        "stop_damping": 0.5,
     }
 )
 _NEEDED = tuple(name for name in GROUP_NAMES if name not in REFINEMENTS)
@@ -60,7 +63,9 @@ class FirstPrincipleModel(SampledModel, ModelParameters):
         given: ``stribeck_drop`` (static over sliding friction, less one; 0) and ``stribeck_deg_per_s`` (speed over
         which it drops), ``ramp_deg`` (half width of the preload's ramp at limp-home; 0.25), ``delay_samples`` of the
         duty (0 to 5; 0), ``presliding_deg`` (LuGre deflection at which friction is full; 0 for none) and
-        ``presliding_damping`` (ratio; 0.5), ``half_gap_deg`` (of the gap between motor and plate; 0).
+        ``presliding_damping`` (ratio; 0.5), ``half_gap_deg`` (of the gap between motor and plate; 0),
+        ``viscous_share`` (of the damping, what is not back-EMF; 0), ``stop_duty_per_deg`` (stiffness of the stops; 0
+        for rigid ones) with ``stop_damping`` (ratio; 0.5).
     closed_deg, open_deg : float
         Mechanical stops [deg].
     substeps : int

@@ -33,6 +33,8 @@ _FIRST = {
     "delay_samples": 1.0,
     "presliding_deg": 0.1,
     "half_gap_deg": 0.15,
+    "viscous_share": 0.3,
+    "stop_duty_per_deg": 30.0,
 }
 _REST_S, _REST_DEG = 0.01, 0.5
 _FIRST_SAMPLES = 5

@@ -1,6 +1,7 @@
 // First-principle throttle in the groups that duty and angle determine: tau = J/b, G = g/J, beta = T_pt/g per side,
 // kappa = k_s/g per side, delta = T_d/g, limp-home angle and electrical time L/R; drop and speed of the Stribeck curve,
-// presliding (LuGre), delay, and a gap between motor and plate that the springs keep closed but at limp-home.
+// presliding (LuGre), delay, a gap between motor and plate that the springs keep closed but at limp-home, the share of
+// the damping that is not back-EMF, and stops that yield.
 // Set-valued friction is solved exactly in each step. Derivatives by duals, zero while the plate sticks. Units deg, s,
 // duty. Steps are noexcept, heap-free. Positions by leapfrog (Hairer et al. 2006, I.1.4), the current exact for a speed
 // held over the step, damping implicit.
@@ -39,7 +40,7 @@ class FirstPrincipleModel;
 
 /// The family: what is set, not fitted.
 struct FirstPrinciple {
-  static constexpr int n_parameters = 16;
+  static constexpr int n_parameters = 19;
   static constexpr int n_start = 3;
   static constexpr std::array<FieldInfo, n_parameters> parameters{{
       {"tau_s", "s", log_scale(0.003, 1.0), "time constant J/b"},
@@ -58,6 +59,9 @@ struct FirstPrinciple {
       {"presliding_deg", "deg", closed(0.0, 1.0), "deflection at which dry friction is full, 0 for none"},
       {"presliding_damping", "-", closed(0.0, 2.0), "damping ratio of the bristles"},
       {"half_gap_deg", "deg", closed(0.0, 2.0), "half of the gap between motor and plate"},
+      {"viscous_share", "-", closed(0.0, 1.0), "share of the damping that is not back-EMF"},
+      {"stop_duty_per_deg", "duty/deg", closed(0.0, 500.0), "stiffness of the stops, 0 for rigid ones"},
+      {"stop_damping", "-", closed(0.0, 3.0), "damping ratio of the stops"},
   }};
   static constexpr std::array<FieldInfo, 3> start_numbers{{
       {"angle_deg", "deg", closed(-90.0, 180.0), "angle of the plate"},
@@ -114,7 +118,8 @@ class FirstPrincipleModel {
     const C held = select(lags, lag, one);
     const C kept = select(lags, exp_of(-h / held), C(0.0));
     const C kept_mean = (lag / h) * (one - kept);
-    const C over = one / (one + (h / p[0]) * (one - kept_mean));
+    const C electric = one - p[16];  // only this share follows the current
+    const C over = one / (one + (h / p[0]) * (one - electric * kept_mean));
     const C slip = over * (h * p[1]);
     const C presliding = select(p[4] > C(0.0), p[13], C(0.0));  // nothing to bend for
     const C stiffness = p[4] / larger(presliding, C(least_presliding_deg));
@@ -135,11 +140,15 @@ class FirstPrincipleModel {
           .half_gap = p[15],
           .closed = C(options.closed_deg) - p[15],
           .open = C(options.open_deg) + p[15],
-          .braking = one / (p[0] * p[1]),
+          .braking = electric / (p[0] * p[1]),
           .delay = p[12],
           .presliding = presliding,
           .bristle = slip * stiffness,
-          .bristle_damping = slip * (C(2.0) * p[14] * pow_of(stiffness / p[1], C(0.5)))};
+          .bristle_damping = slip * (C(2.0) * p[14] * pow_of(stiffness / p[1], C(0.5))),
+          .stop = slip * p[17],
+          .stop_damping = slip * (C(2.0) * p[18] * pow_of(larger(p[17], C(least_stop)) / p[1], C(0.5))),
+          .stop_implicit = C(0.5) * h * slip * p[17]};
+    yields_ = acts(p[17]);
     drops_ = acts(p[9]);
     preslides_ = acts(presliding);
     gapes_ = acts(p[15]);
@@ -154,10 +163,15 @@ class FirstPrincipleModel {
       const SpringLoad<T, C> spring = spring_at(middle);
       const T driven = c_.kept_mean * s.torque + (C(1.0) - c_.kept_mean) * acting;
       const T push = c_.over * s.speed_deg_per_s + c_.slip * (driven - spring.preload - spring.elastic);
-      const T next = rubbed(s, push);
+      const T next = yields_ ? stopped(s, middle, push) : rubbed(s, push, C(1.0));
       s.torque = c_.kept * s.torque + (C(1.0) - c_.kept) * (acting - c_.braking * next);
       const T moved = middle + half * next;
       dynamics::stop_at_ends(s.angle_deg, s.speed_deg_per_s, moved, next, c_.closed, c_.open);
+      if (yields_) {
+        const auto soft = c_.stop > C(0.0);
+        s.angle_deg = select(soft, moved, s.angle_deg);
+        s.speed_deg_per_s = select(soft, next, s.speed_deg_per_s);
+      }
     }
   }
   MGDD_INLINE T output(const State& s) const noexcept {
@@ -207,6 +221,7 @@ class FirstPrincipleModel {
     other.drops_ = drops_;
     other.preslides_ = preslides_;
     other.gapes_ = gapes_;
+    other.yields_ = yields_;
     other.delay_ = delay_;
     other.c_ = std::bit_cast<typename FirstPrincipleModel<U, C>::Coefficients>(c_);
     return other;
@@ -225,6 +240,7 @@ class FirstPrincipleModel {
 
  private:
   static constexpr double least_presliding_deg = 1e-3;  // where a lane without bristles computes them all the same
+  static constexpr double least_stop = 1e-6;
 
   FirstPrincipleModel(const FirstPrinciple& options, double sample_s) noexcept
       : options_(options), sample_s_(sample_s), h_(sample_s / options.substeps) {}
@@ -248,6 +264,14 @@ class FirstPrincipleModel {
     const T gap(c_.half_gap);
     return x - larger(smaller(x, gap), -gap);
   }
+  // The speed after a step, at a stop that yields: it pushes and does not pull, linearly implicit.
+  T stopped(State& s, const T& middle, const T& push) const noexcept {
+    const T beyond = middle - larger(smaller(middle, T(c_.open)), T(c_.closed));
+    const T back = c_.stop * beyond;
+    const auto touches = (back + c_.stop_damping * s.speed_deg_per_s) * beyond > T(0.0);
+    const T divisor = select(touches, T(C(1.0) + c_.stop_damping + c_.stop_implicit), T(1.0));
+    return rubbed(s, T(push - select(touches, back, T(0.0))), divisor);
+  }
   MGDD_INLINE SpringLoad<T, C> spring_at(const T& motor_deg) const noexcept {
     const T x = motor_deg - c_.limp_home;
     return limp_home_spring(gapes_ ? carried(x) : x, c_.above, c_.below, c_.over_ramp);
@@ -264,21 +288,23 @@ class FirstPrincipleModel {
   }
 
   // The speed after a step whose speed without dry friction is `push`.
-  MGDD_INLINE T rubbed(State& s, const T& push) const noexcept {
+  template <class D>
+  MGDD_INLINE T rubbed(State& s, const T& push, const D& divisor) const noexcept {
     const T& speed = s.speed_deg_per_s;
-    if (options_.friction == Friction::tanh) return dynamics::creep(speed, push, c_.slide, c_.over_tanh, C(1.0));
-    if (drops_ || preslides_) return bent(s, push);
-    return dynamics::stick_or_slide(push, c_.hold, c_.slide, C(1.0));
+    if (options_.friction == Friction::tanh) return dynamics::creep(speed, push, c_.slide, c_.over_tanh, divisor);
+    if (drops_ || preslides_) return bent(s, push, divisor);
+    return dynamics::stick_or_slide(push, c_.hold, c_.slide, divisor);
   }
   // The same with a Stribeck curve or bristles; kept out of the loop of those that have neither.
-  T bent(State& s, const T& push) const noexcept {
+  template <class D>
+  T bent(State& s, const T& push, const D& divisor) const noexcept {
     const T& speed = s.speed_deg_per_s;
     const T ratio = speed * c_.over_stribeck;
     const T level = c_.slide * (T(1.0) + c_.drop * exp_of(-ratio * ratio));
-    const T rigid = dynamics::stick_or_slide(push, c_.hold, level, C(1.0));
+    const T rigid = dynamics::stick_or_slide(push, c_.hold, level, divisor);
     if (!preslides_) return rigid;
     const dynamics::Bristles<C> bristles{c_.bristle, c_.bristle_damping};
-    const T soft = dynamics::bend_or_slide(speed, push, level, bristles, h_, C(1.0), s.bristle_deg);
+    const T soft = dynamics::bend_or_slide(speed, push, level, bristles, h_, divisor, s.bristle_deg);
     return select(c_.presliding > C(0.0), soft, rigid);
   }
 
@@ -298,6 +324,7 @@ class FirstPrincipleModel {
     C delay;
     C presliding;
     C bristle, bristle_damping;
+    C stop, stop_damping, stop_implicit;
   };
 
   FirstPrinciple options_;
@@ -306,6 +333,7 @@ class FirstPrincipleModel {
   bool drops_ = false;
   bool preslides_ = false;
   bool gapes_ = false;
+  bool yields_ = false;
   dynamics::Delay delay_;  // used where C is a plain number
   Coefficients c_{};
 

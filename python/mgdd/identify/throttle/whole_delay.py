@@ -1,0 +1,124 @@
+"""The whole delay of a throttle log: every candidate fitted with fine steps, and compared block by block."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+from itertools import pairwise
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from mgdd.identify.throttle.block_losses import block_losses, certainly_less
+from mgdd.identify.throttle.hunt import (
+    AT_NOISE,
+    BRISTLES,
+    FINE,
+    FLOOR_DEG,
+    MOVING,
+    WORTH,
+    Hunt,
+    best_of,
+    names_of,
+    noise_of,
+)
+
+if TYPE_CHECKING:
+    from numpy.typing import NDArray
+
+    from mgdd.identify.throttle.first_principle_problem import Search
+
+__all__ = ["RAMPS", "Delays", "whole_delay"]
+
+RAMPS = (0.1, 0.4)  # where searches begin [deg]: ramp and limp-home have valleys of their own
+_RIVAL = 1.5  # a delay whose coarse search ends that far above the best is no rival
+_ALIKE = 1.25  # delays whose errors are further apart than that are no equals, whatever their blocks say
+_MOTOR_LAGS_S = (3e-4, 3e-3)  # L/R of throttle motors, which decides between delays that the log does not separate
+
+
+@dataclass(frozen=True, kw_only=True)
+class Delays:
+    """The delay that was taken, what its rivals reach, and which of them the log does not separate from the best."""
+
+    found: Search
+    rmse: Mapping[float, float]
+    ties: tuple[float, ...]
+
+
+def whole_delay(hunt: Hunt, rough: Sequence[Search], delays: Sequence[float]) -> Delays:
+    """Fit with fine steps at the delays about the rough one; of equals take the shortest whose lag a motor would have.
+
+    The shortest, since what a model lacks (a gear that bends, a gap) makes the plate come later, never sooner; where it
+    lacks nothing, down to the noise, the one with the least error.
+
+    Equals are delays whose losses, block by block of the log, differ from those of the best by less than twice the
+    standard error of their mean (Diebold and Mariano 1995). The loss of a block is its mean square, cut off where the
+    model at its best does not describe the plate: such blocks do not decide.
+    """
+    at = rough[0].values["delay_samples"]
+    free = [name for name in names_of(rough[0]) if name != "delay_samples"]
+    moving = [name for name in MOVING if name in free]
+    near = [d for d in delays if math.floor(at) - 1 <= d <= math.ceil(at)] or [min(delays, key=lambda d: abs(d - at))]
+    ramps = [{"ramp_deg": ramp} for ramp in RAMPS if "ramp_deg" in free]
+    begin = [*rough, *(rough[0]._replace(values={**rough[0].values, **ramp}) for ramp in ramps)]
+    looks: dict[float, Search] = {}
+    found: dict[float, Search] = {}
+
+    def look(start: Search, delay: float) -> Search:
+        values = _at_delay(start, delay, hunt.problem.step_s, free)
+        first = hunt.search(values, moving, BRISTLES, 8).values if moving else values
+        return hunt.search(first, free, BRISTLES, 15)
+
+    while missing := [delay for delay in near if delay not in looks]:
+        looks |= {delay: best_of([look(start, delay) for start in begin]) for delay in missing}
+        for delay, other in [*pairwise(near), *pairwise(near[::-1])]:  # each also from where its neighbours ended
+            if delay in missing or other in missing:
+                looks[delay] = best_of([looks[delay], look(looks[other], delay)])
+        enough = _RIVAL * max(best_of(looks.values()).rmse, FLOOR_DEG)
+        for delay in near:
+            if looks[delay].rmse <= enough and delay not in found:
+                found[delay] = hunt.search(looks[delay].values, free, FINE, 25, 1e-6)
+        best = min(found, key=lambda delay: found[delay].rmse)
+        at = list(delays).index(best)  # never the last of those looked at, while there are others
+        near = [d for d in delays if d in looks or d in delays[max(at - 1, 0) : at + 2]]
+    problem = hunt.problem
+    residual = {delay: np.asarray(one.report.residual) for delay, one in found.items()}
+    floor = max(noise_of(problem.angle), FLOOR_DEG)
+    alike = _ALIKE * max(best_of(found.values()).rmse, FLOOR_DEG)
+    equals = _equals(block_losses(residual, problem.angle, problem.step_s, floor))
+    ties = [delay for delay in equals if found[delay].rmse <= alike] or equals
+    complete = best_of(found.values()).rmse < AT_NOISE * floor  # nothing is missed that could make the plate come later
+    kept = min(
+        ties,
+        key=lambda delay: (_unlike_a_motor(found[delay].values["electrical_s"]), complete and found[delay].rmse, delay),
+    )
+    rmse = {delay: max(one.rmse, FLOOR_DEG) for delay, one in {**looks, **found}.items()}
+    return Delays(found=found[kept], rmse=rmse, ties=tuple(ties))
+
+
+def _equals(loss: Mapping[float, NDArray[np.float64]]) -> list[float]:
+    """Return the delays within a hundredth of the best error, and those not certainly worse."""
+    best = min(loss, key=lambda delay: float(loss[delay].mean()))
+    least = max(float(loss[best].mean()), FLOOR_DEG**2)
+    return [
+        delay
+        for delay, own in sorted(loss.items())
+        if max(float(own.mean()), FLOOR_DEG**2) * WORTH**2 <= least or not certainly_less(loss[best], own)
+    ]
+
+
+def _unlike_a_motor(lag_s: float) -> float:
+    """Return by which factor a lag is outside of those of motors, as a logarithm."""
+    low, high = _MOTOR_LAGS_S
+    lag = max(lag_s, 1e-5)
+    return math.log(max(low / lag, lag / high, 1.0))
+
+
+def _at_delay(found: Search, delay: float, step_s: float, free: Sequence[str]) -> dict[str, float]:
+    """Move a part of the latency between delay and lag."""
+    values = {**found.values, "delay_samples": float(delay)}
+    if "electrical_s" in free:
+        lag = found.values["electrical_s"] + step_s * (found.values["delay_samples"] - delay)
+        values["electrical_s"] = min(max(lag, 1e-4), 0.015)
+    return values
