@@ -1,6 +1,6 @@
 """One question: how well are throttles identified whose simulation shares no code with the package.
 
-    python benchmarks/independent_throttles.py [--each 10] [--family lugre] [--first-seed 0] [--only REGEX] [--json FILE]
+    python benchmarks/independent_throttles.py [--each 10] [--family lugre] [--first-seed 0] [--only REGEX] [--json F]
 
 Forty random bodies, ten each of Coulomb, Stribeck and LuGre friction and with a gap in the gear; delays of 0 to 3
 samples, lags of 0.3 to 2 ms, angle noise 0.02 to 0.05 deg and a 12-bit converter (tests/python/support). Each gives an
