@@ -195,14 +195,16 @@ def test_a_gated_throttle_is_a_plant_that_says_what_was_applied():
 def test_where_the_bridge_cannot_be_opened_the_run_ends(shadow):
     plant = GatedThrottle(VirtualThrottle(seed=2), shadow=shadow)
     assert plant.start() == pytest.approx(LIMP_HOME_DEG, abs=1.0)
-    plant.apply({"duty": 0.3})
-    assert plant.measure().applied == {"duty": 0.3}
+    for _ in range(250):  # beyond the ramp of the first 0.2 s
+        plant.apply({"duty": 0.3})
+        measured = plant.measure()
+    assert measured.applied == {"duty": 0.3}
     plant.gate.abort()
     if shadow:
         plant.apply({"duty": 0.3})
         assert plant.measure().applied == {"duty": 0.0}
         return
-    with pytest.raises(RigError, match="the safety gate went to 'limp': requested"):
+    with pytest.raises(RigError, match="the safety gate went to 'limp': aborted"):
         plant.apply({"duty": 0.3})
     assert plant.measure().applied == {"duty": 0.3}, "a refused duty is not sent"
 
