@@ -9,6 +9,7 @@ import numpy as np
 import pytest
 
 from bus_node import ETB
+from mgdd.cli import main
 from mgdd.errors import RigError
 from mgdd.loop import ThrottleFault, VirtualThrottle, tuned_controller
 from mgdd.rig import CanRig, GatedThrottle, SafetyEnvelope, SafetyGate, VirtualNode
@@ -129,3 +130,8 @@ def test_the_envelope_of_the_node_is_the_wider_one() -> None:
     assert (node["ramp_s"], node["held_cycles"]) == (0.0, 0.0)
     same = ["stall_duty", "stall_move_deg", "heat_time_constant_s", "sensor_sum_v", "closed_deg", "open_deg"]
     assert [name for name in same if node[name] != host[name]] == []
+
+
+def test_the_envelope_of_a_node_is_refused_by_name(capsys: pytest.CaptureFixture[str]) -> None:
+    assert main(["rig", "node", "--bus", "virtual:nobody", "--envelope", "etb_nod"]) == 2
+    assert "no shipped envelope 'etb_nod': did you mean 'etb_node'" in capsys.readouterr().err

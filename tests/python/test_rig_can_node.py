@@ -10,7 +10,7 @@ from bus_node import ETB
 from mgdd._core.rig import Frame
 from mgdd.errors import ParameterError
 from mgdd.loop import EngineBench, VirtualThrottle
-from mgdd.rig import SignalMap
+from mgdd.rig import SafetyEnvelope, SignalMap
 from mgdd.rig.can.frame import changed
 from mgdd.rig.can.inbox import Inbox
 from mgdd.rig.can.link import Sender
@@ -181,6 +181,36 @@ def test_in_steps_a_command_that_comes_twice_is_one_sample(host: Host) -> None:
     assert host.core.take(frame)
     host.core.answer()
     assert not host.core.take(frame)
+
+
+def test_what_the_gate_limits_is_applied_and_reported() -> None:
+    tight = SafetyEnvelope.load("etb_node").replace(duty_limit=0.3, slew_per_s=20.0)
+    host, applied = Host(NodeCore(node_of(ETB, seed=1), ETB, tight)), []
+    host.send(None, 5)
+    for _ in range(5):
+        host.send(0.5)
+        assert host.core.last is not None
+        applied.append(host.core.last.applied["duty"])
+    assert applied == pytest.approx([0.1, 0.2, 0.3, 0.3, 0.3])
+    (status,) = (frame for frame in host.core.sample(host.now_ns) if frame.id == 0x121)
+    assert ETB.measurements["ETB_Status"].read_applied(status.data)["duty"] == pytest.approx(0.3)
+
+
+def test_in_steps_the_age_of_a_command_is_counted_in_samples() -> None:
+    """Commands that jump in their counter bring samples, and are not used: no clock but that of the samples."""
+    patient = SafetyEnvelope.load("etb_node").replace(bad_frames=1e3)
+    host, driven = Host(NodeCore(node_of(ETB, seed=1), ETB, patient)), []
+    for duty in (None, None, None, None, None, 0.5):
+        assert host.core.take(host.frame(duty))
+        host.core.answer()
+    for _ in range(6):
+        for _ in range(7):
+            host.frame(0.5)  # lost
+        assert host.core.take(host.frame(0.5))
+        host.core.answer()
+        driven.append(host.core.driven)
+    assert driven == [True] * 4 + [False] * 2  # 20 ms are four samples
+    assert host.decided == ("limp", "stale")
 
 
 def test_without_drive_the_plate_is_at_limp_home_and_an_engine_stands(host: Host) -> None:
