@@ -50,6 +50,7 @@ def test_a_host_that_rests_may_fall_silent() -> None:
     loop.until(ONSET, safe=True)
     loop.until(OVER)  # nothing arrives
     assert loop.core.state == "armed"
+    assert loop.core.gate.cause == "none"
     loop.until(OVER + 25.0)  # the first one jumps in its counter, then three good ones
     assert loop.core.driven
 

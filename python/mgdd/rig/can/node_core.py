@@ -162,10 +162,10 @@ class NodeCore:
     def _passed(self, command_age_s: float | None) -> dict[str, float] | None:
         """Tell the gate of this cycle, and give the inputs that it lets pass; None: without drive."""
         was_driven = self.driven
-        age_s = command_age_s if was_driven else 0.0  # who is not driven may be left alone
+        age_s = 0.0 if self._all_say("rest") else command_age_s  # a host that rests may fall silent
         facts = self.plant.facts(self.gate.envelope)
         rounds = min((self._good[name] for name in self._timeouts_s), default=0)
-        self._good.subtract(dict.fromkeys(self._timeouts_s, rounds))
+        self._good = Counter({name: min(self._good[name] - rounds, 1) for name in self._timeouts_s})
         bad, self._bad = self._bad, 0
         self.gate.observe(
             **{
