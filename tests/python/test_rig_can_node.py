@@ -10,12 +10,13 @@ from bus_node import ETB
 from mgdd._core.rig import Frame
 from mgdd.errors import ParameterError
 from mgdd.loop import EngineBench, VirtualThrottle
-from mgdd.rig import SignalMap
+from mgdd.rig import SafetyEnvelope, SignalMap
 from mgdd.rig.can.frame import changed
 from mgdd.rig.can.inbox import Inbox
 from mgdd.rig.can.link import Sender
 from mgdd.rig.can.node import node_of
-from mgdd.rig.can.node_core import NodeCore, node_plant
+from mgdd.rig.can.node_core import NodeCore
+from mgdd.rig.can.node_plant import node_plant
 
 
 class Host:
@@ -41,8 +42,14 @@ class Host:
             self.wait(0.005)
 
     def wait(self, seconds: float) -> None:
+        """One sample of the node, so much later."""
         self.now_ns += round(seconds * 1e9)
-        self.core.watch(self.now_ns)
+        self.core.sample(self.now_ns)
+
+    @property
+    def decided(self) -> tuple[str, str]:
+        """Mode and reason of the gate."""
+        return self.core.gate.mode, self.core.gate.reason
 
 
 @pytest.fixture
@@ -64,6 +71,17 @@ def test_a_node_has_to_be_armed_before_it_is_driven(host: Host) -> None:
     assert host.core.state == "armed"
 
 
+def trouble(host: Host) -> set[str]:
+    """Trouble codes that are on in the next ETB_Diag."""
+    message, names = ETB.measurements["ETB_Diag"], ("command_timeout", "wrong_crc", "wrong_counter")
+    while True:
+        host.now_ns += 5_000_000
+        for frame in host.core.sample(host.now_ns):
+            if frame.id == message.message.frame_id:
+                told = message.read(frame.data)
+                return {name for name in names if told[name]}
+
+
 def running(host: Host) -> None:
     host.send(None, 5)
     host.send(0.5, 3)
@@ -75,7 +93,8 @@ def test_a_late_command_opens_the_bridge_and_only_arming_closes_it(host: Host) -
     host.wait(0.014)
     assert host.core.state == "run"
     host.wait(0.007)  # 5 + 14 + 7 ms after the last one, with a limit of 20 ms
-    assert (host.core.state, host.core.reasons) == ("limp", {"command_timeout": 1})
+    assert host.decided == ("limp", "stale")
+    assert trouble(host) == {"command_timeout"}
     host.send(0.5, 50)
     assert host.core.state == "limp"
     running(host)
@@ -86,14 +105,18 @@ def test_broken_commands_are_ignored_and_three_of_them_open_the_bridge(host: Hos
     for _ in range(2):
         bad = host.frame(0.9)
         host.core.take(changed(bad, data=bad.data[:-1] + bytes([bad.data[-1] ^ 0x10])))
+        host.wait(0.001)
         assert host.core.state == "run"
-    assert host.core._inputs == {"duty": 0.5}
+        assert host.core.last is not None
+        assert host.core.last.applied == {"duty": 0.5}
     host.send(0.4)  # one good frame between
     for k in range(3):
         bad = host.frame(0.9)
         host.core.take(changed(bad, data=bytes([bad.data[0] ^ 1]) + bad.data[1:]))
+        host.wait(0.001)
         assert host.core.state == ("limp" if k == 2 else "run")
-    assert host.core.reasons == {"wrong_crc": 1}
+    assert host.decided == ("limp", "bad_frames")
+    assert trouble(host) == {"wrong_crc"}
 
 
 def test_a_frozen_sender_is_not_one_that_lives(host: Host) -> None:
@@ -103,7 +126,9 @@ def test_a_frozen_sender_is_not_one_that_lives(host: Host) -> None:
     for _ in range(3):
         host.wait(0.004)
         host.core.take(changed(frozen, monotonic_ns=host.now_ns))
-    assert (host.core.state, host.core.reasons) == ("limp", {"wrong_counter": 1})
+    host.wait(0.001)
+    assert host.decided == ("limp", "bad_frames")
+    assert trouble(host) == {"wrong_counter"}
 
 
 def test_a_mode_that_the_node_does_not_have_is_not_driven_and_does_not_arm(host: Host) -> None:
@@ -115,10 +140,12 @@ def test_a_mode_that_the_node_does_not_have_is_not_driven_and_does_not_arm(host:
 
     for _ in range(10):
         host.core.take(in_mode("position"))
+        host.wait(0.005)
     assert host.core.state == "init"
     running(host)
     host.core.take(in_mode("calib"))
-    assert not host.core.driven
+    host.wait(0.005)
+    assert host.decided == ("armed", "requested")
     host.send(0.5)
     assert host.core.driven
 
@@ -128,7 +155,7 @@ def test_what_came_too_long_ago_is_missing() -> None:
     inbox = Inbox(ETB)
     seen = []
     for cycle in range(12):
-        for frame in core.sample():
+        for frame in core.sample(cycle * 5_000_000):
             if frame.id != 0x122 or cycle < 5:  # the sensors fall silent
                 inbox.take(frame)
         if inbox.ready:
@@ -144,6 +171,7 @@ def test_foreign_and_short_frames_change_nothing(host: Host) -> None:
     assert not host.core.take(changed(good, id=0x121))
     assert not host.core.take(changed(good, extended=True))
     assert not host.core.take(changed(good, data=good.data[:7]))
+    host.wait(0.005)
     assert host.core.state == "run"
 
 
@@ -155,16 +183,43 @@ def test_in_steps_a_command_that_comes_twice_is_one_sample(host: Host) -> None:
     assert not host.core.take(frame)
 
 
+def test_what_the_gate_limits_is_applied_and_reported() -> None:
+    tight = SafetyEnvelope.load("etb_node").replace(duty_limit=0.3, slew_per_s=20.0)
+    host, applied = Host(NodeCore(node_of(ETB, seed=1), ETB, tight)), []
+    host.send(None, 5)
+    for _ in range(5):
+        host.send(0.5)
+        assert host.core.last is not None
+        applied.append(host.core.last.applied["duty"])
+    assert applied == pytest.approx([0.1, 0.2, 0.3, 0.3, 0.3])
+    (status,) = (frame for frame in host.core.sample(host.now_ns) if frame.id == 0x121)
+    assert ETB.measurements["ETB_Status"].read_applied(status.data)["duty"] == pytest.approx(0.3)
+
+
+def test_in_steps_the_age_of_a_command_is_counted_in_samples() -> None:
+    """Commands that jump in their counter bring samples, and are not used: no clock but that of the samples."""
+    patient = SafetyEnvelope.load("etb_node").replace(bad_frames=1e3)
+    host, driven = Host(NodeCore(node_of(ETB, seed=1), ETB, patient)), []
+    for duty in (None, None, None, None, None, 0.5):
+        assert host.core.take(host.frame(duty))
+        host.core.answer()
+    for _ in range(6):
+        for _ in range(7):
+            host.frame(0.5)  # lost
+        assert host.core.take(host.frame(0.5))
+        host.core.answer()
+        driven.append(host.core.driven)
+    assert driven == [True] * 4 + [False] * 2  # 20 ms are four samples
+    assert host.decided == ("limp", "stale")
+
+
 def test_without_drive_the_plate_is_at_limp_home_and_an_engine_stands(host: Host) -> None:
     running(host)
-    for _ in range(40):
-        host.send(0.5)
-        host.core.sample()
+    host.send(0.5, 80)
     assert host.core.last is not None
     assert host.core.last.values["angle_deg"] > 40.0
-    host.wait(0.1)
-    for _ in range(80):
-        host.core.sample()
+    for _ in range(81):
+        host.wait(0.005)
     assert host.core.last.values["angle_deg"] == pytest.approx(8.0, abs=1.0)
     assert host.core.last.applied == {"duty": 0.0}
     engine = node_plant(EngineBench())

@@ -16,7 +16,8 @@ from mgdd.errors import RigError
 from mgdd.loop import VirtualThrottle
 from mgdd.rig import CanRig, CanTransport, Frame, SignalMap, SocketCanTransport
 from mgdd.rig.can.node import run_node
-from mgdd.rig.can.node_core import NodeCore, node_plant
+from mgdd.rig.can.node_core import NodeCore
+from mgdd.rig.can.node_plant import node_plant
 
 CHANNEL = "vcan0"
 BUS_OFF, CONTROLLER, RESTARTED = 0x40, 0x04, 0x100
@@ -194,8 +195,7 @@ def test_an_error_frame_takes_the_drive_away(
         while not abs(angle_of(node) - HOME_DEG) < 1.0:  # nothing is sent any more: the node opens the bridge itself
             assert time.monotonic() < until
             time.sleep(0.02)
-        assert node.state == "limp"
-        assert node.reasons == {"command_timeout": node.reasons["command_timeout"]}
+        assert (node.gate.mode, node.gate.reason) == ("limp", "stale")
     assert not node.driven
 
 

@@ -12,10 +12,11 @@ from typing import TYPE_CHECKING, Any
 from mgdd.cli import rig_records, rig_run, rig_selftest
 from mgdd.cli.options import add_command, add_group, refuse_idle
 from mgdd.cli.output import check_file, check_output, emit
-from mgdd.rig import CanTransport, SignalMap
+from mgdd.rig import CanTransport, SafetyEnvelope, SignalMap
 from mgdd.rig.can.hub_faults import BusFault
 from mgdd.rig.can.node import TruthLog, node_of, parent_watch, run_node
-from mgdd.rig.can.node_core import NodeCore, NodePlant, node_plant
+from mgdd.rig.can.node_core import NodeCore
+from mgdd.rig.can.node_plant import NodePlant, node_plant
 from mgdd.rig.can.signal_map import SHIPPED
 from mgdd.rig.can.signals import noted_signals
 
@@ -73,6 +74,10 @@ def _add_node(verbs: Any) -> None:
         metavar="INTERFACE:CHANNEL",
         help="any interface of python-can, ?OPTION=VALUE&... behind",
     )
+    parser.add_argument(
+        "--envelope", default="etb_node", metavar="NAME_OR_FILE.toml",
+        help="of the safety gate of the node; cycle and time limit come from the map (default: etb_node)",
+    )  # fmt: skip
     parser.add_argument("--step", action="store_true", help="no clock: one sample per command, always the same bits")
     parser.add_argument("--period-ms", type=float, metavar="X", help="between samples (default: that of the map)")
     parser.add_argument(
@@ -130,7 +135,7 @@ def _node(args: argparse.Namespace) -> None:
     signal_map = SignalMap.load(args.map)
     period_s = None if args.period_ms is None else args.period_ms * 1e-3
     sample_s = period_s if args.sample_ms is None else args.sample_ms * 1e-3
-    core = NodeCore(_plant_of(args, signal_map, sample_s), signal_map)
+    core = NodeCore(_plant_of(args, signal_map, sample_s), signal_map, SafetyEnvelope.load(args.envelope))
     log = None if args.truth is None else TruthLog(args.truth)
     try:
         with noted_signals() as stopped, CanTransport.parse(args.bus) as bus:
@@ -138,7 +143,8 @@ def _node(args: argparse.Namespace) -> None:
             args.progress.close()
             _say(args, f"{signal_map.file.stem} on {bus.name}: ready")
             run_node(core, bus, step=args.step, period_s=period_s, log=log, keep_on=_until(args.duration_s, stopped))
-            counts = {"samples": core.samples, "state": core.state, **core.reasons, **bus.counters}
+            counts = {"samples": core.samples, "mode": core.gate.mode, "reason": core.gate.reason}
+            counts |= {"gate": core.gate.counts, **bus.counters}
     finally:
         if log is not None:
             log.close()

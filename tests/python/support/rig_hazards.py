@@ -1,15 +1,19 @@
-"""A throttle at 1 kHz behind a safety gate, and the hazards of a rig with what must follow from each."""
+"""A throttle behind a safety gate, at 1 kHz or in a node, and the hazards of a rig with what must follow from each."""
 
 from __future__ import annotations
 
 import math
 from collections.abc import Callable, Mapping
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from typing import Any
 
 from mgdd.control import Pid
-from mgdd.loop import ThrottleFault, VirtualThrottle
-from mgdd.rig import SafetyEnvelope, SafetyGate
+from mgdd.loop import ThrottleFault, VirtualThrottle, tuned_controller
+from mgdd.rig import Frame, SafetyEnvelope, SafetyGate, SignalMap
+from mgdd.rig.can.frame import changed
+from mgdd.rig.can.link import Sender
+from mgdd.rig.can.node_core import NodeCore
+from mgdd.rig.can.node_plant import node_plant
 from mgdd.rig.gated import facts_of
 from mgdd.throttle import SensorFault
 
@@ -140,3 +144,106 @@ class Loop:
         """Where the plate really is."""
         assert self.values is not None
         return self.values["angle_deg"]
+
+
+SAMPLE_MS = 5.0
+LAST = round(ONSET / SAMPLE_MS) - 1  # number of the last command before the onset
+Frames = Callable[[Frame, list[Frame]], list[Frame]]  # of the command of a sample and those before it: what arrives
+
+
+@dataclass(frozen=True, kw_only=True)
+class NodeHazard:
+    """What goes wrong behind the bus from ONSET to OVER [ms], and the answer of the node."""
+
+    mode: str
+    reason: str
+    within_ms: float  # from the onset to the open bridge
+    faults: tuple[ThrottleFault | SensorFault, ...] = ()
+    arrives: Frames = lambda frame, _: [frame]
+    duty: Callable[[float], float] | None = None  # by the milliseconds since the onset
+    reference_deg: float = 40.0  # from the onset on
+    changes: Mapping[str, float] = field(default_factory=dict)  # of the envelope
+    returns: bool = True  # the plate to limp-home, while the hazard lasts
+
+
+def broken(frame: Frame, _: list[Frame]) -> list[Frame]:
+    return [changed(frame, data=frame.data[:-1] + bytes([frame.data[-1] ^ 0x20]))]
+
+
+def of_table(name: str, within_ms: float, **changes: Any) -> NodeHazard:
+    """The same fault of the plate or its sensors as for the host."""
+    known = HAZARDS[name]
+    made = NodeHazard(mode=known.mode, reason=known.reason, within_ms=within_ms, faults=known.faults)
+    return replace(made, returns=known.returns, **changes)
+
+
+NODE_HAZARDS = {
+    "host dies": NodeHazard(mode="limp", reason="stale", within_ms=30.0, arrives=lambda *_: []),
+    "host hangs, its adapter repeats": NodeHazard(
+        mode="limp", reason="bad_frames", within_ms=20.0, arrives=lambda _, before: before[LAST : LAST + 1]
+    ),
+    "commands come late": NodeHazard(
+        mode="limp",
+        reason="stale",
+        within_ms=30.0,
+        arrives=lambda frame, before: [frame] if len(before) % 8 == 0 else [],
+    ),
+    "commands corrupted": NodeHazard(mode="limp", reason="bad_frames", within_ms=20.0, arrives=broken),
+    "lost measurement": of_table("lost measurement", 30.0),
+    "late measurement": of_table("late measurement", 30.0),
+    "sensors disagree": of_table("sensors disagree", 40.0),
+    "sensor wire open": of_table("sensor wire open", 40.0),
+    "sensor shorted to supply": of_table("sensor shorted to supply", 40.0),
+    "actuator overload, plate jammed": of_table("actuator overload, plate jammed", 900.0, reference_deg=85.0),
+    "actuator overload, duty too high for too long": NodeHazard(
+        mode="limp",
+        reason="heat",
+        within_ms=650.0,
+        duty=lambda ms: 0.75 if int(ms) // 30 % 2 else -0.75,
+        changes={"heat_time_constant_s": 0.5},
+    ),
+}
+
+
+class NodeLoop:
+    """Controller and node with frames and time by hand, a sample every 5 ms."""
+
+    def __init__(self, hazard: NodeHazard) -> None:
+        self.hazard, self.ms = hazard, 0.0
+        self.map = SignalMap.load("etb")
+        plant = VirtualThrottle(inputs=("duty", "bridge_open"), sample_s=5e-3, faults=hazard.faults, seed=5)
+        envelope = SafetyEnvelope.load("etb_node").replace(**hazard.changes)
+        self.core = NodeCore(node_plant(plant), self.map, envelope)
+        self.controller, self.sender = tuned_controller("pid", sample_s=5e-3), Sender()
+        self.sent: list[Frame] = []
+
+    def step(self, *, safe: bool = False) -> None:
+        """One command and one sample; the hazard acts on what arrives."""
+        after, acts = self.ms - ONSET, ONSET <= self.ms < OVER
+        measured = math.nan if self.core.last is None else self.core.last.values["sensed_angle_deg"]
+        duty = self.controller.step(self.hazard.reference_deg if after >= 0 else 40.0, measured)
+        if acts and self.hazard.duty is not None:
+            duty = self.hazard.duty(after)
+        command = self.map.commands["ETB_Cmd"]
+        payloads = command.payloads({}, command.safe) if safe else command.payloads({"duty": duty}, command.driven)
+        (frame,) = self.sender.frames(command, payloads)
+        for arrived in self.hazard.arrives(frame, self.sent) if acts else [frame]:
+            self.core.take(changed(arrived, monotonic_ns=self.now_ns))
+        self.sent.append(frame)
+        self.ms += SAMPLE_MS
+        self.core.sample(self.now_ns)
+
+    def until(self, ms: float, *, safe: bool = False) -> None:
+        while self.ms < ms:
+            self.step(safe=safe)
+
+    @property
+    def now_ns(self) -> int:
+        """Monotonic time."""
+        return 10**9 + round(self.ms * 1e6)
+
+    @property
+    def angle_deg(self) -> float:
+        """Where the plate really is."""
+        assert self.core.last is not None
+        return self.core.last.values["angle_deg"]

@@ -8,7 +8,8 @@ from mgdd._core.rig import Frame
 from mgdd.errors import RigError
 from mgdd.loop import Plant
 from mgdd.rig.can.frame import changed
-from mgdd.rig.can.node_core import NodeCore, node_plant
+from mgdd.rig.can.node_core import NodeCore
+from mgdd.rig.can.node_plant import node_plant
 from mgdd.rig.can.signal_map import SignalMap
 
 __all__ = ["LocalBus"]

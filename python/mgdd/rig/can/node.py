@@ -14,7 +14,8 @@ from mgdd.errors import ParameterError
 from mgdd.loop import EngineBench, ThrottleFault, VirtualThrottle
 from mgdd.rig.can.fault_text import fault_of
 from mgdd.rig.can.frame import Bus
-from mgdd.rig.can.node_core import NodeCore, NodePlant, node_plant
+from mgdd.rig.can.node_core import NodeCore
+from mgdd.rig.can.node_plant import NodePlant, node_plant
 from mgdd.rig.can.signal_map import SignalMap
 from mgdd.throttle import SensorFault
 
@@ -26,7 +27,7 @@ _FAULT_KEYS = {"from_s": float, "until_s": float, "size": float, "sensor": int}
 
 
 class TruthLog:
-    """What really happened, a line per sample: time, state of the node, whether driven, and all that the plant knows.
+    """What really happened, a line per sample: time, mode and reason of the gate, and all that the plant knows.
 
     Parameters
     ----------
@@ -58,10 +59,10 @@ class TruthLog:
             self._names = list(values)
             self._writer = csv.writer(self._file)
             heads = [f"applied_{name}" for name in core.plant.input_names]
-            self._writer.writerow(["monotonic_ns", "state", "driven", *heads, *self._names])
+            self._writer.writerow(["monotonic_ns", "mode", "driven", "reason", *heads, *self._names])
         applied = [core.last.applied.get(name, "") for name in core.plant.input_names]
         row = [values.get(name, "") for name in self._names]
-        self._writer.writerow([now_ns, core.state, int(core.driven), *applied, *row])
+        self._writer.writerow([now_ns, core.gate.mode, int(core.driven), core.gate.reason, *applied, *row])
 
     def close(self) -> None:
         """Close the file."""
@@ -176,8 +177,7 @@ def run_node(
         if behind_ns > _MOST_BEHIND_S * 1e9:
             next_ns += behind_ns
         while True:  # a late node catches up in silence: the plate moves, whether somebody looks or not
-            core.watch(next_ns)
-            frames = core.sample()
+            frames = core.sample(next_ns)
             if log is not None:
                 log.write(core, next_ns)
             next_ns += period_ns
@@ -192,9 +192,10 @@ def _run_steps(core: NodeCore, bus: Bus, log: TruthLog | None, keep_on: Callable
         frame = bus.receive(_STEP_POLL_S)
         if frame is None or not core.take(frame):
             continue
+        was_driven = core.driven
         for answer in core.answer():
             bus.send(answer)
-        if log is not None and core.driven:
+        if log is not None and (core.driven or was_driven):  # also why the drive was taken away
             log.write(core, frame.monotonic_ns)
 
 

@@ -1,113 +1,42 @@
 """The other side of the bus, without a process: commands in, one sample of the plant, measurement frames out.
 
-It trusts nobody: counter and CRC of every command are checked here, and a command that stops to come, or comes
-broken, takes the drive away. Then the host has to arm it again with safe frames.
+It trusts nobody: counter and CRC of every command are checked here, and what leaves for the plant passes the safety
+gate of the node. After the gate took the drive away, the host has to arm the node again with safe frames.
 """
 
 from __future__ import annotations
 
 import math
+from collections import Counter
 from collections.abc import Mapping
-from typing import Any, NamedTuple, Protocol
+from typing import Any
 
 from mgdd._core.rig import Frame
 from mgdd.errors import ParameterError
-from mgdd.loop import Plant, VirtualThrottle
 from mgdd.rig.can.link import Receiver, Sender
 from mgdd.rig.can.mapped import MappedMessage, MappedSignal
+from mgdd.rig.can.node_plant import NodePlant, Sampled
 from mgdd.rig.can.signal_map import SignalMap
+from mgdd.rig.safety import SafetyGate
+from mgdd.rig.safety_envelope import SafetyEnvelope
 
-__all__ = ["NodeCore", "NodePlant", "Sampled", "node_plant"]
+__all__ = ["NodeCore"]
 
 _ARMING_FRAMES = 3  # safe commands in a row that arm it
-
-
-class Sampled(NamedTuple):
-    """One sample of a plant behind a bus."""
-
-    values: Mapping[str, float]
-    applied: Mapping[str, float]
-
-
-class NodePlant(Protocol):
-    """A plant that can be driven or left alone."""
-
-    @property
-    def input_names(self) -> tuple[str, ...]:
-        """Inputs that commands may carry."""
-        ...
-
-    def sample(self, inputs: Mapping[str, float] | None) -> Sampled:
-        """Run one sample; None: without drive."""
-        ...
-
-
-class _Throttle:
-    """A throttle: without drive the bridge is open, and the springs move the plate to limp-home."""
-
-    def __init__(self, plant: VirtualThrottle) -> None:
-        self._plant = plant
-        self.input_names = tuple(name for name in plant.input_names if name != "bridge_open")
-
-    def sample(self, inputs: Mapping[str, float] | None) -> Sampled:
-        given = dict.fromkeys(self.input_names, 0.0) if inputs is None else dict(inputs)
-        if inputs is None and "supply_v" in given:
-            given["supply_v"] = self._plant.throttle.supply_v
-        self._plant.apply({**given, "bridge_open": float(inputs is None)})
-        return Sampled(values=self._plant.measure().values, applied=given)
-
-
-class _Cyclic:
-    """An engine: without drive there is no cycle, and nothing is measured."""
-
-    def __init__(self, plant: Plant) -> None:
-        self._plant = plant
-        self.input_names = tuple(plant.input_names)
-
-    def sample(self, inputs: Mapping[str, float] | None) -> Sampled:
-        if inputs is None:
-            return Sampled(values={}, applied={})
-        self._plant.apply(inputs)
-        measured = self._plant.measure()
-        return Sampled(values={**measured.limits, **measured.values}, applied={**inputs, **measured.applied})
-
-
-def node_plant(plant: Plant) -> NodePlant:
-    """Put a plant of the loop behind a node.
-
-    Parameters
-    ----------
-    plant : mgdd.loop.Plant
-        A throttle must have ``bridge_open`` among its inputs.
-
-    Returns
-    -------
-    NodePlant
-        What a node drives.
-
-    Raises
-    ------
-    mgdd.errors.ParameterError
-        A throttle whose bridge cannot be opened.
-    """
-    if not isinstance(plant, VirtualThrottle):
-        return _Cyclic(plant)
-    if "bridge_open" not in plant.input_names:
-        raise ParameterError.of(
-            "inputs of the throttle", list(plant.input_names), "with 'bridge_open': power off means an open bridge"
-        )
-    return _Throttle(plant)
+_COUNTER_ERRORS = ("repeated", "lost", "wrong_counter")
 
 
 class NodeCore:
-    """State machine of a node: init, armed, run, limp.
+    """What a node does: judge commands, ask its safety gate, sample the plant, report.
 
     Parameters
     ----------
     plant : NodePlant
         What it drives.
     signal_map : SignalMap
-        Its messages.
+        Its messages; the time limit of the commands is that of the map.
+    envelope : SafetyEnvelope, optional
+        Of its gate; the shipped ``etb_node`` if left out. Cycle and time limit come from plant and map.
 
     Raises
     ------
@@ -115,7 +44,7 @@ class NodeCore:
         Inputs of the plant that no command carries, or the other way round.
     """
 
-    def __init__(self, plant: NodePlant, signal_map: SignalMap) -> None:
+    def __init__(self, plant: NodePlant, signal_map: SignalMap, envelope: SafetyEnvelope | None = None) -> None:
         if set(plant.input_names) != set(signal_map.input_names):
             raise ParameterError.of(
                 "inputs of the map",
@@ -123,29 +52,44 @@ class NodeCore:
                 f"those of the plant, {', '.join(plant.input_names)}",
             )
         self.plant, self.map = plant, signal_map
-        self.state = "init"
         self.samples = 0
         self.last: Sampled | None = None
-        self.reasons: dict[str, int] = {}
         self._receiver = Receiver(signal_map.commands)
         self._sender = Sender()
         self._inputs: dict[str, float] = {}
         self._said: dict[str, str] = {}  # by message: rest, drive or other
         self._fresh: set[str] = set()
+        self._good: Counter[str] = Counter()  # commands by message that the gate does not know of yet
+        self._bad = 0
+        self._bad_status = ""
         self._safe_frames = 0
-        self._cyclic = {name: m for name, m in signal_map.commands.items() if m.timeout_s is not None}
+        self._is_asked_to_arm = False
+        self._troubles: set[str] = set()  # why the drive was taken away so far, as ETB_Diag names it
+        self._timeouts_s = {name: m.timeout_s for name, m in signal_map.commands.items() if m.timeout_s is not None}
         self._codes = {} if signal_map.state is None else dict(signal_map.state.signal.choices)
         trigger = signal_map.measurements[signal_map.trigger]
         last = [m for m in signal_map.measurements.values() if m is not trigger]
         self._order = [*last, trigger]
+        cycle_s = signal_map.cycle_s if plant.sample_s is None else plant.sample_s
+        self._limit_s = min(self._timeouts_s.values(), default=cycle_s)
+        self.gate = SafetyGate(
+            (SafetyEnvelope.load("etb_node") if envelope is None else envelope).replace(
+                cycle_s=cycle_s, largest_age_cycles=max(self._limit_s / cycle_s, 1.0)
+            )
+        )
+
+    @property
+    def state(self) -> str:
+        """Mode of the gate, as the state signal of the map names it."""
+        return self.gate.mode
 
     @property
     def driven(self) -> bool:
         """Whether the plant is driven."""
-        return self.state == "run"
+        return self.gate.mode == "run"
 
     def take(self, frame: Frame) -> bool:
-        """Take a frame of the bus.
+        """Take a frame of the bus; what follows from it, the next sample shows.
 
         Parameters
         ----------
@@ -164,64 +108,99 @@ class NodeCore:
         message = taken.message
         if taken.usable:
             self._use(message, frame.data)
-        elif self.driven and not self._receiver.valid(message.name):
-            self._limp("wrong_counter" if taken.status in ("repeated", "lost", "wrong_counter") else "wrong_crc")
+        elif taken.status not in ("ok", "initial"):
+            self._bad += 1
+            self._bad_status = taken.status
         if taken.is_new:
             self._fresh.add(message.name)
-        return taken.is_new and message.name in self._cyclic and self._fresh >= set(self._cyclic)
+        return taken.is_new and message.name in self._timeouts_s and self._fresh >= set(self._timeouts_s)
 
-    def watch(self, now_ns: int) -> None:
-        """Take the drive away where a command is late.
+    def sample(self, now_ns: int) -> list[Frame]:
+        """Run one sample of a node with a clock.
 
         Parameters
         ----------
         now_ns : int
             Monotonic time [ns].
-        """
-        for name, message in self._cyclic.items():
-            age_s = (now_ns - self._receiver.stamps_ns.get(name, 0)) * 1e-9
-            if self.driven and message.timeout_s is not None and age_s > message.timeout_s:
-                self._limp("command_timeout")
 
-    def sample(self) -> list[Frame]:
-        """Run one sample and give the frames that report it, the trigger message last."""
-        self.last = self.plant.sample(dict(self._inputs) if self.driven else None)
+        Returns
+        -------
+        list of Frame
+            That report it, the trigger message last.
+        """
+        stamps = self._receiver.stamps_ns
+        shares = [(now_ns - stamps.get(name, 0)) * 1e-9 / limit_s for name, limit_s in self._timeouts_s.items()]
+        self.last = self.plant.sample(self._passed(max([0.0, *shares]) * self._limit_s))
         return self._report(self.last)
 
     def answer(self) -> list[Frame]:
-        """Answer a tick of a node that runs step by step: a sample while driven, else time stands still."""
+        """Answer a tick of a node that runs step by step: a sample while driven, else time stands still.
+
+        The clock of its gate counts ticks: commands that came are new, missing ones a cycle older.
+        """
         self._fresh.clear()
-        if self.driven:
-            return self.sample()
+        came = all(self._good[name] for name in self._timeouts_s)
+        inputs = self._passed(0.0 if came else None)
+        if inputs is not None:
+            self.last = self.plant.sample(inputs)
         return self._report(self.last or Sampled(values={}, applied={}))
 
     def _use(self, message: MappedMessage, payload: bytes) -> None:
         self._inputs.update(message.read(payload))
-        if message.name not in self._cyclic:
+        if message.name not in self._timeouts_s:
             return
+        self._good[message.name] += 1
         rests, drives = message.rests(payload), message.drives(payload)
         self._said[message.name] = "rest" if rests else "drive" if drives else "other"
-        said = [self._said.get(name) for name in self._cyclic]
-        if all(word == "rest" for word in said):
-            self._safe_frames += 1
-            armed = self._safe_frames >= _ARMING_FRAMES * len(self._cyclic)
-            if self.state == "run" or (self.state in ("init", "limp") and armed):
-                self.state = "armed"
-            return
-        self._safe_frames = 0
-        if self.state == "run" and "other" in said:  # a mode that this node does not have
-            self.state = "armed"
-        complete = set(self._inputs) >= set(self.map.input_names)
-        if self.state == "armed" and complete and all(word == "drive" for word in said):
-            self.state = "run"
+        self._safe_frames = self._safe_frames + 1 if self._all_say("rest") else 0
+        if self._safe_frames >= _ARMING_FRAMES * len(self._timeouts_s):
+            self._is_asked_to_arm = True
 
-    def _limp(self, reason: str) -> None:
-        self.state = "limp"
-        self._safe_frames = 0
-        self.reasons[reason] = self.reasons.get(reason, 0) + 1
+    def _all_say(self, word: str) -> bool:
+        return all(self._said.get(name) == word for name in self._timeouts_s)
+
+    def _passed(self, command_age_s: float | None) -> dict[str, float] | None:
+        """Tell the gate of this cycle, and give the inputs that it lets pass; None: without drive."""
+        was_driven = self.driven
+        age_s = 0.0 if self._all_say("rest") else command_age_s  # a host that rests may fall silent
+        facts = self.plant.facts(self.gate.envelope)
+        rounds = min((self._good[name] for name in self._timeouts_s), default=0)
+        self._good = Counter({name: min(self._good[name] - rounds, 1) for name in self._timeouts_s})
+        bad, self._bad = self._bad, 0
+        self.gate.observe(
+            **{
+                **facts,
+                "good_frames": rounds if facts["good_frames"] else 0,
+                "bad_frames": bad,
+                "age_s": None if age_s is None else max(age_s, facts["age_s"]),
+                "request": self._request(),
+            }
+        )
+        drive = self.gate.command(self._inputs.get("duty", 0.0))
+        if was_driven and self.gate.mode == "limp":
+            self._note_trouble(is_late=age_s is None or age_s >= facts["age_s"])
+        if drive.bridge_open:
+            return None
+        return self._inputs | ({"duty": drive.duty} if "duty" in self._inputs else {})
+
+    def _request(self) -> str:
+        """Give what the commands ask of the gate."""
+        asked, self._is_asked_to_arm = self._is_asked_to_arm, False
+        if asked and self.gate.mode in ("init", "limp", "fault"):
+            return "arm" if self.gate.mode == "init" else "reset"
+        drives = self._all_say("drive") and set(self._inputs) >= set(self.map.input_names)
+        if self.gate.mode == "run":
+            return "none" if drives else "stop"  # at rest, or in a mode that this node does not have
+        return "run" if drives else "none"
+
+    def _note_trouble(self, *, is_late: bool) -> None:
+        if self.gate.reason == "stale" and is_late:
+            self._troubles.add("command_timeout")
+        elif self.gate.reason == "bad_frames":
+            self._troubles.add("wrong_counter" if self._bad_status in _COUNTER_ERRORS else "wrong_crc")
 
     def _report(self, sampled: Sampled) -> list[Frame]:
-        own = {name: float(name in self.reasons) for name in ("command_timeout", "wrong_crc", "wrong_counter")}
+        own = {name: float(name in self._troubles) for name in ("command_timeout", "wrong_crc", "wrong_counter")}
         values = {**own, **sampled.values}
         frames: list[Frame] = []
         for message in self._order:
@@ -230,7 +209,7 @@ class NodeCore:
             raws: dict[str, Any] = {}
             state = self.map.state
             if state is not None and state.message == message.name:
-                raws[state.signal.name] = self._codes.get(self.state, 0)
+                raws[state.signal.name] = self._codes.get(self.gate.mode, 0)
             known = _carried(message.signals, values)
             applied = _carried(message.applied, sampled.applied)
             frames += self._sender.frames(message, message.payloads(known, raws, applied))
