@@ -204,7 +204,7 @@ class CanRig:
         if self.mode is RigMode.REPLAY:
             return
         wait_s = max(_PEER_S, _PEER_CYCLES * self.map.cycle_s, self.timeout_s)
-        until, rounds = time.monotonic() + wait_s, 0
+        until, rounds, before = time.monotonic() + wait_s, 0, self._inbox.answers
         checks = [message.e2e.good_until_valid for message in self.map.commands.values() if message.e2e is not None]
         enough = _ARMING_ROUNDS + max(checks, default=0)  # for a node that does not say its state
         while True:
@@ -215,6 +215,7 @@ class CanRig:
             self._inbox.skip()
             refuses = self._sends and (self._inbox.failed or self.state == "init")
             if heard and not refuses and (rounds >= enough or not self._sends):
+                self._hear_out(before + (rounds if self._sends and self.bus.shared else 0))
                 return
             if time.monotonic() > until if self.bus.shared else rounds > _PEER_CYCLES:
                 if heard:
@@ -222,6 +223,13 @@ class CanRig:
                 raise RigError(
                     f"{self.bus.name}: within {wait_s:g} s {self._inbox.no_answer()}; is the node on, is this its DBC?"
                 )
+
+    def _hear_out(self, answers: int) -> None:
+        """Wait for answers that are late: one to a safe frame must not pass for that to the first command."""
+        until = time.monotonic() + self.timeout_s
+        while self._inbox.answers < answers and (left_s := until - time.monotonic()) > 0.0:
+            self._receive(left_s)
+        self._inbox.skip()
 
     def open(self) -> None:
         """Connect, look who is there, and arm the node; `close` undoes it.

@@ -51,6 +51,11 @@ class Inbox:
         return self.map.state is not None and self.state in self.map.state.failed
 
     @property
+    def answers(self) -> int:
+        """How many trigger messages came, valid or not."""
+        return self._receiver.seen.get(self.map.measurements[self.map.trigger].message.frame_id, 0)
+
+    @property
     def counts(self) -> dict[str, dict[str, Any]]:
         """The checks by message."""
         return self._receiver.counts
