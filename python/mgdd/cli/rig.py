@@ -10,7 +10,7 @@ from collections.abc import Callable
 from typing import TYPE_CHECKING, Any
 
 from mgdd.cli import rig_records, rig_run, rig_selftest
-from mgdd.cli.options import add_command, add_group, refuse_idle
+from mgdd.cli.options import add_command, add_group, refuse_idle, require_positive
 from mgdd.cli.output import check_file, check_output, emit
 from mgdd.rig import CanTransport, SignalMap
 from mgdd.rig.can.hub_faults import BusFault
@@ -127,6 +127,7 @@ async def _serve(args: argparse.Namespace, hub: Hub) -> None:
 def _node(args: argparse.Namespace) -> None:
     check_output(args)
     check_file("--truth", args.truth, (".csv",))
+    require_positive(args, "period_ms", "sample_ms", "duration_s")
     signal_map = SignalMap.load(args.map)
     period_s = None if args.period_ms is None else args.period_ms * 1e-3
     sample_s = period_s if args.sample_ms is None else args.sample_ms * 1e-3
