@@ -120,7 +120,7 @@ def run_experiment(
     ------
     mgdd.errors.RigError
         No plant where it should be, a safety gate that took the drive away, a folder that holds another run. What was
-        recorded until then is in the folder.
+        recorded until then is in the folder; where nothing was, no folder is left.
     mgdd.errors.Error
         As `check_experiment`.
 
@@ -142,12 +142,17 @@ def run_experiment(
     mode = checked.experiment.mode
     if arm and mode != "bench":
         raise ParameterError.of("arm", arm, f"left out with mode = {mode!r}: only 'bench' drives hardware")
-    run = None if folder is None else RunFolder(folder)
-    if run is not None:
-        run.text("experiment.toml", checked.experiment.with_files(run.keep).to_toml())
-        run.json("run.json", {**versions(), **checked.to_dict()})
-    with RunRecord(None if run is None else run.file("run.rec"), checked) as record:
-        outcome, stand_said, timing = _steered(checked, record, arm=arm, key_file=key_file, watch=watch)
+    run, record = None if folder is None else RunFolder(folder), None
+    try:
+        if run is not None:
+            run.text("experiment.toml", checked.experiment.with_files(run.keep).to_toml())
+            run.json("run.json", {**versions(), **checked.to_dict()})
+        with RunRecord(None if run is None else run.file("run.rec"), checked) as record:
+            outcome, stand_said, timing = _steered(checked, record, arm=arm, key_file=key_file, watch=watch)
+    except BaseException:
+        if run is not None and (record is None or not record.began):
+            run.discard()
+        raise
     result = ExperimentResult(
         experiment=checked.experiment,
         figures=dict(outcome.figures),
