@@ -42,7 +42,7 @@ def text_of(path: str | os.PathLike[str]) -> tuple[str, str]:
 
 
 def toml_of(text: str, origin: str) -> dict[str, Any]:
-    """Read TOML.
+    r"""Read TOML.
 
     Parameters
     ----------
