@@ -16,7 +16,6 @@ from mgdd.rig import CanTransport, SignalMap
 from mgdd.rig.can.hub_faults import BusFault
 from mgdd.rig.can.node import TruthLog, node_of, parent_watch, run_node
 from mgdd.rig.can.node_core import NodeCore, NodePlant, node_plant
-from mgdd.rig.can.signal_map import SHIPPED
 from mgdd.rig.can.signals import noted_signals
 
 if TYPE_CHECKING:
@@ -65,7 +64,7 @@ def _add_node(verbs: Any) -> None:
         example="mgdd rig node --map etb --bus 'socketcand:can0?host=127.0.0.1&port=29536' --truth truth.csv",
     )  # fmt: skip
     parser.add_argument(
-        "--map", default="etb", metavar="NAME_OR_FILE.toml", help=f"{', '.join(SHIPPED)} or a file (default: etb)"
+        "--map", default="etb", metavar="NAME_OR_FILE.toml", help="etb, engine or a file (default: etb)"
     )
     parser.add_argument(
         "--bus",

@@ -40,7 +40,7 @@ def add(verbs: Any) -> None:
     check = add_command(
         verbs, "check", _check,
         help_text="check an experiment, its map, DBC, envelope and bus, and say what would run; nothing is sent",
-        example="mgdd rig check track.toml --mode bench --json",
+        example="mgdd rig check track.toml --mode bench --connection socketcan:can0 --pace real_time --json",
     )  # fmt: skip
     _add_experiment(check)
 
