@@ -102,7 +102,7 @@ def test_the_default_folder_is_new_for_every_run(
     [
         (["run", "away.toml"], "away.toml"),
         (["check", "away.toml"], "away.toml"),
-        (["run", "FILE", "--arm"], "arm = True: must be left out with mode = 'simulate'"),
+        (["run", "FILE", "--arm"], "--arm = True: must be left out with mode = 'simulate'"),
         (["run", "FILE", "--mode", "bench"], "needs [bus] connection"),
         (["run", "FILE", "--mode", "replay"], "needs [replay] record"),
         (["replay", "."], "holds no experiment.toml"),
@@ -112,7 +112,11 @@ def test_the_default_folder_is_new_for_every_run(
         (["run", "FILE", "--connection", "virtual:x"], "--connection does not act here; mode = 'simulate' has no bus"),
         (["check", "FILE", "--pace", "step"], "--pace does not act here; mode = 'simulate' has no bus"),
         (["run", "FILE", "--record", "run.rec"], "--record does not act here; mode = 'simulate' replays nothing"),
-        (["run", "FILE", "--key-file", "key.txt"], "--key-file does not act here; mode = 'simulate' needs no key"),
+        (
+            ["run", "FILE", "--mode", "bench", "--connection", "virtual:x", "--pace", "real_time"],
+            "drives real hardware: give --arm, and a --key-file or a confirmation",
+        ),
+        (["run", "FILE", "--key-file", "key.txt"], "--key-file = 'key.txt': must be left out with mode = 'simulate'"),
     ],
 )
 def test_bad_input_is_named(

@@ -93,6 +93,9 @@ def test_a_missing_key_or_file_is_named(tmp_path: Path) -> None:
         (TRACK + "[plant.scale]\ncoulomb_nm = -1.2\n", ParameterError, r"plant.scale: coulomb_nm = -0.34\d* N m"),
         (TRACK + '[plant]\npreset = "puma_single"\n', ParameterError, "is an engine, not a throttle"),
         (SEEK.replace("p_max_bar", "p_max"), ParameterError, "'p_max' is not measured"),
+        (TRACK + "[safety]\nrate_cad = 2.0\n", ParameterError, r"safety.rate_cad = 2: must be left out for a throttle"),
+        (TRACK + "[safety.limits]\ncurrent_a = 3.0\n", ParameterError, r"safety.limits = .*current_a.* for a throttle"),
+        (SEEK + '[safety]\nenvelope = "my.toml"\n', ParameterError, r"safety.envelope = 'my.toml': .* for an engine"),
         (TRACK.replace("20:35", "20:95"), ParameterError, r"track.reference = '20 to 95 deg': must be within .*90 deg"),
     ],
 )

@@ -62,8 +62,6 @@ def _checked(args: argparse.Namespace) -> CheckedExperiment:
         refuse_idle(args, "connection", "pace", why=f"mode = {mode!r} has no bus")
     if mode != "replay":
         refuse_idle(args, "record", why=f"mode = {mode!r} replays nothing")
-    if mode != "bench":
-        refuse_idle(args, "key_file", why=f"mode = {mode!r} needs no key")
     return check_experiment(experiment.with_mode(mode, record=args.record, connection=args.connection, pace=args.pace))
 
 

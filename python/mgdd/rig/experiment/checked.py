@@ -15,7 +15,15 @@ from mgdd.results.describe import described
 from mgdd.rig.can.signal_map import SignalMap
 from mgdd.rig.experiment.engine_task import SeekPlan, engine_named
 from mgdd.rig.experiment.experiment import Experiment
-from mgdd.rig.experiment.settings import SAMPLE_S, EnginePlant, IdentifyTask, SeekTask, TrackTask, scaled
+from mgdd.rig.experiment.settings import (
+    SAMPLE_S,
+    EnginePlant,
+    IdentifyTask,
+    SafetySettings,
+    SeekTask,
+    TrackTask,
+    scaled,
+)
 from mgdd.rig.experiment.throttle_tasks import IdentifyPlan, TrackPlan, throttle_named
 from mgdd.rig.recorded import read_record
 from mgdd.rig.safety_envelope import SafetyEnvelope
@@ -144,6 +152,7 @@ def _named(origin: str) -> Iterator[None]:
 
 def _checked(experiment: Experiment) -> CheckedExperiment:
     mode, settings = experiment.mode, experiment.settings
+    _require_acting(experiment)
     signal_map = _map_of(experiment) if mode in _BUS_MODES else None
     _require_bus(experiment)
     record = _record_of(experiment)
@@ -185,6 +194,18 @@ def _beside(experiment: Experiment, name: str) -> str:
 
 def _map_of(experiment: Experiment) -> SignalMap:
     return SignalMap.load(_beside(experiment, experiment.map_name))
+
+
+def _require_acting(experiment: Experiment) -> None:
+    """Refuse what would guard another plant: a limit that does not act must not pass for one."""
+    is_engine, default = isinstance(experiment.plant, EnginePlant), SafetySettings()
+    for name in ("envelope",) if is_engine else ("rate_cad", "limits"):
+        value = getattr(experiment.safety, name)
+        if value != getattr(default, name):
+            why = (
+                "for an engine: rate_cad and limits guard it" if is_engine else "for a throttle: its envelope guards it"
+            )
+            raise ParameterError.of(f"safety.{name}", value, f"left out {why}")
 
 
 def _require_bus(experiment: Experiment) -> None:

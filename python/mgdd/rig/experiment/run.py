@@ -11,7 +11,7 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from mgdd.errors import DataError, ParameterError
+from mgdd.errors import DataError, ParameterError, argument
 from mgdd.results.describe import described
 from mgdd.rig.experiment.checked import CheckedExperiment, check_experiment
 from mgdd.rig.experiment.engine_task import SeekPlan
@@ -107,7 +107,7 @@ def run_experiment(
     arm : bool
         Must be True for the mode ``bench``, and only there.
     key_file : path-like, optional
-        Confirms ``bench`` instead of a person at the terminal.
+        Confirms ``bench`` instead of a person at the terminal; only there.
     watch : callable, optional
         Called with every `Cycle`; what it raises ends the run.
 
@@ -140,8 +140,11 @@ def run_experiment(
     """
     checked = experiment if isinstance(experiment, CheckedExperiment) else check_experiment(experiment)
     mode = checked.experiment.mode
-    if arm and mode != "bench":
-        raise ParameterError.of("arm", arm, f"left out with mode = {mode!r}: only 'bench' drives hardware")
+    for name, value in (("arm", arm), ("key_file", key_file)):
+        if value and mode != "bench":
+            raise ParameterError.of(
+                argument(name), value, f"left out with mode = {mode!r}: only 'bench' drives hardware"
+            )
     run, record = None if folder is None else RunFolder(folder), None
     try:
         if run is not None:
