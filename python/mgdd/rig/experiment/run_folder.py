@@ -113,7 +113,7 @@ class RunFolder:
         except OSError as error:
             half.unlink(missing_ok=True)
             raise RigError(
-                f"{self.path / name}: {error.strerror or error}; what was finished before is kept"
+                f"{self.path / name}: {error.strerror or error}; free some space, or name a folder elsewhere"
             ) from error
 
 
