@@ -52,7 +52,12 @@ def test_a_hub_says_its_bus_and_at_the_end_its_counts() -> None:
         (["hub", "--bit-rate", "1"], "bit_rate = 1: must be in [1e3, 1e8] bit/s"),
         (["node", "--bus", BUS], "nobody answers there"),
         (["node", "--bus", "can0"], "bus = 'can0': must be INTERFACE:CHANNEL"),
-        (["node", "--bus", BUS, "--map", "etp"], "no such file"),
+        (["hub", "--fault", "drop:q=1"], "with keys p, id, from_s, until_s, ms, client, class"),
+        (["node", "--bus", BUS.replace("port=1", "port=one")], "port = 'one': must be a whole number"),
+        (["node", "--bus", BUS, "--map", "etp"], "no such file: shipped maps are etb, engine, surrogate"),
+        (["node", "--bus", BUS, "--duration-s", "-1"], "--duration-s = -1: must be > 0"),
+        (["node", "--bus", BUS, "--period-ms", "0"], "--period-ms = 0: must be > 0"),
+        (["node", "--bus", BUS, "--sample-ms", "nan"], "--sample-ms = nan: must be > 0"),
         (["node", "--bus", BUS, "--map", "surrogate"], "must be those of a virtual throttle"),
         (["node", "--bus", BUS, "--fault", "melted"], "kind = 'melted': must be one of"),
         (["node", "--bus", BUS, "--truth", "truth.xls"], "the ending must be one of .csv"),
@@ -71,7 +76,9 @@ def test_a_port_that_is_taken_is_named(capsys: pytest.CaptureFixture[str]) -> No
     with socket.create_server(("127.0.0.1", 0)) as server:
         port = server.getsockname()[1]
         assert main(["rig", "hub", "--port", str(port)]) == 2
-    assert f"127.0.0.1:{port}: the hub cannot listen there" in capsys.readouterr().err
+    said = capsys.readouterr().err
+    assert f"127.0.0.1:{port}: the hub cannot listen there" in said
+    assert "--port 0 takes a free one" in said
 
 
 def test_a_node_ends_in_time_and_says_what_it_did(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:

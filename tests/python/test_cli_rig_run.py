@@ -8,7 +8,10 @@ import os
 import pty
 import subprocess
 import sys
+import threading
+import time
 from pathlib import Path
+from typing import Any
 
 import pytest
 from rich.console import Console
@@ -16,6 +19,7 @@ from rich.console import Console
 from mgdd.cli import main
 from mgdd.cli.rig_live import LiveView
 from mgdd.loop import Measurement
+from mgdd.rig import read_record
 from mgdd.rig.experiment.watched import Cycle
 
 TRACK = """
@@ -98,13 +102,21 @@ def test_the_default_folder_is_new_for_every_run(
     [
         (["run", "away.toml"], "away.toml"),
         (["check", "away.toml"], "away.toml"),
-        (["run", "FILE", "--arm"], "arm = True: must be left out with mode = 'simulate'"),
+        (["run", "FILE", "--arm"], "--arm = True: must be left out with mode = 'simulate'"),
         (["run", "FILE", "--mode", "bench"], "needs [bus] connection"),
         (["run", "FILE", "--mode", "replay"], "needs [replay] record"),
         (["replay", "."], "holds no experiment.toml"),
         (["export", "away.rec", "run.csv"], "away.rec"),
         (["record", "new.rec", "--bus", "nowhere"], "INTERFACE:CHANNEL"),
         (["record", "new.rec", "--bus", "virtual:x", "--duration-s", "-1"], "--duration-s = -1: must be > 0 s"),
+        (["run", "FILE", "--connection", "virtual:x"], "--connection does not act here; mode = 'simulate' has no bus"),
+        (["check", "FILE", "--pace", "step"], "--pace does not act here; mode = 'simulate' has no bus"),
+        (["run", "FILE", "--record", "run.rec"], "--record does not act here; mode = 'simulate' replays nothing"),
+        (
+            ["run", "FILE", "--mode", "bench", "--connection", "virtual:x", "--pace", "real_time"],
+            "drives real hardware: give --arm, and a --key-file or a confirmation",
+        ),
+        (["run", "FILE", "--key-file", "key.txt"], "--key-file = 'key.txt': must be left out with mode = 'simulate'"),
     ],
 )
 def test_bad_input_is_named(
@@ -118,6 +130,56 @@ def test_bad_input_is_named(
     assert said in json.loads(captured.out)["error"]["message"]
     assert said in captured.err
     assert not (tmp_path / "mgdd-runs").exists()
+
+
+def test_check_prints_what_is_compared_before_a_bench(file: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    """Inputs, time limits and the whole envelope: the list before a run on a bench asks for them."""
+    pytest.importorskip("cantools")
+    assert main(["rig", "check", str(file), "--mode", "hil"]) == 0
+    said = dict(line.split(maxsplit=1) for line in capsys.readouterr().out.splitlines() if " " in line)
+    assert said["inputs"] == "duty"
+    assert "first_v" in said["values"]
+    assert float(said["timeouts_ms.ETB_Cmd"]) == 20.0
+    assert float(said["envelope.duty_limit"]) == 0.8
+    assert said["envelope.bus_fault_from"] == "passive"
+
+
+def test_a_recording_lasts_as_long_as_was_asked(tmp_path: Path) -> None:
+    """The clock starts when the bus is open: importing python-can takes longer than a short recording."""
+    can = pytest.importorskip("can")
+    from mgdd.rig.can import transport
+
+    stop, slow = threading.Event(), transport.connected
+
+    def send() -> None:
+        with can.Bus(interface="virtual", channel="lasts") as bus:
+            while not stop.wait(0.01):
+                bus.send(can.Message(arbitration_id=0x321, data=b"x", is_extended_id=False))
+
+    def late(*given: Any) -> Any:
+        time.sleep(0.4)
+        return slow(*given)
+
+    sender = threading.Thread(target=send)
+    sender.start()
+    try:
+        with pytest.MonkeyPatch.context() as patch:
+            patch.setattr(transport, "connected", late)
+            file = str(tmp_path / "new.rec")
+            assert main(["rig", "record", file, "--bus", "virtual:lasts", "--duration-s", "0.3", "--json"]) == 0
+    finally:
+        stop.set()
+        sender.join()
+    assert read_record(file).frames.sizes["frame"] > 5
+
+
+def test_an_export_that_cannot_be_written_names_its_target(
+    file: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    assert main(["rig", "run", str(file), "--folder", str(tmp_path / "run"), "--quiet"]) == 0
+    target = tmp_path / "away" / "run"
+    assert main(["rig", "export", str(tmp_path / "run" / "run.rec"), str(target), "--kind", "csv"]) == 2
+    assert f"{target}: No such file or directory" in capsys.readouterr().err
 
 
 def test_without_the_extra_a_simulation_runs_and_a_bus_names_it(file: Path, tmp_path: Path) -> None:

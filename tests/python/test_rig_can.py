@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import contextlib
 import io
 import math
 import os
@@ -201,6 +202,19 @@ def test_a_node_with_another_data_identifier_has_no_valid_frame(tmp_path: Path) 
         rig = CanRig(ETB, "virtual:crc", mode="hil", timeout_s=0.05)
         with pytest.raises(RigError, match=r"frames ETB_Status \(0x121\) came, too few of them valid .*wrong_crc"):
             rig.open()
+
+
+def test_a_node_that_stops_is_not_taken_for_another_one() -> None:
+    with contextlib.ExitStack() as left, node("stops"):
+        rig = left.enter_context(CanRig(ETB, "virtual:stops", mode="hil", timeout_s=1.0))
+        for _ in range(10):
+            rig.apply({"duty": 0.1})
+            rig.measure()
+        serving = left.pop_all()
+    with serving:
+        rig.apply({"duty": 0.1})
+        with pytest.raises(RigError, match=r"no new frame ETB_Status \(0x121\) came; those before were valid"):
+            rig.measure()
 
 
 def test_two_nodes_with_the_identifier_of_the_measurement() -> None:

@@ -89,12 +89,36 @@ def test_a_missing_key_or_file_is_named(tmp_path: Path) -> None:
             r"lower_cad = 5: must be < upper",
         ),
         (SEEK.replace("cycles = 60", "start_cad = 40.0"), ParameterError, r"start_cad = 40: must be in \[-30, 10\]"),
+        (TRACK + "[plant.scale]\ncoulomb = 1.2\n", ParameterError, r"plant.scale = 'coulomb': must be a number of"),
+        (TRACK + "[plant.scale]\ncoulomb_nm = -1.2\n", ParameterError, r"plant.scale: coulomb_nm = -0.34\d* N m"),
+        (TRACK + '[plant]\npreset = "puma_single"\n', ParameterError, "is an engine, not a throttle"),
+        (SEEK.replace("p_max_bar", "p_max"), ParameterError, "'p_max' is not measured"),
+        (TRACK + "[safety]\nrate_cad = 2.0\n", ParameterError, r"safety.rate_cad = 2: must be left out for a throttle"),
+        (TRACK + "[safety.limits]\ncurrent_a = 3.0\n", ParameterError, r"safety.limits = .*current_a.* for a throttle"),
+        (SEEK + '[safety]\nenvelope = "my.toml"\n', ParameterError, r"safety.envelope = 'my.toml': .* for an engine"),
+        (TRACK.replace("20:35", "20:95"), ParameterError, r"track.reference = '20 to 95 deg': must be within .*90 deg"),
     ],
 )
 def test_what_a_file_names_is_checked_before_anything_runs(text: str, error: type[Exception], said: str) -> None:
     known = experiment(text)
-    with pytest.raises(error, match=said):
-        run_experiment(known)
+    for call in (check_experiment, run_experiment):
+        with pytest.raises(error, match=said) as caught:
+            call(known)
+        assert "experiment: " in str(caught.value)  # the file
+
+
+def test_a_run_that_never_began_leaves_no_folder(tmp_path: Path) -> None:
+    """The same folder serves once the cause is mended; one that was there stays, empty as it was."""
+    pytest.importorskip("cantools")
+    pytest.importorskip("can")
+    known = experiment(TRACK + '[bus]\nconnection = "virtual:none"\npace = "real_time"\n').with_mode("bench")
+    with pytest.raises(RigError, match="drives real hardware"):
+        run_experiment(known, tmp_path / "run")
+    assert not (tmp_path / "run").exists()
+    (tmp_path / "made").mkdir()
+    with pytest.raises(RigError, match="drives real hardware"):
+        run_experiment(known, tmp_path / "made")
+    assert list((tmp_path / "made").iterdir()) == []
 
 
 def test_modes_that_drive_or_listen_need_what_they_need() -> None:

@@ -157,6 +157,7 @@ WRONG = [
     ('crc = "Check"', 'crc = "Drive"', ParameterError, "crc = 'Drive': must be a signal of 8 bits"),
     ('counter = "Count"', 'counter = "Go"', ParameterError, "counter = 'Go': must be a signal of 4 bits"),
     ("data_id = 7", "data_id = 70000", ParameterError, "data_id = 70000"),
+    ('profile = "h2f"', 'profile = "h2"', ParameterError, "e2e.profile = 'h2': must be sae_j1850, h2f or"),
     ('e2e = { profile', 'timeout_ms = 10\ne2e = { profile', ParameterError, "timeout_ms = 10: must be above"),
     ('[measurements.Answer.applied]\nduty', '[measurements.Answer.applied]\ndudy', ParameterError, "mean 'duty'"),
     ("format = 1", "format = 2", ParameterError, "format = 2: must be 1"),

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import argparse
 import logging
+import math
 from collections.abc import Callable, Mapping, Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, NoReturn
@@ -32,6 +33,8 @@ __all__ = [
     "column_of",
     "engine_of",
     "number_pairs",
+    "refuse_idle",
+    "require_positive",
     "traces_of",
 ]
 
@@ -271,6 +274,14 @@ def refuse_idle(args: argparse.Namespace, *names: str, why: str) -> None:
     for name in names:
         if getattr(args, name, None) not in (None, []):  # a repeatable option that is not given is an empty list
             raise ParameterError(f"{as_option(name)} does not act here; {why}")
+
+
+def require_positive(args: argparse.Namespace, *names: str) -> None:
+    """Refuse options whose number must be positive; the unit is the end of the name."""
+    for name in names:
+        value = getattr(args, name)
+        if value is not None and not 0.0 < value < math.inf:
+            raise ParameterError.of(as_option(name), value, f"> 0 {name.rpartition('_')[2]} and finite")
 
 
 def number_pairs(items: Sequence[str], option: str) -> dict[str, float]:

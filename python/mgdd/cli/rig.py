@@ -10,14 +10,13 @@ from collections.abc import Callable
 from typing import TYPE_CHECKING, Any
 
 from mgdd.cli import rig_records, rig_run, rig_selftest
-from mgdd.cli.options import add_command, add_group, refuse_idle
+from mgdd.cli.options import add_command, add_group, refuse_idle, require_positive
 from mgdd.cli.output import check_file, check_output, emit
 from mgdd.rig import CanTransport, SafetyEnvelope, SignalMap
 from mgdd.rig.can.hub_faults import BusFault
 from mgdd.rig.can.node import TruthLog, node_of, parent_watch, run_node
 from mgdd.rig.can.node_core import NodeCore
 from mgdd.rig.can.node_plant import NodePlant, node_plant
-from mgdd.rig.can.signal_map import SHIPPED
 from mgdd.rig.can.signals import noted_signals
 
 if TYPE_CHECKING:
@@ -66,7 +65,7 @@ def _add_node(verbs: Any) -> None:
         example="mgdd rig node --map etb --bus 'socketcand:can0?host=127.0.0.1&port=29536' --truth truth.csv",
     )  # fmt: skip
     parser.add_argument(
-        "--map", default="etb", metavar="NAME_OR_FILE.toml", help=f"{', '.join(SHIPPED)} or a file (default: etb)"
+        "--map", default="etb", metavar="NAME_OR_FILE.toml", help="etb, engine or a file (default: etb)"
     )
     parser.add_argument(
         "--bus",
@@ -132,6 +131,7 @@ async def _serve(args: argparse.Namespace, hub: Hub) -> None:
 def _node(args: argparse.Namespace) -> None:
     check_output(args)
     check_file("--truth", args.truth, (".csv",))
+    require_positive(args, "period_ms", "sample_ms", "duration_s")
     signal_map = SignalMap.load(args.map)
     period_s = None if args.period_ms is None else args.period_ms * 1e-3
     sample_s = period_s if args.sample_ms is None else args.sample_ms * 1e-3

@@ -3,13 +3,14 @@
 from __future__ import annotations
 
 import argparse
+import math
 import time
 from pathlib import Path
 from typing import Any
 
-from mgdd.cli.options import add_command
+from mgdd.cli.options import add_command, require_positive
 from mgdd.cli.output import check_output, emit, lines, wrote
-from mgdd.errors import DataError, ParameterError
+from mgdd.errors import DataError
 
 __all__ = ["add"]
 
@@ -57,12 +58,11 @@ def _record(args: argparse.Namespace) -> None:
     from mgdd.rig.can.recorded_bus import RecordedBus
 
     check_output(args)
-    if args.duration_s is not None and not args.duration_s > 0.0:
-        raise ParameterError.of("--duration-s", args.duration_s, "> 0 s")
-    transport = CanTransport.parse(args.bus)
-    ends = float("inf") if args.duration_s is None else time.monotonic() + args.duration_s
-    frames, synced = 0, time.monotonic()
+    require_positive(args, "duration_s")
+    transport, frames = CanTransport.parse(args.bus), 0
     with transport, Recorder(args.file, config={"bus": args.bus}) as recorder:
+        synced = time.monotonic()  # the bus is open: python-can may take longer than a short recording
+        ends = math.inf if args.duration_s is None else synced + args.duration_s
         bus = RecordedBus(transport, recorder)
         args.progress(f"listening on {bus.name}")
         try:

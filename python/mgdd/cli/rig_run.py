@@ -5,12 +5,12 @@ from __future__ import annotations
 import argparse
 import contextlib
 import sys
-from collections.abc import Callable, Iterator
+from collections.abc import Callable, Iterator, Mapping
 from datetime import UTC, datetime
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
-from mgdd.cli.options import add_command
+from mgdd.cli.options import add_command, refuse_idle
 from mgdd.cli.output import Stopped, check_output, emit, is_terminal, lines, wrote
 
 if TYPE_CHECKING:
@@ -40,7 +40,7 @@ def add(verbs: Any) -> None:
     check = add_command(
         verbs, "check", _check,
         help_text="check an experiment, its map, DBC, envelope and bus, and say what would run; nothing is sent",
-        example="mgdd rig check track.toml --mode bench --json",
+        example="mgdd rig check track.toml --mode bench --connection socketcan:can0 --pace real_time --json",
     )  # fmt: skip
     _add_experiment(check)
 
@@ -58,6 +58,10 @@ def _checked(args: argparse.Namespace) -> CheckedExperiment:
 
     experiment = Experiment.load(args.file)
     mode = args.mode or experiment.mode
+    if mode in ("simulate", "replay"):
+        refuse_idle(args, "connection", "pace", why=f"mode = {mode!r} has no bus")
+    if mode != "replay":
+        refuse_idle(args, "record", why=f"mode = {mode!r} replays nothing")
     return check_experiment(experiment.with_mode(mode, record=args.record, connection=args.connection, pace=args.pace))
 
 
@@ -102,9 +106,19 @@ def _check(args: argparse.Namespace) -> None:
     found = checked.to_dict()
     if checked.experiment.bus.connection is not None and checked.signal_map is not None:
         found["bus"] = _listen(checked)
-    plain = {name: value for name, value in found.items() if not isinstance(value, (dict, list))}
-    emit(args, {"ok": True, **found}, text=f"{lines(plain)}\n\nall checks passed; nothing was sent")
+    emit(args, {"ok": True, **found}, text=f"{lines(_flat(found))}\n\nall checks passed; nothing was sent")
     sys.stdout.flush()
+
+
+def _flat(found: Mapping[str, Any], path: str = "") -> dict[str, Any]:
+    """Give one entry per value: keys of tables with the table in front, lists as text."""
+    out: dict[str, Any] = {}
+    for name, value in found.items():
+        if isinstance(value, Mapping):
+            out |= _flat(value, f"{path}{name}.")
+        else:
+            out[path + name] = ", ".join(map(str, value)) if isinstance(value, list) else value
+    return out
 
 
 def _listen(checked: CheckedExperiment) -> dict[str, Any]:

@@ -14,7 +14,7 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from mgdd.errors import ParameterError, RigError
+from mgdd.errors import Error, ParameterError, RigError
 from mgdd.io.existing_file import existing_file
 from mgdd.results.labels import label_of
 from mgdd.rig.can.logs import LOG_WRITERS, write_log
@@ -61,7 +61,7 @@ def export_record(
     mgdd.errors.ParameterError
         An unknown kind.
     mgdd.errors.RigError
-        The folder exists already.
+        The folder exists already, or the target cannot be written.
 
     Examples
     --------
@@ -96,8 +96,10 @@ def _write_beside(target: Path, write: Callable[[Path], None]) -> list[Path]:
     try:
         write(beside)
         beside.replace(target)
-    except BaseException:
+    except BaseException as error:
         _remove(beside)
+        if isinstance(error, OSError) and not isinstance(error, Error):
+            raise RigError(f"{target}: {error.strerror or error}; nothing was written, name another place") from error
         raise
     return sorted(target.iterdir()) if target.is_dir() else [target]
 

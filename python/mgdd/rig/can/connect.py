@@ -78,6 +78,9 @@ def _require_hub(name: str, options: Mapping[str, Any]) -> None:
         raise RigError(
             f"{name}: socketcand needs {' and '.join(missing)}, for example socketcand:can0?host=H&port=29536"
         )
+    port = options["port"]
+    if not (str(port).isdigit() and 0 < int(port) < 65536):
+        raise RigError.of(f"{name}: port", port, "a whole number in [1, 65535], as the hub says it")
     try:
         with socket.create_connection((options["host"], options["port"]), timeout=_GREETING_S) as stream:
             greeting = stream.recv(16)

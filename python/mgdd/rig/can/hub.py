@@ -8,11 +8,13 @@ from __future__ import annotations
 
 import asyncio
 import contextlib
+import errno
+import os
 import time
 from collections.abc import Callable, Sequence
 from typing import cast
 
-from mgdd.errors import ParameterError, RigError
+from mgdd.errors import ParameterError, RigError, argument
 from mgdd.rig.can.hub_faults import BusFault, Delivery, FaultInjector
 
 __all__ = ["Hub"]
@@ -112,7 +114,9 @@ class Hub:
         try:
             server = await asyncio.start_server(self._serve, self.host, self.port)
         except OSError as error:
-            raise RigError(f"{self.host}:{self.port}: the hub cannot listen there: {error}") from error
+            why = os.strerror(error.errno) if error.errno and error.errno > 0 else error.strerror or str(error)
+            free = f"; {argument('port', '0')} takes a free one" if error.errno == errno.EADDRINUSE else ""
+            raise RigError(f"{self.host}:{self.port}: the hub cannot listen there: {why}{free}") from error
         self.port = server.sockets[0].getsockname()[1]
         async with server:
             on_ready(self)

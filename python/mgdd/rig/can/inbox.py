@@ -114,11 +114,16 @@ class Inbox:
         trigger = self.map.measurements[self.map.trigger].message
         wanted = f"{trigger.name} ({trigger.frame_id:#x})"
         seen = self._receiver.seen
+        if trigger.frame_id in seen and self._receiver.valid(trigger.name):
+            return (
+                f"no new frame {wanted} came; those before were valid: the node stopped or was late, or this computer "
+                "is too busy; a longer time limit (timeout_ms of the bus) waits for it"
+            )
         if trigger.frame_id in seen:
             checks = {status: n for status, n in self.counts.get(trigger.name, {}).items() if n}
             return (
                 f"{seen[trigger.frame_id]} frames {wanted} came, too few of them valid ({checks}): another data "
-                "identifier, two senders of it, or a node that stopped"
+                "identifier, or two senders of it"
             )
         others = ", ".join(f"{identifier:#x}" for identifier in sorted(seen)) or "none"
         return f"no frame {wanted} came; identifiers seen: {others}"

@@ -229,6 +229,8 @@ class MapReader:
                 **given,
             )
         except (ParameterError, TypeError) as error:
+            if isinstance(error, ParameterError) and error.field == "crc":  # here that is the name of the signal
+                raise table.error("profile", profile, "sae_j1850, h2f or [polynomial, start, final_xor]") from error
             raise ParameterError(f"{table.origin}: [{table.path}]: {error}") from error
         return settings, {crc.name, counter.name}
 

@@ -7,7 +7,7 @@ import sys
 from enum import StrEnum
 from pathlib import Path
 
-from mgdd.errors import ParameterError, RigError
+from mgdd.errors import ParameterError, RigError, argument
 from mgdd.loop import Plant
 from mgdd.rig.can.frame import Bus
 from mgdd.rig.can.local_bus import LocalBus
@@ -60,7 +60,8 @@ def require_key(signal_map: SignalMap, bus: str, *, arm: bool, key_file: str | o
         Not armed, no key, another key, or a person who did not confirm.
     """
     if arm is not True:
-        raise RigError("mode = 'bench' drives real hardware: give arm=True, and a key_file or a confirmation")
+        how = f"{argument('arm', 'True')}, and a {argument('key_file')} or a confirmation"
+        raise RigError(f"mode = 'bench' drives real hardware: give {how}")
     line = key_line(signal_map)
     if key_file is not None:
         file = Path(key_file)
@@ -70,7 +71,7 @@ def require_key(signal_map: SignalMap, bus: str, *, arm: bool, key_file: str | o
             raise RigError(f"{file}: holds no key of this DBC: it must have the line {line!r}")
         return
     if not sys.stdin.isatty():
-        raise RigError("mode = 'bench' without a terminal to confirm in: give a key_file")
+        raise RigError(f"mode = 'bench' without a terminal to confirm in: give a {argument('key_file')}")
     sys.stderr.write(f"{bus} will be driven with {signal_map.file.name}. Emergency stop at hand? Type ARM: ")
     sys.stderr.flush()
     if sys.stdin.readline().strip() != "ARM":

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import errno
 import math
 import os
 from collections.abc import Mapping, Sequence
@@ -95,6 +96,9 @@ class SignalMap:
         """
         named = str(path)
         file = _BUSES / f"{named}.toml" if named in SHIPPED else Path(path)
+        if not file.suffix and not file.exists():
+            known = f"no such file: shipped maps are {', '.join(SHIPPED)}; the path of a file ends in .toml"
+            raise FileNotFoundError(errno.ENOENT, known, named)
         table = TomlTable.read(file)
         table.only(_KEYS)
         kind, version = table.take("kind", "text"), table.take("format", "integer")

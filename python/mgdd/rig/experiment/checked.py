@@ -2,24 +2,36 @@
 
 from __future__ import annotations
 
+from collections.abc import Iterator
+from contextlib import contextmanager
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
-from mgdd.errors import ParameterError, RigError
+from mgdd.errors import Error, ParameterError, RigError
 from mgdd.io.existing_file import existing_file
+from mgdd.loop import EngineBench, VirtualThrottle
 from mgdd.results.describe import described
 from mgdd.rig.can.signal_map import SignalMap
-from mgdd.rig.experiment.engine_task import SeekPlan
+from mgdd.rig.experiment.engine_task import SeekPlan, engine_named
 from mgdd.rig.experiment.experiment import Experiment
-from mgdd.rig.experiment.settings import SAMPLE_S, EnginePlant, IdentifyTask, SeekTask, TrackTask
-from mgdd.rig.experiment.throttle_tasks import IdentifyPlan, TrackPlan
+from mgdd.rig.experiment.settings import (
+    SAMPLE_S,
+    EnginePlant,
+    IdentifyTask,
+    SafetySettings,
+    SeekTask,
+    TrackTask,
+    scaled,
+)
+from mgdd.rig.experiment.throttle_tasks import IdentifyPlan, TrackPlan, throttle_named
 from mgdd.rig.recorded import read_record
 from mgdd.rig.safety_envelope import SafetyEnvelope
 
 __all__ = ["CheckedExperiment", "check_experiment"]
 
 _BUS_MODES = ("hil", "dry_run", "bench")
+_SIMULATED = ("simulate", "hil")
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -106,7 +118,8 @@ def check_experiment(experiment: Experiment) -> CheckedExperiment:
     ImportError
         A mode with a bus, without the extra ``can``.
     mgdd.errors.Error
-        A model, map, envelope or reference that cannot be what the experiment needs.
+        A plant, model, map, envelope, limit or reference that cannot be what the experiment needs; the message names
+        the file of the experiment first.
 
     Examples
     --------
@@ -122,7 +135,24 @@ def check_experiment(experiment: Experiment) -> CheckedExperiment:
     >>> checked.plan.samples, checked.to_dict()["transmits"]
     (1500, False)
     """
+    with _named(experiment.origin):
+        return _checked(experiment)
+
+
+@contextmanager
+def _named(origin: str) -> Iterator[None]:
+    """Put the file of the experiment in front of what is refused."""
+    try:
+        yield
+    except Error as error:
+        raise error.reworded(f"{origin}: {error}") from error
+    except FileNotFoundError as error:
+        raise FileNotFoundError(error.errno, f"{origin}: {error.strerror}", error.filename) from error
+
+
+def _checked(experiment: Experiment) -> CheckedExperiment:
     mode, settings = experiment.mode, experiment.settings
+    _require_acting(experiment)
     signal_map = _map_of(experiment) if mode in _BUS_MODES else None
     _require_bus(experiment)
     record = _record_of(experiment)
@@ -132,7 +162,9 @@ def check_experiment(experiment: Experiment) -> CheckedExperiment:
     else:
         sample_s = _sample_s(experiment, signal_map) if record is None else _recorded_sample_s(experiment, record)
         envelope = _envelope(experiment, sample_s)
-        plan = _throttle_plan(settings, sample_s, experiment)
+        plan = _throttle_plan(settings, sample_s, experiment, envelope)
+    if mode in _SIMULATED:
+        _require_plant(experiment, sample_s)
     checked = CheckedExperiment(
         experiment=experiment, plan=plan, sample_s=sample_s, envelope=envelope, signal_map=signal_map, record=record
     )
@@ -145,7 +177,7 @@ def _record_of(experiment: Experiment) -> Path | None:
     if experiment.mode != "replay":
         return None
     if experiment.replay.record is None:
-        raise ParameterError(f"{experiment.origin}: mode = 'replay': needs [replay] record, the file of a run")
+        raise ParameterError("mode = 'replay': needs [replay] record, the file of a run")
     return existing_file(_beside(experiment, experiment.replay.record))
 
 
@@ -164,17 +196,28 @@ def _map_of(experiment: Experiment) -> SignalMap:
     return SignalMap.load(_beside(experiment, experiment.map_name))
 
 
+def _require_acting(experiment: Experiment) -> None:
+    """Refuse what would guard another plant: a limit that does not act must not pass for one."""
+    is_engine, default = isinstance(experiment.plant, EnginePlant), SafetySettings()
+    for name in ("envelope",) if is_engine else ("rate_cad", "limits"):
+        value = getattr(experiment.safety, name)
+        if value != getattr(default, name):
+            why = (
+                "for an engine: rate_cad and limits guard it" if is_engine else "for a throttle: its envelope guards it"
+            )
+            raise ParameterError.of(f"safety.{name}", value, f"left out {why}")
+
+
 def _require_bus(experiment: Experiment) -> None:
     bus, mode = experiment.bus, experiment.mode
     if mode in ("dry_run", "bench") and bus.connection is None:
         raise ParameterError(
-            f"{experiment.origin}: mode = {mode!r}: needs [bus] connection, for example 'socketcan:can0'",
+            f"mode = {mode!r}: needs [bus] connection, for example 'socketcan:can0'",
             field="bus.connection", value=None, bound="given",
         )  # fmt: skip
     if mode in ("dry_run", "bench") and bus.pace == "step":
         raise ParameterError(
-            f"{experiment.origin}: bus.pace = 'step': must be 'real_time' with mode = {mode!r}; only a simulated node "
-            "steps",
+            f"bus.pace = 'step': must be 'real_time' with mode = {mode!r}; only a simulated node steps",
             field="bus.pace", value="step", bound="'real_time'",
         )  # fmt: skip
 
@@ -185,8 +228,8 @@ def _sample_s(experiment: Experiment, signal_map: SignalMap | None) -> float:
         return SAMPLE_S if given is None else float(given)
     if given is not None and abs(given / signal_map.cycle_s - 1.0) > 1e-9:
         raise ParameterError(
-            f"{experiment.origin}: plant.sample_s = {given:g}: must be {signal_map.cycle_s:g} s, the cycle time of "
-            f"{signal_map.trigger} in {signal_map.dbc.file.name}, or left out; bus.pace = 'step' takes any",
+            f"plant.sample_s = {given:g}: must be {signal_map.cycle_s:g} s, the cycle time of {signal_map.trigger} in "
+            f"{signal_map.dbc.file.name}, or left out; bus.pace = 'step' takes any",
             field="plant.sample_s", value=given, bound=f"{signal_map.cycle_s:g} s",
         )  # fmt: skip
     return signal_map.cycle_s
@@ -197,11 +240,30 @@ def _envelope(experiment: Experiment, sample_s: float) -> SafetyEnvelope:
 
 
 def _throttle_plan(
-    settings: IdentifyTask | TrackTask, sample_s: float, experiment: Experiment
+    settings: IdentifyTask | TrackTask, sample_s: float, experiment: Experiment, envelope: SafetyEnvelope
 ) -> IdentifyPlan | TrackPlan:
     if isinstance(settings, TrackTask):
-        return TrackPlan(settings, sample_s=sample_s, folder=experiment.folder)
+        plan = TrackPlan(settings, sample_s=sample_s, folder=experiment.folder)
+        low, high = float(plan.reference.angle_deg.min()), float(plan.reference.angle_deg.max())
+        if not envelope.closed_deg <= low <= high <= envelope.open_deg:
+            raise ParameterError.of(
+                "track.reference", f"{low:g} to {high:g} deg",
+                f"within the travel of the envelope, {envelope.closed_deg:g} to {envelope.open_deg:g} deg: a stop that "
+                "is driven against stalls the motor",
+            )  # fmt: skip
+        return plan
     return IdentifyPlan(settings, sample_s=sample_s, seed=experiment.seed, folder=experiment.folder)
+
+
+def _require_plant(experiment: Experiment, sample_s: float | None) -> None:
+    """Make what will be simulated once: a wrong preset, scale or limit shows itself."""
+    plant, folder = experiment.plant, experiment.folder
+    if isinstance(plant, EnginePlant):
+        engine = engine_named(plant.preset, folder)
+        EngineBench(scaled(engine.cylinder, plant.scale, "plant"), engine.point, limits=experiment.limit_names)
+    else:
+        throttle = scaled(throttle_named(plant.preset, folder), plant.scale, "plant")
+        VirtualThrottle(throttle, inputs=("duty",), sample_s=sample_s or SAMPLE_S)
 
 
 def _require_names(checked: CheckedExperiment, signal_map: SignalMap) -> None:

@@ -11,7 +11,7 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from mgdd.errors import DataError, ParameterError
+from mgdd.errors import DataError, ParameterError, argument
 from mgdd.results.describe import described
 from mgdd.rig.experiment.checked import CheckedExperiment, check_experiment
 from mgdd.rig.experiment.engine_task import SeekPlan
@@ -107,7 +107,7 @@ def run_experiment(
     arm : bool
         Must be True for the mode ``bench``, and only there.
     key_file : path-like, optional
-        Confirms ``bench`` instead of a person at the terminal.
+        Confirms ``bench`` instead of a person at the terminal; only there.
     watch : callable, optional
         Called with every `Cycle`; what it raises ends the run.
 
@@ -120,7 +120,7 @@ def run_experiment(
     ------
     mgdd.errors.RigError
         No plant where it should be, a safety gate that took the drive away, a folder that holds another run. What was
-        recorded until then is in the folder.
+        recorded until then is in the folder; where nothing was, no folder is left.
     mgdd.errors.Error
         As `check_experiment`.
 
@@ -140,14 +140,22 @@ def run_experiment(
     """
     checked = experiment if isinstance(experiment, CheckedExperiment) else check_experiment(experiment)
     mode = checked.experiment.mode
-    if arm and mode != "bench":
-        raise ParameterError.of("arm", arm, f"left out with mode = {mode!r}: only 'bench' drives hardware")
-    run = None if folder is None else RunFolder(folder)
-    if run is not None:
-        run.text("experiment.toml", checked.experiment.with_files(run.keep).to_toml())
-        run.json("run.json", {**versions(), **checked.to_dict()})
-    with RunRecord(None if run is None else run.file("run.rec"), checked) as record:
-        outcome, stand_said, timing = _steered(checked, record, arm=arm, key_file=key_file, watch=watch)
+    for name, value in (("arm", arm), ("key_file", key_file)):
+        if value and mode != "bench":
+            raise ParameterError.of(
+                argument(name), value, f"left out with mode = {mode!r}: only 'bench' drives hardware"
+            )
+    run, record = None if folder is None else RunFolder(folder), None
+    try:
+        if run is not None:
+            run.text("experiment.toml", checked.experiment.with_files(run.keep).to_toml())
+            run.json("run.json", {**versions(), **checked.to_dict()})
+        with RunRecord(None if run is None else run.file("run.rec"), checked) as record:
+            outcome, stand_said, timing = _steered(checked, record, arm=arm, key_file=key_file, watch=watch)
+    except BaseException:
+        if run is not None and (record is None or not record.began):
+            run.discard()
+        raise
     result = ExperimentResult(
         experiment=checked.experiment,
         figures=dict(outcome.figures),

@@ -2,9 +2,11 @@
 
 from __future__ import annotations
 
+import contextlib
 import json
 import os
 import platform
+import shutil
 import sys
 from collections.abc import Mapping
 from datetime import UTC, datetime
@@ -42,6 +44,7 @@ class RunFolder:
 
     def __init__(self, path: str | os.PathLike[str]) -> None:
         self.path = Path(path)
+        self._made = [folder for folder in (self.path, *self.path.parents) if not folder.exists()]
         try:
             self.path.mkdir(parents=True, exist_ok=True)
             held = sorted(entry.name for entry in self.path.iterdir())
@@ -49,6 +52,17 @@ class RunFolder:
             raise RigError(f"run folder {self.path}: {error.strerror or error}; name another one") from error
         if held:
             raise RigError(f"run folder {self.path}: holds {held[0]} already; name a new folder, no run is overwritten")
+
+    def discard(self) -> None:
+        """Take back what was written, and the folder where it was made: the run never began."""
+        for entry in self.path.iterdir():
+            if entry.is_dir():
+                shutil.rmtree(entry)
+            else:
+                entry.unlink()
+        for folder in self._made:
+            with contextlib.suppress(OSError):  # another run has come into a folder above
+                folder.rmdir()
 
     def file(self, name: str) -> Path:
         """Give the path of a file of the run."""
@@ -99,7 +113,7 @@ class RunFolder:
         except OSError as error:
             half.unlink(missing_ok=True)
             raise RigError(
-                f"{self.path / name}: {error.strerror or error}; what was finished before is kept"
+                f"{self.path / name}: {error.strerror or error}; free some space, or name a folder elsewhere"
             ) from error
 
 

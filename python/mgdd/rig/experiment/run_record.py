@@ -32,10 +32,13 @@ class RunRecord:
         All that was said.
     recorder : Recorder or None
         Of the file.
+    began : bool
+        Whether anything had happened when the record was left: an exchange, a frame or an event.
     """
 
     def __init__(self, file: Path | None, checked: CheckedExperiment) -> None:
         self.events: list[str] = []
+        self.began = False
         header = {"experiment": checked.experiment.to_toml(), **checked.to_dict()}
         self.recorder = None if file is None else Recorder(file, config=header)
         self._names: tuple[str, ...] = ()
@@ -70,4 +73,5 @@ class RunRecord:
         self, kind: type[BaseException] | None, error: BaseException | None, trace: TracebackType | None, /
     ) -> None:
         if self.recorder is not None:
+            self.began = self.recorder.written > 0
             self.recorder.__exit__(kind, error, trace)

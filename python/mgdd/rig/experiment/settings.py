@@ -173,4 +173,7 @@ def scaled(record: _T, scale: Mapping[str, float], what: str) -> _T:
     if "coulomb_nm" in factors:
         factors.setdefault("stiction_nm", factors["coulomb_nm"])
     changed = {name: getattr(record, name) * factor for name, factor in factors.items()}
-    return record.replace(**changed)  # type: ignore[attr-defined,no-any-return]
+    try:
+        return record.replace(**changed)  # type: ignore[attr-defined,no-any-return]
+    except ParameterError as error:
+        raise error.reworded(f"{what}.scale: {error}") from error
