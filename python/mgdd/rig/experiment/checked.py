@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Any
 
@@ -12,6 +12,7 @@ from mgdd.results.describe import described
 from mgdd.rig.can.signal_map import SignalMap
 from mgdd.rig.experiment.engine_task import SeekPlan
 from mgdd.rig.experiment.experiment import Experiment
+from mgdd.rig.experiment.loop_choice import LoopChoice, chosen_loop
 from mgdd.rig.experiment.settings import SAMPLE_S, EnginePlant, IdentifyTask, SeekTask, TrackTask
 from mgdd.rig.experiment.throttle_tasks import IdentifyPlan, TrackPlan
 from mgdd.rig.recorded import read_record
@@ -40,6 +41,8 @@ class CheckedExperiment:
         Of a mode with a bus.
     record : pathlib.Path or None
         Of ``replay``.
+    loop : LoopChoice or None
+        Of a task with a controller: which loop steps it, and why.
     """
 
     experiment: Experiment
@@ -48,6 +51,7 @@ class CheckedExperiment:
     envelope: SafetyEnvelope | None
     signal_map: SignalMap | None
     record: Path | None
+    loop: LoopChoice | None = None
 
     @property
     def bus_map(self) -> SignalMap:
@@ -71,6 +75,8 @@ class CheckedExperiment:
         if experiment.mode in _BUS_MODES:
             out["connection"] = experiment.bus.connection or "a hub and a node of its own"
             out["pace"] = experiment.bus.pace
+        if self.loop is not None:
+            out |= {"loop": self.loop.name, "loop_reason": self.loop.reason}
         if known is not None:
             out |= {
                 "map": str(known.file), "dbc": str(known.dbc.file), "dbc_sha256": known.dbc.sha256,
@@ -138,7 +144,7 @@ def check_experiment(experiment: Experiment) -> CheckedExperiment:
     )
     if signal_map is not None:
         _require_names(checked, signal_map)
-    return checked
+    return replace(checked, loop=chosen_loop(experiment, signal_map))
 
 
 def _record_of(experiment: Experiment) -> Path | None:
