@@ -15,7 +15,7 @@ from mgdd._core.rig import Frame, RingTransport
 from mgdd.errors import RigError
 from mgdd.rig.can.bus_bridge import BusBridge
 from mgdd.rig.can.can_rig import CanRig
-from mgdd.rig.can.frame import Bus
+from mgdd.rig.can.frame import Bus, changed
 from mgdd.rig.can.loop_map import loop_messages
 from mgdd.rig.can.signal_map import SignalMap
 from mgdd.rig.can.signals import held_back
@@ -241,7 +241,7 @@ class _WatchedBus:
         return frame
 
     def send(self, frame: Frame) -> None:
-        self._bus.send(frame)
+        self._bus.send(changed(frame, monotonic_ns=0))  # the record says when it left Python, not when the loop did it
 
 
 @contextmanager
