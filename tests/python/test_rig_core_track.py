@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import json
-import re
 import time
 from dataclasses import replace
 from pathlib import Path
@@ -277,3 +276,28 @@ def test_a_dry_run_transmits_nothing_and_steps_the_controller(tmp_path: Path) ->
     assert np.nanmax(np.abs(result.dataset["asked_duty"])) > 0.05
     assert (result.dataset["duty"] == 0.0).all()
     assert main(["rig", "replay", str(tmp_path / "run"), "--quiet"]) == 0
+
+
+def test_a_node_that_says_several_times_that_it_does_not_drive_is_believed() -> None:
+    signal_map = SignalMap.load("etb")
+    status = signal_map.measurements["ETB_Status"]
+
+    def told(state: int, number: int = status.message.frame_id) -> Frame:
+        known = dict.fromkeys(status.signals, 20.0)
+        return Frame(id=number, data=status.payloads(known, {"State": state}, {"duty": 0.1})[0])
+
+    class Frames:
+        name = "frames"
+
+        def __init__(self, frames: list[Frame]) -> None:
+            self.left = frames
+
+        def receive(self, timeout_s: float) -> Frame | None:  # noqa: ARG002 - never waits
+            return self.left.pop(0) if self.left else None
+
+    for states, failed in (([2, 3, 3, 2, 3, 4], False), ([2, 3, 4, 3], True), ([2, 2, 2, 1], False)):
+        bus: Any = Frames([frame for state in states for frame in (told(state), told(3, 0x400))])
+        watched = core_track._WatchedBus(bus, signal_map)
+        while watched.receive(0.0) is not None:
+            pass
+        assert watched.failed == failed, states

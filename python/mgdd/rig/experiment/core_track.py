@@ -175,7 +175,7 @@ class _CoreRun:
             self._feed()
             self._take()
             self.samples.tell()
-            if self.samples.stopped and not self._shadow:
+            if bridge.error is not None or (self.samples.stopped and not self._shadow):
                 raise self._why(bridge)
             if self._bus.failed and not self._shadow:
                 raise RigError(
