@@ -18,7 +18,7 @@ from mgdd.cli import main
 from mgdd.errors import RigError
 from mgdd.rig import CanRig, Experiment, VirtualNode, read_record, run_experiment
 from mgdd.rig.experiment import ExperimentResult
-from mgdd.rig.experiment.self_test import LIMIT_S, WAYS_TO_DIE, SelfTest
+from mgdd.rig.experiment.self_test import LIMIT_S, WAYS_OF, WAYS_TO_DIE, SelfTest
 
 pytest.importorskip("can", reason="python-can is not installed: pip install 'mgdd[can]'")
 pytest.importorskip("cantools", reason="cantools is not installed: pip install 'mgdd[can]'")
@@ -81,7 +81,7 @@ def test_a_changed_controller_is_seen_by_the_replay(tmp_path: Path) -> None:
 
 def test_a_dry_run_transmits_nothing_and_computes_everything(tmp_path: Path) -> None:
     truth = tmp_path / "truth.csv"
-    short = TRACK.replace("step:20:35", "sine:30:5:4").replace('"guided"', '"pid"')
+    short = TRACK.replace("step:20:35", "sine:30:5:4").replace('"guided"', '"pid"\nloop = "python"')
     with VirtualNode("etb", seed=1, truth=truth) as node:
         known = experiment(short + "[bus]\ntimeout_ms = 5000.0\n")
         result = run_experiment(known.with_mode("dry_run", connection=node.bus, pace="real_time"), tmp_path / "run")
@@ -100,7 +100,7 @@ def test_a_bench_is_driven_only_armed_and_with_a_key(tmp_path: Path) -> None:
 
     key = tmp_path / "key"
     with VirtualNode("etb", seed=1, step=True) as node:  # steps: a busy machine must not let it time out
-        known = experiment(TRACK.replace('"guided"', '"pid"') + "[bus]\ntimeout_ms = 5000.0\n")
+        known = experiment(TRACK.replace('"guided"', '"pid"\nloop = "python"') + "[bus]\ntimeout_ms = 5000.0\n")
         known = known.with_mode("bench", connection=node.bus, pace="real_time")
         with pytest.raises(RigError, match="give arm=True"):
             run_experiment(known, key_file=key)
@@ -191,13 +191,14 @@ def test_record_listens_and_export_writes(tmp_path: Path, capsys: pytest.Capture
     capsys.readouterr()
 
 
-def test_the_self_test_times_every_way_to_die(capsys: pytest.CaptureFixture[str]) -> None:
+@pytest.mark.parametrize("loop", ["python", "core"])
+def test_the_self_test_times_every_way_to_die(loop: str, capsys: pytest.CaptureFixture[str]) -> None:
     """No timing of this machine is asserted here but that of the plate, which the node simulates on its own clock."""
-    code = main(["rig", "selftest", "--json", "--quiet"])
+    code = main(["rig", "selftest", "--json", "--quiet", "--loop", loop])
     said = json.loads(capsys.readouterr().out)
-    assert list(said["ways_to_die"]) == list(WAYS_TO_DIE)
+    assert list(said["ways_to_die"]) == list(WAYS_OF[loop])
     times = [seconds for seconds in said["ways_to_die"].values() if seconds is not None]
-    assert len(times) == len(WAYS_TO_DIE), said["notes"]
+    assert len(times) == len(WAYS_OF[loop]), said["notes"]
     assert all(0.1 < seconds < 1.0 for seconds in times)  # the springs need some 0.2 s from the open plate
     assert code == (0 if max(times) <= LIMIT_S else 1)
 

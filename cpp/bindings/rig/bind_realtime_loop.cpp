@@ -25,18 +25,20 @@ namespace {
 
 using namespace rig;
 
-using SignalArgument = std::tuple<std::string, SignalLayout, double>;
+// Name, layout, number while driven, number with an open bridge, raw value that says that there is none.
+using SignalArgument =
+    std::tuple<std::string, SignalLayout, double, std::optional<double>, std::optional<std::uint64_t>>;
 using MessageArgument = std::tuple<std::uint32_t, bool, int, std::optional<E2eSettings>, std::vector<SignalArgument>>;
 
 template <class SignalOf>
 MessageOf<SignalOf> message_of(const MessageArgument& given) {
   const auto& [id, extended, size, protection, signals] = given;
   MessageOf<SignalOf> message{.id = id, .extended = extended, .size = size, .protection = protection};
-  for (const auto& [name, layout, fixed] : signals) {
+  for (const auto& [name, layout, fixed, at_rest, missing_raw] : signals) {
     if constexpr (std::is_same_v<SignalOf, CommandedSignal>) {
-      message.signals.push_back({parse_name(commanded_names(), "signals", name), layout, fixed});
+      message.signals.push_back({parse_name(commanded_names(), "signals", name), layout, fixed, at_rest});
     } else {
-      message.signals.push_back({parse_name(measured_names(), "signals", name), layout});
+      message.signals.push_back({parse_name(measured_names(), "signals", name), layout, missing_raw});
     }
   }
   return message;
@@ -126,6 +128,10 @@ py::dict samples(RealtimeLoop& loop) {
   out["duty"] = column<double>(rows, [](const S& s) { return s.drive.duty; });
   out["bridge_open"] = column<bool>(rows, [](const S& s) { return s.drive.bridge_open; });
   out["fresh"] = column<bool>(rows, [](const S& s) { return s.fresh; });
+  out["good_frames"] = column<std::int64_t>(rows, [](const S& s) { return s.good_frames; });
+  out["bad_frames"] = column<std::int64_t>(rows, [](const S& s) { return s.bad_frames; });
+  out["bus_state"] = column<std::int8_t>(rows, [](const S& s) { return static_cast<std::int8_t>(s.bus); });
+  out["request"] = column<std::int8_t>(rows, [](const S& s) { return static_cast<std::int8_t>(s.request); });
   out["state"] = column<std::int8_t>(rows, [](const S& s) { return static_cast<std::int8_t>(s.state); });
   out["cause"] = column<std::int8_t>(rows, [](const S& s) { return static_cast<std::int8_t>(s.cause); });
   out["send_result"] = column<std::int8_t>(rows, [](const S& s) { return static_cast<std::int8_t>(s.result); });

@@ -173,6 +173,10 @@ bool ControlCycle::turn(const Turn& turn) noexcept {
   sample.cause = gate_.cause();
   sample.result = last_result_;
   sample.fresh = fresh;
+  sample.good_frames = facts.good_frames;
+  sample.bad_frames = facts.bad_frames;
+  sample.bus = facts.bus;
+  sample.request = facts.request;
   sample.compute_ns = monotonic_ns() - turn.woken_ns;
   samples_.push(sample);
   if (turn.stopping) --stop_frames_left_;

@@ -142,10 +142,11 @@ FrameVerdict FrameCodec::read(const Frame& frame, Measurements& now) noexcept {
     Measurements next = now;
     bool angle = false;
     for (const MeasuredSignal& signal : message.signals) {
-      const std::optional<double> value = unpack(signal.layout, frame.payload());
-      if (!value || !std::isfinite(*value)) return FrameVerdict::bad;
       const auto at = static_cast<std::size_t>(signal.what);
-      next.value[at] = *value;
+      const bool missing = signal.missing_raw && unpack_raw(signal.layout, frame.payload()) == signal.missing_raw;
+      const std::optional<double> value = unpack(signal.layout, frame.payload());
+      if (missing ? at < n_needed : !value || !std::isfinite(*value)) return FrameVerdict::bad;
+      next.value[at] = missing ? unknown : *value;
       next.stamp_ns[at] = frame.monotonic_ns;
       angle = angle || signal.what == Measured::angle_deg;
     }
@@ -165,7 +166,7 @@ bool FrameCodec::write(const Drive& drive, double reference_deg, Frame& frame) n
   frame.fd = message.size > 8;
   const std::span<std::uint8_t> payload(frame.data.data(), frame.size);
   for (const CommandedSignal& signal : message.signals) {
-    double value = signal.fixed;
+    double value = drive.bridge_open ? signal.at_rest.value_or(signal.fixed) : signal.fixed;
     if (signal.what == Commanded::duty) value = drive.duty;
     if (signal.what == Commanded::enable) value = drive.bridge_open ? 0.0 : 1.0;
     if (signal.what == Commanded::reference_deg) value = reference_deg;

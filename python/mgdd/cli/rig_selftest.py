@@ -16,20 +16,25 @@ _FAILED = 1
 
 def add(verbs: Any) -> None:
     """Add the command."""
-    add_command(
+    parser = add_command(
         verbs, "selftest", _selftest,
         help_text="let a process that drives a simulated throttle over a bus die in six ways, and time the plate's way "
         "to limp-home; exit code 1 above 0.4 s",
         example="mgdd rig selftest --json",
     )  # fmt: skip
+    parser.add_argument(
+        "--loop", choices=("python", "core"), default="python",
+        help="what drives the throttle: python, command by command, or an experiment on the loop of the core, whose "
+        "controllers give no NaN: five ways (default: python)",
+    )  # fmt: skip
 
 
 def _selftest(args: argparse.Namespace) -> None:
-    from mgdd.rig.experiment.self_test import WAYS_TO_DIE, run_self_test
+    from mgdd.rig.experiment.self_test import WAYS_OF, run_self_test
 
     check_output(args)
-    step = args.progress.expect(len(WAYS_TO_DIE))
-    test = run_self_test(progress=step)
+    step = args.progress.expect(len(WAYS_OF[args.loop]))
+    test = run_self_test(loop=args.loop, progress=step)
     rows = tuple(
         (way, "–" if time is None else f"{time:.3f}", test.notes.get(way, "")) for way, time in test.ways_to_die.items()
     )

@@ -115,10 +115,7 @@ class GatedThrottle:
             raise ParameterError(f"inputs = {', '.join(map(str, inputs)) or 'none'}: must be duty")
         drive = self._passed(inputs["duty"])
         if drive.bridge_open and not (self._opens or self.shadow):
-            raise RigError(
-                f"the safety gate went to {self.gate.mode!r}: {self.gate.reason}; look for the cause before the next "
-                "run"
-            )
+            raise drive_taken(self.gate.mode, self.gate.reason)
         self._send(drive)
 
     def measure(self) -> Measurement:
@@ -162,3 +159,8 @@ def facts_of(values: Mapping[str, float] | None, cycle_s: float) -> dict[str, An
         "sensor_v": (values["first_v"], values["second_v"]),
         "angle_deg": values["sensed_angle_deg"],
     }
+
+
+def drive_taken(mode: str, reason: str) -> RigError:
+    """Make the error of a run whose gate took the drive away."""
+    return RigError(f"the safety gate went to {mode!r}: {reason}; look for the cause before the next run")

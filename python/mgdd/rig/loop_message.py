@@ -24,7 +24,12 @@ class LoopMessage:
         ``current_a``, ``speed_deg_per_s`` and ``applied_duty``. Of the command ``duty``, and where wanted ``enable`` (1
         while the actuator is driven, 0 with an open bridge) and ``reference_deg``.
     fixed : sequence of (SignalLayout, float)
-        Of the command: numbers that never change, a mode for example.
+        Of the command: numbers that never change.
+    switched : sequence of (SignalLayout, float, float)
+        Of the command: a number while the actuator is driven and one with an open bridge, a mode for example.
+    missing : mapping of str to int
+        Of a received message: raw value by signal that says that there is no number. One of the three that a loop
+        needs makes its frame a bad one, of another the number is NaN.
     extended : bool
         29-bit identifier.
     size : int
@@ -47,12 +52,22 @@ class LoopMessage:
     can_id: int
     signals: Mapping[str, SignalLayout]
     fixed: Sequence[tuple[SignalLayout, float]] = field(default=())
+    switched: Sequence[tuple[SignalLayout, float, float]] = field(default=())
+    missing: Mapping[str, int] = field(default_factory=dict)
     extended: bool = False
     size: int = 8
     protection: E2eSettings | None = None
 
     def to_core(self) -> tuple[Any, ...]:
         """Give what the core takes."""
-        signals = [(name, layout, 0.0) for name, layout in self.signals.items()]
-        signals += [("fixed", layout, float(number)) for layout, number in self.fixed]
+        signals: list[tuple[Any, ...]] = [
+            (name, layout, 0.0, None, _bits(self.missing.get(name))) for name, layout in self.signals.items()
+        ]
+        signals += [("fixed", layout, float(number), None, None) for layout, number in self.fixed]
+        signals += [("fixed", layout, float(driven), float(open_), None) for layout, driven, open_ in self.switched]
         return (self.can_id, self.extended, self.size, self.protection, signals)
+
+
+def _bits(raw: int | None) -> int | None:
+    """Return a raw value as the core holds it: in two's complement of 64 bits."""
+    return None if raw is None else raw % 2**64

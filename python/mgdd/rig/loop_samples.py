@@ -30,10 +30,16 @@ _LABELS: Mapping[str, tuple[str, str]] = {
     "mode": ("-", "mode of the safety gate"),
     "cause": ("-", "what is wrong"),
     "send_result": ("-", "what became of the command"),
+    "good_frames": ("-", "frames with a new angle"),
+    "bad_frames": ("-", "frames that were refused"),
+    "bus_state": ("-", "state of the bus"),
+    "request": ("-", "request to the safety gate"),
 }
 _MODES = tuple(_core.rig.safety_states)
 _REASONS = tuple(_core.rig.safety_reasons)
 _RESULTS = tuple(_core.rig.send_results)
+_BUS_STATES = tuple(_core.rig.bus_states)
+_REQUESTS = tuple(_core.rig.safety_requests)
 _TIMES = {"lateness_us": "lateness", "compute_us": "compute", "age_us": "age", "send_us": "send"}
 
 
@@ -45,6 +51,8 @@ def samples_dataset(columns: Mapping[str, Any], origin_ns: int) -> xr.Dataset:
     values["mode"] = np.array(_MODES)[values.pop("state")]
     values["cause"] = np.array(_REASONS)[values["cause"]]
     values["send_result"] = np.array(_RESULTS)[values["send_result"]]
+    values["bus_state"] = np.array(_BUS_STATES)[values["bus_state"]]
+    values["request"] = np.array(_REQUESTS)[values["request"]]
     variables: dict[str, Any] = {"time_s": ("time_s", time_s)}
     for name, column in values.items():
         variables[name] = ("time_s", column, *(_LABELS.get(name) or VARIABLES[name]))

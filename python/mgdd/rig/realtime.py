@@ -20,7 +20,7 @@ from mgdd.rig.safety_envelope import SafetyEnvelope
 
 if TYPE_CHECKING:
     import xarray as xr
-    from numpy.typing import ArrayLike
+    from numpy.typing import ArrayLike, NDArray
 
 __all__ = ["RealtimeLoop"]
 
@@ -126,8 +126,11 @@ class RealtimeLoop(GateRequests):
         if not isinstance(transport, RingTransport | SocketCanTransport):
             raise ParameterError.of("transport", transport, "a RingTransport or a SocketCanTransport")
         for message in measurements:
-            if message.fixed:
-                raise ParameterError.of("fixed", message.fixed, "empty in a received message")
+            for name in ("fixed", "switched"):
+                if given := getattr(message, name):
+                    raise ParameterError.of(name, given, "empty in a received message")
+        if command.missing:
+            raise ParameterError.of("missing", command.missing, "empty in the command")
         self.envelope = SafetyEnvelope() if envelope is None else envelope
         self.controller = controller
         self.transport = transport
@@ -270,10 +273,21 @@ class RealtimeLoop(GateRequests):
             last good ones), duty asked and duty sent, mode, cause, lateness, compute time and age. What is unknown is
             NaN. What was not taken in time is missing here and counted in ``report()["dropped_samples"]``.
         """
-        columns = dict(self._core.samples())
+        columns = self.sample_columns()
         if self._origin_ns is None and columns["deadline_ns"].size:
             self._origin_ns = int(columns["deadline_ns"][0])
         return samples_dataset(columns, self._origin_ns or 0)
+
+    def sample_columns(self) -> dict[str, NDArray[Any]]:
+        """Take the same samples as plain columns, for a reader that comes every few milliseconds.
+
+        Returns
+        -------
+        dict of str to ndarray
+            As the core has them: ``deadline_ns``, times in us, ``state``, ``cause``, ``send_result``, ``bus_state`` and
+            ``request`` as numbers.
+        """
+        return dict(self._core.samples())
 
     def events(self) -> list[SafetyChange]:
         """Take the changes of mode since the last call.

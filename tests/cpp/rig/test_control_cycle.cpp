@@ -145,6 +145,38 @@ TEST(ControlCycle, SamplesReplayTheControllerBitForBit) {
   EXPECT_GT(stale, 30);
 }
 
+// And with what the gate was told, every drive, also those of a gate that changes its state.
+TEST(ControlCycle, SamplesReplayTheGateBitForBit) {
+  SafetyEnvelope envelope = test::bus_envelope();
+  Rig rig({.initial_reference_deg = 30.0});
+  rig.keep = true;
+  rig.drive();
+  for (int i = 0; i < 300; ++i) {
+    if (i == 60) rig.cycle.set_reference(70.0);
+    rig.answers = i % 7 != 0 && i < 250;  // and then silence
+    rig.turn(i == 120 ? 2 : 0);
+  }
+  ASSERT_EQ(rig.cycle.state(), SafetyState::limp);
+  SafetyGate gate(envelope);
+  bool sent = true;
+  for (const LoopSample& s : rig.kept) {
+    SafetyFacts facts{.good_frames = s.good_frames,
+                      .bad_frames = s.bad_frames,
+                      .sensor_v = {s.measured[1], s.measured[2]},
+                      .angle_deg = s.measured[0],
+                      .bus = s.bus,
+                      .sent = sent,
+                      .missed_deadlines = s.missed,
+                      .request = s.request};
+    if (s.age_ns >= 0) facts.age_s = static_cast<double>(s.age_ns) * 1e-9;
+    gate.observe(facts);
+    const bool driven = gate.state() == SafetyState::run;
+    ASSERT_EQ(gate.command(driven ? s.asked_duty : 0.0), s.drive) << s.cycle;
+    ASSERT_EQ(gate.state(), s.state) << s.cycle;
+    sent = s.result == SendResult::sent;
+  }
+}
+
 TEST(ControlCycle, SilenceOfTheNodeOpensTheBridge) {
   Rig rig({.initial_reference_deg = 40.0});
   rig.drive();

@@ -142,6 +142,61 @@ TEST(FrameCodec, RefusesWhatCannotWork) {
   refused([](auto& s) { s.received[1].signals[2].layout.start = 40; }, "supply_v");
 }
 
+TEST(FrameCodec, AFixedNumberMayBeAnotherOneWithAnOpenBridge) {
+  FrameCodecSettings s = bus_messages();
+  s.command.signals.push_back({Commanded::fixed, intel(56, 4, 1.0), 5.0, 11.0});
+  FrameCodec codec(s);
+  Frame frame;
+  for (const bool open : {true, false, true}) {
+    ASSERT_TRUE(codec.write({.duty = open ? 0.0 : 0.25, .bridge_open = open}, 30.0, frame));
+    EXPECT_EQ(unpack(s.command.signals.back().layout, frame.payload()), open ? 11.0 : 5.0);
+    EXPECT_EQ(unpack(s.command.signals[1].layout, frame.payload()), 2.0);  // without one of its own it stays
+  }
+}
+
+TEST(FrameCodec, AMissingNumberIsNaNAndOneThatALoopNeedsMakesItsFrameBad) {
+  FrameCodecSettings s = bus_messages();
+  s.received[1].signals[2].missing_raw = 1023;
+  s.received[1].signals[1].missing_raw = 4095;
+  FrameCodec codec(s);
+  ThrottleOnBus node;
+  Measurements m;
+  const auto& sensors = s.received[1].signals;
+  Frame frame = node.sensors(now);
+  const auto write = [&](std::size_t which, std::uint64_t raw) {
+    ASSERT_EQ(pack_raw(sensors[which].layout, raw, OutOfRange::refuse, {frame.data.data(), frame.size}),
+              PackStatus::ok);
+  };
+  write(2, 1022);
+  EXPECT_EQ(codec.read(frame, m), FrameVerdict::good);
+  EXPECT_NEAR(m.of(Measured::supply_v), 20.44, 1e-9);
+  write(2, 1023);
+  EXPECT_EQ(codec.read(frame, m), FrameVerdict::good);
+  EXPECT_TRUE(std::isnan(m.of(Measured::supply_v)));
+  const double before_v = m.of(Measured::second_v);
+  write(1, 4095);
+  EXPECT_EQ(codec.read(frame, m), FrameVerdict::bad);
+  EXPECT_EQ(m.of(Measured::second_v), before_v);
+}
+
+TEST(FrameCodec, AMissingSignedNumberIsTold) {
+  FrameCodecSettings s = bus_messages();
+  s.received[1].signals.push_back(
+      {Measured::current_a, intel(34, 12, 0.01, true), static_cast<std::uint64_t>(std::int64_t{-2048})});
+  FrameCodec codec(s);
+  ThrottleOnBus node;
+  Measurements m;
+  Frame frame = node.sensors(now);
+  const auto& current = s.received[1].signals.back();
+  for (const std::int64_t raw : {-2047, -2048}) {
+    ASSERT_EQ(
+        pack_raw(current.layout, static_cast<std::uint64_t>(raw), OutOfRange::refuse, {frame.data.data(), frame.size}),
+        PackStatus::ok);
+    EXPECT_EQ(codec.read(frame, m), FrameVerdict::good);
+    EXPECT_EQ(std::isnan(m.of(Measured::current_a)), raw == -2048);
+  }
+}
+
 TEST(FrameCodec, ACommandMayHaveSeveralFixedNumbers) {
   FrameCodecSettings s = bus_messages();
   s.command.signals.push_back({Commanded::fixed, intel(56, 8, 1.0), 200.0});

@@ -57,6 +57,10 @@ struct LoopSample {
   SafetyReason cause = SafetyReason::none;
   SendResult result = SendResult::sent;
   bool fresh = false;  ///< a new angle arrived
+  // What else the gate was told: with it a record gives every drive again.
+  std::int64_t good_frames = 0, bad_frames = 0;
+  BusState bus = BusState::active;
+  SafetyRequest request = SafetyRequest::none;
 };
 
 /// One thread writes, any thread reads.

@@ -28,18 +28,20 @@ enum class Commanded {
   duty,
   enable,         ///< 1 while the actuator is driven, 0 with the bridge open
   reference_deg,  ///< that the loop follows
-  fixed,          ///< always the same, a mode for example
+  fixed,          ///< one number while driven, one with an open bridge: a mode for example
 };
 Names<Commanded> commanded_names() noexcept;
 
 struct MeasuredSignal {
   Measured what{};
   SignalLayout layout{};
+  std::optional<std::uint64_t> missing_raw{};  ///< raw value that says that there is no number
 };
 struct CommandedSignal {
   Commanded what{};
   SignalLayout layout{};
-  double fixed = 0.0;  ///< of the kind `fixed`
+  double fixed = 0.0;               ///< of the kind `fixed`
+  std::optional<double> at_rest{};  ///< of the kind `fixed`, with an open bridge; none: the same
 };
 
 template <class SignalOf>
@@ -76,7 +78,7 @@ struct Measurements {
 enum class FrameVerdict {
   foreign,  ///< no message of this codec
   waiting,  ///< its counter has not run in yet
-  bad,      ///< wrong CRC, counter, length or number: not used
+  bad,      ///< wrong CRC, counter, length or number, or one that a loop needs is missing: not used
   good,
 };
 

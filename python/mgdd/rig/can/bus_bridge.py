@@ -7,9 +7,9 @@ import threading
 import time
 import weakref
 from types import TracebackType
-from typing import TYPE_CHECKING, Any, Self
+from typing import TYPE_CHECKING, Any, Protocol, Self, cast
 
-from mgdd._core.rig import RingTransport
+from mgdd._core.rig import Frame, RingTransport
 from mgdd.errors import RigError
 from mgdd.rig.can.messages import frame_of, message_of
 
@@ -23,6 +23,18 @@ _LOOK_S = 0.05  # how often a waiting thread looks whether it shall end
 _SEND_ERRORS = 3  # in a row, until the bus counts as gone
 
 
+class FrameBus(Protocol):
+    """What a bridge needs of a bus: a `mgdd.rig.CanTransport`, for example."""
+
+    def receive(self, timeout_s: float) -> Frame | None:
+        """Give the next frame that arrived, or None after the time."""
+        ...
+
+    def send(self, frame: Frame) -> None:
+        """Hand a frame to the bus."""
+        ...
+
+
 class BusBridge:
     """Two threads between a python-can bus and a `RingTransport`: one receives, one sends.
 
@@ -31,9 +43,11 @@ class BusBridge:
 
     Parameters
     ----------
-    bus : can.BusABC
+    bus : can.BusABC or CanTransport
         Any interface of python-can, opened and closed by the caller; nobody else may receive from it meanwhile. Pass
         ``interface``, ``channel`` and ``ignore_config=True`` when you open it: a configuration file must not choose.
+        A transport of ours costs one more thread on the way in, and looks after its bus: what it raises ends the
+        bridge.
     transport : RingTransport
         Of the loop.
 
@@ -61,12 +75,12 @@ class BusBridge:
     0
     """
 
-    def __init__(self, bus: can.BusABC, transport: RingTransport) -> None:
+    def __init__(self, bus: can.BusABC | FrameBus, transport: RingTransport) -> None:
         try:
             import can  # noqa: F401
         except ImportError:
             raise RigError('python-can is not installed: pip install "mgdd[can]"') from None
-        self._bus = bus
+        self._bus = _PythonCan(cast("can.BusABC", bus)) if hasattr(bus, "recv") else bus
         self._transport = transport
         self._stop = threading.Event()
         self.error: BaseException | None = None
@@ -102,10 +116,9 @@ class BusBridge:
 
     def _receive(self) -> None:
         while not self._stop.is_set():
-            message = self._bus.recv(_LOOK_S)
-            if message is None:
-                continue
-            self._transport.feed(frame_of(message, monotonic_ns=time.monotonic_ns(), received=True))
+            frame = self._bus.receive(_LOOK_S)
+            if frame is not None:
+                self._transport.feed(frame)
 
     def _send(self) -> None:
         in_a_row = 0
@@ -114,13 +127,27 @@ class BusBridge:
             if frame is None:
                 continue
             try:
-                self._bus.send(message_of(frame))
+                self._bus.send(frame)
                 in_a_row = 0
             except Exception:
                 self.send_errors += 1
                 in_a_row += 1
                 if in_a_row == _SEND_ERRORS:
                     raise
+
+
+class _PythonCan:
+    """A bus of python-can with the two calls of ours."""
+
+    def __init__(self, bus: can.BusABC) -> None:
+        self._bus = bus
+
+    def receive(self, timeout_s: float) -> Frame | None:
+        message = self._bus.recv(timeout_s)
+        return None if message is None else frame_of(message, monotonic_ns=time.monotonic_ns(), received=True)
+
+    def send(self, frame: Frame) -> None:
+        self._bus.send(message_of(frame))
 
 
 def _end(transport: RingTransport, stop: threading.Event, threads: list[threading.Thread]) -> None:

@@ -9,7 +9,7 @@ from contextlib import contextmanager
 from types import FrameType
 from typing import Any
 
-__all__ = ["SignalsAsExceptions", "noted_signals", "undisturbed"]
+__all__ = ["SignalsAsExceptions", "held_back", "noted_signals", "undisturbed"]
 
 _CAUGHT = (signal.SIGINT, signal.SIGTERM)
 
@@ -54,6 +54,18 @@ def noted_signals() -> Iterator[list[int]]:
         yield noted
     finally:
         _restore(before)
+
+
+@contextmanager
+def held_back() -> Iterator[None]:
+    """Hold both signals back until the block is over, also those that another thread of the process takes."""
+    if threading.current_thread() is not threading.main_thread():
+        yield
+        return
+    with noted_signals() as noted:
+        yield
+    for number in noted:
+        signal.raise_signal(number)
 
 
 def _install(handlers: Mapping[signal.Signals, Any]) -> dict[int, Any]:

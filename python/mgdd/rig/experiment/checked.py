@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Iterator
 from contextlib import contextmanager
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Any
 
@@ -15,6 +15,7 @@ from mgdd.results.describe import described
 from mgdd.rig.can.signal_map import SignalMap
 from mgdd.rig.experiment.engine_task import SeekPlan, engine_named
 from mgdd.rig.experiment.experiment import Experiment
+from mgdd.rig.experiment.loop_choice import LoopChoice, chosen_loop
 from mgdd.rig.experiment.settings import (
     SAMPLE_S,
     EnginePlant,
@@ -52,6 +53,8 @@ class CheckedExperiment:
         Of a mode with a bus.
     record : pathlib.Path or None
         Of ``replay``.
+    loop : LoopChoice or None
+        Of a task with a controller: which loop steps it, and why.
     """
 
     experiment: Experiment
@@ -60,6 +63,7 @@ class CheckedExperiment:
     envelope: SafetyEnvelope | None
     signal_map: SignalMap | None
     record: Path | None
+    loop: LoopChoice | None = None
 
     @property
     def bus_map(self) -> SignalMap:
@@ -83,6 +87,8 @@ class CheckedExperiment:
         if experiment.mode in _BUS_MODES:
             out["connection"] = experiment.bus.connection or "a hub and a node of its own"
             out["pace"] = experiment.bus.pace
+        if self.loop is not None:
+            out |= {"loop": self.loop.name, "loop_reason": self.loop.reason}
         if known is not None:
             out |= {
                 "map": str(known.file), "dbc": str(known.dbc.file), "dbc_sha256": known.dbc.sha256,
@@ -170,7 +176,7 @@ def _checked(experiment: Experiment) -> CheckedExperiment:
     )
     if signal_map is not None:
         _require_names(checked, signal_map)
-    return checked
+    return replace(checked, loop=chosen_loop(experiment, signal_map))
 
 
 def _record_of(experiment: Experiment) -> Path | None:

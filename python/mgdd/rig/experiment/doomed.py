@@ -1,4 +1,4 @@
-"""A process of the self-test: it opens a throttle over a bus and dies in the way it is told, doomed.py WAY BUS.
+"""A process of the self-test: it opens a throttle over a bus and dies in the way it is told, doomed.py WAY BUS LOOP.
 
 It says ``ready`` when everything is imported, waits for a line, says ``open`` when the plate is open, and ``dying``
 with the monotonic time [ns] where it dies by itself.
@@ -9,16 +9,37 @@ from __future__ import annotations
 import math
 import sys
 import time
+from pathlib import Path
+from tempfile import TemporaryDirectory
 
 from mgdd.errors import RigError
 from mgdd.rig.can.can_rig import CanRig
+from mgdd.rig.can.signal_map import SignalMap
 from mgdd.rig.can.transport import CanTransport
+from mgdd.rig.experiment.checked import check_experiment
+from mgdd.rig.experiment.experiment import Experiment
+from mgdd.rig.experiment.run import run_experiment
+from mgdd.rig.experiment.watched import Cycle
 
-__all__ = ["drive_and_die"]
+__all__ = ["drive_and_die", "track_and_die"]
 
 _DUTY, _OPEN_DEG, _SAMPLES = 0.3, 40.0, 8
 _PATIENCE_S = 2.0
 _HANGS_S = 60.0
+_HELD_DEG = 60.0
+_EXPERIMENT = """
+kind = "experiment"
+format = 1
+task = "track"
+mode = "hil"
+[track]
+reference = "{reference}"
+controller = "pid"
+loop = "core"
+[bus]
+connection = "{connection}"
+pace = "real_time"
+"""
 
 
 def drive_and_die(way: str, connection: str) -> None:
@@ -36,6 +57,44 @@ def drive_and_die(way: str, connection: str) -> None:
             raise RuntimeError("a mistake in the experiment")
         if way == "nan":
             rig.apply({"duty": math.nan})
+        time.sleep(_HANGS_S)
+
+
+def track_and_die(way: str, connection: str) -> None:
+    """Open the plate by an experiment on the real-time loop of the core, and die."""
+    with TemporaryDirectory(prefix="mgdd-doomed-") as folder:
+        file = Path(folder) / "held.csv"
+        sample_s = SignalMap.load("etb").cycle_s
+        rows = (f"{k * sample_s:.3f},{_HELD_DEG}" for k in range(round(_HANGS_S / sample_s)))
+        file.write_text("\n".join(["time_s,reference_deg", *rows]), encoding="utf-8")
+        text = _EXPERIMENT.format(reference=file, connection=connection)
+        checked = check_experiment(Experiment.from_toml(text))
+    _say("ready")
+    sys.stdin.readline()
+    ends = time.monotonic() + _HANGS_S
+    while time.monotonic() < ends:
+        try:
+            run_experiment(checked, watch=_Doom(way))
+        except RigError:
+            continue  # a busy machine
+
+
+class _Doom:
+    """Says when the plate is open, and dies where the process is to die by itself."""
+
+    def __init__(self, way: str) -> None:
+        self._way, self._held = way, 0
+
+    def __call__(self, cycle: Cycle) -> None:
+        self._held = self._held + 1 if cycle.measured.values["sensed_angle_deg"] > _OPEN_DEG else 0
+        if self._held != _SAMPLES:
+            return
+        _say("open")
+        if self._way not in ("exception", "hang"):
+            return
+        _say(f"dying {time.monotonic_ns()}")
+        if self._way == "exception":
+            raise RuntimeError("a mistake in the experiment")
         time.sleep(_HANGS_S)
 
 
@@ -59,4 +118,4 @@ def _say(text: str) -> None:
 
 
 if __name__ == "__main__":
-    drive_and_die(*sys.argv[1:])
+    {"python": drive_and_die, "core": track_and_die}[sys.argv[3]](*sys.argv[1:3])

@@ -5,7 +5,8 @@ from __future__ import annotations
 import os
 import time
 from collections.abc import Callable
-from dataclasses import dataclass
+from contextlib import ExitStack
+from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
@@ -14,12 +15,16 @@ import numpy as np
 from mgdd.errors import DataError, ParameterError, argument
 from mgdd.results.describe import described
 from mgdd.rig.experiment.checked import CheckedExperiment, check_experiment
+from mgdd.rig.experiment.core_replay import loop_rows, replayed
+from mgdd.rig.experiment.core_track import track_on_core
 from mgdd.rig.experiment.engine_task import SeekPlan
 from mgdd.rig.experiment.experiment import Experiment
+from mgdd.rig.experiment.loop_choice import LoopChoice
 from mgdd.rig.experiment.outcome import Outcome
 from mgdd.rig.experiment.run_folder import RunFolder, versions
 from mgdd.rig.experiment.run_record import RunRecord
-from mgdd.rig.experiment.stand import Stand, opened
+from mgdd.rig.experiment.stand import Stand, opened, rig_of
+from mgdd.rig.experiment.throttle_tasks import TrackPlan
 from mgdd.rig.experiment.watched import Cycle, Watched
 
 if TYPE_CHECKING:
@@ -41,7 +46,8 @@ class ExperimentResult:
     dataset : xarray.Dataset
         Signals over time or cycle.
     timing : dict
-        Cycles, and percentiles of the time for thinking and for waiting [us].
+        Cycles, and percentiles of the time for thinking and for waiting [us]; of a controller ``loop``, and of that of
+        the core its account.
     counters : dict
         What rig and guard have counted.
     events : tuple of str
@@ -180,21 +186,68 @@ def _steered(
     watch: Callable[[Cycle], None] | None,
 ) -> tuple[Outcome, dict[str, Any], dict[str, Any]]:
     times: list[tuple[float, float]] = []
+
+    def listen(cycle: Cycle) -> None:
+        times.append((cycle.thinking_s, cycle.waiting_s))
+        if watch is not None:
+            watch(cycle)
+
+    if isinstance(checked.plan, TrackPlan):
+        again = loop_rows(checked.record) if checked.record is not None else []
+        if again:
+            return _again(checked, checked.plan, again, record)
+        if checked.loop is not None and checked.loop.name == "core":
+            return _on_core(checked, checked.plan, record, listen, times, arm=arm, key_file=key_file)
     with opened(checked, record, arm=arm, key_file=key_file) as stand:
 
-        def listen(cycle: Cycle) -> None:
-            times.append((cycle.thinking_s, cycle.waiting_s))
+        def listen_here(cycle: Cycle) -> None:
             record.say(stand.events())
-            if watch is not None:
-                watch(cycle)
+            listen(cycle)
 
         begun = time.monotonic()
         try:
-            outcome = _run(checked, stand, listen)
+            outcome = _run(checked, stand, listen_here)
         finally:
             record.say(stand.events())
         elapsed_s = time.monotonic() - begun
-        return outcome, stand.counters(), _timing(times, elapsed_s)
+        timing = _timing(times, elapsed_s)
+        if checked.loop is None:
+            return outcome, stand.counters(), timing
+        return _told(outcome, checked.loop), stand.counters(), {"loop": checked.loop.name, **timing}
+
+
+def _on_core(
+    checked: CheckedExperiment,
+    plan: TrackPlan,
+    record: RunRecord,
+    listen: Callable[[Cycle], None],
+    times: list[tuple[float, float]],
+    *,
+    arm: bool,
+    key_file: str | os.PathLike[str] | None,
+) -> tuple[Outcome, dict[str, Any], dict[str, Any]]:
+    with ExitStack() as stack:
+        rig = stack.enter_context(rig_of(checked, stack, record.recorder, arm=arm, key_file=key_file))
+        begun = time.monotonic()
+        outcome, counters, account = track_on_core(checked, plan, rig, record, listen)
+        timing = _timing(times, time.monotonic() - begun)
+    choice = checked.loop or LoopChoice("core", "")
+    return _told(outcome, choice), counters, {"loop": choice.name, **timing, **account}
+
+
+def _again(
+    checked: CheckedExperiment, plan: TrackPlan, rows: list[dict[str, float]], record: RunRecord
+) -> tuple[Outcome, dict[str, Any], dict[str, Any]]:
+    begun = time.monotonic()
+    outcome, counters = replayed(checked, plan, rows, record)
+    choice = LoopChoice("core", "mode = 'replay': the record is one of that loop, computed again cycle by cycle")
+    timing = {"loop": choice.name, "cycles": len(outcome.dataset["time_s"]), "elapsed_s": time.monotonic() - begun}
+    return _told(outcome, choice), counters, timing
+
+
+def _told(outcome: Outcome, choice: LoopChoice) -> Outcome:
+    """Say in the figures which loop ran, and why that one."""
+    return replace(outcome, figures={**outcome.figures, "loop": choice.name, "loop_reason": choice.reason})
 
 
 def _run(checked: CheckedExperiment, stand: Stand, listen: Callable[[Cycle], None]) -> Outcome:

@@ -15,16 +15,17 @@ from pathlib import Path
 from tempfile import TemporaryDirectory
 from typing import Any
 
-from mgdd.errors import RigError
+from mgdd.errors import ParameterError, RigError
 from mgdd.results.describe import described
 from mgdd.rig.experiment.checked import check_experiment
 from mgdd.rig.experiment.experiment import Experiment
 from mgdd.rig.experiment.own_node import own_node
 from mgdd.rig.experiment.throttle_tasks import throttle_named
 
-__all__ = ["WAYS_TO_DIE", "SelfTest", "run_self_test"]
+__all__ = ["WAYS_OF", "WAYS_TO_DIE", "SelfTest", "run_self_test"]
 
 WAYS_TO_DIE = ("exception", "nan", "sigint", "sigterm", "sigkill", "hang")
+WAYS_OF = {"python": WAYS_TO_DIE, "core": tuple(way for way in WAYS_TO_DIE if way != "nan")}
 LIMIT_S = 0.4
 _AWAY_DEG = 5.0  # from limp-home before the end, or the test says nothing
 _BAND_DEG = 1.0
@@ -54,16 +55,19 @@ class SelfTest:
         What is allowed [s].
     notes : mapping of str to str
         Why a way has no time.
+    loop : {"python", "core"}
+        What drove the plate.
     """
 
     ways_to_die: Mapping[str, float | None]
     limit_s: float
     notes: Mapping[str, str]
+    loop: str = "python"
 
     @property
     def passed(self) -> bool:
         """Whether every way has a time, and none is above the limit."""
-        times = [self.ways_to_die.get(way) for way in WAYS_TO_DIE]
+        times = [self.ways_to_die.get(way) for way in WAYS_OF[self.loop]]
         return all(time is not None and time <= self.limit_s for time in times)
 
     def to_dict(self) -> dict[str, Any]:
@@ -76,13 +80,14 @@ class SelfTest:
         """
         return {
             "passed": self.passed,
+            "loop": self.loop,
             "limit_s": self.limit_s,
             "ways_to_die": dict(self.ways_to_die),
             "notes": dict(self.notes),
         }
 
 
-def run_self_test(*, progress: Callable[[str], None] | None = None) -> SelfTest:
+def run_self_test(*, loop: str = "python", progress: Callable[[str], None] | None = None) -> SelfTest:
     """Let a process that drives a simulated throttle die in every way, and time the way home of the plate.
 
     Three parts on this machine, as on a bench: a hub, a node with the throttle, and the process that dies. The times
@@ -90,21 +95,29 @@ def run_self_test(*, progress: Callable[[str], None] | None = None) -> SelfTest:
 
     Parameters
     ----------
+    loop : {"python", "core"}
+        What drives the plate: Python, command by command, or an experiment on the real-time loop of the core.
     progress : callable, optional
         Called with the name of each way.
 
     Returns
     -------
     SelfTest
-        With ``exception``, ``nan``, ``sigint``, ``sigterm``, ``sigkill`` and ``hang``.
+        With ``exception``, ``nan``, ``sigint``, ``sigterm``, ``sigkill`` and ``hang``; without ``nan`` for ``core``,
+        whose controllers give none.
 
     Raises
     ------
     ImportError
         The extra ``can`` is not installed.
+    mgdd.errors.ParameterError
+        No such loop.
     mgdd.errors.RigError
         Hub and node did not start.
     """
+    if loop not in WAYS_OF:
+        raise ParameterError.of("loop", loop, f"one of {', '.join(WAYS_OF)}")
+    ways = WAYS_OF[loop]
     experiment = Experiment.from_toml(_EXPERIMENT)
     checked, home_deg = check_experiment(experiment), throttle_named(experiment.plant.preset, Path()).limp_home_deg
     times: dict[str, float | None] = {}
@@ -113,18 +126,18 @@ def run_self_test(*, progress: Callable[[str], None] | None = None) -> SelfTest:
         truth = Path(folder) / "truth.csv"
         with own_node(checked, truth=truth) as connection, ExitStack() as hosts:
             coming: list[_Host] = []
-            for number, way in enumerate(WAYS_TO_DIE):
+            for number, way in enumerate(ways):
                 if progress is not None:
                     progress(way)
-                for early in WAYS_TO_DIE[len(coming) : number + 2]:  # the next one starts while this one dies
-                    coming.append(_Host(early, connection))
+                for early in ways[len(coming) : number + 2]:  # the next one starts while this one dies
+                    coming.append(_Host(early, connection, loop))
                     hosts.callback(coming[-1].end)
                 try:
                     times[way] = _time_home(coming[number], truth, home_deg)
                 except RigError as error:
                     times[way], notes[way] = None, str(error)
                 coming[number].end()
-    return SelfTest(ways_to_die=times, limit_s=LIMIT_S, notes=notes)
+    return SelfTest(ways_to_die=times, limit_s=LIMIT_S, notes=notes, loop=loop)
 
 
 def _time_home(host: _Host, truth: Path, home_deg: float) -> float:
@@ -159,10 +172,10 @@ def _rows(truth: Path) -> list[tuple[int, float]]:
 class _Host:
     """The process that dies; it is started early, and drives when it is told to die."""
 
-    def __init__(self, way: str, connection: str) -> None:
+    def __init__(self, way: str, connection: str, loop: str) -> None:
         self.way = way
         self._process = subprocess.Popen(
-            [sys.executable, "-m", "mgdd.rig.experiment.doomed", way, connection],
+            [sys.executable, "-m", "mgdd.rig.experiment.doomed", way, connection, loop],
             stdin=subprocess.PIPE, stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True, start_new_session=True,
         )  # fmt: skip
 

@@ -16,12 +16,13 @@ from mgdd.loop.controller_families import FAMILIES
 from mgdd.rig.can.toml_table import TomlTable
 
 __all__ = [
-    "MODES", "PACES", "SAMPLE_S", "TASKS", "BusSettings", "EnginePlant", "IdentifyTask", "ReplaySettings",
+    "LOOPS", "MODES", "PACES", "SAMPLE_S", "TASKS", "BusSettings", "EnginePlant", "IdentifyTask", "ReplaySettings",
     "SafetySettings", "SeekTask", "Settings", "ThrottlePlant", "TrackTask", "scaled",
 ]  # fmt: skip
 
 MODES = ("simulate", "hil", "dry_run", "replay", "bench")
 PACES = ("step", "real_time")
+LOOPS = ("auto", "core", "python")
 TASKS = ("identify", "track", "seek")
 SAMPLE_S = 1e-3  # between samples of a throttle that is simulated
 GUIDES = ("none", "feed_forward", "curve")
@@ -147,6 +148,7 @@ class TrackTask(Settings):
     controller: str = _key("text", "guided", among=tuple(FAMILIES))
     model: str = _key("text", "P1")
     delay_samples: int | None = _key("integer", low=0, high=16)
+    loop: str = _key("text", "auto", among=LOOPS)
 
 
 @dataclass(frozen=True, kw_only=True)

@@ -32,7 +32,7 @@ from mgdd.rig.simulated import SimulatedRig
 if TYPE_CHECKING:
     import os
 
-__all__ = ["Stand", "opened", "simulated_plant"]
+__all__ = ["Stand", "opened", "rig_of", "simulated_plant"]
 
 _STEP_TIMEOUT_S = 10.0  # a node that steps has no clock: only its end is waited for
 
@@ -75,7 +75,7 @@ def opened(
     Every exchange with the rig itself, below the guard, and every frame of a bus go into the record.
     """
     with ExitStack() as stack:
-        rig = _rig_of(checked, stack, record.recorder, arm=arm, key_file=key_file)
+        rig = rig_of(checked, stack, record.recorder, arm=arm, key_file=key_file)
         yield _guarded(checked, rig, stack.enter_context(RecordingRig(rig, record.row, keep=False)))
 
 
@@ -95,7 +95,7 @@ def simulated_plant(experiment: Experiment, *, sample_s: float | None, inputs: S
     )  # fmt: skip
 
 
-def _rig_of(
+def rig_of(
     checked: CheckedExperiment,
     stack: ExitStack,
     recorder: Recorder | None,
@@ -103,6 +103,7 @@ def _rig_of(
     arm: bool,
     key_file: str | os.PathLike[str] | None,
 ) -> Any:
+    """Make the rig of an experiment in its mode, to be entered; a node of our own ends with the stack."""
     experiment, mode = checked.experiment, checked.experiment.mode
     if mode == "simulate":
         return SimulatedRig(simulated_plant(experiment, sample_s=checked.sample_s, inputs=("duty",)))

@@ -84,6 +84,11 @@ class TrackPlan:
             return float(controller.step(float(wanted[sample]), measured_deg))
 
         columns, interrupted = _drive(plant, _fewer(self.samples, most), duty_at, first_angle_deg)
+        return self.outcome(columns, interrupted=interrupted)
+
+    def outcome(self, columns: dict[str, NDArray[np.float64]], *, interrupted: bool) -> Outcome:
+        """Give the figures and signals of columns: ``asked_duty``, ``duty`` and the angle that followed."""
+        wanted = self.reference.angle_deg
         n = len(columns["asked_duty"])
         if n == 0:
             return Outcome(figures={}, dataset=_dataset(columns, self.sample_s, {}, {}), interrupted=True)

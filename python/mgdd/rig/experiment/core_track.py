@@ -1,0 +1,255 @@
+"""A controller along a reference on the real-time loop of the core, behind the checks of a rig over a bus."""
+
+from __future__ import annotations
+
+import math
+import sys
+import time
+from collections.abc import Callable, Iterator, Sequence
+from contextlib import contextmanager
+from typing import Any
+
+import numpy as np
+
+from mgdd._core.rig import Frame, RingTransport
+from mgdd.errors import RigError
+from mgdd.rig.can.bus_bridge import BusBridge
+from mgdd.rig.can.can_rig import CanRig
+from mgdd.rig.can.frame import Bus, changed
+from mgdd.rig.can.loop_map import loop_messages
+from mgdd.rig.can.signal_map import SignalMap
+from mgdd.rig.can.signals import held_back
+from mgdd.rig.experiment.checked import CheckedExperiment
+from mgdd.rig.experiment.core_samples import LoopSamples
+from mgdd.rig.experiment.outcome import Outcome
+from mgdd.rig.experiment.run_record import RunRecord
+from mgdd.rig.experiment.throttle_tasks import TrackPlan
+from mgdd.rig.experiment.watched import Cycle
+from mgdd.rig.gated import drive_taken
+from mgdd.rig.realtime import RealtimeLoop
+
+__all__ = ["LEAD_S", "track_on_core"]
+
+LEAD_S = 0.06  # of the references before their cycle: so long may Python stand still, and then the bridge opens
+_LOOK_S = 0.005
+_PATIENCE_S = 2.0  # at least, for the gate
+_SWITCH_S = 5e-4
+_FAILED_FRAMES = 3
+_PHASE = 0.3  # of a cycle, from a measurement to the step of the controller: what two threads of Python need
+
+
+def track_on_core(
+    checked: CheckedExperiment, plan: TrackPlan, rig: CanRig, record: RunRecord, listener: Callable[[Cycle], None]
+) -> tuple[Outcome, dict[str, Any], dict[str, Any]]:
+    """Run a controller along its reference.
+
+    The rig has looked at its bus and armed the node; while the loop runs the bus is the loop's. Every reference is
+    queued for its grid point; where Python stood still for `LEAD_S` the loop aborts rather than follow a late one.
+
+    Parameters
+    ----------
+    checked : CheckedExperiment
+        With envelope and map.
+    plan : TrackPlan
+        Of it.
+    rig : CanRig
+        Open.
+    record : RunRecord
+        Takes samples and changes of mode; the frames are in the bus of the rig already.
+    listener : callable
+        Takes every cycle of the task.
+
+    Returns
+    -------
+    outcome : Outcome
+        Also of a run that Ctrl-C cut.
+    counters, timing : dict
+        What rig, frames and gate have counted, and the account of the loop.
+
+    Raises
+    ------
+    mgdd.errors.RigError
+        The gate took the drive away, the node does not follow, the bus has a fault.
+    """
+    import xarray  # noqa: F401 - before the phase of the loop is chosen
+
+    run = _CoreRun(checked, plan, rig, record, listener)
+    interrupted = run.to_the_end()
+    report = run.loop.report()
+    counters = dict(rig.counters)
+    counters["commands"] += report["bus"]["sent"]
+    counters |= {"loop": {**report["frames"], "bus": report["bus"]}, "gate": dict(run.changes)}
+    timing = {name: report[name] for name in _TIMING}
+    return plan.outcome(run.samples.columns(), interrupted=interrupted), counters, timing
+
+
+_TIMING = (
+    "missed", "late", "longest_row", "lateness_us", "compute_us", "age_us", "send_us", "dropped_samples", "schedule",
+)  # fmt: skip
+
+
+class _CoreRun:
+    """The loop, the bridge to its bus, and the thread of Python that feeds references and takes samples."""
+
+    def __init__(
+        self,
+        checked: CheckedExperiment,
+        plan: TrackPlan,
+        rig: CanRig,
+        record: RunRecord,
+        listener: Callable[[Cycle], None],
+    ) -> None:
+        command, measurements = loop_messages(checked.bus_map)
+        sample_s, wanted = plan.sample_s, plan.reference.angle_deg
+        self._ring, self._sample_s = RingTransport(), sample_s
+        self._trigger = checked.bus_map.measurements[checked.bus_map.trigger].key
+        self._shadow = checked.experiment.mode == "dry_run"
+        self._bus = _WatchedBus(rig.bus, checked.bus_map)
+        self._record, self._lead = record, max(4, math.ceil(LEAD_S / sample_s))
+        self._wanted, self._handed_over = wanted, 1
+        self._patience_s = max(_PATIENCE_S, 20.0 * (checked.envelope.good_frames if checked.envelope else 0) * sample_s)
+        self.changes: dict[str, int] = {}
+        self.samples = LoopSamples(
+            record.recorder,
+            row=record.row,
+            listener=listener,
+            value_names=checked.bus_map.value_names,
+            samples=len(wanted),
+            sample_s=sample_s,
+        )
+        self.loop = RealtimeLoop(
+            plan.controller(),
+            self._ring,
+            command=command,
+            measurements=measurements,
+            envelope=checked.envelope,
+            reference_deg=float(wanted[0]),
+            reference_timeout_s=0.5 * sample_s,  # the first grid point without its reference
+            transmit=not self._shadow,
+        )
+
+    def to_the_end(self) -> bool:
+        """Run; whether Ctrl-C cut it."""
+        interrupted = False
+        came_ns = self._trigger_ns()
+        with BusBridge(self._bus, self._ring) as bridge, _prompt_threads():
+            self._wait_for_phase(came_ns)
+            try:
+                with self.loop:
+                    self._bring_into_service(bridge)
+                    try:
+                        self._follow(bridge)
+                    except KeyboardInterrupt:
+                        interrupted = True
+            finally:
+                self._take()
+        return interrupted
+
+    def _trigger_ns(self) -> int:
+        """Wait for the next end of a measured cycle, and give its stamp; now where none comes."""
+        while self._bus.receive(0.0) is not None:
+            pass
+        until = time.monotonic() + _PATIENCE_S
+        while (left_s := until - time.monotonic()) > 0.0:
+            frame = self._bus.receive(left_s)
+            if frame is not None and (frame.id, frame.extended) == self._trigger:
+                return frame.monotonic_ns
+        return time.monotonic_ns()
+
+    def _wait_for_phase(self, came_ns: int) -> None:
+        """Sleep until the grid of the loop lies soon behind the measurements: their age is dead time."""
+        behind_s = (time.monotonic_ns() - came_ns) * 1e-9 - _PHASE * self._sample_s
+        time.sleep(-behind_s % self._sample_s)
+
+    def _bring_into_service(self, bridge: BusBridge) -> None:
+        try:
+            self.loop.arm(self._patience_s)
+            self._feed()
+            self.loop.drive(self._patience_s)
+        except RigError as error:
+            raise bridge.error or error from None
+
+    def _follow(self, bridge: BusBridge) -> None:
+        while self.samples.done < len(self._wanted):
+            time.sleep(_LOOK_S)
+            self._feed()
+            self._take()
+            self.samples.tell()
+            if bridge.error is not None or (self.samples.stopped and not self._shadow):
+                raise self._why(bridge)
+            if self._bus.failed and not self._shadow:
+                raise RigError(
+                    f"{self._bus.name}: the node is in state {self._bus.state!r} and does not drive; look for the "
+                    "cause, then run the experiment again"
+                )
+
+    def _why(self, bridge: BusBridge) -> BaseException:
+        if bridge.error is not None:
+            return bridge.error
+        if self.loop.report()["reference_timeouts"]:
+            return RigError(
+                f"Python stood still for {LEAD_S * 1e3:g} ms and handed over no reference: the loop has opened the "
+                "bridge; keep the machine free, and what watches the run short"
+            )
+        return drive_taken(self.loop.mode, self.loop.reason)
+
+    def _feed(self) -> None:
+        """Fill the queue up to the lead; behind the last reference it holds."""
+        room = self._lead - self.loop.queued_references
+        if room > 0 and self.loop.mode in ("armed", "run"):
+            begin = self._handed_over
+            places = np.minimum(np.arange(begin, begin + room), len(self._wanted) - 1)
+            self.loop.queue_references(self._wanted[places])
+            self._handed_over += room
+
+    def _take(self) -> None:
+        with held_back():  # Ctrl-C between two rows would tear a hole into the record
+            self._record.say(self._said())
+            self.samples.take(self.loop.sample_columns())
+
+    def _said(self) -> Sequence[str]:
+        events = self.loop.events()
+        for change in events:
+            self.changes[change.reason] = self.changes.get(change.reason, 0) + 1
+        return [f"safety gate: {c.before} -> {c.after}: {c.reason}" for c in events]
+
+
+class _WatchedBus:
+    """The bus of a rig, with an eye on the state that the node reports."""
+
+    def __init__(self, bus: Bus, signal_map: SignalMap) -> None:
+        self._bus, self._map = bus, signal_map
+        known = signal_map.state
+        self._key = None if known is None else signal_map.measurements[known.message].key
+        self._in_a_row = 0
+        self.state = ""
+
+    @property
+    def name(self) -> str:
+        return self._bus.name
+
+    @property
+    def failed(self) -> bool:
+        """Whether several frames in a row say so: they are not checked here."""
+        return self._in_a_row >= _FAILED_FRAMES
+
+    def receive(self, timeout_s: float) -> Frame | None:
+        frame = self._bus.receive(timeout_s)
+        if frame is not None and self._map.state is not None and (frame.id, frame.extended) == self._key:
+            self.state = self._map.state.name_of(frame.data)
+            self._in_a_row = self._in_a_row + 1 if self.state in self._map.state.failed else 0
+        return frame
+
+    def send(self, frame: Frame) -> None:
+        self._bus.send(changed(frame, monotonic_ns=0))  # the record says when it left Python, not when the loop did it
+
+
+@contextmanager
+def _prompt_threads() -> Iterator[None]:
+    """Let threads of Python take turns ten times as often: two of them stand between the loop and its bus."""
+    before = sys.getswitchinterval()
+    sys.setswitchinterval(min(before, _SWITCH_S))
+    try:
+        yield
+    finally:
+        sys.setswitchinterval(before)
