@@ -32,6 +32,7 @@ if TYPE_CHECKING:
 __all__ = ["RAMPS", "Delays", "whole_delay"]
 
 RAMPS = (0.1, 0.4)  # where searches begin [deg]: ramp and limp-home have valleys of their own
+_MOVED = 0.25  # samples by which a delay may differ before the time constant is searched anew
 _RIVAL = 1.5  # a delay whose coarse search ends that far above the best is no rival
 _ALIKE = 1.25  # delays whose errors are further apart than that are no equals, whatever their blocks say
 _MOTOR_LAGS_S = (3e-4, 3e-3)  # L/R of throttle motors, which decides between delays that the log does not separate
@@ -67,7 +68,8 @@ def whole_delay(hunt: Hunt, rough: Sequence[Search], delays: Sequence[float]) ->
 
     def look(start: Search, delay: float) -> Search:
         values = _at_delay(start, delay, hunt.problem.step_s, free)
-        first = hunt.search(values, moving, BRISTLES, 8).values if moving else values
+        moved = abs(start.values["delay_samples"] - delay) > _MOVED
+        first = hunt.search(values, moving, BRISTLES, 8).values if moving and moved else values
         return hunt.search(first, free, BRISTLES, 15)
 
     while missing := [delay for delay in near if delay not in looks]:
