@@ -89,7 +89,7 @@ def test_a_node_ends_in_time_and_says_what_it_did(tmp_path: Path, capsys: pytest
     assert {number: signal.getsignal(number) for number in before} == before
     out, err = capsys.readouterr()
     said = json.loads(out)
-    assert said["state"] == "init"
+    assert said["mode"] == "init"
     assert said["samples"] >= 20
     assert "etb on virtual:cli-node: ready" in err
     assert len(truth.read_text(encoding="utf-8").splitlines()) == said["samples"] + 1

@@ -27,8 +27,10 @@ from mgdd.rig import (
     read_record,
     run_experiment,
 )
+from mgdd.rig.can.frame import changed
 from mgdd.rig.can.loop_map import loop_messages
-from mgdd.rig.can.node_core import NodeCore, node_plant
+from mgdd.rig.can.node_core import NodeCore
+from mgdd.rig.can.node_plant import node_plant
 from mgdd.rig.experiment import core_track
 from mgdd.rig.experiment.watched import Cycle
 from patient_bench import patient_experiment
@@ -98,11 +100,12 @@ def test_the_loop_speaks_a_map_as_a_rig_does(which: str, tmp_path: Path) -> None
 
     def answered(wanted: str) -> bool:
         while (frame := ring.take(0.0)) is not None:
-            node.take(frame)
+            now_ns = time.monotonic_ns()
+            node.take(changed(frame, monotonic_ns=now_ns))
+            for answer in node.sample(now_ns):
+                ring.feed(changed(answer, monotonic_ns=time.monotonic_ns()))
             frames.append((node.state, frame))
             states.add(node.state)
-            for answer in node.sample():
-                ring.feed(answer.__class__(**{**answer.to_dict(), "monotonic_ns": time.monotonic_ns()}))
         return node.state == wanted
 
     with loop:
@@ -111,10 +114,8 @@ def test_the_loop_speaks_a_map_as_a_rig_does(which: str, tmp_path: Path) -> None
         assert becomes(lambda: answered("armed") and loop._core.request("arm") and loop.mode == "armed")
         assert becomes(lambda: loop._core.request("run") and answered("run"))
         assert becomes(lambda: answered("run") and abs(plant.measure().values["angle_deg"] - 30.0) < 1.0)
-    while (frame := ring.take(0.0)) is not None:
-        node.take(frame)
+    assert answered("armed"), "after the frames of the stop"
     assert states == {"init", "armed", "run"}
-    assert node.state == "armed"  # after the frames of the stop
     (own,) = signal_map.commands.values()
     driven = [own.read(frame.data)["duty"] for state, frame in frames if state == "run"]
     sent = loop.samples()
