@@ -23,7 +23,7 @@ def patient_experiment(folder: Path, reference: str = "step:20:35", loop: str = 
     (folder / "etb.dbc").write_text(re.sub(cycle, rf"\1 {CYCLE_MS}", dbc), encoding="utf-8")
     own = shipped.file.read_text(encoding="utf-8").replace("timeout_ms = 20", "timeout_ms = 5000")
     (folder / "map.toml").write_text(own, encoding="utf-8")
-    patient = dict.fromkeys(("missed_deadlines", "unsent_cycles", "largest_age_cycles"), 1e6)
+    patient = dict.fromkeys(("missed_deadlines", "unsent_cycles", "largest_age_cycles", "bad_frames"), 1e6)
     envelope = SafetyEnvelope(duty_limit=0.35, good_frames=5.0, stall_s=10.0, sensor_slope_v_per_s=1e5, **patient)
     (folder / "envelope.toml").write_text(envelope.to_toml(), encoding="utf-8")
     file = folder / "track.toml"

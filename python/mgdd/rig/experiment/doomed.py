@@ -77,6 +77,7 @@ def track_and_die(way: str, connection: str) -> None:
             run_experiment(checked, watch=_Doom(way))
         except RigError:
             continue  # a busy machine
+        return  # Ctrl-C keeps what was done, and ends
 
 
 class _Doom:
