@@ -11,6 +11,7 @@ from typing import Any
 import numpy as np
 import pytest
 
+from mgdd import presets
 from mgdd.cli import main
 from mgdd.control import GuidedPredictive, Mgdd1, Pid, SlidingMode
 from mgdd.errors import DataError, ParameterError, ShapeError
@@ -39,6 +40,20 @@ def test_the_loop_in_the_core_is_the_loop_that_a_user_writes() -> None:
         sent, measured = computed, values["sensed_angle_deg"]
         assert run["duty"][k] == computed
         assert run["angle_deg"][k] == values["angle_deg"]
+
+
+@pytest.mark.parametrize("kind", FAMILIES)
+@pytest.mark.parametrize("name", ["P1", "P2", "P3"])
+def test_numbers_that_were_tuned_at_1_ms_hold_the_plate_still_at_5_ms(kind: str, name: str) -> None:
+    """The cycle of the shipped DBC; what predicts also knows a delay of one such sample, the others do not bear it."""
+    throttle = presets.load(name).throttle
+    for delay in (0,) if kind in ("pid", "sliding_mode") else (0, 1):
+        for goal in (42.0, 60.0):
+            controller = tuned_controller(kind, throttle, sample_s=5e-3, delay_samples=delay)
+            reference = Reference.step(goal - 18.0, goal, after_s=1.5, sample_s=5e-3)
+            run = track(controller, reference, throttle=throttle, delay_samples=delay, seed=1)
+            assert abs(float(run["static_error_deg"])) < 0.25
+            assert float(run["limit_cycle_deg"]) < 0.35
 
 
 def test_a_controller_of_the_user_runs_too_and_is_judged_alike() -> None:

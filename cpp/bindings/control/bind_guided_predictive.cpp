@@ -77,7 +77,8 @@ lower, upper, duty_rate_per_s : float
 lowest_deg, highest_deg, angle_limit_weight : float
     Bounds of the predicted angle [deg], and the price of a squared degree beyond them [1/deg²].
 observer_angle_per_s, observer_speed_per_s2 : float
-    How fast a measurement moves the angle [1/s] and the speed [1/s²] of the model.
+    Sum [1/s] and product [1/s²] of the rates at which errors of the model's angle and speed die, the same at every
+    sample time.
 noise_deg : float
     Standard deviation of the measured angle [deg]: what counts as motion.
 learning_rate_per_s, gain_weight, damping_weight : float

@@ -2,6 +2,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <numbers>
 
 #include "mgdd/control/slow_trim.hpp"
 #include "mgdd/dynamics/lag.hpp"
@@ -12,6 +13,7 @@ namespace {
 constexpr double dead_band_deg = 0.3;        // of the measured side of limp-home
 constexpr double end_deg = 0.5;              // a stop holds the plate there: nothing is learnt
 constexpr double slow_deg_per_s = 6.0;       // below it the plate may stick
+constexpr double slow_deviations = 2.5;      // or below so many standard deviations of what noise does to the speed
 constexpr double hold_rate_deg_per_s = 2.0;  // a faster reference is followed, not waited for
 constexpr double breakaway_margin = 0.015;   // duty beyond the friction level
 constexpr double hold_share = 0.3;           // of the friction band that a held duty may use
@@ -39,6 +41,16 @@ PlateBelief<double> widened(const PlateBelief<T>& b) noexcept {
   return {band(b.above), band(b.below), static_cast<double>(b.gain_factor), static_cast<double>(b.damping_factor)};
 }
 
+// The errors of angle and speed die as those of s^2 + a s + b = 0 at any sample time: poles z = exp(s T), of which
+// 1 - z1 z2 is the share of the angle and (1 - z1)(1 - z2) / T the gain of the speed (Astrom and Wittenmark 1997, 4.4).
+double speed_gain_of(const GuidedPredictiveSettings& s) noexcept {
+  const double half = 0.5 * s.observer_angle_per_s * s.sample_s;
+  const double apart = half * half - s.observer_speed_per_s2 * s.sample_s * s.sample_s;
+  const double shape =
+      apart > 0.0 ? std::cosh(std::sqrt(apart)) : std::cos(std::min(std::sqrt(-apart), std::numbers::pi));
+  return (1.0 - 2.0 * std::exp(-half) * shape + std::exp(-2.0 * half)) / s.sample_s;
+}
+
 }  // namespace
 
 template <class T>
@@ -48,7 +60,8 @@ BasicGuidedPredictive<T>::BasicGuidedPredictive(const GuidedPredictiveSettings& 
       predicted_(s.plate, s.prediction_step_s, friction_form(s)),
       proven_(observed_),
       angle_share_(static_cast<T>(1.0 - std::exp(-s.observer_angle_per_s * s.sample_s))),
-      speed_gain_(static_cast<T>(s.observer_speed_per_s2 * s.sample_s)),
+      speed_gain_(static_cast<T>(speed_gain_of(s))),
+      slow_(static_cast<T>(std::max(slow_deg_per_s, slow_deviations * speed_gain_of(s) * s.noise_deg))),
       learner_(s.learner, s.plate, s.sample_s, s.noise_deg, angle_share_, speed_gain_),
       review_(s.review, s.sample_s, s.noise_deg),
       belief_(observed_.belief()),
@@ -185,7 +198,7 @@ template <class T>
 bool BasicGuidedPredictive<T>::hold_still() noexcept {
   const GuidedPredictiveSettings& s = settings_;
   const T error = horizon_.aim - horizon_.ahead.angle_deg, rate = reference_.rate();
-  const bool slow = std::abs(horizon_.ahead.speed_deg_per_s) < T(slow_deg_per_s);
+  const bool slow = std::abs(horizon_.ahead.speed_deg_per_s) < slow_;
   still_ = slow ? still_ + 1 : 0;
   const bool rests = still_ >= 3;
   mean_error_ = still_ <= 1 ? error : mean_error_ + (error - mean_error_) / T(std::min<std::int64_t>(still_, 8));
@@ -211,7 +224,7 @@ bool BasicGuidedPredictive<T>::hold_still() noexcept {
 // A stuck plate has no slope: the first duty is at least the one that frees it.
 template <class T>
 void BasicGuidedPredictive<T>::break_away() noexcept {
-  if (!settings_.friction_learning || !(std::abs(horizon_.ahead.speed_deg_per_s) < T(slow_deg_per_s))) return;
+  if (!settings_.friction_learning || !(std::abs(horizon_.ahead.speed_deg_per_s) < slow_)) return;
   const auto duty = observed_.breakaway(horizon_.ahead);
   if (horizon_.wanted > T(0.0)) moves_[0] = std::max(moves_[0], duty.up + T(breakaway_margin));
   if (horizon_.wanted < T(0.0)) moves_[0] = std::min(moves_[0], duty.down - T(breakaway_margin));

@@ -43,8 +43,8 @@ constexpr std::array<Field<S>, n_guided_predictive_fields> table = joined(
         field<&S::highest_deg>({"highest_deg", "deg", angle, "largest angle of the prediction"}),
         field<&S::angle_limit_weight>({"angle_limit_weight", "1/degree²", weight, "of the squared angle beyond these"}),
         field<&S::observer_angle_per_s>(
-            {"observer_angle_per_s", "1/second", rate, "rate at which the innovation moves the angle"}),
-        field<&S::observer_speed_per_s2>({"observer_speed_per_s2", "1/second²", rate, "and the speed"}),
+            {"observer_angle_per_s", "1/second", rate, "sum of the rates at which the errors of angle and speed die"}),
+        field<&S::observer_speed_per_s2>({"observer_speed_per_s2", "1/second²", rate, "and their product"}),
         field<&S::noise_deg>({"noise_deg", "deg", above(0.0, 1e2), "standard deviation of the measured angle"}),
         field<&S::learner, &L::rate_per_s>(
             {"learning_rate_per_s", "1/second", rate, "share of what explains an innovation that is learnt"}),

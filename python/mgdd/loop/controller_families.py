@@ -154,6 +154,11 @@ class Family:
     build: Callable[[Groups, Mapping[str, float], Setup], Controller]
 
 
+# A bias that learns faster than this, per sample and over what a sample of acceleration moves, chases its own delay.
+_MOST_BIAS = 0.1
+_PREDICTION_STEP_S = 2e-3
+
+
 def _guided(groups: Groups, x: Mapping[str, float], setup: Setup, **fixed: Any) -> GuidedPredictive:
     first, second = round(x["first_move"]), round(x["second_move"])
     settings: dict[str, Any] = {
@@ -166,8 +171,12 @@ def _guided(groups: Groups, x: Mapping[str, float], setup: Setup, **fixed: Any) 
     for name in ("learning_rate_per_s", "gain_weight", "damping_weight", "bias_rate_per_deg_s", "trim_rate_per_deg_s"):
         if name in x:
             settings[name] = x[name]
+    if "bias_rate_per_deg_s" in settings:
+        most = _MOST_BIAS / (groups.gain_deg_per_s2 * setup.sample_s**3)
+        settings["bias_rate_per_deg_s"] = min(settings["bias_rate_per_deg_s"], most)
     return GuidedPredictive(
         sample_s=setup.sample_s,
+        prediction_step_s=max(_PREDICTION_STEP_S, setup.sample_s),  # a move cannot be shorter than a sample
         delay_samples=setup.delay_samples,
         noise_deg=max(setup.noise_deg, _CONVERTER_DEG),
         electrical_s=groups.electrical_s,
@@ -233,7 +242,7 @@ _PREDICTIVE: dict[str, tuple[float, float, bool]] = {
     "duty_change_weight": (0.3, 100.0, True),
     "speed_weight": (1e-7, 1e-4, True),
     "observer_angle_per_s": (200.0, 900.0, True),
-    "observer_speed_per_s2": (8e3, 7e4, True),
+    "observer_speed_per_s2": (9e3, 1e5, True),
 }
 _PLAIN = _PREDICTIVE | {"bias_rate_per_deg_s": (0.3, 40.0, True), "trim_rate_per_deg_s": (0.05, 5.0, True)}
 

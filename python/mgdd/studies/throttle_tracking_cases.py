@@ -60,7 +60,7 @@ _PLAIN: dict[str, Any] = {
     "friction_learning": False,
     "move_steps": (4, 6, 10),
     "duty_change_weight": 20.0,
-    "observer_speed_per_s2": 35000.0,
+    "observer_speed_per_s2": 43218.0,
 }
 CASES: Mapping[str, Case] = {
     "unknown": Case("100 throttles within 20 %", controllers=tuple(FAMILIES)),

@@ -32,7 +32,7 @@ GuidedPredictiveSettings plain(double trim_rate = 0.3) {
   s.friction_learning = false;
   s.move_steps = {4, 6, 10};
   s.duty_change_weight = 20.0;
-  s.observer_speed_per_s2 = 35000.0;
+  s.observer_speed_per_s2 = 43218.0;
   s.trim_rate_per_deg_s = trim_rate;
   return s;
 }

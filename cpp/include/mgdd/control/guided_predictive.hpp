@@ -123,7 +123,7 @@ class BasicGuidedPredictive {
   PlateModel<T> observed_;   // one sample at a time
   PlateModel<T> predicted_;  // one prediction step at a time
   PlateModel<T> proven_;     // `observed_` with the certified belief
-  T angle_share_, speed_gain_;
+  T angle_share_, speed_gain_, slow_;
   FrictionLearner<T> learner_;
   BeliefReview<T> review_;
 

@@ -60,7 +60,7 @@ struct GuidedPredictiveSettings {
 
   // The observer, and what it learns.
   double observer_angle_per_s = 430.0;
-  double observer_speed_per_s2 = 28000.0;
+  double observer_speed_per_s2 = 34549.0;
   double noise_deg = 0.03;  ///< of the measured angle: what counts as motion
   bool friction_learning = true;
   FrictionLearnerSettings learner{};
