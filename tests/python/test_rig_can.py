@@ -19,7 +19,7 @@ from mgdd.errors import ParameterError, RigError
 from mgdd.loop import VirtualThrottle
 from mgdd.rig import CanRig, CanTransport, SignalMap
 from mgdd.rig.can.link import Sender
-from mgdd.rig.can.modes import RigMode, key_line
+from mgdd.rig.can.modes import RigMode, key_line, may_be_real
 
 
 @pytest.fixture(autouse=True)
@@ -67,6 +67,29 @@ def test_the_bench_needs_a_person_or_a_key(tmp_path: Path, monkeypatch: pytest.M
             rig.apply({"duty": 0.2})
             assert rig.measure().applied == {"duty": pytest.approx(0.2)}
         assert rig.mode is RigMode.BENCH
+
+
+@pytest.mark.parametrize(
+    ("bus", "stays"),
+    [
+        ("virtual:x", True),
+        ("socketcan:vcan0", True),
+        ("socketcand:can0?host=127.0.0.1&port=29536", True),
+        ("socketcan:can0", False),
+        ("socketcand:can0?host=10.0.0.7&port=29536", False),
+        ("pcan:PCAN_USBBUS1", False),
+    ],
+)
+def test_hil_on_a_bus_that_leaves_this_machine_is_armed_as_a_bench(bus: str, stays: bool) -> None:
+    """What answers there may be a real plate."""
+    assert CanTransport.parse(bus).stays_here == stays
+    rig = CanRig("etb", bus, mode="hil")
+    assert may_be_real(rig.mode, rig.bus) != stays
+    assert may_be_real(RigMode.BENCH, rig.bus)
+    assert not may_be_real(RigMode.DRY_RUN, rig.bus)
+    if not stays:
+        with pytest.raises(RigError, match=r"mode = 'hil' on .*, which leaves this machine, may, too: give arm=True"):
+            rig.open()
 
 
 class Terminal:

@@ -35,8 +35,10 @@ def add(verbs: Any) -> None:
         "--folder", metavar="DIR", help="new folder for record, signals, timing, result and figures (default: "
         "mgdd-runs/TASK-MODE-TIME)",
     )  # fmt: skip
-    run.add_argument("--arm", action="store_true", help="of the mode bench, which drives real hardware")
-    run.add_argument("--key-file", metavar="FILE", help="confirms the mode bench instead of a person at the terminal")
+    run.add_argument(
+        "--arm", action="store_true", help="of the modes bench, and hil with a connection, which drive hardware"
+    )
+    run.add_argument("--key-file", metavar="FILE", help="confirms --arm instead of a person at the terminal")
     check = add_command(
         verbs, "check", _check,
         help_text="check an experiment, its map, DBC, envelope and bus, and say what would run; nothing is sent",

@@ -18,7 +18,7 @@ from mgdd.rig.can.frame import Bus, changed
 from mgdd.rig.can.inbox import Inbox
 from mgdd.rig.can.link import Sender
 from mgdd.rig.can.mapped import MappedMessage
-from mgdd.rig.can.modes import RigMode, bus_of, require_key
+from mgdd.rig.can.modes import RigMode, bus_of, may_be_real, require_key
 from mgdd.rig.can.signal_map import SignalMap
 from mgdd.rig.can.signals import SignalsAsExceptions, undisturbed
 
@@ -58,9 +58,9 @@ class CanRig:
     on_frame : callable, optional
         Called with every frame, sent or received, in this thread: to record it. What it raises leaves the rig.
     arm : bool
-        Must be True for ``bench``.
+        Must be True for ``bench``, and for ``hil`` on a bus that leaves this machine.
     key_file : path-like, optional
-        Confirms ``bench`` instead of a person at the terminal.
+        Confirms them instead of a person at the terminal.
 
     Raises
     ------
@@ -241,8 +241,8 @@ class CanRig:
         """
         if self._is_open:
             raise RigError("the rig is open already")
-        if self.mode is RigMode.BENCH:
-            require_key(self.map, self.bus.name, arm=self._arm, key_file=self._key_file)
+        if may_be_real(self.mode, self.bus):
+            require_key(self.map, self.bus.name, self.mode, arm=self._arm, key_file=self._key_file)
         self._inbox, self._sender = Inbox(self.map), Sender()
         self._inputs, self._has_sent, self._commands = None, False, 0
         self.bus.claim({message.key for message in self.map.commands.values()} if self._sends else set())

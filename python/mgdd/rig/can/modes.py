@@ -14,13 +14,14 @@ from mgdd.rig.can.local_bus import LocalBus
 from mgdd.rig.can.signal_map import SignalMap
 from mgdd.rig.can.transport import CanTransport
 
-__all__ = ["RigMode", "bus_of", "key_line", "require_key"]
+__all__ = ["RigMode", "bus_of", "key_line", "may_be_real", "require_key"]
 
 
 class RigMode(StrEnum):
     """Mode of an experiment over a bus.
 
-    ``simulate``: a node in this process and a virtual clock. ``hil``: a node in another process, real time.
+    ``simulate``: a node in this process and a virtual clock. ``hil``: a node in another process, real time; on a bus
+    that leaves this machine it has to be armed as ``bench``.
     ``dry_run``: a real bus, of which everything is received and to which nothing is sent. ``replay``: recorded frames
     through the same checks. ``bench``: real hardware, which has to be armed.
 
@@ -51,8 +52,15 @@ def key_line(signal_map: SignalMap) -> str:
     return f"arm {signal_map.dbc.file.name} {signal_map.dbc.sha256[:12]}"
 
 
-def require_key(signal_map: SignalMap, bus: str, *, arm: bool, key_file: str | os.PathLike[str] | None) -> None:
-    """Refuse the mode ``bench`` without a person who wants it.
+def may_be_real(mode: RigMode, bus: Bus) -> bool:
+    """Whether what answers may be an actuator: on a bench, and in ``hil`` on a bus that leaves this machine."""
+    return mode is RigMode.BENCH or (mode is RigMode.HIL and bus.shared and not getattr(bus, "stays_here", False))
+
+
+def require_key(
+    signal_map: SignalMap, bus: str, mode: RigMode, *, arm: bool, key_file: str | os.PathLike[str] | None
+) -> None:
+    """Refuse to drive what may be real without a person who wants it.
 
     Raises
     ------
@@ -61,7 +69,8 @@ def require_key(signal_map: SignalMap, bus: str, *, arm: bool, key_file: str | o
     """
     if arm is not True:
         how = f"{argument('arm', 'True')}, and a {argument('key_file')} or a confirmation"
-        raise RigError(f"mode = 'bench' drives real hardware: give {how}")
+        why = "drives real hardware" if mode is RigMode.BENCH else f"on {bus}, which leaves this machine, may, too"
+        raise RigError(f"mode = {mode.value!r} {why}: give {how}")
     line = key_line(signal_map)
     if key_file is not None:
         file = Path(key_file)
@@ -71,7 +80,7 @@ def require_key(signal_map: SignalMap, bus: str, *, arm: bool, key_file: str | o
             raise RigError(f"{file}: holds no key of this DBC: it must have the line {line!r}")
         return
     if not sys.stdin.isatty():
-        raise RigError(f"mode = 'bench' without a terminal to confirm in: give a {argument('key_file')}")
+        raise RigError(f"mode = {mode.value!r} without a terminal to confirm in: give a {argument('key_file')}")
     sys.stderr.write(f"{bus} will be driven with {signal_map.file.name}. Emergency stop at hand? Type ARM: ")
     sys.stderr.flush()
     if sys.stdin.readline().strip() != "ARM":

@@ -37,6 +37,11 @@ class RecordedBus:
         return self.bus.shared
 
     @property
+    def stays_here(self) -> bool:
+        """Whether it does not leave this machine, as far as one can tell."""
+        return bool(getattr(self.bus, "stays_here", False))
+
+    @property
     def counters(self) -> dict[str, Any]:
         """What the bus counts."""
         return dict(getattr(self.bus, "counters", {}))

@@ -24,6 +24,7 @@ __all__ = ["CanTransport"]
 _POLL_S = 0.05  # longest sleep of the receive thread: how long closing waits
 _QUEUE = 4096  # frames that nobody has read
 _FATAL = frozenset({"bus_off", "error_passive"})
+_THIS_HOST = ("localhost", "127.0.0.1", "::1")
 
 
 class CanTransport:
@@ -121,6 +122,14 @@ class CanTransport:
         """Interface and channel."""
         where = "".join(f" {self.options[name]}" for name in ("host", "port") if name in self.options)
         return f"{self.interface}:{self.channel}{where}"
+
+    @property
+    def stays_here(self) -> bool:
+        """Whether it does not leave this machine: ``virtual``, vcan, and a hub of this host."""
+        if self.interface == "socketcan":
+            return str(self.channel).startswith("vcan")
+        hub = str(self.options.get("host", "")).lower()
+        return self.interface == "virtual" or (self.interface == "socketcand" and hub in _THIS_HOST)
 
     @property
     def shared(self) -> bool:

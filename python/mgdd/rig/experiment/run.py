@@ -111,9 +111,9 @@ def run_experiment(
     folder : path-like, optional
         A new or empty folder; nothing is written if left out.
     arm : bool
-        Must be True for the mode ``bench``, and only there.
+        Must be True for the mode ``bench``, and for ``hil`` with a ``connection`` that leaves this machine.
     key_file : path-like, optional
-        Confirms ``bench`` instead of a person at the terminal; only there.
+        Confirms them instead of a person at the terminal.
     watch : callable, optional
         Called with every `Cycle`; what it raises ends the run.
 
@@ -146,11 +146,13 @@ def run_experiment(
     """
     checked = experiment if isinstance(experiment, CheckedExperiment) else check_experiment(experiment)
     mode = checked.experiment.mode
+    may_be_real = mode == "bench" or (mode == "hil" and checked.experiment.bus.connection is not None)
     for name, value in (("arm", arm), ("key_file", key_file)):
-        if value and mode != "bench":
+        if value and not may_be_real:
             raise ParameterError.of(
-                argument(name), value, f"left out with mode = {mode!r}: only 'bench' drives hardware"
-            )
+                argument(name), value,
+                f"left out with mode = {mode!r}: only 'bench', and 'hil' with a connection, may drive hardware",
+            )  # fmt: skip
     run, record = None if folder is None else RunFolder(folder), None
     try:
         if run is not None:
