@@ -145,8 +145,9 @@ FrameVerdict FrameCodec::read(const Frame& frame, Measurements& now) noexcept {
       const auto at = static_cast<std::size_t>(signal.what);
       const bool missing = signal.missing_raw && unpack_raw(signal.layout, frame.payload()) == signal.missing_raw;
       const std::optional<double> value = unpack(signal.layout, frame.payload());
-      if (missing ? at < n_needed : !value || !std::isfinite(*value)) return FrameVerdict::bad;
-      next.value[at] = missing ? unknown : *value;
+      const double number = missing ? unknown : value.value_or(unknown);
+      if (missing ? at < n_needed : !std::isfinite(number)) return FrameVerdict::bad;
+      next.value[at] = number;
       next.stamp_ns[at] = frame.monotonic_ns;
       angle = angle || signal.what == Measured::angle_deg;
     }

@@ -40,7 +40,7 @@ Int get(const std::uint8_t* from) noexcept {
 
 /// The 16 bytes that every body begins with.
 struct BodyHead {
-  BodyKind kind{};
+  BodyKind kind = BodyKind::frame;
   std::uint8_t flags = 0;
   std::uint16_t small = 0;
   std::uint32_t word = 0;

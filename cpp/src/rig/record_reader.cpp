@@ -28,7 +28,7 @@ constexpr std::size_t longest_record = header_head + largest_body + 4, first_roo
 }  // namespace
 
 ByteSource file_source(const std::string& path) {
-  auto file = std::make_shared<std::ifstream>(path, std::ios::binary);
+  const auto file = std::make_shared<std::ifstream>(path, std::ios::binary);
   std::error_code ignored;
   if (!*file || std::filesystem::is_directory(path, ignored)) {
     throw about("path", DataError(path + ": cannot be opened: name an existing record"));

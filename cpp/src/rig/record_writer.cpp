@@ -139,12 +139,12 @@ RigError AppendFile::failure() const {
 RecordWriter::RecordWriter(const std::string& path, const RecordHeader& header) : file_(path) {
   const bool fits = header.json.size() <= largest_body;
   if (fits && file_.append(encoded(header))) return;
-  const RigError failure = file_.failure();
+  RigError failure = file_.failure();
   file_.close();
   std::remove(path.c_str());
   if (!fits)
     throw ParameterError("json", header.json.size(), "must be at most " + std::to_string(largest_body), "bytes");
-  throw failure;
+  throw RigError(std::move(failure));
 }
 
 std::uint16_t RecordWriter::add_table(std::string_view name, std::span<const std::string> columns,
@@ -171,8 +171,8 @@ std::uint16_t RecordWriter::add_table(std::string_view name, std::span<const std
 }
 
 bool RecordWriter::write(const Frame& frame) noexcept {
-  std::array<std::uint8_t, largest_frame_record>
-      record;  // NOLINT(cppcoreguidelines-pro-type-member-init): encode fills
+  // NOLINTNEXTLINE(cppcoreguidelines-pro-type-member-init): encode fills
+  std::array<std::uint8_t, largest_frame_record> record;
   return put(ByteSpan(record).first(encode(frame, record)));
 }
 

@@ -23,7 +23,7 @@ using namespace test_support;
 constexpr double nan = std::numeric_limits<double>::quiet_NaN();
 
 TEST(GuidedPredictive, LearnsTheLevelsOfEverySideAndDirection) {
-  GuidedPredictiveSettings s = asymmetric();
+  const GuidedPredictiveSettings s = asymmetric();
   Plant plant(s.plate, 30.0);
   const PlateBelief<double> truth{{0.03, 0.11}, {-0.02, 0.05}, 1.0, 1.0};
   plant.believe(truth);
@@ -83,7 +83,8 @@ TEST(GuidedPredictive, APlainOneIsOffsetFreeByItsBias) {
 }
 
 TEST(GuidedPredictive, OneGaussNewtonStepIsEnoughAndRefiningConverges) {
-  GuidedPredictiveSettings once = plain(), often = plain();
+  const GuidedPredictiveSettings once = plain();
+  GuidedPredictiveSettings often = once;
   often.gauss_newton_steps = 10;
   Plant a(once.plate, 25.0), b(once.plate, 25.0);
   GuidedPredictive quick(once), converged(often);
@@ -181,7 +182,7 @@ TEST(GuidedPredictive, APreviewIsBetterThanTheRateAlone) {
 }
 
 TEST(GuidedPredictive, AStuckPlateIsFreedAndAHeldOneIsLeftAlone) {
-  GuidedPredictiveSettings s = asymmetric();
+  const GuidedPredictiveSettings s = asymmetric();
   Plant plant(s.plate, 40.0);
   GuidedPredictive controller(s);
   const auto settle = [&](double reference, int samples) {
@@ -203,7 +204,7 @@ TEST(GuidedPredictive, AStuckPlateIsFreedAndAHeldOneIsLeftAlone) {
 }
 
 TEST(GuidedPredictive, ASlowPlateSaysNothingAboutGainAndDamping) {
-  GuidedPredictiveSettings s = asymmetric();
+  const GuidedPredictiveSettings s = asymmetric();
   Plant plant(s.plate, 40.0);
   plant.believe({{0.01, 0.09}, {0.0, 0.08}, 1.0, 1.0});
   GuidedPredictive controller(s);
@@ -262,7 +263,7 @@ TEST(GuidedPredictive, TheModelIsToldTheDutyThatTheRateAllowed) {
 }
 
 TEST(GuidedPredictive, APreviewIsReadAtItsOwnTime) {
-  GuidedPredictiveSettings s = asymmetric();
+  const GuidedPredictiveSettings s = asymmetric();
   Plant plant(s.plate, 40.0);
   GuidedPredictive controller(s);
   const auto reference = [](int k) { return 40.0 + 10.0 * std::sin(0.0126 * k); };

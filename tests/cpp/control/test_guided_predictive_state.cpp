@@ -45,7 +45,7 @@ TEST(GuidedPredictive, BadInputRepeatsTheReferenceOrCorrectsNothing) {
 }
 
 TEST(GuidedPredictive, TakesOverWithoutABump) {
-  GuidedPredictiveSettings s = asymmetric();
+  const GuidedPredictiveSettings s = asymmetric();
   Plant plant(s.plate, 40.0);
   GuidedPredictive controller(s);
   controller.take_over(40.0, 0.18);

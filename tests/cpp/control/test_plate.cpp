@@ -124,9 +124,10 @@ TEST(MoveQp, FindsTheMinimumInTheBox) {
   int at_bounds = 0;
   for (int trial = 0; trial < 3000; ++trial) {
     Qp qp;
-    for (int row = 0; row < 5; ++row)
+    for (int row = 0; row < 5; ++row) {
       qp.add(0.5 + std::abs(normal(random)), 3.0 * normal(random),
              {normal(random), 2.0 * normal(random), 0.3 * normal(random)});
+    }
     const std::array<double, 3> moves{normal(random), normal(random), normal(random)};
     qp.add_changes(0.7, moves, 0.4);
     Qp::Column low{}, high{};

@@ -83,7 +83,8 @@ TEST(RecedingHorizon, OneIterationIsExactOnALinearModelInEverySampleOfALoop) {
   const auto model = oscillator<double>();
   const auto s = narrow_settings();
   RecedingHorizon<Oscillator<double>, length> controller(model, s);
-  auto plant = dynamics::Rk4<LaggedOscillator>{}.prepare(std::array{5.6}, 0.05);  // so that states are not foreseen
+  const auto plant =
+      dynamics::Rk4<LaggedOscillator>{}.prepare(std::array{5.6}, 0.05);  // so that states are not foreseen
   std::array<double, 3> x{0.4, -1.0, 0.3};
   controller.start(x, 0.3);
   double before = 0.3;
@@ -147,7 +148,7 @@ TEST(RecedingHorizon, ADelayedInputIsPlannedThroughTheNumbersOfItsLine) {
   s.max_iterations = 50;
   s.tolerance = 1e-10;
   RecedingHorizon<Plate, length> controller(model, s);
-  auto x = model.at_rest(20.0, 0.2);
+  const auto x = model.at_rest(20.0, 0.2);
   controller.start(x, 0.2);
   (void)controller.step(x, 31.0);
   ASSERT_EQ(controller.status(), HorizonStatus::converged);

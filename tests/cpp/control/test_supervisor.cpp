@@ -71,7 +71,7 @@ TEST(Supervisor, AMissingReferenceHoldsTheLastOneAndThenOpens) {
 TEST(Supervisor, AShortGapIsHeldFirstByTheLastAngleThenByTheSpringsAndEndsByItself) {
   ThrottleSupervisor s(lively());
   settle(s, 30.0);
-  SupervisorInputs gap = at(nan, 50.0);
+  const SupervisorInputs gap = at(nan, 50.0);
   for (int k = 1; k < 20; ++k) {
     EXPECT_EQ(s.observe(gap).angle_deg, 30.0);
     const SupervisorOrder order = s.decide(0.9);
@@ -89,7 +89,8 @@ TEST(Supervisor, AShortGapIsHeldFirstByTheLastAngleThenByTheSpringsAndEndsByItse
 }
 
 TEST(Supervisor, SilenceOpensWhicheverWayItComes) {
-  SupervisorInputs missing = at(nan, 30.0), unknown_age = at(30.0);
+  const SupervisorInputs missing = at(nan, 30.0);
+  SupervisorInputs unknown_age = at(30.0);
   unknown_age.age_s = nan;
   for (const SupervisorInputs& in : {missing, unknown_age}) {
     ThrottleSupervisor s(lively());
@@ -187,7 +188,7 @@ TEST(Supervisor, ALowSupplyLimitsTheReferenceUntilAcknowledgedAndALostOneOpens) 
   for (int k = 0; k < 100; ++k)
     (void)hold(s, low);
   EXPECT_EQ(s.acknowledge(), Reason::supply_low);
-  SupervisorInputs well = at(30.0, 60.0);
+  const SupervisorInputs well = at(30.0, 60.0);
   for (int k = 0; k < 60; ++k) {
     EXPECT_EQ(s.observe(well).reference_deg, 35.0);
     (void)s.decide(0.16);
@@ -307,7 +308,7 @@ TEST(Supervisor, EveryBadSettingIsNamedAndEveryNameHasAValue) {
     SupervisorSettings s = lively();
     change(s);
     try {
-      ThrottleSupervisor made(s);
+      const ThrottleSupervisor made(s);
       ADD_FAILURE() << field;
     } catch (const ParameterError& error) {
       EXPECT_EQ(error.field, field);

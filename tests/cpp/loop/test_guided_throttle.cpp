@@ -116,7 +116,7 @@ TEST(GuidedThrottle, TrimAndBiasRemoveTheErrorOfASteadyTorque) {
 
 // What a torque step does to a plate that is held at 40 deg, from half of its hold on.
 struct Held {
-  double moved_deg;
+  double moved_deg = 0.0;
   TrackingFigures figures;
 };
 Held torque_step(const GuidedPredictiveSettings& settings, double begin_deg, double torque_nm, std::uint64_t seed) {

@@ -202,7 +202,7 @@ TEST(ThrottleFaults, NoAllocationAndARefusalNamesTheField) {
   EXPECT_EQ(counter.count(), 0u);
   const auto refuses = [](const ThrottleFault& fault, const std::string& field) {
     try {
-      VirtualThrottle made(with({fault}));
+      const VirtualThrottle made(with({fault}));
       ADD_FAILURE() << field;
     } catch (const ParameterError& error) {
       EXPECT_EQ(error.field, field);

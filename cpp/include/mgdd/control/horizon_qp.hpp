@@ -110,13 +110,13 @@ class HorizonQp {
   struct CostToGo {
     Square p;
     Column a;
-    T b;
+    T b{0.0};
   };
   struct Law {
     Column x;  // derivative of the slope of the stage cost to the state
-    T u;       // to the input
-    T over_u;
-    T slope;  // at rest
+    T u{0.0};  // to the input
+    T over_u{0.0};
+    T slope{0.0};  // at rest
   };
 
   void factor() noexcept {

@@ -186,7 +186,7 @@ class RecedingHorizon {
   static Scalar narrow(double value) noexcept { return narrowed<Scalar>(value); }
   template <class V, class Sign>
   static void visit_sign(V& v, const std::string& name, Sign& sign) {
-    std::int64_t wide = sign;  // NOLINT(misc-const-correctness): a reader writes it
+    std::int64_t wide = int{sign};  // NOLINT(misc-const-correctness): a reader writes it
     v(name, wide);
     if constexpr (!std::is_const_v<Sign>) sign = static_cast<Sign>(std::clamp<std::int64_t>(wide, -2, 2));
   }
