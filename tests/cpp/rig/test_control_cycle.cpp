@@ -147,7 +147,7 @@ TEST(ControlCycle, SamplesReplayTheControllerBitForBit) {
 
 // And with what the gate was told, every drive, also those of a gate that changes its state.
 TEST(ControlCycle, SamplesReplayTheGateBitForBit) {
-  SafetyEnvelope envelope = test::bus_envelope();
+  const SafetyEnvelope envelope = test::bus_envelope();
   Rig rig({.initial_reference_deg = 30.0});
   rig.keep = true;
   rig.drive();

@@ -179,7 +179,7 @@ TEST(E2e, AFrozenSenderBecomesInvalid) {
 }
 
 TEST(E2e, AByteAsCounter) {
-  E2eSettings s{.counter_place = CounterPlace::byte, .counter_modulus = 256};
+  const E2eSettings s{.counter_place = CounterPlace::byte, .counter_modulus = 256};
   E2eCheck check(s);
   EXPECT_EQ(check.push(sent(s, 255)), E2eStatus::initial);
   EXPECT_EQ(check.push(sent(s, 0)), E2eStatus::ok);

@@ -81,13 +81,13 @@ TEST(LatencyHistogram, AQuantileOfOneTimeIsThatTime) {
 TEST(LatencyHistogram, CanBeCopiedWhileAnotherThreadAdds) {
   LatencyHistogram h;
   constexpr std::uint64_t n = 20'000;
-  std::jthread writer([&] {
+  const std::jthread writer([&] {
     for (std::uint64_t i = 0; i < n; ++i)
       h.add(static_cast<std::int64_t>(i));
   });
   std::uint64_t last = 0;
   while (last < n) {
-    const LatencyHistogram copy = h;
+    const LatencyHistogram copy = h;  // NOLINT(performance-unnecessary-copy-initialization): copying is the test
     EXPECT_GE(copy.count(), last);
     last = copy.count();
     std::this_thread::yield();

@@ -40,7 +40,7 @@ TEST(LatestValue, TwoThreadsNeverTearOrGoBack) {
   LatestValue<Wide> slot(wide(0));
   constexpr std::uint64_t n = 100'000;
   std::atomic<bool> seen{false};
-  std::jthread writer([&] {
+  const std::jthread writer([&] {
     for (std::uint64_t i = 1; i <= n; ++i) {
       slot.write(wide(i));
       if (i == n / 2) {

@@ -69,8 +69,8 @@ class RecordFile : public testing::Test {
                         second = writer.add_table("engine", engine, 2);
     for (int i = 0; i < 30; ++i) {
       ASSERT_TRUE(writer.write(frame_of(i)));
-      ASSERT_TRUE(i % 3 != 0 || writer.write_sample(first, 10 * i, std::array{0.1 * i, -0.25}));
-      ASSERT_TRUE(i % 6 != 0 || writer.write_sample(second, 10 * i + 1, std::array{1200.0 + i}));
+      ASSERT_TRUE(i % 3 != 0 || writer.write_sample(first, std::int64_t{10} * i, std::array{0.1 * i, -0.25}));
+      ASSERT_TRUE(i % 6 != 0 || writer.write_sample(second, std::int64_t{10} * i + 1, std::array{1200.0 + i}));
     }
     ASSERT_TRUE(writer.write_event(77, "state", "ARMED → RUN"));
     ASSERT_TRUE(writer.write_event(78, "note", ""));

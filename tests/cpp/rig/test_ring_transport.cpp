@@ -95,7 +95,7 @@ TEST(RingTransport, ErrorFramesAndADeadBusShowInItsState) {
 TEST(RingTransport, TwoThreadsEchoEveryFrame) {
   RingTransport bus(16, 16);
   constexpr std::uint32_t n = 20'000;
-  std::jthread other([&] {
+  const std::jthread other([&] {
     Frame frame;
     for (std::uint32_t echoed = 0; echoed < n;) {
       if (bus.waiting_to_send() > 0 && bus.take(frame)) {

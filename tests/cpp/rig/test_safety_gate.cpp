@@ -235,7 +235,7 @@ TEST(SafetyGate, WhatIsWrongWhileArmedLimpsAndInInitOnlyWaits) {
 TEST(SafetyGate, AllocatesNothing) {
   SafetyGate gate = running();
   const test_support::AllocationCounter counter;
-  SafetyFacts silent;
+  const SafetyFacts silent;
   for (int k = 0; k < 200; ++k) {
     (void)cycle(gate, k % 40 < 20 ? healthy() : silent, k == 150 ? nan : 0.25);
     (void)gate.request(Request::reset);

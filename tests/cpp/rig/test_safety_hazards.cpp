@@ -48,7 +48,7 @@ TEST(SafetyHazards, ASilentBusGrowsOldByItself) {
 
 TEST(SafetyHazards, AShortGapEndsByItself) {
   SafetyGate gate = running();
-  SafetyFacts silent;
+  const SafetyFacts silent;
   for (int k = 0; k < 6; ++k)
     EXPECT_EQ(cycle(gate, silent).duty, 0.125);
   EXPECT_EQ(cycle(gate, healthy(), 0.15625).duty, 0.15625);

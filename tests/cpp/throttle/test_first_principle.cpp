@@ -226,7 +226,7 @@ TEST(FirstPrinciple, SlopesToEveryGroupAreThoseOfDifferences) {
     const auto angle = [&]<class T>(const FirstPrinciple::Groups<T>& groups) {
       const auto model = options.prepare<T>(groups, 1e-3);
       auto state = model.at_rest(T(12.0));
-      std::array<T, 90> out;
+      std::array<T, 90> out{};
       for (std::size_t k = 0; k < out.size(); ++k) {
         out[k] = model.output(state);
         model.step(state, T(k < 40 ? -0.34 : 0.41));

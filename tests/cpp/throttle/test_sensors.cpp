@@ -168,7 +168,7 @@ TEST(Sensors, AFaultThatEndsLeavesAWholeSensor) {
       EXPECT_FALSE(a.fault);  // shorter than the debounce time
     }
   }
-  SensorFault backwards{SensorFaultKind::stuck, 0.1, 0.0, 0.1};
+  const SensorFault backwards{SensorFaultKind::stuck, 0.1, 0.0, 0.1};
   EXPECT_THROW(validate(backwards), mgdd::ParameterError);
 }
 
