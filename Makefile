@@ -133,7 +133,7 @@ asan: $(VENV)/.stamp-test | system-test ## ctest and pytest under AddressSanitiz
 	PYTHONPATH=$(CURDIR)/build/asan/python PYTHONUNBUFFERED=1 PYTHONMALLOC=malloc ASAN_OPTIONS=detect_leaks=0 \
 	  UBSAN_OPTIONS=print_stacktrace=1 \
 	  LD_PRELOAD="$$(g++ -print-file-name=libasan.so) $$(g++ -print-file-name=libstdc++.so)" \
-	  $(PY) -m pytest -m "not docs"
+	  $(PY) -m pytest -n $(JOBS) --dist worksteal -m "not docs"
 
 tsan: $(VENV)/.stamp-build | system-test ## the C++ tests under ThreadSanitizer
 	$(CONFIGURE) tsan

@@ -1,11 +1,15 @@
-// Throttle plant at 0.1 ms steps: simulated seconds per second, one run and eight lanes, every friction form.
+// Throttle plant at 0.1 ms steps: simulated seconds per second, one run and eight lanes, every friction form; eight
+// loops with a PID controller at 1 kHz, one by one and side by side.
 #include <benchmark/benchmark.h>
 
 #include <cmath>
 #include <cstdint>
 #include <span>
+#include <utility>
 #include <vector>
 
+#include "mgdd/control/pid.hpp"
+#include "mgdd/loop/throttle_loop.hpp"
 #include "mgdd/throttle/simulation.hpp"
 
 namespace {
@@ -61,6 +65,35 @@ void many_runs(benchmark::State& state) {
   report(state, 12.0 * static_cast<double>(cases.size()));
 }
 
+// Eight loops of 2 s; the argument says whether side by side.
+void closed_loops(benchmark::State& state) {
+  namespace loop = mgdd::loop;
+  loop::ThrottleScenario scenario;
+  scenario.reference_deg.assign(1000, 20.0);
+  scenario.reference_deg.resize(2000, 60.0);
+  std::vector<loop::VirtualThrottleSettings> plants(8);
+  for (std::size_t i = 0; i < plants.size(); ++i) {
+    plants[i].throttle.coulomb_nm *= 1.0 - 0.01 * static_cast<double>(i);
+    plants[i].start_deg = 20.0;
+    plants[i].seed = i;
+  }
+  const mgdd::control::Pid pid{mgdd::control::PidSettings{}};
+  for (auto _ : state) {
+    std::vector<mgdd::control::Pid> controllers(plants.size(), pid);
+    if (state.range(0) != 0) {
+      benchmark::DoNotOptimize(
+          loop::run_throttle_lanes(std::span(controllers), std::span(std::as_const(plants)), 1, scenario).data());
+      continue;
+    }
+    for (std::size_t i = 0; i < plants.size(); ++i)
+      benchmark::DoNotOptimize(loop::run_throttle_loop(controllers[i], plants[i], 1, scenario).duty.data());
+  }
+  state.SetLabel(state.range(0) != 0 ? "side by side" : "one by one");
+  state.counters["times_real_time"] =
+      benchmark::Counter(16.0, benchmark::Counter::kIsIterationInvariantRate | benchmark::Counter::kDefaults);
+}
+
+BENCHMARK(closed_loops)->DenseRange(0, 1);
 BENCHMARK(one_run)->DenseRange(0, 5);
 BENCHMARK(many_runs)->DenseRange(0, 5);
 

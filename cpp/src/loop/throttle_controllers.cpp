@@ -26,25 +26,70 @@ void check(const ThrottleMonteCarlo& plan) {
     validate(scenario);
 }
 
+constexpr std::size_t fewest_lanes = 3;  // fewer are as fast one by one
+
+/// Plants of consecutive numbers that run side by side.
+struct Group {
+  std::size_t first = 0, size = 0;
+};
+
+std::vector<Group> grouped(const std::vector<VirtualThrottleSettings>& plants) {
+  std::vector<Group> groups;
+  for (std::size_t i = 0; i < plants.size(); ++i) {
+    const bool joins = !groups.empty() && groups.back().size < VirtualThrottleLanes::width &&
+                       side_by_side(plants[groups.back().first], plants[i]);
+    if (!joins) groups.push_back({i, 0});
+    ++groups.back().size;
+  }
+  return groups;
+}
+
+VirtualThrottleSettings at_start(VirtualThrottleSettings plant, const ThrottleScenario& scenario) {
+  plant.start_deg = std::clamp(scenario.reference_deg.front(), plant.throttle.closed_deg, plant.throttle.open_deg);
+  return plant;
+}
+
+template <class C>
+std::vector<ThrottleTrack> runs(const C& controller, std::span<const VirtualThrottleSettings> plants, int delay_samples,
+                                const ThrottleScenario& scenario) {
+  std::vector<C> copies(plants.size(), controller);
+  if (plants.size() >= fewest_lanes) return run_throttle_lanes(std::span(copies), plants, delay_samples, scenario);
+  std::vector<ThrottleTrack> tracks;
+  for (std::size_t i = 0; i < plants.size(); ++i)
+    tracks.push_back(run_throttle_loop(copies[i], plants[i], delay_samples, scenario));
+  return tracks;
+}
+
 }  // namespace
 
 ThrottleMonteCarloResult monte_carlo(const ThrottleMonteCarlo& plan, const std::function<bool()>& stop) {
   check(plan);
+  const std::vector<Group> groups = grouped(plan.plants);
   const std::size_t scenarios = plan.scenarios.size(), per_plant = plan.controllers.size() * scenarios;
-  const std::size_t jobs = plan.plants.size() * per_plant;
-  ThrottleMonteCarloResult result{std::vector<TrackingFigures>(jobs), {}};
+  const std::size_t jobs = groups.size() * per_plant;
+  ThrottleMonteCarloResult result{std::vector<TrackingFigures>(plan.plants.size() * per_plant), {}};
   const auto run = [&](std::size_t job, std::size_t, StopRequest& stopped) {
     if (stopped()) return;
+    const Group& group = groups[job / per_plant];
     const std::size_t s = job % scenarios;
     const ThrottleScenario& scenario = plan.scenarios[s];
-    VirtualThrottleSettings plant = plan.plants[job / per_plant];
-    plant.start_deg = std::clamp(scenario.reference_deg.front(), plant.throttle.closed_deg, plant.throttle.open_deg);
-    ThrottleController controller = plan.controllers[job % per_plant / scenarios];
-    const ThrottleTrack track =
-        std::visit([&](auto& c) { return run_throttle_loop(c, plant, plan.delay_samples, scenario); }, controller);
-    result.figures[job] = tracking_figures(scenario, track, plant.sample_s, plan.band_deg[s]);
+    std::vector<VirtualThrottleSettings> plants;
+    for (std::size_t i = 0; i < group.size; ++i)
+      plants.push_back(at_start(plan.plants[group.first + i], scenario));
+    const std::vector<ThrottleTrack> tracks =
+        std::visit([&](const auto& c) { return runs(c, plants, plan.delay_samples, scenario); },
+                   plan.controllers[job % per_plant / scenarios]);
+    for (std::size_t i = 0; i < group.size; ++i) {
+      result.figures[(group.first + i) * per_plant + job % per_plant] =
+          tracking_figures(scenario, tracks[i], plants[i].sample_s, plan.band_deg[s]);
+    }
   };
-  result.finished = parallel_for(jobs, thread_count(jobs, static_cast<std::size_t>(plan.threads)), run, stop);
+  const std::vector<bool> finished =
+      parallel_for(jobs, thread_count(jobs, static_cast<std::size_t>(plan.threads)), run, stop);
+  for (const Group& group : groups) {
+    for (std::size_t i = 0; i < group.size * per_plant; ++i)
+      result.finished.push_back(finished[static_cast<std::size_t>(&group - groups.data()) * per_plant + i % per_plant]);
+  }
   return result;
 }
 

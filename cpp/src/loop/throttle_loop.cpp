@@ -39,6 +39,34 @@ void validate(const ThrottleScenario& s) {
   }
 }
 
+void require_loop(const ThrottleScenario& scenario, int delay_samples) {
+  validate(scenario);
+  if (delay_samples < 0 || delay_samples > longest_loop_delay) {
+    throw ParameterError("delay_samples", delay_samples, "must be in [0, " + std::to_string(longest_loop_delay) + "]");
+  }
+}
+
+ThrottleTrack empty_track(const ThrottleScenario& scenario) {
+  ThrottleTrack track;
+  for (auto* column :
+       {&track.angle_deg, &track.sensed_angle_deg, &track.speed_deg_per_s, &track.current_a, &track.duty})
+    column->resize(scenario.reference_deg.size());
+  return track;
+}
+
+VirtualThrottleInputs inputs_at(const ThrottleScenario& scenario, const ThrottleTrack& track, std::size_t k,
+                                std::size_t delay, double supply_v) noexcept {
+  return {k < delay ? 0.0 : track.duty[k - delay], scenario.supply_v.empty() ? supply_v : scenario.supply_v[k],
+          scenario.airflow_torque_nm.empty() ? 0.0 : scenario.airflow_torque_nm[k]};
+}
+
+void note(ThrottleTrack& track, std::size_t k, const VirtualThrottleSample& now) noexcept {
+  track.angle_deg[k] = now.angle_deg;
+  track.sensed_angle_deg[k] = now.sensed.angle_deg;
+  track.speed_deg_per_s[k] = now.speed_deg_per_s;
+  track.current_a[k] = now.current_a;
+}
+
 TrackingFigures tracking_figures(const ThrottleScenario& s, const ThrottleTrack& track, double sample_s,
                                  double band_deg) {
   const std::size_t n = s.reference_deg.size(), counted = n - s.from;

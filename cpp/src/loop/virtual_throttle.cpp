@@ -41,6 +41,19 @@ double finite_or(double value, double otherwise) noexcept {
 
 }  // namespace
 
+VirtualThrottleInputs taken(const VirtualThrottleInputs& now, const VirtualThrottleInputs& last) noexcept {
+  return {finite_or(now.duty, last.duty), finite_or(now.supply_v, last.supply_v),
+          finite_or(now.airflow_torque_nm, last.airflow_torque_nm), now.bridge_open};
+}
+
+VirtualThrottleSample sample_of(const throttle::ThrottleState& state, double angle_deg) noexcept {
+  VirtualThrottleSample out;
+  out.angle_deg = angle_deg;
+  out.speed_deg_per_s = state.plate_speed_rad_per_s / units::rad_per_deg;
+  out.current_a = state.current_a;
+  return out;
+}
+
 VirtualThrottle::VirtualThrottle(const VirtualThrottleSettings& settings)
     : settings_(checked(settings)),
       plant_(settings.throttle, settings.step_s),
@@ -104,8 +117,7 @@ void VirtualThrottle::transmit(VirtualThrottleSample& out) noexcept {
 }
 
 VirtualThrottleSample VirtualThrottle::step(const VirtualThrottleInputs& inputs) noexcept {
-  last_ = {finite_or(inputs.duty, last_.duty), finite_or(inputs.supply_v, last_.supply_v),
-           finite_or(inputs.airflow_torque_nm, last_.airflow_torque_nm), inputs.bridge_open};
+  last_ = taken(inputs, last_);
   throttle::ThrottleInput in{.duty = last_.bridge_open ? 0.0 : last_.duty,
                              .supply_v = last_.supply_v,
                              .airflow_torque_nm = last_.airflow_torque_nm,
@@ -122,11 +134,8 @@ VirtualThrottleSample VirtualThrottle::step(const VirtualThrottleInputs& inputs)
     plant_.step(state_, in);
     if (!whole) catch_plate(before_deg, plant_.output(state_));
   }
-  VirtualThrottleSample out;
+  VirtualThrottleSample out = sample_of(state_, plant_.output(state_));
   out.sample = samples_ + 1;
-  out.angle_deg = plant_.output(state_);
-  out.speed_deg_per_s = state_.plate_speed_rad_per_s / units::rad_per_deg;
-  out.current_a = state_.current_a;
   out.supply_v = in.supply_v;
   out.sensed = sensors_.step(out.angle_deg);
   if (!whole) transmit(out);

@@ -16,13 +16,9 @@
 namespace mgdd::throttle {
 namespace {
 
-constexpr int width = 8;
-using Wide = Lanes<width>;
-using WidePlant = BasicThrottlePlant<Wide>;
-using Coefficients = PlantCoefficients<double>;
-
-constexpr std::size_t count = n_plant_coefficients;
-static_assert(sizeof(PlantCoefficients<Wide>) == count * sizeof(Wide));
+using Wide = PlantLanes::Wide;
+using WidePlant = PlantLanes::Plant;
+constexpr auto width = static_cast<std::size_t>(PlantLanes::width);
 
 void check_column(std::string_view name, std::span<const double> column, std::size_t n, bool may_be_empty) {
   if (may_be_empty && column.empty()) return;
@@ -36,16 +32,6 @@ void check_column(std::string_view name, std::span<const double> column, std::si
                                   ": must be finite"));
     }
   }
-}
-
-PlantCoefficients<Wide> packed(const std::array<Coefficients, width>& lanes) noexcept {
-  std::array<Wide, count> columns{};
-  for (int lane = 0; lane < width; ++lane) {
-    const auto flat = std::bit_cast<std::array<double, count>>(lanes[static_cast<std::size_t>(lane)]);
-    for (std::size_t i = 0; i < count; ++i)
-      columns[i].set(lane, flat[i]);
-  }
-  return std::bit_cast<PlantCoefficients<Wide>>(columns);
 }
 
 template <class Plant>
@@ -65,18 +51,11 @@ MGDD_INLINE void run_lanes(const WidePlant& plant, const ThrottleSignals& signal
   BasicThrottleState<Wide> s = state;
   const auto input = [&](std::size_t k) __attribute__((always_inline)) { return input_at(plant, signals, k); };
   const auto store = [rows](std::size_t k, const Wide& angle_deg) __attribute__((always_inline)) {
-    angle_deg.store(rows + k * static_cast<std::size_t>(width));
+    angle_deg.store(rows + k * width);
     return true;
   };
   dynamics::run(sampled, s, signals.duty.size(), input, store);
   state = s;
-}
-
-void put(BasicThrottleState<Wide>& wide, int lane, const ThrottleState& one) noexcept {
-  const auto to = WidePlant::numbers(wide);
-  const auto from = WidePlant::numbers(one);
-  for (std::size_t i = 0; i < to.size(); ++i)
-    to[i]->set(lane, *from[i]);
 }
 
 }  // namespace
@@ -128,35 +107,21 @@ void simulate(const ThrottlePlant& plant, const ThrottleSignals& signals, std::s
 std::vector<double> simulate_many(std::span<const ThrottleCase> cases, const ThrottleSignals& signals,
                                   std::size_t steps, double step_s) {
   validate(signals);
-  require_within("step_s", step_s, step_lower_s, step_upper_s, "s");
-  bool flows = false;
   for (const ThrottleCase& one : cases) {
-    validate(one.throttle);
-    if (one.throttle.friction != cases[0].throttle.friction || one.throttle.backlash != cases[0].throttle.backlash) {
+    if (!same_form(one.throttle, cases[0].throttle)) {
       throw ParameterError("friction and backlash must have the same form in all cases of one call");
     }
-    flows = flows || one.throttle.pressure_drop_kpa > 0.0;
   }
   const std::size_t n = signals.duty.size();
-  constexpr auto lanes = static_cast<std::size_t>(width);
   std::vector<double> angle_deg(cases.size() * n);
-  std::vector<double> rows(lanes * n);
-  for (std::size_t first = 0; first < cases.size(); first += lanes) {
-    const std::size_t used = std::min(lanes, cases.size() - first);
-    std::array<Coefficients, lanes> coefficients{};
-    BasicThrottleState<Wide> state;
-    for (std::size_t lane = 0; lane < lanes; ++lane) {  // idle lanes repeat the last case
-      const ThrottleCase& one = cases[first + std::min(lane, used - 1)];
-      coefficients[lane] = plant_coefficients(one.throttle, step_s);
-      put(state, static_cast<int>(lane), one.start);
-    }
-    Throttle options = cases[first].throttle;
-    if (flows) options.pressure_drop_kpa = 1.0;
-    const WidePlant plant(packed(coefficients), options, step_s);
-    dispatch([&]() MGDD_INLINE_LAMBDA { run_lanes(plant, signals, steps, state, rows.data()); });
+  std::vector<double> rows(width * n);
+  for (std::size_t first = 0; first < cases.size(); first += width) {
+    const std::size_t used = std::min(width, cases.size() - first);
+    PlantLanes lanes(cases.subspan(first, used), step_s);
+    dispatch([&]() MGDD_INLINE_LAMBDA { run_lanes(lanes.plant(), signals, steps, lanes.states(), rows.data()); });
     for (std::size_t lane = 0; lane < used; ++lane) {
       for (std::size_t k = 0; k < n; ++k)
-        angle_deg[(first + lane) * n + k] = rows[k * lanes + lane];
+        angle_deg[(first + lane) * n + k] = rows[k * width + lane];
     }
   }
   return angle_deg;

@@ -1,6 +1,7 @@
 // Every controller of the plate that a loop can run by name, and many loops at once: every throttle with every
-// controller and every scenario, on all cores. A run depends on its own plant, controller and scenario only, so the
-// result is the same on any number of threads. Offline code.
+// controller and every scenario, on all cores, healthy throttles of one form in SIMD lanes. A run depends on its own
+// plant, controller and scenario only, so the result is the same in any lane and on any number of threads. Offline
+// code.
 #pragma once
 
 #include <functional>

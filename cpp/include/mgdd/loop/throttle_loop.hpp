@@ -12,6 +12,7 @@
 
 #include "mgdd/common/error.hpp"
 #include "mgdd/loop/virtual_throttle.hpp"
+#include "mgdd/loop/virtual_throttle_lanes.hpp"
 
 namespace mgdd::loop {
 
@@ -53,35 +54,56 @@ struct TrackingFigures {
 TrackingFigures tracking_figures(const ThrottleScenario& scenario, const ThrottleTrack& track, double sample_s,
                                  double band_deg);
 
+/// What stands before a run, and what every sample of one does; shared by single runs and runs in lanes.
+/// ParameterError for a bad delay or scenario.
+void require_loop(const ThrottleScenario& scenario, int delay_samples);
+ThrottleTrack empty_track(const ThrottleScenario& scenario);
+/// Inputs of sample k, whose duty is computed already.
+VirtualThrottleInputs inputs_at(const ThrottleScenario& scenario, const ThrottleTrack& track, std::size_t k,
+                                std::size_t delay, double supply_v) noexcept;
+void note(ThrottleTrack& track, std::size_t k, const VirtualThrottleSample& now) noexcept;
+
 /// The run of a controller from rest at the start angle of the plant. ParameterError for a bad delay or scenario.
 template <AngleController C>
 ThrottleTrack run_throttle_loop(C& controller, const VirtualThrottleSettings& plant, int delay_samples,
                                 const ThrottleScenario& scenario) {
-  validate(scenario);
-  if (delay_samples < 0 || delay_samples > longest_loop_delay) {
-    throw ParameterError("delay_samples", delay_samples, "must be in [0, " + std::to_string(longest_loop_delay) + "]");
-  }
+  require_loop(scenario, delay_samples);
   VirtualThrottle throttle(plant);
-  const std::size_t n = scenario.reference_deg.size();
-  ThrottleTrack track;
-  for (auto* column :
-       {&track.angle_deg, &track.sensed_angle_deg, &track.speed_deg_per_s, &track.current_a, &track.duty})
-    column->resize(n);
+  ThrottleTrack track = empty_track(scenario);
   const auto delay = static_cast<std::size_t>(delay_samples);
   double measured = plant.start_deg;
-  for (std::size_t k = 0; k < n; ++k) {
+  for (std::size_t k = 0; k < scenario.reference_deg.size(); ++k) {
     track.duty[k] = controller.step(scenario.reference_deg[k], measured);
-    const VirtualThrottleSample now =
-        throttle.step({k < delay ? 0.0 : track.duty[k - delay],
-                       scenario.supply_v.empty() ? plant.throttle.supply_v : scenario.supply_v[k],
-                       scenario.airflow_torque_nm.empty() ? 0.0 : scenario.airflow_torque_nm[k]});
+    const VirtualThrottleSample now = throttle.step(inputs_at(scenario, track, k, delay, plant.throttle.supply_v));
     measured = now.sensed.angle_deg;
-    track.angle_deg[k] = now.angle_deg;
-    track.sensed_angle_deg[k] = measured;
-    track.speed_deg_per_s[k] = now.speed_deg_per_s;
-    track.current_a[k] = now.current_a;
+    note(track, k, now);
   }
   return track;
+}
+
+/// As many runs as there are controllers, each on a plant of its own, with the bits of single runs: the plants in
+/// lanes. ParameterError as there, and as for `VirtualThrottleLanes`.
+template <AngleController C>
+std::vector<ThrottleTrack> run_throttle_lanes(std::span<C> controllers, std::span<const VirtualThrottleSettings> plants,
+                                              int delay_samples, const ThrottleScenario& scenario) {
+  require_loop(scenario, delay_samples);
+  VirtualThrottleLanes throttles(plants);
+  std::vector<ThrottleTrack> tracks(plants.size(), empty_track(scenario));
+  std::vector<VirtualThrottleInputs> inputs(plants.size());
+  std::vector<VirtualThrottleSample> now(plants.size());
+  const auto delay = static_cast<std::size_t>(delay_samples);
+  for (std::size_t lane = 0; lane < plants.size(); ++lane)
+    now[lane].sensed.angle_deg = plants[lane].start_deg;
+  for (std::size_t k = 0; k < scenario.reference_deg.size(); ++k) {
+    for (std::size_t lane = 0; lane < plants.size(); ++lane) {
+      tracks[lane].duty[k] = controllers[lane].step(scenario.reference_deg[k], now[lane].sensed.angle_deg);
+      inputs[lane] = inputs_at(scenario, tracks[lane], k, delay, plants[lane].throttle.supply_v);
+    }
+    throttles.step(inputs, now);
+    for (std::size_t lane = 0; lane < plants.size(); ++lane)
+      note(tracks[lane], k, now[lane]);
+  }
+  return tracks;
 }
 
 }  // namespace mgdd::loop

@@ -48,6 +48,12 @@ struct VirtualThrottleSample {
   double current_a = 0.0;
 };
 
+/// Inputs of a sample, with the last ones where they are not finite.
+VirtualThrottleInputs taken(const VirtualThrottleInputs& now, const VirtualThrottleInputs& last) noexcept;
+
+/// The truth at the end of a sample.
+VirtualThrottleSample sample_of(const throttle::ThrottleState& state, double angle_deg) noexcept;
+
 class VirtualThrottle {
  public:
   explicit VirtualThrottle(const VirtualThrottleSettings& settings);

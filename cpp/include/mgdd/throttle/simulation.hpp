@@ -8,6 +8,7 @@
 #include <vector>
 
 #include "mgdd/throttle/plant.hpp"
+#include "mgdd/throttle/plant_lanes.hpp"
 
 namespace mgdd::throttle {
 
@@ -35,12 +36,6 @@ void validate(const ThrottleSignals& signals);
 /// Runs one throttle; `state` ends at the last sample.
 void simulate(const ThrottlePlant& plant, const ThrottleSignals& signals, std::size_t steps, ThrottleState& state,
               const ThrottleColumns& columns) noexcept;
-
-/// One of many runs: parameters and start are its own.
-struct ThrottleCase {
-  Throttle throttle;
-  ThrottleState start;
-};
 
 /// Angle of the plate [deg] of every case under the same signals, case after case in rows of one column per sample.
 /// All cases have the same forms of friction and backlash (ParameterError otherwise).
