@@ -42,7 +42,7 @@ PlateBelief<double> widened(const PlateBelief<T>& b) noexcept {
 }
 
 // The errors of angle and speed die as those of s^2 + a s + b = 0 at any sample time: poles z = exp(s T), of which
-// 1 - z1 z2 is the share of the angle and (1 - z1)(1 - z2) / T the gain of the speed (Astrom and Wittenmark 1997, 4.4).
+// 1 - z1 z2 is the share of the angle and (1 - z1)(1 - z2) / T the gain of the speed (Åström and Wittenmark 1997, 4.4).
 double speed_gain_of(const GuidedPredictiveSettings& s) noexcept {
   const double half = 0.5 * s.observer_angle_per_s * s.sample_s;
   const double apart = half * half - s.observer_speed_per_s2 * s.sample_s * s.sample_s;
