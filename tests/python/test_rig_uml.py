@@ -63,7 +63,7 @@ def console() -> Iterator[str]:
             os.chown(folder, 65534, 65534)
             os.chown(home, 65534, 65534)
         command.chmod(0o755)
-        boot = ["linux.uml", "mem=512M", "root=/dev/root", "rootfstype=hostfs", "rootflags=/", "ro", "quiet"]
+        boot = ["linux.uml", "mem=1G", "root=/dev/root", "rootfstype=hostfs", "rootflags=/", "ro", "quiet"]
         boot += [f"init={folder}/init.sh", f"UML_CMD={command}", "con0=fd:0,fd:1", "con=null"]
         boot = [*(AS_NOBODY if os.getuid() == 0 else []), *boot]
         process = subprocess.Popen(
