@@ -20,7 +20,7 @@ import mgdd
 
 pytestmark = pytest.mark.uml
 UML = Path(__file__).parents[1] / "uml"
-LIMIT_S = 240
+LIMIT_S = 360
 # Root becomes nobody, who may read everything (the interpreter may stand in a home) and write nothing.
 _READ_ONLY = "-all,+dac_read_search"
 AS_NOBODY = [

@@ -24,7 +24,7 @@ __all__ = ["BridgedBus", "SocketBus", "WatchedBus"]
 _ALL_BITS = {False: 0x7FF, True: 0x1FFF_FFFF}
 _FAILED_FRAMES = 3
 _SWITCH_S = 5e-4
-_LAST_S = 0.2  # for the last commands of the loop to be heard
+_LAST_S = 0.5  # for the last commands of the loop to be heard
 
 
 class WatchedBus:
