@@ -32,6 +32,7 @@ from mgdd.rig.can.loop_map import loop_messages
 from mgdd.rig.can.node_core import NodeCore
 from mgdd.rig.can.node_plant import node_plant
 from mgdd.rig.experiment import core_track
+from mgdd.rig.experiment.loop_bus import WatchedBus
 from mgdd.rig.experiment.watched import Cycle
 from patient_bench import patient_experiment
 from realtime_loops import becomes
@@ -151,7 +152,12 @@ def test_the_file_decides_which_loop_runs_and_the_check_says_why(tmp_path: Path)
         said = check_experiment(replace(experiment, settings=replace(experiment.settings, loop=loop))).to_dict()
         return said["loop"], said["loop_reason"]
 
-    assert chosen(known) == ("core", "a bus at real-time pace")
+    assert chosen(known) == ("core", "a bus at real-time pace, by bridge")
+    assert chosen(known.with_mode("hil", connection="socketcan:can7")) == (
+        "core", "a bus at real-time pace, by raw socket",
+    )  # fmt: skip
+    for connection in ("socketcan:can7?fd=true", "socketcand:can7?host=127.0.0.1&port=1", "virtual:can7"):
+        assert chosen(known.with_mode("dry_run", connection=connection))[1].endswith(", by bridge")
     assert chosen(known, "python") == ("python", "track.loop = 'python'")
     assert chosen(known.with_mode("hil", pace="step")) == (
         "python", "bus.pace = 'step': every command brings one sample, without a clock",
@@ -309,7 +315,7 @@ def test_a_node_that_says_several_times_that_it_does_not_drive_is_believed() -> 
 
     for states, failed in (([2, 3, 3, 2, 3, 4], False), ([2, 3, 4, 3], True), ([2, 2, 2, 1], False)):
         bus: Any = Frames([frame for state in states for frame in (told(state), told(3, 0x400))])
-        watched = core_track._WatchedBus(bus, signal_map)
+        watched = WatchedBus(bus, signal_map)
         while watched.receive(0.0) is not None:
             pass
         assert watched.failed == failed, states

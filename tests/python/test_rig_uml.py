@@ -20,7 +20,7 @@ import mgdd
 
 pytestmark = pytest.mark.uml
 UML = Path(__file__).parents[1] / "uml"
-LIMIT_S = 240
+LIMIT_S = 360
 # Root becomes nobody, who may read everything (the interpreter may stand in a home) and write nothing.
 _READ_ONLY = "-all,+dac_read_search"
 AS_NOBODY = [
@@ -63,7 +63,7 @@ def console() -> Iterator[str]:
             os.chown(folder, 65534, 65534)
             os.chown(home, 65534, 65534)
         command.chmod(0o755)
-        boot = ["linux.uml", "mem=512M", "root=/dev/root", "rootfstype=hostfs", "rootflags=/", "ro", "quiet"]
+        boot = ["linux.uml", "mem=1G", "root=/dev/root", "rootfstype=hostfs", "rootflags=/", "ro", "quiet"]
         boot += [f"init={folder}/init.sh", f"UML_CMD={command}", "con0=fd:0,fd:1", "con=null"]
         boot = [*(AS_NOBODY if os.getuid() == 0 else []), *boot]
         process = subprocess.Popen(

@@ -15,12 +15,14 @@ TRACK = (
 )
 
 
-def patient_experiment(folder: Path, reference: str = "step:20:35", loop: str = "auto") -> Experiment:
+def patient_experiment(
+    folder: Path, reference: str = "step:20:35", loop: str = "auto", *, cycle_ms: int = CYCLE_MS
+) -> Experiment:
     """Write map, DBC, envelope and experiment into a folder."""
     shipped = SignalMap.load("etb")
     dbc = shipped.dbc.file.read_text(encoding="utf-8")
     cycle = r'(BA_ "GenMsgCycleTime" BO_ (?:288|289|290)) \d+'
-    (folder / "etb.dbc").write_text(re.sub(cycle, rf"\1 {CYCLE_MS}", dbc), encoding="utf-8")
+    (folder / "etb.dbc").write_text(re.sub(cycle, rf"\1 {cycle_ms}", dbc), encoding="utf-8")
     own = shipped.file.read_text(encoding="utf-8").replace("timeout_ms = 20", "timeout_ms = 5000")
     (folder / "map.toml").write_text(own, encoding="utf-8")
     patient = dict.fromkeys(("missed_deadlines", "unsent_cycles", "largest_age_cycles", "bad_frames"), 1e6)

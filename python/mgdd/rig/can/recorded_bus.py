@@ -21,10 +21,16 @@ class RecordedBus:
         The bus.
     recorder : Recorder
         The record; it stays open.
+
+    Attributes
+    ----------
+    sent_elsewhere : frozenset of (int, bool)
+        Identifiers that another socket of this process sends: what is heard of them is recorded as sent.
     """
 
     def __init__(self, bus: Bus, recorder: Recorder) -> None:
         self.bus, self.recorder = bus, recorder
+        self.sent_elsewhere: frozenset[tuple[int, bool]] = frozenset()
 
     @property
     def name(self) -> str:
@@ -67,7 +73,7 @@ class RecordedBus:
         """Give the next frame."""
         frame = self.bus.receive(timeout_s)
         if frame is not None:
-            self._append(frame, received=True)
+            self._append(frame, received=(frame.id, frame.extended) not in self.sent_elsewhere)
         return frame
 
     def _append(self, frame: Frame, *, received: bool) -> None:

@@ -19,7 +19,7 @@ from mgdd.rig.can.connect import connected, error_code
 from mgdd.rig.can.messages import frame_of, message_of
 from mgdd.rig.extras import import_extra
 
-__all__ = ["CanTransport"]
+__all__ = ["CanTransport", "two_senders"]
 
 _POLL_S = 0.05  # longest sleep of the receive thread: how long closing waits
 _QUEUE = 4096  # frames that nobody has read
@@ -280,10 +280,7 @@ class CanTransport:
             self._count("remote")
             return
         if (frame.id, frame.extended) in self._claimed:
-            raise RigError(
-                f"{self.name}: frame {frame.id:#x} arrived, which this host sends: two nodes have one identifier; take "
-                "the other one off the bus"
-            )
+            raise two_senders(self.name, frame.id)
         with self._arrived:
             if len(self._queue) == _QUEUE:
                 self._queue.popleft()
@@ -309,6 +306,14 @@ class CanTransport:
     def _count(self, name: str) -> None:
         with self._arrived:
             self._counts[name] += 1
+
+
+def two_senders(bus: str, identifier: int) -> RigError:
+    """Say that a frame came which only this host may send."""
+    return RigError(
+        f"{bus}: frame {identifier:#x} arrived, which this host sends: two nodes have one identifier; take the other "
+        "one off the bus"
+    )
 
 
 def _plain(text: str) -> Any:

@@ -3,24 +3,19 @@
 from __future__ import annotations
 
 import math
-import sys
 import time
-from collections.abc import Callable, Iterator, Sequence
-from contextlib import contextmanager
+from collections.abc import Callable, Sequence
 from typing import Any
 
 import numpy as np
 
-from mgdd._core.rig import Frame, RingTransport
 from mgdd.errors import RigError
-from mgdd.rig.can.bus_bridge import BusBridge
 from mgdd.rig.can.can_rig import CanRig
-from mgdd.rig.can.frame import Bus, changed
 from mgdd.rig.can.loop_map import loop_messages
-from mgdd.rig.can.signal_map import SignalMap
 from mgdd.rig.can.signals import held_back
 from mgdd.rig.experiment.checked import CheckedExperiment
 from mgdd.rig.experiment.core_samples import LoopSamples
+from mgdd.rig.experiment.loop_bus import BridgedBus, SocketBus, WatchedBus
 from mgdd.rig.experiment.outcome import Outcome
 from mgdd.rig.experiment.run_record import RunRecord
 from mgdd.rig.experiment.throttle_tasks import TrackPlan
@@ -33,9 +28,7 @@ __all__ = ["LEAD_S", "track_on_core"]
 LEAD_S = 0.06  # of the references before their cycle: so long may Python stand still, and then the bridge opens
 _LOOK_S = 0.005
 _PATIENCE_S = 2.0  # at least, for the gate
-_SWITCH_S = 5e-4
-_FAILED_FRAMES = 3
-_PHASE = 0.3  # of a cycle, from a measurement to the step of the controller: what two threads of Python need
+_PHASE = 0.3  # of a cycle, from a measurement to the step of the controller: what the threads of a bridge need
 
 
 def track_on_core(
@@ -78,7 +71,7 @@ def track_on_core(
     report = run.loop.report()
     counters = dict(rig.counters)
     counters["commands"] += report["bus"]["sent"]
-    counters |= {"loop": {**report["frames"], "bus": report["bus"]}, "gate": dict(run.changes)}
+    counters |= {"loop": {**report["frames"], **run.bus.counters, "bus": report["bus"]}, "gate": dict(run.changes)}
     timing = {name: report[name] for name in _TIMING}
     return plan.outcome(run.samples.columns(), interrupted=interrupted), counters, timing
 
@@ -89,7 +82,7 @@ _TIMING = (
 
 
 class _CoreRun:
-    """The loop, the bridge to its bus, and the thread of Python that feeds references and takes samples."""
+    """The loop, its way to the bus, and the thread of Python that feeds references and takes samples and frames."""
 
     def __init__(
         self,
@@ -101,10 +94,18 @@ class _CoreRun:
     ) -> None:
         command, measurements = loop_messages(checked.bus_map)
         sample_s, wanted = plan.sample_s, plan.reference.angle_deg
-        self._ring, self._sample_s = RingTransport(), sample_s
+        self._sample_s = sample_s
         self._trigger = checked.bus_map.measurements[checked.bus_map.trigger].key
         self._shadow = checked.experiment.mode == "dry_run"
-        self._bus = _WatchedBus(rig.bus, checked.bus_map)
+        self._watched = WatchedBus(rig.bus, checked.bus_map)
+        channel = None if checked.loop is None else checked.loop.channel
+        self.bus: BridgedBus | SocketBus = (
+            BridgedBus(self._watched)
+            if channel is None
+            else SocketBus(
+                self._watched, channel, command=command, measurements=measurements, transmits=not self._shadow
+            )
+        )
         self._record, self._lead = record, max(4, math.ceil(LEAD_S / sample_s))
         self._wanted, self._handed_over = wanted, 1
         self._patience_s = max(_PATIENCE_S, 20.0 * (checked.envelope.good_frames if checked.envelope else 0) * sample_s)
@@ -119,7 +120,7 @@ class _CoreRun:
         )
         self.loop = RealtimeLoop(
             plan.controller(),
-            self._ring,
+            self.bus.transport,
             command=command,
             measurements=measurements,
             envelope=checked.envelope,
@@ -132,13 +133,13 @@ class _CoreRun:
         """Run; whether Ctrl-C cut it."""
         interrupted = False
         came_ns = self._trigger_ns()
-        with BusBridge(self._bus, self._ring) as bridge, _prompt_threads():
+        with self.bus:
             self._wait_for_phase(came_ns)
             try:
                 with self.loop:
-                    self._bring_into_service(bridge)
+                    self._bring_into_service()
                     try:
-                        self._follow(bridge)
+                        self._follow()
                     except KeyboardInterrupt:
                         interrupted = True
             finally:
@@ -147,11 +148,11 @@ class _CoreRun:
 
     def _trigger_ns(self) -> int:
         """Wait for the next end of a measured cycle, and give its stamp; now where none comes."""
-        while self._bus.receive(0.0) is not None:
+        while self._watched.receive(0.0) is not None:
             pass
         until = time.monotonic() + _PATIENCE_S
         while (left_s := until - time.monotonic()) > 0.0:
-            frame = self._bus.receive(left_s)
+            frame = self._watched.receive(left_s)
             if frame is not None and (frame.id, frame.extended) == self._trigger:
                 return frame.monotonic_ns
         return time.monotonic_ns()
@@ -161,31 +162,32 @@ class _CoreRun:
         behind_s = (time.monotonic_ns() - came_ns) * 1e-9 - _PHASE * self._sample_s
         time.sleep(-behind_s % self._sample_s)
 
-    def _bring_into_service(self, bridge: BusBridge) -> None:
+    def _bring_into_service(self) -> None:
         try:
             self.loop.arm(self._patience_s)
             self._feed()
             self.loop.drive(self._patience_s)
         except RigError as error:
-            raise bridge.error or error from None
+            self._take()
+            raise self.bus.error or error from None
 
-    def _follow(self, bridge: BusBridge) -> None:
+    def _follow(self) -> None:
         while self.samples.done < len(self._wanted):
             time.sleep(_LOOK_S)
             self._feed()
             self._take()
             self.samples.tell()
-            if bridge.error is not None or (self.samples.stopped and not self._shadow):
-                raise self._why(bridge)
-            if self._bus.failed and not self._shadow:
+            if self.bus.error is not None or (self.samples.stopped and not self._shadow):
+                raise self._why()
+            if self._watched.failed and not self._shadow:
                 raise RigError(
-                    f"{self._bus.name}: the node is in state {self._bus.state!r} and does not drive; look for the "
-                    "cause, then run the experiment again"
+                    f"{self._watched.name}: the node is in state {self._watched.state!r} and does not drive; look for "
+                    "the cause, then run the experiment again"
                 )
 
-    def _why(self, bridge: BusBridge) -> BaseException:
-        if bridge.error is not None:
-            return bridge.error
+    def _why(self) -> BaseException:
+        if self.bus.error is not None:
+            return self.bus.error
         if self.loop.report()["reference_timeouts"]:
             return RigError(
                 f"Python stood still for {LEAD_S * 1e3:g} ms and handed over no reference: the loop has opened the "
@@ -204,6 +206,7 @@ class _CoreRun:
 
     def _take(self) -> None:
         with held_back():  # Ctrl-C between two rows would tear a hole into the record
+            self.bus.look(self.loop.report)
             self._record.say(self._said())
             self.samples.take(self.loop.sample_columns())
 
@@ -212,44 +215,3 @@ class _CoreRun:
         for change in events:
             self.changes[change.reason] = self.changes.get(change.reason, 0) + 1
         return [f"safety gate: {c.before} -> {c.after}: {c.reason}" for c in events]
-
-
-class _WatchedBus:
-    """The bus of a rig, with an eye on the state that the node reports."""
-
-    def __init__(self, bus: Bus, signal_map: SignalMap) -> None:
-        self._bus, self._map = bus, signal_map
-        known = signal_map.state
-        self._key = None if known is None else signal_map.measurements[known.message].key
-        self._in_a_row = 0
-        self.state = ""
-
-    @property
-    def name(self) -> str:
-        return self._bus.name
-
-    @property
-    def failed(self) -> bool:
-        """Whether several frames in a row say so: they are not checked here."""
-        return self._in_a_row >= _FAILED_FRAMES
-
-    def receive(self, timeout_s: float) -> Frame | None:
-        frame = self._bus.receive(timeout_s)
-        if frame is not None and self._map.state is not None and (frame.id, frame.extended) == self._key:
-            self.state = self._map.state.name_of(frame.data)
-            self._in_a_row = self._in_a_row + 1 if self.state in self._map.state.failed else 0
-        return frame
-
-    def send(self, frame: Frame) -> None:
-        self._bus.send(changed(frame, monotonic_ns=0))  # the record says when it left Python, not when the loop did it
-
-
-@contextmanager
-def _prompt_threads() -> Iterator[None]:
-    """Let threads of Python take turns ten times as often: two of them stand between the loop and its bus."""
-    before = sys.getswitchinterval()
-    sys.setswitchinterval(min(before, _SWITCH_S))
-    try:
-        yield
-    finally:
-        sys.setswitchinterval(before)

@@ -7,6 +7,7 @@ from typing import NamedTuple
 from mgdd.errors import ParameterError
 from mgdd.rig.can.loop_map import loop_messages
 from mgdd.rig.can.signal_map import SignalMap
+from mgdd.rig.can.transport import CanTransport
 from mgdd.rig.experiment.experiment import Experiment
 from mgdd.rig.experiment.settings import TrackTask
 
@@ -23,11 +24,14 @@ class LoopChoice(NamedTuple):
     name : {"core", "python"}
         Which.
     reason : str
-        Why.
+        Why, and of that of the core how it reaches its bus: ``raw socket`` or ``bridge``.
+    channel : str, optional
+        Interface of SocketCAN on which the loop has a raw socket of its own; without one a bridge in Python serves it.
     """
 
     name: str
     reason: str
+    channel: str | None = None
 
 
 def chosen_loop(experiment: Experiment, signal_map: SignalMap | None) -> LoopChoice | None:
@@ -59,7 +63,9 @@ def chosen_loop(experiment: Experiment, signal_map: SignalMap | None) -> LoopCho
         return LoopChoice("python", "track.loop = 'python'")
     against = _against_core(experiment, signal_map)
     if not against:
-        return LoopChoice("core", "a bus at real-time pace")
+        channel = _own_socket(experiment.bus.connection)
+        by = "bridge" if channel is None else "raw socket"
+        return LoopChoice("core", f"a bus at real-time pace, by {by}", channel)
     if settings.loop == "core":
         raise ParameterError(
             f"{experiment.origin}: track.loop = 'core': must be 'auto' or 'python' here: {against}",
@@ -79,3 +85,11 @@ def _against_core(experiment: Experiment, signal_map: SignalMap | None) -> str:
     except ParameterError as error:
         return str(error)
     return ""
+
+
+def _own_socket(connection: str | None) -> str | None:
+    """Give the channel of a connection by SocketCAN without options: they would be those of python-can."""
+    if connection is None:
+        return None
+    bus = CanTransport.parse(connection)
+    return str(bus.channel) if bus.interface == "socketcan" and not bus.options else None
