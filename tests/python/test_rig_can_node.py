@@ -3,10 +3,11 @@
 from __future__ import annotations
 
 import math
+import time
 
 import pytest
 
-from bus_node import ETB
+from bus_node import ETB, node, rig_on
 from mgdd._core.rig import Frame
 from mgdd.errors import ParameterError
 from mgdd.loop import EngineBench, VirtualThrottle
@@ -248,3 +249,21 @@ def test_faults_of_the_plant_reach_the_host() -> None:
     values = [core.plant.sample({"duty": 0.6}).values for _ in range(40)][-1]
     assert values["second_v"] == pytest.approx(0.0, abs=0.01)
     assert values["angle_deg"] == pytest.approx(20.0, abs=0.5)
+
+
+def test_a_late_answer_to_an_arming_frame_is_not_the_first_measurement(monkeypatch: pytest.MonkeyPatch) -> None:
+    """A busy node answers later than a cycle: the host waits for what it has asked for."""
+    answer = NodeCore.answer
+
+    def late(self: NodeCore) -> list[Frame]:
+        time.sleep(0.03)
+        return answer(self)
+
+    monkeypatch.setattr(NodeCore, "answer", late)
+    with node("late-answers"), rig_on("late-answers") as rig:
+        for duty in (0.2, 0.25):
+            rig.apply({"duty": duty})
+            measured = rig.measure()
+            assert measured.applied == {"duty": pytest.approx(duty)}
+            assert math.isfinite(measured.values["sensed_angle_deg"])
+        assert rig.counters["skipped"] == 0

@@ -63,6 +63,17 @@ class PythonCalls {
     if (failed_) x.fill(std::nan(""));
   }
 
+  // What every model of Python has.
+  void step(RunTimeState& x, double input) noexcept {
+    call([&](py::object& o) { take(o.attr("step")(column(x), input), "step", x.data(), order_); });
+    forget(x);
+  }
+  double output(const RunTimeState& x) noexcept {
+    double y = std::nan("");
+    call([&](py::object& o) { take(o.attr("output")(column(x)), "output", &y, 1); });
+    return y;
+  }
+
  private:
   py::object object_;
   Eigen::Index order_;
@@ -81,16 +92,8 @@ class PythonModel {
   PythonModel(const py::object& object, Eigen::Index order, double sample_s)
       : calls_(std::make_shared<PythonCalls>(object, order, false)), sample_s_(sample_s) {}
 
-  void step(State& x, double input) const noexcept {
-    calls_->call(
-        [&](py::object& o) { calls_->take(o.attr("step")(calls_->column(x), input), "step", x.data(), order()); });
-    calls_->forget(x);
-  }
-  double output(const State& x) const noexcept {
-    double y = std::nan("");
-    calls_->call([&](py::object& o) { calls_->take(o.attr("output")(calls_->column(x)), "output", &y, 1); });
-    return y;
-  }
+  void step(State& x, double input) const noexcept { calls_->step(x, input); }
+  double output(const State& x) const noexcept { return calls_->output(x); }
   double sample_s() const noexcept { return sample_s_; }
   Eigen::Index order() const noexcept { return calls_->order(); }
   void linearise(const State& x, double input, Eigen::MatrixXd& a, Eigen::VectorXd& b) const noexcept {
@@ -142,16 +145,8 @@ class PythonGuide {
     calls_->forget(x);
     return x;
   }
-  void step(State& x, double duty) const noexcept {
-    calls_->call(
-        [&](py::object& o) { calls_->take(o.attr("step")(calls_->column(x), duty), "step", x.data(), order()); });
-    calls_->forget(x);
-  }
-  double output(const State& x) const noexcept {
-    double y = std::nan("");
-    calls_->call([&](py::object& o) { calls_->take(o.attr("output")(calls_->column(x)), "output", &y, 1); });
-    return y;
-  }
+  void step(State& x, double duty) const noexcept { calls_->step(x, duty); }
+  double output(const State& x) const noexcept { return calls_->output(x); }
   double sample_s() const noexcept { return sample_s_; }
   Eigen::Index order() const noexcept { return calls_->order(); }
   void correct(State& x, double angle_deg, const throttle::ObserverGains&) const noexcept {

@@ -24,7 +24,7 @@ constexpr std::array<std::int64_t, n_edges> edges_ns = [] {
   std::array<std::int64_t, n_edges> edges{};
   double decade = first_edge_ns;
   for (std::size_t i = 0; i < n_edges; ++i) {
-    // std::lround is no constant expression. NOLINTNEXTLINE(bugprone-incorrect-roundings)
+    // std::lround is not constexpr. NOLINTNEXTLINE(bugprone-incorrect-roundings)
     edges[i] = static_cast<std::int64_t>(decade * within_decade[i % bins_per_decade] + 0.5);
     if (i % bins_per_decade == bins_per_decade - 1) decade *= 10.0;
   }

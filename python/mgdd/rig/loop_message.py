@@ -28,7 +28,7 @@ class LoopMessage:
     switched : sequence of (SignalLayout, float, float)
         Of the command: a number while the actuator is driven and one with an open bridge, a mode for example.
     missing : mapping of str to int
-        Of a received message: raw value by signal that says that there is no number. One of the three that a loop
+        Of a received message: raw value by signal that marks a missing number. One of the three that a loop
         needs makes its frame a bad one, of another the number is NaN.
     extended : bool
         29-bit identifier.

@@ -1,5 +1,5 @@
-// One turn after the other, without a thread or a clock: the loop drives a virtual throttle over frames, does nothing
-// before it is told to, and opens the bridge for every trouble of bus, deadlines and references.
+// One turn after the other, without a thread or a clock: the loop does nothing before it is told to, and opens the
+// bridge for every trouble of bus and deadlines.
 #include "mgdd/rig/control_cycle.hpp"
 
 #include <gtest/gtest.h>
@@ -7,11 +7,10 @@
 #include <cmath>
 #include <cstdint>
 #include <memory>
-#include <string>
 #include <vector>
 
 #include "mgdd/common/error.hpp"
-#include "mgdd/rig/monotonic_clock.hpp"
+#include "support/cycle_rig.hpp"
 #include "support/no_alloc.hpp"
 #include "support/throttle_on_bus.hpp"
 
@@ -20,55 +19,9 @@ namespace {
 
 using test::bus_envelope;
 using test::bus_messages;
-using test::ThrottleOnBus;
-
-constexpr std::int64_t period = 1'000'000, start = 50'000'000'000;
-
-struct Rig {
-  explicit Rig(const CycleSettings& settings = {}, const loop::ThrottleController& controller = control::Pid({}),
-               const SafetyEnvelope& envelope = bus_envelope())
-      : cycle(settings, node.bus, controller, FrameCodec(bus_messages()), SafetyGate(envelope)) {}
-
-  /// One turn; grid points before it were skipped, and the turn before took too long by so many. The node answers
-  /// 0.2 ms later unless it is silent.
-  bool turn(std::int64_t skipped = 0, bool stopping = false, std::int64_t late = 0) {
-    number += 1 + skipped;
-    const std::int64_t deadline = start + number * period;
-    const bool more = cycle.turn({.number = number,
-                                  .deadline_ns = deadline,
-                                  .woken_ns = deadline + 30'000,
-                                  .missed = skipped + late,
-                                  .skipped = skipped,
-                                  .missed_in_row = skipped + late,
-                                  .stopping = stopping});
-    commanded = node.take_commands();
-    node.run_plant();
-    if (answers) node.answer(deadline + 200'000);
-    while (cycle.pop_sample(sample)) {
-      if (keep) kept.push_back(sample);
-    }
-    return more;
-  }
-  void turns(int n) {
-    for (int i = 0; i < n; ++i)
-      turn();
-  }
-  void drive() {
-    turns(12);
-    cycle.request(SafetyRequest::arm);
-    cycle.request(SafetyRequest::run);
-    turns(2);
-    ASSERT_EQ(cycle.state(), SafetyState::run);
-  }
-  bool open() const { return node.enable == 0.0 && node.duty == 0.0; }
-
-  ThrottleOnBus node;
-  ControlCycle cycle;
-  LoopSample sample;
-  std::vector<LoopSample> kept;
-  std::int64_t number = -1;
-  bool answers = true, keep = false, commanded = false;
-};
+using test::period;
+using test::start;
+using Rig = test::CycleRig;
 
 TEST(ControlCycle, TellsTheNodeToStayOpenUntilItRuns) {
   Rig rig;
@@ -102,79 +55,6 @@ TEST(ControlCycle, RequestsAreFollowedInTheirOrderOnePerCycle) {
     EXPECT_EQ(event.reason, SafetyReason::requested);
   }
   EXPECT_FALSE(rig.cycle.pop_event(event));
-}
-
-TEST(ControlCycle, FollowsTheReferenceOverTheBus) {
-  Rig rig({.initial_reference_deg = 25.0});
-  rig.drive();
-  rig.turns(600);
-  EXPECT_NEAR(rig.node.last.angle_deg, 25.0, 0.5);
-  rig.cycle.set_reference(60.0);
-  rig.turn();
-  EXPECT_EQ(rig.sample.reference_deg, 60.0);
-  rig.turns(600);
-  EXPECT_NEAR(rig.node.last.angle_deg, 60.0, 0.5);
-  EXPECT_EQ(rig.cycle.state(), SafetyState::run);
-  EXPECT_EQ(rig.cycle.counts().bad_frames.get(), 0u);
-  EXPECT_NEAR(rig.node.reference_deg, 60.0, 1e-9);
-  EXPECT_EQ(rig.sample.age_ns, 830'000);
-}
-
-// A record of samples gives every duty again: the loop adds nothing of its own.
-TEST(ControlCycle, SamplesReplayTheControllerBitForBit) {
-  loop::ThrottleController controller = control::GuidedPredictive({});
-  Rig rig({.initial_reference_deg = 30.0}, controller);
-  rig.keep = true;
-  rig.drive();
-  for (int i = 0; i < 400; ++i) {
-    if (i == 150) rig.cycle.set_reference(17.0);
-    rig.answers = i % 11 != 0;  // cycles without a new angle
-    rig.turn();
-  }
-  ASSERT_EQ(rig.cycle.state(), SafetyState::run);
-  int stepped = 0, stale = 0;
-  for (const LoopSample& s : rig.kept) {
-    if (s.state != SafetyState::run) continue;
-    ++stepped;
-    stale += s.fresh ? 0 : 1;
-    const double angle = s.fresh ? s.measured[0] : std::numeric_limits<double>::quiet_NaN();
-    const double duty = std::visit([&](auto& c) { return c.step(s.reference_deg, angle); }, controller);
-    ASSERT_EQ(duty, s.asked_duty) << s.cycle;
-  }
-  EXPECT_GT(stepped, 400);
-  EXPECT_GT(stale, 30);
-}
-
-// And with what the gate was told, every drive, also those of a gate that changes its state.
-TEST(ControlCycle, SamplesReplayTheGateBitForBit) {
-  const SafetyEnvelope envelope = test::bus_envelope();
-  Rig rig({.initial_reference_deg = 30.0});
-  rig.keep = true;
-  rig.drive();
-  for (int i = 0; i < 300; ++i) {
-    if (i == 60) rig.cycle.set_reference(70.0);
-    rig.answers = i % 7 != 0 && i < 250;  // and then silence
-    rig.turn(i == 120 ? 2 : 0);
-  }
-  ASSERT_EQ(rig.cycle.state(), SafetyState::limp);
-  SafetyGate gate(envelope);
-  bool sent = true;
-  for (const LoopSample& s : rig.kept) {
-    SafetyFacts facts{.good_frames = s.good_frames,
-                      .bad_frames = s.bad_frames,
-                      .sensor_v = {s.measured[1], s.measured[2]},
-                      .angle_deg = s.measured[0],
-                      .bus = s.bus,
-                      .sent = sent,
-                      .missed_deadlines = s.missed,
-                      .request = s.request};
-    if (s.age_ns >= 0) facts.age_s = static_cast<double>(s.age_ns) * 1e-9;
-    gate.observe(facts);
-    const bool driven = gate.state() == SafetyState::run;
-    ASSERT_EQ(gate.command(driven ? s.asked_duty : 0.0), s.drive) << s.cycle;
-    ASSERT_EQ(gate.state(), s.state) << s.cycle;
-    sent = s.result == SendResult::sent;
-  }
 }
 
 TEST(ControlCycle, SilenceOfTheNodeOpensTheBridge) {
@@ -244,40 +124,6 @@ TEST(ControlCycle, CommandsThatDoNotLeaveAreTroubleToo) {
   EXPECT_GE(rig.cycle.transport_counts().full.get(), 3u);
 }
 
-TEST(ControlCycle, AReferenceThatIsNotRenewedAborts) {
-  Rig rig({.initial_reference_deg = 40.0, .reference_timeout_s = 0.05});
-  rig.turns(200);  // time before the start does not count
-  rig.drive();
-  rig.turns(45);
-  EXPECT_EQ(rig.cycle.state(), SafetyState::run);
-  rig.turns(10);
-  EXPECT_EQ(rig.cycle.state(), SafetyState::limp);
-  EXPECT_EQ(rig.cycle.reason(), SafetyReason::aborted);
-  EXPECT_EQ(rig.cycle.counts().reference_timeouts.get(), 1u);
-}
-
-// Turns of a second before now, so that what is set now lies ahead of all of them.
-TEST(ControlCycle, AReferenceThatIsRenewedKeepsItDriven) {
-  Rig rig({.initial_reference_deg = 40.0, .reference_timeout_s = 0.05});
-  rig.number = (monotonic_ns() - start) / period - 1000;
-  rig.drive();
-  rig.turns(45);
-  rig.cycle.set_reference(41.0);
-  rig.turns(200);
-  EXPECT_EQ(rig.cycle.state(), SafetyState::run);
-  EXPECT_EQ(rig.cycle.counts().reference_timeouts.get(), 0u);
-}
-
-TEST(ControlCycle, QueuedReferencesCountAsRenewed) {
-  Rig rig({.initial_reference_deg = 40.0, .reference_timeout_s = 0.05});
-  rig.cycle.queue_references(std::vector<double>(100, 41.0));
-  rig.drive();
-  rig.turns(145);
-  EXPECT_EQ(rig.cycle.state(), SafetyState::run);
-  rig.turns(10);
-  EXPECT_EQ(rig.cycle.reason(), SafetyReason::aborted);
-}
-
 TEST(ControlCycle, OnlyAFrameWithTheAngleIsFresh) {
   Rig rig({.initial_reference_deg = 40.0});
   rig.drive();
@@ -316,28 +162,6 @@ TEST(ControlCycle, ASenderWithoutEndDoesNotHoldTheLoop) {
     before = bus->waiting_for_loop();
   }
   EXPECT_EQ(cycle.counts().foreign_frames.get(), 8192u);
-}
-
-TEST(ControlCycle, QueuedReferencesAreTakenOnePerGridPoint) {
-  SafetyEnvelope envelope = bus_envelope();
-  envelope.missed_deadlines = 100.0;
-  Rig rig({.initial_reference_deg = 12.0, .queue_capacity = 8}, control::Pid({}), envelope);
-  EXPECT_THROW(rig.cycle.queue_references(std::vector<double>(9, 1.0)), RigError);
-  EXPECT_THROW(rig.cycle.queue_references(std::vector<double>{1.0, NAN}), ParameterError);
-  EXPECT_EQ(rig.cycle.queued_references(), 0u);
-  rig.cycle.queue_references(std::vector{13.0, 14.0, 15.0, 16.0, 17.0, 18.0});
-  rig.turns(20);
-  EXPECT_EQ(rig.cycle.queued_references(), 6u);  // not before it runs
-  rig.drive();
-  std::vector<double> seen{rig.sample.reference_deg};
-  for (const std::int64_t skipped : {0, 0, 2, 0, 0, 0}) {
-    rig.turn(skipped, false, 1);  // one that only took too long has had its reference
-    seen.push_back(rig.sample.reference_deg);
-  }
-  EXPECT_EQ(seen, (std::vector{12.0, 13.0, 14.0, 17.0, 18.0, 18.0, 18.0}));
-  rig.cycle.set_reference(9.0);
-  rig.turn();
-  EXPECT_EQ(rig.sample.reference_deg, 9.0);
 }
 
 TEST(ControlCycle, AStopSendsOpenBridgesAndEnds) {
@@ -382,7 +206,7 @@ TEST(ControlCycle, RunsAgainAfterAResetWithoutTheOldIntegral) {
 }
 
 TEST(ControlCycle, ATransportServesOneLoop) {
-  ThrottleOnBus node;
+  test::ThrottleOnBus node;
   const auto make = [&] {
     return std::make_unique<ControlCycle>(CycleSettings{}, node.bus, control::Pid({}), FrameCodec(bus_messages()),
                                           SafetyGate(bus_envelope()));

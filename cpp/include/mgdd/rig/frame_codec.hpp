@@ -35,7 +35,7 @@ Names<Commanded> commanded_names() noexcept;
 struct MeasuredSignal {
   Measured what{};
   SignalLayout layout{};
-  std::optional<std::uint64_t> missing_raw{};  ///< raw value that says that there is no number
+  std::optional<std::uint64_t> missing_raw{};  ///< raw value of a missing number
 };
 struct CommandedSignal {
   Commanded what{};

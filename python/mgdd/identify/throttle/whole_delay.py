@@ -33,8 +33,8 @@ __all__ = ["RAMPS", "Delays", "whole_delay"]
 
 RAMPS = (0.1, 0.4)  # where searches begin [deg]: ramp and limp-home have valleys of their own
 _MOVED = 0.25  # samples by which a delay may differ before the time constant is searched anew
-_RIVAL = 1.5  # a delay whose coarse search ends that far above the best is no rival
-_ALIKE = 1.25  # delays whose errors are further apart than that are no equals, whatever their blocks say
+_RIVAL = 1.5  # a delay whose coarse search ends that far above the best is not fitted finely
+_ALIKE = 1.25  # delays whose errors differ by more are not treated as equal, whatever their blocks say
 _MOTOR_LAGS_S = (3e-4, 3e-3)  # L/R of throttle motors, which decides between delays that the log does not separate
 
 

@@ -162,7 +162,7 @@ class NodeCore:
     def _passed(self, command_age_s: float | None) -> dict[str, float] | None:
         """Tell the gate of this cycle, and give the inputs that it lets pass; None: without drive."""
         was_driven = self.driven
-        age_s = 0.0 if self._all_say("rest") else command_age_s  # a host that rests may fall silent
+        age_s = 0.0 if self._all_say("rest") else command_age_s  # a host whose commands are safe may stop sending
         facts = self.plant.facts(self.gate.envelope)
         rounds = min((self._good[name] for name in self._timeouts_s), default=0)
         self._good = Counter({name: min(self._good[name] - rounds, 1) for name in self._timeouts_s})
