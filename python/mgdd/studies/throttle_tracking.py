@@ -127,7 +127,8 @@ def _draw(dataset: xr.Dataset) -> dict[str, Figure]:
     from mgdd.plot.style import BLACK, BLUE, GREEN, GREY, ORANGE
 
     colors = dict(zip(FAMILIES, (BLUE, GREY, ORANGE, GREEN, BLACK, "#8c6bb1"), strict=True))
-    styles = dict(zip(FAMILIES, ("-", ":", "--", "-.", "-", ":"), strict=True))
+    dashes: tuple[Any, ...] = ("-", ":", "--", "-.", "-", (0, (6, 1, 1, 1, 1, 1)))  # each also readable without colour
+    styles = dict(zip(FAMILIES, dashes, strict=True))
     figure = NewFigure(figsize=(7.2, 6.2), layout="constrained")
     axes = figure.subplots(2, 2)
     wanted = references()
@@ -138,12 +139,11 @@ def _draw(dataset: xr.Dataset) -> dict[str, Figure]:
             run = track(tuned_controller(kind, throttle_of("P1")), reference, throttle=plant, seed=1)
             time_ms = 1e3 * (run["time_s"].to_numpy() - reference.from_s)
             shown = (time_ms >= -10.0) & (time_ms <= window_ms)
-            left.plot(
-                time_ms[shown], run["angle_deg"].to_numpy()[shown], styles[kind], color=colors[kind], linewidth=1.2
-            )
+            look = {"linestyle": styles[kind], "color": colors[kind], "linewidth": 1.2}
+            left.plot(time_ms[shown], run["angle_deg"].to_numpy()[shown], **look)
             settling = np.sort(dataset["settling_ms"].sel(preset="P1", controller=kind, reference=name).to_numpy())
             share = np.arange(1, len(settling) + 1) / len(settling)
-            right.step(settling, share, styles[kind], color=colors[kind], linewidth=1.2, label=FAMILIES[kind].label)
+            right.step(settling, share, label=FAMILIES[kind].label, **look)
         left.set_ylabel("plate angle [deg]")
         right.set_ylabel("share of the throttles [-]")
         right.set_xlim(0.0, 3.0 * window_ms)
