@@ -11,6 +11,7 @@
 #include <gtest/gtest.h>
 
 #include "mgdd/common/error.hpp"
+#include "mgdd/engine/sensitivity.hpp"
 
 namespace mgdd::engine {
 namespace {
@@ -222,6 +223,54 @@ TEST(Batch, GammaOfTemperatureRunsOneByOne) {
   table.cases.cylinder.gas.gamma_model = GammaModel::linear;
   EXPECT_EQ(form_of(table.cases, BatchForm::lanes), BatchForm::single);
   EXPECT_TRUE(same_bits(run(table.cases, BatchForm::automatic), run(table.cases, BatchForm::single)));
+}
+
+// Leftovers of a job must not disturb the shared tables of the next one.
+TEST(Batch, WeakCasesBetweenOthersDoNotDisturbTheSharedTables) {
+  std::vector<double> rows;
+  for (int i = 0; i < 9000; ++i) {
+    const bool weak = i % 997 == 5;  // of another speed: its constants must not stay in the block
+    for (const double x : {weak ? 2900.0 : 1400.0, weak ? 0.0 : 25.0, -25.0 + 0.004 * i})
+      rows.push_back(x);
+  }
+  Table table({"speed_rpm", "fuel_mg", "soc_cad"}, rows);
+  EXPECT_LT(difference(run(table.cases, BatchForm::shared), run(table.cases, BatchForm::lanes)), 1e-8);
+}
+
+TEST(Batch, DerivativesInLanesAreThoseOfOneCycle) {
+  const std::vector<std::string> along{"soc_cad", "fuel_mg",         "speed_rpm",       "burn_duration_cad",
+                                       "wiebe_m", "wall_heat_scale", "trapped_mass_g",  "wall_temperature_k",
+                                       "bore_mm", "gamma",           "second_fraction", "volumetric_efficiency"};
+  Table table(mixed_names, mixed_points(19, 8));
+  const std::vector<IndicatorMember> members = all_members();
+  for (const BurnShape shape : {BurnShape::triangle, BurnShape::wiebe, BurnShape::double_wiebe}) {
+    for (const WallHeatModel wall : {WallHeatModel::woschni, WallHeatModel::hohenberg}) {
+      table.cases.cylinder.burn.burn_shape = shape;
+      table.cases.cylinder.wall_heat.wall_heat_model = wall;
+      Columns found(along.size() * members.size(), std::vector<double>(table.cases.size()));
+      std::vector<double*> to;
+      for (std::vector<double>& column : found)
+        to.push_back(column.data());
+      differentiate_batch(table.cases, {}, members, along, to);
+      for (std::size_t row = 0; row < table.cases.size(); ++row) {
+        Cylinder cylinder = table.cases.cylinder;
+        OperatingPoint point;
+        const double* x = table.values.data() + 6 * row;
+        point.speed_rpm = x[0], point.fuel_mg = x[1], point.intake_pressure_kpa = x[2];
+        point.intake_temperature_k = x[3], cylinder.wall_heat.wall_heat_scale = x[5];
+        for (std::size_t i = 0; i < along.size(); ++i) {  // one by one: an optional that is asked for stays constant
+          const Indicators<double> expected = sensitivities(cylinder, point, x[4], {along[i]}).indicators.front();
+          for (std::size_t o = 0; o < members.size(); ++o) {
+            const double wanted = expected.*members[o];
+            const double now = found[i * members.size() + o][row];
+            EXPECT_NEAR(now, wanted, 1e-8 * std::max(1.0, std::abs(wanted)))
+                << along[i] << ' ' << indicator_fields<double>()[o].name << ' ' << to_string(shape) << to_string(wall);
+          }
+        }
+      }
+    }
+  }
+  EXPECT_THROW(differentiate_batch(table.cases, {}, members, {"ivc_cad"}, {}), ParameterError);
 }
 
 TEST(Batch, AnUnphysicalCaseIsNanAloneAndCounted) {

@@ -70,4 +70,11 @@ IndicatorMember parse_indicator(std::string_view name);
 std::size_t simulate_batch(const BatchCases& cases, const BatchSettings& settings,
                            std::span<const IndicatorMember> outputs, std::span<double* const> columns);
 
+/// Exact derivatives of every output along every input of `differentiable_inputs()`, by forward mode: column
+/// i * outputs + o holds that of output o along input i. In lanes, one direction at a time; cycle by cycle where the
+/// input changes geometry or gamma. NaN as in `simulate_batch`, but a cycle on its own is a ConvergenceError.
+void differentiate_batch(const BatchCases& cases, const BatchSettings& settings,
+                         std::span<const IndicatorMember> outputs, const std::vector<std::string>& along,
+                         std::span<double* const> columns);
+
 }  // namespace mgdd::engine

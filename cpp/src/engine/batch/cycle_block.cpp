@@ -1,6 +1,6 @@
 #include "cycle_block.hpp"
 
-#include <algorithm>
+#include <cmath>
 #include <limits>
 
 namespace mgdd::engine {
@@ -11,49 +11,55 @@ enum class Heat { none, triangle, wiebe, double_wiebe };
 constexpr std::size_t lanes = block_lanes;
 
 // The laws of burn.hpp without branches.
-MGDD_INLINE double within_unit(double s) noexcept {
-  const double above = s > 0.0 ? s : 0.0;
-  return above < 1.0 ? above : 1.0;
+template <class T>
+MGDD_INLINE T within_unit(const T& s) noexcept {
+  const T above = select(value_of(s) > 0.0, s, T(0.0));
+  return select(value_of(above) < 1.0, above, T(1.0));
 }
-MGDD_INLINE double triangle(double s) noexcept {
-  const double c = within_unit(s);
-  const double second = c > 0.5 ? c + c - 1.0 : 0.0;
+template <class T>
+MGDD_INLINE T triangle(const T& s) noexcept {
+  const T c = within_unit(s);
+  const T second = select(value_of(c) > 0.5, T(c + c - 1.0), T(0.0));
   return 2.0 * c * c - second * second;
 }
-MGDD_INLINE double wiebe(double s, double a, double exponent, double per_complete) noexcept {
-  const double inside = s > 1e-300 ? s : 1e-300;
-  const double fraction = (1.0 - lane_exp(-(a * lane_power(inside, exponent)))) * per_complete;
-  const double begun = s > 0.0 ? fraction : 0.0;
-  return s < 1.0 ? begun : 1.0;
+template <class T>
+MGDD_INLINE T wiebe(const T& s, const T& a, const T& exponent, const T& per_complete) noexcept {
+  const T inside = select(value_of(s) > 1e-300, s, T(1e-300));
+  const T power = lane_exp(T(exponent * lane_log(inside)));
+  const T fraction = (1.0 - lane_exp(T(-(a * power)))) * per_complete;
+  const T begun = select(value_of(s) > 0.0, fraction, T(0.0));
+  return select(value_of(s) < 1.0, begun, T(1.0));
 }
 
-template <Heat heat>
-MGDD_INLINE double burned_fraction(const CycleBlock& b, std::size_t l, double angle) noexcept {
-  const double s = (angle - b.start[l]) * b.per_duration[l];
+template <Heat heat, class T>
+MGDD_INLINE T burned_fraction(const CycleBlock<T>& b, std::size_t l, double angle) noexcept {
+  const T s = (angle - b.start.get(l)) * b.per_duration.get(l);
   if constexpr (heat == Heat::triangle) {
     return triangle(s);
   } else {
-    const double first = wiebe(s, b.a[l], b.exponent[l], b.per_complete[l]);
+    const T a = b.a.get(l), per_complete = b.per_complete.get(l);
+    const T first = wiebe(s, a, b.exponent.get(l), per_complete);
     if constexpr (heat == Heat::wiebe) return first;
-    const double s2 = (angle - b.second_start[l]) * b.second_per_duration[l];
-    return (1.0 - b.second_share[l]) * first +
-           b.second_share[l] * wiebe(s2, b.a[l], b.second_exponent[l], b.per_complete[l]);
+    const T s2 = (angle - b.second_start.get(l)) * b.second_per_duration.get(l);
+    const T share = b.second_share.get(l);
+    return (1.0 - share) * first + share * wiebe(s2, a, b.second_exponent.get(l), per_complete);
   }
 }
 
-/// `at` where `value` passes `best`, otherwise 0; the largest of them is the place of the first maximum. An assignment
-/// under a condition would become a branch.
-MGDD_INLINE double place_if(double value, double best, double at) noexcept {
-  return value > best ? at : 0.0;
-}
-MGDD_INLINE double larger_of(double a, double b) noexcept {
-  return a > b ? a : b;
+/// Remembers where the first maximum stands: `at` where `value` passes `best`, otherwise 0, and the largest of them. An
+/// assignment under a condition would become a branch.
+MGDD_INLINE void keep_peak(Lane<double>& best, Lane<double>& best_at, std::size_t l, double value, double at) noexcept {
+  const double passed = value > best.value[l] ? at : 0.0;
+  best_at.value[l] = passed > best_at.value[l] ? passed : best_at.value[l];
+  best.value[l] = value > best.value[l] ? value : best.value[l];
 }
 
 // One loop for each stage of a step: sixteen lanes at a time keep the processor busy while each waits for its roots.
-template <bool woschni, bool burning, Heat heat, bool stopping = false>
-MGDD_INLINE void steps(const CycleTables& t, std::size_t from, std::size_t to, CycleBlock& b, double* trace) noexcept {
-  alignas(64) Lane root, velocity, film, released;
+template <bool woschni, bool burning, Heat heat, bool stopping = false, class T>
+MGDD_INLINE void steps(const CycleTables& t, std::size_t from, std::size_t to, CycleBlock<T>& b,
+                       Lane<T>* trace) noexcept {
+  alignas(64) Lane<double> root, fifth;
+  alignas(64) Lane<T> velocity, film, released;
   for (std::size_t k = from; k < to; ++k) {
     const double v0 = t.volume_m3[k], v1 = t.volume_m3[k + 1], dv = v1 - v0, term = t.wall_term[k];
     const double ratio = t.motored_ratio[k], keep = t.keep[k], gain = t.gain[k];
@@ -62,73 +68,77 @@ MGDD_INLINE void steps(const CycleTables& t, std::size_t from, std::size_t to, C
     const double next_at = at + 1.0;
 
     for (std::size_t l = 0; l < lanes; ++l)
-      root[l] = std::sqrt(b.pressure[l]);
+      root.value[l] = std::sqrt(b.pressure.value[l]);
     if constexpr (woschni) {
       for (std::size_t l = 0; l < lanes; ++l) {
         if constexpr (burning) {
-          velocity[l] = (b.still[l] - b.burning[l] * ratio) + b.per_pa[l] * b.pressure[l];
-          film[l] = inverse_fifth_root_guess(velocity[l]);
+          const T w = (b.still.get(l) - b.burning.get(l) * ratio) + b.per_pa.get(l) * b.pressure.get(l);
+          velocity.set(l, w);
+          fifth.value[l] = inverse_fifth_root_guess(value_of(w));
         }
-        root[l] = std::sqrt(root[l]);
+        root.value[l] = std::sqrt(root.value[l]);
       }
       if constexpr (burning) {
         for (std::size_t l = 0; l < lanes; ++l)
-          film[l] = inverse_fifth_root_first(velocity[l], film[l]);
+          fifth.value[l] = inverse_fifth_root_first(velocity.value[l], fifth.value[l]);
       }
     } else {
       for (std::size_t l = 0; l < lanes; ++l)
-        film[l] = inverse_fifth_root_first(root[l], inverse_fifth_root_guess(root[l]));
+        fifth.value[l] = inverse_fifth_root_first(root.value[l], inverse_fifth_root_guess(root.value[l]));
     }
     if constexpr (heat != Heat::none) {
       for (std::size_t l = 0; l < lanes; ++l) {
-        const double fraction = burned_fraction<heat>(b, l, angle);
-        released[l] = b.heat[l] * (fraction - b.burned[l]);
-        b.burned[l] = fraction;
+        const T fraction = burned_fraction<heat>(b, l, angle);
+        released.set(l, b.heat.get(l) * (fraction - b.burned.get(l)));
+        b.burned.set(l, fraction);
       }
     }
     for (std::size_t l = 0; l < lanes; ++l) {
+      const T p = b.pressure.get(l);
       if constexpr (!woschni) {
-        film[l] = four_fifths_last(root[l], film[l]);  // p^0.4
-      } else if constexpr (burning) {
-        const double fast = four_fifths_last(velocity[l], film[l]);
-        const double moved = velocity[l] > b.still[l] ? fast : b.still_power[l];
-        film[l] = root[l] * (at < b.first_burning[l] ? b.still_power[l] : moved);
+        film.set(l, with_power(four_fifths_last(root.value[l], fifth.value[l]), 0.4, p));
       } else {
-        film[l] = root[l] * b.still_power[l];
+        const T still_power = b.still_power.get(l), fourth = with_power(root.value[l], 0.25, p);
+        if constexpr (burning) {
+          const T w = velocity.get(l);
+          const T fast = with_power(four_fifths_last(velocity.value[l], fifth.value[l]), 0.8, w);
+          const T moved = select(velocity.value[l] > b.still.value[l], fast, still_power);
+          film.set(l, fourth * select(at < b.first_burning.value[l], still_power, moved));
+        } else {
+          film.set(l, fourth * still_power);
+        }
       }
     }
     for (std::size_t l = 0; l < lanes; ++l) {
-      const double p = b.pressure[l];
-      const double loss = b.scale[l] * term * (p * v0 * b.per_gas[l] - b.wall_k[l]) * film[l];
-      const double warmed = heat == Heat::none ? keep * p : keep * p + gain * released[l];
-      const double next = warmed - gain * loss;
-      b.pressure[l] = next;
-      trace[(k + 1) * lanes + l] = next;
-      const double work = (p + next) * dv;
-      const bool counts = !stopping || at < b.stop[l];
-      b.work[l] += counts ? work : 0.0;
-      b.loss[l] += counts ? loss : 0.0;
-      const double energy = next * v1, rise = (next - p) * per_cad;
-      b.p_at[l] = larger_of(b.p_at[l], place_if(next, b.p_best[l], next_at));
-      b.p_best[l] = larger_of(b.p_best[l], next);
-      b.energy_at[l] = larger_of(b.energy_at[l], place_if(energy, b.energy_best[l], next_at));
-      b.energy_best[l] = larger_of(b.energy_best[l], energy);
-      b.rise_at[l] = larger_of(b.rise_at[l], place_if(rise, b.rise_best[l], at));
-      b.rise_best[l] = larger_of(b.rise_best[l], rise);
+      const T p = b.pressure.get(l);
+      const T loss = b.scale.get(l) * term * (p * v0 * b.per_gas.get(l) - b.wall_k.get(l)) * film.get(l);
+      T warmed = keep * p;
+      if constexpr (heat != Heat::none) warmed = warmed + gain * released.get(l);
+      const T next = warmed - gain * loss;
+      b.pressure.set(l, next);
+      trace[k + 1].set(l, next);
+      const T work = (p + next) * dv;
+      const bool counts = !stopping || at < b.stop.value[l];
+      b.work.set(l, b.work.get(l) + select(counts, work, T(0.0)));
+      b.loss.set(l, b.loss.get(l) + select(counts, loss, T(0.0)));
+      const double after = value_of(next);
+      keep_peak(b.p_best, b.p_at, l, after, next_at);
+      keep_peak(b.energy_best, b.energy_at, l, after * v1, next_at);
+      keep_peak(b.rise_best, b.rise_at, l, (after - value_of(p)) * per_cad, at);
     }
   }
 }
 
-template <Heat heat>
-MGDD_INLINE void begin_heat(const CycleTables& t, std::size_t from, CycleBlock& b) noexcept {
+template <Heat heat, class T>
+MGDD_INLINE void begin_heat(const CycleTables& t, std::size_t from, CycleBlock<T>& b) noexcept {
   for (std::size_t l = 0; l < lanes; ++l)
-    b.burned[l] = burned_fraction<heat>(b, l, t.angle_cad[from]);
+    b.burned.set(l, burned_fraction<heat>(b, l, t.angle_cad[from]));
 }
 
-// The body works on a local copy, so that nothing else can point to it.
-template <bool woschni, Heat heat>
-MGDD_INLINE void run(const CycleTables& t, HeatWindow window, CycleBlock& block, double* trace) noexcept {
-  CycleBlock b = block;
+// The bodies work on a local copy, so that nothing else can point to it.
+template <bool woschni, Heat heat, class T>
+MGDD_INLINE void run(const CycleTables& t, HeatWindow window, CycleBlock<T>& block, Lane<T>* trace) noexcept {
+  CycleBlock<T> b = block;
   steps<woschni, false, Heat::none>(t, 0, window.from, b, trace);
   begin_heat<heat>(t, window.from, b);
   steps<woschni, true, heat>(t, window.from, window.to, b, trace);
@@ -137,16 +147,18 @@ MGDD_INLINE void run(const CycleTables& t, HeatWindow window, CycleBlock& block,
 }
 
 template <bool woschni, Heat heat>
-MGDD_INLINE void run_window(const CycleTables& t, HeatWindow window, CycleBlock& block, double* trace) noexcept {
-  CycleBlock b = block;
+MGDD_INLINE void run_window(const CycleTables& t, HeatWindow window, CycleBlock<double>& block,
+                            Lane<double>* trace) noexcept {
+  CycleBlock<double> b = block;
   begin_heat<heat>(t, window.from, b);
   steps<woschni, true, heat, true>(t, window.from, window.to, b, trace);
   block = b;
 }
 
 template <bool woschni>
-MGDD_INLINE void run_tail(const CycleTables& t, std::size_t from, CycleBlock& block, double* trace) noexcept {
-  CycleBlock b = block;
+MGDD_INLINE void run_tail(const CycleTables& t, std::size_t from, CycleBlock<double>& block,
+                          Lane<double>* trace) noexcept {
+  CycleBlock<double> b = block;
   steps<woschni, true, Heat::none>(t, from, t.n - 1, b, trace);
   block = b;
 }
@@ -169,40 +181,57 @@ void choose(BurnShape shape, WallHeatModel wall, const With& with) noexcept {
   of_shape.template operator()<false>();
 }
 
-void first_samples(const CycleBlock& block, std::size_t at, double* trace) noexcept {
-  std::ranges::copy(block.pressure, trace + at * lanes);
-}
-
 }  // namespace
 
-void CycleBlock::begin(const CycleTables& tables) noexcept {
-  for (Lane* sum : {&work, &loss, &p_at, &energy_at, &rise_at})
-    sum->fill(0.0);
-  p_best = pressure;
+template <class T>
+void CycleBlock<T>::begin(const CycleTables& tables) noexcept {
+  work.fill(T(0.0));
+  loss.fill(T(0.0));
+  for (Lane<double>* place : {&p_at, &energy_at, &rise_at})
+    place->fill(0.0);
+  p_best.value = pressure.value;
   for (std::size_t l = 0; l < lanes; ++l)
-    energy_best[l] = pressure[l] * tables.volume_m3[0];
+    energy_best.value[l] = pressure.value[l] * tables.volume_m3[0];
   rise_best.fill(-std::numeric_limits<double>::infinity());
 }
 
-void integrate(const CycleTables& tables, BurnShape shape, WallHeatModel wall, HeatWindow window, CycleBlock& block,
-               double* trace, InstructionSet set) noexcept {
-  first_samples(block, 0, trace);
+template <class T>
+void CycleBlock<T>::copy_lane(std::size_t from, std::size_t to) noexcept {
+  for (Lane<T>* lane :
+       {&pressure, &per_gas, &scale, &wall_k, &still, &still_power, &burning, &per_pa, &heat, &start, &per_duration, &a,
+        &exponent, &per_complete, &second_share, &second_start, &second_per_duration, &second_exponent})
+    lane->set(to, lane->get(from));
+  for (Lane<double>* lane : {&first_burning, &stop})
+    lane->set(to, lane->get(from));
+}
+
+template struct CycleBlock<double>;
+template struct CycleBlock<Dual<1>>;
+
+template <class T>
+void integrate(const CycleTables& tables, BurnShape shape, WallHeatModel wall, HeatWindow window, CycleBlock<T>& block,
+               Lane<T>* trace, InstructionSet set) noexcept {
+  trace[0] = block.pressure;
   choose(shape, wall, [&]<bool woschni, Heat heat>() {
     dispatch(set, [&]() MGDD_INLINE_LAMBDA { run<woschni, heat>(tables, window, block, trace); });
   });
 }
+template void integrate(const CycleTables&, BurnShape, WallHeatModel, HeatWindow, CycleBlock<double>&, Lane<double>*,
+                        InstructionSet) noexcept;
+template void integrate(const CycleTables&, BurnShape, WallHeatModel, HeatWindow, CycleBlock<Dual<1>>&, Lane<Dual<1>>*,
+                        InstructionSet) noexcept;
 
 void integrate_window(const CycleTables& tables, BurnShape shape, WallHeatModel wall, HeatWindow window,
-                      CycleBlock& block, double* trace, InstructionSet set) noexcept {
-  first_samples(block, window.from, trace);
+                      CycleBlock<double>& block, Lane<double>* trace, InstructionSet set) noexcept {
+  trace[window.from] = block.pressure;
   choose(shape, wall, [&]<bool woschni, Heat heat>() {
     dispatch(set, [&]() MGDD_INLINE_LAMBDA { run_window<woschni, heat>(tables, window, block, trace); });
   });
 }
 
-void integrate_tail(const CycleTables& tables, WallHeatModel wall, std::size_t from, CycleBlock& block, double* trace,
-                    InstructionSet set) noexcept {
-  first_samples(block, from, trace);
+void integrate_tail(const CycleTables& tables, WallHeatModel wall, std::size_t from, CycleBlock<double>& block,
+                    Lane<double>* trace, InstructionSet set) noexcept {
+  trace[from] = block.pressure;
   if (wall == WallHeatModel::woschni) {
     return dispatch(set, [&]() MGDD_INLINE_LAMBDA { run_tail<true>(tables, from, block, trace); });
   }

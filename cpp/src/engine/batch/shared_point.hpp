@@ -27,10 +27,10 @@ struct Tail {
 class SharedPoint {
  public:
   /// Tables for the charge and the wall heat of the block's first lane. Allocates; `set` for its own integrations.
-  void prepare(const CycleTables& tables, const CycleBlock& block, WallHeatModel wall, InstructionSet set);
+  void prepare(const CycleTables& tables, const CycleBlock<double>& block, WallHeatModel wall, InstructionSet set);
 
   /// State and sums of all lanes at a sample of the motored cycle.
-  void begin(std::size_t k, CycleBlock& block) const noexcept;
+  void begin(std::size_t k, CycleBlock<double>& block) const noexcept;
   /// Before combustion, at a sample from IVC to the latest start of combustion.
   const MotoredSample& motored(std::size_t k) const noexcept { return motored_[k]; }
   /// First sample of the tail: after the top dead centre, so that no peak lies in it.
@@ -40,8 +40,8 @@ class SharedPoint {
 
  private:
   static constexpr std::size_t n_nodes = block_lanes;
-  void run_motored(const CycleTables& t, const CycleBlock& block, bool woschni);
-  bool run_tail(const CycleTables& t, const CycleBlock& block, double lowest_pa, WallHeatModel wall,
+  void run_motored(const CycleTables& t, const CycleBlock<double>& block, bool woschni);
+  bool run_tail(const CycleTables& t, const CycleBlock<double>& block, double lowest_pa, WallHeatModel wall,
                 InstructionSet set);
   void prepare_row(std::size_t k) noexcept;
 
@@ -49,7 +49,8 @@ class SharedPoint {
   bool has_tail_ = false;
   std::vector<MotoredSample> motored_;
   // Of each node and sample, from tail_from_ on: its pressure, and work and heat that are left.
-  std::vector<double> trace_, work_left_, loss_left_;
+  std::vector<Lane<double>> trace_;
+  std::vector<double> work_left_, loss_left_;
   // Barycentric interpolation over the logarithm of the pressure, prepared when a sample is first asked for.
   std::vector<double> log_pressure_, weight_;
   enum class Row : unsigned char { unknown, good, unresolved };
