@@ -1,4 +1,4 @@
-#include "cycle_block.hpp"
+#include "mgdd/engine/batch/cycle_block.hpp"
 
 #include <cmath>
 #include <limits>

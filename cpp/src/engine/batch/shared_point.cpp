@@ -1,6 +1,7 @@
 #include "shared_point.hpp"
 
 #include <algorithm>
+#include <array>
 #include <cmath>
 #include <limits>
 #include <numbers>
@@ -156,17 +157,28 @@ Tail SharedPoint::tail(std::size_t k, double pressure_pa) noexcept {
   const double* loss = loss_left_.data() + k * n_nodes;
   const double* last = trace_[n_ - 1].value.data();
   const double at = std::log(pressure_pa);
-  double sum = 0.0, work_sum = 0.0, loss_sum = 0.0, last_sum = 0.0;
+  // Four sums of each, so that their additions do not wait for each other.
+  constexpr std::size_t ways = 4;
+  std::array<double, n_nodes> share;
   for (std::size_t j = 0; j < n_nodes; ++j) {
     const double distance = at - q[j];
     if (distance == 0.0) return {work[j], loss[j], last[j], true};
-    const double share = weight[j] / distance;
-    sum += share;
-    work_sum += share * work[j];
-    loss_sum += share * loss[j];
-    last_sum += share * last[j];
+    share[j] = distance;
   }
-  return {work_sum / sum, loss_sum / sum, last_sum / sum, true};
+  for (std::size_t j = 0; j < n_nodes; ++j)
+    share[j] = weight[j] / share[j];
+  std::array<double, ways> sums{}, work_sums{}, loss_sums{}, last_sums{};
+  for (std::size_t j = 0; j < n_nodes; j += ways) {
+    for (std::size_t w = 0; w < ways; ++w) {
+      sums[w] += share[j + w];
+      work_sums[w] += share[j + w] * work[j + w];
+      loss_sums[w] += share[j + w] * loss[j + w];
+      last_sums[w] += share[j + w] * last[j + w];
+    }
+  }
+  const auto total = [](const std::array<double, ways>& s) { return (s[0] + s[1]) + (s[2] + s[3]); };
+  const double per_sum = 1.0 / total(sums);
+  return {total(work_sums) * per_sum, total(loss_sums) * per_sum, total(last_sums) * per_sum, true};
 }
 
 }  // namespace mgdd::engine

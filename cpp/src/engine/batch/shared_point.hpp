@@ -7,7 +7,7 @@
 #include <cstddef>
 #include <vector>
 
-#include "cycle_block.hpp"
+#include "mgdd/engine/batch/cycle_block.hpp"
 #include "mgdd/engine/cycle.hpp"
 
 namespace mgdd::engine {

@@ -6,7 +6,7 @@
 
 #include <cstddef>
 
-#include "lane.hpp"
+#include "mgdd/engine/batch/lane.hpp"
 #include "mgdd/engine/cycle.hpp"
 #include "mgdd/engine/cylinder.hpp"
 #include "mgdd/math/dispatch.hpp"
