@@ -34,6 +34,7 @@ class CycleLanes {
     for (Member& member : members_)
       member.known = false;
     window_ = no_window;
+    lead_known_ = false;
   }
 
   /// Charge and wall heat of a lane.
@@ -47,7 +48,13 @@ class CycleLanes {
     if (same) return;
     m.wall = wall;
     m.known = true;
-    const auto c = WallHeat<T>(wall, *geometry_, charge.pressure_pa, charge.gas_j_per_k, charge.speed_rpm).constants();
+    if (!lead_known_ || !(wall == lead_wall_)) {
+      lead_ = WallHeat<T>::lead(wall, *geometry_);
+      lead_wall_ = wall;
+      lead_known_ = true;
+    }
+    const auto c =
+        WallHeat<T>(wall, *geometry_, charge.pressure_pa, charge.gas_j_per_k, charge.speed_rpm, lead_).constants();
     block_.per_gas.set(l, 1.0 / charge.gas_j_per_k);
     block_.scale.set(l, c.scale);
     block_.wall_k.set(l, c.wall_k);
@@ -63,18 +70,16 @@ class CycleLanes {
     m.burn.reset();
     if (!(value_of(m.charge.fuel_heat_j) > 0.0)) return set_motored(l);
     const Burn<T>& burn = m.burn.emplace(parameters, soc_cad, m.charge.burn_duration_cad);
-    const std::span<const double> angles = model_->angles_cad();
-    const auto begin = angles.begin();
-    const auto first = std::lower_bound(begin, angles.end(), burn.start_cad()) - begin;
-    const auto end = std::lower_bound(begin, angles.end(), burn.end_cad()) - begin;
-    const auto heated_from = static_cast<std::size_t>(std::max<std::ptrdiff_t>(first, 1)) - 1;
-    m.heated_to = std::min(static_cast<std::size_t>(end), angles.size() - 1);
+    const std::size_t first = first_not_before(burn.start_cad());
+    const std::size_t heated_from = std::max<std::size_t>(first, 1) - 1;
+    m.heated_to = std::min(first_not_before(burn.end_cad()), trace_.size() - 1);
     window_.from = std::min(window_.from, heated_from);
     window_.to = std::max(window_.to, m.heated_to);
     block_.first_burning.set(l, static_cast<double>(first));
     block_.heat.set(l, m.charge.fuel_heat_j);
     block_.start.set(l, burn.soc_cad);
     block_.per_duration.set(l, 1.0 / burn.duration_cad);
+    if (parameters.burn_shape == BurnShape::triangle) return;
     block_.a.set(l, burn.a);
     block_.exponent.set(l, burn.m + 1.0);
     block_.per_complete.set(l, 1.0 / burn.complete);
@@ -154,6 +159,18 @@ class CycleLanes {
   };
   static constexpr HeatWindow no_window{std::numeric_limits<std::size_t>::max(), 0};
 
+  /// Sample of the grid, from its step, which only the last one may not have.
+  std::size_t first_not_before(double angle_cad) const noexcept {
+    const std::span<const double> angles = model_->angles_cad();
+    const double steps = (angle_cad - angles[0]) / (angles[1] - angles[0]);
+    auto k = static_cast<std::size_t>(std::clamp(steps, 0.0, static_cast<double>(angles.size() - 1)));
+    while (k > 0 && angles[k - 1] >= angle_cad)
+      --k;
+    while (k < angles.size() && angles[k] < angle_cad)
+      ++k;
+    return k;
+  }
+
   void set_motored(std::size_t l) noexcept {
     block_.first_burning.set(l, static_cast<double>(trace_.size()));
     for (Lane<T>* none : {&block_.heat, &block_.start, &block_.second_start, &block_.second_share})
@@ -167,6 +184,9 @@ class CycleLanes {
   GasParameters<T> gas_{};
   std::optional<Geometry<T>> geometry_;
   std::vector<T> volume_;
+  T lead_{};  // of the last wall heat
+  WallHeatParameters<T> lead_wall_{};
+  bool lead_known_ = false;
   CycleBlock<T> block_{};
   HeatWindow window_ = no_window;
   std::vector<Lane<T>> trace_;
