@@ -111,9 +111,10 @@ TEST(Batch, SharedPointsGiveTheCyclesOneByOneToAMillionth) {
   std::vector<double> rows;
   for (const double speed : {900.0, 2600.0}) {
     for (const double fuel : {6.0, 21.0, 55.0}) {
-      for (int i = 0; i < 83; ++i)
+      for (int i = 0; i < 83; ++i) {
         for (const double x : {speed, fuel, -32.0 + 0.5 * i})
           rows.push_back(x);
+      }
     }
   }
   Table table({"speed_rpm", "fuel_mg", "soc_cad"}, rows);
@@ -134,11 +135,13 @@ TEST(Batch, SharedPointsGiveTheCyclesOneByOneToAMillionth) {
 // Motored cycles have no pressure after a burn, weak ones too little of it: both run in lanes, to the last bit.
 TEST(Batch, CasesOutsideOfTheSharedTablesRunInLanes) {
   std::vector<double> rows;
-  for (const double fuel : {0.0, 0.05, 0.4})
-    for (int i = 0; i < 40; ++i)
+  for (const double fuel : {0.0, 0.05, 0.4}) {
+    for (int i = 0; i < 40; ++i) {
       for (const double x : {fuel, -30.0 + i})
         rows.push_back(x);
-  Table table({"fuel_mg", "soc_cad"}, rows);
+    }
+  }
+  const Table table({"fuel_mg", "soc_cad"}, rows);
   const Columns shared = run(table.cases, BatchForm::shared), lanes = run(table.cases, BatchForm::lanes);
   for (std::size_t i = 0; i < shared.size(); ++i) {
     for (std::size_t row = 0; row < 40; ++row) {
@@ -152,11 +155,12 @@ TEST(Batch, NumbersDoNotDependOnNeighboursThreadsOrInstructionSet) {
   for (const BatchForm form : {BatchForm::lanes, BatchForm::shared}) {
     std::vector<double> rows = mixed_points(70, 5);
     if (form == BatchForm::shared) {  // one point, many timings in no order
-      for (std::size_t i = 0; i < 70; ++i)
+      for (std::size_t i = 0; i < 70; ++i) {
         for (const std::size_t k : {0U, 2U, 3U, 5U})
           rows[6 * i + k] = rows[k];
+      }
     }
-    Table table(mixed_names, rows);
+    const Table table(mixed_names, rows);
     BatchSettings settings;
     settings.form = form;
     settings.threads = 1;
@@ -167,7 +171,7 @@ TEST(Batch, NumbersDoNotDependOnNeighboursThreadsOrInstructionSet) {
     settings.set = instruction_set();
     EXPECT_TRUE(same_bits(run(table.cases, settings), all));
     for (const std::size_t first : {1UL, 17UL, 64UL}) {  // a part of the rows
-      Table part(mixed_names, {rows.begin() + static_cast<std::ptrdiff_t>(6 * first), rows.end()});
+      const Table part(mixed_names, {rows.begin() + static_cast<std::ptrdiff_t>(6 * first), rows.end()});
       const Columns some = run(part.cases, settings);
       for (std::size_t i = 0; i < some.size(); ++i)
         EXPECT_TRUE(std::equal(some[i].begin(), some[i].end(), all[i].begin() + static_cast<std::ptrdiff_t>(first)));
@@ -179,7 +183,7 @@ TEST(Batch, ManyJobsOnTwoThreadsKeepTheirPlaces) {
   std::vector<double> timings;
   for (int i = 0; i < 9001; ++i)
     timings.push_back(-25.0 + 30.0 * ((i * 37) % 9001) / 9001.0);
-  Table table({"soc_cad"}, timings);
+  const Table table({"soc_cad"}, timings);
   BatchSettings settings;
   settings.threads = 2;
   const Columns columns = run(table.cases, settings);
@@ -233,7 +237,7 @@ TEST(Batch, WeakCasesBetweenOthersDoNotDisturbTheSharedTables) {
     for (const double x : {weak ? 2900.0 : 1400.0, weak ? 0.0 : 25.0, -25.0 + 0.004 * i})
       rows.push_back(x);
   }
-  Table table({"speed_rpm", "fuel_mg", "soc_cad"}, rows);
+  const Table table({"speed_rpm", "fuel_mg", "soc_cad"}, rows);
   EXPECT_LT(difference(run(table.cases, BatchForm::shared), run(table.cases, BatchForm::lanes)), 1e-8);
 }
 
@@ -293,7 +297,7 @@ TEST(Batch, AnUnphysicalCaseIsNanAloneAndCounted) {
 TEST(Batch, RefusesBeforeItWritesAndNamesTheCase) {
   const auto message = [](const BatchCases& cases) {
     std::vector<double> column(cases.size() + 1, 7.0);
-    double* to[] = {column.data()};
+    double* const to[] = {column.data()};
     const IndicatorMember members[] = {&Indicators<double>::p_max_bar};
     try {
       simulate_batch(cases, {}, members, to);
@@ -303,17 +307,17 @@ TEST(Batch, RefusesBeforeItWritesAndNamesTheCase) {
     }
     return std::string("accepted");
   };
-  Table late({"soc_cad"}, {-6.0, -7.0, 30.0});
+  const Table late({"soc_cad"}, {-6.0, -7.0, 30.0});
   EXPECT_NE(message(late.cases).find("case 2: soc_cad = 30"), std::string::npos) << message(late.cases);
-  Table nan({"speed_rpm", "fuel_mg"}, {1500.0, 20.0, std::numeric_limits<double>::quiet_NaN(), 20.0});
+  const Table nan({"speed_rpm", "fuel_mg"}, {1500.0, 20.0, std::numeric_limits<double>::quiet_NaN(), 20.0});
   EXPECT_NE(message(nan.cases).find("case 1: speed_rpm"), std::string::npos) << message(nan.cases);
-  Table valves({"ivc_cad"}, {-140.0, 10.0});
+  const Table valves({"ivc_cad"}, {-140.0, 10.0});
   EXPECT_NE(message(valves.cases).find("case 1: ivc_cad"), std::string::npos) << message(valves.cases);
-  Table unknown({"boost"}, {1.0});
+  const Table unknown({"boost"}, {1.0});
   EXPECT_NE(message(unknown.cases).find("must be one of soc_cad, burn_duration_cad"), std::string::npos);
-  Table twice({"soc_cad", "soc_cad"}, {1.0, 1.0});
+  const Table twice({"soc_cad", "soc_cad"}, {1.0, 1.0});
   EXPECT_NE(message(twice.cases).find("stands there twice"), std::string::npos);
-  Table ragged({"soc_cad", "fuel_mg"}, {1.0, 1.0, 2.0});
+  const Table ragged({"soc_cad", "fuel_mg"}, {1.0, 1.0, 2.0});
   EXPECT_NE(message(ragged.cases).find("must be 2 for each case"), std::string::npos);
   EXPECT_THROW(parse_indicator("imep"), ParameterError);
   EXPECT_EQ(message(Table({"soc_cad"}, {-6.0}).cases), "accepted");

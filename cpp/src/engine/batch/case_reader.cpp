@@ -48,9 +48,10 @@ std::vector<BatchColumn> batch_columns() {
   all.push_back({burn_duration_info, Changes::burn, set_optional<&OperatingPoint::burn_duration_cad>});
   all.push_back({trapped_mass_info, Changes::point, set_optional<&OperatingPoint::trapped_mass_g>});
   all.push_back({ivc_temperature_info, Changes::point, set_optional<&OperatingPoint::ivc_temperature_k>});
-  for (const auto& field : operating_point_fields<double>())
+  for (const auto& field : operating_point_fields<double>()) {
     all.push_back(
         {field.info, field.info.name == "fuel_mg" ? Changes::burn : Changes::point, set_point, field.access, nullptr});
+  }
   for (const auto& field : cylinder_fields<double>())
     all.push_back({field.info, change_of(field.info.name), set_cylinder, nullptr, field.access});
   return all;

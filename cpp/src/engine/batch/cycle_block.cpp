@@ -58,8 +58,8 @@ MGDD_INLINE void keep_peak(Lane<double>& best, Lane<double>& best_at, std::size_
 template <bool woschni, bool burning, Heat heat, bool stopping = false, bool peaks = true, class T>
 MGDD_INLINE void steps(const CycleTables& t, std::size_t from, std::size_t to, CycleBlock<T>& b,
                        Lane<T>* trace) noexcept {
-  alignas(64) Lane<double> root, fifth;
-  alignas(64) Lane<T> velocity, film, released;
+  alignas(64) Lane<double> root{}, fifth{};
+  alignas(64) Lane<T> velocity{}, film{}, released{};  // NOLINT(misc-const-correctness): set where a wall heat needs it
   for (std::size_t k = from; k < to; ++k) {
     const double v0 = t.volume_m3[k], v1 = t.volume_m3[k + 1], dv = v1 - v0, term = t.wall_term[k];
     const double ratio = t.motored_ratio[k], keep = t.keep[k], gain = t.gain[k];

@@ -158,7 +158,7 @@ Tail SharedPoint::tail(std::size_t k, double pressure_pa) noexcept {
   const double at = std::log(pressure_pa);
   // Four sums of each, so that their additions do not wait for each other.
   constexpr std::size_t ways = 4;
-  std::array<double, n_nodes> share;
+  std::array<double, n_nodes> share{};
   for (std::size_t j = 0; j < n_nodes; ++j)
     share[j] = weight[j] / (at - q[j]);
   std::array<double, ways> sums{}, work_sums{}, loss_sums{}, last_sums{};

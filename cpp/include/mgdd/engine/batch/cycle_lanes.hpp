@@ -28,7 +28,7 @@ class CycleLanes {
     model_ = &model;
     const BasicCylinder<T> cylinder = lift<T>(model.cylinder());
     gas_ = cylinder.gas;
-    geometry_.emplace(cylinder.geometry);
+    geometry_ = Geometry<T>(cylinder.geometry);
     volume_.assign(model.volume_m3().begin(), model.volume_m3().end());
     trace_.resize(model.angles_cad().size());
     for (Member& member : members_)
@@ -49,12 +49,12 @@ class CycleLanes {
     m.wall = wall;
     m.known = true;
     if (!lead_known_ || !(wall == lead_wall_)) {
-      lead_ = WallHeat<T>::lead(wall, *geometry_);
+      lead_ = WallHeat<T>::lead(wall, geometry_);
       lead_wall_ = wall;
       lead_known_ = true;
     }
     const auto c =
-        WallHeat<T>(wall, *geometry_, charge.pressure_pa, charge.gas_j_per_k, charge.speed_rpm, lead_).constants();
+        WallHeat<T>(wall, geometry_, charge.pressure_pa, charge.gas_j_per_k, charge.speed_rpm, lead_).constants();
     block_.per_gas.set(l, 1.0 / charge.gas_j_per_k);
     block_.scale.set(l, c.scale);
     block_.wall_k.set(l, c.wall_k);
@@ -121,7 +121,7 @@ class CycleLanes {
     sums.t_max_at = static_cast<std::size_t>(block_.energy_at.get(l));
     sums.dp_max_at = static_cast<std::size_t>(block_.rise_at.get(l));
     Indicators<T> out =
-        indicators_of<T>(gas_, *geometry_, m.charge, model_->angles_cad(), std::span<const T>(volume_), sums, pressure);
+        indicators_of<T>(gas_, geometry_, m.charge, model_->angles_cad(), std::span<const T>(volume_), sums, pressure);
     if (m.burn && burn_angles) {
       out.ca10_cad = m.burn->angle_of(0.1);
       out.ca50_cad = m.burn->angle_of(0.5);
@@ -145,7 +145,7 @@ class CycleLanes {
   std::size_t heated_to(std::size_t l) const noexcept { return members_[l].heated_to; }
   BurnShape shape() const noexcept { return model_->cylinder().burn.burn_shape; }
   WallHeatModel wall_model() const noexcept { return model_->cylinder().wall_heat.wall_heat_model; }
-  const Geometry<T>& geometry() const noexcept { return *geometry_; }
+  const Geometry<T>& geometry() const noexcept { return geometry_; }
   CycleBlock<T>& block() noexcept { return block_; }
   Lane<T>* trace() noexcept { return trace_.data(); }
 
@@ -182,7 +182,7 @@ class CycleLanes {
 
   const CycleModel<double>* model_ = nullptr;
   GasParameters<T> gas_{};
-  std::optional<Geometry<T>> geometry_;
+  Geometry<T> geometry_{GeometryParameters<T>{}};
   std::vector<T> volume_;
   T lead_{};  // of the last wall heat
   WallHeatParameters<T> lead_wall_{};
