@@ -121,7 +121,7 @@ def test_what_cannot_be_pickled_is_named(pool: ProcessPoolExecutor) -> None:
         map_items(lambda x: x, NUMBERS, executor=pool)
     with pytest.raises(ParameterError, match=r"lock.*cannot be pickled"):
         map_items(work.process, [threading.Lock()], executor=pool)
-    with pytest.raises(ParameterError, match="returns cannot be pickled"):
+    with pytest.raises(ParameterError, match="what it returns cannot go from one process to another"):
         map_items(work.unpicklable_result, [1.0], executor=pool)
     assert map_items(work.square, NUMBERS, executor=pool) == SQUARES
 

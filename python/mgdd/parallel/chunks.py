@@ -125,7 +125,7 @@ class _Run:
 
     def _submit(self) -> bool:
         """Hand out chunks; False when nothing is out and nothing is left."""
-        while self._failed is None and len(self._out) < self._plan.n_at_once and (chunk := self._plan.next()):
+        while self._failed is None and len(self._out) < self._room() and (chunk := self._plan.next()):
             arguments = self._cut(chunk.start, chunk.stop)
             if chunk.start == 0 and self._pool.crosses_processes:
                 _require_picklable(self._function, *arguments)
@@ -137,6 +137,11 @@ class _Run:
                 continue
             self._out[future] = chunk
         return bool(self._out)
+
+    def _room(self) -> int:
+        """How many chunks may be out: one that was lost before goes alone, so that one that kills its worker is found."""
+        alone = self._plan.has_lost or any(chunk.attempt for chunk in self._out.values())
+        return 1 if alone else self._plan.n_at_once
 
     def _take(self, future: Future[_Answer]) -> None:
         chunk = self._out.pop(future, None)
@@ -197,8 +202,10 @@ class _Run:
 
     def _refuse_unpicklable(self, chunk: Chunk, error: BaseException) -> None:
         _require_picklable(self._function, *self._cut(chunk.start, chunk.stop))
-        if isinstance(error, pickle.PicklingError):
-            raise ParameterError(f"what {_name(self._function)} returns cannot be pickled ({error})") from error
+        raise ParameterError(
+            f"{chunk}: the work or what it returns cannot go from one process to another ({error}): define functions "
+            "and classes at the top level of a module that the workers can import, and return plain data"
+        ) from error
 
 
 class _Lost(Exception):  # noqa: N818 - the way out of the loop, not an error that anybody sees

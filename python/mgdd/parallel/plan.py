@@ -56,10 +56,13 @@ class Plan:
 
     @property
     def n_at_once(self) -> int:
-        """Chunks that may be handed out at a time; lost ones go alone, so that one that kills its worker is found."""
-        if self._lost:
-            return 1
+        """Chunks that may be out at a time: one more per worker, so that none waits for the next."""
         return 2 * self._workers if self._measured else self._workers
+
+    @property
+    def has_lost(self) -> bool:
+        """Whether a lost chunk is next."""
+        return bool(self._lost)
 
     def next(self) -> Chunk | None:
         """Return the next chunk, None when everything was handed out."""
