@@ -106,7 +106,8 @@ class _Run:
         """Work to the end, to an error, to Ctrl-C, or to a chunk that no worker survives."""
         try:
             while self._submit():
-                for future in wait(self._out, return_when=FIRST_COMPLETED).done:
+                done = wait(self._out, return_when=FIRST_COMPLETED).done
+                for future in sorted(done, key=self._start_of):
                     self._take(future)
                 if self._progress is not None:
                     self._progress(self._done, self._n)
@@ -137,6 +138,9 @@ class _Run:
                 continue
             self._out[future] = chunk
         return bool(self._out)
+
+    def _start_of(self, future: Future[_Answer]) -> int:
+        return self._out[future].start
 
     def _room(self) -> int:
         """How many chunks may be out: one that was lost before goes alone, so that one that kills its worker is found."""
