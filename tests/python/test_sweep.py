@@ -82,6 +82,25 @@ def test_every_input_can_be_swept(name: str) -> None:
     assert table[name].attrs["long_name"]
 
 
+def test_cycles_that_share_an_operating_point_are_single_cycles_to_a_millionth() -> None:
+    grid = {"soc_cad": np.linspace(-20.0, 8.0, 57), "speed_rpm": [2200.0, 1300.0], "fuel_mg": [9.0, 21.5, 15.0]}
+    table = sweep(CYLINDER, POINT, grid)
+    assert table["p_max_bar"].dims == tuple(grid)
+    plain = {name: timing_sweep(CYLINDER, POINT.replace(speed_rpm=1300.0, fuel_mg=15.0), soc_cad=grid["soc_cad"])[name]
+             for name in ("imep_gross_bar", "efficiency_gross", "t_max_k", "heat_loss_fraction")}  # fmt: skip
+    for name, values in plain.items():
+        found = table[name].sel(speed_rpm=1300.0, fuel_mg=15.0)
+        np.testing.assert_allclose(found, values, rtol=1e-6, err_msg=name)
+    turned = sweep(CYLINDER, POINT, dict(reversed(grid.items())), workers=5).transpose(*grid)
+    assert all(np.array_equal(turned[name], table[name]) for name in table.data_vars)
+
+
+def test_what_fits_alone_but_not_together_is_refused_with_its_case() -> None:
+    grid = {"ivc_cad": [-150.0, -20.0], "soc_cad": [-30.0, -6.0]}
+    with pytest.raises(ParameterError, match=r"soc_cad = -30 .*\(at ivc_cad = -20, soc_cad = -30\)"):
+        sweep(CYLINDER, POINT, grid)
+
+
 def test_points_are_rows_of_columns() -> None:
     columns = {"speed_rpm": [1000.0, 2600.0, 1000.0], "soc_cad": [-3.0, -14.0, -3.0], "stroke_mm": [80.0, 90.0, 80.0]}
     table = sweep(CYLINDER, POINT, columns, points=True)
@@ -264,7 +283,11 @@ def test_cycles_out_of_range_are_counted_and_named(caplog: pytest.LogCaptureFixt
         ({"soc_cad": [-6.0, -5.0, -6.0]}, ParameterError, "soc_cad = -6: must be on the axis once"),
         ({"soc_cad": [-6.0, math.nan]}, ParameterError, r"soc_cad\[1\] = nan: must be finite"),
         ({"soc_cad": [-6.0, 40.0]}, ParameterError, "soc_cad = 40 .*: must be"),
-        ({"fuel": [3.0]}, ParameterError, r"over = 'fuel': must be a known input: .*soc_cad, speed_rpm, fuel_mg"),
+        (
+            {"fuel": [3.0]},
+            ParameterError,
+            r"over = 'fuel': must be a known input: .*soc_cad, burn_duration_cad, .*speed_rpm",
+        ),
         ({"speed": [3.0]}, ParameterError, "over = 'speed': .*did you mean 'speed_rpm'"),
         ({"burn_shape": [1.0]}, ParameterError, "sweep once per choice .*triangle"),
         ({"compression_ratio": [16.0, 0.5]}, ParameterError, "compression_ratio = 0.5: must be"),

@@ -237,7 +237,7 @@ def _portable(error: Exception) -> Exception:
     """Give an error a note of where in the worker it was raised, and a plain one where it cannot be pickled."""
     where = "".join(traceback.format_exception(error))
     try:
-        error = pickle.loads(pickle.dumps(error))  # noqa: S301 - our own bytes
+        error = pickle.loads(pickle.dumps(error))
     except Exception:  # noqa: BLE001 - whatever its constructor makes of it
         error = RuntimeError(f"{type(error).__name__}: {error}")
     error.add_note(f"in a worker:\n{where}")

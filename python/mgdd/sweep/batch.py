@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import re
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from typing import TYPE_CHECKING
@@ -10,14 +11,14 @@ import numpy as np
 
 from mgdd import _core
 from mgdd._core.engine import Cylinder, NoxProxy, OperatingPoint
-from mgdd.errors import ConvergenceError
+from mgdd.errors import ConvergenceError, ParameterError
 from mgdd.results.labels import ANGLE
 from mgdd.sweep.inputs import case_of
 
 if TYPE_CHECKING:
     from numpy.typing import NDArray
 
-__all__ = ["NOX", "VOID", "Request", "angles_of", "simulate_cases"]
+__all__ = ["NOX", "VOID", "Request", "angles_of", "said", "simulate_cases"]
 
 NOX = ("nox_affine_log_ppm", "nox_arrhenius_ppm")
 VOID = "void"  # numbers of the cases whose pressure leaves the physical range
@@ -37,6 +38,7 @@ class Request:
     step_cad: float
     integrator: str
     nox: NoxProxy
+    form: str = "automatic"  # of the batch kernel; one for a whole sweep, or the bits would depend on the chunks
 
 
 def simulate_cases(request: Request, columns: NDArray[np.float64]) -> dict[str, NDArray[np.generic]]:
@@ -74,16 +76,31 @@ def angles_of(request: Request) -> NDArray[np.float64]:
 
 
 def _batch(request: Request, columns: NDArray[np.float64], outputs: Sequence[str]) -> Mapping[str, NDArray[np.float64]]:
-    out = {name: np.full(len(columns), np.nan) for name in outputs}
-    for place, row in enumerate(columns.tolist()):
-        cylinder, point, soc = _case(request, row)
-        try:
-            found = _core.engine.scan(cylinder, point, np.array([soc]), request.step_cad, request.integrator)
-        except ConvergenceError:
-            continue
-        for name in outputs:
-            out[name][place] = found[name][0]
-    return out
+    shared = (request.cylinder, request.point, request.soc_cad, request.names)
+    scheme = (request.step_cad, request.integrator)
+    try:
+        found: Mapping[str, NDArray[np.float64]] = _core.engine.batch(
+            *shared, columns, outputs, *scheme, threads=1, form=request.form
+        )
+    except ParameterError as error:
+        raise _located(error, request, columns) from None
+    return found
+
+
+def _located(error: ParameterError, request: Request, columns: NDArray[np.float64]) -> ParameterError:
+    """Name the case of an error by its inputs: its row in a chunk tells nobody anything."""
+    match = re.match(r"case (\d+): ", str(error))
+    if match is None:
+        return error
+    text = str(error)[match.end() :]
+    if len(request.names) > 1:
+        text += f" (at {said(request.names, columns[int(match[1])])})"
+    return ParameterError(text, field=error.field, value=error.value, bound=error.bound)
+
+
+def said(names: Sequence[str], row: NDArray[np.float64]) -> str:
+    """Name a case by its inputs."""
+    return ", ".join(f"{name} = {value:.6g}" for name, value in zip(names, row, strict=True))
 
 
 def _traces(request: Request, columns: NDArray[np.float64]) -> dict[str, NDArray[np.float64]]:
@@ -91,17 +108,11 @@ def _traces(request: Request, columns: NDArray[np.float64]) -> dict[str, NDArray
         return {}
     cycles: list[Mapping[str, NDArray[np.float64]] | None] = []
     for row in columns.tolist():
-        cylinder, point, soc = _case(request, row)
+        values = dict(zip(request.names, row, strict=True))
+        cylinder, point, soc = case_of(request.cylinder, request.point, request.soc_cad, values)
         try:
             cycles.append(_core.engine.simulate(cylinder, point, soc, request.step_cad, request.integrator))
         except ConvergenceError:
             cycles.append(None)
     nothing = np.full(len(angles_of(request)), np.nan)
-    return {
-        name: np.stack([nothing if cycle is None else cycle[name] for cycle in cycles]) for name in request.traces
-    }
-
-
-def _case(request: Request, row: Sequence[float]) -> tuple[Cylinder, OperatingPoint, float]:
-    values = dict(zip(request.names, row, strict=True))
-    return case_of(request.cylinder, request.point, request.soc_cad, values)
+    return {name: np.stack([nothing if cycle is None else cycle[name] for cycle in cycles]) for name in request.traces}

@@ -10,7 +10,7 @@ import numpy as np
 
 from mgdd._arguments import shown
 from mgdd.errors import ParameterError, ShapeError
-from mgdd.sweep.inputs import input_labels, require_input
+from mgdd.sweep.inputs import input_labels, rank_of, require_input
 
 if TYPE_CHECKING:
     from numpy.typing import NDArray
@@ -22,6 +22,9 @@ POINT = "point"
 
 class Cases:
     """Inputs by name, over a grid with one dimension per input, or over `POINT`.
+
+    The cases of a grid are numbered with the timing fastest, then the burn, and the geometry slowest: cycles in a row
+    share then what the kernel computes once for an operating point. `arranged` brings results into the given order.
 
     Parameters
     ----------
@@ -37,6 +40,9 @@ class Cases:
         self.shape = tuple(map(len, inputs.values())) if numbers is None else (len(numbers),)
         self.dims = tuple(inputs) if numbers is None else (POINT,)
         self.n = math.prod(self.shape)
+        axes = range(len(self.shape))
+        self._order = sorted(axes, key=lambda axis: rank_of(self.dims[axis])) if numbers is None else list(axes)
+        self._sizes = tuple(self.shape[axis] for axis in self._order)
 
     def columns(self, start: int, stop: int) -> NDArray[np.float64]:
         """Spell out the cases from `start` to `stop` (exclusive), shape (cases, inputs)."""
@@ -44,24 +50,31 @@ class Cases:
 
     def rows(self, numbers: NDArray[np.int64]) -> NDArray[np.float64]:
         """Spell out some cases, shape (cases, inputs)."""
-        places = [numbers] * len(self.names) if self._numbers is not None else np.unravel_index(numbers, self.shape)
         out = np.empty((len(numbers), len(self.names)))
-        for column, (values, place) in enumerate(zip(self.inputs.values(), places, strict=True)):
-            out[:, column] = values[place]
+        columns = list(self.inputs.values())
+        if self._numbers is not None:
+            for column, values in enumerate(columns):
+                out[:, column] = values[numbers]
+            return out
+        for column, place in zip(self._order, np.unravel_index(numbers, self._sizes), strict=True):
+            out[:, column] = columns[column][place]
         return out
+
+    def arranged(self, array: NDArray[Any]) -> NDArray[Any]:
+        """Give results by number of the case the dimensions `dims`, as a view."""
+        more = array.shape[1:]
+        back = np.argsort(self._order).tolist()
+        return array.reshape(*self._sizes, *more).transpose(*back, *range(len(back), len(back) + len(more)))
 
     def extremes(self) -> NDArray[np.int64]:
         """Number the cases with the least and the greatest value of each input, the others of a grid at their first."""
         lowest_highest = [(int(values.argmin()), int(values.argmax())) for values in self.inputs.values()]
         if self._numbers is not None:
             return np.unique(np.array(lowest_highest))
-        strides = [math.prod(self.shape[axis + 1 :]) for axis in range(len(self.shape))]
-        return np.unique([place * stride for pair, stride in zip(lowest_highest, strides, strict=True) for place in pair])
-
-    def said(self, number: int) -> str:
-        """Name one case by its inputs."""
-        (row,) = self.rows(np.array([number]))
-        return ", ".join(f"{name} = {value:.6g}" for name, value in zip(self.names, row, strict=True))
+        strides = [math.prod(self._sizes[self._order.index(axis) + 1 :]) for axis in range(len(self.shape))]
+        return np.unique(
+            [place * stride for pair, stride in zip(lowest_highest, strides, strict=True) for place in pair]
+        )
 
     def coordinates(self) -> dict[str, tuple[Any, ...]]:
         """Give the coordinates as `labelled_dataset` takes them."""

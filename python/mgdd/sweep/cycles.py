@@ -6,6 +6,7 @@ import logging
 import math
 import os
 from collections.abc import Callable, Iterable, Mapping, Sequence
+from dataclasses import replace
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
@@ -18,7 +19,7 @@ from mgdd.parallel.chunks import run_chunks
 from mgdd.parallel.pool import MakesExecutor
 from mgdd.results import Finding
 from mgdd.results.labels import ANGLE, labelled_dataset
-from mgdd.sweep.batch import NOX, VOID, Request, angles_of, simulate_cases
+from mgdd.sweep.batch import NOX, VOID, Request, angles_of, said, simulate_cases
 from mgdd.sweep.cases import Cases, cases_of
 
 if TYPE_CHECKING:
@@ -29,6 +30,7 @@ __all__ = ["sweep"]
 
 _LOG = logging.getLogger(__name__)
 _CHUNK_BYTES = 8 * 2**20  # what a chunk carries at most: few are under way, so they stay small beside the result
+_SAMPLE = 100_000  # cases that show how many in a row share an operating point
 _GRID_MOVES = ("ivc_cad", "evo_cad")  # a cycle of other valve timings has other crank angles
 
 
@@ -50,8 +52,9 @@ def sweep(
 ) -> xr.Dataset:
     """Simulate a cycle for every point of a grid, or for every point of a list.
 
-    The numbers are those of `mgdd.engine.simulate` for each point, to rounding, and do not depend on executor, workers
-    or chunks.
+    The numbers are those of `mgdd.engine.simulate` for each point, to rounding; to one part in a million where thirty
+    or more cycles in a row differ in timing, fuel and burn alone, which then share a table of the expansion. They do not
+    depend on executor, workers or chunks.
 
     Parameters
     ----------
@@ -119,6 +122,8 @@ def sweep(
     width = 8 * (len(request.outputs) + len(request.traces) * len(angles))
     _require_memory(cases, width)
     simulate_cases(request, cases.rows(cases.extremes()))  # a value outside its domain is found before any work
+    rows = cases.columns(0, min(cases.n, _SAMPLE))
+    request = replace(request, form=_core.engine.batch_form(cylinder, point, soc_cad, request.names, rows))
     arrays = {name: np.empty(cases.n) for name in request.outputs}
     arrays |= {name: np.empty((cases.n, len(angles))) for name in request.traces}
     finished, void = np.zeros(cases.n, bool), _Void()
@@ -168,10 +173,9 @@ def _dataset(
     if request.traces:
         variables[ANGLE] = (ANGLE, angles)
     for name, array in arrays.items():
-        more = (ANGLE,) if array.ndim == 2 else ()
-        variables[name] = ((*cases.dims, *more), array.reshape(*cases.shape, *array.shape[1:]))
+        variables[name] = ((*cases.dims, *((ANGLE,) if array.ndim == 2 else ())), cases.arranged(array))
     if finished is not None:
-        variables["finished"] = (cases.dims, finished.reshape(cases.shape), "-", "whether the cycle was simulated")
+        variables["finished"] = (cases.dims, cases.arranged(finished), "-", "whether the cycle was simulated")
     doubts = [_finding(cases, void)] if void.count else []
     for doubt in doubts:
         _LOG.warning("%s", doubt)
@@ -184,15 +188,9 @@ def _dataset(
 
 def _finding(cases: Cases, void: _Void) -> Finding:
     text = f"{void.count} of {cases.n} cycles leave the physical range of the pressure and are NaN, the first at "
-    return Finding(
-        "unphysical", request_names(cases), text + cases.said(void.first),
-        "take a smaller step_cad, less wall heat or other points",
-    )  # fmt: skip
-
-
-def request_names(cases: Cases) -> tuple[str, ...]:
-    """Name the inputs that are swept."""
-    return tuple(cases.names)
+    (row,) = cases.rows(np.array([void.first]))
+    remedy = "take a smaller step_cad, less wall heat or other points"
+    return Finding("unphysical", tuple(cases.names), text + said(cases.names, row), remedy)
 
 
 def _chosen(argument: str, given: str | Iterable[str] | None, known: Iterable[str]) -> tuple[str, ...]:

@@ -6,23 +6,36 @@ import functools
 from collections.abc import Mapping
 from types import MappingProxyType
 
+from mgdd import _core
 from mgdd._core.engine import Cylinder, OperatingPoint
 from mgdd.errors import ParameterError, did_you_mean
 from mgdd.results.labels import VARIABLES, Label
 
-__all__ = ["case_of", "input_labels", "require_input"]
+__all__ = ["case_of", "input_labels", "rank_of", "require_input"]
 
 _TIMING = "soc_cad"
+_BURN = ("burn_", "wiebe_", "second_", "lower_heating_value")
+_TABLES = tuple("ivc_cad evo_cad bore_mm stroke_mm connecting_rod_mm compression_ratio bowl_area_factor gamma".split())
 
 
 @functools.cache
 def input_labels() -> Mapping[str, Label]:
     """Give unit and name of every input that takes a number."""
-    labels = {_TIMING: VARIABLES[_TIMING]}
-    for name, info in {**OperatingPoint.fields(), **Cylinder.fields()}.items():
-        if "choices" not in info:
-            labels[name] = VARIABLES.get(name) or Label(info["unit"], info["meaning"].partition("; none = ")[0])
-    return MappingProxyType(labels)
+    return MappingProxyType(
+        {
+            name: VARIABLES.get(name) or Label(unit, meaning.partition("; none = ")[0])
+            for name, (unit, meaning) in _core.engine.batch_inputs().items()
+        }
+    )
+
+
+def rank_of(name: str) -> int:
+    """Say where in a grid an input belongs: the higher, the less of a cycle has to be computed anew when it changes."""
+    if name == _TIMING:
+        return 3
+    if name == "fuel_mg" or name.startswith(_BURN):
+        return 2
+    return 0 if name in _TABLES else 1
 
 
 def require_input(name: str) -> None:
