@@ -11,7 +11,7 @@
 #include <vector>
 
 #include "literal_cycle.hpp"
-#include "mgdd/engine/batch.hpp"
+#include "mgdd/engine/batch/batch.hpp"
 
 namespace {
 

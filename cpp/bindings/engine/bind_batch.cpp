@@ -6,7 +6,7 @@
 #include "binding.hpp"
 #include "mgdd/common/enum_names.hpp"
 #include "mgdd/common/error.hpp"
-#include "mgdd/engine/batch.hpp"
+#include "mgdd/engine/batch/batch.hpp"
 
 namespace mgdd::bindings {
 namespace {

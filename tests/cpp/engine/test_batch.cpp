@@ -1,5 +1,5 @@
 // Cycles in lanes and cycles of one operating point that share their tables, against the cycle one by one.
-#include "mgdd/engine/batch.hpp"
+#include "mgdd/engine/batch/batch.hpp"
 
 #include <algorithm>
 #include <cmath>

@@ -1,4 +1,4 @@
-#include "mgdd/engine/batch.hpp"
+#include "mgdd/engine/batch/batch.hpp"
 
 #include <algorithm>
 #include <string>

@@ -84,8 +84,8 @@ CaseReader::CaseReader(const BatchCases& cases) : cases_(cases) {
   }
 }
 
-bool CaseReader::changes(Changes least) const noexcept {
-  return std::ranges::any_of(columns_, [least](const BatchColumn& column) { return column.changes >= least; });
+bool CaseReader::varies_cylinder() const noexcept {
+  return std::ranges::any_of(columns_, [](const BatchColumn& column) { return column.in_cylinder != nullptr; });
 }
 
 double CaseReader::cases_per_point() const noexcept {
@@ -114,8 +114,7 @@ bool CaseReader::within_domains(std::size_t row) const noexcept {
 void CaseReader::require_valid() const {
   CycleInputs<double> inputs = start();
   // Several fields together must fit; the usual inputs cannot break that when each of them lies in its domain.
-  const bool together = std::ranges::any_of(columns_, [](const BatchColumn& c) { return c.in_cylinder != nullptr; }) ||
-                        cases_.cylinder.gas.ivc_pressure_rise_kpa < 0.0 ||
+  const bool together = varies_cylinder() || cases_.cylinder.gas.ivc_pressure_rise_kpa < 0.0 ||
                         cases_.cylinder.burn.burn_shape == BurnShape::double_wiebe;
   for (std::size_t row = 0; row < size(); ++row) {
     if (row > 0 && !together && within_domains(row)) continue;

@@ -6,7 +6,7 @@
 #include <vector>
 
 #include "mgdd/common/field.hpp"
-#include "mgdd/engine/batch.hpp"
+#include "mgdd/engine/batch/batch.hpp"
 #include "mgdd/engine/sensitivity.hpp"
 
 namespace mgdd::engine {
@@ -43,7 +43,7 @@ class CaseReader {
       column.set(inputs, *value++, column);
   }
   CycleInputs<double> start() const { return {cases_.cylinder, cases_.point, cases_.soc_cad}; }
-  bool changes(BatchColumn::Changes least) const noexcept;  ///< whether a column changes that much or more
+  bool varies_cylinder() const noexcept;
   std::size_t size() const noexcept { return cases_.size(); }
   /// Mean length of the rows in a row with one motored cycle.
   double cases_per_point() const noexcept;

@@ -1,4 +1,4 @@
-#include "cycle_block.hpp"
+#include "mgdd/engine/batch/cycle_block.hpp"
 
 #include <cmath>
 #include <limits>
@@ -55,7 +55,7 @@ MGDD_INLINE void keep_peak(Lane<double>& best, Lane<double>& best_at, std::size_
 }
 
 // One loop for each stage of a step: sixteen lanes at a time keep the processor busy while each waits for its roots.
-template <bool woschni, bool burning, Heat heat, bool stopping = false, class T>
+template <bool woschni, bool burning, Heat heat, bool stopping = false, bool peaks = true, class T>
 MGDD_INLINE void steps(const CycleTables& t, std::size_t from, std::size_t to, CycleBlock<T>& b,
                        Lane<T>* trace) noexcept {
   alignas(64) Lane<double> root, fifth;
@@ -121,6 +121,7 @@ MGDD_INLINE void steps(const CycleTables& t, std::size_t from, std::size_t to, C
       const bool counts = !stopping || at < b.stop.value[l];
       b.work.set(l, b.work.get(l) + select(counts, work, T(0.0)));
       b.loss.set(l, b.loss.get(l) + select(counts, loss, T(0.0)));
+      if constexpr (!peaks) continue;
       const double after = value_of(next);
       keep_peak(b.p_best, b.p_at, l, after, next_at);
       keep_peak(b.energy_best, b.energy_at, l, after * v1, next_at);
@@ -135,6 +136,19 @@ MGDD_INLINE void begin_heat(const CycleTables& t, std::size_t from, CycleBlock<T
     b.burned.set(l, burned_fraction<heat>(b, l, t.angle_cad[from]));
 }
 
+MGDD_INLINE std::size_t larger_index(std::size_t a, std::size_t b) noexcept {
+  return a > b ? a : b;
+}
+
+/// Whether the gas of every lane is hotter than the wall at that sample.
+template <class T>
+MGDD_INLINE bool walls_cool(const CycleTables& t, std::size_t at, const CycleBlock<T>& b) noexcept {
+  bool cool = true;
+  for (std::size_t l = 0; l < lanes; ++l)
+    cool = cool && b.pressure.value[l] * t.volume_m3[at] * b.per_gas.value[l] > b.wall_k.value[l];
+  return cool;
+}
+
 // The bodies work on a local copy, so that nothing else can point to it.
 template <bool woschni, Heat heat, class T>
 MGDD_INLINE void run(const CycleTables& t, HeatWindow window, CycleBlock<T>& block, Lane<T>* trace) noexcept {
@@ -142,7 +156,14 @@ MGDD_INLINE void run(const CycleTables& t, HeatWindow window, CycleBlock<T>& blo
   steps<woschni, false, Heat::none>(t, 0, window.from, b, trace);
   begin_heat<heat>(t, window.from, b);
   steps<woschni, true, heat>(t, window.from, window.to, b, trace);
-  steps<woschni, true, Heat::none>(t, window.to, t.n - 1, b, trace);
+  // In expansion without heat release no peak follows, unless a wall that is hotter than the gas still heats it.
+  const std::size_t last = t.n - 1, falling = larger_index(window.to, t.falling_from);
+  steps<woschni, true, Heat::none>(t, window.to, falling, b, trace);
+  if (walls_cool(t, falling, b)) {
+    steps<woschni, true, Heat::none, false, false>(t, falling, last, b, trace);
+  } else {
+    steps<woschni, true, Heat::none>(t, falling, last, b, trace);
+  }
   block = b;
 }
 
@@ -159,7 +180,7 @@ template <bool woschni>
 MGDD_INLINE void run_tail(const CycleTables& t, std::size_t from, CycleBlock<double>& block,
                           Lane<double>* trace) noexcept {
   CycleBlock<double> b = block;
-  steps<woschni, true, Heat::none>(t, from, t.n - 1, b, trace);
+  steps<woschni, true, Heat::none, false, false>(t, from, t.n - 1, b, trace);
   block = b;
 }
 

@@ -1,6 +1,7 @@
 #include "shared_point.hpp"
 
 #include <algorithm>
+#include <array>
 #include <cmath>
 #include <limits>
 #include <numbers>
@@ -17,18 +18,12 @@ constexpr int growths = 6;
 constexpr double highest_ratio = 16.0;
 constexpr double tolerance = 1e-8;  ///< of a polynomial's last coefficient over its values
 
-std::size_t first_after(const CycleTables& t, double angle_cad) noexcept {
-  return static_cast<std::size_t>(std::upper_bound(t.angle_cad, t.angle_cad + t.n, angle_cad) - t.angle_cad);
-}
-
 }  // namespace
 
 void SharedPoint::prepare(const CycleTables& tables, const CycleBlock<double>& block, WallHeatModel wall,
                           InstructionSet set) {
   n_ = tables.n;
-  // The second sample after the top dead centre: from there the gas expands, and without heat its pressure and its
-  // temperature fall.
-  tail_from_ = std::min(first_after(tables, 0.0) + 1, n_ - 1);
+  tail_from_ = tables.falling_from;
   run_motored(tables, block, wall == WallHeatModel::woschni);
   has_tail_ = false;
   double ratio = lowest_ratio;
@@ -40,7 +35,7 @@ void SharedPoint::prepare(const CycleTables& tables, const CycleBlock<double>& b
 
 // The same operations in the same order as a lane of a block, whose bits it must give.
 void SharedPoint::run_motored(const CycleTables& t, const CycleBlock<double>& block, bool woschni) {
-  const std::size_t last = std::min(first_after(t, timing_upper_cad), t.n - 1);
+  const std::size_t last = std::min(t.first_after(timing_upper_cad), t.n - 1);
   motored_.resize(last + 1);
   const double p0 = block.pressure.value[0];
   MotoredSample s{p0, 0.0, 0.0, p0, 0.0, p0 * t.volume_m3[0], 0.0, -std::numeric_limits<double>::infinity(), 0.0};
@@ -83,6 +78,9 @@ bool SharedPoint::run_tail(const CycleTables& t, const CycleBlock<double>& block
   }
   nodes.begin(t);
   trace_.resize(n_);
+  coldest_pa_.resize(n_);
+  for (std::size_t k = tail_from_; k < n_; ++k)
+    coldest_pa_[k] = block.wall_k.value[0] / (t.volume_m3[k] * block.per_gas.value[0]);
   integrate_tail(t, wall, tail_from_, nodes, trace_.data(), set);
   // Work and heat that are left, from the end backwards; the heat from the pressures, in which every step is linear.
   work_left_.assign(n_ * n_nodes, 0.0);
@@ -147,7 +145,9 @@ void SharedPoint::prepare_row(std::size_t k) noexcept {
 
 Tail SharedPoint::tail(std::size_t k, double pressure_pa) noexcept {
   const double* p = trace_[k].value.data();
-  if (!has_tail_ || !(pressure_pa >= p[0] && pressure_pa <= p[n_nodes - 1])) return {};
+  // A gas that is colder than the wall might still find its peak.
+  if (!has_tail_ || !(pressure_pa > coldest_pa_[k])) return {};
+  if (!(pressure_pa >= p[0] && pressure_pa <= p[n_nodes - 1])) return {};
   if (row_[k] == Row::unknown) prepare_row(k);
   if (row_[k] == Row::unresolved) return {};
   const double* q = log_pressure_.data() + k * n_nodes;
@@ -156,17 +156,27 @@ Tail SharedPoint::tail(std::size_t k, double pressure_pa) noexcept {
   const double* loss = loss_left_.data() + k * n_nodes;
   const double* last = trace_[n_ - 1].value.data();
   const double at = std::log(pressure_pa);
-  double sum = 0.0, work_sum = 0.0, loss_sum = 0.0, last_sum = 0.0;
-  for (std::size_t j = 0; j < n_nodes; ++j) {
-    const double distance = at - q[j];
-    if (distance == 0.0) return {work[j], loss[j], last[j], true};
-    const double share = weight[j] / distance;
-    sum += share;
-    work_sum += share * work[j];
-    loss_sum += share * loss[j];
-    last_sum += share * last[j];
+  // Four sums of each, so that their additions do not wait for each other.
+  constexpr std::size_t ways = 4;
+  std::array<double, n_nodes> share;
+  for (std::size_t j = 0; j < n_nodes; ++j)
+    share[j] = weight[j] / (at - q[j]);
+  std::array<double, ways> sums{}, work_sums{}, loss_sums{}, last_sums{};
+  for (std::size_t j = 0; j < n_nodes; j += ways) {
+    for (std::size_t w = 0; w < ways; ++w) {
+      sums[w] += share[j + w];
+      work_sums[w] += share[j + w] * work[j + w];
+      loss_sums[w] += share[j + w] * loss[j + w];
+      last_sums[w] += share[j + w] * last[j + w];
+    }
   }
-  return {work_sum / sum, loss_sum / sum, last_sum / sum, true};
+  const auto total = [](const std::array<double, ways>& s) { return (s[0] + s[1]) + (s[2] + s[3]); };
+  if (!std::isfinite(total(sums))) {  // on a node
+    const auto j = static_cast<std::size_t>(std::find(q, q + n_nodes, at) - q);
+    return {work[j], loss[j], last[j], true};
+  }
+  const double per_sum = 1.0 / total(sums);
+  return {total(work_sums) * per_sum, total(loss_sums) * per_sum, total(last_sums) * per_sum, true};
 }
 
 }  // namespace mgdd::engine

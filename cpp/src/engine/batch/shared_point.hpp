@@ -7,7 +7,7 @@
 #include <cstddef>
 #include <vector>
 
-#include "cycle_block.hpp"
+#include "mgdd/engine/batch/cycle_block.hpp"
 #include "mgdd/engine/cycle.hpp"
 
 namespace mgdd::engine {
@@ -51,6 +51,7 @@ class SharedPoint {
   // Of each node and sample, from tail_from_ on: its pressure, and work and heat that are left.
   std::vector<Lane<double>> trace_;
   std::vector<double> work_left_, loss_left_;
+  std::vector<double> coldest_pa_;  // pressure at which the gas has the temperature of the wall
   // Barycentric interpolation over the logarithm of the pressure, prepared when a sample is first asked for.
   std::vector<double> log_pressure_, weight_;
   enum class Row : unsigned char { unknown, good, unresolved };

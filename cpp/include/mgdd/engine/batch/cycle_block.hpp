@@ -4,9 +4,10 @@
 // noexcept, no heap.
 #pragma once
 
+#include <algorithm>
 #include <cstddef>
 
-#include "lane.hpp"
+#include "mgdd/engine/batch/lane.hpp"
 #include "mgdd/engine/cycle.hpp"
 #include "mgdd/engine/cylinder.hpp"
 #include "mgdd/math/dispatch.hpp"
@@ -22,6 +23,7 @@ struct CycleTables {
   const double* keep;
   const double* gain;
   std::size_t n = 0;
+  std::size_t falling_from = 0;  ///< second sample after the top dead centre: from there the gas expands
 
   explicit CycleTables(const CycleModel<double>& model) noexcept
       : angle_cad(model.angles_cad().data()),
@@ -30,7 +32,13 @@ struct CycleTables {
         motored_ratio(model.motored_ratio().data()),
         keep(model.keep().data()),
         gain(model.gain().data()),
-        n(model.angles_cad().size()) {}
+        n(model.angles_cad().size()),
+        falling_from(std::min(first_after(0.0) + 1, n - 1)) {}
+
+  /// The first sample after an angle; n if there is none.
+  std::size_t first_after(double angle) const noexcept {
+    return static_cast<std::size_t>(std::upper_bound(angle_cad, angle_cad + n, angle) - angle_cad);
+  }
 };
 
 /// State, constants and sums of every lane.
