@@ -143,7 +143,7 @@ class _Run:
         return self._out[future].start
 
     def _room(self) -> int:
-        """How many chunks may be out: one that was lost before goes alone, so that one that kills its worker is found."""
+        """How many chunks may be out: a lost one goes alone, so that the one that kills its worker is found."""
         alone = self._plan.has_lost or any(chunk.attempt for chunk in self._out.values())
         return 1 if alone else self._plan.n_at_once
 
