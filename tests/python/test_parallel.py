@@ -38,7 +38,7 @@ def pool() -> Iterator[ProcessPoolExecutor]:
         yield made
 
 
-@pytest.mark.parametrize("executor", [None, ThreadPoolExecutor, work.LateReversed(), lambda: work.LateReversed()])
+@pytest.mark.parametrize("executor", [None, ThreadPoolExecutor, work.LateReversed(), work.LateReversed])
 @pytest.mark.parametrize("workers", [None, 1, 5])
 def test_results_stand_in_the_order_of_the_items(executor: Any, workers: int | None) -> None:
     assert map_items(work.square, NUMBERS, executor=executor, workers=workers) == SQUARES

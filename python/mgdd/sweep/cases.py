@@ -67,7 +67,7 @@ class Cases:
         return array.reshape(*self._sizes, *more).transpose(*back, *range(len(back), len(back) + len(more)))
 
     def extremes(self) -> NDArray[np.int64]:
-        """Number the cases with the least and the greatest value of each input, the others of a grid at their first."""
+        """Find the cases with the least and the greatest value of each input, the others of a grid at their first."""
         lowest_highest = [(int(values.argmin()), int(values.argmax())) for values in self.inputs.values()]
         if self._numbers is not None:
             return np.unique(np.array(lowest_highest))
@@ -118,9 +118,7 @@ def _values(name: str, given: Any) -> NDArray[np.float64]:
         raise ParameterError.of(name, shown(given), f"a sequence of at least one number{remedy}")
     bad = np.flatnonzero(~np.isfinite(values))
     if bad.size:
-        raise ParameterError(
-            f"{name}[{bad[0]}] = {values[bad[0]]}: must be finite", field=name, value=float(values[bad[0]]), bound="finite"
-        )  # fmt: skip
+        raise ParameterError.of(f"{name}[{bad[0]}]", float(values[bad[0]]), "finite")
     return values
 
 

@@ -53,8 +53,8 @@ def sweep(
     """Simulate a cycle for every point of a grid, or for every point of a list.
 
     The numbers are those of `mgdd.engine.simulate` for each point, to rounding; to one part in a million where thirty
-    or more cycles in a row differ in timing, fuel and burn alone, which then share a table of the expansion. They do not
-    depend on executor, workers or chunks.
+    or more cycles in a row differ in timing, fuel and burn alone, which then share a table of the expansion. They do
+    not depend on executor, workers or chunks.
 
     Parameters
     ----------
@@ -80,8 +80,8 @@ def sweep(
     Returns
     -------
     xarray.Dataset
-        The outputs over the names of `over`, or over ``point`` with the inputs as its coordinates. Cycles whose pressure
-        leaves the physical range are NaN: attribute ``n_void`` counts them, and ``warnings`` names the first.
+        The outputs over the names of `over`, or over ``point`` with the inputs as its coordinates. Cycles whose
+        pressure leaves the physical range are NaN: attribute ``n_void`` counts them, and ``warnings`` names the first.
 
     Raises
     ------

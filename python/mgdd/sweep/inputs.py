@@ -45,9 +45,11 @@ def require_input(name: str) -> None:
     choices = Cylinder.fields().get(name, {}).get("choices")
     if choices:
         raise ParameterError.of(
-            "over", name, f"an input that is a number; sweep once per choice ({', '.join(choices)}) and join the results "
-            "with xarray.concat"
-        )  # fmt: skip
+            "over",
+            name,
+            f"an input that is a number; sweep once per choice ({', '.join(choices)}) and join the results with "
+            "xarray.concat",
+        )
     hint = did_you_mean(name, input_labels()) or "known are"
     raise ParameterError.of("over", name, f"a known input: {hint} {', '.join(input_labels())}")
 
