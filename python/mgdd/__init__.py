@@ -2,9 +2,9 @@
 
 The modules: `mgdd.engine` (cycle model and trace analysis), `mgdd.throttle` (electronic throttle), `mgdd.identify`
 (calibration, throttle logs), `mgdd.guide` (models that guide a seeker), `mgdd.optimize` (least squares, seekers,
-iterative learning), `mgdd.control` (PID, sliding mode), `mgdd.loop` (virtual bench, closed loops), `mgdd.rig` (test
-rigs), `mgdd.presets`, `mgdd.io`, `mgdd.datasets`, `mgdd.plot`, `mgdd.studies`, `mgdd.report`, `mgdd.results` and
-`mgdd.errors`. They are imported on use.
+iterative learning), `mgdd.control` (PID, sliding mode), `mgdd.loop` (virtual bench, closed loops), `mgdd.sweep` (many
+cycles at once), `mgdd.parallel` (executors), `mgdd.rig` (test rigs), `mgdd.presets`, `mgdd.io`, `mgdd.datasets`,
+`mgdd.plot`, `mgdd.studies`, `mgdd.report`, `mgdd.results` and `mgdd.errors`. They are imported on use.
 
 Crank angles are degrees everywhere, firing TDC = 0, compression negative (°CA aTDC).
 """
@@ -27,6 +27,7 @@ __all__ = [
     "io",
     "loop",
     "optimize",
+    "parallel",
     "plot",
     "presets",
     "report",
@@ -35,6 +36,7 @@ __all__ = [
     "signals",
     "studies",
     "surrogate",
+    "sweep",
     "throttle",
 ]
 

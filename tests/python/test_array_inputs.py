@@ -22,6 +22,7 @@ from mgdd.loop import EngineBench, Reference, simulate_drive, track, track_many
 from mgdd.rig import RigRecord
 from mgdd.signals.even_grid import even_step
 from mgdd.signals.metrics import mse
+from mgdd.sweep import sweep
 from mgdd.throttle.characteristics import airflow_torque_nm, mass_flow_kg_per_s
 
 Array = np.ndarray[Any, Any]
@@ -247,6 +248,10 @@ CALLS: dict[str, tuple[Call, tuple[Array, ...]]] = {
     "signals.vaf_percent": (signals.vaf_percent, (ANGLE, ANGLE + NOISE)),
     "surrogate.EngineSurrogate.predict": (
         lambda soi: RECORDS.predict(soi)["imep_bar"].to_numpy(), (np.array([-4.0, 0.0]),),
+    ),
+    "sweep.sweep": (
+        lambda soc, fuel: sweep(Cylinder(), OperatingPoint(), {"soc_cad": soc, "fuel_mg": fuel})["p_max_bar"].to_numpy(),
+        (SOC, 0.5 * OPEN),
     ),
     "throttle.DemandChain.steady": (
         lambda pedal, speed: CHAIN.steady(pedal, speed)["opening_deg"].to_numpy(), (OPEN, 2000.0 + OPEN),

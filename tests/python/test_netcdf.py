@@ -27,6 +27,7 @@ from mgdd.results import FitReport
 from mgdd.results.labels import check_labels
 from mgdd.rig import SimulatedRig
 from mgdd.studies import run_study
+from mgdd.sweep import sweep
 from mgdd.throttle import DemandChain, PseudoWiener, SensorFault, SensorPair, Throttle, characteristics, holding_duty
 from mgdd.throttle import simulate as simulate_throttle
 
@@ -172,6 +173,10 @@ MADE: dict[str, Callable[[Path], Any]] = {
     "optimize.Seeker.history": lambda _: optimize.Spsa(start=1.0).history,
     "optimize.Seeker.run": lambda _: optimize.GradientDescent(start=1.0).run(lambda x: -float((x[0] - 2.0) ** 2), 20),
     "studies.StudyResult.dataset": lambda _: run_study("measured-traces", quick=True, figures=False).dataset,
+    "sweep.sweep": lambda _: [
+        sweep(Cylinder(), POINT, {"bore_mm": [80.0, 90.0], "soc_cad": [-9.0, -6.0]}, traces="pressure_bar"),
+        sweep(Cylinder(), POINT, {"speed_rpm": [900.0, 2000.0]}, points=True),
+    ],
     "throttle.DemandChain.steady": lambda _: DemandChain().steady([10.0, 60.0], 2000.0),
     "throttle.characteristics": lambda _: characteristics(Throttle()),
     "throttle.holding_duty": lambda _: holding_duty(Throttle()),

@@ -22,6 +22,7 @@ _WRITTEN = (
     (re.compile(r"²"), "**2"),
     (re.compile(r"³"), "**3"),
     (re.compile(r"\^"), "**"),
+    (re.compile(r"/\((\w+) (\w+)\)"), r"/\1/\2"),
     (re.compile(r"[ ·]+"), "*"),
     (re.compile(r"(?<=degree/)s\b"), "second"),
 )
