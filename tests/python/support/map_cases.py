@@ -51,9 +51,9 @@ def timing_table() -> CalibrationMap:
     """A map with something in every column."""
     values = centre(SPEED[:, None], FUEL)
     values[2, 4] = np.nan
-    sources = np.full(values.shape, "optimised")
+    sources = np.full(values.shape, "optimised", "U12")
     sources[0, 1], sources[2, 4] = "learned", "infeasible"
-    held = np.full(values.shape, "")
+    held = np.full(values.shape, "", "U12")
     held[1, 3] = "p_max_bar"
     rng = np.random.default_rng(3)
     return CalibrationMap(
