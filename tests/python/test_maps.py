@@ -140,7 +140,7 @@ def test_dataset_and_back() -> None:
 
 # --- the guide ----------------------------------------------------------------------------------------------
 def test_the_guide_uses_a_map_and_what_it_learns_comes_back() -> None:
-    table = plane().replaced(cells={"source": "smoothed", "sd": np.where(FUEL < 12.0, 0.4, np.nan)})
+    table = plane().replaced(cells={"source": "smoothed", "sd": np.where(FUEL < 12.0, 0.4, np.nan) * np.ones((3, 1))})
     timing = table.to_timing_map(prior_sd_cad=2.0)
     np.testing.assert_array_equal(timing.timing_cad, table.values)
     np.testing.assert_allclose(timing.sd_cad, np.where(FUEL < 12.0, 0.4, 2.0) * np.ones((3, 1)))
@@ -174,7 +174,7 @@ def test_only_a_whole_timing_map_becomes_a_guide() -> None:
 # --- comparison ---------------------------------------------------------------------------------------------
 def test_maps_on_other_breakpoints_are_compared_at_those_of_both() -> None:
     def holds(axis: np.ndarray, slope: float) -> CalibrationMap:
-        return CalibrationMap({"fuel_mg": axis}, slope * axis, name="soc_cad", cells={"sd": 0.3 * slope})
+        return CalibrationMap({"fuel_mg": axis}, slope * axis, name="soc_cad")
 
     one, two = holds(np.array([6.0, 10.0, 30.0]), -0.5), holds(np.array([8.0, 30.0, 40.0]), -0.5 - 0.05)
     one = one.replaced(cells={"sd": 0.3})

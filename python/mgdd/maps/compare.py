@@ -8,6 +8,7 @@ import numpy as np
 
 from mgdd.errors import DataError, ParameterError
 from mgdd.maps.calibration_map import CalibrationMap
+from mgdd.maps.optimum import optimize_map
 from mgdd.maps.sweep_columns import sweep_columns
 from mgdd.maps.windows import between
 from mgdd.results.labels import labelled_dataset
@@ -116,7 +117,7 @@ def apply_map(table: CalibrationMap, sweep: xr.Dataset) -> xr.Dataset:
     xarray.Dataset
         The map and every variable of the sweep over the operating axes, linear between the points of the sweep; NaN
         where the map has no value. A map that knows its objective has ``loss`` too: how far the objective lies from
-        the best point of the sweep that keeps the limits of the map, >= 0 but for the parabola between the points.
+        that of `optimize_map` under the limits of the map.
 
     Raises
     ------
@@ -162,12 +163,13 @@ def apply_map(table: CalibrationMap, sweep: xr.Dataset) -> xr.Dataset:
         out[name] = (dims, column.reshape(data.shape), *data.labels[name])
     task = table.task
     if task is not None and task.objective in found and set(task.limits) <= set(names):
+        best = optimize_map(
+            sweep[list(names)], task.objective, over=table.name, limits=task.limits, maximize=task.maximize,
+            infeasible="keep",
+        )  # fmt: skip
+        order = [list(best.axes).index(name) for name in data.axes]
         sign = 1.0 if task.maximize else -1.0
-        best = sign * data.columns[task.objective]
-        for name, cap in task.limits.items():
-            best = np.where(data.columns[name] <= cap, best, -np.inf)
-        best = np.max(np.where(np.isnan(best), -np.inf, best), axis=1)
-        loss = np.where(np.isfinite(best), best - sign * found[task.objective], np.nan)
+        loss = sign * (np.transpose(best.cells["objective"], order).ravel() - found[task.objective])
         unit = data.labels[task.objective].units
         out["loss"] = (dims, loss.reshape(data.shape), unit, f"loss of {data.labels[task.objective].long_name}")
     return labelled_dataset(out)

@@ -22,6 +22,7 @@ __all__ = ["smooth_map"]
 _NARROWEST = 0.05  # of the median range: an optimum is not held more tightly than this
 _INSIDE = 1e-7  # of a slope limit or range: kept free for the tolerance of the solver
 _TOLERANCE = 1e-9
+_HEAVIEST = 1e6
 _AT_END = 1e-4  # of the median range: a value this near to the end of its range is held there
 
 
@@ -42,7 +43,7 @@ def smooth_map(
     optimum : CalibrationMap
         With ``low`` and ``high`` in every cell that has a value, as `optimize_map` gives it with a `max_loss`.
     weight : float
-        Of the smoothness against the distance, >= 0. The second differences count in half widths of the median range
+        Of the smoothness against the distance, 0 to 1e6. The second differences count in half widths of the median range
         per squared mean step of the axis.
     slope_limits : mapping of str to float, optional
         Largest change per unit of an axis [unit of the value / unit of the axis], > 0.
@@ -118,8 +119,8 @@ def _flat(optimum: CalibrationMap, column: str) -> Array:
 
 
 def _checked(optimum: CalibrationMap, weight: float, limits: Mapping[str, float]) -> dict[str, float]:
-    if isinstance(weight, bool) or not (np.isfinite(weight) and weight >= 0.0):
-        raise ParameterError.of("weight", weight, "a number >= 0")
+    if isinstance(weight, bool) or not 0.0 <= weight <= _HEAVIEST:
+        raise ParameterError.of("weight", weight, f">= 0 and <= {_HEAVIEST:g}, which makes a plane")
     for name, limit in limits.items():
         if name not in optimum.axes:
             near = did_you_mean(name, optimum.axes) or f"the map has {', '.join(optimum.axes)}"
@@ -155,18 +156,19 @@ def _check_reach(optimum: CalibrationMap, slopes: Mapping[str, float], low: Arra
     grid = np.meshgrid(*optimum.axes.values(), indexing="ij")
     way = np.zeros((low.size, low.size))
     for entries, slope in zip(grid, slopes.values(), strict=True):
-        apart = np.abs(entries.ravel()[:, None] - entries.ravel())
-        way += np.where(apart > 0.0, apart * slope if np.isfinite(slope) else np.inf, 0.0)
-    short = low[:, None] - high - way
-    if not (short > _TOLERANCE * np.maximum(1.0, np.abs(low[:, None]))).any():
+        distance = np.abs(entries.ravel()[:, None] - entries.ravel())
+        way += np.where(distance > 0.0, distance * slope if np.isfinite(slope) else np.inf, 0.0)
+    apart = low[:, None] - high
+    if not (apart - way > _TOLERANCE * np.maximum(1.0, np.abs(low[:, None]))).any():
         return
-    up, down = (int(k) for k in np.unravel_index(int(np.argmax(short)), short.shape))
+    factor = np.divide(apart, way, out=np.zeros_like(way), where=apart > way)  # that the slopes lack
+    up, down = (int(k) for k in np.unravel_index(int(np.argmax(factor)), factor.shape))
     needed = low[up] - high[down]
     named = ", ".join(f"{name} {slope:g}" for name, slope in slopes.items() if np.isfinite(slope))
     raise ConvergenceError(
         f"slope limits ({named} per unit) allow {way[up, down]:.4g} between {cell_at(optimum.axes, down)}, at most "
         f"{high[down]:.4g}, and {cell_at(optimum.axes, up)}, at least {low[up]:.4g}: {needed:.4g} is needed; "
-        f"raise the slope limits by a factor of {needed / way[up, down]:.3g}, or widen the ranges: a larger max_loss, "
+        f"raise the slope limits by a factor of {factor[up, down]:.3g}, or widen the ranges: a larger max_loss, "
         "other limits"
     )
 
@@ -227,7 +229,8 @@ def _solve(
     pull = np.where(known, (scale / width) ** 2, 1e-9)  # the least, so that a cell without neighbours has one answer
     target = np.where(known, (values - middle) / scale, 0.0)
     bends = _bends(optimum, 1.0)
-    quadratic = sparse.triu(sparse.diags(2.0 * pull) + 2.0 * weight * (bends.T @ bends), format="csc")
+    unit = 2.0 / (1.0 + weight)  # keeps the numbers near one, whatever the weight
+    quadratic = sparse.triu(unit * (sparse.diags(pull) + weight * (bends.T @ bends)), format="csc")
     own = np.flatnonzero(known)
     pick = sparse.csc_matrix((np.ones(own.size), (np.arange(own.size), own)), shape=(own.size, n))
     rows = np.arange(pairs.first.size)
@@ -244,7 +247,7 @@ def _solve(
     settings.verbose = False
     settings.tol_feas = settings.tol_gap_abs = settings.tol_gap_rel = _TOLERANCE
     cones = [clarabel.NonnegativeConeT(bounds.size)]
-    answer = clarabel.DefaultSolver(quadratic, -2.0 * pull * target, rules, bounds, cones, settings).solve()
+    answer = clarabel.DefaultSolver(quadratic, -unit * pull * target, rules, bounds, cones, settings).solve()
     if str(answer.status) not in ("Solved", "AlmostSolved"):
         raise ConvergenceError(
             f"smoothing {optimum.name}: the solver ended with {answer.status} after {answer.iterations} iterations; "
