@@ -123,7 +123,7 @@ def checked_cells(
     if bad.any():
         at = int(np.argmax(bad))
         said = (
-            f"{cell_at(axes, at)}: the value is {values.ravel()[at]:g} and its source {cells['source'].ravel()[at]!r}"
+            f"{cell_at(axes, at)}: the value is {values.ravel()[at]:g} and its source {str(cells['source'].ravel()[at])!r}"
         )
         raise DataError(
             f"{said}: a value must be finite, and NaN where the source is {' or '.join(WITHOUT_VALUE)}; "

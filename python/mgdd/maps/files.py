@@ -100,6 +100,8 @@ def write_map(table: CalibrationMap, path: str | os.PathLike[str]) -> None:
     ,6.0,20.0
     900.0,-1.0,-4.0
     1500.0,-2.0,-6.0
+    <BLANKLINE>
+    end
     True
     """
     ending = _ending(path)

@@ -4,7 +4,8 @@ from __future__ import annotations
 
 import csv
 import io
-from collections.abc import Mapping
+import itertools
+from collections.abc import Mapping, Sequence
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
@@ -22,6 +23,7 @@ __all__ = ["csv_of_map", "map_of_csv"]
 _FORMAT = "1"
 _HEADS = ("mgdd_map", "value", "rows", "columns", "objective", "limit", "provenance")
 _VALUE = "value"
+_END = "end"  # stands last in a file with the line mgdd_map, so that one that was cut off is known
 
 
 def csv_of_map(table: CalibrationMap) -> str:
@@ -38,6 +40,7 @@ def csv_of_map(table: CalibrationMap) -> str:
         if name != _VALUE and _all_missing(column, missing):
             continue
         rows += [[], ["table", name], *_grid(table, column)]
+    rows += [[], [_END]]
     out = io.StringIO()
     csv.writer(out, lineterminator="\n").writerows(rows)
     return out.getvalue()
@@ -54,6 +57,8 @@ def map_of_csv(text: str, origin: str, decimal: str) -> CalibrationMap:
     reader = csv.reader(io.StringIO(text), delimiter=mark)
     lines = [(reader.line_num, _trimmed(cells)) for cells in reader]
     heads, blocks = _parts([(number, cells) for number, cells in lines if cells], origin)
+    if "mgdd_map" in heads and _END not in heads:
+        raise DataError(f"{origin}: no line {_END!r} at its end: the file was cut off; write it again")
     names = [heads[head] for head in ("rows", "columns") if head in heads]
     if _VALUE not in heads or not names:
         lack = _VALUE if _VALUE not in heads else "rows"
@@ -125,6 +130,11 @@ def _parts(
         where = f"{origin}, line {number}"
         if cells[0].startswith("#"):
             continue
+        if _END in heads:
+            raise DataError(f"{where}: {cells[0]!r} behind the line {_END!r}: remove one of them")
+        if cells == [_END]:
+            heads[_END] = True
+            continue
         if cells[0] == "table":
             name = cells[1] if len(cells) > 1 else ""
             if name not in known or name in blocks:
@@ -143,6 +153,7 @@ def _parts(
         elif cells[0] == "mgdd_map":
             if cells[1:2] != [_FORMAT]:
                 raise DataError(f"{where}: format {cells[1:2]}: this version of mgdd reads format {_FORMAT}")
+            heads["mgdd_map"] = _FORMAT
         else:
             near = did_you_mean(cells[0], (*_HEADS, "table")) or f"lines begin with {', '.join((*_HEADS, 'table'))}"
             raise DataError(f"{where}: {','.join(cells)[:60]!r} is not a line of a map: {near}")
@@ -164,6 +175,8 @@ def _read_grid(
                 f"{axes[1]}"
             )
         own[axes[1]] = np.array([_read(origin, line, cell, decimal, axes[1]) for cell in head[1:]])
+        for pair in itertools.pairwise(own[axes[1]]):
+            _require_rise(origin, line, axes[1], pair)
         width, rows = own[axes[1]].size, rows[1:]
     first, cells = [], []
     for line, row in rows:
@@ -171,10 +184,19 @@ def _read_grid(
             raise DataError(f"{origin}, line {line}: {len(row) - 1} values: {width} are needed, one per column")
         full = [*row, *[""] * (width + 1 - len(row))]
         first.append(_read(origin, line, full[0], decimal, axes[0]))
+        if len(first) > 1:
+            _require_rise(origin, line, axes[0], first[-2:])
         cells.append(full[1:] if is_text else [_read(origin, line, c, decimal, "a value", gap=True) for c in full[1:]])
     own = {axes[0]: np.array(first), **own}
     shape = tuple(entries.size for entries in own.values())
     return own, np.array(cells, np.str_ if is_text else np.float64).reshape(shape)
+
+
+def _require_rise(origin: str, line: int, axis: str, pair: Sequence[float]) -> None:
+    if not pair[1] > pair[0]:
+        raise DataError(
+            f"{origin}, line {line}: {axis} = {pair[1]:g} after {pair[0]:g}: breakpoints must increase and stand once"
+        )
 
 
 def _read(origin: str, line: int, cell: str, decimal: str, what: str, *, gap: bool = False) -> float:
