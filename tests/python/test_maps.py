@@ -1,4 +1,4 @@
-"""Calibration maps: values between and outside of the cells, what a map refuses, the guide's table and back, compare."""
+"""Calibration maps: values inside and outside of the axes, refusals, the guide's table and back, comparison."""
 
 from __future__ import annotations
 
@@ -44,7 +44,7 @@ def test_one_point_and_an_operating_point_give_a_number() -> None:
     at = plane().lookup(OperatingPoint(speed_rpm=1200.0, fuel_mg=20.0))
     assert float(at.values) == pytest.approx(centre(1200.0, 20.0))
     assert not bool(at.held_outside)
-    with pytest.raises(ParameterError, match="points.*speed_rpm and fuel_mg"):
+    with pytest.raises(ParameterError, match=r"points.*speed_rpm and fuel_mg"):
         plane().lookup({"speed_rpm": 1200.0})
 
 

@@ -83,7 +83,9 @@ def tables(draw: st.DrawFn) -> CalibrationMap:
     empty = np.array(draw(st.lists(st.booleans(), min_size=count, max_size=count))).reshape(sizes)
     cells = {
         "source": np.where(empty, draw(st.sampled_from(["infeasible", "unattainable"])), "measured"),
-        "sd": np.array(draw(st.lists(st.floats(0.0, 1e9) | st.just(np.nan), min_size=count, max_size=count))).reshape(sizes),
+        "sd": np.array(draw(st.lists(st.floats(0.0, 1e9) | st.just(np.nan), min_size=count, max_size=count))).reshape(
+            sizes
+        ),
         "active_limit": np.array(draw(st.lists(TEXT, min_size=count, max_size=count))).reshape(sizes),
     }
     labels = {"z": (draw(st.sampled_from(["-", "bar", "°CA", "g/kWh"])), draw(TEXT))}
@@ -143,7 +145,12 @@ def test_the_layout_of_other_tools_is_read() -> None:
     assert soc.values.tolist() == [[-1.0, -5.0], [-2.0, -7.0], [-4.0, -12.0]]
     assert torque.values.tolist() == [[80.0, 110.0], [95.0, 120.5]]
     assert [torque.unit, *(label.units for label in torque.labels.values())] == ["N m", "degC", "bar", "N m"]
-    assert found.skipped == ("FUNKTIONEN", "FESTWERT Variant", "FESTWERTEBLOCK Ratios 4", "STUETZSTELLENVERTEILUNG Grid 3")
+    assert found.skipped == (
+        "FUNKTIONEN",
+        "FESTWERT Variant",
+        "FESTWERTEBLOCK Ratios 4",
+        "STUETZSTELLENVERTEILUNG Grid 3",
+    )
 
 
 READER = """
@@ -169,12 +176,16 @@ def test_a_reader_of_other_hands_reads_ours_and_we_read_what_it_writes(tmp_path:
     best = optimize_map(sweep(), "efficiency_gross", provenance={"from": 'the "closed form"'})
     one, two = tmp_path / "ours.dcm", tmp_path / "theirs.dcm"
     write_dcm({"SocBase": best, "SocWarm": curve()}, one, values={"N_Idle": (850.5, "1/min")})
-    run = subprocess.run(
-        [sys.executable, "-c", READER, str(one), str(two)], check=True, capture_output=True, text=True
-    )
+    run = subprocess.run([sys.executable, "-c", READER, str(one), str(two)], check=True, capture_output=True, text=True)
     found = json.loads(run.stdout)
     assert found["values"] == {"N_Idle": [850.5, "1/min"]}
-    assert found["lines"]["SocWarm"] == [FUEL.tolist(), curve().values.tolist(), "mg", "°CA aTDC", "start of combustion"]
+    assert found["lines"]["SocWarm"] == [
+        FUEL.tolist(),
+        curve().values.tolist(),
+        "mg",
+        "°CA aTDC",
+        "start of combustion",
+    ]
     cells, *rest = found["maps"]["SocBase"]
     assert rest == ["rpm", "mg", "°CA aTDC", "speed_rpm", "fuel_mg", 3, 5]
     grid = [[m, n, best.values[i, j]] for j, m in enumerate(FUEL) for i, n in enumerate(SPEED)]
@@ -282,9 +293,7 @@ def test_a_netcdf_or_text_that_is_none(ending: str, tmp_path: Path) -> None:
 
 
 @pytest.mark.parametrize("ending", ["csv", "json", "dcm", "nc"])
-def test_a_write_that_fails_leaves_the_old_file(
-    ending: str, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
-) -> None:
+def test_a_write_that_fails_leaves_the_old_file(ending: str, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     file = tmp_path / f"map.{ending}"
     write_map(whole(curve()), file)
     before = file.read_bytes()

@@ -1,4 +1,4 @@
-"""The cell-wise optimum of a sweep: closed forms, limits between points, ranges, scatter, cells without any, bad sweeps."""
+"""The cell-wise optimum of a sweep: closed forms, limits between points, ranges, scatter, empty cells, bad sweeps."""
 
 from __future__ import annotations
 
@@ -185,7 +185,9 @@ def test_the_cycle_model_and_its_own_optimum_agree() -> None:
     assert found.cells["active_limit"].tolist() == ["".join(best.active_limits) for best in exact] == ["", "p_max_bar"]
     for end in ("low", "high"):
         ends = [timing_sweep(Cylinder(), p, soc_cad=[s]) for p, s in zip(points, found.cells[end], strict=True)]
-        assert all(float(run["efficiency_gross"][0]) >= best.value - 0.0021 for run, best in zip(ends, exact, strict=True))
+        assert all(
+            float(run["efficiency_gross"][0]) >= best.value - 0.0021 for run, best in zip(ends, exact, strict=True)
+        )
         assert all(float(run["p_max_bar"][0]) <= 95.1 for run in ends)
 
 
@@ -222,7 +224,9 @@ def test_no_point_that_keeps_the_limits_is_better(
 
 # --- refusals -----------------------------------------------------------------------------------------------
 def test_cells_without_anything_feasible_are_named_or_kept() -> None:
-    with pytest.raises(ConvergenceError, match=r"3 of 15 cells: speed_rpm = 900, fuel_mg = 40.*nearest at .*limit 110") as e:
+    with pytest.raises(
+        ConvergenceError, match=r"3 of 15 cells: speed_rpm = 900, fuel_mg = 40.*nearest at .*limit 110"
+    ) as e:
         optimize_map(sweep(), "efficiency_gross", limits={"p_max_bar": 110.0})
     assert "infeasible='keep'" in str(e.value)
     kept = optimize_map(sweep(), "efficiency_gross", limits={"p_max_bar": 110.0}, infeasible="keep")
@@ -230,7 +234,9 @@ def test_cells_without_anything_feasible_are_named_or_kept() -> None:
     assert np.isnan(kept.values[:, 4]).all()
     assert np.isfinite(kept.values[:, :4]).all()
     for mode in ("raise", "keep"):
-        with pytest.raises(ConvergenceError, match=r"in any cell; nearest at speed_rpm = 3000, fuel_mg = 6, soc_cad = 8"):
+        with pytest.raises(
+            ConvergenceError, match=r"in any cell; nearest at speed_rpm = 3000, fuel_mg = 6, soc_cad = 8"
+        ):
             optimize_map(sweep(), "efficiency_gross", limits={"p_max_bar": 10.0}, infeasible=mode)  # type: ignore[arg-type]
 
 

@@ -95,7 +95,7 @@ def test_slopes_and_ranges_hold_in_every_cell_and_what_holds_is_named() -> None:
     at_end = np.isclose(held.values, table.cells["low"], atol=1e-5) | np.isclose(
         held.values, table.cells["high"], atol=1e-5
     )
-    assert set(held.cells["active_limit"][at_end].ravel()) <= {"low", "high"}
+    assert set(held.cells["active_limit"][at_end].ravel()) <= {"range_low", "range_high"}
     assert "weight 1, slope over speed_rpm at most 0.0006 per unit" in held.provenance["smoothed"]
 
 

@@ -17,7 +17,17 @@ from mgdd.results.units import attribute_units, unit_of
 if TYPE_CHECKING:
     from numpy.typing import ArrayLike, NDArray
 
-__all__ = ["NUMBERS", "SOURCES", "TEXTS", "MapTask", "cell_at", "checked_cells", "checked_label", "checked_name"]
+__all__ = [
+    "NUMBERS",
+    "SOURCES",
+    "TEXTS",
+    "MapTask",
+    "cell_at",
+    "checked_cells",
+    "checked_label",
+    "checked_name",
+    "spoken_name",
+]
 
 # Where a value comes from; the last two say why there is none.
 SOURCES = (
@@ -76,7 +86,7 @@ def checked_name(what: str, name: object, taken: tuple[str, ...] = ()) -> str:
 
 def checked_label(name: str, given: tuple[str, str] | None) -> Label:
     """Give unit and long name of an axis or value; a unit that contradicts the ending of the name is refused."""
-    known = VARIABLES.get(name) or Label(unit_of(name), name.replace("_", " "))
+    known = VARIABLES.get(name) or Label(unit_of(name), spoken_name(name))
     label = known if given is None else Label(*map(str, given))
     try:
         written = attribute_units(label.units)
@@ -122,9 +132,8 @@ def checked_cells(
     bad = np.isfinite(values) == missing_value
     if bad.any():
         at = int(np.argmax(bad))
-        said = (
-            f"{cell_at(axes, at)}: the value is {values.ravel()[at]:g} and its source {str(cells['source'].ravel()[at])!r}"
-        )
+        source = str(cells["source"].ravel()[at])
+        said = f"{cell_at(axes, at)}: the value is {values.ravel()[at]:g} and its source {source!r}"
         raise DataError(
             f"{said}: a value must be finite, and NaN where the source is {' or '.join(WITHOUT_VALUE)}; "
             "fill the cell or say why it is empty"
@@ -138,6 +147,13 @@ def cell_at(axes: Mapping[str, NDArray[np.float64]], place: int) -> str:
     """Name a cell by its coordinates, for messages."""
     at = np.unravel_index(place, tuple(entries.size for entries in axes.values()))
     return ", ".join(f"{name} = {entries[i]:g}" for (name, entries), i in zip(axes.items(), at, strict=True))
+
+
+def spoken_name(name: str) -> str:
+    """Give a name in words, without the unit at its end."""
+    parts, unit = name.split("_"), unit_of(name)
+    ends = [k for k in range(1, len(parts)) if unit != "-" and unit_of("_".join(parts[k:])) == unit]
+    return " ".join(parts[: max(ends)] if ends else parts)
 
 
 def _shaped(name: str, column: NDArray[Any], shape: tuple[int, ...]) -> NDArray[Any]:

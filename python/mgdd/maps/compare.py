@@ -98,7 +98,7 @@ def compare_maps(
             "rms_difference": ((), _rms(known), *of_unit, "root mean square difference"),
             "n_beyond": ((), int(beyond.sum()), "-", "cells beyond the tolerance"),
         },
-        attrs={"map": first.name} | ({} if tolerance is None else {"tolerance": float(tolerance)}),
+        attrs={"map": "difference", "of": first.name} | ({} if tolerance is None else {"tolerance": float(tolerance)}),
     )
 
 

@@ -13,7 +13,7 @@ import numpy as np
 from mgdd.errors import DataError, did_you_mean
 from mgdd.io.table import parse_number
 from mgdd.maps.calibration_map import CalibrationMap
-from mgdd.maps.cells import NUMBERS, TEXTS, MapTask
+from mgdd.maps.cells import NUMBERS, TEXTS, MapTask, spoken_name
 
 if TYPE_CHECKING:
     from numpy.typing import NDArray
@@ -145,7 +145,7 @@ def _parts(
         elif cells[0] in (_VALUE, "rows", "columns"):
             if cells[0] in heads or len(cells) < 3:
                 raise DataError(f"{where}: {','.join(cells)}: must be {cells[0]},NAME,UNIT,LONG NAME, once in the file")
-            heads[cells[0]] = (*cells[1:3], cells[3] if len(cells) > 3 else cells[1].replace("_", " "))
+            heads[cells[0]] = (*cells[1:3], cells[3] if len(cells) > 3 else spoken_name(cells[1]))
         elif cells[0] == "objective" and len(cells) == 3 and cells[2] in ("highest", "lowest"):
             heads["objective"] = cells[1:]
         elif cells[0] in ("limit", "provenance") and len(cells) == 3:

@@ -97,12 +97,12 @@ def optimize_map(
     >>> import numpy as np, xarray as xr
     >>> from mgdd.engine import Cylinder, OperatingPoint, timing_sweep
     >>> from mgdd.maps import optimize_map
-    >>> fuels = xr.DataArray([15.0, 25.0], dims="fuel_mg", attrs={"units": "mg", "long_name": "fuel"})
-    >>> runs = [timing_sweep(Cylinder(), OperatingPoint(fuel_mg=fuel), soc_cad=np.arange(-20, 11)) for fuel in (15, 25)]
+    >>> fuels = xr.DataArray([12.0, 26.0], dims="fuel_mg", attrs={"units": "mg", "long_name": "fuel"})
+    >>> runs = [timing_sweep(Cylinder(), OperatingPoint(fuel_mg=fuel), soc_cad=np.arange(-20, 11)) for fuel in (12, 26)]
     >>> sweep = xr.concat(runs, "fuel_mg").assign_coords(fuel_mg=fuels)
     >>> best = optimize_map(sweep, "efficiency_gross", limits={"p_max_bar": 95.0}, max_loss=0.002)
     >>> best.values.round(1).tolist(), best.cells["active_limit"].tolist()
-    ([-5.3, -2.3], ['', 'p_max_bar'])
+    ([-3.3, -2.9], ['', 'p_max_bar'])
     """
     kept = limits_of(limits)
     caps = {limit.name: limit.upper - limit.margin for limit in kept}

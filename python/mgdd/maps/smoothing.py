@@ -43,8 +43,8 @@ def smooth_map(
     optimum : CalibrationMap
         With ``low`` and ``high`` in every cell that has a value, as `optimize_map` gives it with a `max_loss`.
     weight : float
-        Of the smoothness against the distance, 0 to 1e6. The second differences count in half widths of the median range
-        per squared mean step of the axis.
+        Of the smoothness against the distance, 0 to 1e6. The second differences count in half widths of the median
+        range per squared mean step of the axis.
     slope_limits : mapping of str to float, optional
         Largest change per unit of an axis [unit of the value / unit of the axis], > 0.
     fill : bool
@@ -55,7 +55,7 @@ def smooth_map(
     -------
     CalibrationMap
         Values with the source ``smoothed``, none outside of its range; ``active_limit`` says what holds a value:
-        ``low`` or ``high`` end of its range, or ``slope_`` and the axis.
+        ``range_low`` or ``range_high``, an end of its range, or ``slope_`` and the axis.
 
     Raises
     ------
@@ -78,7 +78,7 @@ def smooth_map(
     >>> best = CalibrationMap({"fuel_mg": [10, 20, 30]}, [-4, -9, -5], name="soc_cad",
     ...                       cells={"low": [-6, -11, -7], "high": [-2, -7, -3]})
     >>> smooth_map(best, slope_limits={"fuel_mg": 0.3}).values.round(2).tolist()
-    [-5.05, -7.59, -5.87]
+    [-5.67, -7.0, -6.67]
     """
     slopes = _checked(optimum, weight, slope_limits or {})
     values, low, high = (_flat(optimum, name) for name in ("", "low", "high"))
@@ -95,6 +95,7 @@ def smooth_map(
     cells = {
         "source": np.where(missing, optimum.cells["source"].ravel(), np.where(known, "smoothed", "interpolated")),
         "active_limit": np.where(missing, "", held),
+        "support": np.where(known | missing, optimum.cells["support"].ravel(), 0.0),
         "objective": np.full(values.size, np.nan),
     }
     how = ", ".join(f"{name} at most {limit:g} per unit" for name, limit in slopes.items() if np.isfinite(limit))
@@ -269,6 +270,6 @@ def _holds(values: Array, low: Array, high: Array, pairs: _Pairs, near: float) -
     steep = np.abs(values[pairs.second] - values[pairs.first]) >= pairs.most * (1.0 - 1e-4)
     for column in (pairs.first, pairs.second):
         held[column[steep]] = pairs.axis[steep]
-    held[values - low <= near] = "low"
-    held[high - values <= near] = "high"
+    held[values - low <= near] = "range_low"
+    held[high - values <= near] = "range_high"
     return held

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 from dataclasses import dataclass
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
@@ -96,7 +96,8 @@ def sweep_columns(sweep: xr.Dataset, over: str, names: tuple[str, ...], lead: st
         odd = [str(dim) for dim in sweep[name].dims if dim not in dims]
         if odd:
             raise DataError(f"{name} stands over {odd[0]!r} too, {lead} does not: select one of its entries")
-        wide = sweep.variables[name].set_dims({dim: sweep.sizes[dim] for dim in (*axes, over)})
+        own_variable: Any = sweep.variables[name]
+        wide = own_variable.set_dims({dim: sweep.sizes[dim] for dim in (*axes, over)})
         columns[name] = np.ascontiguousarray(wide.to_numpy(), np.float64).reshape(-1, sweep.sizes[over])
     labels = {name: label_of(sweep[name]) for name in (*axes, over, *names)}
     own = {axis: sweep[axis].to_numpy().astype(np.float64) for axis in axes}

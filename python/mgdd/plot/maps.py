@@ -1,4 +1,4 @@
-"""Maps of an engine: contours over speed and load, the cells of a calibration map, the trade-off of two outputs."""
+"""Maps of an engine: contours over speed and load, and the cells of a calibration map."""
 
 from __future__ import annotations
 
@@ -6,8 +6,8 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from mgdd.errors import DataError, ParameterError
-from mgdd.plot.style import BLACK, BLUE, GREY, LINE_STYLES, ORANGE, axis_label, legend, minus, new_axes, require
+from mgdd.errors import DataError
+from mgdd.plot.style import BLACK, BLUE, GREY, ORANGE, axis_label, legend, minus, new_axes, require
 from mgdd.results.labels import label_of
 
 if TYPE_CHECKING:
@@ -17,10 +17,9 @@ if TYPE_CHECKING:
     from matplotlib.artist import Artist
     from matplotlib.axes import Axes
 
-__all__ = ["map_cells", "map_contour", "trade_off"]
+__all__ = ["map_cells", "map_contour"]
 
 _COLOURS = "cividis"  # of even lightness, for colour-blind eyes and for print
-_MARKERS = "osv^D"
 # Beside a value in its cell; what is not named here needs no mark.
 _MARKS = {"interpolated": "i", "held": "h", "learned": "l", "infeasible": "×", "unattainable": "×"}
 
@@ -42,7 +41,8 @@ def map_contour(
     variable : str
         What is drawn.
     levels : int or sequence of float
-        Contour levels, or about how many.
+        Contour levels, or about how many between the lowest hundredth of the values and the highest tenth: specific
+        figures grow without bound towards zero load.
     full_load : str, optional
         Variable over the first axis that is drawn as a line where the Dataset has it; None for none.
     ax : matplotlib.axes.Axes, optional
@@ -79,7 +79,7 @@ def map_contour(
     ax = new_axes(ax, height=4.4)
     values = data[variable].transpose(y, x).to_numpy()
     lines: list[Artist] = []
-    filled = ax.contourf(data[x], data[y], values, levels=levels, cmap=_COLOURS, extend="both")
+    filled = ax.contourf(data[x], data[y], values, levels=_levels(values, levels), cmap=_COLOURS, extend="both")
     drawn = ax.contour(data[x], data[y], values, levels=filled.levels, colors=BLACK, linewidths=0.6)
     ax.clabel(drawn, fmt="%g", fontsize="small")
     bar = ax.figure.colorbar(filled, ax=ax)
@@ -140,7 +140,11 @@ def map_cells(data: xr.Dataset, variable: str | None = None, *, ax: Axes | None 
     require(data, (x, y, own), "CalibrationMap.to_dataset")
     ax = new_axes(ax, height=4.6)
     values = data[own].transpose(x, y).to_numpy()
-    image = ax.imshow(values.T, origin="lower", aspect="auto", cmap=_COLOURS)
+    widest = float(np.nanmax(np.abs(values))) if np.isfinite(values).any() else 1.0
+    how: dict[str, Any] = {"cmap": _COLOURS}
+    if own == "difference":  # of two maps: zero in the middle
+        how = {"cmap": "PuOr", "vmin": -widest, "vmax": widest}
+    image = ax.imshow(values.T, origin="lower", aspect="auto", **how)
     ax.figure.colorbar(image, ax=ax).set_label(axis_label(data, own))
     for axis, name, set_ticks in ((ax.xaxis, x, ax.set_xticks), (ax.yaxis, y, ax.set_yticks)):
         entries = data[name].to_numpy()
@@ -155,95 +159,14 @@ def map_cells(data: xr.Dataset, variable: str | None = None, *, ax: Axes | None 
     return ax
 
 
-def trade_off(
-    sweep: xr.Dataset,
-    x: str,
-    y: str,
-    *,
-    over: str = "soc_cad",
-    every: int = 4,
-    marked: xr.Dataset | None = None,
-    ax: Axes | None = None,
-) -> Axes:
-    """Draw two outputs against each other along a swept input, with labels of the input: the price of one in the other.
+def _levels(values: Any, levels: int | Sequence[float]) -> Any:
+    from matplotlib.ticker import MaxNLocator
 
-    Parameters
-    ----------
-    sweep : xarray.Dataset
-        Both variables over `over`, and over one more axis for several lines.
-    x, y : str
-        To the right and upwards, for example ``nox_affine_log_ppm`` and ``efficiency_gross``.
-    over : str
-        The swept input.
-    every : int
-        Every how many points are labelled with the input, >= 1.
-    marked : xarray.Dataset, optional
-        `x`, `y` and `over` at chosen points, one per line, as `mgdd.maps.apply_map` gives them; drawn as stars.
-    ax : matplotlib.axes.Axes, optional
-        Where to draw; None makes a figure.
-
-    Returns
-    -------
-    matplotlib.axes.Axes
-        The axes.
-
-    Raises
-    ------
-    mgdd.errors.DataError
-        A variable is missing, has no unit, or stands over other axes.
-    mgdd.errors.ParameterError
-        `every` is not >= 1.
-
-    Examples
-    --------
-    >>> from mgdd.engine import Cylinder, OperatingPoint, timing_sweep
-    >>> from mgdd.plot import trade_off
-    >>> sweep = timing_sweep(Cylinder(), OperatingPoint(), soc_cad=range(-16, 9))
-    >>> trade_off(sweep, "p_max_bar", "efficiency_gross").get_xlabel()
-    'maximum pressure [bar]'
-    """
-    if every < 1:
-        raise ParameterError.of("every", every, ">= 1")
-    require(sweep, (over, x, y), "mgdd.engine.timing_sweep")
-    others = [str(dim) for dim in sweep[y].dims if dim != over]
-    if over not in sweep[y].dims or len(others) > 1 or set(sweep[x].dims) != set(sweep[y].dims):
-        raise DataError(f"{x} and {y}: must stand over {over} and at most one more axis, the same for both")
-    ax = new_axes(ax, height=4.4)
-    right = sweep[x].transpose(*others, over).to_numpy().reshape(-1, sweep.sizes[over])
-    up = sweep[y].transpose(*others, over).to_numpy().reshape(-1, sweep.sizes[over])
-    lines: list[Artist] = []
-    for index, (own_x, own_y) in enumerate(zip(right, up, strict=True)):
-        dash, color = LINE_STYLES[index % len(LINE_STYLES)]
-        name = f"{over} swept"
-        if others:
-            label = label_of(sweep[others[0]])
-            name = f"{label.long_name} {sweep[others[0]].to_numpy()[index]:g} {label.units}"
-        lines += ax.plot(
-            own_x, own_y, linestyle=dash, color=color, marker=_MARKERS[index % len(_MARKERS)], markersize=3,
-            markevery=every, label=minus(name),
-        )  # fmt: skip
-        for place in range(0, own_x.size, every):
-            if np.isfinite(own_x[place]) and np.isfinite(own_y[place]):
-                ax.annotate(
-                    minus(f"{sweep[over].to_numpy()[place]:g}"), (own_x[place], own_y[place]), xytext=(4, 3),
-                    textcoords="offset points", fontsize="x-small", color=color,
-                )  # fmt: skip
-    if marked is not None:
-        require(marked, (x, y), "mgdd.maps.apply_map")
-        stars = ax.plot(
-            marked[x].to_numpy().ravel(), marked[y].to_numpy().ravel(), "*", color=BLUE, markersize=11,
-            markeredgecolor=BLACK, linestyle="none", label="chosen",
-        )  # fmt: skip
-        lines += stars
-    ax.set(xlabel=axis_label(sweep, x), ylabel=axis_label(sweep, y))
-    ax.grid(alpha=0.3)
-    ax.margins(0.08)
-    legend(ax, lines, columns=3)
-    unit = label_of(sweep[over])
-    ax.text(
-        0.99, 0.02, f"labels: {unit.long_name} [{unit.units}]", transform=ax.transAxes, ha="right", fontsize="small"
-    )
-    return ax
+    known = values[np.isfinite(values)]
+    if not isinstance(levels, int) or not known.size:
+        return levels
+    low, high = np.quantile(known, [0.01, 0.9])
+    return MaxNLocator(levels).tick_values(float(low), float(high))
 
 
 def _two_axes(data: xr.Dataset, variable: str) -> tuple[str, str]:
@@ -284,30 +207,35 @@ def _cell_marks(ax: Axes, data: xr.Dataset, values: Any, axes: tuple[str, str]) 
         return data[name].transpose(*axes).to_numpy() if there else np.full(values.shape, absent)
 
     source, held, support = column("source", ""), column("active_limit", ""), column("support", 0.0)
+    if "beyond" in data:
+        held = np.where(column("beyond", False), "the tolerance", "")
     middle = 0.5 * (np.nanmin(values) + np.nanmax(values)) if np.isfinite(values).any() else 0.0
     size = "small" if values.size <= 64 else "x-small" if values.size <= 150 else None
-    most = float(np.nanmax(support)) if support.size else 0.0
+    most, same = float(np.nanmax(support)), bool((support == support.flat[0]).all())
+    dark = values < middle
+    if "beyond" in data:  # a difference is pale in its middle
+        dark = np.abs(values) > 0.6 * np.nanmax(np.abs(values))
+    frame = BLACK if "beyond" in data else ORANGE
     lines: list[Artist] = []
     for i, j in np.ndindex(*values.shape):
-        color = BLACK if not values[i, j] < middle else "white"
+        color = "white" if dark[i, j] else BLACK
         mark = _MARKS.get(str(source[i, j]), "")
         said = f"{values[i, j]:.3g}" if np.isfinite(values[i, j]) and size else ""
         text = minus(said) + (f" {mark}" if mark else "")
         if text:
-            ax.text(i, j, text, ha="center", va="center", fontsize=size or "xx-small", color=color)
-        if most > 0.0 and support[i, j] > 0.0:
+            ax.text(i, j, text, ha="center", va="center", fontsize=size or "x-small", color=color)
+        if not same and support[i, j] > 0.0:
             ax.plot(i, j - 0.33, "o", color=color, markersize=1.0 + 3.5 * np.sqrt(support[i, j] / most))
         if str(held[i, j]):
-            ax.add_patch(Rectangle((i - 0.47, j - 0.47), 0.94, 0.94, fill=False, edgecolor=ORANGE, linewidth=1.4))
+            width = 1.4 if size else 0.8
+            ax.add_patch(Rectangle((i - 0.46, j - 0.46), 0.92, 0.92, fill=False, edgecolor=frame, linewidth=width))
     if most > 0.0:
-        lines.append(
-            Line2D(
-                [], [], marker="o", color=BLACK, linestyle="none", markersize=4.5, label=f"support, at most {most:g}"
-            )
-        )
+        said, dot = (f"support {most:g} everywhere", "") if same else (f"support, at most {most:g}", "o")
+        lines.append(Line2D([], [], marker=dot, color=BLACK, linestyle="none", markersize=4.5, label=said))
+    said = "beyond" if "beyond" in data else "held by"
     limits = sorted({str(text) for text in held.ravel() if str(text)})
     if limits:
-        lines.append(Rectangle((0, 0), 1, 1, fill=False, edgecolor=ORANGE, label=f"held by {', '.join(limits)}"))
+        lines.append(Rectangle((0, 0), 1, 1, fill=False, edgecolor=frame, label=f"{said} {', '.join(limits)}"))
     used = sorted({str(text) for text in source.ravel() if str(text) in _MARKS})
     lines += [Line2D([], [], marker=f"${_MARKS[name]}$", color=BLACK, linestyle="none", label=name) for name in used]
     return lines
