@@ -25,6 +25,7 @@ PYBIND11_MODULE(_core, m) {
   m.def("compiler", [] { return std::string(MGDD_COMPILER); }, "Compiler of this build.");
   bind_errors(m);
   const std::vector<Room> rooms{
+      {"math", "Look-up tables.", {&bind_lookup_table}},
       {"optimize",
        "Fits, seekers and learners.",
        {&bind_least_squares, &bind_limits, &bind_seekers, &bind_direct_seekers, &bind_learning}},

@@ -5,6 +5,7 @@
 
 namespace mgdd::bindings {
 
+void bind_lookup_table(pybind11::module_& m);
 void bind_least_squares(pybind11::module_& m);
 void bind_limits(pybind11::module_& m);
 void bind_seekers(pybind11::module_& m);
