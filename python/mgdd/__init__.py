@@ -20,6 +20,7 @@ __all__ = [
     "__version__",
     "control",
     "datasets",
+    "design",
     "engine",
     "errors",
     "guide",

@@ -10,6 +10,7 @@ from __future__ import annotations
 from mgdd.plot.convergence import convergence
 from mgdd.plot.cycle import log_pv, pressure
 from mgdd.plot.identification import correlation_matrix
+from mgdd.plot.response import response_diagnostics
 from mgdd.plot.seeking import seeking
 from mgdd.plot.sensors import sensors
 from mgdd.plot.throttle import holding_duty
@@ -21,6 +22,7 @@ __all__ = [
     "holding_duty",
     "log_pv",
     "pressure",
+    "response_diagnostics",
     "seeking",
     "sensors",
     "timing",

@@ -16,9 +16,9 @@ import numpy as np
 
 from mgdd.errors import Error, ParameterError, RigError
 from mgdd.io.existing_file import existing_file
+from mgdd.io.extras import import_extra
 from mgdd.results.labels import label_of
 from mgdd.rig.can.logs import LOG_WRITERS, write_log
-from mgdd.rig.extras import import_extra
 from mgdd.rig.recorded import RecordedRun, read_record, stamped_frames
 
 if TYPE_CHECKING:

@@ -9,7 +9,7 @@ from collections.abc import Mapping
 from typing import Any
 
 from mgdd.errors import RigError, did_you_mean
-from mgdd.rig.extras import import_extra
+from mgdd.io.extras import import_extra
 
 __all__ = ["connected", "error_code"]
 

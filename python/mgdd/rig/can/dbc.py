@@ -11,7 +11,7 @@ from typing import Any
 from mgdd._core.rig import SignalLayout
 from mgdd.errors import DataError, did_you_mean
 from mgdd.io.existing_file import existing_file
-from mgdd.rig.extras import import_extra
+from mgdd.io.extras import import_extra
 
 __all__ = ["DbcFile", "DbcMessage", "DbcSignal"]
 

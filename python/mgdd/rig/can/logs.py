@@ -7,8 +7,8 @@ from pathlib import Path
 from types import MappingProxyType
 
 from mgdd._core.rig import Frame
+from mgdd.io.extras import import_extra
 from mgdd.rig.can.messages import message_of
-from mgdd.rig.extras import import_extra
 
 __all__ = ["LOG_WRITERS", "write_log"]
 

@@ -5,7 +5,7 @@ from __future__ import annotations
 from typing import TYPE_CHECKING, Any
 
 from mgdd._core.rig import Frame
-from mgdd.rig.extras import import_extra
+from mgdd.io.extras import import_extra
 
 if TYPE_CHECKING:
     import can

@@ -15,9 +15,9 @@ from urllib.parse import parse_qsl
 
 from mgdd._core.rig import Frame, error_classes
 from mgdd.errors import ParameterError, RigError
+from mgdd.io.extras import import_extra
 from mgdd.rig.can.connect import connected, error_code
 from mgdd.rig.can.messages import frame_of, message_of
-from mgdd.rig.extras import import_extra
 
 __all__ = ["CanTransport", "two_senders"]
 

@@ -32,7 +32,7 @@ def import_extra(module: str, extra: str, purpose: str) -> Any:
 
     Examples
     --------
-    >>> from mgdd.rig.extras import import_extra
+    >>> from mgdd.io.extras import import_extra
     >>> import_extra("no_such_package", "can", "a log of a CAN bus")
     Traceback (most recent call last):
     ...
