@@ -24,7 +24,7 @@ __all__ = ["design_points"]
 
 METHODS = ("sobol", "halton", "lhs", "maximin", "factorial", "d_optimal")
 _POOL = 30  # candidates per point where points are chosen by distance
-_MOST_GRID = 20_000  # points of a grid of candidates; beyond it they are drawn
+_MOST_GRID = 8192  # points of a grid of candidates; beyond it they are drawn
 _DRAWN_CANDIDATES = 8192
 
 
@@ -63,7 +63,7 @@ def design_points(
         Polynomial for ``"d_optimal"``.
     levels : int or mapping of str to int, optional
         Levels of each range for ``"factorial"`` (3) and for the candidates of ``"d_optimal"`` (5; fewer where their
-        grid would exceed 20 000 points); an odd number has the middle.
+        grid would exceed 8192 points); an odd number has the middle.
     n_starts : int
         Searches of ``"d_optimal"`` and tries of ``"lhs"``, of which the best is kept.
     seed : int
@@ -221,7 +221,8 @@ def _candidates(
     own: Factors, counts: Mapping[str, int], degree: int, generator: np.random.Generator
 ) -> NDArray[np.float64]:
     """Return the grid; where it is too large one of fewer levels, and Sobol points where that is not enough."""
-    for most in range(max(counts.values()), degree, -1):
+    # By two at a time: an odd number of levels keeps the middle.
+    for most in (*range(max(counts.values()), degree, -2), degree + 1):
         fewer = {f.name: min(counts[f.name], most) if f.levels is None else counts[f.name] for f in own.items}
         if np.prod(list(map(float, fewer.values()))) <= _MOST_GRID:
             return own.grid(fewer)
