@@ -152,19 +152,12 @@ def _covariance(regressor: Any, logs: NDArray[np.float64], free: NDArray[np.intp
 
 
 def _at_bound(name: str, side: int) -> Finding:
-    if name.startswith("length_scale_"):
-        factor = name.removeprefix("length_scale_")
-        text = (
-            f"the response hardly depends on {factor}"
-            if side > 0
-            else f"the response jumps from point to point of {factor}"
-        )
-        remedy = (
-            f"leave {factor} out"
-            if side > 0
-            else f"add points between those of {factor}, or take the response as noise"
-        )
-        return Finding(
-            "at_bound", (name,), f"{name} stands at its {'upper' if side > 0 else 'lower'} bound: {text}", remedy
-        )
-    return Finding("at_bound", (name,), f"{name} stands at its {'upper' if side > 0 else 'lower'} bound")
+    end = f"{name} stands at its {'upper' if side > 0 else 'lower'} bound"
+    if not name.startswith("length_scale_"):
+        return Finding("at_bound", (name,), end)
+    factor = name.removeprefix("length_scale_")
+    if side > 0:
+        remedy = f"look at the cut along {factor}: leave it out where that is flat"
+        return Finding("at_bound", (name,), f"{end}: the response is flat or straight along {factor}", remedy)
+    remedy = f"add points between those of {factor}, or record with less noise"
+    return Finding("at_bound", (name,), f"{end}: the response jumps from point to point of {factor}", remedy)
