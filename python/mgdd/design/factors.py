@@ -11,15 +11,13 @@ import numpy as np
 
 from mgdd.errors import DataError, ParameterError
 from mgdd.results.labels import Label, labelled_dataset, named_label
-from mgdd.surrogate.points import points_of
+from mgdd.surrogate.points import EDGE, points_of
 
 if TYPE_CHECKING:
     import xarray as xr
     from numpy.typing import NDArray
 
 __all__ = ["Factor", "Factors", "factors_of"]
-
-_EDGE = 1e-9  # share of a range by which a point may lie beyond it: digits of a file
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
@@ -90,7 +88,7 @@ class Factors:
         """Read the points of an earlier design, and refuse those outside the ranges."""
         points = points_of(table, self.names, what="existing")
         shares = self.to_unit(points)
-        out = (shares < -_EDGE) | (shares > 1.0 + _EDGE)
+        out = (shares < -EDGE) | (shares > 1.0 + EDGE)
         if out.any():
             row, column = (int(place) for place in np.argwhere(out)[0])
             factor = self.items[column]

@@ -13,7 +13,7 @@ from mgdd.errors import DataError, ParameterError, ShapeError
 from mgdd.optimize.optimum import limits_of
 from mgdd.results.describe import described
 from mgdd.results.labels import labelled_dataset, named_label
-from mgdd.surrogate.points import PointHull, column_label, column_names, hull_of, points_of
+from mgdd.surrogate.points import EDGE, PointHull, column_label, column_names, hull_of, points_of
 
 if TYPE_CHECKING:
     import xarray as xr
@@ -223,7 +223,7 @@ class FeasibleRegion:
         mgdd.errors.DataError
             A missing column, a number that is not finite, a limit that the model does not compute.
         """
-        return self._judged(points)[1].distance >= -1e-12
+        return self._judged(points)[1].distance >= -EDGE
 
     def evaluate(self, points: Any) -> xr.Dataset:
         """Say how far points lie inside, and what bounds them.
@@ -258,7 +258,7 @@ class FeasibleRegion:
         variables: dict[str, tuple[Any, ...]] = {
             "point": ("point", np.arange(judged.distance.size), "-", "point"),
             **{name: ("point", values, *column_label(points, name)) for name, values in columns.items()},
-            "feasible": ("point", judged.distance >= -1e-12, "-", "inside the region"),
+            "feasible": ("point", judged.distance >= -EDGE, "-", "inside the region"),
             "distance": ("point", judged.distance, "-", "distance from the boundary, positive inside"),
             "active_limit": ("point", judged.active, "-", "nearest limit"),
             "extrapolated": ("point", judged.extrapolated, "-", "outside of all measured points"),

@@ -15,9 +15,10 @@ from mgdd.signals.model import columns_of
 if TYPE_CHECKING:
     from numpy.typing import NDArray
 
-__all__ = ["MOST_FACTORS", "PointHull", "column_label", "column_names", "hull_of", "points_of"]
+__all__ = ["EDGE", "MOST_FACTORS", "PointHull", "column_label", "column_names", "hull_of", "points_of"]
 
 MOST_FACTORS = 6  # of a hull: its facets grow beyond all memory with more
+EDGE = 1e-9  # of a range: a point so far outside of a boundary lies on it
 _CHUNK = 1 << 22  # facets times points that are computed at once
 _FLAT = 1e-9  # thickness of points, in their ranges, below which they have no hull
 
@@ -98,5 +99,6 @@ def hull_of(points: NDArray[np.float64], names: Sequence[str]) -> PointHull:
     thickness = np.linalg.svd(scaled - scaled.mean(axis=0), compute_uv=False)[-1] / np.sqrt(n)
     if thickness < _FLAT:
         raise DataError(f"the points of {', '.join(names)} lie in a plane and enclose nothing: vary each on its own")
-    equations = np.unique(ConvexHull(scaled).equations.round(12), axis=0)
+    equations = ConvexHull(scaled).equations
+    equations = equations[np.unique(equations.round(9), axis=0, return_index=True)[1]]  # facets are cut into simplices
     return PointHull(lower=lower, span=span, normals=equations[:, :-1], offsets=equations[:, -1])

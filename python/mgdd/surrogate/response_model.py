@@ -13,7 +13,7 @@ from mgdd.errors import DataError, ParameterError
 from mgdd.io.parameters import ParameterFile, Parameters
 from mgdd.results.describe import described
 from mgdd.results.labels import Label, labelled_dataset
-from mgdd.surrogate.points import PointHull, hull_of, points_of
+from mgdd.surrogate.points import EDGE, PointHull, hull_of, points_of
 from mgdd.surrogate.polynomial import PolynomialSurface
 from mgdd.surrogate.process import ProcessSurface
 from mgdd.surrogate.response_file import read_response, response_file
@@ -174,7 +174,7 @@ class ResponseModel(Parameters):
         if self.hull is None:
             inside = np.all((points >= own.min(axis=0)) & (points <= own.max(axis=0)), axis=1)
         else:
-            inside = self.hull.depth(points)[0] >= -1e-9
+            inside = self.hull.depth(points)[0] >= -EDGE
         return np.asarray(~(inside & self.surface.supports(points)), dtype=np.bool_)
 
     def to_parameters(self) -> ParameterFile:
