@@ -21,6 +21,7 @@ __all__ = [
     "__version__",
     "control",
     "datasets",
+    "design",
     "engine",
     "errors",
     "guide",

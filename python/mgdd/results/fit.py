@@ -79,6 +79,8 @@ class Fit:
         Name of the model's structure.
     train, test : FitQuality or None
         Free run over the record that was fitted, and over another one.
+    checked_by : str
+        How `train` and `test` were computed where it was not a free run, for example ``"leave-one-out"``.
     findings : tuple of Finding
         What to distrust, and which measurement would settle it.
     unidentifiable : tuple of str
@@ -117,6 +119,7 @@ class Fit:
     kind: str
     train: FitQuality | None = None
     test: FitQuality | None = None
+    checked_by: str = "free-run"
     findings: tuple[Finding, ...] = ()
     unidentifiable: tuple[str, ...] = ()
     source: str = "record"
@@ -261,8 +264,8 @@ class Fit:
 
     def _headline(self) -> str:
         quality = [f"{name} {q}" for name, q in (("train", self.train), ("test", self.test)) if q is not None]
-        free_run = f": free-run fit {', '.join(quality)}" if quality else ""
-        return f"{self.kind} fitted to {self.source}{free_run}{'' if self.test else ', no test record'}"
+        checked = f": {self.checked_by} fit {', '.join(quality)}" if quality else ""
+        return f"{self.kind} fitted to {self.source}{checked}{'' if self.test else ', no test record'}"
 
     def _extra(self) -> list[Finding]:
         return [finding for finding in self.findings if finding not in self.report.findings]

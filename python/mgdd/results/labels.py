@@ -16,13 +16,13 @@ from typing import TYPE_CHECKING, Any, NamedTuple
 import numpy as np
 
 from mgdd.errors import DataError, ShapeError
-from mgdd.results.units import attribute_units, printed_units, unit_attributes
+from mgdd.results.units import attribute_units, printed_units, unit_attributes, unit_of, without_unit
 
 if TYPE_CHECKING:
     import xarray as xr
     from numpy.typing import ArrayLike
 
-__all__ = ["ANGLE", "VARIABLES", "Label", "check_labels", "label_of", "labelled_dataset", "to_jsonable"]
+__all__ = ["ANGLE", "VARIABLES", "Label", "check_labels", "label_of", "labelled_dataset", "named_label", "to_jsonable"]
 
 ANGLE = "crank_angle_cad"
 
@@ -235,6 +235,28 @@ def label_of(variable: xr.DataArray | xr.Variable) -> Label:
     Label(units='°CA aTDC', long_name='CA50, angle of 50 % heat released')
     """
     return Label(*printed_units(str(variable.attrs["units"]), str(variable.attrs["long_name"])))
+
+
+def named_label(name: str) -> Label:
+    """Return unit and name of a quantity of which nothing but its name is known.
+
+    Parameters
+    ----------
+    name : str
+        One of `VARIABLES`, or a name that ends in its unit.
+
+    Returns
+    -------
+    Label
+        As `VARIABLES` has it; otherwise the unit of the ending and the words before it.
+
+    Examples
+    --------
+    >>> from mgdd.results.labels import named_label
+    >>> named_label("soi_cad").long_name, named_label("fuel_mg")
+    ('start of injection', Label(units='mg', long_name='fuel'))
+    """
+    return VARIABLES[name] if name in VARIABLES else Label(unit_of(name), without_unit(name))
 
 
 def check_labels(dataset: xr.Dataset) -> None:

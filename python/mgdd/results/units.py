@@ -8,7 +8,7 @@ from __future__ import annotations
 
 import re
 
-__all__ = ["attribute_units", "printed_units", "unit_attributes", "unit_of"]
+__all__ = ["attribute_units", "printed_units", "unit_attributes", "unit_of", "without_unit"]
 
 # Printed units that only say whose unit it is, and counts: without a dimension in an attribute.
 _WHOSE = ("unit of ", "in the unit of ", "not given")
@@ -124,6 +124,29 @@ def unit_of(name: str) -> str:
     """
     whole = f"_{name}"
     return next((_UNITS[ending] for ending in _LONGEST_FIRST if whole.endswith(ending)), "-")
+
+
+def without_unit(name: str) -> str:
+    """Return a name in words, without the unit at its end.
+
+    Parameters
+    ----------
+    name : str
+        Name of a parameter or result.
+
+    Returns
+    -------
+    str
+        Spaces for underscores; the whole name where the unit is all of it.
+
+    Examples
+    --------
+    >>> from mgdd.results.units import without_unit
+    >>> without_unit("intake_pressure_kpa"), without_unit("compression_ratio")
+    ('intake pressure', 'compression ratio')
+    """
+    ending = next((ending for ending in _LONGEST_FIRST if name.endswith(ending)), "")
+    return (name.removesuffix(ending) or name).replace("_", " ").strip()
 
 
 def attribute_units(printed: str) -> str:

@@ -141,16 +141,16 @@ class SampledModel(ABC):
         return self.labels[name] if name in self.labels else VARIABLES[name]
 
 
-def columns_of(table: Any, names: Sequence[str]) -> list[NDArray[np.float64]]:
+def columns_of(table: Any, names: Sequence[str], *, what: str = "inputs", least: int = 2) -> list[NDArray[np.float64]]:
     """Return columns of a Dataset, a DataFrame or a mapping, finite and of one length."""
     columns = []
     for name in names:
         if name not in table:
-            raise DataError(f"inputs have no {name}: needed are {', '.join(names)}")
+            raise DataError(f"{what} have no {name}: needed are {', '.join(names)}")
         columns.append(np.asarray(table[name], dtype=np.float64))
     shapes = [column.shape for column in columns]
-    if columns[0].ndim != 1 or columns[0].size < 2 or set(shapes) != {shapes[0]}:
-        raise ShapeError(f"{', '.join(names)} have shapes {shapes}: must be columns of one length >= 2")
+    if columns[0].ndim != 1 or columns[0].size < least or set(shapes) != {shapes[0]}:
+        raise ShapeError(f"{', '.join(names)} have shapes {shapes}: must be columns of one length >= {least}")
     for name, column in zip(names, columns, strict=True):
         if not np.isfinite(column).all():
             raise DataError(f"{name}: sample {int(np.argmin(np.isfinite(column)))} is not a finite number")

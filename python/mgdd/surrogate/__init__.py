@@ -1,16 +1,22 @@
-"""Surrogate of a measured engine: response surfaces over its injection, and the lag of each signal.
+"""Models of measured responses: of an engine under random steps, and of any quantity over the points of a design.
 
-`fit_surrogate` makes one from records; `mgdd.loop.SurrogatePlant` runs it as an engine.
+`fit_surrogate` makes response surfaces over the injection with the lag of each signal, from records;
+`mgdd.loop.SurrogatePlant` runs them as an engine. `fit_response` fits a polynomial or a Gaussian process to the points
+of an experiment, as `mgdd.design.design_points` plans one.
 """
 
 from __future__ import annotations
 
 from mgdd.surrogate.fit import fit_surrogate
 from mgdd.surrogate.random_steps import random_step_records
+from mgdd.surrogate.response_fit import fit_response
+from mgdd.surrogate.response_model import ResponseModel
 from mgdd.surrogate.surrogate import EngineSurrogate
 
 __all__ = [
     "EngineSurrogate",
+    "ResponseModel",
+    "fit_response",
     "fit_surrogate",
     "random_step_records",
 ]

@@ -10,7 +10,7 @@ import numpy as np
 from mgdd.errors import DataError
 from mgdd.io.parameters import Entry, ParameterFile, Wanted, wanted
 from mgdd.results.labels import Label
-from mgdd.surrogate.response_surface import QuadraticBasis, Support
+from mgdd.surrogate.response_surface import PolynomialBasis, Support
 from mgdd.surrogate.sensor_lag import SensorLag
 from mgdd.surrogate.signal_model import SignalModel
 
@@ -19,7 +19,7 @@ if TYPE_CHECKING:
 
     from mgdd.surrogate.surrogate import EngineSurrogate
 
-__all__ = ["read_surrogate", "surrogate_file"]
+__all__ = ["array_of", "numbers_entry", "read_surrogate", "surrogate_file"]
 
 _LABELS = ("name", "units", "long_name")
 _SIGNAL = "signal_"
@@ -31,20 +31,20 @@ _PER_INPUT = "unit of the input"
 def surrogate_file(surrogate: EngineSurrogate) -> ParameterFile:
     """Give everything that a surrogate holds."""
     support, names = surrogate.support, list(surrogate.inputs)
-    own = {name: _numbers(getattr(support, name), _PER_INPUT) for name in ("lower", "upper")}
-    own |= {name: _numbers(getattr(support.basis, name), _PER_INPUT) for name in ("centre", "scale")}
-    own |= {"root": _numbers(support.root), "leverage_limit": Entry(value=float(support.leverage_limit))}
+    own = {name: numbers_entry(getattr(support, name), _PER_INPUT) for name in ("lower", "upper")}
+    own |= {name: numbers_entry(getattr(support.basis, name), _PER_INPUT) for name in ("centre", "scale")}
+    own |= {"root": numbers_entry(support.root), "leverage_limit": Entry(value=float(support.leverage_limit))}
     tables = {
         "inputs": {
             **_labels(names, [surrogate.input_labels[name] for name in names]),
-            "median": _numbers([surrogate.medians[name] for name in names], _PER_INPUT),
+            "median": numbers_entry([surrogate.medians[name] for name in names], _PER_INPUT),
         },
         "support": own,
         "signals": _labels(list(surrogate.signals), [signal.label for signal in surrogate.signals.values()]),
         **{_SIGNAL + name: _signal(signal) for name, signal in surrogate.signals.items()},
         "records": {
             "nonnegative": Entry(value=list(surrogate.nonnegative)),
-            "residuals": _numbers(surrogate.residuals, "unit of the signal"),
+            "residuals": numbers_entry(surrogate.residuals, "unit of the signal"),
         },
         "source": {name: Entry(value=_said(value)) for name, value in surrogate.source.items()},
     }
@@ -66,25 +66,27 @@ def read_surrogate(file: ParameterFile) -> dict[str, Any]:
     if [_SIGNAL + name for name in labels] != per_signal:
         raise DataError(f"{file.origin}: [signals] names {', '.join(labels)}: each needs its table [signal_...]")
     n, terms = len(inputs["name"]), (len(inputs["name"]) + 1) * (len(inputs["name"]) + 2) // 2
-    lower, upper, centre, scale = (_array(file, f"[support] {name}", own[name], (n,)) for name in vectors)
+    lower, upper, centre, scale = (array_of(file, f"[support] {name}", own[name], (n,)) for name in vectors)
     support = Support(
         inputs=tuple(inputs["name"]),
         lower=lower,
         upper=upper,
         leverage_limit=own["leverage_limit"],
-        basis=QuadraticBasis(centre=centre, scale=scale),
-        root=_array(file, "[support] root", own["root"], (terms, terms)),
+        basis=PolynomialBasis.of("quadratic", centre=centre, scale=scale),
+        root=array_of(file, "[support] root", own["root"], (terms, terms)),
     )
     return dict(  # noqa: C408 one line per field
         signals={name: _signal_of(file, name, label, terms) for name, label in labels.items()},
         support=support,
         medians={
             name: float(value)
-            for name, value in zip(inputs["name"], _array(file, "[inputs] median", inputs["median"], (n,)), strict=True)
+            for name, value in zip(
+                inputs["name"], array_of(file, "[inputs] median", inputs["median"], (n,)), strict=True
+            )
         },
         input_labels={name: Label(*label) for name, *label in zip(*(inputs[part] for part in _LABELS), strict=True)},
         nonnegative=tuple(records["nonnegative"]),
-        residuals=_array(file, "[records] residuals", records["residuals"], (len(records["residuals"]), len(labels))),
+        residuals=array_of(file, "[records] residuals", records["residuals"], (len(records["residuals"]), len(labels))),
         source={
             name: tuple(entry.value) if isinstance(entry.value, list) else entry.value
             for name, entry in file.tables["source"].items()
@@ -95,10 +97,10 @@ def read_surrogate(file: ParameterFile) -> dict[str, Any]:
 def _signal(signal: SignalModel) -> dict[str, Entry]:
     unit = signal.label.units
     own = {
-        "coefficients": _numbers(signal.coefficients, unit),
+        "coefficients": numbers_entry(signal.coefficients, unit),
         "lag_cycles": Entry(value=int(signal.lag_cycles), unit="cycles"),
-        "lags": _numbers(list(signal.lag_scores), "cycles"),
-        "lag_scores": _numbers(list(signal.lag_scores.values())),
+        "lags": numbers_entry(list(signal.lag_scores), "cycles"),
+        "lag_scores": numbers_entry(list(signal.lag_scores.values())),
         "lag_at_bound": Entry(value=bool(signal.lag_at_bound)),
         **{name: Entry(value=float(getattr(signal, name)), unit=_unit(name, unit)) for name in _OWN},
     }
@@ -107,8 +109,8 @@ def _signal(signal: SignalModel) -> dict[str, Entry]:
         own |= {name: Entry(value=float(getattr(sensor, name)), unit="cycles") for name in _SENSOR}
         own |= {
             "delay_cycles": Entry(value=int(sensor.delay_cycles), unit="cycles"),
-            "delays": _numbers(list(sensor.delay_share), "cycles"),
-            "delay_share": _numbers(list(sensor.delay_share.values())),
+            "delays": numbers_entry(list(sensor.delay_share), "cycles"),
+            "delay_share": numbers_entry(list(sensor.delay_share.values())),
             "at_bound": Entry(value=bool(sensor.at_bound)),
         }
     return own
@@ -141,7 +143,7 @@ def _signal_of(file: ParameterFile, name: str, label: Label, terms: int) -> Sign
             **{own: values.pop(own) for own in (*_SENSOR, "delay_cycles", "at_bound")},
         )
     scores = dict(zip(map(int, values.pop("lags")), map(float, values.pop("lag_scores")), strict=True))
-    coefficients = _array(file, f"[{table}] coefficients", values.pop("coefficients"), (terms,))
+    coefficients = array_of(file, f"[{table}] coefficients", values.pop("coefficients"), (terms,))
     return SignalModel(name=name, label=label, coefficients=coefficients, lag_scores=scores, sensor=sensor, **values)
 
 
@@ -157,11 +159,13 @@ def _unit(name: str, own: str) -> str:
     return "-" if name.startswith("r2") else own
 
 
-def _numbers(values: Any, unit: str = "-") -> Entry:
+def numbers_entry(values: Any, unit: str = "-") -> Entry:
+    """Return numbers as an entry of a file."""
     return Entry(value=np.asarray(values, dtype=np.float64).tolist(), unit=unit)
 
 
-def _array(file: ParameterFile, what: str, values: Any, shape: tuple[int, ...]) -> NDArray[np.float64]:
+def array_of(file: ParameterFile, what: str, values: Any, shape: tuple[int, ...]) -> NDArray[np.float64]:
+    """Return what a file holds as an array, and refuse another shape."""
     try:
         array = np.array(values, dtype=np.float64)
     except ValueError as error:

@@ -11,7 +11,7 @@ import numpy as np
 from mgdd.errors import DataError, ParameterError
 from mgdd.results.labels import Label, label_of
 from mgdd.signals.even_grid import check_count
-from mgdd.surrogate.response_surface import QuadraticBasis, least_squares_of, r_squared, support_of
+from mgdd.surrogate.response_surface import PolynomialBasis, least_squares_of, r_squared, support_of
 from mgdd.surrogate.sensor_lag import SensorLag, find_sensor_lag, lagged
 from mgdd.surrogate.signal_model import SignalModel
 from mgdd.surrogate.surrogate import STEERED, EngineSurrogate
@@ -106,7 +106,7 @@ def fit_surrogate(
     flat = [name for name, sd in zip(names, scale, strict=True) if not sd > 0.0]
     if flat:
         raise DataError(f"{flat[0]} does not vary in the records: leave it out of inputs")
-    basis = QuadraticBasis(centre=centre, scale=scale)
+    basis = PolynomialBasis.of("quadratic", centre=centre, scale=scale)
     split = round((1.0 - held_out) * len(commands))
     log = _Log(terms=basis(commands), commands=commands, excited=excited, split=split)
     models, left = {}, []

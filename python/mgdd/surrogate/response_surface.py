@@ -1,9 +1,11 @@
-"""Quadratic response surface: a full second-order polynomial in standardised inputs, and where it was fitted."""
+"""Response surface: a polynomial in standardised inputs, and where it was fitted."""
 
 from __future__ import annotations
 
+from collections import Counter
 from dataclasses import dataclass
 from functools import lru_cache
+from itertools import combinations_with_replacement
 from typing import TYPE_CHECKING
 
 import numpy as np
@@ -15,21 +17,44 @@ if TYPE_CHECKING:
 
     from numpy.typing import NDArray
 
-__all__ = ["QuadraticBasis", "Support", "least_squares_of", "r_squared", "support_of"]
+__all__ = ["MODELS", "PolynomialBasis", "Support", "least_squares_of", "r_squared", "support_of"]
+
+
+MODELS = ("linear", "interactions", "quadratic", "cubic")
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
-class QuadraticBasis:
-    """The terms 1, z_i and z_i z_j of the inputs z = (x - centre)/scale."""
+class PolynomialBasis:
+    """Products of the inputs z = (x - centre)/scale; a row of `monomials` has the inputs of one term, 0 for none."""
 
     centre: NDArray[np.float64]
     scale: NDArray[np.float64]
+    monomials: NDArray[np.intp]
+
+    @classmethod
+    def of(cls, model: str | int, *, centre: NDArray[np.float64], scale: NDArray[np.float64]) -> PolynomialBasis:
+        """Return all terms of a model of `MODELS`, or of a degree: first 1, then the inputs, then the products."""
+        return cls(centre=centre, scale=scale, monomials=_monomials(model, centre.size))
 
     def __call__(self, points: NDArray[np.float64]) -> NDArray[np.float64]:
-        """Return the terms, shape (n, 1 + m + m (m + 1)/2), of points of shape (n, m)."""
-        z = (points - self.centre) / self.scale
-        first, second = _pairs(z.shape[1])
-        return np.column_stack([np.ones(len(z)), z, z[:, first] * z[:, second]])
+        """Return the terms, shape (n, p), of points of shape (n, m)."""
+        z = np.column_stack([np.ones(len(points)), (points - self.centre) / self.scale])
+        terms = z[:, self.monomials[:, 0]]
+        for column in self.monomials.T[1:]:
+            terms = terms * z[:, column]
+        return np.asarray(terms, dtype=np.float64)
+
+    def only(self, kept: Sequence[int] | NDArray[np.intp]) -> PolynomialBasis:
+        """Return some of the terms."""
+        return PolynomialBasis(centre=self.centre, scale=self.scale, monomials=self.monomials[kept])
+
+    def names(self, inputs: Sequence[str]) -> tuple[str, ...]:
+        """Name the terms, for example ``1``, ``soi_cad``, ``soi_cad^2`` and ``soi_cad*fuel_mg``."""
+        out = []
+        for monomial in self.monomials.tolist():
+            powers = Counter(inputs[place - 1] for place in monomial if place > 0)
+            out.append("*".join(name if power == 1 else f"{name}^{power}" for name, power in powers.items()) or "1")
+        return tuple(out)
 
 
 @described
@@ -45,7 +70,7 @@ class Support:
         The box, in the units of the inputs.
     leverage_limit : float
         Leverage that the same share of the records in the box does not exceed [-]; corners of the box do.
-    basis : QuadraticBasis
+    basis : PolynomialBasis
         Turns points into terms.
     root : ndarray, shape (p, p)
         W, whose product with the terms has the leverage as its sum of squares; over the n records in the box its
@@ -65,7 +90,7 @@ class Support:
     lower: NDArray[np.float64]
     upper: NDArray[np.float64]
     leverage_limit: float
-    basis: QuadraticBasis
+    basis: PolynomialBasis
     root: NDArray[np.float64]
 
     def __post_init__(self) -> None:
@@ -113,12 +138,20 @@ class Support:
 
 
 @lru_cache
-def _pairs(inputs: int) -> tuple[NDArray[np.intp], NDArray[np.intp]]:
-    first, second = np.triu_indices(inputs)
-    return first, second
+def _monomials(model: str | int, inputs: int) -> NDArray[np.intp]:
+    """Return the rows of `PolynomialBasis`: every way to pick `degree` of 1, z_1, ... z_m, in their order."""
+    degree = model if isinstance(model, int) else {"linear": 1, "cubic": 3}.get(model, 2)
+    rows = list(combinations_with_replacement(range(inputs + 1), degree))
+    if model == "interactions":
+        rows = [row for row in rows if row[0] != row[1] or row[0] == 0]
+    out = np.array(rows, dtype=np.intp)
+    out.flags.writeable = False
+    return out
 
 
-def support_of(points: NDArray[np.float64], basis: QuadraticBasis, *, inputs: tuple[str, ...], share: float) -> Support:
+def support_of(
+    points: NDArray[np.float64], basis: PolynomialBasis, *, inputs: tuple[str, ...], share: float
+) -> Support:
     """Find the support of the points that a surface was fitted to."""
     tail = 0.5 * (1.0 - share)
     lower, upper = np.quantile(points, [tail, 1.0 - tail], axis=0)

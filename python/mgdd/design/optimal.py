@@ -1,0 +1,153 @@
+"""D-optimal designs by exchange: the points of a candidate set that determine the terms of a model best."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from mgdd.errors import DataError
+
+if TYPE_CHECKING:
+    from numpy.typing import NDArray
+
+__all__ = ["Exchange", "d_efficiency_percent", "d_optimal"]
+
+_LEAST_GAIN = 1e-8  # relative gain in det that is worth an exchange; below it rounding decides
+_SWEEPS = 200
+_RIDGE = 1e-6
+
+
+@dataclass(frozen=True, kw_only=True, eq=False)
+class Exchange:
+    """The best of several searches: rows of the candidates, and log det of X'X after each exchange."""
+
+    rows: NDArray[np.intp]
+    log_det: float
+    history: tuple[float, ...]
+    log_det_starts: tuple[float, ...]
+
+
+def d_optimal(
+    candidates: NDArray[np.float64],
+    n: int,
+    *,
+    fixed: NDArray[np.float64],
+    n_starts: int,
+    generator: np.random.Generator,
+) -> Exchange:
+    """Choose `n` candidates, repeats allowed, that with the fixed rows maximise det X'X.
+
+    Fedorov's exchange in the form of Cook and Nachtsheim: each point in turn gives way to the candidate that raises
+    the determinant most, until none does. A local optimum, hence several random starts.
+
+    Parameters
+    ----------
+    candidates : ndarray, shape (c, p)
+        Terms of the model at the points that may be chosen.
+    n : int
+        Points to choose; with the fixed ones at least p.
+    fixed : ndarray, shape (k, p)
+        Terms at points that stay, maybe none.
+    n_starts : int
+        Random starts.
+    generator : numpy.random.Generator
+        Of the starts.
+
+    Returns
+    -------
+    Exchange
+        The best search.
+
+    Raises
+    ------
+    DataError
+        Candidates that do not determine the terms.
+
+    References
+    ----------
+    Fedorov (1972), Theory of Optimal Experiments.
+    Cook and Nachtsheim (1980), A comparison of algorithms for constructing exact D-optimal designs.
+    """
+    p = candidates.shape[1]
+    rank = int(np.linalg.matrix_rank(np.vstack([candidates, fixed])))
+    if rank < p:
+        raise DataError(
+            f"{len(candidates)} feasible candidates determine {rank} of the {p} terms of the model: choose a smaller "
+            "model, more levels or a wider region"
+        )
+    found = [_search(candidates, _start(candidates, n, fixed, generator), fixed) for _ in range(n_starts)]
+    best = max(found, key=lambda each: each[1][-1])
+    if not np.isfinite(best[1][-1]):
+        raise DataError(f"none of {n_starts} starts determines the {p} terms of the model: add points or starts")
+    return Exchange(
+        rows=best[0],
+        log_det=best[1][-1],
+        history=tuple(best[1]),
+        log_det_starts=tuple(history[-1] for _, history in found),
+    )
+
+
+def d_efficiency_percent(log_det: float, *, n: int, terms: int) -> float:
+    """Return 100 det(X'X)^(1/p)/n: 100 % is an orthogonal design at the ends of all ranges, which may not exist."""
+    return float(100.0 * np.exp(log_det / terms) / n)
+
+
+def _start(
+    candidates: NDArray[np.float64], n: int, fixed: NDArray[np.float64], generator: np.random.Generator
+) -> NDArray[np.intp]:
+    """Return a third of the rows at random, the others where the prediction is worst."""
+    rows = generator.integers(len(candidates), size=max(1, n // 3)).tolist()
+    own = np.vstack([fixed, candidates[rows]])
+    spread = np.linalg.inv(own.T @ own + _RIDGE * np.eye(own.shape[1]))
+    variance = np.sum((candidates @ spread) * candidates, axis=1)
+    while len(rows) < n:
+        row = int(np.argmax(variance))
+        rows.append(row)
+        spread, variance = _changed(candidates, spread, variance, candidates[row], 1.0)
+    return np.array(rows, dtype=np.intp)
+
+
+def _search(
+    candidates: NDArray[np.float64], start: NDArray[np.intp], fixed: NDArray[np.float64]
+) -> tuple[NDArray[np.intp], list[float]]:
+    rows = start.copy()
+    history = [_log_det(candidates[rows], fixed)]
+    for _ in range(_SWEEPS if np.isfinite(history[0]) else 0):
+        own = np.vstack([fixed, candidates[rows]])
+        spread = np.linalg.inv(own.T @ own)
+        variance = np.sum((candidates @ spread) * candidates, axis=1)
+        before = rows.copy()
+        for place in range(rows.size):
+            old = candidates[rows[place]]
+            across, at = candidates @ (spread @ old), variance[rows[place]]
+            gain = variance - at - (variance * at - across**2)  # Fedorov's delta
+            best = int(np.argmax(gain))
+            if gain[best] > _LEAST_GAIN:
+                rows[place] = best
+                spread, variance = _changed(candidates, spread, variance, candidates[best], 1.0)
+                spread, variance = _changed(candidates, spread, variance, old, -1.0)
+                history.append(_log_det(candidates[rows], fixed))
+        if np.array_equal(rows, before):
+            break
+    return rows, history
+
+
+def _changed(
+    candidates: NDArray[np.float64],
+    spread: NDArray[np.float64],
+    variance: NDArray[np.float64],
+    row: NDArray[np.float64],
+    sign: float,
+) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
+    """Add (1) or remove (-1) a row: the rank-one update of the inverse, and of x' (X'X)^-1 x."""
+    along = spread @ row
+    weight = sign / (1.0 + sign * float(row @ along))
+    return spread - weight * np.outer(along, along), variance - weight * (candidates @ along) ** 2
+
+
+def _log_det(rows: NDArray[np.float64], fixed: NDArray[np.float64]) -> float:
+    own = np.vstack([fixed, rows])
+    sign, value = np.linalg.slogdet(own.T @ own)
+    return float(value) if sign > 0.0 else float("-inf")

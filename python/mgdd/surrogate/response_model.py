@@ -1,0 +1,190 @@
+"""The model of one response over the factors of a design: prediction, interval, and where it ends."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass
+from functools import cached_property
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+
+from mgdd.errors import DataError, ParameterError
+from mgdd.io.parameters import ParameterFile, Parameters
+from mgdd.results.describe import described
+from mgdd.results.labels import Label, labelled_dataset
+from mgdd.surrogate.points import EDGE, PointHull, hull_of, points_of
+from mgdd.surrogate.polynomial import PolynomialSurface
+from mgdd.surrogate.process import ProcessSurface
+from mgdd.surrogate.response_file import read_response, response_file
+
+if TYPE_CHECKING:
+    import xarray as xr
+    from numpy.typing import NDArray
+
+__all__ = ["RESERVED", "ResponseModel"]
+
+RESERVED = ("point", "mean", "mean_sd", "sd", "lower", "upper", "extrapolated")
+
+
+def _rows(model: ResponseModel) -> dict[str, Any]:
+    surface = model.surface
+    own: dict[str, Any] = {"factors": tuple(model.factors), "points": model.values.size, "noise_sd": surface.noise_sd}
+    if isinstance(surface, PolynomialSurface):
+        own["terms"] = model.terms
+    else:
+        own["length_scale"] = dict(zip(model.factors, surface.length_scales.tolist(), strict=True))
+    return own
+
+
+@dataclass(frozen=True, kw_only=True, eq=False)
+class ResponseModel(Parameters):
+    """A polynomial or a Gaussian process of one response, with the points that it was fitted to.
+
+    Parameters
+    ----------
+    name : str
+        The response.
+    label : Label
+        Its unit and long name.
+    factors : mapping of str to Label
+        Unit and long name of each factor.
+    surface : object
+        Coefficients or length scales, noise and points.
+
+    Examples
+    --------
+    >>> import numpy as np
+    >>> from mgdd.design import design_points
+    >>> from mgdd.surrogate import fit_response
+    >>> plan = design_points({"soi_cad": (-20.0, 5.0), "fuel_mg": (5.0, 40.0)}, 32, seed=1)
+    >>> noise = np.random.default_rng(1).normal(0.0, 0.05, 32)
+    >>> imep = 0.3 * plan["fuel_mg"] - 0.004 * (plan["soi_cad"] + 6.0) ** 2 + noise
+    >>> model = fit_response(plan, imep).model
+    >>> model.terms
+    ('1', 'soi_cad', 'fuel_mg', 'soi_cad^2')
+    >>> found = model.predict({"soi_cad": -6.0, "fuel_mg": [20.0, 60.0]})
+    >>> found["mean"].values.round(1).tolist(), found["extrapolated"].values.tolist()
+    ([6.0, 18.0], [False, True])
+    """
+
+    name: str
+    label: Label
+    factors: Mapping[str, Label]
+    surface: PolynomialSurface | ProcessSurface
+
+    @property
+    def kind(self) -> str:
+        """``polynomial`` or ``gaussian_process``."""
+        return "polynomial" if isinstance(self.surface, PolynomialSurface) else "gaussian_process"
+
+    @property
+    def points(self) -> NDArray[np.float64]:
+        """Points that were fitted, shape (n, m)."""
+        return self.surface.points
+
+    @property
+    def values(self) -> NDArray[np.float64]:
+        """The response there, shape (n,)."""
+        return self.surface.values
+
+    @property
+    def terms(self) -> tuple[str, ...]:
+        """Names of the terms of a polynomial, nothing of a Gaussian process."""
+        if isinstance(self.surface, PolynomialSurface):
+            return self.surface.support.basis.names(tuple(self.factors))
+        return ()
+
+    @cached_property
+    def hull(self) -> PointHull | None:
+        """Convex hull of the points; None where they have none: then their ranges count."""
+        try:
+            return hull_of(self.points, tuple(self.factors))
+        except DataError:  # said by `fit_response` as a finding
+            return None
+
+    def predict(self, points: Any, *, level: float = 0.95) -> xr.Dataset:
+        """Predict the response.
+
+        Parameters
+        ----------
+        points : xarray.Dataset, DataFrame or mapping of columns
+            The factors in their units; a single number counts for every point.
+        level : float
+            Probability of the interval [-].
+
+        Returns
+        -------
+        xarray.Dataset
+            Over ``point``, in the unit of the response: ``mean``; ``mean_sd``, its standard deviation; ``sd``, that of
+            one new measurement; ``lower`` and ``upper``, between which a new measurement falls with the probability;
+            ``extrapolated`` [-] where the point lies outside the hull of the fitted points, or has a higher leverage
+            than any of them; and the factors. The interval takes the terms or length scales as given.
+
+        Raises
+        ------
+        mgdd.errors.ParameterError
+            A level outside 0 to 1.
+        mgdd.errors.DataError
+            A factor is missing or not finite.
+
+        Examples
+        --------
+        >>> from mgdd.surrogate import fit_response
+        >>> line = {"fuel_mg": [5.0, 10.0, 20.0, 30.0, 40.0], "imep_bar": [1.1, 2.9, 6.1, 8.8, 12.1]}
+        >>> model = fit_response(line, "imep_bar", degree=1).model
+        >>> found = model.predict({"fuel_mg": [15.0]})
+        >>> found["lower"].item() < found["mean"].item() < found["upper"].item()
+        True
+        """
+        from scipy.stats import t
+
+        if not 0.0 < level < 1.0:
+            raise ParameterError.of("level", level, "between 0 and 1")
+        at = points_of(points, tuple(self.factors))
+        mean, mean_sd = self.surface.predict(at)
+        sd = np.sqrt(mean_sd**2 + self.surface.noise_sd**2)
+        wide = float(t.ppf(0.5 + 0.5 * level, self.surface.freedom)) * sd
+        extrapolated = self.extrapolated(at)
+        unit, name = self.label
+        attrs: dict[str, Any] = {"response": self.name, "kind": self.kind, "level": level}
+        if extrapolated.any():
+            attrs["remark"] = f"{int(extrapolated.sum())} of {len(at)} points are extrapolated: measure there first"
+        columns = {
+            factor: ("point", column, *label)
+            for (factor, label), column in zip(self.factors.items(), at.T, strict=True)
+        }
+        return labelled_dataset(
+            {
+                "point": ("point", np.arange(len(at)), "-", "point"),
+                **columns,
+                "mean": ("point", mean, unit, f"{name}, prediction"),
+                "mean_sd": ("point", mean_sd, unit, f"{name}, standard deviation of the prediction"),
+                "sd": ("point", sd, unit, f"{name}, standard deviation of a new measurement"),
+                "lower": ("point", mean - wide, unit, f"{name}, lower end of the prediction interval"),
+                "upper": ("point", mean + wide, unit, f"{name}, upper end of the prediction interval"),
+                "extrapolated": ("point", extrapolated, "-", "outside of the fitted points"),
+            },
+            attrs=attrs,
+        )
+
+    def extrapolated(self, points: NDArray[np.float64]) -> NDArray[np.bool_]:
+        """Return which points, shape (n, m), lie outside of those that were fitted."""
+        own = self.points
+        if self.hull is None:
+            inside = np.all((points >= own.min(axis=0)) & (points <= own.max(axis=0)), axis=1)
+        else:
+            inside = self.hull.depth(points)[0] >= -EDGE
+        return np.asarray(~(inside & self.surface.supports(points)), dtype=np.bool_)
+
+    def to_parameters(self) -> ParameterFile:
+        """Give everything, the points included, as `to_toml` writes it."""
+        return response_file(self)
+
+    @classmethod
+    def from_parameters(cls, file: ParameterFile) -> ResponseModel:
+        """Make the model of a file that `to_toml` wrote; needs no scikit-learn."""
+        return cls(**read_response(file))
+
+
+described(ResponseModel, rows=_rows)
