@@ -3,7 +3,6 @@
 // timed.
 #include <benchmark/benchmark.h>
 
-#include <algorithm>
 #include <cmath>
 #include <cstddef>
 #include <string>
@@ -70,20 +69,10 @@ BENCHMARK_CAPTURE(dual_cycle, wiebe_gamma_linear, Variant{.burn = BurnShape::wie
 
 // --- the literal form -----------------------------------------------------------------------------------------
 
-// Name of the first indicator that differs by more than 1e-9 (of its size, or of 1); empty if none does.
-std::string disagreement(const Indicators<double>& a, const Indicators<double>& b) {
-  for (const auto& f : indicator_fields<double>()) {
-    const double x = a.*(f.member);
-    const double y = b.*(f.member);
-    if (!(std::abs(x - y) <= 1e-9 * std::max(1.0, std::abs(x)))) return std::string(f.name);
-  }
-  return {};
-}
-
 template <bool MotoredTable>
 void literal(benchmark::State& state) {
   const CycleModel<double> model(Cylinder{}, crank_grid(Cylinder{}));
-  const bench::LiteralCycle printed(model);
+  const LiteralCycle printed(model);
   const Charge<double> charge = model.charge({});
   CycleWorkspace<double> work = model.make_workspace();
   model.run(charge, soc_cad, work);

@@ -1,10 +1,10 @@
-// The cycle with its equations as printed, which the core's algebra is compared with: trapezoid, triangle, constant
-// gamma, Woschni; per step p^0.8, T^-0.55, w^0.8 and, where `MotoredTable` is false, (V_ref / V)^gamma. Geometry stands
-// in tables, as in the model.
+// The cycle of Tan 2018 as printed, with its powers by std::pow: what the arranged forms are measured against.
 #pragma once
 
+#include <algorithm>
 #include <cmath>
 #include <cstddef>
+#include <string>
 #include <vector>
 
 #include "mgdd/common/units.hpp"
@@ -12,8 +12,10 @@
 #include "mgdd/engine/cycle.hpp"
 #include "mgdd/engine/wall_heat.hpp"
 
-namespace mgdd::engine::bench {
+namespace mgdd::engine {
 
+// Trapezoid, triangle, constant gamma and Woschni as printed: per step p^0.8, T^-0.55, w^0.8 and, where `motored_table`
+// is false, (V_ref / V)^gamma. Geometry stands in tables, as in the model, and the indicators are the model's own.
 struct LiteralCycle {
   Cylinder c;
   std::vector<double> angle, volume, area, motored;
@@ -60,4 +62,14 @@ struct LiteralCycle {
   }
 };
 
-}  // namespace mgdd::engine::bench
+// Name of the first indicator that differs by more than 1e-9 (of its size, or of 1); empty if none does.
+inline std::string disagreement(const Indicators<double>& a, const Indicators<double>& b) {
+  for (const auto& f : indicator_fields<double>()) {
+    const double x = a.*(f.member);
+    const double y = b.*(f.member);
+    if (!(std::abs(x - y) <= 1e-9 * std::max(1.0, std::abs(x)))) return std::string(f.name);
+  }
+  return {};
+}
+
+}  // namespace mgdd::engine

@@ -15,6 +15,7 @@ void bind_guided_predictive(pybind11::module_& m);
 void bind_supervisor(pybind11::module_& m);
 void bind_cylinder(pybind11::module_& m);
 void bind_emissions(pybind11::module_& m);
+void bind_batch(pybind11::module_& m);
 void bind_cycle(pybind11::module_& m);
 void bind_performance(pybind11::module_& m);
 void bind_pressure(pybind11::module_& m);

@@ -99,6 +99,14 @@ class WallHeat {
     }
   }
 
+  /// The numbers of the law, for code that carries many cycles: the heat of a step is scale volume_term
+  /// (T - wall_k) film; the film of Woschni is p^0.25 still_power, or p^0.25 w^0.8 while w = (still - burning
+  /// motored_ratio) + burning_per_pa p exceeds still; that of Hohenberg p^0.4.
+  struct Constants {
+    T scale, wall_k, still, burning, burning_per_pa, still_power;
+  };
+  Constants constants() const noexcept { return {scale_, wall_k_, still_, burning_, burning_per_pa_, still_power_}; }
+
   /// The heat of a step is `lead_j` times `film`: two factors, because the first is ready long before the second.
   T lead_j(const T& temperature_k, const T& volume_term) const noexcept {
     return scale_ * volume_term * (temperature_k - wall_k_);
