@@ -59,7 +59,7 @@ extern "C" {
 // figures, on the default cylinder with a step of 1 °CA.
 MGDD_BENCH_EXPORT void mgdd_literal_cycles(const double* cases, std::size_t n_cases, double* figures) {
   const CycleModel<double> model(Cylinder{}, crank_grid(Cylinder{}));
-  const bench::LiteralCycle printed(model);
+  const LiteralCycle printed(model);
   CycleWorkspace<double> work = model.make_workspace();
   for (std::size_t i = 0; i < n_cases; ++i) {
     const double* row = cases + 5 * i;
