@@ -1,4 +1,4 @@
-"""One engine cycle as a reactor network in Cantera: other physics than ours, for a table of its own in `sweep_speed.py`.
+"""One engine cycle as a reactor network in Cantera: other physics than ours, for `sweep_speed.py`.
 
 A cylinder of ideal gas with n-dodecane, air and their reactions (`nDodecane_Reitz.yaml` of the wheel), intake and
 exhaust valve, injector and a piston wall that moves by the slider crank, over 720 °CA with gas exchange. No wall heat,

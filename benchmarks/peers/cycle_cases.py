@@ -101,7 +101,7 @@ def cut_tables(e: Engine) -> CutTables:
     return CutTables((v0 - half) / (v1 + half), inner / (v1 + half), wall, (e.volume[0] / v0) ** e.gamma)
 
 
-def charge_of(e, speed, fuel, pressure_kpa, temperature):  # noqa: ANN001, ANN201: floats, columns or tracers
+def charge_of(e, speed, fuel, pressure_kpa, temperature):  # floats, columns or tracers
     """Return p(IVC) [Pa], gas N R [J/K] (Tan 2018, eq. 2-3), heat of the fuel [J] and burn duration [°CA]."""
     pressure = pressure_kpa * 1e3
     gas = e.volumetric_efficiency * pressure * e.swept / temperature

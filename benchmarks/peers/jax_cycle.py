@@ -64,8 +64,7 @@ def _figures(e: Engine, cases: jax.Array, *, shared: bool, unroll: int) -> jax.A
             following = keep * p + gain * (heat * (after - burned) - loss)
             higher = p > highest[1]
             highest = tuple(
-                jnp.where(higher, new, old)
-                for new, old in zip((before, p, following, angle), highest, strict=True)
+                jnp.where(higher, new, old) for new, old in zip((before, p, following, angle), highest, strict=True)
             )
             steeper = following - p > slope
             slope, steep = jnp.where(steeper, following - p, slope), jnp.where(steeper, angle, steep)

@@ -1,4 +1,6 @@
-"""Many cycles in Numba, scalar code per cycle, on one core or by `prange`, for `sweep_speed.py`. The forms:
+"""Many cycles in Numba, scalar code per cycle, on one core or by `prange`, for `sweep_speed.py`.
+
+The forms:
 
 - `literal`: four general powers in every step, as the equations are printed;
 - `cut`: everything of the angle in tables, two square roots, one power and that only from SOC on, figures in the
@@ -33,7 +35,7 @@ def _write(e, p_ref, heat, p_end, closed, lost, a, b, c, top, slope, steep, out)
 
 
 @numba.njit(error_model="numpy")
-def _literal_cycle(e, tables, case, p, out) -> None:  # noqa: ARG001: one signature for both forms
+def _literal_cycle(e, tables, case, p, out) -> None:  # noqa: ARG001 - one signature for both forms
     speed, soc = case[0], case[4]
     p_ref, gas, heat, duration = _charge(e, speed, case[1], case[2], case[3])
     v, n = e.volume, e.angle.size
@@ -64,8 +66,8 @@ def _literal_cycle(e, tables, case, p, out) -> None:  # noqa: ARG001: one signat
 
 
 @numba.njit(error_model="numpy")
-def _wall(e, p_ref, gas, speed):
-    """Scale of the loss, still velocity, velocity per Pa, and the loss of the still velocity per its tables."""
+def _wall(e, gas, speed):
+    """Return scale of the loss, velocity without burn, velocity per Pa of rise, power 0.8 of that without burn."""
     still = e.c2 * e.stroke * speed / 30.0
     scale = e.wall_scale * 1e5**-0.8 * e.bore**-0.2 * gas**0.55 / (6.0 * speed)
     return scale, still, e.cp * e.swept / gas, math.exp(0.8 * math.log(still))
@@ -73,7 +75,7 @@ def _wall(e, p_ref, gas, speed):
 
 @numba.njit(error_model="numpy")
 def _compress(e, tables, p_ref, gas, scale_still, last, p) -> tuple[float, float]:
-    """Steps 0 to `last`, without heat release and power; the pressures go to `p`."""
+    """Integrate to step `last` without heat release and power; the pressures go to `p`."""
     closed = lost = 0.0
     pressure, per_gas = p_ref, 1.0 / gas
     p[0] = p_ref
@@ -94,17 +96,13 @@ def _burn(e, tables, case, charge, wall, start, closed, lost, top, steep, p, out
     scale, still, per_pa, still_power = wall
     soc, per_gas, per_duration = case[4], 1.0 / gas, 1.0 / duration
     pressure, closed, slope, burned = p[start], 2.0 * closed, p[steep + 1] - p[steep], 0.0
-    power = still_power
     highest = p[top]
     for k in range(start, e.angle.size - 1):
         after = burned_fraction((e.angle[k + 1] - soc) * per_duration)
         lead = scale * tables.wall[k] * (pressure * e.volume[k] * per_gas - e.wall_k)
         root = math.sqrt(math.sqrt(pressure))
         rise = pressure - p_ref * tables.motored[k]
-        if k > start and rise > 0.0:
-            power = math.exp(0.8 * math.log(still + per_pa * rise))
-        else:
-            power = still_power
+        power = math.exp(0.8 * math.log(still + per_pa * rise)) if k > start and rise > 0.0 else still_power
         loss = lead * root * power
         following = (
             tables.keep[k] * pressure + tables.gain[k] * heat * (after - burned) - tables.gain[k] * lead * root * power
@@ -134,7 +132,7 @@ def _peaks(p, last) -> tuple[int, int]:
 @numba.njit(error_model="numpy")
 def _cut_cycle(e, tables, case, p, out) -> None:
     charge = _charge(e, case[0], case[1], case[2], case[3])
-    wall = _wall(e, charge[0], charge[1], case[0])
+    wall = _wall(e, charge[1], case[0])
     start = np.searchsorted(e.angle, case[4]) - 1
     closed, lost = _compress(e, tables, charge[0], charge[1], wall[0] * wall[3], start, p)
     top, steep = _peaks(p, start)
@@ -147,7 +145,7 @@ def _shared(e, tables, cases) -> Array:
     n = e.angle.size
     first = cases[0]
     charge = _charge(e, first[0], first[1], first[2], first[3])
-    wall = _wall(e, charge[0], charge[1], first[0])
+    wall = _wall(e, charge[1], first[0])
     last = np.searchsorted(e.angle, cases[:, 4].max()) - 1
     still = np.empty(n)
     closed, lost = np.zeros(n), np.zeros(n)

@@ -12,7 +12,7 @@ def numpy_cycles(e: Engine, cases: Array, block: int) -> Array:
 
 
 def _block(e: Engine, cases: Array) -> Array:
-    """The loop is over the angles, with a column for each quantity."""
+    """Loop over the angles, with a column for each quantity."""
     speed, fuel, pressure_kpa, temperature_in, soc = cases.T
     angle, volume, area = e.angle, e.volume, e.area
     p_ref, gas, heat, duration = charge_of(e, speed, fuel, pressure_kpa, temperature_in)
