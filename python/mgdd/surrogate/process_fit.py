@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import warnings
 from dataclasses import dataclass, field
 from typing import TYPE_CHECKING, Any
 
@@ -21,8 +22,10 @@ if TYPE_CHECKING:
 __all__ = ["fit_process"]
 
 MOST_POINTS = 3000  # the covariance is factorised in every step
+_ONE_THREAD = 500  # points below which threads of the matrix library only wait for each other
 _LENGTH = (0.05, 50.0)  # in half ranges of a factor
 _SIGNAL, _NOISE = (1e-2, 1e4), (1e-8, 1e1)  # variances over that of the response
+_AT_BOUND = 1e-4  # of the logarithms
 _STEP = 1e-4  # of the logarithms, for the curvature of the likelihood
 
 
@@ -71,7 +74,12 @@ def fit_process(
         n_restarts_optimizer=n_starts - 1,
         random_state=seed,
     )
-    regressor.fit((points - points.mean(axis=0)) / half, (values - offset) / spread)
+    few = 1 if len(values) <= _ONE_THREAD else None
+    threads: Any = import_extra("threadpoolctl", "gp", purpose)
+    with threads.threadpool_limits(few), warnings.catch_warnings():
+        # A parameter at its bound is said as a finding.
+        warnings.simplefilter("ignore", import_extra("sklearn.exceptions", "gp", purpose).ConvergenceWarning)
+        regressor.fit((points - points.mean(axis=0)) / half, (values - offset) / spread)
     logs = np.asarray(regressor.kernel_.theta, dtype=np.float64)  # of the variances and lengths: signal, lengths, noise
     surface = ProcessSurface(
         points=points,
@@ -81,7 +89,8 @@ def fit_process(
         length_scales=half * np.exp(logs[1:-1]),
         noise_sd=spread * float(np.exp(0.5 * logs[-1])),
     )
-    return surface, _report(surface, regressor, search, logs, names, half=half, spread=spread)
+    with threads.threadpool_limits(few):
+        return surface, _report(surface, regressor, search, logs, names, half=half, spread=spread)
 
 
 def _report(
@@ -95,7 +104,7 @@ def _report(
     spread: float,
 ) -> FitReport:
     bounds = np.asarray(regressor.kernel_.bounds, dtype=np.float64)
-    at_bound = (logs > bounds[:, 1] - 1e-6).astype(np.int_) - (logs < bounds[:, 0] + 1e-6)
+    at_bound = (logs > bounds[:, 1] - _AT_BOUND).astype(np.int_) - (logs < bounds[:, 0] + _AT_BOUND)
     own = ("signal_sd", *(f"length_scale_{name}" for name in names), "noise_sd")
     values = np.r_[surface.signal_sd, surface.length_scales, surface.noise_sd]
     # d value/d log: 1/2 of a variance, 1 of a length.
