@@ -15,7 +15,7 @@ from dataclasses import dataclass
 
 import numba
 import numpy as np
-from numpy.typing import NDArray
+from peers.cycle_cases import WOSCHNI_BAR_M, Array, crank_tables
 
 FORMS = ("literal", "cut", "cut_table")
 INDICATORS = (
@@ -23,7 +23,6 @@ INDICATORS = (
     *("dp_max_cad", "t_max_k", "t_max_cad", "ca10_cad", "ca50_cad", "ca90_cad", "heat_loss_j", "heat_loss_fraction"),
     *("work_closed_j", "work_gross_j", "ringing_intensity_mw_per_m2"),
 )
-Array = NDArray[np.float64]
 _MANTISSA = np.int64(0xFFFFFFFFFFFFF)
 _ONE = np.int64(0x3FF0000000000000)
 _CENTRES = 256
@@ -50,21 +49,14 @@ class Engine:
 
 
 def engine(cylinder: object, point: object, burn_duration_cad: float) -> Engine:
-    """Geometry (Tan 2018, eq. 2-1), charge (eq. 2-3) and the other constants of one cylinder at one point."""
+    """Crank tables, charge (Tan 2018, eq. 2-3) and the other constants of one cylinder at one point."""
     c, o = cylinder, point
     bore, stroke = c.bore_mm / 1e3, c.stroke_mm / 1e3
-    disc = math.pi / 4 * bore**2
-    swept = disc * stroke
-    clearance = swept / (c.compression_ratio - 1)
-    angle = np.arange(c.ivc_cad, c.evo_cad + 0.5)
-    phi = np.deg2rad(angle)
-    ratio = 2 * c.connecting_rod_mm / c.stroke_mm
-    volume = clearance + swept / 2 * (1 + ratio - np.cos(phi) - np.sqrt(ratio**2 - np.sin(phi) ** 2))
-    area = c.bowl_area_factor * 2 * disc + volume / disc * bore * math.pi
+    angle, volume, area, swept, clearance = crank_tables(c)
     intake_pa = o.intake_pressure_kpa * 1e3
     gas = c.volumetric_efficiency * intake_pa * swept / o.intake_temperature_k
     heat = o.fuel_mg * c.lower_heating_value_mj_per_kg
-    scale = c.wall_heat_scale * 129.8
+    scale = c.wall_heat_scale * WOSCHNI_BAR_M
     constants = np.array(
         [swept, clearance, bore, c.gamma, scale, c.woschni_c2, c.woschni_cp_m_per_sk, c.wall_temperature_k, o.speed_rpm,
          heat, burn_duration_cad, intake_pa, gas, stroke * o.speed_rpm / 30]
@@ -73,7 +65,7 @@ def engine(cylinder: object, point: object, burn_duration_cad: float) -> Engine:
 
 
 @numba.njit(error_model="numpy")
-def _fraction(s: float) -> float:
+def burned_fraction(s: float) -> float:
     if s <= 0.0:
         return 0.0
     if s <= 0.5:
@@ -161,7 +153,7 @@ def compile_form(form: str, model: Engine) -> Callable[[Array], Array]:
         first = np.searchsorted(angle, soc, side="right")
         burned = 0.0
         for k in range(max(first, 1), angle.size):
-            after = _fraction((angle[k] - soc) / duration)
+            after = burned_fraction((angle[k] - soc) / duration)
             heat_j[k - 1] = c[9] * (after - burned)
             burned = after
             if angle[k] >= soc + duration:

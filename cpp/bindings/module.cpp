@@ -25,13 +25,14 @@ PYBIND11_MODULE(_core, m) {
   m.def("compiler", [] { return std::string(MGDD_COMPILER); }, "Compiler of this build.");
   bind_errors(m);
   const std::vector<Room> rooms{
+      {"math", "Look-up tables.", {&bind_lookup_table}},
       {"optimize",
        "Fits, seekers and learners.",
        {&bind_least_squares, &bind_limits, &bind_seekers, &bind_direct_seekers, &bind_learning}},
       {"control", "Controllers of a throttle plate.", {&bind_controllers, &bind_guided_predictive, &bind_supervisor}},
       {"engine",
        "Cycle model of one cylinder, emissions, performance, measured pressure.",
-       {&bind_cylinder, &bind_emissions, &bind_cycle, &bind_performance, &bind_pressure}},
+       {&bind_cylinder, &bind_emissions, &bind_cycle, &bind_batch, &bind_performance, &bind_pressure}},
       {"throttle",
        "Throttle body, its sensors, pseudo-Wiener models, demand chain.",
        {&bind_throttle, &bind_sensors, &bind_stepper, &bind_pseudo_wiener, &bind_demand}},

@@ -5,6 +5,7 @@
 
 namespace mgdd::bindings {
 
+void bind_lookup_table(pybind11::module_& m);
 void bind_least_squares(pybind11::module_& m);
 void bind_limits(pybind11::module_& m);
 void bind_seekers(pybind11::module_& m);
@@ -15,6 +16,7 @@ void bind_guided_predictive(pybind11::module_& m);
 void bind_supervisor(pybind11::module_& m);
 void bind_cylinder(pybind11::module_& m);
 void bind_emissions(pybind11::module_& m);
+void bind_batch(pybind11::module_& m);
 void bind_cycle(pybind11::module_& m);
 void bind_performance(pybind11::module_& m);
 void bind_pressure(pybind11::module_& m);

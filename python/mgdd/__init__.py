@@ -2,9 +2,10 @@
 
 The modules: `mgdd.engine` (cycle model and trace analysis), `mgdd.throttle` (electronic throttle), `mgdd.identify`
 (calibration, throttle logs), `mgdd.guide` (models that guide a seeker), `mgdd.optimize` (least squares, seekers,
-iterative learning), `mgdd.control` (PID, sliding mode), `mgdd.loop` (virtual bench, closed loops), `mgdd.rig` (test
-rigs), `mgdd.presets`, `mgdd.io`, `mgdd.datasets`, `mgdd.plot`, `mgdd.studies`, `mgdd.report`, `mgdd.results` and
-`mgdd.errors`. They are imported on use.
+iterative learning), `mgdd.control` (PID, sliding mode), `mgdd.loop` (virtual bench, closed loops), `mgdd.sweep` (many
+cycles at once), `mgdd.design` (design of experiments), `mgdd.maps` (look-up tables), `mgdd.parallel` (executors),
+`mgdd.rig` (test rigs), `mgdd.presets`, `mgdd.io`, `mgdd.datasets`, `mgdd.plot`, `mgdd.studies`, `mgdd.report`,
+`mgdd.results` and `mgdd.errors`. They are imported on use.
 
 Crank angles are degrees everywhere, firing TDC = 0, compression negative (°CA aTDC).
 """
@@ -27,7 +28,9 @@ __all__ = [
     "identify",
     "io",
     "loop",
+    "maps",
     "optimize",
+    "parallel",
     "plot",
     "presets",
     "report",
@@ -36,6 +39,7 @@ __all__ = [
     "signals",
     "studies",
     "surrogate",
+    "sweep",
     "throttle",
 ]
 

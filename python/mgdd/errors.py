@@ -30,6 +30,7 @@ __all__ = [
     "ParameterError",
     "RigError",
     "ShapeError",
+    "WorkerLostError",
 ]
 
 
@@ -152,6 +153,18 @@ class InUseError(Error, RuntimeError):
     """
 
 
+class WorkerLostError(Error, RuntimeError):
+    """A worker of an executor that is gone, with work that could not be done again.
+
+    Attributes
+    ----------
+    partial : object
+        What the call would have returned, as far as it came.
+    """
+
+    partial: Any = None
+
+
 class Interrupted(KeyboardInterrupt):
     """Ctrl-C during a long call, with what was finished until then.
 
@@ -214,10 +227,11 @@ def keep_finished(call: Callable[[Item], Result], items: Iterable[Item], done: l
     return None
 
 
-def hand_over(result: Result, stop: Interrupted | None) -> Result:
-    """Return a whole result; raise one made of a part, as `or_partial` gave it, in an Interrupted."""
+def hand_over(result: Result, stop: Interrupted | WorkerLostError | None) -> Result:
+    """Return a whole result; raise one made of a part in the error that ended it."""
     if stop is not None:
-        raise Interrupted(str(stop), result)
+        stop.partial = result
+        raise stop
     return result
 
 

@@ -19,9 +19,11 @@ from mgdd.control import DiscreteModel, Pid, RecedingHorizon
 from mgdd.engine import Cylinder, OperatingPoint, fit_nox_proxy, timing_sweep
 from mgdd.io.checks import check_trace
 from mgdd.loop import EngineBench, Reference, simulate_drive, track, track_many
+from mgdd.maps import CalibrationMap
 from mgdd.rig import RigRecord
 from mgdd.signals.even_grid import even_step
 from mgdd.signals.metrics import mse
+from mgdd.sweep import sweep
 from mgdd.throttle.characteristics import airflow_torque_nm, mass_flow_kg_per_s
 
 Array = np.ndarray[Any, Any]
@@ -42,6 +44,7 @@ RECORDS = surrogate.fit_surrogate(surrogate.random_step_records(1500))
 SWEEP = np.linspace(-3.0, 3.0, 40)
 OPEN = np.array([10.0, 30.0, 60.0])
 CHAIN = throttle.DemandChain()
+FUEL, TIMING = np.array([6.0, 20.0, 40.0]), np.array([-2.0, -6.0, -11.0])
 
 
 def lag(_: float, x: Any, u: Any, p: Any) -> Any:
@@ -149,6 +152,15 @@ def mapped_by_guide(fuel: Any) -> Any:
     return table.lookup({"fuel_mg": 21.0}).timing_cad
 
 
+def table(fuel: Any, timing: Any, sd: Any) -> CalibrationMap:
+    return CalibrationMap({"fuel_mg": fuel}, timing, name="soc_cad", cells={"sd": sd})
+
+
+def held(fuel: Any, timing: Any, sd: Any) -> Any:
+    made = table(fuel, timing, sd)
+    return np.concatenate([made.axes["fuel_mg"], made.values, made.cells["sd"]])
+
+
 def log() -> xr.Dataset:
     return io.throttle_log(TIME, DUTY, ANGLE)
 
@@ -209,13 +221,17 @@ CALLS: dict[str, tuple[Call, tuple[Array, ...]]] = {
     ),
     "guide.GuidedEngine.tell": (guided, (pressure(),)),
     "guide.OnlineCalibration.offer": (calibrated, (pressure(),)),
-    "guide.TimingMap.__init__": (mapped, (np.array([6.0, 20.0, 40.0]), np.array([-2.0, -6.0, -11.0]))),
-    "guide.TimingMap.of_guide": (mapped_by_guide, (np.array([6.0, 20.0, 40.0]),)),
+    "guide.TimingMap.__init__": (mapped, (FUEL, TIMING)),
+    "guide.TimingMap.of_guide": (mapped_by_guide, (FUEL,)),
     "identify.OnlineUpdate.update": (updated, (DUTY, ANGLE)),
     "identify.fit_ode": (fitted, (TIME, DUTY, ANGLE, np.array([8.0]))),
     "identify.SmoothThrottle.fit": (smooth, (DUTY, ANGLE, 1.05 * TEN, 0.1 * TEN, 10.0 * TEN)),
     "io.pressure_trace": (lambda a, p: io.pressure_trace(a, p)["pressure_bar"].to_numpy(), (CRANK, BAR)),
     "io.throttle_log": (logged, (TIME, DUTY, ANGLE, 0.1 * DUTY, 12.0 + DUTY)),
+    "maps.CalibrationMap.__init__": (held, (FUEL, TIMING, 0.1 * FUEL)),
+    "maps.CalibrationMap.replaced": (lambda t: table(FUEL, TIMING, 0.2).replaced(t).values, (TIMING - 1.0,)),
+    "maps.CalibrationMap.lookup": (lambda x: table(FUEL, TIMING, 0.2).lookup({"fuel_mg": x}).values, (OPEN,)),
+    "maps.CalibrationMap.sd_at": (lambda x: table(FUEL, TIMING, 0.1 * FUEL).sd_at({"fuel_mg": x}), (OPEN,)),
     "rig.RealtimeLoop.queue_references": (queued, (OPEN,)),
     "rig.RigRecord.from_columns": (exchanged, (np.array([0.0, 0.3, 41.5]),)),
     "loop.EngineBench.run": (lambda soc: EngineBench(seed=1).run(soc)["j"].to_numpy(), (SOC,)),
@@ -247,6 +263,10 @@ CALLS: dict[str, tuple[Call, tuple[Array, ...]]] = {
     "signals.vaf_percent": (signals.vaf_percent, (ANGLE, ANGLE + NOISE)),
     "surrogate.EngineSurrogate.predict": (
         lambda soi: RECORDS.predict(soi)["imep_bar"].to_numpy(), (np.array([-4.0, 0.0]),),
+    ),
+    "sweep.sweep": (
+        lambda soc, fuel: sweep(Cylinder(), OperatingPoint(), {"soc_cad": soc, "fuel_mg": fuel})["p_max_bar"].to_numpy(),
+        (SOC, 0.5 * OPEN),
     ),
     "throttle.DemandChain.steady": (
         lambda pedal, speed: CHAIN.steady(pedal, speed)["opening_deg"].to_numpy(), (OPEN, 2000.0 + OPEN),

@@ -16,6 +16,8 @@ import xarray as xr
 
 import mgdd
 from idle_loop import idle_loop
+from map_cases import sweep as map_sweep
+from map_cases import timing_table
 from mgdd import datasets, identify, optimize, presets, signals, surrogate
 from mgdd.control import Pid
 from mgdd.engine import Cylinder, OperatingPoint, analyze, convergence, sensitivities, simulate, timing_sweep
@@ -23,10 +25,12 @@ from mgdd.guide import FeedForward, GuidedEngine, ModelOptimum, OnlineCalibratio
 from mgdd.identify.throttle.validation import ThrottleValidation
 from mgdd.io import pressure_trace, read_pressure, read_throttle_log, throttle_log, write_throttle_log
 from mgdd.loop import EngineBench, monte_carlo, run_seeker, simulate_drive, track, track_many
+from mgdd.maps import apply_map, compare_maps, optimize_map
 from mgdd.results import FitReport
 from mgdd.results.labels import check_labels
 from mgdd.rig import SimulatedRig
 from mgdd.studies import run_study
+from mgdd.sweep import sweep
 from mgdd.throttle import DemandChain, PseudoWiener, SensorFault, SensorPair, Throttle, characteristics, holding_duty
 from mgdd.throttle import simulate as simulate_throttle
 
@@ -127,7 +131,7 @@ def fitted_load() -> xr.Dataset:
 
 
 SIGNALS = ("amplitude_random_steps", "chirp", "multisine", "prbs", "staircase", "triangle")
-NEEDS = ("cascaded_tanks", "emps", "h2df_502", "wh2009")
+NEEDS = ("advisor_engine_maps", "cascaded_tanks", "emps", "h2df_502", "wh2009")
 MADE: dict[str, Callable[[Path], Any]] = {
     **{f"signals.{name}": lambda _, n=name: getattr(signals, n)(offset=0.15, amplitude=0.2) for name in SIGNALS},
     "datasets.load": lambda _: datasets.load("hd_diesel_128x144"),
@@ -171,7 +175,14 @@ MADE: dict[str, Callable[[Path], Any]] = {
     "optimize.IterativeLearning.history": lambda _: learned(),
     "optimize.Seeker.history": lambda _: optimize.Spsa(start=1.0).history,
     "optimize.Seeker.run": lambda _: optimize.GradientDescent(start=1.0).run(lambda x: -float((x[0] - 2.0) ** 2), 20),
+    "maps.CalibrationMap.to_dataset": lambda _: timing_table().to_dataset(),
+    "maps.apply_map": lambda _: apply_map(optimize_map(map_sweep(), "efficiency_gross"), map_sweep()),
+    "maps.compare_maps": lambda _: compare_maps(timing_table(), timing_table(), tolerance=0.5),
     "studies.StudyResult.dataset": lambda _: run_study("measured-traces", quick=True, figures=False).dataset,
+    "sweep.sweep": lambda _: [
+        sweep(Cylinder(), POINT, {"bore_mm": [80.0, 90.0], "soc_cad": [-9.0, -6.0]}, traces="pressure_bar"),
+        sweep(Cylinder(), POINT, {"speed_rpm": [900.0, 2000.0]}, points=True),
+    ],
     "throttle.DemandChain.steady": lambda _: DemandChain().steady([10.0, 60.0], 2000.0),
     "throttle.characteristics": lambda _: characteristics(Throttle()),
     "throttle.holding_duty": lambda _: holding_duty(Throttle()),

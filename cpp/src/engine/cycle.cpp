@@ -9,7 +9,7 @@
 
 #include "mgdd/common/error.hpp"
 #include "mgdd/common/text.hpp"
-#include "mgdd/common/units.hpp"
+#include "mgdd/engine/cycle_indicators.hpp"
 #include "mgdd/engine/gas.hpp"
 #include "mgdd/engine/wall_heat.hpp"
 
@@ -99,18 +99,6 @@ typename CycleModel<T>::StepCoefficients CycleModel<T>::coefficients(const T& ga
       break;
   }
   return {(v0 - inner * (v1 - v0)) / v1, inner / v1};
-}
-
-template <class T>
-Charge<T> CycleModel<T>::charge(const BasicOperatingPoint<T>& point) const noexcept {
-  Charge<T> c;
-  c.intake_pa = point.intake_pressure_kpa * units::pa_per_kpa;
-  c.pressure_pa = c.intake_pa + cylinder_.gas.ivc_pressure_rise_kpa * units::pa_per_kpa;
-  c.gas_j_per_k = simulated_gas_j_per_k(cylinder_, geometry_, point, c.intake_pa, c.pressure_pa);
-  c.fuel_heat_j = engine::fuel_heat_j(cylinder_.gas, point);
-  c.burn_duration_cad = engine::burn_duration_cad(cylinder_.burn, point);
-  c.speed_rpm = point.speed_rpm;
-  return c;
 }
 
 template <class T>
@@ -247,55 +235,25 @@ Indicators<T> CycleModel<T>::indicators(const Charge<T>& charge, const T& soc_ca
                                         const CycleWorkspace<T>& work) const noexcept {
   const std::size_t n = angles_.size();
   const std::vector<T>& p = work.pressure_pa;
-  T closed(0.0), loss(0.0);
-  std::size_t p_at = 0, t_at = 0, slope_at = 0;
+  TraceSums<T> sums;
   double p_best = value_of(p[0]), t_best = value_of(p[0]) * value_of(volume_[0]);
   double slope_best = -std::numeric_limits<double>::infinity();
   for (std::size_t k = 0; k + 1 < n; ++k) {
-    closed += (p[k] + p[k + 1]) * (volume_[k + 1] - volume_[k]);
-    loss += work.heat_loss_j[k];
+    sums.work_closed_j += (p[k] + p[k + 1]) * (volume_[k + 1] - volume_[k]);
+    sums.heat_loss_j += work.heat_loss_j[k];
     const double next = value_of(p[k + 1]);
-    if (next > p_best) p_best = next, p_at = k + 1;
+    if (next > p_best) p_best = next, sums.p_max_at = k + 1;
     const double energy = next * value_of(volume_[k + 1]);
-    if (energy > t_best) t_best = energy, t_at = k + 1;
+    if (energy > t_best) t_best = energy, sums.t_max_at = k + 1;
     const double slope = (next - value_of(p[k])) / (angles_[k + 1] - angles_[k]);
-    if (slope > slope_best) slope_best = slope, slope_at = k;
+    if (slope > slope_best) slope_best = slope, sums.dp_max_at = k;
   }
-  closed = 0.5 * closed;
-
-  const auto around = [&](std::size_t k, const auto& sample) {
-    return parabola_peak<T>(angles_, k, sample(k > 0 ? k - 1 : k), sample(k), sample(k + 1 < n ? k + 1 : k));
-  };
-  const Peak<T> p_peak = around(p_at, [&](std::size_t k) { return p[k]; });
-  const Peak<T> t_peak = around(t_at, [&](std::size_t k) { return T(p[k] * volume_[k] / charge.gas_j_per_k); });
-  const T slope = (p[slope_at + 1] - p[slope_at]) / (angles_[slope_at + 1] - angles_[slope_at]);
-
-  // Gross work: the ideal remainder of -180..180 CAD, intake pressure before IVC and the blow-down mean after EVO.
-  const T bottom = geometry_.clearance_m3 + geometry_.swept_m3;
-  const T gross = closed + charge.intake_pa * (volume_[0] - bottom) +
-                  0.5 * (p[n - 1] + charge.intake_pa) * (bottom - volume_[n - 1]);
-
-  Indicators<T> out;
-  out.work_closed_j = closed;
-  out.work_gross_j = gross;
-  out.imep_closed_bar = closed / geometry_.swept_m3 / units::pa_per_bar;
-  out.imep_gross_bar = gross / geometry_.swept_m3 / units::pa_per_bar;
-  out.p_max_bar = p_peak.value / units::pa_per_bar;
-  out.p_max_cad = p_peak.angle_cad;
-  out.t_max_k = t_peak.value;
-  out.t_max_cad = t_peak.angle_cad;
-  out.dp_max_bar_per_cad = slope / units::pa_per_bar;
-  out.dp_max_cad = T(0.5 * (angles_[slope_at] + angles_[slope_at + 1]));
-  out.heat_loss_j = loss;
-  out.ringing_intensity_mw_per_m2 = engine::ringing_intensity_mw_per_m2(
-      T(gamma_at(cylinder_.gas, t_peak.value)), T(slope * charge.speed_rpm * units::cad_per_s_per_rpm), p_peak.value,
-      t_peak.value);
-  const T none = undefined<T>();
-  out.efficiency_gross = out.heat_loss_fraction = out.ca10_cad = out.ca50_cad = out.ca90_cad = none;
+  sums.work_closed_j = 0.5 * sums.work_closed_j;
+  sums.last_pressure_pa = p[n - 1];
+  Indicators<T> out =
+      indicators_of<T>(cylinder_.gas, geometry_, charge, angles_, volume_, sums, [&p](std::size_t k) { return p[k]; });
   if (value_of(charge.fuel_heat_j) > 0.0) {
     const Burn<T> burn(cylinder_.burn, soc_cad, charge.burn_duration_cad);
-    out.efficiency_gross = gross / charge.fuel_heat_j;
-    out.heat_loss_fraction = loss / charge.fuel_heat_j;
     out.ca10_cad = burn.angle_of(0.1);
     out.ca50_cad = burn.angle_of(0.5);
     out.ca90_cad = burn.angle_of(0.9);

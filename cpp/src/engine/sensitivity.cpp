@@ -50,15 +50,6 @@ T& find_input(CycleInputs<T>& inputs, std::string_view name) {
   refuse(name);
 }
 
-Indicators<double> direction(const Indicators<SensitivityScalar>& from, std::size_t lane) {
-  Indicators<double> to;
-  constexpr auto source = indicator_fields<SensitivityScalar>();
-  constexpr auto target = indicator_fields<double>();
-  for (std::size_t i = 0; i < source.size(); ++i)
-    to.*(target[i].member) = (from.*(source[i].member)).grad[lane];
-  return to;
-}
-
 Indicators<double> simulate_indicators(const Cylinder& cylinder, const OperatingPoint& point, double soc_cad,
                                        double step_cad, Integrator integrator) {
   const CycleModel<double> model(cylinder, crank_grid(cylinder, step_cad), integrator);
@@ -98,6 +89,9 @@ std::string_view input_unit(std::string_view name) {
 double& input(CycleInputs<double>& inputs, std::string_view name) {
   return find_input(inputs, name);
 }
+Dual<1>& input(CycleInputs<Dual<1>>& inputs, std::string_view name) {
+  return find_input(inputs, name);
+}
 SensitivityScalar& input(CycleInputs<SensitivityScalar>& inputs, std::string_view name) {
   return find_input(inputs, name);
 }
@@ -131,7 +125,7 @@ Sensitivities sensitivities(const Cylinder& cylinder, const OperatingPoint& poin
     model.run(charge, inputs.soc_cad, work);
     const Indicators<SensitivityScalar> all = model.indicators(charge, inputs.soc_cad, work);
     for (std::size_t lane = 0; lane < count; ++lane) {
-      out.indicators.push_back(direction(all, lane));
+      out.indicators.push_back(derivatives(all, lane));
       for (std::size_t k = 0; k < n; ++k) {
         out.pressure_bar(static_cast<Eigen::Index>(k), static_cast<Eigen::Index>(first + lane)) =
             work.pressure_pa[k].grad[lane] / units::pa_per_bar;

@@ -2,6 +2,7 @@
 The C++ core of mgdd, a submodule per room. Use it through mgdd.engine, mgdd.throttle and so on.
 """
 from __future__ import annotations
+from . import math
 from . import optimize
 from . import control
 from . import engine
@@ -11,7 +12,7 @@ from . import guide
 from . import systems
 from . import loop
 from . import rig
-__all__: list[str] = ['compiled_simd_level', 'compiler', 'control', 'engine', 'guide', 'identify', 'loop', 'optimize', 'processor_simd_levels', 'rig', 'systems', 'throttle']
+__all__: list[str] = ['compiled_simd_level', 'compiler', 'control', 'engine', 'guide', 'identify', 'loop', 'math', 'optimize', 'processor_simd_levels', 'rig', 'systems', 'throttle']
 def compiled_simd_level() -> str:
     """
     Instruction set of this build.

@@ -6,7 +6,7 @@ import collections.abc
 import numpy
 import numpy.typing
 import typing
-__all__: list[str] = ['Cylinder', 'NoxFit', 'NoxModel', 'NoxProxy', 'OperatingPoint', 'Performance', 'PerformanceTerm', 'SoftSensor', 'TraceOptions', 'analyze', 'analyze_cycles', 'burn_duration_cad', 'burned_fraction', 'check_trace', 'convergence', 'differentiable_inputs', 'fit_nox_proxy', 'hardenberg_hase_delay_cad', 'hohenberg_coefficient', 'indicator_units', 'input_unit', 'scan', 'sensitivities', 'simulate', 'start_of_combustion', 'start_of_injection', 'timing_window_cad', 'volume_l', 'wall_area_m2', 'watson_delay_ms', 'wolfer_delay_ms', 'woschni_c1_bar_m', 'woschni_coefficient']
+__all__: list[str] = ['Cylinder', 'NoxFit', 'NoxModel', 'NoxProxy', 'OperatingPoint', 'Performance', 'PerformanceTerm', 'SoftSensor', 'TraceOptions', 'analyze', 'analyze_cycles', 'batch', 'batch_form', 'batch_inputs', 'burn_duration_cad', 'burned_fraction', 'check_trace', 'convergence', 'differentiable_inputs', 'fit_nox_proxy', 'hardenberg_hase_delay_cad', 'hohenberg_coefficient', 'indicator_units', 'input_unit', 'instruction_set', 'scan', 'sensitivities', 'simulate', 'start_of_combustion', 'start_of_injection', 'timing_window_cad', 'volume_l', 'wall_area_m2', 'watson_delay_ms', 'wolfer_delay_ms', 'woschni_c1_bar_m', 'woschni_coefficient']
 class Cylinder:
     """
     Parameters of one cylinder: geometry, charge, gas, wall heat, burn law, ignition delay.
@@ -796,6 +796,18 @@ def analyze_cycles(crank_angle_cad: typing.Annotated[numpy.typing.ArrayLike, num
     """
     The same of every row; warnings counted together.
     """
+def batch(cylinder: Cylinder, point: OperatingPoint, soc_cad: typing.SupportsFloat | typing.SupportsIndex, names: collections.abc.Sequence[str], rows: typing.Annotated[numpy.typing.ArrayLike, numpy.float64], outputs: collections.abc.Sequence[str], step_cad: typing.SupportsFloat | typing.SupportsIndex, integrator: str, threads: typing.SupportsInt | typing.SupportsIndex = 0, form: str = 'automatic') -> dict:
+    """
+    Indicators of many cycles; `rows` is (cases, names). NaN where a cycle is not physical. Releases the GIL.
+    """
+def batch_form(cylinder: Cylinder, point: OperatingPoint, soc_cad: typing.SupportsFloat | typing.SupportsIndex, names: collections.abc.Sequence[str], rows: typing.Annotated[numpy.typing.ArrayLike, numpy.float64]) -> str:
+    """
+    What `form='automatic'` stands for: pass it on where a batch is cut into pieces.
+    """
+def batch_inputs() -> dict:
+    """
+    What may vary in a batch: unit and meaning by name.
+    """
 def burn_duration_cad(cylinder: Cylinder, point: OperatingPoint) -> float:
     """
     Burn duration in force [°CA].
@@ -876,5 +888,6 @@ def woschni_coefficient(c1_bar_m: typing.Annotated[numpy.typing.ArrayLike, numpy
     """
     Film coefficient [W/(m2 K)].
     """
+instruction_set: str = 'avx2'
 timing_window_cad: tuple = (-60.0, 20.0)
 woschni_c1_bar_m: float = 129.8

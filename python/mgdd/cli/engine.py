@@ -1,4 +1,4 @@
-"""`mgdd engine simulate | analyze | calibrate | optimum`; `analyze` and `seek` have modules of their own."""
+"""`mgdd engine simulate | analyze | calibrate | optimum`; `analyze`, `seek` and `sweep` have modules of their own."""
 
 from __future__ import annotations
 
@@ -22,6 +22,7 @@ from mgdd.cli.options import (
 )
 from mgdd.cli.output import check_output, emit, lines
 from mgdd.cli.seek import add_seek
+from mgdd.cli.sweep import add_sweep
 from mgdd.engine import find_optimum, ignition_delay, simulate, timing_sweep
 from mgdd.errors import ConvergenceError, ParameterError
 from mgdd.identify import best_timing, estimate_tdc
@@ -38,7 +39,7 @@ def add(commands: Any) -> None:
     """Add the group and its commands."""
     verbs = add_group(
         commands, "engine",
-        help_text="one cycle: simulate, analyze, calibrate, optimum; many: seek",
+        help_text="one cycle: simulate, analyze, calibrate, optimum; many: seek, sweep",
         example="mgdd engine simulate --preset puma_single --soc-cad -6 --json",
     )  # fmt: skip
     _add_simulate(verbs)
@@ -46,6 +47,7 @@ def add(commands: Any) -> None:
     _add_calibrate(verbs)
     _add_optimum(verbs)
     add_seek(verbs)
+    add_sweep(verbs)
 
 
 def _add_simulate(verbs: Any) -> None:

@@ -10,11 +10,12 @@ from pathlib import Path
 from mgdd.datasets.origins import ORIGINS, fetched, find_fetched
 from mgdd.errors import DataError
 
-__all__ = ["FILES", "HD", "available", "path"]
+__all__ = ["ENGINE_MAPS", "FILES", "HD", "available", "path"]
 
 _VARIABLE = "MGDD_DATA_DIR"
 _PACKAGE = Path(__file__).parents[1] / "data"
 HD = "hd_diesel_128x144"
+ENGINE_MAPS = "advisor_engine_maps"
 
 # SHA-256 of every file that the package carries.
 _PACKAGED = {
@@ -28,6 +29,7 @@ _PACKAGED = {
 
 # The sets that `load` reads, and the files that each needs.
 FILES: dict[str, tuple[str, ...]] = {
+    ENGINE_MAPS: ("vw_1.9tdi_ornl_hot.csv", "mercedes_1.7_ornl_hot.csv"),
     "cascaded_tanks": ("dataBenchmark.csv",),
     "emps": ("DATA_EMPS.mat", "DATA_EMPS_PULSES.mat"),
     "h2df_502": ("h2df_test502_cycles.csv",),

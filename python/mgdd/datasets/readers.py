@@ -8,7 +8,8 @@ from typing import TYPE_CHECKING, Literal, overload
 
 import numpy as np
 
-from mgdd.datasets.files import FILES, HD, path
+from mgdd.datasets.engine_maps import engine_map
+from mgdd.datasets.files import ENGINE_MAPS, FILES, HD, path
 from mgdd.errors import DataError, ParameterError
 from mgdd.io import read_conditions, read_pressure
 from mgdd.io.table import read_table
@@ -68,7 +69,7 @@ def load(name: Literal["hd_diesel_128x144"]) -> list[xr.Dataset]: ...
 @overload
 def load(name: Literal["h2df_502"], *, checked: bool = ..., mask_held: bool = ...) -> xr.Dataset: ...
 @overload
-def load(name: Literal["cascaded_tanks", "emps", "wh2009"]) -> tuple[xr.Dataset, xr.Dataset]: ...
+def load(name: Literal["advisor_engine_maps", "cascaded_tanks", "emps", "wh2009"]) -> tuple[xr.Dataset, xr.Dataset]: ...
 def load(
     name: str, *, checked: bool = True, mask_held: bool = True
 ) -> xr.Dataset | list[xr.Dataset] | tuple[xr.Dataset, xr.Dataset]:
@@ -76,7 +77,7 @@ def load(
 
     Parameters
     ----------
-    name : {"hd_diesel_128x144", "h2df_502", "emps", "cascaded_tanks", "wh2009"}
+    name : {"hd_diesel_128x144", "h2df_502", "advisor_engine_maps", "emps", "cascaded_tanks", "wh2009"}
         The first is in the package; the others belong into ``$MGDD_DATA_DIR/NAME``, and `fetch` gets the last three.
     checked : bool
         Of ``h2df_502``: refuse a file whose SHA-256 is not that of the export described on the page "A measured
@@ -102,6 +103,10 @@ def load(
         ``force_n_per_v``. ``cascaded_tanks``: ``pump_v`` and ``level_v`` every 4 s; the level sensor ends at 10 V.
         ``wh2009``: ``input_v`` and ``output_v`` of the Wiener-Hammerstein circuit of the SYSID benchmark at 51.2 kHz,
         100 000 and 78 800 samples.
+        ``advisor_engine_maps``: the maps of a Volkswagen 1.9 L and a Mercedes 1.7 L diesel at their stock calibration,
+        over ``speed_rpm`` and ``torque_nm``: ``bsfc_g_per_kwh`` (not at zero torque), ``nox_g_per_kwh``, flows,
+        exhaust and ``attainable``. Above the full-load curve, ``full_load_nm`` as the highest attainable torque of the
+        grid, everything is NaN.
 
     Raises
     ------
@@ -119,6 +124,8 @@ def load(
 
     A. Winkler, V. Sharma, D. Gordon, A. Norouzi, H2dfDnnTrainExpData,
     https://github.com/alexwin9478/H2dfDnnTrainExpData, Zenodo doi 10.5281/zenodo.16902579, Apache-2.0 licence.
+
+    Markel et al. (2002), ADVISOR: a systems analysis tool for advanced vehicle modeling.
 
     Janot, Gautier and Brunot (2019), Data Set and Reference Models of EMPS.
 
@@ -146,6 +153,9 @@ def load(
     if name == "emps":
         first, second = (_emps_record(path(name, file)) for file in FILES[name])
         return first, second
+    if name == ENGINE_MAPS:
+        one, other = (engine_map(path(name, file)) for file in FILES[name])
+        return one, other
     return _cascaded_tanks() if name == "cascaded_tanks" else _wiener_hammerstein()
 
 

@@ -20,7 +20,7 @@ if TYPE_CHECKING:
 __all__ = ["convergence", "sensitivities", "simulate", "timing_sweep"]
 
 _LOG = logging.getLogger(__name__)
-_TRACES = (
+TRACES = (
     "pressure_bar",
     "volume_l",
     "temperature_k",
@@ -90,7 +90,7 @@ def simulate(
     return labelled_dataset(
         {
             ANGLE: (ANGLE, raw[ANGLE]),
-            **{name: (ANGLE, raw[name]) for name in _TRACES},
+            **{name: (ANGLE, raw[name]) for name in TRACES},
             "motored_pressure_bar": (ANGLE, motored["pressure_bar"]),
             "work_booked_j": (ANGLE, raw["work_booked_j"], "J", "work booked by the integrator in the step"),
             "energy_change_j": (ANGLE, raw["energy_change_j"], "J", "change of internal energy in the step"),

@@ -3,10 +3,11 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
-from pathlib import Path
 from typing import TYPE_CHECKING
 
 import numpy as np
+
+from mgdd.io.whole_file import write_whole_text
 
 if TYPE_CHECKING:
     import os
@@ -41,4 +42,4 @@ def write_columns(columns: Mapping[str, ArrayLike], path: str | os.PathLike[str]
         for column in map(np.asarray, columns.values())
     ]
     rows = [",".join(columns), *(",".join(row) for row in zip(*cells, strict=True))]
-    Path(path).write_text("\n".join(rows) + "\n", encoding="utf-8", newline="\n")
+    write_whole_text(path, "\n".join(rows) + "\n")

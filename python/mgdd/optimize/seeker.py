@@ -13,6 +13,7 @@ import numpy as np
 from mgdd import _core
 from mgdd.errors import DataError, Error, Interrupted, ParameterError
 from mgdd.io.existing_file import existing_file
+from mgdd.io.whole_file import write_whole_text
 from mgdd.results.describe import as_html, rows_of
 from mgdd.results.labels import labelled_dataset
 
@@ -188,10 +189,7 @@ class Seeker(_CoreSeeker):
             "settings": _encode(self.settings),
             "state": _encode(self.state),
         }
-        target = Path(path)
-        fresh = target.with_name(target.name + ".new")
-        fresh.write_text(json.dumps(content, indent=1, allow_nan=False) + "\n", encoding="utf-8")
-        fresh.replace(target)
+        write_whole_text(path, json.dumps(content, indent=1, allow_nan=False) + "\n")
 
     @classmethod
     def load(cls, path: str | os.PathLike[str]) -> Self:

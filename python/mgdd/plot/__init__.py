@@ -10,20 +10,25 @@ from __future__ import annotations
 from mgdd.plot.convergence import convergence
 from mgdd.plot.cycle import log_pv, pressure
 from mgdd.plot.identification import correlation_matrix
+from mgdd.plot.maps import map_cells, map_contour
 from mgdd.plot.response import response_diagnostics
 from mgdd.plot.seeking import seeking
 from mgdd.plot.sensors import sensors
 from mgdd.plot.throttle import holding_duty
 from mgdd.plot.timing import timing
+from mgdd.plot.trade_off import trade_off
 
 __all__ = [
     "convergence",
     "correlation_matrix",
     "holding_duty",
     "log_pv",
+    "map_cells",
+    "map_contour",
     "pressure",
     "response_diagnostics",
     "seeking",
     "sensors",
     "timing",
+    "trade_off",
 ]

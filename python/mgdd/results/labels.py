@@ -149,6 +149,7 @@ def labelled_dataset(
     variables: Mapping[str, Sequence[Any]],
     *,
     attrs: Mapping[str, Any] | None = None,
+    copy: bool = True,
 ) -> xr.Dataset:
     """Build a Dataset in which nothing lacks a unit; the values are copied.
 
@@ -161,6 +162,8 @@ def labelled_dataset(
         figures print them (``"-"`` if dimensionless) or an expression that pint parses.
     attrs : mapping, optional
         Attributes of the Dataset, as netCDF stores them: text, a number, or a flat sequence of numbers.
+    copy : bool
+        False where large arrays belong to nobody else: the Dataset takes them as they are.
 
     Returns
     -------
@@ -195,7 +198,7 @@ def labelled_dataset(
     sizes: dict[str, tuple[int, str]] = {}
     for name, entry in variables.items():
         dims, values, label = _entry(name, entry)
-        array = np.array(values)
+        array = np.array(values) if copy else np.asarray(values)
         if array.ndim != len(dims):
             raise ShapeError(f"{name} has shape {array.shape}: {len(dims)} dimension(s) {dims} were declared")
         for dim, size in zip(dims, array.shape, strict=True):

@@ -22,6 +22,7 @@ _WRITTEN = (
     (re.compile(r"²"), "**2"),
     (re.compile(r"³"), "**3"),
     (re.compile(r"\^"), "**"),
+    (re.compile(r"/\((\w+) (\w+)\)"), r"/\1/\2"),
     (re.compile(r"[ ·]+"), "*"),
     (re.compile(r"(?<=degree/)s\b"), "second"),
 )
@@ -53,6 +54,7 @@ _UNITS = {
     "_percent_per_cad": "%/°CA",
     "_percent_per_ppm": "%/ppm",
     "_mj_per_kg": "MJ/kg",
+    "_g_per_kwh": "g/kWh",
     "_per_ppm": "1/ppm",
     "_per_cad2": "1/°CA²",
     "_per_cad": "1/°CA",
@@ -62,6 +64,7 @@ _UNITS = {
     "_samples": "samples",
     "_cycles": "cycles",
     "_percent": "%",
+    "_kw": "kW",
     "_duration_cad": "°CA",
     "_scatter_cad": "°CA",
     "_rms_cad": "°CA",

@@ -88,8 +88,8 @@ struct Burn {
            second_fraction * wiebe_fraction(s2, a, second_m, complete);
   }
 
-  /// Angle at which the fraction x in (0, 1) is burned: closed form, for the double Wiebe bisection plus one Newton
-  /// step in T, which carries the exact derivative (implicit function theorem).
+  /// Angle at which the fraction x in (0, 1) is burned: closed form, for the double Wiebe false position plus one
+  /// Newton step in T, which carries the exact derivative (implicit function theorem).
   T angle_of(double x) const noexcept {
     using std::exp;
     using std::log;
@@ -101,16 +101,33 @@ struct Burn {
     if (shape == BurnShape::wiebe) {
       return soc_cad + duration_cad * pow(-log(1.0 - x * complete) / a, 1.0 / (m + 1.0));
     }
-    double low = start_cad();
-    double high = end_cad();
-    for (int i = 0; i < 60; ++i) {
-      const double middle = 0.5 * (low + high);
-      (value_of(fraction(middle)) < x ? low : high) = middle;
-    }
-    const double root = 0.5 * (low + high);
+    const double root = double_wiebe_angle(x);
     const double slope = slope_at(root);
     if (!(slope > 0.0)) return soc_cad + (root - value_of(soc_cad));  // a plateau between two burns moves with SOC
     return T(root) + (x - fraction(root)) / slope;
+  }
+
+  /// The same for the double Wiebe as a plain number: false position between start and end (Illinois form; Dowell and
+  /// Jarratt 1971), to 1e-11 of the heat.
+  double double_wiebe_angle(double x) const noexcept {
+    double low = start_cad(), high = end_cad();
+    double below = -x, above = 1.0 - x;
+    double root = low;
+    for (int i = 0, side = 0; i < 100; ++i) {
+      root = i < 4 ? 0.5 * (low + high) : (low * above - high * below) / (above - below);
+      const double error = value_of(fraction(root)) - x;
+      if (std::abs(error) < 1e-11) break;
+      if (error < 0.0) {
+        low = root, below = error;
+        if (side == -1) above *= 0.5;
+        side = -1;
+      } else {
+        high = root, above = error;
+        if (side == 1) below *= 0.5;
+        side = 1;
+      }
+    }
+    return root;
   }
 
   /// dX/dphi [1/°CA], exact, through a one-direction dual in the angle.

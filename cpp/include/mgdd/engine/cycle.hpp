@@ -7,6 +7,7 @@
 #include <span>
 #include <vector>
 
+#include "mgdd/common/units.hpp"
 #include "mgdd/engine/burn.hpp"
 #include "mgdd/engine/charge.hpp"
 #include "mgdd/engine/cylinder.hpp"
@@ -49,6 +50,20 @@ struct Charge {
   T speed_rpm{};
 };
 
+/// Trapped amount by `simulated_gas_j_per_k`; p(IVC) = p_in + rise.
+template <class T>
+Charge<T> charge_of(const BasicCylinder<T>& cylinder, const Geometry<T>& geometry,
+                    const BasicOperatingPoint<T>& point) noexcept {
+  Charge<T> c;
+  c.intake_pa = point.intake_pressure_kpa * units::pa_per_kpa;
+  c.pressure_pa = c.intake_pa + cylinder.gas.ivc_pressure_rise_kpa * units::pa_per_kpa;
+  c.gas_j_per_k = simulated_gas_j_per_k(cylinder, geometry, point, c.intake_pa, c.pressure_pa);
+  c.fuel_heat_j = fuel_heat_j(cylinder.gas, point);
+  c.burn_duration_cad = burn_duration_cad(cylinder.burn, point);
+  c.speed_rpm = point.speed_rpm;
+  return c;
+}
+
 template <class T>
 class CycleModel {
  public:
@@ -60,8 +75,9 @@ class CycleModel {
   /// wall-heat law changed. IVC and EVO do not move the grid.
   void set_cylinder(const BasicCylinder<T>& cylinder) noexcept;
 
-  /// Trapped amount by `simulated_gas_j_per_k`; p(IVC) = p_in + rise.
-  Charge<T> charge(const BasicOperatingPoint<T>& point) const noexcept;
+  Charge<T> charge(const BasicOperatingPoint<T>& point) const noexcept {
+    return charge_of(cylinder_, geometry_, point);
+  }
 
   /// Integrates one cycle into the workspace.
   void run(const Charge<T>& charge, const T& soc_cad, CycleWorkspace<T>& work) const noexcept;
@@ -90,6 +106,10 @@ class CycleModel {
   std::span<const double> angles_cad() const noexcept { return angles_; }
   std::span<const T> volume_m3() const noexcept { return volume_; }
   std::span<const T> motored_ratio() const noexcept { return motored_ratio_; }
+  std::span<const T> wall_term() const noexcept { return wall_term_; }  ///< see `WallHeat::volume_term`
+  /// p1 = keep p0 + gain dQ in each step; for constant gamma only.
+  std::span<const T> keep() const noexcept { return keep_; }
+  std::span<const T> gain() const noexcept { return gain_; }
   const BasicCylinder<T>& cylinder() const noexcept { return cylinder_; }
   const Geometry<T>& geometry() const noexcept { return geometry_; }
 

@@ -34,7 +34,19 @@ std::string_view input_unit(std::string_view name);
 
 /// The input of that name; an optional of the point is filled with the value in force first. ParameterError otherwise.
 double& input(CycleInputs<double>& inputs, std::string_view name);
+Dual<1>& input(CycleInputs<Dual<1>>& inputs, std::string_view name);
 SensitivityScalar& input(CycleInputs<SensitivityScalar>& inputs, std::string_view name);
+
+/// The derivatives along one direction.
+template <int N>
+Indicators<double> derivatives(const Indicators<Dual<N>>& from, std::size_t direction) noexcept {
+  Indicators<double> to;
+  constexpr auto source = indicator_fields<Dual<N>>();
+  constexpr auto target = indicator_fields<double>();
+  for (std::size_t i = 0; i < source.size(); ++i)
+    to.*(target[i].member) = (from.*(source[i].member)).grad[direction];
+  return to;
+}
 
 struct Sensitivities {
   std::vector<std::string> names;  ///< of the inputs, in the order asked

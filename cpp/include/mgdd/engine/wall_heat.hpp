@@ -78,26 +78,44 @@ class WallHeat {
     return g.wall_area_m2(volume_m3) * pow(volume_m3, model == WallHeatModel::woschni ? -0.55 : -0.46) * step_cad;
   }
 
+  /// What the cylinder alone fixes of the scale.
+  static T lead(const WallHeatParameters<T>& c, const Geometry<T>& g) noexcept {
+    using std::pow;
+    const double bar = std::pow(units::pa_per_bar, -0.8);
+    if (c.wall_heat_model == WallHeatModel::woschni)
+      return c.wall_heat_scale * woschni_c1_bar_m * bar * pow(g.bore_m, -0.2);
+    return c.wall_heat_scale * hohenberg_c1_bar_m3 * bar;
+  }
+
   /// `ref_pressure_pa` is p(IVC); `gas_j_per_k` is N R.
   WallHeat(const WallHeatParameters<T>& c, const Geometry<T>& g, const T& ref_pressure_pa, const T& gas_j_per_k,
            const T& speed_rpm) noexcept
+      : WallHeat(c, g, ref_pressure_pa, gas_j_per_k, speed_rpm, lead(c, g)) {}
+  WallHeat(const WallHeatParameters<T>& c, const Geometry<T>& g, const T& ref_pressure_pa, const T& gas_j_per_k,
+           const T& speed_rpm, const T& lead) noexcept
       : wall_k_(c.wall_temperature_k) {
     using std::pow;
     const T piston_speed = g.mean_piston_speed_m_per_s(speed_rpm);
     const T per_cad = 1.0 / (units::cad_per_s_per_rpm * speed_rpm);
-    const double bar = std::pow(units::pa_per_bar, -0.8);
     if (c.wall_heat_model == WallHeatModel::woschni) {
       still_ = c.woschni_c2 * piston_speed;
       // Cp Vs T_ref/(p_ref V_ref) (p - p_mot) with T_ref = p_ref V_ref/(N R).
       burning_per_pa_ = c.woschni_cp_m_per_sk * g.swept_m3 / gas_j_per_k;
       burning_ = burning_per_pa_ * ref_pressure_pa;
       still_power_ = four_fifths_power(still_);
-      scale_ = c.wall_heat_scale * woschni_c1_bar_m * bar * pow(g.bore_m, -0.2) * pow(gas_j_per_k, 0.55) * per_cad;
+      scale_ = lead * pow(gas_j_per_k, 0.55) * per_cad;
     } else {
-      scale_ = c.wall_heat_scale * hohenberg_c1_bar_m3 * bar * pow(gas_j_per_k, 0.4) * per_cad *
-               four_fifths_power(piston_speed + 1.4);
+      scale_ = lead * pow(gas_j_per_k, 0.4) * per_cad * four_fifths_power(piston_speed + 1.4);
     }
   }
+
+  /// The numbers of the law, for code that carries many cycles: the heat of a step is scale volume_term
+  /// (T - wall_k) film; the film of Woschni is p^0.25 still_power, or p^0.25 w^0.8 while w = (still - burning
+  /// motored_ratio) + burning_per_pa p exceeds still; that of Hohenberg p^0.4.
+  struct Constants {
+    T scale, wall_k, still, burning, burning_per_pa, still_power;
+  };
+  Constants constants() const noexcept { return {scale_, wall_k_, still_, burning_, burning_per_pa_, still_power_}; }
 
   /// The heat of a step is `lead_j` times `film`: two factors, because the first is ready long before the second.
   T lead_j(const T& temperature_k, const T& volume_term) const noexcept {

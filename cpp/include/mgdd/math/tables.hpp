@@ -42,11 +42,13 @@ struct TablePlace {
   std::array<double, n> weight{};
   bool outside = false;
 
+  /// A cell without weight does not count, whatever it holds: NaN marks cells without a value.
   template <class Column>
   double value_of(const Column& cells) const noexcept {
     double total = 0.0;
-    for (std::size_t c = 0; c < n; ++c)
-      total += weight[c] * cells[cell[c]];
+    for (std::size_t c = 0; c < n; ++c) {
+      if (weight[c] != 0.0) total += weight[c] * cells[cell[c]];
+    }
     return total;
   }
 };

@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import contextlib
 import json
-import os
 import platform
 import shutil
 import sys
@@ -16,9 +15,12 @@ from typing import TYPE_CHECKING, Any
 
 from mgdd import _core
 from mgdd.errors import RigError
+from mgdd.io.whole_file import write_whole
 from mgdd.results.labels import to_jsonable
 
 if TYPE_CHECKING:
+    import os
+
     import xarray as xr
     from matplotlib.figure import Figure
 
@@ -103,15 +105,9 @@ class RunFolder:
 
     def _whole(self, name: str, write: Any) -> None:
         """Write under another name, and give it its own when it is on the disk."""
-        whole = self.path / name
-        half = whole.with_name(f".{whole.name}.part")
         try:
-            write(half)
-            with half.open("rb") as written:
-                os.fsync(written.fileno())
-            half.replace(whole)
+            write_whole(self.path / name, write)
         except OSError as error:
-            half.unlink(missing_ok=True)
             raise RigError(
                 f"{self.path / name}: {error.strerror or error}; free some space, or name a folder elsewhere"
             ) from error

@@ -1,0 +1,182 @@
+#include "shared_point.hpp"
+
+#include <algorithm>
+#include <array>
+#include <cmath>
+#include <limits>
+#include <numbers>
+
+#include "mgdd/engine/cylinder.hpp"
+
+namespace mgdd::engine {
+namespace {
+
+// Pressures of the nodes over that of the motored gas at the first sample of the tail.
+constexpr double lowest_ratio = 1.1;
+constexpr double ratio_growth = 1.15;  ///< of the lowest, until no node meets the kink of Woschni's law
+constexpr int growths = 6;
+constexpr double highest_ratio = 16.0;
+constexpr double tolerance = 1e-8;  ///< of a polynomial's last coefficient over its values
+
+}  // namespace
+
+void SharedPoint::prepare(const CycleTables& tables, const CycleBlock<double>& block, WallHeatModel wall,
+                          InstructionSet set) {
+  n_ = tables.n;
+  tail_from_ = tables.falling_from;
+  run_motored(tables, block, wall == WallHeatModel::woschni);
+  has_tail_ = false;
+  double ratio = lowest_ratio;
+  for (int i = 0; i < growths && !has_tail_; ++i, ratio *= ratio_growth) {
+    const double lowest = ratio * block.pressure.value[0] * tables.motored_ratio[tail_from_];
+    has_tail_ = run_tail(tables, block, lowest, wall, set);
+  }
+}
+
+// The same operations in the same order as a lane of a block, whose bits it must give.
+void SharedPoint::run_motored(const CycleTables& t, const CycleBlock<double>& block, bool woschni) {
+  const std::size_t last = std::min(t.first_after(timing_upper_cad), t.n - 1);
+  motored_.resize(last + 1);
+  const double p0 = block.pressure.value[0];
+  MotoredSample s{p0, 0.0, 0.0, p0, 0.0, p0 * t.volume_m3[0], 0.0, -std::numeric_limits<double>::infinity(), 0.0};
+  motored_[0] = s;
+  for (std::size_t k = 0; k < last; ++k) {
+    const double p = s.pressure, v0 = t.volume_m3[k], v1 = t.volume_m3[k + 1];
+    double film = std::sqrt(p);
+    film = woschni ? std::sqrt(film) * block.still_power.value[0] : lane_four_fifths(film);
+    const double loss =
+        block.scale.value[0] * t.wall_term[k] * (p * v0 * block.per_gas.value[0] - block.wall_k.value[0]) * film;
+    s.pressure = t.keep[k] * p - t.gain[k] * loss;
+    s.work += (p + s.pressure) * (v1 - v0);
+    s.loss += loss;
+    const double energy = s.pressure * v1;
+    const double rise = (s.pressure - p) * (1.0 / (t.angle_cad[k + 1] - t.angle_cad[k]));
+    if (s.pressure > s.p_best) s.p_best = s.pressure, s.p_at = static_cast<double>(k + 1);
+    if (energy > s.energy_best) s.energy_best = energy, s.energy_at = static_cast<double>(k + 1);
+    if (rise > s.rise_best) s.rise_best = rise, s.rise_at = static_cast<double>(k);
+    motored_[k + 1] = s;
+  }
+}
+
+bool SharedPoint::run_tail(const CycleTables& t, const CycleBlock<double>& block, double lowest_pa, WallHeatModel wall,
+                           InstructionSet set) {
+  const double reference_pa = block.pressure.value[0];  // p(IVC), where Woschni's motored pressure begins
+  CycleBlock<double> nodes{};
+  const double highest = highest_ratio * reference_pa * t.motored_ratio[tail_from_];
+  const double half = 0.5 * std::log(highest / lowest_pa);
+  for (std::size_t j = 0; j < n_nodes; ++j) {  // Chebyshev's extrema, from the lowest to the highest
+    const double angle = std::numbers::pi * static_cast<double>(j) / static_cast<double>(n_nodes - 1);
+    nodes.pressure.value[j] = lowest_pa * std::exp(half * (1.0 - std::cos(angle)));
+    nodes.per_gas.value[j] = block.per_gas.value[0];
+    nodes.scale.value[j] = block.scale.value[0];
+    nodes.wall_k.value[j] = block.wall_k.value[0];
+    nodes.still.value[j] = block.still.value[0];
+    nodes.still_power.value[j] = block.still_power.value[0];
+    nodes.burning.value[j] = block.burning.value[0];
+    nodes.per_pa.value[j] = block.per_pa.value[0];
+    nodes.first_burning.value[j] = 0.0;
+  }
+  nodes.begin(t);
+  trace_.resize(n_);
+  coldest_pa_.resize(n_);
+  for (std::size_t k = tail_from_; k < n_; ++k)
+    coldest_pa_[k] = block.wall_k.value[0] / (t.volume_m3[k] * block.per_gas.value[0]);
+  integrate_tail(t, wall, tail_from_, nodes, trace_.data(), set);
+  // Work and heat that are left, from the end backwards; the heat from the pressures, in which every step is linear.
+  work_left_.assign(n_ * n_nodes, 0.0);
+  loss_left_.assign(n_ * n_nodes, 0.0);
+  log_pressure_.resize(n_ * n_nodes);
+  weight_.resize(n_ * n_nodes);
+  row_.assign(n_, Row::unknown);
+  for (std::size_t k = n_ - 1; k-- > tail_from_;) {
+    const double dv = t.volume_m3[k + 1] - t.volume_m3[k], per_gain = 1.0 / t.gain[k];
+    for (std::size_t j = 0; j < n_nodes; ++j) {
+      const double p = trace_[k].value[j], next = trace_[k + 1].value[j];
+      work_left_[k * n_nodes + j] = work_left_[(k + 1) * n_nodes + j] + (p + next) * dv;
+      loss_left_[k * n_nodes + j] = loss_left_[(k + 1) * n_nodes + j] + (t.keep[k] * p - next) * per_gain;
+    }
+  }
+  if (wall != WallHeatModel::woschni) return true;
+  for (std::size_t k = tail_from_; k < n_; ++k) {
+    if (!(trace_[k].value[0] > reference_pa * t.motored_ratio[k])) return false;
+  }
+  return true;
+}
+
+void SharedPoint::begin(std::size_t k, CycleBlock<double>& block) const noexcept {
+  const MotoredSample& s = motored_[k];
+  block.pressure.fill(s.pressure);
+  block.work.fill(s.work);
+  block.loss.fill(s.loss);
+  block.p_best.fill(s.p_best);
+  block.p_at.fill(s.p_at);
+  block.energy_best.fill(s.energy_best);
+  block.energy_at.fill(s.energy_at);
+  block.rise_best.fill(s.rise_best);
+  block.rise_at.fill(s.rise_at);
+}
+
+void SharedPoint::prepare_row(std::size_t k) noexcept {
+  double* q = log_pressure_.data() + k * n_nodes;
+  double* weight = weight_.data() + k * n_nodes;
+  for (std::size_t j = 0; j < n_nodes; ++j)
+    q[j] = std::log(trace_[k].value[j]);
+  for (std::size_t j = 0; j < n_nodes; ++j) {
+    double product = 1.0;
+    for (std::size_t i = 0; i < n_nodes; ++i)
+      product *= i == j ? 1.0 : q[j] - q[i];
+    weight[j] = 1.0 / product;
+  }
+  // The last Chebyshev coefficient of each polynomial says how well the nodes resolve it.
+  const double half = 0.5 * (q[n_nodes - 1] - q[0]);
+  const double of_last = std::ldexp(std::pow(half, n_nodes - 1), 2 - static_cast<int>(n_nodes));
+  const auto resolved = [&](const double* f) {
+    double leading = 0.0, largest = 0.0;
+    for (std::size_t j = 0; j < n_nodes; ++j) {
+      leading += weight[j] * f[j];
+      largest = std::max(largest, std::abs(f[j]));
+    }
+    return std::abs(leading) * of_last <= tolerance * largest;
+  };
+  const bool good = resolved(work_left_.data() + k * n_nodes) && resolved(loss_left_.data() + k * n_nodes) &&
+                    resolved(trace_[n_ - 1].value.data());
+  row_[k] = good ? Row::good : Row::unresolved;
+}
+
+Tail SharedPoint::tail(std::size_t k, double pressure_pa) noexcept {
+  const double* p = trace_[k].value.data();
+  // A gas that is colder than the wall might still find its peak.
+  if (!has_tail_ || !(pressure_pa > coldest_pa_[k])) return {};
+  if (!(pressure_pa >= p[0] && pressure_pa <= p[n_nodes - 1])) return {};
+  if (row_[k] == Row::unknown) prepare_row(k);
+  if (row_[k] == Row::unresolved) return {};
+  const double* q = log_pressure_.data() + k * n_nodes;
+  const double* weight = weight_.data() + k * n_nodes;
+  const double* work = work_left_.data() + k * n_nodes;
+  const double* loss = loss_left_.data() + k * n_nodes;
+  const double* last = trace_[n_ - 1].value.data();
+  const double at = std::log(pressure_pa);
+  // Four sums of each, so that their additions do not wait for each other.
+  constexpr std::size_t ways = 4;
+  std::array<double, n_nodes> share{};
+  for (std::size_t j = 0; j < n_nodes; ++j)
+    share[j] = weight[j] / (at - q[j]);
+  std::array<double, ways> sums{}, work_sums{}, loss_sums{}, last_sums{};
+  for (std::size_t j = 0; j < n_nodes; j += ways) {
+    for (std::size_t w = 0; w < ways; ++w) {
+      sums[w] += share[j + w];
+      work_sums[w] += share[j + w] * work[j + w];
+      loss_sums[w] += share[j + w] * loss[j + w];
+      last_sums[w] += share[j + w] * last[j + w];
+    }
+  }
+  const auto total = [](const std::array<double, ways>& s) { return (s[0] + s[1]) + (s[2] + s[3]); };
+  if (!std::isfinite(total(sums))) {  // on a node
+    const auto j = static_cast<std::size_t>(std::find(q, q + n_nodes, at) - q);
+    return {work[j], loss[j], last[j], true};
+  }
+  const double per_sum = 1.0 / total(sums);
+  return {total(work_sums) * per_sum, total(loss_sums) * per_sum, total(last_sums) * per_sum, true};
+}
+
+}  // namespace mgdd::engine

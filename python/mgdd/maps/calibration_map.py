@@ -1,0 +1,257 @@
+"""A calibration map: values over one or two axes, and for each cell where its value comes from."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from types import MappingProxyType
+from typing import TYPE_CHECKING, Any, NamedTuple, Self
+
+import numpy as np
+
+from mgdd import _core
+from mgdd.errors import ParameterError, ShapeError
+from mgdd.guide.conditions import numbers_of
+from mgdd.maps.cells import MapTask, checked_cells, checked_label, checked_name
+from mgdd.maps.forms import MapForms
+from mgdd.results.describe import as_html, rows_of
+from mgdd.results.labels import Label
+
+if TYPE_CHECKING:
+    from numpy.typing import ArrayLike, NDArray
+
+__all__ = ["CalibrationMap", "MapPoints"]
+
+_TIMING = "°CA aTDC"
+
+
+class MapPoints(NamedTuple):
+    """What a map says at points.
+
+    Parameters
+    ----------
+    values : numpy.ndarray
+        In the unit of the map; NaN where a cell without a value takes part.
+    held_outside : numpy.ndarray of bool
+        Which points lie outside of the axes: their value is that of the edge.
+    """
+
+    values: NDArray[np.float64]
+    held_outside: NDArray[np.bool_]
+
+
+class CalibrationMap(MapForms):
+    """A table over one or two axes as a control unit holds it: (bi)linear between its cells, held at its edges.
+
+    It does not change. Beside its value each cell knows its source, its support, its standard deviation, the range in
+    which the value may lie and the limit that holds it.
+
+    Parameters
+    ----------
+    axes : mapping of str to array_like
+        One or two, strictly increasing, two entries at least; the ending of a name says its unit.
+    values : array_like
+        One axis of the array per axis; a number for all cells. NaN only where the source says why.
+    name : str
+        What the values are, for example ``soc_cad``.
+    labels : mapping of str to (str, str), optional
+        Unit and long name of the value and of axes; left out, they are those of the name.
+    cells : mapping of str to array_like, optional
+        Columns of one entry per cell, or of one for all: ``source`` (``given``, ``measured``, ``optimised``,
+        ``smoothed``, ``interpolated``, ``held``, ``learned``; without a value ``infeasible`` or ``unattainable``),
+        ``support`` (points behind the value), ``sd``, ``low`` and ``high`` [unit of the value], ``objective`` and
+        ``active_limit``.
+    task : MapTask, optional
+        What the cells were optimised for, as `optimize_map` notes it.
+    provenance : mapping of str to str, optional
+        What it is and where it comes from: ``from``, ``date``, ``version`` and whatever else has to travel with it.
+
+    Raises
+    ------
+    mgdd.errors.ParameterError, mgdd.errors.ShapeError, mgdd.errors.DataError
+        Axes, values, units or cells that make no map; the message names the entry or the cell.
+
+    Examples
+    --------
+    >>> from mgdd.maps import CalibrationMap
+    >>> axes = {"speed_rpm": [900, 1500, 3000], "fuel_mg": [6, 20]}
+    >>> soc = CalibrationMap(axes, [[-1, -4], [-2, -6], [-5, -9]], name="soc_cad", provenance={"from": "bench run 7"})
+    >>> soc
+    <CalibrationMap soc_cad [°CA aTDC], 3 speed_rpm x 2 fuel_mg, 6 given>
+    >>> at = soc.lookup({"speed_rpm": [1200, 4000], "fuel_mg": 13})
+    >>> at.values.tolist(), at.held_outside.tolist()
+    ([-3.25, -7.0], [False, True])
+    """
+
+    def __init__(
+        self,
+        axes: Mapping[str, ArrayLike],
+        values: ArrayLike,
+        *,
+        name: str,
+        labels: Mapping[str, tuple[str, str]] | None = None,
+        cells: Mapping[str, ArrayLike] | None = None,
+        task: MapTask | None = None,
+        provenance: Mapping[str, str] | None = None,
+    ) -> None:
+        self._name = checked_name("name", name)
+        if not isinstance(axes, Mapping) or not 1 <= len(axes) <= 2:
+            raise ParameterError.of("axes", axes, "one or two names with entries, as {'fuel_mg': [6, 20, 40]}")
+        own = {checked_name("axis", axis, (name,)): _column(axis, entries) for axis, entries in axes.items()}
+        shape = tuple(entries.size for entries in own.values())
+        table = np.array(values, np.float64)
+        if table.ndim and table.shape != shape:
+            raise ShapeError(f"{name} has shape {table.shape}: the axes {', '.join(own)} make {shape}")
+        self._values = np.ascontiguousarray(np.broadcast_to(table, shape))
+        self._table = _table(own, self._values)
+        said = dict(labels or {})
+        self._labels = {each: checked_label(each, said.pop(each, None)) for each in (*own, name)}
+        if said:
+            raise ParameterError.of("labels", next(iter(said)), f"of {', '.join(self._labels)}")
+        self._cells = checked_cells(self._values, own, cells or {})
+        self._task, self._provenance = task, _texts(provenance or {})
+        for array in (*own.values(), self._values):
+            array.setflags(write=False)
+        self._axes = own
+
+    @property
+    def name(self) -> str:
+        """What the values are."""
+        return self._name
+
+    @property
+    def unit(self) -> str:
+        """Unit of the values, as figures print it."""
+        return self._labels[self._name].units
+
+    @property
+    def axes(self) -> Mapping[str, NDArray[np.float64]]:
+        """Entries of each axis, by name; not writable."""
+        return MappingProxyType(self._axes)
+
+    @property
+    def values(self) -> NDArray[np.float64]:
+        """Value of every cell, one axis of the array per axis of the map; not writable."""
+        return self._values
+
+    @property
+    def cells(self) -> Mapping[str, NDArray[Any]]:
+        """What is known of every cell, by the names of the columns; not writable."""
+        return MappingProxyType(self._cells)
+
+    @property
+    def labels(self) -> Mapping[str, Label]:
+        """Unit and long name of axes and value."""
+        return MappingProxyType(self._labels)
+
+    @property
+    def task(self) -> MapTask | None:
+        """What the cells were optimised for."""
+        return self._task
+
+    @property
+    def provenance(self) -> Mapping[str, str]:
+        """Where the map comes from."""
+        return MappingProxyType(self._provenance)
+
+    def lookup(self, points: Mapping[str, ArrayLike] | Any) -> MapPoints:
+        """Read the map at points, in the C++ core.
+
+        Parameters
+        ----------
+        points : mapping of str to array_like, or OperatingPoint
+            Coordinates by the names of the axes, broadcast together; other names are ignored.
+
+        Returns
+        -------
+        MapPoints
+            Values and which of them are held at the edge, in the shape of the points.
+
+        Raises
+        ------
+        mgdd.errors.ParameterError
+            An axis is missing.
+        """
+        return self._read(self._table, points)
+
+    def replaced(self, values: ArrayLike | None = None, **changes: Any) -> Self:
+        """Give a map on the same axes with other values, cells, task or provenance.
+
+        Parameters
+        ----------
+        values : array_like, optional
+            As of a new map.
+        **changes
+            ``cells`` (columns that are not named stay), ``task``, ``provenance`` (entries that are not named stay).
+
+        Returns
+        -------
+        CalibrationMap
+            A new one.
+
+        Raises
+        ------
+        mgdd.errors.Error
+            As by a new map.
+        """
+        return type(self)(
+            self._axes,
+            self._values if values is None else values,
+            name=self._name,
+            labels=self._labels,
+            cells={**self._cells, **changes.pop("cells", {})},
+            provenance={**self._provenance, **changes.pop("provenance", {})},
+            **{"task": self._task, **changes},
+        )
+
+    def _read(self, table: Any, points: Any) -> MapPoints:
+        given = points if isinstance(points, Mapping) else numbers_of(points)
+        lacking = [name for name in self._axes if name not in given]
+        if lacking:
+            raise ParameterError.of("points", list(given), f"coordinates with {' and '.join(self._axes)}")
+        columns = np.broadcast_arrays(*(np.asarray(given[name], np.float64) for name in self._axes))
+        values, outside = table.at(np.stack([column.ravel() for column in columns]))
+        return MapPoints(values.reshape(columns[0].shape), outside.reshape(columns[0].shape))
+
+    def sd_at(self, points: Mapping[str, ArrayLike] | Any) -> NDArray[np.float64]:
+        """Read the standard deviation at points, linear between the cells: never below that of independent cells.
+
+        Parameters
+        ----------
+        points : mapping of str to array_like, or OperatingPoint
+            As by `lookup`.
+
+        Returns
+        -------
+        numpy.ndarray
+            [unit of the value]; NaN where it is not known.
+        """
+        return self._read(_table(self._axes, self._cells["sd"]), points).values
+
+    def __repr__(self) -> str:
+        size = " x ".join(f"{entries.size} {name}" for name, entries in self._axes.items())
+        kinds, counts = np.unique(self._cells["source"], return_counts=True)
+        said = ", ".join(f"{count} {kind}" for kind, count in zip(kinds, counts, strict=True))
+        return f"<CalibrationMap {self._name} [{self.unit}], {size}, {said}>"
+
+    def _repr_html_(self) -> str:
+        return as_html(repr(self)[1:-1], rows_of({**self._axes, self._name: self._values, **self._provenance}))
+
+
+def _column(name: str, entries: ArrayLike) -> NDArray[np.float64]:
+    column = np.array(entries, np.float64)
+    if column.ndim != 1:
+        raise ShapeError(f"{name} has {column.ndim} dimensions: an axis is one column of entries")
+    return column
+
+
+def _table(axes: Mapping[str, NDArray[np.float64]], values: NDArray[np.float64]) -> Any:
+    entries = [column.tolist() for column in axes.values()]
+    return _core.math.LookupTable(names=list(axes), axes=entries, values=values)
+
+
+def _texts(provenance: Mapping[str, str]) -> dict[str, str]:
+    for key, text in provenance.items():
+        checked_name("provenance", key)
+        if not isinstance(text, str) or not text.strip() or text != " ".join(text.split()):
+            raise ParameterError.of(f"provenance {key}", text, "a text of one line, not empty, single blanks in it")
+    return dict(provenance)

@@ -1,0 +1,164 @@
+"""What a calibration map knows of each cell beside its value, and the one check of it."""
+
+from __future__ import annotations
+
+import re
+from collections.abc import Mapping
+from dataclasses import dataclass, field
+from types import MappingProxyType
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+
+from mgdd.errors import DataError, ParameterError, ShapeError, did_you_mean
+from mgdd.results.labels import VARIABLES, Label
+from mgdd.results.units import attribute_units, unit_of
+
+if TYPE_CHECKING:
+    from numpy.typing import ArrayLike, NDArray
+
+__all__ = [
+    "NUMBERS",
+    "SOURCES",
+    "TEXTS",
+    "MapTask",
+    "cell_at",
+    "checked_cells",
+    "checked_label",
+    "checked_name",
+    "spoken_name",
+]
+
+# Where a value comes from; the last two say why there is none.
+SOURCES = (
+    "given", "measured", "optimised", "smoothed", "interpolated", "held", "learned", "infeasible", "unattainable",
+)  # fmt: skip
+WITHOUT_VALUE = SOURCES[-2:]
+# Columns of numbers: long name, what stands where nothing is said, and the least that may stand there.
+NUMBERS: Mapping[str, tuple[str, float, float]] = {
+    "support": ("points behind the value", 0.0, 0.0),
+    "sd": ("standard deviation", np.nan, 0.0),
+    "low": ("lowest allowed value", np.nan, -np.inf),
+    "high": ("highest allowed value", np.nan, -np.inf),
+    "objective": ("objective", np.nan, -np.inf),
+}
+TEXTS: Mapping[str, tuple[str, str]] = {
+    "source": ("where the value comes from", "given"),
+    "active_limit": ("limit that holds the value", ""),
+}
+_NAME = re.compile(r"[A-Za-z_][\w.\[\]]*")  # labels of a control unit have dots and brackets
+
+
+@dataclass(frozen=True, kw_only=True)
+class MapTask:
+    """What the cells of an optimised map were optimised for.
+
+    Parameters
+    ----------
+    objective : str
+        Variable of the sweep.
+    limits : mapping of str to float
+        Highest allowed value of other variables, margins taken off.
+    maximize : bool
+        Whether the best objective is the highest.
+    """
+
+    objective: str
+    limits: Mapping[str, float] = field(default_factory=dict)
+    maximize: bool = True
+
+    def __post_init__(self) -> None:
+        object.__setattr__(self, "limits", MappingProxyType({name: float(v) for name, v in self.limits.items()}))
+
+    def to_dict(self) -> dict[str, Any]:
+        """Give plain values."""
+        return {"objective": self.objective, "limits": dict(self.limits), "maximize": self.maximize}
+
+
+def checked_name(what: str, name: object, taken: tuple[str, ...] = ()) -> str:
+    """Give a name that every file form can hold, or refuse it."""
+    if not isinstance(name, str) or not _NAME.fullmatch(name):
+        raise ParameterError.of(what, name, "a name of letters, digits and _ such as soc_cad")
+    if name in taken or name in NUMBERS or name in TEXTS:
+        raise ParameterError.of(what, name, "another name: this one has a meaning of its own in a map")
+    return name
+
+
+def checked_label(name: str, given: tuple[str, str] | None) -> Label:
+    """Give unit and long name of an axis or value; a unit that contradicts the ending of the name is refused."""
+    known = VARIABLES.get(name) or Label(unit_of(name), spoken_name(name))
+    label = known if given is None else Label(*map(str, given))
+    try:
+        written = attribute_units(label.units)
+    except ValueError as error:
+        raise DataError.of(f"unit of {name}", label.units, f"a unit: {error}") from None
+    if known.units != "-" and attribute_units(known.units) != written:
+        raise DataError.of(
+            f"unit of {name}", label.units, f"{known.units!r}, as the name says; convert the numbers or change the name"
+        )
+    if not label.long_name.strip():
+        raise DataError.of(f"long name of {name}", label.long_name, "a text that figures can print")
+    return label
+
+
+def checked_cells(
+    values: NDArray[np.float64],
+    axes: Mapping[str, NDArray[np.float64]],
+    given: Mapping[str, ArrayLike],
+) -> dict[str, NDArray[Any]]:
+    """Give every column with the shape of the values; NaN is a value only where the source says why."""
+    for name in given:
+        if name not in NUMBERS and name not in TEXTS:
+            near = did_you_mean(name, (*NUMBERS, *TEXTS)) or f"known are {', '.join((*NUMBERS, *TEXTS))}"
+            raise ParameterError(f"cells: unknown column {name!r}: {near}")
+    cells: dict[str, NDArray[Any]] = {}
+    for name, (_, missing, least) in NUMBERS.items():
+        cells[name] = _shaped(name, np.array(given.get(name, missing), np.float64), values.shape)
+        bad = (cells[name] < least) | np.isinf(cells[name])
+        if bad.any():
+            at = int(np.argmax(bad))
+            raise DataError.of(
+                f"{name} at {cell_at(axes, at)}", float(cells[name].ravel()[at]), f"finite, >= {least:g}"
+            )
+    for name, (_, absent) in TEXTS.items():
+        cells[name] = _shaped(name, np.array(given.get(name, absent), np.str_), values.shape)
+    for text in np.unique(cells["active_limit"]).tolist():
+        if any(mark in text for mark in "\r\n"):
+            raise DataError.of("active_limit", text, "a text of one line")
+    unknown = [text for text in np.unique(cells["source"]).tolist() if text not in SOURCES]
+    if unknown:
+        raise DataError.of("source", unknown[0], f"one of {', '.join(SOURCES)}")
+    missing_value = np.isin(cells["source"], WITHOUT_VALUE)
+    bad = np.isfinite(values) == missing_value
+    if bad.any():
+        at = int(np.argmax(bad))
+        source = str(cells["source"].ravel()[at])
+        said = f"{cell_at(axes, at)}: the value is {values.ravel()[at]:g} and its source {source!r}"
+        raise DataError(
+            f"{said}: a value must be finite, and NaN where the source is {' or '.join(WITHOUT_VALUE)}; "
+            "fill the cell or say why it is empty"
+        )
+    for column in cells.values():
+        column.setflags(write=False)
+    return cells
+
+
+def cell_at(axes: Mapping[str, NDArray[np.float64]], place: int) -> str:
+    """Name a cell by its coordinates, for messages."""
+    at = np.unravel_index(place, tuple(entries.size for entries in axes.values()))
+    return ", ".join(f"{name} = {entries[i]:g}" for (name, entries), i in zip(axes.items(), at, strict=True))
+
+
+def spoken_name(name: str) -> str:
+    """Give a name in words, without the unit at its end."""
+    parts, unit = name.split("_"), unit_of(name)
+    ends = [k for k in range(1, len(parts)) if unit != "-" and unit_of("_".join(parts[k:])) == unit]
+    return " ".join(parts[: max(ends)] if ends else parts)
+
+
+def _shaped(name: str, column: NDArray[Any], shape: tuple[int, ...]) -> NDArray[Any]:
+    if column.ndim == 0:
+        return np.full(shape, column)
+    if column.shape != shape:
+        raise ShapeError(f"cells: {name} has shape {column.shape}: the map has {shape}")
+    return column

@@ -1,0 +1,191 @@
+"""Two maps side by side, and a map against the sweep that it was made of."""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING, Any, Literal
+
+import numpy as np
+
+from mgdd.errors import DataError, ParameterError
+from mgdd.maps.calibration_map import CalibrationMap
+from mgdd.maps.optimum import optimize_map
+from mgdd.maps.sweep_columns import sweep_columns
+from mgdd.maps.windows import between
+from mgdd.results.labels import labelled_dataset
+
+if TYPE_CHECKING:
+    import xarray as xr
+
+__all__ = ["apply_map", "compare_maps"]
+
+
+def compare_maps(
+    first: CalibrationMap,
+    second: CalibrationMap,
+    *,
+    grid: Literal["union", "first"] = "union",
+    tolerance: float | None = None,
+) -> xr.Dataset:
+    """Subtract the first map from the second.
+
+    Parameters
+    ----------
+    first, second : CalibrationMap
+        Of the same value over the same axes; their breakpoints may differ.
+    grid : {"union", "first"}
+        Where they are compared: at the breakpoints of both inside of both, or at those of the first.
+    tolerance : float, optional
+        Differences beyond it are counted [unit of the value].
+
+    Returns
+    -------
+    xarray.Dataset
+        Over the axes: both maps, ``difference`` (second minus first), ``sd`` of the difference, NaN where one is not
+        known, ``held_outside`` where a map is held at its edge, and ``beyond`` the tolerance; further
+        ``largest_difference`` by size, ``rms_difference`` and ``n_beyond``. Cells without a value count for none.
+
+    Raises
+    ------
+    mgdd.errors.DataError
+        Other axes or units, or axes that have nothing in common.
+    mgdd.errors.ParameterError
+        An unknown grid, a negative tolerance.
+
+    Examples
+    --------
+    >>> from mgdd.maps import CalibrationMap, compare_maps
+    >>> old = CalibrationMap({"fuel_mg": [10, 20, 30]}, [-4, -6, -9], name="soc_cad")
+    >>> new = CalibrationMap({"fuel_mg": [10, 30]}, [-4, -8], name="soc_cad")
+    >>> found = compare_maps(old, new, tolerance=0.5)
+    >>> found["difference"].values.tolist(), int(found["n_beyond"])
+    ([0.0, 0.0, 1.0], 1)
+    """
+    if grid not in ("union", "first"):
+        raise ParameterError.of("grid", grid, "'union' or 'first'")
+    if tolerance is not None and not (np.isfinite(tolerance) and tolerance >= 0.0):
+        raise ParameterError.of("tolerance", tolerance, f">= 0 {first.unit}")
+    if list(first.axes) != list(second.axes):
+        raise DataError(
+            f"one map stands over {', '.join(first.axes)}, the other over {', '.join(second.axes)}: the same axes in "
+            "the same order are needed"
+        )
+    for own, other in zip((*first.axes, first.name), (*second.axes, second.name), strict=True):
+        if first.labels[own].units != second.labels[other].units:
+            raise DataError(
+                f"{own} has unit {first.labels[own].units!r} in one map and {second.labels[other].units!r} in the "
+                "other: convert one"
+            )
+    axes = {name: _common(name, entries, second.axes[name], grid) for name, entries in first.axes.items()}
+    points = dict(zip(axes, np.meshgrid(*axes.values(), indexing="ij"), strict=True))
+    one, two = first.lookup(points), second.lookup(points)
+    difference = two.values - one.values
+    sd = np.hypot(first.sd_at(points), second.sd_at(points))
+    known = difference[np.isfinite(difference)]
+    beyond = np.abs(difference) > (np.inf if tolerance is None else tolerance)
+    largest = known[np.argmax(np.abs(known))] if known.size else np.nan
+    dims, unit, name = tuple(axes), first.unit, first.labels[first.name].long_name
+    of_unit = (unit.removesuffix(" aTDC"),)  # a difference of angles has no zero
+    return labelled_dataset(
+        {
+            **{axis: (axis, entries, *first.labels[axis]) for axis, entries in axes.items()},
+            "first": (dims, one.values, unit, f"{name}, first map"),
+            "second": (dims, two.values, unit, f"{name}, second map"),
+            "difference": (dims, difference, *of_unit, f"{name}, second minus first"),
+            "sd": (dims, sd, *of_unit, "standard deviation of the difference"),
+            "held_outside": (dims, one.held_outside | two.held_outside, "-", "held at an edge"),
+            "beyond": (dims, beyond, "-", "beyond the tolerance"),
+            "largest_difference": ((), float(largest), *of_unit, "largest difference by size"),
+            "rms_difference": ((), _rms(known), *of_unit, "root mean square difference"),
+            "n_beyond": ((), int(beyond.sum()), "-", "cells beyond the tolerance"),
+        },
+        attrs={"map": "difference", "of": first.name} | ({} if tolerance is None else {"tolerance": float(tolerance)}),
+    )
+
+
+def apply_map(table: CalibrationMap, sweep: xr.Dataset) -> xr.Dataset:
+    """Read what a sweep says at the values of a map: what the map achieves.
+
+    Parameters
+    ----------
+    table : CalibrationMap
+        Whose name is the swept input, on the operating points of the sweep.
+    sweep : xarray.Dataset
+        As of `optimize_map`.
+
+    Returns
+    -------
+    xarray.Dataset
+        The map and every variable of the sweep over the operating axes, linear between the points of the sweep; NaN
+        where the map has no value. A map that knows its objective has ``loss`` too: how far the objective lies from
+        that of `optimize_map` under the limits of the map.
+
+    Raises
+    ------
+    mgdd.errors.DataError
+        The sweep has other operating points, or the map leaves its range.
+
+    Examples
+    --------
+    >>> import numpy as np
+    >>> from mgdd.maps import apply_map, optimize_map
+    >>> from mgdd.results.labels import labelled_dataset
+    >>> soc, fuel = np.linspace(-12, 4, 17), np.array([10.0, 20.0])
+    >>> sweep = labelled_dataset({
+    ...     "soc_cad": ("soc_cad", soc), "fuel_mg": ("fuel_mg", fuel, "mg", "fuel"),
+    ...     "efficiency_gross": (("fuel_mg", "soc_cad"), 0.5 - 2e-4 * (soc + 0.3 * fuel[:, None]) ** 2),
+    ... })
+    >>> best = optimize_map(sweep, "efficiency_gross")
+    >>> apply_map(best.replaced(best.values + 2), sweep)["loss"].values.round(4).tolist()
+    [0.0008, 0.0008]
+    """
+    own = (*table.axes, table.name)
+    names = tuple(str(each) for each in sweep.data_vars if set(own) == set(map(str, sweep[each].dims)))
+    if not names:
+        raise DataError(f"the sweep has no variable over {', '.join(own)}: it does not belong to this map")
+    data = sweep_columns(sweep, table.name, names, names[0])
+    if set(data.axes) != set(table.axes) or any(
+        not np.array_equal(data.axes[name], entries) for name, entries in table.axes.items()
+    ):
+        raise DataError(f"{', '.join(table.axes)}: the sweep has other breakpoints than the map")
+    at = np.transpose(table.values, [list(table.axes).index(name) for name in data.axes]).ravel()
+    known = np.isfinite(at)
+    if (at[known] < data.over[0]).any() or (at[known] > data.over[-1]).any():
+        low, high = data.over[0], data.over[-1]
+        raise DataError(f"{table.name}: the map leaves the sweep, {low:g} to {high:g}: widen the sweep")
+    place = np.where(known, at, data.over[0])
+    interval = np.clip(np.searchsorted(data.over, place, side="right") - 1, 0, data.over.size - 2)
+    share = (place - data.over[interval]) / np.diff(data.over)[interval]
+    dims = tuple(data.axes)
+    out: dict[str, tuple[Any, ...]] = {name: (name, entries, *data.labels[name]) for name, entries in data.axes.items()}
+    out[table.name] = (dims, at.reshape(data.shape), *table.labels[table.name])
+    found = {name: np.where(known, between(data.columns[name], share, interval), np.nan) for name in names}
+    for name, column in found.items():
+        out[name] = (dims, column.reshape(data.shape), *data.labels[name])
+    task = table.task
+    if task is not None and task.objective in found and set(task.limits) <= set(names):
+        best = optimize_map(
+            sweep[list(names)], task.objective, over=table.name, limits=task.limits, maximize=task.maximize,
+            infeasible="keep",
+        )  # fmt: skip
+        order = [list(best.axes).index(name) for name in data.axes]
+        sign = 1.0 if task.maximize else -1.0
+        loss = sign * (np.transpose(best.cells["objective"], order).ravel() - found[task.objective])
+        unit = data.labels[task.objective].units
+        out["loss"] = (dims, loss.reshape(data.shape), unit, f"loss of {data.labels[task.objective].long_name}")
+    return labelled_dataset(out)
+
+
+def _common(name: str, one: Any, two: Any, grid: str) -> Any:
+    if grid == "first":
+        return one
+    both = np.union1d(one, two)
+    inside = both[(both >= max(one[0], two[0])) & (both <= min(one[-1], two[-1]))]
+    if inside.size < 2:
+        raise DataError(
+            f"{name}: {one[0]:g} to {one[-1]:g} and {two[0]:g} to {two[-1]:g} have nothing in common: pass grid='first'"
+        )
+    return inside
+
+
+def _rms(values: Any) -> float:
+    return float(np.sqrt(np.mean(values**2))) if values.size else float("nan")

@@ -1,0 +1,226 @@
+"""Calibration maps in DCM files: what of a map such a file holds, and the unit of its texts."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, field
+from pathlib import Path
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from mgdd.errors import DataError, Error
+from mgdd.io.existing_file import existing_file
+from mgdd.io.whole_file import write_whole_text
+from mgdd.maps.calibration_map import CalibrationMap
+from mgdd.maps.cells import spoken_name
+from mgdd.maps.dcm import DcmBlock, dcm_blocks, dcm_text
+from mgdd.results.units import attribute_units, unit_of
+
+if TYPE_CHECKING:
+    import os
+
+__all__ = ["DcmFile", "read_dcm", "text_of_file", "write_dcm"]
+
+# Units as calibration tools write them; everything else stands as it is. Where an angle counts from they do not say.
+_DCM_UNITS = {
+    "°KW": "°CA", "°CRK": "°CA", "deg CA": "°CA", "degCA": "°CA", "1/min": "rpm", "U/min": "rpm", "Nm": "N m",
+    "°C": "degC", "°": "deg",
+}  # fmt: skip
+
+
+@dataclass(frozen=True, kw_only=True)
+class DcmFile:
+    """Content of a DCM file.
+
+    Parameters
+    ----------
+    maps : mapping of str to CalibrationMap
+        Curves and maps by the names of their labels.
+    values : mapping of str to (float, str)
+        Single values with their units.
+    skipped : tuple of str
+        Blocks of other kinds, texts and lists of functions for example, that were not read.
+
+    Examples
+    --------
+    >>> from mgdd.maps.dcm_files import DcmFile
+    >>> DcmFile(maps={}, values={"idle_rpm": (850.0, "rpm")}).values["idle_rpm"]
+    (850.0, 'rpm')
+    """
+
+    maps: Mapping[str, CalibrationMap]
+    values: Mapping[str, tuple[float, str]] = field(default_factory=dict)
+    skipped: tuple[str, ...] = ()
+
+
+def write_dcm(
+    maps: Sequence[CalibrationMap] | Mapping[str, CalibrationMap],
+    path: str | os.PathLike[str],
+    *,
+    values: Mapping[str, tuple[float, str]] | None = None,
+) -> None:
+    """Write maps and single values to one DCM file, for calibration tools.
+
+    Parameters
+    ----------
+    maps : sequence or mapping of CalibrationMap
+        In their order; the keys of a mapping are the names of the labels, else those of the maps. The first axis is x.
+        Source, support and standard deviation of the cells have no place in this format; the provenance becomes
+        comments.
+    path : path-like
+        The file; an existing one is replaced in one step.
+    values : mapping of str to (float, str), optional
+        Single values with their units.
+
+    Raises
+    ------
+    mgdd.errors.DataError
+        A cell without a value, a text with a quote, a name twice. Nothing is written then.
+    OSError
+        The file cannot be written.
+
+    Examples
+    --------
+    >>> import pathlib, tempfile
+    >>> from mgdd.maps import CalibrationMap, read_dcm, write_dcm
+    >>> soc = CalibrationMap({"fuel_mg": [6, 20]}, [-1, -4], name="soc_cad")
+    >>> with tempfile.TemporaryDirectory() as folder:
+    ...     file = pathlib.Path(folder) / "engine.dcm"
+    ...     write_dcm({"SocBase": soc}, file, values={"idle_rpm": (850.0, "rpm")})
+    ...     print(file.read_text(encoding="utf-8"), end="")
+    ...     read_dcm(file).values
+    <BLANKLINE>
+    KONSERVIERUNG_FORMAT 2.0
+    <BLANKLINE>
+    FESTWERT idle_rpm
+       LANGNAME      "idle"
+       EINHEIT_W     "rpm"
+       WERT          850.0
+    END
+    <BLANKLINE>
+    KENNLINIE SocBase 2
+       LANGNAME      "start of combustion"
+       EINHEIT_X     "mg"
+       EINHEIT_W     "°CA aTDC"
+    *SSTX   fuel_mg
+       ST/X          6.0   20.0
+       WERT          -1.0   -4.0
+    END
+    {'idle_rpm': (850.0, 'rpm')}
+    """
+    named = [*(maps.items() if isinstance(maps, Mapping) else ((table.name, table) for table in maps))]
+    blocks = []
+    for name, (number, unit) in (values or {}).items():
+        if not np.isfinite(number):
+            raise DataError.of(f"value {name}", number, "finite")
+        blocks.append(DcmBlock(name=name, long_name=spoken_name(name), unit=unit, values=[[float(number)]]))
+    blocks += [_block_of(name, table) for name, table in named]
+    for block in blocks:
+        if [other.name for other in blocks].count(block.name) > 1:
+            raise DataError(f"{block.name}: stands in the file twice: give the maps other names")
+        for text in (block.long_name, block.unit, block.unit_x, block.unit_y, block.name):
+            if '"' in text or "\n" in text:
+                raise DataError(f"{block.name}: {text!r}: a DCM text has no quotes and no line breaks")
+    comments = [f"{name}, {key}: {text}" for name, table in named for key, text in table.provenance.items()]
+    write_whole_text(path, dcm_text(blocks, comments))
+
+
+def read_dcm(path: str | os.PathLike[str]) -> DcmFile:
+    """Read the curves, maps and single values of a DCM file.
+
+    Parameters
+    ----------
+    path : path-like
+        Format 2.0, UTF-8 or Latin-1. Axes have the names that ``*SSTX`` and ``*SSTY`` give, else ``x`` and ``y``.
+
+    Returns
+    -------
+    DcmFile
+        Values with the source ``given``; what else the file holds is named in ``skipped``.
+
+    Raises
+    ------
+    FileNotFoundError
+        No such file.
+    mgdd.errors.DataError
+        Another format, a file that is cut off, counts that contradict each other, breakpoints that do not increase; the
+        message names file, line and remedy.
+
+    Examples
+    --------
+    See `write_dcm`.
+
+    >>> from mgdd.maps import read_dcm
+    >>> try:
+    ...     read_dcm("no_such_file.dcm")
+    ... except FileNotFoundError as error:
+    ...     print(error.strerror)
+    no such file: check the path
+    """
+    file = existing_file(path)
+    blocks, skipped = dcm_blocks(text_of_file(file), str(file))
+    maps, values = {}, {}
+    for block in blocks:
+        if not block.x:
+            values[block.name] = (block.values[0][0], _unit_from(block.unit, block.name))
+            continue
+        try:
+            maps[block.name] = _map_of(block)
+        except Error as error:
+            raise DataError(f"{file}, line {block.line}, {block.name}: {error}") from error
+    return DcmFile(maps=maps, values=values, skipped=tuple(skipped))
+
+
+def text_of_file(file: Path) -> str:
+    """Read a text, UTF-8 or as older tools write it."""
+    raw = file.read_bytes()
+    if b"\0" in raw:
+        raise DataError(f"{file}: this is a binary file: a text is needed")
+    try:
+        return raw.decode("utf-8-sig")
+    except UnicodeDecodeError:
+        return raw.decode("latin-1")
+
+
+def _block_of(name: str, table: CalibrationMap) -> DcmBlock:
+    if not np.isfinite(table.values).all():
+        raise DataError(
+            f"{name}: {np.count_nonzero(~np.isfinite(table.values))} cells have no value, a DCM file needs all: fill "
+            "them with smooth_map(fill=True)"
+        )
+    x, y = [*table.axes, ""][:2]
+    rows = table.values.reshape(table.values.shape[0], -1).T
+    return DcmBlock(
+        name=name,
+        x=table.axes[x].tolist(),
+        y=table.axes[y].tolist() if y else [],
+        values=rows.tolist(),
+        long_name=table.labels[table.name].long_name,
+        unit=table.unit,
+        unit_x=table.labels[x].units,
+        unit_y=table.labels[y].units if y else "",
+        axis_x=x,
+        axis_y=y,
+    )
+
+
+def _map_of(block: DcmBlock) -> CalibrationMap:
+    axes = {block.axis_x or "x": block.x}
+    if block.y:
+        axes[block.axis_y or "y"] = block.y
+    units = dict(zip(axes, (block.unit_x, block.unit_y), strict=False))
+    labels = {name: (_unit_from(unit, name), spoken_name(name)) for name, unit in units.items()}
+    labels[block.name] = (_unit_from(block.unit, block.name), block.long_name or spoken_name(block.name))
+    rows = np.array(block.values)
+    return CalibrationMap(axes, rows.T if block.y else rows[0], name=block.name, labels=labels)
+
+
+def _unit_from(written: str, name: str) -> str:
+    """Give a unit of a file as mgdd prints it; a name that says the same unit settles how."""
+    unit = _DCM_UNITS.get(written, written) or "-"
+    try:
+        same = attribute_units(unit) == attribute_units(unit_of(name))
+    except ValueError:
+        return f"not given ({unit})"
+    return unit_of(name) if same else unit

@@ -1,0 +1,200 @@
+"""Files of calibration maps: CSV grid, JSON, DCM and netCDF, each whole or as it was before."""
+
+from __future__ import annotations
+
+import io
+import json
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+
+from mgdd.errors import DataError, Error, ParameterError, did_you_mean
+from mgdd.io.existing_file import existing_file
+from mgdd.io.whole_file import write_whole, write_whole_text
+from mgdd.maps.calibration_map import CalibrationMap
+from mgdd.maps.cells import NUMBERS, MapTask
+from mgdd.maps.dcm_files import read_dcm, text_of_file, write_dcm
+from mgdd.maps.grid_csv import csv_of_map, map_of_csv
+from mgdd.results.labels import to_jsonable
+
+if TYPE_CHECKING:
+    import os
+
+__all__ = ["read_map", "write_map"]
+
+_KIND, _FORMAT = "calibration_map", 1
+_ENDINGS = (".csv", ".json", ".dcm", ".nc")
+
+
+def write_map(table: CalibrationMap, path: str | os.PathLike[str]) -> None:
+    """Write a map in the form that the ending of the file says.
+
+    Parameters
+    ----------
+    table : CalibrationMap
+        The map.
+    path : path-like
+        ``.csv``: a grid with units that a spreadsheet shows as it is; ``.json`` and ``.nc`` (netCDF): these three hold
+        everything. ``.dcm``: axes, values, units and long name, for calibration tools. An existing file is replaced in
+        one step.
+
+    Raises
+    ------
+    mgdd.errors.ParameterError
+        Another ending.
+    mgdd.errors.DataError
+        A cell without a value, in a DCM file. Nothing is written then.
+    OSError
+        The file cannot be written; one that was there is as before.
+
+    Examples
+    --------
+    >>> import pathlib, tempfile
+    >>> from mgdd.maps import CalibrationMap, read_map, write_map
+    >>> soc = CalibrationMap({"speed_rpm": [900, 1500], "fuel_mg": [6, 20]}, [[-1, -4], [-2, -6]], name="soc_cad")
+    >>> with tempfile.TemporaryDirectory() as folder:
+    ...     file = pathlib.Path(folder) / "soc.csv"
+    ...     write_map(soc, file)
+    ...     print(file.read_text(encoding="utf-8"), end="")
+    ...     read_map(file) == soc
+    mgdd_map,1
+    value,soc_cad,°CA aTDC,start of combustion
+    rows,speed_rpm,rpm,speed
+    columns,fuel_mg,mg,fuel
+    <BLANKLINE>
+    table,value
+    ,6.0,20.0
+    900.0,-1.0,-4.0
+    1500.0,-2.0,-6.0
+    <BLANKLINE>
+    end
+    True
+    """
+    ending = _ending(path)
+    if ending == ".dcm":
+        write_dcm([table], path)
+    elif ending == ".nc":
+        dataset = table.to_dataset()
+        write_whole(path, lambda half: dataset.to_netcdf(half, engine="scipy"))
+    else:
+        write_whole_text(path, csv_of_map(table) if ending == ".csv" else _json_of(table))
+
+
+def read_map(path: str | os.PathLike[str], name: str | None = None, *, decimal: str = ".") -> CalibrationMap:
+    r"""Read a map in the form that the ending of the file says.
+
+    Parameters
+    ----------
+    path : path-like
+        ``.csv``, ``.json``, ``.nc`` or ``.dcm``, as `write_map` writes them.
+    name : str, optional
+        Which map or variable, where the file holds several.
+    decimal : str
+        Decimal mark of a CSV file.
+
+    Returns
+    -------
+    CalibrationMap
+        Equal to the one that was written; of a DCM file what it holds.
+
+    Raises
+    ------
+    FileNotFoundError
+        No such file.
+    mgdd.errors.ParameterError
+        Another ending, or a name that the file does not have.
+    mgdd.errors.DataError
+        A file that is cut off, lacks an axis, repeats a breakpoint, has another unit than its names say, an empty cell
+        without a reason or another number of values; the message names file, line or field, and remedy.
+
+    Examples
+    --------
+    >>> import pathlib, tempfile
+    >>> from mgdd.errors import DataError
+    >>> from mgdd.maps import read_map
+    >>> with tempfile.TemporaryDirectory() as folder:
+    ...     file = pathlib.Path(folder) / "soc.csv"
+    ...     _ = file.write_text("value,soc_cad,°CA aTDC\nrows,fuel_mg,kg\ntable,value\n6,-1\n20,-4\n")
+    ...     try:
+    ...         read_map(file)
+    ...     except DataError as error:
+    ...         print(str(error).rpartition("/")[2])
+    soc.csv: unit of fuel_mg = 'kg': must be 'mg', as the name says; convert the numbers or change the name
+    """
+    ending, file = _ending(path), existing_file(path)
+    if ending == ".dcm":
+        maps = read_dcm(file).maps
+        if name is None and len(maps) != 1:
+            raise ParameterError(f"{file}: holds {', '.join(maps) or 'no map'}: give the name of one")
+        wanted = next(iter(maps)) if name is None else name
+        if wanted not in maps:
+            near = did_you_mean(wanted, maps) or f"it holds {', '.join(maps) or 'none'}"
+            raise ParameterError(f"{file}: no map {wanted!r}: {near}")
+        return maps[wanted]
+    try:
+        if ending == ".nc":
+            import xarray as xr
+
+            data = xr.load_dataset(io.BytesIO(file.read_bytes()), engine="scipy")
+            return CalibrationMap.from_dataset(data, name)
+        text = text_of_file(file)
+        made = map_of_csv(text, str(file), decimal) if ending == ".csv" else _map_of_json(text)
+    except (Error, TypeError, ValueError, KeyError) as error:
+        said = f"{type(error).__name__} {error}" if isinstance(error, KeyError) else str(error)
+        if isinstance(error, DataError) and said.startswith(str(file)):
+            raise
+        raise DataError(f"{file}: {said}") from error
+    if name is not None and name != made.name:
+        raise ParameterError(f"{file}: holds {made.name!r}, not {name!r}")
+    return made
+
+
+def _ending(path: str | os.PathLike[str]) -> str:
+    ending = Path(path).suffix.lower()
+    if ending not in _ENDINGS:
+        raise ParameterError(f"{path}: a map is written to and read from {', '.join(_ENDINGS)}; give such an ending")
+    return ending
+
+
+def _json_of(table: CalibrationMap) -> str:
+    content: dict[str, Any] = {
+        "kind": _KIND,
+        "format": _FORMAT,
+        "name": table.name,
+        "axes": [{"name": name, "entries": entries} for name, entries in table.axes.items()],
+        "labels": {name: list(label) for name, label in table.labels.items()},
+        "values": table.values,
+        "cells": dict(table.cells),
+        "task": None if table.task is None else table.task.to_dict(),
+        "provenance": dict(table.provenance),
+    }
+    return json.dumps(to_jsonable(content), ensure_ascii=False, allow_nan=False, indent=1) + "\n"
+
+
+def _map_of_json(text: str) -> CalibrationMap:
+    try:
+        content = json.loads(text)
+    except json.JSONDecodeError as error:
+        raise DataError(f"not valid JSON: {error}; the file was cut off or edited") from error
+    if not isinstance(content, dict) or content.get("kind") != _KIND:
+        raise DataError(f"kind must be {_KIND!r}: this is another file")
+    if content.get("format") != _FORMAT:
+        raise DataError(f"format = {content.get('format')!r}: this version of mgdd reads format = {_FORMAT}")
+    for key in ("name", "axes", "values"):
+        if key not in content:
+            raise DataError(f"the field {key!r} is missing: a map has name, axes and values")
+    cells = {
+        name: np.array(column, np.float64) if name in NUMBERS else column
+        for name, column in content.get("cells", {}).items()
+    }
+    task = content.get("task")
+    return CalibrationMap(
+        {axis["name"]: axis["entries"] for axis in content["axes"]},
+        np.array(content["values"], np.float64),
+        name=content["name"],
+        labels={name: tuple(label) for name, label in content.get("labels", {}).items()},
+        cells=cells,
+        task=None if task is None else MapTask(**task),
+        provenance=content.get("provenance"),
+    )

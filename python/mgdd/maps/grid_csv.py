@@ -1,0 +1,214 @@
+"""A calibration map as a CSV grid for spreadsheets: head lines with names and units, then a grid per table."""
+
+from __future__ import annotations
+
+import csv
+import io
+import itertools
+from collections.abc import Mapping, Sequence
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+
+from mgdd.errors import DataError, did_you_mean
+from mgdd.io.table import parse_number
+from mgdd.maps.calibration_map import CalibrationMap
+from mgdd.maps.cells import NUMBERS, TEXTS, MapTask, spoken_name
+
+if TYPE_CHECKING:
+    from numpy.typing import NDArray
+
+__all__ = ["csv_of_map", "map_of_csv"]
+
+_FORMAT = "1"
+_HEADS = ("mgdd_map", "value", "rows", "columns", "objective", "limit", "provenance")
+_VALUE = "value"
+_END = "end"  # stands last in a file with the line mgdd_map, so that one that was cut off is known
+
+
+def csv_of_map(table: CalibrationMap) -> str:
+    """Give the text of a file; numbers come back bit for bit."""
+    axes = list(table.axes)
+    rows: list[list[str]] = [["mgdd_map", _FORMAT], [_VALUE, table.name, *table.labels[table.name]]]
+    rows += [[head, axis, *table.labels[axis]] for head, axis in zip(("rows", "columns"), axes, strict=False)]
+    if table.task is not None:
+        rows.append(["objective", table.task.objective, "highest" if table.task.maximize else "lowest"])
+        rows += [["limit", name, _number(upper)] for name, upper in table.task.limits.items()]
+    rows += [["provenance", name, text] for name, text in table.provenance.items()]
+    for name, column in {_VALUE: table.values, **table.cells}.items():
+        missing = NUMBERS[name][1] if name in NUMBERS else np.nan if name == _VALUE else TEXTS[name][1]
+        if name != _VALUE and _all_missing(column, missing):
+            continue
+        rows += [[], ["table", name], *_grid(table, column)]
+    rows += [[], [_END]]
+    out = io.StringIO()
+    csv.writer(out, lineterminator="\n").writerows(rows)
+    return out.getvalue()
+
+
+def map_of_csv(text: str, origin: str, decimal: str) -> CalibrationMap:
+    """Read what `csv_of_map` wrote, or a spreadsheet or a person did in its form."""
+    if decimal not in (".", ","):
+        raise DataError.of("decimal", decimal, "'.' or ','")
+    first = next((line for line in text.splitlines() if line.strip()), "")
+    mark = next(
+        (mark for mark in (";", "\t", ",") if mark in first and mark != decimal), ";" if decimal == "," else ","
+    )
+    reader = csv.reader(io.StringIO(text), delimiter=mark)
+    lines = [(reader.line_num, _trimmed(cells)) for cells in reader]
+    heads, blocks = _parts([(number, cells) for number, cells in lines if cells], origin)
+    if "mgdd_map" in heads and _END not in heads:
+        raise DataError(f"{origin}: no line {_END!r} at its end: the file was cut off; write it again")
+    names = [heads[head] for head in ("rows", "columns") if head in heads]
+    if _VALUE not in heads or not names:
+        lack = _VALUE if _VALUE not in heads else "rows"
+        example = "value,soc_cad,°CA aTDC" if lack == _VALUE else "rows,speed_rpm,rpm"
+        raise DataError(f"{origin}: no line {lack!r}: a map names its value and its axes, for example {example}")
+    if _VALUE not in blocks:
+        raise DataError(f"{origin}: no line 'table,value': the file ends before its values, or was cut off")
+    labels = {said[0]: (said[1], said[2]) for said in (heads[_VALUE], *names)}
+    grids: dict[str, Any] = {}
+    axes: dict[str, NDArray[np.float64]] = {}
+    for name, (number, rows) in blocks.items():
+        own, grids[name] = _read_grid(origin, number, rows, [said[0] for said in names], decimal, name in TEXTS)
+        axes = axes or own
+        for axis, entries in own.items():
+            if not np.array_equal(entries, axes[axis]):
+                raise DataError(
+                    f"{origin}, line {number}: {axis} of table {name!r} differs from that of the first table"
+                )
+    values = grids.pop(_VALUE)
+    task = heads.get("objective")
+    return CalibrationMap(
+        axes,
+        values,
+        name=heads[_VALUE][0],
+        labels=labels,
+        cells=grids,
+        task=None
+        if task is None
+        else MapTask(objective=task[0], maximize=task[1] != "lowest", limits=_limits(heads, origin, decimal)),
+        provenance=heads.get("provenance", {}),
+    )
+
+
+def _number(value: float) -> str:
+    return "" if np.isnan(value) else repr(float(value))
+
+
+def _all_missing(column: NDArray[Any], missing: Any) -> bool:
+    if column.dtype.kind == "U":
+        return bool((column == missing).all())
+    return bool(np.array_equal(column, np.full(column.shape, missing), equal_nan=True))
+
+
+def _grid(table: CalibrationMap, column: NDArray[Any]) -> list[list[str]]:
+    """Give the rows of a table, first its columns' axis where it has one, each with its own breakpoint in front."""
+    cells = column.reshape(column.shape[0], -1)
+    written = [[str(cell) if column.dtype.kind == "U" else _number(cell) for cell in row] for row in cells]
+    axes = [[_number(entry) for entry in entries] for entries in table.axes.values()]
+    head = [["", *axes[1]]] if len(axes) == 2 else []
+    return [*head, *([own, *row] for own, row in zip(axes[0], written, strict=True))]
+
+
+def _trimmed(cells: list[str]) -> list[str]:
+    """Leave out what a spreadsheet adds: blanks around cells, empty cells at the end of a row."""
+    kept = [cell.strip() for cell in cells]
+    while kept and not kept[-1]:
+        kept.pop()
+    return kept
+
+
+def _parts(
+    lines: list[tuple[int, list[str]]], origin: str
+) -> tuple[dict[str, Any], dict[str, tuple[int, list[tuple[int, list[str]]]]]]:
+    """Sort the lines into heads and tables."""
+    heads: dict[str, Any] = {}
+    blocks: dict[str, tuple[int, list[tuple[int, list[str]]]]] = {}
+    known = (_VALUE, *NUMBERS, *TEXTS)
+    for number, cells in lines:
+        where = f"{origin}, line {number}"
+        if cells[0].startswith("#"):
+            continue
+        if _END in heads:
+            raise DataError(f"{where}: {cells[0]!r} behind the line {_END!r}: remove one of them")
+        if cells == [_END]:
+            heads[_END] = True
+            continue
+        if cells[0] == "table":
+            name = cells[1] if len(cells) > 1 else ""
+            if name not in known or name in blocks:
+                raise DataError(f"{where}: table {name!r}: must be one of {', '.join(known)}, each once")
+            blocks[name] = (number, [])
+        elif blocks:
+            next(reversed(blocks.values()))[1].append((number, cells))
+        elif cells[0] in (_VALUE, "rows", "columns"):
+            if cells[0] in heads or len(cells) < 3:
+                raise DataError(f"{where}: {','.join(cells)}: must be {cells[0]},NAME,UNIT,LONG NAME, once in the file")
+            heads[cells[0]] = (*cells[1:3], cells[3] if len(cells) > 3 else spoken_name(cells[1]))
+        elif cells[0] == "objective" and len(cells) == 3 and cells[2] in ("highest", "lowest"):
+            heads["objective"] = cells[1:]
+        elif cells[0] in ("limit", "provenance") and len(cells) == 3:
+            heads.setdefault(cells[0], {})[cells[1]] = cells[2]
+        elif cells[0] == "mgdd_map":
+            if cells[1:2] != [_FORMAT]:
+                raise DataError(f"{where}: format {cells[1:2]}: this version of mgdd reads format {_FORMAT}")
+            heads["mgdd_map"] = _FORMAT
+        else:
+            near = did_you_mean(cells[0], (*_HEADS, "table")) or f"lines begin with {', '.join((*_HEADS, 'table'))}"
+            raise DataError(f"{where}: {','.join(cells)[:60]!r} is not a line of a map: {near}")
+    return heads, blocks
+
+
+def _read_grid(
+    origin: str, number: int, rows: list[tuple[int, list[str]]], axes: list[str], decimal: str, is_text: bool
+) -> tuple[dict[str, NDArray[np.float64]], NDArray[Any]]:
+    if len(rows) < len(axes) + 1:
+        raise DataError(f"{origin}, line {number}: the table ends after {len(rows)} rows: the file was cut off")
+    own: dict[str, NDArray[np.float64]] = {}
+    width = 1
+    if len(axes) == 2:
+        line, head = rows[0]
+        if head[0]:
+            raise DataError(
+                f"{origin}, line {line}: {head[0]!r}: the first row of a table has an empty cell and the entries of "
+                f"{axes[1]}"
+            )
+        own[axes[1]] = np.array([_read(origin, line, cell, decimal, axes[1]) for cell in head[1:]])
+        for pair in itertools.pairwise(own[axes[1]]):
+            _require_rise(origin, line, axes[1], pair)
+        width, rows = own[axes[1]].size, rows[1:]
+    first, cells = [], []
+    for line, row in rows:
+        if len(row) - 1 > width:
+            raise DataError(f"{origin}, line {line}: {len(row) - 1} values: {width} are needed, one per column")
+        full = [*row, *[""] * (width + 1 - len(row))]
+        first.append(_read(origin, line, full[0], decimal, axes[0]))
+        if len(first) > 1:
+            _require_rise(origin, line, axes[0], first[-2:])
+        cells.append(full[1:] if is_text else [_read(origin, line, c, decimal, "a value", gap=True) for c in full[1:]])
+    own = {axes[0]: np.array(first), **own}
+    shape = tuple(entries.size for entries in own.values())
+    return own, np.array(cells, np.str_ if is_text else np.float64).reshape(shape)
+
+
+def _require_rise(origin: str, line: int, axis: str, pair: Sequence[float]) -> None:
+    if not pair[1] > pair[0]:
+        raise DataError(
+            f"{origin}, line {line}: {axis} = {pair[1]:g} after {pair[0]:g}: breakpoints must increase and stand once"
+        )
+
+
+def _read(origin: str, line: int, cell: str, decimal: str, what: str, *, gap: bool = False) -> float:
+    if gap and not cell:
+        return float("nan")
+    number = parse_number(cell, decimal)
+    if number is None or not np.isfinite(number):
+        remedy = "pass decimal=',' if the comma is a decimal mark" if "," in cell and decimal == "." else "correct it"
+        raise DataError(f"{origin}, line {line}: {cell!r} is not a finite number for {what}: {remedy}")
+    return number
+
+
+def _limits(heads: Mapping[str, Any], origin: str, decimal: str) -> dict[str, float]:
+    said = heads.get("limit", {})
+    return {name: _read(origin, 0, text, decimal, f"limit {name}") for name, text in said.items()}

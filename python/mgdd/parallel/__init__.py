@@ -1,0 +1,11 @@
+"""Work that outgrows one core or one machine: any executor, and the same results in the same order.
+
+Whatever takes ``executor=`` in mgdd goes through here: work is cut into chunks, what a lost worker had is done again,
+and Ctrl-C keeps what is finished.
+"""
+
+from __future__ import annotations
+
+from mgdd.parallel.items import map_items
+
+__all__ = ["map_items"]

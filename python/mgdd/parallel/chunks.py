@@ -1,0 +1,264 @@
+"""The one mechanism: items of work in chunks on an executor, each result at its place, nothing left running."""
+
+from __future__ import annotations
+
+import os
+import pickle
+import time
+import traceback
+from collections.abc import Callable
+from concurrent.futures import FIRST_COMPLETED, BrokenExecutor, Future, wait
+from typing import Any, NamedTuple, TypeVar
+
+from mgdd._arguments import shown
+from mgdd.errors import Interrupted, ParameterError, WorkerLostError
+from mgdd.parallel.plan import Chunk, Plan
+from mgdd.parallel.pool import MakesExecutor, Pool
+
+__all__ = ["run_chunks"]
+
+Part = TypeVar("Part")
+
+
+class _Answer(NamedTuple):
+    """What came back of a chunk. An error of the work is a value here, so any other exception is the executor's."""
+
+    seconds: float
+    part: Any = None
+    error: Exception | None = None
+
+
+def run_chunks(
+    function: Callable[..., Part],
+    cut: Callable[[int, int], tuple[Any, ...]],
+    keep: Callable[[int, int, Part], None],
+    n_items: int,
+    *,
+    executor: MakesExecutor | None = None,
+    workers: int | None = None,
+    seconds_per_item: float | None = None,
+    largest: int | None = None,
+    progress: Callable[[int, int], None] | None = None,
+) -> Interrupted | WorkerLostError | None:
+    """Run ``function(*cut(start, stop))`` for chunks that cover all items, and hand each result to `keep`.
+
+    Chunks begin in order and end in any; what is kept must not depend on how the items were cut. `cut` and `keep`
+    are called here, one at a time; only `function` and what `cut` returns go to the workers.
+
+    Parameters
+    ----------
+    function : callable
+        The work; picklable for executors that leave the process.
+    cut : callable
+        Gives the arguments of the items from ``start`` to ``stop`` (exclusive).
+    keep : callable
+        Takes ``start``, ``stop`` and the result.
+    n_items : int
+        How many items there are.
+    executor, workers
+        As in `map_items`.
+    seconds_per_item : float, optional
+        What an item costs [s]; measured if left out.
+    largest : int, optional
+        Most items of a chunk.
+    progress : callable, optional
+        Called with the finished items and all of them.
+
+    Returns
+    -------
+    Interrupted, WorkerLostError or None
+        What ended the work before its end, for `mgdd.errors.hand_over`: Ctrl-C, or a lost worker. What runs then is
+        waited for and kept.
+
+    Raises
+    ------
+    Exception
+        Of the work itself: that of the lowest items, as a plain loop would raise it.
+    mgdd.errors.ParameterError
+        A bad executor or number of workers, work that cannot be pickled.
+    """
+    pool = Pool(executor, workers)
+    try:
+        return _Run(function, cut, keep, n_items, pool, seconds_per_item, largest, progress).go()
+    finally:
+        pool.close()
+
+
+class _Run:
+    def __init__(
+        self,
+        function: Callable[..., Any],
+        cut: Callable[[int, int], tuple[Any, ...]],
+        keep: Callable[[int, int, Any], None],
+        n_items: int,
+        pool: Pool,
+        seconds_per_item: float | None,
+        largest: int | None,
+        progress: Callable[[int, int], None] | None,
+    ) -> None:
+        self._function, self._cut, self._keep, self._pool = function, cut, keep, pool
+        self._n, self._done, self._progress = n_items, 0, progress
+        self._plan = Plan(n_items, pool.workers, seconds_per_item=seconds_per_item, largest=largest)
+        self._out: dict[Future[_Answer], Chunk] = {}
+        self._failed: tuple[Chunk, Exception] | None = None
+
+    def go(self) -> Interrupted | WorkerLostError | None:
+        """Work to the end, to an error, to Ctrl-C, or to a chunk that no worker survives."""
+        try:
+            while self._submit():
+                done = wait(self._out, return_when=FIRST_COMPLETED).done
+                for future in sorted(done, key=self._start_of):
+                    self._take(future)
+                if self._progress is not None:
+                    self._progress(self._done, self._n)
+        except KeyboardInterrupt:
+            self._settle()
+            return Interrupted(f"interrupted: {self._done} of {self._n} are finished, they are in .partial")
+        except _Lost as lost:
+            self._settle()
+            return lost.error
+        except BaseException:
+            self._settle(keep=False)
+            raise
+        if self._failed is not None:
+            raise self._failed[1]
+        return None
+
+    def _submit(self) -> bool:
+        """Hand out chunks; False when nothing is out and nothing is left."""
+        while self._failed is None and len(self._out) < self._room() and (chunk := self._plan.next()):
+            arguments = self._cut(chunk.start, chunk.stop)
+            if chunk.start == 0 and self._pool.crosses_processes:
+                _require_picklable(self._function, *arguments)
+            try:
+                # The attempt makes the call a new one: Dask would give the failed result of an equal call again.
+                future = self._pool.submit(_answer, chunk.attempt, os.getpid(), self._function, arguments)
+            except BrokenExecutor as error:
+                self._lose([chunk, *self._out.values()], error)
+                continue
+            self._out[future] = chunk
+        return bool(self._out)
+
+    def _start_of(self, future: Future[_Answer]) -> int:
+        return self._out[future].start
+
+    def _room(self) -> int:
+        """How many chunks may be out: a lost one goes alone, so that the one that kills its worker is found."""
+        alone = self._plan.has_lost or any(chunk.attempt for chunk in self._out.values())
+        return 1 if alone else self._plan.n_at_once
+
+    def _take(self, future: Future[_Answer]) -> None:
+        chunk = self._out.pop(future, None)
+        if chunk is None:  # lost with a pool that broke meanwhile
+            return
+        try:
+            answer = future.result()
+        except BrokenExecutor as error:
+            self._lose([chunk, *self._out.values()], error)
+        except Exception as error:  # noqa: BLE001 - every executor has its own words for a worker that is gone
+            if isinstance(error, pickle.PicklingError | TypeError | AttributeError):
+                self._refuse_unpicklable(chunk, error)
+            self._again(chunk, error)
+        else:
+            self._accept(chunk, answer)
+
+    def _accept(self, chunk: Chunk, answer: _Answer) -> None:
+        if answer.error is not None:
+            if self._failed is None or chunk.start < self._failed[0].start:
+                self._failed = chunk, answer.error
+            for future, other in list(self._out.items()):  # lower ones may still fail, and then theirs is the error
+                if other.start > self._failed[0].start and future.cancel():
+                    del self._out[future]
+            return
+        self._keep(chunk.start, chunk.stop, answer.part)
+        self._done += chunk.size
+        self._plan.measured(chunk, answer.seconds)
+
+    def _lose(self, chunks: list[Chunk], error: Exception) -> None:
+        """Do again what a broken pool had, in a new one."""
+        self._out.clear()
+        lowest = min(chunks, key=lambda chunk: chunk.start)
+        if not self._pool.renew():
+            raise _Lost(
+                f"a worker was lost with {lowest} of {self._n} and its pool cannot go on ({_said(error)}): pass a "
+                f"function that makes the executor, and lost work is done again; {self._kept()}"
+            ) from error
+        for chunk in sorted(chunks, key=lambda chunk: chunk.start):
+            self._again(chunk, error)
+
+    def _again(self, chunk: Chunk, error: BaseException) -> None:
+        if not self._plan.lost(chunk):
+            raise _Lost(
+                f"{chunk} of {self._n} was lost {chunk.attempt + 1} times, last by {_said(error)}: this work may kill "
+                f"its worker, for example by its memory; {self._kept()}"
+            ) from error
+
+    def _kept(self) -> str:
+        return f"{self._done} are finished, they are in .partial"
+
+    def _settle(self, *, keep: bool = True) -> None:
+        """Cancel what has not begun, wait for what runs, and keep it."""
+        running = {future: chunk for future, chunk in self._out.items() if not future.cancel()}
+        self._out.clear()
+        for future in wait(running).done:
+            if keep and not future.cancelled() and future.exception() is None and future.result().error is None:
+                self._accept(running[future], future.result())
+
+    def _refuse_unpicklable(self, chunk: Chunk, error: BaseException) -> None:
+        _require_picklable(self._function, *self._cut(chunk.start, chunk.stop))
+        raise ParameterError(
+            f"{chunk}: the work or what it returns cannot go from one process to another ({error}): define functions "
+            "and classes at the top level of a module that the workers can import, and return plain data"
+        ) from error
+
+
+class _Lost(Exception):  # noqa: N818 - the way out of the loop, not an error that anybody sees
+    def __init__(self, message: str) -> None:
+        super().__init__(message)
+
+    @property
+    def error(self) -> WorkerLostError:
+        error = WorkerLostError(str(self))
+        error.__cause__ = self.__cause__
+        return error
+
+
+def _answer(attempt: int, caller: int, function: Callable[..., Any], arguments: tuple[Any, ...]) -> _Answer:  # noqa: ARG001
+    """Run in the worker: the time it took, and the result or the error of the work."""
+    begun = time.perf_counter()
+    try:
+        part = function(*arguments)
+    except Exception as error:  # noqa: BLE001 - it is raised where the call came from
+        return _Answer(time.perf_counter() - begun, error=error if caller == os.getpid() else _portable(error))
+    return _Answer(time.perf_counter() - begun, part)
+
+
+def _portable(error: Exception) -> Exception:
+    """Give an error a note of where in the worker it was raised, and a plain one where it cannot be pickled."""
+    where = "".join(traceback.format_exception(error))
+    try:
+        error = pickle.loads(pickle.dumps(error))
+    except Exception:  # noqa: BLE001 - whatever its constructor makes of it
+        error = RuntimeError(f"{type(error).__name__}: {error}")
+    error.add_note(f"in a worker:\n{where}")
+    return error
+
+
+def _require_picklable(*things: Any) -> None:
+    """Refuse what cannot leave the process, by name."""
+    for thing in things:
+        try:
+            pickle.dumps(thing)
+        except Exception as error:
+            raise ParameterError(
+                f"{_name(thing)} cannot be pickled, so no other process can have it ({error}): define functions and "
+                "classes at the top level of a module, and hand over plain data; or use threads"
+            ) from error
+
+
+def _name(thing: Any) -> str:
+    return str(getattr(thing, "__qualname__", "")) or shown(thing)
+
+
+def _said(error: BaseException) -> str:
+    return f"{type(error).__name__}: {error}" if str(error) else type(error).__name__

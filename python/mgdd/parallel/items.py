@@ -1,0 +1,97 @@
+"""A function over a list of items on any executor."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterable, Sequence
+from typing import TypeVar
+
+from mgdd.errors import hand_over
+from mgdd.parallel.chunks import run_chunks
+from mgdd.parallel.pool import MakesExecutor
+
+__all__ = ["map_items"]
+
+Item = TypeVar("Item")
+Result = TypeVar("Result")
+
+
+def map_items(
+    function: Callable[[Item], Result],
+    items: Iterable[Item],
+    *,
+    executor: MakesExecutor | None = None,
+    workers: int | None = None,
+    seconds_per_item: float | None = None,
+    progress: Callable[[int, int], None] | None = None,
+) -> list[Result]:
+    """Call a function with every item, on threads, processes or machines; the results stand in the order of the items.
+
+    Items are handed out in chunks: small ones first, then as many as fit in a quarter of a second. What a lost worker
+    had is done again, up to three times, so the function should give the same answer when it is called again.
+
+    Parameters
+    ----------
+    function : callable
+        Takes one item. For processes and machines function, items and results must be picklable.
+    items : iterable
+        What it is called with.
+    executor : concurrent.futures.Executor or callable, optional
+        Threads of this process if left out; or a pool of processes, ``client.get_executor()`` of Dask,
+        ``mpi4py.futures.MPIPoolExecutor()``. A pool of processes cannot go on when it loses one: give a function that
+        makes the pool, such as ``lambda: ProcessPoolExecutor(4)``, and it is made anew. What that makes is closed at
+        the end, a given executor stays open.
+    workers : int, optional
+        Number of threads, or of the workers of an executor that does not say it; one per core if left out.
+    seconds_per_item : float, optional
+        What an item costs [s], where it is known; measured if left out.
+    progress : callable, optional
+        Called with the number of finished items and that of all.
+
+    Returns
+    -------
+    list
+        One result per item, in order.
+
+    Raises
+    ------
+    Exception
+        Of the function: that of the first item that fails, with a note of where it happened in the worker.
+    mgdd.errors.ParameterError
+        A bad executor, or work that cannot be pickled.
+    mgdd.errors.WorkerLostError
+        A worker was lost and the work could not be done again; ``partial`` has the finished results by number of item.
+    mgdd.errors.Interrupted
+        Ctrl-C; ``partial`` has the finished results by number of item, and nothing is left running.
+
+    Examples
+    --------
+    >>> from mgdd.engine import Cylinder, OperatingPoint, find_optimum
+    >>> from mgdd.parallel import map_items
+    >>> def best(speed_rpm):
+    ...     return find_optimum(Cylinder(), OperatingPoint(speed_rpm=speed_rpm))["soc_cad"]
+    >>> [round(soc, 1) for soc in map_items(best, [1000.0, 2000.0, 3000.0])]
+    [-6.0, -7.0, -7.6]
+    """
+    given = list(items)
+    results: dict[int, Result] = {}
+
+    def keep(start: int, stop: int, part: list[Result]) -> None:
+        results.update(zip(range(start, stop), part, strict=True))
+
+    stop = run_chunks(
+        _call_each,
+        lambda start, stop: (function, given[start:stop]),
+        keep,
+        len(given),
+        executor=executor,
+        workers=workers,
+        seconds_per_item=seconds_per_item,
+        progress=progress,
+    )
+    if stop is not None:
+        hand_over(results, stop)
+    return [results[number] for number in range(len(given))]
+
+
+def _call_each(function: Callable[[Item], Result], items: Sequence[Item]) -> list[Result]:
+    return [function(item) for item in items]

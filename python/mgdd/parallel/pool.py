@@ -1,0 +1,91 @@
+"""The executor behind a call: given, made by a given function, or threads of its own that end with the call."""
+
+from __future__ import annotations
+
+import os
+from collections.abc import Callable
+from concurrent.futures import Executor, Future, ProcessPoolExecutor, ThreadPoolExecutor
+from typing import Any
+
+from mgdd.errors import ParameterError
+
+__all__ = ["MakesExecutor", "Pool"]
+
+MakesExecutor = Executor | Callable[[], Executor]  # what every ``executor=`` takes, beside None
+
+
+class Pool:
+    """An executor with the number of its workers; a broken one is made anew where a function makes it.
+
+    Parameters
+    ----------
+    executor : Executor or callable, optional
+        Anything with ``submit``, or a function that makes it; threads if left out.
+    workers : int, optional
+        Number of threads, or of workers where the executor does not say it; the cores of this process if left out.
+
+    Raises
+    ------
+    mgdd.errors.ParameterError
+        Something else, or fewer than one worker.
+    """
+
+    def __init__(self, executor: MakesExecutor | Any, workers: int | None) -> None:
+        if workers is not None and not workers >= 1:
+            raise ParameterError.of("workers", workers, ">= 1")
+        self._wanted = workers
+        self._make: Callable[[], Executor] | None = None
+        if executor is None:
+            self._make = self._threads
+        elif isinstance(executor, type) or not hasattr(executor, "submit"):
+            if not callable(executor):
+                bound = "a concurrent.futures.Executor, or a function that makes one"
+                raise ParameterError.of("executor", executor, bound)
+            self._make = executor
+        self._executor: Any = executor if self._make is None else self._make()
+        if not hasattr(self._executor, "submit"):
+            raise ParameterError.of("executor", executor, "a function that makes a concurrent.futures.Executor")
+        self.workers: int = workers or _workers_of(self._executor) or cores()
+
+    def submit(self, function: Callable[..., Any], *arguments: Any) -> Future[Any]:
+        """Hand a call to the executor."""
+        future: Future[Any] = self._executor.submit(function, *arguments)
+        return future
+
+    @property
+    def crosses_processes(self) -> bool:
+        """Whether the executor is known to pickle what it is handed."""
+        return isinstance(self._executor, ProcessPoolExecutor)
+
+    def renew(self) -> bool:
+        """Replace a broken executor; False where nobody knows how it is made."""
+        if self._make is None:
+            return False
+        self._executor.shutdown(wait=False)
+        self._executor = self._make()
+        return True
+
+    def close(self) -> None:
+        """End an executor that was made here; nothing runs on behind it. A given one stays open."""
+        if self._make is not None:
+            self._executor.shutdown(wait=True)
+
+    def _threads(self) -> ThreadPoolExecutor:
+        return ThreadPoolExecutor(self._wanted or cores(), thread_name_prefix="mgdd")
+
+
+def cores() -> int:
+    """Count the cores that this process may use."""
+    return len(os.sched_getaffinity(0))
+
+
+def _workers_of(executor: Any) -> int | None:
+    """Ask an executor for its workers: pools of Python and mpi4py, and the client behind one of Dask."""
+    client: Any = getattr(executor, "_client", None)
+    if hasattr(client, "nthreads"):
+        return sum(client.nthreads().values()) or None
+    for name in ("num_workers", "_max_workers"):
+        count = getattr(executor, name, None)
+        if isinstance(count, int) and count >= 1:
+            return count
+    return None

@@ -1,0 +1,111 @@
+"""Work for executors of several processes, which import it by name; and executors that misbehave."""
+
+from __future__ import annotations
+
+import os
+import signal
+import threading
+import time
+from collections.abc import Callable
+from concurrent.futures import Executor, Future
+from functools import partial
+from pathlib import Path
+from typing import Any
+
+
+def square(x: float) -> float:
+    return x * x
+
+
+def slow_square(x: float) -> float:
+    time.sleep(0.02)
+    return x * x
+
+
+def root(x: float) -> float:
+    if x < 0.0:
+        raise ValueError(f"{x} is negative")
+    return x**0.5
+
+
+def process(_: object) -> int:
+    time.sleep(0.01)
+    return os.getpid()
+
+
+def killed_once(flag: str, x: float) -> float:
+    """Take the worker down at item 7, the first time."""
+    if x == 7.0 and not Path(flag).exists():
+        Path(flag).touch()
+        os.kill(os.getpid(), signal.SIGKILL)
+    return x * x
+
+
+def deadly(x: float) -> float:
+    """Take down every worker that touches item 7."""
+    if x == 7.0:
+        os.kill(os.getpid(), signal.SIGKILL)
+    return x * x
+
+
+def unpicklable_result(x: float) -> Callable[[], float]:
+    return lambda: x
+
+
+class OddError(Exception):
+    """An error that pickle cannot rebuild."""
+
+    def __init__(self, first: str, second: str) -> None:
+        super().__init__(f"{first}, {second}")
+
+
+def odd_error(x: float) -> float:
+    raise OddError("one", str(x))
+
+
+class LateReversed(Executor):
+    """Collects calls for a while and runs them last first."""
+
+    def __init__(self) -> None:
+        self.calls: list[Callable[[], None]] = []
+        self.order: list[Any] = []
+        self.lock = threading.Lock()
+
+    def submit(self, fn: Callable[..., Any], /, *args: Any, **kwargs: Any) -> Future[Any]:
+        future: Future[Any] = Future()
+        with self.lock:
+            self.calls.append(partial(self.run, future, partial(fn, *args, **kwargs)))
+            if len(self.calls) == 1:
+                threading.Timer(0.02, self.flush).start()
+        return future
+
+    def run(self, future: Future[Any], call: Callable[[], Any]) -> None:
+        if future.set_running_or_notify_cancel():
+            self.order.append(call.args[-1][-1])  # type: ignore[attr-defined]
+            future.set_result(call())
+
+    def flush(self) -> None:
+        with self.lock:
+            calls, self.calls = self.calls, []
+        for call in reversed(calls):
+            call()
+
+
+class Dropping(Executor):
+    """Loses every third call, by a cancelled future or by an error of its own; the others run at once."""
+
+    def __init__(self, how: str, always: bool = False) -> None:
+        self.how, self.always, self.count = how, always, 0
+
+    def submit(self, fn: Callable[..., Any], /, *args: Any, **kwargs: Any) -> Future[Any]:
+        future: Future[Any] = Future()
+        self.count += 1
+        if self.always or self.count % 3 == 1:
+            if self.how == "cancelled":
+                future.cancel()
+                future.set_running_or_notify_cancel()
+            else:
+                future.set_exception(ConnectionError("the worker is gone"))
+        else:
+            future.set_result(fn(*args, **kwargs))
+        return future
