@@ -10,6 +10,7 @@ import numpy as np
 import pandas as pd
 import pytest
 import xarray as xr
+from scipy.stats import t
 
 from mgdd import plot
 from mgdd.design import design_points
@@ -19,7 +20,7 @@ from mgdd.results.labels import check_labels
 from mgdd.surrogate import ResponseModel, fit_response
 from mgdd.surrogate.process import ProcessSurface
 from mgdd.surrogate.response_findings import outlier_bound
-from mgdd.surrogate.response_surface import PolynomialBasis
+from mgdd.surrogate.stepwise import leverage_of
 
 FACTORS = {"speed_rpm": (1000.0, 3000.0), "fuel_mg": (5.0, 40.0), "soi_cad": (-20.0, 5.0)}
 PLAN = design_points(FACTORS, 48, method="lhs", seed=2)
@@ -27,8 +28,8 @@ POINTS = np.column_stack([PLAN[name] for name in FACTORS])
 
 
 def truth(points):
-    s, f, t = (np.asarray(points[name], dtype=float) for name in FACTORS)
-    return 0.3 * f - 0.004 * (t + 6.0) ** 2 + 1e-3 * s + 2e-5 * s * f
+    s, f, soi = (np.asarray(points[name], dtype=float) for name in FACTORS)
+    return 0.3 * f - 0.004 * (soi + 6.0) ** 2 + 1e-3 * s + 2e-5 * s * f
 
 
 def measured(seed, sd=0.1, plan=PLAN):
@@ -99,8 +100,6 @@ def test_folds_repeat_the_whole_fit():
 
 def test_mean_and_interval_are_those_of_the_textbook():
     """One factor, straight line: prediction interval of Bates and Watts, section 1.3, by its closed form."""
-    from scipy.stats import t
-
     x, y = np.array([1.0, 2.0, 4.0, 5.0, 9.0]), np.array([2.1, 3.7, 8.4, 9.6, 18.5])
     slope = np.cov(x, y, bias=True)[0, 1] / x.var()
     s = np.sqrt(np.sum((y - y.mean() - slope * (x - x.mean())) ** 2) / 3.0)
@@ -113,15 +112,29 @@ def test_mean_and_interval_are_those_of_the_textbook():
     np.testing.assert_allclose(found["upper"] - found["mean"], t.ppf(0.95, 3) * np.hypot(mean_sd, s))
 
 
+def many_sets(n_sets, sd=0.1):
+    """Residuals, noise estimates and coefficients of many noisy sets at once, by the normal equations."""
+    basis = fit_response(PLAN, measured(0), select="all").model.surface.support.basis
+    terms = basis(POINTS)
+    sets = truth(PLAN)[:, None] + np.stack([measured(seed, sd) - truth(PLAN) for seed in range(n_sets)], axis=1)
+    coefficients = np.linalg.solve(terms.T @ terms, terms.T @ sets)
+    residual = sets - terms @ coefficients
+    return basis, coefficients, residual, np.sum(residual**2, axis=0)
+
+
 def test_intervals_hold_95_percent_of_new_measurements():
+    basis, coefficients, _, rss = many_sets(3000)
     asked = design_points(FACTORS, 64, seed=11)
-    inside = []
-    for seed in range(300):
-        model = fit_response(PLAN, measured(seed), select="all").model
-        found = model.predict(asked)
-        new = truth(asked) + np.random.default_rng(10_000 + seed).normal(0.0, 0.1, 64)
-        inside.append(np.mean((new > found["lower"]) & (new < found["upper"])))
-    assert 0.935 < np.mean(inside) < 0.965
+    points = np.column_stack([asked[name] for name in FACTORS])
+    mean = basis(points) @ coefficients
+    model = fit_response(PLAN, measured(0), select="all").model
+    wide = t.ppf(0.975, 38) * np.sqrt(rss / 38.0) * np.sqrt(1.0 + model.surface.support.leverage(points))[:, None]
+    for seed in range(3):
+        found = fit_response(PLAN, measured(seed), select="all").model.predict(asked)
+        np.testing.assert_allclose(found["lower"], (mean - wide)[:, seed], rtol=1e-7)
+        np.testing.assert_allclose(found["upper"], (mean + wide)[:, seed], rtol=1e-7)
+    new = truth(asked)[:, None] + np.random.default_rng(1).normal(0.0, 0.1, mean.shape)
+    assert 0.947 < np.mean(np.abs(new - mean) < wide) < 0.953
 
 
 def test_after_a_choice_of_terms_the_interval_is_only_a_little_short():
@@ -145,23 +158,30 @@ def test_an_outlier_is_found_and_no_other_point():
         assert np.flatnonzero(fit.diagnostics["outlier"]).tolist()[0:1] == [17] or len(found.names) > 1
 
 
-def test_clean_data_show_outliers_and_patterns_at_the_nominal_rate():
-    """Terms as the truth has them: 5 % of clean sets with an outlier, 1 % with each of four other patterns."""
-    basis = PolynomialBasis.of(2, centre=np.zeros(3), scale=np.ones(3))
-    assert len(basis.monomials) == 10
-    found = [codes(fit_response(PLAN, measured(seed), select="all")) for seed in range(400)]
-    share = {code: np.mean([code in one for one in found]) for code in ("outlier", "heteroscedastic", "structured")}
-    assert 0.02 < share["outlier"] < 0.085
-    assert share["heteroscedastic"] < 0.03
-    assert share["structured"] < 0.06
+def test_clean_data_show_outliers_at_the_nominal_rate():
+    basis, _, residual, rss = many_sets(3000)
+    room = 1.0 - leverage_of(basis(POINTS))[:, None]
+    studentised = residual / np.sqrt(room) / np.sqrt((rss - residual**2 / room) / 37.0)
+    for seed in range(3):
+        own = fit_response(PLAN, measured(seed), select="all").diagnostics
+        np.testing.assert_allclose(own["studentised"], studentised[:, seed], rtol=1e-6)
+    bound = float(own["outlier_bound"])
+    assert bound == pytest.approx(t.isf(0.05 / 96.0, 37))
+    assert 0.037 < np.mean(np.abs(studentised).max(axis=0) > bound) < 0.055
+
+
+def test_clean_data_show_few_patterns():
+    found = [codes(fit_response(PLAN, measured(seed), select="all")) for seed in range(150)]
+    share = {code: np.mean([code in one for one in found]) for code in ("heteroscedastic", "structured")}
+    assert share["heteroscedastic"] < 0.04
+    assert share["structured"] < 0.07
     assert not any({"few_points", "poor_prediction", "high_leverage", "no_hull", "lack_of_fit"} & set(o) for o in found)
 
 
-def test_the_bound_of_outliers_is_that_of_bonferroni():
-    from scipy.stats import t
-
-    assert outlier_bound(20, 15.0) == pytest.approx(t.isf(0.05 / 40.0, 14))
+def test_without_freedom_no_point_is_called_an_outlier():
     assert np.isnan(outlier_bound(3, 1.0))
+    fit = fit_response({"x": [0.0, 1.0, 3.0]}, [0.0, 1.1, 9.0], degree=1, select="all")
+    assert not fit.diagnostics["outlier"].any()
 
 
 def test_patterns_in_the_residuals_are_said():
@@ -255,7 +275,7 @@ def test_a_figure_marks_outliers_and_takes_given_axes():
     figure, axes = plt.subplots(1, 2, figsize=(12, 8))
     drawn = plot.response_diagnostics(data, ax=axes[1])
     assert drawn is axes[1]
-    odd = [line for line in figure.axes[2].lines if line.get_label() == "outlier"][0]
+    odd = next(line for line in figure.axes[2].lines if line.get_label() == "outlier")
     assert odd.get_xdata().tolist() == [5]
     assert odd.get_ydata()[0] == data["studentised"].values[5]
     cut = figure.axes[-1].lines[0]
@@ -355,7 +375,7 @@ def test_a_process_follows_a_response_that_no_low_polynomial_does():
 def test_a_process_covers_new_measurements_and_says_what_is_straight():
     pytest.importorskip("sklearn", reason="scikit-learn is not installed: pip install 'mgdd[gp]'")
     inside = []
-    for seed in range(12):
+    for seed in range(8):
         plan, y = process_points(50, seed=seed)
         asked, wanted = process_points(64, seed=100 + seed)
         generator = np.random.default_rng(seed)

@@ -22,6 +22,7 @@ if TYPE_CHECKING:
 __all__ = ["fit_process"]
 
 MOST_POINTS = 3000  # the covariance is factorised in every step
+_ONE_THREAD = 500  # points below which threads of the matrix library only wait for each other
 _LENGTH = (0.05, 50.0)  # in half ranges of a factor
 _SIGNAL, _NOISE = (1e-2, 1e4), (1e-8, 1e1)  # variances over that of the response
 _AT_BOUND = 1e-4  # of the logarithms
@@ -73,7 +74,9 @@ def fit_process(
         n_restarts_optimizer=n_starts - 1,
         random_state=seed,
     )
-    with warnings.catch_warnings():
+    few = 1 if len(values) <= _ONE_THREAD else None
+    threads: Any = import_extra("threadpoolctl", "gp", purpose)
+    with threads.threadpool_limits(few), warnings.catch_warnings():
         # A parameter at its bound is said as a finding.
         warnings.simplefilter("ignore", import_extra("sklearn.exceptions", "gp", purpose).ConvergenceWarning)
         regressor.fit((points - points.mean(axis=0)) / half, (values - offset) / spread)
@@ -86,7 +89,8 @@ def fit_process(
         length_scales=half * np.exp(logs[1:-1]),
         noise_sd=spread * float(np.exp(0.5 * logs[-1])),
     )
-    return surface, _report(surface, regressor, search, logs, names, half=half, spread=spread)
+    with threads.threadpool_limits(few):
+        return surface, _report(surface, regressor, search, logs, names, half=half, spread=spread)
 
 
 def _report(

@@ -34,11 +34,11 @@ def diagnostics_of(model: ResponseModel, left_out: NDArray[np.float64], studenti
     }
     low, high, middle = model.points.min(axis=0), model.points.max(axis=0), np.median(model.points, axis=0)
     steps = np.linspace(low, high, _STEPS, axis=1)
-    cuts = []
+    at = np.tile(middle, (len(names), _STEPS, 1))
     for place in range(len(names)):
-        at = np.tile(middle, (_STEPS, 1))
-        at[:, place] = steps[place]
-        cuts.append(model.predict(dict(zip(names, at.T, strict=True))))
+        at[place, :, place] = steps[place]
+    cuts = model.predict(dict(zip(names, at.reshape(-1, len(names)).T, strict=True)))
+    cut = {name: cuts[name].to_numpy().reshape(len(names), _STEPS) for name in ("mean", "lower", "upper")}
     along, own = ("factor", "step"), "unit of the factor"
     return labelled_dataset(
         {
@@ -56,9 +56,9 @@ def diagnostics_of(model: ResponseModel, left_out: NDArray[np.float64], studenti
             "factor": ("factor", list(names), "-", "factor"),
             "step": ("step", np.arange(_STEPS), "-", "step of a cut"),
             "cut": (along, steps, own, "factor, the others at their medians"),
-            "cut_mean": (along, np.stack([cut["mean"] for cut in cuts]), unit, f"{said}, prediction"),
-            "cut_lower": (along, np.stack([cut["lower"] for cut in cuts]), unit, f"{said}, lower end of the interval"),
-            "cut_upper": (along, np.stack([cut["upper"] for cut in cuts]), unit, f"{said}, upper end of the interval"),
+            "cut_mean": (along, cut["mean"], unit, f"{said}, prediction"),
+            "cut_lower": (along, cut["lower"], unit, f"{said}, lower end of the interval"),
+            "cut_upper": (along, cut["upper"], unit, f"{said}, upper end of the interval"),
         },
         attrs={"response": model.name, "kind": model.kind, "level": 0.95},
     )
