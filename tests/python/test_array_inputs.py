@@ -40,6 +40,7 @@ NOISE = np.random.default_rng(0).standard_normal(600)
 TEN = np.array(mgdd._core.identify.smooth_example)
 KELVIN, PPM = np.linspace(1900.0, 2500.0, 7), np.array([60.0, 110.0, 150.0, 230.0, 320.0, 450.0, 640.0])
 SOC = np.array([-8.0, -6.0, -4.0])
+FUEL = np.array([5.0, 10.0, 20.0, 30.0, 40.0])
 RECORDS = surrogate.fit_surrogate(surrogate.random_step_records(1500))
 SWEEP = np.linspace(-3.0, 3.0, 40)
 OPEN = np.array([10.0, 30.0, 60.0])
@@ -261,6 +262,10 @@ CALLS: dict[str, tuple[Call, tuple[Array, ...]]] = {
     "signals.residual_tests": (lambda e, u: signals.residual_tests(e, u).share_white, (NOISE, DUTY)),
     "signals.rmse": (signals.rmse, (ANGLE, ANGLE + NOISE)),
     "signals.vaf_percent": (signals.vaf_percent, (ANGLE, ANGLE + NOISE)),
+    "surrogate.fit_response": (
+        lambda fuel, imep: surrogate.fit_response({"fuel_mg": fuel}, imep, degree=1).diagnostics["left_out"].to_numpy(),
+        (FUEL, np.array([1.1, 2.9, 6.1, 8.8, 12.1])),
+    ),
     "surrogate.EngineSurrogate.predict": (
         lambda soi: RECORDS.predict(soi)["imep_bar"].to_numpy(), (np.array([-4.0, 0.0]),),
     ),

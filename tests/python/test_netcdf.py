@@ -18,7 +18,7 @@ import mgdd
 from idle_loop import idle_loop
 from map_cases import sweep as map_sweep
 from map_cases import timing_table
-from mgdd import datasets, identify, optimize, presets, signals, surrogate
+from mgdd import datasets, design, identify, optimize, presets, signals, surrogate
 from mgdd.control import Pid
 from mgdd.engine import Cylinder, OperatingPoint, analyze, convergence, sensitivities, simulate, timing_sweep
 from mgdd.guide import FeedForward, GuidedEngine, ModelOptimum, OnlineCalibration, TimingMap
@@ -109,6 +109,26 @@ def of_records() -> surrogate.EngineSurrogate:
     return surrogate.fit_surrogate(surrogate.random_step_records(1500))
 
 
+def planned(**options: Any) -> xr.Dataset:
+    return design.design_points({"speed_rpm": (1000.0, 3000.0), "fuel_mg": (5.0, 40.0), "gear": {2, 4, 5}}, **options)
+
+
+def region(columns: Any) -> list[xr.Dataset]:
+    """Judge by a model, by measured points, and beside points that could not be driven."""
+    hot = design.FeasibleRegion.of_model(lambda c: {"t_max_k": 50.0 * c["fuel_mg"]}, {"t_max_k": 1500.0})
+    driven = {"speed_rpm": [900.0, 900.0, 3100.0, 2000.0], "fuel_mg": [4.0, 45.0, 4.0, 30.0]}
+    refused = {"speed_rpm": [2500.0], "fuel_mg": [30.0]}
+    measured = design.FeasibleRegion.of_points(driven, infeasible=refused)
+    return [hot.evaluate(columns), measured.evaluate(columns)]
+
+
+def responses() -> Iterable[surrogate.ResponseModel]:
+    plan = planned(n=32)
+    torque = 4.0 * plan["fuel_mg"] - 1e-5 * (plan["speed_rpm"] - 1800.0) ** 2 + np.sin(7.0 * plan["point"])
+    for kind in ("polynomial", "gaussian_process"):
+        yield surrogate.fit_response(plan, torque, kind=kind, n_starts=1).model
+
+
 def loop_samples() -> xr.Dataset:
     with idle_loop() as loop:
         loop.wait(0.05)
@@ -141,6 +161,14 @@ MADE: dict[str, Callable[[Path], Any]] = {
     "engine.sensitivities": lambda _: sensitivities(Cylinder(), POINT),
     "engine.simulate": lambda _: simulate(Cylinder(), OperatingPoint(intake_pressure_kpa=700.0, fuel_mg=400.0)),
     "engine.timing_sweep": lambda _: timing_sweep(Cylinder(), POINT),
+    "design.FeasibleRegion.evaluate": lambda _: region(planned(n=16)),
+    "design.design_points": lambda _: [
+        planned(n=16), planned(method="factorial"), planned(n=12, method="d_optimal", existing=planned(n=4)),
+    ],
+    "surrogate.ResponseModel.predict": lambda _: [model.predict(planned(n=8)) for model in responses()],
+    "surrogate.fit_response.diagnostics": lambda _: surrogate.fit_response(
+        {"fuel_mg": [5.0, 10.0, 20.0, 30.0, 40.0], "imep_bar": [1.1, 2.9, 6.1, 8.8, 12.1]}, "imep_bar", degree=1
+    ).diagnostics,
     "surrogate.EngineSurrogate.predict": lambda _: of_records().predict([-4.0, 0.0]),
     "surrogate.EngineSurrogate.quality": lambda _: of_records().quality(),
     "identify.ExcitationCheck.prediction": lambda _: identify.check_excitation(

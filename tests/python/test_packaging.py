@@ -19,7 +19,7 @@ def test_import_is_light() -> None:
     run = subprocess.run([sys.executable, "-c", code], check=True, capture_output=True, text=True)
     loaded = set(run.stdout.split())
     assert "mgdd" in loaded
-    heavy = {"matplotlib", "xarray", "pandas", "scipy", "rich", "jinja2", "pooch", "can", "dask", "numba"}
+    heavy = {"matplotlib", "xarray", "pandas", "scipy", "rich", "jinja2", "pooch", "can", "dask", "numba", "sklearn"}
     assert loaded & heavy == set()
 
 
