@@ -264,7 +264,7 @@ CALLS: dict[str, tuple[Call, tuple[Array, ...]]] = {
     "signals.vaf_percent": (signals.vaf_percent, (ANGLE, ANGLE + NOISE)),
     "surrogate.fit_response": (
         lambda fuel, imep: surrogate.fit_response({"fuel_mg": fuel}, imep, degree=1).diagnostics["left_out"].to_numpy(),
-        (FUEL, np.array([1.1, 2.9, 6.1, 8.8, 12.1])),
+        (np.array([6.0, 13.0, 20.0, 30.0, 41.0]), np.array([1.1, 2.9, 6.1, 8.8, 12.1])),
     ),
     "surrogate.EngineSurrogate.predict": (
         lambda soi: RECORDS.predict(soi)["imep_bar"].to_numpy(), (np.array([-4.0, 0.0]),),
