@@ -250,7 +250,7 @@ CALLS: dict[str, tuple[Call, tuple[Array, ...]]] = {
         lambda soi: RECORDS.predict(soi)["imep_bar"].to_numpy(), (np.array([-4.0, 0.0]),),
     ),
     "sweep.sweep": (
-        lambda soc, fuel: sweep(Cylinder(), OperatingPoint(), {"soc_cad": soc, "fuel_mg": fuel})["p_max_bar"].to_numpy(),
+        lambda soc, fuel: sweep(Cylinder(), OperatingPoint(), {"soc_cad": soc, "fuel_mg": fuel})["t_max_k"].to_numpy(),
         (SOC, 0.5 * OPEN),
     ),
     "throttle.DemandChain.steady": (

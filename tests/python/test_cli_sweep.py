@@ -43,7 +43,7 @@ def test_the_file_holds_the_table(tmp_path: Path, capsys: pytest.CaptureFixture[
         (["--over", "speed=1000:2000:3"], "did you mean 'speed_rpm'"),
         (["--over", "bore_mm=-1:80:3"], "bore_mm = -1 mm: must be > 0"),
         ([*OVER, "--workers", "0"], "must be >= 1"),
-        ([*OVER, "--outputs", "p_max"], "did you mean 'p_max_bar'"),
+        ([*OVER, "--outputs", "p_max_ba"], "did you mean 'p_max_bar'"),
     ],
 )
 def test_bad_input_writes_nothing(

@@ -13,7 +13,8 @@ CPP = "common > math > dynamics > optimize > control > engine throttle > identif
 # parallel knows errors alone: whatever is long enough to leave the machine may use it.
 PYTHON = (
     "errors > _arguments > _core > parallel results > signals > io plot > presets > optimize > control"
-    " > engine throttle > identify > surrogate > guide > loop sweep design datasets > maps > rig > studies > report > cli > __main__"
+    " > engine throttle > identify > surrogate > guide"
+    " > loop sweep design datasets > maps > rig > studies > report > cli > __main__"
 )
 
 STRANGERS = [("identify/engine", "identify/throttle")]  # parts of one room that do not know each other
