@@ -70,7 +70,7 @@ def map_items(
     >>> def best(speed_rpm):
     ...     return find_optimum(Cylinder(), OperatingPoint(speed_rpm=speed_rpm))["soc_cad"]
     >>> [round(soc, 1) for soc in map_items(best, [1000.0, 2000.0, 3000.0])]
-    [-6.0, -7.0, -7.6]
+    [-1.7, -8.4, -12.1]
     """
     given = list(items)
     results: dict[int, Result] = {}

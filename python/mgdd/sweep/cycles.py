@@ -104,7 +104,7 @@ def sweep(
     >>> dict(table.sizes)
     {'speed_rpm': 2, 'soc_cad': 3}
     >>> table["efficiency_gross"].idxmax("soc_cad").values.tolist()
-    [-6.0, -6.0]
+    [-3.0, -9.0]
     """
     cases = cases_of(over, points=points)
     request = Request(
