@@ -148,7 +148,7 @@ def test_a_changed_packaged_file_is_refused(monkeypatch, tmp_path):
 
 
 def test_an_unknown_set_and_an_option_of_another_are_refused():
-    with pytest.raises(ParameterError, match="data set 'moon': must be one of cascaded_tanks, emps, h2df_502"):
+    with pytest.raises(ParameterError, match="data set 'moon': must be one of advisor_engine_maps, cascaded_tanks"):
         datasets.load("moon")
     with pytest.raises(ParameterError, match="only 'h2df_502' has them"):
         datasets.load(NAME, mask_held=False)

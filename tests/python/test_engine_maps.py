@@ -11,7 +11,7 @@ import xarray as xr
 from mgdd import datasets
 from mgdd.datasets.engine_maps import engine_map
 from mgdd.errors import DataError
-from mgdd.maps import CalibrationMap
+from mgdd.maps import CalibrationMap, read_map, write_map
 from mgdd.results.labels import check_labels
 
 NAME = "advisor_engine_maps"
@@ -71,6 +71,21 @@ def test_a_measured_map_can_be_read_and_says_where_it_ends(engines: tuple[xr.Dat
     assert np.isnan(at.values[2])  # above full load
     assert at.held_outside.tolist() == [False, False, False, True]
     assert set(np.unique(table.cells["source"])) == {"measured", "unattainable"}
+
+
+def test_the_range_of_nox_is_that_of_the_record(engines: tuple[xr.Dataset, xr.Dataset]) -> None:
+    for data, (least, most) in zip(engines, ((1.56, 22.0), (2.15, 11.9)), strict=True):
+        power_w = data["torque_nm"] * data["speed_rpm"] * np.pi / 30.0
+        nox = data["nox_g_per_kwh"].where(power_w > 5000.0)
+        assert float(nox.min()) == pytest.approx(least, abs=0.006)
+        assert float(nox.max()) == pytest.approx(most, abs=0.06)
+
+
+@pytest.mark.parametrize("ending", ["csv", "json", "nc"])
+def test_a_measured_map_travels(engines: tuple[xr.Dataset, xr.Dataset], ending: str, tmp_path: Path) -> None:
+    table = CalibrationMap.from_dataset(engines[1], "nox_g_per_kwh")
+    write_map(table, tmp_path / f"nox.{ending}")
+    assert read_map(tmp_path / f"nox.{ending}") == table
 
 
 def test_columns_units_and_consumption_of_a_small_map(tmp_path: Path) -> None:

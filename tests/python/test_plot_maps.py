@@ -13,7 +13,7 @@ from matplotlib.patches import Rectangle
 
 from map_cases import FUEL, SPEED, sweep, timing_table
 from mgdd.errors import DataError, ParameterError
-from mgdd.maps import CalibrationMap, apply_map, optimize_map
+from mgdd.maps import CalibrationMap, apply_map, compare_maps, optimize_map
 from mgdd.plot import map_cells, map_contour, trade_off
 from mgdd.results.labels import labelled_dataset
 
@@ -80,11 +80,39 @@ def test_cells_show_value_source_support_and_limit() -> None:
     assert written[(2, 4)].strip() == "×"  # infeasible
     assert written[(1, 2)] == f"{table.values[1, 2]:.3g}".replace("-", "−")
     frames = [patch for patch in ax.patches if isinstance(patch, Rectangle)]
-    assert [(frame.get_x() + 0.47, frame.get_y() + 0.47) for frame in frames] == [pytest.approx((1.0, 3.0))]
+    assert [(frame.get_x() + 0.46, frame.get_y() + 0.46) for frame in frames] == [pytest.approx((1.0, 3.0))]
     assert [tick.get_text() for tick in ax.get_xticklabels()] == ["900", "1400", "3000"]
     assert [tick.get_text() for tick in ax.get_yticklabels()] == ["6", "10", "14", "25", "40"]
     said = [text.get_text() for text in ax.get_legend().get_texts()]
     assert said == [f"support, at most {table.cells['support'].max():g}", "held by p_max_bar", "infeasible", "learned"]
+
+
+def test_levels_of_a_figure_that_grows_without_bound_are_those_of_most_values() -> None:
+    data = consumption()
+    data["bsfc_g_per_kwh"][:, 0] = [400.0, 3000.0, 9000.0]
+    low, high = map_contour(data, "bsfc_g_per_kwh").figure.axes[-1].get_ylim()
+    assert low < 220.0
+    assert 400.0 < high < 5000.0
+
+
+def test_support_that_is_the_same_everywhere_is_said_once() -> None:
+    ax = map_cells(timing_table().replaced(cells={"support": 7.0}).to_dataset())
+    assert "support 7 everywhere" in [text.get_text() for text in ax.get_legend().get_texts()]
+    assert [item for item in ax.get_lines() if item.get_marker() == "o"] == []
+    varied = map_cells(timing_table().to_dataset())
+    sizes = {round(item.get_markersize(), 3) for item in varied.get_lines() if item.get_marker() == "o"}
+    assert len(sizes) > 5
+
+
+def test_a_difference_has_zero_in_the_middle_and_frames_beyond_the_tolerance() -> None:
+    one = CalibrationMap({"speed_rpm": SPEED, "fuel_mg": FUEL}, -5.0, name="soc_cad")
+    two = one.replaced(one.values + np.linspace(-0.1, 0.4, 15).reshape(3, 5))
+    found = compare_maps(one, two, tolerance=0.25)
+    ax = map_cells(found)
+    (image,) = ax.get_images()
+    assert image.get_clim() == pytest.approx((-0.4, 0.4))
+    assert len(ax.patches) == int(found["n_beyond"]) > 0
+    assert [text.get_text() for text in ax.get_legend().get_texts()] == ["beyond the tolerance"]
 
 
 def test_a_trade_off_has_a_line_per_operating_point_and_stars_where_the_map_is() -> None:
