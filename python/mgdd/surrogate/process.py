@@ -13,7 +13,7 @@ if TYPE_CHECKING:
 
 __all__ = ["ProcessSurface", "matern"]
 
-_JITTER = 1e-10  # of the signal variance: keeps a noise-free covariance positive
+_NUGGET = 1e-10  # of the signal variance: keeps a noise-free covariance positive
 
 
 def matern(
@@ -74,7 +74,7 @@ class ProcessSurface:
 
     @cached_property
     def _jitter(self) -> float:
-        return _JITTER * self.signal_sd**2
+        return _NUGGET * self.signal_sd**2
 
     @cached_property
     def _root(self) -> NDArray[np.float64]:
