@@ -1,12 +1,15 @@
-// One cycle of the virtual bench on `puma_single` against the bare cycle model that it wraps, and one normal number.
-// Before timing, the noise-free bench must give the indicators of the bare cycle.
+// One cycle of the virtual bench on `puma_single` against the bare cycle model that it wraps, whole loops one by one
+// and in lanes, and one normal number. Before timing, the noise-free bench must give the indicators of the bare cycle.
 #include <benchmark/benchmark.h>
 
+#include <cmath>
 #include <cstdint>
 #include <string>
 
 #include "mgdd/common/random.hpp"
 #include "mgdd/loop/engine_bench.hpp"
+#include "mgdd/loop/engine_bench_lanes.hpp"
+#include "mgdd/loop/monte_carlo.hpp"
 
 namespace {
 
@@ -63,6 +66,33 @@ void step(benchmark::State& state, const BenchSettings& settings) {
 BENCHMARK_CAPTURE(step, quiet, quiet())->Name("bench/step_quiet");
 BENCHMARK_CAPTURE(step, noisy, noisy())->Name("bench/step_noisy");
 BENCHMARK_CAPTURE(step, everything, everything())->Name("bench/step_everything");
+
+/// Whole loops on one thread; the summaries must agree before timing.
+void loops(benchmark::State& state, LoopForm form) {
+  MonteCarloPlan plan;
+  plan.benches.emplace_back(noisy());
+  plan.criteria.push_back({.optimum_cad = -8.0});
+  optimize::ExtremumSeekingSettings esc;
+  esc.space = {optimize::scalar_input(-12.0), optimize::scalar_input(-30.0), optimize::scalar_input(10.0)};
+  plan.seekers.emplace_back(optimize::ExtremumSeeking(esc));
+  plan.seeds.resize(EngineBenchLanes::width);
+  for (std::size_t i = 0; i < plan.seeds.size(); ++i)
+    plan.seeds[i] = i;
+  plan.cycles = 500;
+  plan.threads = 1;
+  plan.form = LoopForm::single;
+  const double expected = monte_carlo(plan, {}).loops.back().mean_cad;
+  plan.form = form;
+  if (std::abs(monte_carlo(plan, {}).loops.back().mean_cad - expected) > 1e-8) {
+    return state.SkipWithError("lanes and single loops disagree");
+  }
+  for (auto _ : state)
+    benchmark::DoNotOptimize(monte_carlo(plan, {}));
+  const auto cycles = static_cast<double>(plan.seeds.size()) * static_cast<double>(plan.cycles);
+  state.counters["cycles/s"] = benchmark::Counter(cycles, benchmark::Counter::kIsIterationInvariantRate);
+}
+BENCHMARK_CAPTURE(loops, single, LoopForm::single)->Name("loops/single")->Unit(benchmark::kMillisecond);
+BENCHMARK_CAPTURE(loops, lanes, LoopForm::lanes)->Name("loops/lanes")->Unit(benchmark::kMillisecond);
 
 void normal(benchmark::State& state) {
   std::uint64_t index = 0;

@@ -38,8 +38,7 @@ void figures_of(const CycleModel<double>& model, const Charge<double>& charge, c
   const double bottom = g.clearance_m3 + g.swept_m3;
   const double gross =
       closed + charge.intake_pa * (volume[0] - bottom) + 0.5 * (p[n - 1] + charge.intake_pa) * (bottom - volume[n - 1]);
-  const std::size_t before = p_at > 0 ? p_at - 1 : p_at, after = std::min(p_at + 1, n - 1);
-  const Peak<double> peak = parabola_peak<double>(angle, p_at, p[before], p[p_at], p[after]);
+  const Peak<double> peak = parabola_peak(samples_around<double>(angle, p_at, [&p](std::size_t k) { return p[k]; }));
   const double values[] = {closed / g.swept_m3 / mgdd::units::pa_per_bar,
                            gross / g.swept_m3 / mgdd::units::pa_per_bar,
                            gross / charge.fuel_heat_j,

@@ -92,7 +92,7 @@ py::dict run_many(const std::vector<BoundBench*>& benches, const py::list& seeke
                   const std::vector<std::uint64_t>& seeds, std::int64_t cycles, const std::vector<double>& optimum_cad,
                   double arrival_cad, std::int64_t tail_cycles, std::optional<std::int64_t> exceed_from,
                   const std::vector<std::vector<double>>& exceed_above, const std::vector<std::vector<double>>& limits,
-                  int threads) {
+                  int threads, const std::string& form) {
   if (optimum_cad.size() != benches.size() || exceed_above.size() != benches.size() ||
       limits.size() != benches.size()) {
     throw ShapeError("optimum_cad, exceed_above and limits: give one entry per bench");
@@ -107,6 +107,7 @@ py::dict run_many(const std::vector<BoundBench*>& benches, const py::list& seeke
   plan.seeds = seeds;
   plan.cycles = cycles;
   plan.threads = threads;
+  plan.form = engine::parse_batch_form(form);
   return hand_over(
       interruptible([&plan](const std::stop_token& stop) {
         return monte_carlo(plan, [&stop] { return stop.stop_requested(); });
@@ -126,7 +127,10 @@ void bind_loop(py::module_& m) {
   m.def("monte_carlo", &run_many, py::arg("benches"), py::arg("seekers"), py::arg("seeds"), py::kw_only(),
         py::arg("cycles"), py::arg("optimum_cad"), py::arg("arrival_cad"), py::arg("tail_cycles"),
         py::arg("exceed_from"), py::arg("exceed_above"), py::arg("limits"), py::arg("threads"),
-        "Whole loops on all cores; behind mgdd.loop.monte_carlo.");
+        py::arg("form") = "automatic", "Whole loops on all cores; behind mgdd.loop.monte_carlo.");
+  m.def(
+      "loop_form", [](std::size_t loops) { return std::string(to_string(form_of_loops(loops, LoopForm::automatic))); },
+      py::arg("loops"), "Form that so many loops take; who cuts them into pieces passes it on.");
 }
 
 }  // namespace mgdd::bindings

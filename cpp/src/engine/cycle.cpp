@@ -250,8 +250,10 @@ Indicators<T> CycleModel<T>::indicators(const Charge<T>& charge, const T& soc_ca
   }
   sums.work_closed_j = 0.5 * sums.work_closed_j;
   sums.last_pressure_pa = p[n - 1];
-  Indicators<T> out =
-      indicators_of<T>(cylinder_.gas, geometry_, charge, angles_, volume_, sums, [&p](std::size_t k) { return p[k]; });
+  const std::span<const T> volume(volume_);
+  Indicators<T> out = indicators_of(figures_of<T>(angles_, volume, sums, [&p](std::size_t k) { return p[k]; }), charge,
+                                    CycleVolumes<T>(geometry_, volume),
+                                    [this](const T& t_k) MGDD_INLINE_LAMBDA { return gamma_at(cylinder_.gas, t_k); });
   if (value_of(charge.fuel_heat_j) > 0.0) {
     const Burn<T> burn(cylinder_.burn, soc_cad, charge.burn_duration_cad);
     out.ca10_cad = burn.angle_of(0.1);

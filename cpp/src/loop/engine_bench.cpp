@@ -161,9 +161,7 @@ PressureTrace EngineBench::pressure() noexcept {
   if (cycle_ == 0) return {};
   const std::int64_t last = cycle_ - 1;
   drift_to(last);
-  engine::Charge<double> charge = prepared_[index_at(last)].charge;
-  if (misfires_at(last)) charge.fuel_heat_j = 0.0;
-  model_.run(charge, burning_soc_cad(last_soc_cad_, last), work_);
+  model_.run(charge_at(last, misfires_at(last)), burning_soc_cad(last_soc_cad_, last), work_);
   return pressure_sensor_.read(model_, work_, seed_, static_cast<std::uint64_t>(BenchStream::pressure), last);
 }
 
@@ -175,28 +173,23 @@ std::array<double, max_limits> EngineBench::noise_free_limits(std::int64_t cycle
   const double applied = std::clamp(soc_cad, window_[0], window_[1]);
   const double burning = std::clamp(drifted_soc_cad(applied, cycle), closed_[0], closed_[1]);
   bool unphysical = false;
-  const Indicators<double> steady = burn(prepared_[index_at(cycle)], burning, false, unphysical);
+  const Indicators<double> steady = burn(prepared_[index_at(cycle)].charge, burning, unphysical);
   for (std::size_t i = 0; i < limit_members_.size() && !unphysical; ++i) {
     if (limit_members_[i]) out[i] = steady.*(limit_members_[i]);
   }
   return out;
 }
 
-Indicators<double> EngineBench::burn(const Prepared& at, double soc_cad, bool misfire, bool& unphysical) noexcept {
-  engine::Charge<double> charge = at.charge;
-  if (misfire) charge.fuel_heat_j = 0.0;
+Indicators<double> EngineBench::burn(const engine::Charge<double>& charge, double soc_cad, bool& unphysical) noexcept {
   model_.run(charge, soc_cad, work_);
   unphysical = model_.first_unphysical(work_) < model_.angles_cad().size();
-  if (unphysical) return {};
-  Indicators<double> out = model_.indicators(charge, soc_cad, work_);
-  if (misfire) out.efficiency_gross = out.work_gross_j / at.charge.fuel_heat_j;
-  return out;
+  return unphysical ? Indicators<double>{} : model_.indicators(charge, soc_cad, work_);
 }
 
 // Fills every sensor with its steady value at the first request, free of scatter and noise.
 void EngineBench::start(const Prepared& at, double soc_cad) noexcept {
   bool unphysical = false;
-  const Indicators<double> steady = burn(at, soc_cad, false, unphysical);
+  const Indicators<double> steady = burn(at.charge, soc_cad, unphysical);
   if (!unphysical) last_t_max_k_ = steady.t_max_k;
   const double nox = settings_.true_nox.ppm(last_t_max_k_);
   analyser_.fill(nox);
@@ -208,6 +201,23 @@ void EngineBench::start(const Prepared& at, double soc_cad) noexcept {
 }
 
 BenchCycle EngineBench::step(double soc_cad) noexcept {
+  BenchCycle c = begin(soc_cad);
+  c.indicators = burn(charge_of(c), c.soc_cad, c.unphysical);
+  conclude(c);
+  return c;
+}
+
+engine::Charge<double> EngineBench::charge_of(const BenchCycle& cycle) const noexcept {
+  return charge_at(cycle.cycle, cycle.misfire);
+}
+
+engine::Charge<double> EngineBench::charge_at(std::int64_t cycle, bool misfire) const noexcept {
+  engine::Charge<double> charge = prepared_[index_at(cycle)].charge;
+  if (misfire) charge.fuel_heat_j = 0.0;
+  return charge;
+}
+
+BenchCycle EngineBench::begin(double soc_cad) noexcept {
   const Prepared& at = prepared_[index_at(cycle_)];
   BenchCycle c;
   c.cycle = cycle_;
@@ -224,7 +234,12 @@ BenchCycle EngineBench::step(double soc_cad) noexcept {
 
   c.soc_cad = burning_soc_cad(applied, cycle_);
   c.misfire = misfires_at(cycle_);
-  c.indicators = burn(at, c.soc_cad, c.misfire, c.unphysical);
+  return c;
+}
+
+void EngineBench::conclude(BenchCycle& c) noexcept {
+  const Prepared& at = prepared_[index_at(cycle_)];
+  if (c.misfire) c.indicators.efficiency_gross = c.indicators.work_gross_j / at.charge.fuel_heat_j;
   if (settings_.efficiency_noise_percent > 0.0 && !c.misfire && !c.unphysical) {
     const double points = settings_.efficiency_noise_percent * noise(BenchStream::efficiency);
     const double work_j = points / percent * at.charge.fuel_heat_j;
@@ -239,7 +254,6 @@ BenchCycle EngineBench::step(double soc_cad) noexcept {
   judge(at, c);
   measure_limits(c);
   ++cycle_;
-  return c;
 }
 
 void EngineBench::measure_nox(const Prepared& at, BenchCycle& c) noexcept {

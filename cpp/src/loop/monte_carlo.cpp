@@ -1,10 +1,13 @@
 #include "mgdd/loop/monte_carlo.hpp"
 
+#include <algorithm>
+#include <cstddef>
 #include <string>
 #include <utility>
 #include <variant>
 
 #include "mgdd/common/parallel.hpp"
+#include "mgdd/loop/engine_bench_lanes.hpp"
 
 namespace mgdd::loop {
 namespace {
@@ -31,34 +34,130 @@ void check(const MonteCarloPlan& plan) {
   }
 }
 
+std::size_t loops_per_bench(const MonteCarloPlan& plan) noexcept {
+  return plan.seekers.size() * plan.seeds.size();
+}
+
+/// One loop of the plan, at its start.
+struct Loop {
+  Loop(const MonteCarloPlan& plan, std::size_t number)
+      : bench_index(number / loops_per_bench(plan)),
+        seed(plan.seeds[number % plan.seeds.size()]),
+        seeker(plan.seekers[number % loops_per_bench(plan) / plan.seeds.size()]),
+        statistics(std::visit([&](const auto& s) { return with_limits_of(plan.criteria[bench_index], s); }, seeker),
+                   plan.cycles) {
+    std::visit(
+        [this](auto& s) {
+          if constexpr (requires { s.reseed(seed); }) s.reseed(seed);
+        },
+        seeker);
+  }
+  EngineBench bench(const MonteCarloPlan& plan) const {
+    EngineBench out = plan.benches[bench_index];
+    out.reset(seed);
+    return out;
+  }
+
+  std::size_t bench_index;
+  std::uint64_t seed;
+  Seeker seeker;
+  LoopStatistics statistics;
+};
+
+void run_alone(const MonteCarloPlan& plan, std::size_t number, StopRequest& stopped, std::vector<LoopSummary>& out) {
+  Loop loop(plan, number);
+  EngineBench bench = loop.bench(plan);
+  std::visit(
+      [&](auto& seeker) {
+        for (std::int64_t k = 0; k < plan.cycles; ++k) {
+          if (k % cycles_between_looks == 0 && stopped()) return;
+          loop.statistics.add(loop_step(bench, seeker));
+        }
+      },
+      loop.seeker);
+  if (!stopped.obeyed()) out[number] = loop.statistics.summary();
+}
+
+/// Loops that one thread takes at a time.
+struct LoopRange {
+  std::size_t first, last;
+  bool lanes;
+};
+
+void run_side_by_side(const MonteCarloPlan& plan, const LoopRange& range, StopRequest& stopped,
+                      std::vector<LoopSummary>& out) {
+  std::vector<Loop> loops;
+  std::vector<EngineBench> benches;
+  for (std::size_t number = range.first; number < range.last; ++number) {
+    loops.emplace_back(plan, number);
+    benches.push_back(loops.back().bench(plan));
+  }
+  EngineBenchLanes lanes(std::move(benches));
+  std::vector<double> soc_cad(loops.size()), estimate_cad(loops.size());
+  std::vector<BenchCycle> cycles(loops.size());
+  for (std::int64_t k = 0; k < plan.cycles; ++k) {
+    if (k % (cycles_between_looks / 16) == 0 && stopped()) return;
+    for (std::size_t i = 0; i < loops.size(); ++i) {
+      soc_cad[i] =
+          std::visit([&](auto& seeker) { return ask(lanes.bench(i), seeker, estimate_cad[i]); }, loops[i].seeker);
+    }
+    lanes.step(soc_cad, cycles);
+    for (std::size_t i = 0; i < loops.size(); ++i) {
+      std::visit([&](auto& seeker) { tell(cycles[i], seeker); }, loops[i].seeker);
+      loops[i].statistics.add({cycles[i], estimate_cad[i]});
+    }
+  }
+  for (std::size_t i = 0; i < loops.size(); ++i)
+    out[range.first + i] = loops[i].statistics.summary();
+}
+
+/// Loops of like benches stand in a row; the threads share each row evenly.
+std::vector<LoopRange> groups_of(const MonteCarloPlan& plan, LoopForm form) {
+  const std::size_t each = loops_per_bench(plan), n = plan.benches.size() * each;
+  const std::size_t threads = thread_count(n, static_cast<std::size_t>(plan.threads));
+  std::vector<LoopRange> groups;
+  for (std::size_t bench = 0; bench < plan.benches.size();) {
+    const EngineBench& one = plan.benches[bench];
+    std::size_t end = bench + 1;
+    while (end < plan.benches.size() && side_by_side(plan.benches[end], one))
+      ++end;
+    const bool lanes = form == LoopForm::lanes && side_by_side(one, one);
+    const std::size_t first = bench * each, count = (end - bench) * each;
+    const std::size_t full = (count + EngineBenchLanes::width - 1) / EngineBenchLanes::width;
+    const std::size_t parts = lanes ? std::min(count, (full + threads - 1) / threads * threads) : count;
+    for (std::size_t part = 0; part < parts; ++part)
+      groups.push_back({first + part * count / parts, first + (part + 1) * count / parts, lanes});
+    bench = end;
+  }
+  return groups;
+}
+
 }  // namespace
+
+LoopForm form_of_loops(std::size_t loops, LoopForm wanted) {
+  if (wanted == LoopForm::shared) {
+    throw ParameterError("form", engine::to_string(wanted), "must be automatic, single or lanes");
+  }
+  if (wanted != LoopForm::automatic) return wanted;
+  return loops >= EngineBenchLanes::width ? LoopForm::lanes : LoopForm::single;
+}
 
 MonteCarloResult monte_carlo(const MonteCarloPlan& plan, const std::function<bool()>& stop) {
   check(plan);
-  const std::size_t seeds = plan.seeds.size();
-  const std::size_t per_bench = plan.seekers.size() * seeds;
-  const std::size_t jobs = plan.benches.size() * per_bench;
-  const std::size_t threads = thread_count(jobs, static_cast<std::size_t>(plan.threads));
-  MonteCarloResult result{std::vector<LoopSummary>(jobs), {}};
-  std::vector<std::vector<EngineBench>> benches(threads, plan.benches);  // a bench carries its workspace
-  const auto run = [&](std::size_t job, std::size_t worker, StopRequest& stopped) {
-    EngineBench& bench = benches[worker][job / per_bench];
-    const std::uint64_t seed = plan.seeds[job % seeds];
-    Seeker seeker = plan.seekers[job % per_bench / seeds];
-    bench.reset(seed);
-    std::visit(
-        [&](auto& s) {
-          LoopStatistics statistics(with_limits_of(plan.criteria[job / per_bench], s), plan.cycles);
-          if constexpr (requires { s.reseed(seed); }) s.reseed(seed);
-          for (std::int64_t k = 0; k < plan.cycles; ++k) {
-            if (k % cycles_between_looks == 0 && stopped()) return;
-            statistics.add(loop_step(bench, s));
-          }
-          if (!stopped.obeyed()) result.loops[job] = statistics.summary();
-        },
-        seeker);
-  };
-  result.finished = parallel_for(jobs, threads, run, stop);
+  const std::size_t loops = plan.benches.size() * loops_per_bench(plan);
+  const std::vector<LoopRange> groups = groups_of(plan, form_of_loops(loops, plan.form));
+  MonteCarloResult result{std::vector<LoopSummary>(loops), std::vector<bool>(loops)};
+  const std::vector<bool> finished = parallel_for(
+      groups.size(), static_cast<std::size_t>(plan.threads),
+      [&](std::size_t group, std::size_t, StopRequest& stopped) {
+        groups[group].lanes ? run_side_by_side(plan, groups[group], stopped, result.loops)
+                            : run_alone(plan, groups[group].first, stopped, result.loops);
+      },
+      stop);
+  for (std::size_t group = 0; group < groups.size(); ++group) {
+    for (std::size_t loop = groups[group].first; loop < groups[group].last; ++loop)
+      result.finished[loop] = finished[group];
+  }
   return result;
 }
 

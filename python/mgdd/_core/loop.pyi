@@ -10,7 +10,7 @@ import mgdd._core.throttle
 import numpy
 import numpy.typing
 import typing
-__all__: list[str] = ['EngineBench', 'Mgdd1', 'ObjectGuidedMgdd1', 'RecedingHorizon', 'SensorDynamics', 'VirtualThrottle', 'monte_carlo', 'run_loop', 'step_times_us', 'throttle_fault_kinds', 'track_throttle', 'track_throttles', 'tracking_figures']
+__all__: list[str] = ['EngineBench', 'Mgdd1', 'ObjectGuidedMgdd1', 'RecedingHorizon', 'SensorDynamics', 'VirtualThrottle', 'loop_form', 'monte_carlo', 'run_loop', 'step_times_us', 'throttle_fault_kinds', 'track_throttle', 'track_throttles', 'tracking_figures']
 class SensorDynamics:
     """
     Transport delay, first-order lag and noise of a gas sensor.
@@ -294,7 +294,11 @@ class RecedingHorizon:
     @property
     def sweeps(self) -> int:
         ...
-def monte_carlo(benches: collections.abc.Sequence[EngineBench], seekers: list, seeds: collections.abc.Sequence[typing.SupportsInt | typing.SupportsIndex], *, cycles: typing.SupportsInt | typing.SupportsIndex, optimum_cad: collections.abc.Sequence[typing.SupportsFloat | typing.SupportsIndex], arrival_cad: typing.SupportsFloat | typing.SupportsIndex, tail_cycles: typing.SupportsInt | typing.SupportsIndex, exceed_from: typing.SupportsInt | typing.SupportsIndex | None, exceed_above: collections.abc.Sequence[collections.abc.Sequence[typing.SupportsFloat | typing.SupportsIndex]], limits: collections.abc.Sequence[collections.abc.Sequence[typing.SupportsFloat | typing.SupportsIndex]], threads: typing.SupportsInt | typing.SupportsIndex) -> dict:
+def loop_form(loops: typing.SupportsInt | typing.SupportsIndex) -> str:
+    """
+    Form that so many loops take; who cuts them into pieces passes it on.
+    """
+def monte_carlo(benches: collections.abc.Sequence[EngineBench], seekers: list, seeds: collections.abc.Sequence[typing.SupportsInt | typing.SupportsIndex], *, cycles: typing.SupportsInt | typing.SupportsIndex, optimum_cad: collections.abc.Sequence[typing.SupportsFloat | typing.SupportsIndex], arrival_cad: typing.SupportsFloat | typing.SupportsIndex, tail_cycles: typing.SupportsInt | typing.SupportsIndex, exceed_from: typing.SupportsInt | typing.SupportsIndex | None, exceed_above: collections.abc.Sequence[collections.abc.Sequence[typing.SupportsFloat | typing.SupportsIndex]], limits: collections.abc.Sequence[collections.abc.Sequence[typing.SupportsFloat | typing.SupportsIndex]], threads: typing.SupportsInt | typing.SupportsIndex, form: str = 'automatic') -> dict:
     """
     Whole loops on all cores; behind mgdd.loop.monte_carlo.
     """

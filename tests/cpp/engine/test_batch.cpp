@@ -2,7 +2,9 @@
 #include "mgdd/engine/batch/batch.hpp"
 
 #include <algorithm>
+#include <array>
 #include <cmath>
+#include <initializer_list>
 #include <limits>
 #include <random>
 #include <string>
@@ -239,6 +241,17 @@ TEST(Batch, WeakCasesBetweenOthersDoNotDisturbTheSharedTables) {
   }
   const Table table({"speed_rpm", "fuel_mg", "soc_cad"}, rows);
   EXPECT_LT(difference(run(table.cases, BatchForm::shared), run(table.cases, BatchForm::lanes)), 1e-8);
+}
+
+TEST(Batch, AMotoredCaseThatChangesThePointDoesNotKeepTheTablesOfTheLastOne) {
+  std::vector<double> rows;
+  for (const std::array<double, 3>& row : std::initializer_list<std::array<double, 3>>{
+           {1200, 25, -6}, {2600, 0, -6}, {2600, 25, -6}, {2600, 25, -6}, {1200, 0, -6}, {1200, 25, -4}})
+    rows.insert(rows.end(), row.begin(), row.end());
+  const Table table({"speed_rpm", "fuel_mg", "soc_cad"}, rows);
+  const Columns shared = run(table.cases, BatchForm::shared), single = run(table.cases, BatchForm::single);
+  EXPECT_LT(difference(shared, single), 1e-6);
+  EXPECT_GT(std::abs(single[0][2] - single[0][0]), 0.01);  // the points do differ
 }
 
 TEST(Batch, DerivativesInLanesAreThoseOfOneCycle) {

@@ -18,19 +18,24 @@ TEST(EngineIndicators, ParabolaFindsTheVertexOfAnyQuadraticOnAnyGrid) {
   std::uniform_real_distribution<double> step(0.2, 2.0), vertex(-0.1, 0.1);
   for (int i = 0; i < 100; ++i) {
     const double left = step(random), right = step(random), at = vertex(random);
-    const std::array<double, 3> angle{3.0 - left, 3.0, 3.0 + right};
     const auto f = [&](double x) { return 80.0 - 1.7 * (x - 3.0 - at) * (x - 3.0 - at); };
-    const Peak<double> peak = parabola_peak<double>(angle, 1, f(angle[0]), f(angle[1]), f(angle[2]));
+    const Peak<double> peak =
+        parabola_peak(PeakSamples<double>{3.0 - left, 3.0, 3.0 + right, f(3.0 - left), f(3.0), f(3.0 + right)});
     EXPECT_NEAR(peak.angle_cad, 3.0 + at, 1e-10);
     EXPECT_NEAR(peak.value, 80.0, 1e-10);
   }
 }
 
 TEST(EngineIndicators, ParabolaKeepsTheSampleAtAnEdgeAndOnAPlateau) {
-  const std::array<double, 3> angle{0.0, 1.0, 2.0};
-  EXPECT_EQ(parabola_peak<double>(angle, 0, 5.0, 5.0, 4.0).angle_cad, 0.0);
-  EXPECT_EQ(parabola_peak<double>(angle, 2, 4.0, 5.0, 5.0).value, 5.0);
-  EXPECT_EQ(parabola_peak<double>(angle, 1, 5.0, 5.0, 5.0).angle_cad, 1.0);
+  const std::array<double, 3> angle{0.0, 1.0, 3.0};
+  const auto peak = [&angle](std::size_t k, const std::array<double, 3>& values) {
+    return parabola_peak(samples_around<double>(angle, k, [&values](std::size_t i) { return values[i]; }));
+  };
+  EXPECT_EQ(peak(0, {5.0, 4.0, 2.0}).angle_cad, 0.0);
+  EXPECT_EQ(peak(2, {2.0, 4.0, 5.0}).value, 5.0);
+  EXPECT_EQ(peak(2, {2.0, 4.0, 5.0}).angle_cad, 3.0);
+  EXPECT_EQ(peak(1, {5.0, 5.0, 5.0}).angle_cad, 1.0);
+  EXPECT_EQ(peak(1, {5.0, 5.0, 5.0}).value, 5.0);
 }
 
 TEST(EngineIndicators, RingingIntensityByHand) {

@@ -3,9 +3,13 @@
 
 #include <gtest/gtest.h>
 
+#include <algorithm>
 #include <atomic>
+#include <cmath>
 #include <cstring>
 #include <stdexcept>
+
+#include "mgdd/loop/cycle_fields.hpp"
 
 namespace mgdd::loop {
 namespace {
@@ -62,6 +66,63 @@ TEST(MonteCarlo, IsTheSameLoopsOnAnyNumberOfThreads) {
   EXPECT_TRUE(same(alone.summary(), one.loops[11]));
 }
 
+MonteCarloPlan wide_plan() {  // three operating points, the last with a gamma of temperature
+  MonteCarloPlan plan = small_plan();
+  BenchSettings bench = plan.benches[1].settings();
+  bench.cylinder.gas.gamma_model = engine::GammaModel::linear;
+  plan.benches.emplace_back(bench);
+  plan.criteria.push_back({.optimum_cad = -7.0});
+  plan.seeds = {3, 1, 4, 8, 5};
+  return plan;
+}
+
+TEST(MonteCarlo, LanesAreTheSameOnAnyNumberOfThreadsAndInAnyPieces) {
+  MonteCarloPlan plan = wide_plan();
+  EXPECT_EQ(form_of_loops(30, plan.form), LoopForm::lanes);
+  plan.threads = 1;
+  const MonteCarloResult one = monte_carlo(plan, {});
+  plan.threads = 3;
+  const MonteCarloResult three = monte_carlo(plan, {});
+  ASSERT_EQ(one.loops.size(), 30u);
+  for (std::size_t i = 0; i < 30; ++i) {
+    EXPECT_TRUE(one.finished[i]);
+    EXPECT_TRUE(same(one.loops[i], three.loops[i])) << i;
+  }
+  MonteCarloPlan piece = plan;  // bench 1, seeker 1, seeds 8 and 5
+  piece.benches = {plan.benches[1]};
+  piece.criteria = {plan.criteria[1]};
+  piece.seekers = {plan.seekers[1]};
+  piece.seeds = {8, 5};
+  piece.form = LoopForm::lanes;
+  const MonteCarloResult part = monte_carlo(piece, {});
+  EXPECT_TRUE(same(part.loops[0], one.loops[18]));
+  EXPECT_TRUE(same(part.loops[1], one.loops[19]));
+}
+
+TEST(MonteCarlo, LanesGiveTheNumbersOfSingleLoops) {
+  MonteCarloPlan plan = wide_plan();
+  const MonteCarloResult lanes = monte_carlo(plan, {});
+  plan.form = LoopForm::single;
+  const MonteCarloResult single = monte_carlo(plan, {});
+  for (std::size_t i = 0; i < 30; ++i) {
+    for (const auto& number : loop_summary_numbers) {
+      const double a = number.of(lanes.loops[i]), b = number.of(single.loops[i]);
+      EXPECT_EQ(std::isnan(a), std::isnan(b)) << number.name << ' ' << i;
+      const double distance = std::isnan(b) || a == b ? 0.0 : std::abs(a - b);
+      EXPECT_LE(distance, 1e-7 * std::max(1.0, std::abs(b))) << number.name << ' ' << i;
+    }
+    EXPECT_NEAR(lanes.loops[i].limits[0].worst, single.loops[i].limits[0].worst, 1e-6) << i;
+    EXPECT_EQ(same(lanes.loops[i], single.loops[i]), i >= 20) << i;  // a gamma of temperature has no lanes
+  }
+}
+
+TEST(MonteCarlo, AFewLoopsHaveTheBitsOfSingleOnes) {
+  EXPECT_EQ(form_of_loops(15, LoopForm::automatic), LoopForm::single);
+  EXPECT_EQ(form_of_loops(15, LoopForm::lanes), LoopForm::lanes);
+  EXPECT_EQ(form_of_loops(16, LoopForm::automatic), LoopForm::lanes);
+  EXPECT_THROW(static_cast<void>(form_of_loops(16, LoopForm::shared)), ParameterError);
+}
+
 TEST(MonteCarlo, SeedsDiffer) {
   const MonteCarloResult r = monte_carlo(small_plan(), {});
   for (std::size_t group = 0; group < 12; group += 3) {
@@ -78,7 +139,9 @@ TEST(MonteCarlo, StopsEarlyAndKeepsWhatIsFinished) {
   const auto done = std::count(r.finished.begin(), r.finished.end(), true);
   EXPECT_GT(done, 0);
   EXPECT_LT(done, static_cast<std::ptrdiff_t>(r.finished.size()));
-  const MonteCarloResult first = monte_carlo(small_plan(), {});
+  plan = small_plan();
+  plan.form = LoopForm::lanes;
+  const MonteCarloResult first = monte_carlo(plan, {});
   for (std::size_t i = 0; i < 3; ++i)
     EXPECT_TRUE(!r.finished[i] || same(r.loops[i], first.loops[1])) << i;  // every seed of the long plan is 1
 }

@@ -7,7 +7,9 @@
 #include <span>
 #include <string_view>
 
+#include "mgdd/math/dispatch.hpp"
 #include "mgdd/math/dual.hpp"
+#include "mgdd/math/select.hpp"
 
 namespace mgdd::engine {
 
@@ -61,31 +63,45 @@ constexpr auto indicator_fields() {
                     F{"ringing_intensity_mw_per_m2", "MW/m²", &I::ringing_intensity_mw_per_m2}};
 }
 
+/// A peak among the samples of a trace, with its neighbours; the angles are plain numbers. One without two neighbours
+/// stands for all three.
 template <class T>
-struct Peak {
-  double angle_hint_cad;  ///< the highest sample
-  T angle_cad, value;     ///< vertex of the parabola
+struct PeakSamples {
+  using Angle = typename PlainScalar<T>::type;
+  Angle before_cad, at_cad, after_cad;
+  T before, at, after;
 };
 
-/// Vertex of the parabola through sample `k` and its neighbours; the sample itself at an edge or on a plateau.
 template <class T>
-Peak<T> parabola_peak(std::span<const double> angle, std::size_t k, const T& before, const T& at,
-                      const T& after) noexcept {
-  const Peak<T> sample{angle[k], T(angle[k]), at};
-  if (k == 0 || k + 1 >= angle.size()) return sample;
-  const double left = angle[k] - angle[k - 1];
-  const double right = angle[k + 1] - angle[k];
-  const T rise = (at - before) / left;
-  const T fall = (after - at) / right;
+struct Peak {
+  T angle_cad, value;  ///< vertex of the parabola
+};
+
+/// Vertex of the parabola through the samples; the middle one itself on a plateau.
+template <class T>
+MGDD_INLINE Peak<T> parabola_peak(const PeakSamples<T>& s) noexcept {
+  const auto left = s.at_cad - s.before_cad, right = s.after_cad - s.at_cad;
+  const T rise = (s.at - s.before) / left;
+  const T fall = (s.after - s.at) / right;
   const T bend = (fall - rise) / (left + right);
-  if (!(value_of(bend) < 0.0)) return sample;
+  const auto curved = bend < T(0.0);
   const T offset = (rise / bend) * -0.5 + 0.5 * left;  // from the left neighbour to the vertex
-  return {angle[k], offset + angle[k - 1], before + rise * offset + bend * offset * (offset - left)};
+  return {select(curved, T(offset + s.before_cad), T(s.at_cad)),
+          select(curved, T(s.before + rise * offset + bend * offset * (offset - left)), s.at)};
+}
+
+/// Sample k and its neighbours; `sample(k)` gives the values.
+template <class T, class Sample>
+PeakSamples<T> samples_around(std::span<const double> angle_cad, std::size_t k, const Sample& sample) noexcept {
+  const T at = sample(k);
+  if (k == 0 || k + 1 >= angle_cad.size()) return {angle_cad[k] - 1.0, angle_cad[k], angle_cad[k] + 1.0, at, at, at};
+  return {angle_cad[k - 1], angle_cad[k], angle_cad[k + 1], sample(k - 1), at, sample(k + 1)};
 }
 
 /// RI = (beta dp/dt)^2 / (2 gamma p_max) sqrt(gamma R T_max), beta = 0.05 ms (Eng 2002), in MW/m2.
 template <class T>
-T ringing_intensity_mw_per_m2(const T& gamma, const T& dp_dt_pa_per_s, const T& p_max_pa, const T& t_max_k) noexcept {
+MGDD_INLINE T ringing_intensity_mw_per_m2(const T& gamma, const T& dp_dt_pa_per_s, const T& p_max_pa,
+                                          const T& t_max_k) noexcept {
   using std::sqrt;
   constexpr double beta_s = 0.05e-3;
   constexpr double air_gas_constant_j_per_kgk = 287.05;

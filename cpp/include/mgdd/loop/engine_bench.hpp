@@ -117,6 +117,13 @@ class EngineBench {
   /// sensor stands at its steady value for the first request.
   BenchCycle step(double soc_cad) noexcept;
 
+  /// The halves of `step` for who runs the cycle elsewhere, as `EngineBenchLanes` does: what burns, its charge, and
+  /// what is measured of it. Once for each cycle and in this order; between them `indicators` and `unphysical` are
+  /// filled in.
+  BenchCycle begin(double soc_cad) noexcept;
+  engine::Charge<double> charge_of(const BenchCycle& cycle) const noexcept;  ///< no fuel in a misfire
+  void conclude(BenchCycle& cycle) noexcept;
+
   /// Limited quantities of a cycle at that request without scatter, noise and misfire, drift included: in the order of
   /// BenchSettings::limits, NaN for the COV of IMEP, for NaN requests and where no such cycle exists. Nothing moves.
   std::array<double, max_limits> noise_free_limits(std::int64_t cycle, double soc_cad) noexcept;
@@ -148,6 +155,8 @@ class EngineBench {
   }
 
   const BenchSettings& settings() const noexcept { return settings_; }
+  /// Cylinder as it has drifted so far, and what follows from it.
+  const engine::CycleModel<double>& model() const noexcept { return model_; }
   std::int64_t cycle() const noexcept { return cycle_; }  ///< index of the next cycle
   std::uint64_t seed() const noexcept { return seed_; }
   /// Operating point of the next cycle, and of any other.
@@ -169,7 +178,8 @@ class EngineBench {
     double analyser_gain = 1.0, fast_gain = 1.0;
   };
   std::size_t index_at(std::int64_t cycle) const noexcept;
-  engine::Indicators<double> burn(const Prepared& at, double soc_cad, bool misfire, bool& unphysical) noexcept;
+  engine::Charge<double> charge_at(std::int64_t cycle, bool misfire) const noexcept;
+  engine::Indicators<double> burn(const engine::Charge<double>& charge, double soc_cad, bool& unphysical) noexcept;
   void start(const Prepared& at, double soc_cad) noexcept;
   void measure_nox(const Prepared& at, BenchCycle& c) noexcept;
   void judge(const Prepared& at, BenchCycle& c) noexcept;

@@ -38,19 +38,30 @@ void require_match(const EngineBench& bench, const S& seeker) {
   require_match(bench, seeker.estimate(), seeker.component_count(), seeker.settings().limits);
 }
 
-/// One cycle; a new operating point restarts the seeker before it asks. Noexcept as the seeker's `tell` is.
+/// What the seeker asks of the next cycle of a bench; a new operating point restarts it first.
 template <class S>
-LoopCycle loop_step(EngineBench& bench, S& seeker) noexcept(noexcept(seeker.tell(optimize::Reading{}))) {
+double ask(const EngineBench& bench, S& seeker, double& estimate_cad) noexcept {
   if (bench.point_changes_at(bench.cycle())) seeker.restart();
-  LoopCycle out;
-  out.estimate_cad = seeker.estimate()[0];
-  out.bench = bench.step(seeker.ask()[0]);
-  const BenchCycle& c = out.bench;
+  estimate_cad = seeker.estimate()[0];
+  return seeker.ask()[0];
+}
+
+/// What the bench gave. Noexcept as the seeker's `tell` is.
+template <class S>
+void tell(const BenchCycle& c, S& seeker) noexcept(noexcept(seeker.tell(optimize::Reading{}))) {
   const bool summed = seeker.component_count() == 1;
   seeker.tell({summed ? std::span<const double>(&c.j, 1) : c.component_values(),
                c.limits(),
                c.misfire || c.unphysical,
                {&c.soc_applied_cad, 1}});
+}
+
+/// One cycle. Noexcept as the seeker's `tell` is.
+template <class S>
+LoopCycle loop_step(EngineBench& bench, S& seeker) noexcept(noexcept(tell(BenchCycle{}, seeker))) {
+  LoopCycle out;
+  out.bench = bench.step(ask(bench, seeker, out.estimate_cad));
+  tell(out.bench, seeker);
   return out;
 }
 

@@ -1,14 +1,20 @@
 // Many whole closed loops at once: every bench with every seeker and every seed, on all cores. A loop depends on its
-// own bench, seeker and seed only, so the result is the same on any number of threads. Offline code.
+// own bench, seeker and seed only, so the result is the same on any number of threads. Loops of like benches run side
+// by side, their cycles in SIMD lanes. Offline code.
 #pragma once
 
 #include <cstdint>
 #include <functional>
 #include <vector>
 
+#include "mgdd/engine/batch/batch.hpp"
 #include "mgdd/loop/engine_loop.hpp"
 
 namespace mgdd::loop {
+
+/// How the loops run; never depends on the threads. `single` gives the bits of a loop that runs alone, `lanes` its
+/// numbers to rounding; `automatic` takes lanes for sixteen loops and more. Gamma of temperature is always `single`.
+using LoopForm = engine::BatchForm;
 
 struct MonteCarloPlan {
   std::vector<EngineBench> benches;
@@ -17,12 +23,17 @@ struct MonteCarloPlan {
   std::vector<std::uint64_t> seeds;  ///< of the bench and of a seeker that draws; each loop starts at cycle 0
   std::int64_t cycles = 1000;
   int threads = 0;  ///< 0 = all cores
+  LoopForm form = LoopForm::automatic;
 };
 
 struct MonteCarloResult {
   std::vector<LoopSummary> loops;  ///< [bench][seeker][seed], the last index fastest
   std::vector<bool> finished;      ///< all true unless stopped
 };
+
+/// The form that this many loops take. Who cuts a plan into pieces asks before and passes it on; ParameterError for
+/// `shared`, which no loop has.
+LoopForm form_of_loops(std::size_t loops, LoopForm wanted);
 
 /// ParameterError for an empty plan or a seeker that does not fit a bench. `stop` is polled by the calling thread about
 /// every 50 ms; loops that are running then are dropped, finished ones stay.

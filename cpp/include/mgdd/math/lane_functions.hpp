@@ -6,10 +6,12 @@
 #pragma once
 
 #include <bit>
+#include <cmath>
 #include <cstdint>
 
 #include "mgdd/math/dispatch.hpp"
 #include "mgdd/math/fast_tanh.hpp"
+#include "mgdd/math/lanes.hpp"
 
 namespace mgdd {
 namespace detail {
@@ -94,6 +96,12 @@ MGDD_INLINE double lane_log(double x) noexcept {
 /// x^exponent to 4e-16 for each unit of its logarithm.
 MGDD_INLINE double lane_power(double x, double exponent) noexcept {
   return lane_exp(exponent * lane_log(x));
+}
+
+/// Elementwise; one instruction where the vector is as wide as the processor's.
+template <int N>
+MGDD_INLINE Lanes<N> sqrt(const Lanes<N>& a) noexcept {
+  return each(a, [](double x) MGDD_INLINE_LAMBDA { return std::sqrt(x); });
 }
 
 }  // namespace mgdd

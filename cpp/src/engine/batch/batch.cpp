@@ -44,7 +44,7 @@ void differentiate_alone(const CaseReader& reader, const BatchSettings& settings
   static_cast<void>(parallel_for(jobs, settings.threads, [&](std::size_t job, std::size_t, StopRequest&) {
     CycleInputs<double> inputs = reader.start();
     for (std::size_t row = job * job_size; row < std::min(n, (job + 1) * job_size); ++row) {
-      reader.read(row, inputs);
+      static_cast<void>(reader.read(row, CaseReader::no_row, inputs));
       output.write(row, sensitivities(inputs.cylinder, inputs.point, inputs.soc_cad, {along}, settings.step_cad,
                                       settings.integrator)
                             .indicators.front());

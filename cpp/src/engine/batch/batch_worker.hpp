@@ -23,13 +23,28 @@ namespace mgdd::engine {
 struct BatchOutput {
   std::span<const IndicatorMember> members;
   std::span<double* const> columns;
+  std::vector<std::size_t> fields;  ///< places of the members in `indicator_fields()`
   bool burn_angles = false;
 
   BatchOutput(std::span<const IndicatorMember> m, std::span<double* const> c) noexcept
       : members(m), columns(c), burn_angles(std::ranges::any_of(m, [](IndicatorMember member) {
           return member == &Indicators<double>::ca10_cad || member == &Indicators<double>::ca50_cad ||
                  member == &Indicators<double>::ca90_cad;
-        })) {}
+        })) {
+    constexpr auto known = indicator_fields<double>();
+    for (const IndicatorMember member : m) {
+      const auto found = std::ranges::find(known, member, &IndicatorField<double>::member);
+      fields.push_back(static_cast<std::size_t>(found - known.begin()));
+    }
+  }
+  /// Column by column: the same place of many columns often shares one set of the cache.
+  void write(const std::array<std::size_t, block_lanes>& rows, std::size_t count,
+             const IndicatorLanes& indicators) const noexcept {
+    for (std::size_t i = 0; i < fields.size(); ++i) {
+      for (std::size_t l = 0; l < count; ++l)
+        columns[i][rows[l]] = indicators.get(l, fields[i]);
+    }
+  }
   void write(std::size_t row, const Indicators<double>& indicators) const noexcept {
     for (std::size_t i = 0; i < members.size(); ++i)
       columns[i][row] = indicators.*members[i];
@@ -64,8 +79,10 @@ class BatchWorker {
 
  private:
   void run(std::size_t row) {
-    reader_.read(row, plain_);
-    prepare_model();
+    changes_ = reader_.read(row, row_, plain_);
+    row_ = row;
+    if (changes_ >= BatchColumn::Changes::point) shared_known_ = false;
+    if (changes_ >= BatchColumn::Changes::cylinder) prepare_model();
     if (form_ == BatchForm::single) return run_alone(row);
     if constexpr (plain) {
       add(row, plain_);
@@ -86,7 +103,6 @@ class BatchWorker {
         return;
       }
       flush();
-      shared_known_ = false;
     }
     if (model_ && model_->cylinder().geometry.ivc_cad == now.ivc_cad &&
         model_->cylinder().geometry.evo_cad == now.evo_cad) {
@@ -124,9 +140,7 @@ class BatchWorker {
   /// Its powers are worth keeping while only the timing changes.
   Charge<T> charge_at(const CycleInputs<T>& inputs) {
     if constexpr (plain) {
-      if (charge_known_ && inputs.point == charge_point_) return charge_;
-      charge_point_ = inputs.point;
-      charge_known_ = !reader_.varies_cylinder();
+      if (changes_ <= BatchColumn::Changes::timing) return charge_;
     }
     return charge_ = charge_of(inputs.cylinder, lanes_.geometry(), inputs.point);
   }
@@ -137,23 +151,27 @@ class BatchWorker {
       if constexpr (plain) run_shared();
     } else {
       lanes_.run(filled_, settings_.set);
-      for (std::size_t l = 0; l < filled_; ++l)
-        lanes_.physical(l) ? output_.write(rows_[l], lanes_.indicators(l, output_.burn_angles)) : fail(rows_[l]);
+      if constexpr (plain) {
+        lanes_.indicators(indicators_, output_.burn_angles, settings_.set);
+        output_.write(rows_, filled_, indicators_);
+      }
+      for (std::size_t l = 0; l < filled_; ++l) {
+        if (!lanes_.physical(l)) {
+          fail(rows_[l]);
+        } else if constexpr (!plain) {
+          output_.write(rows_[l], lanes_.indicators(l, output_.burn_angles));
+        }
+      }
     }
     filled_ = 0;
   }
 
   /// Sees to it that the shared tables are those of this case: all lanes of a block have one operating point.
   void share(const Charge<double>& charge, const WallHeatParameters<double>& wall) {
-    if (shared_known_ && shared_charge_.pressure_pa == charge.pressure_pa &&
-        shared_charge_.gas_j_per_k == charge.gas_j_per_k && shared_charge_.speed_rpm == charge.speed_rpm &&
-        shared_wall_ == wall)
-      return;
+    if (shared_known_) return;
     flush();
     lanes_.set_charge(0, charge, wall);
     shared_.prepare(CycleTables(*model_), lanes_.block(), wall.wall_heat_model, settings_.set);
-    shared_charge_ = charge;
-    shared_wall_ = wall;
     shared_known_ = true;
   }
 
@@ -165,25 +183,30 @@ class BatchWorker {
     lanes_.forget_window();
     // The second sum: the neighbour of a peak that stands at the first sample of the tail.
     window.to = std::min(std::max(window.to, shared_.tail_from()) + 1, tables.n - 1);
-    std::array<std::size_t, block_lanes> end{};
+    TailLanes& tails = tails_;
     for (std::size_t l = 0; l < block_lanes; ++l) {
-      end[l] = std::max(lanes_.heated_to(l < filled_ ? l : 0), shared_.tail_from());
-      block.stop.set(l, static_cast<double>(end[l]));
+      tails.from[l] = std::max(lanes_.heated_to(l < filled_ ? l : 0), shared_.tail_from());
+      block.stop.set(l, static_cast<double>(tails.from[l]));
     }
     shared_.begin(window.from, block);
     integrate_window(tables, lanes_.shape(), lanes_.wall_model(), window, block, lanes_.trace(), settings_.set);
     const Lane<double>* trace = lanes_.trace();
-    for (std::size_t l = 0; l < filled_; ++l) {
-      const Tail tail = shared_.tail(end[l], trace[end[l]].value[l]);
-      if (!tail.known) {
-        left_over_.push_back(rows_[l]);
-        continue;
-      }
+    for (std::size_t l = 0; l < block_lanes; ++l)
+      tails.pressure.set(l, trace[tails.from[l]].value[l]);
+    shared_.find(tails, settings_.set);
+    for (std::size_t l = 0; l < block_lanes; ++l) {
       const auto pressure = [&](std::size_t k) {
         return k < window.from ? shared_.motored(k).pressure : trace[k].value[l];
       };
-      output_.write(rows_[l], lanes_.indicators(l, output_.burn_angles, block.work.get(l) + tail.work,
-                                                block.loss.get(l) + tail.loss, tail.last_pressure, pressure));
+      indicators_.set(l,
+                      lanes_.figures(l, block.work.get(l) + tails.work.get(l), block.loss.get(l) + tails.loss.get(l),
+                                     tails.last_pressure.get(l), pressure),
+                      lanes_.charge(l));
+    }
+    lanes_.finish(indicators_, output_.burn_angles, settings_.set);
+    output_.write(rows_, filled_, indicators_);
+    for (std::size_t l = 0; l < filled_; ++l) {
+      if (!tails.known[l]) left_over_.push_back(rows_[l]);
     }
   }
 
@@ -202,14 +225,14 @@ class BatchWorker {
   std::optional<CycleModel<double>> model_;
   std::optional<CycleWorkspace<double>> work_;  // one by one
   CycleLanes<T> lanes_;
+  IndicatorLanes indicators_;
   Charge<T> charge_{};
-  OperatingPoint charge_point_{};
-  bool charge_known_ = false;
+  std::size_t row_ = CaseReader::no_row;  // that stands in the inputs
+  BatchColumn::Changes changes_ = BatchColumn::Changes::grid;
   std::array<std::size_t, block_lanes> rows_{};
   std::size_t filled_ = 0, failed_ = 0;
   SharedPoint shared_{};
-  Charge<double> shared_charge_{};
-  WallHeatParameters<double> shared_wall_{};
+  TailLanes tails_{};
   bool shared_known_ = false;
   std::vector<std::size_t> left_over_;  // of the shared form: to be run in lanes
 };

@@ -85,10 +85,6 @@ CaseReader::CaseReader(const BatchCases& cases) : cases_(cases) {
   }
 }
 
-bool CaseReader::varies_cylinder() const noexcept {
-  return std::ranges::any_of(columns_, [](const BatchColumn& column) { return column.in_cylinder != nullptr; });
-}
-
 double CaseReader::cases_per_point() const noexcept {
   std::size_t points = size() > 0 ? 1 : 0;
   const std::size_t m = columns_.size();
@@ -115,11 +111,12 @@ bool CaseReader::within_domains(std::size_t row) const noexcept {
 void CaseReader::require_valid() const {
   CycleInputs<double> inputs = start();
   // Several fields together must fit; the usual inputs cannot break that when each of them lies in its domain.
-  const bool together = varies_cylinder() || cases_.cylinder.gas.ivc_pressure_rise_kpa < 0.0 ||
+  const auto in_cylinder = [](const BatchColumn& column) { return column.in_cylinder != nullptr; };
+  const bool together = std::ranges::any_of(columns_, in_cylinder) || cases_.cylinder.gas.ivc_pressure_rise_kpa < 0.0 ||
                         cases_.cylinder.burn.burn_shape == BurnShape::double_wiebe;
   for (std::size_t row = 0; row < size(); ++row) {
     if (row > 0 && !together && within_domains(row)) continue;
-    read(row, inputs);
+    static_cast<void>(read(row, no_row, inputs));
     try {
       validate_cycle(inputs.cylinder, inputs.point, inputs.soc_cad);
     } catch (const ParameterError& e) {

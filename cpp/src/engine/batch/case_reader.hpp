@@ -1,7 +1,9 @@
 // Reads the rows of a batch into the inputs of a cycle.
 #pragma once
 
+#include <algorithm>
 #include <cstddef>
+#include <limits>
 #include <span>
 #include <vector>
 
@@ -14,6 +16,7 @@ namespace mgdd::engine {
 /// One varied input: what it is, and the way to its place.
 struct BatchColumn {
   enum class Changes {
+    nothing,
     timing,    ///< start of combustion
     burn,      ///< fuel and how it burns: the motored cycle stays
     point,     ///< the motored cycle
@@ -36,14 +39,21 @@ class CaseReader {
   /// ParameterError for an unknown or repeated name, ShapeError for a table that is not whole.
   explicit CaseReader(const BatchCases& cases);
 
-  /// The inputs of a row, into inputs that began as `start()`.
-  void read(std::size_t row, CycleInputs<double>& inputs) const {
-    const double* value = cases_.values.data() + row * columns_.size();
-    for (const BatchColumn& column : columns_)
-      column.set(inputs, *value++, column);
+  /// The inputs of a row, into inputs that hold row `before`; says what has changed. `no_row`: inputs are `start()`.
+  BatchColumn::Changes read(std::size_t row, std::size_t before, CycleInputs<double>& inputs) const {
+    const std::size_t m = columns_.size();
+    const double* now = cases_.values.data() + row * m;
+    const double* old = before == no_row ? nullptr : cases_.values.data() + before * m;
+    auto changes = old == nullptr ? BatchColumn::Changes::grid : BatchColumn::Changes::nothing;
+    for (std::size_t i = 0; i < m; ++i) {
+      if (old != nullptr && now[i] == old[i]) continue;
+      columns_[i].set(inputs, now[i], columns_[i]);
+      changes = std::max(changes, columns_[i].changes);
+    }
+    return changes;
   }
+  static constexpr std::size_t no_row = std::numeric_limits<std::size_t>::max();
   CycleInputs<double> start() const { return {cases_.cylinder, cases_.point, cases_.soc_cad}; }
-  bool varies_cylinder() const noexcept;
   std::size_t size() const noexcept { return cases_.size(); }
   /// Mean length of the rows in a row with one motored cycle.
   double cases_per_point() const noexcept;

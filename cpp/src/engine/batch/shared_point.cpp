@@ -1,12 +1,13 @@
 #include "shared_point.hpp"
 
 #include <algorithm>
-#include <array>
 #include <cmath>
 #include <limits>
 #include <numbers>
 
 #include "mgdd/engine/cylinder.hpp"
+#include "mgdd/math/lane_functions.hpp"
+#include "mgdd/math/lanes.hpp"
 
 namespace mgdd::engine {
 namespace {
@@ -120,7 +121,7 @@ void SharedPoint::prepare_row(std::size_t k) noexcept {
   double* q = log_pressure_.data() + k * n_nodes;
   double* weight = weight_.data() + k * n_nodes;
   for (std::size_t j = 0; j < n_nodes; ++j)
-    q[j] = std::log(trace_[k].value[j]);
+    q[j] = lane_log(trace_[k].value[j]);
   for (std::size_t j = 0; j < n_nodes; ++j) {
     double product = 1.0;
     for (std::size_t i = 0; i < n_nodes; ++i)
@@ -143,40 +144,57 @@ void SharedPoint::prepare_row(std::size_t k) noexcept {
   row_[k] = good ? Row::good : Row::unresolved;
 }
 
-Tail SharedPoint::tail(std::size_t k, double pressure_pa) noexcept {
+bool SharedPoint::reaches(std::size_t k, double pressure_pa) noexcept {
   const double* p = trace_[k].value.data();
   // A gas that is colder than the wall might still find its peak.
-  if (!has_tail_ || !(pressure_pa > coldest_pa_[k])) return {};
-  if (!(pressure_pa >= p[0] && pressure_pa <= p[n_nodes - 1])) return {};
+  if (!has_tail_ || !(pressure_pa > coldest_pa_[k])) return false;
+  if (!(pressure_pa >= p[0] && pressure_pa <= p[n_nodes - 1])) return false;
   if (row_[k] == Row::unknown) prepare_row(k);
-  if (row_[k] == Row::unresolved) return {};
-  const double* q = log_pressure_.data() + k * n_nodes;
-  const double* weight = weight_.data() + k * n_nodes;
-  const double* work = work_left_.data() + k * n_nodes;
-  const double* loss = loss_left_.data() + k * n_nodes;
-  const double* last = trace_[n_ - 1].value.data();
-  const double at = std::log(pressure_pa);
-  // Four sums of each, so that their additions do not wait for each other.
-  constexpr std::size_t ways = 4;
-  std::array<double, n_nodes> share{};
-  for (std::size_t j = 0; j < n_nodes; ++j)
-    share[j] = weight[j] / (at - q[j]);
-  std::array<double, ways> sums{}, work_sums{}, loss_sums{}, last_sums{};
-  for (std::size_t j = 0; j < n_nodes; j += ways) {
-    for (std::size_t w = 0; w < ways; ++w) {
-      sums[w] += share[j + w];
-      work_sums[w] += share[j + w] * work[j + w];
-      loss_sums[w] += share[j + w] * loss[j + w];
-      last_sums[w] += share[j + w] * last[j + w];
+  return row_[k] == Row::good;
+}
+
+void SharedPoint::find(TailLanes& tails, InstructionSet set) noexcept {
+  for (std::size_t l = 0; l < block_lanes; ++l)
+    tails.known[l] = reaches(tails.from[l], tails.pressure.value[l]);
+  dispatch(set, [&]() MGDD_INLINE_LAMBDA {
+    Lane<double> at{};
+    for (std::size_t l = 0; l < block_lanes; ++l)
+      at.value[l] = lane_log(tails.pressure.value[l]);
+    for (std::size_t l = 0; l < block_lanes; ++l) {
+      if (!tails.known[l]) continue;
+      const std::size_t first = tails.from[l] * n_nodes;
+      const double* q = log_pressure_.data() + first;
+      const double* weight = weight_.data() + first;
+      const double* work = work_left_.data() + first;
+      const double* loss = loss_left_.data() + first;
+      const double* last = trace_[n_ - 1].value.data();
+      // Four sums of each, which are one vector.
+      using Sums = Lanes<4>;
+      Sums sum(0.0), work_sum(0.0), loss_sum(0.0), last_sum(0.0);
+      for (std::size_t j = 0; j < n_nodes; j += 4) {
+        const Sums share = Sums::load(weight + j) / (Sums(at.value[l]) - Sums::load(q + j));
+        sum += share;
+        work_sum += share * Sums::load(work + j);
+        loss_sum += share * Sums::load(loss + j);
+        last_sum += share * Sums::load(last + j);
+      }
+      const auto total = [](const Sums& s) MGDD_INLINE_LAMBDA { return (s[0] + s[1]) + (s[2] + s[3]); };
+      const double per_sum = 1.0 / total(sum);
+      tails.work.value[l] = total(work_sum) * per_sum;
+      tails.loss.value[l] = total(loss_sum) * per_sum;
+      tails.last_pressure.value[l] = total(last_sum) * per_sum;
     }
+  });
+  for (std::size_t l = 0; l < block_lanes; ++l) {
+    if (!tails.known[l] || std::isfinite(tails.work.value[l])) continue;
+    const double* p = trace_[tails.from[l]].value.data();  // on a node, or so near to one that a share is infinite
+    const auto j = static_cast<std::size_t>(
+        std::ranges::min_element(p, p + n_nodes, {}, [&](double x) { return std::abs(x - tails.pressure.value[l]); }) -
+        p);
+    tails.work.value[l] = work_left_[tails.from[l] * n_nodes + j];
+    tails.loss.value[l] = loss_left_[tails.from[l] * n_nodes + j];
+    tails.last_pressure.value[l] = trace_[n_ - 1].value[j];
   }
-  const auto total = [](const std::array<double, ways>& s) { return (s[0] + s[1]) + (s[2] + s[3]); };
-  if (!std::isfinite(total(sums))) {  // on a node
-    const auto j = static_cast<std::size_t>(std::find(q, q + n_nodes, at) - q);
-    return {work[j], loss[j], last[j], true};
-  }
-  const double per_sum = 1.0 / total(sums);
-  return {total(work_sums) * per_sum, total(loss_sums) * per_sum, total(last_sums) * per_sum, true};
 }
 
 }  // namespace mgdd::engine

@@ -4,6 +4,7 @@
 // 2004) to better than 1e-6 of the work. SI.
 #pragma once
 
+#include <array>
 #include <cstddef>
 #include <vector>
 
@@ -18,10 +19,12 @@ struct MotoredSample {
   double p_best, p_at, energy_best, energy_at, rise_best, rise_at;
 };
 
-/// What is left from a sample after the burn to EVO.
-struct Tail {
-  double work, loss, last_pressure;
-  bool known = false;  ///< false: the table does not reach or resolve that pressure
+/// What is left of each lane from a sample after the burn to EVO.
+struct TailLanes {
+  std::array<std::size_t, block_lanes> from;  ///< sample >= tail_from()
+  Lane<double> pressure;                      ///< there
+  Lane<double> work, loss, last_pressure;
+  std::array<bool, block_lanes> known;  ///< false: the table does not reach or resolve that pressure
 };
 
 class SharedPoint {
@@ -35,8 +38,8 @@ class SharedPoint {
   const MotoredSample& motored(std::size_t k) const noexcept { return motored_[k]; }
   /// First sample of the tail: after the top dead centre, so that no peak lies in it.
   std::size_t tail_from() const noexcept { return tail_from_; }
-  /// At sample k >= tail_from().
-  Tail tail(std::size_t k, double pressure_pa) noexcept;
+  /// Fills what is left and known.
+  void find(TailLanes& tails, InstructionSet set) noexcept;
 
  private:
   static constexpr std::size_t n_nodes = block_lanes;
@@ -44,6 +47,7 @@ class SharedPoint {
   bool run_tail(const CycleTables& t, const CycleBlock<double>& block, double lowest_pa, WallHeatModel wall,
                 InstructionSet set);
   void prepare_row(std::size_t k) noexcept;
+  bool reaches(std::size_t k, double pressure_pa) noexcept;
 
   std::size_t tail_from_ = 0, n_ = 0;
   bool has_tail_ = false;

@@ -67,8 +67,8 @@ void describe_gas(TraceAnalysis& a, const CycleModel<double>& model, double gas_
   a.imep_closed_bar = a.work_closed_j / model.geometry().swept_m3 / units::pa_per_bar;
   const auto at =
       static_cast<std::size_t>(std::max_element(a.pressure_bar.begin(), a.pressure_bar.end()) - a.pressure_bar.begin());
-  const Peak<double> top = parabola_peak<double>(a.angle_cad, at, a.pressure_bar[at > 0 ? at - 1 : at],
-                                                 a.pressure_bar[at], a.pressure_bar[at + 1 < n ? at + 1 : at]);
+  const Peak<double> top =
+      parabola_peak(samples_around<double>(a.angle_cad, at, [&a](std::size_t k) { return a.pressure_bar[k]; }));
   a.p_max_bar = top.value;
   a.p_max_cad = top.angle_cad;
   a.t_max_k = *std::max_element(a.temperature_k.begin(), a.temperature_k.end());

@@ -13,6 +13,7 @@
 #include <vector>
 
 #include "mgdd/engine/batch/cycle_block.hpp"
+#include "mgdd/engine/batch/indicator_lanes.hpp"
 #include "mgdd/engine/burn.hpp"
 #include "mgdd/engine/cycle.hpp"
 #include "mgdd/engine/cycle_indicators.hpp"
@@ -105,23 +106,9 @@ class CycleLanes {
     return std::isfinite(last) && last > 0.0;
   }
   Indicators<T> indicators(std::size_t l, bool burn_angles = true) const noexcept {
-    return indicators(l, burn_angles, block_.work.get(l), block_.loss.get(l), block_.pressure.get(l),
-                      [this, l](std::size_t k) { return trace_[k].get(l); });
-  }
-  /// The same from sums of another way to EVO; `pressure(k)` around the peaks.
-  template <class Pressure>
-  Indicators<T> indicators(std::size_t l, bool burn_angles, const T& twice_work, const T& loss, const T& last_pressure,
-                           const Pressure& pressure) const noexcept {
+    Indicators<T> out = indicators_of(own_figures(l), members_[l].charge, volumes(),
+                                      [this](const T&) MGDD_INLINE_LAMBDA { return gas_.gamma; });
     const Member& m = members_[l];
-    TraceSums<T> sums;
-    sums.work_closed_j = 0.5 * twice_work;
-    sums.heat_loss_j = loss;
-    sums.last_pressure_pa = last_pressure;
-    sums.p_max_at = static_cast<std::size_t>(block_.p_at.get(l));
-    sums.t_max_at = static_cast<std::size_t>(block_.energy_at.get(l));
-    sums.dp_max_at = static_cast<std::size_t>(block_.rise_at.get(l));
-    Indicators<T> out =
-        indicators_of<T>(gas_, geometry_, m.charge, model_->angles_cad(), std::span<const T>(volume_), sums, pressure);
     if (m.burn && burn_angles) {
       out.ca10_cad = m.burn->angle_of(0.1);
       out.ca50_cad = m.burn->angle_of(0.5);
@@ -129,8 +116,37 @@ class CycleLanes {
     }
     return out;
   }
+  /// Those of all lanes, in vectors.
+  void indicators(IndicatorLanes& out, bool burn_angles, InstructionSet set) const noexcept {
+    for (std::size_t l = 0; l < block_lanes; ++l)
+      out.set(l, own_figures(l), members_[l].charge);
+    finish(out, burn_angles, set);
+  }
 
   // What another way to EVO needs.
+  /// Sums of that way; `pressure(k)` around the peaks of the block.
+  template <class Pressure>
+  TraceFigures<T> figures(std::size_t l, const T& twice_work, const T& loss, const T& last_pressure,
+                          const Pressure& pressure) const noexcept {
+    TraceSums<T> sums;
+    sums.work_closed_j = 0.5 * twice_work;
+    sums.heat_loss_j = loss;
+    sums.last_pressure_pa = last_pressure;
+    sums.p_max_at = static_cast<std::size_t>(block_.p_at.get(l));
+    sums.t_max_at = static_cast<std::size_t>(block_.energy_at.get(l));
+    sums.dp_max_at = static_cast<std::size_t>(block_.rise_at.get(l));
+    return figures_of<T>(model_->angles_cad(), std::span<const T>(volume_), sums, pressure);
+  }
+  /// Indicators of the figures that `out` holds.
+  void finish(IndicatorLanes& out, bool burn_angles, InstructionSet set) const noexcept {
+    out.compute(volumes(), gas_.gamma, set);
+    if (!burn_angles) return;
+    for (std::size_t l = 0; l < block_lanes; ++l) {
+      const auto& burn = members_[l].burn;
+      if (burn) out.set_burn_angles(l, burn->angle_of(0.1), burn->angle_of(0.5), burn->angle_of(0.9));
+    }
+  }
+  const Charge<T>& charge(std::size_t l) const noexcept { return members_[l].charge; }
   void fill_up(std::size_t count) noexcept {
     for (std::size_t l = count; l < block_lanes; ++l) {
       block_.copy_lane(0, l);
@@ -170,6 +186,12 @@ class CycleLanes {
       ++k;
     return k;
   }
+
+  TraceFigures<T> own_figures(std::size_t l) const noexcept {
+    return figures(l, block_.work.get(l), block_.loss.get(l), block_.pressure.get(l),
+                   [this, l](std::size_t k) { return trace_[k].get(l); });
+  }
+  CycleVolumes<T> volumes() const noexcept { return {geometry_, std::span<const T>(volume_)}; }
 
   void set_motored(std::size_t l) noexcept {
     block_.first_burning.set(l, static_cast<double>(trace_.size()));
