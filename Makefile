@@ -156,13 +156,20 @@ tidy: $(VENV)/.stamp-build | system-test ## clang-tidy over the core and its tes
 	$(CONFIGURE) tidy
 	$(BUILD) tidy
 
+NEVERGRAD := build/bench-nevergrad/bin/python
 bench: ready ## C++ benchmarks, then the Python ones against peers
 	@tools/system_packages.sh bench
 	$(ALOUD) $(PIP) install --group bench
+	[ -x $(NEVERGRAD) ] || $(PYTHON) -m venv build/bench-nevergrad
+	$(ALOUD) $(NEVERGRAD) -m pip --disable-pip-version-check install "pip>=25.1"
+	$(ALOUD) $(NEVERGRAD) -m pip --disable-pip-version-check install -r $(VENV)/.stamp-run --group bench-nevergrad
 	$(CONFIGURE) bench
 	$(BUILD) bench
 	for program in build/bench/bench/*; do $$program; done
-	for script in benchmarks/*.py; do [ ! -e $$script ] || $(DEV) $(PY) $$script; done
+	for script in benchmarks/*.py; do \
+	  case $$script in */seekers_vs_peers.py) python=$(NEVERGRAD);; *) python=$(PY);; esac; \
+	  [ ! -e $$script ] || $(DEV) $$python $$script; \
+	done
 
 .PHONY: fuzz
 RUNS ?= 10000000

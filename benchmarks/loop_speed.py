@@ -7,8 +7,8 @@ Times of one core are processor time, so that neighbours on a shared machine dis
 to one is of wall time, interleaved, and means nothing while others keep the cores busy: the load is printed. What the
 threads cost each other shows in their processor time even then.
 
-Before anything is timed, the loop in the core must equal the one driven from Python bit for bit, and two threads must
-give the numbers of one.
+Before anything is timed, the loop in the core must equal the one driven from Python bit for bit, two threads must give
+the numbers of one, and loops side by side those of single loops to 1e-9.
 """
 
 from __future__ import annotations
@@ -33,7 +33,8 @@ from mgdd.loop import EngineBench, monte_carlo, run_seeker
 
 CYCLES, PAIRS, STEPS = 1000, 20_000, 20_000
 START, LOWER, UPPER = -20.0, -30.0, 10.0
-SEVERAL = 10  # loops to a call, where its own cost must not count
+SEVERAL = 10  # loops to a call, where its own cost must not count; so few run one by one
+LANES = 16  # side by side
 BENCH_ALONE = "the bench alone, same timings"
 BENCH_PROGRAM = Path(__file__).parents[1] / "build" / "bench" / "bench" / "bench_seekers"
 Times = dict[str, list[float]]
@@ -71,11 +72,14 @@ def check_agreement(loops: int) -> np.ndarray:
     drive_from_python(EngineBench(seed=3), seeker, CYCLES)
     if not np.array_equal(run.dataset["estimate_cad"], seeker.history["estimate"][:, 0]):
         sys.exit("the loop in the core and the loop driven from Python differ: nothing timed")
-    one, two = (monte_carlo(EngineBench(), loop_seeker(), range(loops), cycles=CYCLES, threads=n) for n in (1, 2))
+    one, two = (monte_carlo(EngineBench(), loop_seeker(), range(loops), cycles=CYCLES, workers=n) for n in (1, 2))
     if not one.identical(two):
         sys.exit("one thread and two threads give different numbers: nothing timed")
     if float(one["final_cad"][0, 0, 3]) != run.summary["final_cad"]:
         sys.exit("a loop of monte_carlo and the same loop of run_seeker differ: nothing timed")
+    lanes = monte_carlo(EngineBench(), loop_seeker(), range(2 * loops), cycles=CYCLES)
+    if not np.allclose(lanes["final_cad"][0, 0, :loops], one["final_cad"][0, 0], rtol=1e-9, atol=0.0):
+        sys.exit("loops side by side and loops one by one differ by more than 1e-9: nothing timed")
     return seeker.history["applied"].values[:, 0].copy()
 
 
@@ -131,13 +135,18 @@ def time_loops(applied: np.ndarray, into: Times) -> None:
         call()
         into.setdefault(name, []).append((time.process_time() - begin) / loops * 1e3)
 
-    several, requests = range(SEVERAL), np.tile(applied, SEVERAL)
+    several, lanes, requests = range(SEVERAL), range(LANES), np.tile(applied, SEVERAL)
     timed("run_seeker, with its Dataset", 1, lambda: run_seeker(EngineBench(), loop_seeker(), CYCLES))
     timed("driven from Python", 1, lambda: drive_from_python(EngineBench(), loop_seeker(), CYCLES))
     timed(
         "monte_carlo, one thread",
         SEVERAL,
-        lambda: monte_carlo(EngineBench(), loop_seeker(), several, cycles=CYCLES, threads=1),
+        lambda: monte_carlo(EngineBench(), loop_seeker(), several, cycles=CYCLES, workers=1),
+    )
+    timed(
+        "monte_carlo in lanes, one thread",
+        LANES,
+        lambda: monte_carlo(EngineBench(), loop_seeker(), lanes, cycles=CYCLES, workers=1),
     )
     timed(BENCH_ALONE, SEVERAL, lambda: EngineBench().run_columns(requests))
 
@@ -150,7 +159,7 @@ def time_threads(options: argparse.Namespace) -> dict[str, float]:
     for _ in range(options.loop_repeats):
         for threads, values in seconds.items():
             begin, work = time.perf_counter(), time.process_time()
-            monte_carlo(bench, seeker, seeds, cycles=CYCLES, threads=threads)
+            monte_carlo(bench, seeker, seeds, cycles=CYCLES, workers=threads)
             values.append(time.perf_counter() - begin)
             processor[threads].append(time.process_time() - work)
     ratios = [one / two for one, two in zip(seconds[1], seconds[2], strict=True)]

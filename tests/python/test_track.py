@@ -94,7 +94,7 @@ def test_many_runs_are_the_single_ones() -> None:
     throttles = draw_throttles(Throttle(), 3, seed=5)
     references = [Reference.parse("step:40:42"), Reference.parse("sine:30:5:2")]
     controllers = {"guided": GuidedPredictive(), "mgdd1": Mgdd1(), "sliding": SlidingMode()}
-    runs = track_many(controllers, references, throttles, first_seed=10, threads=2)
+    runs = track_many(controllers, references, throttles, first_seed=10, workers=2)
     assert runs["mse_deg2"].dims == ("throttle", "controller", "reference")
     one = track(Mgdd1(), references[1], throttle=throttles[2], seed=12)
     picked = runs.isel(throttle=2).sel(controller="mgdd1", reference="sine:30:5:2")

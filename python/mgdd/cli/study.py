@@ -11,6 +11,7 @@ from typing import TYPE_CHECKING, Any
 from mgdd.cli.options import add_command, refuse_idle
 from mgdd.cli.output import Stopped, check_output, emit
 from mgdd.errors import Interrupted, ParameterError
+from mgdd.parallel.pool import processes
 from mgdd.report import write_report
 from mgdd.studies import StudyResult, available_studies, run_study
 from mgdd.studies.sections import Table, cells, column_names
@@ -43,6 +44,9 @@ def add(commands: Any) -> None:
         "--real", action="store_true", default=None,
         help="of guided: on the surrogate of the measured hydrogen-diesel engine instead of the virtual bench",
     )  # fmt: skip
+    parser.add_argument(
+        "--workers", type=int, metavar="N", help="processes that share its parts (default: one part after the other)"
+    )
     parser.add_argument("--figures", metavar="DIR", help="write its figures into DIR")
     parser.add_argument("--report", metavar="DIR", help="write a page with tables and figures into DIR")
     parser.add_argument("--format", choices=("png", "svg"), default="png", help="of the figures (default: png)")
@@ -53,7 +57,7 @@ def run(args: argparse.Namespace) -> None:
     check_output(args)
     titles = available_studies()
     if args.list:
-        refuse_idle(args, *_OPTIONS, why="--list runs no study")
+        refuse_idle(args, *_OPTIONS, "workers", why="--list runs no study")
         width = max(map(len, titles))
         text = "\n".join(f"{name:{width}} {title}" for name, title in titles.items())
         emit(args, {"studies": [{"name": name, "title": title} for name, title in titles.items()]}, text=text)
@@ -73,7 +77,10 @@ def run(args: argparse.Namespace) -> None:
     drawn = folder is not None or args.report is not None
     step = args.progress.expect(10)
     try:
-        result = run_study(args.name, seeds=args.seeds, quick=args.quick, figures=drawn, progress=step, **options)
+        result = run_study(
+            args.name, seeds=args.seeds, quick=args.quick, figures=drawn, progress=step,
+            executor=None if args.workers is None else processes(args.workers), **options,
+        )  # fmt: skip
     except Interrupted as stop:
         if not isinstance(stop.partial, StudyResult):
             raise

@@ -2,24 +2,26 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
 from mgdd import _core
-from mgdd.errors import ParameterError, ShapeError, hand_over, keep_finished
+from mgdd.errors import Interrupted, ParameterError, ShapeError, WorkerLostError, hand_over, keep_finished
 from mgdd.identify.ode_model import OdeModel, output_or_first_state, run_in_lockstep
-from mgdd.identify.starts import spread_starts
+from mgdd.identify.starts import search_starts, spread_starts
 from mgdd.optimize import least_squares
-from mgdd.optimize.fit_options import FitOptions, fit_options
+from mgdd.optimize.fit_options import FitOptions, Resolved, fit_options
 from mgdd.optimize.fit_run import fit_of, fit_run, quality_of
+from mgdd.parallel.pool import MakesExecutor
 from mgdd.results import Fit, FitReport
 from mgdd.signals.even_grid import even_step
 from mgdd.signals.model import columns_of
 
 if TYPE_CHECKING:
-    from collections.abc import Collection, Sequence
+    from collections.abc import Collection
 
     from numpy.typing import ArrayLike, NDArray
 
@@ -48,6 +50,8 @@ def fit_ode(
     skip: int = 0,
     sigma: float = 1.0,
     options: FitOptions | None = None,
+    executor: MakesExecutor | None = None,
+    workers: int | None = None,
 ) -> Fit:
     """Fit parameters and start of the user's own ODE to a record: output error of the free run.
 
@@ -89,6 +93,9 @@ def fit_ode(
     options : FitOptions, optional
         1 start, 100 trial steps and a tolerance of 1e-9 where nothing else is said; more starts come from a Latin
         hypercube (seed 0) between the bounds, which must then be finite.
+    executor, workers
+        As in `mgdd.parallel.map_items`, for the starts: one after the other if left out. Python takes turns in threads,
+        so processes are what helps; they need `derivative` and `output` at the top level of a module.
 
     Returns
     -------
@@ -105,6 +112,8 @@ def fit_ode(
         A record that is not finite or not evenly sampled.
     Interrupted
         Ctrl-C; ``partial`` is the best fit of the starts that were finished.
+    WorkerLostError
+        As in `mgdd.parallel.map_items`; ``partial`` as after Ctrl-C.
 
     See Also
     --------
@@ -163,48 +172,37 @@ def fit_ode(
     upper = np.array([high for _, high in limits], dtype=np.float64)
     logs = [name in set(log_scaled) for name in unknowns]
     read = output_or_first_state(output)
-    n = len(unknowns)
-
-    def stack(x: NDArray[np.float64]) -> tuple[NDArray[np.float64], NDArray[np.float64], NDArray[np.float64]]:
-        steps = _STEP * np.maximum(np.abs(x), np.where(logs, 0.0, 1e-3))
-        columns = np.repeat(x[:, None], 2 * n + 1, axis=1)
-        columns[np.arange(n), 1 + np.arange(n)] += steps
-        columns[np.arange(n), 1 + n + np.arange(n)] -= steps
-        p = np.repeat(p0[:, None], 2 * n + 1, axis=1)
-        p[where] = columns[: len(chosen)]
-        s = np.repeat(state[:, None], 2 * n + 1, axis=1)
-        s[list(free_state)] = columns[len(chosen) :]
-        return p, s, columns[np.arange(n), 1 + np.arange(n)] - columns[np.arange(n), 1 + n + np.arange(n)]
-
-    def residual(x: NDArray[np.float64]) -> tuple[NDArray[np.float64], NDArray[np.float64]] | None:
-        p, s, widths = stack(x)
-        with np.errstate(all="ignore"):
-            simulated = run_in_lockstep(derivative, read, time, inputs, s, p, substeps)[skip:]
-        if not np.isfinite(simulated).all():
-            return None
-        difference = (simulated[:, 1 : n + 1] - simulated[:, n + 1 :]) / widths
-        return (simulated[:, 0] - measured[skip:]) / sigma, difference / sigma
-
-    def search(start: Mapping[str, float]) -> FitReport:
-        return least_squares(
-            residual,
-            list(start.values()),
-            names=unknowns,
-            lower=lower,
-            upper=upper,
-            log_scaled=logs,
-            data=measured[skip:] / sigma,
-            max_iterations=chosen_options.max_iterations,
-            cost_tolerance=chosen_options.tolerance,
-        )
-
+    search = _Search(
+        derivative=derivative,
+        output=read,
+        time=time,
+        inputs=inputs,
+        measured=measured,
+        substeps=substeps,
+        skip=skip,
+        sigma=sigma,
+        p0=p0.copy(),
+        state=state.copy(),
+        where=where,
+        free_state=tuple(free_state),
+        names=tuple(unknowns),
+        lower=lower,
+        upper=upper,
+        logs=logs,
+        options=chosen_options,
+    )
     first = dict(zip(unknowns, [*p0[where].tolist(), *state[list(free_state)].tolist()], strict=True))
     box = [
         _core.optimize.Parameter(name=name, lower=low, upper=high, log_scaled=log)
         for name, low, high, log in zip(unknowns, lower.tolist(), upper.tolist(), logs, strict=True)
     ]
+    starts = spread_starts(first, box, n_starts, chosen_options.seed)
     reports: list[FitReport] = []
-    stop = keep_finished(search, spread_starts(first, box, n_starts, chosen_options.seed), reports)
+    stop: Interrupted | WorkerLostError | None
+    if executor is None and workers is None:
+        stop = keep_finished(search.one, starts, reports)
+    else:
+        reports, stop = search_starts(search.each, starts, executor=executor, workers=workers)
     if reports[0].status == "evaluation_failed" and n_starts == 1:
         raise ParameterError("the model gives no finite simulation at the start values: change them or raise substeps")
     best = min(reports, key=lambda report: report.cost if np.isfinite(report.cost) else np.inf)
@@ -227,3 +225,65 @@ def fit_ode(
         quality = quality_of(run.isel(time_s=slice(skip, None)))
     fit = fit_of(best, model, run, errors, train=quality, start_reports=tuple(reports))
     return hand_over(fit, stop)
+
+
+@dataclass(frozen=True, kw_only=True)
+class _Search:
+    """All that a search needs beside its start, in a form that a worker can be sent."""
+
+    derivative: Derivative
+    output: Output
+    time: NDArray[np.float64]
+    inputs: NDArray[np.float64]
+    measured: NDArray[np.float64]
+    substeps: int
+    skip: int
+    sigma: float
+    p0: NDArray[np.float64]
+    state: NDArray[np.float64]
+    where: Sequence[int]
+    free_state: tuple[int, ...]
+    names: tuple[str, ...]
+    lower: NDArray[np.float64]
+    upper: NDArray[np.float64]
+    logs: Sequence[bool]
+    options: Resolved
+
+    def each(self, starts: Sequence[Mapping[str, float]]) -> list[FitReport]:
+        return [self.one(start) for start in starts]
+
+    def one(self, start: Mapping[str, float]) -> FitReport:
+        return least_squares(
+            self.residual,
+            list(start.values()),
+            names=self.names,
+            lower=self.lower,
+            upper=self.upper,
+            log_scaled=self.logs,
+            data=self.measured[self.skip :] / self.sigma,
+            max_iterations=self.options.max_iterations,
+            cost_tolerance=self.options.tolerance,
+        )
+
+    def residual(self, x: NDArray[np.float64]) -> tuple[NDArray[np.float64], NDArray[np.float64]] | None:
+        p, s, widths = self.stack(x)
+        with np.errstate(all="ignore"):
+            simulated = run_in_lockstep(self.derivative, self.output, self.time, self.inputs, s, p, self.substeps)
+        simulated = simulated[self.skip :]
+        if not np.isfinite(simulated).all():
+            return None
+        n = x.size
+        difference = (simulated[:, 1 : n + 1] - simulated[:, n + 1 :]) / widths
+        return (simulated[:, 0] - self.measured[self.skip :]) / self.sigma, difference / self.sigma
+
+    def stack(self, x: NDArray[np.float64]) -> tuple[NDArray[np.float64], NDArray[np.float64], NDArray[np.float64]]:
+        n, m = x.size, len(self.where)
+        steps = _STEP * np.maximum(np.abs(x), np.where(self.logs, 0.0, 1e-3))
+        columns = np.repeat(x[:, None], 2 * n + 1, axis=1)
+        columns[np.arange(n), 1 + np.arange(n)] += steps
+        columns[np.arange(n), 1 + n + np.arange(n)] -= steps
+        p = np.repeat(self.p0[:, None], 2 * n + 1, axis=1)
+        p[self.where] = columns[:m]
+        s = np.repeat(self.state[:, None], 2 * n + 1, axis=1)
+        s[list(self.free_state)] = columns[m:]
+        return p, s, columns[np.arange(n), 1 + np.arange(n)] - columns[np.arange(n), 1 + n + np.arange(n)]

@@ -1,12 +1,22 @@
-"""Where the searches of one fit begin."""
+"""Where the searches of one fit begin, on whom they run, and which of them ended best."""
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+import math
+from collections.abc import Callable, Mapping, Sequence
+from typing import TypeVar
 
 from mgdd import _core
+from mgdd.errors import Interrupted, WorkerLostError
+from mgdd.parallel.chunks import run_chunks
+from mgdd.parallel.pool import MakesExecutor
+from mgdd.results import FitReport
+from mgdd.results.fit import ARRIVED
 
-__all__ = ["spread_starts"]
+__all__ = ["rank", "search_starts", "spread_starts"]
+
+Start = TypeVar("Start")
+Found = TypeVar("Found")
 
 
 def spread_starts(
@@ -46,3 +56,51 @@ def spread_starts(
     further = _core.optimize.latin_hypercube(box, n_starts - 1, seed) if n_starts > 1 else []
     names = [parameter.name for parameter in box]
     return [dict(first), *({**first, **dict(zip(names, point.tolist(), strict=True))} for point in further)]
+
+
+def search_starts(
+    search: Callable[[Sequence[Start]], Sequence[Found]],
+    starts: Sequence[Start],
+    *,
+    executor: MakesExecutor | None,
+    workers: int | None,
+) -> tuple[list[Found], Interrupted | WorkerLostError | None]:
+    """Search from every start on an executor.
+
+    Parameters
+    ----------
+    search : callable
+        Takes some starts and gives what it finds from each; picklable, as are both.
+    starts : sequence
+        All of them.
+    executor, workers
+        As in `mgdd.parallel.map_items`.
+
+    Returns
+    -------
+    tuple
+        What was found, in the order of the starts, and what ended the work before its end, for `mgdd.errors.hand_over`.
+
+    Raises
+    ------
+    mgdd.errors.Interrupted, mgdd.errors.WorkerLostError
+        Nothing was found until then.
+    """
+    found: dict[int, Found] = {}
+
+    def keep(start: int, stop: int, part: Sequence[Found]) -> None:
+        found.update(zip(range(start, stop), part, strict=True))
+
+    stop = run_chunks(search, lambda a, b: (starts[a:b],), keep, len(starts), executor=executor, workers=workers)
+    if stop is not None and not found:
+        raise stop
+    return [found[number] for number in sorted(found)], stop
+
+
+def rank(reports: Sequence[FitReport]) -> tuple[int, int]:
+    """Give the number of the report with the lowest cost, and how many ended within 0.5 % of its error; as the core."""
+    best = 0
+    for number, report in enumerate(reports):
+        if report.cost < reports[best].cost or not math.isfinite(reports[best].cost):
+            best = number
+    return best, sum(report.rmse <= ARRIVED * reports[best].rmse for report in reports)

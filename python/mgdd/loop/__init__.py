@@ -2,8 +2,9 @@
 
 `EngineBench`, `SurrogatePlant` and `VirtualThrottle` are plants: ``apply`` inputs by name, ``measure``. `run_seeker`
 closes the loop on any of them and on a test rig, `monte_carlo` does so for seeds, gains and operating points of the
-bench on all cores, `EngineBench.find_optimum` says where a seeker should end. `track` and `track_many` run controllers
-of the throttle along a `Reference`, `simulate_drive` runs a throttle between the pedal and the engine's torque.
+bench on all cores or an executor, `EngineBench.find_optimum` says where a seeker should end. `track` and `track_many`
+run controllers of the throttle along a `Reference`, `simulate_drive` runs a throttle between the pedal and the engine's
+torque.
 """
 
 from __future__ import annotations
@@ -12,13 +13,16 @@ from mgdd._core.loop import SensorDynamics
 from mgdd.loop.bench import EngineBench
 from mgdd.loop.criteria import LoopCriteria
 from mgdd.loop.drive import simulate_drive
+from mgdd.loop.many_loops import monte_carlo
+from mgdd.loop.many_tracks import track_many
 from mgdd.loop.plant import Measurement, Plant
 from mgdd.loop.reference import Reference
-from mgdd.loop.seek import monte_carlo, run_seeker
+from mgdd.loop.seek import run_seeker
 from mgdd.loop.surrogate_plant import SurrogatePlant
 from mgdd.loop.throttle_faults import ThrottleFault
-from mgdd.loop.track import track, track_many
-from mgdd.loop.tune import tune_controller, tuned_controller
+from mgdd.loop.track import track
+from mgdd.loop.tune import tune_controller
+from mgdd.loop.tuned import tuned_controller
 from mgdd.loop.virtual_throttle import VirtualThrottle
 
 __all__ = [

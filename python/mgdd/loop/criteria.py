@@ -5,7 +5,7 @@ from __future__ import annotations
 import math
 from collections.abc import Mapping
 from dataclasses import dataclass, field
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
 from mgdd.errors import ParameterError
 
@@ -159,6 +159,33 @@ class LoopCriteria:
         if self.limits is not None or seeker is None:
             return _in_order("limits", self.limits or {}, names)
         return _in_order("limits", {limit.name: limit.upper for limit in seeker.settings["limits"]}, names)
+
+    def to_core(self, names: tuple[str, ...]) -> dict[str, Any]:
+        """Give what the loops of the core take.
+
+        Parameters
+        ----------
+        names : tuple of str
+            Limits of the bench.
+
+        Returns
+        -------
+        dict of str to object
+            Keywords; limits are empty where each seeker brings its own.
+
+        Raises
+        ------
+        mgdd.errors.ParameterError
+            ``exceed_above`` or ``limits`` names another limit.
+        """
+        return {
+            "optimum_cad": math.nan if self.optimum is None else self.optimum,
+            "arrival_cad": self.arrival,
+            "tail_cycles": self.tail_cycles,
+            "exceed_from": self.exceed_from,
+            "exceed_above": self.thresholds(names),
+            "limits": [] if self.limits is None else self.limits_of(names),
+        }
 
 
 def _in_order(what: str, values: Mapping[str, float], names: tuple[str, ...]) -> list[float]:

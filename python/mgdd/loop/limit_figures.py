@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
@@ -13,7 +13,7 @@ from mgdd.results.labels import VARIABLES
 if TYPE_CHECKING:
     from numpy.typing import NDArray
 
-__all__ = ["FIGURES", "NOISE_FREE", "limit_figures", "limit_label", "noise_free_variable"]
+__all__ = ["FIGURES", "NOISE_FREE", "limit_figures", "limit_label", "noise_free_variable", "with_a_limit"]
 
 NOISE_FREE = "noise_free_"
 _OWN = "unit of the limit"
@@ -63,6 +63,12 @@ def limit_label(key: str, names: Sequence[str]) -> tuple[str, str]:
             unit, text = FIGURES[figure]
             return (VARIABLES[name].units if unit == _OWN else unit), f"{name}: {text}"
     raise KeyError(key)
+
+
+def with_a_limit(raw: Mapping[str, Any], names: Sequence[str]) -> dict[str, Any]:
+    """Leave out what the core says of a limited quantity without a limit."""
+    free = {f"{figure}_{name}" for name in names if not np.isfinite(raw[f"limit_{name}"]).any() for figure in FIGURES}
+    return {key: value for key, value in raw.items() if key not in free}
 
 
 def noise_free_variable(table: NDArray[np.float64]) -> tuple[Any, ...]:

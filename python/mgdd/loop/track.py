@@ -1,8 +1,7 @@
-"""Controllers on the virtual throttle: one run with its signals, or many throttles and references on all cores."""
+"""A controller on the virtual throttle along a reference: one run with its signals."""
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
 from typing import TYPE_CHECKING, Any, Protocol
 
 import numpy as np
@@ -18,7 +17,17 @@ if TYPE_CHECKING:
     import xarray as xr
     from numpy.typing import ArrayLike, NDArray
 
-__all__ = ["AngleController", "track", "track_many"]
+__all__ = [
+    "FIGURES",
+    "AngleController",
+    "column_of",
+    "core_of",
+    "plant_of",
+    "reference_of",
+    "sensors_of",
+    "step_times_us",
+    "track",
+]
 
 FIGURES = (
     "settling_ms",
@@ -115,10 +124,10 @@ def track(
     >>> float(run["settling_ms"]) < 30.0, run["settling_ms"].units
     (True, 'ms')
     """
-    wanted = _reference_of(reference)
-    plant = _plant(throttle, wanted, start_deg, sensors or sensors_of(noise_deg), seed)
+    wanted = reference_of(reference)
+    plant = plant_of(throttle, wanted, start_deg, sensors or sensors_of(noise_deg), seed)
     n = len(wanted.angle_deg)
-    airflow, supply = _column("airflow_torque_nm", airflow_torque_nm, n), _column("supply_v", supply_v, n)
+    airflow, supply = column_of("airflow_torque_nm", airflow_torque_nm, n), column_of("supply_v", supply_v, n)
     inner = core_of(controller)
     if inner is not None:
         run = _core.loop.track_throttle(
@@ -157,105 +166,6 @@ def track(
     return labelled_dataset(variables, attrs=attributes)
 
 
-def track_many(
-    controllers: Mapping[str, AngleController],
-    references: Sequence[Reference | str],
-    throttles: Sequence[Throttle],
-    *,
-    delay_samples: int = 1,
-    airflow_torque_nm: Mapping[str, ArrayLike] | None = None,
-    noise_deg: float = 0.03,
-    first_seed: int = 0,
-    threads: int = 0,
-) -> xr.Dataset:
-    """Run every controller along every reference on every throttle, on all cores.
-
-    Parameters
-    ----------
-    controllers : mapping of str to controller
-        Controllers of `mgdd.control` by name; each run starts from a copy.
-    references : sequence of Reference or str
-        As for `track`, all with the same sample time.
-    throttles : sequence of Throttle
-        The plants; the noise of number i has the seed ``first_seed + i`` in every run.
-    delay_samples, noise_deg : int, float
-        As for `track`.
-    airflow_torque_nm : mapping of str to array_like, optional
-        Torque on the plate [N m] by the name of the reference, one number or one per sample.
-    first_seed : int
-        Of the noise of the first throttle.
-    threads : int
-        0 for all cores.
-
-    Returns
-    -------
-    xarray.Dataset
-        The scalars of `track` over ``throttle``, ``controller`` and ``reference``.
-
-    Raises
-    ------
-    mgdd.errors.ParameterError
-        Nothing to run, a controller that is not one of mgdd, references of different sample time.
-    mgdd.errors.Interrupted
-        Ctrl-C: nothing is kept.
-
-    Examples
-    --------
-    >>> from mgdd.control import GuidedPredictive, Pid
-    >>> from mgdd.loop import track_many
-    >>> from mgdd.throttle import Throttle
-    >>> plants = [Throttle().replace(coulomb_nm=0.25 + 0.01 * i) for i in range(5)]
-    >>> runs = track_many({"guided": GuidedPredictive(), "PID": Pid()}, ["step:40:42"], plants)
-    >>> mse = runs["mse_deg2"].mean("throttle").squeeze()
-    >>> bool(mse.sel(controller="guided") < mse.sel(controller="PID"))
-    True
-    """
-    wanted = [_reference_of(reference) for reference in references]
-    if not wanted or not controllers or not throttles:
-        raise ParameterError("controllers, references and throttles: give at least one each")
-    if len({reference.sample_s for reference in wanted}) > 1:
-        raise ParameterError("references: must all have the same sample_s")
-    inner = [core_of(controller) for controller in controllers.values()]
-    for name, core in zip(controllers, inner, strict=True):
-        if core is None:
-            raise ParameterError.of(
-                f"controllers[{name!r}]", controllers[name], "a controller of mgdd; run others with track"
-            )
-    sensors = sensors_of(noise_deg)
-    plants = [
-        _plant(throttle, wanted[0], None, sensors, first_seed + number)._core
-        for number, throttle in enumerate(throttles)
-    ]
-    flows = dict(airflow_torque_nm or {})
-    unknown = set(flows) - {reference.name for reference in wanted}
-    if unknown:
-        raise ParameterError.of("airflow_torque_nm", sorted(unknown), "names of references")
-    scenarios = [
-        (r.angle_deg, _column("airflow_torque_nm", flows.get(r.name), len(r.angle_deg)), np.empty(0), r.from_sample)
-        for r in wanted
-    ]
-    figures, _ = _core.loop.track_throttles(
-        plants,
-        inner,
-        scenarios,
-        delay_samples=delay_samples,
-        band_deg=[r.band_deg for r in wanted],
-        threads=threads,
-    )
-    shape = (len(throttles), len(inner), len(wanted))
-    dims = ("throttle", "controller", "reference")
-    variables: dict[str, tuple[Any, ...]] = {
-        "throttle": ("throttle", np.arange(len(throttles)), "-", "number of the throttle"),
-        "controller": ("controller", list(controllers), "-", "controller"),
-        "reference": ("reference", [r.name for r in wanted], "-", "reference"),
-    }
-    for name in FIGURES:
-        variables[name] = (dims, np.asarray(figures[name]).reshape(shape))
-    return labelled_dataset(
-        variables, attrs={"delay_samples": delay_samples, "noise_deg": noise_deg, "seed": first_seed}
-    )
-
-
 def step_times_us(controller: AngleController, run: xr.Dataset) -> tuple[float, float]:
     """Replay a run through a controller of mgdd, and give median and 99.9th percentile of its step [us]."""
     inner = core_of(controller)
@@ -265,7 +175,8 @@ def step_times_us(controller: AngleController, run: xr.Dataset) -> tuple[float, 
     return float(np.median(times)), float(np.quantile(times, 0.999))
 
 
-def _reference_of(given: Reference | str | ArrayLike) -> Reference:
+def reference_of(given: Reference | str | ArrayLike) -> Reference:
+    """Read what `track` takes as a reference."""
     if isinstance(given, Reference):
         return given
     if isinstance(given, str):
@@ -273,15 +184,17 @@ def _reference_of(given: Reference | str | ArrayLike) -> Reference:
     return Reference(angle_deg=np.asarray(given, float))
 
 
-def _plant(
+def plant_of(
     throttle: Throttle | None, reference: Reference, start_deg: float | None, sensors: SensorPair, seed: int
 ) -> VirtualThrottle:
+    """Give the plant at rest at the first angle of the reference, inside its travel, if nothing else is said."""
     body = Throttle() if throttle is None else throttle
     start = float(np.clip(reference.angle_deg[0], body.closed_deg, body.open_deg)) if start_deg is None else start_deg
     return VirtualThrottle(body, sensors=sensors, start_deg=start, sample_s=reference.sample_s, seed=seed)
 
 
-def _column(name: str, given: ArrayLike | None, n: int) -> NDArray[np.float64]:
+def column_of(name: str, given: ArrayLike | None, n: int) -> NDArray[np.float64]:
+    """Give a column of n samples from one number or from a column; empty for None."""
     if given is None:
         return np.empty(0)
     column = np.asarray(given, float)

@@ -4,26 +4,25 @@ from __future__ import annotations
 
 import math
 from collections.abc import Callable, Mapping, Sequence
+from contextlib import nullcontext
 from dataclasses import dataclass, field
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from mgdd.errors import ParameterError
-from mgdd.loop.controller_families import FAMILIES, Family, Groups, Setup, groups_of
+from mgdd.errors import Interrupted, ParameterError, WorkerLostError, hand_over
+from mgdd.loop.controller_families import Setup, groups_of
+from mgdd.loop.many_tracks import track_many
 from mgdd.loop.reference import Reference
-from mgdd.loop.track import track_many
-from mgdd.loop.tuned_sets import TUNED_SETS
+from mgdd.loop.tuned import family_of, shipped_numbers
+from mgdd.parallel.pool import MakesExecutor, Pool
 
 if TYPE_CHECKING:
     import xarray as xr
 
-    from mgdd.control import GuidedPredictive, Mgdd1, Pid, SlidingMode
     from mgdd.throttle import Throttle
 
-    Controller = GuidedPredictive | Mgdd1 | Pid | SlidingMode
-
-__all__ = ["Tuning", "draw_throttles", "tracking_cost", "tune_controller", "tuned_controller"]
+__all__ = ["Tuning", "draw_throttles", "tracking_cost", "tune_controller"]
 
 _SPREAD_FIELDS = (
     ("inertia_kgm2",),
@@ -142,7 +141,8 @@ def tune_controller(
     seed: int = 0,
     delay_samples: int = 1,
     noise_deg: float = 0.03,
-    threads: int = 0,
+    executor: MakesExecutor | None = None,
+    workers: int | None = None,
     progress: Callable[[int, float], None] | None = None,
 ) -> Tuning:
     """Tune a kind of controller for throttles around one; it knows that one only.
@@ -162,8 +162,11 @@ def tune_controller(
         Runs of the whole set, at least 30.
     seed : int
         Of throttles, noise and search.
-    delay_samples, noise_deg, threads : int, float, int
+    delay_samples, noise_deg : int, float
         As for `track_many`.
+    executor, workers
+        As in `mgdd.parallel.map_items`, for the runs of a set: threads on all cores if left out. The numbers do not
+        depend on them.
     progress : callable, optional
         Called with the number of runs and the least cost so far.
 
@@ -176,6 +179,8 @@ def tune_controller(
     ------
     mgdd.errors.ParameterError
         An unknown kind or a budget below 30.
+    mgdd.errors.WorkerLostError, mgdd.errors.Interrupted
+        A lost worker, Ctrl-C; ``partial`` is the Tuning of the sets that were run to the end, None where none was.
 
     Examples
     --------
@@ -185,17 +190,13 @@ def tune_controller(
     >>> tuning.cost <= tuning.start_cost, tuning.evaluations
     (True, 30)
     """
-    from scipy.optimize import minimize
-    from scipy.stats import qmc
-
-    family = _family(kind)
+    family = family_of(kind)
     if budget < 30:
         raise ParameterError.of("budget", budget, ">= 30")
     groups = groups_of(throttle)
     setup = Setup(delay_samples=delay_samples, noise_deg=noise_deg)
     throttles = draw_throttles(throttle, n_throttles, spread=spread, seed=seed)
     references = [reference for reference, _ in tuning_references().values()]
-    names = list(family.space)
     seen: list[tuple[float, tuple[float, ...]]] = []
 
     def cost_of(shares: Sequence[float]) -> float:
@@ -210,7 +211,8 @@ def tune_controller(
             delay_samples=delay_samples,
             noise_deg=noise_deg,
             first_seed=seed,
-            threads=threads,
+            executor=pool,
+            workers=workers,
         )
         outside = float(np.abs(np.asarray(shares, float) - inside).sum())
         cost = tracking_cost(runs.isel(controller=0)) + 10.0 * outside
@@ -219,11 +221,47 @@ def tune_controller(
             progress(len(seen), min(seen)[0])
         return cost
 
-    start_cost = cost_of(_shares(family.space, _shipped(kind, groups)))
-    for point in qmc.LatinHypercube(len(names), seed=seed).random(budget // 3):
+    stop: Interrupted | WorkerLostError | None = None
+    start = _shares(family.space, shipped_numbers(kind, groups))
+    with nullcontext() if executor is None else Pool(executor, workers) as pool:
+        try:
+            _search(cost_of, start, budget, seed, seen)
+        except WorkerLostError as lost:
+            stop = lost
+        except KeyboardInterrupt:
+            stop = Interrupted(f"interrupted: {len(seen)} of {budget} sets were run, the best is in .partial")
+    if stop is not None and not seen:
+        stop.partial = None  # the runs of half a set are no tuning
+        raise stop
+    best, point = min(seen)
+    tuning = Tuning(
+        kind=kind,
+        numbers=_numbers(family.space, point),
+        cost=best,
+        start_cost=seen[0][0],
+        evaluations=len(seen),
+        settings={"n_throttles": n_throttles, "spread": spread, "seed": seed, "noise_deg": noise_deg},
+    )
+    return hand_over(tuning, stop)
+
+
+def _search(
+    cost_of: Callable[[Sequence[float]], float],
+    start: Sequence[float],
+    budget: int,
+    seed: int,
+    seen: Sequence[tuple[float, tuple[float, ...]]],
+) -> None:
+    """Spend the budget; `seen` holds what `cost_of` was asked."""
+    from scipy.optimize import minimize
+    from scipy.stats import qmc
+
+    n = len(start)
+    cost_of(start)
+    for point in qmc.LatinHypercube(n, seed=seed).random(budget // 3):
         cost_of(point)
     while len(seen) < budget:
-        corners = np.array([point for _, point in sorted(seen)[: len(names) + 1]])
+        corners = np.array([point for _, point in sorted(seen)[: n + 1]])
         before = len(seen)
         try:
             minimize(
@@ -234,96 +272,13 @@ def tune_controller(
             )
         except StopIteration:
             break
-        if len(seen) < before + 2 * len(names):  # it stands: look elsewhere near the best
+        if len(seen) < before + 2 * n:  # it stands: look elsewhere near the best
             rng = np.random.default_rng([seed, len(seen)])
             try:
-                for _ in range(2 * len(names)):
-                    cost_of(np.clip(corners[0] + 0.1 * rng.normal(size=len(names)), 0.0, 1.0))
+                for _ in range(2 * n):
+                    cost_of(np.clip(corners[0] + 0.1 * rng.normal(size=n), 0.0, 1.0))
             except StopIteration:
                 break
-    best, point = min(seen)
-    return Tuning(
-        kind=kind,
-        numbers=_numbers(family.space, point),
-        cost=best,
-        start_cost=start_cost,
-        evaluations=len(seen),
-        settings={"n_throttles": n_throttles, "spread": spread, "seed": seed, "noise_deg": noise_deg},
-    )
-
-
-def tuned_controller(
-    kind: str,
-    model: Any = None,
-    *,
-    numbers: Mapping[str, float] | None = None,
-    sample_s: float = 1e-3,
-    delay_samples: int | None = None,
-    noise_deg: float = 0.03,
-) -> Controller:
-    """Give a controller for a throttle, with the numbers that one tuner found for every kind.
-
-    Parameters
-    ----------
-    kind : str
-        ``guided`` (model-guided predictive), ``mgdd1``, ``pid``, ``sliding_mode``, ``linear_mpc`` or ``nmpc``.
-    model : optional
-        What the controller knows: a `Throttle`, PW-R, or fitted first-principle groups; the preset ``P1`` if left out.
-    numbers : mapping of str to float, optional
-        Of `tune_controller`; those of the preset whose groups are nearest to the model's if left out.
-    sample_s, noise_deg : float
-        Time between samples [s], and standard deviation of the measured angle [deg].
-    delay_samples : int, optional
-        From a duty to its effect; that of the model, or 1, if left out.
-
-    Returns
-    -------
-    GuidedPredictive, Mgdd1, Pid or SlidingMode
-        Ready to run.
-
-    Raises
-    ------
-    mgdd.errors.ParameterError
-        An unknown kind, a model without groups, unknown numbers.
-
-    Examples
-    --------
-    >>> from mgdd.loop import track, tuned_controller
-    >>> {kind: type(tuned_controller(kind)).__name__ for kind in ("guided", "pid", "nmpc")}
-    {'guided': 'GuidedPredictive', 'pid': 'Pid', 'nmpc': 'GuidedPredictive'}
-    """
-    family = _family(kind)
-    if model is None:
-        from mgdd.throttle import Throttle
-
-        model = Throttle()
-    groups = groups_of(model)
-    chosen = _shipped(kind, groups) if numbers is None else dict(numbers)
-    if set(chosen) != set(family.space):
-        raise ParameterError.of("numbers", sorted(chosen), f"exactly {', '.join(family.space)}")
-    if delay_samples is None:
-        delay_samples = 1 if groups.delay_samples is None else round(groups.delay_samples)
-    return family.build(groups, chosen, Setup(sample_s, delay_samples, noise_deg))
-
-
-def _family(kind: str) -> Family:
-    if kind not in FAMILIES:
-        raise ParameterError.of("kind", kind, f"one of {', '.join(FAMILIES)}")
-    return FAMILIES[kind]
-
-
-def _distance(a: Groups, b: Groups) -> float:
-    names = ("gain_deg_per_s2", "time_constant_s", "friction", "preload_above", "spring_above_per_deg")
-    pairs = [(getattr(a, name), getattr(b, name)) for name in names]
-    return sum(math.log(max(x, 1e-9) / max(y, 1e-9)) ** 2 for x, y in pairs)
-
-
-def _shipped(kind: str, groups: Groups) -> dict[str, float]:
-    from mgdd import presets
-
-    sets = TUNED_SETS[kind]
-    near = min(sets, key=lambda name: _distance(groups, groups_of(presets.load(name, kind="throttle").throttle)))
-    return dict(sets[near])
 
 
 def _numbers(space: Mapping[str, tuple[float, float, bool]], shares: Sequence[float]) -> dict[str, float]:

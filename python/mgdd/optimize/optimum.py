@@ -5,6 +5,7 @@ from __future__ import annotations
 import math
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
+from functools import partial
 from types import MappingProxyType
 from typing import Any
 
@@ -77,6 +78,12 @@ class Optimum:
             if name in numbers:
                 return numbers[name]
         raise KeyError(f"{name!r}: this optimum has {', '.join([*self.inputs, *self.values])}")
+
+    def __reduce__(self) -> tuple[Any, ...]:
+        own: dict[str, Any] = {name: getattr(self, name) for name in self.__dataclass_fields__}
+        for name, value in own.items():
+            own[name] = dict(value) if isinstance(value, Mapping) else value  # a read-only one cannot be pickled
+        return partial(type(self), **own), ()
 
     def _repr_html_(self) -> str:
         return as_html("Optimum", rows_of({name: getattr(self, name) for name in self.__dataclass_fields__}))

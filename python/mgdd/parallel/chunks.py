@@ -8,12 +8,13 @@ import time
 import traceback
 from collections.abc import Callable
 from concurrent.futures import FIRST_COMPLETED, BrokenExecutor, Future, wait
+from contextlib import nullcontext
 from typing import Any, NamedTuple, TypeVar
 
 from mgdd._arguments import shown
 from mgdd.errors import Interrupted, ParameterError, WorkerLostError
 from mgdd.parallel.plan import Chunk, Plan
-from mgdd.parallel.pool import MakesExecutor, Pool
+from mgdd.parallel.pool import MakesExecutor, Pool, single_threaded
 
 __all__ = ["run_chunks"]
 
@@ -77,11 +78,8 @@ def run_chunks(
     mgdd.errors.ParameterError
         A bad executor or number of workers, work that cannot be pickled.
     """
-    pool = Pool(executor, workers)
-    try:
+    with nullcontext(executor) if isinstance(executor, Pool) else Pool(executor, workers) as pool:
         return _Run(function, cut, keep, n_items, pool, seconds_per_item, largest, progress).go()
-    finally:
-        pool.close()
 
 
 class _Run:
@@ -224,10 +222,11 @@ class _Lost(Exception):  # noqa: N818 - the way out of the loop, not an error th
 
 
 def _answer(attempt: int, caller: int, function: Callable[..., Any], arguments: tuple[Any, ...]) -> _Answer:  # noqa: ARG001
-    """Run in the worker: the time it took, and the result or the error of the work."""
+    """Run in the worker, on one thread: the time it took, and the result or the error of the work."""
     begun = time.perf_counter()
     try:
-        part = function(*arguments)
+        with single_threaded():
+            part = function(*arguments)
     except Exception as error:  # noqa: BLE001 - it is raised where the call came from
         return _Answer(time.perf_counter() - begun, error=error if caller == os.getpid() else _portable(error))
     return _Answer(time.perf_counter() - begun, part)

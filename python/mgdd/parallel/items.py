@@ -27,7 +27,8 @@ def map_items(
     """Call a function with every item, on threads, processes or machines; the results stand in the order of the items.
 
     Items are handed out in chunks: small ones first, then as many as fit in a quarter of a second. What a lost worker
-    had is done again, up to three times, so the function should give the same answer when it is called again.
+    had is done again, up to three times, so the function should give the same answer when it is called again. What
+    the function calls of mgdd takes one core, unless its own `workers` says otherwise: the other workers have the rest.
 
     Parameters
     ----------

@@ -2,16 +2,21 @@
 
 from __future__ import annotations
 
+import multiprocessing
 import os
-from collections.abc import Callable
+import signal
+from collections.abc import Callable, Iterator
 from concurrent.futures import Executor, Future, ProcessPoolExecutor, ThreadPoolExecutor
-from typing import Any
+from contextlib import contextmanager
+from contextvars import ContextVar
+from functools import partial
+from typing import Any, Self
 
 from mgdd.errors import ParameterError
 
-__all__ = ["MakesExecutor", "Pool"]
+__all__ = ["MakesExecutor", "Pool", "cores", "processes", "single_threaded", "threads_of"]
 
-MakesExecutor = Executor | Callable[[], Executor]  # what every ``executor=`` takes, beside None
+_single: ContextVar[bool] = ContextVar("single", default=False)
 
 
 class Pool:
@@ -31,9 +36,7 @@ class Pool:
     """
 
     def __init__(self, executor: MakesExecutor | Any, workers: int | None) -> None:
-        if workers is not None and not workers >= 1:
-            raise ParameterError.of("workers", workers, ">= 1")
-        self._wanted = workers
+        self._wanted = _checked(workers)
         self._make: Callable[[], Executor] | None = None
         if executor is None:
             self._make = self._threads
@@ -46,6 +49,12 @@ class Pool:
         if not hasattr(self._executor, "submit"):
             raise ParameterError.of("executor", executor, "a function that makes a concurrent.futures.Executor")
         self.workers: int = workers or _workers_of(self._executor) or cores()
+
+    def __enter__(self) -> Self:
+        return self
+
+    def __exit__(self, *_: object) -> None:
+        self.close()
 
     def submit(self, function: Callable[..., Any], *arguments: Any) -> Future[Any]:
         """Hand a call to the executor."""
@@ -74,9 +83,47 @@ class Pool:
         return ThreadPoolExecutor(self._wanted or cores(), thread_name_prefix="mgdd")
 
 
+# What every ``executor=`` takes, beside None; a Pool serves several calls and is closed by whoever made it.
+MakesExecutor = Executor | Callable[[], Executor] | Pool
+
+
+def processes(workers: int) -> Callable[[], Executor]:
+    """Give a function that makes a pool of fresh processes; Ctrl-C in the terminal ends them, and without a word."""
+    context = multiprocessing.get_context("spawn")
+    end = (signal.SIGINT, signal.SIG_DFL)
+    return partial(ProcessPoolExecutor, _checked(workers), mp_context=context, initializer=signal.signal, initargs=end)
+
+
+def threads_of(workers: int | None) -> int:
+    """Give the number of threads of one call of the core: as many as wanted, or one per core.
+
+    Raises
+    ------
+    mgdd.errors.ParameterError
+        Fewer than one.
+    """
+    return _checked(workers) or cores()
+
+
 def cores() -> int:
-    """Count the cores that this process may use."""
-    return len(os.sched_getaffinity(0))
+    """Count the cores that a call may use: those of this process, one inside a worker."""
+    return 1 if _single.get() else len(os.sched_getaffinity(0))
+
+
+@contextmanager
+def single_threaded() -> Iterator[None]:
+    """Let calls within take one core where nothing else is said: the other workers have the others."""
+    token = _single.set(True)
+    try:
+        yield
+    finally:
+        _single.reset(token)
+
+
+def _checked(workers: int | None) -> int | None:
+    if workers is not None and not workers >= 1:
+        raise ParameterError.of("workers", workers, ">= 1")
+    return workers
 
 
 def _workers_of(executor: Any) -> int | None:

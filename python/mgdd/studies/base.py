@@ -2,11 +2,16 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterable, Mapping
+from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
+from contextlib import contextmanager
+from contextvars import ContextVar
 from dataclasses import dataclass, field
+from itertools import takewhile
 from typing import TYPE_CHECKING, Any, TypeVar
 
-from mgdd.errors import Interrupted, ParameterError
+from mgdd.errors import Interrupted, ParameterError, WorkerLostError, hand_over
+from mgdd.parallel.chunks import run_chunks
+from mgdd.parallel.pool import MakesExecutor, Pool
 from mgdd.results.describe import described
 from mgdd.studies.sections import Section, standard_sections
 
@@ -14,7 +19,7 @@ if TYPE_CHECKING:
     import xarray as xr
     from matplotlib.figure import Figure
 
-__all__ = ["Progress", "StudyResult", "check_seeds", "finish", "run_parts"]
+__all__ = ["Progress", "StudyResult", "check_seeds", "finish", "parts_on", "run_parts"]
 
 Progress = Callable[[str], None]
 Part = TypeVar("Part")
@@ -82,8 +87,33 @@ def check_seeds(seeds: int) -> int:
     return seeds
 
 
+@dataclass
+class _Workers:
+    pool: Pool
+    lost: WorkerLostError | None = None
+
+
+_workers: ContextVar[_Workers | None] = ContextVar("workers", default=None)
+
+
+@contextmanager
+def parts_on(executor: MakesExecutor | None, workers: int | None) -> Iterator[None]:
+    """Let `run_parts` hand the parts to workers; with neither it runs one after the other, each on all cores."""
+    if executor is None and workers is None:
+        yield
+        return
+    with Pool(executor, workers) as pool:
+        token = _workers.set(_Workers(pool))
+        try:
+            yield
+        finally:
+            _workers.reset(token)
+
+
 def run_parts(parts: Iterable[tuple[str, Callable[[], Part]]], progress: Progress | None) -> tuple[list[Part], bool]:
-    """Run the parts of a study in order; Ctrl-C ends them and keeps what is finished, unless nothing is.
+    """Run the parts of a study; Ctrl-C ends them and keeps what is finished, unless nothing is.
+
+    A part must be picklable, as `functools.partial` of a function at the top level is, and so must what it returns.
 
     Parameters
     ----------
@@ -95,8 +125,11 @@ def run_parts(parts: Iterable[tuple[str, Callable[[], Part]]], progress: Progres
     Returns
     -------
     tuple of list and bool
-        What the finished parts returned, and whether Ctrl-C ended them.
+        What the first parts returned, as many as are finished, and whether Ctrl-C or a lost worker ended them.
     """
+    workers = _workers.get()
+    if workers is not None:
+        return _on_workers(workers, list(parts), progress)
     done: list[Part] = []
     try:
         for text, work in parts:
@@ -110,12 +143,41 @@ def run_parts(parts: Iterable[tuple[str, Callable[[], Part]]], progress: Progres
     return done, False
 
 
+def _on_workers(
+    workers: _Workers, parts: Sequence[tuple[str, Callable[[], Part]]], progress: Progress | None
+) -> tuple[list[Part], bool]:
+    found: dict[int, Part] = {}
+
+    def cut(start: int, _: int) -> tuple[Callable[[], Part]]:
+        text, work = parts[start]
+        if progress is not None:
+            progress(text)
+        return (work,)
+
+    def keep(start: int, _: int, part: Part) -> None:
+        found[start] = part
+
+    # One part to a chunk; an unbroken row of them is what a study knows how to hand over.
+    stop = run_chunks(_call, cut, keep, len(parts), executor=workers.pool, largest=1)
+    done = [found[number] for number in takewhile(found.__contains__, range(len(parts)))]
+    if stop is not None and not done:
+        raise stop
+    workers.lost = stop if isinstance(stop, WorkerLostError) else None
+    return done, stop is not None
+
+
+def _call(work: Callable[[], Part]) -> Part:
+    return work()
+
+
 def finish(
     dataset: xr.Dataset, summary: Mapping[str, Any], draw: Callable[[xr.Dataset], Mapping[str, Figure]] | None
 ) -> StudyResult:
-    """Return a whole result; raise one that Ctrl-C has cut short, as the part that an Interrupted carries."""
+    """Return a whole result; raise one that was cut short as the part of the error that did it."""
     figures = {} if draw is None else draw(dataset)
     result = StudyResult(name=summary["study"], dataset=dataset, figures=figures, summary=summary)
-    if summary["interrupted"]:
-        raise Interrupted(f"interrupted: {len(summary['rows'])} finished rows are in .partial", result)
-    return result
+    workers = _workers.get()
+    stop: Interrupted | WorkerLostError | None = None if workers is None else workers.lost
+    if stop is None and summary["interrupted"]:
+        stop = Interrupted(f"interrupted: {len(summary['rows'])} finished rows are in .partial")
+    return hand_over(result, stop)

@@ -70,7 +70,7 @@ class Steps:
 def uncalibrated(own: Runs, runs: list[Runs]) -> Runs:
     """Find the runs without calibration on the same noise; pressure has no part in those."""
     same = (own.case.engine.name, own.case.start_cad)
-    return next(r for r in runs if r.case.recipe is NONE and (r.case.engine.name, r.case.start_cad) == same)
+    return next(r for r in runs if r.case.recipe == NONE and (r.case.engine.name, r.case.start_cad) == same)
 
 
 def _stays(runs: Runs) -> list[float]:
@@ -141,7 +141,7 @@ def _is_thrown_back(refit: Refit, best: float) -> bool:
 
 def step_row(own: Steps, steps: list[Steps]) -> dict[str, Any]:
     """Put the load steps of one form and recipe into figures, beside the same without calibration."""
-    plain = next(s for s in steps if (s.engine, s.form) == (own.engine, own.form) and s.recipe is NONE)
+    plain = next(s for s in steps if (s.engine, s.form) == (own.engine, own.form) and s.recipe == NONE)
     back = [first_within(error, 0.0, _BACK_CAD) for error in own.error]
     return {
         "engine": own.engine.name,

@@ -154,13 +154,7 @@ def _bench_engine() -> _Engine:
     best = bench.find_optimum(bounds_cad=bounds)
     grid = np.arange(bounds[0], bounds[1] + 0.5 * _GRID_CAD, _GRID_CAD)
     model = ModelOptimum(bench.settings["cylinder"].replace(wall_heat_scale=_WRONG_WALL_HEAT), bounds_cad=bounds)
-
-    def plain(start: float) -> ExtremumSeeking:
-        gain = approach_gain(abs(best.curvature), _TIME_CONSTANT, amplitude=_AMPLITUDE_CAD)
-        return ExtremumSeeking(
-            start=start, lower=bounds[0], upper=bounds[1], amplitude=_AMPLITUDE_CAD, period=_PERIOD, gain=gain
-        )
-
+    gain = approach_gain(abs(best.curvature), _TIME_CONSTANT, amplitude=_AMPLITUDE_CAD)
     return _Engine(
         unit="%",
         start_cad=-20.0,
@@ -171,9 +165,19 @@ def _bench_engine() -> _Engine:
         steady_j=bench.steady_map(grid)["j"].to_numpy(),
         curve=drawn_curve(model, bench.point),
         bend=_BEND,
-        plant=lambda seed, _: EngineBench(seed=seed),
-        plain=plain,
+        plant=_bench_plant,
+        plain=partial(
+            _seeker_from, lower=bounds[0], upper=bounds[1], amplitude=_AMPLITUDE_CAD, period=_PERIOD, gain=gain
+        ),
     )
+
+
+def _bench_plant(seed: int, _: float) -> EngineBench:
+    return EngineBench(seed=seed)
+
+
+def _seeker_from(start: float, **settings: Any) -> ExtremumSeeking:
+    return ExtremumSeeking(**{**settings, "start": start})
 
 
 def _measured_engine() -> _Engine:
@@ -184,11 +188,7 @@ def _measured_engine() -> _Engine:
     bounds = (measured.LOWER_CAD, measured.UPPER_CAD)
     grid = np.arange(bounds[0], bounds[1] + 0.5 * _GRID_CAD, _GRID_CAD)
     guide = measured_guide(records)
-
-    def plain(start: float) -> ExtremumSeeking:
-        settings = {**measured.seeker_of(case, 0).settings, "start": start}
-        return ExtremumSeeking(**settings)
-
+    settings = {name: value for name, value in measured.seeker_of(case, 0).settings.items() if name != "start"}
     return _Engine(
         unit="bar",
         start_cad=measured.START_CAD,
@@ -199,8 +199,8 @@ def _measured_engine() -> _Engine:
         steady_j=surrogate.predict(grid)["imep_bar"].to_numpy(),
         curve=guide.curve,
         bend=_BEND * guide.bar_per_point,
-        plant=lambda seed, start: _measured_plant(surrogate, seed, start),
-        plain=plain,
+        plant=partial(_measured_plant, surrogate),
+        plain=partial(_seeker_from, **settings),
     )
 
 

@@ -42,13 +42,14 @@ _QUIET: dict[str, Any] = {"soc_scatter_cad": 0.0, "efficiency_noise_percent": 0.
 
 @dataclass(frozen=True, kw_only=True)
 class _Sweep:
-    """Steady readings over seed and SOI [ppm], by sensor, their scatter from cycle to cycle, and the fits."""
+    """Steady readings over seed and SOI [ppm], by sensor, their scatter from cycle to cycle, and what was fitted."""
 
     soc_cad: NDArray[np.float64]
     t_max_k: NDArray[np.float64]
     nox_ppm: dict[str, NDArray[np.float64]]
     scatter: dict[str, float]
-    fits: dict[str, Any]
+    fits: list[dict[str, Any]]
+    proxies: dict[str, NoxProxy]
 
 
 def run_nox_sensors(
@@ -98,7 +99,7 @@ def run_nox_sensors(
     """
     seeds = min(check_seeds(seeds), 3) if quick else check_seeds(seeds)
     (sweep,), interrupted = run_parts([("sweep of injection timing", partial(_sweep, seeds))], progress)
-    proxy = sweep.fits["affine_log"].proxy
+    proxy = sweep.proxies["affine_log"]
     moves: list[Any] = []
     if not interrupted:
         moves, interrupted = run_parts([(name, partial(_step, name, proxy)) for name in _STEPS], progress)
@@ -112,7 +113,7 @@ def run_nox_sensors(
         "seeds": seeds,
         "rows": rows,
         "sweep": _sweep_rows(sweep),
-        "fits": [_fit_row(name, fit) for name, fit in sweep.fits.items()],
+        "fits": sweep.fits,
         "correction": [_course_row(own) for own in course],
         "interrupted": interrupted,
     }
@@ -139,7 +140,14 @@ def _sweep(seeds: int) -> _Sweep:
     fits = {name: fit_nox_proxy(t_max, measured, map=name) for name in ("affine_log", "arrhenius")}
     means["soft_fitted"] = fits["affine_log"].proxy.affine_log_ppm(temperature.ravel()).reshape(temperature.shape)
     scatter = {name: 100.0 * float(np.mean(values)) for name, values in deviation.items()}
-    return _Sweep(soc_cad=soc, t_max_k=t_max, nox_ppm=means, scatter=scatter, fits=fits)
+    return _Sweep(
+        soc_cad=soc,
+        t_max_k=t_max,
+        nox_ppm=means,
+        scatter=scatter,
+        fits=[_fit_row(name, fit) for name, fit in fits.items()],
+        proxies={name: fit.proxy for name, fit in fits.items()},
+    )
 
 
 def _step(name: str, fitted: NoxProxy) -> tuple[dict[str, NDArray[np.float64]], xr.Dataset]:
@@ -240,7 +248,7 @@ def _dataset(sweep: _Sweep, moves: list[xr.Dataset], course: list[NDArray[np.flo
         label = VARIABLES[f"nox_{name}_ppm"]
         variables[f"steady_{name}_ppm"] = ("soi_cad", sweep.nox_ppm[name].mean(axis=0), *label)
     for name in ("affine_log", "arrhenius"):
-        proxy = sweep.fits[name].proxy
+        proxy = sweep.proxies[name]
         values = getattr(proxy, f"{name}_ppm")(sweep.t_max_k)
         label = VARIABLES[f"nox_{name}_ppm"]
         variables[f"fitted_{name}_ppm"] = ("soi_cad", values, label.units, f"{label.long_name}, fitted")

@@ -8,7 +8,8 @@ from importlib import import_module
 from typing import Any, NamedTuple
 
 from mgdd.errors import ParameterError
-from mgdd.studies.base import Progress, StudyResult, check_seeds
+from mgdd.parallel.pool import MakesExecutor
+from mgdd.studies.base import Progress, StudyResult, check_seeds, parts_on
 
 __all__ = ["available_studies", "run_study"]
 
@@ -19,10 +20,13 @@ _MODULES = {"identification-benchmarks": "benchmarks.identification_benchmarks"}
 class _Study(NamedTuple):
     title: str
     chapter: int | None = None  # of Tan (2018), where the question comes from it
+    one_part: bool = False  # its work is one chain, nothing that workers could share
 
 
 _STUDIES = {
-    "measured-traces": _Study("calibrate a cycle model to four measured traces and find their best timing"),
+    "measured-traces": _Study(
+        "calibrate a cycle model to four measured traces and find their best timing", one_part=True
+    ),
     "throttle-characteristics": _Study("holding-duty hysteresis, rate dependence and air flow of a throttle", 2),
     "seeker-comparison": _Study("every seeker on the same engine, noise, start and budget", 3),
     "nox-sensors": _Study("NOx analyser, fast sensor and soft sensor, steady and in transients", 4),
@@ -37,6 +41,9 @@ _STUDIES = {
     "model-validation": _Study("cycle models beside measured traces, before and after calibration", 5),
     "online-calibration": _Study("what the engine teaches its model while it runs, also with errors of the sensor", 6),
     "calibrated-guide": _Study("whether a guide that the measured pressure calibrates beats one that stays wrong", 6),
+    "from-design-to-map": _Study(
+        "a timing map by design of experiments: its cost, its losses, other engines, and what a guide makes of it", 2
+    ),
     "torque-demand": _Study("how far the torque follows the pedal through the throttle, and what loses it", 2),
     "throttle-first-principle": _Study(
         "groups of a throttle from noisy logs, also where the plant does more than the model", 7
@@ -77,6 +84,8 @@ def run_study(
     seeds: int | None = None,
     quick: bool = False,
     figures: bool = True,
+    executor: MakesExecutor | None = None,
+    workers: int | None = None,
     progress: Progress | None = None,
     **options: Any,
 ) -> StudyResult:
@@ -92,6 +101,9 @@ def run_study(
         A shorter study with wider intervals.
     figures : bool
         Draw its figures.
+    executor, workers
+        As in `mgdd.parallel.map_items`, for the parts of the study, each on one thread; the result does not depend on
+        them. Without both the parts run one after the other, each on all cores.
     progress : callable, optional
         Called with a short text before each part.
     **options
@@ -108,7 +120,12 @@ def run_study(
     Raises
     ------
     mgdd.errors.ParameterError
-        An unknown name, fewer than one seed, seeds for a deterministic study, or an option that it does not take.
+        An unknown name, fewer than one seed, seeds for a deterministic study, an option that it does not take, workers
+        for a study that is one part, or a bad executor.
+    mgdd.errors.WorkerLostError
+        As in `mgdd.parallel.map_items`; ``partial`` is a StudyResult as after Ctrl-C, or None.
+    mgdd.errors.Interrupted
+        Ctrl-C; ``partial`` is the StudyResult of the parts that were finished, or None.
 
     Examples
     --------
@@ -128,7 +145,10 @@ def run_study(
         if "seeds" not in taken:
             raise ParameterError(f"seeds = {seeds}: study {name!r} is deterministic; leave them out")
         options["seeds"] = check_seeds(seeds)
-    result: StudyResult = function(**options)
+    if _STUDIES[name].one_part and not (executor is None and workers is None):
+        raise ParameterError(f"executor, workers: study {name!r} is one part, which they cannot share; leave them out")
+    with parts_on(executor, workers):
+        result: StudyResult = function(**options)
     return result
 
 

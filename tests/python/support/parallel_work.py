@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import os
+import pickle
 import signal
 import threading
 import time
@@ -11,6 +12,8 @@ from concurrent.futures import Executor, Future
 from functools import partial
 from pathlib import Path
 from typing import Any
+
+from mgdd.parallel.pool import cores
 
 
 def square(x: float) -> float:
@@ -31,6 +34,15 @@ def root(x: float) -> float:
 def process(_: object) -> int:
     time.sleep(0.01)
     return os.getpid()
+
+
+def cores_inside(_: object) -> int:
+    return cores()
+
+
+def lag(_t: float, x: Any, u: Any, p: Any) -> Any:
+    """Give the slope of a first-order lag with gain and time constant."""
+    return (p[0] * u[0] - x) / p[1]
 
 
 def killed_once(flag: str, x: float) -> float:
@@ -89,6 +101,16 @@ class LateReversed(Executor):
             calls, self.calls = self.calls, []
         for call in reversed(calls):
             call()
+
+
+class Pickling(Executor):
+    """Runs a call at once, but sends it and its result through pickle, as to another process and back."""
+
+    def submit(self, fn: Callable[..., Any], /, *args: Any, **kwargs: Any) -> Future[Any]:
+        future: Future[Any] = Future()
+        call, given, named = pickle.loads(pickle.dumps((fn, args, kwargs)))
+        future.set_result(pickle.loads(pickle.dumps(call(*given, **named))))
+        return future
 
 
 class Dropping(Executor):

@@ -3,19 +3,24 @@
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
-from typing import TYPE_CHECKING
+from functools import partial
+from typing import TYPE_CHECKING, Any
 
 from mgdd import _core
-from mgdd.errors import ParameterError, hand_over, or_partial
+from mgdd.errors import Interrupted, WorkerLostError, hand_over, or_partial
+from mgdd.identify.starts import rank, search_starts
 from mgdd.identify.throttle.first_principle_model import GROUP_NAMES, FirstPrincipleModel
 from mgdd.identify.throttle.first_principle_problem import groups_problem, log_columns
 from mgdd.identify.throttle.first_principle_start import group_starts
 from mgdd.identify.throttle.free_run import draw_free_run, free_run, quality_of, source_of
 from mgdd.optimize.fit_options import FitOptions, fit_options
+from mgdd.parallel.pool import MakesExecutor, threads_of
 from mgdd.results import Finding, Fit, FitReport
 
 if TYPE_CHECKING:
+    import numpy as np
     import xarray as xr
+    from numpy.typing import NDArray
 
 __all__ = ["fit_first_principle"]
 
@@ -33,7 +38,8 @@ def fit_first_principle(
     closed_deg: float = 0.0,
     open_deg: float = 90.0,
     options: FitOptions | None = None,
-    threads: int = 1,
+    executor: MakesExecutor | None = None,
+    workers: int | None = None,
     resistance_ohm: float | None = None,
     supply_v: float | None = None,
     inertia_kgm2: float | None = None,
@@ -67,8 +73,9 @@ def fit_first_principle(
     options : FitOptions, optional
         4 starts, within a factor of 2 around the first, with seed 0, 60 trial steps per stage and a tolerance of 1e-10
         of the last stage where nothing else is said.
-    threads : int
-        Threads over starts.
+    executor, workers
+        As in `mgdd.parallel.map_items`, for the starts: threads on all cores if left out. The fit does not depend on
+        them.
     resistance_ohm, supply_v, inertia_kgm2, torque_constant_nm_per_a : float, optional
         Known numbers, for `FirstPrincipleModel.physical_parameters`; their absence is said in `findings`.
 
@@ -83,6 +90,8 @@ def fit_first_principle(
         A log that is not evenly sampled or too short, or whose plate hardly moves.
     ParameterError
         Unknown group names, or a value outside its bounds.
+    Interrupted, WorkerLostError
+        Ctrl-C, a lost worker; ``partial`` is the best fit of what was searched until then, None where nothing was.
 
     References
     ----------
@@ -104,8 +113,7 @@ def fit_first_principle(
     problem = groups_problem(log, free=free, start_values=start_values, fixed=fixed, stops_deg=(closed_deg, open_deg))
     if test is not None:
         log_columns(test)
-    if threads < 1:
-        raise ParameterError.of("threads", threads, ">= 1")
+    threads = threads_of(workers)
     index = {name: i for i, name in enumerate(GROUP_NAMES)}
     static = [index[name] for name in problem.free if name in STATIC]
     dynamics = [index[name] for name in problem.free if name in ("tau_s", "gain_deg_per_s2_per_duty")]
@@ -120,20 +128,21 @@ def fit_first_principle(
         )
         if part and (fraction == 1.0 or fraction * problem.angle.size >= 200)
     ]
-    found, stop = or_partial(
-        lambda: _core.identify.fit_throttle_groups(
-            [problem.record()],
-            stages=stages,
-            starts=group_starts(problem.values, list(problem.free), chosen.n_starts, chosen.seed),
-            closed_deg=closed_deg,
-            open_deg=open_deg,
-            substeps=SUBSTEPS,
-            n_threads=threads,
-        )
-    )
-    report = FitReport.from_core(found["reports"][found["best"]], problem.angle)
+    starts = group_starts(problem.values, list(problem.free), chosen.n_starts, chosen.seed)
+    how = {"records": [problem.record()], "stages": stages, "closed_deg": closed_deg, "open_deg": open_deg}
+    stop: Interrupted | WorkerLostError | None
+    if executor is None:
+        found, stop = or_partial(lambda: _fit(starts, how, threads))
+        errors, n_reached, values = [one.rmse for one in found["reports"]], int(found["n_reached"]), found["values"]
+        report = FitReport.from_core(found["reports"][found["best"]], problem.angle)
+    else:
+        search = partial(_one_by_one, how=how, angle=problem.angle)
+        each, stop = search_starts(search, starts, executor=executor, workers=workers)
+        best, n_reached = rank([own for own, _ in each])
+        report, values = each[best]
+        errors = [own.rmse for own, _ in each]
     model = FirstPrincipleModel(
-        parameters=dict(zip(GROUP_NAMES, found["values"], strict=True)),
+        parameters=dict(zip(GROUP_NAMES, values, strict=True)),
         closed_deg=closed_deg,
         open_deg=open_deg,
         substeps=SUBSTEPS,
@@ -169,9 +178,24 @@ def fit_first_principle(
         unidentifiable=(*problem.unvisited, *report.unidentifiable),
         findings=tuple(findings),
         source=source_of(log),
-        start_rmse=tuple(sorted(float(one.rmse) for one in found["reports"])),
-        n_best=int(found["n_reached"]),
+        start_rmse=tuple(sorted(map(float, errors))),
+        n_best=n_reached,
         run=run,
         draw=draw_free_run,
     )
     return hand_over(fit, stop)
+
+
+def _fit(starts: Sequence[Sequence[float]], how: Mapping[str, Any], threads: int) -> dict[str, Any]:
+    found: dict[str, Any] = _core.identify.fit_throttle_groups(
+        starts=starts, substeps=SUBSTEPS, n_threads=threads, **how
+    )
+    return found
+
+
+def _one_by_one(
+    starts: Sequence[Sequence[float]], *, how: Mapping[str, Any], angle: NDArray[np.float64]
+) -> list[tuple[FitReport, list[float]]]:
+    """Search from each start by itself: the core tells all groups of the best one only."""
+    found = [_fit([start], how, 1) for start in starts]
+    return [(FitReport.from_core(one["reports"][0], angle), list(one["values"])) for one in found]

@@ -5,17 +5,20 @@ from __future__ import annotations
 import math
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field, replace
+from functools import partial
 from types import MappingProxyType
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
 from mgdd import _core
-from mgdd.errors import ParameterError, ShapeError, hand_over, or_partial
+from mgdd.errors import Interrupted, ParameterError, ShapeError, WorkerLostError, hand_over, or_partial
+from mgdd.identify.starts import rank, search_starts
 from mgdd.io.model_parameters import ModelParameters
 from mgdd.io.parameters import wanted
 from mgdd.optimize.fit_options import FitOptions, fit_options
 from mgdd.optimize.fit_run import fit_of, fit_run
+from mgdd.parallel.pool import MakesExecutor
 from mgdd.results import Fit, FitReport
 from mgdd.results.describe import described
 from mgdd.results.labels import VARIABLES
@@ -107,6 +110,8 @@ class SmoothThrottle(SampledModel, ModelParameters):
         initial_state: Mapping[str, float] | Sequence[float] | None = None,
         options: FitOptions | None = None,
         lanes: bool = True,
+        executor: MakesExecutor | None = None,
+        workers: int | None = None,
     ) -> Fit:
         """Fit the ten parameters to a record of duty and angle; the known constants are those of this model.
 
@@ -129,6 +134,9 @@ class SmoothThrottle(SampledModel, ModelParameters):
             are refused.
         lanes : bool
             Several starts at once; False takes one after the other and gives the same numbers.
+        executor, workers
+            As in `mgdd.parallel.map_items`, for the starts: one thread if both are left out. The fit does not depend on
+            them.
 
         Returns
         -------
@@ -143,6 +151,8 @@ class SmoothThrottle(SampledModel, ModelParameters):
             A start outside its bounds, or a constant that is not positive.
         DataError
             A record that is not finite.
+        Interrupted, WorkerLostError
+            Ctrl-C, a lost worker; ``partial`` is the best fit of what was searched until then, None where nothing was.
 
         References
         ----------
@@ -166,27 +176,36 @@ class SmoothThrottle(SampledModel, ModelParameters):
             raise ShapeError(f"start_values has shape {table.shape}: must be (n_starts, 10)")
         time, duty, angle = columns_of(record, ("time_s", "duty", "angle_deg"))
         state = self.state_of(initial_state)
-        found, stop = or_partial(
-            lambda: _core.identify.fit_smooth_throttle(
-                duty,
-                angle,
-                starts=table.tolist(),
-                lower=_ten(lower, "lower"),
-                upper=_ten(upper, "upper"),
-                step_s=even_step(time),
-                start=state,
-                **self.constants,
-                cost_tolerance=chosen.tolerance,
-                lanes=lanes,
-            )
-        )
-        reports = tuple(FitReport.from_core(report) for report in found["reports"])
-        best = reports[found["best"]]
+        how = {
+            "duty": duty,
+            "angle_deg": angle,
+            "lower": _ten(lower, "lower"),
+            "upper": _ten(upper, "upper"),
+            "step_s": even_step(time),
+            "start": state,
+            **self.constants,
+            "cost_tolerance": chosen.tolerance,
+            "lanes": lanes,
+        }
+        search = partial(_searches, how=how)
+        stop: Interrupted | WorkerLostError | None
+        if executor is None and workers is None:
+            found, stop = or_partial(lambda: search(table.tolist()))
+        else:
+            found, stop = search_starts(search, table.tolist(), executor=executor, workers=workers)
+        reports = tuple(found)
+        number, reached = rank(reports)
+        best = reports[number]
         fitted = replace(self, parameters=dict(zip(_EXAMPLE, best.values.tolist(), strict=True)))
         modelled = fitted.simulate(record, initial_state=state)["angle_deg"].to_numpy()
         run = fit_run(time, angle, modelled, VARIABLES["angle_deg"]) if np.isfinite(modelled).all() else None
-        errors, reached = (report.rmse for report in reports), int(found["n_reached"])
+        errors = (report.rmse for report in reports)
         return hand_over(fit_of(best, fitted, run, errors, n_best=reached, start_reports=reports), stop)
+
+
+def _searches(starts: Sequence[Sequence[float]], how: Mapping[str, Any]) -> list[FitReport]:
+    found, stop = or_partial(lambda: _core.identify.fit_smooth_throttle(starts=starts, **how))
+    return hand_over([FitReport.from_core(report) for report in found["reports"]], stop)
 
 
 def _ten(values: ArrayLike, name: str) -> list[float]:
