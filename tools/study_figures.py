@@ -32,6 +32,9 @@ FIGURES = {
     "study_guide_learns_step.png": ("calibrated-guide", 1, 72),
     "study_tracking.png": ("throttle-tracking", 0, 80),
     "study_guide_plane.png": ("guided-transients", 1, 72),
+    "study_map_effort.png": ("from-design-to-map", 0, 80),
+    "study_map_parts.png": ("from-design-to-map", 1, 80),
+    "study_map_drives.png": ("from-design-to-map", 3, 72),
 }
 
 

@@ -214,5 +214,28 @@ def test_commands_of_getting_started_run(tmp_path: Path, monkeypatch: pytest.Mon
     assert (tmp_path / "fit.json").is_file()
 
 
+def test_commands_of_maps_run(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
+) -> None:
+    """The chain of the page runs in an empty folder, and what the page shows is what it prints."""
+    from mgdd.cli import main
+
+    monkeypatch.chdir(tmp_path)
+    (section,) = re.findall(r"^## From the command line\n(.*?)^## ", _page("maps"), re.MULTILINE | re.DOTALL)
+    (block,) = re.findall(r"^```shell\n(.*?)^```", section, re.MULTILINE | re.DOTALL)
+    (shown,) = re.findall(r"^```text\n(.*?)^```", section, re.MULTILINE | re.DOTALL)
+    commands = [shlex.split(line)[1:] for line in block.splitlines()]
+    assert {command[1] for command in commands if command[0] == "map"} == {
+        "design", "fit", "predict", "optimize", "smooth", "show", "diff", "export",
+    }  # fmt: skip
+    for command in commands:
+        assert main(command) == 0, command
+    assert shown in capsys.readouterr().out
+    (grid,) = re.findall(r"`mgdd (engine sweep --over [^`]*)`", section)
+    assert main(shlex.split(grid)) == 0
+    assert main(commands[5]) == 0
+    capsys.readouterr()
+
+
 def _page(name: str) -> str:
     return (DOCS / f"{name}.md").read_text(encoding="utf-8")

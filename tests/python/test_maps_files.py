@@ -309,7 +309,7 @@ def test_a_write_that_fails_leaves_the_old_file(ending: str, tmp_path: Path, mon
 
 
 def test_what_cannot_be_written_writes_nothing(tmp_path: Path) -> None:
-    with pytest.raises(DataError, match=r"1 cells have no value.*smooth_map\(fill=True\)"):
+    with pytest.raises(DataError, match=r"1 cells have no value.*smooth the map with fill=True"):
         write_map(timing_table(), tmp_path / "map.dcm")
     quoted = CalibrationMap({"fuel_mg": FUEL}, 1.0, name="z", labels={"z": ("-", 'the "z"')})
     with pytest.raises(DataError, match="no quotes"):

@@ -251,7 +251,7 @@ def repeated() -> xr.Dataset:
         (sweep, {"limits": {"p_maks_bar": 1.0}}, ParameterError, "did you mean 'p_max_bar'"),
         (sweep, {"limits": {"efficiency_gross": 1.0}}, ParameterError, "is the objective"),
         (sweep, {"limits": {"p_max_bar": np.nan}}, ParameterError, "finite"),
-        (sweep, {"over": "soi_cad"}, DataError, "name the swept input with over="),
+        (sweep, {"over": "soi_cad"}, DataError, "name the swept input with over"),
         (sweep, {"max_loss": 0.0}, ParameterError, "max_loss = 0: must be > 0"),
         (sweep, {"infeasible": "drop"}, ParameterError, "infeasible = 'drop'"),
         (sweep, {"sd": {"imep": 1.0}}, ParameterError, "sd: 'imep'"),

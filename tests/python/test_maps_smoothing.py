@@ -173,7 +173,7 @@ def test_options_out_of_their_domain(options: dict[str, Any], said: str) -> None
 
 
 def test_a_value_without_a_range_is_refused() -> None:
-    with pytest.raises(DataError, match=r"speed_rpm = 900, fuel_mg = 6: .* optimize_map gives one"):
+    with pytest.raises(DataError, match=r"speed_rpm = 900, fuel_mg = 6: .* an optimum with max_loss has one"):
         smooth_map(CalibrationMap(AXES, -5.0, name="soc_cad"))
     with pytest.raises(DataError, match="no cell has a value"):
         smooth_map(CalibrationMap(AXES, np.nan, name="soc_cad", cells={"source": "infeasible"}))

@@ -12,9 +12,10 @@ import numpy as np
 from mgdd.cli.options import refuse_idle
 from mgdd.cli.output import check_file, wrote
 from mgdd.engine import OperatingPoint
-from mgdd.errors import ParameterError, did_you_mean
+from mgdd.errors import DataError, ParameterError, did_you_mean
 from mgdd.guide import FeedForward, TimingMap
 from mgdd.guide.map_table import read_map_table
+from mgdd.io.existing_file import existing_file
 from mgdd.io.parameters import ParameterFile
 
 if TYPE_CHECKING:
@@ -55,6 +56,11 @@ def check_map_options(args: argparse.Namespace) -> None:
 def read_map(file: str) -> TimingMap:
     """Read a table by the ending of its file; its axes are numbers of the operating point."""
     is_csv = Path(file).suffix == ".csv"
+    if is_csv and existing_file(file).read_bytes()[:64].lstrip(b"\xef\xbb\xbf").startswith(b"mgdd_map"):
+        raise DataError(
+            f"--guide-map {file}: a calibration map, another form of file: mgdd map export {file} --guide-map "
+            "-o guide.csv writes the table that is read here"
+        )
     table = TimingMap.read_csv(file) if is_csv else TimingMap.of_file(ParameterFile.read(file))
     known = OperatingPoint.fields()
     for name in table.axes:

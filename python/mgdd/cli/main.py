@@ -10,7 +10,7 @@ import sys
 from collections.abc import Sequence
 
 from mgdd import _core
-from mgdd.cli import demo, doctor, engine, rig, study, throttle
+from mgdd.cli import demo, doctor, engine, maps, rig, study, throttle
 from mgdd.cli.options import Parser, UsageError, as_option
 from mgdd.cli.output import Stopped, fail
 from mgdd.cli.progress import Progress
@@ -27,6 +27,7 @@ examples:
   mgdd demo
   mgdd engine simulate --preset puma_single --soc-cad -6 --json
   mgdd engine optimum --limit p_max_bar=95
+  mgdd map design --over soc_cad=-16:4 --over fuel_mg=6:30 --points 32 -o design.csv
   mgdd throttle simulate --preset P1 --duty 0.6 --json
   mgdd study --list
 """
@@ -102,6 +103,7 @@ def _parser() -> argparse.ArgumentParser:
     commands = parser.add_subparsers(title="commands", metavar="COMMAND")
     demo.add(commands)
     engine.add(commands)
+    maps.add(commands)
     throttle.add(commands)
     rig.add(commands)
     study.add(commands)

@@ -11,6 +11,7 @@ from typing import TYPE_CHECKING, Any
 
 from mgdd.errors import ParameterError
 from mgdd.io.traces import write_traces
+from mgdd.io.whole_file import write_whole, write_whole_text
 from mgdd.results.labels import VARIABLES, to_jsonable
 from mgdd.studies.sections import Table
 
@@ -59,8 +60,8 @@ def check_file(option: str, file: str | None, endings: tuple[str, ...]) -> None:
 
 
 def save_figure(figure: Figure, file: str) -> None:
-    """Write a figure and say so."""
-    figure.savefig(file, dpi=150)
+    """Write a figure, whole or not at all, and say so."""
+    write_whole(file, lambda half: figure.savefig(half, dpi=150, format=Path(file).suffix[1:]))
     wrote(file)
 
 
@@ -83,7 +84,7 @@ def emit(
         if Path(args.output).suffix == ".csv" and traces is not None:
             write_traces(traces, args.output)
         else:
-            Path(args.output).write_text(_json(plain) + "\n", encoding="utf-8")
+            write_whole_text(args.output, _json(plain) + "\n")
         wrote(args.output)
     args.emitted = True
     if args.json:

@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from mgdd.errors import DataError, ParameterError
+from mgdd.errors import DataError, ParameterError, argument
 from mgdd.results.labels import Label, labelled_dataset, named_label
 from mgdd.surrogate.points import EDGE, points_of
 
@@ -86,16 +86,16 @@ class Factors:
 
     def existing(self, table: Any) -> NDArray[np.float64]:
         """Read the points of an earlier design, and refuse those outside the ranges."""
-        points = points_of(table, self.names, what="existing")
+        points = points_of(table, self.names, what=argument("existing"))
         shares = self.to_unit(points)
         out = (shares < -EDGE) | (shares > 1.0 + EDGE)
         if out.any():
             row, column = (int(place) for place in np.argwhere(out)[0])
             factor = self.items[column]
             raise DataError(
-                f"existing: {factor.name} = {points[row, column]:g} of point {row}: must be in [{factor.low:g}, "
-                f"{factor.high:g}]; {int(out.any(axis=1).sum())} of {len(points)} points lie outside the factors: "
-                "widen them or drop these points"
+                f"{argument('existing')}: {factor.name} = {points[row, column]:g} of point {row}: must be "
+                f"in [{factor.low:g}, {factor.high:g}]; {int(out.any(axis=1).sum())} of {len(points)} "
+                "points lie outside the factors: widen them or drop these points"
             )
         return points
 

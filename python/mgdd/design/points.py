@@ -13,7 +13,7 @@ from mgdd.design.factors import Factors, factors_of
 from mgdd.design.optimal import d_efficiency_percent, d_optimal
 from mgdd.design.region import FeasibleRegion, inside_of
 from mgdd.design.space_filling import best_of, draw_inside, extend_hypercube, far_points, least_distance, sampler_of
-from mgdd.errors import DataError, ParameterError
+from mgdd.errors import DataError, ParameterError, argument
 from mgdd.surrogate.response_surface import MODELS, PolynomialBasis
 
 if TYPE_CHECKING:
@@ -118,9 +118,10 @@ def design_points(
     if len(before):
         good = inside(before)
         if not good.all():
+            few = f"{int(good.sum())} of {good.size} points are feasible ({100.0 * good.mean():.2g} %)"
             raise DataError(
-                f"existing: {int(good.sum())} of {good.size} points are feasible ({100.0 * good.mean():.2g} %), point "
-                f"{int(np.argmin(good))} is not: drop what is not, or widen the region"
+                f"{argument('existing')}: {few}, point {int(np.argmin(good))} is not: drop what is not, or widen the "
+                "region"
             )
     generator = np.random.default_rng(seed)
     attrs: dict[str, Any] = {"method": method, "seed": seed}
@@ -195,7 +196,7 @@ def _d_optimal(
     basis = PolynomialBasis.of(model, centre=own.low + half, scale=half)
     terms = len(basis.monomials)
     if n + len(before) < terms:
-        raise ParameterError.of("n", n, f">= {terms - len(before)}: the {model} model has {terms} terms")
+        raise ParameterError.of(argument("n"), n, f">= {terms - len(before)}: the {model} model has {terms} terms")
     grid = _candidates(own, counts, basis.monomials.shape[1], generator)
     good = inside(grid)
     if not good.any():
@@ -249,9 +250,9 @@ def _check(method: str, n: int | None, model: str, n_starts: int, seed: int) -> 
             raise ParameterError.of(name, value, f"one of {', '.join(known)}")
     if method == "factorial":
         if n is not None:
-            raise ParameterError.of("n", n, "None: the levels of a factorial say how many points it has")
+            raise ParameterError.of(argument("n"), n, "None: the levels of a factorial say how many points it has")
     elif n is None or isinstance(n, bool) or not isinstance(n, int | np.integer) or not 1 <= n <= 1_000_000:
-        raise ParameterError.of("n", n, f"a whole number in [1, 1000000] for method {method!r}")
+        raise ParameterError.of(argument("n"), n, f"a whole number in [1, 1000000] for method {method!r}")
     for name, count, least in (("n_starts", n_starts, 1), ("seed", seed, 0)):
         if isinstance(count, bool) or not isinstance(count, int | np.integer) or count < least:
             raise ParameterError.of(name, count, f"a whole number >= {least}")

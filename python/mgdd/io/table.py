@@ -190,7 +190,9 @@ def _is_head(cells: tuple[str, ...]) -> bool:
 
 
 def _like_number(cell: str) -> bool:
-    """Return whether a cell holds data, even misspelt, and not a name: a header must not swallow a row."""
+    """Return whether a cell holds data, even misspelt, and not a name or unit: a header must not swallow a row."""
+    if re.fullmatch(r"1/[^\W\d]+", cell):  # 1/min
+        return False
     return parse_number(cell) is not None or re.match(r"[+-]?[.,]?\d", cell) is not None
 
 

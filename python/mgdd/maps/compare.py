@@ -6,7 +6,7 @@ from typing import TYPE_CHECKING, Any, Literal
 
 import numpy as np
 
-from mgdd.errors import DataError, ParameterError
+from mgdd.errors import DataError, ParameterError, argument
 from mgdd.maps.calibration_map import CalibrationMap
 from mgdd.maps.optimum import optimize_map
 from mgdd.maps.sweep_columns import sweep_columns
@@ -182,7 +182,8 @@ def _common(name: str, one: Any, two: Any, grid: str) -> Any:
     inside = both[(both >= max(one[0], two[0])) & (both <= min(one[-1], two[-1]))]
     if inside.size < 2:
         raise DataError(
-            f"{name}: {one[0]:g} to {one[-1]:g} and {two[0]:g} to {two[-1]:g} have nothing in common: pass grid='first'"
+            f"{name}: {one[0]:g} to {one[-1]:g} and {two[0]:g} to {two[-1]:g} have nothing in common: pass "
+            f"{argument('grid', repr('first'))}"
         )
     return inside
 

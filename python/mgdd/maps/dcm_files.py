@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from mgdd.errors import DataError, Error
+from mgdd.errors import DataError, Error, argument
 from mgdd.io.existing_file import existing_file
 from mgdd.io.whole_file import write_whole_text
 from mgdd.maps.calibration_map import CalibrationMap
@@ -186,8 +186,8 @@ def text_of_file(file: Path) -> str:
 def _block_of(name: str, table: CalibrationMap) -> DcmBlock:
     if not np.isfinite(table.values).all():
         raise DataError(
-            f"{name}: {np.count_nonzero(~np.isfinite(table.values))} cells have no value, a DCM file needs all: fill "
-            "them with smooth_map(fill=True)"
+            f"{name}: {np.count_nonzero(~np.isfinite(table.values))} cells have no value, a DCM file needs all: "
+            f"smooth the map with {argument('fill', 'True')}"
         )
     x, y = [*table.axes, ""][:2]
     rows = table.values.reshape(table.values.shape[0], -1).T

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import io
 import json
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
@@ -11,7 +10,8 @@ import numpy as np
 
 from mgdd.errors import DataError, Error, ParameterError, did_you_mean
 from mgdd.io.existing_file import existing_file
-from mgdd.io.whole_file import write_whole, write_whole_text
+from mgdd.io.netcdf_file import read_netcdf, write_netcdf
+from mgdd.io.whole_file import write_whole_text
 from mgdd.maps.calibration_map import CalibrationMap
 from mgdd.maps.cells import NUMBERS, MapTask
 from mgdd.maps.dcm_files import read_dcm, text_of_file, write_dcm
@@ -21,7 +21,7 @@ from mgdd.results.labels import to_jsonable
 if TYPE_CHECKING:
     import os
 
-__all__ = ["read_map", "write_map"]
+__all__ = ["map_content", "read_map", "write_map"]
 
 _KIND, _FORMAT = "calibration_map", 1
 _ENDINGS = (".csv", ".json", ".dcm", ".nc")
@@ -75,8 +75,7 @@ def write_map(table: CalibrationMap, path: str | os.PathLike[str]) -> None:
     if ending == ".dcm":
         write_dcm([table], path)
     elif ending == ".nc":
-        dataset = table.to_dataset()
-        write_whole(path, lambda half: dataset.to_netcdf(half, engine="scipy"))
+        write_netcdf(table.to_dataset(), path)
     else:
         write_whole_text(path, csv_of_map(table) if ending == ".csv" else _json_of(table))
 
@@ -134,10 +133,7 @@ def read_map(path: str | os.PathLike[str], name: str | None = None, *, decimal: 
         return maps[wanted]
     try:
         if ending == ".nc":
-            import xarray as xr
-
-            data = xr.load_dataset(io.BytesIO(file.read_bytes()), engine="scipy")
-            return CalibrationMap.from_dataset(data, name)
+            return CalibrationMap.from_dataset(read_netcdf(file), name)
         text = text_of_file(file)
         made = map_of_csv(text, str(file), decimal) if ending == ".csv" else _map_of_json(text)
     except (Error, TypeError, ValueError, KeyError) as error:
@@ -157,8 +153,9 @@ def _ending(path: str | os.PathLike[str]) -> str:
     return ending
 
 
-def _json_of(table: CalibrationMap) -> str:
-    content: dict[str, Any] = {
+def map_content(table: CalibrationMap) -> dict[str, Any]:
+    """Give everything that a map holds, as its JSON file has it."""
+    return {
         "kind": _KIND,
         "format": _FORMAT,
         "name": table.name,
@@ -169,7 +166,10 @@ def _json_of(table: CalibrationMap) -> str:
         "task": None if table.task is None else table.task.to_dict(),
         "provenance": dict(table.provenance),
     }
-    return json.dumps(to_jsonable(content), ensure_ascii=False, allow_nan=False, indent=1) + "\n"
+
+
+def _json_of(table: CalibrationMap) -> str:
+    return json.dumps(to_jsonable(map_content(table)), ensure_ascii=False, allow_nan=False, indent=1) + "\n"
 
 
 def _map_of_json(text: str) -> CalibrationMap:

@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING, Any, Self
 
 import numpy as np
 
-from mgdd.errors import DataError
+from mgdd.errors import DataError, argument
 from mgdd.guide import TimingMap
 from mgdd.guide.map_table import SETTINGS
 from mgdd.maps.cells import NUMBERS, TEXTS, MapTask
@@ -57,7 +57,9 @@ class MapForms:
             raise DataError(f"{self._name} has unit {self._labels[self._name].units!r}: a timing map needs {_TIMING!r}")
         empty = ~np.isfinite(self._values)
         if empty.any():
-            raise DataError(f"{self._name}: {empty.sum()} cells have no value: fill them with smooth_map(fill=True)")
+            raise DataError(
+                f"{self._name}: {empty.sum()} cells have no value: smooth the map with {argument('fill', 'True')}"
+            )
         prior = SETTINGS["prior_sd_cad"] if prior_sd_cad is None else prior_sd_cad
         made = TimingMap(
             self._axes, self._values, prior_sd_cad=prior,

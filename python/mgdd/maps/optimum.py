@@ -9,7 +9,7 @@ import numpy as np
 
 from mgdd import _core
 from mgdd._core.optimize import Limit
-from mgdd.errors import ConvergenceError, DataError, ParameterError
+from mgdd.errors import ConvergenceError, DataError, ParameterError, argument
 from mgdd.maps.calibration_map import CalibrationMap
 from mgdd.maps.cells import MapTask, cell_at
 from mgdd.maps.sweep_columns import SweepColumns, sweep_columns
@@ -275,7 +275,9 @@ def _nothing_feasible(
     near = ", ".join(f"{name} = {data.columns[name][cell, point]:.4g} (limit {cap:g})" for name, cap in caps.items())
     said = [cell_at(data.axes, int(place)) for place in np.flatnonzero(empty)]
     which = "any cell" if empty.all() else f"{empty.sum()} of {empty.size} cells: {_several(said)}"
-    remedy = "raise a limit, widen the sweep" + ("" if empty.all() else ", or pass infeasible='keep'")
+    remedy = "raise a limit, widen the sweep" + (
+        "" if empty.all() else f", or pass {argument('infeasible', repr('keep'))}"
+    )
     return (
         f"no {over} keeps the limits in {which}; nearest at {cell_at(data.axes, int(cell))}, {over} = "
         f"{data.over[point]:g}: {near}; {remedy}"

@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING, Any, NamedTuple
 
 import numpy as np
 
-from mgdd.errors import ConvergenceError, DataError, ParameterError, did_you_mean
+from mgdd.errors import ConvergenceError, DataError, ParameterError, argument, did_you_mean
 from mgdd.io.extras import import_extra
 from mgdd.maps.calibration_map import CalibrationMap
 from mgdd.maps.cells import cell_at
@@ -139,7 +139,8 @@ def _check_ranges(optimum: CalibrationMap, values: Array, low: Array, high: Arra
         at = int(np.argmax(bad))
         raise DataError(
             f"{optimum.name} at {cell_at(optimum.axes, at)}: {values[at]:g} has the range {low[at]:g} to {high[at]:g}: "
-            "a value needs a range around it; optimize_map gives one, or set the cells low and high"
+            f"a value needs a range around it; an optimum with {argument('max_loss')} has one, or set the cells low "
+            "and high"
         )
 
 
@@ -169,8 +170,8 @@ def _check_reach(optimum: CalibrationMap, slopes: Mapping[str, float], low: Arra
     raise ConvergenceError(
         f"slope limits ({named} per unit) allow {way[up, down]:.4g} between {cell_at(optimum.axes, down)}, at most "
         f"{high[down]:.4g}, and {cell_at(optimum.axes, up)}, at least {low[up]:.4g}: {needed:.4g} is needed; "
-        f"raise the slope limits by a factor of {factor[up, down]:.3g}, or widen the ranges: a larger max_loss, "
-        "other limits"
+        f"raise the slope limits by a factor of {factor[up, down]:.3g}, or widen the ranges: a larger "
+        f"{argument('max_loss')}, other limits"
     )
 
 

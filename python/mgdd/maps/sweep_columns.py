@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from mgdd.errors import DataError, ParameterError, did_you_mean
+from mgdd.errors import DataError, ParameterError, argument, did_you_mean
 from mgdd.results.labels import Label, check_labels, label_of
 
 if TYPE_CHECKING:
@@ -84,7 +84,7 @@ def sweep_columns(sweep: xr.Dataset, over: str, names: tuple[str, ...], lead: st
     if over not in dims or not 1 <= len(axes) <= 2:
         raise DataError(
             f"{lead} stands over {' x '.join(dims) or 'nothing'}: an optimum needs one or two operating axes and "
-            f"{over!r}; name the swept input with over="
+            f"{over!r}; name the swept input with {argument('over')}"
         )
     check_labels(sweep[list(names)])
     for dim in (*axes, over):

@@ -217,10 +217,12 @@ def _cell_marks(ax: Axes, data: xr.Dataset, values: Any, axes: tuple[str, str]) 
         dark = np.abs(values) > 0.6 * np.nanmax(np.abs(values))
     frame = BLACK if "beyond" in data else ORANGE
     lines: list[Artist] = []
+    widest = float(np.nanmax(np.abs(values))) if np.isfinite(values).any() else 0.0
     for i, j in np.ndindex(*values.shape):
         color = "white" if dark[i, j] else BLACK
         mark = _MARKS.get(str(source[i, j]), "")
-        said = f"{values[i, j]:.3g}" if np.isfinite(values[i, j]) and size else ""
+        value = 0.0 if np.abs(values[i, j]) < 1e-4 * widest else values[i, j]  # what the solver left of a zero
+        said = f"{value:.3g}" if np.isfinite(value) and size else ""
         text = minus(said) + (f" {mark}" if mark else "")
         if text:
             ax.text(i, j, text, ha="center", va="center", fontsize=size or "x-small", color=color)

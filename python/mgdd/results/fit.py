@@ -20,7 +20,7 @@ if TYPE_CHECKING:
 
 __all__ = ["Fit", "FitQuality", "figures_of", "n_best_of"]
 
-_ARRIVED = 1.005  # a start within 0.5 % of the best error counts as having found it
+ARRIVED = 1.005  # a start within 0.5 % of the best error counts as having found it
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -52,7 +52,7 @@ class FitQuality:
 
     def __str__(self) -> str:
         percent = "" if self.nrmse_fit_percent is None else f"{self.nrmse_fit_percent:.2f} %, "
-        return f"{percent}RMSE {self.rmse:.4g} {self.unit}"
+        return f"{percent}RMSE {self.rmse:.4g} {'' if self.unit == '-' else self.unit}".rstrip()
 
     def to_dict(self) -> dict[str, Any]:
         """Give the figures as plain values.
@@ -284,4 +284,4 @@ def figures_of(fit: Fit) -> dict[str, float | None]:
 def n_best_of(rmse: tuple[float, ...]) -> int:
     """Count the searches whose error is within 0.5 % of the best."""
     best = min(rmse, default=0.0)
-    return sum(error <= _ARRIVED * best for error in rmse)
+    return sum(error <= ARRIVED * best for error in rmse)

@@ -114,6 +114,8 @@ def _report(
     covariance[np.ix_(free, free)] = _covariance(regressor, logs, free) * np.outer(slope[free], slope[free])
     stderr = np.sqrt(np.diag(covariance))
     best = min(search.results, key=lambda found: float(found.fun))
+    with np.errstate(invalid="ignore"):  # a flat likelihood has infinite errors, and no correlation
+        correlation = covariance / np.outer(stderr, stderr)
     edges = np.exp(bounds)
     edges[[0, -1]] = spread * np.sqrt(edges[[0, -1]])
     edges[1:-1] *= half[:, None]
@@ -128,7 +130,7 @@ def _report(
         upper=edges[:, 1],
         bounds_active=at_bound,
         covariance=covariance,
-        correlation=covariance / np.outer(stderr, stderr),
+        correlation=correlation,
         unidentifiable=tuple(name for name, side in zip(own, at_bound, strict=True) if side),
         findings=tuple(_at_bound(name, int(side)) for name, side in zip(own, at_bound, strict=True) if side),
         null_directions=np.zeros((logs.size, 0)),

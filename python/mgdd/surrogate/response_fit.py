@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from mgdd.errors import DataError, ParameterError, ShapeError
+from mgdd.errors import DataError, ParameterError, ShapeError, argument
 from mgdd.optimize import least_squares
 from mgdd.results import Fit, FitReport
 from mgdd.results.fit import FitQuality
@@ -194,8 +194,8 @@ def _polynomial(
         raise DataError(f"{n} points for {p} terms: at least {p + 1} are needed; add points or lower the degree")
     if np.linalg.matrix_rank(terms) < p:
         raise DataError(
-            f"the points do not tell the {p} terms apart ({', '.join(said)}): use select='bic', fewer factors or a "
-            "lower degree, or add points with d_optimal"
+            f"the points do not tell the {p} terms apart ({', '.join(said)}): use {argument('select', repr('bic'))}, "
+            "fewer factors or a lower degree, or add points with d_optimal"
         )
     coefficients = np.asarray(np.linalg.lstsq(terms, values, rcond=None)[0], dtype=np.float64)
     report = least_squares(lambda c: (terms @ c - values, terms), coefficients, names=said, data=values)

@@ -14,7 +14,7 @@ import numpy as np
 from mgdd import _core
 from mgdd._core.engine import Cylinder, NoxProxy, OperatingPoint
 from mgdd.engine.cycle import TRACES
-from mgdd.errors import ParameterError, did_you_mean, hand_over
+from mgdd.errors import ParameterError, argument, did_you_mean, hand_over
 from mgdd.parallel.chunks import run_chunks
 from mgdd.parallel.pool import MakesExecutor
 from mgdd.results import Finding
@@ -193,15 +193,15 @@ def _finding(cases: Cases, void: _Void) -> Finding:
     return Finding("unphysical", tuple(cases.names), text + said(cases.names, row), remedy)
 
 
-def _chosen(argument: str, given: str | Iterable[str] | None, known: Iterable[str]) -> tuple[str, ...]:
+def _chosen(what: str, given: str | Iterable[str] | None, known: Iterable[str]) -> tuple[str, ...]:
     known = tuple(known)
     names = known if given is None else (given,) if isinstance(given, str) else tuple(given)
     for name in names:
         if name not in known:
             hint = did_you_mean(name, known) or "known are"
-            raise ParameterError.of(argument, name, f"a known name: {hint} {', '.join(known)}")
+            raise ParameterError.of(argument(what), name, f"a known name: {hint} {', '.join(known)}")
     if len(set(names)) < len(names):
-        raise ParameterError.of(argument, ", ".join(names), "names that differ")
+        raise ParameterError.of(argument(what), ", ".join(names), "names that differ")
     return names
 
 

@@ -3,17 +3,19 @@
 from __future__ import annotations
 
 import functools
+import re
 from collections.abc import Mapping
 from types import MappingProxyType
 
 from mgdd import _core
 from mgdd._core.engine import Cylinder, OperatingPoint
-from mgdd.errors import ParameterError, did_you_mean
+from mgdd.errors import ParameterError, argument, did_you_mean
 from mgdd.results.labels import VARIABLES, Label
 
 __all__ = ["case_of", "input_labels", "rank_of", "require_input"]
 
 _TIMING = "soc_cad"
+_REMARK = re.compile(r"[,;] (0|none) = .*")  # what a value stands for is not a name for an axis
 _BURN = ("burn_", "wiebe_", "second_", "lower_heating_value")
 _TABLES = tuple("ivc_cad evo_cad bore_mm stroke_mm connecting_rod_mm compression_ratio bowl_area_factor gamma".split())
 
@@ -23,7 +25,7 @@ def input_labels() -> Mapping[str, Label]:
     """Give unit and name of every input that takes a number."""
     return MappingProxyType(
         {
-            name: VARIABLES.get(name) or Label(unit, meaning.partition("; none = ")[0])
+            name: VARIABLES.get(name) or Label(unit, _REMARK.sub("", meaning))
             for name, (unit, meaning) in _core.engine.batch_inputs().items()
         }
     )
@@ -45,13 +47,13 @@ def require_input(name: str) -> None:
     choices = Cylinder.fields().get(name, {}).get("choices")
     if choices:
         raise ParameterError.of(
-            "over",
+            argument("over"),
             name,
             f"an input that is a number; sweep once per choice ({', '.join(choices)}) and join the results with "
             "xarray.concat",
         )
     hint = did_you_mean(name, input_labels()) or "known are"
-    raise ParameterError.of("over", name, f"a known input: {hint} {', '.join(input_labels())}")
+    raise ParameterError.of(argument("over"), name, f"a known input: {hint} {', '.join(input_labels())}")
 
 
 def case_of(

@@ -1,0 +1,172 @@
+"""`mgdd map design`: which points to run, inside what the model of the engine allows."""
+
+from __future__ import annotations
+
+import argparse
+import logging
+import warnings
+from collections.abc import Mapping
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+from mgdd._core.engine import OperatingPoint
+from mgdd.cli.map_files import add_csv_options, named_options, write_table
+from mgdd.cli.options import add_command, add_engine, add_scheme, engine_of, number_pairs, refuse_idle
+from mgdd.cli.output import check_output, emit, lines
+from mgdd.cli.ranges import factors_of
+from mgdd.design import FeasibleRegion, design_points
+from mgdd.design.points import METHODS
+from mgdd.errors import ParameterError
+from mgdd.io.point_table import read_points
+from mgdd.studies.sections import Table
+from mgdd.surrogate.response_surface import MODELS
+from mgdd.sweep import sweep
+
+if TYPE_CHECKING:
+    import numpy as np
+    import xarray as xr
+    from numpy.typing import NDArray
+
+__all__ = ["add_design"]
+
+_LOG = logging.getLogger(__name__)
+_ENGINE = ("preset", "set", *OperatingPoint.fields(), "burn", "gamma", "wall_heat", "ignition", "soc_cad")
+
+
+def add_design(verbs: Any) -> None:
+    """Add the command."""
+    parser = add_command(
+        verbs, "design", _design,
+        help_text="choose the points of an experiment, inside limits that the model of the engine predicts",
+        example="mgdd map design --over speed_rpm=1000:3000 --over fuel_mg=6:30 --over soc_cad=-16:4 --points 64 "
+        "--limit p_max_bar=130 -o design.csv",
+        endings=".csv or .nc, the points; .json",
+    )  # fmt: skip
+    parser.add_argument(
+        "--over", action="append", default=[], required=True, metavar="NAME=LOW:HIGH[:N]",
+        help="range of a factor in the unit that its name ends in; with N, or as NAME=VALUE,VALUE, only these levels; "
+        "repeatable",
+    )  # fmt: skip
+    parser.add_argument(
+        "--method", choices=METHODS, default="sobol",
+        help="sobol, halton, lhs: points that fill the space; maximin: far from each other; factorial: every "
+        "combination of levels, 3 where none are given; d_optimal: those that determine the terms of --model best "
+        "(default: sobol)",
+    )  # fmt: skip
+    parser.add_argument("--points", type=int, metavar="N", help="points to add; all methods but factorial need it")
+    parser.add_argument("--seed", type=int, default=0, metavar="N", help="the same seed gives the same points (0)")
+    parser.add_argument(
+        "--limit", action="append", default=[], metavar="NAME=X",
+        help="keep an indicator of the model at or below X, in the unit that its name ends in; repeatable",
+    )  # fmt: skip
+    parser.add_argument(
+        "--extend", metavar="FILE",
+        help="points that were run, .csv or .nc: new ones keep away from them and are numbered behind them",
+    )  # fmt: skip
+    parser.add_argument(
+        "--model", choices=tuple(MODELS), help="of d_optimal: terms of the polynomial (default: quadratic)"
+    )
+    parser.add_argument(
+        "--n-starts", type=int, default=10, metavar="N",
+        help="searches of d_optimal and tries of lhs, of which the best is kept (default: 10)",
+    )  # fmt: skip
+    parser.add_argument(
+        "--soc-cad", type=float, metavar="X", help="of --limit: start of combustion where it is not a factor (-6)"
+    )
+    add_csv_options(parser)
+    add_engine(parser)
+    add_scheme(parser, step_cad=1.0)
+
+
+def _design(args: argparse.Namespace) -> None:
+    check_output(args, ".csv", ".nc", ".json")
+    if args.method != "d_optimal":
+        refuse_idle(args, "model", why=f"--method {args.method} fits no polynomial")
+    factors, limits = factors_of(args.over), number_pairs(args.limit, "--limit")
+    region = _region(args, limits)
+    before = _before(args, tuple(factors))
+    with warnings.catch_warnings(record=True) as doubts, named_options(n="points", existing="extend", outputs="limit"):
+        warnings.simplefilter("always", UserWarning)
+        plan = design_points(
+            factors,
+            args.points,
+            method=args.method,
+            feasible=region,
+            existing=before,
+            model=args.model or "quadratic",
+            n_starts=args.n_starts,
+            seed=args.seed,
+        )
+    said = [str(doubt.message) for doubt in doubts]
+    for text in said:
+        _LOG.warning("%s", text)
+    payload = _payload(plan, limits, region, said)
+    payload["existing"] = 0 if before is None else before.sizes["point"]
+    file = args.output
+    if file is not None and Path(file).suffix != ".json":
+        write_table(plan, file)
+        args.output = None
+    emit(args, {**payload, "file": file}, text=_text(payload, plan if file is None else None))
+
+
+def _region(args: argparse.Namespace, limits: Mapping[str, float]) -> FeasibleRegion | None:
+    if not limits:
+        refuse_idle(args, *_ENGINE, why="without --limit no model is asked")
+        if args.motored:
+            raise ParameterError("--motored does not act here; without --limit no model is asked")
+        return None
+    cylinder, point, _ = engine_of(args)
+    soc_cad = -6.0 if args.soc_cad is None else args.soc_cad
+
+    def indicators(columns: dict[str, NDArray[np.float64]]) -> dict[str, NDArray[np.float64]]:
+        found = sweep(
+            cylinder, point, columns, points=True, soc_cad=soc_cad, outputs=tuple(limits), step_cad=args.step_cad,
+            integrator=args.integrator,
+        )  # fmt: skip
+        return {name: found[name].to_numpy() for name in limits}
+
+    return FeasibleRegion.of_model(indicators, limits)
+
+
+def _before(args: argparse.Namespace, names: tuple[str, ...]) -> xr.Dataset | None:
+    if args.extend is None:
+        return None
+    if args.output is not None and Path(args.output).resolve() == Path(args.extend).resolve():
+        raise ParameterError(f"-o {args.output}: the file of --extend; new points would replace it: name another")
+    return read_points(args.extend, names, delimiter=args.delimiter, decimal=args.decimal)
+
+
+def _payload(
+    plan: xr.Dataset, limits: Mapping[str, float], region: FeasibleRegion | None, said: list[str]
+) -> dict[str, Any]:
+    attrs = dict(plan.attrs)
+    starts = attrs.pop("log_det_starts", None)
+    columns = {str(name): plan[name].to_numpy() for name in plan.data_vars}
+    highest = {}
+    if region is not None:
+        judged = region.evaluate(plan)
+        highest = {name: float(judged[name].max()) for name in limits}
+    return {
+        **attrs,
+        "points": plan.sizes["point"],
+        **({} if starts is None else {"log_det_starts": starts}),
+        "limits": dict(limits),
+        "highest": highest,
+        "warnings": said,
+        "point": plan["point"].to_numpy(),
+        "columns": columns,
+    }
+
+
+def _text(payload: dict[str, Any], shown: xr.Dataset | None) -> list[str | Table]:
+    names = ("method", "points", "existing", "feasible_share", "least_distance", "d_efficiency_percent")
+    out: list[str | Table] = [lines({name: payload[name] for name in names if name in payload})]
+    out += [
+        f"{name}: at most {value:.4g} at these points by the model, limit {payload['limits'][name]:g}"
+        for name, value in payload["highest"].items()
+    ]
+    if shown is None:
+        return out
+    columns = {"point": shown["point"].to_numpy(), **payload["columns"]}
+    rows = zip(*([f"{value:.6g}" for value in column] for column in columns.values()), strict=True)
+    return [*out, "", Table(columns=tuple(columns), rows=tuple(rows)), "", "-o design.csv keeps the points"]

@@ -1,0 +1,163 @@
+"""`mgdd map fit`: a model of one response over the points of an experiment."""
+
+from __future__ import annotations
+
+import argparse
+import logging
+from collections.abc import Sequence
+from dataclasses import replace
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+
+from mgdd.cli.map_files import add_csv_options
+from mgdd.cli.options import add_command
+from mgdd.cli.output import check_figure, check_output, emit, save_figure, wrote
+from mgdd.errors import DataError, ParameterError
+from mgdd.io.netcdf_file import read_netcdf
+from mgdd.io.point_table import POINT, read_points
+from mgdd.io.whole_file import write_whole_text
+from mgdd.plot import response_diagnostics
+from mgdd.plot.style import drawn
+from mgdd.results.fit import figures_of
+from mgdd.surrogate import fit_response
+from mgdd.surrogate.response_fit import KINDS, SELECTIONS
+
+if TYPE_CHECKING:
+    import xarray as xr
+
+    from mgdd.results import Fit
+
+__all__ = ["add_fit"]
+
+_LOG = logging.getLogger(__name__)
+
+
+def add_fit(verbs: Any) -> None:
+    """Add the command of a fit."""
+    parser = add_command(
+        verbs, "fit", _fit,
+        help_text="fit a model of one response to measured or simulated points, and say how far it may be believed",
+        example="mgdd map fit table.nc --response efficiency_gross --factors speed_rpm,fuel_mg,soc_cad -o model.toml "
+        "--figure fit.png",
+        endings=".toml, the model with its points; .json, the figures of the fit",
+    )  # fmt: skip
+    parser.add_argument(
+        "file", metavar="TABLE",
+        help=".nc of mgdd engine sweep, or .csv with a point per row and the unit in each name, in brackets behind it "
+        "or in a second row",
+    )  # fmt: skip
+    parser.add_argument("--response", required=True, metavar="NAME", help="column to fit")
+    parser.add_argument(
+        "--factors",
+        metavar="NAME[,NAME]",
+        help="columns to fit it over (default: the inputs of a sweep; needed for .csv)",
+    )
+    parser.add_argument(
+        "--kind", choices=KINDS, default="polynomial",
+        help="least squares on products of the factors, or a Gaussian process, for what no polynomial follows "
+        "(default: polynomial)",
+    )  # fmt: skip
+    parser.add_argument("--degree", type=int, default=2, metavar="N", help="of the full polynomial, 1 to 4 (2)")
+    parser.add_argument(
+        "--select", choices=SELECTIONS, default="bic",
+        help="terms that are kept: by the Schwarz criterion, by the error of left-out points, or all (default: bic)",
+    )  # fmt: skip
+    parser.add_argument(
+        "--folds", type=int, metavar="N",
+        help="leave out one of N random parts at a time and repeat the whole fit (default: each point alone)",
+    )  # fmt: skip
+    parser.add_argument(
+        "--n-starts", type=int, default=5, metavar="N", help="searches for the length scales of a Gaussian process (5)"
+    )
+    parser.add_argument("--seed", type=int, default=0, metavar="N", help="of these searches and of the parts (0)")
+    parser.add_argument("--figure", metavar="FILE", help="draw the diagnostics of the fit (.png, .svg or .pdf)")
+    add_csv_options(parser)
+
+
+def _fit(args: argparse.Namespace) -> None:
+    check_output(args, ".toml", ".json")
+    check_figure(args.figure)
+    table, left_out = _table(args)
+    factors = [str(name) for name in table.data_vars if name != args.response]
+    fit = fit_response(
+        table,
+        args.response,
+        kind=args.kind,
+        factors=factors,
+        degree=args.degree,
+        select=args.select,
+        folds=args.folds,
+        n_starts=args.n_starts,
+        seed=args.seed,
+    )
+    if args.output is not None and Path(args.output).suffix == ".toml":
+        source = f"{args.response} of {Path(args.file).name}, {table.sizes[POINT]} points"
+        write_whole_text(args.output, replace(fit.model.to_parameters(), notes={"source": source}).to_toml())
+        wrote(args.output)
+        file, args.output = args.output, None
+    else:
+        file = None
+    if args.figure is not None:
+        save_figure(_picture(fit, len(factors)), args.figure)
+    emit(args, {**_figures(fit, factors), "left_out": left_out, "file": file}, text=fit.summary())
+
+
+def _table(args: argparse.Namespace) -> tuple[xr.Dataset, int]:
+    """Read response and factors; points where one is NaN, as of a cycle that was not simulated, are left out."""
+    reading = {"delimiter": args.delimiter, "decimal": args.decimal}
+    if args.factors is not None:
+        factors = [name.strip() for name in args.factors.split(",")]
+        if args.response in factors or len(set(factors)) < len(factors) or not all(factors):
+            raise ParameterError(f"--factors {args.factors}: each name once, without the response {args.response}")
+    elif Path(args.file).suffix.lower() == ".csv":
+        raise ParameterError(f"--factors is needed: which columns of {args.file} make {args.response}")
+    else:
+        factors = _inputs(args.file, args.response)
+    table = read_points(args.file, [*factors, args.response], **reading)
+    known = np.all([np.isfinite(column.to_numpy()) for column in table.data_vars.values()], axis=0)
+    gone = int((~known).sum())
+    if gone == known.size:
+        raise DataError(f"{args.file}: {args.response} or a factor is NaN at every point: there is nothing to fit")
+    if gone:
+        _LOG.warning("%s: %d of %d points have no value (NaN) and are left out", args.file, gone, known.size)
+    return table.isel({POINT: known}), gone
+
+
+def _inputs(file: str, response: str) -> list[str]:
+    """Name the inputs of a sweep: axes of its grid, or coordinates of its points."""
+    data = read_netcdf(file)
+    dims = data[response].dims if response in data else data.dims
+    inputs = [str(name) for name in (*dims, *(name for name in data.coords if name not in data.dims)) if name != POINT]
+    if not inputs:
+        raise ParameterError(f"--factors is needed: {file} does not say which of its columns are inputs")
+    return inputs
+
+
+def _figures(fit: Fit, factors: Sequence[str]) -> dict[str, Any]:
+    model, figures = fit.model, fit.to_dict()
+    of_kind: dict[str, Any] = {"terms": list(model.terms)}
+    if model.kind != "polynomial":
+        of_kind = {"length_scales": dict(zip(factors, model.surface.length_scales.tolist(), strict=True))}
+    return {
+        "model": fit.kind,
+        "response": model.name,
+        "unit": model.label.units,
+        "factors": list(factors),
+        "points": model.values.size,
+        **figures_of(fit),
+        "checked_by": fit.checked_by,
+        "noise_sd": float(model.surface.noise_sd),
+        **of_kind,
+        "parameters": figures["parameters"],
+        "stderr": figures["stderr"],
+        "unidentifiable": figures["unidentifiable"],
+        "outliers": np.flatnonzero(fit.diagnostics["outlier"].to_numpy()).tolist(),  # type: ignore[attr-defined]
+        "findings": [str(finding) for finding in fit.findings],
+        "status": figures["status"],
+    }
+
+
+def _picture(fit: Any, factors: int) -> Any:
+    return drawn(response_diagnostics, fit.diagnostics, size=(6.6, 5.4 + 2.3 * -(-factors // 3)))

@@ -1,0 +1,178 @@
+"""`mgdd map show | diff`: a map as a table or a picture, what it achieves in a sweep, and two maps side by side."""
+
+from __future__ import annotations
+
+import argparse
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+
+from mgdd.cli.map_files import MAP_ENDINGS, emit_map, grid_table, write_table
+from mgdd.cli.map_text import COLUMNS, grid_blocks, map_blocks
+from mgdd.cli.options import add_command
+from mgdd.cli.output import check_figure, check_output, emit, save_figure
+from mgdd.errors import ParameterError
+from mgdd.maps import CalibrationMap, apply_map, compare_maps, read_map
+from mgdd.maps.cells import TEXTS, cell_at
+from mgdd.plot import map_cells, map_contour
+from mgdd.plot.style import drawn
+from mgdd.results.labels import label_of
+
+if TYPE_CHECKING:
+    import xarray as xr
+    from matplotlib.axes import Axes
+
+__all__ = ["add_diff", "add_show"]
+
+
+def add_show(verbs: Any) -> None:
+    """Add the command that shows one map."""
+    parser = add_command(
+        verbs, "show", _show,
+        help_text="show a map with breakpoints, units, and the limits and sources of its cells",
+        example="mgdd map show smooth.json --sweep table.nc --figure smooth.png",
+        endings=".csv, .json, .nc or .dcm, the map",
+    )  # fmt: skip
+    parser.add_argument("file", metavar="MAP", help=".csv, .json, .nc or .dcm")
+    add_map_reading(parser)
+    parser.add_argument(
+        "--column", choices=COLUMNS, default="value",
+        help="what is shown of the cells: the value, its standard deviation, the ends of its range (default: value)",
+    )  # fmt: skip
+    parser.add_argument(
+        "--sweep", metavar="TABLE.nc", help="also say what the map achieves in the table that it was made of"
+    )
+    parser.add_argument("--figure", metavar="FILE", help="draw the cells of the map (.png, .svg or .pdf)")
+    parser.add_argument("--contour", action="store_true", help="draw contours instead of the cells")
+
+
+def add_map_reading(parser: argparse.ArgumentParser) -> None:
+    """Add how to read a file of a map."""
+    parser.add_argument("--name", metavar="NAME", help="which map or variable, where a file holds several")
+    parser.add_argument("--decimal", choices=(".", ","), default=".", help="decimal mark of a CSV file (default: .)")
+
+
+def _show(args: argparse.Namespace) -> None:
+    check_output(args, *MAP_ENDINGS)
+    check_figure(args.figure)
+    if args.contour and args.figure is None:
+        raise ParameterError("--contour does not act here; it is a form of the picture: name one with --figure FILE")
+    if args.contour and args.column in TEXTS:
+        raise ParameterError(f"--contour and --column {args.column} contradict each other: it holds texts")
+    table = read_map(args.file, args.name, decimal=args.decimal)
+    text, more = map_blocks(table, args.column), {}
+    if args.sweep is not None:
+        more["achieved"], said = _achieved(table, grid_table(args.sweep))
+        text += ["", f"in {args.sweep}:", *said]
+    shown = table.name if args.column == "value" else args.column
+
+    def draw(data: xr.Dataset, ax: Axes) -> Axes:
+        return map_contour(data, shown, ax=ax) if args.contour else map_cells(data, shown, ax=ax)
+
+    emit_map(args, table, text, draw=draw, **more)
+
+
+def _achieved(table: CalibrationMap, sweep: xr.Dataset) -> tuple[dict[str, Any], list[str]]:
+    """Say what objective, limited variables and loss become at the values of a map."""
+    found = apply_map(table, sweep)
+    task = table.task
+    wanted = [] if task is None else [name for name in ("loss", task.objective, *task.limits) if name in found]
+    names = wanted or [str(name) for name in found.data_vars if name != table.name]
+    figures, said = {}, []
+    for name in names:
+        values = found[name].transpose(*table.axes).to_numpy()
+        if not np.isfinite(values).any():
+            continue
+        worst = int(np.nanargmax(values))
+        figures[name] = {
+            "mean": float(np.nanmean(values)),
+            "lowest": float(np.nanmin(values)),
+            "highest": float(np.nanmax(values)),
+            "highest_at": {
+                axis: float(entries[place])
+                for (axis, entries), place in zip(
+                    table.axes.items(), np.unravel_index(worst, values.shape), strict=True
+                )
+            },
+        }
+        limit = "" if task is None or name not in task.limits else f", limit {task.limits[name]:g}"
+        unit = label_of(found[name]).units
+        said.append(
+            f"  {name}{'' if unit == '-' else f' [{unit}]'}: mean {figures[name]['mean']:.4g}, "
+            f"{figures[name]['lowest']:.4g} to {figures[name]['highest']:.4g}{limit}, highest at "
+            f"{cell_at(table.axes, worst)}"
+        )
+    return figures, said
+
+
+def add_diff(verbs: Any) -> None:
+    """Add the command that compares two maps."""
+    parser = add_command(
+        verbs, "diff", _diff,
+        help_text="subtract one map from another at the breakpoints of both",
+        example="mgdd map diff best.json smooth.json --tolerance 1 --figure diff.png",
+        endings=".nc, the differences, or .json",
+    )  # fmt: skip
+    parser.add_argument("first", metavar="FIRST", help=".csv, .json, .nc or .dcm")
+    parser.add_argument("second", metavar="SECOND", help="the map that the first is subtracted from")
+    add_map_reading(parser)
+    parser.add_argument(
+        "--grid", choices=("union", "first"), default="union",
+        help="compare at the breakpoints of both inside of both, or at those of the first (default: union)",
+    )  # fmt: skip
+    parser.add_argument(
+        "--tolerance", type=float, metavar="X", help="count and mark differences beyond X, in the unit of the map"
+    )
+    parser.add_argument("--figure", metavar="FILE", help="draw the differences (.png, .svg or .pdf)")
+
+
+def _diff(args: argparse.Namespace) -> None:
+    check_output(args, ".nc", ".json")
+    check_figure(args.figure)
+    first, second = (read_map(file, args.name, decimal=args.decimal) for file in (args.first, args.second))
+    found = compare_maps(first, second, grid=args.grid, tolerance=args.tolerance)
+    file = args.output
+    if file is not None and Path(file).suffix == ".nc":
+        write_table(found, file)
+        args.output = None
+    if args.figure is not None:
+        save_figure(drawn(map_cells, found, size=(6.6, 4.6), variable="difference"), args.figure)
+    axes = {name: found[name].to_numpy() for name in first.axes}
+    payload = {
+        "name": first.name,
+        "first": args.first,
+        "second": args.second,
+        "unit": label_of(found["difference"]).units,
+        **{name: found[name].item() for name in ("largest_difference", "rms_difference", "n_beyond")},
+        "tolerance": args.tolerance,
+        "axes": [{"name": name, "entries": entries} for name, entries in axes.items()],
+        **{name: found[name].to_numpy() for name in ("difference", "sd", "held_outside", "beyond")},
+        "file": file,
+    }
+    emit(args, payload, text=_differences(args, found, first, second))
+
+
+def _differences(
+    args: argparse.Namespace, found: xr.Dataset, first: CalibrationMap, second: CalibrationMap
+) -> list[Any]:
+    label = label_of(found["difference"])
+    values = found["difference"].to_numpy()
+    flags = {
+        "a map is held at its edge": found["held_outside"].to_numpy(),
+        "only one map has a value": np.isfinite(found["first"].to_numpy()) != np.isfinite(found["second"].to_numpy()),
+    }
+    if args.tolerance is not None:
+        flags[f"beyond {args.tolerance:g} {label.units}"] = found["beyond"].to_numpy()
+    axes = {name: found[name].to_numpy() for name in first.axes}
+    out: list[Any] = [f"first:  {args.first}: {repr(first)[1:-1]}", f"second: {args.second}: {repr(second)[1:-1]}"]
+    known = values[np.isfinite(values)]
+    if not known.size:
+        said = "no cell has a value in both maps"
+    elif not known.any():
+        said = f"no difference in {known.size} cells"
+    else:
+        largest, rms = float(found["largest_difference"]), float(found["rms_difference"])
+        at = cell_at(axes, int(np.nanargmax(np.abs(values))))
+        said = f"largest {largest:+.4g} {label.units} at {at}; root mean square {rms:.4g} {label.units}"
+    return [*out, "", *grid_blocks(axes, first.labels, values, f"{label.long_name} [{label.units}]", flags), said]

@@ -1,0 +1,96 @@
+"""`--over NAME=LOW:HIGH:N` and `--over NAME=VALUE,VALUE`: the axes of a grid, and the factors of a design."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Sequence
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+
+from mgdd.errors import ParameterError
+
+if TYPE_CHECKING:
+    from numpy.typing import NDArray
+
+__all__ = ["add_over", "factors_of", "grid_of"]
+
+_FORM = "write NAME=LOW:HIGH:N, for example soc_cad=-20:5:51, or NAME=VALUE,VALUE"
+_FACTOR_FORM = "write NAME=LOW:HIGH, for example fuel_mg=6:36, NAME=LOW:HIGH:N or NAME=VALUE,VALUE"
+
+
+def add_over(parser: Any, *, what: str) -> None:
+    """Add the option of a grid."""
+    parser.add_argument(
+        "--over", action="append", default=[], metavar="NAME=LOW:HIGH:N",
+        help=f"N even values of {what} from LOW to HIGH, both included, or NAME=VALUE,VALUE for values of your own, in "
+        "the unit that the name ends in; repeatable, one dimension each",
+    )  # fmt: skip
+
+
+def grid_of(given: Sequence[str]) -> dict[str, NDArray[np.float64]]:
+    """Read the axes of a grid."""
+    grid: dict[str, NDArray[np.float64]] = {}
+    for item in given:
+        name, span = _split(item, grid, _FORM)
+        listed = _listed(item, span)
+        if listed is not None:
+            grid[name] = listed
+            continue
+        low, high, count = _range(item, span, _FORM)
+        if count is None:
+            raise ParameterError(f"--over {item}: {_FORM}")
+        if count < 1 or not math.isfinite(low) or not math.isfinite(high) or (count == 1) != (low == high):
+            raise ParameterError(f"--over {item}: LOW and HIGH must be finite and differ, N >= 2; or LOW = HIGH, N = 1")
+        grid[name] = np.linspace(low, high, count)
+    return grid
+
+
+def factors_of(given: Sequence[str]) -> dict[str, Any]:
+    """Read factors as `mgdd.design.design_points` takes them: a range, or levels."""
+    factors: dict[str, Any] = {}
+    for item in given:
+        name, span = _split(item, factors, _FACTOR_FORM)
+        listed = _listed(item, span)
+        if listed is not None:
+            factors[name] = set(listed.tolist()) if len(set(listed.tolist())) == listed.size else listed
+            continue
+        low, high, count = _range(item, span, _FACTOR_FORM)
+        if not (math.isfinite(low) and math.isfinite(high) and low < high):
+            raise ParameterError(f"--over {item}: LOW and HIGH must be finite and LOW < HIGH")
+        if count is not None and count < 2:
+            raise ParameterError(f"--over {item}: N = {count}: must be >= 2 levels; leave a constant out")
+        factors[name] = (low, high) if count is None else set(np.linspace(low, high, count).tolist())
+    return factors
+
+
+def _split(item: str, known: Any, form: str) -> tuple[str, str]:
+    name, sign, span = item.partition("=")
+    name = name.strip().replace("-", "_")
+    if not (sign and name and span.strip()):
+        raise ParameterError(f"--over {item}: {form}")
+    if name in known:
+        raise ParameterError(f"--over {name} is given twice: give it once")
+    return name, span
+
+
+def _listed(item: str, span: str) -> NDArray[np.float64] | None:
+    """Read values with commas between them; None where there is no comma."""
+    if "," not in span:
+        return None
+    try:
+        return np.array([float(part) for part in span.split(",")])
+    except ValueError:
+        raise ParameterError(f"--over {item}: the values must be numbers with commas between them") from None
+
+
+def _range(item: str, span: str, form: str) -> tuple[float, float, int | None]:
+    parts = span.split(":")
+    try:
+        low, high = float(parts[0]), float(parts[1])
+        count = int(parts[2]) if len(parts) == 3 else None
+    except (ValueError, IndexError):
+        parts = []
+    if len(parts) not in (2, 3):
+        raise ParameterError(f"--over {item}: {form}")
+    return low, high, count
