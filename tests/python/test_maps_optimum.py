@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import pickle
 from typing import Any
 
 import numpy as np
@@ -63,6 +64,7 @@ def test_a_limit_is_met_at_its_crossing_and_named() -> None:
     assert (p_max(N, M, found.values) <= upper + 1e-9).all()
     assert found.task is not None
     assert dict(found.task.limits) == {"p_max_bar": upper}
+    assert pickle.loads(pickle.dumps(found)) == found  # task and all
 
 
 def test_the_lowest_of_a_consumption() -> None:

@@ -5,6 +5,7 @@ from __future__ import annotations
 import re
 from collections.abc import Mapping
 from dataclasses import dataclass, field
+from functools import partial
 from types import MappingProxyType
 from typing import TYPE_CHECKING, Any
 
@@ -73,6 +74,9 @@ class MapTask:
     def to_dict(self) -> dict[str, Any]:
         """Give plain values."""
         return {"objective": self.objective, "limits": dict(self.limits), "maximize": self.maximize}
+
+    def __reduce__(self) -> tuple[Any, ...]:
+        return partial(MapTask, **self.to_dict()), ()  # a view of the limits cannot be pickled
 
 
 def checked_name(what: str, name: object, taken: tuple[str, ...] = ()) -> str:
