@@ -129,7 +129,7 @@ def test_an_error_frame_reaches_the_loop(known: Experiment, peer: can.BusABC, tm
         peer.send(can.Message(arbitration_id=CONTROLLER, data=data, is_error_frame=True, is_extended_id=False))
 
     # The host names the state of the bus, or finds the gate closed by it: whichever looks first.
-    with pytest.raises(RigError, match="error_passive|bus_fault"):
+    with pytest.raises(RigError, match=r"error_passive|bus_fault"):
         run_experiment(known, tmp_path / "run", watch=at_cycle(20, send))
     rows = read_record(tmp_path / "run" / "run.rec").samples["loop"]
     assert rows["bus_state"].to_numpy().max() == _core.rig.bus_states.index("passive")
