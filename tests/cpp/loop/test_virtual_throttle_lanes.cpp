@@ -124,7 +124,7 @@ TEST(VirtualThrottleLanes, ManyLoopsHaveTheBitsOfSingleOnesHoweverTheyAreGrouped
   for (const int threads : {1, 3}) {
     plan.threads = threads;
     const auto all = monte_carlo(plan, {});
-    ASSERT_EQ(all.finished, std::vector<bool>(std::size_t{13 * 2 * 2}, true));
+    ASSERT_EQ(all.finished, std::vector<bool>(std::size_t{13} * 2 * 2, true));
     for (std::size_t p = 0; p < 13; ++p) {
       for (std::size_t c = 0; c < 2; ++c) {
         for (std::size_t s = 0; s < 2; ++s) {
