@@ -95,8 +95,9 @@ void run_side_by_side(const MonteCarloPlan& plan, const LoopRange& range, StopRe
   EngineBenchLanes lanes(std::move(benches));
   std::vector<double> soc_cad(loops.size()), estimate_cad(loops.size());
   std::vector<BenchCycle> cycles(loops.size());
+  constexpr auto looks = cycles_between_looks / static_cast<std::int64_t>(EngineBenchLanes::width);
   for (std::int64_t k = 0; k < plan.cycles; ++k) {
-    if (k % (cycles_between_looks / 16) == 0 && stopped()) return;
+    if (k % looks == 0 && stopped()) return;
     for (std::size_t i = 0; i < loops.size(); ++i) {
       soc_cad[i] =
           std::visit([&](auto& seeker) { return ask(lanes.bench(i), seeker, estimate_cad[i]); }, loops[i].seeker);

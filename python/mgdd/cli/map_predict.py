@@ -83,7 +83,8 @@ def _predict(args: argparse.Namespace) -> None:
     total = int(np.prod(shape))
     what = "kept, extrapolated)"
     if not args.extrapolate:
-        what = "NaN): narrow --over, add points there (mgdd map design --extend), or keep them with --extrapolate"
+        fewer = "leave them out" if args.points else "narrow --over"
+        what = f"NaN): {fewer}, add points there (mgdd map design --extend), or keep them with --extrapolate"
     said = [
         f"{name}: {count} of {total} points lie outside of those that were fitted ({what}"
         for name, count in outside.items()

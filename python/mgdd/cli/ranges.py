@@ -75,7 +75,7 @@ def _split(item: str, known: Any, form: str) -> tuple[str, str]:
 
 
 def _listed(item: str, span: str) -> NDArray[np.float64] | None:
-    """Read values with commas between them; None where there is no comma."""
+    """Read values with commas between them; None for a range."""
     if "," not in span:
         return None
     try:

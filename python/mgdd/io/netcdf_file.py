@@ -1,4 +1,4 @@
-"""The one reader and writer of netCDF files: whole in memory, whole on the disk."""
+"""Classic netCDF files of users: read whole into memory, written whole to the disk."""
 
 from __future__ import annotations
 

@@ -51,8 +51,8 @@ class TextTable:
         if isinstance(column, str):
             if self.header is None:
                 raise DataError(
-                    f"{self.source}: no header, so there is no column {column!r}: give its number, 0 to "
-                    f"{self.width - 1}"
+                    f"{self.source}: without a header no column can be called {column!r}: give its number, 0 to "
+                    f"{self.width - 1}, or add a header"
                 )
             if self.header.count(column) != 1:
                 what = "no column" if column not in self.header else "more than one column"

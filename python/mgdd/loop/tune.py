@@ -231,7 +231,7 @@ def tune_controller(
         except KeyboardInterrupt:
             stop = Interrupted(f"interrupted: {len(seen)} of {budget} sets were run, the best is in .partial")
     if stop is not None and not seen:
-        stop.partial = None  # the runs of half a set are no tuning
+        stop.partial = None  # the runs of half a set are not a tuning
         raise stop
     best, point = min(seen)
     tuning = Tuning(

@@ -51,7 +51,7 @@ class MapForms:
         Raises
         ------
         mgdd.errors.DataError
-            The values are no timing, or a cell has none.
+            The values are not timings, or a cell has none.
         """
         if self._labels[self._name].units != _TIMING:
             raise DataError(f"{self._name} has unit {self._labels[self._name].units!r}: a timing map needs {_TIMING!r}")

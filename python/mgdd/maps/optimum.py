@@ -80,7 +80,7 @@ def optimize_map(
     Raises
     ------
     mgdd.errors.ParameterError
-        An unknown variable, a limit or loss that is no number.
+        An unknown variable, a limit or loss that is not a number.
     mgdd.errors.DataError
         A sweep with other axes, repeated breakpoints or too few points.
     mgdd.errors.ConvergenceError

@@ -137,7 +137,7 @@ def run_parts(parts: Iterable[tuple[str, Callable[[], Part]]], progress: Progres
                 progress(text)
             done.append(work())
     except KeyboardInterrupt:
-        if not done:  # what the part itself may have kept is no result of a study
+        if not done:  # what the part itself may have kept is not a result of the study
             raise Interrupted("interrupted: nothing was finished") from None
         return done, True
     return done, False

@@ -104,6 +104,7 @@ TEST(MonteCarlo, LanesGiveTheNumbersOfSingleLoops) {
   const MonteCarloResult lanes = monte_carlo(plan, {});
   plan.form = LoopForm::single;
   const MonteCarloResult single = monte_carlo(plan, {});
+  int differing = 0;
   for (std::size_t i = 0; i < 30; ++i) {
     for (const auto& number : loop_summary_numbers) {
       const double a = number.of(lanes.loops[i]), b = number.of(single.loops[i]);
@@ -112,8 +113,12 @@ TEST(MonteCarlo, LanesGiveTheNumbersOfSingleLoops) {
       EXPECT_LE(distance, 1e-7 * std::max(1.0, std::abs(b))) << number.name << ' ' << i;
     }
     EXPECT_NEAR(lanes.loops[i].limits[0].worst, single.loops[i].limits[0].worst, 1e-6) << i;
-    EXPECT_EQ(same(lanes.loops[i], single.loops[i]), i >= 20) << i;  // a gamma of temperature has no lanes
+    differing += same(lanes.loops[i], single.loops[i]) ? 0 : 1;
+    if (i >= 20) {  // a gamma of temperature has no lanes
+      EXPECT_TRUE(same(lanes.loops[i], single.loops[i])) << i;
+    }
   }
+  EXPECT_GT(differing, 0);  // other roundings: lanes did run
 }
 
 TEST(MonteCarlo, AFewLoopsHaveTheBitsOfSingleOnes) {
