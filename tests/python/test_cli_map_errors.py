@@ -236,7 +236,7 @@ def test_smooth(
         (["show", "best.json", "--contour", "--figure", "a.png", "--column", "source"], "contradict each other"),
         (["show", "best.json", "--column", "lowest"], "invalid choice: 'lowest'"),
         (["show", "best.json", "--name", "soi_cad"], "best.json: holds 'soc_cad', not 'soi_cad'"),
-        (["show", "table.nc"], "the Dataset has none; give its name"),
+        (["show", "table.nc"], "of a sweep make a map first, with optimize_map or mgdd map optimize"),
         (["show", "rail.json", "--sweep", "table.nc"], "it does not belong to this map"),
         (["show", "p_max.toml"], "a map is written to and read from .csv, .json, .dcm, .nc"),
         (["diff", "best.json", "rail.json"], "the same axes in the same order are needed"),

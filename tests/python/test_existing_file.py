@@ -47,4 +47,4 @@ def test_where_no_name_is_near_the_path_is_to_be_checked(path: str, tmp_path: Pa
 def test_the_command_line_says_it_too(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
     (tmp_path / "mean.csv").touch()
     assert main(["engine", "analyze", str(tmp_path / "meen.csv"), "--preset", "puma_single"]) == 2
-    assert "no such file: did you mean 'mean.csv'?" in capsys.readouterr().err
+    assert f"error: {tmp_path / 'meen.csv'}: no such file: did you mean 'mean.csv'?" in capsys.readouterr().err

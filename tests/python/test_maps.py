@@ -136,6 +136,10 @@ def test_dataset_and_back() -> None:
     assert other.cells["source"][2].tolist() == ["measured"] * 4 + ["unattainable"]
     with pytest.raises(DataError, match="no variable 'soi_cad' over one or two axes: the Dataset has soc_cad"):
         CalibrationMap.from_dataset(data, "soi_cad")
+    with pytest.raises(
+        DataError, match=r"names no map: give the name of a variable .*\(it has soc_cad, .*optimize_map"
+    ):
+        CalibrationMap.from_dataset(data.drop_attrs(deep=False))
 
 
 # --- the guide ----------------------------------------------------------------------------------------------

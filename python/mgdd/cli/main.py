@@ -80,8 +80,9 @@ def main(argv: Sequence[str] | None = None) -> int:
         os.dup2(os.open(os.devnull, os.O_WRONLY), sys.stdout.fileno())  # the reader has left; nothing more to say
         return EXIT_PIPE
     except (Error, OSError, ImportError) as error:  # an extra that is not installed is named
-        print(f"mgdd: error: {error}", file=sys.stderr)
-        fail(args, error, str(error))
+        text = _text_of(error)
+        print(f"mgdd: error: {text}", file=sys.stderr)
+        fail(args, error, text)
         return EXIT_BAD_INPUT
     except KeyboardInterrupt as error:
         kept = f"interrupted: {error if isinstance(error, Stopped) else 'nothing was kept'}"
@@ -89,6 +90,12 @@ def main(argv: Sequence[str] | None = None) -> int:
         fail(args, error, kept)
         return EXIT_INTERRUPTED
     return int(getattr(args, "exit_code", EXIT_OK))
+
+
+def _text_of(error: BaseException) -> str:
+    if isinstance(error, OSError) and error.filename is not None and error.strerror:
+        return f"{error.filename}: {error.strerror}"  # without the number of the operating system
+    return str(error)
 
 
 def _parser() -> argparse.ArgumentParser:

@@ -157,6 +157,11 @@ class MapForms:
         own = str(dataset.attrs.get("map", "")) if name is None else name
         if own not in dataset or not 1 <= dataset[own].ndim <= 2:
             have = ", ".join(str(each) for each in dataset.data_vars if 1 <= dataset[each].ndim <= 2) or "none"
+            if not own:
+                raise DataError(
+                    f"the Dataset names no map: give the name of a variable over one or two axes (it has {have}); "
+                    "of a sweep make a map first, with optimize_map or mgdd map optimize"
+                )
             raise DataError(f"no variable {own!r} over one or two axes: the Dataset has {have}; give its name")
         variable = dataset[own]
         dims = [str(dim) for dim in variable.dims]
