@@ -281,7 +281,9 @@ def test_a_file_that_was_there_stays_as_it_was(here: Path, capsys: pytest.Captur
     assert (here / "old.dcm").read_text() == "old"
 
 
-@pytest.mark.parametrize("verb", ["design", "fit", "predict", "optimize", "smooth", "show", "diff", "export"])
+@pytest.mark.parametrize(
+    "verb", ["design", "fit", "predict", "optimize", "smooth", "show", "diff", "trade-off", "export"]
+)
 def test_help_ends_with_an_example(verb: str, capsys: pytest.CaptureFixture[str]) -> None:
     with pytest.raises(SystemExit) as stop:
         main(["map", verb, "--help"])

@@ -226,7 +226,7 @@ def test_commands_of_maps_run(
     (shown,) = re.findall(r"^```text\n(.*?)^```", section, re.MULTILINE | re.DOTALL)
     commands = [shlex.split(line)[1:] for line in block.splitlines()]
     assert {command[1] for command in commands if command[0] == "map"} == {
-        "design", "fit", "predict", "optimize", "smooth", "show", "diff", "export",
+        "design", "fit", "predict", "optimize", "smooth", "show", "diff", "trade-off", "export",
     }  # fmt: skip
     for command in commands:
         assert main(command) == 0, command

@@ -60,6 +60,18 @@ def add_design(verbs: Any) -> None:
         help="keep an indicator of the model at or below X, in the unit that its name ends in; repeatable",
     )  # fmt: skip
     parser.add_argument(
+        "--within", metavar="FILE",
+        help="points that the engine was driven at, .csv or .nc: new ones stay between them, in their convex hull",
+    )  # fmt: skip
+    parser.add_argument(
+        "--margin", type=float, metavar="X",
+        help="of --within: kept free inside the boundary, in ranges of the factors (default: 0; 0.05 is 5 %%)",
+    )  # fmt: skip
+    parser.add_argument(
+        "--refused", metavar="FILE",
+        help="of --within: points that could not be driven; what is nearer to one of them than to a driven one is out",
+    )  # fmt: skip
+    parser.add_argument(
         "--extend", metavar="FILE",
         help="points that were run, .csv or .nc: new ones keep away from them and are numbered behind them",
     )  # fmt: skip
@@ -83,7 +95,7 @@ def _design(args: argparse.Namespace) -> None:
     if args.method != "d_optimal":
         refuse_idle(args, "model", why=f"--method {args.method} fits no polynomial")
     factors, limits = factors_of(args.over), number_pairs(args.limit, "--limit")
-    region = _region(args, limits)
+    region, driven = _region(args, limits), _driven(args, tuple(factors))
     before = _before(args, tuple(factors))
     with warnings.catch_warnings(record=True) as doubts, named_options(n="points", existing="extend", outputs="limit"):
         warnings.simplefilter("always", UserWarning)
@@ -91,7 +103,7 @@ def _design(args: argparse.Namespace) -> None:
             factors,
             args.points,
             method=args.method,
-            feasible=region,
+            feasible=_both(region, driven),
             existing=before,
             model=args.model or "quadratic",
             n_starts=args.n_starts,
@@ -126,6 +138,27 @@ def _region(args: argparse.Namespace, limits: Mapping[str, float]) -> FeasibleRe
         return {name: found[name].to_numpy() for name in limits}
 
     return FeasibleRegion.of_model(indicators, limits)
+
+
+def _driven(args: argparse.Namespace, names: tuple[str, ...]) -> FeasibleRegion | None:
+    if args.within is None:
+        refuse_idle(args, "margin", "refused", why="it is of the measured points of --within FILE")
+        return None
+    how = {"delimiter": args.delimiter, "decimal": args.decimal}
+    refused = None if args.refused is None else read_points(args.refused, names, **how)
+    with named_options(infeasible="refused"):
+        return FeasibleRegion.of_points(
+            read_points(args.within, names, **how)[list(names)],
+            margin=0.0 if args.margin is None else args.margin,
+            infeasible=None if refused is None else refused[list(names)],
+        )
+
+
+def _both(region: FeasibleRegion | None, driven: FeasibleRegion | None) -> Any:
+    """Make one region of the limits of the model and the measured boundary, where both are given."""
+    if region is None or driven is None:
+        return region or driven
+    return lambda columns: region.contains(columns) & driven.contains(columns)
 
 
 def _before(args: argparse.Namespace, names: tuple[str, ...]) -> xr.Dataset | None:

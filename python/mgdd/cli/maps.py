@@ -10,6 +10,7 @@ from mgdd.cli.map_fit import add_fit
 from mgdd.cli.map_optimize import add_optimize, add_smooth
 from mgdd.cli.map_predict import add_predict
 from mgdd.cli.map_show import add_diff, add_show
+from mgdd.cli.map_trade_off import add_trade_off
 from mgdd.cli.options import add_group
 
 __all__ = ["add"]
@@ -30,4 +31,5 @@ def add(commands: Any) -> None:
     add_smooth(verbs)
     add_show(verbs)
     add_diff(verbs)
+    add_trade_off(verbs)
     add_export(verbs)

@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING, Any, NamedTuple
 import numpy as np
 
 from mgdd._core.optimize import Limit
-from mgdd.errors import DataError, ParameterError, ShapeError
+from mgdd.errors import DataError, ParameterError, ShapeError, argument
 from mgdd.optimize.optimum import limits_of
 from mgdd.results.describe import described
 from mgdd.results.labels import labelled_dataset, named_label
@@ -194,14 +194,15 @@ class FeasibleRegion:
             Too few points, points in a plane, a factor that does not vary, a point that is in both sets.
         """
         if not (np.isfinite(margin) and 0.0 <= margin < 0.5):
-            raise ParameterError.of("margin", margin, "in [0, 0.5) of the range of a factor")
+            raise ParameterError.of(argument("margin"), margin, "in [0, 0.5) of the range of a factor")
         names = column_names(points, "points")
         driven = points_of(points, names)
         refused = np.empty((0, len(names))) if infeasible is None else points_of(infeasible, names, what="infeasible")
         both = [row for row in refused.tolist() if row in driven.tolist()]
         if both:
             at = ", ".join(f"{name} {value:g}" for name, value in zip(names, both[0], strict=True))
-            raise DataError(f"infeasible: the point {at} is also among the points that were driven: keep it in one")
+            own = argument("infeasible")
+            raise DataError(f"{own}: the point {at} is also among the points that were driven: keep it in one")
         hull = hull_of(driven, names)
         return cls(_Measured(hull=hull, names=names, driven=driven, refused=refused, margin=float(margin)))
 

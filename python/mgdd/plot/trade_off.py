@@ -17,7 +17,7 @@ if TYPE_CHECKING:
 
 __all__ = ["trade_off"]
 
-_MARKERS = "osv^D"
+_MARKERS = "osv^DPX"  # more than there are colours: a sixth line is not the first again
 
 
 def trade_off(
@@ -84,8 +84,8 @@ def trade_off(
             label = label_of(sweep[others[0]])
             name = f"{label.long_name} {sweep[others[0]].to_numpy()[index]:g} {label.units}"
         lines += ax.plot(
-            own_x, own_y, linestyle=dash, color=color, marker=_MARKERS[index % len(_MARKERS)], markersize=3,
-            markevery=every, label=minus(name),
+            own_x, own_y, linestyle=dash, color=color, marker=_MARKERS[index % len(_MARKERS)], markersize=4,
+            markevery=every, label=minus(name), fillstyle="full" if index < len(LINE_STYLES) else "none",
         )  # fmt: skip
         for place in range(0, own_x.size, every):
             if np.isfinite(own_x[place]) and np.isfinite(own_y[place]):

@@ -1,0 +1,146 @@
+"""`mgdd map trade-off`: what one variable costs in another along an input, and where a map stands on it."""
+
+from __future__ import annotations
+
+import argparse
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+
+from mgdd.cli.map_files import grid_table
+from mgdd.cli.options import add_command, number_pairs, refuse_idle
+from mgdd.cli.output import check_figure, check_output, emit, save_figure
+from mgdd.errors import DataError, ParameterError, did_you_mean
+from mgdd.maps import apply_map, read_map
+from mgdd.plot import trade_off
+from mgdd.plot.style import drawn
+from mgdd.results.labels import label_of
+from mgdd.studies.sections import Table
+
+if TYPE_CHECKING:
+    from collections.abc import Mapping
+
+    import xarray as xr
+
+__all__ = ["add_trade_off"]
+
+_SIZE = (6.6, 4.6)
+
+
+def add_trade_off(verbs: Any) -> None:
+    """Add the command."""
+    parser = add_command(
+        verbs, "trade-off", _trade_off,
+        help_text="set two variables of a table against each other along an input: what one costs in the other",
+        example="mgdd map trade-off table.nc --right p_max_bar --up efficiency_gross --at speed_rpm=2200 "
+        "--map smooth.json --figure trade_off.png",
+        endings=".json",
+    )  # fmt: skip
+    parser.add_argument(
+        "file", metavar="TABLE.nc",
+        help="over a grid of the input and perhaps operating axes: of mgdd engine sweep or mgdd map predict",
+    )  # fmt: skip
+    parser.add_argument("--right", required=True, metavar="NAME", help="variable to the right, as nox_affine_log_ppm")
+    parser.add_argument("--up", required=True, metavar="NAME", help="variable upwards, as efficiency_gross")
+    parser.add_argument("--along", default="soc_cad", metavar="NAME", help="the input along a line (soc_cad)")
+    parser.add_argument(
+        "--at", action="append", default=[], metavar="AXIS=X",
+        help="keep an operating axis at one of its breakpoints; one axis may be left, with a line for each of its "
+        "breakpoints; repeatable",
+    )  # fmt: skip
+    parser.add_argument("--map", metavar="MAP", help="also say where the values of this map stand on the lines")
+    parser.add_argument("--name", metavar="NAME", help="of --map: which map, where its file holds several")
+    parser.add_argument(
+        "--every", type=int, metavar="N", help="of --figure: label every N-th value of the input (default: 4)"
+    )
+    parser.add_argument("--figure", metavar="FILE", help="draw it (.png, .svg or .pdf)")
+
+
+def _trade_off(args: argparse.Namespace) -> None:
+    check_output(args, ".json")
+    check_figure(args.figure)
+    if args.map is None:
+        refuse_idle(args, "name", why="without --map no map is read")
+    if args.figure is None:
+        refuse_idle(args, "every", why="it labels the picture: name one with --figure FILE")
+    table = grid_table(args.file)
+    for name in (args.right, args.up):
+        if name not in table.data_vars:
+            have = [str(each) for each in table.data_vars]
+            hint = did_you_mean(name, have) or f"it has {', '.join(have)}"
+            raise DataError(f"{args.file}: no variable {name!r}: {hint}")
+    dims = tuple(map(str, table[args.up].dims))
+    if args.along not in dims or set(dims) != set(map(str, table[args.right].dims)):
+        raise DataError(
+            f"{args.file}: {args.right} and {args.up} must stand over the same axes, one of them --along {args.along}; "
+            f"they stand over {' x '.join(map(str, table[args.right].dims))} and {' x '.join(dims)}"
+        )
+    fixed = _breakpoints(number_pairs(args.at, "--at"), table, dims, args.along)
+    free = [name for name in dims if name not in fixed and name != args.along]
+    if len(free) > 1:
+        raise ParameterError(f"{args.file}: one line each for {' x '.join(free)} is too much: fix one with --at AXIS=X")
+    shown, marked = table[[args.right, args.up]].sel(fixed), None
+    if args.map is not None:
+        marked = apply_map(read_map(args.map, args.name), table)
+        if args.along not in marked.data_vars:
+            raise DataError(f"{args.map}: not a map of {args.along}: choose another --along or another map")
+        marked = marked[[args.along, args.right, args.up]].sel(fixed)
+    if args.figure is not None:
+        how = {"x": args.right, "y": args.up, "over": args.along, "every": 4 if args.every is None else args.every}
+        save_figure(drawn(trade_off, shown, size=_SIZE, marked=marked, **how), args.figure)
+    lines = _lines(args, shown, marked, free)
+    payload = {"right": args.right, "up": args.up, "along": args.along, "at": fixed, "lines": lines}
+    emit(args, payload, text=_text(args, shown, lines, free))
+
+
+def _breakpoints(wanted: Mapping[str, float], table: xr.Dataset, dims: tuple[str, ...], along: str) -> dict[str, float]:
+    fixed = {}
+    for name, value in wanted.items():
+        axes = [dim for dim in dims if dim != along]
+        if name not in axes:
+            raise ParameterError(f"--at {name}: not an operating axis of the table: it has {', '.join(axes) or 'none'}")
+        entries = table[name].to_numpy()
+        near = float(entries[np.argmin(np.abs(entries - value))])
+        if not np.isclose(near, value, rtol=1e-9, atol=0.0):
+            raise ParameterError(f"--at {name}={value:g}: not a breakpoint of the table; the nearest is {near:g}")
+        fixed[name] = near
+    return fixed
+
+
+def _lines(
+    args: argparse.Namespace, shown: xr.Dataset, marked: xr.Dataset | None, free: list[str]
+) -> list[dict[str, Any]]:
+    """Give every line: where it belongs, its values along the input, and those that the map chose."""
+    names = (args.along, args.right, args.up)
+    out = []
+    for place in range(shown.sizes[free[0]] if free else 1):
+        where = {free[0]: place} if free else {}
+        line = shown.isel(where)
+        own: dict[str, Any] = {name: float(shown[name].to_numpy()[place]) for name in free}
+        own |= {name: line[name].to_numpy() for name in names}
+        if marked is not None:
+            own["chosen"] = {name: float(marked[name].isel(where)) for name in names}
+        out.append(own)
+    return out
+
+
+def _text(
+    args: argparse.Namespace, shown: xr.Dataset, lines: list[dict[str, Any]], free: list[str]
+) -> list[str | Table]:
+    names = (args.along, args.right, args.up)
+    chosen = any("chosen" in line for line in lines)
+
+    def headed(name: str) -> str:
+        unit = label_of(shown[name]).units
+        return name if unit == "-" else f"{name} [{unit}]"
+
+    columns = (*free, *(headed(name) for name in names), *(f"chosen {name}" for name in names if chosen))
+    rows = []
+    for line in lines:
+        row = [f"{line[name]:g}" for name in free]
+        for name in names:
+            known = line[name][np.isfinite(line[name])]
+            row.append(f"{known.min():.4g} to {known.max():.4g}" if known.size else "none")
+        row += [f"{line['chosen'][name]:.4g}" for name in names if chosen]
+        rows.append(tuple(row))
+    return [Table(columns=columns, rows=tuple(rows))]
