@@ -19,7 +19,9 @@ namespace mgdd::bindings {
 namespace py = pybind11;
 
 /// One-dimensional input: anything np.asarray takes is copied into a column, so the caller's array stays untouched.
-using InputArray = py::array_t<double, py::array::c_style | py::array::forcecast>;
+/// Aligned: an array over a buffer that was received may begin at any byte, and reading a double there is undefined.
+using InputArray =
+    py::array_t<double, py::array::c_style | py::array::forcecast | py::detail::npy_api::NPY_ARRAY_ALIGNED_>;
 
 std::vector<double> to_column(const InputArray& array, std::string_view name);
 

@@ -321,12 +321,18 @@ def strided(values: Array) -> Array:
     return out
 
 
+def unaligned(values: Array) -> Array:
+    """Begin at an odd byte, as an array over a buffer that another process sent."""
+    return np.frombuffer(b"\0" + values.tobytes(), values.dtype, offset=1)
+
+
 FORMS: dict[str, Callable[[Array], Any]] = {
     "list": lambda values: values.tolist(),
     "tuple": lambda values: tuple(values.tolist()),
     "series": lambda values: pd.Series(values, index=np.arange(values.size) + 1000),
     "dataarray": lambda values: xr.DataArray(values, dims="sample", coords={"sample": np.arange(values.size) + 1000}),
     "read-only strided": strided,
+    "unaligned": unaligned,
     "scalars of numpy": list,
 }
 

@@ -235,7 +235,7 @@ FILE_FAULTS = {
     "ragged": (text().replace("-141.0,", "-141.0,7,"), {}, r"line 3: 3 cell\(s\) where line 1 has 2"),
     "no such name": (text(header="a,p\n"), {"pressure_column": "P"}, "no column 'P': .* has 'a', 'p'"),
     "two of a name": (text(header="a,a\n"), {"pressure_column": "a"}, "more than one column 'a'"),
-    "no header": (text(), {"angle_column": "a"}, "no header, .* column 'a': give its number, 0 to 1"),
+    "no header": (text(), {"angle_column": "a"}, "without a header no column can be called 'a': .*, 0 to 1, or"),
     "no such number": (text(), {"pressure_column": 2}, r"no column 2: the 2 column\(s\) are numbered from 0"),
     "negative number": (text(), {"pressure_column": -1}, "no column -1"),
     "one column": ("\n".join(map(str, ANGLES)), {}, "one column only: .* pass angle_step_deg= with"),

@@ -152,12 +152,15 @@ def test_ctrl_c_leaves_a_usable_partial_result() -> None:
     more = run_seeker(plant, it, 50)
     np.testing.assert_array_equal(more.dataset["estimate_cad"], twin.dataset["estimate_cad"][n:])
 
-    timer = threading.Timer(0.3, os.kill, (os.getpid(), signal.SIGINT))
-    timer.start()
-    with pytest.raises(Interrupted) as stop:
-        monte_carlo(EngineBench(), it, range(20_000), cycles=1000)
-    table = stop.value.partial
-    finished = table["finished"].values
+    for wait_s in (0.3, 10.0):  # under a sanitizer no loop may be through at once
+        timer = threading.Timer(wait_s, os.kill, (os.getpid(), signal.SIGINT))
+        timer.start()
+        with pytest.raises(Interrupted) as stop:
+            monte_carlo(EngineBench(), it, range(20_000), cycles=1000)
+        table = stop.value.partial
+        finished = table["finished"].values
+        if finished.any():
+            break
     assert 0 < finished.sum() < finished.size
     assert np.isfinite(table["mean_cad"].values[finished]).all()
     assert np.isnan(table["mean_cad"].values[~finished]).all()

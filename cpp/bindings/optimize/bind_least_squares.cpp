@@ -16,17 +16,16 @@ using optimize::FitReport;
 using optimize::LeastSquares;
 using optimize::LeastSquaresOptions;
 using optimize::Parameter;
-using DenseArray = py::array_t<double, py::array::c_style | py::array::forcecast>;
 using RowMajorMatrix = Eigen::Matrix<double, Eigen::Dynamic, Eigen::Dynamic, Eigen::RowMajor>;
 
 struct Evaluation {
   bool usable = false;
-  DenseArray residual;
-  DenseArray jacobian;
+  InputArray residual;
+  InputArray jacobian;
 };
 
-DenseArray dense(const py::handle& object, const char* what, py::ssize_t dimensions) {
-  const DenseArray array(py::reinterpret_borrow<py::object>(object));
+InputArray dense(const py::handle& object, const char* what, py::ssize_t dimensions) {
+  const InputArray array(py::reinterpret_borrow<py::object>(object));
   if (array.ndim() != dimensions) {
     throw ShapeError(std::string("fun returned a ") + what + " with " + std::to_string(array.ndim()) +
                      " dimensions, expected " + std::to_string(dimensions));
