@@ -323,7 +323,9 @@ def strided(values: Array) -> Array:
 
 def unaligned(values: Array) -> Array:
     """Begin at an odd byte, as an array over a buffer that another process sent."""
-    return np.frombuffer(b"\0" + values.tobytes(), values.dtype, offset=1)
+    out = np.frombuffer(b"\0" + values.tobytes(), values.dtype, offset=1)
+    assert not out.flags.aligned
+    return out
 
 
 FORMS: dict[str, Callable[[Array], Any]] = {

@@ -80,6 +80,7 @@ def test_the_text_has_ranges_with_units(capsys: pytest.CaptureFixture[str]) -> N
         ([*AXES, "--at", "speed_rpm=1500"], "--at speed_rpm=1500: not a breakpoint of the table; the nearest is 1400"),
         ([*AXES, "--at", "speed=900"], "--at speed: not an operating axis of the table: it has speed_rpm, fuel_mg"),
         ([*AXES, "--at", "soc_cad=0"], "--at soc_cad: not an operating axis"),
+        (["--right", "p_max_bar", "--up", "p_max_bar"], "--right and --up are both p_max_bar: name two variables"),
         ([*AXES, "--along", "soi_cad"], "must stand over the same axes, one of them --along soi_cad"),
         (["--right", "p_max", "--up", "efficiency_gross"], "no variable 'p_max': did you mean 'p_max_bar'?"),
         (["--right", "p_max_bar", "--up", "speed_rpm"], "no variable 'speed_rpm': it has efficiency_gross, p_max_bar"),

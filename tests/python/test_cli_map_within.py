@@ -34,6 +34,7 @@ def test_the_region_is_that_of_the_library(margin: float, capsys: pytest.Capture
     expected = design_points(RANGES, 12, feasible=region, seed=4)
     options = ["--within", "driven.csv", "--refused", "refused.csv", *(["--margin", "0.1"] if margin else [])]
     found = ran(capsys, "map", "design", *OVER, *options)
+    assert found["within"] == "driven.csv"
     for name in RANGES:
         np.testing.assert_array_equal(found["columns"][name], expected[name])
     free = ran(capsys, "map", "design", *OVER)["columns"]

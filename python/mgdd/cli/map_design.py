@@ -113,6 +113,7 @@ def _design(args: argparse.Namespace) -> None:
     for text in said:
         _LOG.warning("%s", text)
     payload = _payload(plan, limits, region, said)
+    payload["within"] = args.within
     payload["existing"] = 0 if before is None else before.sizes["point"]
     file = args.output
     if file is not None and Path(file).suffix != ".json":

@@ -8,6 +8,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from mgdd.cli.map_files import grid_table
+from mgdd.cli.map_show import add_map_reading
 from mgdd.cli.options import add_command, number_pairs, refuse_idle
 from mgdd.cli.output import check_figure, check_output, emit, save_figure
 from mgdd.errors import DataError, ParameterError, did_you_mean
@@ -49,7 +50,7 @@ def add_trade_off(verbs: Any) -> None:
         "breakpoints; repeatable",
     )  # fmt: skip
     parser.add_argument("--map", metavar="MAP", help="also say where the values of this map stand on the lines")
-    parser.add_argument("--name", metavar="NAME", help="of --map: which map, where its file holds several")
+    add_map_reading(parser)
     parser.add_argument(
         "--every", type=int, metavar="N", help="of --figure: label every N-th value of the input (default: 4)"
     )
@@ -64,6 +65,29 @@ def _trade_off(args: argparse.Namespace) -> None:
     if args.figure is None:
         refuse_idle(args, "every", why="it labels the picture: name one with --figure FILE")
     table = grid_table(args.file)
+    dims = _axes(args, table)
+    fixed = _breakpoints(number_pairs(args.at, "--at"), table, dims, args.along)
+    free = [name for name in dims if name not in fixed and name != args.along]
+    if len(free) > 1:
+        raise ParameterError(f"{args.file}: one line each for {' x '.join(free)} is too much: fix one with --at AXIS=X")
+    shown, marked = table[[args.right, args.up]].sel(fixed), None
+    if args.map is not None:
+        marked = apply_map(read_map(args.map, args.name, decimal=args.decimal), table)
+        if args.along not in marked.data_vars:
+            raise DataError(f"{args.map}: not a map of {args.along}: choose another --along or another map")
+        marked = marked[[args.along, args.right, args.up]].sel(fixed)
+    if args.figure is not None:
+        how = {"x": args.right, "y": args.up, "over": args.along, "every": 4 if args.every is None else args.every}
+        save_figure(drawn(trade_off, shown, size=_SIZE, marked=marked, **how), args.figure)
+    lines = _lines(args, shown, marked, free)
+    payload = {"right": args.right, "up": args.up, "along": args.along, "at": fixed, "lines": lines}
+    emit(args, payload, text=_text(args, shown, lines, free))
+
+
+def _axes(args: argparse.Namespace, table: xr.Dataset) -> tuple[str, ...]:
+    """Give the axes that both variables stand over, the input among them."""
+    if args.right == args.up:
+        raise ParameterError(f"--right and --up are both {args.up}: name two variables")
     for name in (args.right, args.up):
         if name not in table.data_vars:
             have = [str(each) for each in table.data_vars]
@@ -75,22 +99,7 @@ def _trade_off(args: argparse.Namespace) -> None:
             f"{args.file}: {args.right} and {args.up} must stand over the same axes, one of them --along {args.along}; "
             f"they stand over {' x '.join(map(str, table[args.right].dims))} and {' x '.join(dims)}"
         )
-    fixed = _breakpoints(number_pairs(args.at, "--at"), table, dims, args.along)
-    free = [name for name in dims if name not in fixed and name != args.along]
-    if len(free) > 1:
-        raise ParameterError(f"{args.file}: one line each for {' x '.join(free)} is too much: fix one with --at AXIS=X")
-    shown, marked = table[[args.right, args.up]].sel(fixed), None
-    if args.map is not None:
-        marked = apply_map(read_map(args.map, args.name), table)
-        if args.along not in marked.data_vars:
-            raise DataError(f"{args.map}: not a map of {args.along}: choose another --along or another map")
-        marked = marked[[args.along, args.right, args.up]].sel(fixed)
-    if args.figure is not None:
-        how = {"x": args.right, "y": args.up, "over": args.along, "every": 4 if args.every is None else args.every}
-        save_figure(drawn(trade_off, shown, size=_SIZE, marked=marked, **how), args.figure)
-    lines = _lines(args, shown, marked, free)
-    payload = {"right": args.right, "up": args.up, "along": args.along, "at": fixed, "lines": lines}
-    emit(args, payload, text=_text(args, shown, lines, free))
+    return dims
 
 
 def _breakpoints(wanted: Mapping[str, float], table: xr.Dataset, dims: tuple[str, ...], along: str) -> dict[str, float]:
