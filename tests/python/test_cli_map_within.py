@@ -61,7 +61,7 @@ def test_limits_of_the_model_hold_as_well(capsys: pytest.CaptureFixture[str]) ->
             "--refused: the point speed_rpm 900, fuel_mg 6 is also",
         ),
         (["--within", "drive.csv"], "drive.csv: no such file: did you mean 'driven.csv'?"),
-        (["--within", "refused.csv"], "points"),
+        (["--within", "refused.csv"], "refused.csv: 2 points of 2 factors enclose nothing: at least 3 are needed"),
         (["--over", "soc_cad=-9:0", "--within", "driven.csv"], "driven.csv: no column 'soc_cad'"),
     ],
 )

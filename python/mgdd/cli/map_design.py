@@ -16,7 +16,7 @@ from mgdd.cli.output import check_output, emit, lines
 from mgdd.cli.ranges import factors_of
 from mgdd.design import FeasibleRegion, design_points
 from mgdd.design.points import METHODS
-from mgdd.errors import ParameterError
+from mgdd.errors import DataError, ParameterError
 from mgdd.io.point_table import read_points
 from mgdd.studies.sections import Table
 from mgdd.surrogate.response_surface import MODELS
@@ -146,13 +146,15 @@ def _driven(args: argparse.Namespace, names: tuple[str, ...]) -> FeasibleRegion 
         refuse_idle(args, "margin", "refused", why="it is of the measured points of --within FILE")
         return None
     how = {"delimiter": args.delimiter, "decimal": args.decimal}
-    refused = None if args.refused is None else read_points(args.refused, names, **how)
+    driven = read_points(args.within, names, **how)[list(names)]
+    refused = None if args.refused is None else read_points(args.refused, names, **how)[list(names)]
+    margin = 0.0 if args.margin is None else args.margin
     with named_options(infeasible="refused"):
-        return FeasibleRegion.of_points(
-            read_points(args.within, names, **how)[list(names)],
-            margin=0.0 if args.margin is None else args.margin,
-            infeasible=None if refused is None else refused[list(names)],
-        )
+        try:
+            return FeasibleRegion.of_points(driven, margin=margin, infeasible=refused)
+        except DataError as error:
+            said = str(error)
+            raise error.reworded(said if said.startswith("--") else f"{args.within}: {said}") from error
 
 
 def _both(region: FeasibleRegion | None, driven: FeasibleRegion | None) -> Any:
