@@ -63,7 +63,7 @@ dev: $(VENV)/.stamp-build | system-test ## compile the module and the C++ tests,
 	$(BUILD) dev
 
 # --- the two commands ---------------------------------------------------------------------------------------
-.PHONY: demo test ready wheel-check
+.PHONY: demo test test-all ready wheel-check
 demo: $(VENV)/.stamp-build ## set up, then run the main job on the measured traces
 	@$(MAKE) --no-print-directory -j2 module $(VENV)/.stamp-run
 	$(DEV) $(PY) -m mgdd demo
@@ -71,15 +71,24 @@ demo: $(VENV)/.stamp-build ## set up, then run the main job on the measured trac
 ready: $(VENV)/.stamp-build | system-test
 	@$(MAKE) --no-print-directory -j2 dev $(VENV)/.stamp-test
 
-test: ready ## set up, then run every test of both languages
-	@mkdir -p $(LOGS); rm -f $(LOGS)/*.log; failed=""; \
+test: MARKED := not slow
+test: ready ## set up, then run the tests of both languages, except those marked slow
+	@$(RUN_TESTS); echo "left out: tests marked slow, which \`make test-all\` runs too"
+
+test-all: MARKED :=
+test-all: ready ## the same with those marked slow
+	@$(RUN_TESTS)
+
+define RUN_TESTS
+	mkdir -p $(LOGS); rm -f $(LOGS)/*.log; failed=""; \
 	$(ALOUD) ctest --preset dev -j$(JOBS) | tee $(LOGS)/ctest.log || failed+=" ctest"; \
 	$(MAKE) --no-print-directory lint 2>&1 | tee $(LOGS)/lint.log || failed+=" lint"; \
-	$(DEV) $(ALOUD) $(PY) -m pytest -n $(JOBS) --dist worksteal | tee $(LOGS)/pytest.log || failed+=" pytest"; \
+	$(DEV) $(ALOUD) $(PY) -m pytest -n $(JOBS) --dist worksteal -m "$(MARKED)" | tee $(LOGS)/pytest.log || failed+=" pytest"; \
 	echo; echo "--- summary ---"; \
 	echo "ctest:  $$(grep -h 'tests passed' $(LOGS)/ctest.log | tail -n 1)"; \
 	echo "pytest: $$(tail -n 1 $(LOGS)/pytest.log)"; \
 	[ -z "$$failed" ] || { echo "FAILED:$$failed"; exit 1; }
+endef
 
 # As a user does: an empty environment outside the repository, plain `pip install .`. The two settings let the compiler
 # cache know the objects of build/dev again.

@@ -173,7 +173,7 @@ def print_cantera(rows: dict[str, dict[str, float]], ours_us: float) -> None:
 
 def versions(options: argparse.Namespace) -> dict[str, str]:
     context = machine.versions()
-    context["instruction set"] = f"{_core.engine.instruction_set}, the widest that mgdd found here"
+    context["instruction set"] = f"{_core.instruction_set()}, the widest that mgdd found here"
     for package in PACKAGES:
         if cycle_contenders.installed(package):
             context[package] = importlib.metadata.version(package)
@@ -201,7 +201,7 @@ def main() -> None:
         print_table(f"{task}: {len(cases_of(task, options.quick))} cycles, {options.cores} core(s)", rows)
     if options.cores == 1:
         report["bars"] = bars(tables, ours=OURS, literal=LITERAL, jax=JAX, numba=NUMBA)
-        print_bars(report["bars"], _core.engine.instruction_set)
+        print_bars(report["bars"], _core.instruction_set())
         if not options.quick:
             report["two_cores"] = on_two_cores(options)
             for task, rows in report["two_cores"].items():

@@ -170,7 +170,7 @@ def main() -> None:
     parser.add_argument("--json", type=Path, metavar="FILE", help="also write the figures to FILE")
     options = parser.parse_args()
     machine.pin()
-    head = {**machine.versions(), "instruction set": _core.identify.smooth_throttle_instruction_set()}
+    head = {**machine.versions(), "instruction set": _core.instruction_set()}
     for key, value in head.items():
         print(f"{key}: {value}")
     results = [measure(name, options) for name in RECORDS]

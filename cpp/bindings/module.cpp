@@ -2,6 +2,7 @@
 
 #include "binding.hpp"
 #include "mgdd/common/platform.hpp"
+#include "mgdd/math/dispatch.hpp"
 #include "nouns.hpp"
 #include "rig/rig_binding.hpp"
 
@@ -22,8 +23,12 @@ PYBIND11_MODULE(_core, m) {
   m.attr("__version__") = MGDD_VERSION;
   m.def("compiled_simd_level", &mgdd::compiled_simd_level, "Instruction set of this build.");
   m.def("processor_simd_levels", &mgdd::processor_simd_levels, "Vector instruction sets of this processor.");
+  m.def(
+      "instruction_set", [] { return as_str(mgdd::to_string(mgdd::instruction_set())); },
+      "Instruction set that the kernels run in: the widest of this processor, or MGDD_INSTRUCTION_SET.");
   m.def("compiler", [] { return std::string(MGDD_COMPILER); }, "Compiler of this build.");
   bind_errors(m);
+  static_cast<void>(mgdd::wanted_instruction_set());  // refuses a wrong MGDD_INSTRUCTION_SET here, by name
   const std::vector<Room> rooms{
       {"math", "Look-up tables.", {&bind_lookup_table}},
       {"optimize",

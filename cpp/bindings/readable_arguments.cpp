@@ -12,11 +12,11 @@ namespace mgdd::bindings {
 namespace {
 
 using Fast = PyObject* (*)(PyObject*, PyObject* const*, Py_ssize_t, PyObject*);
-using Plain = PyObject* (*)(PyObject*, PyObject*, PyObject*);
+using PlainCall = PyObject* (*)(PyObject*, PyObject*, PyObject*);
 
 // pybind11 has one dispatcher for all functions; how it is called depends on its version.
 Fast fast_dispatcher = nullptr;
-Plain plain_dispatcher = nullptr;
+PlainCall plain_dispatcher = nullptr;
 
 // Setters have no name of their own: the name of the property by their function record.
 std::unordered_map<PyObject*, std::string>& setter_names() {
@@ -97,7 +97,7 @@ void wrap(PyObject* object, const std::string& setter = "") {
     method->ml_meth = reinterpret_cast<PyCFunction>(reinterpret_cast<void (*)()>(&call_fast));
   } else {
     if (now == reinterpret_cast<void (*)()>(&call_plain)) return;
-    plain_dispatcher = reinterpret_cast<Plain>(now);
+    plain_dispatcher = reinterpret_cast<PlainCall>(now);
     method->ml_meth = reinterpret_cast<PyCFunction>(reinterpret_cast<void (*)()>(&call_plain));
   }
 }

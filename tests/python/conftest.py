@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import functools
 import os
 import signal
 import sys
@@ -24,13 +23,6 @@ hypothesis.settings.register_profile("reproducible", derandomize=True, deadline=
 hypothesis.settings.load_profile("reproducible")
 
 
-@functools.cache
-def _quick_study(name: str, **options: int) -> Any:
-    from mgdd.studies.registry import function_of
-
-    return function_of(name)(quick=True, **options)
-
-
 @pytest.fixture(autouse=True)
 def _figures_are_closed() -> Iterator[None]:
     """Close what a test or an example drew: one process runs hundreds of them."""
@@ -42,8 +34,10 @@ def _figures_are_closed() -> Iterator[None]:
 
 @pytest.fixture(scope="session")
 def quick_study() -> Callable[..., Any]:
-    """Return a function that runs a study by name with quick=True, once for all tests."""
-    return _quick_study
+    """Return a function that gives a study by name with quick=True, run once for all tests and workers."""
+    from study_cache import quick_study
+
+    return quick_study
 
 
 @pytest.fixture(scope="session")

@@ -154,7 +154,7 @@ def test_a_record_of_the_core_still_evaluates_to_itself() -> None:
 
 
 def test_a_study_says_what_it_holds(quick_study: Callable[..., StudyResult]) -> None:
-    result = quick_study("sensor-delay", seeds=4)
+    result = quick_study("sensor-delay")
     text = repr(result)
     assert text.startswith("StudyResult sensor-delay\n")
     assert "rows 7" in text

@@ -29,10 +29,10 @@ from mgdd.maps import apply_map, compare_maps, optimize_map
 from mgdd.results import FitReport
 from mgdd.results.labels import check_labels
 from mgdd.rig import SimulatedRig
-from mgdd.studies import run_study
 from mgdd.sweep import sweep
 from mgdd.throttle import DemandChain, PseudoWiener, SensorFault, SensorPair, Throttle, characteristics, holding_duty
 from mgdd.throttle import simulate as simulate_throttle
+from study_cache import quick_study
 
 POINT = OperatingPoint()
 REGISTRY = pint.UnitRegistry()
@@ -206,7 +206,7 @@ MADE: dict[str, Callable[[Path], Any]] = {
     "maps.CalibrationMap.to_dataset": lambda _: timing_table().to_dataset(),
     "maps.apply_map": lambda _: apply_map(optimize_map(map_sweep(), "efficiency_gross"), map_sweep()),
     "maps.compare_maps": lambda _: compare_maps(timing_table(), timing_table(), tolerance=0.5),
-    "studies.StudyResult.dataset": lambda _: run_study("measured-traces", quick=True, figures=False).dataset,
+    "studies.StudyResult.dataset": lambda _: quick_study("measured-traces").dataset,
     "sweep.sweep": lambda _: [
         sweep(Cylinder(), POINT, {"bore_mm": [80.0, 90.0], "soc_cad": [-9.0, -6.0]}, traces="pressure_bar"),
         sweep(Cylinder(), POINT, {"speed_rpm": [900.0, 2000.0]}, points=True),

@@ -12,6 +12,7 @@ from pathlib import Path
 import pytest
 
 import mgdd
+from mgdd import _core
 
 
 def test_import_is_light() -> None:
@@ -48,10 +49,26 @@ def test_long_commands_are_never_silent(root: Path) -> None:
     assert "".join(line for line in lines if line not in said) == "firsthalf lineend"
 
 
+@pytest.mark.parametrize("name", ["baseline", "avx2", "avx512f", "sse9", ""])
+def test_instruction_set_of_the_environment(name: str) -> None:
+    code = "from mgdd import _core; print(_core.instruction_set())"
+    environment = {**os.environ, "MGDD_INSTRUCTION_SET": name}
+    run = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, env=environment)
+    known = ["baseline", *(level for level in ("avx2", "avx512f") if level in _core.processor_simd_levels())]
+    if name in ("", *known):
+        assert run.stdout.strip() == (name or known[-1])
+    elif name == "sse9":
+        assert "MGDD_INSTRUCTION_SET = 'sse9': must be one of baseline, avx2, avx512f" in run.stderr
+    else:
+        assert f"MGDD_INSTRUCTION_SET = {name!r}: this processor has {known[-1]} at most" in run.stderr
+
+
 @pytest.mark.stubs
 def test_stubs_agree_with_the_module(root: Path, tmp_path: Path) -> None:
+    """In an instruction set that is hardly the machine's own: what is written there must not depend on it."""
     command = [sys.executable, "-m", "pybind11_stubgen", "mgdd._core", "-o", str(tmp_path)]
-    run = subprocess.run(command, cwd=tmp_path, capture_output=True, text=True)
+    environment = {**os.environ, "MGDD_INSTRUCTION_SET": "baseline"}
+    run = subprocess.run(command, cwd=tmp_path, capture_output=True, text=True, env=environment)
     assert run.returncode == 0, run.stderr
 
     def stubs(folder: Path) -> dict[str, str]:

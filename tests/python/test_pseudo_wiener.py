@@ -186,7 +186,7 @@ def test_online_update_refuses_what_it_cannot_do() -> None:
 
 
 def test_the_study_ranks_the_kinds(quick_study: Callable[..., StudyResult]) -> None:
-    result = quick_study("throttle-pseudo-wiener", starts=4)
+    result = quick_study("throttle-pseudo-wiener")
     rows = {(row["plant"], row["model"]): row for row in result.summary["rows"] if row["lag_start"] != "best"}
     better = {(row["plant"], row["model"]): row for row in result.summary["rows"] if row["lag_start"] == "best"}
     printed = {"P1": {"pw_r": 99.4, "pw_w": 79.3, "pw_p": 53.7}, "P2": {"pw_r": 99.4, "pw_w": 92.0, "pw_p": 82.4}}

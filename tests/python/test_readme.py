@@ -8,7 +8,7 @@ from pathlib import Path
 import pytest
 
 from mgdd.cli import main
-from mgdd.studies import run_study
+from study_cache import quick_study
 
 ROOT = Path(__file__).parents[2]
 README = (ROOT / "README.md").read_text(encoding="utf-8")
@@ -21,7 +21,7 @@ def span(pair: list[float], form: str) -> str:
 def test_table_of_the_demo() -> None:
     table = README.split("<!-- numbers: demo -->")[1].split("<!-- end numbers -->")[0]
     written = [line for line in table.splitlines() if re.match(r"\| \d+ %", line)]
-    summary = run_study("measured-traces", quick=True, figures=False).summary
+    summary = quick_study("measured-traces").summary
     computed = []
     for load, row in zip((25, 50, 75, 100), summary["traces"], strict=True):
         best, fit = row["best_timing"], row["calibrated"]

@@ -19,13 +19,6 @@ from mgdd.studies import StudyResult, available_studies
 from mgdd.studies.sections import Section, Table
 
 NEEDS = {"measured-engine-seek": "h2df_502", "identification-benchmarks": "cascaded_tanks"}
-# As other tests run them, so that each runs once.
-OPTIONS: dict[str, dict[str, int]] = {
-    "sensor-delay": {"seeds": 4},
-    "throttle-first-principle": {"seeds": 1},
-    "throttle-pseudo-wiener": {"starts": 4},
-    "measured-engine-seek": {"seeds": 1},
-}
 
 
 class Page(HTMLParser):
@@ -52,7 +45,7 @@ class Page(HTMLParser):
 def test_every_study_becomes_a_page(name: str, tmp_path: Path, quick_study: Callable[..., StudyResult]) -> None:
     if name in NEEDS and NEEDS[name] not in datasets.available():
         pytest.skip(f"the data set {NEEDS[name]} is not at hand")
-    result = quick_study(name, **OPTIONS.get(name, {}))
+    result = quick_study(name)
     file = write_report(result, tmp_path / "deep" / "page")
     assert file == tmp_path / "deep" / "page" / "index.html"
     text = file.read_text(encoding="utf-8")

@@ -5,19 +5,28 @@ from __future__ import annotations
 import html
 import json
 import re
+from collections.abc import Callable
 from pathlib import Path
 from typing import Any
 
 import pytest
 
+from mgdd import datasets, presets
+from mgdd.cli import demo, main
+from mgdd.errors import Interrupted
+from mgdd.identify import best_timing
+from mgdd.identify.engine import family
 from mgdd.report import write_report
 from mgdd.results.labels import check_labels
 from mgdd.studies import StudyResult, run_study
+from study_cache import study
+
+HD = presets.load("hd_diesel_128x144").cylinder
 
 
 @pytest.fixture(scope="module")
 def result() -> StudyResult:
-    return run_study("measured-traces")
+    return study("measured-traces")
 
 
 def test_every_bar_of_the_calibration(result: StudyResult) -> None:
@@ -203,3 +212,44 @@ def test_every_column_of_the_page_holds_what_its_head_says(result: StudyResult, 
     assert wall["scale [-]"] == [f"{p['value']:.2f}" for p in profiles.values()]
     for head, name in (("as good within 10 % [-]", "range"), ("possible in all [-]", "possible")):
         assert wall[head] == [span((p[f"{name}_low"], p[f"{name}_high"]), 2) for p in profiles.values()]
+
+
+def press_at(models: int) -> Callable[[str], None]:
+    """Press Ctrl-C when that many models are calibrated."""
+    done: list[str] = []
+
+    def progress(text: str) -> None:
+        done.extend([text] if text.startswith("calibrated ") else [])
+        if len(done) == models:
+            raise KeyboardInterrupt
+
+    return progress
+
+
+def test_ctrl_c_keeps_the_finished_models(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    with pytest.raises(Interrupted, match="2 finished models") as stop:
+        run_study("measured-traces", figures=False, progress=press_at(2))
+    part = stop.value.partial
+    assert [len(row["members"]) for row in part.summary["best_timing"]] == [2, 2, 2, 2]
+    assert part.summary["warnings"][0].startswith("interrupted: ranges over 2 finished model(s)")
+    assert "interrupted: ranges over 2" in write_report(part, tmp_path).read_text(encoding="utf-8")
+
+    def press(_: object) -> None:
+        raise KeyboardInterrupt
+
+    monkeypatch.setattr(family, "fit_request", press)
+    with pytest.raises(Interrupted, match="no model was finished") as stop:
+        best_timing(datasets.load("hd_diesel_128x144")[:1], HD)
+    assert stop.value.partial is None
+
+
+def test_ctrl_c_in_the_demo(
+    tmp_path: Path, capsys: pytest.CaptureFixture[str], monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setattr(demo, "run_study", lambda name, **_: run_study(name, progress=press_at(1)))
+    assert main(["demo", "--folder", str(tmp_path)]) == 130
+    shown = capsys.readouterr()
+    assert "Interrupted: these are the models that were finished" in shown.out
+    assert shown.out.splitlines()[-1].endswith(f"{tmp_path / 'index.html'}")
+    assert (tmp_path / "index.html").is_file()
+    assert f"interrupted: what was finished is printed, and in {tmp_path}" in shown.err

@@ -39,12 +39,12 @@ WAY = {way.name: way for way in WAYS}
 
 @pytest.fixture(scope="module")
 def online(quick_study: Callable[..., StudyResult]) -> StudyResult:
-    return quick_study("online-calibration", seeds=2)
+    return quick_study("online-calibration")
 
 
 @pytest.fixture(scope="module")
 def calibrated(quick_study: Callable[..., StudyResult]) -> StudyResult:
-    return quick_study("calibrated-guide", seeds=2)
+    return quick_study("calibrated-guide")
 
 
 # --- what the engine teaches ---------------------------------------------------------------------------------

@@ -19,7 +19,7 @@ KEYS = ["case", "period_cycles", "phase_deg", "step_sign", "cycles_stays", "fina
 
 @pytest.fixture(scope="module")
 def result(quick_study: Callable[..., StudyResult]) -> StudyResult:
-    return quick_study("sensor-delay", seeds=4)
+    return quick_study("sensor-delay")
 
 
 def test_seven_rows_in_order(result: StudyResult) -> None:

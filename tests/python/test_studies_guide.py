@@ -36,12 +36,12 @@ GUIDE = {guide.name: guide for guide in GUIDES}
 
 @pytest.fixture(scope="module")
 def start_up(quick_study: Callable[..., StudyResult]) -> StudyResult:
-    return quick_study("guided-start-up", seeds=6)
+    return quick_study("guided-start-up")
 
 
 @pytest.fixture(scope="module")
 def accuracy(quick_study: Callable[..., StudyResult]) -> StudyResult:
-    return quick_study("guide-accuracy", seeds=4)
+    return quick_study("guide-accuracy")
 
 
 def test_median_interval_by_hand() -> None:

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+from collections.abc import Callable
 
 import numpy as np
 import pytest
@@ -22,8 +23,8 @@ needs_records = pytest.mark.skipif(
 
 
 @pytest.fixture(scope="module")
-def bench() -> StudyResult:
-    return run_study("guided", quick=True)
+def bench(quick_study: Callable[..., StudyResult]) -> StudyResult:
+    return quick_study("guided")
 
 
 def rows(result: StudyResult) -> dict[str, dict[str, float]]:

@@ -22,7 +22,7 @@ LATE = OperatingPoint(speed_rpm=1900.0, fuel_mg=13.0)
 
 @pytest.fixture(scope="module")
 def result(quick_study: Callable[..., StudyResult]) -> StudyResult:
-    return quick_study("ignition-delay", seeds=3)
+    return quick_study("ignition-delay")
 
 
 def told(truth: DelayLaw, name: str) -> DelayLaw:

@@ -48,7 +48,7 @@ def test_result_is_labelled_and_drawn(habits):
 
 
 def test_groups_are_found_also_where_the_plant_does_more(quick_study):
-    result = quick_study("throttle-first-principle", seeds=1)
+    result = quick_study("throttle-first-principle")
     check_labels(result.dataset)
     assert len(result.figures) == 3
     errors = {(row["case"], row["group"]): abs(row["error_percent"]) for row in result.summary["rows"]}
@@ -65,12 +65,10 @@ def test_groups_are_found_also_where_the_plant_does_more(quick_study):
         assert fit["train_percent"] >= 98.0, fit["case"]
 
 
-@pytest.mark.parametrize(
-    ("study", "options"), [("throttle-first-principle", {"seeds": 1}), ("throttle-pseudo-wiener", {"starts": 4})]
-)
-def test_a_fit_in_percent_is_that_of_every_throttle_fit(quick_study, study, options):
+@pytest.mark.parametrize("study", ["throttle-first-principle", "throttle-pseudo-wiener"])
+def test_a_fit_in_percent_is_that_of_every_throttle_fit(quick_study, study):
     """The last record of a study is in its dataset: its stated fit leaves out the first 50 ms, like any other."""
-    result = quick_study(study, **options)
+    result = quick_study(study)
     if study == "throttle-first-principle":
         stated = {fit["case"]: fit["random_steps_percent"] for fit in result.summary["fits"]}
     else:

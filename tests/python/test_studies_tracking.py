@@ -3,12 +3,13 @@
 from __future__ import annotations
 
 import importlib.util
+from collections.abc import Callable
 from pathlib import Path
 
 import numpy as np
 import pytest
 
-from mgdd.studies import StudyResult, run_study
+from mgdd.studies import StudyResult
 from mgdd.studies.throttle_baselines import throttle_of
 from mgdd.studies.throttle_tracking_cases import (
     CASES,
@@ -60,8 +61,8 @@ def test_what_was_learnt_is_worth_knowing_it() -> None:
 
 
 @pytest.fixture(scope="module")
-def quick() -> StudyResult:
-    return run_study("throttle-tracking", seeds=2, quick=True)
+def quick(quick_study: Callable[..., StudyResult]) -> StudyResult:
+    return quick_study("throttle-tracking")
 
 
 def test_the_study_runs_and_draws(quick: StudyResult) -> None:

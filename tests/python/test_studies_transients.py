@@ -18,7 +18,7 @@ from mgdd.studies.guided_plane import Plane, plane_row, run_plane
 
 @pytest.fixture(scope="module")
 def result(quick_study: Callable[..., StudyResult]) -> StudyResult:
-    return quick_study("guided-transients", seeds=2)
+    return quick_study("guided-transients")
 
 
 def test_cells_are_compared_one_by_one() -> None:

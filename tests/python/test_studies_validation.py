@@ -133,7 +133,7 @@ def test_redrawn_errors_have_the_size_of_the_residual_and_bartletts_memory() -> 
 
 @pytest.fixture(scope="module")
 def result(quick_study: Callable[..., StudyResult]) -> StudyResult:
-    return quick_study("model-validation", seeds=6)
+    return quick_study("model-validation")
 
 
 def test_what_a_quick_run_shows(result: StudyResult) -> None:

@@ -70,7 +70,6 @@ void bind_batch(py::module_& m) {
         return out;
       },
       "What may vary in a batch: unit and meaning by name.");
-  m.attr("instruction_set") = as_str(to_string(instruction_set()));
 }
 
 }  // namespace mgdd::bindings

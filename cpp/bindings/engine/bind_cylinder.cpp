@@ -13,7 +13,7 @@ namespace {
 using namespace engine;
 
 using C = Cylinder;
-using P = OperatingPoint;
+using Op = OperatingPoint;
 
 }  // namespace
 
@@ -76,9 +76,9 @@ OperatingPoint(speed_rpm=2000.0, fuel_mg=12.0)
 )");
   constexpr auto point_fields = operating_point_fields<double>();
   bind_record<point_fields.size()>(point, "OperatingPoint", point_fields,
-                                   std::tuple{open_number(burn_duration_info, &P::burn_duration_cad),
-                                              open_number(trapped_mass_info, &P::trapped_mass_g),
-                                              open_number(ivc_temperature_info, &P::ivc_temperature_k)});
+                                   std::tuple{open_number(burn_duration_info, &Op::burn_duration_cad),
+                                              open_number(trapped_mass_info, &Op::trapped_mass_g),
+                                              open_number(ivc_temperature_info, &Op::ivc_temperature_k)});
 }
 
 }  // namespace mgdd::bindings

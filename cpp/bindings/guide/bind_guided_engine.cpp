@@ -14,7 +14,7 @@ namespace mgdd::bindings {
 namespace {
 
 using namespace guide;
-using Bound = Guarded<GuidedEngine>;
+using BoundGuided = Guarded<GuidedEngine>;
 using AnySeeker = std::variant<optimize::ExtremumSeeking, optimize::NewtonSeeking, optimize::BoundedSeeking,
                                optimize::Spsa, optimize::GradientDescent, optimize::GoldenSection, CurveSeeking>;
 
@@ -32,10 +32,11 @@ GuidedEngine::Seeking seeking_of(const py::object& seeker, const FeedForwardSett
 }
 
 // Everything is copied: what Python holds goes its own way.
-Bound make(const py::object& seeker, const Guarded<ModelOptimum>& model,
-           std::optional<const Guarded<OnlineCalibration>*> calibration, const engine::OperatingPoint& point,
-           double changed_share, double calibrated_sd_cad, double recalibrated_cad, double calibration_rate_cad,
-           std::optional<double> noise_sd, bool keep_start) {
+BoundGuided make_guided(const py::object& seeker, const Guarded<ModelOptimum>& model,
+                        std::optional<const Guarded<OnlineCalibration>*> calibration,
+                        const engine::OperatingPoint& point, double changed_share, double calibrated_sd_cad,
+                        double recalibrated_cad, double calibration_rate_cad, std::optional<double> noise_sd,
+                        bool keep_start) {
   FeedForwardSettings trimmed;
   trimmed.calibration_rate = optimize::scalar_input(calibration_rate_cad);
   trimmed.trust.noise_sd = noise_sd;
@@ -64,14 +65,14 @@ py::dict to_dict(const GuidedEngine& engine) {
 
 void bind_guided_engine(py::module_& m) {
   using py::arg;
-  py::class_<Bound> cls(m, "GuidedEngine", "The guided loop of an engine; see mgdd.guide.GuidedEngine.");
-  cls.def(py::init(&make), arg("seeker"), arg("model"), arg("calibration"), arg("point"), py::kw_only(),
+  py::class_<BoundGuided> cls(m, "GuidedEngine", "The guided loop of an engine; see mgdd.guide.GuidedEngine.");
+  cls.def(py::init(&make_guided), arg("seeker"), arg("model"), arg("calibration"), arg("point"), py::kw_only(),
           arg("changed_share"), arg("calibrated_sd_cad"), arg("recalibrated_cad"), arg("calibration_rate_cad"),
           arg("noise_sd"), arg("keep_start"));
   bind_asking(cls);
   cls.def(
          "_tell",
-         [](Bound& b, const py::object& j, const py::object& limits, bool misfire, const py::object& applied,
+         [](BoundGuided& b, const py::object& j, const py::object& limits, bool misfire, const py::object& applied,
             const std::optional<InputArray>& pressure_bar) {
            ReadingBuffer buffer;
            const optimize::Reading reading = reading_from(b.constant(), j, limits, misfire, applied, buffer);
@@ -84,7 +85,7 @@ void bind_guided_engine(py::module_& m) {
          arg("J"), arg("limits"), arg("misfire"), arg("applied"), arg("pressure_bar"), "tell, with the pressure.")
       .def(
           "_at",
-          [](Bound& b, const engine::OperatingPoint& point) {
+          [](BoundGuided& b, const engine::OperatingPoint& point) {
             switch (b.use()->at(point)) {
               case GuideStatus::busy:
                 throw ParameterError("at() between ask() and tell(): tell what was measured first");
@@ -97,38 +98,38 @@ void bind_guided_engine(py::module_& m) {
           },
           arg("point"), "The operating point of the next cycle.")
       .def(
-          "_now", [](const Bound& b) { return to_dict(*b.use()); }, "What the next cycle is made of.")
+          "_now", [](const BoundGuided& b) { return to_dict(*b.use()); }, "What the next cycle is made of.")
       .def_property_readonly(
-          "applied", [](const Bound& b) { return input_array(b.use()->applied()); },
+          "applied", [](const BoundGuided& b) { return input_array(b.use()->applied()); },
           "The input of the last ask, shape (1,).")
       .def_property_readonly(
-          "trust", [](const Bound& b) { return b.use()->now().trust; }, "Trust in the guide, 0 to 1.")
+          "trust", [](const BoundGuided& b) { return b.use()->now().trust; }, "Trust in the guide, 0 to 1.")
       .def_property_readonly(
-          "estimate_sd", [](const Bound& b) { return b.use()->now().estimate_sd_cad; },
+          "estimate_sd", [](const BoundGuided& b) { return b.use()->now().estimate_sd_cad; },
           "Standard deviation of the estimate as stated [°CA]; NaN where the seeker states none.")
       .def_property_readonly(
           "cylinder",
-          [](const Bound& b) {
+          [](const BoundGuided& b) {
             const auto engine = b.use();
             return engine->calibration() ? engine->calibration()->cylinder() : engine->model().settings().cylinder;
           },
           "The guide's cylinder as calibrated.")
       .def_property_readonly(
-          "refusals", [](const Bound& b) { return b.use()->refusals(); },
+          "refusals", [](const BoundGuided& b) { return b.use()->refusals(); },
           "Answers of the model, and operating points, that could not be used.")
       .def_property_readonly(
-          "recalibrations", [](const Bound& b) { return b.use()->recalibrations(); },
+          "recalibrations", [](const BoundGuided& b) { return b.use()->recalibrations(); },
           "How often a calibration moved what the guide says.")
       .def_property_readonly(
           "calibration_status",
-          [](const Bound& b) {
+          [](const BoundGuided& b) {
             const auto engine = b.use();
             return std::string(engine->calibration() ? to_string(engine->calibration()->status()) : "none");
           },
           "What became of the last cycle in the calibration; ``none`` without one.")
       .def_property(
-          "state", [](const Bound& b) { return save_state(*b.use()); },
-          [](Bound& b, const StateColumns& columns) { restore_state(*b.use(), columns); },
+          "state", [](const BoundGuided& b) { return save_state(*b.use()); },
+          [](BoundGuided& b, const StateColumns& columns) { restore_state(*b.use(), columns); },
           "What the run needs to go on bit for bit, the history excepted: named lists of numbers, JSON-able.");
 }
 

@@ -12,11 +12,12 @@
 namespace mgdd::bindings {
 namespace {
 
-using Bound = Guarded<guide::ModelOptimum>;
+using BoundOptimum = Guarded<guide::ModelOptimum>;
 
-Bound make(const engine::Cylinder& cylinder, const engine::Performance& performance, const engine::NoxModel& nox,
-           const std::string& method, std::pair<double, double> bounds_cad, double step_size, double difference_cad,
-           double tolerance_cad, std::int64_t iterations, double step_cad, const std::string& integrator) {
+BoundOptimum make_optimum(const engine::Cylinder& cylinder, const engine::Performance& performance,
+                          const engine::NoxModel& nox, const std::string& method, std::pair<double, double> bounds_cad,
+                          double step_size, double difference_cad, double tolerance_cad, std::int64_t iterations,
+                          double step_cad, const std::string& integrator) {
   guide::ModelOptimumSettings s;
   s.cylinder = cylinder;
   s.performance = performance;
@@ -51,13 +52,13 @@ py::dict to_dict(const guide::ModelOptimumSettings& s) {
 
 void bind_model_optimum(py::module_& m) {
   using py::arg;
-  py::class_<Bound> cls(m, "ModelOptimum", "Best timing of the cycle model; see mgdd.guide.ModelOptimum.");
-  cls.def(py::init(&make), arg("cylinder"), py::kw_only(), arg("performance"), arg("nox"), arg("method"),
+  py::class_<BoundOptimum> cls(m, "ModelOptimum", "Best timing of the cycle model; see mgdd.guide.ModelOptimum.");
+  cls.def(py::init(&make_optimum), arg("cylinder"), py::kw_only(), arg("performance"), arg("nox"), arg("method"),
           arg("bounds_cad"), arg("step_size"), arg("difference_cad"), arg("tolerance_cad"), arg("iterations"),
           arg("step_cad"), arg("integrator"));
   cls.def(
       "_find",
-      [](Bound& b, const engine::OperatingPoint& point) {
+      [](BoundOptimum& b, const engine::OperatingPoint& point) {
         const guide::ModelOptimumResult found = b.use()->find(point);
         py::dict out;
         out["found"] = found.found;
@@ -72,7 +73,7 @@ void bind_model_optimum(py::module_& m) {
       arg("point"), "The search at one operating point.");
   cls.def(
       "_curves",
-      [](Bound& b, const engine::OperatingPoint& point,
+      [](BoundOptimum& b, const engine::OperatingPoint& point,
          const std::vector<std::string>& names) -> std::optional<std::vector<guide::Curve>> {
         std::vector<double engine::Indicators<double>::*> members;
         for (const std::string& name : names) {
@@ -88,12 +89,12 @@ void bind_model_optimum(py::module_& m) {
       arg("point"), arg("names"),
       "J and indicators over SOC at one operating point; None where the model has no physical cycle.");
   cls.def(
-      "_set_cylinder", [](Bound& b, const engine::Cylinder& cylinder) { b.use()->set_cylinder(cylinder); },
+      "_set_cylinder", [](BoundOptimum& b, const engine::Cylinder& cylinder) { b.use()->set_cylinder(cylinder); },
       arg("cylinder"), "Other parameters of the same geometry.");
   cls.def_property_readonly(
-      "cylinder", [](const Bound& b) { return b.use()->settings().cylinder; }, "The model at present.");
+      "cylinder", [](const BoundOptimum& b) { return b.use()->settings().cylinder; }, "The model at present.");
   cls.def_property_readonly(
-      "settings", [](const Bound& b) { return to_dict(b.constant().settings()); },
+      "settings", [](const BoundOptimum& b) { return to_dict(b.constant().settings()); },
       "Keyword arguments that, with `cylinder`, make this guide again.");
 }
 

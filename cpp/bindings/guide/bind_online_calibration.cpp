@@ -16,7 +16,7 @@ namespace mgdd::bindings {
 namespace {
 
 using namespace guide;
-using Bound = Guarded<OnlineCalibration>;
+using BoundCalibration = Guarded<OnlineCalibration>;
 using Names = std::vector<std::string>;
 
 Names names_where(const std::array<bool, n_calibrated>& chosen) {
@@ -56,10 +56,11 @@ py::dict settings_of(const OnlineCalibrationSettings& s) {
   return out;
 }
 
-Bound make(const engine::Cylinder& cylinder, const std::string& method, const Names& parameters,
-           const std::map<std::string, double>& uncertainty, int window_cycles, int steady_cycles,
-           double cov_limit_percent, double forgetting, double soc_scatter_cad, double jump_factor,
-           int trials_per_update, double step_cad, const std::string& integrator) {
+BoundCalibration make_calibration(const engine::Cylinder& cylinder, const std::string& method, const Names& parameters,
+                                  const std::map<std::string, double>& uncertainty, int window_cycles,
+                                  int steady_cycles, double cov_limit_percent, double forgetting,
+                                  double soc_scatter_cad, double jump_factor, int trials_per_update, double step_cad,
+                                  const std::string& integrator) {
   OnlineCalibrationSettings s;
   s.cylinder = cylinder;
   s.method = parse_calibration_method(method);
@@ -84,7 +85,7 @@ Bound make(const engine::Cylinder& cylinder, const std::string& method, const Na
   return {"OnlineCalibration", OnlineCalibration(s)};
 }
 
-py::dict verdicts(const Bound& b) {
+py::dict verdicts(const BoundCalibration& b) {
   const auto calibration = b.use();
   py::dict out;
   for (int i = 0; i < n_calibrated; ++i) {
@@ -95,7 +96,7 @@ py::dict verdicts(const Bound& b) {
   return out;
 }
 
-py::dict figures(const Bound& b) {
+py::dict figures(const BoundCalibration& b) {
   const auto calibration = b.use();
   py::dict out;
   out["residual_rms_bar"] = calibration->residual_rms_bar();
@@ -122,13 +123,14 @@ void bind_online_calibration(py::module_& m) {
         return out;
       },
       "Unit and meaning of every parameter of an online calibration, by name.");
-  py::class_<Bound>(m, "OnlineCalibration", "Calibration while an engine runs; use mgdd.guide.OnlineCalibration.")
-      .def(py::init(&make), py::kw_only(), arg("cylinder"), arg("method"), arg("parameters"), arg("uncertainty"),
-           arg("window_cycles"), arg("steady_cycles"), arg("cov_limit_percent"), arg("forgetting"),
+  py::class_<BoundCalibration>(m, "OnlineCalibration",
+                               "Calibration while an engine runs; use mgdd.guide.OnlineCalibration.")
+      .def(py::init(&make_calibration), py::kw_only(), arg("cylinder"), arg("method"), arg("parameters"),
+           arg("uncertainty"), arg("window_cycles"), arg("steady_cycles"), arg("cov_limit_percent"), arg("forgetting"),
            arg("soc_scatter_cad"), arg("jump_factor"), arg("trials_per_update"), arg("step_cad"), arg("integrator"))
       .def(
           "offer",
-          [](Bound& b, const InputArray& pressure_bar, const engine::OperatingPoint& point, double soc_cad,
+          [](BoundCalibration& b, const InputArray& pressure_bar, const engine::OperatingPoint& point, double soc_cad,
              bool misfire) {
             const std::vector<double> pressure = to_column(pressure_bar, "pressure_bar");
             return as_str(to_string(b.use()->offer(pressure, point, soc_cad, misfire)));
@@ -136,35 +138,35 @@ void bind_online_calibration(py::module_& m) {
           arg("pressure_bar"), arg("point"), arg("soc_cad"), py::kw_only(), arg("misfire") = false,
           "Takes one cycle; the status says what became of it.")
       .def(
-          "update", [](Bound& b) { return as_str(to_string(b.use()->update())); },
+          "update", [](BoundCalibration& b) { return as_str(to_string(b.use()->update())); },
           "One step of the calibration; the status says what became of it.")
       .def(
-          "restart", [](Bound& b) { b.use()->restart(); }, "Forget all cycles, keep the parameters.")
-      .def_property_readonly("values", [](const Bound& b) { return by_name(b.use()->parameters()); })
-      .def_property_readonly("errors", [](const Bound& b) { return by_name(b.use()->standard_errors()); })
+          "restart", [](BoundCalibration& b) { b.use()->restart(); }, "Forget all cycles, keep the parameters.")
+      .def_property_readonly("values", [](const BoundCalibration& b) { return by_name(b.use()->parameters()); })
+      .def_property_readonly("errors", [](const BoundCalibration& b) { return by_name(b.use()->standard_errors()); })
       .def_property_readonly("verdicts", &verdicts)
       .def_property_readonly("figures", &figures)
       .def_property_readonly(
-          "determined", [](const Bound& b) { return b.use()->determined(); },
+          "determined", [](const BoundCalibration& b) { return b.use()->determined(); },
           "Whether the data determine every parameter that is adapted.")
       .def_property_readonly(
-          "status", [](const Bound& b) { return as_str(to_string(b.use()->status())); }, "Of the last call.")
+          "status", [](const BoundCalibration& b) { return as_str(to_string(b.use()->status())); }, "Of the last call.")
       .def_property_readonly(
-          "cylinder", [](const Bound& b) { return b.use()->cylinder(); },
+          "cylinder", [](const BoundCalibration& b) { return b.use()->cylinder(); },
           "The guide's cylinder with the adapted parameters.")
       .def_property_readonly(
           "angles_cad",
-          [](const Bound& b) {
+          [](const BoundCalibration& b) {
             const auto angles = b.constant().angles_cad();
             return to_array({angles.begin(), angles.end()});
           },
           "Angles that a pressure trace is taken on [°CA aTDC].")
       .def_property_readonly(
-          "settings", [](const Bound& b) { return settings_of(b.constant().settings()); },
+          "settings", [](const BoundCalibration& b) { return settings_of(b.constant().settings()); },
           "Constructor keywords as a new dict.")
       .def_property(
-          "state", [](const Bound& b) { return save_state(*b.use()); },
-          [](Bound& b, const StateColumns& state) { restore_state(*b.use(), state); },
+          "state", [](const BoundCalibration& b) { return save_state(*b.use()); },
+          [](BoundCalibration& b, const StateColumns& state) { restore_state(*b.use(), state); },
           "State between two cycles: named lists of numbers, JSON-able. Setting it continues that run bit for\n"
           "bit; a state of other settings raises ParameterError and changes nothing.");
 }

@@ -11,35 +11,35 @@
 namespace mgdd::bindings {
 namespace {
 
-using Bound = Guarded<guide::TimingMap>;
+using BoundMap = Guarded<guide::TimingMap>;
 
 }  // namespace
 
 void bind_timing_map(py::module_& m) {
   using py::arg;
-  py::class_<Bound> cls(m, "TimingMap", "A map of the best timing; see mgdd.guide.TimingMap.");
+  py::class_<BoundMap> cls(m, "TimingMap", "A map of the best timing; see mgdd.guide.TimingMap.");
   cls.def(py::init([](std::vector<std::vector<double>> axes, std::vector<double> values_cad, double prior_sd_cad,
                       double forgetting) {
-            return Bound("TimingMap",
-                         guide::TimingMap({std::move(axes), std::move(values_cad), prior_sd_cad, forgetting}));
+            return BoundMap("TimingMap",
+                            guide::TimingMap({std::move(axes), std::move(values_cad), prior_sd_cad, forgetting}));
           }),
           py::kw_only(), arg("axes"), arg("values_cad"), arg("prior_sd_cad"), arg("forgetting"));
   cls.def(
       "_lookup",
-      [](const Bound& b, const std::vector<double>& point) {
+      [](const BoundMap& b, const std::vector<double>& point) {
         const guide::TimingLookup found = b.use()->lookup(point);
         return py::make_tuple(found.value_cad, found.sd_cad, found.support, found.held_outside);
       },
       arg("point"), "Value, its standard deviation, support, and whether it is held outside of the axes.");
   cls.def(
       "_learn",
-      [](Bound& b, const std::vector<double>& point, double value_cad, double sd_cad) {
+      [](BoundMap& b, const std::vector<double>& point, double value_cad, double sd_cad) {
         return b.use()->learn(point, value_cad, sd_cad);
       },
       arg("point"), arg("value_cad"), arg("sd_cad"), "One confirmed optimum; False where it was not taken.");
   cls.def_property(
-      "_columns", [](const Bound& b) { return save_state(*b.use()); },
-      [](Bound& b, const StateColumns& columns) { restore_state(*b.use(), columns); },
+      "_columns", [](const BoundMap& b) { return save_state(*b.use()); },
+      [](BoundMap& b, const StateColumns& columns) { restore_state(*b.use(), columns); },
       "Values, variances and support of all cells.");
 }
 

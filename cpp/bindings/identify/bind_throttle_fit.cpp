@@ -11,7 +11,6 @@
 #include "mgdd/identify/free_run_fit.hpp"
 #include "mgdd/identify/throttle/first_principle_fit.hpp"
 #include "mgdd/identify/throttle/smooth_fit.hpp"
-#include "mgdd/math/dispatch.hpp"
 
 namespace mgdd::bindings {
 namespace {
@@ -140,9 +139,6 @@ void bind_throttle_fit(py::module_& m) {
   m.attr("smooth_names") = py::tuple(py::cast(names_of(SmoothPlant::parameter_names)));
   m.attr("smooth_example") = py::tuple(py::cast(throttle::smooth_plant_example));
   m.attr("group_names") = py::tuple(py::cast(group_names));
-  m.def(
-      "smooth_throttle_instruction_set", [] { return as_str(to_string(instruction_set())); },
-      "Instruction set that the kernel chose on this machine.");
   m.def(
       "simulate_smooth_throttle",
       [](const Set& p, const InputArray& duty, double step_s, const std::array<double, 3>& start, double j, double n,

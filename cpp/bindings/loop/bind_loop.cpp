@@ -19,7 +19,7 @@ namespace {
 
 using namespace loop;
 
-std::string name_of(std::string_view figure, const std::string& limit) {
+std::string column_name(std::string_view figure, const std::string& limit) {
   return std::string(figure) + "_" + limit;
 }
 
@@ -35,7 +35,7 @@ py::dict to_dict(const LoopRun& run, const BenchSettings& settings) {
     summary[as_str(number.name)] = number.of(run.summary);
   for (std::size_t i = 0; i < settings.limits.size(); ++i) {
     for (const auto& number : limit_figure_numbers)
-      summary[py::str(name_of(number.name, settings.limits[i]))] = number.of(run.summary.limits[i]);
+      summary[py::str(column_name(number.name, settings.limits[i]))] = number.of(run.summary.limits[i]);
   }
   py::dict out;
   out["columns"] = bench_columns(rows, settings);
@@ -79,7 +79,7 @@ py::dict to_dict(const MonteCarloResult& result, const std::vector<std::string>&
     for (const auto& number : limit_figure_numbers) {
       std::ranges::transform(result.loops, column.begin(),
                              [&](const LoopSummary& loop) { return number.of(loop.limits[i]); });
-      out[py::str(name_of(number.name, limit_names[i]))] = to_array(column);
+      out[py::str(column_name(number.name, limit_names[i]))] = to_array(column);
     }
   }
   py::array_t<bool> finished(static_cast<py::ssize_t>(result.finished.size()));
@@ -88,11 +88,11 @@ py::dict to_dict(const MonteCarloResult& result, const std::vector<std::string>&
   return out;
 }
 
-py::dict run_many(const std::vector<BoundBench*>& benches, const py::list& seekers,
-                  const std::vector<std::uint64_t>& seeds, std::int64_t cycles, const std::vector<double>& optimum_cad,
-                  double arrival_cad, std::int64_t tail_cycles, std::optional<std::int64_t> exceed_from,
-                  const std::vector<std::vector<double>>& exceed_above, const std::vector<std::vector<double>>& limits,
-                  int threads, const std::string& form) {
+py::dict seek_many(const std::vector<BoundBench*>& benches, const py::list& seekers,
+                   const std::vector<std::uint64_t>& seeds, std::int64_t cycles, const std::vector<double>& optimum_cad,
+                   double arrival_cad, std::int64_t tail_cycles, std::optional<std::int64_t> exceed_from,
+                   const std::vector<std::vector<double>>& exceed_above, const std::vector<std::vector<double>>& limits,
+                   int threads, const std::string& form) {
   if (optimum_cad.size() != benches.size() || exceed_above.size() != benches.size() ||
       limits.size() != benches.size()) {
     throw ShapeError("optimum_cad, exceed_above and limits: give one entry per bench");
@@ -124,7 +124,7 @@ void bind_runs(py::module_& m, const std::variant<S...>*) {
 
 void bind_loop(py::module_& m) {
   bind_runs(m, static_cast<const Seeker*>(nullptr));
-  m.def("monte_carlo", &run_many, py::arg("benches"), py::arg("seekers"), py::arg("seeds"), py::kw_only(),
+  m.def("monte_carlo", &seek_many, py::arg("benches"), py::arg("seekers"), py::arg("seeds"), py::kw_only(),
         py::arg("cycles"), py::arg("optimum_cad"), py::arg("arrival_cad"), py::arg("tail_cycles"),
         py::arg("exceed_from"), py::arg("exceed_above"), py::arg("limits"), py::arg("threads"),
         py::arg("form") = "automatic", "Whole loops on all cores; behind mgdd.loop.monte_carlo.");

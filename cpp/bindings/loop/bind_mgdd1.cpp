@@ -22,7 +22,7 @@ struct ObjectGuidedMgdd1 {
   Mgdd1On<PythonGuide> controller;
 };
 
-control::Mgdd1Settings settings_of(int horizon_samples, int delay_samples, const Numbers& numbers) {
+control::Mgdd1Settings mgdd1_settings_of(int horizon_samples, int delay_samples, const Numbers& numbers) {
   control::Mgdd1Settings s;
   s.horizon_samples = horizon_samples;
   s.delay_samples = delay_samples;
@@ -72,7 +72,7 @@ void bind_mgdd1(py::module_& m) {
   py::class_<BoundMgdd1> plain(m, "Mgdd1", "The plainest model-guided controller; use mgdd.control.Mgdd1.");
   plain
       .def(py::init([](const BoundModel& guide, int horizon_samples, int delay_samples, const Numbers& numbers) {
-             const auto s = settings_of(horizon_samples, delay_samples, numbers);
+             const auto s = mgdd1_settings_of(horizon_samples, delay_samples, numbers);
              return std::visit(
                  [&](const auto& model) -> BoundMgdd1 { return {Mgdd1On<std::decay_t<decltype(model)>>(model, s)}; },
                  throttle::prepare(guide.parameters));
@@ -89,8 +89,8 @@ void bind_mgdd1(py::module_& m) {
                                        "The same guided by a Python object; use mgdd.control.Mgdd1.");
   guided.def(py::init([](const py::object& guide, int n_states, double sample_s, int horizon_samples, int delay_samples,
                          const Numbers& numbers) {
-               return ObjectGuidedMgdd1{Mgdd1On<PythonGuide>(PythonGuide(guide, n_states, sample_s),
-                                                             settings_of(horizon_samples, delay_samples, numbers))};
+               return ObjectGuidedMgdd1{Mgdd1On<PythonGuide>(
+                   PythonGuide(guide, n_states, sample_s), mgdd1_settings_of(horizon_samples, delay_samples, numbers))};
              }),
              py::arg("guide"), py::kw_only(), py::arg("n_states"), py::arg("sample_s"), py::arg("horizon_samples"),
              py::arg("delay_samples"), py::arg("numbers"));

@@ -35,7 +35,7 @@ struct BoundHorizon {
   AnyHorizon controller;
 };
 
-HorizonSettings settings_of(int max_iterations, int max_sweeps, const std::map<std::string, double>& numbers) {
+HorizonSettings horizon_settings_of(int max_iterations, int max_sweeps, const std::map<std::string, double>& numbers) {
   HorizonSettings s;
   s.max_iterations = max_iterations;
   s.max_sweeps = max_sweeps;
@@ -140,7 +140,7 @@ void bind_receding_horizon(py::module_& m) {
   cls.def_static(
          "of_pseudo_wiener",
          [](const BoundModel& model, int length, int max_iterations, int max_sweeps, const Numbers& numbers) {
-           const HorizonSettings s = settings_of(max_iterations, max_sweeps, numbers);
+           const HorizonSettings s = horizon_settings_of(max_iterations, max_sweeps, numbers);
            return std::visit(
                [&]<class M>(const M& prepared) {
                  return made<OnThrottle<M>>(prepared, s, length, throttle::ObserverGains{});
@@ -155,7 +155,7 @@ void bind_receding_horizon(py::module_& m) {
              const Numbers& numbers) {
             return made<OnThrottle<FirstPrinciple>>(
                 first_principle(groups, sample_s, closed_deg, open_deg, substeps, tanh_deg_per_s),
-                settings_of(max_iterations, max_sweeps, numbers), length, throttle::ObserverGains{});
+                horizon_settings_of(max_iterations, max_sweeps, numbers), length, throttle::ObserverGains{});
           },
           arg("groups"), py::kw_only(), arg("sample_s"), arg("closed_deg"), arg("open_deg"), arg("substeps"),
           arg("tanh_deg_per_s"), arg("horizon_samples"), arg("max_iterations"), arg("max_sweeps"), arg("numbers"))
@@ -164,7 +164,7 @@ void bind_receding_horizon(py::module_& m) {
           [](const Eigen::MatrixXd& a, const Eigen::VectorXd& b, const Eigen::VectorXd& c, double sample_s,
              const std::vector<double>& gain, int length, int max_iterations, int max_sweeps, const Numbers& numbers) {
             return made<OnAnyOrder<LinearModel>>(LinearModel(a, b, c, sample_s),
-                                                 settings_of(max_iterations, max_sweeps, numbers), length,
+                                                 horizon_settings_of(max_iterations, max_sweeps, numbers), length,
                                                  gains_of(gain));
           },
           arg("a"), arg("b"), arg("c"), py::kw_only(), arg("sample_s"), arg("observer_gain"), arg("horizon_samples"),
@@ -174,7 +174,7 @@ void bind_receding_horizon(py::module_& m) {
           [](const py::object& model, int n, double sample_s, const std::vector<double>& gain, int length,
              int max_iterations, int max_sweeps, const Numbers& numbers) {
             return made<OnAnyOrder<PythonModel>>(PythonModel(model, n, sample_s),
-                                                 settings_of(max_iterations, max_sweeps, numbers), length,
+                                                 horizon_settings_of(max_iterations, max_sweeps, numbers), length,
                                                  gains_of(gain));
           },
           arg("model"), py::kw_only(), arg("n_states"), arg("sample_s"), arg("observer_gain"), arg("horizon_samples"),

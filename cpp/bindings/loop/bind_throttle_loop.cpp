@@ -88,9 +88,9 @@ py::dict run_one(const py::object& controller, const VirtualThrottle& plant, int
 
 using ScenarioColumns = std::tuple<InputArray, InputArray, InputArray, std::size_t>;
 
-py::tuple run_many(const std::vector<VirtualThrottle*>& plants, const py::list& controllers,
-                   const std::vector<ScenarioColumns>& scenarios, int delay_samples,
-                   const std::vector<double>& band_deg, int threads) {
+py::tuple track_many(const std::vector<VirtualThrottle*>& plants, const py::list& controllers,
+                     const std::vector<ScenarioColumns>& scenarios, int delay_samples,
+                     const std::vector<double>& band_deg, int threads) {
   ThrottleMonteCarlo plan;
   for (const VirtualThrottle* plant : plants)
     plan.plants.push_back(plant->settings());
@@ -162,7 +162,7 @@ void bind_throttle_loop(py::module_& m) {
       },
       py::arg("controller"), py::arg("reference_deg"), py::arg("measured_deg"),
       "Time of every step of a copy of the controller [us].");
-  m.def("track_throttles", &run_many, py::arg("plants"), py::arg("controllers"), py::arg("scenarios"), py::kw_only(),
+  m.def("track_throttles", &track_many, py::arg("plants"), py::arg("controllers"), py::arg("scenarios"), py::kw_only(),
         py::arg("delay_samples"), py::arg("band_deg"), py::arg("threads"),
         "Whole loops on all cores; behind mgdd.loop.track_many.");
 }

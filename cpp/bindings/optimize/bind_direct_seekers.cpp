@@ -1,5 +1,4 @@
 // Binds include/mgdd/optimize: SPSA, gradient descent, golden section, and the tuner.
-#include <limits>
 #include <numbers>
 #include <optional>
 #include <string>
@@ -14,8 +13,6 @@ namespace mgdd::bindings {
 namespace {
 
 using namespace optimize;
-constexpr double nan = std::numeric_limits<double>::quiet_NaN();
-constexpr double inf = std::numeric_limits<double>::infinity();
 
 void bind_spsa(py::module_& m) {
   using B = BoundSeeker<Spsa>;

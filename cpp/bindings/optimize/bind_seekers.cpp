@@ -1,5 +1,4 @@
 // Binds include/mgdd/optimize: the dithering seekers (extremum seeking, Newton, bounded).
-#include <limits>
 #include <tuple>
 
 #include "optimize/seeker_binding.hpp"
@@ -9,8 +8,6 @@ namespace mgdd::bindings {
 namespace {
 
 using namespace optimize;
-constexpr double nan = std::numeric_limits<double>::quiet_NaN();
-constexpr double inf = std::numeric_limits<double>::infinity();
 
 void bind_extremum_seeking(py::module_& m) {
   using B = BoundSeeker<ExtremumSeeking>;

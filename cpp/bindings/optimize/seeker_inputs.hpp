@@ -1,6 +1,7 @@
 // Numbers between Python and a seeker: inputs, bounds, and what a cycle tells.
 #pragma once
 
+#include <limits>
 #include <string>
 #include <string_view>
 #include <vector>
@@ -12,6 +13,9 @@
 #include "record_binding.hpp"
 
 namespace mgdd::bindings {
+
+inline constexpr double nan = std::numeric_limits<double>::quiet_NaN();
+inline constexpr double inf = std::numeric_limits<double>::infinity();
 
 /// A number (of any kind that NumPy takes) as a column of one, or a column.
 inline std::vector<double> numbers_from(const py::object& value, std::string_view name) {

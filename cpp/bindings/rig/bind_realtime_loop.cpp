@@ -142,9 +142,9 @@ py::list events(RealtimeLoop& loop) {
   py::list out;
   AuditEntry e;
   while (loop.cycle().pop_event(e)) {
-    out.append(py::make_tuple(e.cycle, as_str(mgdd::name_of(safety_state_names(), e.from)),
-                              as_str(mgdd::name_of(safety_state_names(), e.to)),
-                              as_str(mgdd::name_of(safety_reason_names(), e.reason)), e.count));
+    out.append(py::make_tuple(e.cycle, as_str(name_of(safety_state_names(), e.from)),
+                              as_str(name_of(safety_state_names(), e.to)),
+                              as_str(name_of(safety_reason_names(), e.reason)), e.count));
   }
   return out;
 }
@@ -241,16 +241,13 @@ void bind_realtime_loop(py::module_& m) {
       .def_property_readonly("running", [](const RealtimeLoop& l) { return l.thread().running(); })
       .def_property_readonly("queued_references", [](const RealtimeLoop& l) { return l.cycle().queued_references(); })
       .def_property_readonly(
-          "state", [](const RealtimeLoop& l) { return as_str(mgdd::name_of(safety_state_names(), l.cycle().state())); })
+          "state", [](const RealtimeLoop& l) { return as_str(name_of(safety_state_names(), l.cycle().state())); })
       .def_property_readonly(
-          "reason",
-          [](const RealtimeLoop& l) { return as_str(mgdd::name_of(safety_reason_names(), l.cycle().reason())); })
+          "reason", [](const RealtimeLoop& l) { return as_str(name_of(safety_reason_names(), l.cycle().reason())); })
       .def_property_readonly(
-          "cause",
-          [](const RealtimeLoop& l) { return as_str(mgdd::name_of(safety_reason_names(), l.cycle().cause())); })
-      .def_property_readonly("bus_state", [](const RealtimeLoop& l) {
-        return as_str(mgdd::name_of(bus_state_names(), l.cycle().bus_state()));
-      });
+          "cause", [](const RealtimeLoop& l) { return as_str(name_of(safety_reason_names(), l.cycle().cause())); })
+      .def_property_readonly(
+          "bus_state", [](const RealtimeLoop& l) { return as_str(name_of(bus_state_names(), l.cycle().bus_state())); });
 }
 
 }  // namespace mgdd::bindings

@@ -36,11 +36,11 @@ struct Argument {
   }
 };
 constexpr Argument pedal{"pedal_percent", closed(0.0, 100.0), "%"};
-constexpr Argument speed{"speed_rpm", above(0.0, 50000.0), "rpm"};
-constexpr Argument torque{"torque_nm", closed(-1e5, 1e5), "N m"};
-constexpr Argument air{"air_g_per_s", closed(0.0, 1e6), "g/s"};
+constexpr Argument speed_field{"speed_rpm", above(0.0, 50000.0), "rpm"};
+constexpr Argument torque_field{"torque_nm", closed(-1e5, 1e5), "N m"};
+constexpr Argument air_field{"air_g_per_s", closed(0.0, 1e6), "g/s"};
 constexpr Argument pressure{"pressure_kpa", closed(0.0, 1e4), "kPa"};
-constexpr Argument angle{"angle_deg", closed(0.0, 90.0), "deg"};
+constexpr Argument angle_field{"angle_deg", closed(0.0, 90.0), "deg"};
 constexpr Argument area{"area_mm2", closed(0.0, 1e6), "mm²"};
 
 py::tuple as_tuple(std::span<const double> values) {
@@ -130,7 +130,7 @@ Examples
   cls.def(
       "torque_nm",
       [](const PedalMap& map, const InputArray& pedals, const InputArray& speeds) {
-        return elementwise([&](double p, double n) { return map.torque_nm(pedal.checked(p), speed.checked(n)); },
+        return elementwise([&](double p, double n) { return map.torque_nm(pedal.checked(p), speed_field.checked(n)); },
                            pedals, speeds);
       },
       py::arg("pedal_percent"), py::arg("speed_rpm"), "Wanted torque [N m]; arrays are broadcast together.");
@@ -163,26 +163,27 @@ using Chain = DemandChain;
 
 void bind_equations(py::class_<Chain>& cls) {
   equation(
-      cls, "air_g_per_s", torque, speed,
+      cls, "air_g_per_s", torque_field, speed_field,
       [](const Chain& c) { return [&c](double nm, double n) { return c.torque.air_kg_per_s(nm, n) / g; }; },
       "Air that makes a torque [g/s]; 0 where friction alone brakes more.");
   equation(
-      cls, "torque_nm", air, speed,
+      cls, "torque_nm", air_field, speed_field,
       [](const Chain& c) { return [&c](double m, double n) { return c.torque.torque_nm(m * g, n); }; },
       "Torque that an air flow makes [N m].");
   equation(
-      cls, "pressure_kpa", air, speed,
+      cls, "pressure_kpa", air_field, speed_field,
       [](const Chain& c) { return [&c](double m, double n) { return m * g / c.air.pumping_kg_per_s_pa(n) / kpa; }; },
       "Manifold pressure at which the cylinders take an air flow [kPa], by speed density.");
   equation(
-      cls, "cylinder_g_per_s", pressure, speed,
+      cls, "cylinder_g_per_s", pressure, speed_field,
       [](const Chain& c) { return [&c](double p, double n) { return c.air.pumping_kg_per_s_pa(n) * p * kpa / g; }; },
       "Air that the cylinders take at a manifold pressure [g/s], by speed density.");
   equation(
-      cls, "filling_time_s", speed, [](const Chain& c) { return [&c](double n) { return c.air.filling_time_s(n); }; },
+      cls, "filling_time_s", speed_field,
+      [](const Chain& c) { return [&c](double n) { return c.air.filling_time_s(n); }; },
       "Time constant of the manifold where the throttle is choked [s].");
   equation(
-      cls, "area_mm2", angle,
+      cls, "area_mm2", angle_field,
       [](const Chain& c) { return [plate = PlateOpening(c.bore)](double a) { return plate.area_m2(a * deg) / mm2; }; },
       "Open area of the throttle with its leak [mm²].");
   equation(
@@ -192,7 +193,7 @@ void bind_equations(py::class_<Chain>& cls) {
       },
       "Smallest opening of at least that area [deg]; 0 or 90 beyond its range.");
   equation(
-      cls, "throttle_g_per_s", angle, pressure,
+      cls, "throttle_g_per_s", angle_field, pressure,
       [](const Chain& c) {
         return [plate = Manifold(c.air, c.bore, 1e-3)](double a, double p) {
           return plate.throttle_kg_per_s(a, p * kpa) / g;
@@ -200,13 +201,13 @@ void bind_equations(py::class_<Chain>& cls) {
       },
       "Air through the throttle against a manifold pressure [g/s]; negative above the ambient one.");
   equation(
-      cls, "opening_deg", air, pressure,
+      cls, "opening_deg", air_field, pressure,
       [](const Chain& c) {
         return [model = DemandModel(c)](double m, double p) { return model.opening_deg(m * g, p * kpa, p * kpa); };
       },
       "Opening that lets an air flow through against a manifold pressure [deg].");
   equation(
-      cls, "steady_kpa", angle, speed,
+      cls, "steady_kpa", angle_field, speed_field,
       [](const Chain& c) {
         return
             [manifold = Manifold(c.air, c.bore, 1e-3)](double a, double n) { return manifold.steady_pa({a, n}) / kpa; };
@@ -228,7 +229,7 @@ void bind_chain(py::module_& m) {
         const DemandModel model(chain);
         std::vector<double> torques, flows, pressures, openings;
         for (std::size_t i = 0; i < p.size(); ++i) {
-          const Demand demand = model.steady(pedal.checked(p[i]), speed.checked(n[i]));
+          const Demand demand = model.steady(pedal.checked(p[i]), speed_field.checked(n[i]));
           torques.push_back(demand.torque_nm);
           flows.push_back(demand.air_kg_per_s / g);
           pressures.push_back(demand.pressure_pa / kpa);

@@ -9,67 +9,67 @@
 namespace mgdd::control {
 namespace {
 
-using S = GuidedPredictiveSettings;
+using Gp = GuidedPredictiveSettings;
 using P = PlateSettings;
 using L = FrictionLearnerSettings;
 using R = BeliefReviewSettings;
 
 constexpr Domain share = closed(0.0, 1.0);
-constexpr Domain weight = closed(0.0, 1e9);
+constexpr Domain price = closed(0.0, 1e9);
 constexpr Domain rate = closed(0.0, 1e9);
 constexpr Domain angle = closed(-1e3, 1e3);
 
-constexpr std::array<Field<S>, n_guided_predictive_fields> table = joined(
+constexpr std::array<Field<Gp>, n_guided_predictive_fields> guided_predictive_table = joined(
     std::array{
-        field<&S::sample_s>({"sample_s", "s", above(0.0, 1.0), "time between samples"}),
-        field<&S::plate, &P::gain_deg_per_s2>(
+        field<&Gp::sample_s>({"sample_s", "s", above(0.0, 1.0), "time between samples"}),
+        field<&Gp::plate, &P::gain_deg_per_s2>(
             {"gain_deg_per_s2", "degree/second²", above(0.0, 1e9), "acceleration per duty"}),
-        field<&S::plate, &P::time_constant_s>({"time_constant_s", "s", above(0.0, 1e3), "of the speed"}),
-        field<&S::plate, &P::electrical_s>({"electrical_s", "s", closed(0.0, 1.0), "lag of the motor's torque"}),
+        field<&Gp::plate, &P::time_constant_s>({"time_constant_s", "s", above(0.0, 1e3), "of the speed"}),
+        field<&Gp::plate, &P::electrical_s>({"electrical_s", "s", closed(0.0, 1.0), "lag of the motor's torque"}),
     },
-    spring_fields<&S::plate, &P::spring>(),
+    spring_fields<&Gp::plate, &P::spring>(),
     std::array{
-        field<&S::plate, &P::friction>({"friction", "-", closed(0.0, 0.5), "duty against dry friction, at the start"}),
-        field<&S::plate, &P::closed_deg>({"closed_deg", "deg", angle, "lower end of the travel"}),
-        field<&S::plate, &P::open_deg>({"open_deg", "deg", angle, "upper end of the travel"}),
-        field<&S::prediction_step_s>({"prediction_step_s", "s", above(0.0, 1.0), "step of the horizon"}),
-        field<&S::error_weight>({"error_weight", "1/degree²", weight, "of the squared error at each step"}),
-        field<&S::speed_weight>({"speed_weight", "second²/degree²", weight, "of the squared speed at each step"}),
-        field<&S::duty_change_weight>({"duty_change_weight", "-", weight, "of the squared change of each move"}),
-        field<&S::lower>({"lower", "-", lower_duty, "least duty"}),
-        field<&S::upper>({"upper", "-", upper_duty, "largest duty"}),
-        field<&S::duty_rate_per_s>({"duty_rate_per_s", "1/second", above(0.0, 1e9), "largest change of the duty"}),
-        field<&S::lowest_deg>({"lowest_deg", "deg", angle, "least angle of the prediction"}),
-        field<&S::highest_deg>({"highest_deg", "deg", angle, "largest angle of the prediction"}),
-        field<&S::angle_limit_weight>({"angle_limit_weight", "1/degree²", weight, "of the squared angle beyond these"}),
-        field<&S::observer_angle_per_s>(
+        field<&Gp::plate, &P::friction>({"friction", "-", closed(0.0, 0.5), "duty against dry friction, at the start"}),
+        field<&Gp::plate, &P::closed_deg>({"closed_deg", "deg", angle, "lower end of the travel"}),
+        field<&Gp::plate, &P::open_deg>({"open_deg", "deg", angle, "upper end of the travel"}),
+        field<&Gp::prediction_step_s>({"prediction_step_s", "s", above(0.0, 1.0), "step of the horizon"}),
+        field<&Gp::error_weight>({"error_weight", "1/degree²", price, "of the squared error at each step"}),
+        field<&Gp::speed_weight>({"speed_weight", "second²/degree²", price, "of the squared speed at each step"}),
+        field<&Gp::duty_change_weight>({"duty_change_weight", "-", price, "of the squared change of each move"}),
+        field<&Gp::lower>({"lower", "-", lower_duty, "least duty"}),
+        field<&Gp::upper>({"upper", "-", upper_duty, "largest duty"}),
+        field<&Gp::duty_rate_per_s>({"duty_rate_per_s", "1/second", above(0.0, 1e9), "largest change of the duty"}),
+        field<&Gp::lowest_deg>({"lowest_deg", "deg", angle, "least angle of the prediction"}),
+        field<&Gp::highest_deg>({"highest_deg", "deg", angle, "largest angle of the prediction"}),
+        field<&Gp::angle_limit_weight>({"angle_limit_weight", "1/degree²", price, "of the squared angle beyond these"}),
+        field<&Gp::observer_angle_per_s>(
             {"observer_angle_per_s", "1/second", rate, "sum of the rates at which the errors of angle and speed die"}),
-        field<&S::observer_speed_per_s2>({"observer_speed_per_s2", "1/second²", rate, "and their product"}),
-        field<&S::noise_deg>({"noise_deg", "deg", above(0.0, 1e2), "standard deviation of the measured angle"}),
-        field<&S::learner, &L::rate_per_s>(
+        field<&Gp::observer_speed_per_s2>({"observer_speed_per_s2", "1/second²", rate, "and their product"}),
+        field<&Gp::noise_deg>({"noise_deg", "deg", above(0.0, 1e2), "standard deviation of the measured angle"}),
+        field<&Gp::learner, &L::rate_per_s>(
             {"learning_rate_per_s", "1/second", rate, "share of what explains an innovation that is learnt"}),
-        field<&S::learner, &L::gain_weight>(
-            {"gain_weight", "-", weight, "first variance of the gain factor over that of a friction level"}),
-        field<&S::learner, &L::damping_weight>({"damping_weight", "-", weight, "of the damping factor"}),
-        field<&S::learner, &L::level_memory_s>(
+        field<&Gp::learner, &L::gain_weight>(
+            {"gain_weight", "-", price, "first variance of the gain factor over that of a friction level"}),
+        field<&Gp::learner, &L::damping_weight>({"damping_weight", "-", price, "of the damping factor"}),
+        field<&Gp::learner, &L::level_memory_s>(
             {"level_memory_s", "s", above(0.0, 1e6), "sliding after which a level is as uncertain as at first"}),
-        field<&S::learner, &L::memory_s>({"memory_s", "s", above(0.0, 1e6), "the same for gain and damping"}),
-        field<&S::learner, &L::least_gain_factor>(
+        field<&Gp::learner, &L::memory_s>({"memory_s", "s", above(0.0, 1e6), "the same for gain and damping"}),
+        field<&Gp::learner, &L::least_gain_factor>(
             {"least_gain_factor", "-", above(0.0, 1.0), "least learnt gain over the given one"}),
-        field<&S::learner, &L::largest_gain_factor>(
+        field<&Gp::learner, &L::largest_gain_factor>(
             {"largest_gain_factor", "-", closed(1.0, 10.0), "largest learnt gain over the given one"}),
-        field<&S::review, &R::worse>(
+        field<&Gp::review, &R::worse>(
             {"rollback_ratio", "-", closed(1.0, 1e9), "of squared innovations, from which a belief predicts worse"}),
-        field<&S::review, &R::roll_back_s>(
+        field<&Gp::review, &R::roll_back_s>(
             {"rollback_s", "s", above(0.0, 1e6), "sliding over which a worse belief is given up"}),
-        field<&S::review, &R::certify_s>(
+        field<&Gp::review, &R::certify_s>(
             {"certify_s", "s", above(0.0, 1e6), "sliding over which a better belief is certified"}),
-        field<&S::bias_rate_per_deg_s>(
+        field<&Gp::bias_rate_per_deg_s>(
             {"bias_rate_per_deg_s", "1/(degree*second)", rate, "without learning: rate of the one bias"}),
-        field<&S::trim_rate_per_deg_s>(
+        field<&Gp::trim_rate_per_deg_s>(
             {"trim_rate_per_deg_s", "1/(degree*second)", rate, "without learning: rate of the trim"}),
-        field<&S::reference_lag_s>({"reference_lag_s", "s", closed(0.0, 10.0), "lag of the rate of the reference"}),
-        field<&S::reference_jump_deg_per_s>(
+        field<&Gp::reference_lag_s>({"reference_lag_s", "s", closed(0.0, 10.0), "lag of the rate of the reference"}),
+        field<&Gp::reference_jump_deg_per_s>(
             {"reference_jump_deg_per_s", "degree/second", above(0.0, 1e9), "a faster reference steps and has no rate"}),
     });
 
@@ -80,8 +80,8 @@ constexpr std::array<std::pair<SideSwitching, std::string_view>, 2> switchings{
 
 }  // namespace
 
-std::span<const Field<S>, n_guided_predictive_fields> guided_predictive_fields() noexcept {
-  return table;
+std::span<const Field<Gp>, n_guided_predictive_fields> guided_predictive_fields() noexcept {
+  return guided_predictive_table;
 }
 Names<Prediction> prediction_names() noexcept {
   return predictions;
@@ -90,8 +90,8 @@ Names<SideSwitching> side_switching_names() noexcept {
   return switchings;
 }
 
-void validate(const S& s) {
-  require_fields(table, s);
+void validate(const Gp& s) {
+  require_fields(guided_predictive_table, s);
   require_duty_range(s.lower, s.upper);
   const P& p = s.plate;
   if (!(p.closed_deg < p.open_deg)) {
@@ -113,7 +113,7 @@ void validate(const S& s) {
   }
 }
 
-void require_usable_belief(const PlateBelief<double>& belief, const S& settings, const char* prefix) {
+void require_usable_belief(const PlateBelief<double>& belief, const Gp& settings, const char* prefix) {
   const auto check = [prefix](const char* name, double value, double lowest, double highest) {
     require_within("state column '" + std::string(prefix) + name + "'", value, lowest, highest);
   };

@@ -8,27 +8,31 @@
 namespace mgdd::control {
 namespace {
 
-using S = HorizonSettings;
+using Hz = HorizonSettings;
 
-constexpr Domain weight = closed(0.0, 1e12);
+constexpr Domain horizon_weight = closed(0.0, 1e12);
 constexpr Domain bound = closed(-1e12, 1e12);
 constexpr Domain anywhere = closed(-unbounded, unbounded);
 
-constexpr std::array<Field<S>, n_horizon_fields> table{{
-    field<&S::output_weight>({"output_weight", "-", weight, "weight of each squared output error but the last"}),
-    field<&S::terminal_weight>({"terminal_weight", "-", weight, "weight of the last squared output error"}),
-    field<&S::input_weight>({"input_weight", "-", weight, "weight of the squared input"}),
-    field<&S::change_weight>({"change_weight", "-", weight, "weight of its squared change from sample to sample"}),
-    field<&S::lower>({"lower", "-", bound, "least input"}),
-    field<&S::upper>({"upper", "-", bound, "largest input"}),
-    field<&S::largest_change>({"largest_change", "-", above(0.0), "largest change of the input from sample to sample"}),
-    field<&S::least_output>({"least_output", "-", anywhere, "soft bound of the output"}),
-    field<&S::largest_output>({"largest_output", "-", anywhere, "soft bound of the output"}),
-    field<&S::output_limit_weight>({"output_limit_weight", "-", weight, "price of the squared excess over them"}),
-    field<&S::tolerance>({"tolerance", "-", above(0.0, 1e12), "converged where no input changes by more"}),
+constexpr std::array<Field<Hz>, n_horizon_fields> horizon_table{{
+    field<&Hz::output_weight>(
+        {"output_weight", "-", horizon_weight, "weight of each squared output error but the last"}),
+    field<&Hz::terminal_weight>({"terminal_weight", "-", horizon_weight, "weight of the last squared output error"}),
+    field<&Hz::input_weight>({"input_weight", "-", horizon_weight, "weight of the squared input"}),
+    field<&Hz::change_weight>(
+        {"change_weight", "-", horizon_weight, "weight of its squared change from sample to sample"}),
+    field<&Hz::lower>({"lower", "-", bound, "least input"}),
+    field<&Hz::upper>({"upper", "-", bound, "largest input"}),
+    field<&Hz::largest_change>(
+        {"largest_change", "-", above(0.0), "largest change of the input from sample to sample"}),
+    field<&Hz::least_output>({"least_output", "-", anywhere, "soft bound of the output"}),
+    field<&Hz::largest_output>({"largest_output", "-", anywhere, "soft bound of the output"}),
+    field<&Hz::output_limit_weight>(
+        {"output_limit_weight", "-", horizon_weight, "price of the squared excess over them"}),
+    field<&Hz::tolerance>({"tolerance", "-", above(0.0, 1e12), "converged where no input changes by more"}),
 }};
 
-constexpr std::array<std::pair<HorizonStatus, std::string_view>, 3> names{{
+constexpr std::array<std::pair<HorizonStatus, std::string_view>, 3> status_names{{
     {HorizonStatus::converged, "converged"},
     {HorizonStatus::iteration_limit, "iteration_limit"},
     {HorizonStatus::not_finite, "not_finite"},
@@ -37,15 +41,15 @@ constexpr std::array<std::pair<HorizonStatus, std::string_view>, 3> names{{
 }  // namespace
 
 std::span<const Field<HorizonSettings>, n_horizon_fields> horizon_fields() noexcept {
-  return table;
+  return horizon_table;
 }
 
 Names<HorizonStatus> horizon_status_names() noexcept {
-  return names;
+  return status_names;
 }
 
 void validate(const HorizonSettings& s) {
-  require_fields(table, s);
+  require_fields(horizon_table, s);
   if (!(s.lower < s.upper)) throw ParameterError("upper", s.upper, "must be > lower = " + text(s.lower));
   if (!(s.least_output < s.largest_output)) {
     throw ParameterError("largest_output", s.largest_output, "must be > least_output = " + text(s.least_output));

@@ -5,31 +5,31 @@
 namespace mgdd::control {
 namespace {
 
-using S = Mgdd1Settings;
-constexpr Domain weight = closed(0.0, 1e9);
+using Mg = Mgdd1Settings;
+constexpr Domain mgdd1_weight = closed(0.0, 1e9);
 
-constexpr std::array<Field<S>, n_mgdd1_fields> table{{
-    field<&S::adaptation_gain>({"adaptation_gain", "-", above(0.0, 1.0), "share of the Gauss-Newton step"}),
-    field<&S::difference>({"difference", "-", above(0.0, 0.5), "duty by which the model is asked for its slope"}),
-    field<&S::error_weight>({"error_weight", "1/degree²", weight, "of the squared error at each sample"}),
-    field<&S::duty_change_weight>({"duty_change_weight", "-", above(0.0, 1e9), "of the squared change of the duty"}),
-    field<&S::trim_rate_per_deg_s>(
-        {"trim_rate_per_deg_s", "1/(degree*second)", weight, "rate of the trim, which the model does not see"}),
-    field<&S::reference_lag_s>({"reference_lag_s", "s", closed(0.0, 10.0), "lag of the rate of the reference"}),
-    field<&S::reference_jump_deg_per_s>(
+constexpr std::array<Field<Mg>, n_mgdd1_fields> mgdd1_table{{
+    field<&Mg::adaptation_gain>({"adaptation_gain", "-", above(0.0, 1.0), "share of the Gauss-Newton step"}),
+    field<&Mg::difference>({"difference", "-", above(0.0, 0.5), "duty by which the model is asked for its slope"}),
+    field<&Mg::error_weight>({"error_weight", "1/degree²", mgdd1_weight, "of the squared error at each sample"}),
+    field<&Mg::duty_change_weight>({"duty_change_weight", "-", above(0.0, 1e9), "of the squared change of the duty"}),
+    field<&Mg::trim_rate_per_deg_s>(
+        {"trim_rate_per_deg_s", "1/(degree*second)", mgdd1_weight, "rate of the trim, which the model does not see"}),
+    field<&Mg::reference_lag_s>({"reference_lag_s", "s", closed(0.0, 10.0), "lag of the rate of the reference"}),
+    field<&Mg::reference_jump_deg_per_s>(
         {"reference_jump_deg_per_s", "degree/second", above(0.0, 1e9), "a faster reference steps and has no rate"}),
-    field<&S::lower>({"lower", "-", lower_duty, "least duty"}),
-    field<&S::upper>({"upper", "-", upper_duty, "largest duty"}),
+    field<&Mg::lower>({"lower", "-", lower_duty, "least duty"}),
+    field<&Mg::upper>({"upper", "-", upper_duty, "largest duty"}),
 }};
 
 }  // namespace
 
-std::span<const Field<S>, n_mgdd1_fields> mgdd1_fields() noexcept {
-  return table;
+std::span<const Field<Mg>, n_mgdd1_fields> mgdd1_fields() noexcept {
+  return mgdd1_table;
 }
 
-void validate(const S& s) {
-  require_fields(table, s);
+void validate(const Mg& s) {
+  require_fields(mgdd1_table, s);
   require_duty_range(s.lower, s.upper);
   require_within("horizon_samples", s.horizon_samples, 1, 1000);
   require_within("delay_samples", s.delay_samples, 0, longest_mgdd1_delay);

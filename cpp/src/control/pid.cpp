@@ -10,45 +10,46 @@
 namespace mgdd::control {
 namespace {
 
-using S = PidSettings;
+using Pi = PidSettings;
 
-constexpr Domain gain = closed(0.0, 1e3);
-constexpr Domain share = closed(0.0, 1.0);
-constexpr Domain angle = above(0.0, 1e3);
+constexpr Domain pid_gain = closed(0.0, 1e3);
+constexpr Domain pid_share = closed(0.0, 1.0);
+constexpr Domain pid_angle = above(0.0, 1e3);
 
-constexpr std::array<Field<S>, n_pid_fields> table = joined(
+constexpr std::array<Field<Pi>, n_pid_fields> pid_table = joined(
     std::array{
-        field<&S::sample_s>({"sample_s", "s", above(0.0, 1.0), "time between samples"}),
-        field<&S::above, &PidGains::proportional_per_deg>(
-            {"proportional_above_per_deg", "1/degree", gain, "duty per error above limp-home"}),
-        field<&S::above, &PidGains::integral_per_deg_s>(
-            {"integral_above_per_deg_s", "1/(degree*second)", gain, "integral gain above limp-home"}),
-        field<&S::above, &PidGains::derivative_s_per_deg>(
-            {"derivative_above_s_per_deg", "second/degree", gain, "duty against speed above limp-home"}),
-        field<&S::below, &PidGains::proportional_per_deg>(
-            {"proportional_below_per_deg", "1/degree", gain, "duty per error below limp-home"}),
-        field<&S::below, &PidGains::integral_per_deg_s>(
-            {"integral_below_per_deg_s", "1/(degree*second)", gain, "integral gain below limp-home"}),
-        field<&S::below, &PidGains::derivative_s_per_deg>(
-            {"derivative_below_s_per_deg", "second/degree", gain, "duty against speed below limp-home"}),
-        field<&S::derivative_lag_s>({"derivative_lag_s", "s", closed(0.0, 10.0), "lag of the measured speed"}),
+        field<&Pi::sample_s>({"sample_s", "s", above(0.0, 1.0), "time between samples"}),
+        field<&Pi::above, &PidGains::proportional_per_deg>(
+            {"proportional_above_per_deg", "1/degree", pid_gain, "duty per error above limp-home"}),
+        field<&Pi::above, &PidGains::integral_per_deg_s>(
+            {"integral_above_per_deg_s", "1/(degree*second)", pid_gain, "integral gain above limp-home"}),
+        field<&Pi::above, &PidGains::derivative_s_per_deg>(
+            {"derivative_above_s_per_deg", "second/degree", pid_gain, "duty against speed above limp-home"}),
+        field<&Pi::below, &PidGains::proportional_per_deg>(
+            {"proportional_below_per_deg", "1/degree", pid_gain, "duty per error below limp-home"}),
+        field<&Pi::below, &PidGains::integral_per_deg_s>(
+            {"integral_below_per_deg_s", "1/(degree*second)", pid_gain, "integral gain below limp-home"}),
+        field<&Pi::below, &PidGains::derivative_s_per_deg>(
+            {"derivative_below_s_per_deg", "second/degree", pid_gain, "duty against speed below limp-home"}),
+        field<&Pi::derivative_lag_s>({"derivative_lag_s", "s", closed(0.0, 10.0), "lag of the measured speed"}),
     },
-    spring_fields<&S::spring>("half width over which preload and gains change sides"),
+    spring_fields<&Pi::spring>("half width over which preload and gains change sides"),
     std::array{
-        field<&S::kick>({"kick", "-", share, "duty towards the reference against stiction"}),
-        field<&S::kick_width_deg>({"kick_width_deg", "deg", angle, "error at which the kick is full"}),
-        field<&S::dead_band_deg>({"dead_band_deg", "deg", closed(0.0, 1e3), "smaller errors count as zero"}),
-        field<&S::integral_window_deg>({"integral_window_deg", "deg", angle, "only smaller errors are integrated"}),
-        field<&S::integral_limit>({"integral_limit", "-", share, "bound of the integral"}),
-        field<&S::rate_s_per_deg>({"rate_s_per_deg", "second/degree", gain, "duty per rate of the reference"}),
-        field<&S::friction>({"friction", "-", share, "duty in the direction of that rate against dry friction"}),
-        field<&S::friction_rate_deg_per_s>(
+        field<&Pi::kick>({"kick", "-", pid_share, "duty towards the reference against stiction"}),
+        field<&Pi::kick_width_deg>({"kick_width_deg", "deg", pid_angle, "error at which the kick is full"}),
+        field<&Pi::dead_band_deg>({"dead_band_deg", "deg", closed(0.0, 1e3), "smaller errors count as zero"}),
+        field<&Pi::integral_window_deg>(
+            {"integral_window_deg", "deg", pid_angle, "only smaller errors are integrated"}),
+        field<&Pi::integral_limit>({"integral_limit", "-", pid_share, "bound of the integral"}),
+        field<&Pi::rate_s_per_deg>({"rate_s_per_deg", "second/degree", pid_gain, "duty per rate of the reference"}),
+        field<&Pi::friction>({"friction", "-", pid_share, "duty in the direction of that rate against dry friction"}),
+        field<&Pi::friction_rate_deg_per_s>(
             {"friction_rate_deg_per_s", "degree/second", above(0.0, 1e6), "rate at which it is full"}),
-        field<&S::reference_lag_s>({"reference_lag_s", "s", closed(0.0, 10.0), "lag of the rate of the reference"}),
-        field<&S::reference_jump_deg_per_s>(
+        field<&Pi::reference_lag_s>({"reference_lag_s", "s", closed(0.0, 10.0), "lag of the rate of the reference"}),
+        field<&Pi::reference_jump_deg_per_s>(
             {"reference_jump_deg_per_s", "degree/second", above(0.0, 1e9), "a faster reference steps and has no rate"}),
-        field<&S::lower>({"lower", "-", lower_duty, "least duty"}),
-        field<&S::upper>({"upper", "-", upper_duty, "largest duty"}),
+        field<&Pi::lower>({"lower", "-", lower_duty, "least duty"}),
+        field<&Pi::upper>({"upper", "-", upper_duty, "largest duty"}),
     });
 
 const PidSettings& checked(const PidSettings& settings) {
@@ -59,11 +60,11 @@ const PidSettings& checked(const PidSettings& settings) {
 }  // namespace
 
 std::span<const Field<PidSettings>, n_pid_fields> pid_fields() noexcept {
-  return table;
+  return pid_table;
 }
 
 void validate(const PidSettings& s) {
-  require_fields(table, s);
+  require_fields(pid_table, s);
   require_duty_range(s.lower, s.upper);
 }
 

@@ -12,7 +12,7 @@
 namespace mgdd::control {
 namespace {
 
-using S = SlidingModeSettings;
+using Sm = SlidingModeSettings;
 
 constexpr std::array<std::pair<ReachingLaw, std::string_view>, 3> law_names{{
     {ReachingLaw::boundary_layer, "boundary_layer"},
@@ -20,35 +20,35 @@ constexpr std::array<std::pair<ReachingLaw, std::string_view>, 3> law_names{{
     {ReachingLaw::super_twisting, "super_twisting"},
 }};
 
-constexpr Domain share = closed(0.0, 1.0);
+constexpr Domain sliding_share = closed(0.0, 1.0);
 
-constexpr std::array<Field<S>, n_sliding_mode_fields> table = joined(
+constexpr std::array<Field<Sm>, n_sliding_mode_fields> sliding_mode_table = joined(
     std::array{
-        field<&S::sample_s>({"sample_s", "s", above(0.0, 1.0), "time between samples"}),
-        field<&S::gain_deg_per_s2>({"gain_deg_per_s2", "degree/second**2", above(0.0, 1e9), "acceleration per duty"}),
-        field<&S::time_constant_s>({"time_constant_s", "s", above(0.0, 1e9), "time constant of the speed"}),
+        field<&Sm::sample_s>({"sample_s", "s", above(0.0, 1.0), "time between samples"}),
+        field<&Sm::gain_deg_per_s2>({"gain_deg_per_s2", "degree/second**2", above(0.0, 1e9), "acceleration per duty"}),
+        field<&Sm::time_constant_s>({"time_constant_s", "s", above(0.0, 1e9), "time constant of the speed"}),
     },
-    spring_fields<&S::spring>(),
+    spring_fields<&Sm::spring>(),
     std::array{
-        field<&S::friction>({"friction", "-", share, "duty in the direction of the reference's rate"}),
-        field<&S::friction_rate_deg_per_s>(
+        field<&Sm::friction>({"friction", "-", sliding_share, "duty in the direction of the reference's rate"}),
+        field<&Sm::friction_rate_deg_per_s>(
             {"friction_rate_deg_per_s", "degree/second", above(0.0, 1e6), "rate at which it is full"}),
-        field<&S::bandwidth_per_s>(
+        field<&Sm::bandwidth_per_s>(
             {"bandwidth_per_s", "1/second", above(0.0, 1e6), "decay of the error on the surface"}),
-        field<&S::integral_per_s>(
+        field<&Sm::integral_per_s>(
             {"integral_per_s", "1/second", closed(0.0, 1e6), "weight of the integral in the surface"}),
-        field<&S::integral_layers>(
+        field<&Sm::integral_layers>(
             {"integral_layers", "-", closed(0.0, 1e6), "integrates only while |s| is below so many layers"}),
-        field<&S::reference_pole_per_s>(
+        field<&Sm::reference_pole_per_s>(
             {"reference_pole_per_s", "1/second", above(0.0, 1e6), "double pole of the reference's filter"}),
-        field<&S::derivative_lag_s>({"derivative_lag_s", "s", closed(0.0, 10.0), "lag of the measured speed"}),
-        field<&S::switching>({"switching", "-", share, "duty of the reaching law"}),
-        field<&S::layer_deg>({"layer_deg", "deg", closed(0.0, 1e3), "error at which that duty is full"}),
-        field<&S::root_per_root_deg_per_s>({"root_per_root_deg_per_s", "(second/degree)**0.5", closed(0.0, 1e3),
-                                            "super-twisting: duty per root of |s|"}),
-        field<&S::twist_per_s>({"twist_per_s", "1/second", closed(0.0, 1e6), "super-twisting: rate of its integral"}),
-        field<&S::lower>({"lower", "-", lower_duty, "least duty"}),
-        field<&S::upper>({"upper", "-", upper_duty, "largest duty"}),
+        field<&Sm::derivative_lag_s>({"derivative_lag_s", "s", closed(0.0, 10.0), "lag of the measured speed"}),
+        field<&Sm::switching>({"switching", "-", sliding_share, "duty of the reaching law"}),
+        field<&Sm::layer_deg>({"layer_deg", "deg", closed(0.0, 1e3), "error at which that duty is full"}),
+        field<&Sm::root_per_root_deg_per_s>({"root_per_root_deg_per_s", "(second/degree)**0.5", closed(0.0, 1e3),
+                                             "super-twisting: duty per root of |s|"}),
+        field<&Sm::twist_per_s>({"twist_per_s", "1/second", closed(0.0, 1e6), "super-twisting: rate of its integral"}),
+        field<&Sm::lower>({"lower", "-", lower_duty, "least duty"}),
+        field<&Sm::upper>({"upper", "-", upper_duty, "largest duty"}),
     });
 
 const SlidingModeSettings& checked(const SlidingModeSettings& settings) {
@@ -63,11 +63,11 @@ Names<ReachingLaw> reaching_law_names() noexcept {
 }
 
 std::span<const Field<SlidingModeSettings>, n_sliding_mode_fields> sliding_mode_fields() noexcept {
-  return table;
+  return sliding_mode_table;
 }
 
 void validate(const SlidingModeSettings& s) {
-  require_fields(table, s);
+  require_fields(sliding_mode_table, s);
   require_duty_range(s.lower, s.upper);
   if (s.reaching == ReachingLaw::boundary_layer && !(s.layer_deg > 0.0)) {
     throw ParameterError("layer_deg", s.layer_deg, "must be > 0 for a boundary layer; without one take implicit",

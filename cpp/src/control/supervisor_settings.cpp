@@ -7,56 +7,56 @@
 namespace mgdd::control {
 namespace {
 
-using S = SupervisorSettings;
+using Sv = SupervisorSettings;
 using Mode = SupervisorMode;
 using Reason = SupervisorReason;
 
-constexpr Domain share = closed(0.0, 1.0);
+constexpr Domain supervisor_share = closed(0.0, 1.0);
 constexpr Domain degrees = closed(-360.0, 360.0);
 constexpr Domain width = above(0.0, 1e3);
 constexpr Domain time = above(0.0, 60.0);
 constexpr Domain volts = closed(0.0, 100.0);
 
-constexpr std::array<Field<S>, n_supervisor_fields> table = joined(
+constexpr std::array<Field<Sv>, n_supervisor_fields> supervisor_table = joined(
     std::array{
-        field<&S::sample_s>({"sample_s", "s", above(0.0, 1.0), "time between samples"}),
-        field<&S::closed_deg>({"closed_deg", "deg", degrees, "lower end of the travel"}),
-        field<&S::open_deg>({"open_deg", "deg", degrees, "upper end of the travel"}),
-        field<&S::limited_open_deg>({"limited_open_deg", "deg", degrees, "largest reference while the supply is low"}),
-        field<&S::late_s>({"late_s", "s", closed(0.0, 60.0), "age beyond which an angle is not used"}),
-        field<&S::silence_s>({"silence_s", "s", time, "time without a usable reference, angle or duty: open"}),
-        field<&S::range_margin_deg>(
+        field<&Sv::sample_s>({"sample_s", "s", above(0.0, 1.0), "time between samples"}),
+        field<&Sv::closed_deg>({"closed_deg", "deg", degrees, "lower end of the travel"}),
+        field<&Sv::open_deg>({"open_deg", "deg", degrees, "upper end of the travel"}),
+        field<&Sv::limited_open_deg>({"limited_open_deg", "deg", degrees, "largest reference while the supply is low"}),
+        field<&Sv::late_s>({"late_s", "s", closed(0.0, 60.0), "age beyond which an angle is not used"}),
+        field<&Sv::silence_s>({"silence_s", "s", time, "time without a usable reference, angle or duty: open"}),
+        field<&Sv::range_margin_deg>(
             {"range_margin_deg", "deg", width, "a sensor may say so much more than the travel"}),
-        field<&S::disagreement_deg>({"disagreement_deg", "deg", width, "the sensors may differ by so much"}),
-        field<&S::sensor_s>({"sensor_s", "s", time, "time that a sensor must be wrong: open"}),
-        field<&S::nominal_supply_v>({"nominal_supply_v", "V", above(0.0, 100.0), "supply to which duties belong"}),
-        field<&S::supply_low_v>({"supply_low_v", "V", volts, "a lower supply limits the reference"}),
-        field<&S::supply_lost_v>({"supply_lost_v", "V", volts, "a lower supply opens the bridge"}),
-        field<&S::supply_s>({"supply_s", "s", time, "time that the supply must be low"}),
+        field<&Sv::disagreement_deg>({"disagreement_deg", "deg", width, "the sensors may differ by so much"}),
+        field<&Sv::sensor_s>({"sensor_s", "s", time, "time that a sensor must be wrong: open"}),
+        field<&Sv::nominal_supply_v>({"nominal_supply_v", "V", above(0.0, 100.0), "supply to which duties belong"}),
+        field<&Sv::supply_low_v>({"supply_low_v", "V", volts, "a lower supply limits the reference"}),
+        field<&Sv::supply_lost_v>({"supply_lost_v", "V", volts, "a lower supply opens the bridge"}),
+        field<&Sv::supply_s>({"supply_s", "s", time, "time that the supply must be low"}),
     },
-    spring_fields<&S::spring>(),
+    spring_fields<&Sv::spring>(),
     std::array{
-        field<&S::friction>({"friction", "-", share, "duty against dry friction at breakaway"}),
-        field<&S::gain_deg_per_s2>({"gain_deg_per_s2", "degree/second**2", above(0.0, 1e9), "acceleration per duty"}),
-        field<&S::time_constant_s>({"time_constant_s", "s", above(0.0, 1e3), "of the speed"}),
-        field<&S::uncertainty>(
+        field<&Sv::friction>({"friction", "-", supervisor_share, "duty against dry friction at breakaway"}),
+        field<&Sv::gain_deg_per_s2>({"gain_deg_per_s2", "degree/second**2", above(0.0, 1e9), "acceleration per duty"}),
+        field<&Sv::time_constant_s>({"time_constant_s", "s", above(0.0, 1e3), "of the speed"}),
+        field<&Sv::uncertainty>(
             {"uncertainty", "-", closed(0.0, 10.0), "share by which springs and friction may differ"}),
-        field<&S::load>({"load", "-", share, "duty that the air may add"}),
-        field<&S::jam_error_deg>({"jam_error_deg", "deg", width, "a smaller error does not ask for a move"}),
-        field<&S::jam_move_deg>({"jam_move_deg", "deg", width, "a plate that moves farther is not jammed"}),
-        field<&S::jam_s>({"jam_s", "s", time, "time without that move: open"}),
-        field<&S::balance_lag_s>({"balance_lag_s", "s", above(0.0, 1.0), "each of two lags of the balance"}),
-        field<&S::spring_band_deg>({"spring_band_deg", "deg", width, "no check of the springs nearer to limp-home"}),
-        field<&S::spring_evidence_s>(
+        field<&Sv::load>({"load", "-", supervisor_share, "duty that the air may add"}),
+        field<&Sv::jam_error_deg>({"jam_error_deg", "deg", width, "a smaller error does not ask for a move"}),
+        field<&Sv::jam_move_deg>({"jam_move_deg", "deg", width, "a plate that moves farther is not jammed"}),
+        field<&Sv::jam_s>({"jam_s", "s", time, "time without that move: open"}),
+        field<&Sv::balance_lag_s>({"balance_lag_s", "s", above(0.0, 1.0), "each of two lags of the balance"}),
+        field<&Sv::spring_band_deg>({"spring_band_deg", "deg", width, "no check of the springs nearer to limp-home"}),
+        field<&Sv::spring_evidence_s>(
             {"spring_evidence_s", "s", above(0.0, 60.0), "sum of the duty beyond what a whole spring allows: open"}),
-        field<&S::tracking_error_deg>({"tracking_error_deg", "deg", width, "error that must not last"}),
-        field<&S::tracking_s>({"tracking_s", "s", time, "time that it lasts: open"}),
-        field<&S::overload_duty>(
+        field<&Sv::tracking_error_deg>({"tracking_error_deg", "deg", width, "error that must not last"}),
+        field<&Sv::tracking_s>({"tracking_s", "s", time, "time that it lasts: open"}),
+        field<&Sv::overload_duty>(
             {"overload_duty", "-", above(0.0, 1.0), "duty that must not last away from the stops"}),
-        field<&S::overload_s>({"overload_s", "s", time, "time that it lasts: open"}),
-        field<&S::limp_home_band_deg>({"limp_home_band_deg", "deg", width, "the plate is at limp-home so near to it"}),
-        field<&S::return_s>({"return_s", "s", time, "time in which the springs must bring it there"}),
-        field<&S::healthy_s>({"healthy_s", "s", time, "time without any reason before an acknowledgement counts"}),
+        field<&Sv::overload_s>({"overload_s", "s", time, "time that it lasts: open"}),
+        field<&Sv::limp_home_band_deg>({"limp_home_band_deg", "deg", width, "the plate is at limp-home so near to it"}),
+        field<&Sv::return_s>({"return_s", "s", time, "time in which the springs must bring it there"}),
+        field<&Sv::healthy_s>({"healthy_s", "s", time, "time without any reason before an acknowledgement counts"}),
     });
 
 constexpr std::pair<Mode, std::string_view> modes[] = {
@@ -93,11 +93,11 @@ Names<ReturnTest> return_test_names() noexcept {
 }
 
 std::span<const Field<SupervisorSettings>, n_supervisor_fields> supervisor_fields() noexcept {
-  return table;
+  return supervisor_table;
 }
 
 void validate(const SupervisorSettings& s) {
-  require_fields(table, s);
+  require_fields(supervisor_table, s);
   if (!(s.open_deg > s.closed_deg)) {
     throw ParameterError("open_deg", s.open_deg, "must be > closed_deg = " + text(s.closed_deg), "deg");
   }

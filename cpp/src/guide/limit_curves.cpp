@@ -13,7 +13,7 @@ using optimize::LimitState;
 constexpr double level_share = 0.1;   // of the limit's scale: how far a guide's curve may lie off
 constexpr double slope_sd = 0.3;      // [-] of the plant's slope over the guide's
 constexpr double noise_share = 0.01;  // of the limit's scale: first guess of the noise
-constexpr double guess_counts = 4.0;
+constexpr double limit_guess_counts = 4.0;
 constexpr double caution = 2.0;  // standard deviations of the mean
 constexpr int grid = 160, halvings = 10;
 
@@ -106,7 +106,7 @@ LimitCurves::Line LimitCurves::line(std::size_t i) const noexcept {
     out.b = (n[count] * n[my] / out.noise + slope / var_b) / information;
     out.var_b = 1.0 / information;
     const double left = n[count] * std::max(0.0, n[yy] - 2.0 * out.b * n[my] + out.b * out.b * n[mm]);
-    out.noise = (guess_counts * guess + left) / (guess_counts + std::max(0.0, n[count] - 2.0));
+    out.noise = (limit_guess_counts * guess + left) / (limit_guess_counts + std::max(0.0, n[count] - 2.0));
   }
   const double level = n[count] / out.noise + 1.0 / var_a;
   out.a = (n[count] * n[mean_y] / out.noise + (drawn ? n[mean_m] / var_a : 0.0)) / level;

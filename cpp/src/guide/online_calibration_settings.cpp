@@ -12,7 +12,7 @@ namespace {
 
 constexpr double gamma_lower = 1.15, gamma_upper = 1.6;  // the offset of gamma must leave a gas
 
-constexpr std::array<std::pair<CalibrationMethod, std::string_view>, 3> method_names{{
+constexpr std::array<std::pair<CalibrationMethod, std::string_view>, 3> calibration_method_names{{
     {CalibrationMethod::extremum_seeking, "extremum_seeking"},
     {CalibrationMethod::gauss_newton, "gauss_newton"},
     {CalibrationMethod::recursive, "recursive"},
@@ -21,10 +21,10 @@ constexpr std::array<std::pair<CalibrationMethod, std::string_view>, 3> method_n
 }  // namespace
 
 std::string_view to_string(CalibrationMethod method) noexcept {
-  return name_of<CalibrationMethod>(method_names, method);
+  return name_of<CalibrationMethod>(calibration_method_names, method);
 }
 CalibrationMethod parse_calibration_method(std::string_view name) {
-  return parse_name<CalibrationMethod>(method_names, "method", name);
+  return parse_name<CalibrationMethod>(calibration_method_names, "method", name);
 }
 int parse_calibrated(std::string_view field, std::string_view name) {
   std::string valid;

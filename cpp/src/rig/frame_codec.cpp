@@ -27,11 +27,11 @@ constexpr std::array<std::pair<Commanded, std::string_view>, 4> commanded{{{Comm
                                                                            {Commanded::fixed, "fixed"}}};
 
 std::string name(const MeasuredSignal& signal, std::size_t) {
-  return std::string(mgdd::name_of(measured_names(), signal.what));
+  return std::string(name_of(measured_names(), signal.what));
 }
 // A command may have several fixed numbers.
 std::string name(const CommandedSignal& signal, std::size_t place) {
-  const std::string shown(mgdd::name_of(commanded_names(), signal.what));
+  const std::string shown(name_of(commanded_names(), signal.what));
   return signal.what == Commanded::fixed ? shown + " " + std::to_string(place + 1) : shown;
 }
 

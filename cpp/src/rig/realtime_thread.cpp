@@ -34,7 +34,7 @@ constexpr double shortest_period_s = 5e-5, longest_period_s = 1.0;
 
 #ifdef __linux__
 
-std::string why(int error) {
+std::string reason_of(int error) {
   return std::generic_category().message(error);
 }
 
@@ -44,7 +44,7 @@ void ask_for_realtime(std::thread& thread, int priority, ScheduleGrant& grant) {
   const int error = pthread_setschedparam(thread.native_handle(), SCHED_FIFO, &parameters);
   grant.realtime = error == 0;
   if (error != 0) {
-    grant.realtime_note = why(error) + ": give the user rtprio in /etc/security/limits.conf, or CAP_SYS_NICE";
+    grant.realtime_note = reason_of(error) + ": give the user rtprio in /etc/security/limits.conf, or CAP_SYS_NICE";
   }
 }
 
@@ -64,7 +64,7 @@ void ask_for_memory(ScheduleGrant& grant) {
     return;
   }
   grant.memory_locked = mlockall(MCL_CURRENT | MCL_FUTURE) == 0;
-  if (!grant.memory_locked) grant.memory_note = why(errno);
+  if (!grant.memory_locked) grant.memory_note = reason_of(errno);
 }
 
 // Timers of ordinary threads may ring 50 us late; those of SCHED_FIFO do not.

@@ -12,10 +12,10 @@ namespace {
 
 using Wide = PlantLanes::Wide;
 using Coefficients = PlantCoefficients<double>;
-constexpr auto width = static_cast<std::size_t>(PlantLanes::width);
+constexpr auto lane_count = static_cast<std::size_t>(PlantLanes::width);
 static_assert(sizeof(PlantCoefficients<Wide>) == n_plant_coefficients * sizeof(Wide));
 
-PlantCoefficients<Wide> packed(const std::array<Coefficients, width>& lanes) noexcept {
+PlantCoefficients<Wide> packed(const std::array<Coefficients, lane_count>& lanes) noexcept {
   std::array<Wide, n_plant_coefficients> columns{};
   for (int lane = 0; lane < PlantLanes::width; ++lane) {
     const auto flat = std::bit_cast<std::array<double, n_plant_coefficients>>(lanes[static_cast<std::size_t>(lane)]);
@@ -30,11 +30,11 @@ const ThrottleCase& case_in(std::span<const ThrottleCase> cases, std::size_t lan
 }
 
 PlantLanes::Plant plant_of(std::span<const ThrottleCase> cases, double step_s) {
-  require_within("number of throttles", static_cast<double>(cases.size()), 1.0, static_cast<double>(width));
+  require_within("number of throttles", static_cast<double>(cases.size()), 1.0, static_cast<double>(lane_count));
   require_within("step_s", step_s, step_lower_s, step_upper_s, "s");
-  std::array<Coefficients, width> coefficients{};
+  std::array<Coefficients, lane_count> coefficients{};
   Throttle options = cases[0].throttle;
-  for (std::size_t lane = 0; lane < width; ++lane) {
+  for (std::size_t lane = 0; lane < lane_count; ++lane) {
     const Throttle& one = case_in(cases, lane).throttle;
     validate(one);
     if (!same_form(one, cases[0].throttle)) {

@@ -12,7 +12,7 @@ from . import guide
 from . import systems
 from . import loop
 from . import rig
-__all__: list[str] = ['compiled_simd_level', 'compiler', 'control', 'engine', 'guide', 'identify', 'loop', 'math', 'optimize', 'processor_simd_levels', 'rig', 'systems', 'throttle']
+__all__: list[str] = ['compiled_simd_level', 'compiler', 'control', 'engine', 'guide', 'identify', 'instruction_set', 'loop', 'math', 'optimize', 'processor_simd_levels', 'rig', 'systems', 'throttle']
 def compiled_simd_level() -> str:
     """
     Instruction set of this build.
@@ -20,6 +20,10 @@ def compiled_simd_level() -> str:
 def compiler() -> str:
     """
     Compiler of this build.
+    """
+def instruction_set() -> str:
+    """
+    Instruction set that the kernels run in: the widest of this processor, or MGDD_INSTRUCTION_SET.
     """
 def processor_simd_levels() -> list[str]:
     """

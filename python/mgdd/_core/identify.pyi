@@ -8,7 +8,7 @@ import mgdd._core.optimize
 import numpy
 import numpy.typing
 import typing
-__all__: list[str] = ['CylinderFit', 'GradientPwR', 'LoadBurn', 'LoadFit', 'MeasuredCycle', 'RecursivePwR', 'WindowPwR', 'common_parameters', 'correlation_limit', 'estimate_burn', 'fit_cylinder', 'fit_pseudo_wiener', 'fit_smooth_throttle', 'fit_throttle_groups', 'group_names', 'load_parameters', 'simulate_smooth_throttle', 'simulate_throttle_groups', 'smooth_example', 'smooth_names', 'smooth_throttle_instruction_set', 'throttle_group_bounds', 'wall_heat_scale_upper', 'with_burn']
+__all__: list[str] = ['CylinderFit', 'GradientPwR', 'LoadBurn', 'LoadFit', 'MeasuredCycle', 'RecursivePwR', 'WindowPwR', 'common_parameters', 'correlation_limit', 'estimate_burn', 'fit_cylinder', 'fit_pseudo_wiener', 'fit_smooth_throttle', 'fit_throttle_groups', 'group_names', 'load_parameters', 'simulate_smooth_throttle', 'simulate_throttle_groups', 'smooth_example', 'smooth_names', 'throttle_group_bounds', 'wall_heat_scale_upper', 'with_burn']
 class MeasuredCycle:
     def __init__(self, *, label: str, crank_angle_cad: typing.Annotated[numpy.typing.ArrayLike, numpy.float64], pressure_bar: typing.Annotated[numpy.typing.ArrayLike, numpy.float64], point: mgdd._core.engine.OperatingPoint) -> None:
         ...
@@ -208,10 +208,6 @@ def simulate_smooth_throttle(parameters: typing.Annotated[collections.abc.Sequen
 def simulate_throttle_groups(values: typing.Annotated[collections.abc.Sequence[typing.SupportsFloat | typing.SupportsIndex], "FixedSize(19)"], duty: typing.Annotated[numpy.typing.ArrayLike, numpy.float64], *, step_s: typing.SupportsFloat | typing.SupportsIndex, start: typing.Annotated[collections.abc.Sequence[typing.SupportsFloat | typing.SupportsIndex], "FixedSize(3)"], closed_deg: typing.SupportsFloat | typing.SupportsIndex, open_deg: typing.SupportsFloat | typing.SupportsIndex, substeps: typing.SupportsInt | typing.SupportsIndex) -> numpy.typing.NDArray[numpy.float64]:
     """
     Angle [deg] on every sample; releases the GIL.
-    """
-def smooth_throttle_instruction_set() -> str:
-    """
-    Instruction set that the kernel chose on this machine.
     """
 def throttle_group_bounds() -> list:
     """

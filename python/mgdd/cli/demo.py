@@ -7,10 +7,11 @@ from pathlib import Path
 from typing import Any
 
 from mgdd.cli.options import add_command
-from mgdd.cli.output import check_output, emit
+from mgdd.cli.output import Stopped, check_output, emit
+from mgdd.errors import Interrupted
 from mgdd.loop.controller_families import FAMILIES
 from mgdd.report import write_report
-from mgdd.studies import run_study
+from mgdd.studies import StudyResult, run_study
 from mgdd.studies.sections import Table
 
 __all__ = ["add"]
@@ -21,6 +22,9 @@ _GUIDED = {
     "curve": "guided by the model's curve",
     "parabola": "guided by a parabola",
 }
+
+
+_CUT_SHORT = "\nInterrupted: these are the models that were finished, and not every check of them was made."
 
 
 def add(commands: Any) -> None:
@@ -36,19 +40,39 @@ def add(commands: Any) -> None:
 
 
 def run(args: argparse.Namespace) -> None:
-    """Run the study and write the report."""
+    """Run three studies and write the report of the first; Ctrl-C keeps what is finished."""
     check_output(args)
     step = args.progress.expect(120)
-    result = run_study("measured-traces", progress=step)
+    result, stopped = _kept("measured-traces", progress=step)
     step("write the report")
     page = write_report(result, Path(args.folder))
-    guided = run_study("guided", quick=True, figures=False, progress=step).summary
-    throttle = run_study("throttle-tracking", quick=True, figures=False, progress=step).summary
-    text = [*_text(result.summary, page), *_guided_text(guided), *_throttle_text(throttle)]
-    emit(args, {**result.summary, "guided": guided, "throttle": throttle}, text=text)
+    summary, text = {**result.summary, "report": page.as_posix()}, _text(result.summary)
+    for key, study, told in (("guided", "guided", _guided_text), ("throttle", "throttle-tracking", _throttle_text)):
+        if stopped:
+            break
+        try:
+            part, stopped = _kept(study, quick=True, figures=False, progress=step)
+        except KeyboardInterrupt:
+            stopped = True
+        else:
+            summary[key] = part.summary
+            text += told(part.summary)
+    emit(args, summary, text=[*text, f"\nEvery model's answer, and what to distrust: {page}"])
+    if stopped:
+        raise Stopped(f"what was finished is printed, and in {page}")
 
 
-def _text(summary: Any, page: Path) -> list[str | Table]:
+def _kept(study: str, **options: Any) -> tuple[StudyResult, bool]:
+    """Run a study, or as much of it as Ctrl-C leaves, and say whether it did."""
+    try:
+        return run_study(study, **options), False
+    except Interrupted as stop:
+        if not isinstance(stop.partial, StudyResult):
+            raise
+        return stop.partial, True
+
+
+def _text(summary: Any) -> list[str | Table]:
     columns = (
         "trace", "RMSE [%]", "closed IMEP err [%]", "best CA50, no limit [CAD]", "move by [CAD]", "gain [%]",
         "own p_max kept: move by [CAD]", "gain [%]",
@@ -68,7 +92,7 @@ def _text(summary: Any, page: Path) -> list[str | Table]:
     return [
         (
             f"{len(summary['traces'])} measured traces, calibrated with {kept} plausible models of {len(members)}. "
-            "Angles are °CA aTDC.\n"
+            f"Angles are °CA aTDC.{_CUT_SHORT if summary['interrupted'] else ''}\n"
         ),
         Table(columns=columns, rows=tuple(rows)),
         (
@@ -76,7 +100,6 @@ def _text(summary: Any, page: Path) -> list[str | Table]:
             "wall heat and gamma stand in for each other here, so one best timing would be false precision.\n"
             "Positive moves are later."
         ),
-        f"Every model's answer, and what to distrust: {page}",
     ]
 
 

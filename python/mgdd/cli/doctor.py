@@ -36,6 +36,7 @@ def run(args: argparse.Namespace) -> None:
         "compiler": _core.compiler(),
         "simd_compiled": _core.compiled_simd_level(),
         "simd_processor": ", ".join(_core.processor_simd_levels()),
+        "simd_used": _core.instruction_set(),
         "cores": os.cpu_count(),
         "presets": ", ".join(presets.available()),
         "data_sets": ", ".join(datasets.available()),
@@ -65,6 +66,8 @@ def _requirements() -> tuple[list[str], dict[str, list[str]]]:
         requirement = Requirement(line)
         if requirement.marker is None:
             required.append(requirement.name)
+            continue
+        if requirement.name == "mgdd":  # the extra that names all others
             continue
         for extra in metadata.get_all("Provides-Extra") or []:
             if requirement.marker.evaluate({"extra": extra}):

@@ -111,7 +111,7 @@ class _Run:
                     self._progress(self._done, self._n)
         except KeyboardInterrupt:
             self._settle()
-            return Interrupted(f"interrupted: {self._done} of {self._n} are finished, they are in .partial")
+            return Interrupted(f"interrupted: {self._kept()}")
         except _Lost as lost:
             self._settle()
             return lost.error
@@ -192,7 +192,9 @@ class _Run:
             ) from error
 
     def _kept(self) -> str:
-        return f"{self._done} are finished, they are in .partial"
+        if not self._done:
+            return "nothing was finished"
+        return f"{self._done} of {self._n} are finished, they are in .partial"
 
     def _settle(self, *, keep: bool = True) -> None:
         """Cancel what has not begun, wait for what runs, and keep it."""

@@ -9,6 +9,7 @@ from typing import TYPE_CHECKING, Any
 from mgdd import datasets, presets
 from mgdd._core.engine import Cylinder, OperatingPoint
 from mgdd.engine import analyze
+from mgdd.errors import Interrupted, hand_over
 from mgdd.identify import best_timing, estimate_tdc, wall_heat_profile
 from mgdd.identify.engine.best_timing import doubts_of, headline_of
 from mgdd.identify.engine.burn_laws import compare_laws
@@ -25,6 +26,9 @@ from mgdd.studies.measured_summary import law_table, summarize
 
 if TYPE_CHECKING:
     import xarray as xr
+
+    from mgdd.identify.engine.tdc import TdcEstimate
+    from mgdd.identify.engine.timing_records import BestTiming
 
 __all__ = ["run_measured_traces"]
 
@@ -72,6 +76,11 @@ def run_measured_traces(
     StudyResult
         Its summary holds ``traces``, ``laws``, ``common``, ``unidentifiable``, ``warnings`` and ``best_timing``.
 
+    Raises
+    ------
+    mgdd.errors.Interrupted
+        Ctrl-C; ``partial`` is the study over the models that were finished, or None.
+
     Examples
     --------
     >>> from mgdd.studies import run_study
@@ -87,18 +96,31 @@ def run_measured_traces(
     progress("analyse the traces")
     analyses = [analyze(trace, cylinder, point=point, quiet=True) for trace in traces]
     scheme: dict[str, Any] = {"step_cad": step_cad, "integrator": integrator}
-    timing = best_timing(traces, cylinder, point=point, progress=progress, **scheme)
+    timing, stop = _timing(traces, cylinder, point=point, progress=progress, **scheme)
     main = headline_of(timing)
-    tdc = None if quick else estimate_tdc(traces, cylinder, point=point, span_cad=_TDC_SPAN_CAD, progress=progress)
-    fits = compare_laws(traces, cylinder, point=point, progress=progress, **scheme)
-    profiles = {} if quick else _profiles(main, progress)
+    fits, profiles = [main.fit], dict[str, WallHeatProfile]()
+    tdc: TdcEstimate | None = None
+    if stop is None:
+        try:
+            fits = compare_laws(traces, cylinder, point=point, progress=progress, **scheme)
+            if not quick:
+                tdc = estimate_tdc(traces, cylinder, point=point, span_cad=_TDC_SPAN_CAD, progress=progress)
+                profiles = _profiles(main, progress)
+        except KeyboardInterrupt:
+            stop = Interrupted("interrupted: the models and their best timing are in .partial, not all checks of them")
     summary = summarize(analyses, fits, main, profiles, timing)
+    summary["interrupted"] = stop is not None
     summary["warnings"] = doubts_of(timing, tdc)
+    if stop is not None:
+        done = len(timing[0].members)
+        summary["warnings"].insert(
+            0, f"interrupted: ranges over {done} finished model(s), and not every check was made"
+        )
     summary["engine"] = {name: getattr(cylinder, name) for name in _GEOMETRY}
     summary["data"] = _PROVENANCE if own else "Files of the user."
     plain = to_jsonable(summary)
     drawn = draw(analyses, main, profiles, timing) if figures else {}
-    return StudyResult(
+    result = StudyResult(
         name="measured-traces",
         title="Measured pressure, calibrated cycle model, best timing",
         dataset=law_table(fits),
@@ -106,6 +128,17 @@ def run_measured_traces(
         summary=plain,
         sections=measured_sections(plain, drawn),
     )
+    return hand_over(result, stop)
+
+
+def _timing(*traces: Any, **options: Any) -> tuple[list[BestTiming], Interrupted | None]:
+    """Find the best timing by all models, or by those that were finished before Ctrl-C."""
+    try:
+        return best_timing(*traces, **options), None
+    except Interrupted as stop:
+        if stop.partial is None:
+            raise
+        return stop.partial, stop
 
 
 def _profiles(main: Member, progress: Progress) -> dict[str, WallHeatProfile]:

@@ -22,7 +22,11 @@ namespace mgdd {
 enum class InstructionSet { baseline, avx2, avx512f };
 std::string_view to_string(InstructionSet set) noexcept;
 
-/// The widest one that this processor has and the compiler knows; asked once.
+/// The one that the environment variable MGDD_INSTRUCTION_SET names, or the widest that this processor has and the
+/// compiler knows. ParameterError for a name that is unknown, or of a set that the processor lacks.
+InstructionSet wanted_instruction_set();
+
+/// The same, asked once; the widest where the variable names none that can run.
 InstructionSet instruction_set() noexcept;
 
 namespace detail {

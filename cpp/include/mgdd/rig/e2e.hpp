@@ -42,7 +42,8 @@ inline constexpr Crc8 crc8_h2f{.polynomial = 0x2F};  ///< CRC-8H2F of AUTOSAR; o
 
 /// "sae_j1850", "h2f"; ParameterError lists the names.
 Crc8 named_crc8(std::string_view name);
-/// Its name, where it has one.
+/// Its name, where it has one; beside that of an enumerator.
+using mgdd::name_of;
 std::optional<std::string_view> name_of(const Crc8& crc) noexcept;
 
 /// Which bytes of the data identifier the CRC covers beside the payload.

@@ -26,11 +26,11 @@ constexpr double reached_factor = 1.005;
 // The search runs in coordinates in which the flat valley of this plant is an axis. From duty and angle alone, torque
 // constant and resistance act nearly only as Km/R, viscous friction and back-EMF only as Kv + N^2 Km Ke/R; what tells
 // them apart is the inductance. Slots: Km/R for Km, the total for Ke; all others are the parameters themselves.
-constexpr std::size_t km = 0, kv = 1, ke = 8, r = 9, limp_home = 7;
+constexpr std::size_t km = 0, kv = 1, ke = 8, resistance = 9, limp_home = 7;
 
 Set to_search(const Set& p, double n_squared) noexcept {
   Set q = p;
-  q[km] = p[km] / p[r];
+  q[km] = p[km] / p[resistance];
   q[ke] = p[kv] + n_squared * q[km] * p[ke];
   return q;
 }
@@ -38,12 +38,12 @@ Set to_search(const Set& p, double n_squared) noexcept {
 // Back, clipped to the bounds of the parameters; `chain` is d parameter / d search coordinate, zero where clipped.
 Set from_search(const Set& q, double n_squared, const SmoothThrottleFitOptions& options, Eigen::MatrixXd& chain) {
   Set p = q;
-  p[km] = q[km] * q[r];
+  p[km] = q[km] * q[resistance];
   const double slope = 1.0 / (n_squared * q[km]);
   p[ke] = (q[ke] - q[kv]) * slope;
   chain.setIdentity(10, 10);
-  chain(km, km) = q[r];
-  chain(km, r) = q[km];
+  chain(km, km) = q[resistance];
+  chain(km, resistance) = q[km];
   chain(ke, ke) = slope;
   chain(ke, kv) = -slope;
   chain(ke, km) = -p[ke] / q[km];
@@ -58,8 +58,8 @@ Set from_search(const Set& q, double n_squared, const SmoothThrottleFitOptions& 
 std::vector<optimize::Parameter> search_parameters(const SmoothThrottleFitOptions& o, double n_squared,
                                                    const std::vector<std::size_t>& free) {
   Set lower = o.lower, upper = o.upper;
-  lower[km] = o.lower[km] / o.upper[r];
-  upper[km] = o.upper[km] / o.lower[r];
+  lower[km] = o.lower[km] / o.upper[resistance];
+  upper[km] = o.upper[km] / o.lower[resistance];
   lower[ke] = o.lower[kv] + n_squared * lower[km] * o.lower[ke];
   upper[ke] = o.upper[kv] + n_squared * upper[km] * o.upper[ke];
   std::vector<optimize::Parameter> parameters;

@@ -9,7 +9,7 @@
 namespace mgdd::optimize {
 namespace {
 
-constexpr double least_distance = 0.5;  // of the difference: inputs applied nearer to each other show no slope
+constexpr double least_difference = 0.5;  // of the difference: inputs applied nearer to each other show no slope
 
 GradientDescentSettings checked(GradientDescentSettings s) {
   const Eigen::Index n = s.space.size();
@@ -66,7 +66,7 @@ TellStatus GradientDescent::tell(const Reading& reading) noexcept {
     above_missed_ = missed;
   } else {
     const double distance = 2.0 * settings_.difference + (above_missed_ - missed);  // between the applied inputs
-    const bool moved = distance > least_distance * settings_.difference;
+    const bool moved = distance > least_difference * settings_.difference;
     gradient_[input] = moved ? (above_ - j) / distance : 0.0;
   }
   if (++stage_ < 2 * estimate_.size()) return status;

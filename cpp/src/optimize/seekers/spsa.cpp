@@ -14,7 +14,7 @@
 namespace mgdd::optimize {
 namespace {
 
-constexpr std::array<std::pair<SpsaForm, std::string_view>, 3> form_names{{
+constexpr std::array<std::pair<SpsaForm, std::string_view>, 3> spsa_form_names{{
     {SpsaForm::first_order, "first_order"},
     {SpsaForm::second_order, "second_order"},
     {SpsaForm::one_measurement, "one_measurement"},
@@ -27,9 +27,9 @@ constexpr std::array<std::pair<GainSchedule, std::string_view>, 2> schedule_name
 constexpr double memory = 10.0;              // measurements behind the trend and the limits
 constexpr double one_measurement_start = 6;  // measurements before the trend is trusted
 constexpr double blocking_errors = 2.0;
-constexpr int clamp_window = 6;          // measurements, at least, before a clamp is judged
-constexpr double least_distance = 0.25;  // of the perturbation: with less applied a slope is not computed
-constexpr double share_rate = 0.25;      // how fast the perturbation follows its target, per iteration
+constexpr int clamp_window = 6;              // measurements, at least, before a clamp is judged
+constexpr double least_perturbation = 0.25;  // of the perturbation: with less applied a slope is not computed
+constexpr double perturbation_rate = 0.25;   // how fast the perturbation follows its target, per iteration
 
 SpsaSettings checked(SpsaSettings s) {
   const bool second = s.form == SpsaForm::second_order;
@@ -74,10 +74,10 @@ SpsaSettings checked(SpsaSettings s) {
 }  // namespace
 
 std::string_view to_string(SpsaForm v) noexcept {
-  return name_of<SpsaForm>(form_names, v);
+  return name_of<SpsaForm>(spsa_form_names, v);
 }
 SpsaForm parse_spsa_form(std::string_view name) {
-  return parse_name<SpsaForm>(form_names, "form", name);
+  return parse_name<SpsaForm>(spsa_form_names, "form", name);
 }
 std::string_view to_string(GainSchedule v) noexcept {
   return name_of<GainSchedule>(schedule_names, v);
@@ -205,7 +205,7 @@ void Spsa::watch(const Inputs& applied) noexcept {
 void Spsa::add_slope(double rise, double c, const Inputs& missed) noexcept {
   for (Eigen::Index i = 0; i < sum_.size(); ++i) {
     const double distance = c * direction(0, i) + missed[i];
-    if (std::abs(distance) > least_distance * c) sum_[i] += rise / distance;
+    if (std::abs(distance) > least_perturbation * c) sum_[i] += rise / distance;
   }
 }
 
@@ -227,7 +227,7 @@ void Spsa::finish_gradient(double j, const Inputs& applied) noexcept {
   if (within + 1 < static_cast<std::size_t>(per)) return;
   add_slope(measured_[0] - measured_[1], 2.0 * c, missed_.col(0) - missed_.col(1));
   const InputMatrix uneven = missed_.colwise() - missed_.col(0);  // an offset common to all four does not matter
-  if (settings_.form == SpsaForm::second_order && uneven.cwiseAbs().maxCoeff() > least_distance * c) {
+  if (settings_.form == SpsaForm::second_order && uneven.cwiseAbs().maxCoeff() > least_perturbation * c) {
     hessian_sum_ += hessian_;  // perturbations that are cut off bend whatever they measure
   } else if (settings_.form == SpsaForm::second_order) {
     const double bend = ((measured_[2] - measured_[0]) - (measured_[3] - measured_[1])) / (2.0 * c * c);
@@ -274,7 +274,7 @@ void Spsa::finish_iteration() noexcept {
   step = filter_.project(estimate_, step, {settings_.space, widest, reach, most, most, metric_});
   candidate_ = estimate_;
   move_within(candidate_, step, settings_.space, widest, clamp_, Inputs::Zero(step.size()));
-  share_ += share_rate * ((filter_.active() ? settings_.limit_amplitude : 1.0) - share_);
+  share_ += perturbation_rate * ((filter_.active() ? settings_.limit_amplitude : 1.0) - share_);
 }
 
 void Spsa::restart() noexcept {

@@ -11,7 +11,7 @@
 namespace mgdd::optimize {
 namespace {
 
-constexpr std::array<std::pair<TunedMethod, std::string_view>, 3> method_names{{
+constexpr std::array<std::pair<TunedMethod, std::string_view>, 3> tuned_method_names{{
     {TunedMethod::batch, "batch"},
     {TunedMethod::moving_average, "moving_average"},
     {TunedMethod::spsa, "spsa"},
@@ -147,10 +147,10 @@ Tuning tune_dither(const TuningSpec& w) {
 }  // namespace
 
 std::string_view to_string(TunedMethod v) noexcept {
-  return name_of<TunedMethod>(method_names, v);
+  return name_of<TunedMethod>(tuned_method_names, v);
 }
 TunedMethod parse_tuned_method(std::string_view name) {
-  return parse_name<TunedMethod>(method_names, "method", name);
+  return parse_name<TunedMethod>(tuned_method_names, "method", name);
 }
 
 Tuning tune(const TuningSpec& spec) {

@@ -10,7 +10,7 @@ from mgdd import _core
 from mgdd._core.engine import Cylinder, OperatingPoint
 from mgdd.engine import find_optimum, simulate
 from mgdd.engine.optimum import DEFAULT_CAD, check_request
-from mgdd.errors import ConvergenceError
+from mgdd.errors import ConvergenceError, Interrupted, hand_over
 from mgdd.identify.engine.family import Member, ModelFamily, fit_family
 from mgdd.identify.engine.records import Load
 from mgdd.identify.engine.request import Bounds, Request
@@ -75,6 +75,8 @@ def best_timing(
         No member of the family could be fitted, or a plausible one has no timing within the limits.
     mgdd.errors.ParameterError, mgdd.errors.DataError
         As in `fit_cylinder` and `find_optimum`.
+    mgdd.errors.Interrupted
+        Ctrl-C; ``partial`` is the list over the models that were finished, or None.
 
     Examples
     --------
@@ -93,7 +95,14 @@ def best_timing(
         step_cad=step_cad, integrator=integrator, options=None,
         pegging=pegging, pegging_exponent=pegging_exponent, inlet_pressure_kpa=inlet_pressure_kpa,
     )  # fmt: skip
-    members = [m for m in fit_family(request, family or ModelFamily(), progress) if math.isfinite(m.fit.report.rmse)]
+    stop: Interrupted | None = None
+    try:
+        fitted = fit_family(request, family or ModelFamily(), progress)
+    except Interrupted as error:
+        if error.partial is None:
+            raise
+        fitted, stop = error.partial, error
+    members = [member for member in fitted if math.isfinite(member.fit.report.rmse)]
     if not members:
         raise ConvergenceError("no model of the family could be fitted to these traces: check geometry, TDC, pegging")
     scheme: dict[str, Any] = {"step_cad": step_cad, "integrator": integrator}
@@ -101,7 +110,7 @@ def best_timing(
         tuple(_answer(member, at, objective, limits, bounds_cad, scheme) for member in members)
         for at in range(len(request.traces))
     ]
-    return [_over_family(label, own) for label, own in zip(request.labels, answers, strict=True)]
+    return hand_over([_over_family(label, own) for label, own in zip(request.labels, answers, strict=True)], stop)
 
 
 def _answer(

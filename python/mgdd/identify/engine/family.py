@@ -8,7 +8,7 @@ from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass, field, replace
 
 from mgdd._core.engine import Cylinder
-from mgdd.errors import ParameterError
+from mgdd.errors import Interrupted, ParameterError, hand_over
 from mgdd.identify.engine.cylinder import fit_request
 from mgdd.identify.engine.records import CylinderFit, Load
 from mgdd.identify.engine.request import BURN_FIELDS, GAMMA_PARAMETER, SHAPE_FIELDS, Request
@@ -161,18 +161,23 @@ class Member:
 def fit_family(
     request: Request, family: ModelFamily, progress: Callable[[str], None] | None = None
 ) -> tuple[Member, ...]:
-    """Fit every member and judge it; the members stand in the order of the family."""
-    members = []
-    for own in family.requests(request):
-        fit = fit_request(own)
-        members.append(_member(own, fit))
-        if progress is not None:
-            progress(f"calibrated {members[-1].name}")
+    """Fit every member and judge it, in the order of the family; Ctrl-C hands over the finished ones."""
+    members: list[Member] = []
+    stop: Interrupted | None = None
+    try:
+        for own in family.requests(request):
+            members.append(_member(own, fit_request(own)))
+            if progress is not None:
+                progress(f"calibrated {members[-1].name}")
+    except KeyboardInterrupt:
+        if not members:
+            raise Interrupted("interrupted: no model was finished") from None
+        stop = Interrupted(f"interrupted: {len(members)} finished models are in .partial")
     least = min(m.fit.report.rmse for m in members)
     members = [replace(m, why_not=tuple(_judged(m, family, least))) for m in members]
     # The choice is among the plausible ones, so an implausible member does not set the measure.
     kept = [m.fit.report.rmse for m in members if "" in m.why_not]
-    return tuple(replace(m, score=_score(m, family, min(kept, default=least))) for m in members)
+    return hand_over(tuple(replace(m, score=_score(m, family, min(kept, default=least))) for m in members), stop)
 
 
 def of_law(request: Request, cylinder: Cylinder, common: tuple[str, ...]) -> Request:

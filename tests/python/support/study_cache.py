@@ -1,0 +1,75 @@
+"""Studies that ran once are read again: by other tests, by other workers, by the next run of the same code.
+
+The results lie below build/studies, in a folder named after what made them: the module, its sources and its data.
+"""
+
+from __future__ import annotations
+
+import fcntl
+import functools
+import hashlib
+import inspect
+import os
+import pickle
+import shutil
+from pathlib import Path
+from typing import Any
+
+import mgdd
+from mgdd import _core
+from mgdd.studies import StudyResult, run_study
+from mgdd.studies.registry import function_of
+
+ALL = Path(__file__).resolve().parents[3] / "build" / "studies"
+KEPT_VERSIONS = 3
+# The quick studies of all tests: fewer seeds where the tables that are tested are the same with them.
+QUICK: dict[str, dict[str, int]] = {
+    "calibrated-guide": {"seeds": 2},
+    "guide-accuracy": {"seeds": 4},
+    "guided-start-up": {"seeds": 6},
+    "guided-transients": {"seeds": 2},
+    "ignition-delay": {"seeds": 3},
+    "measured-engine-seek": {"seeds": 1},
+    "model-validation": {"seeds": 6},
+    "online-calibration": {"seeds": 2},
+    "sensor-delay": {"seeds": 4},
+    "throttle-first-principle": {"seeds": 1},
+    "throttle-pseudo-wiener": {"starts": 4},
+}
+
+
+@functools.cache
+def folder() -> Path:
+    """Make the folder of this version, and forget old ones."""
+    digest = hashlib.sha256(Path(_core.__file__).read_bytes())
+    package = Path(mgdd.__path__[0])
+    for file in sorted(file for ending in ("py", "toml", "csv") for file in package.rglob(f"*.{ending}")):
+        digest.update(f"{file.relative_to(package)}".encode() + file.read_bytes())
+    digest.update(f"{os.environ.get('MGDD_DATA_DIR')} {_core.instruction_set()}".encode())
+    made = ALL / digest.hexdigest()[:16]
+    made.mkdir(parents=True, exist_ok=True)
+    os.utime(made)
+    for old in sorted(ALL.iterdir(), key=lambda version: -version.stat().st_mtime)[KEPT_VERSIONS:]:
+        shutil.rmtree(old, ignore_errors=True)
+    return made
+
+
+def quick_study(name: str) -> StudyResult:
+    """Give the quick study that every test of it looks at."""
+    return study(name, quick=True, **QUICK.get(name, {}))
+
+
+def study(name: str, **options: Any) -> StudyResult:
+    """Give what `mgdd.studies.run_study` gives, with figures; run it only if nobody has."""
+    call = inspect.signature(function_of(name)).bind(**(options | {"figures": True}))
+    call.apply_defaults()
+    words = "-".join(f"{key}_{value}" for key, value in sorted(call.arguments.items()) if value is not None)
+    file = folder() / f"{name}-{words}.pickle"
+    with file.with_suffix(".lock").open("w") as lock:
+        fcntl.flock(lock, fcntl.LOCK_EX)  # whoever wants the same waits for the first
+        if not file.exists():
+            part = file.with_suffix(".part")
+            part.write_bytes(pickle.dumps(run_study(name, **(options | {"figures": True}))))
+            part.rename(file)
+    result: StudyResult = pickle.loads(file.read_bytes())
+    return result
