@@ -19,11 +19,14 @@ export CMAKE_BUILD_PARALLEL_LEVEL := $(JOBS)
 # Looked for in every recipe: the first one may have installed it. Paths are hashed relative to the repository.
 export CMAKE_CXX_COMPILER_LAUNCHER = $(shell command -v ccache)
 export CCACHE_BASEDIR := $(CURDIR)
+export CCACHE_SLOPPINESS := pch_defines,time_macros
 ifndef MGDD_DATA_DIR
   ifneq ($(wildcard ../shared/data),)
     export MGDD_DATA_DIR := $(abspath ../shared/data)
   endif
 endif
+
+NOT_FETCHED := { echo "mgdd: pip failed, see above: is there a network, and room on the disk?" >&2; exit 1; }
 
 # --- set-up -------------------------------------------------------------------------------------------------
 .PHONY: system system-test
@@ -34,18 +37,17 @@ system-test:
 
 # In three parts, so that the module compiles while the rest is fetched: what builds it, what it imports, what tests it.
 $(VENV)/.stamp-build: pyproject.toml | system
-	$(PYTHON) -c "import sys; sys.exit(sys.version_info < (3, 11) and 'Python 3.11 or newer is needed')"
 	[ -x $(PY) ] || $(PYTHON) -m venv $(VENV)
-	$(ALOUD) $(PIP) install "pip>=25.1"
-	$(ALOUD) $(PIP) install --group build
+	$(ALOUD) $(PIP) install "pip>=25.1" || $(NOT_FETCHED)
+	$(ALOUD) $(PIP) install --group build || $(NOT_FETCHED)
 	touch $@
 
 $(VENV)/.stamp-run: pyproject.toml | $(VENV)/.stamp-build
 	$(PY) -c "import tomllib as t; print(*t.load(open('$<', 'rb'))['project']['dependencies'], sep='\n')" > $@
-	$(ALOUD) $(PIP) install -r $@ || { rm -f $@; exit 1; }
+	$(ALOUD) $(PIP) install -r $@ || { rm -f $@; $(NOT_FETCHED); }
 
 $(VENV)/.stamp-test: pyproject.toml | $(VENV)/.stamp-run
-	$(ALOUD) $(PIP) install --group test --group lint --group docs
+	$(ALOUD) $(PIP) install --group test --group lint --group docs || $(NOT_FETCHED)
 	touch $@
 
 # --- build --------------------------------------------------------------------------------------------------
@@ -120,7 +122,7 @@ lint: $(VENV)/.stamp-test ## ruff, mypy --strict, clang-format, codespell: look,
 	ruff check .
 	ruff format --check .
 	$(ALOUD) mypy
-	clang-format --dry-run -Werror $(CPP_FILES)
+	@echo "clang-format of every C++ file"; clang-format --dry-run -Werror $(CPP_FILES)
 	codespell
 
 format: $(VENV)/.stamp-test ## put every file into the house style

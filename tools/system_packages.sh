@@ -8,9 +8,19 @@ cd "$(dirname "$0")/.."
 python="${PYTHON:-python3}"
 missing=() # needed
 useful=()  # the work gets done without
+fail() {
+  echo "mgdd: $1" >&2
+  exit 1
+}
 has() { command -v "$1" >/dev/null; }
 has_header() { echo "#include <$1>" | g++ -E -x c++ - >/dev/null 2>&1; }
 runs() { "$python" -c "$1" 2>/dev/null; }
+
+if has "$python" && ! runs "import sys; sys.exit(sys.version_info < (3, 11))"; then
+  fail "Python 3.11 or newer is needed, $python is $("$python" -V 2>&1): name another one, make demo PYTHON=python3.12"
+fi
+free_mb="$(df -Pm . | awk 'NR == 2 { print $4 }')"
+((free_mb >= 1000)) || fail "1000 MB of disk are needed, $free_mb MB are free below $PWD"
 
 for group in "$@"; do
   case "$group" in
@@ -42,15 +52,23 @@ if ((${#useful[@]})) && ! has apt-get; then
   useful=()
 fi
 ((${#missing[@]} + ${#useful[@]})) || exit 0
-has apt-get || { echo "please install what Debian calls: ${missing[*]}" >&2; exit 1; }
+has apt-get || fail "missing: please install what Debian calls ${missing[*]}"
 
 sudo=()
-[[ "$(id -u)" == 0 ]] || sudo=(sudo)
-"${sudo[@]}" env DEBIAN_FRONTEND=noninteractive tools/aloud.sh apt-get update -q
+if [[ "$(id -u)" != 0 ]]; then
+  if ! has sudo; then
+    ((${#missing[@]})) || exit 0
+    fail "missing: ${missing[*]}; install them as root with apt-get, there is no sudo"
+  fi
+  sudo=(sudo)
+fi
+"${sudo[@]}" env DEBIAN_FRONTEND=noninteractive tools/aloud.sh apt-get update -q ||
+  fail "apt-get update failed: is there a network?"
 for package in "${useful[@]}"; do # what this distribution does not have is done without
   if apt-cache show "$package" >/dev/null 2>&1; then missing+=("$package"); fi
 done
 ((${#missing[@]})) || exit 0
 echo "installing: ${missing[*]}"
 "${sudo[@]}" env DEBIAN_FRONTEND=noninteractive tools/aloud.sh \
-  apt-get install -y -q -o Dpkg::Use-Pty=0 --no-install-recommends "${missing[@]}"
+  apt-get install -y -q -o Dpkg::Use-Pty=0 --no-install-recommends "${missing[@]}" ||
+  fail "apt-get could not install ${missing[*]}: is there a network?"

@@ -32,6 +32,22 @@ def _figures_are_closed() -> Iterator[None]:
         pyplot.close("all")
 
 
+def _signals() -> tuple[object, ...]:
+    return (
+        signal.getsignal(signal.SIGINT),
+        signal.getsignal(signal.SIGTERM),
+        signal.pthread_sigmask(signal.SIG_BLOCK, ()),
+    )
+
+
+@pytest.fixture(autouse=True)
+def _signals_are_left_as_found() -> Iterator[None]:
+    """A handler that one test leaves behind takes the Ctrl-C of the next."""
+    found = _signals()
+    yield
+    assert _signals() == found
+
+
 @pytest.fixture(scope="session")
 def quick_study() -> Callable[..., Any]:
     """Return a function that gives a study by name with quick=True, run once for all tests and workers."""

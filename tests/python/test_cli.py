@@ -151,6 +151,7 @@ def test_calibrate_reports_what_it_cannot_tell(
     assert not out["tdc"]["suspect"]
 
 
+@pytest.mark.slow
 def test_calibrate_with_known_fuel_and_free_gamma_and_pegging(
     files: tuple[list[str], str], capsys: pytest.CaptureFixture[str]
 ) -> None:
@@ -165,6 +166,7 @@ def test_calibrate_with_known_fuel_and_free_gamma_and_pegging(
     assert "loads" not in refused(capsys, *common, "--free", "soc_cad", "--pegging-exponent", "1.3")
 
 
+@pytest.mark.slow
 def test_calibrate_without_conditions_has_no_onset_column(
     files: tuple[list[str], str], capsys: pytest.CaptureFixture[str]
 ) -> None:
@@ -270,6 +272,7 @@ def test_conditions_of_a_campaign(
     assert "'other.csv'" in error
 
 
+@pytest.mark.slow
 def test_a_short_trace_is_told_and_still_reported(
     tmp_path: Path, files: tuple[list[str], str], capsys: pytest.CaptureFixture[str]
 ) -> None:

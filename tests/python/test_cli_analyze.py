@@ -101,6 +101,7 @@ def test_a_file_of_cycles_adds_their_scatter(tmp_path: Path, capsys: pytest.Capt
     assert shown == pytest.approx([out["ca50_cad"], out["std_ca50_cad"]], rel=1e-4)
 
 
+@pytest.mark.slow
 def test_tdc_is_estimated_and_doubted_when_asked(file: str, tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
     trace = datasets.load("hd_diesel_128x144")[1]
     angle, pressure = trace["crank_angle_cad"].values + 3.0, trace["pressure_bar"].values

@@ -62,7 +62,20 @@ def tables_of(page: Path) -> list[tuple[str, dict[str, str]]]:
 TABLES = [(page, name, rows) for page in PAGES for name, rows in tables_of(page)]
 
 
-@pytest.mark.parametrize(("page", "name", "rows"), TABLES, ids=[f"{p.name}-{n}" for p, n, _ in TABLES])
+# Whole studies, and the calibration of all models.
+DEAR = {
+    "esc_cases", "esc_components", "guided_bench", "guided_plane", "guided_start", "ignition_plane", "members",
+    "model_stages", "seekers", "sensor_fits", "sensors", "throttle_faults", "timing", "demo",
+}  # fmt: skip
+
+
+@pytest.mark.parametrize(
+    ("page", "name", "rows"),
+    [
+        pytest.param(page, name, rows, id=f"{page.name}-{name}", marks=pytest.mark.slow if name in DEAR else [])
+        for page, name, rows in TABLES
+    ],
+)
 def test_table_holds(page: Path, name: str, rows: dict[str, str]) -> None:
     truth = getattr(docs_tables, name)()
     assert list(rows) == list(truth), f"rows of {name} in {page.name}"
@@ -195,6 +208,7 @@ def test_code_named_beside_an_equation_exists() -> None:
 
 
 # --- commands -----------------------------------------------------------------------------------------------
+@pytest.mark.slow
 def test_commands_of_getting_started_run(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     from mgdd.cli import main
 

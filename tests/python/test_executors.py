@@ -52,6 +52,7 @@ def test_the_number_of_threads_changes_no_bit(name: str) -> None:
         CALLS[name](workers=0)
 
 
+@pytest.mark.slow
 def test_dask_changes_no_bit() -> None:
     distributed = pytest.importorskip("distributed")
     with (

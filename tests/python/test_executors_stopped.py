@@ -40,7 +40,7 @@ def test_a_lost_worker_hands_over_what_is_done(name: str, figure: str, monkeypat
     part = lost.value.partial
     done = part["finished"].to_numpy()
     assert 0 < done.sum() < done.size
-    assert f"{done.sum()} of {len(done)} are finished" in str(lost.value)
+    assert f"{done.sum()} of {done.size} are finished" in str(lost.value)
     assert part.sizes == plain(name).sizes
     np.testing.assert_array_equal(part[figure].to_numpy()[done], plain(name)[figure].to_numpy()[done])
     assert np.isnan(part[figure].to_numpy()[~done]).all()

@@ -264,6 +264,7 @@ def test_cascaded_tanks_from_the_stated_window() -> None:
     assert fit.model.estimate_state(blind, window=50) == state
 
 
+@pytest.mark.slow
 @needs["wh2009"]
 def test_the_circuit_below_a_millivolt() -> None:
     train, test = datasets.load("wh2009")

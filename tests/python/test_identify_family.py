@@ -200,6 +200,7 @@ def test_a_shift_moves_angles_pressure_and_injection_together() -> None:
     assert request.traces[0].attrs["spark_cad"] == -8.0
 
 
+@pytest.mark.slow
 def test_the_measured_engine_has_its_tdc_where_it_says() -> None:
     found = estimate_tdc(datasets.load("hd_diesel_128x144"), PRESET.cylinder, span_cad=1.5)
     assert not found.suspect

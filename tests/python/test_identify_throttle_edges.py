@@ -51,6 +51,7 @@ def test_a_coarser_log_is_fitted_and_validated(p1: Throttle, tmp_path: Path, eve
     assert json.loads((tmp_path / "v.json").read_text())["fit_percent"] > 95.0
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("kind", ["pw_r", "first_principle"])
 def test_another_stop_is_named_and_can_be_given(p1: Throttle, kind: str) -> None:
     log = measured(p1.replace(open_deg=70.0), swing(8.0, 0.16, 0.22))
@@ -71,6 +72,7 @@ def test_limp_home_is_read_off_a_record_that_starts_there() -> None:
     assert fit.parameters["gain_deg_per_s2_per_duty"] == pytest.approx(float(truth["gain_deg_per_s2"]), rel=0.03)
 
 
+@pytest.mark.slow
 def test_a_rest_elsewhere_is_doubted(p1: Throttle) -> None:
     duty = np.concatenate([np.full(200, 0.145), swing(offset=0.12)])
     log = measured(p1, duty, start_deg=40.0)
@@ -96,6 +98,7 @@ def test_friction_above_the_preload_makes_every_rest_a_doubt(p1: Throttle) -> No
     assert found[1].text.startswith("friction is 1.1 times the preload, so the plate may rest anywhere")
 
 
+@pytest.mark.slow
 def test_inductance_is_taken_in_where_it_shows(p1: Throttle) -> None:
     duty = amplitude_random_steps(12.0, offset=0.0, amplitude=0.45, seed=4)["duty"].to_numpy()
     test = amplitude_random_steps(6.0, offset=0.15, amplitude=0.2, seed=5)["duty"].to_numpy()

@@ -16,6 +16,8 @@ import throttle_bodies
 from independent_throttle import FAMILIES, Bench, Body
 from throttle_bodies import draw_body, forty_bodies, make_logs
 
+pytestmark = pytest.mark.slow
+
 BODY = Body()
 KINDS = {
     "coulomb": BODY,

@@ -78,6 +78,7 @@ def test_rows_and_dataset_on_made_records(made: EngineSurrogate) -> None:
     assert len(ends.axes[0].get_yticklabels()) == 12
 
 
+@pytest.mark.slow
 @pytest.mark.usefixtures("on_made_records")
 def test_knowing_the_lag_is_what_finds_the_optimum() -> None:
     result = run_measured_engine_seek(seeds=2, figures=False)
@@ -89,6 +90,7 @@ def test_knowing_the_lag_is_what_finds_the_optimum() -> None:
         assert ignored["period_cycles"] < known["period_cycles"]
 
 
+@pytest.mark.slow
 @pytest.mark.usefixtures("on_made_records")
 def test_the_same_seeds_give_the_same_numbers() -> None:
     first = run_measured_engine_seek(seeds=1, quick=True, figures=False)
@@ -121,6 +123,7 @@ def test_errors_name_the_remedy(monkeypatch: pytest.MonkeyPatch) -> None:
         run_study("measured-engine-seek", quick=True)
 
 
+@pytest.mark.slow
 @needs_records
 def test_on_the_measured_engine() -> None:
     result = run_measured_engine_seek(seeds=2, figures=False)

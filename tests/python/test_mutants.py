@@ -11,6 +11,8 @@ from typing import Any
 
 import pytest
 
+pytestmark = pytest.mark.slow
+
 CPP = """\
 // a comment with x + 1
 #define LIMIT 3

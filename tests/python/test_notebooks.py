@@ -21,6 +21,7 @@ ROOT = Path(__file__).resolve().parents[2]
 NOTEBOOKS = sorted((ROOT / "notebooks").glob("*.ipynb"))
 MODULES = sorted({"mgdd", *(module.name for module in pkgutil.walk_packages(mgdd.__path__, "mgdd."))})
 PAGES = [ROOT / "README.md", *sorted((ROOT / "docs").glob("*.md"))]
+DEAR_PAGES = {"getting_started.md", "calibration.md"}  # they calibrate, as README.md does
 FENCE = re.compile(r"^```python\n(.*?)^```", re.MULTILINE | re.DOTALL)
 
 
@@ -30,6 +31,7 @@ def test_there_is_something_to_run() -> None:
     assert FENCE.search(PAGES[0].read_text(encoding="utf-8")), "README.md shows no Python"
 
 
+@pytest.mark.slow
 @pytest.mark.notebook
 @pytest.mark.parametrize("path", NOTEBOOKS, ids=lambda path: path.name)
 def test_notebook_runs(path: Path, tmp_path: Path) -> None:
@@ -38,7 +40,14 @@ def test_notebook_runs(path: Path, tmp_path: Path) -> None:
     nbclient.NotebookClient(notebook, timeout=300, kernel_name="python3", resources=resources).execute()
 
 
-@pytest.mark.parametrize("name", [name for name in MODULES if not name.endswith(("__main__", "._core"))])
+@pytest.mark.parametrize(
+    "name",
+    [
+        pytest.param(name, marks=pytest.mark.slow if name.startswith("mgdd.studies.") else [])
+        for name in MODULES
+        if not name.endswith(("__main__", "._core"))
+    ],
+)
 def test_docstring_examples(name: str, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.chdir(tmp_path)
     module = importlib.import_module(name)
@@ -46,7 +55,10 @@ def test_docstring_examples(name: str, tmp_path: Path, monkeypatch: pytest.Monke
     assert result.failed == 0, f"{result.failed} of {result.attempted} examples of {name} failed: see above"
 
 
-@pytest.mark.parametrize("page", PAGES, ids=lambda page: page.name)
+@pytest.mark.parametrize(
+    "page",
+    [pytest.param(page, id=page.name, marks=pytest.mark.slow if page.name in DEAR_PAGES else []) for page in PAGES],
+)
 def test_page_examples(page: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     """The Python blocks of a page run from top to bottom as one program."""
     monkeypatch.chdir(tmp_path)
@@ -61,6 +73,7 @@ def test_page_examples(page: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPat
             exec(compile(block, str(page), "exec"), names)  # noqa: S102
 
 
+@pytest.mark.slow
 @pytest.mark.docs
 def test_docs_build_without_a_warning(tmp_path: Path) -> None:
     command = [sys.executable, "-m", "sphinx", "-W", "-n", "--keep-going", "-q", "-b", "html"]

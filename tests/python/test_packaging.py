@@ -37,6 +37,7 @@ def test_package_is_typed() -> None:
     assert importlib.resources.files("mgdd").joinpath("py.typed").is_file()
 
 
+@pytest.mark.slow
 def test_long_commands_are_never_silent(root: Path) -> None:
     """The wrapper that `make` puts around them keeps every character and the exit status."""
     script = "echo first; sleep 2.5; printf half; sleep 1.5; echo ' line'; printf end; exit 3"

@@ -37,6 +37,8 @@ from mgdd.rig.experiment.watched import Cycle
 from patient_bench import patient_experiment
 from realtime_loops import becomes
 
+pytestmark = pytest.mark.slow
+
 pytest.importorskip("can", reason="python-can is not installed: pip install 'mgdd[can]'")
 pytest.importorskip("cantools", reason="cantools is not installed: pip install 'mgdd[can]'")
 

@@ -50,7 +50,12 @@ def rms(first: ExperimentResult, other: ExperimentResult, name: str, begin: int 
 
 @pytest.mark.parametrize(
     ("text", "name"),
-    [(TRACK, "sensed_angle_deg"), (IDENTIFY, "sensed_angle_deg"), (SEEK, "estimate_cad"), (FEED, "estimate_cad")],
+    [
+        (TRACK, "sensed_angle_deg"),
+        pytest.param(IDENTIFY, "sensed_angle_deg", marks=pytest.mark.slow),
+        (SEEK, "estimate_cad"),
+        (FEED, "estimate_cad"),
+    ],
     ids=["track", "identify", "seek by curve", "seek by feed-forward"],
 )
 def test_over_the_bus_the_result_is_that_in_process_within_the_noise(text: str, name: str, tmp_path: Path) -> None:
@@ -79,6 +84,7 @@ def test_a_changed_controller_is_seen_by_the_replay(tmp_path: Path) -> None:
     assert main(["rig", "replay", str(tmp_path / "run"), "--quiet"]) == 0
 
 
+@pytest.mark.slow
 def test_a_dry_run_transmits_nothing_and_computes_everything(tmp_path: Path) -> None:
     truth = tmp_path / "truth.csv"
     short = TRACK.replace("step:20:35", "sine:30:5:4").replace('"guided"', '"pid"\nloop = "python"')
@@ -146,6 +152,7 @@ def test_a_wrong_map_is_refused_before_anything_is_opened(tmp_path: Path, capsys
     assert not (tmp_path / "run").exists()
 
 
+@pytest.mark.slow
 def test_ctrl_c_ends_a_run_over_the_bus_with_what_it_has(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
     file, folder = tmp_path / "track.toml", tmp_path / "run"
     file.write_text(TRACK.format(seed=1).replace("step:20:35", "sine:30:5:1"))
@@ -191,6 +198,7 @@ def test_record_listens_and_export_writes(tmp_path: Path, capsys: pytest.Capture
     capsys.readouterr()
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("loop", ["python", "core"])
 def test_the_self_test_times_every_way_to_die(loop: str, capsys: pytest.CaptureFixture[str]) -> None:
     """No timing of this machine is asserted here but that of the plate, which the node simulates on its own clock."""

@@ -151,6 +151,7 @@ def identified(duty: np.ndarray, angle: np.ndarray) -> dict[str, float]:
     return dict(fit.parameters)
 
 
+@pytest.mark.slow
 def test_identification_over_the_bus_is_that_of_one_process(duty: np.ndarray) -> None:
     """Rounded by hand to the grids of both signals, the plant without a bus gives the same bits."""
     own, straight = plant(), []
@@ -181,6 +182,7 @@ def follow(rig: Rig, reference: Reference) -> tuple[np.ndarray, np.ndarray]:
     return np.array(duties), np.array(angles)
 
 
+@pytest.mark.slow
 def test_tracking_over_the_bus_is_that_of_one_process() -> None:
     reference = Reference(angle_deg=np.r_[np.full(150, 20.0), np.full(150, 40.0)])
     own, controller, measured = plant(1e-3), Pid(), 8.0
@@ -198,6 +200,7 @@ def test_tracking_over_the_bus_is_that_of_one_process() -> None:
     assert abs(over_the_bus[-30:].mean() - 40.0) < 1.0
 
 
+@pytest.mark.slow
 def test_seeking_on_the_engine_bench_over_the_bus() -> None:
     def seeker() -> ExtremumSeeking:
         return ExtremumSeeking(start=-12.0, lower=-30.0, upper=10.0)
@@ -221,6 +224,7 @@ def test_a_node_that_cannot_start_says_why() -> None:
         VirtualNode("etb", faults=["jammed:form_s=1"]).start()
 
 
+@pytest.mark.slow
 def test_a_node_ends_with_the_process_that_started_it(tmp_path: Path) -> None:
     code = (
         "import sys; from mgdd.rig import VirtualNode\n"

@@ -6,6 +6,7 @@ import math
 from collections import Counter
 from typing import Any
 
+import pytest
 from hypothesis import example, given, settings
 from hypothesis import strategies as st
 
@@ -130,6 +131,7 @@ def step(gate: SafetyGate, letter: int) -> None:
     gate.command(duty)
 
 
+@pytest.mark.slow
 @settings(max_examples=10_000)
 @given(letters=st.binary(min_size=1, max_size=60), runs=st.booleans(), cut=st.integers(0, 59))
 @example(letters=bytes(range(BLIND + 1)), runs=True, cut=7)

@@ -18,7 +18,7 @@ import pytest
 
 import mgdd
 
-pytestmark = pytest.mark.uml
+pytestmark = [pytest.mark.uml, pytest.mark.slow]
 UML = Path(__file__).parents[1] / "uml"
 LIMIT_S = 360
 # Root becomes nobody, who may read everything (the interpreter may stand in a home) and write nothing.

@@ -19,14 +19,14 @@ from mgdd.identify.engine import family
 from mgdd.report import write_report
 from mgdd.results.labels import check_labels
 from mgdd.studies import StudyResult, run_study
-from study_cache import study
+from study_cache import quick_study
 
 HD = presets.load("hd_diesel_128x144").cylinder
 
 
 @pytest.fixture(scope="module")
 def result() -> StudyResult:
-    return study("measured-traces")
+    return quick_study("measured-traces")
 
 
 def test_every_bar_of_the_calibration(result: StudyResult) -> None:

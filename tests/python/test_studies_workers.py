@@ -40,7 +40,11 @@ def plain() -> StudyResult:
     return run_study("sensor-delay", **DELAYS)
 
 
-@pytest.mark.parametrize("name", sorted(set(available_studies()) - LONG - {"measured-traces"}))
+SHORT = {"throttle-characteristics", "torque-demand"}
+ALL = sorted(set(available_studies()) - LONG - {"measured-traces"})
+
+
+@pytest.mark.parametrize("name", [pytest.param(name, marks=[] if name in SHORT else pytest.mark.slow) for name in ALL])
 def test_parts_that_travel_give_the_same_table(name: str) -> None:
     options = {"quick": True, "figures": False}
     options |= {"seeds": 1} if "seeds" in inspect.signature(function_of(name)).parameters else {}
@@ -84,6 +88,15 @@ def test_ctrl_c_leaves_the_first_parts(plain: StudyResult) -> None:
     rows = stop.value.partial.summary["rows"]
     assert 0 < len(rows) < 7
     assert rows == plain.summary["rows"][: len(rows)]
+
+
+def test_ctrl_c_before_anything_is_finished() -> None:
+    def press(_: str) -> None:
+        raise KeyboardInterrupt
+
+    with pytest.raises(Interrupted, match=r"^interrupted: nothing was finished$") as stop:
+        run_study("sensor-delay", executor=ThreadPoolExecutor, workers=1, progress=press, **DELAYS)
+    assert stop.value.partial is None
 
 
 def test_a_study_of_one_part_takes_no_workers() -> None:

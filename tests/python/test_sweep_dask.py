@@ -13,6 +13,8 @@ import pytest
 from mgdd.engine import Cylinder, OperatingPoint
 from mgdd.sweep import sweep
 
+pytestmark = pytest.mark.slow
+
 distributed = pytest.importorskip("distributed")
 GRID = {
     "speed_rpm": np.linspace(1000.0, 3000.0, 200),

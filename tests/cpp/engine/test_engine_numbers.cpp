@@ -18,6 +18,7 @@
 #include "mgdd/engine/pressure/trace_check.hpp"
 #include "mgdd/engine/sensitivity.hpp"
 #include "support/names.hpp"
+#include "support/preset_file.hpp"
 
 namespace mgdd::engine {
 namespace {
@@ -35,64 +36,19 @@ std::string refusal(Call call) {
   return "";
 }
 
-template <class Record>
-void expect_numbers(const Record& record, const auto& fields,
-                    const std::vector<std::pair<std::string_view, double>>& numbers) {
-  ASSERT_EQ(numbers.size(), fields.size());
-  for (std::size_t i = 0; i < fields.size(); ++i) {
-    EXPECT_EQ(fields[i].info.name, numbers[i].first);
-    EXPECT_EQ(fields[i].in(record), numbers[i].second) << numbers[i].first;
-  }
-}
-
-// The preset `puma_single`: a change of one of these numbers is a breaking change.
+// A change of the preset is a breaking change.
 TEST(EngineNumbers, DefaultsAreTheLightDutyDiesel) {
-  expect_numbers(Cylinder{}, cylinder_fields<double>(),
-                 {{"bore_mm", 86.0},
-                  {"stroke_mm", 86.0},
-                  {"connecting_rod_mm", 155.0},
-                  {"compression_ratio", 18.2},
-                  {"ivc_cad", -140.0},
-                  {"evo_cad", 130.0},
-                  {"bowl_area_factor", 1.0},
-                  {"ivc_pressure_rise_kpa", 0.0},
-                  {"volumetric_efficiency", 0.90},
-                  {"lower_heating_value_mj_per_kg", 42.8},
-                  {"gamma", 1.37},
-                  {"gamma_linear_300k", 1.38},
-                  {"gamma_linear_slope_per_k", -8.0e-5},
-                  {"gamma_polynomial_c0", 1.338},
-                  {"gamma_polynomial_c1_per_k", -6.0e-5},
-                  {"gamma_polynomial_c2_per_k2", 1.0e-8},
-                  {"wall_heat_scale", 0.5},
-                  {"woschni_c2", 2.28},
-                  {"woschni_cp_m_per_sk", 3.24e-3},
-                  {"wall_temperature_k", 450.0},
-                  {"burn_duration_ref_cad", 30.0},
-                  {"burn_fuel_ref_mg", 20.0},
-                  {"burn_speed_ref_rpm", 1500.0},
-                  {"burn_fuel_exponent", 0.6},
-                  {"burn_speed_exponent", 0.3},
-                  {"wiebe_a", 6.908},
-                  {"wiebe_m", 1.5},
-                  {"second_fraction", 0.6},
-                  {"second_delay_cad", 3.0},
-                  {"second_duration_cad", 50.0},
-                  {"second_wiebe_m", 0.8},
-                  {"cetane_number", 45.0},
-                  {"ignition_c0_cad", 4.0},
-                  {"ignition_c1", 0.0},
-                  {"ignition_c2_per_cad", 0.0}});
-  expect_numbers(
-      OperatingPoint{}, operating_point_fields<double>(),
-      {{"speed_rpm", 1500.0}, {"fuel_mg", 20.0}, {"intake_pressure_kpa", 150.0}, {"intake_temperature_k", 313.0}});
+  const Cylinder c;
+  test_support::expect_preset(c, cylinder_fields<double>(),
+                              {{"burn_shape", to_string(c.burn.burn_shape)},
+                               {"gamma_model", to_string(c.gas.gamma_model)},
+                               {"wall_heat_model", to_string(c.wall_heat.wall_heat_model)},
+                               {"ignition_model", to_string(c.ignition.ignition_model)}},
+                              "puma_single", "cylinder");
+  test_support::expect_preset(OperatingPoint{}, operating_point_fields<double>(), {}, "puma_single", "point");
   EXPECT_FALSE(OperatingPoint{}.burn_duration_cad.has_value());
   EXPECT_FALSE(OperatingPoint{}.trapped_mass_g.has_value());
   EXPECT_FALSE(OperatingPoint{}.ivc_temperature_k.has_value());
-  EXPECT_EQ(Cylinder{}.burn.burn_shape, BurnShape::triangle);
-  EXPECT_EQ(Cylinder{}.gas.gamma_model, GammaModel::constant);
-  EXPECT_EQ(Cylinder{}.wall_heat.wall_heat_model, WallHeatModel::woschni);
-  EXPECT_EQ(Cylinder{}.ignition.ignition_model, IgnitionModel::watson);
 }
 
 TEST(EngineNumbers, DefaultsOfAnalysisAndEmissions) {

@@ -15,6 +15,7 @@
 #include "mgdd/throttle/sensors.hpp"
 #include "mgdd/throttle/simulation.hpp"
 #include "support/asymmetric_throttle.hpp"
+#include "support/preset_file.hpp"
 
 namespace mgdd::throttle {
 namespace {
@@ -30,54 +31,13 @@ std::string message(const Throttle& t) {
   return "";
 }
 
-// The preset P1: a change of one of these numbers is a breaking change.
+// A change of the preset is a breaking change.
 TEST(ThrottleNumbers, DefaultsAreThePresetP1) {
   const Throttle standard;
-  const std::pair<std::string_view, double> p1[] = {
-      {"inertia_kgm2", 0.0021},
-      {"viscous_nms_per_rad", 0.0088},
-      {"torque_constant_nm_per_a", 0.383},
-      {"back_emf_vs_per_rad", 0.383},
-      {"resistance_ohm", 1.5},
-      {"inductance_mh", 1.5},
-      {"supply_v", 12.0},
-      {"driver_drop_v", 0.0},
-      {"driver_resistance_ohm", 0.0},
-      {"dead_band", 0.0},
-      {"coulomb_nm", 0.284},
-      {"stiction_nm", 0.284},
-      {"stribeck_rad_per_s", 0.3},
-      {"karnopp_rad_per_s", 0.05},
-      {"tanh_rad_per_s", 0.05},
-      {"bristle_nm_per_rad", 81.0},
-      {"bristle_damping_nms_per_rad", 0.41},
-      {"limp_home_deg", 8.0},
-      {"spring_above_nm_per_rad", 0.087},
-      {"spring_below_nm_per_rad", 0.087},
-      {"preload_above_nm", 0.396},
-      {"preload_below_nm", 0.396},
-      {"preload_ramp_deg", 0.25},
-      {"closed_deg", 0.0},
-      {"open_deg", 90.0},
-      {"stop_stiffness_nm_per_rad", 5000.0},
-      {"stop_damping_nms_per_rad", 4.5},
-      {"backlash_half_deg", 0.2},
-      {"gear_stiffness_nm_per_rad", 200.0},
-      {"gear_damping_nms_per_rad", 0.2},
-      {"plate_inertia_kgm2", 0.0003},
-      {"plate_friction_share", 0.3},
-      {"bore_mm", 60.0},
-      {"pressure_drop_kpa", 0.0},
-  };
-  ASSERT_EQ(std::size(p1), fields().size());
-  for (const auto& [name, value] : p1) {
-    const auto all = fields();
-    const auto field = find_field(all, name);
-    ASSERT_NE(field, all.end()) << name;
-    EXPECT_EQ(field->in(standard), value) << name;
-  }
-  EXPECT_EQ(Throttle{}.friction, Friction::coulomb);
-  EXPECT_EQ(Throttle{}.backlash, Backlash::none);
+  test_support::expect_preset(standard, fields(),
+                              {{"friction", name_of(friction_names(), standard.friction)},
+                               {"backlash", name_of(backlash_names(), standard.backlash)}},
+                              "P1", "throttle");
   EXPECT_EQ(default_step_s, 1e-4);
 }
 
