@@ -182,6 +182,7 @@ def test_an_export_that_cannot_be_written_names_its_target(
     assert f"{target}: No such file or directory" in capsys.readouterr().err
 
 
+@pytest.mark.slow
 def test_without_the_extra_a_simulation_runs_and_a_bus_names_it(file: Path, tmp_path: Path) -> None:
     blocked = "import sys; sys.modules.update(can=None, cantools=None)"
     blocked += "\nfrom mgdd.cli import main; sys.exit(main(sys.argv[1:]))"

@@ -64,8 +64,8 @@ TABLES = [(page, name, rows) for page in PAGES for name, rows in tables_of(page)
 
 # Whole studies, and the calibration of all models.
 DEAR = {
-    "esc_cases", "esc_components", "guided_bench", "guided_plane", "guided_start", "ignition_plane", "members",
-    "model_stages", "seekers", "sensor_fits", "sensors", "throttle_faults", "timing", "demo",
+    "esc_cases", "esc_components", "guided_bench", "guided_plane", "guided_start", "ignition_plane", "learning",
+    "members", "model_stages", "seekers", "sensor_fits", "sensors", "throttle_faults", "timing", "demo",
 }  # fmt: skip
 
 

@@ -83,6 +83,7 @@ def test_intervals_hold_the_lag_and_what_few_samples_below_limp_home_show(seed: 
     assert fit.parameters["viscous_share"] == 0.25
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("seed", one_of(2, 4))
 def test_where_the_model_misses_the_gap_the_delay_is_that_of_the_rest_of_the_log(seed: int) -> None:
     body = draw_body("backlash", seed)

@@ -41,7 +41,12 @@ class Page(HTMLParser):
         assert self.open.pop() == tag
 
 
-@pytest.mark.parametrize("name", available_studies())
+DEAR = {"calibrated-guide", "guide-accuracy", "guided-transients", "identification-benchmarks", "model-validation"}
+
+
+@pytest.mark.parametrize(
+    "name", [pytest.param(name, marks=pytest.mark.slow if name in DEAR else []) for name in available_studies()]
+)
 def test_every_study_becomes_a_page(name: str, tmp_path: Path, quick_study: Callable[..., StudyResult]) -> None:
     if name in NEEDS and NEEDS[name] not in datasets.available():
         pytest.skip(f"the data set {NEEDS[name]} is not at hand")

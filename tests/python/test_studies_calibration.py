@@ -248,6 +248,7 @@ def test_a_load_step_asks_the_guide_for_the_new_point() -> None:
         assert run.estimate[0] == pytest.approx(said[0], abs=0.05)
 
 
+@pytest.mark.slow
 def test_a_guide_that_learns_with_few_seeds(calibrated: StudyResult) -> None:
     rows = {
         (own["engine"], own["start_cad"], own["calibrated"], own["tdc_error_cad"]): own
@@ -274,6 +275,7 @@ def test_a_guide_that_learns_with_few_seeds(calibrated: StudyResult) -> None:
     assert len(calibrated.summary["refits"]) == 4
 
 
+@pytest.mark.slow
 def test_the_page_has_the_rows_of_the_study(root: Path, online: StudyResult, calibrated: StudyResult) -> None:
     """Labels alone: the numbers there are of 200 seeds, and `tools/study_tables.py` prints them."""
     spec = importlib.util.spec_from_file_location("study_tables", root / "tools" / "study_tables.py")
@@ -296,6 +298,7 @@ def test_the_page_has_the_rows_of_the_study(root: Path, online: StudyResult, cal
         assert tool.put_into(other, result.name, result.summary) == other
 
 
+@pytest.mark.slow
 def test_datasets_figures_and_bars(online: StudyResult, calibrated: StudyResult) -> None:
     for result in (online, calibrated):
         check_labels(result.dataset)

@@ -152,6 +152,7 @@ def test_every_curve_arrives_from_both_starts(start_up: StudyResult) -> None:
     assert 0.0 in far
 
 
+@pytest.mark.slow
 def test_accuracy_few_seeds(accuracy: StudyResult) -> None:
     rows = {(row["form"], row["guide"]): row for row in accuracy.summary["rows"]}
     assert len(rows) == 1 + 2 * len(GUIDES)
@@ -165,6 +166,7 @@ def test_accuracy_few_seeds(accuracy: StudyResult) -> None:
             assert rows[form, name]["lost"] < 0.4 * none["lost"]
 
 
+@pytest.mark.slow
 def test_trouble_few_seeds(accuracy: StudyResult) -> None:
     rows = {row["trouble"]: row for row in accuracy.summary["trouble"]}
     assert list(rows) == [case.name for case in HARD]
@@ -173,6 +175,7 @@ def test_trouble_few_seeds(accuracy: StudyResult) -> None:
     assert all((row["median_back"] is not None) == name.startswith("jump") for name, row in rows.items())
 
 
+@pytest.mark.slow
 def test_datasets_figures_and_bars(start_up: StudyResult, accuracy: StudyResult) -> None:
     for result in (start_up, accuracy):
         check_labels(result.dataset)

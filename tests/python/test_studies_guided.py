@@ -66,6 +66,7 @@ def real() -> StudyResult:
     return run_study("guided", seeds=12, real=True)
 
 
+@pytest.mark.slow
 @needs_records
 def test_a_rough_model_of_another_engine_and_fuel_guides_the_measured_one(real: StudyResult) -> None:
     result = real
@@ -77,6 +78,7 @@ def test_a_rough_model_of_another_engine_and_fuel_guides_the_measured_one(real: 
     assert own["curve"]["lost_j_cycles_high"] < 0.2 * own["unguided"]["lost_j_cycles_low"]
 
 
+@pytest.mark.slow
 @needs_records
 def test_under_a_limit_the_curve_arrives_first_and_stays_below_as_often(real: StudyResult) -> None:
     own = rows(real)

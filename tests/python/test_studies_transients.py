@@ -49,6 +49,7 @@ def test_a_guide_reaches_a_far_cell_at_once_and_the_plain_seeker_does_not() -> N
     assert curve.lost[0, 0] < 0.5 * heat.lost[0, 0]
 
 
+@pytest.mark.slow
 def test_sequence_few_seeds(result: StudyResult) -> None:
     rows = {(row["form"], row["guide"]): row for row in result.summary["rows"]}
     assert len(rows) == 7
@@ -61,11 +62,13 @@ def test_sequence_few_seeds(result: StudyResult) -> None:
     assert [int(step) + 1 for step in steps] == list(range(250, 3000, 250))
 
 
+@pytest.mark.slow
 def test_loss_of_the_table_is_that_of_the_dataset(result: StudyResult) -> None:
     whole = result.dataset["lost_per_100"].mean("middle_cycle").to_numpy()
     assert whole == pytest.approx([row["lost_per_100"] for row in result.summary["rows"]], rel=1e-12)
 
 
+@pytest.mark.slow
 def test_plane_few_cells(result: StudyResult) -> None:
     rows = {(row["form"], row["guide"]): row for row in result.summary["plane"]}
     assert rows["none", "none"]["mean_cycles_saved"] == 0.0
@@ -81,6 +84,7 @@ def test_plane_few_cells(result: StudyResult) -> None:
     assert [bar["met"] for bar in result.summary["bars"]] == met
 
 
+@pytest.mark.slow
 def test_dataset_and_figures(result: StudyResult) -> None:
     check_labels(result.dataset)
     assert len(result.figures) == 2

@@ -136,6 +136,7 @@ def result(quick_study: Callable[..., StudyResult]) -> StudyResult:
     return quick_study("model-validation")
 
 
+@pytest.mark.slow
 def test_what_a_quick_run_shows(result: StudyResult) -> None:
     rows = {(row["law"], row["stage"], row["file"]): row for row in result.summary["rows"]}
     assert len(rows) == 4 * 3 * 4
@@ -161,6 +162,7 @@ def test_what_a_quick_run_shows(result: StudyResult) -> None:
         assert row["block_parameters_share"] < row["white_parameters_share"]
 
 
+@pytest.mark.slow
 def test_dataset_and_figures(result: StudyResult) -> None:
     check_labels(result.dataset)
     assert len(result.figures) == 2

@@ -44,7 +44,7 @@ def family_strip(timing: Any, *, ax: Axes | None = None) -> Axes:
     >>> from mgdd import datasets, presets
     >>> from mgdd.identify import ModelFamily, best_timing
     >>> from mgdd.plot.family import family_strip
-    >>> family = ModelFamily(burn_shapes=["double_wiebe"], gammas=[("linear", 1.40)])
+    >>> family = ModelFamily(burn_shapes=["double_wiebe"], gammas=[("linear", 1.40)], wall_heat_scales=[1.0])
     >>> cylinder = presets.load("hd_diesel_128x144").cylinder
     >>> row = best_timing(datasets.load("hd_diesel_128x144"), cylinder, family=family)[1]
     >>> family_strip(row).get_xlabel()
