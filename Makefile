@@ -8,6 +8,8 @@ VENV    ?= .venv
 JOBS    ?= 2
 PY      := $(VENV)/bin/python
 PIP     := $(PY) -m pip --disable-pip-version-check
+# What is never imported need not be compiled: three quarters of the time of an installation.
+FETCH   := $(PIP) install --no-compile
 LOGS    := build/logs
 ALOUD   := tools/aloud.sh
 # The package as it stands in the tree: links to the Python sources, beside the module of build/dev.
@@ -38,16 +40,16 @@ system-test:
 # In three parts, so that the module compiles while the rest is fetched: what builds it, what it imports, what tests it.
 $(VENV)/.stamp-build: pyproject.toml | system
 	[ -x $(PY) ] || $(PYTHON) -m venv $(VENV)
-	$(ALOUD) $(PIP) install "pip>=25.1" || $(NOT_FETCHED)
-	$(ALOUD) $(PIP) install --group build || $(NOT_FETCHED)
+	$(ALOUD) $(FETCH) "pip>=25.1" || $(NOT_FETCHED)
+	$(ALOUD) $(FETCH) --group build || $(NOT_FETCHED)
 	touch $@
 
 $(VENV)/.stamp-run: pyproject.toml | $(VENV)/.stamp-build
 	$(PY) -c "import tomllib as t; print(*t.load(open('$<', 'rb'))['project']['dependencies'], sep='\n')" > $@
-	$(ALOUD) $(PIP) install -r $@ || { rm -f $@; $(NOT_FETCHED); }
+	$(ALOUD) $(FETCH) -r $@ || { rm -f $@; $(NOT_FETCHED); }
 
 $(VENV)/.stamp-test: pyproject.toml | $(VENV)/.stamp-run
-	$(ALOUD) $(PIP) install --group test --group lint --group docs || $(NOT_FETCHED)
+	$(ALOUD) $(FETCH) --group test --group lint --group docs || $(NOT_FETCHED)
 	touch $@
 
 # --- build --------------------------------------------------------------------------------------------------
