@@ -134,6 +134,7 @@ def test_identify_then_validate(
     assert again["fit_percent"] == out["validation"]["fit_percent"]
 
 
+@pytest.mark.slow
 def test_columns_are_mapped(capsys: pytest.CaptureFixture[str], tmp_path: Path, files: tuple[str, str]) -> None:
     log = io.read_throttle_log(files[0])
     rows = zip(log["time_s"].values * 1e3, log["duty"].values * 100.0, np.deg2rad(log["angle_deg"].values), strict=True)

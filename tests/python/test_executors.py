@@ -39,6 +39,7 @@ def test_processes_change_no_bit(name: str, pool: Executor) -> None:
     assert same(CALLS[name](executor=pool), plain(name))
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("name", CALLS)
 def test_order_and_losses_change_no_bit(name: str) -> None:
     for executor in (work.LateReversed(), work.Dropping("error")):

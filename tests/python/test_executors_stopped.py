@@ -19,6 +19,8 @@ from executor_calls import CALLS, fixed_chunks, groups, plain, tuning
 from mgdd.errors import Interrupted, WorkerLostError
 from mgdd.results.labels import check_labels
 
+pytestmark = pytest.mark.slow
+
 
 class Dies(work.Dropping):
     """Works for a while, then loses everything."""

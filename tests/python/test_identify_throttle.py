@@ -74,6 +74,7 @@ def test_a_fit_says_how_good_it_is(kind: str, train: Any, test_log: Any, tmp_pat
     )
 
 
+@pytest.mark.slow
 def test_a_lag_of_the_current_is_kept_only_where_it_pays() -> None:
     signal = chirp(4.0, offset=0.01, amplitude=0.34, high_hz=5.0)
     run = simulate(P1, signal["duty"], time_s=signal["time_s"])  # 1 ms of lag, worth 0.08 deg RMS

@@ -143,6 +143,7 @@ def log_of(model: Any, duty: np.ndarray, seed: int, start_deg: float) -> Any:
     return throttle_log(time, duty, run["angle_deg"].to_numpy() + noise)
 
 
+@pytest.mark.slow
 def test_pw_r_is_taken_where_it_runs_better_on_what_neither_has_seen() -> None:
     plant = two_kinds_of_sides()
     duty = amplitude_random_steps(6.0, offset=0.0, amplitude=0.4, seed=3)["duty"].to_numpy()

@@ -185,6 +185,7 @@ def test_online_update_refuses_what_it_cannot_do() -> None:
         OnlineUpdate(MODELS[0], free=["mass"])
 
 
+@pytest.mark.slow
 def test_the_study_ranks_the_kinds(quick_study: Callable[..., StudyResult]) -> None:
     result = quick_study("throttle-pseudo-wiener")
     rows = {(row["plant"], row["model"]): row for row in result.summary["rows"] if row["lag_start"] != "best"}

@@ -41,7 +41,10 @@ class Page(HTMLParser):
         assert self.open.pop() == tag
 
 
-DEAR = {"calibrated-guide", "guide-accuracy", "guided-transients", "identification-benchmarks", "model-validation"}
+DEAR = {
+    "calibrated-guide", "guide-accuracy", "guided-transients", "identification-benchmarks", "model-validation",
+    "throttle-pseudo-wiener",
+}  # fmt: skip
 
 
 @pytest.mark.parametrize(

@@ -65,7 +65,9 @@ def test_groups_are_found_also_where_the_plant_does_more(quick_study):
         assert fit["train_percent"] >= 98.0, fit["case"]
 
 
-@pytest.mark.parametrize("study", ["throttle-first-principle", "throttle-pseudo-wiener"])
+@pytest.mark.parametrize(
+    "study", ["throttle-first-principle", pytest.param("throttle-pseudo-wiener", marks=pytest.mark.slow)]
+)
 def test_a_fit_in_percent_is_that_of_every_throttle_fit(quick_study, study):
     """The last record of a study is in its dataset: its stated fit leaves out the first 50 ms, like any other."""
     result = quick_study(study)
