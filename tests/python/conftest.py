@@ -14,6 +14,11 @@ import pytest
 
 os.environ.setdefault("MPLBACKEND", "Agg")
 
+# One terminal for all: what rich prints depends on these.
+os.environ["TERM"] = "xterm"
+for name in ("COLUMNS", "LINES", "NO_COLOR", "FORCE_COLOR"):
+    os.environ.pop(name, None)
+
 # A shell that runs the tests in the background has them ignore Ctrl-C, and their children too: some send it.
 if signal.getsignal(signal.SIGINT) is signal.SIG_IGN:
     signal.signal(signal.SIGINT, signal.default_int_handler)
