@@ -74,7 +74,12 @@ def test_stubs_agree_with_the_module(root: Path, tmp_path: Path) -> None:
 
     def stubs(folder: Path) -> dict[str, str]:
         files = [*folder.glob("_core.pyi"), *folder.glob("_core/**/*.pyi")]
-        return {str(file.relative_to(folder)): file.read_text(encoding="utf-8") for file in files}
+        return {str(file.relative_to(folder)): of_any_python(file.read_text(encoding="utf-8")) for file in files}
+
+    def of_any_python(text: str) -> str:  # from 3.12 on the standard library has it
+        return text.replace("import typing_extensions\n", "").replace(
+            "typing_extensions.Buffer", "collections.abc.Buffer"
+        )
 
     fresh, kept = stubs(tmp_path / "mgdd"), stubs(root / "python" / "mgdd")
     assert fresh, run.stderr

@@ -118,13 +118,17 @@ class Hub:
             free = f"; {argument('port', '0')} takes a free one" if error.errno == errno.EADDRINUSE else ""
             raise RigError(f"{self.host}:{self.port}: the hub cannot listen there: {why}{free}") from error
         self.port = server.sockets[0].getsockname()[1]
-        async with server:
+        try:
             on_ready(self)
             await stop.wait()
-        serving = list(self._serving)
-        for task in serving:
-            task.cancel()
-        await asyncio.gather(*serving, return_exceptions=True)
+        finally:
+            server.close()
+            await asyncio.sleep(0.0)  # whoever has just come in begins, and so is seen
+            serving = list(self._serving)
+            for task in serving:
+                task.cancel()
+            await asyncio.gather(*serving, return_exceptions=True)
+            await server.wait_closed()  # last: since Python 3.12 it waits for the connections
 
     @property
     def counts(self) -> dict[str, int]:
