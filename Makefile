@@ -139,14 +139,15 @@ stubs: ready ## write python/mgdd/_core/*.pyi from the built module
 	cp -r build/stubs/mgdd/_core* python/mgdd/
 
 # Both libraries must come first: libasan alone dies at the first C++ exception.
-asan: $(VENV)/.stamp-test | system-test ## ctest and pytest under AddressSanitizer and UBSan
+asan: MARKED ?= not slow and not docs
+asan: $(VENV)/.stamp-test | system-test ## ctest and pytest under AddressSanitizer and UBSan; all: MARKED="not docs"
 	$(CONFIGURE) asan
 	$(BUILD) asan
 	$(ALOUD) ctest --preset asan -j$(JOBS)
 	PYTHONPATH=$(CURDIR)/build/asan/python PYTHONUNBUFFERED=1 PYTHONMALLOC=malloc ASAN_OPTIONS=detect_leaks=0 \
 	  UBSAN_OPTIONS=print_stacktrace=1 \
 	  LD_PRELOAD="$$(g++ -print-file-name=libasan.so) $$(g++ -print-file-name=libstdc++.so)" \
-	  $(PY) -m pytest -n $(JOBS) --dist worksteal -m "not docs"
+	  $(PY) -m pytest -n $(JOBS) --dist worksteal -m "$(MARKED)"
 
 tsan: $(VENV)/.stamp-build | system-test ## the C++ tests under ThreadSanitizer
 	$(CONFIGURE) tsan
