@@ -63,7 +63,10 @@ def study(name: str, **options: Any) -> StudyResult:
     """Give what `mgdd.studies.run_study` gives, with figures; run it only if nobody has."""
     call = inspect.signature(function_of(name)).bind(**(options | {"figures": True}))
     call.apply_defaults()
-    words = "-".join(f"{key}_{value}" for key, value in sorted(call.arguments.items()) if value is not None)
+    # Who is told of progress is no part of the result, and has another address in every process.
+    told = {key: value for key, value in call.arguments.items() if value is not None and not callable(value)}
+    assert all(isinstance(value, bool | int | float | str) for value in told.values()), told
+    words = "-".join(f"{key}_{value}" for key, value in sorted(told.items()))
     file = folder() / f"{name}-{words}.pickle"
     with file.with_suffix(".lock").open("w") as lock:
         fcntl.flock(lock, fcntl.LOCK_EX)  # whoever wants the same waits for the first
