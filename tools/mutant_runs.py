@@ -33,6 +33,7 @@ _PARTS = (
 # Processor time, so that a busy machine kills no mutant: what the tests need without one, times this, and this more.
 _FACTOR = 8.0
 _MORE_S = 20.0
+_FAST = "not slow and not docs and not notebook and not stubs"  # at most what `make test` runs
 _ASLEEP = 60.0  # a test that waits for ever ends after so many times its processor time
 
 
@@ -182,8 +183,9 @@ class Cpp:
         launcher = shutil.which("ccache")
         _need(
             [
-                "cmake", "-S", "..", "-B", ".", "-G", "Ninja", "-DMGDD_BUILD_TESTS=ON", "-DCMAKE_BUILD_TYPE=None",
-                "-DCMAKE_CXX_FLAGS=-O1 -w -D_GLIBCXX_ASSERTIONS", "-DCMAKE_EXPORT_COMPILE_COMMANDS=ON",
+                "cmake", "-S", "..", "-B", ".", "-G", "Ninja", "-DMGDD_BUILD_TESTS=ON", "-DMGDD_UNITY=OFF",
+                "-DCMAKE_BUILD_TYPE=None", "-DCMAKE_CXX_FLAGS=-O1 -w -D_GLIBCXX_ASSERTIONS",
+                "-DCMAKE_EXPORT_COMPILE_COMMANDS=ON",
                 *([f"-DCMAKE_CXX_COMPILER_LAUNCHER={launcher}"] if launcher else []),
             ],
             self._build,
@@ -319,7 +321,7 @@ class Python:
 
     def _command(self, *options: str) -> list[str]:
         return [
-            sys.executable, "-m", "pytest", "-x", "-q", "-m", "not docs and not notebook and not stubs",
+            sys.executable, "-m", "pytest", "-x", "-q", "-m", _FAST,
             "-o", f"cache_dir={self._copy.scratch / 'pytest'}", *options, *self._files,
         ]  # fmt: skip
 

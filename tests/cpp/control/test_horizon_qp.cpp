@@ -12,6 +12,7 @@
 
 #include "support/horizon_case.hpp"
 #include "support/no_alloc.hpp"
+#include "support/reference_algebra.hpp"
 
 namespace mgdd::control {
 namespace {
@@ -26,7 +27,7 @@ TEST(HorizonQp, WithoutLimitsItIsTheStackedLeastSquaresSolution) {
     p.qp.set.limit(-1e30, 1e30, 1e30);
     ASSERT_EQ(p.qp.solve(p.deviation, p.limits.before, 1), QpResult::solved) << seed;
     const auto dense = test_support::stacked(p.qp, p.deviation, p.limits.before);
-    const Eigen::VectorXd expected = dense.hessian.ldlt().solve(-dense.slope);
+    const Eigen::VectorXd expected = test_support::solved(dense.hessian, -dense.slope);
     EXPECT_LT((p.solution() - expected).cwiseAbs().maxCoeff(), 1e-9 * (1.0 + expected.cwiseAbs().maxCoeff())) << seed;
     EXPECT_NEAR(p.qp.cost(), dense.cost(p.solution()), 1e-9 * (1.0 + dense.constant));
   }

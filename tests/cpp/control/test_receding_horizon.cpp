@@ -69,9 +69,10 @@ test_support::DenseHorizon by_differences(const M& model, const typename M::Stat
   }
   for (Eigen::Index k = 0; k < n; ++k)
     rest(k) = weight(k) * (at[static_cast<std::size_t>(k)] - reference);
-  rest.head(n) -= rows.topRows(n) * about;
+  for (Eigen::Index i = 0; i < n; ++i)
+    rest.head(n) -= rows.col(i).head(n) * about(i);
   rest(2 * n) = -std::sqrt(s.change_weight) * before;
-  return {2.0 * rows.transpose() * rows, 2.0 * rows.transpose() * rest, rest.squaredNorm()};
+  return test_support::DenseHorizon::of(rows, rest);
 }
 
 template <class Controller>

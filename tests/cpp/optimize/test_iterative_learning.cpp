@@ -4,12 +4,11 @@
 #include <cmath>
 
 #include <gtest/gtest.h>
-#include <Eigen/Eigenvalues>
-#include <Eigen/LU>
-#include <Eigen/SVD>
+#include <Eigen/Core>
 
 #include "mgdd/common/error.hpp"
 #include "support/no_alloc.hpp"
+#include "support/reference_algebra.hpp"
 
 namespace mgdd::optimize {
 namespace {
@@ -17,6 +16,7 @@ namespace {
 using Eigen::Index;
 using Eigen::MatrixXd;
 using Eigen::VectorXd;
+using test_support::largest_singular_value, test_support::product, test_support::spectral_radius;
 
 using Column = std::vector<double>;
 
@@ -124,18 +124,17 @@ TEST(IterativeLearning, PTypeIsMonotoneUpToFourThirds) {
 TEST(IterativeLearning, NormOptimalShrinksEachSingularDirectionByItsFactor) {
   LearningSettings settings{
       .initial = Column(6, 0.0), .law = LearningLaw::norm_optimal, .impulse_response = {1.0, 0.5}};
-  const Eigen::JacobiSVD<MatrixXd> svd(toeplitz(VectorXd::Unit(6, 0) + 0.5 * VectorXd::Unit(6, 1)),
-                                       Eigen::ComputeFullU | Eigen::ComputeFullV);
-  const double change = 0.1 * svd.singularValues()[0] * svd.singularValues()[0];
+  const auto svd = test_support::singular_values(toeplitz(VectorXd::Unit(6, 0) + 0.5 * VectorXd::Unit(6, 1)));
+  const double change = 0.1 * svd.values[0] * svd.values[0];
   for (const double error_weight : {1.0, 3.0}) {
     settings.error_weight = error_weight;
     for (Index i = 0; i < 6; ++i) {
       IterativeLearning learner(settings);
-      const Plant plant{{1.0, 0.5}, svd.matrixU().col(i)};
+      const Plant plant{{1.0, 0.5}, svd.left.col(i)};
       run(learner, plant);
-      const double s = svd.singularValues()[i];
+      const double s = svd.values[i];
       const double factor = change / (s * s * error_weight + change);
-      EXPECT_LT((run(learner, plant) - factor * svd.matrixU().col(i)).norm(), 1e-12) << i;
+      EXPECT_LT((run(learner, plant) - factor * svd.left.col(i)).norm(), 1e-12) << i;
       if (i == 5) {
         const ConvergenceReport report = learner.convergence();
         EXPECT_NEAR(report.spectral_radius, factor, 1e-10);
@@ -158,23 +157,24 @@ TEST(IterativeLearning, NormOptimalIsThePrintedLaw) {
   h.head(3) << 0.8, 0.5, -0.2;
   const MatrixXd g = toeplitz(h);
   const MatrixXd id = MatrixXd::Identity(7, 7);
-  const MatrixXd core = 2.0 * g.transpose() * g + 0.7 * id;
-  const MatrixXd q = (core + 0.3 * id).inverse() * core;
-  const MatrixXd l = core.inverse() * g.transpose() * 2.0;
+  const MatrixXd core = 2.0 * test_support::gram(g) + 0.7 * id;
+  const MatrixXd q = test_support::solved(core + 0.3 * id, core);
+  const MatrixXd l = test_support::solved(core, 2.0 * g.transpose());
   IterativeLearning learner(settings);
   const VectorXd e = wave(8).array().square();
   learner.ask();
   learner.tell(as_column(e));
-  EXPECT_LT((as_vector(learner.ask()).head(7) - q * (wave(8).head(7) + l * e.tail(7))).norm(), 1e-12);
+  EXPECT_LT((as_vector(learner.ask()).head(7) - product(q, wave(8).head(7) + product(l, e.tail(7)))).norm(), 1e-12);
   EXPECT_EQ(learner.ask()[7], learner.ask()[6]);
 
   const ConvergenceReport report = learner.convergence();
-  const MatrixXd map = g * q * (id - l * g) * g.inverse();
-  EXPECT_NEAR(report.sigma_max, map.jacobiSvd().singularValues()[0], 1e-12);
-  EXPECT_NEAR(report.spectral_radius, map.eigenvalues().cwiseAbs().maxCoeff(), 1e-10);
-  const MatrixXd limit = id - g * (id - q * (id - l * g)).inverse() * q * l;
+  const MatrixXd input_map = product(q, id - product(l, g));
+  const MatrixXd map = product(product(g, input_map), test_support::inverse(g));
+  EXPECT_NEAR(report.sigma_max, largest_singular_value(map), 1e-12);
+  EXPECT_NEAR(report.spectral_radius, spectral_radius(map), 1e-10);
+  const MatrixXd limit = id - product(g, test_support::solved(id - input_map, product(q, l)));
   EXPECT_LT((report.limit_error_map - limit).norm(), 1e-12);
-  EXPECT_NEAR(report.limit_error_gain, limit.jacobiSvd().singularValues()[0], 1e-12);
+  EXPECT_NEAR(report.limit_error_gain, largest_singular_value(limit), 1e-12);
 }
 
 // --- every law against its own lifted matrices -------------------------------------------------------------
@@ -182,6 +182,8 @@ TEST(IterativeLearning, NormOptimalIsThePrintedLaw) {
 struct Lifted {
   MatrixXd g, q, l;
 
+  MatrixXd input_map() const { return q - product(l, g); }
+  MatrixXd error_map() const { return product(product(g, input_map()), test_support::inverse(g)); }
   Lifted(const LearningSettings& settings, const Column& h) {
     const auto n = static_cast<Index>(settings.initial.size());
     g = q = l = MatrixXd::Zero(n, n);
@@ -221,16 +223,14 @@ TEST(IterativeLearning, ReportAgreesWithTheMatricesOfTheLaw) {
   for (const LearningSettings& settings : every_law()) {
     const Lifted m(settings, settings.impulse_response);
     const Index n = m.g.rows();
-    const MatrixXd input_map = m.q - m.l * m.g;
-    const MatrixXd error_map = m.g * input_map * m.g.inverse();
     const ConvergenceReport report = IterativeLearning(settings).convergence();
-    EXPECT_NEAR(report.sigma_max, error_map.jacobiSvd().singularValues()[0], 1e-10) << report.sentence;
+    EXPECT_NEAR(report.sigma_max, largest_singular_value(m.error_map()), 1e-10) << report.sentence;
     if (!report.radius_is_exact || settings.law == LearningLaw::norm_optimal) {
-      EXPECT_NEAR(report.spectral_radius, input_map.eigenvalues().cwiseAbs().maxCoeff(), 1e-10) << report.sentence;
+      EXPECT_NEAR(report.spectral_radius, spectral_radius(m.input_map()), 1e-10) << report.sentence;
     }
     ASSERT_TRUE(report.asymptotic);
-    const MatrixXd limit =
-        MatrixXd::Identity(n, n) - m.g * (MatrixXd::Identity(n, n) - input_map).partialPivLu().solve(m.l);
+    const MatrixXd id = MatrixXd::Identity(n, n);
+    const MatrixXd limit = id - product(m.g, test_support::solved(id - m.input_map(), m.l));
     EXPECT_LT((report.limit_error_map - limit).norm(), 1e-10) << report.sentence;
   }
 }
@@ -240,14 +240,14 @@ TEST(IterativeLearning, ErrorsFollowTheErrorMapToTheLimit) {
     settings.initial = as_column(0.3 * wave(12));
     const Plant plant{settings.impulse_response, wave(12)};
     const Lifted m(settings, plant.h);
-    const MatrixXd error_map = m.g * (m.q - m.l * m.g) * m.g.inverse();
+    const MatrixXd error_map = m.error_map();
     IterativeLearning learner(settings);
     const ConvergenceReport report = learner.convergence();
-    const VectorXd limit = report.limit_error_map * plant.wanted;
+    const VectorXd limit = product(report.limit_error_map, plant.wanted);
     VectorXd before = run(learner, plant);
     for (int j = 0; j < 400; ++j) {
       const VectorXd after = run(learner, plant);
-      EXPECT_LT((after - limit - error_map * (before - limit)).norm(), 1e-11) << report.sentence;
+      EXPECT_LT((after - limit - product(error_map, before - limit)).norm(), 1e-11) << report.sentence;
       if (report.monotone) {
         EXPECT_LE((after - limit).norm(), report.sigma_max * (before - limit).norm() + 1e-12);
       }
@@ -270,7 +270,7 @@ TEST(IterativeLearning, RestsAtThePredictedLimitInLongTrialsToo) {
       settings.impulse_response.push_back(std::pow(0.9, static_cast<double>(k)));
     const ConvergenceReport report = IterativeLearning(settings).convergence();
     ASSERT_TRUE(report.asymptotic) << report.sentence;
-    const VectorXd limit = report.limit_error_map * wave(n);
+    const VectorXd limit = product(report.limit_error_map, wave(n));
     EXPECT_GT(limit.norm(), 1e-3);
     VectorXd input = wave(n) - limit;  // u = G^-1 (w - e) of y(t) = 0.9 y(t-1) + u(t)
     for (Index t = n - 1; t > 0; --t)
@@ -285,7 +285,7 @@ TEST(IterativeLearning, RestsAtThePredictedLimitInLongTrialsToo) {
 
 // Closed forms of one update with relative degree 1; errors before the window are zero, behind it the last one.
 TEST(IterativeLearning, LawsReadTheErrorAsPrinted) {
-  const VectorXd e = (VectorXd(5) << 7.0, 1.0, -2.0, 4.0, 3.0).finished();
+  const VectorXd e{{7.0, 1.0, -2.0, 4.0, 3.0}};
   const LearningSettings base{.initial = {0.1, 0.2, 0.3, 0.4, 0.5}, .relative_degree = 1};
   const auto expect = [&](const LearningSettings& settings, const Column& change) {
     const VectorXd u = Lifted::next(settings, e);

@@ -6,6 +6,7 @@
 
 #include "mgdd/common/error.hpp"
 #include "support/no_alloc.hpp"
+#include "support/reference_algebra.hpp"
 
 namespace mgdd::optimize {
 namespace {
@@ -14,8 +15,8 @@ TEST(LeastSquares, LinearProblemReachesTheNormalEquationsAndTheirCovariance) {
   const MatrixXd a = random_matrix(1, 30, 4);
   const VectorXd b = random_matrix(2, 30, 1);
   const FitReport fit = fit_linear(a, b);
-  const MatrixXd inverse = (a.transpose() * a).inverse();
-  const VectorXd expected = inverse * (a.transpose() * b);
+  const MatrixXd inverse = test_support::inverse(test_support::gram(a));
+  const VectorXd expected = test_support::product(inverse, test_support::product(a.transpose(), b));
   const double variance = (a * expected - b).squaredNorm() / (30 - 4);
   EXPECT_TRUE(fit.success()) << fit.brief();
   EXPECT_LT((fit.values - expected).norm(), 1e-9);

@@ -3,10 +3,10 @@
 #include <limits>
 
 #include <gtest/gtest.h>
-#include <Eigen/Cholesky>
 
 #include "mgdd/common/random.hpp"
 #include "mgdd/optimize/least_squares/least_squares.hpp"
+#include "support/reference_algebra.hpp"
 
 namespace mgdd::optimize {
 namespace {
@@ -48,7 +48,7 @@ TEST(LeastSquaresFacts, ALinearProblemIsSolvedTo1em8InFourSteps) {
   // Every step shrinks the error by the damping, which falls to a third: 1e-2, 3e-3, 1e-3, 4e-4.
   for (int step = 0; step < 4; ++step)
     search.iterate(model);
-  const VectorXd exact = (a.transpose() * a).ldlt().solve(a.transpose() * b);
+  const VectorXd exact = test_support::solved(test_support::gram(a), test_support::product(a.transpose(), b));
   EXPECT_LT((search.report().values - exact).cwiseAbs().maxCoeff(), 1e-8);
 }
 
