@@ -18,6 +18,8 @@ DEV     := PYTHONPATH=$(CURDIR)/build/dev/python PYTHONUNBUFFERED=1
 BARE_PATH := $(PATH)
 export PATH := $(abspath $(VENV))/bin:$(PATH)
 export CMAKE_BUILD_PARALLEL_LEVEL := $(JOBS)
+# What is fetched is compiled when it is first imported: with this set, at every start of Python.
+unexport PYTHONDONTWRITEBYTECODE
 # Looked for in every recipe: the first one may have installed it. Paths are hashed relative to the repository.
 export CMAKE_CXX_COMPILER_LAUNCHER = $(shell command -v ccache)
 export CCACHE_BASEDIR := $(CURDIR)
@@ -80,13 +82,13 @@ test: ready ## set up, then run the tests of both languages, except those marked
 	@$(RUN_TESTS); echo "left out: tests marked slow, which \`make test-all\` runs too"
 
 test-all: MARKED :=
-test-all: ready ## the same with those marked slow
+test-all: ready ## the same with those marked slow, then lint
 	@$(RUN_TESTS)
+	@$(MAKE) --no-print-directory lint
 
 define RUN_TESTS
 	mkdir -p $(LOGS); rm -f $(LOGS)/*.log; failed=""; \
 	$(ALOUD) ctest --preset dev -j$(JOBS) | tee $(LOGS)/ctest.log || failed+=" ctest"; \
-	$(MAKE) --no-print-directory lint 2>&1 | tee $(LOGS)/lint.log || failed+=" lint"; \
 	$(DEV) $(ALOUD) $(PY) -m pytest -n $(JOBS) --dist worksteal -m "$(MARKED)" | tee $(LOGS)/pytest.log || failed+=" pytest"; \
 	echo; echo "--- summary ---"; \
 	echo "ctest:  $$(grep -h 'tests passed' $(LOGS)/ctest.log | tail -n 1)"; \

@@ -40,7 +40,7 @@ void start_from(GuidedPredictive& self, const Levels& given) {
   self.set_belief(b);
 }
 
-constexpr const char* doc =
+constexpr const char* guided_predictive_doc =
     R"(Model-guided predictive controller of a throttle plate, one sample at a time.
 
 A rough model predicts a short horizon; one Gauss-Newton step per sample moves the last duties along its exact slopes;
@@ -142,7 +142,7 @@ True
 
 void bind_guided_predictive(py::module_& m) {
   using S = GuidedPredictiveSettings;
-  py::class_<GuidedPredictive> cls(m, "GuidedPredictive", doc);
+  py::class_<GuidedPredictive> cls(m, "GuidedPredictive", guided_predictive_doc);
   bind_controller(
       cls, "GuidedPredictive", S{}, guided_predictive_fields(),
       std::tuple{named("prediction", &S::prediction, &prediction_names, "what the horizon is predicted with"),

@@ -31,7 +31,8 @@ class RecedingHorizon {
  public:
   using Scalar = typename M::Scalar;
   using State = typename M::State;
-  using Qp = HorizonQp<Scalar, N, n>;
+  // Told at run time anyway, all orders share one program.
+  using Qp = HorizonQp<Scalar, N, N == Eigen::Dynamic ? Eigen::Dynamic : n>;
   using Inputs = typename Qp::Inputs;
 
   /// ParameterError for settings out of range. `start` follows.
