@@ -11,8 +11,8 @@ from typing import Any
 
 import pytest
 
-from mgdd import datasets, presets
-from mgdd.cli import demo, main
+from mgdd import datasets, io, presets
+from mgdd.cli import main, study
 from mgdd.errors import Interrupted
 from mgdd.identify import best_timing
 from mgdd.identify.engine import family
@@ -246,10 +246,25 @@ def test_ctrl_c_keeps_the_finished_models(tmp_path: Path, monkeypatch: pytest.Mo
 def test_ctrl_c_in_the_demo(
     tmp_path: Path, capsys: pytest.CaptureFixture[str], monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    monkeypatch.setattr(demo, "run_study", lambda name, **_: run_study(name, progress=press_at(1)))
+    monkeypatch.setattr(study, "run_study", lambda name, **_: run_study(name, progress=press_at(1)))
     assert main(["demo", "--folder", str(tmp_path)]) == 130
     shown = capsys.readouterr()
     assert "Interrupted: these are the models that were finished" in shown.out
     assert shown.out.splitlines()[-1].endswith(f"{tmp_path / 'index.html'}")
     assert (tmp_path / "index.html").is_file()
     assert f"interrupted: what was finished is printed, and in {tmp_path}" in shown.err
+
+
+def test_ctrl_c_in_the_report_of_a_calibration(
+    tmp_path: Path, capsys: pytest.CaptureFixture[str], monkeypatch: pytest.MonkeyPatch
+) -> None:
+    trace = datasets.load("hd_diesel_128x144")[2]
+    io.write_pressure(trace, tmp_path / "one.csv")
+    told = ["--speed-rpm", str(trace.attrs["speed_rpm"]), "--trapped-mass-g", str(trace.attrs["trapped_mass_g"])]
+    monkeypatch.setattr(study, "run_study", lambda name, **given: run_study(name, **{**given, "progress": press_at(1)}))
+    command = ["engine", "calibrate", str(tmp_path / "one.csv"), "--preset", "hd_diesel_128x144", *told]
+    assert main([*command, "--report-folder", str(tmp_path / "page")]) == 130
+    shown = capsys.readouterr()
+    assert "RMSE" in shown.out
+    assert f"what was finished of the report is in {tmp_path / 'page'}" in shown.err
+    assert "interrupted: ranges over 1" in (tmp_path / "page" / "index.html").read_text(encoding="utf-8")

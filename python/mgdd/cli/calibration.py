@@ -7,7 +7,8 @@ from typing import TYPE_CHECKING, Any
 
 from mgdd._core.engine import Cylinder
 from mgdd.cli.options import engine_of, traces_of
-from mgdd.cli.output import check_output, emit
+from mgdd.cli.output import Stopped, check_output, emit
+from mgdd.cli.study import run_or_part
 from mgdd.errors import ConvergenceError, ParameterError
 from mgdd.identify import estimate_tdc, fit_cylinder, wall_heat_profile
 from mgdd.identify.engine.burn_laws import compare_laws
@@ -16,7 +17,6 @@ from mgdd.identify.engine.records import CylinderFit, figures_of
 from mgdd.identify.engine.tdc import TdcEstimate
 from mgdd.io.trace_forms import mean_cycle
 from mgdd.report import write_report
-from mgdd.studies import run_study
 from mgdd.studies.measured_summary import law_row
 
 if TYPE_CHECKING:
@@ -99,11 +99,16 @@ def calibrate(args: argparse.Namespace) -> None:
         traces, cylinder, point=point, fuel_heat_j=pegging["fuel_heat_j"], span_cad=TDC_SPAN_CAD, progress=step
     )
     laws = compare_laws(traces, cylinder, fuel_heat_j=pegging["fuel_heat_j"], point=point, progress=step, **scheme)
+    stopped = False
     if args.report_folder:
-        result = run_study("measured-traces", traces=traces, cylinder=cylinder, point=point, progress=step, **scheme)
+        result, stopped = run_or_part(
+            "measured-traces", traces=traces, cylinder=cylinder, point=point, progress=step, **scheme
+        )
         write_report(result, args.report_folder)
     payload = {"preset": preset.name, **_payload(fit, profile, laws, tdc)}
     emit(args, payload, text=payload["report"])
+    if stopped:
+        raise Stopped(f"the calibration is printed, and what was finished of the report is in {args.report_folder}")
     if not fit.report.success:
         raise ConvergenceError(f"the calibration did not converge: {fit.report.message}")
 

@@ -8,10 +8,9 @@ from typing import Any
 
 from mgdd.cli.options import add_command
 from mgdd.cli.output import Stopped, check_output, emit
-from mgdd.errors import Interrupted
+from mgdd.cli.study import run_or_part
 from mgdd.loop.controller_families import FAMILIES
 from mgdd.report import write_report
-from mgdd.studies import StudyResult, run_study
 from mgdd.studies.sections import Table
 
 __all__ = ["add"]
@@ -43,7 +42,7 @@ def run(args: argparse.Namespace) -> None:
     """Run three studies and write the report of the first; Ctrl-C keeps what is finished."""
     check_output(args)
     step = args.progress.expect(120)
-    result, stopped = _kept("measured-traces", progress=step)
+    result, stopped = run_or_part("measured-traces", progress=step)
     step("write the report")
     page = write_report(result, Path(args.folder))
     summary, text = {**result.summary, "report": page.as_posix()}, _text(result.summary)
@@ -51,7 +50,7 @@ def run(args: argparse.Namespace) -> None:
         if stopped:
             break
         try:
-            part, stopped = _kept(study, quick=True, figures=False, progress=step)
+            part, stopped = run_or_part(study, quick=True, figures=False, progress=step)
         except KeyboardInterrupt:
             stopped = True
         else:
@@ -60,16 +59,6 @@ def run(args: argparse.Namespace) -> None:
     emit(args, summary, text=[*text, f"\nEvery model's answer, and what to distrust: {page}"])
     if stopped:
         raise Stopped(f"what was finished is printed, and in {page}")
-
-
-def _kept(study: str, **options: Any) -> tuple[StudyResult, bool]:
-    """Run a study, or as much of it as Ctrl-C leaves, and say whether it did."""
-    try:
-        return run_study(study, **options), False
-    except Interrupted as stop:
-        if not isinstance(stop.partial, StudyResult):
-            raise
-        return stop.partial, True
 
 
 def _text(summary: Any) -> list[str | Table]:

@@ -19,7 +19,7 @@ from mgdd.studies.sections import Table, cells, column_names
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
 
-__all__ = ["add"]
+__all__ = ["add", "run_or_part"]
 
 _LOW = "_low"
 _OPTIONS = {"real": ("guided",)}  # of single studies
@@ -76,15 +76,10 @@ def run(args: argparse.Namespace) -> None:
         folder.mkdir(parents=True, exist_ok=True)
     drawn = folder is not None or args.report is not None
     step = args.progress.expect(10)
-    try:
-        result = run_study(
-            args.name, seeds=args.seeds, quick=args.quick, figures=drawn, progress=step,
-            executor=None if args.workers is None else processes(args.workers), **options,
-        )  # fmt: skip
-    except Interrupted as stop:
-        if not isinstance(stop.partial, StudyResult):
-            raise
-        result = stop.partial
+    result, stopped = run_or_part(
+        args.name, seeds=args.seeds, quick=args.quick, figures=drawn, progress=step,
+        executor=None if args.workers is None else processes(args.workers), **options,
+    )  # fmt: skip
     paths = [] if folder is None else _write(result.figures, folder, f"{args.name}.{args.format}")
     page = None if args.report is None else write_report(result, args.report)
     summary: dict[str, Any] = dict(result.summary)
@@ -93,8 +88,18 @@ def run(args: argparse.Namespace) -> None:
     if page is not None:
         summary["report"] = page.as_posix()
     emit(args, summary, text=_text(titles[args.name], summary))
-    if summary.get("interrupted"):
+    if stopped:
         raise Stopped(f"{len(summary['rows'])} finished rows are printed")
+
+
+def run_or_part(name: str, **options: Any) -> tuple[StudyResult, bool]:
+    """Run a study, or as much of it as Ctrl-C leaves, and say whether it did."""
+    try:
+        return run_study(name, **options), False
+    except Interrupted as stop:
+        if not isinstance(stop.partial, StudyResult):
+            raise
+        return stop.partial, True
 
 
 def _write(figures: Mapping[str, Figure], folder: Path, ending: str) -> list[Path]:
