@@ -182,7 +182,12 @@ ARRAY_FAULTS = {
     ),
     "radians": (np.deg2rad(ANGLES), BAR, {}, r"span only 4\.64\d+ degrees: this looks like radians; .*'rad'"),
     "degrees": (ANGLES, BAR, {"angle_unit": "rad"}, "span 266 rad: this looks like degrees; .*'deg'"),
-    "unit": (ANGLES, BAR, {"unit": "atm"}, "pressure_unit = 'atm': must be one of 'bar', 'mbar', 'kPa', 'Pa', 'MPa', "),
+    "unit": (
+        ANGLES,
+        BAR,
+        {"unit": "inHg"},
+        "pressure_unit = 'inHg': must be one of 'bar', 'mbar', 'kPa', 'Pa', 'MPa', ",
+    ),
     "angle unit": (ANGLES, BAR, {"angle_unit": "grad"}, "angle_unit = 'grad': must be one of 'deg', 'rad'"),
     "all zero": (ANGLES, 0.0 * BAR, {}, "highest pressure 0 bar .*no unit of bar, mbar, kPa, Pa, MPa, psi fits"),
 }

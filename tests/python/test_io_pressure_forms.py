@@ -112,7 +112,11 @@ DOUBTFUL = {
     "time first": ([RUN[:1440], FULL, ONE], "time_s,angle,p", "and 'angle' an angle: pass angle_column='angle'"),
     "count first": ([RUN[:1440], ONE], "sample,p", "column 'sample' counts samples: .*pass angle_step_deg= with"),
     "one column": ([ONE], "", "one column only: .*pass angle_step_deg="),
-    "unit unknown": ([FULL, ONE], "CAD,p [atm]", "says 'atm' for the pressure: convert it to one of bar, mbar"),
+    "unit unknown": ([FULL, ONE], "CAD,p [inH2O]", "says 'inH2O' for the pressure: convert it to one of bar, mbar"),
+    "unit unknown in a row": ([FULL, ONE], "CAD,p\ndeg,dyn", "says 'dyn' for the pressure: convert it to one of bar"),
+    "may be a unit": ([FULL, ONE], "CAD,p (dyn/cm2)", "'dyn/cm2' in the header may be a unit, .*pass pressure_unit="),
+    "a unit behind a blank": ([FULL, ONE], "CAD,pressure t/m2", "'t/m2' in the header may be a unit"),
+    "angle in gon": ([FULL, ONE], "CAD [gon],p", "is in 'gon', which is not known: convert it, or pass angle_unit="),
     "two units": ([FULL, ONE, ONE], "CAD,p1,p2\ndeg,bar,kPa", "pressures in bar, kPa"),
     "volts": ([FULL, ONE], "CAD,U [V]", "says V for the pressure: pass gain_bar_per_v= and offset_bar="),
     "unclear time": ([CLOSED + 143.0, BAR], "t,p", "column 't' looks like a time: .*angle_unit='ms' and speed_rpm="),
@@ -327,6 +331,29 @@ def test_units_of_the_header(write: Write, unit: str, header: str) -> None:
     elif unit != "MPa" and unit != "bar":
         with pytest.raises(DataError, match=f"looks like .*{unit}.*; pass .*pressure_unit='{unit}'"):
             read_pressure(path)
+
+
+# 1 kgf = 9.80665 N, 1 atm = 760 torr = 101325 Pa: NIST SP 811, appendix B.8.
+@pytest.mark.parametrize(
+    ("said", "per_bar"),
+    [("kgf/cm2", 1e5 / 98066.5), ("kg/cm²", 1e5 / 98066.5), ("atm", 1e5 / 101325.0), ("mmHg", 760e5 / 101325.0),
+     ("N/mm2", 0.1), ("kN/m²", 100.0), ("lbf/in2", 1e5 / 6894.757)],
+)  # fmt: skip
+@pytest.mark.parametrize(
+    "header", ["angle,p [{}]", "angle,Pressure_{}", "angle,p {}", "angle,Cyl_1 ({})", "angle,p\ndeg,{}"]
+)
+def test_units_of_other_houses(write: Write, said: str, per_bar: float, header: str) -> None:
+    path = write([CLOSED, BAR * per_bar], header.format(said))
+    np.testing.assert_allclose(read_pressure(path)["pressure_bar"], BAR, rtol=1e-7)
+
+
+def test_a_remark_is_no_unit_and_what_may_be_one_is_settled_by_the_user(write: Write) -> None:
+    for remark in ("p (cyl 1)", "p (filtered)", "pressure (mean)", "p (12)"):
+        np.testing.assert_allclose(read_pressure(write([CLOSED, BAR], f"angle,{remark}"))["pressure_bar"], BAR)
+    path = write([CLOSED, BAR * 100.0], "angle,p (AVL 12)")
+    with pytest.raises(DataError, match="'AVL 12' in the header may be a unit"):
+        read_pressure(path)
+    np.testing.assert_allclose(read_pressure(path, pressure_unit="kPa")["pressure_bar"], BAR, rtol=1e-12)
 
 
 def test_psi_without_a_unit_is_told_every_unit_that_fits(write: Write) -> None:

@@ -69,6 +69,46 @@ def test_columns_by_name_number_and_unit(tmp_path: Path) -> None:
     np.testing.assert_allclose(named["current_a"], DUTY)
 
 
+COLUMNS = {"t": TIME * 1e3, "u": DUTY * 100.0, "theta": np.deg2rad(ANGLE)}
+
+
+@pytest.mark.parametrize("form", ["t [ms],u [%],theta [rad]", "t (ms),u (%),theta (rad)", "t,u,theta\nms,%,rad"])
+def test_what_the_file_says_of_its_units_is_taken(tmp_path: Path, form: str) -> None:
+    path = csv(tmp_path / "own.csv", COLUMNS)
+    path.write_text(path.read_text().replace("t,u,theta", form, 1))
+    said = read_throttle_log(path, time=0, duty=1, angle=2)
+    np.testing.assert_allclose(said["time_s"], TIME, atol=1e-12)
+    np.testing.assert_allclose(said["duty"], DUTY, rtol=1e-14, atol=1e-16)
+    np.testing.assert_allclose(said["angle_deg"], ANGLE, rtol=1e-14)
+    assert said.identical(read_throttle_log(path, time=0, duty=1, angle=2, time_unit="ms", angle_unit="rad"))
+    for option, wrong, column in (("time_unit", "s", "ms"), ("duty_unit", "-", "%"), ("angle_unit", "%", "rad")):
+        with pytest.raises(DataError, match=f"is in '{column}' as the file says: leave {option} out"):
+            read_throttle_log(path, time=0, duty=1, angle=2, **{option: wrong})
+
+
+@pytest.mark.parametrize(
+    ("form", "message"),
+    [
+        ("t [min],u [%],theta [rad]", r"'t \[min\]' is in 'min' as the file says: convert it to s or ms, or correct"),
+        ("t [ms],u [V],theta [rad]", "in 'V' as the file says: convert it to - or %"),
+        ("t [ms],u [%],theta (deg/s)", "in 'deg/s' as the file says: convert it to deg or rad or %"),
+        ("t,u,theta\nms,%,gon", "column 'theta' is in 'gon' as the file says"),
+    ],
+)
+def test_a_unit_that_is_not_known_is_refused(tmp_path: Path, form: str, message: str) -> None:
+    path = csv(tmp_path / "own.csv", COLUMNS)
+    path.write_text(path.read_text().replace("t,u,theta", form, 1))
+    with pytest.raises(DataError, match=message):
+        read_throttle_log(path, time=0, duty=1, angle=2)
+
+
+def test_a_current_in_another_unit_is_refused(tmp_path: Path) -> None:
+    path = csv(tmp_path / "own.csv", {**COLUMNS, "ibat": DUTY})
+    path.write_text(path.read_text().replace("ibat", "ibat [mA]", 1))
+    with pytest.raises(DataError, match="in 'mA' as the file says: convert it to A"):
+        read_throttle_log(path, time=0, duty=1, angle=2, current=3, time_unit="ms", duty_unit="%", angle_unit="rad")
+
+
 def test_semicolons_and_decimal_commas(tmp_path: Path) -> None:
     path = tmp_path / "de.csv"
     rows = (f"{t:.4f};{u:.6f};{a:.5f}".replace(".", ",") for t, u, a in zip(TIME, DUTY, ANGLE, strict=True))

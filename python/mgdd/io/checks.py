@@ -51,7 +51,7 @@ def check_trace(
         Crank angle, firing TDC = 0 and compression negative, strictly rising in even steps [`angle_unit`].
     pressure : array_like
         Cylinder pressure [`unit`], over angle or (cycle, angle).
-    unit : {"bar", "mbar", "kPa", "Pa", "MPa", "psi"}
+    unit : {"bar", "mbar", "kPa", "Pa", "MPa", "psi", "kgf/cm2", "atm", "torr"}
         Unit of `pressure`.
     angle_unit : {"deg", "rad"}
         Unit of `angle`.

@@ -10,12 +10,15 @@ from mgdd.errors import DataError
 if TYPE_CHECKING:
     from mgdd.io.table import TextTable
 
-__all__ = ["Heading", "heading", "headings"]
+__all__ = ["Heading", "heading", "headings", "unit_text"]
 
 _UNITS = {
     "bar": "bar", "bara": "bar", "bar abs": "bar", "kpaa": "kPa", "kpa abs": "kPa", "barg": "bar",
     "mbar": "mbar", "hpa": "mbar", "kpa": "kPa", "pa": "Pa", "mpa": "MPa",
-    "psi": "psi", "psia": "psi", "psig": "psi",
+    "psi": "psi", "psia": "psi", "psig": "psi", "lbf/in2": "psi", "lbf/in²": "psi",
+    "kgf/cm2": "kgf/cm2", "kgf/cm²": "kgf/cm2", "kp/cm2": "kgf/cm2", "kp/cm²": "kgf/cm2", "kg/cm2": "kgf/cm2",
+    "kg/cm²": "kgf/cm2", "atm": "atm", "torr": "torr", "mmhg": "torr",
+    "n/mm2": "MPa", "n/mm²": "MPa", "kn/m2": "kPa", "kn/m²": "kPa", "n/m2": "Pa", "n/m²": "Pa", "dan/cm2": "bar",
     "v": "V", "volt": "V", "volts": "V", "mv": "mV",
     "s": "s", "sec": "s", "seconds": "s", "ms": "ms", "us": "us", "µs": "us", "μs": "us",
     "deg": "deg", "degree": "deg", "degrees": "deg", "°": "deg", "°ca": "deg", "°kw": "deg", "cad": "deg", "ca": "deg",
@@ -27,7 +30,7 @@ _UNITS = {
     "cm3": "other", "cm³": "other", "j": "other", "kj": "other", "j/deg": "other", "j/cad": "other", "j/°ca": "other",
     "mm": "other", "%": "other", "ppm": "other", "g": "other", "mg": "other", "kg": "other", "hz": "other",
 }  # fmt: skip
-_QUANTITIES = dict.fromkeys(("bar", "mbar", "kPa", "Pa", "MPa", "psi"), "pressure")
+_QUANTITIES = dict.fromkeys(("bar", "mbar", "kPa", "Pa", "MPa", "psi", "kgf/cm2", "atm", "torr"), "pressure")
 _QUANTITIES |= {"V": "pressure", "mV": "pressure", "s": "time", "ms": "time", "us": "time"}
 _QUANTITIES |= {"deg": "angle", "rad": "angle", "other": "other"}
 # Words of a name, in English and German; places other than the cylinder count as another quantity.
@@ -41,12 +44,20 @@ _WORDS = {
     "counter": "sample samples index idx row nr count counter",
 }
 _BRACKETS = re.compile(r"[\[({]([^\[\](){}]*)[\])}]")
+# Round brackets hold a unit or a remark: these, numbers and the words above are remarks.
+_REMARKS = set(
+    "abs absolute rel relative gauge mean avg average median min max raw filt filtered smoothed corrected pegged "
+    "cyl cylinder zyl zylinder cycle firing fired motored measured model sim plate wanted actual soll ist".split()
+)
 _GAUGE = re.compile(r"(?<![a-z])(barg|psig|gauge)(?![a-z])", re.IGNORECASE)
 _CYLINDER = re.compile(r"(?:cyl\w*?|zyl\w*?)[\s_.\-#]*(\d+)")
 
 
 class Heading(NamedTuple):
-    """What is known of a column, None where nothing is said; `strange` is a unit that no list here knows."""
+    """What is known of a column, None where nothing is said.
+
+    `strange` is a unit that no list here knows, `unclear` a text that may be one: only who reads the file can tell.
+    """
 
     name: str
     unit: str | None
@@ -54,6 +65,7 @@ class Heading(NamedTuple):
     series: str
     cylinder: str | None
     strange: str | None
+    unclear: str | None
     gauge: bool
 
 
@@ -65,7 +77,6 @@ def heading(name: str, units_row: str | None = None, *, where: str = "column") -
             f"{where}: the header says {in_name} and the units row {units_row!r}: correct the one that is wrong"
         )
     unit = in_row or in_name
-    said = [units_row or "", *re.findall(r"\[([^\[\]]*)\]", name)]
     words = _words(_BRACKETS.sub(" ", name))
     quantity = _QUANTITIES.get(unit or "")
     found = next((kind for kind, known in _WORDS.items() if words & set(known.split())), None)
@@ -79,8 +90,33 @@ def heading(name: str, units_row: str | None = None, *, where: str = "column") -
         series=" ".join(re.findall(r"[^\W\d_]+", name.lower())),
         cylinder=cylinder[1] if cylinder else None,
         gauge=bool(_GAUGE.search(f"{name} {units_row}")),
-        strange=next((text for text in said if text.strip(" -") and _known(text) is None), None),
+        strange=_first_strange([units_row or "", *re.findall(r"\[([^\[\]]*)\]", name)]),
+        unclear=_first_strange(_maybe_units(name)),
     )
+
+
+def unit_text(name: str, units_row: str | None = None) -> str | None:
+    """Return what stands where a unit stands: in the units row, else in brackets behind the name; None for nothing."""
+    texts = [units_row or "", *re.findall(r"\[([^\[\]]*)\]", name), *_maybe_units(name)]
+    return next((text.strip() for text in texts if text.strip()), None)
+
+
+def _first_strange(texts: list[str]) -> str | None:
+    return next((text for text in texts if text.strip(" -") and _known(text) is None), None)
+
+
+def _maybe_units(name: str) -> list[str]:
+    """Return what round brackets hold, remarks left out, and a last word with a slash in it."""
+    remarks = _REMARKS | {word for known in _WORDS.values() for word in known.split()}
+    texts = [text for text in re.findall(r"[({]([^(){}]*)[)}]", name) if _known(text) or _words(text) - remarks]
+    ratio = _ratio(name)
+    return [*texts, ratio] if ratio else texts
+
+
+def _ratio(name: str) -> str | None:
+    """Return the last word where it has a slash in it, as no name has."""
+    last = re.split(r"[\s_]+", name.strip())[-1]
+    return last if "/" in last.strip("/") and not _BRACKETS.search(last) else None
 
 
 def headings(table: TextTable) -> list[Heading]:
@@ -102,6 +138,8 @@ def _unit_of(name: str) -> str | None:
         unit = _known(text)
         if unit is not None:
             return unit
+    if (ratio := _ratio(name)) and _known(ratio):
+        return _known(ratio)
     words = [word for word in re.split(r"[\s_/,;.\-]+", name.strip()) if word and not word.isdecimal()]
     if not words or (len(words[-1]) == 1 and (len(words) == 1 or (words[-1] != "V" and words[0].lower() == "p"))):
         return None  # a lone letter is a name, and p_a is a cylinder rather than an ampere

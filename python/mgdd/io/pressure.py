@@ -114,7 +114,7 @@ def read_pressure(
         are cycles of one cylinder, and leaves out what the header calls another quantity.
     angle_unit : {"deg", "rad", "s", "ms", "us"}, optional
         Unit of the angle column; None takes the unit that the file says, else degrees. A time needs `speed_rpm`.
-    pressure_unit : {"bar", "mbar", "kPa", "Pa", "MPa", "psi"}, optional
+    pressure_unit : {"bar", "mbar", "kPa", "Pa", "MPa", "psi", "kgf/cm2", "atm", "torr"}, optional
         Unit of the pressure; None takes the unit that header or units row say, else bar. A unit that contradicts the
         file or that the magnitude excludes is refused.
     firing_tdc_deg : float, optional

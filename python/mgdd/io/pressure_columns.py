@@ -52,6 +52,11 @@ def choose_angle(
     if unit is not None:
         return index, unit
     step = argument("angle_step_deg", "")
+    if head.strange is not None or head.unclear is not None:
+        raise DataError(
+            f"{called} is in {head.strange or head.unclear!r}, which is not known: convert it, or pass "
+            f"{argument('angle_unit', '')} with one of {', '.join(ANGLE_UNITS)}"
+        )
     if head.quantity == "time":
         raise DataError(
             f"{called} looks like a time: {hint}, or pass {argument('angle_unit', repr('s'))} or "
@@ -131,6 +136,12 @@ def unit_of_pressure(
         raise DataError(
             f"{table.source}: the file says {strange!r} for the pressure: convert it to one of "
             f"{', '.join(PRESSURE_UNITS)} first"
+        )
+    unclear = next((heads[i].unclear for i in columns if heads[i].unit is None and heads[i].unclear), None)
+    if unclear is not None and unit is None and not gain:
+        raise DataError(
+            f"{table.source}: {unclear!r} in the header may be a unit, and none that is known: convert it to one of "
+            f"{', '.join(PRESSURE_UNITS)}, or pass {argument('pressure_unit', '')} if the pressure is in one of them"
         )
     if len(said) > 1:
         raise DataError(

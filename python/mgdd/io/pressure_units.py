@@ -16,8 +16,14 @@ __all__ = ["PRESSURE_UNITS", "check_unit", "level_bar", "level_warning", "steep_
 # An exact integer keeps the value in bar correctly rounded: units per bar here, bar per unit below.
 _PER_BAR = {"bar": 1.0, "mbar": 1000.0, "kPa": 100.0, "Pa": 100000.0}
 # 1 psi = 1 lbf/in² with 1 lbf = 0.45359237 kg of 9.80665 m/s² and 1 in = 0.0254 m, all exact.
-_BAR_PER = {"MPa": 10.0, "psi": 4.4482216152605 / 0.0254**2 / 1e5}
+# 1 kgf = 9.80665 N, 1 atm = 101325 Pa = 760 torr, exact as well.
+_BAR_PER = {
+    "MPa": 10.0, "psi": 4.4482216152605 / 0.0254**2 / 1e5,
+    "kgf/cm2": 0.980665, "atm": 1.01325, "torr": 1.01325 / 760.0,
+}  # fmt: skip
 PRESSURE_UNITS = (*_PER_BAR, *_BAR_PER)
+# That a remedy names: the others are too near to one of these to be told by a number.
+_USUAL = PRESSURE_UNITS[:6]
 # Peak pressure from a throttled motored engine to twice today's diesels; traces without TDC get a floor.
 PEAK_BAR = (4.0, 500.0)
 FLOOR_BAR = 0.2
@@ -57,7 +63,7 @@ def check_unit(
         return
     likely = [
         other
-        for other in PRESSURE_UNITS
+        for other in _USUAL
         if other != unit and _peak_fits(peak, other, low) and _level_fits(level_bar(degrees, to_bar(values, other)))
     ]
     if likely:
@@ -65,7 +71,7 @@ def check_unit(
         remedy = f"this looks like {' or '.join(likely)}; "
         remedy += f"the file says {unit}: correct it there" if unit_of_file else f"pass {hint}"
     else:
-        remedy = f"no unit of {', '.join(PRESSURE_UNITS)} fits a cylinder pressure; check column and scale"
+        remedy = f"no unit of {', '.join(_USUAL)} fits a cylinder pressure; check column and scale"
     raise DataError(
         f"{source}: the highest pressure {peak:g} {unit} is outside {low:g} to {PEAK_BAR[1]:g} bar: {remedy}"
     )
@@ -79,7 +85,7 @@ def level_warning(degrees: NDArray[np.float64], values: NDArray[np.float64], uni
     angle, bar = level
     peak, low = float(values.max()), _low(degrees)
     fitting = []
-    for other in PRESSURE_UNITS:
+    for other in _USUAL:
         there = level_bar(degrees, to_bar(values, other))
         if other != unit and there and _peak_fits(peak, other, low) and _level_fits(there):
             fitting.append(f"{argument('pressure_unit', repr(other))} would make it {there[1]:.3g} bar")

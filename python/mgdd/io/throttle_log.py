@@ -9,7 +9,6 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from mgdd.errors import DataError, ParameterError, ShapeError
-from mgdd.io.checks import check_choice
 from mgdd.io.mat_file import read_mat
 from mgdd.io.plain_csv import write_columns
 from mgdd.io.table import read_table
@@ -21,6 +20,7 @@ from mgdd.io.throttle_checks import (
     check_throttle_log,
     check_time,
 )
+from mgdd.io.throttle_units import asked_units, unit_of_column, usual_unit
 from mgdd.results.labels import labelled_dataset
 
 if TYPE_CHECKING:
@@ -31,9 +31,6 @@ if TYPE_CHECKING:
 
 __all__ = ["read_throttle_log", "throttle_log", "write_throttle_log"]
 
-_TIME_UNITS = {"s": 1.0, "ms": 1e3}
-_ANGLE_UNITS = ("deg", "rad", "%")
-_DUTY_UNITS = ("-", "%")
 _OPTIONAL = ("current_a", "supply_v")
 
 
@@ -101,9 +98,9 @@ def read_throttle_log(
     angle: int | str = "angle_deg",
     current: int | str | None = None,
     supply: int | str | None = None,
-    time_unit: str = "s",
-    duty_unit: str = "-",
-    angle_unit: str = "deg",
+    time_unit: str | None = None,
+    duty_unit: str | None = None,
+    angle_unit: str | None = None,
     travel_deg: float = 90.0,
     start_s: float | None = None,
     stop_s: float | None = None,
@@ -122,12 +119,13 @@ def read_throttle_log(
         column of the only matrix.
     current, supply : int or str, optional
         Motor current [A] and supply voltage [V]; None takes ``current_a`` and ``supply_v`` where the file has them.
-    time_unit : {"s", "ms"}
-        Unit of the time column.
-    duty_unit : {"-", "%"}
-        Unit of the duty column: -1 to 1, or percent.
-    angle_unit : {"deg", "rad", "%"}
-        Unit of the angle column; percent of `travel_deg`.
+    time_unit : {"s", "ms"}, optional
+        Unit of the time column; None takes what the units row or brackets in the header say, else s. A unit that
+        contradicts the file, and one that is not known, is refused; so for the others.
+    duty_unit : {"-", "%"}, optional
+        Unit of the duty column: -1 to 1, or percent; else -.
+    angle_unit : {"deg", "rad", "%"}, optional
+        Unit of the angle column; percent of `travel_deg`; else deg.
     travel_deg : float
         Angle at 100 percent [deg].
     start_s, stop_s : float, optional
@@ -168,15 +166,13 @@ def read_throttle_log(
     >>> float(log["duty"].max())
     0.2
     """
-    check_choice("time_unit", time_unit, tuple(_TIME_UNITS))
-    check_choice("duty_unit", duty_unit, _DUTY_UNITS)
-    check_choice("angle_unit", angle_unit, _ANGLE_UNITS)
+    given = asked_units(time_unit, duty_unit, angle_unit)
     if not 0.0 < travel_deg <= 95.0:
         raise ParameterError.of("travel_deg", travel_deg, "in (0, 95]")
     wanted = {"time_s": time, "duty": duty, "angle_deg": angle, "current_a": current, "supply_v": supply}
-    columns, place = _read(path, wanted, delimiter=delimiter, decimal=decimal)
-    scales = {"time_s": 1.0 / _TIME_UNITS[time_unit], "duty": 0.01 if duty_unit == "%" else 1.0}
-    scales["angle_deg"] = {"rad": math.degrees(1.0), "%": travel_deg / 100.0}.get(angle_unit, 1.0)
+    columns, place, units = _read(path, wanted, given, delimiter=delimiter, decimal=decimal)
+    scales = {"time_s": 0.001 if units["time_s"] == "ms" else 1.0, "duty": 0.01 if units["duty"] == "%" else 1.0}
+    scales["angle_deg"] = {"rad": math.degrees(1.0), "%": travel_deg / 100.0}.get(units["angle_deg"], 1.0)
     columns = {key: values * scales.get(key, 1.0) for key, values in columns.items()}
     columns, place = _window(columns, place, start_s, stop_s)
     return _checked(
@@ -184,8 +180,8 @@ def read_throttle_log(
         place,
         step_s=step_s,
         name=Path(path).name,
-        duty_unit=duty_unit,
-        angle_unit=angle_unit,
+        duty_unit=units["duty"],
+        angle_unit=units["angle_deg"],
         travel_deg=travel_deg,
     )
 
@@ -237,9 +233,15 @@ def _columns(given: dict[str, ArrayLike], name: str) -> dict[str, NDArray[np.flo
 
 
 def _read(
-    path: str | os.PathLike[str], wanted: dict[str, int | str | None], *, delimiter: str | None, decimal: str
-) -> tuple[dict[str, NDArray[np.float64]], Place]:
+    path: str | os.PathLike[str],
+    wanted: dict[str, int | str | None],
+    given: dict[str, str | None],
+    *,
+    delimiter: str | None,
+    decimal: str,
+) -> tuple[dict[str, NDArray[np.float64]], Place, dict[str, str]]:
     called: dict[str, str] = {}
+    units = {key: given[key] or usual_unit(key) for key in wanted}
     columns: dict[str, NDArray[np.float64]] = {}
     if Path(path).suffix.lower() == ".mat":
         mat = read_mat(path)
@@ -247,13 +249,15 @@ def _read(
             chosen = key if column is None and mat.has(key) else column
             if chosen is not None:
                 columns[key], called[key] = mat.numbers(chosen), repr(chosen)
-        return columns, Place(mat.source, columns=called)
+        return columns, Place(mat.source, columns=called), units
     table = read_table(path, delimiter=delimiter, decimal=decimal)
     for key, column in wanted.items():
         chosen = key if column is None and key in (table.header or ()) else column
         if chosen is not None:
-            columns[key], called[key] = table.numbers(table.index(chosen)), repr(chosen)
-    return columns, Place(table.source, table.lines, called)
+            index = table.index(chosen)
+            units[key] = unit_of_column(key, given[key], table, index)
+            columns[key], called[key] = table.numbers(index), repr(chosen)
+    return columns, Place(table.source, table.lines, called), units
 
 
 def _window(
