@@ -14,6 +14,7 @@ from scipy.stats import t
 
 from mgdd import plot
 from mgdd.design import design_points
+from mgdd.engine import Cylinder, OperatingPoint
 from mgdd.errors import DataError, ParameterError, ShapeError
 from mgdd.results import Fit
 from mgdd.results.labels import check_labels
@@ -21,6 +22,7 @@ from mgdd.surrogate import ResponseModel, fit_response
 from mgdd.surrogate.process import ProcessSurface
 from mgdd.surrogate.response_findings import outlier_bound
 from mgdd.surrogate.stepwise import leverage_of
+from mgdd.sweep import sweep
 
 FACTORS = {"speed_rpm": (1000.0, 3000.0), "fuel_mg": (5.0, 40.0), "soi_cad": (-20.0, 5.0)}
 PLAN = design_points(FACTORS, 48, method="lhs", seed=2)
@@ -247,6 +249,27 @@ def test_tables_of_all_kinds_give_the_same_fit_and_labels():
     assert fit_response(PLAN, kept).model.name in ("response", "fuel_mg")
     assert "fuel_mg" in fit_response(PLAN, kept).model.factors
     assert fit_response(PLAN, kept).model.name == "response"
+
+
+def test_a_sweep_is_fitted_over_its_inputs_and_over_nothing_else():
+    axes = {"soc_cad": np.linspace(-14.0, 2.0, 7), "fuel_mg": np.linspace(8.0, 30.0, 5)}
+    grid = sweep(Cylinder(), OperatingPoint(), axes)
+    fits = {"grid": fit_response(grid, "efficiency_gross")}
+    cases = {
+        name: column.ravel() for name, column in zip(axes, np.meshgrid(*axes.values(), indexing="ij"), strict=True)
+    }
+    listed = sweep(Cylinder(), OperatingPoint(), cases, points=True)
+    fits["points"] = fit_response(listed, "efficiency_gross")
+    table = pd.DataFrame({**cases, "efficiency_gross": listed["efficiency_gross"].to_numpy()})
+    fits["told"] = fit_response(table, "efficiency_gross", factors=["soc_cad", "fuel_mg"])
+    for fit in fits.values():
+        assert tuple(fit.model.factors) == ("soc_cad", "fuel_mg")
+        at = {"soc_cad": -5.0, "fuel_mg": 21.0}
+        expected = fits["told"].model.predict(at)["mean"].item()
+        assert fit.model.predict(at)["mean"].item() == pytest.approx(expected, rel=1e-9)
+    one = fit_response(grid, "efficiency_gross", factors=["soc_cad"])
+    assert tuple(one.model.factors) == ("soc_cad",)
+    assert tuple(fit_response(PLAN.assign(y=truth(PLAN)), "y").model.factors) == tuple(FACTORS)
 
 
 def test_a_fit_shows_writes_and_draws_itself(tmp_path):

@@ -16,7 +16,7 @@ from mgdd.cli.options import add_command
 from mgdd.cli.output import check_figure, check_output, emit, save_figure, wrote
 from mgdd.errors import DataError, ParameterError
 from mgdd.io.netcdf_file import read_netcdf
-from mgdd.io.point_table import POINT, read_points
+from mgdd.io.point_table import POINT, input_names, read_points
 from mgdd.io.whole_file import write_whole_text
 from mgdd.plot import response_diagnostics
 from mgdd.plot.style import drawn
@@ -127,9 +127,7 @@ def _table(args: argparse.Namespace) -> tuple[xr.Dataset, int]:
 
 def _inputs(file: str, response: str) -> list[str]:
     """Name the inputs of a sweep: axes of its grid, or coordinates of its points."""
-    data = read_netcdf(file)
-    dims = data[response].dims if response in data else data.dims
-    inputs = [str(name) for name in (*dims, *(name for name in data.coords if name not in data.dims)) if name != POINT]
+    inputs = list(input_names(read_netcdf(file), response))
     if not inputs:
         raise ParameterError(f"--factors is needed: {file} does not say which of its columns are inputs")
     return inputs

@@ -20,7 +20,7 @@ if TYPE_CHECKING:
 
     import xarray as xr
 
-__all__ = ["POINT", "read_points"]
+__all__ = ["POINT", "flat_points", "input_names", "read_points"]
 
 POINT = "point"
 _BRACKETS = re.compile(r"(.*\S)\s*[\[(]([^\[\]()]*)[\])]")
@@ -85,7 +85,7 @@ def read_points(
     if ending == ".csv":
         return _of_csv(read_table(path, delimiter=delimiter, decimal=decimal), names, always)
     if ending == ".nc":
-        return _of_dataset(read_netcdf(path), names, str(path))
+        return flat_points(read_netcdf(path), names, str(path))
     raise ParameterError(f"{path}: points are read from .csv and .nc; give such an ending")
 
 
@@ -115,7 +115,15 @@ def _of_csv(table: TextTable, names: Sequence[str] | None, always: Collection[st
     return labelled_dataset(variables, attrs={"file": Path(table.source).name})
 
 
-def _of_dataset(data: xr.Dataset, names: Sequence[str] | None, origin: str) -> xr.Dataset:
+def input_names(data: xr.Dataset, output: str) -> tuple[str, ...]:
+    """Name what an output was computed or measured at: the axes of its grid, or the coordinates of its points."""
+    dims = data[output].dims if output in data else tuple(data.dims)
+    others = (name for name in data.coords if name not in data.dims and set(data[name].dims) <= set(dims))
+    return tuple(str(name) for name in (*dims, *others) if name != POINT)
+
+
+def flat_points(data: xr.Dataset, names: Sequence[str] | None, origin: str) -> xr.Dataset:
+    """Give columns of a Dataset over its points; the inputs of a grid become columns too."""
     data = data.reset_coords([name for name in data.coords if name not in data.dims])
     inputs = [str(dim) for dim in data.dims if dim != POINT]
     if POINT in data.dims and inputs:

@@ -9,6 +9,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from mgdd.errors import DataError, ParameterError, ShapeError, argument
+from mgdd.io.point_table import flat_points, input_names
 from mgdd.optimize import least_squares
 from mgdd.results import Fit, FitReport
 from mgdd.results.fit import FitQuality
@@ -79,14 +80,15 @@ def fit_response(
     Parameters
     ----------
     points : xarray.Dataset, DataFrame or mapping of columns
-        One column per factor, in the order in which the points were run.
+        One column per factor, in the order in which the points were run; or a sweep over a grid.
     response : str or array_like, shape (n,)
         Column of `points`, or the measured values.
     kind : {"polynomial", "gaussian_process"}
         Least squares on products of the factors, or a Gaussian process (Matérn 5/2, a length scale per factor, white
         noise; needs ``pip install "mgdd[gp]"``).
     factors : sequence of str, optional
-        Columns to use; all but the response if left out.
+        Columns to use. If left out: the inputs of a sweep or of read points, which are the axes of its grid or
+        coordinates over its points; all but the response where `points` says of none that it is an input.
     degree : int
         Of the full polynomial, 1 to 4.
     select : {"bic", "press", "all"}
@@ -137,6 +139,10 @@ def fit_response(
     (('1', 'speed_rpm', 'fuel_mg', 'speed_rpm^2'), [])
     """
     _check(kind, degree, select, n_starts, seed)
+    if isinstance(response, str) and hasattr(points, "data_vars") and response in points:
+        factors = factors if factors is not None else input_names(points, response) or None
+        if points[response].ndim > 1:
+            points = flat_points(points, None if factors is None else [*factors, response], "points")
     names = _factor_names(points, response, factors)
     x = points_of(points, names)
     name, label, y = _response(points, response, names, len(x))
