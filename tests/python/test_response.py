@@ -269,7 +269,7 @@ def test_a_sweep_is_fitted_over_its_inputs_and_over_nothing_else():
         assert fit.model.predict(at)["mean"].item() == pytest.approx(expected, rel=1e-9)
     one = fit_response(grid, "efficiency_gross", factors=["soc_cad"])
     assert tuple(one.model.factors) == ("soc_cad",)
-    assert tuple(fit_response(PLAN.assign(y=truth(PLAN)), "y").model.factors) == tuple(FACTORS)
+    assert tuple(fit_response(PLAN.assign(y=("point", truth(PLAN))), "y").model.factors) == tuple(FACTORS)
 
 
 def test_a_fit_shows_writes_and_draws_itself(tmp_path):
