@@ -153,6 +153,22 @@ def test_the_layout_of_other_tools_is_read() -> None:
     )
 
 
+def test_labels_and_axes_that_no_map_can_be_called_cost_nothing_else(tmp_path: Path) -> None:
+    file = tmp_path / "tool.dcm"
+    write_dcm({"Soc-Warm/2": whole(curve()), "SocBase": whole(curve())}, file)
+    text = file.read_text(encoding="utf-8").replace("*SSTX   fuel_mg", "*SSTX   m fuel / 2", 1)
+    head, tail = text.rsplit("*SSTX   fuel_mg", 1)
+    file.write_text(f"{head}*SSTX   fuel quantity (mg){tail}", encoding="utf-8")
+    found = read_dcm(file)
+    assert list(found.maps) == ["SocBase"]
+    assert found.skipped == ("Soc-Warm/2: a map is named by letters, digits, _ . [ and ]: rename the label",)
+    assert list(found.maps["SocBase"].axes) == ["x"]
+    assert found.maps["SocBase"].labels["x"] == ("mg", "fuel quantity (mg)")
+    assert read_map(file) == found.maps["SocBase"]
+    with pytest.raises(ParameterError, match="no map 'Soc-Warm/2': Soc-Warm/2: a map is named by letters"):
+        read_map(file, "Soc-Warm/2")
+
+
 READER = """
 import json, logging, sys
 logging.basicConfig = lambda **_: None

@@ -23,6 +23,7 @@ __all__ = [
     "SOURCES",
     "TEXTS",
     "MapTask",
+    "can_be_name",
     "cell_at",
     "checked_cells",
     "checked_label",
@@ -86,6 +87,11 @@ def checked_name(what: str, name: object, taken: tuple[str, ...] = ()) -> str:
     if name in taken or name in NUMBERS or name in TEXTS:
         raise ParameterError.of(what, name, "another name: this one has a meaning of its own in a map")
     return name
+
+
+def can_be_name(text: str) -> bool:
+    """Whether a map or an axis can be called so."""
+    return bool(_NAME.fullmatch(text)) and text not in NUMBERS and text not in TEXTS
 
 
 def checked_label(name: str, given: tuple[str, str] | None) -> Label:

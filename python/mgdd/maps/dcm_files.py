@@ -13,7 +13,7 @@ from mgdd.errors import DataError, Error, argument
 from mgdd.io.existing_file import existing_file
 from mgdd.io.whole_file import write_whole_text
 from mgdd.maps.calibration_map import CalibrationMap
-from mgdd.maps.cells import spoken_name
+from mgdd.maps.cells import can_be_name, spoken_name
 from mgdd.maps.dcm import DcmBlock, dcm_blocks, dcm_text
 from mgdd.results.units import attribute_units, unit_of
 
@@ -40,7 +40,7 @@ class DcmFile:
     values : mapping of str to (float, str)
         Single values with their units.
     skipped : tuple of str
-        Blocks of other kinds, texts and lists of functions for example, that were not read.
+        What was not read: blocks of other kinds, as texts and lists of functions, and labels that no map can be called.
 
     Examples
     --------
@@ -132,12 +132,14 @@ def read_dcm(path: str | os.PathLike[str]) -> DcmFile:
     Parameters
     ----------
     path : path-like
-        Format 2.0, UTF-8 or Latin-1. Axes have the names that ``*SSTX`` and ``*SSTY`` give, else ``x`` and ``y``.
+        Format 2.0, UTF-8 or Latin-1. Axes have the names that ``*SSTX`` and ``*SSTY`` give, where an axis can be called
+        so, else ``x`` and ``y``.
 
     Returns
     -------
     DcmFile
-        Values with the source ``given``; what else the file holds is named in ``skipped``.
+        Values with the source ``given``; what else the file holds, and labels whose names no map can have, stand in
+        ``skipped``.
 
     Raises
     ------
@@ -164,6 +166,9 @@ def read_dcm(path: str | os.PathLike[str]) -> DcmFile:
     for block in blocks:
         if not block.x:
             values[block.name] = (block.values[0][0], _unit_from(block.unit, block.name))
+            continue
+        if not can_be_name(block.name):
+            skipped.append(f"{block.name}: a map is named by letters, digits, _ . [ and ]: rename the label")
             continue
         try:
             maps[block.name] = _map_of(block)
@@ -206,11 +211,16 @@ def _block_of(name: str, table: CalibrationMap) -> DcmBlock:
 
 
 def _map_of(block: DcmBlock) -> CalibrationMap:
-    axes = {block.axis_x or "x": block.x}
-    if block.y:
-        axes[block.axis_y or "y"] = block.y
-    units = dict(zip(axes, (block.unit_x, block.unit_y), strict=False))
-    labels = {name: (_unit_from(unit, name), spoken_name(name)) for name, unit in units.items()}
+    given = (("x", block.axis_x, block.x, block.unit_x), ("y", block.axis_y, block.y, block.unit_y))
+    axes: dict[str, list[float]] = {}
+    labels: dict[str, tuple[str, str]] = {}
+    for plain, said, points, unit in given if block.y else given[:1]:
+        # The names of axes stand in comments, where other tools may write anything.
+        name = said if can_be_name(said) and said not in (block.name, *axes) else plain
+        axes[name], labels[name] = (
+            points,
+            (_unit_from(unit, name), said if said != name and said else spoken_name(name)),
+        )
     labels[block.name] = (_unit_from(block.unit, block.name), block.long_name or spoken_name(block.name))
     rows = np.array(block.values)
     return CalibrationMap(axes, rows.T if block.y else rows[0], name=block.name, labels=labels)

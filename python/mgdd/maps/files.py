@@ -123,12 +123,14 @@ def read_map(path: str | os.PathLike[str], name: str | None = None, *, decimal: 
     """
     ending, file = _ending(path), existing_file(path)
     if ending == ".dcm":
-        maps = read_dcm(file).maps
+        content = read_dcm(file)
+        maps = content.maps
         if name is None and len(maps) != 1:
             raise ParameterError(f"{file}: holds {', '.join(maps) or 'no map'}: give the name of one")
         wanted = next(iter(maps)) if name is None else name
         if wanted not in maps:
-            near = did_you_mean(wanted, maps) or f"it holds {', '.join(maps) or 'none'}"
+            left_out = next((said for said in content.skipped if said.startswith(f"{wanted}: ")), None)
+            near = left_out or did_you_mean(wanted, maps) or f"it holds {', '.join(maps) or 'none'}"
             raise ParameterError(f"{file}: no map {wanted!r}: {near}")
         return maps[wanted]
     try:
