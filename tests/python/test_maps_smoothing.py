@@ -12,7 +12,7 @@ from hypothesis import strategies as st
 
 from map_cases import FUEL, SPEED, efficiency, sweep
 from mgdd.errors import ConvergenceError, DataError, ParameterError
-from mgdd.maps import CalibrationMap, apply_map, optimize_map, smooth_map
+from mgdd.maps import CalibrationMap, apply_map, optimize_map, read_map, smooth_map, write_map
 
 pytest.importorskip("clarabel", reason="clarabel is not installed: pip install 'mgdd[maps]'")
 
@@ -211,3 +211,50 @@ def test_any_map_is_smoothed_within_its_rules_or_they_contradict_each_other(data
     most = limits["x"] * np.diff(axes["x"])
     steps = np.abs(np.diff(found, axis=0)) - most.reshape([-1] + [1] * (found.ndim - 1))
     assert steps.max() <= 1e-8 * max(1.0, most.max())
+
+
+@pytest.mark.parametrize("shape", [(4, 5), (6,)])
+def test_a_map_with_empty_cells_reaches_a_dcm_file_by_the_remedy_of_the_message(shape, tmp_path):
+    axes = dict(
+        zip(("speed_rpm", "fuel_mg"), (np.linspace(900.0, 2400.0, shape[0]), np.linspace(5.0, 40.0, 5)), strict=True)
+    )
+    axes = dict(list(axes.items())[: len(shape)])
+    grid = np.meshgrid(*axes.values(), indexing="ij")
+    values = -2.0 - 3e-3 * (grid[0] - 900.0) - (0.1 * grid[1] if len(shape) > 1 else 0.0)
+    gaps = [(1,) * len(shape), (2,) * len(shape)]
+    holed = values.copy()
+    for gap in gaps:
+        holed[gap] = np.nan
+    table = CalibrationMap(
+        axes, holed, name="soc_cad", cells={"source": np.where(np.isnan(holed), "unattainable", "given")}
+    )
+    with pytest.raises(DataError, match="fill=True"):
+        write_map(table, tmp_path / "map.dcm")
+    with pytest.raises(DataError, match=r"range nan to nan.*with fill=True cells that have no range keep their values"):
+        smooth_map(table)
+    filled = smooth_map(table, fill=True)
+    known = np.isfinite(holed)
+    np.testing.assert_array_equal(filled.values[known], values[known])
+    np.testing.assert_allclose(filled.values[~known], values[~known], atol=1e-3)  # a plane is smooth
+    assert set(filled.cells["source"][known]) == {"given"}
+    assert set(filled.cells["source"][~known]) == {"interpolated"}
+    write_map(filled, tmp_path / "map.dcm")
+    np.testing.assert_array_equal(read_map(tmp_path / "map.dcm").values, filled.values)
+
+
+def test_cells_with_and_without_a_range_are_smoothed_and_kept():
+    values, low, high = [-4.0, -9.0, np.nan, -5.0], [-6.0, np.nan, np.nan, -7.0], [-2.0, np.nan, np.nan, -3.0]
+    source = ["given", "given", "unattainable", "given"]
+    table = CalibrationMap(
+        {"fuel_mg": [10.0, 20.0, 30.0, 40.0]},
+        values,
+        name="soc_cad",
+        cells={"low": low, "high": high, "source": source},
+    )
+    with pytest.raises(DataError, match="at fuel_mg = 20: -9 has the range nan to nan"):
+        smooth_map(table)
+    filled = smooth_map(table, fill=True, slope_limits={"fuel_mg": 0.4})
+    assert filled.values[1] == -9.0
+    assert list(filled.cells["source"]) == ["smoothed", "given", "interpolated", "smoothed"]
+    assert np.abs(np.diff(filled.values)).max() <= 4.0 * (1.0 + 1e-6)
+    assert np.all(filled.values[[0, 3]] >= [-6.0, -7.0])

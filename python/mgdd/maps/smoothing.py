@@ -19,6 +19,7 @@ if TYPE_CHECKING:
 
 __all__ = ["smooth_map"]
 
+_KEPT = 1e-7  # of the median range: how far a value that is kept may move in the search, before it is set back
 _NARROWEST = 0.05  # of the median range: an optimum is not held more tightly than this
 _INSIDE = 1e-7  # of a slope limit or range: kept free for the tolerance of the solver
 _TOLERANCE = 1e-9
@@ -41,7 +42,8 @@ def smooth_map(
     Parameters
     ----------
     optimum : CalibrationMap
-        With ``low`` and ``high`` in every cell that has a value, as `optimize_map` gives it with a `max_loss`.
+        With ``low`` and ``high`` in every cell that has a value, as `optimize_map` gives it with a `max_loss`. With
+        `fill` a cell that has neither keeps its value and its source.
     weight : float
         Of the smoothness against the distance, 0 to 1e6. The second differences count in half widths of the median
         range per squared mean step of the axis.
@@ -83,20 +85,26 @@ def smooth_map(
     slopes = _checked(optimum, weight, slope_limits or {})
     values, low, high = (_flat(optimum, name) for name in ("", "low", "high"))
     known = np.isfinite(values)
-    _check_ranges(optimum, values, low, high, known)
-    width = _half_widths(values, low, high, known)
-    scale = float(np.median(width[known])) if known.any() else 1.0
-    free_low, free_high = np.where(known, low, -np.inf), np.where(known, high, np.inf)
+    kept = known & np.isnan(low) & np.isnan(high) & fill  # what fills the gaps need not touch the rest
+    _check_ranges(optimum, values, low, high, known, kept)
+    ranged = known & ~kept
+    scale, width = _half_widths(values, low, high, ranged, known)
+    free_low, free_high = np.where(ranged, low, -np.inf), np.where(ranged, high, np.inf)
+    # Not of no width: a method of interior points needs an interior.
+    free_low[kept], free_high[kept] = values[kept] - _KEPT * scale, values[kept] + _KEPT * scale
     _check_reach(optimum, slopes, free_low, free_high)
     pairs = _neighbours(optimum, slopes)
     solved = _solve(optimum, values, width, scale, known, free_low, free_high, pairs, weight)
     held = _holds(solved, free_low, free_high, pairs, _AT_END * scale)
+    solved[kept], held[kept] = values[kept], ""
     missing = ~known & (not fill)
     cells = {
-        "source": np.where(missing, optimum.cells["source"].ravel(), np.where(known, "smoothed", "interpolated")),
+        "source": np.where(
+            missing | kept, optimum.cells["source"].ravel(), np.where(known, "smoothed", "interpolated")
+        ),
         "active_limit": np.where(missing, "", held),
         "support": np.where(known | missing, optimum.cells["support"].ravel(), 0.0),
-        "objective": np.full(values.size, np.nan),
+        "objective": np.where(kept, optimum.cells["objective"].ravel(), np.nan),
     }
     how = ", ".join(f"{name} at most {limit:g} per unit" for name, limit in slopes.items() if np.isfinite(limit))
     return optimum.replaced(
@@ -131,23 +139,37 @@ def _checked(optimum: CalibrationMap, weight: float, limits: Mapping[str, float]
     return {name: float(limits.get(name, np.inf)) for name in optimum.axes}
 
 
-def _check_ranges(optimum: CalibrationMap, values: Array, low: Array, high: Array, known: NDArray[np.bool_]) -> None:
+def _check_ranges(
+    optimum: CalibrationMap,
+    values: Array,
+    low: Array,
+    high: Array,
+    known: NDArray[np.bool_],
+    kept: NDArray[np.bool_],
+) -> None:
     if not known.any():
         raise DataError(f"{optimum.name}: no cell has a value: there is nothing to smooth")
-    bad = known & ~((low <= values) & (values <= high))  # a range that is NaN too
+    bad = known & ~kept & ~((low <= values) & (values <= high))  # a range that is NaN too
     if bad.any():
         at = int(np.argmax(bad))
         raise DataError(
             f"{optimum.name} at {cell_at(optimum.axes, at)}: {values[at]:g} has the range {low[at]:g} to {high[at]:g}: "
             f"a value needs a range around it; an optimum with {argument('max_loss')} has one, or set the cells low "
-            "and high"
+            f"and high; with {argument('fill', 'True')} cells that have no range keep their values"
         )
 
 
-def _half_widths(values: Array, low: Array, high: Array, known: NDArray[np.bool_]) -> Array:
-    width = np.where(known, np.maximum(high - values, values - low), np.nan)
-    middle = float(np.median(width[known]))
-    return np.where(known, np.maximum(width, _NARROWEST * middle if middle > 0.0 else 1.0), np.inf)
+def _half_widths(
+    values: Array, low: Array, high: Array, ranged: NDArray[np.bool_], known: NDArray[np.bool_]
+) -> tuple[float, Array]:
+    """Return the median half width and that of each cell; without ranges the values themselves say what is much."""
+    if not ranged.any():
+        return (scale := float(np.ptp(values[known])) or 1.0), np.where(known, scale, np.inf)
+    width = np.where(ranged, np.maximum(high - values, values - low), np.nan)
+    middle = float(np.median(width[ranged]))
+    width = np.where(ranged, np.maximum(width, _NARROWEST * middle if middle > 0.0 else 1.0), np.inf)
+    scale = float(np.median(width[ranged]))
+    return scale, np.where(known & ~ranged, scale, width)
 
 
 def _check_reach(optimum: CalibrationMap, slopes: Mapping[str, float], low: Array, high: Array) -> None:
