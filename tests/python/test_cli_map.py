@@ -275,6 +275,18 @@ def test_what_is_extrapolated_is_left_empty_and_said(
     assert "kept" in told["warnings"][0]
 
 
+def test_a_map_of_predictions_says_so(chain: Path, here: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    over = ["--over", "speed_rpm=1000:4000:4", "--over", "fuel_mg=20:20:1", "--over", "soc_cad=-6:0:3"]
+    ran(capsys, "map", "predict", str(chain / "p_max.toml"), *over, "--extrapolate", "-o", "all.nc")
+    with xr.open_dataset(here / "all.nc", engine="scipy") as table:
+        write_netcdf(table.isel(fuel_mg=0, drop=True).load(), here / "plane.nc")
+    ran(capsys, "map", "export", "plane.nc", "--name", "p_max_bar", "-o", "plane.json")
+    source = read_map(here / "plane.json").cells["source"]
+    assert set(source[-1]) == {"extrapolated"}  # 4000 rpm were never driven
+    assert "predicted" in source
+    assert not {"measured", "given"} & set(source.ravel())
+
+
 def test_what_is_printed_is_a_map_file(here: Path, capsys: pytest.CaptureFixture[str]) -> None:
     write_netcdf(map_sweep(), here / "table.nc")
     options = ["--minimize", "p_max_bar", "--limit", "efficiency_gross=0.49", "--sd", "p_max_bar=0.5"]

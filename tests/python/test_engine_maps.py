@@ -64,7 +64,7 @@ def test_nothing_above_full_load_and_no_share_of_zero_power(engines: tuple[xr.Da
 
 
 def test_a_measured_map_can_be_read_and_says_where_it_ends(engines: tuple[xr.Dataset, xr.Dataset]) -> None:
-    table = CalibrationMap.from_dataset(engines[0], "bsfc_g_per_kwh")
+    table = CalibrationMap.from_dataset(engines[0], "bsfc_g_per_kwh", source="measured")
     at = table.lookup({"speed_rpm": [1900.0, 1900.0, 4400.0, 9000.0], "torque_nm": [216.92, 150.0, 223.0, 100.0]})
     assert at.values[0] == pytest.approx(211.9, abs=0.05)
     assert 211.0 < at.values[1] < 240.0

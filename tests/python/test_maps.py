@@ -133,7 +133,11 @@ def test_dataset_and_back() -> None:
     check_labels(data)
     assert CalibrationMap.from_dataset(data) == timing_table()
     other = CalibrationMap.from_dataset(data[["soc_cad"]].rename(soc_cad="estimate_cad"), "estimate_cad")
-    assert other.cells["source"][2].tolist() == ["measured"] * 4 + ["unattainable"]
+    assert other.cells["source"][2].tolist() == ["given"] * 4 + ["unattainable"]
+    told = CalibrationMap.from_dataset(
+        data[["soc_cad"]].rename(soc_cad="estimate_cad"), "estimate_cad", source="measured"
+    )
+    assert told.cells["source"][2].tolist() == ["measured"] * 4 + ["unattainable"]
     with pytest.raises(DataError, match="no variable 'soi_cad' over one or two axes: the Dataset has soc_cad"):
         CalibrationMap.from_dataset(data, "soi_cad")
     with pytest.raises(

@@ -78,8 +78,13 @@ def _predict(args: argparse.Namespace) -> None:
         for ending, part in _PARTS.items():
             values = np.where(keep, found[part].to_numpy(), np.nan).reshape(shape)
             variables[f"{model.name}{ending}"] = (dims, values, *label_of(found[part]))
+        if args.extrapolate:
+            where = beyond.reshape(shape).astype(np.int8)
+            variables[f"{model.name}_extrapolated"] = (dims, where, *label_of(found["extrapolated"]))
     table = labelled_dataset(variables, attrs={"level": args.level, "models": ", ".join(args.files)})
     table = table.set_coords([name for name in names if name not in axes])
+    for model in models:
+        table[model.name].attrs["source"] = "predicted"
     total = int(np.prod(shape))
     what = "kept, extrapolated)"
     if not args.extrapolate:

@@ -56,8 +56,9 @@ class CalibrationMap(MapForms):
     labels : mapping of str to (str, str), optional
         Unit and long name of the value and of axes; left out, they are those of the name.
     cells : mapping of str to array_like, optional
-        Columns of one entry per cell, or of one for all: ``source`` (``given``, ``measured``, ``optimised``,
-        ``smoothed``, ``interpolated``, ``held``, ``learned``; without a value ``infeasible`` or ``unattainable``),
+        Columns of one entry per cell, or of one for all: ``source`` (``given``, ``measured``, ``predicted``,
+        ``extrapolated``, ``optimised``, ``smoothed``, ``interpolated``, ``held``, ``learned``; without a value
+        ``infeasible`` or ``unattainable``),
         ``support`` (points behind the value), ``sd``, ``low`` and ``high`` [unit of the value], ``objective`` and
         ``active_limit``.
     task : MapTask, optional

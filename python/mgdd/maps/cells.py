@@ -33,7 +33,8 @@ __all__ = [
 
 # Where a value comes from; the last two say why there is none.
 SOURCES = (
-    "given", "measured", "optimised", "smoothed", "interpolated", "held", "learned", "infeasible", "unattainable",
+    "given", "measured", "predicted", "extrapolated", "optimised", "smoothed", "interpolated", "held", "learned",
+    "infeasible", "unattainable",
 )  # fmt: skip
 WITHOUT_VALUE = SOURCES[-2:]
 # Columns of numbers: long name, what stands where nothing is said, and the least that may stand there.

@@ -132,7 +132,7 @@ class MapForms:
         return labelled_dataset(variables, attrs=attrs)
 
     @classmethod
-    def from_dataset(cls, dataset: xr.Dataset, name: str | None = None, *, source: str = "measured") -> Self:
+    def from_dataset(cls, dataset: xr.Dataset, name: str | None = None, *, source: str | None = None) -> Self:
         """Make a map of what `to_dataset` gave, or of any variable over one or two axes.
 
         Parameters
@@ -141,8 +141,10 @@ class MapForms:
             With units and long names, as every Dataset of mgdd has them.
         name : str, optional
             The variable; the map that the Dataset names, if left out.
-        source : str
-            Source of the cells where the Dataset has none; those without a value are ``unattainable``.
+        source : str, optional
+            Source of the cells where the Dataset is no map. If left out: the attribute ``source`` of the variable,
+            ``extrapolated`` where the variable ``NAME_extrapolated`` says so, else ``given``. Cells without a value are
+            ``unattainable``.
 
         Returns
         -------
@@ -172,7 +174,10 @@ class MapForms:
             if not {"units", "long_name"} <= set(dataset[each].attrs):
                 raise DataError(f"{each} has no units or no long_name: say both in its attributes")
         values = variable.to_numpy()
-        cells: dict[str, Any] = {"source": np.where(np.isfinite(values), source, "unattainable")}
+        said = np.full(values.shape, source or variable.attrs.get("source", "given"), "U64")
+        if source is None and f"{own}_extrapolated" in dataset:
+            said[dataset[f"{own}_extrapolated"].transpose(*dims).to_numpy() > 0] = "extrapolated"
+        cells: dict[str, Any] = {"source": np.where(np.isfinite(values), said, "unattainable")}
         task, provenance = None, {}
         if dataset.attrs.get("map") == own:
             cells = {each: dataset[each].to_numpy() for each in (*NUMBERS, *TEXTS) if each in dataset}

@@ -21,7 +21,10 @@ __all__ = ["map_cells", "map_contour"]
 
 _COLOURS = "cividis"  # of even lightness, for colour-blind eyes and for print
 # Beside a value in its cell; what is not named here needs no mark.
-_MARKS = {"interpolated": "i", "held": "h", "learned": "l", "infeasible": "×", "unattainable": "×"}
+_MARKS = {
+    "predicted": "p", "extrapolated": "e", "interpolated": "i", "held": "h", "learned": "l",
+    "infeasible": "×", "unattainable": "×",
+}  # fmt: skip
 
 
 def map_contour(
@@ -114,7 +117,8 @@ def map_cells(data: xr.Dataset, variable: str | None = None, *, ax: Axes | None 
     -------
     matplotlib.axes.Axes
         The axes. Cells stand at their number, with their breakpoints as ticks. A letter says where a value comes from:
-        i interpolated, h held, l learned; a cross stands where there is none, and a frame where a limit holds it.
+        p predicted, e extrapolated, i interpolated, h held, l learned; a cross stands where there is none, and a frame
+        where a limit holds it.
 
     Raises
     ------
