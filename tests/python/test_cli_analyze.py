@@ -109,8 +109,11 @@ def test_tdc_is_estimated_and_doubted_when_asked(file: str, tmp_path: Path, caps
     np.savetxt(late, np.column_stack([angle, pressure]), delimiter=",", header="angle,p_bar", comments="", fmt="%.17g")
     said = ("--speed-rpm", "1200", "--trapped-mass-g", "4.13863")
     out = run_json(capsys, str(late), *HD, *said, "--tdc")
-    assert -3.6 < out["tdc"]["offset_cad"] < -2.4
+    assert 2.4 < out["tdc"]["tdc_offset_cad"] < 3.6
     assert any("suspect TDC" in text for text in out["warnings"])
     assert "tdc" not in run_json(capsys, str(late), *HD, *said)
+    back = run_json(capsys, str(late), *HD, *said, "--tdc", "--tdc-offset-cad", str(out["tdc"]["tdc_offset_cad"]))
+    assert not back["tdc"]["suspect"]
+    assert abs(back["tdc"]["tdc_offset_cad"]) < 0.1
     right = run_json(capsys, file, *HD, *said, "--tdc")
     assert not right["tdc"]["suspect"]

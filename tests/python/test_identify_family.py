@@ -11,7 +11,7 @@ import xarray as xr
 from matplotlib.figure import Figure
 
 from mgdd import datasets, presets
-from mgdd.engine import OperatingPoint, find_optimum, simulate
+from mgdd.engine import OperatingPoint, analyze, find_optimum, simulate
 from mgdd.errors import DataError, ParameterError
 from mgdd.identify import ModelFamily, best_timing, estimate_tdc, fit_cylinder
 from mgdd.identify.engine.best_timing import doubts_of
@@ -158,8 +158,8 @@ def test_the_residual_of_a_fired_trace_finds_tdc(offset: float) -> None:
     traces = [measured(*load, tdc_cad=offset) for load in LOADS]
     found = estimate_tdc(traces, PRESET.cylinder, span_cad=2.0)
     assert found.method == "residual of the calibration"
-    assert found.offset_cad == pytest.approx(-offset, abs=0.15)
-    assert found.low_cad <= -offset <= found.high_cad
+    assert found.tdc_offset_cad == pytest.approx(offset, abs=0.15)
+    assert found.low_cad <= offset <= found.high_cad
     assert found.suspect == (offset != 0.0)
     check_labels(found.dataset)
 
@@ -171,11 +171,18 @@ def test_the_peak_of_a_motored_trace_finds_tdc() -> None:
         trace = pressure_trace(cycle["crank_angle_cad"].values + offset, cycle["pressure_bar"].values)
         found = estimate_tdc([trace], TRUTH, point=point)
         assert found.method == "motored peak"
-        assert found.low_cad < -offset < found.high_cad
+        assert found.low_cad < offset < found.high_cad
         assert found.loss_angle_cad[0] < found.loss_angle_cad[1] < found.loss_angle_cad[2]
         assert found.suspect
         with pytest.raises(DataError, match="no scan to draw"):
             found.plot()
+        # One sign everywhere: the analysis says the same, and what is said can be taken off.
+        assert float(analyze(trace, TRUTH, point=point, quiet=True)["tdc_offset_cad"]) == pytest.approx(offset, abs=0.7)
+        angle, pressure = trace["crank_angle_cad"].values, trace["pressure_bar"].values
+        right = pressure_trace(angle, pressure, tdc_offset_cad=found.tdc_offset_cad)
+        assert not estimate_tdc([right], TRUTH, point=point).suspect
+        (doubt,) = found.doubts()
+        assert doubt.endswith(f"suspect TDC; tdc_offset_cad={found.tdc_offset_cad:.2f} takes it off")
 
 
 def test_tdc_of_one_kind_of_trace_only() -> None:
@@ -204,5 +211,5 @@ def test_a_shift_moves_angles_pressure_and_injection_together() -> None:
 def test_the_measured_engine_has_its_tdc_where_it_says() -> None:
     found = estimate_tdc(datasets.load("hd_diesel_128x144"), PRESET.cylinder, span_cad=1.5)
     assert not found.suspect
-    assert abs(found.offset_cad) < 0.3
+    assert abs(found.tdc_offset_cad) < 0.3
     assert found.plot(ax=Figure().add_subplot()).get_ylim()[0] == 0.0

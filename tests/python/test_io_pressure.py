@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import itertools
+
 import numpy as np
 import pytest
 from hypothesis import given
@@ -323,3 +325,26 @@ def test_conditions_of_the_whole_bench(file):
 def test_condition_faults(file, content, message):
     with pytest.raises(DataError, match=message):
         read_conditions(file(content))
+
+
+def test_what_the_angles_are_too_large_by_is_taken_off_in_every_convention() -> None:
+    angle = np.arange(-360.0, 360.0, 0.5)
+    pressure = 1.0 + 60.0 * np.exp(-(((angle - 7.0) / 30.0) ** 2))  # not the same on both sides
+    ways = ((1.0, 0.0, {}), (1.0, 360.0, {"firing_tdc_deg": 360.0}), (-1.0, 0.0, {"before_tdc": True}))
+    for (turn, base, said), offset in itertools.product(ways, (1.5, -1.0)):
+        trace = pressure_trace(turn * (angle + offset) + base, pressure, tdc_offset_cad=offset, **said)
+        near = trace.sel(crank_angle_cad=slice(-200.1, 200.1))
+        np.testing.assert_allclose(near["crank_angle_cad"], angle[np.abs(angle) <= 200.0], atol=1e-9)
+        np.testing.assert_array_equal(near["pressure_bar"], pressure[np.abs(angle) <= 200.0])
+    with pytest.raises(DataError, match="tdc_offset_cad = 21: must be within ±20"):
+        pressure_trace(angle, pressure, tdc_offset_cad=21.0)
+    with pytest.raises(DataError, match="tdc_offset_cad = nan"):
+        pressure_trace(angle, pressure, tdc_offset_cad=np.nan)
+
+
+def test_a_whole_cycle_may_begin_a_little_off() -> None:
+    angle = np.arange(-358.8, 361.01, 0.6)
+    trace = pressure_trace(angle, 1.0 + 60.0 * np.exp(-((angle / 30.0) ** 2)))
+    np.testing.assert_allclose(trace["crank_angle_cad"], angle)
+    with pytest.raises(DataError, match=r"looks like a 0\.\.720 record"):
+        pressure_trace(angle + 400.0, 1.0 + 60.0 * np.exp(-((angle / 30.0) ** 2)))

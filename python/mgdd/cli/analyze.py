@@ -119,7 +119,7 @@ def _analyze(args: argparse.Namespace) -> None:
     text: list[str | Table] = _table(payload) if "cycles" in payload else [lines(payload)]
     if args.tdc:
         low, high = payload["tdc"]["low_cad"], payload["tdc"]["high_cad"]
-        text.append(f"TDC offset {payload['tdc']['offset_cad']:+.2f} °CA, {low:+.2f} to {high:+.2f} possible")
+        text.append(f"TDC offset {payload['tdc']['tdc_offset_cad']:+.2f} °CA, {low:+.2f} to {high:+.2f} possible")
     emit(args, payload, text=text, traces=result)
 
 

@@ -157,7 +157,7 @@ def _payload(
 
 def tdc_payload(tdc: TdcEstimate) -> dict[str, Any]:
     """Give an estimate of TDC as plain values."""
-    names = ("method", "offset_cad", "low_cad", "high_cad", "suspect")
+    names = ("method", "tdc_offset_cad", "low_cad", "high_cad", "suspect")
     return {**{name: getattr(tdc, name) for name in names}, "others_cad": list(tdc.others_cad)}
 
 
@@ -199,7 +199,7 @@ def _report(
         ]
     if unidentifiable:
         out += ["", f"not identifiable: {', '.join(unidentifiable)}"]
-    out += ["", f"TDC offset {tdc.offset_cad:+.2f} CAD, {tdc.low_cad:+.2f} to {tdc.high_cad:+.2f} possible"]
+    out += ["", f"TDC offset {tdc.tdc_offset_cad:+.2f} CAD, {tdc.low_cad:+.2f} to {tdc.high_cad:+.2f} possible"]
     doubts = [*map(str, fit.findings), *tdc.doubts(), *_better_laws(fit, laws)]
     if doubts:
         out += ["", "what to distrust:", *(f"  - {text}" for text in doubts)]

@@ -165,6 +165,13 @@ def add_files(parser: argparse.ArgumentParser, *, nargs: int | str) -> None:
     group.add_argument(
         "--offset-bar", type=float, metavar="X", help="bar at 0 V (left out: relative pressure, use --pegging)"
     )
+    group.add_argument(
+        "--tdc-offset-cad",
+        type=float,
+        default=0.0,
+        metavar="X",
+        help="the angles are too large by this; taken off [°CA]",
+    )
     group.add_argument("--angle-column", metavar="NAME", help="column name, or number from 0 (default: 0)")
     group.add_argument(
         "--angle-unit", choices=ANGLE_UNITS,
@@ -236,6 +243,7 @@ def traces_of(args: argparse.Namespace) -> list[xr.Dataset]:
             pressure_unit=args.pressure_unit,
             firing_tdc_deg=args.firing_tdc_deg,
             before_tdc=args.before_tdc,
+            tdc_offset_cad=args.tdc_offset_cad,
             angle_step_deg=args.angle_step_deg,
             angle_start_deg=args.angle_start_deg,
             speed_rpm=rows[file].get("speed_rpm", speed),

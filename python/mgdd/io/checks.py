@@ -172,7 +172,9 @@ def _check_order(degrees: NDArray[np.float64], place: Callable[[int], str]) -> N
 
 def _check_convention(degrees: NDArray[np.float64], source: str) -> None:
     first, last = float(degrees[0]), float(degrees[-1])
-    if first < -360.5 or last > 360.5:
+    whole = first < 30.0 - 360.0 and last > 360.0 - 30.0  # a whole cycle may begin a little off, or be shifted
+    reach = 390.0 if whole else 360.5
+    if first < -reach or last > reach:
         raise DataError(
             f"{source}: crank angles run from {first:g} to {last:g}: this looks like a 0..720 record; "
             f"{CONVENTION}; {_remedy_0_720()}"

@@ -33,6 +33,7 @@ def pressure_trace(
     *,
     firing_tdc_deg: float | None = None,
     before_tdc: bool = False,
+    tdc_offset_cad: float = 0.0,
     name: str = "trace",
 ) -> xr.Dataset:
     """Check arrays and make the Dataset of a measured trace from copies of them.
@@ -47,6 +48,8 @@ def pressure_trace(
         column per cycle.
     firing_tdc_deg, before_tdc
         For angles in another convention, and for angles that run on, as in `read_pressure`.
+    tdc_offset_cad : float
+        What the angles are too large by [°CA], as in `read_pressure`.
     name : str
         What tables and figures call the trace; stored as ``attrs["file"]``.
 
@@ -75,7 +78,12 @@ def pressure_trace(
         pressure_bar = pressure_bar.to_numpy().T
     given, values = pair(crank_angle_cad, pressure_bar)
     angle, pressure, warnings = checked(
-        given, np.atleast_2d(values), firing_tdc_deg=firing_tdc_deg, before_tdc=before_tdc, source=name
+        given,
+        np.atleast_2d(values),
+        firing_tdc_deg=firing_tdc_deg,
+        before_tdc=before_tdc,
+        tdc_offset_cad=tdc_offset_cad,
+        source=name,
     )
     return _dataset(angle, pressure, {"file": name, "warnings": "\n".join(warnings)})
 
@@ -89,6 +97,7 @@ def read_pressure(
     pressure_unit: str | None = None,
     firing_tdc_deg: float | None = None,
     before_tdc: bool = False,
+    tdc_offset_cad: float = 0.0,
     angle_step_deg: float | None = None,
     angle_start_deg: float | None = None,
     speed_rpm: float | None = None,
@@ -122,6 +131,9 @@ def read_pressure(
         record starts at gas-exchange TDC, 0 when it starts at firing TDC. It is never guessed; None for other files.
     before_tdc : bool
         Angles count degrees *before* firing TDC, compression positive.
+    tdc_offset_cad : float
+        What the angles are too large by [°CA], within ±20: taken off, once they are in °CA aTDC. It is what
+        `mgdd.identify.estimate_tdc` and ``tdc_offset_cad`` of a motored `mgdd.engine.analyze` give.
     angle_step_deg : float, optional
         For files without an angle column: degrees between two samples.
     angle_start_deg : float, optional
@@ -171,6 +183,7 @@ def read_pressure(
         pressure_unit=pressure_unit,
         firing_tdc_deg=firing_tdc_deg,
         before_tdc=before_tdc,
+        tdc_offset_cad=tdc_offset_cad,
         angle_step_deg=angle_step_deg,
         angle_start_deg=angle_start_deg,
         speed_rpm=speed_rpm,

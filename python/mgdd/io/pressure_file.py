@@ -30,6 +30,8 @@ if TYPE_CHECKING:
 
 __all__ = ["Reading", "checked", "cycles_of"]
 
+_LARGEST_OFFSET_CAD = 20.0
+
 
 @dataclass(frozen=True)
 class Reading:
@@ -41,6 +43,7 @@ class Reading:
     pressure_unit: str | None
     firing_tdc_deg: float | None
     before_tdc: bool
+    tdc_offset_cad: float
     angle_step_deg: float | None
     angle_start_deg: float | None
     speed_rpm: float | None
@@ -98,6 +101,7 @@ def cycles_of(table: TextTable, how: Reading) -> tuple[NDArray[np.float64], NDAr
         angle_unit=unit,
         firing_tdc_deg=tdc,
         before_tdc=how.before_tdc,
+        tdc_offset_cad=how.tdc_offset_cad,
         source=table.source,
         rows=table.lines,
         level=level,
@@ -114,12 +118,15 @@ def checked(
     angle_unit: str = "deg",
     firing_tdc_deg: float | None,
     before_tdc: bool,
+    tdc_offset_cad: float = 0.0,
     source: str,
     rows: Sequence[int] | None = None,
     level: bool = True,
     unit_of_file: bool = False,
 ) -> tuple[NDArray[np.float64], NDArray[np.float64], list[str]]:
     """Cut a record into cycles and check them; angles are in degrees, `angle_unit` is what they came in."""
+    if not abs(tdc_offset_cad) <= _LARGEST_OFFSET_CAD:
+        raise DataError.of("tdc_offset_cad", tdc_offset_cad, f"within ±{_LARGEST_OFFSET_CAD:g} °CA")
 
     def place(index: int) -> str:
         return f"{source}, line {rows[index]}" if rows is not None else f"{source}, sample {index}"
@@ -129,7 +136,7 @@ def checked(
         cut = arranged(
             degrees, values, firing_tdc_deg=firing_tdc_deg, before_tdc=before_tdc, place=place, source=source
         )
-        degrees, values, notes = cut.degrees, cut.pressure, list(cut.notes)
+        degrees, values, notes = cut.degrees - tdc_offset_cad, cut.pressure, list(cut.notes)
         rows = [rows[i] for i in cut.rows.tolist()] if rows is not None else None
     else:
         notes = []  # check_trace names what is not finite or too short

@@ -180,11 +180,11 @@ def tdc_scan(scan: xr.Dataset, possible: tuple[float, float], *, ax: Axes | None
     >>> from mgdd.plot.calibration import tdc_scan
     >>> from mgdd.results.labels import labelled_dataset
     >>> scan = labelled_dataset({
-    ...     "tdc_offset_cad": ("tdc_offset_cad", [-0.5, 0.0, 0.5], "°CA", "angle added to the trace"),
+    ...     "tdc_offset_cad": ("tdc_offset_cad", [-0.5, 0.0, 0.5], "°CA", "angle taken off the trace"),
     ...     "rmse_percent": ("tdc_offset_cad", [0.30, 0.10, 0.25]),
     ... })
     >>> tdc_scan(scan, (-0.1, 0.1)).get_xlabel()
-    'angle added to the trace [°CA]'
+    'angle taken off the trace [°CA]'
     """
     require(scan, ("tdc_offset_cad", "rmse_percent"), "mgdd.identify.estimate_tdc")
     ax = new_axes(ax, height=4.2)

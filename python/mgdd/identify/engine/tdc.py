@@ -11,7 +11,7 @@ import numpy as np
 from mgdd._core.engine import Cylinder, OperatingPoint
 from mgdd.engine import analyze, simulate
 from mgdd.engine.trace import conditions
-from mgdd.errors import ConvergenceError, DataError, ParameterError
+from mgdd.errors import ConvergenceError, DataError, ParameterError, argument
 from mgdd.identify.engine.cylinder import fit_request
 from mgdd.identify.engine.family import of_law
 from mgdd.identify.engine.records import CylinderFit, starts_of
@@ -40,8 +40,9 @@ class TdcEstimate:
 
     Parameters
     ----------
-    offset_cad : float
-        What must be added to the angles so that firing TDC is at 0 [°CA].
+    tdc_offset_cad : float
+        What the angles are too large by: where they have firing TDC [°CA]. ``tdc_offset_cad=`` of
+        `mgdd.io.read_pressure` takes it off.
     low_cad, high_cad : float
         Range of offsets that the traces do not tell apart [°CA].
     method : {"motored peak", "residual of the calibration"}
@@ -49,7 +50,7 @@ class TdcEstimate:
     loss_angle_cad : tuple of float
         Motored: lowest, textbook and highest angle by which wall heat puts the peak before TDC [°CA]; empty if fired.
     others_cad : tuple of float
-        Fired: further minima of the residual that are as possible [°CA aTDC].
+        Fired: further minima of the residual that are as possible [°CA].
     dataset : xarray.Dataset
         Fired: ``rmse_percent`` over ``tdc_offset_cad``; motored: empty.
 
@@ -63,7 +64,7 @@ class TdcEstimate:
     False
     """
 
-    offset_cad: float
+    tdc_offset_cad: float
     low_cad: float
     high_cad: float
     method: str
@@ -86,7 +87,7 @@ class TdcEstimate:
         """
         if not self.suspect:
             return []
-        edge = "tdc_offset_cad" in self.dataset and abs(self.offset_cad) >= abs(
+        edge = "tdc_offset_cad" in self.dataset and abs(self.tdc_offset_cad) >= abs(
             float(self.dataset["tdc_offset_cad"][0])
         )
         how = (
@@ -94,7 +95,8 @@ class TdcEstimate:
             if edge
             else f"{self.low_cad:+.2f} to {self.high_cad:+.2f} possible"
         )
-        return [f"the {self.method} asks for {self.offset_cad:+.2f} °CA to be added to the angles ({how}): suspect TDC"]
+        said = f"the {self.method} has the angles {self.tdc_offset_cad:+.2f} °CA too large ({how}): suspect TDC"
+        return [f"{said}; {argument('tdc_offset_cad', f'{self.tdc_offset_cad:.2f}')} takes it off"]
 
     def plot(self, *, ax: Axes | None = None) -> Axes:
         """Draw the least RMSE over the TDC offset.
@@ -206,12 +208,12 @@ def _of_motored(request: Request) -> TdcEstimate:
             for scale in _SCALES
         ]
         losses.append(loss)
-        offsets.append([-peak - own for own in loss])
-    low, middle, high = (float(np.mean([own[k] for own in offsets])) for k in (2, 1, 0))
+        offsets.append([peak + own for own in loss])
+    low, middle, high = (float(np.mean([own[k] for own in offsets])) for k in range(3))
     return TdcEstimate(
-        offset_cad=middle,
-        low_cad=low - _NOISE_CAD,
-        high_cad=high + _NOISE_CAD + _LEAK_CAD,
+        tdc_offset_cad=middle,
+        low_cad=low - _NOISE_CAD - _LEAK_CAD,
+        high_cad=high + _NOISE_CAD,
         method="motored peak",
         loss_angle_cad=tuple(float(value) for value in np.mean(losses, axis=0)),
         dataset=labelled_dataset({}),
@@ -235,7 +237,7 @@ def _of_fired(request: Request, span_cad: float, progress: Callable[[str], None]
     for step in sorted(range(-count, count + 1), key=abs):
         offset = step * _STEP_CAD
         if progress is not None:
-            progress(f"calibrate with TDC moved by {offset:+.2f} CAD")
+            progress(f"calibrate with {offset:+.2f} CAD taken off")
         fits[offset] = _best_at(request, offset, fits)
     offsets = np.array(sorted(fits))
     rmse = np.array([100.0 * fits[offset].report.rmse for offset in offsets])
@@ -249,14 +251,14 @@ def _of_fired(request: Request, span_cad: float, progress: Callable[[str], None]
     inner = np.arange(1, offsets.size - 1)
     minima = inner[(rmse[inner] <= rmse[inner - 1]) & (rmse[inner] <= rmse[inner + 1]) & (rmse[inner] <= level)]
     return TdcEstimate(
-        offset_cad=_vertex(offsets, rmse, best),
+        tdc_offset_cad=_vertex(offsets, rmse, best),
         low_cad=float(inside.min()) - _MODEL_CAD,
         high_cad=float(inside.max()) + _MODEL_CAD,
         method="residual of the calibration",
         others_cad=tuple(float(offsets[k]) for k in minima if k != best),
         dataset=labelled_dataset(
             {
-                "tdc_offset_cad": ("tdc_offset_cad", offsets, "°CA", "angle added to the trace"),
+                "tdc_offset_cad": ("tdc_offset_cad", offsets, "°CA", "angle taken off the trace"),
                 "rmse_percent": ("tdc_offset_cad", rmse, "% of p_max", "pressure RMSE of the calibration"),
             }
         ),
@@ -265,7 +267,7 @@ def _of_fired(request: Request, span_cad: float, progress: Callable[[str], None]
 
 def _best_at(request: Request, offset: float, known: dict[float, CylinderFit]) -> CylinderFit:
     """Fit at one offset, from the heat release and from the neighbour that is fitted: the better of both."""
-    moved = request.shifted(angle_cad=offset)
+    moved = request.shifted(angle_cad=-offset)
     found = []
     try:
         found.append(fit_request(moved))
