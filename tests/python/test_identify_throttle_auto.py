@@ -188,3 +188,33 @@ def test_a_short_noise_free_log_keeps_the_lag_of_the_motor_and_no_delay() -> Non
     fit = identify_throttle(throttle_log(run["time_s"], run["duty"], run["angle_deg"]), options=FitOptions(n_starts=1))
     assert fit.parameters["delay_samples"] == 0.0
     assert fit.parameters["electrical_s"] == pytest.approx(1e-3, rel=0.1)
+
+
+@pytest.mark.parametrize(
+    "change",
+    one_of(
+        {"delta_duty": 0.001}, {"delta_duty": 0.35, "beta_above_duty": 0.2, "beta_below_duty": 0.2},
+        {"beta_above_duty": 0.55, "beta_below_duty": 0.5}, {"tau_s": 0.004}, {"tau_s": 0.4},
+        {"gain_deg_per_s2_per_duty": 5e3}, {"gain_deg_per_s2_per_duty": 6e5},
+    ),
+    ids=str,
+)  # fmt: skip
+def test_a_throttle_that_the_rival_cannot_be_is_identified_all_the_same(change: dict[str, float]) -> None:
+    groups = {
+        "tau_s": 0.03, "gain_deg_per_s2_per_duty": 8e4, "beta_above_duty": 0.13, "kappa_above_duty_per_deg": 1e-3,
+        "delta_duty": 0.05, "beta_below_duty": 0.11, "kappa_below_duty_per_deg": 2e-3, "limp_home_deg": 9.0,
+        "electrical_s": 0.001, "delay_samples": 2.0, **change,
+    }  # fmt: skip
+    model = FirstPrincipleModel(parameters=groups, sample_s=1e-3)
+    rng, time = np.random.default_rng(5), np.arange(12000) * 1e-3
+    duty = np.repeat(rng.uniform(-0.75, 0.95, 80), 150)
+    blank = throttle_log(time, duty, np.linspace(9.0, 10.0, time.size))
+    angle = model.simulate(blank, initial_state={"angle_deg": 9.0})["angle_deg"].to_numpy()
+    fit = identify_throttle(throttle_log(time, duty, angle + rng.normal(0.0, 0.02, time.size)))
+    assert fit.kind == "first_principle"
+    assert fit.train is not None
+    assert fit.train.nrmse_fit_percent is not None
+    assert fit.train.nrmse_fit_percent > 99.5
+    for name in ("gain_deg_per_s2_per_duty", "tau_s", *change):
+        assert fit.parameters[name] == pytest.approx(groups[name], rel=0.03), name
+    assert "without a comparison: PW-R is not made for such a throttle (" in said(fit, "model_chosen")

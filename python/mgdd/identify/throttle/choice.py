@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from mgdd.errors import Interrupted
+from mgdd.errors import Interrupted, ParameterError
 from mgdd.identify.throttle.automatic import fit_groups
 from mgdd.identify.throttle.first_principle_model import FirstPrincipleModel
 from mgdd.identify.throttle.first_principle_problem import groups_problem
@@ -65,7 +65,12 @@ def fit_auto(
     iterations = FitOptions(max_iterations=None if options is None else options.max_iterations)
     try:
         ours = _groups_again(groups, early, fixed, stops_deg)
-        other = _pw_r(pseudo_wiener_of(ours), early, iterations)
+        try:
+            start = pseudo_wiener_of(ours)
+        except ParameterError as error:
+            text = f"the groups were taken without a comparison: PW-R is not made for such a throttle ({error})"
+            return _with(groups, Finding("model_chosen", (), text))
+        other = _pw_r(start, early, iterations)
         percent = [_percent_after(model, log, first) for model in (ours, other.model)]
         better = percent[1] > percent[0] + _BETTER_PERCENT
         # The groups may start PW-R in a valley of their own: it is also searched from no delay.
