@@ -169,7 +169,7 @@ def test_the_same_log_gives_the_same_bits_and_a_refused_call_changes_nothing() -
 def test_a_delay_among_several_has_the_error_of_the_costs_beside_it() -> None:
     report = least_squares(lambda x: ([x[0] - 1.0, x[1], x[0] + x[1]], [[1, 0], [0, 1], [1, 1]]), [0.0, 0.0])
     n, rmse = 400.0, {1.0: 0.05, 2.0: 0.04, 3.0: 0.044}
-    known = with_delay(report, 2.0, rmse, n)
+    known = with_delay(report, 2.0, rmse, n, range(6))
     # A parabola c (1 + (d - 2)^2 / (n s^2)) about the minimum, through the flatter neighbour.
     assert known.stderr[-1] == pytest.approx((2.0 * n * np.log(0.044 / 0.04)) ** -0.5)
     assert known.names == (*report.names, "delay_samples")
@@ -178,7 +178,12 @@ def test_a_delay_among_several_has_the_error_of_the_costs_beside_it() -> None:
     np.testing.assert_array_equal(known.stderr[:-1], report.stderr)
     low, high = known.interval()["delay_samples"]
     assert low < 2.0 < high
-    assert with_delay(report, 2.0, {2.0: 0.04, 3.0: 0.04}, n).stderr[-1] == 1.0
+    assert with_delay(report, 2.0, {2.0: 0.04, 3.0: 0.04}, n, range(6)).stderr[-1] == 1.0
+    for end, side in ((3.0, 1), (1.0, -1)):
+        at_end = with_delay(report, end, {1.0: 0.05, 2.0: 0.05, 3.0: 0.05} | {end: 0.04}, n)
+        assert math.isnan(at_end.stderr[-1])
+        assert at_end.bounds_active[-1] == side
+    assert with_delay(report, 0.0, {0.0: 0.04, 1.0: 0.05}, n).bounds_active[-1] == 0  # there is no less
     assert known.to_dataset().sizes["parameter"] == 3
 
 
@@ -218,3 +223,16 @@ def test_a_throttle_that_the_rival_cannot_be_is_identified_all_the_same(change: 
     for name in ("gain_deg_per_s2_per_duty", "tau_s", *change):
         assert fit.parameters[name] == pytest.approx(groups[name], rel=0.03), name
     assert "without a comparison: PW-R is not made for such a throttle (" in said(fit, "model_chosen")
+
+
+@pytest.mark.parametrize("delay", one_of(6, 7, 12, 5))
+def test_a_delay_at_the_end_of_the_search_is_doubted_and_has_no_interval(delay: int) -> None:
+    rng, time = np.random.default_rng(3), np.arange(8000) * 1e-3
+    duty = np.repeat(rng.uniform(-0.6, 0.9, 50), 160)
+    late = np.concatenate([np.full(delay, duty[0]), duty[:-delay]])
+    angle = simulate(Throttle(), late, time_s=time)["angle_deg"].to_numpy()
+    fit = identify_throttle(throttle_log(time, duty, angle + rng.normal(0.0, 0.02, time.size)), "first_principle")
+    assert fit.parameters["delay_samples"] == 5.0
+    at = fit.report.names.index("delay_samples")
+    assert math.isnan(fit.report.stderr[at])
+    assert "the longest that was tried: the true one may be longer" in said(fit, "delay_at_end")

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import dataclasses
 import math
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
@@ -19,7 +19,9 @@ __all__ = ["with_delay"]
 _NAME = "delay_samples"
 
 
-def with_delay(report: FitReport, delay: float, rmse: Mapping[float, float], n: float) -> FitReport:
+def with_delay(
+    report: FitReport, delay: float, rmse: Mapping[float, float], n: float, tried: Sequence[float] | None = None
+) -> FitReport:
     """Add the chosen delay, with the error of the flattest parabola through the costs of the others.
 
     Parameters
@@ -32,16 +34,21 @@ def with_delay(report: FitReport, delay: float, rmse: Mapping[float, float], n: 
         Error by delay, the chosen one included; at least two.
     n : float
         Independent samples of the residual.
+    tried : sequence of float, optional
+        Delays that may be; those of `rmse` if left out.
 
     Returns
     -------
     FitReport
-        With `delay_samples` last; a delay that fits as well as the chosen one leaves a whole sample open.
+        With `delay_samples` last; a delay that fits as well as the chosen one leaves a whole sample open. At the end of
+        what may be the error is NaN: how much further it goes, nobody has looked.
     """
     curvature = min(
         2.0 * n * math.log(other / rmse[delay]) / (at - delay) ** 2 for at, other in rmse.items() if at != delay
     )
-    error = 1.0 / math.sqrt(max(curvature, 1.0))
+    low, high = min(tried or rmse), max(tried or rmse)
+    side = 1 if delay == high else -1 if delay == low > 0.0 else 0  # less than no delay there is not
+    error = math.nan if side else 1.0 / math.sqrt(max(curvature, 1.0))
     null = np.vstack([report.null_directions, np.zeros((1, report.null_directions.shape[1]))])
     null.flags.writeable = False
     return dataclasses.replace(
@@ -49,9 +56,9 @@ def with_delay(report: FitReport, delay: float, rmse: Mapping[float, float], n: 
         names=(*report.names, _NAME),
         values=_longer(report.values, delay),
         stderr=_longer(report.stderr, error),
-        lower=_longer(report.lower, min(rmse)),
-        upper=_longer(report.upper, max(rmse)),
-        bounds_active=_longer(report.bounds_active, 0),
+        lower=_longer(report.lower, low),
+        upper=_longer(report.upper, high),
+        bounds_active=_longer(report.bounds_active, side),
         covariance=_wider(report.covariance, error**2),
         correlation=_wider(report.correlation, 1.0),
         null_directions=null,
