@@ -62,13 +62,16 @@ def in_terminal(command: list[str]) -> str:
 
 
 def test_a_terminal_gets_a_live_table_and_then_the_result(file: Path, tmp_path: Path) -> None:
-    command = [sys.executable, "-m", "mgdd", "rig", "run", str(file), "--folder"]
-    seen = in_terminal([*command, str(tmp_path / "one")])
+    seen = in_terminal([sys.executable, "-m", "mgdd", "rig", "run", str(file), "--folder", str(tmp_path / "one")])
     assert "track, simulate" in seen
     assert "1500 of 1500" in seen
     assert "sensed_angle_deg" in seen
     assert seen.rindex("settling_ms") > seen.rindex("1500 of 1500")
-    quiet = in_terminal([*command, str(tmp_path / "two"), "--quiet"])
+
+
+@pytest.mark.slow
+def test_a_quiet_terminal_gets_the_result_alone(file: Path, tmp_path: Path) -> None:
+    quiet = in_terminal([sys.executable, "-m", "mgdd", "rig", "run", str(file), "--folder", str(tmp_path), "--quiet"])
     assert "of 1500" not in quiet
     assert "settling_ms" in quiet
 

@@ -137,7 +137,7 @@ def test_a_table_of_a_grid_is_netcdf(tmp_path: Path, capsys: pytest.CaptureFixtu
 
 # --- Ctrl-C -------------------------------------------------------------------------------------------------
 @pytest.mark.skipif(os.name != "posix", reason="needs SIGINT")
-@pytest.mark.parametrize("keeps", [True, False])
+@pytest.mark.parametrize("keeps", [True, pytest.param(False, marks=pytest.mark.slow)])
 def test_ctrl_c_writes_what_is_done(keeps: bool, tmp_path: Path) -> None:
     """A signal comes when some cycles are done and most are not: the file has all cells, `finished` says which."""
     file = tmp_path / "table.nc"

@@ -211,15 +211,16 @@ def test_a_throttle_that_the_rival_cannot_be_is_identified_all_the_same(change: 
         "electrical_s": 0.001, "delay_samples": 2.0, **change,
     }  # fmt: skip
     model = FirstPrincipleModel(parameters=groups, sample_s=1e-3)
-    rng, time = np.random.default_rng(5), np.arange(12000) * 1e-3
-    duty = np.repeat(rng.uniform(-0.75, 0.95, 80), 150)
+    rng, time = np.random.default_rng(5), np.arange(6000) * 1e-3
+    duty = np.repeat(rng.uniform(-0.75, 0.95, 40), 150)
     blank = throttle_log(time, duty, np.linspace(9.0, 10.0, time.size))
     angle = model.simulate(blank, initial_state={"angle_deg": 9.0})["angle_deg"].to_numpy()
-    fit = identify_throttle(throttle_log(time, duty, angle + rng.normal(0.0, 0.02, time.size)))
+    log = throttle_log(time, duty, angle + rng.normal(0.0, 0.02, time.size))
+    fit = identify_throttle(log, delay_samples=[1, 2], options=FitOptions(n_starts=1))
     assert fit.kind == "first_principle"
     assert fit.train is not None
     assert fit.train.nrmse_fit_percent is not None
-    assert fit.train.nrmse_fit_percent > 99.5
+    assert fit.train.nrmse_fit_percent > 99.0
     for name in ("gain_deg_per_s2_per_duty", "tau_s", *change):
         assert fit.parameters[name] == pytest.approx(groups[name], rel=0.03), name
     assert "without a comparison: PW-R is not made for such a throttle (" in said(fit, "model_chosen")
@@ -227,11 +228,12 @@ def test_a_throttle_that_the_rival_cannot_be_is_identified_all_the_same(change: 
 
 @pytest.mark.parametrize("delay", one_of(6, 7, 12, 5))
 def test_a_delay_at_the_end_of_the_search_is_doubted_and_has_no_interval(delay: int) -> None:
-    rng, time = np.random.default_rng(3), np.arange(8000) * 1e-3
-    duty = np.repeat(rng.uniform(-0.6, 0.9, 50), 160)
+    rng, time = np.random.default_rng(3), np.arange(4000) * 1e-3
+    duty = np.repeat(rng.uniform(-0.6, 0.9, 25), 160)
     late = np.concatenate([np.full(delay, duty[0]), duty[:-delay]])
     angle = simulate(Throttle(), late, time_s=time)["angle_deg"].to_numpy()
-    fit = identify_throttle(throttle_log(time, duty, angle + rng.normal(0.0, 0.02, time.size)), "first_principle")
+    log = throttle_log(time, duty, angle + rng.normal(0.0, 0.02, time.size))
+    fit = identify_throttle(log, "first_principle", delay_samples=[3, 4, 5], options=FitOptions(n_starts=1))
     assert fit.parameters["delay_samples"] == 5.0
     at = fit.report.names.index("delay_samples")
     assert math.isnan(fit.report.stderr[at])

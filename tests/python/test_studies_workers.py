@@ -51,7 +51,14 @@ def test_parts_that_travel_give_the_same_table(name: str) -> None:
     assert same(run_study(name, executor=work.Pickling(), **options), run_study(name, **options))
 
 
-@pytest.mark.parametrize("how", [{"workers": 3}, {"executor": processes(2)}, {"executor": work.LateReversed()}])
+@pytest.mark.parametrize(
+    "how",
+    [
+        {"workers": 3},
+        pytest.param({"executor": processes(2)}, marks=pytest.mark.slow),  # what the command line takes, too
+        {"executor": work.LateReversed()},
+    ],
+)
 def test_workers_change_nothing(how: dict[str, Any], plain: StudyResult) -> None:
     said: list[str] = []
     assert same(run_study("sensor-delay", progress=said.append, **how, **DELAYS), plain)
