@@ -71,7 +71,9 @@ def test_a_terminal_gets_a_live_table_and_then_the_result(file: Path, tmp_path: 
 
 @pytest.mark.slow
 def test_a_quiet_terminal_gets_the_result_alone(file: Path, tmp_path: Path) -> None:
-    quiet = in_terminal([sys.executable, "-m", "mgdd", "rig", "run", str(file), "--folder", str(tmp_path), "--quiet"])
+    quiet = in_terminal(
+        [sys.executable, "-m", "mgdd", "rig", "run", str(file), "--folder", str(tmp_path / "two"), "--quiet"]
+    )
     assert "of 1500" not in quiet
     assert "settling_ms" in quiet
 
