@@ -183,7 +183,7 @@ def test_a_delay_among_several_has_the_error_of_the_costs_beside_it() -> None:
         at_end = with_delay(report, end, {1.0: 0.05, 2.0: 0.05, 3.0: 0.05} | {end: 0.04}, n)
         assert math.isnan(at_end.stderr[-1])
         assert at_end.bounds_active[-1] == side
-    assert with_delay(report, 0.0, {0.0: 0.04, 1.0: 0.05}, n).bounds_active[-1] == 0  # there is no less
+    assert with_delay(report, 0.0, {0.0: 0.04, 1.0: 0.05}, n).bounds_active[-1] == 0
     assert known.to_dataset().sizes["parameter"] == 3
 
 
@@ -226,15 +226,21 @@ def test_a_throttle_that_the_rival_cannot_be_is_identified_all_the_same(change: 
     assert "without a comparison: PW-R is not made for such a throttle (" in said(fit, "model_chosen")
 
 
-@pytest.mark.parametrize("delay", one_of(6, 7, 12, 5))
-def test_a_delay_at_the_end_of_the_search_is_doubted_and_has_no_interval(delay: int) -> None:
+@pytest.mark.parametrize(
+    ("delay", "tried", "end"),
+    one_of((6, [3, 4, 5], "longest"), (7, [3, 4, 5], "longest"), (12, [3, 4, 5], "longest"), (5, [3, 4, 5], "longest"),
+           (2, [3, 4, 5], "shortest")),
+)  # fmt: skip
+def test_a_delay_at_the_end_of_the_search_is_doubted_and_has_no_interval(
+    delay: int, tried: list[float], end: str
+) -> None:
     rng, time = np.random.default_rng(3), np.arange(4000) * 1e-3
     duty = np.repeat(rng.uniform(-0.6, 0.9, 25), 160)
     late = np.concatenate([np.full(delay, duty[0]), duty[:-delay]])
     angle = simulate(Throttle(), late, time_s=time)["angle_deg"].to_numpy()
     log = throttle_log(time, duty, angle + rng.normal(0.0, 0.02, time.size))
-    fit = identify_throttle(log, "first_principle", delay_samples=[3, 4, 5], options=FitOptions(n_starts=1))
-    assert fit.parameters["delay_samples"] == 5.0
+    fit = identify_throttle(log, "first_principle", delay_samples=tried, options=FitOptions(n_starts=1))
+    assert fit.parameters["delay_samples"] == (tried[-1] if end == "longest" else tried[0])
     at = fit.report.names.index("delay_samples")
     assert math.isnan(fit.report.stderr[at])
-    assert "the longest that was tried: the true one may be longer" in said(fit, "delay_at_end")
+    assert f"the {end} that was tried: the true one may be" in said(fit, "delay_at_end")

@@ -72,7 +72,9 @@ def test_columns_by_name_number_and_unit(tmp_path: Path) -> None:
 COLUMNS = {"t": TIME * 1e3, "u": DUTY * 100.0, "theta": np.deg2rad(ANGLE)}
 
 
-@pytest.mark.parametrize("form", ["t [ms],u [%],theta [rad]", "t (ms),u (%),theta (rad)", "t,u,theta\nms,%,rad"])
+@pytest.mark.parametrize(
+    "form", ["t [ms],u [%],theta [rad]", "t (ms),u (%),theta (rad)", "t,u,theta\nms,%,rad", "t/ms,u/%,theta_plate/rad"]
+)
 def test_what_the_file_says_of_its_units_is_taken(tmp_path: Path, form: str) -> None:
     path = csv(tmp_path / "own.csv", COLUMNS)
     path.write_text(path.read_text().replace("t,u,theta", form, 1))
@@ -100,6 +102,18 @@ def test_a_unit_that_is_not_known_is_refused(tmp_path: Path, form: str, message:
     path.write_text(path.read_text().replace("t,u,theta", form, 1))
     with pytest.raises(DataError, match=message):
         read_throttle_log(path, time=0, duty=1, angle=2)
+
+
+def test_a_remark_in_brackets_is_settled_by_the_user(tmp_path: Path) -> None:
+    path = csv(tmp_path / "own.csv", COLUMNS)
+    path.write_text(path.read_text().replace("t,u,theta", "t (since start),u [%],theta (plate) [rad]", 1))
+    with pytest.raises(
+        DataError, match=r"in 'since start' as the file says: .*, or pass time_unit= if that is a remark"
+    ):
+        read_throttle_log(path, time=0, duty=1, angle=2)
+    np.testing.assert_allclose(
+        read_throttle_log(path, time=0, duty=1, angle=2, time_unit="ms")["time_s"], TIME, atol=1e-12
+    )
 
 
 def test_a_current_in_another_unit_is_refused(tmp_path: Path) -> None:

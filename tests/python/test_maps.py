@@ -138,6 +138,10 @@ def test_dataset_and_back() -> None:
         data[["soc_cad"]].rename(soc_cad="estimate_cad"), "estimate_cad", source="measured"
     )
     assert told.cells["source"][2].tolist() == ["measured"] * 4 + ["unattainable"]
+    foreign = data[["soc_cad"]].rename(soc_cad="estimate_cad")
+    for text, source in (("predicted", "predicted"), ("CFD, version 3", "given"), ("unattainable", "given")):
+        foreign["estimate_cad"].attrs["source"] = text
+        assert CalibrationMap.from_dataset(foreign, "estimate_cad").cells["source"][0, 0] == source
     with pytest.raises(DataError, match="no variable 'soi_cad' over one or two axes: the Dataset has soc_cad"):
         CalibrationMap.from_dataset(data, "soi_cad")
     with pytest.raises(

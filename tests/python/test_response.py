@@ -267,6 +267,7 @@ def test_a_sweep_is_fitted_over_its_inputs_and_over_nothing_else():
         at = {"soc_cad": -5.0, "fuel_mg": 21.0}
         expected = fits["told"].model.predict(at)["mean"].item()
         assert fit.model.predict(at)["mean"].item() == pytest.approx(expected, rel=1e-9)
+    assert tuple(fit_response(listed, listed["efficiency_gross"]).model.factors) == ("soc_cad", "fuel_mg")
     one = fit_response(grid, "efficiency_gross", factors=["soc_cad"])
     assert tuple(one.model.factors) == ("soc_cad",)
     assert tuple(fit_response(PLAN.assign(y=("point", truth(PLAN))), "y").model.factors) == tuple(FACTORS)

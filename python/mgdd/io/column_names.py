@@ -95,10 +95,13 @@ def heading(name: str, units_row: str | None = None, *, where: str = "column") -
     )
 
 
-def unit_text(name: str, units_row: str | None = None) -> str | None:
-    """Return what stands where a unit stands: in the units row, else in brackets behind the name; None for nothing."""
-    texts = [units_row or "", *re.findall(r"\[([^\[\]]*)\]", name), *_maybe_units(name)]
-    return next((text.strip() for text in texts if text.strip()), None)
+def unit_text(name: str, units_row: str | None = None) -> tuple[str | None, bool]:
+    """Return what stands where a unit stands, None for nothing, and whether it can be nothing else."""
+    for texts, sure in (([units_row or "", *re.findall(r"\[([^\[\]]*)\]", name)], True), (_maybe_units(name), False)):
+        said = next((text.strip() for text in texts if text.strip()), None)
+        if said is not None:
+            return said, sure
+    return None, False
 
 
 def _first_strange(texts: list[str]) -> str | None:
@@ -114,9 +117,12 @@ def _maybe_units(name: str) -> list[str]:
 
 
 def _ratio(name: str) -> str | None:
-    """Return the last word where it has a slash in it, as no name has."""
+    """Return the last word where it has a slash in it: a unit of its own, or a quantity over its unit, t/s."""
     last = re.split(r"[\s_]+", name.strip())[-1]
-    return last if "/" in last.strip("/") and not _BRACKETS.search(last) else None
+    if "/" not in last.strip("/") or _BRACKETS.search(last):
+        return None
+    below = last.partition("/")[2]
+    return below if _known(last) is None and _known(below) is not None else last
 
 
 def headings(table: TextTable) -> list[Heading]:

@@ -45,12 +45,15 @@ def asked_units(time: str | None, duty: str | None, angle: str | None) -> dict[s
 
 def unit_of_column(key: str, asked: str | None, table: TextTable, index: int) -> str:
     """Return what the file says, else what is asked for, else the usual unit; the first two must agree."""
-    said = unit_text(table.header[index] if table.header else "", table.unit(index))
+    said, sure = unit_text(table.header[index] if table.header else "", table.unit(index))
     if said is None or (said == "-" and "-" not in _SAID[key]):
         return asked or usual_unit(key)
     unit, where = _SAID[key].get(said.lower()), f"{table.source}: {table.called(index)} is in {said!r} as the file says"
+    if unit is None and not sure and asked is not None:
+        return asked  # a remark, as who reads the file knows
     if unit is None:
-        raise DataError(f"{where}: convert it to {' or '.join(_units(key))}, or correct the file")
+        other = "" if sure or key not in _OPTIONS else f", or pass {argument(_OPTIONS[key], '')} if that is a remark"
+        raise DataError(f"{where}: convert it to {' or '.join(_units(key))}, or correct the file{other}")
     if asked not in (None, unit):
         raise DataError(f"{where}: leave {argument(_OPTIONS[key])} out, or correct the file")
     return unit

@@ -216,11 +216,9 @@ def _map_of(block: DcmBlock) -> CalibrationMap:
     labels: dict[str, tuple[str, str]] = {}
     for plain, said, points, unit in given if block.y else given[:1]:
         # The names of axes stand in comments, where other tools may write anything.
-        name = said if can_be_name(said) and said not in (block.name, *axes) else plain
-        axes[name], labels[name] = (
-            points,
-            (_unit_from(unit, name), said if said != name and said else spoken_name(name)),
-        )
+        name = said if can_be_name(said) and said not in (block.name, "x", "y", *axes) else plain
+        axes[name] = points
+        labels[name] = (_unit_from(unit, name), said if said not in ("", name) else spoken_name(name))
     labels[block.name] = (_unit_from(block.unit, block.name), block.long_name or spoken_name(block.name))
     rows = np.array(block.values)
     return CalibrationMap(axes, rows.T if block.y else rows[0], name=block.name, labels=labels)

@@ -10,7 +10,7 @@ import numpy as np
 from mgdd.errors import DataError, argument
 from mgdd.guide import TimingMap
 from mgdd.guide.map_table import SETTINGS
-from mgdd.maps.cells import NUMBERS, TEXTS, MapTask
+from mgdd.maps.cells import NUMBERS, SOURCES, TEXTS, WITHOUT_VALUE, MapTask
 from mgdd.results.labels import Label, label_of, labelled_dataset
 
 if TYPE_CHECKING:
@@ -142,9 +142,9 @@ class MapForms:
         name : str, optional
             The variable; the map that the Dataset names, if left out.
         source : str, optional
-            Source of the cells where the Dataset is no map. If left out: the attribute ``source`` of the variable,
-            ``extrapolated`` where the variable ``NAME_extrapolated`` says so, else ``given``. Cells without a value are
-            ``unattainable``.
+            Source of the cells of any other Dataset than a map. If left out: the attribute ``source`` of the variable,
+            where it is one of those of a map, and ``extrapolated`` where the variable ``NAME_extrapolated`` says so;
+            otherwise ``given``. Cells without a value are ``unattainable``.
 
         Returns
         -------
@@ -174,7 +174,7 @@ class MapForms:
             if not {"units", "long_name"} <= set(dataset[each].attrs):
                 raise DataError(f"{each} has no units or no long_name: say both in its attributes")
         values = variable.to_numpy()
-        said = np.full(values.shape, source or variable.attrs.get("source", "given"), "U64")
+        said = np.full(values.shape, source or _source_of(variable), "U64")
         if source is None and f"{own}_extrapolated" in dataset:
             said[dataset[f"{own}_extrapolated"].transpose(*dims).to_numpy() > 0] = "extrapolated"
         cells: dict[str, Any] = {"source": np.where(np.isfinite(values), said, "unattainable")}
@@ -201,6 +201,11 @@ class MapForms:
     def __reduce__(self) -> tuple[Any, ...]:
         said = {"labels": self._labels, "cells": self._cells, "task": self._task, "provenance": self._provenance}
         return _rebuild, (type(self), self._axes, self._values, {"name": self._name, **said})
+
+
+def _source_of(variable: xr.DataArray) -> str:
+    said = str(variable.attrs.get("source", ""))  # an attribute that other files use for texts of their own
+    return said if said in SOURCES and said not in WITHOUT_VALUE else "given"
 
 
 def _under(attrs: Mapping[Any, Any], prefix: str) -> dict[str, Any]:

@@ -139,10 +139,11 @@ def fit_response(
     (('1', 'speed_rpm', 'fuel_mg', 'speed_rpm^2'), [])
     """
     _check(kind, degree, select, n_starts, seed)
-    if isinstance(response, str) and hasattr(points, "data_vars") and response in points:
-        factors = factors if factors is not None else input_names(points, response) or None
-        if points[response].ndim > 1:
-            points = flat_points(points, None if factors is None else [*factors, response], "points")
+    if hasattr(points, "data_vars"):
+        own = response if isinstance(response, str) and response in points else ""
+        factors = factors if factors is not None else input_names(points, own) or None
+        if own and points[own].ndim > 1:
+            points = flat_points(points, None if factors is None else [*factors, own], "points")
     names = _factor_names(points, response, factors)
     x = points_of(points, names)
     name, label, y = _response(points, response, names, len(x))

@@ -63,7 +63,7 @@ def study(name: str, **options: Any) -> StudyResult:
     """Give what `mgdd.studies.run_study` gives, with figures; run it only if nobody has."""
     call = inspect.signature(function_of(name)).bind(**(options | {"figures": True}))
     call.apply_defaults()
-    # Who is told of progress is no part of the result, and has another address in every process.
+    # The result does not depend on who is told of progress; his address is another one in every process.
     told = {key: value for key, value in call.arguments.items() if value is not None and not callable(value)}
     assert all(isinstance(value, bool | int | float | str) for value in told.values()), told
     words = "-".join(f"{key}_{value}" for key, value in sorted(told.items()))

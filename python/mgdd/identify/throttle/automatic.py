@@ -106,7 +106,7 @@ def fit_groups(
         found, terms = _without(hunt, by_delay.found, terms)
         if STOPS in terms:
             found = hunt.fine(found.values, list(dict.fromkeys([*names_of(found), *STOPS])))
-        findings = _told(found, terms, by_delay, max(delays))
+        findings = _told(found, terms, by_delay, delays)
         report = FitReport.from_core(found.report, problem.angle)
         if LAG in terms and SHARE not in known:
             report = with_unknown_share(hunt, found, report)
@@ -246,7 +246,7 @@ def _criterion(found: Search, size: int, n: float) -> float:
     return 2.0 * n * math.log(max(found.rmse, FLOOR_DEG)) + size * math.log(n)
 
 
-def _told(found: Search, terms: Sequence[tuple[str, ...]], delays: Delays, longest: float) -> list[Finding]:
+def _told(found: Search, terms: Sequence[tuple[str, ...]], delays: Delays, tried: Sequence[float]) -> list[Finding]:
     """Say what the model has and what it is worth, and how other delays fare."""
     by_delay, rms = delays.rmse, found.rmse
     has = ", ".join(_SHOWN[term] for term in terms if term in _SHOWN) or "none"
@@ -258,8 +258,10 @@ def _told(found: Search, terms: Sequence[tuple[str, ...]], delays: Delays, longe
     each = ", ".join(f"{delay:g}: {error:.3g}" for delay, error in sorted(by_delay.items()))
     text += f"; delay {found.values['delay_samples']:g} samples (deg RMS by delay: {each})"
     told = [Finding("structure_chosen", tuple(name for term in terms for name in term), text)]
-    if found.values["delay_samples"] == longest:
-        text = f"a delay of {longest:g} samples is the longest that was tried: the true one may be longer, and then"
+    kept = found.values["delay_samples"]
+    if kept == max(tried) or kept == min(tried) > 0.0:
+        most, more = ("longest", "longer") if kept == max(tried) else ("shortest", "shorter")
+        text = f"a delay of {kept:g} samples is the {most} that was tried: the true one may be {more}, and then"
         text += " lag and time constant stand for the rest"
         remedy = "log at a longer sample time, of which a delay is fewer, or give delay_samples if it is known"
         told.append(Finding("delay_at_end", ("delay_samples", *LAG, "tau_s"), text, remedy))
