@@ -23,7 +23,7 @@ HEAD = f'''"""Numbers that `mgdd.loop.tune_controller` found for each kind of co
 
 Protocol: {N_THROTTLES} throttles within {SPREAD:.0%} of the preset (P1 with stiction of 0.3 N m), {ROUNDS} rounds of
 {BUDGET} runs of the whole set for every kind, each from the best of the one before, seed {SEED}, noise of
-0.03 deg, a delay of one sample; the controller knows the preset only.
+0.03 deg, samples of 1 ms and a delay of one; the controller knows the preset only.
 Written by ``tools/tune_controllers.py``.
 """
 

@@ -11,7 +11,8 @@ import pytest
 from bus_node import ETB
 from mgdd.cli import main
 from mgdd.errors import RigError
-from mgdd.loop import ThrottleFault, VirtualThrottle, tuned_controller
+from mgdd.loop import ThrottleFault, VirtualThrottle
+from mgdd.loop.tuned import tuned_with_doubts
 from mgdd.rig import CanRig, GatedThrottle, SafetyEnvelope, SafetyGate, VirtualNode
 from mgdd.rig.can.local_bus import LocalBus
 from rig_hazards import LIMP_HOME_DEG, NODE_HAZARDS, ONSET, OVER, SAMPLE_MS, NodeLoop
@@ -111,7 +112,7 @@ def test_no_shipped_controller_meets_a_limit_of_the_node(kind: str, sample_s: fl
         if host:
             driven = GatedThrottle(rig, SafetyGate(SafetyEnvelope.load("etb").replace(cycle_s=sample_s)))
             driven.start()
-        controller, angle_deg = tuned_controller(kind, sample_s=sample_s), 8.0
+        controller, angle_deg = tuned_with_doubts(kind, sample_s=sample_s)[0], 8.0
         for wanted in lively_reference(sample_s):
             driven.apply({"duty": controller.step(float(wanted), angle_deg)})
             angle_deg = driven.measure().values["sensed_angle_deg"]

@@ -17,8 +17,10 @@ import pytest
 import xarray as xr
 
 from mgdd.errors import DataError, ParameterError, RigError
+from mgdd.identify import FirstPrincipleModel
 from mgdd.results.labels import check_labels
 from mgdd.rig import Experiment, SafetyEnvelope, check_experiment, read_record, run_experiment
+from mgdd.rig.experiment.throttle_tasks import TrackPlan
 from mgdd.rig.experiment.watched import Cycle
 
 HEAD = 'kind = "experiment"\nformat = 1\nseed = 5\n'
@@ -182,6 +184,23 @@ def test_identification_finds_the_throttle_and_keeps_the_model(tmp_path: Path) -
     assert load_throttle_model(tmp_path / "run" / "fit.toml") is not None
     again = Experiment.from_toml(TRACK + f'model = "{tmp_path / "run" / "fit.toml"}"\n')
     assert abs(run_experiment(again).figures["static_error_deg"]) < 0.2
+
+
+def test_the_controller_of_a_run_takes_the_delay_of_its_model_and_doubts_are_told(tmp_path: Path) -> None:
+    """The model of a log at 2 ms with two samples of delay: four of the run's; a preset has none."""
+    groups = {**FirstPrincipleModel().parameters, "delay_samples": 2.0}
+    (tmp_path / "late.toml").write_text(FirstPrincipleModel(parameters=groups, sample_s=2e-3).to_toml())
+    late = TRACK + f'model = "{tmp_path / "late.toml"}"\n'
+    for text, delay in ((TRACK, 0), (late, 4), (late + "delay_samples = 1\n", 1)):
+        plan = check_experiment(experiment(text.replace('"pid"', '"guided"'))).plan
+        assert isinstance(plan, TrackPlan)
+        assert plan.controller().settings["delay_samples"] == delay  # type: ignore[attr-defined]
+        assert plan.doubts == ()
+    known = check_experiment(experiment(late))
+    assert "delay_samples = 4 at sample_s = 0.001: the numbers of 'pid'" in known.to_dict()["warnings"][0]
+    assert run_experiment(known).figures["warnings"] == known.to_dict()["warnings"]
+    with pytest.raises(ParameterError, match=r"delay_samples = 3: must be left out with 'pid'"):
+        check_experiment(experiment(TRACK + "delay_samples = 3\n"))
 
 
 @pytest.mark.parametrize("guide", ["curve", "feed_forward", "none"])

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import argparse
 import contextlib
+import logging
 import sys
 from collections.abc import Callable, Iterator, Mapping
 from datetime import UTC, datetime
@@ -18,6 +19,8 @@ if TYPE_CHECKING:
     from mgdd.rig.experiment.watched import Cycle
 
 __all__ = ["add"]
+
+_LOG = logging.getLogger(__name__)
 
 _MODES = ("simulate", "hil", "dry_run", "replay", "bench")
 
@@ -72,6 +75,8 @@ def _run(args: argparse.Namespace) -> None:
 
     check_output(args)
     checked = _checked(args)
+    for doubt in checked.to_dict().get("warnings", []):
+        _LOG.warning("%s", doubt)
     experiment = checked.experiment
     stamp = datetime.now(UTC).strftime("%Y%m%d-%H%M%S")
     folder = args.folder or str(Path("mgdd-runs") / f"{experiment.task}-{experiment.mode}-{stamp}")

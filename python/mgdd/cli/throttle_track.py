@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import argparse
+import logging
 from typing import Any
 
 from mgdd import presets
@@ -10,14 +11,17 @@ from mgdd.cli.options import add_command, assignments
 from mgdd.cli.output import check_figure, check_output, emit, save_figure
 from mgdd.cli.throttle_parameters import add_throttle, throttle_of
 from mgdd.errors import ParameterError, did_you_mean
-from mgdd.loop import Reference, track, tune_controller, tuned_controller
+from mgdd.loop import Reference, track, tune_controller
 from mgdd.loop.controller_families import FAMILIES
 from mgdd.loop.track import FIGURES, step_times_us
+from mgdd.loop.tuned import tuned_with_doubts
 from mgdd.plot.style import drawn
 from mgdd.studies.sections import Table
 from mgdd.throttle import Throttle
 
 __all__ = ["add"]
+
+_LOG = logging.getLogger(__name__)
 
 
 def add(verbs: Any) -> None:
@@ -102,13 +106,15 @@ def _track(args: argparse.Namespace) -> None:
 
         model = load_throttle_model(args.model)
     reference = Reference.parse(args.reference)
-    controller = tuned_controller(
+    controller, doubts = tuned_with_doubts(
         args.controller,
         model,
         sample_s=reference.sample_s,
         delay_samples=None if args.model is not None else args.delay_samples,
         noise_deg=args.noise_deg,
     )
+    for doubt in doubts:
+        _LOG.warning("%s", doubt)
     run = track(
         controller,
         reference,
@@ -129,6 +135,7 @@ def _track(args: argparse.Namespace) -> None:
         "band_deg": reference.band_deg,
         "step_us_p50": p50,
         "step_us_p999": p999,
+        "warnings": list(doubts),
     }
     if args.figure is not None:
         from mgdd.plot.throttle_track import throttle_track
@@ -166,7 +173,8 @@ def _tune(args: argparse.Namespace) -> None:
     text: list[str | Table] = [
         said,
         Table(columns=("number", "tuned"), rows=tuple((name, f"{value:g}") for name, value in found.numbers.items())),
-        f"\nIn Python: mgdd.loop.tuned_controller({found.kind!r}, throttle, numbers={{...}})",
+        f"\nIn Python: mgdd.loop.tuned_controller({found.kind!r}, throttle, numbers={{...}}, "
+        f"delay_samples={args.delay_samples})",
     ]
     emit(args, payload, text=text)
 

@@ -173,7 +173,8 @@ def tune_controller(
     Returns
     -------
     Tuning
-        Its ``numbers`` make the controller: ``tuned_controller(kind, throttle, numbers=tuning.numbers)``.
+        Its ``numbers`` make the controller, with the delay that they were found at: ``tuned_controller(kind, throttle,
+        numbers=tuning.numbers, delay_samples=tuning.settings["delay_samples"])``.
 
     Raises
     ------
@@ -240,7 +241,13 @@ def tune_controller(
         cost=best,
         start_cost=seen[0][0],
         evaluations=len(seen),
-        settings={"n_throttles": n_throttles, "spread": spread, "seed": seed, "noise_deg": noise_deg},
+        settings={
+            "n_throttles": n_throttles,
+            "spread": spread,
+            "seed": seed,
+            "delay_samples": delay_samples,
+            "noise_deg": noise_deg,
+        },
     )
     return hand_over(tuning, stop)
 

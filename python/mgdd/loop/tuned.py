@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+import warnings
 from collections.abc import Mapping
 from typing import TYPE_CHECKING, Any
 
@@ -15,7 +16,7 @@ if TYPE_CHECKING:
 
     Controller = GuidedPredictive | Mgdd1 | Pid | SlidingMode
 
-__all__ = ["family_of", "shipped_numbers", "tuned_controller"]
+__all__ = ["family_of", "require_known_delay", "shipped_numbers", "tuned_controller", "tuned_with_doubts"]
 
 
 def tuned_controller(
@@ -34,13 +35,16 @@ def tuned_controller(
     kind : str
         ``guided`` (model-guided predictive), ``mgdd1``, ``pid``, ``sliding_mode``, ``linear_mpc`` or ``nmpc``.
     model : optional
-        What the controller knows: a `Throttle`, PW-R, or fitted first-principle groups; the preset ``P1`` if left out.
+        What the controller knows: a `Throttle`, PW-R, fitted first-principle groups, or a fit of either; the preset
+        ``P1`` if left out.
     numbers : mapping of str to float, optional
-        Of `tune_controller`; those of the preset whose groups are nearest to the model's if left out.
+        Of `tune_controller`; those of the preset whose groups are nearest to the model's if left out. These were found
+        at samples of 1 ms with a delay of one: a `UserWarning` says where they are not known to serve.
     sample_s, noise_deg : float
         Time between samples [s], and standard deviation of the measured angle [deg].
     delay_samples : int, optional
-        From a duty to its effect; that of the model, or 1, if left out.
+        Samples of `sample_s` from a duty to its effect. Left out: the delay of the model in seconds, to the nearest
+        sample, or 1 where the model has none. ``pid`` and ``sliding_mode`` cannot know a delay.
 
     Returns
     -------
@@ -50,7 +54,8 @@ def tuned_controller(
     Raises
     ------
     mgdd.errors.ParameterError
-        An unknown kind, a model without groups, unknown numbers.
+        An unknown kind, a model without groups, unknown numbers; a delay for a kind that cannot know one and whose
+        shipped numbers do not bear it.
 
     Examples
     --------
@@ -58,6 +63,26 @@ def tuned_controller(
     >>> {kind: type(tuned_controller(kind)).__name__ for kind in ("guided", "pid", "nmpc")}
     {'guided': 'GuidedPredictive', 'pid': 'Pid', 'nmpc': 'GuidedPredictive'}
     """
+    if numbers is None:
+        require_known_delay(kind, sample_s, delay_samples or 0)
+    controller, doubts = tuned_with_doubts(
+        kind, model, numbers=numbers, sample_s=sample_s, delay_samples=delay_samples, noise_deg=noise_deg
+    )
+    for doubt in doubts:
+        warnings.warn(doubt, UserWarning, stacklevel=2)
+    return controller
+
+
+def tuned_with_doubts(
+    kind: str,
+    model: Any = None,
+    *,
+    numbers: Mapping[str, float] | None = None,
+    sample_s: float = 1e-3,
+    delay_samples: int | None = None,
+    noise_deg: float = 0.03,
+) -> tuple[Controller, tuple[str, ...]]:
+    """Give what `tuned_controller` gives, and its doubts as texts rather than as warnings."""
     family = family_of(kind)
     if model is None:
         from mgdd.throttle import Throttle
@@ -68,8 +93,50 @@ def tuned_controller(
     if set(chosen) != set(family.space):
         raise ParameterError.of("numbers", sorted(chosen), f"exactly {', '.join(family.space)}")
     if delay_samples is None:
-        delay_samples = 1 if groups.delay_samples is None else round(groups.delay_samples)
-    return family.build(groups, chosen, Setup(sample_s, delay_samples, noise_deg))
+        delay_samples = 1 if groups.delay_s is None else math.floor(groups.delay_s / sample_s + 0.5)
+    controller = family.build(groups, chosen, Setup(sample_s, delay_samples, noise_deg))
+    if numbers is not None:
+        return controller, ()
+    return controller, _doubts(kind, family, sample_s, delay_samples)
+
+
+def require_known_delay(kind: str, sample_s: float, delay_samples: int) -> None:
+    """Raise ParameterError where a kind that cannot know a delay is told one that its shipped numbers do not bear."""
+    family = family_of(kind)
+    if delay_samples <= 0 or family.knows_delay or _dead_s(sample_s, delay_samples) <= family.longest_dead_s:
+        return
+    knowing = ", ".join(name for name, one in FAMILIES.items() if one.knows_delay)
+    raise ParameterError.of(
+        "delay_samples", delay_samples,
+        f"left out with {kind!r}, which cannot know a delay, and whose shipped numbers do not bear this one; take "
+        f"{knowing}, or numbers that tune_controller({kind!r}, ..., delay_samples=...) finds",
+    )  # fmt: skip
+
+
+_SAME = 1.0 + 1e-9  # of two times
+
+
+def _dead_s(sample_s: float, delay_samples: int) -> float:
+    """Give the mean time from a measurement to the effect of its duty, less rounding."""
+    return (delay_samples + 0.5) * sample_s / _SAME
+
+
+def _doubts(kind: str, family: Family, sample_s: float, delay_samples: int) -> tuple[str, ...]:
+    """Say where shipped numbers are used beyond what they have been seen to bear."""
+    remedy = "look at a run of mgdd.loop.track with both, take a shorter sample time, or give own numbers"
+    told = []
+    if sample_s > family.longest_sample_s * _SAME:
+        told.append(
+            f"sample_s = {sample_s:g}: the numbers of {kind!r} were tuned at 0.001 s and have been seen to serve up to "
+            f"{family.longest_sample_s:g} s; {remedy}"
+        )
+    elif _dead_s(sample_s, delay_samples) > family.longest_dead_s:
+        most = family.longest_dead_s / sample_s - 0.5
+        told.append(
+            f"delay_samples = {delay_samples} at sample_s = {sample_s:g}: the numbers of {kind!r} were tuned at "
+            f"0.001 s and have been seen to serve up to {most:.3g} samples here; {remedy}"
+        )
+    return tuple(told)
 
 
 def family_of(kind: str) -> Family:

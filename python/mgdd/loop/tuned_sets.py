@@ -2,7 +2,7 @@
 
 Protocol: 20 throttles within 20% of the preset (P1 with stiction of 0.3 N m), 2 rounds of
 400 runs of the whole set for every kind, each from the best of the one before, seed 7, noise of
-0.03 deg, a delay of one sample; the controller knows the preset only.
+0.03 deg, samples of 1 ms and a delay of one; the controller knows the preset only.
 Written by ``tools/tune_controllers.py``.
 """
 
@@ -50,19 +50,19 @@ TUNED_SETS: Mapping[str, Mapping[str, Mapping[str, float]]] = {
     },
     "mgdd1": {
         "P1": {
-            "horizon_samples": 7.932,
+            "horizon_s": 0.007932,
             "adaptation_gain": 0.7661,
             "duty_change_weight": 1.787,
             "trim_rate_per_deg_s": 0.6509,
         },
         "P2": {
-            "horizon_samples": 7.558,
+            "horizon_s": 0.007558,
             "adaptation_gain": 0.8944,
             "duty_change_weight": 1.166,
             "trim_rate_per_deg_s": 0.3647,
         },
         "P3": {
-            "horizon_samples": 11.22,
+            "horizon_s": 0.01122,
             "adaptation_gain": 0.9829,
             "duty_change_weight": 5.661,
             "trim_rate_per_deg_s": 0.4259,

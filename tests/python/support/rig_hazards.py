@@ -8,7 +8,8 @@ from dataclasses import dataclass, field, replace
 from typing import Any
 
 from mgdd.control import Pid
-from mgdd.loop import ThrottleFault, VirtualThrottle, tuned_controller
+from mgdd.loop import ThrottleFault, VirtualThrottle
+from mgdd.loop.tuned import tuned_with_doubts
 from mgdd.rig import Frame, SafetyEnvelope, SafetyGate, SignalMap
 from mgdd.rig.can.frame import changed
 from mgdd.rig.can.link import Sender
@@ -214,7 +215,7 @@ class NodeLoop:
         plant = VirtualThrottle(inputs=("duty", "bridge_open"), sample_s=5e-3, faults=hazard.faults, seed=5)
         envelope = SafetyEnvelope.load("etb_node").replace(**hazard.changes)
         self.core = NodeCore(node_plant(plant), self.map, envelope)
-        self.controller, self.sender = tuned_controller("pid", sample_s=5e-3), Sender()
+        self.controller, self.sender = tuned_with_doubts("pid", sample_s=5e-3)[0], Sender()
         self.sent: list[Frame] = []
 
     def step(self, *, safe: bool = False) -> None:

@@ -101,6 +101,8 @@ class CheckedExperiment:
             out["guard"] = experiment.safety.to_dict()
         if self.record is not None:
             out["record"] = str(self.record)
+        if isinstance(self.plan, TrackPlan):
+            out["warnings"] = list(self.plan.doubts)
         return out
 
 

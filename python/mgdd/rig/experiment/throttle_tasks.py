@@ -12,8 +12,10 @@ import numpy as np
 from mgdd import _core, identify, presets
 from mgdd.errors import ParameterError
 from mgdd.io import throttle_log
-from mgdd.loop import Plant, Reference, tuned_controller
+from mgdd.loop import Plant, Reference
+from mgdd.loop.controller_families import groups_of
 from mgdd.loop.track import FIGURES
+from mgdd.loop.tuned import require_known_delay, tuned_with_doubts
 from mgdd.optimize import FitOptions
 from mgdd.plot.style import drawn
 from mgdd.results.fit import figures_of
@@ -63,6 +65,8 @@ class TrackPlan:
                 f"{sample_s:g} s, as that of the plant",
             )  # fmt: skip
         self.model = _model_named(task.model, folder)
+        require_known_delay(task.controller, sample_s, task.delay_samples or 0)
+        _, self.doubts = self._made()
 
     @property
     def samples(self) -> int:
@@ -71,9 +75,13 @@ class TrackPlan:
 
     def controller(self) -> AngleController:
         """Make the controller, at its beginning."""
-        return tuned_controller(
-            self.task.controller, self.model, sample_s=self.sample_s, delay_samples=self.task.delay_samples or 0
-        )
+        return self._made()[0]
+
+    def _made(self) -> tuple[AngleController, tuple[str, ...]]:
+        delay = self.task.delay_samples
+        if delay is None and groups_of(self.model).delay_s is None:
+            delay = 0  # a rig answers within its cycle, and a preset says nothing about it
+        return tuned_with_doubts(self.task.controller, self.model, sample_s=self.sample_s, delay_samples=delay)
 
     def run(self, plant: Plant, first_angle_deg: float, most: int | None = None) -> Outcome:
         """Run it on a plant whose last measured angle is given, for at most so many samples."""
@@ -100,7 +108,12 @@ class TrackPlan:
         numbers = {name: float(figures[name]) for name in FIGURES}
         dataset = _dataset(columns, self.sample_s, {"reference_deg": wanted[:n]}, numbers)
         return Outcome(
-            figures={"reference": self.reference.name, "controller": self.task.controller, **numbers},
+            figures={
+                "reference": self.reference.name,
+                "controller": self.task.controller,
+                **numbers,
+                "warnings": list(self.doubts),
+            },
             dataset=dataset,
             interrupted=interrupted,
             drawings={"track": partial(_draw_track, dataset)},
