@@ -233,7 +233,7 @@ def test_the_record_holds_frames_and_samples_and_replays_bit_for_bit(
     assert said["replay"]["different"] == 0
     assert said["replay"]["samples"] >= len(cycles)
     assert said["result"]["loop"] == "core"
-    assert said["result"]["mse_deg2"] == result.figures["mse_deg2"]
+    assert said["result"]["sensed_mse_deg2"] == result.figures["sensed_mse_deg2"]
 
 
 def test_a_replay_sees_another_controller(run: tuple[Path, Any, list[Cycle]]) -> None:

@@ -16,8 +16,10 @@ import numpy as np
 import pytest
 import xarray as xr
 
+from mgdd._core.loop import tracking_figures
 from mgdd.errors import DataError, ParameterError, RigError
 from mgdd.identify import FirstPrincipleModel
+from mgdd.loop import Reference
 from mgdd.results.labels import check_labels
 from mgdd.rig import Experiment, SafetyEnvelope, check_experiment, read_record, run_experiment
 from mgdd.rig.experiment.throttle_tasks import TrackPlan
@@ -165,6 +167,30 @@ def test_equal_seeds_are_equal_runs_and_others_are_not() -> None:
     name = "sensed_angle_deg"
     np.testing.assert_array_equal(first.dataset[name], again.dataset[name])
     assert (first.dataset[name].to_numpy() != other.dataset[name].to_numpy()).any()
+
+
+def test_one_name_of_a_figure_has_one_meaning(tmp_path: Path) -> None:
+    """`settling_ms` is of the true angle, as in `mgdd.loop.track`; of the measured one it has a name of its own."""
+    known = Experiment.from_toml(TRACK + "[plant]\nnoise_deg = 0.1\n")
+    result = run_experiment(known, tmp_path / "run")
+    wanted = Reference.parse("step:20:35")
+    for prefix, name in (("", "angle_deg"), ("sensed_", "sensed_angle_deg")):
+        angle, duty = result.dataset[name].to_numpy(), result.dataset["duty"].to_numpy()
+        expected = tracking_figures(
+            reference_deg=wanted.angle_deg, angle_deg=angle, duty=duty, sample_s=1e-3,
+            from_sample=wanted.from_sample, band_deg=wanted.band_deg,
+        )  # fmt: skip
+        assert {f"{prefix}{figure}" for figure in expected} - set(result.figures) <= {"sensed_total_variation"}
+        for figure in ("settling_ms", "mse_deg2", "limit_cycle_deg", "static_error_deg"):
+            assert result.figures[prefix + figure] == float(expected[figure])
+    assert result.figures["sensed_limit_cycle_deg"] > result.figures["limit_cycle_deg"]
+    check_labels(result.dataset)
+    again = run_experiment(known.with_mode("replay", record=str(tmp_path / "run" / "run.rec")))
+    assert again.figures["settling_ms"] == result.figures["settling_ms"]
+    pytest.importorskip("can")
+    over_bus = run_experiment(known.with_mode("hil"))
+    assert "settling_ms" not in over_bus.figures
+    assert over_bus.figures["sensed_mse_deg2"] == pytest.approx(result.figures["sensed_mse_deg2"], rel=0.2)
 
 
 def test_a_plant_that_differs_from_the_model_is_scaled_with_its_stiction() -> None:

@@ -96,7 +96,7 @@ def test_a_run_is_recorded_whole_and_replays_bit_for_bit(known: Experiment, tmp_
     again = run_experiment(known.with_mode("replay", record=folder / "run.rec"))
     assert again.counters["replay"]["different"] == 0
     assert again.counters["replay"]["samples"] == np.isfinite(rows["asked_duty"].to_numpy()).sum() > 100
-    assert again.figures["mse_deg2"] == result.figures["mse_deg2"]
+    assert again.figures["sensed_mse_deg2"] == result.figures["sensed_mse_deg2"]
 
 
 def test_another_sender_of_the_command_ends_the_run(known: Experiment, peer: can.BusABC, tmp_path: Path) -> None:

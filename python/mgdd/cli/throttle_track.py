@@ -170,11 +170,11 @@ def _tune(args: argparse.Namespace) -> None:
         f"{FAMILIES[found.kind].label} for throttles around {preset}: cost {found.start_cost:.3f} -> {found.cost:.3f} "
         f"in {found.evaluations} runs of {args.throttles} throttles\n"
     )
+    delay = f"delay_samples={args.delay_samples}"
     text: list[str | Table] = [
         said,
         Table(columns=("number", "tuned"), rows=tuple((name, f"{value:g}") for name, value in found.numbers.items())),
-        f"\nIn Python: mgdd.loop.tuned_controller({found.kind!r}, throttle, numbers={{...}}, "
-        f"delay_samples={args.delay_samples})",
+        f"\nIn Python: mgdd.loop.tuned_controller({found.kind!r}, throttle, numbers={{...}}, {delay})",
     ]
     emit(args, payload, text=text)
 

@@ -50,6 +50,15 @@ class Label(NamedTuple):
 
 _CAD = "°CA aTDC"
 
+_FOLLOWED = {
+    "settling_ms": Label("ms", "settling time"),
+    "mse_deg2": Label("deg²", "mean square error"),
+    "static_error_deg": Label("deg", "static error"),
+    "overshoot_deg": Label("deg", "overshoot"),
+    "limit_cycle_deg": Label("deg", "peak to peak at rest"),
+    "largest_error_deg": Label("deg", "largest error"),
+}  # of the true angle; measured ones bear its noise and have names of their own
+
 VARIABLES: Mapping[str, Label] = MappingProxyType(
     {
         ANGLE: Label(_CAD, "crank angle"),
@@ -134,13 +143,9 @@ VARIABLES: Mapping[str, Label] = MappingProxyType(
         "speed_deg_per_s": Label("deg/s", "plate speed"),
         "sensed_angle_deg": Label("deg", "measured plate angle"),
         "reference_deg": Label("deg", "wanted plate angle"),
-        "settling_ms": Label("ms", "settling time"),
-        "mse_deg2": Label("deg²", "mean square error"),
-        "static_error_deg": Label("deg", "static error"),
-        "overshoot_deg": Label("deg", "overshoot"),
         "total_variation": Label("-", "total variation of the duty"),
-        "limit_cycle_deg": Label("deg", "peak to peak at rest"),
-        "largest_error_deg": Label("deg", "largest error"),
+        **_FOLLOWED,
+        **{f"sensed_{name}": Label(unit, f"{what}, measured") for name, (unit, what) in _FOLLOWED.items()},
     }
 )
 

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Callable
 from functools import partial
 from pathlib import Path
@@ -33,6 +34,7 @@ if TYPE_CHECKING:
 
 __all__ = ["IdentifyPlan", "TrackPlan", "throttle_named"]
 
+_OF_THE_DUTY = "total_variation"  # the one figure that no angle enters
 _SETTLE_S = 1.0  # before an excitation: the plate comes to rest at limp-home
 
 
@@ -100,13 +102,14 @@ class TrackPlan:
         n = len(columns["asked_duty"])
         if n == 0:
             return Outcome(figures={}, dataset=_dataset(columns, self.sample_s, {}, {}), interrupted=True)
-        from_sample = min(self.reference.from_sample, n - 1)
-        figures = _core.loop.tracking_figures(
-            reference_deg=wanted[:n], angle_deg=columns["sensed_angle_deg"], duty=columns["duty"],
-            sample_s=self.sample_s, from_sample=from_sample, band_deg=self.reference.band_deg,
-        )  # fmt: skip
-        numbers = {name: float(figures[name]) for name in FIGURES}
-        dataset = _dataset(columns, self.sample_s, {"reference_deg": wanted[:n]}, numbers)
+        more = {"reference_deg": wanted[:n]}
+        # `settling_ms` and so on are those of `mgdd.loop.track`, of the true angle: most plants do not tell it.
+        sensed = self._figures(columns, "sensed_angle_deg")
+        numbers = {name if name == _OF_THE_DUTY else f"sensed_{name}": value for name, value in sensed.items()}
+        if "angle_deg" in columns:
+            more["angle_deg"] = columns["angle_deg"]
+            numbers = {**self._figures(columns, "angle_deg"), **numbers}
+        dataset = _dataset(columns, self.sample_s, more, numbers)
         return Outcome(
             figures={
                 "reference": self.reference.name,
@@ -118,6 +121,14 @@ class TrackPlan:
             interrupted=interrupted,
             drawings={"track": partial(_draw_track, dataset)},
         )
+
+    def _figures(self, columns: dict[str, NDArray[np.float64]], angle: str) -> dict[str, float]:
+        wanted, n = self.reference, len(columns["duty"])
+        figures = _core.loop.tracking_figures(
+            reference_deg=wanted.angle_deg[:n], angle_deg=columns[angle], duty=columns["duty"], sample_s=self.sample_s,
+            from_sample=min(wanted.from_sample, n - 1), band_deg=wanted.band_deg,
+        )  # fmt: skip
+        return {name: float(figures[name]) for name in FIGURES}
 
 
 class IdentifyPlan:
@@ -192,7 +203,7 @@ def _drive(
     plant: Plant, samples: int, duty_at: Callable[[int, float], float], first_angle_deg: float
 ) -> tuple[dict[str, NDArray[np.float64]], bool]:
     """Step a plant; give columns of what was asked, applied and measured, and whether Ctrl-C cut them."""
-    asked, applied, angle = np.empty(samples), np.empty(samples), np.empty(samples)
+    asked, applied, angle, true = (np.empty(samples) for _ in range(4))
     measured_deg, done, interrupted = first_angle_deg, 0, False
     try:
         for sample in range(samples):
@@ -200,11 +211,15 @@ def _drive(
             plant.apply({"duty": duty})
             measured = plant.measure()
             measured_deg = measured.values["sensed_angle_deg"]
+            true[sample] = measured.values.get("angle_deg", math.nan)
             asked[sample], applied[sample], angle[sample] = duty, measured.applied.get("duty", duty), measured_deg
             done = sample + 1
     except KeyboardInterrupt:
         interrupted = True
-    return {"asked_duty": asked[:done], "duty": applied[:done], "sensed_angle_deg": angle[:done]}, interrupted
+    columns = {"asked_duty": asked[:done], "duty": applied[:done], "sensed_angle_deg": angle[:done]}
+    if np.isfinite(true[:done]).all():
+        columns["angle_deg"] = true[:done]
+    return columns, interrupted
 
 
 def _dataset(
