@@ -19,8 +19,10 @@ from mgdd.loop.controller_families import FAMILIES
 from mgdd.loop.tune import draw_throttles
 from mgdd.loop.tuned import tuned_with_doubts
 
-RATES = ((0.2, 5), (0.5, 2), (1, 0), (1, 1), (1, 2), (1, 3), (1, 5), (2, 0), (2, 1), (2, 2), (5, 0), (5, 1))
-RATES = (*RATES, (10, 0), (10, 1))
+RATES = (
+    (0.2, 5), (0.5, 2), (1, 0), (1, 1), (1, 2), (1, 3), (1, 5), (1, 7), (1, 12), (2, 0), (2, 1), (2, 2), (5, 0), (5, 1),
+    (10, 0), (10, 1),
+)  # fmt: skip
 
 
 def swinging(kind: str, sample_ms: float, delay_samples: int) -> tuple[float, float, bool]:

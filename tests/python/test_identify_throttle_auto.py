@@ -16,6 +16,7 @@ from mgdd.identify.throttle.block_losses import block_losses, certainly_less
 from mgdd.identify.throttle.delay_report import with_delay
 from mgdd.identify.throttle.hunt import noise_of
 from mgdd.io import throttle_log
+from mgdd.loop.tuned import tuned_with_doubts
 from mgdd.optimize import FitOptions, least_squares
 from mgdd.signals import amplitude_random_steps, chirp
 from mgdd.throttle import PseudoWiener, Throttle, simulate
@@ -226,6 +227,23 @@ def test_a_throttle_that_the_rival_cannot_be_is_identified_all_the_same(change: 
     assert "without a comparison: PW-R is not made for such a throttle (" in said(fit, "model_chosen")
 
 
+@pytest.mark.parametrize("delay", one_of(12, 6, 7, 20))
+def test_a_long_delay_is_found_and_its_controller_takes_it(delay: int) -> None:
+    """Beyond five samples, where the first look ends: the search goes on while the longest are the best."""
+    rng, time = np.random.default_rng(3), np.arange(4000) * 1e-3
+    duty = np.repeat(rng.uniform(-0.6, 0.9, 25), 160)
+    late = np.concatenate([np.full(delay, duty[0]), duty[:-delay]])
+    angle = simulate(Throttle(), late, time_s=time)["angle_deg"].to_numpy()
+    log = throttle_log(time, duty, angle + rng.normal(0.0, 0.02, time.size))
+    fit = identify_throttle(log, options=FitOptions(n_starts=1))
+    assert fit.kind == "first_principle"
+    assert fit.parameters["delay_samples"] == delay
+    assert fit.parameters["tau_s"] == pytest.approx(0.0197, rel=0.1)
+    assert ("delay_at_end" in {found.code for found in fit.findings}) == (delay == 20)
+    for kind in ("guided", "mgdd1"):
+        assert tuned_with_doubts(kind, fit)[0].settings["delay_samples"] == delay
+
+
 @pytest.mark.parametrize(
     ("delay", "tried", "end"),
     one_of((6, [3, 4, 5], "longest"), (7, [3, 4, 5], "longest"), (12, [3, 4, 5], "longest"), (5, [3, 4, 5], "longest"),
@@ -241,6 +259,6 @@ def test_a_delay_at_the_end_of_the_search_is_doubted_and_has_no_interval(
     log = throttle_log(time, duty, angle + rng.normal(0.0, 0.02, time.size))
     fit = identify_throttle(log, "first_principle", delay_samples=tried, options=FitOptions(n_starts=1))
     assert fit.parameters["delay_samples"] == (tried[-1] if end == "longest" else tried[0])
-    at = fit.report.names.index("delay_samples")
-    assert math.isnan(fit.report.stderr[at])
+    for name in ("delay_samples", "electrical_s", "tau_s"):
+        assert math.isnan(fit.report.stderr[fit.report.names.index(name)]), name
     assert f"the {end} that was tried: the true one may be" in said(fit, "delay_at_end")

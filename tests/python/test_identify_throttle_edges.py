@@ -111,6 +111,7 @@ def test_a_delay_is_found_from_a_list(p1: Throttle) -> None:
     log = measured(p1, swing(), delay=3)
     late = identify_throttle(log, "pw_r", delay_samples=[0, 2, 3, 4], options=FitOptions(n_starts=3))
     assert late.parameters["delay_samples"] in (3.0, 4.0)  # the inductance is worth about one sample
+    assert ("delay_at_end" in {found.code for found in late.findings}) == (late.parameters["delay_samples"] == 4.0)
     prompt = identify_throttle(log, "pw_r", options=FitOptions(n_starts=3))
     assert late.train.nrmse_fit_percent > 99.0 > prompt.train.nrmse_fit_percent
     for asked, found in ((None, 3.0), ([2, 3], 3.0), (2, 2.0)):
@@ -122,8 +123,9 @@ def test_what_a_kind_lacks_is_refused_first(p1: Throttle) -> None:
     log = measured(p1, swing(2.0))
     with pytest.raises(ParameterError, match="pw_w has one set of parameters"):
         identify_throttle(log, "pw_w", two_sided=True)
-    with pytest.raises(ParameterError, match=r"delay_samples = 6: must be within \[0, 5\]"):
-        identify_throttle(log, "first_principle", delay_samples=[2, 6])
+    for kind, delay, longest in (("first_principle", 21, 20), ("pw_r", 6, 5)):
+        with pytest.raises(ParameterError, match=rf"delay_samples = {delay}: must be within \[0, {longest}\]"):
+            identify_throttle(log, kind, delay_samples=[2, delay])
     with pytest.raises(ParameterError, match="must be at least one delay"):
         identify_throttle(log, delay_samples=[])
     with pytest.raises(ParameterError, match=r"seed = -1: must be >= 0"):

@@ -138,8 +138,19 @@ def test_the_delay_of_a_first_principle_model_keeps_its_seconds() -> None:
     on_coarse = model.simulate({"time_s": coarse, "duty": duty})["angle_deg"].to_numpy()
     assert np.ptp(on_coarse) > 10.0
     np.testing.assert_allclose(on_fine, on_coarse, atol=0.02)
-    with pytest.raises(ParameterError, match=r"delay_samples = 2 of 0\.001 s: at most 5 samples"):
-        model.simulate({"time_s": 2e-4 * np.arange(100), "duty": np.zeros(100)})
+    # Longer than the delay line of the core: 10 samples of 0.2 ms, whole ones being the duty itself, later.
+    finest = model.simulate({"time_s": 2e-4 * np.arange(2000), "duty": np.repeat(duty, 5)})["angle_deg"].to_numpy()[::5]
+    np.testing.assert_allclose(finest, on_coarse, atol=0.05)
+    for delay in (4, 5, 6, 19.5):
+        late = FirstPrincipleModel(parameters=GROUPS | {"delay_samples": delay}, substeps=8)
+        at_once = FirstPrincipleModel(parameters=GROUPS | {"delay_samples": delay % 1.0}, substeps=8)
+        shifted = np.concatenate([np.zeros(int(delay)), duty[: -int(delay)]])
+        np.testing.assert_array_equal(
+            late.simulate({"time_s": coarse, "duty": duty})["angle_deg"],
+            at_once.simulate({"time_s": coarse, "duty": shifted})["angle_deg"],
+        )
+    with pytest.raises(ParameterError, match=r"delay_samples = 20\.5: must be <= 20"):
+        FirstPrincipleModel(parameters=GROUPS | {"delay_samples": 20.5})
 
 
 def test_a_value_outside_its_domain_names_the_file(tmp_path: Path) -> None:

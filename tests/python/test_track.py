@@ -215,8 +215,11 @@ def test_references_are_read_from_text_and_files(tmp_path: Path) -> None:
         (lambda: Reference(angle_deg=np.ones(5), from_s=1.0), ParameterError, "from_s"),
         (lambda: track(3, "step:1:2"), ParameterError, "controller"),  # type: ignore[arg-type]
         (lambda: track(Pid(), "step:40:42", noise_deg=-1.0), ParameterError, "noise_deg"),
-        (lambda: track(Proportional(), "step:40:42", delay_samples=17), ParameterError, "delay_samples"),
+        (lambda: track(Proportional(), "step:40:42", delay_samples=21), ParameterError, "delay_samples"),
         (lambda: track(Pid(), "step:40:42", airflow_torque_nm=[1.0, 2.0]), ShapeError, "airflow_torque_nm"),
+        (lambda: track(Pid(sample_s=2e-3), "step:1:2"), ParameterError, r"sample_s = 0\.002 s: .*must be 0\.001 s"),
+        (lambda: track(Mgdd1(), Reference.parse("step:1:2", sample_s=2e-3)), ParameterError, r"sample_s = 0\.001"),
+        (lambda: track_many({"late": Pid(sample_s=2e-3)}, ["step:1:2"], [Throttle()]), ParameterError, "sample_s"),
         (lambda: track_many({}, ["step:1:2"], [Throttle()]), ParameterError, "at least one"),
         (lambda: track_many({"own": Proportional()}, ["step:1:2"], [Throttle()]), ParameterError, "track"),
         (lambda: tuned_controller("pi"), ParameterError, "guided"),

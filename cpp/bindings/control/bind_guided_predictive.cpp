@@ -100,7 +100,7 @@ prediction : {"nonlinear", "linear"}
 switching : {"predicted", "measured"}
     How the prediction knows its side of limp-home.
 delay_samples : int
-    From a duty to its effect, beside the electrical lag: 0 to 5.
+    From a duty to its effect, beside the electrical lag: 0 to 20.
 move_steps : sequence of three int
     Prediction steps for which each duty of the horizon is held; together at most 64.
 gauss_newton_steps : int
@@ -147,7 +147,7 @@ void bind_guided_predictive(py::module_& m) {
       cls, "GuidedPredictive", S{}, guided_predictive_fields(),
       std::tuple{named("prediction", &S::prediction, &prediction_names, "what the horizon is predicted with"),
                  named("switching", &S::switching, &side_switching_names, "how it knows its side of limp-home"),
-                 explained("delay_samples", &S::delay_samples, "from a duty to its effect, 0 to 5"),
+                 explained("delay_samples", &S::delay_samples, "from a duty to its effect, 0 to 20"),
                  explained("move_steps", &S::move_steps, "prediction steps for which each duty is held"),
                  explained("gauss_newton_steps", &S::gauss_newton_steps, "at most, per sample"),
                  explained("friction_learning", &S::friction_learning, "learn friction levels and gain")},

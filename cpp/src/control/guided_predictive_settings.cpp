@@ -100,7 +100,7 @@ void validate(const Gp& s) {
   if (!(s.lowest_deg < s.highest_deg)) {
     throw ParameterError("highest_deg", s.highest_deg, "must be > lowest_deg = " + text(s.lowest_deg), "deg");
   }
-  require_within("delay_samples", s.delay_samples, 0, longest_guided_delay);
+  require_within("delay_samples", s.delay_samples, 0, longest_control_delay);
   require_within("gauss_newton_steps", s.gauss_newton_steps, 1, 100);
   int steps = 0;
   for (std::size_t i = 0; i < s.move_steps.size(); ++i) {

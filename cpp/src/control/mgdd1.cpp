@@ -32,7 +32,7 @@ void validate(const Mg& s) {
   require_fields(mgdd1_table, s);
   require_duty_range(s.lower, s.upper);
   require_within("horizon_samples", s.horizon_samples, 1, 1000);
-  require_within("delay_samples", s.delay_samples, 0, longest_mgdd1_delay);
+  require_within("delay_samples", s.delay_samples, 0, longest_control_delay);
 }
 
 }  // namespace mgdd::control

@@ -5,6 +5,8 @@
 #include <limits>
 #include <string_view>
 
+#include "mgdd/common/text.hpp"
+
 namespace mgdd::loop {
 namespace {
 
@@ -39,10 +41,15 @@ void validate(const ThrottleScenario& s) {
   }
 }
 
-void require_loop(const ThrottleScenario& scenario, int delay_samples) {
+void require_loop(const ThrottleScenario& scenario, int delay_samples, std::optional<double> controller_s,
+                  double plant_s) {
   validate(scenario);
   if (delay_samples < 0 || delay_samples > longest_loop_delay) {
     throw ParameterError("delay_samples", delay_samples, "must be in [0, " + std::to_string(longest_loop_delay) + "]");
+  }
+  if (controller_s && !(std::abs(*controller_s - plant_s) < 1e-9)) {
+    throw ParameterError("sample_s", *controller_s,
+                         "of the controller, must be " + text(plant_s) + " s, the samples of the reference", "s");
   }
 }
 

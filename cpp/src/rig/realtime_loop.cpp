@@ -5,18 +5,10 @@
 
 #include "mgdd/common/error.hpp"
 #include "mgdd/common/text.hpp"
+#include "mgdd/loop/throttle_loop.hpp"
 
 namespace mgdd::rig {
 namespace {
-
-template <class Controller>
-double sample_s(const Controller& controller) {
-  if constexpr (requires { controller.settings().sample_s; }) {
-    return controller.settings().sample_s;
-  } else {
-    return controller.model().sample_s();
-  }
-}
 
 // The thread rounds its period to nanoseconds.
 void require_same(std::string_view name, double value_s, double period_s) {
@@ -32,7 +24,8 @@ RealtimeLoop::RealtimeLoop(const ScheduleSettings& schedule, const CycleSettings
                            const FrameCodec& codec, const SafetyGate& gate)
     : cycle_([&] {
         validate(schedule);
-        require_same("sample_s", std::visit([](const auto& c) { return sample_s(c); }, controller), schedule.period_s);
+        const auto made_for = std::visit([](const auto& c) { return loop::sample_s_of(c); }, controller);
+        require_same("sample_s", made_for.value_or(schedule.period_s), schedule.period_s);
         require_same("cycle_s", gate.envelope().cycle_s, schedule.period_s);
         return std::make_shared<ControlCycle>(settings, transport, controller, codec, gate);
       }()),

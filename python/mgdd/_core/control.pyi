@@ -302,7 +302,7 @@ class GuidedPredictive:
     switching : {"predicted", "measured"}
         How the prediction knows its side of limp-home.
     delay_samples : int
-        From a duty to its effect, beside the electrical lag: 0 to 5.
+        From a duty to its effect, beside the electrical lag: 0 to 20.
     move_steps : sequence of three int
         Prediction steps for which each duty of the horizon is held; together at most 64.
     gauss_newton_steps : int

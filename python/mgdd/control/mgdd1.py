@@ -53,7 +53,7 @@ class Mgdd1:
     horizon_samples : int
         Length of the prediction [-], 1 to 1000.
     delay_samples : int
-        From a duty to its effect, 0 to 5.
+        From a duty to its effect, 0 to 20.
     adaptation_gain : float
         Share of the Gauss-Newton step [-].
     difference : float

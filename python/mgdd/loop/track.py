@@ -88,7 +88,7 @@ def track(
     throttle : Throttle, optional
         The plant; the preset ``P1`` if left out.
     delay_samples : int
-        Whole samples between the computed duty and its effect, 0 to 16.
+        Whole samples between the computed duty and its effect, 0 to 20.
     airflow_torque_nm, supply_v : array_like, shape (n,), optional
         Torque on the plate [N m], positive when it opens, and supply of the bridge [V]; one number acts all the time.
     start_deg : float, optional
@@ -211,8 +211,8 @@ def _run_in_python(
     airflow: NDArray[np.float64],
     supply: NDArray[np.float64],
 ) -> dict[str, NDArray[np.float64]]:
-    if not 0 <= delay_samples <= 16:
-        raise ParameterError.of("delay_samples", delay_samples, "in [0, 16]")
+    if not 0 <= delay_samples <= 20:
+        raise ParameterError.of("delay_samples", delay_samples, "in [0, 20]")
     names = ("angle_deg", "sensed_angle_deg", "speed_deg_per_s", "current_a", "duty")
     out = {name: np.empty(len(reference_deg)) for name in names}
     still = plant._still

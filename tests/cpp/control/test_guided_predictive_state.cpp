@@ -132,7 +132,7 @@ TEST(GuidedPredictive, RefusesByNameAndChangesNothing) {
     return std::string("nothing");
   };
   EXPECT_EQ(refused([](auto& s) { s.plate.time_constant_s = 0.0; }), "time_constant_s");
-  EXPECT_EQ(refused([](auto& s) { s.delay_samples = 6; }), "delay_samples");
+  EXPECT_EQ(refused([](auto& s) { s.delay_samples = 21; }), "delay_samples");
   EXPECT_EQ(refused([](auto& s) { s.move_steps = {3, 0, 4}; }), "move_steps[1]");
   EXPECT_EQ(refused([](auto& s) { s.move_steps = {30, 30, 30}; }), "move_steps");
   EXPECT_EQ(refused([](auto& s) { s.gauss_newton_steps = 0; }), "gauss_newton_steps");

@@ -121,7 +121,7 @@ TEST(ThrottleLoop, RefusesByName) {
   EXPECT_EQ(refused([](auto& s) { s.airflow_torque_nm = {1.0}; }), "airflow_torque_nm");
   EXPECT_EQ(refused([](auto& s) { s.supply_v.assign(20, INFINITY); }), "supply_v");
   EXPECT_EQ(refused([](auto& s) { s.from = 20; }), "from");
-  EXPECT_EQ(refused([](auto&) {}, 17), "delay_samples");
+  EXPECT_EQ(refused([](auto&) {}, 21), "delay_samples");
   EXPECT_EQ(refused([](auto&) {}), "nothing");
 }
 

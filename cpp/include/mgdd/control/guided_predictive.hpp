@@ -19,7 +19,7 @@
 #include "mgdd/control/filtered_rate.hpp"
 #include "mgdd/control/guided_horizon.hpp"
 #include "mgdd/control/guided_predictive_settings.hpp"
-#include "mgdd/dynamics/delay_line.hpp"
+#include "mgdd/control/sent_duties.hpp"
 
 namespace mgdd::control {
 
@@ -84,8 +84,7 @@ class BasicGuidedPredictive {
     v("rollbacks", self.rollbacks_);
     FrictionLearner<T>::visit(self.learner_, Prefixed<V>{v, "slope_"});
     FilteredRate<T>::visit(self.reference_, Prefixed<V>{v, "reference_"});
-    for (std::size_t i = 0; i < self.sent_.before.size(); ++i)
-      visit_number(v, names_of_sent[i], self.sent_.before[i]);
+    visit_sent(self.sent_, v);
     for (std::size_t i = 0; i < self.moves_.size(); ++i)
       visit_number(v, names_of_moves[i], self.moves_[i]);
     visit_number(v, "innovation_deg", self.innovation_);
@@ -96,8 +95,6 @@ class BasicGuidedPredictive {
 
  private:
   static constexpr std::size_t n = n_guided_moves;
-  static constexpr std::array<const char*, longest_guided_delay + 1> names_of_sent{"sent_0", "sent_1", "sent_2",
-                                                                                   "sent_3", "sent_4", "sent_5"};
   static constexpr std::array<const char*, n> names_of_moves{"move_0", "move_1", "move_2"};
   template <class B, class V>
   static void visit_belief(B& belief, V&& v) {
@@ -133,7 +130,7 @@ class BasicGuidedPredictive {
   T mean_torque_{0.0};
   PlateBelief<T> belief_{};
   FilteredRate<T> reference_;
-  dynamics::DelayLine<T, longest_guided_delay + 1> sent_{};  // duties without trim
+  SentDuties<T> sent_{};  // duties without trim
   GuidedMoves<T> moves_{};
   std::int64_t rollbacks_ = 0;
   T innovation_{0.0}, mean_error_{0.0}, trim_{0.0}, duty_{0.0};

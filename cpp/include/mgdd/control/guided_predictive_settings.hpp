@@ -12,12 +12,12 @@
 #include "mgdd/control/duty_range.hpp"
 #include "mgdd/control/friction_learner.hpp"
 #include "mgdd/control/plate.hpp"
+#include "mgdd/control/sent_duties.hpp"
 
 namespace mgdd::control {
 
 inline constexpr int n_guided_moves = 3;
 inline constexpr int longest_guided_horizon = 64;  ///< prediction steps
-inline constexpr int longest_guided_delay = 5;     ///< samples
 
 /// What the horizon is predicted with.
 enum class Prediction {
@@ -36,7 +36,7 @@ Names<SideSwitching> side_switching_names() noexcept;
 struct GuidedPredictiveSettings {
   double sample_s = 1e-3;
   PlateSettings plate{};  ///< the guide
-  int delay_samples = 1;  ///< from a duty to its effect, beside the electrical lag: 0 to 5
+  int delay_samples = 1;  ///< from a duty to its effect, beside the electrical lag: 0 to `longest_control_delay`
 
   // The horizon.
   Prediction prediction = Prediction::nonlinear;

@@ -18,8 +18,8 @@
 #include "mgdd/common/state.hpp"
 #include "mgdd/control/duty_range.hpp"
 #include "mgdd/control/filtered_rate.hpp"
+#include "mgdd/control/sent_duties.hpp"
 #include "mgdd/control/slow_trim.hpp"
-#include "mgdd/dynamics/delay_line.hpp"
 #include "mgdd/dynamics/discrete_model.hpp"
 #include "mgdd/dynamics/observer.hpp"
 
@@ -27,7 +27,7 @@ namespace mgdd::control {
 
 struct Mgdd1Settings {
   int horizon_samples = 16;  ///< of the model
-  int delay_samples = 1;     ///< from a duty to its effect: 0 to 5
+  int delay_samples = 1;     ///< from a duty to its effect: 0 to `longest_control_delay`
   double adaptation_gain = 1.0;
   double difference = 0.02;          ///< [-] of the duty, for the slope
   double error_weight = 1.0;         ///< per deg²
@@ -41,7 +41,6 @@ struct Mgdd1Settings {
   bool operator==(const Mgdd1Settings&) const = default;
 };
 
-inline constexpr int longest_mgdd1_delay = 5;
 inline constexpr std::size_t n_mgdd1_fields = 9;
 std::span<const Field<Mgdd1Settings>, n_mgdd1_fields> mgdd1_fields() noexcept;
 
@@ -109,16 +108,13 @@ class Mgdd1 {
     Prefixed<V> model{v, "model_"};
     decltype(self.observer_)::visit(self.observer_, model);
     FilteredRate<T>::visit(self.reference_, Prefixed<V>{v, "reference_"});
-    for (std::size_t i = 0; i < self.sent_.before.size(); ++i)
-      visit_number(v, names_of_sent[i], self.sent_.before[i]);
+    visit_sent(self.sent_, v);
     visit_number(v, "move", self.move_);
     visit_number(v, "trim", self.trim_);
     visit_number(v, "duty", self.duty_);
   }
 
  private:
-  static constexpr std::array<const char*, longest_mgdd1_delay + 1> names_of_sent{"sent_0", "sent_1", "sent_2",
-                                                                                  "sent_3", "sent_4", "sent_5"};
   using Observer = dynamics::FixedGainObserver<M, Gains>;
 
   // u moves by -gain (sum w_e (y - r) s + w_u (u - u_last)) / (sum w_e s² + w_u), s the slope of the model's output.
@@ -147,7 +143,7 @@ class Mgdd1 {
   Observer observer_;
   FilteredRate<T> reference_;
   bool started_ = false;
-  dynamics::DelayLine<T, longest_mgdd1_delay + 1> sent_{};  // duties without trim
+  SentDuties<T> sent_{};  // duties without trim
   T move_{0.0}, trim_{0.0}, duty_{0.0};
 };
 

@@ -5,6 +5,7 @@
 
 #include <concepts>
 #include <cstddef>
+#include <optional>
 #include <span>
 #include <string>
 #include <utility>
@@ -32,7 +33,7 @@ struct ThrottleScenario {
 /// ParameterError or ShapeError naming the column.
 void validate(const ThrottleScenario& scenario);
 
-inline constexpr int longest_loop_delay = 16;
+inline constexpr int longest_loop_delay = 20;
 
 /// Columns of a run, one entry per sample: the angles are those at its end, the duty is that computed at its start.
 struct ThrottleTrack {
@@ -54,9 +55,22 @@ struct TrackingFigures {
 TrackingFigures tracking_figures(const ThrottleScenario& scenario, const ThrottleTrack& track, double sample_s,
                                  double band_deg);
 
+/// Time between the samples that a controller is made for; none where it does not say.
+template <class C>
+std::optional<double> sample_s_of(const C& controller) {
+  if constexpr (requires { controller.settings().sample_s; }) {
+    return controller.settings().sample_s;
+  } else if constexpr (requires { controller.model().sample_s(); }) {
+    return controller.model().sample_s();
+  } else {
+    return std::nullopt;
+  }
+}
+
 /// What stands before a run, and what every sample of one does; shared by single runs and runs in lanes.
-/// ParameterError for a bad delay or scenario.
-void require_loop(const ThrottleScenario& scenario, int delay_samples);
+/// ParameterError for a bad delay or scenario, or a controller that is made for other samples than the plant's.
+void require_loop(const ThrottleScenario& scenario, int delay_samples, std::optional<double> controller_s,
+                  double plant_s);
 ThrottleTrack empty_track(const ThrottleScenario& scenario);
 /// Inputs of sample k, whose duty is computed already.
 VirtualThrottleInputs inputs_at(const ThrottleScenario& scenario, const ThrottleTrack& track, std::size_t k,
@@ -67,7 +81,7 @@ void note(ThrottleTrack& track, std::size_t k, const VirtualThrottleSample& now)
 template <AngleController C>
 ThrottleTrack run_throttle_loop(C& controller, const VirtualThrottleSettings& plant, int delay_samples,
                                 const ThrottleScenario& scenario) {
-  require_loop(scenario, delay_samples);
+  require_loop(scenario, delay_samples, sample_s_of(controller), plant.sample_s);
   VirtualThrottle throttle(plant);
   ThrottleTrack track = empty_track(scenario);
   const auto delay = static_cast<std::size_t>(delay_samples);
@@ -86,7 +100,8 @@ ThrottleTrack run_throttle_loop(C& controller, const VirtualThrottleSettings& pl
 template <AngleController C>
 std::vector<ThrottleTrack> run_throttle_lanes(std::span<C> controllers, std::span<const VirtualThrottleSettings> plants,
                                               int delay_samples, const ThrottleScenario& scenario) {
-  require_loop(scenario, delay_samples);
+  for (std::size_t lane = 0; lane < plants.size(); ++lane)
+    require_loop(scenario, delay_samples, sample_s_of(controllers[lane]), plants[lane].sample_s);
   VirtualThrottleLanes throttles(plants);
   std::vector<ThrottleTrack> tracks(plants.size(), empty_track(scenario));
   std::vector<VirtualThrottleInputs> inputs(plants.size());

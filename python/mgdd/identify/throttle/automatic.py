@@ -10,8 +10,8 @@ from mgdd import _core
 from mgdd.errors import Interrupted, hand_over
 from mgdd.identify.starts import spread_starts
 from mgdd.identify.throttle.damping_share import SHARE, TYPICAL_SHARE, with_unknown_share
-from mgdd.identify.throttle.delay_report import with_delay
-from mgdd.identify.throttle.first_principle_model import REFINEMENTS, FirstPrincipleModel
+from mgdd.identify.throttle.delay_report import delay_at_end, with_delay
+from mgdd.identify.throttle.first_principle_model import LONGEST_DELAY, REFINEMENTS, FirstPrincipleModel
 from mgdd.identify.throttle.first_principle_problem import Search, groups_problem
 from mgdd.identify.throttle.free_run import draw_free_run, free_run, quality_of, source_of
 from mgdd.identify.throttle.hunt import (
@@ -47,6 +47,7 @@ _STOP = {"stop_duty_per_deg": 40.0, "stop_damping": 0.7}
 _AS_GOOD, _STIFFEST = 1.002, 400.0  # stops that were touched yield unless the log says that they do not
 _TOUCHED_DEG = 0.5  # as near as that the plate has been at a stop
 _COARSE = 2  # steps per sample of the first look
+_FIRST_LOOK = 6  # delays; the next are tried while one of the last two is the best
 _SEEDS = 2  # rough solutions that are looked at from every delay
 _DROPS, _SPEEDS, _PRESLIDINGS, _HALF_GAPS = (0.08, 0.6), (8.0, 40.0), (0.06, 0.2), (0.1, 0.3)
 
@@ -55,7 +56,7 @@ def fit_groups(
     log: xr.Dataset,
     *,
     fixed: Mapping[str, float] | None = None,
-    delays: Sequence[float] = range(6),
+    delays: Sequence[float] = range(21),
     stops_deg: tuple[float, float] = (0.0, 90.0),
     options: FitOptions | None = None,
 ) -> Fit:
@@ -72,7 +73,7 @@ def fit_groups(
     fixed : mapping of str to float, optional
         Groups that are known.
     delays : sequence of float
-        Delays that may be, in samples.
+        Delays that may be, in samples; long ones are looked at where the best of those before are the longest.
     stops_deg : tuple of float
         Mechanical stops [deg].
     options : FitOptions, optional
@@ -159,8 +160,10 @@ def _structure(
     ramps: list[dict[str, float]] = [{}, *({"ramp_deg": ramp} for ramp in RAMPS if "ramp_deg" in base)]
     moving = [name for name in MOVING if name in base]
     whole = [name for name in base if name not in DELAY]
-    tries = []
-    for delay in delays:
+    tries: list[Search] = []
+    for number, delay in enumerate(delays):
+        if number >= _FIRST_LOOK and best_of(tries) not in tries[-2:]:
+            break
         start = {**values, "delay_samples": float(delay)}
         first = hunt.search(start, moving, _COARSE, 10).values if moving else start
         tries.append(hunt.search(first, whole, _COARSE, 20))
@@ -259,12 +262,7 @@ def _told(found: Search, terms: Sequence[tuple[str, ...]], delays: Delays, tried
     text += f"; delay {found.values['delay_samples']:g} samples (deg RMS by delay: {each})"
     told = [Finding("structure_chosen", tuple(name for term in terms for name in term), text)]
     kept = found.values["delay_samples"]
-    if kept == max(tried) or kept == min(tried) > 0.0:
-        most, more = ("longest", "longer") if kept == max(tried) else ("shortest", "shorter")
-        text = f"a delay of {kept:g} samples is the {most} that was tried: the true one may be {more}, and then"
-        text += " lag and time constant stand for the rest"
-        remedy = "log at a longer sample time, of which a delay is fewer, or give delay_samples if it is known"
-        told.append(Finding("delay_at_end", ("delay_samples", *LAG, "tau_s"), text, remedy))
+    told += delay_at_end(kept, tried, LONGEST_DELAY)
     if len(delays.ties) > 1:
         ties = " and ".join(f"{delay:g}" for delay in delays.ties)
         text = f"delays of {ties} samples fit alike; taken is the shortest with the lag of a motor"

@@ -28,6 +28,7 @@ __all__ = ["fit_auto"]
 _EARLY = 0.75  # of the log, for both models; they are compared on the rest
 _BETTER_PERCENT = 0.3  # PW-R must gain that much to replace the groups, which have physical meaning
 _STIFFEST_SPRING = 0.02  # that PW-R has [duty/deg]; the groups know stiffer ones below limp-home
+_LONGEST_DELAY = 5.0  # that PW-R has [samples]
 _LEAST_SAMPLES, _LEAST_DEG = 100, 1.0
 
 
@@ -35,7 +36,7 @@ def fit_auto(
     log: xr.Dataset,
     *,
     fixed: Mapping[str, float] | None = None,
-    delays: Sequence[float] = range(6),
+    delays: Sequence[float] = range(21),
     stops_deg: tuple[float, float] = (0.0, 90.0),
     options: FitOptions | None = None,
 ) -> Fit:
@@ -126,6 +127,8 @@ def pseudo_wiener_of(model: FirstPrincipleModel) -> PseudoWiener:
     """Give PW-R of the groups, without lag, drop, presliding and gap."""
     p = model.parameters
     values = {name: p[name] for name in ("limp_home_deg", "delay_samples", "ramp_deg")}
+    if values["delay_samples"] < _LONGEST_DELAY + 0.5:  # searched, it may pass the last by a fraction
+        values["delay_samples"] = min(values["delay_samples"], _LONGEST_DELAY)
     for side in ("above", "below"):
         values |= {
             f"{side}_tau_s": p["tau_s"],

@@ -7,9 +7,9 @@ from functools import partial
 from typing import TYPE_CHECKING, Any
 
 from mgdd import _core
-from mgdd.errors import Interrupted, WorkerLostError, hand_over, or_partial
+from mgdd.errors import Interrupted, ParameterError, WorkerLostError, hand_over, or_partial
 from mgdd.identify.starts import rank, search_starts
-from mgdd.identify.throttle.first_principle_model import GROUP_NAMES, FirstPrincipleModel
+from mgdd.identify.throttle.first_principle_model import GROUP_NAMES, FirstPrincipleModel, whole_shift
 from mgdd.identify.throttle.first_principle_problem import groups_problem, log_columns
 from mgdd.identify.throttle.first_principle_start import group_starts
 from mgdd.identify.throttle.free_run import draw_free_run, free_run, quality_of, source_of
@@ -111,6 +111,9 @@ def fit_first_principle(
     """
     chosen = fit_options(options, n_starts=4, seed=0, max_iterations=60, tolerance=1e-10)
     problem = groups_problem(log, free=free, start_values=start_values, fixed=fixed, stops_deg=(closed_deg, open_deg))
+    if whole_shift(problem.values["delay_samples"]):
+        text = "within [0, 5] here; identify_throttle(log, 'first_principle') knows delays of up to 20 samples"
+        raise ParameterError.of("delay_samples", problem.values["delay_samples"], text)
     if test is not None:
         log_columns(test)
     threads = threads_of(workers)

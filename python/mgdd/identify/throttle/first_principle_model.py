@@ -46,7 +46,20 @@ TYPICAL = MappingProxyType(
     dict(zip(_NEEDED, (0.03, 5e4, 0.1, 1e-3, 0.05, 0.1, 1e-3, 8.0, 0.0), strict=True)) | REFINEMENTS
 )
 _POSITIVE = ("tau_s", "gain_deg_per_s2_per_duty", "stribeck_deg_per_s", "ramp_deg")
-_LONGEST_DELAY = 5.0
+LONGEST_DELAY = 20.0
+_CORE_DELAY = 5.0  # of a model of the core, whose delay line is part of its state
+
+
+def whole_shift(delay_samples: float, room: float = 0.0) -> int:
+    """Give the whole samples of a delay that are taken off the duty, so that the rest and `room` fit into the core."""
+    return max(0, math.ceil(delay_samples + room - _CORE_DELAY - 1e-9))
+
+
+def shifted(duty: NDArray[np.float64], samples: int, before: float) -> NDArray[np.float64]:
+    """Give a duty that many samples later, with the one that acted before."""
+    if samples == 0:
+        return duty
+    return np.concatenate([np.full(min(samples, duty.size), before), duty[:-samples]])
 
 
 @described
@@ -62,7 +75,7 @@ class FirstPrincipleModel(SampledModel, ModelParameters):
         ``electrical_s`` (L/R, 0 for none); those of a typical passenger-car throttle without. Further, if they are
         given: ``stribeck_drop`` (static over sliding friction, less one; 0) and ``stribeck_deg_per_s`` (speed over
         which it drops), ``ramp_deg`` (half width of the preload's ramp at limp-home; 0.25), ``delay_samples`` of the
-        duty (0 to 5; 0), ``presliding_deg`` (LuGre deflection at which friction is full; 0 for none) and
+        duty (0 to 20; 0), ``presliding_deg`` (LuGre deflection at which friction is full; 0 for none) and
         ``presliding_damping`` (ratio; 0.5), ``half_gap_deg`` (of the gap between motor and plate; 0),
         ``viscous_share`` (of the damping, what is not back-EMF; 0), ``stop_duty_per_deg`` (stiffness of the stops; 0
         for rigid ones) with ``stop_damping`` (ratio; 0.5).
@@ -109,8 +122,8 @@ class FirstPrincipleModel(SampledModel, ModelParameters):
             positive = name in _POSITIVE
             if name != "limp_home_deg" and not (value > 0.0 if positive else value >= 0.0):
                 raise ParameterError.of(name, value, f"{('>' if positive else '>=')} 0")
-        if ordered["delay_samples"] > _LONGEST_DELAY:
-            raise ParameterError.of("delay_samples", ordered["delay_samples"], f"<= {_LONGEST_DELAY:g}")
+        if ordered["delay_samples"] > LONGEST_DELAY:
+            raise ParameterError.of("delay_samples", ordered["delay_samples"], f"<= {LONGEST_DELAY:g}")
         if not (math.isfinite(self.sample_s) and self.sample_s > 0.0):
             raise ParameterError.of("sample_s", self.sample_s, "> 0")
         if not self.closed_deg < self.open_deg:
@@ -124,14 +137,11 @@ class FirstPrincipleModel(SampledModel, ModelParameters):
         values = dict(self.parameters)
         if not math.isclose(run.step_s, self.sample_s, rel_tol=1e-6):  # the delay keeps its seconds
             values["delay_samples"] *= self.sample_s / run.step_s
-            if values["delay_samples"] > _LONGEST_DELAY:
-                raise ParameterError(
-                    f"delay_samples = {self.parameters['delay_samples']:g} of {self.sample_s:g} s: at most "
-                    f"{_LONGEST_DELAY:g} samples of this run, {run.step_s:g} s"
-                )
+        shift = whole_shift(values["delay_samples"])
+        values["delay_samples"] -= shift
         return _core.identify.simulate_throttle_groups(
             list(values.values()),
-            np.clip(run.columns[0], -1.0, 1.0),
+            shifted(np.clip(run.columns[0], -1.0, 1.0), shift, float(run.state[2])),
             step_s=run.step_s,
             start=run.state,
             closed_deg=self.closed_deg,

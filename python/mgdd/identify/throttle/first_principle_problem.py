@@ -10,7 +10,14 @@ import numpy as np
 
 from mgdd import _core
 from mgdd.errors import DataError, ParameterError, argument, hand_over, or_partial
-from mgdd.identify.throttle.first_principle_model import GROUP_NAMES, REFINEMENTS, TYPICAL
+from mgdd.identify.throttle.first_principle_model import (
+    GROUP_NAMES,
+    LONGEST_DELAY,
+    REFINEMENTS,
+    TYPICAL,
+    shifted,
+    whole_shift,
+)
 from mgdd.identify.throttle.first_principle_start import SIDE_DEG, regression_start, rest_angle
 from mgdd.identify.throttle.free_run import LOG_COLUMNS
 from mgdd.results import Finding
@@ -36,6 +43,7 @@ _FIRST = {
     "viscous_share": 0.3,
     "stop_duty_per_deg": 30.0,
 }
+_DELAY, _ROOM = "delay_samples", 2.0
 _REST_S, _REST_DEG = 0.01, 0.5
 _FIRST_SAMPLES = 5
 
@@ -67,9 +75,12 @@ class GroupsProblem:
         return not self.unvisited
 
     def record(
-        self, share: float = 1.0
+        self, share: float = 1.0, shift: int = 0
     ) -> tuple[float, NDArray[np.float64], NDArray[np.float64], list[float], int, list[int]]:
-        """Return the first share of the log for the core; where it does not begin at rest its speed is free, too."""
+        """Return the first share of the log for the core, the duty `shift` samples later.
+
+        Where it does not begin at rest its speed is free, too.
+        """
         n = round(share * self.angle.size)
         first = self.angle[: max(2, round(_REST_S / self.step_s))]
         start = float(self.angle[:_FIRST_SAMPLES].mean())
@@ -78,7 +89,8 @@ class GroupsProblem:
         # A moving plate has left the mean of its first samples behind.
         begin = float(self.angle[0]) if moving else start
         state = [begin, speed, float(np.clip(self.duty[0], -1.0, 1.0))]
-        return self.step_s, np.clip(self.duty[:n], -1.0, 1.0), self.angle[:n], state, 0, [0, 1] if moving else [0]
+        duty = shifted(np.clip(self.duty[:n], -1.0, 1.0), shift, state[2])
+        return self.step_s, duty, self.angle[:n], state, 0, [0, 1] if moving else [0]
 
     def search(
         self,
@@ -91,13 +103,16 @@ class GroupsProblem:
         share: float = 1.0,
     ) -> Search:
         """Search the groups `free` from `values`, all others kept; Interrupted carries what it had."""
-        start = within_bounds({**values, **{name: values[name] or _FIRST.get(name, 0.0) for name in free}}, free)
+        # A search needs room for a delay that is free; the rest of a long one is taken off the duty.
+        shift = whole_shift(values["delay_samples"], _ROOM if _DELAY in free else 0.0)
+        begin = {**values, _DELAY: values[_DELAY] - shift}
+        start = within_bounds({**begin, **{name: begin[name] or _FIRST.get(name, 0.0) for name in free}}, free)
         stage: tuple[list[int], list[int], float, float, int] = (
             [GROUP_NAMES.index(name) for name in free], [], 1.0, tolerance, max_iterations,
         )  # fmt: skip
         found, stop = or_partial(
             lambda: _core.identify.fit_throttle_groups(
-                [self.record(share)],
+                [self.record(share, shift)],
                 stages=[stage],
                 starts=[[start[name] for name in GROUP_NAMES]],
                 closed_deg=self.stops_deg[0],
@@ -107,7 +122,10 @@ class GroupsProblem:
             )
         )
         report = found["reports"][0]
-        return hand_over(Search(report.rmse, dict(zip(GROUP_NAMES, found["values"], strict=True)), report), stop)
+        ended = dict(zip(GROUP_NAMES, found["values"], strict=True))
+        return hand_over(
+            Search(report.rmse, {**ended, _DELAY: min(ended[_DELAY] + shift, LONGEST_DELAY)}, report), stop
+        )
 
 
 def groups_problem(
@@ -155,7 +173,7 @@ def groups_problem(
         values |= regression_start(step_s, duty, angle, values, searched, *stops_deg)
     bounds = {parameter.name: parameter for parameter in _core.identify.throttle_group_bounds()}
     for name, value in given.items():
-        low, high = bounds[name].lower, bounds[name].upper
+        low, high = bounds[name].lower, LONGEST_DELAY if name == _DELAY else bounds[name].upper
         if not (low <= value <= high or value == REFINEMENTS.get(name)):
             raise ParameterError.of(name, value, f"within [{low:g}, {high:g}]")
     return GroupsProblem(

@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING
 from mgdd.errors import ParameterError
 from mgdd.identify.throttle.automatic import fit_groups
 from mgdd.identify.throttle.choice import fit_auto
-from mgdd.identify.throttle.first_principle_model import FirstPrincipleModel
+from mgdd.identify.throttle.first_principle_model import LONGEST_DELAY, FirstPrincipleModel
 from mgdd.identify.throttle.pseudo_wiener_fit import fit_pseudo_wiener
 from mgdd.io.parameters import ParameterFile
 from mgdd.optimize import FitOptions
@@ -27,7 +27,8 @@ __all__ = ["CHOICES", "KINDS", "PSEUDO_WIENER", "check_kind", "fit_kind", "load_
 PSEUDO_WIENER = ("pw_r", "pw_w", "pw_p")
 KINDS = ("first_principle", *PSEUDO_WIENER)
 CHOICES = ("auto", *KINDS)
-_DELAYS = (0.0, 1.0, 2.0, 3.0, 4.0, 5.0)
+_DELAYS = tuple(float(delay) for delay in range(int(LONGEST_DELAY) + 1))
+_PW_DELAY = 5.0  # the longest of a pseudo-Wiener model, whose delay line is part of its state
 
 
 def fit_kind(
@@ -58,9 +59,10 @@ def check_kind(kind: str, *, two_sided: bool, delay_samples: float | Sequence[fl
     """Refuse what the kind does not have, before the log is looked at."""
     if two_sided and kind in ("pw_w", "pw_p"):
         raise ParameterError(f"two_sided = True: {kind} has one set of parameters; only pw_r has one per side")
+    longest = _PW_DELAY if kind in PSEUDO_WIENER else LONGEST_DELAY
     for delay in () if delay_samples is None else delays_of(delay_samples):
-        if not _DELAYS[0] <= delay <= _DELAYS[-1]:
-            raise ParameterError.of("delay_samples", delay, f"within [{_DELAYS[0]:g}, {_DELAYS[-1]:g}]")
+        if not 0.0 <= delay <= longest:
+            raise ParameterError.of("delay_samples", delay, f"within [0, {longest:g}]")
 
 
 def delays_of(delay_samples: float | Sequence[float]) -> tuple[float, ...]:

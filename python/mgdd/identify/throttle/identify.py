@@ -69,8 +69,8 @@ def identify_throttle(
     closed_deg, open_deg : float
         Mechanical stops [deg].
     delay_samples : float or sequence of float, optional
-        Samples, 0 to 5, until the duty acts; of several the best is kept. None: the groups look at 0 to 5, a
-        pseudo-Wiener model has none.
+        Samples until the duty acts, 0 to 20, of a pseudo-Wiener model 0 to 5; of several the best is kept. None: the
+        groups look at 0 to 5, and on to 20 where the best are the longest; a pseudo-Wiener model has none.
     options : FitOptions, optional
         How hard to search; the number of starts is the model's own, the seed 0 without.
 

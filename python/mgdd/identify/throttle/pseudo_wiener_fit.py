@@ -10,6 +10,7 @@ import numpy as np
 
 from mgdd import _core
 from mgdd.errors import DataError, ParameterError, hand_over, or_partial
+from mgdd.identify.throttle.delay_report import delay_at_end
 from mgdd.identify.throttle.free_run import draw_free_run, free_run, quality_of, source_of
 from mgdd.optimize.fit_options import FitOptions, fit_options
 from mgdd.results import Finding, Fit, FitReport
@@ -138,6 +139,7 @@ def fit_pseudo_wiener(
     model = PseudoWiener(kind, parameters)
     runs = [free_run(model, one) for one in logs]
     found = [*wrapped.findings]
+    found += delay_at_end(parameters["delay_samples"], delays, 5.0)
     if errors.size > 1 and n_best < 2:
         text = "the best fit was found once only: a better one may exist"
         found.append(Finding("found_once", (), text, "raise n_starts"))

@@ -147,7 +147,7 @@ class TrackTask(Settings):
     reference: str = _key("text", "step:40:42")
     controller: str = _key("text", "guided", among=tuple(FAMILIES))
     model: str = _key("text", "P1")
-    delay_samples: int | None = _key("integer", low=0, high=16)
+    delay_samples: int | None = _key("integer", low=0, high=20)
     loop: str = _key("text", "auto", among=LOOPS)
 
 
