@@ -138,3 +138,16 @@ def test_what_a_kind_lacks_is_refused_first(p1: Throttle) -> None:
 def test_groups_outside_their_domain_are_refused(name: str, value: float) -> None:
     with pytest.raises(ParameterError, match=f"^{name} = "):
         FirstPrincipleModel(parameters={**FirstPrincipleModel().parameters, name: value})
+
+
+def test_a_fit_far_below_its_noise_ceiling_is_doubted(p1: Throttle) -> None:
+    """A strict Wiener model has no friction: 81 % where the noise would leave 99 says so, the groups do not."""
+    log = measured(p1, swing())
+    poor = identify_throttle(log, "pw_w", options=FitOptions(n_starts=2))
+    said = [str(found) for found in poor.findings if found.code == "below_ceiling"]
+    assert len(said) == 1
+    assert f"meets its own log at {poor.train.nrmse_fit_percent:.1f} %" in said[0]
+    assert "would leave 99." in said[0]
+    good = identify_throttle(log, "first_principle", options=FitOptions(n_starts=1))
+    assert good.train.nrmse_fit_percent > 98.0
+    assert "below_ceiling" not in {found.code for found in good.findings}
