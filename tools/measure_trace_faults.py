@@ -171,6 +171,36 @@ def stacked(running):
     return write
 
 
+def over_time(random, error, cycles=20):
+    """Read cycles of scattered fuel, charge and burn over time, with an error of the stated speed, as a share.
+
+    Met is a speed told right or corrected to 3e-5, 0.4 CAD from the first cycle to the last, or one that is refused.
+    """
+    cylinder, point, first = draw_cycle(random, step_cad=0.5)
+    speed, soc = first.attrs["speed_rpm"], float(first["soc_cad"])
+    parts = []
+    for _ in range(cycles):
+        fuel, charge = 1.0 + 0.03 * random.standard_normal(), 1.0 + 0.01 * random.standard_normal()
+        drawn = point.replace(fuel_mg=point.fuel_mg * fuel, intake_pressure_kpa=point.intake_pressure_kpa * charge)
+        cycle = simulate(cylinder, drawn, soc_cad=soc + random.uniform(-1.0, 1.0), step_cad=0.5)
+        _, pressure = whole(cycle.crank_angle_cad.values, cycle.pressure_bar.values)
+        parts.append(pressure + NOISE_BAR * random.standard_normal(pressure.size))
+    seconds = 0.5 / (6.0 * speed) * np.arange(sum(map(len, parts)))
+    with tempfile.TemporaryDirectory() as folder:
+        file = Path(folder) / "bench.csv"
+        rows = np.column_stack([seconds, np.concatenate(parts)])
+        np.savetxt(file, rows, delimiter=",", header="time_s,p_bar", comments="", fmt="%.9f")
+        call = {"speed_rpm": speed * (1.0 + error), "firing_tdc_deg": 360.0}
+        try:
+            trace = read_pressure(file, **call)
+        except errors.DataError as refused:
+            return "found" if error and "engine ran at" in str(refused) else "other"
+    if abs(trace.attrs["speed_rpm"] / speed - 1.0) > 3e-5:
+        return "silent" if not trace.attrs["warnings"] else "other"
+    told = "engine ran at" in trace.attrs["warnings"]
+    return ("found" if told else "silent") if error else ("other" if trace.attrs["warnings"] else "right")
+
+
 CASES = {
     "clean, fired": clean,
     "clean, motored": lambda r: clean(r, motored=True),
@@ -197,6 +227,7 @@ CASES = {
     "MPa in the header": lambda r: of_file(r, columns(("angle_deg", "p [MPa]"), 0.1), UNIT),
     "MPa without a word": lambda r: of_file(r, columns(("angle", "p"), 0.1), UNIT),
     "psi without a word": lambda r: of_file(r, columns(("angle", "p"), 14.5038), UNIT),
+    **{f"speed {100 * x:+.2f} %, over time": lambda r, x=x: over_time(r, x) for x in (0.0, 0.0003, -0.0003, 0.05)},
     "time_s": lambda r: of_file(r, columns(("time_s", "p_bar"), 1.0, lambda a: (a + 360.0) / 9000.0), "time|speed"),
     "time_ms": lambda r: of_file(r, columns(("time_ms", "p_bar"), 1.0, lambda a: (a + 360.0) / 9.0), "time|speed"),
 }

@@ -9,6 +9,7 @@ import numpy as np
 
 from mgdd.errors import DataError, argument
 from mgdd.io.angles import turned
+from mgdd.io.cycle_phase import CYCLE_DEG, repetition
 from mgdd.signals.even_grid import wide_steps
 
 if TYPE_CHECKING:
@@ -194,6 +195,14 @@ def _running(
         raise DataError(
             f"{place(int(rows[k]))}: gap in the crank angle from {degrees[k - 1]:g} to {degrees[k]:g}: the usual step "
             f"is {step:g}; fill it or cut the record there"
+        )
+    found = repetition(degrees, pressure, firing_tdc_deg)
+    if found is not None and found.differs:
+        factor = CYCLE_DEG / found.degrees
+        raise DataError(
+            f"{source}: the angle runs on and the pressure repeats every {found.degrees:.6g} degrees, not every 720, "
+            f"over {found.cycles} cycles: correct the step of the angle by a factor of {factor:.6g}, "
+            f"{argument('angle_step_deg', format(step * factor, '.6g'))} for a file without an angle"
         )
     first = float(degrees[0])
     if _splits_a_burn(degrees, firing_tdc_deg):

@@ -140,7 +140,9 @@ def read_pressure(
         With `angle_step_deg` or a time: angle of the first sample [deg], in °CA aTDC, or counted as `firing_tdc_deg`
         is, where that is given; 0 then if left out.
     speed_rpm : float, optional
-        Engine speed [rpm], which turns a time into an angle: first angle + 6 n t; stored as ``attrs["speed_rpm"]``.
+        Engine speed [rpm], which turns a time into an angle: first angle + 6 n t; stored as ``attrs["speed_rpm"]``. Of
+        a record of two cycles and more the period is compared with it: what differs by at most 1 % is corrected and
+        told, more is refused.
     gain_bar_per_v, offset_bar : float, optional
         For a pressure in volts: bar per volt, and bar at 0 V. Without `offset_bar` the pressure is relative.
     delimiter : str, optional
@@ -190,10 +192,10 @@ def read_pressure(
         gain_bar_per_v=gain_bar_per_v,
         offset_bar=offset_bar,
     )
-    angle, pressure, warnings = cycles_of(read_table(path, delimiter=delimiter, decimal=decimal), how)
+    angle, pressure, speed, warnings = cycles_of(read_table(path, delimiter=delimiter, decimal=decimal), how)
     attrs: dict[str, str | float] = {"file": Path(path).name, "warnings": "\n".join(warnings)}
-    if speed_rpm is not None:
-        attrs["speed_rpm"] = float(speed_rpm)
+    if speed is not None:
+        attrs["speed_rpm"] = float(speed)
     return _dataset(angle, pressure, attrs)
 
 

@@ -11,6 +11,7 @@ import numpy as np
 from mgdd.errors import DataError, argument
 from mgdd.io.checks import MIN_SAMPLES, check_choice, check_span, check_trace
 from mgdd.io.column_names import headings
+from mgdd.io.cycle_phase import CYCLE_DEG, phase_warnings, repetition
 from mgdd.io.cycles import arranged
 from mgdd.io.pressure_columns import (
     ANGLE_UNITS,
@@ -31,6 +32,8 @@ if TYPE_CHECKING:
 __all__ = ["Reading", "checked", "cycles_of"]
 
 _LARGEST_OFFSET_CAD = 20.0
+# A speed is stated to a digit or read off a display; one that is further off is of another point.
+_CORRECTED = 0.01
 
 
 @dataclass(frozen=True)
@@ -72,8 +75,10 @@ class Reading:
                 )
 
 
-def cycles_of(table: TextTable, how: Reading) -> tuple[NDArray[np.float64], NDArray[np.float64], list[str]]:
-    """Return angle [°CA aTDC], pressures [bar] as (cycle, angle), and warnings."""
+def cycles_of(
+    table: TextTable, how: Reading
+) -> tuple[NDArray[np.float64], NDArray[np.float64], float | None, list[str]]:
+    """Return angle [°CA aTDC], pressures [bar] as (cycle, angle), the speed [rpm] of a time, and warnings."""
     heads = headings(table)
     index, degrees, unit, made = _angle(table, heads, how)
     columns = choose_pressure(table, heads, how.pressure_column, index)
@@ -94,6 +99,11 @@ def cycles_of(table: TextTable, how: Reading) -> tuple[NDArray[np.float64], NDAr
     tdc = how.firing_tdc_deg
     if made and tdc is None and degrees[-1] > 360.5:
         tdc = 0.0  # angle_start_deg is in °CA aTDC
+    speed = how.speed_rpm
+    over_time = made and how.angle_step_deg is None
+    if over_time and tdc is not None and len(values) == 1 and np.isfinite(values).all():
+        degrees, speed, notes = _at_the_speed_of_the_record(degrees, values[0], float(speed or 0.0), tdc, table.source)
+        warnings += notes
     angle, bar, more = checked(
         degrees,
         values,
@@ -106,8 +116,9 @@ def cycles_of(table: TextTable, how: Reading) -> tuple[NDArray[np.float64], NDAr
         rows=table.lines,
         level=level,
         unit_of_file=unit_of_file,
+        over_time=over_time,
     )
-    return angle, bar, warnings + more
+    return angle, bar, speed, warnings + more
 
 
 def checked(
@@ -123,6 +134,7 @@ def checked(
     rows: Sequence[int] | None = None,
     level: bool = True,
     unit_of_file: bool = False,
+    over_time: bool = False,
 ) -> tuple[NDArray[np.float64], NDArray[np.float64], list[str]]:
     """Cut a record into cycles and check them; angles are in degrees, `angle_unit` is what they came in."""
     if not abs(tdc_offset_cad) <= _LARGEST_OFFSET_CAD:
@@ -143,6 +155,7 @@ def checked(
     one = values[0] if len(values) == 1 else values
     angle, bar = check_trace(degrees, one, unit=unit, source=source, rows=rows, unit_of_file=unit_of_file)
     doubts = [*level_warning(angle, values, unit), *steep_warning(angle, bar)] if level else []
+    doubts += phase_warnings(angle, np.atleast_2d(bar), over_time=over_time, source=source)
     return angle, np.atleast_2d(bar), notes + doubts
 
 
@@ -169,6 +182,27 @@ def _angle(
     _check_start(called, "a time", how)
     seconds = table.numbers(index) / TIME_UNITS[unit]
     return index, (how.angle_start_deg or 0.0) + 6.0 * how.speed_rpm * (seconds - seconds[0]), "deg", True
+
+
+def _at_the_speed_of_the_record(
+    degrees: NDArray[np.float64], pressure: NDArray[np.float64], speed_rpm: float, firing_tdc_deg: float, source: str
+) -> tuple[NDArray[np.float64], float, list[str]]:
+    """Compare the stated speed with the period of the record: correct angles and speed, or refuse."""
+    if not (np.isfinite(degrees).all() and np.all(np.diff(degrees) > 0.0)):
+        return degrees, speed_rpm, []  # check_trace names the sample
+    found = repetition(degrees, pressure, firing_tdc_deg)
+    if found is None or not found.differs:
+        return degrees, speed_rpm, []
+    share = CYCLE_DEG / found.degrees
+    stated = argument("speed_rpm", format(speed_rpm, "g"))
+    said = (
+        f"the pressure repeats every {found.degrees:.6g} degrees of {stated}, not 720: over {found.cycles} cycles the "
+        f"engine ran at {speed_rpm * share:.6g} rpm"
+    )
+    if abs(share - 1.0) > _CORRECTED:
+        raise DataError(f"{source}: {said}: correct it")
+    scaled = degrees[0] + (degrees - degrees[0]) * share
+    return scaled, speed_rpm * share, [f"{said}, and its angles were made with that"]
 
 
 def _check_start(where: str, what: str, how: Reading) -> None:

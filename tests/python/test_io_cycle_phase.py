@@ -1,0 +1,100 @@
+"""Records whose angles slip from cycle to cycle: a stated speed, a step or an encoder that is not the engine's."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+
+from mgdd.engine import Cylinder, OperatingPoint, analyze, simulate
+from mgdd.errors import DataError
+from mgdd.io import pressure_trace, read_pressure
+
+STEP, RPM = 0.5, 1500.0
+FULL = np.arange(-360.0, 360.0, STEP)
+
+
+def record(random, cycles, *, motored=False):
+    """Give cycles of 720 degrees from gas-exchange TDC on, with scatter of fuel, charge, burn, level and sample."""
+    parts = []
+    for _ in range(cycles):
+        point = OperatingPoint(
+            fuel_mg=0.0 if motored else 20.0 * (1.0 + 0.03 * random.standard_normal()),
+            intake_pressure_kpa=150.0 * (1.0 + 0.01 * random.standard_normal()),
+        )
+        cycle = simulate(Cylinder(), point, soc_cad=-4.0 + random.standard_normal(), step_cad=STEP)
+        pressure = cycle["pressure_bar"].to_numpy()
+        closed = np.interp(FULL, cycle["crank_angle_cad"], pressure, left=pressure[0], right=pressure[0])
+        parts.append(closed + 0.02 * random.standard_normal() + 0.05 * random.standard_normal(FULL.size))
+    return np.array(parts)
+
+
+def over_time(folder, cycles, rpm=RPM):
+    """Write a record over time; the speed may change from sample to sample."""
+    bar = cycles.ravel()
+    seconds = np.concatenate([[0.0], np.cumsum(STEP / (6.0 * np.broadcast_to(rpm, bar.shape)))[:-1]])
+    path = folder / "time.csv"
+    np.savetxt(path, np.column_stack([seconds, bar]), delimiter=",", header="time_s,p_bar", comments="", fmt="%.9f")
+    return path
+
+
+def imep(trace):
+    return float(analyze(trace, Cylinder(), point=OperatingPoint(), quiet=True)["mean_imep_closed_bar"])
+
+
+@pytest.mark.parametrize("motored", [False, True])
+@pytest.mark.parametrize("error", [0.0003, -0.0003, 0.004])
+def test_a_speed_that_is_told_slightly_wrong_is_corrected(tmp_path, error, motored):
+    cycles = record(np.random.default_rng(3), 20, motored=motored)
+    trace = read_pressure(over_time(tmp_path, cycles), speed_rpm=RPM * (1.0 + error), firing_tdc_deg=360.0)
+    assert trace.attrs["speed_rpm"] == pytest.approx(RPM, rel=1e-5)
+    assert "the engine ran at 1500" in trace.attrs["warnings"] or "the engine ran at 1499.9" in trace.attrs["warnings"]
+    true = imep(pressure_trace(FULL, cycles))
+    assert imep(trace) == pytest.approx(true, abs=0.015 * max(abs(true), 5.0))
+
+
+def test_a_right_speed_is_left_alone(tmp_path):
+    for seed in range(20):
+        random = np.random.default_rng(seed)
+        path = over_time(tmp_path, record(random, int(random.integers(2, 8))))
+        trace = read_pressure(path, speed_rpm=RPM, firing_tdc_deg=360.0)
+        assert (trace.attrs["speed_rpm"], trace.attrs["warnings"]) == (RPM, "")
+
+
+@pytest.mark.parametrize("error", [0.03, 1.0, -0.5])
+def test_a_speed_of_another_point_is_refused(tmp_path, error):
+    path = over_time(tmp_path, record(np.random.default_rng(3), 6))
+    with pytest.raises(DataError, match=r"speed_rpm=.*the engine ran at (1[45]99|1500)\.?\d* rpm: correct it"):
+        read_pressure(path, speed_rpm=RPM * (1.0 + error), firing_tdc_deg=360.0)
+    assert read_pressure(path, speed_rpm=RPM, firing_tdc_deg=360.0).sizes["cycle"] == 6
+
+
+def test_a_speed_that_changes_within_the_record_is_doubted(tmp_path):
+    cycles = record(np.random.default_rng(3), 20)
+    rpm = RPM * (1.0 + 0.004 * np.linspace(-1.0, 1.0, cycles.size))  # the mean is right, the middle is 7 °CA off
+    with pytest.raises(DataError, match=r"crank angle slips: .* the speed changes within the record"):
+        read_pressure(over_time(tmp_path, cycles, rpm), speed_rpm=RPM, firing_tdc_deg=360.0)
+    rpm = RPM * (1.0 + 0.0006 * np.linspace(-1.0, 1.0, cycles.size))
+    trace = read_pressure(over_time(tmp_path, cycles, rpm), speed_rpm=RPM, firing_tdc_deg=360.0)
+    assert "the speed changes within the record" in trace.attrs["warnings"]
+
+
+def test_a_wrong_step_of_samples_is_refused(tmp_path):
+    cycles = record(np.random.default_rng(3), 10)
+    path = tmp_path / "count.csv"
+    np.savetxt(path, cycles.ravel(), header="p_bar", comments="")
+    with pytest.raises(DataError, match=r"angle_step_deg=0\.(5|49999|500000)"):
+        read_pressure(path, angle_step_deg=0.502, firing_tdc_deg=360.0)
+    assert read_pressure(path, angle_step_deg=0.5, firing_tdc_deg=360.0).attrs["warnings"] == ""
+    angles = 0.502 * np.arange(cycles.size)
+    with pytest.raises(DataError, match=r"repeats every 722\.\d+ degrees, not every 720"):
+        pressure_trace(angles, cycles.ravel(), firing_tdc_deg=360.0)
+
+
+def test_an_encoder_that_loses_pulses_is_doubted():
+    cycles = record(np.random.default_rng(3), 12)
+    slipping = np.array([np.roll(pressure, k // 3) for k, pressure in enumerate(cycles)])
+    assert "compression moves by +2" in pressure_trace(FULL, slipping).attrs["warnings"]
+    one = cycles.copy()
+    one[4] = np.roll(one[4], 3)
+    assert "compression of cycle 5 lies +1." in pressure_trace(FULL, one).attrs["warnings"]
+    assert pressure_trace(FULL, cycles).attrs["warnings"] == ""
