@@ -67,6 +67,53 @@ def clean(random, *, motored=False):
     return outcome(lambda: analyze(trace, cylinder, point=point, quiet=True), lambda _: True, "$^")
 
 
+def spoilt(random, spoil, cause, *said, is_right=never):
+    """Analyse a cycle whose samples were spoilt, where fuel or brake work are said."""
+    cylinder, point, cycle = draw_cycle(random)
+    trace = trace_of(random, cycle)
+    spoil(random, trace["crank_angle_cad"].values, trace["pressure_bar"].values)
+    work = float(cycle["imep_gross_bar"]) - random.uniform(0.8, 2.5)
+    figures = {"fuel_mg": point.fuel_mg, "bmep_bar": max(0.0, work)}
+    trace = trace.assign_attrs({name: figures[name] for name in said})
+    return outcome(lambda: analyze(trace, cylinder, point=point, quiet=True), is_right, cause)
+
+
+def stated(random, *said):
+    """Analyse a clean cycle with stated fuel or brake work: a doubt is a false one."""
+    return spoilt(random, lambda *_: None, "^$", *said, is_right=lambda _: True)
+
+
+def clip(_random, _angle, pressure):
+    """Cut the top off at 0.9 of the peak."""
+    np.minimum(pressure, 0.9 * pressure.max(), out=pressure)
+
+
+def stick(random, angle, pressure):
+    """Hold one sample for 10 CAD in compression or late expansion."""
+    start = random.choice([random.uniform(-90.0, -40.0), random.uniform(80.0, 105.0)])
+    held = (angle >= start) & (angle <= start + 10.0)
+    pressure[held] = pressure[held][0]
+
+
+def spike(random, angle, pressure):
+    """Add 5 bar to a sample of late expansion."""
+    pressure[random.choice(np.flatnonzero((angle > 90.0) & (angle < angle[-1] - 5.0)))] += 5.0
+
+
+def shock(_random, angle, pressure):
+    """Read 1 bar low from 30 CAD behind top dead centre on."""
+    pressure -= np.clip(angle / 30.0, 0.0, 1.0)
+
+
+def gain(factor):
+    """Multiply the pressure."""
+
+    def spoil(_random, _angle, pressure):
+        pressure *= factor
+
+    return spoil
+
+
 def calibrated(random, angle_cad, *, motored=False):
     """Estimate TDC of a cycle whose angles are off: found if the true offset is in the range and zero is not."""
     cylinder, point, cycle = draw_cycle(random, motored=motored, step_cad=0.5)
@@ -221,6 +268,14 @@ CASES = {
     "early burn, -40 to -30": early_burn,
     "low load, 0.5 to 1 bar": low_load,
     "BMEP above the gross IMEP": impossible_work,
+    "clipped at 0.9 of the peak": lambda r: spoilt(r, clip, "clipped"),
+    "stuck for 10 CAD": lambda r: spoilt(r, stick, "stuck"),
+    "+5 bar in expansion": lambda r: spoilt(r, spike, "spike"),
+    "thermal shock of -1 bar": lambda r: spoilt(r, shock, "thermal shock"),
+    "fuel stated": lambda r: stated(r, "fuel_mg"),
+    "BMEP stated": lambda r: stated(r, "bmep_bar"),
+    **{f"gain {x}, fuel stated": lambda r, x=x: spoilt(r, gain(x), "gain", "fuel_mg") for x in (0.9, 1.1)},
+    **{f"gain {x}, BMEP stated": lambda r, x=x: spoilt(r, gain(x), "gain|BMEP|bmep", "bmep_bar") for x in (0.9, 1.1)},
     "60 cycle columns": lambda r: of_file(r, columns(("angle_deg", "p_bar")), "cycle|column", cycles=60),
     "five cycles stacked": lambda r: of_file(r, stacked(False), "cycle", cycles=5),
     "angles running to 3600": lambda r: of_file(r, stacked(True), "cycle|firing_tdc", cycles=5),

@@ -51,6 +51,7 @@ def analyze(
     bmep_bar: float | None = None,
     brake_torque_nm: float | None = None,
     n_cylinders: int = 1,
+    fuel_mg: float | None = None,
     quiet: bool = False,
 ) -> xr.Dataset:
     """Analyse pressure: pegging, heat release, burn angles, work, polytropic exponents, of one cycle or of many.
@@ -62,7 +63,7 @@ def analyze(
         `mgdd.io.read_pressure`, `mgdd.io.pressure_trace` or `simulate`; a table with these columns [°CA aTDC, bar], a
         column over crank angle, angle and pressure as a pair, or a file that `mgdd.io.read_pressure` reads without
         options. The attributes ``speed_rpm trapped_mass_g ivc_temperature_k intake_pressure_kpa soi_cad spark_cad
-        bmep_bar brake_torque_nm n_cylinders`` are used where present.
+        bmep_bar brake_torque_nm n_cylinders fuel_mg`` are used where present.
     cylinder : Cylinder
         Geometry and wall-heat law. Samples outside IVC..EVO serve only pegging.
     point : OperatingPoint, optional
@@ -95,11 +96,14 @@ def analyze(
     smoothing_cutoff_hz : float
         Of ``low_pass`` [Hz]: a second-order Butterworth forward and backward, gain 1/2 there.
     bmep_bar : float, optional
-        Measured brake mean effective pressure [bar]. A cycle whose gross IMEP cannot reach it is refused.
+        Measured brake mean effective pressure [bar]. A cycle whose gross IMEP cannot reach it is refused; one that is
+        too near to it, or too far, is doubted.
     brake_torque_nm : float, optional
         Measured torque of the engine [N m], turned into ``bmep_bar`` by the swept volume (four-stroke).
     n_cylinders : int
         Cylinders behind ``brake_torque_nm``.
+    fuel_mg : float, optional
+        Measured fuel per cycle of this cylinder [mg]. A gross heat outside 0.93 to 1.18 of its heat is doubted.
     quiet : bool
         Leave the warnings to the attribute instead of logging them too.
 
@@ -172,6 +176,7 @@ def analyze(
         intake_pressure_kpa=stated if stated is not None or point is None else point.intake_pressure_kpa,
         intake_factor=_POINT_FACTOR if stated is None else _STATED_FACTOR,
         bmep_bar=_bmep(trace, cylinder, bmep_bar, brake_torque_nm, n_cylinders),
+        fuel_heat_j=_fuel_heat(trace, cylinder, fuel_mg),
     )
     attrs = {
         "file": trace.attrs.get("file", "trace"),
@@ -256,6 +261,14 @@ def _bmep(
     if cylinders < 1:
         raise ParameterError.of("n_cylinders", cylinders, ">= 1")
     return 4.0 * math.pi * torque / (cylinder.swept_volume_l * 1e-3 * cylinders) / 1e5
+
+
+def _fuel_heat(trace: xr.Dataset, cylinder: Cylinder, fuel_mg: float | None) -> float | None:
+    """Heat [J] of the fuel that is stated for this trace; mg times MJ/kg are J."""
+    fuel = _number(trace, "fuel_mg", fuel_mg)
+    if fuel_mg is not None and not (fuel_mg > 0.0 and math.isfinite(fuel_mg)):
+        raise ParameterError.of("fuel_mg", fuel_mg, "> 0 mg per cycle")
+    return fuel * cylinder.lower_heating_value_mj_per_kg if fuel else None
 
 
 def _gamma(gamma: float | str) -> tuple[str, float, float | str]:

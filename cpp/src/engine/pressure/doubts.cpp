@@ -1,10 +1,8 @@
 #include "mgdd/engine/pressure/doubts.hpp"
 
 #include <algorithm>
-#include <array>
 #include <cmath>
 #include <cstddef>
-#include <cstdio>
 #include <string>
 #include <utility>
 
@@ -15,6 +13,8 @@
 #include "mgdd/engine/charge.hpp"
 #include "mgdd/engine/pressure/heat.hpp"
 #include "mgdd/engine/pressure/pegging.hpp"
+#include "mgdd/engine/pressure/sample_doubts.hpp"
+#include "mgdd/engine/pressure/warning_text.hpp"
 
 namespace mgdd::engine {
 namespace {
@@ -24,6 +24,12 @@ constexpr double exponent_low = 1.25, exponent_high = 1.42;
 // Offset over p(IVC) that p + offset = C V^-n asks for without any error of level, by wall heat and gamma(T): simulated
 // compressions give -0.02 to 0.09, the measured heavy-duty traces 0.02 to 0.07.
 constexpr double free_offset_low = -0.04, free_offset_high = 0.11;
+// The same over p at the end for expansion: simulated ones give -0.13 to 0.07, the measured traces 0.04 to 0.08.
+constexpr double after_burn_cad = 5.0, expansion_offset_high = 0.10;
+// Gross heat by constant gamma over fuel heat: simulated traces give 0.95 to 1.17; some fuel leaves unburnt.
+constexpr double fuel_share_low = 0.93, fuel_share_high = 1.18;
+// Gross IMEP less BMEP: from a friction that no engine falls below to that of a small one at speed, throttled.
+constexpr double friction_low_bar = 0.3, friction_high_bar = 4.5;
 constexpr double motored_peak_low_cad = -1.5, motored_peak_high_cad = 0.1;
 constexpr double window_shift_cad = 5.0, window_tolerance_cad = 1.0;
 constexpr double ivc_coldest_k = 250.0, ivc_hottest_k = 400.0, ivc_least_k = 100.0, ivc_most_k = 1500.0;
@@ -32,13 +38,6 @@ constexpr double fired_coldest_k = 900.0, fired_hottest_k = 3200.0;
 constexpr double ivc_lowest_bar = 0.2, ivc_highest_bar = 8.0;
 constexpr const char* mass_causes =
     ": suspect trapped_mass_g (g per cycle, not kg or mg), the pressure unit, or the conditions of another trace";
-
-// Four digits are enough for a warning.
-std::string shown(double value) {
-  std::array<char, 32> buffer{};
-  std::snprintf(buffer.data(), buffer.size(), "%.4g", value);
-  return buffer.data();
-}
 
 double ivc_bar(const TraceAnalysis& a, const Cylinder& cylinder) {
   return ivc_pressure<double>(a.angle_cad, a.pressure_bar, Geometry<double>(cylinder.geometry),
@@ -165,11 +164,12 @@ void doubt_dead_centre(TraceAnalysis& a) {
     a.warnings.push_back({"tdc", "the trace is motored but peaks at " + shown(peak) + " °CA aTDC, not at " +
                                      shown(motored_peak_low_cad) + " to " + shown(motored_peak_high_cad) +
                                      ": suspect a TDC offset; both strokes compared put it at " +
-                                     shown(a.tdc_offset_cad) + " °CA"});
+                                     shown(a.tdc_offset_cad) +
+                                     " °CA; if it was fired, suspect thermal shock of the sensor"});
   }
 }
 
-void doubt_samples(TraceAnalysis& a, const Cylinder& cylinder) {
+void doubt_coverage(TraceAnalysis& a, const Cylinder& cylinder) {
   if (a.angle_cad.front() > cylinder.geometry.ivc_cad + coverage_cad ||
       a.angle_cad.back() < cylinder.geometry.evo_cad - coverage_cad) {
     a.warnings.push_back(
@@ -179,24 +179,59 @@ void doubt_samples(TraceAnalysis& a, const Cylinder& cylinder) {
                          ": its work is not the closed-cycle work, and without a trapped mass its "
                          "temperature is carried back to IVC"});
   }
-  for (std::size_t k = 1; k + 1 < a.pressure_bar.size(); ++k) {
-    const double jump = a.pressure_bar[k] - 0.5 * (a.pressure_bar[k - 1] + a.pressure_bar[k + 1]);
-    if (std::abs(jump) > 0.1 * a.p_max_bar) {
-      a.warnings.push_back({"spike", "the sample at " + shown(a.angle_cad[k]) + " °CA aTDC stands " + shown(jump) +
-                                         " bar off its neighbours: a spike, or a step too coarse"});
-      break;
+}
+
+// A sensor that the flame heats reads too low until the exhaust.
+void doubt_expansion(TraceAnalysis& a, const BurnWindow& burn) {
+  if (a.motored || !burn.found) return;
+  const FreePolytrope free =
+      free_polytrope(a.angle_cad, a.pressure_bar, a.volume_l, burn.end_cad + after_burn_cad, a.angle_cad.back());
+  if (std::isnan(free.offset_bar)) return;
+  const double most = expansion_offset_high * a.pressure_bar.back() + free.offset_stderr_bar;
+  if (free.offset_bar <= most) return;
+  a.warnings.push_back({"expansion", "expansion follows p + " + shown(free.offset_bar) +
+                                         " bar = C V^-n best, where sound traces give at most " + shown(most) +
+                                         " bar: suspect thermal shock of the sensor, then pegging"});
+}
+
+// What the stated fuel and brake work say about the gain of the amplifier.
+void doubt_gain(TraceAnalysis& a, const Cylinder& cylinder, const TraceOptions& o) {
+  if (a.motored) return;
+  const std::string causes = ": suspect the gain of the amplifier, then the stated figure";
+  if (o.fuel_heat_j) {
+    const double share = a.heat_gross_j_total / *o.fuel_heat_j;
+    if (share < fuel_share_low || share > fuel_share_high) {
+      a.warnings.push_back({"gain", "the gross heat is " + shown(share) + " of the heat of the stated fuel, outside " +
+                                        shown(fuel_share_low) + ".." + shown(fuel_share_high) + causes});
     }
   }
+  if (!o.bmep_bar) return;
+  const double most = a.imep_closed_bar + open_part_at_most_bar(a, cylinder) - *o.bmep_bar;
+  const double least = a.imep_closed_bar + open_part_at_least_bar(a, cylinder) - *o.bmep_bar;
+  if (most < friction_low_bar || least > friction_high_bar) {
+    a.warnings.push_back({"gain", "gross IMEP is " + shown(least) + " to " + shown(most) +
+                                      " bar above the stated BMEP, where friction and gas exchange take " +
+                                      shown(friction_low_bar) + " to " + shown(friction_high_bar) + " bar" + causes});
+  }
+}
+
+// Work from EVO to bottom dead centre at `exhaust_bar`, and from there to IVC at a share of p(IVC), over swept volume.
+double open_part_bar(const TraceAnalysis& a, const Cylinder& cylinder, double exhaust_bar, double intake_share) {
+  const Geometry<double> geometry(cylinder.geometry);
+  const double bottom = geometry.volume_m3(180.0);
+  const double exhaust = exhaust_bar * (bottom - geometry.volume_m3(a.angle_cad.back()));
+  const double intake = intake_share * ivc_bar(a, cylinder) * (bottom - geometry.volume_m3(cylinder.geometry.ivc_cad));
+  return (exhaust - intake) / geometry.swept_m3;
 }
 
 }  // namespace
 
 double open_part_at_most_bar(const TraceAnalysis& a, const Cylinder& cylinder) {
-  const Geometry<double> geometry(cylinder.geometry);
-  const double bottom = geometry.volume_m3(180.0);
-  const double exhaust = a.pressure_bar.back() * (bottom - geometry.volume_m3(a.angle_cad.back()));
-  const double intake = 0.7 * ivc_bar(a, cylinder) * (bottom - geometry.volume_m3(cylinder.geometry.ivc_cad));
-  return (exhaust - intake) / geometry.swept_m3;
+  return open_part_bar(a, cylinder, a.pressure_bar.back(), 0.7);
+}
+
+double open_part_at_least_bar(const TraceAnalysis& a, const Cylinder& cylinder) {
+  return open_part_bar(a, cylinder, std::min(a.pressure_bar.back(), 1.0), 1.0);
 }
 
 void refuse_impossible(const TraceAnalysis& a, const Cylinder& cylinder, const OperatingPoint& point,
@@ -222,12 +257,16 @@ void refuse_impossible(const TraceAnalysis& a, const Cylinder& cylinder, const O
 }
 
 void add_warnings(TraceAnalysis& a, const Cylinder& cylinder, const TraceOptions& options, const BurnWindow& burn) {
-  doubt_samples(a, cylinder);
+  doubt_coverage(a, cylinder);
+  doubt_spikes(a);
+  doubt_runs(a);
   doubt_level(a, cylinder, options);
   doubt_compression(a, cylinder, options, burn);
   doubt_mass(a, cylinder);
   doubt_window(a, options, burn);
   doubt_dead_centre(a);
+  doubt_expansion(a, burn);
+  doubt_gain(a, cylinder, options);
 }
 
 }  // namespace mgdd::engine

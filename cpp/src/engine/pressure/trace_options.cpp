@@ -77,6 +77,7 @@ void validate(const TraceOptions& o) {
     require(*o.bmep_bar >= 0.0 && *o.bmep_bar <= 100.0, "bmep_bar", *o.bmep_bar,
             "in [0, 100] bar; a torque is brake_torque_nm", "bar");
   }
+  if (o.fuel_heat_j) require(*o.fuel_heat_j > 0.0, "fuel_heat_j", *o.fuel_heat_j, "> 0 J", "J");
 }
 
 }  // namespace mgdd::engine

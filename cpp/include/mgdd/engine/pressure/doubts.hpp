@@ -20,4 +20,7 @@ void add_warnings(TraceAnalysis& analysis, const Cylinder& cylinder, const Trace
 /// p(IVC) from bottom dead centre to IVC.
 double open_part_at_most_bar(const TraceAnalysis& analysis, const Cylinder& cylinder);
 
+/// And at least this: exhaust pressure at 1 bar, the whole of p(IVC) up to IVC.
+double open_part_at_least_bar(const TraceAnalysis& analysis, const Cylinder& cylinder);
+
 }  // namespace mgdd::engine

@@ -41,6 +41,7 @@ struct TraceOptions {
   std::optional<double> intake_pressure_kpa;  ///< what p(IVC) is judged against
   double intake_factor = 1.5;                 ///< p(IVC) beyond this factor of it is doubted
   std::optional<double> bmep_bar;             ///< a gross IMEP that cannot reach it is refused
+  std::optional<double> fuel_heat_j;          ///< of the stated fuel; a gross heat far from it is doubted
 };
 
 /// ParameterError naming the first option outside its domain.
