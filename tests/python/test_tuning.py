@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import pickle
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 import pytest
@@ -12,6 +12,13 @@ from hypothesis import strategies as st
 
 from mgdd.errors import DataError, ParameterError, ShapeError
 from mgdd.optimize import ExtremumSeeking, Limit, Spsa, measure_map, tune
+
+if TYPE_CHECKING:
+    from collections.abc import Callable
+
+    from numpy.typing import NDArray
+
+    Array = NDArray[np.float64]
 
 SIGMA, BEND = 0.25, -0.051
 METHODS = ["batch", "moving_average", "spsa"]
@@ -65,6 +72,41 @@ def test_a_minimum_is_refused_as_a_maximum_and_taken_as_a_minimum() -> None:
     with pytest.raises(DataError, match="no minimum"):
         measure_map([-2, -1, 0, 1, 2], [-4, -1, 0, -1, -4], maximize=False)
     assert measure_map([-2, -1, 0, 1, 2], [4, 1, 0, 1, 4], maximize=False).curvature == pytest.approx(2.0)
+
+
+SKEWED: dict[str, Callable[[Array], Array]] = {  # J'' = -0.045 at the optimum 0
+    "exponential": lambda u: 50.0 - 2.0 * (np.exp(0.15 * u) - 0.15 * u - 1.0),
+    "cubic": lambda u: 50.0 - 0.0225 * u**2 - 0.0008 * u**3,
+}
+
+
+@pytest.mark.parametrize(("distinct", "repeats"), [(9, 8), (5, 8), (11, 4), (41, 1)])
+@pytest.mark.parametrize("name", SKEWED)
+def test_a_skewed_map_is_no_noise(name: str, distinct: int, repeats: int) -> None:
+    j = SKEWED[name]
+    theta = np.repeat(np.linspace(-20.0, 20.0, distinct), repeats)
+    maps = [measure_map(theta, j(theta) + np.random.default_rng(k).normal(0.0, 0.3, theta.size)) for k in range(100)]
+    assert np.mean([[finding.code for finding in found.findings] == ["lack_of_fit"] for found in maps]) > 0.95
+    assert np.mean([found.noise_sd for found in maps]) == pytest.approx(0.3, rel=0.1 if repeats > 1 else 0.4)
+    assert np.median([found.curvature for found in maps]) == pytest.approx(-0.045, rel=0.45)
+    assert np.mean([abs(found.optimum) < 1.96 * found.optimum_stderr for found in maps]) > 0.9
+
+
+@pytest.mark.parametrize("repeats", [1, 4])
+def test_a_parabola_fits_at_the_rate_of_the_test(repeats: int) -> None:
+    theta = np.repeat(np.linspace(-20.0, 20.0, 11), repeats)
+    rng = np.random.default_rng(8)
+    maps = [measure_map(theta, 0.5 * BEND * theta**2 + rng.normal(0.0, SIGMA, theta.size)) for _ in range(400)]
+    assert np.mean([bool(found.findings) for found in maps]) < 0.025
+    narrow = next((found for found in maps if found.findings), None)
+    assert narrow is None or narrow.points < theta.size
+
+
+def test_a_peak_off_which_no_parabola_can_be_read_is_refused() -> None:
+    theta = np.repeat([0.0, 1.0, 2.0, 3.0, 4.0, 5.0], 3)
+    noise = np.tile([-0.01, 0.0, 0.01], 6)
+    with pytest.raises(DataError, match=r"bends up over theta in \[2, 5\], over the whole of it J is not a parabola"):
+        measure_map(theta, np.repeat([0.0, 8.0, 9.0, 9.5, 9.6, 10.5], 3) + noise)
 
 
 # --- the tuner ----------------------------------------------------------------------------------------------
