@@ -8,6 +8,7 @@ import numpy as np
 import pytest
 
 from mgdd.errors import ParameterError, ShapeError
+from mgdd.guide import Curve, CurveSeeking
 from mgdd.loop import EngineBench, LoopCriteria, monte_carlo, run_seeker
 from mgdd.loop.summary import summarize_cycles
 from mgdd.optimize import (
@@ -155,3 +156,29 @@ def test_tell_needs_a_measurement_or_a_misfire() -> None:
 def test_limits_and_lags_compare_by_value() -> None:
     assert Limit("p_max_bar", 95.0) == Limit("p_max_bar", 95.0) != Limit("p_max_bar", 96.0)
     assert ComponentLag(lag_cycles=2.0) == ComponentLag(lag_cycles=2.0) != ComponentLag()
+
+
+def test_what_is_not_given_is_none_and_no_number_stands_for_it() -> None:
+    curve = Curve.parabola(curvature=-0.06, best=0.0, reach=40.0)
+    assert CurveSeeking(curve=curve, **SPACE).settings["noise_sd"] is None
+    assert CurveSeeking(curve=curve, noise_sd=0.2, **SPACE).settings["noise_sd"] == 0.2
+    for wrong in (0.0, -0.2, float("nan")):
+        with pytest.raises(ParameterError, match="noise_sd"):
+            CurveSeeking(curve=curve, noise_sd=wrong, **SPACE)
+    for seeker in (ExtremumSeeking, BoundedSeeking, GradientDescent, Spsa):
+        assert seeker(**SPACE).settings["curvature"] is None
+        assert seeker(curvature=-0.01, **SPACE).settings["curvature"] == -0.01
+        with pytest.raises(ParameterError, match="curvature = nan"):
+            seeker(curvature=float("nan"), **SPACE)
+    assert ExtremumSeeking(period=12, **SPACE).settings["hold_cycles"] == 12
+    with pytest.raises(ParameterError, match="hold_cycles = -1"):
+        ExtremumSeeking(hold_cycles=-1, **SPACE)
+    for name in ("rms", "cycles", "distance", "arrival", "amplitude_max", "delay_uncertainty"):
+        with pytest.raises(ParameterError, match=f"{name} = nan"):
+            tune(0.25, -0.05, **{name: float("nan")})
+
+
+def test_the_advice_of_spsa_names_a_gain_that_meets_it() -> None:
+    with pytest.warns(UserWarning, match="a gain of 10 meets it"):
+        Spsa(schedule="constant", curvature=-0.1, **SPACE)
+    assert Spsa(schedule="constant", gain=10.0, curvature=-0.1, **SPACE).settings["gain"] == 10.0

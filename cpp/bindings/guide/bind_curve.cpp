@@ -90,7 +90,7 @@ void bind_curve_seeking(py::module_& m) {
                                positive_or_own("prior_sd", &S::prior_sd),
                                plain("scale_sd", &S::scale_sd),
                                plain("discrepancy", &S::discrepancy),
-                               or_none("noise_sd", &S::noise_sd, 0.0),
+                               plain("noise_sd", &S::noise_sd),
                                plain("memory_cycles", &S::memory_cycles),
                                positive_or_own("amplitude_max", &S::amplitude_max),
                                or_none("rate", &S::rate, inf),

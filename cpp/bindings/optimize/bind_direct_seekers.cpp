@@ -35,7 +35,7 @@ void bind_spsa(py::module_& m) {
                                plain("seed", &S::seed),
                                plain("maximize", &S::maximize),
                                plain("limits", &S::limits),
-                               or_none("curvature", &S::curvature, nan)};
+                               plain("curvature", &S::curvature)};
   const S standard;
   bind_settings<Spsa>(cls, "Spsa", standard, rows, py::arg("lower") = -inf, py::arg("upper") = inf);
   cls.def_property_readonly(
@@ -60,7 +60,7 @@ void bind_gradient_descent(py::module_& m) {
   const auto rows = std::tuple{plain("step_size", &S::step_size),   plain("difference", &S::difference),
                                per_input_or_none("rate", &S::rate), plain("tolerance", &S::tolerance),
                                plain("iterations", &S::iterations), plain("maximize", &S::maximize),
-                               plain("limits", &S::limits),         or_none("curvature", &S::curvature, nan)};
+                               plain("limits", &S::limits),         plain("curvature", &S::curvature)};
   const S standard;
   bind_settings<GradientDescent>(cls, "GradientDescent", standard, rows, py::arg("lower") = -inf,
                                  py::arg("upper") = inf);
@@ -112,12 +112,12 @@ void bind_tuner(py::module_& m) {
         w.curvature = curvature;
         w.lag = {delay_cycles, lag_cycles};
         w.compensated = compensated;
-        w.delay_uncertainty = delay_uncertainty.value_or(nan);
-        w.rms = rms.value_or(nan);
-        w.cycles = cycles.value_or(nan);
-        w.distance = distance.value_or(nan);
-        w.arrival = arrival.value_or(nan);
-        w.amplitude_max = amplitude_max.value_or(nan);
+        w.delay_uncertainty = delay_uncertainty;
+        w.rms = rms;
+        w.cycles = cycles;
+        w.distance = distance;
+        w.arrival = arrival;
+        w.amplitude_max = amplitude_max;
         const Tuning t = tune(w);
         py::dict out;
         out["method"] = std::string(to_string(t.method));

@@ -18,10 +18,9 @@ void bind_extremum_seeking(py::module_& m) {
       std::tuple{per_input("gain", &S::gain), per_input_or_none("rate", &S::rate),
                  per_input_or_none("recovery_rate", &S::recovery_rate), plain("washout_pole", &S::washout_pole),
                  plain("low_pass", &S::low_pass), or_default("components", &S::components),
-                 or_none("hold_cycles", &S::hold_cycles, -1), plain("amplitude_floor", &S::amplitude_floor),
+                 plain("hold_cycles", &S::hold_cycles), plain("amplitude_floor", &S::amplitude_floor),
                  plain("full_gradient", &S::full_gradient), plain("limit_amplitude", &S::limit_amplitude),
-                 plain("maximize", &S::maximize), plain("limits", &S::limits),
-                 or_none("curvature", &S::curvature, nan)});
+                 plain("maximize", &S::maximize), plain("limits", &S::limits), plain("curvature", &S::curvature)});
   const S standard;
   bind_settings<ExtremumSeeking>(cls, "ExtremumSeeking", standard, rows, py::arg("lower") = -inf,
                                  py::arg("upper") = inf);
@@ -60,9 +59,9 @@ void bind_bounded(py::module_& m) {
   using B = BoundSeeker<BoundedSeeking>;
   using S = BoundedSeekingSettings;
   py::class_<B> cls(m, "BoundedSeeking", "Bounded extremum seeking; see mgdd.optimize.BoundedSeeking.");
-  const auto rows = std::tuple_cat(dither_rows<S>(),
-                                   std::tuple{plain("kappa", &S::kappa), plain("maximize", &S::maximize),
-                                              plain("limits", &S::limits), or_none("curvature", &S::curvature, nan)});
+  const auto rows =
+      std::tuple_cat(dither_rows<S>(), std::tuple{plain("kappa", &S::kappa), plain("maximize", &S::maximize),
+                                                  plain("limits", &S::limits), plain("curvature", &S::curvature)});
   const S standard;
   bind_settings<BoundedSeeking>(cls, "BoundedSeeking", standard, rows, py::arg("lower") = -inf, py::arg("upper") = inf);
   bind_seeking(cls);

@@ -72,7 +72,7 @@ struct PositiveOrOwn : Row<Place> {
     if (given && !(*given > 0.0)) throw ParameterError(this->name, *given, "must be > 0");
     if (given) this->at(settings) = *given;
   }
-  double get(const Record& settings) const { return this->at(settings); }
+  Argument get(const Record& settings) const { return this->at(settings); }
 };
 template <class Place>
 PositiveOrOwn<Place> positive_or_own(const char* name, Place place) {

@@ -32,7 +32,7 @@ void validate(const CurveFilterSettings& s) {
   require_in(above(0.0, 1e12), "prior_sd", s.prior_sd);
   require_in(above(0.0, 10.0), "scale_sd", s.scale_sd);
   require_in(closed(0.0, 10.0), "discrepancy", s.discrepancy);
-  require_in(closed(0.0, 1e15), "noise_sd", s.noise_sd);
+  if (s.noise_sd) require_in(above(0.0, 1e15), "noise_sd", *s.noise_sd);
   require_in(closed(5.0, 1e9), "memory_cycles", s.memory_cycles);
   require_in(closed(0.0, 1e6), "lag_cycles", s.lag_cycles);
 }
@@ -76,9 +76,9 @@ void CurveFilter::believe(const Curve& curve, double sd) noexcept {
 }
 
 double CurveFilter::guessed_variance() const noexcept {
-  const double told = settings_.noise_sd;
+  if (settings_.noise_sd) return *settings_.noise_sd * *settings_.noise_sd;
   const double drop = 0.5 * bend_ * std::pow(curvature_reach * settings_.prior_sd, 2);
-  return told > 0.0 ? told * told : drop * drop;
+  return drop * drop;
 }
 
 void CurveFilter::fill_drops(double input, Column& drops) const noexcept {

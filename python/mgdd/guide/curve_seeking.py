@@ -33,7 +33,7 @@ class CurveSeeking(Seeker, _core.guide.CurveSeeking):
     discrepancy : float
         Error of the curve per unit of its drop: readings far from the best input count less [-].
     noise_sd : float, optional
-        Standard deviation of one reading [unit of J]; learnt without.
+        Standard deviation of one reading, > 0 [unit of J]; learnt without.
     memory_cycles : float
         Readings fade with this time constant; shorter follows a drift faster and costs more dither.
     amplitude_max : float, optional

@@ -29,7 +29,8 @@ class Spsa(Seeker, _core.optimize.Spsa):
     schedule : {"decreasing", "constant"}
         Decreasing gains settle; constant gains go on tracking.
     gain : float, optional
-        a [squared unit of the input per unit of J]; dimensionless in the second-order form. 20, or 3 there.
+        a [squared unit of the input per unit of J]; dimensionless in the second-order form. 20, or 3 there;
+        20 is for J in percent, J'' near -0.05: for another unit or curvature take 1/abs(J''), or `tune`.
     stability : float
         A, iterations, >= 0; a tenth of the expected number is usual.
     gain_exponent, perturbation_exponent : float
@@ -99,7 +100,8 @@ class GradientDescent(Seeker, _core.optimize.GradientDescent):
     lower, upper : float or array_like
         Bounds of the applied input, per input; infinite for none. The start must lie inside by `difference`.
     step_size : float
-        lambda_c, > 0 [squared unit of the input per unit of J].
+        lambda_c, > 0 [squared unit of the input per unit of J]. The default is for J in percent, J'' near -0.05;
+        1/abs(J'') is fastest.
     difference : float
         c, half the distance of the two measurements, in the unit of the input, > 0.
     rate : float or array_like, optional

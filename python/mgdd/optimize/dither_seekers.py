@@ -33,7 +33,8 @@ class ExtremumSeeking(Seeker, _core.optimize.ExtremumSeeking):
     harmonics : sequence of int, optional
         Oscillations per window, one per input, that do not mix (4, 5, 7 on a period of 40); [1] for one input.
     gain : float or array_like
-        Adaptation gain, per input [unit of the input per unit of J].
+        Adaptation gain, per input [unit of the input per unit of J]. The default is for J in percent, J'' near -0.05
+        per squared unit of the input: for another unit or curvature scale it by 0.05/abs(J''), or take it from `tune`.
     rate : float or array_like, optional
         Largest change of the estimate per cycle, per input; amplitude/period in batches (once per period) and
         3 amplitude/period otherwise.
@@ -116,7 +117,8 @@ class NewtonSeeking(Seeker, _core.optimize.NewtonSeeking):
     hessian_rate, riccati_rate : float
         Low-pass of the Hessian and rate of the Riccati filter, per cycle, in (0, 1] [-].
     initial_hessian : float or array_like
-        Diagonal to begin with, < 0 [unit of J per squared unit of the input].
+        Diagonal to begin with, < 0 [unit of J per squared unit of the input]. The defaults of this, of the inverse and
+        of its bound are for J in percent: for another unit scale them with J, and the latter two inversely.
     initial_inverse : float or array_like
         Diagonal of the inverse to begin with, < 0 [squared unit of the input per unit of J].
     largest_inverse : float
@@ -177,7 +179,8 @@ class BoundedSeeking(Seeker, _core.optimize.BoundedSeeking):
     harmonics : sequence of int, optional
         Oscillations per window, one per input; [1] for one input.
     kappa : float
-        Phase per unit of J, > 0 [rad per unit of J].
+        Phase per unit of J, > 0 [rad per unit of J]. The default is for J in percent, J'' near -0.05: for another unit
+        or curvature scale it by 0.05/abs(J'').
     maximize : bool
         False to minimise J.
     limits : sequence of Limit

@@ -321,7 +321,11 @@ TEST(ExtremumSeeking, RefusesSettingsByName) {
   EXPECT_NE(message([](auto& s) { s.washout_pole = 1.0; }).find("washout_pole = 1"), std::string::npos);
   EXPECT_NE(message([](auto& s) { s.low_pass = 0.0; }).find("low_pass = 0"), std::string::npos);
   EXPECT_NE(message([](auto& s) { s.amplitude_floor = 0.5; }).find("full_gradient = 0"), std::string::npos);
-  EXPECT_NE(message([](auto& s) { s.hold_cycles = -2; }).find("hold_cycles = -2"), std::string::npos);
+  for (const int cycles : {-1, -2}) {
+    EXPECT_NE(message([&](auto& s) { s.hold_cycles = cycles; }).find("hold_cycles = " + std::to_string(cycles)),
+              std::string::npos);
+  }
+  EXPECT_NE(message([](auto& s) { s.curvature = std::nan(""); }).find("curvature = nan"), std::string::npos);
   EXPECT_NE(message([](auto& s) { s.limit_amplitude = std::nan(""); }).find("limit_amplitude"), std::string::npos);
 }
 

@@ -52,7 +52,7 @@ TEST(OptimizeNumbers, DefaultsOfTheSeekers) {
   EXPECT_EQ(e.low_pass, 1.0);
   EXPECT_EQ(e.components, std::vector<ComponentLag>{ComponentLag{}});
   EXPECT_EQ(ComponentLag{}, (ComponentLag{0.0, 0.0}));
-  EXPECT_EQ(e.hold_cycles, -1);
+  EXPECT_FALSE(e.hold_cycles || e.curvature);
   EXPECT_EQ(e.amplitude_floor, 1.0);
   EXPECT_EQ(e.full_gradient, 0.0);
   EXPECT_EQ(e.limit_amplitude, 0.5);
@@ -98,6 +98,7 @@ TEST(OptimizeNumbers, DefaultsOfSpsaByForm) {
   EXPECT_EQ(s.perturbation_exponent, 0.101);
   EXPECT_EQ(s.averaging, 1);
   EXPECT_FALSE(s.blocking);
+  EXPECT_FALSE(s.gain || s.step_max || s.curvature);
   EXPECT_EQ(s.noise_sd, 0.0);
   EXPECT_EQ(s.initial_hessian, -0.051);
   EXPECT_EQ(s.hessian_prior, 20.0);
@@ -113,9 +114,9 @@ TEST(OptimizeNumbers, DefaultsOfSpsaByForm) {
   EXPECT_EQ(made(SpsaForm::first_order).gain, 20.0);
   EXPECT_EQ(made(SpsaForm::one_measurement).gain, 20.0);
   EXPECT_EQ(made(SpsaForm::second_order).gain, 3.0);
-  EXPECT_DOUBLE_EQ(made(SpsaForm::first_order).step_max, 1.2);
-  EXPECT_DOUBLE_EQ(made(SpsaForm::second_order).step_max, 1.2);
-  EXPECT_DOUBLE_EQ(made(SpsaForm::one_measurement).step_max, 0.18);
+  EXPECT_DOUBLE_EQ(*made(SpsaForm::first_order).step_max, 1.2);
+  EXPECT_DOUBLE_EQ(*made(SpsaForm::second_order).step_max, 1.2);
+  EXPECT_DOUBLE_EQ(*made(SpsaForm::one_measurement).step_max, 0.18);
 }
 
 TEST(OptimizeNumbers, DefaultsOfLearningAndOfAWish) {
@@ -140,8 +141,11 @@ TEST(OptimizeNumbers, DefaultsOfLearningAndOfAWish) {
   const TuningSpec w;
   EXPECT_EQ(w.method, TunedMethod::batch);
   EXPECT_TRUE(w.compensated);
-  for (const double open : {w.noise_sd, w.curvature, w.rms, w.cycles, w.distance, w.arrival, w.amplitude_max})
-    EXPECT_TRUE(std::isnan(open));
+  for (const double needed : {w.noise_sd, w.curvature})
+    EXPECT_TRUE(std::isnan(needed));
+  for (const std::optional<double> open :
+       {w.delay_uncertainty, w.rms, w.cycles, w.distance, w.arrival, w.amplitude_max})
+    EXPECT_FALSE(open.has_value());
 }
 
 TEST(OptimizeNumbers, NamesOfTheOptions) {

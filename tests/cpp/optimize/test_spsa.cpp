@@ -212,6 +212,8 @@ TEST(Spsa, RefusesAndAdvises) {
   refused([](auto& s) { s.initial_hessian = 0.0; });
   refused([](auto& s) { s.hessian_prior = 0.0; });
   refused([](auto& s) { s.step_max = -1.0; });
+  refused([](auto& s) { s.step_max = 0.0; });
+  refused([](auto& s) { s.gain = 0.0; });
   SpsaSettings s;
   s.schedule = GainSchedule::constant;
   s.gain = 30.0;
@@ -221,6 +223,9 @@ TEST(Spsa, RefusesAndAdvises) {
   EXPECT_NE(s.advice()[0].find("19.6"), std::string::npos) << s.advice()[0];
   s.gain = 19.0;
   EXPECT_TRUE(s.advice().empty());
+  s.gain.reset();  // the default of 20 is judged as if it were given, and the remedy is no gain of 0
+  ASSERT_EQ(s.advice().size(), 1u);
+  EXPECT_NE(s.advice()[0].find("a gain of 19.6"), std::string::npos) << s.advice()[0];
 }
 
 }  // namespace

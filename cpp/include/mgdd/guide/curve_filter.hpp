@@ -12,6 +12,7 @@
 #include <array>
 #include <cstddef>
 #include <cstdint>
+#include <optional>
 #include <string>
 
 #include "mgdd/common/state.hpp"
@@ -24,9 +25,10 @@ struct CurveFilterSettings {
   double prior_sd = 0.25;           ///< of T about the guide's best input, > 0, input unit
   double scale_sd = 0.3;            ///< of S about 1, > 0
   double discrepancy = 0.25;        ///< error of the curve per unit of its drop: far readings count less, >= 0
-  double noise_sd = 0.0;            ///< of one reading of J; 0 = not known: learnt from a guess that the curve suggests
-  double memory_cycles = 143.0;     ///< readings fade by exp(-1/memory), > 1
-  double lag_cycles = 0.0;          ///< time constant between the plant and J, >= 0
+  /// Of one reading of J, > 0; none: learnt from a guess that the curve suggests.
+  std::optional<double> noise_sd{};
+  double memory_cycles = 143.0;  ///< readings fade by exp(-1/memory), > 1
+  double lag_cycles = 0.0;       ///< time constant between the plant and J, >= 0
 };
 
 /// ParameterError naming field, value and bound.

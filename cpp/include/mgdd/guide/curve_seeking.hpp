@@ -9,6 +9,7 @@
 
 #include <cstdint>
 #include <limits>
+#include <optional>
 #include <vector>
 
 #include "mgdd/common/bounds.hpp"
@@ -30,7 +31,7 @@ struct CurveSeekingSettings {
   double prior_sd = 0.0;
   double scale_sd = 0.3;              ///< of the plant's curvature over the guide's, about 1
   double discrepancy = 0.25;          ///< error of the curve per unit of its drop
-  double noise_sd = 0.0;              ///< of one reading of J; 0 = learnt
+  std::optional<double> noise_sd{};   ///< of one reading of J, > 0; none: learnt
   double memory_cycles = 143.0;       ///< readings fade with this time constant
   double amplitude_max = 0.0;         ///< largest distance from the estimate that is applied; 0 = 0.25 prior_sd
   double rate = optimize::unlimited;  ///< largest change of the applied input per cycle

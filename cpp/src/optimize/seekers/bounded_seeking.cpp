@@ -16,6 +16,7 @@ BoundedSeekingSettings checked(BoundedSeekingSettings s) {
   validate(s.dither, n, false);
   validate(s.space, Inputs::Zero(n));
   require_positive("kappa", s.kappa);
+  validate_curvature(s.curvature);
   return s;
 }
 
@@ -23,11 +24,11 @@ BoundedSeekingSettings checked(BoundedSeekingSettings s) {
 
 std::vector<std::string> BoundedSeekingSettings::advice() const {
   std::vector<std::string> out;
-  if (!std::isfinite(curvature) || curvature == 0.0) return out;
+  if (!curvature) return out;
   for (Eigen::Index i = 0; i < dither.amplitude.size(); ++i) {
     const double a = dither.amplitude[i];
     const double omega = 2.0 * std::numbers::pi * dither.harmonics[static_cast<std::size_t>(i)] / dither.period;
-    const double bound = 1.0 / (a * a * omega * std::abs(curvature) * dither.period);  // tau = 2 periods
+    const double bound = 1.0 / (a * a * omega * std::abs(*curvature) * dither.period);  // tau = 2 periods
     if (!(kappa > bound)) continue;
     out.push_back("kappa = " + text(kappa) + " is above " + text(bound) +
                   ", the bound of averaging (tau of at least 2 periods); lower kappa or the amplitude");

@@ -49,10 +49,11 @@ ExtremumSeekingSettings checked(ExtremumSeekingSettings s) {
     throw ParameterError("full_gradient", s.full_gradient,
                          "must be > 0 where amplitude_floor is below 1: the slope at which the dither is full");
   }
-  if (s.hold_cycles < -1) {
-    throw ParameterError("hold_cycles", s.hold_cycles, "must be >= 0, or -1 for one window");
+  if (!s.hold_cycles) s.hold_cycles = s.dither.period;
+  if (*s.hold_cycles < 0) {
+    throw ParameterError("hold_cycles", *s.hold_cycles, "must be >= 0; leave it out for one window");
   }
-  if (s.hold_cycles == -1) s.hold_cycles = s.dither.period;
+  validate_curvature(s.curvature);
   return s;
 }
 
@@ -67,13 +68,13 @@ MeanRemoval parse_mean_removal(std::string_view name) {
 
 std::vector<std::string> ExtremumSeekingSettings::advice() const {
   std::vector<std::string> out;
-  if (!std::isfinite(curvature) || curvature == 0.0) return out;
+  if (!curvature || *curvature == 0.0) return out;
   const double windows = form == MeanRemoval::batch ? 1.0 : 2.0;  // a batch at tau = M steps straight to the optimum
   for (Eigen::Index i = 0; i < gain.size(); ++i) {
-    const double bound = 2.0 / (dither.amplitude[i] * std::abs(curvature) * windows * dither.period);
+    const double bound = 2.0 / (dither.amplitude[i] * std::abs(*curvature) * windows * dither.period);
     if (!(gain[i] > bound * (1.0 + 1e-12))) continue;
     out.push_back("gain = " + text(gain[i]) + " is above " + text(bound) + ", the bound of averaging: with it tau = " +
-                  text(2.0 / (gain[i] * dither.amplitude[i] * std::abs(curvature))) + " cycles is below " +
+                  text(2.0 / (gain[i] * dither.amplitude[i] * std::abs(*curvature))) + " cycles is below " +
                   text(windows * dither.period) + (windows > 1.0 ? " (two periods)" : " (one period)") +
                   "; lower the gain or the period");
   }
@@ -89,7 +90,7 @@ ExtremumSeeking::ExtremumSeeking(ExtremumSeekingSettings settings)
       applied_(estimate_),
       gradient_(Inputs::Zero(estimate_.size())),
       metric_(settings_.gain.cwiseProduct(settings_.dither.amplitude).asDiagonal()),
-      held_(settings_.hold_cycles),
+      held_(*settings_.hold_cycles),
       mean_(component_count(), 0.0),
       sum_(gradient_),
       smooth_(gradient_),
@@ -226,7 +227,7 @@ void ExtremumSeeking::end_of_window() noexcept {
 void ExtremumSeeking::restart() noexcept {
   seen_ = 0;
   phase_ = 0;
-  held_ = settings_.hold_cycles;
+  held_ = *settings_.hold_cycles;
   share_ = 1.0;
   smooth_.setZero();
   slow_.setZero();

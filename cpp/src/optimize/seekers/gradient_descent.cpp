@@ -15,6 +15,7 @@ GradientDescentSettings checked(GradientDescentSettings s) {
   const Eigen::Index n = s.space.size();
   require_positive("step_size", s.step_size);
   require_positive("difference", s.difference);
+  validate_curvature(s.curvature);
   validate(s.space, Inputs::Constant(n, s.difference));
   if (s.rate.size() == 0) s.rate = Inputs::Constant(n, unlimited);
   validate_entries("rate", s.rate, n, 0.0);
@@ -28,7 +29,8 @@ GradientDescentSettings checked(GradientDescentSettings s) {
 }  // namespace
 
 std::vector<std::string> GradientDescentSettings::advice() const {
-  const double bound = 2.0 / std::abs(curvature);
+  if (!curvature) return {};
+  const double bound = 2.0 / std::abs(*curvature);
   if (!(step_size >= bound)) return {};
   return {"step_size = " + text(step_size) + " is not below " + text(bound) +
           " = 2/|J''|, the bound of convergence; 1/|J''| is fastest"};

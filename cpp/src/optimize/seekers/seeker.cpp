@@ -75,6 +75,12 @@ void require_within_space(std::string_view column, const Inputs& values, const S
   }
 }
 
+void validate_curvature(std::optional<double> curvature) {
+  if (curvature && !std::isfinite(*curvature)) {
+    throw ParameterError("curvature", *curvature, "must be finite; leave it out where it is not known");
+  }
+}
+
 TellStatus Protocol::check(const Reading& reading, std::size_t components, std::size_t limits,
                            Eigen::Index inputs) const noexcept {
   if (!asked) return TellStatus::not_asked;

@@ -33,12 +33,12 @@ constexpr double perturbation_rate = 0.25;   // how fast the perturbation follow
 
 SpsaSettings checked(SpsaSettings s) {
   const bool second = s.form == SpsaForm::second_order;
-  if (s.gain == 0.0) s.gain = second ? 3.0 : 20.0;
+  s.gain = s.first_gain();
   require_positive("perturbation", s.perturbation);
-  if (s.step_max == 0.0)
-    s.step_max = s.form == SpsaForm::one_measurement ? s.perturbation / 5.0 : s.perturbation * 4.0 / 3.0;
-  require_positive("gain", s.gain);
-  if (!(s.step_max > 0.0)) throw ParameterError("step_max", s.step_max, "must be > 0");
+  if (!s.step_max) s.step_max = s.form == SpsaForm::one_measurement ? s.perturbation / 5.0 : s.perturbation * 4.0 / 3.0;
+  require_positive("gain", *s.gain);
+  if (!(*s.step_max > 0.0)) throw ParameterError("step_max", *s.step_max, "must be > 0");
+  validate_curvature(s.curvature);
   const Eigen::Index n = s.space.size();
   validate(s.space, Inputs::Constant(n, s.perturbation * (second ? 2.0 : 1.0)));
   if (!(s.stability >= 0.0 && std::isfinite(s.stability))) {
@@ -86,13 +86,19 @@ GainSchedule parse_gain_schedule(std::string_view name) {
   return parse_name<GainSchedule>(schedule_names, "schedule", name);
 }
 
+double SpsaSettings::first_gain() const noexcept {
+  return gain.value_or(form == SpsaForm::second_order ? 3.0 : 20.0);
+}
+
 std::vector<std::string> SpsaSettings::advice() const {
-  const double bend = form == SpsaForm::second_order ? 1.0 : std::abs(curvature);
-  const double first = gain == 0.0 ? (form == SpsaForm::second_order ? 3.0 : 20.0) : gain;
+  const bool second = form == SpsaForm::second_order;
+  if (!second && !curvature) return {};
+  const double bend = second ? 1.0 : std::abs(*curvature);
+  const double first = first_gain();
   const double now = schedule == GainSchedule::constant ? first : first / std::pow(1.0 + stability, gain_exponent);
   if (!(now * bend > 1.0)) return {};
   return {"gain: the first step factor a_0 |J''| = " + text(now * bend) +
-          " is above 1, the bound beyond which every step overshoots; a gain of " + text(gain / (now * bend)) +
+          " is above 1, the bound beyond which every step overshoots; a gain of " + text(first / (now * bend)) +
           " meets it"};
 }
 
@@ -129,8 +135,8 @@ int Spsa::measurements_per_iteration() const noexcept {
 }
 
 double Spsa::gain_now() const noexcept {
-  if (settings_.schedule == GainSchedule::constant) return settings_.gain;
-  return settings_.gain /
+  if (settings_.schedule == GainSchedule::constant) return *settings_.gain;
+  return *settings_.gain /
          std::pow(static_cast<double>(iteration_) + 1.0 + settings_.stability, settings_.gain_exponent);
 }
 
@@ -268,7 +274,7 @@ void Spsa::finish_iteration() noexcept {
     if (!settings_.limits.empty()) metric_ = bent.solve(InputMatrix::Identity(direction.size(), direction.size()));
   }
   Inputs step = gain_now() * share_ * share_ * direction;
-  const Inputs most = Inputs::Constant(step.size(), settings_.step_max);
+  const Inputs most = Inputs::Constant(step.size(), *settings_.step_max);
   const Inputs reach = Inputs::Constant(step.size(), perturbation_now() * (second ? 2.0 : 1.0));
   const Inputs widest = Inputs::Constant(step.size(), settings_.perturbation * (second ? 2.0 : 1.0));
   step = filter_.project(estimate_, step, {settings_.space, widest, reach, most, most, metric_});

@@ -26,30 +26,42 @@ constexpr double slow_periods = 6.0;    // per cycle by which the echo comes lat
 constexpr double delay_doubt = 0.2, delay_doubt_least = 2.0;  // share of D + tau, and cycles
 constexpr double delays_per_tau = 3.0;  // an integrator with delay D is well damped for tau >= 3 D
 
-TuningSpec filled(TuningSpec w) {
-  const auto positive = [](std::string_view name, double value, std::string_view remedy) {
-    if (!(value > 0.0 && std::isfinite(value))) {
-      throw ParameterError(name, value, "must be > 0" + std::string(remedy));
-    }
-  };
-  positive("noise_sd", w.noise_sd, "; repeat one set-point some twenty times and take the standard deviation of J");
-  w.curvature = std::abs(w.curvature);
-  positive("|curvature|", w.curvature, "; measure J at three timings or more and fit a parabola");
-  validate(std::vector<ComponentLag>{w.lag});
-  const double length = std::sqrt(w.noise_sd / w.curvature);
-  const auto fill = [&](std::string_view name, double& value, double otherwise) {
-    if (std::isnan(value)) value = otherwise;
-    positive(name, value, "");
-  };
-  fill("rms", w.rms, default_rms * length);
-  fill("distance", w.distance, default_distance * length);
-  fill("arrival", w.arrival, default_arrival * length);
-  fill("amplitude_max", w.amplitude_max, default_amplitude_max * length);
-  if (!std::isnan(w.cycles)) positive("cycles", w.cycles, "");
-  const double whole_lag = w.lag.delay_cycles + w.lag.lag_cycles;
-  if (std::isnan(w.delay_uncertainty)) {
-    w.delay_uncertainty = whole_lag > 0.0 ? std::max(delay_doubt * whole_lag, delay_doubt_least) : 0.0;
-  }
+/// A specification with what was left open filled in; only `cycles` waits for the method.
+struct Filled {
+  TunedMethod method;
+  double noise_sd, curvature;
+  ComponentLag lag;
+  bool compensated;
+  double delay_uncertainty, rms, distance, arrival, amplitude_max;
+  std::optional<double> cycles;
+};
+
+double positive(std::string_view name, double value, std::string_view remedy = "") {
+  if (value > 0.0 && std::isfinite(value)) return value;
+  throw ParameterError(name, value, "must be > 0" + std::string(remedy));
+}
+
+Filled filled(const TuningSpec& s) {
+  const double noise =
+      positive("noise_sd", s.noise_sd, "; repeat one set-point some twenty times and take the standard deviation of J");
+  const double bend =
+      positive("|curvature|", std::abs(s.curvature), "; measure J at three timings or more and fit a parabola");
+  validate(std::vector<ComponentLag>{s.lag});
+  const double length = std::sqrt(noise / bend);
+  const double whole_lag = s.lag.delay_cycles + s.lag.lag_cycles;
+  const double doubt = whole_lag > 0.0 ? std::max(delay_doubt * whole_lag, delay_doubt_least) : 0.0;
+  const Filled w{.method = s.method,
+                 .noise_sd = noise,
+                 .curvature = bend,
+                 .lag = s.lag,
+                 .compensated = s.compensated,
+                 .delay_uncertainty = s.delay_uncertainty.value_or(doubt),
+                 .rms = positive("rms", s.rms.value_or(default_rms * length)),
+                 .distance = positive("distance", s.distance.value_or(default_distance * length)),
+                 .arrival = positive("arrival", s.arrival.value_or(default_arrival * length)),
+                 .amplitude_max = positive("amplitude_max", s.amplitude_max.value_or(default_amplitude_max * length)),
+                 .cycles = s.cycles};
+  if (w.cycles) positive("cycles", *w.cycles);
   if (!(w.delay_uncertainty >= 0.0 && std::isfinite(w.delay_uncertainty))) {
     throw ParameterError("delay_uncertainty", w.delay_uncertainty,
                          "must be >= 0 and finite; 0 for a delay known exactly");
@@ -60,7 +72,7 @@ TuningSpec filled(TuningSpec w) {
   return w;
 }
 
-Tuning tune_spsa(const TuningSpec& w) {
+Tuning tune_spsa(const Filled& w) {
   Tuning t;
   t.method = TunedMethod::spsa;
   t.period = 2;
@@ -70,7 +82,7 @@ Tuning tune_spsa(const TuningSpec& w) {
         ParameterError("method = 'spsa': takes a measurement without delay and lag; hold each set-point until the "
                        "sensor has settled, or use 'batch'"));
   }
-  const double wished = std::isnan(w.cycles) ? default_cycles : w.cycles;
+  const double wished = w.cycles.value_or(default_cycles);
   const double ratio = w.arrival / w.distance;
   const double q = std::min(0.5, 1.0 - std::pow(ratio, 2.0 / (reserve * wished)));
   const auto rms_at = [&](double c, double rate) {
@@ -90,7 +102,7 @@ Tuning tune_spsa(const TuningSpec& w) {
   return t;
 }
 
-Tuning tune_dither(const TuningSpec& w) {
+Tuning tune_dither(const Filled& w) {
   const bool batch = w.method == TunedMethod::batch;
   if (!batch && !w.compensated && (w.lag.delay_cycles > 0.0 || w.lag.lag_cycles > 0.0)) {
     throw about("method",
@@ -119,8 +131,7 @@ Tuning tune_dither(const TuningSpec& w) {
   const double tau_least =
       std::max((lagged && w.compensated ? 4.0 : 2.0) * period, delays_per_tau * (whole_lag + w.delay_uncertainty));
   const double decades = std::log(w.distance / w.arrival);
-  const double wished =
-      std::isnan(w.cycles) ? std::max(default_cycles, (period + tau_least * decades) / reserve) : w.cycles;
+  const double wished = w.cycles.value_or(std::max(default_cycles, (period + tau_least * decades) / reserve));
   const double tau_wished = (reserve * wished - period) / decades;
   const auto rms_at = [&](double amplitude, double tau) {
     const double stepping = batch ? std::sqrt(1.0 - period / (2.0 * tau)) : 1.0;
@@ -154,7 +165,7 @@ TunedMethod parse_tuned_method(std::string_view name) {
 }
 
 Tuning tune(const TuningSpec& spec) {
-  const TuningSpec w = filled(spec);
+  const Filled w = filled(spec);
   Tuning t = w.method == TunedMethod::spsa ? tune_spsa(w) : tune_dither(w);
   t.jitter_cost = 0.5 * w.curvature * t.rms * t.rms;
   if (t.rms > w.rms * (1.0 + 1e-9)) {

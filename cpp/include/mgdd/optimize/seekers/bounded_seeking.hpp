@@ -5,6 +5,7 @@
 // ask and tell are noexcept and allocation-free.
 #pragma once
 
+#include <optional>
 #include <string>
 #include <vector>
 
@@ -21,7 +22,7 @@ struct BoundedSeekingSettings {
   double kappa = 1.0;     ///< phase per unit of J [rad], > 0
   bool maximize = true;
   std::vector<Limit> limits;
-  double curvature = std::numeric_limits<double>::quiet_NaN();  ///< J'' if known
+  std::optional<double> curvature{};  ///< J'' if known
 
   std::vector<std::string> advice() const;
 };

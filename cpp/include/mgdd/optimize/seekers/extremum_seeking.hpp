@@ -5,7 +5,7 @@
 // ask and tell are noexcept and allocation-free.
 #pragma once
 
-#include <limits>
+#include <optional>
 #include <string>
 #include <string_view>
 #include <vector>
@@ -31,7 +31,7 @@ struct ExtremumSeekingSettings {
   double washout_pole = 0.9;  ///< h of (z - 1)/(z - h)
   double low_pass = 1.0;      ///< b of y += b (x - y) after demodulation; 1 = off
   std::vector<ComponentLag> components{ComponentLag{}};
-  int hold_cycles = -1;  ///< estimate held at the start and after `restart`; -1 = one window
+  std::optional<int> hold_cycles{};  ///< estimate held at the start and after `restart`; none: one window
 
   /// Vanishing dither: A shrinks to this share of the amplitude where |J'| is below `full_gradient`; 1 = off.
   double amplitude_floor = 1.0;
@@ -39,7 +39,7 @@ struct ExtremumSeekingSettings {
   double limit_amplitude = 0.5;  ///< share of the amplitude while a limit holds the estimate back
   bool maximize = true;
   std::vector<Limit> limits;
-  double curvature = std::numeric_limits<double>::quiet_NaN();  ///< J'' if known: lets `advice` judge the gain
+  std::optional<double> curvature{};  ///< J'' if known: lets `advice` judge the gain
 
   /// What averaging theory says against these settings, in sentences; empty if nothing (or J'' is not known).
   std::vector<std::string> advice() const;

@@ -4,6 +4,7 @@
 // allocation-free.
 #pragma once
 
+#include <optional>
 #include <string>
 #include <vector>
 
@@ -22,7 +23,7 @@ struct GradientDescentSettings {
   std::int64_t iterations = 60;  ///< steps after which an unconverged search says so; it goes on all the same
   bool maximize = true;
   std::vector<Limit> limits;
-  double curvature = std::numeric_limits<double>::quiet_NaN();  ///< J'' if known
+  std::optional<double> curvature{};  ///< J'' if known
 
   std::vector<std::string> advice() const;
 };

@@ -7,6 +7,7 @@
 #include <cstddef>
 #include <cstdint>
 #include <limits>
+#include <optional>
 #include <span>
 #include <string_view>
 
@@ -43,6 +44,9 @@ void validate(const SearchSpace& space, const Inputs& reach);
 /// ShapeError unless `values` has one entry per input, ParameterError unless each is inside (lower, upper].
 void validate_entries(std::string_view name, const Inputs& values, Eigen::Index inputs, double lower,
                       double upper = unlimited);
+
+/// ParameterError for a curvature that is given and not finite.
+void validate_curvature(std::optional<double> curvature);
 
 /// What one cycle returned. Components of J add up to it; a misfired cycle's numbers are not read, all others must
 /// satisfy `is_reading`.

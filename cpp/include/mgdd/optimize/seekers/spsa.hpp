@@ -5,7 +5,7 @@
 #pragma once
 
 #include <cstdint>
-#include <limits>
+#include <optional>
 #include <string>
 #include <string_view>
 #include <vector>
@@ -30,13 +30,13 @@ struct SpsaSettings {
   SearchSpace space;
   SpsaForm form = SpsaForm::first_order;
   GainSchedule schedule = GainSchedule::decreasing;
-  double gain =
-      0.0;  ///< a, squared input unit per unit of J (second order: dimensionless); 0 = 20, or 3 for the latter
+  /// a, squared input unit per unit of J (second order: dimensionless); none: 20, or 3 for the latter
+  std::optional<double> gain{};
   double stability = 50.0;               ///< A
   double gain_exponent = 0.602;          ///< alpha
   double perturbation = 1.5;             ///< c in input units, > 0
   double perturbation_exponent = 0.101;  ///< gamma
-  double step_max = 0.0;                 ///< largest change per iteration and input; 0 = 4/3 c, one measurement: c/5
+  std::optional<double> step_max{};      ///< largest change per iteration and input; none: 4/3 c, one measurement c/5
   int averaging = 1;                     ///< gradients per iteration
   bool blocking =
       false;  ///< accept a step only if J there is not below its mean around the old estimate less 2 noise_sd
@@ -47,8 +47,9 @@ struct SpsaSettings {
   std::uint64_t seed = 0;
   bool maximize = true;
   std::vector<Limit> limits;
-  double curvature = std::numeric_limits<double>::quiet_NaN();  ///< J'' if known
+  std::optional<double> curvature{};  ///< J'' if known
 
+  double first_gain() const noexcept;  ///< `gain`, or its default where there is none
   std::vector<std::string> advice() const;
 };
 

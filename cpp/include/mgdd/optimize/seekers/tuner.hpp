@@ -10,6 +10,7 @@
 #pragma once
 
 #include <limits>
+#include <optional>
 #include <string>
 #include <string_view>
 #include <vector>
@@ -28,13 +29,13 @@ struct TuningSpec {
   double curvature = std::numeric_limits<double>::quiet_NaN();  ///< J'' at the optimum; its sign is not used
   ComponentLag lag{};                                           ///< between plant and J
   bool compensated = true;  ///< the seeker knows the lag and turns its demodulation back
-  // NaN: left open.
-  double delay_uncertainty = std::numeric_limits<double>::quiet_NaN();  ///< cycles, u; a fifth of D + tau, 2 at least
-  double rms = std::numeric_limits<double>::quiet_NaN();                ///< of the estimate at the end; 0.2 L
-  double cycles = std::numeric_limits<double>::quiet_NaN();             ///< to arrive; 50, more where a lag asks for it
-  double distance = std::numeric_limits<double>::quiet_NaN();           ///< e0, at the start; 5 L
-  double arrival = std::numeric_limits<double>::quiet_NaN();            ///< eps, what counts as arrived; 0.45 L
-  double amplitude_max = std::numeric_limits<double>::quiet_NaN();      ///< 1.8 L
+  // None: left open.
+  std::optional<double> delay_uncertainty{};  ///< cycles, u; a fifth of D + tau, 2 at least
+  std::optional<double> rms{};                ///< of the estimate at the end; 0.2 L
+  std::optional<double> cycles{};             ///< to arrive; 50, more where a lag asks for it
+  std::optional<double> distance{};           ///< e0, at the start; 5 L
+  std::optional<double> arrival{};            ///< eps, what counts as arrived; 0.45 L
+  std::optional<double> amplitude_max{};      ///< 1.8 L
 };
 
 struct Tuning {
