@@ -13,7 +13,7 @@ from typing import Any
 
 from mgdd.errors import Error, ParameterError, did_you_mean
 
-__all__ = ["refusal", "shown"]
+__all__ = ["refusal", "require_plain", "shown", "unit_refusal"]
 
 _NUMBERS, _NUMBER, _WHOLE = "ArrayLike", "SupportsFloat", "SupportsInt"
 _NAMED = {
@@ -29,6 +29,8 @@ _NAMED = {
     "Callable": "a function",
     "Buffer": "bytes",
 }
+_BOUND = "plain, without a unit"
+_PLAIN = "give the magnitude in the unit of the name, as in soc.to('degree').magnitude"
 _MAKE = {
     "Cylinder": "mgdd.presets.load(name).cylinder is one",
     "OperatingPoint": "mgdd.presets.load(name).point is one",
@@ -82,6 +84,8 @@ def refusal(
     last = [(argument, value) for place, argument, value in culprits if place == furthest]
     argument, value = last[0]
     bound_text = " or ".join(dict.fromkeys(_said(each.kind) for each, _ in last))
+    if has_units(value):
+        bound_text = _BOUND
     remedy = _remedy(argument, value)
     return ParameterError(
         f"{argument.name} = {shown(value)}: must be {bound_text}{remedy}",
@@ -89,6 +93,22 @@ def refusal(
         value=value,
         bound=bound_text,
     )
+
+
+def unit_refusal(
+    name: str, signatures: Sequence[str], given: Sequence[Any], keywords: Mapping[str, Any], method: bool = False
+) -> ParameterError | None:
+    """Say which number carries a unit where a plain one is wanted; None where none does. Arguments as for `refusal`."""
+    error = refusal(name, signatures, given, keywords, method)
+    return error if isinstance(error, ParameterError) else None
+
+
+def has_units(value: Any) -> bool:
+    """Whether a value, or an entry of a list or tuple, carries a unit, as those of pint, astropy and unyt do."""
+    if isinstance(value, list | tuple):
+        return any(has_units(each) for each in value)
+    kind = type(value)
+    return hasattr(kind, "to") and any(hasattr(kind, each) for each in ("dimensionality", "unit", "units"))
 
 
 def _arguments(signature: str, function: str) -> list[_Argument]:
@@ -184,7 +204,7 @@ def _fits(kind: ast.expr, value: Any) -> bool:
 
 def _fits_name(name: str, value: Any) -> bool:
     if name in ("Any", "object", ""):
-        return True
+        return not has_units(value)
     if name in (_NUMBER, _WHOLE, "SupportsIndex"):
         return _is_number(value, whole=name != _NUMBER)
     if name == _NUMBERS:
@@ -201,7 +221,7 @@ def _fits_name(name: str, value: Any) -> bool:
 
 
 def _is_number(value: Any, *, whole: bool) -> bool:
-    if isinstance(value, str | bytes) or getattr(value, "ndim", 0) != 0:
+    if isinstance(value, str | bytes) or getattr(value, "ndim", 0) != 0 or has_units(value):
         return False
     try:
         operator.index(value) if whole else float(value)
@@ -213,6 +233,8 @@ def _is_number(value: Any, *, whole: bool) -> bool:
 def _is_numbers(value: Any) -> bool:
     import numpy as np
 
+    if has_units(value):
+        return False
     try:
         np.asarray(value, np.float64)
     except (TypeError, ValueError):
@@ -253,6 +275,8 @@ def _plural(kind: ast.expr) -> str:
 
 def _remedy(argument: _Argument, value: Any) -> str:
     """Say what to do, where what was given tells."""
+    if has_units(value):
+        return f"; {_PLAIN}"
     for name in dict.fromkeys((argument.name, *(_name(choice).lower() for choice in _choices(argument.kind)))):
         try:
             part = getattr(value, name, None)
@@ -264,6 +288,14 @@ def _remedy(argument: _Argument, value: Any) -> str:
     if _NUMBER in names or _WHOLE in names:
         return "; call once per value" if _is_sequence(value) or bool(getattr(value, "ndim", 0)) else ""
     return next((f"; {_MAKE[name]}" for name in names if name in _MAKE), "")
+
+
+def require_plain(name: str, value: Any) -> None:
+    """Refuse a number, or numbers, with a unit: numpy would drop it, and read degrees as radians."""
+    if has_units(value):
+        raise ParameterError(
+            f"{name} = {shown(value)}: must be {_BOUND}; {_PLAIN}", field=name, value=value, bound=_BOUND
+        )
 
 
 def shown(value: Any) -> str:

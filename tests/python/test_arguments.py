@@ -8,12 +8,23 @@ from collections.abc import Callable, Iterator
 from typing import Any
 
 import numpy as np
+import pint
 import pytest
 
 from mgdd import _core, presets
 from mgdd._arguments import refusal
-from mgdd.engine import Cylinder, NoxModel, NoxProxy, OperatingPoint, Performance, PerformanceTerm
+from mgdd.engine import (
+    Cylinder,
+    NoxModel,
+    NoxProxy,
+    OperatingPoint,
+    Performance,
+    PerformanceTerm,
+    find_optimum,
+    simulate,
+)
 from mgdd.errors import Error, ParameterError
+from mgdd.guide import Curve
 from mgdd.loop import EngineBench, SensorDynamics, monte_carlo, run_seeker
 from mgdd.optimize import ExtremumSeeking, Limit, Spsa
 from mgdd.throttle import SensorPair, Throttle
@@ -139,3 +150,25 @@ def test_overloads_that_fail_at_the_same_argument_are_named_together() -> None:
     unknown = refusal("f", ["(a: object) -> None"], (1,), {})
     assert isinstance(unknown, TypeError)
     assert str(unknown) == "f() does not take these arguments: it is f(a: object) -> None"
+
+
+@pytest.mark.parametrize("soc", ["scalar", "array", "list"])
+def test_numbers_that_carry_a_unit_are_refused_and_not_read_as_radians(soc: str) -> None:
+    """Of pint -6 degree is the number -0.105."""
+    quantity = pint.UnitRegistry()
+    given = {
+        "scalar": -6 * quantity.degree,
+        "array": np.array([-6.0, -3.0]) * quantity.degree,
+        "list": [-6 * quantity.degree],
+    }[soc]
+    with pytest.raises(ParameterError, match=r"soc_cad = .*magnitude"):
+        simulate(PRESET.cylinder, PRESET.point, soc_cad=given)
+    with pytest.raises(ParameterError, match=r"magnitude"):
+        find_optimum(PRESET.cylinder, PRESET.point, bounds_cad=(-20 * quantity.degree, 5 * quantity.degree))
+    with pytest.raises(ParameterError, match=r"start = .*magnitude"):
+        ExtremumSeeking(start=given, lower=-30.0, upper=10.0)
+    with pytest.raises(ParameterError, match=r"limp_home_deg = .*magnitude"):
+        Throttle(limp_home_deg=7 * quantity.degree)
+    curve = Curve.parabola(curvature=-0.05, best=3.0, reach=60.0)
+    with pytest.raises(ParameterError, match=r"inputs = .*magnitude"):
+        curve(given)

@@ -8,6 +8,7 @@ from collections.abc import Callable, Iterable, Mapping, Sequence
 import numpy as np
 
 from mgdd import _core
+from mgdd._arguments import require_plain
 from mgdd._core.engine import Cylinder, OperatingPoint
 from mgdd._core.optimize import Limit
 from mgdd.errors import ConvergenceError, ParameterError
@@ -73,6 +74,7 @@ def find_optimum(
     >>> round(best["soc_cad"], 2), best.active_limits
     (-3.08, ('p_max_bar',))
     """
+    require_plain("bounds_cad", bounds_cad)
     kept = limits_of(limits)
     caps = {limit.name: limit.upper - limit.margin for limit in kept}
     low, high = bounds_cad or (max(DEFAULT_CAD[0], cylinder.ivc_cad), min(DEFAULT_CAD[1], cylinder.evo_cad - 1.0))

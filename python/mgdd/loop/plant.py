@@ -7,6 +7,7 @@ from collections.abc import Mapping
 from dataclasses import dataclass, field
 from typing import TYPE_CHECKING, Protocol, runtime_checkable
 
+from mgdd._arguments import require_plain
 from mgdd.errors import ParameterError
 from mgdd.results.describe import described
 
@@ -151,6 +152,7 @@ def checked_inputs(inputs: Mapping[str, float], names: tuple[str, ...]) -> tuple
     if set(inputs) != set(names):
         raise ParameterError(f"inputs = {', '.join(map(str, inputs)) or 'none'}: must be {', '.join(names)}")
     for name in names:
+        require_plain(name, inputs[name])
         if not math.isfinite(inputs[name]):
             raise ParameterError.of(name, inputs[name], "finite")
     return tuple(float(inputs[name]) for name in names)

@@ -7,6 +7,7 @@ from typing import TYPE_CHECKING, Any, Protocol
 import numpy as np
 
 from mgdd import _core
+from mgdd._arguments import require_plain
 from mgdd.errors import ParameterError
 from mgdd.loop.reference import Reference
 from mgdd.loop.virtual_throttle import VirtualThrottle
@@ -197,6 +198,7 @@ def column_of(name: str, given: ArrayLike | None, n: int) -> NDArray[np.float64]
     """Give a column of n samples from one number or from a column; empty for None."""
     if given is None:
         return np.empty(0)
+    require_plain(name, given)
     column = np.asarray(given, float)
     if column.ndim > 1:
         raise ParameterError.of(name, f"an array of shape {column.shape}", "one number or one per sample")

@@ -10,6 +10,7 @@ from typing import TYPE_CHECKING, Any, ClassVar, NamedTuple
 
 import numpy as np
 
+from mgdd._arguments import require_plain
 from mgdd.errors import DataError, ParameterError, ShapeError
 from mgdd.results.labels import VARIABLES, Label, labelled_dataset
 from mgdd.signals.even_grid import even_step
@@ -147,6 +148,7 @@ def columns_of(table: Any, names: Sequence[str], *, what: str = "inputs", least:
     for name in names:
         if name not in table:
             raise DataError(f"{what} have no {name}: needed are {', '.join(names)}")
+        require_plain(name, table[name])
         columns.append(np.asarray(table[name], dtype=np.float64))
     shapes = [column.shape for column in columns]
     if columns[0].ndim != 1 or columns[0].size < least or set(shapes) != {shapes[0]}:
