@@ -96,6 +96,7 @@ void bind_curve_seeking(py::module_& m) {
                                or_none("rate", &S::rate, inf),
                                plain("delay_cycles", Path{&S::sensor, &ComponentLag::delay_cycles}),
                                plain("lag_cycles", Path{&S::sensor, &ComponentLag::lag_cycles}),
+                               plain("delay_uncertainty", &S::delay_uncertainty),
                                plain("hand_over", &S::hand_over),
                                plain("maximize", &S::maximize),
                                plain("limits", &S::limits),
@@ -119,6 +120,12 @@ void bind_curve_seeking(py::module_& m) {
           "Between 0 and 1: how much of what the curve leaves unexplained is noise; 0 after a hand-over.")
       .def_property_readonly(
           "doubts", [](const B& b) { return b.use()->seeker().doubts(); }, "How often the readings were doubted.")
+      .def_property_readonly(
+          "delay_cycles", [](const B& b) { return b.use()->seeker().delay_cycles(); },
+          "Whole cycles between input and reading that explain the readings best.")
+      .def_property_readonly(
+          "answered", [](const B& b) { return b.use()->seeker().answered(); },
+          "False where 60 readings and more have not shown that J answers the input: the estimate is the guide's.")
       .def_property_readonly(
           "handed_over", [](const B& b) { return b.use()->seeker().handed_over(); },
           "Whether plain extremum seeking is at work, because the guide kept failing.");

@@ -14,14 +14,22 @@ struct Shape {
   double log_prior;
 };
 constexpr double steep = 0.35, rare = -3.0;  // a cliff on one side: one chance in twenty before any reading
-constexpr std::array<Shape, CurveFilter::shapes> shape_table{{{1.0, 1.0, 0.0}, {steep, 1.0, rare}, {1.0, steep, rare}}};
+constexpr std::array<Shape, CurveBank::shapes> shape_table{{{1.0, 1.0, 0.0}, {steep, 1.0, rare}, {1.0, steep, rare}}};
 
 constexpr double curvature_reach = 0.3;  // of the prior's sd: second differences and the guess of the noise
-constexpr double guess_counts = 4.0;     // readings that the first guess of the noise is worth
-constexpr double least_scale = 0.1;      // a curve flatter than this, or upside down, is hardly believed
-constexpr double scale_penalty = 1500.0;
-// Of the variance that fading leaves: closed loops read more than their dither does. Makes the stated 95 % hold.
-constexpr double calibrated = 0.5;
+
+// The first is that of every delay.
+struct Assumption {
+  double memory_share, drift, slope, prior;
+};
+constexpr std::array<Assumption, 4> assumptions{
+    {{1.0, 2e-4, 0.03, 0.8}, {1.0, 0.05, 0.0, 0.05}, {0.25, 0.01, 0.1, 0.1}, {0.1, 0.05, 0.0, 0.05}}};
+constexpr double shortest_memory = 8.0;
+constexpr double little = 0.03;  // weight of a bank whose posterior follows its readings only now and then
+constexpr std::int64_t early = 40, seldom = 8;
+constexpr double told_prior = 0.5;  // probability that the delay is as told
+constexpr double change = 0.0001;   // ... that another one is right from one cycle to the next
+constexpr double assumption_change = 0.01;
 
 }  // namespace
 
@@ -37,14 +45,32 @@ void validate(const CurveFilterSettings& s) {
   require_in(closed(0.0, 1e6), "lag_cycles", s.lag_cycles);
 }
 
-CurveFilter::CurveFilter(const CurveFilterSettings& settings, const Curve& curve) noexcept
+CurveFilter::CurveFilter(const CurveFilterSettings& settings, const Curve& curve)
     : settings_(settings),
       per_lag_(settings.lag_cycles > 0.0 ? -std::expm1(-1.0 / settings.lag_cycles) : 1.0),
-      fading_(std::exp(-1.0 / settings.memory_cycles)) {
-  for (Column& sum : sums_)
-    sum.setZero();
-  for (Column& drops : recent_drops_)
-    drops.setZero();
+      fading_(std::exp(-1.0 / settings.memory_cycles)),
+      delays_(static_cast<std::size_t>(settings.earlier + settings.later) + 1),
+      ring_(delays_ + recent, Column::Zero()),
+      delay_weights_(delays_),
+      assumption_weights_(assumptions.size()),
+      leader_(settings.earlier) {
+  lagged_.setZero();
+  for (std::size_t d = 0; d < delays_; ++d) {
+    banks_.emplace_back(CurveBank::Assumed{settings.memory_cycles, assumptions[0].drift, assumptions[0].slope});
+    delay_weights_[d] = delays_ == 1 ? 1.0 : (1.0 - told_prior) / static_cast<double>(delays_ - 1);
+  }
+  if (delays_ > 1) delay_weights_[leader()] = told_prior;
+  for (std::size_t i = 1; i < assumptions.size(); ++i) {
+    const double memory = std::max(shortest_memory, assumptions[i].memory_share * settings.memory_cycles);
+    banks_.emplace_back(CurveBank::Assumed{memory, assumptions[i].drift, assumptions[i].slope});
+  }
+  prior_.first = settings.lower;
+  prior_.step = (settings.upper - settings.lower) / (places - 1);
+  for (int i = 0; i < places; ++i)
+    prior_.place[i] = prior_.step * i;
+  prior_.scale_sd = settings.scale_sd;
+  prior_.discrepancy = settings.discrepancy;
+  prior_.noise_told = settings.noise_sd.has_value();
   restart(curve, curve.best(), settings.prior_sd);
 }
 
@@ -53,26 +79,40 @@ void CurveFilter::expect(const Curve& curve, double mean, double sd) noexcept {
   bend_ = curve.curvature(curvature_reach * settings_.prior_sd);
   prior_mean_ = mean;
   prior_extra_ = std::max(0.0, 1.0 / (sd * sd) - 1.0 / (settings_.prior_sd * settings_.prior_sd));
+  prior_.noise_variance = guessed_variance();
+  place_prior();
 }
 
-double CurveFilter::prior_precision() const noexcept {
-  return 1.0 / (settings_.prior_sd * settings_.prior_sd) + prior_extra_;
+void CurveFilter::place_prior() noexcept {
+  prior_.precision = 1.0 / (settings_.prior_sd * settings_.prior_sd) + prior_extra_;
+  for (std::size_t s = 0; s < shape_table.size(); ++s) {
+    for (int i = 0; i < places; ++i) {
+      const double away = prior_.first + prior_.step * i - prior_mean_;
+      prior_.log_of[static_cast<Eigen::Index>(s) * places + i] =
+          shape_table[s].log_prior - 0.5 * away * away * prior_.precision;
+    }
+  }
+  prior_.mass_of = prior_.log_of.exp();
+  prior_.mass = prior_.mass_of.sum();
 }
 
 void CurveFilter::restart(const Curve& curve, double mean, double sd) noexcept {
   expect(curve, mean, sd);
-  count_ = count_squared_ = weight_ = y_ = yy_ = 0.0;
   recent_count_ = 0;
+  cycles_ = 0;
   started_ = false;
-  for (const Sum sum : {c, cc, cy})
-    sums_[sum].setZero();
-  if (!(variance_ > 0.0)) variance_ = guessed_variance();  // what was learnt of the noise stays
-  judge();
+  for (std::size_t i = 0; i < assumptions.size(); ++i)
+    assumption_weights_[i] = assumptions[i].prior;
+  for (CurveBank& bank : banks_)
+    bank.restart(prior_);
+  mix();
 }
 
 void CurveFilter::believe(const Curve& curve, double sd) noexcept {
   expect(curve, curve.best(), sd);
-  judge();
+  for (CurveBank& bank : banks_)
+    bank.judge(prior_);
+  mix();
 }
 
 double CurveFilter::guessed_variance() const noexcept {
@@ -82,12 +122,11 @@ double CurveFilter::guessed_variance() const noexcept {
 }
 
 void CurveFilter::fill_drops(double input, Column& drops) const noexcept {
-  const double step = (settings_.upper - settings_.lower) / (places - 1);
   const double best = curve_.best(), top = curve_.top();
   for (std::size_t s = 0; s < shape_table.size(); ++s) {
     const double per_below = 1.0 / shape_table[s].below, per_above = 1.0 / shape_table[s].above;
     for (int i = 0; i < places; ++i) {
-      const double away = input - (settings_.lower + step * i);
+      const double away = input - (prior_.first + prior_.step * i);
       drops[static_cast<Eigen::Index>(s) * places + i] =
           curve_(best + away * (away < 0.0 ? per_below : per_above)) - top;
     }
@@ -97,124 +136,128 @@ void CurveFilter::fill_drops(double input, Column& drops) const noexcept {
 void CurveFilter::pass(double input) noexcept {
   Column drops;
   fill_drops(input, drops);
-  sums_[lagged] += (started_ ? per_lag_ : 1.0) * (drops - sums_[lagged]);  // settled before the first cycle
+  lagged_ += (started_ ? per_lag_ : 1.0) * (drops - lagged_);  // settled before the first cycle
+  if (!started_) std::fill(ring_.begin(), ring_.end(), lagged_);
   started_ = true;
+  ring_[static_cast<std::size_t>(cycles_) % ring_.size()] = lagged_;
+  ++cycles_;
+}
+
+// Behind `delay` the input of this cycle was that of as many cycles ago, or the first one.
+const CurveFilter::Column& CurveFilter::drops_at(std::int64_t cycle, std::size_t delay) const noexcept {
+  const auto size = static_cast<std::int64_t>(ring_.size());
+  return ring_[static_cast<std::size_t>((cycle - static_cast<std::int64_t>(delay) + size) % size)];
 }
 
 void CurveFilter::learn(double input, double j) noexcept {
   pass(input);
-  if (!(count_ > 0.0)) origin_ = j;
   prior_extra_ *= fading_ * fading_;  // sooner than the readings, or a guide that is wrong would draw the end to itself
-  add(sums_[lagged], j);
+  place_prior();
+  std::array<double, 64> log_likely{};
+  for (std::size_t i = 0; i < banks_.size(); ++i) {
+    const bool turn = recent_count_ < early || (cycles_ + static_cast<std::int64_t>(i)) % seldom == 0;
+    log_likely[i] = banks_[i].learn(prior_, drops_at(cycles_ - 1, delay_of(i)), j, turn || weight_of(i) > little);
+  }
   const auto at = static_cast<std::size_t>(recent_count_++) % recent;
-  recent_drops_[at] = sums_[lagged];
+  recent_at_[at] = static_cast<double>(cycles_ - 1);
   recent_j_[at] = j;
-  judge();
+  weigh(log_likely.data());
+  mix();
 }
 
-void CurveFilter::add(const Column& drops, double j) noexcept {
-  const double value = j - origin_;
-  const double error = settings_.discrepancy * (sums_[share] * drops).sum();
-  const double own = variance_ / (variance_ + error * error);
-  count_ = fading_ * count_ + 1.0;
-  count_squared_ = fading_ * fading_ * count_squared_ + 1.0;
-  weight_ = fading_ * weight_ + own;
-  y_ = fading_ * y_ + own * value;
-  yy_ = fading_ * yy_ + own * (value * value);
-  sums_[c] = fading_ * sums_[c] + own * drops;
-  sums_[cc] = fading_ * sums_[cc] + own * drops.square();
-  sums_[cy] = fading_ * sums_[cy] + (own * value) * drops;
+void CurveFilter::weigh(const double* log_likely) noexcept {
+  const auto update = [](std::vector<double>& weights, const auto& log_of, double chance, const auto& prior_of) {
+    double highest = log_of(0), sum = 0.0;
+    for (std::size_t i = 1; i < weights.size(); ++i)
+      highest = std::max(highest, log_of(i));
+    for (std::size_t i = 0; i < weights.size(); ++i)
+      sum += weights[i] *= std::exp(log_of(i) - highest);
+    for (std::size_t i = 0; i < weights.size(); ++i)
+      weights[i] = (1.0 - chance) * weights[i] / sum + chance * prior_of(i);
+  };
+  const auto told = static_cast<std::size_t>(settings_.earlier);
+  update(
+      delay_weights_, [&](std::size_t d) { return log_likely[d]; }, change,
+      [&](std::size_t d) {
+        return delays_ == 1 ? 1.0 : d == told ? told_prior : (1.0 - told_prior) / static_cast<double>(delays_ - 1);
+      });
+  update(
+      assumption_weights_, [&](std::size_t i) { return log_likely[i == 0 ? leader() : delays_ + i - 1]; },
+      assumption_change, [&](std::size_t i) { return assumptions[i].prior; });
+  const auto best = std::max_element(delay_weights_.begin(), delay_weights_.end()) - delay_weights_.begin();
+  if (best == leader_) return;
+  leader_ = best;
+  for (std::size_t i = delays_; i < banks_.size(); ++i)
+    banks_[i].take_over(banks_[leader()]);
+}
+
+double CurveFilter::weight_of(std::size_t bank) const noexcept {
+  const double delay = delay_weights_[delay_of(bank)];
+  if (bank < delays_ && bank != leader()) return delay;
+  return delay * assumption_weights_[bank < delays_ ? 0 : bank - delays_ + 1];
+}
+
+void CurveFilter::mix() noexcept {
+  mean_ = variance_ = scale_ = unexplained_ = 0.0;
+  for (std::size_t i = 0; i < banks_.size(); ++i) {
+    const double weight = weight_of(i);
+    mean_ += weight * banks_[i].mean();
+    variance_ += weight * banks_[i].variance();
+    scale_ += weight * banks_[i].scale();
+    unexplained_ += weight * banks_[i].unexplained();
+  }
+  double spread = 0.0, search = 0.0, stated = 0.0;
+  for (std::size_t i = 0; i < banks_.size(); ++i) {
+    const CurveBank& bank = banks_[i];
+    const double weight = weight_of(i), off = (bank.mean() - mean_) * (bank.mean() - mean_);
+    spread += weight * (bank.spread() * bank.spread() + off);
+    search += weight * std::log(std::pow(bank.search_sd(prior_), 2) + off);
+    stated += weight * (std::pow(bank.stated_sd(prior_), 2) + off);
+  }
+  spread_ = std::sqrt(spread);
+  search_sd_ = std::exp(0.5 * search);
+  stated_sd_ = std::sqrt(stated);
 }
 
 void CurveFilter::forget(double kept) noexcept {
-  for (double* sum : {&count_, &weight_, &y_, &yy_})
-    *sum *= kept;
-  count_squared_ *= kept * kept;
-  for (const Sum sum : {c, cc, cy})
-    sums_[sum] *= kept;
   const auto known = std::min<std::int64_t>(recent_count_, recent);
-  for (std::int64_t i = recent_count_ - known; i < recent_count_; ++i) {
-    const auto at = static_cast<std::size_t>(i) % recent;
-    add(recent_drops_[at], recent_j_[at]);
-  }
-  judge();
-}
-
-// Posterior of every hypothesis from its sums: S is normal about 1, o flat, the noise an inverse gamma.
-void CurveFilter::judge() noexcept {
-  const double guess = guessed_variance();
-  const double counts = guess_counts + std::max(0.0, weight_ - 1.0);
-  const double per_scale = variance_ / (settings_.scale_sd * settings_.scale_sd);
-  const double step = (settings_.upper - settings_.lower) / (places - 1);
-  Column residual = Column::Constant(guess_counts * guess), log_of = Column::Zero();
-  sums_[own_scale].setOnes();
-  if (count_ > 0.0) {
-    const double per = 1.0 / weight_;
-    const Column bend = (sums_[cc] - per * sums_[c].square()).max(0.0);
-    const Column cross = sums_[cy] - (per * y_) * sums_[c];
-    const double rest = yy_ - per * y_ * y_;
-    const Column precision = per_scale + bend;
-    sums_[own_scale] += (cross - bend) / precision;
-    residual += (rest - 2.0 * cross + bend - (cross - bend).square() / precision).max(0.0);
-    log_of = -0.5 * (precision * (1.0 / per_scale)).log();
-  }
-  log_of -= 0.5 * counts * residual.log();
-  const Column flat = (least_scale - sums_[own_scale]).max(0.0);
-  log_of -= scale_penalty * flat.square();
-  for (std::size_t s = 0; s < shape_table.size(); ++s) {
-    for (int i = 0; i < places; ++i) {
-      const double away = settings_.lower + step * i - prior_mean_;
-      log_of[static_cast<Eigen::Index>(s) * places + i] +=
-          shape_table[s].log_prior - 0.5 * away * away * prior_precision();
+  for (std::size_t b = 0; b < banks_.size(); ++b) {
+    banks_[b].fade(kept);
+    for (std::int64_t i = recent_count_ - known; i < recent_count_; ++i) {
+      const auto at = static_cast<std::size_t>(i) % recent;
+      const auto cycle = static_cast<std::int64_t>(recent_at_[at]);
+      if (cycles_ - cycle <= static_cast<std::int64_t>(recent)) {
+        banks_[b].add(prior_, drops_at(cycle, delay_of(b)), recent_j_[at]);
+      }
     }
+    banks_[b].judge(prior_);
   }
-  sums_[share] = (log_of - log_of.maxCoeff()).exp();
-  sums_[share] /= sums_[share].sum();
-  double mean = 0.0, square = 0.0;
-  for (int k = 0; k < hypotheses; ++k) {
-    const double place = step * (k % places);
-    mean += sums_[share][k] * place;
-    square += sums_[share][k] * place * place;
-  }
-  mean_ = settings_.lower + mean;
-  spread_ = std::sqrt(std::max(0.0, square - mean * mean));
-  scale_ = (sums_[share] * sums_[own_scale]).sum();
-  const double left = (sums_[share] * residual).sum();
-  variance_ = left / counts;
-  unexplained_ = count_ > 1.0 ? std::max(0.0, left - guess_counts * guess) / weight_ : 0.0;
+  mix();
 }
 
 CurveFilter::Prediction CurveFilter::predict(double input) const noexcept {
+  if (!(readings() > 0.0)) return {0.0, std::numeric_limits<double>::infinity()};
   Column drops;
   fill_drops(input, drops);
-  if (per_lag_ < 1.0) drops = (sums_[lagged] + per_lag_ * (drops - sums_[lagged])).eval();
-  if (!(count_ > 0.0)) return {0.0, std::numeric_limits<double>::infinity()};
-  const double per = 1.0 / weight_;
-  const Column away = drops - per * sums_[c];
-  const Column means = per * y_ + sums_[own_scale] * away;
-  const double per_scale = variance_ / (settings_.scale_sd * settings_.scale_sd);
-  const Column bend = (sums_[cc] - per * sums_[c].square()).max(0.0);
-  const Column variances =
-      variance_ * (1.0 + per + away.square() / (per_scale + bend)) + (settings_.discrepancy * drops).square();
-  const double mean = (sums_[share] * means).sum();
-  const double variance = (sums_[share] * (variances + (means - mean).square())).sum();
-  return {origin_ + mean, variance};
+  if (per_lag_ < 1.0) drops = (lagged_ + per_lag_ * (drops - lagged_)).eval();
+  double mean = 0.0, square = 0.0;
+  const double about = banks_[leader()].predict(prior_, drops).mean;
+  for (std::size_t i = 0; i < banks_.size(); ++i) {
+    const std::size_t delay = delay_of(i);
+    const Prediction own = banks_[i].predict(prior_, delay == 0 ? drops : drops_at(cycles_, delay));
+    const double weight = weight_of(i), off = own.mean - about;
+    mean += weight * off;
+    square += weight * (own.variance + off * off);
+  }
+  return {about + mean, square - mean * mean};
 }
 
-double CurveFilter::faded_sd(double factor) const noexcept {
-  const double of_prior = std::min(1.0, spread_ * spread_ * prior_precision());
-  const double left = count_ > 1.0 ? count_squared_ / count_ : 1.0;  // sum of w^2 over sum of w: Liang and Zeger 1986
-  return spread_ * std::sqrt(of_prior + (1.0 - of_prior) * left * factor);
-}
-
-double CurveFilter::stated_sd() const noexcept {
-  return faded_sd(calibrated);
-}
 double CurveFilter::noise_sd() const noexcept {
   return std::sqrt(variance_);
 }
+
 double CurveFilter::curvature() const noexcept {
-  return bend_ * std::max(scale_, 2.0 * least_scale);
+  return bend_ * std::max(scale_, 1e-3);
 }
 
 }  // namespace mgdd::guide

@@ -1,11 +1,13 @@
 #include "mgdd/guide/curve_seeking.hpp"
 
 #include <algorithm>
+#include <array>
 #include <cmath>
 #include <string>
 #include <utility>
 
 #include "mgdd/common/bounds.hpp"
+#include "mgdd/common/random.hpp"
 #include "mgdd/common/text.hpp"
 
 namespace mgdd::guide {
@@ -34,9 +36,13 @@ constexpr double worst_ratio = 0.12, good_ratio = 0.6;  // of the noise seen to 
 constexpr double little_share = 0.1;                    // of the drop at 0.3 prior_sd, squared
 constexpr double repeat_memory = 0.98;
 constexpr std::int64_t fewest_repeats = 60;
+constexpr double least_evidence = 1.0;  // logarithm of how much likelier J answers the input than not
 
+constexpr std::int64_t first_blocks = 4, centre_every = 8;
 constexpr double hold_share = 2.0;     // of the sensor's lag: cycles on one side of the estimate
 constexpr double modest_share = 0.25;  // of the cheapest amplitude, less than the place is uncertain by
+
+constexpr int most_uncertain = 20;  // cycles of delay
 
 constexpr int plain_period = 10;
 constexpr double plain_time_constant = 40.0;
@@ -66,6 +72,10 @@ CurveSeekingSettings checked(CurveSeekingSettings s) {
   require_in(above(0.0, 1e12), "amplitude_max", s.amplitude_max);
   if (!(s.rate > 0.0)) throw ParameterError("rate", s.rate, "must be > 0");
   optimize::validate(std::vector{s.sensor});
+  if (!(s.delay_uncertainty >= 0 && s.delay_uncertainty <= most_uncertain)) {
+    throw ParameterError("delay_uncertainty", s.delay_uncertainty,
+                         "must be in [0, " + std::to_string(most_uncertain) + "] cycles");
+  }
   if (s.sensor.delay_cycles > 10000.0) throw ParameterError("delay_cycles", s.sensor.delay_cycles, "must be <= 10000");
   if (!(s.curve.curvature(curvature_share * s.prior_sd) < 0.0)) {
     throw about("curve", ParameterError("curve does not bend down at its best input, " + text(s.curve.best()) +
@@ -83,11 +93,26 @@ double surprise_share_of(const optimize::ComponentLag& sensor) noexcept {
   return surprise_share / (1.0 + patience * sensor.lag_cycles);
 }
 
+int shortest_delay(const CurveSeekingSettings& s) noexcept {
+  return std::max(0, static_cast<int>(std::lround(s.sensor.delay_cycles)) - s.delay_uncertainty);
+}
+
 CurveFilterSettings filter_settings(const CurveSeekingSettings& s) {
-  const CurveFilterSettings out{s.space.lower[0], s.space.upper[0], s.prior_sd,      s.scale_sd,
-                                s.discrepancy,    s.noise_sd,       s.memory_cycles, s.sensor.lag_cycles};
+  CurveFilterSettings out{s.space.lower[0], s.space.upper[0], s.prior_sd,      s.scale_sd,
+                          s.discrepancy,    s.noise_sd,       s.memory_cycles, s.sensor.lag_cycles};
+  out.earlier = static_cast<int>(std::lround(s.sensor.delay_cycles)) - shortest_delay(s);
+  out.later = s.delay_uncertainty;
   validate(out);
   return out;
+}
+
+// In an order without a period, since a delay that is wrong by a few cycles must find no echo of the dither; as often
+// up as down in every four, since a level that drifts is known the better.
+bool side_of(std::int64_t block) noexcept {
+  constexpr std::array<unsigned, 6> halves{0b0011, 0b0101, 0b0110, 0b1001, 0b1010, 0b1100};
+  if (block < first_blocks) return block % 2 == 1;
+  const auto order = random::bits(1, 1, static_cast<std::uint64_t>(block / 4)) % halves.size();
+  return (halves[order] >> (block % 4) & 1U) != 0;
 }
 
 // About an origin that is set when it takes over; amplitude and gain follow from the guide's curvature.
@@ -102,7 +127,8 @@ optimize::ExtremumSeekingSettings plain_settings(const CurveSeekingSettings& s) 
   out.dither.amplitude = scalar_input(amplitude);
   out.dither.period = period;
   out.gain = scalar_input(2.0 / (amplitude * std::abs(s.curve.curvature(curvature_share * s.prior_sd)) * tau));
-  out.components = {s.sensor};
+  // Readings are held back to the longest delay: so the same tables serve whichever delay has been found.
+  out.components = {{std::round(s.sensor.delay_cycles) + s.delay_uncertainty, s.sensor.lag_cycles}};
   out.maximize = s.maximize;
   return out;
 }
@@ -119,7 +145,8 @@ CurveSeeking::CurveSeeking(CurveSeekingSettings settings)
       applied_(estimate_),
       delay_(std::lround(settings_.sensor.delay_cycles)),
       hold_(std::max(1L, std::lround(hold_share * settings_.sensor.lag_cycles))),
-      sent_(static_cast<std::size_t>(delay_) + 1, 0.0) {}
+      sent_(static_cast<std::size_t>(shortest_delay(settings_)) + 1, 0.0),
+      held_back_(static_cast<std::size_t>(filter_.settings().earlier + filter_.settings().later) + 1, 0.0) {}
 
 // As far as the place is uncertain; once it is known, as far as learning its moves costs least: the dither costs
 // |J''| A^2/4 a cycle, the error that it leaves |J''| s^2/2 with s = sigma/(A |J''| sqrt(N)).
@@ -131,7 +158,8 @@ double CurveSeeking::amplitude() const noexcept {
   const double held_back =
       limits_.size() > 0 && filter_.readings() > 0.0 ? std::abs(filter_.mean() - estimate_[0]) : 0.0;
   const double cheapest = std::sqrt(filter_.noise_sd() / (std::abs(bend) * std::sqrt(readings)));
-  return std::min(std::max(filter_.search_sd() - held_back - modest_share * cheapest, cheapest),
+  const double active = std::sqrt(static_cast<double>(centre_every) / static_cast<double>(centre_every - 1));
+  return std::min(active * std::max(filter_.search_sd() - held_back - modest_share * cheapest, cheapest),
                   settings_.amplitude_max);
 }
 
@@ -143,7 +171,9 @@ const Inputs& CurveSeeking::ask() noexcept {
   } else if (sent_count_ == 0) {
     applied_[0] = estimate_[0];
   } else {
-    applied_[0] = estimate_[0] + (upwards_ ? amplitude() : -amplitude());
+    const std::int64_t block = sent_count_ / hold_;
+    const bool centre = block > first_blocks && block % centre_every == 0;  // tells a curve from a level
+    applied_[0] = estimate_[0] + (centre ? 0.0 : upwards_ ? amplitude() : -amplitude());
   }
   if (sent_count_ > 0) applied_[0] = within_limits(applied_[0]);
   if (protocol_.cycle > 0) applied_[0] = std::clamp(applied_[0], last - settings_.rate, last + settings_.rate);
@@ -171,30 +201,37 @@ TellStatus CurveSeeking::tell(const Reading& reading) noexcept {
   if (status != TellStatus::accepted && status != TellStatus::misfire) return status;
   Inputs told;
   const double applied = applied_input(reading, applied_, told)[0];
-  if ((sent_count_ + 1) % hold_ == 0) upwards_ = !upwards_;
+  if ((sent_count_ + 1) % hold_ == 0) upwards_ = side_of((sent_count_ + 1) / hold_);
   if (status == TellStatus::accepted) limits_.record(applied, reading.limits);
-  sent_[static_cast<std::size_t>(sent_count_ % (delay_ + 1))] = applied;
+  const auto ring = static_cast<std::int64_t>(sent_.size());
+  sent_[static_cast<std::size_t>(sent_count_ % ring)] = applied;
   ++sent_count_;
   if (plain_at_work_) {
-    const double moved = applied - taken_over_at_;
-    Reading own = reading;
-    own.limits = {};
-    own.applied = {&moved, 1};
-    const double as_guided = reading.components.empty() ? 0.0 : reading.components[0] / taken_over_scale_;
-    if (!reading.components.empty()) own.components = {&as_guided, 1};
-    plain_.tell(own);
-    estimate_[0] =
-        std::clamp(taken_over_at_ + plain_.estimate()[0], settings_.space.lower[0], settings_.space.upper[0]);
+    tell_plain(reading, applied, status);
     return status;
   }
-  if (sent_count_ <= delay_) return status;  // what is read now was caused before the first cycle
-  const double cause = sent_[static_cast<std::size_t>(sent_count_ % (delay_ + 1))];
-  if (status == TellStatus::misfire) {
-    filter_.pass(cause);
+  if (sent_count_ < ring) return status;
+  const double cause = sent_[static_cast<std::size_t>(sent_count_ % ring)];
+  if (status == TellStatus::misfire || sent_count_ <= delay_) {
+    filter_.pass(cause);  // what is read now was caused before the first cycle
   } else {
     learn(cause, objective_of(reading, settings_.maximize));
   }
   return status;
+}
+
+void CurveSeeking::tell_plain(const Reading& reading, double applied, TellStatus status) noexcept {
+  const auto size = static_cast<std::int64_t>(held_back_.size());
+  const auto at = [&](std::int64_t k) -> double& { return held_back_[static_cast<std::size_t>(k % size)]; };
+  const double moved = applied - taken_over_at_;
+  double held = 0.0;
+  if (status == TellStatus::accepted) {
+    at(held_count_) = reading.components[0] / taken_over_scale_;
+    held = at(std::max<std::int64_t>(0, held_count_ - (settings_.delay_uncertainty - delay_error_)));
+    ++held_count_;
+  }
+  plain_.tell({{&held, 1}, {}, status != TellStatus::accepted, {&moved, 1}});
+  estimate_[0] = std::clamp(taken_over_at_ + plain_.estimate()[0], settings_.space.lower[0], settings_.space.upper[0]);
 }
 
 void CurveSeeking::learn(double cause, double j) noexcept {
@@ -247,6 +284,8 @@ void CurveSeeking::take_over() noexcept {
   plain_at_work_ = true;
   taken_over_at_ = estimate_[0];
   taken_over_scale_ = filter_.curvature() / filter_.curve().curvature(curvature_share * settings_.prior_sd);
+  delay_error_ = filter_.delay_error();
+  held_count_ = 0;
   plain_.restart();
 }
 
@@ -295,6 +334,10 @@ void CurveSeeking::restart() noexcept {
 
 void CurveSeeking::shift_estimate(const Inputs& by) noexcept {
   begin_at(filter_.curve(), estimate_[0] + by[0], std::hypot(filter_.spread(), point_doubt_share * settings_.prior_sd));
+}
+
+bool CurveSeeking::answered() const noexcept {
+  return !plain_at_work_ && (filter_.readings() < fewest_repeats || filter_.answer_evidence() > least_evidence);
 }
 
 double CurveSeeking::trust() const noexcept {

@@ -14,9 +14,11 @@ class CurveSeeking(Seeker, _core.guide.CurveSeeking):
     """Seeking guided by a curve: a rough model gives the shape of J, the measurements give its place.
 
     The guide's curve may stand in the wrong place and have the wrong height; every reading of J says where it stands.
-    After a few readings the estimate is near the plant's own best input, wherever the guide's lies. Curvature, noise
-    and level of J are learnt. Readings that the curve cannot explain are doubted and the search begins anew; a guide
-    that keeps failing is given up for plain extremum seeking. With ``Curve.parabola`` no model is needed at all.
+    After a few readings the estimate is near the plant's own best input, wherever the guide's lies. Curvature and
+    noise of J are learnt, its level and the drift of that, the delay of the readings, and how fast the best input
+    moves. A guide in another unit than J, or a hundred times too steep or too flat, still gives the shape. Readings
+    that the curve cannot explain are doubted and the search begins anew; a guide that keeps failing is given up for
+    plain extremum seeking. With ``Curve.parabola`` no model is needed at all.
 
     Parameters
     ----------
@@ -29,7 +31,7 @@ class CurveSeeking(Seeker, _core.guide.CurveSeeking):
     prior_sd : float, optional
         How far the plant's best input may lie from the guide's, one standard deviation; a quarter of the bounds.
     scale_sd : float
-        Standard deviation of the plant's curvature over the guide's, about 1 [-].
+        Standard deviation of the plant's curvature over the guide's, about 1 [-]; other powers of ten are thought of.
     discrepancy : float
         Error of the curve per unit of its drop: readings far from the best input count less [-].
     noise_sd : float, optional
@@ -42,6 +44,9 @@ class CurveSeeking(Seeker, _core.guide.CurveSeeking):
         Largest change of the applied input per cycle; none without.
     delay_cycles, lag_cycles : float
         Transport delay and time constant between the plant and J [cycles].
+    delay_uncertainty : int
+        Cycles by which the delay may be shorter or longer than told, at most 20; the property ``delay_cycles`` says
+        which one the readings show. 0 takes the delay as told.
     hand_over : bool
         Whether a guide that keeps failing is given up for plain extremum seeking.
     maximize : bool
@@ -67,6 +72,8 @@ class CurveSeeking(Seeker, _core.guide.CurveSeeking):
     ----------
     Wellstead and Zarrop (1991), Self-tuning systems: control and signal processing.
     Bucy and Senne (1971), Digital synthesis of non-linear filters.
+    Raftery, Karny and Ettler (2010), Online prediction under model uncertainty via dynamic model averaging.
+    Harvey (1989), Forecasting, structural time series models and the Kalman filter.
 
     Examples
     --------

@@ -1,6 +1,7 @@
 // Where a known curve stands: Bayes' rule against a slow direct integral, invariances, memory and lag.
 #include "mgdd/guide/curve_filter.hpp"
 
+#include <array>
 #include <cmath>
 #include <vector>
 
@@ -35,10 +36,11 @@ TEST(CurveFilter, FindsPlaceAndScaleOfAMovedCurve) {
   for (const double place : {-14.0, -3.2, 6.0}) {
     CurveFilter filter(settings_on(-30.0, 10.0), skewed_curve(-2.0));
     for (int k = 0; k < 40; ++k) {
-      const double x = place + (k % 3 == 0 ? 5.0 : k % 3 == 1 ? -3.0 : 0.5);
+      // Three inputs alone would fit a curve that is steep on one side as well.
+      const double x = place + std::array{5.0, -3.0, 0.5, -6.0, 2.0}[static_cast<std::size_t>(k % 5)];
       filter.learn(x, 17.0 + 1.25 * skewed(x - place));
     }
-    EXPECT_NEAR(filter.mean(), place, 0.15);
+    EXPECT_NEAR(filter.mean(), place, 0.26) << "half the distance of two places";
     EXPECT_NEAR(filter.scale(), 1.25, 0.1) << "between what is read and one";
     EXPECT_LT(filter.spread(), 0.5);
     EXPECT_LT(filter.noise_sd(), 0.1);

@@ -141,22 +141,22 @@ TEST(CurveSeeking, ACurveThatIsNoneIsRefusedAndThePointCountsAsNew) {
 }
 
 TEST(CurveSeeking, HandsOverWhereTheGuideIsNothingLikeThePlant) {
-  CurveSeeking seeker(guided(0.0, 0.0));
+  const auto spike = [](double x) { return -2.0 * std::abs(std::tanh(3.0 * x)) - 0.3 * std::abs(x); };
+  CurveSeekingSettings settings = guided(8.0, 0.0);
+  CurveSeeking seeker(settings);
   double reach = 0.0;
   for (int k = 0; k < 900; ++k) {
-    const double x = seeker.ask()[0] + 6.0;
-    const double j[] = {-0.5 * x * x + 0.05 * random::normal(4, 1, static_cast<std::uint64_t>(k))};
+    const double j[] = {spike(seeker.ask()[0] + 6.0) + 0.05 * random::normal(4, 1, static_cast<std::uint64_t>(k))};
     ASSERT_EQ(seeker.tell({j, {}, false}), TellStatus::accepted);
     if (k > 700) reach = std::max(reach, std::abs(seeker.estimate()[0] + 6.0));
   }
   EXPECT_TRUE(seeker.handed_over());
   EXPECT_EQ(seeker.trust(), 0.0);
   EXPECT_LT(reach, 1.5);
-  CurveSeekingSettings settings = guided(0.0, 0.0);
   settings.hand_over = false;
   CurveSeeking stubborn(settings);
   for (int k = 0; k < 900; ++k)
-    optimize::cycle_of(stubborn, [](const Inputs& x) { return -0.5 * (x[0] + 6.0) * (x[0] + 6.0); });
+    optimize::cycle_of(stubborn, [&](const Inputs& x) { return spike(x[0] + 6.0); });
   EXPECT_FALSE(stubborn.handed_over());
 }
 

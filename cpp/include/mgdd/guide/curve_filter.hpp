@@ -1,22 +1,22 @@
-// Where a known curve stands: a point-mass filter (Bucy and Senne 1971) over the place T of its maximum and over its
-// shape, from noisy readings of J at any inputs. Hypothesis (T, shape): J = o + S [c(b + (x - T)/w) - c(b)], with c the
-// guide's curve, b its best input and w the width on that side of T. Offset o and scale S are integrated out as in a
-// linear regression, the noise as in Student's t (Rao-Blackwellised; Doucet et al. 2000); old readings fade, and with
-// them all that the prior says beyond its widest. A reading counts alike in every hypothesis, the less the lower on the
-// curve it lies: weights that differed would favour the hypotheses to which every reading is a near one.
+// Where a known curve stands, from noisy readings of J at any inputs: a mixture of filters (`CurveBank`), each with its
+// own delay between input and reading, or its own memory and drift of J's level. Their weights follow from how well
+// each foretold the readings, with a small chance that another one is right from now on (dynamic model averaging:
+// Raftery, Karny and Ettler 2010). Every delay has one bank; the most probable
+// delay has one for every assumption of memory and drift.
 // Shapes: as the guide says, and steep on one side, which is what a knock limit or a cliff looks like.
 // A first-order lag of the sensor is part of every hypothesis. noexcept and allocation-free after construction.
 #pragma once
 
-#include <Eigen/Core>
 #include <array>
 #include <cstddef>
 #include <cstdint>
 #include <optional>
 #include <string>
+#include <vector>
 
 #include "mgdd/common/state.hpp"
 #include "mgdd/guide/curve.hpp"
+#include "mgdd/guide/curve_bank.hpp"
 
 namespace mgdd::guide {
 
@@ -29,6 +29,7 @@ struct CurveFilterSettings {
   std::optional<double> noise_sd{};
   double memory_cycles = 143.0;  ///< readings fade by exp(-1/memory), > 1
   double lag_cycles = 0.0;       ///< time constant between the plant and J, >= 0
+  int earlier = 0, later = 0;    ///< cycles by which the delay may be shorter or longer than told, >= 0
 };
 
 /// ParameterError naming field, value and bound.
@@ -36,23 +37,18 @@ void validate(const CurveFilterSettings& settings);
 
 class CurveFilter {
  public:
-  static constexpr int places = 81;
-  static constexpr int shapes = 3;
-  static constexpr int hypotheses = places * shapes;
-  using Column = Eigen::Array<double, hypotheses, 1>;
+  static constexpr int places = CurveBank::places;
+  using Column = CurveBank::Column;
+  using Prediction = CurveBank::Prediction;
 
   /// The settings must be valid and the curve bend down at its best input.
-  CurveFilter(const CurveFilterSettings& settings, const Curve& curve) noexcept;
+  CurveFilter(const CurveFilterSettings& settings, const Curve& curve);
 
-  /// Takes what was read at this input.
+  /// Takes what was read; `input` is the one that caused it at the shortest delay.
   void learn(double input, double j) noexcept;
-  /// A cycle at this input without a reading: the sensor's lag goes on.
+  /// A cycle at this input without a reading.
   void pass(double input) noexcept;
-
-  /// Reading at this input as it is expected next, and its variance.
-  struct Prediction {
-    double mean = 0.0, variance = 0.0;
-  };
+  /// Reading as it is expected next, and its variance, where `input` follows at the shortest delay.
   Prediction predict(double input) const noexcept;
 
   /// Keeps this share of what the readings said, and the last few in full; the sensor's lag and the prior stay.
@@ -65,15 +61,19 @@ class CurveFilter {
   double mean() const noexcept { return mean_; }      ///< of T
   double spread() const noexcept { return spread_; }  ///< of T as Bayes' rule states it
   /// Standard deviation of the estimate that the fading of the readings leaves, and the same as it covers in practice.
-  double search_sd() const noexcept { return faded_sd(1.0); }
-  double stated_sd() const noexcept;
+  double search_sd() const noexcept { return search_sd_; }
+  double stated_sd() const noexcept { return stated_sd_; }
   double noise_sd() const noexcept;  ///< of a reading, as learnt
   /// Mean square of what the curve leaves of the readings, and the square of the drop that counts as small.
   double unexplained_variance() const noexcept { return unexplained_; }
-  double small_variance() const noexcept { return guessed_variance(); }
+  double small_variance() const noexcept { return scale_ * scale_ * guessed_variance(); }
   double curvature() const noexcept;  ///< J'' of the curve as scaled, < 0
   double scale() const noexcept { return scale_; }
-  double readings() const noexcept { return count_; }  ///< that count now
+  /// Logarithm of how much likelier the readings have made it that J answers the input; >= 0.
+  double answer_evidence() const noexcept { return -banks_[leader()].remembered_flat(); }
+  double readings() const noexcept { return banks_[0].readings(); }  ///< that count now
+  /// Cycles that the most probable delay is longer than told.
+  int delay_error() const noexcept { return offset_of(leader()); }
   const Curve& curve() const noexcept { return curve_; }
   const CurveFilterSettings& settings() const noexcept { return settings_; }
 
@@ -82,56 +82,72 @@ class CurveFilter {
     Prefixed<V> curve{v, "curve."};
     Curve::visit(self.curve_, curve);
     v("filter_bend", self.bend_);
-    v("filter_count", self.count_);
-    v("filter_count_squared", self.count_squared_);
-    v("filter_weight", self.weight_);
-    v("filter_y", self.y_);
-    v("filter_yy", self.yy_);
     v("filter_prior_mean", self.prior_mean_);
     v("filter_prior_extra", self.prior_extra_);
-    v("filter_mean", self.mean_);
-    v("filter_spread", self.spread_);
-    v("filter_variance", self.variance_);
-    v("filter_scale", self.scale_);
-    v("filter_unexplained", self.unexplained_);
-    v("filter_origin", self.origin_);
-    const char* names[] = {"c", "cc", "cy", "lagged", "share", "own_scale"};
-    for (std::size_t i = 0; i < self.sums_.size(); ++i)
-      v(std::string("filter_") + names[i], self.sums_[i]);
     v("filter_started", self.started_);
-    v("filter_recent", self.recent_j_);
+    v("filter_lagged", self.lagged_);
+    v("filter_cycles", self.cycles_);
+    for (std::size_t i = 0; i < self.ring_.size(); ++i)
+      v("filter_ring" + std::to_string(i), self.ring_[i]);
+    v("filter_recent_j", self.recent_j_);
+    v("filter_recent_at", self.recent_at_);
     v("filter_recent_count", self.recent_count_);
-    for (std::size_t i = 0; i < recent; ++i)
-      v("filter_recent" + std::to_string(i), self.recent_drops_[i]);
+    v("filter_delays", self.delay_weights_, self.delay_weights_.size());
+    v("filter_assumptions", self.assumption_weights_, self.assumption_weights_.size());
+    v("filter_leader", self.leader_, static_cast<std::int64_t>(self.delays_));
+    for (std::size_t i = 0; i < self.banks_.size(); ++i) {
+      const std::string name = "bank" + std::to_string(i) + "_";
+      Prefixed<V> bank{v, name};
+      CurveBank::visit(self.banks_[i], bank);
+    }
+    for (const auto& [name, place] : mixed(self))
+      v(name, *place);
   }
 
  private:
-  enum Sum : std::size_t { c, cc, cy, lagged, share, own_scale, sums };
   static constexpr std::size_t recent = 3;  // readings that survive a doubt
+  template <class Self>
+  static auto mixed(Self& self) {
+    using Place = decltype(&self.mean_);
+    return std::array<std::pair<const char*, Place>, 7>{{{"filter_mean", &self.mean_},
+                                                         {"filter_spread", &self.spread_},
+                                                         {"filter_search_sd", &self.search_sd_},
+                                                         {"filter_stated_sd", &self.stated_sd_},
+                                                         {"filter_variance", &self.variance_},
+                                                         {"filter_scale", &self.scale_},
+                                                         {"filter_unexplained", &self.unexplained_}}};
+  }
+  std::size_t leader() const noexcept { return static_cast<std::size_t>(leader_); }
+  int offset_of(std::size_t delay) const noexcept { return static_cast<int>(delay) - settings_.earlier; }
+  std::size_t delay_of(std::size_t bank) const noexcept { return bank < delays_ ? bank : leader(); }
+  double weight_of(std::size_t bank) const noexcept;
+  const Column& drops_at(std::int64_t cycle, std::size_t delay) const noexcept;
   void fill_drops(double input, Column& drops) const noexcept;
-  void add(const Column& drops, double j) noexcept;
-  void judge() noexcept;
-  double faded_sd(double factor) const noexcept;
-  double prior_precision() const noexcept;
+  void weigh(const double* log_likely) noexcept;
+  void mix() noexcept;
   void expect(const Curve& curve, double mean, double sd) noexcept;
+  void place_prior() noexcept;
   double guessed_variance() const noexcept;
 
   CurveFilterSettings settings_;
   Curve curve_;
+  CurveBank::Prior prior_;
   double per_lag_;  // share of the way that the lag goes in one cycle
   double fading_;
+  std::size_t delays_;
   double bend_ = 0.0;                            // of the curve
   double prior_mean_ = 0.0, prior_extra_ = 0.0;  // precision of the prior beyond that of `prior_sd`; it fades
-  double count_ = 0.0, count_squared_ = 0.0;     // readings that have not faded, and sum of their squares
-  double weight_ = 0.0, y_ = 0.0, yy_ = 0.0;     // weighted: the readings, J and J^2
-  double mean_ = 0.0, spread_ = 0.0, variance_ = 0.0, scale_ = 1.0;
-  double unexplained_ = 0.0;
-  double origin_ = 0.0;   // first reading, taken off before summing
-  bool started_ = false;  // the lag has an input
-  std::array<Column, sums> sums_;
-  std::array<Column, recent> recent_drops_;  // a ring, with the readings that belong to it
-  std::array<double, recent> recent_j_{};
+  bool started_ = false;                         // the lag has an input
+  Column lagged_;
+  std::vector<Column> ring_;                             // drops behind the lag, of the last cycles
+  std::int64_t cycles_ = 0;                              // since the start
+  std::array<double, recent> recent_j_{}, recent_at_{};  // readings and their cycles, a ring
   std::int64_t recent_count_ = 0;
+  std::vector<CurveBank> banks_;  // one per delay, then the other assumptions at the leading delay
+  std::vector<double> delay_weights_, assumption_weights_;
+  std::int64_t leader_ = 0;
+  double mean_ = 0.0, spread_ = 0.0, search_sd_ = 0.0, stated_sd_ = 0.0;
+  double variance_ = 0.0, scale_ = 1.0, unexplained_ = 0.0;
 };
 
 }  // namespace mgdd::guide

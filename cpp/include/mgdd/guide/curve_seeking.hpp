@@ -1,10 +1,11 @@
 // Curve-guided seeking of one input: the guide's whole curve gives the shape, the measurements give the place. A filter
 // over the place of the curve (`CurveFilter`) takes every reading; the next input lies one standard deviation of the
-// place to one side of its mean and then to the other, at least as far as keeping track costs least.
-// Kin: self-tuning extremum control (Wellstead and Zarrop 1991). Readings that the curve cannot explain raise a doubt:
-// what was known is dropped but for the last few readings. A guide that keeps failing hands over to plain extremum
-// seeking. Behind a slow sensor every reading is paired with the input that caused it, and the side is held for two
-// time constants of its lag, which would blot out a faster change. ask and tell are noexcept and allocation-free.
+// place to one side of its mean or the other, at least as far as keeping track costs least, every fourth time at it.
+// Kin: self-tuning extremum control (Wellstead and Zarrop 1991). The sides have no period and the delay of the readings
+// is learnt about the one told. Readings that the curve cannot explain raise a doubt: what was known is dropped but for
+// the last few readings. A guide that keeps failing hands over to plain extremum seeking. Behind a slow sensor a side
+// is held for two time constants of its lag, which would blot out a faster change. ask and tell are noexcept and
+// allocation-free.
 #pragma once
 
 #include <cstdint>
@@ -36,6 +37,7 @@ struct CurveSeekingSettings {
   double amplitude_max = 0.0;         ///< largest distance from the estimate that is applied; 0 = 0.25 prior_sd
   double rate = optimize::unlimited;  ///< largest change of the applied input per cycle
   optimize::ComponentLag sensor{};    ///< between the plant and J; the delay is rounded to whole cycles
+  int delay_uncertainty = 4;          ///< cycles by which the delay may be shorter or longer: it is learnt
   bool hand_over = true;              ///< to plain extremum seeking where the guide keeps failing
   bool maximize = true;
   std::vector<optimize::Limit> limits{};
@@ -70,6 +72,12 @@ class CurveSeeking {
   double estimate_sd() const noexcept;  ///< of the estimate as stated; NaN after a hand-over
   double noise_sd() const noexcept { return filter_.noise_sd(); }
   double scale() const noexcept { return filter_.scale(); }
+  /// Whole cycles between input and reading that explain the readings best.
+  std::int64_t delay_cycles() const noexcept {
+    return delay_ + (plain_at_work_ ? delay_error_ : filter_.delay_error());
+  }
+  /// False where enough readings were told and J has not been seen to answer the input: the estimate is the guide's.
+  bool answered() const noexcept;
   /// 1: what the curve leaves unexplained is noise; towards 0: it is not; 0 after a hand-over.
   double trust() const noexcept;
   std::int64_t doubts() const noexcept { return doubts_; }
@@ -97,6 +105,9 @@ class CurveSeeking {
     v("upwards", self.upwards_);
     v("sent", self.sent_);
     v("sent_count", self.sent_count_);
+    v("held_back", self.held_back_);
+    v("held_count", self.held_count_);
+    v("delay_error", self.delay_error_);
     v("surprise", self.surprise_);
     v("doubts", self.doubts_);
     v("since_doubt", self.since_doubt_);
@@ -123,6 +134,7 @@ class CurveSeeking {
   void watch_repeats(double applied, double j) noexcept;
   void judge_surprise(double input, double j) noexcept;
   void take_over() noexcept;
+  void tell_plain(const optimize::Reading& reading, double applied, optimize::TellStatus status) noexcept;
   void begin_at(const Curve& curve, double mean, double sd) noexcept;
   bool usable(const Curve& curve) const noexcept;
 
@@ -136,6 +148,8 @@ class CurveSeeking {
   bool upwards_ = true;        // side of the next input
   std::vector<double> sent_;   // inputs on their way through the delay, a ring
   std::int64_t sent_count_ = 0;
+  std::vector<double> held_back_;  // readings after a hand-over, a ring
+  std::int64_t held_count_ = 0, delay_error_ = 0;
   double surprise_ = 1.0;  // running mean of the squared normalised innovation
   std::int64_t doubts_ = 0, since_doubt_ = 0;
   double doubt_rate_ = 0.0;                            // of late

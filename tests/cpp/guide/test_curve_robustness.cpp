@@ -1,0 +1,156 @@
+// What a guide of one input must bear: a level of J that drifts, a delay told wrong, a guide in another unit or far too
+// steep or flat, an optimum that moves, an input that is stuck. Laws and shares over seeds.
+#include <algorithm>
+#include <cmath>
+#include <functional>
+#include <string>
+#include <vector>
+
+#include "mgdd/common/random.hpp"
+#include "mgdd/guide/curve_seeking.hpp"
+#include "support/seeker_case.hpp"
+
+namespace mgdd::guide {
+namespace {
+
+using optimize::scalar_input;
+
+/// -0.03 (u - 4)^2 on bounds of +-20, noise 0.3, 4 away from the guide's best input, on either side by turns.
+struct Plant {
+  std::function<double(double)> drop = [](double away) { return -0.03 * away * away; };
+  double guide_best = 0.0, unit = 1.0, noise_sd = 0.3;
+  double level_per_cycle = 0.0, optimum_per_cycle = 0.0, step = 0.0;  // the step comes and goes every 50 cycles
+  int delay = 0, told_delay = 0, stuck_from = 1 << 30, cycles = 500, seeds = 6;
+};
+
+struct Figures {
+  double early_loss = 0.0, late_loss = 0.0;  // J lost in 100 cycles, and per cycle in the second half
+  double inside = 0.0, wrong_delay = 0.0, unanswered = 0.0, handed_over = 0.0, at_bound = 0.0;  // shares
+};
+
+Figures figures_of(const Plant& plant) {
+  Figures out;
+  const double share = 1.0 / plant.seeds;
+  for (int seed = 0; seed < plant.seeds; ++seed) {
+    CurveSeekingSettings settings;
+    settings.space = {scalar_input(0.0), scalar_input(-20.0), scalar_input(20.0)};
+    settings.curve = Curve::parabola(-0.06, plant.guide_best, 60.0);
+    settings.sensor.delay_cycles = plant.told_delay;
+    CurveSeeking seeker(settings);
+    std::vector<double> sent;
+    double inside = 0.0, counted = 0.0;
+    bool at_bound = false;
+    for (int k = 0; k < plant.cycles; ++k) {
+      const double moved = plant.optimum_per_cycle * k + plant.step * (k / 50 % 2);
+      const double best = (seed % 2 == 0 ? 4.0 : -4.0) + moved;
+      const double asked = seeker.ask()[0];
+      sent.push_back(k <= plant.stuck_from ? asked : sent.back());
+      const double cause = sent[static_cast<std::size_t>(std::max(0, k - plant.delay))];
+      const double noise =
+          plant.noise_sd * random::normal(static_cast<std::uint64_t>(seed), 7, static_cast<std::uint64_t>(k));
+      const double j[] = {plant.unit * (50.0 + plant.drop(cause - best) + plant.level_per_cycle * k + noise)};
+      EXPECT_EQ(seeker.tell({j, {}, false}), optimize::TellStatus::accepted);
+      const double off = seeker.estimate()[0] - best;
+      if (k < 100) out.early_loss -= share * plant.drop(asked - best);
+      if (k >= plant.cycles / 2) out.late_loss -= share * plant.drop(asked - best) / (plant.cycles - plant.cycles / 2);
+      at_bound = at_bound || (k > 30 && std::abs(seeker.estimate()[0]) > 19.5);
+      if (k < 200 || k % 20 > 0 || seeker.handed_over()) continue;
+      inside += std::abs(off) <= 1.96 * seeker.estimate_sd() ? 1.0 : 0.0;
+      counted += 1.0;
+    }
+    out.inside += share * (counted > 0.0 ? inside / counted : 1.0);
+    out.wrong_delay += seeker.delay_cycles() == plant.delay ? 0.0 : share;
+    out.unanswered += seeker.answered() ? 0.0 : share;
+    out.handed_over += seeker.handed_over() ? share : 0.0;
+    out.at_bound += at_bound ? share : 0.0;
+  }
+  return out;
+}
+
+TEST(CurveRobustness, ADriftOfTheLevelOfJCostsNothing) {
+  const Figures still = figures_of({});
+  EXPECT_LT(still.late_loss, 0.03);
+  EXPECT_GE(still.inside, 0.85);
+  for (const double slope : {-0.005, 0.005, 0.02}) {
+    Plant plant;
+    plant.level_per_cycle = slope;
+    const Figures drifting = figures_of(plant);
+    EXPECT_LE(drifting.late_loss, 1.5 * still.late_loss) << slope;
+    EXPECT_GE(drifting.inside, 0.85) << slope;
+  }
+}
+
+TEST(CurveRobustness, ADelayToldWrongIsFound) {
+  for (const int delay : {0, 3, 10}) {
+    Plant plant;
+    plant.delay = plant.told_delay = delay;
+    plant.cycles = 120;
+    plant.seeds = 4;
+    const double right = figures_of(plant).early_loss;
+    for (const int error : {-4, -3, -1, 1, 2, 3}) {
+      plant.told_delay = delay + error;
+      if (plant.told_delay < 0) continue;
+      const Figures wrong = figures_of(plant);
+      const std::string at = "is " + std::to_string(delay) + ", told " + std::to_string(plant.told_delay);
+      EXPECT_LE(wrong.early_loss, 3.0 * right) << at;
+      EXPECT_EQ(wrong.at_bound, 0.0) << at;
+      EXPECT_LE(wrong.wrong_delay, 0.25) << at;
+    }
+  }
+}
+
+TEST(CurveRobustness, NeitherDoesADelayLeadAwayAfterAHandOver) {
+  for (const int error : {-3, -1, 1, 3}) {
+    Plant plant;
+    plant.delay = 4;
+    plant.told_delay = plant.delay + error;
+    plant.guide_best = 12.0;
+    plant.noise_sd = 0.05;
+    plant.cycles = 700;
+    plant.seeds = 2;
+    plant.drop = [](double away) { return -2.0 * std::abs(std::tanh(3.0 * away)) - 0.3 * std::abs(away); };
+    const Figures found = figures_of(plant);
+    EXPECT_EQ(found.at_bound, 0.0) << error;
+    EXPECT_LT(found.late_loss, 2.6) << error << ": 2 is a peak narrower than the dither";
+  }
+}
+
+TEST(CurveRobustness, AnIntervalHoldsWhereTheGuideIsInAnotherUnitOrFarTooSteepOrFlat) {
+  for (const double unit : {0.01, 0.1, 100.0}) {
+    Plant plant;
+    plant.unit = unit;
+    const Figures found = figures_of(plant);
+    EXPECT_GE(found.inside, 0.85) << unit;
+    EXPECT_LE(found.early_loss, 25.0) << unit << ": six times that of the right unit at most";
+  }
+  for (const double curvature : {0.003, 0.3}) {
+    Plant plant;
+    plant.drop = [curvature](double away) { return -curvature * away * away; };
+    plant.noise_sd = curvature < 0.03 ? 0.03 : 0.3;
+    EXPECT_GE(figures_of(plant).inside, 0.85) << curvature;
+  }
+}
+
+TEST(CurveRobustness, AnIntervalHoldsWhereTheOptimumMoves) {
+  for (const double drift : {0.01, -0.01}) {
+    Plant plant;
+    plant.optimum_per_cycle = drift;
+    EXPECT_GE(figures_of(plant).inside, 0.85) << drift;
+  }
+  Plant plant;
+  plant.step = 3.0;
+  EXPECT_GE(figures_of(plant).inside, 0.75) << "a fifth of the cycles follow a step that nobody can have seen yet";
+}
+
+TEST(CurveRobustness, JThatDoesNotAnswerIsSaidAloud) {
+  Plant plant;
+  plant.seeds = 12;
+  plant.stuck_from = 2;
+  EXPECT_GE(figures_of(plant).unanswered, 0.75);
+  plant.stuck_from = 1 << 30;
+  plant.noise_sd = 0.1;
+  EXPECT_LE(figures_of(plant).unanswered, 0.25);
+}
+
+}  // namespace
+}  // namespace mgdd::guide
