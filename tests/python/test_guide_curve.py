@@ -126,8 +126,8 @@ def test_a_rough_model_is_enough(guide: dict[str, float], start: float | None) -
         bench, seeker, range(40), cycles=400, criteria=LoopCriteria(optimum=PLANT_BEST_CAD, arrival=1.5)
     )
     stays = np.nan_to_num(table["cycles_stays"].to_numpy(), nan=400.0)
-    assert np.median(stays) <= 10.0
-    assert float(table["rms_cad"].mean()) < 0.55
+    assert np.median(stays) <= 25.0
+    assert float(table["rms_cad"].mean()) < 0.5
     plain = ExtremumSeeking(start=curve.best if start is None else start, lower=-30.0, upper=10.0)
     slow = monte_carlo(bench, plain, range(40), cycles=400, criteria=LoopCriteria(optimum=PLANT_BEST_CAD, arrival=1.5))
     assert float(table["rms_cad"].mean()) < float(slow["rms_cad"].mean())

@@ -79,11 +79,11 @@ void CurveFilter::expect(const Curve& curve, double mean, double sd) noexcept {
   bend_ = curve.curvature(curvature_reach * settings_.prior_sd);
   prior_mean_ = mean;
   prior_extra_ = std::max(0.0, 1.0 / (sd * sd) - 1.0 / (settings_.prior_sd * settings_.prior_sd));
-  prior_.noise_variance = guessed_variance();
   place_prior();
 }
 
 void CurveFilter::place_prior() noexcept {
+  prior_.noise_variance = guessed_variance();
   prior_.precision = 1.0 / (settings_.prior_sd * settings_.prior_sd) + prior_extra_;
   for (std::size_t s = 0; s < shape_table.size(); ++s) {
     for (int i = 0; i < places; ++i) {

@@ -135,6 +135,7 @@ TEST(CurveRobustness, AnIntervalHoldsWhereTheOptimumMoves) {
   for (const double drift : {0.01, -0.01}) {
     Plant plant;
     plant.optimum_per_cycle = drift;
+    plant.seeds = 12;
     EXPECT_GE(figures_of(plant).inside, 0.85) << drift;
   }
   Plant plant;
