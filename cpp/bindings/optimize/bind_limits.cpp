@@ -27,6 +27,7 @@ py::str limit_text(const Limit& l) {
   add("delay_cycles", l.lag.delay_cycles, standard.lag.delay_cycles);
   add("lag_cycles", l.lag.lag_cycles, standard.lag.lag_cycles);
   add("margin_sd", l.margin_sd, standard.margin_sd);
+  add("delay_uncertainty", l.delay_uncertainty, standard.delay_uncertainty);
   return py::str("{})").format(out);
 }
 
@@ -56,11 +57,16 @@ lag_cycles : float
 margin_sd : float
     Added to `margin`: this many standard deviations of the reading about the local model that the seeker learns of it.
     Without any, an estimate at the limit is above it in 5 to 25 % of the cycles; with one in less than 1 %.
+    Where more readings lie above than this margin lets expect, it grows by as much as five deviations more.
+delay_uncertainty : int
+    `delay_cycles` may be off by as many cycles to either side: the delay that foretells the readings clearly better is
+    taken instead, and the ``findings`` of the seeker say so. 0: the stated one is exact.
 
 Raises
 ------
 mgdd.errors.ParameterError
-    Limit not finite, negative margin, delay or lag, weight not > 0, ``margin_sd`` outside [0, 100].
+    Limit not finite, negative margin, delay or lag, weight not > 0, ``margin_sd`` outside [0, 100],
+    ``delay_uncertainty`` outside [0, 20].
 
 Examples
 --------
@@ -69,15 +75,16 @@ Examples
 Limit('p_max_bar', 95.0, margin=1.0)
 )")
       .def(py::init([](std::string name, double upper, double margin, const std::string& method, double weight,
-                       double scale, double delay_cycles, double lag_cycles, double margin_sd) {
+                       double scale, double delay_cycles, double lag_cycles, double margin_sd, int delay_uncertainty) {
              const ComponentLag lag{delay_cycles, lag_cycles};
-             Limit limit{std::move(name), upper, margin, parse_limit_method(method), weight, scale, lag, margin_sd};
+             Limit limit{std::move(name), upper, margin,    parse_limit_method(method), weight,
+                         scale,           lag,   margin_sd, delay_uncertainty};
              validate({limit});
              return limit;
            }),
            py::arg("name"), py::arg("upper"), py::kw_only(), py::arg("margin") = 0.0, py::arg("method") = "switching",
            py::arg("weight") = 1.0, py::arg("scale") = 0.0, py::arg("delay_cycles") = 0.0, py::arg("lag_cycles") = 0.0,
-           py::arg("margin_sd") = Limit{}.margin_sd)
+           py::arg("margin_sd") = Limit{}.margin_sd, py::arg("delay_uncertainty") = Limit{}.delay_uncertainty)
       .def_readonly("name", &Limit::name, "What is limited.")
       .def_readonly("upper", &Limit::upper, "The limit.")
       .def_readonly("margin", &Limit::margin, "Kept free below the limit.")
@@ -90,19 +97,21 @@ Limit('p_max_bar', 95.0, margin=1.0)
       .def_property_readonly(
           "lag_cycles", [](const Limit& l) { return l.lag.lag_cycles; }, "Time constant of its lag.")
       .def_readonly("margin_sd", &Limit::margin_sd, "Margin in standard deviations of the reading.")
+      .def_readonly("delay_uncertainty", &Limit::delay_uncertainty, "Cycles that the delay may be off to either side.")
       .def(
           "__eq__", [](const Limit& a, const Limit& b) { return a == b; }, py::is_operator())
       .def("__repr__", &limit_text)
       .def(py::pickle(
           [](const Limit& l) {
             return py::make_tuple(l.name, l.upper, l.margin, std::string(to_string(l.method)), l.weight, l.scale,
-                                  l.lag.delay_cycles, l.lag.lag_cycles, l.margin_sd);
+                                  l.lag.delay_cycles, l.lag.lag_cycles, l.margin_sd, l.delay_uncertainty);
           },
           [](const py::tuple& t) {
             const auto number = [&](std::size_t at) { return t[at].cast<double>(); };
             const LimitMethod method = parse_limit_method(t[3].cast<std::string>());
             const ComponentLag lag{number(6), number(7)};
-            return Limit{t[0].cast<std::string>(), number(1), number(2), method, number(4), number(5), lag, number(8)};
+            return Limit{t[0].cast<std::string>(), number(1), number(2), method, number(4), number(5), lag, number(8),
+                         t[9].cast<int>()};
           }));
 }
 

@@ -83,6 +83,17 @@ void bind_asking(py::class_<Guarded<T>>& cls) {
       .def_property_readonly(
           "misfires", [](const B& b) { return b.use()->protocol().misfires; }, "Misfired cycles told so far.")
       .def_property_readonly(
+          "failing_above", [](const B& b) { return input_array(b.use()->protocol().failures.failing_above()); },
+          "The nearest input known to fail on the upper side, shape (inputs,); infinite: none. After four failures "
+          "on\n"
+          "one side no more is asked than what has worked, but for single cycles that try whether it still fails.")
+      .def_property_readonly(
+          "failing_below", [](const B& b) { return input_array(b.use()->protocol().failures.failing_below()); },
+          "The same on the lower side; minus infinity: none.")
+      .def_property_readonly(
+          "failing_everywhere", [](const B& b) { return b.use()->protocol().failures.failing_everywhere(); },
+          "True after twelve failures in a row: of several inputs, or of the start where nothing has worked yet.")
+      .def_property_readonly(
           "component_count", [](const B& b) { return b.constant().component_count(); },
           "Components of J that tell takes.")
       .def_property_readonly(
@@ -94,6 +105,17 @@ void bind_asking(py::class_<Guarded<T>>& cls) {
             return names;
           },
           "Names of the limits, in the order of tell.")
+      .def_property_readonly(
+          "limit_delays",
+          [](const B& b) {
+            const auto r = b.use();
+            py::dict delays;
+            for (std::size_t i = 0; i < r->limit_count(); ++i)
+              delays[as_str(r->settings().limits[i].name)] = optimize::limit_delay_of(*r, i);
+            return delays;
+          },
+          "The delay at which every limit is read, by name [cycles]: as stated, until its readings clearly fit "
+          "another.")
       .def_property_readonly(
           "limit_states",
           [](const B& b) {

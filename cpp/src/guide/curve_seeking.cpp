@@ -141,6 +141,7 @@ CurveSeeking::CurveSeeking(CurveSeekingSettings settings)
       limits_(settings_.limits, settings_.limit_curves, settings_.space.lower[0], settings_.space.upper[0],
               limit_reach_share * settings_.prior_sd, settings_.memory_cycles),
       plain_(plain_settings(settings_)),
+      protocol_(1),
       estimate_(settings_.space.start),
       applied_(estimate_),
       delay_(std::lround(settings_.sensor.delay_cycles)),
@@ -164,8 +165,8 @@ double CurveSeeking::amplitude() const noexcept {
 }
 
 const Inputs& CurveSeeking::ask() noexcept {
-  if (protocol_.asked) return applied_;
-  const double last = applied_[0];
+  if (protocol_.asked) return applied();
+  const double last = applied()[0];
   if (plain_at_work_) {
     applied_[0] = taken_over_at_ + plain_.ask()[0];
   } else if (sent_count_ == 0) {
@@ -178,8 +179,7 @@ const Inputs& CurveSeeking::ask() noexcept {
   if (sent_count_ > 0) applied_[0] = within_limits(applied_[0]);
   if (protocol_.cycle > 0) applied_[0] = std::clamp(applied_[0], last - settings_.rate, last + settings_.rate);
   applied_[0] = std::clamp(applied_[0], settings_.space.lower[0], settings_.space.upper[0]);
-  protocol_.asked = true;
-  return applied_;
+  return protocol_.ask(applied_);
 }
 
 // An input that a limit forbids is taken back: to the other side of the estimate, or to the edge and inside of it.
@@ -200,14 +200,15 @@ TellStatus CurveSeeking::tell(const Reading& reading) noexcept {
   protocol_.count(status);
   if (status != TellStatus::accepted && status != TellStatus::misfire) return status;
   Inputs told;
-  const double applied = applied_input(reading, applied_, told)[0];
+  const double applied = protocol_.applied(reading, applied_, told)[0];
   if ((sent_count_ + 1) % hold_ == 0) upwards_ = side_of((sent_count_ + 1) / hold_);
   if (status == TellStatus::accepted) limits_.record(applied, reading.limits);
   const auto ring = static_cast<std::int64_t>(sent_.size());
   sent_[static_cast<std::size_t>(sent_count_ % ring)] = applied;
   ++sent_count_;
   if (plain_at_work_) {
-    tell_plain(reading, applied, status);
+    // After a misfire it is asked again, or elsewhere as the protocol says.
+    if (status == TellStatus::accepted) tell_plain(reading.components[0], applied);
     return status;
   }
   if (sent_count_ < ring) return status;
@@ -220,17 +221,14 @@ TellStatus CurveSeeking::tell(const Reading& reading) noexcept {
   return status;
 }
 
-void CurveSeeking::tell_plain(const Reading& reading, double applied, TellStatus status) noexcept {
+void CurveSeeking::tell_plain(double j, double applied) noexcept {
   const auto size = static_cast<std::int64_t>(held_back_.size());
   const auto at = [&](std::int64_t k) -> double& { return held_back_[static_cast<std::size_t>(k % size)]; };
+  at(held_count_) = j / taken_over_scale_;
+  const double held = at(std::max<std::int64_t>(0, held_count_ - (settings_.delay_uncertainty - delay_error_)));
   const double moved = applied - taken_over_at_;
-  double held = 0.0;
-  if (status == TellStatus::accepted) {
-    at(held_count_) = reading.components[0] / taken_over_scale_;
-    held = at(std::max<std::int64_t>(0, held_count_ - (settings_.delay_uncertainty - delay_error_)));
-    ++held_count_;
-  }
-  plain_.tell({{&held, 1}, {}, status != TellStatus::accepted, {&moved, 1}});
+  ++held_count_;
+  plain_.tell({{&held, 1}, {}, false, {&moved, 1}});
   estimate_[0] = std::clamp(taken_over_at_ + plain_.estimate()[0], settings_.space.lower[0], settings_.space.upper[0]);
 }
 
@@ -255,7 +253,8 @@ void CurveSeeking::learn(double cause, double j) noexcept {
 }
 
 double CurveSeeking::allowed_mean() noexcept {
-  return limits_.size() > 0 ? limits_.nearest(filter_.mean()) : filter_.mean();
+  const double mean = limits_.size() > 0 ? limits_.nearest(filter_.mean()) : filter_.mean();
+  return protocol_.failures.keep(scalar_input(mean))[0];
 }
 
 void CurveSeeking::judge_surprise(double input, double j) noexcept {
@@ -323,12 +322,14 @@ bool CurveSeeking::guide(const Curve& curve, std::span<const Curve> limit_curves
   const double error = learnt ? estimate_[0] - filter_.curve().best() : 0.0;
   const double sd = learnt ? filter_.spread() : settings_.prior_sd;
   limits_.restart(limit_curves);
+  protocol_.failures.forget();
   begin_at(curve, curve.best() + error, std::hypot(sd, point_doubt_share * settings_.prior_sd));
   return true;
 }
 
 void CurveSeeking::restart() noexcept {
   limits_.restart({});
+  protocol_.failures.forget();
   begin_at(filter_.curve(), estimate_[0], std::hypot(filter_.spread(), lost_share * settings_.prior_sd));
 }
 

@@ -201,6 +201,10 @@ optimize::LimitState GuidedEngine::limit_state(std::size_t i) const noexcept {
   return on(seeking_, [&](const auto& s) { return optimize::limit_state_of(s, i); });
 }
 
+double GuidedEngine::limit_delay(std::size_t i) const noexcept {
+  return on(seeking_, [&](const auto& s) { return optimize::limit_delay_of(s, i); });
+}
+
 GuidedCycle GuidedEngine::now() const noexcept {
   GuidedCycle out;
   out.guide_cad = out.feed_forward_cad = guide_cad_;

@@ -17,13 +17,6 @@ constexpr double limit_guess_counts = 4.0;
 constexpr double caution = 2.0;  // standard deviations of the mean
 constexpr int grid = 160, halvings = 10;
 
-std::vector<optimize::ComponentLag> lags_of(const std::vector<optimize::Limit>& limits) {
-  std::vector<optimize::ComponentLag> out;
-  for (const optimize::Limit& limit : limits)
-    out.push_back(limit.lag);
-  return out;
-}
-
 double scale_of(const optimize::Limit& limit) noexcept {
   if (limit.scale > 0.0) return limit.scale;
   return limit.upper != 0.0 ? std::abs(limit.upper) : 1.0;
@@ -35,14 +28,13 @@ LimitCurves::LimitCurves(std::vector<optimize::Limit> limits, std::vector<Curve>
                          double reach, double memory_cycles)
     : limits_(std::move(limits)),
       curves_(std::move(curves)),
-      causes_(lags_of(limits_), 1),
+      causes_(optimize::lags_of(limits_, memory_cycles), 1),
       lower_(lower),
       upper_(upper),
       reach_(reach),
       fading_(std::exp(-1.0 / memory_cycles)),
       sums_(limits_.size()),
       states_(limits_.size(), 0.0) {
-  optimize::validate(limits_);
   if (limits_.size() > max_limits) {
     throw about("limits", ShapeError("limits has " + std::to_string(limits_.size()) + " entries: at most 8 here"));
   }
@@ -69,6 +61,7 @@ void LimitCurves::record(double applied, std::span<const double> values) noexcep
   for (std::size_t i = 0; i < limits_.size(); ++i) {
     if (!causes_.known(i)) continue;
     auto& n = sums_[i];
+    if (causes_.judge(i, now, values[i])) n.fill(0.0);
     const double x = shape(i, causes_.of(i, now)[0]), y = values[i];
     // Running means: sums of squares of large numbers would cancel.
     n[count] = fading_ * n[count] + 1.0;

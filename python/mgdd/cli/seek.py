@@ -269,6 +269,7 @@ def _payload(
         "mean_efficiency_percent": summary["mean_efficiency_percent"],
         "mean_nox_ppm": summary["mean_nox_ppm"],
         "misfires": int(summary["misfires"]),
+        "findings": [str(finding) for finding in run.findings],
         "limits": dict(limits),
         "judged_from": int(summary["judged_from"]),
         "limit_report": limit_report(run, best, limits, states),

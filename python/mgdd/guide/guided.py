@@ -9,6 +9,7 @@ from typing import TYPE_CHECKING, Any, ClassVar, NamedTuple
 
 import numpy as np
 
+from mgdd.optimize.seeker_findings import SeekerFindings
 from mgdd.results.describe import as_html, rows_of
 from mgdd.results.labels import labelled_dataset
 
@@ -56,7 +57,7 @@ class Column(NamedTuple):
 TOLD = {"objective": Column("unit of J", "objective J"), "misfire": Column("-", "misfired cycle", np.int8)}
 
 
-class Guided(_CoreGuided):
+class Guided(SeekerFindings, _CoreGuided):
     """A seeker with a guide that keeps every told cycle.
 
     A subclass sets `_columns`: what `_standing` gives before a cycle is told, then what was applied, then `TOLD`. Its

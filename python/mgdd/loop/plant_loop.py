@@ -17,6 +17,7 @@ from mgdd.loop.limit_figures import noise_free_variable
 from mgdd.loop.plant import AnnouncingPlant, Measurement, Plant
 from mgdd.loop.summary import summarize_cycles
 from mgdd.results.describe import described
+from mgdd.results.finding import Finding
 from mgdd.results.labels import VARIABLES, labelled_dataset
 
 if TYPE_CHECKING:
@@ -63,6 +64,8 @@ class LoopRun:
         cycles from ``judged_from`` on above any of the thresholds ``exceed_above_NAME``.
     interrupted : bool
         Ctrl-C ended the run before all its cycles: it is the part that `mgdd.errors.Interrupted` carried.
+    findings : tuple of mgdd.results.Finding
+        What the seeker holds against the run at its end, as its ``findings``: inputs that make the plant fail.
 
     Examples
     --------
@@ -76,6 +79,7 @@ class LoopRun:
     dataset: xr.Dataset
     summary: Mapping[str, float]
     interrupted: bool = False
+    findings: tuple[Finding, ...] = ()
 
 
 def steer(plant: Plant, seeker: Seeker | FeedForward | GuidedEngine, cycles: int, criteria: LoopCriteria) -> LoopRun:
@@ -115,7 +119,8 @@ def steer(plant: Plant, seeker: Seeker | FeedForward | GuidedEngine, cycles: int
         del log[seeker.cycle - first :]  # a cycle that was measured and not told: it is asked again
     dataset = _dataset(log, first, plant.input_names, _guided(seeker, len(log)))
     dataset.attrs["interrupted"] = int(interrupted)
-    run = LoopRun(dataset=dataset, summary=summarize_cycles(dataset, criteria), interrupted=interrupted)
+    summary = summarize_cycles(dataset, criteria)
+    run = LoopRun(dataset=dataset, summary=summary, interrupted=interrupted, findings=seeker.findings)
     if interrupted:
         raise Interrupted(f"interrupted after {len(log)} of {cycles} cycles, which are in .partial", run)
     return run

@@ -78,8 +78,8 @@ def run_seeker(
     if not isinstance(plant, EngineBench) or isinstance(seeker, FeedForward | GuidedEngine):
         return steer(plant, seeker, cycles, criteria)
     goal = criteria.to_core(plant.limit_names)
-    run: Any = _core.loop.run_loop  # one overload for each class of seeker
-    raw, stop = or_partial(lambda: run(plant, seeker, cycles, **goal))
+    run_loop: Any = _core.loop.run_loop  # one overload for each class of seeker
+    raw, stop = or_partial(lambda: run_loop(plant, seeker, cycles, **goal))
     columns, names = raw["columns"], plant.limit_names
     known = plant.noise_free_limits(columns["soc_requested_cad"], columns["cycle"])
     dataset = cycles_to_dataset(plant, columns, estimate_cad=raw["estimate_cad"], noise_free_limits=known)
@@ -88,4 +88,5 @@ def run_seeker(
     summary |= {f"exceed_above_{name}": float(value) for name, value in criteria.exceed_above.items()}
     uppers = criteria.limits_of(names, seeker)
     summary |= limit_figures(known, names, uppers, int(summary["judged_from"]), NOISE_FREE)
-    return hand_over(LoopRun(dataset=dataset, summary=summary, interrupted=raw["interrupted"]), stop)
+    run = LoopRun(dataset=dataset, summary=summary, interrupted=raw["interrupted"], findings=seeker.findings)
+    return hand_over(run, stop)

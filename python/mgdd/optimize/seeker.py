@@ -14,6 +14,7 @@ from mgdd import _core
 from mgdd.errors import DataError, Error, Interrupted, ParameterError
 from mgdd.io.existing_file import existing_file
 from mgdd.io.whole_file import write_whole_text
+from mgdd.optimize.seeker_findings import SeekerFindings
 from mgdd.results.describe import as_html, rows_of
 from mgdd.results.labels import labelled_dataset
 
@@ -67,7 +68,7 @@ else:
     _CoreSeeker = object
 
 
-class Seeker(_CoreSeeker):
+class Seeker(SeekerFindings, _CoreSeeker):
     """What every seeker of `mgdd.optimize` has beside ``ask`` and ``tell``; `Seeker.load` reads a file of any kind.
 
     Examples
@@ -268,8 +269,8 @@ def _encode(value: Any) -> Any:
     if isinstance(value, _core.optimize.ComponentLag):
         return {"component_lag": {"delay_cycles": value.delay_cycles, "lag_cycles": value.lag_cycles}}
     if isinstance(value, _core.optimize.Limit):
-        names = ("name", "upper", "margin", "method", "weight", "scale", "delay_cycles", "lag_cycles", "margin_sd")
-        return {"limit": {name: getattr(value, name) for name in names}}
+        own = "name upper margin method weight scale delay_cycles lag_cycles margin_sd delay_uncertainty"
+        return {"limit": {name: getattr(value, name) for name in own.split()}}
     if isinstance(value, _core.guide.Curve):
         return {"curve": value._table}
     if isinstance(value, dict):

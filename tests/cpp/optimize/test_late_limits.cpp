@@ -32,7 +32,7 @@ class Sensor {
 TEST(CausingInputs, AreWhatTheReadingShows) {
   for (const ComponentLag lag :
        {ComponentLag{}, ComponentLag{7.0, 0.0}, ComponentLag{0.0, 3.0}, ComponentLag{4.0, 6.0}}) {
-    CausingInputs causes({ComponentLag{2.0, 0.0}, lag}, 2);
+    CausingInputs causes({{ComponentLag{2.0, 0.0}}, {lag}}, 2);
     Sensor first(lag), second(lag);
     int known = 0;
     for (int k = 0; k < 200; ++k) {
@@ -48,7 +48,7 @@ TEST(CausingInputs, AreWhatTheReadingShows) {
 }
 
 TEST(CausingInputs, ADelayBetweenTwoCyclesIsBetweenTheirInputs) {
-  CausingInputs causes({ComponentLag{2.25, 0.0}}, 1);
+  CausingInputs causes({{ComponentLag{2.25, 0.0}}}, 1);
   for (int k = 0; k < 20; ++k)
     causes.record(scalar_input(4.0 * k));
   EXPECT_DOUBLE_EQ(causes.of(0, scalar_input(76.0))[0], 4.0 * (19.0 - 2.25));
@@ -115,6 +115,25 @@ TEST(LateLimits, AndOneBehindALagToo) {
       EXPECT_LE(out.above, name == "golden_section" ? 0.15 : 0.02) << name << ", noise " << noise;
       EXPECT_GT(out.mean, -1.5) << name << ", noise " << noise;
     }
+  }
+}
+
+// Odd errors and even ones: a dither that flips every cycle takes a slope for its opposite at an odd one.
+TEST(LateLimits, ADelayWrongByAsManyCyclesAsItIsUncertainIsFound) {
+  for (const auto& [truth, stated] : {std::pair{10, 7}, {10, 8}, {10, 9}, {10, 11}, {10, 12}, {10, 13}, {1, 0}, {0, 3}}) {
+    Limit limit{"p_max_bar", 104.0};
+    limit.lag.delay_cycles = stated;
+    std::vector<double> above(10, 0.0);
+    for (std::uint64_t seed = 0; seed < 3; ++seed) {
+      auto all = every_seeker(space_at(scalar_input(-8.0), 30.0), 0.25, seed, {limit});
+      for (std::size_t i = 0; i < all.size(); ++i) {
+        const ComponentLag lag{static_cast<double>(truth), 0.0};
+        above[i] += std::visit([&](auto& s) { return late_run(s, lag, 0.25, seed); }, all[i].second).above / 3.0;
+      }
+    }
+    const auto names = every_seeker(space_at(scalar_input(-8.0), 30.0), 0.25, 0, {limit});
+    for (std::size_t i = 0; i < names.size(); ++i)
+      EXPECT_LE(above[i], 0.03) << names[i].first << ", " << truth << " stated as " << stated;
   }
 }
 

@@ -84,11 +84,12 @@ class CurveSeeking {
   bool handed_over() const noexcept { return plain_at_work_; }
   const Curve& curve() const noexcept { return filter_.curve(); }  ///< of the guide, now
   const CurveSeekingSettings& settings() const noexcept { return settings_; }
-  const optimize::Inputs& applied() const noexcept { return applied_; }
+  const optimize::Inputs& applied() const noexcept { return protocol_.sent(applied_); }
   const optimize::Protocol& protocol() const noexcept { return protocol_; }
   std::size_t component_count() const noexcept { return 1; }
   std::size_t limit_count() const noexcept { return settings_.limits.size(); }
   optimize::LimitState limit_state(std::size_t i) const noexcept { return limits_.state(i); }
+  double limit_delay(std::size_t i) const noexcept { return limits_.delay_cycles(i); }
 
   /// ParameterError for a restored state that these settings do not allow.
   void require_usable() const {
@@ -134,7 +135,7 @@ class CurveSeeking {
   void watch_repeats(double applied, double j) noexcept;
   void judge_surprise(double input, double j) noexcept;
   void take_over() noexcept;
-  void tell_plain(const optimize::Reading& reading, double applied, optimize::TellStatus status) noexcept;
+  void tell_plain(double j, double applied) noexcept;
   void begin_at(const Curve& curve, double mean, double sd) noexcept;
   bool usable(const Curve& curve) const noexcept;
 

@@ -25,6 +25,7 @@ class FeedForward {
   explicit FeedForward(S seeker, FeedForwardSettings settings = {})
       : seeker_(std::move(seeker)),
         path_(std::move(settings), seeker_.estimate().size()),
+        protocol_(seeker_.estimate().size()),
         applied_(seeker_.applied()) {}
 
   /// What the guide says of the operating point of the next cycle. A refused value lowers the trust and moves nothing;
@@ -33,7 +34,7 @@ class FeedForward {
   GuideStatus offer(const GuideValue& value, GuideCause cause) noexcept {
     if (protocol_.asked) return GuideStatus::busy;
     const GuidePath::Order order = path_.take(value, cause, seeker_.estimate(), seeker_.settings().space);
-    if (order.restart) seeker_.restart();
+    if (order.restart) restart();
     if (order.move.size() > 0) seeker_.shift_estimate(order.move);
     return order.status;
   }
@@ -43,8 +44,7 @@ class FeedForward {
       const optimize::Inputs move = path_.follow();
       if (move.size() > 0) seeker_.shift_estimate(move);
     }
-    applied_ = path_.testing() ? path_.test_input(seeker_.estimate()) : seeker_.ask();
-    protocol_.asked = true;
+    applied_ = path_.testing() ? protocol_.ask(path_.test_input(seeker_.estimate())) : protocol_.pass(seeker_.ask());
     return applied_;
   }
 
@@ -74,11 +74,14 @@ class FeedForward {
   /// A new operating point of which the guide says nothing: the feed-forward stands, the seeker begins anew, and the
   /// next value of the guide counts as one for a new point.
   void hold() noexcept {
-    seeker_.restart();
+    restart();
     path_.open();
   }
   /// The seeker begins anew; what the guide said stands.
-  void restart() noexcept { seeker_.restart(); }
+  void restart() noexcept {
+    seeker_.restart();
+    protocol_.failures.forget();
+  }
   void shift_estimate(const optimize::Inputs& by) noexcept { seeker_.shift_estimate(by); }
 
   const optimize::Inputs& estimate() const noexcept { return seeker_.estimate(); }
@@ -88,6 +91,7 @@ class FeedForward {
   std::size_t component_count() const noexcept { return seeker_.component_count(); }
   std::size_t limit_count() const noexcept { return seeker_.limit_count(); }
   optimize::LimitState limit_state(std::size_t i) const noexcept { return limit_state_of(seeker_, i); }
+  double limit_delay(std::size_t i) const noexcept { return limit_delay_of(seeker_, i); }
   const auto& settings() const noexcept { return seeker_.settings(); }
   const S& seeker() const noexcept { return seeker_; }
   S& seeker() noexcept { return seeker_; }  ///< for its history

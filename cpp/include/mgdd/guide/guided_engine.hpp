@@ -70,6 +70,7 @@ class GuidedEngine {
   /// What the settings of all seekers share.
   const optimize::VariantSeeker::Settings& settings() const noexcept { return settings_; }
   optimize::LimitState limit_state(std::size_t i) const noexcept;
+  double limit_delay(std::size_t i) const noexcept;
   const GuidedEngineSettings& guidance() const noexcept { return guidance_; }
 
   GuidedCycle now() const noexcept;

@@ -38,6 +38,7 @@ class LimitCurves {
   /// limit without a curve has not been read.
   double nearest(double wanted) noexcept;
   optimize::LimitState state(std::size_t i) const noexcept;
+  double delay_cycles(std::size_t i) const noexcept { return causes_.delay_cycles(i); }  ///< as far as readings tell
 
   template <class Self, class V>
   static void visit(Self& self, V& v) {

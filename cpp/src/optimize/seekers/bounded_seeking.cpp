@@ -40,6 +40,7 @@ BoundedSeeking::BoundedSeeking(BoundedSeekingSettings settings)
     : settings_(checked(std::move(settings))),
       filter_(settings_.limits, settings_.space.size(), 2.0 * settings_.dither.period),
       clamp_(settings_.space.size()),
+      protocol_(settings_.space.size()),
       applied_(settings_.space.start),
       estimate_(applied_),
       omega_(applied_),
@@ -53,8 +54,7 @@ BoundedSeeking::BoundedSeeking(BoundedSeekingSettings settings)
 }
 
 const Inputs& BoundedSeeking::ask() noexcept {
-  protocol_.asked = true;
-  return applied_;
+  return protocol_.ask(applied_);
 }
 
 TellStatus BoundedSeeking::tell(const Reading& reading) noexcept {
@@ -62,7 +62,7 @@ TellStatus BoundedSeeking::tell(const Reading& reading) noexcept {
   protocol_.count(status);
   if (status != TellStatus::accepted) return status;
   Inputs told;
-  const Inputs& applied = applied_input(reading, applied_, told);
+  const Inputs& applied = protocol_.applied(reading, applied_, told);
   filter_.record(applied, reading.limits);
   clamp_.record(applied_, applied, applied_);
   const Eigen::Index n = applied_.size();

@@ -3,6 +3,7 @@
 #include <algorithm>
 #include <array>
 #include <cmath>
+#include <numbers>
 #include <utility>
 
 #include "mgdd/common/enum_names.hpp"
@@ -25,21 +26,13 @@ constexpr std::array<std::pair<LimitState, std::string_view>, 3> state_names{{
 
 constexpr double significance = 2.0;        // standard errors
 constexpr double patience_share = 0.6;      // of the memory: how long the search waits for the slope of a limit
+constexpr double most_extra = 5.0;          // scatters: what integral action adds to a margin at most
 constexpr double alarm_cycles = 3.0;        // in a row over the limit
 constexpr double contradicted_steps = 3.0;  // in a row: infeasible
-constexpr double lag_memory = 4.0;          // time constants: behind a lag a slope takes longer to show
+constexpr double lag_memory = 4.0;          // time constants
 constexpr double binding_room = 1e-6;       // scales: no room
 constexpr double rounding = 1e-9;           // scales: less is not over a limit
 constexpr double barrier_edge = 0.01;       // scaled distance where the logarithm goes on as its tangent
-
-/// Refuses a limit's own mistakes before its lag sizes anything.
-std::vector<ComponentLag> lags_of(const std::vector<Limit>& limits) {
-  validate(limits);
-  std::vector<ComponentLag> out;
-  for (const Limit& limit : limits)
-    out.push_back(limit.lag);
-  return out;
-}
 
 /// The largest share of a step, at most 1, with which every entry stays within `most`.
 double share_within(const Inputs& step, const Inputs& most) noexcept {
@@ -80,17 +73,36 @@ void validate(const std::vector<Limit>& limits) {
       throw in_context(at, ParameterError("margin_sd", limit.margin_sd, "must lie in [0, 100]"));
     }
     validate(limit.lag, at);
+    if (limit.delay_uncertainty < 0 || limit.delay_uncertainty > 20) {
+      throw in_context(at, ParameterError("delay_uncertainty", limit.delay_uncertainty, "must lie in [0, 20] cycles"));
+    }
     if (!(limit.scale >= 0.0 && std::isfinite(limit.scale))) {
       throw in_context(at, ParameterError("scale", limit.scale, "must be >= 0 (0: the limit itself) and finite"));
     }
   }
 }
 
+std::vector<UncertainLag> lags_of(const std::vector<Limit>& limits, double memory) {
+  validate(limits);
+  std::vector<UncertainLag> out;
+  for (const Limit& limit : limits)
+    out.push_back({limit.lag, limit.delay_uncertainty, memory + lag_memory * limit.lag.lag_cycles});
+  return out;
+}
+
+void learn_excess(double& extra, const Limit& limit, double reading, double scatter, double memory) noexcept {
+  const double expected = 0.5 * std::erfc(limit.margin_sd / std::numbers::sqrt2);  // at the edge of the margin
+  const double over = reading > limit.upper - limit.margin ? 1.0 : 0.0;
+  extra = std::clamp(extra + (over - expected) * scatter / memory, 0.0, most_extra * scatter);
+}
+
 ConstraintFilter::ConstraintFilter(std::vector<Limit> limits, Eigen::Index inputs, double memory)
     : limits_(std::move(limits)),
-      causes_(lags_of(limits_), inputs),
+      causes_(lags_of(limits_, memory), inputs),
+      memory_(memory),
       patience_(patience_share * memory),
-      in_a_row_(limits_.size(), 0.0),
+      extra_(limits_.size(), 0.0),
+      in_a_row_(extra_),
       binding_(in_a_row_),
       contradicted_(in_a_row_),
       slopes_(limits_.size(), Inputs::Zero(inputs)),
@@ -109,6 +121,8 @@ void ConstraintFilter::record(const Inputs& applied, std::span<const double> val
   for (std::size_t i = 0; i < limits_.size(); ++i) {
     if (!causes_.known(i)) continue;
     models_[i].record(causes_.of(i, applied), values[i]);
+    if (causes_.judge(i, applied, values[i])) models_[i] = causes_.model(i);
+    learn_excess(extra_[i], limits_[i], values[i], models_[i].scatter(), memory_);
     in_a_row_[i] = values[i] > limits_[i].upper - limits_[i].margin ? in_a_row_[i] + 1.0 : 0.0;
   }
 }
@@ -138,7 +152,7 @@ double ConstraintFilter::excess(std::size_t i, const Inputs& at, const Inputs& r
 
 double ConstraintFilter::margin(std::size_t i) const noexcept {
   const double scatter = limits_[i].margin_sd > 0.0 ? limits_[i].margin_sd * models_[i].scatter() : 0.0;
-  return limits_[i].margin + scatter;
+  return limits_[i].margin + scatter + extra_[i];
 }
 
 LimitState ConstraintFilter::state(std::size_t i) const noexcept {
@@ -240,7 +254,7 @@ void ConstraintFilter::forget() noexcept {
   for (LocalModel& model : models_)
     model.forget();
   causes_.forget();
-  for (std::vector<double>* const column : {&in_a_row_, &binding_, &contradicted_})
+  for (std::vector<double>* const column : {&extra_, &in_a_row_, &binding_, &contradicted_})
     std::fill(column->begin(), column->end(), 0.0);
   has_good_ = false;
   active_ = false;

@@ -86,6 +86,7 @@ ExtremumSeeking::ExtremumSeeking(ExtremumSeekingSettings settings)
       dither_(settings_.dither, settings_.components, false),
       filter_(settings_.limits, settings_.space.size(), limit_memory_windows * settings_.dither.period),
       clamp_(settings_.space.size()),
+      protocol_(settings_.space.size()),
       estimate_(settings_.space.start),
       applied_(estimate_),
       gradient_(Inputs::Zero(estimate_.size())),
@@ -107,8 +108,7 @@ const Inputs& ExtremumSeeking::ask() noexcept {
     applied_[i] =
         estimate_[i] + share_ * settings_.dither.amplitude[i] * dither_.perturbation(static_cast<int>(phase_), i);
   }
-  protocol_.asked = true;
-  return applied_;
+  return protocol_.ask(applied_);
 }
 
 TellStatus ExtremumSeeking::tell(const Reading& reading) noexcept {
@@ -156,7 +156,7 @@ void ExtremumSeeking::move(Inputs step, const Inputs& rate) noexcept {
 
 void ExtremumSeeking::learn(const Reading& reading) noexcept {
   Inputs told;
-  const Inputs& applied = applied_input(reading, applied_, told);
+  const Inputs& applied = protocol_.applied(reading, applied_, told);
   filter_.record(applied, reading.limits);
   clamp_.record(applied_, applied, estimate_);
   const Inputs& a = settings_.dither.amplitude;
@@ -236,6 +236,7 @@ void ExtremumSeeking::restart() noexcept {
   limited_cycles_ = 0;
   filter_.forget();
   clamp_.forget();
+  protocol_.failures.forget();
 }
 
 }  // namespace mgdd::optimize

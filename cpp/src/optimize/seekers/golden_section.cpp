@@ -49,6 +49,7 @@ GoldenSection::GoldenSection(GoldenSectionSettings settings)
     : settings_(checked(std::move(settings))),
       filter_(settings_.limits, 1, 20.0),
       clamp_(1),
+      protocol_(1),
       estimate_(settings_.space.start),
       applied_(estimate_),
       lower_(settings_.space.lower[0]),
@@ -70,8 +71,7 @@ const Inputs& GoldenSection::ask() noexcept {
   } else {
     applied_ = estimate_;
   }
-  protocol_.asked = true;
-  return applied_;
+  return protocol_.ask(applied_);
 }
 
 TellStatus GoldenSection::tell(const Reading& reading) noexcept {
@@ -79,7 +79,7 @@ TellStatus GoldenSection::tell(const Reading& reading) noexcept {
   protocol_.count(status);
   if (status != TellStatus::accepted) return status;
   Inputs told;
-  const Inputs& applied = applied_input(reading, applied_, told);
+  const Inputs& applied = protocol_.applied(reading, applied_, told);
   const double j = objective_of(reading, settings_.maximize) + filter_.shaping(applied, reading.limits);
   filter_.record(applied, reading.limits);
   const auto slot = static_cast<std::size_t>(samples_++) % ring;
@@ -261,6 +261,7 @@ void GoldenSection::restart() noexcept {
   refining_ = false;
   filter_.forget();
   clamp_.forget();
+  protocol_.failures.forget();
 }
 
 // A bracket that still covers the range stays: what the range holds does not move.

@@ -40,6 +40,7 @@ GradientDescent::GradientDescent(GradientDescentSettings settings)
     : settings_(checked(std::move(settings))),
       filter_(settings_.limits, settings_.space.size(), 8.0 * static_cast<double>(settings_.space.size())),
       clamp_(settings_.space.size()),
+      protocol_(settings_.space.size()),
       estimate_(settings_.space.start),
       applied_(estimate_),
       gradient_(Inputs::Zero(estimate_.size())),
@@ -48,8 +49,7 @@ GradientDescent::GradientDescent(GradientDescentSettings settings)
 const Inputs& GradientDescent::ask() noexcept {
   applied_ = estimate_;
   applied_[stage_ / 2] += stage_ % 2 == 0 ? settings_.difference : -settings_.difference;
-  protocol_.asked = true;
-  return applied_;
+  return protocol_.ask(applied_);
 }
 
 TellStatus GradientDescent::tell(const Reading& reading) noexcept {
@@ -57,7 +57,7 @@ TellStatus GradientDescent::tell(const Reading& reading) noexcept {
   protocol_.count(status);
   if (status != TellStatus::accepted) return status;
   Inputs told;
-  const Inputs& applied = applied_input(reading, applied_, told);
+  const Inputs& applied = protocol_.applied(reading, applied_, told);
   filter_.record(applied, reading.limits);
   clamp_.record(applied_, applied, estimate_);
   const double j = objective_of(reading, settings_.maximize) + filter_.shaping(applied, reading.limits);
@@ -91,6 +91,7 @@ void GradientDescent::restart() noexcept {
   converged_at_ = -1;
   filter_.forget();
   clamp_.forget();
+  protocol_.failures.forget();
 }
 
 }  // namespace mgdd::optimize

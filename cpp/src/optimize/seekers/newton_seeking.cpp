@@ -58,6 +58,7 @@ NewtonSeeking::NewtonSeeking(NewtonSeekingSettings settings)
       dither_(settings_.dither, settings_.components, true),
       filter_(settings_.limits, settings_.space.size(), 2.0 * settings_.dither.period),
       clamp_(settings_.space.size()),
+      protocol_(settings_.space.size()),
       estimate_(settings_.space.start),
       applied_(estimate_),
       gradient_(Inputs::Zero(estimate_.size())),
@@ -72,8 +73,7 @@ const Inputs& NewtonSeeking::ask() noexcept {
     applied_[i] =
         estimate_[i] + share_ * settings_.dither.amplitude[i] * dither_.perturbation(static_cast<int>(phase_), i);
   }
-  protocol_.asked = true;
-  return applied_;
+  return protocol_.ask(applied_);
 }
 
 TellStatus NewtonSeeking::tell(const Reading& reading) noexcept {
@@ -98,7 +98,7 @@ void NewtonSeeking::update_inverse() noexcept {
 
 void NewtonSeeking::learn(const Reading& reading) noexcept {
   Inputs told;
-  const Inputs& applied = applied_input(reading, applied_, told);
+  const Inputs& applied = protocol_.applied(reading, applied_, told);
   filter_.record(applied, reading.limits);
   clamp_.record(applied_, applied, estimate_);
   const auto period = static_cast<std::size_t>(dither_.period());
@@ -159,6 +159,7 @@ void NewtonSeeking::restart() noexcept {
   slow_.setZero();
   filter_.forget();
   clamp_.forget();
+  protocol_.failures.forget();
 }
 
 }  // namespace mgdd::optimize

@@ -100,7 +100,12 @@ void Protocol::count(TellStatus status) noexcept {
   if (status != TellStatus::accepted && status != TellStatus::misfire) return;
   asked = false;
   ++cycle;
-  if (status == TellStatus::misfire) ++misfires;
+  if (status == TellStatus::misfire) {
+    ++misfires;
+    failures.failed();
+  } else {
+    failures.worked();
+  }
 }
 
 void require(TellStatus status, const Protocol& protocol, const Reading& reading, std::size_t components,

@@ -107,6 +107,7 @@ Spsa::Spsa(SpsaSettings settings)
       filter_(settings_.limits, settings_.space.size(), 2.0 * memory),
       clamp_(settings_.space.size()),
       trend_(settings_.space.size(), memory),
+      protocol_(settings_.space.size()),
       estimate_(settings_.space.start),
       candidate_(estimate_),
       applied_(estimate_),
@@ -164,8 +165,7 @@ const Inputs& Spsa::ask() noexcept {
       if (within >= 2) applied_[i] += c * direction(1, i);
     }
   }
-  protocol_.asked = true;
-  return applied_;
+  return protocol_.ask(applied_);
 }
 
 TellStatus Spsa::tell(const Reading& reading) noexcept {
@@ -173,7 +173,7 @@ TellStatus Spsa::tell(const Reading& reading) noexcept {
   protocol_.count(status);
   if (status != TellStatus::accepted) return status;
   Inputs told;
-  const Inputs& applied = applied_input(reading, applied_, told);
+  const Inputs& applied = protocol_.applied(reading, applied_, told);
   const double j = objective_of(reading, settings_.maximize) + filter_.shaping(applied, reading.limits);
   filter_.record(applied, reading.limits);
   const int gradients_end = per_gradient() * settings_.averaging;
@@ -295,6 +295,7 @@ void Spsa::restart() noexcept {
   trend_.forget();
   filter_.forget();
   clamp_.forget();
+  protocol_.failures.forget();
 }
 
 void Spsa::shift_estimate(const Inputs& by) noexcept {

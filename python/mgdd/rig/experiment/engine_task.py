@@ -112,7 +112,9 @@ class SeekPlan:
         summary = {name: value for name, value in run.summary.items() if value == value}
         said = {"guide": self.task.guide, "guide_cad": self.guide_cad, "start_cad": self.start_cad}
         return Outcome(
-            figures=to_jsonable({**said, "cycles": run.dataset.sizes["cycle"], **summary}),
+            figures=to_jsonable(
+                {**said, "cycles": run.dataset.sizes["cycle"], **summary, "findings": [str(f) for f in run.findings]}
+            ),
             dataset=run.dataset,
             interrupted=run.interrupted,
             drawings={"seek": partial(_draw, run.dataset, dict(self.task.limits))},

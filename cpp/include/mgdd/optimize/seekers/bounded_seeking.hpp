@@ -37,13 +37,14 @@ class BoundedSeeking {
   void restart() noexcept {
     filter_.forget();
     clamp_.forget();
+    protocol_.failures.forget();
   }
 
   /// Mean of the applied input over the last window; the start before there is one.
   const Inputs& estimate() const noexcept { return estimate_; }
   const BoundedSeekingSettings& settings() const noexcept { return settings_; }
   /// The input of the last ask; what the plant made of it stands in the reading.
-  const Inputs& applied() const noexcept { return applied_; }
+  const Inputs& applied() const noexcept { return protocol_.sent(applied_); }
   const Protocol& protocol() const noexcept { return protocol_; }
   std::size_t component_count() const noexcept { return 1; }
   /// What has been learnt of the limits.

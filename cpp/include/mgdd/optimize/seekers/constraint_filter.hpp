@@ -31,14 +31,22 @@ struct Limit {
   double upper = 0.0;
   double margin = 0.0;  ///< kept free below `upper`, same unit, >= 0
   LimitMethod method = LimitMethod::switching;
-  double weight = 1.0;     ///< penalty: J units per squared scaled excess; barrier: J units times the logarithm
-  double scale = 0.0;      ///< > 0; 0 = abs(upper), or 1
-  ComponentLag lag{};      ///< between the input and the reading: a reading is judged on the input that caused it
-  double margin_sd = 1.0;  ///< added to `margin`: standard deviations of the reading about its local model, >= 0
+  double weight = 1.0;        ///< penalty: J units per squared scaled excess; barrier: J units times the logarithm
+  double scale = 0.0;         ///< > 0; 0 = abs(upper), or 1
+  ComponentLag lag{};         ///< between the input and the reading: a reading is judged on the input that caused it
+  double margin_sd = 1.0;     ///< added to `margin`: standard deviations of the reading about its local model, >= 0
+  int delay_uncertainty = 3;  ///< [cycles] the delay may be off by as many to either side, 0 to 20: readings decide
 
   bool operator==(const Limit&) const = default;
 };
 void validate(const std::vector<Limit>& limits);
+/// Their lags, for planes that look back `memory` cycles, and longer behind a lag, where a slope takes longer to show.
+/// Refuses a limit's own mistakes before its lag sizes anything.
+std::vector<UncertainLag> lags_of(const std::vector<Limit>& limits, double memory);
+/// What is kept free for a limit of which more readings lie above than its margin lets expect; integral action, >= 0.
+/// `scatter` is the standard deviation of a reading, `memory` the cycles in which a limit that is always broken adds
+/// one.
+void learn_excess(double& extra, const Limit& limit, double reading, double scatter, double memory) noexcept;
 
 /// How a seeker steps, for the length of one call.
 struct StepFrame {
@@ -58,6 +66,8 @@ class ConstraintFilter {
   std::size_t size() const noexcept { return limits_.size(); }
   const std::vector<Limit>& limits() const noexcept { return limits_; }
   LimitState state(std::size_t i) const noexcept;
+  /// The delay at which limit i is read, as far as the readings tell [cycles].
+  double delay_cycles(std::size_t i) const noexcept { return causes_.delay_cycles(i); }
   /// Cycles until every limit is read at an input that has stayed; 0 where none is delayed or lagged.
   std::int64_t settling() const noexcept { return causes_.settling(); }
 
@@ -74,7 +84,7 @@ class ConstraintFilter {
   /// What has been learnt of limit i.
   const LocalModel& model(std::size_t i) const noexcept { return models_[i]; }
 
-  /// What limit i keeps free, scatter included, in its unit.
+  /// What limit i keeps free, scatter and what its readings have asked for included, in its unit.
   double margin(std::size_t i) const noexcept;
 
   /// The step within its rate, or where a limit forbids that, the nearest one in the metric of the seeker that no limit
@@ -98,6 +108,7 @@ class ConstraintFilter {
   static void visit(Self& self, V& v) {
     for (std::size_t i = 0; i < self.models_.size(); ++i)
       LocalModel::visit(self.models_[i], v, "limit" + std::to_string(i));
+    v("limit_extra", self.extra_);
     v("limit_in_a_row", self.in_a_row_);
     v("limit_good", self.good_);
     v("limit_has_good", self.has_good_);
@@ -114,8 +125,9 @@ class ConstraintFilter {
 
   std::vector<Limit> limits_;
   CausingInputs causes_;
-  double patience_;                 // cycles that a broken limit is given to show its slope
+  double memory_, patience_;        // cycles that a broken limit is given to show its slope
   std::vector<LocalModel> models_;  // one per limit
+  std::vector<double> extra_;       // margin that the share of readings above has asked for, in the unit of the limit
   std::vector<double> in_a_row_;
   std::vector<double> binding_;       // 1 where the limit turned the last step or is broken
   std::vector<double> contradicted_;  // steps in a row without any that would meet it
@@ -134,6 +146,16 @@ LimitState limit_state_of(const S& seeker, std::size_t i) noexcept {
     return seeker.limit_state(i);
   } else {
     return seeker.filter().state(i);
+  }
+}
+
+/// The delay at which limit i is read, as far as the readings tell [cycles].
+template <class S>
+double limit_delay_of(const S& seeker, std::size_t i) noexcept {
+  if constexpr (requires { seeker.limit_delay(i); }) {
+    return seeker.limit_delay(i);
+  } else {
+    return seeker.filter().delay_cycles(i);
   }
 }
 

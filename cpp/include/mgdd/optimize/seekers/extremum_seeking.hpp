@@ -63,7 +63,7 @@ class ExtremumSeeking {
   double amplitude_share() const noexcept { return share_; }
   const ExtremumSeekingSettings& settings() const noexcept { return settings_; }
   /// The input of the last ask; what the plant made of it stands in the reading.
-  const Inputs& applied() const noexcept { return applied_; }
+  const Inputs& applied() const noexcept { return protocol_.sent(applied_); }
   const Protocol& protocol() const noexcept { return protocol_; }
   std::size_t component_count() const noexcept { return settings_.components.size(); }
   /// What has been learnt of the limits.

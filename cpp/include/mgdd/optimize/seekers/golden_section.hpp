@@ -38,7 +38,7 @@ class GoldenSection {
   bool converged() const noexcept { return refining_; }
   const GoldenSectionSettings& settings() const noexcept { return settings_; }
   /// The input of the last ask; what the plant made of it stands in the reading.
-  const Inputs& applied() const noexcept { return applied_; }
+  const Inputs& applied() const noexcept { return protocol_.sent(applied_); }
   const Protocol& protocol() const noexcept { return protocol_; }
   std::size_t component_count() const noexcept { return 1; }
   /// What has been learnt of the limits.

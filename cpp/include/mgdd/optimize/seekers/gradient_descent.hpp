@@ -43,7 +43,7 @@ class GradientDescent {
   std::int64_t converged_at() const noexcept { return converged_at_; }
   const GradientDescentSettings& settings() const noexcept { return settings_; }
   /// The input of the last ask; what the plant made of it stands in the reading.
-  const Inputs& applied() const noexcept { return applied_; }
+  const Inputs& applied() const noexcept { return protocol_.sent(applied_); }
   const Protocol& protocol() const noexcept { return protocol_; }
   std::size_t component_count() const noexcept { return 1; }
   /// What has been learnt of the limits.

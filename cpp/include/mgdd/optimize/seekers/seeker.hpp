@@ -3,30 +3,18 @@
 // `ask` and `tell` are noexcept and allocation-free; `require` turns a status into an exception.
 #pragma once
 
-#include <Eigen/Core>
 #include <cstddef>
 #include <cstdint>
-#include <limits>
 #include <optional>
 #include <span>
 #include <string_view>
 
 #include "mgdd/common/error.hpp"
 #include "mgdd/optimize/reading.hpp"
+#include "mgdd/optimize/seekers/failure_watch.hpp"
+#include "mgdd/optimize/seekers/inputs.hpp"
 
 namespace mgdd::optimize {
-
-inline constexpr int max_inputs = 8;
-inline constexpr double unlimited = std::numeric_limits<double>::infinity();
-
-/// One number per input; at most eight, so that it never allocates.
-using Inputs = Eigen::Matrix<double, Eigen::Dynamic, 1, 0, max_inputs, 1>;
-using InputMatrix = Eigen::Matrix<double, Eigen::Dynamic, Eigen::Dynamic, 0, max_inputs, max_inputs>;
-
-/// A single input as a column.
-inline Inputs scalar_input(double value) {
-  return Inputs::Constant(1, value);
-}
 
 /// Where to start and what may be applied, per input; infinite: not bounded on that side.
 struct SearchSpace {
@@ -57,6 +45,14 @@ struct Reading {
   std::span<const double> applied{};  ///< what the plant really applied, in the order of the inputs; empty: as asked
 };
 
+/// The input that the plant applied, kept in `told`, or `asked` itself where the reading
+/// does not say; both outlive the answer.
+inline const Inputs& applied_input(const Reading& reading, const Inputs& asked, Inputs& told) noexcept {
+  if (reading.applied.empty()) return asked;  // NOLINT(bugprone-return-const-ref-from-parameter)
+  told = Eigen::Map<const Inputs>(reading.applied.data(), asked.size());
+  return told;
+}
+
 enum class TellStatus {
   accepted,
   misfire,
@@ -67,11 +63,36 @@ enum class TellStatus {
   wrong_applied  ///< not one number per input, or one that is not a reading; of a misfired cycle too
 };
 
-/// The bookkeeping of ask and tell.
+/// The bookkeeping of ask and tell, and the one place through which every input passes on its way to the plant.
 struct Protocol {
+  explicit Protocol(Eigen::Index inputs) noexcept : failures(inputs) {}
+
   std::int64_t cycle = 0;  ///< cycles told so far, misfires included
   std::int64_t misfires = 0;
   bool asked = false;
+  FailureWatch failures;
+
+  /// What is asked of the plant where the seeker wants `wanted`; the same until it is told.
+  const Inputs& ask(const Inputs& wanted) noexcept {
+    if (asked) return sent(wanted);
+    asked = true;
+    return failures.admit(wanted);
+  }
+  /// The same for an input that goes to the plant as it is, since what it comes from has looked already.
+  const Inputs& pass(const Inputs& input) noexcept {
+    asked = true;
+    return failures.pass(input);
+  }
+  /// What `ask` gave last.
+  const Inputs& sent(const Inputs& wanted) const noexcept {
+    return failures.instead() != nullptr ? *failures.instead()
+                                         : wanted;  // NOLINT(bugprone-return-const-ref-from-parameter)
+  }
+  /// What a seeker that wanted `wanted` learns from: the input that the plant applied, kept in `told`, or what was
+  /// asked where the reading does not say; all outlive the answer.
+  const Inputs& applied(const Reading& reading, const Inputs& wanted, Inputs& told) const noexcept {
+    return applied_input(reading, sent(wanted), told);
+  }
 
   /// What would become of this reading; changes nothing.
   TellStatus check(const Reading& reading, std::size_t components, std::size_t limits,
@@ -85,6 +106,7 @@ struct Protocol {
     v("cycle", self.cycle);
     v("misfires", self.misfires);
     v("asked", self.asked);
+    FailureWatch::visit(self.failures, v);
   }
 };
 
@@ -94,14 +116,6 @@ void require(TellStatus status, const Protocol& protocol, const Reading& reading
 
 /// ParameterError unless every entry of a restored column lies within the bounds of these settings.
 void require_within_space(std::string_view column, const Inputs& values, const SearchSpace& space);
-
-/// What a seeker learns from: the input that the plant applied, kept in `told`, or `asked` itself where the reading
-/// does not say; both outlive the answer.
-inline const Inputs& applied_input(const Reading& reading, const Inputs& asked, Inputs& told) noexcept {
-  if (reading.applied.empty()) return asked;  // NOLINT(bugprone-return-const-ref-from-parameter)
-  told = Eigen::Map<const Inputs>(reading.applied.data(), asked.size());
-  return told;
-}
 
 /// Sum of the components of J, negated where the user minimises.
 inline double objective_of(const Reading& reading, bool maximize) noexcept {

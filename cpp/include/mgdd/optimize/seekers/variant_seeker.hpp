@@ -51,6 +51,9 @@ class VariantSeeker {
   LimitState limit_state(std::size_t i) const noexcept {
     return on(seeker_, [&](const auto& s) { return limit_state_of(s, i); });
   }
+  double limit_delay(std::size_t i) const noexcept {
+    return on(seeker_, [&](const auto& s) { return limit_delay_of(s, i); });
+  }
   const Settings& settings() const noexcept { return settings_; }
   const Seeker& variant() const noexcept { return seeker_; }
 

@@ -1,0 +1,88 @@
+// Watches which inputs make a plant fail, as a misfire or a trip does, and keeps a seeker out of them. Four failures
+// on one side of what works, with no success as far out, set an edge there: from then on no more is asked than what has
+// worked, and a seeker learns from that as from a plant that clamps. Beyond the edge one cycle is tried at a time, at
+// the edge and half way to it in turn, after a wait that doubles with each failure; what works moves the edge or takes
+// it away. Failures of what has
+// just worked as well say nothing of the input: then no edge stays, and other inputs that have worked are asked in
+// turn. Inputs in their own units. noexcept and allocation-free.
+#pragma once
+
+#include <array>
+#include <cstdint>
+#include <string>
+
+#include "mgdd/optimize/reading.hpp"
+#include "mgdd/optimize/seekers/inputs.hpp"
+
+namespace mgdd::optimize {
+
+class FailureWatch {
+ public:
+  explicit FailureWatch(Eigen::Index inputs) noexcept;
+
+  /// What to ask of the plant where a seeker wants `wanted`: the same object as long as nothing speaks against it. One
+  /// call per cycle.
+  const Inputs& admit(const Inputs& wanted) noexcept;
+  /// The same for an input that goes to the plant as it is.
+  const Inputs& pass(const Inputs& input) noexcept;
+  /// What `admit` gave last where it differs from what was wanted; nullptr where it was the same.
+  const Inputs* instead() const noexcept { return differs_ ? &sent_ : nullptr; }
+
+  /// What became of the input that `admit` gave.
+  void worked() noexcept;
+  void failed() noexcept;
+
+  /// The nearest input, per input, that is known to fail on the upper and the lower side; infinite: none.
+  Inputs failing_above() const noexcept { return edge(0); }
+  Inputs failing_below() const noexcept { return -edge(1); }
+  /// True after so many failures in a row that other inputs have failed as well, or none has worked yet.
+  bool failing_everywhere() const noexcept;
+  /// `input` moved to where no edge is beyond.
+  Inputs keep(const Inputs& input) const noexcept;
+  /// A new operating point: the edges are void. What has worked is kept as somewhere to go back to.
+  void forget() noexcept;
+
+  template <class Self, class V>
+  static void visit(Self& self, V& v) {
+    v("failing_sent", self.sent_);
+    v("failing_differs", self.differs_);
+    v("failing_good", self.good_);
+    v("failing_worked", self.worked_);
+    v("failing_in_a_row", self.in_a_row_);
+    v("failing_probe", self.probe_);
+    for (std::size_t s = 0; s < 2; ++s) {
+      const std::string name = s == 0 ? "failing_above_" : "failing_below_";
+      v(name + "farthest", self.sides_[s].farthest);
+      v(name + "reach", self.sides_[s].reach);
+      v(name + "edge", self.sides_[s].edge);
+      v(name + "suspect", self.sides_[s].suspect);
+      v(name + "failures", self.sides_[s].failures);
+      v(name + "wait", self.sides_[s].wait);
+      v(name + "held", self.sides_[s].held);
+      v(name + "again", self.sides_[s].again);
+    }
+  }
+
+ private:
+  struct Side {         // inputs times +1 (upper) or -1 (lower side)
+    Inputs farthest;    // that has ever worked
+    Inputs reach;       // the same of late: less where an edge has come nearer
+    Inputs edge;        // the nearest that is known to fail
+    Inputs suspect;     // the nearest that failed since something as far out worked
+    Inputs failures;    // in number, of these
+    Inputs wait, held;  // cycles until the next try beyond, and how many have passed
+    Inputs again;       // 1: that one is at the edge itself
+  };
+  Inputs edge(std::size_t side) const noexcept;
+  Inputs middle() const noexcept { return 0.5 * (sides_[0].reach - sides_[1].reach); }
+  void set_edge(Side& side, Eigen::Index i, double failing, double good) noexcept;
+
+  std::array<Side, 2> sides_;
+  Inputs sent_, good_;
+  bool differs_ = false;
+  bool worked_ = false;        // anything at all
+  std::int64_t in_a_row_ = 0;  // failures
+  std::int64_t probe_ = -1;    // 2 i + side while a try beyond the edge of input i is out, else -1
+};
+
+}  // namespace mgdd::optimize

@@ -1,0 +1,70 @@
+"""What a seeker has found out that speaks against its run, in words."""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+
+from mgdd.results.finding import Finding
+
+if TYPE_CHECKING:
+    from numpy.typing import NDArray
+
+__all__ = ["SeekerFindings"]
+
+
+if TYPE_CHECKING:
+
+    class _Watching:
+        """What every seeker has of its class of the core, and what stands around one."""
+
+        @property
+        def failing_above(self) -> NDArray[np.float64]: ...
+        @property
+        def failing_below(self) -> NDArray[np.float64]: ...
+        @property
+        def failing_everywhere(self) -> bool: ...
+        @property
+        def limit_delays(self) -> dict[str, float]: ...
+        @property
+        def settings(self) -> dict[str, Any]: ...
+else:
+    _Watching = object
+
+
+class SeekerFindings(_Watching):
+    """Mixed into every seeker: its findings."""
+
+    @property
+    def findings(self) -> tuple[Finding, ...]:
+        """What speaks against the run so far: codes ``failing_inputs``, ``failing_everywhere`` and ``limit_delay``.
+
+        Examples
+        --------
+        >>> from mgdd.optimize import GradientDescent
+        >>> seeker = GradientDescent(start=0.0, difference=0.5)
+        >>> def fails_above_3(x):
+        ...     return None if x[0] > 3.0 else -0.02 * (x[0] - 5.0) ** 2
+        >>> history = seeker.run(fails_above_3, 300)
+        >>> [finding.code for finding in seeker.findings], float(history["applied"][-1, 0]) <= 3.0
+        (['failing_inputs'], True)
+        """
+        out = list[Finding]()
+        if self.failing_everywhere:
+            text = "the last twelve cycles and more have failed, of every input that was tried"
+            out.append(Finding("failing_everywhere", (), text, "look at the plant, or start where it is known to run"))
+        for side, edges in (("above", self.failing_above), ("below", self.failing_below)):
+            for index in np.flatnonzero(np.isfinite(edges)):
+                name, edge = f"input[{index}]", float(edges[index])
+                text = f"the plant fails at {name} = {edge:.4g} and {side}: less is asked, and it is tried now and then"
+                remedy = f"set {'upper' if side == 'above' else 'lower'} inside of it, or mend what makes it fail"
+                out.append(Finding("failing_inputs", (name,), text, remedy))
+        for limit in self.settings["limits"]:
+            taken = self.limit_delays[limit.name]
+            if taken != limit.delay_cycles:
+                text = f"readings of {limit.name} fit a delay of {taken:g} cycles, not {limit.delay_cycles:g} as stated"
+                at_end = abs(taken - limit.delay_cycles) >= limit.delay_uncertainty
+                more = ", and raise delay_uncertainty: it is the end of the search" if at_end else ""
+                out.append(Finding("limit_delay", (limit.name,), text, f"mend delay_cycles of the limit{more}"))
+        return tuple(out)
