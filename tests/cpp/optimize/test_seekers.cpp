@@ -123,9 +123,11 @@ TEST(EverySeeker, AMisfireOnlyCounts) {
     EXPECT_EQ(seeker.protocol().cycle, 58);
     EXPECT_EQ(seeker.protocol().misfires, 1);
     EXPECT_EQ(seeker.ask(), x);
-    const StateColumns after = save_state(seeker);
+    StateColumns after = save_state(seeker);
     other.ask();
     StateColumns before = save_state(other);
+    for (StateColumns* const state : {&before, &after})  // where it failed is counted as well
+      std::erase_if(*state, [](const auto& column) { return column.first.starts_with("failing_"); });
     before["cycle"] = {58.0};
     before["misfires"] = {1.0};
     EXPECT_EQ(before, after);
