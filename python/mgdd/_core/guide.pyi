@@ -94,7 +94,7 @@ class CurveSeeking:
     """
     Seeking guided by a curve; see mgdd.guide.CurveSeeking.
     """
-    def __init__(self, *, start: typing.Any, lower: typing.Any, upper: typing.Any, curve: Curve, prior_sd: typing.SupportsFloat | typing.SupportsIndex | None = None, scale_sd: typing.SupportsFloat | typing.SupportsIndex = 0.3, discrepancy: typing.SupportsFloat | typing.SupportsIndex = 0.25, noise_sd: typing.SupportsFloat | typing.SupportsIndex | None = None, memory_cycles: typing.SupportsFloat | typing.SupportsIndex = 143.0, amplitude_max: typing.SupportsFloat | typing.SupportsIndex | None = None, rate: typing.SupportsFloat | typing.SupportsIndex | None = None, delay_cycles: typing.SupportsFloat | typing.SupportsIndex = 0.0, lag_cycles: typing.SupportsFloat | typing.SupportsIndex = 0.0, hand_over: bool = True, maximize: bool = True, limits: collections.abc.Sequence[mgdd._core.optimize.Limit] = [], limit_curves: collections.abc.Sequence[Curve] | None = None) -> None:
+    def __init__(self, *, start: typing.Any, lower: typing.Any, upper: typing.Any, curve: Curve, prior_sd: typing.SupportsFloat | typing.SupportsIndex | None = None, scale_sd: typing.SupportsFloat | typing.SupportsIndex = 0.3, discrepancy: typing.SupportsFloat | typing.SupportsIndex = 0.25, noise_sd: typing.SupportsFloat | typing.SupportsIndex | None = None, memory_cycles: typing.SupportsFloat | typing.SupportsIndex = 143.0, amplitude_max: typing.SupportsFloat | typing.SupportsIndex | None = None, rate: typing.SupportsFloat | typing.SupportsIndex | None = None, delay_cycles: typing.SupportsFloat | typing.SupportsIndex = 0.0, lag_cycles: typing.SupportsFloat | typing.SupportsIndex = 0.0, delay_uncertainty: typing.SupportsInt | typing.SupportsIndex = 4, hand_over: bool = True, maximize: bool = True, limits: collections.abc.Sequence[mgdd._core.optimize.Limit] = [], limit_curves: collections.abc.Sequence[Curve] | None = None) -> None:
         ...
     def _clear_history(self) -> None:
         """
@@ -131,6 +131,11 @@ class CurveSeeking:
         1e30 in magnitude); the state is unchanged then.
         """
     @property
+    def answered(self) -> bool:
+        """
+        False where 60 readings and more have not shown that J answers the input: the estimate is the guide's.
+        """
+    @property
     def component_count(self) -> int:
         """
         Components of J that tell takes.
@@ -139,6 +144,11 @@ class CurveSeeking:
     def cycle(self) -> int:
         """
         Cycles told so far, misfires included.
+        """
+    @property
+    def delay_cycles(self) -> int:
+        """
+        Whole cycles between input and reading that explain the readings best.
         """
     @property
     def doubts(self) -> int:
@@ -156,9 +166,30 @@ class CurveSeeking:
         Standard deviation of the estimate as stated, in the unit of the input; NaN after a hand-over.
         """
     @property
+    def failing_above(self) -> numpy.typing.NDArray[numpy.float64]:
+        """
+        The nearest input known to fail on the upper side, shape (inputs,); infinite: none. After four failures on
+        one side no more is asked than what has worked, but for single cycles that try whether it still fails.
+        """
+    @property
+    def failing_below(self) -> numpy.typing.NDArray[numpy.float64]:
+        """
+        The same on the lower side; minus infinity: none.
+        """
+    @property
+    def failing_everywhere(self) -> bool:
+        """
+        True after twelve failures in a row: of several inputs, or of the start where nothing has worked yet.
+        """
+    @property
     def handed_over(self) -> bool:
         """
         Whether plain extremum seeking is at work, because the guide kept failing.
+        """
+    @property
+    def limit_delays(self) -> dict:
+        """
+        The delay at which every limit is read, by name [cycles]: as stated, until its readings clearly fit another.
         """
     @property
     def limit_names(self) -> list[str]:
@@ -281,6 +312,22 @@ class FeedForward:
         Present estimate of the optimum, shape (inputs,).
         """
     @property
+    def failing_above(self) -> numpy.typing.NDArray[numpy.float64]:
+        """
+        The nearest input known to fail on the upper side, shape (inputs,); infinite: none. After four failures on
+        one side no more is asked than what has worked, but for single cycles that try whether it still fails.
+        """
+    @property
+    def failing_below(self) -> numpy.typing.NDArray[numpy.float64]:
+        """
+        The same on the lower side; minus infinity: none.
+        """
+    @property
+    def failing_everywhere(self) -> bool:
+        """
+        True after twelve failures in a row: of several inputs, or of the start where nothing has worked yet.
+        """
+    @property
     def feed_forward(self) -> numpy.typing.NDArray[numpy.float64]:
         """
         Feed-forward in force, shape (inputs,); NaN before there is one.
@@ -289,6 +336,11 @@ class FeedForward:
     def guide_optimum(self) -> numpy.typing.NDArray[numpy.float64]:
         """
         Last valid optimum of the guide, shape (inputs,); NaN before there is one.
+        """
+    @property
+    def limit_delays(self) -> dict:
+        """
+        The delay at which every limit is read, by name [cycles]: as stated, until its readings clearly fit another.
         """
     @property
     def limit_names(self) -> list[str]:
@@ -516,6 +568,27 @@ class GuidedEngine:
     def estimate_sd(self) -> float:
         """
         Standard deviation of the estimate as stated [°CA]; NaN where the seeker states none.
+        """
+    @property
+    def failing_above(self) -> numpy.typing.NDArray[numpy.float64]:
+        """
+        The nearest input known to fail on the upper side, shape (inputs,); infinite: none. After four failures on
+        one side no more is asked than what has worked, but for single cycles that try whether it still fails.
+        """
+    @property
+    def failing_below(self) -> numpy.typing.NDArray[numpy.float64]:
+        """
+        The same on the lower side; minus infinity: none.
+        """
+    @property
+    def failing_everywhere(self) -> bool:
+        """
+        True after twelve failures in a row: of several inputs, or of the start where nothing has worked yet.
+        """
+    @property
+    def limit_delays(self) -> dict:
+        """
+        The delay at which every limit is read, by name [cycles]: as stated, until its readings clearly fit another.
         """
     @property
     def limit_names(self) -> list[str]:

@@ -254,11 +254,16 @@ class Limit:
     margin_sd : float
         Added to `margin`: this many standard deviations of the reading about the local model that the seeker learns of it.
         Without any, an estimate at the limit is above it in 5 to 25 % of the cycles; with one in less than 1 %.
+        Where more readings lie above than this margin lets expect, it grows by as much as five deviations more.
+    delay_uncertainty : int
+        `delay_cycles` may be off by as many cycles to either side: the delay that foretells the readings clearly better is
+        taken instead, and the ``findings`` of the seeker say so. 0: the stated one is exact.
     
     Raises
     ------
     mgdd.errors.ParameterError
-        Limit not finite, negative margin, delay or lag, weight not > 0, ``margin_sd`` outside [0, 100].
+        Limit not finite, negative margin, delay or lag, weight not > 0, ``margin_sd`` outside [0, 100],
+        ``delay_uncertainty`` outside [0, 20].
     
     Examples
     --------
@@ -269,9 +274,9 @@ class Limit:
     __hash__: typing.ClassVar[None] = None
     def __eq__(self, arg0: Limit) -> bool:
         ...
-    def __getstate__(self) -> tuple[str, float, float, str, float, float, float, float, float]:
+    def __getstate__(self) -> tuple[str, float, float, str, float, float, float, float, float, int]:
         ...
-    def __init__(self, name: str, upper: typing.SupportsFloat | typing.SupportsIndex, *, margin: typing.SupportsFloat | typing.SupportsIndex = 0.0, method: str = 'switching', weight: typing.SupportsFloat | typing.SupportsIndex = 1.0, scale: typing.SupportsFloat | typing.SupportsIndex = 0.0, delay_cycles: typing.SupportsFloat | typing.SupportsIndex = 0.0, lag_cycles: typing.SupportsFloat | typing.SupportsIndex = 0.0, margin_sd: typing.SupportsFloat | typing.SupportsIndex = 1.0) -> None:
+    def __init__(self, name: str, upper: typing.SupportsFloat | typing.SupportsIndex, *, margin: typing.SupportsFloat | typing.SupportsIndex = 0.0, method: str = 'switching', weight: typing.SupportsFloat | typing.SupportsIndex = 1.0, scale: typing.SupportsFloat | typing.SupportsIndex = 0.0, delay_cycles: typing.SupportsFloat | typing.SupportsIndex = 0.0, lag_cycles: typing.SupportsFloat | typing.SupportsIndex = 0.0, margin_sd: typing.SupportsFloat | typing.SupportsIndex = 1.0, delay_uncertainty: typing.SupportsInt | typing.SupportsIndex = 3) -> None:
         ...
     def __repr__(self) -> str:
         ...
@@ -281,6 +286,11 @@ class Limit:
     def delay_cycles(self) -> float:
         """
         Transport delay of the reading.
+        """
+    @property
+    def delay_uncertainty(self) -> int:
+        """
+        Cycles that the delay may be off to either side.
         """
     @property
     def lag_cycles(self) -> float:
@@ -427,9 +437,30 @@ class ExtremumSeeking:
         Present estimate of the optimum, shape (inputs,).
         """
     @property
+    def failing_above(self) -> numpy.typing.NDArray[numpy.float64]:
+        """
+        The nearest input known to fail on the upper side, shape (inputs,); infinite: none. After four failures on
+        one side no more is asked than what has worked, but for single cycles that try whether it still fails.
+        """
+    @property
+    def failing_below(self) -> numpy.typing.NDArray[numpy.float64]:
+        """
+        The same on the lower side; minus infinity: none.
+        """
+    @property
+    def failing_everywhere(self) -> bool:
+        """
+        True after twelve failures in a row: of several inputs, or of the start where nothing has worked yet.
+        """
+    @property
     def gradient(self) -> numpy.typing.NDArray[numpy.float64]:
         """
         Last estimate of the slope of the maximised objective, shape (inputs,).
+        """
+    @property
+    def limit_delays(self) -> dict:
+        """
+        The delay at which every limit is read, by name [cycles]: as stated, until its readings clearly fit another.
         """
     @property
     def limit_names(self) -> list[str]:
@@ -514,6 +545,22 @@ class NewtonSeeking:
         Present estimate of the optimum, shape (inputs,).
         """
     @property
+    def failing_above(self) -> numpy.typing.NDArray[numpy.float64]:
+        """
+        The nearest input known to fail on the upper side, shape (inputs,); infinite: none. After four failures on
+        one side no more is asked than what has worked, but for single cycles that try whether it still fails.
+        """
+    @property
+    def failing_below(self) -> numpy.typing.NDArray[numpy.float64]:
+        """
+        The same on the lower side; minus infinity: none.
+        """
+    @property
+    def failing_everywhere(self) -> bool:
+        """
+        True after twelve failures in a row: of several inputs, or of the start where nothing has worked yet.
+        """
+    @property
     def gradient(self) -> numpy.typing.NDArray[numpy.float64]:
         """
         Last estimate of the slope of the maximised objective, shape (inputs,).
@@ -527,6 +574,11 @@ class NewtonSeeking:
     def inverse_hessian(self) -> typing.Annotated[numpy.typing.NDArray[numpy.float64], "[m, n]"]:
         """
         State of the Riccati filter, which tends to the inverse Hessian.
+        """
+    @property
+    def limit_delays(self) -> dict:
+        """
+        The delay at which every limit is read, by name [cycles]: as stated, until its readings clearly fit another.
         """
     @property
     def limit_names(self) -> list[str]:
@@ -609,6 +661,27 @@ class BoundedSeeking:
     def estimate(self) -> numpy.typing.NDArray[numpy.float64]:
         """
         Present estimate of the optimum, shape (inputs,).
+        """
+    @property
+    def failing_above(self) -> numpy.typing.NDArray[numpy.float64]:
+        """
+        The nearest input known to fail on the upper side, shape (inputs,); infinite: none. After four failures on
+        one side no more is asked than what has worked, but for single cycles that try whether it still fails.
+        """
+    @property
+    def failing_below(self) -> numpy.typing.NDArray[numpy.float64]:
+        """
+        The same on the lower side; minus infinity: none.
+        """
+    @property
+    def failing_everywhere(self) -> bool:
+        """
+        True after twelve failures in a row: of several inputs, or of the start where nothing has worked yet.
+        """
+    @property
+    def limit_delays(self) -> dict:
+        """
+        The delay at which every limit is read, by name [cycles]: as stated, until its readings clearly fit another.
         """
     @property
     def limit_names(self) -> list[str]:
@@ -698,6 +771,22 @@ class Spsa:
         Present estimate of the optimum, shape (inputs,).
         """
     @property
+    def failing_above(self) -> numpy.typing.NDArray[numpy.float64]:
+        """
+        The nearest input known to fail on the upper side, shape (inputs,); infinite: none. After four failures on
+        one side no more is asked than what has worked, but for single cycles that try whether it still fails.
+        """
+    @property
+    def failing_below(self) -> numpy.typing.NDArray[numpy.float64]:
+        """
+        The same on the lower side; minus infinity: none.
+        """
+    @property
+    def failing_everywhere(self) -> bool:
+        """
+        True after twelve failures in a row: of several inputs, or of the start where nothing has worked yet.
+        """
+    @property
     def gradient(self) -> numpy.typing.NDArray[numpy.float64]:
         """
         Last estimate of the slope of the maximised objective, shape (inputs,).
@@ -711,6 +800,11 @@ class Spsa:
     def iteration(self) -> int:
         """
         Iterations since the start or restart.
+        """
+    @property
+    def limit_delays(self) -> dict:
+        """
+        The delay at which every limit is read, by name [cycles]: as stated, until its readings clearly fit another.
         """
     @property
     def limit_names(self) -> list[str]:
@@ -805,6 +899,22 @@ class GradientDescent:
         Present estimate of the optimum, shape (inputs,).
         """
     @property
+    def failing_above(self) -> numpy.typing.NDArray[numpy.float64]:
+        """
+        The nearest input known to fail on the upper side, shape (inputs,); infinite: none. After four failures on
+        one side no more is asked than what has worked, but for single cycles that try whether it still fails.
+        """
+    @property
+    def failing_below(self) -> numpy.typing.NDArray[numpy.float64]:
+        """
+        The same on the lower side; minus infinity: none.
+        """
+    @property
+    def failing_everywhere(self) -> bool:
+        """
+        True after twelve failures in a row: of several inputs, or of the start where nothing has worked yet.
+        """
+    @property
     def gradient(self) -> numpy.typing.NDArray[numpy.float64]:
         """
         Last estimate of the slope of the maximised objective, shape (inputs,).
@@ -813,6 +923,11 @@ class GradientDescent:
     def iteration(self) -> int:
         """
         Steps made.
+        """
+    @property
+    def limit_delays(self) -> dict:
+        """
+        The delay at which every limit is read, by name [cycles]: as stated, until its readings clearly fit another.
         """
     @property
     def limit_names(self) -> list[str]:
@@ -905,6 +1020,27 @@ class GoldenSection:
     def estimate(self) -> numpy.typing.NDArray[numpy.float64]:
         """
         Present estimate of the optimum, shape (inputs,).
+        """
+    @property
+    def failing_above(self) -> numpy.typing.NDArray[numpy.float64]:
+        """
+        The nearest input known to fail on the upper side, shape (inputs,); infinite: none. After four failures on
+        one side no more is asked than what has worked, but for single cycles that try whether it still fails.
+        """
+    @property
+    def failing_below(self) -> numpy.typing.NDArray[numpy.float64]:
+        """
+        The same on the lower side; minus infinity: none.
+        """
+    @property
+    def failing_everywhere(self) -> bool:
+        """
+        True after twelve failures in a row: of several inputs, or of the start where nothing has worked yet.
+        """
+    @property
+    def limit_delays(self) -> dict:
+        """
+        The delay at which every limit is read, by name [cycles]: as stated, until its readings clearly fit another.
         """
     @property
     def limit_names(self) -> list[str]:
