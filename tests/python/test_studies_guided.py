@@ -45,7 +45,7 @@ def test_a_guide_4_cad_wrong_saves_cycles_and_j(bench: StudyResult) -> None:
     assert own["feed_forward"]["cycles_to_1_cad_high"] < 0.5 * own["unguided"]["cycles_to_1_cad_low"]
     for case in ("curve", "parabola"):
         assert own[case]["cycles_to_1_cad_high"] <= 8
-        assert own[case]["cycles_stays_1_5_cad"] <= 12
+        assert own[case]["cycles_stays_1_5_cad"] <= 25
         assert own[case]["lost_j_cycles_high"] < 0.5 * own["feed_forward"]["lost_j_cycles_low"]
         assert own[case]["late_loss_high"] < own["unguided"]["late_loss_low"]
 
