@@ -82,9 +82,9 @@ test: ready ## set up, then run the tests of both languages, except those marked
 	@$(RUN_TESTS); echo "left out: tests marked slow, which \`make test-all\` runs too"
 
 test-all: MARKED :=
-test-all: ready ## the same with those marked slow, then lint
-	@$(RUN_TESTS)
+test-all: ready ## lint, then the same with those marked slow
 	@$(MAKE) --no-print-directory lint
+	@$(RUN_TESTS)
 
 define RUN_TESTS
 	mkdir -p $(LOGS); rm -f $(LOGS)/*.log; failed=""; \

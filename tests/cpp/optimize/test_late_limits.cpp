@@ -120,7 +120,8 @@ TEST(LateLimits, AndOneBehindALagToo) {
 
 // Odd errors and even ones: a dither that flips every cycle takes a slope for its opposite at an odd one.
 TEST(LateLimits, ADelayWrongByAsManyCyclesAsItIsUncertainIsFound) {
-  for (const auto& [truth, stated] : {std::pair{10, 7}, {10, 8}, {10, 9}, {10, 11}, {10, 12}, {10, 13}, {1, 0}, {0, 3}}) {
+  for (const auto& [truth, stated] :
+       {std::pair{10, 7}, {10, 8}, {10, 9}, {10, 11}, {10, 12}, {10, 13}, {1, 0}, {0, 3}}) {
     Limit limit{"p_max_bar", 104.0};
     limit.lag.delay_cycles = stated;
     std::vector<double> above(10, 0.0);
