@@ -67,7 +67,7 @@ def seekers(limit: Limit, seed: int) -> dict[str, Callable[[], Any]]:
         "spsa": lambda: Spsa(**common, seed=seed),
         "spsa_second_order": lambda: Spsa(**common, form="second_order", seed=seed),
         "golden": lambda: GoldenSection(**common, noise_sd=0.25),
-        "gradient": lambda: GradientDescent(**common, rate=1.0),
+        "gradient": lambda: GradientDescent(**common, rate=1.0, step_size=15.0),
     }
 
 

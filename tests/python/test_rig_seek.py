@@ -96,7 +96,7 @@ def hill(_: int, soc: float) -> Measurement:
 
 
 def seeker() -> ExtremumSeeking:
-    return ExtremumSeeking(start=-12.0, lower=-30.0, upper=10.0)
+    return ExtremumSeeking(start=-12.0, lower=-30.0, upper=10.0, gain=0.98)
 
 
 @pytest.mark.parametrize("sensor", ["analyser", "soft_corrected"])

@@ -60,7 +60,7 @@ def test_a_constant_added_to_j_and_the_gain_do_not_move_the_end() -> None:
 def test_newton_does_not_mind_the_scale_of_j() -> None:
     counts = []
     for scale in (1.0, 5.0):
-        seeker = NewtonSeeking(start=12.0, rate=np.inf)
+        seeker = NewtonSeeking(start=12.0, rate=np.inf, initial_hessian=BEND)
         hessian, inverse = [], []
         for _ in range(299):
             seeker.tell(scale * 0.5 * BEND * seeker.ask()[0] ** 2)

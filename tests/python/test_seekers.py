@@ -137,6 +137,30 @@ def test_settings_are_refused_by_name(make: Any, message: str) -> None:
         make()
 
 
+@pytest.mark.parametrize(
+    ("make", "name"),
+    [
+        (ExtremumSeeking, "gain"),
+        (BoundedSeeking, "kappa"),
+        (Spsa, "gain"),
+        (GradientDescent, "step_size"),
+    ],
+)
+def test_a_gain_left_open_is_made_of_first_readings_and_fits_any_unit_of_j(make: Any, name: str) -> None:
+    """Percent or fraction: the optimum is found, and `settings` leave the gain open again."""
+    found = []
+    for unit in (1.0, 0.01, 3000.0):
+        seeker, noise = make(start=-12.0, lower=-30.0, upper=10.0), np.random.default_rng(2)
+        for k in range(800):
+            assert (getattr(seeker, name) is None) == (k < 24)
+            seeker.tell(unit * (40.0 - 0.06 * (seeker.ask()[0] + 5.5) ** 2 + 0.2 * noise.normal()))
+        assert seeker.settings[name] is None
+        assert getattr(make(**seeker.settings), name) is None
+        found.append((seeker.estimate[0], np.squeeze(getattr(seeker, name)) * unit))
+    np.testing.assert_allclose(found, [found[0]] * 3, rtol=1e-6)
+    assert abs(found[0][0] + 5.5) < 1.5
+
+
 def test_a_gain_above_the_bound_of_averaging_warns_with_the_bound() -> None:
     with pytest.warns(UserWarning, match=r"gain = 9 is above 3\.92\d+, the bound of averaging"):
         ExtremumSeeking(start=0.0, gain=9.0, curvature=-0.051)

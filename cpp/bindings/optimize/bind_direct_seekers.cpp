@@ -45,6 +45,9 @@ void bind_spsa(py::module_& m) {
           "iteration", [](const B& b) { return b.use()->seeker().iteration(); },
           "Iterations since the start or restart.")
       .def_property_readonly(
+          "gain", [](const B& b) { return b.use()->seeker().gain(); },
+          "Gain in use; None while the first readings are taken.")
+      .def_property_readonly(
           "blocked", [](const B& b) { return b.use()->seeker().blocked(); }, "Steps that blocking refused.")
       .def_property_readonly(
           "measurements_per_iteration", [](const B& b) { return b.constant().seeker().measurements_per_iteration(); },
@@ -57,15 +60,22 @@ void bind_gradient_descent(py::module_& m) {
   using B = BoundSeeker<GradientDescent>;
   using S = GradientDescentSettings;
   py::class_<B> cls(m, "GradientDescent", "Two-sided differences; see mgdd.optimize.GradientDescent.");
-  const auto rows = std::tuple{plain("step_size", &S::step_size),   plain("difference", &S::difference),
-                               per_input_or_none("rate", &S::rate), plain("tolerance", &S::tolerance),
-                               plain("iterations", &S::iterations), plain("maximize", &S::maximize),
-                               plain("limits", &S::limits),         plain("curvature", &S::curvature)};
+  const auto rows = std::tuple{positive_or_own("step_size", &S::step_size),
+                               plain("difference", &S::difference),
+                               per_input_or_none("rate", &S::rate),
+                               plain("tolerance", &S::tolerance),
+                               plain("iterations", &S::iterations),
+                               plain("maximize", &S::maximize),
+                               plain("limits", &S::limits),
+                               plain("curvature", &S::curvature)};
   const S standard;
   bind_settings<GradientDescent>(cls, "GradientDescent", standard, rows, py::arg("lower") = -inf,
                                  py::arg("upper") = inf);
   cls.def_property_readonly(
          "iteration", [](const B& b) { return b.use()->seeker().iteration(); }, "Steps made.")
+      .def_property_readonly(
+          "step_size", [](const B& b) { return b.use()->seeker().step_size(); },
+          "Step size in use; None while the first readings are taken.")
       .def_property_readonly(
           "converged_at",
           [](const B& b) {

@@ -15,7 +15,7 @@ void bind_extremum_seeking(py::module_& m) {
   py::class_<B> cls(m, "ExtremumSeeking", "Extremum seeking; see mgdd.optimize.ExtremumSeeking.");
   const auto rows = std::tuple_cat(
       std::tuple{choice("form", &S::form, &parse_mean_removal)}, dither_rows<S>(),
-      std::tuple{per_input("gain", &S::gain), per_input_or_none("rate", &S::rate),
+      std::tuple{per_input_or_none("gain", &S::gain), per_input_or_none("rate", &S::rate),
                  per_input_or_none("recovery_rate", &S::recovery_rate), plain("washout_pole", &S::washout_pole),
                  plain("low_pass", &S::low_pass), or_default("components", &S::components),
                  plain("hold_cycles", &S::hold_cycles), plain("amplitude_floor", &S::amplitude_floor),
@@ -25,8 +25,11 @@ void bind_extremum_seeking(py::module_& m) {
   bind_settings<ExtremumSeeking>(cls, "ExtremumSeeking", standard, rows, py::arg("lower") = -inf,
                                  py::arg("upper") = inf);
   cls.def_property_readonly(
-      "amplitude_share", [](const B& b) { return b.use()->seeker().amplitude_share(); },
-      "Amplitude now over that of the settings.");
+         "amplitude_share", [](const B& b) { return b.use()->seeker().amplitude_share(); },
+         "Amplitude now over that of the settings.")
+      .def_property_readonly(
+          "gain", [](const B& b) { return list_or_none(b.use()->seeker().gain()); },
+          "Gain in use, per input; None while the first readings are taken.");
   bind_seeking(cls);
   bind_gradient(cls);
 }
@@ -38,11 +41,12 @@ void bind_newton(py::module_& m) {
   const auto rows = std::tuple_cat(
       dither_rows<S>(),
       std::tuple{plain("time_constant_cycles", &S::time_constant_cycles), plain("hessian_rate", &S::hessian_rate),
-                 plain("riccati_rate", &S::riccati_rate), per_input("initial_hessian", &S::initial_hessian),
-                 per_input("initial_inverse", &S::initial_inverse), plain("largest_inverse", &S::largest_inverse),
-                 plain("hold_cycles", &S::hold_cycles), per_input_or_none("rate", &S::rate),
-                 or_default("components", &S::components), plain("limit_amplitude", &S::limit_amplitude),
-                 plain("maximize", &S::maximize), plain("limits", &S::limits)});
+                 plain("riccati_rate", &S::riccati_rate), per_input_or_none("initial_hessian", &S::initial_hessian),
+                 per_input_or_none("initial_inverse", &S::initial_inverse),
+                 positive_or_own("largest_inverse", &S::largest_inverse), plain("hold_cycles", &S::hold_cycles),
+                 per_input_or_none("rate", &S::rate), or_default("components", &S::components),
+                 plain("limit_amplitude", &S::limit_amplitude), plain("maximize", &S::maximize),
+                 plain("limits", &S::limits)});
   const S standard;
   bind_settings<NewtonSeeking>(cls, "NewtonSeeking", standard, rows, py::arg("lower") = -inf, py::arg("upper") = inf);
   cls.def_property_readonly(
@@ -60,10 +64,13 @@ void bind_bounded(py::module_& m) {
   using S = BoundedSeekingSettings;
   py::class_<B> cls(m, "BoundedSeeking", "Bounded extremum seeking; see mgdd.optimize.BoundedSeeking.");
   const auto rows =
-      std::tuple_cat(dither_rows<S>(), std::tuple{plain("kappa", &S::kappa), plain("maximize", &S::maximize),
+      std::tuple_cat(dither_rows<S>(), std::tuple{positive_or_own("kappa", &S::kappa), plain("maximize", &S::maximize),
                                                   plain("limits", &S::limits), plain("curvature", &S::curvature)});
   const S standard;
   bind_settings<BoundedSeeking>(cls, "BoundedSeeking", standard, rows, py::arg("lower") = -inf, py::arg("upper") = inf);
+  cls.def_property_readonly(
+      "kappa", [](const B& b) { return b.use()->seeker().kappa(); },
+      "Phase per unit of J in use; None while the first readings are taken.");
   bind_seeking(cls);
 }
 

@@ -2,6 +2,7 @@
 #pragma once
 
 #include <limits>
+#include <optional>
 #include <string>
 #include <string_view>
 #include <vector>
@@ -56,6 +57,9 @@ inline py::array_t<double> input_array(const optimize::Inputs& values) {
 
 inline std::vector<double> list_of(const optimize::Inputs& values) {
   return {values.begin(), values.end()};
+}
+inline std::optional<std::vector<double>> list_or_none(const optimize::Inputs& values) {
+  return values.size() == 0 ? std::nullopt : std::optional(list_of(values));
 }
 
 /// The arguments `start`, `lower` and `upper` again.

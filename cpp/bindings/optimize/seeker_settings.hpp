@@ -52,6 +52,7 @@ struct PerInputOrNone : PerInput<Place> {
   void put(Record& settings, const py::object& given) const {
     if (!given.is_none()) PerInput<Place>::put(settings, given);
   }
+  std::optional<std::vector<double>> get(const Record& settings) const { return list_or_none(this->at(settings)); }
 };
 template <class Place>
 PerInputOrNone<Place> per_input_or_none(const char* name, Place place) {

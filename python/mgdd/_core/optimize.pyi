@@ -384,7 +384,7 @@ class ExtremumSeeking:
     """
     Extremum seeking; see mgdd.optimize.ExtremumSeeking.
     """
-    def __init__(self, *, start: typing.Any, lower: typing.Any = ..., upper: typing.Any = ..., form: str = 'batch', amplitude: typing.Any = 1.0, period: typing.SupportsInt | typing.SupportsIndex = 10, harmonics: collections.abc.Sequence[typing.SupportsInt | typing.SupportsIndex] | None = None, gain: typing.Any = 0.98, rate: typing.Any = None, recovery_rate: typing.Any = None, washout_pole: typing.SupportsFloat | typing.SupportsIndex = 0.9, low_pass: typing.SupportsFloat | typing.SupportsIndex = 1.0, components: collections.abc.Sequence[ComponentLag] | None = None, hold_cycles: typing.SupportsInt | typing.SupportsIndex | None = None, amplitude_floor: typing.SupportsFloat | typing.SupportsIndex = 1.0, full_gradient: typing.SupportsFloat | typing.SupportsIndex = 0.0, limit_amplitude: typing.SupportsFloat | typing.SupportsIndex = 0.5, maximize: bool = True, limits: collections.abc.Sequence[Limit] = [], curvature: typing.SupportsFloat | typing.SupportsIndex | None = None) -> None:
+    def __init__(self, *, start: typing.Any, lower: typing.Any = ..., upper: typing.Any = ..., form: str = 'batch', amplitude: typing.Any = 1.0, period: typing.SupportsInt | typing.SupportsIndex = 10, harmonics: collections.abc.Sequence[typing.SupportsInt | typing.SupportsIndex] | None = None, gain: typing.Any = None, rate: typing.Any = None, recovery_rate: typing.Any = None, washout_pole: typing.SupportsFloat | typing.SupportsIndex = 0.9, low_pass: typing.SupportsFloat | typing.SupportsIndex = 1.0, components: collections.abc.Sequence[ComponentLag] | None = None, hold_cycles: typing.SupportsInt | typing.SupportsIndex | None = None, amplitude_floor: typing.SupportsFloat | typing.SupportsIndex = 1.0, full_gradient: typing.SupportsFloat | typing.SupportsIndex = 0.0, limit_amplitude: typing.SupportsFloat | typing.SupportsIndex = 0.5, maximize: bool = True, limits: collections.abc.Sequence[Limit] = [], curvature: typing.SupportsFloat | typing.SupportsIndex | None = None) -> None:
         ...
     def _clear_history(self) -> None:
         """
@@ -453,6 +453,11 @@ class ExtremumSeeking:
         True after twelve failures in a row: of several inputs, or of the start where nothing has worked yet.
         """
     @property
+    def gain(self) -> list[float] | None:
+        """
+        Gain in use, per input; None while the first readings are taken.
+        """
+    @property
     def gradient(self) -> numpy.typing.NDArray[numpy.float64]:
         """
         Last estimate of the slope of the maximised objective, shape (inputs,).
@@ -497,7 +502,7 @@ class NewtonSeeking:
     """
     Newton extremum seeking; see mgdd.optimize.NewtonSeeking.
     """
-    def __init__(self, *, start: typing.Any, lower: typing.Any = ..., upper: typing.Any = ..., amplitude: typing.Any = 2.0, period: typing.SupportsInt | typing.SupportsIndex = 10, harmonics: collections.abc.Sequence[typing.SupportsInt | typing.SupportsIndex] | None = None, time_constant_cycles: typing.SupportsFloat | typing.SupportsIndex = 40.0, hessian_rate: typing.SupportsFloat | typing.SupportsIndex = 0.03, riccati_rate: typing.SupportsFloat | typing.SupportsIndex = 0.02, initial_hessian: typing.Any = -0.051, initial_inverse: typing.Any = -20.0, largest_inverse: typing.SupportsFloat | typing.SupportsIndex = 100.0, hold_cycles: typing.SupportsInt | typing.SupportsIndex = 300, rate: typing.Any = None, components: collections.abc.Sequence[ComponentLag] | None = None, limit_amplitude: typing.SupportsFloat | typing.SupportsIndex = 0.5, maximize: bool = True, limits: collections.abc.Sequence[Limit] = []) -> None:
+    def __init__(self, *, start: typing.Any, lower: typing.Any = ..., upper: typing.Any = ..., amplitude: typing.Any = 2.0, period: typing.SupportsInt | typing.SupportsIndex = 10, harmonics: collections.abc.Sequence[typing.SupportsInt | typing.SupportsIndex] | None = None, time_constant_cycles: typing.SupportsFloat | typing.SupportsIndex = 40.0, hessian_rate: typing.SupportsFloat | typing.SupportsIndex = 0.03, riccati_rate: typing.SupportsFloat | typing.SupportsIndex = 0.02, initial_hessian: typing.Any = None, initial_inverse: typing.Any = None, largest_inverse: typing.SupportsFloat | typing.SupportsIndex | None = None, hold_cycles: typing.SupportsInt | typing.SupportsIndex = 300, rate: typing.Any = None, components: collections.abc.Sequence[ComponentLag] | None = None, limit_amplitude: typing.SupportsFloat | typing.SupportsIndex = 0.5, maximize: bool = True, limits: collections.abc.Sequence[Limit] = []) -> None:
         ...
     def _clear_history(self) -> None:
         """
@@ -615,7 +620,7 @@ class BoundedSeeking:
     """
     Bounded extremum seeking; see mgdd.optimize.BoundedSeeking.
     """
-    def __init__(self, *, start: typing.Any, lower: typing.Any = ..., upper: typing.Any = ..., amplitude: typing.Any = 1.0, period: typing.SupportsInt | typing.SupportsIndex = 10, harmonics: collections.abc.Sequence[typing.SupportsInt | typing.SupportsIndex] | None = None, kappa: typing.SupportsFloat | typing.SupportsIndex = 1.0, maximize: bool = True, limits: collections.abc.Sequence[Limit] = [], curvature: typing.SupportsFloat | typing.SupportsIndex | None = None) -> None:
+    def __init__(self, *, start: typing.Any, lower: typing.Any = ..., upper: typing.Any = ..., amplitude: typing.Any = 1.0, period: typing.SupportsInt | typing.SupportsIndex = 10, harmonics: collections.abc.Sequence[typing.SupportsInt | typing.SupportsIndex] | None = None, kappa: typing.SupportsFloat | typing.SupportsIndex | None = None, maximize: bool = True, limits: collections.abc.Sequence[Limit] = [], curvature: typing.SupportsFloat | typing.SupportsIndex | None = None) -> None:
         ...
     def _clear_history(self) -> None:
         """
@@ -679,6 +684,11 @@ class BoundedSeeking:
         True after twelve failures in a row: of several inputs, or of the start where nothing has worked yet.
         """
     @property
+    def kappa(self) -> float | None:
+        """
+        Phase per unit of J in use; None while the first readings are taken.
+        """
+    @property
     def limit_delays(self) -> dict:
         """
         The delay at which every limit is read, by name [cycles]: as stated, until its readings clearly fit another.
@@ -718,7 +728,7 @@ class Spsa:
     """
     Simultaneous perturbation; see mgdd.optimize.Spsa.
     """
-    def __init__(self, *, start: typing.Any, lower: typing.Any = ..., upper: typing.Any = ..., form: str = 'first_order', schedule: str = 'decreasing', gain: typing.SupportsFloat | typing.SupportsIndex | None = None, stability: typing.SupportsFloat | typing.SupportsIndex = 50.0, gain_exponent: typing.SupportsFloat | typing.SupportsIndex = 0.602, perturbation: typing.SupportsFloat | typing.SupportsIndex = 1.5, perturbation_exponent: typing.SupportsFloat | typing.SupportsIndex = 0.101, step_max: typing.SupportsFloat | typing.SupportsIndex | None = None, averaging: typing.SupportsInt | typing.SupportsIndex = 1, blocking: bool = False, noise_sd: typing.SupportsFloat | typing.SupportsIndex = 0.0, initial_hessian: typing.SupportsFloat | typing.SupportsIndex = -0.051, hessian_prior: typing.SupportsFloat | typing.SupportsIndex = 20.0, limit_amplitude: typing.SupportsFloat | typing.SupportsIndex = 0.5, seed: typing.SupportsInt | typing.SupportsIndex = 0, maximize: bool = True, limits: collections.abc.Sequence[Limit] = [], curvature: typing.SupportsFloat | typing.SupportsIndex | None = None) -> None:
+    def __init__(self, *, start: typing.Any, lower: typing.Any = ..., upper: typing.Any = ..., form: str = 'first_order', schedule: str = 'decreasing', gain: typing.SupportsFloat | typing.SupportsIndex | None = None, stability: typing.SupportsFloat | typing.SupportsIndex = 50.0, gain_exponent: typing.SupportsFloat | typing.SupportsIndex = 0.602, perturbation: typing.SupportsFloat | typing.SupportsIndex = 1.5, perturbation_exponent: typing.SupportsFloat | typing.SupportsIndex = 0.101, step_max: typing.SupportsFloat | typing.SupportsIndex | None = None, averaging: typing.SupportsInt | typing.SupportsIndex = 1, blocking: bool = False, noise_sd: typing.SupportsFloat | typing.SupportsIndex = 0.0, initial_hessian: typing.SupportsFloat | typing.SupportsIndex | None = None, hessian_prior: typing.SupportsFloat | typing.SupportsIndex = 20.0, limit_amplitude: typing.SupportsFloat | typing.SupportsIndex = 0.5, seed: typing.SupportsInt | typing.SupportsIndex = 0, maximize: bool = True, limits: collections.abc.Sequence[Limit] = [], curvature: typing.SupportsFloat | typing.SupportsIndex | None = None) -> None:
         ...
     def _clear_history(self) -> None:
         """
@@ -787,6 +797,11 @@ class Spsa:
         True after twelve failures in a row: of several inputs, or of the start where nothing has worked yet.
         """
     @property
+    def gain(self) -> float | None:
+        """
+        Gain in use; None while the first readings are taken.
+        """
+    @property
     def gradient(self) -> numpy.typing.NDArray[numpy.float64]:
         """
         Last estimate of the slope of the maximised objective, shape (inputs,).
@@ -846,7 +861,7 @@ class GradientDescent:
     """
     Two-sided differences; see mgdd.optimize.GradientDescent.
     """
-    def __init__(self, *, start: typing.Any, lower: typing.Any = ..., upper: typing.Any = ..., step_size: typing.SupportsFloat | typing.SupportsIndex = 15.0, difference: typing.SupportsFloat | typing.SupportsIndex = 1.0, rate: typing.Any = None, tolerance: typing.SupportsFloat | typing.SupportsIndex = 0.02, iterations: typing.SupportsInt | typing.SupportsIndex = 60, maximize: bool = True, limits: collections.abc.Sequence[Limit] = [], curvature: typing.SupportsFloat | typing.SupportsIndex | None = None) -> None:
+    def __init__(self, *, start: typing.Any, lower: typing.Any = ..., upper: typing.Any = ..., step_size: typing.SupportsFloat | typing.SupportsIndex | None = None, difference: typing.SupportsFloat | typing.SupportsIndex = 1.0, rate: typing.Any = None, tolerance: typing.SupportsFloat | typing.SupportsIndex = 0.02, iterations: typing.SupportsInt | typing.SupportsIndex = 60, maximize: bool = True, limits: collections.abc.Sequence[Limit] = [], curvature: typing.SupportsFloat | typing.SupportsIndex | None = None) -> None:
         ...
     def _clear_history(self) -> None:
         """
@@ -960,6 +975,11 @@ class GradientDescent:
     @state.setter
     def state(self, arg1: collections.abc.Mapping[str, collections.abc.Sequence[typing.SupportsFloat | typing.SupportsIndex]]) -> None:
         ...
+    @property
+    def step_size(self) -> float | None:
+        """
+        Step size in use; None while the first readings are taken.
+        """
 class GoldenSection:
     """
     Golden-section search; see mgdd.optimize.GoldenSection.

@@ -29,8 +29,8 @@ class Spsa(Seeker, _core.optimize.Spsa):
     schedule : {"decreasing", "constant"}
         Decreasing gains settle; constant gains go on tracking.
     gain : float, optional
-        a [squared unit of the input per unit of J]; dimensionless in the second-order form. 20, or 3 there;
-        20 is for J in percent, J'' near -0.05: for another unit or curvature take 1/abs(J''), or `tune`.
+        a [squared unit of the input per unit of J]: without, 1/abs(J'') by `curvature` or by first readings as those
+        of `ExtremumSeeking`. Dimensionless, 3, in the second-order form. `tune` gives a better one.
     stability : float
         A, iterations, >= 0; a tenth of the expected number is usual.
     gain_exponent, perturbation_exponent : float
@@ -46,8 +46,9 @@ class Spsa(Seeker, _core.optimize.Spsa):
         Measure once more at the new estimate and refuse it where J is worse by more than 2 `noise_sd`.
     noise_sd : float
         Standard deviation of one measurement of J, for blocking.
-    initial_hessian : float
-        Second order: curvature to begin with, < 0 [unit of J per squared unit of the input].
+    initial_hessian : float, optional
+        Second order: curvature to begin with, < 0 [unit of J per squared unit of the input]; without, `curvature`, or
+        that of first readings.
     hessian_prior : float
         Second order: iterations that `initial_hessian` counts for.
     limit_amplitude : float
@@ -59,7 +60,7 @@ class Spsa(Seeker, _core.optimize.Spsa):
     limits : sequence of Limit
         Measured quantities to keep.
     curvature : float, optional
-        J'' if known: a first step factor gain abs(J'') above 1 gives a UserWarning.
+        J'' if known: makes the gain; a first step factor gain abs(J'') above 1 gives a UserWarning.
 
     Raises
     ------
@@ -99,13 +100,13 @@ class GradientDescent(Seeker, _core.optimize.GradientDescent):
         First estimate, in the unit of the input; one to eight inputs.
     lower, upper : float or array_like
         Bounds of the applied input, per input; infinite for none. The start must lie inside by `difference`.
-    step_size : float
-        lambda_c, > 0 [squared unit of the input per unit of J]. The default is for J in percent, J'' near -0.05;
-        1/abs(J'') is fastest.
+    step_size : float, optional
+        lambda_c, > 0 [squared unit of the input per unit of J]; 1/abs(J'') is fastest. Without, half of that by
+        `curvature` or by first readings as those of `ExtremumSeeking`.
     difference : float
         c, half the distance of the two measurements, in the unit of the input, > 0.
     rate : float or array_like, optional
-        Largest change per step, per input; none without.
+        Largest change per step, per input; without, none, or four differences where `step_size` is left out too.
     tolerance : float
         Converged once every entry of a step is smaller, in the unit of the input.
     iterations : int
@@ -115,7 +116,7 @@ class GradientDescent(Seeker, _core.optimize.GradientDescent):
     limits : sequence of Limit
         Measured quantities to keep.
     curvature : float, optional
-        J'' if known: a step size that cannot converge gives a UserWarning with the bound.
+        J'' if known: makes the step size; one given that cannot converge gives a UserWarning with the bound.
 
     Raises
     ------

@@ -32,9 +32,10 @@ class ExtremumSeeking(Seeker, _core.optimize.ExtremumSeeking):
         Cycles of the window that all inputs share, >= 4.
     harmonics : sequence of int, optional
         Oscillations per window, one per input, that do not mix (4, 5, 7 on a period of 40); [1] for one input.
-    gain : float or array_like
-        Adaptation gain, per input [unit of the input per unit of J]. The default is for J in percent, J'' near -0.05
-        per squared unit of the input: for another unit or curvature scale it by 0.05/abs(J''), or take it from `tune`.
+    gain : float or array_like, optional
+        Adaptation gain, per input [unit of the input per unit of J]. Without, it is made of `curvature` or, where that
+        is not given either, of first readings: start, above, start, below it by `amplitude`, per input, six times,
+        before the search begins; so any unit of J does. The property `gain` tells it. `tune` gives a better one.
     rate : float or array_like, optional
         Largest change of the estimate per cycle, per input; amplitude/period in batches (once per period) and
         3 amplitude/period otherwise.
@@ -59,7 +60,8 @@ class ExtremumSeeking(Seeker, _core.optimize.ExtremumSeeking):
     limits : sequence of Limit
         Measured quantities to keep; ``tell(J, limits)`` then takes their values.
     curvature : float, optional
-        J'' if known: a gain above the bound of averaging gives a UserWarning with that bound.
+        J'' if known: makes the gain (time constant of four periods), or, where a gain above the bound of averaging is
+        given, a UserWarning with that bound.
 
     Raises
     ------
@@ -116,13 +118,14 @@ class NewtonSeeking(Seeker, _core.optimize.NewtonSeeking):
         Of the approach [cycles].
     hessian_rate, riccati_rate : float
         Low-pass of the Hessian and rate of the Riccati filter, per cycle, in (0, 1] [-].
-    initial_hessian : float or array_like
-        Diagonal to begin with, < 0 [unit of J per squared unit of the input]. The defaults of this, of the inverse and
-        of its bound are for J in percent: for another unit scale them with J, and the latter two inversely.
-    initial_inverse : float or array_like
-        Diagonal of the inverse to begin with, < 0 [squared unit of the input per unit of J].
-    largest_inverse : float
-        Bound of the norm of the inverse, > 0, same unit.
+    initial_hessian : float or array_like, optional
+        Diagonal to begin with, < 0 [unit of J per squared unit of the input]; without, of first readings as those of
+        `ExtremumSeeking`.
+    initial_inverse : float or array_like, optional
+        Diagonal of the inverse to begin with, < 0 [squared unit of the input per unit of J]; that of the Hessian
+        without.
+    largest_inverse : float, optional
+        Bound of the norm of the inverse, > 0, same unit; five times the largest to begin with.
     hold_cycles : int
         Cycles that the estimate is held at the start, at least one period; `restart` holds one period.
     rate : float or array_like, optional
@@ -178,16 +181,17 @@ class BoundedSeeking(Seeker, _core.optimize.BoundedSeeking):
         Cycles of the window that all inputs share, >= 4.
     harmonics : sequence of int, optional
         Oscillations per window, one per input; [1] for one input.
-    kappa : float
-        Phase per unit of J, > 0 [rad per unit of J]. The default is for J in percent, J'' near -0.05: for another unit
-        or curvature scale it by 0.05/abs(J'').
+    kappa : float, optional
+        Phase per unit of J, > 0 [rad per unit of J]; without, made of `curvature` or of first readings as the gain of
+        `ExtremumSeeking`, for an approach in about ten periods.
     maximize : bool
         False to minimise J.
     limits : sequence of Limit
         Measured quantities to keep. The oscillation is the search itself: single steps are held back, and while nothing
         is known of a late limit yet, the search goes on where other seekers wait.
     curvature : float, optional
-        J'' if known: a kappa above the bound of averaging gives a UserWarning with that bound.
+        J'' if known: makes kappa, or, where a kappa above the bound of averaging is given, a UserWarning with that
+        bound.
 
     Raises
     ------

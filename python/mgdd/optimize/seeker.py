@@ -114,7 +114,7 @@ class Seeker(SeekerFindings, _CoreSeeker):
         Examples
         --------
         >>> from mgdd.optimize import GradientDescent
-        >>> history = GradientDescent(start=0.0).run(lambda x: -0.02 * (x[0] - 3.0) ** 2, 40)
+        >>> history = GradientDescent(start=0.0).run(lambda x: -0.02 * (x[0] - 3.0) ** 2, 60)
         >>> round(float(history["estimate"][-1, 0]), 3)
         3.0
         """

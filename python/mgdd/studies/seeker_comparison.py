@@ -130,40 +130,48 @@ def _contenders(best: Optimum) -> list[_Contender]:
     spsa = tune(NOISE_PERCENT, best.curvature, method="spsa", **wish)
     dither = "amplitude 1, period 10, gain 0.98"
     return [
-        _Contender(name="extremum seeking, batch", settings=dither, seeker=ExtremumSeeking(**box)),
+        _Contender(name="extremum seeking, batch", settings=dither, seeker=ExtremumSeeking(**box, gain=0.98)),
         _Contender(name="extremum seeking, batch, tuned", settings=_short(batch), seeker=batch.seeker(**box)),
         _Contender(
             name="extremum seeking, vanishing dither",
             settings=f"{dither}, floor 0.3 below slope 0.2",
-            seeker=ExtremumSeeking(**box, amplitude_floor=0.3, full_gradient=0.2),
+            seeker=ExtremumSeeking(**box, gain=0.98, amplitude_floor=0.3, full_gradient=0.2),
         ),
         _Contender(
             name="extremum seeking, moving average",
             settings=dither,
-            seeker=ExtremumSeeking(**box, form="moving_average"),
+            seeker=ExtremumSeeking(**box, gain=0.98, form="moving_average"),
         ),
         _Contender(
             name="extremum seeking, washout",
             settings=f"{dither}, pole 0.9",
-            seeker=ExtremumSeeking(**box, form="washout"),
+            seeker=ExtremumSeeking(**box, gain=0.98, form="washout"),
         ),
         _Contender(
             name="Newton extremum seeking",
             settings="amplitude 2, period 10, time constant 40, held 300",
-            seeker=NewtonSeeking(**box),
+            seeker=NewtonSeeking(**box, initial_hessian=-0.051, initial_inverse=-20.0, largest_inverse=100.0),
         ),
         _Contender(
-            name="bounded extremum seeking", settings="amplitude 1, period 10, kappa 1", seeker=BoundedSeeking(**box)
+            name="bounded extremum seeking",
+            settings="amplitude 1, period 10, kappa 1",
+            seeker=BoundedSeeking(**box, kappa=1.0),
         ),
-        _Contender(name="SPSA, first order", settings="a 20, c 1.5, decreasing", seeker=Spsa(**box)),
+        _Contender(name="SPSA, first order", settings="a 20, c 1.5, decreasing", seeker=Spsa(**box, gain=20.0)),
         _Contender(name="SPSA, tuned", settings=_short(spsa), seeker=spsa.seeker(**box)),
         _Contender(
-            name="SPSA, second order", settings="a 3, c 1.5, decreasing", seeker=Spsa(**box, form="second_order")
+            name="SPSA, second order",
+            settings="a 3, c 1.5, decreasing",
+            seeker=Spsa(**box, form="second_order", initial_hessian=-0.051),
         ),
         _Contender(
-            name="SPSA, one measurement", settings="a 20, c 1.5, decreasing", seeker=Spsa(**box, form="one_measurement")
+            name="SPSA, one measurement",
+            settings="a 20, c 1.5, decreasing",
+            seeker=Spsa(**box, form="one_measurement", gain=20.0),
         ),
-        _Contender(name="two-sided differences", settings="step size 15, c 1", seeker=GradientDescent(**box)),
+        _Contender(
+            name="two-sided differences", settings="step size 15, c 1", seeker=GradientDescent(**box, step_size=15.0)
+        ),
         _Contender(
             name="golden section",
             settings=f"noise {NOISE_PERCENT:g}",

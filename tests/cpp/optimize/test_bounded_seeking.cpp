@@ -7,6 +7,7 @@ namespace {
 BoundedSeekingSettings from(double start) {
   BoundedSeekingSettings s;
   s.space = space_at(scalar_input(start));
+  s.kappa = 1.0;
   return s;
 }
 
@@ -59,6 +60,7 @@ TEST(BoundedSeeking, MinimisingIsMaximisingTheNegative) {
 TEST(BoundedSeeking, TwoInputs) {
   BoundedSeekingSettings s;
   s.space = space_at(inputs({6.0, -5.0}));
+  s.kappa = 1.0;
   s.dither = {.amplitude = inputs({1.0, 1.0}), .period = 40, .harmonics = {4, 5}};
   BoundedSeeking seeker(s);
   for (int k = 0; k < 4000; ++k)

@@ -135,9 +135,11 @@ TEST(ClampedPlant, SlopesOfAStraightLineAreExact) {
   const auto line = [](const Inputs& x) { return 5.0 + 0.75 * x[0]; };
   GradientDescentSettings descent;
   descent.space = space_at(scalar_input(1.5), 30.0);
+  descent.curvature = bend;
   GradientDescent by_descent(descent);
   SpsaSettings spsa;
   spsa.space = descent.space;
+  spsa.curvature = bend;
   Spsa by_spsa(spsa);
   for (int k = 0; k < 2; ++k) {
     clamped_cycle(by_descent, line, -30.0, clamp_at);
@@ -147,6 +149,7 @@ TEST(ClampedPlant, SlopesOfAStraightLineAreExact) {
   EXPECT_NEAR(by_spsa.gradient()[0], 0.75, 1e-12);
   ExtremumSeekingSettings batch;
   batch.space = descent.space;
+  batch.curvature = bend;
   ExtremumSeeking by_batch(batch);
   for (int k = 0; k < 10; ++k)
     clamped_cycle(by_batch, line, -30.0, clamp_at);

@@ -7,6 +7,7 @@ namespace {
 NewtonSeekingSettings unclipped(double start) {
   NewtonSeekingSettings s;
   s.space = space_at(scalar_input(start));
+  s.initial_hessian = scalar_input(bend);
   s.rate = scalar_input(unlimited);
   return s;
 }

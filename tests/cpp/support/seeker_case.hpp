@@ -94,7 +94,7 @@ inline ExtremumSeekingSettings plain_seeking(double start, double tau_cycles = 4
   return s;
 }
 
-/// Every seeker and form with its own defaults; golden section knows the noise and never has infinite bounds.
+/// Every seeker and form with the gain that suits `bend`; golden section knows the noise and never has infinite bounds.
 inline std::vector<std::pair<std::string, Seeker>> every_seeker(const SearchSpace& space, double noise_sd,
                                                                 std::uint64_t seed = 0,
                                                                 const std::vector<Limit>& limits = {}) {
@@ -129,6 +129,7 @@ inline std::vector<std::pair<std::string, Seeker>> every_seeker(const SearchSpac
   BoundedSeekingSettings bounded;
   bounded.space = space;
   bounded.dither = dither(1.0);
+  bounded.curvature = bend;
   bounded.limits = limits;
   out.emplace_back("bounded_seeking", BoundedSeeking(bounded));
   for (const SpsaForm form : {SpsaForm::first_order, SpsaForm::second_order, SpsaForm::one_measurement}) {
@@ -136,11 +137,13 @@ inline std::vector<std::pair<std::string, Seeker>> every_seeker(const SearchSpac
     s.space = space;
     s.form = form;
     s.seed = seed;
+    s.curvature = bend;
     s.limits = limits;
     out.emplace_back("spsa_" + std::string(to_string(form)), Spsa(s));
   }
   GradientDescentSettings descent;
   descent.space = space;
+  descent.curvature = bend;
   descent.limits = limits;
   out.emplace_back("gradient_descent", GradientDescent(descent));
   if (!many) {

@@ -10,12 +10,22 @@
 namespace mgdd::optimize {
 namespace {
 
+constexpr double own_kappa = 0.051;            // times |J''| a^2: the mean approaches in ten periods
+constexpr double bounded_unseen_bend = 0.067;  // |J''| (a omega)^2 over the noise: 0.17 of |J''| a^2 at a period of 10
+
+Inputs omega_of(const DitherSettings& dither) {
+  Inputs omega(dither.amplitude.size());
+  for (Eigen::Index i = 0; i < omega.size(); ++i)
+    omega[i] = 2.0 * std::numbers::pi * dither.harmonics[static_cast<std::size_t>(i)] / dither.period;
+  return omega;
+}
+
 BoundedSeekingSettings checked(BoundedSeekingSettings s) {
   const Eigen::Index n = s.space.size();
   if (n < 1) throw about("start", ShapeError("start is empty: give one number per input"));
   validate(s.dither, n, false);
   validate(s.space, Inputs::Zero(n));
-  require_positive("kappa", s.kappa);
+  if (s.kappa) require_positive("kappa", *s.kappa);
   validate_curvature(s.curvature);
   return s;
 }
@@ -24,13 +34,12 @@ BoundedSeekingSettings checked(BoundedSeekingSettings s) {
 
 std::vector<std::string> BoundedSeekingSettings::advice() const {
   std::vector<std::string> out;
-  if (!curvature) return out;
+  if (!curvature || !kappa) return out;
   for (Eigen::Index i = 0; i < dither.amplitude.size(); ++i) {
     const double a = dither.amplitude[i];
-    const double omega = 2.0 * std::numbers::pi * dither.harmonics[static_cast<std::size_t>(i)] / dither.period;
-    const double bound = 1.0 / (a * a * omega * std::abs(*curvature) * dither.period);  // tau = 2 periods
-    if (!(kappa > bound)) continue;
-    out.push_back("kappa = " + text(kappa) + " is above " + text(bound) +
+    const double bound = 1.0 / (a * a * omega_of(dither)[i] * std::abs(*curvature) * dither.period);  // tau = 2 periods
+    if (!(*kappa > bound)) continue;
+    out.push_back("kappa = " + text(*kappa) + " is above " + text(bound) +
                   ", the bound of averaging (tau of at least 2 periods); lower kappa or the amplitude");
   }
   return out;
@@ -41,19 +50,25 @@ BoundedSeeking::BoundedSeeking(BoundedSeekingSettings settings)
       filter_(settings_.limits, settings_.space.size(), 2.0 * settings_.dither.period),
       clamp_(settings_.space.size()),
       protocol_(settings_.space.size()),
+      first_(settings_.dither.amplitude.cwiseProduct(omega_of(settings_.dither)), bounded_unseen_bend, !settings_.kappa,
+             settings_.curvature),
       applied_(settings_.space.start),
       estimate_(applied_),
-      omega_(applied_),
+      omega_(omega_of(settings_.dither)),
       metric_(InputMatrix::Identity(applied_.size(), applied_.size())),
       window_(static_cast<std::size_t>(settings_.dither.period * applied_.size()), 0.0) {
-  for (Eigen::Index i = 0; i < omega_.size(); ++i) {
-    omega_[i] =
-        2.0 * std::numbers::pi * settings_.dither.harmonics[static_cast<std::size_t>(i)] / settings_.dither.period;
-  }
   metric_.diagonal() = settings_.dither.amplitude.cwiseAbs2().cwiseProduct(omega_);  // of the mean drift
 }
 
+std::optional<double> BoundedSeeking::kappa() const noexcept {
+  if (settings_.kappa || first_.open()) return settings_.kappa;
+  return own_kappa / first_.bend().cwiseProduct(settings_.dither.amplitude.cwiseAbs2()).maxCoeff();
+}
+
 const Inputs& BoundedSeeking::ask() noexcept {
+  if (first_.open()) {
+    applied_ = first_.ask(estimate_).cwiseMax(settings_.space.lower).cwiseMin(settings_.space.upper);
+  }
   return protocol_.ask(applied_);
 }
 
@@ -64,6 +79,12 @@ TellStatus BoundedSeeking::tell(const Reading& reading) noexcept {
   Inputs told;
   const Inputs& applied = protocol_.applied(reading, applied_, told);
   filter_.record(applied, reading.limits);
+  const double j = objective_of(reading, settings_.maximize) + filter_.shaping(applied, reading.limits);
+  if (first_.open()) {
+    first_.learn(applied, j);
+    applied_ = estimate_;
+    return status;
+  }
   clamp_.record(applied_, applied, applied_);
   const Eigen::Index n = applied_.size();
   const std::int64_t period = settings_.dither.period;
@@ -80,11 +101,11 @@ TellStatus BoundedSeeking::tell(const Reading& reading) noexcept {
     }
     estimate_ /= static_cast<double>(period);
   }
-  const double j = objective_of(reading, settings_.maximize) + filter_.shaping(applied, reading.limits);
+  const double phase_per_j = *kappa();
   const Inputs largest = settings_.dither.amplitude.cwiseProduct(omega_);
   Inputs step(n);
   for (Eigen::Index i = 0; i < n; ++i)
-    step[i] = largest[i] * std::cos(omega_[i] * static_cast<double>(phase) - settings_.kappa * j);
+    step[i] = largest[i] * std::cos(omega_[i] * static_cast<double>(phase) - phase_per_j * j);
   const Inputs none = Inputs::Zero(n);
   step = filter_.project(applied_, step, {settings_.space, none, none, largest, largest, metric_});
   move_within(applied_, step, settings_.space, none, clamp_, largest);

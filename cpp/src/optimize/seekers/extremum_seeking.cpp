@@ -18,8 +18,10 @@ constexpr std::array<std::pair<MeanRemoval, std::string_view>, 3> form_names{{
 }};
 
 constexpr double limit_memory_windows = 2.0;
-constexpr double least_response = 0.05;  // share of the dither that must arrive before a slope is told
-constexpr double share_rate = 0.25;      // how fast the amplitude follows its target, per window
+constexpr double least_response = 0.05;      // share of the dither that must arrive before a slope is told
+constexpr double share_rate = 0.25;          // how fast the amplitude follows its target, per window
+constexpr double own_periods = 4.0;          // time constant of the seeker's own gain
+constexpr double dither_unseen_bend = 0.17;  // |J''| A^2 over the noise: 0.051 for an amplitude of 1 and noise of 0.3
 
 ExtremumSeekingSettings checked(ExtremumSeekingSettings s) {
   const Eigen::Index n = s.space.size();
@@ -27,7 +29,7 @@ ExtremumSeekingSettings checked(ExtremumSeekingSettings s) {
   validate(s.dither, n, false);
   validate(s.space, s.dither.amplitude);
   validate(s.components);
-  validate_entries("gain", s.gain, n, 0.0, 1e300);
+  if (s.gain.size() > 0) validate_entries("gain", s.gain, n, 0.0, 1e300);
   if (s.recovery_rate.size() == 0) s.recovery_rate = s.rate.size() == 0 ? s.dither.amplitude : s.rate;
   if (s.rate.size() == 0) {
     s.rate = s.dither.amplitude * ((s.form == MeanRemoval::batch ? 1.0 : 3.0) / s.dither.period);
@@ -87,10 +89,11 @@ ExtremumSeeking::ExtremumSeeking(ExtremumSeekingSettings settings)
       filter_(settings_.limits, settings_.space.size(), limit_memory_windows * settings_.dither.period),
       clamp_(settings_.space.size()),
       protocol_(settings_.space.size()),
+      first_(settings_.dither.amplitude, dither_unseen_bend, settings_.gain.size() == 0, settings_.curvature,
+             settings_.components),
       estimate_(settings_.space.start),
       applied_(estimate_),
       gradient_(Inputs::Zero(estimate_.size())),
-      metric_(settings_.gain.cwiseProduct(settings_.dither.amplitude).asDiagonal()),
       held_(*settings_.hold_cycles),
       mean_(component_count(), 0.0),
       sum_(gradient_),
@@ -103,7 +106,15 @@ ExtremumSeeking::ExtremumSeeking(ExtremumSeekingSettings settings)
   }
 }
 
+Inputs ExtremumSeeking::gain() const noexcept {
+  if (settings_.gain.size() > 0) return settings_.gain;
+  if (first_.open()) return {};
+  const double tau = own_periods * settings_.dither.period;
+  return (2.0 / tau) * settings_.dither.amplitude.cwiseProduct(first_.bend()).cwiseInverse();
+}
+
 const Inputs& ExtremumSeeking::ask() noexcept {
+  if (first_.open()) return protocol_.ask(applied_ = first_.ask(estimate_));
   for (Eigen::Index i = 0; i < estimate_.size(); ++i) {
     applied_[i] =
         estimate_[i] + share_ * settings_.dither.amplitude[i] * dither_.perturbation(static_cast<int>(phase_), i);
@@ -149,7 +160,10 @@ bool ExtremumSeeking::remove_mean(const Reading& reading, const Inputs& applied)
 
 void ExtremumSeeking::move(Inputs step, const Inputs& rate) noexcept {
   const Inputs& a = settings_.dither.amplitude;
-  step = filter_.project(estimate_, step, {settings_.space, a, a * share_, rate, settings_.recovery_rate, metric_});
+  const Inputs metric = first_.open() ? a : Inputs(gain().cwiseProduct(a));  // turns the slope into a step
+  step = filter_.project(
+      estimate_, step,
+      {settings_.space, a, a * share_, rate, settings_.recovery_rate, InputMatrix(metric.asDiagonal())});
   if (filter_.active()) ++limited_cycles_;
   move_within(estimate_, step, settings_.space, settings_.dither.amplitude, clamp_, Inputs::Zero(step.size()));
 }
@@ -158,6 +172,14 @@ void ExtremumSeeking::learn(const Reading& reading) noexcept {
   Inputs told;
   const Inputs& applied = protocol_.applied(reading, applied_, told);
   filter_.record(applied, reading.limits);
+  if (first_.open()) {
+    double j = filter_.shaping(applied, reading.limits);
+    for (const double c : reading.components)
+      j += sign() * c;
+    first_.learn(applied, j);
+    if (filter_.alarmed()) move(Inputs::Zero(applied.size()), settings_.recovery_rate);
+    return;
+  }
   clamp_.record(applied_, applied, estimate_);
   const Inputs& a = settings_.dither.amplitude;
   const double period = dither_.period();
@@ -181,7 +203,7 @@ void ExtremumSeeking::learn(const Reading& reading) noexcept {
     gradient_ = (smooth_.cwiseQuotient(a) * (2.0 / share_)).cwiseProduct(response_);
     if (!holding) {
       // A limit passes what points inwards and turns the rest: of a ripple that would leave a bias.
-      move(settings_.gain.cwiseProduct(filter_.active() ? slow_ : smooth_) * share_, settings_.rate);
+      move(gain().cwiseProduct(filter_.active() ? slow_ : smooth_) * share_, settings_.rate);
       moved_by_alarm = true;
     }
   }
@@ -205,8 +227,7 @@ void ExtremumSeeking::learn(const Reading& reading) noexcept {
   if (settings_.form == MeanRemoval::batch) {
     gradient_ = (sum_ * (2.0 / (period * share_))).cwiseQuotient(a);
     if (!holding) {  // the mean rate of the continuous form: M g_r A/2 times the slope, smaller with a smaller dither
-      move((settings_.gain.cwiseProduct(a)).cwiseProduct(gradient_) * (0.5 * period * share_ * share_),
-           settings_.rate * period);
+      move(gain().cwiseProduct(a).cwiseProduct(gradient_) * (0.5 * period * share_ * share_), settings_.rate * period);
     }
     gradient_ = gradient_.cwiseProduct(response_);
   }
@@ -234,6 +255,7 @@ void ExtremumSeeking::restart() noexcept {
   sum_.setZero();
   response_.setOnes();
   limited_cycles_ = 0;
+  first_.restart();
   filter_.forget();
   clamp_.forget();
   protocol_.failures.forget();

@@ -9,6 +9,9 @@
 namespace mgdd::optimize {
 namespace {
 
+constexpr double newton_unseen_bend = 0.68;  // |J''| A^2 over the noise: 0.051 for an amplitude of 2 and noise of 0.3
+constexpr double own_reach = 5.0;            // bound of |Gamma| over the first one
+
 NewtonSeekingSettings checked(NewtonSeekingSettings s) {
   const Eigen::Index n = s.space.size();
   if (n < 1) throw about("start", ShapeError("start is empty: give one number per input"));
@@ -20,7 +23,7 @@ NewtonSeekingSettings checked(NewtonSeekingSettings s) {
   for (const auto& [name, value, upper] :
        {std::tuple{"time_constant_cycles", s.time_constant_cycles, 1e9},
         std::tuple{"hessian_rate", s.hessian_rate, 1.0}, std::tuple{"riccati_rate", s.riccati_rate, 1.0},
-        std::tuple{"largest_inverse", s.largest_inverse, 1e300},
+        std::tuple{"largest_inverse", s.largest_inverse.value_or(1.0), 1e300},
         std::tuple{"limit_amplitude", s.limit_amplitude, 1.0}}) {
     if (!(value > 0.0 && value <= upper)) {
       throw ParameterError(name, value, "must be > 0 and <= " + text(upper));
@@ -28,7 +31,7 @@ NewtonSeekingSettings checked(NewtonSeekingSettings s) {
   }
   for (const auto& [name, values] :
        {std::pair{"initial_hessian", &s.initial_hessian}, std::pair{"initial_inverse", &s.initial_inverse}}) {
-    if (values->size() != n) {
+    if (values->size() != n && values->size() > 0) {
       throw about(name, ShapeError(std::string(name) + " has " + std::to_string(values->size()) +
                                    " entries: must have " + std::to_string(n) + ", one per entry of start"));
     }
@@ -37,6 +40,15 @@ NewtonSeekingSettings checked(NewtonSeekingSettings s) {
         throw ParameterError(name, value, "must be < 0, as at a maximum");
       }
     }
+  }
+  if (s.initial_hessian.size() == 0 && s.initial_inverse.size() > 0) {
+    s.initial_hessian = s.initial_inverse.cwiseInverse();
+  }
+  if (s.initial_inverse.size() == 0 && s.initial_hessian.size() > 0) {
+    s.initial_inverse = s.initial_hessian.cwiseInverse();
+  }
+  if (!s.largest_inverse && s.initial_inverse.size() > 0) {
+    s.largest_inverse = own_reach * s.initial_inverse.cwiseAbs().maxCoeff();
   }
   if (s.hold_cycles < s.dither.period) {
     throw ParameterError("hold_cycles", s.hold_cycles,
@@ -59,16 +71,23 @@ NewtonSeeking::NewtonSeeking(NewtonSeekingSettings settings)
       filter_(settings_.limits, settings_.space.size(), 2.0 * settings_.dither.period),
       clamp_(settings_.space.size()),
       protocol_(settings_.space.size()),
+      first_(settings_.dither.amplitude, newton_unseen_bend, settings_.initial_hessian.size() == 0, {},
+             settings_.components),
       estimate_(settings_.space.start),
       applied_(estimate_),
       gradient_(Inputs::Zero(estimate_.size())),
       slow_(gradient_),
-      hessian_(settings_.initial_hessian.asDiagonal()),
-      inverse_(settings_.initial_inverse.asDiagonal()),
+      hessian_(InputMatrix::Zero(estimate_.size(), estimate_.size())),
+      inverse_(hessian_),
       held_(settings_.hold_cycles),
-      window_(component_count() * static_cast<std::size_t>(settings_.dither.period), 0.0) {}
+      window_(component_count() * static_cast<std::size_t>(settings_.dither.period), 0.0) {
+  if (first_.open()) return;
+  hessian_.diagonal() = settings_.initial_hessian;
+  inverse_.diagonal() = settings_.initial_inverse;
+}
 
 const Inputs& NewtonSeeking::ask() noexcept {
+  if (first_.open()) return protocol_.ask(applied_ = first_.ask(estimate_));
   for (Eigen::Index i = 0; i < estimate_.size(); ++i) {
     applied_[i] =
         estimate_[i] + share_ * settings_.dither.amplitude[i] * dither_.perturbation(static_cast<int>(phase_), i);
@@ -83,9 +102,13 @@ TellStatus NewtonSeeking::tell(const Reading& reading) noexcept {
   return status;
 }
 
+double NewtonSeeking::largest_inverse() const noexcept {
+  return settings_.largest_inverse ? *settings_.largest_inverse : own_reach / first_.bend().minCoeff();
+}
+
 // Gamma stays negative definite and bounded: an update that would leave that set is not made.
 void NewtonSeeking::update_inverse() noexcept {
-  const double largest = settings_.largest_inverse;
+  const double largest = largest_inverse();
   InputMatrix next = inverse_ + settings_.riccati_rate * (inverse_ - inverse_ * hessian_ * inverse_);
   if (next.size() == 1) {
     inverse_(0, 0) = std::clamp(next(0, 0), -largest, -largest * 1e-6);
@@ -100,6 +123,14 @@ void NewtonSeeking::learn(const Reading& reading) noexcept {
   Inputs told;
   const Inputs& applied = protocol_.applied(reading, applied_, told);
   filter_.record(applied, reading.limits);
+  if (first_.open()) {
+    first_.learn(applied, objective_of(reading, settings_.maximize) + filter_.shaping(applied, reading.limits));
+    if (!first_.open()) {
+      hessian_.diagonal() = -first_.bend();
+      inverse_.diagonal() = -first_.bend().cwiseInverse();
+    }
+    return;
+  }
   clamp_.record(applied_, applied, estimate_);
   const auto period = static_cast<std::size_t>(dither_.period());
   const Eigen::Index n = estimate_.size();
@@ -157,6 +188,7 @@ void NewtonSeeking::restart() noexcept {
   share_ = 1.0;
   limited_cycles_ = 0;
   slow_.setZero();
+  first_.restart();
   filter_.forget();
   clamp_.forget();
   protocol_.failures.forget();

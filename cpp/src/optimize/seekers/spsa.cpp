@@ -30,13 +30,16 @@ constexpr double blocking_errors = 2.0;
 constexpr int clamp_window = 6;              // measurements, at least, before a clamp is judged
 constexpr double least_perturbation = 0.25;  // of the perturbation: with less applied a slope is not computed
 constexpr double perturbation_rate = 0.25;   // how fast the perturbation follows its target, per iteration
+constexpr double second_order_gain = 3.0;
+constexpr double spsa_unseen_bend = 0.38;  // |J''| c^2 over the noise: 0.051 for a perturbation of 1.5 and noise of 0.3
 
 SpsaSettings checked(SpsaSettings s) {
   const bool second = s.form == SpsaForm::second_order;
-  s.gain = s.first_gain();
+  if (second && !s.gain) s.gain = second_order_gain;
+  if (second && !s.initial_hessian && s.curvature && *s.curvature != 0.0) s.initial_hessian = -std::abs(*s.curvature);
   require_positive("perturbation", s.perturbation);
   if (!s.step_max) s.step_max = s.form == SpsaForm::one_measurement ? s.perturbation / 5.0 : s.perturbation * 4.0 / 3.0;
-  require_positive("gain", *s.gain);
+  if (s.gain) require_positive("gain", *s.gain);
   if (!(*s.step_max > 0.0)) throw ParameterError("step_max", *s.step_max, "must be > 0");
   validate_curvature(s.curvature);
   const Eigen::Index n = s.space.size();
@@ -61,8 +64,8 @@ SpsaSettings checked(SpsaSettings s) {
   if (!(s.noise_sd >= 0.0 && std::isfinite(s.noise_sd))) {
     throw ParameterError("noise_sd", s.noise_sd, "must be >= 0 and finite");
   }
-  if (!(s.initial_hessian < 0.0 && std::isfinite(s.initial_hessian))) {
-    throw ParameterError("initial_hessian", s.initial_hessian, "must be < 0, as at a maximum");
+  if (s.initial_hessian && !(*s.initial_hessian < 0.0 && std::isfinite(*s.initial_hessian))) {
+    throw ParameterError("initial_hessian", *s.initial_hessian, "must be < 0, as at a maximum");
   }
   require_positive("hessian_prior", s.hessian_prior);
   if (!(s.limit_amplitude > 0.0 && s.limit_amplitude <= 1.0)) {
@@ -86,15 +89,11 @@ GainSchedule parse_gain_schedule(std::string_view name) {
   return parse_name<GainSchedule>(schedule_names, "schedule", name);
 }
 
-double SpsaSettings::first_gain() const noexcept {
-  return gain.value_or(form == SpsaForm::second_order ? 3.0 : 20.0);
-}
-
 std::vector<std::string> SpsaSettings::advice() const {
   const bool second = form == SpsaForm::second_order;
-  if (!second && !curvature) return {};
+  if (!second && !(curvature && gain)) return {};
   const double bend = second ? 1.0 : std::abs(*curvature);
-  const double first = first_gain();
+  const double first = gain.value_or(second_order_gain);
   const double now = schedule == GainSchedule::constant ? first : first / std::pow(1.0 + stability, gain_exponent);
   if (!(now * bend > 1.0)) return {};
   return {"gain: the first step factor a_0 |J''| = " + text(now * bend) +
@@ -108,12 +107,15 @@ Spsa::Spsa(SpsaSettings settings)
       clamp_(settings_.space.size()),
       trend_(settings_.space.size(), memory),
       protocol_(settings_.space.size()),
+      first_(Inputs::Constant(settings_.space.size(), settings_.perturbation), spsa_unseen_bend,
+             settings_.form == SpsaForm::second_order ? !settings_.initial_hessian : !settings_.gain,
+             settings_.curvature),
       estimate_(settings_.space.start),
       candidate_(estimate_),
       applied_(estimate_),
       gradient_(Inputs::Zero(estimate_.size())),
       sum_(gradient_),
-      hessian_(InputMatrix::Identity(estimate_.size(), estimate_.size()) * settings_.initial_hessian),
+      hessian_(InputMatrix::Identity(estimate_.size(), estimate_.size()) * settings_.initial_hessian.value_or(0.0)),
       hessian_sum_(InputMatrix::Zero(estimate_.size(), estimate_.size())),
       metric_(InputMatrix::Identity(estimate_.size(), estimate_.size())),
       missed_(InputMatrix::Zero(estimate_.size(), 4)),
@@ -135,10 +137,15 @@ int Spsa::measurements_per_iteration() const noexcept {
   return per_gradient() * settings_.averaging + (settings_.blocking ? 1 : 0);
 }
 
+std::optional<double> Spsa::gain() const noexcept {
+  if (settings_.gain || first_.open()) return settings_.gain;
+  return 1.0 / first_.largest_bend();
+}
+
 double Spsa::gain_now() const noexcept {
-  if (settings_.schedule == GainSchedule::constant) return *settings_.gain;
-  return *settings_.gain /
-         std::pow(static_cast<double>(iteration_) + 1.0 + settings_.stability, settings_.gain_exponent);
+  const double first = *gain();
+  if (settings_.schedule == GainSchedule::constant) return first;
+  return first / std::pow(static_cast<double>(iteration_) + 1.0 + settings_.stability, settings_.gain_exponent);
 }
 
 double Spsa::perturbation_now() const noexcept {
@@ -154,6 +161,7 @@ double Spsa::direction(int kind, Eigen::Index input) const noexcept {
 }
 
 const Inputs& Spsa::ask() noexcept {
+  if (first_.open()) return protocol_.ask(applied_ = first_.ask(estimate_));
   const int per = per_gradient();
   if (stage_ == std::int64_t{per} * settings_.averaging) {
     applied_ = candidate_;
@@ -176,6 +184,11 @@ TellStatus Spsa::tell(const Reading& reading) noexcept {
   const Inputs& applied = protocol_.applied(reading, applied_, told);
   const double j = objective_of(reading, settings_.maximize) + filter_.shaping(applied, reading.limits);
   filter_.record(applied, reading.limits);
+  if (first_.open()) {
+    first_.learn(applied, j);
+    if (!first_.open() && !settings_.initial_hessian) hessian_.diagonal() = -first_.bend();
+    return status;
+  }
   const int gradients_end = per_gradient() * settings_.averaging;
   if (stage_ < gradients_end) {
     around_j_ += j;
@@ -252,7 +265,8 @@ InputMatrix Spsa::bent_down() noexcept {
   const double seen = static_cast<double>(iteration_) + settings_.hessian_prior;
   hessian_ += (hessian_sum_ / q - hessian_) / (seen + 1.0);
   hessian_sum_.setZero();
-  const double least = 0.2 * std::abs(settings_.initial_hessian);
+  const double least =
+      0.2 * (settings_.initial_hessian ? std::abs(*settings_.initial_hessian) : first_.bend().minCoeff());
   const auto n = hessian_.rows();
   const InputMatrix floor = InputMatrix::Identity(n, n) * least;
   InputMatrix bent = -hessian_;
@@ -293,6 +307,7 @@ void Spsa::restart() noexcept {
   share_ = 1.0;
   watched_ = 0;
   trend_.forget();
+  first_.restart();
   filter_.forget();
   clamp_.forget();
   protocol_.failures.forget();

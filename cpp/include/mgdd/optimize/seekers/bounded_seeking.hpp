@@ -12,14 +12,15 @@
 #include "mgdd/optimize/seekers/clamp_watch.hpp"
 #include "mgdd/optimize/seekers/constraint_filter.hpp"
 #include "mgdd/optimize/seekers/dither.hpp"
+#include "mgdd/optimize/seekers/first_readings.hpp"
 #include "mgdd/optimize/seekers/seeker.hpp"
 
 namespace mgdd::optimize {
 
 struct BoundedSeekingSettings {
   SearchSpace space;
-  DitherSettings dither;  ///< amplitude is the size a of the oscillation
-  double kappa = 1.0;     ///< phase per unit of J [rad], > 0
+  DitherSettings dither;          ///< amplitude is the size a of the oscillation
+  std::optional<double> kappa{};  ///< phase per unit of J [rad], > 0; none: by `curvature` or first readings
   bool maximize = true;
   std::vector<Limit> limits;
   std::optional<double> curvature{};  ///< J'' if known
@@ -35,6 +36,7 @@ class BoundedSeeking {
   TellStatus tell(const Reading& reading) noexcept;
   /// New operating point: forget the limits; the estimate goes on.
   void restart() noexcept {
+    first_.restart();
     filter_.forget();
     clamp_.forget();
     protocol_.failures.forget();
@@ -42,6 +44,8 @@ class BoundedSeeking {
 
   /// Mean of the applied input over the last window; the start before there is one.
   const Inputs& estimate() const noexcept { return estimate_; }
+  /// Phase per unit of J in use; none while the first readings are taken.
+  std::optional<double> kappa() const noexcept;
   const BoundedSeekingSettings& settings() const noexcept { return settings_; }
   /// The input of the last ask; what the plant made of it stands in the reading.
   const Inputs& applied() const noexcept { return protocol_.sent(applied_); }
@@ -58,6 +62,7 @@ class BoundedSeeking {
   void require_usable() const {
     require_within_space("estimate", estimate_, settings_.space);
     require_within_space("applied", applied_, settings_.space);
+    first_.require_usable();
   }
 
   template <class Self, class V>
@@ -69,6 +74,7 @@ class BoundedSeeking {
     v("window", self.window_);
     ConstraintFilter::visit(self.filter_, v);
     ClampWatch::visit(self.clamp_, v);
+    FirstReadings::visit(self.first_, v);
   }
 
  private:
@@ -76,6 +82,7 @@ class BoundedSeeking {
   ConstraintFilter filter_;
   ClampWatch clamp_;
   Protocol protocol_;
+  FirstReadings first_;
   Inputs applied_, estimate_, omega_;
   InputMatrix metric_;
   std::int64_t seen_ = 0;

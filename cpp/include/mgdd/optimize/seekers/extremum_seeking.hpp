@@ -13,6 +13,7 @@
 #include "mgdd/optimize/seekers/clamp_watch.hpp"
 #include "mgdd/optimize/seekers/constraint_filter.hpp"
 #include "mgdd/optimize/seekers/dither.hpp"
+#include "mgdd/optimize/seekers/first_readings.hpp"
 #include "mgdd/optimize/seekers/seeker.hpp"
 
 namespace mgdd::optimize {
@@ -25,8 +26,8 @@ struct ExtremumSeekingSettings {
   SearchSpace space;
   DitherSettings dither;
   MeanRemoval form = MeanRemoval::batch;
-  Inputs gain = scalar_input(0.98);  ///< g_r, input unit per unit of J; the default gives tau = 40 at J'' = -0.051
-  Inputs rate{};                     ///< largest change of the estimate per cycle; empty: A/M in batches, else 3 A/M
+  Inputs gain{};              ///< g_r, input unit per unit of J; empty: for tau of 4 M by `curvature` or first readings
+  Inputs rate{};              ///< largest change of the estimate per cycle; empty: A/M in batches, else 3 A/M
   Inputs recovery_rate{};     ///< the same on the way back below a limit; empty: `rate` where that is given, else A
   double washout_pole = 0.9;  ///< h of (z - 1)/(z - h)
   double low_pass = 1.0;      ///< b of y += b (x - y) after demodulation; 1 = off
@@ -39,7 +40,7 @@ struct ExtremumSeekingSettings {
   double limit_amplitude = 0.5;  ///< share of the amplitude while a limit holds the estimate back
   bool maximize = true;
   std::vector<Limit> limits;
-  std::optional<double> curvature{};  ///< J'' if known: lets `advice` judge the gain
+  std::optional<double> curvature{};  ///< J'' if known: makes the gain, or lets `advice` judge the one given
 
   /// What averaging theory says against these settings, in sentences; empty if nothing (or J'' is not known).
   std::vector<std::string> advice() const;
@@ -61,6 +62,8 @@ class ExtremumSeeking {
   /// Last estimate of dJ/dtheta of the maximised objective.
   const Inputs& gradient() const noexcept { return gradient_; }
   double amplitude_share() const noexcept { return share_; }
+  /// g_r in use; empty while the first readings are taken.
+  Inputs gain() const noexcept;
   const ExtremumSeekingSettings& settings() const noexcept { return settings_; }
   /// The input of the last ask; what the plant made of it stands in the reading.
   const Inputs& applied() const noexcept { return protocol_.sent(applied_); }
@@ -79,6 +82,7 @@ class ExtremumSeeking {
   void require_usable() const {
     require_within_space("estimate", estimate_, settings_.space);
     if (!(share_ > 0.0 && share_ <= 1.0)) throw ParameterError("state column 'share' must lie in (0, 1]");
+    first_.require_usable();
   }
 
   template <class Self, class V>
@@ -101,6 +105,7 @@ class ExtremumSeeking {
     v("limited_cycles", self.limited_cycles_);
     ConstraintFilter::visit(self.filter_, v);
     ClampWatch::visit(self.clamp_, v);
+    FirstReadings::visit(self.first_, v);
   }
 
  private:
@@ -115,8 +120,8 @@ class ExtremumSeeking {
   ConstraintFilter filter_;
   ClampWatch clamp_;
   Protocol protocol_;
+  FirstReadings first_;
   Inputs estimate_, applied_, gradient_;
-  InputMatrix metric_;          // what turns the slope into a step: gain times amplitude, but for a factor
   std::int64_t phase_ = 0;      // of the window
   std::int64_t seen_ = 0;       // cycles since the last restart
   std::int64_t held_ = 0;       // cycles that the estimate is still held

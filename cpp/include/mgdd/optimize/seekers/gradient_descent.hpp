@@ -10,15 +10,17 @@
 
 #include "mgdd/optimize/seekers/clamp_watch.hpp"
 #include "mgdd/optimize/seekers/constraint_filter.hpp"
+#include "mgdd/optimize/seekers/first_readings.hpp"
 #include "mgdd/optimize/seekers/seeker.hpp"
 
 namespace mgdd::optimize {
 
 struct GradientDescentSettings {
   SearchSpace space;
-  double step_size = 15.0;       ///< lambda_c, squared input unit per unit of J, > 0
+  /// lambda_c, squared input unit per unit of J, > 0; none: 1/(2 |J''|) by `curvature` or first readings
+  std::optional<double> step_size{};
   double difference = 1.0;       ///< c in input units, > 0
-  Inputs rate{};                 ///< largest change per step; empty: none
+  Inputs rate{};                 ///< largest change per step; empty: none, or 4 c with a step size of its own
   double tolerance = 0.02;       ///< converged once every entry of a step is below it, input unit
   std::int64_t iterations = 60;  ///< steps after which an unconverged search says so; it goes on all the same
   bool maximize = true;
@@ -39,6 +41,8 @@ class GradientDescent {
   const Inputs& estimate() const noexcept { return estimate_; }
   const Inputs& gradient() const noexcept { return gradient_; }
   std::int64_t iteration() const noexcept { return iteration_; }
+  /// lambda_c in use; none while the first readings are taken.
+  std::optional<double> step_size() const noexcept;
   /// The step at which the tolerance was met first, counting that step; -1 before, and after `iterations` without.
   std::int64_t converged_at() const noexcept { return converged_at_; }
   const GradientDescentSettings& settings() const noexcept { return settings_; }
@@ -56,7 +60,10 @@ class GradientDescent {
   }
 
   /// ParameterError for a restored state that these settings do not allow.
-  void require_usable() const { require_within_space("estimate", estimate_, settings_.space); }
+  void require_usable() const {
+    require_within_space("estimate", estimate_, settings_.space);
+    first_.require_usable();
+  }
 
   template <class Self, class V>
   static void visit(Self& self, V& v) {
@@ -71,13 +78,17 @@ class GradientDescent {
     v("converged_at", self.converged_at_);
     ConstraintFilter::visit(self.filter_, v);
     ClampWatch::visit(self.clamp_, v);
+    FirstReadings::visit(self.first_, v);
   }
 
  private:
+  double move(Inputs step) noexcept;
+
   GradientDescentSettings settings_;
   ConstraintFilter filter_;
   ClampWatch clamp_;
   Protocol protocol_;
+  FirstReadings first_;
   Inputs estimate_, applied_, gradient_;
   InputMatrix metric_;
   double above_ = 0.0;         // J at theta + c of the input at work

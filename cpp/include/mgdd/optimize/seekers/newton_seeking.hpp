@@ -5,12 +5,14 @@
 
 #include <cmath>
 #include <limits>
+#include <optional>
 #include <string>
 #include <vector>
 
 #include "mgdd/optimize/seekers/clamp_watch.hpp"
 #include "mgdd/optimize/seekers/constraint_filter.hpp"
 #include "mgdd/optimize/seekers/dither.hpp"
+#include "mgdd/optimize/seekers/first_readings.hpp"
 #include "mgdd/optimize/seekers/seeker.hpp"
 
 namespace mgdd::optimize {
@@ -18,14 +20,14 @@ namespace mgdd::optimize {
 struct NewtonSeekingSettings {
   SearchSpace space;
   DitherSettings dither{.amplitude = scalar_input(2.0), .period = 10, .harmonics = {1}};
-  double time_constant_cycles = 40.0;             ///< tau of the approach
-  double hessian_rate = 0.03;                     ///< low-pass of H per cycle
-  double riccati_rate = 0.02;                     ///< w_r
-  Inputs initial_hessian = scalar_input(-0.051);  ///< diagonal of H0, < 0, J unit per squared input unit
-  Inputs initial_inverse = scalar_input(-20.0);   ///< diagonal of Gamma0, < 0
-  double largest_inverse = 100.0;                 ///< bound of |Gamma|, > 0
-  int hold_cycles = 300;                          ///< estimate held at the start
-  Inputs rate{};                                  ///< per cycle; empty: 3 A/M
+  double time_constant_cycles = 40.0;  ///< tau of the approach
+  double hessian_rate = 0.03;          ///< low-pass of H per cycle
+  double riccati_rate = 0.02;          ///< w_r
+  Inputs initial_hessian{};            ///< diagonal of H0, < 0, J unit per squared input unit; empty: of first readings
+  Inputs initial_inverse{};            ///< diagonal of Gamma0, < 0; empty: the inverse of H0
+  std::optional<double> largest_inverse{};  ///< bound of |Gamma|, > 0; none: five times the largest of Gamma0
+  int hold_cycles = 300;                    ///< estimate held at the start
+  Inputs rate{};                            ///< per cycle; empty: 3 A/M
   std::vector<ComponentLag> components{ComponentLag{}};
   double limit_amplitude = 0.5;  ///< share of the amplitude while a limit holds the estimate back
   bool maximize = true;
@@ -65,6 +67,7 @@ class NewtonSeeking {
   void require_usable() const {
     require_within_space("estimate", estimate_, settings_.space);
     if (!(share_ > 0.0 && share_ <= 1.0)) throw ParameterError("state column 'share' must lie in (0, 1]");
+    first_.require_usable();
   }
 
   template <class Self, class V>
@@ -84,17 +87,20 @@ class NewtonSeeking {
     v("window", self.window_);
     ConstraintFilter::visit(self.filter_, v);
     ClampWatch::visit(self.clamp_, v);
+    FirstReadings::visit(self.first_, v);
   }
 
  private:
   void learn(const Reading& reading) noexcept;
   void update_inverse() noexcept;
+  double largest_inverse() const noexcept;
 
   NewtonSeekingSettings settings_;
   Dither dither_;
   ConstraintFilter filter_;
   ClampWatch clamp_;
   Protocol protocol_;
+  FirstReadings first_;
   Inputs estimate_, applied_, gradient_;
   Inputs slow_;  // mean of the slope over about a window: what steps along a limit
   InputMatrix hessian_, inverse_;

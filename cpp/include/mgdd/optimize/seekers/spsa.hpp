@@ -12,6 +12,7 @@
 
 #include "mgdd/optimize/seekers/clamp_watch.hpp"
 #include "mgdd/optimize/seekers/constraint_filter.hpp"
+#include "mgdd/optimize/seekers/first_readings.hpp"
 #include "mgdd/optimize/seekers/local_model.hpp"
 #include "mgdd/optimize/seekers/seeker.hpp"
 
@@ -30,7 +31,8 @@ struct SpsaSettings {
   SearchSpace space;
   SpsaForm form = SpsaForm::first_order;
   GainSchedule schedule = GainSchedule::decreasing;
-  /// a, squared input unit per unit of J (second order: dimensionless); none: 20, or 3 for the latter
+  /// a, squared input unit per unit of J; none: 1/|J''| by `curvature` or first readings. Second order: dimensionless,
+  /// 3
   std::optional<double> gain{};
   double stability = 50.0;               ///< A
   double gain_exponent = 0.602;          ///< alpha
@@ -40,16 +42,15 @@ struct SpsaSettings {
   int averaging = 1;                     ///< gradients per iteration
   bool blocking =
       false;  ///< accept a step only if J there is not below its mean around the old estimate less 2 noise_sd
-  double noise_sd = 0.0;            ///< of one measurement of J, for blocking
-  double initial_hessian = -0.051;  ///< second order: curvature before the first measurement, < 0
-  double hessian_prior = 20.0;      ///< ... and how many iterations it counts for
-  double limit_amplitude = 0.5;     ///< share of c while a limit holds the estimate back
+  double noise_sd = 0.0;                    ///< of one measurement of J, for blocking
+  std::optional<double> initial_hessian{};  ///< second order: curvature to begin with, < 0; none: as for `gain`
+  double hessian_prior = 20.0;              ///< ... and how many iterations it counts for
+  double limit_amplitude = 0.5;             ///< share of c while a limit holds the estimate back
   std::uint64_t seed = 0;
   bool maximize = true;
   std::vector<Limit> limits;
   std::optional<double> curvature{};  ///< J'' if known
 
-  double first_gain() const noexcept;  ///< `gain`, or its default where there is none
   std::vector<std::string> advice() const;
 };
 
@@ -69,6 +70,8 @@ class Spsa {
   const Inputs& gradient() const noexcept { return gradient_; }
   const InputMatrix& hessian() const noexcept { return hessian_; }
   std::int64_t iteration() const noexcept { return iteration_; }
+  /// a in use; none while the first readings are taken.
+  std::optional<double> gain() const noexcept;
   std::int64_t blocked() const noexcept { return blocked_; }
   int measurements_per_iteration() const noexcept;
   const SpsaSettings& settings() const noexcept { return settings_; }
@@ -88,6 +91,7 @@ class Spsa {
     require_within_space("estimate", estimate_, settings_.space);
     require_within_space("candidate", candidate_, settings_.space);
     if (!(share_ > 0.0 && share_ <= 1.0)) throw ParameterError("state column 'share' must lie in (0, 1]");
+    first_.require_usable();
   }
 
   template <class Self, class V>
@@ -112,6 +116,7 @@ class Spsa {
     LocalModel::visit(self.trend_, v, "trend");
     ConstraintFilter::visit(self.filter_, v);
     ClampWatch::visit(self.clamp_, v);
+    FirstReadings::visit(self.first_, v);
   }
 
  private:
@@ -130,6 +135,7 @@ class Spsa {
   ClampWatch clamp_;
   LocalModel trend_;
   Protocol protocol_;
+  FirstReadings first_;
   Inputs estimate_, candidate_, applied_, gradient_, sum_;
   InputMatrix hessian_, hessian_sum_;
   InputMatrix metric_;            // inverse of the bend, or one

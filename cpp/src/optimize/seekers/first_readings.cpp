@@ -1,0 +1,106 @@
+#include "mgdd/optimize/seekers/first_readings.hpp"
+
+#include <algorithm>
+#include <cmath>
+#include <utility>
+
+namespace mgdd::optimize {
+namespace {
+
+constexpr int rounds = 6;
+constexpr double standard_errors = 1.5;
+constexpr double farthest = 20.0;     // where the optimum is at most, in reaches
+constexpr double least_moved = 0.25;  // of the reach: with less applied neither slope nor bend is computed
+constexpr double least_of_all = 1e-3;
+constexpr double least_movement = 1e-13;  // of J
+constexpr double lags = 3.0;              // after which a first-order lag has settled
+
+std::int64_t settling_cycles(const std::vector<ComponentLag>& components) {
+  double longest = 0.0;
+  for (const ComponentLag& c : components)
+    longest = std::max(longest, c.delay_cycles + lags * c.lag_cycles);
+  return 1 + static_cast<std::int64_t>(std::ceil(longest));
+}
+
+}  // namespace
+
+FirstReadings::FirstReadings(Inputs reach, double share, bool wanted, std::optional<double> curvature,
+                             const std::vector<ComponentLag>& components)
+    : reach_(std::move(reach)),
+      share_(share),
+      settle_(settling_cycles(components)),
+      open_(wanted && !(curvature && *curvature != 0.0)),
+      bend_(Inputs::Constant(reach_.size(), curvature ? std::abs(*curvature) : 0.0)),
+      asked_(bend_) {
+  if (!open_) return;
+  readings_.assign(static_cast<std::size_t>(rounds * slots()), 0.0);
+  applied_.assign(static_cast<std::size_t>(slots()), 0.0);
+}
+
+const Inputs& FirstReadings::ask(const Inputs& estimate) noexcept {
+  asked_ = estimate;
+  const Eigen::Index slot = told_ / settle_ % slots();
+  if (slot % 2 == 1) asked_[slot / 4] += slot % 4 == 1 ? reach_[slot / 4] : -reach_[slot / 4];
+  return asked_;
+}
+
+void FirstReadings::learn(const Inputs& applied, double j) noexcept {
+  if ((told_ + 1) % settle_ == 0) {
+    const std::int64_t read = told_ / settle_, slot = read % slots();
+    readings_[static_cast<std::size_t>(read)] = j;
+    applied_[static_cast<std::size_t>(slot)] += applied[slot / 4];
+  }
+  if (++told_ == settle_ * rounds * slots()) close();
+}
+
+void FirstReadings::close() noexcept {
+  told_ = 0;
+  Eigen::Map<Eigen::MatrixXd> y(readings_.data(), slots(), rounds);
+  const double highest = y.cwiseAbs().maxCoeff();
+  // A steady drift of the level is neither a bend nor noise.
+  constexpr int half = rounds / 2;
+  const auto all = static_cast<double>(y.size());
+  const double drift = (y.rightCols<half>().sum() - y.leftCols<half>().sum()) / (0.25 * all * all);
+  double start = 0.0, squares = 0.0;
+  for (Eigen::Index k = 0; k < y.size(); ++k) {
+    y(k) -= drift * static_cast<double>(k);
+    if (k % 2 == 0) start += y(k) / (0.5 * all);
+  }
+  for (Eigen::Index s = 0; s < slots(); ++s)
+    squares += (y.row(s).array() - (s % 2 == 0 ? start : y.row(s).mean())).square().sum();
+  const double means = 2.0 + 0.5 * static_cast<double>(slots());  // taken off: start, drift, two per input
+  const double noise = std::sqrt(squares / (all - means));
+  const double bend_error = std::sqrt((2.0 + 2.0 / static_cast<double>(reach_.size())) / rounds) * noise;
+  for (Eigen::Index i = 0; i < reach_.size(); ++i) {
+    const double c = reach_[i];
+    const double* const x = &applied_[static_cast<std::size_t>(4 * i)];
+    const double middle = 0.5 * (x[0] + x[2]), up = (x[1] - middle) / rounds, down = (middle - x[3]) / rounds;
+    double slope = 0.0, seen = 0.0;
+    if (std::min(up, down) > least_moved * c) {
+      const double rise = (y.row(4 * i + 1).mean() - start) / up, fall = (start - y.row(4 * i + 3).mean()) / down;
+      slope = (rise * down + fall * up) / (up + down);
+      seen = std::abs(2.0 * (rise - fall) / (up + down)) - standard_errors * bend_error / (c * c);
+    }
+    bend_[i] = std::max({share_ * noise / (c * c), seen, std::abs(slope) / (farthest * c)});
+  }
+  const double largest = bend_.cwiseProduct(reach_.cwiseAbs2()).maxCoeff();
+  if (!(largest > least_movement * highest)) return restart();  // J has not moved at all: nothing to go by
+  bend_ = bend_.cwiseMax(least_of_all * largest * reach_.cwiseAbs2().cwiseInverse());
+  open_ = false;
+}
+
+void FirstReadings::restart() noexcept {
+  if (!open_) return;
+  told_ = 0;
+  std::fill(applied_.begin(), applied_.end(), 0.0);
+}
+
+void FirstReadings::require_usable() const {
+  const auto whole = settle_ * static_cast<std::int64_t>(readings_.size());
+  if (open_ && !(told_ < whole)) {
+    throw ParameterError("state column 'first_open' holds 1: must be 0, as these settings give the gain");
+  }
+  if (!(bend_.array() >= 0.0).all()) throw ParameterError("state column 'first_bend' must hold numbers >= 0");
+}
+
+}  // namespace mgdd::optimize

@@ -1,0 +1,168 @@
+// Gains that a seeker makes of its first readings: the same path in every unit of J, and sense on any curvature.
+#include "mgdd/optimize/seekers/first_readings.hpp"
+
+#include "support/seeker_case.hpp"
+
+namespace mgdd::optimize {
+namespace {
+
+/// Every seeker whose gain can be left open, with it left open.
+std::vector<std::pair<std::string, Seeker>> own_gains(const SearchSpace& space, std::uint64_t seed) {
+  std::vector<std::pair<std::string, Seeker>> out;
+  for (const MeanRemoval form : {MeanRemoval::batch, MeanRemoval::moving_average, MeanRemoval::washout}) {
+    ExtremumSeekingSettings s;
+    s.space = space;
+    s.form = form;
+    out.emplace_back(to_string(form), ExtremumSeeking(s));
+  }
+  NewtonSeekingSettings newton;
+  newton.space = space;
+  out.emplace_back("newton", NewtonSeeking(newton));
+  BoundedSeekingSettings bounded;
+  bounded.space = space;
+  out.emplace_back("bounded", BoundedSeeking(bounded));
+  for (const SpsaForm form : {SpsaForm::first_order, SpsaForm::second_order, SpsaForm::one_measurement}) {
+    SpsaSettings s;
+    s.space = space;
+    s.form = form;
+    s.seed = seed;
+    out.emplace_back(to_string(form), Spsa(s));
+  }
+  GradientDescentSettings descent;
+  descent.space = space;
+  out.emplace_back("descent", GradientDescent(descent));
+  return out;
+}
+
+SearchSpace from(double start) {
+  return {scalar_input(start), scalar_input(-25.0), scalar_input(20.0)};
+}
+
+std::vector<double> path_of(Seeker& any, double curvature, double noise_sd, double unit, int cycles,
+                            std::uint64_t seed) {
+  return std::visit(
+      [&](auto& seeker) {
+        std::vector<double> path{seeker.estimate()[0]};
+        for (int k = 0; k < cycles; ++k) {
+          const double noise = noise_sd * random::normal(seed, 7, static_cast<std::uint64_t>(k));
+          cycle_of(seeker, [&](const Inputs& x) {
+            return unit * (3.0 + noise + 0.5 * curvature * (x[0] + 5.5) * (x[0] + 5.5));
+          });
+          path.push_back(seeker.estimate()[0]);
+        }
+        return path;
+      },
+      any);
+}
+
+TEST(FirstReadings, ThePathIsTheSameInEveryUnitOfJ) {
+  for (const double noise : {0.0, 0.3}) {
+    const std::size_t count = own_gains(from(-12.0), 1).size();
+    for (std::size_t i = 0; i < count; ++i) {
+      std::vector<std::vector<double>> paths;
+      for (const double unit : {1.0, 0x1p10, 0x1p-10}) {  // powers of two: nothing is rounded
+        auto all = own_gains(from(-12.0), 1);
+        paths.push_back(path_of(all[i].second, bend, noise, unit, 500, 3));
+      }
+      EXPECT_EQ(paths[0], paths[1]) << i;
+      EXPECT_EQ(paths[0], paths[2]) << i;
+      EXPECT_NE(paths[0].back(), -12.0) << i;
+    }
+  }
+}
+
+TEST(FirstReadings, EverySeekerArrivesAndStaysOnGentleAndOnSharpCurves) {
+  for (const double curvature : {0.01, 0.051, 0.3, 1.0, 5.0}) {
+    const std::size_t count = own_gains(from(-12.0), 1).size();
+    for (std::size_t i = 0; i < count; ++i) {
+      int arrived = 0;
+      double square = 0.0;
+      std::string name;
+      for (std::uint64_t seed = 0; seed < 40; ++seed) {
+        auto all = own_gains(from(-12.0), seed);
+        name = all[i].first;
+        const std::vector<double> path = path_of(all[i].second, -curvature, 0.3, 1.0, 2000, seed);
+        if (first_within(path, 1.0, -5.5) >= 0) ++arrived;
+        for (std::size_t k = 1200; k < 2000; ++k)
+          square += (path[k] + 5.5) * (path[k] + 5.5) / (40.0 * 800.0);
+      }
+      EXPECT_GE(arrived, 38) << name << ", curvature " << curvature;
+      EXPECT_LE(0.5 * curvature * square, name == "descent" ? 0.15 : 0.07) << name << ", curvature " << curvature;
+    }
+  }
+}
+
+double bend_of(FirstReadings& first, double slope, double curvature, double noise_sd, double drift, std::uint64_t seed,
+               std::int64_t late = 0) {
+  std::vector<double> asked;
+  for (int k = 0; first.open() && k < 1000; ++k) {
+    asked.push_back(first.ask(scalar_input(2.0))[0]);
+    const double x = asked[asked.size() - 1 - static_cast<std::size_t>(std::min<std::int64_t>(k, late))] - 2.0;
+    first.learn(scalar_input(asked.back()), slope * x + 0.5 * curvature * x * x + drift * k +
+                                                noise_sd * random::normal(seed, 9, static_cast<std::uint64_t>(k)));
+  }
+  return first.largest_bend();
+}
+
+TEST(FirstReadings, BendIsWhatIsSeenOrWhatTheNoiseWouldHideOrWhatTheSlopeAsksFor) {
+  const auto fresh = [] { return FirstReadings(scalar_input(1.5), 0.4, true); };
+  FirstReadings seen = fresh(), drifting = fresh(), steep = fresh();
+  EXPECT_NEAR(bend_of(seen, 0.3, -0.8, 0.0, 0.0, 1), 0.8, 1e-12);
+  EXPECT_NEAR(bend_of(drifting, 0.3, 0.8, 0.0, 5.0, 1), 0.8, 1e-9) << "a drift is not a bend";
+  EXPECT_NEAR(bend_of(steep, 6.0, 0.0, 0.0, 0.0, 1), 6.0 / (20.0 * 1.5), 1e-12);
+  double hidden = 0.0;
+  for (std::uint64_t seed = 0; seed < 400; ++seed) {
+    FirstReadings noisy = fresh();
+    hidden += std::log(bend_of(noisy, 0.1, -0.01, 0.5, 0.0, seed)) / 400.0;
+  }
+  EXPECT_NEAR(std::exp(hidden), 0.4 * 0.5 / (1.5 * 1.5), 0.03);
+}
+
+TEST(FirstReadings, WaitForALateSensorAndForAJThatMoves) {
+  FirstReadings late(scalar_input(1.0), 0.4, true, {}, {{3.0, 0.0}});
+  EXPECT_NEAR(bend_of(late, 0.4, -0.6, 0.0, 0.0, 1, 3), 0.6, 1e-12);
+  FirstReadings flat(scalar_input(1.0), 0.4, true);
+  EXPECT_EQ(bend_of(flat, 0.0, 0.0, 0.0, 0.0, 1), 0.0);
+  EXPECT_TRUE(flat.open());
+  FirstReadings known(scalar_input(1.0), 0.4, true, -0.7);
+  EXPECT_FALSE(known.open());
+  EXPECT_EQ(known.largest_bend(), 0.7);
+}
+
+// An input whose plant does not follow to one side shows the noise, and no slope of nothing.
+TEST(FirstReadings, APlantThatDoesNotFollowBendsNothing) {
+  FirstReadings first({inputs({1.0, 2.0})}, 0.4, true);
+  for (int k = 0; first.open(); ++k) {
+    Inputs x = first.ask(inputs({0.0, 0.0}));
+    x[1] = std::min(x[1], 0.0);
+    first.learn(x, -0.5 * x[0] * x[0] - 3.0 * x[1]);
+  }
+  EXPECT_NEAR(first.bend()[0], 1.0, 1e-12);
+  EXPECT_NEAR(first.bend()[1], 1e-3 / 4.0, 1e-12);
+}
+
+TEST(FirstReadings, StateGoesOnInTheMiddle) {
+  for (auto& [name, any] : own_gains(from(-12.0), 5)) {
+    SCOPED_TRACE(name);
+    std::visit(
+        [&](auto& seeker) {
+          const auto j = [](const Inputs& x) { return quadratic(x[0] + 5.0); };
+          for (int k = 0; k < 11; ++k)
+            cycle_of(seeker, j);
+          auto other = seeker;
+          for (int k = 0; k < 400; ++k)
+            cycle_of(other, j);
+          restore_state(other, save_state(seeker));
+          for (int k = 0; k < 400; ++k) {
+            cycle_of(seeker, j);
+            cycle_of(other, j);
+          }
+          EXPECT_EQ(seeker.estimate(), other.estimate());
+          EXPECT_NE(seeker.estimate()[0], -12.0);
+        },
+        any);
+  }
+}
+
+}  // namespace
+}  // namespace mgdd::optimize
