@@ -143,7 +143,7 @@ def _node(args: argparse.Namespace) -> None:
             args.progress.close()
             _say(args, f"{signal_map.file.stem} on {bus.name}: ready")
             run_node(core, bus, step=args.step, period_s=period_s, log=log, keep_on=_until(args.duration_s, stopped))
-            counts = {"samples": core.samples, "mode": core.gate.mode, "reason": core.gate.reason}
+            counts = {"samples": core.samples, "late": core.late, "mode": core.gate.mode, "reason": core.gate.reason}
             counts |= {"gate": core.gate.counts, **bus.counters}
     finally:
         if log is not None:

@@ -11,7 +11,8 @@ from typing import TYPE_CHECKING, Any, Protocol, Self, cast
 
 from mgdd._core.rig import Frame, RingTransport
 from mgdd.errors import RigError
-from mgdd.rig.can.messages import frame_of, message_of
+from mgdd.rig.can.messages import message_of
+from mgdd.rig.can.reception import POLL_S, Reception
 
 if TYPE_CHECKING:
     import can
@@ -116,7 +117,7 @@ class BusBridge:
 
     def _receive(self) -> None:
         while not self._stop.is_set():
-            frame = self._bus.receive(_LOOK_S)
+            frame = self._bus.receive(POLL_S)
             if frame is not None:
                 self._transport.feed(frame)
 
@@ -140,14 +141,15 @@ class _PythonCan:
     """A bus of python-can with the two calls of ours."""
 
     def __init__(self, bus: can.BusABC) -> None:
-        self._bus = bus
+        self._bus, self._reception = bus, Reception(bus)
 
     def receive(self, timeout_s: float) -> Frame | None:
-        message = self._bus.recv(timeout_s)
-        return None if message is None else frame_of(message, monotonic_ns=time.monotonic_ns(), received=True)
+        return self._reception.receive(timeout_s)
 
     def send(self, frame: Frame) -> None:
-        self._bus.send(message_of(frame))
+        message = message_of(frame)
+        self._reception.sending(message)
+        self._bus.send(message)
 
 
 def _end(transport: RingTransport, stop: threading.Event, threads: list[threading.Thread]) -> None:

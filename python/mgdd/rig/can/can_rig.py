@@ -19,6 +19,7 @@ from mgdd.rig.can.inbox import Inbox
 from mgdd.rig.can.link import Sender
 from mgdd.rig.can.mapped import MappedMessage
 from mgdd.rig.can.modes import RigMode, bus_of, may_be_real, require_key
+from mgdd.rig.can.punctual import Punctual
 from mgdd.rig.can.signal_map import SignalMap
 from mgdd.rig.can.signals import SignalsAsExceptions, undisturbed
 
@@ -106,6 +107,7 @@ class CanRig:
         self._signals = SignalsAsExceptions()
         self._inputs: tuple[float, ...] | None = None
         self._is_open = self._has_sent = False
+        self._punctual = Punctual(self.map, self.bus.name, self.timeout_s)
         self._commands = 0
         self._inbox, self._sender = Inbox(self.map), Sender()
 
@@ -147,7 +149,8 @@ class CanRig:
         mgdd.errors.ParameterError
             A missing, unknown or non-finite input; nothing was sent.
         mgdd.errors.RigError
-            The rig is not open, or the bus has a fault.
+            The rig is not open, or the bus has a fault; behind a node with a clock also a command that comes later than
+            the time limit of the commands allows: call `arm`.
         """
         self._require_open()
         values = checked_inputs(inputs, self.input_names)
@@ -158,9 +161,11 @@ class CanRig:
         }
         self._take_all()
         self._inbox.skip()  # older than this command
+        self._punctual.require_command()
         self._inputs = tuple(clamped.values())
         for message in self.map.commands.values():
             self._send(message, {name: clamped[name] for name in message.signals})
+        self._punctual.commanded()
         if self.mode is RigMode.REPLAY:  # what came before the recorded command is older than this one
             self._take_all()
             self._inbox.skip()
@@ -177,8 +182,8 @@ class CanRig:
         Raises
         ------
         mgdd.errors.RigError
-            Nothing was applied yet, no valid measurement in time, a node that does not follow its commands, a fault of
-            the bus.
+            Nothing was applied yet, no valid measurement in time or only one that waited too long, a node that does not
+            follow its commands, a fault of the bus.
         """
         self._require_open()
         if self._inputs is None:
@@ -190,7 +195,9 @@ class CanRig:
                 f"{self.bus.name}: the node is in state {self.state!r} and does not drive; look for the cause, then "
                 "call arm() or enter the rig again"
             )
-        return self._inbox.read()
+        arrived_ns, measured = self._inbox.read()
+        self._punctual.require_measurement(arrived_ns)
+        return measured
 
     def arm(self) -> None:
         """Send safe frames until the node is ready to be driven.
@@ -203,6 +210,9 @@ class CanRig:
         self._require_open()
         if self.mode is RigMode.REPLAY:
             return
+        self._take_all()
+        self._inbox.skip()  # what waited says nothing of now
+        self._punctual.armed_again()
         wait_s = max(_PEER_S, _PEER_CYCLES * self.map.cycle_s, self.timeout_s)
         until, rounds, before = time.monotonic() + wait_s, 0, self._inbox.answers
         checks = [message.e2e.good_until_valid for message in self.map.commands.values() if message.e2e is not None]
@@ -245,6 +255,7 @@ class CanRig:
             require_key(self.map, self.bus.name, self.mode, arm=self._arm, key_file=self._key_file)
         self._inbox, self._sender = Inbox(self.map), Sender()
         self._inputs, self._has_sent, self._commands = None, False, 0
+        self._punctual = Punctual(self.map, self.bus.name, self.timeout_s)
         self.bus.claim({message.key for message in self.map.commands.values()} if self._sends else set())
         self.bus.open()
         self._is_open = True
@@ -303,6 +314,7 @@ class CanRig:
         until = time.monotonic() + max(_LISTEN_S, _LISTEN_CYCLES * max([*cycles, self.map.cycle_s]))
         while (left := until - time.monotonic()) > 0.0:
             self._receive(left)
+        self._punctual.is_timed = self._inbox.answers > 0  # nobody has asked it anything yet
         if jumping := self._inbox.jumping():
             raise RigError(f"{self.bus.name}: {jumping}: two nodes send it, or most frames are lost")
 

@@ -7,7 +7,6 @@ rate: the hub does so when asked.
 from __future__ import annotations
 
 import asyncio
-import contextlib
 import errno
 import os
 import time
@@ -16,10 +15,14 @@ from typing import cast
 
 from mgdd.errors import ParameterError, RigError, argument
 from mgdd.rig.can.hub_faults import BusFault, Delivery, FaultInjector
+from mgdd.rig.can.messages import MOST_BYTES, largest_identifier
 
 __all__ = ["Hub"]
 
-_READ = 4096
+_MOST_TEXT = 1024  # bytes of a frame: of 64 bytes it has some 200
+_TICK_S = 0.005  # of the clock by which the hub knows that it stood still
+_STILL_S = 3.0 * _TICK_S
+_READ = 1 << 18  # bytes that asyncio reads at once: behind a full read there are more
 _JOIN_S = 0.02  # python-can does not expect a frame in one packet with the last "ok"
 _MOST_WAITING_S = 1.0  # of a frame before a bus with a bit rate: then it is lost
 _MOST_WAITING = 1 << 20  # bytes that a client has not read: then it is put out
@@ -28,30 +31,69 @@ _EXTENDED_BITS = 67
 _STUFFING = 1.2
 
 
-class _Client:
-    """One connection in raw mode; its first frames wait until it has read the greeting."""
+class _Client(asyncio.Protocol):
+    """One connection; in raw mode its first frames wait until it has read the greeting."""
 
-    def __init__(self, number: int, writer: asyncio.StreamWriter) -> None:
-        self.number, self._writer = number, writer
+    def __init__(self, hub: Hub) -> None:
+        self._hub = hub
+        self._text = b""
         self._waiting: list[bytes] | None = []
-        asyncio.get_running_loop().call_later(_JOIN_S, self._begin)
+        self._arrived_s: float | None = None  # of what a full read has left behind
+        self.number = 0  # in the order of raw mode
+
+    def connection_made(self, transport: asyncio.BaseTransport) -> None:
+        """Greet it."""
+        self._transport = cast("asyncio.Transport", transport)
+        self._hub.connections.add(self)
+        self._transport.write(b"< hi >")
+
+    def data_received(self, data: bytes) -> None:
+        """Take what it says, as old as it may be."""
+        arrived_s = self._hub.arrival_s() if self._arrived_s is None else self._arrived_s
+        self._arrived_s = arrived_s if len(data) >= _READ else None
+        *whole, self._text = (self._text + data).split(b">")
+        if len(self._text) > _MOST_TEXT:
+            self._text = b""
+            self._hub.malformed += 1
+        for one in whole:
+            words = one.strip().lstrip(b"<").split()
+            if words[:1] == [b"open"]:
+                self._transport.write(b"< ok >")
+            elif words[:1] == [b"rawmode"] and not self.number:
+                self._transport.write(b"< ok >")
+                self.number = self._hub.joined(self)
+                asyncio.get_running_loop().call_later(_JOIN_S, self._begin)
+            elif words[:1] == [b"send"] and self.number:
+                self._hub.pass_on(self, words[1:], arrived_s)
+
+    def connection_lost(self, exc: Exception | None) -> None:  # noqa: ARG002 - a killed client is a normal event
+        """Forget it."""
+        self._hub.left(self)
 
     def write(self, text: bytes) -> None:
         """Give it a frame; one that does not read is put out."""
         if self._waiting is not None:
             self._waiting.append(text)
-        elif self._writer.transport.get_write_buffer_size() > _MOST_WAITING:
-            self._writer.transport.abort()
+        elif self._transport.get_write_buffer_size() > _MOST_WAITING:
+            self._transport.abort()
         else:
-            self._writer.write(text)
+            self._transport.write(text)
+
+    def close(self) -> None:
+        """Put it out; one that reads gets what waits."""
+        if self._transport.get_write_buffer_size():
+            self._transport.abort()
+        self._transport.close()
 
     def _begin(self) -> None:
         waiting, self._waiting = self._waiting or [], None
-        self._writer.write(b"".join(waiting))
+        self._transport.write(b"".join(waiting))
 
 
 class Hub:
     """A hub for processes of this machine.
+
+    A frame is stamped with its arrival: what waited while the hub was stopped is as old as that.
 
     Parameters
     ----------
@@ -86,14 +128,14 @@ class Hub:
         if bit_rate is not None and not 1e3 <= bit_rate <= 1e8:
             raise ParameterError.of("bit_rate", bit_rate, "in [1e3, 1e8] bit/s")
         self.host, self.port = host, port
-        self.frames = self._overload = 0
+        self.frames = self.malformed = self._overload = 0
         self._rate = bit_rate
         self._injector = FaultInjector(faults, seed)
+        self.connections: set[_Client] = set()
         self._clients: list[_Client] = []
-        self._serving: set[asyncio.Task[None]] = set()
         self._joined = 0
         self._free_s = 0.0
-        self._start_s = 0.0
+        self._start_s = self._ticked_s = self._looked_s = time.monotonic()
 
     async def run(self, on_ready: Callable[[Hub], None], stop: asyncio.Event) -> None:
         """Serve until `stop` is set.
@@ -111,83 +153,79 @@ class Hub:
             The port is taken.
         """
         self._start_s = time.monotonic()
+        loop = asyncio.get_running_loop()
         try:
-            server = await asyncio.start_server(self._serve, self.host, self.port)
+            server = await loop.create_server(lambda: _Client(self), self.host, self.port)
         except OSError as error:
             why = os.strerror(error.errno) if error.errno and error.errno > 0 else error.strerror or str(error)
             free = f"; {argument('port', '0')} takes a free one" if error.errno == errno.EADDRINUSE else ""
             raise RigError(f"{self.host}:{self.port}: the hub cannot listen there: {why}{free}") from error
         self.port = server.sockets[0].getsockname()[1]
+        ticking = asyncio.create_task(self._tick())
         try:
             on_ready(self)
             await stop.wait()
         finally:
+            ticking.cancel()
             server.close()
             await asyncio.sleep(0.0)  # whoever has just come in begins, and so is seen
-            serving = list(self._serving)
-            for task in serving:
-                task.cancel()
-            await asyncio.gather(*serving, return_exceptions=True)
+            for client in list(self.connections):
+                client.close()
             await server.wait_closed()  # last: since Python 3.12 it waits for the connections
+            await asyncio.sleep(0.0)
 
     @property
     def counts(self) -> dict[str, int]:
-        """Frames taken, lost because the bus was too slow for them, and how often each fault struck."""
-        return {"frames": self.frames, "overload": self._overload, **self._injector.counts}
+        """Frames taken, malformed ones, lost because the bus was too slow, and how often each fault struck."""
+        own = {"frames": self.frames, "malformed": self.malformed, "overload": self._overload}
+        return {**own, **self._injector.counts}
 
-    async def _serve(self, reader: asyncio.StreamReader, writer: asyncio.StreamWriter) -> None:
-        client: _Client | None = None
-        task = cast("asyncio.Task[None]", asyncio.current_task())
-        self._serving.add(task)
-        writer.write(b"< hi >")
-        buffer = b""
-        try:
-            while data := await reader.read(_READ):
-                buffer += data
-                while b">" in buffer:
-                    one, _, buffer = buffer.partition(b">")
-                    words = one.strip().lstrip(b"<").split()
-                    if words[:1] == [b"open"]:
-                        writer.write(b"< ok >")
-                    elif words[:1] == [b"rawmode"] and client is None:
-                        writer.write(b"< ok >")
-                        await writer.drain()
-                        self._joined += 1
-                        client = _Client(self._joined, writer)
-                        self._clients.append(client)
-                    elif words[:1] == [b"send"] and client is not None:
-                        self._pass_on(client, words)
-        except (ConnectionError, asyncio.CancelledError):  # a killed client is a normal event on a test bus
-            pass
-        finally:
-            self._serving.discard(task)
-            if client is not None:
-                self._clients.remove(client)
-            writer.close()
-            with contextlib.suppress(ConnectionError, asyncio.CancelledError):
-                await writer.wait_closed()
+    def arrival_s(self) -> float:
+        """Return since when bytes that are read now may have waited; now, unless the hub stood still [s]."""
+        now = time.monotonic()
+        return now if now - self._looked_s <= _STILL_S else self._looked_s
 
-    def _pass_on(self, sender: _Client, words: list[bytes]) -> None:
+    def joined(self, client: _Client) -> int:
+        """Take a client that is in raw mode, and give its number."""
+        self._joined += 1
+        self._clients.append(client)
+        return self._joined
+
+    def left(self, client: _Client) -> None:
+        """Forget a client."""
+        self.connections.discard(client)
+        if client in self._clients:
+            self._clients.remove(client)
+
+    async def _tick(self) -> None:
+        while True:  # after a stop the clock may ring before asyncio looks at its sockets: the tick before is safe
+            self._looked_s, self._ticked_s = self._ticked_s, time.monotonic()
+            await asyncio.sleep(_TICK_S)
+
+    def pass_on(self, sender: _Client, words: list[bytes], arrived_s: float) -> None:
+        """Give a frame to all other clients; one that is malformed is counted: socketcand says nothing either."""
         try:
-            size = int(words[2], 16)
-            data = bytes(int(word, 16) for word in words[3 : 3 + size])
-            identifier = int(words[1], 16)
+            number, size = words[0], int(words[1], 16)
+            data = bytes(int(word, 16) for word in words[2:])
+            identifier = int(number, 16)
         except (IndexError, ValueError):
-            return  # not a frame: socketcand says nothing either
-        if len(data) != size:
+            self.malformed += 1
+            return
+        width = len(number)  # 3 digits say 11 bits, 8 say 29
+        if not (0 <= identifier <= largest_identifier(extended=width > 3) and len(data) == size <= MOST_BYTES):
+            self.malformed += 1
             return
         self.frames += 1
         now = time.monotonic() - self._start_s
         if self._injector.frozen(sender.number, now):
             return
-        width = len(words[1])  # 3 digits say 11 bits, 8 say 29
         for other, delivery in self._injector.deliver(identifier, data, now):
             waiting_s = self._queueing_s(len(delivery.data), width, now)
             if waiting_s > _MOST_WAITING_S:
                 self._overload += 1
                 continue
             late = delivery.late_s + waiting_s
-            text = _text(other, width, delivery)
+            text = _text(other, width, delivery, arrived_s + late)
             if late > 0.0:
                 asyncio.get_running_loop().call_later(late, self._write, sender, text)
             else:
@@ -211,8 +249,8 @@ class Hub:
             client.write(text)
 
 
-def _text(identifier: int, width: int, delivery: Delivery) -> bytes:
-    stamp = b"%.6f" % time.time()
+def _text(identifier: int, width: int, delivery: Delivery, at_s: float) -> bytes:
+    stamp = b"%.6f" % (time.time() - time.monotonic() + at_s)
     if delivery.error_class:
         return b"< error %08X %s >" % (delivery.error_class, stamp)
     number = b"%08X" % identifier if width > 3 else b"%03X" % identifier

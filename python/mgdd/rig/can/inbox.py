@@ -38,7 +38,7 @@ class Inbox:
         self.state = ""
         self._receiver = Receiver(signal_map.measurements)
         self._cycles = 0
-        self._whole: deque[Measurement] = deque()
+        self._whole: deque[tuple[int, Measurement]] = deque()  # with the arrival of its trigger [ns]
         self._values: dict[str, dict[str, float]] = {}
         self._applied: dict[str, float] = {}
         self._cycle_of: dict[str, int] = {}
@@ -77,18 +77,20 @@ class Inbox:
         if self.map.state is not None and self.map.state.message == name:
             self.state = self.map.state.name_of(frame.data)
         if name == self.map.trigger:  # a cycle is whole: frames of the next one do not mix into it
-            self._end_cycle()
+            self._end_cycle(frame.monotonic_ns)
 
     @property
     def ready(self) -> bool:
         """Whether there is a whole cycle that nobody has read."""
         return bool(self._whole)
 
-    def read(self) -> Measurement:
+    def read(self) -> tuple[int, Measurement]:
         """Give the oldest whole cycle that nobody has read.
 
         Returns
         -------
+        int
+            When it arrived, monotonic [ns].
         mgdd.loop.Measurement
             NaN for what never came, or longer ago than the time limit of its message.
         """
@@ -128,14 +130,14 @@ class Inbox:
         others = ", ".join(f"{identifier:#x}" for identifier in sorted(seen)) or "none"
         return f"no frame {wanted} came; identifiers seen: {others}"
 
-    def _end_cycle(self) -> None:
+    def _end_cycle(self, arrived_ns: int) -> None:
         for name, values in self._pending.items():
             self._values.setdefault(name, {}).update(values)
             self._cycle_of[name] = self._cycles
         self._applied.update(self._pending_applied)
         self._pending, self._pending_applied = {}, {}
         self._cycles += 1
-        self._whole.append(self._measurement())
+        self._whole.append((arrived_ns, self._measurement()))
 
     def _measurement(self) -> Measurement:
         values: dict[str, float] = {}

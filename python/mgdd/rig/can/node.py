@@ -166,17 +166,20 @@ def run_node(
     if period_ns < 100_000:
         raise ParameterError.of("period_s", period_s, ">= 1e-4 s")
     next_ns = time.monotonic_ns() + period_ns
+    known_ns = 0  # until when the node is known to have stood still
     while keep_on():
         while (left_ns := next_ns - time.monotonic_ns()) > 0:
             frame = bus.receive(left_ns * 1e-9)
             if frame is not None:
-                core.take(frame)
-        while (frame := bus.receive(0.0)) is not None:
-            core.take(frame)
-        behind_ns = time.monotonic_ns() - next_ns
-        if behind_ns > _MOST_BEHIND_S * 1e9:
-            next_ns += behind_ns
+                core.take(frame, time.monotonic_ns())
+        while time.monotonic_ns() < next_ns + period_ns and (frame := bus.receive(0.0)) is not None:
+            core.take(frame, time.monotonic_ns())
         while True:  # a late node catches up in silence: the plate moves, whether somebody looks or not
+            now_ns, since_ns = time.monotonic_ns(), max(next_ns, known_ns)
+            if now_ns - since_ns > core.patience_s * 1e9:
+                core.stood_still(since_ns, now_ns)
+                known_ns = now_ns
+                next_ns = max(next_ns, now_ns - round(_MOST_BEHIND_S * 1e9))
             frames = core.sample(next_ns)
             if log is not None:
                 log.write(core, next_ns)

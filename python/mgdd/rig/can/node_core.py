@@ -1,7 +1,8 @@
 """The other side of the bus, without a process: commands in, one sample of the plant, measurement frames out.
 
 It trusts nobody: counter and CRC of every command are checked here, and what leaves for the plant passes the safety
-gate of the node. After the gate took the drive away, the host has to arm the node again with safe frames.
+gate of the node. After the gate took the drive away, the host has to arm the node again with safe frames. A node that
+stood still longer than its limits allow trusts nothing that waited meanwhile.
 """
 
 from __future__ import annotations
@@ -52,7 +53,7 @@ class NodeCore:
                 f"those of the plant, {', '.join(plant.input_names)}",
             )
         self.plant, self.map = plant, signal_map
-        self.samples = 0
+        self.samples = self.late = 0
         self.last: Sampled | None = None
         self._receiver = Receiver(signal_map.commands)
         self._sender = Sender()
@@ -77,6 +78,8 @@ class NodeCore:
                 cycle_s=cycle_s, largest_age_cycles=max(self._limit_s / cycle_s, 1.0)
             )
         )
+        self._deaf_until_ns = 0
+        self._missed = 0  # samples, of a time in which the node stood still
 
     @property
     def state(self) -> str:
@@ -88,13 +91,21 @@ class NodeCore:
         """Whether the plant is driven."""
         return self.gate.mode == "run"
 
-    def take(self, frame: Frame) -> bool:
+    @property
+    def patience_s(self) -> float:
+        """How long the node may stand still: the time limit of the commands, or as many samples as its gate allows."""
+        envelope = self.gate.envelope
+        return max(self._limit_s, envelope.missed_deadlines * envelope.cycle_s)
+
+    def take(self, frame: Frame, now_ns: int | None = None) -> bool:
         """Take a frame of the bus; what follows from it, the next sample shows.
 
         Parameters
         ----------
         frame : Frame
-            With our stamp.
+            With the time of its arrival.
+        now_ns : int, optional
+            Monotonic time [ns], of a node with a clock: a frame that waited too long is left out.
 
         Returns
         -------
@@ -102,18 +113,38 @@ class NodeCore:
             Whether with it every cyclic command has come since the last sample, usable or not: the tick of a node that
             runs step by step.
         """
+        if now_ns is not None and self._is_late(frame, now_ns):
+            self.late += 1
+            return False
         taken = self._receiver.take(frame)
         if taken is None:
             return False
         message = taken.message
-        if taken.usable:
-            self._use(message, frame.data)
-        elif taken.status not in ("ok", "initial"):
+        if taken.usable and not self._use(message, frame.data):
+            self._bad += 1
+            self._bad_status = "not_finite"
+        elif not taken.usable and taken.status not in ("ok", "initial"):
             self._bad += 1
             self._bad_status = taken.status
         if taken.is_new:
             self._fresh.add(message.name)
         return taken.is_new and message.name in self._timeouts_s and self._fresh >= set(self._timeouts_s)
+
+    def stood_still(self, since_ns: int, now_ns: int) -> None:
+        """Note that the node did not run: a fault of the next sample, and what waited meanwhile is left out.
+
+        Parameters
+        ----------
+        since_ns, now_ns : int
+            Monotonic times [ns].
+        """
+        self._deaf_until_ns = now_ns
+        self._missed = max(self._missed, int((now_ns - since_ns) * 1e-9 / self.gate.envelope.cycle_s))
+        self._receiver.reset()
+        for known in (self._said, self._fresh, self._good):
+            known.clear()
+        self._bad = self._safe_frames = 0
+        self._is_asked_to_arm = False
 
     def sample(self, now_ns: int) -> list[Frame]:
         """Run one sample of a node with a clock.
@@ -145,16 +176,24 @@ class NodeCore:
             self.last = self.plant.sample(inputs)
         return self._report(self.last or Sampled(values={}, applied={}))
 
-    def _use(self, message: MappedMessage, payload: bytes) -> None:
-        self._inputs.update(message.read(payload))
+    def _is_late(self, frame: Frame, now_ns: int) -> bool:
+        return frame.monotonic_ns < max(self._deaf_until_ns, now_ns - round(self.patience_s * 1e9))
+
+    def _use(self, message: MappedMessage, payload: bytes) -> bool:
+        """Take the inputs; False where one is not finite. A duty that is not, the gate judges."""
+        inputs = message.read(payload)
+        if not all(math.isfinite(value) for name, value in inputs.items() if name != "duty"):
+            return False
+        self._inputs.update(inputs)
         if message.name not in self._timeouts_s:
-            return
+            return True
         self._good[message.name] += 1
         rests, drives = message.rests(payload), message.drives(payload)
         self._said[message.name] = "rest" if rests else "drive" if drives else "other"
         self._safe_frames = self._safe_frames + 1 if self._all_say("rest") else 0
         if self._safe_frames >= _ARMING_FRAMES * len(self._timeouts_s):
             self._is_asked_to_arm = True
+        return True
 
     def _all_say(self, word: str) -> bool:
         return all(self._said.get(name) == word for name in self._timeouts_s)
@@ -167,12 +206,14 @@ class NodeCore:
         rounds = min((self._good[name] for name in self._timeouts_s), default=0)
         self._good = Counter({name: min(self._good[name] - rounds, 1) for name in self._timeouts_s})
         bad, self._bad = self._bad, 0
+        missed, self._missed = self._missed, 0
         self.gate.observe(
             **{
                 **facts,
                 "good_frames": rounds if facts["good_frames"] else 0,
                 "bad_frames": bad,
                 "age_s": None if age_s is None else max(age_s, facts["age_s"]),
+                "missed_deadlines": missed,
                 "request": self._request(),
             }
         )

@@ -17,21 +17,21 @@ from mgdd._core.rig import Frame, error_classes
 from mgdd.errors import ParameterError, RigError
 from mgdd.io.extras import import_extra
 from mgdd.rig.can.connect import connected, error_code
-from mgdd.rig.can.messages import frame_of, message_of
+from mgdd.rig.can.messages import message_of
+from mgdd.rig.can.reception import THIS_HOST, Reception
 
 __all__ = ["CanTransport", "two_senders"]
 
-_POLL_S = 0.05  # longest sleep of the receive thread: how long closing waits
 _QUEUE = 4096  # frames that nobody has read
 _FATAL = frozenset({"bus_off", "error_passive"})
-_THIS_HOST = ("localhost", "127.0.0.1", "::1")
 
 
 class CanTransport:
     """A bus of python-can behind our own receive thread.
 
     The configuration files and environment variables of python-can are not read: what is not given here, is not used.
-    The thread only stamps and stores frames; whatever ends it, and every fault of the bus, is raised by the next call.
+    The thread only stamps frames with their arrival and stores them; whatever ends it, and every fault of the bus, is
+    raised by the next call. A frame that is malformed, and our own one that comes back, is left out and counted.
 
     Parameters
     ----------
@@ -78,6 +78,7 @@ class CanTransport:
         self.options = dict(options)
         self.send_timeout_s = send_timeout_s
         self._bus: Any = None
+        self._reception: Reception | None = None
         self._thread: threading.Thread | None = None
         self._stop = threading.Event()
         self._arrived = threading.Condition()
@@ -129,7 +130,7 @@ class CanTransport:
         if self.interface == "socketcan":
             return str(self.channel).startswith("vcan")
         hub = str(self.options.get("host", "")).lower()
-        return self.interface == "virtual" or (self.interface == "socketcand" and hub in _THIS_HOST)
+        return self.interface == "virtual" or (self.interface == "socketcand" and hub in THIS_HOST)
 
     @property
     def shared(self) -> bool:
@@ -138,9 +139,9 @@ class CanTransport:
 
     @property
     def counters(self) -> dict[str, int]:
-        """Frames sent and received, retries, overflows, error frames by class."""
+        """Frames sent and received, retries, overflows, error frames by class; malformed and own ones left out."""
         with self._arrived:
-            return dict(self._counts)
+            return dict(self._counts + (self._reception.counts if self._reception is not None else Counter()))
 
     def open(self) -> None:
         """Connect and start to receive.
@@ -155,6 +156,9 @@ class CanTransport:
         if self._bus is not None:
             raise RigError(f"{self.name} is open already: close it first")
         self._bus = connected(self.interface, self.channel, self.options, self.name)
+        if self._reception is not None:
+            self._counts += self._reception.counts
+        self._reception = Reception(self._bus)
         self._stop.clear()
         self._queue.clear()
         self._fault = None
@@ -207,6 +211,8 @@ class CanTransport:
         bus = self._open_bus(final=final)
         can, message = import_extra("can", "can", "a CAN bus"), message_of(frame)
         until, pause = time.monotonic() + self.send_timeout_s, 1e-4
+        if self._reception is not None:
+            self._reception.sending(message)
         while True:
             try:
                 bus.send(message)
@@ -254,10 +260,10 @@ class CanTransport:
 
     def _receive_all(self) -> None:
         try:
-            while not self._stop.is_set():
-                message = self._bus.recv(timeout=_POLL_S)
-                if message is not None:
-                    self._store(message, time.monotonic_ns())
+            while not self._stop.is_set() and self._reception is not None:
+                frame = self._reception.receive()
+                if frame is not None:
+                    self._store(frame)
                 elif self.interface == "socketcand":
                     self._require_connection()
         except RigError as error:
@@ -265,8 +271,7 @@ class CanTransport:
         except Exception as error:  # noqa: BLE001 whatever ends the thread is raised by the next call
             self._trip(RigError(f"{self.name}: receiving ended: {error}"))
 
-    def _store(self, message: Any, now_ns: int) -> None:
-        frame = frame_of(message, monotonic_ns=now_ns, received=True)
+    def _store(self, frame: Frame) -> None:
         if frame.error:
             classes = error_classes(frame)
             for name in classes:
