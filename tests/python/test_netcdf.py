@@ -269,3 +269,12 @@ def test_written_and_read_back(source: str, tmp_path: Path) -> None:
             np.testing.assert_array_equal(back[name].to_numpy(), variable.to_numpy(), err_msg=str(name))
             assert back[name].attrs["long_name"] == variable.attrs["long_name"]
             REGISTRY.parse_units(back[name].attrs["units"])
+
+
+def test_every_file_is_classic_whatever_engine_is_installed() -> None:
+    """The reader of this package knows no other; without an engine's name xarray takes the first that it finds."""
+    package = Path(mgdd.__file__).resolve().parent
+    files = [file for folder in package.iterdir() for file in folder.rglob("*.py")]
+    calls = [line for file in files for line in file.read_text(encoding="utf-8").splitlines() if ".to_netcdf(" in line]
+    assert calls
+    assert [line.strip() for line in calls if 'engine="scipy"' not in line] == []

@@ -101,6 +101,43 @@ def test_a_late_command_opens_the_bridge_and_only_arming_closes_it(host: Host) -
     running(host)
 
 
+def test_a_node_that_stood_still_trusts_nothing_that_waited(host: Host) -> None:
+    """Below the time limit of the commands a gap is no fault."""
+    assert host.core.patience_s == 0.02
+    running(host)
+    begin_ns, waited = host.now_ns, [host.frame(None) for _ in range(8)] + [host.frame(0.5)]
+    host.now_ns += 400_000_000
+    host.core.stood_still(begin_ns, host.now_ns)
+    for place, frame in enumerate(waited):  # a handshake and a command, the last one just before the end of the gap
+        arrived = changed(frame, monotonic_ns=host.now_ns - 5_000_000 * (len(waited) - place))
+        assert not host.core.take(arrived, host.now_ns)
+    host.core.sample(host.now_ns)
+    assert host.decided == ("limp", "deadlines")
+    assert host.core.late == len(waited)
+    host.send(0.5, 50)
+    assert host.core.state == "limp"
+    running(host)
+
+
+def test_a_gap_is_a_fault_of_a_node_that_is_only_armed(host: Host) -> None:
+    host.send(None, 6)
+    assert host.core.state == "armed"
+    host.wait(3.0)  # the host may be silent
+    assert host.core.state == "armed"
+    host.core.stood_still(host.now_ns, host.now_ns + 30_000_000)
+    host.wait(0.03)
+    assert host.decided == ("limp", "deadlines")
+
+
+def test_a_frame_that_waited_on_the_bus_is_left_out(host: Host) -> None:
+    """The hub stood still, and the node did not."""
+    running(host)
+    for waited_s, taken in ((0.019, True), (0.021, False)):
+        frame = changed(host.frame(0.5), monotonic_ns=host.now_ns - round(waited_s * 1e9))
+        assert host.core.take(frame, host.now_ns) is taken
+    assert host.core.late == 1
+
+
 def test_broken_commands_are_ignored_and_three_of_them_open_the_bridge(host: Host) -> None:
     running(host)
     for _ in range(2):

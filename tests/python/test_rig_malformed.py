@@ -79,15 +79,19 @@ def test_a_malformed_line_ends_nobody_at_the_hub(text: str) -> None:
 
 
 def test_bytes_without_an_end_are_not_kept() -> None:
-    with running_hub() as hub, CanTransport.parse(bus_of(hub)) as bus, CanTransport.parse(bus_of(hub)) as other:
-        with stranger(hub) as stream:
-            for _ in range(100):
-                stream.sendall(b"<" * 10_000)
-                other.send(Frame(id=0x122, data=b"\x07"))
-            stream.sendall(f">{GOOD}".encode())
-            assert len([frame for frame in received(bus, 101) if frame.id == 0x122]) == 100
-            assert all(len(client._text) < 2000 for client in hub.connections)
-            assert hub.counts["malformed"] > 1
+    with (
+        running_hub() as hub,
+        CanTransport.parse(bus_of(hub)) as bus,
+        CanTransport.parse(bus_of(hub)) as other,
+        stranger(hub) as stream,
+    ):
+        for _ in range(100):
+            stream.sendall(b"<" * 10_000)
+            other.send(Frame(id=0x122, data=b"\x07"))
+        stream.sendall(f">{GOOD}".encode())
+        assert len([frame for frame in received(bus, 101) if frame.id == 0x122]) == 100
+        assert all(len(client._text) < 2000 for client in hub.connections)
+        assert hub.counts["malformed"] > 1
 
 
 @pytest.mark.parametrize("text", NOT_ANSWERS)

@@ -16,7 +16,9 @@ from hub_thread import bus_of, running_hub
 from mgdd._core.rig import Frame, error_classes
 from mgdd.errors import ParameterError, RigError
 from mgdd.rig import CanTransport
+from mgdd.rig.can.hub import Hub
 from mgdd.rig.can.hub_faults import BusFault, FaultInjector
+from mgdd.rig.can.reception import STILL_S, Reception
 
 can = pytest.importorskip("can", reason="the extra `can` is not installed")
 
@@ -247,6 +249,40 @@ def test_a_hub_that_goes_away() -> None:
             bus.receive(5.0)
     finally:
         bus.close()
+
+
+def test_the_age_of_a_frame_counts_from_its_arrival() -> None:
+    """A bus with the clock of this machine says when a frame came; of another one the last look at it does."""
+    with can.Bus(interface="virtual", channel="age", ignore_config=True) as other:
+        host = can.Bus(interface="virtual", channel="age", ignore_config=True)
+        reception, before_ns = Reception(host), time.monotonic_ns()
+        other.send(can.Message(arbitration_id=1, is_extended_id=False))
+        sent_ns = time.monotonic_ns()
+        time.sleep(0.1)
+        got = reception.receive()
+        host.shutdown()
+    assert got is not None
+    assert before_ns - 10_000 <= got.monotonic_ns <= sent_ns + 10_000
+    late = FakeBus([])
+    reception = Reception(late)  # type: ignore[arg-type]
+    made_ns = time.monotonic_ns()
+    time.sleep(2.0 * STILL_S)
+    late.incoming = [can.Message(arbitration_id=1, data=[k], is_extended_id=False) for k in range(3)]
+    stamps = [frame.monotonic_ns for frame in (reception.receive(), reception.receive(), reception.receive()) if frame]
+    assert [stamp <= made_ns for stamp in stamps] == [True] * 3
+    assert reception.receive() is None
+    late.incoming = [can.Message(arbitration_id=1, is_extended_id=False)]
+    fresh = reception.receive()
+    assert fresh is not None
+    assert fresh.monotonic_ns > made_ns
+
+
+def test_what_waited_before_the_hub_is_as_old_as_that() -> None:
+    quiet = Hub()
+    quiet._looked_s -= 2.0 * STILL_S
+    assert quiet.arrival_s() == quiet._looked_s
+    quiet._looked_s += 2.0 * STILL_S
+    assert quiet.arrival_s() > quiet._looked_s
 
 
 @contextmanager

@@ -207,7 +207,7 @@ class Fit:
         return plain
 
     def to_netcdf(self, path: str | os.PathLike[str]) -> None:
-        """Write estimates, correlation and what was simulated to a netCDF file.
+        """Write estimates, correlation and what was simulated to a classic netCDF file.
 
         Parameters
         ----------
@@ -215,6 +215,8 @@ class Fit:
             The file; one that is there is overwritten.
         """
         import xarray as xr
+
+        from mgdd.io.netcdf_file import write_netcdf
 
         dataset = self.report.to_dataset()
         for name in self.__dataclass_fields__:
@@ -229,7 +231,7 @@ class Fit:
             for name, value in self.to_dict().items()
             if value is not None
         }
-        dataset.to_netcdf(path)
+        write_netcdf(dataset, path)
 
     def to_toml(self) -> str:
         """Write the model as TOML with the standard errors, the quality and the name of the record.

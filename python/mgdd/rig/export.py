@@ -17,6 +17,7 @@ import numpy as np
 from mgdd.errors import Error, ParameterError, RigError
 from mgdd.io.existing_file import existing_file
 from mgdd.io.extras import import_extra
+from mgdd.io.netcdf_file import write_netcdf
 from mgdd.results.labels import label_of
 from mgdd.rig.can.logs import LOG_WRITERS, write_log
 from mgdd.rig.recorded import RecordedRun, read_record, stamped_frames
@@ -41,8 +42,8 @@ def export_record(
     kind : str, optional
         Default the ending of `target`. One file with everything: ``"mf4"`` (asammdf: tables, events and raw frames as
         a bus log; ``pip install "mgdd[mdf]"``). One file with the frames: ``"blf"``, ``"asc"`` or ``"log"`` (candump;
-        ``pip install "mgdd[can]"``). A folder with ``frames``, ``events`` and each table of samples: ``"netcdf"``,
-        ``"csv"``, ``"parquet"`` (``pip install "mgdd[parquet]"``).
+        ``pip install "mgdd[can]"``). A folder with ``frames``, ``events`` and each table of samples: ``"netcdf"``
+        (classic format, by scipy), ``"csv"``, ``"parquet"`` (``pip install "mgdd[parquet]"``).
 
     Returns
     -------
@@ -150,9 +151,9 @@ def _write_csv(path: Path, data: xr.Dataset) -> None:
 
 
 def _write_netcdf(path: Path, data: xr.Dataset) -> None:
-    """NetCDF 3 knows no unsigned numbers."""
+    """Classic netCDF knows no unsigned numbers."""
     small = {name: v.astype(np.int16) for name, v in data.variables.items() if v.dtype == np.uint8}
-    data.assign({str(name): v for name, v in small.items()}).to_netcdf(path)
+    write_netcdf(data.assign({str(name): v for name, v in small.items()}), path)
 
 
 def _write_parquet(path: Path, data: xr.Dataset) -> None:

@@ -223,7 +223,7 @@ class CanRig:
             rounds += 1
             heard = self._heard(self.map.cycle_s if self.bus.shared else 0.0)
             self._inbox.skip()
-            refuses = self._sends and (self._inbox.failed or self.state == "init")
+            refuses = self._sends and (self._inbox.failed or self._inbox.unarmed)
             if heard and not refuses and (rounds >= enough or not self._sends):
                 self._hear_out(before + (rounds if self._sends and self.bus.shared else 0))
                 return

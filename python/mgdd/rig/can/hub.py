@@ -16,12 +16,12 @@ from typing import cast
 from mgdd.errors import ParameterError, RigError, argument
 from mgdd.rig.can.hub_faults import BusFault, Delivery, FaultInjector
 from mgdd.rig.can.messages import MOST_BYTES, largest_identifier
+from mgdd.rig.can.reception import STILL_S
 
 __all__ = ["Hub"]
 
 _MOST_TEXT = 1024  # bytes of a frame: of 64 bytes it has some 200
 _TICK_S = 0.005  # of the clock by which the hub knows that it stood still
-_STILL_S = 3.0 * _TICK_S
 _READ = 1 << 18  # bytes that asyncio reads at once: behind a full read there are more
 _JOIN_S = 0.02  # python-can does not expect a frame in one packet with the last "ok"
 _MOST_WAITING_S = 1.0  # of a frame before a bus with a bit rate: then it is lost
@@ -183,7 +183,7 @@ class Hub:
     def arrival_s(self) -> float:
         """Return since when bytes that are read now may have waited; now, unless the hub stood still [s]."""
         now = time.monotonic()
-        return now if now - self._looked_s <= _STILL_S else self._looked_s
+        return now if now - self._looked_s <= STILL_S else self._looked_s
 
     def joined(self, client: _Client) -> int:
         """Take a client that is in raw mode, and give its number."""

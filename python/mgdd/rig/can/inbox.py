@@ -51,6 +51,11 @@ class Inbox:
         return self.map.state is not None and self.state in self.map.state.failed
 
     @property
+    def unarmed(self) -> bool:
+        """Whether the node says that it was never armed."""
+        return self.map.state is not None and self.state == self.map.state.unarmed
+
+    @property
     def answers(self) -> int:
         """How many trigger messages came, valid or not."""
         return self._receiver.seen.get(self.map.measurements[self.map.trigger].message.frame_id, 0)

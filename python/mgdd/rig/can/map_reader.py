@@ -11,7 +11,7 @@ from mgdd.errors import DataError, ParameterError, did_you_mean
 from mgdd.results.labels import VARIABLES
 from mgdd.results.units import attribute_units, unit_of
 from mgdd.rig.can.dbc import DbcFile, DbcMessage, DbcSignal
-from mgdd.rig.can.mapped import MappedMessage, MappedSignal, Raw, StateSignal
+from mgdd.rig.can.mapped import GATE_MODES, MappedMessage, MappedSignal, Raw, StateSignal
 from mgdd.rig.can.toml_table import TomlTable
 
 __all__ = ["MapReader"]
@@ -110,18 +110,25 @@ class MapReader:
 
     def state(self, table: TomlTable, measurements: Mapping[str, MappedMessage]) -> StateSignal | None:
         """Read where the node says its state."""
-        table.only(("message", "signal", "failed"))
+        table.only(("message", "signal", "failed", "names"))
         name = table.take("message", "text", None)
         if name is None:
             return None
         if name not in measurements:
             raise table.error("message", name, f"one of the measurements {', '.join(measurements)}")
         signal = self._signal(measurements[name].message, table.take("signal", "text"), table, "signal")
-        failed = tuple(table.take("failed", "texts", []))
+        named = table.table("names")
+        named.only(GATE_MODES)
+        names = {mode: named.take(mode, "text", mode) for mode in GATE_MODES}
+        for mode, state in names.items():
+            if state != mode and state not in signal.choices:
+                raise named.error(mode, state, f"a name of the value table: {', '.join(signal.choices) or 'none'}")
+        known = {mode: state for mode, state in names.items() if state in signal.choices}
+        failed = tuple(table.take("failed", "texts", [known[mode] for mode in ("limp", "fault") if mode in known]))
         for state in failed:
             if state not in signal.choices:
                 raise table.error("failed", state, f"a name of the value table: {', '.join(signal.choices) or 'none'}")
-        return StateSignal(message=name, signal=signal, failed=failed)
+        return StateSignal(message=name, signal=signal, failed=failed, names=known)
 
     def _message(self, name: str, table: TomlTable) -> DbcMessage:
         try:

@@ -7,10 +7,14 @@ from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
 from types import MappingProxyType
 
+from mgdd import _core
 from mgdd._core.rig import E2eSettings
+from mgdd.errors import ParameterError
 from mgdd.rig.can.dbc import DbcMessage, DbcSignal
 
-__all__ = ["MappedMessage", "MappedSignal", "StateSignal"]
+__all__ = ["GATE_MODES", "MappedMessage", "MappedSignal", "StateSignal"]
+
+GATE_MODES: tuple[str, ...] = tuple(_core.rig.safety_states)
 
 Raw = int | float  # an integer; of a float signal the float
 
@@ -187,11 +191,37 @@ class StateSignal:
         With a value table: names of the states.
     failed : tuple of str
         States in which the node does not follow its commands until it is armed again.
+    names : mapping of str to str
+        Name of the state by mode of a safety gate, as far as the value table has one.
     """
 
     message: str
     signal: DbcSignal
     failed: tuple[str, ...]
+    names: Mapping[str, str] = field(default_factory=dict)
+
+    @property
+    def unarmed(self) -> str | None:
+        """State of a node that was never armed; None where it looks like an armed one."""
+        name = self.names.get("init")
+        return None if name == self.names.get("armed") else name
+
+    def codes(self) -> dict[str, int]:
+        """Give the raw value by mode of a safety gate, for a node that reports them.
+
+        Raises
+        ------
+        mgdd.errors.ParameterError
+            Modes without a state.
+        """
+        if missing := [mode for mode in GATE_MODES if mode not in self.names]:
+            known = ", ".join(self.signal.choices) or "none"
+            raise ParameterError.of(
+                f"states of {self.message}.{self.signal.name}", known,
+                f"named for the modes {', '.join(missing)} of a virtual node: add names = "
+                f'{{ {missing[0]} = "STATE", ... }} to [state] of the map',
+            )  # fmt: skip
+        return {mode: self.signal.choices[self.names[mode]] for mode in GATE_MODES}
 
     def name_of(self, payload: bytes) -> str:
         """Return the name of the state, or its raw number."""

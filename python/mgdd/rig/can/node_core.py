@@ -42,7 +42,8 @@ class NodeCore:
     Raises
     ------
     mgdd.errors.ParameterError
-        Inputs of the plant that no command carries, or the other way round.
+        Inputs of the plant that no command carries, or the other way round; modes of its gate that the state signal of
+        the map has no name for.
     """
 
     def __init__(self, plant: NodePlant, signal_map: SignalMap, envelope: SafetyEnvelope | None = None) -> None:
@@ -67,7 +68,7 @@ class NodeCore:
         self._is_asked_to_arm = False
         self._troubles: set[str] = set()  # why the drive was taken away so far, as ETB_Diag names it
         self._timeouts_s = {name: m.timeout_s for name, m in signal_map.commands.items() if m.timeout_s is not None}
-        self._codes = {} if signal_map.state is None else dict(signal_map.state.signal.choices)
+        self._codes = {} if signal_map.state is None else signal_map.state.codes()
         trigger = signal_map.measurements[signal_map.trigger]
         last = [m for m in signal_map.measurements.values() if m is not trigger]
         self._order = [*last, trigger]
@@ -201,12 +202,13 @@ class NodeCore:
     def _passed(self, command_age_s: float | None) -> dict[str, float] | None:
         """Tell the gate of this cycle, and give the inputs that it lets pass; None: without drive."""
         was_driven = self.driven
-        age_s = 0.0 if self._all_say("rest") else command_age_s  # a host whose commands are safe may stop sending
+        missed, self._missed = self._missed, 0
+        rests = self._all_say("rest")  # a host whose commands are safe may stop sending
+        age_s = 0.0 if rests or missed else command_age_s
         facts = self.plant.facts(self.gate.envelope)
         rounds = min((self._good[name] for name in self._timeouts_s), default=0)
         self._good = Counter({name: min(self._good[name] - rounds, 1) for name in self._timeouts_s})
         bad, self._bad = self._bad, 0
-        missed, self._missed = self._missed, 0
         self.gate.observe(
             **{
                 **facts,
@@ -250,7 +252,7 @@ class NodeCore:
             raws: dict[str, Any] = {}
             state = self.map.state
             if state is not None and state.message == message.name:
-                raws[state.signal.name] = self._codes.get(self.gate.mode, 0)
+                raws[state.signal.name] = self._codes[self.gate.mode]
             known = _carried(message.signals, values)
             applied = _carried(message.applied, sampled.applied)
             frames += self._sender.frames(message, message.payloads(known, raws, applied))

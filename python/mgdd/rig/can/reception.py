@@ -13,9 +13,10 @@ from mgdd.rig.can.messages import Echoes, frame_of
 if TYPE_CHECKING:
     import can
 
-__all__ = ["POLL_S", "THIS_HOST", "Reception"]
+__all__ = ["POLL_S", "STILL_S", "THIS_HOST", "Reception"]
 
-POLL_S = 0.01  # longest wait for a frame: a thread that comes back later stood still
+POLL_S = 0.01  # longest wait for a frame
+STILL_S = 0.03  # without a look at the bus: by then a receiver of commands every 5 ms has let go by itself
 THIS_HOST = ("localhost", "127.0.0.1", "::1")
 _OF_THE_WIRE = ("socketcand", "udp_multicast")  # interfaces that parse what a stranger may have written
 _TEXT = "_SocketCanDaemonBus__receive_buffer"
@@ -75,17 +76,17 @@ class Reception:
             self.counts["own"] += 1
             return None
         try:
-            return frame_of(message, monotonic_ns=self._arrival_ns(message.timestamp, timeout_s), received=True)
+            return frame_of(message, monotonic_ns=self._arrival_ns(message.timestamp), received=True)
         except DataError:
             self.counts["malformed"] += 1
             return None
 
-    def _arrival_ns(self, stamp_s: float, timeout_s: float) -> int:
+    def _arrival_ns(self, stamp_s: float) -> int:
         now_ns = time.monotonic_ns()
         if self._has_our_clock and stamp_s > 0.0:
             waited_ns = (time.time() - stamp_s) * 1e9 - 1e3  # stamps are exact to 1 us
             return now_ns - round(max(0.0, min(waited_ns, float(now_ns))))
-        return now_ns if now_ns - self._empty_ns <= timeout_s * 1e9 else self._empty_ns
+        return now_ns if now_ns - self._empty_ns <= STILL_S * 1e9 else self._empty_ns
 
     def _next(self, timeout_s: float) -> can.Message | None:
         try:

@@ -8,7 +8,7 @@ from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Any
 
-from mgdd.errors import Error, ParameterError, RigError
+from mgdd.errors import DataError, Error, ParameterError, RigError
 from mgdd.io.existing_file import existing_file
 from mgdd.loop import EngineBench, VirtualThrottle
 from mgdd.results.describe import described
@@ -276,16 +276,27 @@ def _require_plant(experiment: Experiment, sample_s: float | None) -> None:
 
 def _require_names(checked: CheckedExperiment, signal_map: SignalMap) -> None:
     """Refuse a map without what the task applies and measures."""
-    seeks = checked.experiment.task == "seek"
+    experiment = checked.experiment
+    seeks = experiment.task == "seek"
     inputs = ("soc_cad",) if seeks else ("duty",)
+    needed = experiment.limit_names if seeks else ("sensed_angle_deg", "first_v", "second_v")
     if signal_map.input_names != inputs:
-        raise ParameterError.of(f"{signal_map.file}: inputs", ", ".join(signal_map.input_names), ", ".join(inputs))
-    needed = checked.experiment.limit_names if seeks else ("first_v", "second_v", "sensed_angle_deg")
-    for name in needed:
-        if name not in signal_map.value_names:
-            raise ParameterError.of(
-                f"{signal_map.file}: measured values", ", ".join(signal_map.value_names), f"with {name}, map it"
-            )
+        raise ParameterError.of(
+            f"{signal_map.file}: inputs", ", ".join(signal_map.input_names),
+            f"{', '.join(inputs)}: so task = {experiment.task!r} calls what it commands",
+        )  # fmt: skip
+    if missing := [name for name in needed if name not in signal_map.value_names]:
+        raise ParameterError.of(
+            f"{signal_map.file}: measured values", ", ".join(signal_map.value_names),
+            f"completed by {', '.join(missing)}: so task = {experiment.task!r} calls what it measures; map them",
+        )  # fmt: skip
+    if seeks and not signal_map.objective:
+        raise DataError(f"{signal_map.file}: [[objective]] is missing: task = 'seek' needs a value and its weight")
+    if experiment.mode == "hil" and experiment.bus.connection is None and signal_map.state is not None:
+        try:
+            signal_map.state.codes()
+        except ParameterError as error:
+            raise error.reworded(f"{signal_map.file}: {error}") from error
 
 
 described(CheckedExperiment, rows=lambda checked: checked.to_dict())
