@@ -20,6 +20,7 @@ from mgdd.loop import VirtualThrottle
 from mgdd.rig import CanRig, CanTransport, SignalMap
 from mgdd.rig.can.link import Sender
 from mgdd.rig.can.modes import RigMode, key_line, may_be_real
+from mgdd.rig.can.punctual import Punctual
 
 
 @pytest.fixture(autouse=True)
@@ -316,3 +317,36 @@ def test_a_late_command_is_seen_over_the_bus_and_arming_mends_it() -> None:
                 assert tried < 10
                 continue
             break
+
+
+# --- too late -----------------------------------------------------------------------------------------------
+
+
+def test_a_host_that_is_late_before_a_node_with_a_clock_has_to_arm_again() -> None:
+    with node("late", step=False), rig_on("late") as rig:
+        rig.apply({"duty": 0.2})
+        time.sleep(0.05)  # this process stood still
+        for _ in range(2):
+            with pytest.raises(RigError, match=r"ms since the last command, the time limit is 20 ms: .*call arm\(\)"):
+                rig.apply({"duty": 0.2})
+        rig.arm()
+        time.sleep(0.05)
+        rig.apply({"duty": 0.2})
+
+
+def test_a_measurement_that_waited_is_refused() -> None:
+    punctual = Punctual(ETB, "the bus", 0.015)
+    old_ns = time.monotonic_ns() - 50_000_000
+    punctual.require_measurement(old_ns)  # of a node that steps: it waits as long as it takes
+    punctual.is_timed = True
+    with pytest.raises(RigError, match=r"the bus: the measurement is \d+ ms old, the limit is 20 ms: .*stood still"):
+        punctual.require_measurement(old_ns)
+    Punctual(ETB, "the bus", LONG_S).require_measurement(old_ns)
+
+
+def test_a_host_may_think_before_a_node_that_steps() -> None:
+    with node("thinks"), rig_on("thinks") as rig:
+        for _ in range(3):
+            rig.apply({"duty": 0.2})
+            time.sleep(0.03)
+            assert rig.measure().applied == {"duty": 0.2}

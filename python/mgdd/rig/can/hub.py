@@ -134,8 +134,8 @@ class Hub:
         self.connections: set[_Client] = set()
         self._clients: list[_Client] = []
         self._joined = 0
-        self._free_s = 0.0
-        self._start_s = self._ticked_s = self._looked_s = time.monotonic()
+        self._free_s = self._start_s = 0.0
+        self._ticked_s = self._looked_s = time.monotonic()
 
     async def run(self, on_ready: Callable[[Hub], None], stop: asyncio.Event) -> None:
         """Serve until `stop` is set.
@@ -152,7 +152,7 @@ class Hub:
         mgdd.errors.RigError
             The port is taken.
         """
-        self._start_s = time.monotonic()
+        self._start_s = self._ticked_s = self._looked_s = time.monotonic()
         loop = asyncio.get_running_loop()
         try:
             server = await loop.create_server(lambda: _Client(self), self.host, self.port)
