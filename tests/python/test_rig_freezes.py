@@ -36,6 +36,7 @@ class Row(NamedTuple):
     at_s: float
     driven: bool
     angle_deg: float
+    reason: str
 
 
 class Bench:
@@ -58,7 +59,10 @@ class Bench:
         if not self._names and lines:
             self._names = lines.pop(0).strip().split(",")
         read = [dict(zip(self._names, line, strict=True)) for line in csv.reader(lines)]
-        return [Row(float(row["monotonic_ns"]) * 1e-9, row["driven"] == "1", float(row["angle_deg"])) for row in read]
+        return [
+            Row(float(row["monotonic_ns"]) * 1e-9, row["driven"] == "1", float(row["angle_deg"]), row["reason"])
+            for row in read
+        ]
 
     def say(self, line: str, *, wait: bool = True) -> None:
         """Tell the host what to do."""
@@ -144,6 +148,13 @@ def stale_moves(bench: Bench, count: int, longest_s: float, seed: int) -> list[s
 
 def test_nothing_that_waited_moves_the_plate(bench: Bench) -> None:
     assert stale_moves(bench, 10, 0.3, seed=21) == []
+
+
+def test_a_gap_of_its_clock_is_a_fault_of_the_node_until_it_is_armed_again(bench: Bench) -> None:
+    bench.drive()
+    rows = bench.freeze("node", 0.15, "goes on")
+    assert {row.reason for row in rows} == {"deadlines"}
+    assert bench.drive() > 20.0
 
 
 @pytest.mark.slow
