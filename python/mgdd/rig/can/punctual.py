@@ -34,6 +34,7 @@ class Punctual:
     def __init__(self, signal_map: SignalMap, bus: str, timeout_s: float) -> None:
         limits = [m.timeout_s for m in signal_map.commands.values() if m.timeout_s is not None]
         self._command_s = min(limits, default=math.inf)
+        self._let_go_s = self._command_s + signal_map.cycle_s  # by then the node has looked at the time
         self._measured_s = max(timeout_s, self._command_s)
         self._bus = bus
         self._driven_ns: int | None = None
@@ -58,7 +59,7 @@ class Punctual:
         if not self.is_timed or self._driven_ns is None:
             return
         late_s = (time.monotonic_ns() - self._driven_ns) * 1e-9
-        if late_s > self._command_s:
+        if late_s > self._let_go_s:
             raise RigError(
                 f"{self._bus}: {late_s * 1e3:.0f} ms since the last command, the time limit is "
                 f"{self._command_s * 1e3:g} ms: the node has let go; {_REMEDY}"
