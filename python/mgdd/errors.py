@@ -13,6 +13,7 @@ Examples
 from __future__ import annotations
 
 import difflib
+import re
 from collections.abc import Callable, Iterable, Iterator
 from contextlib import contextmanager
 from contextvars import ContextVar
@@ -34,13 +35,57 @@ __all__ = [
 ]
 
 
+# Letters: of a value that a message quotes, and of a whole message. What a file carries may be of any length.
+_LONGEST_VALUE, _LONGEST_MESSAGE = 400, 4000
+_LONGEST_NAME = 200  # of what is compared with known names, a comparison that grows with the square of the length
+_LONG_WORD = re.compile(rf"\S{{{_LONGEST_VALUE + 1},}}")
+_LONG_QUOTE = re.compile(rf"'[^'\n]{{{_LONGEST_VALUE + 1},}}'|\"[^\"\n]{{{_LONGEST_VALUE + 1},}}\"")
+
+
+def shortened(text: str, longest: int = _LONGEST_VALUE) -> str:
+    """Cut a long text in its middle.
+
+    Parameters
+    ----------
+    text : str
+        Of any length.
+    longest : int
+        Letters of the result, without the note of what is left out.
+
+    Returns
+    -------
+    str
+        The text itself, or its beginning and end with the number of letters between them.
+
+    Examples
+    --------
+    >>> from mgdd.errors import shortened
+    >>> shortened("a" * 500_000, 12)
+    'aaaaaaaaa[... 499988 letters ...]aaa'
+    """
+    if len(text) <= longest:
+        return text
+    tail = longest // 4
+    return f"{text[: longest - tail]}[... {len(text) - longest} letters ...]{text[len(text) - tail :]}"
+
+
+def _short_message(message: str) -> str:
+    """Cut what a message quotes, then the message, so that the field before and the remedy behind stay."""
+    if len(message) <= _LONGEST_VALUE:
+        return message
+    message = _LONG_WORD.sub(lambda found: shortened(found[0]), message)
+    if len(message) > _LONGEST_MESSAGE:
+        message = _LONG_QUOTE.sub(lambda found: shortened(found[0]), message)
+    return shortened(message, _LONGEST_MESSAGE)
+
+
 class Error(Exception):
     """Base of everything mgdd raises, Ctrl-C apart.
 
     Parameters
     ----------
     message : str
-        What is wrong and what to do.
+        What is wrong and what to do; values in it are cut to 400 letters, the whole to 4000.
     field : str, optional
         Name of the field or argument to blame.
     value : object, optional
@@ -71,7 +116,7 @@ class Error(Exception):
     def __init__(
         self, message: str = "", *, field: str | None = None, value: Any = None, bound: str | None = None
     ) -> None:
-        super().__init__(message)
+        super().__init__(_short_message(message))
         self.field, self.value, self.bound = field, value, bound
 
     @classmethod
@@ -99,7 +144,7 @@ class Error(Exception):
         ParameterError('cycles = 0: must be >= 1')
         """
         shown = f"{value:.12g}" if isinstance(value, float) else repr(value) if isinstance(value, str) else f"{value}"
-        return cls(f"{field} = {shown}: must be {bound}", field=field, value=value, bound=bound)
+        return cls(f"{field} = {shortened(shown)}: must be {bound}", field=field, value=value, bound=bound)
 
     def reworded(self, message: str) -> Self:
         """Give the same error with another message, for callers that know more of where it happened.
@@ -237,7 +282,9 @@ def hand_over(result: Result, stop: Interrupted | WorkerLostError | None) -> Res
 
 def did_you_mean(name: str, known: Iterable[str]) -> str:
     """Ask for the nearest of the known names, or say nothing where none is near."""
-    close = difflib.get_close_matches(name, list(known), 1)
+    if len(name) > _LONGEST_NAME:
+        return ""
+    close = difflib.get_close_matches(name, [other for other in known if len(other) <= _LONGEST_NAME], 1)
     return f"did you mean {close[0]!r}?" if close else ""
 
 

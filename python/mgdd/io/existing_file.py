@@ -4,13 +4,11 @@ from __future__ import annotations
 
 import contextlib
 import errno
+import os
+import stat
 from pathlib import Path
-from typing import TYPE_CHECKING
 
-from mgdd.errors import did_you_mean
-
-if TYPE_CHECKING:
-    import os
+from mgdd.errors import ParameterError, did_you_mean
 
 __all__ = ["existing_file"]
 
@@ -32,6 +30,8 @@ def existing_file(path: str | os.PathLike[str]) -> Path:
     ------
     FileNotFoundError
         No such file; the message names the one of its folder whose name is nearest.
+    mgdd.errors.ParameterError
+        A folder, or a path that cannot be looked up: too long, with a NUL, or behind a folder that must not be entered.
 
     Examples
     --------
@@ -46,7 +46,16 @@ def existing_file(path: str | os.PathLike[str]) -> Path:
     no such file: did you mean 'chirp.csv'?
     """
     file = Path(path)
-    if file.exists():
+    with contextlib.suppress(FileNotFoundError, NotADirectoryError):
+        try:
+            mode = os.stat(file).st_mode
+        except (FileNotFoundError, NotADirectoryError):
+            raise
+        except (OSError, ValueError) as error:  # ValueError: what cannot be handed to the system at all
+            why = error.strerror if isinstance(error, OSError) else str(error)
+            raise ParameterError.of("path", str(file), f"one that can be looked up ({why}): give another") from error
+        if stat.S_ISDIR(mode):
+            raise ParameterError.of("path", str(file), "a file, and this is a folder: name a file in it")
         return file
     near = ""
     with contextlib.suppress(OSError):  # no such folder either, or one that must not be listed

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import codecs
 import itertools
 import re
 from dataclasses import dataclass
@@ -13,7 +12,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from mgdd.errors import DataError, argument
-from mgdd.io.existing_file import existing_file
+from mgdd.io.plain_text import read_plain_text
 
 if TYPE_CHECKING:
     import os
@@ -22,6 +21,8 @@ if TYPE_CHECKING:
     from numpy.typing import NDArray
 
 __all__ = ["TextTable", "parse_number", "read_table"]
+
+_COUNT = re.compile(r"\d{1,9}")  # of columns; `int` refuses thousands of digits
 
 
 @dataclass(frozen=True)
@@ -138,10 +139,10 @@ def read_table(
         raise DataError.of("decimal", decimal, "'.' or ','")
     if delimiter is not None and delimiter in ("", decimal):
         raise DataError(f"delimiter = {delimiter!r}: must not be empty or the decimal mark {decimal!r}")
-    file = existing_file(path)
+    file = Path(path)
     content = [
         (number, line.strip())
-        for number, line in enumerate(_text(file).splitlines(), start=1)
+        for number, line in enumerate(read_plain_text(path).splitlines(), start=1)
         if line.strip() and not line.lstrip().startswith("#")
     ]
     if not content:
@@ -183,8 +184,8 @@ def _is_head(cells: tuple[str, ...]) -> bool:
     """Return whether a row holds names: no numbers, or behind a first name nothing but a count of columns."""
     if not any(_like_number(cell) for cell in cells):
         return True
-    counted = [int(cell) for cell in cells[1:] if cell.isdecimal()]
-    others = [cell for cell in cells[1:] if not cell.isdecimal()]
+    counted = [int(cell) for cell in cells[1:] if _COUNT.fullmatch(cell)]
+    others = [cell for cell in cells[1:] if not _COUNT.fullmatch(cell)]
     counts_up = all(b - a == 1 for a, b in itertools.pairwise(counted)) and (not counted or not others)
     return not _like_number(cells[0]) and counts_up and all(parse_number(cell) is None for cell in others)
 
@@ -194,18 +195,6 @@ def _like_number(cell: str) -> bool:
     if re.fullmatch(r"1/[^\W\d]+", cell):  # 1/min
         return False
     return parse_number(cell) is not None or re.match(r"[+-]?[.,]?\d", cell) is not None
-
-
-def _text(file: Path) -> str:
-    raw = file.read_bytes()
-    if raw.startswith((codecs.BOM_UTF16_LE, codecs.BOM_UTF16_BE)):
-        return raw.decode("utf-16", errors="replace")
-    if b"\0" in raw:
-        raise DataError(f"{file}: this is a binary file: export it as text (CSV or two columns)")
-    try:
-        return raw.decode("utf-8-sig")
-    except UnicodeDecodeError:
-        return raw.decode("latin-1")
 
 
 def _detect(line: str, decimal: str) -> str | None:

@@ -2,14 +2,11 @@
 
 from __future__ import annotations
 
-import tomllib
-from typing import TYPE_CHECKING, Any
+import os
+from typing import Any
 
-from mgdd.errors import DataError
-from mgdd.io.existing_file import existing_file
-
-if TYPE_CHECKING:
-    import os
+from mgdd.io.nesting import parsed
+from mgdd.io.plain_text import read_plain_text
 
 __all__ = ["text_of", "toml_of"]
 
@@ -34,11 +31,7 @@ def text_of(path: str | os.PathLike[str]) -> tuple[str, str]:
     mgdd.errors.DataError
         Not UTF-8.
     """
-    file = existing_file(path)
-    try:
-        return file.read_text(encoding="utf-8"), str(file)
-    except UnicodeDecodeError as error:
-        raise DataError(f"{file}: not a UTF-8 text file: {error}") from error
+    return read_plain_text(path, only_utf8=True), os.fspath(path)
 
 
 def toml_of(text: str, origin: str) -> dict[str, Any]:
@@ -59,7 +52,7 @@ def toml_of(text: str, origin: str) -> dict[str, Any]:
     Raises
     ------
     mgdd.errors.DataError
-        Not TOML.
+        Not TOML, nested more than 64 levels deep, or a number beyond all floats or 64 bits.
 
     Examples
     --------
@@ -67,7 +60,5 @@ def toml_of(text: str, origin: str) -> dict[str, Any]:
     >>> toml_of("[plant]\nseed = 3", "experiment")
     {'plant': {'seed': 3}}
     """
-    try:
-        return tomllib.loads(text)
-    except tomllib.TOMLDecodeError as error:
-        raise DataError(f"{origin}: not valid TOML: {error}") from error
+    content: dict[str, Any] = parsed(text, origin, "TOML")
+    return content

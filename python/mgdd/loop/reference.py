@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+import os
 from dataclasses import dataclass, field
 from pathlib import Path
 from typing import TYPE_CHECKING
@@ -10,6 +11,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from mgdd.errors import DataError, ParameterError, ShapeError
+from mgdd.io.table import read_table
 from mgdd.results.describe import described
 
 if TYPE_CHECKING:
@@ -195,7 +197,7 @@ class Reference:
             if kind == "step":
                 return cls.step(numbers[0], numbers[1], sample_s=sample_s)
             return cls.sine(numbers[0], numbers[1], numbers[2], sample_s=sample_s)
-        if not Path(text).is_file():
+        if not os.path.isfile(text):  # False too for a text that no path can be
             raise ParameterError.of("reference", text, "step:FROM:TO, sine:MEAN:AMPLITUDE:HZ or a CSV file that exists")
         return _from_csv(Path(text))
 
@@ -203,22 +205,8 @@ class Reference:
 def _from_csv(path: Path) -> Reference:
     from mgdd.signals.even_grid import even_step
 
-    with path.open(encoding="utf-8") as lines:
-        names = [name.strip() for name in lines.readline().split(",")]
-        missing = {"time_s", "reference_deg"} - set(names)
-        if missing:
-            raise DataError(
-                f"{path}: has no column {' and '.join(sorted(missing))}; its first line must name time_s, reference_deg"
-            )
-        try:
-            rows = np.loadtxt(lines, delimiter=",", ndmin=2)
-        except ValueError as error:
-            raise DataError(f"{path}: {error}") from error
-    if len(rows) < 2:
-        raise DataError(f"{path}: has {len(rows)} samples: must have at least 2")
-    time_s = rows[:, names.index("time_s")]
-    return Reference(
-        angle_deg=rows[:, names.index("reference_deg")],
-        sample_s=even_step(time_s),
-        name=path.stem,
-    )
+    table = read_table(path, units_row=False)
+    time_s, angle_deg = (table.numbers(table.index(name)) for name in ("time_s", "reference_deg"))
+    if len(time_s) < 2:
+        raise DataError(f"{path}: has {len(time_s)} samples: must have at least 2")
+    return Reference(angle_deg=angle_deg, sample_s=even_step(time_s), name=path.stem)

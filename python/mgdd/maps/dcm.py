@@ -139,7 +139,7 @@ def _block(head: _Line, lines: Iterator[_Line], origin: str) -> DcmBlock | None:
     """Read a block up to its END, or None for a value that is a text."""
     where = f"{origin}, line {head.number}"
     name, *sizes = head.rest.split()[: 1 + _AXES[head.word]] or [""]
-    if not name or len(sizes) != _AXES[head.word] or not all(size.isdecimal() for size in sizes):
+    if not name or len(sizes) != _AXES[head.word] or not all(re.fullmatch(r"\d{1,9}", size) for size in sizes):
         raise DataError(f"{where}: {head.word} {head.rest}: a name and {_AXES[head.word]} sizes are needed")
     block = DcmBlock(name=name, line=head.number)
     rows: list[list[float]] = []

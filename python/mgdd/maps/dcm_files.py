@@ -10,7 +10,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from mgdd.errors import DataError, Error, argument
-from mgdd.io.existing_file import existing_file
+from mgdd.io.plain_text import read_plain_text
 from mgdd.io.whole_file import write_whole_text
 from mgdd.maps.calibration_map import CalibrationMap
 from mgdd.maps.cells import can_be_name, spoken_name
@@ -20,7 +20,7 @@ from mgdd.results.units import attribute_units, unit_of
 if TYPE_CHECKING:
     import os
 
-__all__ = ["DcmFile", "read_dcm", "text_of_file", "write_dcm"]
+__all__ = ["DcmFile", "read_dcm", "write_dcm"]
 
 # Units as calibration tools write them; everything else stands as it is. Where an angle counts from they do not say.
 _DCM_UNITS = {
@@ -132,7 +132,7 @@ def read_dcm(path: str | os.PathLike[str]) -> DcmFile:
     Parameters
     ----------
     path : path-like
-        Format 2.0, UTF-8 or Latin-1. Axes have the names that ``*SSTX`` and ``*SSTY`` give, where an axis can be called
+        Format 2.0, UTF-8 or Windows-1252. Axes have the names that ``*SSTX`` and ``*SSTY`` give, where an axis can be called
         so, else ``x`` and ``y``.
 
     Returns
@@ -160,8 +160,8 @@ def read_dcm(path: str | os.PathLike[str]) -> DcmFile:
     ...     print(error.strerror)
     no such file: check the path
     """
-    file = existing_file(path)
-    blocks, skipped = dcm_blocks(text_of_file(file), str(file))
+    file = Path(path)
+    blocks, skipped = dcm_blocks(read_plain_text(file), str(file))
     maps, values = {}, {}
     for block in blocks:
         if not block.x:
@@ -175,17 +175,6 @@ def read_dcm(path: str | os.PathLike[str]) -> DcmFile:
         except Error as error:
             raise DataError(f"{file}, line {block.line}, {block.name}: {error}") from error
     return DcmFile(maps=maps, values=values, skipped=tuple(skipped))
-
-
-def text_of_file(file: Path) -> str:
-    """Read a text, UTF-8 or as older tools write it."""
-    raw = file.read_bytes()
-    if b"\0" in raw:
-        raise DataError(f"{file}: this is a binary file: a text is needed")
-    try:
-        return raw.decode("utf-8-sig")
-    except UnicodeDecodeError:
-        return raw.decode("latin-1")
 
 
 def _block_of(name: str, table: CalibrationMap) -> DcmBlock:

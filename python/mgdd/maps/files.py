@@ -10,11 +10,13 @@ import numpy as np
 
 from mgdd.errors import DataError, Error, ParameterError, did_you_mean
 from mgdd.io.existing_file import existing_file
+from mgdd.io.nesting import parsed
 from mgdd.io.netcdf_file import read_netcdf, write_netcdf
+from mgdd.io.plain_text import read_plain_text
 from mgdd.io.whole_file import write_whole_text
 from mgdd.maps.calibration_map import CalibrationMap
 from mgdd.maps.cells import NUMBERS, MapTask
-from mgdd.maps.dcm_files import read_dcm, text_of_file, write_dcm
+from mgdd.maps.dcm_files import read_dcm, write_dcm
 from mgdd.maps.grid_csv import csv_of_map, map_of_csv
 from mgdd.results.labels import to_jsonable
 
@@ -136,8 +138,8 @@ def read_map(path: str | os.PathLike[str], name: str | None = None, *, decimal: 
     try:
         if ending == ".nc":
             return CalibrationMap.from_dataset(read_netcdf(file), name)
-        text = text_of_file(file)
-        made = map_of_csv(text, str(file), decimal) if ending == ".csv" else _map_of_json(text)
+        text = read_plain_text(file, only_utf8=ending == ".json")
+        made = map_of_csv(text, str(file), decimal) if ending == ".csv" else _map_of_json(text, str(file))
     except (Error, TypeError, ValueError, KeyError) as error:
         said = f"{type(error).__name__} {error}" if isinstance(error, KeyError) else str(error)
         if isinstance(error, DataError) and said.startswith(str(file)):
@@ -174,11 +176,8 @@ def _json_of(table: CalibrationMap) -> str:
     return json.dumps(to_jsonable(map_content(table)), ensure_ascii=False, allow_nan=False, indent=1) + "\n"
 
 
-def _map_of_json(text: str) -> CalibrationMap:
-    try:
-        content = json.loads(text)
-    except json.JSONDecodeError as error:
-        raise DataError(f"not valid JSON: {error}; the file was cut off or edited") from error
+def _map_of_json(text: str, origin: str) -> CalibrationMap:
+    content = parsed(text, origin, "JSON")
     if not isinstance(content, dict) or content.get("kind") != _KIND:
         raise DataError(f"kind must be {_KIND!r}: this is another file")
     if content.get("format") != _FORMAT:

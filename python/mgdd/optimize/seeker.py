@@ -12,7 +12,8 @@ import numpy as np
 
 from mgdd import _core
 from mgdd.errors import DataError, Error, Interrupted, ParameterError
-from mgdd.io.existing_file import existing_file
+from mgdd.io.nesting import parsed
+from mgdd.io.plain_text import read_plain_text
 from mgdd.io.whole_file import write_whole_text
 from mgdd.optimize.seeker_findings import SeekerFindings
 from mgdd.results.describe import as_html, rows_of
@@ -237,13 +238,14 @@ class Seeker(SeekerFindings, _CoreSeeker):
 
 def _read(path: str | os.PathLike[str]) -> tuple[str, dict[str, Any], dict[str, Any]]:
     """Read kind, settings and state of a file that `Seeker.save` wrote; DataError for any other file."""
-    file = existing_file(path)
+    file = Path(path)
     try:
-        content = json.loads(file.read_text(encoding="utf-8"), object_hook=_decode)
+        content = parsed(read_plain_text(file, only_utf8=True), "content", "JSON", _decode)
         found = content["format"]
         kind, settings, state = content["kind"], content["settings"], content["state"]
     except (ValueError, KeyError, TypeError) as error:
-        raise DataError(f"{file}: is not a seeker written by save(): {error!r}") from error
+        said = str(error) if isinstance(error, DataError) else repr(error)
+        raise DataError(f"{file}: is not a seeker written by save(): {said}") from error
     if found != _FORMAT:
         raise DataError(f"{file}: has format {found!r}: this version of mgdd reads format {_FORMAT}")
     if not (isinstance(kind, str) and isinstance(settings, dict) and isinstance(state, dict)):

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import datetime as dt
-import json
 import os
 from collections.abc import Iterator, Mapping
 from dataclasses import dataclass
@@ -13,7 +12,9 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from mgdd._core import rig as core
+from mgdd.errors import DataError
 from mgdd.io.existing_file import existing_file
+from mgdd.io.nesting import parsed
 from mgdd.results.labels import VARIABLES, labelled_dataset
 from mgdd.results.units import unit_of
 
@@ -197,8 +198,8 @@ def _header(raw: Mapping[str, Any]) -> dict[str, Any]:
     """Decode the header; JSON of another program that is none is kept as text."""
     text = raw["json"].decode("utf-8", "backslashreplace")
     try:
-        content = json.loads(text)
-    except ValueError:
+        content = parsed(text, "header", "JSON")
+    except DataError:
         content = {"text": text}
     if not isinstance(content, dict):
         content = {"json": content}

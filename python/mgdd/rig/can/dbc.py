@@ -3,19 +3,31 @@
 from __future__ import annotations
 
 import hashlib
+import re
 from collections.abc import Mapping
 from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any
 
 from mgdd._core.rig import SignalLayout
-from mgdd.errors import DataError, did_you_mean
+from mgdd.errors import DataError, Error, did_you_mean
 from mgdd.io.existing_file import existing_file
 from mgdd.io.extras import import_extra
+from mgdd.io.plain_text import decoded
 
 __all__ = ["DbcFile", "DbcMessage", "DbcSignal"]
 
 _MISSING = ("invalid", "sna", "signal_not_available", "not_available")  # names of a raw value that says: no value
+
+# What the parser would allocate or count without a bound, looked for outside of texts in quotes and comments.
+_QUOTED = re.compile(r'"(?:\\"|[^"])*?"|//[^\n]*')
+_MESSAGE = re.compile(r"(?<![A-Za-z_])BO_\s([^:;]*):\s*([^\s:]+)")
+_SIGNAL = re.compile(r"(?<![A-Za-z_])SG_\s([^:;]*):\s*([-+]?\d+)\s*\|\s*([-+]?\d+)\s*@")
+_RANGES = re.compile(r"(?<![A-Za-z_])SG_MUL_VAL_\s[^;]*")
+_RANGE = re.compile(r"(\d+)\s*-\s*(\d+)")
+_LONG_NUMBER = re.compile(r"(?<![\w.])[-+]?(?:\d{41,}|\d+\.?\d*[eE][-+]?\d{4,})")
+_QUOTED_NUMBER = re.compile(r'"\s*[-+\d._]+[eE][-+]?[\d_]{4,}\s*"')
+_BYTES, _BITS, _BRANCHES = 64, 64, 1 << 16  # of a CAN FD frame, of a signal, and values of all multiplexers together
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -128,20 +140,24 @@ class DbcFile:
         FileNotFoundError
             No such file.
         mgdd.errors.DataError
-            Not a DBC, overlapping signals, or signals beyond their message.
+            Not a DBC, overlapping signals, signals beyond their message, or a message beyond 64 bytes.
         """
         cantools = import_extra("cantools", "can", "a DBC file")
         file = existing_file(path)
         content = file.read_bytes()
+        text = decoded(content, str(file))
+        _require_bounded(file, text)
         try:
-            database = cantools.database.load_file(file, database_format="dbc", strict=True, cache_dir=None)
+            database = cantools.database.load_string(text, database_format="dbc", strict=True)
+            messages = {message.name: _message(file, message) for message in database.messages}
+        except DataError:
+            raise
         except cantools.Error as error:
             raise DataError(
                 f"{file}: {error}; correct the file, signals must fit their message and not overlap"
             ) from error
-        except (UnicodeDecodeError, ValueError, KeyError) as error:
-            raise DataError(f"{file}: cannot be read as a DBC: {error}") from error
-        messages = {message.name: _message(file, message) for message in database.messages}
+        except Exception as error:  # the parser raises what it stumbles over
+            raise DataError(f"{file}: cannot be read as a DBC: {error}; correct the file") from error
         return cls(file=file, sha256=hashlib.sha256(content).hexdigest(), messages=messages)
 
     def message(self, name: str) -> DbcMessage:
@@ -149,6 +165,27 @@ class DbcFile:
         if name in self.messages:
             return self.messages[name]
         raise DataError(f"{self.file.name} has no message {name!r}: {near(name, self.messages)}")
+
+
+def _require_bounded(file: Path, text: str) -> None:
+    """Refuse what no frame can carry before the parser makes room for it."""
+    plain = _QUOTED.sub('""', text)
+    if number := _LONG_NUMBER.search(plain) or _QUOTED_NUMBER.search(text):
+        raise DataError(f"{file}: the number {number[0]} is beyond all signals: correct it")
+    for name, size in _MESSAGE.findall(plain):
+        if not re.fullmatch(r"\d{1,2}", size) or int(size) > _BYTES:
+            raise DataError(f"{file}: message {name.strip()} has {size} bytes: a frame has 0 to {_BYTES}; correct it")
+    for name, start, length in _SIGNAL.findall(plain):
+        if int(length) > _BITS or int(start) >= 8 * _BYTES:
+            raise DataError(
+                f"{file}: signal {name.strip()} has {length} bits from bit {start}: a signal has up to {_BITS}, a frame "
+                f"{8 * _BYTES}; correct it"
+            )
+    branches = 0
+    for ranges in _RANGES.findall(plain):
+        branches += sum(max(0, int(last) - int(first) + 1) for first, last in _RANGE.findall(ranges))
+    if branches > _BRANCHES:
+        raise DataError(f"{file}: SG_MUL_VAL_ names {branches} values: at most {_BRANCHES} are read; narrow the ranges")
 
 
 def near(name: str, known: Mapping[str, Any]) -> str:
