@@ -4,11 +4,14 @@ from __future__ import annotations
 
 import contextlib
 import errno
-import os
 import stat
 from pathlib import Path
+from typing import TYPE_CHECKING
 
 from mgdd.errors import ParameterError, did_you_mean
+
+if TYPE_CHECKING:
+    import os
 
 __all__ = ["existing_file"]
 
@@ -46,14 +49,14 @@ def existing_file(path: str | os.PathLike[str]) -> Path:
     no such file: did you mean 'chirp.csv'?
     """
     file = Path(path)
-    with contextlib.suppress(FileNotFoundError, NotADirectoryError):
-        try:
-            mode = os.stat(file).st_mode
-        except (FileNotFoundError, NotADirectoryError):
-            raise
-        except (OSError, ValueError) as error:  # ValueError: what cannot be handed to the system at all
-            why = error.strerror if isinstance(error, OSError) else str(error)
-            raise ParameterError.of("path", str(file), f"one that can be looked up ({why}): give another") from error
+    try:
+        mode = file.stat().st_mode
+    except (FileNotFoundError, NotADirectoryError):
+        pass
+    except (OSError, ValueError) as error:  # ValueError: what cannot be handed to the system at all
+        why = error.strerror if isinstance(error, OSError) else str(error)
+        raise ParameterError.of("path", str(file), f"one that can be looked up ({why}): give another") from error
+    else:
         if stat.S_ISDIR(mode):
             raise ParameterError.of("path", str(file), "a file, and this is a folder: name a file in it")
         return file

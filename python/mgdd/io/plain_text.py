@@ -86,15 +86,18 @@ def decoded(raw: bytes, origin: str, *, only_utf8: bool = False) -> str:
     try:
         return raw.decode("utf-8-sig")
     except UnicodeDecodeError as error:
-        line = raw.count(b"\n", 0, error.start) + 1
         if only_utf8:
-            raise DataError(f"{origin}, line {line}: not a UTF-8 text file, {error.reason}: save it as UTF-8") from error
+            raise _refused(raw, origin, error, f"not a UTF-8 text file, {error.reason}: save it as UTF-8") from error
         if _UTF8.search(raw):
-            raise DataError(f"{origin}, line {line}: damaged UTF-8, {error.reason}: correct the letter there") from error
+            raise _refused(raw, origin, error, f"damaged UTF-8, {error.reason}: correct the letter there") from error
     try:
         return raw.decode("cp1252")
     except UnicodeDecodeError as error:
-        line = raw.count(b"\n", 0, error.start) + 1
-        raise DataError(
-            f"{origin}, line {line}: byte {raw[error.start]:#x} is neither UTF-8 nor Windows-1252: save it as UTF-8"
-        ) from error
+        byte = f"{raw[error.start]:#x}"
+        said = f"byte {byte} is neither UTF-8 nor Windows-1252: save it as UTF-8"
+        raise _refused(raw, origin, error, said) from error
+
+
+def _refused(raw: bytes, origin: str, error: UnicodeDecodeError, said: str) -> DataError:
+    line = raw.count(b"\n", 0, error.start) + 1
+    return DataError(f"{origin}, line {line}: {said}")

@@ -20,6 +20,7 @@ if TYPE_CHECKING:
 __all__ = ["Place", "check_throttle_log"]
 
 MIN_SAMPLES = 50
+_INFINITE = 1e100  # of differences and products something is left below it
 MIN_DURATION_S = 0.5
 # A plate needs 70 to 200 ms through its travel: slower logs miss it, and 10 µs is beyond any position sensor.
 STEP_S = (1e-5, 0.1)
@@ -116,14 +117,15 @@ def check_throttle_log(log: xr.Dataset, *, two_sided: bool = False, limp_home_de
 
 
 def check_finite(columns: Mapping[str, NDArray[np.float64]], place: Place) -> None:
-    """Refuse NaN and infinity."""
+    """Refuse NaN, infinity, and numbers whose differences and squares would be infinite."""
     for name, values in columns.items():
-        bad = np.flatnonzero(~np.isfinite(values))
+        bad = np.flatnonzero(~(np.abs(values) < _INFINITE))
         if bad.size:
             at = int(bad[0])
+            what = "beyond any measurement" if np.isfinite(values[at]) else "not finite"
             more = f" ({bad.size} such cells)" if bad.size > 1 else ""
             raise DataError(
-                f"{place.cell(at, name)}: {values[at]} is not finite{more}: repair it or cut the log; {_window()}"
+                f"{place.cell(at, name)}: {values[at]} is {what}{more}: repair it or cut the log; {_window()}"
             )
 
 

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import math
-import os
 from dataclasses import dataclass, field
 from pathlib import Path
 from typing import TYPE_CHECKING
@@ -11,6 +10,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from mgdd.errors import DataError, ParameterError, ShapeError
+from mgdd.io.existing_file import existing_file
 from mgdd.io.table import read_table
 from mgdd.results.describe import described
 
@@ -197,9 +197,12 @@ class Reference:
             if kind == "step":
                 return cls.step(numbers[0], numbers[1], sample_s=sample_s)
             return cls.sine(numbers[0], numbers[1], numbers[2], sample_s=sample_s)
-        if not os.path.isfile(text):  # False too for a text that no path can be
-            raise ParameterError.of("reference", text, "step:FROM:TO, sine:MEAN:AMPLITUDE:HZ or a CSV file that exists")
-        return _from_csv(Path(text))
+        try:
+            file = existing_file(text)
+        except (FileNotFoundError, ParameterError) as error:
+            form = "step:FROM:TO, sine:MEAN:AMPLITUDE:HZ or a CSV file that exists"
+            raise ParameterError.of("reference", text, form) from error
+        return _from_csv(file)
 
 
 def _from_csv(path: Path) -> Reference:

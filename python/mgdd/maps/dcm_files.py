@@ -132,8 +132,8 @@ def read_dcm(path: str | os.PathLike[str]) -> DcmFile:
     Parameters
     ----------
     path : path-like
-        Format 2.0, UTF-8 or Windows-1252. Axes have the names that ``*SSTX`` and ``*SSTY`` give, where an axis can be called
-        so, else ``x`` and ``y``.
+        Format 2.0, UTF-8 or Windows-1252. Axes have the names that ``*SSTX`` and ``*SSTY`` give, where an axis can be
+        called so, else ``x`` and ``y``.
 
     Returns
     -------

@@ -54,8 +54,11 @@ def map_of_csv(text: str, origin: str, decimal: str) -> CalibrationMap:
     mark = next(
         (mark for mark in (";", "\t", ",") if mark in first and mark != decimal), ";" if decimal == "," else ","
     )
-    reader = csv.reader(io.StringIO(text), delimiter=mark)
-    lines = [(reader.line_num, _trimmed(cells)) for cells in reader]
+    reader = csv.reader(io.StringIO(text), delimiter=mark, strict=True)
+    try:
+        lines = [(reader.line_num, _trimmed(cells)) for cells in reader]
+    except csv.Error as error:
+        raise DataError(f"{origin}, line {reader.line_num}: {error}: correct the quotes and cells there") from error
     heads, blocks = _parts([(number, cells) for number, cells in lines if cells], origin)
     if "mgdd_map" in heads and _END not in heads:
         raise DataError(f"{origin}: no line {_END!r} at its end: the file was cut off; write it again")

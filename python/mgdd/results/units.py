@@ -15,7 +15,7 @@ _WHOSE = ("unit of ", "in the unit of ", "not given")
 _COUNTS = frozenset({"-", "cycle", "cycles", "sample", "samples"})
 _REMARK = re.compile(r" per unit of .*$| of .*$| \([^)]*\)$| per duty$")
 _WRITTEN = (
-    (re.compile(r"°CA aTDC|°(CA|KW|CRK)\b|°(?![A-Za-z])|\bdeg(?=\b|[²³])"), "degree"),
+    (re.compile(r"°CA aTDC|°(CA|KW|CRK)(?![A-Za-z])|°(?![A-Za-z])|\bdeg(?=\b|[²³])"), "degree"),
     (re.compile(r"^duty/"), "1/"),
     (re.compile(r"/duty$"), ""),
     (re.compile(r"%"), "percent"),

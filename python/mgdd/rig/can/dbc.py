@@ -10,7 +10,7 @@ from pathlib import Path
 from typing import Any
 
 from mgdd._core.rig import SignalLayout
-from mgdd.errors import DataError, Error, did_you_mean
+from mgdd.errors import DataError, did_you_mean
 from mgdd.io.existing_file import existing_file
 from mgdd.io.extras import import_extra
 from mgdd.io.plain_text import decoded
@@ -21,7 +21,7 @@ _MISSING = ("invalid", "sna", "signal_not_available", "not_available")  # names 
 
 # What the parser would allocate or count without a bound, looked for outside of texts in quotes and comments.
 _QUOTED = re.compile(r'"(?:\\"|[^"])*?"|//[^\n]*')
-_MESSAGE = re.compile(r"(?<![A-Za-z_])BO_\s([^:;]*):\s*([^\s:]+)")
+_MESSAGE = re.compile(r"(?<![A-Za-z_])BO_\s([^:;]*):\s*([-+]?\d[^\s:]*)")
 _SIGNAL = re.compile(r"(?<![A-Za-z_])SG_\s([^:;]*):\s*([-+]?\d+)\s*\|\s*([-+]?\d+)\s*@")
 _RANGES = re.compile(r"(?<![A-Za-z_])SG_MUL_VAL_\s[^;]*")
 _RANGE = re.compile(r"(\d+)\s*-\s*(\d+)")
@@ -173,13 +173,13 @@ def _require_bounded(file: Path, text: str) -> None:
     if number := _LONG_NUMBER.search(plain) or _QUOTED_NUMBER.search(text):
         raise DataError(f"{file}: the number {number[0]} is beyond all signals: correct it")
     for name, size in _MESSAGE.findall(plain):
-        if not re.fullmatch(r"\d{1,2}", size) or int(size) > _BYTES:
+        if "SG_" not in name and (not re.fullmatch(r"\d{1,2}", size) or int(size) > _BYTES):
             raise DataError(f"{file}: message {name.strip()} has {size} bytes: a frame has 0 to {_BYTES}; correct it")
     for name, start, length in _SIGNAL.findall(plain):
         if int(length) > _BITS or int(start) >= 8 * _BYTES:
             raise DataError(
-                f"{file}: signal {name.strip()} has {length} bits from bit {start}: a signal has up to {_BITS}, a frame "
-                f"{8 * _BYTES}; correct it"
+                f"{file}: signal {name.strip()} has {length} bits from bit {start}: a signal has up to {_BITS}, "
+                f"a frame {8 * _BYTES}; correct it"
             )
     branches = 0
     for ranges in _RANGES.findall(plain):
