@@ -2,14 +2,9 @@
 
 from __future__ import annotations
 
-import json
-import struct
 import threading
 import time
-import zlib
-from collections.abc import Iterator
 from pathlib import Path
-from typing import Any
 
 import numpy as np
 import pytest
@@ -20,38 +15,7 @@ from mgdd._core.rig import RecordReader
 from mgdd.errors import DataError, ParameterError, RigError, ShapeError
 from mgdd.results.labels import check_labels
 from mgdd.rig import Frame, Recorder, read_record, repair_record
-from recorded_rig import FRAMES, write
-
-
-def independent(path: Path) -> Iterator[tuple[Any, ...]]:
-    """Read a record with the standard library alone, as docs/rig_record.md says."""
-    data = path.read_bytes()
-    magic, version, length, run_id, wall_ns, monotonic_ns = struct.unpack_from("<8sII16sqq", data)
-    assert (magic, version) == (b"\x89MREC\r\n\x1a", 1)
-    at = 48 + length + 4
-    assert zlib.crc32(data[: at - 4]) == struct.unpack_from("<I", data, at - 4)[0]
-    yield "header", run_id, wall_ns, monotonic_ns, json.loads(data[48 : 48 + length])
-    while at + 8 <= len(data):
-        length, crc = struct.unpack_from("<II", data, at)
-        body = data[at + 8 : at + 8 + length]
-        if length < 16 or len(body) < length or zlib.crc32(body) != crc:
-            break
-        at += 8 + length
-        kind, flags, small, word, stamp = struct.unpack_from("<BBHIq", body)
-        if kind == 1:
-            yield "frame", flags, small & 255, small >> 8, word, stamp, struct.unpack_from("<q", body, 16)[0], body[24:]
-        elif kind == 2:
-            names, place = [], 16
-            for _ in range(word + 1):
-                size = struct.unpack_from("<H", body, place)[0]
-                names.append(body[place + 2 : place + 2 + size].decode())
-                place += 2 + size
-            yield "columns", small, stamp, names
-        elif kind == 3:
-            yield "sample", small, stamp, struct.unpack_from(f"<{word}d", body, 16)
-        elif kind == 4:
-            yield "event", stamp, body[16 : 16 + small].decode(), body[16 + small :].decode()
-    yield "ignored", len(data) - at
+from recorded_rig import FRAMES, independent, write
 
 
 def test_a_reader_of_its_own_finds_the_same(tmp_path: Path) -> None:

@@ -22,6 +22,7 @@ __all__ = ["csv_of_map", "map_of_csv"]
 
 _FORMAT = "1"
 _HEADS = ("mgdd_map", "value", "rows", "columns", "objective", "limit", "provenance")
+_NAMED = ("limit", "provenance")  # heads that may stand in a file several times, each with another name
 _VALUE = "value"
 _END = "end"  # stands last in a file with the line mgdd_map, so that one that was cut off is known
 
@@ -56,10 +57,10 @@ def map_of_csv(text: str, origin: str, decimal: str) -> CalibrationMap:
     )
     reader = csv.reader(io.StringIO(text), delimiter=mark, strict=True)
     try:
-        lines = [(reader.line_num, _trimmed(cells)) for cells in reader]
+        lines = [(reader.line_num, [cell.strip() for cell in cells]) for cells in reader]
     except csv.Error as error:
         raise DataError(f"{origin}, line {reader.line_num}: {error}: correct the quotes and cells there") from error
-    heads, blocks = _parts([(number, cells) for number, cells in lines if cells], origin)
+    heads, blocks = _parts([(number, cells) for number, cells in lines if any(cells)], origin)
     if "mgdd_map" in heads and _END not in heads:
         raise DataError(f"{origin}: no line {_END!r} at its end: the file was cut off; write it again")
     names = [heads[head] for head in ("rows", "columns") if head in heads]
@@ -115,11 +116,11 @@ def _grid(table: CalibrationMap, column: NDArray[Any]) -> list[list[str]]:
 
 
 def _trimmed(cells: list[str]) -> list[str]:
-    """Leave out what a spreadsheet adds: blanks around cells, empty cells at the end of a row."""
-    kept = [cell.strip() for cell in cells]
-    while kept and not kept[-1]:
-        kept.pop()
-    return kept
+    """Leave out the empty cells that a spreadsheet adds at the end of a row."""
+    kept = len(cells)
+    while kept and not cells[kept - 1]:
+        kept -= 1
+    return cells[:kept]
 
 
 def _parts(
@@ -129,8 +130,8 @@ def _parts(
     heads: dict[str, Any] = {}
     blocks: dict[str, tuple[int, list[tuple[int, list[str]]]]] = {}
     known = (_VALUE, *NUMBERS, *TEXTS)
-    for number, cells in lines:
-        where = f"{origin}, line {number}"
+    for number, row in lines:
+        where, cells = f"{origin}, line {number}", _trimmed(row)
         if cells[0].startswith("#"):
             continue
         if _END in heads:
@@ -144,14 +145,19 @@ def _parts(
                 raise DataError(f"{where}: table {name!r}: must be one of {', '.join(known)}, each once")
             blocks[name] = (number, [])
         elif blocks:
-            next(reversed(blocks.values()))[1].append((number, cells))
+            next(reversed(blocks.values()))[1].append((number, row))
         elif cells[0] in (_VALUE, "rows", "columns"):
-            if cells[0] in heads or len(cells) < 3:
-                raise DataError(f"{where}: {','.join(cells)}: must be {cells[0]},NAME,UNIT,LONG NAME, once in the file")
+            if cells[0] in heads or not 3 <= len(cells) <= 4:
+                raise DataError(
+                    f"{where}: {','.join(cells)}: must be {cells[0]},NAME,UNIT,LONG NAME, once in the file; a name with "
+                    "commas stands in quotes"
+                )
             heads[cells[0]] = (*cells[1:3], cells[3] if len(cells) > 3 else spoken_name(cells[1]))
+        elif cells[0] in heads and (cells[0] not in _NAMED or cells[1:2] in ([name] for name in heads[cells[0]])):
+            raise DataError(f"{where}: {','.join(cells)}: stands in the file already: keep one of them")
         elif cells[0] == "objective" and len(cells) == 3 and cells[2] in ("highest", "lowest"):
             heads["objective"] = cells[1:]
-        elif cells[0] in ("limit", "provenance") and len(cells) == 3:
+        elif cells[0] in _NAMED and len(cells) == 3:
             heads.setdefault(cells[0], {})[cells[1]] = cells[2]
         elif cells[0] == "mgdd_map":
             if cells[1:2] != [_FORMAT]:
@@ -177,15 +183,20 @@ def _read_grid(
                 f"{origin}, line {line}: {head[0]!r}: the first row of a table has an empty cell and the entries of "
                 f"{axes[1]}"
             )
-        own[axes[1]] = np.array([_read(origin, line, cell, decimal, axes[1]) for cell in head[1:]])
+        own[axes[1]] = np.array([_read(origin, line, cell, decimal, axes[1]) for cell in _trimmed(head)[1:]])
         for pair in itertools.pairwise(own[axes[1]]):
             _require_rise(origin, line, axes[1], pair)
         width, rows = own[axes[1]].size, rows[1:]
     first, cells = [], []
     for line, row in rows:
-        if len(row) - 1 > width:
-            raise DataError(f"{origin}, line {line}: {len(row) - 1} values: {width} are needed, one per column")
-        full = [*row, *[""] * (width + 1 - len(row))]
+        found = _trimmed(row)
+        # A row without any value may end where a spreadsheet ends it; in any other a lost cell would shift the rest.
+        if len(found) - 1 > width or 1 < len(found) and len(row) - 1 < width:
+            raise DataError(
+                f"{origin}, line {line}: {len(row) - 1} values: {width} are needed, one per column; an empty cell keeps "
+                "its separator"
+            )
+        full = [*found, *[""] * (width + 1 - len(found))]
         first.append(_read(origin, line, full[0], decimal, axes[0]))
         if len(first) > 1:
             _require_rise(origin, line, axes[0], first[-2:])

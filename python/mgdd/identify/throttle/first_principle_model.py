@@ -165,9 +165,12 @@ class FirstPrincipleModel(SampledModel, ModelParameters):
         """
         file.expect(kinds=(cls.kind,), tables=("parameters", "settings", "fit?"), notes=FIT_NOTES)
         names = wanted(cls.parameter_names)
-        may_lack = {name: want._replace(required=False) for name, want in names.items() if name in REFINEMENTS}
+        # All or none: of a file that has some the others were lost.
+        older = REFINEMENTS.keys().isdisjoint(file.tables["parameters"])
+        may_lack = {name: want._replace(required=not older) for name, want in names.items() if name in REFINEMENTS}
         values = file.values("parameters", names | may_lack)
-        settings = file.values("settings", {**cls.settings, "ramp_deg": names["ramp_deg"]._replace(required=False)})
+        own = {name: want._replace(required=want.required or not older) for name, want in cls.settings.items()}
+        settings = file.values("settings", {**own, "ramp_deg": names["ramp_deg"]._replace(required=False)})
         ramp = settings.pop("ramp_deg", None)
         if ramp is not None:
             values.setdefault("ramp_deg", ramp)
