@@ -225,7 +225,7 @@ def _is_number(value: Any, *, whole: bool) -> bool:
         return False
     try:
         operator.index(value) if whole else float(value)
-    except (TypeError, ValueError):
+    except (TypeError, ValueError, OverflowError):
         return False
     return True
 
@@ -237,7 +237,7 @@ def _is_numbers(value: Any) -> bool:
         return False
     try:
         np.asarray(value, np.float64)
-    except (TypeError, ValueError):
+    except (TypeError, ValueError, OverflowError):
         return False
     return True
 

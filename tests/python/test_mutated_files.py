@@ -7,6 +7,7 @@ import io
 import re
 from collections import Counter
 from collections.abc import Callable
+from functools import partial
 from pathlib import Path
 from typing import Any
 
@@ -138,13 +139,13 @@ def require_model(written: dict[str, dict[str, tuple[str, str]]]) -> Callable[[P
         model = load_throttle_model(path)
         found = entries_in(raw)
         settings = model._options if isinstance(model, PseudoWiener) else vars(model)
-        assert found[""]["kind"][0].strip('"\'') == model.kind
+        assert found[""]["kind"][0].strip("\"'") == model.kind
         for table, own in (("parameters", model.parameters), ("settings", settings)):
             assert found[table].keys() == written[table].keys()  # none is missing without a word
             for name, (value, unit) in found[table].items():
                 assert unit == written[table][name][1], name
                 got = own[name]
-                assert (got == value.strip('"\'')) if isinstance(got, str) else got == float(value.replace("_", "")), name
+                assert got == (value.strip("\"'") if isinstance(got, str) else float(value.replace("_", ""))), name
 
     return require
 
@@ -196,16 +197,22 @@ def survey(form: str, folder: Path, count: int, first_seed: int) -> Counter[str]
     for seed in range(first_seed, first_seed + count):
         kind, raw = mutant_of_text(good.decode(), np.random.default_rng(seed))
         path.write_bytes(raw)
-        try:
-            require(path, raw)
-        except Error as error:
-            assert str(path) in str(error), (seed, kind, error)
-            seen["refused"] += 1
-        except Exception as error:
-            raise AssertionError(f"{form}, seed {seed}, {kind}: {error!r}\n{raw.decode(errors='replace')}") from error
-        else:
-            seen["the same" if raw == good else "read"] += 1
+        seen[judged(partial(require, path, raw), path, f"{form}, seed {seed}, {kind}")] += raw != good
     return seen
+
+
+def judged(require: Callable[[], object], path: Path, what: str) -> str:
+    """Say whether a file was read, as it stands, or refused by its name; anything else fails."""
+    try:
+        require()
+    except Error as error:
+        said: Exception = error
+    except Exception as error:
+        raise AssertionError(f"{what}: {error!r}\n{path.read_bytes().decode(errors='replace')}") from error
+    else:
+        return "read"
+    assert str(path) in str(said), (what, said)
+    return "refused"
 
 
 @pytest.mark.parametrize("form", GOOD)
@@ -310,16 +317,8 @@ def survey_records(folder: Path, count: int, first_seed: int) -> Counter[str]:
     for seed in range(first_seed, first_seed + count):
         kind, raw = mutant_of_bytes(good, np.random.default_rng(seed))
         path.write_bytes(raw)
-        for call in (lambda: require_record(path), lambda: require_repair(path, raw, good, whole)):
-            try:
-                call()
-            except Error as error:
-                assert str(path) in str(error), (seed, kind, error)
-                seen["refused"] += 1
-            except Exception as error:
-                raise AssertionError(f"seed {seed}, {kind}: {error!r}") from error
-            else:
-                seen["read"] += 1
+        seen[judged(partial(require_record, path), path, f"seed {seed}, {kind}")] += 1
+        seen[judged(partial(require_repair, path, raw, good, whole), path, f"repair, seed {seed}, {kind}")] += 1
     return seen
 
 

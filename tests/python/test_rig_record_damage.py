@@ -7,14 +7,16 @@ import signal
 import subprocess
 import sys
 import time
+import zlib
 from pathlib import Path
 
 import pytest
 
 from mgdd._core.rig import RecordReader
 from mgdd.errors import DataError, RigError
-from mgdd.rig import Frame, Recorder, read_record, repair_record
+from mgdd.rig import Frame, Recorder, RigRecord, export_record, read_record, repair_record
 from recorded_rig import write
+from sample_files import sample_file
 
 WRITER = """
 import sys
@@ -164,3 +166,35 @@ def test_a_record_can_be_read_while_it_is_written(tmp_path: Path) -> None:
         for i in range(3):
             record.event("note", str(i))
             assert read_record(tmp_path / "run.rec").events["text"].values.tolist() == [str(n) for n in range(i + 1)]
+
+
+def test_an_identifier_that_no_bus_has(tmp_path: Path) -> None:
+    path = tmp_path / "run.rec"
+    write(path)
+    whole = path.read_bytes()
+    at = whole.index(b"\x20\x01\0\0") - 4  # 0x120, behind the four bytes that a body begins with
+    length = int.from_bytes(whole[at - 8 : at - 4], "little")
+    body = whole[at : at + 7] + b"\xff" + whole[at + 8 : at + length]
+    path.write_bytes(whole[: at - 4] + zlib.crc32(body).to_bytes(4, "little") + body + whole[at + length :])
+    with pytest.raises(DataError, match=r"run\.rec: frame 0 has the identifier 0xff000120: it has at most 29 bits"):
+        read_record(path)
+
+
+@pytest.mark.parametrize("kind", ["csv", "netcdf", "log"])
+def test_an_export_of_what_is_left_says_what_is_missing(tmp_path: Path, kind: str) -> None:
+    path = tmp_path / "run.rec"
+    write(path)
+    with path.open("ab") as file:
+        file.write(bytes(30))
+    with pytest.warns(UserWarning, match=r"run\.rec: 30 bytes at its end are not readable and left out: mgdd"):
+        export_record(path, tmp_path / f"out.{kind}", kind=kind)
+    repair_record(path)
+    export_record(path, tmp_path / f"mended.{kind}", kind=kind)  # without a warning, which would be an error here
+
+
+def test_exchanges_that_are_lost_are_missed(tmp_path: Path) -> None:
+    path = sample_file("rig.RigRecord.read", tmp_path)
+    whole = RigRecord.read(path)
+    path.write_bytes(path.read_bytes()[:-1])
+    with pytest.warns(UserWarning, match="bytes at its end are not readable"):
+        assert len(RigRecord.read(path)) == len(whole) - 1

@@ -149,8 +149,8 @@ def _parts(
         elif cells[0] in (_VALUE, "rows", "columns"):
             if cells[0] in heads or not 3 <= len(cells) <= 4:
                 raise DataError(
-                    f"{where}: {','.join(cells)}: must be {cells[0]},NAME,UNIT,LONG NAME, once in the file; a name with "
-                    "commas stands in quotes"
+                    f"{where}: {','.join(cells)}: must be {cells[0]},NAME,UNIT,LONG NAME, once in the file; "
+                    "a name with commas stands in quotes"
                 )
             heads[cells[0]] = (*cells[1:3], cells[3] if len(cells) > 3 else spoken_name(cells[1]))
         elif cells[0] in heads and (cells[0] not in _NAMED or cells[1:2] in ([name] for name in heads[cells[0]])):
@@ -191,10 +191,10 @@ def _read_grid(
     for line, row in rows:
         found = _trimmed(row)
         # A row without any value may end where a spreadsheet ends it; in any other a lost cell would shift the rest.
-        if len(found) - 1 > width or 1 < len(found) and len(row) - 1 < width:
+        if len(found) - 1 > width or (len(found) > 1 and len(row) - 1 < width):
             raise DataError(
-                f"{origin}, line {line}: {len(row) - 1} values: {width} are needed, one per column; an empty cell keeps "
-                "its separator"
+                f"{origin}, line {line}: {len(row) - 1} values: {width} are needed, one per column; an empty cell "
+                "keeps its separator"
             )
         full = [*found, *[""] * (width + 1 - len(found))]
         first.append(_read(origin, line, full[0], decimal, axes[0]))

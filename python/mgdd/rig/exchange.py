@@ -13,7 +13,7 @@ import numpy as np
 from mgdd.errors import DataError
 from mgdd.loop import Measurement, Plant
 from mgdd.rig.base import Rig
-from mgdd.rig.recorded import read_record
+from mgdd.rig.recorded import readable_record
 
 if TYPE_CHECKING:
     from numpy.typing import ArrayLike, NDArray
@@ -163,18 +163,21 @@ class RigRecord:
         Returns
         -------
         RigRecord
-            As far as the file can be read.
+            As far as the file can be read, with a warning where it ends before.
 
         Raises
         ------
         mgdd.errors.DataError
             Not a record, or one without that table.
         """
-        samples = read_record(path).samples
+        samples = readable_record(path).samples
         if table not in samples:
             raise DataError(f"{path}: has no table {table!r}: it has {', '.join(samples) or 'none'}")
         columns = samples[table].data_vars
-        return cls.from_columns([str(name) for name in columns], np.column_stack([*columns.values()]))
+        try:
+            return cls.from_columns([str(name) for name in columns], np.column_stack([*columns.values()]))
+        except DataError as error:
+            raise error.reworded(f"{path}: table {table!r}: {error}") from error
 
 
 def flat(exchange: Exchange) -> dict[str, float]:

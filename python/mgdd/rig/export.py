@@ -20,7 +20,7 @@ from mgdd.io.extras import import_extra
 from mgdd.io.netcdf_file import write_netcdf
 from mgdd.results.labels import label_of
 from mgdd.rig.can.logs import LOG_WRITERS, write_log
-from mgdd.rig.recorded import RecordedRun, read_record, stamped_frames
+from mgdd.rig.recorded import RecordedRun, readable_record, stamped_frames
 
 if TYPE_CHECKING:
     import xarray as xr
@@ -36,7 +36,7 @@ def export_record(
     Parameters
     ----------
     source : path-like
-        File of a `Recorder`; what cannot be read of it is left out (`read_record` says how much).
+        File of a `Recorder`; what cannot be read of it is left out, with a warning.
     target : path-like
         The file; of the kinds that hold one table per file a new folder.
     kind : str, optional
@@ -84,9 +84,9 @@ def export_record(
     if chosen in _TABLE_WRITERS:
         if whole.exists():
             raise RigError(f"{whole} exists already: name a new folder")
-        return _write_beside(whole, lambda folder: _write_tables(chosen, folder, read_record(record)))
+        return _write_beside(whole, lambda folder: _write_tables(chosen, folder, readable_record(record)))
     if chosen == "mf4":
-        return _write_beside(whole, lambda file: _write_mf4(file, read_record(record)))
+        return _write_beside(whole, lambda file: _write_mf4(file, readable_record(record)))
     return _write_beside(whole, lambda file: write_log(chosen, file, stamped_frames(record)))
 
 

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import datetime as dt
 import os
+import warnings
 from collections.abc import Iterator, Mapping
 from dataclasses import dataclass
 from pathlib import Path
@@ -22,8 +23,9 @@ if TYPE_CHECKING:
     import xarray as xr
     from numpy.typing import NDArray
 
-__all__ = ["RecordedRun", "read_record", "repair_record", "stamped_frames"]
+__all__ = ["RecordedRun", "read_record", "readable_record", "repair_record", "stamped_frames"]
 
+_LAST_ID = 0x1FFF_FFFF
 _FLAGS = {
     "extended": "29-bit identifier",
     "error": "news of a bus error",
@@ -130,7 +132,7 @@ def read_record(path: str | os.PathLike[str]) -> RecordedRun:
         started=dt.datetime.fromtimestamp(header["wall_ns"] * 1e-9, dt.UTC),
         config=header.get("config", {}),
         header=header,
-        frames=_frame_dataset(read["frames"], start),
+        frames=_frame_dataset(read["frames"], start, os.fspath(path)),
         samples=samples,
         events=_event_dataset(read["events"], start),
         records=read["records"],
@@ -185,13 +187,30 @@ def repair_record(path: str | os.PathLike[str], target: str | os.PathLike[str] |
     return dict(core.repair_record(os.fspath(source), os.fspath(source if target is None else target)))
 
 
+def readable_record(path: str | os.PathLike[str]) -> RecordedRun:
+    """Read a record for a caller who does not look at its counts, and warn of what cannot be read."""
+    run = read_record(path)
+    _warn_of_rest(path, run.ignored_bytes)
+    return run
+
+
+def _warn_of_rest(path: str | os.PathLike[str], ignored_bytes: int) -> None:
+    if ignored_bytes:
+        said = "are not readable and left out: mgdd.rig.repair_record looks behind them"
+        warnings.warn(f"{os.fspath(path)}: {ignored_bytes} bytes at its end {said}", UserWarning, stacklevel=3)
+
+
 def stamped_frames(path: Path) -> Iterator[tuple[float, core.Frame]]:
-    """Yield the frames of a record with their wall-clock time [s since 1970]: the start's, gone on by the monotonic."""
+    """Yield the frames of a record with their wall-clock time [s since 1970]: the start's, gone on by the monotonic.
+
+    Warns at the end of what cannot be read.
+    """
     reader = core.RecordReader(os.fspath(path))
     shift = reader.header["wall_ns"] - reader.header["monotonic_ns"]
     for record in reader:
         if isinstance(record, core.Frame):
             yield (record.monotonic_ns + shift) * 1e-9, record
+    _warn_of_rest(path, reader.ignored_bytes)
 
 
 def _header(raw: Mapping[str, Any]) -> dict[str, Any]:
@@ -227,8 +246,12 @@ def _table_dataset(table: Mapping[str, Any], start: int) -> xr.Dataset:
     return labelled_dataset(variables)
 
 
-def _frame_dataset(frames: Mapping[str, Any], start: int) -> xr.Dataset:
+def _frame_dataset(frames: Mapping[str, Any], start: int, origin: str) -> xr.Dataset:
     bus = frames["bus_ns"]
+    beyond = np.flatnonzero(frames["id"] > _LAST_ID)
+    if beyond.size:
+        at = int(beyond[0])
+        raise DataError(f"{origin}: frame {at} has the identifier {int(frames['id'][at]):#x}: it has at most 29 bits")
     given = bus != 0
     first = int(bus[given][0]) if given.any() else 0
     variables: dict[str, Any] = {

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
@@ -19,13 +19,14 @@ if TYPE_CHECKING:
 
     from mgdd.surrogate.surrogate import EngineSurrogate
 
-__all__ = ["array_of", "numbers_entry", "read_surrogate", "surrogate_file"]
+__all__ = ["array_of", "labels_of", "numbers_entry", "read_surrogate", "surrogate_file", "whole_of"]
 
 _LABELS = ("name", "units", "long_name")
 _SIGNAL = "signal_"
 _OWN = ("r2", "r2_held_out", "residual_sd", "cyclic_sd")
 _SENSOR = ("tau_cycles", "tau_stderr_cycles", "total_cycles", "total_stderr_cycles")
 _PER_INPUT = "unit of the input"
+_LARGEST_COUNT = 1_000_000
 
 
 def surrogate_file(surrogate: EngineSurrogate) -> ParameterFile:
@@ -62,7 +63,7 @@ def read_surrogate(file: ParameterFile) -> dict[str, Any]:
     records = file.values(
         "records", {"nonnegative": Wanted(form="texts"), "residuals": Wanted("unit of the signal", "numbers")}
     )
-    labels = {name: Label(*label) for name, *label in zip(*(signals[part] for part in _LABELS), strict=True)}
+    labels = labels_of(file, "signals", signals)
     if [_SIGNAL + name for name in labels] != per_signal:
         raise DataError(f"{file.origin}: [signals] names {', '.join(labels)}: each needs its table [signal_...]")
     n, terms = len(inputs["name"]), (len(inputs["name"]) + 1) * (len(inputs["name"]) + 2) // 2
@@ -84,7 +85,7 @@ def read_surrogate(file: ParameterFile) -> dict[str, Any]:
                 inputs["name"], array_of(file, "[inputs] median", inputs["median"], (n,)), strict=True
             )
         },
-        input_labels={name: Label(*label) for name, *label in zip(*(inputs[part] for part in _LABELS), strict=True)},
+        input_labels=labels_of(file, "inputs", inputs),
         nonnegative=tuple(records["nonnegative"]),
         residuals=array_of(file, "[records] residuals", records["residuals"], (len(records["residuals"]), len(labels))),
         source={
@@ -137,12 +138,11 @@ def _signal_of(file: ParameterFile, name: str, label: Label, terms: int) -> Sign
     values = file.values(table, expected | (slow if has_sensor else {}))
     sensor = None
     if has_sensor:
-        shares = zip(values.pop("delays"), values.pop("delay_share"), strict=True)
         sensor = SensorLag(
-            delay_share={int(delay): float(share) for delay, share in shares},
+            delay_share=_scores(file, table, values, "delays", "delay_share"),
             **{own: values.pop(own) for own in (*_SENSOR, "delay_cycles", "at_bound")},
         )
-    scores = dict(zip(map(int, values.pop("lags")), map(float, values.pop("lag_scores")), strict=True))
+    scores = _scores(file, table, values, "lags", "lag_scores")
     coefficients = array_of(file, f"[{table}] coefficients", values.pop("coefficients"), (terms,))
     return SignalModel(name=name, label=label, coefficients=coefficients, lag_scores=scores, sensor=sensor, **values)
 
@@ -164,15 +164,37 @@ def numbers_entry(values: Any, unit: str = "-") -> Entry:
     return Entry(value=np.asarray(values, dtype=np.float64).tolist(), unit=unit)
 
 
-def array_of(file: ParameterFile, what: str, values: Any, shape: tuple[int, ...]) -> NDArray[np.float64]:
+def array_of(file: ParameterFile, what: str, values: Any, shape: tuple[int, ...] | None = None) -> NDArray[np.float64]:
     """Return what a file holds as an array, and refuse another shape."""
     try:
         array = np.array(values, dtype=np.float64)
     except ValueError as error:
         raise DataError(f"{file.origin}: {what}: rows of different length") from error
-    if array.shape != shape:
+    if shape is not None and array.shape != shape:
         raise DataError(f"{file.origin}: {what}: has shape {array.shape}: must be {shape}")
     return array
+
+
+def whole_of(file: ParameterFile, what: str, values: Any) -> NDArray[np.intp]:
+    """Return numbers that a file counts with, and refuse fractions."""
+    array = array_of(file, what, values)
+    if not (np.abs(array) < _LARGEST_COUNT).all() or (array != np.rint(array)).any():
+        raise DataError(f"{file.origin}: {what}: must be whole numbers below {_LARGEST_COUNT}")
+    return array.astype(np.intp)
+
+
+def labels_of(file: ParameterFile, table: str, columns: Mapping[str, Any]) -> dict[str, Label]:
+    """Return the labels of a table of names, units and long names."""
+    if len({len(columns[part]) for part in _LABELS}) > 1:
+        raise DataError(f"{file.origin}: [{table}]: {', '.join(_LABELS)} must be equally long")
+    return {name: Label(*label) for name, *label in zip(*(columns[part] for part in _LABELS), strict=True)}
+
+
+def _scores(file: ParameterFile, table: str, values: dict[str, Any], keys: str, own: str) -> dict[int, float]:
+    """Take counts of cycles and what belongs to each."""
+    counts = whole_of(file, f"[{table}] {keys}", values.pop(keys))
+    numbers = array_of(file, f"[{table}] {own}", values.pop(own), counts.shape)
+    return dict(zip(counts.tolist(), numbers.tolist(), strict=True))
 
 
 def _said(value: object) -> Any:

@@ -9,7 +9,7 @@ import numpy as np
 from mgdd.errors import DataError
 from mgdd.io.parameters import Entry, ParameterFile, Wanted, wanted
 from mgdd.results.labels import Label
-from mgdd.surrogate.file import array_of, numbers_entry
+from mgdd.surrogate.file import array_of, labels_of, numbers_entry, whole_of
 from mgdd.surrogate.polynomial import PolynomialSurface
 from mgdd.surrogate.process import ProcessSurface
 from mgdd.surrogate.response_surface import PolynomialBasis, Support
@@ -68,7 +68,7 @@ def read_response(file: ParameterFile) -> dict[str, Any]:
     file.expect(kinds=("response",), tables=("factors", "response", "points", "values", *kinds))
     factors = file.values("factors", wanted(_LABELS, form="texts"))
     response = file.values("response", wanted(_LABELS, form="text"))
-    labels = {name: Label(*label) for name, *label in zip(*(factors[part] for part in _LABELS), strict=True)}
+    labels = labels_of(file, "factors", factors)
     label = Label(response["units"], response["long_name"])
     columns = file.values("points", {name: Wanted(each.units, "numbers") for name, each in labels.items()})
     measured = file.values("values", {response["name"]: Wanted(label.units, "numbers")})
@@ -98,7 +98,7 @@ def _polynomial(
         },
     )
     m, p = len(names), len(given["coefficients"])
-    monomials = np.array(given["monomials"], dtype=np.intp)
+    monomials = whole_of(file, "[polynomial] monomials", given["monomials"])
     if monomials.ndim != 2 or len(monomials) != p or monomials.min() < 0 or monomials.max() > m:
         raise DataError(
             f"{file.origin}: [polynomial] monomials: must be {p} rows of factors, numbered 1 to {m}, 0 for none"

@@ -165,8 +165,8 @@ class FirstPrincipleModel(SampledModel, ModelParameters):
         """
         file.expect(kinds=(cls.kind,), tables=("parameters", "settings", "fit?"), notes=FIT_NOTES)
         names = wanted(cls.parameter_names)
-        # All or none: of a file that has some the others were lost.
-        older = REFINEMENTS.keys().isdisjoint(file.tables["parameters"])
+        # A file with some of them and the ramp among them is not an older one: what it lacks was lost.
+        older = REFINEMENTS.keys().isdisjoint(file.tables["parameters"]) or "ramp_deg" in file.tables["settings"]
         may_lack = {name: want._replace(required=not older) for name, want in names.items() if name in REFINEMENTS}
         values = file.values("parameters", names | may_lack)
         own = {name: want._replace(required=want.required or not older) for name, want in cls.settings.items()}

@@ -16,7 +16,7 @@ from mgdd.rig.experiment.core_samples import LOOP_TABLE, task_columns
 from mgdd.rig.experiment.outcome import Outcome
 from mgdd.rig.experiment.run_record import RunRecord
 from mgdd.rig.experiment.throttle_tasks import TrackPlan
-from mgdd.rig.recorded import read_record
+from mgdd.rig.recorded import readable_record
 from mgdd.rig.safety import SafetyGate
 
 __all__ = ["loop_rows", "replayed"]
@@ -27,7 +27,7 @@ _NOTHING = math.nan
 
 def loop_rows(record: Path) -> list[dict[str, float]]:
     """Give the rows of the loop in a record; none for the record of another loop."""
-    table = read_record(record).samples.get(LOOP_TABLE)
+    table = readable_record(record).samples.get(LOOP_TABLE)
     if table is None:
         return []
     names = [str(name) for name in table.data_vars]
