@@ -66,7 +66,7 @@ def read_netcdf(path: str | os.PathLike[str]) -> xr.Dataset:
         raise DataError(f"{file}: not a netCDF file: it begins with {content[:8]!r}; a text table ends in .csv")
     try:
         return xr.load_dataset(io.BytesIO(content), engine="scipy")
-    except (ValueError, TypeError, IndexError, KeyError) as error:  # what scipy makes of missing bytes
+    except (ValueError, TypeError, LookupError) as error:  # what scipy makes of missing bytes
         raise DataError(f"{file}: cannot be read ({error}): the file was cut off or damaged; write it again") from error
 
 

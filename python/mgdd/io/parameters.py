@@ -12,7 +12,7 @@ from typing import TYPE_CHECKING, Any, Self
 
 import numpy as np
 
-from mgdd.errors import DataError, ParameterError, did_you_mean
+from mgdd.errors import DataError, Error, ParameterError, did_you_mean
 from mgdd.io.parameter_entries import FORMS, PARTS, Entry, Wanted, entries, entry_of, fits, key_line, quoted, wanted
 from mgdd.io.toml_text import text_of, toml_of
 
@@ -269,7 +269,7 @@ class Parameters:
         """Make the object of a file that was read; every refusal names the file."""
         try:
             return cls.from_parameters(file)
-        except ParameterError as error:
+        except Error as error:
             if str(error).startswith(f"{file.origin}: "):
                 raise
             raise error.reworded(f"{file.origin}: {error}") from error

@@ -45,7 +45,7 @@ class TextTable:
     @cached_property
     def width(self) -> int:
         """Return the number of columns, which every row has."""
-        return len(_cells(self.texts[0], self.mark))
+        return len(_cells(self.texts[0], self.mark)) if self.texts else len(self.header or ())
 
     def index(self, column: int | str) -> int:
         """Return the position of a column given by position (from 0) or header name."""

@@ -209,7 +209,8 @@ def _from_csv(path: Path) -> Reference:
     from mgdd.signals.even_grid import even_step
 
     table = read_table(path, units_row=False)
-    time_s, angle_deg = (table.numbers(table.index(name)) for name in ("time_s", "reference_deg"))
-    if len(time_s) < 2:
-        raise DataError(f"{path}: has {len(time_s)} samples: must have at least 2")
+    places = [table.index(name) for name in ("time_s", "reference_deg")]
+    if len(table.lines) < 2:
+        raise DataError(f"{path}: has {len(table.lines)} samples: must have at least 2")
+    time_s, angle_deg = table.matrix(places)
     return Reference(angle_deg=angle_deg, sample_s=even_step(time_s), name=path.stem)

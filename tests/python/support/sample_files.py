@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import shutil
 from collections.abc import Callable
 from functools import cache
 from pathlib import Path
@@ -138,7 +139,8 @@ def _of_toml(cls: Any, make: Callable[[], str]) -> Sample:
 
 
 def _export(path: Path) -> Any:
-    return export_record(path, path.with_name("out.csv"), kind="csv")
+    shutil.rmtree(path.with_name("out"), ignore_errors=True)
+    return export_record(path, path.with_name("out"), kind="csv")
 
 
 SAMPLES: dict[str, Sample] = {
@@ -180,6 +182,10 @@ SAMPLES: dict[str, Sample] = {
     "throttle.PseudoWiener": _of_toml(PseudoWiener, lambda: PseudoWiener("pw_r").to_toml()),
     "throttle.SensorPair": _of_toml(SensorPair, lambda: SensorPair().to_toml()),
 }
+
+
+# Whose good file takes seconds to make.
+SLOW = ("surrogate.EngineSurrogate",)
 
 
 def sample_file(name: str, folder: Path) -> Path:

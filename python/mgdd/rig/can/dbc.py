@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import hashlib
 import re
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any
@@ -150,6 +150,7 @@ class DbcFile:
         try:
             database = cantools.database.load_string(text, database_format="dbc", strict=True)
             messages = {message.name: _message(file, message) for message in database.messages}
+            _require_once(file, database.messages)
         except DataError:
             raise
         except cantools.Error as error:
@@ -186,6 +187,19 @@ def _require_bounded(file: Path, text: str) -> None:
         branches += sum(max(0, int(last) - int(first) + 1) for first, last in _RANGE.findall(ranges))
     if branches > _BRANCHES:
         raise DataError(f"{file}: SG_MUL_VAL_ names {branches} values: at most {_BRANCHES} are read; narrow the ranges")
+
+
+def _require_once(file: Path, messages: Sequence[Any]) -> None:
+    """Refuse two messages of one name or identifier: which of them is meant, nobody knows."""
+    taken: dict[Any, str] = {}
+    for message in messages:
+        for key in (message.name, (message.frame_id, message.is_extended_frame)):
+            if key in taken:
+                raise DataError(
+                    f"{file}: message {message.name} has the name or identifier {message.frame_id:#x} of "
+                    f"{taken[key]}: remove one"
+                )
+            taken[key] = message.name
 
 
 def near(name: str, known: Mapping[str, Any]) -> str:
