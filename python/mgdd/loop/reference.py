@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from mgdd.errors import DataError, ParameterError, ShapeError
+from mgdd.errors import DataError, Error, ParameterError, ShapeError
 from mgdd.io.existing_file import existing_file
 from mgdd.io.table import read_table
 from mgdd.results.describe import described
@@ -213,4 +213,7 @@ def _from_csv(path: Path) -> Reference:
     if len(table.lines) < 2:
         raise DataError(f"{path}: has {len(table.lines)} samples: must have at least 2")
     time_s, angle_deg = table.matrix(places)
-    return Reference(angle_deg=angle_deg, sample_s=even_step(time_s), name=path.stem)
+    try:
+        return Reference(angle_deg=angle_deg, sample_s=even_step(time_s), name=path.stem)
+    except Error as error:
+        raise error.reworded(f"{path}: {error}") from error
