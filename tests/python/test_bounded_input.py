@@ -14,11 +14,12 @@ from typing import Any
 import pytest
 
 import mgdd
+from mgdd import presets
 from mgdd.errors import DataError, Error, ParameterError, did_you_mean, shortened
 from mgdd.io.nesting import parsed
 from mgdd.io.plain_text import decoded
 from mgdd.results.units import attribute_units
-from mgdd.rig import SignalMap
+from mgdd.rig import SafetyEnvelope, SignalMap
 from mgdd.rig.can.dbc import DbcFile
 from sample_files import SAMPLES, SLOW, sample_file
 
@@ -114,6 +115,14 @@ def test_paths_that_lead_to_no_file(name: str, tmp_path: Path) -> None:
         assert re.search(r"folder|looked up|CSV file that exists", refused(read, path)), path.name[:20]
     with pytest.raises((FileNotFoundError, ParameterError), match=r"no such file|exists|no preset file"):
         read(tmp_path / f"none.{ending}")
+
+
+@pytest.mark.parametrize("read", [presets.load, SafetyEnvelope.load, SignalMap.load])
+@pytest.mark.parametrize("name", ["n" * 300, "n\0", LETTERS])
+def test_shipped_names_of_any_length(read: Callable[[str], Any], name: str) -> None:
+    with pytest.raises((Error, FileNotFoundError), match=r"shipped|looked up") as caught:
+        read(name)
+    assert len(str(caught.value)) < MESSAGE
 
 
 HOSTILE = {

@@ -130,7 +130,7 @@ def entries_in(raw: bytes) -> dict[str, dict[str, tuple[str, str]]]:
             tables[found[1]] = {}
         elif found := re.match(r'\s*"?(\w+)"?\s*=\s*(.*)', line):
             inner = dict(re.findall(r'(\w+)\s*=\s*("[^"]*"|[^,}]*[^,}\s])', found[2]))
-            [*tables.values()][-1][found[1]] = (inner.get("value", found[2]), inner.get("unit", ""))
+            [*tables.values()][-1][found[1]] = (inner.get("value", found[2].strip()), inner.get("unit", ""))
     return tables
 
 

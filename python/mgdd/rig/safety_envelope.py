@@ -53,12 +53,12 @@ class SafetyEnvelope(Parameters, _core.rig.SafetyEnvelope):  # noqa: D101 the co
         if "." in text or os.sep in text:
             return cls.of_file(ParameterFile.read(text))
         folder = resources.files("mgdd.rig").joinpath("envelopes")
-        file = folder.joinpath(f"{text}.toml")
-        if not file.is_file():
-            shipped = sorted(entry.name.removesuffix(".toml") for entry in folder.iterdir())
+        shipped = sorted(entry.name.removesuffix(".toml") for entry in folder.iterdir())
+        if text not in shipped:
             hint = did_you_mean(text, shipped) or f"shipped are {', '.join(shipped)}"
             raise DataError(f"no shipped envelope {text!r}: {hint}; the path of a file ends in .toml")
-        return cls.from_toml(file.read_text(encoding="utf-8"), origin=f"envelope {text!r}")
+        shipped_text = folder.joinpath(f"{text}.toml").read_text(encoding="utf-8")
+        return cls.from_toml(shipped_text, origin=f"envelope {text!r}")
 
     def to_parameters(self) -> ParameterFile:
         """Give all fields, as `to_toml` writes them."""

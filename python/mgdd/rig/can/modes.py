@@ -5,9 +5,9 @@ from __future__ import annotations
 import os
 import sys
 from enum import StrEnum
-from pathlib import Path
 
 from mgdd.errors import ParameterError, RigError, argument
+from mgdd.io.plain_text import read_plain_text
 from mgdd.loop import Plant
 from mgdd.rig.can.frame import Bus
 from mgdd.rig.can.local_bus import LocalBus
@@ -73,11 +73,14 @@ def require_key(
         raise RigError(f"mode = {mode.value!r} {why}: give {how}")
     line = key_line(signal_map)
     if key_file is not None:
-        file = Path(key_file)
-        if not file.is_file():
-            raise RigError(f"{file}: no such key file: write the line {line!r} into it when the bench is safe")
-        if line not in file.read_text(encoding="utf-8").splitlines():
-            raise RigError(f"{file}: holds no key of this DBC: it must have the line {line!r}")
+        try:
+            said = read_plain_text(key_file).splitlines()
+        except FileNotFoundError as error:
+            raise RigError(
+                f"{key_file}: no such key file: write the line {line!r} into it when the bench is safe"
+            ) from error
+        if line not in said:
+            raise RigError(f"{key_file}: holds no key of this DBC: it must have the line {line!r}")
         return
     if not sys.stdin.isatty():
         raise RigError(f"mode = {mode.value!r} without a terminal to confirm in: give a {argument('key_file')}")

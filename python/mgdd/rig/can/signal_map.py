@@ -96,10 +96,13 @@ class SignalMap:
         """
         named = str(path)
         file = _BUSES / f"{named}.toml" if named in SHIPPED else Path(path)
-        if not file.suffix and not file.exists():
+        try:
+            table = TomlTable.read(file)
+        except FileNotFoundError as error:
+            if file.suffix:
+                raise
             known = f"no such file: shipped maps are {', '.join(SHIPPED)}; the path of a file ends in .toml"
-            raise FileNotFoundError(errno.ENOENT, known, named)
-        table = TomlTable.read(file)
+            raise FileNotFoundError(errno.ENOENT, known, named) from error
         table.only(_KEYS)
         kind, version = table.take("kind", "text"), table.take("format", "integer")
         if kind != "signal_map":
