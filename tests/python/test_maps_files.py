@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+import re
 import subprocess
 import sys
 from collections.abc import Callable
@@ -249,6 +250,12 @@ DAMAGE = [
     ("csv", lambda text: text[: text.index("table,source")] + "end", "the value is nan and its source 'given'"),
     ("csv", edited("mgdd_map,1", "mgdd_map,2"), "reads format 1"),
     ("csv", lambda _: "", "no line 'value'"),
+    ("csv", lambda text: re.sub(r"(table,sd\n.*\n900.0),[^,]*", r"\1", text), "4 values: 5 are needed, one per column"),
+    ("csv", edited("provenance,date", "provenance,from"), "provenance,from,2024-05-17: stands in the file already"),
+    ("csv", edited("mgdd_map,1\n", "mgdd_map,1\nmgdd_map,1\n"), "line 2: mgdd_map,1: stands in the file already"),
+    ("csv", edited("columns,fuel_mg,mg,", "columns,fuel_mg,mg,fuel,"), "a name with commas stands in quotes"),
+    ("csv", edited("value,soc_cad,", 'value,soc_cad,"'), "correct the quotes and cells there"),
+    ("json", edited('"format": 1,', '"format": 1, "name": "soc_cad",'), "the key 'name' stands twice"),
     ("json", lambda text: text[:200], "not valid JSON"),
     ("json", edited('"kind": "calibration_map"', '"kind": "spsa"'), "kind must be 'calibration_map'"),
     ("json", edited('"format": 1', '"format": 7'), "format = 7"),

@@ -126,6 +126,10 @@ def test_a_first_principle_file_without_the_later_groups_is_read_as_it_was_meant
     read = FirstPrincipleModel.from_toml(old)
     assert read == model
     assert [read.parameters[name] for name in ("stribeck_drop", "delay_samples", "presliding_deg")] == [0.0, 0.0, 0.0]
+    for lost in ("stribeck_drop", "delay_samples", "sample_s"):
+        rest = "\n".join(line for line in model.to_toml().splitlines() if not line.startswith(lost))
+        with pytest.raises(DataError, match=rf"lacks {lost}: write {lost} = "):
+            FirstPrincipleModel.from_toml(rest)
     with pytest.raises(DataError, match="tau_s"):
         FirstPrincipleModel.from_toml("\n".join(line for line in lines if not line.startswith("tau_s")))
 
