@@ -4,10 +4,13 @@ from __future__ import annotations
 
 import re
 from collections.abc import Callable
+from pathlib import Path
 
 import numpy as np
 
-__all__ = ["mutant_of_bytes", "mutant_of_text"]
+from mgdd.errors import Error
+
+__all__ = ["judged", "mutant_of_bytes", "mutant_of_text"]
 
 _UNITS = ("bar", "kPa", "deg", "rad", "°CA", "mg", "g", "s", "ms", "1/s", "%", "-", "N m/rad", "rpm", "kg")
 _LETTERS = '0123456789-+.eE,;\t"# =[]{}abnif\n'
@@ -136,3 +139,17 @@ def mutant_of_bytes(raw: bytes, rng: np.random.Generator) -> tuple[str, bytes]:
         raw = raw[:at] + moved + raw[at:]
         kinds.append(kind)
     return ", ".join(kinds), raw
+
+
+def judged(require: Callable[[], object], path: Path, what: str) -> str:
+    """Say whether a file was read, as it stands, or refused by its name; anything else fails."""
+    try:
+        require()
+    except (Error, FileNotFoundError) as error:  # not found: what a mutant names
+        said: Exception = error
+    except Exception as error:
+        raise AssertionError(f"{what}: {error!r}") from error
+    else:
+        return "read"
+    assert str(path) in str(said), (what, said)
+    return "refused"
